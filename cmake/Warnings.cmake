@@ -1,0 +1,23 @@
+# Strict warnings for the project's own code; `tensorray_library(NAME ...)` makes one static library of a folder.
+
+add_library(tensorray_options INTERFACE)
+target_compile_options(tensorray_options INTERFACE -Wall -Wextra -Wpedantic -Wshadow -Wnon-virtual-dtor
+                       -Woverloaded-virtual -Wcast-align -Wunused -Wnull-dereference)
+if(TENSORRAY_WERROR)
+  target_compile_options(tensorray_options INTERFACE -Werror)
+endif()
+if(CMAKE_CXX_COMPILER_ID STREQUAL "GNU")
+  # False positives inside inlined Eigen and standard library code at -O3.
+  target_compile_options(tensorray_options INTERFACE -Wno-maybe-uninitialized -Wno-null-dereference
+                         -Wno-array-bounds -Wno-stringop-overflow)
+endif()
+if(TENSORRAY_SANITIZE)
+  target_compile_options(tensorray_options INTERFACE -fsanitize=address,undefined -fno-omit-frame-pointer
+                         -fno-sanitize-recover=undefined)
+  target_link_options(tensorray_options INTERFACE -fsanitize=address,undefined)
+endif()
+
+function(tensorray_library name)
+  add_library(${name} STATIC ${ARGN})
+  target_link_libraries(${name} PUBLIC Eigen3::Eigen PRIVATE tensorray_options)
+endfunction()
