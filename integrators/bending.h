@@ -1,0 +1,76 @@
+#pragma once
+/// @file integrators/bending.h
+/// Bends light through a tensor field. Only bending.cpp knows the rule
+/// (Zheng and Pang 2003, Eq. 5):  P' = V,  V' = s (T V − (VᵀTV) V),  |V| = 1.
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include <Eigen/Core>
+
+#include "renderer/geometry.h"
+#include "volumes/tensor_field.h"
+
+namespace tensorray {
+
+enum class BendingMethod {
+  euler,      ///< The paper's Eq. 3–4: D ← normalize(D + s h T(P) D), P ← P + h D. Order 1.
+  splitting,  ///< Drift h/2, kick D ← normalize(exp(h s T(P)) D), drift h/2. Order 2; exact in V for constant T;
+              ///< stable.
+  rk4,        ///< Classical Runge–Kutta. Order 4.
+  bs23,       ///< Bogacki–Shampine, adaptive. Order 3.
+  dopri5,     ///< Dormand–Prince, adaptive. Order 5: the reference on smooth fields.
+};
+
+struct BendingSettings {
+  BendingMethod method = BendingMethod::splitting;
+
+  /// Arc length per step, in voxels (TensorField::voxel_size); 0: automatic, which is ½ voxel, and shorter where the
+  /// field is strong: s h ‖T − ⅓ tr(T) I‖ (Frobenius) ≤ 0.2 with T as last sampled (Eq. 9, read dimensionally).
+  /// For the adaptive methods the first and (for automatic: twice it, at most 2 voxels) the longest step.
+  double step = 0;
+  double tolerance = 1e-3;  ///< Adaptive methods: error per step, in voxels and in radians; > 0.
+  int max_steps = 20000;    ///< Steps before a ray is given up; > 0.
+};
+
+/// Why a ray ended. Never ignored: the counts are part of every render's statistics.
+enum class RayEnd : std::uint8_t {
+  plate,       ///< On the receiver.
+  missed,      ///< Left the scene.
+  obstacle,    ///< On an obstacle.
+  step_limit,  ///< Took BendingSettings::max_steps steps.
+  degenerate,  ///< Its direction could not be followed: s·T is not finite, or annihilates it.
+};
+constexpr int ray_end_count = 5;
+const char* to_string(RayEnd end);
+
+/// Rays, one an entry of every vector. Rays of one origin (the wavelengths of a photon) stand next to each other.
+struct RayBatch {
+  std::vector<Eigen::Vector3d> position;   ///< World.
+  std::vector<Eigen::Vector3d> direction;  ///< Unit.
+  std::vector<double> flexibility;         ///< s; any sign.
+
+  // Set by `trace`.
+  std::vector<RayEnd> end;
+  std::vector<std::uint32_t> steps;  ///< Steps in the field.
+  std::uint64_t tensor_samples = 0;  ///< Added to.
+
+  std::size_t size() const { return position.size(); }
+  void clear();
+  void add(const Eigen::Vector3d& position, const Eigen::Vector3d& direction, double flexibility);
+};
+
+/// Follows every ray of `batch` to its end, in place: position and direction are then those of the end. A ray that
+/// missed is left where it last crossed the bounds (or where it began).
+/// @param field     World frame; s·T in 1/length. Light goes straight outside its extent and outside the cut.
+/// @param geometry  Bounds (those of the field), cut, plate and obstacles.
+/// Accuracy: the method's order on smooth fields, 2 on trilinear data. Entry, exit and hits are located by repeating
+/// the step with the length that ends on the surface, which keeps the order.
+/// Threads: `field` and `geometry` are shared and immutable; one batch belongs to one thread.
+/// @throw std::invalid_argument if a setting is out of range.
+void trace(const TensorField& field, const Geometry& geometry, const BendingSettings& settings, RayBatch& batch);
+
+}  // namespace tensorray

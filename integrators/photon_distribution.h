@@ -1,0 +1,56 @@
+#pragma once
+/// @file integrators/photon_distribution.h
+/// The light that a field throws on a plate (Zheng and Pang 2003, section on photon distribution).
+
+#include <array>
+#include <cstdint>
+#include <vector>
+
+#include "integrators/bending.h"
+#include "integrators/progress.h"
+#include "renderer/beam.h"
+#include "renderer/density.h"
+#include "renderer/photon_map.h"
+
+namespace tensorray {
+
+/// A channel of light: a wavelength band, or a colour in RGB mode.
+struct LightChannel {
+  double flexibility = 0;
+  double wavelength = 0;  ///< nm; 0 in RGB mode.
+  double power = 1;       ///< Fraction of the beam's power.
+};
+
+struct PhotonSettings {
+  std::uint64_t photons = 1u << 20;  ///< About how many positions emit; > 0.
+  BeamPattern pattern = BeamPattern::stratified;
+  int channels_per_photon =
+      0;  ///< How many channels each position carries, stratified; a divisor of their number; 0: all.
+  std::uint64_t seed = 0;
+  DensitySettings density;
+  bool keep_photons = false;  ///< Whether to return the photon map: 44 bytes a photon and channel.
+};
+
+/// How the rays of one channel ended.
+using EndCounts = std::array<std::uint64_t, ray_end_count>;
+
+struct PhotonDistribution {
+  Film irradiance;    ///< A channel each; 1 is the undisturbed beam's irradiance in that channel.
+  PhotonMap photons;  ///< Empty unless asked for; ordered by emission, then channel.
+
+  std::uint64_t positions = 0;  ///< That emitted.
+  std::vector<EndCounts> ends;  ///< A channel each. Every ray of a channel has the same power, so that emitted =
+                                ///< deposited + missed + stopped holds exactly.
+  double ray_area = 0;          ///< Cross section of the beam that one ray stands for, world units².
+  std::uint64_t ray_steps = 0, tensor_samples = 0;
+  double seconds_tracing = 0, seconds_density = 0;
+};
+
+/// Emits parallel light, bends it through the field and estimates its density on the plate of `geometry`.
+/// The result is the same for any number of threads.
+/// @throw std::invalid_argument if a setting is out of range or `geometry` has no plate; Cancelled.
+PhotonDistribution distribute_photons(const TensorField& field, const Geometry& geometry, const Beam& beam,
+                                      const std::vector<LightChannel>& channels, const BendingSettings& bending,
+                                      const PhotonSettings& settings, const Progress& progress);
+
+}  // namespace tensorray
