@@ -1,0 +1,210 @@
+#include "renderer/image.h"
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <cstdint>
+#include <limits>
+#include <stdexcept>
+#include <thread>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "tests/renderer/support.h"
+
+namespace tensorray {
+namespace {
+
+using ::testing::HasSubstr;
+using ::testing::Not;
+
+/// A picture whose values are all different and within [0, 1], and compress badly.
+Image noise(int width, int height, std::vector<std::string> channels) {
+  Image image(width, height, std::move(channels));
+  std::uint32_t state = 1;
+  for (float& value : image.pixels)
+    value = static_cast<float>((state = state * 1664525u + 1013904223u) >> 8) * 0x1p-24f;
+  return image;
+}
+
+/// Smooth enough for JPEG.
+Image gradient() {
+  Image image(64, 48, {"R", "G", "B"});
+  for (int y = 0; y < 48; ++y)
+    for (int x = 0; x < 64; ++x) {
+      image.pixel(x, y)[0] = static_cast<float>(x) / 63;
+      image.pixel(x, y)[1] = static_cast<float>(y) / 47;
+      image.pixel(x, y)[2] = 0.25f;
+    }
+  return image;
+}
+
+double largest_difference(const Image& a, const Image& b) {
+  EXPECT_EQ(a.width, b.width);
+  EXPECT_EQ(a.height, b.height);
+  EXPECT_EQ(a.pixels.size(), b.pixels.size());
+  double largest = 0;
+  for (std::size_t i = 0; i < std::min(a.pixels.size(), b.pixels.size()); ++i)
+    largest = std::max(largest, std::abs(static_cast<double>(a.pixels[i]) - b.pixels[i]));
+  return largest;
+}
+
+class EveryEnding : public ::testing::TestWithParam<std::string> {};
+INSTANTIATE_TEST_SUITE_P(ImageTest, EveryEnding, ::testing::ValuesIn(image_endings()),
+                         [](const auto& ending) { return ending.param.substr(1); });
+
+TEST_P(EveryEnding, WritesAndReadsBack) {
+  const Temporary file("there_and_back" + GetParam());
+  const Image image = gradient();
+  write_image(file.path(), image);
+  const Image read = read_image(file.path());
+  EXPECT_EQ(read.channels, image.channels);
+  // Half a step of the format; JPEG's error at this quality is a few steps.
+  const double tolerance = GetParam() == ".exr" ? 0 : GetParam()[1] == 'j' ? 5 / 255.0 : 0.51 / 65535;
+  EXPECT_LE(largest_difference(read, image), tolerance);
+}
+
+TEST_P(EveryEnding, KeepsDescriptions) {
+  const Temporary file("described" + GetParam());
+  write_image(file.path(), gradient(), {{"ImageDescription", "seed 4711"}, {"Software", "tensorray 9.9"}});
+  EXPECT_THAT(read_bytes(file.path()), HasSubstr("seed 4711"));
+  EXPECT_THAT(read_bytes(file.path()), HasSubstr("tensorray 9.9"));
+}
+
+TEST_P(EveryEnding, FullDiskIsAnError) {
+  if (!std::filesystem::exists("/dev/full")) GTEST_SKIP() << "no device that is always full";
+  for (const Image& image : {gradient(), noise(512, 512, {"R", "G", "B"})}) {  // Fails at the end, and in the middle.
+    const Temporary file("full_disk" + GetParam());
+    std::filesystem::create_symlink("/dev/full", file.path());
+    EXPECT_EQ(message([&] { write_image(file.path(), image); }),
+              "cannot write " + file.path().string() + ": No space left on device");
+  }
+}
+
+TEST_P(EveryEnding, FailuresNameFileAndReason) {
+  const Temporary folder("a_folder" + GetParam());
+  std::filesystem::create_directory(folder.path());
+  EXPECT_EQ(message([&] { write_image(folder.path(), gradient()); }),
+            "cannot write " + folder.path().string() + ": Is a directory");
+  const std::filesystem::path lost = folder.path() / "missing" / ("x" + GetParam());
+  EXPECT_EQ(message([&] { write_image(lost, gradient()); }),
+            "cannot write " + lost.string() + ": No such file or directory");
+  EXPECT_EQ(message([&] { read_image(lost); }), "cannot read " + lost.string() + ": no such file");
+  EXPECT_THAT(message([&] { read_image(folder.path()); }), HasSubstr("folder"));
+}
+
+TEST_P(EveryEnding, FilesThatWereCutOffAreRefused) {
+  const Temporary whole("whole" + GetParam());
+  write_image(whole.path(), noise(100, 80, {"R", "G", "B"}));
+  const std::string bytes = read_bytes(whole.path());
+  for (const double part : {0.001, 0.3, 0.5, 0.9, 0.999}) {
+    const Temporary file("cut" + GetParam(), bytes.substr(0, static_cast<std::size_t>(part * bytes.size())));
+    const std::string text = message([&] { read_image(file.path()); });
+    EXPECT_THAT(text, HasSubstr("cannot read " + file.path().string() + ": ")) << part;
+    EXPECT_THAT(text, Not(::testing::EndsWith(": "))) << part;
+  }
+}
+
+TEST_P(EveryEnding, GarbageIsRefused) {
+  const Temporary file("garbage" + GetParam(), "this is not a picture, whatever its name says\n");
+  EXPECT_THAT(message([&] { read_image(file.path()); }), HasSubstr("cannot read " + file.path().string() + ": "));
+  const Temporary empty("empty" + GetParam(), "");
+  EXPECT_THAT(message([&] { read_image(empty.path()); }), HasSubstr("empty"));
+}
+
+TEST(ImageTest, TheSamePictureGivesTheSameBytesAtAnyTime) {
+  const ImageMetadata metadata{{"ImageDescription", "a scene"}, {"Software", "tensorray"}};
+  const auto write_all = [&] {
+    std::vector<std::string> files;
+    for (const std::string& ending : image_endings()) {
+      const Temporary file("any_time" + ending);
+      write_image(file.path(), gradient(), metadata);
+      files.push_back(read_bytes(file.path()));
+    }
+    return files;
+  };
+  const std::vector<std::string> first = write_all();
+  std::this_thread::sleep_for(std::chrono::milliseconds(1100));  // Time stamps count seconds.
+  const std::vector<std::string> second = write_all();
+  for (std::size_t i = 0; i < first.size(); ++i) EXPECT_TRUE(first[i] == second[i]) << image_endings()[i];
+}
+
+TEST(ImageTest, ExrKeepsEverything) {
+  const Temporary file("everything.exr");
+  Image image = noise(5, 4, {"R", "G", "B", "A", "Z", "S0.550,000000nm"});
+  image.pixel(1, 1)[0] = -3;
+  image.pixel(2, 1)[1] = std::numeric_limits<float>::infinity();
+  image.pixel(3, 1)[5] = 1e-30f;
+  write_image(file.path(), image, {{"scene", "{\n  \"é\": 1\n}"}, {"seed", "17"}});
+  const Image read = read_image(file.path());
+  ASSERT_EQ(read.channels, image.channels);
+  EXPECT_EQ(read.pixels, image.pixels);
+  EXPECT_THAT(read_bytes(file.path()), HasSubstr("{\n  \"é\": 1\n}"));
+}
+
+TEST(ImageTest, PngKeepsAllMetadataAndIsMarkedAsSrgb) {
+  const Temporary file("metadata.png");
+  write_image(file.path(), gradient(), {{"scene", "{\"x\": 1}"}});
+  EXPECT_THAT(read_bytes(file.path()), HasSubstr("{\"x\": 1}"));
+  EXPECT_THAT(read_bytes(file.path()), HasSubstr("sRGB"));
+  write_image(file.path(), gradient(), {{"oiio:ColorSpace", "Rec709"}});
+  EXPECT_THAT(read_bytes(file.path()), Not(HasSubstr("sRGB")));
+}
+
+TEST(ImageTest, DisplayFormatsClip) {
+  for (const std::string ending : {".png", ".tif"}) {
+    const Temporary file("clipped" + ending);
+    Image image(3, 1, {"R", "G", "B"});
+    image.pixels = {-0.5f, 2, 0.25f, std::nanf(""), INFINITY, -INFINITY, 1, 0, 0.5f};
+    write_image(file.path(), image);
+    const std::vector<float> expected{0, 1, 0.25f, 0, 1, 0, 1, 0, 0.5f}, read = read_image(file.path()).pixels;
+    ASSERT_EQ(read.size(), expected.size());
+    for (std::size_t i = 0; i < expected.size(); ++i) EXPECT_NEAR(read[i], expected[i], 0.51 / 65535) << i;
+  }
+}
+
+TEST(ImageTest, DisplayFormatsChooseTheirChannels) {
+  const auto kept = [](const std::string& ending, const std::vector<std::string>& channels) {
+    const Temporary file("channels" + ending);
+    const Image image = noise(16, 16, channels);
+    write_image(file.path(), image);
+    const Image read = read_image(file.path());
+    const double tolerance = ending == ".jpg" ? 1 : 0.51 / 65535;
+    for (std::size_t c = 0; c < read.channels.size(); ++c)
+      EXPECT_NEAR(read.pixel(3, 5)[c], image.pixel(3, 5)[c], tolerance) << ending;
+    return read.channels.size();
+  };
+  for (const std::string ending : {".png", ".tif", ".jpg"}) {
+    EXPECT_EQ(kept(ending, {"Y"}), 1u);
+    EXPECT_EQ(kept(ending, {"Y", "A"}), 1u);
+    EXPECT_EQ(kept(ending, {"R", "G", "B"}), 3u);
+    EXPECT_EQ(kept(ending, {"R", "G", "B", "A"}), ending == ".jpg" ? 3u : 4u);
+    EXPECT_EQ(kept(ending, {"R", "G", "B", "Z"}), 3u);
+    EXPECT_EQ(kept(ending, {"R", "G", "B", "A", "Z"}), ending == ".jpg" ? 3u : 4u);
+  }
+}
+
+TEST(ImageTest, EndingsInCapitalsAreKnown) {
+  const Temporary file("capitals.PNG");
+  write_image(file.path(), gradient());
+  EXPECT_EQ(read_image(file.path()).width, 64);
+}
+
+TEST(ImageTest, UnknownEndingsAreRefused) {
+  const std::string text = message([] { write_image("/tmp/picture.bmpx", gradient()); });
+  EXPECT_EQ(text,
+            "cannot write /tmp/picture.bmpx: unknown picture ending \".bmpx\"; known: .exr, .png, .jpg, .jpeg, .tif, "
+            ".tiff");
+  EXPECT_THROW(write_image("/tmp/picture", gradient()), std::runtime_error);
+}
+
+TEST(ImageTest, PicturesMustHaveTheirPixels) {
+  EXPECT_THROW(write_image("/tmp/x.png", Image()), std::invalid_argument);
+  Image short_of_one = gradient();
+  short_of_one.pixels.pop_back();
+  EXPECT_THROW(write_image("/tmp/x.png", short_of_one), std::invalid_argument);
+}
+
+}  // namespace
+}  // namespace tensorray

@@ -1,0 +1,149 @@
+#include "renderer/random.h"
+
+#include <cmath>
+#include <set>
+#include <stdexcept>
+#include <vector>
+
+#include <gtest/gtest.h>
+
+namespace tensorray {
+namespace {
+
+/// Chi-square of counts against equal expectation, as standard deviations from its mean (for many bins it is normal).
+double chi_square_score(const std::vector<int>& counts) {
+  double total = 0, sum = 0;
+  for (const int count : counts) total += count;
+  const double expected = total / static_cast<double>(counts.size());
+  for (const int count : counts) sum += (count - expected) * (count - expected) / expected;
+  const double freedom = static_cast<double>(counts.size()) - 1;
+  return (sum - freedom) / std::sqrt(2 * freedom);
+}
+
+/// Fills 32 x 32 bins with the pairs (first(i), second(i)): uniform only if both are, and if they are independent.
+template <class First, class Second>
+double pair_score(const First& first, const Second& second) {
+  std::vector<int> counts(32 * 32);
+  for (int i = 0; i < 65536; ++i) ++counts[static_cast<int>(first(i) * 32) * 32 + static_cast<int>(second(i) * 32)];
+  return chi_square_score(counts);
+}
+
+TEST(RandomUniformTest, IsAFunctionOfItsKeys) {
+  EXPECT_EQ(random_uniform(1, 2, 3), random_uniform(1, 2, 3));
+  std::set<double> values;
+  for (int seed = 0; seed < 20; ++seed)
+    for (int index = 0; index < 20; ++index)
+      for (int dimension = 0; dimension < 20; ++dimension) values.insert(random_uniform(seed, index, dimension));
+  EXPECT_EQ(values.size(), 8000u);
+}
+
+TEST(RandomUniformTest, IsUniform) {
+  std::vector<int> counts(1000);
+  double low_bits = 0;
+  for (int i = 0; i < 1000000; ++i) {
+    const double value = random_uniform(7, i, 0);
+    ASSERT_GE(value, 0);
+    ASSERT_LT(value, 1);
+    ++counts[static_cast<int>(value * 1000)];
+    const double fine = value * 0x1p40;
+    low_bits += fine - std::floor(fine);
+  }
+  EXPECT_LT(std::abs(chi_square_score(counts)), 4);
+  EXPECT_NEAR(low_bits / 1e6, 0.5, 4 / std::sqrt(12e6));
+}
+
+TEST(RandomUniformTest, KeysAreIndependent) {
+  const auto base = [](int i) { return random_uniform(5, i, 0); };
+  EXPECT_LT(std::abs(pair_score(base, [](int i) { return random_uniform(5, i, 1); })), 4) << "dimensions";
+  EXPECT_LT(std::abs(pair_score(base, [](int i) { return random_uniform(5, i + 1, 0); })), 4) << "indices";
+  EXPECT_LT(std::abs(pair_score(base, [](int i) { return random_uniform(6, i, 0); })), 4) << "seeds";
+  EXPECT_LT(std::abs(pair_score(base, [](int i) { return random_uniform(i, 5, 0); })), 4) << "seed for index";
+  const auto by_seed = [](int i) { return random_uniform(i, 0, 0); };
+  EXPECT_LT(std::abs(pair_score(by_seed, [](int i) { return random_uniform(i + 1, 0, 0); })), 4) << "runs of seeds";
+  EXPECT_LT(std::abs(pair_score(by_seed, [](int i) { return random_uniform(i, 0, 1); })), 4) << "dimensions by seed";
+}
+
+TEST(SobolTest, FirstPointsFillEveryElementaryInterval) {
+  for (const std::uint64_t seed : {0u, 1u, 12345u})
+    for (int k = 0; k <= 10; ++k)
+      for (int i = 0; i <= k; ++i) {
+        std::vector<int> counts(1 << k);
+        for (int index = 0; index < (1 << k); ++index) {
+          const int column = static_cast<int>(std::ldexp(sobol(seed, index, 0), i));
+          const int row = static_cast<int>(std::ldexp(sobol(seed, index, 1), k - i));
+          ++counts[(column << (k - i)) + row];
+        }
+        for (const int count : counts)
+          ASSERT_EQ(count, 1) << "seed " << seed << ", 2^" << k << " points, column bits " << i;
+      }
+}
+
+TEST(SobolTest, ThreeDimensionsAreStratifiedTogether) {
+  constexpr int k = 9;
+  for (int i = 0; i < k; ++i)
+    for (int j = 0; i + j < k; ++j) {
+      const int l = k - 1 - i - j;
+      std::vector<int> counts(1 << (k - 1));
+      for (int index = 0; index < (1 << k); ++index) {
+        const int x = static_cast<int>(std::ldexp(sobol(3, index, 0), i));
+        const int y = static_cast<int>(std::ldexp(sobol(3, index, 1), j));
+        const int z = static_cast<int>(std::ldexp(sobol(3, index, 2), l));
+        ++counts[(((x << j) + y) << l) + z];
+      }
+      for (const int count : counts) ASSERT_EQ(count, 2) << i << " " << j << " " << l;
+    }
+}
+
+TEST(SobolTest, EachDimensionAloneIsStratified) {
+  for (int dimension = 0; dimension < 3; ++dimension) {
+    std::vector<int> counts(4096);
+    for (int index = 0; index < 4096; ++index) ++counts[static_cast<int>(sobol(9, index, dimension) * 4096)];
+    for (const int count : counts) ASSERT_EQ(count, 1) << dimension;
+  }
+}
+
+TEST(SobolTest, SeedsAreIndependent) {
+  // One point of many seeds must itself be uniform, and two of them unrelated but for the stratification of the pair:
+  // points 0 and 1 lie in different halves, so the second is folded into a half first.
+  const auto first = [](int seed) { return sobol(seed, 0, 0); };
+  EXPECT_LT(std::abs(pair_score(first, [](int seed) { return sobol(seed, 0, 1); })), 4);
+  EXPECT_LT(std::abs(pair_score(first, [](int seed) { return std::fmod(2 * sobol(seed, 1, 0), 1.0); })), 4);
+  EXPECT_LT(std::abs(pair_score(first, [](int seed) { return sobol(seed + 1, 0, 0); })), 4);
+}
+
+TEST(SobolTest, SequencesOfTwoSeedsCanBePaired) {
+  // Their points come in unrelated orders. The marginals are stratified, so that 31 * 31 degrees of freedom remain.
+  const auto first = [](int i) { return sobol(1, i, 0); };
+  EXPECT_LT(std::abs(pair_score(first, [](int i) { return sobol(2, i, 0); })), 5.5);
+  EXPECT_LT(std::abs(pair_score(first, [](int i) { return sobol(2, i, 1); })), 5.5);
+}
+
+TEST(SobolTest, IntegratesBetterThanRandomNumbers) {
+  // Owen-scrambled nets integrate smooth functions with a variance of about N^-3.
+  const auto estimate = [](std::uint64_t seed, bool low_discrepancy) {
+    double sum = 0;
+    for (int i = 0; i < 1024; ++i) {
+      const double x = low_discrepancy ? sobol(seed, i, 0) : random_uniform(seed, i, 0);
+      const double y = low_discrepancy ? sobol(seed, i, 1) : random_uniform(seed, i, 1);
+      sum += std::exp(x * y) / 1024;
+    }
+    return sum;
+  };
+  const double exact = 1.3179021514544039;  // Ei(1) - γ.
+  double sobol_error = 0, random_error = 0;
+  for (int seed = 0; seed < 64; ++seed) {
+    sobol_error += std::pow(estimate(seed, true) - exact, 2);
+    random_error += std::pow(estimate(seed, false) - exact, 2);
+  }
+  EXPECT_LT(sobol_error, random_error / 1000);
+}
+
+TEST(SobolTest, RefusesFurtherDimensions) {
+  EXPECT_THROW(sobol(0, 0, 3), std::invalid_argument);
+  const double last = sobol(0, 0xffffffffu, 2);
+  EXPECT_GE(last, 0);
+  EXPECT_LT(last, 1);
+}
+
+}  // namespace
+}  // namespace tensorray

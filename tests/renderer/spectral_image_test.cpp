@@ -1,0 +1,128 @@
+#include "renderer/spectral_image.h"
+
+#include <algorithm>
+#include <clocale>
+#include <stdexcept>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "tests/renderer/support.h"
+
+namespace tensorray {
+namespace {
+
+using ::testing::HasSubstr;
+
+Film counting_film(int width, int height, int channels) {
+  Film film(width, height, channels);
+  for (std::size_t i = 0; i < film.values.size(); ++i) film.values[i] = 0.25 * static_cast<double>(i);
+  return film;
+}
+
+TEST(LinearImageTest, UndisturbedLightHasTheColorOfItsIlluminant) {
+  const Spectrum light = illuminant("D65");
+  for (const int count : {1, 5, 32}) {
+    Film film(3, 2, count);
+    film.values.assign(film.values.size(), 1);
+    const std::vector<Band> bands = make_bands(light, observer_min, observer_max, count);
+    const Image image = linear_image(film, bands, Eigen::Matrix3d::Identity());
+    EXPECT_EQ(image.channels, (std::vector<std::string>{"R", "G", "B"}));
+    for (int x = 0; x < 3; ++x) {
+      EXPECT_NEAR(image.pixel(x, 1)[0], 0.9505, 1e-3);
+      EXPECT_NEAR(image.pixel(x, 1)[1], 1, 1e-6);
+      EXPECT_NEAR(image.pixel(x, 1)[2], 1.0891, 1e-3);
+    }
+  }
+}
+
+TEST(LinearImageTest, EqualsTheSumOverBands) {
+  const Film film = counting_film(4, 3, 2);
+  std::vector<Band> bands(2);
+  bands[0].xyz = {1, 2, 3};
+  bands[1].xyz = {0, 0.5, 0};
+  Eigen::Matrix3d matrix;
+  matrix << 1, 0, 0, 0, 0, 1, 0, 2, 0;
+  const Image image = linear_image(film, bands, matrix);
+  for (int y = 0; y < 3; ++y)
+    for (int x = 0; x < 4; ++x) {
+      const double first = 0.25 * (y * 4 + x), second = 0.25 * (12 + y * 4 + x);
+      EXPECT_FLOAT_EQ(image.pixel(x, y)[0], first);
+      EXPECT_FLOAT_EQ(image.pixel(x, y)[1], 3 * first);
+      EXPECT_FLOAT_EQ(image.pixel(x, y)[2], 2 * (2 * first + 0.5 * second));
+    }
+}
+
+TEST(LinearImageTest, UnitBandsPassColorsOn) {
+  const Film film = counting_film(2, 2, 3);
+  std::vector<Band> bands(3);
+  for (int k = 0; k < 3; ++k) bands[k].xyz = Eigen::Vector3d::Unit(k);
+  const Image image = linear_image(film, bands, Eigen::Matrix3d::Identity());
+  for (int c = 0; c < 3; ++c) EXPECT_EQ(image.pixel(1, 0)[c], film.plane(c)[1]);
+}
+
+TEST(SpectralImageTest, FollowsTheLayout) {
+  const std::vector<Band> bands = make_bands(illuminant("D65"), 380, 730, 4);
+  const Film film = counting_film(4, 3, 4);
+  const SpectralImage spectral = spectral_image(film, bands, 10, Eigen::Matrix3d::Identity());
+  EXPECT_EQ(spectral.image.channels, (std::vector<std::string>{"R", "G", "B", "S0.423,750000nm", "S0.511,250000nm",
+                                                               "S0.598,750000nm", "S0.686,250000nm"}));
+  EXPECT_EQ(spectral.metadata.at("spectralLayoutVersion"), "1.0");
+  EXPECT_EQ(spectral.metadata.at("emissiveUnits"), "W.m^-2.nm^-1");
+  const Image rgb = linear_image(film, bands, Eigen::Matrix3d::Identity());
+  for (int k = 0; k < 4; ++k)
+    EXPECT_FLOAT_EQ(spectral.image.pixel(2, 1)[3 + k], film.plane(k)[6] * 10 * bands[k].power / bands[k].width);
+  for (int c = 0; c < 3; ++c) EXPECT_EQ(spectral.image.pixel(2, 1)[c], rgb.pixel(2, 1)[c]);
+}
+
+TEST(SpectralImageTest, IntegratesToTheBeamsIrradiance) {
+  const std::vector<Band> bands = make_bands(illuminant("A"), 400, 700, 7);
+  Film film(1, 1, 7);
+  film.values.assign(7, 1);
+  const Image image = spectral_image(film, bands, 2.5, Eigen::Matrix3d::Identity()).image;
+  double irradiance = 0;
+  for (int k = 0; k < 7; ++k) irradiance += image.pixels[3 + k] * bands[k].width;
+  EXPECT_NEAR(irradiance, 2.5, 1e-6);
+}
+
+TEST(SpectralImageTest, NamesHaveSixDecimalsInEveryLocale) {
+  std::vector<Band> bands(3);
+  bands[0].wavelength = 380;
+  bands[1].wavelength = 1000 / 3.0;
+  bands[2].wavelength = 1250.0000004;
+  const char* const changed = std::setlocale(LC_NUMERIC, "de_DE.UTF-8");  // Where it is installed.
+  for (Band& band : bands) band.width = 1;
+  const Image image = spectral_image(Film(1, 1, 3), bands, 1, Eigen::Matrix3d::Identity()).image;
+  std::setlocale(LC_NUMERIC, "C");
+  EXPECT_EQ(image.channels[3], "S0.380,000000nm") << (changed ? changed : "C");
+  EXPECT_EQ(image.channels[4], "S0.333,333333nm");
+  EXPECT_EQ(image.channels[5], "S0.1250,000000nm");
+}
+
+TEST(SpectralImageTest, SurvivesTheFile) {
+  const Temporary file("layout.exr");
+  const std::vector<Band> bands = make_bands(illuminant("D65"), 380, 730, 32);
+  const SpectralImage spectral = spectral_image(counting_film(5, 4, 32), bands, 1, Eigen::Matrix3d::Identity());
+  write_image(file.path(), spectral.image, spectral.metadata);
+  const Image read = read_image(file.path());
+  ASSERT_THAT(read.channels, ::testing::UnorderedElementsAreArray(spectral.image.channels));
+  for (std::size_t c = 0; c < read.channels.size(); ++c) {
+    const auto& names = spectral.image.channels;
+    const std::size_t written = std::find(names.begin(), names.end(), read.channels[c]) - names.begin();
+    for (int y = 0; y < 4; ++y)
+      for (int x = 0; x < 5; ++x) EXPECT_EQ(read.pixel(x, y)[c], spectral.image.pixel(x, y)[written]);
+  }
+  const std::string bytes = read_bytes(file.path());
+  EXPECT_THAT(bytes, HasSubstr("spectralLayoutVersion"));
+  EXPECT_THAT(bytes, HasSubstr("W.m^-2.nm^-1"));
+  EXPECT_THAT(bytes, HasSubstr(spectral.image.channels[3]));
+}
+
+TEST(SpectralImageTest, FilmAndBandsMustAgree) {
+  EXPECT_THROW(linear_image(Film(1, 1, 2), std::vector<Band>(3), Eigen::Matrix3d::Identity()), std::invalid_argument);
+  EXPECT_THROW(spectral_image(Film(1, 1, 2), std::vector<Band>(3), 1, Eigen::Matrix3d::Identity()),
+               std::invalid_argument);
+}
+
+}  // namespace
+}  // namespace tensorray
