@@ -1,0 +1,145 @@
+#include "scenes/check_scene.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <map>
+#include <string>
+#include <vector>
+
+#include <fmt/core.h>
+
+#include "renderer/spectrum.h"
+
+namespace tensorray {
+namespace {
+
+bool given(const Json& json, const char* pointer) { return json.contains(Json::json_pointer(pointer)); }
+
+void warn_unused(SceneDescription& scene, const Json& json, const char* key, const char* because_of) {
+  if (!given(json, key) || !given(json, because_of)) return;
+  scene.warnings.push_back(fmt::format("`{}` has no effect beside `{}`", key, because_of));
+}
+
+void check_wavelengths(const LightDescription& light, const SceneSource& source) {
+  const double min = light.wavelength_min, max = light.wavelength_max;
+  if (min > max) {
+    source.fail(fmt::format("`/light/wavelengths/min` ({} nm) must not be above `max` ({} nm)", min, max));
+  }
+  if (min == max && light.wavelength_count > 1) {
+    source.fail(fmt::format("`/light/wavelengths/count` must be 1, but is {}: `min` and `max` are the same wavelength",
+                            light.wavelength_count));
+  }
+  if (light.wavelengths_per_photon > 0 && light.wavelength_count % light.wavelengths_per_photon != 0) {
+    source.fail(fmt::format("`/light/wavelengths/per_photon` must divide `count` ({}), but is {}",
+                            light.wavelength_count, light.wavelengths_per_photon));
+  }
+}
+
+/// An illuminant, "blackbody KELVIN", or a file; files come out relative to where the scene's are.
+void check_spectrum(LightDescription& light, const SceneSource& source) {
+  const std::vector<std::string> names = illuminant_names();
+  const std::string& text = light.spectrum;
+  if (std::find(names.begin(), names.end(), text) != names.end()) return;
+
+  const std::string blackbody = "blackbody";
+  if (text == blackbody || text.compare(0, blackbody.size() + 1, blackbody + " ") == 0) {
+    double kelvin = 0;
+    char rest = 0;
+    const bool read = std::sscanf(text.c_str() + blackbody.size(), " %lf %c", &kelvin, &rest) == 1;
+    if (read && std::isfinite(kelvin) && kelvin > 0) return;
+    source.fail(
+        fmt::format("`/light/spectrum` must be \"blackbody KELVIN\" with a temperature > 0, but is \"{}\"", text));
+  }
+  if (text.find_first_of("./") == std::string::npos) {
+    std::string known;
+    for (const std::string& name : names) known += fmt::format("\"{}\", ", name);
+    source.fail(fmt::format(
+        "`/light/spectrum` must be one of {}\"blackbody KELVIN\", or a file (NAME.txt), but is \"{}\"", known, text));
+  }
+  light.spectrum = source.resolve(text).string();
+}
+
+/// s(λ) < 0 is allowed, and bends light the other way: more often than not the range was widened carelessly.
+void warn_of_negative_flexibility(SceneDescription& scene) {
+  if (scene.bending.rgb) return;
+  const double at_min = scene.bending.flexibility.at(scene.light.wavelength_min);
+  const double at_max = scene.bending.flexibility.at(scene.light.wavelength_max);
+  if (at_min >= 0 && at_max >= 0) return;
+  scene.warnings.push_back(
+      fmt::format("`/bending`: s = a + b * wavelength is {:.4g} at {} nm and {:.4g} at {} nm; where it is negative, "
+                  "light bends the other way",
+                  at_min, scene.light.wavelength_min, at_max, scene.light.wavelength_max));
+}
+
+void check_receiver(const SceneDescription& scene, const SceneSource& source) {
+  if (!scene.receiver.normal) return;
+  const double cosine = scene.receiver.normal->normalized().dot(scene.light.direction.normalized());
+  if (std::abs(cosine) > 1e-6) return;
+  source.fail("`/receiver/normal` is across the light: the plate would be seen edge-on; turn it towards the light");
+}
+
+/// A file where an earlier step may have left another form of the same path.
+std::filesystem::path identity(const std::filesystem::path& path) {
+  return std::filesystem::absolute(path).lexically_normal();
+}
+
+std::map<std::filesystem::path, std::string> input_files(const SceneDescription& scene) {
+  std::map<std::filesystem::path, std::string> files;
+  const auto add = [&files](const std::filesystem::path& path, const std::string& what) {
+    if (!path.empty()) files.emplace(identity(path), what);
+  };
+  add(scene.path, "the scene file");
+  add(scene.field.file, "`/field/file`");
+  add(scene.field.bounds, "`/field/bounds`");
+  add(scene.output.ocio, "`/output/ocio`");
+  for (const auto& obstacle : scene.obstacles) add(obstacle, "an obstacle's file");
+  return files;
+}
+
+void check_output(const SceneDescription& scene, const SceneSource& source) {
+  const OutputDescription& output = scene.output;
+  std::map<std::filesystem::path, std::string> taken = input_files(scene);
+  const auto check = [&](const std::filesystem::path& path, const std::string& pointer) {
+    // Devices may take several files, one after the other.
+    if (path.empty() || path.parent_path() == "/dev") return;
+    const auto [other, is_new] = taken.emplace(identity(path), "`" + pointer + "`");
+    if (is_new) return;
+    source.fail(fmt::format("`{}` ({}) is the same file as {}; choose another", pointer, path.string(), other->second));
+  };
+  check(output.image, "/output/image");
+  check(output.exr, "/output/exr");
+  check(output.spectral, "/output/spectral");
+  check(output.photons, "/output/photons");
+  if (scene.bending.rgb && !output.spectral.empty()) {
+    source.fail("`/output/spectral` needs wavelengths, which `/bending/rgb` has none of; remove one of the two");
+  }
+}
+
+/// The picture in memory, in double precision.
+void check_memory(const SceneDescription& scene, const SceneSource& source) {
+  if (!scene.receiver.resolution) return;
+  const int channels = scene.bending.rgb ? 3 : scene.light.wavelength_count;
+  const double gibibytes = scene.receiver.resolution->cast<double>().prod() * channels * sizeof(double) / (1 << 30);
+  if (gibibytes <= 64) return;
+  source.fail(
+      fmt::format("`/receiver/resolution` with {} channels of light needs {:.0f} GiB; ask for fewer pixels or a "
+                  "lower `/light/wavelengths/count`",
+                  channels, gibibytes));
+}
+
+}  // namespace
+
+void check_scene(SceneDescription& scene, const Json& json, const SceneSource& source) {
+  check_wavelengths(scene.light, source);
+  check_spectrum(scene.light, source);
+  check_receiver(scene, source);
+  check_memory(scene, source);
+  check_output(scene, source);
+  warn_of_negative_flexibility(scene);
+  warn_unused(scene, json, "/field/name", "/field/generate");
+  warn_unused(scene, json, "/field/derive", "/field/generate");
+  warn_unused(scene, json, "/light/wavelengths", "/bending/rgb");
+}
+
+}  // namespace tensorray

@@ -1,0 +1,105 @@
+#pragma once
+/// @file scenes/description.h
+/// A scene file as plain data: what was written, with defaults for what was not. Nothing is loaded yet.
+/// Lengths are world units (the field's), wavelengths nm.
+
+#include <cstdint>
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include <Eigen/Core>
+
+#include "integrators/bending.h"
+#include "integrators/flexibility.h"
+#include "renderer/beam.h"
+#include "renderer/density.h"
+#include "volumes/eigenvalues.h"
+#include "volumes/generators.h"
+#include "volumes/tensor_files.h"
+
+namespace tensorray {
+
+/// `field.generate`.
+struct GenerateDescription {
+  Generator generator;
+  GridSettings grid;
+};
+
+struct FieldDescription {
+  std::filesystem::path file;                   ///< Either this ...
+  std::string name;                             ///< In the file; empty: the only one.
+  std::optional<GenerateDescription> generate;  ///< ... or this.
+  Derive derive = Derive::none;
+  Eigenvalues eigenvalues = Eigenvalues::automatic;
+  std::optional<double> scale;   ///< None: "auto".
+  std::filesystem::path bounds;  ///< A closed mesh that cuts the volume; empty: none.
+};
+
+struct BendingDescription {
+  Flexibility flexibility;
+  std::optional<Eigen::Vector3d> rgb;  ///< Three flexibilities, one a colour channel, instead of wavelengths.
+  BendingSettings settings;
+};
+
+struct ApertureDescription {
+  std::optional<Eigen::Vector3d> center;  ///< None: the middle of the silhouette.
+  Eigen::Vector2d size{1, 1};             ///< Along right and up of the light's frame; > 0.
+};
+
+struct LightDescription {
+  Eigen::Vector3d direction{0, 0, -1};  ///< Not zero; need not be unit.
+  std::optional<Eigen::Vector3d> up;    ///< Frame of aperture and receiver; none: +z, or +y for light along z.
+  std::uint64_t photons = 1u << 20;
+  BeamPattern pattern = BeamPattern::stratified;
+  std::string spectrum = "D65";  ///< An illuminant, "blackbody 5500" (kelvin), or a two-column text file.
+  double wavelength_min = 380, wavelength_max = 730;
+  int wavelength_count = 32;
+  int wavelengths_per_photon = 0;               ///< 0: all.
+  double irradiance = 1;                        ///< W per world unit², of the undisturbed beam; > 0.
+  std::optional<ApertureDescription> aperture;  ///< None: the silhouette of the volume.
+};
+
+struct ReceiverDescription {
+  std::optional<double> distance;  ///< Behind the volume, along the light; none: a quarter of the volume's depth.
+  std::optional<Eigen::Vector3d> center;      ///< None: behind the middle of the volume, at `distance`.
+  std::optional<Eigen::Vector3d> normal;      ///< None: against the light.
+  std::optional<Eigen::Vector3d> up;          ///< None: the light's.
+  std::optional<Eigen::Vector2d> size;        ///< None: 1.25 times the extent of the beam.
+  std::optional<Eigen::Vector2i> resolution;  ///< Pixels; none: 512 along the longer side, square pixels.
+};
+
+enum class IntegratorType { photon_distribution };
+
+struct IntegratorDescription {
+  IntegratorType type = IntegratorType::photon_distribution;
+  DensitySettings density;
+};
+
+struct OutputDescription {
+  std::filesystem::path image;     ///< Display-referred picture (.png .jpg .tif); empty: none.
+  std::filesystem::path exr;       ///< Scene-linear EXR; empty: none.
+  std::filesystem::path spectral;  ///< Spectral EXR; empty: none.
+  std::filesystem::path photons;   ///< Photon map (.vdb points or .vtp); empty: none.
+  std::optional<double> exposure;  ///< Stops, for `image`; none: "auto".
+  bool white_balance = true;       ///< Adapt the light's white to the working space's.
+  std::filesystem::path ocio;      ///< OCIO config; empty: $OCIO, or the built-in one.
+  std::string display, view;       ///< Empty: the config's default.
+};
+
+struct SceneDescription {
+  std::filesystem::path path;  ///< The scene file.
+  std::string text;            ///< The scene as JSON, overrides applied: provenance of the pictures.
+  std::uint64_t seed = 0;
+  FieldDescription field;
+  BendingDescription bending;
+  LightDescription light;
+  std::vector<std::filesystem::path> obstacles;
+  ReceiverDescription receiver;
+  IntegratorDescription integrator;
+  OutputDescription output;
+  std::vector<std::string> warnings;  ///< Things that are allowed but likely a mistake, a line each.
+};
+
+}  // namespace tensorray

@@ -1,0 +1,45 @@
+#pragma once
+/// @file scenes/load_scene.h
+/// SceneDescription → Scene: fields, meshes and spectra are loaded, and everything that was left to be chosen is.
+
+#include <cstddef>
+#include <string>
+#include <vector>
+
+#include "integrators/auto_scale.h"
+#include "integrators/bending.h"
+#include "integrators/photon_distribution.h"
+#include "renderer/beam.h"
+#include "renderer/color.h"
+#include "renderer/geometry.h"
+#include "renderer/spectrum.h"
+#include "scenes/description.h"
+#include "volumes/tensor_field.h"
+
+namespace tensorray {
+
+/// All that a render needs. Immutable once loaded.
+struct Scene {
+  SceneDescription description;
+  TensorField field;  ///< Preprocessed and scaled.
+  Geometry geometry;
+  Beam beam;
+  ColorManagement color;
+
+  /// What travels: wavelength bands, or in RGB mode the three primaries (wavelength 0), and their flexibilities.
+  std::vector<Band> bands;
+  std::vector<LightChannel> channels;
+
+  EigenvalueReport eigenvalues;
+  AutoScale scale;
+  bool scale_chosen = false;       ///< Whether the scale was "auto".
+  std::size_t non_finite = 0;      ///< Voxels that were not finite, and are taken as empty.
+  std::vector<std::string> notes;  ///< What was chosen or found, a line each, for the user to read.
+  double seconds = 0;              ///< That loading took.
+};
+
+/// @throw std::runtime_error, one line that names the file and the mend; SceneError where the scene's values do not go
+/// with what was loaded.
+Scene load_scene(const SceneDescription& description);
+
+}  // namespace tensorray

@@ -1,0 +1,59 @@
+#include "scenes/render.h"
+
+#include <chrono>
+
+namespace tensorray {
+namespace {
+
+/// From XYZ to the working space; the light's own white becomes neutral if the scene wants it so.
+Eigen::Matrix3d to_working(const Scene& scene) {
+  if (!scene.description.output.white_balance) return scene.color.xyz_to_working();
+  Eigen::Vector3d white = Eigen::Vector3d::Zero();
+  for (const Band& band : scene.bands) white += band.xyz;
+  // Nearly monochromatic light has no white to adapt to: its colour is what one wants to see.
+  return scene.bands.size() > 1 ? scene.color.xyz_to_working_adapted(white) : scene.color.xyz_to_working();
+}
+
+Render render_photons(const Scene& scene, const Progress& progress) {
+  const SceneDescription& description = scene.description;
+  PhotonSettings settings;
+  settings.photons = description.light.photons;
+  settings.pattern = description.light.pattern;
+  settings.channels_per_photon = description.bending.rgb ? 0 : description.light.wavelengths_per_photon;
+  settings.seed = description.seed;
+  settings.density = description.integrator.density;
+  settings.keep_photons = !description.output.photons.empty();
+  PhotonDistribution light = distribute_photons(scene.field, scene.geometry, scene.beam, scene.channels,
+                                                description.bending.settings, settings, progress);
+
+  const auto start = std::chrono::steady_clock::now();
+  Render result;
+  const Eigen::Matrix3d matrix = to_working(scene);
+  result.linear = linear_image(light.irradiance, scene.bands, matrix);
+  if (!description.output.spectral.empty())
+    result.spectral = spectral_image(light.irradiance, scene.bands, description.light.irradiance, matrix);
+  result.photons = std::move(light.photons);
+
+  Statistics& statistics = result.statistics;
+  statistics.positions = light.positions;
+  statistics.ends = std::move(light.ends);
+  for (const LightChannel& channel : scene.channels) statistics.channel_power.push_back(channel.power * light.ray_area);
+  statistics.ray_steps = light.ray_steps;
+  statistics.tensor_samples = light.tensor_samples;
+  statistics.seconds_tracing = light.seconds_tracing;
+  statistics.seconds_density = light.seconds_density;
+  statistics.seconds_color = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  return result;
+}
+
+}  // namespace
+
+Render render(const Scene& scene, const Progress& progress) {
+  switch (scene.description.integrator.type) {
+    case IntegratorType::photon_distribution:
+      return render_photons(scene, progress);
+  }
+  throw std::logic_error("unknown integrator");
+}
+
+}  // namespace tensorray

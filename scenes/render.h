@@ -1,0 +1,34 @@
+#pragma once
+/// @file scenes/render.h
+/// Scene → Render: the only switch over the methods.
+
+#include <optional>
+
+#include "integrators/photon_distribution.h"
+#include "integrators/progress.h"
+#include "renderer/image.h"
+#include "renderer/spectral_image.h"
+#include "scenes/load_scene.h"
+
+namespace tensorray {
+
+struct Statistics {
+  std::uint64_t positions = 0;        ///< From which light was emitted.
+  std::vector<EndCounts> ends;        ///< Rays by channel and end.
+  std::vector<double> channel_power;  ///< Of one ray, by channel; the beam's irradiance is 1.
+  std::uint64_t ray_steps = 0, tensor_samples = 0;
+  double seconds_tracing = 0, seconds_density = 0, seconds_color = 0;
+};
+
+/// What a method made, ready to be written.
+struct Render {
+  Image linear;                           ///< R, G, B in the scene-linear working space; 1 is the undisturbed light.
+  std::optional<SpectralImage> spectral;  ///< If the scene asks for it.
+  PhotonMap photons;                      ///< If the scene asks for it.
+  Statistics statistics;
+};
+
+/// @throw Cancelled; std::runtime_error.
+Render render(const Scene& scene, const Progress& progress);
+
+}  // namespace tensorray

@@ -1,0 +1,98 @@
+#include "scenes/write_outputs.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include <fmt/format.h>
+
+#include "renderer/image.h"
+#include "volumes/point_files.h"
+
+namespace tensorray {
+namespace {
+
+ImageMetadata provenance(const Scene& scene, const Render& render) {
+  return {{"Software", "tensorray " TENSORRAY_VERSION},
+          {"tensorray:version", TENSORRAY_VERSION},
+          {"tensorray:scene", scene.description.text},
+          {"tensorray:seed", std::to_string(scene.description.seed)},
+          {"tensorray:photons", std::to_string(render.statistics.positions)},
+          {"tensorray:scale", fmt::format("{:.17g}", scene.scale.scale)},
+          {"tensorray:ocio_config", scene.color.config_name()},
+          {"tensorray:color_space", scene.color.working_space()}};
+}
+
+Image display_image(const Scene& scene, const Image& linear) {
+  const double exposure = scene.description.output.exposure.value_or(automatic_exposure(linear));
+  const auto gain = static_cast<float>(std::exp2(exposure));
+  Image image = linear;
+  for (float& value : image.pixels) value *= gain;
+  scene.color.to_display(image);
+  return image;
+}
+
+PointCloud point_cloud(const PhotonMap& photons, const ImageMetadata& metadata) {
+  PointCloud points;
+  points.metadata = metadata;
+  std::vector<float>&wavelength = points.scalars["wavelength"], &power = points.scalars["power"];
+  std::vector<Eigen::Vector3f>&direction = points.vectors["direction"], &origin = points.vectors["origin"];
+  for (const Photon& photon : photons) {
+    points.positions.push_back(photon.position);
+    wavelength.push_back(photon.wavelength);
+    power.push_back(photon.power);
+    direction.push_back(photon.direction);
+    origin.push_back(photon.origin);
+  }
+  return points;
+}
+
+}  // namespace
+
+double automatic_exposure(const Image& linear) {
+  constexpr float lit = 0.02f;        // Of the undisturbed light.
+  constexpr double brightest = 0.99;  // This fraction of the lit pixels is darker than ...
+  constexpr double shown_as = 0.9;    // ... this display-linear value.
+  const std::size_t channels = linear.channels.size();
+  std::vector<float> values;
+  for (std::size_t i = 0; i + 2 < linear.pixels.size(); i += channels) {
+    const float value = std::max({linear.pixels[i], linear.pixels[i + 1], linear.pixels[i + 2]});
+    if (value > lit) values.push_back(value);
+  }
+  if (values.empty()) return 0;
+  const auto bright = values.begin() + static_cast<std::ptrdiff_t>(brightest * static_cast<double>(values.size() - 1));
+  std::nth_element(values.begin(), bright, values.end());
+  return std::log2(shown_as / *bright);
+}
+
+OutputFiles open_outputs(const OutputDescription& output) {
+  OutputFiles files;
+  if (!output.image.empty()) files.image.emplace(output.image);
+  if (!output.exr.empty()) files.exr.emplace(output.exr);
+  if (!output.spectral.empty()) files.spectral.emplace(output.spectral);
+  if (!output.photons.empty()) files.photons.emplace(output.photons);
+  return files;
+}
+
+std::vector<std::filesystem::path> write_outputs(const Render& render, const Scene& scene, OutputFiles files) {
+  const ImageMetadata metadata = provenance(scene, render);
+  if (files.image) write_image(files.image->path(), display_image(scene, render.linear), metadata);
+  if (files.exr) write_image(files.exr->path(), render.linear, metadata);
+  if (files.spectral) {
+    ImageMetadata spectral = metadata;
+    spectral.insert(render.spectral->metadata.begin(), render.spectral->metadata.end());
+    write_image(files.spectral->path(), render.spectral->image, spectral);
+  }
+  if (files.photons) write_points(files.photons->path(), point_cloud(render.photons, metadata));
+
+  std::vector<OutputFile> complete;
+  std::vector<std::filesystem::path> written;
+  for (std::optional<OutputFile>* file : {&files.image, &files.exr, &files.spectral, &files.photons}) {
+    if (!*file) continue;
+    written.push_back((*file)->target());
+    complete.push_back(std::move(**file));
+  }
+  commit_all(complete);
+  return written;
+}
+
+}  // namespace tensorray

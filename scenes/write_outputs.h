@@ -1,0 +1,31 @@
+#pragma once
+/// @file scenes/write_outputs.h
+/// Render → files. All of them are complete, or none has changed.
+
+#include <filesystem>
+#include <optional>
+#include <vector>
+
+#include "scenes/load_scene.h"
+#include "scenes/output_file.h"
+#include "scenes/render.h"
+
+namespace tensorray {
+
+/// The files of an OutputDescription, being written; those that it does not name are absent.
+struct OutputFiles {
+  std::optional<OutputFile> image, exr, spectral, photons;
+};
+
+/// Opens the files, so that one that cannot be written is known before the work is done.
+/// @throw std::runtime_error naming the file and the mend.
+OutputFiles open_outputs(const OutputDescription& output);
+
+/// Writes the files; when all are complete they take their names. @return the names.
+/// @throw std::runtime_error naming the file and the reason; then no file has changed.
+std::vector<std::filesystem::path> write_outputs(const Render& render, const Scene& scene, OutputFiles files);
+
+/// The exposure, in stops, at which a scene-linear picture is well shown: its brightest hundredth just below white.
+double automatic_exposure(const Image& linear);
+
+}  // namespace tensorray

@@ -1,0 +1,364 @@
+#include "scenes/read_scene.h"
+
+#include <filesystem>
+#include <fstream>
+#include <string>
+#include <vector>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <nlohmann/json.hpp>
+#include <unistd.h>
+
+namespace tensorray {
+namespace {
+
+namespace fs = std::filesystem;
+using ::testing::AllOf;
+using ::testing::EndsWith;
+using ::testing::HasSubstr;
+using ::testing::Not;
+using Overrides = std::vector<std::string>;
+
+const char* const smallest = R"({"field": {"file": "a.vdb"}, "integrator": {"type": "photon_distribution"}})";
+
+/// A folder of its own for each test, gone afterwards.
+class ReadScene : public ::testing::Test {
+ protected:
+  ReadScene() {
+    const auto* test = ::testing::UnitTest::GetInstance()->current_test_info();
+    folder_ = fs::path(::testing::TempDir()) / ("read_scene_" + std::to_string(getpid()) + "_" + test->name());
+    fs::create_directories(folder_);
+  }
+  ~ReadScene() override { fs::remove_all(folder_); }
+
+  fs::path file(const std::string& text) const {
+    fs::path path = folder_ / "scene.json";
+    std::ofstream(path, std::ios::binary) << text;
+    return path;
+  }
+
+  SceneDescription read(const Overrides& overrides = {}, const std::string& text = smallest) const {
+    return read_scene(file(text), overrides);
+  }
+
+  /// The message, one line of which is expected; empty if nothing is thrown.
+  std::string error(const Overrides& overrides, const std::string& text = smallest) const {
+    try {
+      read(overrides, text);
+    } catch (const SceneError& error) {
+      EXPECT_THAT(error.what(), Not(HasSubstr("\n")));
+      EXPECT_LT(std::string(error.what()).size(), 1000u);
+      return error.what();
+    }
+    ADD_FAILURE() << "no error: " << ::testing::PrintToString(overrides) << " on " << text.substr(0, 200);
+    return "";
+  }
+
+  fs::path folder_;
+};
+
+TEST_F(ReadScene, DefaultsAreThoseOfTheDescription) {
+  const SceneDescription scene = read();
+  const SceneDescription standard;
+  EXPECT_EQ(scene.field.file, folder_ / "a.vdb");
+  EXPECT_FALSE(scene.field.generate);
+  EXPECT_EQ(scene.light.photons, standard.light.photons);
+  EXPECT_EQ(scene.light.direction, standard.light.direction);
+  EXPECT_EQ(scene.bending.flexibility.b, -0.001);
+  EXPECT_EQ(scene.bending.settings.method, BendingMethod::splitting);
+  EXPECT_FALSE(scene.field.scale);
+  EXPECT_FALSE(scene.receiver.distance);
+  EXPECT_EQ(scene.output.image, folder_ / "scene.png");
+  EXPECT_EQ(scene.output.exr, folder_ / "scene.exr");
+  EXPECT_TRUE(scene.output.spectral.empty());
+  EXPECT_TRUE(scene.warnings.empty());
+}
+
+TEST_F(ReadScene, ReadsEveryKindOfValue) {
+  const SceneDescription scene = read({}, R"({
+    // A comment, and another one:  /* */
+    "$schema": "scene.schema.json",
+    "seed": 7,
+    "field": { "file": "/data/stress.vdb", "name": "stress", "derive": "gradient", "eigenvalues": "positive",
+               "scale": -2.5, "bounds": "hull.ply" },
+    "bending": { "rgb": [0.1, 0.2, 0.3], "method": "dopri5", "step": 0.25, "tolerance": 1e-5, "max_steps": 1e3 },
+    "light": { "direction": [1, 0, -1], "up": [0, 1, 0], "photons": 1e6, "pattern": "sobol", "spectrum": "lamp.txt",
+               "irradiance": 2, "aperture": { "center": [1, 2, 3], "size": [4, 5] } },
+    "obstacles": [ { "file": "body.ply" }, { "file": "../hand.obj" } ],
+    "receiver": { "center": [0, 0, -3], "normal": [0, 0, 1], "up": [1, 0, 0], "size": [2, 3], "resolution": [64, 32] },
+    "integrator": { "type": "photon_distribution", "density": { "kind": "histogram", "tau": 2 } },
+    "output": { "photons": "out/photons.vtp", "exposure": -1, "white_balance": false, "view": "Raw" }
+  })");
+  EXPECT_EQ(scene.seed, 7u);
+  EXPECT_EQ(scene.field.file, "/data/stress.vdb");
+  EXPECT_EQ(scene.field.name, "stress");
+  EXPECT_EQ(scene.field.derive, Derive::gradient);
+  EXPECT_EQ(scene.field.eigenvalues, Eigenvalues::positive);
+  EXPECT_EQ(scene.field.scale, -2.5);
+  EXPECT_EQ(scene.field.bounds, folder_ / "hull.ply");
+  EXPECT_EQ(scene.bending.rgb, Eigen::Vector3d(0.1, 0.2, 0.3));
+  EXPECT_EQ(scene.bending.settings.method, BendingMethod::dopri5);
+  EXPECT_EQ(scene.bending.settings.step, 0.25);
+  EXPECT_EQ(scene.bending.settings.tolerance, 1e-5);
+  EXPECT_EQ(scene.bending.settings.max_steps, 1000);
+  EXPECT_EQ(scene.light.direction, Eigen::Vector3d(1, 0, -1));
+  EXPECT_EQ(scene.light.up, Eigen::Vector3d(0, 1, 0));
+  EXPECT_EQ(scene.light.photons, 1000000u);
+  EXPECT_EQ(scene.light.pattern, BeamPattern::sobol);
+  EXPECT_EQ(scene.light.spectrum, (folder_ / "lamp.txt").string());
+  EXPECT_EQ(scene.light.irradiance, 2);
+  ASSERT_TRUE(scene.light.aperture);
+  EXPECT_EQ(scene.light.aperture->center, Eigen::Vector3d(1, 2, 3));
+  EXPECT_EQ(scene.light.aperture->size, Eigen::Vector2d(4, 5));
+  EXPECT_EQ(scene.obstacles, (std::vector<fs::path>{folder_ / "body.ply", folder_ / "../hand.obj"}));
+  EXPECT_EQ(scene.receiver.center, Eigen::Vector3d(0, 0, -3));
+  EXPECT_EQ(scene.receiver.size, Eigen::Vector2d(2, 3));
+  EXPECT_EQ(scene.receiver.resolution, Eigen::Vector2i(64, 32));
+  EXPECT_EQ(scene.integrator.density.kind, DensityKind::histogram);
+  EXPECT_EQ(scene.integrator.density.tau, 2);
+  EXPECT_EQ(scene.output.photons, folder_ / "out/photons.vtp");
+  EXPECT_TRUE(scene.output.image.empty()) << "one output is named, so that the others are not wanted";
+  EXPECT_EQ(scene.output.exposure, -1);
+  EXPECT_FALSE(scene.output.white_balance);
+  EXPECT_EQ(scene.output.view, "Raw");
+}
+
+TEST_F(ReadScene, WordsStandForNoValue) {
+  const SceneDescription scene = read({"field.scale=auto", "bending.step=auto", "output.exposure=auto",
+                                       "light.wavelengths.per_photon=all", "receiver.resolution=100"});
+  EXPECT_FALSE(scene.field.scale);
+  EXPECT_EQ(scene.bending.settings.step, 0);
+  EXPECT_FALSE(scene.output.exposure);
+  EXPECT_EQ(scene.light.wavelengths_per_photon, 0);
+  EXPECT_EQ(scene.receiver.resolution, Eigen::Vector2i(100, 100));
+}
+
+TEST_F(ReadScene, Generates) {
+  const std::string text = R"({"field": {"generate": {"kind": "constant", "tensor": [[1, 2, 3], [4, 5, 6], [7, 8, 9]],
+      "resolution": [4, 5, 6], "min": [0, 0, 0], "max": [1, 2, 3]}}, "integrator": {"type": "photon_distribution"}})";
+  const SceneDescription scene = read({}, text);
+  ASSERT_TRUE(scene.field.generate);
+  const auto& constant = std::get<Constant>(scene.field.generate->generator);
+  EXPECT_EQ(constant.tensor(0, 1), 2);
+  EXPECT_EQ(constant.tensor(2, 0), 7);
+  EXPECT_EQ(scene.field.generate->grid.resolution, Eigen::Vector3i(4, 5, 6));
+  EXPECT_EQ(scene.field.generate->grid.max, Eigen::Vector3d(1, 2, 3));
+}
+
+TEST_F(ReadScene, OneResolutionMakesCubes) {
+  const Overrides generate{"field.file=null", "field.generate.kind=helix", "field.generate.resolution=17"};
+  const GridSettings standard = read(generate).field.generate->grid;
+  const GridSettings expected = default_grid(Helix{}, 17);
+  EXPECT_EQ(standard.resolution, expected.resolution);
+  EXPECT_EQ(standard.max, expected.max);
+
+  Overrides box = generate;
+  box.insert(box.end(), {"field.generate.min=[0,0,0]", "field.generate.max=[1,2,4]"});
+  EXPECT_EQ(read(box).field.generate->grid.resolution, Eigen::Vector3i(5, 9, 17));
+}
+
+TEST_F(ReadScene, OverridesChangeAddAndRemove) {
+  const Overrides overrides{"light.photons=12",           "light.pattern=grid", "obstacles.0.file=a.ply",
+                            "obstacles.1.file=\"b.ply\"", "obstacles.0=null",   "receiver.size.0=3",
+                            "receiver.size.1=4",          "output.view=x=y",    "light.photons=13",
+                            "nothing.here=null"};
+  const SceneDescription scene = read(overrides);
+  EXPECT_EQ(scene.light.photons, 13u);
+  EXPECT_EQ(scene.light.pattern, BeamPattern::grid);
+  EXPECT_EQ(scene.obstacles, std::vector<fs::path>{folder_ / "b.ply"});
+  EXPECT_EQ(scene.receiver.size, Eigen::Vector2d(3, 4));
+  EXPECT_EQ(scene.output.view, "x=y");
+  const auto text = nlohmann::json::parse(scene.text);
+  EXPECT_EQ(text["light"]["photons"], 13) << "the scene's text is that after overrides";
+}
+
+TEST_F(ReadScene, OverridesAreChecked) {
+  EXPECT_THAT(error({"seed"}), HasSubstr("must be KEY=VALUE"));
+  EXPECT_THAT(error({"=3"}), HasSubstr("must be KEY=VALUE"));
+  EXPECT_THAT(error({"light..photons=3"}), HasSubstr("one dot"));
+  EXPECT_THAT(error({"field.file.x=3"}), HasSubstr("`x` has no place in \"a.vdb\""));
+  EXPECT_THAT(error({"obstacles.0.file=a", "obstacles.7.file=a"}), HasSubstr("no item 7"));
+  EXPECT_THAT(error({"obstacles.0.file=a", "obstacles.x.file=a"}), HasSubstr("must be a number"));
+  EXPECT_THAT(error({"field.name=\xff"}), HasSubstr("UTF-8"));
+  EXPECT_THAT(error({"seed=" + std::string(100000, '[')}), HasSubstr("nested deeper"));
+  std::string deep = "a";
+  for (int i = 0; i < 100000; ++i) deep += ".a";
+  EXPECT_THAT(error({deep + "=1"}), HasSubstr("deeper"));
+}
+
+TEST_F(ReadScene, UnknownKeysAreRefusedWithTheNearest) {
+  const std::string file = (folder_ / "scene.json").string();
+  EXPECT_EQ(error({"lihgt.photons=1"}), file + ": unknown key `/lihgt`; did you mean `light`?");
+  EXPECT_THAT(error({"light.photon=1"}), HasSubstr("`/light/photon`; did you mean `photons`?"));
+  EXPECT_THAT(error({"light.wavelengths.cuont=1"}), HasSubstr("`/light/wavelengths/cuont`; did you mean `count`?"));
+  EXPECT_THAT(error({"obstacles.0.fiel=a"}), HasSubstr("`/obstacles/0/fiel`; did you mean `file`?"));
+  EXPECT_THAT(error({"camera={}"}), HasSubstr("unknown key `/camera`; known here are `$schema`, `bending`, `field`"));
+  EXPECT_THAT(error({"a/b~c=1"}), HasSubstr("`/a~1b~0c`"));
+  EXPECT_THAT(error({std::string(5000, 'x') + "=1"}), HasSubstr("known here"));
+  EXPECT_THAT(error({"field.file=null", "field.generate={\"kind\":\"helix\",\"lod\":1}"}),
+              HasSubstr("unknown key `/field/generate/lod`"));
+}
+
+TEST_F(ReadScene, WrongTypesSayWhatIsExpectedAndFound) {
+  const std::string file = (folder_ / "scene.json").string();
+  EXPECT_EQ(error({"output.white_balance=1"}), file + ": `/output/white_balance` must be true or false, but is 1");
+  EXPECT_THAT(error({"light.photons=many"}),
+              AllOf(HasSubstr("`/light/photons` must be an integer"), EndsWith("but is \"many\"")));
+  EXPECT_THAT(error({"bending.method=rk5"}),
+              HasSubstr("must be one of \"euler\", \"splitting\", \"rk4\", \"bs23\", \"dopri5\", but is \"rk5\""));
+  EXPECT_THAT(error({"integrator.type=lens"}), HasSubstr("must be \"photon_distribution\", but is \"lens\""));
+  EXPECT_THAT(error({"light=[]"}), HasSubstr("`/light` must be an object"));
+  EXPECT_THAT(error({"obstacles={}"}), HasSubstr("`/obstacles` must be a list of objects"));
+  EXPECT_THAT(error({"obstacles=[1]"}), HasSubstr("`/obstacles/0` must be an object"));
+  EXPECT_THAT(error({"field.file="}), HasSubstr("`/field/file` must be a file name, but is \"\""));
+  EXPECT_THAT(error({"field.scale=x"}), HasSubstr("must be a number other than 0, or \"auto\", but is \"x\""));
+  EXPECT_THAT(error({"light.direction=[0,1]"}), HasSubstr("a list of 3 numbers"));
+  EXPECT_THAT(error({"light.direction=[0,1,null]"}), HasSubstr("a list of 3 numbers"));
+}
+
+TEST_F(ReadScene, ValuesOutOfRange) {
+  const Overrides wrong{"light.photons=0",
+                        "light.photons=1.5",
+                        "light.photons=1e30",
+                        "light.photons=-1",
+                        "seed=18446744073709551616",
+                        "light.direction=[0,0,0]",
+                        "light.direction=[1e-200,0,0]",
+                        "light.direction=[1e200,0,0]",
+                        "light.wavelengths.min=300",
+                        "light.wavelengths.max=900",
+                        "light.wavelengths.count=0",
+                        "light.irradiance=0",
+                        "light.irradiance=NaN",
+                        "light.irradiance=1e999",
+                        "light.aperture.size=[1,0]",
+                        "bending.step=0",
+                        "bending.tolerance=0",
+                        "bending.max_steps=4294967297",
+                        "field.scale=0",
+                        "receiver.distance=-1",
+                        "receiver.normal=[0,0,0]",
+                        "receiver.size=[1,-1]",
+                        "receiver.resolution=[1,0]",
+                        "receiver.resolution=40000",
+                        "integrator.density.tau=0",
+                        "output.image=picture.bmp",
+                        "output.image=png",
+                        "output.exr=picture.png",
+                        "output.spectral=spectra.csv",
+                        "output.photons=photons.ply"};
+  for (const std::string& change : wrong) {
+    std::string pointer = "/" + change.substr(0, change.find('='));
+    for (char& c : pointer) c = c == '.' ? '/' : c;
+    EXPECT_THAT(error({change}), HasSubstr("`" + pointer + "` must be ")) << change;
+  }
+}
+
+TEST_F(ReadScene, GeneratorsAreChecked) {
+  const std::string start = R"({"integrator": {"type": "photon_distribution"}, "field": {"generate": )";
+  EXPECT_THAT(error({}, start + "{}}}"), HasSubstr("`/field/generate` needs the key `kind`"));
+  EXPECT_THAT(error({}, start + R"({"kind": "hleix"}}})"), HasSubstr("`helix`, but is \"hleix\""));
+  EXPECT_THAT(error({}, start + R"({"kind": 3}}})"), HasSubstr("`/field/generate/kind` must be one of"));
+  EXPECT_THAT(error({}, start + R"({"kind": "point_load", "poisson_ratio": 0.7}}})"), HasSubstr("poisson_ratio"));
+  EXPECT_THAT(error({}, start + R"({"kind": "rotation", "axis": [0, 0, 0]}}})"), HasSubstr("axis"));
+  EXPECT_THAT(error({}, start + R"({"kind": "helix", "min": [2, 0, 0]}}})"), HasSubstr("`max`"));
+  EXPECT_THAT(error({}, start + R"({"kind": "helix", "resolution": 0}}})"), HasSubstr("`/field/generate/resolution`"));
+  EXPECT_THAT(error({}, start + R"({"kind": "helix", "resolution": 20000}}})"), HasSubstr("2^31"));
+  EXPECT_THAT(error({}, start + R"({"kind": "constant", "tensor": [1,0,0,0,1,0,0,0,1]}}})"),
+              HasSubstr("3 rows of 3 numbers"));
+}
+
+TEST_F(ReadScene, KeysThatAreMissingOrExcludeEachOther) {
+  EXPECT_THAT(error({"field=null"}), EndsWith("the scene needs the key `field`"));
+  EXPECT_THAT(error({"integrator=null"}), EndsWith("the scene needs the key `integrator`"));
+  EXPECT_THAT(error({"integrator.type=null"}), EndsWith("`/integrator` needs the key `type`"));
+  EXPECT_THAT(error({"field.file=null"}), EndsWith("`/field` needs exactly one of `file` and `generate`"));
+  EXPECT_THAT(error({"field.generate.kind=helix"}), EndsWith("`/field` needs exactly one of `file` and `generate`"));
+  EXPECT_THAT(error({"bending.rgb=[1,2,3]", "bending.b=0"}), HasSubstr("`/bending/rgb` and `/bending/b` exclude"));
+  EXPECT_THAT(error({"bending.rgb=[1,2,3]", "output.spectral=a.exr"}), HasSubstr("`/output/spectral` needs"));
+  EXPECT_THAT(error({"receiver.center=[0,0,0]", "receiver.distance=1"}), HasSubstr("exclude each other"));
+}
+
+TEST_F(ReadScene, ChecksAcrossKeys) {
+  EXPECT_THAT(error({"light.wavelengths={\"min\":600,\"max\":500}"}), HasSubstr("`/light/wavelengths/min` (600 nm)"));
+  EXPECT_THAT(error({"light.wavelengths={\"min\":600,\"max\":600}"}),
+              HasSubstr("`/light/wavelengths/count` must be 1"));
+  EXPECT_EQ(read({"light.wavelengths={\"min\":600,\"max\":600,\"count\":1}"}).light.wavelength_count, 1);
+  EXPECT_THAT(error({"light.wavelengths.per_photon=5"}), HasSubstr("must divide `count` (32), but is 5"));
+  EXPECT_THAT(error({"light.wavelengths.per_photon=64"}), HasSubstr("must divide"));
+  EXPECT_EQ(read({"light.wavelengths.per_photon=8"}).light.wavelengths_per_photon, 8);
+  EXPECT_THAT(error({"receiver.normal=[1,0,0]"}), HasSubstr("`/receiver/normal` is across the light"));
+  EXPECT_NO_THROW(read({"receiver.normal=[1,0,0.01]"}));
+  EXPECT_NO_THROW(read({"light.up=[0,0,1]"})) << "up along the light has a fallback";
+  EXPECT_THAT(error({"receiver.resolution=[32768,32768]", "light.wavelengths.count=64"}), HasSubstr("GiB"));
+}
+
+TEST_F(ReadScene, OutputsNeverOverwriteEachOtherOrAnInput) {
+  EXPECT_THAT(error({"output.exr=a.exr", "output.spectral=./x/../a.exr"}), HasSubstr("same file as `/output/exr`"));
+  EXPECT_THAT(error({"output.photons=a.vdb"}),
+              HasSubstr("`/output/photons` (" + (folder_ / "a.vdb").string() + ") is the same file as `/field/file`"));
+  EXPECT_NO_THROW(read({"output.exr=a.exr", "output.spectral=b/a.exr", "output.photons=b.vdb"}));
+}
+
+TEST_F(ReadScene, Spectra) {
+  for (const char* name : {"D65", "E", "A", "blackbody 5500", "blackbody 2856.5"}) {
+    EXPECT_EQ(read({std::string("light.spectrum=\"") + name + "\""}).light.spectrum, name);
+  }
+  EXPECT_EQ(read({"light.spectrum=blackbody.txt"}).light.spectrum, (folder_ / "blackbody.txt").string());
+  EXPECT_EQ(read({"light.spectrum=/lamps/led"}).light.spectrum, "/lamps/led");
+  EXPECT_THAT(error({"light.spectrum=d65"}), HasSubstr("`/light/spectrum` must be one of \"D65\""));
+  for (const char* wrong : {"blackbody", "blackbody -1", "blackbody 0", "blackbody hot", "blackbody 5000 K"}) {
+    EXPECT_THAT(error({std::string("light.spectrum=") + wrong}), HasSubstr("blackbody KELVIN")) << wrong;
+  }
+}
+
+TEST_F(ReadScene, Warnings) {
+  const auto warnings = read({"light.wavelengths.max=800"}).warnings;
+  ASSERT_EQ(warnings.size(), 1u);
+  EXPECT_THAT(warnings[0], HasSubstr("-0.05 at 800 nm"));  // 0.75 − 0.001 · 800
+  EXPECT_TRUE(read({"light.wavelengths.max=750"}).warnings.empty());
+  EXPECT_THAT(read({"bending.rgb=[1,2,3]", "light.wavelengths.count=4"}).warnings.at(0), HasSubstr("no effect"));
+}
+
+TEST_F(ReadScene, SyntaxErrorsHaveAPosition) {
+  const std::string file = (folder_ / "scene.json").string();
+  EXPECT_THAT(error({}, "{\n  \"seed\": 1,\n  \"field\" {}\n}"), HasSubstr(file + ": line 3, column 11: "));
+  EXPECT_THAT(error({}, "{\n  \"seed\": 1,\n}"), AllOf(HasSubstr("line 3, column 1: "), HasSubstr("comma too many")));
+  EXPECT_THAT(error({}, "{\"seed\": 1"), HasSubstr("line 1, column 11: "));
+  EXPECT_THAT(error({}, "{\"seed\": 1} x"), HasSubstr("line 1, column 13: "));
+  EXPECT_THAT(error({}, "{\"seed\": 1e999}"), HasSubstr("number overflow"));
+  EXPECT_THAT(error({}, "{\"seed\": 1, \"seed\": 2}"), HasSubstr("key `seed` is given twice"));
+}
+
+TEST_F(ReadScene, FilesThatAreNoScenes) {
+  EXPECT_THAT(error({}, ""), EndsWith("is empty; a scene is a JSON object with `field` and `integrator`"));
+  EXPECT_THAT(error({}, " \n"), HasSubstr("is empty"));
+  EXPECT_THAT(error({}, "[]"), HasSubstr("must be a JSON object"));
+  EXPECT_THAT(error({"seed=1"}, "3"), HasSubstr("must be a JSON object"));
+  EXPECT_THAT(error({}, std::string(100000, '[')), HasSubstr("nested deeper than 64"));
+  std::string objects;
+  for (int i = 0; i < 100000; ++i) objects += "{\"a\":";
+  EXPECT_THAT(error({}, objects), HasSubstr("nested deeper than 64"));
+  std::string garbage;
+  for (int i = 0; i < 3000; ++i) garbage += static_cast<char>((i * 7919 + i / 3) % 256);
+  EXPECT_THAT(error({}, garbage), HasSubstr("line 1, column 1"));
+  EXPECT_THAT(error({}, "{\"field\": {\"file\": \"\xff\xfe\"}}"), HasSubstr("UTF-8"));
+  EXPECT_THAT(error({}, "{\"" + std::string(100000, 'x')), HasSubstr("line 1, column"));
+}
+
+TEST_F(ReadScene, PathsThatAreNoFiles) {
+  const auto message = [](const fs::path& path) -> std::string {
+    try {
+      read_scene(path);
+    } catch (const SceneError& error) {
+      return error.what();
+    }
+    return "";
+  };
+  EXPECT_THAT(message(folder_ / "missing.json"), HasSubstr("missing.json: no such file"));
+  EXPECT_THAT(message(folder_), HasSubstr("is a folder"));
+}
+
+}  // namespace
+}  // namespace tensorray

@@ -1,0 +1,155 @@
+// The schema and the reader are made from one table. Here every value that the schema speaks of is put through the
+// reader, so that both mean the same.
+
+#include <filesystem>
+#include <fstream>
+#include <string>
+#include <vector>
+
+#include <gtest/gtest.h>
+#include <nlohmann/json.hpp>
+#include <unistd.h>
+
+#include "scenes/read_scene.h"
+
+namespace tensorray {
+namespace {
+
+using Json = nlohmann::json;
+using Pointer = Json::json_pointer;
+
+/// A key that holds a value (not an object) in the schema.
+struct Leaf {
+  Pointer pointer;
+  Json schema;
+  Json scene;  ///< A scene to which the key can be added.
+};
+
+Json smallest_scene() { return {{"field", {{"file", "a.vdb"}}}, {"integrator", {{"type", "photon_distribution"}}}}; }
+
+void collect(const Json& schema, const Pointer& pointer, const Json& scene, std::vector<Leaf>& leaves) {
+  for (const auto& [key, value] : schema.at("properties").items()) {
+    const Pointer inner = pointer / key;
+    if (value.contains("properties")) {
+      collect(value, inner, scene, leaves);
+    } else if (key == "generate") {
+      for (const Json& kind : value.at("oneOf")) {
+        Json generated = scene;
+        generated["field"] = {{"generate", {{"kind", kind.at("properties").at("kind").at("const")}}}};
+        collect(kind, inner, generated, leaves);
+      }
+    } else {
+      leaves.push_back({inner, value, scene});
+    }
+  }
+}
+
+std::vector<Leaf> leaves() {
+  std::vector<Leaf> all;
+  collect(Json::parse(scene_schema()), Pointer(), smallest_scene(), all);
+  return all;
+}
+
+/// The reader's message; empty where it accepts.
+std::string refusal(const Json& scene) {
+  const auto path = std::filesystem::path(::testing::TempDir()) / ("schema_" + std::to_string(getpid()) + ".json");
+  std::ofstream(path) << scene;
+  std::string message;
+  try {
+    read_scene(path);
+  } catch (const SceneError& error) {
+    message = error.what();
+  }
+  std::filesystem::remove(path);
+  return message;
+}
+
+std::string refusal(const Leaf& leaf, const Json& value) {
+  Json scene = leaf.scene;
+  scene[leaf.pointer] = value;
+  return refusal(scene);
+}
+
+/// Whether the reader refused the very key with what it expected, and not something else.
+bool refused_for_its_value(const Leaf& leaf, const Json& value) {
+  return refusal(leaf, value).find("`" + leaf.pointer.to_string() + "` must be ") != std::string::npos;
+}
+
+TEST(Schema, IsOfTheDraftAndClosed) {
+  const Json schema = Json::parse(scene_schema());
+  EXPECT_EQ(schema.at("$schema"), "https://json-schema.org/draft/2020-12/schema");
+  EXPECT_EQ(schema.at("required"), Json({"field", "integrator"}));
+  EXPECT_EQ(schema.at("additionalProperties"), false);
+  EXPECT_EQ(schema.at("/properties/integrator/required"_json_pointer), Json::array({"type"}));
+  EXPECT_EQ(schema.at("/properties/light/additionalProperties"_json_pointer), false);
+  EXPECT_EQ(schema.at("/properties/light/properties/photons/default"_json_pointer), 1 << 20);
+  EXPECT_EQ(schema.at("/properties/field/properties/scale/default"_json_pointer), "auto");
+  EXPECT_EQ(schema.at("/properties/field/oneOf"_json_pointer).size(), 2u);
+  EXPECT_EQ(schema.at("/properties/field/properties/generate/oneOf"_json_pointer).size(), generator_kinds().size());
+}
+
+TEST(Schema, EveryKeyHasAMeaning) {
+  ASSERT_GT(leaves().size(), 60u);
+  for (const Leaf& leaf : leaves()) EXPECT_FALSE(leaf.schema.at("description").get<std::string>().empty());
+}
+
+TEST(Schema, TheReaderAcceptsEveryDefault) {
+  for (const Leaf& leaf : leaves()) {
+    if (!leaf.schema.contains("default")) continue;
+    EXPECT_EQ(refusal(leaf, leaf.schema.at("default")), "") << leaf.pointer.to_string();
+  }
+}
+
+TEST(Schema, TheReaderKnowsEveryWordAndNoOther) {
+  int checked = 0;
+  for (const Leaf& leaf : leaves()) {
+    if (!leaf.schema.contains("enum")) continue;
+    for (const Json& name : leaf.schema.at("enum")) EXPECT_EQ(refusal(leaf, name), "") << leaf.pointer.to_string();
+    EXPECT_TRUE(refused_for_its_value(leaf, "nonsense")) << leaf.pointer.to_string();
+    ++checked;
+  }
+  EXPECT_GE(checked, 6);
+}
+
+TEST(Schema, TheReaderRefusesWhatIsOutOfRange) {
+  int checked = 0;
+  for (const Leaf& leaf : leaves()) {
+    const Json number = leaf.schema.contains("anyOf") ? leaf.schema.at("anyOf").at(0) : leaf.schema;
+    const std::string type = number.value("type", "");
+    if (type != "number" && type != "integer") continue;
+    const std::string where = leaf.pointer.to_string();
+    EXPECT_TRUE(refused_for_its_value(leaf, "nonsense")) << where;
+    if (number.contains("minimum")) {
+      EXPECT_TRUE(refused_for_its_value(leaf, number.at("minimum").get<double>() - 1)) << where;
+    }
+    if (number.contains("exclusiveMinimum")) {
+      EXPECT_TRUE(refused_for_its_value(leaf, number.at("exclusiveMinimum"))) << where;
+    }
+    if (number.contains("maximum")) {
+      EXPECT_TRUE(refused_for_its_value(leaf, 2 * number.at("maximum").get<double>())) << where;
+    }
+    if (number.contains("not")) {
+      EXPECT_TRUE(refused_for_its_value(leaf, 0)) << where;
+    }
+    if (type == "integer") {
+      EXPECT_TRUE(refused_for_its_value(leaf, 1.5)) << where;
+    }
+    ++checked;
+  }
+  EXPECT_GE(checked, 20);
+}
+
+TEST(Schema, TheReaderRefusesListsOfAnotherLength) {
+  int checked = 0;
+  for (const Leaf& leaf : leaves()) {
+    if (!leaf.schema.contains("maxItems")) continue;
+    const auto size = leaf.schema.at("maxItems").get<std::size_t>();
+    EXPECT_TRUE(refused_for_its_value(leaf, std::vector<int>(size + 1, 1))) << leaf.pointer.to_string();
+    EXPECT_TRUE(refused_for_its_value(leaf, Json::array())) << leaf.pointer.to_string();
+    ++checked;
+  }
+  EXPECT_GE(checked, 8);
+}
+
+}  // namespace
+}  // namespace tensorray
