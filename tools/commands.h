@@ -1,0 +1,19 @@
+#pragma once
+/// @file tools/commands.h
+/// The subcommands of the program, a file each. Each adds itself to `program`, and does its work when the command line
+/// is parsed; errors are exceptions: CLI::Error, SceneError and std::invalid_argument where the user's input is wrong.
+
+namespace CLI {
+class App;
+}
+
+namespace tensorray {
+
+struct Progress;
+
+void add_render_command(CLI::App& program, Progress& progress);  ///< tensorray render SCENE.json: pictures of a scene.
+void add_make_command(CLI::App& program);                        ///< tensorray make KIND: an analytic field.
+void add_info_command(CLI::App& program);                        ///< tensorray info FILE.vdb: what a file holds.
+void add_schema_command(CLI::App& program);                      ///< tensorray schema: the JSON Schema of scenes.
+
+}  // namespace tensorray
