@@ -1,0 +1,143 @@
+#include <functional>
+#include <random>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <openvdb/openvdb.h>
+
+#include "tests/volumes/file_support.h"
+#include "volumes/tensor_files.h"
+
+namespace tensorray {
+namespace {
+
+namespace fs = std::filesystem;
+using testing::AllOf;
+using testing::HasSubstr;
+using testing::ThrowsMessage;
+
+/// Runs `read` on every fiftieth of a file, and some lengths near its ends; each must throw one line with its name.
+void expect_all_truncations_fail(const std::string& bytes, const std::string& label) {
+  std::vector<std::size_t> lengths{1, 7, 8, 11, 12, 20, 21, 57, bytes.size() - 1, bytes.size() - 2, bytes.size() - 9};
+  for (std::size_t i = 0; i < 50; ++i) lengths.push_back(bytes.size() * i / 50);
+  const Temporary path("short.vdb");
+  for (const std::size_t length : lengths) {
+    write_bytes(path, bytes.substr(0, length));
+    EXPECT_THAT([&] { read_tensor_vdb(path); },
+                ThrowsMessage<std::runtime_error>(AllOf(HasSubstr(path.string()), testing::Not(HasSubstr("\n")))))
+        << label << " " << length;
+    EXPECT_THROW(list_vdb(path), std::runtime_error) << label << " " << length;
+  }
+}
+
+TEST(DamagedFiles, TruncationIsNoticed) {
+  using namespace openvdb::io;
+  const Temporary path("a.vdb"), recompressed("b.vdb");
+  for (const bool half : {false, true}) {
+    write_tensor_vdb(path, sparse_grid(), half);
+    openvdb::io::File file(path.string());
+    file.open(/*delayLoad=*/false);
+    const auto grids = file.getGrids();
+    for (const std::uint32_t compression :
+         std::initializer_list<std::uint32_t>{COMPRESS_NONE, COMPRESS_ACTIVE_MASK, COMPRESS_ZIP | COMPRESS_ACTIVE_MASK,
+                                              COMPRESS_BLOSC | COMPRESS_ACTIVE_MASK}) {
+      write_stock(recompressed, *grids, compression);
+      expect_same_blocks(read_tensor_vdb(recompressed), read_tensor_vdb(path));
+      expect_all_truncations_fail(bytes_of(recompressed), compressionToString(compression));
+    }
+  }
+}
+
+TEST(DamagedFiles, DamageBeforeTheTreesNeverCrashes) {
+  const Temporary path("a.vdb"), damaged("b.vdb");
+  write_tensor_vdb(path, sparse_grid());
+  const std::string bytes = bytes_of(path);
+  std::mt19937 engine(3);
+  // What stands before the first grid's tree: header, metadata, table. (OpenVDB does not survive damaged trees.)
+  const std::size_t end = bytes.find("AffineMap") + 9;
+  for (int i = 0; i < 300; ++i) {
+    std::string changed = bytes;
+    for (int j = 0; j < 3; ++j) changed[engine() % end] = static_cast<char>(engine());
+    write_bytes(damaged, changed);
+    try {
+      read_tensor_vdb(damaged);
+    } catch (const std::runtime_error& error) {
+      EXPECT_THAT(error.what(), HasSubstr(damaged.string()));
+    }
+  }
+}
+
+TEST(DamagedFiles, NotVdbFiles) {
+  const Temporary path("a.vdb");
+  const auto expect = [&](const fs::path& file, const std::string& what) {
+    for (const auto& read :
+         {std::function<void()>([&] { read_tensor_vdb(file); }), std::function<void()>([&] { list_vdb(file); })})
+      EXPECT_THAT(read, ThrowsMessage<std::runtime_error>(AllOf(HasSubstr(file.string()), HasSubstr(what))));
+  };
+  expect(Temporary("missing.vdb"), "No such file");
+  expect(testing::TempDir(), "is a folder");
+  write_bytes(path, "");
+  expect(path, "not an OpenVDB file");
+  write_bytes(path, "{ \"field\": \"this is text, and long enough for a header of OpenVDB, or so one thinks\" }\n");
+  expect(path, "not an OpenVDB file");
+  std::mt19937 engine(5);
+  std::string noise(100000, ' ');
+  for (char& c : noise) c = static_cast<char>(engine());
+  write_bytes(path, noise);
+  expect(path, "not an OpenVDB file");
+  const std::int64_t magic = openvdb::OPENVDB_MAGIC;
+  const std::uint32_t format = openvdb::OPENVDB_FILE_VERSION;
+  std::string header(reinterpret_cast<const char*>(&magic), sizeof magic);
+  header.append(reinterpret_cast<const char*>(&format), sizeof format);
+  write_bytes(path, header + noise);
+  expect(path, "damaged");
+  header.back() = 1;
+  write_bytes(path, header + noise);
+  expect(path, "newer OpenVDB");
+}
+
+TEST(DamagedFiles, ReadsFormatsThatHoldUnknownGrids) {
+  // An unknown type in the table of grids does not hide the others: rename that of an unrelated grid.
+  const Temporary path("a.vdb");
+  openvdb::GridPtrVec grids;
+  for (int row = 0; row < 3; ++row) {
+    grids.push_back(stock_grid<openvdb::Vec3SGrid>("T_row" + std::to_string(row), openvdb::Vec3s(0)));
+    openvdb::gridPtrCast<openvdb::Vec3SGrid>(grids.back())->tree().setValue({0, 0, 0}, openvdb::Vec3s(1));
+  }
+  grids.insert(grids.begin(), stock_grid<openvdb::Int32Grid>("other", 0));
+  write_stock(path, grids);
+  std::string bytes = bytes_of(path);
+  const std::size_t at = bytes.find("Tree_int32_5_4_3");
+  ASSERT_NE(at, std::string::npos);
+  bytes.replace(at, 10, "Tree_mat3x");
+  write_bytes(path, bytes);
+  EXPECT_EQ(list_vdb(path)[0].type, "mat3x");
+  EXPECT_EQ(read_tensor_vdb(path).active_voxels(), 1u);
+}
+
+TEST(TensorFileWriting, FullDiskIsNoticed) {
+  const TensorGrid grid = sparse_grid();
+  const Temporary path("a.vdb");
+  write_tensor_vdb(path, grid);
+  const auto size = fs::file_size(path);
+  for (const auto limit : {std::uintmax_t{0}, std::uintmax_t{30}, size / 3, size / 2, size - 1}) {
+    fs::remove(path);
+    const FileSizeLimit limited(limit);
+    EXPECT_THROW(write_tensor_vdb(path, grid), std::runtime_error) << limit << " of " << size;
+  }
+  fs::remove(path);
+  const FileSizeLimit enough(size);
+  EXPECT_NO_THROW(write_tensor_vdb(path, grid));
+}
+
+TEST(TensorFileWriting, ToAFullDeviceOrAMissingFolderFails) {
+  const fs::path missing = Temporary("no_such_folder") / "a.vdb";
+  EXPECT_THAT([&] { write_tensor_vdb(missing, sparse_grid()); },
+              ThrowsMessage<std::runtime_error>(AllOf(HasSubstr(missing.string()), HasSubstr("No such file"))));
+  if (!fs::exists("/dev/full")) GTEST_SKIP() << "no /dev/full";
+  EXPECT_THAT([&] { write_tensor_vdb("/dev/full", sparse_grid()); },
+              ThrowsMessage<std::runtime_error>(HasSubstr("/dev/full: cannot be written")));
+}
+
+}  // namespace
+}  // namespace tensorray

@@ -1,0 +1,320 @@
+#include "volumes/eigenvalues.h"
+
+#include <cmath>
+#include <complex>
+#include <random>
+
+#include <Eigen/Eigenvalues>
+#include <Eigen/Geometry>
+#include <Eigen/LU>
+#include <gtest/gtest.h>
+#include <tbb/global_control.h>
+
+namespace tensorray {
+namespace {
+
+using Eigen::Matrix3d;
+using Eigen::Vector3d;
+using Complex = std::complex<double>;
+
+constexpr Eigenvalues both[] = {Eigenvalues::absolute, Eigenvalues::positive};
+
+Matrix3d matrix(std::initializer_list<double> rows) {
+  return Eigen::Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>(rows.begin());
+}
+
+class RandomTensors {
+ public:
+  Matrix3d general() {
+    return Matrix3d::NullaryExpr([&] { return normal_(engine_); });
+  }
+  Matrix3d symmetric() {
+    const Matrix3d half = general();
+    return half + half.transpose();
+  }
+  Eigen::Matrix3d rotation() {
+    const Eigen::Vector4d q = Eigen::Vector4d::NullaryExpr([&] { return normal_(engine_); });
+    return Eigen::Quaterniond(q).normalized().toRotationMatrix();
+  }
+  double exponent(double low, double high) { return std::uniform_real_distribution<double>(low, high)(engine_); }
+
+ private:
+  std::mt19937 engine_{7};
+  std::normal_distribution<double> normal_;
+};
+
+/// E f(Λ) E⁻¹ by complex eigenvectors, and what rounding makes of it: cond(E)² or so.
+struct Reference {
+  Matrix3d value;
+  double tolerance;
+};
+
+Reference reference(const Matrix3d& tensor, Eigenvalues mode) {
+  const Eigen::EigenSolver<Matrix3d> solver(tensor);
+  const Eigen::Matrix3cd vectors = solver.eigenvectors();
+  const Eigen::Vector3cd values = solver.eigenvalues().unaryExpr([&](Complex value) -> Complex {
+    if (mode == Eigenvalues::absolute) return std::abs(value);
+    return value.real() < 0 ? -value : value;
+  });
+  const Eigen::Matrix3cd inverse = vectors.inverse();
+  const double condition = vectors.norm() * inverse.norm();
+  return {(vectors * values.asDiagonal() * inverse).real(), 1e-14 * condition * condition * tensor.norm()};
+}
+
+TEST(Eigenvalues, AgreesWithComplexEigenvectorsOnRandomTensors) {
+  RandomTensors random;
+  int pairs = 0, compared = 0;
+  for (int i = 0; i < 20000; ++i) {
+    const Matrix3d tensor = random.general();
+    pairs += eigenvalues(tensor)[0].imag() != 0 || eigenvalues(tensor)[1].imag() != 0;
+    for (const Eigenvalues mode : both) {
+      const Reference expected = reference(tensor, mode);
+      if (expected.value.norm() > 4 * tensor.norm()) continue;  // Near-nilpotent: faded on purpose.
+      ++compared;
+      bool defective = false;
+      ASSERT_LE((with_eigenvalues(tensor, mode, &defective) - expected.value).norm(), expected.tolerance) << tensor;
+      EXPECT_FALSE(defective) << tensor;
+    }
+  }
+  EXPECT_GT(pairs, 5000);
+  EXPECT_LT(pairs, 15000);
+  EXPECT_GT(compared, 39000);
+}
+
+TEST(Eigenvalues, SquareRootOfSquareForPositive) {
+  RandomTensors random;
+  for (int i = 0; i < 2000; ++i) {
+    const Matrix3d tensor = random.general();
+    const Reference expected = reference(tensor, Eigenvalues::positive);
+    if (expected.value.norm() > 4 * tensor.norm()) continue;
+    const Matrix3d root = with_eigenvalues(tensor, Eigenvalues::positive);
+    EXPECT_LE((root * root - tensor * tensor).norm(), 10 * expected.tolerance * tensor.norm()) << tensor;
+    EXPECT_GE(eigenvalues(root)[2].real(), -1e-9);
+  }
+}
+
+TEST(Eigenvalues, SymmetricTensorsTakeTheAbsoluteValueOfEachEigenvalue) {
+  RandomTensors random;
+  for (int i = 0; i < 2000; ++i) {
+    const Matrix3d tensor = random.symmetric();
+    const Matrix3d absolute = with_eigenvalues(tensor, Eigenvalues::absolute);
+    EXPECT_EQ(absolute, with_eigenvalues(tensor, Eigenvalues::positive));
+    EXPECT_LE((absolute * absolute - tensor * tensor).norm(), 1e-13 * tensor.squaredNorm());
+    EXPECT_GE(eigenvalues(absolute)[2].real(), -1e-14 * tensor.norm());
+    EXPECT_LE((absolute - absolute.transpose()).norm(), 1e-14 * tensor.norm());
+  }
+}
+
+TEST(Eigenvalues, NearlySymmetricTensorsAreLikeSymmetricOnes) {
+  RandomTensors random;
+  for (int i = 0; i < 2000; ++i) {
+    Matrix3d tensor = random.symmetric();
+    if (i % 3 == 0) {  // Repeated eigenvalues.
+      const Matrix3d rotation = random.rotation();
+      tensor = rotation * Vector3d(1, -1, -1).asDiagonal() * rotation.transpose();
+    }
+    const Matrix3d noise = 1e-9 * random.general();
+    const Matrix3d expected = with_eigenvalues(tensor, Eigenvalues::absolute);
+    EXPECT_LE((with_eigenvalues(tensor + noise, Eigenvalues::absolute) - expected).norm(), 1e-7) << tensor;
+  }
+}
+
+TEST(Eigenvalues, IsIdempotent) {
+  RandomTensors random;
+  for (int i = 0; i < 5000; ++i) {
+    const Matrix3d tensor = random.general();
+    for (const Eigenvalues mode : both) {
+      const double tolerance = reference(tensor, mode).tolerance;
+      const Matrix3d once = with_eigenvalues(tensor, mode);
+      EXPECT_LE((with_eigenvalues(once, mode) - once).norm(), 10 * tolerance + 1e-6 * once.norm()) << tensor;
+    }
+  }
+}
+
+TEST(Eigenvalues, CommutesWithRotation) {
+  RandomTensors random;
+  for (int i = 0; i < 5000; ++i) {
+    const Matrix3d tensor = random.general(), rotation = random.rotation();
+    for (const Eigenvalues mode : both) {
+      const Matrix3d after = with_eigenvalues(rotation * tensor * rotation.transpose(), mode);
+      const Matrix3d before = rotation * with_eigenvalues(tensor, mode) * rotation.transpose();
+      EXPECT_LE((after - before).norm(), 10 * reference(tensor, mode).tolerance) << tensor;
+    }
+  }
+}
+
+TEST(Eigenvalues, ScalesWithTheTensor) {
+  RandomTensors random;
+  for (const double factor : {1e-300, 1e-30, 1e-12, 3.0, 1e12, 1e30, 1e300}) {
+    const Matrix3d tensor = random.general();
+    for (const Eigenvalues mode : both) {
+      const Matrix3d expected = with_eigenvalues(tensor, mode);
+      EXPECT_LE((with_eigenvalues(factor * tensor, mode) / factor - expected).norm(), 1e-12 * expected.norm());
+    }
+  }
+}
+
+TEST(Eigenvalues, ZeroStaysZero) {
+  for (const Eigenvalues mode : both) {
+    bool defective = false;
+    EXPECT_EQ(with_eigenvalues(Matrix3d::Zero(), mode, &defective), Matrix3d(Matrix3d::Zero()));
+    EXPECT_FALSE(defective);
+  }
+}
+
+TEST(Eigenvalues, JordanBlocksOfANonZeroEigenvalueKeepTheTensor) {
+  const Matrix3d two = matrix({2, 1, 0, 0, 2, 0, 0, 0, 5}), three = matrix({2, 1, 0, 0, 2, 1, 0, 0, 2});
+  const Matrix3d negative = matrix({-2, 1, 0, 0, -2, 0, 0, 0, -5});
+  for (const Eigenvalues mode : both) {
+    for (const Matrix3d& block : {two, three, negative}) {
+      bool defective = false;
+      const Matrix3d result = with_eigenvalues(block, mode, &defective);
+      EXPECT_LE((result - (block(0, 0) < 0 ? -1 : 1) * block).norm(), 1e-12) << block;
+      EXPECT_TRUE(defective) << block;
+    }
+    const Matrix3d mixed = matrix({-2, 1, 0, 0, -2, 0, 0, 0, 5});
+    bool defective = false;
+    EXPECT_LE((with_eigenvalues(mixed, mode, &defective) - matrix({2, -1, 0, 0, 2, 0, 0, 0, 5})).norm(), 1e-7);
+    EXPECT_TRUE(defective);
+  }
+}
+
+TEST(Eigenvalues, NilpotentTensorsVanish) {
+  RandomTensors random;
+  const Matrix3d shear = matrix({0, 0, 3, 0, 0, 0, 0, 0, 0}), chain = matrix({0, 1, 0, 0, 0, 1, 0, 0, 0});
+  const Matrix3d with_stretch = matrix({0, 0, 3, 0, 7, 0, 0, 0, 0});
+  for (const Eigenvalues mode : both) {
+    for (const Matrix3d& tensor : {shear, chain}) {
+      bool defective = false;
+      EXPECT_EQ(with_eigenvalues(tensor, mode, &defective).norm(), 0);
+      EXPECT_TRUE(defective);
+    }
+    bool defective = false;
+    EXPECT_LE((with_eigenvalues(with_stretch, mode, &defective) - matrix({0, 0, 0, 0, 7, 0, 0, 0, 0})).norm(), 1e-12);
+    EXPECT_TRUE(defective);
+    const Matrix3d rotation = random.rotation();
+    EXPECT_LE(with_eigenvalues(rotation * shear * rotation.transpose(), mode).norm(), 1e-7);
+    EXPECT_LE(with_eigenvalues(rotation * chain * rotation.transpose(), mode).norm(), 1e-7);
+  }
+}
+
+TEST(Eigenvalues, SingularButDiagonalisableTensorsAreNotDefective) {
+  RandomTensors random;
+  for (int i = 0; i < 200; ++i) {
+    const Matrix3d basis = random.general();
+    if (basis.jacobiSvd().singularValues()[2] < 0.1) continue;
+    const Matrix3d inverse = basis.inverse();
+    for (const Eigenvalues mode : both)
+      for (const Vector3d& diagonal : {Vector3d(-1, 0, 0), Vector3d(1, -1, 0), Vector3d(2, 2, -1), Vector3d(1, 1, 1)}) {
+        const Matrix3d tensor = basis * diagonal.asDiagonal() * inverse;
+        bool defective = false;
+        const Matrix3d expected = basis * diagonal.cwiseAbs().asDiagonal() * inverse;
+        EXPECT_LE((with_eigenvalues(tensor, mode, &defective) - expected).norm(), 1e-9 * basis.norm() * inverse.norm());
+        EXPECT_FALSE(defective) << tensor;
+      }
+  }
+}
+
+TEST(Eigenvalues, AlmostSimpleShearBecomesIsotropic) {
+  const double k = 2;
+  for (const Eigenvalues mode : both)
+    for (double epsilon = 0.1; epsilon > 1e-16; epsilon /= 10) {
+      // In the (x, z) plane, with an eigenvalue of zero across it.
+      const Matrix3d shear = matrix({0, 0, k, 0, 0, 0, epsilon, 0, 0});
+      const Matrix3d expected = std::sqrt(k * epsilon) * Vector3d(1, 0, 1).asDiagonal().toDenseMatrix();
+      EXPECT_LE((with_eigenvalues(shear, mode) - expected).norm(), 1.5e-6 * k) << epsilon;
+    }
+}
+
+TEST(Eigenvalues, AntisymmetricTensors) {
+  RandomTensors random;
+  for (int i = 0; i < 100; ++i) {
+    const Vector3d axis = random.rotation() * Vector3d::UnitX();
+    const double rate = std::pow(10, random.exponent(-6, 6));
+    const Matrix3d tensor = rate * matrix({0, -axis.z(), axis.y(), axis.z(), 0, -axis.x(), -axis.y(), axis.x(), 0});
+    const Matrix3d across = Matrix3d::Identity() - axis * axis.transpose();
+    bool defective = false;
+    EXPECT_LE((with_eigenvalues(tensor, Eigenvalues::absolute, &defective) - rate * across).norm(), 1e-12 * rate);
+    EXPECT_FALSE(defective);
+    EXPECT_LE((with_eigenvalues(tensor, Eigenvalues::positive, &defective) - tensor).norm(), 1e-12 * rate);
+    EXPECT_TRUE(defective);
+  }
+}
+
+TEST(Eigenvalues, NearDefectiveTensorsStayBounded) {
+  RandomTensors random;
+  const Matrix3d blocks[] = {matrix({0, 1, 0, 0, 0, 1, 0, 0, 0}), matrix({1, 1, 0, 0, 1, 1, 0, 0, 1}),
+                             matrix({0, 1, 0, 0, 0, 0, 0, 0, 0}), matrix({0, 1, 0, 0, 0, 0, 0, 0, 1})};
+  for (int i = 0; i < 40000; ++i) {
+    const Matrix3d rotation = random.rotation();
+    const Matrix3d noise = std::pow(10, random.exponent(-18, -1)) * random.general();
+    const Eigen::Matrix3f single = (rotation * (blocks[i % 4] + noise) * rotation.transpose()).cast<float>();
+    const Matrix3d tensor = single.cast<double>();
+    for (const Eigenvalues mode : both) {
+      const Matrix3d result = with_eigenvalues(tensor, mode);
+      ASSERT_TRUE(result.allFinite()) << tensor;
+      EXPECT_LE(result.norm(), 4.0001 * tensor.norm()) << tensor;
+    }
+  }
+}
+
+TEST(Eigenvalues, RefusesModesThatAreNotAFunction) {
+  EXPECT_THROW(with_eigenvalues(Matrix3d::Identity(), Eigenvalues::raw), std::invalid_argument);
+  EXPECT_THROW(with_eigenvalues(Matrix3d::Identity(), Eigenvalues::automatic), std::invalid_argument);
+}
+
+TEST(Eigenvalues, AreSortedByRealPart) {
+  const Eigen::Vector3cd real = eigenvalues(Vector3d(1, 3, -2).asDiagonal());
+  EXPECT_EQ(real, Eigen::Vector3cd(3, 1, -2));
+  const Eigen::Vector3cd pair = eigenvalues(matrix({1, -2, 0, 2, 1, 0, 0, 0, 0.5}));
+  EXPECT_LE((pair - Eigen::Vector3cd(Complex(1, 2), Complex(1, -2), 0.5)).norm(), 1e-14);
+}
+
+TensorGrid grid_of(const std::function<Matrix3d(const Eigen::Vector3i&)>& value) {
+  return dense_grid({Eigen::Vector3i(-3, 0, 5), Eigen::Vector3i(20, 17, 30)}, Eigen::Affine3d::Identity(), value);
+}
+
+TEST(ApplyEigenvalues, AutomaticIsAbsoluteForSymmetricFieldsOnly) {
+  TensorGrid symmetric = grid_of([](const auto& i) -> Matrix3d { return Vector3d(-1, i.x(), 1).asDiagonal(); });
+  const EigenvalueReport absolute = apply_eigenvalues(symmetric, Eigenvalues::automatic);
+  EXPECT_EQ(absolute.chosen, Eigenvalues::absolute);
+  EXPECT_NEAR(absolute.norm_lost, 0, 1e-12);
+  EXPECT_EQ(absolute.defective, 0u);
+  EXPECT_EQ(symmetric.blocks.front().values[511], Eigen::Matrix3f(Eigen::Vector3f(1, 1, 1).asDiagonal()));
+
+  TensorGrid general = grid_of([](const auto&) { return matrix({-1, 1, 0, 0, -1, 0, 0, 0, -1}); });
+  const TensorGrid before = general;
+  const EigenvalueReport raw = apply_eigenvalues(general, Eigenvalues::automatic);
+  EXPECT_EQ(raw.chosen, Eigenvalues::raw);
+  EXPECT_EQ(raw.norm_lost, 0);
+  EXPECT_EQ(general.blocks[0].values, before.blocks[0].values);
+}
+
+TEST(ApplyEigenvalues, CountsDefectiveVoxelsAndLostNorm) {
+  // Half of the voxels simple shear, half a rotation of the same norm: shear vanishes, rotation keeps its norm.
+  const auto value = [](const Eigen::Vector3i& i) {
+    return i.y() % 2 == 0 ? matrix({0, 0, std::sqrt(2.0), 0, 0, 0, 0, 0, 0}) : matrix({0, -1, 0, 1, 0, 0, 0, 0, 0});
+  };
+  TensorGrid grid = grid_of(value);
+  const std::size_t voxels = grid.active_voxels();
+  const EigenvalueReport report = apply_eigenvalues(grid, Eigenvalues::absolute);
+  EXPECT_EQ(report.chosen, Eigenvalues::absolute);
+  EXPECT_EQ(report.defective, voxels / 2);
+  EXPECT_NEAR(report.norm_lost, 0.5, 1e-6);
+}
+
+TEST(ApplyEigenvalues, DoesNotDependOnThreads) {
+  const auto value = [](const Eigen::Vector3i& i) {
+    return matrix({0.1 * i.x(), 1, -2, 0.3 * i.y(), -4, 0.5, 0.7, 0.2 * i.z(), -1});
+  };
+  TensorGrid many = grid_of(value), one = grid_of(value);
+  const EigenvalueReport with_many = apply_eigenvalues(many, Eigenvalues::absolute);
+  const tbb::global_control single(tbb::global_control::max_allowed_parallelism, 1);
+  const EigenvalueReport with_one = apply_eigenvalues(one, Eigenvalues::absolute);
+  EXPECT_EQ(with_many.norm_lost, with_one.norm_lost);
+  EXPECT_EQ(with_many.defective, with_one.defective);
+  for (std::size_t i = 0; i < one.blocks.size(); ++i) EXPECT_EQ(many.blocks[i].values, one.blocks[i].values);
+}
+
+}  // namespace
+}  // namespace tensorray

@@ -1,0 +1,346 @@
+#include "volumes/tensor_files.h"
+
+#include <fstream>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <openvdb/io/Stream.h>
+#include <openvdb/openvdb.h>
+
+#include "tests/volumes/file_support.h"
+
+namespace tensorray {
+namespace {
+
+namespace fs = std::filesystem;
+using Eigen::Matrix3d;
+using Eigen::Matrix3f;
+using Eigen::Vector3d;
+using Eigen::Vector3i;
+using testing::AllOf;
+using testing::HasSubstr;
+using testing::ThrowsMessage;
+
+TEST(TensorFiles, RoundTripIsExact) {
+  const TensorGrid grid = sparse_grid();
+  const Temporary path("a.vdb");
+  write_tensor_vdb(path, grid);
+  const TensorGrid read = read_tensor_vdb(path);
+  EXPECT_EQ(read.name, "stress");
+  EXPECT_EQ(read.metadata, grid.metadata);
+  EXPECT_LE((read.to_world.matrix() - grid.to_world.matrix()).norm(), 1e-14);
+  expect_same_blocks(read, grid);
+}
+
+TEST(TensorFiles, HalfRoundTripErrsByHalfsPrecision) {
+  const TensorGrid grid = sparse_grid();
+  const Temporary path("a.vdb"), full("b.vdb");
+  write_tensor_vdb(path, grid, true);
+  write_tensor_vdb(full, grid);
+  EXPECT_LT(fs::file_size(path), fs::file_size(full));
+  const TensorGrid read = read_tensor_vdb(path);
+  ASSERT_EQ(read.blocks.size(), grid.blocks.size());
+  for (std::size_t i = 0; i < grid.blocks.size(); ++i) {
+    EXPECT_EQ(read.blocks[i].active, grid.blocks[i].active);
+    for (int offset = 0; offset < TensorBlock::voxels; ++offset)  // 11 bits; below 2^-14 steps of 2^-24.
+      for (int c = 0; c < 9; ++c) {
+        const float value = grid.blocks[i].values[offset](c);
+        ASSERT_NEAR(read.blocks[i].values[offset](c), value, std::max(std::abs(value) / 2048, 3e-8f));
+      }
+  }
+  EXPECT_EQ(list_vdb(path)[0].storage, "half");
+  EXPECT_EQ(list_vdb(full)[0].storage, "full");
+}
+
+TEST(TensorFiles, HalfRefusesGreatValues) {
+  TensorGrid grid = sparse_grid();
+  grid.blocks[1].values[1](2, 0) = -70000;
+  const Temporary path("a.vdb");
+  EXPECT_THAT([&] { write_tensor_vdb(path, grid, true); },
+              ThrowsMessage<std::runtime_error>(AllOf(HasSubstr(path.string()), HasSubstr("65504"))));
+  EXPECT_NO_THROW(write_tensor_vdb(path, grid, false));
+}
+
+TEST(TensorFiles, KeepsNonFiniteValues) {
+  TensorGrid grid = sparse_grid();
+  grid.blocks[0].values[grid.blocks[0].active[1] ? 1 : 2](0, 1) = std::numeric_limits<float>::quiet_NaN();
+  const std::size_t active = grid.active_voxels();
+  const Temporary path("a.vdb");
+  write_tensor_vdb(path, grid);
+  TensorGrid read = read_tensor_vdb(path);
+  EXPECT_EQ(read.active_voxels(), active);
+  EXPECT_EQ(remove_non_finite(read), remove_non_finite(grid));
+}
+
+TEST(TensorFiles, SameGridGivesSameBytes) {
+  const Temporary a("a.vdb"), b("b.vdb"), c("c.vdb");
+  TensorGrid grid = sparse_grid();
+  write_tensor_vdb(a, grid);
+  write_tensor_vdb(b, grid);
+  EXPECT_EQ(bytes_of(a), bytes_of(b));
+  grid.blocks[3].active.set(4);
+  grid.blocks[3].values[4](1, 1) += 1;
+  write_tensor_vdb(c, grid);
+  EXPECT_NE(bytes_of(a).substr(21, 36), bytes_of(c).substr(21, 36));  // The unique tag tells them apart.
+}
+
+TEST(TensorFiles, StockOpenVdbReadsThem) {
+  const TensorGrid grid = sparse_grid();
+  const Temporary path("a.vdb");
+  write_tensor_vdb(path, grid);
+  openvdb::io::File file(path.string());
+  file.open();
+  const auto metadata = file.getMetadata();
+  EXPECT_EQ(metadata->metaValue<std::string>("tensorray:units"), "Pa/m");
+  for (int row = 0; row < 3; ++row) {
+    const auto base = file.readGrid("stress_row" + std::to_string(row));
+    const auto vectors = openvdb::gridPtrCast<openvdb::Vec3SGrid>(base);
+    ASSERT_TRUE(vectors);
+    EXPECT_EQ(vectors->getVectorType(), openvdb::VEC_INVARIANT);
+    EXPECT_EQ(vectors->activeVoxelCount(), grid.active_voxels());
+    EXPECT_EQ(vectors->metaValue<std::string>("tensorray:source"), "a test");
+    const openvdb::Vec3d world = vectors->indexToWorld(openvdb::Vec3d(2, 3, 4));
+    EXPECT_LE((Vector3d(world.x(), world.y(), world.z()) - grid.to_world * Vector3d(2, 3, 4)).norm(), 1e-12);
+    auto accessor = vectors->getConstAccessor();
+    for (const Vector3i& i : {Vector3i(-11, -3, 6), Vector3i(0, 0, 13), Vector3i(6, 12, 21)}) {
+      const openvdb::Vec3s value = accessor.getValue(openvdb::Coord(i.x(), i.y(), i.z()));
+      const Matrix3f* expected = find(grid, i);
+      for (int column = 0; column < 3; ++column) EXPECT_EQ(value[column], expected ? (*expected)(row, column) : 0);
+    }
+  }
+}
+
+TEST(TensorFiles, NumberedAndLetteredScalars) {
+  const auto scalar = [](const std::string& name, double value) -> openvdb::GridBase::Ptr {
+    const auto grid = stock_grid<openvdb::FloatGrid>(name, 0);
+    grid->tree().setValue(openvdb::Coord(1, 2, -3), static_cast<float>(value));
+    return grid;
+  };
+  openvdb::GridPtrVec numbered, full, six;
+  for (int i = 0; i < 9; ++i) {
+    numbered.push_back(scalar("T_" + std::to_string(i), i + 1));
+    full.push_back(scalar(std::string("T.") + "xyz"[i / 3] + "xyz"[i % 3], i + 1));
+    if (i % 3 >= i / 3) six.push_back(scalar(std::string("T.") + "xyz"[i / 3] + "xyz"[i % 3], i + 1));
+  }
+  std::reverse(full.begin(), full.end());  // The order in the file does not matter.
+  Matrix3f all, symmetric;
+  all << 1, 2, 3, 4, 5, 6, 7, 8, 9;
+  symmetric << 1, 2, 3, 2, 5, 6, 3, 6, 9;
+  const Temporary path("a.vdb");
+  for (const auto& [grids, expected] : {std::pair(numbered, all), std::pair(full, all), std::pair(six, symmetric)}) {
+    write_stock(path, grids);
+    const TensorGrid read = read_tensor_vdb(path);
+    EXPECT_EQ(read.name, "T");
+    ASSERT_EQ(read.active_voxels(), 1u);
+    ASSERT_NE(find(read, {1, 2, -3}), nullptr);
+    EXPECT_EQ(*find(read, {1, 2, -3}), expected);
+  }
+}
+
+TEST(TensorFiles, DoublePrecisionRows) {
+  openvdb::GridPtrVec rows;
+  for (int row = 0; row < 3; ++row) {
+    rows.push_back(stock_grid<openvdb::Vec3DGrid>("T_row" + std::to_string(row), openvdb::Vec3d(0)));
+    openvdb::gridPtrCast<openvdb::Vec3DGrid>(rows.back())->tree().setValue({0, 0, 0}, {row + 0.5, row + 1.5, 1e300});
+  }
+  const Temporary path("a.vdb");
+  write_stock(path, rows);
+  const TensorGrid read = read_tensor_vdb(path, "T");
+  EXPECT_EQ((*find(read, {0, 0, 0}))(2, 1), 3.5f);
+  EXPECT_EQ((*find(read, {0, 0, 0}))(2, 2), std::numeric_limits<float>::infinity());
+}
+
+TEST(TensorFiles, ActiveWhereAnyComponentIsAndZeroElsewhere) {
+  openvdb::GridPtrVec rows;
+  for (int row = 0; row < 3; ++row) {
+    const auto grid = stock_grid<openvdb::Vec3SGrid>("T_row" + std::to_string(row), openvdb::Vec3s(7));
+    grid->tree().setValueOn({row, 0, 0}, openvdb::Vec3s(1, 2, 3));
+    grid->tree().setValueOff({5, 5, 5}, openvdb::Vec3s(9));  // Inactive: does not count, whatever its value.
+    rows.push_back(grid);
+  }
+  const Temporary path("a.vdb");
+  write_stock(path, rows);
+  const TensorGrid read = read_tensor_vdb(path);
+  EXPECT_EQ(read.active_voxels(), 3u);
+  Matrix3f expected = Matrix3f::Zero();
+  expected.row(1) << 1, 2, 3;
+  EXPECT_EQ(*find(read, {1, 0, 0}), expected);
+  EXPECT_EQ(read.blocks[0].values[TensorBlock::offset(5, 5, 5)], Matrix3f(Matrix3f::Zero()));
+}
+
+TEST(TensorFiles, ActiveTilesAreVoxels) {
+  openvdb::GridPtrVec rows;
+  for (int row = 0; row < 3; ++row) {
+    const auto grid = stock_grid<openvdb::Vec3SGrid>("T_row" + std::to_string(row), openvdb::Vec3s(0));
+    // One leaf-sized tile and one of 16 × 128³ … that is, of the next level, plus ragged voxels around.
+    grid->sparseFill(openvdb::CoordBBox(-1, -8, 0, 8, -1, 7), openvdb::Vec3s(static_cast<float>(row + 1)));
+    grid->tree().addTile(2, openvdb::Coord(128, 0, 0), openvdb::Vec3s(4), true);
+    rows.push_back(grid);
+  }
+  EXPECT_GT(openvdb::gridPtrCast<openvdb::Vec3SGrid>(rows[0])->tree().activeTileCount(), 1u);
+  const Temporary path("a.vdb");
+  write_stock(path, rows);
+  const TensorGrid read = read_tensor_vdb(path);
+  EXPECT_EQ(read.active_voxels(), 10u * 8 * 8 + 128u * 128 * 128);
+  EXPECT_EQ((*find(read, {3, -4, 4}))(2, 0), 3.0f);
+  EXPECT_EQ((*find(read, {200, 100, 127}))(0, 2), 4.0f);
+  EXPECT_TRUE(std::is_sorted(read.blocks.begin(), read.blocks.end(), [](const auto& a, const auto& b) {
+    return std::lexicographical_compare(a.origin.data(), a.origin.data() + 3, b.origin.data(), b.origin.data() + 3);
+  }));
+}
+
+TEST(TensorFiles, GridsThatShareATree) {
+  const auto first = stock_grid<openvdb::FloatGrid>("T_1", 0);
+  first->tree().setValue({1, 1, 1}, 3);
+  openvdb::GridPtrVec grids{first};
+  for (const int i : {0, 2, 3, 4, 5, 6, 7, 8}) {
+    const openvdb::FloatGrid::Ptr shared = first->copy();  // Written once, referred to by the others.
+    shared->setName("T_" + std::to_string(i));
+    grids.push_back(shared);
+  }
+  const Temporary path("a.vdb");
+  write_stock(path, grids);
+  EXPECT_EQ(*find(read_tensor_vdb(path), {1, 1, 1}), Matrix3f(Matrix3f::Constant(3)));
+}
+
+TEST(TensorFiles, FilesWrittenAsAStream) {
+  const TensorGrid grid = sparse_grid();
+  const Temporary path("a.vdb"), streamed("b.vdb");
+  write_tensor_vdb(path, grid);
+  openvdb::io::File file(path.string());
+  file.open();
+  {
+    std::ofstream out(streamed, std::ios::binary);
+    openvdb::io::Stream(out).write(*file.getGrids());
+  }
+  expect_same_blocks(read_tensor_vdb(streamed), grid);
+  const std::string bytes = bytes_of(streamed);
+  for (int i = 0; i < 50; ++i) {
+    write_bytes(path, bytes.substr(0, bytes.size() * i / 50));
+    EXPECT_THROW(read_tensor_vdb(path), std::runtime_error) << i;
+  }
+}
+
+TEST(TensorFiles, ChoosesAmongFieldsByName) {
+  const Temporary path("a.vdb");
+  openvdb::GridPtrVec grids;
+  for (const std::string name : {"A", "B"})
+    for (int row = 0; row < 3; ++row) {
+      const auto grid = stock_grid<openvdb::Vec3SGrid>(name + "_row" + std::to_string(row), openvdb::Vec3s(0));
+      grid->tree().setValue({0, 0, 0}, openvdb::Vec3s(name == "A" ? 1 : 2));
+      grids.push_back(grid);
+    }
+  grids.push_back(stock_grid<openvdb::FloatGrid>("density", 0));
+  grids.push_back(stock_grid<openvdb::BoolGrid>("mask", false));
+  write_stock(path, grids);
+  EXPECT_EQ((*find(read_tensor_vdb(path, "B"), {0, 0, 0}))(0, 0), 2);
+  EXPECT_EQ(tensor_names(list_vdb(path)), (std::vector<std::string>{"A", "B"}));
+  EXPECT_THAT([&] { read_tensor_vdb(path); },
+              ThrowsMessage<std::runtime_error>(AllOf(HasSubstr(path.string()), HasSubstr("name one of: A, B"))));
+  EXPECT_THAT([&] { read_tensor_vdb(path, "C"); },
+              ThrowsMessage<std::runtime_error>(
+                  AllOf(HasSubstr("\"C\""), HasSubstr("density (float)"), HasSubstr("mask (bool)"))));
+  EXPECT_THAT([&] { read_tensor_vdb(path, "density", Derive::hessian); },
+              ThrowsMessage<std::runtime_error>(HasSubstr("no active voxel")));
+}
+
+TEST(TensorFiles, IncompleteFieldIsNoField) {
+  const Temporary path("a.vdb");
+  write_stock(path, {stock_grid<openvdb::Vec3SGrid>("T_row0", openvdb::Vec3s(0)),
+                     stock_grid<openvdb::Vec3SGrid>("T_row2", openvdb::Vec3s(0))});
+  EXPECT_THAT([&] { read_tensor_vdb(path); },
+              ThrowsMessage<std::runtime_error>(HasSubstr("T_row0 (vec3s), T_row2 (vec3s)")));
+}
+
+TEST(TensorFiles, RefusesDifferentTransformsAndFrustums) {
+  const Temporary path("a.vdb");
+  openvdb::GridPtrVec rows;
+  for (int row = 0; row < 3; ++row) {
+    rows.push_back(stock_grid<openvdb::Vec3SGrid>("T_row" + std::to_string(row), openvdb::Vec3s(0)));
+    openvdb::gridPtrCast<openvdb::Vec3SGrid>(rows.back())->tree().setValue({0, 0, 0}, openvdb::Vec3s(1));
+  }
+  rows[2]->setTransform(openvdb::math::Transform::createLinearTransform(0.5));
+  write_stock(path, rows);
+  EXPECT_THAT([&] { read_tensor_vdb(path); }, ThrowsMessage<std::runtime_error>(HasSubstr("different transforms")));
+  for (const auto& row : rows)
+    row->setTransform(
+        openvdb::math::Transform::createFrustumTransform(openvdb::BBoxd({0, 0, 0}, {8, 8, 8}), 0.5, 10, 1));
+  write_stock(path, rows);
+  EXPECT_THAT([&] { read_tensor_vdb(path); }, ThrowsMessage<std::runtime_error>(HasSubstr("not affine")));
+}
+
+/// Values of `value(world)` at the voxels of a ball, so that every kind of edge occurs.
+template <class Grid, class Value>
+typename Grid::Ptr ball(const std::string& name, const openvdb::math::Transform::Ptr& transform, const Value& value) {
+  const auto grid = stock_grid<Grid>(name, openvdb::zeroVal<typename Grid::ValueType>());
+  grid->setTransform(transform);
+  for (int x = -9; x <= 9; ++x)
+    for (int y = -9; y <= 9; ++y)
+      for (int z = -9; z <= 9; ++z)
+        if (x * x + y * y + z * z <= 80)
+          grid->tree().setValue({x, y, z}, value(transform->indexToWorld(openvdb::Coord(x, y, z))));
+  return grid;
+}
+
+openvdb::math::Transform::Ptr oblique_transform() {
+  const auto transform = openvdb::math::Transform::createLinearTransform(0.5);
+  transform->preScale(openvdb::Vec3d(1, 0.5, 2));
+  transform->postRotate(0.7, openvdb::math::X_AXIS);
+  transform->postRotate(-0.4, openvdb::math::Z_AXIS);
+  transform->postTranslate(openvdb::Vec3d(3, -1, 2));
+  return transform;
+}
+
+TEST(TensorFiles, GradientOfALinearFieldIsExactInWorldAxes) {
+  Matrix3d jacobian;
+  jacobian << 1, -2, 0.5, 3, 0.25, -1, 0.125, 4, -0.75;
+  const auto velocity = [&](const openvdb::Vec3d& p) {
+    const Vector3d v = jacobian * Vector3d(p.x(), p.y(), p.z());
+    return openvdb::Vec3d(v.x(), v.y(), v.z());
+  };
+  const Temporary path("a.vdb");
+  write_stock(path, {ball<openvdb::Vec3DGrid>("velocity", oblique_transform(), velocity)});
+  const TensorGrid read = read_tensor_vdb(path, "", Derive::gradient);
+  EXPECT_EQ(read.name, "velocity");
+  EXPECT_GT(read.active_voxels(), 2000u);
+  for (const TensorBlock& block : read.blocks)
+    for (int offset = 0; offset < TensorBlock::voxels; ++offset) {
+      if (!block.active[offset]) continue;
+      // The ball's six poles have no neighbour along two axes, which count as constant.
+      if ((block.origin + TensorBlock::position(offset)).cast<double>().norm() > 8.5) continue;
+      ASSERT_LE((block.values[offset].cast<double>() - jacobian).norm(), 1e-5);
+    }
+}
+
+TEST(TensorFiles, HessianOfAQuadraticIsExactInWorldAxes) {
+  Matrix3d second;
+  second << 2, 1, -0.5, 1, -3, 0.25, -0.5, 0.25, 1;
+  const auto potential = [&](const openvdb::Vec3d& p) {
+    const Vector3d x(p.x(), p.y(), p.z());
+    return 0.5 * x.dot(second * x) + x.dot(Vector3d(1, 2, 3)) - 5;
+  };
+  const Temporary path("a.vdb");
+  write_stock(path, {ball<openvdb::DoubleGrid>("potential", oblique_transform(), potential)});
+  const TensorGrid read = read_tensor_vdb(path, "potential", Derive::hessian);
+  std::size_t inside = 0;
+  for (const TensorBlock& block : read.blocks)
+    for (int offset = 0; offset < TensorBlock::voxels; ++offset) {
+      if (!block.active[offset]) continue;
+      ASSERT_EQ(block.values[offset], Matrix3f(block.values[offset].transpose()));
+      const Vector3i index = block.origin + TensorBlock::position(offset);
+      if (index.cast<double>().norm() > 6.5) continue;  // Deep enough for all differences.
+      ++inside;
+      ASSERT_LE((block.values[offset].cast<double>() - second).norm(), 1e-5);
+    }
+  EXPECT_GT(inside, 1000u);
+}
+
+TEST(TensorFiles, DeriveNeedsTheRightKindOfGrid) {
+  const Temporary path("a.vdb");
+  write_stock(path, {stock_grid<openvdb::FloatGrid>("f", 0)});
+  EXPECT_THAT([&] { read_tensor_vdb(path, "", Derive::gradient); },
+              ThrowsMessage<std::runtime_error>(AllOf(HasSubstr("vector grid"), HasSubstr("f (float)"))));
+}
+
+}  // namespace
+}  // namespace tensorray
