@@ -171,7 +171,8 @@ Plate make_plate(const SceneDescription& description, const TensorField& field, 
 
 Scene load_scene(const SceneDescription& description) {
   const auto start = std::chrono::steady_clock::now();
-  std::vector<std::string> notes = description.warnings;
+  std::vector<std::string> notes;
+  for (const std::string& warning : description.warnings) notes.push_back("warning: " + warning);
   ColorManagement color({description.output.ocio, description.output.display, description.output.view});
   std::vector<Band> bands = load_bands(description);
   std::vector<LightChannel> channels = channels_of(bands, description.bending);

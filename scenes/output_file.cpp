@@ -132,6 +132,13 @@ OutputFile& OutputFile::operator=(OutputFile&& other) noexcept {
   return *this;
 }
 
+void OutputFile::rethrow_for_target(std::string message) const {
+  const std::string name = temporary_.string();
+  for (std::size_t at = message.find(name); at != std::string::npos; at = message.find(name, at + 1))
+    message.replace(at, name.size(), target_.string());
+  throw std::runtime_error(message);
+}
+
 void OutputFile::commit() {
   if (temporary_.empty()) throw std::logic_error(target_.string() + ": was committed before");
   if (is_device_) {

@@ -29,11 +29,22 @@ class OutputFile {
   const std::filesystem::path& target() const { return target_; }
   bool is_device() const { return is_device_; }
 
+  /// Lets `writer(path())` write the temporary file; what it throws then names the target instead.
+  template <class Writer>
+  void write(const Writer& writer) {
+    try {
+      writer(temporary_);
+    } catch (const std::runtime_error& error) {
+      rethrow_for_target(error.what());
+    }
+  }
+
   /// Makes the target what was written; its permissions stay those of the file that was there.
   /// @throw std::runtime_error naming the target and the reason (a device that is full, say).
   void commit();
 
  private:
+  [[noreturn]] void rethrow_for_target(std::string message) const;
   void discard() noexcept;
 
   std::filesystem::path target_;     ///< As given.

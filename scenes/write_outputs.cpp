@@ -75,14 +75,19 @@ OutputFiles open_outputs(const OutputDescription& output) {
 
 std::vector<std::filesystem::path> write_outputs(const Render& render, const Scene& scene, OutputFiles files) {
   const ImageMetadata metadata = provenance(scene, render);
-  if (files.image) write_image(files.image->path(), display_image(scene, render.linear), metadata);
-  if (files.exr) write_image(files.exr->path(), render.linear, metadata);
+  const auto write_picture = [](std::optional<OutputFile>& file, const Image& image, const ImageMetadata& header) {
+    file->write([&](const std::filesystem::path& path) { write_image(path, image, header); });
+  };
+  if (files.image) write_picture(files.image, display_image(scene, render.linear), metadata);
+  if (files.exr) write_picture(files.exr, render.linear, metadata);
   if (files.spectral) {
     ImageMetadata spectral = metadata;
     spectral.insert(render.spectral->metadata.begin(), render.spectral->metadata.end());
-    write_image(files.spectral->path(), render.spectral->image, spectral);
+    write_picture(files.spectral, render.spectral->image, spectral);
   }
-  if (files.photons) write_points(files.photons->path(), point_cloud(render.photons, metadata));
+  if (files.photons)
+    files.photons->write(
+        [&](const std::filesystem::path& path) { write_points(path, point_cloud(render.photons, metadata)); });
 
   std::vector<OutputFile> complete;
   std::vector<std::filesystem::path> written;

@@ -125,7 +125,7 @@ void make(const MakeOptions& options) {
   OutputFile file(options.output);
   TensorGrid grid = generate(options.generator, settings);
   if (!options.name.empty()) grid.name = options.name;
-  write_tensor_vdb(file.path(), grid, options.half);
+  file.write([&](const std::filesystem::path& path) { write_tensor_vdb(path, grid, options.half); });
   const auto bytes = static_cast<double>(std::filesystem::file_size(file.path()));
   file.commit();
 

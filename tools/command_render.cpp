@@ -106,10 +106,13 @@ nlohmann::json statistics_json(const Scene& scene, const Statistics& statistics,
 }
 
 void write_text(OutputFile& file, const std::string& text) {
-  std::ofstream stream(file.path(), std::ios::binary);
-  stream << text;
-  stream.close();
-  if (!stream) throw std::runtime_error(file.target().string() + ": cannot be written: the disk may be full");
+  file.write([&](const std::filesystem::path& path) {
+    std::ofstream stream(path, std::ios::binary);
+    stream << text;
+    stream.close();
+    if (!stream) throw std::runtime_error("cannot write " + path.string() + ": the disk may be full");
+  });
+  file.commit();
 }
 
 void run(const RenderOptions& options, Progress& progress) {
@@ -132,7 +135,6 @@ void run(const RenderOptions& options, Progress& progress) {
   if (statistics_file) {
     write_text(*statistics_file,
                statistics_json(scene, result.statistics, seconds, static_cast<int>(threads)).dump(2) + "\n");
-    statistics_file->commit();
   }
   if (!options.quiet)
     for (const auto& path : written) fmt::print("wrote {}\n", path.string());

@@ -27,6 +27,17 @@ int report(const std::exception& error, int status) {
   return status;
 }
 
+/// CLI11 says no more of an unknown command than that one is required.
+void require_known_command(const CLI::App& app, int argc, char** argv) {
+  if (argc < 2 || argv[1][0] == '-') return;
+  std::string known;
+  for (const CLI::App* command : app.get_subcommands({})) {
+    if (command->get_name() == argv[1]) return;
+    known += (known.empty() ? "" : ", ") + command->get_name();
+  }
+  throw std::invalid_argument(fmt::format("unknown command `{}`; there are {}", argv[1], known));
+}
+
 }  // namespace
 
 int main(int argc, char** argv) {
@@ -43,6 +54,7 @@ int main(int argc, char** argv) {
   tensorray::add_info_command(app);
   tensorray::add_schema_command(app);
   try {
+    require_known_command(app, argc, argv);
     app.parse(argc, argv);
     if (std::fflush(stdout) != 0) throw std::runtime_error("standard output cannot be written: the disk may be full");
     return 0;

@@ -1,0 +1,138 @@
+// What a user can get wrong, and what the program then says: one line, exit status 1 or 2, nothing written.
+
+#include <regex>
+
+#include "tests/program/support.h"
+
+namespace tensorray {
+namespace {
+
+using namespace test;
+
+class Errors : public Program {
+ protected:
+  /// Runs the program, which must fail with `status` and one line on standard error that matches `pattern`.
+  void expect_error(int status, const std::string& pattern, const std::vector<std::string>& arguments,
+                    long file_size_limit = 0) {
+    const auto before = files();
+    const Outcome outcome = run(arguments, file_size_limit);
+    EXPECT_EQ(outcome.status, status) << outcome.error;
+    EXPECT_TRUE(std::regex_search(outcome.error, std::regex(pattern))) << outcome.error << "\nexpected " << pattern;
+    EXPECT_EQ(std::count(outcome.error.begin(), outcome.error.end(), '\n'), 1) << outcome.error;
+    EXPECT_EQ(files(), before);
+  }
+
+  void expect_scene_error(int status, const std::string& pattern, const std::string& set) {
+    write("scene.json", small_scene());
+    expect_error(status, pattern, {"render", "scene.json", "-q", "--set", set});
+  }
+
+  void make_field(const std::string& name) { run_well({"make", "shear", "-o", name, "--resolution", "12"}); }
+};
+
+TEST_F(Errors, SceneFiles) {
+  expect_error(2, "none.json", {"render", "none.json"});
+  write("empty.json", "");
+  expect_error(2, "empty.json", {"render", "empty.json"});
+  write("broken.json", "{\n  \"field\": }");
+  expect_error(2, "broken.json.*line 2", {"render", "broken.json"});
+  write("partial.json", R"({"field": {"file": "a.vdb"}})");
+  expect_error(2, "integrator", {"render", "partial.json"});
+}
+
+TEST_F(Errors, SceneValues) {
+  expect_scene_error(2, "unknown key `/lihgt`; did you mean `light`", "lihgt.photons=5");
+  expect_scene_error(2, "/light/photons.*many", "light.photons=many");
+  expect_scene_error(2, "/light/photons", "light.photons=-5");
+  expect_scene_error(2, "/light/direction", "light.direction=[0,0,0]");
+  expect_scene_error(2, "/receiver/size", "receiver.size=[0,1]");
+  expect_scene_error(2, "/receiver/size", "receiver.size=[-1,1]");
+  expect_scene_error(2, "/receiver/resolution", "receiver.resolution=[0,5]");
+  expect_scene_error(2, "/receiver/normal", "receiver.normal=[1,0,0]");  // Parallel to light along −z.
+  expect_scene_error(2, "/integrator/type.*photon_distribution", "integrator.type=magic");
+  expect_scene_error(2, "/field/generate.*point_load", "field.generate.kind=cheese");
+  expect_scene_error(2, "poisson_ratio", "field.generate.poisson_ratio=0.9");
+  expect_scene_error(2, "/light/spectrum|cheese", "light.spectrum=cheese");
+  expect_scene_error(2, "output", "output.image=out.gif");
+}
+
+TEST_F(Errors, CommandLines) {
+  expect_error(2, "", {});
+  expect_error(2, "photograph", {"photograph"});
+  write("scene.json", small_scene());
+  expect_error(2, "threads", {"render", "scene.json", "--threads", "0"});
+  expect_error(2, "threads", {"render", "scene.json", "--threads", "many"});
+  expect_error(2, "", {"make", "cheese", "-o", "a.vdb"});
+  expect_error(2, "resolution", {"make", "vortex", "-o", "a.vdb", "--resolution", "0"});
+  expect_error(2, "", {"make", "vortex"});
+}
+
+TEST_F(Errors, FieldFiles) {
+  const auto render = [](const std::string& file, const std::string& name = "") {
+    std::vector<std::string> arguments{"render", "scene.json",        "-q", "--set", "field={}",
+                                       "--set",  "field.file=" + file};
+    if (!name.empty()) arguments.insert(arguments.end(), {"--set", "field.name=" + name});
+    return arguments;
+  };
+  write("scene.json", small_scene());
+  make_field("good.vdb");
+  run_well(render("good.vdb"));
+  for (const char* name : {"scene.png", "scene.exr"}) std::filesystem::remove(in_folder(name));
+
+  expect_error(1, "none.vdb", render("none.vdb"));
+  expect_error(1, "good.vdb.*cheese.*shear", render("good.vdb", "cheese"));
+  const std::string bytes = read_file(in_folder("good.vdb"));
+  for (const double part : {0.01, 0.1, 0.5, 0.9, 0.999}) {
+    write("truncated.vdb", bytes.substr(0, static_cast<std::size_t>(part * static_cast<double>(bytes.size()))));
+    expect_error(1, "truncated.vdb", render("truncated.vdb"));
+    expect_error(1, "truncated.vdb", {"info", "truncated.vdb"});
+  }
+  write("text.vdb", "this is no VDB");
+  expect_error(1, "text.vdb", render("text.vdb"));
+  expect_error(1, "none.vdb", {"info", "none.vdb"});
+}
+
+TEST_F(Errors, Meshes) {
+  expect_scene_error(1, "none.ply", R"(obstacles=[{"file":"none.ply"}])");
+  write("open.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n");
+  expect_scene_error(1, "open.obj.*3 open edges|open.obj.*closed", "field.bounds=open.obj");
+  write("text.obj", "cheese");
+  expect_scene_error(1, "text.obj", R"(obstacles=[{"file":"text.obj"}])");
+}
+
+TEST_F(Errors, LightThatTheFieldMakesOddIsWarnedOf) {
+  write("scene.json", small_scene());
+  const Outcome outcome = run_well({"render", "scene.json", "--set", "bending.a=0.5"});
+  EXPECT_TRUE(std::regex_search(outcome.error, std::regex("warning.*negative"))) << outcome.error;
+}
+
+TEST_F(Errors, OutputsThatCannotBeWritten) {
+  write("scene.json", small_scene());
+  write("occupied", "");
+  expect_error(1, "none/a.png", {"render", "scene.json", "-q", "-o", "none/a.png"});
+  expect_error(1, "occupied", {"render", "scene.json", "-q", "-o", "occupied/a.png"});
+  std::filesystem::create_directory(in_folder("folder.png"));
+  expect_error(1, "folder.png", {"render", "scene.json", "-q", "-o", "folder.png"});
+  expect_error(1, "none/a.vdb", {"make", "vortex", "-o", "none/a.vdb"});
+}
+
+TEST_F(Errors, AFullDiskLeavesTheOldPictureAndNoHalfOne) {
+  write("scene.json", small_scene());
+  for (const char* name : {"a.png", "a.exr", "a.spectral.exr", "a.vdb", "a.vtp", "a.jpg", "a.tif"}) {
+    write(name, "old");
+    expect_error(1, name, {"render", "scene.json", "-q", "-o", name, "--set", "receiver.resolution=[300,300]"}, 8);
+    EXPECT_EQ(read_file(in_folder(name)), "old") << name;
+    // A device that is full, behind a link.
+    std::filesystem::remove(in_folder(name));
+    std::filesystem::create_symlink("/dev/full", in_folder(name));
+    expect_error(1, name, {"render", "scene.json", "-q", "-o", name});
+    EXPECT_TRUE(std::filesystem::is_character_file("/dev/full"));
+  }
+  expect_error(1, "big.vdb", {"make", "helix", "-o", "big.vdb", "--resolution", "24"}, 8);
+  expect_error(1, "/dev/full", {"make", "helix", "-o", "/dev/full", "--resolution", "24"});
+  write("complete.png", "");
+  expect_error(1, "/dev/full", {"render", "scene.json", "-q", "-o", "complete.png", "--stats", "/dev/full"});
+}
+
+}  // namespace
+}  // namespace tensorray

@@ -1,0 +1,190 @@
+#include <cmath>
+
+#include "renderer/image.h"
+#include "tests/program/support.h"
+
+namespace tensorray {
+namespace {
+
+using namespace test;
+
+constexpr const char* zero_field =
+    R"({"generate": {"kind": "constant", "resolution": 9, "tensor": [[0, 0, 0], [0, 0, 0], [0, 0, 0]]}})";
+
+TEST_F(Program, WritesPictureAndExrBesideTheScene) {
+  write("scene.json", small_scene());
+  const Outcome outcome = run_well({"render", "scene.json"});
+  EXPECT_EQ(files(), (std::vector<std::string>{"scene.exr", "scene.json", "scene.png"}));
+  EXPECT_NE(outcome.out.find("scene.png"), std::string::npos);
+  EXPECT_NE(outcome.error.find("scale"), std::string::npos);  // What "auto" chose is told.
+  const Image exr = read_image(in_folder("scene.exr"));
+  EXPECT_EQ(exr.width, 32);
+  EXPECT_EQ(exr.channels, (std::vector<std::string>{"R", "G", "B"}));
+}
+
+TEST_F(Program, QuietPrintsNothing) {
+  write("scene.json", small_scene());
+  const Outcome outcome = run_well({"render", "scene.json", "--quiet"});
+  EXPECT_EQ(outcome.out + outcome.error, "");
+}
+
+TEST_F(Program, OutputOptionsTakeThePlaceOfTheScenes) {
+  write("scene.json", small_scene());
+  run_well({"render", "scene.json", "-o", "a.png", "-o", "b.spectral.exr", "-o", "c.vdb", "-o", "d.exr"});
+  EXPECT_EQ(files(), (std::vector<std::string>{"a.png", "b.spectral.exr", "c.vdb", "d.exr", "scene.json"}));
+  const Image spectral = read_image(in_folder("b.spectral.exr"));
+  ASSERT_EQ(spectral.channels.size(), 3u + 4u);
+  for (const double wavelength : {423.75, 511.25, 598.75, 686.25}) {
+    char name[32];
+    std::snprintf(name, sizeof name, "S0.%d,%06dnm", static_cast<int>(wavelength),
+                  static_cast<int>(std::lround(1e6 * (wavelength - std::floor(wavelength)))));
+    EXPECT_EQ(std::count(spectral.channels.begin(), spectral.channels.end(), name), 1) << name;
+  }
+}
+
+TEST_F(Program, ZeroFieldGivesANeutralUniformPlate) {
+  write("scene.json", small_scene(zero_field));
+  for (const std::string illuminant : {"D65", "A", "blackbody 3000"}) {
+    run_well({"render", "scene.json", "-q", "-o", "out.exr", "--set", "light.pattern=grid", "--set",
+              "light.photons=40000", "--set", "receiver.size=[1.5,1.5]", "--set", "light.spectrum=" + illuminant,
+              "--set", "receiver.resolution=[64,64]"});
+    const Image image = read_image(in_folder("out.exr"));
+    double sum = 0, least = 1e9, greatest = 0;
+    for (int y = 12; y < 52; ++y)  // Six standard deviations of the estimate from where the plate ends.
+      for (int x = 12; x < 52; ++x)
+        for (int c = 0; c < 3; ++c) {
+          const double value = image.pixel(x, y)[c];
+          sum += value / (40 * 40 * 3);
+          least = std::min(least, value);
+          greatest = std::max(greatest, value);
+        }
+    EXPECT_NEAR(sum, 1, 0.02) << illuminant;
+    EXPECT_LT((greatest - least) / sum, 1e-6) << illuminant;
+  }
+}
+
+TEST_F(Program, WithoutWhiteBalanceThePlateHasTheLightsColour) {
+  write("scene.json", small_scene(zero_field));
+  run_well({"render", "scene.json", "-q", "-o", "out.exr", "--set", "light.spectrum=A", "--set",
+            "output.white_balance=false", "--set", "light.wavelengths.min=360", "--set", "light.wavelengths.max=830"});
+  const Image image = read_image(in_folder("out.exr"));
+  const float* rgb = image.pixel(16, 16);
+  // Illuminant A, x = 0.4476, y = 0.4074, in linear Rec. 709 (IEC 61966-2-1) at Y = 1.
+  const double X = 0.4476 / 0.4074, Z = (1 - 0.4476 - 0.4074) / 0.4074;
+  const double red = 3.2406 * X - 1.5372 - 0.4986 * Z, green = -0.9689 * X + 1.8758 + 0.0415 * Z;
+  const double blue = 0.0557 * X - 0.2040 + 1.0570 * Z;
+  EXPECT_NEAR(rgb[0] / rgb[1], red / green, 3e-3);
+  EXPECT_NEAR(rgb[2] / rgb[1], blue / green, 3e-3);
+}
+
+TEST_F(Program, TheSamePictureOnAnyNumberOfThreads) {
+  write("scene.json", small_scene());
+  std::string first;
+  for (const std::string threads : {"1", "2", "8", "2"}) {
+    run_well({"render", "scene.json", "-q", "-o", "out.exr", "-o", "out.png", "--threads", threads, "--seed", "5",
+              "--set", "light.pattern=random"});
+    const std::string bytes = read_file(in_folder("out.exr")) + read_file(in_folder("out.png"));
+    if (first.empty()) first = bytes;
+    EXPECT_TRUE(bytes == first) << threads;
+  }
+  run_well(
+      {"render", "scene.json", "-q", "-o", "out.exr", "-o", "out.png", "--seed", "6", "--set", "light.pattern=random"});
+  EXPECT_FALSE(read_file(in_folder("out.exr")) + read_file(in_folder("out.png")) == first);
+}
+
+TEST_F(Program, StatisticsBalance) {
+  write("scene.json", small_scene());
+  run_well({"render", "scene.json", "-q", "-o", "out.exr", "--stats", "stats.json", "--threads", "2", "--set",
+            "field.scale=20"});
+  const nlohmann::json stats = read_json("stats.json");
+  const auto count = [&](const char* key) { return stats["photons"][key].get<std::uint64_t>(); };
+  EXPECT_EQ(count("emitted"), 4 * count("positions"));
+  std::uint64_t ended = count("deposited") + count("missed");
+  for (const auto& [reason, stopped] : stats["photons"]["stopped"].items()) ended += stopped.get<std::uint64_t>();
+  EXPECT_EQ(ended, count("emitted"));
+  EXPECT_GT(count("deposited"), 0u);
+  for (const char* key : {"ray_steps", "tensor_samples", "peak_memory_bytes", "threads"})
+    EXPECT_GT(stats[key], 0) << key;
+  for (const char* phase : {"load", "trace", "density", "color", "write"})
+    EXPECT_GE(stats["seconds"][phase], 0) << phase;
+}
+
+TEST_F(Program, RgbModeIsThePapers) {
+  write("scene.json", small_scene());
+  run_well({"render", "scene.json", "-q", "-o", "out.exr", "--set", "bending.rgb=[0.1,0.2,0.3]"});
+  EXPECT_EQ(read_image(in_folder("out.exr")).channels.size(), 3u);
+  // Equal flexibilities: no colour at all.
+  run_well({"render", "scene.json", "-q", "-o", "out.exr", "--set", "bending.rgb=[0.2,0.2,0.2]"});
+  const Image grey = read_image(in_folder("out.exr"));
+  for (int i = 0; i < 32 * 32; ++i) {
+    const float* rgb = grey.pixel(i % 32, i / 32);
+    ASSERT_NEAR(rgb[0], rgb[1], 1e-5);
+    ASSERT_NEAR(rgb[0], rgb[2], 1e-5);
+  }
+}
+
+TEST_F(Program, ProvenanceIsInTheHeader) {
+  write("scene.json", small_scene());
+  run_well({"render", "scene.json", "-q", "-o", "out.exr", "--seed", "77"});
+  const std::string bytes = read_file(in_folder("out.exr"));
+  for (const char* text : {"tensorray:version", "tensorray:scene", "point_load", "tensorray:seed", "77",
+                           "tensorray:photons", "tensorray:ocio_config", "tensorray:color_space"})
+    EXPECT_NE(bytes.find(text), std::string::npos) << text;
+}
+
+TEST_F(Program, FilesGoThroughMakeInfoAndRender) {
+  const Outcome made = run_well({"make", "vortex", "-o", "vortex.vdb", "--resolution", "16", "--circulation", "3"});
+  const nlohmann::json info = nlohmann::json::parse(run_well({"info", "vortex.vdb", "--json"}).out);
+  EXPECT_NE(info.dump().find("circulation=3"), std::string::npos) << info.dump(2);
+  EXPECT_NE(run_well({"info", "vortex.vdb"}).out.find("4096"), std::string::npos);
+  write("scene.json", small_scene(R"({"file": "vortex.vdb"})"));
+  run_well({"render", "scene.json", "-q"});
+  // The same field made in memory gives the same picture.
+  const std::vector<float> from_file = read_image(in_folder("scene.exr")).pixels;
+  write("scene.json", small_scene(R"({"generate": {"kind": "vortex", "resolution": 16, "circulation": 3}})"));
+  run_well({"render", "scene.json", "-q"});
+  EXPECT_EQ(read_image(in_folder("scene.exr")).pixels, from_file);
+}
+
+TEST_F(Program, ObstaclesAndCutsAreLoaded) {
+  write("wall.obj", "v -9 -9 -2.2\nv 9 -9 -2.2\nv 9 9 -2.2\nv -9 9 -2.2\nf 1 2 3 4\n");
+  write("scene.json", small_scene());
+  run_well({"render", "scene.json", "-q", "-o", "out.exr", "--stats", "stats.json", "--set",
+            R"(obstacles=[{"file":"wall.obj"}])"});
+  EXPECT_EQ(read_json("stats.json")["photons"]["deposited"], 0);
+  EXPECT_GT(read_json("stats.json")["photons"]["stopped"]["obstacle"], 0);
+
+  // A small closed box in a corner: the rest of the light goes straight.
+  write("box.obj",
+        "v 0.5 0.5 -1\nv 0.9 0.5 -1\nv 0.9 0.9 -1\nv 0.5 0.9 -1\n"
+        "v 0.5 0.5 -0.5\nv 0.9 0.5 -0.5\nv 0.9 0.9 -0.5\nv 0.5 0.9 -0.5\n"
+        "f 4 3 2 1\nf 5 6 7 8\nf 1 2 6 5\nf 2 3 7 6\nf 3 4 8 7\nf 4 1 5 8\n");
+  run_well({"render", "scene.json", "-q", "-o", "cut.exr", "--set", "field.bounds=box.obj"});
+  const Image cut = read_image(in_folder("cut.exr"));
+  EXPECT_NEAR(cut.pixel(8, 24)[1], 1, 0.05);
+}
+
+TEST_F(Program, AnInterruptLeavesNothingBehind) {
+  write("scene.json", small_scene());
+  write("scene.png", "an old picture");
+  const pid_t child = start({"render", "scene.json", "--set", "light.photons=1e9"});
+  // It has begun to render once its temporary files are there.
+  for (int i = 0; i < 500 && files().size() < 4; ++i) std::this_thread::sleep_for(std::chrono::milliseconds(20));
+  ASSERT_GE(files().size(), 4u);
+  kill(child, SIGINT);
+  const Outcome outcome = wait_for(child);
+  EXPECT_EQ(outcome.status, 130);
+  EXPECT_EQ(files(), (std::vector<std::string>{"scene.json", "scene.png"}));
+  EXPECT_EQ(read_file(in_folder("scene.png")), "an old picture");
+}
+
+TEST_F(Program, HelpAndVersion) {
+  EXPECT_NE(run_well({"--help"}).out.find("render"), std::string::npos);
+  EXPECT_NE(run_well({"render", "--help"}).out.find("--set"), std::string::npos);
+  EXPECT_NE(run_well({"make", "vortex", "--help"}).out.find("--circulation"), std::string::npos);
+  EXPECT_EQ(run_well({"--version"}).out.find("tensorray "), 0u);
+  EXPECT_TRUE(nlohmann::json::parse(run_well({"schema"}).out).contains("$schema"));
+}
+
+}  // namespace
+}  // namespace tensorray

@@ -1,0 +1,107 @@
+// The example scenes, and what their pictures show.
+
+#include <cmath>
+
+#include <Eigen/Core>
+
+#include "renderer/image.h"
+#include "tests/program/support.h"
+
+namespace tensorray {
+namespace {
+
+using namespace test;
+
+std::vector<std::filesystem::path> example_scenes() {
+  std::vector<std::filesystem::path> scenes;
+  for (const auto& entry : std::filesystem::directory_iterator(TENSORRAY_SOURCE_DIR "/scenes"))
+    if (entry.path().extension() == ".json") scenes.push_back(entry.path());
+  return scenes;
+}
+
+TEST_F(Program, EveryExampleSceneRendersAndBendsLight) {
+  const auto scenes = example_scenes();
+  EXPECT_GE(scenes.size(), 9u);
+  for (const auto& scene : scenes) {
+    const Outcome outcome = run_well({"render", scene.string(), "-o", "out.exr", "--set", "light.photons=4000", "--set",
+                                      "receiver.resolution=[64,64]", "--set", "light.wavelengths.count=8"});
+    // "auto" found a scale at which the median ray turns as far as it should.
+    EXPECT_NE(outcome.error.find("turns by 0.150 rad"), std::string::npos) << scene << "\n" << outcome.error;
+    const Image image = read_image(in_folder("out.exr"));
+    double least = 1e9, greatest = 0;
+    for (const float value : image.pixels) {
+      ASSERT_TRUE(std::isfinite(value));
+      least = std::min<double>(least, value);
+      greatest = std::max<double>(greatest, value);
+    }
+    EXPECT_LT(least, 0.1) << scene;
+    EXPECT_GT(greatest, 0.5) << scene;
+  }
+}
+
+/// A picture of a point load, the plate from −1.3 to 1.3 both ways.
+class PointLoadPicture : public Program {
+ protected:
+  Image picture(const std::string& scene) {
+    run_well({"render", TENSORRAY_SOURCE_DIR "/scenes/" + scene, "-q", "-o", "out.exr", "--set", "light.photons=40000",
+              "--set", "receiver.resolution=[130,130]", "--set", "light.wavelengths.count=16", "--set",
+              "integrator.density.tau=1.5", "--set", "field.generate.resolution=48"});
+    return read_image(in_folder("out.exr"));
+  }
+
+  /// Mean colour on a ring about the picture's middle; radii in world units.
+  static Eigen::Vector3d ring(const Image& image, double from, double to) {
+    Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+    int count = 0;
+    for (int y = 0; y < image.height; ++y)
+      for (int x = 0; x < image.width; ++x) {
+        const double r = 0.02 * std::hypot(x + 0.5 - 65, y + 0.5 - 65);
+        if (r < from || r >= to) continue;
+        sum += Eigen::Vector3f(image.pixel(x, y)).cast<double>();
+        ++count;
+      }
+    return sum / count;
+  }
+};
+
+TEST_F(PointLoadPicture, WithThePushThereIsADarkDiscWithARedRim) {
+  const Image image = picture("point_load_photons.json");
+  EXPECT_LT(ring(image, 0, 0.1).maxCoeff(), 0.02);
+  // From inside the light begins with red, which bends the least and so is pushed out the least.
+  double rim = 0.1;
+  while (ring(image, rim, rim + 0.02).x() < 0.2) rim += 0.02;
+  const Eigen::Vector3d colour = ring(image, rim, rim + 0.02);
+  EXPECT_GT(rim, 0.2);
+  EXPECT_LT(rim, 0.9);
+  EXPECT_GT(colour.x(), 1.5 * colour.y());
+  EXPECT_GT(colour.x(), 3 * colour.z());
+  // Sharp: within a few pixels it is brighter than undisturbed light.
+  EXPECT_GT(ring(image, rim + 0.08, rim + 0.12).y(), 1);
+}
+
+TEST_F(PointLoadPicture, AgainstThePushTheCentreIsBrightAndBluish) {
+  const Image image = picture("point_load_photons_against.json");
+  const Eigen::Vector3d centre = ring(image, 0, 0.3);
+  EXPECT_GT(centre.minCoeff(), 1.1);
+  EXPECT_GT(centre.z(), 1.05 * centre.x());
+}
+
+TEST_F(PointLoadPicture, FromTheSideBlueLightGathersAtTheLoad) {
+  const Image image = picture("point_load_photons_side.json");
+  Eigen::Vector3d brightest = Eigen::Vector3d::Zero();
+  int row = 0;
+  for (int y = 0; y < image.height; ++y) {
+    const Eigen::Vector3d colour = Eigen::Vector3f(image.pixel(65, y)).cast<double>();
+    if (colour.sum() > brightest.sum()) {
+      brightest = colour;
+      row = y;
+    }
+  }
+  EXPECT_LT(row, 45);  // The upper third: the load is at the top.
+  EXPECT_GT(brightest.z(), 1.5);
+  const Eigen::Vector3d far = Eigen::Vector3f(image.pixel(30, 95)).cast<double>();
+  EXPECT_LT((far.array() / far.mean() - 1).abs().maxCoeff(), 0.1);  // Grey.
+}
+
+}  // namespace
+}  // namespace tensorray

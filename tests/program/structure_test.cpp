@@ -1,0 +1,94 @@
+// The rules of ARCHITECTURE.md that a machine can check, on the sources themselves.
+
+#include <algorithm>
+#include <filesystem>
+#include <fstream>
+#include <map>
+#include <regex>
+#include <set>
+#include <string>
+#include <vector>
+
+#include <gtest/gtest.h>
+
+namespace {
+
+const std::filesystem::path root = TENSORRAY_SOURCE_DIR;
+
+/// What each folder may include, besides itself.
+const std::map<std::string, std::set<std::string>> allowed{
+    {"renderer", {}},
+    {"volumes", {}},
+    {"integrators", {"renderer", "volumes"}},
+    {"scenes", {"integrators", "renderer", "volumes"}},
+    {"tools", {"scenes", "integrators", "renderer", "volumes"}},
+};
+
+struct Line {
+  std::string file, text;
+};
+
+/// All lines of the sources in a folder.
+std::vector<Line> lines_of(const std::string& folder) {
+  std::vector<Line> lines;
+  for (const auto& entry : std::filesystem::recursive_directory_iterator(root / folder)) {
+    const std::string ending = entry.path().extension().string();
+    if (ending != ".h" && ending != ".cpp") continue;
+    std::ifstream file(entry.path());
+    const std::string name = std::filesystem::relative(entry.path(), root).string();
+    for (std::string text; std::getline(file, text);) lines.push_back({name, text});
+  }
+  EXPECT_GT(lines.size(), 100u) << "no sources in " << folder;
+  return lines;
+}
+
+TEST(Structure, NothingIncludesUpwards) {
+  const std::regex include("^#include \"([a-z]+)/");
+  for (const auto& [folder, others] : allowed)
+    for (const Line& line : lines_of(folder)) {
+      std::smatch match;
+      if (!std::regex_search(line.text, match, include)) continue;
+      EXPECT_TRUE(match[1] == folder || others.count(match[1])) << line.file << ": " << line.text;
+    }
+}
+
+TEST(Structure, HeavyLibrariesStayOutOfHeadersAndInTheirFolder) {
+  const std::map<std::string, std::string> homes{{"openvdb", "volumes"},      {"embree", "renderer"},
+                                                 {"OpenImageIO", "renderer"}, {"OpenColorIO", "renderer"},
+                                                 {"assimp", "renderer"},      {"vtk", "volumes"}};
+  const std::regex include("#include <(openvdb|embree|OpenImageIO|OpenColorIO|assimp|vtk)");
+  std::map<std::string, std::set<std::string>> users;
+  for (const auto& [folder, others] : allowed)
+    for (const Line& line : lines_of(folder)) {
+      std::smatch match;
+      if (!std::regex_search(line.text, match, include)) continue;
+      EXPECT_EQ(homes.at(match[1]), folder) << line.file;
+      users[match[1]].insert(line.file);
+      const bool private_header = line.file == "volumes/vdb_archive.h";  // Included by two .cpp of the same folder.
+      EXPECT_TRUE(private_header || line.file.substr(line.file.size() - 2) != ".h") << line.file << ": " << line.text;
+    }
+  for (const char* once : {"embree", "OpenColorIO", "OpenImageIO", "assimp"}) EXPECT_EQ(users[once].size(), 1u) << once;
+}
+
+TEST(Structure, LibrariesNeitherPrintNorExit) {
+  const std::regex forbidden(R"(std::(cout|cerr|clog|exit|abort|quick_exit)\b|\b(printf|puts|perror)\(|fmt::print)");
+  for (const auto& [folder, others] : allowed) {
+    if (folder == "tools") continue;
+    for (const Line& line : lines_of(folder))
+      EXPECT_FALSE(std::regex_search(line.text, forbidden)) << line.file << ": " << line.text;
+  }
+}
+
+TEST(Structure, OnlyBendingKnowsTheRule) {
+  for (const Line& line : lines_of("integrators")) {
+    if (line.file.rfind("integrators/bending", 0) == 0) continue;
+    EXPECT_EQ(line.text.find("TensorSampler"), std::string::npos) << line.file << ": " << line.text;
+  }
+}
+
+TEST(Structure, IntegratorsNeverSeeAScene) {
+  for (const Line& line : lines_of("integrators"))
+    EXPECT_EQ(line.text.find("SceneDescription"), std::string::npos) << line.file << ": " << line.text;
+}
+
+}  // namespace

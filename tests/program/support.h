@@ -1,0 +1,113 @@
+#pragma once
+/// @file tests/program/support.h
+/// Runs the whole program as a user does.
+
+#include <chrono>
+#include <csignal>
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
+#include <iterator>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include <fcntl.h>
+#include <gtest/gtest.h>
+#include <nlohmann/json.hpp>
+#include <sys/wait.h>
+#include <unistd.h>
+
+namespace tensorray::test {
+
+inline std::string read_file(const std::filesystem::path& path) {
+  std::ifstream file(path, std::ios::binary);
+  return {std::istreambuf_iterator<char>(file), {}};
+}
+
+struct Outcome {
+  int status = -1;  ///< Exit status; 128 + the signal's number if one ended the program.
+  std::string out, error;
+};
+
+/// A folder of its own for each test, removed at the end.
+class Program : public ::testing::Test {
+ protected:
+  void SetUp() override {
+    const auto* test = ::testing::UnitTest::GetInstance()->current_test_info();
+    folder_ =
+        std::filesystem::path(::testing::TempDir()) / ("tensorray_" + std::to_string(getpid()) + "_" + test->name());
+    std::filesystem::create_directories(folder_);
+  }
+  void TearDown() override { std::filesystem::remove_all(folder_); }
+
+  std::filesystem::path in_folder(const std::string& name) const { return folder_ / name; }
+
+  /// Starts the program with the test's folder as working folder. @return its process.
+  pid_t start(const std::vector<std::string>& arguments, long file_size_limit = 0) const {
+    const pid_t child = fork();
+    if (child != 0) return child;
+    if (chdir(folder_.c_str()) != 0) _exit(126);
+    const int out = open("stdout", O_WRONLY | O_CREAT | O_TRUNC, 0600);
+    const int error = open("stderr", O_WRONLY | O_CREAT | O_TRUNC, 0600);
+    dup2(out, 1);
+    dup2(error, 2);
+    std::string command;
+    if (file_size_limit > 0) command += "ulimit -f " + std::to_string(file_size_limit) + "; ";
+    command += "exec \"$0\" \"$@\"";
+    std::vector<const char*> argv{"sh", "-c", command.c_str(), TENSORRAY_BINARY};
+    for (const std::string& argument : arguments) argv.push_back(argument.c_str());
+    argv.push_back(nullptr);
+    execv("/bin/sh", const_cast<char**>(argv.data()));
+    _exit(127);
+  }
+
+  Outcome wait_for(pid_t child) const {
+    int status = 0;
+    waitpid(child, &status, 0);
+    return {WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status), read_file(in_folder("stdout")),
+            read_file(in_folder("stderr"))};
+  }
+
+  /// @param file_size_limit  In blocks of 512 bytes: what a full disk is like; 0: none.
+  Outcome run(const std::vector<std::string>& arguments, long file_size_limit = 0) const {
+    return wait_for(start(arguments, file_size_limit));
+  }
+
+  /// Runs the program, which must succeed.
+  Outcome run_well(const std::vector<std::string>& arguments) const {
+    const Outcome outcome = run(arguments);
+    EXPECT_EQ(outcome.status, 0) << outcome.error;
+    return outcome;
+  }
+
+  void write(const std::string& name, const std::string& text) const {
+    std::ofstream(in_folder(name), std::ios::binary) << text;
+  }
+
+  nlohmann::json read_json(const std::string& name) const { return nlohmann::json::parse(read_file(in_folder(name))); }
+
+  /// Names of what is in the folder besides what `run` leaves there.
+  std::vector<std::string> files() const {
+    std::vector<std::string> names;
+    for (const auto& entry : std::filesystem::directory_iterator(folder_)) {
+      const std::string name = entry.path().filename().string();
+      if (name != "stdout" && name != "stderr") names.push_back(name);
+    }
+    std::sort(names.begin(), names.end());
+    return names;
+  }
+
+ private:
+  std::filesystem::path folder_;
+};
+
+/// A scene that renders in a moment; `field` is the value of the key.
+inline std::string small_scene(const std::string& field = R"({"generate": {"kind": "point_load", "resolution": 17}})") {
+  return R"({"field": )" + field + R"(,
+             "light": {"photons": 2000, "wavelengths": {"count": 4}},
+             "receiver": {"resolution": [32, 32]},
+             "integrator": {"type": "photon_distribution", "density": {"tau": 2}}})";
+}
+
+}  // namespace tensorray::test
