@@ -22,4 +22,4 @@ endif()
 pkg_check_modules(OpenImageIO REQUIRED IMPORTED_TARGET OpenImageIO>=2.4)
 pkg_check_modules(OpenColorIO REQUIRED IMPORTED_TARGET OpenColorIO>=2.1)
 
-find_package(VTK REQUIRED COMPONENTS CommonCore CommonDataModel CommonMisc IOXML)
+find_package(VTK REQUIRED COMPONENTS CommonCore CommonDataModel IOXML)

@@ -66,7 +66,7 @@ TEST(Bending, SplittingIsExactInDirectionForConstantTensorsAtAnyStep) {
       const TensorField field = constant_field(T);
       const double h = step * field.voxel_size();
       const Ray ray = trace_steps(field, settings_of(BendingMethod::splitting, step), 1, P, V, 0.8);
-      EXPECT_LT((ray.direction - exact_path(T, 0.8, P, V, h).direction).norm(), 1e-13) << T << "\nstep " << step;
+      EXPECT_LT((ray.direction - exact_path(T, 0.8, P, V, h).direction).norm(), 2e-12) << T << "\nstep " << step;
     }
 }
 
@@ -94,7 +94,7 @@ TEST(Bending, DiagonalTensorsMatchTheClosedForm) {
   const Ray ray = trace_steps(field, settings_of(BendingMethod::splitting, 0.5), 4, {0, 0, 0.5}, V, 0.7);
   const double t = 4 * 0.5 * field.voxel_size();
   const Vector3d expected = ((0.7 * t * diagonal).array().exp() * V.array()).matrix().normalized();
-  EXPECT_LT((ray.direction - expected).norm(), 1e-13);
+  EXPECT_LT((ray.direction - expected).norm(), 1e-11);
 }
 
 TEST(Bending, AntisymmetricTensorsTurnLightAboutTheirAxis) {
@@ -103,7 +103,7 @@ TEST(Bending, AntisymmetricTensorsTurnLightAboutTheirAxis) {
   for (const double s : {0.3, -0.6}) {
     const Ray ray = trace_steps(field, settings_of(BendingMethod::splitting, 0.25), 8, {-0.4, 0, 0}, {1, 0, 0}, s);
     const double angle = s * 2 * 8 * 0.25 * field.voxel_size();
-    EXPECT_LT((ray.direction - Vector3d(std::cos(angle), std::sin(angle), 0)).norm(), 1e-13);
+    EXPECT_LT((ray.direction - Vector3d(std::cos(angle), std::sin(angle), 0)).norm(), 1e-11);
   }
 }
 
@@ -133,7 +133,7 @@ TEST(Bending, PathsAreRetracedWithTheOppositeSign) {
     const Ray there = trace_steps(field, settings, 16, P, V, 0.5);
     return (trace_steps(field, settings, 16, there.position, -there.direction, back).position - P).norm();
   };
-  EXPECT_LT(there_and_back(BendingMethod::splitting, -0.5), 1e-13);  // Symmetric in time: to rounding.
+  EXPECT_LT(there_and_back(BendingMethod::splitting, -0.5), 1e-10);  // Symmetric in time: exact but for rounding.
   EXPECT_LT(there_and_back(BendingMethod::rk4, -0.5), 1e-6);
   EXPECT_GT(there_and_back(BendingMethod::splitting, 0.5), 0.05);
 }
