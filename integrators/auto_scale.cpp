@@ -24,11 +24,12 @@ std::vector<Eigen::Vector3d> probe_origins(const Beam& beam) {
 
 /// How far the median ray turns if the field is multiplied by `scale`.
 AutoScale probe(const TensorField& field, const Geometry& geometry, const Beam& beam,
-                const std::vector<Eigen::Vector3d>& origins, double scale) {
+                const std::vector<Eigen::Vector3d>& origins, double scale, const Progress& progress) {
   BendingSettings settings;
   settings.step = 0.5;  // A fixed step: the splitting is stable however large the scale.
   std::vector<double> turns(origins.size());
   tbb::parallel_for(std::size_t{0}, origins.size(), [&](std::size_t i) {
+    if (progress.cancelled) throw Cancelled();
     RayBatch batch;
     batch.add(origins[i], beam.direction, probe_flexibility * scale);
     trace(field, geometry, settings, batch);
@@ -46,7 +47,7 @@ AutoScale probe(const TensorField& field, const Geometry& geometry, const Beam& 
 
 }  // namespace
 
-AutoScale choose_scale(const TensorField& field, const Geometry& geometry, const Beam& beam) {
+AutoScale choose_scale(const TensorField& field, const Geometry& geometry, const Beam& beam, const Progress& progress) {
   const double norm = field.greatest_norm();
   if (norm == 0) return {};
   const std::vector<Eigen::Vector3d> origins = probe_origins(beam);
@@ -58,12 +59,12 @@ AutoScale choose_scale(const TensorField& field, const Geometry& geometry, const
   AutoScale best{1, 0, 0};
   for (int doubling = 0; doubling < 50 && high.median_turn < wanted_turn; ++doubling) {
     low = high;
-    high = probe(field, geometry, beam, origins, 2 * low.scale);
+    high = probe(field, geometry, beam, origins, 2 * low.scale, progress);
     if (high.median_turn > best.median_turn) best = high;
   }
   if (best.median_turn < wanted_turn) return best;  // It turns no ray, or never enough.
   for (int i = 0; i < 20; ++i) {
-    const AutoScale middle = probe(field, geometry, beam, origins, (low.scale + high.scale) / 2);
+    const AutoScale middle = probe(field, geometry, beam, origins, (low.scale + high.scale) / 2, progress);
     (middle.median_turn < wanted_turn ? low : high) = middle;
   }
   return high;

@@ -3,6 +3,7 @@
 /// Chooses by how much a field is multiplied so that light bends visibly but does not tangle.
 
 #include "integrators/bending.h"
+#include "integrators/progress.h"
 #include "renderer/beam.h"
 
 namespace tensorray {
@@ -16,6 +17,7 @@ struct AutoScale {
 /// Finds the scale at which the median of the probe rays that turn at all, at s = 0.2, turns by 0.15 rad. By scaling
 /// invariance ((kT, s) is (T, ks)) the field itself is not touched. A field that turns no ray gets scale 1.
 /// Deterministic; runs on all threads.
-AutoScale choose_scale(const TensorField& field, const Geometry& geometry, const Beam& beam);
+/// @throw Cancelled.
+AutoScale choose_scale(const TensorField& field, const Geometry& geometry, const Beam& beam, const Progress& progress);
 
 }  // namespace tensorray

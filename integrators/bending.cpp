@@ -13,6 +13,7 @@ constexpr double longest_step = 0.5;         // Automatic steps, in voxels ...
 constexpr double shortest_step = 1.0 / 64;   // ... however strong the field: the splitting is stable at any step.
 constexpr double strongest_kick = 0.2;       // s h ‖T − ⅓ tr(T) I‖ of an automatic step.
 constexpr double longest_adaptive_step = 2;  // In voxels: so that no voxel is stepped over.
+constexpr double shortest_adaptive_step = 1e-6;
 
 struct State {
   Eigen::Vector3d P, V;
@@ -115,7 +116,7 @@ State advance(BendingMethod method, Medium& medium, const State& from, double h,
 class Tracer {
  public:
   Tracer(const TensorField& field, const Geometry& geometry, const BendingSettings& settings)
-      : field_(field), geometry_(geometry), settings_(settings), sampler_(field), voxel_(field.voxel_size()) {}
+      : field_(field), geometry_(geometry), settings_(settings), sampler_(field) {}
 
   RayEnd trace(Eigen::Vector3d& position, Eigen::Vector3d& direction, double flexibility, std::uint32_t& steps);
   std::uint64_t samples() const { return sampler_.samples(); }
@@ -131,6 +132,7 @@ class Tracer {
 
   RayEnd end_on(Surface surface) const { return surface == Surface::plate ? RayEnd::plate : RayEnd::obstacle; }
   State step(double h, State& error) { return advance(settings_.method, medium_, ray_, h, error); }
+  double length_of_voxel() const { return 1 / (field_.to_index().linear() * ray_.V).norm(); }
   double automatic_step() const;
   double control_step(const State& error);
   Event meet(const State& next, Hit& hit) const;
@@ -140,11 +142,11 @@ class Tracer {
   const Geometry& geometry_;
   const BendingSettings& settings_;
   TensorSampler sampler_;
-  const double voxel_;
 
   Medium medium_{sampler_, 0};
   State ray_;
-  double adaptive_step_ = 0;  // The length that the error control asks for next.
+  double voxel_ = 0;          // Length of a voxel along the ray, world units.
+  double adaptive_step_ = 0;  // What the error control asks for next, in voxels.
   std::uint32_t steps_ = 0;
 };
 
@@ -183,13 +185,13 @@ std::optional<RayEnd> Tracer::cross_box() {
   return std::nullopt;
 }
 
+/// In voxels.
 double Tracer::automatic_step() const {
   const Eigen::Matrix3d& T = medium_.last;
   const double third = T.trace() / 3;
   const double norm = std::sqrt(std::max(0.0, T.squaredNorm() - 3 * third * third));
   const double kick = std::abs(medium_.s) * norm * voxel_;
-  return voxel_ *
-         (kick * longest_step > strongest_kick ? std::max(strongest_kick / kick, shortest_step) : longest_step);
+  return kick * longest_step > strongest_kick ? std::max(strongest_kick / kick, shortest_step) : longest_step;
 }
 
 /// The nearest thing that the chord from the ray to `next` meets. `hit.distance` is along the chord.
@@ -248,23 +250,26 @@ double Tracer::control_step(const State& error) {
   const double factor = 0.9 * std::pow(std::max(excess, 1e-10), -1.0 / order(settings_.method));
   const double longest = settings_.step > 0 ? settings_.step : longest_adaptive_step;
   const double wanted = adaptive_step_ * (std::isfinite(factor) ? std::clamp(factor, 0.2, 5.0) : 0.2);
-  adaptive_step_ = std::clamp(wanted, 1e-6 * voxel_, longest * voxel_);
+  adaptive_step_ = std::clamp(wanted, shortest_adaptive_step, longest);
   return excess;
 }
 
 /// In the field: step by step to an absorber, out of the box or out of the cut. Returns nothing in the last case.
 std::optional<RayEnd> Tracer::bend() {
-  if (settings_.step == 0) medium_.tensor(ray_.P);
-  adaptive_step_ = settings_.step > 0 ? settings_.step * voxel_ : automatic_step();
+  const bool automatic = settings_.step == 0, controlled = adaptive(settings_.method);
+  voxel_ = length_of_voxel();
+  if (automatic) medium_.tensor(ray_.P);
+  adaptive_step_ = automatic ? automatic_step() : settings_.step;
   while (true) {
     if (steps_ >= static_cast<std::uint32_t>(settings_.max_steps)) return RayEnd::step_limit;
     ++steps_;
-    const bool controlled = adaptive(settings_.method);
-    const double h = controlled ? adaptive_step_ : settings_.step > 0 ? settings_.step * voxel_ : automatic_step();
+    voxel_ = length_of_voxel();
+    const double voxels = controlled ? adaptive_step_ : automatic ? automatic_step() : settings_.step;
+    const double h = voxels * voxel_;
     State error;
     const State next = step(h, error);
     if (next.V.isZero() || !next.P.allFinite()) return RayEnd::degenerate;
-    if (controlled && control_step(error) > 1 && h > 1e-6 * voxel_) continue;
+    if (controlled && control_step(error) > 1 && voxels > shortest_adaptive_step) continue;
 
     Hit hit;
     const Event event = meet(next, hit);

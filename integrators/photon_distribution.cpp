@@ -69,7 +69,8 @@ std::uint64_t trace_positions(const Job& job, std::uint64_t first, std::uint64_t
     Landing& landing = *traced[i];
     landing.end = batch.end[i];
     landing.steps = batch.steps[i];
-    landing.pixel = plate.to_pixel(batch.position[i]);
+    // Rounding may take a hit on the plate's edge outside of it.
+    landing.pixel = plate.to_pixel(batch.position[i]).cwiseMax(0).cwiseMin(plate.resolution.cast<double>());
     if (!job.settings.keep_photons) continue;
     const LightChannel& channel = job.channels[landing.channel];
     landing.photon = {batch.position[i].cast<float>(), batch.direction[i].cast<float>(), origins[i].cast<float>(),

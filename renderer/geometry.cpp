@@ -50,20 +50,19 @@ void check(RTCDevice device) {
     throw std::runtime_error("Embree cannot build the scene (error " + std::to_string(error) + ")");
 }
 
-void attach(RTCDevice device, Group& group, const Eigen::Vector3d& origin) {
+void attach(RTCDevice device, Group& group, const Eigen::Vector3d& origin, double unit) {
   group.scene = rtcNewScene(device);
   rtcSetSceneFlags(group.scene, RTC_SCENE_FLAG_ROBUST);
   rtcSetSceneBuildQuality(group.scene, RTC_BUILD_QUALITY_HIGH);
   for (const Part& part : group.parts) {
     const RTCGeometry geometry = rtcNewGeometry(device, RTC_GEOMETRY_TYPE_TRIANGLE);
-    auto* vertices = static_cast<float*>(rtcSetNewGeometryBuffer(
-        geometry, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3, 3 * sizeof(float), part.mesh.vertices.size()));
-    auto* triangles = static_cast<std::uint32_t*>(
-        rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3, 3 * sizeof(std::uint32_t),
-                                part.mesh.triangles.size()));
+    auto* vertices = static_cast<float*>(rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3,
+                                                                 3 * sizeof(float), part.mesh.vertices.size()));
+    auto* triangles = static_cast<std::uint32_t*>(rtcSetNewGeometryBuffer(
+        geometry, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3, 3 * sizeof(std::uint32_t), part.mesh.triangles.size()));
     check(device);
     for (const Eigen::Vector3d& vertex : part.mesh.vertices)
-      for (int axis = 0; axis < 3; ++axis) *vertices++ = static_cast<float>(vertex[axis] - origin[axis]);
+      for (int axis = 0; axis < 3; ++axis) *vertices++ = static_cast<float>((vertex[axis] - origin[axis]) / unit);
     for (const auto& triangle : part.mesh.triangles) triangles = std::copy(triangle.begin(), triangle.end(), triangles);
     rtcCommitGeometry(geometry);
     rtcAttachGeometry(group.scene, geometry);
@@ -80,7 +79,9 @@ struct Geometry::State {
   Surfaces surfaces;
   RTCDevice device = nullptr;
   Group bounds, cut, absorbers;
-  Eigen::Vector3d origin = Eigen::Vector3d::Zero();  // Embree's, so that its single precision is spent on the scene.
+  // Embree's frame, so that its single precision is spent on the scene, whatever the world's units.
+  Eigen::Vector3d origin = Eigen::Vector3d::Zero();
+  double unit = 1;
   double margin = 0;
 
   ~State() {
@@ -106,11 +107,13 @@ Geometry::Geometry(Surfaces surfaces) : state_(std::make_unique<State>()) {
   for (const Group* group : {&state.bounds, &state.cut, &state.absorbers})
     for (const Part& part : group->parts) box.extend(part.mesh.bounds());
   state.origin = box.center();
+  state.unit = state.surfaces.bounds.bounds().diagonal().norm();
   state.margin = tolerance * box.diagonal().norm();
 
   state.device = rtcNewDevice(nullptr);
   if (!state.device) throw std::runtime_error("Embree cannot start on this processor");
-  for (Group* group : {&state.bounds, &state.cut, &state.absorbers}) attach(state.device, *group, state.origin);
+  for (Group* group : {&state.bounds, &state.cut, &state.absorbers})
+    attach(state.device, *group, state.origin, state.unit);
 }
 
 Geometry::~Geometry() = default;
@@ -124,7 +127,7 @@ std::optional<Hit> Geometry::State::nearest(const Group& group, const Eigen::Vec
                                             double max_distance) const {
   if (group.parts.empty()) return std::nullopt;
   // Embree sees no hits behind a ray's origin, so that the ray starts at `min_distance`.
-  const Eigen::Vector3d start = from + min_distance * direction - origin;
+  const Eigen::Vector3d start = (from + min_distance * direction - origin) / unit;
   RTCRayHit ray{};
   ray.ray.org_x = static_cast<float>(start.x());
   ray.ray.org_y = static_cast<float>(start.y());
@@ -132,7 +135,7 @@ std::optional<Hit> Geometry::State::nearest(const Group& group, const Eigen::Vec
   ray.ray.dir_x = static_cast<float>(direction.x());
   ray.ray.dir_y = static_cast<float>(direction.y());
   ray.ray.dir_z = static_cast<float>(direction.z());
-  ray.ray.tfar = static_cast<float>(max_distance - min_distance);
+  ray.ray.tfar = static_cast<float>((max_distance - min_distance) / unit);
   ray.ray.mask = 0xffffffffu;
   ray.hit.geomID = RTC_INVALID_GEOMETRY_ID;
   tensorray::intersect(group.scene, ray);
@@ -146,7 +149,7 @@ std::optional<Hit> Geometry::State::nearest(const Group& group, const Eigen::Vec
   Hit hit;
   hit.surface = part.surface;
   hit.normal = (b - a).cross(c - a).normalized();
-  const double seen = min_distance + ray.ray.tfar;
+  const double seen = min_distance + ray.ray.tfar * unit;
   const double exact = hit.normal.dot(a - from) / hit.normal.dot(direction);
   // Where light grazes a plane the distance to it is ill-determined: keep what Embree saw.
   hit.distance = std::abs(exact - seen) <= margin ? exact : seen;

@@ -62,7 +62,11 @@ void check_spectrum(LightDescription& light, const SceneSource& source) {
 
 /// s(λ) < 0 is allowed, and bends light the other way: more often than not the range was widened carelessly.
 void warn_of_negative_flexibility(SceneDescription& scene) {
-  if (scene.bending.rgb) return;
+  if (scene.bending.rgb) {
+    if (scene.bending.rgb->minCoeff() < 0)
+      scene.warnings.push_back("`/bending/rgb`: where the flexibility is negative, light bends the other way");
+    return;
+  }
   const double at_min = scene.bending.flexibility.at(scene.light.wavelength_min);
   const double at_max = scene.bending.flexibility.at(scene.light.wavelength_max);
   if (at_min >= 0 && at_max >= 0) return;

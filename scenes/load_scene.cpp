@@ -17,6 +17,7 @@ namespace {
 
 constexpr double default_margin = 1.25;    // Of the plate about the beam.
 constexpr double default_distance = 0.25;  // Of the plate behind the volume, in depths of the volume.
+constexpr double greatest_size = 1e5;      // Of the scene, in sizes of the volume: Embree is single precision.
 constexpr int default_resolution = 512;    // Of the plate's longer side.
 
 TensorGrid load_grid(const SceneDescription& scene) {
@@ -52,7 +53,7 @@ TensorField load_field(const SceneDescription& description, EigenvalueReport& ei
     notes.push_back(fmt::format("{} voxels hold a defective tensor, preprocessed by its limit", eigenvalues.defective));
   if (eigenvalues.norm_lost > 0.01)
     notes.push_back(
-        fmt::format("preprocessing took {:.0f}% of the field's squared norm (rotation and shear); "
+        fmt::format("preprocessing erased {:.0f}% of the field's squared norm (rotation and shear); "
                     "\"eigenvalues\": \"raw\" keeps it",
                     100 * eigenvalues.norm_lost));
   return TensorField(grid);
@@ -167,9 +168,23 @@ Plate make_plate(const SceneDescription& description, const TensorField& field, 
   return plate;
 }
 
+/// Refuses a plate or a beam so large, or so far away, that single precision would not find it.
+void check_sizes(const SceneDescription& description, const TensorField& field, const Beam& beam, const Plate& plate) {
+  Eigen::AlignedBox3d volume;
+  for (const Eigen::Vector3d& corner : field.corners()) volume.extend(corner);
+  const double limit = greatest_size * volume.diagonal().norm();
+  const auto fail = [&](const char* pointer) {
+    throw SceneError(fmt::format("{}: `{}` lies, or reaches, more than {:g} times the volume's size away from it",
+                                 description.path.string(), pointer, greatest_size));
+  };
+  for (const Eigen::Vector2d& corner : beam.aperture)
+    if (!(corner.norm() < limit)) fail("/light/aperture");
+  if (!(plate.size.maxCoeff() < limit && (plate.center - volume.center()).norm() < limit)) fail("/receiver");
+}
+
 }  // namespace
 
-Scene load_scene(const SceneDescription& description) {
+Scene load_scene(const SceneDescription& description, const Progress& progress) {
   const auto start = std::chrono::steady_clock::now();
   std::vector<std::string> notes;
   for (const std::string& warning : description.warnings) notes.push_back("warning: " + warning);
@@ -179,6 +194,7 @@ Scene load_scene(const SceneDescription& description) {
 
   EigenvalueReport eigenvalues;
   std::size_t non_finite = 0;
+  progress.update("loading", 0, 1);
   TensorField field = load_field(description, eigenvalues, non_finite, notes);
 
   Surfaces surfaces;
@@ -187,12 +203,17 @@ Scene load_scene(const SceneDescription& description) {
   for (const std::filesystem::path& path : description.obstacles) surfaces.obstacles.push_back(read_mesh(path));
   Beam beam = make_beam(description, field, surfaces.obstacles);
   surfaces.plate = make_plate(description, field, beam);
+  check_sizes(description, field, beam, *surfaces.plate);
   Geometry geometry(std::move(surfaces));
 
   const bool automatic = !description.field.scale;
-  const AutoScale scale = automatic ? choose_scale(field, geometry, beam) : AutoScale{*description.field.scale, 0, 0};
+  const Geometry probed({geometry.surfaces().bounds, geometry.surfaces().cut, std::nullopt, {}});
+  const AutoScale scale =
+      automatic ? choose_scale(field, probed, beam, progress) : AutoScale{*description.field.scale, 0, 0};
   if (automatic && scale.median_turn == 0)
-    notes.push_back("warning: the field turns no light of this direction; scale 1");
+    notes.push_back(
+        "warning: no probe ray is turned (the field is zero or isotropic, or light travels along its "
+        "eigenvectors, or misses the volume); scale 1");
   else if (automatic)
     notes.push_back(
         fmt::format("scale: {:.6g} (at s = 0.2 the median ray turns by {:.3f} rad)", scale.scale, scale.median_turn));

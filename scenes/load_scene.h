@@ -39,7 +39,7 @@ struct Scene {
 };
 
 /// @throw std::runtime_error, one line that names the file and the mend; SceneError where the scene's values do not go
-/// with what was loaded.
-Scene load_scene(const SceneDescription& description);
+/// with what was loaded; Cancelled.
+Scene load_scene(const SceneDescription& description, const Progress& progress);
 
 }  // namespace tensorray

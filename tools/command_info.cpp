@@ -1,5 +1,6 @@
 #include <algorithm>
 #include <cmath>
+#include <csignal>
 #include <cstddef>
 #include <filesystem>
 #include <map>
@@ -159,7 +160,7 @@ void print_tensors(const FieldStatistics& s) {
   print_row("complex", percent(s.complex_fraction) + " of the voxels");
   print_row("negative", percent(s.negative_fraction) + " of the voxels have an eigenvalue with a negative real part");
   print_row("asymmetry", fmt::format("{:.4g} (0 symmetric, 2 antisymmetric)", s.asymmetry));
-  print_row("absolute would lose", percent(s.absolute_loss) + " of the squared norm (rotation and shear)");
+  print_row("absolute would erase", percent(s.absolute_loss) + " of the squared norm (rotation and shear)");
 }
 
 void print_field(const FieldInfo& field) {
@@ -204,7 +205,11 @@ void add_info_command(CLI::App& program) {
   command->add_option("file", options->file, "The file, FILE.vdb")->required();
   command->add_option("--field", options->field, "Only this tensor field; without it, all");
   command->add_flag("--json", options->json, "As JSON");
-  command->callback([options] { info(*options); });
+  command->callback([options] {
+    std::signal(SIGINT, SIG_DFL);  // It writes nothing that could be left half.
+    std::signal(SIGTERM, SIG_DFL);
+    info(*options);
+  });
 }
 
 }  // namespace tensorray

@@ -11,6 +11,7 @@
 #include <CLI/CLI.hpp>
 #include <fmt/core.h>
 
+#include "integrators/progress.h"
 #include "scenes/generate_grid.h"
 #include "scenes/output_file.h"
 #include "tools/bytes_text.h"
@@ -120,13 +121,17 @@ void add_grid_flags(CLI::App& command, GridRequest& grid) {
   add_corner("--max", grid.max, "Greatest corner of the box, world", standard.max);
 }
 
-void make(const MakeOptions& options) {
+void make(const MakeOptions& options, const Progress& progress) {
   const GridSettings settings = choose_grid(options.generator, options.grid);
   OutputFile file(options.output);
   TensorGrid grid = generate(options.generator, settings);
   if (!options.name.empty()) grid.name = options.name;
+  if (remove_non_finite(grid) > 0)
+    throw std::invalid_argument("with these parameters the field is too large for single precision");
+  progress.update("writing", 0, 1);
   file.write([&](const std::filesystem::path& path) { write_tensor_vdb(path, grid, options.half); });
   const auto bytes = static_cast<double>(std::filesystem::file_size(file.path()));
+  progress.update("writing", 1, 1);
   file.commit();
 
   const Eigen::Vector3i& n = settings.resolution;
@@ -142,7 +147,7 @@ std::string check_output(const std::string& text) {
   return text + " must end in .vdb";
 }
 
-void add_kind(CLI::App& parent, const std::string& kind) {
+void add_kind(CLI::App& parent, const std::string& kind, Progress& progress) {
   const auto options = std::make_shared<MakeOptions>();
   options->generator = generator_of(kind);
   CLI::App* command = parent.add_subcommand(kind, "Make a field of the kind " + kind);
@@ -154,16 +159,16 @@ void add_kind(CLI::App& parent, const std::string& kind) {
   command->add_flag("--half", options->half, "Store 16-bit floats: three significant digits, half the size");
   std::visit([command](auto& parameters) { describe(parameters, FlagMaker(*command)); }, options->generator);
   add_grid_flags(*command, options->grid);
-  command->callback([options] { make(*options); });
+  command->callback([options, &progress] { make(*options, progress); });
 }
 
 }  // namespace
 
-void add_make_command(CLI::App& program) {
+void add_make_command(CLI::App& program, Progress& progress) {
   CLI::App* command = program.add_subcommand("make", "Make an analytic tensor field");
   std::string kinds;
   for (const std::string& kind : generator_kinds()) {
-    add_kind(*command, kind);
+    add_kind(*command, kind, progress);
     kinds += (kinds.empty() ? "" : ", ") + kind;
   }
   // A word that is no kind would be an extra argument; instead of refusing it as that, list the kinds.

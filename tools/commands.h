@@ -12,7 +12,7 @@ namespace tensorray {
 struct Progress;
 
 void add_render_command(CLI::App& program, Progress& progress);  ///< tensorray render SCENE.json: pictures of a scene.
-void add_make_command(CLI::App& program);                        ///< tensorray make KIND: an analytic field.
+void add_make_command(CLI::App& program, Progress& progress);    ///< tensorray make KIND: an analytic field.
 void add_info_command(CLI::App& program);                        ///< tensorray info FILE.vdb: what a file holds.
 void add_schema_command(CLI::App& program);                      ///< tensorray schema: the JSON Schema of scenes.
 

@@ -50,7 +50,7 @@ int main(int argc, char** argv) {
   app.set_version_flag("--version", "tensorray " TENSORRAY_VERSION);
   app.require_subcommand(1);
   tensorray::add_render_command(app, progress);
-  tensorray::add_make_command(app);
+  tensorray::add_make_command(app, progress);
   tensorray::add_info_command(app);
   tensorray::add_schema_command(app);
   try {

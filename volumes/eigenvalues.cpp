@@ -127,7 +127,7 @@ Matrix3d general_with_eigenvalues(const Matrix3d& tensor, Eigenvalues mode, bool
 /// What apply_eigenvalues counts, of one block.
 struct BlockReport {
   std::size_t defective = 0;
-  double norm_before = 0, norm_after = 0;
+  double norm = 0, erased = 0;
 };
 
 BlockReport apply_to_block(TensorBlock& block, Eigenvalues mode) {
@@ -139,8 +139,8 @@ BlockReport apply_to_block(TensorBlock& block, Eigenvalues mode) {
     const Matrix3d result = with_eigenvalues(tensor, mode, &defective);
     block.values[offset] = result.cast<float>();
     report.defective += defective;
-    report.norm_before += tensor.squaredNorm();
-    report.norm_after += result.squaredNorm();
+    report.norm += tensor.squaredNorm();
+    report.erased += erased_norm(tensor, result);
   }
   return report;
 }
@@ -161,6 +161,13 @@ Matrix3d with_eigenvalues(const Matrix3d& tensor, Eigenvalues mode, bool* defect
   return result;
 }
 
+double erased_norm(const Matrix3d& before, const Matrix3d& after) {
+  const auto part = [](const Matrix3d& tensor, double sign) {
+    return (tensor + sign * tensor.transpose()).squaredNorm() / 4;
+  };
+  return std::max(0.0, part(before, -1) - part(after, -1)) + std::max(0.0, part(before, 1) - part(after, 1));
+}
+
 EigenvalueReport apply_eigenvalues(TensorGrid& grid, Eigenvalues mode) {
   EigenvalueReport report;
   report.chosen = mode;
@@ -171,13 +178,13 @@ EigenvalueReport apply_eigenvalues(TensorGrid& grid, Eigenvalues mode) {
   std::vector<BlockReport> blocks(grid.blocks.size());
   tbb::parallel_for(std::size_t{0}, blocks.size(),
                     [&](std::size_t i) { blocks[i] = apply_to_block(grid.blocks[i], report.chosen); });
-  double before = 0, after = 0;  // Summed in the blocks' order: the same for any number of threads.
+  double norm = 0, erased = 0;  // Summed in the blocks' order: the same for any number of threads.
   for (const BlockReport& block : blocks) {
     report.defective += block.defective;
-    before += block.norm_before;
-    after += block.norm_after;
+    norm += block.norm;
+    erased += block.erased;
   }
-  report.norm_lost = before > 0 ? 1 - after / before : 0;
+  report.norm_lost = norm > 0 ? erased / norm : 0;
   return report;
 }
 

@@ -23,7 +23,7 @@ struct EigenvalueReport {
   Eigenvalues chosen = Eigenvalues::raw;  ///< Never `automatic`.
   std::size_t defective = 0;  ///< Voxels with (numerically) repeated eigenvalues of a non-diagonalisable tensor, or on
                               ///< the cut of `positive`.
-  double norm_lost = 0;  ///< 1 − Σ‖T_p‖² / Σ‖T‖²: how much of the field was rotation or shear; 0 for `raw`.
+  double norm_lost = 0;  ///< Σ erased_norm / Σ‖T‖²: how much of the field was rotation or shear; 0 for `raw`.
 };
 
 /// One tensor's `absolute` or `positive` (mode must be one of these). The result is real; where the function has no
@@ -32,6 +32,10 @@ struct EigenvalueReport {
 /// within 1e-6 ‖T‖ of each other, or of an axis, count as being there: fields are single precision.
 /// @param defective  If given, set to true where such a limit was taken, left alone elsewhere.
 Eigen::Matrix3d with_eigenvalues(const Eigen::Matrix3d& tensor, Eigenvalues mode, bool* defective = nullptr);
+
+/// What preprocessing erased of a tensor's squared norm: what its antisymmetric part (rotation, half of a simple shear)
+/// and its symmetric part have less than before, each by itself, as `absolute` puts strain in the place of rotation.
+double erased_norm(const Eigen::Matrix3d& before, const Eigen::Matrix3d& after);
 
 /// Preprocesses every voxel in place, on all threads. Voxels must be finite.
 EigenvalueReport apply_eigenvalues(TensorGrid& grid, Eigenvalues mode);

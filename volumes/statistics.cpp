@@ -29,14 +29,14 @@ struct BlockStatistics {
   double real_min = std::numeric_limits<double>::infinity(), real_max = -real_min;
   double imaginary_max = 0, deviator_max = 0;
   std::size_t complex = 0, negative = 0;
-  double norm = 0, norm_absolute = 0;  ///< Sums of squares, of T and of its `absolute`.
+  double norm = 0, erased = 0;  ///< Sums of ‖T‖², and of what `absolute` would erase of it.
 };
 
 void add_voxel(const Eigen::Matrix3d& tensor, BlockStatistics& statistics) {
   const double norm = tensor.norm();
   statistics.norms.push_back(norm);
   statistics.norm += norm * norm;
-  statistics.norm_absolute += with_eigenvalues(tensor, Eigenvalues::absolute).squaredNorm();
+  statistics.erased += erased_norm(tensor, with_eigenvalues(tensor, Eigenvalues::absolute));
 
   const Eigen::Vector3cd values = eigenvalues(tensor);
   const double imaginary = values.imag().maxCoeff();
@@ -78,7 +78,7 @@ void join(const std::vector<BlockStatistics>& blocks, FieldStatistics& result) {
     all.complex += block.complex;
     all.negative += block.negative;
     all.norm += block.norm;
-    all.norm_absolute += block.norm_absolute;
+    all.erased += block.erased;
   }
   const double count = static_cast<double>(all.norms.size());
   result.real_min = all.real_min;
@@ -87,7 +87,7 @@ void join(const std::vector<BlockStatistics>& blocks, FieldStatistics& result) {
   result.deviator_max = all.deviator_max;
   result.complex_fraction = all.complex / count;
   result.negative_fraction = all.negative / count;
-  result.absolute_loss = all.norm > 0 ? 1 - all.norm_absolute / all.norm : 0;
+  result.absolute_loss = all.norm > 0 ? all.erased / all.norm : 0;
   take_percentiles(all.norms, result);
 }
 

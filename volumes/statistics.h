@@ -27,7 +27,7 @@ struct FieldStatistics {
   double negative_fraction = 0;       ///< Voxels with an eigenvalue of negative real part (by 1e-6 of the norm).
   double asymmetry = 0;               ///< See asymmetry().
   double deviator_max = 0;            ///< Greatest ‖T − ⅓ tr(T) I‖₂, 1/length at scale 1.
-  double absolute_loss = 0;           ///< What `absolute` would take of the norm: EigenvalueReport::norm_lost.
+  double absolute_loss = 0;           ///< What `absolute` would erase: EigenvalueReport::norm_lost.
 
   /// The largest stable step by Eq. 9, read dimensionally (s h ‖T − ⅓ tr(T) I‖₂ ≤ 1), world units; infinite for a
   /// field that does not bend light.

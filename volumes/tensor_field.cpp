@@ -79,7 +79,6 @@ TensorField::TensorField(const TensorGrid& grid) : to_world_(grid.to_world), to_
     throw std::invalid_argument("the tensor field's transform cannot be inverted");
   index_bounds_ = extent_of(active);
   voxels_ = Eigen::AlignedBox3d(active.min().cast<double>(), active.max().cast<double>());
-  voxel_size_ = to_world_.linear().colwise().norm().minCoeff();
 
   std::set<Eigen::Vector3i, CoordinateLess> found;
   for (const TensorBlock& block : grid.blocks) add_bricks_of(block, found);

@@ -39,9 +39,6 @@ class TensorField {
   /// The eight corners of the extent, world.
   std::vector<Eigen::Vector3d> corners() const;
 
-  /// The shortest edge of a voxel, world units: the unit in which steps are given.
-  double voxel_size() const { return voxel_size_; }
-
   /// Whether a point is inside the extent, its faces included.
   bool contains(const Eigen::Vector3d& world) const { return index_bounds_.contains(to_index_ * world); }
 
@@ -70,7 +67,6 @@ class TensorField {
 
   Eigen::Affine3d to_world_, to_index_;
   Eigen::AlignedBox3d index_bounds_, voxels_;
-  double voxel_size_ = 0;
   std::vector<float> bricks_;
   std::vector<Slot> slots_;  ///< Open-addressing hash table of the bricks; its size is a power of two.
 };

@@ -15,7 +15,7 @@ using Eigen::Vector3d;
 
 AutoScale scale_of(const TensorField& field, const Vector3d& direction = {0, 0, -1}) {
   return choose_scale(field, Geometry(surfaces_of(field)),
-                      silhouette_beam(field.corners(), direction, Vector3d::UnitY()));
+                      silhouette_beam(field.corners(), direction, Vector3d::UnitY()), Progress());
 }
 
 TEST(AutoScale, TurnsTheMedianRayByTheWantedAngle) {
@@ -47,6 +47,14 @@ TEST(AutoScale, FieldsThatTurnNoLightKeepTheirScale) {
   }
   // An eigenvector as direction.
   EXPECT_EQ(scale_of(constant_field(Vector3d(1, 2, 3).asDiagonal().toDenseMatrix())).median_turn, 0);
+}
+
+TEST(AutoScale, StopsWhenCancelled) {
+  const TensorField field = cube_field(9, linear_tensor);
+  Progress progress;
+  progress.cancelled = true;
+  const Beam beam = silhouette_beam(field.corners(), {0, 0, -1}, Vector3d::UnitY());
+  EXPECT_THROW(choose_scale(field, Geometry(surfaces_of(field)), beam, progress), Cancelled);
 }
 
 TEST(AutoScale, RaysThatMeetNothingDoNotCount) {

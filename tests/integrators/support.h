@@ -36,6 +36,9 @@ inline TensorField constant_field(const Eigen::Matrix3d& tensor) {
   return cube_field(9, [&](const Eigen::Vector3d&) { return tensor; });
 }
 
+/// The edge of a voxel, world units, of a field whose voxels are cubes.
+inline double voxel_size(const TensorField& field) { return field.to_world().linear().col(0).norm(); }
+
 inline Surfaces surfaces_of(const TensorField& field) {
   Surfaces surfaces;
   surfaces.bounds = box_mesh(field.index_bounds(), field.to_world());
@@ -67,7 +70,8 @@ inline Ray trace_one(const TensorField& field, const Geometry& geometry, const B
   return {batch.position[0], batch.direction[0], batch.end[0], batch.steps[0]};
 }
 
-/// Follows a ray for `steps` steps and no further: where it is at the arc length steps · step · voxel_size.
+/// Follows a ray for `steps` steps and no further: where it is at the arc length steps · step · voxel_size, for cubic
+/// voxels.
 inline Ray trace_steps(const TensorField& field, BendingSettings settings, int steps, const Eigen::Vector3d& position,
                        const Eigen::Vector3d& direction, double flexibility) {
   settings.max_steps = steps;

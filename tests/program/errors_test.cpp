@@ -2,6 +2,8 @@
 
 #include <regex>
 
+#include <fmt/core.h>
+
 #include "tests/program/support.h"
 
 namespace tensorray {
@@ -54,6 +56,10 @@ TEST_F(Errors, SceneValues) {
   expect_scene_error(2, "poisson_ratio", "field.generate.poisson_ratio=0.9");
   expect_scene_error(2, "/light/spectrum|cheese", "light.spectrum=cheese");
   expect_scene_error(2, "output", "output.image=out.gif");
+  for (const char* size : {"1e15", "1e25", "1e300"}) {
+    expect_scene_error(2, "/receiver", fmt::format("receiver.size=[{0},{0}]", size));
+    expect_scene_error(2, "/light/aperture", fmt::format("light.aperture.size=[{0},{0}]", size));
+  }
 }
 
 TEST_F(Errors, CommandLines) {
@@ -62,6 +68,9 @@ TEST_F(Errors, CommandLines) {
   write("scene.json", small_scene());
   expect_error(2, "threads", {"render", "scene.json", "--threads", "0"});
   expect_error(2, "threads", {"render", "scene.json", "--threads", "many"});
+  expect_error(2, "one kind", {"render", "scene.json", "-o", "a.png", "-o", "b.jpg"});
+  expect_error(2, "--stats.*scene.json", {"render", "scene.json", "--stats", "scene.json"});
+  expect_error(2, "--stats.*a.png", {"render", "scene.json", "-o", "a.png", "--stats", "a.png"});
   expect_error(2, "", {"make", "cheese", "-o", "a.vdb"});
   expect_error(2, "resolution", {"make", "vortex", "-o", "a.vdb", "--resolution", "0"});
   expect_error(2, "", {"make", "vortex"});
@@ -104,6 +113,18 @@ TEST_F(Errors, LightThatTheFieldMakesOddIsWarnedOf) {
   write("scene.json", small_scene());
   const Outcome outcome = run_well({"render", "scene.json", "--set", "bending.a=0.5"});
   EXPECT_TRUE(std::regex_search(outcome.error, std::regex("warning.*negative"))) << outcome.error;
+}
+
+TEST_F(Errors, PicturesThatShowNothingAreWarnedOf) {
+  write("scene.json", small_scene());
+  const auto expect_warning = [&](const std::string& pattern, const std::string& set) {
+    const Outcome outcome = run_well({"render", "scene.json", "--set", set});
+    EXPECT_TRUE(std::regex_search(outcome.error, std::regex(pattern))) << outcome.error;
+  };
+  expect_warning("warning: no light reached the plate", "receiver.center=[900,0,0]");
+  expect_warning("warning: 100% of the rays.*max_steps", "bending.max_steps=2");
+  expect_warning("warning: no probe ray is turned",
+                 "field.generate={\"kind\":\"constant\",\"tensor\":[[1,0,0],[0,1,0],[0,0,1]]}");
 }
 
 TEST_F(Errors, OutputsThatCannotBeWritten) {

@@ -98,11 +98,17 @@ TEST_F(Program, StatisticsBalance) {
             "field.scale=20"});
   const nlohmann::json stats = read_json("stats.json");
   const auto count = [&](const char* key) { return stats["photons"][key].get<std::uint64_t>(); };
-  EXPECT_EQ(count("emitted"), 4 * count("positions"));
+  EXPECT_EQ(count("emitted"), 4 * stats["positions"].get<std::uint64_t>());
   std::uint64_t ended = count("deposited") + count("missed");
   for (const auto& [reason, stopped] : stats["photons"]["stopped"].items()) ended += stopped.get<std::uint64_t>();
   EXPECT_EQ(ended, count("emitted"));
   EXPECT_GT(count("deposited"), 0u);
+  ASSERT_EQ(stats["channels"].size(), 4u);
+  for (const auto& channel : stats["channels"]) {
+    EXPECT_EQ(channel["rays"]["emitted"], stats["positions"]);
+    EXPECT_GT(channel["ray_power"], 0);
+  }
+  EXPECT_NEAR(stats["power"]["emitted"], 4, 1e-3);  // Irradiance 1 on the cross section of the beam.
   for (const char* key : {"ray_steps", "tensor_samples", "peak_memory_bytes", "threads"})
     EXPECT_GT(stats[key], 0) << key;
   for (const char* phase : {"load", "trace", "density", "color", "write"})

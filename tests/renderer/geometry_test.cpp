@@ -63,6 +63,17 @@ TEST(Geometry, StaysPreciseFarFromTheOrigin) {
   EXPECT_NEAR(hit->distance, 4, 1e-8);
 }
 
+TEST(Geometry, WorksInAnyUnit) {
+  for (const double unit : {1e-20, 1e-6, 1e12, 1e20}) {
+    Eigen::Affine3d scaled = Eigen::Affine3d::Identity();
+    scaled.linear() *= unit;
+    const Geometry geometry(box_surfaces(scaled));
+    const auto hit = geometry.crossing(Surface::bounds, false, scaled * Vector3d(0.3, 0.2, 0), Vector3d(0, 0, -1));
+    ASSERT_TRUE(hit) << unit;
+    EXPECT_NEAR(hit->distance / unit, 1, 1e-12);
+  }
+}
+
 TEST(Geometry, PlateIsHitFromBothSidesAndOnlyWithinIt) {
   Surfaces surfaces = box_surfaces();
   Plate plate;

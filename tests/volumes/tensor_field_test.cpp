@@ -78,11 +78,6 @@ TEST(TensorField, ExtentIsSpannedByActiveVoxels) {
   EXPECT_EQ(field.index_bounds().max(), Vector3d(10, 20, 30));
   EXPECT_TRUE(field.contains({2, 3, 4}));
   EXPECT_FALSE(field.contains({1.999, 3, 4}));
-  EXPECT_EQ(field.voxel_size(), 1);
-  EXPECT_EQ(TensorField(
-                dense_grid(box({0, 0, 0}, {3, 3, 3}), oblique(), [](const Vector3i&) { return Matrix3d::Identity(); }))
-                .voxel_size(),
-            0.5);
 }
 
 TEST(TensorField, InactiveVoxelsCountAsZero) {
