@@ -10,9 +10,9 @@
 namespace tensorray {
 namespace {
 
-constexpr int degree = 5;                    // Of the B-splines.
+constexpr int degree = 5;                  // Of the B-splines.
 constexpr double smallest_spline_tau = 2;  // Below it the spline interpolant of the Gaussian is not good enough.
-constexpr double cut_off = 4.5;              // In tau; the Gaussian is 4e-5 of its peak there.
+constexpr double cut_off = 4.5;            // In tau; the Gaussian is 4e-5 of its peak there.
 
 /// Folds an index back into [0, size) as mirrors at the edges (between pixels) do.
 int mirror(int index, int size) {
