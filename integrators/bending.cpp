@@ -10,7 +10,7 @@ namespace tensorray {
 namespace {
 
 constexpr double longest_step = 0.5;         // Automatic steps, in voxels ...
-constexpr double shortest_step = 1.0 / 64;   // ... however strong the field: the splitting is stable at any step.
+constexpr double shortest_step = 1.0 / 64;   // ... of the splitting, which is stable however strong the field.
 constexpr double strongest_kick = 0.2;       // s h ‖T − ⅓ tr(T) I‖ of an automatic step.
 constexpr double longest_adaptive_step = 2;  // In voxels: so that no voxel is stepped over.
 constexpr double shortest_adaptive_step = 1e-6;
@@ -191,7 +191,8 @@ double Tracer::automatic_step() const {
   const double third = T.trace() / 3;
   const double norm = std::sqrt(std::max(0.0, T.squaredNorm() - 3 * third * third));
   const double kick = std::abs(medium_.s) * norm * voxel_;
-  return kick * longest_step > strongest_kick ? std::max(strongest_kick / kick, shortest_step) : longest_step;
+  if (kick * longest_step <= strongest_kick) return longest_step;
+  return std::max(strongest_kick / kick, settings_.method == BendingMethod::splitting ? shortest_step : 0.0);
 }
 
 /// The nearest thing that the chord from the ray to `next` meets. `hit.distance` is along the chord.

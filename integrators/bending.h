@@ -30,8 +30,8 @@ struct BendingSettings {
 
   /// Arc length per step, in voxels as the ray crosses them (a step of 1 is as long as the direction's unit in index
   /// space); 0: automatic, which is ½ voxel, and shorter where the field is strong: s h ‖T − ⅓ tr(T) I‖ (Frobenius) ≤
-  /// 0.2 with T as last sampled (Eq. 9, read dimensionally). For the adaptive methods the first and (for automatic:
-  /// twice it, at most 2 voxels) the longest step.
+  /// 0.2 with T as last sampled (Eq. 9, read dimensionally); of `splitting`, which is stable, never below 1/64 voxel.
+  /// For the adaptive methods the first and the longest step; automatic ones are at most 2 voxels long.
   double step = 0;
   double tolerance = 1e-3;  ///< Adaptive methods: error per step, in voxels and in radians; > 0.
   int max_steps = 20000;    ///< Steps before a ray is given up; > 0.

@@ -91,11 +91,12 @@ std::uint64_t trace_chunk(const Job& job, std::uint64_t first, std::uint64_t las
 }
 
 /// Adds a chunk to the estimate and the counts, each channel's rays in their order: sums do not depend on threads.
-void collect(const std::vector<Landing>& landings, std::size_t count, DensityEstimator& estimator,
+void collect(const Job& job, const std::vector<Landing>& landings, std::size_t count, DensityEstimator& estimator,
              PhotonDistribution& result) {
   tbb::parallel_for(0, static_cast<int>(result.ends.size()), [&](int channel) {
     std::vector<Eigen::Vector2d> points;
-    for (std::size_t i = 0; i < count; ++i) {
+    const std::size_t rays = job.rays_per_position, ray = channel * rays / job.channels.size();
+    for (std::size_t i = ray; i < count; i += rays) {  // A channel is always the same ray of its positions.
       if (landings[i].channel != channel) continue;
       ++result.ends[channel][static_cast<int>(landings[i].end)];
       if (landings[i].end == RayEnd::plate) points.push_back(landings[i].pixel);
@@ -146,7 +147,7 @@ PhotonDistribution distribute_photons(const TensorField& field, const Geometry& 
     result.tensor_samples += trace_chunk(job, first, last, landings);
     result.seconds_tracing += seconds_since(start);
     start = std::chrono::steady_clock::now();
-    collect(landings, (last - first) * rays, estimator, result);
+    collect(job, landings, (last - first) * rays, estimator, result);
     if (settings.keep_photons) keep_photons(landings, (last - first) * rays, result.photons);
     result.seconds_density += seconds_since(start);
   }

@@ -13,7 +13,7 @@
 namespace tensorray {
 namespace {
 
-constexpr double tolerance = 1e-6;  // Of the scene's size: what single precision resolves, with some room.
+constexpr double tolerance = 1e-6;  // Of the volume's size: what single precision resolves, with some room.
 
 /// Hides the difference between Embree 3 and 4.
 void intersect(RTCScene scene, RTCRayHit& ray) {
@@ -26,11 +26,7 @@ void intersect(RTCScene scene, RTCRayHit& ray) {
 #endif
 }
 
-TriangleMesh plate_mesh(const Plate& plate) {
-  const Eigen::Vector3d right = plate.right * plate.size.x() / 2, up = plate.up * plate.size.y() / 2;
-  return {{plate.center - right - up, plate.center + right - up, plate.center + right + up, plate.center - right + up},
-          {{0, 1, 2}, {0, 2, 3}}};
-}
+TriangleMesh plate_mesh(const Plate& plate) { return {plate.corners(), {{0, 1, 2}, {0, 2, 3}}}; }
 
 /// One mesh, kept in double precision beside Embree's copy.
 struct Part {
@@ -79,7 +75,7 @@ struct Geometry::State {
   Surfaces surfaces;
   RTCDevice device = nullptr;
   Group bounds, cut, absorbers;
-  // Embree's frame, so that its single precision is spent on the scene, whatever the world's units.
+  // Embree's frame, so that its single precision is spent on the volume, whatever the world's units.
   Eigen::Vector3d origin = Eigen::Vector3d::Zero();
   double unit = 1;
   double margin = 0;
@@ -103,12 +99,10 @@ Geometry::Geometry(Surfaces surfaces) : state_(std::make_unique<State>()) {
   if (state.surfaces.plate) state.absorbers.parts.push_back({plate_mesh(*state.surfaces.plate), Surface::plate});
   for (const TriangleMesh& mesh : state.surfaces.obstacles) state.absorbers.parts.push_back({mesh, Surface::obstacle});
 
-  Eigen::AlignedBox3d box;
-  for (const Group* group : {&state.bounds, &state.cut, &state.absorbers})
-    for (const Part& part : group->parts) box.extend(part.mesh.bounds());
-  state.origin = box.center();
-  state.unit = state.surfaces.bounds.bounds().diagonal().norm();
-  state.margin = tolerance * box.diagonal().norm();
+  const Eigen::AlignedBox3d volume = state.surfaces.bounds.bounds();
+  state.origin = volume.center();
+  state.unit = volume.diagonal().norm();
+  state.margin = tolerance * state.unit;
 
   state.device = rtcNewDevice(nullptr);
   if (!state.device) throw std::runtime_error("Embree cannot start on this processor");
@@ -152,7 +146,7 @@ std::optional<Hit> Geometry::State::nearest(const Group& group, const Eigen::Vec
   const double seen = min_distance + ray.ray.tfar * unit;
   const double exact = hit.normal.dot(a - from) / hit.normal.dot(direction);
   // Where light grazes a plane the distance to it is ill-determined: keep what Embree saw.
-  hit.distance = std::abs(exact - seen) <= margin ? exact : seen;
+  hit.distance = std::abs(exact - seen) <= 10 * (margin + tolerance * std::abs(seen)) ? exact : seen;
   return hit;
 }
 
@@ -173,10 +167,12 @@ bool Geometry::may_absorb(const Eigen::Vector3d& from, const Eigen::Vector3d& to
 std::optional<Hit> Geometry::crossing(Surface surface, bool inwards, const Eigen::Vector3d& origin,
                                       const Eigen::Vector3d& direction, double max_distance) const {
   const Group& group = surface == Surface::bounds ? state_->bounds : state_->cut;
+  constexpr int most_crossings = 10000;  // Of one line and one mesh: rounding shall not keep it here for ever.
   double from = -state_->margin;
-  while (auto hit = state_->nearest(group, origin, direction, from, max_distance + state_->margin)) {
+  for (int i = 0; i < most_crossings; ++i) {
+    auto hit = state_->nearest(group, origin, direction, from, max_distance + state_->margin);
+    if (!hit || hit->distance > max_distance) return std::nullopt;
     if ((hit->normal.dot(direction) < 0) == inwards) {
-      if (hit->distance > max_distance) return std::nullopt;
       hit->distance = std::max(hit->distance, 0.0);
       return hit;
     }

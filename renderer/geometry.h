@@ -39,7 +39,7 @@ struct Surfaces {
 /// An immutable Embree scene. Any number of threads may query it at once.
 ///
 /// Embree finds the triangle in single precision; the distance is then that to the triangle's plane in double
-/// precision. A surface behind the origin by less than about 1e-6 of the scene's size counts as hit at 0: light that
+/// precision. A surface behind the origin by less than about 1e-6 of the volume's size counts as hit at 0: light that
 /// starts on a plate, or leaves the volume through one, meets it.
 class Geometry {
  public:

@@ -8,6 +8,7 @@
 
 namespace tensorray {
 
+/// Single precision: seven digits of world coordinates.
 struct Photon {
   Eigen::Vector3f position;   ///< Where it landed, world.
   Eigen::Vector3f direction;  ///< Unit, as it landed.

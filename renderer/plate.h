@@ -2,6 +2,8 @@
 /// @file renderer/plate.h
 /// The receiver: a rectangle that collects light.
 
+#include <vector>
+
 #include <Eigen/Core>
 
 namespace tensorray {
@@ -18,6 +20,11 @@ struct Plate {
   Eigen::Vector3d normal() const { return right.cross(up); }  ///< Unit, towards the viewer (against the light).
   Eigen::Vector2d pixel_size() const { return size.cwiseQuotient(resolution.cast<double>()); }
   double pixel_area() const { return pixel_size().prod(); }
+
+  std::vector<Eigen::Vector3d> corners() const {
+    const Eigen::Vector3d x = size.x() / 2 * right, y = size.y() / 2 * up;
+    return {center - x - y, center + x - y, center + x + y, center - x + y};
+  }
 
   Eigen::Vector2d to_pixel(const Eigen::Vector3d& world) const {
     const Eigen::Vector3d p = world - center;

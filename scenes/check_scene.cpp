@@ -47,9 +47,9 @@ void check_spectrum(LightDescription& light, const SceneSource& source) {
     double kelvin = 0;
     char rest = 0;
     const bool read = std::sscanf(text.c_str() + blackbody.size(), " %lf %c", &kelvin, &rest) == 1;
-    if (read && std::isfinite(kelvin) && kelvin > 0) return;
-    source.fail(
-        fmt::format("`/light/spectrum` must be \"blackbody KELVIN\" with a temperature > 0, but is \"{}\"", text));
+    if (read && kelvin >= 100 && kelvin <= 1e9) return;
+    source.fail(fmt::format(
+        "`/light/spectrum` must be \"blackbody KELVIN\" with a temperature from 100 to 1e9, but is \"{}\"", text));
   }
   if (text.find_first_of("./") == std::string::npos) {
     std::string known;
@@ -135,7 +135,7 @@ void check_memory(const SceneDescription& scene, const SceneSource& source) {
 }  // namespace
 
 void check_scene(SceneDescription& scene, const Json& json, const SceneSource& source) {
-  check_wavelengths(scene.light, source);
+  if (!scene.bending.rgb) check_wavelengths(scene.light, source);
   check_spectrum(scene.light, source);
   check_receiver(scene, source);
   check_memory(scene, source);
@@ -144,6 +144,7 @@ void check_scene(SceneDescription& scene, const Json& json, const SceneSource& s
   warn_unused(scene, json, "/field/name", "/field/generate");
   warn_unused(scene, json, "/field/derive", "/field/generate");
   warn_unused(scene, json, "/light/wavelengths", "/bending/rgb");
+  warn_unused(scene, json, "/light/spectrum", "/bending/rgb");
 }
 
 }  // namespace tensorray

@@ -112,9 +112,15 @@ std::vector<Eigen::Vector2d> rectangle(const Eigen::Vector2d& center, const Eige
   return {center - x - y, center + x - y, center + x + y, center - x + y};
 }
 
-/// The silhouette's beam, or that of the given aperture; it starts before the volume and all obstacles.
-Beam make_beam(const SceneDescription& description, const TensorField& field,
-               const std::vector<TriangleMesh>& obstacles) {
+/// Moves the start of the beam so that it is before the points, too.
+void start_before(Beam& beam, const std::vector<Eigen::Vector3d>& points) {
+  double before = 0;
+  for (const Eigen::Vector3d& point : points) before = std::min(before, (point - beam.center).dot(beam.direction));
+  beam.center += 1.01 * before * beam.direction;
+}
+
+/// The silhouette's beam, or that of the given aperture.
+Beam make_beam(const SceneDescription& description, const TensorField& field) {
   const LightDescription& light = description.light;
   const Eigen::Vector3d up = light.up.value_or(Eigen::Vector3d::UnitZ());
   Beam beam = silhouette_beam(field.corners(), light.direction, up);
@@ -126,11 +132,6 @@ Beam make_beam(const SceneDescription& description, const TensorField& field,
     }
     beam.aperture = rectangle(center, light.aperture->size);
   }
-  double before = 0;
-  for (const TriangleMesh& mesh : obstacles)
-    for (const Eigen::Vector3d& vertex : mesh.vertices)
-      before = std::min(before, (vertex - beam.center).dot(beam.direction));
-  beam.center += 1.01 * before * beam.direction;
   return beam;
 }
 
@@ -156,7 +157,8 @@ Plate make_plate(const SceneDescription& description, const TensorField& field, 
   Plate plate;
   const double distance = receiver.distance.value_or(default_distance * (far - near));
   plate.center = receiver.center.value_or(beam.center + (far + distance) * beam.direction);
-  const Eigen::Vector3d normal = receiver.normal.value_or(-beam.direction).normalized();
+  Eigen::Vector3d normal = receiver.normal.value_or(-beam.direction).normalized();
+  if (normal.dot(beam.direction) > 0) normal = -normal;  // Seen along the light, whichever side it was given by.
   plate.up = upright(normal, receiver.up.value_or(beam.up));
   plate.right = plate.up.cross(normal);
   plate.size = receiver.size ? *receiver.size : Eigen::Vector2d(default_margin * lit_extent(plate, beam));
@@ -201,15 +203,19 @@ Scene load_scene(const SceneDescription& description, const Progress& progress) 
   surfaces.bounds = box_mesh(field.index_bounds(), field.to_world());
   if (!description.field.bounds.empty()) surfaces.cut = load_closed_mesh(description.field.bounds);
   for (const std::filesystem::path& path : description.obstacles) surfaces.obstacles.push_back(read_mesh(path));
-  Beam beam = make_beam(description, field, surfaces.obstacles);
+  Beam beam = make_beam(description, field);
   surfaces.plate = make_plate(description, field, beam);
   check_sizes(description, field, beam, *surfaces.plate);
+  for (const TriangleMesh& mesh : surfaces.obstacles) start_before(beam, mesh.vertices);
+  start_before(beam, surfaces.plate->corners());
   Geometry geometry(std::move(surfaces));
 
   const bool automatic = !description.field.scale;
+  // Of the field alone, so that pictures with and without obstacles or aperture can be compared.
+  const Beam silhouette = silhouette_beam(field.corners(), beam.direction, beam.up);
   const Geometry probed({geometry.surfaces().bounds, geometry.surfaces().cut, std::nullopt, {}});
   const AutoScale scale =
-      automatic ? choose_scale(field, probed, beam, progress) : AutoScale{*description.field.scale, 0, 0};
+      automatic ? choose_scale(field, probed, silhouette, progress) : AutoScale{*description.field.scale, 0, 0};
   if (automatic && scale.median_turn == 0)
     notes.push_back(
         "warning: no probe ray is turned (the field is zero or isotropic, or light travels along its "

@@ -5,13 +5,20 @@
 namespace tensorray {
 namespace {
 
+constexpr double narrowest_white = 100;  // nm: light of a smaller range is seen as a colour.
+
 /// From XYZ to the working space; the light's own white becomes neutral if the scene wants it so.
 Eigen::Matrix3d to_working(const Scene& scene) {
   if (!scene.description.output.white_balance) return scene.color.xyz_to_working();
   Eigen::Vector3d white = Eigen::Vector3d::Zero();
-  for (const Band& band : scene.bands) white += band.xyz;
+  double width = 0;
+  for (const Band& band : scene.bands) {
+    white += band.xyz;
+    width += band.width;
+  }
   // Nearly monochromatic light has no white to adapt to: its colour is what one wants to see.
-  return scene.bands.size() > 1 ? scene.color.xyz_to_working_adapted(white) : scene.color.xyz_to_working();
+  const bool has_white = scene.description.bending.rgb || width >= narrowest_white;
+  return has_white ? scene.color.xyz_to_working_adapted(white) : scene.color.xyz_to_working();
 }
 
 Render render_photons(const Scene& scene, const Progress& progress) {

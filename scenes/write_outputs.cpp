@@ -49,16 +49,20 @@ PointCloud point_cloud(const PhotonMap& photons, const ImageMetadata& metadata) 
 }  // namespace
 
 double automatic_exposure(const Image& linear) {
-  constexpr float lit = 0.02f;        // Of the undisturbed light.
+  constexpr float lit = 0.02f;        // Of the undisturbed light, or of the brightest pixel where that is darker.
   constexpr double brightest = 0.99;  // This fraction of the lit pixels is darker than ...
   constexpr double shown_as = 0.9;    // ... this display-linear value.
   const std::size_t channels = linear.channels.size();
   std::vector<float> values;
   for (std::size_t i = 0; i + 2 < linear.pixels.size(); i += channels) {
     const float value = std::max({linear.pixels[i], linear.pixels[i + 1], linear.pixels[i + 2]});
-    if (value > lit) values.push_back(value);
+    values.push_back(value);
   }
-  if (values.empty()) return 0;
+  const float brightest_value = values.empty() ? 0 : *std::max_element(values.begin(), values.end());
+  if (!(brightest_value > 0)) return 0;
+  const float threshold = lit * std::min(1.0f, brightest_value);
+  values.erase(std::remove_if(values.begin(), values.end(), [&](float value) { return value <= threshold; }),
+               values.end());
   const auto bright = values.begin() + static_cast<std::ptrdiff_t>(brightest * static_cast<double>(values.size() - 1));
   std::nth_element(values.begin(), bright, values.end());
   return std::log2(shown_as / *bright);

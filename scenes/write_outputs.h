@@ -22,7 +22,8 @@ struct OutputFiles {
 OutputFiles open_outputs(const OutputDescription& output);
 
 /// Writes the files; when all are complete they take their names. @return the names.
-/// @throw std::runtime_error naming the file and the reason; then no file has changed.
+/// @throw std::runtime_error naming the file and the reason; no file has changed then, unless one could be written but
+/// not take its name, which leaves those that were renamed before it.
 std::vector<std::filesystem::path> write_outputs(const Render& render, const Scene& scene, OutputFiles files);
 
 /// The exposure, in stops, at which a scene-linear picture is well shown: its brightest hundredth just below white.

@@ -133,10 +133,10 @@ std::vector<Eigen::Vector3d> TensorField::corners() const {
 }
 
 double TensorField::greatest_norm() const {
-  float greatest = 0;
+  double greatest = 0;
   for (std::size_t i = 0; i < bricks_.size(); i += voxel_floats)
-    greatest = std::max(greatest, Eigen::Map<const Eigen::Matrix3f>(&bricks_[i]).squaredNorm());
-  return std::sqrt(static_cast<double>(greatest));
+    greatest = std::max(greatest, Eigen::Map<const Eigen::Matrix3f>(&bricks_[i]).cast<double>().squaredNorm());
+  return std::sqrt(greatest);
 }
 
 TensorField TensorField::scaled(double factor) && {

@@ -129,6 +129,49 @@ TEST_F(Program, RgbModeIsThePapers) {
   }
 }
 
+TEST_F(Program, OneBandIsNeutralIfItIsBroadAndColouredIfItIsNarrow) {
+  write("scene.json", small_scene(zero_field));
+  const auto middle = [&](const std::string& wavelengths) {
+    run_well({"render", "scene.json", "-q", "-o", "out.exr", "--set", "light.wavelengths=" + wavelengths});
+    const Image image = read_image(in_folder("out.exr"));
+    return std::vector<float>(image.pixel(16, 16), image.pixel(16, 16) + 3);
+  };
+  const auto broad = middle(R"({"min": 380, "max": 730, "count": 1})");
+  EXPECT_NEAR(broad[0], broad[1], 1e-4);
+  EXPECT_NEAR(broad[2], broad[1], 1e-4);
+  for (const char* green : {R"({"min": 550, "max": 550, "count": 1})", R"({"min": 549, "max": 551, "count": 2})"})
+    EXPECT_GT(middle(green)[1], 2 * middle(green)[0]);
+}
+
+TEST_F(Program, APlateAnywhereIsSeenAlongTheLight) {
+  write("scene.json", small_scene(zero_field));
+  const auto column_of_light = [&](const std::vector<std::string>& receiver) {
+    std::vector<std::string> arguments{"render",
+                                       "scene.json",
+                                       "-q",
+                                       "-o",
+                                       "out.exr",
+                                       "--set",
+                                       R"(light.aperture={"center":[0.5,0,0],"size":[0.5,0.5]})"};
+    for (const std::string& value : receiver) arguments.insert(arguments.end(), {"--set", value});
+    run_well(arguments);
+    const Image image = read_image(in_folder("out.exr"));
+    double sum = 0, moment = 0;
+    for (int y = 0; y < 32; ++y)
+      for (int x = 0; x < 32; ++x) {
+        sum += image.pixel(x, y)[1];
+        moment += image.pixel(x, y)[1] * (x + 0.5);
+      }
+    return moment / sum;
+  };
+  const std::string size = "receiver.size=[2,2]";
+  EXPECT_NEAR(column_of_light({size}), 24, 0.2);
+  EXPECT_NEAR(column_of_light({size, "receiver.normal=[0,0,-1]"}), 24, 0.2);  // Given by its other side.
+  EXPECT_NEAR(column_of_light({size, "receiver.center=[0,0,5]"}), 24, 0.2);   // Before the volume.
+  EXPECT_NEAR(column_of_light({size, "receiver.center=[0,0,0]"}), 24, 0.2);   // In it.
+  EXPECT_NEAR(column_of_light({"receiver.size=[4000,4000]", "receiver.distance=1e4"}), 16, 0.2);
+}
+
 TEST_F(Program, ProvenanceIsInTheHeader) {
   write("scene.json", small_scene());
   run_well({"render", "scene.json", "-q", "-o", "out.exr", "--seed", "77"});
