@@ -48,14 +48,22 @@ enum class RayEnd : std::uint8_t {
 constexpr int ray_end_count = 5;
 const char* to_string(RayEnd end);
 
+/// How a ray changes with two parameters (Igehy 1999, "Tracing Ray Differentials"): a column each.
+struct RayDifferential {
+  Eigen::Matrix<double, 3, 2> position = Eigen::Matrix<double, 3, 2>::Zero();   ///< World units per parameter.
+  Eigen::Matrix<double, 3, 2> direction = Eigen::Matrix<double, 3, 2>::Zero();  ///< Radians per parameter.
+};
+
 /// Rays, one an entry of every vector. Rays of one origin (the wavelengths of a photon) stand next to each other.
 struct RayBatch {
-  std::vector<Eigen::Vector3d> position;   ///< World.
-  std::vector<Eigen::Vector3d> direction;  ///< Unit.
-  std::vector<double> flexibility;         ///< s; any sign.
+  std::vector<Eigen::Vector3d> position;       ///< World.
+  std::vector<Eigen::Vector3d> direction;      ///< Unit.
+  std::vector<double> flexibility;             ///< s; any sign.
+  std::vector<RayDifferential> differentials;  ///< One for every ray, or none at all: they cost about three rays.
 
   // Set by `trace`.
   std::vector<RayEnd> end;
+  std::vector<double> length;        ///< Of the way, world units.
   std::vector<std::uint32_t> steps;  ///< Steps in the field.
   std::uint64_t tensor_samples = 0;  ///< Added to.
 
@@ -65,7 +73,9 @@ struct RayBatch {
 };
 
 /// Follows every ray of `batch` to its end, in place: position and direction are then those of the end. A ray that
-/// missed is left where it last crossed the bounds (or where it began).
+/// missed is left where it last crossed the bounds (or where it began). Differentials are carried along by the
+/// variational equations, as the derivative of the method's own steps; on a surface they are those of the point where
+/// rays meet it, so that those of position lie in the surface.
 /// @param field     World frame; s·T in 1/length. Light goes straight outside its extent and outside the cut.
 /// @param geometry  Bounds (those of the field), cut, plate and obstacles.
 /// Accuracy: the method's order on smooth fields, 2 on trilinear data. Entry, exit and hits are located by repeating

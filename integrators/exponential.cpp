@@ -1,5 +1,6 @@
 #include "integrators/exponential.h"
 
+#include <algorithm>
 #include <cmath>
 
 namespace tensorray {
@@ -49,23 +50,69 @@ Eigen::Matrix3d squared(const Eigen::Matrix3d& A, double norm) {
   return power;
 }
 
+Eigen::Matrix3d deviator(const Eigen::Matrix3d& A) { return A - A.trace() / 3 * Eigen::Matrix3d::Identity(); }
+
+/// exp(A) v by its power series, with the derivatives along two parameters: columns as `exponential_derivatives` has.
+Eigen::Matrix3d series(const Eigen::Matrix3d& A, const std::array<Eigen::Matrix3d, 2>& dA, const Eigen::Matrix3d& v,
+                       int terms) {
+  Eigen::Matrix3d term = v, sum = v;
+  for (int k = 1; k <= terms; ++k) {
+    Eigen::Matrix3d next = A * term;
+    next.col(1) += dA[0] * term.col(0);
+    next.col(2) += dA[1] * term.col(0);
+    term = next / k;
+    sum += term;
+  }
+  return sum;
+}
+
 }  // namespace
 
 Eigen::Vector3d exponential_direction(const Eigen::Matrix3d& A, const Eigen::Vector3d& v) {
   // The trace only changes the length.
-  Eigen::Matrix3d deviator = A;
-  deviator.diagonal().array() -= A.trace() / 3;
-  const double squared_norm = deviator.squaredNorm();
+  const Eigen::Matrix3d without_trace = deviator(A);
+  const double squared_norm = without_trace.squaredNorm();
   Eigen::Vector3d result;
   if (squared_norm <= 1) {
-    result = series(deviator, v, terms_for(squared_norm));
+    result = series(without_trace, v, terms_for(squared_norm));
   } else if (std::isfinite(squared_norm)) {
-    result = squared(deviator, std::sqrt(squared_norm)) * v;
+    result = squared(without_trace, std::sqrt(squared_norm)) * v;
   } else {
     return Eigen::Vector3d::Zero();
   }
   const double length = result.norm();
   return length > 0 && std::isfinite(length) ? Eigen::Vector3d(result / length) : Eigen::Vector3d::Zero();
+}
+
+Eigen::Matrix3d exponential_derivatives(const Eigen::Matrix3d& A, const std::array<Eigen::Matrix3d, 2>& dA,
+                                        const Eigen::Matrix3d& v) {
+  const Eigen::Matrix3d without_trace = deviator(A);
+  const double squared_norm = without_trace.squaredNorm();
+  // One term more, as the derivative of a series has one less.
+  if (squared_norm <= 1) return series(without_trace, dA, v, std::min(terms_for(squared_norm) + 1, most_terms));
+  const int halvings = std::isfinite(squared_norm) ? std::ilogb(std::sqrt(squared_norm)) + 1 : 0;
+  const double part = std::ldexp(1.0, -halvings);
+  const std::array<Eigen::Matrix3d, 2> small{part * dA[0], part * dA[1]};
+  Eigen::Matrix3d power;
+  std::array<Eigen::Matrix3d, 2> change;
+  for (int column = 0; column < 3; ++column) {
+    Eigen::Matrix3d unit = Eigen::Matrix3d::Zero();
+    unit(column, 0) = 1;
+    const Eigen::Matrix3d applied = series(part * without_trace, small, unit, most_terms);
+    power.col(column) = applied.col(0);
+    change[0].col(column) = applied.col(1);
+    change[1].col(column) = applied.col(2);
+  }
+  for (int i = 0; i < halvings; ++i) {
+    for (Eigen::Matrix3d& each : change) each = (power * each + each * power).eval();
+    power = (power * power).eval();
+    const double scale = 1 / power.norm();  // Only the direction is wanted, so that nothing overflows.
+    power *= scale;
+    for (Eigen::Matrix3d& each : change) each *= scale;
+  }
+  Eigen::Matrix3d result = power * v;
+  for (int i = 0; i < 2; ++i) result.col(i + 1) += change[i] * v.col(0);
+  return result;
 }
 
 }  // namespace tensorray

@@ -101,6 +101,18 @@ colorspaces:
         - !<BuiltinTransform> {style: UTILITY - ACES-AP1_to_LINEAR-REC709_BFD}
 
   - !<ColorSpace>
+    name: srgb_texture
+    bitdepth: 32f
+    description: Pictures as most files hold them, Rec.709 primaries under the curve of IEC 61966-2-1.
+    isdata: false
+    allocation: uniform
+    to_scene_reference: !<GroupTransform>
+      children:
+        - !<ExponentWithLinearTransform> {gamma: 2.4, offset: 0.055}
+        - !<BuiltinTransform> {style: UTILITY - ACES-AP1_to_LINEAR-REC709_BFD, direction: inverse}
+        - !<BuiltinTransform> {style: ACEScg_to_ACES2065-1}
+
+  - !<ColorSpace>
     name: Raw
     bitdepth: 32f
     description: Data that is not colour.

@@ -32,12 +32,6 @@ Matrix3d rgb_to_xyz(const Matrix3d& primaries, const Vector3d& white) {
   return primaries * (primaries.inverse() * white).asDiagonal();
 }
 
-Matrix3d rec709_to_xyz() {
-  Matrix3d primaries;
-  primaries << from_chromaticity(0.64, 0.33), from_chromaticity(0.30, 0.60), from_chromaticity(0.15, 0.06);
-  return rgb_to_xyz(primaries, white_d65);
-}
-
 /// ACES2065-1 (SMPTE ST 2065-1); its blue primary has a negative y.
 Matrix3d aces_to_xyz() {
   Matrix3d primaries;
@@ -128,6 +122,28 @@ Vector3d apply(const OCIO::CPUProcessor& processor, const Vector3d& color) {
   return values.cast<double>();
 }
 
+std::vector<std::string> color_spaces(const OCIO::Config& config) {
+  std::vector<std::string> names;
+  for (int i = 0; i < config.getNumColorSpaces(); ++i) names.emplace_back(config.getColorSpaceNameByIndex(i));
+  return names;
+}
+
+/// The space that the first fitting file rule names; empty where none but the default rule fits.
+std::string space_by_rule(const OCIO::Config& config, const std::filesystem::path& file) {
+  std::size_t rule = 0;
+  const std::string space = config.getColorSpaceFromFilepath(file.string().c_str(), rule);
+  return rule + 1 < config.getFileRules()->getNumEntries() ? space : "";
+}
+
+/// The name under which a config has the colours of ordinary picture files; empty if it has none of the usual ones.
+std::string srgb_texture_space(const OCIO::Config& config) {
+  for (const char* const name :
+       {"texture_paint", "srgb_texture", "sRGB - Texture", "sRGB Encoded Rec.709 (sRGB)", "srgb_rec709_scene",
+        "srgb_tx", "Utility - sRGB - Texture", "Input - Generic - sRGB - Texture", "sRGB"})
+    if (config.getColorSpace(name)) return name;
+  return "";
+}
+
 /// Reads the matrix from a space to scene_linear off the basis.
 /// @throw std::runtime_error if the way there is not linear.
 Matrix3d matrix_to_working(const OCIO::Config& config, const char* space) {
@@ -153,7 +169,14 @@ Matrix3d find_xyz_to_working(const OCIO::Config& config) {
 
 }  // namespace
 
+Matrix3d rec709_to_xyz() {
+  Matrix3d primaries;
+  primaries << from_chromaticity(0.64, 0.33), from_chromaticity(0.30, 0.60), from_chromaticity(0.15, 0.06);
+  return rgb_to_xyz(primaries, white_d65);
+}
+
 struct ColorManagement::State {
+  OCIO::ConstConfigRcPtr config;
   std::string config_name, working_space, display, view;
   OCIO::ConstCPUProcessorRcPtr to_display;
   Matrix3d xyz_to_working;
@@ -176,6 +199,7 @@ ColorManagement::ColorManagement(const ColorSettings& settings) : state_(std::ma
   } catch (const std::exception& error) {
     throw std::runtime_error(subject + ": " + one_line(error.what()));
   }
+  state_->config = config;
   state_->config_name = name;
 }
 
@@ -203,6 +227,44 @@ void ColorManagement::to_display(Image& image) const {
                               pixel_bytes * image.width);
     state_->to_display->apply(row);
   });
+}
+
+std::string ColorManagement::texture_space(const std::filesystem::path& file, bool integer,
+                                           const std::string& wanted) const {
+  const OCIO::Config& config = *state_->config;
+  if (!wanted.empty())
+    return config.getColorSpace(wanted.c_str())
+               ? wanted
+               : choose(wanted, "", color_spaces(config), "OCIO config " + state_->config_name);
+  const std::string by_rule = space_by_rule(config, file);
+  if (!by_rule.empty()) return by_rule;
+  if (!integer) return OCIO::ROLE_SCENE_LINEAR;
+  const std::string srgb = srgb_texture_space(config);
+  if (srgb.empty())
+    throw std::runtime_error("OCIO config " + state_->config_name + " has no colour space for sRGB pictures such as " +
+                             file.string() + "; name theirs by `integrator.image_color_space`");
+  return srgb;
+}
+
+ColorConversion ColorManagement::to_working(const std::string& space) const {
+  // Faster settings approximate powers and logarithms, and inverse tables.
+  constexpr OCIO::OptimizationFlags exact = OCIO::OPTIMIZATION_LOSSLESS;
+  try {
+    const auto processor = state_->config->getProcessor(space.c_str(), OCIO::ROLE_SCENE_LINEAR);
+    const OCIO::ConstCPUProcessorRcPtr cpu = processor->getOptimizedCPUProcessor(exact);
+    if (cpu->isNoOp()) return {};
+    return [cpu](float* rgba, std::size_t count) {
+      // As three channels: curves would leave alpha alone in name only, with a rounding error.
+      const std::ptrdiff_t pixel_bytes = 4 * sizeof(float),
+                           row_bytes = pixel_bytes * static_cast<std::ptrdiff_t>(count);
+      OCIO::PackedImageDesc pixels(rgba, static_cast<long>(count), 1, 3, OCIO::BIT_DEPTH_F32, sizeof(float),
+                                   pixel_bytes, row_bytes);
+      cpu->apply(pixels);
+    };
+  } catch (const std::exception& error) {
+    throw std::runtime_error("OCIO config " + state_->config_name + " cannot convert " + in_quotes(space) +
+                             " to scene_linear: " + one_line(error.what()));
+  }
 }
 
 std::string ColorManagement::config_name() const { return state_->config_name; }

@@ -1,115 +1,84 @@
 #include "renderer/geometry.h"
 
-#if __has_include(<embree4/rtcore.h>)
-#include <embree4/rtcore.h>
-#else
-#include <embree3/rtcore.h>
-#endif
-
 #include <algorithm>
-#include <stdexcept>
-#include <string>
+#include <cmath>
+#include <utility>
+
+#include "renderer/triangle_scene.h"
 
 namespace tensorray {
 namespace {
 
 constexpr double tolerance = 1e-6;  // Of the volume's size: what single precision resolves, with some room.
 
-/// Hides the difference between Embree 3 and 4.
-void intersect(RTCScene scene, RTCRayHit& ray) {
-#if RTC_VERSION_MAJOR >= 4
-  rtcIntersect1(scene, &ray, nullptr);
-#else
-  RTCIntersectContext context;
-  rtcInitIntersectContext(&context);
-  rtcIntersect1(scene, &context, &ray);
-#endif
-}
-
 TriangleMesh plate_mesh(const Plate& plate) { return {plate.corners(), {{0, 1, 2}, {0, 2, 3}}}; }
 
-/// One mesh, kept in double precision beside Embree's copy.
 struct Part {
-  TriangleMesh mesh;
+  const TriangleMesh* mesh;  // In double precision, beside the scene's copy.
   Surface surface;
 };
 
+std::vector<const TriangleMesh*> meshes(const std::vector<Part>& parts) {
+  std::vector<const TriangleMesh*> result;
+  for (const Part& part : parts) result.push_back(part.mesh);
+  return result;
+}
+
 /// Some meshes in a scene of their own: queries name a group, as ray masks are not in every build of Embree.
 struct Group {
-  std::vector<Part> parts;  // By Embree's geometry number.
-  Eigen::AlignedBox3d box;
-  RTCScene scene = nullptr;
-};
-
-void check(RTCDevice device) {
-  if (const RTCError error = rtcGetDeviceError(device); error != RTC_ERROR_NONE)
-    throw std::runtime_error("Embree cannot build the scene (error " + std::to_string(error) + ")");
-}
-
-void attach(RTCDevice device, Group& group, const Eigen::Vector3d& origin, double unit) {
-  group.scene = rtcNewScene(device);
-  rtcSetSceneFlags(group.scene, RTC_SCENE_FLAG_ROBUST);
-  rtcSetSceneBuildQuality(group.scene, RTC_BUILD_QUALITY_HIGH);
-  for (const Part& part : group.parts) {
-    const RTCGeometry geometry = rtcNewGeometry(device, RTC_GEOMETRY_TYPE_TRIANGLE);
-    auto* vertices = static_cast<float*>(rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3,
-                                                                 3 * sizeof(float), part.mesh.vertices.size()));
-    auto* triangles = static_cast<std::uint32_t*>(rtcSetNewGeometryBuffer(
-        geometry, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3, 3 * sizeof(std::uint32_t), part.mesh.triangles.size()));
-    check(device);
-    for (const Eigen::Vector3d& vertex : part.mesh.vertices)
-      for (int axis = 0; axis < 3; ++axis) *vertices++ = static_cast<float>((vertex[axis] - origin[axis]) / unit);
-    for (const auto& triangle : part.mesh.triangles) triangles = std::copy(triangle.begin(), triangle.end(), triangles);
-    rtcCommitGeometry(geometry);
-    rtcAttachGeometry(group.scene, geometry);
-    rtcReleaseGeometry(geometry);
-    group.box.extend(part.mesh.bounds());
+  Group(std::vector<Part> meshes_and_surfaces, const Eigen::Vector3d& origin, double unit)
+      : parts(std::move(meshes_and_surfaces)), scene(meshes(parts), origin, unit) {
+    for (const Part& part : parts) box.extend(part.mesh->bounds());
   }
-  rtcCommitScene(group.scene);
-  check(device);
-}
+
+  std::vector<Part> parts;
+  Eigen::AlignedBox3d box;
+  TriangleScene scene;
+};
 
 }  // namespace
 
 struct Geometry::State {
-  Surfaces surfaces;
-  RTCDevice device = nullptr;
-  Group bounds, cut, absorbers;
-  // Embree's frame, so that its single precision is spent on the volume, whatever the world's units.
-  Eigen::Vector3d origin = Eigen::Vector3d::Zero();
-  double unit = 1;
-  double margin = 0;
+  explicit State(Surfaces parts);
 
-  ~State() {
-    for (const Group* group : {&bounds, &cut, &absorbers})
-      if (group->scene) rtcReleaseScene(group->scene);
-    if (device) rtcReleaseDevice(device);
-  }
+  Surfaces surfaces;
+  TriangleMesh plate;
+  Eigen::AlignedBox3d volume;
+  double size, margin;
+  // Scenes relative to the volume, so that their single precision is spent on it.
+  Group bounds, cut, absorbers;
+
+  std::vector<Part> cut_parts() const;
+  std::vector<Part> absorber_parts() const;
 
   /// The nearest hit of a group beyond `min_distance` (which may be negative).
   std::optional<Hit> nearest(const Group& group, const Eigen::Vector3d& from, const Eigen::Vector3d& direction,
                              double min_distance, double max_distance) const;
 };
 
-Geometry::Geometry(Surfaces surfaces) : state_(std::make_unique<State>()) {
-  State& state = *state_;
-  state.surfaces = std::move(surfaces);
-  state.bounds.parts.push_back({state.surfaces.bounds, Surface::bounds});
-  if (state.surfaces.cut) state.cut.parts.push_back({*state.surfaces.cut, Surface::cut});
-  if (state.surfaces.plate) state.absorbers.parts.push_back({plate_mesh(*state.surfaces.plate), Surface::plate});
-  for (const TriangleMesh& mesh : state.surfaces.obstacles) state.absorbers.parts.push_back({mesh, Surface::obstacle});
+Geometry::State::State(Surfaces parts)
+    : surfaces(std::move(parts)),
+      plate(surfaces.plate ? plate_mesh(*surfaces.plate) : TriangleMesh()),
+      volume(surfaces.bounds.bounds()),
+      size(volume.diagonal().norm()),
+      margin(tolerance * size),
+      bounds({{&surfaces.bounds, Surface::bounds}}, volume.center(), size),
+      cut(cut_parts(), volume.center(), size),
+      absorbers(absorber_parts(), volume.center(), size) {}
 
-  const Eigen::AlignedBox3d volume = state.surfaces.bounds.bounds();
-  state.origin = volume.center();
-  state.unit = volume.diagonal().norm();
-  state.margin = tolerance * state.unit;
-
-  state.device = rtcNewDevice(nullptr);
-  if (!state.device) throw std::runtime_error("Embree cannot start on this processor");
-  for (Group* group : {&state.bounds, &state.cut, &state.absorbers})
-    attach(state.device, *group, state.origin, state.unit);
+std::vector<Part> Geometry::State::cut_parts() const {
+  if (!surfaces.cut) return {};
+  return {{&*surfaces.cut, Surface::cut}};
 }
 
+std::vector<Part> Geometry::State::absorber_parts() const {
+  std::vector<Part> parts;
+  if (surfaces.plate) parts.push_back({&plate, Surface::plate});
+  for (const TriangleMesh& mesh : surfaces.obstacles) parts.push_back({&mesh, Surface::obstacle});
+  return parts;
+}
+
+Geometry::Geometry(Surfaces surfaces) : state_(std::make_unique<State>(std::move(surfaces))) {}
 Geometry::~Geometry() = default;
 Geometry::Geometry(Geometry&&) noexcept = default;
 Geometry& Geometry::operator=(Geometry&&) noexcept = default;
@@ -119,34 +88,20 @@ const Surfaces& Geometry::surfaces() const { return state_->surfaces; }
 std::optional<Hit> Geometry::State::nearest(const Group& group, const Eigen::Vector3d& from,
                                             const Eigen::Vector3d& direction, double min_distance,
                                             double max_distance) const {
-  if (group.parts.empty()) return std::nullopt;
-  // Embree sees no hits behind a ray's origin, so that the ray starts at `min_distance`.
-  const Eigen::Vector3d start = (from + min_distance * direction - origin) / unit;
-  RTCRayHit ray{};
-  ray.ray.org_x = static_cast<float>(start.x());
-  ray.ray.org_y = static_cast<float>(start.y());
-  ray.ray.org_z = static_cast<float>(start.z());
-  ray.ray.dir_x = static_cast<float>(direction.x());
-  ray.ray.dir_y = static_cast<float>(direction.y());
-  ray.ray.dir_z = static_cast<float>(direction.z());
-  ray.ray.tfar = static_cast<float>((max_distance - min_distance) / unit);
-  ray.ray.mask = 0xffffffffu;
-  ray.hit.geomID = RTC_INVALID_GEOMETRY_ID;
-  tensorray::intersect(group.scene, ray);
-  if (ray.hit.geomID == RTC_INVALID_GEOMETRY_ID) return std::nullopt;
-
-  const Part& part = group.parts[ray.hit.geomID];
-  const auto& triangle = part.mesh.triangles[ray.hit.primID];
-  const Eigen::Vector3d& a = part.mesh.vertices[triangle[0]];
-  const Eigen::Vector3d& b = part.mesh.vertices[triangle[1]];
-  const Eigen::Vector3d& c = part.mesh.vertices[triangle[2]];
+  const auto seen = group.scene.nearest(from, direction, min_distance, max_distance);
+  if (!seen) return std::nullopt;
+  const Part& part = group.parts[seen->mesh];
+  const auto& triangle = part.mesh->triangles[seen->triangle];
+  const Eigen::Vector3d& a = part.mesh->vertices[triangle[0]];
+  const Eigen::Vector3d& b = part.mesh->vertices[triangle[1]];
+  const Eigen::Vector3d& c = part.mesh->vertices[triangle[2]];
   Hit hit;
   hit.surface = part.surface;
   hit.normal = (b - a).cross(c - a).normalized();
-  const double seen = min_distance + ray.ray.tfar * unit;
   const double exact = hit.normal.dot(a - from) / hit.normal.dot(direction);
-  // Where light grazes a plane the distance to it is ill-determined: keep what Embree saw.
-  hit.distance = std::abs(exact - seen) <= 10 * (margin + tolerance * std::abs(seen)) ? exact : seen;
+  // Where light grazes a plane the distance to it is ill-determined: keep what was seen.
+  const double allowed = 10 * (margin + tolerance * std::abs(seen->distance));
+  hit.distance = std::abs(exact - seen->distance) <= allowed ? exact : seen->distance;
   return hit;
 }
 

@@ -2,9 +2,11 @@
 /// @file renderer/image.h
 /// A picture in memory, and the one place where pictures are written (OpenImageIO).
 
+#include <array>
 #include <cstddef>
 #include <filesystem>
 #include <map>
+#include <memory>
 #include <string>
 #include <utility>
 #include <vector>
@@ -31,6 +33,9 @@ struct Image {
   }
 };
 
+/// Whether files with the ending of `path` hold an alpha: then as it is, not multiplied into the colours (EXR: it is).
+bool holds_alpha(const std::filesystem::path& path);
+
 /// Text that is written into a picture's header, by attribute name.
 using ImageMetadata = std::map<std::string, std::string>;
 
@@ -54,5 +59,39 @@ void write_image(const std::filesystem::path& path, const Image& image, const Im
 /// alpha is not multiplied in. Of several pictures in one file, the first.
 /// @throw std::runtime_error naming the file and the reason; a file that was cut off is refused.
 Image read_image(const std::filesystem::path& path);
+
+/// How a picture's values are stored.
+enum class SampleType { uint8, uint16, float32 };
+
+/// A picture as it is in its file, for pictures too large to be held as floats.
+struct NativeImage {
+  int width = 0;  ///< Of the whole picture (the display window).
+  int height = 0;
+  int data_x = 0;  ///< Where the stored pixels begin, from the picture's upper left corner (the data window).
+  int data_y = 0;
+  int data_width = 0;
+  int data_height = 0;
+  SampleType type = SampleType::float32;
+  int channels = 0;                     ///< Stored for each pixel, interleaved.
+  std::array<int, 3> rgb{};             ///< Which of them are red, green and blue; of a grey picture, the same one.
+  int alpha = -1;                       ///< Which one is alpha; -1: none.
+  bool is_premultiplied = false;        ///< Whether the colours are multiplied by alpha.
+  std::shared_ptr<const void> samples;  ///< data_width * data_height * channels values, rows from the top.
+};
+
+/// Reads a picture as it is in its file: integers of up to 8 bits and up to 16 bits, everything else as floats. The
+/// channels are found by their names: R, G, B (without a layer's name, or else of the first layer that has them), Y or
+/// a single channel of any name for grey, and A.
+/// @throw std::runtime_error naming the file and the reason; a file that was cut off, that has no such channels, or
+/// whose values take more than 8 GiB is refused.
+NativeImage read_native_image(const std::filesystem::path& path);
+
+/// The same in memory, without a copy. @throw std::invalid_argument unless the channels are R, G, B or R, G, B, A (with
+/// the alpha multiplied in) and all pixels are there.
+NativeImage native_image(Image image);
+
+/// Writes R, G, B, A of `count` pixels, from (x, y) to the right, all within the picture. Integers become 0 to 1; alpha
+/// is 1 where the picture has none; all four are 0 where no pixels are stored; values that are not finite are 0.
+void read_pixels(const NativeImage& image, int x, int y, int count, float* rgba);
 
 }  // namespace tensorray

@@ -10,6 +10,7 @@
 #include <fmt/core.h>
 
 #include "renderer/spectrum.h"
+#include "scenes/choices.h"
 
 namespace tensorray {
 namespace {
@@ -60,6 +61,19 @@ void check_spectrum(LightDescription& light, const SceneSource& source) {
   light.spectrum = source.resolve(text).string();
 }
 
+/// A built-in image, or a file; files come out relative to where the scene's are.
+void check_image(LensDescription& lens, const SceneSource& source) {
+  std::string known;
+  for (const auto& choice : choices(TestImage())) {
+    if (lens.image == choice.name) return;
+    known += fmt::format("\"{}\", ", choice.name);
+  }
+  if (lens.image.find_first_of("./") == std::string::npos)
+    source.fail(
+        fmt::format("`/integrator/image` must be one of {}or a file (NAME.png), but is \"{}\"", known, lens.image));
+  lens.image = source.resolve(lens.image).string();
+}
+
 /// s(λ) < 0 is allowed, and bends light the other way: more often than not the range was widened carelessly.
 void warn_of_negative_flexibility(SceneDescription& scene) {
   if (scene.bending.rgb) {
@@ -76,11 +90,11 @@ void warn_of_negative_flexibility(SceneDescription& scene) {
                   at_min, scene.light.wavelength_min, at_max, scene.light.wavelength_max));
 }
 
-void check_receiver(const SceneDescription& scene, const SceneSource& source) {
-  if (!scene.receiver.normal) return;
-  const double cosine = scene.receiver.normal->normalized().dot(scene.light.direction.normalized());
-  if (std::abs(cosine) > 1e-6) return;
-  source.fail("`/receiver/normal` is across the light: the plate would be seen edge-on; turn it towards the light");
+void check_normal(const std::optional<Eigen::Vector3d>& normal, const char* pointer, const LightDescription& light,
+                  const SceneSource& source) {
+  if (!normal || std::abs(normal->normalized().dot(light.direction.normalized())) > 1e-6) return;
+  source.fail(fmt::format("`{}/normal` is across the light: the plate would be seen edge-on; turn it towards the light",
+                          pointer));
 }
 
 /// A file where an earlier step may have left another form of the same path.
@@ -98,11 +112,16 @@ std::map<std::filesystem::path, std::string> input_files(const SceneDescription&
   add(scene.field.bounds, "`/field/bounds`");
   add(scene.output.ocio, "`/output/ocio`");
   for (const auto& obstacle : scene.obstacles) add(obstacle, "an obstacle's file");
+  add(scene.integrator.lens.image, "`/integrator/image`");
   return files;
 }
 
-void check_output(const SceneDescription& scene, const SceneSource& source) {
-  const OutputDescription& output = scene.output;
+void check_output(SceneDescription& scene, const SceneSource& source) {
+  OutputDescription& output = scene.output;
+  if (scene.integrator.type == IntegratorType::lens && !output.photons.empty()) {
+    scene.warnings.push_back("`/output/photons` has no effect with the lens, which deposits no photons");
+    output.photons.clear();
+  }
   std::map<std::filesystem::path, std::string> taken = input_files(scene);
   const auto check = [&](const std::filesystem::path& path, const std::string& pointer) {
     // Devices may take several files, one after the other.
@@ -137,7 +156,9 @@ void check_memory(const SceneDescription& scene, const SceneSource& source) {
 void check_scene(SceneDescription& scene, const Json& json, const SceneSource& source) {
   if (!scene.bending.rgb) check_wavelengths(scene.light, source);
   check_spectrum(scene.light, source);
-  check_receiver(scene, source);
+  check_image(scene.integrator.lens, source);
+  check_normal(scene.receiver.normal, "/receiver", scene.light, source);
+  check_normal(scene.integrator.lens.plane.normal, "/integrator/image_plane", scene.light, source);
   check_memory(scene, source);
   check_output(scene, source);
   warn_of_negative_flexibility(scene);

@@ -7,6 +7,7 @@
 #include "integrators/bending.h"
 #include "renderer/beam.h"
 #include "renderer/density.h"
+#include "renderer/test_images.h"
 #include "scenes/description.h"
 #include "volumes/eigenvalues.h"
 #include "volumes/tensor_files.h"
@@ -51,7 +52,30 @@ inline auto choices(DensityKind) {
 
 inline auto choices(IntegratorType) {
   using C = Choice<IntegratorType>;
-  return std::array{C{"photon_distribution", IntegratorType::photon_distribution}};
+  return std::array{C{"photon_distribution", IntegratorType::photon_distribution}, C{"lens", IntegratorType::lens}};
+}
+
+inline auto choices(LensMode) {
+  using C = Choice<LensMode>;
+  return std::array{C{"gather", LensMode::gather}, C{"scatter", LensMode::scatter}};
+}
+
+inline auto choices(Wrap) {
+  using C = Choice<Wrap>;
+  return std::array{C{"none", Wrap::none}, C{"clamp", Wrap::clamp}, C{"repeat", Wrap::repeat},
+                    C{"mirror", Wrap::mirror}};
+}
+
+inline auto choices(Overlay) {
+  using C = Choice<Overlay>;
+  return std::array{C{"none", Overlay::none}, C{"grid", Overlay::grid}};
+}
+
+/// The built-in images, as `integrator.image` names them.
+inline auto choices(TestImage) {
+  using C = Choice<TestImage>;
+  return std::array{C{"checkerboard", TestImage::checkerboard}, C{"grid", TestImage::grid},
+                    C{"color_wheel", TestImage::color_wheel}, C{"line", TestImage::line}};
 }
 
 /// The word for an alternative.

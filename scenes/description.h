@@ -13,8 +13,10 @@
 
 #include "integrators/bending.h"
 #include "integrators/flexibility.h"
+#include "integrators/lens.h"
 #include "renderer/beam.h"
 #include "renderer/density.h"
+#include "renderer/texture.h"
 #include "volumes/eigenvalues.h"
 #include "volumes/generators.h"
 #include "volumes/tensor_files.h"
@@ -70,11 +72,35 @@ struct ReceiverDescription {
   std::optional<Eigen::Vector2i> resolution;  ///< Pixels; none: 512 along the longer side, square pixels.
 };
 
-enum class IntegratorType { photon_distribution };
+enum class IntegratorType { photon_distribution, lens };
+
+/// `integrator.image_plane`: at most one of distance, depth and center.
+struct ImagePlaneDescription {
+  std::optional<double> distance;  ///< Before the volume, along the light; none: a quarter of the volume's depth.
+  std::optional<std::vector<double>> depth;  ///< Into the volume, 0 where light enters it and 1 where it leaves: a
+                                             ///< picture for each, side by side.
+  std::optional<Eigen::Vector3d> center;     ///< None: on the line along the light through the receiver's.
+  std::optional<Eigen::Vector3d> normal;     ///< None: the receiver's.
+  std::optional<Eigen::Vector3d> up;         ///< None: the receiver's.
+  std::optional<Eigen::Vector2d> size;       ///< None: the least that covers the receiver, in the image's proportions.
+};
+
+enum class Overlay { none, grid };
+
+struct LensDescription {
+  LensMode mode = LensMode::scatter;
+  std::string image = "checkerboard";  ///< A built-in one, or a file.
+  std::string image_color_space;       ///< Empty: "auto".
+  ImagePlaneDescription plane;
+  Wrap wrap = Wrap::none;
+  int samples = 1;  ///< Per pixel along x and y.
+  Overlay overlay = Overlay::none;
+};
 
 struct IntegratorDescription {
   IntegratorType type = IntegratorType::photon_distribution;
   DensitySettings density;
+  LensDescription lens;
 };
 
 struct OutputDescription {

@@ -81,8 +81,7 @@ Spectrum load_spectrum(const std::string& name) {
 
 /// The primaries of linear Rec. 709 as three bands of light, so that RGB mode needs no colour path of its own.
 std::vector<Band> rgb_bands() {
-  Eigen::Matrix3d xyz;  // Columns: red, green, blue (ITU-R BT.709, D65).
-  xyz << 0.4123908, 0.3575843, 0.1804808, 0.2126390, 0.7151687, 0.0721923, 0.0193308, 0.1191948, 0.9505322;
+  const Eigen::Matrix3d xyz = rec709_to_xyz();
   std::vector<Band> bands(3);
   for (int i = 0; i < 3; ++i) bands[i] = {0, 0, 1.0 / 3, xyz.col(i)};
   return bands;
@@ -170,18 +169,27 @@ Plate make_plate(const SceneDescription& description, const TensorField& field, 
   return plate;
 }
 
-/// Refuses a plate or a beam so large, or so far away, that single precision would not find it.
-void check_sizes(const SceneDescription& description, const TensorField& field, const Beam& beam, const Plate& plate) {
+[[noreturn]] void fail_size(const SceneDescription& description, const char* pointer) {
+  throw SceneError(fmt::format("{}: `{}` lies, or reaches, more than {:g} times the volume's size away from it",
+                               description.path.string(), pointer, greatest_size));
+}
+
+/// Refuses a plate so large, or so far away, that single precision would not find it.
+void check_size(const SceneDescription& description, const TensorField& field, const Plate& plate,
+                const char* pointer) {
   Eigen::AlignedBox3d volume;
   for (const Eigen::Vector3d& corner : field.corners()) volume.extend(corner);
   const double limit = greatest_size * volume.diagonal().norm();
-  const auto fail = [&](const char* pointer) {
-    throw SceneError(fmt::format("{}: `{}` lies, or reaches, more than {:g} times the volume's size away from it",
-                                 description.path.string(), pointer, greatest_size));
-  };
+  if (!(plate.size.maxCoeff() < limit && (plate.center - volume.center()).norm() < limit))
+    fail_size(description, pointer);
+}
+
+/// The same of the beam.
+void check_size(const SceneDescription& description, const TensorField& field, const Beam& beam) {
+  Eigen::AlignedBox3d volume;
+  for (const Eigen::Vector3d& corner : field.corners()) volume.extend(corner);
   for (const Eigen::Vector2d& corner : beam.aperture)
-    if (!(corner.norm() < limit)) fail("/light/aperture");
-  if (!(plate.size.maxCoeff() < limit && (plate.center - volume.center()).norm() < limit)) fail("/receiver");
+    if (!(corner.norm() < greatest_size * volume.diagonal().norm())) fail_size(description, "/light/aperture");
 }
 
 }  // namespace
@@ -205,9 +213,15 @@ Scene load_scene(const SceneDescription& description, const Progress& progress) 
   for (const std::filesystem::path& path : description.obstacles) surfaces.obstacles.push_back(read_mesh(path));
   Beam beam = make_beam(description, field);
   surfaces.plate = make_plate(description, field, beam);
-  check_sizes(description, field, beam, *surfaces.plate);
+  check_size(description, field, beam);
+  check_size(description, field, *surfaces.plate, "/receiver");
   for (const TriangleMesh& mesh : surfaces.obstacles) start_before(beam, mesh.vertices);
   start_before(beam, surfaces.plate->corners());
+  std::optional<LensScene> lens;
+  if (description.integrator.type == IntegratorType::lens) {
+    lens.emplace(load_lens(description, field, color, beam.direction, *surfaces.plate));
+    for (const Plate& plane : lens->planes) check_size(description, field, plane, "/integrator/image_plane");
+  }
   Geometry geometry(std::move(surfaces));
 
   const bool automatic = !description.field.scale;
@@ -225,19 +239,13 @@ Scene load_scene(const SceneDescription& description, const Progress& progress) 
         fmt::format("scale: {:.6g} (at s = 0.2 the median ray turns by {:.3f} rad)", scale.scale, scale.median_turn));
   field = std::move(field).scaled(scale.scale);
 
-  Scene scene{description,
-              std::move(field),
-              std::move(geometry),
-              std::move(beam),
-              std::move(color),
-              std::move(bands),
-              std::move(channels),
-              eigenvalues,
-              scale,
-              automatic,
-              non_finite,
-              std::move(notes),
-              0};
+  Scene scene{description,         std::move(field),
+              std::move(geometry), std::move(beam),
+              std::move(color),    std::move(lens),
+              std::move(bands),    std::move(channels),
+              eigenvalues,         scale,
+              automatic,           non_finite,
+              std::move(notes),    0};
   scene.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
   return scene;
 }

@@ -3,6 +3,7 @@
 /// SceneDescription → Scene: fields, meshes and spectra are loaded, and everything that was left to be chosen is.
 
 #include <cstddef>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -14,6 +15,7 @@
 #include "renderer/geometry.h"
 #include "renderer/spectrum.h"
 #include "scenes/description.h"
+#include "scenes/load_lens.h"
 #include "volumes/tensor_field.h"
 
 namespace tensorray {
@@ -25,6 +27,7 @@ struct Scene {
   Geometry geometry;
   Beam beam;
   ColorManagement color;
+  std::optional<LensScene> lens;  ///< If it is what the scene is rendered by.
 
   /// What travels: wavelength bands, or in RGB mode the three primaries (wavelength 0), and their flexibilities.
   std::vector<Band> bands;

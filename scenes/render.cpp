@@ -2,24 +2,12 @@
 
 #include <chrono>
 
+#include "scenes/render_lens.h"
+
 namespace tensorray {
 namespace {
 
 constexpr double narrowest_white = 100;  // nm: light of a smaller range is seen as a colour.
-
-/// From XYZ to the working space; the light's own white becomes neutral if the scene wants it so.
-Eigen::Matrix3d to_working(const Scene& scene) {
-  if (!scene.description.output.white_balance) return scene.color.xyz_to_working();
-  Eigen::Vector3d white = Eigen::Vector3d::Zero();
-  double width = 0;
-  for (const Band& band : scene.bands) {
-    white += band.xyz;
-    width += band.width;
-  }
-  // Nearly monochromatic light has no white to adapt to: its colour is what one wants to see.
-  const bool has_white = scene.description.bending.rgb || width >= narrowest_white;
-  return has_white ? scene.color.xyz_to_working_adapted(white) : scene.color.xyz_to_working();
-}
 
 Render render_photons(const Scene& scene, const Progress& progress) {
   const SceneDescription& description = scene.description;
@@ -55,10 +43,25 @@ Render render_photons(const Scene& scene, const Progress& progress) {
 
 }  // namespace
 
+bool has_white(const Scene& scene) {
+  double width = 0;
+  for (const Band& band : scene.bands) width += band.width;
+  return scene.description.bending.rgb || width >= narrowest_white;
+}
+
+Eigen::Matrix3d to_working(const Scene& scene) {
+  if (!scene.description.output.white_balance || !has_white(scene)) return scene.color.xyz_to_working();
+  Eigen::Vector3d white = Eigen::Vector3d::Zero();
+  for (const Band& band : scene.bands) white += band.xyz;
+  return scene.color.xyz_to_working_adapted(white);
+}
+
 Render render(const Scene& scene, const Progress& progress) {
   switch (scene.description.integrator.type) {
     case IntegratorType::photon_distribution:
       return render_photons(scene, progress);
+    case IntegratorType::lens:
+      return render_lens(scene, progress);
   }
   throw std::logic_error("unknown integrator");
 }

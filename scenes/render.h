@@ -22,11 +22,21 @@ struct Statistics {
 
 /// What a method made, ready to be written.
 struct Render {
-  Image linear;                           ///< R, G, B in the scene-linear working space; 1 is the undisturbed light.
+  Image linear;  ///< R, G, B in the scene-linear working space (1 is the undisturbed light, or the image's white); then
+                 ///< A, multiplied in, and other channels, if the method has them.
   std::optional<SpectralImage> spectral;  ///< If the scene asks for it.
   PhotonMap photons;                      ///< If the scene asks for it.
+  std::optional<double> exposure;         ///< Stops at which it is well shown; none: by its brightness.
+  ImageMetadata metadata;                 ///< What the method has to say of the picture, for its header.
   Statistics statistics;
 };
+
+/// Whether the scene's light has a white that pictures can be adapted to: nearly monochromatic light has none, its
+/// colour is what one wants to see.
+bool has_white(const Scene& scene);
+
+/// From XYZ to the working space; the light's own white becomes neutral if the scene wants it so.
+Eigen::Matrix3d to_working(const Scene& scene);
 
 /// @throw Cancelled; std::runtime_error.
 Render render(const Scene& scene, const Progress& progress);

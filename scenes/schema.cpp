@@ -82,6 +82,11 @@ Json schema_of(const Eigen::Matrix3d&, const Limits& limits) {
   return list_schema(3, schema_of(Eigen::Vector3d(), limits));
 }
 
+Json schema_of(const std::vector<double>&, const Limits& limits) {
+  const Json item = schema_of(double(), limits);
+  return {{"anyOf", {item, {{"type", "array"}, {"items", item}, {"minItems", 1}}}}};
+}
+
 Json schema_of(const std::variant<int, Eigen::Vector3i>&, const Limits& limits) {
   return {{"anyOf", {schema_of(int(), limits), schema_of(Eigen::Vector3i(), limits)}}};
 }
@@ -117,6 +122,8 @@ Json default_of(const Eigen::Matrix3d& member) {
   for (int i = 0; i < 3; ++i) rows.push_back(default_of(Eigen::Vector3d(member.row(i))));
   return rows;
 }
+
+Json default_of(const std::vector<double>& member) { return member; }
 
 Json default_of(const std::variant<int, Eigen::Vector3i>& member) {
   return std::visit([](const auto& value) { return default_of(value); }, member);

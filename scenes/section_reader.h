@@ -84,6 +84,7 @@ class SectionReader {
   static void set_word(T& member) {
     if constexpr (std::is_arithmetic_v<T>) member = 0;
   }
+  static void set_word(std::string& member) { member.clear(); }
   template <class T>
   static void set_word(std::optional<T>& member) {
     member.reset();

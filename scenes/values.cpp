@@ -117,6 +117,14 @@ bool assign(const Json& value, const Limits& limits, Eigen::Matrix3d& target) {
   return true;
 }
 
+bool assign(const Json& value, const Limits& limits, std::vector<double>& target) {
+  const Json list = value.is_array() ? value : Json::array({value});
+  target.resize(list.size());
+  for (std::size_t i = 0; i < target.size(); ++i)
+    if (!assign(list[i], limits, target[i])) return false;
+  return !target.empty();
+}
+
 bool assign(const Json& value, const Limits& limits, std::variant<int, Eigen::Vector3i>& target) {
   if (value.is_array()) return assign(value, limits, target.emplace<Eigen::Vector3i>());
   return assign(value, limits, target.emplace<int>());
@@ -151,6 +159,10 @@ std::string expectation(const Eigen::Vector2d&, const Limits& limits) { return l
 std::string expectation(const Eigen::Vector3d&, const Limits& limits) { return list_expectation(3, "numbers", limits); }
 
 std::string expectation(const Eigen::Matrix3d&, const Limits&) { return "a list of 3 rows of 3 numbers"; }
+
+std::string expectation(const std::vector<double>&, const Limits& limits) {
+  return expectation(double(), limits) + ", or a list of them";
+}
 
 std::string expectation(const std::variant<int, Eigen::Vector3i>&, const Limits& limits) {
   return expectation(int(), limits) + ", or a list of 3 of them";

@@ -8,6 +8,7 @@
 #include <string>
 #include <type_traits>
 #include <variant>
+#include <vector>
 
 #include <Eigen/Core>
 #include <fmt/core.h>
@@ -32,6 +33,7 @@ bool assign(const Json& value, const Limits& limits, Eigen::Vector3i& target);
 bool assign(const Json& value, const Limits& limits, Eigen::Vector2d& target);
 bool assign(const Json& value, const Limits& limits, Eigen::Vector3d& target);
 bool assign(const Json& value, const Limits& limits, Eigen::Matrix3d& target);
+bool assign(const Json& value, const Limits& limits, std::vector<double>& target);  // Or one number.
 bool assign(const Json& value, const Limits& limits, std::variant<int, Eigen::Vector3i>& target);
 
 std::string expectation(const bool&, const Limits& limits);
@@ -45,6 +47,7 @@ std::string expectation(const Eigen::Vector3i&, const Limits& limits);
 std::string expectation(const Eigen::Vector2d&, const Limits& limits);
 std::string expectation(const Eigen::Vector3d&, const Limits& limits);
 std::string expectation(const Eigen::Matrix3d&, const Limits& limits);
+std::string expectation(const std::vector<double>&, const Limits& limits);
 std::string expectation(const std::variant<int, Eigen::Vector3i>&, const Limits& limits);
 
 template <class Enum>

@@ -12,21 +12,37 @@ namespace tensorray {
 namespace {
 
 ImageMetadata provenance(const Scene& scene, const Render& render) {
-  return {{"Software", "tensorray " TENSORRAY_VERSION},
-          {"tensorray:version", TENSORRAY_VERSION},
-          {"tensorray:scene", scene.description.text},
-          {"tensorray:seed", std::to_string(scene.description.seed)},
-          {"tensorray:photons", std::to_string(render.statistics.positions)},
-          {"tensorray:scale", fmt::format("{:.17g}", scene.scale.scale)},
-          {"tensorray:ocio_config", scene.color.config_name()},
-          {"tensorray:color_space", scene.color.working_space()}};
+  ImageMetadata metadata = render.metadata;
+  metadata.insert({{"Software", "tensorray " TENSORRAY_VERSION},
+                   {"tensorray:version", TENSORRAY_VERSION},
+                   {"tensorray:scene", scene.description.text},
+                   {"tensorray:seed", std::to_string(scene.description.seed)},
+                   {"tensorray:photons", std::to_string(render.statistics.positions)},
+                   {"tensorray:scale", fmt::format("{:.17g}", scene.scale.scale)},
+                   {"tensorray:ocio_config", scene.color.config_name()},
+                   {"tensorray:color_space", scene.color.working_space()}});
+  return metadata;
 }
 
-Image display_image(const Scene& scene, const Image& linear) {
-  const double exposure = scene.description.output.exposure.value_or(automatic_exposure(linear));
+/// R, G, B as the display shows them, and the alpha if there is one. Formats with an alpha hold colours that are not
+/// multiplied by it; in others the picture is seen on black.
+Image display_image(const Scene& scene, const Render& render) {
+  const Image& linear = render.linear;
+  const double exposure =
+      scene.description.output.exposure.value_or(render.exposure.value_or(automatic_exposure(linear)));
   const auto gain = static_cast<float>(std::exp2(exposure));
-  Image image = linear;
-  for (float& value : image.pixels) value *= gain;
+  const bool has_alpha = linear.channels.size() > 3 && linear.channels[3] == "A";
+  const bool divides = has_alpha && holds_alpha(scene.description.output.image);
+  const std::size_t from = linear.channels.size(), to = has_alpha ? 4 : 3;
+  Image image(linear.width, linear.height,
+              {linear.channels.begin(), linear.channels.begin() + static_cast<std::ptrdiff_t>(to)});
+  for (std::size_t i = 0; i < image.pixels.size() / to; ++i) {
+    const float* const in = &linear.pixels[i * from];
+    float* const out = &image.pixels[i * to];
+    const float alpha = divides && in[3] > 0 ? in[3] : 1;
+    for (int c = 0; c < 3; ++c) out[c] = gain * in[c] / alpha;
+    if (has_alpha) out[3] = in[3];
+  }
   scene.color.to_display(image);
   return image;
 }
@@ -82,7 +98,7 @@ std::vector<std::filesystem::path> write_outputs(const Render& render, const Sce
   const auto write_picture = [](std::optional<OutputFile>& file, const Image& image, const ImageMetadata& header) {
     file->write([&](const std::filesystem::path& path) { write_image(path, image, header); });
   };
-  if (files.image) write_picture(files.image, display_image(scene, render.linear), metadata);
+  if (files.image) write_picture(files.image, display_image(scene, render), metadata);
   if (files.exr) write_picture(files.exr, render.linear, metadata);
   if (files.spectral) {
     ImageMetadata spectral = metadata;

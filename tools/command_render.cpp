@@ -72,7 +72,7 @@ void check_statistics_path(const std::filesystem::path& path, const SceneDescrip
 }
 
 /// What a picture does not show of itself.
-std::vector<std::string> warnings_of(const Statistics& statistics) {
+std::vector<std::string> warnings_of(const Scene& scene, const Statistics& statistics) {
   std::uint64_t emitted = 0, deposited = 0, limited = 0;
   for (const EndCounts& counts : statistics.ends) {
     for (const std::uint64_t count : counts) emitted += count;
@@ -80,7 +80,9 @@ std::vector<std::string> warnings_of(const Statistics& statistics) {
     limited += counts[static_cast<int>(RayEnd::step_limit)];
   }
   std::vector<std::string> warnings;
-  if (deposited == 0) warnings.push_back("warning: no light reached the plate; look at `receiver` and `light`");
+  if (deposited == 0)
+    warnings.push_back(scene.lens ? "warning: no ray found the image; look at `receiver` and `integrator.image_plane`"
+                                  : "warning: no light reached the plate; look at `receiver` and `light`");
   if (100 * limited > emitted)
     warnings.push_back(
         fmt::format("warning: {:.0f}% of the rays were given up after `bending.max_steps` steps; raise it",
@@ -120,7 +122,7 @@ void run(const RenderOptions& options, Progress& progress) {
   tell(scene.notes, options.quiet);
   const Render result = render(scene, progress);
   bar.reset();  // Erased, so that what is printed next stands alone.
-  tell(warnings_of(result.statistics), options.quiet);
+  tell(warnings_of(scene, result.statistics), options.quiet);
 
   const auto start = std::chrono::steady_clock::now();
   const auto written = write_outputs(result, scene, std::move(outputs));

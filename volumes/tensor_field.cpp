@@ -197,28 +197,29 @@ Eigen::Matrix3d TensorSampler::at(const Eigen::Vector3d& world) {
   return result;
 }
 
-std::array<Eigen::Matrix3d, 3> TensorSampler::gradient(const Eigen::Vector3d& world) {
+Eigen::Matrix3d TensorSampler::at(const Eigen::Vector3d& world, std::array<Eigen::Matrix3d, 3>& gradient) {
+  ++samples_;
   Eigen::Vector3d f;
   const float* voxel = locate(world, f);
-  std::array<Components, 3> by_index{Components::Zero(), Components::Zero(), Components::Zero()};
+  Components value = Components::Zero();
+  std::array<Components, 3> slope{value, value, value};  // Along the axes of index space.
   for (int corner = 0; corner < 8; ++corner) {
-    const Eigen::Vector3i far(corner >> 2, corner >> 1 & 1, corner & 1);
-    const Components value = components(voxel + far.x() * step_x + far.y() * step_y + far.z() * step_z);
-    const auto weight = [&](int axis) { return far[axis] ? f[axis] : 1 - f[axis]; };
-    const auto slope = [&](int axis) { return far[axis] ? 1.0 : -1.0; };
-    by_index[0] += slope(0) * weight(1) * weight(2) * value;
-    by_index[1] += weight(0) * slope(1) * weight(2) * value;
-    by_index[2] += weight(0) * weight(1) * slope(2) * value;
+    const int x = corner >> 2, y = corner >> 1 & 1, z = corner & 1;
+    const Components at_corner = components(voxel + x * step_x + y * step_y + z * step_z);
+    const double wx = x ? f.x() : 1 - f.x(), wy = y ? f.y() : 1 - f.y(), wz = z ? f.z() : 1 - f.z();
+    value += wx * wy * wz * at_corner;
+    slope[0] += (x ? 1 : -1) * wy * wz * at_corner;
+    slope[1] += (y ? 1 : -1) * wx * wz * at_corner;
+    slope[2] += (z ? 1 : -1) * wx * wy * at_corner;
   }
   // An axis of a single voxel has the same tensor across it.
   for (int axis = 0; axis < 3; ++axis)
-    if (field_->voxels().sizes()[axis] == 0) by_index[axis].setZero();
-  const Eigen::Matrix3d to_index = field_->to_index().linear();
-  std::array<Eigen::Matrix3d, 3> result;
+    if (field_->voxels().sizes()[axis] == 0) slope[axis].setZero();
+  const auto to_index = field_->to_index().linear();
   for (int axis = 0; axis < 3; ++axis)
-    result[axis] =
-        to_matrix(by_index[0] * to_index(0, axis) + by_index[1] * to_index(1, axis) + by_index[2] * to_index(2, axis));
-  return result;
+    gradient[axis] =
+        to_matrix(slope[0] * to_index(0, axis) + slope[1] * to_index(1, axis) + slope[2] * to_index(2, axis));
+  return to_matrix(value);
 }
 
 }  // namespace tensorray

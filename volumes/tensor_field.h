@@ -80,8 +80,8 @@ class TensorSampler {
   /// Trilinear interpolation at a world position, in world axes; inactive voxels count as zero.
   Eigen::Matrix3d at(const Eigen::Vector3d& world);
 
-  /// ∂T/∂x, ∂T/∂y, ∂T/∂z of the interpolation, world axes, 1/length; at a cell's face that of one side.
-  std::array<Eigen::Matrix3d, 3> gradient(const Eigen::Vector3d& world);
+  /// `at`, and ∂T/∂x, ∂T/∂y, ∂T/∂z of the interpolation, world axes, 1/length; at a cell's face that of one side.
+  Eigen::Matrix3d at(const Eigen::Vector3d& world, std::array<Eigen::Matrix3d, 3>& gradient);
 
   std::uint64_t samples() const { return samples_; }  ///< Calls of `at` so far.
 

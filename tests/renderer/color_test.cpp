@@ -244,5 +244,70 @@ TEST_F(ColorTest, BadConfigsAreOneClearLine) {
   EXPECT_THAT(error_of({}), AllOf(HasSubstr("/no/such.ocio: no such file"), HasSubstr("$OCIO")));
 }
 
+double srgb_decoded(double v) { return v <= 0.04045 ? v / 12.92 : std::pow((v + 0.055) / 1.055, 2.4); }
+
+TEST_F(ColorTest, PicturesAreDecodedToSinglePrecision) {
+  const ColorManagement color({});
+  const ColorConversion conversion = color.to_working(color.texture_space("a.png", true, ""));
+  for (int i = 0; i <= 65535; i += 5) {
+    const double value = i / 65535.0;
+    float rgba[8] = {static_cast<float>(value), 0, 1, 0.25f, 1, static_cast<float>(value), 0, 7};
+    conversion(rgba, 2);
+    EXPECT_NEAR(rgba[0], srgb_decoded(value), 1e-6);
+    EXPECT_NEAR(rgba[1], 0, 1e-6);
+    EXPECT_NEAR(rgba[2], 1, 1e-6);
+    EXPECT_EQ(rgba[3], 0.25f);
+    EXPECT_NEAR(rgba[5], srgb_decoded(value), 1e-6);
+    EXPECT_EQ(rgba[7], 7);
+  }
+}
+
+TEST_F(ColorTest, ConversionsOutliveTheirConfig) {
+  ColorConversion conversion;
+  {
+    const ColorManagement color({});
+    conversion = color.to_working("ACEScg");
+    EXPECT_FALSE(color.to_working("scene_linear"));
+    EXPECT_FALSE(color.to_working("lin_rec709"));
+    EXPECT_FALSE(color.to_working("Raw"));
+  }
+  float white[4] = {1, 1, 1, 0.5f};
+  conversion(white, 1);
+  for (int c = 0; c < 3; ++c) EXPECT_NEAR(white[c], 1, 1e-5);
+  EXPECT_THAT(message([] { ColorManagement({}).to_working("nowhere"); }), HasSubstr("nowhere"));
+}
+
+TEST_F(ColorTest, TextureSpaces) {
+  const ColorManagement color({});
+  EXPECT_EQ(color.texture_space("a.png", true, ""), "srgb_texture");
+  EXPECT_EQ(color.texture_space("a.exr", false, ""), "scene_linear");
+  EXPECT_EQ(color.texture_space("a.png", true, "ACEScg"), "ACEScg");
+  EXPECT_EQ(color.texture_space("a.png", true, "scene_linear"), "scene_linear");
+  EXPECT_THAT(message([&] { color.texture_space("a.png", true, "Technicolor"); }),
+              AllOf(HasSubstr("\"Technicolor\""), HasSubstr("\"ACEScg\""), HasSubstr("\"srgb_texture\"")));
+}
+
+TEST_F(ColorTest, TextureSpacesOfConfigs) {
+  const std::string text = config_text(linear_role + aces_role);
+  const Temporary plain("plain.ocio", text);
+  const ColorManagement without({plain.path(), "", ""});
+  EXPECT_EQ(without.texture_space("a.exr", false, ""), "scene_linear");
+  EXPECT_THAT(message([&] { without.texture_space("a.png", true, ""); }),
+              AllOf(HasSubstr(plain.path().string()), HasSubstr("a.png"), HasSubstr("integrator.image_color_space")));
+  const std::string aliased = text + "    aliases: [srgb_tx]\n";
+  const Temporary alias("alias.ocio", aliased);
+  EXPECT_EQ(ColorManagement({alias.path(), "", ""}).texture_space("a.png", true, ""), "srgb_tx");
+  std::string ruled = text;
+  const std::string rules = "file_rules:\n";
+  ruled.insert(ruled.find(rules) + rules.size(),
+               "  - !<Rule> {name: scans, colorspace: curve, pattern: \"*scan*\", extension: \"*\"}\n");
+  const Temporary rule("rule.ocio", ruled);
+  const ColorManagement with({rule.path(), "", ""});
+  EXPECT_EQ(with.texture_space("/x/my_scan_1.png", true, ""), "curve");
+  EXPECT_EQ(with.texture_space("/x/my_scan_1.exr", false, ""), "curve");
+  EXPECT_EQ(with.texture_space("/x/my_scan_1.png", true, "aces"), "aces");
+  EXPECT_EQ(with.texture_space("/x/other.exr", false, ""), "scene_linear");
+}
+
 }  // namespace
 }  // namespace tensorray

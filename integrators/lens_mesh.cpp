@@ -1,0 +1,232 @@
+#include "integrators/lens_mesh.h"
+
+#include <algorithm>
+#include <array>
+#include <unordered_map>
+
+#include <tbb/parallel_for.h>
+
+namespace tensorray {
+namespace {
+
+constexpr double cell_pixels = 4;          // Of the first lattice.
+constexpr double most_cells = 4096;        // ... along either side, however large the image is.
+constexpr double finest_pixels = 1.0 / 8;  // No edge shorter than this, in the starts, is halved.
+constexpr double bend_pixels = 0.1;        // How far the landings may lie beside an edge.
+constexpr double gap_pixels = 0.5;         // How far an edge's length may be off what the Jacobians explain.
+constexpr double torn_fraction = 0.5;      // ... and beyond which part of the edge's length it is torn.
+
+using Triangle = std::array<std::uint32_t, 3>;
+
+/// Follows the rays of `mesh` that have no landing yet.
+void trace_new(const LensMap& map, double flexibility, LensMesh& mesh, TraceCounts& counts, const Progress& progress) {
+  constexpr std::size_t task_size = 64;
+  const std::size_t first = mesh.landings.size(), count = mesh.starts.size() - first;
+  mesh.landings.resize(mesh.starts.size());
+  std::vector<TraceCounts> took((count + task_size - 1) / task_size);
+  tbb::parallel_for(std::size_t{0}, took.size(), [&](std::size_t task) {
+    if (progress.cancelled) throw Cancelled();
+    const auto from = mesh.starts.begin() + static_cast<std::ptrdiff_t>(first + task * task_size);
+    const auto to = mesh.starts.begin() + static_cast<std::ptrdiff_t>(first + std::min(count, (task + 1) * task_size));
+    took[task] = map.trace({from, to}, {flexibility}, &mesh.landings[first + task * task_size]);
+  });
+  for (const TraceCounts& each : took) {
+    counts.ray_steps += each.ray_steps;
+    counts.tensor_samples += each.tensor_samples;
+  }
+}
+
+enum class Edge { fine, coarse, torn };
+
+Edge judge(const Landing& a, const Landing& b, const Eigen::Vector2d& along, double pixel) {
+  const bool a_landed = a.end == RayEnd::plate, b_landed = b.end == RayEnd::plate;
+  if (!a_landed && !b_landed) return Edge::fine;
+  if (a_landed != b_landed) return Edge::torn;
+  const Eigen::Vector2d edge = b.at - a.at;
+  const double gap = (edge - (a.jacobian + b.jacobian) / 2 * along).norm();
+  if (!(gap <= std::max(gap_pixels * pixel, torn_fraction * edge.norm()))) return Edge::torn;
+  // The middle of the cubic that has these ends and slopes.
+  const double bend = ((a.jacobian - b.jacobian) * along / 8).norm();
+  return bend > bend_pixels * pixel || gap > gap_pixels * pixel ? Edge::coarse : Edge::fine;
+}
+
+Edge judge(const LensMesh& mesh, std::uint32_t a, std::uint32_t b, double pixel) {
+  return judge(mesh.landings[a], mesh.landings[b], mesh.starts[b] - mesh.starts[a], pixel);
+}
+
+/// Halves edges, round by round. With an edge of a triangle its longest one is halved, too, which keeps triangles from
+/// becoming needles (Rivara 1984).
+class Refinement {
+ public:
+  Refinement(LensMesh& mesh, std::vector<Triangle>& triangles, const LensMeshSettings& settings)
+      : mesh_(mesh), triangles_(triangles), settings_(settings) {}
+
+  /// Halves each edge that needs it once. @return false if none did. New starts have no landings yet.
+  bool halve() {
+    middles_.clear();
+    for (const Triangle& triangle : triangles_)
+      for (int i = 0; i < 3; ++i) {
+        const auto [edge, is_new] = middles_.emplace(edge_of(triangle, i), none);
+        if (is_new && needs_halving(triangle[i], triangle[(i + 1) % 3])) edge->second = unset;
+      }
+    while (mark_longest()) continue;
+    const std::size_t before = mesh_.starts.size();
+    std::vector<Triangle> next;
+    for (const Triangle& triangle : triangles_) {
+      Triangle middle{};
+      for (int i = 0; i < 3; ++i) middle[i] = middle_of(triangle, i);
+      divide(triangle, middle, next);
+    }
+    triangles_ = std::move(next);
+    return mesh_.starts.size() > before;
+  }
+
+ private:
+  // What middles_ holds where there is no vertex: the edge stays whole, or is to be halved.
+  static constexpr std::uint32_t none = 0xffffffffu, unset = 0xfffffffeu;
+
+  static std::uint64_t edge_of(const Triangle& triangle, int i) {
+    const std::uint32_t a = triangle[i], b = triangle[(i + 1) % 3];
+    return static_cast<std::uint64_t>(std::min(a, b)) << 32 | std::max(a, b);
+  }
+
+  double length(const Triangle& triangle, int i) const {
+    return (mesh_.starts[triangle[i]] - mesh_.starts[triangle[(i + 1) % 3]]).norm();
+  }
+
+  /// @return whether an edge was marked.
+  bool mark_longest() {
+    bool changed = false;
+    for (const Triangle& triangle : triangles_) {
+      int longest = 0;
+      bool halved = false;
+      for (int i = 0; i < 3; ++i) {
+        halved = halved || middles_[edge_of(triangle, i)] != none;
+        if (length(triangle, i) > length(triangle, longest)) longest = i;
+      }
+      std::uint32_t& middle = middles_[edge_of(triangle, longest)];
+      if (!halved || middle != none) continue;
+      middle = unset;
+      changed = true;
+    }
+    return changed;
+  }
+
+  bool needs_halving(std::uint32_t a, std::uint32_t b) const {
+    const Landing &from = mesh_.landings[a], &to = mesh_.landings[b];
+    if ((mesh_.starts[a] - mesh_.starts[b]).norm() < 2 * finest_pixels * settings_.pixel) return false;
+    if (from.end == RayEnd::plate && to.end == RayEnd::plate) {
+      const Eigen::Array2d edge = settings_.target.array() / 2 + settings_.pixel;
+      const Eigen::Array2d low = from.at.cwiseMin(to.at).array(), high = from.at.cwiseMax(to.at).array();
+      if ((low > edge).any() || (high < -edge).any()) return false;
+    }
+    return judge(mesh_, a, b, settings_.pixel) != Edge::fine;
+  }
+
+  /// The vertex in the middle of an edge, the same from both sides; `none` if it stays whole.
+  std::uint32_t middle_of(const Triangle& triangle, int i) {
+    std::uint32_t& middle = middles_[edge_of(triangle, i)];
+    if (middle == unset) {
+      middle = static_cast<std::uint32_t>(mesh_.starts.size());
+      mesh_.starts.push_back((mesh_.starts[triangle[i]] + mesh_.starts[triangle[(i + 1) % 3]]) / 2);
+    }
+    return middle;
+  }
+
+  void divide(Triangle corner, Triangle middle, std::vector<Triangle>& into) const {
+    const auto count = std::count_if(middle.begin(), middle.end(), [](std::uint32_t each) { return each != none; });
+    // Turned so that the first edge, or the first two, are the halved ones.
+    while ((count == 1 && middle[0] == none) || (count == 2 && middle[2] != none)) {
+      std::rotate(corner.begin(), corner.begin() + 1, corner.end());
+      std::rotate(middle.begin(), middle.begin() + 1, middle.end());
+    }
+    const auto [a, b, c] = corner;
+    const auto [ab, bc, ca] = middle;
+    const auto add = [&](std::initializer_list<Triangle> parts) { into.insert(into.end(), parts); };
+    if (count == 0) {
+      add({corner});
+    } else if (count == 1) {
+      add({{a, ab, c}, {ab, b, c}});
+    } else if (count == 3) {
+      add({{a, ab, ca}, {ab, b, bc}, {ca, bc, c}, {ab, bc, ca}});
+    } else if ((mesh_.starts[a] - mesh_.starts[bc]).norm() < (mesh_.starts[ab] - mesh_.starts[c]).norm()) {
+      add({{ab, b, bc}, {a, ab, bc}, {a, bc, c}});
+    } else {
+      add({{ab, b, bc}, {a, ab, c}, {ab, bc, c}});
+    }
+  }
+
+  LensMesh& mesh_;
+  std::vector<Triangle>& triangles_;
+  const LensMeshSettings& settings_;
+  std::unordered_map<std::uint64_t, std::uint32_t> middles_;  // By the vertices of the edge.
+};
+
+std::vector<Triangle> lattice_triangles(int columns, int rows) {
+  std::vector<Triangle> triangles;
+  for (int y = 0; y + 1 < rows; ++y)
+    for (int x = 0; x + 1 < columns; ++x) {
+      const auto corner = static_cast<std::uint32_t>(y * columns + x), below = corner + static_cast<unsigned>(columns);
+      triangles.push_back({corner, below, corner + 1});
+      triangles.push_back({corner + 1, below, below + 1});
+    }
+  return triangles;
+}
+
+/// Keeps what light covers: triangles whose rays all landed, next to each other.
+void finish(LensMesh& mesh, const std::vector<Triangle>& triangles, double pixel) {
+  for (const Landing& landing : mesh.landings) mesh.mesh.vertices.push_back(landing.at);
+  for (const Triangle& triangle : triangles) {
+    const bool covered = std::all_of(triangle.begin(), triangle.end(), [&](std::uint32_t vertex) {
+      return mesh.landings[vertex].end == RayEnd::plate && mesh.landings[vertex].at.allFinite();
+    });
+    const auto is_torn = [&](int i) { return judge(mesh, triangle[i], triangle[(i + 1) % 3], pixel) == Edge::torn; };
+    if (covered && !is_torn(0) && !is_torn(1) && !is_torn(2)) mesh.mesh.triangles.push_back(triangle);
+  }
+}
+
+}  // namespace
+
+LensMesh make_lens_mesh(const LensMap& map, double flexibility, const LensMeshSettings& settings, TraceCounts& counts,
+                        const Progress& progress) {
+  const Eigen::Array2i cells =
+      (settings.extent / (cell_pixels * settings.pixel)).array().ceil().max(1).min(most_cells).cast<int>();
+  LensMesh mesh;
+  for (int y = 0; y <= cells.y(); ++y)
+    for (int x = 0; x <= cells.x(); ++x)
+      mesh.starts.emplace_back((Eigen::Array2d(x, y) / cells.cast<double>() - 0.5) * settings.extent.array());
+  std::vector<Triangle> triangles = lattice_triangles(cells.x() + 1, cells.y() + 1);
+  trace_new(map, flexibility, mesh, counts, progress);
+  Refinement refinement(mesh, triangles, settings);
+  while (refinement.halve()) trace_new(map, flexibility, mesh, counts, progress);
+  finish(mesh, triangles, settings.pixel);
+  return mesh;
+}
+
+LensMesh lattice_mesh(std::vector<Eigen::Vector2d> starts, std::vector<Landing> landings, int columns, int rows,
+                      double pixel) {
+  LensMesh mesh;
+  mesh.starts = std::move(starts);
+  mesh.landings = std::move(landings);
+  finish(mesh, lattice_triangles(columns, rows), pixel);
+  return mesh;
+}
+
+void SheetSearch::find(const Eigen::Vector2d& point, std::vector<Sheet>& sheets) const {
+  thread_local std::vector<PlanarHit> hits;
+  search_.find(point, hits);
+  sheets.clear();
+  for (const PlanarHit& hit : hits) {
+    Sheet sheet;
+    for (int i = 0; i < 3; ++i) {
+      const std::uint32_t vertex = mesh_.mesh.triangles[hit.triangle][i];
+      sheet.start += hit.weights[i] * mesh_.starts[vertex];
+      sheet.jacobian += hit.weights[i] * mesh_.landings[vertex].jacobian;
+      sheet.length += hit.weights[i] * mesh_.landings[vertex].length;
+    }
+    const auto is_same = [&](const Sheet& other) { return (other.start - sheet.start).norm() < 1e-3 * pixel_; };
+    if (std::none_of(sheets.begin(), sheets.end(), is_same)) sheets.push_back(sheet);
+  }
+}
+
+}  // namespace tensorray

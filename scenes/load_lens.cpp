@@ -1,0 +1,109 @@
+#include "scenes/load_lens.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include <fmt/format.h>
+
+#include "renderer/test_images.h"
+#include "scenes/choices.h"
+#include "scenes/read_scene.h"
+
+namespace tensorray {
+namespace {
+
+constexpr double default_distance = 0.25;  // Of the image before the volume, in depths of the volume.
+constexpr int test_image_pixels = 4096;    // Along the longer side, at most: 8 to a pixel of the receiver.
+
+Image load_test_image(TestImage which, const Plate& receiver, const ColorManagement& color) {
+  const int longest = std::min(test_image_pixels, 8 * receiver.resolution.maxCoeff());
+  const Eigen::Vector2d pixels = longest * receiver.size / receiver.size.maxCoeff();
+  Image image = test_image(which, std::max(1, static_cast<int>(std::lround(pixels.x()))),
+                           std::max(1, static_cast<int>(std::lround(pixels.y()))));
+  const Eigen::Matrix3f to_working = (color.xyz_to_working() * rec709_to_xyz()).cast<float>();
+  for (int y = 0; y < image.height; ++y)
+    for (int x = 0; x < image.width; ++x) {
+      Eigen::Map<Eigen::Vector3f> pixel(image.pixel(x, y));
+      pixel = to_working * pixel;
+    }
+  return image;
+}
+
+Texture load_image(const LensDescription& lens, const Plate& receiver, const ColorManagement& color) {
+  for (const auto& choice : choices(TestImage()))
+    if (lens.image == choice.name) return {load_test_image(choice.value, receiver, color), lens.wrap};
+  return {lens.image, color, lens.image_color_space, lens.wrap};
+}
+
+/// The plate as it is seen from its other side.
+Plate from_behind(Plate plate) {
+  plate.right = -plate.right;
+  return plate;
+}
+
+/// The least rectangle of the image's proportions that covers the receiver.
+Eigen::Vector2d covering_size(const Plate& receiver, const Texture& image) {
+  const double aspect = static_cast<double>(image.width()) / image.height();
+  const Eigen::Vector2d size = receiver.size;
+  // Pixels of the same proportions as the receiver's: exactly its size, whatever the rounding.
+  if (std::abs(aspect * size.y() / size.x() - 1) < 0.5 / std::max(image.width(), image.height())) return size;
+  return {std::max(size.x(), size.y() * aspect), std::max(size.y(), size.x() / aspect)};
+}
+
+/// Where the volume begins and ends along the light.
+struct Depths {
+  double near = std::numeric_limits<double>::infinity(), far = -near;
+};
+
+Depths depths_of(const TensorField& field, const Eigen::Vector3d& direction) {
+  Depths depths;
+  for (const Eigen::Vector3d& corner : field.corners()) {
+    depths.near = std::min(depths.near, corner.dot(direction));
+    depths.far = std::max(depths.far, corner.dot(direction));
+  }
+  return depths;
+}
+
+}  // namespace
+
+LensScene load_lens(const SceneDescription& description, const TensorField& field, const ColorManagement& color,
+                    const Eigen::Vector3d& direction, const Plate& plate) {
+  const LensDescription& lens = description.integrator.lens;
+  const Plate receiver = from_behind(plate);
+  LensScene scene{load_image(lens, receiver, color), receiver, {}};
+
+  Plate plane = receiver;
+  if (lens.plane.normal || lens.plane.up) {
+    Eigen::Vector3d normal = lens.plane.normal.value_or(receiver.normal()).normalized();
+    if (normal.dot(direction) < 0) normal = -normal;
+    plane.up = upright(normal, lens.plane.up.value_or(receiver.up));
+    plane.right = plane.up.cross(normal);
+  }
+  plane.size = lens.plane.size.value_or(covering_size(receiver, scene.image));
+
+  const Depths depths = depths_of(field, direction);
+  const double depth = depths.far - depths.near, receiver_at = receiver.center.dot(direction);
+  const auto add = [&](const Eigen::Vector3d& center) {
+    if (!(center.dot(direction) < receiver_at))
+      throw SceneError(
+          fmt::format("{}: `/integrator/image_plane`: the image would not be before the receiver, which "
+                      "light reaches at depth {:.6g} of the volume",
+                      description.path.string(), (receiver_at - depths.near) / depth));
+    scene.planes.push_back(plane);
+    scene.planes.back().center = center;
+  };
+  const auto along = [&](double position) -> Eigen::Vector3d {
+    return receiver.center + (position - receiver_at) * direction;
+  };
+  if (lens.plane.center) {
+    add(*lens.plane.center);
+  } else if (lens.plane.depth) {
+    for (const double part : *lens.plane.depth) add(along(depths.near + part * depth));
+  } else {
+    add(along(depths.near - lens.plane.distance.value_or(default_distance * depth)));
+  }
+  return scene;
+}
+
+}  // namespace tensorray

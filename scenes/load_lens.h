@@ -1,0 +1,28 @@
+#pragma once
+/// @file scenes/load_lens.h
+/// What a lens needs beside the field: the image, where it stands, and from where it is seen.
+
+#include <vector>
+
+#include "renderer/color.h"
+#include "renderer/plate.h"
+#include "renderer/texture.h"
+#include "scenes/description.h"
+#include "volumes/tensor_field.h"
+
+namespace tensorray {
+
+/// Rectangles are as the viewer sees them, who looks against the light: their normals point along it.
+struct LensScene {
+  Texture image;
+  Plate receiver;
+  std::vector<Plate> planes;  ///< Of the image: a picture each, side by side.
+};
+
+/// @param direction  Of the light, unit.
+/// @param plate      The receiver as photons see it, along the light.
+/// @throw std::runtime_error if the image cannot be read; SceneError if it would stand behind the receiver.
+LensScene load_lens(const SceneDescription& description, const TensorField& field, const ColorManagement& color,
+                    const Eigen::Vector3d& direction, const Plate& plate);
+
+}  // namespace tensorray

@@ -1,0 +1,394 @@
+#include "renderer/texture.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <limits>
+#include <stdexcept>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "tests/renderer/picture_files.h"
+#include "tests/renderer/support.h"
+
+namespace tensorray {
+namespace {
+
+using Eigen::Matrix2d;
+using Eigen::Vector2d;
+using Eigen::Vector4f;
+using ::testing::AllOf;
+using ::testing::HasSubstr;
+
+const std::vector<Wrap> every_wrap{Wrap::none, Wrap::clamp, Wrap::repeat, Wrap::mirror};
+
+/// Values that are all different.
+Image noise(int width, int height, std::vector<std::string> channels = {"R", "G", "B"}) {
+  Image image(width, height, std::move(channels));
+  std::uint32_t state = 1;
+  for (float& value : image.pixels)
+    value = static_cast<float>((state = state * 1664525u + 1013904223u) >> 8) * 0x1p-24f;
+  return image;
+}
+
+Image checkerboard(int width, int height) {
+  Image image(width, height, {"R", "G", "B"});
+  for (int y = 0; y < height; ++y)
+    for (int x = 0; x < width; ++x) std::fill_n(image.pixel(x, y), 3, static_cast<float>((x + y) % 2));
+  return image;
+}
+
+/// The place of a texel's centre; y counts from the top, as in an Image.
+Vector2d centre(const Image& image, double x, double y) {
+  return {(x + 0.5) / image.width, 1 - (y + 0.5) / image.height};
+}
+
+/// A footprint of so many texels along the picture's axes.
+Matrix2d texels(const Image& image, double x, double y) {
+  return Vector2d(x / image.width, y / image.height).asDiagonal();
+}
+
+/// The colour of texel (x, y), as a look-up should have it.
+Vector4f color_of(const Image& image, int x, int y) {
+  const float* const pixel = image.pixel(x, y);
+  return {pixel[0], pixel[1], pixel[2], image.channels.size() > 3 ? pixel[3] : 1.0f};
+}
+
+Vector4f mean_of(const Image& image) {
+  Eigen::Vector4d sum = Eigen::Vector4d::Zero();
+  for (int y = 0; y < image.height; ++y)
+    for (int x = 0; x < image.width; ++x) sum += color_of(image, x, y).cast<double>();
+  return (sum / image.width / image.height).cast<float>();
+}
+
+double difference(const Vector4f& a, const Vector4f& b) { return (a - b).cwiseAbs().maxCoeff(); }
+
+double decoded(double value) { return value <= 0.04045 ? value / 12.92 : std::pow((value + 0.055) / 1.055, 2.4); }
+
+TEST(TextureTest, FootprintsOfATexelGiveTheTexels) {
+  for (const Image& image : {noise(512, 512), noise(300, 200), noise(37, 211, {"R", "G", "B", "A"}), noise(1000, 3)})
+    for (const Wrap wrap : every_wrap) {
+      const Texture texture(image, wrap);
+      EXPECT_EQ(texture.width(), image.width);
+      EXPECT_EQ(texture.height(), image.height);
+      double worst = 0;
+      for (const double size : {1.0, 0.999, 0.5, 1e-3, 0.0})
+        for (int y = 0; y < image.height; y += 3)
+          for (int x = 0; x < image.width; x += 7)
+            worst = std::max(worst, difference(texture.lookup(centre(image, x, y), texels(image, size, size)),
+                                               color_of(image, x, y)));
+      EXPECT_EQ(worst, 0) << image.width << " x " << image.height << ", " << static_cast<int>(wrap);
+    }
+}
+
+TEST(TextureTest, RotatedAndMirroredFootprintsOfATexelGiveTheTexels) {
+  const Image image = noise(300, 200);
+  const Texture texture(image, Wrap::clamp);
+  for (const double angle : {0.3, 1.0, 2.5}) {
+    Matrix2d turn;
+    turn << std::cos(angle), std::sin(angle), std::sin(angle), -std::cos(angle);
+    for (int x = 0; x < 300; ++x)
+      EXPECT_LT(difference(texture.lookup(centre(image, x, 99), texels(image, 1, 1) * turn), color_of(image, x, 99)),
+                1e-6);
+  }
+}
+
+TEST(TextureTest, MagnifiedTexelsAreInterpolatedLinearly) {
+  const Image image = noise(50, 40);
+  const Texture texture(image, Wrap::clamp);
+  for (const Matrix2d& footprint : {texels(image, 0.1, 0.1), texels(image, 0.9, 0.01)})
+    for (double x = 0; x < 48; x += 1.13)
+      for (double y = 0; y < 38; y += 1.37) {
+        const int column = static_cast<int>(x), row = static_cast<int>(y);
+        const auto u = static_cast<float>(x - column), v = static_cast<float>(y - row);
+        const Vector4f expected =
+            (1 - v) * ((1 - u) * color_of(image, column, row) + u * color_of(image, column + 1, row)) +
+            v * ((1 - u) * color_of(image, column, row + 1) + u * color_of(image, column + 1, row + 1));
+        EXPECT_LT(difference(texture.lookup(centre(image, x, y), footprint), expected), 2e-5) << x << " " << y;
+      }
+}
+
+TEST(TextureTest, MinifiedCheckerboardsAreGrey) {
+  for (const Image& image :
+       {checkerboard(1000, 1000), checkerboard(1024, 512), checkerboard(1001, 999), checkerboard(777, 40)}) {
+    const Texture texture(image, Wrap::repeat);
+    // Where an odd size wraps, two squares of one colour meet; and the mean is half a texel's off in a row.
+    const double tolerance = image.width % 2 || image.height % 2 ? 0.02 : 0.01;
+    for (double size = 2; size < std::min(image.height, 500); size *= 1.17)
+      for (double x = 100; x < 700; x += 7.3)
+        for (const double slant : {0.0, 0.4}) {
+          // A slanted footprint is narrower than its columns are long.
+          Matrix2d footprint = (1 + slant) * texels(image, size, size);
+          footprint(0, 1) = slant * footprint(0, 0);
+          const Vector4f seen = texture.lookup(centre(image, x, 0.37 * image.height + 0.01 * x), footprint);
+          ASSERT_LT(difference(seen, {0.5f, 0.5f, 0.5f, 1}), tolerance) << image.width << " " << size << " " << x;
+        }
+  }
+}
+
+TEST(TextureTest, LongFootprintsAverageAlongThemAndStaySharpAcross) {
+  Image image(512, 512, {"R", "G", "B"});  // One bright row, and stripes across it in the second channel.
+  for (int y = 0; y < 512; ++y)
+    for (int x = 0; x < 512; ++x) {
+      image.pixel(x, y)[0] = y == 256;
+      image.pixel(x, y)[1] = static_cast<float>(x % 2);
+    }
+  const Texture texture(image, Wrap::repeat);
+  for (const double length : {2.0, 5.5, 16.0, 31.0})
+    for (const double x : {100.0, 100.3, 100.5}) {
+      const Vector4f on = texture.lookup(centre(image, x, 256), texels(image, length, 1));
+      EXPECT_NEAR(on[0], 1, 1e-4);
+      EXPECT_NEAR(on[1], 0.5, 0.51 / length);
+      EXPECT_NEAR(texture.lookup(centre(image, x, 257), texels(image, length, 1))[0], 0, 1e-4);
+    }
+  // The same along the other axis, and along a diagonal, where the row is crossed.
+  EXPECT_NEAR(texture.lookup(centre(image, 100, 256), texels(image, 1, 16))[0], 1.0 / 16, 0.01);
+  EXPECT_NEAR(texture.lookup(centre(image, 101, 256), texels(image, 1, 16))[1], 1, 1e-4);
+}
+
+TEST(TextureTest, ALinearRampStaysLinearAtEveryFootprint) {
+  Image image(640, 480, {"R", "G", "B"});
+  for (int y = 0; y < 480; ++y)
+    for (int x = 0; x < 640; ++x)
+      image.pixel(x, y)[0] = static_cast<float>(x), image.pixel(x, y)[1] = static_cast<float>(y);
+  const Texture texture(image, Wrap::clamp);
+  for (double size = 0.5; size < 40; size *= 1.3)
+    for (const double stretch : {1.0, 3.7}) {
+      Matrix2d footprint = texels(image, size * stretch, size);
+      footprint(1, 0) = footprint(1, 1);
+      const Vector4f seen = texture.lookup(centre(image, 301.7, 222.2), footprint);
+      // Levels are exact means over areas of one shape, so that a ramp stays one; float places limit it.
+      EXPECT_NEAR(seen[0], 301.7, 1e-2) << size;
+      EXPECT_NEAR(seen[1], 222.2, 1e-2) << size;
+    }
+}
+
+TEST(TextureTest, HugeFootprintsGiveTheMean) {
+  const double nan = std::numeric_limits<double>::quiet_NaN(), infinity = std::numeric_limits<double>::infinity();
+  for (const Image& image : {noise(300, 200), noise(1, 1), noise(513, 2), noise(100, 100, {"R", "G", "B", "A"})})
+    for (const Wrap wrap : every_wrap) {
+      const Texture texture(image, wrap);
+      const Vector4f mean = mean_of(image);
+      for (const double size : {1.0, 3.0, 1e9, 1e200, infinity, nan})
+        for (const Vector2d& st : {Vector2d(0.5, 0.5), Vector2d(0.1, 0.9)}) {
+          Matrix2d footprint = Matrix2d::Identity() * size * image.width / std::min(image.width, image.height);
+          EXPECT_LT(difference(texture.lookup(st, footprint), mean), 1e-5) << size;
+          if (std::isfinite(size)) continue;
+          footprint = Matrix2d::Zero();
+          footprint(0, 1) = size;
+          EXPECT_LT(difference(texture.lookup(st, footprint), mean), 1e-5);
+        }
+      for (const double s : {nan, infinity, -infinity})
+        EXPECT_EQ(texture.lookup({s, 0.5}, texels(image, 1, 1)), Vector4f(Vector4f::Zero()));
+    }
+}
+
+TEST(TextureTest, Wraps) {
+  const Image image = noise(30, 20);
+  const Matrix2d footprint = texels(image, 1, 1);
+  const auto seen = [&](Wrap wrap, int x, int y) {
+    return Texture(image, wrap).lookup(centre(image, x, y), footprint);
+  };
+  const Vector4f nothing = Vector4f::Zero();
+  EXPECT_EQ(seen(Wrap::none, -1, 5), nothing);
+  EXPECT_EQ(seen(Wrap::none, 30, 5), nothing);
+  EXPECT_EQ(seen(Wrap::none, 3, 2000), nothing);
+  EXPECT_EQ(seen(Wrap::clamp, -4, 5), color_of(image, 0, 5));
+  EXPECT_EQ(seen(Wrap::clamp, 1000000, 2000), color_of(image, 29, 19));
+  EXPECT_EQ(seen(Wrap::clamp, 3, -1), color_of(image, 3, 0));
+  EXPECT_EQ(seen(Wrap::repeat, -1, 5), color_of(image, 29, 5));
+  EXPECT_EQ(seen(Wrap::repeat, 30 * 1000000 + 4, -20 * 1000 + 7), color_of(image, 4, 7));
+  EXPECT_EQ(seen(Wrap::mirror, -1, 5), color_of(image, 0, 5));
+  EXPECT_EQ(seen(Wrap::mirror, 31, 22), color_of(image, 28, 17));
+  EXPECT_EQ(seen(Wrap::mirror, 60 * 1000 + 4, -40 * 1000 - 8), color_of(image, 4, 7));
+}
+
+TEST(TextureTest, EdgesAreAsSoftAsTheFootprint) {
+  Image image(256, 256, {"R", "G", "B"});
+  std::fill(image.pixels.begin(), image.pixels.end(), 1.0f);
+  const Texture texture(image, Wrap::none);
+  for (const double size : {1.0, 4.0, 16.0}) {
+    const Matrix2d footprint = texels(image, size, size);
+    EXPECT_LT(difference(texture.lookup({0, 0.5}, footprint), Vector4f::Constant(0.5f)), 1e-5) << size;
+    EXPECT_LT(difference(texture.lookup({size / 256, 0.5}, footprint), Vector4f::Ones()), 1e-5) << size;
+    EXPECT_LT(difference(texture.lookup({-size / 256, 0.5}, footprint), Vector4f::Zero()), 1e-5) << size;
+  }
+}
+
+TEST(TextureTest, AnyNumberOfThreadsSeesTheSame) {
+  const Image image = noise(700, 500);
+  const Texture texture(image, Wrap::mirror);
+  const auto look = [&] {
+    std::vector<Vector4f> seen;
+    for (int i = 0; i < 20000; ++i) {
+      const Vector2d st(std::fmod(i * 0.618034, 3), std::fmod(i * 0.754878, 3));
+      Matrix2d footprint;
+      footprint << 1e-3 * (i % 17), 3e-4 * (i % 7), -2e-3 * (i % 5), 1e-3 * (i % 29);
+      seen.push_back(texture.lookup(st, footprint));
+    }
+    return seen;
+  };
+  std::vector<std::vector<Vector4f>> results(4);
+  std::vector<std::thread> threads;
+  for (auto& result : results) threads.emplace_back([&result, &look] { result = look(); });
+  for (std::thread& thread : threads) thread.join();
+  for (const auto& result : results) EXPECT_TRUE(result == results.front());
+  EXPECT_TRUE(look() == results.front());
+}
+
+TEST(TextureTest, PicturesInMemoryMustHaveColours) {
+  EXPECT_THROW(Texture(Image(2, 2, {"Y"}), Wrap::none), std::invalid_argument);
+  EXPECT_THROW(Texture(Image(), Wrap::none), std::invalid_argument);
+}
+
+/// The texel of a file that is one row.
+Vector4f texel_of(const std::filesystem::path& file, int x, const std::string& space = "") {
+  const Texture texture(file, ColorManagement({}), space, Wrap::clamp);
+  return texture.lookup({(x + 0.5) / texture.width(), 0.5}, Matrix2d::Zero());
+}
+
+/// What 8-bit sRGB numbers are in linear light, with an alpha that was not multiplied in.
+Vector4f linear(int r, int g, int b, double alpha = 1) {
+  return Eigen::Vector4d(alpha * decoded(r / 255.0), alpha * decoded(g / 255.0), alpha * decoded(b / 255.0), alpha)
+      .cast<float>();
+}
+
+TEST(TextureFileTest, EveryEightBitNumberIsDecodedExactly) {
+  std::vector<int> values;
+  for (int i = 0; i < 256; ++i) values.insert(values.end(), {i, 255 - i, i / 2});
+  const Temporary file("all.png", png_file(256, 1, 3, 8, values));
+  for (int i = 0; i < 256; ++i) EXPECT_LT(difference(texel_of(file.path(), i), linear(i, 255 - i, i / 2)), 1e-6) << i;
+  for (int i = 0; i < 256; i += 15)  // What is linear already stays as it is.
+    EXPECT_LT(difference(texel_of(file.path(), i, "scene_linear"), Vector4f(i, 255 - i, i / 2, 255) / 255), 1e-7) << i;
+}
+
+TEST(TextureFileTest, FormatsOfPng) {
+  const Temporary grey("grey.png", png_file(2, 1, 1, 8, {51, 200}));
+  EXPECT_LT(difference(texel_of(grey.path(), 1), linear(200, 200, 200)), 1e-6);
+  const Temporary grey_alpha("grey_alpha.png", png_file(2, 1, 2, 8, {51, 102, 200, 0}));
+  EXPECT_LT(difference(texel_of(grey_alpha.path(), 0), linear(51, 51, 51, 0.4)), 1e-6);
+  EXPECT_EQ(texel_of(grey_alpha.path(), 1), Vector4f(Vector4f::Zero()));
+  const Temporary rgba("rgba.png", png_file(2, 1, 4, 8, {10, 20, 250, 51, 3, 2, 1, 255}));
+  EXPECT_LT(difference(texel_of(rgba.path(), 0), linear(10, 20, 250, 0.2)), 1e-6);
+  EXPECT_LT(difference(texel_of(rgba.path(), 1), linear(3, 2, 1)), 1e-6);
+  const Temporary deep("deep.png", png_file(2, 1, 3, 16, {1, 256, 65535, 30000, 2, 0}));
+  const Vector4f expected(static_cast<float>(decoded(1 / 65535.0)), static_cast<float>(decoded(256 / 65535.0)), 1, 1);
+  EXPECT_LT(difference(texel_of(deep.path(), 0), expected), 1e-6);
+}
+
+TEST(TextureFileTest, FormatsOfTiff) {
+  const Temporary straight("straight.tif", tiff_file(1, 4, 2, 2, "\x64\x32\x0A\x33"));
+  EXPECT_LT(difference(texel_of(straight.path(), 0), linear(100, 50, 10, 0.2)), 1e-6);
+  const Temporary multiplied("multiplied.tif", tiff_file(1, 4, 2, 1, "\x14\x0A\x02\x33"));
+  EXPECT_LT(difference(texel_of(multiplied.path(), 0), linear(100, 50, 10, 0.2)), 1e-6);
+  // No ink, all of cyan, all of black.
+  const Temporary cmyk("cmyk.tif", tiff_file(3, 4, 5, 0, std::string("\0\0\0\0\xFF\0\0\0\0\0\0\xFF", 12)));
+  EXPECT_LT(difference(texel_of(cmyk.path(), 0), linear(255, 255, 255)), 1e-6);
+  EXPECT_LT(difference(texel_of(cmyk.path(), 1), linear(0, 255, 255)), 1e-6);
+  EXPECT_LT(difference(texel_of(cmyk.path(), 2), linear(0, 0, 0)), 1e-6);
+}
+
+TEST(TextureFileTest, FloatsAreTakenAsTheyAre) {
+  const Temporary file("floats.exr");
+  Image image(3, 1, {"R", "G", "B", "A"});
+  image.pixels = {-2, 1e-20f, 1e20f, 1, 0.25f, 0.5f, 0.75f, 0.5f, 3, 2, std::nanf(""), 0};
+  write_image(file.path(), image);
+  EXPECT_EQ(texel_of(file.path(), 0), Vector4f(-2, 1e-20f, 1e20f, 1));
+  EXPECT_EQ(texel_of(file.path(), 1), Vector4f(0.25f, 0.5f, 0.75f, 0.5f));
+  EXPECT_EQ(texel_of(file.path(), 2), Vector4f(3, 2, 0, 0));  // Light of no alpha; what is not a number counts as 0.
+}
+
+TEST(TextureFileTest, ChannelsOfExrAreFoundByName) {
+  const auto first = [](const std::vector<std::string>& channels, const std::vector<float>& values) {
+    const Temporary file("channels.exr", exr_file({0, 0, 0, 0}, {0, 0, 0, 0}, channels, values));
+    return texel_of(file.path(), 0);
+  };
+  EXPECT_EQ(first({"A", "B", "G", "R", "Z"}, {0.5f, 0.1f, 0.2f, 0.3f, 9}), Vector4f(0.3f, 0.2f, 0.1f, 0.5f));
+  EXPECT_EQ(first({"AO", "B", "G", "N.x", "R"}, {7, 0.1f, 0.2f, 8, 0.3f}), Vector4f(0.3f, 0.2f, 0.1f, 1));
+  EXPECT_EQ(first({"beauty.B", "beauty.G", "beauty.R", "depth.Z"}, {1, 2, 3, 4}), Vector4f(3, 2, 1, 1));
+  EXPECT_EQ(first({"Y", "Z"}, {0.7f, 4}), Vector4f(0.7f, 0.7f, 0.7f, 1));
+  EXPECT_EQ(first({"Z"}, {4}), Vector4f(4, 4, 4, 1));
+  EXPECT_EQ(first({"A", "V"}, {0.5f, 0.25f}), Vector4f(0.25f, 0.25f, 0.25f, 0.5f));
+  EXPECT_THAT(message([&] { first({"X", "Z"}, {1, 2}); }), AllOf(HasSubstr("channels.exr"), HasSubstr("X, Z")));
+}
+
+TEST(TextureFileTest, OutsideOfItsDataWindowAPictureIsTransparent) {
+  // Of a picture of 4 x 2, the right half's lower row, and one pixel beyond its edge.
+  const Temporary file("window.exr", exr_file({10, 20, 13, 21}, {12, 21, 14, 21}, {"B", "G", "R"},
+                                              {0.1f, 0.2f, 0.3f, 1, 2, 3, 4, 5, 6}));
+  const Texture texture(file.path(), ColorManagement({}), "", Wrap::clamp);
+  ASSERT_EQ(texture.width(), 4);
+  ASSERT_EQ(texture.height(), 2);
+  const auto texel = [&](int x, int y) { return texture.lookup({(x + 0.5) / 4, 1 - (y + 0.5) / 2}, Matrix2d::Zero()); };
+  EXPECT_EQ(texel(2, 1), Vector4f(4, 1, 0.1f, 1));
+  EXPECT_EQ(texel(3, 1), Vector4f(5, 2, 0.2f, 1));
+  EXPECT_EQ(texel(1, 1), Vector4f(Vector4f::Zero()));
+  EXPECT_EQ(texel(3, 0), Vector4f(Vector4f::Zero()));
+}
+
+TEST(TextureFileTest, FilteringIsOfLightNotOfNumbers) {
+  std::vector<int> values;
+  for (int i = 0; i < 64 * 64; ++i) values.insert(values.end(), 3, (i + i / 64) % 2 * 255);
+  const Temporary file("light.png", png_file(64, 64, 3, 8, values));
+  const Texture texture(file.path(), ColorManagement({}), "", Wrap::repeat);
+  for (const double size : {2.0, 7.0, 16.0, 64.0})
+    EXPECT_LT(difference(texture.lookup({0.3, 0.4}, Matrix2d::Identity() * size / 64), {0.5f, 0.5f, 0.5f, 1}), 1e-5);
+}
+
+TEST(TextureFileTest, LevelsOfLargeFilesHaveTheirMean) {
+  constexpr int width = 3001, height = 1777;  // 48 x 28 tiles; odd at most levels.
+  std::vector<int> values;
+  double sum = 0;
+  for (int i = 0; i < width * height; ++i) {
+    values.push_back((i % width * 7 + i / width * 13) % 256);
+    sum += decoded(values.back() / 255.0);
+  }
+  const Temporary file("large.png", png_file(width, height, 1, 8, values));
+  const Texture texture(file.path(), ColorManagement({}), "", Wrap::repeat);
+  const double mean = sum / width / height;
+  EXPECT_NEAR(texture.lookup({0, 0}, 2 * Matrix2d::Identity())[0], mean, 1e-5);
+  for (const double size : {300.0, 900.0})
+    EXPECT_NEAR(texture.lookup({0.4, 0.7}, Vector2d(size / width, size / height).asDiagonal())[0], mean, 2e-3) << size;
+}
+
+TEST(TextureFileTest, BadFilesAreOneClearLine) {
+  const auto error_of = [](const std::filesystem::path& file, const std::string& space = "") {
+    return message([&] { Texture(file, ColorManagement({}), space, Wrap::none); });
+  };
+  const Temporary folder("folder.png"), empty("empty.png", ""), text("text.png", "this is no picture\n");
+  std::filesystem::create_directory(folder.path());
+  EXPECT_EQ(error_of(folder.path() / "lost.png"),
+            "cannot read " + (folder.path() / "lost.png").string() + ": no such file");
+  EXPECT_THAT(error_of(folder.path()), AllOf(HasSubstr(folder.path().string()), HasSubstr("folder")));
+  EXPECT_THAT(error_of(empty.path()), AllOf(HasSubstr(empty.path().string()), HasSubstr("empty")));
+  EXPECT_THAT(error_of(text.path()), HasSubstr("cannot read " + text.path().string() + ": "));
+  for (const std::string ending : {".png", ".jpg", ".tif", ".exr"}) {
+    const Temporary whole("whole" + ending);
+    write_image(whole.path(), noise(100, 80));
+    const std::string bytes = read_bytes(whole.path());
+    for (const double part : {0.3, 0.9}) {
+      const Temporary cut("cut" + ending, bytes.substr(0, static_cast<std::size_t>(part * bytes.size())));
+      EXPECT_THAT(error_of(cut.path()), HasSubstr("cannot read " + cut.path().string() + ": ")) << part;
+    }
+  }
+  const Temporary silent("silent.ppm", "P6 9 9 255\nshort");  // A reader that does not say what is wrong.
+  EXPECT_EQ(error_of(silent.path()), "cannot read " + silent.path().string() + ": the file is cut off or damaged");
+  const Temporary good("good.png", png_file(1, 1, 1, 8, {7}));
+  EXPECT_THAT(error_of(good.path(), "Technicolor"), AllOf(HasSubstr("\"Technicolor\""), HasSubstr("\"srgb_texture\"")));
+}
+
+TEST(TextureFileTest, FilesTooLargeAreRefusedBeforeTheyAreRead) {
+  const Temporary file(
+      "giant.png", "\x89PNG\r\n\x1A\n" +
+                       png_chunk("IHDR", big_endian(60000) + big_endian(60000) + "\x08\x02" + std::string(3, '\0')) +
+                       png_chunk("IDAT", zlib_stored("x")) + png_chunk("IEND", ""));
+  EXPECT_THAT(message([&] { Texture(file.path(), ColorManagement({}), "", Wrap::none); }),
+              AllOf(HasSubstr(file.path().string()), HasSubstr("60000 x 60000"), HasSubstr("8 GiB")));
+}
+
+}  // namespace
+}  // namespace tensorray
