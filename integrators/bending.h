@@ -33,7 +33,8 @@ struct BendingSettings {
   /// 0.2 with T as last sampled (Eq. 9, read dimensionally); of `splitting`, which is stable, never below 1/64 voxel.
   /// For the adaptive methods the first and the longest step; automatic ones are at most 2 voxels long.
   double step = 0;
-  double tolerance = 1e-3;  ///< Adaptive methods: error per step, in voxels and in radians; > 0.
+  double tolerance = 1e-3;  ///< Adaptive methods: error per step of the ray, not of its differentials, in voxels and in
+                            ///< radians; > 0.
   int max_steps = 20000;    ///< Steps before a ray is given up; > 0.
 };
 

@@ -45,9 +45,7 @@ struct Medium {
     if constexpr (N == 1) {
       T = sampler.at(P);
     } else {
-      std::array<Eigen::Matrix3d, 3> gradient;
-      T = sampler.at(P.col(0), gradient);
-      for (int i = 1; i < N; ++i) dT[i - 1] = P(0, i) * gradient[0] + P(1, i) * gradient[1] + P(2, i) * gradient[2];
+      T = sampler.at(P.col(0), P.template rightCols<N - 1>(), dT);
     }
   }
 

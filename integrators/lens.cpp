@@ -52,14 +52,21 @@ Eigen::Matrix2d per_pixel(const Job& job, const Eigen::Matrix2d& image_by_receiv
          Eigen::Vector2d(pixel.x(), -pixel.y()).asDiagonal();
 }
 
+bool sees_image(const Job& job, const Eigen::Vector2d& st) {
+  constexpr double rounding = 1e-9;
+  return job.image.wraps || ((st.array() >= -rounding).all() && (st.array() <= 1 + rounding).all());
+}
+
 /// What one sample of a channel adds to its pixel.
 struct Shade {
   double radiance = 0, alpha = 0;
 };
 
 Shade shade(const Job& job, std::size_t channel, const Eigen::Vector2d& at, const Eigen::Matrix2d& image_by_receiver) {
+  const Eigen::Vector2d st = texture_coordinates(job, at);
+  if (!sees_image(job, st)) return {};
   const Eigen::Matrix2d footprint = per_pixel(job, image_by_receiver) / job.settings.samples;
-  const Eigen::Vector4d texel = job.image.texture->lookup(texture_coordinates(job, at), footprint).cast<double>();
+  const Eigen::Vector4d texel = job.image.texture->lookup(st, footprint).cast<double>();
   const double part = 1.0 / (job.settings.samples * job.settings.samples);
   if (!(texel.w() > 0)) return {};
   return {part * texel.w() * job.image.radiance(texel.head<3>() / texel.w(), channel), part * texel.w()};
@@ -70,8 +77,7 @@ LensPoint make_point(const Job& job, const Eigen::Vector2d& pixel, const Eigen::
                      const Eigen::Matrix2d& image_by_receiver, double length) {
   LensPoint point;
   point.st = texture_coordinates(job, at);
-  const bool inside = (point.st.array() >= 0).all() && (point.st.array() <= 1).all();
-  point.end = inside || job.image.wraps ? LensEnd::image : LensEnd::outside;
+  point.end = sees_image(job, point.st) ? LensEnd::image : LensEnd::outside;
   point.per_pixel = per_pixel(job, image_by_receiver);
   point.displacement = plane_point(job.image.plane, at) - plane_point(job.image.plane, job.straight * pixel);
   const Eigen::Vector2d shrink = image_by_receiver.jacobiSvd().singularValues();
@@ -98,11 +104,12 @@ struct GatheredRow {
 };
 
 /// The landing of the pixel's centre in the reference channel.
-Landing reference_landing(const Job& job, int x, int y, const std::vector<Landing>& landings) {
+Landing reference_landing(const Job& job, int x, int y, const std::vector<Landing>& landings, TraceCounts& counts) {
   const int n = job.settings.samples;
   if (n % 2 == 1) return landings[(n * n / 2) * job.channels.size() + job.settings.reference];
   Landing landing;
-  job.map.trace({receiver_point(job, {x + 0.5, y + 0.5})}, {job.flexibilities[job.settings.reference]}, &landing);
+  const Eigen::Vector2d center = receiver_point(job, {x + 0.5, y + 0.5});
+  add(counts, job.map.trace({center}, {job.flexibilities[job.settings.reference]}, &landing));
   return landing;
 }
 
@@ -126,7 +133,7 @@ void gather_row(const Job& job, int y, LensPicture& picture, std::vector<Landing
       alpha[channel] += seen.alpha;
     }
     picture.alpha[pixel] = *std::max_element(alpha.begin(), alpha.end());
-    const Landing& landing = references[pixel] = reference_landing(job, x, y, landings);
+    const Landing& landing = references[pixel] = reference_landing(job, x, y, landings, row.counts);
     LensPoint& point = picture.points[pixel];
     point.end = static_cast<LensEnd>(landing.end);
     if (landing.end != RayEnd::plate) continue;

@@ -32,7 +32,8 @@ enum class LensMode {
 struct LensImage {
   const Texture* texture = nullptr;
   Plate plane;         ///< Its resolution plays no part.
-  bool wraps = false;  ///< Whether the texture goes on beyond the plane's edges (seen in `gather` alone).
+  bool wraps = false;  ///< Whether it goes on beyond the plane's edges, as the texture does (seen in `gather` alone).
+                       ///< If not, the texture should be one that clamps: its edges are then as sharp as the samples.
 
   /// The radiance of a colour (R, G, B in the working space) in a channel; 1 is that of white.
   std::function<double(const Eigen::Vector3d& rgb, std::size_t channel)> radiance;

@@ -19,6 +19,7 @@ using Eigen::Vector3d;
 constexpr int table_nodes = 16;
 /// Below it a colour gets the spectrum of a brighter one, scaled down: coefficients grow without bound towards black,
 /// while the spectrum's shape no longer changes.
+constexpr double grey_tolerance = 1e-6;
 constexpr double darkest = 1.0 / 32;
 
 constexpr double tolerance = 1e-9;   ///< Differences in colour that are none.
@@ -171,7 +172,8 @@ ReflectanceSpectrum ReflectanceModel::spectrum(const Vector3d& rgb) const {
   if (!rgb.allFinite()) return {{}, 0};
   const Vector3d color = rgb.cwiseMax(0);
   const double brightness = color.maxCoeff();
-  if (color.minCoeff() == brightness) return {{}, 2 * brightness};  // σ(0) = ½
+  // What filtering makes of a grey picture in single precision is still grey.
+  if (color.minCoeff() >= (1 - grey_tolerance) * brightness) return {{}, 2 * color.mean()};  // σ(0) = ½
   const double scale = brightness > 1 ? brightness : brightness < darkest ? brightness / darkest : 1;
   const Vector3d reflectance = color / scale;
   const Vector3d coefficients = solve(bands_, reflectance, interpolate(table_, reflectance));

@@ -46,7 +46,8 @@ class ReflectanceModel {
   /// is below what single precision shows; elsewhere it is nearly the smallest possible (mostly to 1e-4, at worst to
   /// 0.03). The spectrum is within [0, 1], but colours with values above 1 have the spectrum of the colour divided by
   /// the largest value, times that value. Negative values count as 0. Black, and what is not finite, gives exactly 0,
-  /// and grey exactly that constant. About 1 µs with 16 bands; colours out of reach take up to 20 times longer.
+  /// and grey (to 1e-6) exactly its constant mean. About 1 µs with 16 bands; colours out of reach take up to 20 times
+  /// longer.
   ReflectanceSpectrum spectrum(const Eigen::Vector3d& rgb) const;
 
  private:

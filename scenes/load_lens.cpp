@@ -31,9 +31,11 @@ Image load_test_image(TestImage which, const Plate& receiver, const ColorManagem
 }
 
 Texture load_image(const LensDescription& lens, const Plate& receiver, const ColorManagement& color) {
+  // The lens itself cuts an image that does not go on, sharply.
+  const Wrap wrap = lens.wrap == Wrap::none ? Wrap::clamp : lens.wrap;
   for (const auto& choice : choices(TestImage()))
-    if (lens.image == choice.name) return {load_test_image(choice.value, receiver, color), lens.wrap};
-  return {lens.image, color, lens.image_color_space, lens.wrap};
+    if (lens.image == choice.name) return {load_test_image(choice.value, receiver, color), wrap};
+  return {lens.image, color, lens.image_color_space, wrap};
 }
 
 /// The plate as it is seen from its other side.

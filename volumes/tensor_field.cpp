@@ -164,15 +164,44 @@ const float* TensorSampler::locate(const Eigen::Vector3d& world, Eigen::Vector3d
 
 namespace {
 
-using Components = Eigen::Array<double, voxel_floats, 1>;
+constexpr int step_x = voxel_offset(1, 0, 0), step_y = voxel_offset(0, 1, 0), step_z = voxel_offset(0, 0, 1);
 
-Components components(const float* voxel) {
-  return Eigen::Map<const Eigen::Array<float, voxel_floats, 1>>(voxel).cast<double>();
+/// Eight components fill vector registers, the ninth goes alone.
+using Eight = Eigen::Array<double, 8, 1>;
+
+Eight first_eight(const float* voxel) { return Eigen::Map<const Eigen::Array<float, 8, 1>>(voxel).cast<double>(); }
+double ninth(const float* voxel) { return voxel[8]; }
+
+Eigen::Matrix3d to_matrix(const Eight& eight, double last) {
+  Eigen::Matrix3d result;
+  Eigen::Map<Eight>(result.data()) = eight;
+  result(2, 2) = last;
+  return result;
 }
 
-Eigen::Matrix3d to_matrix(const Components& c) { return Eigen::Map<const Eigen::Matrix3d>(c.data()); }
+/// A value, and its slopes along the axes of index space.
+template <class Value>
+struct Slopes {
+  Value value, x, y, z;
+};
 
-constexpr int step_x = voxel_offset(1, 0, 0), step_y = voxel_offset(0, 1, 0), step_z = voxel_offset(0, 0, 1);
+/// Trilinear interpolation in a cell: along z, then y, then x. `load` gives the components of a voxel.
+template <class Value, class Load>
+Slopes<Value> interpolate(const float* voxel, const Eigen::Vector3d& f, Load load) {
+  Value value[2], slope_y[2], slope_z[2];
+  for (int x = 0; x < 2; ++x) {
+    const float* const face = voxel + x * step_x;
+    const Value near = load(face), far = load(face + step_y);
+    const Value near_z = load(face + step_z) - near, far_z = load(face + step_y + step_z) - far;
+    const Value near_value = near + f.z() * near_z;
+    slope_y[x] = far + f.z() * far_z - near_value;
+    slope_z[x] = near_z + f.y() * (far_z - near_z);
+    value[x] = near_value + f.y() * slope_y[x];
+  }
+  const Value slope_x = value[1] - value[0];
+  return {value[0] + f.x() * slope_x, slope_x, slope_y[0] + f.x() * (slope_y[1] - slope_y[0]),
+          slope_z[0] + f.x() * (slope_z[1] - slope_z[0])};
+}
 
 }  // namespace
 
@@ -181,45 +210,34 @@ Eigen::Matrix3d TensorSampler::at(const Eigen::Vector3d& world) {
   Eigen::Vector3d f;
   const float* voxel = locate(world, f);
   const double wx[2] = {1 - f.x(), f.x()}, wy[2] = {1 - f.y(), f.y()}, wz[2] = {1 - f.z(), f.z()};
-  // Eight components fill vector registers, the ninth goes alone.
-  Eigen::Array<double, 8, 1> eight = Eigen::Array<double, 8, 1>::Zero();
-  double ninth = 0;
+  Eight eight = Eight::Zero();
+  double last = 0;
   for (int corner = 0; corner < 8; ++corner) {
     const int x = corner >> 2, y = corner >> 1 & 1, z = corner & 1;
     const float* value = voxel + x * step_x + y * step_y + z * step_z;
     const double weight = wx[x] * wy[y] * wz[z];
-    eight += weight * Eigen::Map<const Eigen::Array<float, 8, 1>>(value).cast<double>();
-    ninth += weight * value[8];
+    eight += weight * first_eight(value);
+    last += weight * ninth(value);
   }
-  Eigen::Matrix3d result;
-  Eigen::Map<Eigen::Array<double, 8, 1>>(result.data()) = eight;
-  result(2, 2) = ninth;
-  return result;
+  return to_matrix(eight, last);
 }
 
-Eigen::Matrix3d TensorSampler::at(const Eigen::Vector3d& world, std::array<Eigen::Matrix3d, 3>& gradient) {
+Eigen::Matrix3d TensorSampler::at(const Eigen::Vector3d& world, const Eigen::Matrix<double, 3, 2>& along,
+                                  std::array<Eigen::Matrix3d, 2>& derivatives) {
   ++samples_;
   Eigen::Vector3d f;
   const float* voxel = locate(world, f);
-  Components value = Components::Zero();
-  std::array<Components, 3> slope{value, value, value};  // Along the axes of index space.
-  for (int corner = 0; corner < 8; ++corner) {
-    const int x = corner >> 2, y = corner >> 1 & 1, z = corner & 1;
-    const Components at_corner = components(voxel + x * step_x + y * step_y + z * step_z);
-    const double wx = x ? f.x() : 1 - f.x(), wy = y ? f.y() : 1 - f.y(), wz = z ? f.z() : 1 - f.z();
-    value += wx * wy * wz * at_corner;
-    slope[0] += (x ? 1 : -1) * wy * wz * at_corner;
-    slope[1] += (y ? 1 : -1) * wx * wz * at_corner;
-    slope[2] += (z ? 1 : -1) * wx * wy * at_corner;
-  }
+  const Slopes<Eight> eight = interpolate<Eight>(voxel, f, first_eight);
+  const Slopes<double> last = interpolate<double>(voxel, f, ninth);
+  Eigen::Matrix<double, 3, 2> by_index = field_->to_index().linear() * along;
   // An axis of a single voxel has the same tensor across it.
   for (int axis = 0; axis < 3; ++axis)
-    if (field_->voxels().sizes()[axis] == 0) slope[axis].setZero();
-  const auto to_index = field_->to_index().linear();
-  for (int axis = 0; axis < 3; ++axis)
-    gradient[axis] =
-        to_matrix(slope[0] * to_index(0, axis) + slope[1] * to_index(1, axis) + slope[2] * to_index(2, axis));
-  return to_matrix(value);
+    if (field_->voxels().sizes()[axis] == 0) by_index.row(axis).setZero();
+  for (int i = 0; i < 2; ++i) {
+    const double x = by_index(0, i), y = by_index(1, i), z = by_index(2, i);
+    derivatives[i] = to_matrix(x * eight.x + y * eight.y + z * eight.z, x * last.x + y * last.y + z * last.z);
+  }
+  return to_matrix(eight.value, last.value);
 }
 
 }  // namespace tensorray

@@ -80,8 +80,10 @@ class TensorSampler {
   /// Trilinear interpolation at a world position, in world axes; inactive voxels count as zero.
   Eigen::Matrix3d at(const Eigen::Vector3d& world);
 
-  /// `at`, and ∂T/∂x, ∂T/∂y, ∂T/∂z of the interpolation, world axes, 1/length; at a cell's face that of one side.
-  Eigen::Matrix3d at(const Eigen::Vector3d& world, std::array<Eigen::Matrix3d, 3>& gradient);
+  /// The same, with the derivatives of the interpolation along two world vectors, the columns of `along`; at a cell's
+  /// face those of one side.
+  Eigen::Matrix3d at(const Eigen::Vector3d& world, const Eigen::Matrix<double, 3, 2>& along,
+                     std::array<Eigen::Matrix3d, 2>& derivatives);
 
   std::uint64_t samples() const { return samples_; }  ///< Calls of `at` so far.
 

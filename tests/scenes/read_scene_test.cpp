@@ -124,6 +124,44 @@ TEST_F(ReadScene, ReadsEveryKindOfValue) {
   EXPECT_EQ(scene.output.view, "Raw");
 }
 
+TEST_F(ReadScene, ReadsTheLens) {
+  const SceneDescription scene = read({}, R"({
+    "field": { "file": "a.vdb" },
+    "integrator": { "type": "lens", "mode": "gather", "image": "photo.jpg", "image_color_space": "ACEScg",
+                    "image_plane": { "depth": [0, 0.5], "normal": [0, 1, -1], "up": [1, 0, 0], "size": [2, 3] },
+                    "wrap": "mirror", "samples": 3, "overlay": "grid" }
+  })");
+  const LensDescription& lens = scene.integrator.lens;
+  EXPECT_EQ(scene.integrator.type, IntegratorType::lens);
+  EXPECT_EQ(lens.mode, LensMode::gather);
+  EXPECT_EQ(lens.image, (folder_ / "photo.jpg").string());
+  EXPECT_EQ(lens.image_color_space, "ACEScg");
+  EXPECT_EQ(lens.plane.depth, (std::vector<double>{0, 0.5}));
+  EXPECT_EQ(lens.plane.normal, Eigen::Vector3d(0, 1, -1));
+  EXPECT_EQ(lens.plane.up, Eigen::Vector3d(1, 0, 0));
+  EXPECT_EQ(lens.plane.size, Eigen::Vector2d(2, 3));
+  EXPECT_EQ(lens.wrap, Wrap::mirror);
+  EXPECT_EQ(lens.samples, 3);
+  EXPECT_EQ(lens.overlay, Overlay::grid);
+
+  const LensDescription changed =
+      read({"integrator.image=color_wheel", "integrator.image_plane.depth=0.25", "integrator.image_color_space=auto"})
+          .integrator.lens;
+  EXPECT_EQ(changed.image, "color_wheel");
+  EXPECT_EQ(changed.plane.depth, std::vector<double>{0.25});
+  EXPECT_EQ(changed.image_color_space, "");
+}
+
+TEST_F(ReadScene, WrongLensesAreRefused) {
+  EXPECT_THAT(error({"integrator.image=chekerboard"}), HasSubstr("\"checkerboard\", \"grid\", \"color_wheel\""));
+  EXPECT_THAT(error({"integrator.image_plane.depth=[]"}), HasSubstr("a number, or a list of them"));
+  EXPECT_THAT(error({"integrator.image_plane.depth=[0,\"a\"]"}), HasSubstr("a number, or a list of them"));
+  EXPECT_THAT(error({"integrator.image_plane.depth=0", "integrator.image_plane.distance=1"}),
+              HasSubstr("/integrator/image_plane"));
+  EXPECT_THAT(error({"integrator.image_plane.normal=[1,0,0]"}), HasSubstr("is across the light"));
+  EXPECT_THAT(error({"integrator.samples=0"}), HasSubstr("an integer from 1 to 16"));
+}
+
 TEST_F(ReadScene, WordsStandForNoValue) {
   const SceneDescription scene = read({"field.scale=auto", "bending.step=auto", "output.exposure=auto",
                                        "light.wavelengths.per_photon=all", "receiver.resolution=100"});

@@ -60,14 +60,20 @@ TEST(TensorField, GradientIsTheDerivativeOfTheInterpolation) {
   TensorSampler sampler(field);
   for (const Vector3d& index : points_in({Vector3d::Constant(0.1), Vector3d::Constant(19.9)}, 200)) {
     const Vector3d world = oblique() * index;
-    std::array<Eigen::Matrix3d, 3> gradient;
-    EXPECT_TRUE(sampler.at(world, gradient).isApprox(sampler.at(world), 1e-12));
-    for (int axis = 0; axis < 3; ++axis) {
-      // The analytic function's: central differences are exact for what is linear along each index axis.
+    Eigen::Matrix<double, 3, 2> along;
+    along << Vector3d(0.5, -1, 2), Vector3d(1, 0.25, 0);
+    std::array<Matrix3d, 2> derivatives;
+    EXPECT_TRUE(sampler.at(world, along, derivatives).isApprox(sampler.at(world), 1e-12));
+    for (int i = 0; i < 2; ++i) {
+      // The analytic function's, along the index axes: central differences are exact for what is linear along each.
       const double h = 1e-4;
-      const Vector3d step = oblique().linear().inverse() * (h * Vector3d::Unit(axis));
-      const Matrix3d expected = (trilinear((index + step) / 8) - trilinear((index - step) / 8)) / (2 * h);
-      EXPECT_LT((gradient[axis] - expected).norm(), 1e-4 * expected.norm() + 1e-5);
+      const Vector3d by_index = oblique().linear().inverse() * along.col(i);
+      Matrix3d expected = Matrix3d::Zero();
+      for (int axis = 0; axis < 3; ++axis) {
+        const Vector3d step = h * Vector3d::Unit(axis);
+        expected += by_index[axis] * (trilinear((index + step) / 8) - trilinear((index - step) / 8)) / (2 * h);
+      }
+      EXPECT_LT((derivatives[static_cast<std::size_t>(i)] - expected).norm(), 1e-4 * expected.norm() + 1e-5);
     }
   }
 }
@@ -101,9 +107,12 @@ TEST(TensorField, ASingleVoxelAcrossIsOneVoxelThick) {
   EXPECT_EQ(field.index_bounds().max().y(), 5.5);
   TensorSampler sampler(field);
   for (const double y : {4.5, 4.9, 5.0, 5.5}) EXPECT_DOUBLE_EQ(sampler.at({3.5, y, 2})(0, 0), 3.5);
-  std::array<Eigen::Matrix3d, 3> gradient;
-  sampler.at({3.5, 5.2, 2}, gradient);
-  EXPECT_TRUE(gradient[1].isZero());
+  Eigen::Matrix<double, 3, 2> along;
+  along << Vector3d::UnitY(), Vector3d::UnitX();
+  std::array<Matrix3d, 2> derivatives;
+  sampler.at({3.5, 5.2, 2}, along, derivatives);
+  EXPECT_TRUE(derivatives[0].isZero());
+  EXPECT_DOUBLE_EQ(derivatives[1](0, 0), 1);
 }
 
 TEST(TensorField, MemoryFollowsActiveVoxelsNotTheExtent) {

@@ -1,0 +1,463 @@
+// Pictures seen through a tensor field, in both modes.
+
+#include "integrators/lens.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include <Eigen/LU>
+#include <gtest/gtest.h>
+#include <tbb/global_control.h>
+
+#include "tests/integrators/support.h"
+
+namespace tensorray {
+namespace {
+
+using namespace test;
+using Eigen::Matrix2d;
+using Eigen::Matrix3d;
+using Eigen::Vector2d;
+using Eigen::Vector2i;
+using Eigen::Vector3d;
+
+const LensMode modes[] = {LensMode::gather, LensMode::scatter};
+
+/// Across z, its normal +z: light goes along it.
+Plate plate_at(double z, const Vector2d& size, const Vector2i& resolution = {1, 1}) {
+  Plate plate;
+  plate.center = {0, 0, z};
+  plate.size = size;
+  plate.resolution = resolution;
+  return plate;
+}
+
+/// Noise without any pattern: SplitMix64.
+Image noise(int width, int height) {
+  Image image(width, height, {"R", "G", "B"});
+  std::uint64_t state = 1;
+  for (float& value : image.pixels) {
+    std::uint64_t z = state += 0x9e3779b97f4a7c15u;
+    z = (z ^ (z >> 30)) * 0xbf58476d1ce4e5b9u;
+    z = (z ^ (z >> 27)) * 0x94d049bb133111ebu;
+    value = static_cast<float>((z ^ (z >> 31)) >> 40) / (1 << 24);
+  }
+  return image;
+}
+
+Image uniform(float value) {
+  Image image(16, 16, {"R", "G", "B"});
+  std::fill(image.pixels.begin(), image.pixels.end(), value);
+  return image;
+}
+
+BendingSettings precise() {
+  BendingSettings settings = settings_of(BendingMethod::dopri5, 0.5);
+  settings.tolerance = 1e-8;
+  return settings;
+}
+
+/// Light along +z from an image to a receiver, either 1.5 from the middle of the field. The channels are R, G and B.
+struct Bench {
+  TensorField field;
+  Surfaces surfaces;
+  BendingSettings bending = precise();
+  std::vector<LightChannel> channels;
+  Plate receiver;
+  Texture texture;
+  LensImage image;
+  LensSettings settings;
+
+  Bench(TensorField field_, const Plate& receiver_, const Vector2d& image_size, Image picture, Wrap wrap = Wrap::none)
+      : field(std::move(field_)),
+        surfaces(surfaces_of(field)),
+        channels{{0.1, 0, 1}},
+        receiver(receiver_),
+        texture(std::move(picture), wrap) {
+    image.texture = &texture;
+    image.plane = plate_at(-1.5, image_size);
+    image.wraps = wrap == Wrap::repeat || wrap == Wrap::mirror;
+    image.radiance = [](const Vector3d& rgb, std::size_t channel) { return rgb[static_cast<int>(channel)]; };
+  }
+
+  LensPicture simulate(LensMode mode, const Progress& progress = Progress()) const {
+    LensSettings with_mode = settings;
+    with_mode.mode = mode;
+    return simulate_lens(field, surfaces, bending, channels, Vector3d::UnitZ(), receiver, image, with_mode, progress);
+  }
+
+  /// Of one channel with flexibility `s`.
+  LensPicture simulate(LensMode mode, double s) {
+    channels = {{s, 0, 1}};
+    return simulate(mode);
+  }
+};
+
+TensorField no_field() { return constant_field(Matrix3d::Zero()); }
+
+const LensPoint& point_at(const LensPicture& picture, int x, int y) {
+  return picture.points[static_cast<std::size_t>(y * picture.radiance.width + x)];
+}
+
+/// (s, t) at a pixel's centre.
+Vector2d center_of(int x, int y, const Vector2i& resolution) {
+  return {(x + 0.5) / resolution.x(), 1 - (y + 0.5) / resolution.y()};
+}
+
+TEST(Lens, WithoutFieldThePictureIsTheImage) {
+  const Vector2i size(48, 32);
+  const Image picture = noise(size.x(), size.y());
+  Bench bench(no_field(), plate_at(1.5, {1.5, 1}, size), {1.5, 1}, picture);
+  bench.channels = {{0.1, 650, 1}, {0.2, 550, 1}, {-0.5, 450, 1}};
+  bench.settings.reference = 1;
+  for (const LensMode mode : modes) {
+    const LensPicture seen = bench.simulate(mode);
+    ASSERT_EQ(seen.radiance.channels, 3);
+    for (int y = 0; y < size.y(); ++y)
+      for (int x = 0; x < size.x(); ++x) {
+        const std::size_t pixel = static_cast<std::size_t>(y * size.x() + x);
+        for (int channel = 0; channel < 3; ++channel)
+          ASSERT_NEAR(seen.radiance.plane(channel)[pixel], picture.pixel(x, y)[channel], 1e-5) << x << " " << y;
+        EXPECT_NEAR(seen.alpha[pixel], 1, 1e-6);
+        const LensPoint& point = seen.points[pixel];
+        ASSERT_EQ(point.end, LensEnd::image);
+        EXPECT_LT((point.st - center_of(x, y, size)).norm(), 1e-9);
+        EXPECT_LT((point.per_pixel - Matrix2d(Vector2d(1.0 / 48, -1.0 / 32).asDiagonal())).norm(), 1e-9);
+        EXPECT_LT(point.displacement.norm(), 1e-9);
+        EXPECT_NEAR(point.log_magnification, 0, 1e-9);
+        EXPECT_NEAR(point.log_stretch[0], 0, 1e-9);
+        EXPECT_NEAR(point.log_stretch[1], 0, 1e-9);
+        EXPECT_EQ(point.folds, 1);
+        EXPECT_NEAR(point.length, 3, 1e-9);
+        EXPECT_LT((seen.straight * Vector2d(x + 0.5, y + 0.5) - point.st).norm(), 1e-9);
+      }
+    for (const EndCounts& ends : seen.ends)
+      for (int end = 0; end < ray_end_count; ++end) {
+        if (end == static_cast<int>(RayEnd::plate)) {
+          EXPECT_GT(ends[end], 0u);
+        } else {
+          EXPECT_EQ(ends[end], 0u);
+        }
+      }
+  }
+}
+
+TEST(Lens, ASmallerImageLeavesPixelsThatSeeNothing) {
+  const Image picture = noise(24, 16);
+  const Bench bench(no_field(), plate_at(1.5, {1.5, 1}, {48, 32}), {0.75, 0.5}, picture);
+  for (const LensMode mode : modes) {
+    const LensPicture seen = bench.simulate(mode);
+    for (int y = 0; y < 32; ++y)
+      for (int x = 0; x < 48; ++x) {
+        const std::size_t pixel = static_cast<std::size_t>(y * 48 + x);
+        const bool inside = x >= 12 && x < 36 && y >= 8 && y < 24;
+        const LensEnd nothing = mode == LensMode::gather ? LensEnd::outside : LensEnd::missed;
+        ASSERT_EQ(seen.points[pixel].end, inside ? LensEnd::image : nothing) << x << " " << y;
+        EXPECT_NEAR(seen.alpha[pixel], inside ? 1 : 0, 1e-6);
+        EXPECT_NEAR(seen.radiance.plane(0)[pixel], inside ? picture.pixel(x - 12, y - 8)[0] : 0, 1e-5);
+        if (!inside && mode == LensMode::gather) {
+          EXPECT_LT((seen.points[pixel].st - center_of(x - 12, y - 8, {24, 16})).norm(), 1e-9);
+        }
+      }
+  }
+}
+
+TEST(Lens, AWrappedImageIsEverywhere) {
+  const Image picture = noise(24, 16);
+  const Bench bench(no_field(), plate_at(1.5, {1.5, 1}, {48, 32}), {0.75, 0.5}, picture, Wrap::repeat);
+  const LensPicture seen = bench.simulate(LensMode::gather);
+  for (int y = 0; y < 32; ++y)
+    for (int x = 0; x < 48; ++x) {
+      const std::size_t pixel = static_cast<std::size_t>(y * 48 + x);
+      EXPECT_EQ(seen.points[pixel].end, LensEnd::image);
+      EXPECT_NEAR(seen.alpha[pixel], 1, 1e-6);
+      EXPECT_NEAR(seen.radiance.plane(0)[pixel], picture.pixel((x + 12) % 24, (y + 8) % 16)[0], 1e-5);
+    }
+}
+
+TEST(Lens, AnObstacleHidesTheImage) {
+  Bench bench(no_field(), plate_at(1.5, {1.5, 1}, {48, 32}), {1.5, 1}, uniform(0.5f), Wrap::clamp);
+  const double pixel = 1.5 / 48;  // Its edges lie between pixels.
+  bench.surfaces.obstacles.push_back(
+      box_mesh(Eigen::AlignedBox3d(Vector3d(-8 * pixel, -4 * pixel, 1.1), Vector3d(12 * pixel, 6 * pixel, 1.2)),
+               Eigen::Affine3d::Identity()));
+  for (const LensMode mode : modes) {
+    const LensPicture seen = bench.simulate(mode);
+    for (int y = 0; y < 32; ++y)
+      for (int x = 0; x < 48; ++x) {
+        const bool hidden = x >= 16 && x < 36 && y >= 10 && y < 20;
+        const LensEnd end = mode == LensMode::gather ? LensEnd::obstacle : LensEnd::missed;
+        ASSERT_EQ(point_at(seen, x, y).end, hidden ? end : LensEnd::image) << x << " " << y;
+        EXPECT_NEAR(seen.alpha[static_cast<std::size_t>(y * 48 + x)], hidden ? 0 : 1, 1e-6);
+        EXPECT_NEAR(seen.radiance.values[static_cast<std::size_t>(y * 48 + x)], hidden ? 0 : 0.5, 1e-6);
+      }
+    EXPECT_GT(seen.ends[0][static_cast<int>(RayEnd::obstacle)], 0u);
+  }
+}
+
+TEST(Lens, SamplesOfAUniformImageHaveItsRadiance) {
+  Bench bench(cube_field(9, linear_tensor), plate_at(1.5, {0.6, 0.4}, {24, 16}), {3, 3}, uniform(0.75f), Wrap::repeat);
+  for (const LensMode mode : modes)
+    for (const int samples : {1, 2, 3}) {
+      bench.settings.samples = samples;
+      const LensPicture seen = bench.simulate(mode);
+      for (std::size_t i = 0; i < seen.alpha.size(); ++i) {
+        ASSERT_NEAR(seen.radiance.values[i], 0.75, 1e-5) << samples;
+        ASSERT_NEAR(seen.alpha[i], 1, 1e-6);
+      }
+    }
+}
+
+TEST(Lens, SamplesDescribeTheSamePoints) {
+  Bench bench(cube_field(9, linear_tensor), plate_at(1.5, {0.6, 0.4}, {24, 16}), {3, 3}, noise(64, 64));
+  bench.channels = {{0.1, 0, 1}, {0.15, 0, 1}};
+  bench.settings.reference = 1;
+  for (const LensMode mode : modes) {
+    const LensPicture one = bench.simulate(mode);
+    for (const int samples : {2, 3}) {
+      bench.settings.samples = samples;
+      const LensPicture more = bench.simulate(mode);
+      for (std::size_t i = 0; i < one.points.size(); ++i) {
+        ASSERT_LT((more.points[i].st - one.points[i].st).norm(), 1e-12);
+        ASSERT_EQ(more.points[i].folds, one.points[i].folds);
+      }
+    }
+    bench.settings.samples = 1;
+  }
+}
+
+TEST(Lens, PointsDescribeTheMapFromPixelsToTheImage) {
+  const Vector2i size(64, 48);
+  // Zero in the middle, so that light stays off the volume's sides, where the map has kinks.
+  const auto tensor = [](const Vector3d& p) -> Matrix3d { return linear_tensor(p) - general_tensor(); };
+  Bench bench(cube_field(9, tensor), plate_at(1.5, {0.8, 0.6}, size), {4, 5}, noise(16, 16));
+  for (const LensMode mode : modes) {
+    const LensPicture seen = bench.simulate(mode, mode == LensMode::gather ? 0.3 : -0.3);  // About the same picture.
+    double least = 1e9, greatest = -1e9;
+    for (int y = 1; y + 1 < size.y(); ++y)
+      for (int x = 1; x + 1 < size.x(); ++x) {
+        const LensPoint& point = point_at(seen, x, y);
+        ASSERT_EQ(point.end, LensEnd::image);
+        Matrix2d difference;
+        difference << (point_at(seen, x + 1, y).st - point_at(seen, x - 1, y).st) / 2,
+            (point_at(seen, x, y + 1).st - point_at(seen, x, y - 1).st) / 2;
+        // In `scatter`, (s, t) is linear within a triangle: its slope is off by half of the Jacobian's change across
+        // it.
+        const double tolerance = mode == LensMode::gather ? 0.01 : 0.03;
+        ASSERT_LT((difference - point.per_pixel).norm(), tolerance * point.per_pixel.norm()) << x << " " << y;
+
+        const Vector2d pixel = bench.receiver.pixel_size();
+        const Matrix2d image_by_receiver = bench.image.plane.size.asDiagonal() * point.per_pixel *
+                                           Vector2d(1 / pixel.x(), -1 / pixel.y()).asDiagonal();
+        EXPECT_NEAR(point.log_magnification, -std::log(std::abs(image_by_receiver.determinant())), 1e-9);
+        EXPECT_NEAR(point.log_stretch[0] + point.log_stretch[1], point.log_magnification, 1e-12);
+        EXPECT_GE(point.log_stretch[0], point.log_stretch[1]);
+        EXPECT_NEAR(std::exp(-2 * point.log_stretch[0]) + std::exp(-2 * point.log_stretch[1]),
+                    image_by_receiver.squaredNorm(), 1e-9);
+        const Vector2d moved = (point.st - seen.straight * Vector2d(x + 0.5, y + 0.5)).cwiseProduct(Vector2d(4, 5));
+        EXPECT_LT((point.displacement - Vector3d(moved.x(), moved.y(), 0)).norm(), 1e-9);
+        least = std::min(least, point.log_magnification);
+        greatest = std::max(greatest, point.log_magnification);
+      }
+    EXPECT_GT(greatest - least, 0.2);  // There is distortion, and it varies.
+  }
+}
+
+/// Converges light along +z within |x| < ½, less and less outside; it acts on x alone, and is linear between voxels.
+TensorField converging_field(double k) {
+  return cube_field(9, [k](const Vector3d& p) {
+    const double x = std::abs(p.x());
+    Matrix3d T = Matrix3d::Zero();
+    T(0, 2) = -k * std::copysign(x < 0.5 ? x : 1 - x, p.x());
+    return T;
+  });
+}
+
+/// The map x → x' of a field that acts on x alone: of closely spaced starts.
+struct Scan {
+  std::vector<double> starts, landings;
+
+  Scan(const Bench& bench, double s) {
+    const LensMap map(bench.field, bench.surfaces, bench.bending, bench.image.plane, bench.receiver, {0, 0, 1});
+    for (double x = -1.5; x < 1.5; x += 1e-3) {
+      Landing landing;
+      map.trace({{x, 0}}, {s}, &landing);
+      starts.push_back(x);
+      landings.push_back(landing.at.x());
+    }
+  }
+
+  /// All starts that land at `at`.
+  std::vector<double> find(double at) const {
+    std::vector<double> found;
+    for (std::size_t i = 0; i + 1 < starts.size(); ++i) {
+      const double a = landings[i] - at, b = landings[i + 1] - at;
+      if ((a < 0) != (b < 0)) found.push_back(starts[i] + (starts[i + 1] - starts[i]) * a / (a - b));
+    }
+    return found;
+  }
+
+  /// How many there are; 0 where that changes within `margin`.
+  int count(double at, double margin) const {
+    const std::size_t low = find(at - margin).size(), high = find(at + margin).size();
+    return low == high ? static_cast<int>(low) : 0;
+  }
+};
+
+TEST(Lens, ThreeSheetsBeyondTheFocus) {
+  const double s = 0.4, k = 2.5, pixel = 0.04;
+  Bench bench(converging_field(k), plate_at(1.5, {2.4, 0.4}, {60, 10}), {2.8, 0.8}, noise(64, 16));
+  const Scan scan(bench, s);
+  const double magnified = std::cos(2.0) - 0.5 * std::sin(2.0);  // On the axis, x'' = −s k x.
+  for (const LensMode mode : modes) {
+    const LensPicture seen = bench.simulate(mode, s);
+    int threefold = 0, single = 0;
+    for (int x = 0; x < 60; ++x) {
+      const LensPoint& point = point_at(seen, x, 5);
+      const double at = (x + 0.5) * pixel - 1.2;
+      const double target = mode == LensMode::scatter ? at : (point.st.x() - 0.5) * 2.8;
+      ASSERT_EQ(point.end, LensEnd::image) << x;
+      EXPECT_TRUE(std::isfinite(seen.radiance.plane(0)[5 * 60 + x]));
+      const int count = scan.count(target, 0.5 * pixel);
+      // In `gather` the places are those of the picture, whose map is the same one: the planes are at equal distances.
+      if (count == 0) continue;
+      EXPECT_EQ(point.folds, count) << x;
+      ++(count == 3 ? threefold : single);
+      if (mode == LensMode::gather) continue;
+      const std::vector<double> found = scan.find(at);
+      const double nearest = *std::min_element(found.begin(), found.end(),
+                                               [&](double a, double b) { return std::abs(a - at) < std::abs(b - at); });
+      EXPECT_NEAR((point.st.x() - 0.5) * 2.8, nearest, 0.3 * pixel) << x;
+    }
+    EXPECT_GT(threefold, 10);
+    EXPECT_GT(single, 4);
+    const double expected = mode == LensMode::scatter ? 1 / magnified : magnified;
+    EXPECT_NEAR(point_at(seen, 30, 5).per_pixel(0, 0) * 2.8 / pixel, expected, 0.02 * std::abs(expected));
+  }
+}
+
+double largest_difference(const LensPicture& a, const LensPicture& b) {
+  double largest = 0;
+  for (std::size_t i = 0; i < a.points.size(); ++i) {
+    EXPECT_EQ(a.points[i].end, LensEnd::image);
+    EXPECT_EQ(b.points[i].end, LensEnd::image);
+    largest = std::max(largest, (a.points[i].st - b.points[i].st).norm());
+  }
+  return largest;
+}
+
+TEST(Lens, GatherIsScatterWithTheOppositeSignToSecondOrder) {
+  // The field is its own mirror image about the middle plane, where the levers of both are equal.
+  const auto tensor = [](const Vector3d& p) { return linear_tensor({p.x(), p.y(), 0}); };
+  Bench bench(cube_field(9, tensor), plate_at(1.5, {0.8, 0.8}, {16, 16}), {2, 2}, uniform(1));
+  double opposite[2], same[2];
+  for (const int i : {0, 1}) {
+    const double s = i == 0 ? 0.04 : 0.02;
+    const LensPicture gathered = bench.simulate(LensMode::gather, s);
+    opposite[i] = largest_difference(gathered, bench.simulate(LensMode::scatter, -s));
+    same[i] = largest_difference(gathered, bench.simulate(LensMode::scatter, s));
+  }
+  EXPECT_NEAR(opposite[0] / opposite[1], 4, 0.5);
+  EXPECT_NEAR(same[0] / same[1], 2, 0.25);
+  EXPECT_GT(same[0], 3 * opposite[0]);
+}
+
+TEST(Lens, AStronglyMagnifiedImageHasNoCracks) {
+  const auto tensor = [](const Vector3d& p) {
+    Matrix3d T = Matrix3d::Zero();
+    T.col(2) << 1.5 * std::sin(2 * p.x()) * std::cos(p.y()), 1.5 * std::sin(2 * p.y()) + 0.8 * p.x(), 0;
+    return T;
+  };
+  Bench bench(cube_field(17, tensor), plate_at(1.5, {1.6, 1.6}, {40, 40}), {0.8, 0.8}, uniform(1));
+  bench.settings.samples = 3;
+  const LensPicture seen = bench.simulate(LensMode::scatter, 0.5);
+  double most = 0;
+  for (std::size_t i = 0; i < seen.points.size(); ++i) {
+    ASSERT_EQ(seen.points[i].end, LensEnd::image);
+    ASSERT_NEAR(seen.alpha[i], 1, 1e-6);
+    most = std::max(most, seen.points[i].log_magnification);
+  }
+  EXPECT_GT(most, std::log(15.0));
+}
+
+TEST(Lens, ATornImageShowsAGap) {
+  const double rate = 0.3, angle = std::asin(2 * rate), pixel = 3.0 / 60;
+  const double aside = (1 - std::cos(angle)) / rate + 0.5 * std::tan(angle);
+  Matrix3d T = Matrix3d::Zero();  // Light along +z turns towards +y; beside the volume it is straight.
+  T(1, 2) = rate;
+  T(2, 1) = -rate;
+  Bench bench(constant_field(T), plate_at(1.5, {3, 3}, {60, 60}), {3, 3}, uniform(1), Wrap::clamp);
+  const LensPicture seen = bench.simulate(LensMode::scatter, 1);
+  int dark = 0;
+  for (int row = 0; row < 60; ++row)
+    for (int column = 0; column < 60; ++column) {
+      const double x = (column + 0.5) * pixel - 1.5, y = 1.5 - (row + 0.5) * pixel;
+      const auto near = [&](double value, double edge) { return std::abs(value - edge) < 0.6 * pixel; };
+      if (near(x, -1) || near(x, 1) || near(y, -1) || near(y, -1 + aside)) continue;
+      const bool in_gap = std::abs(x) < 1 && y > -1 && y < -1 + aside;
+      EXPECT_NEAR(seen.alpha[static_cast<std::size_t>(row * 60 + column)], in_gap ? 0 : 1, 1e-6) << x << " " << y;
+      dark += in_gap;
+    }
+  EXPECT_GT(dark, 200);
+}
+
+TEST(Lens, TheSameOnAnyNumberOfThreads) {
+  Bench bench(cube_field(9, linear_tensor), plate_at(1.5, {1.5, 1}, {48, 32}), {1.5, 1}, noise(48, 32));
+  bench.channels = {{0.1, 0, 1}, {0.3, 0, 1}};
+  bench.settings.samples = 2;
+  for (const LensMode mode : modes) {
+    LensPicture seen[2];
+    for (const std::size_t i : {0, 1}) {
+      const tbb::global_control threads(tbb::global_control::max_allowed_parallelism, i + 1);
+      seen[i] = bench.simulate(mode);
+    }
+    EXPECT_EQ(seen[0].radiance.values, seen[1].radiance.values);
+    EXPECT_EQ(seen[0].alpha, seen[1].alpha);
+    EXPECT_EQ(seen[0].ends, seen[1].ends);
+    EXPECT_EQ(seen[0].counts.ray_steps, seen[1].counts.ray_steps);
+    EXPECT_EQ(seen[0].counts.tensor_samples, seen[1].counts.tensor_samples);
+    for (std::size_t i = 0; i < seen[0].points.size(); ++i) {
+      ASSERT_EQ(seen[0].points[i].end, seen[1].points[i].end);
+      ASSERT_EQ(seen[0].points[i].st, seen[1].points[i].st);
+      ASSERT_EQ(seen[0].points[i].per_pixel, seen[1].points[i].per_pixel);
+      ASSERT_EQ(seen[0].points[i].folds, seen[1].points[i].folds);
+    }
+  }
+}
+
+TEST(Lens, CanBeCancelled) {
+  const Bench bench(no_field(), plate_at(1.5, {1, 1}, {32, 32}), {1, 1}, uniform(1));
+  for (const LensMode mode : modes) {
+    Progress before;
+    before.cancelled = true;
+    EXPECT_THROW(bench.simulate(mode, before), Cancelled);
+    Progress during;
+    during.report = [&](const std::string&, std::uint64_t, std::uint64_t) { during.cancelled = true; };
+    EXPECT_THROW(bench.simulate(mode, during), Cancelled);
+  }
+}
+
+TEST(Lens, SettingsOutOfRangeAreRefused) {
+  const auto refused = [](const std::function<void(Bench&)>& change) {
+    Bench bench(no_field(), plate_at(1.5, {1, 1}, {4, 4}), {1, 1}, uniform(1));
+    change(bench);
+    for (const LensMode mode : modes) EXPECT_THROW(bench.simulate(mode), std::invalid_argument);
+  };
+  refused([](Bench& bench) { bench.channels.clear(); });
+  refused([](Bench& bench) { bench.settings.samples = 0; });
+  refused([](Bench& bench) { bench.settings.reference = 1; });
+  refused([](Bench& bench) { bench.image.texture = nullptr; });
+  refused([](Bench& bench) { bench.image.radiance = nullptr; });
+  refused([](Bench& bench) { bench.bending.step = -1; });
+  refused([](Bench& bench) { bench.bending.max_steps = 0; });
+}
+
+TEST(Lens, EveryEndHasAName) {
+  EXPECT_STREQ(to_string(LensEnd::image), "image");
+  EXPECT_STREQ(to_string(LensEnd::outside), "outside");
+  for (const RayEnd end : {RayEnd::missed, RayEnd::obstacle, RayEnd::step_limit, RayEnd::degenerate})
+    EXPECT_STREQ(to_string(static_cast<LensEnd>(end)), to_string(end));
+}
+
+}  // namespace
+}  // namespace tensorray

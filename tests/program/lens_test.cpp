@@ -1,0 +1,217 @@
+// Images seen through a field, as a user sees them.
+
+#include <cmath>
+
+#include <Eigen/Core>
+#include <gmock/gmock.h>
+
+#include "renderer/image.h"
+#include "renderer/random.h"
+#include "tests/program/support.h"
+
+namespace tensorray {
+namespace {
+
+using namespace test;
+
+/// A picture of random colours whose display values are those of 8 bits.
+Image random_picture(int width, int height) {
+  Image image(width, height, {"R", "G", "B"});
+  for (std::size_t i = 0; i < image.pixels.size(); ++i)
+    image.pixels[i] = static_cast<float>(std::floor(256 * random_uniform(1, i, 0)) / 255);
+  return image;
+}
+
+/// A lens that renders in a moment; `rest` are further keys of the integrator.
+std::string small_lens(const std::string& rest, const std::string& kind = R"("kind": "point_load", "resolution": 17)") {
+  return R"({"field": {"generate": {)" + kind + R"(}},
+             "light": {"wavelengths": {"count": 10}},
+             "receiver": {"resolution": [48, 32], "size": [2.4, 1.6]},
+             "integrator": {"type": "lens", )" +
+         rest + "}}";
+}
+
+constexpr const char* zero = R"("kind": "constant", "resolution": 9, "tensor": [[0, 0, 0], [0, 0, 0], [0, 0, 0]])";
+
+const std::vector<std::string> all_channels{"R",
+                                            "G",
+                                            "B",
+                                            "A",
+                                            "texture.s",
+                                            "texture.t",
+                                            "displacement.x",
+                                            "displacement.y",
+                                            "displacement.z",
+                                            "magnification.log",
+                                            "magnification.major",
+                                            "magnification.minor",
+                                            "folds",
+                                            "length",
+                                            "end"};
+
+/// The named channel of a picture, by pixel.
+std::vector<float> channel(const Image& image, const std::string& name) {
+  const auto found = std::find(image.channels.begin(), image.channels.end(), name);
+  if (found == image.channels.end()) ADD_FAILURE() << "no channel " << name;
+  std::vector<float> values;
+  for (std::size_t i = found - image.channels.begin(); i < image.pixels.size(); i += image.channels.size())
+    values.push_back(image.pixels[i]);
+  return values;
+}
+
+class Lens : public Program {
+ protected:
+  Image render(const std::vector<std::string>& settings) {
+    std::vector<std::string> arguments{"render", "scene.json", "-q", "-o", "out.exr"};
+    for (const std::string& setting : settings) arguments.insert(arguments.end(), {"--set", setting});
+    run_well(arguments);
+    return read_image(in_folder("out.exr"));
+  }
+};
+
+TEST_F(Lens, WithoutAFieldThePictureIsTheImage) {
+  const Image picture = random_picture(48, 32);
+  write_image(in_folder("photo.png"), picture);
+  write("scene.json", small_lens(R"("image": "photo.png")", zero));
+  for (const std::string settings : {"integrator.mode=gather", "integrator.mode=scatter", "bending.rgb=[0.1,0.2,0.3]",
+                                     "light.spectrum=A", "integrator.image_plane.depth=0.5"}) {
+    run_well({"render", "scene.json", "-q", "-o", "out.png", "--set", settings});
+    const Image seen = read_image(in_folder("out.png"));
+    ASSERT_EQ(seen.width, 48);
+    ASSERT_EQ(seen.channels.size(), 4u);
+    double difference = 0;
+    for (std::size_t pixel = 0; pixel < 48 * 32; ++pixel)
+      for (std::size_t c = 0; c < 3; ++c)
+        difference = std::max<double>(difference, std::abs(seen.pixels[4 * pixel + c] - picture.pixels[3 * pixel + c]));
+    // Half a step of 8 bits is 0.002; 1e-4 is what sRGB's slope makes of single precision near black.
+    EXPECT_LT(difference, 2e-4) << settings;
+    for (const float alpha : channel(seen, "A")) EXPECT_EQ(alpha, 1);
+  }
+}
+
+TEST_F(Lens, EveryChannelIsInTheExr) {
+  write("scene.json", small_lens(R"("image": "checkerboard")"));
+  for (const std::string mode : {"gather", "scatter"}) {
+    const Image image = render({"integrator.mode=" + mode});
+    EXPECT_THAT(image.channels, ::testing::UnorderedElementsAreArray(all_channels));  // In the file they are sorted.
+    for (const float value : image.pixels) ASSERT_TRUE(std::isfinite(value));
+    const std::vector<float> length = channel(image, "length"), end = channel(image, "end");
+    for (std::size_t i = 0; i < length.size(); ++i) EXPECT_EQ(length[i] > 0, end[i] == 0 || end[i] == 5) << i;
+  }
+}
+
+TEST_F(Lens, PixelsThatSeeNoImageAreTransparent) {
+  write("scene.json", small_lens(R"("image": "checkerboard", "image_plane": {"size": [1.2, 0.8]})", zero));
+  for (const std::string mode : {"gather", "scatter"}) {
+    const Image image = render({"integrator.mode=" + mode});
+    const std::vector<float> alpha = channel(image, "A"), end = channel(image, "end");
+    for (int y = 0; y < 32; ++y)
+      for (int x = 0; x < 48; ++x) {
+        const bool inside = x >= 12 && x < 36 && y >= 8 && y < 24;
+        EXPECT_EQ(alpha[static_cast<std::size_t>(48 * y + x)], inside ? 1 : 0) << mode << " " << x << " " << y;
+        const float outside = mode == "gather" ? 5 : 1;  // Beside the image, or where none of its light lands.
+        EXPECT_EQ(end[static_cast<std::size_t>(48 * y + x)], inside ? 0 : outside);
+      }
+  }
+  const Image repeated = render({"integrator.mode=gather", "integrator.wrap=repeat"});
+  for (const float alpha : channel(repeated, "A")) EXPECT_EQ(alpha, 1);
+}
+
+/// The greatest distance of a pixel's chromaticity from that of the picture's sum.
+double colour_range(const Image& image) {
+  Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+  std::vector<Eigen::Vector3d> pixels;
+  for (std::size_t i = 0; i < image.pixels.size(); i += image.channels.size()) {
+    pixels.push_back(Eigen::Vector3f(&image.pixels[i]).cast<double>());
+    sum += pixels.back();
+  }
+  double range = 0;
+  for (const Eigen::Vector3d& pixel : pixels)
+    if (pixel.norm() > 0.05) range = std::max(range, (pixel.normalized() - sum.normalized()).norm());
+  return range;
+}
+
+TEST_F(Lens, AWhiteLineBecomesAFringeOnlyWhereThereAreManyWavelengths) {
+  write("scene.json", small_lens(R"("image": "line", "mode": "gather")"));
+  EXPECT_GT(colour_range(render({})), 0.3);
+  EXPECT_LT(
+      colour_range(render({"light.wavelengths.min=550", "light.wavelengths.max=550", "light.wavelengths.count=1"})),
+      1e-5);
+  EXPECT_LT(colour_range(render({"bending.rgb=[0.2,0.2,0.2]"})), 1e-5);
+}
+
+TEST_F(Lens, DepthsStandSideBySideAndLessOfTheVolumeBendsLess) {
+  // Turns light about z at a constant rate: the longer the way, the farther aside.
+  write("scene.json", small_lens(R"("image": "grid", "image_plane": {"depth": [0, 0.25, 0.5, 0.75, 0.95]})",
+                                 R"("kind": "constant", "resolution": 9,
+                                    "tensor": [[0, 0.75, 0], [-0.75, 0, 0], [0, 0, 0]])"));
+  for (const std::string mode : {"gather", "scatter"}) {
+    const Image image = render({"integrator.mode=" + mode, "light.direction=[0,1,0]", "receiver.resolution=[32,32]",
+                                "receiver.size=[3,3]", "field.scale=1"});
+    ASSERT_EQ(image.width, 5 * 32 + 4);
+    const std::vector<float> aside = channel(image, "displacement.x");
+    for (int panel = 1; panel < 5; ++panel) {
+      const auto middle = [&](int which) {
+        return std::abs(aside[static_cast<std::size_t>(16 * image.width + 33 * which + 16)]);
+      };
+      EXPECT_LT(middle(panel), middle(panel - 1)) << mode << " " << panel;
+      EXPECT_GT(middle(panel), 0) << mode << " " << panel;
+    }
+  }
+}
+
+TEST_F(Lens, OverlayDrawsOverThePictureAlone) {
+  write("scene.json", small_lens(R"("image": "color_wheel", "mode": "gather")"));
+  const Image plain = render({}), drawn = render({"integrator.overlay=grid"});
+  EXPECT_NE(channel(plain, "R"), channel(drawn, "R"));
+  for (std::size_t i = 4; i < all_channels.size(); ++i)
+    EXPECT_EQ(channel(plain, all_channels[i]), channel(drawn, all_channels[i])) << all_channels[i];
+}
+
+TEST_F(Lens, TheSameBytesOnAnyNumberOfThreads) {
+  write("scene.json", small_lens(R"("image": "grid")"));
+  for (const std::string mode : {"gather", "scatter"}) {
+    std::vector<std::string> files;
+    for (const std::string threads : {"1", "3"}) {
+      run_well(
+          {"render", "scene.json", "-q", "-o", "out.exr", "--threads", threads, "--set", "integrator.mode=" + mode});
+      files.push_back(read_file(in_folder("out.exr")));
+    }
+    EXPECT_TRUE(files[0] == files[1]) << mode;
+  }
+}
+
+TEST_F(Lens, TheImageIsSeenUprightFromBehindTheReceiver) {
+  // Red on the viewer's left, above green; the light travels down, and the viewer looks up: +y is up in the picture.
+  Image picture(2, 2, {"R", "G", "B"});
+  picture.pixel(0, 0)[0] = 1;
+  picture.pixel(0, 1)[1] = 1;
+  write_image(in_folder("photo.png"), picture);
+  write("scene.json", small_lens(R"("image": "photo.png")", zero));
+  const Image image = render({"receiver.resolution=[2,2]", "receiver.size=[2,2]"});
+  EXPECT_NEAR(image.pixel(0, 0)[0], 1, 1e-4);
+  EXPECT_NEAR(image.pixel(0, 1)[1], 1, 1e-4);
+  EXPECT_NEAR(image.pixel(1, 0)[0], 0, 1e-4);
+}
+
+TEST_F(Lens, ImagesThatCannotBeReadAreNamed) {
+  write("scene.json", small_lens(R"("image": "checkerboard")"));
+  write("empty.png", "");
+  write("text.png", "This is not a picture.");
+  write_image(in_folder("whole.png"), random_picture(40, 40));
+  write("cut.png", read_file(in_folder("whole.png")).substr(0, 2000));
+  std::filesystem::create_directory(in_folder("folder.png"));
+  for (const std::string file : {"missing.png", "empty.png", "text.png", "cut.png", "folder.png"}) {
+    const Outcome outcome = run({"render", "scene.json", "-q", "-o", "out.png", "--set", "integrator.image=" + file});
+    EXPECT_EQ(outcome.status, 1) << file;
+    EXPECT_NE(outcome.error.find(file), std::string::npos) << outcome.error;
+    EXPECT_EQ(std::count(outcome.error.begin(), outcome.error.end(), '\n'), 1) << outcome.error;
+    EXPECT_FALSE(std::filesystem::exists(in_folder("out.png")));
+  }
+  const Outcome behind = run({"render", "scene.json", "-q", "--set", "integrator.image_plane.depth=3"});
+  EXPECT_EQ(behind.status, 2);
+  EXPECT_NE(behind.error.find("before the receiver"), std::string::npos) << behind.error;
+}
+
+}  // namespace
+}  // namespace tensorray
