@@ -9,6 +9,8 @@
 namespace tensorray {
 namespace {
 
+using namespace bending_steps;
+
 constexpr double longest_step = 0.5;         // Automatic steps, in voxels ...
 constexpr double shortest_step = 1.0 / 64;   // ... of the splitting, which is stable however strong the field.
 constexpr double strongest_kick = 0.2;       // s h ‖T − ⅓ tr(T) I‖ of an automatic step.
@@ -36,7 +38,7 @@ class Tracer {
 
  private:
   /// What light meets next; `none` while it travels freely.
-  enum class Event { none, absorber, leaves_box, enters_cut, leaves_cut };
+  enum class Event { none, absorber, leaves_box, leaves_cut };
 
   RayEnd follow();
   std::optional<RayEnd> reach_box();
@@ -76,6 +78,7 @@ template <int N>
 void Tracer<N>::meet_surface(const Eigen::Vector3d& normal, bool bends) {
   if constexpr (N > 1) {
     const double approach = normal.dot(direction());
+    if (!(std::abs(approach) > 0)) return;  // Light along a surface has no crossing to speak of.
     const State<N> flow = bends ? medium_.derivative(ray_) : State<N>{ray_.V, Eigen::Matrix<double, 3, N>::Zero()};
     for (int i = 1; i < N; ++i) {
       const double later = -normal.dot(ray_.P.col(i)) / approach;

@@ -1,6 +1,6 @@
 #pragma once
 /// @file integrators/bending.h
-/// Bends light through a tensor field. Only bending.cpp knows the rule
+/// Bends light through a tensor field. Only bending.cpp and bending_steps.h know the rule
 /// (Zheng and Pang 2003, Eq. 5):  P' = V,  V' = s (T V − (VᵀTV) V),  |V| = 1.
 
 #include <array>

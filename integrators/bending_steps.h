@@ -12,7 +12,7 @@
 #include "integrators/exponential.h"
 #include "volumes/tensor_field.h"
 
-namespace tensorray {
+namespace tensorray::bending_steps {
 
 /// A ray at a point of its way, or (N = 3) the ray and its derivatives along two parameters. Column 0 of P and V is the
 /// ray itself, the others are the derivatives, so that a method that is linear in states carries them along as it is.
@@ -163,4 +163,4 @@ State<N> advance(BendingMethod method, Medium<N>& medium, const State<N>& from, 
   return splitting(medium, from, h);
 }
 
-}  // namespace tensorray
+}  // namespace tensorray::bending_steps

@@ -7,8 +7,8 @@
 
 #include <Eigen/Geometry>
 #include <Eigen/LU>
-#include <Eigen/SVD>
 #include <tbb/parallel_for.h>
+#include <tbb/task_arena.h>
 
 #include "integrators/lens_mesh.h"
 
@@ -72,29 +72,31 @@ Shade shade(const Job& job, std::size_t channel, const Eigen::Vector2d& at, cons
   return {part * texel.w() * job.image.radiance(texel.head<3>() / texel.w(), channel), part * texel.w()};
 }
 
+/// ln σ₁ >= ln σ₂ of a matrix; −∞ where it is singular, 0 where it is not finite.
+Eigen::Vector2d log_singular_values(const Eigen::Matrix2d& m) {
+  if (!m.allFinite()) return Eigen::Vector2d::Zero();
+  const double greater =
+      (std::hypot(m(0, 0) + m(1, 1), m(0, 1) - m(1, 0)) + std::hypot(m(0, 0) - m(1, 1), m(0, 1) + m(1, 0))) / 2;
+  return {std::log(greater), std::log(std::abs(m.determinant())) - std::log(greater)};
+}
+
 /// What a position (in pixels) of the receiver sees that shows the image's plane at `at`.
+/// @param log_stretch  ln σ₁ >= ln σ₂ of ∂receiver/∂image.
 LensPoint make_point(const Job& job, const Eigen::Vector2d& pixel, const Eigen::Vector2d& at,
-                     const Eigen::Matrix2d& image_by_receiver, double length) {
+                     const Eigen::Matrix2d& image_by_receiver, const Eigen::Vector2d& log_stretch, double length) {
   LensPoint point;
   point.st = texture_coordinates(job, at);
   point.end = sees_image(job, point.st) ? LensEnd::image : LensEnd::outside;
   point.per_pixel = per_pixel(job, image_by_receiver);
   point.displacement = plane_point(job.image.plane, at) - plane_point(job.image.plane, job.straight * pixel);
-  const Eigen::Vector2d shrink = image_by_receiver.jacobiSvd().singularValues();
-  point.log_stretch[0] = -std::log(shrink[1]);
-  point.log_stretch[1] = -std::log(shrink[0]);
-  point.log_magnification = point.log_stretch[0] + point.log_stretch[1];
+  point.log_stretch = log_stretch;
+  point.log_magnification = log_stretch.sum();
   point.length = length;
   return point;
 }
 
 void count_ends(const std::vector<Landing>& landings, std::size_t channels, std::vector<EndCounts>& ends) {
   for (std::size_t i = 0; i < landings.size(); ++i) ++ends[i % channels][static_cast<int>(landings[i].end)];
-}
-
-void add(TraceCounts& sum, const TraceCounts& counts) {
-  sum.ray_steps += counts.ray_steps;
-  sum.tensor_samples += counts.tensor_samples;
 }
 
 /// What the pixels of one row gathered.
@@ -109,7 +111,7 @@ Landing reference_landing(const Job& job, int x, int y, const std::vector<Landin
   if (n % 2 == 1) return landings[(n * n / 2) * job.channels.size() + job.settings.reference];
   Landing landing;
   const Eigen::Vector2d center = receiver_point(job, {x + 0.5, y + 0.5});
-  add(counts, job.map.trace({center}, {job.flexibilities[job.settings.reference]}, &landing));
+  counts += job.map.trace({center}, {job.flexibilities[job.settings.reference]}, &landing);
   return landing;
 }
 
@@ -121,7 +123,7 @@ void gather_row(const Job& job, int y, LensPicture& picture, std::vector<Landing
     if (job.progress.cancelled) throw Cancelled();
     std::vector<Eigen::Vector2d> starts = sample_points(job, x, y);
     for (Eigen::Vector2d& start : starts) start = receiver_point(job, start);
-    add(row.counts, job.map.trace(starts, job.flexibilities, landings.data()));
+    row.counts += job.map.trace(starts, job.flexibilities, landings.data());
     count_ends(landings, channels, row.ends);
     const std::size_t pixel = static_cast<std::size_t>(y) * job.receiver.resolution.x() + x;
     std::vector<double> alpha(channels);
@@ -137,7 +139,8 @@ void gather_row(const Job& job, int y, LensPicture& picture, std::vector<Landing
     LensPoint& point = picture.points[pixel];
     point.end = static_cast<LensEnd>(landing.end);
     if (landing.end != RayEnd::plate) continue;
-    point = make_point(job, {x + 0.5, y + 0.5}, landing.at, landing.jacobian, landing.length);
+    const Eigen::Vector2d log_stretch = -log_singular_values(landing.jacobian).reverse();
+    point = make_point(job, {x + 0.5, y + 0.5}, landing.at, landing.jacobian, log_stretch, landing.length);
   }
 }
 
@@ -159,7 +162,7 @@ void count_places(const Job& job, std::vector<Landing> references, LensPicture& 
 }
 
 void gather(const Job& job, LensPicture& picture) {
-  constexpr int rows_at_once = 8;  // Between two progress reports.
+  const int rows_at_once = 8 * tbb::this_task_arena::max_concurrency();  // Between two progress reports.
   const int height = job.receiver.resolution.y();
   std::vector<Landing> references(picture.points.size());
   std::vector<GatheredRow> rows(static_cast<std::size_t>(height));
@@ -169,7 +172,7 @@ void gather(const Job& job, LensPicture& picture) {
                       [&](int y) { gather_row(job, y, picture, references, rows[static_cast<std::size_t>(y)]); });
   }
   for (const GatheredRow& row : rows) {
-    add(picture.counts, row.counts);
+    picture.counts += row.counts;
     for (std::size_t channel = 0; channel < row.ends.size(); ++channel)
       for (int end = 0; end < ray_end_count; ++end) picture.ends[channel][end] += row.ends[channel][end];
   }
@@ -202,14 +205,32 @@ void scatter_row(const Job& job, int y, std::size_t channel, const SheetSearch& 
     search.find(receiver_point(job, center), sheets);
     if (sheets.empty()) continue;
     const Sheet& sheet = nearest_sheet(sheets, job.straight * center);
-    picture.points[pixel] = make_point(job, center, sheet.start, sheet.jacobian.inverse(), sheet.length);
+    picture.points[pixel] = make_point(job, center, sheet.start, sheet.jacobian.inverse(),
+                                       log_singular_values(sheet.jacobian), sheet.length);
     picture.points[pixel].folds = static_cast<int>(sheets.size());
   }
 }
 
-void scatter(const Job& job, LensPicture& picture) {
+/// The part of the image whose light may arrive: what is before the volume, and what straight light shows.
+Eigen::AlignedBox2d useful_starts(const Job& job, const TriangleMesh& volume, const Eigen::Vector3d& direction) {
+  const Plate& plane = job.image.plane;
+  Eigen::AlignedBox2d useful;
+  for (const Eigen::Vector3d& vertex : volume.vertices) {
+    const double ahead = plane.normal().dot(vertex - plane.center) / plane.normal().dot(direction);
+    useful.extend(plane_coordinates(plane, vertex - ahead * direction));
+  }
+  const Eigen::Vector2d size = job.receiver.resolution.cast<double>();
+  for (const Eigen::Vector2d& corner :
+       {Eigen::Vector2d(0, 0), Eigen::Vector2d(size.x(), 0), Eigen::Vector2d(0, size.y()), size})
+    useful.extend(job.straight * corner);
+  const Eigen::AlignedBox2d image(-plane.size / 2, plane.size / 2);
+  const Eigen::AlignedBox2d part = useful.intersection(image);
+  return part.isEmpty() ? image : part;
+}
+
+void scatter(const Job& job, const TriangleMesh& volume, const Eigen::Vector3d& direction, LensPicture& picture) {
   LensMeshSettings settings;
-  settings.extent = job.image.plane.size;
+  settings.starts = useful_starts(job, volume, direction);
   settings.target = job.receiver.size;
   settings.pixel = job.receiver.pixel_size().minCoeff();
   for (std::size_t channel = 0; channel < job.channels.size(); ++channel) {
@@ -272,7 +293,11 @@ LensPicture simulate_lens(const TensorField& field, const Surfaces& surfaces, co
   picture.ends.assign(channels.size(), EndCounts{});
   for (int i = 0; i < 2; ++i) picture.straight.linear().row(i) = job.straight.linear().row(i) / image.plane.size[i];
   picture.straight.translation() = texture_coordinates(job, job.straight.translation());
-  (gathers ? gather : scatter)(job, picture);
+  if (gathers) {
+    gather(job, picture);
+  } else {
+    scatter(job, surfaces.bounds, direction, picture);
+  }
   picture.seconds_tracing = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
   return picture;
 }

@@ -40,13 +40,15 @@ struct LensImage {
 };
 
 struct LensSettings {
-  LensMode mode = LensMode::gather;
+  LensMode mode = LensMode::scatter;
   int samples = 1;            ///< Per pixel along x and along y; > 0.
   std::size_t reference = 0;  ///< The channel whose rays LensPicture::points describes.
 };
 
-/// Why a pixel sees the image, or not. The first ones are RayEnd's.
+/// Why a pixel sees the image, or not: the ends of rays, where `image` is a ray that landed, and `outside` one that
+/// landed beside it.
 enum class LensEnd { image, missed, obstacle, step_limit, degenerate, outside };
+static_assert(static_cast<int>(LensEnd::degenerate) == static_cast<int>(RayEnd::degenerate));
 constexpr int lens_end_count = 6;
 const char* to_string(LensEnd end);
 
@@ -60,7 +62,7 @@ struct LensPoint {
   Eigen::Vector3d displacement = Eigen::Vector3d::Zero();  ///< Of the point seen, from the one that straight light
                                                            ///< would show; world units.
   double log_magnification = 0;  ///< ln of image area as seen over image area: ln(σ₁σ₂) of ∂receiver/∂image.
-  double log_stretch[2] = {0, 0};  ///< ln σ₁ >= ln σ₂: its parts along the two principal directions.
+  Eigen::Vector2d log_stretch{0, 0};  ///< ln σ₁ >= ln σ₂: its parts along the two principal directions.
   int folds = 0;      ///< `scatter`: sheets of the image that lie here. `gather`: places of the picture that
                       ///< show the point that is seen here. 1: no fold.
   double length = 0;  ///< Of the ray, world units.

@@ -1,5 +1,6 @@
 #include "integrators/lens_map.h"
 
+#include <algorithm>
 #include <numeric>
 
 namespace tensorray {
@@ -9,19 +10,29 @@ constexpr double reach = 100;    // Of the planes, in sizes of the volume.
 constexpr double behind = 1e-5;  // Of the plane that stops light behind its start, in sizes of the volume: light that
                                  // starts on a surface would meet it at once.
 
+/// Whether a part of the volume lies behind a plane, which looks along `normal`.
+bool is_cut(const TriangleMesh& volume, const Plate& plane, const Eigen::Vector3d& normal, double size) {
+  return std::any_of(volume.vertices.begin(), volume.vertices.end(),
+                     [&](const Eigen::Vector3d& vertex) { return normal.dot(vertex - plane.center) < -behind * size; });
+}
+
 Plate enlarged(Plate plate, double size) {
   plate.size = plate.size.cwiseMax(reach * size);
   return plate;
 }
 
-/// Embree's surfaces: the plane where light lands is the plate, the one where it starts an obstacle.
+/// Embree's surfaces: the plane where light lands is the plate, the one where it starts an obstacle if it cuts the
+/// volume. (Light does not return to one outside: it has left the volume for good.)
 Geometry make_geometry(const Surfaces& surfaces, const Plate& from, const Plate& to, const Eigen::Vector3d& direction) {
   const double size = surfaces.bounds.bounds().diagonal().norm();
   Surfaces all = surfaces;
   all.plate = enlarged(to, size);
-  Plate back = enlarged(from, size);
-  back.center -= behind * size * direction;
-  all.obstacles.push_back({back.corners(), {{0, 1, 2}, {0, 2, 3}}});
+  const Eigen::Vector3d normal = from.normal().dot(direction) > 0 ? from.normal() : Eigen::Vector3d(-from.normal());
+  if (is_cut(surfaces.bounds, from, normal, size)) {
+    Plate back = enlarged(from, size);
+    back.center -= behind * size * normal;
+    all.obstacles.push_back({back.corners(), {{0, 1, 2}, {0, 2, 3}}});
+  }
   return Geometry(std::move(all));
 }
 

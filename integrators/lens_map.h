@@ -22,6 +22,12 @@ struct Landing {
 /// What tracing took.
 struct TraceCounts {
   std::uint64_t ray_steps = 0, tensor_samples = 0;
+
+  TraceCounts& operator+=(const TraceCounts& more) {
+    ray_steps += more.ray_steps;
+    tensor_samples += more.tensor_samples;
+    return *this;
+  }
 };
 
 /// A map from the plane of `from` to that of `to`, a function of the start and the flexibility. Light beyond both

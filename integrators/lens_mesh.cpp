@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <unordered_map>
 
 #include <tbb/parallel_for.h>
@@ -9,12 +10,15 @@
 namespace tensorray {
 namespace {
 
-constexpr double cell_pixels = 4;          // Of the first lattice.
-constexpr double most_cells = 4096;        // ... along either side, however large the image is.
-constexpr double finest_pixels = 1.0 / 8;  // No edge shorter than this, in the starts, is halved.
-constexpr double bend_pixels = 0.1;        // How far the landings may lie beside an edge.
-constexpr double gap_pixels = 0.5;         // How far an edge's length may be off what the Jacobians explain.
-constexpr double torn_fraction = 0.5;      // ... and beyond which part of the edge's length it is torn.
+constexpr double cell_pixels = 4;              // Of the first lattice.
+constexpr double most_cells = 4096;            // ... along either side, however large the image is.
+constexpr double short_pixels = 1.0 / 4;       // Edges shorter than this, in starts and landings, are not halved ...
+constexpr double shortest_pixels = 1.0 / 64;   // ... nor those shorter than this in the starts.
+constexpr std::size_t most_starts = 1u << 14;  // No edge is halved beyond so many starts ...
+constexpr double starts_per_pixel = 4;         // ... and so many for each pixel: a chaotic field would need them all.
+constexpr double bend_pixels = 0.1;            // How far the landings may lie beside an edge.
+constexpr double gap_pixels = 1;               // How far an edge's length may be off what the Jacobians explain.
+constexpr double torn_fraction = 0.5;          // ... and beyond which part of the edge's length it is torn.
 
 using Triangle = std::array<std::uint32_t, 3>;
 
@@ -30,10 +34,7 @@ void trace_new(const LensMap& map, double flexibility, LensMesh& mesh, TraceCoun
     const auto to = mesh.starts.begin() + static_cast<std::ptrdiff_t>(first + std::min(count, (task + 1) * task_size));
     took[task] = map.trace({from, to}, {flexibility}, &mesh.landings[first + task * task_size]);
   });
-  for (const TraceCounts& each : took) {
-    counts.ray_steps += each.ray_steps;
-    counts.tensor_samples += each.tensor_samples;
-  }
+  for (const TraceCounts& each : took) counts += each;
 }
 
 enum class Edge { fine, coarse, torn };
@@ -58,17 +59,24 @@ Edge judge(const LensMesh& mesh, std::uint32_t a, std::uint32_t b, double pixel)
 /// becoming needles (Rivara 1984).
 class Refinement {
  public:
-  Refinement(LensMesh& mesh, std::vector<Triangle>& triangles, const LensMeshSettings& settings)
-      : mesh_(mesh), triangles_(triangles), settings_(settings) {}
+  Refinement(LensMesh& mesh, std::vector<Triangle>& triangles, const LensMeshSettings& settings,
+             const Progress& progress)
+      : mesh_(mesh), triangles_(triangles), settings_(settings), progress_(progress) {
+    most_starts_ = mesh.starts.size() + most_starts +
+                   static_cast<std::size_t>(starts_per_pixel * settings.target.prod() / std::pow(settings.pixel, 2));
+  }
 
   /// Halves each edge that needs it once. @return false if none did. New starts have no landings yet.
   bool halve() {
+    if (mesh_.starts.size() > most_starts_) return false;
     middles_.clear();
-    for (const Triangle& triangle : triangles_)
+    for (const Triangle& triangle : triangles_) {
+      if (progress_.cancelled) throw Cancelled();
       for (int i = 0; i < 3; ++i) {
         const auto [edge, is_new] = middles_.emplace(edge_of(triangle, i), none);
         if (is_new && needs_halving(triangle[i], triangle[(i + 1) % 3])) edge->second = unset;
       }
+    }
     while (mark_longest()) continue;
     const std::size_t before = mesh_.starts.size();
     std::vector<Triangle> next;
@@ -98,6 +106,7 @@ class Refinement {
   bool mark_longest() {
     bool changed = false;
     for (const Triangle& triangle : triangles_) {
+      if (progress_.cancelled) throw Cancelled();
       int longest = 0;
       bool halved = false;
       for (int i = 0; i < 3; ++i) {
@@ -114,13 +123,24 @@ class Refinement {
 
   bool needs_halving(std::uint32_t a, std::uint32_t b) const {
     const Landing &from = mesh_.landings[a], &to = mesh_.landings[b];
-    if ((mesh_.starts[a] - mesh_.starts[b]).norm() < 2 * finest_pixels * settings_.pixel) return false;
+    if (is_short(a, b)) return false;
     if (from.end == RayEnd::plate && to.end == RayEnd::plate) {
       const Eigen::Array2d edge = settings_.target.array() / 2 + settings_.pixel;
       const Eigen::Array2d low = from.at.cwiseMin(to.at).array(), high = from.at.cwiseMax(to.at).array();
       if ((low > edge).any() || (high < -edge).any()) return false;
     }
     return judge(mesh_, a, b, settings_.pixel) != Edge::fine;
+  }
+
+  /// In the starts, and as far as the ends that landed know it in the landings.
+  bool is_short(std::uint32_t a, std::uint32_t b) const {
+    const Eigen::Vector2d along = mesh_.starts[b] - mesh_.starts[a];
+    double length = along.norm();
+    if (length < shortest_pixels * settings_.pixel) return true;
+    for (const std::uint32_t end : {a, b})
+      if (mesh_.landings[end].end == RayEnd::plate)
+        length = std::max(length, (mesh_.landings[end].jacobian * along).norm());
+    return length < short_pixels * settings_.pixel;
   }
 
   /// The vertex in the middle of an edge, the same from both sides; `none` if it stays whole.
@@ -159,6 +179,8 @@ class Refinement {
   LensMesh& mesh_;
   std::vector<Triangle>& triangles_;
   const LensMeshSettings& settings_;
+  const Progress& progress_;
+  std::size_t most_starts_;
   std::unordered_map<std::uint64_t, std::uint32_t> middles_;  // By the vertices of the edge.
 };
 
@@ -189,15 +211,17 @@ void finish(LensMesh& mesh, const std::vector<Triangle>& triangles, double pixel
 
 LensMesh make_lens_mesh(const LensMap& map, double flexibility, const LensMeshSettings& settings, TraceCounts& counts,
                         const Progress& progress) {
+  const Eigen::Vector2d extent = settings.starts.sizes();
   const Eigen::Array2i cells =
-      (settings.extent / (cell_pixels * settings.pixel)).array().ceil().max(1).min(most_cells).cast<int>();
+      (extent / (cell_pixels * settings.pixel)).array().ceil().max(1).min(most_cells).cast<int>();
   LensMesh mesh;
   for (int y = 0; y <= cells.y(); ++y)
     for (int x = 0; x <= cells.x(); ++x)
-      mesh.starts.emplace_back((Eigen::Array2d(x, y) / cells.cast<double>() - 0.5) * settings.extent.array());
+      mesh.starts.emplace_back(settings.starts.min().array() +
+                               Eigen::Array2d(x, y) / cells.cast<double>() * extent.array());
   std::vector<Triangle> triangles = lattice_triangles(cells.x() + 1, cells.y() + 1);
   trace_new(map, flexibility, mesh, counts, progress);
-  Refinement refinement(mesh, triangles, settings);
+  Refinement refinement(mesh, triangles, settings, progress);
   while (refinement.halve()) trace_new(map, flexibility, mesh, counts, progress);
   finish(mesh, triangles, settings.pixel);
   return mesh;

@@ -5,7 +5,7 @@
 #include <cstdint>
 #include <vector>
 
-#include <Eigen/Core>
+#include <Eigen/Geometry>
 
 #include "integrators/lens_map.h"
 #include "integrators/progress.h"
@@ -29,17 +29,19 @@ struct Sheet {
 
 /// How fine a mesh becomes.
 struct LensMeshSettings {
-  Eigen::Vector2d extent{1, 1};  ///< Of the rectangle of starts about the centre of their plane, world units.
+  Eigen::AlignedBox2d starts{Eigen::Vector2d(-0.5, -0.5), Eigen::Vector2d(0.5, 0.5)};  ///< In their plane.
   Eigen::Vector2d target{1, 1};  ///< Of the rectangle about the other plane's centre in which accuracy matters.
-  double pixel = 1;              ///< Size of a pixel there, world units: the mesh's edges are within a tenth of it.
+  double pixel = 1;              ///< Size of a pixel there, world units.
 };
 
-/// Triangulates the landings of a rectangle of starts: first a regular one, 4 pixels a cell; then edges are halved
-/// where the landing between their ends would lie more than a tenth of a pixel beside the straight line (by the
-/// Jacobians of both ends), and where one end landed and the other did not, down to 1/8 pixel in the starts.
-/// An edge halved is halved for both of its triangles, so that there are no cracks. Edges that are torn (the landings
-/// are apart by far more than the Jacobians explain: the volume's silhouette, an obstacle's shadow) have no triangles.
-/// The result does not depend on the number of threads. @throw Cancelled
+/// Triangulates the landings of a rectangle of starts: first a regular one, 4 pixels a cell (at most 4096 cells along
+/// either side); then, within `target`, edges are halved where the landing between their ends would lie more than a
+/// tenth of a pixel beside the straight line (by the Jacobians of both ends), and where one end landed and the other
+/// did not. That ends where edges are shorter than 1/4 pixel, in the starts and, by the Jacobians, in the landings, or
+/// than 1/64 pixel in the starts, or when there are some 4 starts for each pixel. An edge halved is halved for both of
+/// its triangles, so that there are no cracks. Edges that are torn (the landings are apart by a pixel more than the
+/// Jacobians explain: the volume's silhouette, an obstacle's shadow) have no triangles. The result does not depend on
+/// the number of threads. @throw Cancelled
 LensMesh make_lens_mesh(const LensMap& map, double flexibility, const LensMeshSettings& settings, TraceCounts& counts,
                         const Progress& progress);
 

@@ -28,11 +28,11 @@ std::vector<const TriangleMesh*> meshes(const std::vector<Part>& parts) {
 struct Group {
   Group(std::vector<Part> meshes_and_surfaces, const Eigen::Vector3d& origin, double unit)
       : parts(std::move(meshes_and_surfaces)), scene(meshes(parts), origin, unit) {
-    for (const Part& part : parts) box.extend(part.mesh->bounds());
+    for (const Part& part : parts) boxes.push_back(part.mesh->bounds());
   }
 
   std::vector<Part> parts;
-  Eigen::AlignedBox3d box;
+  std::vector<Eigen::AlignedBox3d> boxes;  // Of the parts.
   TriangleScene scene;
 };
 
@@ -114,9 +114,12 @@ std::optional<Hit> Geometry::absorber(const Eigen::Vector3d& origin, const Eigen
 }
 
 bool Geometry::may_absorb(const Eigen::Vector3d& from, const Eigen::Vector3d& to) const {
-  const Eigen::AlignedBox3d& box = state_->absorbers.box;
-  return (from.cwiseMin(to).array() <= box.max().array() + state_->margin).all() &&
-         (from.cwiseMax(to).array() >= box.min().array() - state_->margin).all();
+  const Eigen::Array3d low = from.cwiseMin(to).array() - state_->margin,
+                       high = from.cwiseMax(to).array() + state_->margin;
+  const std::vector<Eigen::AlignedBox3d>& boxes = state_->absorbers.boxes;
+  return std::any_of(boxes.begin(), boxes.end(), [&](const Eigen::AlignedBox3d& box) {
+    return (low <= box.max().array()).all() && (high >= box.min().array()).all();
+  });
 }
 
 std::optional<Hit> Geometry::crossing(Surface surface, bool inwards, const Eigen::Vector3d& origin,

@@ -17,7 +17,7 @@ struct Plate {
   Eigen::Vector2d size{1, 1};                        ///< Along right and up, world units; > 0.
   Eigen::Vector2i resolution{512, 512};              ///< Pixels; > 0.
 
-  Eigen::Vector3d normal() const { return right.cross(up); }  ///< Unit, towards the viewer (against the light).
+  Eigen::Vector3d normal() const { return right.cross(up); }  ///< Unit, towards the viewer.
   Eigen::Vector2d pixel_size() const { return size.cwiseQuotient(resolution.cast<double>()); }
   double pixel_area() const { return pixel_size().prod(); }
 

@@ -93,8 +93,8 @@ void warn_of_negative_flexibility(SceneDescription& scene) {
 void check_normal(const std::optional<Eigen::Vector3d>& normal, const char* pointer, const LightDescription& light,
                   const SceneSource& source) {
   if (!normal || std::abs(normal->normalized().dot(light.direction.normalized())) > 1e-6) return;
-  source.fail(fmt::format("`{}/normal` is across the light: the plate would be seen edge-on; turn it towards the light",
-                          pointer));
+  source.fail(
+      fmt::format("`{}/normal` is across the light: it would be seen edge-on; turn it towards the light", pointer));
 }
 
 /// A file where an earlier step may have left another form of the same path.
@@ -121,6 +121,9 @@ void check_output(SceneDescription& scene, const SceneSource& source) {
   if (scene.integrator.type == IntegratorType::lens && !output.photons.empty()) {
     scene.warnings.push_back("`/output/photons` has no effect with the lens, which deposits no photons");
     output.photons.clear();
+    if (output.image.empty() && output.exr.empty() && output.spectral.empty())
+      source.fail(
+          "`/output/photons` is the only output, and the lens deposits no photons; name an `image` or an `exr`");
   }
   std::map<std::filesystem::path, std::string> taken = input_files(scene);
   const auto check = [&](const std::filesystem::path& path, const std::string& pointer) {
@@ -143,7 +146,14 @@ void check_output(SceneDescription& scene, const SceneSource& source) {
 void check_memory(const SceneDescription& scene, const SceneSource& source) {
   if (!scene.receiver.resolution) return;
   const int channels = scene.bending.rgb ? 3 : scene.light.wavelength_count;
-  const double gibibytes = scene.receiver.resolution->cast<double>().prod() * channels * sizeof(double) / (1 << 30);
+  const double pixels = scene.receiver.resolution->cast<double>().prod();
+  double bytes = pixels * channels * sizeof(double);
+  if (scene.integrator.type == IntegratorType::lens) {
+    // Rays, their mesh, and two copies of the picture with all of its channels, for each depth.
+    const auto& depth = scene.integrator.lens.plane.depth;
+    bytes += pixels * (600 + 2.0 * sizeof(float) * (15 + channels) * static_cast<double>(depth ? depth->size() : 1));
+  }
+  const double gibibytes = bytes / (1 << 30);
   if (gibibytes <= 64) return;
   source.fail(
       fmt::format("`/receiver/resolution` with {} channels of light needs {:.0f} GiB; ask for fewer pixels or a "
@@ -164,6 +174,8 @@ void check_scene(SceneDescription& scene, const Json& json, const SceneSource& s
   warn_of_negative_flexibility(scene);
   warn_unused(scene, json, "/field/name", "/field/generate");
   warn_unused(scene, json, "/field/derive", "/field/generate");
+  warn_unused(scene, json, "/bending/a", "/bending/rgb");
+  warn_unused(scene, json, "/bending/b", "/bending/rgb");
   warn_unused(scene, json, "/light/wavelengths", "/bending/rgb");
   warn_unused(scene, json, "/light/spectrum", "/bending/rgb");
 }

@@ -30,9 +30,11 @@ Image load_test_image(TestImage which, const Plate& receiver, const ColorManagem
   return image;
 }
 
+/// Light that leaves the image leaves from nowhere else.
+bool goes_on(const LensDescription& lens) { return lens.wrap != Wrap::none && lens.mode == LensMode::gather; }
+
 Texture load_image(const LensDescription& lens, const Plate& receiver, const ColorManagement& color) {
-  // The lens itself cuts an image that does not go on, sharply.
-  const Wrap wrap = lens.wrap == Wrap::none ? Wrap::clamp : lens.wrap;
+  const Wrap wrap = goes_on(lens) ? lens.wrap : Wrap::clamp;  // The lens itself cuts the others, sharply.
   for (const auto& choice : choices(TestImage()))
     if (lens.image == choice.name) return {load_test_image(choice.value, receiver, color), wrap};
   return {lens.image, color, lens.image_color_space, wrap};
@@ -73,7 +75,7 @@ LensScene load_lens(const SceneDescription& description, const TensorField& fiel
                     const Eigen::Vector3d& direction, const Plate& plate) {
   const LensDescription& lens = description.integrator.lens;
   const Plate receiver = from_behind(plate);
-  LensScene scene{load_image(lens, receiver, color), receiver, {}};
+  LensScene scene{load_image(lens, receiver, color), receiver, {}, goes_on(lens)};
 
   Plate plane = receiver;
   if (lens.plane.normal || lens.plane.up) {
@@ -87,7 +89,7 @@ LensScene load_lens(const SceneDescription& description, const TensorField& fiel
   const Depths depths = depths_of(field, direction);
   const double depth = depths.far - depths.near, receiver_at = receiver.center.dot(direction);
   const auto add = [&](const Eigen::Vector3d& center) {
-    if (!(center.dot(direction) < receiver_at))
+    if (!(receiver.normal().dot(receiver.center - center) > 0))
       throw SceneError(
           fmt::format("{}: `/integrator/image_plane`: the image would not be before the receiver, which "
                       "light reaches at depth {:.6g} of the volume",

@@ -17,6 +17,7 @@ struct LensScene {
   Texture image;
   Plate receiver;
   std::vector<Plate> planes;  ///< Of the image: a picture each, side by side.
+  bool wraps = false;         ///< Whether the image goes on beyond its edges.
 };
 
 /// @param direction  Of the light, unit.

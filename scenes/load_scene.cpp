@@ -18,6 +18,7 @@ namespace {
 constexpr double default_margin = 1.25;    // Of the plate about the beam.
 constexpr double default_distance = 0.25;  // Of the plate behind the volume, in depths of the volume.
 constexpr double greatest_size = 1e5;      // Of the scene, in sizes of the volume: Embree is single precision.
+constexpr std::size_t exact_bands = 10;    // With so many a reflectance can have any colour of Rec.709.
 constexpr int default_resolution = 512;    // Of the plate's longer side.
 
 TensorGrid load_grid(const SceneDescription& scene) {
@@ -220,6 +221,11 @@ Scene load_scene(const SceneDescription& description, const Progress& progress) 
   std::optional<LensScene> lens;
   if (description.integrator.type == IntegratorType::lens) {
     lens.emplace(load_lens(description, field, color, beam.direction, *surfaces.plate));
+    if (!description.bending.rgb && bands.size() > 1 && bands.size() < exact_bands)
+      notes.push_back(
+          fmt::format("warning: with {} wavelengths saturated colours of the image may come out wrong; {} are "
+                      "enough",
+                      bands.size(), exact_bands));
     for (const Plate& plane : lens->planes) check_size(description, field, plane, "/integrator/image_plane");
   }
   Geometry geometry(std::move(surfaces));

@@ -28,6 +28,7 @@ Render render_photons(const Scene& scene, const Progress& progress) {
   if (!description.output.spectral.empty())
     result.spectral = spectral_image(light.irradiance, scene.bands, description.light.irradiance, matrix);
   result.photons = std::move(light.photons);
+  result.metadata["tensorray:photons"] = std::to_string(light.positions);
 
   Statistics& statistics = result.statistics;
   statistics.positions = light.positions;

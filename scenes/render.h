@@ -1,6 +1,6 @@
 #pragma once
 /// @file scenes/render.h
-/// Scene → Render: the only switch over the methods.
+/// Scene → Render: the switch over the methods.
 
 #include <optional>
 
@@ -13,9 +13,10 @@
 namespace tensorray {
 
 struct Statistics {
-  std::uint64_t positions = 0;        ///< From which light was emitted.
-  std::vector<EndCounts> ends;        ///< Rays by channel and end.
-  std::vector<double> channel_power;  ///< Of one ray, by channel; the beam's irradiance is 1.
+  std::uint64_t positions = 0;  ///< From which light was emitted.
+  std::vector<EndCounts> ends;  ///< Rays by channel and end.
+  std::vector<double>
+      channel_power;  ///< Of one ray, by channel, the beam's irradiance being 1; empty if rays carry none.
   std::uint64_t ray_steps = 0, tensor_samples = 0;
   double seconds_tracing = 0, seconds_density = 0, seconds_color = 0;
 };

@@ -16,6 +16,7 @@ namespace {
 constexpr double pi = 3.14159265358979323846;
 constexpr double reference_wavelength = 550;  // nm: the channel next to it is that of the points.
 constexpr int overlay_cells = 16;             // Along the image's shorter side.
+constexpr double most_overlay_cells = 1e6;    // Too dense to be drawn.
 constexpr int gap_part = 64;                  // Between pictures side by side: this part of one's width.
 
 /// How the image's colours become light, channel by channel.
@@ -58,7 +59,7 @@ const std::vector<std::string> point_channels{"texture.s",
                                               "end"};
 
 void write_point(const LensPoint& point, float* values) {
-  const auto finite = [](double value) { return static_cast<float>(std::clamp(value, -100.0, 100.0)); };
+  const auto finite = [](double value) { return std::clamp(value, -100.0, 100.0); };
   const auto next = [&values](double value) { *values++ = static_cast<float>(value); };
   for (int i = 0; i < 2; ++i) next(point.st[i]);
   for (int i = 0; i < 3; ++i) next(point.displacement[i]);
@@ -93,7 +94,8 @@ void draw_overlay(const LensPicture& picture, const Plate& plane, Image& image) 
       straight.push_back({true, picture.straight * Eigen::Vector2d(x + 0.5, y + 0.5), picture.straight.linear()});
       seen.push_back({point.end == LensEnd::image, point.st, point.per_pixel});
     }
-  const Eigen::Array2d cells = (overlay_cells * plane.size / plane.size.minCoeff()).array().round();
+  const Eigen::Array2d cells =
+      (overlay_cells * plane.size / plane.size.minCoeff()).array().round().min(most_overlay_cells);
   GridLines lines;
   lines.cells = cells.cast<int>();
   lines.width = 1;
@@ -120,7 +122,6 @@ Image side_by_side(const std::vector<Image>& images) {
 }
 
 void add_statistics(const LensPicture& picture, Statistics& statistics) {
-  statistics.positions += picture.points.size();
   statistics.ends.resize(picture.ends.size());
   for (std::size_t channel = 0; channel < picture.ends.size(); ++channel)
     for (int end = 0; end < ray_end_count; ++end) statistics.ends[channel][end] += picture.ends[channel][end];
@@ -147,12 +148,13 @@ Render render_lens(const Scene& scene, const Progress& progress) {
   settings.reference = reference_channel(scene);
   LensImage image;
   image.texture = &scene.lens->image;
-  image.wraps = lens.wrap != Wrap::none && lens.mode == LensMode::gather;
+  image.wraps = scene.lens->wraps;
   image.radiance = radiance_of(scene);
 
   Render result;
   const Eigen::Matrix3d matrix = to_working(scene);
-  std::vector<Image> pictures, spectra;
+  std::vector<Image> pictures;
+  std::vector<SpectralImage> spectra;
   for (const Plate& plane : scene.lens->planes) {
     image.plane = plane;
     const LensPicture picture =
@@ -163,15 +165,16 @@ Render render_lens(const Scene& scene, const Progress& progress) {
     add_statistics(picture, result.statistics);
     if (description.output.spectral.empty()) continue;
     // A white image is a diffuse one in the light of the scene.
-    result.spectral = spectral_image(picture.radiance, scene.bands, description.light.irradiance / pi, matrix);
-    spectra.push_back(std::move(result.spectral->image));
+    spectra.push_back(spectral_image(picture.radiance, scene.bands, description.light.irradiance / pi, matrix));
   }
   result.linear = side_by_side(pictures);
-  if (result.spectral) {
-    result.spectral->image = side_by_side(spectra);
+  if (!spectra.empty()) {
+    std::vector<Image> images;
+    for (SpectralImage& spectrum : spectra) images.push_back(std::move(spectrum.image));
+    result.spectral = {side_by_side(images), spectra.front().metadata};
     result.spectral->metadata["emissiveUnits"] = "W.m^-2.sr^-1.nm^-1";
   }
-  for (const LightChannel& channel : scene.channels) result.statistics.channel_power.push_back(channel.power);
+  for (const std::uint64_t count : result.statistics.ends[settings.reference]) result.statistics.positions += count;
   result.metadata["tensorray:end"] = end_codes();
   result.exposure = 0;  // The image is shown as it is.
   return result;

@@ -50,7 +50,6 @@ void describe(FieldDescription& field, Visitor& visit) {
 
 template <class Visitor>
 void describe(BendingDescription& bending, Visitor& visit) {
-  visit.exclude("rgb", {"a", "b"});
   visit("a", bending.flexibility.a, "flexibility of light is s = a + b * wavelength");
   visit("b", bending.flexibility.b, "flexibility of light is s = a + b * wavelength, per nm");
   visit("rgb", bending.rgb, "three flexibilities, one a colour channel, instead of wavelengths");

@@ -17,7 +17,7 @@ ImageMetadata provenance(const Scene& scene, const Render& render) {
                    {"tensorray:version", TENSORRAY_VERSION},
                    {"tensorray:scene", scene.description.text},
                    {"tensorray:seed", std::to_string(scene.description.seed)},
-                   {"tensorray:photons", std::to_string(render.statistics.positions)},
+
                    {"tensorray:scale", fmt::format("{:.17g}", scene.scale.scale)},
                    {"tensorray:ocio_config", scene.color.config_name()},
                    {"tensorray:color_space", scene.color.working_space()}});

@@ -33,42 +33,43 @@ std::string statistics_json(const Scene& scene, const Statistics& statistics, do
   EndCounts rays{};
   std::array<double, ray_end_count> power{};
   Json channels = Json::array();
+  const bool has_power = !statistics.channel_power.empty();
   for (std::size_t channel = 0; channel < statistics.ends.size(); ++channel) {
     for (int end = 0; end < ray_end_count; ++end) {
       const std::uint64_t count = statistics.ends[channel][end];
       rays[end] += count;
-      power[end] += static_cast<double>(count) * statistics.channel_power[channel];
+      if (has_power) power[end] += static_cast<double>(count) * statistics.channel_power[channel];
     }
-    channels.push_back({{"wavelength", scene.channels[channel].wavelength},
-                        {"flexibility", scene.channels[channel].flexibility},
-                        {"ray_power", statistics.channel_power[channel]},
-                        {"rays", balance(statistics.ends[channel])}});
+    channels.push_back(
+        {{"wavelength", scene.channels[channel].wavelength}, {"flexibility", scene.channels[channel].flexibility}});
+    if (has_power) channels.back()["ray_power"] = statistics.channel_power[channel];
+    channels.back()["rays"] = balance(statistics.ends[channel]);
   }
   const double seconds = scene.seconds + statistics.seconds_tracing + statistics.seconds_density +
                          statistics.seconds_color + seconds_writing;
-  const Json json = {{"version", TENSORRAY_VERSION},
-                     {"scene", scene.description.path.string()},
-                     {"seed", scene.description.seed},
-                     {"threads", threads},
-                     {"positions", statistics.positions},
-                     {"photons", balance(rays)},
-                     {"power", balance(power)},
-                     {"ray_steps", statistics.ray_steps},
-                     {"tensor_samples", statistics.tensor_samples},
-                     {"field",
-                      {{"scale", scene.scale.scale},
-                       {"non_finite_voxels", scene.non_finite},
-                       {"defective_voxels", scene.eigenvalues.defective},
-                       {"memory_bytes", scene.field.memory_bytes()}}},
-                     {"seconds",
-                      {{"load", scene.seconds},
-                       {"trace", statistics.seconds_tracing},
-                       {"density", statistics.seconds_density},
-                       {"color", statistics.seconds_color},
-                       {"write", seconds_writing},
-                       {"total", seconds}}},
-                     {"peak_memory_bytes", peak_memory_bytes()},
-                     {"channels", channels}};
+  Json json = {{"version", TENSORRAY_VERSION},
+               {"scene", scene.description.path.string()},
+               {"seed", scene.description.seed},
+               {"threads", threads},
+               {"positions", statistics.positions},
+               {"photons", balance(rays)},
+               {"ray_steps", statistics.ray_steps},
+               {"tensor_samples", statistics.tensor_samples},
+               {"field",
+                {{"scale", scene.scale.scale},
+                 {"non_finite_voxels", scene.non_finite},
+                 {"defective_voxels", scene.eigenvalues.defective},
+                 {"memory_bytes", scene.field.memory_bytes()}}},
+               {"seconds",
+                {{"load", scene.seconds},
+                 {"trace", statistics.seconds_tracing},
+                 {"density", statistics.seconds_density},
+                 {"color", statistics.seconds_color},
+                 {"write", seconds_writing},
+                 {"total", seconds}}},
+               {"peak_memory_bytes", peak_memory_bytes()},
+               {"channels", channels}};
+  if (has_power) json["power"] = balance(power);
   return json.dump(2) + "\n";
 }
 

@@ -163,7 +163,8 @@ TEST(RayDifferential, MatchesFiniteDifferencesWhereKicksAreStrong) {
   const Vector3d direction(0, 0, -1);
   surfaces.plate = test::plate_across(direction, 1);
   const Geometry geometry(surfaces);
-  const BendingSettings settings = test::settings_of(BendingMethod::splitting, 4);  // One step of 0.5: ‖h s T‖ of some 8.
+  const BendingSettings settings =
+      test::settings_of(BendingMethod::splitting, 4);  // One step of 0.5: ‖h s T‖ of some 8.
   const Start start = make_start({0.1, -0.2, 0.3}, direction, 0);
   RayBatch batch;
   batch.add(start.position, start.direction, 8);

@@ -113,6 +113,21 @@ TEST(LensMap, WithoutFieldLightIsProjected) {
   }
 }
 
+TEST(LensMap, NoPlaneStopsTheLightThatStartsOnIt) {
+  const TensorField field = constant_field(Matrix3d::Zero());
+  const double size = 2 * std::sqrt(3.0);
+  for (const double tilt : {0.0, 60.0, 75.0, 85.0})
+    for (const double distance : {0.0, 0.5, 1.0, 3.0, 1000 * size}) {  // In the volume, touching it, and far away.
+      const double angle = tilt * 3.14159265358979 / 180;
+      const Plate from = tilted_plane({0, 0, distance}, {std::sin(angle), 0, -std::cos(angle)});
+      const LensMap map = make_map(field, from, plane_at(-2), down);
+      for (int i = 0; i < 200; ++i) {
+        const Vector2d start(0.5 * std::sin(1.7 * i), 0.5 * std::cos(2.9 * i));
+        ASSERT_EQ(land(map, start, 1).end, RayEnd::plate) << "tilt " << tilt << ", distance " << distance;
+      }
+    }
+}
+
 TEST(LensMap, BetweenParallelPlanesWithoutFieldNothingChanges) {
   const TensorField field = constant_field(Matrix3d::Zero());
   for (const double distance : {1.0, 1.5}) {  // Touching the volume, and outside of it.

@@ -45,7 +45,8 @@ LensMesh make_mesh(const LensMap& map, double s, const LensMeshSettings& setting
 }
 
 LensMeshSettings mesh_settings(double extent, double target, double pixel) {
-  return {{extent, extent}, {target, target}, pixel};
+  const Eigen::Vector2d corner = Eigen::Vector2d::Constant(extent / 2);
+  return {{-corner, corner}, {target, target}, pixel};
 }
 
 /// Spreads light along +z, in the middle about fivefold, towards its sides less and less.
@@ -94,7 +95,7 @@ TEST(LensMesh, SmoothMapsHaveNoCracks) {
     covered += std::abs(part);
     for (int i = 0; i < 3; ++i) ++edges[std::minmax(triangle[i], triangle[(i + 1) % 3])];
   }
-  EXPECT_NEAR(covered, settings.extent.prod(), 1e-12);
+  EXPECT_NEAR(covered, settings.starts.volume(), 1e-12);
   const auto on_border = [&](const Vector2d& a, const Vector2d& b) {
     for (int axis = 0; axis < 2; ++axis)
       if (std::abs(std::abs(a[axis]) - 0.2) < 1e-12 && a[axis] == b[axis]) return true;

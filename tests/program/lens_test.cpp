@@ -194,6 +194,50 @@ TEST_F(Lens, TheImageIsSeenUprightFromBehindTheReceiver) {
   EXPECT_NEAR(image.pixel(1, 0)[0], 0, 1e-4);
 }
 
+TEST_F(Lens, AlphaIsMultipliedInWhereTheFormatWantsItSo) {
+  Image picture(2, 2, {"R", "G", "B", "A"});
+  for (std::size_t i = 0; i < picture.pixels.size(); ++i) picture.pixels[i] = i % 4 == 3 ? 0.5f : 1;
+  write_image(in_folder("photo.png"), picture);
+  write("scene.json", small_lens(R"("image": "photo.png")", zero));
+  run_well({"render", "scene.json", "-q", "-o", "out.exr", "-o", "out.png", "--set", "receiver.resolution=[2,2]",
+            "--set", "receiver.size=[2,2]"});
+  const Image linear = read_image(in_folder("out.exr")), shown = read_image(in_folder("out.png"));
+  EXPECT_NEAR(channel(linear, "R")[0], 0.5, 1e-4);
+  EXPECT_NEAR(channel(linear, "A")[0], 0.5, 1e-4);
+  EXPECT_NEAR(channel(shown, "R")[0], 1, 1e-4);
+  EXPECT_NEAR(channel(shown, "A")[0], 0.5, 1e-4);
+  run_well({"render", "scene.json", "-q", "-o", "out.jpg", "--set", "receiver.resolution=[2,2]", "--set",
+            "receiver.size=[2,2]"});
+  EXPECT_NEAR(read_image(in_folder("out.jpg")).pixels[0], 0.735, 0.01) << "half the light, on the sRGB curve";
+}
+
+TEST_F(Lens, StrongFieldsLeaveNothingThatIsNotFinite) {
+  write("scene.json", small_lens(R"("image": "checkerboard")"));
+  for (const std::string mode : {"gather", "scatter"})
+    for (const std::string scale : {"300", "-300", "1e8"}) {
+      const Image image = render(
+          {"integrator.mode=" + mode, "field.scale=" + scale, "receiver.resolution=[24,16]", "bending.max_steps=100"});
+      for (const float value : image.pixels) ASSERT_TRUE(std::isfinite(value)) << mode << " " << scale;
+    }
+}
+
+TEST_F(Lens, ImagesMuchWiderThanTheReceiverCostNoMore) {
+  write_image(in_folder("wide.png"), random_picture(1000, 4));
+  write("scene.json", small_lens(R"("image": "wide.png")"));
+  run_well({"render", "scene.json", "-q", "-o", "out.exr", "--stats", "wide.json"});
+  run_well({"render", "scene.json", "-q", "-o", "out.exr", "--stats", "square.json", "--set", "integrator.image=grid"});
+  EXPECT_LT(read_json("wide.json")["ray_steps"].get<double>(),
+            1.5 * read_json("square.json")["ray_steps"].get<double>());
+  EXPECT_FALSE(read_json("wide.json").contains("power")) << "an image's rays carry none";
+}
+
+TEST_F(Lens, PhotonsAloneAreNoOutputOfALens) {
+  write("scene.json", small_lens(R"("image": "grid")"));
+  const Outcome outcome = run({"render", "scene.json", "-q", "-o", "out.vdb"});
+  EXPECT_EQ(outcome.status, 2);
+  EXPECT_NE(outcome.error.find("deposits no photons"), std::string::npos) << outcome.error;
+}
+
 TEST_F(Lens, ImagesThatCannotBeReadAreNamed) {
   write("scene.json", small_lens(R"("image": "checkerboard")"));
   write("empty.png", "");
