@@ -3,9 +3,11 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <unordered_map>
+#include <tuple>
+#include <utility>
 
 #include <tbb/parallel_for.h>
+#include <tbb/parallel_sort.h>
 
 namespace tensorray {
 namespace {
@@ -13,7 +15,7 @@ namespace {
 constexpr double cell_pixels = 4;              // Of the first lattice.
 constexpr double most_cells = 4096;            // ... along either side, however large the image is.
 constexpr double short_pixels = 1.0 / 4;       // Edges shorter than this, in starts and landings, are not halved ...
-constexpr double shortest_pixels = 1.0 / 64;   // ... nor those shorter than this in the starts.
+constexpr double shortest_pixels = 1.0 / 16;   // ... nor those shorter than this in the starts.
 constexpr std::size_t most_starts = 1u << 14;  // No edge is halved beyond so many starts ...
 constexpr double starts_per_pixel = 4;         // ... and so many for each pixel: a chaotic field would need them all.
 constexpr double bend_pixels = 0.1;            // How far the landings may lie beside an edge.
@@ -69,21 +71,18 @@ class Refinement {
   /// Halves each edge that needs it once. @return false if none did. New starts have no landings yet.
   bool halve() {
     if (mesh_.starts.size() > most_starts_) return false;
-    middles_.clear();
-    for (const Triangle& triangle : triangles_) {
-      if (progress_.cancelled) throw Cancelled();
-      for (int i = 0; i < 3; ++i) {
-        const auto [edge, is_new] = middles_.emplace(edge_of(triangle, i), none);
-        if (is_new && needs_halving(triangle[i], triangle[(i + 1) % 3])) edge->second = unset;
-      }
-    }
+    number_edges();
+    tbb::parallel_for(std::size_t{0}, edges_.size(), [&](std::size_t edge) {
+      if (needs_halving(edges_[edge].first, edges_[edge].second)) middles_[edge] = unset;
+    });
     while (mark_longest()) continue;
     const std::size_t before = mesh_.starts.size();
     std::vector<Triangle> next;
-    for (const Triangle& triangle : triangles_) {
+    next.reserve(triangles_.size());
+    for (std::size_t t = 0; t < triangles_.size(); ++t) {
       Triangle middle{};
-      for (int i = 0; i < 3; ++i) middle[i] = middle_of(triangle, i);
-      divide(triangle, middle, next);
+      for (int i = 0; i < 3; ++i) middle[i] = middle_of(edges_of_[t][i]);
+      divide(triangles_[t], middle, next);
     }
     triangles_ = std::move(next);
     return mesh_.starts.size() > before;
@@ -93,28 +92,46 @@ class Refinement {
   // What middles_ holds where there is no vertex: the edge stays whole, or is to be halved.
   static constexpr std::uint32_t none = 0xffffffffu, unset = 0xfffffffeu;
 
-  static std::uint64_t edge_of(const Triangle& triangle, int i) {
-    const std::uint32_t a = triangle[i], b = triangle[(i + 1) % 3];
-    return static_cast<std::uint64_t>(std::min(a, b)) << 32 | std::max(a, b);
+  /// Edges by the order of their vertices: from both sides an edge has one number.
+  void number_edges() {
+    if (progress_.cancelled) throw Cancelled();
+    using Side = std::tuple<std::uint32_t, std::uint32_t, std::uint32_t>;  // The two vertices; 3 · triangle + side.
+    std::vector<Side> sides(3 * triangles_.size());
+    for (std::size_t i = 0; i < sides.size(); ++i) {
+      const std::uint32_t a = triangles_[i / 3][i % 3], b = triangles_[i / 3][(i + 1) % 3];
+      sides[i] = {std::min(a, b), std::max(a, b), static_cast<std::uint32_t>(i)};
+    }
+    tbb::parallel_sort(sides);
+    edges_.clear();
+    edges_of_.resize(triangles_.size());
+    for (const auto& [a, b, i] : sides) {
+      if (edges_.empty() || edges_.back() != std::pair(a, b)) edges_.emplace_back(a, b);
+      edges_of_[i / 3][i % 3] = static_cast<std::uint32_t>(edges_.size() - 1);
+    }
+    middles_.assign(edges_.size(), none);
   }
 
-  double length(const Triangle& triangle, int i) const {
-    return (mesh_.starts[triangle[i]] - mesh_.starts[triangle[(i + 1) % 3]]).norm();
+  /// The number of the triangle's longest edge; of equal ones the first.
+  std::uint32_t longest_edge(std::size_t triangle) const {
+    const auto length = [&](int i) {
+      const auto [a, b] = edges_[edges_of_[triangle][i]];
+      return (mesh_.starts[a] - mesh_.starts[b]).squaredNorm();
+    };
+    int longest = 0;
+    for (const int i : {1, 2})
+      if (length(i) > length(longest)) longest = i;
+    return edges_of_[triangle][longest];
   }
 
   /// @return whether an edge was marked.
   bool mark_longest() {
+    if (progress_.cancelled) throw Cancelled();
     bool changed = false;
-    for (const Triangle& triangle : triangles_) {
-      if (progress_.cancelled) throw Cancelled();
-      int longest = 0;
-      bool halved = false;
-      for (int i = 0; i < 3; ++i) {
-        halved = halved || middles_[edge_of(triangle, i)] != none;
-        if (length(triangle, i) > length(triangle, longest)) longest = i;
-      }
-      std::uint32_t& middle = middles_[edge_of(triangle, longest)];
-      if (!halved || middle != none) continue;
+    for (std::size_t t = 0; t < triangles_.size(); ++t) {
+      const auto& edges = edges_of_[t];
+      if (std::all_of(edges.begin(), edges.end(), [&](std::uint32_t edge) { return middles_[edge] == none; })) continue;
+      std::uint32_t& middle = middles_[longest_edge(t)];
+      if (middle != none) continue;
       middle = unset;
       changed = true;
     }
@@ -144,11 +161,11 @@ class Refinement {
   }
 
   /// The vertex in the middle of an edge, the same from both sides; `none` if it stays whole.
-  std::uint32_t middle_of(const Triangle& triangle, int i) {
-    std::uint32_t& middle = middles_[edge_of(triangle, i)];
+  std::uint32_t middle_of(std::uint32_t edge) {
+    std::uint32_t& middle = middles_[edge];
     if (middle == unset) {
       middle = static_cast<std::uint32_t>(mesh_.starts.size());
-      mesh_.starts.push_back((mesh_.starts[triangle[i]] + mesh_.starts[triangle[(i + 1) % 3]]) / 2);
+      mesh_.starts.push_back((mesh_.starts[edges_[edge].first] + mesh_.starts[edges_[edge].second]) / 2);
     }
     return middle;
   }
@@ -181,7 +198,9 @@ class Refinement {
   const LensMeshSettings& settings_;
   const Progress& progress_;
   std::size_t most_starts_;
-  std::unordered_map<std::uint64_t, std::uint32_t> middles_;  // By the vertices of the edge.
+  std::vector<std::pair<std::uint32_t, std::uint32_t>> edges_;  // Their vertices, the lesser first.
+  std::vector<std::array<std::uint32_t, 3>> edges_of_;          // Of each triangle; i joins its corners i and i + 1.
+  std::vector<std::uint32_t> middles_;                          // Of each edge.
 };
 
 std::vector<Triangle> lattice_triangles(int columns, int rows) {

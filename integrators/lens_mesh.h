@@ -38,7 +38,7 @@ struct LensMeshSettings {
 /// either side); then, within `target`, edges are halved where the landing between their ends would lie more than a
 /// tenth of a pixel beside the straight line (by the Jacobians of both ends), and where one end landed and the other
 /// did not. That ends where edges are shorter than 1/4 pixel, in the starts and, by the Jacobians, in the landings, or
-/// than 1/64 pixel in the starts, or when there are some 4 starts for each pixel. An edge halved is halved for both of
+/// than 1/16 pixel in the starts, or when there are some 4 starts for each pixel. An edge halved is halved for both of
 /// its triangles, so that there are no cracks. Edges that are torn (the landings are apart by a pixel more than the
 /// Jacobians explain: the volume's silhouette, an obstacle's shadow) have no triangles. The result does not depend on
 /// the number of threads. @throw Cancelled
