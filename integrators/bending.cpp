@@ -28,8 +28,8 @@ class Tracer {
   Tracer(const TensorField& field, const Geometry& geometry, const BendingSettings& settings)
       : field_(field), geometry_(geometry), settings_(settings), sampler_(field) {}
 
-  /// Follows a ray to its end; `state` says where that is.
-  RayEnd trace(const State<N>& start, double flexibility);
+  /// Follows a ray to its end; `state` says where that is, and `way`, unless null, how it came there.
+  RayEnd trace(const State<N>& start, double flexibility, Way* way);
 
   const State<N>& state() const { return ray_; }
   double length() const { return length_; }
@@ -53,6 +53,7 @@ class Tracer {
   double length_of_voxel() const { return 1 / (field_.to_index().linear() * direction()).norm(); }
   double automatic_step() const;
   double control_step(const State<N>& error);
+  void record(bool in_field);
   void go_straight(const Hit& hit);
   void meet_surface(const Eigen::Vector3d& normal, bool bends);
   Event meet(const State<N>& next, Hit& hit) const;
@@ -65,6 +66,7 @@ class Tracer {
 
   Medium<N> medium_{sampler_, 0};
   State<N> ray_;
+  Way* way_ = nullptr;
   double length_ = 0;         // Of the way so far, world units.
   double voxel_ = 0;          // Length of a voxel along the ray, world units.
   double adaptive_step_ = 0;  // What the error control asks for next, in voxels.
@@ -88,12 +90,31 @@ void Tracer<N>::meet_surface(const Eigen::Vector3d& normal, bool bends) {
   }
 }
 
+/// Leaves the medium as last sampled: the steps are the same, recorded or not.
+template <int N>
+void Tracer<N>::record(bool in_field) {
+  if (!way_) return;
+  Waypoint here;
+  here.position = position();
+  here.direction = direction();
+  here.length = length_;
+  here.in_field = in_field;
+  if (in_field) {
+    Medium<1> medium{sampler_, medium_.s};
+    here.change = medium.derivative({here.position, here.direction}).V;
+    here.tensor = medium.T;
+  }
+  way_->push_back(here);
+}
+
 /// In free space, to a surface.
 template <int N>
 void Tracer<N>::go_straight(const Hit& hit) {
+  record(false);
   ray_.P += hit.distance * ray_.V;
   length_ += hit.distance;
   meet_surface(hit.normal, false);
+  record(false);
 }
 
 /// In free space before the volume: to an absorber, or to the face of the box where light enters.
@@ -220,6 +241,7 @@ std::optional<RayEnd> Tracer<N>::bend() {
   voxel_ = length_of_voxel();
   if (automatic) medium_.sample(ray_.P);
   adaptive_step_ = automatic ? automatic_step() : settings_.step;
+  record(true);
   while (true) {
     if (steps_ >= static_cast<std::uint32_t>(settings_.max_steps)) return RayEnd::step_limit;
     ++steps_;
@@ -236,10 +258,12 @@ std::optional<RayEnd> Tracer<N>::bend() {
     if (event == Event::none) {
       ray_ = next;
       length_ += h;
+      record(true);
       continue;
     }
     length_ += land(next, h, hit);
     if (direction().isZero() || !position().allFinite()) return RayEnd::degenerate;
+    record(true);
     if (event == Event::absorber) return end_on(hit.surface);
     if (event == Event::leaves_box) return leave();
     return std::nullopt;
@@ -260,17 +284,19 @@ RayEnd Tracer<N>::follow() {
 }
 
 template <int N>
-RayEnd Tracer<N>::trace(const State<N>& start, double flexibility) {
+RayEnd Tracer<N>::trace(const State<N>& start, double flexibility, Way* way) {
   ray_ = normalized(start);
+  way_ = way;
   medium_.s = flexibility;
   length_ = 0;
   steps_ = 0;
   return follow();
 }
 
-/// The rays of a batch, which is N = 3 wide if it carries differentials.
+/// The rays of a batch, which is N = 3 wide if it carries differentials. `ways`, unless null, are recorded.
 template <int N>
-void trace_rays(const TensorField& field, const Geometry& geometry, const BendingSettings& settings, RayBatch& batch) {
+void trace_rays(const TensorField& field, const Geometry& geometry, const BendingSettings& settings, RayBatch& batch,
+                std::vector<Way>* ways) {
   Tracer<N> tracer(field, geometry, settings);
   for (std::size_t i = 0; i < batch.size(); ++i) {
     State<N> start;
@@ -280,7 +306,7 @@ void trace_rays(const TensorField& field, const Geometry& geometry, const Bendin
       start.P.template rightCols<2>() = batch.differentials[i].position;
       start.V.template rightCols<2>() = batch.differentials[i].direction;
     }
-    batch.end[i] = tracer.trace(start, batch.flexibility[i]);
+    batch.end[i] = tracer.trace(start, batch.flexibility[i], ways ? &(*ways)[i] : nullptr);
     batch.position[i] = tracer.state().position();
     batch.direction[i] = tracer.state().direction();
     if constexpr (N == 3)
@@ -296,6 +322,19 @@ void check(const BendingSettings& settings) {
     throw std::invalid_argument("bending.step must be automatic, or a positive number of voxels");
   if (!(settings.tolerance > 0)) throw std::invalid_argument("bending.tolerance must be positive");
   if (settings.max_steps < 1) throw std::invalid_argument("bending.max_steps must be positive");
+}
+
+void trace_batch(const TensorField& field, const Geometry& geometry, const BendingSettings& settings, RayBatch& batch,
+                 std::vector<Way>* ways) {
+  check(settings);
+  const bool differentials = !batch.differentials.empty();
+  if (differentials && batch.differentials.size() != batch.size())
+    throw std::invalid_argument("a batch has differentials for every ray, or for none");
+  batch.end.resize(batch.size());
+  batch.length.resize(batch.size());
+  batch.steps.resize(batch.size());
+  if (ways) ways->assign(batch.size(), Way());
+  (differentials ? trace_rays<3> : trace_rays<1>)(field, geometry, settings, batch, ways);
 }
 
 }  // namespace
@@ -322,14 +361,12 @@ void RayBatch::add(const Eigen::Vector3d& from, const Eigen::Vector3d& along, do
 }
 
 void trace(const TensorField& field, const Geometry& geometry, const BendingSettings& settings, RayBatch& batch) {
-  check(settings);
-  const bool differentials = !batch.differentials.empty();
-  if (differentials && batch.differentials.size() != batch.size())
-    throw std::invalid_argument("a batch has differentials for every ray, or for none");
-  batch.end.resize(batch.size());
-  batch.length.resize(batch.size());
-  batch.steps.resize(batch.size());
-  (differentials ? trace_rays<3> : trace_rays<1>)(field, geometry, settings, batch);
+  trace_batch(field, geometry, settings, batch, nullptr);
+}
+
+void trace(const TensorField& field, const Geometry& geometry, const BendingSettings& settings, RayBatch& batch,
+           std::vector<Way>& ways) {
+  trace_batch(field, geometry, settings, batch, &ways);
 }
 
 }  // namespace tensorray

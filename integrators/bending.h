@@ -73,6 +73,23 @@ struct RayBatch {
   void add(const Eigen::Vector3d& position, const Eigen::Vector3d& direction, double flexibility);
 };
 
+/// A point on the way of a ray.
+struct Waypoint {
+  Eigen::Vector3d position = Eigen::Vector3d::Zero();
+  Eigen::Vector3d direction = Eigen::Vector3d::Zero();  ///< V; unit.
+  double length = 0;                                    ///< Of the way so far, world units.
+  Eigen::Matrix3d tensor = Eigen::Matrix3d::Zero();     ///< T here; zero where light is straight.
+  Eigen::Vector3d change = Eigen::Vector3d::Zero();     ///< V' here: its length is the way's curvature.
+  bool in_field = false;                                ///< Whether the way bends here (inside the volume and the cut).
+
+  Eigen::Vector3d force() const { return tensor * direction; }  ///< T V, whose length is Eq. 11.
+};
+
+/// From the start to the end. A ray has a point at each step in the field, from where it enters to where it leaves, and
+/// one at either end of each straight piece that ends on something; two, of which one is in the field, where it
+/// enters or leaves. Empty if it meets nothing.
+using Way = std::vector<Waypoint>;
+
 /// Follows every ray of `batch` to its end, in place: position and direction are then those of the end. A ray that
 /// missed is left where it last crossed the bounds (or where it began). Differentials are carried along by the
 /// variational equations, as the derivative of the method's own steps; on a surface they are those of the point where
@@ -84,5 +101,9 @@ struct RayBatch {
 /// Threads: `field` and `geometry` are shared and immutable; one batch belongs to one thread.
 /// @throw std::invalid_argument if a setting is out of range.
 void trace(const TensorField& field, const Geometry& geometry, const BendingSettings& settings, RayBatch& batch);
+
+/// The same, and records the ways, one a ray: the same rays, for one more tensor sample a step.
+void trace(const TensorField& field, const Geometry& geometry, const BendingSettings& settings, RayBatch& batch,
+           std::vector<Way>& ways);
 
 }  // namespace tensorray
