@@ -1,44 +1,15 @@
 #include "renderer/triangle_scene.h"
 
-#if __has_include(<embree4/rtcore.h>)
-#include <embree4/rtcore.h>
-#else
-#include <embree3/rtcore.h>
-#endif
-
 #include <algorithm>
-#include <stdexcept>
-#include <string>
 #include <tuple>
-#include <type_traits>
+
+#include "renderer/embree_handles.h"
 
 namespace tensorray {
 namespace {
 
-/// What differs between Embree 3 and 4.
-void intersect(RTCScene scene, RTCRayHit& ray) {
-#if RTC_VERSION_MAJOR >= 4
-  rtcIntersect1(scene, &ray, nullptr);
-#else
-  RTCIntersectContext context;
-  rtcInitIntersectContext(&context);
-  rtcIntersect1(scene, &context, &ray);
-#endif
-}
-
-struct Release {
-  void operator()(RTCDevice device) const { rtcReleaseDevice(device); }
-  void operator()(RTCScene scene) const { rtcReleaseScene(scene); }
-  void operator()(RTCGeometry geometry) const { rtcReleaseGeometry(geometry); }
-};
-
-template <class Handle>
-using Owned = std::unique_ptr<std::remove_pointer_t<Handle>, Release>;
-
-void check(RTCDevice device) {
-  if (const RTCError error = rtcGetDeviceError(device); error != RTC_ERROR_NONE)
-    throw std::runtime_error("Embree cannot build the scene (error " + std::to_string(error) + ")");
-}
+using embree::check;
+using embree::Owned;
 
 /// By mesh and triangle. Embree may report a triangle more than once where its search tree has split it.
 void sort_and_join(std::vector<TriangleId>& triangles) {
@@ -56,7 +27,6 @@ bool add_candidate(RTCPointQueryFunctionArguments* arguments) {
 
 }  // namespace
 
-/// A device costs a tenth of a millisecond, so that every scene has its own and no two share anything.
 struct TriangleScene::State {
   Eigen::Vector3d origin;
   double unit;
@@ -82,8 +52,7 @@ struct TriangleScene::State {
 };
 
 void TriangleScene::State::start(RTCBuildQuality quality) {
-  device.reset(rtcNewDevice(nullptr));
-  if (!device) throw std::runtime_error("Embree cannot start on this processor");
+  device = embree::make_device();
   scene.reset(rtcNewScene(device.get()));
   check(device.get());
   rtcSetSceneFlags(scene.get(), RTC_SCENE_FLAG_ROBUST);
@@ -158,7 +127,7 @@ std::optional<TriangleHit> TriangleScene::nearest(const Eigen::Vector3d& from, c
                                                   double min_distance, double max_distance) const {
   if (empty()) return std::nullopt;
   RTCRayHit ray = state_->ray(from, direction, min_distance, max_distance);
-  intersect(state_->scene.get(), ray);
+  embree::intersect(state_->scene.get(), ray);
   if (ray.hit.geomID == RTC_INVALID_GEOMETRY_ID) return std::nullopt;
   return TriangleHit{min_distance + ray.ray.tfar * state_->unit, ray.hit.geomID, ray.hit.primID};
 }

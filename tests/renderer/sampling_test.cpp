@@ -1,0 +1,175 @@
+#include "renderer/sampling.h"
+
+#include <algorithm>
+#include <cmath>
+#include <set>
+
+#include <Eigen/LU>
+#include <gtest/gtest.h>
+
+#include "renderer/random.h"
+#include "tests/renderer/statistics.h"
+
+namespace tensorray {
+namespace {
+
+using Eigen::Vector2d;
+using Eigen::Vector3d;
+
+constexpr double pi = 3.14159265358979323846;
+
+/// Counts in 32 x 32 bins of the unit square. Points on its far edges count to the last bins.
+template <class Point>
+double square_score(const Point& point) {
+  std::vector<int> counts(32 * 32);
+  const auto bin = [](double x) { return std::min(static_cast<int>(x * 32), 31); };
+  for (int i = 0; i < 65536; ++i) {
+    const Vector2d p = point(i);
+    EXPECT_GE(p.minCoeff(), 0);
+    EXPECT_LE(p.maxCoeff(), 1 + 1e-12);
+    ++counts[bin(p.x()) * 32 + bin(p.y())];
+  }
+  return chi_square_score(counts);
+}
+
+Vector2d uniform(int i) { return {random_uniform(11, i, 0), random_uniform(11, i, 1)}; }
+
+double turn(double x, double y) { return std::atan2(y, x) / (2 * pi) + 0.5; }
+
+TEST(PathSampler, IsAFunctionOfItsKeys) {
+  std::set<double> values;
+  for (std::uint64_t seed = 0; seed < 8; ++seed)
+    for (std::uint64_t pixel = 0; pixel < 8; ++pixel)
+      for (std::uint32_t sample = 0; sample < 8; ++sample) {
+        PathSampler path{seed, pixel, sample}, again{seed, pixel, sample};
+        for (int dimension = 0; dimension < 8; ++dimension) {
+          const Vector2d value = path.next_2d();
+          EXPECT_EQ(value, again.next_2d());
+          values.insert({value.x(), value.y()});
+        }
+        EXPECT_EQ(path.dimension, 8u);
+        PathSampler jump{seed, pixel, sample, 5};
+        again.dimension = 5;
+        EXPECT_EQ(jump.next_1d(), again.next_1d());
+      }
+  EXPECT_GT(values.size(), 8190u);  // Of 8192 multiples of 2^-32.
+}
+
+TEST(PathSampler, SamplesOfAPixelFillEveryElementaryInterval) {
+  for (const std::uint64_t pixel : {0u, 1u, 1000000u})
+    for (std::uint32_t dimension = 0; dimension < 20; dimension += 7)
+      for (int k = 0; k <= 8; k += 2)
+        for (int i = 0; i <= k; ++i) {
+          std::vector<int> counts(1 << k);
+          for (std::uint32_t sample = 0; sample < (1u << k); ++sample) {
+            const Vector2d p = PathSampler{1, pixel, sample, dimension}.next_2d();
+            ++counts[(static_cast<int>(std::ldexp(p.x(), i)) << (k - i)) + static_cast<int>(std::ldexp(p.y(), k - i))];
+          }
+          for (const int count : counts) ASSERT_EQ(count, 1) << pixel << " " << dimension << " " << k << " " << i;
+        }
+}
+
+TEST(PathSampler, SingleNumbersAreStratified) {
+  std::vector<int> counts(256);
+  for (std::uint32_t sample = 0; sample < 256; ++sample)
+    ++counts[static_cast<int>(PathSampler{3, 4, sample, 9}.next_1d() * 256)];
+  for (const int count : counts) EXPECT_EQ(count, 1);
+}
+
+TEST(PathSampler, DimensionsAndPixelsAreUnrelated) {
+  const auto number = [](std::uint64_t pixel, int sample, std::uint32_t dimension) {
+    return PathSampler{5, pixel, static_cast<std::uint32_t>(sample), dimension}.next_1d();
+  };
+  // Each number alone is stratified, which leaves 31 * 31 of 1023 degrees of freedom: 1.4 standard deviations less.
+  EXPECT_LT(std::abs(square_score([&](int i) { return Vector2d(number(0, i, 0), number(0, i, 1)); })), 5.5);
+  EXPECT_LT(std::abs(square_score([&](int i) { return Vector2d(number(0, i, 0), number(1, i, 0)); })), 5.5);
+  // The first sample of every pixel, and two dimensions of it.
+  EXPECT_LT(std::abs(square_score([&](int i) { return Vector2d(number(i, 0, 0), number(i, 0, 1)); })), 4);
+  EXPECT_LT(std::abs(square_score([&](int i) { return Vector2d(number(i, 0, 0), number(i + 1, 0, 0)); })), 4);
+  EXPECT_LT(std::abs(square_score([&](int i) {
+              return PathSampler{5, static_cast<std::uint64_t>(i), 0}.next_2d();
+            })),
+            4);
+}
+
+TEST(FrameAbout, IsRightHandedAndOrthonormal) {
+  for (int i = 0; i < 1000; ++i) {
+    Vector3d axis = square_to_sphere(uniform(i));
+    if (i < 6) axis = (i % 2 ? -1 : 1) * Vector3d::Unit(i / 2);
+    if (i == 6) axis = Vector3d(1e-9, -1e-9, -1).normalized();
+    const Eigen::Matrix3d frame = frame_about(axis);
+    EXPECT_EQ(frame.col(2), axis);
+    EXPECT_LT((frame.transpose() * frame - Eigen::Matrix3d::Identity()).norm(), 1e-14);
+    EXPECT_GT(frame.determinant(), 0);
+  }
+}
+
+// Each warp is undone by the textbook's inverse of its density, which must give an even square back.
+
+TEST(Warps, DiskIsEven) {
+  EXPECT_LT(std::abs(square_score([](int i) {
+              const Vector2d p = square_to_disk(uniform(i));
+              return Vector2d(p.squaredNorm(), turn(p.x(), p.y()));
+            })),
+            4);
+  EXPECT_EQ(square_to_disk({0.5, 0.5}), Vector2d::Zero());
+  for (const Vector2d& edge : {Vector2d(0, 0), Vector2d(0, 0.3), Vector2d(0.7, 0), Vector2d(1, 1), Vector2d(0.2, 1)})
+    EXPECT_NEAR(square_to_disk(edge).norm(), 1, 1e-15);
+}
+
+TEST(Warps, CosineHemisphere) {
+  EXPECT_LT(std::abs(square_score([](int i) {
+              const Vector3d d = square_to_cosine_hemisphere(uniform(i));
+              EXPECT_NEAR(d.norm(), 1, 1e-14);
+              EXPECT_GE(d.z(), 0);
+              return Vector2d(d.z() * d.z(), turn(d.x(), d.y()));
+            })),
+            4);
+}
+
+TEST(Warps, Sphere) {
+  EXPECT_LT(std::abs(square_score([](int i) {
+              const Vector3d d = square_to_sphere(uniform(i));
+              EXPECT_NEAR(d.norm(), 1, 1e-14);
+              return Vector2d((1 + d.z()) / 2, turn(d.x(), d.y()));
+            })),
+            4);
+}
+
+TEST(Warps, Cone) {
+  for (const double angle : {pi, 1.0, 0.1, 0.00465, 1e-7}) {
+    EXPECT_LT(std::abs(square_score([angle](int i) {
+                const Vector3d d = square_to_cone(uniform(i), angle);
+                // sin²(θ/2) over its largest value; from the sine of θ where θ is small.
+                const double sine = std::hypot(d.x(), d.y());
+                const double half = d.z() > 0 ? std::asin(sine) / 2 : (pi - std::asin(sine)) / 2;
+                return Vector2d(std::pow(std::sin(half) / std::sin(angle / 2), 2), turn(d.x(), d.y()));
+              })),
+              4)
+        << angle;
+  }
+  EXPECT_NEAR(cone_solid_angle(pi), 4 * pi, 1e-14);
+  EXPECT_NEAR(cone_solid_angle(pi / 2), 2 * pi, 1e-14);
+  EXPECT_NEAR(cone_solid_angle(1e-7) / (pi * 1e-14), 1, 1e-9);
+}
+
+TEST(Warps, Triangle) {
+  EXPECT_LT(std::abs(square_score([](int i) {
+              const Vector3d b = square_to_triangle(uniform(i));
+              EXPECT_GE(b.minCoeff(), 0);
+              EXPECT_NEAR(b.sum(), 1, 1e-15);
+              return Vector2d(std::pow(1 - b.x(), 2), b.y() / (1 - b.x()));
+            })),
+            4);
+  // The map has two linear parts, each of which halves areas exactly.
+  for (const Vector2d& u : {Vector2d(0.2, 0.7), Vector2d(0.6, 0.1)}) {
+    Eigen::Matrix2d derivative;
+    for (int axis = 0; axis < 2; ++axis)
+      derivative.col(axis) =
+          (square_to_triangle(u + 0.01 * Vector2d::Unit(axis)) - square_to_triangle(u)).head<2>() / 0.01;
+    EXPECT_NEAR(std::abs(derivative.determinant()), 0.5, 1e-12);
+  }
+}
+
+}  // namespace
+}  // namespace tensorray
