@@ -113,18 +113,76 @@ std::map<std::filesystem::path, std::string> input_files(const SceneDescription&
   add(scene.output.ocio, "`/output/ocio`");
   for (const auto& obstacle : scene.obstacles) add(obstacle, "an obstacle's file");
   add(scene.integrator.lens.image, "`/integrator/image`");
+  add(scene.integrator.paths.paths, "`/integrator/paths`");
+  add(scene.integrator.paths.seeds.file, "`/integrator/seeds/file`");
+  for (const LightSourceDescription& light : scene.lights) add(light.file, "a light's file");
   return files;
+}
+
+/// Outputs that belong to another method are left out, unless nothing is left to write.
+void drop_unmade_outputs(SceneDescription& scene, const SceneSource& source) {
+  OutputDescription& output = scene.output;
+  const auto drop = [&](std::filesystem::path& path, const char* name, const char* what, IntegratorType maker) {
+    if (path.empty() || scene.integrator.type == maker) return;
+    path.clear();
+    const char* type = choice_name(scene.integrator.type);
+    scene.warnings.push_back(fmt::format("`/output/{}` has no effect with {}, which makes no {}", name, type, what));
+    if (output.image.empty() && output.exr.empty() && output.spectral.empty() && output.photons.empty() &&
+        output.paths.empty() && output.tubes.empty())
+      source.fail(fmt::format("`/output/{}` is the only output, and {} makes no {}; name an `image` or an `exr`", name,
+                              type, what));
+  };
+  drop(output.photons, "photons", "photons", IntegratorType::photon_distribution);
+  drop(output.paths, "paths", "paths", IntegratorType::path_tracing);
+  drop(output.tubes, "tubes", "tubes", IntegratorType::path_tracing);
+}
+
+void check_range(const std::optional<Eigen::Vector2d>& range, bool logarithmic, const char* pointer,
+                 const SceneSource& source) {
+  if (!range) return;
+  if (!(range->x() < range->y()))
+    source.fail(fmt::format("`{}` must rise, but is [{:g}, {:g}]", pointer, range->x(), range->y()));
+  if (logarithmic && !(range->x() > 0))
+    source.fail(fmt::format("`{}` is logarithmic and must be above 0, but begins at {:g}", pointer, range->x()));
+}
+
+void check_seeds(const SeedDescription& seeds, const SceneSource& source) {
+  if (seeds.from && seeds.to && *seeds.from == *seeds.to && seeds.count > 1)
+    source.fail(
+        "`/integrator/seeds`: `from` and `to` are one point, where there is room for one seed; set `count` to 1");
+  if (seeds.above && seeds.below && *seeds.above > *seeds.below)
+    source.fail("`/integrator/seeds`: `above` must not exceed `below`");
+}
+
+void check_path_tracing(const SceneDescription& scene, const SceneSource& source) {
+  const PathTracingDescription& paths = scene.integrator.paths;
+  check_seeds(paths.seeds, source);
+  check_range(paths.color.range, paths.color.logarithmic, "/integrator/color/range", source);
+  if (paths.context.slice) check_range(paths.context.slice->range, false, "/integrator/context/slice/range", source);
+  if (paths.radius.min && paths.radius.max && *paths.radius.min > *paths.radius.max)
+    source.fail("`/integrator/radius`: `min` must not exceed `max`");
+  for (std::size_t i = 0; i < scene.lights.size(); ++i)
+    if (scene.lights[i].kind == LightKind::environment && scene.lights[i].file.empty())
+      source.fail(fmt::format("`/lights/{}` is an environment and needs its `file`", i));
+  for (std::size_t i = 0; i < scene.lights.size(); ++i)
+    if (scene.lights[i].kind == LightKind::area && !scene.lights[i].center)
+      source.fail(fmt::format("`/lights/{}` is an area and needs its `center`", i));
+}
+
+/// The names of other programs, and of another method, for what one wants here.
+void warn_of_other_samples(SceneDescription& scene, const Json& json) {
+  if (json["integrator"].contains("samples"))
+    scene.warnings.push_back(
+        "`/integrator/samples` is the lens's and has no effect with path_tracing; `max_samples` has");
+  if (scene.camera.target && !scene.camera.position)
+    scene.warnings.push_back(
+        "`/camera/target` has no effect without `/camera/position`: the camera is then chosen so that everything is "
+        "seen");
 }
 
 void check_output(SceneDescription& scene, const SceneSource& source) {
   OutputDescription& output = scene.output;
-  if (scene.integrator.type == IntegratorType::lens && !output.photons.empty()) {
-    scene.warnings.push_back("`/output/photons` has no effect with the lens, which deposits no photons");
-    output.photons.clear();
-    if (output.image.empty() && output.exr.empty() && output.spectral.empty())
-      source.fail(
-          "`/output/photons` is the only output, and the lens deposits no photons; name an `image` or an `exr`");
-  }
+  drop_unmade_outputs(scene, source);
   std::map<std::filesystem::path, std::string> taken = input_files(scene);
   const auto check = [&](const std::filesystem::path& path, const std::string& pointer) {
     // Devices may take several files, one after the other.
@@ -137,13 +195,22 @@ void check_output(SceneDescription& scene, const SceneSource& source) {
   check(output.exr, "/output/exr");
   check(output.spectral, "/output/spectral");
   check(output.photons, "/output/photons");
-  if (scene.bending.rgb && !output.spectral.empty()) {
+  check(output.paths, "/output/paths");
+  check(output.tubes, "/output/tubes");
+  if (scene.bending.rgb && !output.spectral.empty() && scene.integrator.type != IntegratorType::path_tracing) {
     source.fail("`/output/spectral` needs wavelengths, which `/bending/rgb` has none of; remove one of the two");
   }
 }
 
+constexpr double most_gibibytes = 64;
+
 /// The picture in memory, in double precision.
 void check_memory(const SceneDescription& scene, const SceneSource& source) {
+  if (scene.integrator.type == IntegratorType::path_tracing) {
+    const double bytes = scene.camera.resolution.cast<double>().prod() * (200.0 + 24.0 * scene.integrator.paths.bands);
+    if (bytes > most_gibibytes * (1 << 30))
+      source.fail(fmt::format("`/camera/resolution` needs {:.0f} GiB; ask for fewer pixels", bytes / (1 << 30)));
+  }
   if (!scene.receiver.resolution) return;
   const int channels = scene.bending.rgb ? 3 : scene.light.wavelength_count;
   const double pixels = scene.receiver.resolution->cast<double>().prod();
@@ -154,7 +221,7 @@ void check_memory(const SceneDescription& scene, const SceneSource& source) {
     bytes += pixels * (600 + 2.0 * sizeof(float) * (15 + channels) * static_cast<double>(depth ? depth->size() : 1));
   }
   const double gibibytes = bytes / (1 << 30);
-  if (gibibytes <= 64) return;
+  if (gibibytes <= most_gibibytes) return;
   source.fail(
       fmt::format("`/receiver/resolution` with {} channels of light needs {:.0f} GiB; ask for fewer pixels or a "
                   "lower `/light/wavelengths/count`",
@@ -169,6 +236,7 @@ void check_scene(SceneDescription& scene, const Json& json, const SceneSource& s
   check_image(scene.integrator.lens, source);
   check_normal(scene.receiver.normal, "/receiver", scene.light, source);
   check_normal(scene.integrator.lens.plane.normal, "/integrator/image_plane", scene.light, source);
+  check_path_tracing(scene, source);
   check_memory(scene, source);
   check_output(scene, source);
   warn_of_negative_flexibility(scene);
@@ -177,7 +245,12 @@ void check_scene(SceneDescription& scene, const Json& json, const SceneSource& s
   warn_unused(scene, json, "/bending/a", "/bending/rgb");
   warn_unused(scene, json, "/bending/b", "/bending/rgb");
   warn_unused(scene, json, "/light/wavelengths", "/bending/rgb");
-  warn_unused(scene, json, "/light/spectrum", "/bending/rgb");
+  if (scene.integrator.type == IntegratorType::path_tracing) {
+    warn_unused(scene, json, "/integrator/seeds", "/integrator/paths");
+    warn_of_other_samples(scene, json);
+  } else {
+    warn_unused(scene, json, "/light/spectrum", "/bending/rgb");
+  }
 }
 
 }  // namespace tensorray

@@ -17,6 +17,7 @@
 #include "renderer/beam.h"
 #include "renderer/density.h"
 #include "renderer/texture.h"
+#include "scenes/path_tracing_description.h"
 #include "volumes/eigenvalues.h"
 #include "volumes/generators.h"
 #include "volumes/tensor_files.h"
@@ -72,7 +73,7 @@ struct ReceiverDescription {
   std::optional<Eigen::Vector2i> resolution;  ///< Pixels; none: 512 along the longer side, square pixels.
 };
 
-enum class IntegratorType { photon_distribution, lens };
+enum class IntegratorType { photon_distribution, lens, path_tracing };
 
 /// `integrator.image_plane`: at most one of distance, depth and center.
 struct ImagePlaneDescription {
@@ -101,6 +102,7 @@ struct IntegratorDescription {
   IntegratorType type = IntegratorType::photon_distribution;
   DensitySettings density;
   LensDescription lens;
+  PathTracingDescription paths;
 };
 
 struct OutputDescription {
@@ -108,6 +110,8 @@ struct OutputDescription {
   std::filesystem::path exr;       ///< Scene-linear EXR; empty: none.
   std::filesystem::path spectral;  ///< Spectral EXR; empty: none.
   std::filesystem::path photons;   ///< Photon map (.vdb points or .vtp); empty: none.
+  std::filesystem::path paths;     ///< Bent rays (.vtp or .tck); empty: none.
+  std::filesystem::path tubes;     ///< Bent rays as a mesh (.ply or .obj); empty: none.
   std::optional<double> exposure;  ///< Stops, for `image`; none: "auto".
   bool white_balance = true;       ///< Adapt the light's white to the working space's.
   std::filesystem::path ocio;      ///< OCIO config; empty: $OCIO, or the built-in one.
@@ -124,6 +128,8 @@ struct SceneDescription {
   std::vector<std::filesystem::path> obstacles;
   ReceiverDescription receiver;
   IntegratorDescription integrator;
+  CameraDescription camera;
+  std::vector<LightSourceDescription> lights;  ///< Of path tracing; empty: a white sky and a lamp.
   OutputDescription output;
   std::vector<std::string> warnings;  ///< Things that are allowed but likely a mistake, a line each.
 };

@@ -16,6 +16,7 @@
 #include "renderer/spectrum.h"
 #include "scenes/description.h"
 #include "scenes/load_lens.h"
+#include "scenes/load_paths.h"
 #include "volumes/tensor_field.h"
 
 namespace tensorray {
@@ -27,7 +28,8 @@ struct Scene {
   Geometry geometry;
   Beam beam;
   ColorManagement color;
-  std::optional<LensScene> lens;  ///< If it is what the scene is rendered by.
+  std::optional<LensScene> lens;   ///< If it is what the scene is rendered by.
+  std::optional<PathScene> paths;  ///< The same.
 
   /// What travels: wavelength bands, or in RGB mode the three primaries (wavelength 0), and their flexibilities.
   std::vector<Band> bands;

@@ -3,6 +3,7 @@
 #include <chrono>
 
 #include "scenes/render_lens.h"
+#include "scenes/render_paths.h"
 
 namespace tensorray {
 namespace {
@@ -63,6 +64,8 @@ Render render(const Scene& scene, const Progress& progress) {
       return render_photons(scene, progress);
     case IntegratorType::lens:
       return render_lens(scene, progress);
+    case IntegratorType::path_tracing:
+      return render_paths(scene, progress);
   }
   throw std::logic_error("unknown integrator");
 }

@@ -2,8 +2,12 @@
 /// @file scenes/render.h
 /// Scene → Render: the switch over the methods.
 
+#include <filesystem>
+#include <functional>
 #include <optional>
+#include <vector>
 
+#include "integrators/paths.h"
 #include "integrators/photon_distribution.h"
 #include "integrators/progress.h"
 #include "renderer/image.h"
@@ -18,7 +22,7 @@ struct Statistics {
   std::vector<double>
       channel_power;  ///< Of one ray, by channel, the beam's irradiance being 1; empty if rays carry none.
   std::uint64_t ray_steps = 0, tensor_samples = 0;
-  double seconds_tracing = 0, seconds_density = 0, seconds_color = 0;
+  double seconds_tracing = 0, seconds_density = 0, seconds_drawing = 0, seconds_color = 0;
 };
 
 /// What a method made, ready to be written.
@@ -27,8 +31,12 @@ struct Render {
                  ///< A, multiplied in, and other channels, if the method has them.
   std::optional<SpectralImage> spectral;  ///< If the scene asks for it.
   PhotonMap photons;                      ///< If the scene asks for it.
+  std::vector<Path> paths;                ///< Of path tracing.
   std::optional<double> exposure;         ///< Stops at which it is well shown; none: by its brightness.
   ImageMetadata metadata;                 ///< What the method has to say of the picture, for its header.
+  /// Writes the tubes about `paths`; empty unless the scene asks for them.
+  std::function<void(const std::filesystem::path&, const std::vector<Path>& paths)> write_tubes;
+  std::function<void(Image&)> annotate;  ///< Draws a legend over a scene-linear picture; empty: there is none.
   Statistics statistics;
 };
 

@@ -19,6 +19,7 @@
 #include "scenes/description.h"
 #include "scenes/generate_grid.h"
 #include "scenes/limits.h"
+#include "scenes/path_tracing_keys.h"
 
 namespace tensorray {
 
@@ -144,6 +145,7 @@ void describe(IntegratorDescription& integrator, Visitor& visit) {
   visit("wrap", lens.wrap, "lens: how the image continues beyond its edges (gather)");
   visit("samples", lens.samples, "lens: samples of a pixel along x and along y", between(1, 16));
   visit("overlay", lens.overlay, "lens: grid draws straight and distorted grid lines over the picture");
+  describe(integrator.paths, visit);
 }
 
 template <class Visitor>
@@ -152,6 +154,8 @@ void describe(OutputDescription& output, Visitor& visit) {
   visit("exr", output.exr, "scene-linear picture", endings({".exr"}));
   visit("spectral", output.spectral, "spectral picture, a channel each band", endings({".exr"}));
   visit("photons", output.photons, "the photons, one by one", endings({".vdb", ".vtp"}));
+  visit("paths", output.paths, "the bent rays, with all that is known along them", endings({".vtp", ".tck"}));
+  visit("tubes", output.tubes, "the bent rays as a mesh", endings({".ply", ".obj"}));
   visit("exposure", output.exposure, "stops, for `image`", between(-100, 100).or_word("auto"));
   visit("white_balance", output.white_balance, "adapt the light's white to the working space's");
   visit("ocio", output.ocio, "OpenColorIO config; without it $OCIO, or the built-in one");
@@ -183,6 +187,9 @@ void describe(SceneDescription& scene, Visitor& visit) {
              [](std::filesystem::path& file) { return ObstacleKeys{file}; });
   visit.section("receiver", scene.receiver, "the plate that collects light");
   visit.section("integrator", scene.integrator, "the method");
+  visit.section("camera", scene.camera, "path_tracing: from where the picture is taken");
+  visit.list("lights", scene.lights, "path_tracing: what lights the paths; default: a white sky and a lamp",
+             [](LightSourceDescription& item) -> LightSourceDescription& { return item; });
   visit.section("output", scene.output, "files to write; default: the scene file's name with .png and .exr");
 }
 

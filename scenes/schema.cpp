@@ -178,7 +178,7 @@ class SchemaWriter {
   template <class T, class KeysOf>
   void list(const char* key, std::vector<T>&, const char* meaning, KeysOf keys_of) {
     T item;
-    auto keys = keys_of(item);
+    auto&& keys = keys_of(item);
     SchemaWriter inner;
     describe(keys, inner);
     properties_[key] = {{"description", meaning}, {"type", "array"}, {"items", inner.finish("")}};

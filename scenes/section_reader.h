@@ -55,7 +55,7 @@ class SectionReader {
     items.resize(value->size());
     SectionReader elements(*value, pointer_to(key), source_);
     for (std::size_t i = 0; i < items.size(); ++i) {
-      auto keys = keys_of(items[i]);
+      auto&& keys = keys_of(items[i]);
       elements.read_item((*value)[i], std::to_string(i), keys);
     }
   }

@@ -5,6 +5,7 @@
 
 #include <fmt/format.h>
 
+#include "integrators/path_files.h"
 #include "renderer/image.h"
 #include "volumes/point_files.h"
 
@@ -43,6 +44,7 @@ Image display_image(const Scene& scene, const Render& render) {
     for (int c = 0; c < 3; ++c) out[c] = gain * in[c] / alpha;
     if (has_alpha) out[3] = in[3];
   }
+  if (render.annotate) render.annotate(image);
   scene.color.to_display(image);
   return image;
 }
@@ -90,6 +92,8 @@ OutputFiles open_outputs(const OutputDescription& output) {
   if (!output.exr.empty()) files.exr.emplace(output.exr);
   if (!output.spectral.empty()) files.spectral.emplace(output.spectral);
   if (!output.photons.empty()) files.photons.emplace(output.photons);
+  if (!output.paths.empty()) files.paths.emplace(output.paths);
+  if (!output.tubes.empty()) files.tubes.emplace(output.tubes);
   return files;
 }
 
@@ -108,10 +112,14 @@ std::vector<std::filesystem::path> write_outputs(const Render& render, const Sce
   if (files.photons)
     files.photons->write(
         [&](const std::filesystem::path& path) { write_points(path, point_cloud(render.photons, metadata)); });
+  if (files.paths) files.paths->write([&](const std::filesystem::path& path) { write_paths(path, render.paths); });
+  if (files.tubes)
+    files.tubes->write([&](const std::filesystem::path& path) { render.write_tubes(path, render.paths); });
 
   std::vector<OutputFile> complete;
   std::vector<std::filesystem::path> written;
-  for (std::optional<OutputFile>* file : {&files.image, &files.exr, &files.spectral, &files.photons}) {
+  for (std::optional<OutputFile>* file :
+       {&files.image, &files.exr, &files.spectral, &files.photons, &files.paths, &files.tubes}) {
     if (!*file) continue;
     written.push_back((*file)->target());
     complete.push_back(std::move(**file));

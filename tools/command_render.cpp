@@ -33,11 +33,13 @@ bool ends_with(const std::string& text, const std::string& ending) {
   return text.size() >= ending.size() && text.compare(text.size() - ending.size(), ending.size(), ending) == 0;
 }
 
-/// The key under `output` that a file's ending belongs to.
-std::string output_key(const std::string& file) {
+/// The key under `output` that a file's ending belongs to. @param draws_paths  Whether the scene is path tracing.
+std::string output_key(const std::string& file, bool draws_paths) {
   if (ends_with(file, ".spectral.exr")) return "spectral";
   if (ends_with(file, ".exr")) return "exr";
-  if (ends_with(file, ".vdb") || ends_with(file, ".vtp")) return "photons";
+  if (ends_with(file, ".vdb") || (ends_with(file, ".vtp") && !draws_paths)) return "photons";
+  if (ends_with(file, ".vtp") || ends_with(file, ".tck")) return "paths";
+  if (ends_with(file, ".ply") || ends_with(file, ".obj")) return "tubes";
   return "image";
 }
 
@@ -45,18 +47,19 @@ std::string output_key(const std::string& file) {
 /// @throw CLI::ValidationError if two are of one kind.
 std::vector<std::string> overrides_of(const RenderOptions& options) {
   std::vector<std::string> overrides = options.overrides;
-  if (!options.outputs.empty())
-    for (const char* key : {"image", "exr", "spectral", "photons"})
-      overrides.push_back(fmt::format("output.{}=null", key));
+  if (options.seed) overrides.push_back(fmt::format("seed={}", *options.seed));
+  if (options.outputs.empty()) return overrides;
+  for (const char* key : {"image", "exr", "spectral", "photons", "paths", "tubes"})
+    overrides.push_back(fmt::format("output.{}=null", key));
+  const bool draws_paths = read_scene(options.scene, overrides).integrator.type == IntegratorType::path_tracing;
   std::map<std::string, std::string> files;
   for (const std::string& file : options.outputs) {
-    const auto [other, is_new] = files.emplace(output_key(file), file);
+    const auto [other, is_new] = files.emplace(output_key(file, draws_paths), file);
     if (!is_new)
       throw CLI::ValidationError("-o", fmt::format("{} and {} are of one kind; give one of them", other->second, file));
     overrides.push_back(
         fmt::format("output.{}={}", other->first, nlohmann::json(std::filesystem::absolute(file).string()).dump()));
   }
-  if (options.seed) overrides.push_back(fmt::format("seed={}", *options.seed));
   return overrides;
 }
 
@@ -66,7 +69,8 @@ void check_statistics_path(const std::filesystem::path& path, const SceneDescrip
     return std::filesystem::weakly_canonical(std::filesystem::absolute(file));
   };
   const OutputDescription& output = scene.output;
-  for (const auto& other : {scene.path, scene.field.file, output.image, output.exr, output.spectral, output.photons})
+  for (const auto& other : {scene.path, scene.field.file, output.image, output.exr, output.spectral, output.photons,
+                            output.paths, output.tubes})
     if (!other.empty() && identity(other) == identity(path) && !std::filesystem::is_other(path))
       throw CLI::ValidationError("--stats", path.string() + " is another file of this render; choose another name");
 }
@@ -80,7 +84,7 @@ std::vector<std::string> warnings_of(const Scene& scene, const Statistics& stati
     limited += counts[static_cast<int>(RayEnd::step_limit)];
   }
   std::vector<std::string> warnings;
-  if (deposited == 0)
+  if (deposited == 0 && !scene.paths)
     warnings.push_back(scene.lens ? "warning: no ray found the image; look at `receiver` and `integrator.image_plane`"
                                   : "warning: no light reached the plate; look at `receiver` and `light`");
   if (100 * limited > emitted)
@@ -142,7 +146,8 @@ void add_render_command(CLI::App& app, Progress& progress) {
   command->add_option(
       "-o,--output", options->outputs,
       "Write this instead of the scene's outputs; one of each kind may be given. The ending says the kind: "
-      ".png .jpg .tif the displayed picture, .exr scene-linear, .spectral.exr spectra, .vdb .vtp photons");
+      ".png .jpg .tif the displayed picture, .exr scene-linear, .spectral.exr spectra, .vdb .vtp photons, of path "
+      "tracing .vtp .tck paths, .ply .obj tubes");
   command
       ->add_option(
           "--set", options->overrides,

@@ -46,7 +46,7 @@ std::string statistics_json(const Scene& scene, const Statistics& statistics, do
     channels.back()["rays"] = balance(statistics.ends[channel]);
   }
   const double seconds = scene.seconds + statistics.seconds_tracing + statistics.seconds_density +
-                         statistics.seconds_color + seconds_writing;
+                         statistics.seconds_drawing + statistics.seconds_color + seconds_writing;
   Json json = {{"version", TENSORRAY_VERSION},
                {"scene", scene.description.path.string()},
                {"seed", scene.description.seed},
@@ -64,6 +64,7 @@ std::string statistics_json(const Scene& scene, const Statistics& statistics, do
                 {{"load", scene.seconds},
                  {"trace", statistics.seconds_tracing},
                  {"density", statistics.seconds_density},
+                 {"draw", statistics.seconds_drawing},
                  {"color", statistics.seconds_color},
                  {"write", seconds_writing},
                  {"total", seconds}}},

@@ -235,7 +235,7 @@ TEST_F(Lens, PhotonsAloneAreNoOutputOfALens) {
   write("scene.json", small_lens(R"("image": "grid")"));
   const Outcome outcome = run({"render", "scene.json", "-q", "-o", "out.vdb"});
   EXPECT_EQ(outcome.status, 2);
-  EXPECT_NE(outcome.error.find("deposits no photons"), std::string::npos) << outcome.error;
+  EXPECT_NE(outcome.error.find("makes no photons"), std::string::npos) << outcome.error;
 }
 
 TEST_F(Lens, ImagesThatCannotBeReadAreNamed) {

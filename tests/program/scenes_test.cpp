@@ -24,7 +24,8 @@ TEST_F(Program, EveryExampleSceneRendersAndBendsLight) {
   EXPECT_GE(scenes.size(), 9u);
   for (const auto& scene : scenes) {
     const Outcome outcome = run_well({"render", scene.string(), "-o", "out.exr", "--set", "light.photons=4000", "--set",
-                                      "receiver.resolution=[64,64]", "--set", "light.wavelengths.count=8"});
+                                      "receiver.resolution=[64,64]", "--set", "light.wavelengths.count=8", "--set",
+                                      "camera.resolution=[64,64]", "--set", "integrator.max_samples=4"});
     // "auto" found a scale at which the median ray turns as far as it should.
     EXPECT_NE(outcome.error.find("turns by 0.150 rad"), std::string::npos) << scene << "\n" << outcome.error;
     const Image image = read_image(in_folder("out.exr"));

@@ -231,7 +231,8 @@ TEST_F(ReadScene, UnknownKeysAreRefusedWithTheNearest) {
   EXPECT_THAT(error({"light.photon=1"}), HasSubstr("`/light/photon`; did you mean `photons`?"));
   EXPECT_THAT(error({"light.wavelengths.cuont=1"}), HasSubstr("`/light/wavelengths/cuont`; did you mean `count`?"));
   EXPECT_THAT(error({"obstacles.0.fiel=a"}), HasSubstr("`/obstacles/0/fiel`; did you mean `file`?"));
-  EXPECT_THAT(error({"camera={}"}), HasSubstr("unknown key `/camera`; known here are `$schema`, `bending`, `field`"));
+  EXPECT_THAT(error({"weather={}"}),
+              HasSubstr("unknown key `/weather`; known here are `$schema`, `bending`, `camera`"));
   EXPECT_THAT(error({"a/b~c=1"}), HasSubstr("`/a~1b~0c`"));
   EXPECT_THAT(error({std::string(5000, 'x') + "=1"}), HasSubstr("known here"));
   EXPECT_THAT(error({"field.file=null", "field.generate={\"kind\":\"helix\",\"lod\":1}"}),
@@ -246,7 +247,7 @@ TEST_F(ReadScene, WrongTypesSayWhatIsExpectedAndFound) {
   EXPECT_THAT(error({"bending.method=rk5"}),
               HasSubstr("must be one of \"euler\", \"splitting\", \"rk4\", \"bs23\", \"dopri5\", but is \"rk5\""));
   EXPECT_THAT(error({"integrator.type=lenses"}),
-              HasSubstr("must be one of \"photon_distribution\", \"lens\", but is \"lenses\""));
+              HasSubstr("must be one of \"photon_distribution\", \"lens\", \"path_tracing\", but is \"lenses\""));
   EXPECT_THAT(error({"light=[]"}), HasSubstr("`/light` must be an object"));
   EXPECT_THAT(error({"obstacles={}"}), HasSubstr("`/obstacles` must be a list of objects"));
   EXPECT_THAT(error({"obstacles=[1]"}), HasSubstr("`/obstacles/0` must be an object"));

@@ -1,0 +1,172 @@
+#include "scenes/load_paths.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include <Eigen/LU>
+#include <fmt/format.h>
+
+#include "integrators/path_files.h"
+#include "integrators/seed_files.h"
+#include "integrators/seeds.h"
+#include "integrators/threshold_seeds.h"
+#include "renderer/image.h"
+#include "scenes/read_scene.h"
+#include "volumes/invariants.h"
+
+namespace tensorray {
+namespace {
+
+constexpr double shown_min = 380, shown_max = 730;  // nm, of the light that shows the paths.
+constexpr double reference_wavelength = 550;        // nm: unless paths are to show their wavelength, they are of this.
+constexpr std::size_t most_paths = 2'000'000;       // Some kilobytes each.
+constexpr double pi = 3.14159265358979323846;
+
+/// Unlike the light that is bent, what shows the paths is always white.
+ShownLight shown_light(const ColorManagement& color, const Spectrum& light, int count) {
+  std::vector<Band> bands = make_bands(light, shown_min, shown_max, count);
+  Eigen::Vector3d white = Eigen::Vector3d::Zero();
+  for (const Band& band : bands) white += band.xyz;
+  const Eigen::Matrix3d matrix = color.xyz_to_working_adapted(white);
+  ReflectanceModel model(bands, matrix);
+  return {std::move(bands), matrix, color.xyz_to_working() * rec709_to_xyz(), std::move(model)};
+}
+
+Eigen::AlignedBox3d world_box(const TensorField& field) {
+  Eigen::AlignedBox3d box;
+  for (const Eigen::Vector3d& corner : field.corners()) box.extend(corner);
+  return box;
+}
+
+std::vector<Eigen::Vector3d> line_positions(const SeedDescription& seeds, const Eigen::AlignedBox3d& box,
+                                            const Beam& beam) {
+  const double half = 0.45 * box.sizes().dot(beam.right.cwiseAbs());
+  return line_seeds(seeds.from.value_or(box.center() - half * beam.right),
+                    seeds.to.value_or(box.center() + half * beam.right), seeds.count);
+}
+
+/// @param scale  Of the field, which the scene's thresholds do not know.
+std::vector<Eigen::Vector3d> threshold_positions(const SeedDescription& seeds, const TensorField& field, double scale,
+                                                 std::uint64_t seed) {
+  if (!seeds.above && !seeds.below) throw std::invalid_argument("the kind \"threshold\" needs `above` or `below`");
+  Threshold threshold;
+  threshold.value = [which = seeds.invariant, scale](const Eigen::Matrix3d& tensor) {
+    return invariant(which, tensor / scale);
+  };
+  if (seeds.above) threshold.least = *seeds.above;
+  if (seeds.below) threshold.greatest = *seeds.below;
+  try {
+    return threshold_seeds(field, world_box(field), threshold, seeds.count, seed);
+  } catch (const std::runtime_error& error) {
+    throw std::invalid_argument(error.what());
+  }
+}
+
+SeedList seed_list(const SceneDescription& description, const TensorField& field, double scale, const Beam& beam) {
+  const SeedDescription& seeds = description.integrator.paths.seeds;
+  const Eigen::AlignedBox3d box = world_box(field);
+  switch (seeds.kind) {
+    case SeedKind::grid:
+      return {grid_seeds(beam, seeds.count), {}};
+    case SeedKind::poisson_disk:
+      return {poisson_disk_seeds(beam, seeds.count, description.seed), {}};
+    case SeedKind::line:
+      return {line_positions(seeds, box, beam), {}};
+    case SeedKind::sphere:
+      return {sphere_seeds(seeds.center.value_or(box.center()), seeds.radius.value_or(box.sizes().minCoeff() / 4),
+                           seeds.count, description.seed),
+              {}};
+    case SeedKind::threshold:
+      return {threshold_positions(seeds, field, scale, description.seed), {}};
+    case SeedKind::file:
+      if (seeds.file.empty())
+        throw std::invalid_argument("the kind \"file\" needs `file`, a text file with x y z in each line");
+      return read_seeds(seeds.file);
+  }
+  throw std::logic_error("unknown kind of seeds");
+}
+
+/// The flexibilities that are followed from every seed: all, where the paths' colour is their wavelength. The three of
+/// RGB mode get the wavelengths for which the paper has them.
+std::vector<LightChannel> followed(std::vector<LightChannel> channels, bool rgb, PathColor by) {
+  if (rgb)
+    for (std::size_t i = 0; i < 3; ++i) channels[i].wavelength = 650 - 100 * static_cast<double>(i);
+  if (by == PathColor::wavelength) return channels;
+  return {*std::min_element(channels.begin(), channels.end(), [](const LightChannel& a, const LightChannel& b) {
+    return std::abs(a.wavelength - reference_wavelength) < std::abs(b.wavelength - reference_wavelength);
+  })};
+}
+
+std::vector<PathSeed> seeds_of(const SeedList& list, const std::vector<LightChannel>& channels, const Beam& beam) {
+  const std::size_t count = list.positions.size() * channels.size();
+  if (count > most_paths)
+    throw std::invalid_argument(fmt::format("{} seeds with {} wavelengths are more than {} paths; ask for fewer",
+                                            list.positions.size(), channels.size(), most_paths));
+  std::vector<PathSeed> seeds;
+  for (std::size_t i = 0; i < list.positions.size(); ++i)
+    for (const LightChannel& channel : channels)
+      seeds.push_back({list.positions[i], list.directions.empty() ? beam.direction : list.directions[i],
+                       channel.flexibility, channel.wavelength});
+  return seeds;
+}
+
+/// The picture's primaries as spectra, so that every colour of it is right: spectra and colours add alike.
+EnvironmentLight load_environment(const LightSourceDescription& description, const ColorManagement& color,
+                                  const ShownLight& light) {
+  EnvironmentLight environment;
+  Image picture = read_image(description.file);
+  if (picture.channels.size() < 3)
+    throw std::runtime_error(description.file.string() + ": an environment needs the channels R, G, B");
+  const bool is_float = description.file.extension() == ".exr" || description.file.extension() == ".hdr";
+  const ColorConversion convert = color.to_working(color.texture_space(description.file, !is_float, ""));
+  Image rgb(picture.width, picture.height, {"R", "G", "B"});
+  const std::size_t channels = picture.channels.size();
+  for (std::size_t i = 0; i < picture.pixels.size() / channels; ++i) {
+    float rgba[4] = {picture.pixels[i * channels], picture.pixels[i * channels + 1], picture.pixels[i * channels + 2],
+                     1};
+    if (convert) convert(rgba, 1);
+    std::copy_n(rgba, 3, &rgb.pixels[3 * i]);
+  }
+  environment.picture = std::move(rgb);
+  environment.channel_spectra.resize(static_cast<Eigen::Index>(light.bands.size()), 3);
+  for (int c = 0; c < 3; ++c) {
+    const ReflectanceSpectrum spectrum = light.model.spectrum(Eigen::Vector3d::Unit(c));
+    const double factor = description.strength * (light.rec709_to_working * description.color)[c];
+    for (std::size_t band = 0; band < light.bands.size(); ++band)
+      environment.channel_spectra(static_cast<Eigen::Index>(band), c) =
+          static_cast<float>(factor * spectrum.at(light.bands[band].wavelength));
+  }
+  environment.to_world = Eigen::AngleAxisd(description.rotation * pi / 180, Eigen::Vector3d::UnitZ()).matrix();
+  return environment;
+}
+
+}  // namespace
+
+std::vector<float> ShownLight::radiance(const Eigen::Vector3d& rec709, double factor) const {
+  const ReflectanceSpectrum spectrum = model.spectrum(rec709_to_working * rec709);
+  std::vector<float> values;
+  for (const Band& band : bands) values.push_back(static_cast<float>(factor * spectrum.at(band.wavelength)));
+  return values;
+}
+
+PathScene load_paths(const SceneDescription& description, const TensorField& field, double scale,
+                     const ColorManagement& color, const Spectrum& light, const std::vector<LightChannel>& channels,
+                     const Beam& beam) {
+  const PathTracingDescription& settings = description.integrator.paths;
+  PathScene scene{{}, {}, shown_light(color, light, settings.bands), {}};
+  if (!settings.paths.empty()) {
+    scene.paths = read_paths(settings.paths);
+  } else {
+    try {
+      scene.seeds = seeds_of(seed_list(description, field, scale, beam),
+                             followed(channels, description.bending.rgb.has_value(), settings.color.by), beam);
+    } catch (const std::invalid_argument& error) {
+      throw SceneError(fmt::format("{}: `/integrator/seeds`: {}", description.path.string(), error.what()));
+    }
+  }
+  for (const LightSourceDescription& each : description.lights)
+    if (each.kind == LightKind::environment) scene.environments.push_back(load_environment(each, color, scene.light));
+  return scene;
+}
+
+}  // namespace tensorray

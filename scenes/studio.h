@@ -1,0 +1,24 @@
+#pragma once
+/// @file scenes/studio.h
+/// Camera and lights of a picture of paths, where the scene gives them and where it does not.
+
+#include <vector>
+
+#include <Eigen/Geometry>
+
+#include "renderer/camera.h"
+#include "renderer/lights.h"
+#include "scenes/description.h"
+#include "scenes/load_paths.h"
+
+namespace tensorray {
+
+/// The scene's camera; without a position, one that sees all of `points`.
+/// @param margin  Part of the picture that it then leaves free on each side.
+/// @throw std::invalid_argument naming what does not go together.
+Camera make_camera(const CameraDescription& description, const std::vector<Eigen::Vector3d>& points, double margin);
+
+/// The scene's lights; without any, a white sky, brighter above, and a lamp at the viewer's upper left.
+std::vector<Light> make_lights(const SceneDescription& description, const PathScene& paths, const Camera& camera);
+
+}  // namespace tensorray
