@@ -16,8 +16,8 @@
 namespace tensorray {
 namespace {
 
-constexpr double plain_margin = 0.04, legend_margin = 0.16;  // Of a chosen camera: a legend stands at the right edge.
-constexpr float nothing_depth = 1e10f;                       // Where nothing is: behind everything.
+constexpr double legend_width = 0.16;   // Of a picture's width; a chosen camera leaves it free.
+constexpr float nothing_depth = 1e10f;  // Where nothing is: behind everything.
 constexpr double tube_tolerance = 0.2;  // Pixels: how far a tube's triangles may be off its surface.
 
 std::vector<Path> trace_scene(const Scene& scene, const Progress& progress) {
@@ -87,9 +87,9 @@ PathShapes make_shapes(const Scene& scene, const std::vector<Path>& paths, const
   return shapes;
 }
 
-Camera scene_camera(const Scene& scene, const std::vector<Path>& paths, double margin) {
+Camera scene_camera(const Scene& scene, const std::vector<Path>& paths, double free) {
   try {
-    return make_camera(scene.description.camera, points_of_interest(scene, paths), margin);
+    return make_camera(scene.description.camera, points_of_interest(scene, paths), free);
   } catch (const std::invalid_argument& error) {
     throw SceneError(fmt::format("{}: `/camera`: {}", scene.description.path.string(), error.what()));
   }
@@ -184,7 +184,7 @@ Render render_paths(const Scene& scene, const Progress& progress) {
   const auto drawing = Clock::now();
   const PathColors colors = path_colors(description.color, result.paths);
   const bool has_legend = description.color.legend && colors.legend;
-  const Camera camera = scene_camera(scene, result.paths, has_legend ? legend_margin : plain_margin);
+  const Camera camera = scene_camera(scene, result.paths, has_legend ? legend_width : 0);
   PathShapes shapes = make_shapes(scene, result.paths, colors, camera);
   std::vector<Material> materials{load_material(description.material, light)};
   std::vector<ShadedSurface> surfaces{std::move(shapes.surface)};

@@ -1,5 +1,7 @@
 #include "scenes/studio.h"
 
+#include <cmath>
+
 #include "renderer/plate.h"
 
 namespace tensorray {
@@ -16,15 +18,20 @@ Camera with_lens(Camera camera, const CameraDescription& description) {
   return camera;
 }
 
-Camera chosen_camera(const CameraDescription& description, const std::vector<Eigen::Vector3d>& points, double margin) {
+/// Frames the points in the left part of the picture: for a narrower one first, which is then moved along its plane.
+Camera chosen_camera(const CameraDescription& description, const std::vector<Eigen::Vector3d>& points, double free) {
+  const double free_pixels = std::floor(free * description.resolution.x());
   Framing framing;
-  framing.margin = margin;
   framing.projection = description.projection;
   if (description.direction) framing.direction = *description.direction;
   if (description.up) framing.up = *description.up;
   framing.angle = description.angle;
-  framing.resolution = description.resolution;
-  return frame_points(points, framing);
+  framing.resolution = description.resolution - Eigen::Vector2i(static_cast<int>(free_pixels), 0);
+  Camera camera = frame_points(points, framing);
+  camera.resolution = description.resolution;
+  const double pixel = pixel_size(camera, camera.position + camera.focus_distance * camera.forward);
+  camera.position += free_pixels / 2 * pixel * camera.right;
+  return camera;
 }
 
 /// The middle and the half size of what there is.
@@ -56,8 +63,8 @@ Light make_light(const LightSourceDescription& light, const ShownLight& shown) {
 
 }  // namespace
 
-Camera make_camera(const CameraDescription& description, const std::vector<Eigen::Vector3d>& points, double margin) {
-  if (!description.position) return with_lens(chosen_camera(description, points, margin), description);
+Camera make_camera(const CameraDescription& description, const std::vector<Eigen::Vector3d>& points, double free) {
+  if (!description.position) return with_lens(chosen_camera(description, points, free), description);
   const Eigen::AlignedBox3d box = box_of(points);
   const Eigen::Vector3d target = description.target.value_or(box.center());
   const Eigen::Vector3d up = description.up.value_or(Eigen::Vector3d::UnitZ());

@@ -14,9 +14,9 @@
 namespace tensorray {
 
 /// The scene's camera; without a position, one that sees all of `points`.
-/// @param margin  Part of the picture that it then leaves free on each side.
+/// @param free  Part of the picture's width that it then leaves free at the right.
 /// @throw std::invalid_argument naming what does not go together.
-Camera make_camera(const CameraDescription& description, const std::vector<Eigen::Vector3d>& points, double margin);
+Camera make_camera(const CameraDescription& description, const std::vector<Eigen::Vector3d>& points, double free);
 
 /// The scene's lights; without any, a white sky, brighter above, and a lamp at the viewer's upper left.
 std::vector<Light> make_lights(const SceneDescription& description, const PathScene& paths, const Camera& camera);
