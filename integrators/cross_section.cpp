@@ -126,10 +126,10 @@ std::vector<CrossSection> cross_sections(const Way& way, const CrossSectionSetti
   return sections;
 }
 
-double scale_for_radius(const std::vector<Way>& ways, double radius) {
+double scale_for_radius(const std::vector<const Way*>& ways, double radius) {
   std::vector<double> lengths;
-  for (const Way& way : ways)
-    for (const Waypoint& point : way) {
+  for (const Way* way : ways)
+    for (const Waypoint& point : *way) {
       if (!point.in_field) continue;
       const Basis axes = ellipse(point.tensor, point.direction);
       for (int i = 0; i < 2; ++i)

@@ -47,6 +47,6 @@ Eigen::Vector3d transported(const Eigen::Vector3d& normal, const Eigen::Vector3d
 std::vector<CrossSection> cross_sections(const Way& way, const CrossSectionSettings& settings);
 
 /// The scale at which the median of all semi-axes of `ways` in the field is `radius`; 1 where there is none.
-double scale_for_radius(const std::vector<Way>& ways, double radius);
+double scale_for_radius(const std::vector<const Way*>& ways, double radius);
 
 }  // namespace tensorray

@@ -111,12 +111,14 @@ std::uint32_t range_of(const std::vector<std::uint32_t>& ends, std::uint32_t ind
   return static_cast<std::uint32_t>(std::upper_bound(ends.begin(), ends.end(), index) - ends.begin());
 }
 
-/// Above the planes that the normals at the corners make, where the smooth surface is.
+/// Above the planes that the normals at the corners make, where the smooth surface is. @param outwards  The triangle's
+/// normal on this side.
 Vector3d lifted(const std::vector<Vector3d>& vertices, const std::vector<Vector3f>& normals, const Corners& corners,
-                const Vector3d& position, double side) {
+                const Vector3d& position, const Vector3d& outwards, double side) {
   Vector3d result = position;
   for (int i = 0; i < 3; ++i) {
-    const Vector3d normal = side * normals[corners.point[i]].cast<double>().normalized();
+    Vector3d normal = side * normals[corners.point[i]].cast<double>().normalized();
+    if (normal.dot(outwards) < 0) normal = -normal;  // Of a poor mesh.
     const double below = std::min(0.0, (position - vertices[corners.point[i]]).dot(normal));
     result -= corners.weight[i] * below * normal;
   }
@@ -279,7 +281,7 @@ void SurfaceScene::State::complete(const TriangleMesh& mesh, const Vector3d& dir
   if (!(smooth.squaredNorm() > 0)) return;
   hit.shading_normal = smooth.dot(hit.normal) < 0 ? Vector3d(-smooth.normalized()) : smooth.normalized();
   const double side = hit.normal.dot(direction) > 0 ? -1 : 1;
-  hit.lifted_position = lifted(mesh.vertices, normals, corner, hit.position, side);
+  hit.lifted_position = lifted(mesh.vertices, normals, corner, hit.position, side * hit.normal, side);
 }
 
 /// The normal is turned as the smooth axis is against the segment's.

@@ -53,7 +53,8 @@ TubePoint between(const TubePoint& a, const TubePoint& b, double t) {
   const auto mixed = [&](const Eigen::Vector3d& u, const Eigen::Vector3d& v) -> Eigen::Vector3d {
     return part * ((1 - t) * u + t * (turn.conjugate() * v));
   };
-  return {a.center + t * chord + bulge, mixed(a.x, b.x), mixed(a.y, b.y), (1 - t) * a.value + t * b.value};
+  return {a.center + t * chord + bulge, mixed(a.x, b.x), mixed(a.y, b.y), (1 - t) * a.value + t * b.value,
+          (1 - t) * a.shade + t * b.shade};
 }
 
 /// How far the straight surface between two rings is off the tube.
@@ -63,7 +64,7 @@ double deviation(const TubePoint& a, const TubePoint& b) {
 }
 
 /// Leaves out the rings that others imply, to half the tolerance, and adds those that curvature asks for.
-Tube adapted(const Tube& tube, double tolerance, double value_tolerance) {
+Tube adapted(const Tube& tube, double tolerance, double value_tolerance, double shade_tolerance) {
   const auto error = [&](std::size_t i, std::size_t j, std::size_t k) {
     const TubePoint &a = tube[i], &b = tube[j], &point = tube[k];
     const Eigen::Vector3d chord = b.center - a.center;
@@ -73,8 +74,12 @@ Tube adapted(const Tube& tube, double tolerance, double value_tolerance) {
       return ((a.*member) + t * ((b.*member) - (a.*member)) - (point.*member)).norm();
     };
     const double apart = unlike(&TubePoint::center) + std::max(unlike(&TubePoint::x), unlike(&TubePoint::y));
-    const double off = std::abs(a.value + t * (b.value - a.value) - point.value);
-    return std::max(apart / (tolerance / 2), off > 0 ? off / value_tolerance : 0);
+    const auto off = [&](auto member, double allowed) {
+      const double difference = std::abs(a.*member + t * (b.*member - a.*member) - point.*member);
+      return difference > 0 ? difference / allowed : 0;
+    };
+    return std::max(
+        {apart / (tolerance / 2), off(&TubePoint::value, value_tolerance), off(&TubePoint::shade, shade_tolerance)});
   };
   Tube result;
   for (const std::size_t i : thinned(tube.size(), error)) {
@@ -216,7 +221,7 @@ void add_solid(const Tube& tube, int segments, TubeCaps caps, TubeMesh& mesh) {
 /// Settings with nothing left to choose.
 struct Job {
   TubeSettings settings;
-  double value_tolerance;
+  double value_tolerance, shade_tolerance;
 };
 
 /// A round wire along the ellipse of `point`.
@@ -260,7 +265,7 @@ TubeMesh make_tube(const Job& job, const Tube& tube) {
   if (tube.size() >= 2 && settings.style == TubeStyle::discs) {
     for (const TubePoint& point : spaced(tube, settings.spacing)) add_disc(job, point, mesh);
   } else if (tube.size() >= 2) {
-    const Tube rings = adapted(tube, settings.tolerance, job.value_tolerance);
+    const Tube rings = adapted(tube, settings.tolerance, job.value_tolerance, job.shade_tolerance);
     if (settings.style == TubeStyle::wire) {
       for (const TubePoint& point : spaced(tube, settings.spacing)) add_hoop(job, point, mesh);
       for (int j = 0; j < settings.lines; ++j) add_line(job, rings, 2 * pi * j / settings.lines, mesh);
@@ -311,12 +316,12 @@ TubeMesh joined(std::vector<TubeMesh>& parts) {
   return whole;
 }
 
-double value_range(const std::vector<Tube>& tubes) {
+double range_of(const std::vector<Tube>& tubes, double TubePoint::*member) {
   double least = std::numeric_limits<double>::infinity(), greatest = -least;
   for (const Tube& tube : tubes)
     for (const TubePoint& point : tube) {
-      least = std::min(least, point.value);
-      greatest = std::max(greatest, point.value);
+      least = std::min(least, point.*member);
+      greatest = std::max(greatest, point.*member);
     }
   return std::max(0.0, greatest - least);
 }
@@ -355,7 +360,7 @@ Job make_job(const std::vector<Tube>& tubes, TubeSettings settings) {
   choose(settings.wire_radius, 1.0 / 20);
   choose(settings.thickness, 1.0 / 10);
   require_few_ellipses(tubes, settings);
-  return {settings, value_range(tubes) / value_steps};
+  return {settings, range_of(tubes, &TubePoint::value) / value_steps, range_of(tubes, &TubePoint::shade) / value_steps};
 }
 
 }  // namespace

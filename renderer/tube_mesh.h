@@ -18,6 +18,7 @@ struct TubePoint {
   /// of equal θ are joined.
   Eigen::Vector3d x = Eigen::Vector3d::Zero(), y = Eigen::Vector3d::Zero();
   double value = 0;  ///< Interpolated; a colour is made of it, say.
+  double shade = 0;  ///< Where it is not linear along the tube there are rings for it, as for the value; not kept.
 };
 
 /// Two points or more; an empty one, or of a single point, makes no triangles.

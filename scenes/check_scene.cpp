@@ -157,6 +157,8 @@ void check_seeds(const SeedDescription& seeds, const SceneSource& source) {
 void check_path_tracing(const SceneDescription& scene, const SceneSource& source) {
   const PathTracingDescription& paths = scene.integrator.paths;
   check_seeds(paths.seeds, source);
+  if (scene.integrator.type == IntegratorType::path_tracing && scene.bending.settings.max_steps > 1'000'000)
+    source.fail("`/bending/max_steps` must be at most 1e6 with path_tracing, which keeps every step of a path");
   check_range(paths.color.range, paths.color.logarithmic, "/integrator/color/range", source);
   if (paths.context.slice) check_range(paths.context.slice->range, false, "/integrator/context/slice/range", source);
   if (paths.radius.min && paths.radius.max && *paths.radius.min > *paths.radius.max)

@@ -68,15 +68,7 @@ void add_lattice(int columns, int rows, const Keeps& keeps, TriangleMesh& mesh) 
 
 /// The plate with the photons' light on it: a vertex in the middle of each pixel.
 ShadedSurface lit_plate(const Scene& scene, const Progress& progress) {
-  const SceneDescription& description = scene.description;
-  PhotonSettings settings;
-  settings.photons = description.light.photons;
-  settings.pattern = description.light.pattern;
-  settings.channels_per_photon = description.bending.rgb ? 0 : description.light.wavelengths_per_photon;
-  settings.seed = description.seed;
-  settings.density = description.integrator.density;
-  const PhotonDistribution light = distribute_photons(scene.field, scene.geometry, scene.beam, scene.channels,
-                                                      description.bending.settings, settings, progress);
+  const PhotonDistribution light = distribute_photons(scene, progress);
   const Image image = linear_image(light.irradiance, scene.bands, to_working(scene));
   std::vector<float> greatest;
   for (std::size_t i = 0; i < image.pixels.size(); i += 3)
@@ -121,7 +113,7 @@ ShadedSurface make_slice(const Scene& scene, const SliceDescription& slice) {
   Eigen::AlignedBox2d area;
   for (const Eigen::Vector3d& point : cut_points(scene.field, center, normal))
     area.extend(Eigen::Vector2d((point - center).dot(right), (point - center).dot(up)));
-  if (area.isEmpty())
+  if (area.isEmpty() || !(area.sizes().minCoeff() > 0))
     throw SceneError(scene.description.path.string() +
                      ": `/integrator/context/slice` does not cut the volume; move its `center`");
   const Eigen::Array2i cells = (slice_cells * area.sizes() / area.sizes().maxCoeff()).array().ceil().max(1).cast<int>();

@@ -110,31 +110,35 @@ std::vector<PathSeed> seeds_of(const SeedList& list, const std::vector<LightChan
   return seeds;
 }
 
-/// The picture's primaries as spectra, so that every colour of it is right: spectra and colours add alike.
+/// A picture in linear Rec. 709.
+Image load_rec709(const std::filesystem::path& file, const ColorManagement& color, const Eigen::Matrix3d& to_rec709) {
+  const NativeImage native = read_native_image(file);
+  const ColorConversion to_working =
+      color.to_working(color.texture_space(file, native.type != SampleType::float32, ""));
+  Image image(native.width, native.height, {"R", "G", "B"});
+  std::vector<float> row(4 * static_cast<std::size_t>(native.width));
+  for (int y = 0; y < native.height; ++y) {
+    read_pixels(native, 0, y, native.width, row.data());
+    if (to_working) to_working(row.data(), static_cast<std::size_t>(native.width));
+    for (int x = 0; x < native.width; ++x)
+      Eigen::Map<Eigen::Vector3f>(image.pixel(x, y)) =
+          to_rec709.cast<float>() * Eigen::Map<const Eigen::Vector3f>(&row[4 * static_cast<std::size_t>(x)]);
+  }
+  return image;
+}
+
+/// The primaries of Rec. 709, which reflectances can have, as spectra, so that every colour within is right: spectra
+/// and colours add alike.
 EnvironmentLight load_environment(const LightSourceDescription& description, const ColorManagement& color,
                                   const ShownLight& light) {
   EnvironmentLight environment;
-  Image picture = read_image(description.file);
-  if (picture.channels.size() < 3)
-    throw std::runtime_error(description.file.string() + ": an environment needs the channels R, G, B");
-  const bool is_float = description.file.extension() == ".exr" || description.file.extension() == ".hdr";
-  const ColorConversion convert = color.to_working(color.texture_space(description.file, !is_float, ""));
-  Image rgb(picture.width, picture.height, {"R", "G", "B"});
-  const std::size_t channels = picture.channels.size();
-  for (std::size_t i = 0; i < picture.pixels.size() / channels; ++i) {
-    float rgba[4] = {picture.pixels[i * channels], picture.pixels[i * channels + 1], picture.pixels[i * channels + 2],
-                     1};
-    if (convert) convert(rgba, 1);
-    std::copy_n(rgba, 3, &rgb.pixels[3 * i]);
-  }
-  environment.picture = std::move(rgb);
+  environment.picture = load_rec709(description.file, color, light.rec709_to_working.inverse());
   environment.channel_spectra.resize(static_cast<Eigen::Index>(light.bands.size()), 3);
   for (int c = 0; c < 3; ++c) {
-    const ReflectanceSpectrum spectrum = light.model.spectrum(Eigen::Vector3d::Unit(c));
-    const double factor = description.strength * (light.rec709_to_working * description.color)[c];
-    for (std::size_t band = 0; band < light.bands.size(); ++band)
-      environment.channel_spectra(static_cast<Eigen::Index>(band), c) =
-          static_cast<float>(factor * spectrum.at(light.bands[band].wavelength));
+    const std::vector<float> spectrum =
+        light.radiance(Eigen::Vector3d::Unit(c), description.strength * description.color[c]);
+    environment.channel_spectra.col(c) =
+        Eigen::Map<const Eigen::VectorXf>(spectrum.data(), static_cast<Eigen::Index>(spectrum.size()));
   }
   environment.to_world = Eigen::AngleAxisd(description.rotation * pi / 180, Eigen::Vector3d::UnitZ()).matrix();
   return environment;

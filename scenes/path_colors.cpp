@@ -45,7 +45,7 @@ std::string title_of(const PathColorDescription& description) {
     case PathColor::force:
       return "|T V|";
     case PathColor::transverse_force:
-      return "|T V - (V.T V) V|";
+      return "|T V| across";
     case PathColor::curvature:
       return "|V'|";
     case PathColor::invariant:

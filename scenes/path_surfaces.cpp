@@ -68,6 +68,19 @@ bool is_bare(const Way& way) {
   return std::all_of(way.begin(), way.end(), [](const Waypoint& point) { return point.tensor.isZero(0); });
 }
 
+/// One number that changes where the colour, as displayed, does.
+double shade_of(const PathColors& colors, const Path& path, const Waypoint& point) {
+  if (!colors.color) return 0;
+  return linear_to_srgb(colors.color(path, point)).dot(Eigen::Vector3d(0.7, 1, 0.4));
+}
+
+/// The scale at which the median semi-axis of all paths is `typical`.
+double scale_for_radius(const std::vector<Path>& paths, double typical) {
+  std::vector<const Way*> ways;
+  for (const Path& path : paths) ways.push_back(&path.points);
+  return scale_for_radius(ways, typical);
+}
+
 TubeStyle tube_style(PathStyle style) {
   if (style == PathStyle::wire) return TubeStyle::wire;
   return style == PathStyle::ellipses ? TubeStyle::discs : TubeStyle::solid;
@@ -76,29 +89,29 @@ TubeStyle tube_style(PathStyle style) {
 }  // namespace
 
 double typical_radius(const RadiusDescription& radius, std::size_t paths, const Eigen::AlignedBox3d& volume) {
-  const double face = std::pow(volume.volume(), 2.0 / 3);
+  const double face = std::pow(volume.diagonal().norm(), 2) / 3;  // Of a cube of this size.
   const double spacing = std::sqrt(face / static_cast<double>(std::max<std::size_t>(1, paths)));
   return radius.typical.value_or(std::min(radius_per_spacing * spacing, radius_per_extent * volume.diagonal().norm()));
 }
 
-TubeMesh path_mesh(const std::vector<Path>& paths, const PathTracingDescription& description, double typical,
-                   double tolerance) {
-  std::vector<Way> ways;
-  for (const Path& path : paths) ways.push_back(path.points);
+TubeMesh path_mesh(const std::vector<Path>& paths, const PathTracingDescription& description, const PathColors& colors,
+                   double typical, double tolerance) {
   CrossSectionSettings sections;
-  sections.scale = description.radius.scale ? *description.radius.scale : scale_for_radius(ways, typical);
+  sections.scale = description.radius.scale ? *description.radius.scale : scale_for_radius(paths, typical);
   sections.least_radius = description.radius.min.value_or(
       std::min(thinnest * typical, description.radius.max.value_or(std::numeric_limits<double>::max())));
   // Who gives a scale wants true sizes.
   const double greatest = description.radius.scale ? std::numeric_limits<double>::max() : thickest * typical;
   sections.greatest_radius = std::max(sections.least_radius, description.radius.max.value_or(greatest));
-  std::vector<Tube> tubes(ways.size());
-  tbb::parallel_for(std::size_t{0}, ways.size(), [&](std::size_t i) {
+  std::vector<Tube> tubes(paths.size());
+  tbb::parallel_for(std::size_t{0}, paths.size(), [&](std::size_t i) {
+    const Way& way = paths[i].points;
     CrossSectionSettings section = sections;
-    if (is_bare(ways[i])) section.least_radius = section.greatest_radius = typical;
-    const std::vector<CrossSection> ellipses = cross_sections(ways[i], section);
+    if (is_bare(way)) section.least_radius = section.greatest_radius = typical;
+    const std::vector<CrossSection> ellipses = cross_sections(way, section);
     for (std::size_t k = 0; k < ellipses.size(); ++k)
-      tubes[i].push_back({ways[i][k].position, ellipses[k].x, ellipses[k].y, static_cast<double>(k)});
+      tubes[i].push_back(
+          {way[k].position, ellipses[k].x, ellipses[k].y, static_cast<double>(k), shade_of(colors, paths[i], way[k])});
   });
   TubeSettings settings;
   settings.style = tube_style(description.style);

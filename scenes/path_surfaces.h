@@ -20,8 +20,8 @@ double typical_radius(const RadiusDescription& radius, std::size_t paths, const 
 /// The paths' tubes, of any style but lines. `TubePoint::value` is the number of the path's point. Paths along which
 /// there is no tensor are round, of the typical radius.
 /// @param tolerance  How far triangles may be off the tube, world units.
-TubeMesh path_mesh(const std::vector<Path>& paths, const PathTracingDescription& description, double typical,
-                   double tolerance);
+TubeMesh path_mesh(const std::vector<Path>& paths, const PathTracingDescription& description, const PathColors& colors,
+                   double typical, double tolerance);
 
 /// The surface of that mesh, with colours and what else is known along paths.
 /// @param to_working  From linear Rec. 709.

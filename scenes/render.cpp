@@ -12,15 +12,7 @@ constexpr double narrowest_white = 100;  // nm: light of a smaller range is seen
 
 Render render_photons(const Scene& scene, const Progress& progress) {
   const SceneDescription& description = scene.description;
-  PhotonSettings settings;
-  settings.photons = description.light.photons;
-  settings.pattern = description.light.pattern;
-  settings.channels_per_photon = description.bending.rgb ? 0 : description.light.wavelengths_per_photon;
-  settings.seed = description.seed;
-  settings.density = description.integrator.density;
-  settings.keep_photons = !description.output.photons.empty();
-  PhotonDistribution light = distribute_photons(scene.field, scene.geometry, scene.beam, scene.channels,
-                                                description.bending.settings, settings, progress);
+  PhotonDistribution light = distribute_photons(scene, progress);
 
   const auto start = std::chrono::steady_clock::now();
   Render result;
@@ -44,6 +36,19 @@ Render render_photons(const Scene& scene, const Progress& progress) {
 }
 
 }  // namespace
+
+PhotonDistribution distribute_photons(const Scene& scene, const Progress& progress) {
+  const SceneDescription& description = scene.description;
+  PhotonSettings settings;
+  settings.photons = description.light.photons;
+  settings.pattern = description.light.pattern;
+  settings.channels_per_photon = description.bending.rgb ? 0 : description.light.wavelengths_per_photon;
+  settings.seed = description.seed;
+  settings.density = description.integrator.density;
+  settings.keep_photons = !description.output.photons.empty();
+  return distribute_photons(scene.field, scene.geometry, scene.beam, scene.channels, description.bending.settings,
+                            settings, progress);
+}
 
 bool has_white(const Scene& scene) {
   double width = 0;

@@ -47,6 +47,9 @@ bool has_white(const Scene& scene);
 /// From XYZ to the working space; the light's own white becomes neutral if the scene wants it so.
 Eigen::Matrix3d to_working(const Scene& scene);
 
+/// The light of the scene on its plate.
+PhotonDistribution distribute_photons(const Scene& scene, const Progress& progress);
+
 /// @throw Cancelled; std::runtime_error.
 Render render(const Scene& scene, const Progress& progress);
 

@@ -16,11 +16,25 @@
 namespace tensorray {
 namespace {
 
-constexpr double legend_width = 0.16;   // Of a picture's width; a chosen camera leaves it free.
+constexpr double most_radii = 2e5;      // Rays start a 5e-7th of the diagonal off a surface: a tenth of a radius.
+constexpr double legend_width = 0.2;    // Of a picture's width; a chosen camera leaves it free.
 constexpr float nothing_depth = 1e10f;  // Where nothing is: behind everything.
 constexpr double tube_tolerance = 0.2;  // Pixels: how far a tube's triangles may be off its surface.
 
-std::vector<Path> trace_scene(const Scene& scene, const Progress& progress) {
+/// Paths of a file may have a flexibility that is none of the scene's: they count as the first channel's.
+void count_ends(const Scene& scene, const std::vector<Path>& paths, Statistics& statistics) {
+  statistics.positions = paths.size();
+  statistics.ends.assign(scene.channels.size(), EndCounts{});
+  for (const Path& path : paths) {
+    const auto found = std::find_if(scene.channels.begin(), scene.channels.end(), [&](const LightChannel& channel) {
+      return channel.flexibility == path.flexibility;
+    });
+    const auto channel = found == scene.channels.end() ? 0 : found - scene.channels.begin();
+    ++statistics.ends[static_cast<std::size_t>(channel)][static_cast<std::size_t>(path.end)];
+  }
+}
+
+std::vector<Path> trace_scene(const Scene& scene, const Progress& progress, Statistics& statistics) {
   const PathTracingDescription& description = scene.description.integrator.paths;
   PathSettings settings;
   settings.backwards = description.backwards;
@@ -29,6 +43,7 @@ std::vector<Path> trace_scene(const Scene& scene, const Progress& progress) {
                                 ? scene.paths->paths
                                 : trace_paths(scene.field, scene.geometry, scene.description.bending.settings,
                                               scene.paths->seeds, settings, progress);
+  count_ends(scene, paths, statistics);
   paths.erase(std::remove_if(paths.begin(), paths.end(), [](const Path& path) { return path.points.size() < 2; }),
               paths.end());
   // The scene's colours, and files, are in the units of the field's file.
@@ -63,6 +78,19 @@ Eigen::AlignedBox3d world_box(const TensorField& field) {
   return box;
 }
 
+/// How far before the camera the nearest tenth of the paths is: what is nearer may show its triangles.
+double near_depth(const std::vector<Path>& paths, const Camera& camera) {
+  std::vector<double> depths;
+  for (const Path& path : paths)
+    for (const Waypoint& point : path.points)
+      if (const double depth = (point.position - camera.position).dot(camera.forward); depth > 0)
+        depths.push_back(depth);
+  if (depths.empty()) return camera.focus_distance;
+  const auto tenth = depths.begin() + static_cast<std::ptrdiff_t>(depths.size() / 10);
+  std::nth_element(depths.begin(), tenth, depths.end());
+  return *tenth;
+}
+
 /// The paths' surface, and their mesh for the scene's `tubes`.
 struct PathShapes {
   ShadedSurface surface;
@@ -73,13 +101,13 @@ PathShapes make_shapes(const Scene& scene, const std::vector<Path>& paths, const
                        const Camera& camera) {
   const PathTracingDescription& description = scene.description.integrator.paths;
   const double typical = typical_radius(description.radius, paths.size(), world_box(scene.field));
-  const double pixel = pixel_size(camera, camera.position + camera.focus_distance * camera.forward);
+  const double pixel = pixel_size(camera, camera.position + near_depth(paths, camera) * camera.forward);
   const Eigen::Matrix3d& to_working = scene.paths->light.rec709_to_working;
   PathShapes shapes;
   TubeMesh mesh;
   const bool writes = !scene.description.output.tubes.empty();
   if (writes || description.style != PathStyle::lines)
-    mesh = path_mesh(paths, description, typical, tube_tolerance * pixel);
+    mesh = path_mesh(paths, description, colors, typical, tube_tolerance * pixel);
   if (writes) shapes.tubes = mesh;
   shapes.surface = description.style == PathStyle::lines
                        ? line_surface(paths, description.radius.typical.value_or(0.75 * pixel), colors, to_working)
@@ -100,6 +128,9 @@ PathTracerSettings tracer_settings(const SceneDescription& scene) {
   PathTracerSettings settings;
   settings.shading.shading = description.shading;
   settings.shading.max_depth = description.max_depth;
+  double strength = scene.lights.empty() ? 1 : 0;
+  for (const LightSourceDescription& light : scene.lights) strength = std::max(strength, light.strength);
+  settings.shading.indirect_clamp *= strength;  // A brighter light is no firefly.
   settings.filter = PixelFilter(description.filter);
   settings.transparent = description.background != Background::lights;
   settings.min_samples = std::min(description.min_samples, description.samples);
@@ -153,17 +184,15 @@ void add_lamps(const std::vector<Light>& lights, const ShownLight& light, std::v
   }
 }
 
-/// Paths of a file may have a flexibility that is none of the scene's: they count as the first channel's.
-void count_ends(const Scene& scene, const std::vector<Path>& paths, Statistics& statistics) {
-  statistics.positions = paths.size();
-  statistics.ends.assign(scene.channels.size(), EndCounts{});
-  for (const Path& path : paths) {
-    const auto found = std::find_if(scene.channels.begin(), scene.channels.end(), [&](const LightChannel& channel) {
-      return channel.flexibility == path.flexibility;
-    });
-    const auto channel = found == scene.channels.end() ? 0 : found - scene.channels.begin();
-    ++statistics.ends[static_cast<std::size_t>(channel)][static_cast<std::size_t>(path.end)];
-  }
+/// Refuses what lies so far away that the renderer's precision, which goes by the size of everything, loses the paths.
+void require_fine(const Scene& scene, const SurfaceScene& stage, const std::vector<Path>& paths) {
+  const double typical =
+      typical_radius(scene.description.integrator.paths.radius, paths.size(), world_box(scene.field));
+  if (stage.bounds().diagonal().norm() < most_radii * typical) return;
+  throw SceneError(fmt::format(
+      "{}: what is drawn is {:.3g} long, and paths are {:.3g} thick: too fine for it; bring lamps, obstacles and plate "
+      "nearer, or raise `/integrator/radius/typical`",
+      scene.description.path.string(), stage.bounds().diagonal().norm(), typical));
 }
 
 }  // namespace
@@ -177,8 +206,7 @@ Render render_paths(const Scene& scene, const Progress& progress) {
   const ShownLight& light = scene.paths->light;
   const auto start = Clock::now();
   Render result;
-  result.paths = trace_scene(scene, progress);
-  count_ends(scene, result.paths, result.statistics);
+  result.paths = trace_scene(scene, progress, result.statistics);
   result.statistics.seconds_tracing = seconds_since(start);
 
   const auto drawing = Clock::now();
@@ -192,6 +220,7 @@ Render render_paths(const Scene& scene, const Progress& progress) {
   const std::vector<Light> lights = make_lights(scene.description, *scene.paths, camera);
   add_lamps(lights, light, surfaces, materials);
   const SurfaceScene stage(std::move(surfaces));
+  require_fine(scene, stage, result.paths);
   std::vector<float> luminance;
   for (const Band& band : light.bands) luminance.push_back(static_cast<float>(band.xyz.y()));
   const LightSampler sampler(lights, luminance, stage.bounds());

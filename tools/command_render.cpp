@@ -69,8 +69,9 @@ void check_statistics_path(const std::filesystem::path& path, const SceneDescrip
     return std::filesystem::weakly_canonical(std::filesystem::absolute(file));
   };
   const OutputDescription& output = scene.output;
-  for (const auto& other : {scene.path, scene.field.file, output.image, output.exr, output.spectral, output.photons,
-                            output.paths, output.tubes})
+  for (const auto& other :
+       {scene.path, scene.field.file, output.image, output.exr, output.spectral, output.photons, output.paths,
+        output.tubes, scene.integrator.paths.paths, scene.integrator.paths.seeds.file})
     if (!other.empty() && identity(other) == identity(path) && !std::filesystem::is_other(path))
       throw CLI::ValidationError("--stats", path.string() + " is another file of this render; choose another name");
 }

@@ -206,7 +206,7 @@ TEST(CrossSection, ATurningEllipseIsFollowedWithoutAFlip) {
 
 TEST(CrossSection, TheScaleSetsTheMedianRadius) {
   const Way way = straight_way(11, [](double z) -> Matrix3d { return (1 + z) * Matrix3d::Identity(); });
-  EXPECT_NEAR(scale_for_radius({way}, 0.3), 0.3 / 1.5, 1e-12);
+  EXPECT_NEAR(scale_for_radius({&way}, 0.3), 0.3 / 1.5, 1e-12);
   EXPECT_EQ(scale_for_radius({}, 0.3), 1);
 }
 
