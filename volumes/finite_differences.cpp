@@ -106,9 +106,9 @@ Matrix3d hessian_at(const Neighbourhood& near, const Vector3i& position, const M
 
 /// `tensor_at(neighbourhood, position, to_index)` at every active voxel.
 template <class TensorAt>
-std::vector<TensorBlock> derive(const std::vector<SampleBlock>& blocks, const Matrix3d& to_index,
-                                const TensorAt& tensor_at) {
-  std::vector<TensorBlock> result(blocks.size());
+std::deque<TensorBlock> derive(const std::vector<SampleBlock>& blocks, const Matrix3d& to_index,
+                               const TensorAt& tensor_at) {
+  std::deque<TensorBlock> result(blocks.size());
   tbb::parallel_for(std::size_t{0}, blocks.size(), [&](std::size_t i) {
     const Neighbourhood near(blocks, blocks[i].origin);
     result[i].origin = blocks[i].origin;
@@ -122,11 +122,11 @@ std::vector<TensorBlock> derive(const std::vector<SampleBlock>& blocks, const Ma
 
 }  // namespace
 
-std::vector<TensorBlock> gradient(const std::vector<SampleBlock>& blocks, const Matrix3d& to_index) {
+std::deque<TensorBlock> gradient(const std::vector<SampleBlock>& blocks, const Matrix3d& to_index) {
   return derive(blocks, to_index, gradient_at);
 }
 
-std::vector<TensorBlock> hessian(const std::vector<SampleBlock>& blocks, const Matrix3d& to_index) {
+std::deque<TensorBlock> hessian(const std::vector<SampleBlock>& blocks, const Matrix3d& to_index) {
   return derive(blocks, to_index, hessian_at);
 }
 

@@ -4,6 +4,7 @@
 
 #include <array>
 #include <bitset>
+#include <deque>
 #include <vector>
 
 #include <Eigen/Core>
@@ -27,9 +28,9 @@ struct SampleBlock {
 // @param to_index  The linear part of the transform from world to index space.
 
 /// T(i, j) = ∂v_i/∂x_j, world axes.
-std::vector<TensorBlock> gradient(const std::vector<SampleBlock>& blocks, const Eigen::Matrix3d& to_index);
+std::deque<TensorBlock> gradient(const std::vector<SampleBlock>& blocks, const Eigen::Matrix3d& to_index);
 
 /// T(i, j) = ∂²f/∂x_i∂x_j, world axes; exactly symmetric.
-std::vector<TensorBlock> hessian(const std::vector<SampleBlock>& blocks, const Eigen::Matrix3d& to_index);
+std::deque<TensorBlock> hessian(const std::vector<SampleBlock>& blocks, const Eigen::Matrix3d& to_index);
 
 }  // namespace tensorray

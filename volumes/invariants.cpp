@@ -8,6 +8,7 @@
 
 #include <Eigen/Eigenvalues>
 #include <Eigen/LU>
+#include <tbb/parallel_for.h>
 
 #include "volumes/eigenvalues.h"
 
@@ -67,6 +68,11 @@ const Definition definitions[] = {
     {"asymmetry", asymmetry, 0},
 };
 
+std::string units_of_power(const std::string& units, int degree) {
+  if (degree == 1 || units.empty()) return units;
+  return degree == 0 ? "1" : "(" + units + ")^" + std::to_string(degree);
+}
+
 }  // namespace
 
 const std::vector<std::string>& invariant_names() {
@@ -94,6 +100,33 @@ double invariant(Invariant which, const Matrix3d& tensor) {
   double value = definition.value(tensor / largest);  // Squares and cubes neither overflow nor underflow.
   for (int i = 0; i < definition.degree; ++i) value *= largest;
   return std::clamp(value, std::numeric_limits<double>::lowest(), std::numeric_limits<double>::max());
+}
+
+int invariant_degree(Invariant which) { return definitions[static_cast<std::size_t>(which)].degree; }
+
+ScalarGrid invariant_grid(Invariant which, const TensorGrid& grid) {
+  constexpr double greatest = std::numeric_limits<float>::max();
+  ScalarGrid result;
+  result.name = invariant_names()[static_cast<std::size_t>(which)];
+  result.to_world = grid.to_world;
+  result.metadata = grid.metadata;
+  const auto units = result.metadata.find("tensorray:units");
+  if (units != result.metadata.end()) units->second = units_of_power(units->second, invariant_degree(which));
+  result.blocks.resize(grid.blocks.size());
+  tbb::parallel_for(std::size_t{0}, grid.blocks.size(), [&](std::size_t i) {
+    const TensorBlock& from = grid.blocks[i];
+    ScalarBlock& to = result.blocks[i];
+    to.origin = from.origin;
+    to.active = from.active;
+    for (int offset = 0; offset < TensorBlock::voxels; ++offset) {
+      if (!from.active[offset]) continue;
+      const Matrix3d tensor = from.values[offset].cast<double>();
+      to.values[offset] = tensor.allFinite()
+                              ? static_cast<float>(std::clamp(invariant(which, tensor), -greatest, greatest))
+                              : std::numeric_limits<float>::quiet_NaN();
+    }
+  });
+  return result;
 }
 
 }  // namespace tensorray

@@ -7,6 +7,8 @@
 
 #include <Eigen/Core>
 
+#include "volumes/scalar_grid.h"
+
 namespace tensorray {
 
 /// T = S + A, its symmetric and antisymmetric parts; D = S − ⅓ tr(S) I, the deviator. ‖·‖ is Frobenius's norm, and
@@ -39,5 +41,13 @@ Invariant invariant_of(const std::string& name);
 /// becomes its end. Zero of the zero tensor. Ratios whose denominator is rounding (‖S‖, or ‖D‖, below 1e-6 ‖T‖: fields
 /// are single precision) are zero. Any thread may call it.
 double invariant(Invariant which, const Eigen::Matrix3d& tensor);
+
+/// The power of the tensor's unit that is the invariant's: f(c T) = c^degree f(T) for c > 0. 0: a ratio.
+int invariant_degree(Invariant which);
+
+/// The invariant at every active voxel of a field, under its name; of tensors that are not finite, not a number. What is
+/// beyond the range of single precision becomes its end. Metadata are the field's, `tensorray:units` (if there are any)
+/// the invariant's. Runs on all threads.
+ScalarGrid invariant_grid(Invariant which, const TensorGrid& grid);
 
 }  // namespace tensorray

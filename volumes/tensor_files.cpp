@@ -1,6 +1,7 @@
 #include "volumes/tensor_files.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <stdexcept>
 
@@ -193,10 +194,10 @@ void put(SampleBlock& block, int offset, const Entry& entry, double value) {
 }
 
 /// Blocks (TensorBlock or SampleBlock) of all active voxels. Only blocks of active voxels are made, of tiles too.
-template <class Block>
-std::vector<Block> blocks_of(const std::vector<Source>& sources) {
+template <class Blocks>
+Blocks blocks_of(const std::vector<Source>& sources) {
   const std::vector<openvdb::Coord> origins = block_origins(sources);
-  std::vector<Block> blocks(origins.size());
+  Blocks blocks(origins.size());
   tbb::parallel_for(std::size_t{0}, blocks.size(), [&](std::size_t i) {
     blocks[i].origin = {origins[i].x(), origins[i].y(), origins[i].z()};
     for (const Source& source : sources)
@@ -216,13 +217,6 @@ Eigen::Affine3d to_eigen(const openvdb::Mat4d& matrix) {
   for (int row = 0; row < 4; ++row)
     for (int column = 0; column < 4; ++column) affine.matrix()(row, column) = matrix(column, row);
   return affine;
-}
-
-openvdb::Mat4d to_openvdb(const Eigen::Affine3d& affine) {
-  openvdb::Mat4d matrix;
-  for (int row = 0; row < 4; ++row)
-    for (int column = 0; column < 4; ++column) matrix(column, row) = affine.matrix()(row, column);
-  return matrix;
 }
 
 Eigen::Affine3d transform_of(const std::filesystem::path& path, const openvdb::GridBase& grid) {
@@ -280,31 +274,46 @@ std::vector<Part> parts_of(const std::vector<GridInfo>& grids, const std::string
   return {{"", {{0, 0, 0}, {1, 0, 0}, {2, 0, 0}}}};
 }
 
-std::vector<TensorBlock> tensors_of(const std::vector<Source>& sources, Derive derive,
-                                    const Eigen::Matrix3d& to_index) {
-  if (derive == Derive::none) return blocks_of<TensorBlock>(sources);
-  const std::vector<SampleBlock> samples = blocks_of<SampleBlock>(sources);
+std::deque<TensorBlock> tensors_of(const std::vector<Source>& sources, Derive derive, const Eigen::Matrix3d& to_index) {
+  if (derive == Derive::none) return blocks_of<std::deque<TensorBlock>>(sources);
+  const auto samples = blocks_of<std::vector<SampleBlock>>(sources);
   return derive == Derive::gradient ? gradient(samples, to_index) : hessian(samples, to_index);
 }
 
-openvdb::Vec3SGrid::Ptr row_grid(const TensorGrid& grid, int row, bool half) {
-  using Leaf = openvdb::Vec3STree::LeafNodeType;
-  const auto result = openvdb::Vec3SGrid::create();
-  for (const TensorBlock& block : grid.blocks) {
-    auto* leaf = new Leaf(openvdb::Coord(block.origin.x(), block.origin.y(), block.origin.z()));
-    result->tree().addLeaf(leaf);  // The tree owns it.
+/// The three grids of a field, still empty.
+std::array<openvdb::Vec3SGrid::Ptr, 3> empty_rows(const TensorGrid& grid, bool half) {
+  std::array<openvdb::Vec3SGrid::Ptr, 3> rows;
+  for (int row = 0; row < 3; ++row) {
+    rows[row] = openvdb::Vec3SGrid::create();
+    rows[row]->setName(grid.name + "_row" + std::to_string(row));
+    rows[row]->setTransform(linear_transform(grid.to_world));
+    rows[row]->setGridClass(openvdb::GRID_UNKNOWN);
+    rows[row]->setVectorType(openvdb::VEC_INVARIANT);
+    rows[row]->setSaveFloatAsHalf(half);
+    for (const auto& [key, value] : grid.metadata)
+      if (!(*rows[row])[key]) rows[row]->insertMeta(key, openvdb::StringMetadata(value));  // Not its name, type, ...
+  }
+  return rows;
+}
+
+void add_block(const TensorBlock& block, const std::array<openvdb::Vec3SGrid::Ptr, 3>& rows) {
+  for (int row = 0; row < 3; ++row) {
+    auto* leaf =
+        new openvdb::Vec3STree::LeafNodeType(openvdb::Coord(block.origin.x(), block.origin.y(), block.origin.z()));
+    rows[row]->tree().addLeaf(leaf);  // The tree owns it.
     for (int offset = 0; offset < TensorBlock::voxels; ++offset) {
       if (!block.active[offset]) continue;
       const auto values = block.values[offset].row(row);
       leaf->setValueOn(static_cast<openvdb::Index>(offset), openvdb::Vec3s(values[0], values[1], values[2]));
     }
   }
-  result->setName(grid.name + "_row" + std::to_string(row));
-  result->setTransform(openvdb::math::Transform::createLinearTransform(to_openvdb(grid.to_world)));
-  result->setGridClass(openvdb::GRID_UNKNOWN);
-  result->setVectorType(openvdb::VEC_INVARIANT);
-  result->setSaveFloatAsHalf(half);
-  return result;
+}
+
+void write_rows(const std::filesystem::path& path, const TensorGrid& grid,
+                const std::array<openvdb::Vec3SGrid::Ptr, 3>& rows) {
+  openvdb::MetaMap metadata;
+  for (const auto& [key, value] : grid.metadata) metadata.insertMeta(key, openvdb::StringMetadata(value));
+  write_vdb(path, {rows.begin(), rows.end()}, metadata);
 }
 
 void check_half_range(const std::filesystem::path& path, const TensorGrid& grid) {
@@ -358,16 +367,16 @@ TensorGrid read_tensor_vdb(const std::filesystem::path& path, const std::string&
 
 void write_tensor_vdb(const std::filesystem::path& path, const TensorGrid& grid, bool half) {
   if (half) check_half_range(path, grid);
-  openvdb::MetaMap metadata;
-  for (const auto& [key, value] : grid.metadata) metadata.insertMeta(key, openvdb::StringMetadata(value));
-  openvdb::GridCPtrVec rows;
-  for (int row = 0; row < 3; ++row) {
-    const auto row_of = row_grid(grid, row, half);
-    for (const auto& [key, value] : grid.metadata)
-      if (!(*row_of)[key]) row_of->insertMeta(key, openvdb::StringMetadata(value));  // Not its name, type, ...
-    rows.push_back(row_of);
-  }
-  write_vdb(path, rows, metadata);
+  const auto rows = empty_rows(grid, half);
+  for (const TensorBlock& block : grid.blocks) add_block(block, rows);
+  write_rows(path, grid, rows);
+}
+
+void write_tensor_vdb(const std::filesystem::path& path, TensorGrid&& grid, bool half) {
+  if (half) check_half_range(path, grid);
+  const auto rows = empty_rows(grid, half);
+  for (; !grid.blocks.empty(); grid.blocks.pop_front()) add_block(grid.blocks.front(), rows);
+  write_rows(path, grid, rows);
 }
 
 }  // namespace tensorray

@@ -45,6 +45,9 @@ TensorGrid read_tensor_vdb(const std::filesystem::path& path, const std::string&
 /// exceeds 65504). The file is written in place.
 void write_tensor_vdb(const std::filesystem::path& path, const TensorGrid& grid, bool half = false);
 
+/// The same, giving back the grid's blocks on the way, so that there is never twice the field in memory.
+void write_tensor_vdb(const std::filesystem::path& path, TensorGrid&& grid, bool half = false);
+
 /// The grids of a file, in its order. @throw std::runtime_error as read_tensor_vdb.
 std::vector<GridInfo> list_vdb(const std::filesystem::path& path);
 

@@ -6,10 +6,10 @@
 #include <array>
 #include <bitset>
 #include <cstddef>
+#include <deque>
 #include <functional>
 #include <map>
 #include <string>
-#include <vector>
 
 #include <Eigen/Geometry>
 
@@ -35,7 +35,9 @@ struct TensorBlock {
 struct TensorGrid {
   std::string name = "tensor";
   Eigen::Affine3d to_world = Eigen::Affine3d::Identity();  ///< From index to world space; invertible.
-  std::vector<TensorBlock> blocks;              ///< Each has an active voxel; ordered by origin (x, then y, then z).
+  /// Each has an active voxel; ordered by origin (x, then y, then z). A deque, so that blocks can be given back one by
+  /// one while something else is made of them.
+  std::deque<TensorBlock> blocks;
   std::map<std::string, std::string> metadata;  ///< `tensorray:field`, `tensorray:units`, `tensorray:source`, ...
 
   std::size_t active_voxels() const;

@@ -10,6 +10,7 @@
 #include <string>
 #include <vector>
 
+#include <Eigen/Geometry>
 #include <openvdb/openvdb.h>
 
 namespace tensorray {
@@ -35,5 +36,8 @@ VdbFile read_vdb(const std::filesystem::path& path, const std::set<std::string>&
 /// tag, which OpenVDB draws at random, is made of the contents.
 /// @throw std::runtime_error naming the file and the reason, also when the disk is full.
 void write_vdb(const std::filesystem::path& path, const openvdb::GridCPtrVec& grids, const openvdb::MetaMap& metadata);
+
+/// A grid's transform from what takes its indices to the world.
+openvdb::math::Transform::Ptr linear_transform(const Eigen::Affine3d& to_world);
 
 }  // namespace tensorray
