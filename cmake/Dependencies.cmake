@@ -22,4 +22,19 @@ endif()
 pkg_check_modules(OpenImageIO REQUIRED IMPORTED_TARGET OpenImageIO>=2.4)
 pkg_check_modules(OpenColorIO REQUIRED IMPORTED_TARGET OpenColorIO>=2.1)
 
-find_package(VTK REQUIRED COMPONENTS CommonCore CommonDataModel IOXML)
+find_package(VTK REQUIRED COMPONENTS CommonCore CommonDataModel CommonExecutionModel FiltersCore FiltersGeneral
+             IOCore IOExodus IOGeometry IOLegacy IOParallelXML IOXML)
+
+# Neither of these two comes with a CMake package that Debian's other packages leave usable.
+find_path(Teem_INCLUDE_DIR teem/nrrd.h REQUIRED)
+find_library(Teem_LIBRARY teem REQUIRED)
+add_library(Teem::teem INTERFACE IMPORTED)
+target_include_directories(Teem::teem INTERFACE ${Teem_INCLUDE_DIR})
+target_link_libraries(Teem::teem INTERFACE ${Teem_LIBRARY})
+
+find_path(NIfTI_INCLUDE_DIR nifti/nifti2_io.h REQUIRED)
+find_library(NIfTI_LIBRARY nifti2 REQUIRED)
+find_library(NIfTI_znz_LIBRARY znz REQUIRED)
+add_library(NIfTI::nifti2 INTERFACE IMPORTED)
+target_include_directories(NIfTI::nifti2 INTERFACE ${NIfTI_INCLUDE_DIR}/nifti)
+target_link_libraries(NIfTI::nifti2 INTERFACE ${NIfTI_LIBRARY} ${NIfTI_znz_LIBRARY})

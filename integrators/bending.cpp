@@ -20,6 +20,12 @@ constexpr double shortest_adaptive_step = 1e-6;
 bool adaptive(BendingMethod method) { return method == BendingMethod::bs23 || method == BendingMethod::dopri5; }
 int order(BendingMethod method) { return method == BendingMethod::bs23 ? 3 : 5; }
 
+/// What is kept of a ray's way; null: nothing.
+struct Recording {
+  Way* way = nullptr;
+  Track* track = nullptr;
+};
+
 /// One ray on its way, alone (N = 1) or with its derivatives along two parameters (N = 3). The volume is the field's
 /// extent, a convex box, cut by a mesh of any shape.
 template <int N>
@@ -28,11 +34,12 @@ class Tracer {
   Tracer(const TensorField& field, const Geometry& geometry, const BendingSettings& settings)
       : field_(field), geometry_(geometry), settings_(settings), sampler_(field) {}
 
-  /// Follows a ray to its end; `state` says where that is, and `way`, unless null, how it came there.
-  RayEnd trace(const State<N>& start, double flexibility, Way* way);
+  /// Follows a ray to its end; `state` says where that is, and `recording` how it came there.
+  RayEnd trace(const State<N>& start, double flexibility, const Recording& recording);
 
   const State<N>& state() const { return ray_; }
   double length() const { return length_; }
+  const Eigen::RowVector2d& length_change() const { return length_change_; }
   std::uint32_t steps() const { return steps_; }
   std::uint64_t samples() const { return sampler_.samples(); }
 
@@ -45,6 +52,7 @@ class Tracer {
   std::optional<RayEnd> cross_box();
   std::optional<RayEnd> bend();
   RayEnd leave();
+  RayEnd miss();
 
   Eigen::Vector3d position() const { return ray_.position(); }
   Eigen::Vector3d direction() const { return ray_.direction(); }
@@ -55,6 +63,7 @@ class Tracer {
   double control_step(const State<N>& error);
   void record(bool in_field);
   void go_straight(const Hit& hit);
+  bool ends_before(double distance) const { return length_ + distance >= settings_.max_length; }
   void meet_surface(const Eigen::Vector3d& normal, bool bends);
   Event meet(const State<N>& next, Hit& hit) const;
   double land(const State<N>& next, double h, const Hit& hit);
@@ -66,10 +75,11 @@ class Tracer {
 
   Medium<N> medium_{sampler_, 0};
   State<N> ray_;
-  Way* way_ = nullptr;
-  double length_ = 0;         // Of the way so far, world units.
-  double voxel_ = 0;          // Length of a voxel along the ray, world units.
-  double adaptive_step_ = 0;  // What the error control asks for next, in voxels.
+  Recording recording_;
+  double length_ = 0;                 // Of the way so far, world units.
+  Eigen::RowVector2d length_change_;  // Its derivatives.
+  double voxel_ = 0;                  // Length of a voxel along the ray, world units.
+  double adaptive_step_ = 0;          // What the error control asks for next, in voxels.
   std::uint32_t steps_ = 0;
 };
 
@@ -86,6 +96,7 @@ void Tracer<N>::meet_surface(const Eigen::Vector3d& normal, bool bends) {
       const double later = -normal.dot(ray_.P.col(i)) / approach;
       ray_.P.col(i) += later * flow.P.col(0);
       ray_.V.col(i) += later * flow.V.col(0);
+      length_change_[i - 1] += later;
     }
   }
 }
@@ -93,7 +104,8 @@ void Tracer<N>::meet_surface(const Eigen::Vector3d& normal, bool bends) {
 /// Leaves the medium as last sampled: the steps are the same, recorded or not.
 template <int N>
 void Tracer<N>::record(bool in_field) {
-  if (!way_) return;
+  if (recording_.track) recording_.track->push_back({position(), length_});
+  if (!recording_.way) return;
   Waypoint here;
   here.position = position();
   here.direction = direction();
@@ -104,7 +116,7 @@ void Tracer<N>::record(bool in_field) {
     here.change = medium.derivative({here.position, here.direction}).V;
     here.tensor = medium.T;
   }
-  way_->push_back(here);
+  recording_.way->push_back(here);
 }
 
 /// In free space, to a surface.
@@ -117,16 +129,33 @@ void Tracer<N>::go_straight(const Hit& hit) {
   record(false);
 }
 
+/// In free space, where nothing is met. Behind a cut that is still within the volume.
+template <int N>
+RayEnd Tracer<N>::miss() {
+  if (std::isfinite(settings_.max_length)) {
+    Hit end;
+    end.distance = settings_.max_length - length_;
+    go_straight(end);
+  } else if (recording_.track && field_.contains(position())) {
+    if (const auto exit = geometry_.crossing(Surface::bounds, false, position(), direction())) {
+      recording_.track->push_back({position(), length_});
+      recording_.track->push_back({position() + exit->distance * direction(), length_ + exit->distance});
+    }
+  }
+  return RayEnd::missed;
+}
+
 /// In free space before the volume: to an absorber, or to the face of the box where light enters.
 template <int N>
 std::optional<RayEnd> Tracer<N>::reach_box() {
   const auto entry = geometry_.crossing(Surface::bounds, true, position(), direction());
-  const auto hit = geometry_.absorber(position(), direction(), entry ? entry->distance : Geometry::infinite);
+  const double free_way = entry ? entry->distance : Geometry::infinite;
+  const auto hit = geometry_.absorber(position(), direction(), free_way);
+  if (ends_before(hit ? hit->distance : free_way)) return miss();
   if (hit) {
     go_straight(*hit);
     return end_on(hit->surface);
   }
-  if (!entry) return RayEnd::missed;
   go_straight(*entry);
   return std::nullopt;
 }
@@ -135,7 +164,7 @@ std::optional<RayEnd> Tracer<N>::reach_box() {
 template <int N>
 RayEnd Tracer<N>::leave() {
   const auto hit = geometry_.absorber(position(), direction());
-  if (!hit) return RayEnd::missed;
+  if (!hit || ends_before(hit->distance)) return miss();
   go_straight(*hit);
   return end_on(hit->surface);
 }
@@ -147,7 +176,9 @@ std::optional<RayEnd> Tracer<N>::cross_box() {
   const auto exit = geometry_.crossing(Surface::bounds, false, position(), direction());
   const auto entry = geometry_.crossing(Surface::cut, true, position(), direction(), exit ? exit->distance : 0);
   if (!entry) return leave();
-  if (const auto hit = geometry_.absorber(position(), direction(), entry->distance)) {
+  const auto hit = geometry_.absorber(position(), direction(), entry->distance);
+  if (ends_before(hit ? hit->distance : entry->distance)) return miss();
+  if (hit) {
     go_straight(*hit);
     return end_on(hit->surface);
   }
@@ -247,7 +278,7 @@ std::optional<RayEnd> Tracer<N>::bend() {
     ++steps_;
     voxel_ = length_of_voxel();
     const double voxels = controlled ? adaptive_step_ : automatic ? automatic_step() : settings_.step;
-    const double h = voxels * voxel_;
+    const double rest = settings_.max_length - length_, h = std::min(voxels * voxel_, rest);
     State<N> error;
     const State<N> next = step(h, error);
     if (next.direction().isZero() || !next.position().allFinite()) return RayEnd::degenerate;
@@ -259,6 +290,7 @@ std::optional<RayEnd> Tracer<N>::bend() {
       ray_ = next;
       length_ += h;
       record(true);
+      if (h == rest) return RayEnd::missed;
       continue;
     }
     length_ += land(next, h, hit);
@@ -284,19 +316,20 @@ RayEnd Tracer<N>::follow() {
 }
 
 template <int N>
-RayEnd Tracer<N>::trace(const State<N>& start, double flexibility, Way* way) {
+RayEnd Tracer<N>::trace(const State<N>& start, double flexibility, const Recording& recording) {
   ray_ = normalized(start);
-  way_ = way;
+  recording_ = recording;
   medium_.s = flexibility;
   length_ = 0;
+  length_change_.setZero();
   steps_ = 0;
   return follow();
 }
 
-/// The rays of a batch, which is N = 3 wide if it carries differentials. `ways`, unless null, are recorded.
-template <int N>
+/// The rays of a batch, which is N = 3 wide if it carries differentials. `record(i)` says what is kept of ray i.
+template <int N, class Record>
 void trace_rays(const TensorField& field, const Geometry& geometry, const BendingSettings& settings, RayBatch& batch,
-                std::vector<Way>* ways) {
+                const Record& record) {
   Tracer<N> tracer(field, geometry, settings);
   for (std::size_t i = 0; i < batch.size(); ++i) {
     State<N> start;
@@ -306,11 +339,12 @@ void trace_rays(const TensorField& field, const Geometry& geometry, const Bendin
       start.P.template rightCols<2>() = batch.differentials[i].position;
       start.V.template rightCols<2>() = batch.differentials[i].direction;
     }
-    batch.end[i] = tracer.trace(start, batch.flexibility[i], ways ? &(*ways)[i] : nullptr);
+    batch.end[i] = tracer.trace(start, batch.flexibility[i], record(i));
     batch.position[i] = tracer.state().position();
     batch.direction[i] = tracer.state().direction();
     if constexpr (N == 3)
-      batch.differentials[i] = {tracer.state().P.template rightCols<2>(), tracer.state().V.template rightCols<2>()};
+      batch.differentials[i] = {tracer.state().P.template rightCols<2>(), tracer.state().V.template rightCols<2>(),
+                                tracer.length_change()};
     batch.length[i] = tracer.length();
     batch.steps[i] = tracer.steps();
   }
@@ -322,10 +356,12 @@ void check(const BendingSettings& settings) {
     throw std::invalid_argument("bending.step must be automatic, or a positive number of voxels");
   if (!(settings.tolerance > 0)) throw std::invalid_argument("bending.tolerance must be positive");
   if (settings.max_steps < 1) throw std::invalid_argument("bending.max_steps must be positive");
+  if (!(settings.max_length > 0)) throw std::invalid_argument("the greatest length of a ray must be positive");
 }
 
+template <class Record>
 void trace_batch(const TensorField& field, const Geometry& geometry, const BendingSettings& settings, RayBatch& batch,
-                 std::vector<Way>* ways) {
+                 const Record& record) {
   check(settings);
   const bool differentials = !batch.differentials.empty();
   if (differentials && batch.differentials.size() != batch.size())
@@ -333,8 +369,10 @@ void trace_batch(const TensorField& field, const Geometry& geometry, const Bendi
   batch.end.resize(batch.size());
   batch.length.resize(batch.size());
   batch.steps.resize(batch.size());
-  if (ways) ways->assign(batch.size(), Way());
-  (differentials ? trace_rays<3> : trace_rays<1>)(field, geometry, settings, batch, ways);
+  if (differentials)
+    trace_rays<3>(field, geometry, settings, batch, record);
+  else
+    trace_rays<1>(field, geometry, settings, batch, record);
 }
 
 }  // namespace
@@ -361,12 +399,20 @@ void RayBatch::add(const Eigen::Vector3d& from, const Eigen::Vector3d& along, do
 }
 
 void trace(const TensorField& field, const Geometry& geometry, const BendingSettings& settings, RayBatch& batch) {
-  trace_batch(field, geometry, settings, batch, nullptr);
+  trace_batch(field, geometry, settings, batch, [](std::size_t) { return Recording(); });
 }
 
 void trace(const TensorField& field, const Geometry& geometry, const BendingSettings& settings, RayBatch& batch,
            std::vector<Way>& ways) {
-  trace_batch(field, geometry, settings, batch, &ways);
+  ways.assign(batch.size(), Way());
+  trace_batch(field, geometry, settings, batch, [&](std::size_t i) { return Recording{&ways[i], nullptr}; });
+}
+
+void trace(const TensorField& field, const Geometry& geometry, const BendingSettings& settings, RayBatch& batch,
+           std::vector<Track>& tracks) {
+  tracks.resize(batch.size());
+  for (Track& track : tracks) track.clear();  // Keeps what they have allocated.
+  trace_batch(field, geometry, settings, batch, [&](std::size_t i) { return Recording{nullptr, &tracks[i]}; });
 }
 
 }  // namespace tensorray

@@ -6,6 +6,7 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <limits>
 #include <string>
 #include <vector>
 
@@ -36,6 +37,9 @@ struct BendingSettings {
   double tolerance = 1e-3;  ///< Adaptive methods: error per step of the ray, not of its differentials, in voxels and in
                             ///< radians; > 0.
   int max_steps = 20000;    ///< Steps before a ray is given up; > 0.
+
+  /// Of the way, world units; > 0. A ray that has come so far ends there, in the volume or outside, as one that missed.
+  double max_length = std::numeric_limits<double>::infinity();
 };
 
 /// Why a ray ended. Never ignored: the counts are part of every render's statistics.
@@ -53,6 +57,10 @@ const char* to_string(RayEnd end);
 struct RayDifferential {
   Eigen::Matrix<double, 3, 2> position = Eigen::Matrix<double, 3, 2>::Zero();   ///< World units per parameter.
   Eigen::Matrix<double, 3, 2> direction = Eigen::Matrix<double, 3, 2>::Zero();  ///< Radians per parameter.
+
+  /// Set by `trace`: of the way's length, as on surfaces neighbouring rays have not come equally far. The rays at equal
+  /// lengths differ by `position` − V `length`.
+  Eigen::RowVector2d length = Eigen::RowVector2d::Zero();
 };
 
 /// Rays, one an entry of every vector. Rays of one origin (the wavelengths of a photon) stand next to each other.
@@ -90,10 +98,20 @@ struct Waypoint {
 /// enters or leaves. Empty if it meets nothing.
 using Way = std::vector<Waypoint>;
 
+/// A corner of the polyline that a ray's steps are.
+struct TrackPoint {
+  Eigen::Vector3d position = Eigen::Vector3d::Zero();
+  double length = 0;  ///< Of the way so far, world units; a step is a little longer than its chord.
+};
+
+/// From the start to the end; within the volume without gaps, also where light misses all else behind a cut. Empty if
+/// the ray meets nothing. Parts may lie outside of the volume.
+using Track = std::vector<TrackPoint>;
+
 /// Follows every ray of `batch` to its end, in place: position and direction are then those of the end. A ray that
-/// missed is left where it last crossed the bounds (or where it began). Differentials are carried along by the
-/// variational equations, as the derivative of the method's own steps; on a surface they are those of the point where
-/// rays meet it, so that those of position lie in the surface.
+/// missed is left where it last crossed the bounds (or where it began), unless there is a `max_length`. Differentials
+/// are carried along by the variational equations, as the derivative of the method's own steps; on a surface they are
+/// those of the point where rays meet it, so that those of position lie in the surface.
 /// @param field     World frame; s·T in 1/length. Light goes straight outside its extent and outside the cut.
 /// @param geometry  Bounds (those of the field), cut, plate and obstacles.
 /// Accuracy: the method's order on smooth fields, 2 on trilinear data. Entry, exit and hits are located by repeating
@@ -105,5 +123,9 @@ void trace(const TensorField& field, const Geometry& geometry, const BendingSett
 /// The same, and records the ways, one a ray: the same rays, for one more tensor sample a step.
 void trace(const TensorField& field, const Geometry& geometry, const BendingSettings& settings, RayBatch& batch,
            std::vector<Way>& ways);
+
+/// The same, and records the tracks, one a ray, at next to no cost.
+void trace(const TensorField& field, const Geometry& geometry, const BendingSettings& settings, RayBatch& batch,
+           std::vector<Track>& tracks);
 
 }  // namespace tensorray

@@ -2,9 +2,12 @@
 
 #include <algorithm>
 #include <chrono>
+#include <memory>
 #include <stdexcept>
 
 #include <tbb/parallel_for.h>
+
+#include "integrators/fluence.h"
 
 namespace tensorray {
 namespace {
@@ -37,6 +40,7 @@ struct Job {
   BeamSampler positions;
   int rays_per_position;
   double ray_area;
+  FluenceSums* fluence;  // Null unless asked for.
 };
 
 /// The channel of the position's ray number `ray`: one in each of `rays_per_position` equal ranges of channels.
@@ -64,7 +68,14 @@ std::uint64_t trace_positions(const Job& job, std::uint64_t first, std::uint64_t
       origins.push_back(emission.origin);
     }
   }
-  trace(job.field, job.geometry, job.bending, batch);
+  if (job.fluence) {
+    thread_local std::vector<Track> tracks;
+    trace(job.field, job.geometry, job.bending, batch, tracks);
+    for (std::size_t i = 0; i < traced.size(); ++i)
+      job.fluence->add(static_cast<std::size_t>(traced[i]->channel), tracks[i]);
+  } else {
+    trace(job.field, job.geometry, job.bending, batch);
+  }
   for (std::size_t i = 0; i < traced.size(); ++i) {
     Landing& landing = *traced[i];
     landing.end = batch.end[i];
@@ -111,6 +122,15 @@ void keep_photons(const std::vector<Landing>& landings, std::size_t count, Photo
     if (landings[i].channel >= 0 && landings[i].end == RayEnd::plate) photons.push_back(landings[i].photon);
 }
 
+/// Null unless it is asked for.
+std::unique_ptr<FluenceSums> make_fluence(const Job& job) {
+  if (job.settings.fluence == FluenceKind::none) return nullptr;
+  std::vector<double> powers;
+  for (const LightChannel& channel : job.channels) powers.push_back(channel.power);
+  const std::uint64_t rays = job.positions.candidates() * static_cast<std::uint64_t>(job.rays_per_position);
+  return std::make_unique<FluenceSums>(job.field, std::move(powers), job.settings.fluence == FluenceKind::bands, rays);
+}
+
 int rays_per_position(const std::vector<LightChannel>& channels, const PhotonSettings& settings) {
   const int count = static_cast<int>(channels.size());
   if (count < 1 || count > 4096) throw std::invalid_argument("light needs between 1 and 4096 wavelengths");
@@ -130,8 +150,11 @@ PhotonDistribution distribute_photons(const TensorField& field, const Geometry& 
   const int rays = rays_per_position(channels, settings);
   Job job{field,   geometry, beam,     channels,
           bending, settings, progress, BeamSampler(beam, settings.pattern, settings.photons, settings.seed),
-          rays,    0};
+          rays,    0,        nullptr};
   job.ray_area = job.positions.area_per_candidate() * static_cast<double>(channels.size()) / rays;
+
+  const std::unique_ptr<FluenceSums> fluence = make_fluence(job);
+  job.fluence = fluence.get();
 
   PhotonDistribution result;
   result.ends.assign(channels.size(), EndCounts{});
@@ -152,6 +175,7 @@ PhotonDistribution distribute_photons(const TensorField& field, const Geometry& 
     result.seconds_density += seconds_since(start);
   }
   progress.update("tracing photons", candidates, candidates);
+  if (fluence) result.fluence = fluence->grids(job.ray_area);
 
   const auto start = std::chrono::steady_clock::now();
   result.irradiance = std::move(estimator).finish();

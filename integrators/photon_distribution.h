@@ -11,6 +11,7 @@
 #include "renderer/beam.h"
 #include "renderer/density.h"
 #include "renderer/photon_map.h"
+#include "volumes/scalar_grid.h"
 
 namespace tensorray {
 
@@ -21,6 +22,9 @@ struct LightChannel {
   double power = 1;       ///< Fraction of the beam's power.
 };
 
+/// Whether to return the light inside the volume, and as how many grids.
+enum class FluenceKind { none, all_light, bands };
+
 struct PhotonSettings {
   std::uint64_t photons = 1u << 20;  ///< About how many positions emit; > 0.
   BeamPattern pattern = BeamPattern::stratified;
@@ -29,14 +33,16 @@ struct PhotonSettings {
   std::uint64_t seed = 0;
   DensitySettings density;
   bool keep_photons = false;  ///< Whether to return the photon map: 44 bytes a photon and channel.
+  FluenceKind fluence = FluenceKind::none;
 };
 
 /// How the rays of one channel ended.
 using EndCounts = std::array<std::uint64_t, ray_end_count>;
 
 struct PhotonDistribution {
-  Film irradiance;    ///< A channel each; 1 is the undisturbed beam's irradiance in that channel.
-  PhotonMap photons;  ///< Empty unless asked for; ordered by emission, then channel.
+  Film irradiance;                  ///< A channel each; 1 is the undisturbed beam's irradiance in that channel.
+  PhotonMap photons;                ///< Empty unless asked for; ordered by emission, then channel.
+  std::vector<ScalarGrid> fluence;  ///< Empty unless asked for: all channels, then each one; not named. See fluence.h.
 
   std::uint64_t positions = 0;  ///< That emitted.
   std::vector<EndCounts> ends;  ///< A channel each. Every ray of a channel has the same power, so that emitted =

@@ -128,11 +128,12 @@ void drop_unmade_outputs(SceneDescription& scene, const SceneSource& source) {
     const char* type = choice_name(scene.integrator.type);
     scene.warnings.push_back(fmt::format("`/output/{}` has no effect with {}, which makes no {}", name, type, what));
     if (output.image.empty() && output.exr.empty() && output.spectral.empty() && output.photons.empty() &&
-        output.paths.empty() && output.tubes.empty())
+        output.paths.empty() && output.tubes.empty() && output.fluence.empty())
       source.fail(fmt::format("`/output/{}` is the only output, and {} makes no {}; name an `image` or an `exr`", name,
                               type, what));
   };
   drop(output.photons, "photons", "photons", IntegratorType::photon_distribution);
+  drop(output.fluence, "fluence", "fluence", IntegratorType::photon_distribution);
   drop(output.paths, "paths", "paths", IntegratorType::path_tracing);
   drop(output.tubes, "tubes", "tubes", IntegratorType::path_tracing);
 }
@@ -199,6 +200,9 @@ void check_output(SceneDescription& scene, const SceneSource& source) {
   check(output.photons, "/output/photons");
   check(output.paths, "/output/paths");
   check(output.tubes, "/output/tubes");
+  check(output.fluence, "/output/fluence");
+  if (output.fluence_bands && output.fluence.empty() && scene.integrator.type == IntegratorType::photon_distribution)
+    scene.warnings.push_back("`/output/fluence_bands` has no effect without `/output/fluence`");
   if (scene.bending.rgb && !output.spectral.empty() && scene.integrator.type != IntegratorType::path_tracing) {
     source.fail("`/output/spectral` needs wavelengths, which `/bending/rgb` has none of; remove one of the two");
   }

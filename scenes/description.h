@@ -112,6 +112,8 @@ struct OutputDescription {
   std::filesystem::path photons;   ///< Photon map (.vdb points or .vtp); empty: none.
   std::filesystem::path paths;     ///< Bent rays (.vtp or .tck); empty: none.
   std::filesystem::path tubes;     ///< Bent rays as a mesh (.ply or .obj); empty: none.
+  std::filesystem::path fluence;   ///< The light inside the volume (.vdb); empty: none.
+  bool fluence_bands = false;      ///< Whether `fluence` also has a grid for each band.
   std::optional<double> exposure;  ///< Stops, for `image`; none: "auto".
   bool white_balance = true;       ///< Adapt the light's white to the working space's.
   std::filesystem::path ocio;      ///< OCIO config; empty: $OCIO, or the built-in one.

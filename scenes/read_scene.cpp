@@ -12,7 +12,8 @@ namespace {
 void choose_outputs(SceneDescription& scene) {
   OutputDescription& output = scene.output;
   const bool named = !output.image.empty() || !output.exr.empty() || !output.spectral.empty() ||
-                     !output.photons.empty() || !output.paths.empty() || !output.tubes.empty();
+                     !output.photons.empty() || !output.paths.empty() || !output.tubes.empty() ||
+                     !output.fluence.empty();
   if (named) return;
   output.image = std::filesystem::path(scene.path).replace_extension(".png");
   output.exr = std::filesystem::path(scene.path).replace_extension(".exr");

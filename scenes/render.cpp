@@ -1,6 +1,9 @@
 #include "scenes/render.h"
 
 #include <chrono>
+#include <set>
+
+#include <fmt/format.h>
 
 #include "scenes/render_lens.h"
 #include "scenes/render_paths.h"
@@ -9,6 +12,34 @@ namespace tensorray {
 namespace {
 
 constexpr double narrowest_white = 100;  // nm: light of a smaller range is seen as a colour.
+
+/// "550nm", with as many decimals as tell the bands apart; in RGB mode "red", "green", "blue".
+std::vector<std::string> band_names(const Scene& scene) {
+  if (scene.description.bending.rgb) return {"red", "green", "blue"};
+  constexpr int most_decimals = 9;
+  for (int decimals = 0;; ++decimals) {
+    std::vector<std::string> names;
+    for (const Band& band : scene.bands) names.push_back(fmt::format("{:.{}f}nm", band.wavelength, decimals));
+    if (decimals == most_decimals || std::set<std::string>(names.begin(), names.end()).size() == names.size())
+      return names;
+  }
+}
+
+void name_fluence(const Scene& scene, std::vector<ScalarGrid>& grids) {
+  if (grids.empty()) return;
+  grids[0].name = "fluence";
+  grids[0].metadata["tensorray:units"] = "irradiance of the undisturbed beam";
+  if (grids.size() == 1) return;
+  const std::vector<std::string> names = band_names(scene);
+  for (std::size_t i = 0; i < names.size(); ++i) {
+    ScalarGrid& grid = grids[i + 1];
+    grid.name = "fluence_" + names[i];
+    grid.metadata["tensorray:units"] = "irradiance of the undisturbed beam in this band";
+    grid.metadata["tensorray:power"] = fmt::format("{}", scene.bands[i].power);
+    if (!scene.description.bending.rgb)
+      grid.metadata["tensorray:wavelength"] = fmt::format("{} nm", scene.bands[i].wavelength);
+  }
+}
 
 Render render_photons(const Scene& scene, const Progress& progress) {
   const SceneDescription& description = scene.description;
@@ -21,6 +52,8 @@ Render render_photons(const Scene& scene, const Progress& progress) {
   if (!description.output.spectral.empty())
     result.spectral = spectral_image(light.irradiance, scene.bands, description.light.irradiance, matrix);
   result.photons = std::move(light.photons);
+  result.fluence = std::move(light.fluence);
+  name_fluence(scene, result.fluence);
   result.metadata["tensorray:photons"] = std::to_string(light.positions);
 
   Statistics& statistics = result.statistics;
@@ -46,6 +79,8 @@ PhotonDistribution distribute_photons(const Scene& scene, const Progress& progre
   settings.seed = description.seed;
   settings.density = description.integrator.density;
   settings.keep_photons = !description.output.photons.empty();
+  if (!description.output.fluence.empty())
+    settings.fluence = description.output.fluence_bands ? FluenceKind::bands : FluenceKind::all_light;
   return distribute_photons(scene.field, scene.geometry, scene.beam, scene.channels, description.bending.settings,
                             settings, progress);
 }

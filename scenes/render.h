@@ -31,6 +31,7 @@ struct Render {
                  ///< A, multiplied in, and other channels, if the method has them.
   std::optional<SpectralImage> spectral;  ///< If the scene asks for it.
   PhotonMap photons;                      ///< If the scene asks for it.
+  std::vector<ScalarGrid> fluence;        ///< The same.
   std::vector<Path> paths;                ///< Of path tracing.
   std::optional<double> exposure;         ///< Stops at which it is well shown; none: by its brightness.
   ImageMetadata metadata;                 ///< What the method has to say of the picture, for its header.

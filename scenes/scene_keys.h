@@ -156,6 +156,8 @@ void describe(OutputDescription& output, Visitor& visit) {
   visit("photons", output.photons, "the photons, one by one", endings({".vdb", ".vtp"}));
   visit("paths", output.paths, "the bent rays, with all that is known along them", endings({".vtp", ".tck"}));
   visit("tubes", output.tubes, "the bent rays as a mesh", endings({".ply", ".obj"}));
+  visit("fluence", output.fluence, "the light inside the volume, as a fog volume", endings({".vdb"}));
+  visit("fluence_bands", output.fluence_bands, "`fluence` also has a grid for each band of wavelengths");
   visit("exposure", output.exposure, "stops, for `image`", between(-100, 100).or_word("auto"));
   visit("white_balance", output.white_balance, "adapt the light's white to the working space's");
   visit("ocio", output.ocio, "OpenColorIO config; without it $OCIO, or the built-in one");

@@ -8,6 +8,7 @@
 #include "integrators/path_files.h"
 #include "renderer/image.h"
 #include "volumes/point_files.h"
+#include "volumes/scalar_files.h"
 
 namespace tensorray {
 namespace {
@@ -94,6 +95,7 @@ OutputFiles open_outputs(const OutputDescription& output) {
   if (!output.photons.empty()) files.photons.emplace(output.photons);
   if (!output.paths.empty()) files.paths.emplace(output.paths);
   if (!output.tubes.empty()) files.tubes.emplace(output.tubes);
+  if (!output.fluence.empty()) files.fluence.emplace(output.fluence);
   return files;
 }
 
@@ -115,11 +117,13 @@ std::vector<std::filesystem::path> write_outputs(const Render& render, const Sce
   if (files.paths) files.paths->write([&](const std::filesystem::path& path) { write_paths(path, render.paths); });
   if (files.tubes)
     files.tubes->write([&](const std::filesystem::path& path) { render.write_tubes(path, render.paths); });
+  if (files.fluence)
+    files.fluence->write([&](const std::filesystem::path& path) { write_scalar_vdb(path, render.fluence, metadata); });
 
   std::vector<OutputFile> complete;
   std::vector<std::filesystem::path> written;
   for (std::optional<OutputFile>* file :
-       {&files.image, &files.exr, &files.spectral, &files.photons, &files.paths, &files.tubes}) {
+       {&files.image, &files.exr, &files.spectral, &files.photons, &files.paths, &files.tubes, &files.fluence}) {
     if (!*file) continue;
     written.push_back((*file)->target());
     complete.push_back(std::move(**file));

@@ -14,7 +14,7 @@ namespace tensorray {
 
 /// The files of an OutputDescription, being written; those that it does not name are absent.
 struct OutputFiles {
-  std::optional<OutputFile> image, exr, spectral, photons, paths, tubes;
+  std::optional<OutputFile> image, exr, spectral, photons, paths, tubes, fluence;
 };
 
 /// Opens the files, so that one that cannot be written is known before the work is done.

@@ -4,7 +4,6 @@
 #include <memory>
 #include <optional>
 #include <string>
-#include <system_error>
 #include <variant>
 #include <vector>
 
@@ -16,6 +15,7 @@
 #include "scenes/output_file.h"
 #include "tools/bytes_text.h"
 #include "tools/commands.h"
+#include "tools/vdb_output.h"
 #include "volumes/generators.h"
 #include "volumes/tensor_files.h"
 
@@ -139,21 +139,13 @@ void make(const MakeOptions& options, const Progress& progress) {
              bytes_text(bytes));
 }
 
-/// An ending that other programs will know the file by; devices and pipes have none.
-std::string check_output(const std::string& text) {
-  const std::filesystem::path path(text);
-  std::error_code error;
-  if (path.extension() == ".vdb" || std::filesystem::is_other(path, error)) return "";
-  return text + " must end in .vdb";
-}
-
 void add_kind(CLI::App& parent, const std::string& kind, Progress& progress) {
   const auto options = std::make_shared<MakeOptions>();
   options->generator = generator_of(kind);
   CLI::App* command = parent.add_subcommand(kind, "Make a field of the kind " + kind);
   command->add_option("-o,--output", options->output, "The file to write, FILE.vdb")
       ->required()
-      ->check(check_output)
+      ->check(check_vdb_output)
       ->type_name("FILE");
   command->add_option("--name", options->name, "Name of the field")->default_str(kind);
   command->add_flag("--half", options->half, "Store 16-bit floats: three significant digits, half the size");

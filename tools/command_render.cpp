@@ -37,6 +37,7 @@ bool ends_with(const std::string& text, const std::string& ending) {
 std::string output_key(const std::string& file, bool draws_paths) {
   if (ends_with(file, ".spectral.exr")) return "spectral";
   if (ends_with(file, ".exr")) return "exr";
+  if (ends_with(file, ".fluence.vdb")) return "fluence";
   if (ends_with(file, ".vdb") || (ends_with(file, ".vtp") && !draws_paths)) return "photons";
   if (ends_with(file, ".vtp") || ends_with(file, ".tck")) return "paths";
   if (ends_with(file, ".ply") || ends_with(file, ".obj")) return "tubes";
@@ -49,7 +50,7 @@ std::vector<std::string> overrides_of(const RenderOptions& options) {
   std::vector<std::string> overrides = options.overrides;
   if (options.seed) overrides.push_back(fmt::format("seed={}", *options.seed));
   if (options.outputs.empty()) return overrides;
-  for (const char* key : {"image", "exr", "spectral", "photons", "paths", "tubes"})
+  for (const char* key : {"image", "exr", "spectral", "photons", "paths", "tubes", "fluence"})
     overrides.push_back(fmt::format("output.{}=null", key));
   const bool draws_paths = read_scene(options.scene, overrides).integrator.type == IntegratorType::path_tracing;
   std::map<std::string, std::string> files;
@@ -71,7 +72,7 @@ void check_statistics_path(const std::filesystem::path& path, const SceneDescrip
   const OutputDescription& output = scene.output;
   for (const auto& other :
        {scene.path, scene.field.file, output.image, output.exr, output.spectral, output.photons, output.paths,
-        output.tubes, scene.integrator.paths.paths, scene.integrator.paths.seeds.file})
+        output.tubes, output.fluence, scene.integrator.paths.paths, scene.integrator.paths.seeds.file})
     if (!other.empty() && identity(other) == identity(path) && !std::filesystem::is_other(path))
       throw CLI::ValidationError("--stats", path.string() + " is another file of this render; choose another name");
 }
@@ -147,8 +148,8 @@ void add_render_command(CLI::App& app, Progress& progress) {
   command->add_option(
       "-o,--output", options->outputs,
       "Write this instead of the scene's outputs; one of each kind may be given. The ending says the kind: "
-      ".png .jpg .tif the displayed picture, .exr scene-linear, .spectral.exr spectra, .vdb .vtp photons, of path "
-      "tracing .vtp .tck paths, .ply .obj tubes");
+      ".png .jpg .tif the displayed picture, .exr scene-linear, .spectral.exr spectra, .vdb .vtp photons, .fluence.vdb "
+      "the light inside the volume, of path tracing .vtp .tck paths, .ply .obj tubes");
   command
       ->add_option(
           "--set", options->overrides,

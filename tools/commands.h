@@ -11,9 +11,12 @@ namespace tensorray {
 
 struct Progress;
 
-void add_render_command(CLI::App& program, Progress& progress);  ///< tensorray render SCENE.json: pictures of a scene.
-void add_make_command(CLI::App& program, Progress& progress);    ///< tensorray make KIND: an analytic field.
-void add_info_command(CLI::App& program);                        ///< tensorray info FILE.vdb: what a file holds.
-void add_schema_command(CLI::App& program);                      ///< tensorray schema: the JSON Schema of scenes.
+void add_render_command(CLI::App& program, Progress& progress);   ///< tensorray render SCENE.json: pictures of a scene.
+void add_make_command(CLI::App& program, Progress& progress);     ///< tensorray make KIND: an analytic field.
+void add_import_command(CLI::App& program, Progress& progress);   ///< tensorray import FILE: another program's field.
+void add_derive_command(CLI::App& program, Progress& progress);   ///< tensorray derive FIELD.vdb: its invariants.
+void add_stretch_command(CLI::App& program, Progress& progress);  ///< tensorray stretch SCENE.json: how light spreads.
+void add_info_command(CLI::App& program);                         ///< tensorray info FILE.vdb: what a file holds.
+void add_schema_command(CLI::App& program);                       ///< tensorray schema: the JSON Schema of scenes.
 
 }  // namespace tensorray

@@ -1,30 +1,24 @@
 /// @file tools/tensorray.cpp
-/// The command line: picks the command, and turns errors into one line and an exit status.
+/// The command line: picks the command.
 
 #include <csignal>
-#include <cstdio>
+#include <stdexcept>
+#include <string>
 
 #include <CLI/CLI.hpp>
 #include <fmt/format.h>
 
 #include "integrators/progress.h"
-#include "scenes/read_scene.h"
 #include "tools/commands.h"
+#include "tools/run_and_report.h"
 
 namespace {
-
-constexpr int failed = 1, wrong_input = 2, interrupted = 130;
 
 tensorray::Progress progress;  // Global, as a signal handler can reach nothing else.
 
 void on_interrupt(int) {
   progress.cancelled = true;
   std::signal(SIGINT, SIG_DFL);  // A second Ctrl-C ends the program at once.
-}
-
-int report(const std::exception& error, int status) {
-  fmt::print(stderr, "tensorray: {}\n", error.what());
-  return status;
 }
 
 /// CLI11 says no more of an unknown command than that one is required.
@@ -51,29 +45,17 @@ int main(int argc, char** argv) {
   app.require_subcommand(1);
   tensorray::add_render_command(app, progress);
   tensorray::add_make_command(app, progress);
+  tensorray::add_derive_command(app, progress);
+  tensorray::add_import_command(app, progress);
+  tensorray::add_stretch_command(app, progress);
   tensorray::add_info_command(app);
   tensorray::add_schema_command(app);
-  try {
+  return tensorray::run_and_report([&] {
     require_known_command(app, argc, argv);
-    app.parse(argc, argv);
-    if (std::fflush(stdout) != 0) throw std::runtime_error("standard output cannot be written: the disk may be full");
-    return 0;
-  } catch (const CLI::Success& request) {  // --help, --version
-    return app.exit(request);
-  } catch (const CLI::ParseError& error) {
-    fmt::print(stderr, "tensorray: {} (--help says more)\n", error.what());
-    return wrong_input;
-  } catch (const tensorray::Cancelled&) {
-    fmt::print(stderr, "tensorray: interrupted; nothing was written\n");
-    return interrupted;
-  } catch (const tensorray::SceneError& error) {
-    return report(error, wrong_input);
-  } catch (const std::invalid_argument& error) {
-    return report(error, wrong_input);
-  } catch (const std::bad_alloc&) {
-    fmt::print(stderr, "tensorray: out of memory; lower the resolution, or the number of wavelengths\n");
-    return failed;
-  } catch (const std::exception& error) {
-    return report(error, failed);
-  }
+    try {
+      app.parse(argc, argv);
+    } catch (const CLI::Success& request) {  // --help, --version
+      app.exit(request);
+    }
+  });
 }

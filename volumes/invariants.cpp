@@ -120,10 +120,8 @@ ScalarGrid invariant_grid(Invariant which, const TensorGrid& grid) {
     to.active = from.active;
     for (int offset = 0; offset < TensorBlock::voxels; ++offset) {
       if (!from.active[offset]) continue;
-      const Matrix3d tensor = from.values[offset].cast<double>();
-      to.values[offset] = tensor.allFinite()
-                              ? static_cast<float>(std::clamp(invariant(which, tensor), -greatest, greatest))
-                              : std::numeric_limits<float>::quiet_NaN();
+      const double value = invariant(which, from.values[offset].cast<double>());
+      to.values[offset] = static_cast<float>(std::clamp(value, -greatest, greatest));
     }
   });
   return result;

@@ -45,9 +45,9 @@ double invariant(Invariant which, const Eigen::Matrix3d& tensor);
 /// The power of the tensor's unit that is the invariant's: f(c T) = c^degree f(T) for c > 0. 0: a ratio.
 int invariant_degree(Invariant which);
 
-/// The invariant at every active voxel of a field, under its name; of tensors that are not finite, not a number. What is
-/// beyond the range of single precision becomes its end. Metadata are the field's, `tensorray:units` (if there are any)
-/// the invariant's. Runs on all threads.
+/// The invariant at every active voxel of a field that is finite (see remove_non_finite), under the invariant's name.
+/// What is beyond the range of single precision becomes its end. Metadata are the field's; `tensorray:units`, if it has
+/// them, are the invariant's. Runs on all threads.
 ScalarGrid invariant_grid(Invariant which, const TensorGrid& grid);
 
 }  // namespace tensorray

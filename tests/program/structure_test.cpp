@@ -53,10 +53,12 @@ TEST(Structure, NothingIncludesUpwards) {
 }
 
 TEST(Structure, HeavyLibrariesStayOutOfHeadersAndInTheirFolder) {
-  const std::map<std::string, std::string> homes{{"openvdb", "volumes"},      {"embree", "renderer"},
-                                                 {"OpenImageIO", "renderer"}, {"OpenColorIO", "renderer"},
-                                                 {"assimp", "renderer"},      {"vtk", "volumes"}};
-  const std::regex include("#include <(openvdb|embree|OpenImageIO|OpenColorIO|assimp|vtk)");
+  const std::map<std::string, std::string> homes{{"openvdb", "volumes"},
+                                                 {"embree", "renderer"},
+                                                 {"OpenImageIO", "renderer"},
+                                                 {"OpenColorIO", "renderer"},
+                                                 {"assimp", "renderer"}};
+  const std::regex include("#include <(openvdb|embree|OpenImageIO|OpenColorIO|assimp)");
   std::map<std::string, std::set<std::string>> users;
   for (const auto& [folder, others] : allowed)
     for (const Line& line : lines_of(folder)) {
@@ -76,11 +78,21 @@ TEST(Structure, HeavyLibrariesStayOutOfHeadersAndInTheirFolder) {
   for (const auto& [library, files] : only) EXPECT_EQ(users[library], files) << library;
 }
 
+TEST(Structure, ForeignFormatsStayInVolumesAndTheImporter) {
+  const std::regex include("#include <(vtk|teem|nifti|nrrd)");
+  for (const auto& [folder, others] : allowed)
+    for (const Line& line : lines_of(folder)) {
+      if (!std::regex_search(line.text, include)) continue;
+      const bool source_of_volumes = folder == "volumes" && line.file.substr(line.file.size() - 2) != ".h";
+      EXPECT_TRUE(source_of_volumes || line.file.rfind("tools/import/", 0) == 0) << line.file << ": " << line.text;
+    }
+}
+
 TEST(Structure, LibrariesNeitherPrintNorExit) {
   const std::regex forbidden(R"(std::(cout|cerr|clog|exit|abort|quick_exit)\b|\b(printf|puts|perror)\(|fmt::print)");
   for (const auto& [folder, others] : allowed) {
-    if (folder == "tools") continue;
-    for (const Line& line : lines_of(folder))
+    // Of the tools, the importer is a library.
+    for (const Line& line : lines_of(folder == "tools" ? "tools/import" : folder))
       EXPECT_FALSE(std::regex_search(line.text, forbidden)) << line.file << ": " << line.text;
   }
 }

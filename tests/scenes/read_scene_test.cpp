@@ -287,7 +287,8 @@ TEST_F(ReadScene, ValuesOutOfRange) {
                         "output.image=png",
                         "output.exr=picture.png",
                         "output.spectral=spectra.csv",
-                        "output.photons=photons.ply"};
+                        "output.photons=photons.ply",
+                        "output.fluence=light.exr"};
   for (const std::string& change : wrong) {
     std::string pointer = "/" + change.substr(0, change.find('='));
     for (char& c : pointer) c = c == '.' ? '/' : c;

@@ -1,0 +1,115 @@
+#pragma once
+/// @file tests/import/openfoam_case.h
+/// An OpenFOAM case as blockMesh and a solver would write it, in ASCII: 2 x 2 x 2 hexahedra of 1 x 0.5 x 2.
+
+#include <array>
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "tests/import/mesh_files.h"
+
+namespace tensorray {
+
+class OpenFoamCase {
+ public:
+  static constexpr int cells = 8;
+
+  /// Components of a cell's value: `at_end` is the time, 0 or 1. The numbers are in OpenFOAM's order.
+  static double value(int cell, int component, int at_end) { return 1000 * at_end + 10 * cell + component; }
+
+  static void write(const std::filesystem::path& folder) {
+    OpenFoamCase mesh;
+    mesh.make();
+    mesh.write_mesh(folder / "constant" / "polyMesh");
+    write_bytes(
+        folder / "system" / "controlDict",
+        head("dictionary", "controlDict") +
+            "application none;\nstartFrom startTime;\nstartTime 0;\nstopAt endTime;\nendTime 0.5;\ndeltaT 0.5;\n"
+            "writeControl timeStep;\nwriteInterval 1;\n");
+    for (const int at_end : {0, 1}) {
+      const std::filesystem::path time = folder / (at_end ? "0.5" : "0");
+      write_field(time / "U", "volVectorField", "vector", 3, at_end);
+      write_field(time / "sigma", "volSymmTensorField", "symmTensor", 6, at_end);
+      write_field(time / "gradU", "volTensorField", "tensor", 9, at_end);
+    }
+  }
+
+ private:
+  using Face = std::array<int, 4>;
+  struct Side {
+    int owner, neighbour;
+    Face face;
+  };
+
+  static int point(int i, int j, int k) { return i + 3 * (j + 3 * k); }
+
+  static std::string head(const std::string& kind, const std::string& object) {
+    return "FoamFile\n{\n    version 2.0;\n    format ascii;\n    class " + kind + ";\n    object " + object + ";\n}\n";
+  }
+
+  static std::string list(const std::vector<std::string>& rows) {
+    std::string text = std::to_string(rows.size()) + "\n(\n";
+    for (const std::string& row : rows) text += row + "\n";
+    return text + ")\n";
+  }
+
+  static void write_field(const std::filesystem::path& path, const std::string& kind, const std::string& type,
+                          int components, int at_end) {
+    std::vector<std::string> rows;
+    for (int cell = 0; cell < cells; ++cell) {
+      std::string row = "(";
+      for (int c = 0; c < components; ++c) row += std::to_string(value(cell, c, at_end)) + " ";
+      rows.push_back(row + ")");
+    }
+    write_bytes(path, head(kind, path.filename().string()) +
+                          "dimensions [0 0 0 0 0 0 0];\ninternalField nonuniform List<" + type + ">\n" + list(rows) +
+                          ";\nboundaryField\n{\n    walls\n    {\n        type zeroGradient;\n    }\n}\n");
+  }
+
+  /// Faces as OpenFOAM orders them: inner ones by owner and then neighbour, then those of the boundary.
+  void make() {
+    for (int cell = 0; cell < cells; ++cell) {
+      const int i = cell % 2, j = cell / 2 % 2, k = cell / 4;
+      const auto p = [&](int a, int b, int c) { return point(i + a, j + b, k + c); };
+      add(i == 0, cell, cell + 1, {p(1, 0, 0), p(1, 1, 0), p(1, 1, 1), p(1, 0, 1)});
+      add(j == 0, cell, cell + 2, {p(0, 1, 0), p(0, 1, 1), p(1, 1, 1), p(1, 1, 0)});
+      add(k == 0, cell, cell + 4, {p(0, 0, 1), p(1, 0, 1), p(1, 1, 1), p(0, 1, 1)});
+      if (i == 0) add(false, cell, 0, {p(0, 0, 0), p(0, 0, 1), p(0, 1, 1), p(0, 1, 0)});
+      if (j == 0) add(false, cell, 0, {p(0, 0, 0), p(1, 0, 0), p(1, 0, 1), p(0, 0, 1)});
+      if (k == 0) add(false, cell, 0, {p(0, 0, 0), p(0, 1, 0), p(1, 1, 0), p(1, 0, 0)});
+    }
+  }
+
+  void add(bool inner, int owner, int neighbour, const Face& face) {
+    (inner ? inner_ : outer_).push_back({owner, neighbour, face});
+  }
+
+  void write_mesh(const std::filesystem::path& folder) const {
+    std::vector<std::string> points, faces, owner, neighbour;
+    for (int n = 0; n < 27; ++n) {
+      points.push_back("(" + std::to_string(n % 3) + " " + std::to_string(0.5 * (n / 3 % 3)) + " " +
+                       std::to_string(2 * (n / 9)) + ")");
+    }
+    for (const auto* sides : {&inner_, &outer_}) {
+      for (const Side& side : *sides) {
+        std::string face = "4(";
+        for (const int p : side.face) face += std::to_string(p) + " ";
+        faces.push_back(face + ")");
+        owner.push_back(std::to_string(side.owner));
+        if (sides == &inner_) neighbour.push_back(std::to_string(side.neighbour));
+      }
+    }
+    write_bytes(folder / "points", head("vectorField", "points") + list(points));
+    write_bytes(folder / "faces", head("faceList", "faces") + list(faces));
+    write_bytes(folder / "owner", head("labelList", "owner") + list(owner));
+    write_bytes(folder / "neighbour", head("labelList", "neighbour") + list(neighbour));
+    write_bytes(folder / "boundary", head("polyBoundaryMesh", "boundary") +
+                                         "1\n(\nwalls\n{\n    type wall;\n    nFaces " + std::to_string(outer_.size()) +
+                                         ";\n    startFace " + std::to_string(inner_.size()) + ";\n}\n)\n");
+  }
+
+  std::vector<Side> inner_, outer_;
+};
+
+}  // namespace tensorray

@@ -1,0 +1,49 @@
+#include "tools/import/tensor_order.h"
+
+#include <stdexcept>
+
+#include <gtest/gtest.h>
+
+namespace tensorray {
+namespace {
+
+/// Entry (i, j) is 10 i + j, 11 to 33, of the symmetric tensor the upper one.
+Eigen::Matrix3d numbered(bool symmetric) {
+  Eigen::Matrix3d tensor;
+  tensor << 11, 12, 13, 21, 22, 23, 31, 32, 33;
+  if (symmetric) tensor.triangularView<Eigen::StrictlyLower>() = tensor.transpose();
+  return tensor;
+}
+
+TEST(TensorOrder, EachOrderPutsComponentsInTheirPlaces) {
+  const double vtk[] = {11, 22, 33, 12, 23, 13}, fsl[] = {11, 12, 13, 22, 23, 33}, mrtrix[] = {11, 22, 33, 12, 13, 23},
+               voigt[] = {11, 22, 33, 23, 13, 12}, lower[] = {11, 12, 22, 13, 23, 33},
+               full[] = {11, 12, 13, 21, 22, 23, 31, 32, 33};
+  EXPECT_EQ(tensor_of(vtk, TensorOrder::vtk), numbered(true));
+  EXPECT_EQ(tensor_of(fsl, TensorOrder::fsl), numbered(true));
+  EXPECT_EQ(tensor_of(mrtrix, TensorOrder::mrtrix), numbered(true));
+  EXPECT_EQ(tensor_of(voigt, TensorOrder::voigt), numbered(true));
+  EXPECT_EQ(tensor_of(lower, TensorOrder::lower_triangle), numbered(true));
+  EXPECT_EQ(tensor_of(full, TensorOrder::full), numbered(false));
+}
+
+TEST(TensorOrder, NamesAreThoseOfTheirOrders) {
+  EXPECT_EQ(tensor_order_of("vtk"), TensorOrder::vtk);
+  EXPECT_EQ(tensor_order_of("fsl"), TensorOrder::fsl);
+  EXPECT_EQ(tensor_order_of("mrtrix"), TensorOrder::mrtrix);
+  EXPECT_EQ(tensor_order_of("voigt"), TensorOrder::voigt);
+  for (const std::string& name : tensor_order_names()) EXPECT_NO_THROW(tensor_order_of(name));
+}
+
+TEST(TensorOrder, UnknownNamesAreErrorsThatListTheKnown) {
+  for (const std::string name : {"abaqus", "", "VTK"}) try {
+      tensor_order_of(name);
+      ADD_FAILURE() << name;
+    } catch (const std::invalid_argument& error) {
+      EXPECT_EQ(std::string(error.what()),
+                "--order: unknown order \"" + name + "\"; there are vtk, fsl, mrtrix, voigt");
+    }
+}
+
+}  // namespace
+}  // namespace tensorray

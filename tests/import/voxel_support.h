@@ -1,0 +1,163 @@
+#pragma once
+/// @file tests/import/voxel_support.h
+/// Temporary files of voxels, the data sets, and looks at what was made of them.
+
+#include <array>
+#include <cmath>
+#include <cstdlib>
+#include <cstring>
+#include <filesystem>
+#include <fstream>
+#include <functional>
+#include <iterator>
+#include <map>
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+#include <Eigen/Eigenvalues>
+#include <gtest/gtest.h>
+#include <unistd.h>
+
+#include "tools/import/lattice.h"
+
+namespace tensorray::test {
+
+/// A path in the tests' temporary folder that no other process uses; what is there is removed at the end.
+class TemporaryFile : public std::filesystem::path {
+ public:
+  explicit TemporaryFile(const std::string& name) : path(testing::TempDir()) {
+    *this /= "tensorray_" + std::to_string(::getpid()) + "_" + name;
+  }
+  TemporaryFile(const std::string& name, const std::string& contents) : TemporaryFile(name) { write(contents); }
+  ~TemporaryFile() { std::filesystem::remove(*this); }
+  TemporaryFile(const TemporaryFile&) = delete;
+  TemporaryFile& operator=(const TemporaryFile&) = delete;
+
+  void write(const std::string& contents) const { std::ofstream(*this, std::ios::binary) << contents; }
+};
+
+inline std::filesystem::path data_file(const std::string& name) {
+  const char* folder = std::getenv("TENSORRAY_DATA");
+  return std::filesystem::path(folder ? folder : TENSORRAY_SOURCE_DIR "/../shared/data") / name;
+}
+
+#define TENSORRAY_NEEDS(path) \
+  if (!std::filesystem::exists(path)) GTEST_SKIP() << path << " is not here: set TENSORRAY_DATA"
+
+inline std::string contents_of(const std::filesystem::path& path) {
+  std::ifstream file(path, std::ios::binary);
+  return {std::istreambuf_iterator<char>(file), {}};
+}
+
+template <class Number>
+std::string bytes_of(const std::vector<Number>& numbers) {
+  return {reinterpret_cast<const char*>(numbers.data()), numbers.size() * sizeof(Number)};
+}
+
+/// The tensor at an index, or null where it is inactive.
+inline const Eigen::Matrix3f* voxel(const TensorGrid& grid, const Eigen::Vector3i& index) {
+  for (const TensorBlock& block : grid.blocks) {
+    const Eigen::Vector3i p = index - block.origin;
+    if ((p.array() < 0).any() || (p.array() >= TensorBlock::size).any()) continue;
+    const int offset = TensorBlock::offset(p.x(), p.y(), p.z());
+    return block.active[offset] ? &block.values[offset] : nullptr;
+  }
+  return nullptr;
+}
+
+inline TensorGrid tensors_of(const Lattice& lattice, const std::string& order = "") {
+  LatticeReport report;
+  return tensors_of(lattice, order.empty() ? std::nullopt : std::optional(tensor_order_of(order)), report);
+}
+
+/// Calls `visit(index, tensor)` at the active voxels.
+inline void for_each_voxel(const TensorGrid& grid,
+                           const std::function<void(const Eigen::Vector3i&, const Eigen::Matrix3d&)>& visit) {
+  for (const TensorBlock& block : grid.blocks)
+    for (int offset = 0; offset < TensorBlock::voxels; ++offset)
+      if (block.active[offset])
+        visit(block.origin + TensorBlock::position(offset), block.values[offset].cast<double>());
+}
+
+/// The least and the greatest eigenvalue of a symmetric field, and how many voxels have a negative one.
+struct Spectrum {
+  double least = INFINITY, greatest = -INFINITY;
+  int negative = 0;
+};
+
+inline Spectrum spectrum_of(const TensorGrid& grid) {
+  Spectrum spectrum;
+  for_each_voxel(grid, [&](const Eigen::Vector3i&, const Eigen::Matrix3d& tensor) {
+    const Eigen::Vector3d values = Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(tensor).eigenvalues();
+    spectrum.least = std::min(spectrum.least, values.minCoeff());
+    spectrum.greatest = std::max(spectrum.greatest, values.maxCoeff());
+    if (values.minCoeff() < 0) ++spectrum.negative;
+  });
+  return spectrum;
+}
+
+/// How many fibres go on: of the voxels p with a fractional anisotropy above one half, how often the major eigenvector
+/// e, after `turn`, is within half a radian of that of such a voxel at p ± step e. Tensors in a wrong frame have fewer:
+/// fibres then point out of their bundles.
+inline int coherence(const TensorGrid& grid, const Eigen::Matrix3d& turn, double step) {
+  const auto major = [&](const Eigen::Matrix3d& tensor) -> Eigen::Vector3d {
+    const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> solver(tensor);
+    const Eigen::Vector3d values = solver.eigenvalues();
+    const double anisotropy = std::sqrt(1.5) * (values.array() - values.mean()).matrix().norm() / values.norm();
+    if (values[0] <= 0 || anisotropy < 0.5) return Eigen::Vector3d::Zero();
+    return turn * solver.eigenvectors().col(2);
+  };
+  std::map<std::array<int, 3>, Eigen::Vector3d> directions;
+  for_each_voxel(grid, [&](const Eigen::Vector3i& index, const Eigen::Matrix3d& tensor) {
+    const Eigen::Vector3d direction = major(tensor);
+    if (!direction.isZero()) directions[{index.x(), index.y(), index.z()}] = direction;
+  });
+  const Eigen::Affine3d to_index = grid.to_world.inverse();
+  int count = 0;
+  for (const auto& [index, here] : directions)
+    for (const double side : {-step, step}) {
+      const Eigen::Vector3d from = grid.to_world * Eigen::Vector3d(index[0], index[1], index[2]);
+      const Eigen::Vector3i to = (to_index * (from + side * here)).array().round().cast<int>();
+      const auto next = directions.find({to.x(), to.y(), to.z()});
+      if (next != directions.end() && std::abs(here.dot(next->second)) > std::cos(0.5)) ++count;
+    }
+  return count;
+}
+
+/// Expects an error of one line with `words` in it, whatever its type is.
+inline void expect_error(const std::function<void()>& run, const std::vector<std::string>& words) {
+  try {
+    run();
+    ADD_FAILURE() << "no error, which should speak of " << words.front();
+  } catch (const std::exception& error) {
+    const std::string text = error.what();
+    EXPECT_EQ(text.find('\n'), std::string::npos) << text;
+    for (const std::string& word : words) EXPECT_NE(text.find(word), std::string::npos) << text << "\nlacks " << word;
+  }
+}
+
+/// A rotation without any symmetry.
+inline Eigen::Matrix3d rotation() {
+  return Eigen::AngleAxisd(0.7, Eigen::Vector3d(1, -2, 0.5).normalized()).toRotationMatrix();
+}
+
+/// A symmetric tensor without any symmetry of axes.
+inline Eigen::Matrix3d symmetric_tensor() {
+  Eigen::Matrix3d tensor;
+  tensor << 1.5, 0.25, -0.5, 0.25, 0.75, 0.125, -0.5, 0.125, 2;
+  return tensor;
+}
+
+inline Eigen::Matrix3d general_tensor() {
+  Eigen::Matrix3d tensor;
+  tensor << 0.5, -1.25, 0.375, 0.75, -0.5, 1.0, -0.25, 0.625, 0.25;
+  return tensor;
+}
+
+inline void expect_near(const Eigen::Matrix3d& expected, const Eigen::Matrix3f* found, double tolerance = 1e-6) {
+  ASSERT_NE(found, nullptr);
+  EXPECT_LT((found->cast<double>() - expected).norm(), tolerance * expected.norm()) << *found << "\nnot\n" << expected;
+}
+
+}  // namespace tensorray::test

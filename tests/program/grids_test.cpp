@@ -1,0 +1,213 @@
+// What flows out into OpenVDB's tools: invariants, the light inside the volume, the stretch of its bundles.
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+
+#include <openvdb/openvdb.h>
+
+#include "renderer/image.h"
+#include "tests/program/support.h"
+
+namespace tensorray {
+namespace {
+
+using namespace test;
+
+class Grids : public Program {
+ protected:
+  void SetUp() override {
+    openvdb::initialize();
+    Program::SetUp();
+  }
+
+  openvdb::FloatGrid::Ptr read_grid(const std::string& file, const std::string& name) const {
+    openvdb::io::File vdb(in_folder(file).string());
+    vdb.open();
+    return openvdb::gridPtrCast<openvdb::FloatGrid>(vdb.readGrid(name));
+  }
+
+  std::vector<std::string> grid_names(const std::string& file) const {
+    openvdb::io::File vdb(in_folder(file).string());
+    vdb.open();
+    std::vector<std::string> names;
+    for (auto name = vdb.beginName(); name != vdb.endName(); ++name) names.push_back(*name);
+    std::sort(names.begin(), names.end());
+    return names;
+  }
+
+  /// Fails with status 2 and one line that has all of `parts`.
+  void expect_wrong_input(const std::vector<std::string>& arguments, const std::vector<std::string>& parts) const {
+    const auto before = files();
+    const Outcome outcome = run(arguments);
+    EXPECT_EQ(outcome.status, 2) << outcome.error;
+    EXPECT_EQ(std::count(outcome.error.begin(), outcome.error.end(), '\n'), 1) << outcome.error;
+    for (const std::string& part : parts) EXPECT_NE(outcome.error.find(part), std::string::npos) << outcome.error;
+    EXPECT_EQ(files(), before);
+  }
+};
+
+std::string text(const openvdb::MetaMap& metadata, const std::string& key) {
+  return metadata.getMetadata<openvdb::StringMetadata>(key)->value();
+}
+
+TEST_F(Grids, DeriveMakesFloatGridsNamedByTheirInvariants) {
+  std::vector<std::string> make{"make", "constant", "-o", "t.vdb", "--resolution", "9", "--tensor"};
+  for (const char* number : {"3", "0", "0", "0", "1", "0", "0", "0", "-2"}) make.emplace_back(number);
+  run_well(make);
+  run_well({"derive", "t.vdb", "--invariant", "norm", "--invariant", "smallest_eigenvalue", "--invariant", "norm", "-o",
+            "i.vdb"});
+  EXPECT_EQ(grid_names("i.vdb"), (std::vector<std::string>{"norm", "smallest_eigenvalue"}));
+  const auto norm = read_grid("i.vdb", "norm");
+  EXPECT_EQ(norm->activeVoxelCount(), 729u);
+  for (auto voxel = norm->cbeginValueOn(); voxel; ++voxel) ASSERT_NEAR(*voxel, std::sqrt(14.0), 1e-6);
+  const auto smallest = read_grid("i.vdb", "smallest_eigenvalue");
+  for (auto voxel = smallest->cbeginValueOn(); voxel; ++voxel) ASSERT_NEAR(*voxel, -2, 1e-6);
+
+  openvdb::io::File vdb(in_folder("t.vdb").string());
+  vdb.open();
+  EXPECT_EQ(vdb.readGrid("constant_row0")->transform(), norm->transform());
+}
+
+TEST_F(Grids, DeriveTellsWhatThereIs) {
+  EXPECT_NE(run_well({"derive", "--help"}).out.find("fractional_anisotropy"), std::string::npos);
+  run_well({"make", "vortex", "-o", "t.vdb", "--resolution", "9"});
+  expect_wrong_input({"derive", "t.vdb", "--invariant", "curl", "-o", "i.vdb"}, {"curl", "norm", "vorticity"});
+  expect_wrong_input({"derive", "t.vdb", "--invariant", "norm", "-o", "t.vdb"}, {"t.vdb", "the field itself"});
+  expect_wrong_input({"derive", "t.vdb", "--invariant", "norm", "-o", "i.nrrd"}, {".vdb"});
+  expect_wrong_input({"derive", "t.vdb", "-o", "i.vdb"}, {"--invariant"});
+  const Outcome other = run({"derive", "t.vdb", "--name", "stress", "--invariant", "norm", "-o", "i.vdb"});
+  EXPECT_EQ(other.status, 1);
+  EXPECT_NE(other.error.find("vortex"), std::string::npos) << other.error;
+  EXPECT_EQ(files(), std::vector<std::string>{"t.vdb"});
+}
+
+TEST_F(Grids, FluenceIsAFogVolumeInTheFieldsVoxels) {
+  write("scene.json", small_scene());
+  run_well({"render", "scene.json", "-q", "-o", "light.fluence.vdb"});
+  EXPECT_EQ(files(), (std::vector<std::string>{"light.fluence.vdb", "scene.json"}));
+  EXPECT_EQ(grid_names("light.fluence.vdb"), std::vector<std::string>{"fluence"});
+  const auto grid = read_grid("light.fluence.vdb", "fluence");
+  EXPECT_EQ(grid->getGridClass(), openvdb::GRID_FOG_VOLUME);
+  const openvdb::CoordBBox box = grid->evalActiveVoxelBoundingBox();
+  EXPECT_EQ(box.dim().x(), 17);
+  EXPECT_EQ(box.dim().y(), 17);
+  double sum = 0;
+  for (auto voxel = grid->cbeginValueOn(); voxel; ++voxel) sum += *voxel;
+  EXPECT_NEAR(sum / static_cast<double>(grid->activeVoxelCount()), 1, 0.15);
+}
+
+TEST_F(Grids, FluenceHasAGridForEachBandIfAsked) {
+  write("scene.json", small_scene());
+  const std::vector<std::string> command{
+      "render", "scene.json", "-q", "--set", "output.fluence=f.vdb", "--set", "output.fluence_bands=true"};
+  run_well(command);
+  const std::vector<std::string> bands{"fluence_424nm", "fluence_511nm", "fluence_599nm", "fluence_686nm"};
+  std::vector<std::string> all = bands;
+  all.insert(all.begin(), "fluence");
+  EXPECT_EQ(grid_names("f.vdb"), all);
+  EXPECT_EQ(text(*read_grid("f.vdb", bands[1]), "tensorray:wavelength"), "511.25 nm");
+
+  // Together they are the light.
+  const auto together = read_grid("f.vdb", "fluence");
+  std::vector<openvdb::FloatGrid::Ptr> grids;
+  std::vector<double> powers;
+  double sum = 0;
+  for (const std::string& band : bands) {
+    grids.push_back(read_grid("f.vdb", band));
+    powers.push_back(std::stod(text(*grids.back(), "tensorray:power")));
+    sum += powers.back();
+  }
+  EXPECT_NEAR(sum, 1, 1e-5);
+  for (auto voxel = together->cbeginValueOn(); voxel; ++voxel) {
+    double expected = 0;
+    for (std::size_t i = 0; i < grids.size(); ++i) expected += powers[i] * grids[i]->tree().getValue(voxel.getCoord());
+    ASSERT_NEAR(*voxel, expected, 1e-4 * expected);
+  }
+
+  std::vector<std::string> rgb = command;
+  rgb.insert(rgb.end(), {"--set", "bending.rgb=[0.1,0.2,0.3]"});
+  run_well(rgb);
+  EXPECT_EQ(grid_names("f.vdb"), (std::vector<std::string>{"fluence", "fluence_blue", "fluence_green", "fluence_red"}));
+}
+
+TEST_F(Grids, FluenceIsTheSameFileOnAnyNumberOfThreads) {
+  write("scene.json", small_scene());
+  const auto on_threads = [&](const std::string& threads) {
+    run_well({"render", "scene.json", "-q", "--threads", threads, "-o", "f.fluence.vdb", "--set",
+              "output.fluence_bands=true"});
+    return read_file(in_folder("f.fluence.vdb"));
+  };
+  const std::string one = on_threads("1");
+  EXPECT_TRUE(one == on_threads("2"));
+  EXPECT_TRUE(one == on_threads("4"));
+}
+
+TEST_F(Grids, FluenceIsOfPhotonsAlone) {
+  write("scene.json", small_scene());
+  expect_wrong_input({"render", "scene.json", "-q", "-o", "a.fluence.vdb", "--set", "integrator.type=lens"},
+                     {"/output/fluence", "lens makes no fluence"});
+  expect_wrong_input({"render", "scene.json", "-q", "--set", "output.fluence=a.png"}, {"/output/fluence", ".vdb"});
+  expect_wrong_input({"render", "scene.json", "-q", "-o", "a.vdb", "--stats", "b.fluence.vdb", "-o", "b.fluence.vdb"},
+                     {"--stats", "b.fluence.vdb"});
+}
+
+TEST_F(Grids, StretchIsAGridAndAPicture) {
+  write("scene.json", small_scene());
+  const auto stretch = [&](const std::string& threads, const std::string& name) {
+    run_well({"stretch", "scene.json", "-q", "-o", name + ".vdb", "-o", name + ".png", "-o", name + ".exr",
+              "--resolution", "12", "--pixels", "40", "--threads", threads});
+  };
+  stretch("1", "a");
+  stretch("2", "b");
+  for (const char* ending : {".vdb", ".png", ".exr"})
+    EXPECT_TRUE(read_file(in_folder(std::string("a") + ending)) == read_file(in_folder(std::string("b") + ending)));
+  const auto grid = read_grid("a.vdb", "stretch");
+  EXPECT_EQ(grid->evalActiveVoxelBoundingBox().dim().x(), 12);
+  EXPECT_EQ(text(*grid, "tensorray:units"), "1/length");
+  float greatest = 0;
+  for (auto voxel = grid->cbeginValueOn(); voxel; ++voxel) greatest = std::max(greatest, *voxel);
+  EXPECT_GT(greatest, 0.01f);
+  const Image image = read_image(in_folder("a.exr"));
+  EXPECT_EQ(image.width, 40);
+  EXPECT_EQ(std::count(image.channels.begin(), image.channels.end(), "stretch"), 1);
+
+  expect_wrong_input({"stretch", "scene.json", "-o", "a.txt"}, {"a.txt", ".vdb", ".exr"});
+  expect_wrong_input({"stretch", "scene.json", "-o", "c.vdb", "--length", "-1"}, {"--length"});
+  expect_wrong_input(
+      {"stretch", "scene.json", "-q", "-o", "c.vdb", "--wavelength", "500", "--set", "bending.rgb=[0.1,0.2,0.3]"},
+      {"rgb"});
+}
+
+/// What /usr/bin/python3 with OpenVDB's module prints; empty where there is none.
+std::string ask_python(const std::string& program) {
+  std::string printed;
+  const std::string command = "/usr/bin/python3 -c '" + program + "' 2>/dev/null";
+  FILE* const pipe = popen(command.c_str(), "r");
+  if (!pipe) return printed;
+  char buffer[256];
+  while (std::fgets(buffer, sizeof buffer, pipe)) printed += buffer;
+  pclose(pipe);
+  return printed;
+}
+
+TEST_F(Grids, PythonReadsThem) {
+  const std::string import = "try: import pyopenvdb as vdb\nexcept ImportError: import openvdb as vdb\n";
+  if (ask_python(import + "print(1)").empty()) GTEST_SKIP() << "python3 has no OpenVDB (python3-openvdb)";
+  write("scene.json", small_scene());
+  run_well({"make", "vortex", "-o", "t.vdb", "--resolution", "9"});
+  run_well({"derive", "t.vdb", "--invariant", "vorticity", "-o", "i.vdb"});
+  run_well({"render", "scene.json", "-q", "-o", "f.fluence.vdb"});
+  const auto python = [&](const std::string& file, const std::string& print) {
+    return ask_python(import + "grids, metadata = vdb.readAll(\"" + in_folder(file).string() + "\")\nprint(" + print +
+                      ")");
+  };
+  EXPECT_EQ(python("t.vdb", "*sorted(g.name for g in grids)"), "vortex_row0 vortex_row1 vortex_row2\n");
+  EXPECT_EQ(python("i.vdb", "grids[0].name, grids[0].activeVoxelCount()"), "vorticity 729\n");
+  const auto fluence = read_grid("f.fluence.vdb", "fluence");
+  EXPECT_EQ(python("f.fluence.vdb", "grids[0].name, grids[0].gridClass, grids[0].activeVoxelCount()"),
+            "fluence fog volume " + std::to_string(fluence->activeVoxelCount()) + "\n");
+}
+
+}  // namespace
+}  // namespace tensorray

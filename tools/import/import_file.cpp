@@ -1,0 +1,148 @@
+#include "tools/import/import_file.h"
+
+#include <algorithm>
+#include <cctype>
+#include <stdexcept>
+#include <variant>
+
+#include <vtkCellData.h>
+#include <vtkDataArray.h>
+#include <vtkImageData.h>
+#include <vtkPointData.h>
+
+#include "tools/import/lattice_files.h"
+#include "tools/import/mesh_boundary.h"
+#include "tools/import/vtk_source.h"
+
+namespace tensorray {
+namespace {
+
+std::string lower(std::string text) {
+  std::transform(text.begin(), text.end(), text.begin(), [](unsigned char c) { return std::tolower(c); });
+  return text;
+}
+
+bool ends_with(const std::string& text, const std::string& ending) {
+  return text.size() >= ending.size() && text.compare(text.size() - ending.size(), ending.size(), ending) == 0;
+}
+
+/// The reader of a format of voxels, or null.
+using OpenLattice = Lattice (*)(const std::filesystem::path&);
+
+OpenLattice lattice_reader(const std::filesystem::path& path) {
+  const std::string name = lower(path.filename().string());
+  for (const char* ending : {".nrrd", ".nhdr"})
+    if (ends_with(name, ending)) return open_nrrd;
+  for (const char* ending : {".nii", ".nii.gz", ".hdr", ".img"})
+    if (ends_with(name, ending)) return open_nifti;
+  return ends_with(name, ".npy") ? open_npy : nullptr;
+}
+
+bool wants_sampling(const ImportSettings& settings) {
+  return !std::holds_alternative<std::monostate>(settings.sampling.resolution);
+}
+
+/// Leaves the voxels whose centres are in `bounds`.
+void crop(TensorGrid& grid, const Eigen::AlignedBox3d& bounds) {
+  for (TensorBlock& block : grid.blocks)
+    for (int offset = 0; offset < TensorBlock::voxels; ++offset) {
+      const Eigen::Vector3i index = block.origin + TensorBlock::position(offset);
+      if (!block.active[offset] || bounds.contains(grid.to_world * index.cast<double>())) continue;
+      block.active.reset(offset);
+      block.values[offset].setZero();
+    }
+  grid.blocks.erase(std::remove_if(grid.blocks.begin(), grid.blocks.end(),
+                                   [](const TensorBlock& block) { return block.active.none(); }),
+                    grid.blocks.end());
+}
+
+void make_symmetric(TensorGrid& grid) {
+  for (TensorBlock& block : grid.blocks)
+    for (Eigen::Matrix3f& value : block.values) value = (0.5f * (value + value.transpose())).eval();
+}
+
+/// @param name  Of the file, for messages.
+TensorGrid import_lattice(const Lattice& lattice, const ImportSettings& settings, const std::string& name,
+                          ImportReport& report) {
+  if (!settings.boundary.empty())
+    throw std::invalid_argument(name + " has voxels, which have no body: leave --boundary out");
+  report.lattice.emplace();
+  TensorGrid grid = settings.take == Take::tensor ? tensors_of(lattice, settings.order, *report.lattice)
+                                                  : gradient_of(lattice, *report.lattice);
+  if (settings.take == Take::strain) make_symmetric(grid);
+  if (settings.sampling.bounds) crop(grid, *settings.sampling.bounds);
+  grid.name = lattice.array;
+  report.lattice->active = grid.active_voxels();
+  return grid;
+}
+
+TensorGrid import_mesh(vtkDataSet& data, const ArrayChoice& array, const ImportSettings& settings,
+                       const Progress& progress, ImportReport& report) {
+  report.mesh_cells = static_cast<std::size_t>(data.GetNumberOfCells());
+  if (!settings.boundary.empty()) {
+    progress.update("finding the boundary", 0, 1);
+    report.boundary_triangles = write_boundary(data, settings.boundary);
+    if (report.boundary_triangles == 0)
+      throw std::invalid_argument(settings.files.front().string() +
+                                  " is a convex mesh, with no body in it: leave --boundary out");
+  }
+  progress.update("making tensors", 0, 1);
+  const auto mesh = with_tensors(data, array, settings.take, settings.order);
+  report.mesh.emplace();
+  TensorGrid grid = sample_mesh(*mesh, settings.sampling, progress, *report.mesh);
+  grid.name = array.name;
+  return grid;
+}
+
+/// A VTK image's voxels are kept, unless others are asked for.
+TensorGrid import_data_set(vtkSmartPointer<vtkDataSet> data, const ImportSettings& settings, const Progress& progress,
+                           ImportReport& report) {
+  const ArrayChoice array = choose_array(*data, settings.array, settings.take);
+  const auto image = vtkSmartPointer<vtkImageData>(vtkImageData::SafeDownCast(data));
+  if (!image || wants_sampling(settings)) return import_mesh(*data, array, settings, progress, report);
+  data = nullptr;  // So that the lattice alone holds the numbers, and can give them back.
+  vtkDataSetAttributes* attributes = array.of_cells ? static_cast<vtkDataSetAttributes*>(image->GetCellData())
+                                                    : static_cast<vtkDataSetAttributes*>(image->GetPointData());
+  vtkSmartPointer<vtkDataArray> values = attributes->GetArray(array.name.c_str());
+  Lattice lattice = lattice_of(image, values, array.of_cells);
+  values = nullptr;
+  return import_lattice(lattice, settings, settings.files.front().string(), report);
+}
+
+TensorGrid import_any(const ImportSettings& settings, const Progress& progress, ImportReport& report) {
+  const std::filesystem::path& file = settings.files.front();
+  if (settings.files.size() == 2) {
+    return import_data_set(read_plot3d(file, settings.files[1]), settings, progress, report);
+  }
+  const OpenLattice open = lattice_reader(file);
+  if (!open) return import_data_set(read_vtk_source(file), settings, progress, report);
+  if (wants_sampling(settings))
+    throw std::invalid_argument(file.string() +
+                                " has voxels of its own, which are kept: leave --resolution and "
+                                "--voxel-size out");
+  return import_lattice(open(file), settings, file.string(), report);
+}
+
+std::string tensor_name(const std::string& array, Take take) {
+  const std::string base = array.empty() ? "tensor" : array;
+  if (take == Take::tensor) return base;
+  return base + (take == Take::gradient ? "_gradient" : "_strain");
+}
+
+}  // namespace
+
+TensorGrid import_tensors(const ImportSettings& settings, const Progress& progress, ImportReport& report) {
+  if (settings.files.empty() || settings.files.size() > 2)
+    throw std::invalid_argument("give one file, or PLOT3D's two: the grid and its q");
+  const std::filesystem::path& file = settings.files.front();
+  progress.update("reading", 0, 1);
+  TensorGrid grid = import_any(settings, progress, report);
+  if (grid.blocks.empty())
+    throw std::runtime_error(file.string() + ": no voxel is left" +
+                             (settings.sampling.bounds ? " inside of --bounds" : ": all are background or not finite"));
+  grid.name = tensor_name(grid.name, settings.take);
+  grid.metadata["tensorray:source"] = file.filename().string();
+  return grid;
+}
+
+}  // namespace tensorray

@@ -1,0 +1,35 @@
+#pragma once
+/// @file tools/import/vtk_messages.h
+/// VTK's readers print what is wrong with a file and go on. Here it is caught, so that it can be thrown.
+/// Private to the importer.
+
+#include <filesystem>
+#include <string>
+
+namespace tensorray {
+
+/// While alive, VTK's errors and warnings are kept instead of printed. VTK has one output for a process: only one of
+/// these may be alive at a time, and no other thread may use VTK meanwhile.
+class VtkMessages {
+ public:
+  VtkMessages();
+  ~VtkMessages();
+  VtkMessages(const VtkMessages&) = delete;
+  VtkMessages& operator=(const VtkMessages&) = delete;
+
+  /// The first warning since construction, one line without VTK's own source position; empty if there was none.
+  const std::string& first_warning() const { return warning_; }
+
+  /// @throw std::runtime_error with the first error and the file's name, if there was one.
+  void throw_error(const std::filesystem::path& path) const;
+
+  /// For VTK's callbacks. A warning of an error in reading counts as an error.
+  void keep(const char* message, bool is_error);
+
+ private:
+  std::string error_, warning_;
+  unsigned long error_observer_, warning_observer_;
+  int display_mode_, verbosity_;
+};
+
+}  // namespace tensorray

@@ -1,0 +1,13 @@
+#pragma once
+/// @file tools/run_and_report.h
+/// Errors as users see them: one line, and an exit status.
+
+#include <functional>
+
+namespace tensorray {
+
+/// Does `work`. What it throws becomes a line on standard error.
+/// @return the exit status: 0 done, 1 failed, 2 the command line or the scene is wrong, 130 interrupted.
+int run_and_report(const std::function<void()>& work);
+
+}  // namespace tensorray
