@@ -96,8 +96,10 @@ Way thinned(const Way& way, double tolerance, double tensor_tolerance) {
     const auto over = [](double value, double allowed) { return value > 0 ? value / allowed : 0; };
     return std::max(over(apart, tolerance), over(unlike, tensor_tolerance * norm));
   };
+  const std::vector<std::size_t> needed = tensorray::thinned(way.size(), error);
   Way kept;
-  for (const std::size_t i : tensorray::thinned(way.size(), error)) kept.push_back(way[i]);
+  kept.reserve(needed.size());  // There may be many paths.
+  for (const std::size_t i : needed) kept.push_back(way[i]);
   return kept;
 }
 

@@ -21,8 +21,9 @@ using embree::Owned;
 constexpr double offset_fraction = 1e-6;
 /// Of the way to a target, left out at its end.
 constexpr double end_fraction = 5e-5;
-/// Below this many triangles a slower build pays, as long thin triangles are then split.
-constexpr std::size_t quick_build_size = 2'000'000;
+/// Below this many triangles a slower build pays, as long thin triangles are then split; from it on, memory is what
+/// limits a picture, and the search tree does without copies of the triangles.
+constexpr std::size_t large_scene = 2'000'000;
 
 void require(bool condition, const char* message) {
   if (!condition) throw std::invalid_argument(message);
@@ -187,9 +188,9 @@ void SurfaceScene::State::build() {
   std::size_t triangles = 0;
   for (const ShadedSurface& surface : surfaces)
     if (const auto* mesh = std::get_if<TriangleMesh>(&surface.shape)) triangles += mesh->triangles.size();
-  rtcSetSceneFlags(scene.get(), RTC_SCENE_FLAG_ROBUST);
-  rtcSetSceneBuildQuality(scene.get(),
-                          triangles < quick_build_size ? RTC_BUILD_QUALITY_HIGH : RTC_BUILD_QUALITY_MEDIUM);
+  const bool is_large = triangles >= large_scene;
+  rtcSetSceneFlags(scene.get(), is_large ? RTC_SCENE_FLAG_ROBUST | RTC_SCENE_FLAG_COMPACT : RTC_SCENE_FLAG_ROBUST);
+  rtcSetSceneBuildQuality(scene.get(), is_large ? RTC_BUILD_QUALITY_MEDIUM : RTC_BUILD_QUALITY_HIGH);
   segments.resize(surfaces.size());
   for (std::size_t i = 0; i < surfaces.size(); ++i)
     std::visit([&](const auto& shape) { attach(static_cast<unsigned>(i), shape); }, surfaces[i].shape);

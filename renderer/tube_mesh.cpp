@@ -375,14 +375,14 @@ double typical_radius(const std::vector<Tube>& tubes) {
   return *middle;
 }
 
-TubeMesh make_tube_mesh(const std::vector<Tube>& tubes, const TubeSettings& settings) {
+TubeMesh make_tube_mesh(std::vector<Tube> tubes, const TubeSettings& settings) {
   const Job job = make_job(tubes, settings);
   std::vector<TubeMesh> chunks;
   std::atomic<std::uint64_t> triangles{0};
   for (std::size_t first = 0; first < tubes.size(); first += chunk) {
     std::vector<TubeMesh> parts(std::min(chunk, tubes.size() - first));
     tbb::parallel_for(std::size_t{0}, parts.size(), [&](std::size_t i) {
-      parts[i] = make_tube(job, tubes[first + i]);
+      parts[i] = make_tube(job, std::exchange(tubes[first + i], {}));
       if ((triangles += parts[i].mesh.triangles.size()) > settings.most_triangles) refuse_size(settings);
     });
     chunks.push_back(joined(parts));

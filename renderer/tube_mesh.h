@@ -68,11 +68,11 @@ struct TubeMesh {
 /// The median of |x| over all points: the tubes' typical size. 0 where there is none.
 double typical_radius(const std::vector<Tube>& tubes);
 
-/// Runs on all threads; the result does not depend on their number.
+/// Runs on all threads; the result does not depend on their number. Tubes that are moved in are given back on the way.
 /// A solid tube has at most 64 rings for each of its points; the other styles have an ellipse at every `spacing`.
 /// Where a tube bends more tightly than it is thick its surface runs through itself.
 /// @throw std::invalid_argument if a setting or a point is out of range; std::runtime_error if there are more triangles
 /// than the settings allow (before they are all made: what is in memory stays near the limit).
-TubeMesh make_tube_mesh(const std::vector<Tube>& tubes, const TubeSettings& settings);
+TubeMesh make_tube_mesh(std::vector<Tube> tubes, const TubeSettings& settings);
 
 }  // namespace tensorray

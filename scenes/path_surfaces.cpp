@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <utility>
 
 #include <tbb/parallel_for.h>
 
@@ -16,7 +17,7 @@ namespace {
 constexpr double radius_per_spacing = 0.16;           // So that neighbours do not touch.
 constexpr double radius_per_extent = 0.01;            // At most, of the volume's diagonal.
 constexpr double thinnest = 0.2, thickest = 3;        // Of the typical radius.
-constexpr std::uint64_t most_triangles = 60'000'000;  // With the search tree some 8 GB.
+constexpr std::uint64_t most_triangles = 60'000'000;  // With the search tree some 6 GB.
 
 /// What is known at a vertex: the path's point before it, and how far it is to the next one.
 struct Place {
@@ -109,6 +110,7 @@ TubeMesh path_mesh(const std::vector<Path>& paths, const PathTracingDescription&
     CrossSectionSettings section = sections;
     if (is_bare(way)) section.least_radius = section.greatest_radius = typical;
     const std::vector<CrossSection> ellipses = cross_sections(way, section);
+    tubes[i].reserve(ellipses.size());
     for (std::size_t k = 0; k < ellipses.size(); ++k)
       tubes[i].push_back(
           {way[k].position, ellipses[k].x, ellipses[k].y, static_cast<double>(k), shade_of(colors, paths[i], way[k])});
@@ -117,8 +119,9 @@ TubeMesh path_mesh(const std::vector<Path>& paths, const PathTracingDescription&
   settings.style = tube_style(description.style);
   settings.caps = description.caps;
   settings.tolerance = tolerance;
+  settings.least_segments = 4;  // Of tubes that are thinner than a pixel; there may be many.
   settings.most_triangles = most_triangles;
-  return make_tube_mesh(tubes, settings);
+  return make_tube_mesh(std::move(tubes), settings);
 }
 
 ShadedSurface path_surface(TubeMesh mesh, const std::vector<Path>& paths, const PathColors& colors,
