@@ -19,26 +19,29 @@ std::vector<std::filesystem::path> example_scenes() {
   return scenes;
 }
 
-TEST_F(Program, EveryExampleSceneRendersAndBendsLight) {
-  const auto scenes = example_scenes();
-  EXPECT_GE(scenes.size(), 9u);
-  for (const auto& scene : scenes) {
-    const Outcome outcome = run_well({"render", scene.string(), "-o", "out.exr", "--set", "light.photons=4000", "--set",
-                                      "receiver.resolution=[64,64]", "--set", "light.wavelengths.count=8", "--set",
-                                      "camera.resolution=[64,64]", "--set", "integrator.max_samples=4"});
-    // "auto" found a scale at which the median ray turns as far as it should.
-    EXPECT_NE(outcome.error.find("turns by 0.150 rad"), std::string::npos) << scene << "\n" << outcome.error;
-    const Image image = read_image(in_folder("out.exr"));
-    double least = 1e9, greatest = 0;
-    for (const float value : image.pixels) {
-      ASSERT_TRUE(std::isfinite(value));
-      least = std::min<double>(least, value);
-      greatest = std::max<double>(greatest, value);
-    }
-    EXPECT_LT(least, 0.1) << scene;
-    EXPECT_GT(greatest, 0.5) << scene;
+class ExampleScene : public Program, public ::testing::WithParamInterface<std::filesystem::path> {};
+
+TEST_P(ExampleScene, RendersAndBendsLight) {
+  const std::string scene = GetParam().string();
+  const Outcome outcome = run_well({"render", scene, "-o", "out.exr", "--set", "light.photons=4000", "--set",
+                                    "receiver.resolution=[64,64]", "--set", "light.wavelengths.count=8", "--set",
+                                    "camera.resolution=[64,64]", "--set", "integrator.max_samples=4"});
+  // "auto" found a scale at which the median ray turns as far as it should.
+  if (read_file(scene).find("\"scale\"") == std::string::npos)
+    EXPECT_NE(outcome.error.find("turns by 0.150 rad"), std::string::npos) << outcome.error;
+  const Image image = read_image(in_folder("out.exr"));
+  double least = 1e9, greatest = 0;
+  for (const float value : image.pixels) {
+    ASSERT_TRUE(std::isfinite(value));
+    least = std::min<double>(least, value);
+    greatest = std::max<double>(greatest, value);
   }
+  EXPECT_LT(least, 0.1);
+  EXPECT_GT(greatest, 0.5);
 }
+
+INSTANTIATE_TEST_SUITE_P(Scenes, ExampleScene, ::testing::ValuesIn(example_scenes()),
+                         [](const auto& scene) { return scene.param.stem().string(); });
 
 /// A picture of a point load, the plate from −1.3 to 1.3 both ways.
 class PointLoadPicture : public Program {

@@ -2,6 +2,7 @@
 /// @file tests/program/support.h
 /// Runs the whole program as a user does.
 
+#include <algorithm>
 #include <chrono>
 #include <csignal>
 #include <cstdlib>
@@ -35,8 +36,9 @@ class Program : public ::testing::Test {
  protected:
   void SetUp() override {
     const auto* test = ::testing::UnitTest::GetInstance()->current_test_info();
-    folder_ =
-        std::filesystem::path(::testing::TempDir()) / ("tensorray_" + std::to_string(getpid()) + "_" + test->name());
+    std::string name = test->name();
+    std::replace(name.begin(), name.end(), '/', '_');
+    folder_ = std::filesystem::path(::testing::TempDir()) / ("tensorray_" + std::to_string(getpid()) + "_" + name);
     std::filesystem::create_directories(folder_);
   }
   void TearDown() override { std::filesystem::remove_all(folder_); }

@@ -1,0 +1,87 @@
+// The scenes of measured and computed data, whose comments say how to import these: that, to the letter, on the data
+// sets of TENSORRAY_DATA.
+
+#include <cctype>
+#include <cmath>
+#include <cstdlib>
+#include <iomanip>
+#include <sstream>
+
+#include "renderer/image.h"
+#include "tests/program/support.h"
+
+namespace tensorray {
+namespace {
+
+using namespace test;
+
+std::filesystem::path data_folder() {
+  const char* given = std::getenv("TENSORRAY_DATA");
+  return given ? std::filesystem::path(given) : std::filesystem::path(TENSORRAY_SOURCE_DIR) / ".." / "shared" / "data";
+}
+
+std::vector<std::filesystem::path> imported_scenes() {
+  std::vector<std::filesystem::path> scenes;
+  for (const auto& entry : std::filesystem::directory_iterator(TENSORRAY_SOURCE_DIR "/scenes/imported"))
+    if (entry.path().extension() == ".json") scenes.push_back(entry.path());
+  return scenes;
+}
+
+/// The words after `tensorray` in the comment of a scene, lines that end with a backslash joined.
+std::vector<std::string> import_command(const std::filesystem::path& scene) {
+  std::istringstream lines(read_file(scene));
+  std::string command;
+  for (std::string line; std::getline(lines, line);) {
+    if (command.empty() && line.find("tensorray import ") == std::string::npos) continue;
+    const bool goes_on = line.back() == '\\';
+    command += line.substr(2, line.size() - 2 - (goes_on ? 1 : 0)) + " ";
+    if (!goes_on) break;
+  }
+  std::istringstream text(command.substr(std::min(command.size(), command.find("import"))));
+  std::vector<std::string> words;
+  for (std::string word; text >> std::quoted(word);) words.push_back(word);
+  return words;
+}
+
+/// Where a data set's file is, by its name alone; empty if it is not there.
+std::string data_file(const std::string& name) {
+  for (const auto& entry : std::filesystem::recursive_directory_iterator(data_folder()))
+    if (entry.path().filename() == name) return entry.path().string();
+  return {};
+}
+
+class ImportedScene : public Program, public ::testing::WithParamInterface<std::filesystem::path> {};
+
+TEST_P(ImportedScene, IsImportedAsItSaysAndBendsLight) {
+  if (!std::filesystem::is_directory(data_folder()))
+    GTEST_SKIP() << "no data sets at " << data_folder() << "; TENSORRAY_DATA says where they are";
+  std::vector<std::string> command = import_command(GetParam());
+  ASSERT_GE(command.size(), 4u) << "no import command in the scene's comment";
+  for (std::string& word : command) {
+    const std::filesystem::path path(word);
+    if (path.parent_path() == "scenes/imported")
+      word = path.filename().string();
+    else if (path.has_extension() && word[0] != '-' && !std::isdigit(static_cast<unsigned char>(word[0])))
+      word = data_file(word);
+  }
+  run_well(command);
+  std::filesystem::copy_file(GetParam(), in_folder("scene.json"));
+  run_well({"render", "scene.json", "-o", "out.exr", "--set", "light.photons=2000", "--set",
+            "receiver.resolution=[64,64]", "--set", "light.wavelengths.count=8", "--set", "camera.resolution=[64,64]",
+            "--set", "integrator.max_samples=4"});
+  const Image image = read_image(in_folder("out.exr"));
+  double sum = 0, greatest = 0;
+  for (const float value : image.pixels) {
+    ASSERT_TRUE(std::isfinite(value));
+    greatest = std::max<double>(greatest, value);
+    sum += value;
+  }
+  EXPECT_GT(greatest, 0.5);
+  EXPECT_GT(sum, 0);
+}
+
+INSTANTIATE_TEST_SUITE_P(Scenes, ImportedScene, ::testing::ValuesIn(imported_scenes()),
+                         [](const auto& scene) { return scene.param.stem().string(); });
+
+}  // namespace
+}  // namespace tensorray
