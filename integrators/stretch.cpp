@@ -35,6 +35,8 @@ void in_parallel(std::size_t count, const Progress& progress, const Work& work) 
   progress.update("tracing rays", count, count);
 }
 
+constexpr double most_voxels = 1 << 30;
+
 /// A lattice in the volume: its middle is the extent's.
 struct Lattice {
   Eigen::Vector3i size;
@@ -47,6 +49,8 @@ Lattice make_lattice(const TensorField& field, int resolution) {
   const double spacing = extent.sizes().maxCoeff() / (resolution - 1);
   Lattice lattice;
   lattice.size = (extent.sizes() / spacing + Eigen::Vector3d::Constant(1e-6)).array().floor().cast<int>() + 1;
+  if (lattice.size.cast<double>().prod() > most_voxels)
+    throw std::invalid_argument("the grid would have more than 2^30 voxels: lower the resolution");
   const Eigen::Vector3d first = extent.center() - spacing / 2 * (lattice.size.cast<double>() - Eigen::Vector3d::Ones());
   lattice.to_world = field.to_world() * Eigen::Translation3d(first) * Eigen::Scaling(spacing);
   return lattice;

@@ -9,6 +9,9 @@
 #include <utility>
 
 #include <CLI/CLI.hpp>
+#ifdef __linux__
+#include <sys/prctl.h>
+#endif
 #include <sys/wait.h>
 #include <unistd.h>
 
@@ -16,6 +19,14 @@
 
 namespace tensorray {
 namespace {
+
+/// The child ends at once when it is told to, as the parent does away with what it leaves behind, and with its parent.
+void be_mortal() {
+  for (const int signal : {SIGINT, SIGTERM}) std::signal(signal, SIG_DFL);
+#ifdef __linux__
+  prctl(PR_SET_PDEATHSIG, SIGTERM);
+#endif
+}
 
 int wait_for(pid_t child, const Progress& progress) {
   int status = 0;
@@ -34,9 +45,12 @@ void in_child_process(const std::function<void()>& work, const Progress& progres
   std::fflush(nullptr);  // What is in the buffers would be printed twice.
   const pid_t child = fork();
   if (child < 0) throw std::runtime_error("no child process can be started: the system has too many");
-  // Without cleaning up: some libraries' last rites wait for threads, which the child does not have.
-  if (child == 0) _exit(run_and_report(work));
+  if (child == 0) {
+    be_mortal();
+    _exit(run_and_report(work));  // Not exit: some libraries' last rites wait for threads, which the child lacks.
+  }
   const int status = wait_for(child, progress);
+  if (progress.cancelled) throw Cancelled();
   if (WIFSIGNALED(status)) throw std::runtime_error(on_crash);
   if (WEXITSTATUS(status) != 0) throw CLI::RuntimeError(WEXITSTATUS(status));
 }

@@ -1,3 +1,4 @@
+#include <cmath>
 #include <filesystem>
 #include <memory>
 #include <optional>
@@ -15,6 +16,7 @@
 #include "tools/commands.h"
 #include "tools/import/import_file.h"
 #include "tools/progress_bar.h"
+#include "tools/vdb_output.h"
 #include "volumes/tensor_files.h"
 
 namespace tensorray {
@@ -122,11 +124,14 @@ void import(const ImportOptions& options, Progress& progress) {
   commit_all(files);
 }
 
-std::string ending_must_be(const std::string& text, const std::string& ending) {
-  const std::filesystem::path path(text);
-  std::error_code error;
-  if (path.extension() == ending || std::filesystem::is_other(path, error)) return "";
-  return text + " must end in " + ending;
+std::string check_ply_output(const std::string& text) {
+  return std::filesystem::path(text).extension() == ".ply" ? "" : text + " must end in .ply";
+}
+
+std::string positive(const std::string& text) {
+  double value = 0;
+  const bool is_number = CLI::detail::lexical_cast(text, value);
+  return is_number && std::isfinite(value) && value > 0 ? "" : text + " is no size: give a number greater than 0";
 }
 
 void add_what(CLI::App& command, ImportOptions& options) {
@@ -144,7 +149,8 @@ void add_what(CLI::App& command, ImportOptions& options) {
                   "yz), voigt (xx yy zz yz xz xy)")
       ->check(CLI::IsMember(tensor_order_names()))
       ->option_text("ORDER");
-  for (CLI::Option* option : command.get_options({})) option->group("What to take");
+  for (CLI::Option* option : command.get_options({}))
+    if (option != command.get_help_ptr()) option->group("What to take");
 }
 
 void add_where(CLI::App& command, ImportOptions& options) {
@@ -156,7 +162,7 @@ void add_where(CLI::App& command, ImportOptions& options) {
                          ->check(CLI::Range(2, 8192))
                          ->group("Grid");
   command.add_option("--voxel-size", options.voxel_size, "Edge of a voxel")
-      ->check(CLI::PositiveNumber)
+      ->check(positive)
       ->excludes(resolution)
       ->group("Grid");
   command.add_option("--bounds", options.bounds, "Crop: xmin xmax ymin ymax zmin zmax")->expected(6)->group("Grid");
@@ -179,12 +185,12 @@ void add_import_command(CLI::App& program, Progress& progress) {
       ->option_text("FILE...");
   command->add_option("-o,--output", options->output, "The field to write, FILE.vdb")
       ->required()
-      ->check([](const std::string& text) { return ending_must_be(text, ".vdb"); })
+      ->check(check_vdb_output)
       ->option_text("FILE");
   command
       ->add_option("--boundary", options->boundary,
                    "Write the surface of the body that the mesh lies around, for `obstacles`: FILE.ply")
-      ->check([](const std::string& text) { return ending_must_be(text, ".ply"); })
+      ->check(check_ply_output)
       ->option_text("FILE");
   command->add_option("--name", options->name, "Name of the field (default: the array's)");
   command->add_option("--units", options->units, "Units of the tensor, noted in the file");

@@ -1,4 +1,5 @@
 #include <algorithm>
+#include <cctype>
 #include <cmath>
 #include <filesystem>
 #include <memory>
@@ -10,6 +11,7 @@
 
 #include <CLI/CLI.hpp>
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 #include <tbb/global_control.h>
 
 #include "renderer/spectrum.h"
@@ -36,9 +38,15 @@ struct StretchOptions {
 
 bool is_grid(const std::filesystem::path& path) { return check_vdb_output(path.string()).empty(); }
 
-std::string check_output(const std::string& text) {
-  std::string ending = std::filesystem::path(text).extension().string();
+/// In lower case.
+std::string ending_of(const std::filesystem::path& path) {
+  std::string ending = path.extension().string();
   std::transform(ending.begin(), ending.end(), ending.begin(), [](unsigned char c) { return std::tolower(c); });
+  return ending;
+}
+
+std::string check_output(const std::string& text) {
+  const std::string ending = ending_of(text);
   const std::vector<std::string> pictures = image_endings();
   if (is_grid(text) || std::find(pictures.begin(), pictures.end(), ending) != pictures.end()) return "";
   return text + " must end in .vdb (a grid), or as a picture does: " + fmt::format("{}", fmt::join(pictures, " "));
@@ -67,7 +75,7 @@ void write_grid(OutputFile& file, const Scene& scene, const StretchSettings& set
 void write_picture(OutputFile& file, const Scene& scene, const StretchSettings& settings,
                    const StretchPicture& picture) {
   const auto metadata = stretch_metadata(scene, settings);
-  const bool linear = file.target().extension() == ".exr";
+  const bool linear = ending_of(file.target()) == ".exr";
   file.write([&](const std::filesystem::path& path) {
     write_image(path, linear ? picture.linear : picture.display, metadata);
   });

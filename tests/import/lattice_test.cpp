@@ -151,11 +151,12 @@ TEST(Lattice, OfMoreThanNineComponentsTheFirstSixAreTheTensor) {
   test::expect_near((Matrix3d() << 11, 12, 13, 12, 22, 23, 13, 23, 33).finished(), test::voxel(grid, {0, 0, 0}));
 }
 
-TEST(Lattice, TheLatticesOwnOrderGoesBeforeTheUsers) {
+TEST(Lattice, TheLatticesOwnOrderIsTakenAndNotContradicted) {
   Lattice lattice = lattice_of({1, 1, 1}, [](const Vector3i&) { return std::vector<double>{11, 12, 22, 13, 23, 33}; });
   lattice.order = TensorOrder::lower_triangle;
-  const TensorGrid grid = test::tensors_of(lattice, "vtk");
+  const TensorGrid grid = test::tensors_of(lattice);
   test::expect_near((Matrix3d() << 11, 12, 13, 12, 22, 23, 13, 23, 33).finished(), test::voxel(grid, {0, 0, 0}));
+  test::expect_error([&] { test::tensors_of(lattice, "vtk"); }, {"--order"});
 }
 
 TEST(Lattice, WrongNumbersOfComponentsAndAMissingOrderAreErrors) {
@@ -174,7 +175,7 @@ TEST(Lattice, WrongNumbersOfComponentsAndAMissingOrderAreErrors) {
   test::expect_error(tensors(3), {"--gradient-of", "vector"});
   test::expect_error(tensors(1), {"1 component and", "another array"});
   test::expect_error(tensors(8), {"8 components", "another array"});
-  test::expect_error([&] { gradient_of(components(6), report); }, {"--gradient-of", "\"stress\"", "6 components"});
+  test::expect_error([&] { gradient_of(components(6), report); }, {"gradient", "\"stress\"", "has 6"});
   EXPECT_NO_THROW(tensors(9)());
 }
 

@@ -205,7 +205,7 @@ TEST(Npy, AnImportTakesLittleMoreMemoryThanItsNumbers) {
   for (const bool fortran : {false, true}) {
     const test::TemporaryFile file("large.npy", header_of("<f4", fortran, {n, n, n, 3, 3}));
     std::filesystem::resize_file(file, std::filesystem::file_size(file) + n * n * n * 9 * 4);
-    EXPECT_LT(import_megabytes(file), 1.3 * data);
+    EXPECT_LT(import_megabytes(file), 1.7 * data);  // Two copies would be twice the data; libraries wake up meanwhile.
   }
 }
 

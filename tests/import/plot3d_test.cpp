@@ -1,6 +1,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
+#include <cstring>
 #include <string>
 #include <vector>
 
@@ -178,7 +179,11 @@ TEST(Plot3dTest, FilesThatDoNotFit) {
   EXPECT_NE(error(wild, q).find("no PLOT3D grid"), std::string::npos);
   std::string endless = grid;
   std::fill_n(endless.begin() + 12 + 40, 4, '\xff');
-  EXPECT_NE(error(endless, q).find("not finite"), std::string::npos);
+  EXPECT_NE(error(endless, q).find("grid.bin: is damaged, or not of the form it seems: point 10 "), std::string::npos);
+  const float far = 1e31f;
+  std::string remote = grid;
+  std::memcpy(&remote[12 + 40], &far, sizeof far);
+  EXPECT_NE(error(remote, q).find("not finite, or beyond 1e30"), std::string::npos);
 
   write_bytes(folder / "grid.bin", grid);
   const std::string missing = error_of([&] { read_plot3d(folder / "grid.bin", folder / "none.bin"); });

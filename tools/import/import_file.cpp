@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cctype>
 #include <stdexcept>
+#include <utility>
 #include <variant>
 
 #include <vtkCellData.h>
@@ -33,7 +34,7 @@ OpenLattice lattice_reader(const std::filesystem::path& path) {
   const std::string name = lower(path.filename().string());
   for (const char* ending : {".nrrd", ".nhdr"})
     if (ends_with(name, ending)) return open_nrrd;
-  for (const char* ending : {".nii", ".nii.gz", ".hdr", ".img"})
+  for (const char* ending : {".nii", ".nii.gz", ".hdr"})
     if (ends_with(name, ending)) return open_nifti;
   return ends_with(name, ".npy") ? open_npy : nullptr;
 }
@@ -42,8 +43,10 @@ bool wants_sampling(const ImportSettings& settings) {
   return !std::holds_alternative<std::monostate>(settings.sampling.resolution);
 }
 
-/// Leaves the voxels whose centres are in `bounds`.
-void crop(TensorGrid& grid, const Eigen::AlignedBox3d& bounds) {
+/// Leaves the voxels whose centres are in `bounds`, to rounding.
+void crop(TensorGrid& grid, Eigen::AlignedBox3d bounds) {
+  const Eigen::Vector3d rounding = Eigen::Vector3d::Constant(1e-6 * grid.to_world.linear().colwise().norm().minCoeff());
+  bounds = {bounds.min() - rounding, bounds.max() + rounding};
   for (TensorBlock& block : grid.blocks)
     for (int offset = 0; offset < TensorBlock::voxels; ++offset) {
       const Eigen::Vector3i index = block.origin + TensorBlock::position(offset);
@@ -61,11 +64,10 @@ void make_symmetric(TensorGrid& grid) {
     for (Eigen::Matrix3f& value : block.values) value = (0.5f * (value + value.transpose())).eval();
 }
 
-/// @param name  Of the file, for messages.
-TensorGrid import_lattice(const Lattice& lattice, const ImportSettings& settings, const std::string& name,
-                          ImportReport& report) {
-  if (!settings.boundary.empty())
-    throw std::invalid_argument(name + " has voxels, which have no body: leave --boundary out");
+TensorGrid import_lattice(const Lattice& lattice, const ImportSettings& settings, ImportReport& report) {
+  if (!settings.boundary.empty()) throw std::invalid_argument("has voxels, which have no body: leave --boundary out");
+  if (settings.take == Take::tensor && !settings.array.empty() && lattice.array.empty())
+    throw std::invalid_argument("has one array, which has no name: leave --array out");
   report.lattice.emplace();
   TensorGrid grid = settings.take == Take::tensor ? tensors_of(lattice, settings.order, *report.lattice)
                                                   : gradient_of(lattice, *report.lattice);
@@ -83,8 +85,7 @@ TensorGrid import_mesh(vtkDataSet& data, const ArrayChoice& array, const ImportS
     progress.update("finding the boundary", 0, 1);
     report.boundary_triangles = write_boundary(data, settings.boundary);
     if (report.boundary_triangles == 0)
-      throw std::invalid_argument(settings.files.front().string() +
-                                  " is a convex mesh, with no body in it: leave --boundary out");
+      throw std::invalid_argument("is a convex mesh, with no body in it: leave --boundary out");
   }
   progress.update("making tensors", 0, 1);
   const auto mesh = with_tensors(data, array, settings.take, settings.order);
@@ -98,15 +99,14 @@ TensorGrid import_mesh(vtkDataSet& data, const ArrayChoice& array, const ImportS
 TensorGrid import_data_set(vtkSmartPointer<vtkDataSet> data, const ImportSettings& settings, const Progress& progress,
                            ImportReport& report) {
   const ArrayChoice array = choose_array(*data, settings.array, settings.take);
-  const auto image = vtkSmartPointer<vtkImageData>(vtkImageData::SafeDownCast(data));
+  auto image = vtkSmartPointer<vtkImageData>(vtkImageData::SafeDownCast(data));
   if (!image || wants_sampling(settings)) return import_mesh(*data, array, settings, progress, report);
   data = nullptr;  // So that the lattice alone holds the numbers, and can give them back.
   vtkDataSetAttributes* attributes = array.of_cells ? static_cast<vtkDataSetAttributes*>(image->GetCellData())
                                                     : static_cast<vtkDataSetAttributes*>(image->GetPointData());
   vtkSmartPointer<vtkDataArray> values = attributes->GetArray(array.name.c_str());
-  Lattice lattice = lattice_of(image, values, array.of_cells);
-  values = nullptr;
-  return import_lattice(lattice, settings, settings.files.front().string(), report);
+  const Lattice lattice = lattice_of(std::move(image), std::move(values), array.of_cells);
+  return import_lattice(lattice, settings, report);
 }
 
 TensorGrid import_any(const ImportSettings& settings, const Progress& progress, ImportReport& report) {
@@ -114,13 +114,21 @@ TensorGrid import_any(const ImportSettings& settings, const Progress& progress, 
   if (settings.files.size() == 2) {
     return import_data_set(read_plot3d(file, settings.files[1]), settings, progress, report);
   }
+  if (lower(file.extension().string()) == ".img") {
+    ImportSettings with_header = settings;
+    with_header.files = {std::filesystem::path(file).replace_extension(".hdr")};
+    return import_any(with_header, progress, report);
+  }
   const OpenLattice open = lattice_reader(file);
   if (!open) return import_data_set(read_vtk_source(file), settings, progress, report);
   if (wants_sampling(settings))
-    throw std::invalid_argument(file.string() +
-                                " has voxels of its own, which are kept: leave --resolution and "
-                                "--voxel-size out");
-  return import_lattice(open(file), settings, file.string(), report);
+    throw std::invalid_argument("has voxels of its own, which are kept: leave --resolution and --voxel-size out");
+  return import_lattice(open(file), settings, report);
+}
+
+/// Errors name the file, whoever found them.
+std::string about(const std::filesystem::path& file, const std::string& message) {
+  return message.find(file.string()) == std::string::npos ? file.string() + ": " + message : message;
 }
 
 std::string tensor_name(const std::string& array, Take take) {
@@ -136,10 +144,19 @@ TensorGrid import_tensors(const ImportSettings& settings, const Progress& progre
     throw std::invalid_argument("give one file, or PLOT3D's two: the grid and its q");
   const std::filesystem::path& file = settings.files.front();
   progress.update("reading", 0, 1);
-  TensorGrid grid = import_any(settings, progress, report);
-  if (grid.blocks.empty())
-    throw std::runtime_error(file.string() + ": no voxel is left" +
-                             (settings.sampling.bounds ? " inside of --bounds" : ": all are background or not finite"));
+  TensorGrid grid;
+  try {
+    grid = import_any(settings, progress, report);
+  } catch (const Cancelled&) {
+    throw;
+  } catch (const std::invalid_argument& error) {
+    throw std::invalid_argument(about(file, error.what()));
+  } catch (const std::runtime_error& error) {
+    throw std::runtime_error(about(file, error.what()));
+  }
+  if (grid.blocks.empty() && settings.sampling.bounds)
+    throw std::invalid_argument(file.string() + ": --bounds: no voxel is inside that has a tensor");
+  if (grid.blocks.empty()) throw std::runtime_error(file.string() + ": all voxels are background or not finite");
   grid.name = tensor_name(grid.name, settings.take);
   grid.metadata["tensorray:source"] = file.filename().string();
   return grid;

@@ -130,6 +130,8 @@ int unmasked(const Lattice& lattice) { return lattice.components - (lattice.mask
 
 TensorOrder order_of(const Lattice& lattice, const std::optional<TensorOrder>& order) {
   const int count = unmasked(lattice);
+  if (order && (count == 9 || (lattice.order && *lattice.order != *order)))
+    throw std::invalid_argument(called(lattice) + " says its order itself: leave --order out");
   if (count == 9) return TensorOrder::full;
   if (count == 3)
     throw std::invalid_argument(
@@ -170,8 +172,9 @@ TensorGrid tensors_of(const Lattice& lattice, const std::optional<TensorOrder>& 
 
 TensorGrid gradient_of(const Lattice& lattice, LatticeReport& report) {
   if (unmasked(lattice) != 3)
-    throw std::invalid_argument(fmt::format("--gradient-of: {} has {} components and a vector three: choose another",
-                                            called(lattice), unmasked(lattice)));
+    throw std::invalid_argument(
+        fmt::format("a gradient or a strain needs a vector of three components: {} has {}; choose another",
+                    called(lattice), unmasked(lattice)));
   std::vector<SampleBlock> vectors;
   const Vector3i blocks = (lattice.size.array() - 1) / width + 1;
   vectors.reserve(static_cast<std::size_t>(blocks.x()) * blocks.y() * blocks.z());  // Growing would need it twice.

@@ -26,7 +26,6 @@ class MeshCell {
   int points() const { return static_cast<int>(positions_.cols()); }
   vtkIdType point(int i) const { return cell_->GetPointId(i); }
   const Eigen::Matrix3Xd& positions() const { return positions_; }
-  bool is_linear() const { return linear_; }
   vtkGenericCell& vtk() const { return *cell_; }
 
   /// Contains the cell; that of a curved one is larger than that of its points.

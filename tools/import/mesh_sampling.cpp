@@ -135,7 +135,6 @@ LatticeShape shape_of(vtkDataSet& mesh, const Solid& solid, const SamplingSettin
     throw std::invalid_argument(fmt::format("--bounds: nothing of the mesh is inside, which goes from {} to {}",
                                             text_of(solid.bounds.min()), text_of(solid.bounds.max())));
   LatticeShape shape;
-  shape.origin = box.min();
   const double longest = box.sizes().maxCoeff();
   Vector3d size;
   if (const auto* counts = std::get_if<Vector3i>(&settings.resolution)) {
@@ -165,6 +164,8 @@ LatticeShape shape_of(vtkDataSet& mesh, const Solid& solid, const SamplingSettin
                     "a larger --voxel-size or a lower --resolution",
                     size.x(), size.y(), size.z()));
   shape.size = size.cast<int>();
+  // What the voxels do not fill is left over on both sides alike.
+  shape.origin = box.center() - 0.5 * (shape.voxel.array() * (size.array() - 1)).matrix();
   return shape;
 }
 

@@ -32,8 +32,8 @@ struct SamplingReport {
 
 /// Samples the tensors of with_tensors at the voxels' centres, by the interpolation of the cell that each is in (where
 /// cells overlap, the one of the lowest index); voxels in no cell, or in one with a NaN at a point that counts, are
-/// inactive. Voxels are at box.min() + h * (i, j, k) as far as the box goes, and those within 1e-6 of the mesh's
-/// diagonal of a face count as inside. On all threads, with the same result on any number.
+/// inactive. Voxels have the middle of the box as their middle as far as the box goes, and those within 1e-6 of the
+/// mesh's diagonal of a face count as inside. On all threads, with the same result on any number.
 /// @throw std::invalid_argument if the mesh has no three-dimensional cells, a setting is out of range, no voxel is
 /// inside, or the grid would exceed 2^30 voxels.
 TensorGrid sample_mesh(vtkDataSet& mesh, const SamplingSettings& settings, const Progress& progress,

@@ -89,10 +89,22 @@ std::optional<TensorOrder> order_of_names(vtkDataArray& array) {
   return {};
 }
 
+std::string component_names(vtkDataArray& array) {
+  std::string names;
+  for (int i = 0; i < 6; ++i) names += (names.empty() ? "" : " ") + std::string(array.GetComponentName(i));
+  return names;
+}
+
 TensorOrder order_in(vtkDataArray& array, const std::optional<TensorOrder>& given) {
   if (array.GetNumberOfComponents() == 9) return TensorOrder::full;
+  const std::optional<TensorOrder> said = order_of_names(array);
+  if (given && said && *given != *said)
+    throw std::invalid_argument(
+        fmt::format("the file itself names the components of array \"{}\": they are {}, of which --order says "
+                    "otherwise; leave --order out",
+                    array.GetName(), component_names(array)));
+  if (said) return *said;
   if (given) return *given;
-  if (const auto said = order_of_names(array)) return *said;
   std::string names;
   for (const std::string& name : tensor_order_names()) names += (names.empty() ? "" : ", ") + name;
   throw std::invalid_argument(

@@ -39,10 +39,11 @@ ArrayChoice choose_array(vtkDataSet& mesh, const std::string& name, Take take);
 /// the three-dimensional cells that are not hidden. Points whose tensor is not finite, and hidden ones (blanked:
 /// vtkGhostType with another bit than that of a duplicate), get NaN; a derivative never looks at hidden points of a
 /// curvilinear grid.
-/// @param order  Of six and more than nine components. Without one, the names of the components may say it (XX, YY,
-/// ...).
+/// @param order  Of six and more than nine components. Not needed where the names of the components say it (XX, YY,
+/// ...), and then not to contradict them.
 /// @return a mesh that shares the geometry, and keeps the vtkGhostType, of the given one.
-/// @throw std::invalid_argument if no order is known, or std::runtime_error if VTK cannot differentiate on the mesh.
+/// @throw std::invalid_argument if no order is known or it is another than the names', or std::runtime_error if VTK
+/// cannot differentiate on the mesh.
 vtkSmartPointer<vtkDataSet> with_tensors(vtkDataSet& mesh, const ArrayChoice& array, Take take,
                                          const std::optional<TensorOrder>& order);
 

@@ -4,7 +4,6 @@
 // error says what does not fit.
 
 #include <algorithm>
-#include <cmath>
 #include <cstring>
 #include <fstream>
 #include <limits>
@@ -79,27 +78,17 @@ std::ifstream open_at(const Path& path, std::uintmax_t offset) {
   return file;
 }
 
-void check_coordinates(const Path& path, vtkDataArray& coordinates) {
-  for (vtkIdType i = 0; i < coordinates.GetNumberOfTuples(); ++i) {
-    for (int axis = 0; axis < 3; ++axis) {
-      if (std::isfinite(coordinates.GetComponent(i, axis))) continue;
-      throw std::runtime_error(path.string() + ": is damaged, or no PLOT3D grid: point " + std::to_string(i) +
-                               " has coordinates that are not finite");
-    }
-  }
-}
-
 vtkSmartPointer<vtkStructuredGrid> read_grid(const Path& path, const Plot3dLayout& layout) {
   std::ifstream file = open_at(path, layout.numbers);
   const vtkSmartPointer<vtkDataArray> coordinates = new_array(layout, "Points", 3);
   for (int axis = 0; axis < 3; ++axis) read_component(file, path, layout, *coordinates, axis);
-  check_coordinates(path, *coordinates);
 
   vtkNew<vtkPoints> points;
   points->SetData(coordinates);
   auto grid = vtkSmartPointer<vtkStructuredGrid>::New();
   grid->SetDimensions(layout.size.x(), layout.size.y(), layout.size.z());
   grid->SetPoints(points);
+  check_geometry(*grid, path);
   if (layout.blanking) {
     const auto blanks = read_numbers<std::int32_t>(file, path, layout.big_endian, layout.points());
     for (std::size_t i = 0; i < blanks.size(); ++i) {

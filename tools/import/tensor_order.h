@@ -12,7 +12,7 @@ namespace tensorray {
 enum class TensorOrder {
   full,            ///< Nine: xx xy xz yx yy yz zx zy zz, row by row.
   vtk,             ///< Six: xx yy zz xy yz xz. VTK, ParaView, Ansys, CalculiX.
-  fsl,             ///< Six: xx xy xz yy yz zz. FSL, NRRD, OpenFOAM.
+  fsl,             ///< Six: xx xy xz yy yz zz. FSL, NRRD. OpenFOAM's files too, but VTK hands them over as `vtk`.
   mrtrix,          ///< Six: xx yy zz xy xz yz. MRtrix.
   voigt,           ///< Six: xx yy zz yz xz xy. Continuum mechanics.
   lower_triangle,  ///< Six: xx xy yy xz yz zz. NIfTI where it says "symmetric matrix"; never asked for by name.

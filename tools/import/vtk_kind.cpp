@@ -1,14 +1,20 @@
 #include "tools/import/vtk_kind.h"
 
 #include <algorithm>
+#include <array>
 #include <cctype>
 #include <cstdint>
 #include <cstdlib>
 #include <fstream>
+#include <limits>
 #include <optional>
+#include <sstream>
 #include <stdexcept>
 #include <string>
 #include <vector>
+
+#include <vtkExtentSplitter.h>
+#include <vtkNew.h>
 
 #include "tools/import/netcdf_size.h"
 
@@ -121,17 +127,67 @@ void check_xml_end(const fs::path& path) {
   }
 }
 
+using Extent = std::array<int, 6>;
+
+/// None if the text is no extent, or that of nothing.
+std::optional<Extent> extent_of(const std::string& text) {
+  std::istringstream stream(text);
+  Extent extent;
+  for (int& bound : extent) stream >> bound;
+  for (std::size_t axis = 0; axis < 3; ++axis)
+    if (!stream || extent[2 * axis] > extent[2 * axis + 1]) return {};
+  return extent;
+}
+
+/// VTK takes numbers that it cannot read for 0 or 1.
+void check_placement(const fs::path& path, const std::string& tag) {
+  for (const char* name : {"Origin", "Spacing"}) {
+    std::size_t from = 0;
+    const std::string text = attribute(tag, name, from);
+    std::istringstream stream(text);
+    double x, y, z;
+    if (!text.empty() && !(stream >> x >> y >> z))
+      fail(path, "is damaged: its origin or spacing is not finite, or beyond 1e30; write it again");
+  }
+}
+
+/// VTK leaves the part of an extent that no piece covers as memory happens to be.
+void check_extents(const fs::path& path) {
+  std::ifstream file(path, std::ios::binary);
+  vtkNew<vtkExtentSplitter> splitter;
+  std::optional<Extent> whole;
+  int pieces = 0;
+  constexpr auto any_number = std::numeric_limits<std::streamsize>::max();
+  for (std::string tag; file.ignore(any_number, '<') && std::getline(file, tag, '>');) {
+    if (tag.compare(0, 12, "AppendedData") == 0) break;  // bytes that may look like tags
+    std::size_t from = 0;
+    if (!whole) {
+      whole = extent_of(attribute(tag, "WholeExtent", from));
+      if (whole) check_placement(path, tag);
+    } else if (tag.compare(0, 5, "Piece") == 0) {
+      std::optional<Extent> extent = extent_of(attribute(tag, "Extent", from));
+      if (extent) splitter->AddExtentSource(pieces++, 0, extent->data());
+    }
+  }
+  if (!whole) return;
+  splitter->AddExtent(whole->data());
+  if (splitter->ComputeSubExtents() == 0)
+    fail(path, "its pieces do not fill its extent; write it again, or import the file that names it as a piece");
+}
+
 VtkKind piece_kind(VtkKind whole) {
   const int distance = static_cast<int>(VtkKind::image_pieces) - static_cast<int>(VtkKind::image);
   return static_cast<VtkKind>(static_cast<int>(whole) - distance);
 }
+
+VtkKind checked_kind(const fs::path& path);
 
 void check_pieces(const fs::path& path, VtkKind kind) {
   const std::vector<fs::path> pieces = piece_files(path);
   if (pieces.empty()) fail(path, "names no pieces; write it again");
   for (const fs::path& piece : pieces) {
     if (!fs::is_regular_file(piece)) fail(path, "its piece " + piece.string() + " is missing; copy it there too");
-    if (vtk_kind(piece) != piece_kind(kind)) {
+    if (checked_kind(piece) != piece_kind(kind)) {
       fail(path, "its piece " + piece.string() + " is not " + facts_of(piece_kind(kind)).text);
     }
   }
@@ -176,6 +232,33 @@ void check_foam(const fs::path& path) {
   if (!has_times(folder)) fail(path, "has no time folder; run the case's solver first");
 }
 
+/// Of a piece as well, which may have the extent of the whole.
+VtkKind checked_kind(const fs::path& path) {
+  if (!fs::exists(path)) fail(path, "does not exist");
+  if (fs::is_directory(path)) {
+    check_foam(path);
+    return VtkKind::openfoam;
+  }
+  const std::string head = read_head(path);
+  const std::optional<VtkKind> promised = promised_kind(path), found = kind_of_contents(path, head);
+  if (head.empty() && promised != VtkKind::openfoam) fail(path, "is empty; write it again");
+  if (!found && promised) fail(path, std::string("is not ") + facts_of(*promised).text + ", as its ending says");
+  if (!found)
+    fail(path,
+         "is no file of VTK, ExodusII or OpenFOAM, nor named as NRRD (.nrrd), NIfTI (.nii) or NumPy (.npy); PLOT3D "
+         "needs two files, the grid and its q");
+  if (promised && *promised != *found) {
+    fail(path, std::string("its ending says ") + facts_of(*promised).text + ", its contents are " +
+                   facts_of(*found).text + "; give it the ending " + facts_of(*found).endings.front());
+  }
+  if (facts_of(*found).xml_type) check_xml_end(path);
+  if (*found >= VtkKind::image_pieces && *found <= VtkKind::unstructured_pieces) check_pieces(path, *found);
+  if (*found == VtkKind::legacy) check_legacy(path, head);
+  if (*found == VtkKind::openfoam) check_foam(path);
+  if (*found == VtkKind::exodus) check_netcdf_size(path);
+  return *found;
+}
+
 }  // namespace
 
 std::vector<fs::path> piece_files(const fs::path& path) {
@@ -195,26 +278,11 @@ fs::path openfoam_case(const fs::path& path) {
 }
 
 VtkKind vtk_kind(const fs::path& path) {
-  if (!fs::exists(path)) fail(path, "does not exist");
-  if (fs::is_directory(path)) {
-    check_foam(path);
-    return VtkKind::openfoam;
-  }
-  const std::string head = read_head(path);
-  const std::optional<VtkKind> promised = promised_kind(path), found = kind_of_contents(path, head);
-  if (head.empty() && promised != VtkKind::openfoam) fail(path, "is empty; write it again");
-  if (!found && promised) fail(path, std::string("is not ") + facts_of(*promised).text + ", as its ending says");
-  if (!found) fail(path, "is no file of VTK, ExodusII or OpenFOAM");
-  if (promised && *promised != *found) {
-    fail(path, std::string("its ending says ") + facts_of(*promised).text + ", its contents are " +
-                   facts_of(*found).text + "; give it the ending " + facts_of(*found).endings.front());
-  }
-  if (facts_of(*found).xml_type) check_xml_end(path);
-  if (*found >= VtkKind::image_pieces && *found <= VtkKind::unstructured_pieces) check_pieces(path, *found);
-  if (*found == VtkKind::legacy) check_legacy(path, head);
-  if (*found == VtkKind::openfoam) check_foam(path);
-  if (*found == VtkKind::exodus) check_netcdf_size(path);
-  return *found;
+  const VtkKind kind = checked_kind(path);
+  const bool has_extent = (kind >= VtkKind::image && kind <= VtkKind::structured) ||
+                          (kind >= VtkKind::image_pieces && kind <= VtkKind::structured_pieces);
+  if (has_extent) check_extents(path);
+  return kind;
 }
 
 }  // namespace tensorray

@@ -24,8 +24,10 @@ enum class VtkKind {
 
 /// The kind of a file, or of a folder (an OpenFOAM case).
 /// @throw std::runtime_error naming the file: missing; empty; of no kind above; named by the ending of another kind;
-/// cut off (an XML file without its end; a piece that is missing, cut off or of another kind; a legacy file without
-/// its line DATASET); surfaces alone; an OpenFOAM case without mesh, times or controlDict, or decomposed.
+/// an XML image whose origin or spacing are no finite numbers; cut off (an XML file without its end; a piece that is
+/// missing, cut off or of another kind; a legacy file without its line DATASET); an image, rectilinear or structured
+/// grid with parts of its extent in none of its pieces; surfaces alone; an OpenFOAM case without mesh, times or
+/// controlDict, or decomposed.
 VtkKind vtk_kind(const std::filesystem::path& path);
 
 /// The files that a file in pieces names, in its order.

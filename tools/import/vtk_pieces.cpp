@@ -18,10 +18,8 @@
 namespace tensorray {
 namespace {
 
-using Pieces = std::vector<vtkSmartPointer<vtkDataSet>>;
-
-/// Copies of the pieces that share their arrays, so that those may be added and removed.
-void collect(vtkDataObject* data, Pieces& pieces) {
+/// Copies, so that arrays may be added and removed.
+void collect(vtkDataObject* data, DataSets& pieces) {
   if (auto* const tree = vtkCompositeDataSet::SafeDownCast(data)) {
     vtkSmartPointer<vtkCompositeDataIterator> leaf;
     leaf.TakeReference(tree->NewIterator());
@@ -69,7 +67,7 @@ void remove_ghosts(vtkDataSet& piece) {
 }
 
 /// vtkAppendFilter drops arrays that not all of its inputs have.
-void complete_arrays(const Pieces& pieces, vtkDataObject::AttributeTypes type) {
+void complete_arrays(const DataSets& pieces, vtkDataObject::AttributeTypes type) {
   std::map<std::string, vtkDataArray*> wanted;
   for (vtkDataSet* const piece : pieces) {
     vtkDataSetAttributes& arrays = *piece->GetAttributes(type);
@@ -94,9 +92,13 @@ void complete_arrays(const Pieces& pieces, vtkDataObject::AttributeTypes type) {
 
 }  // namespace
 
-vtkSmartPointer<vtkDataSet> one_data_set(vtkDataObject* data) {
-  Pieces pieces;
+DataSets data_sets_in(vtkDataObject* data) {
+  DataSets pieces;
   collect(data, pieces);
+  return pieces;
+}
+
+vtkSmartPointer<vtkDataSet> one_data_set(const DataSets& pieces) {
   for (vtkDataSet* const piece : pieces) remove_ghosts(*piece);
   if (pieces.empty()) return nullptr;
   if (pieces.size() == 1) return pieces.front();

@@ -2,18 +2,25 @@
 /// @file tools/import/vtk_pieces.h
 /// One data set of what VTK's readers give. Private to the importer: it includes VTK.
 
+#include <vector>
+
 #include <vtkDataObject.h>
 #include <vtkDataSet.h>
 #include <vtkSmartPointer.h>
 
 namespace tensorray {
 
-/// The one data set in `data`, which may be a tree of blocks; if there are several with cells, one unstructured grid of
-/// all, points of equal position merged. An array that some blocks lack is there NaN (or zero, if of integers).
-/// Null if there is none with cells.
+using DataSets = std::vector<vtkSmartPointer<vtkDataSet>>;
+
+/// The data sets with cells in `data`, which may be a tree of blocks: copies that share their arrays.
+DataSets data_sets_in(vtkDataObject* data);
+
+/// The one data set among `pieces`; if there are several, one unstructured grid of all, points of equal position
+/// merged. An array that some pieces lack is there NaN (or zero, if of integers). Null if there is none. The pieces'
+/// ghosts change. Their geometry must be sound: see check_geometry in vtk_source.h.
 ///
 /// Copies of neighbours' cells (duplicate ghosts) and hidden cells of unstructured grids are removed. Points are marked
 /// as ghosts only where they are hidden: a copy of a neighbour's point has the neighbour's value.
-vtkSmartPointer<vtkDataSet> one_data_set(vtkDataObject* data);
+vtkSmartPointer<vtkDataSet> one_data_set(const DataSets& pieces);
 
 }  // namespace tensorray

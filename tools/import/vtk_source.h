@@ -20,14 +20,21 @@ namespace tensorray {
 ///   .vtk (legacy)  .vti .vtr .vts .vtu  .pvti .pvtr .pvts .pvtu  .ex2 .exo .e .g (ExodusII: last time step)
 ///   .foam, controlDict or a folder with system/controlDict (OpenFOAM: last time step, internal mesh)
 /// OpenFOAM has its fields at cells; VTK adds points with the mean of their cells under the same names. A symmTensor
-/// (xx xy xz yy yz zz in OpenFOAM's files) comes in VTK's order, xx yy zz xy yz xz: TensorOrder::vtk. A volTensorField
-/// comes as it is: of OpenFOAM's grad(U), which is ∂_i u_j, that is the transpose of this program's gradients. Points
-/// of an ExodusII mesh are where they were meshed, not displaced. Images stay vtkImageData, structured and rectilinear
-/// grids what they are, also if they were in pieces. Ghosts: see vtk_pieces.h. The kind is found in the contents where
-/// they say it, so that a wrong ending is an error that names both. VTK's readers may end the process, or never, on
-/// damaged files: call it where that is survivable.
+/// (xx xy xz yy yz zz in OpenFOAM's files) comes in VTK's order, its components named XX YY ZZ XY YZ XZ. A
+/// volTensorField comes as it is: of OpenFOAM's grad(U), which is ∂_i u_j, that is the transpose of this program's
+/// gradients. Points of an ExodusII mesh are where they were meshed, not displaced. Images stay vtkImageData,
+/// structured and rectilinear grids what they are, also if they were in pieces. Ghosts: see vtk_pieces.h. The kind is
+/// found in the contents where they say it, so that a wrong ending is an error that names both. VTK's readers may end
+/// the process, or never, on damaged files: call it where that is survivable. What it returns has passed
+/// check_geometry.
 /// @throw std::runtime_error, one line with the file and the mend; what VTK would print is part of it.
 vtkSmartPointer<vtkDataSet> read_vtk_source(const std::filesystem::path& path);
+
+/// VTK takes any geometry that a file holds, and then reads beyond its arrays, or never ends.
+/// @throw std::runtime_error naming `path`: coordinates, an origin or a spacing not finite or beyond 1e30; fewer points
+/// or coordinates than a grid's dimensions; cells of an unstructured grid with points that are not there, or with fewer
+/// than their type needs.
+void check_geometry(vtkDataSet& data, const std::filesystem::path& path);
 
 /// PLOT3D: a grid and its q file (single or multi-block with one block; with or without iblank; 2 or 3 dimensions is an
 /// error; raw or with Fortran record marks; either byte order; float or double), as a curvilinear grid with point
