@@ -27,8 +27,9 @@ TEST_P(ExampleScene, RendersAndBendsLight) {
                                     "receiver.resolution=[64,64]", "--set", "light.wavelengths.count=8", "--set",
                                     "camera.resolution=[64,64]", "--set", "integrator.max_samples=4"});
   // "auto" found a scale at which the median ray turns as far as it should.
-  if (read_file(scene).find("\"scale\"") == std::string::npos)
+  if (read_file(scene).find("\"scale\"") == std::string::npos) {
     EXPECT_NE(outcome.error.find("turns by 0.150 rad"), std::string::npos) << outcome.error;
+  }
   const Image image = read_image(in_folder("out.exr"));
   double least = 1e9, greatest = 0;
   for (const float value : image.pixels) {

@@ -1,0 +1,223 @@
+// What cannot be imported is one line, and leaves everything as it was.
+
+#include <sys/resource.h>
+#include <sys/stat.h>
+
+#include "tests/program/import_support.h"
+
+namespace tensorray {
+namespace {
+
+using namespace test;
+
+class ImportErrors : public Import {
+ protected:
+  /// The beginning of a data set's file; `part` of its bytes.
+  void cut(const std::string& data, const std::string& name, double part = 0.5) const {
+    const std::string bytes = read_file(data_file(data));
+    write(name, bytes.substr(0, static_cast<std::size_t>(part * static_cast<double>(bytes.size()))));
+  }
+  std::string npy() const { return npy_header("12, 14, 18, 3, 3") + bytes_of(components(Matrix3d::Identity(), nine)); }
+  std::string image() const {
+    return vti(lumps_size, Vector3d::Zero(), Vector3d::Ones(), Matrix3d::Identity(),
+               components(Matrix3d::Identity(), nine));
+  }
+};
+
+TEST_F(ImportErrors, FilesThatAreCutOff) {
+  SKIP_WITHOUT(data_file("bluntfin"));
+  const std::string fin = data_file("bluntfin/bluntfinxyz.bin"), q = data_file("bluntfin/bluntfinq.bin");
+  cut("bluntfin/bluntfinxyz.bin", "half.xyz");
+  cut("bluntfin/bluntfinq.bin", "half.q");
+  refuses({"half.xyz", q, "--gradient-of", "velocity"}, 1, {"half.xyz", "cut off"});
+  refuses({fin, "half.q", "--gradient-of", "velocity"}, 1, {"half.q", "cut off"});
+  cut("notch_stress/notch_stress_fixed.vtk", "half.vtk");
+  refuses({"half.vtk", "--array", "Nodal Stress", "--order", "vtk"}, 1, {"half.vtk"});
+  cut("disk_out_ref/disk_out_ref.ex2", "half.ex2");
+  refuses({"half.ex2", "--gradient-of", "V"}, 1, {"half.ex2", "cut off"});
+  cut("dt_helix/dt-helix-ref-RotationAndAffine.nrrd", "half.nrrd");  // Compressed.
+  refuses({"half.nrrd"}, 1, {"half.nrrd", "cut off"});
+  cut("dmri_crop/tensor.nii.gz", "half.nii.gz");
+  refuses({"half.nii.gz", "--order", "mrtrix"}, 1, {"half.nii.gz", "cut off"});
+  write("pieces.pvti", read_file(data_file("pv_tensors/tensors.pvti")));
+  refuses({"pieces.pvti"}, 1, {"pieces.pvti", "tensors_0.vti"});
+}
+
+TEST_F(ImportErrors, WrittenFilesThatAreCutOffOrEmpty) {
+  write("half.npy", npy().substr(0, 20000));
+  refuses({"half.npy"}, 1, {"half.npy", "cut off"});
+  write("half.vti", image().substr(0, 20000));
+  refuses({"half.vti"}, 1, {"half.vti", "cut off"});
+  write("half.nrrd", nrrd_of_lumps(turn, turn).substr(0, 20000));
+  refuses({"half.nrrd"}, 1, {"half.nrrd", "cut off"});
+  write("half.nii", nifti(Eigen::Matrix<float, 3, 4>::Identity(), components(turn, mrtrix)).substr(0, 20000));
+  refuses({"half.nii", "--order", "fsl"}, 1, {"half.nii", "cut off"});
+  for (const std::string name : {"none.vtu", "none.vtk", "none.ex2", "none.nrrd", "none.nii.gz", "none.npy"}) {
+    write(name, "");
+    refuses({name}, 1, {name});
+  }
+}
+
+TEST_F(ImportErrors, FilesThatAreSomethingElse) {
+  write("image.vtu", image());
+  refuses({"image.vtu"}, 1, {"image.vtu", ".vti"});
+  write("image.nii", image());
+  refuses({"image.nii"}, 1, {"image.nii", "NIfTI"});
+  write("array.nrrd", npy());
+  refuses({"array.nrrd"}, 1, {"array.nrrd", "NRRD"});
+  write("head.npy", nifti(Eigen::Matrix<float, 3, 4>::Identity(), components(turn, mrtrix)));
+  refuses({"head.npy"}, 1, {"head.npy"});
+  write("array.vtk", npy());
+  refuses({"array.vtk"}, 1, {"array.vtk"});
+  write("flat.npy", npy_header("12, 14, 18, 4") + std::string(12 * 14 * 18 * 4 * 4, 'a'));
+  refuses({"flat.npy"}, 1, {"flat.npy"});
+  refuses({"missing.vti"}, 1, {"missing.vti", "does not exist"});
+  std::filesystem::create_directory(in_folder("folder"));
+  refuses({"folder"}, 1, {"folder", "OpenFOAM"});
+}
+
+TEST_F(ImportErrors, Plot3dNeedsItsTwoFiles) {
+  const std::string folder = data_file("bluntfin");
+  SKIP_WITHOUT(folder);
+  const std::string grid = folder + "/bluntfinxyz.bin", q = folder + "/bluntfinq.bin";
+  refuses({grid, "--gradient-of", "velocity"}, 1, {grid});
+  refuses({grid, "missing.q", "--gradient-of", "velocity"}, 1, {"missing.q", "does not exist"});
+  refuses({q, grid, "--gradient-of", "velocity"}, 1, {q});
+  refuses({grid, q}, 2, {"density", "momentum", "energy", "velocity"});
+  refuses({grid, q, "--array", "velocity"}, 2, {"velocity", "3 components"});
+}
+
+TEST_F(ImportErrors, WrongArguments) {
+  write("image.vti", image());
+  refuses({"image.vti", "--array", "stress"}, 2, {"stress", "lumps (9 components"});
+  refuses({"image.vti", "--gradient-of", "lumps"}, 2, {"lumps", "--gradient-of"});
+  refuses({"image.vti", "--array", "lumps", "--gradient-of", "v"}, 2, {"--array", "--gradient-of"});
+  refuses({"image.vti", "--order", "xyz"}, 2, {"--order", "vtk", "fsl", "mrtrix", "voigt"});
+  refuses({"image.vti", "--voxel-size", "0"}, 2, {"--voxel-size"});
+  refuses({"image.vti", "--voxel-size", "1e-6"}, 2, {"--voxel-size", "limit"});
+  refuses({"image.vti", "--resolution", "8", "8"}, 2, {"--resolution"});
+  refuses({"image.vti", "--bounds", "1", "0", "0", "1", "0", "1"}, 2, {"--bounds"});
+  refuses({"image.vti", "--boundary", "body.stl"}, 2, {"--boundary", ".ply"});
+  refuses({"image.vti", "-o", "image.txt"}, 2, {"--output"});
+  write("array.npy", npy());
+  refuses({"array.npy", "--resolution", "8"}, 2, {"array.npy", "--resolution"});
+  const Outcome elsewhere = run({"import", "image.vti", "-q", "-o", "missing/image.vdb"});
+  EXPECT_EQ(elsewhere.status, 1);
+  EXPECT_NE(elsewhere.error.find("missing"), std::string::npos) << elsewhere.error;
+}
+
+TEST_F(ImportErrors, BoundsWithNothingInside) {
+  write("image.vti", image());
+  const Arguments far{"--bounds", "50", "60", "50", "60", "50", "60"};
+  Arguments voxels{"image.vti"}, mesh{"image.vti", "--resolution", "8"};
+  for (Arguments* const arguments : {&voxels, &mesh}) arguments->insert(arguments->end(), far.begin(), far.end());
+  refuses(voxels, 2, {"--bounds"});
+  refuses(mesh, 2, {"--bounds"});
+}
+
+TEST_F(ImportErrors, AFullDiskLeavesWhatWasThere) {
+  write("array.npy", npy());
+  write("old.vdb", "what was there before");
+  const Outcome outcome = run({"import", "array.npy", "-q", "-o", "old.vdb"}, 16);
+  EXPECT_EQ(outcome.status, 1);
+  EXPECT_EQ(std::count(outcome.error.begin(), outcome.error.end(), '\n'), 1) << outcome.error;
+  EXPECT_EQ(read_file(in_folder("old.vdb")), "what was there before");
+  EXPECT_EQ(files(), (std::vector<std::string>{"array.npy", "old.vdb"}));
+}
+
+TEST_F(ImportErrors, HelpNamesEveryFlagAndFormat) {
+  const std::string help = run_well({"import", "--help"}).out;
+  for (const char* word :
+       {"--array", "--gradient-of", "--strain-of", "--order",  "--resolution", "--voxel-size", "--bounds", "--boundary",
+        "--half",  "--name",        "--units",     "--output", "--quiet",      ".pvtu",        ".vtk",     ".ex2",
+        ".foam",   ".nrrd",         ".nii.gz",     ".npy",     "PLOT3D",       "mrtrix",       "voigt"})
+    EXPECT_NE(help.find(word), std::string::npos) << word;
+}
+
+constexpr std::size_t large_numbers = 128 * 128 * 128 * 9;
+
+class ImportProcess : public Import {
+ protected:
+  /// A file of 128³ tensors: `header`, then numbers, then `footer`.
+  void write_large(const std::string& name, const std::string& header, const std::string& footer = "") const {
+    std::ofstream file(in_folder(name), std::ios::binary);
+    file << header;
+    std::vector<float> slice(large_numbers / 128);
+    for (int z = 0; z < 128; ++z) {
+      for (std::size_t i = 0; i < slice.size(); ++i) slice[i] = static_cast<float>((i * 2654435761u + 97u * z) % 1024);
+      file << bytes_of(slice);
+    }
+    file << footer;
+  }
+
+  /// The most memory that an import had resident, whichever of its processes had it.
+  double peak_bytes(const std::string& file) const {
+    const pid_t program = start({"import", file, "-q", "-o", "field.vdb"});
+    int status = 0;
+    rusage usage{};
+    wait4(program, &status, 0, &usage);
+    EXPECT_EQ(status, 0) << read_file(in_folder("stderr"));
+    return 1024.0 * static_cast<double>(usage.ru_maxrss);
+  }
+
+  /// Starts an import that takes a while. @return its process and, once it is there, the one that reads; 0 if none.
+  std::array<pid_t, 2> start_reading() const {
+    write_large("large.npy", npy_header("128, 128, 128, 3, 3"));
+    const pid_t program = start({"import", "large.npy", "-q", "-o", "field.vdb"});
+    const std::string children = fmt::format("/proc/{0}/task/{0}/children", program);
+    for (int i = 0; i < 60000; ++i) {
+      pid_t reader = 0;
+      if (std::ifstream(children) >> reader) return {program, reader};
+      std::this_thread::sleep_for(std::chrono::milliseconds(1));
+    }
+    return {program, 0};
+  }
+};
+
+TEST_F(ImportProcess, AReaderThatCrashesIsOneLine) {
+  if (!std::filesystem::exists(fmt::format("/proc/{0}/task/{0}/children", getpid())))
+    GTEST_SKIP() << "this system does not tell a process's children";
+  const auto [program, reader] = start_reading();
+  ASSERT_GT(reader, 0);
+  kill(reader, SIGSEGV);
+  const Outcome outcome = wait_for(program);
+  EXPECT_EQ(outcome.status, 1);
+  EXPECT_NE(outcome.error.find("large.npy: reading it ended the reader"), std::string::npos) << outcome.error;
+  EXPECT_EQ(std::count(outcome.error.begin(), outcome.error.end(), '\n'), 1) << outcome.error;
+  EXPECT_EQ(files(), std::vector<std::string>{"large.npy"});
+}
+
+TEST_F(ImportProcess, AnInterruptedImportLeavesNothing) {
+  if (!std::filesystem::exists(fmt::format("/proc/{0}/task/{0}/children", getpid())))
+    GTEST_SKIP() << "this system does not tell a process's children";
+  const auto [program, reader] = start_reading();
+  ASSERT_GT(reader, 0);
+  kill(program, SIGINT);
+  const Outcome outcome = wait_for(program);
+  EXPECT_EQ(outcome.status, 130);
+  EXPECT_EQ(outcome.error, "tensorray: interrupted; nothing was written\n");
+  EXPECT_EQ(files(), std::vector<std::string>{"large.npy"});
+}
+
+TEST_F(ImportProcess, TakesLessThanTwiceTheData) {
+#ifdef __SANITIZE_ADDRESS__
+  GTEST_SKIP() << "the sanitizer's own memory is larger";
+#endif
+  write("small.npy", npy_header("2, 2, 2, 3, 3") + bytes_of(std::vector<float>(72, 1.0f)));
+  write("small.vti",
+        vti({2, 2, 2}, Vector3d::Zero(), Vector3d::Ones(), Matrix3d::Identity(), std::vector<float>(72, 1.0f)));
+  const double data = 4.0 * large_numbers;
+  write_large("large.npy", npy_header("128, 128, 128, 3, 3"));
+  EXPECT_LT(peak_bytes("large.npy") - peak_bytes("small.npy"), 2 * data);
+  std::string image =
+      "<VTKFile type=\"ImageData\" version=\"1.0\" byte_order=\"LittleEndian\" header_type=\"UInt64\"><ImageData "
+      "WholeExtent=\"0 127 0 127 0 127\" Origin=\"0 0 0\" Spacing=\"1 1 1\"><Piece Extent=\"0 127 0 127 0 127\">"
+      "<PointData><DataArray type=\"Float32\" Name=\"T\" NumberOfComponents=\"9\" format=\"appended\" offset=\"0\"/>"
+      "</PointData></Piece></ImageData><AppendedData encoding=\"raw\">_";
+  image += bytes_of(std::vector<std::uint64_t>{4 * large_numbers});
+  write_large("large.vti", image, "</AppendedData></VTKFile>");
+  EXPECT_LT(peak_bytes("large.vti") - peak_bytes("small.vti"), 2 * data);
+}
+
+}  // namespace
+}  // namespace tensorray

@@ -1,0 +1,213 @@
+#pragma once
+/// @file tests/program/import_support.h
+/// Imports as a user does; and writes files to import: of a field of lumps without any symmetry.
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdint>
+#include <cstring>
+#include <functional>
+
+#include <Eigen/Geometry>
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include "tests/import/openfoam_case.h"
+#include "tests/program/support.h"
+#include "volumes/tensor_files.h"
+
+namespace tensorray::test {
+
+using Eigen::Matrix3d;
+using Eigen::Vector3d;
+using Eigen::Vector3i;
+using Arguments = std::vector<std::string>;
+using nlohmann::json;
+
+inline void for_each_voxel(const TensorGrid& grid,
+                           const std::function<void(const Vector3i&, const Eigen::Matrix3f&)>& visit) {
+  for (const TensorBlock& block : grid.blocks)
+    for (int offset = 0; offset < TensorBlock::voxels; ++offset)
+      if (block.active[offset]) visit(block.origin + TensorBlock::position(offset), block.values[offset]);
+}
+
+/// The same voxels with the same numbers, bit for bit.
+inline void expect_same(const TensorGrid& a, const TensorGrid& b) {
+  EXPECT_LT((a.to_world.matrix() - b.to_world.matrix()).norm(), 1e-12 * a.to_world.matrix().norm());
+  ASSERT_EQ(a.blocks.size(), b.blocks.size());
+  for (std::size_t i = 0; i < a.blocks.size(); ++i) {
+    ASSERT_EQ(a.blocks[i].origin, b.blocks[i].origin);
+    ASSERT_EQ(a.blocks[i].active, b.blocks[i].active);
+    for (int offset = 0; offset < TensorBlock::voxels; ++offset)
+      ASSERT_EQ(a.blocks[i].values[offset], b.blocks[i].values[offset]) << a.blocks[i].origin.transpose();
+  }
+}
+
+template <class Number>
+inline std::string bytes_of(const std::vector<Number>& numbers) {
+  return {reinterpret_cast<const char*>(numbers.data()), numbers.size() * sizeof(Number)};
+}
+
+class Import : public Program {
+ protected:
+  /// Imports into FIELD.vdb. @return what `info` says of the field.
+  json import(Arguments arguments, const std::string& field) {
+    arguments.insert(arguments.begin(), "import");
+    arguments.insert(arguments.end(), {"-q", "-o", field + ".vdb"});
+    imported_ = run_well(arguments);
+    return info(field);
+  }
+  json info(const std::string& field) const {
+    const json all = json::parse(run_well({"info", field + ".vdb", "--json"}).out);
+    return all["fields"][0];
+  }
+  TensorGrid field(const std::string& name) const { return read_tensor_vdb(in_folder(name + ".vdb")); }
+
+  /// Expects one line that has `parts`, `status`, and that all files stay as they were, the old output among them.
+  void refuses(const Arguments& arguments, int status, const std::vector<std::string>& parts) const {
+    write("old.vdb", "what was there before");
+    const auto before = files();
+    Arguments all{"import", "-q", "-o", "old.vdb"};
+    all.insert(all.end(), arguments.begin(), arguments.end());
+    const Outcome outcome = run(all);
+    const std::string trace = fmt::format("{}: {}", fmt::join(arguments, " "), outcome.error);
+    EXPECT_EQ(outcome.status, status) << trace;
+    EXPECT_EQ(outcome.out, "") << trace;
+    EXPECT_EQ(std::count(outcome.error.begin(), outcome.error.end(), '\n'), 1) << trace;
+    for (const std::string& part : parts)
+      EXPECT_NE(outcome.error.find(part), std::string::npos) << part << "\n" << trace;
+    EXPECT_EQ(files(), before) << trace;
+    EXPECT_EQ(read_file(in_folder("old.vdb")), "what was there before") << trace;
+  }
+
+  Outcome imported_;  ///< What the last import said.
+};
+
+inline double at(const json& value, const char* group, const char* key) { return value[group][key].get<double>(); }
+
+inline void expect_extent(const json& field, const Vector3d& min, const Vector3d& max, double tolerance) {
+  for (int axis = 0; axis < 3; ++axis) {
+    EXPECT_NEAR(field["world_extent"]["min"][axis].get<double>(), min[axis], tolerance) << "axis " << axis;
+    EXPECT_NEAR(field["world_extent"]["max"][axis].get<double>(), max[axis], tolerance) << "axis " << axis;
+  }
+}
+
+inline Vector3i voxels_of(const json& field) {
+  Vector3i size;
+  for (int axis = 0; axis < 3; ++axis)
+    size[axis] = field["index_extent"]["max"][axis].get<int>() - field["index_extent"]["min"][axis].get<int>() + 1;
+  return size;
+}
+
+constexpr int lump_size[3] = {18, 14, 12};
+inline const Vector3i lumps_size(lump_size[0], lump_size[1], lump_size[2]);
+
+/// @param p  From the lattice's centre. @return a symmetric tensor, nowhere zero.
+inline Matrix3d lumps(const Vector3d& p) {
+  Matrix3d a, b, c;
+  a << 0.2, 0.1, 0.35, 0.1, -0.1, 0.15, 0.35, 0.15, 0.3;
+  b << -0.3, 0.2, -0.2, 0.2, 0.2, 0.3, -0.2, 0.3, 0.1;
+  c << 0.1, -0.3, 0.1, -0.3, 0.4, -0.25, 0.1, -0.25, -0.2;
+  const auto lump = [&](double x, double y, double z, double width) {
+    return std::exp(-(p - Vector3d(x, y, z)).squaredNorm() / (width * width));
+  };
+  return a * lump(-3, 2, 1, 4) + b * lump(4, -2.5, -2, 3) + c * lump(1, 3, 0, 5);
+}
+
+/// `put(tensor)` for every voxel, x fastest.
+template <class Put>
+inline void for_lumps(const Put& put) {
+  for (int z = 0; z < lumps_size.z(); ++z)
+    for (int y = 0; y < lumps_size.y(); ++y)
+      for (int x = 0; x < lumps_size.x(); ++x)
+        put(lumps(Vector3d(x, y, z) - 0.5 * (lumps_size.cast<double>() - Vector3d::Ones())));
+}
+
+/// World position of the first voxel, if the centre of the lattice, with axes `turn`, is the world's origin.
+inline Vector3d lumps_origin(const Matrix3d& turn) {
+  return turn * (-0.5 * (lumps_size.cast<double>() - Vector3d::Ones()));
+}
+
+/// The components (row, column) of all tensors, after `turn` has turned their axes.
+inline std::vector<float> components(const Matrix3d& turn, const std::vector<std::array<int, 2>>& which) {
+  std::vector<float> numbers;
+  for_lumps([&](const Matrix3d& tensor) {
+    const Matrix3d turned = turn * tensor * turn.transpose();
+    for (const auto& [row, column] : which) numbers.push_back(static_cast<float>(turned(row, column)));
+  });
+  return numbers;
+}
+
+inline const std::vector<std::array<int, 2>> nine{{0, 0}, {0, 1}, {0, 2}, {1, 0}, {1, 1},
+                                                  {1, 2}, {2, 0}, {2, 1}, {2, 2}};
+inline const std::vector<std::array<int, 2>> row_by_row{{0, 0}, {0, 1}, {0, 2}, {1, 1}, {1, 2}, {2, 2}};
+inline const std::vector<std::array<int, 2>> mrtrix{{0, 0}, {1, 1}, {2, 2}, {0, 1}, {0, 2}, {1, 2}};
+
+/// `turn` is where the axes of the voxels point; `frame` those of the components, which stay what they are.
+inline std::string nrrd_of_lumps(const Matrix3d& turn, const Matrix3d& frame) {
+  const auto vector = [](const Vector3d& v) { return fmt::format("({:.17g},{:.17g},{:.17g})", v.x(), v.y(), v.z()); };
+  const auto columns = [&](const Matrix3d& m) {
+    return vector(m.col(0)) + " " + vector(m.col(1)) + " " + vector(m.col(2));
+  };
+  return fmt::format(
+             "NRRD0005\ntype: float\ndimension: 4\nspace: right-anterior-superior\nsizes: 6 {} {} {}\n"
+             "space directions: none {}\nkinds: 3D-symmetric-matrix space space space\nendian: little\n"
+             "encoding: raw\nspace origin: {}\nmeasurement frame: {}\n\n",
+             lumps_size.x(), lumps_size.y(), lumps_size.z(), columns(turn), vector(lumps_origin(turn)),
+             columns(frame)) +
+         bytes_of(components(Matrix3d::Identity(), row_by_row));
+}
+
+/// An image in ASCII XML with nine components in world axes.
+inline std::string vti(const Vector3i& size, const Vector3d& origin, const Vector3d& spacing, const Matrix3d& direction,
+                       const std::vector<float>& numbers) {
+  const Eigen::Matrix<double, 3, 3, Eigen::RowMajor> rows = direction;
+  const auto extent = fmt::format("0 {} 0 {} 0 {}", size.x() - 1, size.y() - 1, size.z() - 1);
+  std::string values;
+  for (const float number : numbers) values += fmt::format("{:.9g} ", number);
+  return fmt::format(
+      "<VTKFile type=\"ImageData\" version=\"1.0\" byte_order=\"LittleEndian\"><ImageData WholeExtent=\"{}\" "
+      "Origin=\"{:.17g} {:.17g} {:.17g}\" Spacing=\"{:.17g} {:.17g} {:.17g}\" Direction=\"{:.17g}\"><Piece "
+      "Extent=\"{}\">"
+      "<PointData Tensors=\"lumps\"><DataArray type=\"Float32\" Name=\"lumps\" NumberOfComponents=\"9\" "
+      "format=\"ascii\">{}</DataArray></PointData></Piece></ImageData></VTKFile>",
+      extent, origin.x(), origin.y(), origin.z(), spacing.x(), spacing.y(), spacing.z(),
+      fmt::join(rows.data(), rows.data() + 9, " "), extent, values);
+}
+
+/// As numpy.save writes 32-bit floats.
+inline std::string npy_header(const std::string& shape) {
+  std::string header = "{'descr': '<f4', 'fortran_order': False, 'shape': (" + shape + "), }";
+  header.resize(117, ' ');
+  return std::string("\x93NUMPY\x01\x00\x76\x00", 10) + header + "\n";
+}
+
+/// A NIfTI-1 file of six volumes; `sform` is its three rows.
+inline std::string nifti(const Eigen::Matrix<float, 3, 4>& sform, const std::vector<float>& numbers) {
+  std::string header(352, '\0');
+  const auto put = [&](std::size_t offset, auto value) { std::memcpy(&header[offset], &value, sizeof value); };
+  put(0, std::int32_t{348});
+  const std::array<int, 8> sizes{4, lumps_size.x(), lumps_size.y(), lumps_size.z(), 6, 1, 1, 1};
+  for (std::size_t i = 0; i < 8; ++i) {
+    put(40 + 2 * i, static_cast<std::int16_t>(sizes[i]));
+    put(76 + 4 * i, 1.0f);
+  }
+  put(70, std::int16_t{16});
+  put(72, std::int16_t{32});
+  put(108, 352.0f);
+  put(254, std::int16_t{1});
+  for (int row = 0; row < 3; ++row)
+    for (int column = 0; column < 4; ++column)
+      put(static_cast<std::size_t>(280 + 16 * row + 4 * column), sform(row, column));
+  std::memcpy(&header[344], "n+1", 4);
+  std::vector<float> volumes;
+  for (std::size_t component = 0; component < 6; ++component)
+    for (std::size_t i = component; i < numbers.size(); i += 6) volumes.push_back(numbers[i]);
+  return header + bytes_of(volumes);
+}
+
+/// A turn about no axis in particular.
+inline const Matrix3d turn = Eigen::AngleAxisd(0.9, Vector3d(1, -2, 0.5).normalized()).toRotationMatrix();
+
+}  // namespace tensorray::test
