@@ -1,3 +1,5 @@
+#include "tools/import/image_lattice.h"
+
 #include <cmath>
 #include <fstream>
 #include <string>
@@ -17,7 +19,6 @@
 #include <vtkUnsignedCharArray.h>
 
 #include "tests/import/mesh_files.h"
-#include "tools/import/vtk_source.h"
 
 namespace tensorray {
 namespace {

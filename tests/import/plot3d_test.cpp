@@ -1,3 +1,5 @@
+#include "tools/import/plot3d.h"
+
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
@@ -15,7 +17,6 @@
 #include <vtkStructuredGrid.h>
 
 #include "tests/import/mesh_files.h"
-#include "tools/import/vtk_source.h"
 
 namespace tensorray {
 namespace {

@@ -58,6 +58,30 @@ TEST_F(ImportErrors, WrittenFilesThatAreCutOffOrEmpty) {
   }
 }
 
+/// VTK reads on beyond the faces where their numbers are wrong, and may or may not survive it.
+TEST_F(ImportErrors, FacesOfPolyhedraThatAreMiscounted) {
+  const auto vtu = [](const std::string& faces) {
+    const auto array = [](const std::string& name, const std::string& values, const std::string& type = "Int64") {
+      return "<DataArray type=\"" + type + "\" Name=\"" + name + "\" format=\"ascii\">" + values + "</DataArray>";
+    };
+    return "<VTKFile type=\"UnstructuredGrid\" version=\"1.0\" byte_order=\"LittleEndian\" header_type=\"UInt64\">"
+           "<UnstructuredGrid><Piece NumberOfPoints=\"4\" NumberOfCells=\"1\"><PointData><DataArray type=\"Float64\" "
+           "Name=\"t\" NumberOfComponents=\"9\" format=\"ascii\">1 0 0 0 1 0 0 0 1 1 0 0 0 1 0 0 0 1 1 0 0 0 1 0 0 0 1 "
+           "1 "
+           "0 0 0 1 0 0 0 1</DataArray></PointData><Points><DataArray type=\"Float64\" NumberOfComponents=\"3\" "
+           "format=\"ascii\">0 0 0 1 0 0 0 1 0 0 0 1</DataArray></Points><Cells>" +
+           array("connectivity", "0 1 2 3") + array("offsets", "4") + array("types", "42", "UInt8") +
+           array("faces", faces) + array("faceoffsets", "17") + "</Cells></Piece></UnstructuredGrid></VTKFile>";
+  };
+  write("sound.vtu", vtu("4 3 0 1 2 3 0 3 1 3 1 3 2 3 0 2 3"));
+  run_well({"import", "sound.vtu", "-q", "--resolution", "4", "-o", "sound.vdb"});
+  for (const char* faces : {"7 3 0 1 2 3 0 3 1 3 1 3 2 3 0 2 3", "4 8 0 1 2 3 0 3 1 3 1 3 2 3 0 2 3",
+                            "4 3 0 1 9 3 0 3 1 3 1 3 2 3 0 2 3"}) {
+    write("wrong.vtu", vtu(faces));
+    refuses({"wrong.vtu", "--resolution", "4"}, 1, {"wrong.vtu: "});
+  }
+}
+
 TEST_F(ImportErrors, FilesThatAreSomethingElse) {
   write("image.vtu", image());
   refuses({"image.vtu"}, 1, {"image.vtu", ".vti"});

@@ -1,3 +1,5 @@
+#include "tools/import/image_lattice.h"
+
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -9,9 +11,8 @@
 #include <vtkImageData.h>
 #include <vtkMatrix3x3.h>
 #include <vtkPointData.h>
+#include <vtkSmartPointer.h>
 #include <vtkUnsignedCharArray.h>
-
-#include "tools/import/vtk_source.h"
 
 namespace tensorray {
 namespace {

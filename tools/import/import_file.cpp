@@ -8,11 +8,15 @@
 
 #include <vtkCellData.h>
 #include <vtkDataArray.h>
+#include <vtkDataSet.h>
 #include <vtkImageData.h>
 #include <vtkPointData.h>
+#include <vtkSmartPointer.h>
 
+#include "tools/import/image_lattice.h"
 #include "tools/import/lattice_files.h"
 #include "tools/import/mesh_boundary.h"
+#include "tools/import/plot3d.h"
 #include "tools/import/vtk_source.h"
 
 namespace tensorray {

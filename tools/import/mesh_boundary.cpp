@@ -12,6 +12,7 @@
 #include <utility>
 #include <vector>
 
+#include <vtkDataSet.h>
 #include <vtkIdList.h>
 #include <vtkPoints.h>
 #include <vtkPolyData.h>

@@ -1,11 +1,11 @@
 #pragma once
 /// @file tools/import/mesh_boundary.h
-/// The surface of the body around which a mesh lies. Private to the importer: it includes VTK.
+/// The surface of the body around which a mesh lies.
 
 #include <cstddef>
 #include <filesystem>
 
-#include <vtkDataSet.h>
+class vtkDataSet;
 
 namespace tensorray {
 

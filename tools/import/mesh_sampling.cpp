@@ -12,6 +12,7 @@
 #include <fmt/format.h>
 #include <tbb/blocked_range.h>
 #include <tbb/parallel_for.h>
+#include <vtkDataSet.h>
 #include <vtkDoubleArray.h>
 #include <vtkPointData.h>
 

@@ -1,16 +1,17 @@
 #pragma once
 /// @file tools/import/mesh_sampling.h
-/// From tensors on a mesh to tensors on a lattice. Private to the importer: it includes VTK.
+/// From tensors on a mesh to tensors on a lattice.
 
 #include <cstddef>
 #include <optional>
 #include <variant>
 
 #include <Eigen/Geometry>
-#include <vtkDataSet.h>
 
 #include "integrators/progress.h"
 #include "volumes/tensor_grid.h"
+
+class vtkDataSet;
 
 namespace tensorray {
 

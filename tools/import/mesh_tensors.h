@@ -1,14 +1,15 @@
 #pragma once
 /// @file tools/import/mesh_tensors.h
-/// Tensors at the points of a mesh, of the arrays that solvers write. Private to the importer: it includes VTK.
+/// Tensors at the points of a mesh, of the arrays that solvers write.
 
 #include <optional>
 #include <string>
 
-#include <vtkDataSet.h>
-#include <vtkSmartPointer.h>
-
 #include "tools/import/tensor_order.h"
+
+class vtkDataSet;
+template <class T>
+class vtkSmartPointer;
 
 namespace tensorray {
 

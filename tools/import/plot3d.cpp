@@ -3,6 +3,8 @@
 // file "is corrupt". Here each file's length decides on its own form, to the byte, nothing is allocated before, and the
 // error says what does not fit.
 
+#include "tools/import/plot3d.h"
+
 #include <algorithm>
 #include <cstring>
 #include <fstream>
@@ -15,11 +17,12 @@
 #include <vtkNew.h>
 #include <vtkPointData.h>
 #include <vtkPoints.h>
+#include <vtkSmartPointer.h>
 #include <vtkStructuredGrid.h>
 #include <vtkUnsignedCharArray.h>
 
 #include "tools/import/plot3d_layout.h"
-#include "tools/import/vtk_source.h"
+#include "tools/import/vtk_geometry.h"
 
 namespace tensorray {
 namespace {

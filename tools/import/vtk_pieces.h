@@ -1,12 +1,13 @@
 #pragma once
 /// @file tools/import/vtk_pieces.h
-/// One data set of what VTK's readers give. Private to the importer: it includes VTK.
+/// One data set of what VTK's readers give.
 
 #include <vector>
 
-#include <vtkDataObject.h>
-#include <vtkDataSet.h>
-#include <vtkSmartPointer.h>
+class vtkDataObject;
+class vtkDataSet;
+template <class T>
+class vtkSmartPointer;
 
 namespace tensorray {
 

@@ -1,0 +1,141 @@
+#pragma once
+/// @file tests/import/vtk_files.h
+/// Small data sets of every kind with a point array "tensor" and a cell array "rate", and files of them.
+
+#include <filesystem>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include <Eigen/Core>
+#include <gtest/gtest.h>
+#include <vtkCellData.h>
+#include <vtkDataSetWriter.h>
+#include <vtkDoubleArray.h>
+#include <vtkImageData.h>
+#include <vtkNew.h>
+#include <vtkPointData.h>
+#include <vtkPoints.h>
+#include <vtkRectilinearGrid.h>
+#include <vtkSmartPointer.h>
+#include <vtkStructuredGrid.h>
+#include <vtkUnstructuredGrid.h>
+#include <vtkXMLDataSetWriter.h>
+
+namespace tensorray {
+
+/// Component c at a place.
+inline double number(const double* x, int c) { return 3 * x[0] - 5 * x[1] + 7 * x[2] + c; }
+
+/// Point array "tensor" of nine and cell array "rate" of three components.
+template <typename Set>
+inline vtkSmartPointer<Set> with_arrays(vtkSmartPointer<Set> set) {
+  vtkNew<vtkDoubleArray> tensor, rate;
+  tensor->SetName("tensor");
+  tensor->SetNumberOfComponents(9);
+  tensor->SetNumberOfTuples(set->GetNumberOfPoints());
+  for (vtkIdType i = 0; i < set->GetNumberOfPoints(); ++i) {
+    for (int c = 0; c < 9; ++c) tensor->SetComponent(i, c, number(set->GetPoint(i), c));
+  }
+  rate->SetName("rate");
+  rate->SetNumberOfComponents(3);
+  rate->SetNumberOfTuples(set->GetNumberOfCells());
+  for (vtkIdType i = 0; i < set->GetNumberOfCells(); ++i) {
+    for (int c = 0; c < 3; ++c) rate->SetComponent(i, c, static_cast<double>(i) + 0.25 * c);
+  }
+  set->GetPointData()->AddArray(tensor);
+  set->GetCellData()->AddArray(rate);
+  return set;
+}
+
+inline vtkSmartPointer<vtkImageData> image() {
+  auto set = vtkSmartPointer<vtkImageData>::New();
+  set->SetDimensions(5, 4, 3);
+  set->SetOrigin(1, 2, 3);
+  set->SetSpacing(0.5, 1, 2);
+  return with_arrays(set);
+}
+
+inline vtkSmartPointer<vtkRectilinearGrid> rectilinear() {
+  auto set = vtkSmartPointer<vtkRectilinearGrid>::New();
+  vtkNew<vtkDoubleArray> x, y, z;
+  for (const double value : {0.0, 1.0, 4.0}) x->InsertNextValue(value);
+  for (const double value : {-1.0, 0.5}) y->InsertNextValue(value);
+  for (const double value : {2.0, 3.0, 9.0, 10.0}) z->InsertNextValue(value);
+  set->SetDimensions(3, 2, 4);
+  set->SetXCoordinates(x);
+  set->SetYCoordinates(y);
+  set->SetZCoordinates(z);
+  return with_arrays(set);
+}
+
+inline vtkSmartPointer<vtkStructuredGrid> structured() {
+  auto set = vtkSmartPointer<vtkStructuredGrid>::New();
+  vtkNew<vtkPoints> points;
+  points->SetDataTypeToDouble();
+  for (int i = 0; i < 4 * 3 * 2; ++i)
+    points->InsertNextPoint(i % 4 + 0.1 * (i / 12), i / 4 % 3, i / 12 + 0.2 * (i % 4));
+  set->SetDimensions(4, 3, 2);
+  set->SetPoints(points);
+  return with_arrays(set);
+}
+
+/// A bar of unit cubes along x, from `first`.
+inline vtkSmartPointer<vtkUnstructuredGrid> bar(int first, int cubes) {
+  auto set = vtkSmartPointer<vtkUnstructuredGrid>::New();
+  vtkNew<vtkPoints> points;
+  points->SetDataTypeToDouble();
+  for (int i = 0; i <= cubes; ++i) {
+    for (int corner = 0; corner < 4; ++corner) points->InsertNextPoint(first + i, corner % 2, corner / 2);
+  }
+  set->SetPoints(points);
+  for (vtkIdType i = 0; i < cubes; ++i) {
+    const vtkIdType p = 4 * i, corners[8] = {p, p + 4, p + 5, p + 1, p + 2, p + 6, p + 7, p + 3};
+    set->InsertNextCell(VTK_HEXAHEDRON, 8, corners);
+  }
+  return with_arrays(set);
+}
+
+enum class Mode { ascii, binary, raw_compressed, raw_plain };
+
+inline void write_xml(vtkDataSet& set, const std::filesystem::path& path, Mode mode = Mode::raw_compressed) {
+  vtkNew<vtkXMLDataSetWriter> writer;
+  writer->SetInputData(&set);
+  writer->SetFileName(path.c_str());
+  writer->SetDataMode(mode == Mode::ascii    ? vtkXMLWriter::Ascii
+                      : mode == Mode::binary ? vtkXMLWriter::Binary
+                                             : vtkXMLWriter::Appended);
+  writer->SetEncodeAppendedData(false);
+  if (mode == Mode::raw_plain) writer->SetCompressorTypeToNone();
+  ASSERT_EQ(writer->Write(), 1);
+}
+
+inline void write_legacy(vtkDataSet& set, const std::filesystem::path& path, bool binary) {
+  vtkNew<vtkDataSetWriter> writer;
+  writer->SetInputData(&set);
+  writer->SetFileName(path.c_str());
+  binary ? writer->SetFileTypeToBinary() : writer->SetFileTypeToASCII();
+  ASSERT_EQ(writer->Write(), 1);
+}
+
+inline void expect_same(vtkDataSet& read, vtkDataSet& written, double tolerance) {
+  ASSERT_EQ(read.GetNumberOfPoints(), written.GetNumberOfPoints());
+  ASSERT_EQ(read.GetNumberOfCells(), written.GetNumberOfCells());
+  vtkDataArray* const tensor = read.GetPointData()->GetArray("tensor");
+  vtkDataArray* const rate = read.GetCellData()->GetArray("rate");
+  ASSERT_TRUE(tensor && rate);
+  for (vtkIdType i = 0; i < read.GetNumberOfPoints(); ++i) {
+    const Eigen::Vector3d x(read.GetPoint(i)), expected(written.GetPoint(i));
+    EXPECT_LT((x - expected).norm(), tolerance);
+    for (int c = 0; c < 9; ++c) EXPECT_NEAR(tensor->GetComponent(i, c), number(expected.data(), c), tolerance);
+  }
+  for (vtkIdType i = 0; i < read.GetNumberOfCells(); ++i) {
+    EXPECT_NEAR(rate->GetComponent(i, 2), static_cast<double>(i) + 0.5, tolerance);
+  }
+}
+
+inline std::vector<std::pair<std::string, vtkSmartPointer<vtkDataSet>>> data_sets() {
+  return {{".vti", image()}, {".vtr", rectilinear()}, {".vts", structured()}, {".vtu", bar(0, 3)}};
+}
+
+}  // namespace tensorray
