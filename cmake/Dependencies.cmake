@@ -7,6 +7,7 @@ find_package(nlohmann_json REQUIRED)
 find_package(fmt REQUIRED)
 find_package(CLI11 REQUIRED)
 find_package(assimp REQUIRED)
+find_package(hwy REQUIRED)
 
 # OpenVDB's find module sits outside CMake's search path on Debian.
 file(GLOB OPENVDB_MODULE_PATHS /usr/lib/*/cmake/OpenVDB /usr/lib/cmake/OpenVDB /usr/local/lib*/cmake/OpenVDB)
