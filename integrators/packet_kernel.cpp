@@ -40,6 +40,7 @@ struct Medium {
   float to_index[3][3];
   std::int32_t first[3], last[3];  // Voxels of the extent.
   float margin[3];                 // Of the extent beyond these: ½ on an axis of a single voxel.
+  bool flat;                       // Whether an axis has a single voxel.
   float longest_step;              // Voxels; but through straight bricks.
 
   TensorBrick brick(const std::int32_t at[3]) const { return field.brick({at[0], at[1], at[2]}); }
@@ -65,22 +66,31 @@ constexpr int most_terms = 10;
 struct Packet {
   alignas(64) float p[3][most_lanes];    // Position, voxels from the brick's first.
   alignas(64) float v[3][most_lanes];    // V.
-  alignas(64) float u[3][most_lanes];    // The direction in index space; if voxels are uniform, V.
+  alignas(64) float u[3][most_lanes];    // The direction in index space; unused if voxels are uniform: it is V.
   alignas(64) float kick[most_lanes];    // s, times the voxel's edge if voxels are uniform.
   alignas(64) float length[most_lanes];  // Of the way since the ray came, in units of the time that u is per.
   alignas(64) float norm[most_lanes];    // Of T's deviator as last sampled, or 0.
   alignas(64) float reach[most_lanes];   // Bound on ‖s h T‖ in the brick.
   alignas(64) float strongest[most_lanes];
   alignas(64) float low[3][most_lanes], high[3][most_lanes];  // The voxels' box, relative to the brick.
-  alignas(64) float margin[3][most_lanes];                    // Of the extent beyond it.
-  alignas(64) float time[most_lanes];                         // Of the step being taken.
+  alignas(64) float last[3][most_lanes];                      // The last cell, likewise.
+
+  // Of the step being taken:
+  alignas(64) float time[most_lanes];              // In units of what u is per.
+  alignas(64) float middle[3][most_lanes];         // Positions there ...
+  alignas(64) float fraction[3][most_lanes];       // ... and within the cell;
+  alignas(64) float polynomial[8][8];              // the cell's, if it is one_cell,
+  alignas(64) float components[2][most_lanes][4];  // or each lane's tensor;
+  alignas(64) float tensor[8][most_lanes];         // the same, lanes side by side.
+
   const float* bending[most_lanes] = {};
-  std::int32_t brick[most_lanes][3];
+  alignas(64) std::int32_t brick[3][most_lanes];
   std::int32_t ray[most_lanes];
   std::uint32_t alive = 0;  // A bit each.
   std::uint32_t steps = 0, most_steps = 0;
   float greatest_reach = 0;
-  bool one_brick = false, near_border = false, near_surface = false, straight = false;
+  bool one_brick = false, near_border = false, near_surface = false, straight = false, one_cell = false;
+  bool clamps = false;  // Whether points beyond the voxels' box are taken to it.
 };
 
 }  // namespace tensorray::packets
@@ -175,22 +185,22 @@ constexpr Eight eight;
 constexpr int eight_lanes = static_cast<int>(hn::MaxLanes(Eight()));
 
 /// All lanes are in one cell: its polynomial is made once, and its coefficients go to all lanes.
-HWY_INLINE Tensor sample_one_cell(const float* corner, const F3& f) {
-  alignas(64) float k[8][8];
+HWY_INLINE void make_polynomial(const float* corner, float (&k)[8][8]) {
   for (int i = 0; i < 8; i += eight_lanes) {
     const Polynomial<Eight> polynomial = cell_polynomial(eight, corner + i);
     for (int j = 0; j < 8; ++j) hn::Store(polynomial.k[j], eight, &k[j][i]);
   }
-  Tensor T;
-  for (int i = 0; i < 8; ++i)
-    T.c[i] = evaluate(set(k[0][i]), set(k[1][i]), set(k[2][i]), set(k[3][i]), set(k[4][i]), set(k[5][i]), set(k[6][i]),
-                      set(k[7][i]), f.x, f.y, f.z);
-  return T;
 }
 
-/// Lanes are in cells of their own: a vector holds the components of one lane at a time.
-HWY_NOINLINE void sample_cells(const float* const bending[], const std::int32_t* voxels, const float (*f)[most_lanes],
-                               float (*components)[most_lanes][4]) {
+HWY_INLINE F evaluate_polynomial(const float (&k)[8][8], int i, const F3& f) {
+  return evaluate(set(k[0][i]), set(k[1][i]), set(k[2][i]), set(k[3][i]), set(k[4][i]), set(k[5][i]), set(k[6][i]),
+                  set(k[7][i]), f.x, f.y, f.z);
+}
+
+/// Lanes are in cells of their own: a vector holds the components of one lane at a time. `components` are the first
+/// four of each lane, and the last four.
+HWY_NOINLINE void sample_own_cells(const float* const bending[], const std::int32_t* voxels,
+                                   const float (*f)[most_lanes], float (*components)[most_lanes][4]) {
   for (int lane = 0; lane < lanes; ++lane) {
     const float* const corner = bending[lane] + voxels[lane] * TensorBrick::bending_floats;
     const auto x = hn::Set(eight, f[0][lane]), y = hn::Set(eight, f[1][lane]), z = hn::Set(eight, f[2][lane]);
@@ -202,17 +212,6 @@ HWY_NOINLINE void sample_cells(const float* const bending[], const std::int32_t*
     std::memcpy(components[0][lane], result, 16);
     std::memcpy(components[1][lane], result + 4, 16);
   }
-}
-
-HWY_INLINE Tensor sample_own_cells(const Packet& packet, const std::int32_t* voxels, const F3& fraction) {
-  alignas(64) float f[3][most_lanes];
-  alignas(64) float components[2][most_lanes][4];
-  store(fraction, f);
-  sample_cells(packet.bending, voxels, f, components);
-  Tensor T;
-  hn::LoadInterleaved4(floats, components[0][0], T.c[0], T.c[1], T.c[2], T.c[3]);
-  hn::LoadInterleaved4(floats, components[1][0], T.c[4], T.c[5], T.c[6], T.c[7]);
-  return T;
 }
 
 /// The kernel, for voxels that are cubes along the axes (`uniform`) or any others.
@@ -228,20 +227,25 @@ class Kernel {
 
   bool fill(Packet& packet);
   void enter(Packet& packet, int lane);
-  void visit_brick(Packet& packet, int lane);
+  void begin(Packet& packet);
+  void find_bricks(Packet& packet, std::uint32_t wanted);
   void repeat(Packet& packet, int lane, int of);
   void summarize(Packet& packet);
   void move_to_bricks(Packet& packet, const F3& point);
-  Tensor sample(Packet& packet, const F3& offset);
+  void locate(Packet& packet, F time);
   F3 bend(Packet& packet, const Tensor& T, const F3& v, F factor);
   F3 bend_strongly(Packet& packet, const Tensor& T, const F3& v, F factor);
   F3 index_direction(const F3& v) const;
   F step_time(Packet& packet, const F3& u);
-  F3 take_step(Packet& packet, F time, F3& v, F3& u);
+  F3 take_step(Packet& packet, F3& v, F3& u);
   void step(Packet& packet);
-  std::uint32_t stopped(Packet& packet, const F3& to, const F3& v, F time, std::uint32_t& leaves) const;
+  std::uint32_t outside(const Packet& packet, const F3& to) const;
+  std::uint32_t stopped(const Packet& packet, const F3& to, const F3& v) const;
   void take_out(Packet& packet, std::uint32_t stop, std::uint32_t leave);
   void repeat_one_alive(Packet& packet);
+  static auto direction(const Packet& packet) -> const float (&)[3][most_lanes] {
+    return uniform ? packet.v : packet.u;
+  }
   float to_world() const { return uniform ? medium_.voxel : 1.0f; }  // Of what u is per.
   void land(Packet& packet);
 
@@ -261,34 +265,11 @@ void Kernel<uniform>::enter(Packet& packet, int lane) {
   for (int axis = 0; axis < 3; ++axis) {
     packet.p[axis][lane] = ray.position[axis];
     packet.v[axis][lane] = ray.direction[axis];
-    packet.u[axis][lane] = ray.direction[axis];
-    packet.brick[lane][axis] = ray.brick[axis];
-    packet.margin[axis][lane] = medium_.margin[axis];
+    packet.brick[axis][lane] = ray.brick[axis];
   }
   packet.kick[lane] = uniform ? ray.flexibility * medium_.voxel : ray.flexibility;
   packet.norm[lane] = ray.norm;
   packet.length[lane] = 0;
-  visit_brick(packet, lane);
-}
-
-/// Sets what depends on a lane's brick alone.
-template <bool uniform>
-void Kernel<uniform>::visit_brick(Packet& packet, int lane) {
-  const std::int32_t* const at = packet.brick[lane];
-  if (lane > 0 && packet.bending[lane - 1] && std::equal(at, at + 3, packet.brick[lane - 1])) {
-    packet.bending[lane] = packet.bending[lane - 1];
-    packet.strongest[lane] = packet.strongest[lane - 1];
-  } else {
-    const TensorBrick brick = medium_.brick(at);
-    packet.bending[lane] = brick.bending;
-    packet.strongest[lane] = brick.strongest;
-  }
-  const float longest = medium_.longest_step * (uniform ? 1.0f : medium_.longest_voxel);
-  packet.reach[lane] = std::fabs(packet.kick[lane]) * longest * packet.strongest[lane];
-  for (int axis = 0; axis < 3; ++axis) {
-    packet.low[axis][lane] = static_cast<float>(medium_.first[axis] - TensorBrick::cells * at[axis]);
-    packet.high[axis][lane] = static_cast<float>(medium_.last[axis] - TensorBrick::cells * at[axis]);
-  }
 }
 
 /// Lets a lane repeat what another does.
@@ -298,44 +279,87 @@ void Kernel<uniform>::repeat(Packet& packet, int lane, int of) {
     packet.p[axis][lane] = packet.p[axis][of];
     packet.v[axis][lane] = packet.v[axis][of];
     packet.u[axis][lane] = packet.u[axis][of];
-    packet.low[axis][lane] = packet.low[axis][of];
-    packet.high[axis][lane] = packet.high[axis][of];
-    packet.margin[axis][lane] = packet.margin[axis][of];
-    packet.brick[lane][axis] = packet.brick[of][axis];
+    packet.brick[axis][lane] = packet.brick[axis][of];
   }
   packet.kick[lane] = packet.kick[of];
   packet.length[lane] = packet.length[of];
   packet.norm[lane] = packet.norm[of];
-  packet.reach[lane] = packet.reach[of];
-  packet.strongest[lane] = packet.strongest[of];
   packet.time[lane] = packet.time[of];
-  packet.bending[lane] = packet.bending[of];
   packet.ray[lane] = packet.ray[of];
 }
 
-/// Sets what depends on all lanes' bricks.
+/// Finds the bricks of some lanes, given as bits.
 template <bool uniform>
-void Kernel<uniform>::summarize(Packet& packet) {
-  packet.one_brick = true;
-  packet.near_border = packet.near_surface = packet.straight = false;
-  packet.greatest_reach = 0;
-  const float margin = medium_.longest_step + 1;  // A step may begin a little outside of its brick.
-  for (int lane = 0; lane < lanes; ++lane) {
-    packet.one_brick &= packet.bending[lane] == packet.bending[0];
-    packet.straight |= packet.strongest[lane] == 0;
-    packet.greatest_reach =
-        packet.reach[lane] <= packet.greatest_reach ? packet.greatest_reach : packet.reach[lane];  // Keeps NaN.
-    for (int axis = 0; axis < 3; ++axis)
-      packet.near_border |= packet.low[axis][lane] > -margin || packet.high[axis][lane] < TensorBrick::cells + margin;
-    packet.near_surface |= medium_.near_surface(packet.brick[lane]);
+HWY_INLINE void Kernel<uniform>::find_bricks(Packet& packet, std::uint32_t wanted) {
+  const auto x = hn::Load(ints, packet.brick[0]), y = hn::Load(ints, packet.brick[1]),
+             z = hn::Load(ints, packet.brick[2]);
+  while (wanted != 0) {
+    const auto first = hwy::Num0BitsBelowLS1Bit_Nonzero32(wanted);
+    const std::int32_t at[3] = {packet.brick[0][first], packet.brick[1][first], packet.brick[2][first]};
+    const TensorBrick brick = medium_.brick(at);
+    const auto same = hn::And(hn::Eq(x, hn::Set(ints, at[0])),
+                              hn::And(hn::Eq(y, hn::Set(ints, at[1])), hn::Eq(z, hn::Set(ints, at[2]))));
+    const std::uint32_t found = to_bits(hn::RebindMask(floats, same)) & wanted;
+    for (int lane = 0; lane < lanes; ++lane) {
+      if (!(found >> lane & 1)) continue;
+      packet.bending[lane] = brick.bending;
+      packet.strongest[lane] = brick.strongest;
+    }
+    wanted &= ~found;
   }
-  if (packet.greatest_reach <= strongest_kick) std::fill_n(packet.norm, lanes, 0.0f);  // No step need be shorter here.
+}
+
+/// Sets what follows from the lanes' bricks.
+template <bool uniform>
+HWY_INLINE void Kernel<uniform>::summarize(Packet& packet) {
+  const F strongest = hn::Load(floats, packet.strongest), most = set(1e30f);
+  const float longest = medium_.longest_step * (uniform ? 1.0f : medium_.longest_voxel);
+  const F reach = hn::Mul(hn::Mul(hn::Abs(hn::Load(floats, packet.kick)), set(longest)), strongest);
+  hn::Store(reach, floats, packet.reach);
+  packet.greatest_reach =
+      hn::AllTrue(floats, hn::Le(reach, most)) ? hn::GetLane(hn::MaxOfLanes(floats, reach)) : 1e30f;  // NaN is strong.
+  packet.straight = !hn::AllFalse(floats, hn::Eq(strongest, hn::Zero(floats)));
+  if (packet.greatest_reach <= strongest_kick) hn::Store(hn::Zero(floats), floats, packet.norm);  // Steps stay long.
+
+  // A step may begin a little outside of its brick.
+  const F near = set(-medium_.longest_step - 1), far = set(TensorBrick::cells + medium_.longest_step + 1);
+  Mask border = hn::Gt(hn::Load(floats, packet.low[0]), near), apart = hn::Lt(near, near);
+  for (int axis = 0; axis < 3; ++axis) {
+    const auto brick = hn::Load(ints, packet.brick[axis]);
+    apart = hn::Or(apart, hn::RebindMask(floats, hn::Ne(brick, hn::Set(ints, packet.brick[axis][0]))));
+    border = hn::Or(border, hn::Or(hn::Gt(hn::Load(floats, packet.low[axis]), near),
+                                   hn::Lt(hn::Load(floats, packet.high[axis]), far)));
+  }
+  packet.one_brick = hn::AllFalse(floats, apart);
+  packet.near_border = !hn::AllFalse(floats, border);
+  if (!medium_.settings.meets_surface) return;
+  packet.near_surface = false;
+  for (int lane = 0; lane < lanes; ++lane) {
+    const std::int32_t at[3] = {packet.brick[0][lane], packet.brick[1][lane], packet.brick[2][lane]};
+    packet.near_surface |= medium_.near_surface(at);
+  }
+}
+
+/// After lanes have been set: what follows from their rays.
+template <bool uniform>
+void Kernel<uniform>::begin(Packet& packet) {
+  for (int axis = 0; axis < 3; ++axis) {
+    const auto base = hn::Mul(hn::Load(ints, packet.brick[axis]), hn::Set(ints, TensorBrick::cells));
+    const F low = hn::ConvertTo(floats, hn::Sub(hn::Set(ints, medium_.first[axis]), base));
+    const F high = hn::ConvertTo(floats, hn::Sub(hn::Set(ints, medium_.last[axis]), base));
+    hn::Store(low, floats, packet.low[axis]);
+    hn::Store(high, floats, packet.high[axis]);
+    hn::Store(hn::Max(hn::Sub(high, set(1)), low), floats, packet.last[axis]);
+  }
+  find_bricks(packet, (1u << lanes) - 1);
+  summarize(packet);
 }
 
 template <bool uniform>
 bool Kernel<uniform>::fill(Packet& packet) {
   if (next_ == rays_.size()) return false;
   packet.alive = 0;
+  packet.clamps = medium_.flat;
   packet.steps = 0;
   packet.most_steps = medium_.settings.max_steps;
   for (int lane = 0; lane < lanes; ++lane) {
@@ -348,30 +372,27 @@ bool Kernel<uniform>::fill(Packet& packet) {
     packet.alive |= 1u << lane;
     packet.most_steps = std::min(packet.most_steps, medium_.settings.max_steps - rays_[packet.ray[lane]].steps);
   }
-  store(index_direction(load(packet.v)), packet.u);
-  summarize(packet);
+  if constexpr (!uniform) store(index_direction(load(packet.v)), packet.u);
+  begin(packet);
   return true;
 }
 
-/// Rebases the lanes whose point has left their brick.
+/// Takes the lanes whose point has left their brick to the point's.
 template <bool uniform>
 HWY_NOINLINE void Kernel<uniform>::move_to_bricks(Packet& packet, const F3& point) {
-  alignas(64) float at[3][most_lanes];
-  store(point, at);
-  for (int lane = 0; lane < lanes; ++lane) {
-    bool moved = false;
-    for (int axis = 0; axis < 3; ++axis) {
-      // The cell between the last two voxels is the last one, also for points on its far face.
-      const float cell =
-          std::min(std::floor(at[axis][lane]), std::max(packet.high[axis][lane] - 1, packet.low[axis][lane]));
-      const float bricks = std::floor(cell / TensorBrick::cells);
-      if (bricks == 0) continue;
-      moved = true;
-      packet.brick[lane][axis] += static_cast<std::int32_t>(bricks);
-      packet.p[axis][lane] -= TensorBrick::cells * bricks;
-    }
-    if (moved) visit_brick(packet, lane);
+  const F axes[3] = {point.x, point.y, point.z};
+  const F zero = hn::Zero(floats), cells = set(TensorBrick::cells);
+  Mask moved = hn::Lt(zero, zero);
+  for (int axis = 0; axis < 3; ++axis) {
+    // The cell between the last two voxels is the last one, also for points on its far face.
+    const F cell = hn::Min(hn::Floor(axes[axis]), hn::Load(floats, packet.last[axis]));
+    const F bricks = hn::Floor(hn::Mul(cell, set(1.0f / TensorBrick::cells)));
+    moved = hn::Or(moved, hn::Ne(bricks, zero));
+    for (float* values : {packet.p[axis], packet.low[axis], packet.high[axis], packet.last[axis]})
+      hn::Store(hn::NegMulAdd(bricks, cells, hn::Load(floats, values)), floats, values);
+    hn::Store(hn::Add(hn::Load(ints, packet.brick[axis]), hn::ConvertTo(ints, bricks)), ints, packet.brick[axis]);
   }
+  find_bricks(packet, to_bits(moved));
   summarize(packet);
 }
 
@@ -390,43 +411,56 @@ HWY_INLINE F3 clamp(const F3& p, const F3& low, const F3& high) {
           hn::Min(hn::Max(p.z, low.z), high.z)};
 }
 
-/// The tensor at the packet's positions plus `offset`. Takes lanes to the bricks of these points.
+/// The first part of a step: to its middle, and what is needed to interpolate there. Takes lanes to the bricks of these
+/// points. Steps have parts so that the processor works on the same part of several packets at once: each is a chain of
+/// operations that wait for one another, and a whole step is longer than what a processor looks ahead.
 template <bool uniform>
-HWY_INLINE Tensor Kernel<uniform>::sample(Packet& packet, const F3& offset) {
+HWY_INLINE void Kernel<uniform>::locate(Packet& packet, F time) {
+  const F3 offset = mul(hn::Mul(set(0.5f), time), load(direction(packet)));
   F3 point, near;
-  F voxel;
   for (bool again = false;; again = true) {
     point = add(load(packet.p), offset);
-    if (HWY_UNLIKELY(packet.near_border)) point = clamp(point, load(packet.low), load(packet.high));
+    if (HWY_UNLIKELY(packet.clamps)) point = clamp(point, load(packet.low), load(packet.high));
     near = {hn::Floor(point.x), hn::Floor(point.y), hn::Floor(point.z)};
-    if (HWY_UNLIKELY(packet.near_border)) {
-      const F3 low = load(packet.low), high = load(packet.high);
-      const F one = set(1);
-      near = {hn::Min(near.x, hn::Max(hn::Sub(high.x, one), low.x)),
-              hn::Min(near.y, hn::Max(hn::Sub(high.y, one), low.y)),
-              hn::Min(near.z, hn::Max(hn::Sub(high.z, one), low.z))};
-    }
+    if (HWY_UNLIKELY(packet.clamps)) near = clamp(near, load(packet.low), load(packet.last));
     // As unsigned integers, negative floats are the greatest.
     const auto greatest =
         hn::Max(hn::Max(hn::BitCast(bits, near.x), hn::BitCast(bits, near.y)), hn::BitCast(bits, near.z));
-    const auto outside = hn::Gt(greatest, hn::BitCast(bits, set(TensorBrick::cells - 1)));
-    if (HWY_LIKELY(hn::AllFalse(bits, outside))) break;
-    if (again) {  // Rounding took a point onto its new brick's face.
+    const auto outside_brick = hn::Gt(greatest, hn::BitCast(bits, set(TensorBrick::cells - 1)));
+    if (HWY_LIKELY(hn::AllFalse(bits, outside_brick))) break;
+    if (again) {  // Beyond the extent, or on the face that rounding took it to.
       const F zero = hn::Zero(floats), last = set(TensorBrick::cells - 1);
       near = clamp(near, {zero, zero, zero}, {last, last, last});
       break;
     }
     move_to_bricks(packet, point);
   }
-  const F3 f{hn::Sub(point.x, near.x), hn::Sub(point.y, near.y), hn::Sub(point.z, near.z)};
+  hn::Store(time, floats, packet.time);
+  store(add(load(packet.p), offset), packet.middle);
+  store({hn::Sub(point.x, near.x), hn::Sub(point.y, near.y), hn::Sub(point.z, near.z)}, packet.fraction);
   const F width = set(TensorBrick::width);
-  voxel = hn::MulAdd(hn::MulAdd(near.x, width, near.y), width, near.z);
+  const F voxel = hn::MulAdd(hn::MulAdd(near.x, width, near.y), width, near.z);
   const float first = hn::GetLane(voxel);
-  if (HWY_LIKELY(packet.one_brick && hn::AllTrue(floats, hn::Eq(voxel, set(first)))))
-    return sample_one_cell(packet.bending[0] + static_cast<int>(first) * TensorBrick::bending_floats, f);
+  packet.one_cell = packet.one_brick && hn::AllTrue(floats, hn::Eq(voxel, set(first)));
+  if (HWY_LIKELY(packet.one_cell))
+    return make_polynomial(packet.bending[0] + static_cast<int>(first) * TensorBrick::bending_floats,
+                           packet.polynomial);
   alignas(64) std::int32_t voxels[most_lanes];
   hn::Store(hn::ConvertTo(ints, voxel), ints, voxels);
-  return sample_own_cells(packet, voxels, f);
+  sample_own_cells(packet.bending, voxels, packet.fraction, packet.components);
+}
+
+/// The second part: the tensor there.
+HWY_INLINE void interpolate(Packet& packet) {
+  F T[8];
+  if (HWY_LIKELY(packet.one_cell)) {
+    const F3 f = load(packet.fraction);
+    for (int i = 0; i < 8; ++i) hn::Store(evaluate_polynomial(packet.polynomial, i, f), floats, packet.tensor[i]);
+  } else {
+    hn::LoadInterleaved4(floats, packet.components[0][0], T[0], T[1], T[2], T[3]);
+    hn::LoadInterleaved4(floats, packet.components[1][0], T[4], T[5], T[6], T[7]);
+    for (int i = 0; i < 8; ++i) hn::Store(T[i], floats, packet.tensor[i]);
+  }
 }
 
 /// exp(factor · T) V, normalised, where ‖factor · T‖ is small in all lanes: two terms, and the square root as a series.
@@ -527,47 +561,49 @@ HWY_INLINE F Kernel<uniform>::step_time(Packet& packet, const F3& u) {
   return time;
 }
 
-/// A step from the packet's positions. Sets the directions at its end. @return the positions.
+/// The third part: bends, and on from the middle. Sets the directions at the end. @return the positions.
 template <bool uniform>
-HWY_INLINE F3 Kernel<uniform>::take_step(Packet& packet, F time, F3& v, F3& u) {
-  const F half = hn::Mul(set(0.5f), time);
-  const F3 offset = mul(half, load(packet.u));
-  const Tensor T = sample(packet, offset);
+HWY_INLINE F3 Kernel<uniform>::take_step(Packet& packet, F3& v, F3& u) {
+  const F time = hn::Load(floats, packet.time);
+  Tensor T;
+  for (int i = 0; i < 8; ++i) T.c[i] = hn::Load(floats, packet.tensor[i]);
   v = bend(packet, T, load(packet.v), hn::Mul(time, hn::Load(floats, packet.kick)));
   u = index_direction(v);
-  return mul_add(half, u, add(load(packet.p), offset));
+  return mul_add(hn::Mul(set(0.5f), time), u, load(packet.middle));
 }
 
-/// The lanes that cannot take this step, as bits; `leaves` those of them that leave the extent by it.
+/// The lanes that leave the extent, as bits.
 template <bool uniform>
-HWY_NOINLINE std::uint32_t Kernel<uniform>::stopped(Packet& packet, const F3& to, const F3& v, F time,
-                                                    std::uint32_t& leaves) const {
-  const auto outside = [&](F x, int axis) HWY_ATTR {
-    const F margin = hn::Load(floats, packet.margin[axis]);
-    return hn::Or(hn::Lt(x, hn::Sub(hn::Load(floats, packet.low[axis]), margin)),
-                  hn::Gt(x, hn::Add(hn::Load(floats, packet.high[axis]), margin)));
+HWY_INLINE std::uint32_t Kernel<uniform>::outside(const Packet& packet, const F3& to) const {
+  const auto of_axis = [&](F x, int axis) HWY_ATTR {
+    const F margin = set(medium_.margin[axis]);
+    return hn::Or(hn::Lt(hn::Add(x, margin), hn::Load(floats, packet.low[axis])),
+                  hn::Gt(hn::Sub(x, margin), hn::Load(floats, packet.high[axis])));
   };
-  leaves = to_bits(hn::Or(hn::Or(outside(to.x, 0), outside(to.y, 1)), outside(to.z, 2)));
+  return to_bits(hn::Or(hn::Or(of_axis(to.x, 0), of_axis(to.y, 1)), of_axis(to.z, 2)));
+}
+
+/// The lanes that cannot take this step, as bits.
+template <bool uniform>
+HWY_NOINLINE std::uint32_t Kernel<uniform>::stopped(const Packet& packet, const F3& to, const F3& v) const {
   const F unit = dot(v, v);
-  std::uint32_t stop = to_bits(hn::Or(hn::Lt(unit, set(0.5f)), hn::Ne(unit, unit)));  // No direction to go in.
-  const F length = hn::Mul(hn::Add(hn::Load(floats, packet.length), time), set(to_world()));
+  std::uint32_t stop = to_bits(hn::Not(hn::Gt(unit, set(0.5f))));  // No direction to go in.
+  const F length = hn::Mul(hn::Add(hn::Load(floats, packet.length), hn::Load(floats, packet.time)), set(to_world()));
   stop |= to_bits(hn::Ge(length, set(medium_.settings.max_length)));
-  if (packet.near_surface) {
-    alignas(64) float ends[3][most_lanes];
-    store(to, ends);
-    for (int lane = 0; lane < lanes; ++lane) {
-      if (!(packet.alive >> lane & 1)) continue;
-      double from[3], until[3];
-      for (int axis = 0; axis < 3; ++axis) {
-        const double base = double{TensorBrick::cells} * packet.brick[lane][axis];
-        from[axis] = base + packet.p[axis][lane];
-        until[axis] = base + ends[axis][lane];
-      }
-      if (medium_.meets_surface(from, until)) stop |= 1u << lane;
+  if (!packet.near_surface) return stop;
+  alignas(64) float ends[3][most_lanes];
+  store(to, ends);
+  for (int lane = 0; lane < lanes; ++lane) {
+    if (!(packet.alive >> lane & 1)) continue;
+    double from[3], until[3];
+    for (int axis = 0; axis < 3; ++axis) {
+      const double base = double{TensorBrick::cells} * packet.brick[axis][lane];
+      from[axis] = base + packet.p[axis][lane];
+      until[axis] = base + ends[axis][lane];
     }
+    if (medium_.meets_surface(from, until)) stop |= 1u << lane;
   }
-  leaves &= ~stop & packet.alive;
-  return stop & packet.alive;
+  return stop;
 }
 
 /// Hands the rays of some lanes on, as they are before the step.
@@ -578,7 +614,7 @@ HWY_NOINLINE void Kernel<uniform>::take_out(Packet& packet, std::uint32_t stop, 
     if (!((stop | leave) >> lane & 1)) continue;
     KernelRay& ray = rays_[packet.ray[lane]];
     for (int axis = 0; axis < 3; ++axis) {
-      ray.brick[axis] = packet.brick[lane][axis];
+      ray.brick[axis] = packet.brick[axis][lane];
       ray.position[axis] = packet.p[axis][lane];
       ray.direction[axis] = packet.v[axis][lane];
     }
@@ -591,13 +627,11 @@ HWY_NOINLINE void Kernel<uniform>::take_out(Packet& packet, std::uint32_t stop, 
       leaving.p[axis][lane] = packet.p[axis][lane];
       leaving.v[axis][lane] = packet.v[axis][lane];
       leaving.u[axis][lane] = packet.u[axis][lane];
-      leaving.brick[lane][axis] = packet.brick[lane][axis];
-      leaving.margin[axis][lane] = packet.margin[axis][lane];
+      leaving.brick[axis][lane] = packet.brick[axis][lane];
     }
     leaving.kick[lane] = packet.kick[lane];
     leaving.time[lane] = packet.time[lane];
     leaving.ray[lane] = packet.ray[lane];
-    visit_brick(leaving, lane);
     leaving.alive |= 1u << lane;
   }
 }
@@ -607,27 +641,25 @@ void Kernel<uniform>::repeat_one_alive(Packet& packet) {
   const int of = static_cast<int>(hwy::Num0BitsBelowLS1Bit_Nonzero32(packet.alive));
   for (int lane = 0; lane < lanes; ++lane)
     if (!(packet.alive >> lane & 1)) repeat(packet, lane, of);
-  summarize(packet);
+  begin(packet);
 }
 
 template <bool uniform>
 HWY_INLINE void Kernel<uniform>::step(Packet& packet) {
-  if (HWY_UNLIKELY(packet.steps >= packet.most_steps)) return take_out(packet, packet.alive, 0);
-  const F time = step_time(packet, load(packet.u));
   F3 v, u;
-  const F3 to = take_step(packet, time, v, u);
+  const F3 to = take_step(packet, v, u);
   samples_ += hwy::PopCount(packet.alive);
-  std::uint32_t leave = 0, stop = 0;
-  if (HWY_UNLIKELY(packet.near_border || packet.near_surface || may_stop_ ||
-                   !(packet.greatest_reach <= strongest_kick))) {
-    hn::Store(time, floats, packet.time);
-    stop = stopped(packet, to, v, time, leave);
-    if (HWY_UNLIKELY((stop | leave) != 0)) take_out(packet, stop, leave);
-  }
+  std::uint32_t stop = 0, leave = 0;
+  if (HWY_UNLIKELY(packet.near_border)) leave = outside(packet, to);
+  if (HWY_UNLIKELY(packet.near_surface || may_stop_ || !(packet.greatest_reach <= strongest_kick)))
+    stop = stopped(packet, to, v);
+  stop &= packet.alive;
+  leave &= packet.alive & ~stop;
+  if (HWY_UNLIKELY((stop | leave) != 0)) take_out(packet, stop, leave);
   store(to, packet.p);
   store(v, packet.v);
   if constexpr (!uniform) store(u, packet.u);
-  hn::Store(hn::Add(hn::Load(floats, packet.length), time), floats, packet.length);
+  hn::Store(hn::Add(hn::Load(floats, packet.length), hn::Load(floats, packet.time)), floats, packet.length);
   ++packet.steps;
   if (HWY_UNLIKELY((stop | leave) != 0) && packet.alive != 0) repeat_one_alive(packet);
 }
@@ -636,12 +668,15 @@ HWY_INLINE void Kernel<uniform>::step(Packet& packet) {
 template <bool uniform>
 HWY_NOINLINE void Kernel<uniform>::land(Packet& packet) {
   repeat_one_alive(packet);
+  packet.clamps = true;
   const F zero = hn::Zero(floats), one = set(1), longest = hn::Load(floats, packet.time);
   F3 v, u;
-  F3 to = take_step(packet, longest, v, u);
+  locate(packet, longest);
+  interpolate(packet);
+  F3 to = take_step(packet, v, u);
   const F3 from = load(packet.p), chord{hn::Sub(to.x, from.x), hn::Sub(to.y, from.y), hn::Sub(to.z, from.z)};
   const auto face = [&](F along, int axis) HWY_ATTR {
-    const F margin = hn::Load(floats, packet.margin[axis]);
+    const F margin = set(medium_.margin[axis]);
     return hn::IfThenElse(hn::Gt(along, zero), hn::Add(hn::Load(floats, packet.high[axis]), margin),
                           hn::Sub(hn::Load(floats, packet.low[axis]), margin));
   };
@@ -655,7 +690,9 @@ HWY_NOINLINE void Kernel<uniform>::land(Packet& packet) {
   const auto of_axis = [&](F a, F b, F c) HWY_ATTR { return hn::IfThenElse(is_x, a, hn::IfThenElse(is_y, b, c)); };
   F time = hn::Mul(longest, hn::Max(nearest, zero));
   for (int i = 0; i < 3; ++i) {
-    to = take_step(packet, time, v, u);  // Which may take the packet to another brick.
+    locate(packet, time);  // Which may take lanes to other bricks.
+    interpolate(packet);
+    to = take_step(packet, v, u);
     const F gap = hn::Sub(of_axis(face(chord.x, 0), face(chord.y, 1), face(chord.z, 2)), of_axis(to.x, to.y, to.z));
     F rest = hn::Div(gap, of_axis(u.x, u.y, u.z));
     rest = hn::IfThenElseZero(hn::Le(hn::Abs(rest), longest), rest);  // But of light that grazes the face.
@@ -674,7 +711,7 @@ HWY_NOINLINE void Kernel<uniform>::land(Packet& packet) {
     if (!(packet.alive >> lane & 1)) continue;
     KernelRay& ray = rays_[packet.ray[lane]];
     for (int axis = 0; axis < 3; ++axis) {
-      ray.brick[axis] = packet.brick[lane][axis];
+      ray.brick[axis] = packet.brick[axis][lane];
       ray.position[axis] = packet.p[axis][lane];
       ray.direction[axis] = packet.v[axis][lane];
     }
@@ -691,11 +728,19 @@ std::uint64_t Kernel<uniform>::run() {
   for (Packet& packet : packets_) fill(packet);
   for (bool busy = true; busy;) {
     busy = false;
+    for (Packet& packet : packets_) {
+      if (HWY_UNLIKELY(packet.alive == 0)) continue;
+      busy = true;
+      locate(packet, step_time(packet, load(direction(packet))));
+    }
+    for (Packet& packet : packets_) interpolate(packet);
     for (int i = 0; i < in_flight; ++i) {
       Packet& packet = packets_[i];
-      if (packet.alive == 0) continue;
-      step(packet);
-      busy = true;
+      if (HWY_UNLIKELY(packet.alive == 0)) continue;
+      if (HWY_LIKELY(packet.steps < packet.most_steps))
+        step(packet);
+      else
+        take_out(packet, packet.alive, 0);
       if (HWY_LIKELY(packet.alive != 0)) continue;
       if (leaving_[i].alive != 0) land(leaving_[i]);
       fill(packet);
@@ -752,6 +797,7 @@ Medium::Medium(const TensorField& field_, const KernelSettings& settings_) : fie
     last[axis] = static_cast<std::int32_t>(field.voxels().max()[axis]);
     margin[axis] = static_cast<float>(field.index_bounds().max()[axis] - field.voxels().max()[axis]);
   }
+  flat = (field.voxels().sizes().array() == 0).any();
   longest_step = settings.step > 0 ? settings.step : longest_automatic_step;
 }
 
