@@ -22,6 +22,8 @@ endif()
 pkg_check_modules(OpenImageIO REQUIRED IMPORTED_TARGET OpenImageIO>=2.4)
 pkg_check_modules(OpenColorIO REQUIRED IMPORTED_TARGET OpenColorIO>=2.1)
 
+pkg_check_modules(Highway REQUIRED IMPORTED_TARGET libhwy>=1.0)
+
 find_package(VTK REQUIRED COMPONENTS CommonCore CommonDataModel CommonExecutionModel FiltersCore FiltersGeneral
              IOCore IOExodus IOGeometry IOLegacy IOParallelXML IOXML)
 

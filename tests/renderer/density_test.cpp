@@ -10,9 +10,15 @@ namespace {
 
 using Points = std::vector<Eigen::Vector2d>;
 
+void add(DensityEstimator& estimator, int channel, const Points& points) {
+  std::vector<DensityPoint> made;
+  for (const Eigen::Vector2d& point : points) made.push_back(estimator.point(channel, point));
+  estimator.add(made);
+}
+
 Film estimate(int width, int height, const DensitySettings& settings, const Points& points) {
   DensityEstimator estimator(width, height, 1, settings);
-  estimator.add(0, points);
+  add(estimator, 0, points);
   return std::move(estimator).finish();
 }
 
@@ -95,7 +101,7 @@ TEST(Density, HistogramCountsInThePixel) {
 
 TEST(Density, ChannelsAreSeparate) {
   DensityEstimator estimator(20, 20, 3, {});
-  estimator.add(1, {{10, 10}});
+  add(estimator, 1, {{10, 10}});
   const Film film = std::move(estimator).finish();
   for (std::size_t i = 0; i < film.plane_size(); ++i) {
     EXPECT_EQ(film.plane(0)[i], 0);
