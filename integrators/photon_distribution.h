@@ -44,9 +44,9 @@ struct PhotonSettings {
 using EndCounts = std::array<std::uint64_t, ray_end_count>;
 
 struct PhotonDistribution {
-  Film irradiance;                  ///< A channel each, 1 being the undisturbed beam's irradiance in that channel; or
-                                    ///< their sum in colour.
-  PhotonMap photons;                ///< Empty unless asked for; ordered by emission, then channel.
+  Film irradiance;    ///< A channel each, 1 being the undisturbed beam's irradiance in that channel; or
+                      ///< their sum in colour.
+  PhotonMap photons;  ///< Empty unless asked for; ordered by emission (neighbours together), then channel.
   std::vector<ScalarGrid> fluence;  ///< Empty unless asked for: all channels, then each one; not named. See fluence.h.
 
   std::uint64_t positions = 0;  ///< That emitted.
@@ -54,7 +54,8 @@ struct PhotonDistribution {
                                 ///< deposited + missed + stopped holds exactly.
   double ray_area = 0;          ///< Cross section of the beam that one ray stands for, world units².
   std::uint64_t ray_steps = 0, tensor_samples = 0;
-  double seconds_tracing = 0, seconds_density = 0;
+  double seconds_tracing = 0;  ///< With emission.
+  double seconds_density = 0;  ///< From landings to the film.
 };
 
 /// Emits parallel light, bends it through the field and estimates its density on the plate of `geometry`.

@@ -5,17 +5,17 @@
 #include <stdexcept>
 
 #include <tbb/parallel_for.h>
+#include <tbb/partitioner.h>
 
 #include "renderer/convolution.h"
 
 namespace tensorray {
 namespace {
 
-constexpr double smallest_spline_tau = 2;  // Below it the spline interpolant of the Gaussian is not good enough.
-constexpr double cut_off = 4.5;            // In tau; the Gaussian is 4e-5 of its peak there.
-constexpr int largest_size = 65000;        // Of a plate: columns and rows of points are 16 bits.
-constexpr std::size_t band_size = std::size_t{1}
-                                  << 15;  // Values of a band of rows: with a point's kernel they fit a cache.
+constexpr double smallest_spline_tau = 2;       // Below it the spline interpolant of the Gaussian is not good enough.
+constexpr double cut_off = 4.5;                 // In tau; the Gaussian is 4e-5 of its peak there.
+constexpr std::size_t most_buckets = 1u << 14;  // To sort points into.
+constexpr int largest_size = 65000;             // Of a plate: columns and rows of points are 16 bits.
 
 /// Folds an index back into [0, size) as mirrors at the edges (between pixels) do.
 int mirror(int index, int size) {
@@ -92,13 +92,18 @@ void filter_columns(Film& film, const std::vector<double>& filter) {
   });
 }
 
-/// Two bands of rows that have one between them must not meet: a band has as many rows as a kernel, at least.
-PointBucketing make_bucketing(int rows, std::size_t row_values, int taps) {
+/// Two tiles that have one between them must not meet: a tile is as wide as a kernel, at least. A small one fits a
+/// cache together with what surrounds it; as many as there are let all threads find work where light is concentrated.
+PointBucketing make_bucketing(int width, int height, int planes, int least_tile_bits, int taps) {
   PointBucketing bucketing;
-  while ((1 << bucketing.row_bits) < taps || (std::size_t{2} << bucketing.row_bits) * row_values <= band_size)
-    ++bucketing.row_bits;
-  bucketing.bands = static_cast<std::uint32_t>((rows - 1) >> bucketing.row_bits) + 1;
-  return bucketing;
+  bucketing.planes = static_cast<std::uint32_t>(planes);
+  for (int bits = least_tile_bits;; ++bits) {
+    bucketing.tile_bits = bits;
+    bucketing.columns = static_cast<std::uint32_t>(width >> bits) + 1;  // Points' columns are 0 to width.
+    bucketing.rows = static_cast<std::uint32_t>(height >> bits) + 1;
+    const bool is_one = bucketing.tiles() == 1;
+    if ((1 << bits) >= taps && (is_one || std::size_t{bucketing.tiles()} * planes <= most_buckets)) return bucketing;
+  }
 }
 
 void check(int width, int height, int channels, const DensitySettings& settings,
@@ -128,11 +133,11 @@ DensityEstimator::DensityEstimator(int width, int height, int channels, const De
     taps = gaussian_->taps();
   }
   margin_ = taps / 2;
-  const std::size_t planes = colors_.empty() ? channels : 1, values = colors_.empty() ? 1 : 4;
-  bucketing_ = make_bucketing(height + 1, values * (width + 2 * margin_), taps);
-  bucketing_.by_channel = colors_.empty();
-  bucketing_.planes = static_cast<std::uint32_t>(planes);
-  sums_.resize((planes * values * plane_size() + 3) / 4);
+  const bool is_colored = !colors_.empty();
+  const int planes = is_colored ? 1 : channels;
+  bucketing_ = make_bucketing(width, height, planes, is_colored ? 5 : 7, taps);
+  const std::size_t values = (is_colored ? 4 : planes) * plane_size();
+  sums_.resize((values + 3) / 4);
 }
 
 /// In pixels, with the margins.
@@ -158,14 +163,18 @@ DensityPoint DensityEstimator::point(int channel, const Eigen::Vector2d& at) con
   return point;
 }
 
-/// Bands of rows whose points' kernels do not meet, every other one, are filled at the same time.
+/// Tiles whose points' kernels do not meet are filled at the same time: of every two by two, one after the other.
 void DensityEstimator::add(const std::vector<DensityPoint>& points) {
   sort_into_buckets(points, bucketing_, buckets_);
-  for (std::uint32_t parity = 0; parity < 2; ++parity) {
-    const std::uint32_t bands = (bucketing_.bands + 1 - parity) / 2;
-    tbb::parallel_for(std::uint32_t{0}, bands * bucketing_.planes, [&](std::uint32_t task) {
-      deposit(task / bands * bucketing_.bands + 2 * (task % bands) + parity);
-    });
+  for (const std::uint32_t first : {0u, 1u, 2u, 3u}) {
+    const std::uint32_t right = first % 2, down = first / 2;
+    const std::uint32_t columns = (bucketing_.columns + 1 - right) / 2, rows = (bucketing_.rows + 1 - down) / 2;
+    const auto deposit_tile = [&](std::uint32_t task) {
+      const std::uint32_t plane = task / (rows * columns), row = 2 * (task / columns % rows) + down;
+      deposit((plane * bucketing_.rows + row) * bucketing_.columns + 2 * (task % columns) + right);
+    };
+    // Each tile by itself: those that hold many points are next to each other.
+    tbb::parallel_for(std::uint32_t{0}, bucketing_.planes * rows * columns, deposit_tile, tbb::simple_partitioner());
   }
 }
 
@@ -174,7 +183,7 @@ void DensityEstimator::deposit(std::uint32_t bucket) {
   DepositTarget target;
   target.width = width_ + 2 * margin_;
   target.colors = colors_.empty() ? nullptr : colors_.data();
-  target.pixels = sums_[0].values + (colors_.empty() ? bucket / bucketing_.bands * plane_size() : 0);
+  target.pixels = sums_[0].values + (colors_.empty() ? bucket / bucketing_.tiles() * plane_size() : 0);
   if (uses_splines(settings_)) {
     deposit_splines(buckets_.points, first, last, target);
   } else if (gaussian_) {

@@ -9,16 +9,18 @@
 
 namespace tensorray {
 
-/// Which points belong together: those of a plane (a channel, or all of them) and of a band of 2^row_bits rows.
+/// Which points belong together: those of a plane (a channel, or all of them) and of a square tile of it, 2^tile_bits
+/// columns and rows.
 struct PointBucketing {
-  bool by_channel = false;
-  int row_bits = 0;
-  std::uint32_t bands = 1;   ///< Of each plane.
-  std::uint32_t planes = 1;  ///< 1 unless by channel.
+  int tile_bits = 0;
+  std::uint32_t columns = 1, rows = 1;  ///< Of tiles, in each plane.
+  std::uint32_t planes = 1;             ///< 1, or the number of channels.
 
-  std::uint32_t count() const { return bands * planes; }
+  std::uint32_t tiles() const { return columns * rows; }
+  std::uint32_t count() const { return tiles() * planes; }
   std::uint32_t operator()(const DensityPoint& point) const {
-    return (by_channel ? point.channel * bands : 0) + (static_cast<std::uint32_t>(point.row) >> row_bits);
+    const std::uint32_t column = point.column, row = point.row, plane = planes > 1 ? point.channel : 0;
+    return (plane * rows + (row >> tile_bits)) * columns + (column >> tile_bits);
   }
 };
 
