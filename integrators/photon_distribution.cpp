@@ -55,6 +55,7 @@ struct Job {
   BeamSampler positions;
   PixelMap to_pixel;
   int rays_per_position;
+  int channels_per_ray;  // One of so many.
   double ray_area;
   FluenceSums* fluence;  // Null unless asked for.
 
@@ -82,7 +83,7 @@ struct Chunk {
 
 /// The channel of the position's ray number `ray`: one in each of `rays_per_position` equal ranges of channels.
 int channel_of(const Job& job, int ray, double stratum) {
-  const int range = static_cast<int>(job.channels.size()) / job.rays_per_position;
+  const int range = job.channels_per_ray;
   return ray * range + std::min(static_cast<int>(stratum * range), range - 1);
 }
 
@@ -119,14 +120,18 @@ void emit(const BeamSampler& positions, std::uint64_t first, std::uint64_t last,
 }
 
 void fill_batch(const Job& job, const Emission* first, const Emission* last, Worker& worker) {
-  worker.batch.clear();
+  RayBatch& batch = worker.batch;
+  batch.clear();
   worker.channels.clear();
-  for (const Emission* emission = first; emission != last; ++emission)
+  for (const Emission* emission = first; emission != last; ++emission) {
+    batch.position.insert(batch.position.end(), job.rays_per_position, emission->origin);
     for (int ray = 0; ray < job.rays_per_position; ++ray) {
       const int channel = channel_of(job, ray, emission->stratum);
       worker.channels.push_back(static_cast<std::uint16_t>(channel));
-      worker.batch.add(emission->origin, job.beam.direction, job.channels[channel].flexibility);
+      batch.flexibility.push_back(job.channels[channel].flexibility);
     }
+  }
+  batch.direction.assign(batch.position.size(), job.beam.direction);
 }
 
 void trace_batch(const Job& job, Worker& worker) {
@@ -236,9 +241,19 @@ PhotonDistribution distribute_photons(const TensorField& field, const Geometry& 
   if (!geometry.surfaces().plate) throw std::invalid_argument("photon distribution needs a receiver");
   const Plate& plate = *geometry.surfaces().plate;
   const int rays = rays_per_position(channels, settings);
-  Job job{field,           geometry, beam,     channels,
-          bending,         settings, progress, BeamSampler(beam, settings.pattern, settings.photons, settings.seed),
-          PixelMap(plate), rays,     0,        nullptr};
+  Job job{field,
+          geometry,
+          beam,
+          channels,
+          bending,
+          settings,
+          progress,
+          BeamSampler(beam, settings.pattern, settings.photons, settings.seed),
+          PixelMap(plate),
+          rays,
+          static_cast<int>(channels.size()) / rays,
+          0,
+          nullptr};
   job.ray_area = job.positions.area_per_candidate() * static_cast<double>(channels.size()) / rays;
 
   const std::unique_ptr<FluenceSums> fluence = make_fluence(job);

@@ -10,12 +10,22 @@ namespace {
 
 constexpr std::size_t shortest_segment = 1u << 14, most_segments = 64;
 
-/// Calls `use(point)` for those of a segment's points that are somewhere.
+/// Calls `use(bucket, first, last)` for the runs of a segment's points that share a bucket: neighbours mostly do.
 template <class Use>
-void visit_segment(const std::vector<DensityPoint>& points, std::size_t segment, std::size_t length, const Use& use) {
-  const std::size_t last = std::min((segment + 1) * length, points.size());
-  for (std::size_t i = segment * length; i < last; ++i)
-    if (points[i].channel != DensityPoint::nowhere) use(points[i]);
+void visit_runs(const std::vector<DensityPoint>& points, const PointBucketing& bucketing, std::size_t segment,
+                std::size_t length, const Use& use) {
+  constexpr std::uint32_t none = 0xffffffffu;
+  const DensityPoint* const end = points.data() + std::min((segment + 1) * length, points.size());
+  const auto bucket_of = [&](const DensityPoint& point) {
+    return point.channel == DensityPoint::nowhere ? none : bucketing(point);
+  };
+  for (const DensityPoint* first = points.data() + segment * length; first != end;) {
+    const std::uint32_t bucket = bucket_of(*first);
+    const DensityPoint* last = first + 1;
+    while (last != end && bucket_of(*last) == bucket) ++last;
+    if (bucket != none) use(bucket, first, last);
+    first = last;
+  }
 }
 
 /// From each segment's numbers of points in each bucket to where it puts its first one.
@@ -46,15 +56,21 @@ void sort_into_buckets(const std::vector<DensityPoint>& points, const PointBucke
   std::vector<std::uint32_t> counts(segments * size);
   tbb::parallel_for(std::size_t{0}, segments, [&](std::size_t segment) {
     std::uint32_t* const count = &counts[segment * size];
-    visit_segment(points, segment, length, [&](const DensityPoint& point) { ++count[bucketing(point)]; });
+    visit_runs(points, bucketing, segment, length,
+               [&](std::uint32_t bucket, const DensityPoint* first, const DensityPoint* last) {
+                 count[bucket] += static_cast<std::uint32_t>(last - first);
+               });
   });
   buckets.begin.resize(size + 1);
   counts_to_places(counts, segments, buckets);
   buckets.points.resize(std::max<std::size_t>(buckets.points.size(), buckets.begin.back()));
   tbb::parallel_for(std::size_t{0}, segments, [&](std::size_t segment) {
     std::uint32_t* const place = &counts[segment * size];
-    visit_segment(points, segment, length,
-                  [&](const DensityPoint& point) { buckets.points[place[bucketing(point)]++] = point; });
+    visit_runs(points, bucketing, segment, length,
+               [&](std::uint32_t bucket, const DensityPoint* first, const DensityPoint* last) {
+                 std::copy(first, last, &buckets.points[place[bucket]]);
+                 place[bucket] += static_cast<std::uint32_t>(last - first);
+               });
   });
 }
 
