@@ -99,6 +99,7 @@ bool BeamSampler::sample(std::uint64_t index, Emission& emission) const {
   const Eigen::Vector2d position = corner_ + u.head<2>().cwiseProduct(extent_);
   if (!contains(beam_.aperture, position)) return false;
   emission.origin = beam_.center + position.x() * beam_.right + position.y() * beam_.up;
+  emission.across = u.head<2>();
   emission.stratum = u.z();
   return true;
 }

@@ -31,6 +31,7 @@ double area(const std::vector<Eigen::Vector2d>& polygon);
 /// One position of light.
 struct Emission {
   Eigen::Vector3d origin = Eigen::Vector3d::Zero();  ///< World.
+  Eigen::Vector2d across = Eigen::Vector2d::Zero();  ///< Within the rectangle about the aperture, from 0 to 1.
   double stratum = 0;  ///< In [0, 1): stratified jointly with the position; chooses among wavelengths.
 };
 

@@ -70,7 +70,7 @@ void add_lattice(int columns, int rows, const Keeps& keeps, TriangleMesh& mesh) 
 /// The plate with the photons' light on it: a vertex in the middle of each pixel.
 ShadedSurface lit_plate(const Scene& scene, const Progress& progress) {
   const PhotonDistribution light = distribute_photons(scene, progress);
-  const Image image = linear_image(light.irradiance, scene.bands, to_working(scene));
+  const Image image = light_image(scene, light.irradiance);
   std::vector<float> greatest;
   for (std::size_t i = 0; i < image.pixels.size(); i += 3)
     greatest.push_back(std::max({image.pixels[i], image.pixels[i + 1], image.pixels[i + 2]}));

@@ -13,6 +13,11 @@ namespace {
 
 constexpr double narrowest_white = 100;  // nm: light of a smaller range is seen as a colour.
 
+/// Whether light is collected in colour: three bands need no more planes, and cost less.
+bool is_collected_in_color(const Scene& scene) {
+  return scene.description.output.spectral.empty() && scene.bands.size() > 3;
+}
+
 /// "550nm", with as many decimals as tell the bands apart; in RGB mode "red", "green", "blue".
 std::vector<std::string> band_names(const Scene& scene) {
   if (scene.description.bending.rgb) return {"red", "green", "blue"};
@@ -47,10 +52,9 @@ Render render_photons(const Scene& scene, const Progress& progress) {
 
   const auto start = std::chrono::steady_clock::now();
   Render result;
-  const Eigen::Matrix3d matrix = to_working(scene);
-  result.linear = linear_image(light.irradiance, scene.bands, matrix);
+  result.linear = light_image(scene, light.irradiance);
   if (!description.output.spectral.empty())
-    result.spectral = spectral_image(light.irradiance, scene.bands, description.light.irradiance, matrix);
+    result.spectral = spectral_image(light.irradiance, scene.bands, description.light.irradiance, to_working(scene));
   result.photons = std::move(light.photons);
   result.fluence = std::move(light.fluence);
   name_fluence(scene, result.fluence);
@@ -81,8 +85,17 @@ PhotonDistribution distribute_photons(const Scene& scene, const Progress& progre
   settings.keep_photons = !description.output.photons.empty();
   if (!description.output.fluence.empty())
     settings.fluence = description.output.fluence_bands ? FluenceKind::bands : FluenceKind::all_light;
+  if (is_collected_in_color(scene))
+    for (const Band& band : scene.bands) settings.colors.push_back(to_working(scene) * band.xyz);
   return distribute_photons(scene.field, scene.geometry, scene.beam, scene.channels, description.bending.settings,
                             settings, progress);
+}
+
+Image light_image(const Scene& scene, const Film& irradiance) {
+  if (!is_collected_in_color(scene)) return linear_image(irradiance, scene.bands, to_working(scene));
+  std::vector<Band> primaries(3);
+  for (int c = 0; c < 3; ++c) primaries[c].xyz = Eigen::Vector3d::Unit(c);
+  return linear_image(irradiance, primaries, Eigen::Matrix3d::Identity());
 }
 
 bool has_white(const Scene& scene) {

@@ -48,8 +48,12 @@ bool has_white(const Scene& scene);
 /// From XYZ to the working space; the light's own white becomes neutral if the scene wants it so.
 Eigen::Matrix3d to_working(const Scene& scene);
 
-/// The light of the scene on its plate.
+/// The light of the scene on its plate: a plane for each band, or if no output needs the bands, for red, green and
+/// blue.
 PhotonDistribution distribute_photons(const Scene& scene, const Progress& progress);
+
+/// The picture of that light.
+Image light_image(const Scene& scene, const Film& irradiance);
 
 /// @throw Cancelled; std::runtime_error.
 Render render(const Scene& scene, const Progress& progress);

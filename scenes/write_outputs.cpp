@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include <fmt/format.h>
+#include <tbb/parallel_invoke.h>
 
 #include "integrators/path_files.h"
 #include "renderer/image.h"
@@ -104,8 +105,13 @@ std::vector<std::filesystem::path> write_outputs(const Render& render, const Sce
   const auto write_picture = [](std::optional<OutputFile>& file, const Image& image, const ImageMetadata& header) {
     file->write([&](const std::filesystem::path& path) { write_image(path, image, header); });
   };
-  if (files.image) write_picture(files.image, display_image(scene, render), metadata);
-  if (files.exr) write_picture(files.exr, render.linear, metadata);
+  tbb::parallel_invoke(  // Most of the time goes into compressing each by one thread.
+      [&] {
+        if (files.image) write_picture(files.image, display_image(scene, render), metadata);
+      },
+      [&] {
+        if (files.exr) write_picture(files.exr, render.linear, metadata);
+      });
   if (files.spectral) {
     ImageMetadata spectral = metadata;
     spectral.insert(render.spectral->metadata.begin(), render.spectral->metadata.end());

@@ -143,6 +143,48 @@ TEST(PhotonDistribution, SomeChannelsPerPhotonEstimateTheSame) {
   }
 }
 
+TEST(PhotonDistribution, InColourItIsTheChannelsColoured) {
+  const Bench bench = Bench::make(linear_tensor, 2.5, 48);
+  PhotonSettings settings;
+  settings.photons = 5000;
+  settings.channels_per_photon = 4;
+  const PhotonDistribution bands = distribute(bench, channels(8), settings);
+  for (int k = 0; k < 8; ++k) settings.colors.emplace_back(0.1 * k, 1 - 0.2 * k, 0.5);
+  const PhotonDistribution rgb = distribute(bench, channels(8), settings);
+  EXPECT_EQ(rgb.ends, bands.ends);
+  EXPECT_EQ(rgb.ray_steps, bands.ray_steps);
+  ASSERT_EQ(rgb.irradiance.channels, 3);
+  for (int c = 0; c < 3; ++c)
+    for (std::size_t i = 0; i < rgb.irradiance.plane_size(); ++i) {
+      double sum = 0;
+      for (int k = 0; k < 8; ++k) sum += settings.colors[k][c] * bands.irradiance.plane(k)[i];
+      ASSERT_NEAR(rgb.irradiance.plane(c)[i], sum, 1e-12);
+    }
+  settings.colors.pop_back();
+  EXPECT_THROW(distribute(bench, channels(8), settings), std::invalid_argument);
+}
+
+TEST(PhotonDistribution, NeighboursFollowEachOther) {
+  const Bench bench = Bench::make(zero, 2.5, 16);
+  PhotonSettings settings;
+  settings.photons = 64 * 64;
+  settings.keep_photons = true;
+  for (const BeamPattern pattern : {BeamPattern::grid, BeamPattern::sobol, BeamPattern::random}) {
+    settings.pattern = pattern;
+    const PhotonMap photons = distribute(bench, channels(1), settings).photons;
+    ASSERT_GT(photons.size(), 3500u);
+    // Sixteen that follow each other on a Morton curve fill a square of 4 by 4 of the 64 by 64, or two halves of such
+    // ones; in the order of rows they would span a quarter of the beam's width, and at random nearly all of it.
+    int small = 0, groups = 0;
+    for (std::size_t first = 0; first + 16 <= photons.size(); first += 16, ++groups) {
+      Eigen::AlignedBox3f box;
+      for (std::size_t i = first; i < first + 16; ++i) box.extend(photons[i].origin);
+      small += box.sizes().maxCoeff() < 0.15 * 2;
+    }
+    EXPECT_GT(small, 0.75 * groups);
+  }
+}
+
 TEST(PhotonDistribution, AConstantFieldShiftsTheBeam) {
   // T V = (k, 0, 0) for V = −z: all rays bend alike, and the beam lands where a single ray does.
   Matrix3d T = Matrix3d::Zero();

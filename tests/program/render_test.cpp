@@ -1,3 +1,4 @@
+#include <algorithm>
 #include <cmath>
 
 #include "renderer/image.h"
@@ -40,6 +41,22 @@ TEST_F(Program, OutputOptionsTakeThePlaceOfTheScenes) {
                   static_cast<int>(std::lround(1e6 * (wavelength - std::floor(wavelength)))));
     EXPECT_EQ(std::count(spectral.channels.begin(), spectral.channels.end(), name), 1) << name;
   }
+}
+
+TEST_F(Program, ThePictureIsTheSameWithAndWithoutSpectra) {
+  write("scene.json", small_scene());
+  const std::vector<std::string> light{"--set", "field.scale=20", "--set", "light.wavelengths.count=16"};
+  const auto picture = [&](std::vector<std::string> arguments) {
+    arguments.insert(arguments.end(), light.begin(), light.end());
+    run_well(arguments);
+    return read_image(in_folder("out.exr"));
+  };
+  const Image colors = picture({"render", "scene.json", "-q", "-o", "out.exr"});
+  const Image bands = picture({"render", "scene.json", "-q", "-o", "out.exr", "-o", "out.spectral.exr"});
+  ASSERT_EQ(colors.pixels.size(), bands.pixels.size());
+  const float greatest = *std::max_element(bands.pixels.begin(), bands.pixels.end());
+  for (std::size_t i = 0; i < bands.pixels.size(); ++i)
+    ASSERT_NEAR(colors.pixels[i], bands.pixels[i], 1e-6f * greatest) << i;
 }
 
 TEST_F(Program, ZeroFieldGivesANeutralUniformPlate) {

@@ -66,6 +66,7 @@ TEST(Beam, GridPositionsAreCellCentres) {
   Emission emission;
   ASSERT_TRUE(sampler.sample(5, emission));
   EXPECT_LT((emission.origin.head<2>() - Eigen::Vector2d(-0.25, -0.25)).norm(), 1e-12);
+  EXPECT_EQ(emission.across, Eigen::Vector2d(0.375, 0.375));
 }
 
 TEST(Beam, SeedsChangeRandomPatternsAndNothingElseDoes) {

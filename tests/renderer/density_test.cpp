@@ -4,15 +4,22 @@
 #include <random>
 
 #include <gtest/gtest.h>
+#include <tbb/global_control.h>
 
 namespace tensorray {
 namespace {
 
 using Points = std::vector<Eigen::Vector2d>;
 
+void add(DensityEstimator& estimator, int channel, const Points& points) {
+  std::vector<DensityPoint> made;
+  for (const Eigen::Vector2d& point : points) made.push_back(estimator.point(channel, point));
+  estimator.add(made);
+}
+
 Film estimate(int width, int height, const DensitySettings& settings, const Points& points) {
   DensityEstimator estimator(width, height, 1, settings);
-  estimator.add(0, points);
+  add(estimator, 0, points);
   return std::move(estimator).finish();
 }
 
@@ -95,12 +102,64 @@ TEST(Density, HistogramCountsInThePixel) {
 
 TEST(Density, ChannelsAreSeparate) {
   DensityEstimator estimator(20, 20, 3, {});
-  estimator.add(1, {{10, 10}});
+  add(estimator, 1, {{10, 10}});
   const Film film = std::move(estimator).finish();
   for (std::size_t i = 0; i < film.plane_size(); ++i) {
     EXPECT_EQ(film.plane(0)[i], 0);
     EXPECT_EQ(film.plane(2)[i], 0);
   }
+}
+
+/// Points of three channels, more than are sorted at once, most of them on a small part of the plate.
+std::vector<DensityPoint> channel_points(const DensityEstimator& estimator, int width, int height) {
+  const Points spread = random_points(20000, width, height), dense = random_points(60000, 30, 20);
+  std::vector<DensityPoint> points;
+  for (std::size_t i = 0; i < dense.size(); ++i) {
+    const Eigen::Vector2d at = i < spread.size() ? spread[i] : Eigen::Vector2d(dense[i] + Eigen::Vector2d(40, 50));
+    points.push_back(estimator.point(static_cast<int>(i % 3), at));
+    if (i % 5 == 0) points.push_back({});  // Nowhere.
+  }
+  return points;
+}
+
+TEST(Density, ColoursAreThoseOfTheChannelsPlanes) {
+  const std::vector<Eigen::Vector3d> colors{{1, 0.2, 0}, {-0.1, 0.9, 0.3}, {0, 0, 2}};
+  constexpr int width = 150, height = 101;
+  for (const DensityKind kind : {DensityKind::gaussian, DensityKind::histogram})
+    for (const double tau : {0.8, 3.0}) {
+      DensityEstimator colored(width, height, 3, {kind, tau}, colors), plain(width, height, 3, {kind, tau});
+      const std::vector<DensityPoint> points = channel_points(plain, width, height);
+      colored.add(points);
+      plain.add(points);
+      const Film rgb = std::move(colored).finish(0.5), planes = std::move(plain).finish(0.5);
+      ASSERT_EQ(rgb.channels, 3);
+      EXPECT_NEAR(sum(planes), 0.5 * 60000, 1e-6);
+      double greatest = 0;
+      for (const double value : rgb.values) greatest = std::max(greatest, value);
+      for (std::size_t i = 0; i < rgb.plane_size(); ++i)
+        for (int c = 0; c < 3; ++c) {
+          double expected = 0;
+          for (int k = 0; k < 3; ++k) expected += planes.plane(k)[i] * colors[k][c];
+          ASSERT_NEAR(rgb.plane(c)[i], expected, 1e-12 * greatest) << tau;
+        }
+    }
+}
+
+TEST(Density, IsTheSameOnAnyNumberOfThreads) {
+  const std::vector<Eigen::Vector3d> rgb{{1, 0.2, 0}, {-0.1, 0.9, 0.3}, {0, 0, 2}};
+  for (const std::vector<Eigen::Vector3d>& colors : {rgb, std::vector<Eigen::Vector3d>()})
+    for (const double tau : {0.8, 3.0}) {
+      const auto on_threads = [&](int threads) {
+        const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, threads);
+        DensityEstimator estimator(300, 200, 3, {DensityKind::gaussian, tau}, colors);
+        const std::vector<DensityPoint> points = channel_points(estimator, 300, 200);
+        estimator.add(points);
+        estimator.add(points);
+        return std::move(estimator).finish();
+      };
+      const Film one = on_threads(1);
+      for (const int threads : {2, 8}) EXPECT_EQ(one.values, on_threads(threads).values) << tau;
+    }
 }
 
 TEST(Density, PlatesSmallerThanTheKernelWork) {
@@ -111,6 +170,8 @@ TEST(Density, PlatesSmallerThanTheKernelWork) {
 TEST(Density, RefusesSettingsOutOfRange) {
   EXPECT_THROW(DensityEstimator(0, 5, 1, {}), std::invalid_argument);
   EXPECT_THROW(DensityEstimator(5, 5, 0, {}), std::invalid_argument);
+  EXPECT_THROW(DensityEstimator(65001, 1, 1, {}), std::invalid_argument);
+  EXPECT_THROW(DensityEstimator(5, 5, 2, {}, {{1, 1, 1}}), std::invalid_argument);
   EXPECT_THROW(DensityEstimator(5, 5, 1, {DensityKind::gaussian, 0}), std::invalid_argument);
   EXPECT_THROW(DensityEstimator(5, 5, 1, {DensityKind::gaussian, std::nan("")}), std::invalid_argument);
 }
