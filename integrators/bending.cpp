@@ -9,27 +9,13 @@
 namespace tensorray {
 namespace {
 
-/// The rays of a batch, which is N = 3 wide if it carries differentials. `record(i)` says what is kept of ray i.
-template <int N, class Record>
+template <int N>
 void trace_rays(const TensorField& field, const Geometry& geometry, const BendingSettings& settings, RayBatch& batch,
-                const Record& record) {
+                const Recordings& recordings) {
   Tracer<N> tracer(field, geometry, settings);
   for (std::size_t i = 0; i < batch.size(); ++i) {
-    State<N> start;
-    start.P.col(0) = batch.position[i];
-    start.V.col(0) = batch.direction[i];
-    if constexpr (N == 3) {
-      start.P.template rightCols<2>() = batch.differentials[i].position;
-      start.V.template rightCols<2>() = batch.differentials[i].direction;
-    }
-    batch.end[i] = tracer.trace(start, batch.flexibility[i], record(i));
-    batch.position[i] = tracer.state().position();
-    batch.direction[i] = tracer.state().direction();
-    if constexpr (N == 3)
-      batch.differentials[i] = {tracer.state().P.template rightCols<2>(), tracer.state().V.template rightCols<2>(),
-                                tracer.length_change()};
-    batch.length[i] = tracer.length();
-    batch.steps[i] = tracer.steps();
+    const RayEnd end = tracer.trace(start_of<N>(batch, i), batch.flexibility[i], recordings.of(i));
+    set_end(batch, i, end, tracer);
   }
   batch.tensor_samples += tracer.samples();
 }
@@ -53,14 +39,19 @@ void prepare(const BendingSettings& settings, RayBatch& batch) {
   batch.steps.resize(batch.size());
 }
 
-template <class Record>
 void trace_one_by_one(const TensorField& field, const Geometry& geometry, const BendingSettings& settings,
-                      RayBatch& batch, const Record& record) {
-  prepare(settings, batch);
+                      RayBatch& batch, const Recordings& recordings) {
   if (has_differentials(batch))
-    trace_rays<3>(field, geometry, settings, batch, record);
+    trace_rays<3>(field, geometry, settings, batch, recordings);
   else
-    trace_rays<1>(field, geometry, settings, batch, record);
+    trace_rays<1>(field, geometry, settings, batch, recordings);
+}
+
+void trace_batch(const TensorField& field, const Geometry& geometry, const BendingSettings& settings, RayBatch& batch,
+                 const Recordings& recordings) {
+  prepare(settings, batch);
+  if (!trace_in_packets(field, geometry, settings, batch, recordings))
+    trace_one_by_one(field, geometry, settings, batch, recordings);
 }
 
 }  // namespace
@@ -87,26 +78,26 @@ void RayBatch::add(const Eigen::Vector3d& from, const Eigen::Vector3d& along, do
 }
 
 void trace(const TensorField& field, const Geometry& geometry, const BendingSettings& settings, RayBatch& batch) {
-  prepare(settings, batch);
-  if (!trace_in_packets(field, geometry, settings, batch)) trace_reference(field, geometry, settings, batch);
-}
-
-void trace_reference(const TensorField& field, const Geometry& geometry, const BendingSettings& settings,
-                     RayBatch& batch) {
-  trace_one_by_one(field, geometry, settings, batch, [](std::size_t) { return Recording(); });
+  trace_batch(field, geometry, settings, batch, {});
 }
 
 void trace(const TensorField& field, const Geometry& geometry, const BendingSettings& settings, RayBatch& batch,
            std::vector<Way>& ways) {
   ways.assign(batch.size(), Way());
-  trace_one_by_one(field, geometry, settings, batch, [&](std::size_t i) { return Recording{&ways[i], nullptr}; });
+  trace_batch(field, geometry, settings, batch, {&ways, nullptr});
 }
 
 void trace(const TensorField& field, const Geometry& geometry, const BendingSettings& settings, RayBatch& batch,
            std::vector<Track>& tracks) {
   tracks.resize(batch.size());
   for (Track& track : tracks) track.clear();  // Keeps what they have allocated.
-  trace_one_by_one(field, geometry, settings, batch, [&](std::size_t i) { return Recording{nullptr, &tracks[i]}; });
+  trace_batch(field, geometry, settings, batch, {nullptr, &tracks});
+}
+
+void trace_reference(const TensorField& field, const Geometry& geometry, const BendingSettings& settings,
+                     RayBatch& batch) {
+  prepare(settings, batch);
+  trace_one_by_one(field, geometry, settings, batch, {});
 }
 
 }  // namespace tensorray

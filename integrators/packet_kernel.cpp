@@ -41,6 +41,7 @@ struct Medium {
   std::int32_t first[3], last[3];  // Voxels of the extent.
   float margin[3];                 // Of the extent beyond these: ½ on an axis of a single voxel.
   bool flat;                       // Whether an axis has a single voxel.
+  float slope[3];                  // 0 along those axes, 1 along the others.
   float longest_step;              // Voxels; but through straight bricks.
 
   TensorBrick brick(const std::int32_t at[3]) const { return field.brick({at[0], at[1], at[2]}); }
@@ -82,6 +83,13 @@ struct Packet {
   alignas(64) float polynomial[8][8];              // the cell's, if it is one_cell,
   alignas(64) float components[2][most_lanes][4];  // or each lane's tensor;
   alignas(64) float tensor[8][most_lanes];         // the same, lanes side by side.
+
+  // Only of rays with differentials: p and v along two parameters, now, in the middle of the step and after it, the
+  // slopes of the tensor along x, y and z, and ‖s h T‖ or a bound on it.
+  alignas(64) float dp[2][3][most_lanes], dv[2][3][most_lanes], dmiddle[2][3][most_lanes];
+  alignas(64) float dp_next[2][3][most_lanes], dv_next[2][3][most_lanes];
+  alignas(64) float slope_components[3][2][most_lanes][4], slopes[3][8][most_lanes];
+  alignas(64) float size[most_lanes];
 
   const float* bending[most_lanes] = {};
   alignas(64) std::int32_t brick[3][most_lanes];
@@ -180,6 +188,21 @@ HWY_INLINE V evaluate(V k0, V kz, V ky, V kyz, V kx, V kxz, V kxy, V kxyz, V x, 
   return hn::MulAdd(hn::MulAdd(hn::MulAdd(kxyz, z, kxy), y, hn::MulAdd(kxz, z, kx)), x, near);
 }
 
+/// A value and its slopes.
+template <class V>
+struct Slopes {
+  V value, x, y, z;
+};
+
+/// The same with the slopes: 11 operations.
+template <class V>
+HWY_INLINE Slopes<V> evaluate_slopes(V k0, V kz, V ky, V kyz, V kx, V kxz, V kxy, V kxyz, V x, V y, V z) {
+  const V near_y = hn::MulAdd(kyz, z, ky), far_y = hn::MulAdd(kxyz, z, kxy);
+  const V near = hn::MulAdd(near_y, y, hn::MulAdd(kz, z, k0)), far = hn::MulAdd(far_y, y, hn::MulAdd(kxz, z, kx));
+  return {hn::MulAdd(far, x, near), far, hn::MulAdd(far_y, x, near_y),
+          hn::MulAdd(hn::MulAdd(kxyz, y, kxz), x, hn::MulAdd(kyz, y, kz))};
+}
+
 using Eight = hn::CappedTag<float, 8>;  // For the components of one voxel.
 constexpr Eight eight;
 constexpr int eight_lanes = static_cast<int>(hn::MaxLanes(Eight()));
@@ -197,28 +220,60 @@ HWY_INLINE F evaluate_polynomial(const float (&k)[8][8], int i, const F3& f) {
                   set(k[7][i]), f.x, f.y, f.z);
 }
 
-/// Lanes are in cells of their own: a vector holds the components of one lane at a time. `components` are the first
-/// four of each lane, and the last four.
-HWY_NOINLINE void sample_own_cells(const float* const bending[], const std::int32_t* voxels,
-                                   const float (*f)[most_lanes], float (*components)[most_lanes][4]) {
+HWY_INLINE Slopes<F> polynomial_slopes(const float (&k)[8][8], int i, const F3& f) {
+  return evaluate_slopes(set(k[0][i]), set(k[1][i]), set(k[2][i]), set(k[3][i]), set(k[4][i]), set(k[5][i]),
+                         set(k[6][i]), set(k[7][i]), f.x, f.y, f.z);
+}
+
+/// Components of one lane: the first four of each lane, and the last four.
+template <class V>
+HWY_INLINE void store_components(V values, int i, int lane, float (*components)[most_lanes][4]) {
+  alignas(32) float eight_values[8];
+  hn::Store(values, eight, eight_values);
+  for (int j = 0; j < eight_lanes; j += 4) std::memcpy(components[(i + j) / 4][lane], eight_values + j, 16);
+}
+
+/// Lanes are in cells of their own: a vector holds the components of one lane at a time.
+template <bool differentials>
+HWY_NOINLINE void sample_own_cells(Packet& packet, const std::int32_t* voxels) {
   for (int lane = 0; lane < lanes; ++lane) {
-    const float* const corner = bending[lane] + voxels[lane] * TensorBrick::bending_floats;
-    const auto x = hn::Set(eight, f[0][lane]), y = hn::Set(eight, f[1][lane]), z = hn::Set(eight, f[2][lane]);
-    alignas(32) float result[8];
+    const float* const corner = packet.bending[lane] + voxels[lane] * TensorBrick::bending_floats;
+    const auto x = hn::Set(eight, packet.fraction[0][lane]), y = hn::Set(eight, packet.fraction[1][lane]),
+               z = hn::Set(eight, packet.fraction[2][lane]);
     for (int i = 0; i < 8; i += eight_lanes) {
       const Polynomial<Eight> p = cell_polynomial(eight, corner + i);
-      hn::Store(evaluate(p.k[0], p.k[1], p.k[2], p.k[3], p.k[4], p.k[5], p.k[6], p.k[7], x, y, z), eight, result + i);
+      if constexpr (differentials) {
+        const auto at = evaluate_slopes(p.k[0], p.k[1], p.k[2], p.k[3], p.k[4], p.k[5], p.k[6], p.k[7], x, y, z);
+        store_components(at.value, i, lane, packet.components);
+        store_components(at.x, i, lane, packet.slope_components[0]);
+        store_components(at.y, i, lane, packet.slope_components[1]);
+        store_components(at.z, i, lane, packet.slope_components[2]);
+      } else {
+        store_components(evaluate(p.k[0], p.k[1], p.k[2], p.k[3], p.k[4], p.k[5], p.k[6], p.k[7], x, y, z), i, lane,
+                         packet.components);
+      }
     }
-    std::memcpy(components[0][lane], result, 16);
-    std::memcpy(components[1][lane], result + 4, 16);
   }
 }
 
-/// The kernel, for voxels that are cubes along the axes (`uniform`) or any others.
-template <bool uniform>
+/// From lane after lane to component after component.
+HWY_INLINE void transpose(const float (&components)[2][most_lanes][4], float (&tensor)[8][most_lanes]) {
+  for (int half = 0; half < 2; ++half) {
+    F a, b, c, d;
+    hn::LoadInterleaved4(floats, components[half][0], a, b, c, d);
+    hn::Store(a, floats, tensor[4 * half]);
+    hn::Store(b, floats, tensor[4 * half + 1]);
+    hn::Store(c, floats, tensor[4 * half + 2]);
+    hn::Store(d, floats, tensor[4 * half + 3]);
+  }
+}
+
+/// The kernel, for voxels that are cubes along the axes (`uniform`) or any others, and for rays with or without
+/// differentials.
+template <bool uniform, bool differentials>
 class Kernel {
  public:
-  Kernel(const Medium& medium, std::vector<KernelRay>& rays) : medium_(medium), rays_(rays) {}
+  Kernel(const Medium& medium, KernelRays& batch) : medium_(medium), rays_(batch.rays), batch_(batch) {}
 
   std::uint64_t run();
 
@@ -233,8 +288,10 @@ class Kernel {
   void summarize(Packet& packet);
   void move_to_bricks(Packet& packet, const F3& point);
   void locate(Packet& packet, F time);
+  void interpolate(Packet& packet);
   F3 bend(Packet& packet, const Tensor& T, const F3& v, F factor);
   F3 bend_strongly(Packet& packet, const Tensor& T, const F3& v, F factor);
+  void bend_differentials(Packet& packet, const Tensor& T, const F3& v, F factor, F time);
   F3 index_direction(const F3& v) const;
   F step_time(Packet& packet, const F3& u);
   F3 take_step(Packet& packet, F3& v, F3& u);
@@ -243,6 +300,7 @@ class Kernel {
   std::uint32_t stopped(const Packet& packet, const F3& to, const F3& v) const;
   void take_out(Packet& packet, std::uint32_t stop, std::uint32_t leave);
   void repeat_one_alive(Packet& packet);
+  void keep_points(const Packet& packet);
   static auto direction(const Packet& packet) -> const float (&)[3][most_lanes] {
     return uniform ? packet.v : packet.u;
   }
@@ -252,6 +310,7 @@ class Kernel {
   const Medium& medium_;
   const bool may_stop_ = std::isfinite(medium_.settings.max_length);  // Within the field, before the last step.
   std::vector<KernelRay>& rays_;
+  KernelRays& batch_;
   std::size_t next_ = 0;  // The first ray that no packet has held yet.
   std::uint64_t samples_ = 0;
   Packet packets_[in_flight];
@@ -259,13 +318,18 @@ class Kernel {
 };
 
 /// Brings a ray into a lane.
-template <bool uniform>
-void Kernel<uniform>::enter(Packet& packet, int lane) {
+template <bool uniform, bool differentials>
+void Kernel<uniform, differentials>::enter(Packet& packet, int lane) {
   const KernelRay& ray = rays_[packet.ray[lane]];
   for (int axis = 0; axis < 3; ++axis) {
     packet.p[axis][lane] = ray.position[axis];
     packet.v[axis][lane] = ray.direction[axis];
     packet.brick[axis][lane] = ray.brick[axis];
+    if constexpr (differentials)
+      for (int i = 0; i < 2; ++i) {
+        packet.dp[i][axis][lane] = batch_.differentials[packet.ray[lane]].position[i][axis];
+        packet.dv[i][axis][lane] = batch_.differentials[packet.ray[lane]].direction[i][axis];
+      }
   }
   packet.kick[lane] = uniform ? ray.flexibility * medium_.voxel : ray.flexibility;
   packet.norm[lane] = ray.norm;
@@ -273,13 +337,18 @@ void Kernel<uniform>::enter(Packet& packet, int lane) {
 }
 
 /// Lets a lane repeat what another does.
-template <bool uniform>
-void Kernel<uniform>::repeat(Packet& packet, int lane, int of) {
+template <bool uniform, bool differentials>
+void Kernel<uniform, differentials>::repeat(Packet& packet, int lane, int of) {
   for (int axis = 0; axis < 3; ++axis) {
     packet.p[axis][lane] = packet.p[axis][of];
     packet.v[axis][lane] = packet.v[axis][of];
     packet.u[axis][lane] = packet.u[axis][of];
     packet.brick[axis][lane] = packet.brick[axis][of];
+    if constexpr (differentials)
+      for (int i = 0; i < 2; ++i) {
+        packet.dp[i][axis][lane] = packet.dp[i][axis][of];
+        packet.dv[i][axis][lane] = packet.dv[i][axis][of];
+      }
   }
   packet.kick[lane] = packet.kick[of];
   packet.length[lane] = packet.length[of];
@@ -289,8 +358,8 @@ void Kernel<uniform>::repeat(Packet& packet, int lane, int of) {
 }
 
 /// Finds the bricks of some lanes, given as bits.
-template <bool uniform>
-HWY_INLINE void Kernel<uniform>::find_bricks(Packet& packet, std::uint32_t wanted) {
+template <bool uniform, bool differentials>
+HWY_INLINE void Kernel<uniform, differentials>::find_bricks(Packet& packet, std::uint32_t wanted) {
   const auto x = hn::Load(ints, packet.brick[0]), y = hn::Load(ints, packet.brick[1]),
              z = hn::Load(ints, packet.brick[2]);
   while (wanted != 0) {
@@ -310,8 +379,8 @@ HWY_INLINE void Kernel<uniform>::find_bricks(Packet& packet, std::uint32_t wante
 }
 
 /// Sets what follows from the lanes' bricks.
-template <bool uniform>
-HWY_INLINE void Kernel<uniform>::summarize(Packet& packet) {
+template <bool uniform, bool differentials>
+HWY_INLINE void Kernel<uniform, differentials>::summarize(Packet& packet) {
   const F strongest = hn::Load(floats, packet.strongest), most = set(1e30f);
   const float longest = medium_.longest_step * (uniform ? 1.0f : medium_.longest_voxel);
   const F reach = hn::Mul(hn::Mul(hn::Abs(hn::Load(floats, packet.kick)), set(longest)), strongest);
@@ -341,8 +410,8 @@ HWY_INLINE void Kernel<uniform>::summarize(Packet& packet) {
 }
 
 /// After lanes have been set: what follows from their rays.
-template <bool uniform>
-void Kernel<uniform>::begin(Packet& packet) {
+template <bool uniform, bool differentials>
+void Kernel<uniform, differentials>::begin(Packet& packet) {
   for (int axis = 0; axis < 3; ++axis) {
     const auto base = hn::Mul(hn::Load(ints, packet.brick[axis]), hn::Set(ints, TensorBrick::cells));
     const F low = hn::ConvertTo(floats, hn::Sub(hn::Set(ints, medium_.first[axis]), base));
@@ -355,8 +424,8 @@ void Kernel<uniform>::begin(Packet& packet) {
   summarize(packet);
 }
 
-template <bool uniform>
-bool Kernel<uniform>::fill(Packet& packet) {
+template <bool uniform, bool differentials>
+bool Kernel<uniform, differentials>::fill(Packet& packet) {
   if (next_ == rays_.size()) return false;
   packet.alive = 0;
   packet.clamps = medium_.flat;
@@ -378,8 +447,8 @@ bool Kernel<uniform>::fill(Packet& packet) {
 }
 
 /// Takes the lanes whose point has left their brick to the point's.
-template <bool uniform>
-HWY_NOINLINE void Kernel<uniform>::move_to_bricks(Packet& packet, const F3& point) {
+template <bool uniform, bool differentials>
+HWY_NOINLINE void Kernel<uniform, differentials>::move_to_bricks(Packet& packet, const F3& point) {
   const F axes[3] = {point.x, point.y, point.z};
   const F zero = hn::Zero(floats), cells = set(TensorBrick::cells);
   Mask moved = hn::Lt(zero, zero);
@@ -396,8 +465,8 @@ HWY_NOINLINE void Kernel<uniform>::move_to_bricks(Packet& packet, const F3& poin
   summarize(packet);
 }
 
-template <bool uniform>
-HWY_INLINE F3 Kernel<uniform>::index_direction(const F3& v) const {
+template <bool uniform, bool differentials>
+HWY_INLINE F3 Kernel<uniform, differentials>::index_direction(const F3& v) const {
   if constexpr (uniform) return v;
   const auto& m = medium_.to_index;
   const auto row = [&](int i) HWY_ATTR {
@@ -414,8 +483,8 @@ HWY_INLINE F3 clamp(const F3& p, const F3& low, const F3& high) {
 /// The first part of a step: to its middle, and what is needed to interpolate there. Takes lanes to the bricks of these
 /// points. Steps have parts so that the processor works on the same part of several packets at once: each is a chain of
 /// operations that wait for one another, and a whole step is longer than what a processor looks ahead.
-template <bool uniform>
-HWY_INLINE void Kernel<uniform>::locate(Packet& packet, F time) {
+template <bool uniform, bool differentials>
+HWY_INLINE void Kernel<uniform, differentials>::locate(Packet& packet, F time) {
   const F3 offset = mul(hn::Mul(set(0.5f), time), load(direction(packet)));
   F3 point, near;
   for (bool again = false;; again = true) {
@@ -430,13 +499,17 @@ HWY_INLINE void Kernel<uniform>::locate(Packet& packet, F time) {
     if (HWY_LIKELY(hn::AllFalse(bits, outside_brick))) break;
     if (again) {  // Beyond the extent, or on the face that rounding took it to.
       const F zero = hn::Zero(floats), last = set(TensorBrick::cells - 1);
-      near = clamp(near, {zero, zero, zero}, {last, last, last});
+      near = clamp(near, F3{zero, zero, zero}, F3{last, last, last});
       break;
     }
     move_to_bricks(packet, point);
   }
   hn::Store(time, floats, packet.time);
   store(add(load(packet.p), offset), packet.middle);
+  if constexpr (differentials)
+    for (int i = 0; i < 2; ++i)
+      store(mul_add(hn::Mul(set(0.5f), time), index_direction(load(packet.dv[i])), load(packet.dp[i])),
+            packet.dmiddle[i]);
   store({hn::Sub(point.x, near.x), hn::Sub(point.y, near.y), hn::Sub(point.z, near.z)}, packet.fraction);
   const F width = set(TensorBrick::width);
   const F voxel = hn::MulAdd(hn::MulAdd(near.x, width, near.y), width, near.z);
@@ -447,19 +520,29 @@ HWY_INLINE void Kernel<uniform>::locate(Packet& packet, F time) {
                            packet.polynomial);
   alignas(64) std::int32_t voxels[most_lanes];
   hn::Store(hn::ConvertTo(ints, voxel), ints, voxels);
-  sample_own_cells(packet.bending, voxels, packet.fraction, packet.components);
+  sample_own_cells<differentials>(packet, voxels);
 }
 
 /// The second part: the tensor there.
-HWY_INLINE void interpolate(Packet& packet) {
-  F T[8];
-  if (HWY_LIKELY(packet.one_cell)) {
-    const F3 f = load(packet.fraction);
-    for (int i = 0; i < 8; ++i) hn::Store(evaluate_polynomial(packet.polynomial, i, f), floats, packet.tensor[i]);
-  } else {
-    hn::LoadInterleaved4(floats, packet.components[0][0], T[0], T[1], T[2], T[3]);
-    hn::LoadInterleaved4(floats, packet.components[1][0], T[4], T[5], T[6], T[7]);
-    for (int i = 0; i < 8; ++i) hn::Store(T[i], floats, packet.tensor[i]);
+template <bool uniform, bool differentials>
+HWY_INLINE void Kernel<uniform, differentials>::interpolate(Packet& packet) {
+  if (HWY_UNLIKELY(!packet.one_cell)) {
+    transpose(packet.components, packet.tensor);
+    if constexpr (differentials)
+      for (int axis = 0; axis < 3; ++axis) transpose(packet.slope_components[axis], packet.slopes[axis]);
+    return;
+  }
+  const F3 f = load(packet.fraction);
+  for (int i = 0; i < 8; ++i) {
+    if constexpr (differentials) {
+      const Slopes<F> at = polynomial_slopes(packet.polynomial, i, f);
+      hn::Store(at.value, floats, packet.tensor[i]);
+      hn::Store(at.x, floats, packet.slopes[0][i]);
+      hn::Store(at.y, floats, packet.slopes[1][i]);
+      hn::Store(at.z, floats, packet.slopes[2][i]);
+    } else {
+      hn::Store(evaluate_polynomial(packet.polynomial, i, f), floats, packet.tensor[i]);
+    }
   }
 }
 
@@ -481,15 +564,18 @@ HWY_INLINE F deviator_norm(const Tensor& T) {
   return hn::Sqrt(hn::Max(hn::NegMulAdd(hn::Mul(trace, trace), set(1.0f / 3), squares), hn::Zero(floats)));
 }
 
-template <bool uniform>
-HWY_INLINE F3 Kernel<uniform>::bend(Packet& packet, const Tensor& T, const F3& v, F factor) {
-  if (HWY_LIKELY(packet.greatest_reach <= series_reach[0])) return bend_weakly(T, v, factor);
+template <bool uniform, bool differentials>
+HWY_INLINE F3 Kernel<uniform, differentials>::bend(Packet& packet, const Tensor& T, const F3& v, F factor) {
+  if (HWY_LIKELY(packet.greatest_reach <= series_reach[0])) {
+    if constexpr (differentials) hn::Store(hn::Load(floats, packet.reach), floats, packet.size);
+    return bend_weakly(T, v, factor);
+  }
   return bend_strongly(packet, T, v, factor);
 }
 
 /// The same for any strength. Which lane is computed how depends on that lane alone.
-template <bool uniform>
-HWY_INLINE F3 Kernel<uniform>::bend_strongly(Packet& packet, const Tensor& T, const F3& v, F factor) {
+template <bool uniform, bool differentials>
+HWY_INLINE F3 Kernel<uniform, differentials>::bend_strongly(Packet& packet, const Tensor& T, const F3& v, F factor) {
   const F reach = hn::Load(floats, packet.reach);
   F size = reach;
   if (HWY_UNLIKELY(!(packet.greatest_reach <= strongest_kick))) {
@@ -497,10 +583,10 @@ HWY_INLINE F3 Kernel<uniform>::bend_strongly(Packet& packet, const Tensor& T, co
     hn::Store(norm, floats, packet.norm);
     size = hn::IfThenElse(hn::Le(reach, set(strongest_kick)), reach, hn::Mul(norm, hn::Abs(factor)));
   }
-  F3 term = mul(factor, apply(T, v));
-  F3 sum = add(v, term);
-  term = mul(hn::Mul(set(0.5f), factor), apply(T, term));
-  sum = add(sum, term);
+  if constexpr (differentials) hn::Store(size, floats, packet.size);
+  const F3 first = mul(factor, apply(T, v)), second = apply(T, first);
+  const F half = hn::Mul(set(0.5f), factor);
+  F3 sum = mul_add(half, second, add(v, first)), term = mul(half, second);
   for (int n = 3; n <= most_terms; ++n) {
     const Mask needed = hn::Gt(size, set(series_reach[n - 3]));
     if (hn::AllFalse(floats, needed)) break;
@@ -516,6 +602,10 @@ HWY_INLINE F3 Kernel<uniform>::bend_strongly(Packet& packet, const Tensor& T, co
 
   const Mask fits = hn::Le(size, set(1));
   if (HWY_LIKELY(hn::AllTrue(floats, fits))) return result;
+  if constexpr (differentials) {  // Those rays stop here.
+    const F zero = hn::Zero(floats);
+    return select(fits, result, {zero, zero, zero});
+  }
   const std::uint32_t too_strong = ~to_bits(fits);
   alignas(64) float all[8][most_lanes], factors[most_lanes], from[3][most_lanes], to[3][most_lanes];
   for (int i = 0; i < 8; ++i) hn::Store(T.c[i], floats, all[i]);
@@ -533,8 +623,8 @@ HWY_INLINE F3 Kernel<uniform>::bend_strongly(Packet& packet, const Tensor& T, co
 }
 
 /// How long the next step is, in the units that u is per: voxels, or, if voxels are not uniform, world units.
-template <bool uniform>
-HWY_INLINE F Kernel<uniform>::step_time(Packet& packet, const F3& u) {
+template <bool uniform, bool differentials>
+HWY_INLINE F Kernel<uniform, differentials>::step_time(Packet& packet, const F3& u) {
   const F voxel = uniform ? set(1) : hn::Div(set(1), hn::Sqrt(dot(u, u)));
   const bool automatic = medium_.settings.step == 0;
   F steps = set(medium_.longest_step);
@@ -561,20 +651,57 @@ HWY_INLINE F Kernel<uniform>::step_time(Packet& packet, const F3& u) {
   return time;
 }
 
+/// The derivatives of exp(factor · T) V, normalised, along two parameters, and those of the positions at the end of the
+/// step: of the method's own steps. One term more than without, as the derivative of a series has one less.
+template <bool uniform, bool differentials>
+HWY_INLINE void Kernel<uniform, differentials>::bend_differentials(Packet& packet, const Tensor& T, const F3& v,
+                                                                   F factor, F time) {
+  const F size = hn::Load(floats, packet.size);
+  for (int i = 0; i < 2; ++i) {
+    F3 along = load(packet.dmiddle[i]);
+    if (medium_.flat)  // The tensor is the same across an axis of a single voxel.
+      along = F3{hn::Mul(along.x, set(medium_.slope[0])), hn::Mul(along.y, set(medium_.slope[1])),
+                 hn::Mul(along.z, set(medium_.slope[2]))};
+    Tensor dT;
+    for (int c = 0; c < 8; ++c)
+      dT.c[c] = hn::MulAdd(along.x, hn::Load(floats, packet.slopes[0][c]),
+                           hn::MulAdd(along.y, hn::Load(floats, packet.slopes[1][c]),
+                                      hn::Mul(along.z, hn::Load(floats, packet.slopes[2][c]))));
+    F3 term = v, sum = v, dterm = load(packet.dv[i]), dsum = dterm;
+    for (int n = 1; n <= most_terms; ++n) {
+      const Mask needed = hn::Gt(size, set(n < 4 ? -1.0f : series_reach[n - 4]));
+      if (hn::AllFalse(floats, needed)) break;
+      const F part = hn::Mul(set(1.0f / static_cast<float>(n)), factor);
+      dterm = mul(part, add(apply(T, dterm), apply(dT, term)));
+      term = mul(part, apply(T, term));
+      const F3 zero{hn::Zero(floats), hn::Zero(floats), hn::Zero(floats)};
+      sum = add(sum, select(needed, term, zero));
+      dsum = add(dsum, select(needed, dterm, zero));
+    }
+    const F inverse = hn::Div(set(1), hn::Sqrt(dot(sum, sum)));
+    const F3 unit = mul(inverse, sum), change = mul(inverse, dsum);
+    const F3 dv = mul_add(hn::Neg(dot(unit, change)), unit, change);
+    store(dv, packet.dv_next[i]);
+    store(mul_add(hn::Mul(set(0.5f), time), index_direction(dv), load(packet.dmiddle[i])), packet.dp_next[i]);
+  }
+}
+
 /// The third part: bends, and on from the middle. Sets the directions at the end. @return the positions.
-template <bool uniform>
-HWY_INLINE F3 Kernel<uniform>::take_step(Packet& packet, F3& v, F3& u) {
+template <bool uniform, bool differentials>
+HWY_INLINE F3 Kernel<uniform, differentials>::take_step(Packet& packet, F3& v, F3& u) {
   const F time = hn::Load(floats, packet.time);
   Tensor T;
   for (int i = 0; i < 8; ++i) T.c[i] = hn::Load(floats, packet.tensor[i]);
-  v = bend(packet, T, load(packet.v), hn::Mul(time, hn::Load(floats, packet.kick)));
+  const F factor = hn::Mul(time, hn::Load(floats, packet.kick));
+  v = bend(packet, T, load(packet.v), factor);
+  if constexpr (differentials) bend_differentials(packet, T, load(packet.v), factor, time);
   u = index_direction(v);
   return mul_add(hn::Mul(set(0.5f), time), u, load(packet.middle));
 }
 
 /// The lanes that leave the extent, as bits.
-template <bool uniform>
-HWY_INLINE std::uint32_t Kernel<uniform>::outside(const Packet& packet, const F3& to) const {
+template <bool uniform, bool differentials>
+HWY_INLINE std::uint32_t Kernel<uniform, differentials>::outside(const Packet& packet, const F3& to) const {
   const auto of_axis = [&](F x, int axis) HWY_ATTR {
     const F margin = set(medium_.margin[axis]);
     return hn::Or(hn::Lt(hn::Add(x, margin), hn::Load(floats, packet.low[axis])),
@@ -584,8 +711,9 @@ HWY_INLINE std::uint32_t Kernel<uniform>::outside(const Packet& packet, const F3
 }
 
 /// The lanes that cannot take this step, as bits.
-template <bool uniform>
-HWY_NOINLINE std::uint32_t Kernel<uniform>::stopped(const Packet& packet, const F3& to, const F3& v) const {
+template <bool uniform, bool differentials>
+HWY_NOINLINE std::uint32_t Kernel<uniform, differentials>::stopped(const Packet& packet, const F3& to,
+                                                                   const F3& v) const {
   const F unit = dot(v, v);
   std::uint32_t stop = to_bits(hn::Not(hn::Gt(unit, set(0.5f))));  // No direction to go in.
   const F length = hn::Mul(hn::Add(hn::Load(floats, packet.length), hn::Load(floats, packet.time)), set(to_world()));
@@ -607,8 +735,8 @@ HWY_NOINLINE std::uint32_t Kernel<uniform>::stopped(const Packet& packet, const 
 }
 
 /// Hands the rays of some lanes on, as they are before the step.
-template <bool uniform>
-HWY_NOINLINE void Kernel<uniform>::take_out(Packet& packet, std::uint32_t stop, std::uint32_t leave) {
+template <bool uniform, bool differentials>
+HWY_NOINLINE void Kernel<uniform, differentials>::take_out(Packet& packet, std::uint32_t stop, std::uint32_t leave) {
   Packet& leaving = leaving_[&packet - packets_];
   for (int lane = 0; lane < lanes; ++lane) {
     if (!((stop | leave) >> lane & 1)) continue;
@@ -617,6 +745,11 @@ HWY_NOINLINE void Kernel<uniform>::take_out(Packet& packet, std::uint32_t stop, 
       ray.brick[axis] = packet.brick[axis][lane];
       ray.position[axis] = packet.p[axis][lane];
       ray.direction[axis] = packet.v[axis][lane];
+      if constexpr (differentials)
+        for (int i = 0; i < 2; ++i) {
+          batch_.differentials[packet.ray[lane]].position[i][axis] = packet.dp[i][axis][lane];
+          batch_.differentials[packet.ray[lane]].direction[i][axis] = packet.dv[i][axis][lane];
+        }
     }
     ray.length += double{packet.length[lane]} * to_world();
     ray.step = packet.time[lane] * to_world();
@@ -636,16 +769,32 @@ HWY_NOINLINE void Kernel<uniform>::take_out(Packet& packet, std::uint32_t stop, 
   }
 }
 
-template <bool uniform>
-void Kernel<uniform>::repeat_one_alive(Packet& packet) {
+template <bool uniform, bool differentials>
+void Kernel<uniform, differentials>::repeat_one_alive(Packet& packet) {
   const int of = static_cast<int>(hwy::Num0BitsBelowLS1Bit_Nonzero32(packet.alive));
   for (int lane = 0; lane < lanes; ++lane)
     if (!(packet.alive >> lane & 1)) repeat(packet, lane, of);
   begin(packet);
 }
 
-template <bool uniform>
-HWY_INLINE void Kernel<uniform>::step(Packet& packet) {
+template <bool uniform, bool differentials>
+HWY_NOINLINE void Kernel<uniform, differentials>::keep_points(const Packet& packet) {
+  for (int lane = 0; lane < lanes; ++lane) {
+    if (!(packet.alive >> lane & 1)) continue;
+    const KernelRay& ray = rays_[packet.ray[lane]];
+    KernelPoint point;
+    for (int axis = 0; axis < 3; ++axis) {
+      point.brick[axis] = packet.brick[axis][lane];
+      point.position[axis] = packet.p[axis][lane];
+      point.direction[axis] = packet.v[axis][lane];
+    }
+    point.length = ray.length + double{packet.length[lane]} * to_world();
+    batch_.points[packet.ray[lane]].push_back(point);
+  }
+}
+
+template <bool uniform, bool differentials>
+HWY_INLINE void Kernel<uniform, differentials>::step(Packet& packet) {
   F3 v, u;
   const F3 to = take_step(packet, v, u);
   samples_ += hwy::PopCount(packet.alive);
@@ -654,19 +803,31 @@ HWY_INLINE void Kernel<uniform>::step(Packet& packet) {
   if (HWY_UNLIKELY(packet.near_surface || may_stop_ || !(packet.greatest_reach <= strongest_kick)))
     stop = stopped(packet, to, v);
   stop &= packet.alive;
-  leave &= packet.alive & ~stop;
+  if constexpr (differentials) {  // Those of a crossing are the reference's.
+    stop |= leave;
+    stop &= packet.alive;
+    leave = 0;
+  } else {
+    leave &= packet.alive & ~stop;
+  }
   if (HWY_UNLIKELY((stop | leave) != 0)) take_out(packet, stop, leave);
   store(to, packet.p);
   store(v, packet.v);
   if constexpr (!uniform) store(u, packet.u);
   hn::Store(hn::Add(hn::Load(floats, packet.length), hn::Load(floats, packet.time)), floats, packet.length);
   ++packet.steps;
+  if constexpr (differentials)
+    for (int i = 0; i < 2; ++i) {
+      store(load(packet.dp_next[i]), packet.dp[i]);
+      store(load(packet.dv_next[i]), packet.dv[i]);
+    }
+  if (HWY_UNLIKELY(!batch_.points.empty())) keep_points(packet);
   if (HWY_UNLIKELY((stop | leave) != 0) && packet.alive != 0) repeat_one_alive(packet);
 }
 
 /// The step that leaves the extent, repeated with the length that ends on its face (Newton's method).
-template <bool uniform>
-HWY_NOINLINE void Kernel<uniform>::land(Packet& packet) {
+template <bool uniform, bool differentials>
+HWY_NOINLINE void Kernel<uniform, differentials>::land(Packet& packet) {
   repeat_one_alive(packet);
   packet.clamps = true;
   const F zero = hn::Zero(floats), one = set(1), longest = hn::Load(floats, packet.time);
@@ -723,8 +884,8 @@ HWY_NOINLINE void Kernel<uniform>::land(Packet& packet) {
   packet.alive = 0;
 }
 
-template <bool uniform>
-std::uint64_t Kernel<uniform>::run() {
+template <bool uniform, bool differentials>
+std::uint64_t Kernel<uniform, differentials>::run() {
   for (Packet& packet : packets_) fill(packet);
   for (bool busy = true; busy;) {
     busy = false;
@@ -749,8 +910,10 @@ std::uint64_t Kernel<uniform>::run() {
   return samples_;
 }
 
-std::uint64_t trace(const Medium& medium, std::vector<KernelRay>& rays) {
-  return medium.uniform ? Kernel<true>(medium, rays).run() : Kernel<false>(medium, rays).run();
+std::uint64_t trace(const Medium& medium, KernelRays& batch) {
+  if (!batch.differentials.empty())
+    return medium.uniform ? Kernel<true, true>(medium, batch).run() : Kernel<false, true>(medium, batch).run();
+  return medium.uniform ? Kernel<true, false>(medium, batch).run() : Kernel<false, false>(medium, batch).run();
 }
 
 int vector_lanes() { return lanes; }
@@ -795,6 +958,7 @@ Medium::Medium(const TensorField& field_, const KernelSettings& settings_) : fie
   for (int axis = 0; axis < 3; ++axis) {
     first[axis] = static_cast<std::int32_t>(field.voxels().min()[axis]);
     last[axis] = static_cast<std::int32_t>(field.voxels().max()[axis]);
+    slope[axis] = field.voxels().sizes()[axis] > 0 ? 1.0f : 0.0f;
     margin[axis] = static_cast<float>(field.index_bounds().max()[axis] - field.voxels().max()[axis]);
   }
   flat = (field.voxels().sizes().array() == 0).any();
@@ -823,10 +987,10 @@ void Medium::exponential(const float T[8], float factor, float V[3]) {
 
 bool has_kernel(BendingMethod method) { return method == BendingMethod::splitting; }
 
-std::uint64_t run(const TensorField& field, const KernelSettings& settings, std::vector<KernelRay>& rays) {
+std::uint64_t run(const TensorField& field, const KernelSettings& settings, KernelRays& batch) {
   const Medium medium(field, settings);
   const WithoutDenormals guard;
-  return HWY_DYNAMIC_DISPATCH(trace)(medium, rays);
+  return HWY_DYNAMIC_DISPATCH(trace)(medium, batch);
 }
 
 std::vector<std::string> instruction_sets() {

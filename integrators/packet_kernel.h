@@ -22,10 +22,28 @@ struct KernelRay {
   std::array<float, 3> direction;     ///< V; unit, world axes.
   float flexibility = 0;              ///< s.
   float norm = 0;                     ///< Of the deviator of T as last sampled; 0 where that asks for no shorter step.
-  double length = 0;                  ///< Of the way, world units; added to.
+  double length = 0;                  ///< Of the way in the kernel, world units; added to.
   std::uint32_t steps = 0;            ///< Added to.
   std::int8_t axis = -1;              ///< Of the face of the extent where it left; -1: it has not.
   float step = 0;                     ///< If it has not left: of its next step, world units; 0: not known.
+};
+
+/// How a ray changes with two parameters: voxels, in index space, and radians.
+struct KernelDifferential {
+  float position[2][3], direction[2][3];
+};
+
+/// A ray after a step.
+struct KernelPoint {
+  std::array<std::int32_t, 3> brick;
+  std::array<float, 3> position, direction;
+  double length;  ///< Of the way in the kernel, world units.
+};
+
+struct KernelRays {
+  std::vector<KernelRay> rays;
+  std::vector<KernelDifferential> differentials;  ///< One for every ray, or none.
+  std::vector<std::vector<KernelPoint>> points;   ///< One list for every ray, added to; or none.
 };
 
 /// Why a ray cannot go on by packets: asked where surfaces are near.
@@ -44,11 +62,11 @@ struct KernelSettings {
 bool has_kernel(BendingMethod method);
 
 /// Takes every ray to the face of the extent where it leaves (`axis` is set, and it is on that face), or to the point
-/// before the step that the kernel does not take: on a surface, past the greatest length or number of steps, or where
-/// s·T cannot be followed. A ray's result depends on that ray alone, not on its neighbours; rays are fastest if those
-/// of one origin, or of neighbouring ones, stand next to each other.
+/// before a step that the kernel does not take: onto a surface, past the greatest length or number of steps, where s·T
+/// cannot be followed, and, of rays with differentials, out of the extent. A ray's result depends on that ray alone,
+/// not on its neighbours; rays are fastest if those of one origin, or of neighbouring ones, stand next to each other.
 /// @return the number of tensor samples.
-std::uint64_t run(const TensorField& field, const KernelSettings& settings, std::vector<KernelRay>& rays);
+std::uint64_t run(const TensorField& field, const KernelSettings& settings, KernelRays& batch);
 
 /// Vector instructions of the processor that the kernel is compiled for, best first, by name; the first is used.
 std::vector<std::string> instruction_sets();

@@ -55,93 +55,184 @@ KernelSettings kernel_settings(const TensorField& field, const Geometry& geometr
   return result;
 }
 
+/// A batch on its way.
+struct Flight {
+  packets::KernelRays kernel;
+  std::vector<std::size_t> numbers;  // In the batch, of each of the kernel's rays.
+  std::vector<Travelled> travelled;  // Before the kernel.
+
+  void clear() {
+    kernel.rays.clear();
+    kernel.differentials.clear();
+    kernel.points.clear();
+    numbers.clear();
+    travelled.clear();
+  }
+};
+
+Eigen::Vector3d index_position(const std::array<std::int32_t, 3>& brick, const std::array<float, 3>& position) {
+  Eigen::Vector3d index;
+  for (int axis = 0; axis < 3; ++axis) index[axis] = double{TensorBrick::cells} * brick[axis] + position[axis];
+  return index;
+}
+
+Eigen::Vector3d to_vector(const std::array<float, 3>& v) { return {v[0], v[1], v[2]}; }
+
 /// A ray where its way begins to bend, but for its flexibility.
-KernelRay kernel_ray(const TensorField& field, Tracer<1>& tracer) {
+template <int N>
+KernelRay kernel_ray(const TensorField& field, Tracer<N>& tracer) {
   KernelRay ray;
-  const Eigen::Vector3d index = field.to_index() * Eigen::Vector3d(tracer.state().P);
+  const Eigen::Vector3d index = field.to_index() * Eigen::Vector3d(tracer.state().position());
   for (int axis = 0; axis < 3; ++axis) {
     const double first = field.voxels().min()[axis], last = std::max(first, field.voxels().max()[axis] - 1);
     const double cell = std::clamp(std::floor(index[axis]), first, last);
     ray.brick[axis] = static_cast<std::int32_t>(std::floor(cell / TensorBrick::cells));
-    ray.position[axis] = static_cast<float>(index[axis] - TensorBrick::cells * ray.brick[axis]);
-    ray.direction[axis] = static_cast<float>(tracer.state().V(axis));
+    ray.position[axis] = static_cast<float>(index[axis] - double{TensorBrick::cells} * ray.brick[axis]);
+    ray.direction[axis] = static_cast<float>(tracer.state().V(axis, 0));
   }
   ray.norm = static_cast<float>(tracer.strength());
-  ray.length = tracer.length();
-  ray.steps = tracer.steps();
   return ray;
 }
 
-State<1> state_of(const TensorField& field, const KernelRay& ray) {
-  Eigen::Vector3d index;
-  State<1> state;
-  for (int axis = 0; axis < 3; ++axis) {
-    index[axis] = TensorBrick::cells * double{1} * ray.brick[axis] + ray.position[axis];
-    state.V(axis) = ray.direction[axis];
-  }
+packets::KernelDifferential kernel_differential(const TensorField& field, const State<3>& state) {
+  const Eigen::Matrix<double, 3, 2> position = field.to_index().linear() * state.P.rightCols<2>();
+  packets::KernelDifferential result;
+  for (int i = 0; i < 2; ++i)
+    for (int axis = 0; axis < 3; ++axis) {
+      result.position[i][axis] = static_cast<float>(position(axis, i));
+      result.direction[i][axis] = static_cast<float>(state.V(axis, i + 1));
+    }
+  return result;
+}
+
+/// Where the kernel has taken a ray.
+template <int N>
+State<N> state_of(const TensorField& field, const packets::KernelRays& kernel, std::size_t i) {
+  const KernelRay& ray = kernel.rays[i];
+  Eigen::Vector3d index = index_position(ray.brick, ray.position);
   if (ray.axis >= 0) {
     const Eigen::AlignedBox3d& box = field.index_bounds();
     const int axis = ray.axis;
     index[axis] = index[axis] > box.center()[axis] ? box.max()[axis] : box.min()[axis];
   }
-  state.P = field.to_world() * index;
+  State<N> state;
+  state.P.col(0) = field.to_world() * index;
+  state.V.col(0) = to_vector(ray.direction);
+  if constexpr (N == 3) {
+    for (int k = 0; k < 2; ++k)
+      for (int axis = 0; axis < 3; ++axis) {
+        state.P(axis, k + 1) = kernel.differentials[i].position[k][axis];
+        state.V(axis, k + 1) = kernel.differentials[i].direction[k][axis];
+      }
+    state.P.template rightCols<2>() = (field.to_world().linear() * state.P.template rightCols<2>()).eval();
+  }
   return bending_steps::normalized(state);
 }
 
-void set_end(RayBatch& batch, std::size_t i, RayEnd end, const Tracer<1>& tracer) {
-  batch.end[i] = end;
-  batch.position[i] = tracer.state().P;
-  batch.direction[i] = tracer.state().V;
-  batch.length[i] = tracer.length();
-  batch.steps[i] = tracer.steps();
-}
-
 bool same_start(const RayBatch& batch, std::size_t i, std::size_t j) {
-  return batch.position[i] == batch.position[j] && batch.direction[i] == batch.direction[j];
+  const bool same = batch.position[i] == batch.position[j] && batch.direction[i] == batch.direction[j];
+  return same &&
+         (batch.differentials.empty() || (batch.differentials[i].position == batch.differentials[j].position &&
+                                          batch.differentials[i].direction == batch.differentials[j].direction));
 }
 
-/// The rays of the batch that come to where light bends, and which ones they are. The others end here.
-void approach(const TensorField& field, RayBatch& batch, Tracer<1>& tracer, std::vector<KernelRay>& rays,
-              std::vector<std::size_t>& numbers) {
+/// Takes the rays of the batch to where light bends. Those that do not come there end.
+template <int N>
+void approach(const TensorField& field, RayBatch& batch, const Recordings& recordings, Tracer<N>& tracer,
+              Flight& flight) {
   for (std::size_t i = 0; i < batch.size();) {
     const std::size_t first = i;
-    const auto end = tracer.approach({batch.position[i], batch.direction[i]}, Recording());
+    const State<N> start = start_of<N>(batch, first);
+    const auto end = tracer.approach(start, recordings.of(first));
+    const State<N> state = tracer.state();
     const KernelRay ray = end ? KernelRay() : kernel_ray(field, tracer);
-    std::size_t last = first + 1;
-    while (last < batch.size() && same_start(batch, last, first)) ++last;
-    for (; i < last; ++i) {
+    do {
       if (end || !std::isfinite(batch.flexibility[i])) {
         set_end(batch, i, std::isfinite(batch.flexibility[i]) ? *end : RayEnd::degenerate, tracer);
         continue;
       }
-      rays.push_back(ray);
-      rays.back().flexibility = static_cast<float>(batch.flexibility[i]);
-      numbers.push_back(i);
-    }
+      flight.kernel.rays.push_back(ray);
+      flight.kernel.rays.back().flexibility = static_cast<float>(batch.flexibility[i]);
+      if constexpr (N == 3) flight.kernel.differentials.push_back(kernel_differential(field, state));
+      flight.numbers.push_back(i);
+      flight.travelled.push_back(tracer.travelled());
+      if (!recordings) continue;
+      tracer.take_over(state, batch.flexibility[i], tracer.travelled(), recordings.of(i));
+      tracer.record(true);
+    } while (++i < batch.size() && !recordings && same_start(batch, i, first));
   }
+}
+
+/// Adds to a ray's record where the kernel has been. Its last point is not that of the ray, which is recorded when it
+/// goes on.
+template <int N>
+void record_points(const TensorField& field, const std::vector<packets::KernelPoint>& points, double flexibility,
+                   Travelled travelled, const Recording& recording, Tracer<N>& tracer) {
+  const double before = travelled.length;
+  for (const packets::KernelPoint& point : points) {
+    State<N> state;
+    state.P.setZero();
+    state.V.setZero();
+    state.P.col(0) = field.to_world() * index_position(point.brick, point.position);
+    state.V.col(0) = to_vector(point.direction);
+    travelled.length = before + point.length;
+    tracer.take_over(bending_steps::normalized(state), flexibility, travelled, recording);
+    tracer.record(true);
+  }
+}
+
+template <class Points>
+void drop_last(Points* points) {
+  if (points) points->pop_back();
+}
+
+/// From where the kernel has left a ray to its end.
+template <int N>
+RayEnd finish(const TensorField& field, const Flight& flight, std::size_t i, double flexibility,
+              const Recording& recording, Tracer<N>& tracer) {
+  const KernelRay& ray = flight.kernel.rays[i];
+  Travelled travelled = flight.travelled[i];
+  if (!flight.kernel.points.empty())
+    record_points(field, flight.kernel.points[i], flexibility, travelled, recording, tracer);
+  travelled.length += ray.length;
+  travelled.steps += ray.steps;
+  tracer.take_over(state_of<N>(field, flight.kernel, i), flexibility, travelled, recording);
+  if (ray.axis >= 0) {
+    if (tracer.state().direction().isZero()) return RayEnd::degenerate;
+    tracer.record(true);
+    return tracer.leave();
+  }
+  drop_last(recording.way);  // It begins with that point.
+  drop_last(recording.track);
+  return tracer.follow(double{ray.step});
+}
+
+template <int N>
+void trace_rays(const TensorField& field, const Geometry& geometry, const BendingSettings& settings, RayBatch& batch,
+                const Recordings& recordings) {
+  thread_local Flight flight;
+  flight.clear();
+  Tracer<N> tracer(field, geometry, settings);
+  approach(field, batch, recordings, tracer, flight);
+  if (recordings) flight.kernel.points.resize(flight.kernel.rays.size());
+  batch.tensor_samples += packets::run(field, kernel_settings(field, geometry, settings), flight.kernel);
+  for (std::size_t i = 0; i < flight.numbers.size(); ++i) {
+    const std::size_t number = flight.numbers[i];
+    const RayEnd end = finish(field, flight, i, batch.flexibility[number], recordings.of(number), tracer);
+    set_end(batch, number, end, tracer);
+  }
+  batch.tensor_samples += tracer.samples();
 }
 
 }  // namespace
 
 bool trace_in_packets(const TensorField& field, const Geometry& geometry, const BendingSettings& settings,
-                      RayBatch& batch) {
-  if (!packets::has_kernel(settings.method) || !batch.differentials.empty()) return false;
-  thread_local std::vector<KernelRay> rays;
-  thread_local std::vector<std::size_t> numbers;
-  rays.clear();
-  numbers.clear();
-  Tracer<1> tracer(field, geometry, settings);
-  approach(field, batch, tracer, rays, numbers);
-  batch.tensor_samples += packets::run(field, kernel_settings(field, geometry, settings), rays);
-  for (std::size_t i = 0; i < rays.size(); ++i) {
-    const KernelRay& ray = rays[i];
-    const State<1> state = state_of(field, ray);
-    const double s = batch.flexibility[numbers[i]];
-    const RayEnd end = ray.axis >= 0 ? tracer.take_over_leaving(state, ray.length, ray.steps)
-                                     : tracer.take_over(state, s, ray.length, ray.steps, double{ray.step});
-    set_end(batch, numbers[i], end, tracer);
-  }
-  batch.tensor_samples += tracer.samples();
+                      RayBatch& batch, const Recordings& recordings) {
+  if (!packets::has_kernel(settings.method)) return false;
+  if (batch.differentials.empty())
+    trace_rays<1>(field, geometry, settings, batch, recordings);
+  else
+    trace_rays<3>(field, geometry, settings, batch, recordings);
   return true;
 }
 

@@ -4,11 +4,12 @@
 /// the volume, on surfaces within it, and beyond it. A part of bending.cpp.
 
 #include "integrators/bending.h"
+#include "integrators/scalar_tracer.h"
 
 namespace tensorray {
 
 /// As `trace` does. @return false if this batch is nothing for packets; it is unchanged then.
 bool trace_in_packets(const TensorField& field, const Geometry& geometry, const BendingSettings& settings,
-                      RayBatch& batch);
+                      RayBatch& batch, const Recordings& recordings);
 
 }  // namespace tensorray

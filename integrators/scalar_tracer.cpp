@@ -296,25 +296,18 @@ RayEnd Tracer<N>::trace(const State<N>& start, double flexibility, const Recordi
   medium_.s = flexibility;
   const auto end = approach(start, recording);
   if (!std::isfinite(flexibility)) return RayEnd::degenerate;
-  return end ? *end : follow(0);
+  return end ? *end : follow();
 }
 
 template <int N>
-RayEnd Tracer<N>::take_over(const State<N>& from, double flexibility, double length, std::uint32_t steps,
-                            double first_step) {
-  ray_ = from;
+void Tracer<N>::take_over(const State<N>& state, double flexibility, const Travelled& travelled,
+                          const Recording& recording) {
+  ray_ = state;
+  recording_ = recording;
   medium_.s = flexibility;
-  length_ = length;
-  steps_ = steps;
-  return follow(first_step);
-}
-
-template <int N>
-RayEnd Tracer<N>::take_over_leaving(const State<N>& from, double length, std::uint32_t steps) {
-  ray_ = from;
-  length_ = length;
-  steps_ = steps;
-  return leave();
+  length_ = travelled.length;
+  length_change_ = travelled.length_change;
+  steps_ = travelled.steps;
 }
 
 template class Tracer<1>;

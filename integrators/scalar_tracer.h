@@ -5,6 +5,7 @@
 
 #include <cstdint>
 #include <optional>
+#include <vector>
 
 #include "integrators/bending.h"
 #include "integrators/bending_steps.h"
@@ -22,6 +23,22 @@ struct Recording {
   Track* track = nullptr;
 };
 
+/// What is kept of the ways of a batch.
+struct Recordings {
+  std::vector<Way>* ways = nullptr;
+  std::vector<Track>* tracks = nullptr;
+
+  Recording of(std::size_t ray) const { return {ways ? &(*ways)[ray] : nullptr, tracks ? &(*tracks)[ray] : nullptr}; }
+  explicit operator bool() const { return ways || tracks; }
+};
+
+/// How far a ray has come.
+struct Travelled {
+  double length = 0;  // World units.
+  Eigen::RowVector2d length_change = Eigen::RowVector2d::Zero();
+  std::uint32_t steps = 0;
+};
+
 /// One ray on its way, alone (N = 1) or with its derivatives along two parameters (N = 3). The volume is the field's
 /// extent, a convex box, cut by a mesh of any shape.
 template <int N>
@@ -36,30 +53,32 @@ class Tracer {
   /// Follows a ray to where its way begins to bend, or (if it does not come there) to its end.
   std::optional<RayEnd> approach(const State<N>& start, const Recording& recording);
 
-  /// Takes over a ray where its way bends: `first_step` long, world units, is its first step; 0: as long as any.
-  RayEnd take_over(const State<N>& from, double flexibility, double length, std::uint32_t steps, double first_step);
+  /// Takes a ray over that has come to `state`: to be followed where it bends, or, on the face of the box, to leave.
+  void take_over(const State<N>& state, double flexibility, const Travelled& travelled, const Recording& recording);
 
-  /// Takes over a ray on the face of the box where it leaves the volume.
-  RayEnd take_over_leaving(const State<N>& from, double length, std::uint32_t steps);
+  /// From where its way bends to its end; `first_step` long, world units, is its first step; 0: as long as any.
+  RayEnd follow(double first_step = 0);
+
+  /// In free space behind the volume, to its end.
+  RayEnd leave();
+
+  /// Keeps the point where the ray is, if it is recorded.
+  void record(bool in_field);
 
   /// The Frobenius norm of the deviator of T here.
   double strength();
 
   const State<N>& state() const { return ray_; }
-  double length() const { return length_; }
-  const Eigen::RowVector2d& length_change() const { return length_change_; }
-  std::uint32_t steps() const { return steps_; }
+  Travelled travelled() const { return {length_, length_change_, steps_}; }
   std::uint64_t samples() const { return sampler_.samples(); }
 
  private:
   /// What light meets next; `none` while it travels freely.
   enum class Event { none, absorber, leaves_box, leaves_cut };
 
-  RayEnd follow(double first_step);
   std::optional<RayEnd> reach_box();
   std::optional<RayEnd> cross_box();
   std::optional<RayEnd> bend(double first_step);
-  RayEnd leave();
   RayEnd miss();
 
   Eigen::Vector3d position() const { return ray_.position(); }
@@ -70,7 +89,6 @@ class Tracer {
   double automatic_step() const;
   double next_step() const;
   double control_step(const State<N>& error);
-  void record(bool in_field);
   void go_straight(const Hit& hit);
   bool ends_before(double distance) const { return length_ + distance >= settings_.max_length; }
   void meet_surface(const Eigen::Vector3d& normal, bool bends);
@@ -91,5 +109,32 @@ class Tracer {
   double adaptive_step_ = 0;          // What the error control asks for next, in voxels.
   std::uint32_t steps_ = 0;
 };
+
+/// A ray of a batch as it starts; N = 3 if the batch has differentials.
+template <int N>
+State<N> start_of(const RayBatch& batch, std::size_t i) {
+  State<N> start;
+  start.P.col(0) = batch.position[i];
+  start.V.col(0) = batch.direction[i];
+  if constexpr (N == 3) {
+    start.P.template rightCols<2>() = batch.differentials[i].position;
+    start.V.template rightCols<2>() = batch.differentials[i].direction;
+  }
+  return start;
+}
+
+/// Writes where the tracer's ray has come to.
+template <int N>
+void set_end(RayBatch& batch, std::size_t i, RayEnd end, const Tracer<N>& tracer) {
+  const Travelled travelled = tracer.travelled();
+  batch.end[i] = end;
+  batch.position[i] = tracer.state().position();
+  batch.direction[i] = tracer.state().direction();
+  if constexpr (N == 3)
+    batch.differentials[i] = {tracer.state().P.template rightCols<2>(), tracer.state().V.template rightCols<2>(),
+                              travelled.length_change};
+  batch.length[i] = travelled.length;
+  batch.steps[i] = travelled.steps;
+}
 
 }  // namespace tensorray

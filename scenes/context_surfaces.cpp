@@ -146,7 +146,7 @@ ShadedSurface make_slice(const Scene& scene, const SliceDescription& slice) {
 }
 
 ShadedSurface make_isosurface(const Scene& scene, const IsosurfaceDescription& description) {
-  const TensorField unscaled = TensorField(scene.field).scaled(1 / scene.scale.scale);
+  const TensorField unscaled = scene.field.copy().scaled(1 / scene.scale.scale);
   const Isosurface found = isosurface(unscaled, description.invariant, description.value);
   if (found.triangles.empty())
     throw SceneError(fmt::format("{}: `/integrator/context/isosurfaces`: {} is nowhere {:g} in this field",

@@ -219,6 +219,19 @@ double TensorField::greatest_norm() const {
   return std::sqrt(greatest);
 }
 
+TensorField TensorField::copy() const {
+  TensorField result;
+  result.to_world_ = to_world_;
+  result.to_index_ = to_index_;
+  result.index_bounds_ = index_bounds_;
+  result.voxels_ = voxels_;
+  result.strongest_ = strongest_;
+  result.slots_ = slots_;
+  result.floats_.reset(allocate(brick_count() * brick_floats));
+  std::copy_n(floats_.get(), brick_count() * brick_floats, result.floats_.get());
+  return result;
+}
+
 TensorField TensorField::scaled(double factor) && {
   tbb::parallel_for(std::size_t{0}, brick_count() * brick_floats,
                     [&](std::size_t i) { floats_[i] = static_cast<float>(floats_[i] * factor); });

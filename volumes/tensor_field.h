@@ -60,6 +60,8 @@ class TensorField {
   /// The greatest Frobenius norm of a voxel.
   double greatest_norm() const;
 
+  TensorField copy() const;
+
   /// This field with every tensor multiplied by `factor`, in place.
   TensorField scaled(double factor) &&;
 
@@ -83,6 +85,7 @@ class TensorField {
   };
   static constexpr std::uint32_t missing = 0xffffffffu;
 
+  TensorField() = default;
   void make_table(const std::vector<Eigen::Vector3i>& bricks);
   std::size_t home_slot(const Eigen::Vector3i& brick) const;
   std::uint32_t find(const Eigen::Vector3i& brick) const;
