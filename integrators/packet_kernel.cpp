@@ -233,15 +233,15 @@ HWY_INLINE void store_components(V values, int i, int lane, float (*components)[
   for (int j = 0; j < eight_lanes; j += 4) std::memcpy(components[(i + j) / 4][lane], eight_values + j, 16);
 }
 
-/// Lanes are in cells of their own: a vector holds the components of one lane at a time.
+/// Lanes are in several cells: a vector holds the components of one lane at a time.
 template <bool differentials>
 HWY_NOINLINE void sample_own_cells(Packet& packet, const std::int32_t* voxels) {
-  for (int lane = 0; lane < lanes; ++lane) {
-    const float* const corner = packet.bending[lane] + voxels[lane] * TensorBrick::bending_floats;
-    const auto x = hn::Set(eight, packet.fraction[0][lane]), y = hn::Set(eight, packet.fraction[1][lane]),
-               z = hn::Set(eight, packet.fraction[2][lane]);
-    for (int i = 0; i < 8; i += eight_lanes) {
-      const Polynomial<Eight> p = cell_polynomial(eight, corner + i);
+  for (int i = 0; i < 8; i += eight_lanes) {
+    for (int lane = 0; lane < lanes; ++lane) {
+      const float* const corner = packet.bending[lane] + voxels[lane] * TensorBrick::bending_floats + i;
+      const Polynomial<Eight> p = cell_polynomial(eight, corner);
+      const auto x = hn::Set(eight, packet.fraction[0][lane]), y = hn::Set(eight, packet.fraction[1][lane]),
+                 z = hn::Set(eight, packet.fraction[2][lane]);
       if constexpr (differentials) {
         const auto at = evaluate_slopes(p.k[0], p.k[1], p.k[2], p.k[3], p.k[4], p.k[5], p.k[6], p.k[7], x, y, z);
         store_components(at.value, i, lane, packet.components);

@@ -90,8 +90,14 @@ KernelRay kernel_ray(const TensorField& field, Tracer<N>& tracer) {
     ray.position[axis] = static_cast<float>(index[axis] - double{TensorBrick::cells} * ray.brick[axis]);
     ray.direction[axis] = static_cast<float>(tracer.state().V(axis, 0));
   }
-  ray.norm = static_cast<float>(tracer.strength());
   return ray;
+}
+
+/// Whether the field may be strong enough, where a ray begins to bend, to ask for shorter steps.
+bool may_be_strong(const TensorField& field, const KernelRay& ray, double flexibility) {
+  const double longest_voxel = field.to_world().linear().norm();
+  const TensorBrick brick = field.brick({ray.brick[0], ray.brick[1], ray.brick[2]});
+  return std::abs(flexibility) * longest_voxel * brick.strongest > 0.1;
 }
 
 packets::KernelDifferential kernel_differential(const TensorField& field, const State<3>& state) {
@@ -136,30 +142,44 @@ bool same_start(const RayBatch& batch, std::size_t i, std::size_t j) {
                                           batch.differentials[i].direction == batch.differentials[j].direction));
 }
 
-/// Takes the rays of the batch to where light bends. Those that do not come there end.
+/// Lets a ray have the record of another.
+void copy_record(const Recordings& recordings, std::size_t from, std::size_t to) {
+  if (recordings.ways) (*recordings.ways)[to] = (*recordings.ways)[from];
+  if (recordings.tracks) (*recordings.tracks)[to] = (*recordings.tracks)[from];
+}
+
+/// Takes the rays of the batch to where light bends, those of one origin together. Those that do not come there end.
 template <int N>
 void approach(const TensorField& field, RayBatch& batch, const Recordings& recordings, Tracer<N>& tracer,
               Flight& flight) {
   for (std::size_t i = 0; i < batch.size();) {
     const std::size_t first = i;
-    const State<N> start = start_of<N>(batch, first);
-    const auto end = tracer.approach(start, recordings.of(first));
-    const State<N> state = tracer.state();
-    const KernelRay ray = end ? KernelRay() : kernel_ray(field, tracer);
-    do {
-      if (end || !std::isfinite(batch.flexibility[i])) {
-        set_end(batch, i, std::isfinite(batch.flexibility[i]) ? *end : RayEnd::degenerate, tracer);
+    const auto end = tracer.approach(start_of<N>(batch, first), recordings.of(first));
+    KernelRay ray = end ? KernelRay() : kernel_ray(field, tracer);
+    bool sampled = false;
+    std::size_t last = first + 1;
+    while (last < batch.size() && same_start(batch, last, first)) copy_record(recordings, first, last++);
+    const auto state = tracer.state();
+    const Travelled travelled = tracer.travelled();
+    for (; i < last; ++i) {
+      const double s = batch.flexibility[i];
+      if (end || !std::isfinite(s)) {
+        set_end(batch, i, std::isfinite(s) ? *end : RayEnd::degenerate, tracer);
         continue;
       }
+      if (!sampled && may_be_strong(field, ray, s)) {
+        ray.norm = static_cast<float>(tracer.strength());
+        sampled = true;
+      }
+      ray.flexibility = static_cast<float>(s);
       flight.kernel.rays.push_back(ray);
-      flight.kernel.rays.back().flexibility = static_cast<float>(batch.flexibility[i]);
       if constexpr (N == 3) flight.kernel.differentials.push_back(kernel_differential(field, state));
       flight.numbers.push_back(i);
-      flight.travelled.push_back(tracer.travelled());
+      flight.travelled.push_back(travelled);
       if (!recordings) continue;
-      tracer.take_over(state, batch.flexibility[i], tracer.travelled(), recordings.of(i));
+      tracer.take_over(state, s, travelled, recordings.of(i));
       tracer.record(true);
-    } while (++i < batch.size() && !recordings && same_start(batch, i, first));
+    }
   }
 }
 

@@ -106,9 +106,10 @@ TEST(LensMap, WithoutFieldLightIsProjected) {
       const double distance = normal.dot(to.center - point) / normal.dot(direction);
       const Landing landing = land(map, start, 0.4);
       ASSERT_EQ(landing.end, RayEnd::plate);
-      EXPECT_LT((plane_point(to, landing.at) - (point + distance * direction)).norm(), 1e-9);
-      EXPECT_LT((landing.jacobian - to_axes.transpose() * projection * from_axes).norm(), 1e-9);
-      EXPECT_NEAR(landing.length, distance, 1e-9);
+      const double tolerance = method == BendingMethod::splitting ? single_precision : 1e-9;
+      EXPECT_LT((plane_point(to, landing.at) - (point + distance * direction)).norm(), tolerance);
+      EXPECT_LT((landing.jacobian - to_axes.transpose() * projection * from_axes).norm(), tolerance);
+      EXPECT_NEAR(landing.length, distance, tolerance);
     }
   }
 }
@@ -317,7 +318,7 @@ TEST(LensMap, LandingsAreOrderedByStartThenFlexibility) {
   EXPECT_EQ(counts.ray_steps, sum.ray_steps);
   EXPECT_EQ(counts.tensor_samples, sum.tensor_samples);
   EXPECT_GT(counts.ray_steps, 0u);
-  EXPECT_LT((landings[3].at - starts[1]).norm(), 1e-9);  // s = 0: straight.
+  EXPECT_LT((landings[3].at - starts[1]).norm(), single_precision);  // s = 0: straight.
 }
 
 TEST(LensMap, SettingsOutOfRangeAreRefused) {

@@ -67,9 +67,9 @@ TEST(Paths, AnIsotropicFieldGivesStraightPathsOfTwoPoints) {
   EXPECT_NEAR(path.points[0].position.z(), 1, 1e-12);
   EXPECT_NEAR(path.points[1].position.z(), -1, 1e-9);
   EXPECT_EQ(path.points[0].length, 0);
-  EXPECT_NEAR(path.points[1].length, 2 / -V.z(), 1e-9);
+  EXPECT_NEAR(path.points[1].length, 2 / -V.z(), single_precision);
   for (const Waypoint& point : path.points) {
-    EXPECT_LT((point.direction - V).norm(), 1e-13);
+    EXPECT_LT((point.direction - V).norm(), single_precision);
     EXPECT_LT((point.force() - 3 * V).norm(), 1e-6);
     EXPECT_LT(point.change.norm(), 1e-12);
   }
