@@ -35,7 +35,7 @@ struct KernelSettings {
   BendingMethod method = BendingMethod::splitting;
   float step = 0;  ///< Voxels; 0: automatic.
   std::uint32_t max_steps = 0;
-  float max_length = 0;          ///< World units; from where the rays are now.
+  float max_length = 0;          ///< World units; of the whole way, `KernelRay::length` included.
   MeetsSurface meets_surface;    ///< Null if there are no surfaces within the field.
   Eigen::AlignedBox3d surfaces;  ///< Where they are, index space.
 };

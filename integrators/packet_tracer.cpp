@@ -14,6 +14,7 @@ namespace {
 using packets::KernelRay;
 using packets::KernelSettings;
 
+constexpr double face_margin = 1e-3;     // Voxels; more than single precision errs by.
 constexpr double surface_margin = 4e-6;  // In sizes of the volume; more than Geometry's own.
 
 /// Surfaces that rays may meet within the field, in index space; empty if there are none.
@@ -82,7 +83,8 @@ State<1> state_of(const TensorField& field, const KernelRay& ray) {
   if (ray.axis >= 0) {
     const Eigen::AlignedBox3d& box = field.index_bounds();
     const int axis = ray.axis;
-    index[axis] = index[axis] > box.center()[axis] ? box.max()[axis] : box.min()[axis];
+    const double face = index[axis] > box.center()[axis] ? box.max()[axis] : box.min()[axis];
+    if (std::abs(index[axis] - face) < face_margin) index[axis] = face;  // Light that grazes it may end beside it.
   }
   state.P = field.to_world() * index;
   return bending_steps::normalized(state);
