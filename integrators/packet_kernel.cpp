@@ -56,6 +56,7 @@ constexpr int most_lanes = 16;
 constexpr float longest_automatic_step = 0.5f, shortest_automatic_step = 1.0f / 64;  // Voxels; as in scalar_tracer.cpp.
 constexpr float strongest_kick = 0.2f;
 constexpr float past_straight_brick = 1.0f / 64;
+constexpr int landing_steps = 4;  // Of Newton's method, to a face of the extent.
 
 /// With n terms the power series of exp(A) V is exact to 3e-8, half a unit in the last place, for ‖A‖ up to entry n −
 /// 2: (3e-8 (n + 1)!)^(1/(n + 1)).
@@ -293,11 +294,14 @@ class Kernel {
   F3 bend_strongly(Packet& packet, const Tensor& T, const F3& v, F factor);
   void bend_differentials(Packet& packet, const Tensor& T, const F3& v, F factor, F time);
   F3 index_direction(const F3& v) const;
+  void leave_straight_bricks(Packet& packet);
   F step_time(Packet& packet, const F3& u);
   F3 take_step(Packet& packet, F3& v, F3& u);
   void step(Packet& packet);
   std::uint32_t outside(const Packet& packet, const F3& to) const;
   std::uint32_t stopped(const Packet& packet, const F3& to, const F3& v) const;
+  std::uint32_t spent(const Packet& packet) const;
+  void locate_on_extent(Packet& packet);
   void take_out(Packet& packet, std::uint32_t stop, std::uint32_t leave);
   void repeat_one_alive(Packet& packet);
   void keep_points(const Packet& packet);
@@ -622,6 +626,19 @@ HWY_INLINE F3 Kernel<uniform, differentials>::bend_strongly(Packet& packet, cons
   return load(to);
 }
 
+/// The last step of lanes in bricks where nothing bends light ended a little behind them: takes these lanes to the
+/// bricks where they are now. (Others are taken there by their steps' middles, whatever their neighbours do.)
+template <bool uniform, bool differentials>
+HWY_NOINLINE void Kernel<uniform, differentials>::leave_straight_bricks(Packet& packet) {
+  const F zero = hn::Zero(floats), end = set(TensorBrick::cells);
+  const F3 p = load(packet.p);
+  const auto beyond = [&](F x) HWY_ATTR { return hn::Or(hn::Lt(x, zero), hn::Ge(x, end)); };
+  const Mask moves =
+      hn::And(hn::Eq(hn::Load(floats, packet.strongest), zero), hn::Or(beyond(p.x), hn::Or(beyond(p.y), beyond(p.z))));
+  if (!hn::AllFalse(floats, moves))
+    move_to_bricks(packet, select(moves, clamp(p, load(packet.low), load(packet.high)), {zero, zero, zero}));
+}
+
 /// How long the next step is, in the units that u is per: voxels, or, if voxels are not uniform, world units.
 template <bool uniform, bool differentials>
 HWY_INLINE F Kernel<uniform, differentials>::step_time(Packet& packet, const F3& u) {
@@ -635,6 +652,7 @@ HWY_INLINE F Kernel<uniform, differentials>::step_time(Packet& packet, const F3&
   }
   F time = uniform ? steps : hn::Mul(steps, voxel);
   if (HWY_UNLIKELY(packet.straight)) {
+    leave_straight_bricks(packet);
     // Out of the brick where nothing bends light, and a little further, so that rounding does not keep it there.
     const F3 p = load(packet.p);
     const F zero = hn::Zero(floats), end = set(TensorBrick::cells);
@@ -716,7 +734,10 @@ HWY_NOINLINE std::uint32_t Kernel<uniform, differentials>::stopped(const Packet&
                                                                    const F3& v) const {
   const F unit = dot(v, v);
   std::uint32_t stop = to_bits(hn::Not(hn::Gt(unit, set(0.5f))));  // No direction to go in.
-  const F length = hn::Mul(hn::Add(hn::Load(floats, packet.length), hn::Load(floats, packet.time)), set(to_world()));
+  alignas(64) float before[most_lanes];                            // Of the way to the field.
+  for (int lane = 0; lane < lanes; ++lane) before[lane] = static_cast<float>(rays_[packet.ray[lane]].length);
+  const F way = hn::Add(hn::Load(floats, packet.length), hn::Load(floats, packet.time));
+  const F length = hn::MulAdd(way, set(to_world()), hn::Load(floats, before));
   stop |= to_bits(hn::Ge(length, set(medium_.settings.max_length)));
   if (!packet.near_surface) return stop;
   alignas(64) float ends[3][most_lanes];
@@ -732,6 +753,25 @@ HWY_NOINLINE std::uint32_t Kernel<uniform, differentials>::stopped(const Packet&
     if (medium_.meets_surface(from, until)) stop |= 1u << lane;
   }
   return stop;
+}
+
+/// The lanes that may take no further step, as bits: those of light that has come through a cut have taken more.
+template <bool uniform, bool differentials>
+HWY_NOINLINE std::uint32_t Kernel<uniform, differentials>::spent(const Packet& packet) const {
+  std::uint32_t result = 0;
+  for (int lane = 0; lane < lanes; ++lane)
+    if (rays_[packet.ray[lane]].steps + packet.steps >= medium_.settings.max_steps) result |= 1u << lane;
+  return result;
+}
+
+/// Takes the middles of steps that lie beyond the extent to the nearest points on it, where the tensor is that of the
+/// outermost voxels. Light may turn back into the extent from there.
+template <bool uniform, bool differentials>
+HWY_NOINLINE void Kernel<uniform, differentials>::locate_on_extent(Packet& packet) {
+  packet.clamps = true;
+  locate(packet, hn::Load(floats, packet.time));
+  interpolate(packet);
+  packet.clamps = medium_.flat;
 }
 
 /// Hands the rays of some lanes on, as they are before the step.
@@ -795,6 +835,8 @@ HWY_NOINLINE void Kernel<uniform, differentials>::keep_points(const Packet& pack
 
 template <bool uniform, bool differentials>
 HWY_INLINE void Kernel<uniform, differentials>::step(Packet& packet) {
+  if (HWY_UNLIKELY(packet.near_border && (outside(packet, load(packet.middle)) & packet.alive) != 0))
+    locate_on_extent(packet);
   F3 v, u;
   const F3 to = take_step(packet, v, u);
   samples_ += hwy::PopCount(packet.alive);
@@ -802,6 +844,7 @@ HWY_INLINE void Kernel<uniform, differentials>::step(Packet& packet) {
   if (HWY_UNLIKELY(packet.near_border)) leave = outside(packet, to);
   if (HWY_UNLIKELY(packet.near_surface || may_stop_ || !(packet.greatest_reach <= strongest_kick)))
     stop = stopped(packet, to, v);
+  if (HWY_UNLIKELY(packet.steps >= packet.most_steps)) stop |= spent(packet);
   stop &= packet.alive;
   if constexpr (differentials) {  // Those of a crossing are the reference's.
     stop |= leave;
@@ -843,21 +886,21 @@ HWY_NOINLINE void Kernel<uniform, differentials>::land(Packet& packet) {
   };
   const auto part = [&](F p, F along, int axis) HWY_ATTR {
     const F gap = hn::Sub(face(along, axis), p);
-    return hn::IfThenElse(hn::Lt(hn::Abs(gap), hn::Abs(along)), hn::Div(gap, along), one);
+    return hn::IfThenElse(hn::Gt(hn::Abs(along), zero), hn::Div(gap, along), set(1e30f));
   };
   const F x = part(from.x, chord.x, 0), y = part(from.y, chord.y, 1), z = part(from.z, chord.z, 2);
   const F nearest = hn::Min(hn::Min(x, y), z);
   const Mask is_x = hn::Eq(x, nearest), is_y = hn::Eq(y, nearest);
   const auto of_axis = [&](F a, F b, F c) HWY_ATTR { return hn::IfThenElse(is_x, a, hn::IfThenElse(is_y, b, c)); };
-  F time = hn::Mul(longest, hn::Max(nearest, zero));
-  for (int i = 0; i < 3; ++i) {
+  F time = hn::Mul(longest, hn::Min(hn::Max(nearest, zero), one));
+  for (int i = 0; i < landing_steps; ++i) {
     locate(packet, time);  // Which may take lanes to other bricks.
     interpolate(packet);
     to = take_step(packet, v, u);
     const F gap = hn::Sub(of_axis(face(chord.x, 0), face(chord.y, 1), face(chord.z, 2)), of_axis(to.x, to.y, to.z));
     F rest = hn::Div(gap, of_axis(u.x, u.y, u.z));
     rest = hn::IfThenElseZero(hn::Le(hn::Abs(rest), longest), rest);  // But of light that grazes the face.
-    if (i == 2) {
+    if (i == landing_steps - 1) {
       to = mul_add(rest, u, to);
       time = hn::Add(time, rest);
     } else {
@@ -879,7 +922,7 @@ HWY_NOINLINE void Kernel<uniform, differentials>::land(Packet& packet) {
     ray.axis = static_cast<std::int8_t>(on_x >> lane & 1 ? 0 : on_y >> lane & 1 ? 1 : 2);
     ray.length += double{packet.time[lane]} * to_world();
     ++ray.steps;
-    samples_ += 4;
+    samples_ += 1 + landing_steps;
   }
   packet.alive = 0;
 }
@@ -898,10 +941,7 @@ std::uint64_t Kernel<uniform, differentials>::run() {
     for (int i = 0; i < in_flight; ++i) {
       Packet& packet = packets_[i];
       if (HWY_UNLIKELY(packet.alive == 0)) continue;
-      if (HWY_LIKELY(packet.steps < packet.most_steps))
-        step(packet);
-      else
-        take_out(packet, packet.alive, 0);
+      step(packet);
       if (HWY_LIKELY(packet.alive != 0)) continue;
       if (leaving_[i].alive != 0) land(leaving_[i]);
       fill(packet);

@@ -22,7 +22,7 @@ struct KernelRay {
   std::array<float, 3> direction;     ///< V; unit, world axes.
   float flexibility = 0;              ///< s.
   float norm = 0;                     ///< Of the deviator of T as last sampled; 0 where that asks for no shorter step.
-  double length = 0;                  ///< Of the way in the kernel, world units; added to.
+  double length = 0;                  ///< Of the way, world units; added to.
   std::uint32_t steps = 0;            ///< Added to.
   std::int8_t axis = -1;              ///< Of the face of the extent where it left; -1: it has not.
   float step = 0;                     ///< If it has not left: of its next step, world units; 0: not known.
@@ -37,7 +37,7 @@ struct KernelDifferential {
 struct KernelPoint {
   std::array<std::int32_t, 3> brick;
   std::array<float, 3> position, direction;
-  double length;  ///< Of the way in the kernel, world units.
+  double length;  ///< Of the way, world units.
 };
 
 struct KernelRays {
@@ -53,7 +53,7 @@ struct KernelSettings {
   BendingMethod method = BendingMethod::splitting;
   float step = 0;  ///< Voxels; 0: automatic.
   std::uint32_t max_steps = 0;
-  float max_length = 0;          ///< World units; from where the rays are now.
+  float max_length = 0;          ///< World units; of the whole way, `KernelRay::length` included.
   MeetsSurface meets_surface;    ///< Null if there are no surfaces within the field.
   Eigen::AlignedBox3d surfaces;  ///< Where they are, index space.
 };

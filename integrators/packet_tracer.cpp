@@ -14,6 +14,7 @@ namespace {
 using packets::KernelRay;
 using packets::KernelSettings;
 
+constexpr double face_margin = 1e-3;     // Voxels; more than single precision errs by.
 constexpr double surface_margin = 4e-6;  // In sizes of the volume; more than Geometry's own.
 
 /// Surfaces that rays may meet within the field, in index space; empty if there are none.
@@ -119,7 +120,8 @@ State<N> state_of(const TensorField& field, const packets::KernelRays& kernel, s
   if (ray.axis >= 0) {
     const Eigen::AlignedBox3d& box = field.index_bounds();
     const int axis = ray.axis;
-    index[axis] = index[axis] > box.center()[axis] ? box.max()[axis] : box.min()[axis];
+    const double face = index[axis] > box.center()[axis] ? box.max()[axis] : box.min()[axis];
+    if (std::abs(index[axis] - face) < face_margin) index[axis] = face;  // Light that grazes it may end beside it.
   }
   State<N> state;
   state.P.col(0) = field.to_world() * index;
@@ -172,6 +174,8 @@ void approach(const TensorField& field, RayBatch& batch, const Recordings& recor
         sampled = true;
       }
       ray.flexibility = static_cast<float>(s);
+      ray.length = travelled.length;
+      ray.steps = travelled.steps;
       flight.kernel.rays.push_back(ray);
       if constexpr (N == 3) flight.kernel.differentials.push_back(kernel_differential(field, state));
       flight.numbers.push_back(i);
@@ -188,14 +192,13 @@ void approach(const TensorField& field, RayBatch& batch, const Recordings& recor
 template <int N>
 void record_points(const TensorField& field, const std::vector<packets::KernelPoint>& points, double flexibility,
                    Travelled travelled, const Recording& recording, Tracer<N>& tracer) {
-  const double before = travelled.length;
   for (const packets::KernelPoint& point : points) {
     State<N> state;
     state.P.setZero();
     state.V.setZero();
     state.P.col(0) = field.to_world() * index_position(point.brick, point.position);
     state.V.col(0) = to_vector(point.direction);
-    travelled.length = before + point.length;
+    travelled.length = point.length;
     tracer.take_over(bending_steps::normalized(state), flexibility, travelled, recording);
     tracer.record(true);
   }
@@ -214,8 +217,8 @@ RayEnd finish(const TensorField& field, const Flight& flight, std::size_t i, dou
   Travelled travelled = flight.travelled[i];
   if (!flight.kernel.points.empty())
     record_points(field, flight.kernel.points[i], flexibility, travelled, recording, tracer);
-  travelled.length += ray.length;
-  travelled.steps += ray.steps;
+  travelled.length = ray.length;
+  travelled.steps = ray.steps;
   tracer.take_over(state_of<N>(field, flight.kernel, i), flexibility, travelled, recording);
   if (ray.axis >= 0) {
     if (tracer.state().direction().isZero()) return RayEnd::degenerate;

@@ -190,6 +190,7 @@ double Tracer<N>::land(const State<N>& next, double h, const Hit& hit) {
     if (!(std::abs(gap) <= h)) break;  // Light that grazes the plane.
     if (std::abs(gap) <= 1e-10 * h || i == 3) {
       landed.P += gap * landed.V;
+      length += gap;
       break;
     }
     length = std::clamp(length + gap, 0.0, h);
@@ -210,10 +211,12 @@ double Tracer<N>::control_step(const State<N>& error) {
   return excess;
 }
 
-/// Where nothing in a brick bends light, a step goes through it to a little behind it, world units.
+/// Where nothing in a brick bends light, a step goes through it to a little behind it, world units. (But by Eq. 3–4,
+/// which see the trace of T.)
 template <int N>
-double Tracer<N>::next_step() const {
-  const double way = sampler_.way_through_straight_brick(position(), direction());
+double Tracer<N>::next_step() {
+  const double way =
+      settings_.method == BendingMethod::euler ? 0 : sampler_.way_through_straight_brick(position(), direction());
   if (way > 0) return way + (stages(settings_.method) == 1 ? past_straight_brick : past_straight_brick_stages) * voxel_;
   return voxel_ * (adaptive(settings_.method) ? adaptive_step_
                    : settings_.step == 0      ? automatic_step()

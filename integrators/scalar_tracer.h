@@ -87,7 +87,7 @@ class Tracer {
   State<N> step(double h, State<N>& error) { return advance(settings_.method, medium_, ray_, h, error); }
   double length_of_voxel() const { return 1 / (field_.to_index().linear() * direction()).norm(); }
   double automatic_step() const;
-  double next_step() const;
+  double next_step();
   double control_step(const State<N>& error);
   void go_straight(const Hit& hit);
   bool ends_before(double distance) const { return length_ + distance >= settings_.max_length; }

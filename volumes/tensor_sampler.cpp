@@ -108,8 +108,11 @@ Eigen::Matrix3d TensorSampler::at(const Eigen::Vector3d& world, const Eigen::Mat
   return to_matrix(eight.value, last.value);
 }
 
-double TensorSampler::way_through_straight_brick(const Eigen::Vector3d& world, const Eigen::Vector3d& direction) const {
+double TensorSampler::way_through_straight_brick(const Eigen::Vector3d& world, const Eigen::Vector3d& direction) {
   if (brick_.strongest > 0 || !brick_.bending) return 0;
+  Eigen::Vector3d unused;
+  locate(world, unused);
+  if (brick_.strongest > 0) return 0;
   const Eigen::Vector3d index = field_->to_index() * world - (TensorBrick::cells * at_).cast<double>();
   const Eigen::Vector3d along = field_->to_index().linear() * direction;
   double way = std::numeric_limits<double>::infinity();

@@ -25,9 +25,10 @@ class TensorSampler {
   Eigen::Matrix3d at(const Eigen::Vector3d& world, const Eigen::Matrix<double, 3, 2>& along,
                      std::array<Eigen::Matrix3d, 2>& derivatives);
 
-  /// If nothing in the brick that was sampled last bends light: how far it is from `world`, a point in that brick, out
-  /// of it, where one goes along `direction` (of any length, which is the unit of the result). Otherwise 0.
-  double way_through_straight_brick(const Eigen::Vector3d& world, const Eigen::Vector3d& direction) const;
+  /// If nothing bends light in the brick that was sampled last, nor in that of `world`, which may be the next one: how
+  /// far it is from `world` out of the latter, where one goes along `direction` (of any length, which is the unit of
+  /// the result). Otherwise 0.
+  double way_through_straight_brick(const Eigen::Vector3d& world, const Eigen::Vector3d& direction);
 
   std::uint64_t samples() const { return samples_; }  ///< Calls of `at` so far.
 

@@ -46,7 +46,7 @@ Traced trace_with_differential(const TensorField& field, const Geometry& geometr
     differential.direction.col(i) = start.turn * start.across[i];
   }
   batch.differentials.push_back(differential);
-  trace(field, geometry, settings, batch);
+  trace_reference(field, geometry, settings, batch);
   return {{batch.position[0], batch.direction[0], batch.end[0], batch.steps[0]}, batch.differentials[0]};
 }
 
@@ -172,7 +172,7 @@ TEST(RayDifferential, MatchesFiniteDifferencesWhereKicksAreStrong) {
   one_step.max_steps = 1;
   batch.differentials.push_back({(Eigen::Matrix<double, 3, 2>() << start.across[0], start.across[1]).finished(), {}});
   batch.differentials[0].direction.setZero();
-  trace(field, geometry, one_step, batch);
+  trace_reference(field, geometry, one_step, batch);
   ASSERT_EQ(batch.end[0], RayEnd::step_limit);
   for (int i = 0; i < 2; ++i) {
     const double d = 1e-5;
@@ -194,7 +194,7 @@ TEST(RayDifferential, LengthIsThatOfTheWay) {
   surfaces.plate = test::plate_across(direction, 3);
   RayBatch batch;
   batch.add(-2 * direction, direction, 1);
-  trace(field, Geometry(surfaces), {}, batch);
+  trace_reference(field, Geometry(surfaces), {}, batch);
   EXPECT_NEAR(batch.length[0], 5, 1e-9);
 
   // A circle: an antisymmetric tensor turns light at a constant rate, and length is the angle over it.
@@ -204,7 +204,8 @@ TEST(RayDifferential, LengthIsThatOfTheWay) {
   const TensorField circle = test::constant_field(turning);
   RayBatch arc;
   arc.add({0, 0, 0.9}, {0, 0, -1}, 1);
-  trace(circle, Geometry(test::surfaces_of(circle)), test::settings_of(BendingMethod::splitting, 1.0 / 16), arc);
+  trace_reference(circle, Geometry(test::surfaces_of(circle)), test::settings_of(BendingMethod::splitting, 1.0 / 16),
+                  arc);
   ASSERT_EQ(arc.end[0], RayEnd::missed);
   const double angle = std::acos(-arc.direction[0].z());
   EXPECT_NEAR(arc.length[0], angle / 0.5, 1e-4);

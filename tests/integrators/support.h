@@ -66,11 +66,13 @@ struct Ray {
   std::uint32_t steps = 0;
 };
 
+/// By the reference: its mathematics is tested to double precision, and packet_tracer_test.cpp compares `trace` with
+/// it.
 inline Ray trace_one(const TensorField& field, const Geometry& geometry, const BendingSettings& settings,
                      const Eigen::Vector3d& position, const Eigen::Vector3d& direction, double flexibility) {
   RayBatch batch;
   batch.add(position, direction.normalized(), flexibility);
-  trace(field, geometry, settings, batch);
+  trace_reference(field, geometry, settings, batch);
   return {batch.position[0], batch.direction[0], batch.end[0], batch.steps[0]};
 }
 
