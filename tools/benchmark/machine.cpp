@@ -84,7 +84,7 @@ Bandwidth bandwidth(int threads, std::size_t array_bytes) {
                  for (std::uint64_t round = 0; round < rounds; ++round) for_ranges(threads, arrays.count, work);
                  return rounds * bytes;
                },
-               0.05)
+               wall_seconds, 0.05)
         .median;
   };
   Bandwidth result;

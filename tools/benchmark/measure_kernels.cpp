@@ -79,7 +79,7 @@ KernelRate measure_kernel(const TestField& test, Order order, const TraceFunctio
     samples += units;
     return units;
   };
-  const Rate rate = repeat(prepare, work, seconds);
+  const Rate rate = repeat(prepare, work, thread_seconds, seconds);
   return {rate, static_cast<double>(samples) / static_cast<double>(rays)};
 }
 

@@ -24,12 +24,12 @@ Json measure_loading(const Options& options, const Json& machine) {
   double voxels = 0, memory = 0;
   for (std::size_t i = 0; i < reading.size(); ++i) {
     options.announce(fmt::format("loading, {} of {}", i + 1, reading.size()));
-    auto start = std::chrono::steady_clock::now();
+    double start = wall_seconds();
     const TensorGrid grid = read_tensor_vdb(path);
-    reading[i] = seconds_since(start);
-    start = std::chrono::steady_clock::now();
+    reading[i] = wall_seconds() - start;
+    start = wall_seconds();
     const TensorField field(grid);
-    bricks[i] = seconds_since(start);
+    bricks[i] = wall_seconds() - start;
     voxels = static_cast<double>(grid.active_voxels());
     memory = static_cast<double>(field.memory_bytes());
   }

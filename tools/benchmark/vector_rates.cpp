@@ -59,7 +59,7 @@ std::vector<VectorRate> vector_rates(double seconds) {
       unused = HWY_DYNAMIC_DISPATCH(multiply_add)(rounds);
       return chains * rounds;
     };
-    rate.multiply_adds = repeat(as_many, work, seconds).median;
+    rate.multiply_adds = repeat(as_many, work, thread_seconds, seconds).median;
     rates.push_back(rate);
   }
   hwy::SetSupportedTargetsForTest(0);

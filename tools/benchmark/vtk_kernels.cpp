@@ -2,6 +2,9 @@
 
 #ifdef TENSORRAY_HAS_VTK_FLOW_PATHS
 
+#include <cmath>
+#include <memory>
+
 #include <vtkFloatArray.h>
 #include <vtkHyperStreamline.h>
 #include <vtkImageData.h>
@@ -69,7 +72,7 @@ TraceFunction stream_tracer(const TestField& test) {
   };
 }
 
-/// Hyperstreamlines of the field from the rays' origins, a point for every step.
+/// Hyperstreamlines of the pressure from the rays' origins, a point for every step.
 TraceFunction hyperstreamline_tracer(const TestField& test) {
   constexpr int sides = 3;  // Of the tube that comes with it: the least that VTK takes.
   const auto image = make_image(test, 9, [](const Eigen::Matrix3f& T) { return T; });
@@ -81,10 +84,10 @@ TraceFunction hyperstreamline_tracer(const TestField& test) {
       vtkNew<vtkHyperStreamline> tracer;
       tracer->SetInputData(*image);
       tracer->SetStartPosition(at.x(), at.y(), at.z());
-      tracer->IntegrateMajorEigenvector();
+      tracer->IntegrateMinorEigenvector();
       tracer->SetIntegrationDirectionToIntegrateBothDirections();
-      tracer->SetIntegrationStepLength(step);
-      tracer->SetStepLength(step);
+      tracer->SetIntegrationStepLength(step / std::sqrt(3.0));  // In diagonals of a voxel, ...
+      tracer->SetStepLength(step / way_through(test));          // ... and the tube's, in diagonals of the field.
       tracer->SetMaximumPropagationDistance(way_through(test));
       tracer->SetTerminalEigenvalue(0);
       tracer->SetNumberOfSides(sides);
