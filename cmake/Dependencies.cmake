@@ -7,6 +7,7 @@ find_package(nlohmann_json REQUIRED)
 find_package(fmt REQUIRED)
 find_package(CLI11 REQUIRED)
 find_package(assimp REQUIRED)
+find_package(hwy REQUIRED)
 
 # OpenVDB's find module sits outside CMake's search path on Debian.
 file(GLOB OPENVDB_MODULE_PATHS /usr/lib/*/cmake/OpenVDB /usr/lib/cmake/OpenVDB /usr/local/lib*/cmake/OpenVDB)
@@ -21,8 +22,6 @@ endif()
 # The CMake packages of these two name folders that distributions do not install; their pkg-config modules are sound.
 pkg_check_modules(OpenImageIO REQUIRED IMPORTED_TARGET OpenImageIO>=2.4)
 pkg_check_modules(OpenColorIO REQUIRED IMPORTED_TARGET OpenColorIO>=2.1)
-
-pkg_check_modules(Highway REQUIRED IMPORTED_TARGET libhwy>=1.0)
 
 find_package(VTK REQUIRED COMPONENTS CommonCore CommonDataModel CommonExecutionModel FiltersCore FiltersGeneral
              IOCore IOExodus IOGeometry IOLegacy IOParallelXML IOXML

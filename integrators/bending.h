@@ -1,6 +1,6 @@
 #pragma once
 /// @file integrators/bending.h
-/// Bends light through a tensor field. Only bending.cpp and bending_steps.h know the rule
+/// Bends light through a tensor field. Only bending_steps.h and packet_kernel.cpp know the rule
 /// (Zheng and Pang 2003, Eq. 5):  P' = V,  V' = s (T V − (VᵀTV) V),  |V| = 1.
 
 #include <array>
@@ -119,6 +119,10 @@ using Track = std::vector<TrackPoint>;
 /// Threads: `field` and `geometry` are shared and immutable; one batch belongs to one thread.
 /// @throw std::invalid_argument if a setting is out of range.
 void trace(const TensorField& field, const Geometry& geometry, const BendingSettings& settings, RayBatch& batch);
+
+/// The same, one ray at a time and in double precision throughout: the reference that `trace` is tested against.
+void trace_reference(const TensorField& field, const Geometry& geometry, const BendingSettings& settings,
+                     RayBatch& batch);
 
 /// The same, and records the ways, one a ray: the same rays, for one more tensor sample a step.
 void trace(const TensorField& field, const Geometry& geometry, const BendingSettings& settings, RayBatch& batch,

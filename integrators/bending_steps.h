@@ -10,7 +10,7 @@
 
 #include "integrators/bending.h"
 #include "integrators/exponential.h"
-#include "volumes/tensor_field.h"
+#include "volumes/tensor_sampler.h"
 
 namespace tensorray::bending_steps {
 

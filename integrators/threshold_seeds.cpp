@@ -9,6 +9,7 @@
 #include <tbb/parallel_for.h>
 
 #include "renderer/random.h"
+#include "volumes/tensor_sampler.h"
 
 namespace tensorray {
 namespace {

@@ -122,6 +122,15 @@ bool Geometry::may_absorb(const Eigen::Vector3d& from, const Eigen::Vector3d& to
   });
 }
 
+Eigen::AlignedBox3d Geometry::absorbers_within(const Eigen::AlignedBox3d& region) const {
+  Eigen::AlignedBox3d all;
+  for (const Eigen::AlignedBox3d& box : state_->absorbers.boxes) {
+    const Eigen::AlignedBox3d common = box.intersection(region);
+    if (!common.isEmpty()) all.extend(common);
+  }
+  return all;
+}
+
 std::optional<Hit> Geometry::crossing(Surface surface, bool inwards, const Eigen::Vector3d& origin,
                                       const Eigen::Vector3d& direction, double max_distance) const {
   const Group& group = surface == Surface::bounds ? state_->bounds : state_->cut;

@@ -56,6 +56,9 @@ class Geometry {
   /// False only if no plate or obstacle can meet the segment; cheap.
   bool may_absorb(const Eigen::Vector3d& from, const Eigen::Vector3d& to) const;
 
+  /// A box around all parts of plates and obstacles that may lie in `region`; empty if there are none.
+  Eigen::AlignedBox3d absorbers_within(const Eigen::AlignedBox3d& region) const;
+
   /// Where light crosses the bounds, or the cut, inwards or outwards; crossings in the other sense are passed over.
   std::optional<Hit> crossing(Surface surface, bool inwards, const Eigen::Vector3d& origin,
                               const Eigen::Vector3d& direction, double max_distance = infinite) const;

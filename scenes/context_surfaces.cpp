@@ -12,6 +12,7 @@
 #include "scenes/read_scene.h"
 #include "scenes/render.h"
 #include "volumes/isosurface.h"
+#include "volumes/tensor_sampler.h"
 
 namespace tensorray {
 namespace {

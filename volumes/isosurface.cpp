@@ -11,6 +11,8 @@
 #include <openvdb/openvdb.h>
 #include <openvdb/tools/VolumeToMesh.h>
 
+#include "volumes/tensor_sampler.h"
+
 namespace tensorray {
 namespace {
 
@@ -39,17 +41,15 @@ void set_with_margin(openvdb::FloatGrid::Accessor& grid, const Voxels& box, cons
       for (int z = first.z(); z <= last.z(); ++z) grid.setValue({x, y, z}, value);
 }
 
-void add_brick(const float* floats, const Vector3i& origin, const Voxels& box, Invariant which,
+void add_brick(const TensorBrick& brick, const Vector3i& origin, const Voxels& box, Invariant which,
                openvdb::FloatGrid::Accessor& grid) {
-  constexpr int width = TensorField::brick_width;
-  const Voxels own(origin, origin + Vector3i::Constant(TensorField::brick_cells - 1));
+  const Voxels own(origin, origin + Vector3i::Constant(TensorBrick::cells));
   const Voxels shared = own.intersection(box);
   for (int x = shared.min().x(); x <= shared.max().x(); ++x)
     for (int y = shared.min().y(); y <= shared.max().y(); ++y)
       for (int z = shared.min().z(); z <= shared.max().z(); ++z) {
         const Vector3i voxel(x, y, z), p = voxel - origin;
-        const int offset = ((p.x() * width + p.y()) * width + p.z()) * TensorField::voxel_floats;
-        const Eigen::Matrix3d tensor = Eigen::Map<const Eigen::Matrix3f>(floats + offset).cast<double>();
+        const Eigen::Matrix3d tensor = brick.tensor(TensorBrick::voxel(p.x(), p.y(), p.z()));
         set_with_margin(grid, box, voxel, as_float(invariant(which, tensor)));
       }
 }
@@ -57,18 +57,15 @@ void add_brick(const float* floats, const Vector3i& origin, const Voxels& box, I
 /// The invariant at the voxels of all bricks that are stored, in index space; 0 elsewhere.
 openvdb::FloatGrid::Ptr invariant_grid(const TensorField& field, const Voxels& box, Invariant which) {
   const auto brick_of = [](int index) { return index >> 3; };
-  static_assert(TensorField::brick_cells == 8, "a brick's index is a voxel's, less three bits");
+  static_assert(TensorBrick::cells == 8, "a brick's index is a voxel's, less three bits");
   const Vector3i first = box.min().unaryExpr(brick_of), last = box.max().unaryExpr(brick_of);
-  const float* const zero =
-      field.brick(last + Vector3i::Constant(2));  // There is none; it stands for all missing ones.
   const openvdb::FloatGrid::Ptr grid = openvdb::FloatGrid::create(0);
   openvdb::FloatGrid::Accessor accessor = grid->getAccessor();
   for (int x = first.x(); x <= last.x(); ++x)
     for (int y = first.y(); y <= last.y(); ++y)
-      for (int z = first.z(); z <= last.z(); ++z) {
-        const float* const floats = field.brick({x, y, z});
-        if (floats != zero) add_brick(floats, TensorField::brick_cells * Vector3i(x, y, z), box, which, accessor);
-      }
+      for (int z = first.z(); z <= last.z(); ++z)
+        if (field.is_stored({x, y, z}))
+          add_brick(field.brick({x, y, z}), TensorBrick::cells * Vector3i(x, y, z), box, which, accessor);
   return grid;
 }
 

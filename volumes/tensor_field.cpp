@@ -2,23 +2,44 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdlib>
+#include <new>
 #include <set>
 #include <stdexcept>
 #include <tuple>
 
+#include <sys/mman.h>
 #include <tbb/parallel_for.h>
 
 namespace tensorray {
 namespace {
 
-constexpr int cells = TensorField::brick_cells;
-constexpr int width = TensorField::brick_width;
-constexpr int voxel_floats = TensorField::voxel_floats;
+constexpr int cells = TensorBrick::cells;
+constexpr int width = TensorBrick::width;
 static_assert(cells == TensorBlock::size, "a brick holds a block and the near faces of its neighbours");
 
-constexpr int voxel_offset(int x, int y, int z) { return ((x * width + y) * width + z) * voxel_floats; }
+constexpr int trailing_offset = TensorBrick::voxels * TensorBrick::bending_floats;
+constexpr int used_floats = trailing_offset + TensorBrick::voxels;
+constexpr int brick_floats = (used_floats + 15) / 16 * 16;  // Bricks begin on cache lines.
 
-const std::array<float, TensorField::brick_floats> zero_brick{};
+struct alignas(64) ZeroBrick {
+  float floats[brick_floats] = {};
+};
+const ZeroBrick zero_brick;
+
+TensorBrick brick_at(const float* floats, float strongest) { return {floats, floats + trailing_offset, strongest}; }
+
+/// Memory for `count` floats, from large pages where the system has them: bricks are visited far apart.
+float* allocate(std::size_t count) {
+  constexpr std::size_t page = std::size_t{2} << 20;
+  const std::size_t bytes = (count * sizeof(float) + page - 1) / page * page;
+  auto* const floats = static_cast<float*>(std::aligned_alloc(page, bytes));
+  if (!floats) throw std::bad_alloc();
+#ifdef MADV_HUGEPAGE
+  madvise(floats, bytes, MADV_HUGEPAGE);
+#endif
+  return floats;
+}
 
 struct CoordinateLess {
   bool operator()(const Eigen::Vector3i& a, const Eigen::Vector3i& b) const {
@@ -27,8 +48,9 @@ struct CoordinateLess {
 };
 
 /// The bricks that hold an active voxel of a block, as a cell's corner: its own, and where a voxel lies on a near face
-/// of the block the one before it, whose apron shares that voxel.
-void add_bricks_of(const TensorBlock& block, std::set<Eigen::Vector3i, CoordinateLess>& bricks) {
+/// of the block the one before it, whose apron shares that voxel. Only those whose cells are in the extent.
+void add_bricks_of(const TensorBlock& block, const Eigen::AlignedBox3i& extent,
+                   std::set<Eigen::Vector3i, CoordinateLess>& bricks) {
   std::bitset<8> touched;
   for (int offset = 0; offset < TensorBlock::voxels; ++offset) {
     if (!block.active[offset]) continue;
@@ -37,9 +59,25 @@ void add_bricks_of(const TensorBlock& block, std::set<Eigen::Vector3i, Coordinat
     for (int before = 0; before < 8; ++before)
       if ((before & faces) == before) touched.set(before);
   }
-  for (int before = 0; before < 8; ++before)
-    if (touched[before])
-      bricks.insert(block.origin / cells - Eigen::Vector3i(before & 1, before >> 1 & 1, before >> 2 & 1));
+  for (int before = 0; before < 8; ++before) {
+    const Eigen::Vector3i brick = block.origin / cells - Eigen::Vector3i(before & 1, before >> 1 & 1, before >> 2 & 1);
+    if (touched[before] && extent.contains(brick)) bricks.insert(brick);
+  }
+}
+
+/// The bricks of the cells between the voxels of a box (an axis of a single voxel has one cell).
+Eigen::AlignedBox3i bricks_of(const Eigen::AlignedBox3i& voxels) {
+  const auto brick_of = [](int cell) { return cell >> 3; };
+  const Eigen::Vector3i last = (voxels.max().array() - 1).matrix().cwiseMax(voxels.min());
+  return {voxels.min().unaryExpr(brick_of), last.unaryExpr(brick_of)};
+}
+
+void store(const Eigen::Matrix3f& T, int voxel, float* brick) {
+  Eigen::Map<Eigen::Matrix<float, 8, 1>> bending(brick + voxel * TensorBrick::bending_floats);
+  bending = Eigen::Map<const Eigen::Matrix<float, 8, 1>>(T.data());
+  bending[0] -= T(2, 2);
+  bending[4] -= T(2, 2);
+  brick[trailing_offset + voxel] = T(2, 2);
 }
 
 /// Copies the voxels that a block and a brick share.
@@ -49,8 +87,8 @@ void copy_shared_voxels(const TensorBlock& block, const Eigen::Vector3i& brick, 
   for (int x = 0; x < last.x(); ++x)
     for (int y = 0; y < last.y(); ++y)
       for (int z = 0; z < last.z(); ++z)
-        Eigen::Map<Eigen::Matrix3f>(floats + voxel_offset(x + shift.x(), y + shift.y(), z + shift.z())) =
-            block.values[TensorBlock::offset(x, y, z)];
+        store(block.values[TensorBlock::offset(x, y, z)],
+              TensorBrick::voxel(x + shift.x(), y + shift.y(), z + shift.z()), floats);
 }
 
 std::vector<std::pair<Eigen::Vector3i, const TensorBlock*>> sorted_blocks(const TensorGrid& grid) {
@@ -70,7 +108,25 @@ Eigen::AlignedBox3d extent_of(const Eigen::AlignedBox3i& active) {
   return extent;
 }
 
+/// The squared Frobenius norm of the deviator of T, from the eight floats of T − T₂₂ I.
+double squared_deviator(const float* bending) {
+  double squares = 0;
+  for (int i = 0; i < TensorBrick::bending_floats; ++i) squares += double{bending[i]} * bending[i];
+  const double trace = double{bending[0]} + bending[4];
+  return std::max(0.0, squares - trace * trace / 3);
+}
+
 }  // namespace
+
+Eigen::Matrix3d TensorBrick::tensor(int voxel) const {
+  Eigen::Matrix3d T;
+  Eigen::Map<Eigen::Matrix<double, 8, 1>>(T.data()) =
+      Eigen::Map<const Eigen::Matrix<float, 8, 1>>(bending + voxel * bending_floats).cast<double>();
+  T(2, 2) = trailing[voxel];
+  T(0, 0) += T(2, 2);
+  T(1, 1) += T(2, 2);
+  return T;
+}
 
 TensorField::TensorField(const TensorGrid& grid) : to_world_(grid.to_world), to_index_(grid.to_world.inverse()) {
   const Eigen::AlignedBox3i active = grid.active_box();
@@ -81,14 +137,16 @@ TensorField::TensorField(const TensorGrid& grid) : to_world_(grid.to_world), to_
   voxels_ = Eigen::AlignedBox3d(active.min().cast<double>(), active.max().cast<double>());
 
   std::set<Eigen::Vector3i, CoordinateLess> found;
-  for (const TensorBlock& block : grid.blocks) add_bricks_of(block, found);
+  const Eigen::AlignedBox3i extent = bricks_of(active);
+  for (const TensorBlock& block : grid.blocks) add_bricks_of(block, extent, found);
   const std::vector<Eigen::Vector3i> coordinates(found.begin(), found.end());
   make_table(coordinates);
 
   const auto blocks = sorted_blocks(grid);
-  bricks_.resize(coordinates.size() * brick_floats);
+  floats_.reset(allocate(coordinates.size() * brick_floats));
   tbb::parallel_for(std::size_t{0}, coordinates.size(), [&](std::size_t i) {
-    float* floats = bricks_.data() + i * brick_floats;
+    float* floats = floats_.get() + i * brick_floats;
+    std::fill_n(floats, brick_floats, 0.0f);
     for (int corner = 0; corner < 8; ++corner) {
       const Eigen::Vector3i origin =
           cells * (coordinates[i] + Eigen::Vector3i(corner & 1, corner >> 1 & 1, corner >> 2 & 1));
@@ -97,15 +155,19 @@ TensorField::TensorField(const TensorGrid& grid) : to_world_(grid.to_world), to_
       if (block != blocks.end() && block->first == origin) copy_shared_voxels(*block->second, coordinates[i], floats);
     }
   });
+  strongest_.resize(coordinates.size());
+  update_strongest();
 }
+
+void TensorField::Release::operator()(float* floats) const { std::free(floats); }
 
 void TensorField::make_table(const std::vector<Eigen::Vector3i>& bricks) {
   std::size_t size = 16;
   while (size < 2 * bricks.size()) size *= 2;
-  slots_.assign(size, Slot{Eigen::Vector3i::Zero(), empty_slot});
+  slots_.assign(size, Slot{Eigen::Vector3i::Zero(), missing});
   for (std::size_t i = 0; i < bricks.size(); ++i) {
     std::size_t slot = home_slot(bricks[i]);
-    while (slots_[slot].index != empty_slot) slot = (slot + 1) & (size - 1);
+    while (slots_[slot].index != missing) slot = (slot + 1) & (size - 1);
     slots_[slot] = {bricks[i], static_cast<std::uint32_t>(i)};
   }
 }
@@ -118,11 +180,15 @@ std::size_t TensorField::home_slot(const Eigen::Vector3i& brick) const {
   return static_cast<std::size_t>(hash) & (slots_.size() - 1);
 }
 
-const float* TensorField::brick(const Eigen::Vector3i& brick) const {
-  for (std::size_t slot = home_slot(brick);; slot = (slot + 1) & (slots_.size() - 1)) {
-    if (slots_[slot].index == empty_slot) return zero_brick.data();
-    if (slots_[slot].brick == brick) return bricks_.data() + std::size_t{slots_[slot].index} * brick_floats;
-  }
+std::uint32_t TensorField::find(const Eigen::Vector3i& brick) const {
+  for (std::size_t slot = home_slot(brick);; slot = (slot + 1) & (slots_.size() - 1))
+    if (slots_[slot].index == missing || slots_[slot].brick == brick) return slots_[slot].index;
+}
+
+TensorBrick TensorField::brick(const Eigen::Vector3i& brick) const {
+  const std::uint32_t index = find(brick);
+  if (index == missing) return brick_at(zero_brick.floats, 0);
+  return brick_at(floats_.get() + std::size_t{index} * brick_floats, strongest_[index]);
 }
 
 std::vector<Eigen::Vector3d> TensorField::corners() const {
@@ -132,112 +198,36 @@ std::vector<Eigen::Vector3d> TensorField::corners() const {
   return corners;
 }
 
+void TensorField::update_strongest() {
+  tbb::parallel_for(std::size_t{0}, brick_count(), [&](std::size_t i) {
+    const TensorBrick brick = brick_at(floats_.get() + i * brick_floats, 0);
+    double greatest = 0;
+    for (int voxel = 0; voxel < TensorBrick::voxels; ++voxel)
+      greatest = std::max(greatest, squared_deviator(brick.bending + voxel * TensorBrick::bending_floats));
+    // Rounded up: interpolation between voxels may round to a little more than any of them.
+    strongest_[i] = static_cast<float>(std::sqrt(greatest) * (1 + 1e-5));
+  });
+}
+
 double TensorField::greatest_norm() const {
   double greatest = 0;
-  for (std::size_t i = 0; i < bricks_.size(); i += voxel_floats)
-    greatest = std::max(greatest, Eigen::Map<const Eigen::Matrix3f>(&bricks_[i]).cast<double>().squaredNorm());
+  for (std::size_t i = 0; i < brick_count(); ++i) {
+    const TensorBrick brick = brick_at(floats_.get() + i * brick_floats, 0);
+    for (int voxel = 0; voxel < TensorBrick::voxels; ++voxel)
+      greatest = std::max(greatest, brick.tensor(voxel).squaredNorm());
+  }
   return std::sqrt(greatest);
 }
 
 TensorField TensorField::scaled(double factor) && {
-  for (float& value : bricks_) value = static_cast<float>(value * factor);
+  tbb::parallel_for(std::size_t{0}, brick_count() * brick_floats,
+                    [&](std::size_t i) { floats_[i] = static_cast<float>(floats_[i] * factor); });
+  update_strongest();
   return std::move(*this);
 }
 
-std::size_t TensorField::memory_bytes() const { return bricks_.size() * sizeof(float) + slots_.size() * sizeof(Slot); }
-
-const float* TensorSampler::locate(const Eigen::Vector3d& world, Eigen::Vector3d& fraction) {
-  const Eigen::AlignedBox3d& voxels = field_->voxels();
-  Eigen::Vector3d index = field_->to_index() * world;
-  for (int axis = 0; axis < 3; ++axis)  // In this order NaN goes to the first voxel.
-    index[axis] = std::min(std::max(voxels.min()[axis], index[axis]), voxels.max()[axis]);
-  Eigen::Vector3i cell = index.array().floor().cast<int>();
-  fraction = index - cell.cast<double>();
-  const Eigen::Vector3i brick(cell.x() >> 3, cell.y() >> 3, cell.z() >> 3);
-  if (floats_ == nullptr || brick != brick_) {
-    brick_ = brick;
-    floats_ = field_->brick(brick);
-  }
-  cell -= cells * brick;
-  return floats_ + voxel_offset(cell.x(), cell.y(), cell.z());
-}
-
-namespace {
-
-constexpr int step_x = voxel_offset(1, 0, 0), step_y = voxel_offset(0, 1, 0), step_z = voxel_offset(0, 0, 1);
-
-/// Eight components fill vector registers, the ninth goes alone.
-using Eight = Eigen::Array<double, 8, 1>;
-
-Eight first_eight(const float* voxel) { return Eigen::Map<const Eigen::Array<float, 8, 1>>(voxel).cast<double>(); }
-double ninth(const float* voxel) { return voxel[8]; }
-
-Eigen::Matrix3d to_matrix(const Eight& eight, double last) {
-  Eigen::Matrix3d result;
-  Eigen::Map<Eight>(result.data()) = eight;
-  result(2, 2) = last;
-  return result;
-}
-
-/// A value, and its slopes along the axes of index space.
-template <class Value>
-struct Slopes {
-  Value value, x, y, z;
-};
-
-/// Trilinear interpolation in a cell: along z, then y, then x. `load` gives the components of a voxel.
-template <class Value, class Load>
-Slopes<Value> interpolate(const float* voxel, const Eigen::Vector3d& f, Load load) {
-  Value value[2], slope_y[2], slope_z[2];
-  for (int x = 0; x < 2; ++x) {
-    const float* const face = voxel + x * step_x;
-    const Value near = load(face), far = load(face + step_y);
-    const Value near_z = load(face + step_z) - near, far_z = load(face + step_y + step_z) - far;
-    const Value near_value = near + f.z() * near_z;
-    slope_y[x] = far + f.z() * far_z - near_value;
-    slope_z[x] = near_z + f.y() * (far_z - near_z);
-    value[x] = near_value + f.y() * slope_y[x];
-  }
-  const Value slope_x = value[1] - value[0];
-  return {value[0] + f.x() * slope_x, slope_x, slope_y[0] + f.x() * (slope_y[1] - slope_y[0]),
-          slope_z[0] + f.x() * (slope_z[1] - slope_z[0])};
-}
-
-}  // namespace
-
-Eigen::Matrix3d TensorSampler::at(const Eigen::Vector3d& world) {
-  ++samples_;
-  Eigen::Vector3d f;
-  const float* voxel = locate(world, f);
-  const double wx[2] = {1 - f.x(), f.x()}, wy[2] = {1 - f.y(), f.y()}, wz[2] = {1 - f.z(), f.z()};
-  Eight eight = Eight::Zero();
-  double last = 0;
-  for (int corner = 0; corner < 8; ++corner) {
-    const int x = corner >> 2, y = corner >> 1 & 1, z = corner & 1;
-    const float* value = voxel + x * step_x + y * step_y + z * step_z;
-    const double weight = wx[x] * wy[y] * wz[z];
-    eight += weight * first_eight(value);
-    last += weight * ninth(value);
-  }
-  return to_matrix(eight, last);
-}
-
-Eigen::Matrix3d TensorSampler::at(const Eigen::Vector3d& world, const Eigen::Matrix<double, 3, 2>& along,
-                                  std::array<Eigen::Matrix3d, 2>& derivatives) {
-  ++samples_;
-  Eigen::Vector3d f;
-  const float* voxel = locate(world, f);
-  const Slopes<Eight> eight = interpolate<Eight>(voxel, f, first_eight);
-  const Slopes<double> last = interpolate<double>(voxel, f, ninth);
-  Eigen::Matrix<double, 3, 2> by_index = field_->to_index().linear() * along;
-  // An axis of a single voxel has the same tensor across it.
-  for (int axis = 0; axis < 3; ++axis)
-    if (field_->voxels().sizes()[axis] == 0) by_index.row(axis).setZero();
-  for (int i = 0; i < 2; ++i) {
-    const double x = by_index(0, i), y = by_index(1, i), z = by_index(2, i);
-    derivatives[i] = to_matrix(x * eight.x + y * eight.y + z * eight.z, x * last.x + y * last.y + z * last.z);
-  }
-  return to_matrix(eight.value, last.value);
+std::size_t TensorField::memory_bytes() const {
+  return brick_count() * (brick_floats + 1) * sizeof(float) + slots_.size() * sizeof(Slot);
 }
 
 }  // namespace tensorray

@@ -2,9 +2,9 @@
 /// @file volumes/tensor_field.h
 /// A tensor field that light can be traced through: immutable bricks in memory, sampled trilinearly.
 
-#include <array>
 #include <cstddef>
 #include <cstdint>
+#include <memory>
 #include <vector>
 
 #include <Eigen/Geometry>
@@ -13,16 +13,31 @@
 
 namespace tensorray {
 
-/// Bricks of 8³ cells with the far apron that interpolation needs (9³ voxels), nine floats a voxel, contiguous.
-/// Bricks without an active voxel are not stored: memory grows with the active voxels, not with the extent.
-/// Immutable; any number of threads may read it at once, each through its own TensorSampler.
+/// 8³ cells with the far apron that interpolation needs: 9³ voxels. Bricks without an active voxel are all one brick of
+/// zeros.
+///
+/// A tensor T is kept in two parts. What bends light is T − T₂₂ I, as a multiple of the identity bends nothing (Zheng
+/// and Pang 2003, Eq. 5): its last component is zero, so that eight floats, one or two vector registers, are all that a
+/// tracer reads. T₂₂ lies apart.
+struct TensorBrick {
+  static constexpr int cells = 8;
+  static constexpr int width = cells + 1;  ///< Voxels along an edge, with the apron.
+  static constexpr int voxels = width * width * width;
+  static constexpr int bending_floats = 8;
+
+  static constexpr int voxel(int x, int y, int z) { return (x * width + y) * width + z; }
+
+  const float* bending;   ///< Eight a voxel: T − T₂₂ I column by column, aligned to 32 bytes.
+  const float* trailing;  ///< One a voxel: T₂₂.
+  float strongest;  ///< No tensor within the brick has a deviator, T − ⅓ tr(T) I, of a greater Frobenius norm.
+
+  Eigen::Matrix3d tensor(int voxel) const;  ///< T.
+};
+
+/// Bricks in memory, which grows with the active voxels and not with the extent. Immutable; any number of threads may
+/// read it at once.
 class TensorField {
  public:
-  static constexpr int brick_cells = 8;
-  static constexpr int brick_width = brick_cells + 1;  ///< Voxels along an edge, with the apron.
-  static constexpr int voxel_floats = 9;               ///< Column by column, as Eigen stores them.
-  static constexpr int brick_floats = brick_width * brick_width * brick_width * voxel_floats;
-
   /// @throw std::invalid_argument if the grid has no active voxel or its transform cannot be inverted.
   explicit TensorField(const TensorGrid& grid);
 
@@ -48,52 +63,36 @@ class TensorField {
   /// This field with every tensor multiplied by `factor`, in place.
   TensorField scaled(double factor) &&;
 
-  std::size_t brick_count() const { return bricks_.size() / brick_floats; }
+  std::size_t brick_count() const { return strongest_.size(); }
   std::size_t memory_bytes() const;
 
-  /// The floats of the brick that holds the cells from `brick` * 8 on, or the shared zero brick. Never null.
-  /// Voxel (x, y, z), 0 to 8, starts at ((x * 9 + y) * 9 + z) * 9.
-  const float* brick(const Eigen::Vector3i& brick) const;
+  /// The brick that holds the cells from `brick` * 8 on. Those within the extent that hold no active voxel, and all
+  /// others, are the brick of zeros.
+  TensorBrick brick(const Eigen::Vector3i& brick) const;
+
+  /// Whether the brick is in memory: if not, `brick` gives zeros.
+  bool is_stored(const Eigen::Vector3i& brick) const { return find(brick) != missing; }
 
  private:
   struct Slot {
     Eigen::Vector3i brick;
-    std::uint32_t index;  ///< In units of brick_floats; `empty_slot` if the slot is free.
+    std::uint32_t index;  ///< `missing` if the slot is free.
   };
-  static constexpr std::uint32_t empty_slot = 0xffffffffu;
+  struct Release {
+    void operator()(float* floats) const;
+  };
+  static constexpr std::uint32_t missing = 0xffffffffu;
 
   void make_table(const std::vector<Eigen::Vector3i>& bricks);
   std::size_t home_slot(const Eigen::Vector3i& brick) const;
+  std::uint32_t find(const Eigen::Vector3i& brick) const;
+  void update_strongest();
 
   Eigen::Affine3d to_world_, to_index_;
   Eigen::AlignedBox3d index_bounds_, voxels_;
-  std::vector<float> bricks_;
-  std::vector<Slot> slots_;  ///< Open-addressing hash table of the bricks; its size is a power of two.
-};
-
-/// Samples a field, which must outlive it. Cheap to make; one belongs to one thread (it remembers the last brick).
-/// Points outside the extent are taken to the nearest point on it: the tracer knows what is inside.
-class TensorSampler {
- public:
-  explicit TensorSampler(const TensorField& field) : field_(&field) {}
-
-  /// Trilinear interpolation at a world position, in world axes; inactive voxels count as zero.
-  Eigen::Matrix3d at(const Eigen::Vector3d& world);
-
-  /// The same, with the derivatives of the interpolation along two world vectors, the columns of `along`; at a cell's
-  /// face those of one side.
-  Eigen::Matrix3d at(const Eigen::Vector3d& world, const Eigen::Matrix<double, 3, 2>& along,
-                     std::array<Eigen::Matrix3d, 2>& derivatives);
-
-  std::uint64_t samples() const { return samples_; }  ///< Calls of `at` so far.
-
- private:
-  const float* locate(const Eigen::Vector3d& world, Eigen::Vector3d& fraction);
-
-  const TensorField* field_;
-  Eigen::Vector3i brick_ = Eigen::Vector3i::Constant(INT32_MIN);
-  const float* floats_ = nullptr;
-  std::uint64_t samples_ = 0;
+  std::unique_ptr<float[], Release> floats_;  ///< Brick after brick.
+  std::vector<float> strongest_;              ///< Of each brick.
+  std::vector<Slot> slots_;                   ///< Open-addressing hash table of the bricks; its size is a power of two.
 };
 
 }  // namespace tensorray

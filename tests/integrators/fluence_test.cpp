@@ -162,9 +162,9 @@ TEST(Fluence, CountsLightThatIsStraightBesideACutAndMissesThePlate) {
 }
 
 TEST(Fluence, ASingleLayerOfVoxelsIsCrossedWhole) {
-  const TensorField layer(dense_grid({Vector3i(0, 0, 3), Vector3i(8, 8, 3)}, Affine3d::Identity(),
-                                     [](const Vector3i&) { return Matrix3d::Zero(); }));
-  const Bench bench = make_bench(layer, {0, 0, -1});
+  TensorField layer(dense_grid({Vector3i(0, 0, 3), Vector3i(8, 8, 3)}, Affine3d::Identity(),
+                               [](const Vector3i&) { return Matrix3d::Zero(); }));
+  const Bench bench = make_bench(std::move(layer), {0, 0, -1});
   int voxels = 0;
   for_each(distribute(bench, FluenceKind::all_light, 64 * 64, BeamPattern::grid).fluence[0],
            [&](const Vector3i&, float value) {

@@ -15,6 +15,7 @@
 #include "integrators/paths.h"
 #include "tests/integrators/support.h"
 #include "tests/renderer/support.h"
+#include "volumes/tensor_sampler.h"
 
 namespace tensorray {
 namespace {

@@ -6,6 +6,8 @@
 
 #include <gtest/gtest.h>
 
+#include "volumes/tensor_sampler.h"
+
 namespace tensorray {
 namespace {
 

@@ -57,8 +57,7 @@ void run(int argc, char** argv) {
       ->type_name("PART");
   app.add_flag("--quick", line.options.quick, "Tiny sizes, seconds: shows that all of it works, measures nothing");
   app.add_flag("--million", line.options.million,
-               "With the jobs, also a million positions of 32 wavelengths on a plate of 1024², and the same scene "
-               "with OpenVDB's sampler");
+               "With the jobs, also a million positions of 32 wavelengths on a plate of 1024²");
   try {
     app.parse(argc, argv);
   } catch (const CLI::Success& request) {  // --help

@@ -1,5 +1,7 @@
 #include <algorithm>
+#include <stdexcept>
 
+#include "integrators/packet_kernel.h"
 #include "tools/benchmark/kernels.h"
 #include "tools/benchmark/parts.h"
 #include "tools/benchmark/repeat.h"
@@ -8,11 +10,8 @@
 namespace tensorray::benchmark {
 namespace {
 
-/// Of this program's kernel, for a vector of samples and their steps.
-constexpr double operations_per_sample_vector = 107;
-
 /// That a packet of rays reads of a cell that was not in the cache: the four voxels that its neighbour does not have.
-constexpr double bytes_per_cold_cell = 4 * 36;
+constexpr double bytes_per_cold_cell = 4 * TensorBrick::bending_floats * sizeof(float);
 
 struct Measurement {
   std::string name;
@@ -50,7 +49,7 @@ double greatest_difference(const TestField& test, Order order, const TraceFuncti
   kernel(rays);
   BendingSettings settings;
   settings.step = step;
-  trace(test.field, test.geometry, settings, expected);
+  trace_reference(test.field, test.geometry, settings, expected);
   double greatest = 0;
   for (std::size_t i = 0; i < rays.size(); ++i)
     greatest = std::max(greatest, (rays.position[i] - expected.position[i]).norm() / test.voxel());
@@ -83,13 +82,13 @@ KernelRate measure_kernel(const TestField& test, Order order, const TraceFunctio
   return {rate, static_cast<double>(samples) / static_cast<double>(rays)};
 }
 
-/// Of what the widest vectors, or those of `lanes`, could issue.
-double issue_fraction(double samples_per_second, int lanes, const Json& machine) {
+/// Of the rate at which vectors of those instructions could be issued.
+double issue_fraction(double samples_per_second, const std::string& instructions, const Json& machine) {
   for (const Json& rate : machine.at("vectors"))
-    if (rate.at("lanes") == lanes)
-      return samples_per_second * operations_per_sample_vector / lanes /
+    if (rate.at("instructions") == instructions)
+      return samples_per_second * packets::operations_per_step / rate.at("lanes").get<double>() /
              rate.at("multiply_adds_per_second").get<double>();
-  return 0;
+  throw std::logic_error("no rate was measured of " + instructions);
 }
 
 double bandwidth_fraction(double samples_per_second, const Json& machine) {
@@ -108,7 +107,8 @@ Json describe_kernel(const TestField& test, Order order, const Kernel& kernel, c
   row["rays_per_second"] = rate.samples.median / rate.samples_per_ray;
   row["samples_per_ray"] = rate.samples_per_ray;
   row["greatest_difference_in_voxels"] = greatest_difference(test, order, function);
-  if (kernel.lanes > 0) row["issue_fraction"] = issue_fraction(rate.samples.median, kernel.lanes, machine);
+  if (!kernel.instructions.empty())
+    row["issue_fraction"] = issue_fraction(rate.samples.median, kernel.instructions, machine);
   if (order == Order::fresh) row["bandwidth_fraction"] = bandwidth_fraction(rate.samples.median, machine);
   return row;
 }
@@ -141,6 +141,7 @@ Json measure_kernels(const Options& options, const Json& machine) {
       if (!kernel.missing.empty()) result["not_measured"][kernel.name] = kernel.missing;
       if (!kernel.missing.empty() || (kernel.slow && !first)) continue;
       const TraceFunction function = kernel.make(test);
+      packets::use_instruction_set(kernel.instructions);
       for (std::size_t i = 0; i < rows.size(); ++i) {
         options.announce(field.measurements[i].name + ": " + kernel.name);
         rows[i].push_back(describe_kernel(test, field.measurements[i].order, kernel, function, seconds, machine));
@@ -152,6 +153,7 @@ Json measure_kernels(const Options& options, const Json& machine) {
     }
     first = false;
   }
+  packets::use_instruction_set("");
   return result;
 }
 

@@ -104,7 +104,7 @@ std::string jobs_text(const Json& jobs) {
   heading.insert(heading.end(), phases.begin(), phases.end());
   heading.push_back("speed-up");
   std::vector<Row> rows{heading};
-  for (const Json& job : jobs) {
+  for (const Json& job : jobs.at("renders")) {
     Row row{job.at("name"), fmt::format("{}³", job.at("resolution").get<int>())};
     if (job.contains("skipped")) {
       row.push_back(job.at("skipped"));
@@ -117,7 +117,13 @@ std::string jobs_text(const Json& jobs) {
     }
     rows.push_back(row);
   }
-  return table(rows);
+  const Json& against = jobs.at("box_sampler");
+  return table(rows) + fmt::format(
+                           "a position of 32 wavelengths in {0}³ is traced {1:.1f} times faster than with OpenVDB's "
+                           "BoxSampler in the same program ({2} threads, {3} and {4} positions)\n",
+                           against.at("resolution").get<int>(), number(against, "ratio"),
+                           against.at("threads").get<int>(), against.at("positions")[1].get<std::uint64_t>(),
+                           against.at("positions")[0].get<std::uint64_t>());
 }
 
 }  // namespace

@@ -1,3 +1,4 @@
+#include "integrators/packet_kernel.h"
 #include "tools/benchmark/kernels.h"
 
 namespace tensorray::benchmark {
@@ -10,6 +11,10 @@ BendingSettings settings() {
 }
 
 TraceFunction reference_tracer(const TestField& test) {
+  return [&test](RayBatch& batch) { trace_reference(test.field, test.geometry, settings(), batch); };
+}
+
+TraceFunction packet_tracer(const TestField& test) {
   return [&test](RayBatch& batch) { trace(test.field, test.geometry, settings(), batch); };
 }
 
@@ -17,9 +22,17 @@ TraceFunction reference_tracer(const TestField& test) {
 
 std::vector<Kernel> tensorray_kernels() {
   Kernel reference;
-  reference.name = "tensorray, scalar reference, double";
+  reference.name = "tensorray, scalar reference";
   reference.make = reference_tracer;
-  return {reference};
+  std::vector<Kernel> kernels{reference};
+  for (const std::string& instructions : packets::instruction_sets()) {
+    Kernel kernel;
+    kernel.name = "tensorray, packets, " + instructions;
+    kernel.instructions = instructions;
+    kernel.make = packet_tracer;
+    kernels.push_back(kernel);
+  }
+  return kernels;
 }
 
 }  // namespace tensorray::benchmark
