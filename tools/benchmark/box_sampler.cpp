@@ -78,23 +78,22 @@ struct View {
                                                              rows[2]->getConstAccessor()};
 };
 
-View& view_of(const TensorField& field) {
-  thread_local std::optional<View> view;
+thread_local std::optional<View> view;  // Of the field that this thread's sampler is of.
+
+void look_at(const TensorField& field) {
   if (!view || !(view->key == key_of(field))) view.emplace(field);
-  return *view;
 }
 
 }  // namespace
 
 Eigen::Matrix3d TensorSampler::at(const Eigen::Vector3d& world) {
-  ++samples_;
+  if (samples_++ == 0) look_at(*field_);  // A thread uses one sampler after another.
   const Eigen::AlignedBox3d& voxels = field_->voxels();
   const Eigen::Vector3d index = (field_->to_index() * world).cwiseMax(voxels.min()).cwiseMin(voxels.max());
-  View& view = view_of(*field_);
   Eigen::Matrix3d T;
   for (int row = 0; row < 3; ++row) {
     const openvdb::Vec3s value =
-        openvdb::tools::BoxSampler::sample(view.accessors[row], openvdb::Vec3R(index.x(), index.y(), index.z()));
+        openvdb::tools::BoxSampler::sample(view->accessors[row], openvdb::Vec3R(index.x(), index.y(), index.z()));
     T.row(row) << value[0], value[1], value[2];
   }
   return T;
