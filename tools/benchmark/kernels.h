@@ -19,7 +19,7 @@ struct Kernel {
   std::string name;
   /// Makes what the kernel samples of the field, which must outlive the function.
   std::function<TraceFunction(const TestField&)> make;
-  int lanes = 0;                 ///< Of the vectors of this program's kernel; 0 for the others.
+  std::string instructions;      ///< Of this program's packet kernel; empty for the others.
   std::string missing;           ///< Why it cannot be measured here; empty if it can.
   bool follows_the_rule = true;  ///< Whether its rays are those of Eq. 5, with the same ends.
   bool slow = false;             ///< Measured on one field only.
