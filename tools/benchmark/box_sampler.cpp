@@ -68,14 +68,14 @@ Rows shared_rows(const TensorField& field, const FieldKey& key) {
   return rows;
 }
 
-/// A thread's accessors.
+/// A thread's accessors; unregistered ones, as threads end after the grids do.
 struct View {
   explicit View(const TensorField& field) : key(key_of(field)), rows(shared_rows(field, key)) {}
 
   FieldKey key;
   Rows rows;
-  std::array<openvdb::Vec3SGrid::ConstAccessor, 3> accessors{rows[0]->getConstAccessor(), rows[1]->getConstAccessor(),
-                                                             rows[2]->getConstAccessor()};
+  std::array<openvdb::Vec3SGrid::ConstUnsafeAccessor, 3> accessors{
+      rows[0]->getConstUnsafeAccessor(), rows[1]->getConstUnsafeAccessor(), rows[2]->getConstUnsafeAccessor()};
 };
 
 thread_local std::optional<View> view;  // Of the field that this thread's sampler is of.

@@ -132,12 +132,13 @@ Json measure_kernels(const Options& options, const Json& machine) {
   const double seconds = options.quick ? 0.001 : 0.25;
   Json result = {{"step_in_voxels", step}, {"rays_per_packet", packet_rays}, {"not_measured", Json::object()}};
   Json& measured = result["measurements"] = Json::array();
+  const std::vector<Kernel> kernels = all_kernels();
   bool first = true;
   for (const MeasuredField& field : fields_to_measure(options.quick)) {
     options.announce(field.measurements[0].name + ": making the field");
     const TestField test = make_field(field.request);
     std::vector<Json> rows(field.measurements.size(), Json::array());
-    for (const Kernel& kernel : all_kernels()) {
+    for (const Kernel& kernel : kernels) {
       if (!kernel.missing.empty()) result["not_measured"][kernel.name] = kernel.missing;
       if (!kernel.missing.empty() || (kernel.slow && !first)) continue;
       const TraceFunction function = kernel.make(test);
