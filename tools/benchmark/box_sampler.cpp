@@ -59,7 +59,7 @@ FieldKey key_of(const TensorField& field) {
 Rows shared_rows(const TensorField& field, const FieldKey& key) {
   static std::mutex mutex;
   static FieldKey made;
-  static Rows rows;
+  static Rows& rows = *new Rows;  // Never destroyed: OpenVDB does that with threads, which have ended by then.
   const std::lock_guard<std::mutex> lock(mutex);
   if (!(made == key)) {
     rows = benchmark::make_openvdb_rows(grid_of(field));
