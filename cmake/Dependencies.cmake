@@ -25,7 +25,10 @@ pkg_check_modules(OpenColorIO REQUIRED IMPORTED_TARGET OpenColorIO>=2.1)
 pkg_check_modules(Highway REQUIRED IMPORTED_TARGET libhwy>=1.0)
 
 find_package(VTK REQUIRED COMPONENTS CommonCore CommonDataModel CommonExecutionModel FiltersCore FiltersGeneral
-             IOCore IOExodus IOGeometry IOLegacy IOParallelXML IOXML)
+             IOCore IOExodus IOGeometry IOLegacy IOParallelXML IOXML
+             OPTIONAL_COMPONENTS FiltersFlowPaths)
+
+find_path(NanoVDB_INCLUDE_DIR nanovdb/NanoVDB.h)
 
 # Neither of these two comes with a CMake package that Debian's other packages leave usable.
 find_path(Teem_INCLUDE_DIR teem/nrrd.h REQUIRED)

@@ -1,0 +1,72 @@
+// `tensorray_bench` in its quick form: that it measures the same rays with every kernel, and fails as programs do.
+
+#include <set>
+#include <string>
+
+#include "tests/program/support.h"
+
+namespace tensorray::test {
+namespace {
+
+/// As Program, with the benchmark in the program's place.
+class Benchmark : public Program {
+ protected:
+  Outcome measure(const std::string& options) const {
+    const std::string benchmark = std::filesystem::path(TENSORRAY_BINARY).replace_filename("tensorray_bench").string();
+    const std::string files = " > '" + in_folder("out").string() + "' 2> '" + in_folder("error").string() + "'";
+    const int status = std::system(("'" + benchmark + "' " + options + files).c_str());
+    return {WIFEXITED(status) ? WEXITSTATUS(status) : -1, read_file(in_folder("out")), read_file(in_folder("error"))};
+  }
+};
+
+TEST_F(Benchmark, EveryKernelFollowsTheSameRays) {
+  const Outcome outcome = measure("--quick --json --only kernels");
+  ASSERT_EQ(outcome.status, 0) << outcome.error;
+  const auto results = nlohmann::json::parse(outcome.out);
+  std::set<std::string> names;
+  for (const auto& measurement : results.at("kernels").at("measurements")) {
+    const std::string name = measurement.at("name");
+    names.insert(name.substr(0, name.rfind(' ')));
+    EXPECT_EQ(measurement.at("kernels")[0].at("ratio"), 1) << name;
+    EXPECT_GE(measurement.at("kernels").size(), 4u) << name;
+    for (const auto& row : measurement.at("kernels")) {
+      EXPECT_GT(row.at("samples_per_second"), 0) << name << row;
+      // The step's own error: the plain kernels stop at the exponential's second order, and a strong vortex multiplies
+      // what is left of that.
+      if (row.contains("greatest_difference_in_voxels") && name.rfind("diverging", 0) != 0) {
+        EXPECT_LT(row.at("greatest_difference_in_voxels"), 0.01) << name << row;
+      }
+    }
+  }
+  EXPECT_EQ(names, (std::set<std::string>{"coherent", "cold cells", "half empty", "diverging", "as rendered"}));
+}
+
+TEST_F(Benchmark, WholeJobsSayWhatTheyTookByPhase) {
+  const Outcome outcome = measure("--quick --json --only jobs");
+  ASSERT_EQ(outcome.status, 0) << outcome.error;
+  const auto jobs = nlohmann::json::parse(outcome.out).at("jobs");
+  ASSERT_GE(jobs.at("renders").size(), 3u);
+  for (const auto& job : jobs.at("renders")) {
+    EXPECT_GT(job.at("rays"), 0) << job;
+    EXPECT_GT(job.at("seconds").at("total"), 0) << job;
+  }
+  // The same photons, whoever samples the field.
+  const auto& positions = jobs.at("box_sampler").at("positions");
+  EXPECT_EQ(positions[0], positions[1]);
+}
+
+TEST_F(Benchmark, TablesNameEveryPart) {
+  const Outcome outcome = measure("--quick --only loading");
+  ASSERT_EQ(outcome.status, 0) << outcome.error;
+  EXPECT_NE(outcome.out.find("GB/s"), std::string::npos) << outcome.out;
+  EXPECT_NE(outcome.out.find("from file to bricks"), std::string::npos) << outcome.out;
+}
+
+TEST_F(Benchmark, UnknownPartsAreRefusedInALine) {
+  const Outcome outcome = measure("--only nothing");
+  EXPECT_EQ(outcome.status, 2);
+  EXPECT_EQ(std::count(outcome.error.begin(), outcome.error.end(), '\n'), 1) << outcome.error;
+}
+
+}  // namespace
+}  // namespace tensorray::test

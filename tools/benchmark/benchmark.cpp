@@ -1,0 +1,77 @@
+/// @file tools/benchmark/benchmark.cpp
+/// `tensorray_bench`: measures, prints.
+
+#include <cstdio>
+#include <map>
+#include <set>
+#include <string>
+
+#include <CLI/CLI.hpp>
+#include <fmt/format.h>
+#include <unistd.h>
+
+#include "tools/benchmark/parts.h"
+#include "tools/benchmark/tables.h"
+#include "tools/run_and_report.h"
+
+namespace tensorray::benchmark {
+namespace {
+
+constexpr const char* description =
+    "Measures how fast this machine bends light through tensor fields.\n\n"
+    "  machine  the processor, its vectors and its memory: the bounds\n"
+    "  kernels  this program's kernels beside what one would use instead, on the same fields, rays and step\n"
+    "  loading  a file of 256³ voxels to bricks in memory\n"
+    "  jobs     whole renders, from scene file to picture, by phase, with one thread and with all\n\n"
+    "A sample is one look-up of a tensor, with the step that uses it. Numbers are medians of five repetitions; ratios "
+    "are to the first row. All of it takes less than ten minutes on two cores; let nothing else run meanwhile.";
+
+struct CommandLine {
+  Options options;
+  std::string only;
+  bool json = false;
+};
+
+/// On a terminal one line that is drawn over and over.
+void announce(const std::string& what) {
+  if (isatty(STDERR_FILENO) != 0) fmt::print(stderr, "\r\033[K{}", what.empty() ? "" : "measuring " + what + " ...");
+}
+
+Json measure(const CommandLine& line) {
+  const auto wanted = [&](const char* part) { return line.only.empty() || line.only == part; };
+  Json results = {{"version", TENSORRAY_VERSION}, {"quick", line.options.quick}};
+  results["machine"] = measure_machine(line.options);  // Its bounds are part of the others' tables.
+  if (wanted("kernels")) results["kernels"] = measure_kernels(line.options, results["machine"]);
+  if (wanted("loading")) results["loading"] = measure_loading(line.options, results["machine"]);
+  if (wanted("jobs")) results["jobs"] = measure_jobs(line.options);
+  return results;
+}
+
+void run(int argc, char** argv) {
+  CommandLine line;
+  line.options.announce = announce;
+  CLI::App app(description, "tensorray_bench");
+  app.add_flag("--json", line.json, "Print everything as JSON instead of tables");
+  app.add_option("--only", line.only, "Measure this part alone")
+      ->check(CLI::IsMember({"machine", "kernels", "loading", "jobs"}))
+      ->type_name("PART");
+  app.add_flag("--quick", line.options.quick, "Tiny sizes, seconds: shows that all of it works, measures nothing");
+  app.add_flag("--million", line.options.million,
+               "With the jobs, also a million positions of 32 wavelengths on a plate of 1024²");
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::Success& request) {  // --help
+    app.exit(request);
+    return;
+  }
+  const Json results = measure(line);
+  announce("");
+  fmt::print("{}", line.json ? results.dump(2) + "\n" : tables(results));
+}
+
+}  // namespace
+}  // namespace tensorray::benchmark
+
+int main(int argc, char** argv) {
+  return tensorray::run_and_report([&] { tensorray::benchmark::run(argc, argv); });
+}

@@ -1,0 +1,111 @@
+/// @file tools/benchmark/box_sampler.cpp
+/// TensorSampler on OpenVDB's BoxSampler, and no packets: linked before the libraries it makes of `tensorray` the
+/// program that one would write without bricks.
+
+#include <array>
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <stdexcept>
+
+#include <openvdb/tools/Interpolation.h>
+
+#include "integrators/packet_tracer.h"
+#include "tools/benchmark/openvdb_grids.h"
+#include "volumes/tensor_sampler.h"
+
+namespace tensorray {
+namespace {
+
+using Rows = std::array<openvdb::Vec3SGrid::Ptr, 3>;
+
+/// The bricks of the field as blocks.
+TensorGrid grid_of(const TensorField& field) {
+  TensorGrid grid;
+  grid.to_world = field.to_world();
+  const Eigen::Vector3i first = (field.voxels().min() / TensorBrick::cells).array().floor().cast<int>(),
+                        last = (field.voxels().max() / TensorBrick::cells).array().floor().cast<int>();
+  for (int x = first.x(); x <= last.x(); ++x)
+    for (int y = first.y(); y <= last.y(); ++y)
+      for (int z = first.z(); z <= last.z(); ++z) {
+        if (!field.is_stored({x, y, z})) continue;
+        const TensorBrick brick = field.brick({x, y, z});
+        TensorBlock& block = grid.blocks.emplace_back();
+        block.origin = TensorBlock::size * Eigen::Vector3i(x, y, z);
+        block.active.set();
+        for (int offset = 0; offset < TensorBlock::voxels; ++offset) {
+          const Eigen::Vector3i at = TensorBlock::position(offset);
+          block.values[offset] = brick.tensor(TensorBrick::voxel(at.x(), at.y(), at.z())).cast<float>();
+        }
+      }
+  return grid;
+}
+
+/// Tells fields apart, also one from itself scaled: by where its first brick is, and how strong.
+struct FieldKey {
+  const float* floats = nullptr;
+  float strongest = 0;
+
+  bool operator==(const FieldKey& other) const { return floats == other.floats && strongest == other.strongest; }
+};
+
+FieldKey key_of(const TensorField& field) {
+  const Eigen::Vector3i first = (field.voxels().min() / TensorBrick::cells).array().floor().cast<int>();
+  const TensorBrick brick = field.brick(first);
+  return {brick.bending, brick.strongest};
+}
+
+/// The grids of the field that was last asked for, which all threads share.
+Rows shared_rows(const TensorField& field, const FieldKey& key) {
+  static std::mutex mutex;
+  static FieldKey made;
+  static Rows& rows = *new Rows;  // Never destroyed: OpenVDB does that with threads, which have ended by then.
+  const std::lock_guard<std::mutex> lock(mutex);
+  if (!(made == key)) {
+    rows = benchmark::make_openvdb_rows(grid_of(field));
+    made = key;
+  }
+  return rows;
+}
+
+/// A thread's accessors; unregistered ones, as threads end after the grids do.
+struct View {
+  explicit View(const TensorField& field) : key(key_of(field)), rows(shared_rows(field, key)) {}
+
+  FieldKey key;
+  Rows rows;
+  std::array<openvdb::Vec3SGrid::ConstUnsafeAccessor, 3> accessors{
+      rows[0]->getConstUnsafeAccessor(), rows[1]->getConstUnsafeAccessor(), rows[2]->getConstUnsafeAccessor()};
+};
+
+thread_local std::optional<View> view;  // Of the field that this thread's sampler is of.
+
+void look_at(const TensorField& field) {
+  if (!view || !(view->key == key_of(field))) view.emplace(field);
+}
+
+}  // namespace
+
+Eigen::Matrix3d TensorSampler::at(const Eigen::Vector3d& world) {
+  if (samples_++ == 0) look_at(*field_);  // A thread uses one sampler after another.
+  const Eigen::AlignedBox3d& voxels = field_->voxels();
+  const Eigen::Vector3d index = (field_->to_index() * world).cwiseMax(voxels.min()).cwiseMin(voxels.max());
+  Eigen::Matrix3d T;
+  for (int row = 0; row < 3; ++row) {
+    const openvdb::Vec3s value =
+        openvdb::tools::BoxSampler::sample(view->accessors[row], openvdb::Vec3R(index.x(), index.y(), index.z()));
+    T.row(row) << value[0], value[1], value[2];
+  }
+  return T;
+}
+
+Eigen::Matrix3d TensorSampler::at(const Eigen::Vector3d&, const Eigen::Matrix<double, 3, 2>&,
+                                  std::array<Eigen::Matrix3d, 2>&) {
+  throw std::invalid_argument("OpenVDB's BoxSampler has no derivatives; use this program for photons");
+}
+
+double TensorSampler::way_through_straight_brick(const Eigen::Vector3d&, const Eigen::Vector3d&) const { return 0; }
+
+bool trace_in_packets(const TensorField&, const Geometry&, const BendingSettings&, RayBatch&) { return false; }
+
+}  // namespace tensorray

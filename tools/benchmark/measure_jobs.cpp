@@ -1,0 +1,142 @@
+#include <fstream>
+
+#include <fmt/format.h>
+#include <unistd.h>
+
+#include "tools/benchmark/child.h"
+#include "tools/benchmark/machine.h"
+#include "tools/benchmark/parts.h"
+#include "tools/benchmark/temporary_folder.h"
+
+namespace tensorray::benchmark {
+namespace {
+
+struct Job {
+  std::string name;
+  int resolution = 64;  ///< Of the field.
+  Json scene;           ///< Without the field.
+};
+
+/// @param side  Of the picture, pixels.
+Job photon_job(int resolution, std::uint64_t photons, int side) {
+  return {fmt::format("photon distribution, {} positions, {}²", photons, side),
+          resolution,
+          {{"light", {{"photons", photons}, {"wavelengths", {{"count", 32}}}}},
+           {"receiver", {{"resolution", {side, side}}}},
+           {"integrator", {{"type", "photon_distribution"}}}}};
+}
+
+Job lens_job(int resolution, int side) {
+  return {fmt::format("lens (gather), {}²", side),
+          resolution,
+          {{"light", {{"wavelengths", {{"count", 32}}}}},
+           {"receiver", {{"resolution", {side, side}}}},
+           {"integrator", {{"type", "lens"}, {"mode", "gather"}, {"image", "checkerboard"}}}}};
+}
+
+Job path_job(int resolution, int seeds, int side) {
+  return {fmt::format("path tracing, {} tubes, {}²", seeds, side),
+          resolution,
+          {{"integrator", {{"type", "path_tracing"}, {"seeds", {{"kind", "grid"}, {"count", seeds}}}, {"samples", 16}}},
+           {"camera", {{"resolution", {side, side}}}}}};
+}
+
+/// Fewer positions in larger fields, so that each takes about as many samples.
+std::vector<Job> jobs(bool quick) {
+  if (quick) return {photon_job(16, 200, 32), lens_job(16, 32), path_job(16, 9, 32)};
+  std::vector<Job> result;
+  for (const int resolution : {64, 128, 256, 512}) {
+    result.push_back(photon_job(resolution, resolution <= 128 ? 262144 : 33554432 / resolution, 1024));
+    result.push_back(lens_job(resolution, 512));
+    result.push_back(path_job(resolution, 1000, 256));
+  }
+  return result;
+}
+
+/// Runs the job. @return what it says of itself (`tensorray render --stats`).
+Json run_job(const TemporaryFolder& folder, const Job& job, int threads, const std::string& program = "tensorray",
+             const std::vector<std::string>& options = {}) {
+  Json scene = job.scene;
+  scene["field"] = {{"generate", {{"kind", "point_load"}, {"resolution", job.resolution}}}};
+  const auto scene_path = folder / "scene.json", statistics_path = folder / "statistics.json";
+  std::ofstream(scene_path) << scene;
+  std::vector<std::string> arguments{"render",    scene_path.string(),
+                                     "-o",        (folder / "picture.png").string(),
+                                     "-o",        (folder / "picture.exr").string(),
+                                     "--stats",   statistics_path.string(),
+                                     "--threads", std::to_string(threads),
+                                     "--quiet"};
+  arguments.insert(arguments.end(), options.begin(), options.end());
+  run_program(sibling(program), arguments);
+  std::ifstream file(statistics_path);
+  return Json::parse(file);
+}
+
+Json describe(const Job& job, int threads, const Json& statistics) {
+  return {{"name", job.name},
+          {"resolution", job.resolution},
+          {"threads", threads},
+          {"rays", statistics.at("photons").at("emitted")},
+          {"tensor_samples", statistics.at("tensor_samples")},
+          {"seconds", statistics.at("seconds")},
+          {"peak_memory_bytes", statistics.at("peak_memory_bytes")}};
+}
+
+/// What a job takes at its peak, roughly: the field as a grid and as bricks.
+bool fits_in_memory(const Job& job) {
+  constexpr double bytes_per_voxel = 110;
+  const double needed = bytes_per_voxel * job.resolution * job.resolution * job.resolution;
+  const double there = static_cast<double>(sysconf(_SC_AVPHYS_PAGES)) * static_cast<double>(sysconf(_SC_PAGESIZE));
+  return needed < there;
+}
+
+/// With one thread and with all.
+void add_job(const Options& options, const TemporaryFolder& folder, const Job& job, Json& results) {
+  if (!fits_in_memory(job)) {
+    results.push_back({{"name", job.name}, {"resolution", job.resolution}, {"skipped", "not enough memory"}});
+    return;
+  }
+  double alone = 0;
+  for (const int threads : {1, processor().threads}) {
+    options.announce(fmt::format("jobs: {}, {}³, threads: {}", job.name, job.resolution, threads));
+    Json result = describe(job, threads, run_job(folder, job, threads));
+    const double seconds = result.at("seconds").at("total");
+    if (threads == 1)
+      alone = seconds;
+    else
+      result["speed_up"] = alone / seconds;
+    results.push_back(std::move(result));
+  }
+}
+
+/// How often faster a position is traced than with OpenVDB's sampler, which gets fewer positions.
+Json compare_box_sampler(const Options& options, const TemporaryFolder& folder) {
+  const int resolution = options.quick ? 16 : 128, side = options.quick ? 32 : 1024, threads = processor().threads;
+  const Job few = photon_job(resolution, options.quick ? 100 : 2048, side),
+            many = photon_job(resolution, options.quick ? 100 : 262144, side);
+  options.announce("jobs: OpenVDB's BoxSampler in the tracer's place");
+  const Json slow = run_job(folder, few, threads, "tensorray_box_sampler"), fast = run_job(folder, many, threads);
+  const auto seconds_per_position = [](const Json& job) {
+    return job.at("seconds").at("trace").get<double>() / job.at("positions").get<double>();
+  };
+  return {{"resolution", resolution},
+          {"threads", threads},
+          {"positions", {slow.at("positions"), fast.at("positions")}},
+          {"samples_per_position",
+           {slow.at("tensor_samples").get<double>() / slow.at("positions").get<double>(),
+            fast.at("tensor_samples").get<double>() / fast.at("positions").get<double>()}},
+          {"seconds_per_position", {seconds_per_position(slow), seconds_per_position(fast)}},
+          {"ratio", seconds_per_position(slow) / seconds_per_position(fast)}};
+}
+
+}  // namespace
+
+Json measure_jobs(const Options& options) {
+  const TemporaryFolder folder;
+  Json results = Json::array();
+  for (const Job& job : jobs(options.quick)) add_job(options, folder, job, results);
+  if (options.million) add_job(options, folder, photon_job(128, options.quick ? 1000 : 1u << 20, 1024), results);
+  return {{"renders", results}, {"box_sampler", compare_box_sampler(options, folder)}};
+}
+
+}  // namespace tensorray::benchmark

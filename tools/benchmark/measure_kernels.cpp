@@ -1,0 +1,161 @@
+#include <algorithm>
+#include <stdexcept>
+
+#include "integrators/packet_kernel.h"
+#include "tools/benchmark/kernels.h"
+#include "tools/benchmark/parts.h"
+#include "tools/benchmark/repeat.h"
+#include "tools/benchmark/workload.h"
+
+namespace tensorray::benchmark {
+namespace {
+
+/// That a packet of rays reads of a cell that was not in the cache: the four voxels that its neighbour does not have.
+constexpr double bytes_per_cold_cell = 4 * TensorBrick::bending_floats * sizeof(float);
+
+struct Measurement {
+  std::string name;
+  Order order;
+};
+
+struct MeasuredField {
+  std::string about;
+  FieldRequest request;
+  std::vector<Measurement> measurements;
+};
+
+/// Weak fields: the wavelengths of a packet part by about a voxel on their way.
+std::vector<MeasuredField> fields_to_measure(bool quick) {
+  constexpr double weak = 0.01, automatic = 0.15, strong = 1.5;
+  const Eigen::Vector3d down(0.1, 0.07, -1), across(-1, 0.1, 0.05);
+  const int small = quick ? 24 : 128, large = quick ? 32 : 256;
+  const auto size = [](int n) { return std::to_string(n) + "³"; };
+  return {
+      {"point load, weak", {PointLoad(), small, down, weak}, {{"coherent " + size(small), Order::warm}}},
+      {"point load, weak",
+       {PointLoad(), large, down, weak},
+       {{"coherent " + size(large), Order::warm}, {"cold cells " + size(large), Order::fresh}}},
+      {"point load, weak, every second cube of 64³ voxels inactive",
+       {PointLoad(), large, down, weak, true},
+       {{"half empty " + size(large), Order::warm}}},
+      {"vortex, strong", {Vortex(), small, across, strong}, {{"diverging " + size(small), Order::fresh}}},
+      {"point load as rendered", {PointLoad(), small, down, automatic}, {{"as rendered " + size(small), Order::fresh}}},
+  };
+}
+
+/// The greatest distance between the ends of the kernel's rays and of the reference's, in voxels.
+double greatest_difference(const TestField& test, Order order, const TraceFunction& kernel) {
+  RayBatch rays = make_batches(test, order, 0, 1)[0], expected = rays;
+  kernel(rays);
+  BendingSettings settings;
+  settings.step = step;
+  trace_reference(test.field, test.geometry, settings, expected);
+  double greatest = 0;
+  for (std::size_t i = 0; i < rays.size(); ++i)
+    greatest = std::max(greatest, (rays.position[i] - expected.position[i]).norm() / test.voxel());
+  return greatest;
+}
+
+struct KernelRate {
+  Rate samples;
+  double samples_per_ray = 0;
+};
+
+KernelRate measure_kernel(const TestField& test, Order order, const TraceFunction& kernel, double seconds) {
+  constexpr std::uint64_t packets = 16;  // A round.
+  std::uint64_t next = 0, rays = 0, samples = 0;
+  const auto prepare = [&](std::uint64_t rounds) {
+    next += rounds * packets;
+    return make_batches(test, order, next - rounds * packets, rounds * packets);
+  };
+  const auto work = [&](std::vector<RayBatch>& batches) {
+    std::uint64_t units = 0;
+    for (RayBatch& batch : batches) {
+      kernel(batch);
+      units += batch.tensor_samples;
+      rays += batch.size();
+    }
+    samples += units;
+    return units;
+  };
+  const Rate rate = repeat(prepare, work, thread_seconds, seconds);
+  return {rate, static_cast<double>(samples) / static_cast<double>(rays)};
+}
+
+/// Of the rate at which vectors of those instructions could be issued.
+double issue_fraction(double samples_per_second, const std::string& instructions, const Json& machine) {
+  for (const Json& rate : machine.at("vectors"))
+    if (rate.at("instructions") == instructions)
+      return samples_per_second * packets::operations_per_step / rate.at("lanes").get<double>() /
+             rate.at("multiply_adds_per_second").get<double>();
+  throw std::logic_error("no rate was measured of " + instructions);
+}
+
+double bandwidth_fraction(double samples_per_second, const Json& machine) {
+  const double cells_per_second = samples_per_second / packet_rays * step;
+  return cells_per_second * bytes_per_cold_cell / machine.at("memory")[0].at("read_bytes_per_second").get<double>();
+}
+
+Json describe_kernel(const TestField& test, Order order, const Kernel& kernel, const TraceFunction& function,
+                     double seconds, const Json& machine) {
+  const KernelRate rate = measure_kernel(test, order, function, seconds);
+  Json row = {{"kernel", kernel.name},
+              {"samples_per_second", rate.samples.median},
+              {"least", rate.samples.least},
+              {"most", rate.samples.most}};
+  if (!kernel.follows_the_rule) return row;
+  row["rays_per_second"] = rate.samples.median / rate.samples_per_ray;
+  row["samples_per_ray"] = rate.samples_per_ray;
+  row["greatest_difference_in_voxels"] = greatest_difference(test, order, function);
+  if (!kernel.instructions.empty())
+    row["issue_fraction"] = issue_fraction(rate.samples.median, kernel.instructions, machine);
+  if (order == Order::fresh) row["bandwidth_fraction"] = bandwidth_fraction(rate.samples.median, machine);
+  return row;
+}
+
+void add_ratios(Json& rows) {
+  if (rows.empty()) return;
+  const double first = rows[0].at("samples_per_second");
+  for (Json& row : rows) row["ratio"] = row.at("samples_per_second").get<double>() / first;
+}
+
+}  // namespace
+
+std::vector<Kernel> all_kernels() {
+  std::vector<Kernel> kernels{openvdb_rows_kernel(), openvdb_matrix_kernel(), nanovdb_rows_kernel()};
+  for (Kernel& kernel : vtk_kernels()) kernels.push_back(std::move(kernel));
+  for (Kernel& kernel : tensorray_kernels()) kernels.push_back(std::move(kernel));
+  return kernels;
+}
+
+Json measure_kernels(const Options& options, const Json& machine) {
+  const double seconds = options.quick ? 0.001 : 0.25;
+  Json result = {{"step_in_voxels", step}, {"rays_per_packet", packet_rays}, {"not_measured", Json::object()}};
+  Json& measured = result["measurements"] = Json::array();
+  const std::vector<Kernel> kernels = all_kernels();
+  bool first = true;
+  for (const MeasuredField& field : fields_to_measure(options.quick)) {
+    options.announce(field.measurements[0].name + ": making the field");
+    const TestField test = make_field(field.request);
+    std::vector<Json> rows(field.measurements.size(), Json::array());
+    for (const Kernel& kernel : kernels) {
+      if (!kernel.missing.empty()) result["not_measured"][kernel.name] = kernel.missing;
+      if (!kernel.missing.empty() || (kernel.slow && !first)) continue;
+      const TraceFunction function = kernel.make(test);
+      packets::use_instruction_set(kernel.instructions);
+      for (std::size_t i = 0; i < rows.size(); ++i) {
+        options.announce(field.measurements[i].name + ": " + kernel.name);
+        rows[i].push_back(describe_kernel(test, field.measurements[i].order, kernel, function, seconds, machine));
+      }
+    }
+    for (std::size_t i = 0; i < rows.size(); ++i) {
+      add_ratios(rows[i]);
+      measured.push_back({{"name", field.measurements[i].name}, {"field", field.about}, {"kernels", rows[i]}});
+    }
+    first = false;
+  }
+  packets::use_instruction_set("");
+  return result;
+}
+
+}  // namespace tensorray::benchmark

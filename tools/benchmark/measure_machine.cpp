@@ -1,0 +1,28 @@
+#include "tools/benchmark/machine.h"
+#include "tools/benchmark/parts.h"
+
+namespace tensorray::benchmark {
+
+Json measure_machine(const Options& options) {
+  options.announce("the processor");
+  const Processor machine = processor();
+  Json vectors = Json::array();
+  for (const VectorRate& rate : vector_rates(options.quick ? 0.001 : 0.1))
+    vectors.push_back(
+        {{"instructions", rate.instructions}, {"lanes", rate.lanes}, {"multiply_adds_per_second", rate.multiply_adds}});
+  options.announce("the memory");
+  const std::size_t array_bytes = std::size_t{options.quick ? 1u : 256u} << 20;
+  Json memory = Json::array();
+  for (const int threads : {1, machine.threads}) {
+    const Bandwidth rate = bandwidth(threads, array_bytes);
+    memory.push_back(
+        {{"threads", threads}, {"read_bytes_per_second", rate.read}, {"triad_bytes_per_second", rate.triad}});
+  }
+  return {{"processor", machine.model},
+          {"threads", machine.threads},
+          {"compiler", machine.compiler},
+          {"vectors", vectors},
+          {"memory", memory}};
+}
+
+}  // namespace tensorray::benchmark

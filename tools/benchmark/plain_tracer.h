@@ -1,0 +1,54 @@
+#pragma once
+/// @file tools/benchmark/plain_tracer.h
+/// The loop that one would write about a library's sampler: scalar, single precision, in index space, with the
+/// splitting step and the exponential's series up to the second order.
+
+#include <Eigen/Core>
+
+#include "tools/benchmark/workload.h"
+
+namespace tensorray::benchmark {
+
+/// A ray in index space. `kick` is h·s in world units: what tensors are multiplied with.
+struct PlainRay {
+  Eigen::Vector3f P, V;
+  float kick;
+};
+
+/// @param sample  Of an index position, the Matrix3f there.
+/// @return how many samples were taken. The ray ends on the face where it leaves `box`.
+template <class Sample>
+std::uint64_t follow_plainly(const Eigen::AlignedBox3f& box, const Sample& sample, PlainRay& ray) {
+  constexpr auto half = static_cast<float>(step / 2);
+  std::uint64_t samples = 0;
+  do {
+    const Eigen::Vector3f middle = ray.P + half * ray.V;
+    const Eigen::Matrix3f T = ray.kick * sample(middle);
+    const Eigen::Vector3f first = T * ray.V;
+    ray.V = (ray.V + first + 0.5f * (T * first)).normalized();
+    ray.P = middle + half * ray.V;
+    ++samples;
+  } while (box.contains(ray.P));
+  float beyond = 0;
+  for (int axis = 0; axis < 3; ++axis) {
+    const float outside = std::max(box.min()[axis] - ray.P[axis], ray.P[axis] - box.max()[axis]);
+    if (outside > 0) beyond = std::max(beyond, outside / std::abs(ray.V[axis]));
+  }
+  ray.P -= beyond * ray.V;
+  return samples;
+}
+
+template <class Sample>
+void trace_plainly(const TestField& test, const Sample& sample, RayBatch& batch) {
+  const Eigen::AlignedBox3f box = test.field.index_bounds().cast<float>();
+  const auto kick = static_cast<float>(step * test.voxel());
+  for (std::size_t i = 0; i < batch.size(); ++i) {
+    PlainRay ray{(test.field.to_index() * batch.position[i]).cast<float>(), batch.direction[i].cast<float>(),
+                 kick * static_cast<float>(batch.flexibility[i])};
+    batch.tensor_samples += follow_plainly(box, sample, ray);
+    batch.position[i] = test.field.to_world() * ray.P.cast<double>();
+    batch.direction[i] = ray.V.cast<double>();
+  }
+}
+
+}  // namespace tensorray::benchmark

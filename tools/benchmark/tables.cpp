@@ -1,0 +1,144 @@
+#include "tools/benchmark/tables.h"
+
+#include <algorithm>
+#include <vector>
+
+#include <fmt/format.h>
+
+namespace tensorray::benchmark {
+namespace {
+
+using Row = std::vector<std::string>;
+
+/// Columns as a terminal shows them: bytes after the first one of a character take no room.
+std::size_t width_of(const std::string& text) {
+  return static_cast<std::size_t>(std::count_if(text.begin(), text.end(), [](char c) { return (c & 0xc0) != 0x80; }));
+}
+
+/// The first row is the heading, the first column is flush left.
+std::string table(const std::vector<Row>& rows) {
+  std::vector<std::size_t> widths(rows[0].size(), 0);
+  for (const Row& row : rows)
+    for (std::size_t i = 0; i < row.size(); ++i) widths[i] = std::max(widths[i], width_of(row[i]));
+  std::string text;
+  for (const Row& row : rows) {
+    std::string line;
+    for (std::size_t i = 0; i < row.size(); ++i) {
+      const std::string space(widths[i] - width_of(row[i]), ' ');
+      line += i == 0 ? row[i] + space : "  " + space + row[i];
+    }
+    text += line.substr(0, line.find_last_not_of(' ') + 1) + "\n";
+  }
+  return text;
+}
+
+double number(const Json& json, const char* key) { return json.value(key, 0.0); }
+
+std::string percent(const Json& json, const char* key) {
+  return json.contains(key) ? fmt::format("{:.0f}%", 100 * number(json, key)) : "";
+}
+
+std::string machine_text(const Json& machine) {
+  std::string text = fmt::format("{}, {} threads, {}\n", machine.at("processor").get<std::string>(),
+                                 machine.at("threads").get<int>(), machine.at("compiler").get<std::string>());
+  for (const Json& rate : machine.at("vectors"))
+    text += fmt::format("{}: {:.2f} billion vectors of {} floats multiplied and added a second, on one thread\n",
+                        rate.at("instructions").get<std::string>(), number(rate, "multiply_adds_per_second") / 1e9,
+                        rate.at("lanes").get<int>());
+  for (const Json& rate : machine.at("memory"))
+    text += fmt::format("memory, {} thread{}: {:.1f} GB/s read, {:.1f} GB/s triad\n", rate.at("threads").get<int>(),
+                        rate.at("threads") == 1 ? "" : "s", number(rate, "read_bytes_per_second") / 1e9,
+                        number(rate, "triad_bytes_per_second") / 1e9);
+  return text;
+}
+
+std::string rate_and_ratio(const Json& row) {
+  return fmt::format("{:.3g} ({:.3g}x)", number(row, "samples_per_second") / 1e6, number(row, "ratio"));
+}
+
+/// Kernels down, measurements across.
+std::string kernel_rates(const Json& measurements, const Json& missing) {
+  std::vector<Row> rows{{"millions of samples a second, one thread"}};
+  for (const Json& row : measurements[0].at("kernels")) rows.push_back({row.at("kernel")});
+  for (const Json& measurement : measurements) {
+    rows[0].push_back(measurement.at("name"));
+    for (std::size_t i = 1; i < rows.size(); ++i) {
+      const Json& kernels = measurement.at("kernels");
+      const auto found =
+          std::find_if(kernels.begin(), kernels.end(), [&](const Json& row) { return row.at("kernel") == rows[i][0]; });
+      rows[i].push_back(found == kernels.end() ? "" : rate_and_ratio(*found));
+    }
+  }
+  for (const auto& [kernel, why] : missing.items()) rows.push_back({kernel, why});
+  return table(rows);
+}
+
+std::string kernel_details(const Json& measurements) {
+  std::vector<Row> rows{{"", "kernel", "rays/s", "samples/ray", "of issue bound", "of memory read",
+                         "difference, voxels", "least to most"}};
+  for (const Json& measurement : measurements)
+    for (const Json& row : measurement.at("kernels")) {
+      if (!row.contains("rays_per_second")) continue;
+      rows.push_back({measurement.at("name"), row.at("kernel"), fmt::format("{:.0f}", number(row, "rays_per_second")),
+                      fmt::format("{:.0f}", number(row, "samples_per_ray")), percent(row, "issue_fraction"),
+                      percent(row, "bandwidth_fraction"),
+                      fmt::format("{:.1e}", number(row, "greatest_difference_in_voxels")),
+                      fmt::format("{:.3g} to {:.3g}", number(row, "least") / 1e6, number(row, "most") / 1e6)});
+    }
+  return table(rows);
+}
+
+std::string loading_text(const Json& loading) {
+  return fmt::format(
+      "{}: {:.2f} s from file to bricks ({:.2f} s reading, {:.2f} s making bricks)\n"
+      "bricks are made at {:.2f} GB/s of tensors, {:.0f}% of what memory is read with; they take {:.2f} times the "
+      "active voxels' 36 bytes\n",
+      loading.at("field").get<std::string>(), number(loading, "seconds"), number(loading, "seconds_reading"),
+      number(loading, "seconds_bricks"), number(loading, "bytes_per_second") / 1e9,
+      100 * number(loading, "bandwidth_fraction"), number(loading, "memory_ratio"));
+}
+
+std::string jobs_text(const Json& jobs) {
+  Row heading{"seconds, scene file to picture", "voxels", "rays", "threads"};
+  const std::vector<std::string> phases{"load", "trace", "density", "draw", "color", "write", "total"};
+  heading.insert(heading.end(), phases.begin(), phases.end());
+  heading.push_back("speed-up");
+  std::vector<Row> rows{heading};
+  for (const Json& job : jobs.at("renders")) {
+    Row row{job.at("name"), fmt::format("{}³", job.at("resolution").get<int>())};
+    if (job.contains("skipped")) {
+      row.push_back(job.at("skipped"));
+    } else {
+      row.push_back(fmt::format("{}", job.at("rays").get<std::uint64_t>()));
+      row.push_back(fmt::format("{}", job.at("threads").get<int>()));
+      for (const std::string& phase : phases)
+        row.push_back(fmt::format("{:.2f}", number(job.at("seconds"), phase.c_str())));
+      if (job.contains("speed_up")) row.push_back(fmt::format("{:.2f}", number(job, "speed_up")));
+    }
+    rows.push_back(row);
+  }
+  const Json& against = jobs.at("box_sampler");
+  return table(rows) + fmt::format(
+                           "a position of 32 wavelengths in {0}³ is traced {1:.1f} times faster than with OpenVDB's "
+                           "BoxSampler in the same program ({2} threads, {3} and {4} positions)\n",
+                           against.at("resolution").get<int>(), number(against, "ratio"),
+                           against.at("threads").get<int>(), against.at("positions")[1].get<std::uint64_t>(),
+                           against.at("positions")[0].get<std::uint64_t>());
+}
+
+}  // namespace
+
+std::string tables(const Json& results) {
+  std::string text;
+  if (results.contains("machine")) text += machine_text(results.at("machine"));
+  if (results.contains("kernels")) {
+    const Json& kernels = results.at("kernels");
+    text += "\n" + kernel_rates(kernels.at("measurements"), kernels.at("not_measured"));
+    text += "\n" + kernel_details(kernels.at("measurements"));
+  }
+  if (results.contains("loading")) text += "\n" + loading_text(results.at("loading"));
+  if (results.contains("jobs")) text += "\n" + jobs_text(results.at("jobs"));
+  return text;
+}
+
+}  // namespace tensorray::benchmark

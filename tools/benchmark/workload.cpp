@@ -1,0 +1,81 @@
+#include "tools/benchmark/workload.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "integrators/auto_scale.h"
+#include "renderer/beam.h"
+
+namespace tensorray::benchmark {
+namespace {
+
+constexpr std::uint64_t batch_packets = 16;
+constexpr std::uint64_t warm_edge = 8;           // Origins of a warm square along an edge, a voxel apart.
+constexpr double least_s = 0.02, most_s = 0.37;  // Flexibilities of 730 and 380 nm by the paper's a and b.
+
+/// The standard generators' grids are scaled by what turns the median ray by `turn`; small turns grow in proportion.
+void scale_to_turn(TensorGrid& grid, const Eigen::Vector3d& direction, double turn) {
+  const TensorField field(grid);
+  Surfaces surfaces;
+  surfaces.bounds = box_mesh(field.index_bounds(), field.to_world());
+  const Beam beam = silhouette_beam(field.corners(), direction, Eigen::Vector3d::UnitZ());
+  constexpr double automatic_turn = 0.15;
+  const double scale = choose_scale(field, Geometry(std::move(surfaces)), beam, Progress()).scale;
+  const auto factor = static_cast<float>(scale * turn / automatic_turn);
+  for (TensorBlock& block : grid.blocks)
+    for (Eigen::Matrix3f& value : block.values) value *= factor;
+}
+
+void empty_every_second_cube(TensorGrid& grid, int edge) {
+  const auto leaves = [&](const TensorBlock& block) {
+    const Eigen::Vector3i cube = block.origin / edge;
+    return (cube.sum() & 1) != 0;
+  };
+  grid.blocks.erase(std::remove_if(grid.blocks.begin(), grid.blocks.end(), leaves), grid.blocks.end());
+}
+
+/// A permutation of the numbers below 2^16.
+std::uint64_t shuffled(std::uint64_t i) { return (i * 40503 + 12345) & 0xffff; }
+
+/// Where packet number `packet` enters, as fractions of the face's edges.
+Eigen::Vector2d place(Order order, std::uint64_t packet, int voxels) {
+  if (order == Order::warm) {
+    const double x = static_cast<double>(packet % warm_edge), y = static_cast<double>(packet / warm_edge % warm_edge);
+    return Eigen::Vector2d(0.55, 0.6) + Eigen::Vector2d(x + 0.3, y + 0.6) / voxels;
+  }
+  const std::uint64_t cell = shuffled(packet);
+  return Eigen::Vector2d(static_cast<double>(cell & 0xff) + 0.41, static_cast<double>(cell >> 8) + 0.73) / 256;
+}
+
+}  // namespace
+
+TestField make_field(const FieldRequest& request) {
+  const Eigen::Vector3d direction = request.direction.normalized();
+  TensorGrid grid = generate(request.generator, default_grid(request.generator, request.resolution));
+  scale_to_turn(grid, direction, request.turn);
+  if (request.half_empty) empty_every_second_cube(grid, request.resolution < 128 ? 16 : 64);
+  TensorField field(grid);
+  Surfaces surfaces;
+  surfaces.bounds = box_mesh(field.index_bounds(), field.to_world());
+  return {std::move(grid), std::move(field), Geometry(std::move(surfaces)), direction};
+}
+
+std::vector<RayBatch> make_batches(const TestField& test, Order order, std::uint64_t first, std::uint64_t packets) {
+  const Eigen::AlignedBox3d& box = test.field.index_bounds();
+  int axis = 0;
+  test.direction.cwiseAbs().maxCoeff(&axis);
+  std::vector<RayBatch> batches((packets + batch_packets - 1) / batch_packets);
+  for (std::uint64_t i = 0; i < packets; ++i) {
+    const Eigen::Vector2d at = place(order, first + i, static_cast<int>(box.sizes()[axis]));
+    Eigen::Vector3d fraction;
+    fraction[axis] = test.direction[axis] < 0 ? 1 : 0;
+    fraction[(axis + 1) % 3] = at.x();
+    fraction[(axis + 2) % 3] = at.y();
+    const Eigen::Vector3d origin = test.field.to_world() * (box.min() + fraction.cwiseProduct(box.sizes())).eval();
+    for (int lane = 0; lane < packet_rays; ++lane)
+      batches[i / batch_packets].add(origin, test.direction, least_s + (most_s - least_s) * lane / (packet_rays - 1));
+  }
+  return batches;
+}
+
+}  // namespace tensorray::benchmark
