@@ -104,8 +104,10 @@ Eigen::Matrix3d TensorSampler::at(const Eigen::Vector3d&, const Eigen::Matrix<do
   throw std::invalid_argument("OpenVDB's BoxSampler has no derivatives; use this program for photons");
 }
 
-double TensorSampler::way_through_straight_brick(const Eigen::Vector3d&, const Eigen::Vector3d&) const { return 0; }
+double TensorSampler::way_through_straight_brick(const Eigen::Vector3d&, const Eigen::Vector3d&) { return 0; }
 
-bool trace_in_packets(const TensorField&, const Geometry&, const BendingSettings&, RayBatch&) { return false; }
+bool trace_in_packets(const TensorField&, const Geometry&, const BendingSettings&, RayBatch&, const Recordings&) {
+  return false;
+}
 
 }  // namespace tensorray
