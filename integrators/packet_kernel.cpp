@@ -68,13 +68,13 @@ constexpr int most_terms = 11;
 /// Rays side by side, one a lane. All lanes hold a ray: those whose ray has ended repeat that of another, so that no
 /// step needs a mask.
 struct Packet {
-  alignas(64) float p[3][most_lanes];    // Position, voxels from the brick's first.
-  alignas(64) float v[3][most_lanes];    // V.
-  alignas(64) float u[3][most_lanes];    // The direction in index space; unused if voxels are uniform: it is V.
-  alignas(64) float kick[most_lanes];    // s, times the voxel's edge if voxels are uniform.
-  alignas(64) float length[most_lanes];  // Of the way since the ray came, in units of the time that u is per.
-  alignas(64) float norm[most_lanes];    // Of T's deviator as last sampled, or 0.
-  alignas(64) float reach[most_lanes];   // Bound on ‖s h T‖ in the brick.
+  alignas(64) float p[3][most_lanes];          // Position, voxels from the brick's first.
+  alignas(64) float v[3][most_lanes];          // V.
+  alignas(64) float u[3][most_lanes];          // The direction in index space; unused if voxels are uniform: it is V.
+  alignas(64) float kick[most_lanes];          // s, times the voxel's edge if voxels are uniform.
+  alignas(64) float length[most_lanes];        // Of the way since the ray came, in units of the time that u is per.
+  alignas(64) float bending_rate[most_lanes];  // s times the norm of T's deviator as last sampled, or 0.
+  alignas(64) float reach[most_lanes];         // Bound on ‖s h T‖ in the brick.
   alignas(64) float strongest[most_lanes];
   alignas(64) float low[3][most_lanes], high[3][most_lanes];  // The voxels' box, relative to the brick.
   alignas(64) float last[3][most_lanes];                      // The last cell, likewise.
@@ -339,7 +339,7 @@ void Kernel<uniform, differentials>::enter(Packet& packet, int lane) {
       }
   }
   packet.kick[lane] = uniform ? ray.flexibility * medium_.voxel : ray.flexibility;
-  packet.norm[lane] = ray.norm;
+  packet.bending_rate[lane] = std::fabs(packet.kick[lane]) * ray.norm;
   packet.length[lane] = 0;
 }
 
@@ -359,7 +359,7 @@ void Kernel<uniform, differentials>::repeat(Packet& packet, int lane, int of) {
   }
   packet.kick[lane] = packet.kick[of];
   packet.length[lane] = packet.length[of];
-  packet.norm[lane] = packet.norm[of];
+  packet.bending_rate[lane] = packet.bending_rate[of];
   packet.time[lane] = packet.time[of];
   packet.ray[lane] = packet.ray[of];
 }
@@ -395,7 +395,8 @@ HWY_INLINE void Kernel<uniform, differentials>::summarize(Packet& packet) {
   packet.greatest_reach =
       hn::AllTrue(floats, hn::Le(reach, most)) ? hn::GetLane(hn::MaxOfLanes(floats, reach)) : 1e30f;  // NaN is strong.
   packet.straight = !hn::AllFalse(floats, hn::Eq(strongest, hn::Zero(floats)));
-  if (packet.greatest_reach <= strongest_kick) hn::Store(hn::Zero(floats), floats, packet.norm);  // Steps stay long.
+  if (packet.greatest_reach <= strongest_kick)
+    hn::Store(hn::Zero(floats), floats, packet.bending_rate);  // Steps stay long.
 
   // A step may begin a little outside of its brick.
   const F near = set(-medium_.longest_step - 1), far = set(TensorBrick::cells + medium_.longest_step + 1);
@@ -587,12 +588,16 @@ HWY_INLINE F3 bend_weakly(const Tensor& T, const F3& v, F factor) {
   return mul(hn::MulAdd(series, e, set(1)), sum);
 }
 
-/// The Frobenius norm of T's deviator.
-HWY_INLINE F deviator_norm(const Tensor& T) {
-  F squares = hn::Mul(T.c[0], T.c[0]);
-  for (int i = 1; i < 8; ++i) squares = hn::MulAdd(T.c[i], T.c[i], squares);
-  const F trace = hn::Add(T.c[0], T.c[4]);
-  return hn::Sqrt(hn::Max(hn::NegMulAdd(hn::Mul(trace, trace), set(1.0f / 3), squares), hn::Zero(floats)));
+/// The Frobenius norm of the deviator of factor · T. T itself may be too large, or too small, for its square.
+HWY_INLINE F deviator_norm(const Tensor& T, F factor) {
+  F squares = hn::Zero(floats);
+  for (int i = 0; i < 8; ++i) {
+    const F scaled = hn::Mul(factor, T.c[i]);
+    squares = hn::MulAdd(scaled, scaled, squares);
+  }
+  const F trace = hn::Mul(factor, hn::Add(T.c[0], T.c[4]));
+  const F deviator = hn::Max(hn::NegMulAdd(hn::Mul(trace, trace), set(1.0f / 3), squares), hn::Zero(floats));
+  return hn::Sqrt(hn::IfThenElse(hn::Le(squares, set(1e38f)), deviator, squares));  // Infinity stays what it is.
 }
 
 template <bool uniform, bool differentials>
@@ -610,9 +615,9 @@ HWY_INLINE F3 Kernel<uniform, differentials>::bend_strongly(Packet& packet, cons
   const F reach = hn::Load(floats, packet.reach);
   F size = reach;
   if (HWY_UNLIKELY(!(packet.greatest_reach <= strongest_kick))) {
-    const F norm = deviator_norm(T);
-    hn::Store(norm, floats, packet.norm);
-    size = hn::IfThenElse(hn::Le(reach, set(strongest_kick)), reach, hn::Mul(norm, hn::Abs(factor)));
+    const F norm = deviator_norm(T, factor), time = hn::Max(hn::Load(floats, packet.time), set(1e-30f));
+    hn::Store(hn::Div(norm, time), floats, packet.bending_rate);
+    size = hn::IfThenElse(hn::Le(reach, set(strongest_kick)), reach, norm);
   }
   if constexpr (differentials) hn::Store(size, floats, packet.size);
   const F3 first = mul(factor, apply(T, v)), second = apply(T, first);
@@ -673,7 +678,7 @@ HWY_INLINE F Kernel<uniform, differentials>::step_time(Packet& packet, const F3&
   const bool automatic = medium_.settings.step == 0;
   F steps = set(medium_.longest_step);
   if (HWY_UNLIKELY(automatic && !(packet.greatest_reach <= strongest_kick))) {
-    const F kick = hn::Mul(hn::Mul(hn::Abs(hn::Load(floats, packet.kick)), hn::Load(floats, packet.norm)), voxel);
+    const F kick = hn::Mul(hn::Load(floats, packet.bending_rate), voxel);
     const F shorter = hn::Max(hn::Div(set(strongest_kick), kick), set(shortest_automatic_step));
     steps = hn::IfThenElse(hn::Gt(hn::Mul(kick, set(longest_automatic_step)), set(strongest_kick)), shorter, steps);
   }

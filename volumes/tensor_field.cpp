@@ -1,15 +1,15 @@
 #include "volumes/tensor_field.h"
 
 #include <algorithm>
+#include <bitset>
 #include <cmath>
-#include <cstdlib>
 #include <new>
-#include <set>
 #include <stdexcept>
 #include <tuple>
 
 #include <sys/mman.h>
 #include <tbb/parallel_for.h>
+#include <tbb/parallel_sort.h>
 
 namespace tensorray {
 namespace {
@@ -29,16 +29,14 @@ const ZeroBrick zero_brick;
 
 TensorBrick brick_at(const float* floats, float strongest) { return {floats, floats + trailing_offset, strongest}; }
 
-/// Memory for `count` floats, from large pages where the system has them: bricks are visited far apart.
+/// Memory for `count` floats, zero, from large pages where the system has them: bricks are visited far apart.
 float* allocate(std::size_t count) {
-  constexpr std::size_t page = std::size_t{2} << 20;
-  const std::size_t bytes = (count * sizeof(float) + page - 1) / page * page;
-  auto* const floats = static_cast<float*>(std::aligned_alloc(page, bytes));
-  if (!floats) throw std::bad_alloc();
+  void* const memory = mmap(nullptr, count * sizeof(float), PROT_READ | PROT_WRITE, MAP_PRIVATE | MAP_ANONYMOUS, -1, 0);
+  if (memory == MAP_FAILED) throw std::bad_alloc();
 #ifdef MADV_HUGEPAGE
-  madvise(floats, bytes, MADV_HUGEPAGE);
+  madvise(memory, count * sizeof(float), MADV_HUGEPAGE);
 #endif
-  return floats;
+  return static_cast<float*>(memory);
 }
 
 struct CoordinateLess {
@@ -47,11 +45,10 @@ struct CoordinateLess {
   }
 };
 
-/// The bricks that hold an active voxel of a block, as a cell's corner: its own, and where a voxel lies on a near face
-/// of the block the one before it, whose apron shares that voxel. Only those whose cells are in the extent.
-void add_bricks_of(const TensorBlock& block, const Eigen::AlignedBox3i& extent,
-                   std::set<Eigen::Vector3i, CoordinateLess>& bricks) {
+/// The blocks before this one, as bits of x, y and z, whose aprons share an active voxel of it.
+std::bitset<8> shared_faces(const TensorBlock& block) {
   std::bitset<8> touched;
+  if (block.active.all()) return touched.set();
   for (int offset = 0; offset < TensorBlock::voxels; ++offset) {
     if (!block.active[offset]) continue;
     const Eigen::Vector3i p = TensorBlock::position(offset);
@@ -59,10 +56,24 @@ void add_bricks_of(const TensorBlock& block, const Eigen::AlignedBox3i& extent,
     for (int before = 0; before < 8; ++before)
       if ((before & faces) == before) touched.set(before);
   }
-  for (int before = 0; before < 8; ++before) {
-    const Eigen::Vector3i brick = block.origin / cells - Eigen::Vector3i(before & 1, before >> 1 & 1, before >> 2 & 1);
-    if (touched[before] && extent.contains(brick)) bricks.insert(brick);
+  return touched;
+}
+
+/// The bricks of `extent` that hold an active voxel as a cell's corner, in order: each block's own, and where a voxel
+/// lies on a near face of it the one before it, whose apron shares that voxel.
+std::vector<Eigen::Vector3i> active_bricks(const TensorGrid& grid, const Eigen::AlignedBox3i& extent) {
+  std::vector<Eigen::Vector3i> bricks;
+  for (const TensorBlock& block : grid.blocks) {
+    const std::bitset<8> touched = shared_faces(block);
+    for (int before = 0; before < 8; ++before) {
+      const Eigen::Vector3i brick =
+          block.origin / cells - Eigen::Vector3i(before & 1, before >> 1 & 1, before >> 2 & 1);
+      if (touched[before] && extent.contains(brick)) bricks.push_back(brick);
+    }
   }
+  tbb::parallel_sort(bricks.begin(), bricks.end(), CoordinateLess());
+  bricks.erase(std::unique(bricks.begin(), bricks.end()), bricks.end());
+  return bricks;
 }
 
 /// The bricks of the cells between the voxels of a box (an axis of a single voxel has one cell).
@@ -116,6 +127,14 @@ double squared_deviator(const float* bending) {
   return std::max(0.0, squares - trace * trace / 3);
 }
 
+float strongest_deviator(const float* brick) {
+  double greatest = 0;
+  for (int voxel = 0; voxel < TensorBrick::voxels; ++voxel)
+    greatest = std::max(greatest, squared_deviator(brick + voxel * TensorBrick::bending_floats));
+  // Rounded up: interpolation between voxels may round to a little more than any of them.
+  return static_cast<float>(std::sqrt(greatest) * (1 + 1e-5));
+}
+
 }  // namespace
 
 Eigen::Matrix3d TensorBrick::tensor(int voxel) const {
@@ -136,17 +155,14 @@ TensorField::TensorField(const TensorGrid& grid) : to_world_(grid.to_world), to_
   index_bounds_ = extent_of(active);
   voxels_ = Eigen::AlignedBox3d(active.min().cast<double>(), active.max().cast<double>());
 
-  std::set<Eigen::Vector3i, CoordinateLess> found;
-  const Eigen::AlignedBox3i extent = bricks_of(active);
-  for (const TensorBlock& block : grid.blocks) add_bricks_of(block, extent, found);
-  const std::vector<Eigen::Vector3i> coordinates(found.begin(), found.end());
+  const std::vector<Eigen::Vector3i> coordinates = active_bricks(grid, bricks_of(active));
   make_table(coordinates);
 
   const auto blocks = sorted_blocks(grid);
-  floats_.reset(allocate(coordinates.size() * brick_floats));
+  floats_ = {allocate(coordinates.size() * brick_floats), {coordinates.size() * brick_floats * sizeof(float)}};
+  strongest_.resize(coordinates.size());
   tbb::parallel_for(std::size_t{0}, coordinates.size(), [&](std::size_t i) {
     float* floats = floats_.get() + i * brick_floats;
-    std::fill_n(floats, brick_floats, 0.0f);
     for (int corner = 0; corner < 8; ++corner) {
       const Eigen::Vector3i origin =
           cells * (coordinates[i] + Eigen::Vector3i(corner & 1, corner >> 1 & 1, corner >> 2 & 1));
@@ -154,12 +170,11 @@ TensorField::TensorField(const TensorGrid& grid) : to_world_(grid.to_world), to_
                                           [](auto& a, auto& b) { return CoordinateLess()(a.first, b); });
       if (block != blocks.end() && block->first == origin) copy_shared_voxels(*block->second, coordinates[i], floats);
     }
+    strongest_[i] = strongest_deviator(floats);
   });
-  strongest_.resize(coordinates.size());
-  update_strongest();
 }
 
-void TensorField::Release::operator()(float* floats) const { std::free(floats); }
+void TensorField::Release::operator()(float* floats) const { munmap(floats, bytes); }
 
 void TensorField::make_table(const std::vector<Eigen::Vector3i>& bricks) {
   std::size_t size = 16;
@@ -198,17 +213,6 @@ std::vector<Eigen::Vector3d> TensorField::corners() const {
   return corners;
 }
 
-void TensorField::update_strongest() {
-  tbb::parallel_for(std::size_t{0}, brick_count(), [&](std::size_t i) {
-    const TensorBrick brick = brick_at(floats_.get() + i * brick_floats, 0);
-    double greatest = 0;
-    for (int voxel = 0; voxel < TensorBrick::voxels; ++voxel)
-      greatest = std::max(greatest, squared_deviator(brick.bending + voxel * TensorBrick::bending_floats));
-    // Rounded up: interpolation between voxels may round to a little more than any of them.
-    strongest_[i] = static_cast<float>(std::sqrt(greatest) * (1 + 1e-5));
-  });
-}
-
 double TensorField::greatest_norm() const {
   double greatest = 0;
   for (std::size_t i = 0; i < brick_count(); ++i) {
@@ -227,15 +231,17 @@ TensorField TensorField::copy() const {
   result.voxels_ = voxels_;
   result.strongest_ = strongest_;
   result.slots_ = slots_;
-  result.floats_.reset(allocate(brick_count() * brick_floats));
+  result.floats_ = {allocate(brick_count() * brick_floats), floats_.get_deleter()};
   std::copy_n(floats_.get(), brick_count() * brick_floats, result.floats_.get());
   return result;
 }
 
 TensorField TensorField::scaled(double factor) && {
-  tbb::parallel_for(std::size_t{0}, brick_count() * brick_floats,
-                    [&](std::size_t i) { floats_[i] = static_cast<float>(floats_[i] * factor); });
-  update_strongest();
+  tbb::parallel_for(std::size_t{0}, brick_count(), [&](std::size_t i) {
+    float* const floats = floats_.get() + i * brick_floats;
+    for (int j = 0; j < used_floats; ++j) floats[j] = static_cast<float>(floats[j] * factor);
+    strongest_[i] = strongest_deviator(floats);
+  });
   return std::move(*this);
 }
 

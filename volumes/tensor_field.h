@@ -81,6 +81,8 @@ class TensorField {
     std::uint32_t index;  ///< `missing` if the slot is free.
   };
   struct Release {
+    std::size_t bytes;
+
     void operator()(float* floats) const;
   };
   static constexpr std::uint32_t missing = 0xffffffffu;
@@ -89,7 +91,6 @@ class TensorField {
   void make_table(const std::vector<Eigen::Vector3i>& bricks);
   std::size_t home_slot(const Eigen::Vector3i& brick) const;
   std::uint32_t find(const Eigen::Vector3i& brick) const;
-  void update_strongest();
 
   Eigen::Affine3d to_world_, to_index_;
   Eigen::AlignedBox3d index_bounds_, voxels_;

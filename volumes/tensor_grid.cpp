@@ -38,9 +38,12 @@ std::size_t TensorGrid::active_voxels() const {
 
 Eigen::AlignedBox3i TensorGrid::active_box() const {
   Eigen::AlignedBox3i box;
-  for_each_active(*this, [&](const TensorBlock& block, int offset) {
-    box.extend(Eigen::Vector3i(block.origin + TensorBlock::position(offset)));
-  });
+  for (const TensorBlock& block : blocks) {
+    const Eigen::Vector3i last = block.origin + Eigen::Vector3i::Constant(TensorBlock::size - 1);
+    if (box.contains(block.origin) && box.contains(last)) continue;
+    for (int offset = 0; offset < TensorBlock::voxels; ++offset)
+      if (block.active[offset]) box.extend(Eigen::Vector3i(block.origin + TensorBlock::position(offset)));
+  }
   return box;
 }
 
