@@ -13,8 +13,8 @@
 
 namespace tensorray::test {
 
-/// What `trace` may differ by from exact arithmetic, in the units of these fields, whose edges are 2: half a unit in the
-/// last place of single precision, for each of some ten steps.
+/// What `trace` may differ by from exact arithmetic, in the units of these fields, whose edges are 2: half a unit in
+/// the last place of single precision, for each of some ten steps.
 constexpr double single_precision = 5e-7;
 
 using TensorFunction = std::function<Eigen::Matrix3d(const Eigen::Vector3d&)>;
