@@ -1,6 +1,6 @@
 #pragma once
 /// @file integrators/bending.h
-/// Bends light through a tensor field. Only bending_steps.h and packet_kernel.cpp know the rule
+/// Bends light through a tensor field. Only bending_steps.h and packet_bending-inl.h know the rule
 /// (Zheng and Pang 2003, Eq. 5):  P' = V,  V' = s (T V − (VᵀTV) V),  |V| = 1.
 
 #include <array>

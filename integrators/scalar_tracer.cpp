@@ -93,10 +93,9 @@ RayEnd Tracer<N>::miss() {
   return RayEnd::missed;
 }
 
-/// In free space before the volume: to an absorber, or to the face of the box where light enters.
+/// In free space: to an absorber, or to where light enters the volume, if it does. Returns nothing in that case.
 template <int N>
-std::optional<RayEnd> Tracer<N>::reach_box() {
-  const auto entry = geometry_.crossing(Surface::bounds, true, position(), direction());
+std::optional<RayEnd> Tracer<N>::reach(const std::optional<Hit>& entry) {
   const double free_way = entry ? entry->distance : Geometry::infinite;
   const auto hit = geometry_.absorber(position(), direction(), free_way);
   if (ends_before(hit ? hit->distance : free_way)) return miss();
@@ -106,6 +105,12 @@ std::optional<RayEnd> Tracer<N>::reach_box() {
   }
   go_straight(*entry);
   return std::nullopt;
+}
+
+/// Before the volume.
+template <int N>
+std::optional<RayEnd> Tracer<N>::reach_box() {
+  return reach(geometry_.crossing(Surface::bounds, true, position(), direction()));
 }
 
 /// In free space behind the volume, which is convex: straight light does not meet it again.
@@ -123,15 +128,7 @@ template <int N>
 std::optional<RayEnd> Tracer<N>::cross_box() {
   const auto exit = geometry_.crossing(Surface::bounds, false, position(), direction());
   const auto entry = geometry_.crossing(Surface::cut, true, position(), direction(), exit ? exit->distance : 0);
-  if (!entry) return leave();
-  const auto hit = geometry_.absorber(position(), direction(), entry->distance);
-  if (ends_before(hit ? hit->distance : entry->distance)) return miss();
-  if (hit) {
-    go_straight(*hit);
-    return end_on(hit->surface);
-  }
-  go_straight(*entry);
-  return std::nullopt;
+  return entry ? reach(entry) : leave();
 }
 
 /// In voxels.

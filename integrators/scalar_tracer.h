@@ -76,6 +76,7 @@ class Tracer {
   /// What light meets next; `none` while it travels freely.
   enum class Event { none, absorber, leaves_box, leaves_cut };
 
+  std::optional<RayEnd> reach(const std::optional<Hit>& entry);
   std::optional<RayEnd> reach_box();
   std::optional<RayEnd> cross_box();
   std::optional<RayEnd> bend(double first_step);
