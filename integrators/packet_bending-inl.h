@@ -16,14 +16,24 @@
 HWY_BEFORE_NAMESPACE();
 namespace tensorray::packets::HWY_NAMESPACE {
 
+/// 1 / √(1 + excess) for an excess below 0.006, to 7e-8: less than rounding, and corrected in the next step.
+HWY_INLINE F inverse_root_near_one(F excess) {
+  return hn::MulAdd(hn::MulAdd(set(3.0f / 8), excess, set(-0.5f)), excess, set(1));
+}
+
+/// |v|² − 1.
+HWY_INLINE F excess(const F3& v) { return hn::MulAdd(v.x, v.x, hn::MulAdd(v.y, v.y, hn::MulAdd(v.z, v.z, set(-1)))); }
+
+/// Two terms of exp(factor · T) v.
+HWY_INLINE F3 two_terms(const Tensor& T, const F3& v, const F3& inner, F factor) {
+  const F3 half = mul_add(hn::Mul(set(0.5f), factor), apply(T, inner), v);
+  return mul_add(factor, apply(T, half), v);
+}
+
 /// exp(factor · T) V, normalised, where ‖factor · T‖ is small in all lanes: two terms, and the square root as a series.
 HWY_INLINE F3 bend_weakly(const Tensor& T, const F3& v, F factor) {
-  const F3 first = mul(factor, apply(T, v));
-  const F3 second = apply(T, first);
-  const F3 sum = mul_add(hn::Mul(set(0.5f), factor), second, add(v, first));
-  const F e = hn::Sub(dot(sum, sum), set(1));
-  const F series = hn::MulAdd(hn::MulAdd(set(-5.0f / 16), e, set(3.0f / 8)), e, set(-0.5f));
-  return mul(hn::MulAdd(series, e, set(1)), sum);
+  const F3 sum = two_terms(T, v, v, factor);
+  return mul(inverse_root_near_one(excess(sum)), sum);
 }
 
 /// The Frobenius norm of the deviator of factor · T. T itself may be too large, or too small, for its square.
@@ -38,63 +48,56 @@ HWY_INLINE F deviator_norm(const Tensor& T, F factor) {
   return hn::Sqrt(hn::IfThenElse(hn::Le(squares, set(1e38f)), deviator, squares));  // Infinity stays what it is.
 }
 
-/// The same for any strength. Which lane is computed how depends on that lane alone.
-template <bool differentials>
-HWY_INLINE F3 bend_strongly(Packet& packet, const Tensor& T, const F3& v, F factor) {
-  const F reach = hn::Load(floats, packet.reach);
-  F size = reach;
-  if (HWY_UNLIKELY(!(packet.greatest_reach <= strongest_kick))) {
-    const F norm = deviator_norm(T, factor), time = hn::Max(hn::Load(floats, packet.time), set(1e-30f));
-    hn::Store(hn::Div(norm, time), floats, packet.bending_rate);
-    size = hn::IfThenElse(hn::Le(reach, set(strongest_kick)), reach, norm);
-  }
-  if constexpr (differentials) hn::Store(size, floats, packet.size);
-  const F3 first = mul(factor, apply(T, v)), second = apply(T, first);
-  const F half = hn::Mul(set(0.5f), factor);
-  F3 sum = mul_add(half, second, add(v, first)), term = mul(half, second);
-  for (int n = 3; n <= most_terms; ++n) {
-    const Mask needed = hn::Gt(size, set(series_reach[n - 3]));
-    if (hn::AllFalse(floats, needed)) break;
-    term = mul(hn::Mul(set(1.0f / static_cast<float>(n)), factor), apply(T, term));
-    const F zero = hn::Zero(floats);
-    sum = add(sum, select(needed, term, {zero, zero, zero}));
-  }
-  const F squared = dot(sum, sum), e = hn::Sub(squared, set(1));
-  const F series = hn::MulAdd(hn::MulAdd(set(-5.0f / 16), e, set(3.0f / 8)), e, set(-0.5f));
-  const F exact = hn::Div(set(1), hn::Sqrt(squared));
-  const Mask weak = hn::Le(size, set(series_reach[0]));
-  F3 result = mul(hn::IfThenElse(weak, hn::MulAdd(series, e, set(1)), exact), sum);
-
-  const Mask fits = hn::Le(size, set(1));
-  if (HWY_LIKELY(hn::AllTrue(floats, fits))) return result;
-  if constexpr (differentials) {  // Those rays stop here.
-    const F zero = hn::Zero(floats);
-    return select(fits, result, {zero, zero, zero});
-  }
-  const std::uint32_t too_strong = ~to_bits(fits);
-  alignas(64) float all[8][most_lanes], factors[most_lanes], from[3][most_lanes], to[3][most_lanes];
+/// Lanes where ‖factor · T‖ is too large for a series, given as bits.
+HWY_NOINLINE F3 bend_in_double(const Tensor& T, const F3& v, F factor, const F3& others, std::uint32_t which) {
+  alignas(64) float all[8][lanes], factors[lanes], from[3][lanes], to[3][lanes];
   for (int i = 0; i < 8; ++i) hn::Store(T.c[i], floats, all[i]);
   hn::Store(factor, floats, factors);
-  store(v, from);
-  store(result, to);
+  const auto keep = [&](const F3& a, float(&b)[3][lanes]) HWY_ATTR {
+    hn::Store(a.x, floats, b[0]);
+    hn::Store(a.y, floats, b[1]);
+    hn::Store(a.z, floats, b[2]);
+  };
+  keep(v, from);
+  keep(others, to);
   for (int lane = 0; lane < lanes; ++lane) {
-    if (!(too_strong >> lane & 1)) continue;
+    if (!(which >> lane & 1)) continue;
     float one[8], direction[3] = {from[0][lane], from[1][lane], from[2][lane]};
     for (int i = 0; i < 8; ++i) one[i] = all[i][lane];
     Medium::exponential(one, factors[lane], direction);
     for (int axis = 0; axis < 3; ++axis) to[axis][lane] = direction[axis];
   }
-  return load(to);
+  return {hn::Load(floats, to[0]), hn::Load(floats, to[1]), hn::Load(floats, to[2])};
 }
 
-/// The same, whichever it takes.
+/// The same for any strength. Which lane is computed how depends on that lane alone.
 template <bool differentials>
-HWY_INLINE F3 bend(Packet& packet, const Tensor& T, const F3& v, F factor) {
-  if (HWY_LIKELY(packet.greatest_reach <= series_reach[0])) {
-    if constexpr (differentials) hn::Store(hn::Load(floats, packet.reach), floats, packet.size);
-    return bend_weakly(T, v, factor);
+HWY_INLINE F3 bend_strongly(Packet& packet, const Tensor& T, const F3& v, F factor, int at) {
+  const F reach = load(packet.reach, at);
+  F size = reach;
+  if (HWY_UNLIKELY(!(packet.greatest_reach <= strongest_kick))) {
+    const F norm = deviator_norm(T, factor), time = hn::Max(load(packet.time, at), set(1e-30f));
+    store(hn::Div(norm, time), packet.bending_rate, at);
+    size = hn::IfThenElse(hn::Le(reach, set(strongest_kick)), reach, norm);
   }
-  return bend_strongly<differentials>(packet, T, v, factor);
+  if constexpr (differentials) store(size, packet.size, at);
+  int terms = 2;
+  while (terms < most_terms && !hn::AllTrue(floats, hn::Le(size, set(series_reach[terms - 2])))) ++terms;
+  F3 inner = v;  // Horner's rule, from the last term that any lane needs.
+  for (int n = terms; n > 2; --n) {
+    const F part = hn::Mul(set(1.0f / static_cast<float>(n)), factor);
+    inner = select(hn::Gt(size, set(series_reach[n - 3])), mul_add(part, apply(T, inner), v), v);
+  }
+  const F3 sum = two_terms(T, v, inner, factor);
+  const F e = excess(sum);
+  const F exact = hn::Div(set(1), hn::Sqrt(hn::Add(e, set(1))));
+  const Mask weak = hn::Le(size, set(series_reach[0]));
+  const F3 result = mul(hn::IfThenElse(weak, inverse_root_near_one(e), exact), sum);
+
+  const Mask fits = hn::Le(size, set(1));
+  if (HWY_LIKELY(hn::AllTrue(floats, fits))) return result;
+  if constexpr (differentials) return select(fits, result, zeros());  // Those rays stop here.
+  return bend_in_double(T, v, factor, result, to_bits(hn::Not(fits), 0));
 }
 
 }  // namespace tensorray::packets::HWY_NAMESPACE

@@ -16,7 +16,7 @@ HWY_BEFORE_NAMESPACE();
 namespace tensorray::packets::HWY_NAMESPACE {
 
 namespace hn = hwy::HWY_NAMESPACE;
-using Floats = hn::CappedTag<float, most_lanes>;
+using Floats = hn::CappedTag<float, 16>;
 using Ints = hn::RebindToSigned<Floats>;
 using Bits = hn::RebindToUnsigned<Floats>;
 using F = hn::Vec<Floats>;
@@ -35,35 +35,42 @@ struct Tensor {
   F c[8];
 };
 
+// Vectors of a packet have the number of their first lane, `at`.
+
 HWY_INLINE F set(float value) { return hn::Set(floats, value); }
-HWY_INLINE F3 load(const float from[3][most_lanes]) {
-  return {hn::Load(floats, from[0]), hn::Load(floats, from[1]), hn::Load(floats, from[2])};
+HWY_INLINE F load(const PerRay& from, int at) { return hn::Load(floats, from + at); }
+HWY_INLINE F3 load(const PerRay (&from)[3], int at) {
+  return {load(from[0], at), load(from[1], at), load(from[2], at)};
 }
-HWY_INLINE void store(const F3& v, float to[3][most_lanes]) {
-  hn::Store(v.x, floats, to[0]);
-  hn::Store(v.y, floats, to[1]);
-  hn::Store(v.z, floats, to[2]);
+HWY_INLINE void store(F value, PerRay& to, int at) { hn::Store(value, floats, to + at); }
+HWY_INLINE void store(const F3& v, PerRay (&to)[3], int at) {
+  store(v.x, to[0], at);
+  store(v.y, to[1], at);
+  store(v.z, to[2], at);
 }
+HWY_INLINE F3 zeros() { return {hn::Zero(floats), hn::Zero(floats), hn::Zero(floats)}; }
 HWY_INLINE F3 add(const F3& a, const F3& b) { return {hn::Add(a.x, b.x), hn::Add(a.y, b.y), hn::Add(a.z, b.z)}; }
+HWY_INLINE F3 sub(const F3& a, const F3& b) { return {hn::Sub(a.x, b.x), hn::Sub(a.y, b.y), hn::Sub(a.z, b.z)}; }
 HWY_INLINE F3 mul(F s, const F3& a) { return {hn::Mul(s, a.x), hn::Mul(s, a.y), hn::Mul(s, a.z)}; }
 HWY_INLINE F3 mul_add(F s, const F3& a, const F3& b) {
   return {hn::MulAdd(s, a.x, b.x), hn::MulAdd(s, a.y, b.y), hn::MulAdd(s, a.z, b.z)};
 }
 HWY_INLINE F dot(const F3& a, const F3& b) { return hn::MulAdd(a.x, b.x, hn::MulAdd(a.y, b.y, hn::Mul(a.z, b.z))); }
+HWY_INLINE F3 floor(const F3& a) { return {hn::Floor(a.x), hn::Floor(a.y), hn::Floor(a.z)}; }
 HWY_INLINE F3 select(Mask mask, const F3& yes, const F3& no) {
   return {hn::IfThenElse(mask, yes.x, no.x), hn::IfThenElse(mask, yes.y, no.y), hn::IfThenElse(mask, yes.z, no.z)};
 }
-HWY_INLINE std::uint32_t to_bits(Mask mask) {
+HWY_INLINE F3 clamp(const F3& p, const F3& low, const F3& high) {
+  return {hn::Min(hn::Max(p.x, low.x), high.x), hn::Min(hn::Max(p.y, low.y), high.y),
+          hn::Min(hn::Max(p.z, low.z), high.z)};
+}
+/// A bit for each lane of the packet.
+HWY_INLINE std::uint32_t to_bits(Mask mask, int at) {
   std::uint8_t bytes[8] = {};
   hn::StoreMaskBits(floats, mask, bytes);
   std::uint32_t result;
   std::memcpy(&result, bytes, sizeof result);
-  return result & ((1u << lanes) - 1);
-}
-
-HWY_INLINE F3 clamp(const F3& p, const F3& low, const F3& high) {
-  return {hn::Min(hn::Max(p.x, low.x), high.x), hn::Min(hn::Max(p.y, low.y), high.y),
-          hn::Min(hn::Max(p.z, low.z), high.z)};
+  return (result & ((1u << lanes) - 1)) << at;
 }
 
 /// T V.
@@ -73,32 +80,107 @@ HWY_INLINE F3 apply(const Tensor& T, const F3& v) {
           hn::MulAdd(T.c[5], v.y, hn::Mul(T.c[2], v.x))};
 }
 
-/// The trilinear polynomial of a cell in the fractions x, y, z: coefficients of 1, z, y, yz, x, xz, xy, xyz.
-template <class D>
-struct Polynomial {
-  hn::Vec<D> k[8];
-};
+/// Of a cell's corners, from its first voxel on: z changes first, then y, then x.
+constexpr int z_stride = TensorBrick::bending_floats, y_stride = TensorBrick::width * z_stride,
+              x_stride = TensorBrick::width * y_stride;
+constexpr int corners[8] = {0,
+                            z_stride,
+                            y_stride,
+                            y_stride + z_stride,
+                            x_stride,
+                            x_stride + z_stride,
+                            x_stride + y_stride,
+                            x_stride + y_stride + z_stride};
 
-/// Of the components from `corner` on, of the cell's first voxel. 12 operations.
-template <class D>
-HWY_INLINE Polynomial<D> cell_polynomial(D d, const float* corner) {
-  constexpr int z = TensorBrick::bending_floats, y = TensorBrick::width * z, x = TensorBrick::width * y;
-  const auto c000 = hn::Load(d, corner), c001 = hn::Load(d, corner + z);
-  const auto c010 = hn::Load(d, corner + y), c011 = hn::Load(d, corner + y + z);
-  const auto c100 = hn::Load(d, corner + x), c101 = hn::Load(d, corner + x + z);
-  const auto c110 = hn::Load(d, corner + x + y), c111 = hn::Load(d, corner + x + y + z);
-  const auto dz = hn::Sub(c001, c000), dy = hn::Sub(c010, c000), dx = hn::Sub(c100, c000);
-  const auto yz = hn::Sub(hn::Sub(c011, c010), dz);
-  const auto far = hn::Sub(c101, c100), far_y = hn::Sub(c110, c100);
-  const auto xyz = hn::Sub(hn::Sub(hn::Sub(c111, c110), far), yz);
-  return {{c000, dz, dy, yz, dx, hn::Sub(far, dz), hn::Sub(far_y, dy), xyz}};
+/// The weights of a cell's corners at a point within it, stored. 13 operations.
+HWY_INLINE void make_weights(const F3& fraction, Packet& packet, int at) {
+  const F yz = hn::Mul(fraction.y, fraction.z);
+  const F y = hn::Sub(fraction.y, yz), z = hn::Sub(fraction.z, yz), neither = hn::Sub(hn::Sub(set(1), fraction.y), z);
+  const F of_face[4] = {neither, z, y, yz};
+  for (int i = 0; i < 4; ++i) {
+    const F far = hn::Mul(fraction.x, of_face[i]);
+    store(hn::Sub(of_face[i], far), packet.weights[i], at);
+    store(far, packet.weights[4 + i], at);
+  }
 }
 
-/// 7 operations; the same ones in the same order whatever D is.
+using Eight = hn::CappedTag<float, 8>;  // For the components of one voxel.
+constexpr Eight eight;
+constexpr int eight_lanes = static_cast<int>(hn::MaxLanes(Eight()));
+
+HWY_INLINE const float* cell_of(const Packet& packet, int lane) {
+  return packet.bending[lane] + static_cast<int>(packet.voxel[lane]) * TensorBrick::bending_floats;
+}
+
+/// The tensors of `count` vectors, one or two, whose lanes all are in one cell: each component of a corner is loaded
+/// once, goes to all lanes, and is multiplied by all vectors' weights. The same operations in the same order as in
+/// sample_own_cells.
+template <int count>
+HWY_INLINE void sample_cell(const float* HWY_RESTRICT cell, Packet& packet, int first) {
+  constexpr int together = 8 / count;  // Components: as many sums as registers hold with what they are made of.
+  for (int i = 0; i < 8; i += together) {
+    F sums[together][count], weights[count];
+#pragma GCC unroll 8
+    for (int k = 7; k >= 0; --k) {
+      for (int n = 0; n < count; ++n) weights[n] = load(packet.weights[k], first + n * lanes);
+#pragma GCC unroll 8
+      for (int j = 0; j < together; ++j) {
+        const F corner = set(cell[corners[k] + i + j]);
+        for (int n = 0; n < count; ++n)
+          sums[j][n] = k == 7 ? hn::Mul(corner, weights[n]) : hn::MulAdd(corner, weights[n], sums[j][n]);
+      }
+    }
+#pragma GCC unroll 8
+    for (int j = 0; j < together; ++j)
+      for (int n = 0; n < count; ++n) store(sums[j][n], packet.tensor[i + j], first + n * lanes);
+  }
+}
+
+/// The same of any number of vectors.
+HWY_INLINE void sample_cell(const float* cell, Packet& packet, int first, int count) {
+  for (; count > 1; count -= 2, first += 2 * lanes) sample_cell<2>(cell, packet, first);
+  if (count > 0) sample_cell<1>(cell, packet, first);
+}
+
+/// Keeps components of a lane's tensor: the first four of all lanes, then the last four.
 template <class V>
-HWY_INLINE V evaluate(V k0, V kz, V ky, V kyz, V kx, V kxz, V kxy, V kxyz, V x, V y, V z) {
-  const V near = hn::MulAdd(hn::MulAdd(kyz, z, ky), y, hn::MulAdd(kz, z, k0));
-  return hn::MulAdd(hn::MulAdd(hn::MulAdd(kxyz, z, kxy), y, hn::MulAdd(kxz, z, kx)), x, near);
+HWY_INLINE void store_components(V values, int i, int lane, float* components) {
+  float* const first = components + (i / 4 * lanes + lane) * 4 + i % 4;
+#if HWY_TARGET != HWY_SCALAR
+  if constexpr (eight_lanes == 8) {
+    const hn::Half<Eight> four;
+    hn::Store(hn::LowerHalf(four, values), four, first);
+    return hn::Store(hn::UpperHalf(four, values), four, first + lanes * 4);
+  }
+#endif
+  hn::Store(values, eight, first);
+}
+
+/// From lane after lane to component after component.
+HWY_INLINE void transpose(const float* components, PerRay (&tensor)[8], int at) {
+  for (int half = 0; half < 2; ++half) {
+    F a, b, c, d;
+    hn::LoadInterleaved4(floats, components + half * lanes * 4, a, b, c, d);
+    store(a, tensor[4 * half], at);
+    store(b, tensor[4 * half + 1], at);
+    store(c, tensor[4 * half + 2], at);
+    store(d, tensor[4 * half + 3], at);
+  }
+}
+
+/// The tensors of a vector whose lanes are in several cells: a vector holds the components of one lane at a time.
+HWY_INLINE void sample_own_cells(Packet& packet, int at) {
+  for (int i = 0; i < 8; i += eight_lanes) {
+    for (int lane = 0; lane < lanes; ++lane) {
+      const float* const cell = cell_of(packet, at + lane) + i;
+      const auto weight = [&](int k) HWY_ATTR { return hn::Set(eight, packet.weights[k][at + lane]); };
+      auto sum = hn::Mul(hn::Load(eight, cell + corners[7]), weight(7));
+#pragma GCC unroll 8
+      for (int k = 6; k >= 0; --k) sum = hn::MulAdd(hn::Load(eight, cell + corners[k]), weight(k), sum);
+      store_components(sum, i, lane, packet.components);
+    }
+  }
+  transpose(packet.components, packet.tensor, at);
 }
 
 /// A value and its slopes.
@@ -107,86 +189,44 @@ struct Slopes {
   V value, x, y, z;
 };
 
-/// The same with the slopes: 11 operations.
+/// The trilinear polynomial of a cell, of the components from `cell` on, and its slopes at a point within it.
 template <class V>
-HWY_INLINE Slopes<V> evaluate_slopes(V k0, V kz, V ky, V kyz, V kx, V kxz, V kxy, V kxyz, V x, V y, V z) {
-  const V near_y = hn::MulAdd(kyz, z, ky), far_y = hn::MulAdd(kxyz, z, kxy);
-  const V near = hn::MulAdd(near_y, y, hn::MulAdd(kz, z, k0)), far = hn::MulAdd(far_y, y, hn::MulAdd(kxz, z, kx));
-  return {hn::MulAdd(far, x, near), far, hn::MulAdd(far_y, x, near_y),
+HWY_INLINE Slopes<V> sample_slopes(const float* cell, V x, V y, V z) {
+  const auto c = [&](int k) HWY_ATTR { return hn::Load(eight, cell + corners[k]); };
+  const V k0 = c(0), kz = hn::Sub(c(1), k0), ky = hn::Sub(c(2), k0), kx = hn::Sub(c(4), k0);
+  const V kyz = hn::Sub(hn::Sub(c(3), c(2)), kz);
+  const V far = hn::Sub(c(5), c(4)), far_y = hn::Sub(c(6), c(4));
+  const V kxz = hn::Sub(far, kz), kxy = hn::Sub(far_y, ky);
+  const V kxyz = hn::Sub(hn::Sub(hn::Sub(c(7), c(6)), far), kyz);
+  const V y_near = hn::MulAdd(kyz, z, ky), y_far = hn::MulAdd(kxyz, z, kxy);
+  const V near = hn::MulAdd(y_near, y, hn::MulAdd(kz, z, k0)), slope = hn::MulAdd(y_far, y, hn::MulAdd(kxz, z, kx));
+  return {hn::MulAdd(slope, x, near), slope, hn::MulAdd(y_far, x, y_near),
           hn::MulAdd(hn::MulAdd(kxyz, y, kxz), x, hn::MulAdd(kyz, y, kz))};
 }
 
-using Eight = hn::CappedTag<float, 8>;  // For the components of one voxel.
-constexpr Eight eight;
-constexpr int eight_lanes = static_cast<int>(hn::MaxLanes(Eight()));
-
-/// All lanes are in one cell: its polynomial is made once, and its coefficients go to all lanes.
-HWY_INLINE void make_polynomial(const float* corner, float (&k)[8][8]) {
-  for (int i = 0; i < 8; i += eight_lanes) {
-    const Polynomial<Eight> polynomial = cell_polynomial(eight, corner + i);
-    for (int j = 0; j < 8; ++j) hn::Store(polynomial.k[j], eight, &k[j][i]);
-  }
-}
-
-HWY_INLINE F evaluate_polynomial(const float (&k)[8][8], int i, const F3& f) {
-  return evaluate(set(k[0][i]), set(k[1][i]), set(k[2][i]), set(k[3][i]), set(k[4][i]), set(k[5][i]), set(k[6][i]),
-                  set(k[7][i]), f.x, f.y, f.z);
-}
-
-HWY_INLINE Slopes<F> polynomial_slopes(const float (&k)[8][8], int i, const F3& f) {
-  return evaluate_slopes(set(k[0][i]), set(k[1][i]), set(k[2][i]), set(k[3][i]), set(k[4][i]), set(k[5][i]),
-                         set(k[6][i]), set(k[7][i]), f.x, f.y, f.z);
-}
-
-/// Components of one lane: the first four of each lane, and the last four.
-template <class V>
-HWY_INLINE void store_components(V values, int i, int lane, float (*components)[most_lanes][4]) {
-  alignas(32) float eight_values[8];
-  hn::Store(values, eight, eight_values);
-  for (int j = 0; j < eight_lanes; j += 4) std::memcpy(components[(i + j) / 4][lane], eight_values + j, 16);
-}
-
-/// Lanes are in several cells: a vector holds the components of one lane at a time.
-template <bool differentials>
-HWY_NOINLINE void sample_own_cells(Packet& packet, const std::int32_t* voxels) {
+/// The same of all components, with the slopes of the tensors.
+HWY_INLINE void sample_own_slopes(Packet& packet, int at) {
+  alignas(64) float components[4][lanes * 8];
   for (int i = 0; i < 8; i += eight_lanes) {
     for (int lane = 0; lane < lanes; ++lane) {
-      const float* const corner = packet.bending[lane] + voxels[lane] * TensorBrick::bending_floats + i;
-      const Polynomial<Eight> p = cell_polynomial(eight, corner);
-      const auto x = hn::Set(eight, packet.fraction[0][lane]), y = hn::Set(eight, packet.fraction[1][lane]),
-                 z = hn::Set(eight, packet.fraction[2][lane]);
-      if constexpr (differentials) {
-        const auto at = evaluate_slopes(p.k[0], p.k[1], p.k[2], p.k[3], p.k[4], p.k[5], p.k[6], p.k[7], x, y, z);
-        store_components(at.value, i, lane, packet.components);
-        store_components(at.x, i, lane, packet.slope_components[0]);
-        store_components(at.y, i, lane, packet.slope_components[1]);
-        store_components(at.z, i, lane, packet.slope_components[2]);
-      } else {
-        store_components(evaluate(p.k[0], p.k[1], p.k[2], p.k[3], p.k[4], p.k[5], p.k[6], p.k[7], x, y, z), i, lane,
-                         packet.components);
-      }
+      const float* const cell = cell_of(packet, at + lane) + i;
+      const auto fraction = [&](int axis) HWY_ATTR { return hn::Set(eight, packet.fraction[axis][at + lane]); };
+      const auto sampled = sample_slopes(cell, fraction(0), fraction(1), fraction(2));
+      store_components(sampled.value, i, lane, components[0]);
+      store_components(sampled.x, i, lane, components[1]);
+      store_components(sampled.y, i, lane, components[2]);
+      store_components(sampled.z, i, lane, components[3]);
     }
   }
-}
-
-/// From lane after lane to component after component.
-HWY_INLINE void transpose(const float (&components)[2][most_lanes][4], float (&tensor)[8][most_lanes]) {
-  for (int half = 0; half < 2; ++half) {
-    F a, b, c, d;
-    hn::LoadInterleaved4(floats, components[half][0], a, b, c, d);
-    hn::Store(a, floats, tensor[4 * half]);
-    hn::Store(b, floats, tensor[4 * half + 1]);
-    hn::Store(c, floats, tensor[4 * half + 2]);
-    hn::Store(d, floats, tensor[4 * half + 3]);
-  }
+  transpose(components[0], packet.tensor, at);
+  for (int axis = 0; axis < 3; ++axis) transpose(components[1 + axis], packet.slopes[axis], at);
 }
 
 /// Asks for the memory of a cell.
-HWY_INLINE void prefetch_cell(const float* corner) {
-  constexpr int z = TensorBrick::bending_floats, y = TensorBrick::width * z, x = TensorBrick::width * y;
-  for (const int edge : {0, y, x, x + y}) {
-    hwy::Prefetch(corner + edge);
-    hwy::Prefetch(corner + edge + z);
+HWY_INLINE void prefetch_cell(const float* cell) {
+  for (const int edge : {0, y_stride, x_stride, x_stride + y_stride}) {
+    hwy::Prefetch(cell + edge);
+    hwy::Prefetch(cell + edge + z_stride);
   }
 }
 

@@ -37,35 +37,41 @@ class Kernel {
   std::uint64_t run();
 
  private:
-  static constexpr int in_flight = 4;  // Packets that are stepped in turn: the processor works on several at once.
+  // Packets that are stepped in turn: as many vectors as the processor needs to have work while one waits for another.
+  static constexpr int in_flight = lanes > 8 ? 2 : 1;
 
   bool fill(Packet& packet);
   void enter(Packet& packet, int lane);
-  void repeat(Packet& packet, int lane, int of);
-  void prefetch(const Packet& packet, const F3& point);
-  void locate(Packet& packet, F time);
-  void interpolate(Packet& packet);
-  void bend_differentials(Packet& packet, const Tensor& T, const F3& v, F factor, F time);
+  static void copy_lane(const Packet& from, int of, Packet& to, int lane);
+  void close_ranks(Packet& packet);
   F3 index_direction(const F3& v) const;
   void leave_straight_bricks(Packet& packet);
-  F step_time(Packet& packet, const F3& u);
-  F3 take_step(Packet& packet, F3& v, F3& u);
+  void find_times(Packet& packet);
+  template <bool careful>
+  bool find_cells(Packet& packet, bool forced);
+  void locate(Packet& packet);
+  void prefetch_one(const Packet& packet, int lane);
+  void prefetch_all(const Packet& packet, int first);
+  bool in_one_cell(const Packet& packet, int first) const;
+  void interpolate(Packet& packet);
+  void sample_apart(Packet& packet);
+  void bend_differentials(Packet& packet, const Tensor& T, const F3& v, F factor, int at);
+  template <bool weakly>
+  void take_step_as(Packet& packet, PerRay (&p)[3], PerRay (&v)[3], PerRay (&u)[3]);
+  void take_step(Packet& packet, PerRay (&p)[3], PerRay (&v)[3], PerRay (&u)[3]);
   void step(Packet& packet);
-  std::uint32_t outside(const Packet& packet, const F3& to) const;
-  std::uint32_t stopped(const Packet& packet, const F3& to, const F3& v) const;
+  void step_watched(Packet& packet);
+  std::uint32_t outside(const Packet& packet, const PerRay (&points)[3]) const;
+  std::uint32_t stopped(const Packet& packet) const;
   std::uint32_t spent(const Packet& packet) const;
   void locate_on_extent(Packet& packet);
   void take_out(Packet& packet, std::uint32_t stop, std::uint32_t leave);
-  void repeat_one_alive(Packet& packet);
   void keep_points(const Packet& packet);
-  static auto direction(const Packet& packet) -> const float (&)[3][most_lanes] {
-    return uniform ? packet.v : packet.u;
-  }
+  static auto direction(const Packet& packet) -> const PerRay (&)[3] { return uniform ? packet.v : packet.u; }
   float to_world() const { return uniform ? medium_.voxel : 1.0f; }  // Of what u is per.
   void land(Packet& packet);
 
   const Medium& medium_;
-  const bool may_stop_ = std::isfinite(medium_.settings.max_length);  // Within the field, before the last step.
   std::vector<KernelRay>& rays_;
   KernelRays& batch_;
   std::size_t next_ = 0;  // The first ray that no packet has held yet.
@@ -93,52 +99,72 @@ void Kernel<uniform, differentials>::enter(Packet& packet, int lane) {
   packet.length[lane] = 0;
 }
 
-/// Lets a lane repeat what another does.
+/// Copies what a ray is, but for what follows from its brick (see `begin`).
 template <bool uniform, bool differentials>
-void Kernel<uniform, differentials>::repeat(Packet& packet, int lane, int of) {
+void Kernel<uniform, differentials>::copy_lane(const Packet& from, int of, Packet& to, int lane) {
   for (int axis = 0; axis < 3; ++axis) {
-    packet.p[axis][lane] = packet.p[axis][of];
-    packet.v[axis][lane] = packet.v[axis][of];
-    packet.u[axis][lane] = packet.u[axis][of];
-    packet.brick[axis][lane] = packet.brick[axis][of];
+    to.p[axis][lane] = from.p[axis][of];
+    to.v[axis][lane] = from.v[axis][of];
+    if constexpr (!uniform) to.u[axis][lane] = from.u[axis][of];
+    to.brick[axis][lane] = from.brick[axis][of];
     if constexpr (differentials)
       for (int i = 0; i < 2; ++i) {
-        packet.dp[i][axis][lane] = packet.dp[i][axis][of];
-        packet.dv[i][axis][lane] = packet.dv[i][axis][of];
+        to.dp[i][axis][lane] = from.dp[i][axis][of];
+        to.dv[i][axis][lane] = from.dv[i][axis][of];
       }
   }
-  packet.kick[lane] = packet.kick[of];
-  packet.length[lane] = packet.length[of];
-  packet.bending_rate[lane] = packet.bending_rate[of];
-  packet.time[lane] = packet.time[of];
-  packet.ray[lane] = packet.ray[of];
+  to.kick[lane] = from.kick[of];
+  to.length[lane] = from.length[of];
+  to.bending_rate[lane] = from.bending_rate[of];
+  to.time[lane] = from.time[of];
+  to.ray[lane] = from.ray[of];
+}
+
+/// Brings the rays that go on to the front if that frees a vector, and lets the other lanes repeat one of them.
+template <bool uniform, bool differentials>
+void Kernel<uniform, differentials>::close_ranks(Packet& packet) {
+  const int count = static_cast<int>(hwy::PopCount(packet.alive));
+  if (count <= (packet.vectors - 1) * lanes) {
+    int to = 0;
+    for (std::uint32_t rest = packet.alive; rest != 0; rest &= rest - 1, ++to) {
+      const int lane = static_cast<int>(hwy::Num0BitsBelowLS1Bit_Nonzero32(rest));
+      if (to != lane) copy_lane(packet, lane, packet, to);
+    }
+    packet.vectors = (count + lanes - 1) / lanes;
+    packet.alive = ~0u >> (packet_rays - count);
+  }
+  const int of = static_cast<int>(hwy::Num0BitsBelowLS1Bit_Nonzero32(packet.alive));
+  for (int lane = 0; lane < packet.vectors * lanes; ++lane)
+    if (!(packet.alive >> lane & 1)) copy_lane(packet, of, packet, lane);
+  begin<uniform>(medium_, packet);
 }
 
 template <bool uniform, bool differentials>
 bool Kernel<uniform, differentials>::fill(Packet& packet) {
   if (next_ == rays_.size()) return false;
-  packet.alive = 0;
+  const int count = static_cast<int>(std::min<std::size_t>(packet_rays, rays_.size() - next_));
+  packet.alive = ~0u >> (packet_rays - count);
+  packet.vectors = packet_rays / lanes;
   packet.clamps = medium_.flat;
   packet.steps = 0;
   packet.most_steps = medium_.settings.max_steps;
-  for (int lane = 0; lane < lanes; ++lane) {
-    if (next_ == rays_.size()) {
-      repeat(packet, lane, 0);
-      continue;
-    }
+  for (int lane = 0; lane < count; ++lane) {
     packet.ray[lane] = static_cast<std::int32_t>(next_++);
     enter(packet, lane);
-    packet.alive |= 1u << lane;
     packet.most_steps = std::min(packet.most_steps, medium_.settings.max_steps - rays_[packet.ray[lane]].steps);
   }
-  if constexpr (!uniform) store(index_direction(load(packet.v)), packet.u);
-  begin<uniform>(medium_, packet);
+  if constexpr (!uniform)
+    for (int i = 0; i < packet_rays; i += lanes) store(index_direction(load(packet.v, i)), packet.u, i);
+  if (count < packet_rays)
+    close_ranks(packet);
+  else
+    begin<uniform>(medium_, packet);
   return true;
 }
 
 template <bool uniform, bool differentials>
 HWY_INLINE F3 Kernel<uniform, differentials>::index_direction(const F3& v) const {
-  if constexpr (uniform) return v;
+  if (uniform) return {v.x, v.y, v.z};
   const auto& m = medium_.to_index;
   const auto row = [&](int i) HWY_ATTR {
     return hn::MulAdd(set(m[i][0]), v.x, hn::MulAdd(set(m[i][1]), v.y, hn::Mul(set(m[i][2]), v.z)));
@@ -146,213 +172,299 @@ HWY_INLINE F3 Kernel<uniform, differentials>::index_direction(const F3& v) const
   return {row(0), row(1), row(2)};
 }
 
-/// Asks for the memory of the cells where a packet will be after two long steps, as far as they are in its bricks. Only
-/// where its lanes are apart: the cells of others are mostly at hand, and it would cost them a tenth.
-template <bool uniform, bool differentials>
-HWY_INLINE void Kernel<uniform, differentials>::prefetch(const Packet& packet, const F3& point) {
-  const F3 ahead = add(point, load(direction(packet)));
-  const F zero = hn::Zero(floats), last = set(TensorBrick::cells - 0.5f), width = set(TensorBrick::width);
-  const F3 cell = clamp(ahead, F3{zero, zero, zero}, F3{last, last, last});
-  const F voxel = hn::MulAdd(hn::MulAdd(hn::Floor(cell.x), width, hn::Floor(cell.y)), width, hn::Floor(cell.z));
-  alignas(64) std::int32_t voxels[most_lanes];
-  hn::Store(hn::ConvertTo(ints, voxel), ints, voxels);
-  for (int lane = 0; lane < lanes; ++lane)
-    prefetch_cell(packet.bending[lane] + voxels[lane] * TensorBrick::bending_floats);
-}
-
-/// The first part of a step: to its middle, and what is needed to interpolate there. Takes lanes to the bricks of these
-/// points. Steps have parts so that the processor works on the same part of several packets at once: each is a chain of
-/// operations that wait for one another, and a whole step is longer than what a processor looks ahead.
-template <bool uniform, bool differentials>
-HWY_INLINE void Kernel<uniform, differentials>::locate(Packet& packet, F time) {
-  const F3 offset = mul(hn::Mul(set(0.5f), time), load(direction(packet)));
-  F3 point, near;
-  for (bool again = false;; again = true) {
-    point = add(load(packet.p), offset);
-    if (HWY_UNLIKELY(packet.clamps)) point = clamp(point, load(packet.low), load(packet.high));
-    near = {hn::Floor(point.x), hn::Floor(point.y), hn::Floor(point.z)};
-    if (HWY_UNLIKELY(packet.clamps)) near = clamp(near, load(packet.low), load(packet.last));
-    // As unsigned integers, negative floats are the greatest.
-    const auto greatest =
-        hn::Max(hn::Max(hn::BitCast(bits, near.x), hn::BitCast(bits, near.y)), hn::BitCast(bits, near.z));
-    const auto outside_brick = hn::Gt(greatest, hn::BitCast(bits, set(TensorBrick::cells - 1)));
-    if (HWY_LIKELY(hn::AllFalse(bits, outside_brick))) break;
-    if (again) {  // Beyond the extent, or on the face that rounding took it to.
-      const F zero = hn::Zero(floats), last = set(TensorBrick::cells - 1);
-      near = clamp(near, F3{zero, zero, zero}, F3{last, last, last});
-      break;
-    }
-    move_to_bricks<uniform>(medium_, packet, point);
-  }
-  hn::Store(time, floats, packet.time);
-  store(add(load(packet.p), offset), packet.middle);
-  if constexpr (differentials)
-    for (int i = 0; i < 2; ++i)
-      store(mul_add(hn::Mul(set(0.5f), time), index_direction(load(packet.dv[i])), load(packet.dp[i])),
-            packet.dmiddle[i]);
-  store({hn::Sub(point.x, near.x), hn::Sub(point.y, near.y), hn::Sub(point.z, near.z)}, packet.fraction);
-  const F width = set(TensorBrick::width);
-  const F voxel = hn::MulAdd(hn::MulAdd(near.x, width, near.y), width, near.z);
-  const float first = hn::GetLane(voxel);
-  packet.one_cell = packet.one_brick && hn::AllTrue(floats, hn::Eq(voxel, set(first)));
-  if (HWY_LIKELY(packet.one_cell))
-    return make_polynomial(packet.bending[0] + static_cast<int>(first) * TensorBrick::bending_floats,
-                           packet.polynomial);
-  prefetch(packet, point);
-  alignas(64) std::int32_t voxels[most_lanes];
-  hn::Store(hn::ConvertTo(ints, voxel), ints, voxels);
-  sample_own_cells<differentials>(packet, voxels);
-}
-
-/// The second part: the tensor there.
-template <bool uniform, bool differentials>
-HWY_INLINE void Kernel<uniform, differentials>::interpolate(Packet& packet) {
-  if (HWY_UNLIKELY(!packet.one_cell)) {
-    transpose(packet.components, packet.tensor);
-    if constexpr (differentials)
-      for (int axis = 0; axis < 3; ++axis) transpose(packet.slope_components[axis], packet.slopes[axis]);
-    return;
-  }
-  const F3 f = load(packet.fraction);
-  for (int i = 0; i < 8; ++i) {
-    if constexpr (differentials) {
-      const Slopes<F> at = polynomial_slopes(packet.polynomial, i, f);
-      hn::Store(at.value, floats, packet.tensor[i]);
-      hn::Store(at.x, floats, packet.slopes[0][i]);
-      hn::Store(at.y, floats, packet.slopes[1][i]);
-      hn::Store(at.z, floats, packet.slopes[2][i]);
-    } else {
-      hn::Store(evaluate_polynomial(packet.polynomial, i, f), floats, packet.tensor[i]);
-    }
-  }
-}
-
 /// The last step of lanes in bricks where nothing bends light ended a little behind them: takes these lanes to the
 /// bricks where they are now. (Others are taken there by their steps' middles, whatever their neighbours do.)
 template <bool uniform, bool differentials>
 HWY_NOINLINE void Kernel<uniform, differentials>::leave_straight_bricks(Packet& packet) {
   const F zero = hn::Zero(floats), end = set(TensorBrick::cells);
-  const F3 p = load(packet.p);
-  const auto beyond = [&](F x) HWY_ATTR { return hn::Or(hn::Lt(x, zero), hn::Ge(x, end)); };
-  const Mask moves =
-      hn::And(hn::Eq(hn::Load(floats, packet.strongest), zero), hn::Or(beyond(p.x), hn::Or(beyond(p.y), beyond(p.z))));
-  if (!hn::AllFalse(floats, moves))
-    move_to_bricks<uniform>(medium_, packet,
-                            select(moves, clamp(p, load(packet.low), load(packet.high)), {zero, zero, zero}));
+  const auto moves = [&](int i) HWY_ATTR {
+    const F3 p = load(packet.p, i);
+    const auto beyond = [&](F x) HWY_ATTR { return hn::Or(hn::Lt(x, zero), hn::Ge(x, end)); };
+    return hn::And(hn::Eq(load(packet.strongest, i), zero), hn::Or(beyond(p.x), hn::Or(beyond(p.y), beyond(p.z))));
+  };
+  std::uint32_t any = 0;
+  for (int i = 0; i < packet.vectors * lanes; i += lanes) any |= to_bits(moves(i), i);
+  if (any == 0) return;
+  move_to_bricks<uniform>(medium_, packet, [&](int i) HWY_ATTR {
+    return select(moves(i), clamp(load(packet.p, i), load(packet.low, i), load(packet.high, i)), zeros());
+  });
 }
 
 /// How long the next step is, in the units that u is per: voxels, or, if voxels are not uniform, world units.
 template <bool uniform, bool differentials>
-HWY_INLINE F Kernel<uniform, differentials>::step_time(Packet& packet, const F3& u) {
-  const F voxel = uniform ? set(1) : hn::Div(set(1), hn::Sqrt(dot(u, u)));
+HWY_NOINLINE void Kernel<uniform, differentials>::find_times(Packet& packet) {
+  if (packet.straight) leave_straight_bricks(packet);
   const bool automatic = medium_.settings.step == 0;
-  F steps = set(medium_.longest_step);
-  if (HWY_UNLIKELY(automatic && !(packet.greatest_reach <= strongest_kick))) {
-    const F kick = hn::Mul(hn::Load(floats, packet.bending_rate), voxel);
-    const F shorter = hn::Max(hn::Div(set(strongest_kick), kick), set(shortest_automatic_step));
-    steps = hn::IfThenElse(hn::Gt(hn::Mul(kick, set(longest_automatic_step)), set(strongest_kick)), shorter, steps);
+  const F zero = hn::Zero(floats), end = set(TensorBrick::cells);
+  for (int i = 0; i < packet.vectors * lanes; i += lanes) {
+    const F3 u = load(direction(packet), i);
+    const F voxel = uniform ? set(1) : hn::Div(set(1), hn::Sqrt(dot(u, u)));
+    F steps = set(medium_.longest_step);
+    if (automatic && !(packet.greatest_reach <= strongest_kick)) {
+      const F kick = hn::Mul(load(packet.bending_rate, i), voxel);
+      const F shorter = hn::Max(hn::Div(set(strongest_kick), kick), set(shortest_automatic_step));
+      steps = hn::IfThenElse(hn::Gt(hn::Mul(kick, set(longest_automatic_step)), set(strongest_kick)), shorter, steps);
+    }
+    F time = uniform ? steps : hn::Mul(steps, voxel);
+    if (packet.straight) {
+      // Out of the brick where nothing bends light, and a little further, so that rounding does not keep it there.
+      const F3 p = load(packet.p, i);
+      const auto way = [&](F x, F along) HWY_ATTR {
+        const F to = hn::Sub(hn::IfThenElse(hn::Gt(along, zero), end, zero), x);
+        return hn::IfThenElse(hn::Eq(along, zero), set(1e30f), hn::Div(to, along));
+      };
+      const F out = hn::Min(hn::Min(way(p.x, u.x), way(p.y, u.y)), way(p.z, u.z));
+      const auto within = [&](F x) HWY_ATTR { return hn::And(hn::Ge(x, zero), hn::Le(x, end)); };
+      const Mask crosses = hn::And(hn::And(within(p.x), hn::And(within(p.y), within(p.z))),
+                                   hn::And(hn::Eq(load(packet.strongest, i), zero), hn::Lt(out, set(1e29f))));
+      time = hn::IfThenElse(crosses, hn::MulAdd(set(past_straight_brick), voxel, out), time);
+    }
+    store(time, packet.time, i);
   }
-  F time = uniform ? steps : hn::Mul(steps, voxel);
-  if (HWY_UNLIKELY(packet.straight)) {
-    leave_straight_bricks(packet);
-    // Out of the brick where nothing bends light, and a little further, so that rounding does not keep it there.
-    const F3 p = load(packet.p);
-    const F zero = hn::Zero(floats), end = set(TensorBrick::cells);
-    const auto way = [&](F x, F along) HWY_ATTR {
-      const F to = hn::Sub(hn::IfThenElse(hn::Gt(along, zero), end, zero), x);
-      return hn::IfThenElse(hn::Eq(along, zero), set(1e30f), hn::Div(to, along));
-    };
-    const F out = hn::Min(hn::Min(way(p.x, u.x), way(p.y, u.y)), way(p.z, u.z));
-    const auto within = [&](F x) HWY_ATTR { return hn::And(hn::Ge(x, zero), hn::Le(x, end)); };
-    const Mask crosses = hn::And(hn::And(within(p.x), hn::And(within(p.y), within(p.z))),
-                                 hn::And(hn::Eq(hn::Load(floats, packet.strongest), zero), hn::Lt(out, set(1e29f))));
-    time = hn::IfThenElse(crosses, hn::MulAdd(set(past_straight_brick), voxel, out), time);
+  packet.timed = !packet.varied;
+}
+
+/// Finds the middles of steps, their cells, and what is needed to interpolate there. `careful`: where the packet
+/// clamps, or, with `forced`, points are beyond their bricks, on whose faces they then are taken to be.
+/// @return whether all are within their lanes' bricks.
+template <bool uniform, bool differentials>
+template <bool careful>
+HWY_INLINE bool Kernel<uniform, differentials>::find_cells(Packet& packet, bool forced) {
+  const F last = set(TensorBrick::cells - 1), width = set(TensorBrick::width);
+  auto greatest = hn::Zero(bits);
+  F first = hn::Zero(floats);
+  Mask same = hn::Eq(first, first);
+  for (int i = 0; i < packet.vectors * lanes; i += lanes) {
+    const F half = hn::Mul(set(0.5f), load(packet.time, i));
+    F3 point = mul_add(half, load(direction(packet), i), load(packet.p, i));
+    store(point, packet.middle, i);
+    if (careful && packet.clamps) point = clamp(point, load(packet.low, i), load(packet.high, i));
+    F3 near = floor(point);
+    if (careful && packet.clamps) near = clamp(near, load(packet.low, i), load(packet.last, i));
+    // As unsigned integers, negative floats are the greatest.
+    greatest = hn::Max(hn::Max(greatest, hn::BitCast(bits, near.x)),
+                       hn::Max(hn::BitCast(bits, near.y), hn::BitCast(bits, near.z)));
+    if (careful && forced) near = clamp(near, zeros(), {last, last, last});
+    const F3 fraction = sub(point, near);
+    if constexpr (differentials)
+      store(fraction, packet.fraction, i);
+    else
+      make_weights(fraction, packet, i);
+    const F voxel = hn::MulAdd(hn::MulAdd(near.x, width, near.y), width, near.z);
+    store(voxel, packet.voxel, i);
+    if (i == 0) first = set(hn::GetLane(voxel));
+    same = hn::And(same, hn::Eq(voxel, first));
   }
-  return time;
+  packet.one_cell = packet.one_brick && hn::AllTrue(floats, same);
+  return hn::AllFalse(bits, hn::Gt(greatest, hn::BitCast(bits, last)));
+}
+
+/// The first part of a step: to its middle. Takes lanes to the bricks of these points.
+template <bool uniform, bool differentials>
+HWY_INLINE void Kernel<uniform, differentials>::locate(Packet& packet) {
+  const bool found = packet.clamps ? find_cells<true>(packet, false) : find_cells<false>(packet, false);
+  if (HWY_LIKELY(found)) return;
+  move_to_bricks<uniform>(medium_, packet, [&](int i) HWY_ATTR {
+    const F3 point = load(packet.middle, i);
+    return packet.clamps ? clamp(point, load(packet.low, i), load(packet.high, i)) : point;
+  });
+  find_cells<true>(packet, true);  // Beyond the extent, or on the face that rounding took it to.
+}
+
+/// Asks for the memory of the cell where a lane will be after two long steps, if it is in its brick.
+template <bool uniform, bool differentials>
+HWY_INLINE void Kernel<uniform, differentials>::prefetch_one(const Packet& packet, int lane) {
+  int voxel = 0;
+  for (int axis = 0; axis < 3; ++axis) {
+    const float ahead = packet.middle[axis][lane] + direction(packet)[axis][lane];
+    const int cell = static_cast<int>(std::min(std::max(ahead, 0.0f), TensorBrick::cells - 0.5f));
+    voxel = voxel * TensorBrick::width + cell;
+  }
+  prefetch_cell(packet.bending[lane] + voxel * TensorBrick::bending_floats);
+}
+
+/// Asks for the memory of the cells where the lanes of a vector will be after two long steps.
+template <bool uniform, bool differentials>
+HWY_INLINE void Kernel<uniform, differentials>::prefetch_all(const Packet& packet, int first) {
+  float between =
+      packet.one_brick ? 0 : 2;  // The outermost lanes, or so: of wavelengths, whose order is that of space.
+  for (const PerRay& middle : packet.middle)
+    between = std::max(between, std::fabs(middle[first] - middle[first + lanes - 1]));
+  if (between < 1) {
+    prefetch_one(packet, first);
+    return prefetch_one(packet, first + lanes - 1);
+  }
+  const F3 ahead = add(load(packet.middle, first), load(direction(packet), first));
+  const F zero = hn::Zero(floats), cells = set(TensorBrick::cells), part = set(1.0f / TensorBrick::cells);
+  const auto bricks = [&](F x) HWY_ATTR { return hn::Floor(hn::Mul(x, part)); };
+  const F3 offset{bricks(ahead.x), bricks(ahead.y), bricks(ahead.z)};
+  const auto cell = [&](F x, F of) HWY_ATTR { return hn::Floor(hn::NegMulAdd(of, cells, x)); };
+  const F width = set(TensorBrick::width);
+  const F voxel =
+      hn::MulAdd(hn::MulAdd(cell(ahead.x, offset.x), width, cell(ahead.y, offset.y)), width, cell(ahead.z, offset.z));
+  alignas(64) std::int32_t voxels[lanes], offsets[3][lanes];
+  hn::Store(hn::ConvertTo(ints, voxel), ints, voxels);
+  hn::Store(hn::ConvertTo(ints, offset.x), ints, offsets[0]);
+  hn::Store(hn::ConvertTo(ints, offset.y), ints, offsets[1]);
+  hn::Store(hn::ConvertTo(ints, offset.z), ints, offsets[2]);
+  const std::uint32_t moves =
+      to_bits(hn::Or(hn::Ne(offset.x, zero), hn::Or(hn::Ne(offset.y, zero), hn::Ne(offset.z, zero))), 0);
+  for (int lane = 0; lane < lanes; ++lane) {
+    const float* brick = packet.bending[first + lane];
+    if (moves >> lane & 1) {
+      const std::int32_t at[3] = {packet.brick[0][first + lane] + offsets[0][lane],
+                                  packet.brick[1][first + lane] + offsets[1][lane],
+                                  packet.brick[2][first + lane] + offsets[2][lane]};
+      brick = medium_.brick(at).bending;
+    }
+    prefetch_cell(brick + voxels[lane] * TensorBrick::bending_floats);
+  }
+}
+
+/// Whether all lanes of a vector are in one cell.
+template <bool uniform, bool differentials>
+HWY_INLINE bool Kernel<uniform, differentials>::in_one_cell(const Packet& packet, int first) const {
+  Mask same = hn::Eq(load(packet.voxel, first), set(packet.voxel[first]));
+  if (!packet.one_brick)
+    for (const auto& brick : packet.brick)
+      same = hn::And(same, hn::RebindMask(floats, hn::Eq(hn::Load(ints, brick + first), hn::Set(ints, brick[first]))));
+  return hn::AllTrue(floats, same);
+}
+
+/// The tensors of lanes in several cells.
+template <bool uniform, bool differentials>
+HWY_INLINE void Kernel<uniform, differentials>::sample_apart(Packet& packet) {
+  for (int i = 0; i < packet.vectors * lanes; i += lanes) {
+    if (in_one_cell(packet, i)) {
+      sample_cell<1>(cell_of(packet, i), packet, i);
+    } else {
+      prefetch_all(packet, i);
+      sample_own_cells(packet, i);
+    }
+  }
+}
+
+/// The second part: the tensors there.
+template <bool uniform, bool differentials>
+HWY_INLINE void Kernel<uniform, differentials>::interpolate(Packet& packet) {
+  if constexpr (differentials) {
+    for (int i = 0; i < packet.vectors * lanes; i += lanes) sample_own_slopes(packet, i);
+  } else {
+    if (HWY_LIKELY(packet.one_cell)) {
+      prefetch_one(packet, 0);
+      sample_cell(cell_of(packet, 0), packet, 0, packet.vectors);
+    } else {
+      sample_apart(packet);
+    }
+  }
 }
 
 /// The derivatives of exp(factor · T) V, normalised, along two parameters, and those of the positions at the end of the
 /// step: of the method's own steps. One term more than without, as the derivative of a series has one less.
 template <bool uniform, bool differentials>
 HWY_INLINE void Kernel<uniform, differentials>::bend_differentials(Packet& packet, const Tensor& T, const F3& v,
-                                                                   F factor, F time) {
-  const F size = hn::Load(floats, packet.size);
+                                                                   F factor, int at) {
+  const F size = load(packet.size, at), half = hn::Mul(set(0.5f), load(packet.time, at));
   for (int i = 0; i < 2; ++i) {
-    F3 along = load(packet.dmiddle[i]);
+    const F3 dmiddle = mul_add(half, index_direction(load(packet.dv[i], at)), load(packet.dp[i], at));
+    F3 along = dmiddle;
     if (medium_.flat)  // The tensor is the same across an axis of a single voxel.
       along = F3{hn::Mul(along.x, set(medium_.slope[0])), hn::Mul(along.y, set(medium_.slope[1])),
                  hn::Mul(along.z, set(medium_.slope[2]))};
     Tensor dT;
     for (int c = 0; c < 8; ++c)
-      dT.c[c] = hn::MulAdd(along.x, hn::Load(floats, packet.slopes[0][c]),
-                           hn::MulAdd(along.y, hn::Load(floats, packet.slopes[1][c]),
-                                      hn::Mul(along.z, hn::Load(floats, packet.slopes[2][c]))));
-    F3 term = v, sum = v, dterm = load(packet.dv[i]), dsum = dterm;
+      dT.c[c] = hn::MulAdd(
+          along.x, load(packet.slopes[0][c], at),
+          hn::MulAdd(along.y, load(packet.slopes[1][c], at), hn::Mul(along.z, load(packet.slopes[2][c], at))));
+    F3 term = v, sum = v, dterm = load(packet.dv[i], at), dsum = dterm;
     for (int n = 1; n <= most_terms; ++n) {
       const Mask needed = hn::Gt(size, set(n < 4 ? -1.0f : series_reach[n - 4]));
       if (hn::AllFalse(floats, needed)) break;
       const F part = hn::Mul(set(1.0f / static_cast<float>(n)), factor);
       dterm = mul(part, add(apply(T, dterm), apply(dT, term)));
       term = mul(part, apply(T, term));
-      const F3 zero{hn::Zero(floats), hn::Zero(floats), hn::Zero(floats)};
-      sum = add(sum, select(needed, term, zero));
-      dsum = add(dsum, select(needed, dterm, zero));
+      sum = add(sum, select(needed, term, zeros()));
+      dsum = add(dsum, select(needed, dterm, zeros()));
     }
     const F inverse = hn::Div(set(1), hn::Sqrt(dot(sum, sum)));
     const F3 unit = mul(inverse, sum), change = mul(inverse, dsum);
     const F3 dv = mul_add(hn::Neg(dot(unit, change)), unit, change);
-    store(dv, packet.dv_next[i]);
-    store(mul_add(hn::Mul(set(0.5f), time), index_direction(dv), load(packet.dmiddle[i])), packet.dp_next[i]);
+    store(dv, packet.dv_next[i], at);
+    store(mul_add(half, index_direction(dv), dmiddle), packet.dp_next[i], at);
   }
 }
 
-/// The third part: bends, and on from the middle. Sets the directions at the end. @return the positions.
+/// The third part: bends, and on from the middle, to the positions and directions at the end, which may be the
+/// packet's. `weakly`: no lane needs more than two terms.
 template <bool uniform, bool differentials>
-HWY_INLINE F3 Kernel<uniform, differentials>::take_step(Packet& packet, F3& v, F3& u) {
-  const F time = hn::Load(floats, packet.time);
-  Tensor T;
-  for (int i = 0; i < 8; ++i) T.c[i] = hn::Load(floats, packet.tensor[i]);
-  const F factor = hn::Mul(time, hn::Load(floats, packet.kick));
-  v = bend<differentials>(packet, T, load(packet.v), factor);
-  if constexpr (differentials) bend_differentials(packet, T, load(packet.v), factor, time);
-  u = index_direction(v);
-  return mul_add(hn::Mul(set(0.5f), time), u, load(packet.middle));
+template <bool weakly>
+HWY_INLINE void Kernel<uniform, differentials>::take_step_as(Packet& packet, PerRay (&p)[3], PerRay (&v)[3],
+                                                             PerRay (&u)[3]) {
+  for (int i = 0; i < packet.vectors * lanes; i += lanes) {
+    const F time = load(packet.time, i), factor = hn::Mul(time, load(packet.kick, i)), half = hn::Mul(set(0.5f), time);
+    Tensor T;
+    for (int c = 0; c < 8; ++c) T.c[c] = load(packet.tensor[c], i);
+    const F3 before = load(packet.v, i);
+    const F3 after =
+        weakly ? bend_weakly(T, before, factor) : bend_strongly<differentials>(packet, T, before, factor, i);
+    if constexpr (differentials) bend_differentials(packet, T, before, factor, i);
+    store(after, v, i);
+    if constexpr (uniform) {
+      store(mul_add(half, after, load(packet.middle, i)), p, i);
+    } else {
+      const F3 along = index_direction(after);
+      store(along, u, i);
+      store(mul_add(half, along, load(packet.middle, i)), p, i);
+    }
+  }
 }
 
-/// The lanes that leave the extent, as bits.
 template <bool uniform, bool differentials>
-HWY_INLINE std::uint32_t Kernel<uniform, differentials>::outside(const Packet& packet, const F3& to) const {
-  const auto of_axis = [&](F x, int axis) HWY_ATTR {
-    const F margin = set(medium_.margin[axis]);
-    return hn::Or(hn::Lt(hn::Add(x, margin), hn::Load(floats, packet.low[axis])),
-                  hn::Gt(hn::Sub(x, margin), hn::Load(floats, packet.high[axis])));
-  };
-  return to_bits(hn::Or(hn::Or(of_axis(to.x, 0), of_axis(to.y, 1)), of_axis(to.z, 2)));
+HWY_INLINE void Kernel<uniform, differentials>::take_step(Packet& packet, PerRay (&p)[3], PerRay (&v)[3],
+                                                          PerRay (&u)[3]) {
+  if (!differentials && HWY_LIKELY(packet.greatest_reach <= series_reach[0]))
+    return take_step_as<true>(packet, p, v, u);
+  take_step_as<false>(packet, p, v, u);
+}
+
+/// The lanes whose points are beyond the extent, as bits.
+template <bool uniform, bool differentials>
+HWY_INLINE std::uint32_t Kernel<uniform, differentials>::outside(const Packet& packet,
+                                                                 const PerRay (&points)[3]) const {
+  std::uint32_t result = 0;
+  for (int i = 0; i < packet.vectors * lanes; i += lanes)
+    for (int axis = 0; axis < 3; ++axis) {
+      const F x = load(points[axis], i), margin = set(medium_.margin[axis]);
+      result |= to_bits(hn::Or(hn::Lt(hn::Add(x, margin), load(packet.low[axis], i)),
+                               hn::Gt(hn::Sub(x, margin), load(packet.high[axis], i))),
+                        i);
+    }
+  return result;
 }
 
 /// The lanes that cannot take this step, as bits.
 template <bool uniform, bool differentials>
-HWY_NOINLINE std::uint32_t Kernel<uniform, differentials>::stopped(const Packet& packet, const F3& to,
-                                                                   const F3& v) const {
-  const F unit = dot(v, v);
-  std::uint32_t stop = to_bits(hn::Not(hn::Gt(unit, set(0.5f))));  // No direction to go in.
-  alignas(64) float before[most_lanes];                            // Of the way to the field.
-  for (int lane = 0; lane < lanes; ++lane) before[lane] = static_cast<float>(rays_[packet.ray[lane]].length);
-  const F way = hn::Add(hn::Load(floats, packet.length), hn::Load(floats, packet.time));
-  const F length = hn::MulAdd(way, set(to_world()), hn::Load(floats, before));
-  stop |= to_bits(hn::Ge(length, set(medium_.settings.max_length)));
-  if (!packet.near_surface) return stop;
-  alignas(64) float ends[3][most_lanes];
-  store(to, ends);
-  for (int lane = 0; lane < lanes; ++lane) {
-    if (!(packet.alive >> lane & 1)) continue;
-    double from[3], until[3];
-    for (int axis = 0; axis < 3; ++axis) {
-      const double base = double{TensorBrick::cells} * packet.brick[axis][lane];
-      from[axis] = base + packet.p[axis][lane];
-      until[axis] = base + ends[axis][lane];
+HWY_NOINLINE std::uint32_t Kernel<uniform, differentials>::stopped(const Packet& packet) const {
+  std::uint32_t stop = 0;
+  for (int i = 0; i < packet.vectors * lanes; i += lanes) {
+    const F3 v = load(packet.v_next, i);
+    stop |= to_bits(hn::Not(hn::Gt(dot(v, v), set(0.5f))), i);  // No direction to go in.
+  }
+  for (std::uint32_t rest = packet.alive; rest != 0; rest &= rest - 1) {
+    const auto lane = hwy::Num0BitsBelowLS1Bit_Nonzero32(rest);
+    const float before = static_cast<float>(rays_[packet.ray[lane]].length);  // Of the way to the field.
+    const float length = (packet.length[lane] + packet.time[lane]) * to_world() + before;
+    bool stops = length >= medium_.settings.max_length;
+    if (packet.near_surface) {
+      double from[3], until[3];
+      for (int axis = 0; axis < 3; ++axis) {
+        const double base = double{TensorBrick::cells} * packet.brick[axis][lane];
+        from[axis] = base + packet.p[axis][lane];
+        until[axis] = base + packet.p_next[axis][lane];
+      }
+      stops |= medium_.meets_surface(from, until);
     }
-    if (medium_.meets_surface(from, until)) stop |= 1u << lane;
+    if (stops) stop |= 1u << lane;
   }
   return stop;
 }
@@ -361,8 +473,10 @@ HWY_NOINLINE std::uint32_t Kernel<uniform, differentials>::stopped(const Packet&
 template <bool uniform, bool differentials>
 HWY_NOINLINE std::uint32_t Kernel<uniform, differentials>::spent(const Packet& packet) const {
   std::uint32_t result = 0;
-  for (int lane = 0; lane < lanes; ++lane)
+  for (std::uint32_t rest = packet.alive; rest != 0; rest &= rest - 1) {
+    const auto lane = hwy::Num0BitsBelowLS1Bit_Nonzero32(rest);
     if (rays_[packet.ray[lane]].steps + packet.steps >= medium_.settings.max_steps) result |= 1u << lane;
+  }
   return result;
 }
 
@@ -371,7 +485,7 @@ HWY_NOINLINE std::uint32_t Kernel<uniform, differentials>::spent(const Packet& p
 template <bool uniform, bool differentials>
 HWY_NOINLINE void Kernel<uniform, differentials>::locate_on_extent(Packet& packet) {
   packet.clamps = true;
-  locate(packet, hn::Load(floats, packet.time));
+  locate(packet);
   interpolate(packet);
   packet.clamps = medium_.flat;
 }
@@ -380,8 +494,8 @@ HWY_NOINLINE void Kernel<uniform, differentials>::locate_on_extent(Packet& packe
 template <bool uniform, bool differentials>
 HWY_NOINLINE void Kernel<uniform, differentials>::take_out(Packet& packet, std::uint32_t stop, std::uint32_t leave) {
   Packet& leaving = leaving_[&packet - packets_];
-  for (int lane = 0; lane < lanes; ++lane) {
-    if (!((stop | leave) >> lane & 1)) continue;
+  for (std::uint32_t rest = stop | leave; rest != 0; rest &= rest - 1) {
+    const int lane = static_cast<int>(hwy::Num0BitsBelowLS1Bit_Nonzero32(rest));
     KernelRay& ray = rays_[packet.ray[lane]];
     for (int axis = 0; axis < 3; ++axis) {
       ray.brick[axis] = packet.brick[axis][lane];
@@ -398,31 +512,15 @@ HWY_NOINLINE void Kernel<uniform, differentials>::take_out(Packet& packet, std::
     ray.steps += packet.steps;
     packet.alive &= ~(1u << lane);
     if (!(leave >> lane & 1)) continue;
-    for (int axis = 0; axis < 3; ++axis) {
-      leaving.p[axis][lane] = packet.p[axis][lane];
-      leaving.v[axis][lane] = packet.v[axis][lane];
-      leaving.u[axis][lane] = packet.u[axis][lane];
-      leaving.brick[axis][lane] = packet.brick[axis][lane];
-    }
-    leaving.kick[lane] = packet.kick[lane];
-    leaving.time[lane] = packet.time[lane];
-    leaving.ray[lane] = packet.ray[lane];
-    leaving.alive |= 1u << lane;
+    copy_lane(packet, lane, leaving, static_cast<int>(hwy::PopCount(leaving.alive)));
+    leaving.alive = leaving.alive << 1 | 1;
   }
 }
 
 template <bool uniform, bool differentials>
-void Kernel<uniform, differentials>::repeat_one_alive(Packet& packet) {
-  const int of = static_cast<int>(hwy::Num0BitsBelowLS1Bit_Nonzero32(packet.alive));
-  for (int lane = 0; lane < lanes; ++lane)
-    if (!(packet.alive >> lane & 1)) repeat(packet, lane, of);
-  begin<uniform>(medium_, packet);
-}
-
-template <bool uniform, bool differentials>
 HWY_NOINLINE void Kernel<uniform, differentials>::keep_points(const Packet& packet) {
-  for (int lane = 0; lane < lanes; ++lane) {
-    if (!(packet.alive >> lane & 1)) continue;
+  for (std::uint32_t rest = packet.alive; rest != 0; rest &= rest - 1) {
+    const auto lane = hwy::Num0BitsBelowLS1Bit_Nonzero32(rest);
     const KernelRay& ray = rays_[packet.ray[lane]];
     KernelPoint point;
     for (int axis = 0; axis < 3; ++axis) {
@@ -435,93 +533,111 @@ HWY_NOINLINE void Kernel<uniform, differentials>::keep_points(const Packet& pack
   }
 }
 
+/// A step that may end rays: these are taken out as they were before it.
 template <bool uniform, bool differentials>
-HWY_INLINE void Kernel<uniform, differentials>::step(Packet& packet) {
-  if (HWY_UNLIKELY(packet.near_border && (outside(packet, load(packet.middle)) & packet.alive) != 0))
-    locate_on_extent(packet);
-  F3 v, u;
-  const F3 to = take_step(packet, v, u);
-  samples_ += hwy::PopCount(packet.alive);
+HWY_NOINLINE void Kernel<uniform, differentials>::step_watched(Packet& packet) {
+  if (packet.near_border && (outside(packet, packet.middle) & packet.alive) != 0) locate_on_extent(packet);
+  take_step(packet, packet.p_next, packet.v_next, packet.u_next);
   std::uint32_t stop = 0, leave = 0;
-  if (HWY_UNLIKELY(packet.near_border)) leave = outside(packet, to);
-  if (HWY_UNLIKELY(packet.near_surface || may_stop_ || !(packet.greatest_reach <= strongest_kick)))
-    stop = stopped(packet, to, v);
-  if (HWY_UNLIKELY(packet.steps >= packet.most_steps)) stop |= spent(packet);
-  stop &= packet.alive;
+  if (packet.near_border) leave = outside(packet, packet.p_next);
+  if (packet.near_surface || medium_.bounded || !(packet.greatest_reach <= strongest_kick)) stop = stopped(packet);
+  if (packet.steps >= packet.most_steps) stop |= spent(packet);
   if constexpr (differentials) {  // Those of a crossing are the reference's.
     stop |= leave;
-    stop &= packet.alive;
     leave = 0;
-  } else {
-    leave &= packet.alive & ~stop;
   }
-  if (HWY_UNLIKELY((stop | leave) != 0)) take_out(packet, stop, leave);
-  store(to, packet.p);
-  store(v, packet.v);
-  if constexpr (!uniform) store(u, packet.u);
-  hn::Store(hn::Add(hn::Load(floats, packet.length), hn::Load(floats, packet.time)), floats, packet.length);
+  stop &= packet.alive;
+  leave &= packet.alive & ~stop;
+  if ((stop | leave) != 0) take_out(packet, stop, leave);
+  for (int i = 0; i < packet.vectors * lanes; i += lanes) {
+    store(load(packet.p_next, i), packet.p, i);
+    store(load(packet.v_next, i), packet.v, i);
+    if constexpr (!uniform) store(load(packet.u_next, i), packet.u, i);
+    store(hn::Add(load(packet.length, i), load(packet.time, i)), packet.length, i);
+    if constexpr (differentials)
+      for (int k = 0; k < 2; ++k) {
+        store(load(packet.dp_next[k], i), packet.dp[k], i);
+        store(load(packet.dv_next[k], i), packet.dv[k], i);
+      }
+  }
   ++packet.steps;
-  if constexpr (differentials)
-    for (int i = 0; i < 2; ++i) {
-      store(load(packet.dp_next[i]), packet.dp[i]);
-      store(load(packet.dv_next[i]), packet.dv[i]);
-    }
+  if (!batch_.points.empty()) keep_points(packet);
+  if ((stop | leave) != 0 && packet.alive != 0) close_ranks(packet);
+}
+
+template <bool uniform, bool differentials>
+HWY_INLINE void Kernel<uniform, differentials>::step(Packet& packet) {
+  samples_ += hwy::PopCount(packet.alive);
+  if (differentials || HWY_UNLIKELY(packet.watched || packet.steps >= packet.most_steps)) return step_watched(packet);
+  take_step(packet, packet.p, packet.v, packet.u);
+  for (int i = 0; i < packet.vectors * lanes; i += lanes)
+    store(hn::Add(load(packet.length, i), load(packet.time, i)), packet.length, i);
+  ++packet.steps;
   if (HWY_UNLIKELY(!batch_.points.empty())) keep_points(packet);
-  if (HWY_UNLIKELY((stop | leave) != 0) && packet.alive != 0) repeat_one_alive(packet);
 }
 
 /// The step that leaves the extent, repeated with the length that ends on its face (Newton's method).
 template <bool uniform, bool differentials>
 HWY_NOINLINE void Kernel<uniform, differentials>::land(Packet& packet) {
-  repeat_one_alive(packet);
+  packet.vectors = packet_rays / lanes;
+  close_ranks(packet);
   packet.clamps = true;
-  const F zero = hn::Zero(floats), one = set(1), longest = hn::Load(floats, packet.time);
-  F3 v, u;
-  locate(packet, longest);
-  interpolate(packet);
-  F3 to = take_step(packet, v, u);
-  const F3 from = load(packet.p), chord{hn::Sub(to.x, from.x), hn::Sub(to.y, from.y), hn::Sub(to.z, from.z)};
-  const auto face = [&](F along, int axis) HWY_ATTR {
-    const F margin = set(medium_.margin[axis]);
-    return hn::IfThenElse(hn::Gt(along, zero), hn::Add(hn::Load(floats, packet.high[axis]), margin),
-                          hn::Sub(hn::Load(floats, packet.low[axis]), margin));
-  };
-  const auto part = [&](F p, F along, int axis) HWY_ATTR {
-    const F gap = hn::Sub(face(along, axis), p);
-    return hn::IfThenElse(hn::Gt(hn::Abs(along), zero), hn::Div(gap, along), set(1e30f));
-  };
-  const F x = part(from.x, chord.x, 0), y = part(from.y, chord.y, 1), z = part(from.z, chord.z, 2);
-  const F nearest = hn::Min(hn::Min(x, y), z);
-  const Mask is_x = hn::Eq(x, nearest), is_y = hn::Eq(y, nearest);
-  const auto of_axis = [&](F a, F b, F c) HWY_ATTR { return hn::IfThenElse(is_x, a, hn::IfThenElse(is_y, b, c)); };
-  F time = hn::Mul(longest, hn::Min(hn::Max(nearest, zero), one));
-  for (int i = 0; i < landing_steps; ++i) {
-    locate(packet, time);  // Which may take lanes to other bricks.
+  const F zero = hn::Zero(floats), one = set(1);
+  PerRay& longest = packet.length;  // Which is known to the rays already.
+  alignas(64) PerRay chord[3];
+  const auto find = [&]() HWY_ATTR {
+    locate(packet);  // Which may take lanes to other bricks.
     interpolate(packet);
-    to = take_step(packet, v, u);
-    const F gap = hn::Sub(of_axis(face(chord.x, 0), face(chord.y, 1), face(chord.z, 2)), of_axis(to.x, to.y, to.z));
-    F rest = hn::Div(gap, of_axis(u.x, u.y, u.z));
-    rest = hn::IfThenElseZero(hn::Le(hn::Abs(rest), longest), rest);  // But of light that grazes the face.
-    if (i == landing_steps - 1) {
-      to = mul_add(rest, u, to);
-      time = hn::Add(time, rest);
-    } else {
-      time = hn::Min(hn::Max(hn::Add(time, rest), zero), longest);
+    take_step(packet, packet.p_next, packet.v_next, packet.u_next);
+  };
+  const auto face = [&](int axis, int i) HWY_ATTR {
+    const F margin = set(medium_.margin[axis]);
+    return hn::IfThenElse(hn::Gt(load(chord[axis], i), zero), hn::Add(load(packet.high[axis], i), margin),
+                          hn::Sub(load(packet.low[axis], i), margin));
+  };
+  alignas(64) PerRay axes;
+  for (int i = 0; i < packet.vectors * lanes; i += lanes) store(load(packet.time, i), longest, i);
+  find();
+  for (int i = 0; i < packet.vectors * lanes; i += lanes) {
+    store(sub(load(packet.p_next, i), load(packet.p, i)), chord, i);
+    const auto part = [&](int axis) HWY_ATTR {
+      const F along = load(chord[axis], i), gap = hn::Sub(face(axis, i), load(packet.p[axis], i));
+      return hn::IfThenElse(hn::Gt(hn::Abs(along), zero), hn::Div(gap, along), set(1e30f));
+    };
+    const F x = part(0), y = part(1), z = part(2), nearest = hn::Min(hn::Min(x, y), z);
+    store(hn::IfThenElse(hn::Eq(x, nearest), zero, hn::IfThenElse(hn::Eq(y, nearest), one, set(2))), axes, i);
+    store(hn::Mul(load(longest, i), hn::Min(hn::Max(nearest, zero), one)), packet.time, i);
+  }
+  for (int n = 0; n < landing_steps; ++n) {
+    find();
+    for (int i = 0; i < packet.vectors * lanes; i += lanes) {
+      const F axis = load(axes, i);
+      const auto of_axis = [&](F a, F b, F c) HWY_ATTR {
+        return hn::IfThenElse(hn::Eq(axis, zero), a, hn::IfThenElse(hn::Eq(axis, one), b, c));
+      };
+      const F3 to = load(packet.p_next, i);
+      const F3 u = uniform ? load(packet.v_next, i) : load(packet.u_next, i);
+      const F gap = hn::Sub(of_axis(face(0, i), face(1, i), face(2, i)), of_axis(to.x, to.y, to.z));
+      F rest = hn::Div(gap, of_axis(u.x, u.y, u.z));
+      rest = hn::IfThenElseZero(hn::Le(hn::Abs(rest), load(longest, i)), rest);  // But of light that grazes the face.
+      const F time = hn::Add(load(packet.time, i), rest);
+      if (n < landing_steps - 1) {
+        store(hn::Min(hn::Max(time, zero), load(longest, i)), packet.time, i);
+      } else {
+        store(mul_add(rest, u, to), packet.p_next, i);
+        store(time, packet.time, i);
+      }
     }
   }
-  store(to, packet.p);
-  store(v, packet.v);
-  hn::Store(time, floats, packet.time);
-  const std::uint32_t on_x = to_bits(is_x), on_y = to_bits(is_y);
-  for (int lane = 0; lane < lanes; ++lane) {
-    if (!(packet.alive >> lane & 1)) continue;
+  for (std::uint32_t rest = packet.alive; rest != 0; rest &= rest - 1) {
+    const auto lane = hwy::Num0BitsBelowLS1Bit_Nonzero32(rest);
     KernelRay& ray = rays_[packet.ray[lane]];
     for (int axis = 0; axis < 3; ++axis) {
       ray.brick[axis] = packet.brick[axis][lane];
-      ray.position[axis] = packet.p[axis][lane];
-      ray.direction[axis] = packet.v[axis][lane];
+      ray.position[axis] = packet.p_next[axis][lane];
+      ray.direction[axis] = packet.v_next[axis][lane];
     }
-    ray.axis = static_cast<std::int8_t>(on_x >> lane & 1 ? 0 : on_y >> lane & 1 ? 1 : 2);
+    ray.axis = static_cast<std::int8_t>(axes[lane]);
     ray.length += double{packet.time[lane]} * to_world();
     ++ray.steps;
     samples_ += 1 + landing_steps;
@@ -535,17 +651,15 @@ std::uint64_t Kernel<uniform, differentials>::run() {
   for (bool busy = true; busy;) {
     busy = false;
     for (Packet& packet : packets_) {
-      if (HWY_UNLIKELY(packet.alive == 0)) continue;
+      if (packet.alive == 0) continue;
       busy = true;
-      locate(packet, step_time(packet, load(direction(packet))));
-    }
-    for (Packet& packet : packets_) interpolate(packet);
-    for (int i = 0; i < in_flight; ++i) {
-      Packet& packet = packets_[i];
-      if (HWY_UNLIKELY(packet.alive == 0)) continue;
+      if (HWY_UNLIKELY(!packet.timed)) find_times(packet);
+      locate(packet);
+      interpolate(packet);
       step(packet);
       if (HWY_LIKELY(packet.alive != 0)) continue;
-      if (leaving_[i].alive != 0) land(leaving_[i]);
+      Packet& leaving = leaving_[&packet - packets_];
+      if (leaving.alive != 0) land(leaving);
       fill(packet);
     }
   }

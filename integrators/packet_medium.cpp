@@ -1,5 +1,7 @@
 #include "integrators/packet_medium.h"
 
+#include <cmath>
+
 #include <Eigen/Geometry>
 
 #include "integrators/exponential.h"
@@ -22,6 +24,7 @@ Medium::Medium(const TensorField& field_, const KernelSettings& settings_) : fie
   }
   flat = (field.voxels().sizes().array() == 0).any();
   longest_step = settings.step > 0 ? settings.step : longest_automatic_step;
+  bounded = std::isfinite(settings.max_length);
 }
 
 bool Medium::near_surface(const std::int32_t at[3]) const {

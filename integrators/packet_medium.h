@@ -24,6 +24,7 @@ struct Medium {
   bool flat;                       // Whether an axis has a single voxel.
   float slope[3];                  // 0 along those axes, 1 along the others.
   float longest_step;              // Voxels; but through straight bricks.
+  bool bounded;                    // Whether rays may end within the field, by their length.
 
   TensorBrick brick(const std::int32_t at[3]) const { return field.brick({at[0], at[1], at[2]}); }
   bool near_surface(const std::int32_t at[3]) const;
@@ -33,7 +34,6 @@ struct Medium {
   static void exponential(const float T[8], float factor, float V[3]);
 };
 
-constexpr int most_lanes = 16;
 constexpr float longest_automatic_step = 0.5f, shortest_automatic_step = 1.0f / 64;  // Voxels; as in scalar_tracer.cpp.
 constexpr float strongest_kick = 0.2f;
 constexpr float past_straight_brick = 1.0f / 64;
@@ -45,43 +45,52 @@ constexpr float series_reach[] = {0.00262f, 0.0164f, 0.0514f, 0.1137f, 0.205f,
                                   0.3238f,  0.4688f, 0.6364f, 0.8246f, 1.03f};
 constexpr int most_terms = 11;
 
-/// Rays side by side, one a lane. All lanes hold a ray: those whose ray has ended repeat that of another, so that no
-/// step needs a mask.
-struct Packet {
-  alignas(64) float p[3][most_lanes];          // Position, voxels from the brick's first.
-  alignas(64) float v[3][most_lanes];          // V.
-  alignas(64) float u[3][most_lanes];          // The direction in index space; unused if voxels are uniform: it is V.
-  alignas(64) float kick[most_lanes];          // s, times the voxel's edge if voxels are uniform.
-  alignas(64) float length[most_lanes];        // Of the way since the ray came, in units of the time that u is per.
-  alignas(64) float bending_rate[most_lanes];  // s times the norm of T's deviator as last sampled, or 0.
-  alignas(64) float reach[most_lanes];         // Bound on ‖s h T‖ in the brick.
-  alignas(64) float strongest[most_lanes];
-  alignas(64) float low[3][most_lanes], high[3][most_lanes];  // The voxels' box, relative to the brick.
-  alignas(64) float last[3][most_lanes];                      // The last cell, likewise.
+constexpr int packet_rays = 32;  // A packet's: several vectors of them.
+using PerRay = float[packet_rays];
+
+/// Rays side by side, a lane each. All lanes of its vectors hold a ray: those whose ray has ended repeat that of
+/// another, so that no step needs a mask.
+struct alignas(64) Packet {
+  PerRay p[3];          // Position, voxels from the brick's first.
+  PerRay v[3];          // V.
+  PerRay u[3];          // The direction in index space; unused if voxels are uniform: it is V.
+  PerRay kick;          // s, times the voxel's edge if voxels are uniform.
+  PerRay length;        // Of the way since the ray came, in units of the time that u is per.
+  PerRay bending_rate;  // s times the norm of T's deviator as last sampled, or 0.
+  PerRay reach;         // Bound on ‖s h T‖ in the brick.
+  PerRay strongest;
+  PerRay low[3], high[3];  // The voxels' box, relative to the brick.
+  PerRay last[3];          // The last cell, likewise.
 
   // Of the step being taken:
-  alignas(64) float time[most_lanes];              // In units of what u is per.
-  alignas(64) float middle[3][most_lanes];         // Positions there ...
-  alignas(64) float fraction[3][most_lanes];       // ... and within the cell;
-  alignas(64) float polynomial[8][8];              // the cell's, if it is one_cell,
-  alignas(64) float components[2][most_lanes][4];  // or each lane's tensor;
-  alignas(64) float tensor[8][most_lanes];         // the same, lanes side by side.
+  PerRay time;                        // In units of what u is per.
+  PerRay middle[3];                   // Positions there;
+  PerRay voxel;                       // the number, in the brick, of the cell's first voxel,
+  PerRay weights[8];                  // and the weights of the cell's corners, or,
+  PerRay fraction[3];                 // of rays with differentials, the position within the cell.
+  float components[packet_rays * 8];  // The tensors of lanes in several cells;
+  PerRay tensor[8];                   // of all, component after component.
+  PerRay p_next[3], v_next[3], u_next[3];
 
   // Only of rays with differentials: p and v along two parameters, now, in the middle of the step and after it, the
   // slopes of the tensor along x, y and z, and ‖s h T‖ or a bound on it.
-  alignas(64) float dp[2][3][most_lanes], dv[2][3][most_lanes], dmiddle[2][3][most_lanes];
-  alignas(64) float dp_next[2][3][most_lanes], dv_next[2][3][most_lanes];
-  alignas(64) float slope_components[3][2][most_lanes][4], slopes[3][8][most_lanes];
-  alignas(64) float size[most_lanes];
+  PerRay dp[2][3], dv[2][3], dmiddle[2][3], dp_next[2][3], dv_next[2][3];
+  PerRay slopes[3][8];
+  PerRay size;
 
-  const float* bending[most_lanes] = {};
-  alignas(64) std::int32_t brick[3][most_lanes];
-  std::int32_t ray[most_lanes];
+  const float* bending[packet_rays] = {};
+  alignas(64) std::int32_t brick[3][packet_rays];
+  std::int32_t ray[packet_rays];
   std::uint32_t alive = 0;  // A bit each.
+  int vectors = 0;          // In use.
   std::uint32_t steps = 0, most_steps = 0;
   float greatest_reach = 0;
-  bool one_brick = false, near_border = false, near_surface = false, straight = false, one_cell = false;
-  bool clamps = false;  // Whether points beyond the voxels' box are taken to it.
+  bool one_brick = false, one_cell = false;
+  bool near_border = false, near_surface = false, straight = false;
+  bool varied = false;   // Whether steps are not all of the longest length, ...
+  bool timed = false;    // and whether `time` is that of the next step already.
+  bool watched = false;  // Whether a step may end a ray, but for their number.
+  bool clamps = false;   // Whether points beyond the voxels' box are taken to it.
 };
 
 }  // namespace tensorray::packets

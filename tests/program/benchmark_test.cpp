@@ -38,7 +38,8 @@ TEST_F(Benchmark, EveryKernelFollowsTheSameRays) {
       }
     }
   }
-  EXPECT_EQ(names, (std::set<std::string>{"coherent", "cold cells", "half empty", "diverging", "as rendered"}));
+  EXPECT_EQ(names,
+            (std::set<std::string>{"coherent", "cold cells", "half empty", "parting", "diverging", "as rendered"}));
 }
 
 TEST_F(Benchmark, WholeJobsSayWhatTheyTookByPhase) {

@@ -24,22 +24,23 @@ struct MeasuredField {
   std::vector<Measurement> measurements;
 };
 
-/// Weak fields: the wavelengths of a packet part by about a voxel on their way.
+/// On their way the wavelengths of a packet part by a tenth of a voxel in the weakest field, by one in the weak one.
 std::vector<MeasuredField> fields_to_measure(bool quick) {
-  constexpr double weak = 0.01, automatic = 0.15, strong = 1.5;
+  constexpr double weakest = 0.001, weak = 0.01, automatic = 0.15, strong = 1.5;
   const Eigen::Vector3d down(0.1, 0.07, -1), across(-1, 0.1, 0.05);
   const int small = quick ? 24 : 128, large = quick ? 32 : 256;
   const auto size = [](int n) { return std::to_string(n) + "³"; };
   return {
-      {"point load, weak", {PointLoad(), small, down, weak}, {{"coherent " + size(small), Order::warm}}},
-      {"point load, weak",
-       {PointLoad(), large, down, weak},
+      {"point load, weakest", {PointLoad(), small, down, weakest}, {{"coherent " + size(small), Order::warm}}},
+      {"point load, weakest",
+       {PointLoad(), large, down, weakest},
        {{"coherent " + size(large), Order::warm}, {"cold cells " + size(large), Order::fresh}}},
-      {"point load, weak, every second cube of 64³ voxels inactive",
-       {PointLoad(), large, down, weak, true},
+      {"point load, weakest, every second cube of 64³ voxels inactive",
+       {PointLoad(), large, down, weakest, true},
        {{"half empty " + size(large), Order::warm}}},
-      {"vortex, strong", {Vortex(), small, across, strong}, {{"diverging " + size(small), Order::fresh}}},
+      {"point load, weak", {PointLoad(), small, down, weak}, {{"parting " + size(small), Order::warm}}},
       {"point load as rendered", {PointLoad(), small, down, automatic}, {{"as rendered " + size(small), Order::fresh}}},
+      {"vortex, strong", {Vortex(), small, across, strong}, {{"diverging " + size(small), Order::fresh}}},
   };
 }
 
