@@ -183,35 +183,65 @@ HWY_INLINE void sample_own_cells(Packet& packet, int at) {
   transpose(packet.components, packet.tensor, at);
 }
 
+/// The trilinear polynomial of a cell: coefficients of 1, z, y, yz, x, xz, xy and xyz. Rays with differentials have it,
+/// as its slopes cost little more than its value.
+template <class V>
+struct Polynomial {
+  V k[8];
+};
+
+/// Of the components from `cell` on.
+HWY_INLINE Polynomial<hn::Vec<Eight>> cell_polynomial(const float* cell) {
+  const auto c = [&](int k) HWY_ATTR { return hn::Load(eight, cell + corners[k]); };
+  const auto z = hn::Sub(c(1), c(0)), y = hn::Sub(c(2), c(0)), x = hn::Sub(c(4), c(0));
+  const auto yz = hn::Sub(hn::Sub(c(3), c(2)), z);
+  const auto far = hn::Sub(c(5), c(4)), far_y = hn::Sub(c(6), c(4));
+  const auto xyz = hn::Sub(hn::Sub(hn::Sub(c(7), c(6)), far), yz);
+  return {{c(0), z, y, yz, x, hn::Sub(far, z), hn::Sub(far_y, y), xyz}};
+}
+
 /// A value and its slopes.
 template <class V>
 struct Slopes {
   V value, x, y, z;
 };
 
-/// The trilinear polynomial of a cell, of the components from `cell` on, and its slopes at a point within it.
 template <class V>
-HWY_INLINE Slopes<V> sample_slopes(const float* cell, V x, V y, V z) {
-  const auto c = [&](int k) HWY_ATTR { return hn::Load(eight, cell + corners[k]); };
-  const V k0 = c(0), kz = hn::Sub(c(1), k0), ky = hn::Sub(c(2), k0), kx = hn::Sub(c(4), k0);
-  const V kyz = hn::Sub(hn::Sub(c(3), c(2)), kz);
-  const V far = hn::Sub(c(5), c(4)), far_y = hn::Sub(c(6), c(4));
-  const V kxz = hn::Sub(far, kz), kxy = hn::Sub(far_y, ky);
-  const V kxyz = hn::Sub(hn::Sub(hn::Sub(c(7), c(6)), far), kyz);
-  const V y_near = hn::MulAdd(kyz, z, ky), y_far = hn::MulAdd(kxyz, z, kxy);
-  const V near = hn::MulAdd(y_near, y, hn::MulAdd(kz, z, k0)), slope = hn::MulAdd(y_far, y, hn::MulAdd(kxz, z, kx));
+HWY_INLINE Slopes<V> evaluate(const Polynomial<V>& p, V x, V y, V z) {
+  const V y_near = hn::MulAdd(p.k[3], z, p.k[2]), y_far = hn::MulAdd(p.k[7], z, p.k[6]);
+  const V near = hn::MulAdd(y_near, y, hn::MulAdd(p.k[1], z, p.k[0]));
+  const V slope = hn::MulAdd(y_far, y, hn::MulAdd(p.k[5], z, p.k[4]));
   return {hn::MulAdd(slope, x, near), slope, hn::MulAdd(y_far, x, y_near),
-          hn::MulAdd(hn::MulAdd(kxyz, y, kxz), x, hn::MulAdd(kyz, y, kz))};
+          hn::MulAdd(hn::MulAdd(p.k[7], y, p.k[5]), x, hn::MulAdd(p.k[3], y, p.k[1]))};
 }
 
-/// The same of all components, with the slopes of the tensors.
+/// The tensors and their slopes of a vector whose lanes are in one cell.
+HWY_INLINE void sample_slopes(const float* cell, Packet& packet, int at) {
+  alignas(64) float coefficients[8][8];
+  for (int i = 0; i < 8; i += eight_lanes) {
+    const auto polynomial = cell_polynomial(cell + i);
+    for (int k = 0; k < 8; ++k) hn::Store(polynomial.k[k], eight, coefficients[k] + i);
+  }
+  const F3 fraction = load(packet.fraction, at);
+  for (int c = 0; c < 8; ++c) {
+    Polynomial<F> polynomial;
+    for (int k = 0; k < 8; ++k) polynomial.k[k] = set(coefficients[k][c]);
+    const Slopes<F> sampled = evaluate(polynomial, fraction.x, fraction.y, fraction.z);
+    store(sampled.value, packet.tensor[c], at);
+    store(sampled.x, packet.slopes[0][c], at);
+    store(sampled.y, packet.slopes[1][c], at);
+    store(sampled.z, packet.slopes[2][c], at);
+  }
+}
+
+/// The same of a vector whose lanes are in several cells.
 HWY_INLINE void sample_own_slopes(Packet& packet, int at) {
   alignas(64) float components[4][lanes * 8];
   for (int i = 0; i < 8; i += eight_lanes) {
     for (int lane = 0; lane < lanes; ++lane) {
       const float* const cell = cell_of(packet, at + lane) + i;
       const auto fraction = [&](int axis) HWY_ATTR { return hn::Set(eight, packet.fraction[axis][at + lane]); };
-      const auto sampled = sample_slopes(cell, fraction(0), fraction(1), fraction(2));
+      const auto sampled = evaluate(cell_polynomial(cell), fraction(0), fraction(1), fraction(2));
       store_components(sampled.value, i, lane, components[0]);
       store_components(sampled.x, i, lane, components[1]);
       store_components(sampled.y, i, lane, components[2]);

@@ -54,7 +54,6 @@ class Kernel {
   void prefetch_all(const Packet& packet, int first);
   bool in_one_cell(const Packet& packet, int first) const;
   void interpolate(Packet& packet);
-  void sample_apart(Packet& packet);
   void bend_differentials(Packet& packet, const Tensor& T, const F3& v, F factor, int at);
   template <bool weakly>
   void take_step_as(Packet& packet, PerRay (&p)[3], PerRay (&v)[3], PerRay (&u)[3]);
@@ -331,30 +330,26 @@ HWY_INLINE bool Kernel<uniform, differentials>::in_one_cell(const Packet& packet
   return hn::AllTrue(floats, same);
 }
 
-/// The tensors of lanes in several cells.
-template <bool uniform, bool differentials>
-HWY_INLINE void Kernel<uniform, differentials>::sample_apart(Packet& packet) {
-  for (int i = 0; i < packet.vectors * lanes; i += lanes) {
-    if (in_one_cell(packet, i)) {
-      sample_cell<1>(cell_of(packet, i), packet, i);
-    } else {
-      prefetch_all(packet, i);
-      sample_own_cells(packet, i);
-    }
-  }
-}
-
 /// The second part: the tensors there.
 template <bool uniform, bool differentials>
 HWY_INLINE void Kernel<uniform, differentials>::interpolate(Packet& packet) {
-  if constexpr (differentials) {
-    for (int i = 0; i < packet.vectors * lanes; i += lanes) sample_own_slopes(packet, i);
-  } else {
-    if (HWY_LIKELY(packet.one_cell)) {
-      prefetch_one(packet, 0);
-      sample_cell(cell_of(packet, 0), packet, 0, packet.vectors);
+  if (!differentials && HWY_LIKELY(packet.one_cell)) {
+    prefetch_one(packet, 0);
+    return sample_cell(cell_of(packet, 0), packet, 0, packet.vectors);
+  }
+  for (int i = 0; i < packet.vectors * lanes; i += lanes) {
+    const bool together = in_one_cell(packet, i);
+    if (!together) prefetch_all(packet, i);
+    if constexpr (differentials) {
+      if (together)
+        sample_slopes(cell_of(packet, i), packet, i);
+      else
+        sample_own_slopes(packet, i);
     } else {
-      sample_apart(packet);
+      if (together)
+        sample_cell<1>(cell_of(packet, i), packet, i);
+      else
+        sample_own_cells(packet, i);
     }
   }
 }

@@ -1,3 +1,4 @@
+#include <algorithm>
 #include <fstream>
 
 #include <fmt/format.h>
@@ -41,13 +42,13 @@ Job path_job(int resolution, int seeds, int side) {
            {"camera", {{"resolution", {side, side}}}}}};
 }
 
-/// Fewer positions in larger fields, so that each takes about as many samples.
+/// Fewer rays in larger fields, so that all take a few seconds but for the fields.
 std::vector<Job> jobs(bool quick) {
   if (quick) return {photon_job(16, 200, 32), lens_job(16, 32), path_job(16, 9, 32)};
   std::vector<Job> result;
   for (const int resolution : {64, 128, 256, 512}) {
-    result.push_back(photon_job(resolution, resolution <= 128 ? 262144 : 33554432 / resolution, 1024));
-    result.push_back(lens_job(resolution, 512));
+    result.push_back(photon_job(resolution, 4194304u / static_cast<unsigned>(resolution), 1024));
+    result.push_back(lens_job(resolution, std::min(256, 32768 / resolution)));
     result.push_back(path_job(resolution, 1000, 256));
   }
   return result;
@@ -57,7 +58,7 @@ std::vector<Job> jobs(bool quick) {
 Json run_job(const TemporaryFolder& folder, const Job& job, int threads, const std::string& program = "tensorray",
              const std::vector<std::string>& options = {}) {
   Json scene = job.scene;
-  scene["field"] = {{"generate", {{"kind", "point_load"}, {"resolution", job.resolution}}}};
+  scene["field"] = {{"generate", {{"kind", "point_load"}, {"resolution", job.resolution}}}, {"eigenvalues", "raw"}};
   const auto scene_path = folder / "scene.json", statistics_path = folder / "statistics.json";
   std::ofstream(scene_path) << scene;
   std::vector<std::string> arguments{"render",    scene_path.string(),
