@@ -23,6 +23,10 @@ pkg_check_modules(OpenImageIO REQUIRED IMPORTED_TARGET OpenImageIO>=2.4)
 pkg_check_modules(OpenColorIO REQUIRED IMPORTED_TARGET OpenColorIO>=2.1)
 
 pkg_check_modules(Highway REQUIRED IMPORTED_TARGET libhwy>=1.0)
+if(CMAKE_SYSTEM_PROCESSOR MATCHES "^(aarch64|arm64)" AND CMAKE_CXX_COMPILER_ID STREQUAL "GNU")
+  # Highway's NEON code is for processors with these instructions, and GCC asks that its callers be so too.
+  target_compile_options(PkgConfig::Highway INTERFACE -march=armv8-a+crypto)
+endif()
 
 find_package(VTK REQUIRED COMPONENTS CommonCore CommonDataModel CommonExecutionModel FiltersCore FiltersGeneral
              IOCore IOExodus IOGeometry IOLegacy IOParallelXML IOXML

@@ -702,7 +702,7 @@ bool has_kernel(BendingMethod method) { return method == BendingMethod::splittin
 
 std::uint64_t run(const TensorField& field, const KernelSettings& settings, KernelRays& batch) {
   const Medium medium(field, settings);
-  const WithoutDenormals guard;
+  [[maybe_unused]] const WithoutDenormals guard;
   return HWY_DYNAMIC_DISPATCH(trace)(medium, batch);
 }
 
