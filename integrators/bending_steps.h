@@ -10,6 +10,7 @@
 
 #include "integrators/bending.h"
 #include "integrators/exponential.h"
+#include "integrators/runge_kutta.h"
 #include "volumes/tensor_sampler.h"
 
 namespace tensorray::bending_steps {
@@ -105,62 +106,28 @@ State<N> splitting(Medium<N>& medium, const State<N>& from, double h) {
   }
 }
 
+/// `error` is set by the adaptive methods.
 template <int N>
-State<N> rk4(Medium<N>& medium, const State<N>& from, double h) {
-  const State<N> k1 = medium.derivative(from);
-  const State<N> k2 = medium.derivative(from + h / 2 * k1);
-  const State<N> k3 = medium.derivative(from + h / 2 * k2);
-  const State<N> k4 = medium.derivative(from + h * k3);
-  return normalized(from + h / 6 * (k1 + 2 * k2 + 2 * k3 + k4));
-}
-
-/// Bogacki and Shampine 1989. `error` is the difference to the embedded method of order 2.
-template <int N>
-State<N> bs23(Medium<N>& medium, const State<N>& from, double h, State<N>& error) {
-  const State<N> k1 = medium.derivative(from);
-  const State<N> k2 = medium.derivative(from + h / 2 * k1);
-  const State<N> k3 = medium.derivative(from + 3 * h / 4 * k2);
-  const State<N> to = from + h * (2.0 / 9 * k1 + 1.0 / 3 * k2 + 4.0 / 9 * k3);
-  const State<N> k4 = medium.derivative(to);
-  error = h * (-5.0 / 72 * k1 + 1.0 / 12 * k2 + 1.0 / 9 * k3 + -1.0 / 8 * k4);
-  return normalized(to);
-}
-
-/// Dormand and Prince 1980. `error` is the difference to the embedded method of order 4.
-template <int N>
-State<N> dopri5(Medium<N>& medium, const State<N>& from, double h, State<N>& error) {
-  const State<N> k1 = medium.derivative(from);
-  const State<N> k2 = medium.derivative(from + h * (1.0 / 5 * k1));
-  const State<N> k3 = medium.derivative(from + h * (3.0 / 40 * k1 + 9.0 / 40 * k2));
-  const State<N> k4 = medium.derivative(from + h * (44.0 / 45 * k1 + -56.0 / 15 * k2 + 32.0 / 9 * k3));
-  const State<N> k5 = medium.derivative(
-      from + h * (19372.0 / 6561 * k1 + -25360.0 / 2187 * k2 + 64448.0 / 6561 * k3 + -212.0 / 729 * k4));
-  const State<N> k6 = medium.derivative(from + h * (9017.0 / 3168 * k1 + -355.0 / 33 * k2 + 46732.0 / 5247 * k3 +
-                                                    49.0 / 176 * k4 + -5103.0 / 18656 * k5));
-  const State<N> to =
-      from + h * (35.0 / 384 * k1 + 500.0 / 1113 * k3 + 125.0 / 192 * k4 + -2187.0 / 6784 * k5 + 11.0 / 84 * k6);
-  const State<N> k7 = medium.derivative(to);
-  error = h * (71.0 / 57600 * k1 + -71.0 / 16695 * k3 + 71.0 / 1920 * k4 + -17253.0 / 339200 * k5 + 22.0 / 525 * k6 +
-               -1.0 / 40 * k7);
-  return normalized(to);
+State<N> by_stages(const RungeKutta& method, Medium<N>& medium, const State<N>& from, double h, State<N>& error) {
+  std::array<State<N>, RungeKutta::most_stages> k;
+  const auto along = [&](const double* factors, int count, State<N> to) {
+    for (int j = 0; j < count; ++j)
+      if (factors[j] != 0) to = to + h * factors[j] * k[j];
+    return to;
+  };
+  for (int i = 0; i < method.stages; ++i) k[i] = medium.derivative(along(method.a[i], i, from));
+  if (method.adaptive) {
+    const auto zero = Eigen::Matrix<double, 3, N>::Zero();
+    error = along(method.error, method.stages, {zero, zero});
+  }
+  return normalized(along(method.b, method.stages, from));
 }
 
 /// A step of arc length h. `error` is set by the adaptive methods.
 template <int N>
 State<N> advance(BendingMethod method, Medium<N>& medium, const State<N>& from, double h, State<N>& error) {
-  switch (method) {
-    case BendingMethod::euler:
-      return euler(medium, from, h);
-    case BendingMethod::rk4:
-      return rk4(medium, from, h);
-    case BendingMethod::bs23:
-      return bs23(medium, from, h, error);
-    case BendingMethod::dopri5:
-      return dopri5(medium, from, h, error);
-    case BendingMethod::splitting:
-      break;
-  }
-  return splitting(medium, from, h);
+  if (const RungeKutta* const stages = runge_kutta(method)) return by_stages(*stages, medium, from, h, error);
+  return method == BendingMethod::euler ? euler(medium, from, h) : splitting(medium, from, h);
 }
 
 }  // namespace tensorray::bending_steps

@@ -48,6 +48,12 @@ HWY_INLINE F deviator_norm(const Tensor& T, F factor) {
   return hn::Sqrt(hn::IfThenElse(hn::Le(squares, set(1e38f)), deviator, squares));  // Infinity stays what it is.
 }
 
+/// Keeps s times the norm of T's deviator, where steps may have to be shorter for it.
+HWY_INLINE void keep_bending_rate(Packet& packet, const Tensor& T, int at) {
+  if (packet.greatest_reach <= strongest_kick) return;
+  store(deviator_norm(T, load(packet.kick, at)), packet.bending_rate, at);
+}
+
 /// Lanes where ‖factor · T‖ is too large for a series, given as bits.
 HWY_NOINLINE F3 bend_in_double(const Tensor& T, const F3& v, F factor, const F3& others, std::uint32_t which) {
   alignas(64) float all[8][lanes], factors[lanes], from[3][lanes], to[3][lanes];

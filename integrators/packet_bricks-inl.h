@@ -44,20 +44,22 @@ template <bool uniform>
 HWY_INLINE void find_reach(const Medium& medium, Packet& packet) {
   const F most = set(1e30f);
   const F longest = set(medium.longest_step * (uniform ? 1.0f : medium.longest_voxel));
+  const bool euler = medium.settings.method == BendingMethod::euler;  // It sees the trace of T, which has no bound.
   F greatest = hn::Zero(floats);
   packet.straight = false;
   for (int i = 0; i < packet.vectors * lanes; i += lanes) {
     const F strongest = load(packet.strongest, i);
-    const F reach = hn::Mul(hn::Mul(hn::Abs(load(packet.kick, i)), longest), strongest);
+    F reach = hn::Mul(hn::Mul(hn::Abs(load(packet.kick, i)), longest), strongest);
+    if (euler) reach = most;
     store(reach, packet.reach, i);
     const Mask long_steps = hn::Le(reach, set(strongest_kick));
     store(hn::IfThenZeroElse(long_steps, load(packet.bending_rate, i)), packet.bending_rate, i);
     greatest = hn::Max(greatest, hn::IfThenElse(hn::Le(reach, most), reach, most));  // NaN is strong.
-    packet.straight |= !hn::AllFalse(floats, hn::Eq(strongest, hn::Zero(floats)));
+    packet.straight |= !euler && !hn::AllFalse(floats, hn::Eq(strongest, hn::Zero(floats)));
   }
   packet.greatest_reach = hn::GetLane(hn::MaxOfLanes(floats, greatest));
   const bool weak = packet.greatest_reach <= strongest_kick;
-  packet.varied = !uniform || packet.straight || (!weak && medium.settings.step == 0);
+  packet.varied = !uniform || packet.straight || medium.adaptive || (!weak && medium.settings.step == 0);
   packet.timed = packet.timed && !packet.varied;
 }
 

@@ -190,14 +190,19 @@ struct Polynomial {
   V k[8];
 };
 
+/// `c(k)` is the value at corner k.
+template <class V, class Corner>
+HWY_INLINE Polynomial<V> polynomial(const Corner& c) {
+  const V z = hn::Sub(c(1), c(0)), y = hn::Sub(c(2), c(0)), x = hn::Sub(c(4), c(0));
+  const V yz = hn::Sub(hn::Sub(c(3), c(2)), z);
+  const V far = hn::Sub(c(5), c(4)), far_y = hn::Sub(c(6), c(4));
+  const V xyz = hn::Sub(hn::Sub(hn::Sub(c(7), c(6)), far), yz);
+  return {{c(0), z, y, yz, x, hn::Sub(far, z), hn::Sub(far_y, y), xyz}};
+}
+
 /// Of the components from `cell` on.
 HWY_INLINE Polynomial<hn::Vec<Eight>> cell_polynomial(const float* cell) {
-  const auto c = [&](int k) HWY_ATTR { return hn::Load(eight, cell + corners[k]); };
-  const auto z = hn::Sub(c(1), c(0)), y = hn::Sub(c(2), c(0)), x = hn::Sub(c(4), c(0));
-  const auto yz = hn::Sub(hn::Sub(c(3), c(2)), z);
-  const auto far = hn::Sub(c(5), c(4)), far_y = hn::Sub(c(6), c(4));
-  const auto xyz = hn::Sub(hn::Sub(hn::Sub(c(7), c(6)), far), yz);
-  return {{c(0), z, y, yz, x, hn::Sub(far, z), hn::Sub(far_y, y), xyz}};
+  return polynomial<hn::Vec<Eight>>([&](int k) HWY_ATTR { return hn::Load(eight, cell + corners[k]); });
 }
 
 /// A value and its slopes.

@@ -16,7 +16,8 @@
 // Must come after it:
 #include <hwy/highway.h>
 
-#include "integrators/packet_steps-inl.h"
+#include "integrators/packet_landing-inl.h"
+#include "integrators/packet_stages-inl.h"
 
 #if defined(__SSE__)
 #include <xmmintrin.h>
@@ -38,28 +39,23 @@ class Kernel {
   // Packets that are stepped in turn: as many vectors as the processor needs to have work while one waits for another.
   static constexpr int in_flight = lanes > 8 ? 2 : 1;
 
-  // Of rays that take their last step: the whole step, which is too long, its chord, and the axis that they leave
-  // along.
-  struct alignas(64) Landing {
-    PerRay longest, chord[3], axis;
-  };
-
   void fill(Packet& packet);
   void enter(Packet& packet, int lane);
   static void copy_lane(const Packet& from, int of, Packet& to, int lane);
   void close_ranks(Packet& packet);
-  void step(Packet& packet);
+  void step_split(Packet& packet);
   void step_watched(Packet& packet);
+  void step_otherwise(Packet& packet);
+  void attempt(Packet& packet);
+  void end_step(Packet& packet, std::uint32_t staying, std::uint32_t stop);
   std::uint32_t outside(const Packet& packet, const PerRay (&points)[3]) const;
   std::uint32_t stopped(const Packet& packet) const;
   std::uint32_t spent(const Packet& packet) const;
   void locate_on_extent(Packet& packet);
   void take_out(Packet& packet, std::uint32_t stop, std::uint32_t leave);
-  void keep_points(const Packet& packet);
+  void keep_points(const Packet& packet, std::uint32_t which);
+  unsigned samples_per_step() const { return medium_.stages ? medium_.stages->stages : 1; }
   float to_world() const { return uniform ? medium_.voxel : 1.0f; }  // Of what u is per.
-  void try_landing(Packet& packet);
-  F face(const Packet& packet, const Landing& landing, int axis, int at) const;
-  void aim(Packet& packet, Landing& landing) const;
   void land(Packet& packet);
   void arrive(Packet& packet, const Landing& landing);
 
@@ -88,6 +84,7 @@ void Kernel<uniform, differentials>::enter(Packet& packet, int lane) {
   }
   packet.kick[lane] = uniform ? ray.flexibility * medium_.voxel : ray.flexibility;
   packet.bending_rate[lane] = std::fabs(packet.kick[lane]) * ray.norm;
+  packet.wanted[lane] = medium_.settings.step;
   packet.length[lane] = 0;
 }
 
@@ -109,6 +106,7 @@ void Kernel<uniform, differentials>::copy_lane(const Packet& from, int of, Packe
   to.length[lane] = from.length[of];
   to.bending_rate[lane] = from.bending_rate[of];
   to.time[lane] = from.time[of];
+  to.wanted[lane] = from.wanted[of];
   to.ray[lane] = from.ray[of];
 }
 
@@ -137,7 +135,7 @@ void Kernel<uniform, differentials>::fill(Packet& packet) {
   const int count = static_cast<int>(std::min<std::size_t>(packet_rays, rays_.size() - next_));
   packet.alive = ~0u >> (packet_rays - count);
   packet.vectors = packet_rays / lanes;
-  packet.clamps = medium_.flat;
+  packet.clamps = medium_.clamps;
   packet.steps = 0;
   packet.most_steps = medium_.settings.max_steps;
   for (int lane = 0; lane < count; ++lane) {
@@ -148,6 +146,7 @@ void Kernel<uniform, differentials>::fill(Packet& packet) {
   if constexpr (!uniform)
     for (int i = 0; i < packet_rays; i += lanes)
       store(index_direction<uniform>(medium_, load(packet.v, i)), packet.u, i);
+  if (medium_.adaptive && medium_.settings.step == 0) begin_steps<uniform>(medium_, packet);
   if (count < packet_rays)
     close_ranks(packet);
   else
@@ -177,6 +176,7 @@ HWY_NOINLINE std::uint32_t Kernel<uniform, differentials>::stopped(const Packet&
     const F3 v = load(packet.v_next, i);
     stop |= to_bits(hn::Not(hn::Gt(dot(v, v), set(0.5f))), i);  // No direction to go in.
   }
+  if (!packet.near_surface && !medium_.bounded) return stop;
   for (std::uint32_t rest = packet.alive; rest != 0; rest &= rest - 1) {
     const auto lane = hwy::Num0BitsBelowLS1Bit_Nonzero32(rest);
     const float before = static_cast<float>(rays_[packet.ray[lane]].length);  // Of the way to the field.
@@ -212,9 +212,9 @@ HWY_NOINLINE std::uint32_t Kernel<uniform, differentials>::spent(const Packet& p
 template <bool uniform, bool differentials>
 HWY_NOINLINE void Kernel<uniform, differentials>::locate_on_extent(Packet& packet) {
   packet.clamps = true;
-  locate<uniform, differentials>(medium_, packet);
+  locate_middles<uniform, differentials>(medium_, packet);
   interpolate<uniform, differentials>(medium_, packet);
-  packet.clamps = medium_.flat;
+  packet.clamps = medium_.clamps;
 }
 
 /// Hands the rays of some lanes on, as they are before the step.
@@ -245,8 +245,8 @@ HWY_NOINLINE void Kernel<uniform, differentials>::take_out(Packet& packet, std::
 }
 
 template <bool uniform, bool differentials>
-HWY_NOINLINE void Kernel<uniform, differentials>::keep_points(const Packet& packet) {
-  for (std::uint32_t rest = packet.alive; rest != 0; rest &= rest - 1) {
+HWY_NOINLINE void Kernel<uniform, differentials>::keep_points(const Packet& packet, std::uint32_t which) {
+  for (std::uint32_t rest = which; rest != 0; rest &= rest - 1) {
     const auto lane = hwy::Num0BitsBelowLS1Bit_Nonzero32(rest);
     const KernelRay& ray = rays_[packet.ray[lane]];
     KernelPoint point;
@@ -260,14 +260,15 @@ HWY_NOINLINE void Kernel<uniform, differentials>::keep_points(const Packet& pack
   }
 }
 
-/// A step that may end rays: these are taken out as they were before it.
+/// From the positions after a step. Takes out rays that it ends, as they were before it: those of `stop` and others,
+/// but for those that are `staying`.
 template <bool uniform, bool differentials>
-HWY_NOINLINE void Kernel<uniform, differentials>::step_watched(Packet& packet) {
-  if (packet.near_border && (outside(packet, packet.middle) & packet.alive) != 0) locate_on_extent(packet);
-  take_step<uniform, differentials>(medium_, packet, packet.p_next, packet.v_next, packet.u_next);
-  std::uint32_t stop = 0, leave = 0;
-  if (packet.near_border) leave = outside(packet, packet.p_next);
-  if (packet.near_surface || medium_.bounded || !(packet.greatest_reach <= strongest_kick)) stop = stopped(packet);
+void Kernel<uniform, differentials>::end_step(Packet& packet, std::uint32_t staying, std::uint32_t stop) {
+  std::uint32_t leave = 0;
+  if (packet.near_border) leave = outside(packet, packet.p_next) & ~staying;
+  const bool may_fail = medium_.settings.method != BendingMethod::splitting;
+  if (may_fail || packet.near_surface || medium_.bounded || !(packet.greatest_reach <= strongest_kick))
+    stop |= stopped(packet) & ~staying;
   if (packet.steps >= packet.most_steps) stop |= spent(packet);
   if constexpr (differentials) {  // Those of a crossing are the reference's.
     stop |= leave;
@@ -288,55 +289,49 @@ HWY_NOINLINE void Kernel<uniform, differentials>::step_watched(Packet& packet) {
       }
   }
   ++packet.steps;
-  if (!batch_.points.empty()) keep_points(packet);
+  if (!batch_.points.empty()) keep_points(packet, packet.alive & ~staying);
   if ((stop | leave) != 0 && packet.alive != 0) close_ranks(packet);
 }
 
+/// A step that may end rays.
 template <bool uniform, bool differentials>
-HWY_INLINE void Kernel<uniform, differentials>::step(Packet& packet) {
+HWY_NOINLINE void Kernel<uniform, differentials>::step_watched(Packet& packet) {
+  if (packet.near_border && (outside(packet, packet.middle) & packet.alive) != 0) locate_on_extent(packet);
+  take_step<uniform, differentials>(medium_, packet, packet.p_next, packet.v_next, packet.u_next);
+  end_step(packet, 0, 0);
+}
+
+template <bool uniform, bool differentials>
+HWY_INLINE void Kernel<uniform, differentials>::step_split(Packet& packet) {
+  locate_middles<uniform, differentials>(medium_, packet);
+  interpolate<uniform, differentials>(medium_, packet);
   samples_ += hwy::PopCount(packet.alive);
   if (differentials || HWY_UNLIKELY(packet.watched || packet.steps >= packet.most_steps)) return step_watched(packet);
   take_step<uniform, differentials>(medium_, packet, packet.p, packet.v, packet.u);
   for (int i = 0; i < packet.vectors * lanes; i += lanes)
     store(hn::Add(load(packet.length, i), load(packet.time, i)), packet.length, i);
   ++packet.steps;
-  if (HWY_UNLIKELY(!batch_.points.empty())) keep_points(packet);
+  if (HWY_UNLIKELY(!batch_.points.empty())) keep_points(packet, packet.alive);
 }
 
-/// The step that leaves the extent, as long as `time` says.
+/// To the positions after a step as long as `time` says. May take lanes to other bricks.
 template <bool uniform, bool differentials>
-void Kernel<uniform, differentials>::try_landing(Packet& packet) {
-  locate<uniform, differentials>(medium_, packet);  // Which may take lanes to other bricks.
+void Kernel<uniform, differentials>::attempt(Packet& packet) {
+  if (medium_.stages) return step_by_stages<uniform, differentials>(medium_, packet);
+  if (medium_.settings.method == BendingMethod::euler) return step_by_euler<uniform, differentials>(medium_, packet);
+  locate_middles<uniform, differentials>(medium_, packet);
   interpolate<uniform, differentials>(medium_, packet);
   take_step<uniform, differentials>(medium_, packet, packet.p_next, packet.v_next, packet.u_next);
 }
 
-/// Where the extent's face across an axis is that rays along `chord` leave through.
+/// A step by another method than splitting.
 template <bool uniform, bool differentials>
-HWY_INLINE F Kernel<uniform, differentials>::face(const Packet& packet, const Landing& landing, int axis,
-                                                  int at) const {
-  const F margin = set(medium_.margin[axis]);
-  return hn::IfThenElse(hn::Gt(load(landing.chord[axis], at), hn::Zero(floats)),
-                        hn::Add(load(packet.high[axis], at), margin), hn::Sub(load(packet.low[axis], at), margin));
-}
-
-/// Finds the face that the whole step's chord meets, and about how long a step ends there.
-template <bool uniform, bool differentials>
-void Kernel<uniform, differentials>::aim(Packet& packet, Landing& landing) const {
-  const F zero = hn::Zero(floats), one = set(1);
-  for (int i = 0; i < packet.vectors * lanes; i += lanes) {
-    const F longest = load(packet.time, i);
-    store(longest, landing.longest, i);
-    store(sub(load(packet.p_next, i), load(packet.p, i)), landing.chord, i);
-    const auto part = [&](int axis) HWY_ATTR {
-      const F along = load(landing.chord[axis], i);
-      const F gap = hn::Sub(face(packet, landing, axis, i), load(packet.p[axis], i));
-      return hn::IfThenElse(hn::Gt(hn::Abs(along), zero), hn::Div(gap, along), set(1e30f));
-    };
-    const F x = part(0), y = part(1), z = part(2), nearest = hn::Min(hn::Min(x, y), z);
-    store(hn::IfThenElse(hn::Eq(x, nearest), zero, hn::IfThenElse(hn::Eq(y, nearest), one, set(2))), landing.axis, i);
-    store(hn::Mul(longest, hn::Min(hn::Max(nearest, zero), one)), packet.time, i);
-  }
+HWY_NOINLINE void Kernel<uniform, differentials>::step_otherwise(Packet& packet) {
+  const std::uint32_t stop = too_short<uniform>(packet);
+  attempt(packet);
+  samples_ += hwy::PopCount(packet.alive) * samples_per_step();
+  const std::uint32_t staying = medium_.adaptive ? control_steps<uniform, differentials>(medium_, packet) : 0;
+  end_step(packet, staying, stop);
 }
 
 /// The step that leaves the extent, repeated with the length that ends on its face (Newton's method).
@@ -345,31 +340,15 @@ HWY_NOINLINE void Kernel<uniform, differentials>::land(Packet& packet) {
   packet.vectors = packet_rays / lanes;
   close_ranks(packet);
   packet.clamps = true;
-  const F zero = hn::Zero(floats), one = set(1);
   Landing landing;
-  try_landing(packet);
-  aim(packet, landing);
+  attempt(packet);
+  aim(medium_, packet, landing);
   for (int n = 0; n < landing_steps; ++n) {
-    try_landing(packet);
-    for (int i = 0; i < packet.vectors * lanes; i += lanes) {
-      const F axis = load(landing.axis, i), longest = load(landing.longest, i);
-      const auto of_axis = [&](F a, F b, F c) HWY_ATTR {
-        return hn::IfThenElse(hn::Eq(axis, zero), a, hn::IfThenElse(hn::Eq(axis, one), b, c));
-      };
-      const auto on_face = [&](int k) HWY_ATTR { return face(packet, landing, k, i); };
-      const F3 to = load(packet.p_next, i);
-      const F3 u = uniform ? load(packet.v_next, i) : load(packet.u_next, i);
-      const F gap = hn::Sub(of_axis(on_face(0), on_face(1), on_face(2)), of_axis(to.x, to.y, to.z));
-      F rest = hn::Div(gap, of_axis(u.x, u.y, u.z));
-      rest = hn::IfThenElseZero(hn::Le(hn::Abs(rest), longest), rest);  // But of light that grazes the face.
-      const F time = hn::Add(load(packet.time, i), rest);
-      if (n < landing_steps - 1) {
-        store(hn::Min(hn::Max(time, zero), longest), packet.time, i);
-      } else {
-        store(mul_add(rest, u, to), packet.p_next, i);
-        store(time, packet.time, i);
-      }
-    }
+    attempt(packet);
+    if (n < landing_steps - 1)
+      improve<uniform>(medium_, packet, landing);
+    else
+      touch_down<uniform>(medium_, packet, landing);
   }
   arrive(packet, landing);
 }
@@ -388,13 +367,14 @@ void Kernel<uniform, differentials>::arrive(Packet& packet, const Landing& landi
     ray.axis = static_cast<std::int8_t>(landing.axis[lane]);
     ray.length += double{packet.time[lane]} * to_world();
     ++ray.steps;
-    samples_ += 1 + landing_steps;
+    samples_ += (1 + landing_steps) * samples_per_step();
   }
   packet.alive = 0;
 }
 
 template <bool uniform, bool differentials>
 std::uint64_t Kernel<uniform, differentials>::run() {
+  const bool otherwise = medium_.settings.method != BendingMethod::splitting;
   for (Packet& packet : packets_) fill(packet);
   for (bool busy = true; busy;) {
     busy = false;
@@ -402,9 +382,10 @@ std::uint64_t Kernel<uniform, differentials>::run() {
       if (packet.alive == 0) continue;
       busy = true;
       if (HWY_UNLIKELY(!packet.timed)) find_times<uniform>(medium_, packet);
-      locate<uniform, differentials>(medium_, packet);
-      interpolate<uniform, differentials>(medium_, packet);
-      step(packet);
+      if (HWY_UNLIKELY(otherwise))
+        step_otherwise(packet);
+      else
+        step_split(packet);
       if (HWY_LIKELY(packet.alive != 0)) continue;
       Packet& leaving = leaving_[&packet - packets_];
       if (leaving.alive != 0) land(leaving);
@@ -450,8 +431,6 @@ struct WithoutDenormals {};
 #endif
 
 }  // namespace
-
-bool has_kernel(BendingMethod method) { return method == BendingMethod::splitting; }
 
 std::uint64_t run(const TensorField& field, const KernelSettings& settings, KernelRays& batch) {
   const Medium medium(field, settings);

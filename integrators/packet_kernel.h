@@ -51,15 +51,13 @@ using MeetsSurface = std::function<bool(const Eigen::Vector3d& from, const Eigen
 
 struct KernelSettings {
   BendingMethod method = BendingMethod::splitting;
-  float step = 0;  ///< Voxels; 0: automatic.
+  float step = 0;       ///< Voxels; 0: automatic.
+  float tolerance = 0;  ///< Adaptive methods: voxels and radians.
   std::uint32_t max_steps = 0;
   float max_length = 0;          ///< World units; of the whole way, `KernelRay::length` included.
   MeetsSurface meets_surface;    ///< Null if there are no surfaces within the field.
   Eigen::AlignedBox3d surfaces;  ///< Where they are, index space.
 };
-
-/// Whether the kernel has the method. (Eq. 3–4 see the trace of T, which is not in the bricks' eight floats.)
-bool has_kernel(BendingMethod method);
 
 /// Takes every ray to the face of the extent where it leaves (`axis` is set, and it is on that face), or to the point
 /// before a step that the kernel does not take: onto a surface, past the greatest length or number of steps, where s·T

@@ -23,7 +23,13 @@ Medium::Medium(const TensorField& field_, const KernelSettings& settings_) : fie
     margin[axis] = static_cast<float>(field.index_bounds().max()[axis] - field.voxels().max()[axis]);
   }
   flat = (field.voxels().sizes().array() == 0).any();
-  longest_step = settings.step > 0 ? settings.step : longest_automatic_step;
+  stages = runge_kutta(settings.method);
+  adaptive = stages && stages->adaptive;
+  clamps = flat || settings.method != BendingMethod::splitting;
+  const double automatic = adaptive ? step_lengths::longest_adaptive : step_lengths::longest_automatic;
+  longest_step = settings.step > 0 ? settings.step : static_cast<float>(automatic);
+  past_straight_brick =
+      static_cast<float>(stages ? step_lengths::past_straight_brick_by_stages : step_lengths::past_straight_brick);
   bounded = std::isfinite(settings.max_length);
 }
 

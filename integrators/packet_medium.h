@@ -6,6 +6,8 @@
 #include <cstdint>
 
 #include "integrators/packet_kernel.h"
+#include "integrators/runge_kutta.h"
+#include "integrators/step_lengths.h"
 
 namespace tensorray::packets {
 
@@ -15,6 +17,8 @@ struct Medium {
 
   const TensorField& field;
   const KernelSettings& settings;
+  const RungeKutta* stages;  // Of the method; null if it has one, which is at a step's middle or (Euler's) beginning.
+  bool adaptive;
   bool uniform;         // Voxels are cubes along the world's axes: index space is world space, scaled.
   float voxel;          // If so, their edge.
   float longest_voxel;  // Along any direction.
@@ -23,7 +27,9 @@ struct Medium {
   float margin[3];                 // Of the extent beyond these: ½ on an axis of a single voxel.
   bool flat;                       // Whether an axis has a single voxel.
   float slope[3];                  // 0 along those axes, 1 along the others.
+  bool clamps;                     // Whether points that are sampled may be beyond the voxels' box, always.
   float longest_step;              // Voxels; but through straight bricks.
+  float past_straight_brick;       // Voxels.
   bool bounded;                    // Whether rays may end within the field, by their length.
 
   TensorBrick brick(const std::int32_t at[3]) const { return field.brick({at[0], at[1], at[2]}); }
@@ -34,10 +40,10 @@ struct Medium {
   static void exponential(const float T[8], float factor, float V[3]);
 };
 
-constexpr float longest_automatic_step = 0.5f, shortest_automatic_step = 1.0f / 64;  // Voxels; as in scalar_tracer.cpp.
-constexpr float strongest_kick = 0.2f;
-constexpr float past_straight_brick = 1.0f / 64;
-constexpr int landing_steps = 4;  // Of Newton's method, to a face of the extent.
+constexpr float strongest_kick = static_cast<float>(step_lengths::strongest_kick);
+constexpr float shortest_step = 1.0f / 1024;  // Voxels: shorter ones, which only other methods than splitting take, are
+                                              // for double precision.
+constexpr int landing_steps = 4;              // Of Newton's method, to a face of the extent.
 
 /// With n terms the power series of exp(A) V is exact to 3e-9 for ‖A‖ up to entry n − 2: (3e-9 (n + 1)!)^(1/(n + 1)).
 /// That is less than rounding, as the error is the same in every step where rounding is not.
@@ -71,6 +77,7 @@ struct alignas(64) Packet {
   float components[packet_rays * 8];  // The tensors of lanes in several cells;
   PerRay tensor[8];                   // of all, component after component.
   PerRay p_next[3], v_next[3], u_next[3];
+  PerRay wanted, excess;  // Of adaptive methods: the next step, voxels, and this one's error over what is allowed.
 
   // Only of rays with differentials: p and v along two parameters, now, in the middle of the step and after it, the
   // slopes of the tensor along x, y and z, and ‖s h T‖ or a bound on it.

@@ -57,21 +57,29 @@ HWY_NOINLINE void leave_straight_bricks(const Medium& medium, Packet& packet) {
   });
 }
 
+/// How long an automatic step of fixed-step methods is, voxels, if one voxel is as long as `voxel`. @p bending_rate as
+/// a packet has it.
+HWY_INLINE F automatic_step(const Medium& medium, F bending_rate, F voxel) {
+  const bool splitting = medium.settings.method == BendingMethod::splitting;
+  const F shortest = set(splitting ? static_cast<float>(step_lengths::shortest_splitting) : 0.0f);
+  const F longest = set(static_cast<float>(step_lengths::longest_automatic));
+  const F kick = hn::Mul(bending_rate, voxel), strongest = set(strongest_kick);
+  return hn::IfThenElse(hn::Gt(hn::Mul(kick, longest), strongest), hn::Max(hn::Div(strongest, kick), shortest),
+                        longest);
+}
+
 /// How long the next step is, in the units that u is per: voxels, or, if voxels are not uniform, world units.
 template <bool uniform>
 HWY_NOINLINE void find_times(const Medium& medium, Packet& packet) {
   if (packet.straight) leave_straight_bricks<uniform>(medium, packet);
-  const bool automatic = medium.settings.step == 0;
+  const bool automatic = medium.settings.step == 0 && !(packet.greatest_reach <= strongest_kick);
   const F zero = hn::Zero(floats), end = set(TensorBrick::cells);
   for (int i = 0; i < packet.vectors * lanes; i += lanes) {
     const F3 u = load(direction<uniform>(packet), i);
     const F voxel = uniform ? set(1) : hn::Div(set(1), hn::Sqrt(dot(u, u)));
-    F steps = set(medium.longest_step);
-    if (automatic && !(packet.greatest_reach <= strongest_kick)) {
-      const F kick = hn::Mul(load(packet.bending_rate, i), voxel);
-      const F shorter = hn::Max(hn::Div(set(strongest_kick), kick), set(shortest_automatic_step));
-      steps = hn::IfThenElse(hn::Gt(hn::Mul(kick, set(longest_automatic_step)), set(strongest_kick)), shorter, steps);
-    }
+    const F steps = medium.adaptive ? load(packet.wanted, i)
+                    : automatic     ? automatic_step(medium, load(packet.bending_rate, i), voxel)
+                                    : set(medium.longest_step);
     F time = uniform ? steps : hn::Mul(steps, voxel);
     if (packet.straight) {
       // Out of the brick where nothing bends light, and a little further, so that rounding does not keep it there.
@@ -84,25 +92,25 @@ HWY_NOINLINE void find_times(const Medium& medium, Packet& packet) {
       const auto within = [&](F x) HWY_ATTR { return hn::And(hn::Ge(x, zero), hn::Le(x, end)); };
       const Mask crosses = hn::And(hn::And(within(p.x), hn::And(within(p.y), within(p.z))),
                                    hn::And(hn::Eq(load(packet.strongest, i), zero), hn::Lt(out, set(1e29f))));
-      time = hn::IfThenElse(crosses, hn::MulAdd(set(past_straight_brick), voxel, out), time);
+      time = hn::IfThenElse(crosses, hn::MulAdd(set(medium.past_straight_brick), voxel, out), time);
     }
     store(time, packet.time, i);
   }
   packet.timed = !packet.varied;
 }
 
-/// Finds the middles of steps, their cells, and what is needed to interpolate there. `careful`: where the packet
-/// clamps, or, with `forced`, points are beyond their bricks, on whose faces they then are taken to be.
+/// Finds the points where tensors are wanted, `point_of(i)` of the vector at lane i, their cells, and what is needed to
+/// interpolate there. `careful`: where the packet clamps, or, with `forced`, points are beyond their bricks, on whose
+/// faces they then are taken to be.
 /// @return whether all are within their lanes' bricks.
-template <bool uniform, bool differentials, bool careful>
-HWY_INLINE bool find_cells(Packet& packet, bool forced) {
+template <bool differentials, bool careful, class Point>
+HWY_INLINE bool find_cells(Packet& packet, bool forced, const Point& point_of) {
   const F last = set(TensorBrick::cells - 1), width = set(TensorBrick::width);
   auto greatest = hn::Zero(bits);
   F first = hn::Zero(floats);
   Mask same = hn::Eq(first, first);
   for (int i = 0; i < packet.vectors * lanes; i += lanes) {
-    const F half = hn::Mul(set(0.5f), load(packet.time, i));
-    F3 point = mul_add(half, load(direction<uniform>(packet), i), load(packet.p, i));
+    F3 point = point_of(i);
     store(point, packet.middle, i);
     if (careful && packet.clamps) point = clamp(point, load(packet.low, i), load(packet.high, i));
     F3 near = floor(point);
@@ -125,18 +133,27 @@ HWY_INLINE bool find_cells(Packet& packet, bool forced) {
   return hn::AllFalse(bits, hn::Gt(greatest, hn::BitCast(bits, last)));
 }
 
-/// The first part of a step: to its middle. Takes lanes to the bricks of these points.
-template <bool uniform, bool differentials>
-HWY_INLINE void locate(const Medium& medium, Packet& packet) {
-  const bool found = packet.clamps ? find_cells<uniform, differentials, true>(packet, false)
-                                   : find_cells<uniform, differentials, false>(packet, false);
+/// Goes to points where tensors are wanted: takes lanes to the bricks of these.
+template <bool uniform, bool differentials, class Point>
+HWY_INLINE void locate(const Medium& medium, Packet& packet, const Point& point_of) {
+  const bool found = packet.clamps ? find_cells<differentials, true>(packet, false, point_of)
+                                   : find_cells<differentials, false>(packet, false, point_of);
   if (HWY_LIKELY(found)) return;
   move_to_bricks<uniform>(medium, packet, [&](int i) HWY_ATTR {
     const F3 point = load(packet.middle, i);
     return packet.clamps ? clamp(point, load(packet.low, i), load(packet.high, i)) : point;
   });
-  find_cells<uniform, differentials, true>(packet,
-                                           true);  // Beyond the extent, or on the face that rounding took it to.
+  // Beyond the extent, or on the face that rounding took it to.
+  find_cells<differentials, true>(packet, true, point_of);
+}
+
+/// The first part of a step: to its middle.
+template <bool uniform, bool differentials>
+HWY_INLINE void locate_middles(const Medium& medium, Packet& packet) {
+  locate<uniform, differentials>(medium, packet, [&](int i) HWY_ATTR {
+    const F half = hn::Mul(set(0.5f), load(packet.time, i));
+    return mul_add(half, load(direction<uniform>(packet), i), load(packet.p, i));
+  });
 }
 
 /// Asks for the memory of the cell where a lane will be after two long steps, if it is in its brick.
@@ -222,6 +239,20 @@ HWY_INLINE void interpolate(const Medium& medium, Packet& packet) {
   }
 }
 
+/// A change of position, but across axes of a single voxel, where the tensor is the same.
+HWY_INLINE F3 along_slopes(const Medium& medium, const F3& dp) {
+  return {hn::Mul(dp.x, set(medium.slope[0])), hn::Mul(dp.y, set(medium.slope[1])),
+          hn::Mul(dp.z, set(medium.slope[2]))};
+}
+
+/// How the tensor changes if the position does by `along`.
+HWY_INLINE Tensor tensor_along(const Packet& packet, const F3& along, int at) {
+  Tensor dT;
+  for (int c = 0; c < 8; ++c)
+    dT.c[c] = dot(along, {load(packet.slopes[0][c], at), load(packet.slopes[1][c], at), load(packet.slopes[2][c], at)});
+  return dT;
+}
+
 /// The derivatives of exp(factor · T) V, normalised, along two parameters, and those of the positions at the end of the
 /// step: of the method's own steps. One term more than without, as the derivative of a series has one less.
 template <bool uniform>
@@ -230,15 +261,7 @@ HWY_INLINE void bend_differentials(const Medium& medium, Packet& packet, const T
   const F size = load(packet.size, at), half = hn::Mul(set(0.5f), load(packet.time, at));
   for (int i = 0; i < 2; ++i) {
     const F3 dmiddle = mul_add(half, index_direction<uniform>(medium, load(packet.dv[i], at)), load(packet.dp[i], at));
-    F3 along = dmiddle;
-    if (medium.flat)  // The tensor is the same across an axis of a single voxel.
-      along = F3{hn::Mul(along.x, set(medium.slope[0])), hn::Mul(along.y, set(medium.slope[1])),
-                 hn::Mul(along.z, set(medium.slope[2]))};
-    Tensor dT;
-    for (int c = 0; c < 8; ++c)
-      dT.c[c] = hn::MulAdd(
-          along.x, load(packet.slopes[0][c], at),
-          hn::MulAdd(along.y, load(packet.slopes[1][c], at), hn::Mul(along.z, load(packet.slopes[2][c], at))));
+    const Tensor dT = tensor_along(packet, along_slopes(medium, dmiddle), at);
     F3 term = v, sum = v, dterm = load(packet.dv[i], at), dsum = dterm;
     for (int n = 1; n <= most_terms; ++n) {
       const Mask needed = hn::Gt(size, set(n < 4 ? -1.0f : series_reach[n - 4]));

@@ -6,6 +6,7 @@
 #include <Eigen/Geometry>
 
 #include "integrators/packet_kernel.h"
+#include "integrators/runge_kutta.h"
 #include "integrators/scalar_tracer.h"
 
 namespace tensorray {
@@ -14,8 +15,9 @@ namespace {
 using packets::KernelRay;
 using packets::KernelSettings;
 
-constexpr double face_margin = 1e-3;     // Voxels; more than single precision errs by.
-constexpr double surface_margin = 4e-6;  // In sizes of the volume; more than Geometry's own.
+constexpr double face_margin = 1e-3;      // Voxels; more than single precision errs by.
+constexpr double least_tolerance = 1e-5;  // Of adaptive methods: below, single precision's errors would be seen.
+constexpr double surface_margin = 4e-6;   // In sizes of the volume; more than Geometry's own.
 
 /// Surfaces that rays may meet within the field, in index space; empty if there are none.
 Eigen::AlignedBox3d surfaces_within(const TensorField& field, const Geometry& geometry) {
@@ -46,6 +48,7 @@ KernelSettings kernel_settings(const TensorField& field, const Geometry& geometr
   KernelSettings result;
   result.method = settings.method;
   result.step = static_cast<float>(settings.step);
+  result.tolerance = static_cast<float>(settings.tolerance);
   result.max_steps = static_cast<std::uint32_t>(settings.max_steps);
   result.max_length = static_cast<float>(settings.max_length);
   result.surfaces = surfaces_within(field, geometry);
@@ -251,7 +254,8 @@ void trace_rays(const TensorField& field, const Geometry& geometry, const Bendin
 
 bool trace_in_packets(const TensorField& field, const Geometry& geometry, const BendingSettings& settings,
                       RayBatch& batch, const Recordings& recordings) {
-  if (!packets::has_kernel(settings.method)) return false;
+  const RungeKutta* const stages = runge_kutta(settings.method);
+  if (stages && stages->adaptive && settings.tolerance < least_tolerance) return false;
   if (batch.differentials.empty())
     trace_rays<1>(field, geometry, settings, batch, recordings);
   else

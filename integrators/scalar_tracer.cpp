@@ -3,26 +3,13 @@
 #include <algorithm>
 #include <cmath>
 
+#include "integrators/step_lengths.h"
+
 namespace tensorray {
 
 using namespace bending_steps;
 
 namespace {
-
-constexpr double longest_step = 0.5;         // Automatic steps, in voxels ...
-constexpr double shortest_step = 1.0 / 64;   // ... of the splitting, which is stable however strong the field.
-constexpr double strongest_kick = 0.2;       // s h ‖T − ⅓ tr(T) I‖ of an automatic step.
-constexpr double longest_adaptive_step = 2;  // In voxels: so that no voxel is stepped over.
-constexpr double shortest_adaptive_step = 1e-6;
-
-constexpr double past_straight_brick = 1.0 / 64;     // In voxels; so that rounding does not keep light there.
-constexpr double past_straight_brick_stages = 1e-5;  // The same for methods that sample also at a step's end.
-
-bool adaptive(BendingMethod method) { return method == BendingMethod::bs23 || method == BendingMethod::dopri5; }
-int order(BendingMethod method) { return method == BendingMethod::bs23 ? 3 : 5; }
-int stages(BendingMethod method) {
-  return method == BendingMethod::euler || method == BendingMethod::splitting ? 1 : order(method);
-}
 
 double deviator_norm(const Eigen::Matrix3d& T) {
   const double third = T.trace() / 3;
@@ -135,8 +122,9 @@ std::optional<RayEnd> Tracer<N>::cross_box() {
 template <int N>
 double Tracer<N>::automatic_step() const {
   const double kick = std::abs(medium_.s) * deviator_norm(medium_.T) * voxel_;
-  if (kick * longest_step <= strongest_kick) return longest_step;
-  return std::max(strongest_kick / kick, settings_.method == BendingMethod::splitting ? shortest_step : 0.0);
+  if (kick * step_lengths::longest_automatic <= step_lengths::strongest_kick) return step_lengths::longest_automatic;
+  const double shortest = settings_.method == BendingMethod::splitting ? step_lengths::shortest_splitting : 0.0;
+  return std::max(step_lengths::strongest_kick / kick, shortest);
 }
 
 /// The nearest thing that the chord from the ray to `next` meets. `hit.distance` is along the chord.
@@ -201,10 +189,9 @@ double Tracer<N>::land(const State<N>& next, double h, const Hit& hit) {
 template <int N>
 double Tracer<N>::control_step(const State<N>& error) {
   const double excess = std::max(error.position().norm() / voxel_, error.direction().norm()) / settings_.tolerance;
-  const double factor = 0.9 * std::pow(std::max(excess, 1e-10), -1.0 / order(settings_.method));
-  const double longest = settings_.step > 0 ? settings_.step : longest_adaptive_step;
-  const double wanted = adaptive_step_ * (std::isfinite(factor) ? std::clamp(factor, 0.2, 5.0) : 0.2);
-  adaptive_step_ = std::clamp(wanted, shortest_adaptive_step, longest);
+  const double longest = settings_.step > 0 ? settings_.step : step_lengths::longest_adaptive;
+  const double wanted = adaptive_step_ * step_lengths::growth(excess, runge_kutta(settings_.method)->order);
+  adaptive_step_ = std::clamp(wanted, step_lengths::shortest_adaptive, longest);
   return excess;
 }
 
@@ -214,19 +201,21 @@ template <int N>
 double Tracer<N>::next_step() {
   const double way =
       settings_.method == BendingMethod::euler ? 0 : sampler_.way_through_straight_brick(position(), direction());
-  if (way > 0) return way + (stages(settings_.method) == 1 ? past_straight_brick : past_straight_brick_stages) * voxel_;
-  return voxel_ * (adaptive(settings_.method) ? adaptive_step_
-                   : settings_.step == 0      ? automatic_step()
-                                              : settings_.step);
+  const RungeKutta* const stages = runge_kutta(settings_.method);
+  if (way > 0)
+    return way + (stages ? step_lengths::past_straight_brick_by_stages : step_lengths::past_straight_brick) * voxel_;
+  if (stages && stages->adaptive) return voxel_ * adaptive_step_;
+  return voxel_ * (settings_.step == 0 ? automatic_step() : settings_.step);
 }
 
 /// In the field: step by step to an absorber, out of the box or out of the cut. Returns nothing in the last case.
 template <int N>
 std::optional<RayEnd> Tracer<N>::bend(double first_step) {
-  const bool controlled = adaptive(settings_.method);
+  const RungeKutta* const stages = runge_kutta(settings_.method);
+  const bool controlled = stages && stages->adaptive;
   voxel_ = length_of_voxel();
   medium_.sample(ray_.P);
-  adaptive_step_ = settings_.step == 0 ? automatic_step() : settings_.step;
+  adaptive_step_ = first_step > 0 ? first_step / voxel_ : settings_.step == 0 ? automatic_step() : settings_.step;
   record(true);
   while (true) {
     if (steps_ >= static_cast<std::uint32_t>(settings_.max_steps)) return RayEnd::step_limit;
@@ -238,7 +227,7 @@ std::optional<RayEnd> Tracer<N>::bend(double first_step) {
     State<N> error;
     const State<N> next = step(h, error);
     if (next.direction().isZero() || !next.position().allFinite()) return RayEnd::degenerate;
-    if (controlled && control_step(error) > 1 && wanted > shortest_adaptive_step * voxel_) continue;
+    if (controlled && control_step(error) > 1 && wanted > step_lengths::shortest_adaptive * voxel_) continue;
 
     Hit hit;
     const Event event = meet(next, hit);

@@ -18,7 +18,7 @@ constexpr int cells = TensorBrick::cells;
 constexpr int width = TensorBrick::width;
 static_assert(cells == TensorBlock::size, "a brick holds a block and the near faces of its neighbours");
 
-constexpr int trailing_offset = TensorBrick::voxels * TensorBrick::bending_floats;
+constexpr int trailing_offset = TensorBrick::trailing_offset;
 constexpr int used_floats = trailing_offset + TensorBrick::voxels;
 constexpr int brick_floats = (used_floats + 15) / 16 * 16;  // Bricks begin on cache lines.
 

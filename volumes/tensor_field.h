@@ -24,6 +24,7 @@ struct TensorBrick {
   static constexpr int width = cells + 1;  ///< Voxels along an edge, with the apron.
   static constexpr int voxels = width * width * width;
   static constexpr int bending_floats = 8;
+  static constexpr int trailing_offset = voxels * bending_floats;  ///< From `bending` to `trailing`.
 
   static constexpr int voxel(int x, int y, int z) { return (x * width + y) * width + z; }
 

@@ -203,13 +203,18 @@ inline RayBatch turned_a_little(const Scene& scene) {
 constexpr double position_tolerance = 1e-3;  // Voxels.
 constexpr double length_tolerance = 1e-5;    // Of the length, and of a voxel.
 
+/// Whether a method may repeat a step, which it does or does not where rounding decides.
+inline bool is_adaptive(BendingMethod method) {
+  return method == BendingMethod::bs23 || method == BendingMethod::dopri5;
+}
+
 /// Whether ray i has the same way in both, to single precision.
-inline bool agree(const RayBatch& a, const RayBatch& b, std::size_t i) {
+inline bool agree(const RayBatch& a, const RayBatch& b, std::size_t i, double steps_allowed = 1) {
   const double steps_apart = std::abs(double(a.steps[i]) - double(b.steps[i]));
   const double apart = (a.position[i] - b.position[i]).norm();  // Which is in the length where light grazes a surface.
   return a.end[i] == b.end[i] && distance_in_voxels(a.position[i], b.position[i]) < position_tolerance &&
          std::abs(a.length[i] - b.length[i]) <= length_tolerance * (b.length[i] + mean_edge) + apart &&
-         steps_apart <= 1;
+         steps_apart <= steps_allowed;
 }
 
 inline std::string description(const TensorField& field, const RayBatch& rays, std::size_t i) {
@@ -235,14 +240,16 @@ inline void expect_reference(const Scene& scene, double sensitive = 0) {
   SCOPED_TRACE(scene.name);
   const RayBatch fast = traced(scene, scene.rays), exact = traced_by_reference(scene, scene.rays);
   const RayBatch moved = traced_by_reference(scene, turned_a_little(scene));
+  const bool adaptive = is_adaptive(scene.settings.method);
   std::size_t unstable = 0, steps_apart = 0, wrong = 0;
   for (std::size_t i = 0; i < exact.size(); ++i) {
-    if (!agree(moved, exact, i) || ends_beside_face(scene, exact, i)) {
+    const double steps_allowed = adaptive ? 10 + 0.25 * exact.steps[i] : 1;
+    if (!agree(moved, exact, i, steps_allowed) || ends_beside_face(scene, exact, i)) {
       ++unstable;
       continue;
     }
     steps_apart += fast.steps[i] != exact.steps[i];
-    if (agree(fast, exact, i) || ++wrong > 3) continue;
+    if (agree(fast, exact, i, steps_allowed) || ++wrong > 3) continue;
     ADD_FAILURE() << "ray " << i << " from voxel " << (scene.field.to_index() * scene.rays.position[i]).transpose()
                   << ", s " << scene.rays.flexibility[i] << ":\n  packets:   " << description(scene.field, fast, i)
                   << "\n  reference: " << description(scene.field, exact, i);
@@ -250,7 +257,7 @@ inline void expect_reference(const Scene& scene, double sensitive = 0) {
   const auto count = static_cast<double>(exact.size());
   EXPECT_EQ(wrong, 0u);
   EXPECT_LE(static_cast<double>(unstable), sensitive * count);
-  EXPECT_LE(static_cast<double>(steps_apart), 0.02 * count + 1) << "rounding at faces is rare";
+  EXPECT_TRUE(adaptive || static_cast<double>(steps_apart) <= 0.02 * count + 1) << "rounding at faces is rare";
 }
 
 /// Whether a ray of one batch and one of another have the same bytes.

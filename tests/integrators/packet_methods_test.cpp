@@ -1,0 +1,342 @@
+// Each method by packets, in single precision, against the same method in double precision.
+
+#include <gtest/gtest.h>
+
+#include "integrators/packet_tracer.h"
+#include "tests/integrators/packet_support.h"
+#include "volumes/generators.h"
+
+namespace tensorray {
+namespace {
+
+using namespace test;
+using Eigen::Matrix3d;
+using Eigen::Vector3d;
+using Eigen::Vector3i;
+
+constexpr BendingMethod other_methods[] = {BendingMethod::euler, BendingMethod::rk4, BendingMethod::bs23,
+                                           BendingMethod::dopri5};
+
+std::string name_of(BendingMethod method) {
+  const char* const names[] = {"euler", "splitting", "rk4", "bs23", "dopri5"};
+  return names[static_cast<int>(method)];
+}
+
+using PacketMethods = EveryInstructionSet;
+INSTANTIATE_TEST_SUITE_P(All, PacketMethods, test::instruction_sets(), instruction_set_name);
+
+std::vector<double> wavelengths(double kick) { return {0.2 * kick, -0.4 * kick, 0.6 * kick, 0.8 * kick, kick}; }
+
+Scene scene_of(BendingMethod method, const std::string& name, TensorField field, const Surfaces& surfaces, double step,
+               RayBatch rays) {
+  Scene scene = make_scene(name_of(method) + ", " + name, std::move(field), surfaces, step, std::move(rays));
+  scene.settings.method = method;
+  // Errors of a few hundred steps stay below those that are compared. The least that packets are for.
+  scene.settings.tolerance = 1e-5;
+  return scene;
+}
+
+/// Where tensors have kinks, an adaptive method's errors depend on where exactly its steps end, and these on rounding:
+/// packets then err as the reference does, but not by the same. The measure is the reference with a hundredth of the
+/// tolerance.
+void expect_as_exact_as_reference(const Scene& scene) {
+  SCOPED_TRACE(scene.name);
+  const RayBatch fast = traced(scene, scene.rays), reference = traced_by_reference(scene, scene.rays);
+  BendingSettings settings = scene.settings;
+  settings.tolerance /= 100;
+  RayBatch truth = scene.rays;
+  trace_reference(scene.field, scene.geometry, settings, truth);
+  std::vector<double> errors, usual_errors;
+  for (std::size_t i = 0; i < truth.size(); ++i) {
+    errors.push_back(distance_in_voxels(fast.position[i], truth.position[i]));
+    usual_errors.push_back(distance_in_voxels(reference.position[i], truth.position[i]));
+  }
+  std::sort(errors.begin(), errors.end());
+  std::sort(usual_errors.begin(), usual_errors.end());
+  for (const double part : {0.5, 0.75, 0.9}) {
+    const auto i = static_cast<std::size_t>(part * static_cast<double>(errors.size()));
+    EXPECT_LE(errors[i], 2 * usual_errors[i] + position_tolerance) << part;
+    EXPECT_LE(usual_errors[i], 2 * errors[i] + position_tolerance) << part;
+  }
+}
+
+void expect_like_reference(const Scene& scene) {
+  if (is_adaptive(scene.settings.method)) return expect_as_exact_as_reference(scene);
+  expect_reference(scene, 0.1);
+}
+
+Eigen::AlignedBox3i odd_box() { return index_box({-13, 5, -30}, {27, 34, 41}); }
+
+Scene random_scene(BendingMethod method, const Lattice& lattice, double step, double kick, int bundles) {
+  TensorField field(lattice_grid(odd_box(), lattice, smooth_tensor(41)));
+  RayBatch rays = random_rays(field, bundles, wavelengths(kick), 42);
+  const std::string name = lattice.name + ", step " + std::to_string(step) + ", kick " + std::to_string(kick);
+  Scene scene = scene_of(method, name, std::move(field), {}, step, std::move(rays));
+  scene.settings.max_steps = 1000;
+  return scene;
+}
+
+TEST_P(PacketMethods, KeepToAThousandthOfAVoxelOnLongWays) {
+  for (const Lattice& lattice : tested_lattices()) {
+    for (const BendingMethod method : other_methods) {
+      TensorField field(lattice_grid(index_box({-7, 3, -100}, {60, 62, 261}), lattice, smooth_tensor(3)));
+      Numbers numbers(4);
+      RayBatch rays;
+      for (int i = 0; i < 10; ++i) {
+        const Vector3d across(numbers.between(-0.01, 0.01), numbers.between(-0.01, 0.01), 1);
+        add_bundle(rays, field, {numbers.between(18, 28), numbers.between(28, 38), -110}, across, wavelengths(0.002));
+      }
+      const Scene scene = scene_of(method, lattice.name + ", long", std::move(field), {}, 0, std::move(rays));
+      expect_like_reference(scene);
+      for (const std::uint32_t steps : traced(scene, scene.rays).steps)
+        EXPECT_GT(steps, is_adaptive(method) ? 100 : 500);
+    }
+  }
+}
+
+TEST_P(PacketMethods, FollowFieldsOnAnyLattice) {
+  for (const Lattice& lattice : tested_lattices())
+    for (const BendingMethod method : other_methods)
+      for (const double step : {0.0, 0.25, 1.0})
+        for (const double kick : {1e-4, 0.01, 0.1})
+          expect_reference(random_scene(method, lattice, step, kick, 24), 0.1);
+}
+
+TEST_P(PacketMethods, FollowStrongFields) {
+  for (const Lattice& lattice : tested_lattices())
+    for (const BendingMethod method : other_methods)
+      for (const double kick : {0.5, 2.0}) {
+        Scene scene = random_scene(method, lattice, 0, kick, 24);
+        scene.settings.max_length = 1.013;  // World units: some 20 voxels.
+        expect_like_reference(scene);
+      }
+}
+
+TEST_P(PacketMethods, TakeTheSameFewStepsInStrongFields) {
+  const auto expect_few_steps = [](Scene scene) {
+    scene.settings.max_steps = 4;
+    expect_reference(scene, 0.4);
+  };
+  for (const Lattice& lattice : tested_lattices())
+    for (const BendingMethod method : {BendingMethod::euler, BendingMethod::rk4}) {
+      expect_few_steps(random_scene(method, lattice, 0, 5, 24));
+      expect_few_steps(random_scene(method, lattice, 0.25, 5, 24));  // Beyond what the method's order says.
+      expect_few_steps(random_scene(method, lattice, 0, 1000, 24));  // Steps too short for single precision.
+    }
+}
+
+TEST_P(PacketMethods, CrossSparseFields) {
+  for (const Lattice& lattice : tested_lattices())
+    for (const BendingMethod method : other_methods)
+      for (const double fraction : {0.5, 0.9}) {
+        const TensorGrid grid = lattice_grid(index_box({-16, 8, -32}, {64, 56, 64}), lattice, smooth_tensor(45));
+        TensorField field(without_blocks(grid, fraction, 46));
+        RayBatch rays = random_rays(field, 24, wavelengths(0.1), 47);
+        expect_like_reference(scene_of(method, lattice.name + ", sparse", std::move(field), {}, 0, std::move(rays)));
+      }
+}
+
+TEST_P(PacketMethods, CrossFieldsOfFewVoxels) {
+  for (const Lattice& lattice : tested_lattices())
+    for (const BendingMethod method : other_methods)
+      for (const Vector3i& voxels : {Vector3i(1, 30, 20), Vector3i(30, 1, 1), Vector3i(2, 3, 2), Vector3i(10, 9, 17)}) {
+        TensorField field(lattice_grid(index_box({7, -1, -9}, voxels), lattice, smooth_tensor(48)));
+        RayBatch rays = random_rays(field, 24, wavelengths(0.3), 49);
+        expect_like_reference(
+            scene_of(method, lattice.name + ", few voxels", std::move(field), {}, 0, std::move(rays)));
+      }
+}
+
+TEST_P(PacketMethods, PassASingularCorner) {
+  const Generator load = PointLoad();
+  for (const BendingMethod method : other_methods) {
+    TensorField field(generate(load, default_grid(load, 48)));
+    Numbers numbers(50);
+    RayBatch rays;
+    for (int i = 0; i < 100; ++i) {
+      const double reach = i % 10 ? 20 : 2;
+      const Vector3d from(23.5 + numbers.between(-reach, reach), 23.5 + numbers.between(-reach, reach), 60);
+      add_bundle(rays, field, from, {0, 0, -1}, {0.1, 0.2, 0.3});
+    }
+    Surfaces surfaces;
+    surfaces.plate = plate_across({0, 0, -1}, 3);
+    expect_like_reference(scene_of(method, "point load", std::move(field), surfaces, 0, std::move(rays)));
+  }
+}
+
+/// A cut, an oblique plate and an obstacle within the field.
+Surfaces surfaces_within(const Lattice& lattice, bool with_cut) {
+  const Vector3d middle = lattice.to_world * odd_box().cast<double>().center();
+  Eigen::Affine3d turned = lattice.to_world;
+  turned.translation() = middle;
+  turned.linear() = turned.linear() * Eigen::AngleAxisd(0.6, Vector3d(1, 1, -2).normalized()).toRotationMatrix();
+  Surfaces surfaces;
+  if (with_cut) surfaces.cut = box_mesh({Vector3d(-9, -8, -10), Vector3d(9, 8, 10)}, turned);
+  surfaces.obstacles.push_back(box_mesh({Vector3d(-2, -3, 4), Vector3d(3, 2, 6)}, turned));
+  surfaces.plate = plate_across({0.5, -0.3, -1}, 0);
+  surfaces.plate->center = middle;
+  surfaces.plate->size = {0.6, 0.6};
+  return surfaces;
+}
+
+TEST_P(PacketMethods, EndOnSurfacesWithinTheField) {
+  for (const Lattice& lattice : tested_lattices())
+    for (const BendingMethod method : other_methods)
+      for (const bool with_cut : {false, true}) {
+        TensorField field(lattice_grid(odd_box(), lattice, smooth_tensor(51)));
+        RayBatch rays = random_rays(field, 40, wavelengths(0.05), 52);
+        expect_reference(scene_of(method, lattice.name + (with_cut ? ", cut" : ", plate"), std::move(field),
+                                  surfaces_within(lattice, with_cut), 0, std::move(rays)),
+                         0.1);
+      }
+}
+
+TEST_P(PacketMethods, EndAtTheGreatestLengthAndNumberOfSteps) {
+  for (const Lattice& lattice : tested_lattices())
+    for (const BendingMethod method : other_methods) {
+      Scene scene = random_scene(method, lattice, 0, 0.05, 40);
+      scene.settings.max_length = 1.013;
+      expect_reference(scene, 0.1);
+      scene.settings.max_length = std::numeric_limits<double>::infinity();
+      scene.settings.max_steps = 7;
+      if (!is_adaptive(method)) expect_reference(scene, 0.1);
+      const RayBatch fast = traced(scene, scene.rays), exact = traced_by_reference(scene, scene.rays);
+      for (std::size_t i = 0; i < exact.size(); ++i) {
+        EXPECT_LE(fast.steps[i], 7u);
+        EXPECT_TRUE(fast.end[i] != RayEnd::step_limit || fast.steps[i] == 7);
+      }
+      const auto limited = [](const RayBatch& rays) {
+        return std::count(rays.end.begin(), rays.end.end(), RayEnd::step_limit);
+      };
+      EXPECT_GT(limited(fast), 0);
+      EXPECT_NEAR(double(limited(fast)), double(limited(exact)), 0.1 * double(exact.size()));
+    }
+}
+
+TEST_P(PacketMethods, EndAsTheReferenceDoesInOddFields) {
+  const TensorFunction smooth = smooth_tensor(53);
+  for (const BendingMethod method : other_methods)
+    for (const double factor : {1e-41, 1.0, 1e15, std::nan("")}) {
+      TensorField field(lattice_grid(index_box({-3, 0, 2}, {20, 17, 19}), lattices()[0], [&](const Vector3d& p) {
+        // Of which a part has no deviator, but a trace that turns light about in Eq. 3.
+        return p.x() < 5 ? Matrix3d(-30 * factor * Matrix3d::Identity()) : Matrix3d(factor * smooth(p));
+      }));
+      RayBatch rays = random_rays(field, 24, {0.1, -0.1, 0, 1e30, 1e300, std::nan("")}, 54);
+      Scene scene = scene_of(method, "factor " + std::to_string(factor), std::move(field), {}, 0, std::move(rays));
+      scene.settings.max_steps = 300;
+      SCOPED_TRACE(scene.name);
+      const RayBatch fast = traced(scene, scene.rays), exact = traced_by_reference(scene, scene.rays);
+      const RayBatch moved = traced_by_reference(scene, turned_a_little(scene));
+      std::size_t compared = 0;
+      for (std::size_t i = 0; i < exact.size(); ++i) {
+        EXPECT_TRUE(fast.position[i].allFinite() && fast.direction[i].allFinite()) << i;
+        const bool follows = std::abs(scene.rays.flexibility[i]) * scene.field.greatest_norm() * mean_edge < 10;
+        if (moved.end[i] != exact.end[i] || !follows) continue;
+        ++compared;
+        EXPECT_EQ(fast.end[i], exact.end[i]) << "ray " << i << ", s " << scene.rays.flexibility[i];
+      }
+      EXPECT_TRUE(!(factor <= 1) || compared > exact.size() / 4);
+    }
+}
+
+TEST_P(PacketMethods, RaysDoNotDependOnTheirNeighbours) {
+  for (const BendingMethod method : other_methods) {
+    const Lattice lattice = lattices()[2];
+    const TensorGrid grid = lattice_grid(odd_box(), lattice, smooth_tensor(55));
+    TensorField field(without_blocks(grid, 0.3, 56));
+    RayBatch rays = random_rays(field, 16, {1e-4, 0.3, -30, 0, 0.02, 5, 1e5, -0.1, 1e300, 0.002, 0.6}, 57);
+    Scene scene = scene_of(method, "unlike", std::move(field), surfaces_within(lattice, true), 0, std::move(rays));
+    scene.settings.max_steps = 200;
+    SCOPED_TRACE(scene.name);
+    const RayBatch all = traced(scene, scene.rays);
+    RayBatch backwards;
+    for (std::size_t i = all.size(); i-- > 0;) {
+      const auto add = [&](RayBatch& to) {
+        to.add(scene.rays.position[i], scene.rays.direction[i], scene.rays.flexibility[i]);
+      };
+      RayBatch alone;
+      add(alone);
+      add(backwards);
+      EXPECT_TRUE(identical(traced(scene, alone), 0, all, i)) << "ray " << i;
+    }
+    backwards = traced(scene, backwards);
+    for (std::size_t i = 0; i < all.size(); ++i) EXPECT_TRUE(identical(backwards, all.size() - 1 - i, all, i)) << i;
+  }
+}
+
+TEST_P(PacketMethods, RecordTheSameTracks) {
+  for (const BendingMethod method : other_methods) {
+    const Scene scene = random_scene(method, lattices()[2], 0, 0.05, 16);
+    RayBatch recorded = scene.rays;
+    std::vector<Track> tracks;
+    trace(scene.field, scene.geometry, scene.settings, recorded, tracks);
+    const RayBatch alone = traced(scene, scene.rays);
+    for (std::size_t i = 0; i < alone.size(); ++i) {
+      EXPECT_TRUE(identical(recorded, i, alone, i)) << name_of(method) << ", ray " << i;
+      // The two at either end are those of surfaces.
+      for (std::size_t k = 3; k + 3 < tracks[i].size(); ++k) {
+        const double chord = (tracks[i][k].position - tracks[i][k - 1].position).norm();
+        const double length = tracks[i][k].length - tracks[i][k - 1].length;
+        EXPECT_GT(length, 0) << name_of(method) << ", ray " << i << ": a step that is repeated is no point";
+        EXPECT_LE(chord, length * (1 + 1e-4) + 1e-7);
+      }
+    }
+  }
+}
+
+/// Rays with derivatives: moved across, and turned.
+RayBatch with_differentials(RayBatch rays) {
+  for (const Vector3d& direction : rays.direction) {
+    RayDifferential differential;
+    const Vector3d across = upright(direction, Vector3d(1, 2, 3).normalized());
+    differential.position.col(0) = across;
+    differential.position.col(1) = direction.cross(across);
+    differential.direction.col(1) = 0.3 * direction.cross(across);
+    rays.differentials.push_back(differential);
+  }
+  return rays;
+}
+
+TEST_P(PacketMethods, CarryDifferentials) {
+  // Derivatives jump where a ray crosses a cell's face; in a field that is linear in position there is nothing to jump.
+  for (const Lattice& lattice : tested_lattices())
+    for (const BendingMethod method : {BendingMethod::splitting, BendingMethod::euler, BendingMethod::rk4,
+                                       BendingMethod::bs23, BendingMethod::dopri5}) {
+      const Vector3d middle = odd_box().cast<double>().center();
+      TensorField field(lattice_grid(odd_box(), lattice, [&](const Vector3d& p) {
+        return Matrix3d(0.02 * (1 + 0.03 * (p - middle).x() - 0.05 * (p - middle).y()) * general_tensor() +
+                        0.001 * (p - middle).z() * Matrix3d(Vector3d(1, -2, 0.5).asDiagonal()));
+      }));
+      RayBatch rays = with_differentials(random_rays(field, 40, {0.3, -0.5, 1}, 58));
+      const Scene scene = scene_of(method, lattice.name + ", differentials", std::move(field),
+                                   surfaces_within(lattice, false), 0, std::move(rays));
+      SCOPED_TRACE(scene.name);
+      const RayBatch fast = traced(scene, scene.rays), exact = traced_by_reference(scene, scene.rays);
+      RayBatch turned = turned_a_little(scene);
+      turned.differentials = scene.rays.differentials;
+      const RayBatch moved = traced_by_reference(scene, turned);
+      std::size_t compared = 0;
+      for (std::size_t i = 0; i < exact.size(); ++i) {
+        const auto apart = [&](const RayBatch& a) {
+          const RayDifferential &of = a.differentials[i], &right = exact.differentials[i];
+          return std::max((of.position - right.position).norm() / right.position.norm(),
+                          (of.direction - right.direction).norm() / (right.direction.norm() + right.position.norm()));
+        };
+        if (moved.end[i] != exact.end[i] || apart(moved) > 1e-4) continue;  // Where light grazes a surface.
+        ++compared;
+        EXPECT_EQ(fast.end[i], exact.end[i]);
+        EXPECT_LT(apart(fast), 1e-3) << "ray " << i << " after " << exact.steps[i] << " steps";
+      }
+      EXPECT_GT(compared, exact.size() * 8 / 10);
+    }
+}
+
+TEST(PacketMethods, TightTolerancesAreForDoublePrecision) {
+  Scene scene = random_scene(BendingMethod::dopri5, lattices()[0], 0, 0.05, 8);
+  scene.settings.tolerance = 1e-7;
+  const RayBatch ends = traced(scene, scene.rays), exact = traced_by_reference(scene, scene.rays);
+  for (std::size_t i = 0; i < exact.size(); ++i) EXPECT_TRUE(identical(ends, i, exact, i)) << i;
+}
+
+}  // namespace
+}  // namespace tensorray
