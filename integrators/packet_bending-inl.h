@@ -54,31 +54,23 @@ HWY_INLINE void keep_bending_rate(Packet& packet, const Tensor& T, int at) {
   store(deviator_norm(T, load(packet.kick, at)), packet.bending_rate, at);
 }
 
-/// Lanes where ‖factor · T‖ is too large for a series, given as bits.
-HWY_NOINLINE F3 bend_in_double(const Tensor& T, const F3& v, F factor, const F3& others, std::uint32_t which) {
-  alignas(64) float all[8][lanes], factors[lanes], from[3][lanes], to[3][lanes];
-  for (int i = 0; i < 8; ++i) hn::Store(T.c[i], floats, all[i]);
-  hn::Store(factor, floats, factors);
-  const auto keep = [&](const F3& a, float(&b)[3][lanes]) HWY_ATTR {
-    hn::Store(a.x, floats, b[0]);
-    hn::Store(a.y, floats, b[1]);
-    hn::Store(a.z, floats, b[2]);
-  };
-  keep(v, from);
-  keep(others, to);
-  for (int lane = 0; lane < lanes; ++lane) {
-    if (!(which >> lane & 1)) continue;
-    float one[8], direction[3] = {from[0][lane], from[1][lane], from[2][lane]};
-    for (int i = 0; i < 8; ++i) one[i] = all[i][lane];
-    Medium::exponential(one, factors[lane], direction);
-    for (int axis = 0; axis < 3; ++axis) to[axis][lane] = direction[axis];
+/// Bends lanes, given as bits, where ‖s h T‖ is too large for a series.
+HWY_NOINLINE void bend_in_double(const Packet& packet, std::uint32_t which, PerRay (&to)[3]) {
+  for (; which != 0; which &= which - 1) {
+    const auto lane = hwy::Num0BitsBelowLS1Bit_Nonzero32(which);
+    float T[8], v[3];
+    for (int i = 0; i < 8; ++i) T[i] = packet.tensor[i][lane];
+    for (int axis = 0; axis < 3; ++axis) v[axis] = packet.v[axis][lane];
+    Medium::exponential(T, packet.time[lane] * packet.kick[lane], v);
+    for (int axis = 0; axis < 3; ++axis) to[axis][lane] = v[axis];
   }
-  return {hn::Load(floats, to[0]), hn::Load(floats, to[1]), hn::Load(floats, to[2])};
 }
 
-/// The same for any strength. Which lane is computed how depends on that lane alone.
+/// The same for any strength, stored: as a value it would take a way through memory, in halves of vectors, that stalls.
+/// Which lane is computed how depends on that lane alone.
+/// @param to  The packet's next directions; its present ones only if the field is weak in all lanes' bricks.
 template <bool differentials>
-HWY_INLINE F3 bend_strongly(Packet& packet, const Tensor& T, const F3& v, F factor, int at) {
+HWY_INLINE void bend_strongly(Packet& packet, const Tensor& T, const F3& v, F factor, int at, PerRay (&to)[3]) {
   const F reach = load(packet.reach, at);
   F size = reach;
   if (HWY_UNLIKELY(!(packet.greatest_reach <= strongest_kick))) {
@@ -97,13 +89,12 @@ HWY_INLINE F3 bend_strongly(Packet& packet, const Tensor& T, const F3& v, F fact
   const F3 sum = two_terms(T, v, inner, factor);
   const F e = excess(sum);
   const F exact = hn::Div(set(1), hn::Sqrt(hn::Add(e, set(1))));
-  const Mask weak = hn::Le(size, set(series_reach[0]));
-  const F3 result = mul(hn::IfThenElse(weak, inverse_root_near_one(e), exact), sum);
-
-  const Mask fits = hn::Le(size, set(1));
-  if (HWY_LIKELY(hn::AllTrue(floats, fits))) return result;
-  if constexpr (differentials) return select(fits, result, zeros());  // Those rays stop here.
-  return bend_in_double(T, v, factor, result, to_bits(hn::Not(fits), 0));
+  const Mask weak = hn::Le(size, set(series_reach[0])), fits = hn::Le(size, set(1));
+  const F scale = hn::IfThenElse(weak, inverse_root_near_one(e), exact);
+  // Rays with differentials stop where no series fits.
+  store(mul(differentials ? hn::IfThenElseZero(fits, scale) : scale, sum), to, at);
+  if (!differentials && HWY_UNLIKELY(!hn::AllTrue(floats, fits)))
+    bend_in_double(packet, to_bits(hn::Not(fits), at), to);
 }
 
 }  // namespace tensorray::packets::HWY_NAMESPACE

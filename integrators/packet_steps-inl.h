@@ -289,10 +289,12 @@ HWY_INLINE void take_step_as(const Medium& medium, Packet& packet, PerRay (&p)[3
     Tensor T;
     for (int c = 0; c < 8; ++c) T.c[c] = load(packet.tensor[c], i);
     const F3 before = load(packet.v, i);
-    const F3 after =
-        weakly ? bend_weakly(T, before, factor) : bend_strongly<differentials>(packet, T, before, factor, i);
+    if constexpr (weakly)
+      store(bend_weakly(T, before, factor), v, i);
+    else
+      bend_strongly<differentials>(packet, T, before, factor, i, v);
     if constexpr (differentials) bend_differentials<uniform>(medium, packet, T, before, factor, i);
-    store(after, v, i);
+    const F3 after = load(v, i);
     if constexpr (uniform) {
       store(mul_add(half, after, load(packet.middle, i)), p, i);
     } else {
