@@ -42,6 +42,10 @@ using ImageMetadata = std::map<std::string, std::string>;
 /// The endings that `write_image` knows: .exr .png .jpg .jpeg .tif .tiff (in any case).
 std::vector<std::string> image_endings();
 
+/// How many threads writing and reading of pictures may use, from now on: all until this is called. OpenEXR compresses
+/// strips of a picture at once. Not while pictures are written or read.
+void set_image_threads(int threads);
+
 /// Writes a picture; the ending of `path` chooses the format. The same picture gives the same bytes at any time.
 /// - EXR: all channels as 32-bit floats, ZIP-compressed, values and names as they are; all metadata.
 /// - PNG: 16 bits, all metadata. TIFF: 16 bits. JPEG: 8 bits, quality 95. TIFF and JPEG hold no metadata but

@@ -10,6 +10,7 @@
 #include <nlohmann/json.hpp>
 #include <tbb/global_control.h>
 
+#include "renderer/image.h"
 #include "scenes/load_scene.h"
 #include "scenes/read_scene.h"
 #include "scenes/render.h"
@@ -114,6 +115,7 @@ void tell(const std::vector<std::string>& lines, bool quiet) {
 void run(const RenderOptions& options, Progress& progress) {
   const unsigned threads = options.threads > 0 ? options.threads : std::max(1u, std::thread::hardware_concurrency());
   const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, threads);
+  set_image_threads(static_cast<int>(threads));
 
   const SceneDescription description = read_scene(options.scene, overrides_of(options));
   OutputFiles outputs = open_outputs(description.output);
