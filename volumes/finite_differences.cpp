@@ -106,9 +106,8 @@ Matrix3d hessian_at(const Neighbourhood& near, const Vector3i& position, const M
 
 /// `tensor_at(neighbourhood, position, to_index)` at every active voxel.
 template <class TensorAt>
-std::deque<TensorBlock> derive(const std::vector<SampleBlock>& blocks, const Matrix3d& to_index,
-                               const TensorAt& tensor_at) {
-  std::deque<TensorBlock> result(blocks.size());
+TensorBlocks derive(const std::vector<SampleBlock>& blocks, const Matrix3d& to_index, const TensorAt& tensor_at) {
+  TensorBlocks result = make_blocks(blocks.size());
   tbb::parallel_for(std::size_t{0}, blocks.size(), [&](std::size_t i) {
     const Neighbourhood near(blocks, blocks[i].origin);
     result[i].origin = blocks[i].origin;
@@ -122,11 +121,11 @@ std::deque<TensorBlock> derive(const std::vector<SampleBlock>& blocks, const Mat
 
 }  // namespace
 
-std::deque<TensorBlock> gradient(const std::vector<SampleBlock>& blocks, const Matrix3d& to_index) {
+TensorBlocks gradient(const std::vector<SampleBlock>& blocks, const Matrix3d& to_index) {
   return derive(blocks, to_index, gradient_at);
 }
 
-std::deque<TensorBlock> hessian(const std::vector<SampleBlock>& blocks, const Matrix3d& to_index) {
+TensorBlocks hessian(const std::vector<SampleBlock>& blocks, const Matrix3d& to_index) {
   return derive(blocks, to_index, hessian_at);
 }
 

@@ -4,7 +4,6 @@
 
 #include <array>
 #include <bitset>
-#include <deque>
 #include <vector>
 
 #include <Eigen/Core>
@@ -28,9 +27,9 @@ struct SampleBlock {
 // @param to_index  The linear part of the transform from world to index space.
 
 /// T(i, j) = ∂v_i/∂x_j, world axes.
-std::deque<TensorBlock> gradient(const std::vector<SampleBlock>& blocks, const Eigen::Matrix3d& to_index);
+TensorBlocks gradient(const std::vector<SampleBlock>& blocks, const Eigen::Matrix3d& to_index);
 
 /// T(i, j) = ∂²f/∂x_i∂x_j, world axes; exactly symmetric.
-std::deque<TensorBlock> hessian(const std::vector<SampleBlock>& blocks, const Eigen::Matrix3d& to_index);
+TensorBlocks hessian(const std::vector<SampleBlock>& blocks, const Eigen::Matrix3d& to_index);
 
 }  // namespace tensorray

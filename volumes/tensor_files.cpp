@@ -178,6 +178,11 @@ double component(const openvdb::math::Vec3<T>& value, int i) {
 template <class Tree, class Put>
 void for_each_in_block(const Tree& tree, const openvdb::Coord& origin, const Put& put) {
   if (const auto* leaf = tree.probeConstLeaf(origin)) {
+    if (leaf->isDense()) {
+      const auto* const values = leaf->buffer().data();
+      for (int offset = 0; offset < TensorBlock::voxels; ++offset) put(offset, values[offset]);
+      return;
+    }
     for (auto voxel = leaf->cbeginValueOn(); voxel; ++voxel) put(static_cast<int>(voxel.pos()), *voxel);
   } else if (tree.isValueOn(origin)) {
     const auto value = tree.getValue(origin);
@@ -194,10 +199,11 @@ void put(SampleBlock& block, int offset, const Entry& entry, double value) {
 }
 
 /// Blocks (TensorBlock or SampleBlock) of all active voxels. Only blocks of active voxels are made, of tiles too.
-template <class Blocks>
-Blocks blocks_of(const std::vector<Source>& sources) {
+/// @param make  make(n) is n blocks without active voxels.
+template <class Make>
+auto blocks_of(const std::vector<Source>& sources, const Make& make) {
   const std::vector<openvdb::Coord> origins = block_origins(sources);
-  Blocks blocks(origins.size());
+  auto blocks = make(origins.size());
   tbb::parallel_for(std::size_t{0}, blocks.size(), [&](std::size_t i) {
     blocks[i].origin = {origins[i].x(), origins[i].y(), origins[i].z()};
     for (const Source& source : sources)
@@ -274,9 +280,9 @@ std::vector<Part> parts_of(const std::vector<GridInfo>& grids, const std::string
   return {{"", {{0, 0, 0}, {1, 0, 0}, {2, 0, 0}}}};
 }
 
-std::deque<TensorBlock> tensors_of(const std::vector<Source>& sources, Derive derive, const Eigen::Matrix3d& to_index) {
-  if (derive == Derive::none) return blocks_of<std::deque<TensorBlock>>(sources);
-  const auto samples = blocks_of<std::vector<SampleBlock>>(sources);
+TensorBlocks tensors_of(const std::vector<Source>& sources, Derive derive, const Eigen::Matrix3d& to_index) {
+  if (derive == Derive::none) return blocks_of(sources, make_blocks);
+  const auto samples = blocks_of(sources, [](std::size_t count) { return std::vector<SampleBlock>(count); });
   return derive == Derive::gradient ? gradient(samples, to_index) : hessian(samples, to_index);
 }
 

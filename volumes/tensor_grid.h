@@ -13,6 +13,8 @@
 
 #include <Eigen/Geometry>
 
+#include "volumes/block_memory.h"
+
 namespace tensorray {
 
 /// 8³ voxels; the first one's index is a multiple of 8 in each axis. Inactive voxels hold zero.
@@ -31,13 +33,17 @@ struct TensorBlock {
   static Eigen::Vector3i position(int offset) { return {offset / (size * size), offset / size % size, offset % size}; }
 };
 
+/// A deque, so that blocks can be given back one by one while something else is made of them.
+using TensorBlocks = std::deque<TensorBlock, SlotAllocator<TensorBlock>>;
+
+/// So many blocks without an active voxel. Runs on all threads.
+TensorBlocks make_blocks(std::size_t count);
+
 /// A sparse grid of tensors. Plain data; voxel (i, j, k) has its centre at `to_world` * (i, j, k).
 struct TensorGrid {
   std::string name = "tensor";
   Eigen::Affine3d to_world = Eigen::Affine3d::Identity();  ///< From index to world space; invertible.
-  /// Each has an active voxel; ordered by origin (x, then y, then z). A deque, so that blocks can be given back one by
-  /// one while something else is made of them.
-  std::deque<TensorBlock> blocks;
+  TensorBlocks blocks;                                     ///< Each has an active voxel; ordered by origin (x, y, z).
   std::map<std::string, std::string> metadata;  ///< `tensorray:field`, `tensorray:units`, `tensorray:source`, ...
 
   std::size_t active_voxels() const;
@@ -51,10 +57,12 @@ struct TensorGrid {
 TensorGrid dense_grid(const Eigen::AlignedBox3i& box, const Eigen::Affine3d& to_world,
                       const std::function<Eigen::Matrix3d(const Eigen::Vector3i&)>& value);
 
-/// Sets voxels that are not finite to zero and inactive, so that light goes straight there. @return how many.
+/// Sets voxels that are not finite to zero and inactive, so that light goes straight there. On all threads.
+/// @return how many.
 std::size_t remove_non_finite(TensorGrid& grid);
 
 /// sqrt(Σ‖T − Tᵀ‖² / Σ‖T‖²) (Frobenius) over the active voxels: 0 where symmetric, 2 where antisymmetric.
+/// Runs on all threads; the same for any number of them.
 double asymmetry(const TensorGrid& grid);
 
 /// Fields whose `asymmetry` is below this count as symmetric: single precision leaves no less.
