@@ -57,7 +57,7 @@ TensorField load_field(const SceneDescription& description, EigenvalueReport& ei
         fmt::format("preprocessing erased {:.0f}% of the field's squared norm (rotation and shear); "
                     "\"eigenvalues\": \"raw\" keeps it",
                     100 * eigenvalues.norm_lost));
-  return TensorField(grid);
+  return TensorField(std::move(grid));
 }
 
 TriangleMesh load_closed_mesh(const std::filesystem::path& path) {

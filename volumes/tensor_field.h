@@ -9,6 +9,7 @@
 
 #include <Eigen/Geometry>
 
+#include "volumes/brick_index.h"
 #include "volumes/tensor_grid.h"
 
 namespace tensorray {
@@ -24,7 +25,8 @@ struct TensorBrick {
   static constexpr int width = cells + 1;  ///< Voxels along an edge, with the apron.
   static constexpr int voxels = width * width * width;
   static constexpr int bending_floats = 8;
-  static constexpr int trailing_offset = voxels * bending_floats;  ///< From `bending` to `trailing`.
+  static constexpr int trailing_offset = voxels * bending_floats;                  ///< Of `trailing`, in floats.
+  static constexpr int stored_floats = (trailing_offset + voxels + 15) / 16 * 16;  ///< Whole cache lines.
 
   static constexpr int voxel(int x, int y, int z) { return (x * width + y) * width + z; }
 
@@ -41,6 +43,9 @@ class TensorField {
  public:
   /// @throw std::invalid_argument if the grid has no active voxel or its transform cannot be inverted.
   explicit TensorField(const TensorGrid& grid);
+
+  /// The same, giving back the grid's blocks on the way, so that there is never twice the field in memory.
+  explicit TensorField(TensorGrid&& grid);
 
   const Eigen::Affine3d& to_world() const { return to_world_; }
   const Eigen::Affine3d& to_index() const { return to_index_; }
@@ -71,33 +76,38 @@ class TensorField {
 
   /// The brick that holds the cells from `brick` * 8 on. Those within the extent that hold no active voxel, and all
   /// others, are the brick of zeros.
-  TensorBrick brick(const Eigen::Vector3i& brick) const;
+  TensorBrick brick(const Eigen::Vector3i& brick) const {
+    const std::uint32_t index = index_.find(brick);
+    return index == BrickIndex::missing ? zeros : stored(index);
+  }
 
   /// Whether the brick is in memory: if not, `brick` gives zeros.
-  bool is_stored(const Eigen::Vector3i& brick) const { return find(brick) != missing; }
+  bool is_stored(const Eigen::Vector3i& brick) const { return index_.find(brick) != BrickIndex::missing; }
 
  private:
-  struct Slot {
-    Eigen::Vector3i brick;
-    std::uint32_t index;  ///< `missing` if the slot is free.
-  };
+  static const TensorBrick zeros;
+
   struct Release {
     std::size_t bytes;
 
     void operator()(float* floats) const;
   };
-  static constexpr std::uint32_t missing = 0xffffffffu;
+  using Floats = std::unique_ptr<float[], Release>;
 
   TensorField() = default;
-  void make_table(const std::vector<Eigen::Vector3i>& bricks);
-  std::size_t home_slot(const Eigen::Vector3i& brick) const;
-  std::uint32_t find(const Eigen::Vector3i& brick) const;
+  template <class GiveBack>
+  void make_bricks(const TensorGrid& grid, const GiveBack& give_back);
+  static Floats allocate(std::size_t bricks);
+  TensorBrick stored(std::size_t index) const {
+    const float* const floats = floats_.get() + index * TensorBrick::stored_floats;
+    return {floats, floats + TensorBrick::trailing_offset, strongest_[index]};
+  }
 
   Eigen::Affine3d to_world_, to_index_;
   Eigen::AlignedBox3d index_bounds_, voxels_;
-  std::unique_ptr<float[], Release> floats_;  ///< Brick after brick.
-  std::vector<float> strongest_;              ///< Of each brick.
-  std::vector<Slot> slots_;                   ///< Open-addressing hash table of the bricks; its size is a power of two.
+  Floats floats_;                 ///< Brick after brick.
+  std::vector<float> strongest_;  ///< Of each brick.
+  BrickIndex index_;              ///< Where in them a brick is.
 };
 
 }  // namespace tensorray

@@ -1,5 +1,6 @@
 #include "volumes/tensor_field.h"
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
 #include <random>
@@ -148,6 +149,81 @@ TEST(TensorField, ScalesInPlace) {
   EXPECT_NEAR(field.greatest_norm(), std::sqrt(3.0), 1e-6);
   field = std::move(field).scaled(-2.5);
   EXPECT_EQ(TensorSampler(field).at({1, 2, 3}), Matrix3d(-2.5 * Matrix3d::Identity()));
+}
+
+/// Checks that two fields have the same bricks, bit for bit.
+void expect_same(const TensorField& a, const TensorField& b, const Eigen::AlignedBox3i& bricks) {
+  ASSERT_EQ(a.brick_count(), b.brick_count());
+  for (int x = bricks.min().x(); x <= bricks.max().x(); ++x)
+    for (int y = bricks.min().y(); y <= bricks.max().y(); ++y)
+      for (int z = bricks.min().z(); z <= bricks.max().z(); ++z) {
+        const TensorBrick one = a.brick({x, y, z}), other = b.brick({x, y, z});
+        ASSERT_EQ(a.is_stored({x, y, z}), b.is_stored({x, y, z}));
+        ASSERT_EQ(one.strongest, other.strongest);
+        ASSERT_TRUE(std::equal(one.bending, one.bending + TensorBrick::trailing_offset, other.bending));
+        ASSERT_TRUE(std::equal(one.trailing, one.trailing + TensorBrick::voxels, other.trailing));
+      }
+}
+
+TEST(TensorField, IsTheSameIfItTakesTheBlocks) {
+  const auto value = [](const Vector3i& i) { return trilinear(i.cast<double>() / 8); };
+  TensorGrid grid = dense_grid(box({-200, -3, 5}, {170, 140, 200}), oblique(), value);  // Several parts are made.
+  for (int turn = 0; turn < 2; ++turn) {
+    const TensorField field(grid);
+    TensorGrid given = grid;
+    const TensorField taken(std::move(given));
+    expect_same(field, taken, box({-26, -2, -1}, {23, 19, 27}));
+    std::mt19937 random(3);
+    std::bernoulli_distribution leaves(0.6);
+    grid.blocks.erase(
+        std::remove_if(grid.blocks.begin(), grid.blocks.end(), [&](const TensorBlock&) { return leaves(random); }),
+        grid.blocks.end());
+  }
+}
+
+/// Frobenius, in double precision, of the tensor of a voxel.
+double deviator(const TensorBrick& brick, int voxel) {
+  const Matrix3d T = brick.tensor(voxel);
+  return (T - T.trace() / 3 * Matrix3d::Identity()).norm();
+}
+
+TEST(TensorField, KnowsTheStrongestDeviatorOfABrickAtAnyScale) {
+  std::mt19937 random(2);
+  std::normal_distribution<double> normal;
+  for (const double scale : {1e-37, 1e-30, 1e-20, 1e-13, 1e-6, 1.0, 1e6, 1e14, 1e15, 1e20, 1e37})
+    for (const double isotropic : {0.0, 1.0}) {
+      const TensorField field(dense_grid(box({0, 0, 0}, {15, 8, 8}), Eigen::Affine3d::Identity(), [&](const Vector3i&) {
+        Matrix3d T = isotropic * Matrix3d::Identity();
+        for (int i = 0; i < 9; ++i) T(i / 3, i % 3) += (1 - 0.9 * isotropic) * normal(random);
+        return Matrix3d(scale * T);
+      }));
+      for (int x = 0; x < 2; ++x) {
+        const TensorBrick brick = field.brick({x, 0, 0});
+        double greatest = 0;
+        for (int voxel = 0; voxel < TensorBrick::voxels; ++voxel) greatest = std::max(greatest, deviator(brick, voxel));
+        EXPECT_GE(brick.strongest, greatest * (1 + 9e-6)) << scale;
+        EXPECT_LE(brick.strongest, greatest * (1 + 2e-5)) << scale;
+      }
+    }
+}
+
+TEST(TensorField, BricksThatBendNothingHaveNoDeviator) {
+  for (const double value : {0.0, 3.0, 1e-30, 1e38}) {
+    const TensorField field(dense_grid(box({0, 0, 0}, {7, 7, 7}), Eigen::Affine3d::Identity(),
+                                       [&](const Vector3i&) { return Matrix3d(value * Matrix3d::Identity()); }));
+    EXPECT_EQ(field.brick({0, 0, 0}).strongest, 0);
+  }
+}
+
+TEST(TensorField, WhatIsNotFiniteDoesNotHideTheStrongestDeviator) {
+  const float infinity = std::numeric_limits<float>::infinity();
+  TensorGrid grid = dense_grid(box({0, 0, 0}, {7, 7, 7}), Eigen::Affine3d::Identity(),
+                               [](const Vector3i& i) { return Matrix3d(i.x() * Vector3d::UnitX().asDiagonal()); });
+  grid.blocks[0].values[100].setConstant(std::nanf(""));
+  grid.blocks[0].values[200](1, 1) = infinity;
+  EXPECT_NEAR(TensorField(grid).brick({0, 0, 0}).strongest, 7 * std::sqrt(2.0 / 3), 1e-3);
+  grid.blocks[0].values[300](0, 1) = infinity;
+  EXPECT_EQ(TensorField(grid).brick({0, 0, 0}).strongest, infinity);
 }
 
 TEST(TensorField, RefusesWhatCannotBeTraced) {
