@@ -7,9 +7,11 @@
 #include <fstream>
 #include <stdexcept>
 #include <system_error>
+#include <utility>
 
 #include <openvdb/io/Archive.h>
 #include <openvdb/io/GridDescriptor.h>
+#include <tbb/parallel_for.h>
 
 namespace tensorray {
 namespace {
@@ -147,7 +149,7 @@ class Reader : private openvdb::io::Archive {
     return grid;
   }
 
-  /// Reads the wanted grids, and those whose trees they share.
+  /// Reads the wanted grids, and those whose trees they share: at once, each from a stream of its own.
   void read_wanted(const std::vector<openvdb::io::GridDescriptor>& table, const std::set<std::string>& wanted,
                    NamedGridMap& grids) {
     std::set<std::string> needed;
@@ -156,11 +158,16 @@ class Reader : private openvdb::io::Archive {
       needed.insert(descriptor.uniqueName());
       if (descriptor.isInstance()) needed.insert(descriptor.instanceParentName());
     }
-    for (const auto& descriptor : table) {
-      if (!needed.count(descriptor.uniqueName())) continue;
-      descriptor.seekToGrid(in_);
-      grids[descriptor.uniqueName()] = read_one(descriptor);
-    }
+    std::vector<std::pair<const openvdb::io::GridDescriptor*, openvdb::GridBase::Ptr>> read;
+    for (const auto& descriptor : table)
+      if (needed.count(descriptor.uniqueName())) read.emplace_back(&descriptor, nullptr);
+    tbb::parallel_for(std::size_t{0}, read.size(), [&](std::size_t i) {
+      Reader reader(path_);
+      reader.read_file_header();
+      read[i].first->seekToGrid(reader.in_);
+      read[i].second = reader.read_one(*read[i].first);
+    });
+    for (const auto& [descriptor, grid] : read) grids[descriptor->uniqueName()] = grid;
   }
 
   std::filesystem::path path_;

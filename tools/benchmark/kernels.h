@@ -19,10 +19,17 @@ struct Kernel {
   std::string name;
   /// Makes what the kernel samples of the field, which must outlive the function.
   std::function<TraceFunction(const TestField&)> make;
-  std::string instructions;      ///< Of this program's packet kernel; empty for the others.
-  std::string missing;           ///< Why it cannot be measured here; empty if it can.
-  bool follows_the_rule = true;  ///< Whether its rays are those of Eq. 5, with the same ends.
-  bool slow = false;             ///< Measured on one field only.
+  std::string instructions;                ///< Of this program's packet kernel; empty for the others.
+  std::string missing;                     ///< Why it cannot be measured here; empty if it can.
+  bool follows_the_rule = true;            ///< Whether its rays are those of Eq. 5, with the same ends.
+  bool on_one_field = false;               ///< Measured on the first only.
+  BendingSettings settings = splitting();  ///< Of the reference that its ends are compared with.
+
+  static BendingSettings splitting() {
+    BendingSettings settings;
+    settings.step = step;
+    return settings;
+  }
 };
 
 /// The first is what ratios are taken to.

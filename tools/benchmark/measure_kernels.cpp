@@ -45,11 +45,10 @@ std::vector<MeasuredField> fields_to_measure(bool quick) {
 }
 
 /// The greatest distance between the ends of the kernel's rays and of the reference's, in voxels.
-double greatest_difference(const TestField& test, Order order, const TraceFunction& kernel) {
+double greatest_difference(const TestField& test, Order order, const TraceFunction& kernel,
+                           const BendingSettings& settings) {
   RayBatch rays = make_batches(test, order, 0, 1)[0], expected = rays;
   kernel(rays);
-  BendingSettings settings;
-  settings.step = step;
   trace_reference(test.field, test.geometry, settings, expected);
   double greatest = 0;
   for (std::size_t i = 0; i < rays.size(); ++i)
@@ -107,7 +106,7 @@ Json describe_kernel(const TestField& test, Order order, const Kernel& kernel, c
   if (!kernel.follows_the_rule) return row;
   row["rays_per_second"] = rate.samples.median / rate.samples_per_ray;
   row["samples_per_ray"] = rate.samples_per_ray;
-  row["greatest_difference_in_voxels"] = greatest_difference(test, order, function);
+  row["greatest_difference_in_voxels"] = greatest_difference(test, order, function, kernel.settings);
   if (!kernel.instructions.empty())
     row["issue_fraction"] = issue_fraction(rate.samples.median, kernel.instructions, machine);
   if (order == Order::fresh) row["bandwidth_fraction"] = bandwidth_fraction(rate.samples.median, machine);
@@ -141,7 +140,7 @@ Json measure_kernels(const Options& options, const Json& machine) {
     std::vector<Json> rows(field.measurements.size(), Json::array());
     for (const Kernel& kernel : kernels) {
       if (!kernel.missing.empty()) result["not_measured"][kernel.name] = kernel.missing;
-      if (!kernel.missing.empty() || (kernel.slow && !first)) continue;
+      if (!kernel.missing.empty() || (kernel.on_one_field && !first)) continue;
       const TraceFunction function = kernel.make(test);
       packets::use_instruction_set(kernel.instructions);
       for (std::size_t i = 0; i < rows.size(); ++i) {

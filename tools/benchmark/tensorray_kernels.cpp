@@ -4,18 +4,25 @@
 namespace tensorray::benchmark {
 namespace {
 
-BendingSettings settings() {
-  BendingSettings settings;
-  settings.step = step;
-  return settings;
-}
-
 TraceFunction reference_tracer(const TestField& test) {
-  return [&test](RayBatch& batch) { trace_reference(test.field, test.geometry, settings(), batch); };
+  return [&test](RayBatch& batch) { trace_reference(test.field, test.geometry, Kernel::splitting(), batch); };
 }
 
-TraceFunction packet_tracer(const TestField& test) {
-  return [&test](RayBatch& batch) { trace(test.field, test.geometry, settings(), batch); };
+std::function<TraceFunction(const TestField&)> packet_tracer(const BendingSettings& settings) {
+  return [=](const TestField& test) {
+    return [&test, settings](RayBatch& batch) { trace(test.field, test.geometry, settings, batch); };
+  };
+}
+
+/// By the processor's best instructions, with automatic steps.
+Kernel other_method(const std::string& name, BendingMethod method) {
+  Kernel kernel;
+  kernel.name = "tensorray, packets, " + name;
+  kernel.on_one_field = true;
+  kernel.settings.method = method;
+  kernel.settings.step = 0;
+  kernel.make = packet_tracer(kernel.settings);
+  return kernel;
 }
 
 }  // namespace
@@ -29,9 +36,13 @@ std::vector<Kernel> tensorray_kernels() {
     Kernel kernel;
     kernel.name = "tensorray, packets, " + instructions;
     kernel.instructions = instructions;
-    kernel.make = packet_tracer;
+    kernel.make = packet_tracer(kernel.settings);
     kernels.push_back(kernel);
   }
+  kernels.push_back(other_method("euler", BendingMethod::euler));
+  kernels.push_back(other_method("rk4", BendingMethod::rk4));
+  kernels.push_back(other_method("bs23", BendingMethod::bs23));
+  kernels.push_back(other_method("dopri5", BendingMethod::dopri5));
   return kernels;
 }
 

@@ -107,7 +107,7 @@ std::vector<Kernel> vtk_kernels() {
   kernels[1].make = hyperstreamline_tracer;
   for (Kernel& kernel : kernels) {
     kernel.follows_the_rule = false;
-    kernel.slow = true;
+    kernel.on_one_field = true;
   }
   return kernels;
 }
