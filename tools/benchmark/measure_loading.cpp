@@ -35,16 +35,18 @@ Json measure_loading(const Options& options, const Json& machine) {
     memory = static_cast<double>(field.memory_bytes());
   }
   const double seconds_reading = rate_of(reading).median, seconds_bricks = rate_of(bricks).median;
-  const double bytes = voxels * voxel_bytes, rate = bytes / seconds_bricks;
-  const double read_rate = machine.at("memory").back().at("read_bytes_per_second");
+  const double bytes = voxels * voxel_bytes;
+  const double moved = (bytes + memory) / seconds_bricks;  // Read and written, as the triad counts.
+  const double triad = machine.at("memory").back().at("triad_bytes_per_second");
   return {{"field", fmt::format("point load, {}³, from a file that the system has in memory", resolution)},
           {"active_voxels", voxels},
           {"seconds", seconds_reading + seconds_bricks},
           {"seconds_reading", seconds_reading},
           {"seconds_bricks", seconds_bricks},
-          {"bytes_per_second", rate},
+          {"bytes_per_second", bytes / seconds_bricks},
+          {"moved_bytes_per_second", moved},
           {"bytes_per_second_with_reading", bytes / (seconds_reading + seconds_bricks)},
-          {"bandwidth_fraction", rate / read_rate},
+          {"bandwidth_fraction", moved / triad},
           {"memory_bytes", memory},
           {"memory_ratio", memory / bytes}};
 }
