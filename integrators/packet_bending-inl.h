@@ -11,7 +11,7 @@
 
 #include <hwy/highway.h>
 
-#include "integrators/packet_cells-inl.h"
+#include "integrators/packet_exponential-inl.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace tensorray::packets::HWY_NAMESPACE {
@@ -52,18 +52,6 @@ HWY_INLINE F deviator_norm(const Tensor& T, F factor) {
 HWY_INLINE void keep_bending_rate(Packet& packet, const Tensor& T, int at) {
   if (packet.greatest_reach <= strongest_kick) return;
   store(deviator_norm(T, load(packet.kick, at)), packet.bending_rate, at);
-}
-
-/// Bends lanes, given as bits, where ‖s h T‖ is too large for a series.
-HWY_NOINLINE void bend_in_double(const Packet& packet, std::uint32_t which, PerRay (&to)[3]) {
-  for (; which != 0; which &= which - 1) {
-    const auto lane = hwy::Num0BitsBelowLS1Bit_Nonzero32(which);
-    float T[8], v[3];
-    for (int i = 0; i < 8; ++i) T[i] = packet.tensor[i][lane];
-    for (int axis = 0; axis < 3; ++axis) v[axis] = packet.v[axis][lane];
-    Medium::exponential(T, packet.time[lane] * packet.kick[lane], v);
-    for (int axis = 0; axis < 3; ++axis) to[axis][lane] = v[axis];
-  }
 }
 
 /// The same for any strength, stored: as a value it would take a way through memory, in halves of vectors, that stalls.

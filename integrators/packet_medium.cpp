@@ -4,8 +4,6 @@
 
 #include <Eigen/Geometry>
 
-#include "integrators/exponential.h"
-
 namespace tensorray::packets {
 
 Medium::Medium(const TensorField& field_, const KernelSettings& settings_) : field(field_), settings(settings_) {
@@ -44,13 +42,6 @@ bool Medium::near_surface(const std::int32_t at[3]) const {
 bool Medium::meets_surface(const double from[3], const double to[3]) const {
   return settings.meets_surface(field.to_world() * Eigen::Vector3d(from[0], from[1], from[2]),
                                 field.to_world() * Eigen::Vector3d(to[0], to[1], to[2]));
-}
-
-void Medium::exponential(const float T[8], float factor, float V[3]) {
-  Eigen::Matrix3d A = Eigen::Matrix3d::Zero();
-  for (int i = 0; i < 8; ++i) A.data()[i] = double{factor} * T[i];
-  const Eigen::Vector3d to = exponential_direction(A, {V[0], V[1], V[2]});
-  for (int axis = 0; axis < 3; ++axis) V[axis] = static_cast<float>(to[axis]);
 }
 
 }  // namespace tensorray::packets

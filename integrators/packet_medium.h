@@ -35,9 +35,6 @@ struct Medium {
   TensorBrick brick(const std::int32_t at[3]) const { return field.brick({at[0], at[1], at[2]}); }
   bool near_surface(const std::int32_t at[3]) const;
   bool meets_surface(const double from[3], const double to[3]) const;
-
-  /// exp(factor · T) V, normalised; zero if it has no direction.
-  static void exponential(const float T[8], float factor, float V[3]);
 };
 
 constexpr float strongest_kick = static_cast<float>(step_lengths::strongest_kick);

@@ -252,6 +252,31 @@ TEST_P(Packets, EndAsTheReferenceDoesInOddFields) {
   expect_same_ends("ordinary", smooth, {0, -0.3, 1e30, -1e30, 1e38, 1e200, 1e308, nan, huge, -huge});
 }
 
+TEST_P(Packets, BendHoweverStrongTheFieldIs) {
+  // A constant field takes light to the direction that its exponential stretches most: a shear's, and an eigenvector.
+  Matrix3d shear = Matrix3d::Zero();
+  shear(0, 1) = 1;
+  for (const Matrix3d& tensor : {shear, general_tensor(), Matrix3d(Vector3d(1, -2, 0.5).asDiagonal())}) {
+    TensorField field(
+        lattice_grid(index_box({0, 0, 0}, {17, 17, 17}), lattices()[0], [&](const Vector3d&) { return tensor; }));
+    Numbers numbers(17);
+    RayBatch rays;
+    for (int i = 0; i < 40; ++i)
+      add_bundle(rays, field, numbers.in(field.index_bounds()), numbers.direction(),
+                 {3, 30, 1e4, 1e9, 1e18, 1e25, 1e35});
+    Scene scene = make_scene("strong constant field", std::move(field), {}, 1, std::move(rays));
+    scene.settings.max_steps = 2;
+    const RayBatch fast = traced(scene, scene.rays), exact = traced_by_reference(scene, scene.rays);
+    for (std::size_t i = 0; i < exact.size(); ++i) {
+      EXPECT_EQ(fast.end[i], exact.end[i]) << "ray " << i << ", s " << scene.rays.flexibility[i];
+      // Where eigenvalues are complex light turns by more than single precision of s can say.
+      if (tensor == general_tensor() && scene.rays.flexibility[i] > 1e4) continue;
+      EXPECT_LT((fast.direction[i] - exact.direction[i]).norm(), 1e-3)
+          << "ray " << i << ", s " << scene.rays.flexibility[i];
+    }
+  }
+}
+
 TEST_P(Packets, ZeroFlexibilityLeavesLightStraight) {
   Scene scene = random_scene(lattices()[2], 0, 0.1, 40);
   std::fill(scene.rays.flexibility.begin(), scene.rays.flexibility.end(), 0.0);
