@@ -1,7 +1,7 @@
 #pragma once
 /// @file integrators/bending.h
-/// Bends light through a tensor field. Only bending_steps.h and packet_bending-inl.h know the rule
-/// (Zheng and Pang 2003, Eq. 5):  P' = V,  V' = s (T V − (VᵀTV) V),  |V| = 1.
+/// Bends light through a tensor field. Only bending_steps.h, and for packets packet_bending-inl.h and
+/// packet_stages-inl.h, know the rule (Zheng and Pang 2003, Eq. 5):  P' = V,  V' = s (T V − (VᵀTV) V),  |V| = 1.
 
 #include <array>
 #include <cstddef>

@@ -38,9 +38,9 @@ struct Medium {
 };
 
 constexpr float strongest_kick = static_cast<float>(step_lengths::strongest_kick);
-constexpr float shortest_step = 1.0f / 1024;  // Voxels: shorter ones, which only other methods than splitting take, are
-                                              // for double precision.
-constexpr int landing_steps = 4;              // Of Newton's method, to a face of the extent.
+/// Voxels. Shorter steps, which only other methods than splitting take, are for double precision.
+constexpr float shortest_step = 1.0f / 1024;
+constexpr int landing_steps = 4;  // Of Newton's method, to a face of the extent.
 
 /// With n terms the power series of exp(A) V is exact to 3e-9 for ‖A‖ up to entry n − 2: (3e-9 (n + 1)!)^(1/(n + 1)).
 /// That is less than rounding, as the error is the same in every step where rounding is not.

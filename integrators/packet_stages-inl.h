@@ -136,34 +136,22 @@ HWY_INLINE void combine_stages(const Medium& medium, Packet& packet, const Stage
   }
 }
 
-/// What may end a ray, in all bricks where a step has sampled tensors.
-struct Nearby {
-  bool border = false, surface = false;
-
-  void add(const Packet& packet) {
-    border |= packet.near_border;
-    surface |= packet.near_surface;
-  }
-  void keep(Packet& packet) const {
-    packet.near_border |= border;
-    packet.near_surface |= surface;
-  }
-};
-
 /// A step of a Runge–Kutta method.
 template <bool uniform, bool differentials>
 HWY_NOINLINE void step_by_stages(const Medium& medium, Packet& packet) {
   Stages stages;
-  Nearby nearby;
+  bool near_border = false, near_surface = false;  // In any brick where tensors are sampled.
   for (int stage = 0; stage < medium.stages->stages; ++stage) {
     begin_stage<uniform, differentials>(medium, packet, stage, stages);
     locate<uniform, differentials>(medium, packet,
                                    [&](int i) HWY_ATTR { return add(load(packet.p, i), load(stages.ahead, i)); });
-    nearby.add(packet);
+    near_border |= packet.near_border;
+    near_surface |= packet.near_surface;
     interpolate<uniform, differentials>(medium, packet);
     end_stage<differentials>(medium, packet, stage, stages);
   }
-  nearby.keep(packet);
+  packet.near_border |= near_border;
+  packet.near_surface |= near_surface;
   combine_stages<uniform, differentials>(medium, packet, stages);
 }
 
@@ -222,8 +210,7 @@ HWY_NOINLINE void step_by_euler(const Medium& medium, Packet& packet) {
 template <bool uniform>
 HWY_NOINLINE void begin_steps(const Medium& medium, Packet& packet) {
   for (int i = 0; i < packet.vectors * lanes; i += lanes) {
-    const F3 u = load(direction<uniform>(packet), i);
-    const F voxel = uniform ? set(1) : hn::Div(set(1), hn::Sqrt(dot(u, u)));
+    const F voxel = voxel_along<uniform>(packet, i);
     store(automatic_step(medium, load(packet.bending_rate, i), voxel), packet.wanted, i);
   }
 }
@@ -260,12 +247,13 @@ HWY_INLINE void stay(Packet& packet, int lane) {
   }
 }
 
-/// The next adaptive step over the last one, as step_lengths::growth.
+/// The next adaptive step over the last one: see step_lengths.h.
 HWY_INLINE F growth(F excess, int order) {
-  const F within = hn::Min(hn::Max(excess, set(1e-10f)), set(1e30f));
-  const F root = hn::Exp(floats, hn::Mul(set(-1.0f / static_cast<float>(order)), hn::Log(floats, within)));
-  const F factor = hn::Mul(set(0.9f), root);
-  const F least = set(0.2f), most = set(5);
+  using namespace step_lengths;
+  const auto single = [](double value) HWY_ATTR { return set(static_cast<float>(value)); };
+  const F within = hn::Min(hn::Max(excess, single(least_excess)), set(1e30f));
+  const F root = hn::Exp(floats, hn::Mul(single(-1.0 / order), hn::Log(floats, within)));
+  const F factor = hn::Mul(single(safety), root), least = single(least_growth), most = single(most_growth);
   return hn::IfThenElse(hn::Eq(excess, excess), hn::Min(hn::Max(factor, least), most), least);
 }
 

@@ -68,6 +68,14 @@ HWY_INLINE F automatic_step(const Medium& medium, F bending_rate, F voxel) {
                         longest);
 }
 
+/// How long a voxel is along the rays, in the units of the time.
+template <bool uniform>
+HWY_INLINE F voxel_along(const Packet& packet, int at) {
+  if (uniform) return set(1);
+  const F3 u = load(packet.u, at);
+  return hn::Div(set(1), hn::Sqrt(dot(u, u)));
+}
+
 /// How long the next step is, in the units that u is per: voxels, or, if voxels are not uniform, world units.
 template <bool uniform>
 HWY_NOINLINE void find_times(const Medium& medium, Packet& packet) {
@@ -76,7 +84,7 @@ HWY_NOINLINE void find_times(const Medium& medium, Packet& packet) {
   const F zero = hn::Zero(floats), end = set(TensorBrick::cells);
   for (int i = 0; i < packet.vectors * lanes; i += lanes) {
     const F3 u = load(direction<uniform>(packet), i);
-    const F voxel = uniform ? set(1) : hn::Div(set(1), hn::Sqrt(dot(u, u)));
+    const F voxel = voxel_along<uniform>(packet, i);
     const F steps = medium.adaptive ? load(packet.wanted, i)
                     : automatic     ? automatic_step(medium, load(packet.bending_rate, i), voxel)
                                     : set(medium.longest_step);

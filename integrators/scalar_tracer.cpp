@@ -188,10 +188,13 @@ double Tracer<N>::land(const State<N>& next, double h, const Hit& hit) {
 /// Sets the next adaptive step from this one's error. @return the error over what is allowed.
 template <int N>
 double Tracer<N>::control_step(const State<N>& error) {
+  using namespace step_lengths;
   const double excess = std::max(error.position().norm() / voxel_, error.direction().norm()) / settings_.tolerance;
-  const double longest = settings_.step > 0 ? settings_.step : step_lengths::longest_adaptive;
-  const double wanted = adaptive_step_ * step_lengths::growth(excess, runge_kutta(settings_.method)->order);
-  adaptive_step_ = std::clamp(wanted, step_lengths::shortest_adaptive, longest);
+  const double order = runge_kutta(settings_.method)->order;
+  const double factor = safety * std::pow(std::max(excess, least_excess), -1 / order);
+  const double growth = factor > least_growth ? std::min(factor, most_growth) : least_growth;
+  const double longest = settings_.step > 0 ? settings_.step : longest_adaptive;
+  adaptive_step_ = std::clamp(adaptive_step_ * growth, shortest_adaptive, longest);
   return excess;
 }
 

@@ -2,9 +2,6 @@
 /// @file integrators/step_lengths.h
 /// What both tracers hold steps to, in voxels.
 
-#include <algorithm>
-#include <cmath>
-
 namespace tensorray::step_lengths {
 
 constexpr double longest_automatic = 0.5;
@@ -17,10 +14,9 @@ constexpr double shortest_adaptive = 1e-6;
 /// there; the second is for methods that sample also at a step's end.
 constexpr double past_straight_brick = 1.0 / 64, past_straight_brick_by_stages = 1e-5;
 
-/// The next step of an adaptive method over the last one, whose error was `excess` times what is allowed.
-inline double growth(double excess, int order) {
-  const double factor = 0.9 * std::pow(std::max(excess, 1e-10), -1.0 / order);
-  return std::isfinite(factor) ? std::clamp(factor, 0.2, 5.0) : 0.2;
-}
+/// The next step of an adaptive method is the last one times safety · excess^(-1 / order), between the least and the
+/// most growth; `excess` is the last one's error over what is allowed. NaN: the least.
+constexpr double safety = 0.9, least_growth = 0.2, most_growth = 5;
+constexpr double least_excess = 1e-10;  ///< Taken instead of smaller ones.
 
 }  // namespace tensorray::step_lengths

@@ -25,8 +25,6 @@ std::string name_of(BendingMethod method) {
 using PacketMethods = EveryInstructionSet;
 INSTANTIATE_TEST_SUITE_P(All, PacketMethods, test::instruction_sets(), instruction_set_name);
 
-std::vector<double> wavelengths(double kick) { return {0.2 * kick, -0.4 * kick, 0.6 * kick, 0.8 * kick, kick}; }
-
 Scene scene_of(BendingMethod method, const std::string& name, TensorField field, const Surfaces& surfaces, double step,
                RayBatch rays) {
   Scene scene = make_scene(name_of(method) + ", " + name, std::move(field), surfaces, step, std::move(rays));
@@ -64,8 +62,6 @@ void expect_like_reference(const Scene& scene) {
   if (is_adaptive(scene.settings.method)) return expect_as_exact_as_reference(scene);
   expect_reference(scene, 0.1);
 }
-
-Eigen::AlignedBox3i odd_box() { return index_box({-13, 5, -30}, {27, 34, 41}); }
 
 Scene random_scene(BendingMethod method, const Lattice& lattice, double step, double kick, int bundles) {
   TensorField field(lattice_grid(odd_box(), lattice, smooth_tensor(41)));
@@ -151,13 +147,7 @@ TEST_P(PacketMethods, PassASingularCorner) {
   const Generator load = PointLoad();
   for (const BendingMethod method : other_methods) {
     TensorField field(generate(load, default_grid(load, 48)));
-    Numbers numbers(50);
-    RayBatch rays;
-    for (int i = 0; i < 100; ++i) {
-      const double reach = i % 10 ? 20 : 2;
-      const Vector3d from(23.5 + numbers.between(-reach, reach), 23.5 + numbers.between(-reach, reach), 60);
-      add_bundle(rays, field, from, {0, 0, -1}, {0.1, 0.2, 0.3});
-    }
+    RayBatch rays = rays_under_load(field, 100, 50);
     Surfaces surfaces;
     surfaces.plate = plate_across({0, 0, -1}, 3);
     expect_like_reference(scene_of(method, "point load", std::move(field), surfaces, 0, std::move(rays)));

@@ -154,6 +154,24 @@ inline RayBatch random_rays(const TensorField& field, int bundles, const std::ve
   return batch;
 }
 
+/// Light of five wavelengths, the strongest with that kick per voxel where the field is strongest.
+inline std::vector<double> wavelengths(double kick) { return {0.2 * kick, -0.4 * kick, 0.6 * kick, 0.8 * kick, kick}; }
+
+/// Extents that begin and end anywhere in a brick.
+inline Eigen::AlignedBox3i odd_box() { return index_box({-13, 5, -30}, {27, 34, 41}); }
+
+/// Towards the face of a point load's 48 voxels that it presses on, all over it; every tenth bundle right under it.
+inline RayBatch rays_under_load(const TensorField& field, int bundles, unsigned seed) {
+  Numbers numbers(seed);
+  RayBatch rays;
+  for (int i = 0; i < bundles; ++i) {
+    const double reach = i % 10 ? 20 : 2;
+    const Eigen::Vector3d from(23.5 + numbers.between(-reach, reach), 23.5 + numbers.between(-reach, reach), 60);
+    add_bundle(rays, field, from, {0, 0, -1}, {0.1, 0.2, 0.3});
+  }
+  return rays;
+}
+
 /// In mean edges of a voxel.
 inline double distance_in_voxels(const Eigen::Vector3d& a, const Eigen::Vector3d& b) {
   return (a - b).norm() / mean_edge;

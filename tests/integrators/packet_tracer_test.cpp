@@ -23,12 +23,6 @@ constexpr double huge = std::numeric_limits<double>::infinity();
 using Packets = EveryInstructionSet;
 INSTANTIATE_TEST_SUITE_P(All, Packets, test::instruction_sets(), instruction_set_name);
 
-/// Light of five wavelengths, the strongest with that kick per voxel where the field is strongest.
-std::vector<double> wavelengths(double kick) { return {0.2 * kick, -0.4 * kick, 0.6 * kick, 0.8 * kick, kick}; }
-
-/// Extents that begin and end anywhere in a brick.
-Eigen::AlignedBox3i odd_box() { return index_box({-13, 5, -30}, {27, 34, 41}); }
-
 Scene random_scene(const Lattice& lattice, double step, double kick, int bundles) {
   TensorField field(lattice_grid(odd_box(), lattice, smooth_tensor(1)));
   RayBatch rays = random_rays(field, bundles, wavelengths(kick), 2);
@@ -107,14 +101,7 @@ TEST_P(Packets, CrossFieldsOfFewVoxels) {
 TEST_P(Packets, PassASingularCorner) {
   const Generator load = PointLoad();
   TensorField field(generate(load, default_grid(load, 48)));
-  Numbers numbers(10);
-  RayBatch rays;
-  for (int i = 0; i < 200; ++i) {
-    // Towards the face with the load, all over it; every tenth ray right under the load.
-    const double reach = i % 10 ? 20 : 2;
-    const Vector3d from(23.5 + numbers.between(-reach, reach), 23.5 + numbers.between(-reach, reach), 60);
-    add_bundle(rays, field, from, {0, 0, -1}, {0.1, 0.2, 0.3});
-  }
+  RayBatch rays = rays_under_load(field, 200, 10);
   Surfaces surfaces;
   surfaces.plate = plate_across({0, 0, -1}, 3);
   expect_reference(make_scene("point load", std::move(field), std::move(surfaces), 0, std::move(rays)), 0.1);
@@ -261,9 +248,14 @@ TEST_P(Packets, BendHoweverStrongTheFieldIs) {
         lattice_grid(index_box({0, 0, 0}, {17, 17, 17}), lattices()[0], [&](const Vector3d&) { return tensor; }));
     Numbers numbers(17);
     RayBatch rays;
-    for (int i = 0; i < 40; ++i)
-      add_bundle(rays, field, numbers.in(field.index_bounds()), numbers.direction(),
+    for (int i = 0; i < 40; ++i) {
+      // The first along axes, and in planes of them: also of those that shrink, where only rounding could lift it out.
+      const Vector3d towards = i < 3   ? Vector3d::Unit(i)
+                               : i < 6 ? Vector3d(Vector3d::Ones() - Vector3d::Unit(i - 3))
+                                       : numbers.direction();
+      add_bundle(rays, field, numbers.in(field.index_bounds()), towards.normalized(),
                  {3, 30, 1e4, 1e9, 1e18, 1e25, 1e35});
+    }
     Scene scene = make_scene("strong constant field", std::move(field), {}, 1, std::move(rays));
     scene.settings.max_steps = 2;
     const RayBatch fast = traced(scene, scene.rays), exact = traced_by_reference(scene, scene.rays);
