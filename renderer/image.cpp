@@ -22,10 +22,6 @@
 namespace tensorray {
 namespace {
 
-// Of zlib's levels from 1 to 9. 6, the usual one, takes more than twice as long to make photons' noise 2% smaller; 4 is
-// a third slower for 1%, and for a tenth where colours are flat and files small.
-constexpr int png_compression = 2;
-
 /// What a file format takes. OpenImageIO's name for it chooses the writer.
 struct Format {
   std::string name;
@@ -80,7 +76,8 @@ OIIO::ImageSpec make_spec(const Image& image, const Format& format, const ImageM
   if (image.channels.size() > 3 && image.channels[3] == "A") spec.alpha_channel = 3;
   if (format.display_referred) spec.attribute("oiio:UnassociatedAlpha", 1);
   if (format.name == "openexr") spec.attribute("compression", "zip");
-  if (format.name == "png") spec.attribute("png:compressionLevel", png_compression);
+  // zlib's strategy for PNG: four times as fast as the usual one at its usual level, for files 5% smaller to 2% larger.
+  if (format.name == "png") spec.attribute("compression", "rle");
   if (format.name == "jpeg") {
     spec.attribute("Compression", "jpeg:95");
     spec.attribute("jpeg:subsampling", "4:4:4");
