@@ -39,7 +39,7 @@ struct MatrixPolynomial {
   D p, q, c[3];
 };
 
-/// From a norm of 2^28 on exp(A) is taken for that of 2^28: single precision does not know A to more than 8 anyway.
+/// From a norm of 2^28 on exp(A) is taken for that of 2^28: single precision knows A to within 8 then.
 constexpr int most_squarings = 31;
 
 HWY_INLINE D set_double(double value) { return hn::Set(doubles, value); }

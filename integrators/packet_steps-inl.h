@@ -83,7 +83,6 @@ HWY_NOINLINE void find_times(const Medium& medium, Packet& packet) {
   const bool automatic = medium.settings.step == 0 && !(packet.greatest_reach <= strongest_kick);
   const F zero = hn::Zero(floats), end = set(TensorBrick::cells);
   for (int i = 0; i < packet.vectors * lanes; i += lanes) {
-    const F3 u = load(direction<uniform>(packet), i);
     const F voxel = voxel_along<uniform>(packet, i);
     const F steps = medium.adaptive ? load(packet.wanted, i)
                     : automatic     ? automatic_step(medium, load(packet.bending_rate, i), voxel)
@@ -91,7 +90,7 @@ HWY_NOINLINE void find_times(const Medium& medium, Packet& packet) {
     F time = uniform ? steps : hn::Mul(steps, voxel);
     if (packet.straight) {
       // Out of the brick where nothing bends light, and a little further, so that rounding does not keep it there.
-      const F3 p = load(packet.p, i);
+      const F3 p = load(packet.p, i), u = load(direction<uniform>(packet), i);
       const auto way = [&](F x, F along) HWY_ATTR {
         const F to = hn::Sub(hn::IfThenElse(hn::Gt(along, zero), end, zero), x);
         return hn::IfThenElse(hn::Eq(along, zero), set(1e30f), hn::Div(to, along));

@@ -249,7 +249,7 @@ TEST_P(Packets, BendHoweverStrongTheFieldIs) {
     Numbers numbers(17);
     RayBatch rays;
     for (int i = 0; i < 40; ++i) {
-      // The first along axes, and in planes of them: also of those that shrink, where only rounding could lift it out.
+      // The first along axes, and in planes of them: also of those that shrink, where only rounding lifts light out.
       const Vector3d towards = i < 3   ? Vector3d::Unit(i)
                                : i < 6 ? Vector3d(Vector3d::Ones() - Vector3d::Unit(i - 3))
                                        : numbers.direction();
