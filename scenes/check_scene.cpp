@@ -9,7 +9,7 @@
 
 #include <fmt/core.h>
 
-#include "renderer/spectrum.h"
+#include "renderer/color/spectrum.h"
 #include "scenes/choices.h"
 
 namespace tensorray {

@@ -4,13 +4,13 @@
 
 #include <array>
 
-#include "integrators/bending.h"
-#include "renderer/beam.h"
-#include "renderer/density.h"
-#include "renderer/test_images.h"
+#include "integrators/bending/bending.h"
+#include "renderer/film/density.h"
+#include "renderer/lights/beam.h"
+#include "renderer/textures/test_images.h"
 #include "scenes/description.h"
-#include "volumes/eigenvalues.h"
-#include "volumes/tensor_files.h"
+#include "volumes/files/tensor_files.h"
+#include "volumes/tensors/eigenvalues.h"
 
 namespace tensorray {
 

@@ -5,14 +5,14 @@
 
 #include <fmt/format.h>
 
-#include "renderer/color.h"
-#include "renderer/colormap.h"
-#include "renderer/spectral_image.h"
+#include "renderer/color/color.h"
+#include "renderer/color/colormap.h"
+#include "renderer/film/spectral_image.h"
 #include "scenes/choices.h"
 #include "scenes/read_scene.h"
 #include "scenes/render.h"
-#include "volumes/isosurface.h"
-#include "volumes/tensor_sampler.h"
+#include "volumes/bricks/tensor_sampler.h"
+#include "volumes/tensors/isosurface.h"
 
 namespace tensorray {
 namespace {

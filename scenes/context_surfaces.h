@@ -4,9 +4,9 @@
 
 #include <vector>
 
-#include "integrators/progress.h"
-#include "renderer/material.h"
-#include "renderer/surface.h"
+#include "base/progress.h"
+#include "renderer/materials/material.h"
+#include "renderer/surfaces/surface.h"
 #include "scenes/load_scene.h"
 
 namespace tensorray {

@@ -11,16 +11,16 @@
 
 #include <Eigen/Core>
 
-#include "integrators/bending.h"
-#include "integrators/flexibility.h"
-#include "integrators/lens.h"
-#include "renderer/beam.h"
-#include "renderer/density.h"
-#include "renderer/texture.h"
+#include "integrators/bending/bending.h"
+#include "integrators/bending/flexibility.h"
+#include "integrators/lens/lens.h"
+#include "renderer/film/density.h"
+#include "renderer/lights/beam.h"
+#include "renderer/textures/texture.h"
 #include "scenes/path_tracing_description.h"
-#include "volumes/eigenvalues.h"
-#include "volumes/generators.h"
-#include "volumes/tensor_files.h"
+#include "volumes/files/tensor_files.h"
+#include "volumes/tensors/eigenvalues.h"
+#include "volumes/tensors/generators.h"
 
 namespace tensorray {
 

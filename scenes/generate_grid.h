@@ -7,7 +7,7 @@
 
 #include <Eigen/Core>
 
-#include "volumes/generators.h"
+#include "volumes/tensors/generators.h"
 
 namespace tensorray {
 

@@ -6,7 +6,7 @@
 
 #include <fmt/format.h>
 
-#include "renderer/test_images.h"
+#include "renderer/textures/test_images.h"
 #include "scenes/choices.h"
 #include "scenes/read_scene.h"
 

@@ -4,11 +4,11 @@
 
 #include <vector>
 
-#include "renderer/color.h"
-#include "renderer/plate.h"
-#include "renderer/texture.h"
+#include "renderer/color/color.h"
+#include "renderer/surfaces/plate.h"
+#include "renderer/textures/texture.h"
 #include "scenes/description.h"
-#include "volumes/tensor_field.h"
+#include "volumes/bricks/tensor_field.h"
 
 namespace tensorray {
 

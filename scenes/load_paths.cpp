@@ -6,13 +6,14 @@
 #include <Eigen/LU>
 #include <fmt/format.h>
 
-#include "integrators/path_files.h"
-#include "integrators/seed_files.h"
-#include "integrators/seeds.h"
-#include "integrators/threshold_seeds.h"
-#include "renderer/image.h"
+#include "base/constants.h"
+#include "integrators/paths/path_files.h"
+#include "integrators/paths/seed_files.h"
+#include "integrators/paths/seeds.h"
+#include "integrators/paths/threshold_seeds.h"
+#include "renderer/images/image.h"
 #include "scenes/read_scene.h"
-#include "volumes/invariants.h"
+#include "volumes/tensors/invariants.h"
 
 namespace tensorray {
 namespace {
@@ -20,7 +21,6 @@ namespace {
 constexpr double shown_min = 380, shown_max = 730;  // nm, of the light that shows the paths.
 constexpr double reference_wavelength = 550;        // nm: unless paths are to show their wavelength, they are of this.
 constexpr std::size_t most_paths = 2'000'000;       // Some kilobytes each.
-constexpr double pi = 3.14159265358979323846;
 
 /// Unlike the light that is bent, what shows the paths is always white.
 ShownLight shown_light(const ColorManagement& color, const Spectrum& light, int count) {

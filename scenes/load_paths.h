@@ -4,14 +4,14 @@
 
 #include <vector>
 
-#include "integrators/paths.h"
-#include "integrators/photon_distribution.h"
-#include "renderer/beam.h"
-#include "renderer/color.h"
-#include "renderer/lights.h"
-#include "renderer/reflectance.h"
+#include "integrators/paths/paths.h"
+#include "integrators/photons/photon_distribution.h"
+#include "renderer/color/color.h"
+#include "renderer/color/reflectance.h"
+#include "renderer/lights/beam.h"
+#include "renderer/lights/lights.h"
 #include "scenes/description.h"
-#include "volumes/tensor_field.h"
+#include "volumes/bricks/tensor_field.h"
 
 namespace tensorray {
 

@@ -7,10 +7,10 @@
 
 #include <fmt/format.h>
 
-#include "renderer/mesh.h"
+#include "renderer/surfaces/mesh.h"
 #include "scenes/choices.h"
 #include "scenes/read_scene.h"
-#include "volumes/tensor_files.h"
+#include "volumes/files/tensor_files.h"
 
 namespace tensorray {
 namespace {

@@ -7,17 +7,17 @@
 #include <string>
 #include <vector>
 
-#include "integrators/auto_scale.h"
-#include "integrators/bending.h"
-#include "integrators/photon_distribution.h"
-#include "renderer/beam.h"
-#include "renderer/color.h"
-#include "renderer/geometry.h"
-#include "renderer/spectrum.h"
+#include "integrators/bending/bending.h"
+#include "integrators/photons/photon_distribution.h"
+#include "integrators/probes/auto_scale.h"
+#include "renderer/color/color.h"
+#include "renderer/color/spectrum.h"
+#include "renderer/lights/beam.h"
+#include "renderer/surfaces/geometry.h"
 #include "scenes/description.h"
 #include "scenes/load_lens.h"
 #include "scenes/load_paths.h"
-#include "volumes/tensor_field.h"
+#include "volumes/bricks/tensor_field.h"
 
 namespace tensorray {
 

@@ -5,11 +5,11 @@
 
 #include <Eigen/LU>
 
-#include "renderer/color.h"
-#include "renderer/color_bar.h"
-#include "renderer/spectrum.h"
+#include "renderer/color/color.h"
+#include "renderer/color/color_bar.h"
+#include "renderer/color/spectrum.h"
 #include "scenes/choices.h"
-#include "volumes/invariants.h"
+#include "volumes/tensors/invariants.h"
 
 namespace tensorray {
 namespace {

@@ -6,9 +6,9 @@
 #include <optional>
 #include <vector>
 
-#include "integrators/paths.h"
-#include "renderer/colormap.h"
-#include "renderer/image.h"
+#include "integrators/paths/paths.h"
+#include "renderer/color/colormap.h"
+#include "renderer/images/image.h"
 #include "scenes/description.h"
 
 namespace tensorray {

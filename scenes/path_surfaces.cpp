@@ -7,9 +7,9 @@
 
 #include <tbb/parallel_for.h>
 
-#include "integrators/cross_section.h"
-#include "renderer/color.h"
-#include "renderer/mesh_files.h"
+#include "integrators/paths/cross_section.h"
+#include "renderer/color/color.h"
+#include "renderer/surfaces/mesh_files.h"
 
 namespace tensorray {
 namespace {

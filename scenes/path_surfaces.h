@@ -5,9 +5,9 @@
 #include <filesystem>
 #include <vector>
 
-#include "integrators/paths.h"
-#include "renderer/surface.h"
-#include "renderer/tube_mesh.h"
+#include "integrators/paths/paths.h"
+#include "renderer/surfaces/surface.h"
+#include "renderer/surfaces/tube_mesh.h"
 #include "scenes/description.h"
 #include "scenes/path_colors.h"
 

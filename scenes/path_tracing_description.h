@@ -11,12 +11,12 @@
 
 #include <Eigen/Core>
 
-#include "renderer/camera.h"
-#include "renderer/colormap.h"
-#include "renderer/pixel_filter.h"
-#include "renderer/shading.h"
-#include "renderer/tube_mesh.h"
-#include "volumes/invariants.h"
+#include "renderer/color/colormap.h"
+#include "renderer/shading/camera.h"
+#include "renderer/shading/pixel_filter.h"
+#include "renderer/shading/shading.h"
+#include "renderer/surfaces/tube_mesh.h"
+#include "volumes/tensors/invariants.h"
 
 namespace tensorray {
 

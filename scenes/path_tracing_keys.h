@@ -2,7 +2,7 @@
 /// @file scenes/path_tracing_keys.h
 /// The part of scene_keys.h (see there) that tells of path tracing.
 
-#include "renderer/spectrum.h"
+#include "renderer/color/spectrum.h"
 #include "scenes/choices.h"
 #include "scenes/limits.h"
 #include "scenes/path_tracing_description.h"

@@ -7,11 +7,11 @@
 #include <optional>
 #include <vector>
 
-#include "integrators/paths.h"
-#include "integrators/photon_distribution.h"
-#include "integrators/progress.h"
-#include "renderer/image.h"
-#include "renderer/spectral_image.h"
+#include "base/progress.h"
+#include "integrators/paths/paths.h"
+#include "integrators/photons/photon_distribution.h"
+#include "renderer/film/spectral_image.h"
+#include "renderer/images/image.h"
 #include "scenes/load_scene.h"
 
 namespace tensorray {

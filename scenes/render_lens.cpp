@@ -6,14 +6,14 @@
 #include <Eigen/LU>
 #include <fmt/format.h>
 
-#include "integrators/lens.h"
-#include "renderer/grid_lines.h"
-#include "renderer/reflectance.h"
+#include "base/constants.h"
+#include "integrators/lens/lens.h"
+#include "renderer/color/reflectance.h"
+#include "renderer/images/grid_lines.h"
 
 namespace tensorray {
 namespace {
 
-constexpr double pi = 3.14159265358979323846;
 constexpr double reference_wavelength = 550;  // nm: the channel next to it is that of the points.
 constexpr int overlay_cells = 16;             // Along the image's shorter side.
 constexpr double most_overlay_cells = 1e6;    // Too dense to be drawn.

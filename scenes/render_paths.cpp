@@ -5,8 +5,8 @@
 
 #include <fmt/format.h>
 
-#include "integrators/paths.h"
-#include "renderer/path_tracer.h"
+#include "integrators/paths/paths.h"
+#include "renderer/shading/path_tracer.h"
 #include "scenes/context_surfaces.h"
 #include "scenes/path_colors.h"
 #include "scenes/path_surfaces.h"

@@ -13,8 +13,8 @@
 #include <filesystem>
 #include <string>
 
-#include "renderer/image.h"
-#include "renderer/spectrum.h"
+#include "renderer/color/spectrum.h"
+#include "renderer/images/image.h"
 #include "scenes/choices.h"
 #include "scenes/description.h"
 #include "scenes/generate_grid.h"

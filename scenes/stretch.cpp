@@ -7,8 +7,8 @@
 
 #include <fmt/format.h>
 
-#include "renderer/color_bar.h"
-#include "renderer/colormap.h"
+#include "renderer/color/color_bar.h"
+#include "renderer/color/colormap.h"
 
 namespace tensorray {
 namespace {

@@ -1,13 +1,13 @@
 #pragma once
 /// @file scenes/stretch.h
-/// How a scene's field stretches bundles of its light (integrators/stretch.h), as a grid and as a picture.
+/// How a scene's field stretches bundles of its light (integrators/probes/stretch.h), as a grid and as a picture.
 
 #include <map>
 #include <optional>
 #include <string>
 
-#include "integrators/stretch.h"
-#include "renderer/image.h"
+#include "integrators/probes/stretch.h"
+#include "renderer/images/image.h"
 #include "scenes/load_scene.h"
 
 namespace tensorray {

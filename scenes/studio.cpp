@@ -2,12 +2,12 @@
 
 #include <cmath>
 
-#include "renderer/plate.h"
+#include "base/constants.h"
+#include "renderer/surfaces/plate.h"
 
 namespace tensorray {
 namespace {
 
-constexpr double pi = 3.14159265358979323846;
 constexpr double sky = 0.55;         // Radiance of the light that nobody has chosen: of the sky ...
 constexpr double lamp = 0.6;         // ... and its lamp's irradiance over π: a white wall across it is then at 1.15.
 constexpr double lamp_degrees = 12;  // Its size, for soft shadows.

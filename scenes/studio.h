@@ -6,8 +6,8 @@
 
 #include <Eigen/Geometry>
 
-#include "renderer/camera.h"
-#include "renderer/lights.h"
+#include "renderer/lights/lights.h"
+#include "renderer/shading/camera.h"
 #include "scenes/description.h"
 #include "scenes/load_paths.h"
 

@@ -6,10 +6,10 @@
 #include <fmt/format.h>
 #include <tbb/parallel_invoke.h>
 
-#include "integrators/path_files.h"
-#include "renderer/image.h"
-#include "volumes/point_files.h"
-#include "volumes/scalar_files.h"
+#include "integrators/paths/path_files.h"
+#include "renderer/images/image.h"
+#include "volumes/files/point_files.h"
+#include "volumes/files/scalar_files.h"
 
 namespace tensorray {
 namespace {

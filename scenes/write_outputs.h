@@ -6,8 +6,8 @@
 #include <optional>
 #include <vector>
 
+#include "base/output_file.h"
 #include "scenes/load_scene.h"
-#include "scenes/output_file.h"
 #include "scenes/render.h"
 
 namespace tensorray {

@@ -5,7 +5,7 @@
 #include <functional>
 #include <string>
 
-#include "integrators/progress.h"
+#include "base/progress.h"
 
 namespace tensorray {
 

@@ -9,14 +9,14 @@
 #include <CLI/CLI.hpp>
 #include <fmt/core.h>
 
-#include "integrators/progress.h"
-#include "scenes/output_file.h"
-#include "tools/bytes_text.h"
+#include "base/output_file.h"
+#include "base/progress.h"
+#include "base/text.h"
 #include "tools/commands.h"
 #include "tools/vdb_output.h"
-#include "volumes/invariants.h"
-#include "volumes/scalar_files.h"
-#include "volumes/tensor_files.h"
+#include "volumes/files/scalar_files.h"
+#include "volumes/files/tensor_files.h"
+#include "volumes/tensors/invariants.h"
 
 namespace tensorray {
 namespace {

@@ -9,15 +9,15 @@
 #include <CLI/CLI.hpp>
 #include <fmt/core.h>
 
-#include "integrators/progress.h"
-#include "scenes/output_file.h"
-#include "tools/bytes_text.h"
+#include "base/output_file.h"
+#include "base/progress.h"
+#include "base/text.h"
 #include "tools/child_process.h"
 #include "tools/commands.h"
 #include "tools/import/import_file.h"
 #include "tools/progress_bar.h"
 #include "tools/vdb_output.h"
-#include "volumes/tensor_files.h"
+#include "volumes/files/tensor_files.h"
 
 namespace tensorray {
 namespace {

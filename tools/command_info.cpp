@@ -12,10 +12,10 @@
 #include <fmt/core.h>
 #include <nlohmann/json.hpp>
 
-#include "tools/bytes_text.h"
+#include "base/text.h"
 #include "tools/commands.h"
-#include "volumes/statistics.h"
-#include "volumes/tensor_files.h"
+#include "volumes/files/tensor_files.h"
+#include "volumes/tensors/statistics.h"
 
 namespace tensorray {
 namespace {

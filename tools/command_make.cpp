@@ -10,14 +10,14 @@
 #include <CLI/CLI.hpp>
 #include <fmt/core.h>
 
-#include "integrators/progress.h"
+#include "base/output_file.h"
+#include "base/progress.h"
+#include "base/text.h"
 #include "scenes/generate_grid.h"
-#include "scenes/output_file.h"
-#include "tools/bytes_text.h"
 #include "tools/commands.h"
 #include "tools/vdb_output.h"
-#include "volumes/generators.h"
-#include "volumes/tensor_files.h"
+#include "volumes/files/tensor_files.h"
+#include "volumes/tensors/generators.h"
 
 namespace tensorray {
 namespace {

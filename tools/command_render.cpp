@@ -10,7 +10,7 @@
 #include <nlohmann/json.hpp>
 #include <tbb/global_control.h>
 
-#include "renderer/image.h"
+#include "renderer/images/image.h"
 #include "scenes/load_scene.h"
 #include "scenes/read_scene.h"
 #include "scenes/render.h"

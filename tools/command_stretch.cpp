@@ -14,15 +14,15 @@
 #include <fmt/ranges.h>
 #include <tbb/global_control.h>
 
-#include "renderer/spectrum.h"
+#include "base/output_file.h"
+#include "renderer/color/spectrum.h"
 #include "scenes/load_scene.h"
-#include "scenes/output_file.h"
 #include "scenes/read_scene.h"
 #include "scenes/stretch.h"
 #include "tools/commands.h"
 #include "tools/progress_bar.h"
 #include "tools/vdb_output.h"
-#include "volumes/scalar_files.h"
+#include "volumes/files/scalar_files.h"
 
 namespace tensorray {
 namespace {

@@ -6,7 +6,7 @@
 #include <cstdint>
 #include <string>
 
-#include "integrators/progress.h"
+#include "base/progress.h"
 
 namespace tensorray {
 

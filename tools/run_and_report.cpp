@@ -7,7 +7,7 @@
 #include <CLI/CLI.hpp>
 #include <fmt/format.h>
 
-#include "integrators/progress.h"
+#include "base/progress.h"
 #include "scenes/read_scene.h"
 
 namespace tensorray {

@@ -8,7 +8,7 @@
 #include <CLI/CLI.hpp>
 #include <fmt/format.h>
 
-#include "integrators/progress.h"
+#include "base/progress.h"
 #include "tools/commands.h"
 #include "tools/run_and_report.h"
 

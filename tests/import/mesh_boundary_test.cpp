@@ -8,7 +8,7 @@
 #include <gtest/gtest.h>
 #include <vtkUnsignedCharArray.h>
 
-#include "renderer/mesh.h"
+#include "renderer/surfaces/mesh.h"
 #include "tests/import/mesh_fixtures.h"
 
 namespace tensorray {

@@ -19,7 +19,7 @@
 #include <vtkStructuredGrid.h>
 #include <vtkUnstructuredGrid.h>
 
-#include "volumes/tensor_grid.h"
+#include "volumes/grids/tensor_grid.h"
 
 namespace tensorray::mesh_fixtures {
 

@@ -1,4 +1,4 @@
-#include "integrators/auto_scale.h"
+#include "integrators/probes/auto_scale.h"
 
 #include <cmath>
 

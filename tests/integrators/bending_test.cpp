@@ -1,4 +1,4 @@
-#include "integrators/bending.h"
+#include "integrators/bending/bending.h"
 
 #include <cmath>
 #include <vector>

@@ -1,4 +1,4 @@
-#include "integrators/cross_section.h"
+#include "integrators/paths/cross_section.h"
 
 #include <cmath>
 

@@ -1,4 +1,4 @@
-#include "integrators/exponential.h"
+#include "integrators/bending/exponential.h"
 
 #include <limits>
 

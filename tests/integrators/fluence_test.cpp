@@ -1,4 +1,4 @@
-#include "integrators/fluence.h"
+#include "integrators/photons/fluence.h"
 
 #include <cmath>
 #include <map>
@@ -6,7 +6,7 @@
 #include <gtest/gtest.h>
 #include <tbb/global_control.h>
 
-#include "integrators/photon_distribution.h"
+#include "integrators/photons/photon_distribution.h"
 #include "tests/integrators/support.h"
 
 namespace tensorray {

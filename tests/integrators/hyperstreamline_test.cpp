@@ -12,10 +12,10 @@
 #include <Eigen/Geometry>
 #include <gtest/gtest.h>
 
-#include "integrators/paths.h"
+#include "integrators/paths/paths.h"
 #include "tests/integrators/support.h"
 #include "tests/renderer/support.h"
-#include "volumes/tensor_sampler.h"
+#include "volumes/bricks/tensor_sampler.h"
 
 namespace tensorray {
 namespace {

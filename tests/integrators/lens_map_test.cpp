@@ -1,6 +1,6 @@
 // Parallel light from plane to plane against closed forms.
 
-#include "integrators/lens_map.h"
+#include "integrators/lens/lens_map.h"
 
 #include <cmath>
 #include <complex>
@@ -9,7 +9,7 @@
 #include <gtest/gtest.h>
 
 #include "tests/integrators/support.h"
-#include "volumes/generators.h"
+#include "volumes/tensors/generators.h"
 
 namespace tensorray {
 namespace {

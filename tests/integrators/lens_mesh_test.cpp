@@ -1,6 +1,6 @@
 // Meshes of landings: no cracks, accurate, torn where the map is, and searched sheet by sheet.
 
-#include "integrators/lens_mesh.h"
+#include "integrators/lens/lens_mesh.h"
 
 #include <algorithm>
 #include <cmath>

@@ -1,6 +1,6 @@
 // Pictures seen through a tensor field, in both modes.
 
-#include "integrators/lens.h"
+#include "integrators/lens/lens.h"
 
 #include <algorithm>
 #include <cmath>

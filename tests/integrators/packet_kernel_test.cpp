@@ -1,6 +1,6 @@
 // What packets promise beside being right: a ray's result is its own, and work is in proportion to its way.
 
-#include "integrators/packet_kernel.h"
+#include "integrators/packets/packet_kernel.h"
 
 #include <numeric>
 

@@ -2,9 +2,9 @@
 
 #include <gtest/gtest.h>
 
-#include "integrators/packet_tracer.h"
+#include "integrators/packets/packet_tracer.h"
 #include "tests/integrators/packet_support.h"
-#include "volumes/generators.h"
+#include "volumes/tensors/generators.h"
 
 namespace tensorray {
 namespace {

@@ -13,8 +13,8 @@
 
 #include <gtest/gtest.h>
 
-#include "integrators/bending.h"
-#include "integrators/packet_kernel.h"
+#include "integrators/bending/bending.h"
+#include "integrators/packets/packet_kernel.h"
 #include "tests/integrators/support.h"
 
 namespace tensorray::test {

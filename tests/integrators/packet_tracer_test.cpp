@@ -1,13 +1,13 @@
 // Rays by packets, in single precision, against the same rays one by one in double precision.
 
-#include "integrators/packet_tracer.h"
+#include "integrators/packets/packet_tracer.h"
 
 #include <limits>
 
 #include <gtest/gtest.h>
 
 #include "tests/integrators/packet_support.h"
-#include "volumes/generators.h"
+#include "volumes/tensors/generators.h"
 
 namespace tensorray {
 namespace {

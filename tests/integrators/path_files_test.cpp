@@ -1,4 +1,4 @@
-#include "integrators/path_files.h"
+#include "integrators/paths/path_files.h"
 
 #include <array>
 #include <cmath>
@@ -13,7 +13,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "integrators/cross_section.h"
+#include "integrators/paths/cross_section.h"
 #include "tests/renderer/support.h"
 
 namespace tensorray {

@@ -1,4 +1,4 @@
-#include "integrators/paths.h"
+#include "integrators/paths/paths.h"
 
 #include <algorithm>
 #include <cmath>
@@ -6,8 +6,8 @@
 
 #include <gtest/gtest.h>
 
-#include "integrators/cross_section.h"
-#include "renderer/tube_mesh.h"
+#include "integrators/paths/cross_section.h"
+#include "renderer/surfaces/tube_mesh.h"
 #include "tests/integrators/support.h"
 
 namespace tensorray {

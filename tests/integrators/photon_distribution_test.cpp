@@ -1,4 +1,4 @@
-#include "integrators/photon_distribution.h"
+#include "integrators/photons/photon_distribution.h"
 
 #include <cmath>
 

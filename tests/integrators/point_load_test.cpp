@@ -10,8 +10,8 @@
 #include <gtest/gtest.h>
 
 #include "tests/integrators/support.h"
-#include "volumes/eigenvalues.h"
-#include "volumes/generators.h"
+#include "volumes/tensors/eigenvalues.h"
+#include "volumes/tensors/generators.h"
 
 namespace tensorray {
 namespace {

@@ -1,4 +1,4 @@
-#include "integrators/seed_files.h"
+#include "integrators/paths/seed_files.h"
 
 #include <gtest/gtest.h>
 

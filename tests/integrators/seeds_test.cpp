@@ -1,4 +1,4 @@
-#include "integrators/seeds.h"
+#include "integrators/paths/seeds.h"
 
 #include <algorithm>
 #include <cmath>

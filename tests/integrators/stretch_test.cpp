@@ -1,6 +1,6 @@
 // The stretch of bundles of light against closed forms, and against neighbouring rays.
 
-#include "integrators/stretch.h"
+#include "integrators/probes/stretch.h"
 
 #include <cmath>
 

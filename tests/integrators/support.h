@@ -7,9 +7,9 @@
 #include <Eigen/Geometry>
 #include <gtest/gtest.h>
 
-#include "integrators/bending.h"
-#include "renderer/mesh.h"
-#include "volumes/tensor_field.h"
+#include "integrators/bending/bending.h"
+#include "renderer/surfaces/mesh.h"
+#include "volumes/bricks/tensor_field.h"
 
 namespace tensorray::test {
 

@@ -1,4 +1,4 @@
-#include "integrators/threshold_seeds.h"
+#include "integrators/paths/threshold_seeds.h"
 
 #include <cmath>
 

@@ -6,7 +6,7 @@
 
 #include <openvdb/openvdb.h>
 
-#include "renderer/image.h"
+#include "renderer/images/image.h"
 #include "tests/program/support.h"
 
 namespace tensorray {

@@ -1,6 +1,6 @@
 // Imported tensors turn with their voxels: pictures of turned and mirrored files are turned and mirrored pictures.
 
-#include "renderer/image.h"
+#include "renderer/images/image.h"
 #include "tests/program/import_support.h"
 
 namespace tensorray {

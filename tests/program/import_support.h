@@ -15,7 +15,7 @@
 
 #include "tests/import/openfoam_case.h"
 #include "tests/program/support.h"
-#include "volumes/tensor_files.h"
+#include "volumes/files/tensor_files.h"
 
 namespace tensorray::test {
 

@@ -7,7 +7,7 @@
 #include <iomanip>
 #include <sstream>
 
-#include "renderer/image.h"
+#include "renderer/images/image.h"
 #include "tests/program/support.h"
 
 namespace tensorray {

@@ -5,8 +5,8 @@
 #include <Eigen/Core>
 #include <gmock/gmock.h>
 
-#include "renderer/image.h"
-#include "renderer/random.h"
+#include "renderer/images/image.h"
+#include "renderer/sampling/random.h"
 #include "tests/program/support.h"
 
 namespace tensorray {

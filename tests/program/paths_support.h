@@ -9,7 +9,7 @@
 
 #include <Eigen/Core>
 
-#include "renderer/image.h"
+#include "renderer/images/image.h"
 #include "tests/program/support.h"
 
 namespace tensorray::test {

@@ -1,7 +1,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "renderer/image.h"
+#include "renderer/images/image.h"
 #include "tests/program/support.h"
 
 namespace tensorray {

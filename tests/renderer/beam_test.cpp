@@ -1,4 +1,4 @@
-#include "renderer/beam.h"
+#include "renderer/lights/beam.h"
 
 #include <array>
 #include <cmath>

@@ -1,4 +1,4 @@
-#include "renderer/camera.h"
+#include "renderer/shading/camera.h"
 
 #include <algorithm>
 #include <cmath>
@@ -6,7 +6,7 @@
 
 #include <gtest/gtest.h>
 
-#include "renderer/random.h"
+#include "renderer/sampling/random.h"
 
 namespace tensorray {
 namespace {

@@ -1,4 +1,4 @@
-#include "renderer/color_bar.h"
+#include "renderer/color/color_bar.h"
 
 #include <algorithm>
 #include <cmath>

@@ -1,4 +1,4 @@
-#include "renderer/color.h"
+#include "renderer/color/color.h"
 
 #include <cmath>
 #include <cstdlib>
@@ -7,7 +7,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "renderer/spectrum.h"
+#include "renderer/color/spectrum.h"
 #include "tests/renderer/support.h"
 
 namespace tensorray {

@@ -1,4 +1,4 @@
-#include "renderer/colormap.h"
+#include "renderer/color/colormap.h"
 
 #include <algorithm>
 #include <cmath>
@@ -10,7 +10,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "renderer/color.h"
+#include "renderer/color/color.h"
 #include "tests/renderer/support.h"
 
 namespace tensorray {

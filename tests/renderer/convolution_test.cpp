@@ -1,4 +1,4 @@
-#include "renderer/convolution.h"
+#include "renderer/film/convolution.h"
 
 #include <random>
 

@@ -1,4 +1,4 @@
-#include "renderer/density.h"
+#include "renderer/film/density.h"
 
 #include <cmath>
 #include <random>

@@ -1,4 +1,4 @@
-#include "renderer/distribution.h"
+#include "renderer/sampling/distribution.h"
 
 #include <cmath>
 #include <limits>
@@ -6,7 +6,7 @@
 
 #include <gtest/gtest.h>
 
-#include "renderer/random.h"
+#include "renderer/sampling/random.h"
 #include "tests/renderer/statistics.h"
 
 namespace tensorray {

@@ -1,4 +1,4 @@
-#include "renderer/environment_map.h"
+#include "renderer/textures/environment_map.h"
 
 #include <algorithm>
 #include <cmath>
@@ -7,8 +7,8 @@
 #include <Eigen/Geometry>
 #include <gtest/gtest.h>
 
-#include "renderer/random.h"
-#include "renderer/sampling.h"
+#include "renderer/sampling/random.h"
+#include "renderer/sampling/sampling.h"
 #include "tests/renderer/statistics.h"
 
 namespace tensorray {

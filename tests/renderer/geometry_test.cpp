@@ -1,4 +1,4 @@
-#include "renderer/geometry.h"
+#include "renderer/surfaces/geometry.h"
 
 #include <cmath>
 #include <random>

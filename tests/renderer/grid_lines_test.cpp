@@ -1,4 +1,4 @@
-#include "renderer/grid_lines.h"
+#include "renderer/images/grid_lines.h"
 
 #include <cmath>
 #include <functional>

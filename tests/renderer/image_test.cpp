@@ -1,4 +1,4 @@
-#include "renderer/image.h"
+#include "renderer/images/image.h"
 
 #include <algorithm>
 #include <chrono>

@@ -1,4 +1,4 @@
-#include "renderer/ink.h"
+#include "renderer/images/ink.h"
 
 #include <vector>
 

@@ -1,4 +1,4 @@
-#include "renderer/kernel_deposit.h"
+#include "renderer/film/kernel_deposit.h"
 
 #include <cmath>
 

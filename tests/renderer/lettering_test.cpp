@@ -1,4 +1,4 @@
-#include "renderer/lettering.h"
+#include "renderer/images/lettering.h"
 
 #include <algorithm>
 #include <array>

@@ -1,4 +1,4 @@
-#include "renderer/lights.h"
+#include "renderer/lights/lights.h"
 
 #include <algorithm>
 #include <cmath>
@@ -7,8 +7,8 @@
 
 #include <gtest/gtest.h>
 
-#include "renderer/random.h"
-#include "renderer/sampling.h"
+#include "renderer/sampling/random.h"
+#include "renderer/sampling/sampling.h"
 #include "tests/renderer/statistics.h"
 #include "tests/renderer/support.h"
 

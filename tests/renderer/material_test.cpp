@@ -1,4 +1,4 @@
-#include "renderer/material.h"
+#include "renderer/materials/material.h"
 
 #include <cmath>
 #include <stdexcept>
@@ -7,7 +7,7 @@
 
 #include <gtest/gtest.h>
 
-#include "renderer/random.h"
+#include "renderer/sampling/random.h"
 #include "tests/renderer/support.h"
 
 namespace tensorray {

@@ -1,4 +1,4 @@
-#include "renderer/mesh_files.h"
+#include "renderer/surfaces/mesh_files.h"
 
 #include <cmath>
 #include <cstring>

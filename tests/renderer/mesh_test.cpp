@@ -1,4 +1,4 @@
-#include "renderer/mesh.h"
+#include "renderer/surfaces/mesh.h"
 
 #include <algorithm>
 #include <cstdint>

@@ -1,4 +1,4 @@
-#include "renderer/microfacet.h"
+#include "renderer/materials/microfacet.h"
 
 #include <cmath>
 #include <complex>
@@ -6,8 +6,8 @@
 
 #include <gtest/gtest.h>
 
-#include "renderer/random.h"
-#include "renderer/rough_conductor.h"
+#include "renderer/materials/rough_conductor.h"
+#include "renderer/sampling/random.h"
 #include "tests/renderer/support.h"
 
 namespace tensorray {

@@ -1,4 +1,4 @@
-#include "renderer/path_tracer.h"
+#include "renderer/shading/path_tracer.h"
 
 #include <algorithm>
 #include <cmath>
@@ -12,7 +12,7 @@
 #include <gtest/gtest.h>
 #include <tbb/global_control.h>
 
-#include "renderer/random.h"
+#include "renderer/sampling/random.h"
 #include "tests/renderer/statistics.h"
 #include "tests/renderer/support.h"
 

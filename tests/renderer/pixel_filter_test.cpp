@@ -1,4 +1,4 @@
-#include "renderer/pixel_filter.h"
+#include "renderer/shading/pixel_filter.h"
 
 #include <cmath>
 #include <limits>
@@ -7,7 +7,7 @@
 
 #include <gtest/gtest.h>
 
-#include "renderer/random.h"
+#include "renderer/sampling/random.h"
 #include "tests/renderer/statistics.h"
 
 namespace tensorray {

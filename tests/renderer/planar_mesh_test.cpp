@@ -1,4 +1,4 @@
-#include "renderer/planar_mesh.h"
+#include "renderer/surfaces/planar_mesh.h"
 
 #include <algorithm>
 #include <cmath>

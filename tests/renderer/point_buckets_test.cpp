@@ -1,4 +1,4 @@
-#include "renderer/point_buckets.h"
+#include "renderer/film/point_buckets.h"
 
 #include <random>
 

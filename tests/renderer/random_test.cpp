@@ -1,4 +1,4 @@
-#include "renderer/random.h"
+#include "renderer/sampling/random.h"
 
 #include <cmath>
 #include <set>

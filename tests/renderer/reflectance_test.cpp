@@ -1,4 +1,4 @@
-#include "renderer/reflectance.h"
+#include "renderer/color/reflectance.h"
 
 #include <algorithm>
 #include <cmath>
@@ -11,7 +11,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "renderer/color.h"
+#include "renderer/color/color.h"
 #include "tests/renderer/support.h"
 
 namespace tensorray {

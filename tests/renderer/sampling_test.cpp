@@ -1,4 +1,4 @@
-#include "renderer/sampling.h"
+#include "renderer/sampling/sampling.h"
 
 #include <algorithm>
 #include <cmath>
@@ -7,7 +7,7 @@
 #include <Eigen/LU>
 #include <gtest/gtest.h>
 
-#include "renderer/random.h"
+#include "renderer/sampling/random.h"
 #include "tests/renderer/statistics.h"
 
 namespace tensorray {

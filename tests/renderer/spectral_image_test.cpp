@@ -1,4 +1,4 @@
-#include "renderer/spectral_image.h"
+#include "renderer/film/spectral_image.h"
 
 #include <algorithm>
 #include <clocale>

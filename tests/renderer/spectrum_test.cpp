@@ -1,4 +1,4 @@
-#include "renderer/spectrum.h"
+#include "renderer/color/spectrum.h"
 
 #include <algorithm>
 #include <cmath>

@@ -1,4 +1,4 @@
-#include "renderer/surface_scene.h"
+#include "renderer/surfaces/surface_scene.h"
 
 #include <algorithm>
 #include <cmath>
@@ -8,9 +8,9 @@
 
 #include <gtest/gtest.h>
 
-#include "renderer/lights.h"
-#include "renderer/random.h"
-#include "renderer/sampling.h"
+#include "renderer/lights/lights.h"
+#include "renderer/sampling/random.h"
+#include "renderer/sampling/sampling.h"
 #include "tests/renderer/support.h"
 
 namespace tensorray {

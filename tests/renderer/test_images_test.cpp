@@ -1,4 +1,4 @@
-#include "renderer/test_images.h"
+#include "renderer/textures/test_images.h"
 
 #include <algorithm>
 #include <cmath>

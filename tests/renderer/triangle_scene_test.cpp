@@ -1,4 +1,4 @@
-#include "renderer/triangle_scene.h"
+#include "renderer/surfaces/triangle_scene.h"
 
 #include <algorithm>
 #include <cmath>

@@ -1,4 +1,4 @@
-#include "renderer/tube_mesh.h"
+#include "renderer/surfaces/tube_mesh.h"
 
 #include <array>
 #include <cmath>

@@ -1,4 +1,4 @@
-#include "volumes/block_memory.h"
+#include "volumes/grids/block_memory.h"
 
 #include <algorithm>
 #include <array>

@@ -1,4 +1,4 @@
-#include "volumes/brick_index.h"
+#include "volumes/bricks/brick_index.h"
 
 #include <algorithm>
 #include <limits>

@@ -6,7 +6,7 @@
 #include <openvdb/openvdb.h>
 
 #include "tests/volumes/file_support.h"
-#include "volumes/tensor_files.h"
+#include "volumes/files/tensor_files.h"
 
 namespace tensorray {
 namespace {

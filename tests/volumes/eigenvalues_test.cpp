@@ -1,4 +1,4 @@
-#include "volumes/eigenvalues.h"
+#include "volumes/tensors/eigenvalues.h"
 
 #include <cmath>
 #include <complex>

@@ -14,7 +14,7 @@
 #include <sys/resource.h>
 #include <unistd.h>
 
-#include "volumes/tensor_grid.h"
+#include "volumes/grids/tensor_grid.h"
 
 namespace tensorray {
 

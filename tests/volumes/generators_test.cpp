@@ -1,4 +1,4 @@
-#include "volumes/generators.h"
+#include "volumes/tensors/generators.h"
 
 #include <cmath>
 #include <cstdlib>
@@ -14,7 +14,7 @@
 #include <vtkPointData.h>
 #include <vtkXMLImageDataReader.h>
 
-#include "volumes/eigenvalues.h"
+#include "volumes/tensors/eigenvalues.h"
 
 namespace tensorray {
 namespace {

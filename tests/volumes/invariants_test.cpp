@@ -1,4 +1,4 @@
-#include "volumes/invariants.h"
+#include "volumes/tensors/invariants.h"
 
 #include <cmath>
 #include <limits>

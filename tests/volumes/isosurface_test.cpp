@@ -1,4 +1,4 @@
-#include "volumes/isosurface.h"
+#include "volumes/tensors/isosurface.h"
 
 #include <cmath>
 #include <limits>

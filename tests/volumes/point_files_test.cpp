@@ -1,4 +1,4 @@
-#include "volumes/point_files.h"
+#include "volumes/files/point_files.h"
 
 #include <algorithm>
 #include <random>

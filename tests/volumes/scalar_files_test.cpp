@@ -1,14 +1,14 @@
 // Invariants of a field as float grids, read back by OpenVDB itself.
 
-#include "volumes/scalar_files.h"
+#include "volumes/files/scalar_files.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <openvdb/openvdb.h>
 
 #include "tests/volumes/file_support.h"
-#include "volumes/invariants.h"
-#include "volumes/tensor_files.h"
+#include "volumes/files/tensor_files.h"
+#include "volumes/tensors/invariants.h"
 
 namespace tensorray {
 namespace {

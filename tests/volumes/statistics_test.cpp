@@ -1,4 +1,4 @@
-#include "volumes/statistics.h"
+#include "volumes/tensors/statistics.h"
 
 #include <cmath>
 #include <limits>
@@ -6,8 +6,8 @@
 #include <gtest/gtest.h>
 #include <tbb/global_control.h>
 
-#include "volumes/generators.h"
-#include "volumes/tensor_field.h"
+#include "volumes/bricks/tensor_field.h"
+#include "volumes/tensors/generators.h"
 
 namespace tensorray {
 namespace {

@@ -1,4 +1,4 @@
-#include "volumes/tensor_field.h"
+#include "volumes/bricks/tensor_field.h"
 
 #include <algorithm>
 #include <cmath>
@@ -7,7 +7,7 @@
 
 #include <gtest/gtest.h>
 
-#include "volumes/tensor_sampler.h"
+#include "volumes/bricks/tensor_sampler.h"
 
 namespace tensorray {
 namespace {

@@ -1,4 +1,4 @@
-#include "volumes/tensor_files.h"
+#include "volumes/files/tensor_files.h"
 
 #include <fstream>
 

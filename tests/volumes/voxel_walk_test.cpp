@@ -1,4 +1,4 @@
-#include "volumes/voxel_walk.h"
+#include "volumes/bricks/voxel_walk.h"
 
 #include <random>
 #include <vector>

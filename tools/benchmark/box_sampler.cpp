@@ -10,9 +10,9 @@
 
 #include <openvdb/tools/Interpolation.h>
 
-#include "integrators/packet_tracer.h"
+#include "integrators/packets/packet_tracer.h"
 #include "tools/benchmark/openvdb_grids.h"
-#include "volumes/tensor_sampler.h"
+#include "volumes/bricks/tensor_sampler.h"
 
 namespace tensorray {
 namespace {

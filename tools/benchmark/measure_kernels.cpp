@@ -1,7 +1,7 @@
 #include <algorithm>
 #include <stdexcept>
 
-#include "integrators/packet_kernel.h"
+#include "integrators/packets/packet_kernel.h"
 #include "tools/benchmark/kernels.h"
 #include "tools/benchmark/parts.h"
 #include "tools/benchmark/repeat.h"

@@ -6,9 +6,9 @@
 #include "tools/benchmark/parts.h"
 #include "tools/benchmark/repeat.h"
 #include "tools/benchmark/temporary_folder.h"
-#include "volumes/generators.h"
-#include "volumes/tensor_field.h"
-#include "volumes/tensor_files.h"
+#include "volumes/bricks/tensor_field.h"
+#include "volumes/files/tensor_files.h"
+#include "volumes/tensors/generators.h"
 
 namespace tensorray::benchmark {
 

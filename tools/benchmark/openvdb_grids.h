@@ -6,7 +6,7 @@
 
 #include <openvdb/openvdb.h>
 
-#include "volumes/tensor_grid.h"
+#include "volumes/grids/tensor_grid.h"
 
 namespace tensorray::benchmark {
 

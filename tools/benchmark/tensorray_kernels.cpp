@@ -1,4 +1,4 @@
-#include "integrators/packet_kernel.h"
+#include "integrators/packets/packet_kernel.h"
 #include "tools/benchmark/kernels.h"
 
 namespace tensorray::benchmark {

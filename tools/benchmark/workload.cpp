@@ -3,8 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
-#include "integrators/auto_scale.h"
-#include "renderer/beam.h"
+#include "integrators/probes/auto_scale.h"
+#include "renderer/lights/beam.h"
 
 namespace tensorray::benchmark {
 namespace {

@@ -6,10 +6,10 @@
 #include <string>
 #include <vector>
 
-#include "integrators/bending.h"
-#include "renderer/geometry.h"
-#include "volumes/generators.h"
-#include "volumes/tensor_field.h"
+#include "integrators/bending/bending.h"
+#include "renderer/surfaces/geometry.h"
+#include "volumes/bricks/tensor_field.h"
+#include "volumes/tensors/generators.h"
 
 namespace tensorray::benchmark {
 

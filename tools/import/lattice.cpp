@@ -13,7 +13,7 @@
 #include <fmt/ranges.h>
 #include <tbb/parallel_for.h>
 
-#include "volumes/finite_differences.h"
+#include "volumes/tensors/finite_differences.h"
 
 namespace tensorray {
 namespace {

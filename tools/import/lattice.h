@@ -10,7 +10,7 @@
 #include <Eigen/Geometry>
 
 #include "tools/import/tensor_order.h"
-#include "volumes/tensor_grid.h"
+#include "volumes/grids/tensor_grid.h"
 
 namespace tensorray {
 

@@ -18,14 +18,13 @@
 #include <vtkPolyData.h>
 #include <vtkStaticPointLocator.h>
 
+#include "base/constants.h"
 #include "tools/import/mesh_cell.h"
 
 namespace tensorray {
 namespace {
 
 using Eigen::Vector3d;
-
-constexpr double pi = 3.14159265358979323846;
 
 /// The points of a mesh, and for each the one that stands for all at its position.
 struct Points {

@@ -8,8 +8,8 @@
 
 #include <Eigen/Geometry>
 
-#include "integrators/progress.h"
-#include "volumes/tensor_grid.h"
+#include "base/progress.h"
+#include "volumes/grids/tensor_grid.h"
 
 class vtkDataSet;
 

@@ -20,6 +20,7 @@
 #include <fmt/format.h>
 #include <nifti2_io.h>
 
+#include "base/errors.h"
 #include "tools/import/lattice_files.h"
 
 namespace tensorray {
@@ -31,10 +32,6 @@ using Image = std::unique_ptr<nifti_image, decltype(&nifti_image_free)>;
 
 /// The bytes of one component of one slice.
 using Plane = std::vector<char>;
-
-[[noreturn]] void fail(const std::filesystem::path& path, const std::string& what) {
-  throw std::runtime_error(fmt::format("\"{}\": {}", path.string(), what));
-}
 
 template <class Number>
 double number(const char* bytes, std::size_t index) {

@@ -17,6 +17,7 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
+#include "base/errors.h"
 #include "tools/import/lattice_files.h"
 
 namespace tensorray {
@@ -30,10 +31,6 @@ struct Header {
   std::vector<std::size_t> shape;
   std::uint64_t data_start = 0;  ///< Bytes into the file.
 };
-
-[[noreturn]] void fail(const std::filesystem::path& path, const std::string& what) {
-  throw std::runtime_error(fmt::format("\"{}\": {}", path.string(), what));
-}
 
 bool little_endian() {
   const std::uint16_t one = 1;

@@ -21,6 +21,7 @@
 #include <teem/biff.h>
 #include <teem/nrrd.h>
 
+#include "base/errors.h"
 #include "tools/import/lattice_files.h"
 
 namespace tensorray {
@@ -48,10 +49,6 @@ struct Components {
   bool masked = false;
   std::optional<TensorOrder> order;
 };
-
-[[noreturn]] void fail(const std::filesystem::path& path, const std::string& what) {
-  throw std::runtime_error(fmt::format("\"{}\": {}", path.string(), what));
-}
 
 /// The innermost of Teem's errors, which says what is wrong, without the function's name.
 std::string last_error() {

@@ -11,16 +11,14 @@
 #include <string>
 #include <vector>
 
+#include "base/errors.h"
+
 namespace tensorray {
 namespace {
 
 using Path = std::filesystem::path;
 
 enum class Contents { grid, q };
-
-[[noreturn]] void fail(const Path& path, const std::string& what) {
-  throw std::runtime_error(path.string() + ": " + what);
-}
 
 /// What is needed of a file to find its layout.
 struct Bytes {

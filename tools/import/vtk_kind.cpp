@@ -16,6 +16,7 @@
 #include <vtkExtentSplitter.h>
 #include <vtkNew.h>
 
+#include "base/errors.h"
 #include "tools/import/netcdf_size.h"
 
 namespace tensorray {
@@ -45,10 +46,6 @@ const std::vector<KindFacts>& kinds() {
       {VtkKind::openfoam, "an OpenFOAM case", nullptr, {".foam"}},
   };
   return table;
-}
-
-[[noreturn]] void fail(const fs::path& path, const std::string& what) {
-  throw std::runtime_error(path.string() + ": " + what);
 }
 
 const KindFacts& facts_of(VtkKind kind) {

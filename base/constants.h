@@ -1,0 +1,9 @@
+#pragma once
+/// @file base/constants.h
+/// Numbers of mathematics.
+
+namespace tensorray {
+
+constexpr double pi = 3.14159265358979323846;
+
+}  // namespace tensorray

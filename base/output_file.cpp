@@ -1,0 +1,173 @@
+#include "base/output_file.h"
+
+#include <atomic>
+#include <cerrno>
+#include <cstddef>
+#include <cstring>
+#include <stdexcept>
+#include <string>
+#include <system_error>
+#include <utility>
+
+#include <fcntl.h>
+#include <fmt/core.h>
+#include <unistd.h>
+
+#include "base/errors.h"
+
+namespace tensorray {
+namespace {
+
+namespace fs = std::filesystem;
+
+/// Closes a file descriptor when it goes out of scope.
+class Descriptor {
+ public:
+  explicit Descriptor(int value) : value_(value) {}
+  ~Descriptor() { close(); }
+  Descriptor(const Descriptor&) = delete;
+  Descriptor& operator=(const Descriptor&) = delete;
+
+  int get() const { return value_; }
+  bool is_open() const { return value_ >= 0; }
+  bool close() { return value_ < 0 || ::close(std::exchange(value_, -1)) == 0; }
+
+ private:
+  int value_;
+};
+
+/// Follows symbolic links, also where they end at nothing yet.
+fs::path behind_links(const fs::path& target) {
+  constexpr int longest_chain = 40;  // As in Linux.
+  fs::path path = target;
+  for (int i = 0; i < longest_chain; ++i) {
+    std::error_code error;
+    if (!fs::is_symlink(fs::symlink_status(path, error))) return path;
+    const fs::path next = fs::read_symlink(path, error);
+    if (error) fail(target, fmt::format("cannot follow the link {}: {}", path.string(), error.message()));
+    path = next.is_absolute() ? next : path.parent_path() / next;
+  }
+  fail(target, "is a loop of symbolic links; remove it or choose another name");
+}
+
+/// Makes an empty file in `folder` whose name nobody else has.
+fs::path make_temporary(const fs::path& folder, const fs::path& target) {
+  static std::atomic<unsigned> counter{0};
+  const std::string ending = target.extension().string();
+  while (true) {
+    const fs::path path = folder / fmt::format(".tensorray-{}-{}{}", getpid(), counter++, ending);
+    const Descriptor file(::open(path.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0666));
+    if (file.is_open()) return path;
+    if (errno == EEXIST) continue;  // Left over by a process that was killed and had the same number.
+    fail(target, fmt::format("cannot write to the folder {}: {}", folder.string(), std::strerror(errno)));
+  }
+}
+
+void write_all(int descriptor, const char* data, std::size_t size, const fs::path& target) {
+  while (size > 0) {
+    const ssize_t written = ::write(descriptor, data, size);
+    if (written < 0 && errno == EINTR) continue;
+    if (written < 0) fail(target, fmt::format("cannot be written: {}", std::strerror(errno)));
+    data += written;
+    size -= static_cast<std::size_t>(written);
+  }
+}
+
+void copy_into(const fs::path& source, const fs::path& device) {
+  const Descriptor from(::open(source.c_str(), O_RDONLY | O_CLOEXEC));
+  if (!from.is_open()) fail(device, fmt::format("cannot read {}: {}", source.string(), std::strerror(errno)));
+  Descriptor to(::open(device.c_str(), O_WRONLY | O_CLOEXEC));
+  if (!to.is_open()) fail(device, fmt::format("cannot be opened: {}", std::strerror(errno)));
+  std::vector<char> buffer(1 << 20);
+  while (true) {
+    const ssize_t size = ::read(from.get(), buffer.data(), buffer.size());
+    if (size < 0 && errno == EINTR) continue;
+    if (size < 0) fail(device, fmt::format("cannot read {}: {}", source.string(), std::strerror(errno)));
+    if (size == 0) break;
+    write_all(to.get(), buffer.data(), static_cast<std::size_t>(size), device);
+  }
+  if (!to.close()) fail(device, fmt::format("cannot be written: {}", std::strerror(errno)));
+}
+
+fs::path folder_of(const fs::path& file) { return file.has_parent_path() ? file.parent_path() : fs::path("."); }
+
+}  // namespace
+
+OutputFile::OutputFile(fs::path target) : target_(std::move(target)) {
+  std::error_code error;
+  const fs::file_status status = fs::status(target_, error);
+  if (fs::is_directory(status) || !target_.has_filename()) fail(target_, "is a folder; give the name of a file");
+  if (fs::exists(status) && ::access(target_.c_str(), W_OK) != 0) {
+    fail(target_, fmt::format("cannot be written: {}", std::strerror(errno)));
+  }
+  is_device_ = fs::exists(status) && !fs::is_regular_file(status);
+  if (is_device_) {
+    resolved_ = target_;
+    temporary_ = make_temporary(fs::temp_directory_path(), target_);
+    return;
+  }
+  resolved_ = fs::exists(status) ? fs::canonical(target_) : behind_links(target_);
+  const fs::path folder = folder_of(resolved_);
+  if (!fs::is_directory(folder, error)) fail(target_, fmt::format("there is no folder {}; make it", folder.string()));
+  temporary_ = make_temporary(folder, target_);
+}
+
+OutputFile::~OutputFile() { discard(); }
+
+OutputFile::OutputFile(OutputFile&& other) noexcept
+    : target_(std::move(other.target_)),
+      resolved_(std::move(other.resolved_)),
+      temporary_(std::exchange(other.temporary_, {})),
+      is_device_(other.is_device_) {}
+
+OutputFile& OutputFile::operator=(OutputFile&& other) noexcept {
+  if (this == &other) return *this;
+  discard();
+  target_ = std::move(other.target_);
+  resolved_ = std::move(other.resolved_);
+  temporary_ = std::exchange(other.temporary_, {});
+  is_device_ = other.is_device_;
+  return *this;
+}
+
+void OutputFile::rethrow_for_target(std::string message) const {
+  const std::string name = temporary_.string();
+  for (std::size_t at = message.find(name); at != std::string::npos; at = message.find(name, at + 1))
+    message.replace(at, name.size(), target_.string());
+  throw std::runtime_error(message);
+}
+
+void OutputFile::commit() {
+  if (temporary_.empty()) throw std::logic_error(target_.string() + ": was committed before");
+  if (is_device_) {
+    copy_into(temporary_, resolved_);
+    discard();
+    return;
+  }
+  std::error_code error;
+  const fs::file_status old = fs::status(resolved_, error);
+  if (fs::exists(old) && !fs::is_regular_file(old)) {
+    fail(target_, "has become a folder or a device while it was written; choose another name");
+  }
+  if (fs::is_regular_file(old)) fs::permissions(temporary_, old.permissions(), error);
+  fs::rename(temporary_, resolved_, error);
+  if (error) fail(target_, fmt::format("cannot be replaced: {}", error.message()));
+  temporary_.clear();
+}
+
+void OutputFile::discard() noexcept {
+  if (temporary_.empty()) return;
+  std::error_code error;
+  fs::remove(temporary_, error);
+  temporary_.clear();
+}
+
+void commit_all(std::vector<OutputFile>& files) {
+  for (const bool devices : {true, false}) {
+    for (OutputFile& file : files) {
+      if (file.is_device() == devices) file.commit();
+    }
+  }
+}
+
+}  // namespace tensorray

@@ -1,0 +1,26 @@
+#include "integrators/bending/bending.h"
+
+namespace tensorray {
+
+const char* to_string(RayEnd end) {
+  constexpr const char* names[ray_end_count] = {"plate", "missed", "obstacle", "step_limit", "degenerate"};
+  return names[static_cast<int>(end)];
+}
+
+void RayBatch::clear() {
+  position.clear();
+  direction.clear();
+  flexibility.clear();
+  differentials.clear();
+  end.clear();
+  length.clear();
+  steps.clear();
+}
+
+void RayBatch::add(const Eigen::Vector3d& from, const Eigen::Vector3d& along, double s) {
+  position.push_back(from);
+  direction.push_back(along);
+  flexibility.push_back(s);
+}
+
+}  // namespace tensorray

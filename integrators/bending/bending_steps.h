@@ -1,0 +1,133 @@
+#pragma once
+/// @file integrators/bending/bending_steps.h
+/// One step along a bent ray, by each of the methods: a part of bending.cpp.
+
+#include <array>
+#include <cmath>
+
+#include <Eigen/Core>
+#include <Eigen/LU>
+
+#include "integrators/bending/bending.h"
+#include "integrators/bending/exponential.h"
+#include "integrators/bending/runge_kutta.h"
+#include "volumes/bricks/tensor_sampler.h"
+
+namespace tensorray::bending_steps {
+
+/// A ray at a point of its way, or (N = 3) the ray and its derivatives along two parameters. Column 0 of P and V is the
+/// ray itself, the others are the derivatives, so that a method that is linear in states carries them along as it is.
+template <int N>
+struct State {
+  Eigen::Matrix<double, 3, N> P, V;
+
+  auto position() const { return P.template leftCols<1>(); }
+  auto direction() const { return V.template leftCols<1>(); }
+};
+
+template <int N>
+State<N> operator+(const State<N>& a, const State<N>& b) {
+  return {a.P + b.P, a.V + b.V};
+}
+template <int N>
+State<N> operator*(double factor, const State<N>& a) {
+  return {factor * a.P, factor * a.V};
+}
+
+/// The field as one ray meets it.
+template <int N>
+struct Medium {
+  TensorSampler& sampler;
+  double s;
+  Eigen::Matrix3d T = Eigen::Matrix3d::Zero();  ///< As last sampled ...
+  std::array<Eigen::Matrix3d, N - 1> dT{};      ///< ... and its derivatives along the parameters.
+
+  void sample(const Eigen::Matrix<double, 3, N>& P) {
+    if constexpr (N == 1) {
+      T = sampler.at(P);
+    } else {
+      T = sampler.at(P.col(0), P.template rightCols<N - 1>(), dT);
+    }
+  }
+
+  /// T V and its derivatives, with the tensor as last sampled.
+  Eigen::Matrix<double, 3, N> apply(const Eigen::Matrix<double, 3, N>& V) const {
+    Eigen::Matrix<double, 3, N> TV = T * V;
+    for (int i = 1; i < N; ++i) TV.col(i) += dT[i - 1] * V.col(0);
+    return TV;
+  }
+
+  /// Eq. 5, in a form that is blind to the trace of T also where V is not quite a unit vector (inside a step), and its
+  /// derivatives (the variational equations).
+  State<N> derivative(const State<N>& at) {
+    sample(at.P);
+    Eigen::Matrix<double, 3, N> change = apply(at.V);
+    const Eigen::Vector3d V = at.V.col(0), TV = change.col(0);
+    const double squared = V.squaredNorm(), along = V.dot(TV) / squared;
+    change.col(0) -= along * V;
+    for (int i = 1; i < N; ++i) {
+      const Eigen::Vector3d dV = at.V.col(i), dTV = change.col(i);
+      const double change_along = (dV.dot(TV) + V.dot(dTV) - 2 * along * V.dot(dV)) / squared;
+      change.col(i) -= along * dV + change_along * V;
+    }
+    return {at.V, s * change};
+  }
+};
+
+/// Takes V to unit length (and its derivatives with it); to zero if it has no direction.
+template <int N>
+State<N> normalized(const State<N>& state) {
+  const double length = state.direction().norm();
+  if (!(length > 0) || !std::isfinite(length)) return {state.P, Eigen::Matrix<double, 3, N>::Zero()};
+  State<N> unit{state.P, state.V / length};
+  for (int i = 1; i < N; ++i) unit.V.col(i) -= unit.V.col(0).dot(unit.V.col(i)) * unit.V.col(0);
+  return unit;
+}
+
+template <int N>
+State<N> euler(Medium<N>& medium, const State<N>& from, double h) {
+  medium.sample(from.P);
+  const State<N> to = normalized<N>({from.P, from.V + medium.s * h * medium.apply(from.V)});
+  return {from.P + h * to.V, to.V};
+}
+
+template <int N>
+State<N> splitting(Medium<N>& medium, const State<N>& from, double h) {
+  const Eigen::Matrix<double, 3, N> middle = from.P + h / 2 * from.V;
+  medium.sample(middle);
+  const double factor = h * medium.s;
+  if constexpr (N == 1) {
+    const Eigen::Vector3d V = exponential_direction(factor * medium.T, from.V);
+    return {middle + h / 2 * V, V};
+  } else {
+    const State<N> to = normalized<N>(
+        {middle, exponential_derivatives(factor * medium.T, {factor * medium.dT[0], factor * medium.dT[1]}, from.V)});
+    return {middle + h / 2 * to.V, to.V};
+  }
+}
+
+/// `error` is set by the adaptive methods.
+template <int N>
+State<N> by_stages(const RungeKutta& method, Medium<N>& medium, const State<N>& from, double h, State<N>& error) {
+  std::array<State<N>, RungeKutta::most_stages> k;
+  const auto along = [&](const double* factors, int count, State<N> to) {
+    for (int j = 0; j < count; ++j)
+      if (factors[j] != 0) to = to + h * factors[j] * k[j];
+    return to;
+  };
+  for (int i = 0; i < method.stages; ++i) k[i] = medium.derivative(along(method.a[i], i, from));
+  if (method.adaptive) {
+    const auto zero = Eigen::Matrix<double, 3, N>::Zero();
+    error = along(method.error, method.stages, {zero, zero});
+  }
+  return normalized(along(method.b, method.stages, from));
+}
+
+/// A step of arc length h. `error` is set by the adaptive methods.
+template <int N>
+State<N> advance(BendingMethod method, Medium<N>& medium, const State<N>& from, double h, State<N>& error) {
+  if (const RungeKutta* const stages = runge_kutta(method)) return by_stages(*stages, medium, from, h, error);
+  return method == BendingMethod::euler ? euler(medium, from, h) : splitting(medium, from, h);
+}
+
+}  // namespace tensorray::bending_steps

@@ -1,0 +1,308 @@
+#include "integrators/bending/scalar_tracer.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "integrators/bending/step_lengths.h"
+
+namespace tensorray {
+
+using namespace bending_steps;
+
+namespace {
+
+double deviator_norm(const Eigen::Matrix3d& T) {
+  const double third = T.trace() / 3;
+  return std::sqrt(std::max(0.0, T.squaredNorm() - 3 * third * third));
+}
+
+}  // namespace
+
+/// Derivatives are those at equal arc length; from a surface on they are those of the rays' crossings of it, as a ray's
+/// direction begins, or ceases, to change there. (Where light bends on one side only, its neighbours do so earlier or
+/// later: without this the derivatives would miss a finite amount.)
+template <int N>
+void Tracer<N>::meet_surface(const Eigen::Vector3d& normal, bool bends) {
+  if constexpr (N > 1) {
+    const double approach = normal.dot(direction());
+    if (!(std::abs(approach) > 0)) return;  // Light along a surface has no crossing to speak of.
+    const State<N> flow = bends ? medium_.derivative(ray_) : State<N>{ray_.V, Eigen::Matrix<double, 3, N>::Zero()};
+    for (int i = 1; i < N; ++i) {
+      const double later = -normal.dot(ray_.P.col(i)) / approach;
+      ray_.P.col(i) += later * flow.P.col(0);
+      ray_.V.col(i) += later * flow.V.col(0);
+      length_change_[i - 1] += later;
+    }
+  }
+}
+
+/// Leaves the medium as last sampled: the steps are the same, recorded or not.
+template <int N>
+void Tracer<N>::record(bool in_field) {
+  if (recording_.track) recording_.track->push_back({position(), length_});
+  if (!recording_.way) return;
+  Waypoint here;
+  here.position = position();
+  here.direction = direction();
+  here.length = length_;
+  here.in_field = in_field;
+  if (in_field) {
+    Medium<1> medium{sampler_, medium_.s};
+    here.change = medium.derivative({here.position, here.direction}).V;
+    here.tensor = medium.T;
+  }
+  recording_.way->push_back(here);
+}
+
+/// In free space, to a surface.
+template <int N>
+void Tracer<N>::go_straight(const Hit& hit) {
+  record(false);
+  ray_.P += hit.distance * ray_.V;
+  length_ += hit.distance;
+  meet_surface(hit.normal, false);
+  record(false);
+}
+
+/// In free space, where nothing is met. Behind a cut that is still within the volume.
+template <int N>
+RayEnd Tracer<N>::miss() {
+  if (std::isfinite(settings_.max_length)) {
+    Hit end;
+    end.distance = settings_.max_length - length_;
+    go_straight(end);
+  } else if (recording_.track && field_.contains(position())) {
+    if (const auto exit = geometry_.crossing(Surface::bounds, false, position(), direction())) {
+      recording_.track->push_back({position(), length_});
+      recording_.track->push_back({position() + exit->distance * direction(), length_ + exit->distance});
+    }
+  }
+  return RayEnd::missed;
+}
+
+/// In free space: to an absorber, or to where light enters the volume, if it does. Returns nothing in that case.
+template <int N>
+std::optional<RayEnd> Tracer<N>::reach(const std::optional<Hit>& entry) {
+  const double free_way = entry ? entry->distance : Geometry::infinite;
+  const auto hit = geometry_.absorber(position(), direction(), free_way);
+  if (ends_before(hit ? hit->distance : free_way)) return miss();
+  if (hit) {
+    go_straight(*hit);
+    return end_on(hit->surface);
+  }
+  go_straight(*entry);
+  return std::nullopt;
+}
+
+/// Before the volume.
+template <int N>
+std::optional<RayEnd> Tracer<N>::reach_box() {
+  return reach(geometry_.crossing(Surface::bounds, true, position(), direction()));
+}
+
+/// In free space behind the volume, which is convex: straight light does not meet it again.
+template <int N>
+RayEnd Tracer<N>::leave() {
+  const auto hit = geometry_.absorber(position(), direction());
+  if (!hit || ends_before(hit->distance)) return miss();
+  go_straight(*hit);
+  return end_on(hit->surface);
+}
+
+/// Within the box, outside of the cut: straight on to the cut, an absorber, or out of the box. Returns nothing when
+/// light enters the cut.
+template <int N>
+std::optional<RayEnd> Tracer<N>::cross_box() {
+  const auto exit = geometry_.crossing(Surface::bounds, false, position(), direction());
+  const auto entry = geometry_.crossing(Surface::cut, true, position(), direction(), exit ? exit->distance : 0);
+  return entry ? reach(entry) : leave();
+}
+
+/// In voxels.
+template <int N>
+double Tracer<N>::automatic_step() const {
+  const double kick = std::abs(medium_.s) * deviator_norm(medium_.T) * voxel_;
+  if (kick * step_lengths::longest_automatic <= step_lengths::strongest_kick) return step_lengths::longest_automatic;
+  const double shortest = settings_.method == BendingMethod::splitting ? step_lengths::shortest_splitting : 0.0;
+  return std::max(step_lengths::strongest_kick / kick, shortest);
+}
+
+/// The nearest thing that the chord from the ray to `next` meets. `hit.distance` is along the chord.
+template <int N>
+typename Tracer<N>::Event Tracer<N>::meet(const State<N>& next, Hit& hit) const {
+  const Eigen::Vector3d from = position(), to = next.position();
+  const bool leaves_box = !field_.contains(to);
+  const bool may_absorb = geometry_.may_absorb(from, to);
+  if (!leaves_box && !may_absorb && !geometry_.has_cut()) return Event::none;
+
+  const Eigen::Vector3d chord = to - from;
+  double length = chord.norm();
+  const Eigen::Vector3d along = length > 0 ? Eigen::Vector3d(chord / length) : direction();
+  Event event = Event::none;
+  if (leaves_box) {
+    const auto exit = geometry_.crossing(Surface::bounds, false, from, along, length);
+    hit = exit ? *exit : Hit{};  // A chord so short that rounding hides the face leaves at once.
+    length = hit.distance;
+    event = Event::leaves_box;
+  }
+  if (geometry_.has_cut())
+    if (const auto exit = geometry_.crossing(Surface::cut, false, from, along, length)) {
+      hit = *exit;
+      length = hit.distance;
+      event = Event::leaves_cut;
+    }
+  if (may_absorb)
+    if (const auto absorber = geometry_.absorber(from, along, length)) {
+      hit = *absorber;
+      event = Event::absorber;
+    }
+  return event;
+}
+
+/// Repeats the step with the length that ends on the plane of `hit` (Newton's method), which keeps the order.
+/// @return that length.
+template <int N>
+double Tracer<N>::land(const State<N>& next, double h, const Hit& hit) {
+  if (hit.normal.isZero()) return 0;
+  const State<N> from = ray_;
+  const Eigen::Vector3d start = position(), chord = next.position() - start;
+  const double to_plane = hit.normal.dot(chord) / chord.norm() * hit.distance;
+  double length = h * hit.distance / chord.norm();
+  State<N> unused, landed = from;
+  for (int i = 0; i < 4; ++i) {
+    landed = step(length, unused);
+    const double gap = (to_plane - hit.normal.dot(landed.position() - start)) / hit.normal.dot(landed.direction());
+    if (!(std::abs(gap) <= h)) break;  // Light that grazes the plane.
+    if (std::abs(gap) <= 1e-10 * h || i == 3) {
+      landed.P += gap * landed.V;
+      length += gap;
+      break;
+    }
+    length = std::clamp(length + gap, 0.0, h);
+  }
+  ray_ = landed;
+  meet_surface(hit.normal, true);
+  return length;
+}
+
+/// Sets the next adaptive step from this one's error. @return the error over what is allowed.
+template <int N>
+double Tracer<N>::control_step(const State<N>& error) {
+  using namespace step_lengths;
+  const double excess = std::max(error.position().norm() / voxel_, error.direction().norm()) / settings_.tolerance;
+  const double order = runge_kutta(settings_.method)->order;
+  const double factor = safety * std::pow(std::max(excess, least_excess), -1 / order);
+  const double growth = factor > least_growth ? std::min(factor, most_growth) : least_growth;
+  const double longest = settings_.step > 0 ? settings_.step : longest_adaptive;
+  adaptive_step_ = std::clamp(adaptive_step_ * growth, shortest_adaptive, longest);
+  return excess;
+}
+
+/// Where nothing in a brick bends light, a step goes through it to a little behind it, world units. (But by Eq. 3–4,
+/// which see the trace of T.)
+template <int N>
+double Tracer<N>::next_step() {
+  const double way =
+      settings_.method == BendingMethod::euler ? 0 : sampler_.way_through_straight_brick(position(), direction());
+  const RungeKutta* const stages = runge_kutta(settings_.method);
+  if (way > 0)
+    return way + (stages ? step_lengths::past_straight_brick_by_stages : step_lengths::past_straight_brick) * voxel_;
+  if (stages && stages->adaptive) return voxel_ * adaptive_step_;
+  return voxel_ * (settings_.step == 0 ? automatic_step() : settings_.step);
+}
+
+/// In the field: step by step to an absorber, out of the box or out of the cut. Returns nothing in the last case.
+template <int N>
+std::optional<RayEnd> Tracer<N>::bend(double first_step) {
+  const RungeKutta* const stages = runge_kutta(settings_.method);
+  const bool controlled = stages && stages->adaptive;
+  voxel_ = length_of_voxel();
+  medium_.sample(ray_.P);
+  adaptive_step_ = first_step > 0 ? first_step / voxel_ : settings_.step == 0 ? automatic_step() : settings_.step;
+  record(true);
+  while (true) {
+    if (steps_ >= static_cast<std::uint32_t>(settings_.max_steps)) return RayEnd::step_limit;
+    ++steps_;
+    voxel_ = length_of_voxel();
+    const double wanted = first_step > 0 ? first_step : next_step();
+    const double rest = settings_.max_length - length_, h = std::min(wanted, rest);
+    first_step = 0;
+    State<N> error;
+    const State<N> next = step(h, error);
+    if (next.direction().isZero() || !next.position().allFinite()) return RayEnd::degenerate;
+    if (controlled && control_step(error) > 1 && wanted > step_lengths::shortest_adaptive * voxel_) continue;
+
+    Hit hit;
+    const Event event = meet(next, hit);
+    if (event == Event::none) {
+      ray_ = next;
+      length_ += h;
+      record(true);
+      if (h == rest) return RayEnd::missed;
+      continue;
+    }
+    length_ += land(next, h, hit);
+    if (direction().isZero() || !position().allFinite()) return RayEnd::degenerate;
+    record(true);
+    if (event == Event::absorber) return end_on(hit.surface);
+    if (event == Event::leaves_box) return leave();
+    return std::nullopt;
+  }
+}
+
+template <int N>
+double Tracer<N>::strength() {
+  medium_.sample(ray_.P);
+  return deviator_norm(medium_.T);
+}
+
+template <int N>
+RayEnd Tracer<N>::follow(double first_step) {
+  while (true) {
+    if (const auto end = bend(first_step)) return *end;
+    ++steps_;
+    first_step = 0;
+    if (const auto end = cross_box()) return *end;
+    ++steps_;
+  }
+}
+
+template <int N>
+std::optional<RayEnd> Tracer<N>::approach(const State<N>& start, const Recording& recording) {
+  ray_ = normalized(start);
+  recording_ = recording;
+  length_ = 0;
+  length_change_.setZero();
+  steps_ = 0;
+  if (direction().isZero() || !position().allFinite()) return RayEnd::degenerate;
+  if (!field_.contains(position()))
+    if (const auto end = reach_box()) return end;
+  if (geometry_.inside_cut(position())) return std::nullopt;
+  const auto end = cross_box();
+  if (!end) ++steps_;
+  return end;
+}
+
+template <int N>
+RayEnd Tracer<N>::trace(const State<N>& start, double flexibility, const Recording& recording) {
+  medium_.s = flexibility;
+  const auto end = approach(start, recording);
+  if (!std::isfinite(flexibility)) return RayEnd::degenerate;
+  return end ? *end : follow();
+}
+
+template <int N>
+void Tracer<N>::take_over(const State<N>& state, double flexibility, const Travelled& travelled,
+                          const Recording& recording) {
+  ray_ = state;
+  recording_ = recording;
+  medium_.s = flexibility;
+  length_ = travelled.length;
+  length_change_ = travelled.length_change;
+  steps_ = travelled.steps;
+}
+
+template class Tracer<1>;
+template class Tracer<3>;
+
+}  // namespace tensorray

@@ -1,0 +1,137 @@
+/// @file integrators/packets/packet_bricks-inl.h
+/// The bricks that a packet's lanes are in. A part of packet_kernel.cpp.
+
+// Included once for each instruction set: see Highway's foreach_target.h.
+#if defined(TENSORRAY_INTEGRATORS_PACKET_BRICKS_TOGGLE) == defined(HWY_TARGET_TOGGLE)
+#ifdef TENSORRAY_INTEGRATORS_PACKET_BRICKS_TOGGLE
+#undef TENSORRAY_INTEGRATORS_PACKET_BRICKS_TOGGLE
+#else
+#define TENSORRAY_INTEGRATORS_PACKET_BRICKS_TOGGLE
+#endif
+
+#include <hwy/highway.h>
+
+#include "integrators/packets/packet_cells-inl.h"
+
+HWY_BEFORE_NAMESPACE();
+namespace tensorray::packets::HWY_NAMESPACE {
+
+/// Finds the bricks of some lanes, given as bits.
+HWY_INLINE void find_bricks(const Medium& medium, Packet& packet, std::uint32_t wanted) {
+  while (wanted != 0) {
+    const auto first = hwy::Num0BitsBelowLS1Bit_Nonzero32(wanted);
+    const std::int32_t at[3] = {packet.brick[0][first], packet.brick[1][first], packet.brick[2][first]};
+    const TensorBrick brick = medium.brick(at);
+    std::uint32_t found = 0;
+    for (int i = 0; i < packet.vectors * lanes; i += lanes) {
+      const auto same = [&](int axis) HWY_ATTR {
+        return hn::Eq(hn::Load(ints, packet.brick[axis] + i), hn::Set(ints, at[axis]));
+      };
+      found |= to_bits(hn::RebindMask(floats, hn::And(same(0), hn::And(same(1), same(2)))), i);
+    }
+    found &= wanted;
+    wanted &= ~found;
+    for (; found != 0; found &= found - 1) {
+      const auto lane = hwy::Num0BitsBelowLS1Bit_Nonzero32(found);
+      packet.bending[lane] = brick.bending;
+      packet.strongest[lane] = brick.strongest;
+    }
+  }
+}
+
+/// Sets what follows from how strong the lanes' bricks are.
+template <bool uniform>
+HWY_INLINE void find_reach(const Medium& medium, Packet& packet) {
+  const F most = set(1e30f);
+  const F longest = set(medium.longest_step * (uniform ? 1.0f : medium.longest_voxel));
+  const bool euler = medium.settings.method == BendingMethod::euler;  // It sees the trace of T, which has no bound.
+  F greatest = hn::Zero(floats);
+  packet.straight = false;
+  for (int i = 0; i < packet.vectors * lanes; i += lanes) {
+    const F strongest = load(packet.strongest, i);
+    F reach = hn::Mul(hn::Mul(hn::Abs(load(packet.kick, i)), longest), strongest);
+    if (euler) reach = most;
+    store(reach, packet.reach, i);
+    const Mask long_steps = hn::Le(reach, set(strongest_kick));
+    store(hn::IfThenZeroElse(long_steps, load(packet.bending_rate, i)), packet.bending_rate, i);
+    greatest = hn::Max(greatest, hn::IfThenElse(hn::Le(reach, most), reach, most));  // NaN is strong.
+    packet.straight |= !euler && !hn::AllFalse(floats, hn::Eq(strongest, hn::Zero(floats)));
+  }
+  packet.greatest_reach = hn::GetLane(hn::MaxOfLanes(floats, greatest));
+  const bool weak = packet.greatest_reach <= strongest_kick;
+  packet.varied = !uniform || packet.straight || medium.adaptive || (!weak && medium.settings.step == 0);
+  packet.timed = packet.timed && !packet.varied;
+}
+
+/// Sets what follows from the lanes' bricks.
+template <bool uniform>
+HWY_INLINE void summarize(const Medium& medium, Packet& packet) {
+  find_reach<uniform>(medium, packet);
+  // A step may begin a little outside of its brick.
+  const F near = set(-medium.longest_step - 1), far = set(TensorBrick::cells + medium.longest_step + 1);
+  Mask border = hn::Lt(near, near), apart = border;
+  for (int i = 0; i < packet.vectors * lanes; i += lanes)
+    for (int axis = 0; axis < 3; ++axis) {
+      const auto brick = hn::Load(ints, packet.brick[axis] + i);
+      apart = hn::Or(apart, hn::RebindMask(floats, hn::Ne(brick, hn::Set(ints, packet.brick[axis][0]))));
+      border = hn::Or(border, hn::Or(hn::Gt(load(packet.low[axis], i), near), hn::Lt(load(packet.high[axis], i), far)));
+    }
+  packet.one_brick = hn::AllFalse(floats, apart);
+  packet.near_border = !hn::AllFalse(floats, border);
+  packet.near_surface = false;
+  if (medium.settings.meets_surface)
+    for (int lane = 0; lane < packet.vectors * lanes; ++lane) {
+      const std::int32_t at[3] = {packet.brick[0][lane], packet.brick[1][lane], packet.brick[2][lane]};
+      packet.near_surface |= medium.near_surface(at);
+    }
+  packet.watched =
+      packet.near_border || packet.near_surface || medium.bounded || !(packet.greatest_reach <= strongest_kick);
+}
+
+/// After lanes have been set: what follows from their rays.
+template <bool uniform>
+void begin(const Medium& medium, Packet& packet) {
+  for (int i = 0; i < packet.vectors * lanes; i += lanes)
+    for (int axis = 0; axis < 3; ++axis) {
+      const auto base = hn::Mul(hn::Load(ints, packet.brick[axis] + i), hn::Set(ints, TensorBrick::cells));
+      const F low = hn::ConvertTo(floats, hn::Sub(hn::Set(ints, medium.first[axis]), base));
+      const F high = hn::ConvertTo(floats, hn::Sub(hn::Set(ints, medium.last[axis]), base));
+      store(low, packet.low[axis], i);
+      store(high, packet.high[axis], i);
+      store(hn::Max(hn::Sub(high, set(1)), low), packet.last[axis], i);
+    }
+  packet.timed = false;
+  find_bricks(medium, packet, ~0u >> (packet_rays - packet.vectors * lanes));
+  summarize<uniform>(medium, packet);
+}
+
+/// Takes the lanes whose point has left their brick to the point's. `point(i)` gives those of the vector at lane i,
+/// from the lanes' bricks.
+template <bool uniform, class Point>
+HWY_INLINE void move_to_bricks(const Medium& medium, Packet& packet, const Point& point) {
+  const F zero = hn::Zero(floats), cells = set(TensorBrick::cells);
+  std::uint32_t moved = 0;
+  for (int i = 0; i < packet.vectors * lanes; i += lanes) {
+    const F3 to = point(i);
+    const F axes[3] = {to.x, to.y, to.z};
+    for (int axis = 0; axis < 3; ++axis) {
+      // The cell between the last two voxels is the last one, also for points on its far face.
+      const F cell = hn::Min(hn::Floor(axes[axis]), load(packet.last[axis], i));
+      const F bricks = hn::Floor(hn::Mul(cell, set(1.0f / TensorBrick::cells)));
+      const Mask moves = hn::Ne(bricks, zero);
+      if (hn::AllFalse(floats, moves)) continue;
+      moved |= to_bits(moves, i);
+      for (PerRay* values : {&packet.p[axis], &packet.low[axis], &packet.high[axis], &packet.last[axis]})
+        store(hn::NegMulAdd(bricks, cells, load(*values, i)), *values, i);
+      std::int32_t* const brick = packet.brick[axis] + i;
+      hn::Store(hn::Add(hn::Load(ints, brick), hn::ConvertTo(ints, bricks)), ints, brick);
+    }
+  }
+  find_bricks(medium, packet, moved);
+  summarize<uniform>(medium, packet);
+}
+
+}  // namespace tensorray::packets::HWY_NAMESPACE
+HWY_AFTER_NAMESPACE();
+
+#endif

@@ -1,0 +1,271 @@
+/// @file integrators/packets/packet_cells-inl.h
+/// Vectors with a ray in each lane, and the tensor at them. A part of packet_kernel.cpp.
+
+// Included once for each instruction set: see Highway's foreach_target.h.
+#if defined(TENSORRAY_INTEGRATORS_PACKET_CELLS_TOGGLE) == defined(HWY_TARGET_TOGGLE)
+#ifdef TENSORRAY_INTEGRATORS_PACKET_CELLS_TOGGLE
+#undef TENSORRAY_INTEGRATORS_PACKET_CELLS_TOGGLE
+#else
+#define TENSORRAY_INTEGRATORS_PACKET_CELLS_TOGGLE
+#endif
+
+#include <hwy/cache_control.h>
+#include <hwy/highway.h>
+
+HWY_BEFORE_NAMESPACE();
+namespace tensorray::packets::HWY_NAMESPACE {
+
+namespace hn = hwy::HWY_NAMESPACE;
+using Floats = hn::CappedTag<float, 16>;
+using Ints = hn::RebindToSigned<Floats>;
+using Bits = hn::RebindToUnsigned<Floats>;
+using F = hn::Vec<Floats>;
+using Mask = hn::Mask<Floats>;
+constexpr Floats floats;
+constexpr Ints ints;
+constexpr Bits bits;
+constexpr int lanes = static_cast<int>(hn::MaxLanes(Floats()));
+
+struct F3 {
+  F x, y, z;
+};
+
+/// The eight components of T − T₂₂ I, column by column.
+struct Tensor {
+  F c[8];
+};
+
+// Vectors of a packet have the number of their first lane, `at`.
+
+HWY_INLINE F set(float value) { return hn::Set(floats, value); }
+HWY_INLINE F load(const PerRay& from, int at) { return hn::Load(floats, from + at); }
+HWY_INLINE F3 load(const PerRay (&from)[3], int at) {
+  return {load(from[0], at), load(from[1], at), load(from[2], at)};
+}
+HWY_INLINE void store(F value, PerRay& to, int at) { hn::Store(value, floats, to + at); }
+HWY_INLINE void store(const F3& v, PerRay (&to)[3], int at) {
+  store(v.x, to[0], at);
+  store(v.y, to[1], at);
+  store(v.z, to[2], at);
+}
+HWY_INLINE F3 zeros() { return {hn::Zero(floats), hn::Zero(floats), hn::Zero(floats)}; }
+HWY_INLINE F3 add(const F3& a, const F3& b) { return {hn::Add(a.x, b.x), hn::Add(a.y, b.y), hn::Add(a.z, b.z)}; }
+HWY_INLINE F3 sub(const F3& a, const F3& b) { return {hn::Sub(a.x, b.x), hn::Sub(a.y, b.y), hn::Sub(a.z, b.z)}; }
+HWY_INLINE F3 mul(F s, const F3& a) { return {hn::Mul(s, a.x), hn::Mul(s, a.y), hn::Mul(s, a.z)}; }
+HWY_INLINE F3 mul_add(F s, const F3& a, const F3& b) {
+  return {hn::MulAdd(s, a.x, b.x), hn::MulAdd(s, a.y, b.y), hn::MulAdd(s, a.z, b.z)};
+}
+HWY_INLINE F dot(const F3& a, const F3& b) { return hn::MulAdd(a.x, b.x, hn::MulAdd(a.y, b.y, hn::Mul(a.z, b.z))); }
+HWY_INLINE F3 floor(const F3& a) { return {hn::Floor(a.x), hn::Floor(a.y), hn::Floor(a.z)}; }
+HWY_INLINE F3 select(Mask mask, const F3& yes, const F3& no) {
+  return {hn::IfThenElse(mask, yes.x, no.x), hn::IfThenElse(mask, yes.y, no.y), hn::IfThenElse(mask, yes.z, no.z)};
+}
+HWY_INLINE F3 clamp(const F3& p, const F3& low, const F3& high) {
+  return {hn::Min(hn::Max(p.x, low.x), high.x), hn::Min(hn::Max(p.y, low.y), high.y),
+          hn::Min(hn::Max(p.z, low.z), high.z)};
+}
+/// A bit for each lane of the packet.
+HWY_INLINE std::uint32_t to_bits(Mask mask, int at) {
+  std::uint8_t bytes[8] = {};
+  hn::StoreMaskBits(floats, mask, bytes);
+  std::uint32_t result;
+  std::memcpy(&result, bytes, sizeof result);
+  return (result & ((1u << lanes) - 1)) << at;
+}
+
+/// T V.
+HWY_INLINE F3 apply(const Tensor& T, const F3& v) {
+  return {hn::MulAdd(T.c[6], v.z, hn::MulAdd(T.c[3], v.y, hn::Mul(T.c[0], v.x))),
+          hn::MulAdd(T.c[7], v.z, hn::MulAdd(T.c[4], v.y, hn::Mul(T.c[1], v.x))),
+          hn::MulAdd(T.c[5], v.y, hn::Mul(T.c[2], v.x))};
+}
+
+/// Of a cell's corners, from its first voxel on: z changes first, then y, then x.
+constexpr int z_stride = TensorBrick::bending_floats, y_stride = TensorBrick::width * z_stride,
+              x_stride = TensorBrick::width * y_stride;
+constexpr int corners[8] = {0,
+                            z_stride,
+                            y_stride,
+                            y_stride + z_stride,
+                            x_stride,
+                            x_stride + z_stride,
+                            x_stride + y_stride,
+                            x_stride + y_stride + z_stride};
+
+/// The weights of a cell's corners at a point within it, stored. 13 operations.
+HWY_INLINE void make_weights(const F3& fraction, Packet& packet, int at) {
+  const F yz = hn::Mul(fraction.y, fraction.z);
+  const F y = hn::Sub(fraction.y, yz), z = hn::Sub(fraction.z, yz), neither = hn::Sub(hn::Sub(set(1), fraction.y), z);
+  const F of_face[4] = {neither, z, y, yz};
+  for (int i = 0; i < 4; ++i) {
+    const F far = hn::Mul(fraction.x, of_face[i]);
+    store(hn::Sub(of_face[i], far), packet.weights[i], at);
+    store(far, packet.weights[4 + i], at);
+  }
+}
+
+using Eight = hn::CappedTag<float, 8>;  // For the components of one voxel.
+constexpr Eight eight;
+constexpr int eight_lanes = static_cast<int>(hn::MaxLanes(Eight()));
+
+HWY_INLINE const float* cell_of(const Packet& packet, int lane) {
+  return packet.bending[lane] + static_cast<int>(packet.voxel[lane]) * TensorBrick::bending_floats;
+}
+
+/// The tensors of `count` vectors, one or two, whose lanes all are in one cell: each component of a corner is loaded
+/// once, goes to all lanes, and is multiplied by all vectors' weights. The same operations in the same order as in
+/// sample_own_cells.
+template <int count>
+HWY_INLINE void sample_cell(const float* HWY_RESTRICT cell, Packet& packet, int first) {
+  constexpr int together = 8 / count;  // Components: as many sums as registers hold with what they are made of.
+  for (int i = 0; i < 8; i += together) {
+    F sums[together][count], weights[count];
+#pragma GCC unroll 8
+    for (int k = 7; k >= 0; --k) {
+      for (int n = 0; n < count; ++n) weights[n] = load(packet.weights[k], first + n * lanes);
+#pragma GCC unroll 8
+      for (int j = 0; j < together; ++j) {
+        const F corner = set(cell[corners[k] + i + j]);
+        for (int n = 0; n < count; ++n)
+          sums[j][n] = k == 7 ? hn::Mul(corner, weights[n]) : hn::MulAdd(corner, weights[n], sums[j][n]);
+      }
+    }
+#pragma GCC unroll 8
+    for (int j = 0; j < together; ++j)
+      for (int n = 0; n < count; ++n) store(sums[j][n], packet.tensor[i + j], first + n * lanes);
+  }
+}
+
+/// The same of any number of vectors.
+HWY_INLINE void sample_cell(const float* cell, Packet& packet, int first, int count) {
+  for (; count > 1; count -= 2, first += 2 * lanes) sample_cell<2>(cell, packet, first);
+  if (count > 0) sample_cell<1>(cell, packet, first);
+}
+
+/// Keeps components of a lane's tensor: the first four of all lanes, then the last four.
+template <class V>
+HWY_INLINE void store_components(V values, int i, int lane, float* components) {
+  float* const first = components + (i / 4 * lanes + lane) * 4 + i % 4;
+#if HWY_TARGET != HWY_SCALAR
+  if constexpr (eight_lanes == 8) {
+    const hn::Half<Eight> four;
+    hn::Store(hn::LowerHalf(four, values), four, first);
+    return hn::Store(hn::UpperHalf(four, values), four, first + lanes * 4);
+  }
+#endif
+  hn::Store(values, eight, first);
+}
+
+/// From lane after lane to component after component.
+HWY_INLINE void transpose(const float* components, PerRay (&tensor)[8], int at) {
+  for (int half = 0; half < 2; ++half) {
+    F a, b, c, d;
+    hn::LoadInterleaved4(floats, components + half * lanes * 4, a, b, c, d);
+    store(a, tensor[4 * half], at);
+    store(b, tensor[4 * half + 1], at);
+    store(c, tensor[4 * half + 2], at);
+    store(d, tensor[4 * half + 3], at);
+  }
+}
+
+/// The tensors of a vector whose lanes are in several cells: a vector holds the components of one lane at a time.
+HWY_INLINE void sample_own_cells(Packet& packet, int at) {
+  for (int i = 0; i < 8; i += eight_lanes) {
+    for (int lane = 0; lane < lanes; ++lane) {
+      const float* const cell = cell_of(packet, at + lane) + i;
+      const auto weight = [&](int k) HWY_ATTR { return hn::Set(eight, packet.weights[k][at + lane]); };
+      auto sum = hn::Mul(hn::Load(eight, cell + corners[7]), weight(7));
+#pragma GCC unroll 8
+      for (int k = 6; k >= 0; --k) sum = hn::MulAdd(hn::Load(eight, cell + corners[k]), weight(k), sum);
+      store_components(sum, i, lane, packet.components);
+    }
+  }
+  transpose(packet.components, packet.tensor, at);
+}
+
+/// The trilinear polynomial of a cell: coefficients of 1, z, y, yz, x, xz, xy and xyz. Rays with differentials have it,
+/// as its slopes cost little more than its value.
+template <class V>
+struct Polynomial {
+  V k[8];
+};
+
+/// `c(k)` is the value at corner k.
+template <class V, class Corner>
+HWY_INLINE Polynomial<V> polynomial(const Corner& c) {
+  const V z = hn::Sub(c(1), c(0)), y = hn::Sub(c(2), c(0)), x = hn::Sub(c(4), c(0));
+  const V yz = hn::Sub(hn::Sub(c(3), c(2)), z);
+  const V far = hn::Sub(c(5), c(4)), far_y = hn::Sub(c(6), c(4));
+  const V xyz = hn::Sub(hn::Sub(hn::Sub(c(7), c(6)), far), yz);
+  return {{c(0), z, y, yz, x, hn::Sub(far, z), hn::Sub(far_y, y), xyz}};
+}
+
+/// Of the components from `cell` on.
+HWY_INLINE Polynomial<hn::Vec<Eight>> cell_polynomial(const float* cell) {
+  return polynomial<hn::Vec<Eight>>([&](int k) HWY_ATTR { return hn::Load(eight, cell + corners[k]); });
+}
+
+/// A value and its slopes.
+template <class V>
+struct Slopes {
+  V value, x, y, z;
+};
+
+template <class V>
+HWY_INLINE Slopes<V> evaluate(const Polynomial<V>& p, V x, V y, V z) {
+  const V y_near = hn::MulAdd(p.k[3], z, p.k[2]), y_far = hn::MulAdd(p.k[7], z, p.k[6]);
+  const V near = hn::MulAdd(y_near, y, hn::MulAdd(p.k[1], z, p.k[0]));
+  const V slope = hn::MulAdd(y_far, y, hn::MulAdd(p.k[5], z, p.k[4]));
+  return {hn::MulAdd(slope, x, near), slope, hn::MulAdd(y_far, x, y_near),
+          hn::MulAdd(hn::MulAdd(p.k[7], y, p.k[5]), x, hn::MulAdd(p.k[3], y, p.k[1]))};
+}
+
+/// The tensors and their slopes of a vector whose lanes are in one cell.
+HWY_INLINE void sample_slopes(const float* cell, Packet& packet, int at) {
+  alignas(64) float coefficients[8][8];
+  for (int i = 0; i < 8; i += eight_lanes) {
+    const auto polynomial = cell_polynomial(cell + i);
+    for (int k = 0; k < 8; ++k) hn::Store(polynomial.k[k], eight, coefficients[k] + i);
+  }
+  const F3 fraction = load(packet.fraction, at);
+  for (int c = 0; c < 8; ++c) {
+    Polynomial<F> polynomial;
+    for (int k = 0; k < 8; ++k) polynomial.k[k] = set(coefficients[k][c]);
+    const Slopes<F> sampled = evaluate(polynomial, fraction.x, fraction.y, fraction.z);
+    store(sampled.value, packet.tensor[c], at);
+    store(sampled.x, packet.slopes[0][c], at);
+    store(sampled.y, packet.slopes[1][c], at);
+    store(sampled.z, packet.slopes[2][c], at);
+  }
+}
+
+/// The same of a vector whose lanes are in several cells.
+HWY_INLINE void sample_own_slopes(Packet& packet, int at) {
+  alignas(64) float components[4][lanes * 8];
+  for (int i = 0; i < 8; i += eight_lanes) {
+    for (int lane = 0; lane < lanes; ++lane) {
+      const float* const cell = cell_of(packet, at + lane) + i;
+      const auto fraction = [&](int axis) HWY_ATTR { return hn::Set(eight, packet.fraction[axis][at + lane]); };
+      const auto sampled = evaluate(cell_polynomial(cell), fraction(0), fraction(1), fraction(2));
+      store_components(sampled.value, i, lane, components[0]);
+      store_components(sampled.x, i, lane, components[1]);
+      store_components(sampled.y, i, lane, components[2]);
+      store_components(sampled.z, i, lane, components[3]);
+    }
+  }
+  transpose(components[0], packet.tensor, at);
+  for (int axis = 0; axis < 3; ++axis) transpose(components[1 + axis], packet.slopes[axis], at);
+}
+
+/// Asks for the memory of a cell.
+HWY_INLINE void prefetch_cell(const float* cell) {
+  for (const int edge : {0, y_stride, x_stride, x_stride + y_stride}) {
+    hwy::Prefetch(cell + edge);
+    hwy::Prefetch(cell + edge + z_stride);
+  }
+}
+
+}  // namespace tensorray::packets::HWY_NAMESPACE
+HWY_AFTER_NAMESPACE();
+
+#endif

@@ -1,0 +1,458 @@
+#include "integrators/packets/packet_kernel.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstring>
+#include <stdexcept>
+
+#include "integrators/packets/packet_medium.h"
+
+// Compiled once for each instruction set, of which the processor's best is chosen at run time.
+#undef HWY_TARGET_INCLUDE
+#define HWY_TARGET_INCLUDE "integrators/packets/packet_kernel.cpp"  // NOLINT
+// Vectors are members of structs here, which those whose size is not known when compiling cannot be.
+#define HWY_DISABLED_TARGETS (HWY_SSSE3 | HWY_SVE | HWY_SVE2 | HWY_SVE_256 | HWY_SVE2_128 | HWY_RVV)
+#include <hwy/foreach_target.h>  // IWYU pragma: keep
+// Must come after it:
+#include <hwy/highway.h>
+
+#include "integrators/packets/packet_landing-inl.h"
+#include "integrators/packets/packet_stages-inl.h"
+
+#if defined(__SSE__)
+#include <xmmintrin.h>
+#endif
+
+HWY_BEFORE_NAMESPACE();
+namespace tensorray::packets::HWY_NAMESPACE {
+
+/// The kernel, for voxels that are cubes along the axes (`uniform`) or any others, and for rays with or without
+/// differentials.
+template <bool uniform, bool differentials>
+class Kernel {
+ public:
+  Kernel(const Medium& medium, KernelRays& batch) : medium_(medium), rays_(batch.rays), batch_(batch) {}
+
+  std::uint64_t run();
+
+ private:
+  // Packets that are stepped in turn: as many vectors as the processor needs to have work while one waits for another.
+  static constexpr int in_flight = lanes > 8 ? 2 : 1;
+
+  void fill(Packet& packet);
+  void enter(Packet& packet, int lane);
+  static void copy_lane(const Packet& from, int of, Packet& to, int lane);
+  void close_ranks(Packet& packet);
+  void step_split(Packet& packet);
+  void step_watched(Packet& packet);
+  void step_otherwise(Packet& packet);
+  void attempt(Packet& packet);
+  void end_step(Packet& packet, std::uint32_t staying, std::uint32_t stop);
+  std::uint32_t outside(const Packet& packet, const PerRay (&points)[3]) const;
+  std::uint32_t stopped(const Packet& packet) const;
+  std::uint32_t spent(const Packet& packet) const;
+  void locate_on_extent(Packet& packet);
+  void take_out(Packet& packet, std::uint32_t stop, std::uint32_t leave);
+  void keep_points(const Packet& packet, std::uint32_t which);
+  unsigned samples_per_step() const { return medium_.stages ? medium_.stages->stages : 1; }
+  float to_world() const { return uniform ? medium_.voxel : 1.0f; }  // Of what u is per.
+  void land(Packet& packet);
+  void arrive(Packet& packet, const Landing& landing);
+
+  const Medium& medium_;
+  std::vector<KernelRay>& rays_;
+  KernelRays& batch_;
+  std::size_t next_ = 0;  // The first ray that no packet has held yet.
+  std::uint64_t samples_ = 0;
+  Packet packets_[in_flight];
+  Packet leaving_[in_flight];  // Rays of these that leave the extent, as before their last step.
+};
+
+/// Brings a ray into a lane.
+template <bool uniform, bool differentials>
+void Kernel<uniform, differentials>::enter(Packet& packet, int lane) {
+  const KernelRay& ray = rays_[packet.ray[lane]];
+  for (int axis = 0; axis < 3; ++axis) {
+    packet.p[axis][lane] = ray.position[axis];
+    packet.v[axis][lane] = ray.direction[axis];
+    packet.brick[axis][lane] = ray.brick[axis];
+    if constexpr (differentials)
+      for (int i = 0; i < 2; ++i) {
+        packet.dp[i][axis][lane] = batch_.differentials[packet.ray[lane]].position[i][axis];
+        packet.dv[i][axis][lane] = batch_.differentials[packet.ray[lane]].direction[i][axis];
+      }
+  }
+  packet.kick[lane] = uniform ? ray.flexibility * medium_.voxel : ray.flexibility;
+  packet.bending_rate[lane] = std::fabs(packet.kick[lane]) * ray.norm;
+  packet.wanted[lane] = medium_.settings.step;
+  packet.length[lane] = 0;
+}
+
+/// Copies what a ray is, but for what follows from its brick (see `begin`).
+template <bool uniform, bool differentials>
+void Kernel<uniform, differentials>::copy_lane(const Packet& from, int of, Packet& to, int lane) {
+  for (int axis = 0; axis < 3; ++axis) {
+    to.p[axis][lane] = from.p[axis][of];
+    to.v[axis][lane] = from.v[axis][of];
+    if constexpr (!uniform) to.u[axis][lane] = from.u[axis][of];
+    to.brick[axis][lane] = from.brick[axis][of];
+    if constexpr (differentials)
+      for (int i = 0; i < 2; ++i) {
+        to.dp[i][axis][lane] = from.dp[i][axis][of];
+        to.dv[i][axis][lane] = from.dv[i][axis][of];
+      }
+  }
+  to.kick[lane] = from.kick[of];
+  to.length[lane] = from.length[of];
+  to.bending_rate[lane] = from.bending_rate[of];
+  to.time[lane] = from.time[of];
+  to.wanted[lane] = from.wanted[of];
+  to.ray[lane] = from.ray[of];
+}
+
+/// Brings the rays that go on to the front if that frees a vector, and lets the other lanes repeat one of them.
+template <bool uniform, bool differentials>
+void Kernel<uniform, differentials>::close_ranks(Packet& packet) {
+  const int count = static_cast<int>(hwy::PopCount(packet.alive));
+  if (count <= (packet.vectors - 1) * lanes) {
+    int to = 0;
+    for (std::uint32_t rest = packet.alive; rest != 0; rest &= rest - 1, ++to) {
+      const int lane = static_cast<int>(hwy::Num0BitsBelowLS1Bit_Nonzero32(rest));
+      if (to != lane) copy_lane(packet, lane, packet, to);
+    }
+    packet.vectors = (count + lanes - 1) / lanes;
+    packet.alive = ~0u >> (packet_rays - count);
+  }
+  const int of = static_cast<int>(hwy::Num0BitsBelowLS1Bit_Nonzero32(packet.alive));
+  for (int lane = 0; lane < packet.vectors * lanes; ++lane)
+    if (!(packet.alive >> lane & 1)) copy_lane(packet, of, packet, lane);
+  begin<uniform>(medium_, packet);
+}
+
+template <bool uniform, bool differentials>
+void Kernel<uniform, differentials>::fill(Packet& packet) {
+  if (next_ == rays_.size()) return;
+  const int count = static_cast<int>(std::min<std::size_t>(packet_rays, rays_.size() - next_));
+  packet.alive = ~0u >> (packet_rays - count);
+  packet.vectors = packet_rays / lanes;
+  packet.clamps = medium_.clamps;
+  packet.steps = 0;
+  packet.most_steps = medium_.settings.max_steps;
+  for (int lane = 0; lane < count; ++lane) {
+    packet.ray[lane] = static_cast<std::int32_t>(next_++);
+    enter(packet, lane);
+    packet.most_steps = std::min(packet.most_steps, medium_.settings.max_steps - rays_[packet.ray[lane]].steps);
+  }
+  if constexpr (!uniform)
+    for (int i = 0; i < packet_rays; i += lanes)
+      store(index_direction<uniform>(medium_, load(packet.v, i)), packet.u, i);
+  if (medium_.adaptive && medium_.settings.step == 0) begin_steps<uniform>(medium_, packet);
+  if (count < packet_rays)
+    close_ranks(packet);
+  else
+    begin<uniform>(medium_, packet);
+}
+
+/// The lanes whose points are beyond the extent, as bits.
+template <bool uniform, bool differentials>
+HWY_INLINE std::uint32_t Kernel<uniform, differentials>::outside(const Packet& packet,
+                                                                 const PerRay (&points)[3]) const {
+  std::uint32_t result = 0;
+  for (int i = 0; i < packet.vectors * lanes; i += lanes)
+    for (int axis = 0; axis < 3; ++axis) {
+      const F x = load(points[axis], i), margin = set(medium_.margin[axis]);
+      result |= to_bits(hn::Or(hn::Lt(hn::Add(x, margin), load(packet.low[axis], i)),
+                               hn::Gt(hn::Sub(x, margin), load(packet.high[axis], i))),
+                        i);
+    }
+  return result;
+}
+
+/// The lanes that cannot take this step, as bits.
+template <bool uniform, bool differentials>
+HWY_NOINLINE std::uint32_t Kernel<uniform, differentials>::stopped(const Packet& packet) const {
+  std::uint32_t stop = 0;
+  for (int i = 0; i < packet.vectors * lanes; i += lanes) {
+    const F3 v = load(packet.v_next, i);
+    stop |= to_bits(hn::Not(hn::Gt(dot(v, v), set(0.5f))), i);  // No direction to go in.
+  }
+  if (!packet.near_surface && !medium_.bounded) return stop;
+  for (std::uint32_t rest = packet.alive; rest != 0; rest &= rest - 1) {
+    const auto lane = hwy::Num0BitsBelowLS1Bit_Nonzero32(rest);
+    const float before = static_cast<float>(rays_[packet.ray[lane]].length);  // Of the way to the field.
+    const float length = (packet.length[lane] + packet.time[lane]) * to_world() + before;
+    bool stops = length >= medium_.settings.max_length;
+    if (packet.near_surface) {
+      double from[3], until[3];
+      for (int axis = 0; axis < 3; ++axis) {
+        const double base = double{TensorBrick::cells} * packet.brick[axis][lane];
+        from[axis] = base + packet.p[axis][lane];
+        until[axis] = base + packet.p_next[axis][lane];
+      }
+      stops |= medium_.meets_surface(from, until);
+    }
+    if (stops) stop |= 1u << lane;
+  }
+  return stop;
+}
+
+/// The lanes that may take no further step, as bits: those of light that has come through a cut have taken more.
+template <bool uniform, bool differentials>
+HWY_NOINLINE std::uint32_t Kernel<uniform, differentials>::spent(const Packet& packet) const {
+  std::uint32_t result = 0;
+  for (std::uint32_t rest = packet.alive; rest != 0; rest &= rest - 1) {
+    const auto lane = hwy::Num0BitsBelowLS1Bit_Nonzero32(rest);
+    if (rays_[packet.ray[lane]].steps + packet.steps >= medium_.settings.max_steps) result |= 1u << lane;
+  }
+  return result;
+}
+
+/// Takes the middles of steps that lie beyond the extent to the nearest points on it, where the tensor is that of the
+/// outermost voxels. Light may turn back into the extent from there.
+template <bool uniform, bool differentials>
+HWY_NOINLINE void Kernel<uniform, differentials>::locate_on_extent(Packet& packet) {
+  packet.clamps = true;
+  locate_middles<uniform, differentials>(medium_, packet);
+  interpolate<uniform, differentials>(medium_, packet);
+  packet.clamps = medium_.clamps;
+}
+
+/// Hands the rays of some lanes on, as they are before the step.
+template <bool uniform, bool differentials>
+HWY_NOINLINE void Kernel<uniform, differentials>::take_out(Packet& packet, std::uint32_t stop, std::uint32_t leave) {
+  Packet& leaving = leaving_[&packet - packets_];
+  for (std::uint32_t rest = stop | leave; rest != 0; rest &= rest - 1) {
+    const int lane = static_cast<int>(hwy::Num0BitsBelowLS1Bit_Nonzero32(rest));
+    KernelRay& ray = rays_[packet.ray[lane]];
+    for (int axis = 0; axis < 3; ++axis) {
+      ray.brick[axis] = packet.brick[axis][lane];
+      ray.position[axis] = packet.p[axis][lane];
+      ray.direction[axis] = packet.v[axis][lane];
+      if constexpr (differentials)
+        for (int i = 0; i < 2; ++i) {
+          batch_.differentials[packet.ray[lane]].position[i][axis] = packet.dp[i][axis][lane];
+          batch_.differentials[packet.ray[lane]].direction[i][axis] = packet.dv[i][axis][lane];
+        }
+    }
+    ray.length += double{packet.length[lane]} * to_world();
+    ray.step = packet.time[lane] * to_world();
+    ray.steps += packet.steps;
+    packet.alive &= ~(1u << lane);
+    if (!(leave >> lane & 1)) continue;
+    copy_lane(packet, lane, leaving, static_cast<int>(hwy::PopCount(leaving.alive)));
+    leaving.alive = leaving.alive << 1 | 1;
+  }
+}
+
+template <bool uniform, bool differentials>
+HWY_NOINLINE void Kernel<uniform, differentials>::keep_points(const Packet& packet, std::uint32_t which) {
+  for (std::uint32_t rest = which; rest != 0; rest &= rest - 1) {
+    const auto lane = hwy::Num0BitsBelowLS1Bit_Nonzero32(rest);
+    const KernelRay& ray = rays_[packet.ray[lane]];
+    KernelPoint point;
+    for (int axis = 0; axis < 3; ++axis) {
+      point.brick[axis] = packet.brick[axis][lane];
+      point.position[axis] = packet.p[axis][lane];
+      point.direction[axis] = packet.v[axis][lane];
+    }
+    point.length = ray.length + double{packet.length[lane]} * to_world();
+    batch_.points[packet.ray[lane]].push_back(point);
+  }
+}
+
+/// From the positions after a step. Takes out rays that it ends, as they were before it: those of `stop` and others,
+/// but for those that are `staying`.
+template <bool uniform, bool differentials>
+void Kernel<uniform, differentials>::end_step(Packet& packet, std::uint32_t staying, std::uint32_t stop) {
+  std::uint32_t leave = 0;
+  if (packet.near_border) leave = outside(packet, packet.p_next) & ~staying;
+  const bool may_fail = medium_.settings.method != BendingMethod::splitting;
+  if (may_fail || packet.near_surface || medium_.bounded || !(packet.greatest_reach <= strongest_kick))
+    stop |= stopped(packet) & ~staying;
+  if (packet.steps >= packet.most_steps) stop |= spent(packet);
+  if constexpr (differentials) {  // Those of a crossing are the reference's.
+    stop |= leave;
+    leave = 0;
+  }
+  stop &= packet.alive;
+  leave &= packet.alive & ~stop;
+  if ((stop | leave) != 0) take_out(packet, stop, leave);
+  for (int i = 0; i < packet.vectors * lanes; i += lanes) {
+    store(load(packet.p_next, i), packet.p, i);
+    store(load(packet.v_next, i), packet.v, i);
+    if constexpr (!uniform) store(load(packet.u_next, i), packet.u, i);
+    store(hn::Add(load(packet.length, i), load(packet.time, i)), packet.length, i);
+    if constexpr (differentials)
+      for (int k = 0; k < 2; ++k) {
+        store(load(packet.dp_next[k], i), packet.dp[k], i);
+        store(load(packet.dv_next[k], i), packet.dv[k], i);
+      }
+  }
+  ++packet.steps;
+  if (!batch_.points.empty()) keep_points(packet, packet.alive & ~staying);
+  if ((stop | leave) != 0 && packet.alive != 0) close_ranks(packet);
+}
+
+/// A step that may end rays.
+template <bool uniform, bool differentials>
+HWY_NOINLINE void Kernel<uniform, differentials>::step_watched(Packet& packet) {
+  if (packet.near_border && (outside(packet, packet.middle) & packet.alive) != 0) locate_on_extent(packet);
+  take_step<uniform, differentials>(medium_, packet, packet.p_next, packet.v_next, packet.u_next);
+  end_step(packet, 0, 0);
+}
+
+template <bool uniform, bool differentials>
+HWY_INLINE void Kernel<uniform, differentials>::step_split(Packet& packet) {
+  locate_middles<uniform, differentials>(medium_, packet);
+  interpolate<uniform, differentials>(medium_, packet);
+  samples_ += hwy::PopCount(packet.alive);
+  if (differentials || HWY_UNLIKELY(packet.watched || packet.steps >= packet.most_steps)) return step_watched(packet);
+  take_step<uniform, differentials>(medium_, packet, packet.p, packet.v, packet.u);
+  for (int i = 0; i < packet.vectors * lanes; i += lanes)
+    store(hn::Add(load(packet.length, i), load(packet.time, i)), packet.length, i);
+  ++packet.steps;
+  if (HWY_UNLIKELY(!batch_.points.empty())) keep_points(packet, packet.alive);
+}
+
+/// To the positions after a step as long as `time` says. May take lanes to other bricks.
+template <bool uniform, bool differentials>
+void Kernel<uniform, differentials>::attempt(Packet& packet) {
+  if (medium_.stages) return step_by_stages<uniform, differentials>(medium_, packet);
+  if (medium_.settings.method == BendingMethod::euler) return step_by_euler<uniform, differentials>(medium_, packet);
+  locate_middles<uniform, differentials>(medium_, packet);
+  interpolate<uniform, differentials>(medium_, packet);
+  take_step<uniform, differentials>(medium_, packet, packet.p_next, packet.v_next, packet.u_next);
+}
+
+/// A step by another method than splitting.
+template <bool uniform, bool differentials>
+HWY_NOINLINE void Kernel<uniform, differentials>::step_otherwise(Packet& packet) {
+  const std::uint32_t stop = too_short<uniform>(packet);
+  attempt(packet);
+  samples_ += hwy::PopCount(packet.alive) * samples_per_step();
+  const std::uint32_t staying = medium_.adaptive ? control_steps<uniform, differentials>(medium_, packet) : 0;
+  end_step(packet, staying, stop);
+}
+
+/// The step that leaves the extent, repeated with the length that ends on its face (Newton's method).
+template <bool uniform, bool differentials>
+HWY_NOINLINE void Kernel<uniform, differentials>::land(Packet& packet) {
+  packet.vectors = packet_rays / lanes;
+  close_ranks(packet);
+  packet.clamps = true;
+  Landing landing;
+  attempt(packet);
+  aim(medium_, packet, landing);
+  for (int n = 0; n < landing_steps; ++n) {
+    attempt(packet);
+    if (n < landing_steps - 1)
+      improve<uniform>(medium_, packet, landing);
+    else
+      touch_down<uniform>(medium_, packet, landing);
+  }
+  arrive(packet, landing);
+}
+
+/// Hands rays on that are on the extent's faces.
+template <bool uniform, bool differentials>
+void Kernel<uniform, differentials>::arrive(Packet& packet, const Landing& landing) {
+  for (std::uint32_t rest = packet.alive; rest != 0; rest &= rest - 1) {
+    const auto lane = hwy::Num0BitsBelowLS1Bit_Nonzero32(rest);
+    KernelRay& ray = rays_[packet.ray[lane]];
+    for (int axis = 0; axis < 3; ++axis) {
+      ray.brick[axis] = packet.brick[axis][lane];
+      ray.position[axis] = packet.p_next[axis][lane];
+      ray.direction[axis] = packet.v_next[axis][lane];
+    }
+    ray.axis = static_cast<std::int8_t>(landing.axis[lane]);
+    ray.length += double{packet.time[lane]} * to_world();
+    ++ray.steps;
+    samples_ += (1 + landing_steps) * samples_per_step();
+  }
+  packet.alive = 0;
+}
+
+template <bool uniform, bool differentials>
+std::uint64_t Kernel<uniform, differentials>::run() {
+  const bool otherwise = medium_.settings.method != BendingMethod::splitting;
+  for (Packet& packet : packets_) fill(packet);
+  for (bool busy = true; busy;) {
+    busy = false;
+    for (Packet& packet : packets_) {
+      if (packet.alive == 0) continue;
+      busy = true;
+      if (HWY_UNLIKELY(!packet.timed)) find_times<uniform>(medium_, packet);
+      if (HWY_UNLIKELY(otherwise))
+        step_otherwise(packet);
+      else
+        step_split(packet);
+      if (HWY_LIKELY(packet.alive != 0)) continue;
+      Packet& leaving = leaving_[&packet - packets_];
+      if (leaving.alive != 0) land(leaving);
+      fill(packet);
+    }
+  }
+  return samples_;
+}
+
+std::uint64_t trace(const Medium& medium, KernelRays& batch) {
+  if (!batch.differentials.empty())
+    return medium.uniform ? Kernel<true, true>(medium, batch).run() : Kernel<false, true>(medium, batch).run();
+  return medium.uniform ? Kernel<true, false>(medium, batch).run() : Kernel<false, false>(medium, batch).run();
+}
+
+int vector_lanes() { return lanes; }
+
+}  // namespace tensorray::packets::HWY_NAMESPACE
+HWY_AFTER_NAMESPACE();
+
+#if HWY_ONCE
+namespace tensorray::packets {
+
+HWY_EXPORT(trace);
+HWY_EXPORT(vector_lanes);
+
+namespace {
+
+#if defined(__SSE__)
+/// Tiny numbers count as zero while it lives: arithmetic with them is many times slower.
+class WithoutDenormals {
+ public:
+  WithoutDenormals() { _mm_setcsr(before_ | 0x8040); }
+  ~WithoutDenormals() { _mm_setcsr(before_); }
+  WithoutDenormals(const WithoutDenormals&) = delete;
+  WithoutDenormals& operator=(const WithoutDenormals&) = delete;
+
+ private:
+  const unsigned before_ = _mm_getcsr();
+};
+#else
+struct WithoutDenormals {};
+#endif
+
+}  // namespace
+
+std::uint64_t run(const TensorField& field, const KernelSettings& settings, KernelRays& batch) {
+  const Medium medium(field, settings);
+  [[maybe_unused]] const WithoutDenormals guard;
+  return HWY_DYNAMIC_DISPATCH(trace)(medium, batch);
+}
+
+std::vector<std::string> instruction_sets() {
+  std::vector<std::string> names;
+  for (const std::int64_t target : hwy::SupportedAndGeneratedTargets()) names.push_back(hwy::TargetName(target));
+  return names;
+}
+
+void use_instruction_set(const std::string& name) {
+  hwy::SetSupportedTargetsForTest(0);
+  if (name.empty()) return;
+  for (const std::int64_t target : hwy::SupportedAndGeneratedTargets())
+    if (name == hwy::TargetName(target)) return hwy::SetSupportedTargetsForTest(target);
+  throw std::invalid_argument("this processor has no instruction set \"" + name + "\"");
+}
+
+int lane_count() { return HWY_DYNAMIC_DISPATCH(vector_lanes)(); }
+
+}  // namespace tensorray::packets
+#endif

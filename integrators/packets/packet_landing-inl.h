@@ -1,0 +1,86 @@
+/// @file integrators/packets/packet_landing-inl.h
+/// The last step of rays in the extent, which ends on its face. A part of packet_kernel.cpp.
+
+// Included once for each instruction set: see Highway's foreach_target.h.
+#if defined(TENSORRAY_INTEGRATORS_PACKET_LANDING_TOGGLE) == defined(HWY_TARGET_TOGGLE)
+#ifdef TENSORRAY_INTEGRATORS_PACKET_LANDING_TOGGLE
+#undef TENSORRAY_INTEGRATORS_PACKET_LANDING_TOGGLE
+#else
+#define TENSORRAY_INTEGRATORS_PACKET_LANDING_TOGGLE
+#endif
+
+#include <hwy/highway.h>
+
+#include "integrators/packets/packet_steps-inl.h"
+
+HWY_BEFORE_NAMESPACE();
+namespace tensorray::packets::HWY_NAMESPACE {
+
+/// Of rays that take their last step: the whole step, which is too long, its chord, and the axis that they leave along.
+struct alignas(64) Landing {
+  PerRay longest, chord[3], axis;
+};
+
+/// Where the extent's face across an axis is that rays along `chord` leave through.
+HWY_INLINE F face(const Medium& medium, const Packet& packet, const Landing& landing, int axis, int at) {
+  const F margin = set(medium.margin[axis]);
+  return hn::IfThenElse(hn::Gt(load(landing.chord[axis], at), hn::Zero(floats)),
+                        hn::Add(load(packet.high[axis], at), margin), hn::Sub(load(packet.low[axis], at), margin));
+}
+
+/// Finds the face that the whole step's chord meets, and about how long a step ends there.
+HWY_NOINLINE void aim(const Medium& medium, Packet& packet, Landing& landing) {
+  const F zero = hn::Zero(floats), one = set(1);
+  for (int i = 0; i < packet.vectors * lanes; i += lanes) {
+    const F longest = load(packet.time, i);
+    store(longest, landing.longest, i);
+    store(sub(load(packet.p_next, i), load(packet.p, i)), landing.chord, i);
+    const auto part = [&](int axis) HWY_ATTR {
+      const F along = load(landing.chord[axis], i);
+      const F gap = hn::Sub(face(medium, packet, landing, axis, i), load(packet.p[axis], i));
+      return hn::IfThenElse(hn::Gt(hn::Abs(along), zero), hn::Div(gap, along), set(1e30f));
+    };
+    const F x = part(0), y = part(1), z = part(2), nearest = hn::Min(hn::Min(x, y), z);
+    store(hn::IfThenElse(hn::Eq(x, nearest), zero, hn::IfThenElse(hn::Eq(y, nearest), one, set(2))), landing.axis, i);
+    store(hn::Mul(longest, hn::Min(hn::Max(nearest, zero), one)), packet.time, i);
+  }
+}
+
+/// How much longer, to first order, steps must be that end on the faces; 0 of light that grazes its face.
+template <bool uniform>
+HWY_INLINE F rest_of_way(const Medium& medium, const Packet& packet, const Landing& landing, int at) {
+  const F zero = hn::Zero(floats), axis = load(landing.axis, at);
+  const auto of_axis = [&](F a, F b, F c) HWY_ATTR {
+    return hn::IfThenElse(hn::Eq(axis, zero), a, hn::IfThenElse(hn::Eq(axis, set(1)), b, c));
+  };
+  const auto on_face = [&](int k) HWY_ATTR { return face(medium, packet, landing, k, at); };
+  const F3 to = load(packet.p_next, at), u = uniform ? load(packet.v_next, at) : load(packet.u_next, at);
+  const F gap = hn::Sub(of_axis(on_face(0), on_face(1), on_face(2)), of_axis(to.x, to.y, to.z));
+  const F rest = hn::Div(gap, of_axis(u.x, u.y, u.z));
+  return hn::IfThenElseZero(hn::Le(hn::Abs(rest), load(landing.longest, at)), rest);
+}
+
+/// A step of Newton's method for the steps' lengths.
+template <bool uniform>
+HWY_NOINLINE void improve(const Medium& medium, Packet& packet, const Landing& landing) {
+  for (int i = 0; i < packet.vectors * lanes; i += lanes) {
+    const F time = hn::Add(load(packet.time, i), rest_of_way<uniform>(medium, packet, landing, i));
+    store(hn::Min(hn::Max(time, hn::Zero(floats)), load(landing.longest, i)), packet.time, i);
+  }
+}
+
+/// Straight on to the faces.
+template <bool uniform>
+HWY_NOINLINE void touch_down(const Medium& medium, Packet& packet, const Landing& landing) {
+  for (int i = 0; i < packet.vectors * lanes; i += lanes) {
+    const F rest = rest_of_way<uniform>(medium, packet, landing, i);
+    const F3 u = uniform ? load(packet.v_next, i) : load(packet.u_next, i);
+    store(mul_add(rest, u, load(packet.p_next, i)), packet.p_next, i);
+    store(hn::Add(load(packet.time, i), rest), packet.time, i);
+  }
+}
+
+}  // namespace tensorray::packets::HWY_NAMESPACE
+HWY_AFTER_NAMESPACE();
+
+#endif

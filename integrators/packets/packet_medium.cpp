@@ -1,0 +1,47 @@
+#include "integrators/packets/packet_medium.h"
+
+#include <cmath>
+
+#include <Eigen/Geometry>
+
+namespace tensorray::packets {
+
+Medium::Medium(const TensorField& field_, const KernelSettings& settings_) : field(field_), settings(settings_) {
+  const Eigen::Matrix3d M = field.to_index().linear();
+  uniform = M == Eigen::Matrix3d(M(0, 0) * Eigen::Matrix3d::Identity()) && M(0, 0) > 0;
+  voxel = static_cast<float>(1 / M(0, 0));
+  const Eigen::Matrix3d to_world = field.to_world().linear();
+  longest_voxel = static_cast<float>(to_world.norm());  // Not less than the greatest singular value.
+  for (int row = 0; row < 3; ++row)
+    for (int column = 0; column < 3; ++column) to_index[row][column] = static_cast<float>(M(row, column));
+  for (int axis = 0; axis < 3; ++axis) {
+    first[axis] = static_cast<std::int32_t>(field.voxels().min()[axis]);
+    last[axis] = static_cast<std::int32_t>(field.voxels().max()[axis]);
+    slope[axis] = field.voxels().sizes()[axis] > 0 ? 1.0f : 0.0f;
+    margin[axis] = static_cast<float>(field.index_bounds().max()[axis] - field.voxels().max()[axis]);
+  }
+  flat = (field.voxels().sizes().array() == 0).any();
+  stages = runge_kutta(settings.method);
+  adaptive = stages && stages->adaptive;
+  clamps = flat || settings.method != BendingMethod::splitting;
+  const double automatic = adaptive ? step_lengths::longest_adaptive : step_lengths::longest_automatic;
+  longest_step = settings.step > 0 ? settings.step : static_cast<float>(automatic);
+  past_straight_brick =
+      static_cast<float>(stages ? step_lengths::past_straight_brick_by_stages : step_lengths::past_straight_brick);
+  bounded = std::isfinite(settings.max_length);
+}
+
+bool Medium::near_surface(const std::int32_t at[3]) const {
+  if (!settings.meets_surface) return false;
+  const Eigen::Vector3d first_voxel = TensorBrick::cells * Eigen::Vector3d(at[0], at[1], at[2]);
+  const Eigen::Vector3d margin_around = Eigen::Vector3d::Constant(longest_step + 1);
+  return settings.surfaces.intersects(
+      {first_voxel - margin_around, first_voxel + Eigen::Vector3d::Constant(TensorBrick::cells) + margin_around});
+}
+
+bool Medium::meets_surface(const double from[3], const double to[3]) const {
+  return settings.meets_surface(field.to_world() * Eigen::Vector3d(from[0], from[1], from[2]),
+                                field.to_world() * Eigen::Vector3d(to[0], to[1], to[2]));
+}
+
+}  // namespace tensorray::packets

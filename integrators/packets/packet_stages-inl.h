@@ -1,0 +1,279 @@
+/// @file integrators/packets/packet_stages-inl.h
+/// Steps of the methods other than splitting, from p and v to p_next and v_next. A part of packet_kernel.cpp.
+
+// Included once for each instruction set: see Highway's foreach_target.h.
+#if defined(TENSORRAY_INTEGRATORS_PACKET_STAGES_TOGGLE) == defined(HWY_TARGET_TOGGLE)
+#ifdef TENSORRAY_INTEGRATORS_PACKET_STAGES_TOGGLE
+#undef TENSORRAY_INTEGRATORS_PACKET_STAGES_TOGGLE
+#else
+#define TENSORRAY_INTEGRATORS_PACKET_STAGES_TOGGLE
+#endif
+
+#include <hwy/contrib/math/math-inl.h>
+#include <hwy/highway.h>
+
+#include "integrators/packets/packet_steps-inl.h"
+
+HWY_BEFORE_NAMESPACE();
+namespace tensorray::packets::HWY_NAMESPACE {
+
+/// The stages of a Runge–Kutta method: V in each, and s (T V − (VᵀTV) V / |V|²), and their derivatives along two
+/// parameters (of rays with differentials).
+struct alignas(64) Stages {
+  PerRay v[3][RungeKutta::most_stages][3], change[3][RungeKutta::most_stages][3];
+  PerRay ahead[3];  // Of the next stage's point, voxels.
+  PerRay dp[2][3];  // There.
+};
+
+/// Σ_j factors[j] · rates[j].
+HWY_INLINE F3 combine(const PerRay (&rates)[RungeKutta::most_stages][3], const double* factors, int count, int at) {
+  F3 sum = zeros();
+  for (int j = 0; j < count; ++j)
+    if (factors[j] != 0) sum = mul_add(set(static_cast<float>(factors[j])), load(rates[j], at), sum);
+  return sum;
+}
+
+/// Positions along a way whose direction is `v` in world axes, after `time`, from the start.
+template <bool uniform>
+HWY_INLINE F3 way(const Medium& medium, F time, const F3& v) {
+  return mul(time, index_direction<uniform>(medium, v));
+}
+
+/// The state of a packet in a stage, but for its position, which is `ahead` of p.
+template <bool uniform, bool differentials>
+HWY_INLINE void begin_stage(const Medium& medium, const Packet& packet, int stage, Stages& stages) {
+  const double* const factors = medium.stages->a[stage];
+  for (int i = 0; i < packet.vectors * lanes; i += lanes) {
+    const F time = load(packet.time, i);
+    const auto after = [&](const PerRay(&v)[3], int column) HWY_ATTR {
+      return mul_add(time, combine(stages.change[column], factors, stage, i), load(v, i));
+    };
+    store(way<uniform>(medium, time, combine(stages.v[0], factors, stage, i)), stages.ahead, i);
+    store(after(packet.v, 0), stages.v[0][stage], i);
+    if constexpr (differentials)
+      for (int k = 0; k < 2; ++k) {
+        const F3 dway = way<uniform>(medium, time, combine(stages.v[k + 1], factors, stage, i));
+        store(add(load(packet.dp[k], i), dway), stages.dp[k], i);
+        store(after(packet.dv[k], k + 1), stages.v[k + 1][stage], i);
+      }
+  }
+}
+
+/// Eq. 5 and its derivatives, with the tensors as last sampled.
+template <bool differentials>
+HWY_INLINE void end_stage(const Medium& medium, Packet& packet, int stage, Stages& stages) {
+  for (int i = 0; i < packet.vectors * lanes; i += lanes) {
+    const F kick = load(packet.kick, i);
+    Tensor T;
+    for (int c = 0; c < 8; ++c) T.c[c] = load(packet.tensor[c], i);
+    const F3 v = load(stages.v[0][stage], i), Tv = apply(T, v);
+    const F inverse = hn::Div(set(1), dot(v, v)), along = hn::Mul(dot(v, Tv), inverse);
+    const F3 change = mul_add(hn::Neg(along), v, Tv);
+    store(mul(kick, change), stages.change[0][stage], i);
+    if constexpr (differentials)
+      for (int k = 0; k < 2; ++k) {
+        const F3 dv = load(stages.v[k + 1][stage], i);
+        const Tensor dT = tensor_along(packet, along_slopes(medium, load(stages.dp[k], i)), i);
+        const F3 dTv = add(apply(T, dv), apply(dT, v));
+        // v·change is 0: Tv is along · v beside it.
+        const F dalong = hn::Mul(inverse, hn::Sub(hn::Add(dot(dv, change), dot(v, dTv)), hn::Mul(along, dot(v, dv))));
+        const F3 dchange = mul_add(hn::Neg(dalong), v, mul_add(hn::Neg(along), dv, dTv));
+        store(mul(kick, dchange), stages.change[k + 1][stage], i);
+      }
+    if (stage == medium.stages->stages - 1) keep_bending_rate(packet, T, i);
+  }
+}
+
+/// Keeps v, taken to unit length, and its derivatives, as the packet's next.
+template <bool uniform, bool differentials>
+HWY_INLINE void keep_unit(const Medium& medium, Packet& packet, const F3& v, const F3 (&dv)[2], int at) {
+  const F inverse = hn::Div(set(1), hn::Sqrt(dot(v, v)));
+  const F3 unit = mul(inverse, v);
+  store(unit, packet.v_next, at);
+  if constexpr (!uniform) store(index_direction<uniform>(medium, unit), packet.u_next, at);
+  if constexpr (differentials)
+    for (int k = 0; k < 2; ++k) {
+      const F3 change = mul(inverse, dv[k]);
+      store(mul_add(hn::Neg(dot(unit, change)), unit, change), packet.dv_next[k], at);
+    }
+}
+
+/// The error of an adaptive step over what is allowed: in voxels as the ray crosses them, or in radians.
+template <bool uniform>
+HWY_INLINE F find_excess(const Medium& medium, const Packet& packet, const Stages& stages, int at) {
+  const double* const factors = medium.stages->error;
+  const int count = medium.stages->stages;
+  const F3 by_v = combine(stages.v[0], factors, count, at), by_change = combine(stages.change[0], factors, count, at);
+  F squares = dot(by_v, by_v);
+  if constexpr (!uniform) {
+    const F3 u = load(packet.u, at);
+    squares = hn::Mul(squares, dot(u, u));
+  }
+  const F greater = hn::Sqrt(hn::Max(squares, dot(by_change, by_change)));
+  return hn::Mul(hn::Mul(load(packet.time, at), greater), set(1 / medium.settings.tolerance));
+}
+
+template <bool uniform, bool differentials>
+HWY_INLINE void combine_stages(const Medium& medium, Packet& packet, const Stages& stages) {
+  const double* const factors = medium.stages->b;
+  const int count = medium.stages->stages;
+  for (int i = 0; i < packet.vectors * lanes; i += lanes) {
+    const F time = load(packet.time, i);
+    const auto after = [&](const PerRay(&v)[3], int column) HWY_ATTR {
+      return mul_add(time, combine(stages.change[column], factors, count, i), load(v, i));
+    };
+    store(add(load(packet.p, i), way<uniform>(medium, time, combine(stages.v[0], factors, count, i))), packet.p_next,
+          i);
+    F3 dv[2];
+    if constexpr (differentials)
+      for (int k = 0; k < 2; ++k) {
+        const F3 dway = way<uniform>(medium, time, combine(stages.v[k + 1], factors, count, i));
+        store(add(load(packet.dp[k], i), dway), packet.dp_next[k], i);
+        dv[k] = after(packet.dv[k], k + 1);
+      }
+    keep_unit<uniform, differentials>(medium, packet, after(packet.v, 0), dv, i);
+    if (medium.adaptive) store(find_excess<uniform>(medium, packet, stages, i), packet.excess, i);
+  }
+}
+
+/// A step of a Runge–Kutta method.
+template <bool uniform, bool differentials>
+HWY_NOINLINE void step_by_stages(const Medium& medium, Packet& packet) {
+  Stages stages;
+  bool near_border = false, near_surface = false;  // In any brick where tensors are sampled.
+  for (int stage = 0; stage < medium.stages->stages; ++stage) {
+    begin_stage<uniform, differentials>(medium, packet, stage, stages);
+    locate<uniform, differentials>(medium, packet,
+                                   [&](int i) HWY_ATTR { return add(load(packet.p, i), load(stages.ahead, i)); });
+    near_border |= packet.near_border;
+    near_surface |= packet.near_surface;
+    interpolate<uniform, differentials>(medium, packet);
+    end_stage<differentials>(medium, packet, stage, stages);
+  }
+  packet.near_border |= near_border;
+  packet.near_surface |= near_surface;
+  combine_stages<uniform, differentials>(medium, packet, stages);
+}
+
+/// T₂₂ of lanes as their tensors were sampled, and its slopes.
+template <bool differentials>
+HWY_INLINE Slopes<F> sample_trailing(const Packet& packet, int at) {
+  alignas(64) float values[8][lanes];
+  const auto corner = [&](int lane, int k) HWY_ATTR {
+    const int voxel = static_cast<int>(packet.voxel[at + lane]) + corners[k] / TensorBrick::bending_floats;
+    return packet.bending[at + lane][TensorBrick::trailing_offset + voxel];
+  };
+  for (int lane = 0; lane < (packet.one_cell ? 0 : lanes); ++lane)
+    for (int k = 0; k < 8; ++k) values[k][lane] = corner(lane, k);
+  const auto value = [&](int k) HWY_ATTR { return packet.one_cell ? set(corner(0, k)) : hn::Load(floats, values[k]); };
+  if constexpr (differentials) {
+    const F3 fraction = load(packet.fraction, at);
+    return evaluate(polynomial<F>(value), fraction.x, fraction.y, fraction.z);
+  }
+  Slopes<F> result{};
+  result.value = hn::Mul(value(7), load(packet.weights[7], at));
+  for (int k = 6; k >= 0; --k) result.value = hn::MulAdd(value(k), load(packet.weights[k], at), result.value);
+  return result;
+}
+
+/// A step of Euler's method (Eq. 3–4), which sees the trace of T.
+template <bool uniform, bool differentials>
+HWY_NOINLINE void step_by_euler(const Medium& medium, Packet& packet) {
+  locate<uniform, differentials>(medium, packet, [&](int i) HWY_ATTR { return load(packet.p, i); });
+  interpolate<uniform, differentials>(medium, packet);
+  for (int i = 0; i < packet.vectors * lanes; i += lanes) {
+    const F time = load(packet.time, i), factor = hn::Mul(time, load(packet.kick, i));
+    Tensor T;
+    for (int c = 0; c < 8; ++c) T.c[c] = load(packet.tensor[c], i);
+    const Slopes<F> trailing = sample_trailing<differentials>(packet, i);
+    const F3 v = load(packet.v, i);
+    F3 dv[2];
+    if constexpr (differentials)
+      for (int k = 0; k < 2; ++k) {
+        const F3 along = along_slopes(medium, load(packet.dp[k], i)), before = load(packet.dv[k], i);
+        const F dtrailing = dot(along, {trailing.x, trailing.y, trailing.z});
+        const F3 bent = add(apply(T, before), apply(tensor_along(packet, along, i), v));
+        dv[k] = mul_add(factor, mul_add(trailing.value, before, mul_add(dtrailing, v, bent)), before);
+      }
+    const F3 after = mul_add(factor, mul_add(trailing.value, v, apply(T, v)), v);
+    keep_unit<uniform, differentials>(medium, packet, after, dv, i);
+    keep_bending_rate(packet, T, i);
+    const auto on = [&](const PerRay(&p)[3], const PerRay(&along)[3])
+                        HWY_ATTR { return add(load(p, i), way<uniform>(medium, time, load(along, i))); };
+    store(on(packet.p, packet.v_next), packet.p_next, i);
+    if constexpr (differentials)
+      for (int k = 0; k < 2; ++k) store(on(packet.dp[k], packet.dv_next[k]), packet.dp_next[k], i);
+  }
+}
+
+/// Sets adaptive methods' first steps.
+template <bool uniform>
+HWY_NOINLINE void begin_steps(const Medium& medium, Packet& packet) {
+  for (int i = 0; i < packet.vectors * lanes; i += lanes) {
+    const F voxel = voxel_along<uniform>(packet, i);
+    store(automatic_step(medium, load(packet.bending_rate, i), voxel), packet.wanted, i);
+  }
+}
+
+/// The lanes whose steps are too short for single precision, as bits.
+template <bool uniform>
+HWY_INLINE std::uint32_t too_short(const Packet& packet) {
+  std::uint32_t result = 0;
+  for (int i = 0; i < packet.vectors * lanes; i += lanes) {
+    const F time = load(packet.time, i);
+    F squares = hn::Mul(time, time);
+    if constexpr (!uniform) {
+      const F3 u = load(packet.u, i);
+      squares = hn::Mul(squares, dot(u, u));
+    }
+    result |= to_bits(hn::Not(hn::Ge(squares, set(shortest_step * shortest_step))), i);
+  }
+  return result;
+}
+
+/// Lets a lane take no step.
+template <bool uniform, bool differentials>
+HWY_INLINE void stay(Packet& packet, int lane) {
+  packet.time[lane] = 0;
+  for (int axis = 0; axis < 3; ++axis) {
+    packet.p_next[axis][lane] = packet.p[axis][lane];
+    packet.v_next[axis][lane] = packet.v[axis][lane];
+    if constexpr (!uniform) packet.u_next[axis][lane] = packet.u[axis][lane];
+    if constexpr (differentials)
+      for (int k = 0; k < 2; ++k) {
+        packet.dp_next[k][axis][lane] = packet.dp[k][axis][lane];
+        packet.dv_next[k][axis][lane] = packet.dv[k][axis][lane];
+      }
+  }
+}
+
+/// The next adaptive step over the last one: see step_lengths.h.
+HWY_INLINE F growth(F excess, int order) {
+  using namespace step_lengths;
+  const auto single = [](double value) HWY_ATTR { return set(static_cast<float>(value)); };
+  const F within = hn::Min(hn::Max(excess, single(least_excess)), set(1e30f));
+  const F root = hn::Exp(floats, hn::Mul(single(-1.0 / order), hn::Log(floats, within)));
+  const F factor = hn::Mul(single(safety), root), least = single(least_growth), most = single(most_growth);
+  return hn::IfThenElse(hn::Eq(excess, excess), hn::Min(hn::Max(factor, least), most), least);
+}
+
+/// Sets the next adaptive steps by the errors of these; lanes that err by too much stay.
+/// @return these, as bits.
+template <bool uniform, bool differentials>
+HWY_NOINLINE std::uint32_t control_steps(const Medium& medium, Packet& packet) {
+  std::uint32_t staying = 0;
+  for (int i = 0; i < packet.vectors * lanes; i += lanes) {
+    const F excess = load(packet.excess, i), wanted = load(packet.wanted, i);
+    store(hn::Min(hn::Mul(wanted, growth(excess, medium.stages->order)), set(medium.longest_step)), packet.wanted, i);
+    const F3 v = load(packet.v_next, i);  // If it is none, no matter how it errs.
+    staying |= to_bits(hn::And(hn::Gt(excess, set(1)), hn::Gt(dot(v, v), hn::Zero(floats))), i);
+  }
+  for (std::uint32_t rest = staying; rest != 0; rest &= rest - 1)
+    stay<uniform, differentials>(packet, static_cast<int>(hwy::Num0BitsBelowLS1Bit_Nonzero32(rest)));
+  return staying;
+}
+
+}  // namespace tensorray::packets::HWY_NAMESPACE
+HWY_AFTER_NAMESPACE();
+
+#endif

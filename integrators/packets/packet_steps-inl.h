@@ -1,0 +1,325 @@
+/// @file integrators/packets/packet_steps-inl.h
+/// A step of a packet, in three parts: to its middle, the tensors there, the kick and on. A part of packet_kernel.cpp.
+
+// Included once for each instruction set: see Highway's foreach_target.h.
+#if defined(TENSORRAY_INTEGRATORS_PACKET_STEPS_TOGGLE) == defined(HWY_TARGET_TOGGLE)
+#ifdef TENSORRAY_INTEGRATORS_PACKET_STEPS_TOGGLE
+#undef TENSORRAY_INTEGRATORS_PACKET_STEPS_TOGGLE
+#else
+#define TENSORRAY_INTEGRATORS_PACKET_STEPS_TOGGLE
+#endif
+
+#include <algorithm>
+#include <cmath>
+
+#include <hwy/highway.h>
+
+#include "integrators/packets/packet_bending-inl.h"
+#include "integrators/packets/packet_bricks-inl.h"
+#include "integrators/packets/packet_cells-inl.h"
+
+HWY_BEFORE_NAMESPACE();
+namespace tensorray::packets::HWY_NAMESPACE {
+
+// `uniform`: voxels are cubes along the axes. `differentials`: rays have them.
+
+/// The direction per unit of time, of which there are as many as `time` says: V in voxels, or in index space.
+template <bool uniform>
+HWY_INLINE const PerRay (&direction(const Packet& packet))[3] {
+  return uniform ? packet.v : packet.u;
+}
+
+template <bool uniform>
+HWY_INLINE F3 index_direction(const Medium& medium, const F3& v) {
+  if (uniform) return {v.x, v.y, v.z};
+  const auto& m = medium.to_index;
+  const auto row = [&](int i) HWY_ATTR {
+    return hn::MulAdd(set(m[i][0]), v.x, hn::MulAdd(set(m[i][1]), v.y, hn::Mul(set(m[i][2]), v.z)));
+  };
+  return {row(0), row(1), row(2)};
+}
+
+/// The last step of lanes in bricks where nothing bends light ended a little behind them: takes these lanes to the
+/// bricks where they are now. (Others are taken there by their steps' middles, whatever their neighbours do.)
+template <bool uniform>
+HWY_NOINLINE void leave_straight_bricks(const Medium& medium, Packet& packet) {
+  const F zero = hn::Zero(floats), end = set(TensorBrick::cells);
+  const auto moves = [&](int i) HWY_ATTR {
+    const F3 p = load(packet.p, i);
+    const auto beyond = [&](F x) HWY_ATTR { return hn::Or(hn::Lt(x, zero), hn::Ge(x, end)); };
+    return hn::And(hn::Eq(load(packet.strongest, i), zero), hn::Or(beyond(p.x), hn::Or(beyond(p.y), beyond(p.z))));
+  };
+  std::uint32_t any = 0;
+  for (int i = 0; i < packet.vectors * lanes; i += lanes) any |= to_bits(moves(i), i);
+  if (any == 0) return;
+  move_to_bricks<uniform>(medium, packet, [&](int i) HWY_ATTR {
+    return select(moves(i), clamp(load(packet.p, i), load(packet.low, i), load(packet.high, i)), zeros());
+  });
+}
+
+/// How long an automatic step of fixed-step methods is, voxels, if one voxel is as long as `voxel`. @p bending_rate as
+/// a packet has it.
+HWY_INLINE F automatic_step(const Medium& medium, F bending_rate, F voxel) {
+  const bool splitting = medium.settings.method == BendingMethod::splitting;
+  const F shortest = set(splitting ? static_cast<float>(step_lengths::shortest_splitting) : 0.0f);
+  const F longest = set(static_cast<float>(step_lengths::longest_automatic));
+  const F kick = hn::Mul(bending_rate, voxel), strongest = set(strongest_kick);
+  return hn::IfThenElse(hn::Gt(hn::Mul(kick, longest), strongest), hn::Max(hn::Div(strongest, kick), shortest),
+                        longest);
+}
+
+/// How long a voxel is along the rays, in the units of the time.
+template <bool uniform>
+HWY_INLINE F voxel_along(const Packet& packet, int at) {
+  if (uniform) return set(1);
+  const F3 u = load(packet.u, at);
+  return hn::Div(set(1), hn::Sqrt(dot(u, u)));
+}
+
+/// How long the next step is, in the units that u is per: voxels, or, if voxels are not uniform, world units.
+template <bool uniform>
+HWY_NOINLINE void find_times(const Medium& medium, Packet& packet) {
+  if (packet.straight) leave_straight_bricks<uniform>(medium, packet);
+  const bool automatic = medium.settings.step == 0 && !(packet.greatest_reach <= strongest_kick);
+  const F zero = hn::Zero(floats), end = set(TensorBrick::cells);
+  for (int i = 0; i < packet.vectors * lanes; i += lanes) {
+    const F voxel = voxel_along<uniform>(packet, i);
+    const F steps = medium.adaptive ? load(packet.wanted, i)
+                    : automatic     ? automatic_step(medium, load(packet.bending_rate, i), voxel)
+                                    : set(medium.longest_step);
+    F time = uniform ? steps : hn::Mul(steps, voxel);
+    if (packet.straight) {
+      // Out of the brick where nothing bends light, and a little further, so that rounding does not keep it there.
+      const F3 p = load(packet.p, i), u = load(direction<uniform>(packet), i);
+      const auto way = [&](F x, F along) HWY_ATTR {
+        const F to = hn::Sub(hn::IfThenElse(hn::Gt(along, zero), end, zero), x);
+        return hn::IfThenElse(hn::Eq(along, zero), set(1e30f), hn::Div(to, along));
+      };
+      const F out = hn::Min(hn::Min(way(p.x, u.x), way(p.y, u.y)), way(p.z, u.z));
+      const auto within = [&](F x) HWY_ATTR { return hn::And(hn::Ge(x, zero), hn::Le(x, end)); };
+      const Mask crosses = hn::And(hn::And(within(p.x), hn::And(within(p.y), within(p.z))),
+                                   hn::And(hn::Eq(load(packet.strongest, i), zero), hn::Lt(out, set(1e29f))));
+      time = hn::IfThenElse(crosses, hn::MulAdd(set(medium.past_straight_brick), voxel, out), time);
+    }
+    store(time, packet.time, i);
+  }
+  packet.timed = !packet.varied;
+}
+
+/// Finds the points where tensors are wanted, `point_of(i)` of the vector at lane i, their cells, and what is needed to
+/// interpolate there. `careful`: where the packet clamps, or, with `forced`, points are beyond their bricks, on whose
+/// faces they then are taken to be.
+/// @return whether all are within their lanes' bricks.
+template <bool differentials, bool careful, class Point>
+HWY_INLINE bool find_cells(Packet& packet, bool forced, const Point& point_of) {
+  const F last = set(TensorBrick::cells - 1), width = set(TensorBrick::width);
+  auto greatest = hn::Zero(bits);
+  F first = hn::Zero(floats);
+  Mask same = hn::Eq(first, first);
+  for (int i = 0; i < packet.vectors * lanes; i += lanes) {
+    F3 point = point_of(i);
+    store(point, packet.middle, i);
+    if (careful && packet.clamps) point = clamp(point, load(packet.low, i), load(packet.high, i));
+    F3 near = floor(point);
+    if (careful && packet.clamps) near = clamp(near, load(packet.low, i), load(packet.last, i));
+    // As unsigned integers, negative floats are the greatest.
+    greatest = hn::Max(hn::Max(greatest, hn::BitCast(bits, near.x)),
+                       hn::Max(hn::BitCast(bits, near.y), hn::BitCast(bits, near.z)));
+    if (careful && forced) near = clamp(near, zeros(), {last, last, last});
+    const F3 fraction = sub(point, near);
+    if constexpr (differentials)
+      store(fraction, packet.fraction, i);
+    else
+      make_weights(fraction, packet, i);
+    const F voxel = hn::MulAdd(hn::MulAdd(near.x, width, near.y), width, near.z);
+    store(voxel, packet.voxel, i);
+    if (i == 0) first = set(hn::GetLane(voxel));
+    same = hn::And(same, hn::Eq(voxel, first));
+  }
+  packet.one_cell = packet.one_brick && hn::AllTrue(floats, same);
+  return hn::AllFalse(bits, hn::Gt(greatest, hn::BitCast(bits, last)));
+}
+
+/// Goes to points where tensors are wanted: takes lanes to the bricks of these.
+template <bool uniform, bool differentials, class Point>
+HWY_INLINE void locate(const Medium& medium, Packet& packet, const Point& point_of) {
+  const bool found = packet.clamps ? find_cells<differentials, true>(packet, false, point_of)
+                                   : find_cells<differentials, false>(packet, false, point_of);
+  if (HWY_LIKELY(found)) return;
+  move_to_bricks<uniform>(medium, packet, [&](int i) HWY_ATTR {
+    const F3 point = load(packet.middle, i);
+    return packet.clamps ? clamp(point, load(packet.low, i), load(packet.high, i)) : point;
+  });
+  // Beyond the extent, or on the face that rounding took it to.
+  find_cells<differentials, true>(packet, true, point_of);
+}
+
+/// The first part of a step: to its middle.
+template <bool uniform, bool differentials>
+HWY_INLINE void locate_middles(const Medium& medium, Packet& packet) {
+  locate<uniform, differentials>(medium, packet, [&](int i) HWY_ATTR {
+    const F half = hn::Mul(set(0.5f), load(packet.time, i));
+    return mul_add(half, load(direction<uniform>(packet), i), load(packet.p, i));
+  });
+}
+
+/// Asks for the memory of the cell where a lane will be after two long steps, if it is in its brick.
+template <bool uniform>
+HWY_INLINE void prefetch_one(const Packet& packet, int lane) {
+  int voxel = 0;
+  for (int axis = 0; axis < 3; ++axis) {
+    const float ahead = packet.middle[axis][lane] + direction<uniform>(packet)[axis][lane];
+    const int cell = static_cast<int>(std::min(std::max(ahead, 0.0f), TensorBrick::cells - 0.5f));
+    voxel = voxel * TensorBrick::width + cell;
+  }
+  prefetch_cell(packet.bending[lane] + voxel * TensorBrick::bending_floats);
+}
+
+/// Asks for the memory of the cells where the lanes of a vector will be after two long steps.
+template <bool uniform>
+HWY_INLINE void prefetch_all(const Medium& medium, const Packet& packet, int first) {
+  // Lanes are wavelengths in their order, mostly: where the outermost ones are close, so are the others.
+  float between = packet.one_brick ? 0 : 2;
+  for (const PerRay& middle : packet.middle)
+    between = std::max(between, std::fabs(middle[first] - middle[first + lanes - 1]));
+  if (between < 1) {
+    prefetch_one<uniform>(packet, first);
+    return prefetch_one<uniform>(packet, first + lanes - 1);
+  }
+  const F3 ahead = add(load(packet.middle, first), load(direction<uniform>(packet), first));
+  const F zero = hn::Zero(floats), cells = set(TensorBrick::cells), part = set(1.0f / TensorBrick::cells);
+  const auto bricks = [&](F x) HWY_ATTR { return hn::Floor(hn::Mul(x, part)); };
+  const F3 offset{bricks(ahead.x), bricks(ahead.y), bricks(ahead.z)};
+  const auto cell = [&](F x, F of) HWY_ATTR { return hn::Floor(hn::NegMulAdd(of, cells, x)); };
+  const F width = set(TensorBrick::width);
+  const F voxel =
+      hn::MulAdd(hn::MulAdd(cell(ahead.x, offset.x), width, cell(ahead.y, offset.y)), width, cell(ahead.z, offset.z));
+  alignas(64) std::int32_t voxels[lanes], offsets[3][lanes];
+  hn::Store(hn::ConvertTo(ints, voxel), ints, voxels);
+  hn::Store(hn::ConvertTo(ints, offset.x), ints, offsets[0]);
+  hn::Store(hn::ConvertTo(ints, offset.y), ints, offsets[1]);
+  hn::Store(hn::ConvertTo(ints, offset.z), ints, offsets[2]);
+  const std::uint32_t moves =
+      to_bits(hn::Or(hn::Ne(offset.x, zero), hn::Or(hn::Ne(offset.y, zero), hn::Ne(offset.z, zero))), 0);
+  for (int lane = 0; lane < lanes; ++lane) {
+    const float* brick = packet.bending[first + lane];
+    if (moves >> lane & 1) {
+      const std::int32_t at[3] = {packet.brick[0][first + lane] + offsets[0][lane],
+                                  packet.brick[1][first + lane] + offsets[1][lane],
+                                  packet.brick[2][first + lane] + offsets[2][lane]};
+      brick = medium.brick(at).bending;
+    }
+    prefetch_cell(brick + voxels[lane] * TensorBrick::bending_floats);
+  }
+}
+
+/// Whether all lanes of a vector are in one cell.
+HWY_INLINE bool in_one_cell(const Packet& packet, int first) {
+  Mask same = hn::Eq(load(packet.voxel, first), set(packet.voxel[first]));
+  if (!packet.one_brick)
+    for (const auto& brick : packet.brick)
+      same = hn::And(same, hn::RebindMask(floats, hn::Eq(hn::Load(ints, brick + first), hn::Set(ints, brick[first]))));
+  return hn::AllTrue(floats, same);
+}
+
+/// The second part: the tensors there.
+template <bool uniform, bool differentials>
+HWY_INLINE void interpolate(const Medium& medium, Packet& packet) {
+  if (!differentials && HWY_LIKELY(packet.one_cell)) {
+    prefetch_one<uniform>(packet, 0);
+    return sample_cell(cell_of(packet, 0), packet, 0, packet.vectors);
+  }
+  for (int i = 0; i < packet.vectors * lanes; i += lanes) {
+    const bool together = in_one_cell(packet, i);
+    if (!together) prefetch_all<uniform>(medium, packet, i);
+    if constexpr (differentials) {
+      if (together)
+        sample_slopes(cell_of(packet, i), packet, i);
+      else
+        sample_own_slopes(packet, i);
+    } else {
+      if (together)
+        sample_cell<1>(cell_of(packet, i), packet, i);
+      else
+        sample_own_cells(packet, i);
+    }
+  }
+}
+
+/// A change of position, but across axes of a single voxel, where the tensor is the same.
+HWY_INLINE F3 along_slopes(const Medium& medium, const F3& dp) {
+  return {hn::Mul(dp.x, set(medium.slope[0])), hn::Mul(dp.y, set(medium.slope[1])),
+          hn::Mul(dp.z, set(medium.slope[2]))};
+}
+
+/// How the tensor changes if the position does by `along`.
+HWY_INLINE Tensor tensor_along(const Packet& packet, const F3& along, int at) {
+  Tensor dT;
+  for (int c = 0; c < 8; ++c)
+    dT.c[c] = dot(along, {load(packet.slopes[0][c], at), load(packet.slopes[1][c], at), load(packet.slopes[2][c], at)});
+  return dT;
+}
+
+/// The derivatives of exp(factor · T) V, normalised, along two parameters, and those of the positions at the end of the
+/// step: of the method's own steps. One term more than without, as the derivative of a series has one less.
+template <bool uniform>
+HWY_INLINE void bend_differentials(const Medium& medium, Packet& packet, const Tensor& T, const F3& v, F factor,
+                                   int at) {
+  const F size = load(packet.size, at), half = hn::Mul(set(0.5f), load(packet.time, at));
+  for (int i = 0; i < 2; ++i) {
+    const F3 dmiddle = mul_add(half, index_direction<uniform>(medium, load(packet.dv[i], at)), load(packet.dp[i], at));
+    const Tensor dT = tensor_along(packet, along_slopes(medium, dmiddle), at);
+    F3 term = v, sum = v, dterm = load(packet.dv[i], at), dsum = dterm;
+    for (int n = 1; n <= most_terms; ++n) {
+      const Mask needed = hn::Gt(size, set(n < 4 ? -1.0f : series_reach[n - 4]));
+      if (hn::AllFalse(floats, needed)) break;
+      const F part = hn::Mul(set(1.0f / static_cast<float>(n)), factor);
+      dterm = mul(part, add(apply(T, dterm), apply(dT, term)));
+      term = mul(part, apply(T, term));
+      sum = add(sum, select(needed, term, zeros()));
+      dsum = add(dsum, select(needed, dterm, zeros()));
+    }
+    const F inverse = hn::Div(set(1), hn::Sqrt(dot(sum, sum)));
+    const F3 unit = mul(inverse, sum), change = mul(inverse, dsum);
+    const F3 dv = mul_add(hn::Neg(dot(unit, change)), unit, change);
+    store(dv, packet.dv_next[i], at);
+    store(mul_add(half, index_direction<uniform>(medium, dv), dmiddle), packet.dp_next[i], at);
+  }
+}
+
+/// The third part: bends, and on from the middle, to the positions and directions at the end, which may be the
+/// packet's. `weakly`: no lane needs more than two terms.
+template <bool uniform, bool differentials, bool weakly>
+HWY_INLINE void take_step_as(const Medium& medium, Packet& packet, PerRay (&p)[3], PerRay (&v)[3], PerRay (&u)[3]) {
+  for (int i = 0; i < packet.vectors * lanes; i += lanes) {
+    const F time = load(packet.time, i), factor = hn::Mul(time, load(packet.kick, i)), half = hn::Mul(set(0.5f), time);
+    Tensor T;
+    for (int c = 0; c < 8; ++c) T.c[c] = load(packet.tensor[c], i);
+    const F3 before = load(packet.v, i);
+    if constexpr (weakly)
+      store(bend_weakly(T, before, factor), v, i);
+    else
+      bend_strongly<differentials>(packet, T, before, factor, i, v);
+    if constexpr (differentials) bend_differentials<uniform>(medium, packet, T, before, factor, i);
+    const F3 after = load(v, i);
+    if constexpr (uniform) {
+      store(mul_add(half, after, load(packet.middle, i)), p, i);
+    } else {
+      const F3 along = index_direction<uniform>(medium, after);
+      store(along, u, i);
+      store(mul_add(half, along, load(packet.middle, i)), p, i);
+    }
+  }
+}
+
+template <bool uniform, bool differentials>
+HWY_INLINE void take_step(const Medium& medium, Packet& packet, PerRay (&p)[3], PerRay (&v)[3], PerRay (&u)[3]) {
+  if (!differentials && HWY_LIKELY(packet.greatest_reach <= series_reach[0]))
+    return take_step_as<uniform, differentials, true>(medium, packet, p, v, u);
+  take_step_as<uniform, differentials, false>(medium, packet, p, v, u);
+}
+
+}  // namespace tensorray::packets::HWY_NAMESPACE
+HWY_AFTER_NAMESPACE();
+
+#endif

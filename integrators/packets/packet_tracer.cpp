@@ -1,0 +1,266 @@
+#include "integrators/packets/packet_tracer.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include <Eigen/Geometry>
+
+#include "integrators/bending/runge_kutta.h"
+#include "integrators/bending/scalar_tracer.h"
+#include "integrators/packets/packet_kernel.h"
+
+namespace tensorray {
+namespace {
+
+using packets::KernelRay;
+using packets::KernelSettings;
+
+constexpr double face_margin = 1e-3;      // Voxels; more than single precision errs by.
+constexpr double least_tolerance = 1e-5;  // Of adaptive methods: below, single precision's errors would be seen.
+constexpr double surface_margin = 4e-6;   // In sizes of the volume; more than Geometry's own.
+
+/// Surfaces that rays may meet within the field, in index space; empty if there are none.
+Eigen::AlignedBox3d surfaces_within(const TensorField& field, const Geometry& geometry) {
+  if (geometry.has_cut()) return field.index_bounds();
+  Eigen::AlignedBox3d volume = geometry.surfaces().bounds.bounds();
+  const Eigen::Vector3d margin = Eigen::Vector3d::Constant(surface_margin * volume.diagonal().norm());
+  volume = Eigen::AlignedBox3d(volume.min() - margin, volume.max() + margin);
+  const Eigen::AlignedBox3d world = geometry.absorbers_within(volume);
+  Eigen::AlignedBox3d index;
+  if (world.isEmpty()) return index;
+  for (int i = 0; i < 8; ++i)
+    index.extend(field.to_index() * world.corner(static_cast<Eigen::AlignedBox3d::CornerType>(i)));
+  return index;
+}
+
+/// Whether the step from one point to another is one that only the reference takes.
+bool meets_surface(const Geometry& geometry, const Eigen::Vector3d& from, const Eigen::Vector3d& to) {
+  const bool may_absorb = geometry.may_absorb(from, to);
+  if (!may_absorb && !geometry.has_cut()) return false;
+  const double length = (to - from).norm();
+  if (!(length > 0)) return true;
+  const Eigen::Vector3d along = (to - from) / length;
+  return (geometry.has_cut() && geometry.crossing(Surface::cut, false, from, along, length)) ||
+         (may_absorb && geometry.absorber(from, along, length));
+}
+
+KernelSettings kernel_settings(const TensorField& field, const Geometry& geometry, const BendingSettings& settings) {
+  KernelSettings result;
+  result.method = settings.method;
+  result.step = static_cast<float>(settings.step);
+  result.tolerance = static_cast<float>(settings.tolerance);
+  result.max_steps = static_cast<std::uint32_t>(settings.max_steps);
+  result.max_length = static_cast<float>(settings.max_length);
+  result.surfaces = surfaces_within(field, geometry);
+  if (!result.surfaces.isEmpty())
+    result.meets_surface = [&geometry](const Eigen::Vector3d& from, const Eigen::Vector3d& to) {
+      return meets_surface(geometry, from, to);
+    };
+  return result;
+}
+
+/// A batch on its way.
+struct Flight {
+  packets::KernelRays kernel;
+  std::vector<std::size_t> numbers;  // In the batch, of each of the kernel's rays.
+  std::vector<Travelled> travelled;  // Before the kernel.
+
+  void clear() {
+    kernel.rays.clear();
+    kernel.differentials.clear();
+    kernel.points.clear();
+    numbers.clear();
+    travelled.clear();
+  }
+};
+
+Eigen::Vector3d index_position(const std::array<std::int32_t, 3>& brick, const std::array<float, 3>& position) {
+  Eigen::Vector3d index;
+  for (int axis = 0; axis < 3; ++axis) index[axis] = double{TensorBrick::cells} * brick[axis] + position[axis];
+  return index;
+}
+
+Eigen::Vector3d to_vector(const std::array<float, 3>& v) { return {v[0], v[1], v[2]}; }
+
+/// A ray where its way begins to bend, but for its flexibility.
+template <int N>
+KernelRay kernel_ray(const TensorField& field, Tracer<N>& tracer) {
+  KernelRay ray;
+  const Eigen::Vector3d index = field.to_index() * Eigen::Vector3d(tracer.state().position());
+  for (int axis = 0; axis < 3; ++axis) {
+    const double first = field.voxels().min()[axis], last = std::max(first, field.voxels().max()[axis] - 1);
+    const double cell = std::clamp(std::floor(index[axis]), first, last);
+    ray.brick[axis] = static_cast<std::int32_t>(std::floor(cell / TensorBrick::cells));
+    ray.position[axis] = static_cast<float>(index[axis] - double{TensorBrick::cells} * ray.brick[axis]);
+    ray.direction[axis] = static_cast<float>(tracer.state().V(axis, 0));
+  }
+  return ray;
+}
+
+/// Whether the field may be strong enough, where a ray begins to bend, to ask for shorter steps.
+bool may_be_strong(const TensorField& field, const KernelRay& ray, double flexibility) {
+  const double longest_voxel = field.to_world().linear().norm();
+  const TensorBrick brick = field.brick({ray.brick[0], ray.brick[1], ray.brick[2]});
+  return std::abs(flexibility) * longest_voxel * brick.strongest > 0.1;
+}
+
+packets::KernelDifferential kernel_differential(const TensorField& field, const State<3>& state) {
+  const Eigen::Matrix<double, 3, 2> position = field.to_index().linear() * state.P.rightCols<2>();
+  packets::KernelDifferential result;
+  for (int i = 0; i < 2; ++i)
+    for (int axis = 0; axis < 3; ++axis) {
+      result.position[i][axis] = static_cast<float>(position(axis, i));
+      result.direction[i][axis] = static_cast<float>(state.V(axis, i + 1));
+    }
+  return result;
+}
+
+/// Where the kernel has taken a ray.
+template <int N>
+State<N> state_of(const TensorField& field, const packets::KernelRays& kernel, std::size_t i) {
+  const KernelRay& ray = kernel.rays[i];
+  Eigen::Vector3d index = index_position(ray.brick, ray.position);
+  if (ray.axis >= 0) {
+    const Eigen::AlignedBox3d& box = field.index_bounds();
+    const int axis = ray.axis;
+    const double face = index[axis] > box.center()[axis] ? box.max()[axis] : box.min()[axis];
+    if (std::abs(index[axis] - face) < face_margin) index[axis] = face;  // Light that grazes it may end beside it.
+  }
+  State<N> state;
+  state.P.col(0) = field.to_world() * index;
+  state.V.col(0) = to_vector(ray.direction);
+  if constexpr (N == 3) {
+    for (int k = 0; k < 2; ++k)
+      for (int axis = 0; axis < 3; ++axis) {
+        state.P(axis, k + 1) = kernel.differentials[i].position[k][axis];
+        state.V(axis, k + 1) = kernel.differentials[i].direction[k][axis];
+      }
+    state.P.template rightCols<2>() = (field.to_world().linear() * state.P.template rightCols<2>()).eval();
+  }
+  return bending_steps::normalized(state);
+}
+
+bool same_start(const RayBatch& batch, std::size_t i, std::size_t j) {
+  const bool same = batch.position[i] == batch.position[j] && batch.direction[i] == batch.direction[j];
+  return same &&
+         (batch.differentials.empty() || (batch.differentials[i].position == batch.differentials[j].position &&
+                                          batch.differentials[i].direction == batch.differentials[j].direction));
+}
+
+/// Lets a ray have the record of another.
+void copy_record(const Recordings& recordings, std::size_t from, std::size_t to) {
+  if (recordings.ways) (*recordings.ways)[to] = (*recordings.ways)[from];
+  if (recordings.tracks) (*recordings.tracks)[to] = (*recordings.tracks)[from];
+}
+
+/// Takes the rays of the batch to where light bends, those of one origin together. Those that do not come there end.
+template <int N>
+void approach(const TensorField& field, RayBatch& batch, const Recordings& recordings, Tracer<N>& tracer,
+              Flight& flight) {
+  for (std::size_t i = 0; i < batch.size();) {
+    const std::size_t first = i;
+    const auto end = tracer.approach(start_of<N>(batch, first), recordings.of(first));
+    KernelRay ray = end ? KernelRay() : kernel_ray(field, tracer);
+    bool sampled = false;
+    std::size_t last = first + 1;
+    while (last < batch.size() && same_start(batch, last, first)) copy_record(recordings, first, last++);
+    const auto state = tracer.state();
+    const Travelled travelled = tracer.travelled();
+    for (; i < last; ++i) {
+      const double s = batch.flexibility[i];
+      if (end || !std::isfinite(s)) {
+        set_end(batch, i, std::isfinite(s) ? *end : RayEnd::degenerate, tracer);
+        continue;
+      }
+      if (!sampled && may_be_strong(field, ray, s)) {
+        ray.norm = static_cast<float>(tracer.strength());
+        sampled = true;
+      }
+      ray.flexibility = static_cast<float>(s);
+      ray.length = travelled.length;
+      ray.steps = travelled.steps;
+      flight.kernel.rays.push_back(ray);
+      if constexpr (N == 3) flight.kernel.differentials.push_back(kernel_differential(field, state));
+      flight.numbers.push_back(i);
+      flight.travelled.push_back(travelled);
+      if (!recordings) continue;
+      tracer.take_over(state, s, travelled, recordings.of(i));
+      tracer.record(true);
+    }
+  }
+}
+
+/// Adds to a ray's record where the kernel has been. Its last point is not that of the ray, which is recorded when it
+/// goes on.
+template <int N>
+void record_points(const TensorField& field, const std::vector<packets::KernelPoint>& points, double flexibility,
+                   Travelled travelled, const Recording& recording, Tracer<N>& tracer) {
+  for (const packets::KernelPoint& point : points) {
+    State<N> state;
+    state.P.setZero();
+    state.V.setZero();
+    state.P.col(0) = field.to_world() * index_position(point.brick, point.position);
+    state.V.col(0) = to_vector(point.direction);
+    travelled.length = point.length;
+    tracer.take_over(bending_steps::normalized(state), flexibility, travelled, recording);
+    tracer.record(true);
+  }
+}
+
+template <class Points>
+void drop_last(Points* points) {
+  if (points) points->pop_back();
+}
+
+/// From where the kernel has left a ray to its end.
+template <int N>
+RayEnd finish(const TensorField& field, const Flight& flight, std::size_t i, double flexibility,
+              const Recording& recording, Tracer<N>& tracer) {
+  const KernelRay& ray = flight.kernel.rays[i];
+  Travelled travelled = flight.travelled[i];
+  if (!flight.kernel.points.empty())
+    record_points(field, flight.kernel.points[i], flexibility, travelled, recording, tracer);
+  travelled.length = ray.length;
+  travelled.steps = ray.steps;
+  tracer.take_over(state_of<N>(field, flight.kernel, i), flexibility, travelled, recording);
+  if (ray.axis >= 0) {
+    if (tracer.state().direction().isZero()) return RayEnd::degenerate;
+    tracer.record(true);
+    return tracer.leave();
+  }
+  drop_last(recording.way);  // It begins with that point.
+  drop_last(recording.track);
+  return tracer.follow(double{ray.step});
+}
+
+template <int N>
+void trace_rays(const TensorField& field, const Geometry& geometry, const BendingSettings& settings, RayBatch& batch,
+                const Recordings& recordings) {
+  thread_local Flight flight;
+  flight.clear();
+  Tracer<N> tracer(field, geometry, settings);
+  approach(field, batch, recordings, tracer, flight);
+  if (recordings) flight.kernel.points.resize(flight.kernel.rays.size());
+  batch.tensor_samples += packets::run(field, kernel_settings(field, geometry, settings), flight.kernel);
+  for (std::size_t i = 0; i < flight.numbers.size(); ++i) {
+    const std::size_t number = flight.numbers[i];
+    const RayEnd end = finish(field, flight, i, batch.flexibility[number], recordings.of(number), tracer);
+    set_end(batch, number, end, tracer);
+  }
+  batch.tensor_samples += tracer.samples();
+}
+
+}  // namespace
+
+bool trace_in_packets(const TensorField& field, const Geometry& geometry, const BendingSettings& settings,
+                      RayBatch& batch, const Recordings& recordings) {
+  const RungeKutta* const stages = runge_kutta(settings.method);
+  if (stages && stages->adaptive && settings.tolerance < least_tolerance) return false;
+  if (batch.differentials.empty())
+    trace_rays<1>(field, geometry, settings, batch, recordings);
+  else
+    trace_rays<3>(field, geometry, settings, batch, recordings);
+  return true;
+}
+
+}  // namespace tensorray

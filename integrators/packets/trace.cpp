@@ -1,0 +1,83 @@
+// `trace` of bending.h: in packets where they serve, else ray by ray.
+
+#include <cmath>
+#include <stdexcept>
+
+#include "integrators/bending/bending.h"
+#include "integrators/bending/scalar_tracer.h"
+#include "integrators/packets/packet_tracer.h"
+
+namespace tensorray {
+namespace {
+
+template <int N>
+void trace_rays(const TensorField& field, const Geometry& geometry, const BendingSettings& settings, RayBatch& batch,
+                const Recordings& recordings) {
+  Tracer<N> tracer(field, geometry, settings);
+  for (std::size_t i = 0; i < batch.size(); ++i) {
+    const RayEnd end = tracer.trace(start_of<N>(batch, i), batch.flexibility[i], recordings.of(i));
+    set_end(batch, i, end, tracer);
+  }
+  batch.tensor_samples += tracer.samples();
+}
+
+void check(const BendingSettings& settings) {
+  if (!(settings.step >= 0) || !std::isfinite(settings.step))
+    throw std::invalid_argument("bending.step must be automatic, or a positive number of voxels");
+  if (!(settings.tolerance > 0)) throw std::invalid_argument("bending.tolerance must be positive");
+  if (settings.max_steps < 1) throw std::invalid_argument("bending.max_steps must be positive");
+  if (!(settings.max_length > 0)) throw std::invalid_argument("the greatest length of a ray must be positive");
+}
+
+bool has_differentials(const RayBatch& batch) { return !batch.differentials.empty(); }
+
+void prepare(const BendingSettings& settings, RayBatch& batch) {
+  check(settings);
+  if (has_differentials(batch) && batch.differentials.size() != batch.size())
+    throw std::invalid_argument("a batch has differentials for every ray, or for none");
+  batch.end.resize(batch.size());
+  batch.length.resize(batch.size());
+  batch.steps.resize(batch.size());
+}
+
+void trace_one_by_one(const TensorField& field, const Geometry& geometry, const BendingSettings& settings,
+                      RayBatch& batch, const Recordings& recordings) {
+  if (has_differentials(batch))
+    trace_rays<3>(field, geometry, settings, batch, recordings);
+  else
+    trace_rays<1>(field, geometry, settings, batch, recordings);
+}
+
+void trace_batch(const TensorField& field, const Geometry& geometry, const BendingSettings& settings, RayBatch& batch,
+                 const Recordings& recordings) {
+  prepare(settings, batch);
+  if (!trace_in_packets(field, geometry, settings, batch, recordings))
+    trace_one_by_one(field, geometry, settings, batch, recordings);
+}
+
+}  // namespace
+
+void trace(const TensorField& field, const Geometry& geometry, const BendingSettings& settings, RayBatch& batch) {
+  trace_batch(field, geometry, settings, batch, {});
+}
+
+void trace(const TensorField& field, const Geometry& geometry, const BendingSettings& settings, RayBatch& batch,
+           std::vector<Way>& ways) {
+  ways.assign(batch.size(), Way());
+  trace_batch(field, geometry, settings, batch, {&ways, nullptr});
+}
+
+void trace(const TensorField& field, const Geometry& geometry, const BendingSettings& settings, RayBatch& batch,
+           std::vector<Track>& tracks) {
+  tracks.resize(batch.size());
+  for (Track& track : tracks) track.clear();  // Keeps what they have allocated.
+  trace_batch(field, geometry, settings, batch, {nullptr, &tracks});
+}
+
+void trace_reference(const TensorField& field, const Geometry& geometry, const BendingSettings& settings,
+                     RayBatch& batch) {
+  prepare(settings, batch);
+  trace_one_by_one(field, geometry, settings, batch, {});
+}
+
+}  // namespace tensorray

@@ -1,0 +1,20 @@
+#pragma once
+/// @file integrators/paths/path_formats.h
+/// The formats behind path_files.h.
+
+#include <filesystem>
+#include <vector>
+
+#include "integrators/paths/paths.h"
+
+namespace tensorray {
+
+/// @throw std::runtime_error naming the file and the reason.
+void write_vtp_paths(const std::filesystem::path& path, const std::vector<Path>& paths);
+void write_tck_paths(const std::filesystem::path& path, const std::vector<Path>& paths);
+
+/// @throw std::runtime_error with the reason (not the file).
+std::vector<Path> read_vtp_paths(const std::filesystem::path& path);
+std::vector<Path> read_tck_paths(const std::filesystem::path& path);
+
+}  // namespace tensorray

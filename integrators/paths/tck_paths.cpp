@@ -1,0 +1,194 @@
+// Tracks of MRtrix (mrtrix.readthedocs.io, "Image and other file formats", "Tracks file format"): a header of
+// `key: value` lines, then triplets; a track ends with NaNs, the file with infinities.
+
+#include <algorithm>
+#include <array>
+#include <cctype>
+#include <charconv>
+#include <cmath>
+#include <cstdint>
+#include <cstring>
+#include <fstream>
+#include <limits>
+#include <optional>
+#include <stdexcept>
+#include <string>
+
+#include "integrators/paths/path_files.h"
+#include "integrators/paths/path_formats.h"
+
+namespace tensorray {
+namespace {
+
+const std::string magic = "mrtrix tracks";
+
+/// Adds a number of `bytes` bytes, least byte first.
+void put_little_endian(std::uint64_t bits, int bytes, std::string& text) {
+  for (int i = 0; i < bytes; ++i) text += static_cast<char>(bits >> (8 * i) & 0xff);
+}
+
+void put(const Eigen::Vector3d& triplet, std::string& text) {
+  for (int axis = 0; axis < 3; ++axis) {
+    const auto value = static_cast<float>(triplet[axis]);
+    std::uint32_t bits;
+    std::memcpy(&bits, &value, sizeof bits);
+    put_little_endian(bits, 4, text);
+  }
+}
+
+std::string header_text(std::size_t count) {
+  const std::string before = magic + "\ndatatype: Float32LE\ncount: " + std::to_string(count) + "\nfile: . ";
+  const std::string behind = "\nEND\n";
+  // The offset counts its own digits.
+  std::size_t offset = before.size() + behind.size();
+  while (before.size() + std::to_string(offset).size() + behind.size() != offset) ++offset;
+  return before + std::to_string(offset) + behind;
+}
+
+struct Header {
+  int bytes = 0;  ///< Of a number.
+  bool little_endian = true;
+  std::optional<std::uint64_t> count;  ///< Of tracks.
+  std::uint64_t offset = 0;            ///< Of the first triplet.
+};
+
+std::uint64_t to_number(const std::string& key, const std::string& text) {
+  std::uint64_t number = 0;
+  const auto result = std::from_chars(text.data(), text.data() + text.size(), number);
+  if (result.ec != std::errc() || result.ptr != text.data() + text.size())
+    throw std::runtime_error("\"" + key + "\" in its header is not a number");
+  return number;
+}
+
+std::string trimmed(const std::string& text) {
+  const std::size_t begin = text.find_first_not_of(" \t\r"), end = text.find_last_not_of(" \t\r");
+  return begin == std::string::npos ? "" : text.substr(begin, end + 1 - begin);
+}
+
+void parse_line(const std::string& line, Header& header) {
+  const std::size_t colon = line.find(':');
+  if (colon == std::string::npos) return;
+  const std::string key = trimmed(line.substr(0, colon)), value = trimmed(line.substr(colon + 1));
+  if (key == "datatype") {
+    if (value != "Float32LE" && value != "Float32BE" && value != "Float64LE" && value != "Float64BE")
+      throw std::runtime_error("its datatype is not Float32LE, Float32BE, Float64LE or Float64BE");
+    header.bytes = value.compare(5, 2, "32") == 0 ? 4 : 8;
+    header.little_endian = value.compare(7, 2, "LE") == 0;
+  } else if (key == "count") {
+    header.count = to_number(key, value);
+  } else if (key == "file") {
+    if (value.compare(0, 1, ".") != 0)
+      throw std::runtime_error("its tracks are in another file; write both as one, with \"file: .\" in the header");
+    header.offset = to_number(key, trimmed(value.substr(1)));
+  }
+}
+
+Header read_header(std::ifstream& file, std::uint64_t file_size) {
+  constexpr std::size_t longest_first_line = 100, longest_line = 1 << 20;  // What is longer is another format.
+  Header header;
+  std::string line;
+  bool first = true;
+  for (char c; file.get(c);) {
+    if (c != '\n') {
+      line += c;
+      if (line.size() > (first ? longest_first_line : longest_line)) break;
+      continue;
+    }
+    line = trimmed(line);
+    if (first && line != magic) break;
+    if (line == "END") {
+      if (header.bytes == 0) throw std::runtime_error("its header has no datatype");
+      if (header.offset < static_cast<std::uint64_t>(file.tellg()) || header.offset > file_size)
+        throw std::runtime_error("the offset in its header points to no place behind it; the file is damaged");
+      return header;
+    }
+    if (!first) parse_line(line, header);
+    first = false;
+    line.clear();
+  }
+  throw std::runtime_error(first ? "it is not a file of MRtrix tracks" : "its header is cut off");
+}
+
+double to_double(const char* bytes, const Header& header) {
+  std::uint64_t bits = 0;
+  for (int i = 0; i < header.bytes; ++i) {
+    const int place = header.little_endian ? i : header.bytes - 1 - i;
+    bits |= static_cast<std::uint64_t>(static_cast<unsigned char>(bytes[i])) << (8 * place);
+  }
+  if (header.bytes == 8) {
+    double value;
+    std::memcpy(&value, &bits, sizeof value);
+    return value;
+  }
+  const auto low = static_cast<std::uint32_t>(bits);
+  float value;
+  std::memcpy(&value, &low, sizeof value);
+  return value;
+}
+
+Eigen::Vector3d read_triplet(std::ifstream& file, const Header& header) {
+  std::array<char, 24> bytes;
+  if (!file.read(bytes.data(), 3 * header.bytes))
+    throw std::runtime_error("the file is cut off: it ends before its tracks do");
+  Eigen::Vector3d triplet;
+  for (int axis = 0; axis < 3; ++axis)
+    triplet[axis] = to_double(&bytes[static_cast<std::size_t>(axis * header.bytes)], header);
+  return triplet;
+}
+
+bool all_nan(const Eigen::Vector3d& triplet) { return triplet.array().isNaN().all(); }
+bool all_infinite(const Eigen::Vector3d& triplet) { return triplet.array().isInf().all(); }
+
+}  // namespace
+
+void write_tck_paths(const std::filesystem::path& path, const std::vector<Path>& paths) {
+  const auto has_points = [](const Path& line) { return !line.points.empty(); };
+  std::ofstream file(path, std::ios::binary);
+  file << header_text(static_cast<std::size_t>(std::count_if(paths.begin(), paths.end(), has_points)));
+  std::string track;
+  for (const Path& line : paths) {
+    if (!has_points(line)) continue;
+    track.clear();
+    for (const Waypoint& point : line.points) put(point.position, track);
+    put(Eigen::Vector3d::Constant(std::numeric_limits<double>::quiet_NaN()), track);
+    file.write(track.data(), static_cast<std::streamsize>(track.size()));
+  }
+  track.clear();
+  put(Eigen::Vector3d::Constant(std::numeric_limits<double>::infinity()), track);
+  file.write(track.data(), static_cast<std::streamsize>(track.size()));
+  file.close();
+  if (!file) throw std::runtime_error(path.string() + ": cannot be written; check the path and the space on the disk");
+}
+
+std::vector<Path> read_tck_paths(const std::filesystem::path& path) {
+  std::ifstream file(path, std::ios::binary);
+  const Header header = read_header(file, std::filesystem::file_size(path));
+  file.seekg(static_cast<std::streamoff>(header.offset));
+  std::vector<Path> paths;
+  std::vector<Eigen::Vector3d> positions;
+  std::uint64_t count = 0;
+  while (true) {
+    const Eigen::Vector3d triplet = read_triplet(file, header);
+    if (triplet.allFinite()) {
+      positions.push_back(triplet);
+      continue;
+    }
+    const bool ends = all_infinite(triplet);
+    if (!ends && !all_nan(triplet))
+      throw std::runtime_error("a point of track " + std::to_string(count) + " is not finite; the file is damaged");
+    if (!ends || !positions.empty()) {
+      ++count;
+      Path line;
+      line.points = bare_way(positions);
+      if (!line.points.empty()) paths.push_back(std::move(line));
+      positions.clear();
+    }
+    if (ends) break;
+  }
+  if (header.count && *header.count != count)
+    throw std::runtime_error("its header announces " + std::to_string(*header.count) + " tracks, and it holds " +
+                             std::to_string(count) + "; it is damaged, or was cut off as it was written");
+  return paths;
+}
+
+}  // namespace tensorray

@@ -1,0 +1,191 @@
+#include <algorithm>
+#include <cmath>
+#include <stdexcept>
+#include <string>
+#include <utility>
+
+#include "integrators/paths/cross_section.h"
+#include "integrators/paths/path_files.h"
+#include "integrators/paths/path_formats.h"
+#include "volumes/files/vtk_files.h"
+
+namespace tensorray {
+namespace {
+
+using RowMajorMatrix = Eigen::Matrix<double, 3, 3, Eigen::RowMajor>;
+
+/// Makes a DataArray of values that are numbers, vectors or matrices.
+template <class Number>
+class Column {
+ public:
+  explicit Column(int components) { array_.components = components; }
+
+  void add(double value) { values_.push_back(static_cast<Number>(value)); }
+  template <class Derived>
+  void add(const Eigen::PlainObjectBase<Derived>& value) {
+    for (Eigen::Index i = 0; i < value.size(); ++i) add(value.data()[i]);
+  }
+  DataArray take() {
+    array_.values = std::move(values_);
+    return std::move(array_);
+  }
+
+ private:
+  DataArray array_;
+  std::vector<Number> values_;
+};
+
+template <class Number, class Get>
+DataArray per_point(const std::vector<Path>& paths, int components, const Get& get) {
+  Column<Number> column(components);
+  for (const Path& path : paths)
+    for (const Waypoint& point : path.points) column.add(get(point));
+  return column.take();
+}
+
+template <class Number, class Get>
+DataArray per_path(const std::vector<Path>& paths, const Get& get) {
+  Column<Number> column(1);
+  for (const Path& path : paths)
+    if (!path.points.empty()) column.add(get(path));
+  return column.take();
+}
+
+void add_axes(const std::vector<Path>& paths, PolylineData& data) {
+  CrossSectionSettings bare;
+  bare.least_radius = 1e-300;  // Zero, once in single precision.
+  Column<float> major(3), minor(3);
+  for (const Path& path : paths)
+    for (const CrossSection& section : cross_sections(path.points, bare)) {
+      major.add(section.major);
+      minor.add(section.minor);
+    }
+  data.point_data["axis_major"] = major.take();
+  data.point_data["axis_minor"] = minor.take();
+}
+
+PolylineData data_of(const std::vector<Path>& paths) {
+  PolylineData data;
+  for (const Path& path : paths) {
+    for (const Waypoint& point : path.points) data.points.push_back(point.position);
+    if (!path.points.empty()) data.line_ends.push_back(data.points.size());
+  }
+  auto& points = data.point_data;
+  points["direction"] = per_point<double>(paths, 3, [](const Waypoint& point) { return point.direction; });
+  points["length"] = per_point<double>(paths, 1, [](const Waypoint& point) { return point.length; });
+  points["tensor"] = per_point<double>(paths, 9, [](const Waypoint& point) { return RowMajorMatrix(point.tensor); });
+  points["change"] = per_point<double>(paths, 3, [](const Waypoint& point) { return point.change; });
+  points["in_field"] = per_point<std::uint8_t>(paths, 1, [](const Waypoint& point) { return point.in_field ? 1 : 0; });
+  points["force"] = per_point<float>(paths, 3, [](const Waypoint& point) { return point.force(); });
+  points["curvature"] = per_point<float>(paths, 1, [](const Waypoint& point) { return point.change.norm(); });
+  add_axes(paths, data);
+
+  auto& lines = data.line_data;
+  lines["wavelength"] = per_path<double>(paths, [](const Path& path) { return path.wavelength; });
+  lines["flexibility"] = per_path<double>(paths, [](const Path& path) { return path.flexibility; });
+  lines["end"] = per_path<std::int32_t>(paths, [](const Path& path) { return static_cast<int>(path.end); });
+  lines["backward_end"] = per_path<std::int32_t>(
+      paths, [](const Path& path) { return path.backward_end ? static_cast<int>(*path.backward_end) : -1; });
+  for (int i = 0; i < ray_end_count; ++i) data.texts["end_names"].push_back(to_string(static_cast<RayEnd>(i)));
+  return data;
+}
+
+/// The values of an array that was read, if it is there and has that many components; all are finite.
+const double* find(const std::map<std::string, DataArray>& arrays, const std::string& name, int components) {
+  const auto found = arrays.find(name);
+  if (found == arrays.end() || found->second.components != components) return nullptr;
+  const auto& values = std::get<std::vector<double>>(found->second.values);
+  if (!std::all_of(values.begin(), values.end(), [](double value) { return std::isfinite(value); }))
+    throw std::runtime_error("the array \"" + name + "\" has a value that is not finite; remove it from the file");
+  return values.data();
+}
+
+/// The arrays of which ways are made.
+struct PointArrays {
+  const double* direction;
+  const double* length;
+  const double* tensor;
+  const double* change;
+  const double* in_field;
+};
+
+PointArrays point_arrays(const PolylineData& data) {
+  return {find(data.point_data, "direction", 3), find(data.point_data, "length", 1), find(data.point_data, "tensor", 9),
+          find(data.point_data, "change", 3), find(data.point_data, "in_field", 1)};
+}
+
+Waypoint waypoint(const PolylineData& data, const PointArrays& arrays, std::size_t i) {
+  Waypoint point;
+  point.position = data.points[i];
+  point.direction = Eigen::Map<const Eigen::Vector3d>(arrays.direction + 3 * i);
+  point.length = arrays.length[i];
+  point.tensor = Eigen::Map<const RowMajorMatrix>(arrays.tensor + 9 * i);
+  point.change = Eigen::Map<const Eigen::Vector3d>(arrays.change + 3 * i);
+  point.in_field = arrays.in_field[i] != 0;
+  const double norm = point.direction.norm();
+  if (!(norm > 0)) throw std::runtime_error("the direction of point " + std::to_string(i) + " is zero");
+  // Other programs interpolate, or keep single precision; what is a unit vector stays as it is to the last bit.
+  if (std::abs(norm - 1) > 1e-12) point.direction /= norm;
+  return point;
+}
+
+Way full_way(const PolylineData& data, const PointArrays& arrays, std::size_t begin, std::size_t end) {
+  Way way;
+  way.reserve(end - begin);
+  for (std::size_t i = begin; i < end; ++i) {
+    way.push_back(waypoint(data, arrays, i));
+    way.back().length -= arrays.length[begin];
+    if (i > begin && !(way[i - begin].length > way[i - begin - 1].length))
+      throw std::runtime_error("the array \"length\" does not grow along a line, at point " + std::to_string(i) +
+                               "; without it the bare lines are read");
+  }
+  if (way.size() < 2) way.clear();
+  return way;
+}
+
+Way way_of(const PolylineData& data, const PointArrays& arrays, std::size_t begin, std::size_t end) {
+  if (arrays.direction && arrays.length && arrays.tensor && arrays.change && arrays.in_field)
+    return full_way(data, arrays, begin, end);
+  using Difference = std::vector<Eigen::Vector3d>::difference_type;
+  const auto first = data.points.begin();
+  return bare_way({first + static_cast<Difference>(begin), first + static_cast<Difference>(end)});
+}
+
+RayEnd to_ray_end(double value) {
+  if (!(value >= 0 && value < ray_end_count && value == std::floor(value)))
+    throw std::runtime_error("the array \"end\" or \"backward_end\" has a value that is no reason to end");
+  return static_cast<RayEnd>(static_cast<int>(value));
+}
+
+}  // namespace
+
+void write_vtp_paths(const std::filesystem::path& path, const std::vector<Path>& paths) {
+  write_vtp(path, data_of(paths));
+}
+
+std::vector<Path> read_vtp_paths(const std::filesystem::path& path) {
+  const PolylineData data = read_vtp_lines(path, {"direction", "length", "tensor", "change", "in_field", "wavelength",
+                                                  "flexibility", "end", "backward_end"});
+  for (std::size_t i = 0; i < data.points.size(); ++i)
+    if (!data.points[i].allFinite())
+      throw std::runtime_error("point " + std::to_string(i) + " of its lines is not finite; remove it from the file");
+  const PointArrays arrays = point_arrays(data);
+  const double* const wavelength = find(data.line_data, "wavelength", 1);
+  const double* const flexibility = find(data.line_data, "flexibility", 1);
+  const double* const end = find(data.line_data, "end", 1);
+  const double* const backward_end = find(data.line_data, "backward_end", 1);
+  std::vector<Path> paths;
+  for (std::size_t i = 0; i < data.line_ends.size(); ++i) {
+    Path line;
+    line.points = way_of(data, arrays, i > 0 ? data.line_ends[i - 1] : 0, data.line_ends[i]);
+    if (line.points.empty()) continue;
+    if (wavelength) line.wavelength = wavelength[i];
+    if (flexibility) line.flexibility = flexibility[i];
+    if (end) line.end = to_ray_end(end[i]);
+    if (backward_end && backward_end[i] != -1) line.backward_end = to_ray_end(backward_end[i]);
+    paths.push_back(std::move(line));
+  }
+  return paths;
+}
+
+}  // namespace tensorray

@@ -1,0 +1,138 @@
+#include "integrators/photons/fluence.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+#include <stdexcept>
+#include <utility>
+
+#include <Eigen/LU>
+#include <tbb/parallel_for.h>
+
+#include "volumes/bricks/voxel_walk.h"
+
+namespace tensorray {
+namespace {
+
+constexpr int finest_bits = 32;  // The last bit of a sum is 2^-32 of a voxel's edge ...
+constexpr int room_bits = 60;    // ... unless sixteen edges of each ray need more than 64 bits.
+
+double quantum_for(std::uint64_t rays) {
+  int bits = 0;
+  while (bits < room_bits && (std::uint64_t{1} << bits) < rays) ++bits;
+  return std::ldexp(1.0, -std::min(finest_bits, room_bits - bits));
+}
+
+Eigen::Vector3i block_of(const Eigen::Vector3i& voxel) { return {voxel.x() >> 3, voxel.y() >> 3, voxel.z() >> 3}; }
+
+/// The part of a voxel that lies within the bounds, of its volume.
+double part_within(const Eigen::AlignedBox3d& bounds, const Eigen::Vector3i& voxel) {
+  const Eigen::Vector3d center = voxel.cast<double>(), half = Eigen::Vector3d::Constant(0.5);
+  return Eigen::AlignedBox3d(center - half, center + half).intersection(bounds).sizes().prod();
+}
+
+}  // namespace
+
+FluenceSums::FluenceSums(const TensorField& field, std::vector<double> powers, bool bands, std::uint64_t rays)
+    : field_(field),
+      powers_(std::move(powers)),
+      bands_(bands),
+      planes_(bands ? powers_.size() : 1),
+      edge_(std::cbrt(std::abs(field.to_world().linear().determinant()))),
+      quantum_(quantum_for(rays)),
+      first_block_(block_of(field.voxels().min().cast<int>())),
+      block_count_(block_of(field.voxels().max().cast<int>()) - first_block_ + Eigen::Vector3i::Ones()),
+      blocks_(block_count_.cast<std::size_t>().prod()) {
+  const double sum = std::accumulate(powers_.begin(), powers_.end(), 0.0);
+  if (!(sum > 0)) throw std::invalid_argument("light without power has no fluence");
+  for (double& power : powers_) power /= sum;
+  greatest_power_ = *std::max_element(powers_.begin(), powers_.end());
+}
+
+FluenceSums::~FluenceSums() {
+  for (const std::atomic<Sum*>& block : blocks_) delete[] block.load();
+}
+
+FluenceSums::Sum* FluenceSums::block_at(const Eigen::Vector3i& voxel) {
+  const Eigen::Vector3i at = block_of(voxel) - first_block_;
+  const std::size_t row = static_cast<std::size_t>(at.x()) * block_count_.y() + at.y();
+  std::atomic<Sum*>& block = blocks_[row * block_count_.z() + at.z()];
+  Sum* sums = block.load(std::memory_order_acquire);
+  if (sums) return sums;
+  std::unique_ptr<Sum[]> made(new Sum[planes_ * TensorBlock::voxels]());
+  // Unless another thread has been faster.
+  if (block.compare_exchange_strong(sums, made.get(), std::memory_order_acq_rel)) return made.release();
+  return sums;
+}
+
+void FluenceSums::add(std::size_t channel, const Track& track) {
+  const std::size_t plane = bands_ ? channel : 0;
+  const double weight = (bands_ ? 1 : powers_[channel] / greatest_power_) / (edge_ * quantum_);
+  // What is added is rounded such that the whole way is right to one quantum.
+  double way = 0;
+  std::uint64_t added = 0;
+  Eigen::Vector3d from;
+  for (std::size_t i = 0; i < track.size(); ++i) {
+    const Eigen::Vector3d to = field_.to_index() * track[i].position;
+    if (i > 0) {
+      const double length = weight * (track[i].length - track[i - 1].length);
+      walk_voxels(from, to, field_.index_bounds(), [&](const Eigen::Vector3i& voxel, double begin, double end) {
+        way += length * (end - begin);
+        const auto more = static_cast<std::uint64_t>(std::llround(way)) - added;
+        if (more == 0) return;
+        added += more;
+        const int offset = TensorBlock::offset(voxel.x() & 7, voxel.y() & 7, voxel.z() & 7);
+        block_at(voxel)[plane * TensorBlock::voxels + offset].fetch_add(more, std::memory_order_relaxed);
+      });
+    }
+    from = to;
+  }
+}
+
+/// The block's place in the table.
+Eigen::Vector3i FluenceSums::block_origin(std::size_t i) const {
+  const std::size_t ny = block_count_.y(), nz = block_count_.z();
+  const Eigen::Matrix<std::size_t, 3, 1> at(i / nz / ny, i / nz % ny, i % nz);
+  return TensorBlock::size * (first_block_ + at.cast<int>());
+}
+
+ScalarGrid FluenceSums::grid_of(std::size_t first_plane, const std::vector<double>& weights) const {
+  ScalarGrid grid;
+  grid.to_world = field_.to_world();
+  grid.fog = true;
+  std::vector<std::size_t> lit;
+  for (std::size_t i = 0; i < blocks_.size(); ++i)
+    if (blocks_[i].load()) lit.push_back(i);
+  grid.blocks.resize(lit.size());
+  const double unit = quantum_ / (edge_ * edge_);  // quantum · edge / edge³
+  tbb::parallel_for(std::size_t{0}, lit.size(), [&](std::size_t i) {
+    ScalarBlock& block = grid.blocks[i];
+    block.origin = block_origin(lit[i]);
+    const Sum* const sums = blocks_[lit[i]].load();
+    for (int offset = 0; offset < TensorBlock::voxels; ++offset) {
+      double value = 0;
+      for (std::size_t plane = 0; plane < weights.size(); ++plane)
+        value +=
+            weights[plane] * static_cast<double>(sums[(first_plane + plane) * TensorBlock::voxels + offset].load());
+      if (value == 0) continue;
+      const Eigen::Vector3i voxel = block.origin + TensorBlock::position(offset);
+      block.active.set(offset);
+      block.values[offset] = static_cast<float>(value * unit / part_within(field_.index_bounds(), voxel));
+    }
+  });
+  grid.blocks.erase(std::remove_if(grid.blocks.begin(), grid.blocks.end(),
+                                   [](const ScalarBlock& block) { return block.active.none(); }),
+                    grid.blocks.end());
+  return grid;
+}
+
+std::vector<ScalarGrid> FluenceSums::grids(double ray_area) const {
+  std::vector<double> weights{greatest_power_};
+  if (bands_) weights = powers_;
+  for (double& weight : weights) weight *= ray_area;
+  std::vector<ScalarGrid> all{grid_of(0, weights)};
+  for (std::size_t plane = 0; bands_ && plane < planes_; ++plane) all.push_back(grid_of(plane, {ray_area}));
+  return all;
+}
+
+}  // namespace tensorray

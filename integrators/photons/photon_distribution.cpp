@@ -1,0 +1,292 @@
+#include "integrators/photons/photon_distribution.h"
+
+#include <algorithm>
+#include <chrono>
+#include <memory>
+#include <stdexcept>
+#include <thread>
+
+#include <tbb/blocked_range.h>
+#include <tbb/enumerable_thread_specific.h>
+#include <tbb/parallel_for.h>
+#include <tbb/parallel_sort.h>
+
+#include "integrators/photons/fluence.h"
+
+namespace tensorray {
+namespace {
+
+// Positions whose landings are sorted and deposited together: many, so that all threads find work in it, and as light
+// that starts together lands together; but no more rays than these, whose landings take 16 MiB, and twice that sorted.
+constexpr std::uint64_t largest_chunk = 1u << 16, rays_in_chunk = 1u << 20;
+constexpr std::uint64_t task_size = 32;       // Positions that one thread traces before it takes others.
+constexpr std::uint64_t rays_in_batch = 512;  // About; all wavelengths of a position stay together.
+
+double seconds_since(std::chrono::steady_clock::time_point start) {
+  return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+}
+
+/// From the world to pixels of a plate.
+struct PixelMap {
+  Eigen::Matrix<double, 2, 3> linear;
+  Eigen::Vector2d offset, size;
+
+  explicit PixelMap(const Plate& plate)
+      : offset(plate.to_pixel(Eigen::Vector3d::Zero())), size(plate.resolution.cast<double>()) {
+    linear.row(0) = size.x() / plate.size.x() * plate.right.transpose();
+    linear.row(1) = -size.y() / plate.size.y() * plate.up.transpose();
+  }
+
+  /// Rounding may take a hit on the plate's edge outside of it.
+  Eigen::Vector2d operator()(const Eigen::Vector3d& world) const {
+    return (linear * world + offset).cwiseMax(0).cwiseMin(size);
+  }
+};
+
+/// Everything that the threads share and do not change.
+struct Job {
+  const TensorField& field;
+  const Geometry& geometry;
+  const Beam& beam;
+  const std::vector<LightChannel>& channels;
+  const BendingSettings& bending;
+  const PhotonSettings& settings;
+  const Progress& progress;
+  BeamSampler positions;
+  PixelMap to_pixel;
+  int rays_per_position;
+  int channels_per_ray;  // One of so many.
+  double ray_area;
+  FluenceSums* fluence;  // Null unless asked for.
+
+  std::uint64_t chunk_size() const {
+    return std::clamp(rays_in_chunk / rays_per_position, std::uint64_t{1}, largest_chunk);
+  }
+};
+
+/// What a thread works with, and what it has counted.
+struct Worker {
+  RayBatch batch;
+  std::vector<Track> tracks;
+  std::vector<std::uint16_t> channels;  // Of the batch's rays.
+  std::vector<EndCounts> ends;
+  std::uint64_t ray_steps = 0;
+};
+using Workers = tbb::enumerable_thread_specific<Worker>;
+
+/// A part of the emission, and what becomes of it.
+struct Chunk {
+  std::vector<Emission> emissions;           // Along a Morton curve.
+  std::vector<DensityPoint> landings;        // Nowhere: not on the plate.
+  std::vector<std::vector<Photon>> photons;  // By task, if they are kept.
+};
+
+/// The channel of the position's ray number `ray`: one in each of `rays_per_position` equal ranges of channels.
+int channel_of(const Job& job, int ray, double stratum) {
+  const int range = job.channels_per_ray;
+  return ray * range + std::min(static_cast<int>(stratum * range), range - 1);
+}
+
+/// Puts zeros between the bits.
+std::uint64_t spread_bits(std::uint32_t value) {
+  std::uint64_t bits = value;
+  bits = (bits | bits << 8) & 0x00ff00ffu;
+  bits = (bits | bits << 4) & 0x0f0f0f0fu;
+  bits = (bits | bits << 2) & 0x33333333u;
+  return (bits | bits << 1) & 0x55555555u;
+}
+
+/// Where a position lies on a Morton curve across the beam.
+std::uint64_t morton_code(const Eigen::Vector2d& across) {
+  const auto cell = [](double value) { return static_cast<std::uint32_t>(std::clamp(value, 0.0, 1.0) * 0xffff); };
+  return spread_bits(cell(across.x())) | spread_bits(cell(across.y())) << 1;
+}
+
+/// The positions [first, last) that emit, in an order in which neighbours follow each other: their light crosses the
+/// same cells of the field, and falls on the same pixels.
+void emit(const BeamSampler& positions, std::uint64_t first, std::uint64_t last, std::vector<Emission>& emissions) {
+  constexpr std::uint64_t none = ~std::uint64_t{0};
+  const std::size_t count = last - first;
+  std::vector<Emission> sampled(count);
+  std::vector<std::uint64_t> order(count);
+  tbb::parallel_for(tbb::blocked_range<std::size_t>(0, count, 256), [&](const tbb::blocked_range<std::size_t>& range) {
+    for (std::size_t i = range.begin(); i < range.end(); ++i)
+      order[i] = positions.sample(first + i, sampled[i]) ? morton_code(sampled[i].across) << 32 | i : none;
+  });
+  tbb::parallel_sort(order.begin(), order.end());
+  order.erase(std::lower_bound(order.begin(), order.end(), none), order.end());
+  emissions.clear();
+  for (const std::uint64_t key : order) emissions.push_back(sampled[static_cast<std::uint32_t>(key)]);
+}
+
+void fill_batch(const Job& job, const Emission* first, const Emission* last, Worker& worker) {
+  RayBatch& batch = worker.batch;
+  batch.clear();
+  worker.channels.clear();
+  for (const Emission* emission = first; emission != last; ++emission) {
+    batch.position.insert(batch.position.end(), job.rays_per_position, emission->origin);
+    for (int ray = 0; ray < job.rays_per_position; ++ray) {
+      const int channel = channel_of(job, ray, emission->stratum);
+      worker.channels.push_back(static_cast<std::uint16_t>(channel));
+      batch.flexibility.push_back(job.channels[channel].flexibility);
+    }
+  }
+  batch.direction.assign(batch.position.size(), job.beam.direction);
+}
+
+void trace_batch(const Job& job, Worker& worker) {
+  if (!job.fluence) return trace(job.field, job.geometry, job.bending, worker.batch);
+  trace(job.field, job.geometry, job.bending, worker.batch, worker.tracks);
+  for (std::size_t i = 0; i < worker.batch.size(); ++i) job.fluence->add(worker.channels[i], worker.tracks[i]);
+}
+
+Photon make_photon(const Job& job, const Worker& worker, std::size_t ray, const Eigen::Vector3d& origin) {
+  const LightChannel& channel = job.channels[worker.channels[ray]];
+  return {worker.batch.position[ray].cast<float>(), worker.batch.direction[ray].cast<float>(), origin.cast<float>(),
+          static_cast<float>(channel.wavelength), static_cast<float>(channel.power * job.ray_area)};
+}
+
+/// Counts the rays of a batch, and writes the landings of its positions' first rays from `landings` on, those of their
+/// second rays `step` further, and so on: the same wavelength of neighbouring positions falls on the same pixels.
+void collect_batch(const Job& job, const DensityEstimator& estimator, Worker& worker, DensityPoint* landings,
+                   std::size_t step) {
+  const std::size_t rays = job.rays_per_position;
+  for (std::size_t i = 0, position = 0; i < worker.batch.size(); ++position)
+    for (std::size_t ray = 0; ray < rays; ++ray, ++i) {
+      const RayEnd end = worker.batch.end[i];
+      const std::uint16_t channel = worker.channels[i];
+      ++worker.ends[channel][static_cast<int>(end)];
+      worker.ray_steps += worker.batch.steps[i];
+      landings[ray * step + position] =
+          end == RayEnd::plate ? estimator.point(channel, job.to_pixel(worker.batch.position[i])) : DensityPoint();
+    }
+}
+
+/// Traces the rays of a task's positions.
+void trace_task(const Job& job, const DensityEstimator& estimator, std::size_t task, Worker& worker, Chunk& chunk) {
+  const std::size_t rays = job.rays_per_position, first = task * task_size;
+  const std::size_t count = std::min<std::size_t>(task_size, chunk.emissions.size() - first);
+  const std::size_t batch = std::max<std::size_t>(1, rays_in_batch / rays);
+  const Emission* const emissions = &chunk.emissions[first];
+  if (worker.ends.empty()) worker.ends.assign(job.channels.size(), EndCounts{});
+  if (job.settings.keep_photons) chunk.photons[task].clear();
+  for (std::size_t begin = 0; begin < count; begin += batch) {
+    const std::size_t end = std::min(begin + batch, count);
+    fill_batch(job, emissions + begin, emissions + end, worker);
+    trace_batch(job, worker);
+    collect_batch(job, estimator, worker, &chunk.landings[first * rays + begin], count);
+    if (!job.settings.keep_photons) continue;
+    for (std::size_t i = 0; i < worker.batch.size(); ++i)
+      if (worker.batch.end[i] == RayEnd::plate)
+        chunk.photons[task].push_back(make_photon(job, worker, i, emissions[begin + i / rays].origin));
+  }
+}
+
+/// Traces a chunk's positions. Progress is told by the thread that called.
+void trace_chunk(const Job& job, const DensityEstimator& estimator, std::uint64_t first, std::uint64_t last,
+                 Workers& workers, Chunk& chunk) {
+  emit(job.positions, first, last, chunk.emissions);
+  const std::size_t count = chunk.emissions.size(), tasks = (count + task_size - 1) / task_size;
+  chunk.landings.resize(count * job.rays_per_position);
+  if (job.settings.keep_photons) chunk.photons.resize(tasks);
+  std::atomic<std::uint64_t> done{0};
+  const std::thread::id caller = std::this_thread::get_id();
+  tbb::parallel_for(std::size_t{0}, tasks, [&](std::size_t task) {
+    if (job.progress.cancelled) throw Cancelled();
+    trace_task(job, estimator, task, workers.local(), chunk);
+    const std::uint64_t traced = done += std::min<std::uint64_t>(task_size, count - task * task_size);
+    if (std::this_thread::get_id() == caller)
+      job.progress.update("tracing photons", first + traced, job.positions.candidates());
+  });
+}
+
+/// Adds the counts, which are integers: their sum has no order.
+void add_counts(const Workers& workers, int rays_per_position, PhotonDistribution& result) {
+  std::uint64_t rays = 0;
+  for (const Worker& worker : workers) {
+    result.ray_steps += worker.ray_steps;
+    result.tensor_samples += worker.batch.tensor_samples;
+    for (std::size_t channel = 0; channel < worker.ends.size(); ++channel)
+      for (int end = 0; end < ray_end_count; ++end) {
+        result.ends[channel][end] += worker.ends[channel][end];
+        rays += worker.ends[channel][end];
+      }
+  }
+  result.positions = rays / rays_per_position;
+}
+
+/// Null unless it is asked for.
+std::unique_ptr<FluenceSums> make_fluence(const Job& job) {
+  if (job.settings.fluence == FluenceKind::none) return nullptr;
+  std::vector<double> powers;
+  for (const LightChannel& channel : job.channels) powers.push_back(channel.power);
+  const std::uint64_t rays = job.positions.candidates() * static_cast<std::uint64_t>(job.rays_per_position);
+  return std::make_unique<FluenceSums>(job.field, std::move(powers), job.settings.fluence == FluenceKind::bands, rays);
+}
+
+int rays_per_position(const std::vector<LightChannel>& channels, const PhotonSettings& settings) {
+  const int count = static_cast<int>(channels.size());
+  if (count < 1 || count > 4096) throw std::invalid_argument("light needs between 1 and 4096 wavelengths");
+  if (settings.channels_per_photon == 0) return count;
+  if (settings.channels_per_photon < 0 || count % settings.channels_per_photon != 0)
+    throw std::invalid_argument("the number of wavelengths per photon must divide the number of wavelengths");
+  return settings.channels_per_photon;
+}
+
+}  // namespace
+
+PhotonDistribution distribute_photons(const TensorField& field, const Geometry& geometry, const Beam& beam,
+                                      const std::vector<LightChannel>& channels, const BendingSettings& bending,
+                                      const PhotonSettings& settings, const Progress& progress) {
+  if (!geometry.surfaces().plate) throw std::invalid_argument("photon distribution needs a receiver");
+  const Plate& plate = *geometry.surfaces().plate;
+  const int rays = rays_per_position(channels, settings);
+  Job job{field,
+          geometry,
+          beam,
+          channels,
+          bending,
+          settings,
+          progress,
+          BeamSampler(beam, settings.pattern, settings.photons, settings.seed),
+          PixelMap(plate),
+          rays,
+          static_cast<int>(channels.size()) / rays,
+          0,
+          nullptr};
+  job.ray_area = job.positions.area_per_candidate() * static_cast<double>(channels.size()) / rays;
+
+  const std::unique_ptr<FluenceSums> fluence = make_fluence(job);
+  job.fluence = fluence.get();
+
+  PhotonDistribution result;
+  result.ends.assign(channels.size(), EndCounts{});
+  result.ray_area = job.ray_area;
+  DensityEstimator estimator(plate.resolution.x(), plate.resolution.y(), static_cast<int>(channels.size()),
+                             settings.density, settings.colors);
+  Workers workers;
+  Chunk chunk;
+  const std::uint64_t candidates = job.positions.candidates();
+  for (std::uint64_t first = 0; first < candidates; first += job.chunk_size()) {
+    const std::uint64_t last = std::min(first + job.chunk_size(), candidates);
+    progress.update("tracing photons", first, candidates);
+    auto start = std::chrono::steady_clock::now();
+    trace_chunk(job, estimator, first, last, workers, chunk);
+    result.seconds_tracing += seconds_since(start);
+    start = std::chrono::steady_clock::now();
+    estimator.add(chunk.landings);
+    for (const std::vector<Photon>& photons : chunk.photons)
+      result.photons.insert(result.photons.end(), photons.begin(), photons.end());
+    result.seconds_density += seconds_since(start);
+  }
+  progress.update("tracing photons", candidates, candidates);
+  add_counts(workers, rays, result);
+  if (fluence) result.fluence = fluence->grids(job.ray_area);
+
+  const auto start = std::chrono::steady_clock::now();
+  result.irradiance = std::move(estimator).finish(job.ray_area / plate.pixel_area());
+  result.seconds_density += seconds_since(start);
+  return result;
+}
+
+}  // namespace tensorray

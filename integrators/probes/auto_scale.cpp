@@ -1,0 +1,73 @@
+#include "integrators/probes/auto_scale.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include <tbb/parallel_for.h>
+
+namespace tensorray {
+namespace {
+
+constexpr double probe_flexibility = 0.2;
+constexpr double wanted_turn = 0.15;    // Radians.
+constexpr double smallest_turn = 1e-7;  // Of a ray that turns at all.
+constexpr std::uint64_t probe_count = 1024;
+
+std::vector<Eigen::Vector3d> probe_origins(const Beam& beam) {
+  const BeamSampler sampler(beam, BeamPattern::stratified, probe_count, 0);
+  std::vector<Eigen::Vector3d> origins;
+  Emission emission;
+  for (std::uint64_t i = 0; i < sampler.candidates(); ++i)
+    if (sampler.sample(i, emission)) origins.push_back(emission.origin);
+  return origins;
+}
+
+/// How far the median ray turns if the field is multiplied by `scale`.
+AutoScale probe(const TensorField& field, const Geometry& geometry, const Beam& beam,
+                const std::vector<Eigen::Vector3d>& origins, double scale, const Progress& progress) {
+  BendingSettings settings;
+  settings.step = 0.5;  // A fixed step: the splitting is stable however large the scale.
+  std::vector<double> turns(origins.size());
+  tbb::parallel_for(std::size_t{0}, origins.size(), [&](std::size_t i) {
+    if (progress.cancelled) throw Cancelled();
+    RayBatch batch;
+    batch.add(origins[i], beam.direction, probe_flexibility * scale);
+    trace(field, geometry, settings, batch);
+    const Eigen::Vector3d& V = batch.direction[0];
+    const bool followed = batch.end[0] == RayEnd::plate || batch.end[0] == RayEnd::missed;
+    turns[i] = followed ? std::atan2(beam.direction.cross(V).norm(), beam.direction.dot(V)) : 0;
+  });
+  turns.erase(std::remove_if(turns.begin(), turns.end(), [](double turn) { return turn < smallest_turn; }),
+              turns.end());
+  if (turns.empty()) return {scale, 0, 0};
+  const auto median = turns.begin() + static_cast<std::ptrdiff_t>(turns.size() / 2);
+  std::nth_element(turns.begin(), median, turns.end());
+  return {scale, *median, static_cast<double>(turns.size()) / static_cast<double>(origins.size())};
+}
+
+}  // namespace
+
+AutoScale choose_scale(const TensorField& field, const Geometry& geometry, const Beam& beam, const Progress& progress) {
+  const double norm = field.greatest_norm();
+  if (norm == 0) return {};
+  const std::vector<Eigen::Vector3d> origins = probe_origins(beam);
+  const double depth = (field.to_world().linear() * field.index_bounds().sizes()).norm();
+
+  // No ray turns by more than s‖T‖ times its length: start where that is small, and go up to the first scale that
+  // turns enough.
+  AutoScale low{0.1 * wanted_turn / (probe_flexibility * norm * depth), 0, 0}, high = low;
+  AutoScale best{1, 0, 0};
+  for (int doubling = 0; doubling < 50 && high.median_turn < wanted_turn; ++doubling) {
+    low = high;
+    high = probe(field, geometry, beam, origins, 2 * low.scale, progress);
+    if (high.median_turn > best.median_turn) best = high;
+  }
+  if (best.median_turn < wanted_turn) return best;  // It turns no ray, or never enough.
+  for (int i = 0; i < 20; ++i) {
+    const AutoScale middle = probe(field, geometry, beam, origins, (low.scale + high.scale) / 2, progress);
+    (middle.median_turn < wanted_turn ? low : high) = middle;
+  }
+  return high;
+}
+
+}  // namespace tensorray

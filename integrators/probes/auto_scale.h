@@ -1,0 +1,23 @@
+#pragma once
+/// @file integrators/probes/auto_scale.h
+/// Chooses by how much a field is multiplied so that light bends visibly but does not tangle.
+
+#include "base/progress.h"
+#include "integrators/bending/bending.h"
+#include "renderer/lights/beam.h"
+
+namespace tensorray {
+
+struct AutoScale {
+  double scale = 1;
+  double median_turn = 0;    ///< Radians between entry and exit of the median bent ray, at s = 0.2 and this scale.
+  double bent_fraction = 0;  ///< Of the probe rays, those that the field turns at all.
+};
+
+/// Finds the scale at which the median of the probe rays that turn at all, at s = 0.2, turns by 0.15 rad. By scaling
+/// invariance ((kT, s) is (T, ks)) the field itself is not touched. A field that turns no ray gets scale 1.
+/// Deterministic; runs on all threads.
+/// @throw Cancelled.
+AutoScale choose_scale(const TensorField& field, const Geometry& geometry, const Beam& beam, const Progress& progress);
+
+}  // namespace tensorray

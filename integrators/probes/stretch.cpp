@@ -1,0 +1,143 @@
+#include "integrators/probes/stretch.h"
+
+#include <algorithm>
+#include <cmath>
+#include <deque>
+#include <limits>
+#include <stdexcept>
+
+#include <Eigen/Geometry>
+#include <tbb/parallel_for.h>
+
+namespace tensorray {
+namespace {
+
+constexpr std::size_t chunk_size = 64;  // Blocks, or rows, between two progress reports.
+
+/// ln of the greatest singular value.
+double log_stretch(const Eigen::Matrix<double, 3, 2>& m) {
+  const Eigen::Matrix2d square = m.transpose() * m;
+  const double mean = square.trace() / 2;
+  const double greatest = mean + std::hypot((square(0, 0) - square(1, 1)) / 2, square(0, 1));
+  return std::log(std::max(greatest, std::numeric_limits<double>::min())) / 2;
+}
+
+/// Calls `work(i)` for each i below `count` on all threads, and tells of it.
+template <class Work>
+void in_parallel(std::size_t count, const Progress& progress, const Work& work) {
+  for (std::size_t first = 0; first < count; first += chunk_size) {
+    progress.update("tracing rays", first, count);
+    tbb::parallel_for(first, std::min(first + chunk_size, count), [&](std::size_t i) {
+      if (progress.cancelled) throw Cancelled();
+      work(i);
+    });
+  }
+  progress.update("tracing rays", count, count);
+}
+
+constexpr double most_voxels = 1 << 30;
+
+/// A lattice in the volume: its middle is the extent's.
+struct Lattice {
+  Eigen::Vector3i size;
+  Eigen::Affine3d to_world;
+};
+
+Lattice make_lattice(const TensorField& field, int resolution) {
+  if (resolution < 2) throw std::invalid_argument("the resolution must be 2 or more");
+  const Eigen::AlignedBox3d& extent = field.index_bounds();
+  const double spacing = extent.sizes().maxCoeff() / (resolution - 1);
+  Lattice lattice;
+  lattice.size = (extent.sizes() / spacing + Eigen::Vector3d::Constant(1e-6)).array().floor().cast<int>() + 1;
+  if (lattice.size.cast<double>().prod() > most_voxels)
+    throw std::invalid_argument("the grid would have more than 2^30 voxels: lower the resolution");
+  const Eigen::Vector3d first = extent.center() - spacing / 2 * (lattice.size.cast<double>() - Eigen::Vector3d::Ones());
+  lattice.to_world = field.to_world() * Eigen::Translation3d(first) * Eigen::Scaling(spacing);
+  return lattice;
+}
+
+/// Every block that a lattice needs, in order.
+std::deque<ScalarBlock> blocks_of(const Lattice& lattice) {
+  constexpr int size = TensorBlock::size;
+  std::deque<ScalarBlock> blocks;
+  for (int x = 0; x < lattice.size.x(); x += size)
+    for (int y = 0; y < lattice.size.y(); y += size)
+      for (int z = 0; z < lattice.size.z(); z += size) {
+        blocks.emplace_back();
+        blocks.back().origin = {x, y, z};
+      }
+  return blocks;
+}
+
+}  // namespace
+
+std::vector<float> stretches(const TensorField& field, const Geometry& geometry, const BendingSettings& bending,
+                             const StretchSettings& settings, const std::vector<Eigen::Vector3d>& starts) {
+  if (!std::isfinite(settings.length)) throw std::invalid_argument("the length of the rays must be finite");
+  BendingSettings limited = bending;
+  limited.max_length = settings.length;
+  RayDifferential across;
+  across.position.col(0) = settings.direction.unitOrthogonal();
+  across.position.col(1) = settings.direction.cross(across.position.col(0));
+  RayBatch batch;
+  for (const Eigen::Vector3d& start : starts) {
+    batch.add(start, settings.direction, settings.flexibility);
+    batch.differentials.push_back(across);
+  }
+  trace(field, geometry, limited, batch);
+
+  std::vector<float> values(starts.size(), std::numeric_limits<float>::quiet_NaN());
+  for (std::size_t i = 0; i < starts.size(); ++i) {
+    if (batch.end[i] != RayEnd::missed || batch.steps[i] == 0) continue;
+    const RayDifferential& end = batch.differentials[i];
+    values[i] = static_cast<float>(log_stretch(end.position - batch.direction[i] * end.length) / settings.length);
+  }
+  return values;
+}
+
+ScalarGrid stretch_grid(const TensorField& field, const Geometry& geometry, const BendingSettings& bending,
+                        const StretchSettings& settings, int resolution, const Progress& progress) {
+  const Lattice lattice = make_lattice(field, resolution);
+  ScalarGrid grid;
+  grid.name = "stretch";
+  grid.to_world = lattice.to_world;
+  grid.blocks = blocks_of(lattice);
+  in_parallel(grid.blocks.size(), progress, [&](std::size_t i) {
+    ScalarBlock& block = grid.blocks[i];
+    std::vector<Eigen::Vector3d> starts;
+    std::vector<int> offsets;
+    for (int offset = 0; offset < TensorBlock::voxels; ++offset) {
+      const Eigen::Vector3i voxel = block.origin + TensorBlock::position(offset);
+      if ((voxel.array() >= lattice.size.array()).any()) continue;
+      starts.push_back(lattice.to_world * voxel.cast<double>());
+      offsets.push_back(offset);
+    }
+    const std::vector<float> values = stretches(field, geometry, bending, settings, starts);
+    for (std::size_t k = 0; k < values.size(); ++k) {
+      if (std::isnan(values[k])) continue;
+      block.active.set(offsets[k]);
+      block.values[offsets[k]] = values[k];
+    }
+  });
+  grid.blocks.erase(std::remove_if(grid.blocks.begin(), grid.blocks.end(),
+                                   [](const ScalarBlock& block) { return block.active.none(); }),
+                    grid.blocks.end());
+  return grid;
+}
+
+std::vector<float> stretch_picture(const TensorField& field, const Geometry& geometry, const BendingSettings& bending,
+                                   const StretchSettings& settings, const Plate& pixels, const Progress& progress) {
+  const auto width = static_cast<std::size_t>(pixels.resolution.x());
+  const auto height = static_cast<std::size_t>(pixels.resolution.y());
+  std::vector<float> picture(width * height);
+  in_parallel(height, progress, [&](std::size_t y) {
+    std::vector<Eigen::Vector3d> starts;
+    for (std::size_t x = 0; x < width; ++x)
+      starts.push_back(pixels.to_world(Eigen::Vector2d(static_cast<double>(x) + 0.5, static_cast<double>(y) + 0.5)));
+    const std::vector<float> row = stretches(field, geometry, bending, settings, starts);
+    std::copy(row.begin(), row.end(), picture.begin() + static_cast<std::ptrdiff_t>(y * width));
+  });
+  return picture;
+}
+
+}  // namespace tensorray

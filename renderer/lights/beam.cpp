@@ -1,0 +1,134 @@
+#include "renderer/lights/beam.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <stdexcept>
+
+#include "renderer/sampling/random.h"
+#include "renderer/surfaces/plate.h"
+
+namespace tensorray {
+namespace {
+
+double cross(const Eigen::Vector2d& a, const Eigen::Vector2d& b) { return a.x() * b.y() - a.y() * b.x(); }
+
+/// Andrew's monotone chain; counter-clockwise, without collinear points.
+std::vector<Eigen::Vector2d> convex_hull(std::vector<Eigen::Vector2d> points) {
+  std::sort(points.begin(), points.end(),
+            [](auto& a, auto& b) { return a.x() < b.x() || (a.x() == b.x() && a.y() < b.y()); });
+  std::vector<Eigen::Vector2d> hull;
+  const auto extend = [&](const Eigen::Vector2d& point, std::size_t start) {
+    while (hull.size() >= start + 2 && cross(hull.back() - hull[hull.size() - 2], point - hull.back()) <= 0)
+      hull.pop_back();
+    hull.push_back(point);
+  };
+  for (const Eigen::Vector2d& point : points) extend(point, 0);
+  const std::size_t upper = hull.size() - 1;
+  for (auto point = points.rbegin() + 1; point != points.rend(); ++point) extend(*point, upper);
+  hull.pop_back();
+  return hull;
+}
+
+/// Inside or on the edge of a convex polygon, to rounding: a position on the edge of a rectangular beam is in it.
+bool contains(const std::vector<Eigen::Vector2d>& polygon, const Eigen::Vector2d& point) {
+  for (std::size_t i = 0; i < polygon.size(); ++i) {
+    const Eigen::Vector2d& from = polygon[i];
+    const Eigen::Vector2d edge = polygon[(i + 1) % polygon.size()] - from;
+    if (cross(edge, point - from) < -1e-12 * edge.squaredNorm()) return false;
+  }
+  return true;
+}
+
+}  // namespace
+
+double area(const std::vector<Eigen::Vector2d>& polygon) {
+  double twice = 0;
+  for (std::size_t i = 0; i < polygon.size(); ++i) twice += cross(polygon[i], polygon[(i + 1) % polygon.size()]);
+  return twice / 2;
+}
+
+Beam silhouette_beam(const std::vector<Eigen::Vector3d>& points, const Eigen::Vector3d& direction,
+                     const Eigen::Vector3d& up) {
+  Beam beam;
+  beam.direction = direction.normalized();
+  beam.up = upright(beam.direction, up);
+  beam.right = beam.direction.cross(beam.up);
+
+  Eigen::AlignedBox3d box;  // In the frame (right, up, direction).
+  std::vector<Eigen::Vector2d> seen;
+  for (const Eigen::Vector3d& point : points) {
+    const Eigen::Vector3d p(point.dot(beam.right), point.dot(beam.up), point.dot(beam.direction));
+    box.extend(p);
+    seen.push_back(p.head<2>());
+  }
+  const Eigen::Vector2d middle = box.center().head<2>();
+  for (Eigen::Vector2d& p : seen) p -= middle;
+  beam.aperture = convex_hull(seen);
+  const double size = box.diagonal().norm();
+  if (!(area(beam.aperture) > 1e-12 * size * size))
+    throw std::invalid_argument("seen along the light the volume has no area: choose another light direction");
+  const double start = box.min().z() - 0.01 * size;
+  beam.center = middle.x() * beam.right + middle.y() * beam.up + start * beam.direction;
+  return beam;
+}
+
+BeamSampler::BeamSampler(const Beam& beam, BeamPattern pattern, std::uint64_t count, std::uint64_t seed)
+    : beam_(beam), pattern_(pattern), seed_(seed) {
+  if (count < 1) throw std::invalid_argument("a beam needs at least one photon");
+  Eigen::AlignedBox2d box;
+  for (const Eigen::Vector2d& p : beam.aperture) box.extend(p);
+  corner_ = box.min();
+  extent_ = box.sizes();
+  const double rectangle = extent_.prod();
+  const double wanted = static_cast<double>(count) * rectangle / area(beam.aperture);
+  if (pattern == BeamPattern::grid || pattern == BeamPattern::stratified) {
+    columns_ = std::max<std::uint64_t>(1, std::llround(std::sqrt(wanted * extent_.x() / extent_.y())));
+    rows_ = std::max<std::uint64_t>(1, std::llround(wanted / static_cast<double>(columns_)));
+    candidates_ = columns_ * rows_;
+  } else {
+    candidates_ = std::max<std::uint64_t>(1, std::llround(wanted));
+  }
+  if (pattern == BeamPattern::sobol && candidates_ > std::numeric_limits<std::uint32_t>::max())
+    throw std::invalid_argument("the sobol pattern has at most 2^32 photons: choose the stratified pattern");
+  area_per_candidate_ = rectangle / static_cast<double>(candidates_);
+}
+
+bool BeamSampler::sample(std::uint64_t index, Emission& emission) const {
+  const Eigen::Vector3d u = unit_sample(index);
+  const Eigen::Vector2d position = corner_ + u.head<2>().cwiseProduct(extent_);
+  if (!contains(beam_.aperture, position)) return false;
+  emission.origin = beam_.center + position.x() * beam_.right + position.y() * beam_.up;
+  emission.across = u.head<2>();
+  emission.stratum = u.z();
+  return true;
+}
+
+Eigen::Vector3d BeamSampler::unit_sample(std::uint64_t index) const {
+  const auto uniform = [&](std::uint32_t dimension) { return random_uniform(seed_, index, dimension); };
+  switch (pattern_) {
+    case BeamPattern::grid:
+      return cell_sample(index, {0.5, 0.5});
+    case BeamPattern::stratified:
+      return cell_sample(index, {uniform(0), uniform(1)});
+    case BeamPattern::sobol: {
+      const auto i = static_cast<std::uint32_t>(index);
+      return {sobol(seed_, i, 0), sobol(seed_, i, 1), sobol(seed_, i, 2)};
+    }
+    case BeamPattern::random:
+      break;
+  }
+  return {uniform(0), uniform(1), uniform(2)};
+}
+
+/// A position in the cell of a lattice. The stratum is a rank-1 lattice of the cells: the cells of equal stratum are
+/// spread evenly, and so is the light of each wavelength if only some of them start from each cell.
+Eigen::Vector3d BeamSampler::cell_sample(std::uint64_t index, const Eigen::Vector2d& within) const {
+  const auto column = static_cast<double>(index % columns_), row = static_cast<double>(index / columns_);
+  constexpr double golden1 = 0.7548776662466927, golden2 = 0.5698402909980532;  // Roberts' R2 sequence.
+  const double stratum = golden1 * column + golden2 * row + random_uniform(seed_, 0, 3);
+  return {(column + within.x()) / static_cast<double>(columns_), (row + within.y()) / static_cast<double>(rows_),
+          stratum - std::floor(stratum)};
+}
+
+}  // namespace tensorray

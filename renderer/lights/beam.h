@@ -1,0 +1,63 @@
+#pragma once
+/// @file renderer/lights/beam.h
+/// A parallel beam of light through an aperture.
+
+#include <cstdint>
+#include <vector>
+
+#include <Eigen/Geometry>
+
+namespace tensorray {
+
+enum class BeamPattern { grid, stratified, sobol, random };
+
+/// Parallel light. Positions across it are in the frame (right, up) about `center`; it starts at `center`'s plane.
+struct Beam {
+  Eigen::Vector3d direction = -Eigen::Vector3d::UnitZ();  ///< Unit.
+  Eigen::Vector3d center = Eigen::Vector3d::Zero();       ///< World.
+  Eigen::Vector3d right = Eigen::Vector3d::UnitX();       ///< Unit, across the beam.
+  Eigen::Vector3d up = Eigen::Vector3d::UnitY();          ///< Unit, across the beam.
+  std::vector<Eigen::Vector2d> aperture;                  ///< Convex polygon, counter-clockwise in (right, up).
+};
+
+/// The beam whose aperture is the silhouette of `points` (their convex hull seen along `direction`) and which starts
+/// before all of them. `up` sets the frame (see `upright`).
+/// @throw std::invalid_argument if the silhouette has no area.
+Beam silhouette_beam(const std::vector<Eigen::Vector3d>& points, const Eigen::Vector3d& direction,
+                     const Eigen::Vector3d& up);
+
+double area(const std::vector<Eigen::Vector2d>& polygon);
+
+/// One position of light.
+struct Emission {
+  Eigen::Vector3d origin = Eigen::Vector3d::Zero();  ///< World.
+  Eigen::Vector2d across = Eigen::Vector2d::Zero();  ///< Within the rectangle about the aperture, from 0 to 1.
+  double stratum = 0;  ///< In [0, 1): stratified jointly with the position; chooses among wavelengths.
+};
+
+/// The positions from which a beam emits, as a function of the index. Immutable, shared by threads.
+class BeamSampler {
+ public:
+  /// @param count  About how many positions shall lie in the aperture.
+  /// @throw std::invalid_argument if count is 0, or above what the pattern has.
+  BeamSampler(const Beam& beam, BeamPattern pattern, std::uint64_t count, std::uint64_t seed);
+
+  std::uint64_t candidates() const { return candidates_; }  ///< Indices run from 0 to here.
+  double area_per_candidate() const { return area_per_candidate_; }
+
+  /// Sets `emission` and returns true if candidate `index` lies in the aperture.
+  bool sample(std::uint64_t index, Emission& emission) const;
+
+ private:
+  Eigen::Vector3d unit_sample(std::uint64_t index) const;
+  Eigen::Vector3d cell_sample(std::uint64_t index, const Eigen::Vector2d& within) const;
+
+  Beam beam_;
+  BeamPattern pattern_;
+  std::uint64_t seed_;
+  Eigen::Vector2d corner_, extent_;  // Rectangle about the aperture.
+  std::uint64_t columns_ = 1, rows_ = 1, candidates_ = 0;
+  double area_per_candidate_ = 0;
+};
+
+}  // namespace tensorray

@@ -1,0 +1,215 @@
+#include "renderer/lights/lights.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <stdexcept>
+#include <string>
+#include <utility>
+
+#include "base/constants.h"
+#include "base/errors.h"
+#include "renderer/sampling/sampling.h"
+
+namespace tensorray {
+namespace {
+
+using Eigen::Vector2d;
+using Eigen::Vector3d;
+
+void require_bands(const std::vector<float>& values, std::size_t bands, const char* name) {
+  const bool valid = std::all_of(values.begin(), values.end(), [](float v) { return v >= 0 && std::isfinite(v); });
+  require(values.size() == bands && valid,
+          std::string(name) + " must have a finite value >= 0 for each of the " + std::to_string(bands) + " bands");
+}
+
+std::vector<float> band_importance(const std::vector<float>& luminance) {
+  require_bands(luminance, luminance.size(), "the luminance");
+  double sum = 0;
+  for (const float value : luminance) sum += value;
+  require(sum > 0, "light needs a band with a luminance above 0");
+  std::vector<float> importance;
+  for (const float value : luminance)
+    importance.push_back(static_cast<float>(0.9 * value / sum + 0.1 / static_cast<double>(luminance.size())));
+  return importance;
+}
+
+double dot(const std::vector<float>& a, const std::vector<float>& b) {
+  double sum = 0;
+  for (std::size_t i = 0; i < a.size(); ++i) sum += static_cast<double>(a[i]) * b[i];
+  return sum;
+}
+
+/// Twice the area as its length, towards the side that shines.
+Vector3d triangle_normal(const TriangleMesh& mesh, std::size_t triangle) {
+  const auto [a, b, c] = mesh.triangles[triangle];
+  return (mesh.vertices[b] - mesh.vertices[a]).cross(mesh.vertices[c] - mesh.vertices[a]);
+}
+
+Distribution1D triangles_by_area(const TriangleMesh& mesh) {
+  std::vector<double> areas;
+  for (std::size_t i = 0; i < mesh.triangles.size(); ++i) areas.push_back(triangle_normal(mesh, i).norm() / 2);
+  require(!areas.empty(), "the mesh has no triangles");
+  Distribution1D result(areas);
+  require(result.sum() > 0, "the mesh has no area");
+  return result;
+}
+
+/// Whether a direction towards the sky is in the light's disk. Compares chords, which small angles need.
+bool in_disk(const DirectionalLight& light, const Vector3d& direction) {
+  return (direction + light.direction).norm() <= 2 * std::sin(light.angle / 2);
+}
+
+/// That of an even disk which gives the light's irradiance to a surface that faces it: ∫ cos θ dω = π sin² angle.
+double radiance_per_irradiance(const DirectionalLight& light) { return 1 / (pi * std::pow(std::sin(light.angle), 2)); }
+
+bool is_background(const Light& light) {
+  if (const auto* directional = std::get_if<DirectionalLight>(&light)) return directional->angle > 0;
+  return !std::holds_alternative<AreaLight>(light);
+}
+
+/// Of the side that `cosine` (of the direction to the viewer with the normal) sees.
+bool shines(const AreaLight& light, double cosine) { return cosine > 0 || (light.two_sided && cosine < 0); }
+
+void add(double factor, const std::vector<float>& values, std::vector<float>& sum) {
+  for (std::size_t i = 0; i < sum.size(); ++i) sum[i] += static_cast<float>(factor) * values[i];
+}
+
+}  // namespace
+
+TriangleMesh rectangle_mesh(const Vector3d& center, const Vector3d& right, const Vector3d& up, const Vector2d& size) {
+  const Vector3d x = size.x() / 2 * right, y = size.y() / 2 * up;
+  return {{center - x - y, center + x - y, center + x + y, center - x + y}, {{0, 1, 2}, {0, 2, 3}}};
+}
+
+LightSampler::LightSampler(std::vector<Light> lights, const std::vector<float>& luminance,
+                           const Eigen::AlignedBox3d& scene)
+    : bands_(luminance.size()), lights_(std::move(lights)) {
+  const std::vector<float> importance = band_importance(luminance);
+  const double radius = scene.isEmpty() ? 0 : scene.diagonal().norm() / 2;
+  std::vector<double> powers;
+  for (std::size_t i = 0; i < lights_.size(); ++i) {
+    try {
+      prepared_.push_back(prepare(lights_[i], importance, radius > 0 ? radius : 1));
+    } catch (const std::invalid_argument& error) {
+      throw std::invalid_argument("light " + std::to_string(i) + ": " + error.what());
+    }
+    powers.push_back(prepared_.back().power);
+  }
+  if (!powers.empty()) choice_.emplace(powers);
+}
+
+/// The power of what is infinitely far away is that which passes through the ball about the scene.
+LightSampler::Prepared LightSampler::prepare(Light& light, const std::vector<float>& importance,
+                                             double scene_radius) const {
+  const double ball = pi * scene_radius * scene_radius;
+  Prepared result;
+  if (auto* area = std::get_if<AreaLight>(&light)) {
+    require_bands(area->radiance, bands_, "radiance");
+    result.triangles = triangles_by_area(area->mesh);
+    result.power = pi * result.triangles->sum() * dot(area->radiance, importance) * (area->two_sided ? 2 : 1);
+  } else if (auto* directional = std::get_if<DirectionalLight>(&light)) {
+    require_bands(directional->irradiance, bands_, "irradiance");
+    require(directional->direction.allFinite() && directional->direction.stableNorm() > 0,
+            "direction must be finite and not zero");
+    require(directional->angle >= 0 && directional->angle <= pi / 2, "angle must be 0 to pi / 2");
+    directional->direction.stableNormalize();
+    result.power = ball * dot(directional->irradiance, importance);
+  } else if (auto* constant = std::get_if<ConstantLight>(&light)) {
+    require_bands(constant->radiance, bands_, "radiance");
+    result.power = ball * 4 * pi * dot(constant->radiance, importance);
+  } else {
+    result.environment.emplace(std::move(std::get<EnvironmentLight>(light)), importance);
+    result.power = ball * result.environment->importance();
+  }
+  return result;
+}
+
+double LightSampler::choice_probability(int light) const { return choice_->probability(light); }
+
+bool LightSampler::sample(const Vector3d& point, double choice, const Vector2d& u, LightSample& sample) const {
+  if (!choice_) return false;
+  const Distribution1D::Sample chosen = choice_->sample(choice);
+  const Light& light = lights_[chosen.cell];
+  if (std::holds_alternative<AreaLight>(light)) return sample_area(chosen.cell, point, chosen.within, u, sample);
+
+  const auto* directional = std::get_if<DirectionalLight>(&light);
+  sample.distance = std::numeric_limits<double>::infinity();
+  sample.is_delta = !is_background(light);
+  if (sample.is_delta) {
+    sample.direction = -directional->direction;
+    sample.radiance = directional->irradiance;
+    sample.pdf = chosen.probability;
+    return true;
+  }
+  if (directional) {
+    sample.direction = frame_about(-directional->direction) * square_to_cone(u, directional->angle);
+  } else {
+    const auto& environment = prepared_[chosen.cell].environment;
+    sample.direction = environment ? environment->sample(u) : square_to_sphere(u);
+  }
+  sample.pdf = background_pdf(sample.direction);
+  background(sample.direction, sample.radiance);
+  return sample.pdf > 0;
+}
+
+bool LightSampler::sample_area(int light, const Vector3d& point, double choice, const Vector2d& u,
+                               LightSample& sample) const {
+  const auto& area = std::get<AreaLight>(lights_[light]);
+  const int triangle = prepared_[light].triangles->sample(choice).cell;
+  const auto [a, b, c] = area.mesh.triangles[triangle];
+  const Vector3d weights = square_to_triangle(u);
+  const Vector3d position =
+      weights.x() * area.mesh.vertices[a] + weights.y() * area.mesh.vertices[b] + weights.z() * area.mesh.vertices[c];
+  sample.distance = (position - point).norm();
+  sample.direction = (position - point) / sample.distance;
+  sample.radiance = area.radiance;
+  sample.is_delta = false;
+  sample.pdf = area_pdf(light, point, position, triangle_normal(area.mesh, triangle).normalized());
+  return sample.pdf > 0;
+}
+
+double LightSampler::area_pdf(int light, const Vector3d& point, const Vector3d& position,
+                              const Vector3d& normal) const {
+  const Vector3d way = point - position;
+  const double distance = way.norm(), cosine = normal.dot(way) / distance;
+  if (!shines(std::get<AreaLight>(lights_[light]), cosine)) return 0;
+  const double area = prepared_[light].triangles->sum();
+  return choice_->probability(light) * distance * distance / (std::abs(cosine) * area);
+}
+
+const std::vector<float>* LightSampler::emitted(int light, const Vector3d& normal, const Vector3d& direction) const {
+  const auto& area = std::get<AreaLight>(lights_[light]);
+  return shines(area, -normal.dot(direction)) ? &area.radiance : nullptr;
+}
+
+void LightSampler::background(const Vector3d& direction, std::vector<float>& radiance) const {
+  radiance.assign(bands_, 0);
+  for (std::size_t i = 0; i < lights_.size(); ++i) {
+    if (!is_background(lights_[i])) continue;
+    if (const auto* disk = std::get_if<DirectionalLight>(&lights_[i])) {
+      if (in_disk(*disk, direction)) add(radiance_per_irradiance(*disk), disk->irradiance, radiance);
+    } else if (const auto* constant = std::get_if<ConstantLight>(&lights_[i])) {
+      add(1, constant->radiance, radiance);
+    } else {
+      prepared_[i].environment->add_radiance(direction, radiance);
+    }
+  }
+}
+
+double LightSampler::background_pdf(const Vector3d& direction) const {
+  double sum = 0;
+  for (int i = 0; i < static_cast<int>(lights_.size()); ++i)
+    if (is_background(lights_[i])) sum += choice_->probability(i) * directional_pdf(i, direction);
+  return sum;
+}
+
+/// The density with which a light of the background, once chosen, chooses a direction.
+double LightSampler::directional_pdf(int light, const Vector3d& direction) const {
+  if (const auto* disk = std::get_if<DirectionalLight>(&lights_[light]))
+    return in_disk(*disk, direction) ? 1 / cone_solid_angle(disk->angle) : 0;
+  const auto& environment = prepared_[light].environment;
+  return environment ? environment->pdf(direction) : 1 / (4 * pi);
+}
+
+}  // namespace tensorray

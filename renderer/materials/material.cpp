@@ -1,0 +1,94 @@
+#include "renderer/materials/material.h"
+
+#include <cmath>
+#include <stdexcept>
+#include <string>
+
+#include "base/constants.h"
+
+namespace tensorray {
+namespace {
+
+Diffuse prepare(const Diffuse& settings) { return settings; }
+
+void evaluate(const Diffuse&, const BandsIn& reflectance, const Eigen::Vector3d&, const Eigen::Vector3d&, BandsOut f) {
+  f = reflectance / pi;
+}
+
+double pdf(const Diffuse&, const BandsIn&, const Eigen::Vector3d& wi, const Eigen::Vector3d&) { return wi.z() / pi; }
+
+Eigen::Vector3d sample(const Diffuse&, const BandsIn&, const Eigen::Vector3d&, const Eigen::Vector3d& u) {
+  const double sine = std::sqrt(u.y()), turn = 2 * pi * u.z();
+  return {sine * std::cos(turn), sine * std::sin(turn), std::sqrt(1 - u.y())};
+}
+
+bool is_glass(const Material& material) { return std::holds_alternative<DielectricScattering>(material.scattering); }
+
+/// Opaque materials are written for wo above the surface.
+Eigen::Vector3d seen(const Material& material, const Eigen::Vector3d& w, const Eigen::Vector3d& wo) {
+  return wo.z() < 0 && !is_glass(material) ? Eigen::Vector3d(w.x(), w.y(), -w.z()) : w;
+}
+
+/// False where f is 0 because of the directions alone.
+bool scatters(const Material& material, const Eigen::Vector3d& wi, const Eigen::Vector3d& wo) {
+  const double sides = wi.z() * wo.z();
+  return sides > 0 || (sides < 0 && is_glass(material));
+}
+
+double refraction(const Material& material, const Eigen::Vector3d& wi, const Eigen::Vector3d& wo) {
+  const auto* glass = std::get_if<DielectricScattering>(&material.scattering);
+  if (glass == nullptr || wi.z() * wo.z() > 0) return 1;
+  const double index2 = glass->index * glass->index;
+  return wo.z() > 0 ? 1 / index2 : index2;
+}
+
+}  // namespace
+
+Material make_material(const MaterialSettings& settings, const BandValues& reflectance) {
+  if (!(reflectance.allFinite() && (reflectance >= 0).all() && (reflectance <= 1).all()))
+    throw std::invalid_argument("a material's reflectance must be in 0..1 in every band");
+  if (const auto* metal = std::get_if<RoughConductor>(&settings))
+    if (metal->index.n.size() != reflectance.size())
+      throw std::invalid_argument("the metal's index has " + std::to_string(metal->index.n.size()) +
+                                  " bands and its reflectance " + std::to_string(reflectance.size()) +
+                                  "; give both for the bands of the film");
+  Material material;
+  std::visit([&](const auto& model) { material.scattering = prepare(model); }, settings);
+  material.reflectance = reflectance;
+  return material;
+}
+
+void evaluate(const Material& material, const BandsIn& reflectance, const Eigen::Vector3d& wi,
+              const Eigen::Vector3d& wo, BandsOut f) {
+  if (!scatters(material, wi, wo)) {
+    f.setZero();
+    return;
+  }
+  const Eigen::Vector3d i = seen(material, wi, wo), o = seen(material, wo, wo);
+  std::visit([&](const auto& model) { evaluate(model, reflectance, i, o, f); }, material.scattering);
+}
+
+double pdf(const Material& material, const BandsIn& reflectance, const Eigen::Vector3d& wi, const Eigen::Vector3d& wo) {
+  if (!scatters(material, wi, wo)) return 0;
+  const Eigen::Vector3d i = seen(material, wi, wo), o = seen(material, wo, wo);
+  return std::visit([&](const auto& model) { return pdf(model, reflectance, i, o); }, material.scattering);
+}
+
+std::optional<ScatteringSample> sample(const Material& material, const BandsIn& reflectance, const Eigen::Vector3d& wo,
+                                       const Eigen::Vector3d& u, BandsOut weight) {
+  weight.setZero();
+  if (wo.z() == 0) return std::nullopt;
+  const Eigen::Vector3d o = seen(material, wo, wo);
+  ScatteringSample result;
+  result.wi =
+      seen(material,
+           std::visit([&](const auto& model) { return sample(model, reflectance, o, u); }, material.scattering), wo);
+  result.pdf = pdf(material, reflectance, result.wi, wo);
+  if (!(result.pdf > 0)) return std::nullopt;
+  evaluate(material, reflectance, result.wi, wo, weight);
+  weight *= std::abs(result.wi.z()) / result.pdf;
+  result.refraction = refraction(material, result.wi, wo);
+  return result;
+}
+
+}  // namespace tensorray

@@ -1,0 +1,161 @@
+#include "renderer/materials/rough_dielectric.h"
+
+#include <algorithm>
+#include <cmath>
+#include <stdexcept>
+#include <string>
+
+#include <Eigen/Geometry>
+
+namespace tensorray {
+namespace {
+
+double square(double x) { return x * x; }
+
+/// The surface as wo sees it, turned so that wo has z > 0.
+struct View {
+  double index;               ///< Of the far side, relative to wo's.
+  const CosineTable& near;    ///< What is missing on wo's side,
+  const CosineTable& far;     ///< and on the other one.
+  double refracted;           ///< Of what is missing, the fraction that is refracted; the rest is reflected.
+  double refracted_radiance;  ///< The lobe's factor of near · far / π.
+};
+
+View view_of(const DielectricScattering& glass, bool outside) {
+  // A lobe that refracts near · far · c / π for light that leaves to the inside is n² times that for light that leaves
+  // to the outside, by reciprocity; a cone of light from one side is compressed by the same factor on the other one.
+  const double index2 = square(glass.index);
+  if (outside)
+    return {glass.index, glass.missing_outside, glass.missing_inside,
+            glass.refracted * index2 * glass.missing_inside.mean(), glass.refracted};
+  return {1 / glass.index, glass.missing_inside, glass.missing_outside, glass.refracted * glass.missing_outside.mean(),
+          glass.refracted * index2};
+}
+
+Eigen::Vector3d turned(const Eigen::Vector3d& w, bool outside) {
+  return outside ? w : Eigen::Vector3d(w.x(), w.y(), -w.z());
+}
+
+/// Zero if all is reflected. `index` as for Fresnel; wo and m on one side.
+Eigen::Vector3d refracted(const Eigen::Vector3d& wo, const Eigen::Vector3d& m, double index) {
+  const double cosine = wo.dot(m);
+  const double cosine2 = 1 - (1 - square(cosine)) / square(index);
+  if (cosine2 <= 0) return Eigen::Vector3d::Zero();
+  return ((cosine / index - std::sqrt(cosine2)) * m - wo / index).normalized();
+}
+
+double fresnel(const Eigen::Vector3d& wo, const Eigen::Vector3d& m, double index) {
+  return fresnel_dielectric(std::clamp(wo.dot(m), 0.0, 1.0), index);
+}
+
+/// A facet that refracts wi to wo, and how densely its normals lie over wi: d(m) / d(wi).
+struct Refraction {
+  Eigen::Vector3d m;
+  double jacobian = 0;  ///< 0 if there is no such facet.
+};
+
+Refraction refraction_between(const Eigen::Vector3d& wi, const Eigen::Vector3d& wo, double index) {
+  Eigen::Vector3d m = wo + index * wi;
+  if (m.z() < 0) m = -m;
+  const double length = m.norm();
+  if (length == 0) return {};
+  m /= length;
+  const double o = wo.dot(m), i = wi.dot(m);
+  if (o <= 0 || i >= 0) return {m, 0};
+  return {m, square(index) * -i / square(o + index * i)};
+}
+
+double single_bounce_share(const View& view, const Eigen::Vector3d& wo) { return 1 - view.near.at(wo.z()); }
+
+/// Of light along wo, a facet's fraction that leaves it and is seen from outside the facets.
+double single_bounce(double alpha, double index, const Eigen::Vector3d& wo, const Eigen::Vector3d& m) {
+  const double reflected = fresnel(wo, m, index);
+  const Eigen::Vector3d above = mirrored(wo, m), below = refracted(wo, m, index);
+  double sum = 0;
+  if (above.z() > 0) sum += reflected * ggx_shadowing(alpha, wo.z(), above.z());
+  if (below.z() < 0) sum += (1 - reflected) * ggx_shadowing(alpha, wo.z(), -below.z());
+  return sum;
+}
+
+CosineTable missing_table(double alpha, double index) {
+  return make_cosine_table(alpha, [=](double cosine) {
+    return 1 - visible_mean(alpha, cosine, [=](const Eigen::Vector3d& wo, const Eigen::Vector3d& m) {
+             return single_bounce(alpha, index, wo, m);
+           });
+  });
+}
+
+}  // namespace
+
+DielectricScattering prepare(const RoughDielectric& settings) {
+  const double index = settings.index;
+  if (!(index >= 0.2 && index <= 5 && std::abs(index - 1) >= 0.01))
+    throw std::invalid_argument("the dielectric's index is " + std::to_string(index) +
+                                "; give a value in 0.2..5, at least 0.01 from 1, which has no surface");
+  DielectricScattering glass;
+  glass.alpha = ggx_alpha(settings.roughness, "the dielectric's roughness");
+  glass.index = index;
+  glass.missing_outside = missing_table(glass.alpha, index);
+  glass.missing_inside = missing_table(glass.alpha, 1 / index);
+
+  // From outside the lobes refract the fraction refracted · n² · mean(missing_inside), from inside refracted ·
+  // mean(missing_outside). Smooth glass refracts 1 - F, and n² (1 - F inside) of uniform light: the largest factor with
+  // which neither fraction is above that.
+  const double smooth = 1 - hemispherical_mean([=](double cosine) { return fresnel_dielectric(cosine, index); });
+  const double missing = std::max(glass.missing_outside.mean(), glass.missing_inside.mean());
+  glass.refracted = missing > 0 ? smooth / (square(index) * missing) : 0;
+  return glass;
+}
+
+void evaluate(const DielectricScattering& glass, const BandsIn& reflectance, const Eigen::Vector3d& wi,
+              const Eigen::Vector3d& wo, BandsOut f) {
+  const bool outside = wo.z() > 0;
+  const View view = view_of(glass, outside);
+  const Eigen::Vector3d o = turned(wo, outside), i = turned(wi, outside);
+  const double missing = view.near.at(o.z());
+  double value = 0;
+  if (i.z() > 0) {
+    value = fresnel(o, (i + o).normalized(), view.index) * ggx_reflection(glass.alpha, i, o) +
+            (1 - view.refracted) * fill(missing, view.near.at(i.z()), view.near.mean());
+  } else {
+    const auto [m, jacobian] = refraction_between(i, o, view.index);
+    if (jacobian > 0)
+      value = (1 - fresnel(o, m, view.index)) * ggx_visible_pdf(glass.alpha, o, m) *
+              ggx_shadowing(glass.alpha, o.z(), -i.z()) * jacobian / (-i.z() * square(view.index));
+    value += view.refracted_radiance * fill(missing, view.far.at(-i.z()), 1);
+  }
+  f = reflectance * value;
+}
+
+double pdf(const DielectricScattering& glass, const BandsIn&, const Eigen::Vector3d& wi, const Eigen::Vector3d& wo) {
+  const bool outside = wo.z() > 0;
+  const View view = view_of(glass, outside);
+  const Eigen::Vector3d o = turned(wo, outside), i = turned(wi, outside);
+  const double share = single_bounce_share(view, o);
+  if (i.z() > 0)
+    return share * fresnel(o, (i + o).normalized(), view.index) * ggx_reflection_pdf(glass.alpha, i, o) +
+           (1 - share) * (1 - view.refracted) * view.near.pdf(i.z());
+  const auto [m, jacobian] = refraction_between(i, o, view.index);
+  const double several = (1 - share) * view.refracted * view.far.pdf(-i.z());
+  if (jacobian <= 0) return several;
+  return share * (1 - fresnel(o, m, view.index)) * ggx_visible_pdf(glass.alpha, o, m) * jacobian + several;
+}
+
+Eigen::Vector3d sample(const DielectricScattering& glass, const BandsIn&, const Eigen::Vector3d& wo,
+                       const Eigen::Vector3d& u) {
+  const bool outside = wo.z() > 0;
+  const View view = view_of(glass, outside);
+  const Eigen::Vector3d o = turned(wo, outside);
+  const double share = single_bounce_share(view, o);
+  if (u.x() < share) {
+    const Eigen::Vector3d m = ggx_sample_visible(glass.alpha, o, u.tail<2>());
+    const bool reflects = u.x() < share * fresnel(o, m, view.index);
+    // Light that leaves a facet on the wrong side has no density.
+    const Eigen::Vector3d wi = reflects ? mirrored(o, m) : refracted(o, m, view.index);
+    return (reflects ? wi.z() > 0 : wi.z() < 0) ? turned(wi, outside) : Eigen::Vector3d::Zero();
+  }
+  if (u.x() >= share + (1 - share) * view.refracted) return turned(view.near.sample(u.tail<2>()), outside);
+  return turned(view.far.sample(u.tail<2>()), !outside);
+}
+
+}  // namespace tensorray

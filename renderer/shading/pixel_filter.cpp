@@ -1,0 +1,103 @@
+#include "renderer/shading/pixel_filter.h"
+
+#include <algorithm>
+#include <cmath>
+#include <stdexcept>
+#include <string>
+
+#include "base/constants.h"
+
+namespace tensorray {
+namespace {
+
+constexpr int quantile_count = 256;
+
+/// All shapes are given on [−1, 1], with integral 1.
+struct Gaussian {
+  static constexpr double steepness = 4.5;  ///< exp(−steepness x²): the radius is 3 σ.
+
+  static double density(double x) { return (std::exp(-steepness * x * x) - edge()) / (2 * half_integral(1)); }
+  static double cumulative(double x) { return 0.5 + half_integral(x) / (2 * half_integral(1)); }
+
+ private:
+  static double edge() { return std::exp(-steepness); }
+  static double half_integral(double x) {
+    return std::sqrt(pi / steepness) / 2 * std::erf(std::sqrt(steepness) * x) - x * edge();
+  }
+};
+
+/// Harris 1978, "On the Use of Windows for Harmonic Analysis with the Discrete Fourier Transform": minimum 4-term.
+struct BlackmanHarris {
+  static constexpr double a0 = 0.35875, a1 = 0.48829, a2 = 0.14128, a3 = 0.01168;
+
+  static double density(double x) {
+    const double c = std::cos(pi * x);
+    return (a0 + a1 * c + a2 * (2 * c * c - 1) + a3 * c * (4 * c * c - 3)) / (2 * a0);
+  }
+  static double cumulative(double x) {
+    const double c = std::cos(pi * x), s = std::sin(pi * x);
+    const double sines = a1 * s + a2 * s * c + a3 / 3 * s * (4 * c * c - 1);
+    return 0.5 + (a0 * x + sines / pi) / (2 * a0);
+  }
+};
+
+}  // namespace
+
+double default_radius(PixelFilterShape shape) { return shape == PixelFilterShape::box ? 0.5 : 1.5; }
+
+PixelFilter::PixelFilter(PixelFilterShape shape, double radius) : shape_(shape), radius_(radius) {
+  if (!(radius > 0 && std::isfinite(radius)))
+    throw std::invalid_argument("the pixel filter's radius must be above 0, not " + std::to_string(radius));
+  quantiles_.push_back(-radius);
+  for (int i = 1; i < quantile_count; ++i)
+    quantiles_.push_back(invert(static_cast<double>(i) / quantile_count, quantiles_.back(), radius));
+  quantiles_.push_back(radius);
+}
+
+double PixelFilter::density(double x) const {
+  const double t = x / radius_;
+  if (std::abs(t) > 1) return 0;
+  switch (shape_) {
+    case PixelFilterShape::gaussian:
+      return Gaussian::density(t) / radius_;
+    case PixelFilterShape::blackman_harris:
+      return BlackmanHarris::density(t) / radius_;
+    case PixelFilterShape::box:
+      break;
+  }
+  return 0.5 / radius_;
+}
+
+double PixelFilter::cumulative(double x) const {
+  const double t = x / radius_;
+  switch (shape_) {
+    case PixelFilterShape::gaussian:
+      return Gaussian::cumulative(t);
+    case PixelFilterShape::blackman_harris:
+      return BlackmanHarris::cumulative(t);
+    case PixelFilterShape::box:
+      break;
+  }
+  return 0.5 + t / 2;
+}
+
+double PixelFilter::sample(double u) const {
+  const int i = std::clamp(static_cast<int>(u * quantile_count), 0, quantile_count - 1);
+  return invert(u, quantiles_[i], quantiles_[i + 1]);
+}
+
+/// Where `cumulative` is u, between low and high: Newton's method, and bisection where that would leave the bracket.
+double PixelFilter::invert(double u, double low, double high) const {
+  double x = (low + high) / 2;
+  for (int i = 0; i < 60; ++i) {
+    const double excess = cumulative(x) - u;
+    (excess > 0 ? high : low) = x;
+    const double newton = x - excess / density(x);
+    const double next = newton >= low && newton <= high ? newton : (low + high) / 2;
+    if (std::abs(next - x) <= 1e-9 * radius_) return next;
+    x = next;
+  }
+  return x;
+}
+
+}  // namespace tensorray

@@ -1,0 +1,62 @@
+#pragma once
+/// @file renderer/surfaces/embree_handles.h
+/// The one file that includes Embree, private to the scenes that are built on it: what differs between Embree 3 and 4,
+/// and handles that own.
+
+#if __has_include(<embree4/rtcore.h>)
+#include <embree4/rtcore.h>
+#else
+#include <embree3/rtcore.h>
+#endif
+
+#include <memory>
+#include <stdexcept>
+#include <string>
+#include <type_traits>
+
+namespace tensorray::embree {
+
+inline void intersect(RTCScene scene, RTCRayHit& ray) {
+#if RTC_VERSION_MAJOR >= 4
+  rtcIntersect1(scene, &ray, nullptr);
+#else
+  RTCIntersectContext context;
+  rtcInitIntersectContext(&context);
+  rtcIntersect1(scene, &context, &ray);
+#endif
+}
+
+/// Sets tfar to −infinity if there is anything on the way.
+inline void occluded(RTCScene scene, RTCRay& ray) {
+#if RTC_VERSION_MAJOR >= 4
+  rtcOccluded1(scene, &ray, nullptr);
+#else
+  RTCIntersectContext context;
+  rtcInitIntersectContext(&context);
+  rtcOccluded1(scene, &context, &ray);
+#endif
+}
+
+struct Release {
+  void operator()(RTCDevice device) const { rtcReleaseDevice(device); }
+  void operator()(RTCScene scene) const { rtcReleaseScene(scene); }
+  void operator()(RTCGeometry geometry) const { rtcReleaseGeometry(geometry); }
+};
+
+template <class Handle>
+using Owned = std::unique_ptr<std::remove_pointer_t<Handle>, Release>;
+
+/// @throw std::runtime_error if something has failed since the last check.
+inline void check(RTCDevice device) {
+  if (const RTCError error = rtcGetDeviceError(device); error != RTC_ERROR_NONE)
+    throw std::runtime_error("Embree cannot build the scene (error " + std::to_string(error) + ")");
+}
+
+/// A device costs a tenth of a millisecond, so that every scene has its own and no two share anything.
+inline Owned<RTCDevice> make_device() {
+  Owned<RTCDevice> device(rtcNewDevice(nullptr));
+  if (!device) throw std::runtime_error("Embree cannot start on this processor");
+  return device;
+}
+
+}  // namespace tensorray::embree

@@ -1,0 +1,160 @@
+#include "renderer/surfaces/geometry.h"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "renderer/surfaces/triangle_scene.h"
+
+namespace tensorray {
+namespace {
+
+constexpr double tolerance = 1e-6;  // Of the volume's size: what single precision resolves, with some room.
+
+TriangleMesh plate_mesh(const Plate& plate) { return {plate.corners(), {{0, 1, 2}, {0, 2, 3}}}; }
+
+struct Part {
+  const TriangleMesh* mesh;  // In double precision, beside the scene's copy.
+  Surface surface;
+};
+
+std::vector<const TriangleMesh*> meshes(const std::vector<Part>& parts) {
+  std::vector<const TriangleMesh*> result;
+  for (const Part& part : parts) result.push_back(part.mesh);
+  return result;
+}
+
+/// Some meshes in a scene of their own: queries name a group, as ray masks are not in every build of Embree.
+struct Group {
+  Group(std::vector<Part> meshes_and_surfaces, const Eigen::Vector3d& origin, double unit)
+      : parts(std::move(meshes_and_surfaces)), scene(meshes(parts), origin, unit) {
+    for (const Part& part : parts) boxes.push_back(part.mesh->bounds());
+  }
+
+  std::vector<Part> parts;
+  std::vector<Eigen::AlignedBox3d> boxes;  // Of the parts.
+  TriangleScene scene;
+};
+
+}  // namespace
+
+struct Geometry::State {
+  explicit State(Surfaces parts);
+
+  Surfaces surfaces;
+  TriangleMesh plate;
+  Eigen::AlignedBox3d volume;
+  double size, margin;
+  // Scenes relative to the volume, so that their single precision is spent on it.
+  Group bounds, cut, absorbers;
+
+  std::vector<Part> cut_parts() const;
+  std::vector<Part> absorber_parts() const;
+
+  /// The nearest hit of a group beyond `min_distance` (which may be negative).
+  std::optional<Hit> nearest(const Group& group, const Eigen::Vector3d& from, const Eigen::Vector3d& direction,
+                             double min_distance, double max_distance) const;
+};
+
+Geometry::State::State(Surfaces parts)
+    : surfaces(std::move(parts)),
+      plate(surfaces.plate ? plate_mesh(*surfaces.plate) : TriangleMesh()),
+      volume(surfaces.bounds.bounds()),
+      size(volume.diagonal().norm()),
+      margin(tolerance * size),
+      bounds({{&surfaces.bounds, Surface::bounds}}, volume.center(), size),
+      cut(cut_parts(), volume.center(), size),
+      absorbers(absorber_parts(), volume.center(), size) {}
+
+std::vector<Part> Geometry::State::cut_parts() const {
+  if (!surfaces.cut) return {};
+  return {{&*surfaces.cut, Surface::cut}};
+}
+
+std::vector<Part> Geometry::State::absorber_parts() const {
+  std::vector<Part> parts;
+  if (surfaces.plate) parts.push_back({&plate, Surface::plate});
+  for (const TriangleMesh& mesh : surfaces.obstacles) parts.push_back({&mesh, Surface::obstacle});
+  return parts;
+}
+
+Geometry::Geometry(Surfaces surfaces) : state_(std::make_unique<State>(std::move(surfaces))) {}
+Geometry::~Geometry() = default;
+Geometry::Geometry(Geometry&&) noexcept = default;
+Geometry& Geometry::operator=(Geometry&&) noexcept = default;
+
+const Surfaces& Geometry::surfaces() const { return state_->surfaces; }
+
+std::optional<Hit> Geometry::State::nearest(const Group& group, const Eigen::Vector3d& from,
+                                            const Eigen::Vector3d& direction, double min_distance,
+                                            double max_distance) const {
+  const auto seen = group.scene.nearest(from, direction, min_distance, max_distance);
+  if (!seen) return std::nullopt;
+  const Part& part = group.parts[seen->mesh];
+  const auto& triangle = part.mesh->triangles[seen->triangle];
+  const Eigen::Vector3d& a = part.mesh->vertices[triangle[0]];
+  const Eigen::Vector3d& b = part.mesh->vertices[triangle[1]];
+  const Eigen::Vector3d& c = part.mesh->vertices[triangle[2]];
+  Hit hit;
+  hit.surface = part.surface;
+  hit.normal = (b - a).cross(c - a).normalized();
+  const double exact = hit.normal.dot(a - from) / hit.normal.dot(direction);
+  // Where light grazes a plane the distance to it is ill-determined: keep what was seen.
+  const double allowed = 10 * (margin + tolerance * std::abs(seen->distance));
+  hit.distance = std::abs(exact - seen->distance) <= allowed ? exact : seen->distance;
+  return hit;
+}
+
+std::optional<Hit> Geometry::absorber(const Eigen::Vector3d& origin, const Eigen::Vector3d& direction,
+                                      double max_distance) const {
+  auto hit = state_->nearest(state_->absorbers, origin, direction, -state_->margin, max_distance + state_->margin);
+  if (!hit || hit->distance > max_distance) return std::nullopt;
+  hit->distance = std::max(hit->distance, 0.0);
+  return hit;
+}
+
+bool Geometry::may_absorb(const Eigen::Vector3d& from, const Eigen::Vector3d& to) const {
+  const Eigen::Array3d low = from.cwiseMin(to).array() - state_->margin,
+                       high = from.cwiseMax(to).array() + state_->margin;
+  const std::vector<Eigen::AlignedBox3d>& boxes = state_->absorbers.boxes;
+  return std::any_of(boxes.begin(), boxes.end(), [&](const Eigen::AlignedBox3d& box) {
+    return (low <= box.max().array()).all() && (high >= box.min().array()).all();
+  });
+}
+
+Eigen::AlignedBox3d Geometry::absorbers_within(const Eigen::AlignedBox3d& region) const {
+  Eigen::AlignedBox3d all;
+  for (const Eigen::AlignedBox3d& box : state_->absorbers.boxes) {
+    const Eigen::AlignedBox3d common = box.intersection(region);
+    if (!common.isEmpty()) all.extend(common);
+  }
+  return all;
+}
+
+std::optional<Hit> Geometry::crossing(Surface surface, bool inwards, const Eigen::Vector3d& origin,
+                                      const Eigen::Vector3d& direction, double max_distance) const {
+  const Group& group = surface == Surface::bounds ? state_->bounds : state_->cut;
+  constexpr int most_crossings = 10000;  // Of one line and one mesh: rounding shall not keep it here for ever.
+  double from = -state_->margin;
+  for (int i = 0; i < most_crossings; ++i) {
+    auto hit = state_->nearest(group, origin, direction, from, max_distance + state_->margin);
+    if (!hit || hit->distance > max_distance) return std::nullopt;
+    if ((hit->normal.dot(direction) < 0) == inwards) {
+      hit->distance = std::max(hit->distance, 0.0);
+      return hit;
+    }
+    from = std::max(hit->distance, from) + state_->margin;
+  }
+  return std::nullopt;
+}
+
+bool Geometry::inside_cut(const Eigen::Vector3d& point) const {
+  if (!has_cut()) return true;
+  // From inside a closed mesh the first surface along any direction is met from behind. This direction is unlikely to
+  // meet an edge.
+  const Eigen::Vector3d direction = Eigen::Vector3d(0.5381, 0.3127, 0.7827).normalized();
+  const auto hit = state_->nearest(state_->cut, point, direction, 0, infinite);
+  return hit && hit->normal.dot(direction) > 0;
+}
+
+}  // namespace tensorray

@@ -1,0 +1,79 @@
+#pragma once
+/// @file renderer/surfaces/geometry.h
+/// All surfaces that light can meet, in one Embree scene.
+
+#include <cstdint>
+#include <limits>
+#include <memory>
+#include <optional>
+#include <vector>
+
+#include <Eigen/Geometry>
+
+#include "renderer/surfaces/mesh.h"
+#include "renderer/surfaces/plate.h"
+
+namespace tensorray {
+
+enum class Surface : std::uint8_t {
+  bounds,    ///< The box of the volume.
+  cut,       ///< A closed mesh, inside of which the volume is.
+  plate,     ///< The receiver.
+  obstacle,  ///< Absorbs light.
+};
+
+struct Hit {
+  double distance = 0;  ///< Along the unit direction, world units, in double precision: see Geometry.
+  Surface surface = Surface::plate;
+  Eigen::Vector3d normal = Eigen::Vector3d::Zero();  ///< Unit, geometric; outwards for bounds, cut and obstacles.
+};
+
+/// The parts of a Geometry.
+struct Surfaces {
+  TriangleMesh bounds;              ///< Closed, convex, looks outwards.
+  std::optional<TriangleMesh> cut;  ///< Closed, looks outwards.
+  std::optional<Plate> plate;
+  std::vector<TriangleMesh> obstacles;
+};
+
+/// An immutable Embree scene. Any number of threads may query it at once.
+///
+/// Embree finds the triangle in single precision; the distance is then that to the triangle's plane in double
+/// precision. A surface behind the origin by less than about 1e-6 of the volume's size counts as hit at 0: light that
+/// starts on a plate, or leaves the volume through one, meets it.
+class Geometry {
+ public:
+  /// @throw std::runtime_error if Embree fails (out of memory, unsupported processor).
+  explicit Geometry(Surfaces surfaces);
+  ~Geometry();
+  Geometry(Geometry&&) noexcept;
+  Geometry& operator=(Geometry&&) noexcept;
+
+  /// The nearest plate or obstacle within `max_distance` along the unit `direction`, from either side.
+  std::optional<Hit> absorber(const Eigen::Vector3d& origin, const Eigen::Vector3d& direction,
+                              double max_distance = infinite) const;
+
+  /// False only if no plate or obstacle can meet the segment; cheap.
+  bool may_absorb(const Eigen::Vector3d& from, const Eigen::Vector3d& to) const;
+
+  /// A box around all parts of plates and obstacles that may lie in `region`; empty if there are none.
+  Eigen::AlignedBox3d absorbers_within(const Eigen::AlignedBox3d& region) const;
+
+  /// Where light crosses the bounds, or the cut, inwards or outwards; crossings in the other sense are passed over.
+  std::optional<Hit> crossing(Surface surface, bool inwards, const Eigen::Vector3d& origin,
+                              const Eigen::Vector3d& direction, double max_distance = infinite) const;
+
+  const Surfaces& surfaces() const;
+  bool has_cut() const { return surfaces().cut.has_value(); }
+
+  /// Whether a point is inside the cut; true where there is none.
+  bool inside_cut(const Eigen::Vector3d& point) const;
+
+  static constexpr double infinite = std::numeric_limits<double>::infinity();
+
+ private:
+  struct State;
+  std::unique_ptr<State> state_;
+};
+
+}  // namespace tensorray

@@ -1,0 +1,245 @@
+#include "renderer/surfaces/ply.h"
+
+#include <algorithm>
+#include <charconv>
+#include <cmath>
+#include <cstring>
+#include <fstream>
+#include <iterator>
+#include <map>
+#include <sstream>
+#include <stdexcept>
+#include <string>
+
+namespace tensorray {
+namespace {
+
+enum class Encoding { ascii, little_endian, big_endian };
+
+/// How a number is stored: signed or unsigned integer, or floating point.
+struct NumberType {
+  enum Kind { integer, natural, real } kind = integer;
+  int bytes = 0;
+};
+
+struct Property {
+  std::string name;
+  NumberType type;
+  bool is_list = false;
+  NumberType count_type;  ///< Of a list.
+};
+
+struct Element {
+  std::string name;
+  std::size_t count = 0;
+  std::vector<Property> properties;
+};
+
+struct Header {
+  Encoding encoding = Encoding::ascii;
+  std::vector<Element> elements;
+  std::size_t size = 0;  ///< Bytes before the first element.
+};
+
+NumberType find_type(const std::string& name) {
+  static const std::map<std::string, NumberType> types{
+      {"char", {NumberType::integer, 1}},   {"int8", {NumberType::integer, 1}},   {"uchar", {NumberType::natural, 1}},
+      {"uint8", {NumberType::natural, 1}},  {"short", {NumberType::integer, 2}},  {"int16", {NumberType::integer, 2}},
+      {"ushort", {NumberType::natural, 2}}, {"uint16", {NumberType::natural, 2}}, {"int", {NumberType::integer, 4}},
+      {"int32", {NumberType::integer, 4}},  {"uint", {NumberType::natural, 4}},   {"uint32", {NumberType::natural, 4}},
+      {"float", {NumberType::real, 4}},     {"float32", {NumberType::real, 4}},   {"double", {NumberType::real, 8}},
+      {"float64", {NumberType::real, 8}}};
+  const auto found = types.find(name);
+  if (found == types.end()) throw std::runtime_error("unknown type \"" + name + "\" in its header");
+  return found->second;
+}
+
+Encoding find_encoding(const std::string& name) {
+  if (name == "ascii") return Encoding::ascii;
+  if (name == "binary_little_endian") return Encoding::little_endian;
+  if (name == "binary_big_endian") return Encoding::big_endian;
+  throw std::runtime_error("unknown format \"" + name + "\" in its header");
+}
+
+Property parse_property(std::istringstream& words) {
+  Property property;
+  std::string type, count_type;
+  words >> type;
+  property.is_list = type == "list";
+  if (property.is_list) words >> count_type >> type;
+  if (property.is_list) property.count_type = find_type(count_type);
+  property.type = find_type(type);
+  words >> property.name;
+  return property;
+}
+
+void parse_header_line(const std::string& line, Header& header) {
+  std::istringstream words(line);
+  std::string keyword, name;
+  words >> keyword;
+  if (keyword == "format") {
+    words >> name;
+    header.encoding = find_encoding(name);
+  } else if (keyword == "element") {
+    Element element;
+    words >> element.name >> element.count;
+    if (!words) throw std::runtime_error("an element of its header has no count");
+    header.elements.push_back(element);
+  } else if (keyword == "property") {
+    if (header.elements.empty()) throw std::runtime_error("a property of its header belongs to no element");
+    header.elements.back().properties.push_back(parse_property(words));
+  }
+}
+
+Header parse_header(const std::string& bytes) {
+  Header header;
+  std::size_t begin = 0;
+  for (bool first = true;; first = false) {
+    const std::size_t end = bytes.find('\n', begin);
+    if (first && bytes.compare(0, 3, "ply") != 0) throw std::runtime_error("it is not a PLY file");
+    if (end == std::string::npos) throw std::runtime_error("its header is cut off");
+    std::string line = bytes.substr(begin, end - begin);
+    if (!line.empty() && line.back() == '\r') line.pop_back();
+    begin = end + 1;
+    if (line == "end_header") break;
+    parse_header_line(line, header);
+  }
+  header.size = begin;
+  return header;
+}
+
+/// The numbers after the header, one after another.
+class Numbers {
+ public:
+  Numbers(const std::string& bytes, std::size_t begin, Encoding encoding)
+      : position_(bytes.data() + begin), end_(bytes.data() + bytes.size()), encoding_(encoding) {}
+
+  double next(const NumberType& type) { return encoding_ == Encoding::ascii ? next_word() : next_binary(type); }
+
+ private:
+  [[noreturn]] static void throw_cut_off() { throw std::runtime_error("the file is cut off"); }
+
+  static bool is_blank(char c) { return c == ' ' || c == '\t' || c == '\r' || c == '\n'; }
+
+  double next_word() {
+    while (position_ != end_ && is_blank(*position_)) ++position_;
+    if (position_ == end_) throw_cut_off();
+    const char* const word = position_ + (*position_ == '+' ? 1 : 0);
+    while (position_ != end_ && !is_blank(*position_)) ++position_;
+    double value = 0;
+    const std::from_chars_result result = std::from_chars(word, position_, value);
+    if (result.ec != std::errc() || result.ptr != position_)
+      throw std::runtime_error("\"" + std::string(word, std::min(position_, word + 20)) + "\" is not a number");
+    return value;
+  }
+
+  double next_binary(const NumberType& type) {
+    if (end_ - position_ < type.bytes) throw_cut_off();
+    std::uint64_t bits = 0;
+    for (int i = 0; i < type.bytes; ++i) {
+      const int place = encoding_ == Encoding::little_endian ? i : type.bytes - 1 - i;
+      bits |= static_cast<std::uint64_t>(static_cast<unsigned char>(position_[i])) << (8 * place);
+    }
+    position_ += type.bytes;
+    return decode(bits, type);
+  }
+
+  static double decode(std::uint64_t bits, const NumberType& type) {
+    if (type.kind == NumberType::natural) return static_cast<double>(bits);
+    if (type.kind == NumberType::integer) {
+      const double range = std::ldexp(1, 8 * type.bytes), value = static_cast<double>(bits);
+      return value < range / 2 ? value : value - range;
+    }
+    if (type.bytes == 8) return reinterpret<double>(bits);
+    return reinterpret<float>(static_cast<std::uint32_t>(bits));
+  }
+
+  template <class Real, class Bits>
+  static Real reinterpret(Bits bits) {
+    static_assert(sizeof(Real) == sizeof(Bits));
+    Real value;
+    std::memcpy(&value, &bits, sizeof(value));
+    return value;
+  }
+
+  const char* position_;
+  const char* end_;
+  Encoding encoding_;
+};
+
+std::size_t to_count(double value) {
+  if (!(value >= 0 && value == std::floor(value) && value < 1e9)) throw std::runtime_error("a list has a bad length");
+  return static_cast<std::size_t>(value);
+}
+
+void read_vertex(const Element& element, Numbers& numbers, TriangleMesh& mesh) {
+  Eigen::Vector3d position = Eigen::Vector3d::Zero();
+  for (const Property& property : element.properties) {
+    const std::size_t count = property.is_list ? to_count(numbers.next(property.count_type)) : 1;
+    for (std::size_t i = 0; i < count; ++i) {
+      const double value = numbers.next(property.type);
+      if (property.name == "x") position.x() = value;
+      if (property.name == "y") position.y() = value;
+      if (property.name == "z") position.z() = value;
+    }
+  }
+  mesh.vertices.push_back(position);
+}
+
+std::uint32_t to_index(double value) {
+  if (!(value >= 0 && value == std::floor(value) && value <= 4294967294.0))
+    throw std::runtime_error("a face names a vertex that is not there");
+  return static_cast<std::uint32_t>(value);
+}
+
+void read_face(const Element& element, Numbers& numbers, TriangleMesh& mesh) {
+  for (const Property& property : element.properties) {
+    const bool corners = property.is_list && (property.name == "vertex_indices" || property.name == "vertex_index");
+    const std::size_t count = property.is_list ? to_count(numbers.next(property.count_type)) : 1;
+    std::uint32_t first = 0, last = 0;
+    for (std::size_t i = 0; i < count; ++i) {
+      const double value = numbers.next(property.type);
+      if (!corners) continue;
+      const std::uint32_t index = to_index(value);
+      if (i == 0) first = index;
+      if (i >= 2) mesh.triangles.push_back({first, last, index});
+      last = index;
+    }
+  }
+}
+
+void pass_over(const Element& element, Numbers& numbers) {
+  for (const Property& property : element.properties) {
+    const std::size_t count = property.is_list ? to_count(numbers.next(property.count_type)) : 1;
+    for (std::size_t i = 0; i < count; ++i) numbers.next(property.type);
+  }
+}
+
+void read_element(const Element& element, Numbers& numbers, TriangleMesh& mesh) {
+  if (element.properties.empty()) return;  // Takes no bytes, however many the header promises.
+  for (std::size_t row = 0; row < element.count; ++row) {
+    if (element.name == "vertex")
+      read_vertex(element, numbers, mesh);
+    else if (element.name == "face")
+      read_face(element, numbers, mesh);
+    else
+      pass_over(element, numbers);
+  }
+}
+
+}  // namespace
+
+TriangleMesh read_ply(const std::filesystem::path& path) {
+  std::ifstream file(path, std::ios::binary);
+  const std::string bytes((std::istreambuf_iterator<char>(file)), std::istreambuf_iterator<char>());
+  const Header header = parse_header(bytes);
+  Numbers numbers(bytes, header.size, header.encoding);
+  TriangleMesh mesh;
+  for (const Element& element : header.elements) read_element(element, numbers, mesh);
+  for (const auto& triangle : mesh.triangles)
+    if (*std::max_element(triangle.begin(), triangle.end()) >= mesh.vertices.size())
+      throw std::runtime_error("a face names a vertex that is not there");
+  return mesh;
+}
+
+}  // namespace tensorray

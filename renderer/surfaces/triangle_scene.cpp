@@ -1,0 +1,149 @@
+#include "renderer/surfaces/triangle_scene.h"
+
+#include <algorithm>
+#include <tuple>
+
+#include "renderer/surfaces/embree_handles.h"
+
+namespace tensorray {
+namespace {
+
+using embree::check;
+using embree::Owned;
+
+/// By mesh and triangle. Embree may report a triangle more than once where its search tree has split it.
+void sort_and_join(std::vector<TriangleId>& triangles) {
+  const auto key = [](const TriangleId& id) { return std::tie(id.mesh, id.triangle); };
+  const auto before = [&](const TriangleId& a, const TriangleId& b) { return key(a) < key(b); };
+  const auto same = [&](const TriangleId& a, const TriangleId& b) { return key(a) == key(b); };
+  std::sort(triangles.begin(), triangles.end(), before);
+  triangles.erase(std::unique(triangles.begin(), triangles.end(), same), triangles.end());
+}
+
+bool add_candidate(RTCPointQueryFunctionArguments* arguments) {
+  static_cast<std::vector<TriangleId>*>(arguments->userPtr)->push_back({arguments->geomID, arguments->primID});
+  return false;  // The radius stays as it is.
+}
+
+}  // namespace
+
+struct TriangleScene::State {
+  Eigen::Vector3d origin;
+  double unit;
+  Owned<RTCDevice> device;
+  Owned<RTCScene> scene;  // Null if there are no triangles.
+
+  void start(RTCBuildQuality quality);
+
+  /// Vertices may have two or three coordinates.
+  template <class Vertex>
+  void attach(unsigned id, const std::vector<Vertex>& vertices,
+              const std::vector<std::array<std::uint32_t, 3>>& triangles);
+
+  void commit() {
+    rtcCommitScene(scene.get());
+    check(device.get());
+  }
+
+  float local(double coordinate, int axis) const { return static_cast<float>((coordinate - origin[axis]) / unit); }
+
+  RTCRayHit ray(const Eigen::Vector3d& from, const Eigen::Vector3d& direction, double min_distance,
+                double max_distance) const;
+};
+
+void TriangleScene::State::start(RTCBuildQuality quality) {
+  device = embree::make_device();
+  scene.reset(rtcNewScene(device.get()));
+  check(device.get());
+  rtcSetSceneFlags(scene.get(), RTC_SCENE_FLAG_ROBUST);
+  rtcSetSceneBuildQuality(scene.get(), quality);
+}
+
+template <class Vertex>
+void TriangleScene::State::attach(unsigned id, const std::vector<Vertex>& vertices,
+                                  const std::vector<std::array<std::uint32_t, 3>>& triangles) {
+  const Owned<RTCGeometry> geometry(rtcNewGeometry(device.get(), RTC_GEOMETRY_TYPE_TRIANGLE));
+  check(device.get());
+  auto* positions = static_cast<float*>(rtcSetNewGeometryBuffer(geometry.get(), RTC_BUFFER_TYPE_VERTEX, 0,
+                                                                RTC_FORMAT_FLOAT3, 3 * sizeof(float), vertices.size()));
+  auto* indices = static_cast<std::uint32_t*>(rtcSetNewGeometryBuffer(
+      geometry.get(), RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3, 3 * sizeof(std::uint32_t), triangles.size()));
+  check(device.get());
+  constexpr int axes = Vertex::RowsAtCompileTime;
+  for (const Vertex& vertex : vertices) {
+    for (int axis = 0; axis < axes; ++axis) *positions++ = local(vertex[axis], axis);
+    if constexpr (axes == 2) *positions++ = 0;
+  }
+  for (const auto& triangle : triangles) indices = std::copy(triangle.begin(), triangle.end(), indices);
+  rtcCommitGeometry(geometry.get());
+  rtcAttachGeometryByID(scene.get(), geometry.get(), id);
+  check(device.get());
+}
+
+RTCRayHit TriangleScene::State::ray(const Eigen::Vector3d& from, const Eigen::Vector3d& direction, double min_distance,
+                                    double max_distance) const {
+  // Embree sees no hits behind a ray's origin, so that the ray starts at `min_distance`.
+  const Eigen::Vector3d start = from + min_distance * direction;
+  RTCRayHit result{};
+  result.ray.org_x = local(start.x(), 0);
+  result.ray.org_y = local(start.y(), 1);
+  result.ray.org_z = local(start.z(), 2);
+  result.ray.dir_x = static_cast<float>(direction.x());
+  result.ray.dir_y = static_cast<float>(direction.y());
+  result.ray.dir_z = static_cast<float>(direction.z());
+  result.ray.tfar = static_cast<float>((max_distance - min_distance) / unit);
+  result.ray.mask = 0xffffffffu;
+  result.hit.geomID = RTC_INVALID_GEOMETRY_ID;
+  return result;
+}
+
+TriangleScene::TriangleScene(const std::vector<const TriangleMesh*>& meshes, const Eigen::Vector3d& origin, double unit)
+    : state_(new State{origin, unit, nullptr, nullptr}) {
+  const auto has_triangles = [](const TriangleMesh* mesh) { return !mesh->triangles.empty(); };
+  if (std::none_of(meshes.begin(), meshes.end(), has_triangles)) return;
+  state_->start(RTC_BUILD_QUALITY_HIGH);
+  for (std::size_t i = 0; i < meshes.size(); ++i)
+    if (has_triangles(meshes[i])) state_->attach(static_cast<unsigned>(i), meshes[i]->vertices, meshes[i]->triangles);
+  state_->commit();
+}
+
+TriangleScene::TriangleScene(const std::vector<Eigen::Vector2d>& vertices,
+                             const std::vector<std::array<std::uint32_t, 3>>& triangles, const Eigen::Vector2d& origin,
+                             double unit)
+    : state_(new State{{origin.x(), origin.y(), 0}, unit, nullptr, nullptr}) {
+  if (triangles.empty()) return;
+  state_->start(RTC_BUILD_QUALITY_MEDIUM);
+  state_->attach(0, vertices, triangles);
+  state_->commit();
+}
+
+TriangleScene::~TriangleScene() = default;
+TriangleScene::TriangleScene(TriangleScene&&) noexcept = default;
+TriangleScene& TriangleScene::operator=(TriangleScene&&) noexcept = default;
+
+bool TriangleScene::empty() const { return !state_->scene; }
+
+std::optional<TriangleHit> TriangleScene::nearest(const Eigen::Vector3d& from, const Eigen::Vector3d& direction,
+                                                  double min_distance, double max_distance) const {
+  if (empty()) return std::nullopt;
+  RTCRayHit ray = state_->ray(from, direction, min_distance, max_distance);
+  embree::intersect(state_->scene.get(), ray);
+  if (ray.hit.geomID == RTC_INVALID_GEOMETRY_ID) return std::nullopt;
+  return TriangleHit{min_distance + ray.ray.tfar * state_->unit, ray.hit.geomID, ray.hit.primID};
+}
+
+void TriangleScene::near(const Eigen::Vector3d& point, double radius, std::vector<TriangleId>& candidates) const {
+  candidates.clear();
+  if (empty()) return;
+  RTCPointQuery query{};
+  query.x = state_->local(point.x(), 0);
+  query.y = state_->local(point.y(), 1);
+  query.z = state_->local(point.z(), 2);
+  query.radius = static_cast<float>(radius / state_->unit);
+  RTCPointQueryContext context;
+  rtcInitPointQueryContext(&context);
+  rtcPointQuery(state_->scene.get(), &query, &context, add_candidate, &candidates);
+  sort_and_join(candidates);
+}
+
+}  // namespace tensorray

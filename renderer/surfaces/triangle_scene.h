@@ -1,0 +1,61 @@
+#pragma once
+/// @file renderer/surfaces/triangle_scene.h
+/// Rays and points against triangles: the one place that knows Embree.
+
+#include <array>
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <vector>
+
+#include <Eigen/Core>
+
+#include "renderer/surfaces/mesh.h"
+
+namespace tensorray {
+
+/// One of a scene's triangles.
+struct TriangleId {
+  std::uint32_t mesh = 0, triangle = 0;
+};
+
+/// Where a ray meets a triangle.
+struct TriangleHit {
+  double distance = 0;  ///< Along the unit direction, in single precision.
+  std::uint32_t mesh = 0, triangle = 0;
+};
+
+/// Immutable; any number of threads may query it at once. It keeps no reference to the meshes.
+class TriangleScene {
+ public:
+  /// @param meshes        Meshes without triangles are welcome; queries number the meshes in this order.
+  /// @param origin, unit  Coordinates are taken relative to these before they become single precision, so that it is
+  ///                      spent on what matters, whatever the world's units.
+  /// @throw std::runtime_error if Embree fails (out of memory, unsupported processor).
+  TriangleScene(const std::vector<const TriangleMesh*>& meshes, const Eigen::Vector3d& origin, double unit);
+
+  /// One mesh, in the plane z = 0. It is built faster, as such a mesh may have millions of triangles.
+  TriangleScene(const std::vector<Eigen::Vector2d>& vertices,
+                const std::vector<std::array<std::uint32_t, 3>>& triangles, const Eigen::Vector2d& origin, double unit);
+
+  ~TriangleScene();
+  TriangleScene(TriangleScene&&) noexcept;
+  TriangleScene& operator=(TriangleScene&&) noexcept;
+
+  /// Whether it has no triangles.
+  bool empty() const;
+
+  /// The nearest triangle met between the two distances (world units; the first may be negative), from either side.
+  std::optional<TriangleHit> nearest(const Eigen::Vector3d& from, const Eigen::Vector3d& direction, double min_distance,
+                                     double max_distance) const;
+
+  /// All triangles whose bounding boxes come within `radius` of the point, and some further ones, ordered by mesh and
+  /// triangle. A radius of 1e-6 units makes up for single precision where coordinates are below one unit.
+  void near(const Eigen::Vector3d& point, double radius, std::vector<TriangleId>& candidates) const;
+
+ private:
+  struct State;
+  std::unique_ptr<State> state_;
+};
+
+}  // namespace tensorray

@@ -1,0 +1,393 @@
+#include "renderer/surfaces/tube_mesh.h"
+
+#include <algorithm>
+#include <atomic>
+#include <cmath>
+#include <limits>
+#include <stdexcept>
+#include <string>
+#include <utility>
+
+#include <Eigen/Geometry>
+#include <tbb/parallel_for.h>
+
+#include "base/constants.h"
+#include "renderer/surfaces/polyline.h"
+
+namespace tensorray {
+namespace {
+
+constexpr double value_steps = 128;  // Over the range of all values: a finer change needs no ring of its own.
+constexpr int most_pieces = 64;      // Of what is between two points.
+constexpr std::size_t chunk = 1024;  // Tubes that are made before they are put together.
+
+Eigen::Vector3d axis(const TubePoint& p) { return p.x.cross(p.y).normalized(); }
+Eigen::Vector3d rim(const TubePoint& p, double angle) { return std::cos(angle) * p.x + std::sin(angle) * p.y; }
+Eigen::Vector3d along_rim(const TubePoint& p, double angle) { return std::cos(angle) * p.y - std::sin(angle) * p.x; }
+
+/// In the ellipse's plane, normal to it.
+Eigen::Vector3d rim_normal(const TubePoint& p, double angle) { return along_rim(p, angle).cross(axis(p)).normalized(); }
+
+/// The greater semi-axis a: by Apollonius |x|² + |y|² = a² + b² and |x × y| = a b.
+double greatest_radius(const TubePoint& p) {
+  const double sum = p.x.squaredNorm() + p.y.squaredNorm(), product = p.x.cross(p.y).norm();
+  return (std::sqrt(sum + 2 * product) + std::sqrt(std::max(0.0, sum - 2 * product))) / 2;
+}
+
+/// Segments of a polygon in a circle, so that it is nowhere farther inside than `tolerance`.
+int segments_for(double radius, double tolerance, const TubeSettings& settings) {
+  const double half = std::acos(std::clamp(1 - tolerance / radius, -1.0, 1.0));
+  const double wanted = half > 0 ? std::ceil(pi / half) : settings.most_segments;
+  return static_cast<int>(std::clamp(wanted, double(settings.least_segments), double(settings.most_segments)));
+}
+
+/// What is between two points: the centre on the cubic that has the tube's direction at both, its speed there such that
+/// a circle's arc keeps its height; the ellipse turned with the direction, so that it keeps its size in a bend.
+TubePoint between(const TubePoint& a, const TubePoint& b, double t) {
+  const Eigen::Vector3d from = axis(a), to = axis(b), chord = b.center - a.center;
+  const double half_turn = std::sqrt(std::max(0.0, (1 + from.dot(to)) / 2));  // Its cosine.
+  const double speed = chord.norm() * 2 / (1 + half_turn);
+  const Eigen::Vector3d bulge = t * (1 - t) * (speed * ((1 - t) * from - t * to) - (1 - 2 * t) * chord);
+  const auto turn = Eigen::Quaterniond::FromTwoVectors(from, to);
+  const auto part = Eigen::Quaterniond::Identity().slerp(t, turn);
+  const auto mixed = [&](const Eigen::Vector3d& u, const Eigen::Vector3d& v) -> Eigen::Vector3d {
+    return part * ((1 - t) * u + t * (turn.conjugate() * v));
+  };
+  return {a.center + t * chord + bulge, mixed(a.x, b.x), mixed(a.y, b.y), (1 - t) * a.value + t * b.value,
+          (1 - t) * a.shade + t * b.shade};
+}
+
+/// How far the straight surface between two rings is off the tube.
+double deviation(const TubePoint& a, const TubePoint& b) {
+  const double turn = (axis(b) - axis(a)).norm();
+  return ((b.center - a.center).norm() + turn * std::max(greatest_radius(a), greatest_radius(b))) * turn / 8;
+}
+
+/// Leaves out the rings that others imply, to half the tolerance, and adds those that curvature asks for.
+Tube adapted(const Tube& tube, double tolerance, double value_tolerance, double shade_tolerance) {
+  const auto error = [&](std::size_t i, std::size_t j, std::size_t k) {
+    const TubePoint &a = tube[i], &b = tube[j], &point = tube[k];
+    const Eigen::Vector3d chord = b.center - a.center;
+    const double squared = chord.squaredNorm();
+    const double t = squared > 0 ? std::clamp(chord.dot(point.center - a.center) / squared, 0.0, 1.0) : 0;
+    const auto unlike = [&](auto member) {
+      return ((a.*member) + t * ((b.*member) - (a.*member)) - (point.*member)).norm();
+    };
+    const double apart = unlike(&TubePoint::center) + std::max(unlike(&TubePoint::x), unlike(&TubePoint::y));
+    const auto off = [&](auto member, double allowed) {
+      const double difference = std::abs(a.*member + t * (b.*member - a.*member) - point.*member);
+      return difference > 0 ? difference / allowed : 0;
+    };
+    return std::max(
+        {apart / (tolerance / 2), off(&TubePoint::value, value_tolerance), off(&TubePoint::shade, shade_tolerance)});
+  };
+  Tube result;
+  for (const std::size_t i : thinned(tube.size(), error)) {
+    if (!result.empty()) {
+      const TubePoint last = result.back();
+      const double wanted = std::ceil(std::sqrt(deviation(last, tube[i]) / (tolerance / 2)));
+      const int pieces = static_cast<int>(std::clamp(wanted, 1.0, double(most_pieces)));
+      for (int piece = 1; piece < pieces; ++piece) result.push_back(between(last, tube[i], double(piece) / pieces));
+    }
+    result.push_back(tube[i]);
+  }
+  return result;
+}
+
+/// Points at even distances of about `spacing`, the ends among them.
+Tube spaced(const Tube& tube, double spacing) {
+  std::vector<double> lengths{0};
+  for (std::size_t i = 1; i < tube.size(); ++i)
+    lengths.push_back(lengths.back() + (tube[i].center - tube[i - 1].center).norm());
+  const double pieces = std::max(1.0, std::round(lengths.back() / spacing));
+  Tube result;
+  std::size_t next = 1;
+  for (double piece = 0; piece <= pieces; ++piece) {
+    const double at = piece / pieces * lengths.back();
+    while (next + 1 < tube.size() && lengths[next] < at) ++next;
+    const double gap = lengths[next] - lengths[next - 1];
+    const double t = gap > 0 ? std::clamp((at - lengths[next - 1]) / gap, 0.0, 1.0) : 1;
+    result.push_back(between(tube[next - 1], tube[next], t));
+  }
+  return result;
+}
+
+/// Joins rings of equally many vertices into a surface.
+class Loft {
+ public:
+  Loft(const Tube& rings, int segments, bool closed, TubeMesh& mesh)
+      : rings_(rings), segments_(segments), closed_(closed), mesh_(mesh), first_(mesh.mesh.vertices.size()) {}
+
+  void add_side() {
+    for (std::size_t k = 0; k < rings_.size(); ++k)
+      for (int j = 0; j < segments_; ++j) add_vertex(position(k, j), normal(k, j), rings_[k].value);
+    const std::size_t strips = closed_ ? rings_.size() : rings_.size() - 1;
+    for (std::size_t k = 0; k < strips; ++k)
+      for (int j = 0; j < segments_; ++j) {
+        const std::uint32_t a = index(k, j), b = index(k, j + 1), c = index(k + 1, j + 1), d = index(k + 1, j);
+        mesh_.mesh.triangles.push_back({a, b, c});
+        mesh_.mesh.triangles.push_back({a, c, d});
+      }
+  }
+
+  /// The polygon of ring `k`, which is the first or the last, with vertices of its own.
+  void add_flat_cap(std::size_t k) {
+    const Eigen::Vector3d outwards = k == 0 ? Eigen::Vector3d(-axis(rings_[k])) : axis(rings_[k]);
+    const auto center = static_cast<std::uint32_t>(mesh_.mesh.vertices.size());
+    for (int j = 0; j < segments_; ++j) add_vertex(position(k, j), outwards, rings_[k].value);
+    for (int j = 1; j + 1 < segments_; ++j) add_oriented(k, center, center + j, center + j + 1);
+  }
+
+  /// The cone to a point beyond ring `k`, with the ring's own vertices.
+  void add_pole(std::size_t k, const Eigen::Vector3d& pole) {
+    const Eigen::Vector3d outwards = k == 0 ? Eigen::Vector3d(-axis(rings_[k])) : axis(rings_[k]);
+    const auto tip = static_cast<std::uint32_t>(mesh_.mesh.vertices.size());
+    add_vertex(pole, outwards, rings_[k].value);
+    for (int j = 0; j < segments_; ++j) add_oriented(k, tip, index(k, j), index(k, j + 1));
+  }
+
+ private:
+  double angle(int j) const { return 2 * pi * j / segments_; }
+  Eigen::Vector3d position(std::size_t k, int j) const { return rings_[k].center + rim(rings_[k], angle(j)); }
+  std::uint32_t index(std::size_t k, int j) const {
+    return static_cast<std::uint32_t>(first_ + k % rings_.size() * segments_ + j % segments_);
+  }
+
+  /// Normal to the surface: along the rim, and from the ring before to the ring behind.
+  Eigen::Vector3d normal(std::size_t k, int j) const {
+    const std::size_t n = rings_.size();
+    const std::size_t before = k > 0 ? k - 1 : closed_ ? n - 1 : 0, behind = k + 1 < n ? k + 1 : closed_ ? 0 : n - 1;
+    const Eigen::Vector3d flat = rim_normal(rings_[k], angle(j));
+    const Eigen::Vector3d steep = along_rim(rings_[k], angle(j)).cross(position(behind, j) - position(before, j));
+    // On the inside of a bend that is tighter than the tube is thick, the surface runs backwards.
+    return steep.dot(flat) > 0 ? Eigen::Vector3d(steep.normalized()) : flat;
+  }
+
+  void add_vertex(const Eigen::Vector3d& position, const Eigen::Vector3d& normal, double value) {
+    mesh_.mesh.vertices.push_back(position);
+    mesh_.normals.push_back(normal.cast<float>());
+    mesh_.values.push_back(static_cast<float>(value));
+  }
+
+  /// (a, b, c) is counter-clockwise about the tube's direction: right at its end, and the other way round at its start.
+  void add_oriented(std::size_t k, std::uint32_t a, std::uint32_t b, std::uint32_t c) {
+    if (k == 0) std::swap(b, c);
+    mesh_.mesh.triangles.push_back({a, b, c});
+  }
+
+  const Tube& rings_;
+  int segments_;
+  bool closed_;
+  TubeMesh& mesh_;
+  std::size_t first_;
+};
+
+/// The rings of half an ellipsoid from the pole to `end`, both left out; `sense` is −1 at a tube's start, 1 at its end.
+Tube dome(const TubePoint& end, double sense, double height, int segments) {
+  Tube rings;
+  const int count = std::max(2, segments / 4);
+  for (int i = count - 1; i > 0; --i) {
+    const double angle = pi / 2 * i / count;
+    const Eigen::Vector3d center = end.center + sense * height * std::sin(angle) * axis(end);
+    rings.push_back({center, std::cos(angle) * end.x, std::cos(angle) * end.y, end.value});
+  }
+  return rings;
+}
+
+/// About the lesser semi-axis, and exactly the radius of a circle.
+double dome_height(const TubePoint& end) {
+  return std::sqrt(2) * end.x.cross(end.y).norm() / std::sqrt(end.x.squaredNorm() + end.y.squaredNorm());
+}
+
+void add_solid(const Tube& tube, int segments, TubeCaps caps, TubeMesh& mesh) {
+  if (caps != TubeCaps::round) {
+    Loft loft(tube, segments, false, mesh);
+    loft.add_side();
+    if (caps == TubeCaps::open) return;
+    loft.add_flat_cap(0);
+    loft.add_flat_cap(tube.size() - 1);
+    return;
+  }
+  const TubePoint &start = tube.front(), &end = tube.back();
+  Tube rings = dome(start, -1, dome_height(start), segments), last = dome(end, 1, dome_height(end), segments);
+  rings.insert(rings.end(), tube.begin(), tube.end());
+  rings.insert(rings.end(), last.rbegin(), last.rend());
+  Loft loft(rings, segments, false, mesh);
+  loft.add_side();
+  loft.add_pole(0, start.center - dome_height(start) * axis(start));
+  loft.add_pole(rings.size() - 1, end.center + dome_height(end) * axis(end));
+}
+
+/// Settings with nothing left to choose.
+struct Job {
+  TubeSettings settings;
+  double value_tolerance, shade_tolerance;
+};
+
+/// A round wire along the ellipse of `point`.
+void add_hoop(const Job& job, const TubePoint& point, TubeMesh& mesh) {
+  const TubeSettings& s = job.settings;
+  const int pieces = std::max(12, segments_for(greatest_radius(point), s.tolerance, s));
+  Tube hoop;
+  for (int j = 0; j < pieces; ++j) {
+    const double angle = 2 * pi * j / pieces;
+    hoop.push_back({point.center + rim(point, angle), s.wire_radius * axis(point),
+                    s.wire_radius * rim_normal(point, angle), point.value});
+  }
+  Loft(hoop, segments_for(s.wire_radius, s.tolerance, s), true, mesh).add_side();
+}
+
+/// A round wire along the tube, at one angle.
+void add_line(const Job& job, const Tube& tube, double angle, TubeMesh& mesh) {
+  const double radius = job.settings.wire_radius;
+  const auto position = [&](std::size_t k) -> Eigen::Vector3d { return tube[k].center + rim(tube[k], angle); };
+  Tube line;
+  for (std::size_t k = 0; k < tube.size(); ++k) {
+    const Eigen::Vector3d step = position(std::min(k + 1, tube.size() - 1)) - position(k > 0 ? k - 1 : 0);
+    const Eigen::Vector3d tangent = step.dot(axis(tube[k])) > 0 ? Eigen::Vector3d(step.normalized()) : axis(tube[k]);
+    const Eigen::Vector3d normal = rim_normal(tube[k], angle);
+    const Eigen::Vector3d x = radius * (normal - normal.dot(tangent) * tangent).normalized();
+    line.push_back({position(k), x, tangent.cross(x), tube[k].value});
+  }
+  add_solid(line, segments_for(radius, job.settings.tolerance, job.settings), job.settings.caps, mesh);
+}
+
+void add_disc(const Job& job, const TubePoint& point, TubeMesh& mesh) {
+  Tube disc{point, point};
+  disc[0].center -= job.settings.thickness / 2 * axis(point);
+  disc[1].center += job.settings.thickness / 2 * axis(point);
+  add_solid(disc, segments_for(greatest_radius(point), job.settings.tolerance, job.settings), TubeCaps::flat, mesh);
+}
+
+TubeMesh make_tube(const Job& job, const Tube& tube) {
+  TubeMesh mesh;
+  const TubeSettings& settings = job.settings;
+  if (tube.size() >= 2 && settings.style == TubeStyle::discs) {
+    for (const TubePoint& point : spaced(tube, settings.spacing)) add_disc(job, point, mesh);
+  } else if (tube.size() >= 2) {
+    const Tube rings = adapted(tube, settings.tolerance, job.value_tolerance, job.shade_tolerance);
+    if (settings.style == TubeStyle::wire) {
+      for (const TubePoint& point : spaced(tube, settings.spacing)) add_hoop(job, point, mesh);
+      for (int j = 0; j < settings.lines; ++j) add_line(job, rings, 2 * pi * j / settings.lines, mesh);
+    } else {
+      double radius = 0;
+      for (const TubePoint& ring : rings) radius = std::max(radius, greatest_radius(ring));
+      add_solid(rings, segments_for(radius, settings.tolerance, settings), settings.caps, mesh);
+    }
+  }
+  mesh.tube_ends.push_back(static_cast<std::uint32_t>(mesh.mesh.triangles.size()));
+  return mesh;
+}
+
+[[noreturn]] void refuse_size(const TubeSettings& settings) {
+  throw std::runtime_error("the tubes need more than " + std::to_string(settings.most_triangles) +
+                           " triangles: draw fewer of them, lines instead, or a picture of fewer pixels");
+}
+
+void append(const TubeMesh& part, TubeMesh& whole) {
+  const auto vertices = static_cast<std::uint32_t>(whole.mesh.vertices.size());
+  const auto triangles = static_cast<std::uint32_t>(whole.mesh.triangles.size());
+  whole.mesh.vertices.insert(whole.mesh.vertices.end(), part.mesh.vertices.begin(), part.mesh.vertices.end());
+  whole.normals.insert(whole.normals.end(), part.normals.begin(), part.normals.end());
+  whole.values.insert(whole.values.end(), part.values.begin(), part.values.end());
+  for (const auto& [a, b, c] : part.mesh.triangles)
+    whole.mesh.triangles.push_back({a + vertices, b + vertices, c + vertices});
+  for (const std::uint32_t end : part.tube_ends) whole.tube_ends.push_back(end + triangles);
+}
+
+/// One mesh of many, in the memory that it needs and no more; each part is freed as soon as it is in.
+TubeMesh joined(std::vector<TubeMesh>& parts) {
+  std::size_t vertices = 0, triangles = 0, tubes = 0;
+  for (const TubeMesh& part : parts) {
+    vertices += part.mesh.vertices.size();
+    triangles += part.mesh.triangles.size();
+    tubes += part.tube_ends.size();
+  }
+  TubeMesh whole;
+  whole.mesh.vertices.reserve(vertices);
+  whole.normals.reserve(vertices);
+  whole.values.reserve(vertices);
+  whole.mesh.triangles.reserve(triangles);
+  whole.tube_ends.reserve(tubes);
+  for (TubeMesh& part : parts) {
+    append(part, whole);
+    part = TubeMesh();
+  }
+  return whole;
+}
+
+double range_of(const std::vector<Tube>& tubes, double TubePoint::*member) {
+  double least = std::numeric_limits<double>::infinity(), greatest = -least;
+  for (const Tube& tube : tubes)
+    for (const TubePoint& point : tube) {
+      least = std::min(least, point.*member);
+      greatest = std::max(greatest, point.*member);
+    }
+  return std::max(0.0, greatest - least);
+}
+
+/// Before any is made: a small spacing asks for any number of them.
+void require_few_ellipses(const std::vector<Tube>& tubes, const TubeSettings& settings) {
+  if (settings.style == TubeStyle::solid) return;
+  double ellipses = 0;
+  for (const Tube& tube : tubes)
+    for (std::size_t i = 1; i < tube.size(); ++i)
+      ellipses += (tube[i].center - tube[i - 1].center).norm() / settings.spacing;
+  const double triangles = ellipses * settings.least_segments * (settings.style == TubeStyle::wire ? 24 : 2);
+  if (triangles > static_cast<double>(settings.most_triangles)) refuse_size(settings);
+}
+
+Job make_job(const std::vector<Tube>& tubes, TubeSettings settings) {
+  const double lengths[] = {settings.tolerance, settings.spacing, settings.wire_radius, settings.thickness};
+  for (const double length : lengths)
+    if (!(length >= 0) || !std::isfinite(length))
+      throw std::invalid_argument("lengths of the tubes' style must be positive, or 0 (automatic)");
+  if (settings.least_segments < 3 || settings.most_segments < settings.least_segments)
+    throw std::invalid_argument("tubes need 3 segments around or more, and no fewer at most than at least");
+  if (settings.most_triangles > std::uint64_t{1} << 31)
+    throw std::invalid_argument("tubes have at most 2^31 triangles");
+  if (settings.lines < 0) throw std::invalid_argument("the number of lines of wire tubes must not be negative");
+  for (const Tube& tube : tubes)
+    for (const TubePoint& point : tube)
+      if (!point.center.allFinite() || !(point.x.cross(point.y).norm() > 0))
+        throw std::invalid_argument("a tube has a point that is not finite, or an ellipse without an area");
+  const double radius = typical_radius(tubes);
+  const auto choose = [&](double& length, double factor) {
+    if (length == 0) length = factor * radius;
+  };
+  choose(settings.tolerance, 1.0 / 50);
+  choose(settings.spacing, 2);
+  choose(settings.wire_radius, 1.0 / 20);
+  choose(settings.thickness, 1.0 / 10);
+  require_few_ellipses(tubes, settings);
+  return {settings, range_of(tubes, &TubePoint::value) / value_steps, range_of(tubes, &TubePoint::shade) / value_steps};
+}
+
+}  // namespace
+
+double typical_radius(const std::vector<Tube>& tubes) {
+  std::vector<double> radii;
+  for (const Tube& tube : tubes)
+    for (const TubePoint& point : tube) radii.push_back(point.x.norm());
+  if (radii.empty()) return 0;
+  const auto middle = radii.begin() + static_cast<std::ptrdiff_t>(radii.size() / 2);
+  std::nth_element(radii.begin(), middle, radii.end());
+  return *middle;
+}
+
+TubeMesh make_tube_mesh(std::vector<Tube> tubes, const TubeSettings& settings) {
+  const Job job = make_job(tubes, settings);
+  std::vector<TubeMesh> chunks;
+  std::atomic<std::uint64_t> triangles{0};
+  for (std::size_t first = 0; first < tubes.size(); first += chunk) {
+    std::vector<TubeMesh> parts(std::min(chunk, tubes.size() - first));
+    tbb::parallel_for(std::size_t{0}, parts.size(), [&](std::size_t i) {
+      parts[i] = make_tube(job, std::exchange(tubes[first + i], {}));
+      if ((triangles += parts[i].mesh.triangles.size()) > settings.most_triangles) refuse_size(settings);
+    });
+    chunks.push_back(joined(parts));
+  }
+  return chunks.size() == 1 ? std::move(chunks[0]) : joined(chunks);
+}
+
+}  // namespace tensorray

@@ -1,0 +1,117 @@
+#include "renderer/textures/image_pyramid.h"
+
+#include <algorithm>
+#include <cstdint>
+#include <utility>
+
+#include <tbb/parallel_for.h>
+
+namespace tensorray {
+namespace {
+
+/// Larger levels would take more memory than the picture itself; from the full picture they are quickly made.
+constexpr int first_stored = 3;
+
+int halved(int size, int level) { return std::max(1, size >> level); }
+
+/// What one pixel of a smaller level covers of a larger one, along one axis.
+struct Cover {
+  int begin;     ///< The first pixel that it touches.
+  int end;       ///< Behind the last one.
+  double first;  ///< How much of the first pixel is covered, from 0 to 1.
+  double last;   ///< Of the last one, if it is another.
+
+  double weight(int i) const { return i == begin ? first : i + 1 == end ? last : 1.0; }
+};
+
+/// Pixel `i` of `small` covers the range [i, i + 1) * large / small: bounds in whole numbers, so that they never err.
+Cover cover(int i, int small, int large) {
+  const std::int64_t from = static_cast<std::int64_t>(i) * large, to = from + large;
+  const int begin = static_cast<int>(from / small), end = static_cast<int>((to + small - 1) / small);
+  const auto part = [small](std::int64_t numerator) { return static_cast<double>(numerator) / small; };
+  const std::int64_t first_end = std::min((static_cast<std::int64_t>(begin) + 1) * small, to);
+  return {begin, end, part(first_end - from), part(to - (static_cast<std::int64_t>(end) - 1) * small)};
+}
+
+/// Converts and multiplies alpha in. Where it is already, it is taken out for the conversion, as curves want it; a
+/// colour of no alpha (a glow) is converted as it is.
+void convert(const NativeImage& image, const ColorConversion& conversion, int count, float* rgba) {
+  const auto scale = [&](bool out) {
+    for (float* pixel = rgba; pixel != rgba + static_cast<std::size_t>(count) * 4; pixel += 4)
+      if (pixel[3] != 1 && (pixel[3] > 0 || !image.is_premultiplied))
+        for (int c = 0; c < 3; ++c) pixel[c] = out ? pixel[c] / pixel[3] : pixel[c] * pixel[3];
+  };
+  const bool take_out = image.is_premultiplied && conversion;
+  if (take_out) scale(true);
+  if (conversion) conversion(rgba, static_cast<std::size_t>(count));
+  if (take_out || !image.is_premultiplied) scale(false);
+}
+
+}  // namespace
+
+ImagePyramid::ImagePyramid(NativeImage image, ColorConversion conversion)
+    : image_(std::move(image)), conversion_(std::move(conversion)) {
+  for (int level = first_stored; level < levels(); ++level) {
+    std::vector<float> pixels(static_cast<std::size_t>(width(level)) * height(level) * 4);
+    const int from = level == first_stored ? 0 : level - 1;
+    tbb::parallel_for(0, height(level), [&](int y) {
+      reduce_row(from, level, 0, y, width(level), &pixels[static_cast<std::size_t>(y) * width(level) * 4]);
+    });
+    stored_.push_back(std::move(pixels));
+  }
+}
+
+int ImagePyramid::levels() const {
+  int count = 1;
+  for (int size = std::max(image_.width, image_.height); size > 1; size /= 2) ++count;
+  return count;
+}
+
+int ImagePyramid::width(int level) const { return halved(image_.width, level); }
+int ImagePyramid::height(int level) const { return halved(image_.height, level); }
+
+Eigen::Vector4f ImagePyramid::mean() const {
+  Eigen::Vector4f rgba;
+  read_row(levels() - 1, 0, 0, 1, rgba.data());
+  return rgba;
+}
+
+void ImagePyramid::read(int level, int x, int y, int columns, int rows, std::size_t row_pixels, float* rgba) const {
+  for (int row = 0; row < rows; ++row) read_row(level, x, y + row, columns, rgba + row * row_pixels * 4);
+}
+
+void ImagePyramid::read_row(int level, int x, int y, int count, float* rgba) const {
+  if (level == 0) {
+    read_pixels(image_, x, y, count, rgba);
+    convert(image_, conversion_, count, rgba);
+  } else if (level < first_stored) {
+    reduce_row(0, level, x, y, count, rgba);
+  } else {
+    const std::size_t first = static_cast<std::size_t>(y) * width(level) + x;
+    std::copy_n(&stored_[level - first_stored][first * 4], static_cast<std::size_t>(count) * 4, rgba);
+  }
+}
+
+/// Averages what the pixels of a row cover of the larger level `from`.
+void ImagePyramid::reduce_row(int from, int level, int x, int y, int count, float* rgba) const {
+  const Cover rows = cover(y, height(level), height(from));
+  const int begin = cover(x, width(level), width(from)).begin,
+            end = cover(x + count - 1, width(level), width(from)).end;
+  std::vector<float> line(static_cast<std::size_t>(end - begin) * 4);
+  std::vector<Eigen::Vector4d> sums(count, Eigen::Vector4d::Zero());
+  for (int row = rows.begin; row < rows.end; ++row) {
+    read_row(from, begin, row, end - begin, line.data());
+    for (int i = 0; i < count; ++i) {
+      const Cover columns = cover(x + i, width(level), width(from));
+      for (int column = columns.begin; column < columns.end; ++column)
+        sums[i] +=
+            rows.weight(row) * columns.weight(column) *
+            Eigen::Map<const Eigen::Vector4f>(&line[static_cast<std::size_t>(column - begin) * 4]).cast<double>();
+    }
+  }
+  const double area = static_cast<double>(width(from)) / width(level) * height(from) / height(level);
+  for (int i = 0; i < count; ++i)
+    Eigen::Map<Eigen::Vector4f>(rgba + static_cast<std::size_t>(i) * 4) = (sums[i] / area).cast<float>();
+}
+
+}  // namespace tensorray

@@ -1,0 +1,153 @@
+#include "volumes/bricks/tensor_field.h"
+
+#include <algorithm>
+#include <cmath>
+#include <new>
+#include <stdexcept>
+
+#include <sys/mman.h>
+#include <tbb/parallel_for.h>
+
+#include "volumes/bricks/brick_making.h"
+
+namespace tensorray {
+namespace {
+
+struct alignas(64) ZeroBrick {
+  float floats[TensorBrick::stored_floats] = {};
+};
+constexpr ZeroBrick zero_brick;
+
+/// The bricks of the cells between the voxels of a box (an axis of a single voxel has one cell).
+Eigen::AlignedBox3i bricks_of(const Eigen::AlignedBox3i& voxels) {
+  const auto brick_of = [](int cell) { return cell >> 3; };
+  const Eigen::Vector3i last = (voxels.max().array() - 1).matrix().cwiseMax(voxels.min());
+  return {voxels.min().unaryExpr(brick_of), last.unaryExpr(brick_of)};
+}
+
+/// How many bricks are made before blocks are given back: as many as keep all threads busy.
+constexpr std::size_t enough_bricks = 4096;
+
+/// The first one after `brick` that begins a new x.
+std::size_t end_of_layer(const std::vector<Eigen::Vector3i>& bricks, std::size_t brick) {
+  while (brick < bricks.size() && bricks[brick].x() == bricks[brick - 1].x()) ++brick;
+  return std::min(brick, bricks.size());
+}
+
+Eigen::AlignedBox3d extent_of(const Eigen::AlignedBox3i& active) {
+  Eigen::AlignedBox3d extent(active.min().cast<double>(), active.max().cast<double>());
+  for (int axis = 0; axis < 3; ++axis)
+    if (active.sizes()[axis] == 0) {
+      extent.min()[axis] -= 0.5;
+      extent.max()[axis] += 0.5;
+    }
+  return extent;
+}
+
+}  // namespace
+
+const TensorBrick TensorField::zeros{zero_brick.floats, zero_brick.floats + TensorBrick::trailing_offset, 0};
+
+Eigen::Matrix3d TensorBrick::tensor(int voxel) const {
+  Eigen::Matrix3d T;
+  Eigen::Map<Eigen::Matrix<double, 8, 1>>(T.data()) =
+      Eigen::Map<const Eigen::Matrix<float, 8, 1>>(bending + voxel * bending_floats).cast<double>();
+  T(2, 2) = trailing[voxel];
+  T(0, 0) += T(2, 2);
+  T(1, 1) += T(2, 2);
+  return T;
+}
+
+TensorField::TensorField(const TensorGrid& grid) : to_world_(grid.to_world), to_index_(grid.to_world.inverse()) {
+  make_bricks(grid, [](int) {});
+}
+
+TensorField::TensorField(TensorGrid&& grid) : to_world_(grid.to_world), to_index_(grid.to_world.inverse()) {
+  make_bricks(grid, [&](int x) {
+    while (!grid.blocks.empty() && grid.blocks.front().origin.x() < x) grid.blocks.pop_front();
+  });
+  grid.blocks.clear();
+}
+
+/// @param give_back  give_back(x) is called when no block whose origin is before x is needed any more.
+template <class GiveBack>
+void TensorField::make_bricks(const TensorGrid& grid, const GiveBack& give_back) {
+  const Eigen::AlignedBox3i active = grid.active_box();
+  if (active.isEmpty()) throw std::invalid_argument("the tensor field has no active voxel");
+  if (!to_world_.matrix().allFinite() || !to_index_.matrix().allFinite())
+    throw std::invalid_argument("the tensor field's transform cannot be inverted");
+  index_bounds_ = extent_of(active);
+  voxels_ = Eigen::AlignedBox3d(active.min().cast<double>(), active.max().cast<double>());
+
+  const BlockTable blocks(grid);
+  const std::vector<Eigen::Vector3i> bricks = active_bricks(blocks, bricks_of(active));
+  index_ = BrickIndex(bricks);
+  floats_ = allocate(bricks.size());
+  strongest_.resize(bricks.size());
+  for (std::size_t first = 0; first < bricks.size();) {
+    const std::size_t last = end_of_layer(bricks, first + enough_bricks);
+    tbb::parallel_for(first, last, [&](std::size_t i) {
+      strongest_[i] = make_brick(blocks, bricks[i], floats_.get() + i * TensorBrick::stored_floats);
+    });
+    if (last < bricks.size()) give_back(bricks[last].x() * TensorBrick::cells);
+    first = last;
+  }
+}
+
+/// Memory for `bricks` bricks, zero, from large pages where the system has them: bricks are visited far apart.
+TensorField::Floats TensorField::allocate(std::size_t bricks) {
+  const std::size_t bytes = bricks * TensorBrick::stored_floats * sizeof(float);
+  void* const memory = mmap(nullptr, bytes, PROT_READ | PROT_WRITE, MAP_PRIVATE | MAP_ANONYMOUS, -1, 0);
+  if (memory == MAP_FAILED) throw std::bad_alloc();
+#ifdef MADV_HUGEPAGE
+  madvise(memory, bytes, MADV_HUGEPAGE);
+#endif
+  return {static_cast<float*>(memory), {bytes}};
+}
+
+void TensorField::Release::operator()(float* floats) const { munmap(floats, bytes); }
+
+std::vector<Eigen::Vector3d> TensorField::corners() const {
+  std::vector<Eigen::Vector3d> corners;
+  for (int i = 0; i < 8; ++i)
+    corners.push_back(to_world_ * index_bounds_.corner(static_cast<Eigen::AlignedBox3d::CornerType>(i)));
+  return corners;
+}
+
+double TensorField::greatest_norm() const {
+  double greatest = 0;
+  for (std::size_t i = 0; i < brick_count(); ++i) {
+    const TensorBrick brick = stored(i);
+    for (int voxel = 0; voxel < TensorBrick::voxels; ++voxel)
+      greatest = std::max(greatest, brick.tensor(voxel).squaredNorm());
+  }
+  return std::sqrt(greatest);
+}
+
+TensorField TensorField::copy() const {
+  TensorField result;
+  result.to_world_ = to_world_;
+  result.to_index_ = to_index_;
+  result.index_bounds_ = index_bounds_;
+  result.voxels_ = voxels_;
+  result.strongest_ = strongest_;
+  result.index_ = index_;
+  result.floats_ = allocate(brick_count());
+  std::copy_n(floats_.get(), brick_count() * TensorBrick::stored_floats, result.floats_.get());
+  return result;
+}
+
+TensorField TensorField::scaled(double factor) && {
+  tbb::parallel_for(std::size_t{0}, brick_count(), [&](std::size_t i) {
+    float* const floats = floats_.get() + i * TensorBrick::stored_floats;
+    for (int j = 0; j < TensorBrick::stored_floats; ++j) floats[j] = static_cast<float>(floats[j] * factor);
+    strongest_[i] = strongest_deviator(floats);
+  });
+  return std::move(*this);
+}
+
+std::size_t TensorField::memory_bytes() const {
+  return brick_count() * (TensorBrick::stored_floats + 1) * sizeof(float) + index_.memory_bytes();
+}
+
+}  // namespace tensorray

@@ -1,0 +1,126 @@
+#include "volumes/bricks/tensor_sampler.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+namespace tensorray {
+
+int TensorSampler::locate(const Eigen::Vector3d& world, Eigen::Vector3d& fraction) {
+  const Eigen::AlignedBox3d& voxels = field_->voxels();
+  const Eigen::Vector3d index = field_->to_index() * world;
+  Eigen::Vector3i cell;
+  for (int axis = 0; axis < 3; ++axis) {
+    const double first = voxels.min()[axis], last = voxels.max()[axis];
+    const double inside = std::min(std::max(first, index[axis]), last);  // In this order NaN goes to the first voxel.
+    const double near = std::max(std::min(std::floor(inside), last - 1), first);
+    cell[axis] = static_cast<int>(near);
+    fraction[axis] = inside - near;
+  }
+  const Eigen::Vector3i at(cell.x() >> 3, cell.y() >> 3, cell.z() >> 3);
+  if (at != at_) {
+    at_ = at;
+    brick_ = field_->brick(at);
+  }
+  cell -= TensorBrick::cells * at;
+  return TensorBrick::voxel(cell.x(), cell.y(), cell.z());
+}
+
+namespace {
+
+constexpr int step_x = TensorBrick::voxel(1, 0, 0), step_y = TensorBrick::voxel(0, 1, 0);
+
+/// What bends light fills vector registers, T₂₂ goes alone.
+using Eight = Eigen::Array<double, 8, 1>;
+
+Eigen::Matrix3d to_matrix(const Eight& bending, double trailing) {
+  Eigen::Matrix3d T;
+  Eigen::Map<Eight>(T.data()) = bending;
+  T(0, 0) += trailing;
+  T(1, 1) += trailing;
+  T(2, 2) = trailing;
+  return T;
+}
+
+/// A value, and its slopes along the axes of index space.
+template <class Value>
+struct Slopes {
+  Value value, x, y, z;
+};
+
+/// Trilinear interpolation in a cell: along z, then y, then x. `load` gives the components of a voxel.
+template <class Value, class Load>
+Slopes<Value> interpolate(int voxel, const Eigen::Vector3d& f, Load load) {
+  Value value[2], slope_y[2], slope_z[2];
+  for (int x = 0; x < 2; ++x) {
+    const int face = voxel + x * step_x;
+    const Value near = load(face), far = load(face + step_y);
+    const Value near_z = load(face + 1) - near, far_z = load(face + step_y + 1) - far;
+    const Value near_value = near + f.z() * near_z;
+    slope_y[x] = far + f.z() * far_z - near_value;
+    slope_z[x] = near_z + f.y() * (far_z - near_z);
+    value[x] = near_value + f.y() * slope_y[x];
+  }
+  const Value slope_x = value[1] - value[0];
+  return {value[0] + f.x() * slope_x, slope_x, slope_y[0] + f.x() * (slope_y[1] - slope_y[0]),
+          slope_z[0] + f.x() * (slope_z[1] - slope_z[0])};
+}
+
+Eight bending(const TensorBrick& brick, int voxel) {
+  return Eigen::Map<const Eigen::Array<float, 8, 1>>(brick.bending + voxel * TensorBrick::bending_floats)
+      .cast<double>();
+}
+
+}  // namespace
+
+Eigen::Matrix3d TensorSampler::at(const Eigen::Vector3d& world) {
+  ++samples_;
+  Eigen::Vector3d f;
+  const int voxel = locate(world, f);
+  const double wx[2] = {1 - f.x(), f.x()}, wy[2] = {1 - f.y(), f.y()}, wz[2] = {1 - f.z(), f.z()};
+  Eight eight = Eight::Zero();
+  double last = 0;
+  for (int corner = 0; corner < 8; ++corner) {
+    const int x = corner >> 2, y = corner >> 1 & 1, z = corner & 1;
+    const int at = voxel + x * step_x + y * step_y + z;
+    const double weight = wx[x] * wy[y] * wz[z];
+    eight += weight * bending(brick_, at);
+    last += weight * brick_.trailing[at];
+  }
+  return to_matrix(eight, last);
+}
+
+Eigen::Matrix3d TensorSampler::at(const Eigen::Vector3d& world, const Eigen::Matrix<double, 3, 2>& along,
+                                  std::array<Eigen::Matrix3d, 2>& derivatives) {
+  ++samples_;
+  Eigen::Vector3d f;
+  const int voxel = locate(world, f);
+  const auto eight = interpolate<Eight>(voxel, f, [&](int at) { return bending(brick_, at); });
+  const auto last = interpolate<double>(voxel, f, [&](int at) { return double{brick_.trailing[at]}; });
+  Eigen::Matrix<double, 3, 2> by_index = field_->to_index().linear() * along;
+  // An axis of a single voxel has the same tensor across it.
+  for (int axis = 0; axis < 3; ++axis)
+    if (field_->voxels().sizes()[axis] == 0) by_index.row(axis).setZero();
+  for (int i = 0; i < 2; ++i) {
+    const double x = by_index(0, i), y = by_index(1, i), z = by_index(2, i);
+    derivatives[i] = to_matrix(x * eight.x + y * eight.y + z * eight.z, x * last.x + y * last.y + z * last.z);
+  }
+  return to_matrix(eight.value, last.value);
+}
+
+double TensorSampler::way_through_straight_brick(const Eigen::Vector3d& world, const Eigen::Vector3d& direction) {
+  if (brick_.strongest > 0 || !brick_.bending) return 0;
+  Eigen::Vector3d unused;
+  locate(world, unused);
+  if (brick_.strongest > 0) return 0;
+  const Eigen::Vector3d index = field_->to_index() * world - (TensorBrick::cells * at_).cast<double>();
+  const Eigen::Vector3d along = field_->to_index().linear() * direction;
+  double way = std::numeric_limits<double>::infinity();
+  for (int axis = 0; axis < 3; ++axis) {
+    if (!(index[axis] >= 0 && index[axis] <= TensorBrick::cells)) return 0;
+    if (along[axis] != 0) way = std::min(way, ((along[axis] > 0 ? TensorBrick::cells : 0) - index[axis]) / along[axis]);
+  }
+  return std::isfinite(way) ? way : 0;
+}
+
+}  // namespace tensorray

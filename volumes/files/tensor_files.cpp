@@ -1,0 +1,385 @@
+#include "volumes/files/tensor_files.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <stdexcept>
+
+#include <tbb/parallel_for.h>
+
+#include "base/errors.h"
+#include "volumes/files/vdb_archive.h"
+#include "volumes/tensors/finite_differences.h"
+
+namespace tensorray {
+namespace {
+
+constexpr double greatest_half = 65504;
+
+/// More blocks than any machine holds: what an active tile at the root of a tree would expand to.
+constexpr std::size_t greatest_block_count = std::size_t{1} << 25;
+
+bool is_vector(const GridInfo& grid) { return grid.type == "vec3s" || grid.type == "vec3d"; }
+bool is_scalar(const GridInfo& grid) { return grid.type == "float" || grid.type == "double"; }
+
+/// Where a component of a grid's value goes in the tensor.
+struct Entry {
+  int component, row, column;
+};
+
+/// A grid of a field: the ending of its name, and what it holds.
+struct Part {
+  std::string suffix;
+  std::vector<Entry> entries;
+};
+
+/// A way to lay a tensor out in grids.
+struct Layout {
+  bool (*suits)(const GridInfo&);
+  std::vector<Part> parts;
+};
+
+Layout rows_layout() {
+  Layout layout{is_vector, {}};
+  for (int row = 0; row < 3; ++row)
+    layout.parts.push_back({"_row" + std::to_string(row), {{0, row, 0}, {1, row, 1}, {2, row, 2}}});
+  return layout;
+}
+
+Layout numbered_layout() {
+  Layout layout{is_scalar, {}};
+  for (int i = 0; i < 9; ++i) layout.parts.push_back({"_" + std::to_string(i), {{0, i / 3, i % 3}}});
+  return layout;
+}
+
+Layout lettered_layout(bool symmetric) {
+  Layout layout{is_scalar, {}};
+  for (int row = 0; row < 3; ++row)
+    for (int column = symmetric ? row : 0; column < 3; ++column) {
+      layout.parts.push_back({std::string(".") + "xyz"[row] + "xyz" [column], {
+                                { 0, row, column }
+                              }});
+      if (symmetric && column != row) layout.parts.back().entries.push_back({0, column, row});
+    }
+  return layout;
+}
+
+/// In the order of preference, where a name has several.
+const std::vector<Layout>& layouts() {
+  static const std::vector<Layout> all{rows_layout(), numbered_layout(), lettered_layout(false), lettered_layout(true)};
+  return all;
+}
+
+bool has(const std::vector<GridInfo>& grids, const std::string& name, const Layout& layout) {
+  return std::all_of(layout.parts.begin(), layout.parts.end(), [&](const Part& part) {
+    return std::any_of(grids.begin(), grids.end(),
+                       [&](const GridInfo& grid) { return grid.name == name + part.suffix && layout.suits(grid); });
+  });
+}
+
+const Layout& layout_of(const std::vector<GridInfo>& grids, const std::string& name) {
+  return *std::find_if(layouts().begin(), layouts().end(),
+                       [&](const Layout& layout) { return has(grids, name, layout); });
+}
+
+std::string joined(const std::vector<std::string>& words) {
+  std::string text;
+  for (const std::string& word : words) text += (text.empty() ? "" : ", ") + word;
+  return text.empty() ? "none" : text;
+}
+
+std::string described(const std::vector<GridInfo>& grids) {
+  std::vector<std::string> words;
+  for (const GridInfo& grid : grids) words.push_back(grid.name + " (" + grid.type + ")");
+  return joined(words);
+}
+
+/// What may be read with `derive`, by name.
+std::vector<std::string> names_for(const std::vector<GridInfo>& grids, Derive derive) {
+  if (derive == Derive::none) return tensor_names(grids);
+  std::vector<std::string> names;
+  for (const GridInfo& grid : grids)
+    if (derive == Derive::gradient ? is_vector(grid) : is_scalar(grid)) names.push_back(grid.name);
+  return names;
+}
+
+std::string chosen_name(const std::filesystem::path& path, const std::vector<GridInfo>& grids, const std::string& name,
+                        Derive derive) {
+  const std::string kind = derive == Derive::none       ? "tensor field"
+                           : derive == Derive::gradient ? "vector grid for a gradient"
+                                                        : "scalar grid for a hessian";
+  const std::vector<std::string> names = names_for(grids, derive);
+  if (!name.empty()) {
+    if (std::find(names.begin(), names.end(), name) != names.end()) return name;
+    fail(path,
+         "has no " + kind + " \"" + name + "\"; there are: " + joined(names) + "; the grids are: " + described(grids));
+  }
+  if (names.size() == 1) return names.front();
+  if (names.empty()) fail(path, "has no " + kind + "; the grids are: " + described(grids));
+  fail(path, "has several of what could be the " + kind + "; name one of: " + joined(names));
+}
+
+/// A grid and where its values go.
+struct Source {
+  openvdb::GridBase::ConstPtr grid;
+  std::vector<Entry> entries;
+};
+
+/// Calls `visit(tree)` with the grid's tree in its type.
+template <class Visit>
+void with_tree(const openvdb::GridBase& grid, const Visit& visit) {
+  using namespace openvdb;
+  if (grid.isType<Vec3SGrid>()) visit(static_cast<const Vec3SGrid&>(grid).tree());
+  if (grid.isType<Vec3DGrid>()) visit(static_cast<const Vec3DGrid&>(grid).tree());
+  if (grid.isType<FloatGrid>()) visit(static_cast<const FloatGrid&>(grid).tree());
+  if (grid.isType<DoubleGrid>()) visit(static_cast<const DoubleGrid&>(grid).tree());
+}
+
+template <class Tree>
+void add_tile_origins(const Tree& tree, std::vector<openvdb::Coord>& origins) {
+  constexpr int size = TensorBlock::size;
+  auto tile = tree.cbeginValueOn();
+  tile.setMaxDepth(Tree::ValueOnCIter::LEAF_DEPTH - 1);
+  for (; tile; ++tile) {
+    openvdb::CoordBBox box;
+    tile.getBoundingBox(box);
+    if (box.volume() / TensorBlock::voxels + origins.size() > greatest_block_count) throw std::bad_alloc();
+    for (int x = box.min().x(); x <= box.max().x(); x += size)
+      for (int y = box.min().y(); y <= box.max().y(); y += size)
+        for (int z = box.min().z(); z <= box.max().z(); z += size) origins.emplace_back(x, y, z);
+  }
+}
+
+/// The origins of all blocks with an active voxel, in order.
+std::vector<openvdb::Coord> block_origins(const std::vector<Source>& sources) {
+  std::vector<openvdb::Coord> origins;
+  for (const Source& source : sources)
+    with_tree(*source.grid, [&](const auto& tree) {
+      static_assert(std::decay_t<decltype(tree)>::LeafNodeType::DIM == TensorBlock::size, "leaves are blocks");
+      for (auto leaf = tree.cbeginLeaf(); leaf; ++leaf)
+        if (!leaf->isEmpty()) origins.push_back(leaf->origin());
+      add_tile_origins(tree, origins);
+    });
+  std::sort(origins.begin(), origins.end());
+  origins.erase(std::unique(origins.begin(), origins.end()), origins.end());
+  return origins;
+}
+
+double component(double value, int) { return value; }
+template <class T>
+double component(const openvdb::math::Vec3<T>& value, int i) {
+  return value[i];
+}
+
+/// Calls `put(offset, value)` for the active voxels of a tree in the block at `origin`.
+template <class Tree, class Put>
+void for_each_in_block(const Tree& tree, const openvdb::Coord& origin, const Put& put) {
+  if (const auto* leaf = tree.probeConstLeaf(origin)) {
+    if (leaf->isDense()) {
+      const auto* const values = leaf->buffer().data();
+      for (int offset = 0; offset < TensorBlock::voxels; ++offset) put(offset, values[offset]);
+      return;
+    }
+    for (auto voxel = leaf->cbeginValueOn(); voxel; ++voxel) put(static_cast<int>(voxel.pos()), *voxel);
+  } else if (tree.isValueOn(origin)) {
+    const auto value = tree.getValue(origin);
+    for (int offset = 0; offset < TensorBlock::voxels; ++offset) put(offset, value);
+  }
+}
+
+void put(TensorBlock& block, int offset, const Entry& entry, double value) {
+  block.values[offset](entry.row, entry.column) = static_cast<float>(value);
+}
+
+void put(SampleBlock& block, int offset, const Entry& entry, double value) {
+  block.values[offset][entry.component] = value;
+}
+
+/// Blocks (TensorBlock or SampleBlock) of all active voxels. Only blocks of active voxels are made, of tiles too.
+/// @param make  make(n) is n blocks without active voxels.
+template <class Make>
+auto blocks_of(const std::vector<Source>& sources, const Make& make) {
+  const std::vector<openvdb::Coord> origins = block_origins(sources);
+  auto blocks = make(origins.size());
+  tbb::parallel_for(std::size_t{0}, blocks.size(), [&](std::size_t i) {
+    blocks[i].origin = {origins[i].x(), origins[i].y(), origins[i].z()};
+    for (const Source& source : sources)
+      with_tree(*source.grid, [&](const auto& tree) {
+        for_each_in_block(tree, origins[i], [&](int offset, const auto& value) {
+          blocks[i].active.set(offset);
+          for (const Entry& entry : source.entries) put(blocks[i], offset, entry, component(value, entry.component));
+        });
+      });
+  });
+  return blocks;
+}
+
+/// OpenVDB multiplies row vectors from the left, Eigen column vectors from the right.
+Eigen::Affine3d to_eigen(const openvdb::Mat4d& matrix) {
+  Eigen::Affine3d affine;
+  for (int row = 0; row < 4; ++row)
+    for (int column = 0; column < 4; ++column) affine.matrix()(row, column) = matrix(column, row);
+  return affine;
+}
+
+Eigen::Affine3d transform_of(const std::filesystem::path& path, const openvdb::GridBase& grid) {
+  if (!grid.transform().isLinear())
+    fail(path, "grid " + grid.getName() + " has a transform that is not affine (a frustum); resample it first");
+  const Eigen::Affine3d affine = to_eigen(grid.transform().baseMap()->getAffineMap()->getMat4());
+  if (!affine.matrix().allFinite() || !affine.inverse().matrix().allFinite())
+    fail(path, "grid " + grid.getName() + " has a transform that cannot be inverted; give it voxels of some size");
+  return affine;
+}
+
+/// Whether two transforms differ by less than a millionth of a voxel a voxel, and a thousandth of a voxel in all.
+bool same_transform(const Eigen::Affine3d& a, const Eigen::Affine3d& b) {
+  const Eigen::Matrix4d difference = (a.inverse() * b).matrix() - Eigen::Matrix4d::Identity();
+  return difference.leftCols<3>().norm() < 1e-6 && difference.col(3).norm() < 1e-3;
+}
+
+Eigen::Affine3d common_transform(const std::filesystem::path& path, const std::vector<Source>& sources) {
+  const Eigen::Affine3d first = transform_of(path, *sources.front().grid);
+  for (const Source& source : sources)
+    if (!same_transform(first, transform_of(path, *source.grid)))
+      fail(path, "grids " + sources.front().grid->getName() + " and " + source.grid->getName() +
+                     " have different transforms; resample them to one");
+  return first;
+}
+
+std::string text_of(const openvdb::Metadata& value) {
+  const auto* text = dynamic_cast<const openvdb::StringMetadata*>(&value);
+  return text ? text->value() : value.str();
+}
+
+/// The file's metadata and, for tools that keep only the grids', what we wrote there.
+std::map<std::string, std::string> metadata_of(const openvdb::MetaMap& file, const openvdb::GridBase& grid) {
+  std::map<std::string, std::string> metadata;
+  for (auto i = file.beginMeta(); i != file.endMeta(); ++i) metadata[i->first] = text_of(*i->second);
+  for (auto i = grid.beginMeta(); i != grid.endMeta(); ++i)
+    if (i->first.rfind("tensorray:", 0) == 0) metadata.emplace(i->first, text_of(*i->second));
+  return metadata;
+}
+
+std::vector<GridInfo> infos_of(const VdbFile& file) {
+  std::vector<GridInfo> infos;
+  for (const VdbGrid& grid : file.grids) {
+    // "Tree_vec3s_5_4_3" is a tree of vec3s.
+    std::string type = grid.type;
+    if (type.rfind("Tree_", 0) == 0) type = type.substr(5, type.find('_', 5) - 5);
+    infos.push_back({grid.name, type, grid.half ? "half" : "full"});
+  }
+  return infos;
+}
+
+std::vector<Part> parts_of(const std::vector<GridInfo>& grids, const std::string& name, Derive derive) {
+  if (derive == Derive::none) return layout_of(grids, name).parts;
+  if (derive == Derive::hessian) return {{"", {{0, 0, 0}}}};
+  return {{"", {{0, 0, 0}, {1, 0, 0}, {2, 0, 0}}}};
+}
+
+TensorBlocks tensors_of(const std::vector<Source>& sources, Derive derive, const Eigen::Matrix3d& to_index) {
+  if (derive == Derive::none) return blocks_of(sources, make_blocks);
+  const auto samples = blocks_of(sources, [](std::size_t count) { return std::vector<SampleBlock>(count); });
+  return derive == Derive::gradient ? gradient(samples, to_index) : hessian(samples, to_index);
+}
+
+/// The three grids of a field, still empty.
+std::array<openvdb::Vec3SGrid::Ptr, 3> empty_rows(const TensorGrid& grid, bool half) {
+  std::array<openvdb::Vec3SGrid::Ptr, 3> rows;
+  for (int row = 0; row < 3; ++row) {
+    rows[row] = openvdb::Vec3SGrid::create();
+    rows[row]->setName(grid.name + "_row" + std::to_string(row));
+    rows[row]->setTransform(linear_transform(grid.to_world));
+    rows[row]->setGridClass(openvdb::GRID_UNKNOWN);
+    rows[row]->setVectorType(openvdb::VEC_INVARIANT);
+    rows[row]->setSaveFloatAsHalf(half);
+    for (const auto& [key, value] : grid.metadata)
+      if (!(*rows[row])[key]) rows[row]->insertMeta(key, openvdb::StringMetadata(value));  // Not its name, type, ...
+  }
+  return rows;
+}
+
+void add_block(const TensorBlock& block, const std::array<openvdb::Vec3SGrid::Ptr, 3>& rows) {
+  for (int row = 0; row < 3; ++row) {
+    auto* leaf =
+        new openvdb::Vec3STree::LeafNodeType(openvdb::Coord(block.origin.x(), block.origin.y(), block.origin.z()));
+    rows[row]->tree().addLeaf(leaf);  // The tree owns it.
+    for (int offset = 0; offset < TensorBlock::voxels; ++offset) {
+      if (!block.active[offset]) continue;
+      const auto values = block.values[offset].row(row);
+      leaf->setValueOn(static_cast<openvdb::Index>(offset), openvdb::Vec3s(values[0], values[1], values[2]));
+    }
+  }
+}
+
+void write_rows(const std::filesystem::path& path, const TensorGrid& grid,
+                const std::array<openvdb::Vec3SGrid::Ptr, 3>& rows) {
+  openvdb::MetaMap metadata;
+  for (const auto& [key, value] : grid.metadata) metadata.insertMeta(key, openvdb::StringMetadata(value));
+  write_vdb(path, {rows.begin(), rows.end()}, metadata);
+}
+
+void check_half_range(const std::filesystem::path& path, const TensorGrid& grid) {
+  for (const TensorBlock& block : grid.blocks)
+    for (const Eigen::Matrix3f& value : block.values)
+      if ((value.array().abs() > greatest_half).any())
+        fail(path, "a component exceeds 65504, the greatest 16-bit float; write single precision or scale the field");
+}
+
+}  // namespace
+
+std::vector<std::string> tensor_names(const std::vector<GridInfo>& grids) {
+  std::vector<std::string> names;
+  for (const GridInfo& grid : grids)
+    for (const Layout& layout : layouts()) {
+      const std::string& first = layout.parts.front().suffix;
+      if (grid.name.size() < first.size()) continue;
+      const std::string name = grid.name.substr(0, grid.name.size() - first.size());
+      if (grid.name != name + first || !has(grids, name, layout)) continue;
+      if (std::find(names.begin(), names.end(), name) == names.end()) names.push_back(name);
+    }
+  return names;
+}
+
+std::vector<GridInfo> list_vdb(const std::filesystem::path& path) { return infos_of(read_vdb(path)); }
+
+TensorGrid read_tensor_vdb(const std::filesystem::path& path, const std::string& name, Derive derive) {
+  const std::vector<GridInfo> infos = list_vdb(path);
+  TensorGrid result;
+  result.name = chosen_name(path, infos, name, derive);
+
+  const std::vector<Part> parts = parts_of(infos, result.name, derive);
+  std::set<std::string> wanted;
+  for (const Part& part : parts) wanted.insert(result.name + part.suffix);
+  const VdbFile file = read_vdb(path, wanted);
+  std::vector<Source> sources;
+  for (const Part& part : parts)
+    for (const VdbGrid& grid : file.grids)
+      if (grid.name == result.name + part.suffix) sources.push_back({grid.grid, part.entries});
+
+  result.to_world = common_transform(path, sources);
+  result.metadata = metadata_of(file.metadata, *sources.front().grid);
+  try {
+    result.blocks = tensors_of(sources, derive, result.to_world.inverse().linear());
+  } catch (const std::bad_alloc&) {
+    fail(path, "the active voxels of \"" + result.name + "\" do not fit in memory; resample it more coarsely");
+  }
+  if (result.blocks.empty()) fail(path, "\"" + result.name + "\" has no active voxel");
+  return result;
+}
+
+void write_tensor_vdb(const std::filesystem::path& path, const TensorGrid& grid, bool half) {
+  if (half) check_half_range(path, grid);
+  const auto rows = empty_rows(grid, half);
+  for (const TensorBlock& block : grid.blocks) add_block(block, rows);
+  write_rows(path, grid, rows);
+}
+
+void write_tensor_vdb(const std::filesystem::path& path, TensorGrid&& grid, bool half) {
+  if (half) check_half_range(path, grid);
+  const auto rows = empty_rows(grid, half);
+  for (; !grid.blocks.empty(); grid.blocks.pop_front()) add_block(grid.blocks.front(), rows);
+  write_rows(path, grid, rows);
+}
+
+}  // namespace tensorray

@@ -1,0 +1,257 @@
+#include "volumes/files/vdb_archive.h"
+
+#include <algorithm>
+#include <array>
+#include <cerrno>
+#include <cstdint>
+#include <fstream>
+#include <stdexcept>
+#include <system_error>
+#include <utility>
+
+#include <openvdb/io/Archive.h>
+#include <openvdb/io/GridDescriptor.h>
+#include <tbb/parallel_for.h>
+
+#include "base/errors.h"
+
+namespace tensorray {
+namespace {
+
+constexpr std::ios::iostate any_failure = std::ios::failbit | std::ios::badbit | std::ios::eofbit;
+constexpr std::size_t stream_buffer = 1 << 20;
+
+// OpenVDB's header: magic number, versions of format (4 bytes) and library (8), a flag, then the unique tag as text.
+constexpr std::streamoff version_offset = 8, tag_offset = 21;
+
+[[noreturn]] void fail_damaged(const std::filesystem::path& path, const std::string& how) {
+  fail(path, "the file is truncated or damaged" + how + "; copy or write it again");
+}
+
+std::string one_line(std::string text) {
+  std::replace(text.begin(), text.end(), '\n', ' ');
+  return text;
+}
+
+template <class T>
+T read_number(std::istream& in) {
+  T value;
+  in.read(reinterpret_cast<char*>(&value), sizeof value);
+  return value;
+}
+
+/// Reads a table of grids itself rather than with GridDescriptor::read, which refuses the whole file for one grid of a
+/// type that it does not know.
+class Reader : private openvdb::io::Archive {
+ public:
+  explicit Reader(const std::filesystem::path& path) : path_(path), buffer_(stream_buffer) {
+    if (std::filesystem::is_directory(path)) fail(path, "is a folder; name an OpenVDB file");
+    in_.rdbuf()->pubsetbuf(buffer_.data(), static_cast<std::streamsize>(buffer_.size()));
+    errno = 0;
+    in_.open(path, std::ios::binary);
+    if (!in_) fail(path, "cannot be opened: " + std::generic_category().message(errno) + "; check the path");
+    in_.exceptions(any_failure);
+    size_ = static_cast<std::int64_t>(std::filesystem::file_size(path));
+  }
+
+  VdbFile read(const std::set<std::string>& wanted) {
+    VdbFile file;
+    read_file_header();
+    check_lengths(in_.tellg(), 0);
+    file.metadata.readMeta(in_);
+    const std::int32_t count = readGridCount(in_);
+    std::vector<openvdb::io::GridDescriptor> table;
+    NamedGridMap grids;
+    for (std::int32_t i = 0; i < count; ++i) {
+      table.push_back(read_descriptor());
+      if (inputHasGridOffsets())
+        skip(table.back());
+      else  // Written as a stream, in which only reading finds the end of a grid.
+        grids[table.back().uniqueName()] = read_one(table.back());
+    }
+    if (inputHasGridOffsets()) read_wanted(table, wanted, grids);
+    for (const auto& descriptor : table) {
+      connectInstance(descriptor, grids);
+      const std::string name = openvdb::io::GridDescriptor::nameAsString(descriptor.uniqueName());
+      file.grids.push_back({name, descriptor.gridType(), descriptor.saveFloatAsHalf(), nullptr});
+      if (wanted.count(name)) file.grids.back().grid = grids.at(descriptor.uniqueName());
+    }
+    return file;
+  }
+
+ private:
+  void read_file_header() {
+    if (size_ < version_offset + 4 || read_number<std::int64_t>(in_) != openvdb::OPENVDB_MAGIC)
+      fail(path_, "is not an OpenVDB file");
+    if (read_number<std::uint32_t>(in_) > openvdb::OPENVDB_FILE_VERSION)
+      fail(path_, "was written by a newer OpenVDB than this program has; write it in an older format");
+    in_.seekg(0);
+    readHeader(in_);
+    setFormatVersion(in_);
+    setLibraryVersion(in_);
+    setDataCompression(in_);
+  }
+
+  std::uint32_t read_length() {
+    const std::uint32_t length = read_number<std::uint32_t>(in_);
+    if (length > size_ - in_.tellg()) fail_damaged(path_, "");
+    return length;
+  }
+
+  std::string read_string() {
+    std::string text(read_length(), ' ');
+    in_.read(&text[0], static_cast<std::streamsize>(text.size()));
+    return text;
+  }
+
+  /// Whether the metadata at `start`, and as many strings after them, fit in the file: OpenVDB allocates and fills
+  /// what a length says, up to 4 GB, before it reads. Returns to where the stream was.
+  void check_lengths(std::streamoff start, int strings) {
+    const std::streamoff before = in_.tellg();
+    in_.seekg(start);
+    const auto skip_string = [&] { in_.seekg(read_length(), std::ios::cur); };
+    for (std::uint32_t left = read_number<std::uint32_t>(in_); left > 0; --left)
+      for (int part = 0; part < 3; ++part) skip_string();  // Name, type, value.
+    for (int i = 0; i < strings; ++i) skip_string();
+    in_.seekg(before);
+  }
+
+  openvdb::io::GridDescriptor read_descriptor() {
+    static const std::string half_suffix = "_HalfFloat";
+    const std::string name = read_string();
+    std::string type = read_string();
+    const bool half = type.size() > half_suffix.size() &&
+                      type.compare(type.size() - half_suffix.size(), half_suffix.size(), half_suffix) == 0;
+    if (half) type.resize(type.size() - half_suffix.size());
+    openvdb::io::GridDescriptor descriptor(name, type, half);
+    if (fileVersion() >= openvdb::OPENVDB_FILE_VERSION_GRID_INSTANCING) descriptor.setInstanceParentName(read_string());
+    descriptor.setGridPos(read_number<std::int64_t>(in_));
+    descriptor.setBlockPos(read_number<std::int64_t>(in_));
+    descriptor.setEndPos(read_number<std::int64_t>(in_));
+    return descriptor;
+  }
+
+  void skip(const openvdb::io::GridDescriptor& descriptor) {
+    if (descriptor.getGridPos() < in_.tellg() || descriptor.getEndPos() < descriptor.getGridPos() ||
+        descriptor.getEndPos() > size_)
+      fail_damaged(path_, "");
+    descriptor.seekToEnd(in_);
+  }
+
+  openvdb::GridBase::Ptr read_one(const openvdb::io::GridDescriptor& descriptor) {
+    const openvdb::GridBase::Ptr grid = openvdb::GridBase::createGrid(descriptor.gridType());
+    grid->setSaveFloatAsHalf(descriptor.saveFloatAsHalf());
+    const bool has_compression = fileVersion() >= openvdb::OPENVDB_FILE_VERSION_NODE_MASK_COMPRESSION;
+    check_lengths(in_.tellg() + std::streamoff(has_compression ? 4 : 0), 1);  // The string is the transform's type.
+    readGrid(grid, descriptor, in_);
+    return grid;
+  }
+
+  /// Reads the wanted grids, and those whose trees they share: at once, each from a stream of its own.
+  void read_wanted(const std::vector<openvdb::io::GridDescriptor>& table, const std::set<std::string>& wanted,
+                   NamedGridMap& grids) {
+    std::set<std::string> needed;
+    for (const auto& descriptor : table) {
+      if (!wanted.count(openvdb::io::GridDescriptor::nameAsString(descriptor.uniqueName()))) continue;
+      needed.insert(descriptor.uniqueName());
+      if (descriptor.isInstance()) needed.insert(descriptor.instanceParentName());
+    }
+    std::vector<std::pair<const openvdb::io::GridDescriptor*, openvdb::GridBase::Ptr>> read;
+    for (const auto& descriptor : table)
+      if (needed.count(descriptor.uniqueName())) read.emplace_back(&descriptor, nullptr);
+    tbb::parallel_for(std::size_t{0}, read.size(), [&](std::size_t i) {
+      Reader reader(path_);
+      reader.read_file_header();
+      read[i].first->seekToGrid(reader.in_);
+      read[i].second = reader.read_one(*read[i].first);
+    });
+    for (const auto& [descriptor, grid] : read) grids[descriptor->uniqueName()] = grid;
+  }
+
+  std::filesystem::path path_;
+  std::vector<char> buffer_;
+  std::ifstream in_;
+  std::int64_t size_ = 0;
+};
+
+class Writer : private openvdb::io::Archive {
+ public:
+  void write_file(std::fstream& file, const openvdb::GridCPtrVec& grids, const openvdb::MetaMap& metadata) {
+    Archive::write(file, grids, /*seekable=*/true, metadata);
+    file.flush();
+    make_tag_of_contents(file);
+  }
+
+ private:
+  /// Replaces the random tag in the header by a hash of what follows it.
+  void make_tag_of_contents(std::fstream& file) const {
+    const std::streamoff end = file.tellp();
+    std::string tag = getUniqueTag();
+    std::string stored(tag.size(), ' ');
+    file.seekg(tag_offset);
+    file.read(&stored[0], static_cast<std::streamsize>(stored.size()));
+    if (stored != tag) return;  // Another format than we know.
+    std::uint64_t low = 14695981039346656037u, high = 1099511628211u;
+    std::vector<char> chunk(stream_buffer);
+    for (std::streamoff at = file.tellg(); at < end; at += static_cast<std::streamoff>(chunk.size())) {
+      chunk.resize(static_cast<std::size_t>(std::min<std::streamoff>(end - at, stream_buffer)));
+      file.read(chunk.data(), static_cast<std::streamsize>(chunk.size()));
+      for (const char c : chunk) {  // Fowler–Noll–Vo, and a rotation of it for the other half.
+        low = (low ^ static_cast<unsigned char>(c)) * 1099511628211u;
+        high = (high << 5 | high >> 59) ^ low;
+      }
+    }
+    for (std::size_t i = 0, digit = 0; i < tag.size(); ++i)
+      if (tag[i] != '-') {
+        tag[i] = "0123456789abcdef"[(digit < 16 ? low : high) >> (digit % 16 * 4) & 15];
+        ++digit;
+      }
+    file.seekp(tag_offset);
+    file.write(tag.data(), static_cast<std::streamsize>(tag.size()));
+  }
+};
+
+}  // namespace
+
+VdbFile read_vdb(const std::filesystem::path& path, const std::set<std::string>& wanted) {
+  openvdb::initialize();
+  try {
+    return Reader(path).read(wanted);
+  } catch (const std::ios_base::failure&) {
+    fail_damaged(path, "");
+  } catch (const openvdb::Exception& error) {
+    fail_damaged(path, " (" + one_line(error.what()) + ")");
+  } catch (const std::bad_alloc&) {
+    fail_damaged(path, ", or larger than the memory");
+  } catch (const std::length_error&) {
+    fail_damaged(path, "");
+  }
+}
+
+void write_vdb(const std::filesystem::path& path, const openvdb::GridCPtrVec& grids, const openvdb::MetaMap& metadata) {
+  openvdb::initialize();
+  std::vector<char> buffer(stream_buffer);
+  std::fstream file;
+  file.rdbuf()->pubsetbuf(buffer.data(), static_cast<std::streamsize>(buffer.size()));
+  errno = 0;
+  try {
+    file.exceptions(any_failure);
+    file.open(path, std::ios::in | std::ios::out | std::ios::binary | std::ios::trunc);
+    Writer().write_file(file, grids, metadata);
+    file.close();
+  } catch (const std::ios_base::failure&) {
+    fail(path, "cannot be written: " + (errno ? std::generic_category().message(errno) : "the write failed"));
+  } catch (const openvdb::Exception& error) {
+    fail(path, "cannot be written: " + one_line(error.what()));
+  }
+}
+
+/// OpenVDB multiplies row vectors from the left, Eigen column vectors from the right.
+openvdb::math::Transform::Ptr linear_transform(const Eigen::Affine3d& to_world) {
+  openvdb::Mat4d matrix;
+  for (int row = 0; row < 4; ++row)
+    for (int column = 0; column < 4; ++column) matrix(column, row) = to_world.matrix()(row, column);
+  return openvdb::math::Transform::createLinearTransform(matrix);
+}
+
+}  // namespace tensorray

@@ -1,0 +1,91 @@
+#include "volumes/grids/block_memory.h"
+
+#include <cstdint>
+#include <new>
+
+#include <sys/mman.h>
+#include <tbb/parallel_for.h>
+
+namespace tensorray {
+namespace {
+
+constexpr std::size_t slab_bytes = std::size_t{1} << 21;
+constexpr std::size_t header_bytes = 64;
+
+struct FreeSlot {
+  FreeSlot* next;
+};
+
+/// A slab, at a multiple of its size, so that slots find it and the system can give it one large page.
+void* map_slab() {
+  constexpr std::size_t reserved = 2 * slab_bytes;
+  void* const memory = mmap(nullptr, reserved, PROT_READ | PROT_WRITE, MAP_PRIVATE | MAP_ANONYMOUS, -1, 0);
+  if (memory == MAP_FAILED) throw std::bad_alloc();
+  char* const begin = static_cast<char*>(memory);
+  const std::size_t before = -reinterpret_cast<std::uintptr_t>(memory) % slab_bytes;
+  char* const slab = begin + before;
+  if (before > 0) munmap(begin, before);
+  munmap(slab + slab_bytes, slab_bytes - before);
+#ifdef MADV_HUGEPAGE
+  madvise(slab, slab_bytes, MADV_HUGEPAGE);
+#endif
+  return slab;
+}
+
+}  // namespace
+
+/// At the beginning of its memory; the slots follow.
+struct SlotPool::Slab {
+  Slab *before = nullptr, *after = nullptr;  // In the list of those with free slots.
+  std::size_t fresh = 0, used = 0;           // Slots that were ever taken, and those that are.
+  FreeSlot* free = nullptr;                  // Given back.
+};
+
+SlotPool::SlotPool(std::size_t slot_bytes) : slot_bytes_(slot_bytes), slots_((slab_bytes - header_bytes) / slot_bytes) {
+  static_assert(sizeof(Slab) <= header_bytes);
+}
+
+void SlotPool::link(Slab* slab) noexcept {
+  slab->before = nullptr;
+  slab->after = open_;
+  if (open_) open_->before = slab;
+  open_ = slab;
+}
+
+void SlotPool::unlink(Slab* slab) noexcept {
+  (slab->before ? slab->before->after : open_) = slab->after;
+  if (slab->after) slab->after->before = slab->before;
+}
+
+void SlotPool::prepare(std::size_t slots) {
+  tbb::parallel_for(std::size_t{0}, (slots + slots_ - 1) / slots_, [&](std::size_t) {
+    auto* const slab = new (map_slab()) Slab;  // Writing to it has its page cleared.
+    const std::lock_guard<std::mutex> lock(mutex_);
+    link(slab);
+  });
+}
+
+void* SlotPool::take() {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  if (!open_) link(new (map_slab()) Slab);
+  Slab* const slab = open_;
+  if (++slab->used == slots_) unlink(slab);
+  if (FreeSlot* const slot = slab->free) {
+    slab->free = slot->next;
+    return slot;
+  }
+  return reinterpret_cast<char*>(slab) + header_bytes + slot_bytes_ * slab->fresh++;
+}
+
+void SlotPool::give_back(void* slot) noexcept {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  auto* const slab = reinterpret_cast<Slab*>(reinterpret_cast<std::uintptr_t>(slot) / slab_bytes * slab_bytes);
+  if (slab->used-- == slots_) link(slab);
+  slab->free = new (slot) FreeSlot{slab->free};
+  const bool only_one = !slab->before && !slab->after;
+  if (slab->used > 0 || only_one) return;
+  unlink(slab);
+  munmap(slab, slab_bytes);
+}
+
+}  // namespace tensorray

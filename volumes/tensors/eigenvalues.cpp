@@ -1,0 +1,197 @@
+#include "volumes/tensors/eigenvalues.h"
+
+#include <algorithm>
+#include <cmath>
+#include <stdexcept>
+#include <vector>
+
+#include <Eigen/Eigenvalues>
+#include <tbb/parallel_for.h>
+
+namespace tensorray {
+namespace {
+
+using Eigen::Matrix3d;
+using Eigen::Vector3d;
+
+/// Eigenvalues closer to each other, or to an axis, than this (relative to the Frobenius norm) are taken to be there.
+/// Fields are single precision: what is below is noise.
+constexpr double tolerance = 1e-6;
+
+/// A nilpotent Jordan block of three rows is recognised by eigenvalues below this (rounding moves them by its cube
+/// root) and a square above `chain_square`.
+constexpr double chain_tolerance = 2e-5;
+constexpr double chain_square = 1e-3;
+
+/// Near such a block |·| has no limit, and may grow as 1/|λ|. A result beyond this many times
+/// the norm of the tensor is faded to zero, which is the value on the block itself.
+constexpr double greatest_growth = 4;
+
+const Matrix3d identity = Matrix3d::Identity();
+
+double sign_of(double x) { return x < 0 ? -1 : 1; }
+
+bool is_symmetric(const Matrix3d& tensor) { return tensor == tensor.transpose(); }
+
+/// General eigenvalues, sorted by falling real part and, in a pair, by falling imaginary part.
+Eigen::Vector3cd sorted_eigenvalues(const Matrix3d& tensor) {
+  Eigen::Vector3cd values = Eigen::EigenSolver<Matrix3d>(tensor, false).eigenvalues();
+  std::sort(values.data(), values.data() + 3, [](const auto& a, const auto& b) {
+    return a.real() != b.real() ? a.real() > b.real() : a.imag() > b.imag();
+  });
+  return values;
+}
+
+Matrix3d symmetric_absolute(const Matrix3d& tensor) {
+  const Eigen::SelfAdjointEigenSolver<Matrix3d> solver(tensor);
+  const Matrix3d& vectors = solver.eigenvectors();
+  return vectors * solver.eigenvalues().cwiseAbs().asDiagonal() * vectors.transpose();
+}
+
+/// Whether a tensor of unit norm with three real eigenvalues has a Jordan block: repeated eigenvalues, and no
+/// polynomial with simple zeros at the distinct ones that annihilates it.
+bool has_jordan_block(const Matrix3d& tensor, const Vector3d& falling) {
+  const bool first = falling[0] - falling[1] <= tolerance, second = falling[1] - falling[2] <= tolerance;
+  const double rest = 4 * tolerance;
+  if (first && second) return (tensor - falling.mean() * identity).norm() > rest;
+  if (!first && !second) return false;
+  const double twice = first ? 0.5 * (falling[0] + falling[1]) : 0.5 * (falling[1] + falling[2]);
+  const double once = first ? falling[2] : falling[0];
+  return ((tensor - once * identity) * (tensor - twice * identity)).norm() > rest;
+}
+
+/// |T| of a tensor of unit norm with real eigenvalues, sorted falling: the Newton polynomial of |·| on them. Its
+/// divided differences [a, b] are ±1 where the signs agree and [a, b, c] is zero where all three do, so that repeated
+/// eigenvalues need no care; opposite signs leave c/(c − b), which lies in [0, 1].
+Matrix3d absolute_of_real(const Matrix3d& tensor, const Vector3d& falling) {
+  const int zeros = static_cast<int>((falling.array().abs() <= tolerance).count());
+  if (zeros == 3) return Matrix3d::Zero();
+  if (zeros == 2) {  // Points (0, 0, a), with the derivative of |·| at zero taken as 0.
+    const double a = falling[0] > tolerance ? falling[0] : falling[2];
+    return tensor * tensor / std::abs(a);
+  }
+  if (falling[2] >= 0) return tensor;
+  if (falling[0] <= 0) return -tensor;
+  // One eigenvalue, `odd`, has the sign that the others have not: T sign(T) = ±(T − 2 odd Π), Π the projector on it.
+  const bool odd_negative = falling[1] >= 0;
+  const double odd = odd_negative ? falling[2] : falling[0];
+  const double near = falling[1], far = odd_negative ? falling[0] : falling[2];
+  const Matrix3d numerator = (tensor - near * identity) * (tensor - far * identity) / (odd - far);
+  return (odd_negative ? 1 : -1) * (tensor - 2 * (odd / (odd - near)) * numerator);
+}
+
+/// The real projector on the eigenvector of the real eigenvalue, along the invariant plane of the pair α ± iβ.
+Matrix3d real_projector(const Matrix3d& tensor, double real, std::complex<double> pair) {
+  const Matrix3d shifted = tensor - pair.real() * identity;
+  const double beta = pair.imag(), distance = real - pair.real();
+  return (shifted * shifted + beta * beta * identity) / (distance * distance + beta * beta);
+}
+
+Matrix3d absolute_of_pair(const Matrix3d& tensor, double real, std::complex<double> pair) {
+  const double modulus = std::abs(pair);
+  return modulus * identity + (std::abs(real) - modulus) * real_projector(tensor, real, pair);
+}
+
+/// sign(α) T on the plane of the pair, |λ| on the real eigenvector. On the cut, α = 0, T is kept on the plane.
+Matrix3d positive_of_pair(const Matrix3d& tensor, double real, std::complex<double> pair, bool& on_cut) {
+  on_cut = std::abs(pair.real()) <= tolerance;
+  const double plane = on_cut ? 1 : sign_of(pair.real());
+  if (plane == sign_of(real)) return plane * tensor;
+  return plane * tensor + 2 * std::abs(real) * real_projector(tensor, real, pair);
+}
+
+/// The general case, for a tensor of unit norm.
+Matrix3d general_with_eigenvalues(const Matrix3d& tensor, Eigenvalues mode, bool& limit_taken) {
+  const Eigen::Vector3cd values = sorted_eigenvalues(tensor);
+  if (values.cwiseAbs().maxCoeff() <= chain_tolerance && (tensor * tensor).norm() > chain_square) {
+    limit_taken = true;
+    return Matrix3d::Zero();
+  }
+  Eigen::Index upper = 0;
+  const double beta = values.imag().maxCoeff(&upper);
+  Matrix3d result;
+  if (beta <= tolerance) {
+    limit_taken = has_jordan_block(tensor, values.real());
+    result = absolute_of_real(tensor, values.real());
+  } else {
+    const double real = (values.imag().array() == 0).select(values.real(), 0).sum();
+    result = mode == Eigenvalues::absolute ? absolute_of_pair(tensor, real, values[upper])
+                                           : positive_of_pair(tensor, real, values[upper], limit_taken);
+  }
+  const double growth = result.norm() / greatest_growth;
+  if (growth <= 1) return result;
+  limit_taken = true;
+  return result / (growth * growth);
+}
+
+/// What apply_eigenvalues counts, of one block.
+struct BlockReport {
+  std::size_t defective = 0;
+  double norm = 0, erased = 0;
+};
+
+BlockReport apply_to_block(TensorBlock& block, Eigenvalues mode) {
+  BlockReport report;
+  for (int offset = 0; offset < TensorBlock::voxels; ++offset) {
+    if (!block.active[offset]) continue;
+    const Matrix3d tensor = block.values[offset].cast<double>();
+    bool defective = false;
+    const Matrix3d result = with_eigenvalues(tensor, mode, &defective);
+    block.values[offset] = result.cast<float>();
+    report.defective += defective;
+    report.norm += tensor.squaredNorm();
+    report.erased += erased_norm(tensor, result);
+  }
+  return report;
+}
+
+}  // namespace
+
+Matrix3d with_eigenvalues(const Matrix3d& tensor, Eigenvalues mode, bool* defective) {
+  if (mode != Eigenvalues::absolute && mode != Eigenvalues::positive)
+    throw std::invalid_argument("with_eigenvalues: mode must be absolute or positive");
+  const double largest = tensor.cwiseAbs().maxCoeff();
+  if (largest == 0) return Matrix3d::Zero();
+  const Matrix3d scaled = tensor / largest;  // Its norm neither overflows nor underflows.
+  if (is_symmetric(tensor)) return largest * symmetric_absolute(scaled);
+  bool limit_taken = false;
+  const double norm = scaled.norm();
+  const Matrix3d result = largest * (norm * general_with_eigenvalues(scaled / norm, mode, limit_taken));
+  if (limit_taken && defective) *defective = true;
+  return result;
+}
+
+double erased_norm(const Matrix3d& before, const Matrix3d& after) {
+  const auto part = [](const Matrix3d& tensor, double sign) {
+    return (tensor + sign * tensor.transpose()).squaredNorm() / 4;
+  };
+  return std::max(0.0, part(before, -1) - part(after, -1)) + std::max(0.0, part(before, 1) - part(after, 1));
+}
+
+EigenvalueReport apply_eigenvalues(TensorGrid& grid, Eigenvalues mode) {
+  EigenvalueReport report;
+  report.chosen = mode;
+  if (mode == Eigenvalues::automatic)
+    report.chosen = asymmetry(grid) < symmetric_tolerance ? Eigenvalues::absolute : Eigenvalues::raw;
+  if (report.chosen == Eigenvalues::raw) return report;
+
+  std::vector<BlockReport> blocks(grid.blocks.size());
+  tbb::parallel_for(std::size_t{0}, blocks.size(),
+                    [&](std::size_t i) { blocks[i] = apply_to_block(grid.blocks[i], report.chosen); });
+  double norm = 0, erased = 0;  // Summed in the blocks' order: the same for any number of threads.
+  for (const BlockReport& block : blocks) {
+    report.defective += block.defective;
+    norm += block.norm;
+    erased += block.erased;
+  }
+  report.norm_lost = norm > 0 ? erased / norm : 0;
+  return report;
+}
+
+Eigen::Vector3cd eigenvalues(const Matrix3d& tensor) {
+  if (!is_symmetric(tensor)) return sorted_eigenvalues(tensor);
+  const Eigen::SelfAdjointEigenSolver<Matrix3d> solver(tensor, Eigen::EigenvaluesOnly);
+  return solver.eigenvalues().reverse().cast<std::complex<double>>();
+}
+
+}  // namespace tensorray

@@ -1,0 +1,138 @@
+#include "volumes/tensors/statistics.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <vector>
+
+#include <Eigen/Eigenvalues>
+#include <tbb/parallel_for.h>
+#include <tbb/parallel_sort.h>
+
+#include "volumes/bricks/tensor_field.h"
+#include "volumes/tensors/eigenvalues.h"
+
+namespace tensorray {
+namespace {
+
+/// Imaginary parts, and negative real parts, below this fraction of a tensor's norm are rounding.
+constexpr double significant = 1e-6;
+
+double spectral_norm(const Eigen::Matrix3d& tensor) {
+  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> solver(tensor.transpose() * tensor, Eigen::EigenvaluesOnly);
+  return std::sqrt(std::max(0.0, solver.eigenvalues()[2]));
+}
+
+/// What is gathered of the voxels of one block.
+struct BlockStatistics {
+  std::vector<double> norms;
+  double real_min = std::numeric_limits<double>::infinity(), real_max = -real_min;
+  double imaginary_max = 0, deviator_max = 0;
+  std::size_t complex = 0, negative = 0;
+  double norm = 0, erased = 0;  ///< Sums of ‖T‖², and of what `absolute` would erase of it.
+};
+
+void add_voxel(const Eigen::Matrix3d& tensor, BlockStatistics& statistics) {
+  const double norm = tensor.norm();
+  statistics.norms.push_back(norm);
+  statistics.norm += norm * norm;
+  statistics.erased += erased_norm(tensor, with_eigenvalues(tensor, Eigenvalues::absolute));
+
+  const Eigen::Vector3cd values = eigenvalues(tensor);
+  const double imaginary = values.imag().maxCoeff();
+  statistics.real_max = std::max(statistics.real_max, values[0].real());
+  statistics.real_min = std::min(statistics.real_min, values[2].real());
+  statistics.imaginary_max = std::max(statistics.imaginary_max, imaginary);
+  statistics.complex += imaginary > significant * norm;
+  statistics.negative += values[2].real() < -significant * norm;
+
+  const Eigen::Matrix3d deviator = tensor - tensor.trace() / 3 * Eigen::Matrix3d::Identity();
+  if (deviator.norm() > statistics.deviator_max)  // The Frobenius norm bounds the spectral one.
+    statistics.deviator_max = std::max(statistics.deviator_max, spectral_norm(deviator));
+}
+
+BlockStatistics statistics_of(const TensorBlock& block) {
+  BlockStatistics statistics;
+  for (int offset = 0; offset < TensorBlock::voxels; ++offset)
+    if (block.active[offset]) add_voxel(block.values[offset].cast<double>(), statistics);
+  return statistics;
+}
+
+/// Sorts `norms` and takes the nearest rank of each percentile.
+void take_percentiles(std::vector<double>& norms, FieldStatistics& result) {
+  tbb::parallel_sort(norms);
+  const double last = static_cast<double>(norms.size() - 1);
+  for (std::size_t i = 0; i < result.norm.size(); ++i)
+    result.norm[i] = norms[static_cast<std::size_t>(std::lround(FieldStatistics::percentiles[i] / 100 * last))];
+}
+
+/// Joins the blocks in their order, so that the result is the same for any number of threads.
+void join(const std::vector<BlockStatistics>& blocks, FieldStatistics& result) {
+  BlockStatistics all;
+  for (const BlockStatistics& block : blocks) {
+    all.norms.insert(all.norms.end(), block.norms.begin(), block.norms.end());
+    all.real_min = std::min(all.real_min, block.real_min);
+    all.real_max = std::max(all.real_max, block.real_max);
+    all.imaginary_max = std::max(all.imaginary_max, block.imaginary_max);
+    all.deviator_max = std::max(all.deviator_max, block.deviator_max);
+    all.complex += block.complex;
+    all.negative += block.negative;
+    all.norm += block.norm;
+    all.erased += block.erased;
+  }
+  const double count = static_cast<double>(all.norms.size());
+  result.real_min = all.real_min;
+  result.real_max = all.real_max;
+  result.imaginary_max = all.imaginary_max;
+  result.deviator_max = all.deviator_max;
+  result.complex_fraction = all.complex / count;
+  result.negative_fraction = all.negative / count;
+  result.absolute_loss = all.norm > 0 ? all.erased / all.norm : 0;
+  take_percentiles(all.norms, result);
+}
+
+void describe_extent(const TensorGrid& grid, FieldStatistics& result) {
+  const TensorField field(grid);
+  result.index_box = grid.active_box();
+  for (const Eigen::Vector3d& corner : field.corners()) result.world_box.extend(corner);
+  result.memory_bytes = field.memory_bytes();
+}
+
+bool all_finite(const TensorGrid& grid) {
+  return std::all_of(grid.blocks.begin(), grid.blocks.end(), [](const TensorBlock& block) {
+    return std::all_of(block.values.begin(), block.values.end(), [](const auto& value) { return value.allFinite(); });
+  });
+}
+
+/// All but the numbers of voxels and their size.
+void describe_finite(const TensorGrid& grid, FieldStatistics& result) {
+  if (grid.active_voxels() == 0) return;
+  describe_extent(grid, result);
+  result.asymmetry = asymmetry(grid);
+  std::vector<BlockStatistics> blocks(grid.blocks.size());
+  tbb::parallel_for(std::size_t{0}, blocks.size(), [&](std::size_t i) { blocks[i] = statistics_of(grid.blocks[i]); });
+  join(blocks, result);
+}
+
+}  // namespace
+
+double FieldStatistics::stable_step(double flexibility) const {
+  const double rate = std::abs(flexibility) * deviator_max;
+  return rate > 0 ? 1 / rate : std::numeric_limits<double>::infinity();
+}
+
+FieldStatistics field_statistics(const TensorGrid& grid) {
+  FieldStatistics result;
+  result.active_voxels = grid.active_voxels();
+  result.voxel_size = grid.to_world.linear().colwise().norm();
+  if (all_finite(grid)) {
+    describe_finite(grid, result);
+  } else {
+    TensorGrid finite = grid;
+    result.non_finite = remove_non_finite(finite);
+    describe_finite(finite, result);
+  }
+  return result;
+}
+
+}  // namespace tensorray
