@@ -36,20 +36,6 @@ class Descriptor {
   int value_;
 };
 
-/// Follows symbolic links, also where they end at nothing yet.
-fs::path behind_links(const fs::path& target) {
-  constexpr int longest_chain = 40;  // As in Linux.
-  fs::path path = target;
-  for (int i = 0; i < longest_chain; ++i) {
-    std::error_code error;
-    if (!fs::is_symlink(fs::symlink_status(path, error))) return path;
-    const fs::path next = fs::read_symlink(path, error);
-    if (error) fail(target, fmt::format("cannot follow the link {}: {}", path.string(), error.message()));
-    path = next.is_absolute() ? next : path.parent_path() / next;
-  }
-  fail(target, "is a loop of symbolic links; remove it or choose another name");
-}
-
 /// Makes an empty file in `folder` whose name nobody else has.
 fs::path make_temporary(const fs::path& folder, const fs::path& target) {
   static std::atomic<unsigned> counter{0};
@@ -118,6 +104,7 @@ OutputFile::OutputFile(OutputFile&& other) noexcept
     : target_(std::move(other.target_)),
       resolved_(std::move(other.resolved_)),
       temporary_(std::exchange(other.temporary_, {})),
+      backup_(std::exchange(other.backup_, {})),
       is_device_(other.is_device_) {}
 
 OutputFile& OutputFile::operator=(OutputFile&& other) noexcept {
@@ -126,6 +113,7 @@ OutputFile& OutputFile::operator=(OutputFile&& other) noexcept {
   target_ = std::move(other.target_);
   resolved_ = std::move(other.resolved_);
   temporary_ = std::exchange(other.temporary_, {});
+  backup_ = std::exchange(other.backup_, {});
   is_device_ = other.is_device_;
   return *this;
 }
@@ -137,37 +125,92 @@ void OutputFile::rethrow_for_target(std::string message) const {
   throw std::runtime_error(message);
 }
 
-void OutputFile::commit() {
-  if (temporary_.empty()) throw std::logic_error(target_.string() + ": was committed before");
-  if (is_device_) {
-    copy_into(temporary_, resolved_);
-    discard();
-    return;
-  }
+void OutputFile::copy_into_device() {
+  if (is_device_) copy_into(temporary_, resolved_);
+}
+
+/// Gives what is at the target a second name, under which it can come back.
+void OutputFile::keep_old() {
+  if (is_device_) return;
   std::error_code error;
   const fs::file_status old = fs::status(resolved_, error);
-  if (fs::exists(old) && !fs::is_regular_file(old)) {
+  if (!fs::exists(old)) return;
+  if (!fs::is_regular_file(old))
     fail(target_, "has become a folder or a device while it was written; choose another name");
+  fs::permissions(temporary_, old.permissions(), error);
+  backup_ = make_temporary(folder_of(resolved_), target_);
+  fs::remove(backup_, error);
+  fs::create_hard_link(resolved_, backup_, error);
+  if (!error) return;
+  fs::rename(resolved_, backup_, error);  // A file system without hard links.
+  if (error) {
+    backup_.clear();
+    fail(target_, fmt::format("cannot be replaced: {}", error.message()));
   }
-  if (fs::is_regular_file(old)) fs::permissions(temporary_, old.permissions(), error);
+}
+
+void OutputFile::replace_old() {
+  if (is_device_) return;
+  std::error_code error;
   fs::rename(temporary_, resolved_, error);
   if (error) fail(target_, fmt::format("cannot be replaced: {}", error.message()));
   temporary_.clear();
 }
 
-void OutputFile::discard() noexcept {
-  if (temporary_.empty()) return;
+/// Brings back what was at the target.
+void OutputFile::undo() noexcept {
+  if (is_device_) return;
   std::error_code error;
-  fs::remove(temporary_, error);
-  temporary_.clear();
+  const bool replaced = temporary_.empty();
+  if (!backup_.empty()) {
+    fs::rename(backup_, resolved_, error);
+    // Two names of one file: rename does nothing then.
+    fs::remove(backup_, error);
+  } else if (replaced) {
+    fs::remove(resolved_, error);
+  }
+  backup_.clear();
+}
+
+void OutputFile::discard() noexcept {
+  std::error_code error;
+  for (fs::path* path : {&temporary_, &backup_}) {
+    if (!path->empty()) fs::remove(*path, error);
+    path->clear();
+  }
+}
+
+fs::path behind_links(const fs::path& target) {
+  constexpr int longest_chain = 40;  // As in Linux.
+  fs::path path = target;
+  for (int i = 0; i < longest_chain; ++i) {
+    std::error_code error;
+    if (!fs::is_symlink(fs::symlink_status(path, error))) return path;
+    const fs::path next = fs::read_symlink(path, error);
+    if (error) fail(target, fmt::format("cannot follow the link {}: {}", path.string(), error.message()));
+    path = next.is_absolute() ? next : path.parent_path() / next;
+  }
+  fail(target, "is a loop of symbolic links; remove it or choose another name");
+}
+
+void OutputFile::commit() {
+  std::vector<OutputFile> files;
+  files.push_back(std::move(*this));
+  commit_all(files);
 }
 
 void commit_all(std::vector<OutputFile>& files) {
-  for (const bool devices : {true, false}) {
-    for (OutputFile& file : files) {
-      if (file.is_device() == devices) file.commit();
-    }
+  for (const OutputFile& file : files)
+    if (file.temporary_.empty()) throw std::logic_error(file.target_.string() + ": was committed before");
+  for (OutputFile& file : files) file.copy_into_device();
+  try {
+    for (OutputFile& file : files) file.keep_old();
+    for (OutputFile& file : files) file.replace_old();
+  } catch (...) {
+    for (OutputFile& file : files) file.undo();
+    throw;
   }
+  for (OutputFile& file : files) file.discard();
 }
 
 }  // namespace tensorray

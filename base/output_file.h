@@ -39,21 +39,35 @@ class OutputFile {
     }
   }
 
-  /// Makes the target what was written; its permissions stay those of the file that was there.
-  /// @throw std::runtime_error naming the target and the reason (a device that is full, say).
+  /// As commit_all, for this file alone.
   void commit();
 
  private:
+  friend void commit_all(std::vector<OutputFile>& files);
+
   [[noreturn]] void rethrow_for_target(std::string message) const;
+  void copy_into_device();
+  void keep_old();
+  void replace_old();
+  void undo() noexcept;
   void discard() noexcept;
 
   std::filesystem::path target_;     ///< As given.
   std::filesystem::path resolved_;   ///< Behind symbolic links.
   std::filesystem::path temporary_;  ///< Empty: committed, or moved from.
+  std::filesystem::path backup_;     ///< Of what was at the target, until all files of a commit are in place.
   bool is_device_ = false;
 };
 
-/// Commits all, those first that are the most likely to fail (devices). @throw std::runtime_error as commit.
+/// Makes each target what was written; its permissions stay those of the file that was there. All targets change, or
+/// none: the old files are kept until all new ones are in place, and come back if one cannot be placed. Two things are
+/// beyond that. What has been copied into a device cannot be taken back (devices come first, so that nothing else has
+/// changed if one fails). And if the process is killed in the short time between two renames, each target is either
+/// the old or the new file, complete, but they may be mixed; hidden files `.tensorray-*` may then be left beside them.
+/// @throw std::runtime_error naming the target and the reason (a device that is full, say).
 void commit_all(std::vector<OutputFile>& files);
+
+/// Follows symbolic links, also where they end at nothing yet. @throw std::runtime_error if they form a loop.
+std::filesystem::path behind_links(const std::filesystem::path& target);
 
 }  // namespace tensorray

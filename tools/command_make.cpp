@@ -13,7 +13,7 @@
 #include "base/output_file.h"
 #include "base/progress.h"
 #include "base/text.h"
-#include "scenes/generate_grid.h"
+#include "scenes/keys/generate_grid.h"
 #include "tools/commands.h"
 #include "tools/vdb_output.h"
 #include "volumes/files/tensor_files.h"

@@ -1,7 +1,7 @@
 #include <CLI/CLI.hpp>
 #include <fmt/core.h>
 
-#include "scenes/read_scene.h"
+#include "scenes/pipeline/read_scene.h"
 #include "tools/commands.h"
 
 namespace tensorray {

@@ -8,7 +8,7 @@
 #include <fmt/format.h>
 
 #include "base/progress.h"
-#include "scenes/read_scene.h"
+#include "scenes/keys/scene_source.h"
 
 namespace tensorray {
 namespace {

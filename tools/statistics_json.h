@@ -4,8 +4,8 @@
 
 #include <string>
 
-#include "scenes/load_scene.h"
-#include "scenes/render.h"
+#include "scenes/scene/render.h"
+#include "scenes/scene/scene.h"
 
 namespace tensorray {
 

@@ -12,13 +12,6 @@
 namespace tensorray {
 namespace {
 
-std::string lower_case_ending(const std::filesystem::path& path) {
-  std::string ending = path.extension().string();
-  std::transform(ending.begin(), ending.end(), ending.begin(),
-                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
-  return ending;
-}
-
 [[noreturn]] void throw_unknown_ending(const std::filesystem::path& path) {
   throw std::invalid_argument(path.string() + ": the ending of a file of paths must be .vtp or .tck");
 }

@@ -190,6 +190,39 @@ TEST_F(OutputFileTest, DevicesAreFirst) {
   EXPECT_EQ(text_of(folder_ / "a.png"), "old");
 }
 
+TEST_F(OutputFileTest, AllFilesChangeOrNone) {
+  write(folder_ / "a", "old a");
+  write(folder_ / "c", "old c");
+  fs::create_directories(folder_ / "other");
+  std::vector<OutputFile> files;
+  files.emplace_back(folder_ / "a");
+  files.emplace_back(folder_ / "b");
+  files.emplace_back(folder_ / "other/d");
+  files.emplace_back(folder_ / "c");
+  for (const OutputFile& file : files) write(file.path(), "new");
+  fs::remove(files[2].path());  // The third of four cannot take its name.
+  EXPECT_THROW(commit_all(files), std::runtime_error);
+  files.clear();
+  EXPECT_EQ(text_of(folder_ / "a"), "old a");
+  EXPECT_EQ(text_of(folder_ / "c"), "old c");
+  EXPECT_THAT(names(), ::testing::ElementsAre("a", "c", "other"));
+  EXPECT_TRUE(fs::is_empty(folder_ / "other"));
+}
+
+TEST_F(OutputFileTest, CommittingSeveralFilesLeavesNothingElse) {
+  write(folder_ / "a", "old");
+  fs::permissions(folder_ / "a", fs::perms::owner_read | fs::perms::owner_write);
+  std::vector<OutputFile> files;
+  files.emplace_back(folder_ / "a");
+  files.emplace_back(folder_ / "b");
+  for (const OutputFile& file : files) write(file.path(), "new");
+  commit_all(files);
+  EXPECT_EQ(text_of(folder_ / "a"), "new");
+  EXPECT_EQ(text_of(folder_ / "b"), "new");
+  EXPECT_EQ(fs::status(folder_ / "a").permissions(), fs::perms::owner_read | fs::perms::owner_write);
+  EXPECT_THAT(names(), ::testing::ElementsAre("a", "b"));
+}
+
 TEST_F(OutputFileTest, TargetsThatCannotBe) {
   write(folder_ / "file", "");
   fs::create_symlink("loop", folder_ / "loop");

@@ -1,7 +1,8 @@
-#include "scenes/read_scene.h"
+#include "scenes/pipeline/read_scene.h"
 
 #include <filesystem>
 #include <fstream>
+#include <map>
 #include <string>
 #include <vector>
 
@@ -9,6 +10,11 @@
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
 #include <unistd.h>
+
+#include "scenes/description/run_files.h"
+#include "scenes/lens/lens_description.h"
+#include "scenes/path_tracing/path_tracing_description.h"
+#include "scenes/photons/photon_distribution_method.h"
 
 namespace tensorray {
 namespace {
@@ -19,6 +25,7 @@ using ::testing::EndsWith;
 using ::testing::HasSubstr;
 using ::testing::Not;
 using Overrides = std::vector<std::string>;
+using Files = std::map<std::string, fs::path>;
 
 const char* const smallest = R"({"field": {"file": "a.vdb"}, "integrator": {"type": "photon_distribution"}})";
 
@@ -39,7 +46,7 @@ class ReadScene : public ::testing::Test {
   }
 
   SceneDescription read(const Overrides& overrides = {}, const std::string& text = smallest) const {
-    return read_scene(file(text), overrides);
+    return read_scene(file(text), {overrides, {}});
   }
 
   /// The message, one line of which is expected; empty if nothing is thrown.
@@ -69,9 +76,7 @@ TEST_F(ReadScene, DefaultsAreThoseOfTheDescription) {
   EXPECT_EQ(scene.bending.settings.method, BendingMethod::splitting);
   EXPECT_FALSE(scene.field.scale);
   EXPECT_FALSE(scene.receiver.distance);
-  EXPECT_EQ(scene.output.image, folder_ / "scene.png");
-  EXPECT_EQ(scene.output.exr, folder_ / "scene.exr");
-  EXPECT_TRUE(scene.output.spectral.empty());
+  EXPECT_EQ(scene.output.files, (Files{{"image", folder_ / "scene.png"}, {"exr", folder_ / "scene.exr"}}));
   EXPECT_TRUE(scene.warnings.empty());
 }
 
@@ -106,7 +111,7 @@ TEST_F(ReadScene, ReadsEveryKindOfValue) {
   EXPECT_EQ(scene.light.up, Eigen::Vector3d(0, 1, 0));
   EXPECT_EQ(scene.light.photons, 1000000u);
   EXPECT_EQ(scene.light.pattern, BeamPattern::sobol);
-  EXPECT_EQ(scene.light.spectrum, (folder_ / "lamp.txt").string());
+  EXPECT_EQ(std::get<fs::path>(scene.light.spectrum), folder_ / "lamp.txt");
   EXPECT_EQ(scene.light.irradiance, 2);
   ASSERT_TRUE(scene.light.aperture);
   EXPECT_EQ(scene.light.aperture->center, Eigen::Vector3d(1, 2, 3));
@@ -115,10 +120,11 @@ TEST_F(ReadScene, ReadsEveryKindOfValue) {
   EXPECT_EQ(scene.receiver.center, Eigen::Vector3d(0, 0, -3));
   EXPECT_EQ(scene.receiver.size, Eigen::Vector2d(2, 3));
   EXPECT_EQ(scene.receiver.resolution, Eigen::Vector2i(64, 32));
-  EXPECT_EQ(scene.integrator.density.kind, DensityKind::histogram);
-  EXPECT_EQ(scene.integrator.density.tau, 2);
-  EXPECT_EQ(scene.output.photons, folder_ / "out/photons.vtp");
-  EXPECT_TRUE(scene.output.image.empty()) << "one output is named, so that the others are not wanted";
+  const DensitySettings& density = scene.integrator.settings<PhotonDescription>().density;
+  EXPECT_EQ(density.kind, DensityKind::histogram);
+  EXPECT_EQ(density.tau, 2);
+  EXPECT_EQ(scene.output.files, (Files{{"photons", folder_ / "out/photons.vtp"}}))
+      << "one output is named, so that the others are not wanted";
   EXPECT_EQ(scene.output.exposure, -1);
   EXPECT_FALSE(scene.output.white_balance);
   EXPECT_EQ(scene.output.view, "Raw");
@@ -131,10 +137,10 @@ TEST_F(ReadScene, ReadsTheLens) {
                     "image_plane": { "depth": [0, 0.5], "normal": [0, 1, -1], "up": [1, 0, 0], "size": [2, 3] },
                     "wrap": "mirror", "samples": 3, "overlay": "grid" }
   })");
-  const LensDescription& lens = scene.integrator.lens;
-  EXPECT_EQ(scene.integrator.type, IntegratorType::lens);
+  const LensDescription& lens = scene.integrator.settings<LensDescription>();
+  EXPECT_STREQ(scene.integrator.method().name(), "lens");
   EXPECT_EQ(lens.mode, LensMode::gather);
-  EXPECT_EQ(lens.image, (folder_ / "photo.jpg").string());
+  EXPECT_EQ(std::get<fs::path>(lens.image), folder_ / "photo.jpg");
   EXPECT_EQ(lens.image_color_space, "ACEScg");
   EXPECT_EQ(lens.plane.depth, (std::vector<double>{0, 0.5}));
   EXPECT_EQ(lens.plane.normal, Eigen::Vector3d(0, 1, -1));
@@ -146,8 +152,8 @@ TEST_F(ReadScene, ReadsTheLens) {
 
   const LensDescription changed =
       read({"integrator.image=color_wheel", "integrator.image_plane.depth=0.25", "integrator.image_color_space=auto"})
-          .integrator.lens;
-  EXPECT_EQ(changed.image, "color_wheel");
+          .integrator.settings<LensDescription>();
+  EXPECT_EQ(std::get<TestImage>(changed.image), TestImage::color_wheel);
   EXPECT_EQ(changed.plane.depth, std::vector<double>{0.25});
   EXPECT_EQ(changed.image_color_space, "");
 }
@@ -341,16 +347,88 @@ TEST_F(ReadScene, OutputsNeverOverwriteEachOtherOrAnInput) {
   EXPECT_NO_THROW(read({"output.exr=a.exr", "output.spectral=b/a.exr", "output.photons=b.vdb"}));
 }
 
-TEST_F(ReadScene, Spectra) {
-  for (const char* name : {"D65", "E", "A", "blackbody 5500", "blackbody 2856.5"}) {
-    EXPECT_EQ(read({std::string("light.spectrum=\"") + name + "\""}).light.spectrum, name);
+TEST_F(ReadScene, OutputsOfTheCommandLineTakeThePlaceOfTheScenes) {
+  const auto files_of = [this](const std::vector<fs::path>& outputs, const Overrides& overrides = {}) {
+    return read_scene(file(smallest), {overrides, outputs}).output.files;
+  };
+  EXPECT_EQ(files_of({"/a/b.jpg", "/a/c.spectral.exr"}, {"output.exr=d.exr"}),
+            (Files{{"image", "/a/b.jpg"}, {"spectral", "/a/c.spectral.exr"}}));
+  EXPECT_EQ(files_of({"/a.vdb", "/a.fluence.vdb"}), (Files{{"photons", "/a.vdb"}, {"fluence", "/a.fluence.vdb"}}));
+  EXPECT_EQ(files_of({"/a.vtp"}), (Files{{"photons", "/a.vtp"}}));
+  EXPECT_EQ(files_of({"/a.vtp"}, {"integrator.type=path_tracing"}), (Files{{"paths", "/a.vtp"}}));
+  EXPECT_EQ(files_of({"/a.vdb"}, {"integrator.type=stretch"}), (Files{{"stretch", "/a.vdb"}}));
+  EXPECT_EQ(files_of({"a.png"}), (Files{{"image", fs::absolute("a.png")}}));
+  const auto refusal = [&](const std::vector<fs::path>& outputs, const Overrides& overrides = {}) -> std::string {
+    try {
+      files_of(outputs, overrides);
+    } catch (const SceneError& error) {
+      return error.what();
+    }
+    return "";
+  };
+  EXPECT_THAT(refusal({"a.png", "b.jpg"}), HasSubstr("one kind"));
+  EXPECT_THAT(refusal({"a.gif"}), HasSubstr(".png, .jpg"));
+  EXPECT_THAT(refusal({"a.vdb"}, {"integrator.type=lens"}), HasSubstr("lens makes no such output"));
+}
+
+/// Every key that names a file is known as an input, by whatever name the output has it.
+TEST_F(ReadScene, NoOutputTakesThePlaceOfAnInput) {
+  for (const char* name : {"body.ply", "cut.ply", "photo.png", "sky.exr", "lamp.txt", "config.ocio", "seeds.txt"})
+    std::ofstream(folder_ / name) << name;
+  fs::create_directories(folder_ / "folder");
+  const Overrides inputs{"obstacles=[{\"file\":\"body.ply\"}]",
+                         "field.bounds=cut.ply",
+                         "integrator.image=photo.png",
+                         "lights=[{\"kind\":\"environment\",\"file\":\"sky.exr\"}]",
+                         "light.spectrum=lamp.txt",
+                         "output.ocio=config.ocio",
+                         "integrator.seeds={\"kind\":\"file\",\"file\":\"seeds.txt\"}"};
+  unsetenv("OCIO");
+  const SceneDescription scene = read(inputs);
+  for (const NamedFile& input : input_files(scene)) {
+    if (!fs::exists(input.path)) continue;
+    const fs::path hard = folder_ / "hard_link", soft = folder_ / "soft_link";
+    fs::remove(hard);
+    fs::remove(soft);
+    fs::create_hard_link(input.path, hard);
+    fs::create_symlink(input.path.filename(), soft);
+    for (const fs::path& output : {input.path, folder_ / "folder/.." / input.path.filename(), hard, soft})
+      EXPECT_THROW(check_files(scene, {{output, "--stats"}}), SceneError) << input.name << " by " << output;
   }
-  EXPECT_EQ(read({"light.spectrum=blackbody.txt"}).light.spectrum, (folder_ / "blackbody.txt").string());
-  EXPECT_EQ(read({"light.spectrum=/lamps/led"}).light.spectrum, "/lamps/led");
+  EXPECT_EQ(input_files(scene).size(), 10u) << "a new kind of input belongs into this test";
+  EXPECT_NO_THROW(check_files(scene, {{folder_ / "new.json", "--stats"}}));
+  EXPECT_NO_THROW(check_files(scene, {{"/dev/stdout", "--stats"}}));
+}
+
+TEST_F(ReadScene, Spectra) {
+  for (const char* name : {"D65", "E", "A"})
+    EXPECT_EQ(std::get<Illuminant>(read({std::string("light.spectrum=") + name}).light.spectrum).name, name);
+  EXPECT_EQ(std::get<BlackBody>(read({"light.spectrum=blackbody 5500"}).light.spectrum).kelvin, 5500);
+  EXPECT_EQ(std::get<BlackBody>(read({"light.spectrum=blackbody  2856.5 "}).light.spectrum).kelvin, 2856.5);
+  const auto file_of = [this](const std::string& text) {
+    return std::get<fs::path>(read({"light.spectrum=" + text}).light.spectrum);
+  };
+  EXPECT_EQ(file_of("blackbody.txt"), folder_ / "blackbody.txt");
+  EXPECT_EQ(file_of("/lamps/led"), "/lamps/led");
   EXPECT_THAT(error({"light.spectrum=d65"}), HasSubstr("`/light/spectrum` must be one of \"D65\""));
-  for (const char* wrong : {"blackbody", "blackbody -1", "blackbody 0", "blackbody hot", "blackbody 5000 K"}) {
+  for (const char* wrong : {"blackbody", "blackbody -1", "blackbody 0", "blackbody hot", "blackbody 5000 K",
+                            "blackbody 0x1p12", "blackbody nan", "blackbody inf", "blackbody 1e300"}) {
     EXPECT_THAT(error({std::string("light.spectrum=") + wrong}), HasSubstr("blackbody KELVIN")) << wrong;
   }
+}
+
+TEST_F(ReadScene, KeysOfAnotherKindAreRefused) {
+  const auto expect = [this](const Overrides& overrides, const char* pointer) {
+    EXPECT_THAT(error(overrides), AllOf(HasSubstr("`" + std::string(pointer) + "` has a meaning only where")));
+  };
+  expect({R"(integrator.material={"kind":"metal","clearcoat":1})"}, "/integrator/material/clearcoat");
+  expect({R"(integrator.material={"metal":"gold"})"}, "/integrator/material/metal");
+  expect({R"(integrator.material={"kind":"diffuse","roughness":1})"}, "/integrator/material/roughness");
+  expect({R"(integrator.seeds={"kind":"grid","radius":1})"}, "/integrator/seeds/radius");
+  expect({R"(integrator.seeds={"kind":"sphere","file":"a.txt"})"}, "/integrator/seeds/file");
+  expect({R"(lights=[{"kind":"constant"},{"kind":"constant","angle":3}])"}, "/lights/1/angle");
+  EXPECT_NO_THROW(read({R"(integrator.material={"kind":"glass","index":1.3,"roughness":0})"}));
+  EXPECT_NO_THROW(read({R"(integrator.material={"clearcoat":1})"})) << "principled is the default";
 }
 
 TEST_F(ReadScene, Warnings) {

@@ -10,7 +10,7 @@
 #include <nlohmann/json.hpp>
 #include <unistd.h>
 
-#include "scenes/read_scene.h"
+#include "scenes/pipeline/read_scene.h"
 
 namespace tensorray {
 namespace {
@@ -27,6 +27,16 @@ struct Leaf {
 
 Json smallest_scene() { return {{"field", {{"file", "a.vdb"}}}, {"integrator", {{"type", "photon_distribution"}}}}; }
 
+/// `scene` with the kind of object to which the key belongs, if it does not belong to all kinds.
+Json with_chooser(const Json& schema, const Pointer& pointer, const std::string& key, Json scene) {
+  for (const Json& rule : schema.value("allOf", Json::array())) {
+    if (!rule.contains("anyOf") || rule.at("/anyOf/1/not/required/0"_json_pointer) != key) continue;
+    for (const auto& [chooser, words] : rule.at("/anyOf/0/properties"_json_pointer).items())
+      scene[pointer / chooser] = words.at("enum").at(0);
+  }
+  return scene;
+}
+
 void collect(const Json& schema, const Pointer& pointer, const Json& scene, std::vector<Leaf>& leaves) {
   for (const auto& [key, value] : schema.at("properties").items()) {
     const Pointer inner = pointer / key;
@@ -39,7 +49,7 @@ void collect(const Json& schema, const Pointer& pointer, const Json& scene, std:
         collect(kind, inner, generated, leaves);
       }
     } else {
-      leaves.push_back({inner, value, scene});
+      leaves.push_back({inner, value, with_chooser(schema, pointer, key, scene)});
     }
   }
 }

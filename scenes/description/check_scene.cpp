@@ -1,0 +1,130 @@
+#include "scenes/description/check_scene.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include <fmt/core.h>
+
+#include "scenes/description/run_files.h"
+
+namespace tensorray {
+namespace {
+
+void check_wavelengths(const LightDescription& light, const SceneSource& source) {
+  const double min = light.wavelength_min, max = light.wavelength_max;
+  if (min > max) {
+    source.fail(fmt::format("`/light/wavelengths/min` ({} nm) must not be above `max` ({} nm)", min, max));
+  }
+  if (min == max && light.wavelength_count > 1) {
+    source.fail(fmt::format("`/light/wavelengths/count` must be 1, but is {}: `min` and `max` are the same wavelength",
+                            light.wavelength_count));
+  }
+  if (light.wavelengths_per_photon > 0 && light.wavelength_count % light.wavelengths_per_photon != 0) {
+    source.fail(fmt::format("`/light/wavelengths/per_photon` must divide `count` ({}), but is {}",
+                            light.wavelength_count, light.wavelengths_per_photon));
+  }
+}
+
+/// s(λ) < 0 is allowed, and bends light the other way: more often than not the range was widened carelessly.
+void warn_of_negative_flexibility(SceneDescription& scene) {
+  if (scene.bending.rgb) {
+    if (scene.bending.rgb->minCoeff() < 0)
+      scene.warnings.push_back("`/bending/rgb`: where the flexibility is negative, light bends the other way");
+    return;
+  }
+  const double at_min = scene.bending.flexibility.at(scene.light.wavelength_min);
+  const double at_max = scene.bending.flexibility.at(scene.light.wavelength_max);
+  if (at_min >= 0 && at_max >= 0) return;
+  scene.warnings.push_back(
+      fmt::format("`/bending`: s = a + b * wavelength is {:.4g} at {} nm and {:.4g} at {} nm; where it is negative, "
+                  "light bends the other way",
+                  at_min, scene.light.wavelength_min, at_max, scene.light.wavelength_max));
+}
+
+void check_lights(const SceneDescription& scene, const SceneSource& source) {
+  for (std::size_t i = 0; i < scene.lights.size(); ++i) {
+    const LightSourceDescription& light = scene.lights[i];
+    if (light.kind == LightKind::environment && light.file.empty())
+      source.fail(fmt::format("`/lights/{}` is an environment and needs its `file`", i));
+    if (light.kind == LightKind::area && !light.center)
+      source.fail(fmt::format("`/lights/{}` is an area and needs its `center`", i));
+  }
+}
+
+/// Outputs that belong to another method are left out, unless nothing is left to write.
+void drop_unmade_outputs(SceneDescription& scene, const SceneSource& source) {
+  const Method& method = scene.integrator.method();
+  const std::vector<Output> made = method.outputs();
+  std::map<std::string, std::filesystem::path> kept;
+  std::string dropped;
+  for (const auto& [key, file] : scene.output.files) {
+    const bool is_made =
+        std::any_of(made.begin(), made.end(), [&key = key](const Output& output) { return key == output.key; });
+    if (is_made) {
+      kept[key] = file;
+    } else {
+      dropped = key;
+      scene.warnings.push_back(
+          fmt::format("`/output/{0}` has no effect with {1}, which makes no {0}", key, method.name()));
+    }
+  }
+  if (kept.empty() && !dropped.empty())
+    source.fail(fmt::format("`/output/{0}` is the only output, and {1} makes no {0}; name an `image` or an `exr`",
+                            dropped, method.name()));
+  scene.output.files = std::move(kept);
+}
+
+}  // namespace
+
+bool given(const Json& json, const char* pointer) { return json.contains(Json::json_pointer(pointer)); }
+
+void warn_unused(SceneDescription& scene, const Json& json, const char* key, const char* because_of) {
+  if (!given(json, key) || !given(json, because_of)) return;
+  scene.warnings.push_back(fmt::format("`{}` has no effect beside `{}`", key, because_of));
+}
+
+void check_normal(const std::optional<Eigen::Vector3d>& normal, const char* pointer, const LightDescription& light,
+                  const SceneSource& source) {
+  if (!normal || std::abs(normal->normalized().dot(light.direction.normalized())) > 1e-6) return;
+  source.fail(
+      fmt::format("`{}/normal` is across the light: it would be seen edge-on; turn it towards the light", pointer));
+}
+
+void check_memory(double bytes, const std::string& what, const SceneSource& source) {
+  constexpr double most_gibibytes = 64;
+  const double gibibytes = bytes / (1 << 30);
+  if (gibibytes > most_gibibytes) source.fail(fmt::format("{} needs {:.0f} GiB; ask for less of it", what, gibibytes));
+}
+
+void check_receiver_memory(const SceneDescription& scene, double bytes_per_pixel, const SceneSource& source) {
+  if (!scene.receiver.resolution) return;
+  const int channels = scene.bending.rgb ? 3 : scene.light.wavelength_count;
+  const double pixels = scene.receiver.resolution->cast<double>().prod();
+  check_memory(pixels * (channels * sizeof(double) + bytes_per_pixel),
+               fmt::format("`/receiver/resolution` with {} channels of light (`/light/wavelengths/count`)", channels),
+               source);
+}
+
+void check_spectral_output(const SceneDescription& scene, const SceneSource& source) {
+  if (scene.bending.rgb && scene.output.wants("spectral"))
+    source.fail("`/output/spectral` needs wavelengths, which `/bending/rgb` has none of; remove one of the two");
+}
+
+void check_scene(SceneDescription& scene, const Json& json, const SceneSource& source) {
+  if (!scene.bending.rgb) check_wavelengths(scene.light, source);
+  check_normal(scene.receiver.normal, "/receiver", scene.light, source);
+  check_lights(scene, source);
+  check_receiver_memory(scene, 0, source);
+  drop_unmade_outputs(scene, source);
+  for (const auto& method : scene.integrator.methods)
+    method->check(scene, json, source, method.get() == &scene.integrator.method());
+  check_files(scene);
+  warn_of_negative_flexibility(scene);
+  warn_unused(scene, json, "/field/name", "/field/generate");
+  warn_unused(scene, json, "/field/derive", "/field/generate");
+  warn_unused(scene, json, "/bending/a", "/bending/rgb");
+  warn_unused(scene, json, "/bending/b", "/bending/rgb");
+  warn_unused(scene, json, "/light/wavelengths", "/bending/rgb");
+}
+
+}  // namespace tensorray

@@ -1,0 +1,78 @@
+#pragma once
+/// @file scenes/description/choices.h
+/// The words of the enumerations that the whole scene, or several methods, use (see scenes/keys/choice.h).
+
+#include <array>
+
+#include "integrators/bending/bending.h"
+#include "renderer/color/colormap.h"
+#include "renderer/lights/beam.h"
+#include "renderer/shading/camera.h"
+#include "scenes/description/description.h"
+#include "scenes/keys/choice.h"
+#include "volumes/files/tensor_files.h"
+#include "volumes/tensors/eigenvalues.h"
+#include "volumes/tensors/invariants.h"
+
+namespace tensorray {
+
+inline auto choices(Derive) {
+  using C = Choice<Derive>;
+  return std::array{C{"none", Derive::none}, C{"gradient", Derive::gradient}, C{"hessian", Derive::hessian}};
+}
+
+inline auto choices(Eigenvalues) {
+  using C = Choice<Eigenvalues>;
+  return std::array{C{"auto", Eigenvalues::automatic}, C{"raw", Eigenvalues::raw}, C{"absolute", Eigenvalues::absolute},
+                    C{"positive", Eigenvalues::positive}};
+}
+
+inline auto choices(BendingMethod) {
+  using C = Choice<BendingMethod>;
+  return std::array{C{"euler", BendingMethod::euler}, C{"splitting", BendingMethod::splitting},
+                    C{"rk4", BendingMethod::rk4}, C{"bs23", BendingMethod::bs23}, C{"dopri5", BendingMethod::dopri5}};
+}
+
+inline auto choices(BeamPattern) {
+  using C = Choice<BeamPattern>;
+  return std::array{C{"grid", BeamPattern::grid}, C{"stratified", BeamPattern::stratified},
+                    C{"sobol", BeamPattern::sobol}, C{"random", BeamPattern::random}};
+}
+
+inline auto choices(Projection) {
+  using C = Choice<Projection>;
+  return std::array{C{"perspective", Projection::perspective}, C{"orthographic", Projection::orthographic}};
+}
+
+inline auto choices(LightKind) {
+  using C = Choice<LightKind>;
+  return std::array{C{"constant", LightKind::constant}, C{"environment", LightKind::environment},
+                    C{"directional", LightKind::directional}, C{"area", LightKind::area}};
+}
+
+inline auto choices(Invariant) {
+  using C = Choice<Invariant>;
+  return std::array{C{"norm", Invariant::norm},
+                    C{"trace", Invariant::trace},
+                    C{"determinant", Invariant::determinant},
+                    C{"fractional_anisotropy", Invariant::fractional_anisotropy},
+                    C{"mode", Invariant::mode},
+                    C{"largest_eigenvalue", Invariant::largest_eigenvalue},
+                    C{"middle_eigenvalue", Invariant::middle_eigenvalue},
+                    C{"smallest_eigenvalue", Invariant::smallest_eigenvalue},
+                    C{"von_mises", Invariant::von_mises},
+                    C{"max_shear", Invariant::max_shear},
+                    C{"vorticity", Invariant::vorticity},
+                    C{"swirling_strength", Invariant::swirling_strength},
+                    C{"asymmetry", Invariant::asymmetry}};
+}
+
+inline auto choices(Colormap) {
+  using C = Choice<Colormap>;
+  return std::array{C{"viridis", Colormap::viridis},   C{"magma", Colormap::magma},
+                    C{"inferno", Colormap::inferno},   C{"plasma", Colormap::plasma},
+                    C{"cividis", Colormap::cividis},   C{"cool_warm", Colormap::cool_warm},
+                    C{"twilight", Colormap::twilight}, C{"grey", Colormap::grey}};
+}
+
+}  // namespace tensorray

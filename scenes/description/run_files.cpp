@@ -1,0 +1,42 @@
+#include "scenes/description/run_files.h"
+
+#include <cstdlib>
+
+#include <fmt/core.h>
+
+namespace tensorray {
+
+std::vector<NamedFile> input_files(const SceneDescription& scene) {
+  std::vector<NamedFile> files{{scene.path, "the scene file"},
+                               {scene.field.file, "`/field/file`"},
+                               {scene.field.bounds, "`/field/bounds`"},
+                               {scene.output.ocio, "`/output/ocio`"}};
+  if (const char* config = std::getenv("OCIO")) files.push_back({config, "$OCIO"});
+  if (const auto* spectrum = std::get_if<std::filesystem::path>(&scene.light.spectrum))
+    files.push_back({*spectrum, "`/light/spectrum`"});
+  for (std::size_t i = 0; i < scene.obstacles.size(); ++i)
+    files.push_back({scene.obstacles[i], fmt::format("`/obstacles/{}/file`", i)});
+  for (std::size_t i = 0; i < scene.lights.size(); ++i)
+    files.push_back({scene.lights[i].file, fmt::format("`/lights/{}/file`", i)});
+  for (const auto& method : scene.integrator.methods)
+    for (NamedFile& file : method->inputs()) files.push_back(std::move(file));
+  return files;
+}
+
+std::vector<NamedFile> output_files(const SceneDescription& scene) {
+  std::vector<NamedFile> files;
+  for (const auto& [key, file] : scene.output.files) files.push_back({file, "`/output/" + key + "`"});
+  return files;
+}
+
+void check_files(const SceneDescription& scene, const std::vector<NamedFile>& more) {
+  std::vector<NamedFile> outputs = output_files(scene);
+  outputs.insert(outputs.end(), more.begin(), more.end());
+  try {
+    require_distinct_files(input_files(scene), outputs);
+  } catch (const std::invalid_argument& error) {
+    throw SceneError(printable(scene.path.string() + ": " + error.what()));
+  }
+}
+
+}  // namespace tensorray

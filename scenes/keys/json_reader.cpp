@@ -1,0 +1,125 @@
+#include "scenes/keys/json_reader.h"
+
+#include <algorithm>
+#include <cctype>
+#include <cerrno>
+#include <cstddef>
+#include <cstring>
+#include <fstream>
+#include <set>
+#include <vector>
+
+#include <fmt/core.h>
+
+#include "scenes/keys/scene_source.h"
+
+namespace tensorray {
+namespace {
+
+constexpr std::size_t largest_file = std::size_t{64} << 20;  // Bytes. Reached by a wrong file only, a VDB say.
+
+std::string read_text(const SceneSource& source) {
+  std::error_code error;
+  const std::filesystem::file_status status = std::filesystem::status(source.path, error);
+  if (!std::filesystem::exists(status)) source.fail("no such file; give the path of a scene file");
+  if (std::filesystem::is_directory(status)) source.fail("is a folder; give the path of a scene file");
+
+  errno = 0;
+  std::ifstream file(source.path, std::ios::binary);
+  if (!file) source.fail(fmt::format("cannot be read: {}", std::strerror(errno)));
+  std::string text;
+  std::vector<char> buffer(1 << 16);
+  while (file.read(buffer.data(), static_cast<std::streamsize>(buffer.size())) || file.gcount() > 0) {
+    text.append(buffer.data(), static_cast<std::size_t>(file.gcount()));
+    if (text.size() > largest_file) source.fail("is larger than 64 MiB, which no scene file is; give another file");
+  }
+  if (file.bad()) source.fail("cannot be read to its end");
+  return text;
+}
+
+/// Follows the parser and refuses what JSON allows but no scene means.
+class StrictRules {
+ public:
+  bool operator()(int depth, Json::parse_event_t event, Json& parsed) {
+    using Event = Json::parse_event_t;
+    if (event == Event::object_start || event == Event::array_start) {
+      if (depth >= nesting_limit) throw SceneError(fmt::format("is nested deeper than {} levels", nesting_limit));
+    }
+    if (event == Event::object_start) {
+      keys_.emplace_back();
+    } else if (event == Event::object_end) {
+      keys_.pop_back();
+    } else if (event == Event::key) {
+      const auto& key = parsed.get_ref<const std::string&>();
+      if (!keys_.back().insert(key).second) {
+        throw SceneError(fmt::format("key `{}` is given twice in the same object; remove one", key));
+      }
+    }
+    return true;
+  }
+
+ private:
+  std::vector<std::set<std::string>> keys_;  // Of the objects that are open.
+};
+
+Json parse(const std::string& text, bool comments) {
+  StrictRules rules;
+  const auto follow = [&rules](int depth, Json::parse_event_t event, Json& parsed) {
+    return rules(depth, event, parsed);
+  };
+  return Json::parse(text, follow, true, comments);
+}
+
+/// "line 3, column 7" of the byte at `offset`.
+std::string position(const std::string& text, std::size_t offset) {
+  const auto end = text.begin() + static_cast<std::ptrdiff_t>(std::min(offset, text.size()));
+  const auto line = std::count(text.begin(), end, '\n') + 1;
+  const auto start = std::find(std::make_reverse_iterator(end), text.rend(), '\n').base();
+  return fmt::format("line {}, column {}", line, end - start + 1);
+}
+
+/// The parser's own words on an error, without its prefixes and without bytes that are not text.
+std::string reason(const std::string& what) {
+  const std::size_t column = what.find("column ");
+  const std::size_t colon = what.find(": ", column == std::string::npos ? 0 : column);
+  const std::size_t bracket = what.find("] ");
+  std::string text = column != std::string::npos && colon != std::string::npos ? what.substr(colon + 2)
+                     : bracket != std::string::npos                            ? what.substr(bracket + 2)
+                                                                               : what;
+  if (text.size() > 200) text = text.substr(0, 200) + "...";
+  for (char& c : text) {
+    if (static_cast<unsigned char>(c) >= 0x80) c = '?';
+  }
+  const bool closing =
+      text.find("unexpected '}'") != std::string::npos || text.find("unexpected ']'") != std::string::npos;
+  return closing ? text + " (is there a comma too many before it?)" : text;
+}
+
+bool is_blank(const std::string& text) {
+  return std::all_of(text.begin(), text.end(), [](unsigned char c) { return std::isspace(c); });
+}
+
+}  // namespace
+
+Json read_json_object(const std::filesystem::path& path) {
+  const SceneSource source{path};
+  const std::string text = read_text(source);
+  if (is_blank(text)) source.fail("is empty; a scene is a JSON object with `field` and `integrator`");
+  Json json;
+  try {
+    json = parse(text, true);
+  } catch (const SceneError& error) {
+    source.fail(error.what());
+  } catch (const Json::parse_error& error) {
+    const std::size_t read = error.byte;  // How many bytes the parser had read: the last of them is wrong.
+    source.fail(fmt::format("{}: {}", position(text, read > 0 ? read - 1 : 0), reason(error.what())));
+  } catch (const Json::exception& error) {
+    source.fail(reason(error.what()));
+  }
+  if (!json.is_object()) source.fail("must be a JSON object: { \"field\": ..., \"integrator\": ... }");
+  return json;
+}
+
+Json parse_value(const std::string& text) { return parse(text, false); }
+
+}  // namespace tensorray

@@ -1,0 +1,151 @@
+#include "scenes/keys/section_reader.h"
+
+#include <algorithm>
+#include <cstddef>
+#include <stdexcept>
+#include <utility>
+#include <variant>
+
+namespace tensorray {
+namespace {
+
+/// How many letters must be inserted, removed, replaced or swapped with their neighbour to make `a` of `b`.
+std::size_t edit_distance(const std::string& a, const std::string& b) {
+  std::vector<std::vector<std::size_t>> distance(a.size() + 1, std::vector<std::size_t>(b.size() + 1));
+  for (std::size_t i = 0; i <= a.size(); ++i) {
+    for (std::size_t j = 0; j <= b.size(); ++j) {
+      if (i == 0 || j == 0) {
+        distance[i][j] = i + j;
+        continue;
+      }
+      const std::size_t replace = distance[i - 1][j - 1] + (a[i - 1] == b[j - 1] ? 0 : 1);
+      distance[i][j] = std::min({distance[i - 1][j] + 1, distance[i][j - 1] + 1, replace});
+      if (i > 1 && j > 1 && a[i - 1] == b[j - 2] && a[i - 2] == b[j - 1]) {
+        distance[i][j] = std::min(distance[i][j], distance[i - 2][j - 2] + 1);
+      }
+    }
+  }
+  return distance[a.size()][b.size()];
+}
+
+std::string quoted_list(const std::vector<std::string>& names, const char* separator) {
+  std::string list;
+  for (const std::string& name : names) list += fmt::format("{}`{}`", list.empty() ? "" : separator, name);
+  return list;
+}
+
+/// "did you mean `light`?", or the known keys where none is like `key`.
+std::string suggestion(const std::string& key, const std::set<std::string>& known) {
+  constexpr std::size_t longest = 64;  // No key is as long; the distance takes quadratic time.
+  std::string nearest;
+  std::size_t least = key.size() > longest ? 0 : std::max<std::size_t>(2, key.size() / 2);
+  for (const std::string& name : known) {
+    const std::size_t distance = key.size() > longest ? longest : edit_distance(key, name);
+    if (distance > std::max<std::size_t>(1, std::min(key.size(), name.size()) / 2)) continue;
+    if (distance > least || (distance == least && !nearest.empty())) continue;
+    nearest = name;
+    least = distance;
+  }
+  if (!nearest.empty()) return fmt::format("did you mean `{}`?", nearest);
+  return "known here are " + quoted_list({known.begin(), known.end()}, ", ");
+}
+
+}  // namespace
+
+SectionReader::SectionReader(const Json& object, std::string pointer, const SceneSource& source)
+    : object_(object), pointer_(std::move(pointer)), source_(source) {}
+
+const Json* SectionReader::find(const char* key) {
+  known_.insert(key);
+  const auto found = object_.find(key);
+  return found == object_.end() ? nullptr : &*found;
+}
+
+std::string SectionReader::pointer_to(const std::string& key) const {
+  std::string pointer = pointer_ + "/";
+  for (const char c : key) {  // As RFC 6901 has it.
+    if (c == '~') {
+      pointer += "~0";
+    } else if (c == '/') {
+      pointer += "~1";
+    } else {
+      pointer += c;
+    }
+  }
+  return pointer;
+}
+
+void SectionReader::refuse(const std::string& key, const std::string& expected, const char* word) const {
+  const std::string alternative = word ? fmt::format(", or \"{}\"", word) : "";
+  source_.fail(
+      fmt::format("`{}` must be {}{}, but is {}", pointer_to(key), expected, alternative, excerpt(object_.at(key))));
+}
+
+void SectionReader::generator(const char* key, std::optional<GenerateDescription>& member, const char* /*meaning*/) {
+  const Json* value = find(key);
+  if (!value) return;
+  if (!value->is_object()) refuse(key, "an object");
+  SectionReader inner(*value, pointer_to(key), source_);
+  const std::string kinds = "one of " + quoted_list(generator_kinds(), ", ");
+  const Json* kind = inner.find("kind");
+  if (!kind) source_.fail(fmt::format("`{}` needs the key `kind`: {}", pointer_to(key), kinds));
+  const auto& known = generator_kinds();
+  if (!kind->is_string() || std::find(known.begin(), known.end(), kind->get<std::string>()) == known.end()) {
+    inner.refuse("kind", kinds);
+  }
+
+  member.emplace();
+  member->generator = generator_of(kind->get<std::string>());
+  GridRequest grid;
+  describe(grid, inner);
+  std::visit([&inner](auto& parameters) { describe(parameters, inner); }, member->generator);
+  inner.finish();
+  try {
+    member->grid = choose_grid(member->generator, grid);
+    generate(member->generator, default_grid(member->generator, 4));  // Knows the ranges of the kind's parameters.
+  } catch (const std::invalid_argument& error) {
+    source_.fail(fmt::format("`{}`: {}", pointer_to(key), error.what()));
+  }
+}
+
+void SectionReader::require(std::initializer_list<const char*> keys) {
+  required_.insert(required_.end(), keys.begin(), keys.end());
+}
+
+void SectionReader::exactly_one(std::initializer_list<const char*> keys) {
+  alternatives_.insert(alternatives_.end(), keys.begin(), keys.end());
+}
+
+void SectionReader::exclude(const char* key, std::initializer_list<const char*> others) {
+  for (const char* other : others) exclusions_.push_back({key, other});
+}
+
+void SectionReader::refuse_unknown_keys() const {
+  for (const auto& item : object_.items()) {
+    if (known_.count(item.key()) > 0) continue;
+    source_.fail(fmt::format("unknown key `{}`; {}", pointer_to(item.key()), suggestion(item.key(), known_)));
+  }
+}
+
+void SectionReader::finish() const {
+  refuse_unknown_keys();
+  const std::string where = pointer_.empty() ? "the scene" : fmt::format("`{}`", pointer_);
+  for (const std::string& key : required_) {
+    if (!object_.contains(key)) source_.fail(fmt::format("{} needs the key `{}`", where, key));
+  }
+  const auto given = std::count_if(alternatives_.begin(), alternatives_.end(),
+                                   [this](const std::string& key) { return object_.contains(key); });
+  if (!alternatives_.empty() && given != 1) {
+    source_.fail(fmt::format("{} needs exactly one of {}", where, quoted_list(alternatives_, " and ")));
+  }
+  for (const Stray& stray : strays_)
+    source_.fail(fmt::format("`{}` has a meaning only where `{}` is {}, but that is \"{}\"; remove one of the two keys",
+                             pointer_to(stray.key), pointer_to(stray.chooser), stray.allowed, stray.value));
+  for (const Exclusion& exclusion : exclusions_) {
+    if (!object_.contains(exclusion.key) || !object_.contains(exclusion.other)) continue;
+    source_.fail(fmt::format("`{}` and `{}` exclude each other; remove one", pointer_to(exclusion.key),
+                             pointer_to(exclusion.other)));
+  }
+}
+
+}  // namespace tensorray

@@ -1,0 +1,179 @@
+#pragma once
+/// @file scenes/keys/values.h
+/// How each type of value stands in a scene file: one trait a type.
+
+#include <cstdint>
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <type_traits>
+#include <variant>
+#include <vector>
+
+#include <Eigen/Core>
+#include <fmt/core.h>
+
+#include "scenes/keys/choice.h"
+#include "scenes/keys/json_reader.h"
+#include "scenes/keys/limits.h"
+
+namespace tensorray {
+
+/// A type that may be the value of a key has a specialisation `Value<T>` with four static functions:
+///   bool read(json, limits, target)       sets `target`, or returns false (and may have changed it) if the JSON value
+///                                         is of another type or breaks a limit;
+///   std::string expectation(target, limits)    what would have been right: "an integer >= 1";
+///   Json schema(target, limits)           what JSON Schema allows;
+///   Json json(value)                      the JSON of a default; null where there is none to be told.
+/// `target` is passed where only its type counts, too, because the allowed words of a `Word` are known at run time.
+template <class T, class = void>
+struct Value;
+
+/// A word of a list that is known at run time.
+struct Word {
+  std::string value;
+  std::vector<std::string> allowed;
+};
+
+/// Declares the trait of a type whose functions are in values.cpp.
+#define TENSORRAY_VALUE(T)                                                 \
+  template <>                                                              \
+  struct Value<T> {                                                        \
+    static bool read(const Json& json, const Limits& limits, T& target);   \
+    static std::string expectation(const T& target, const Limits& limits); \
+    static Json schema(const T& target, const Limits& limits);             \
+    static Json json(const T& value);                                      \
+  }
+
+TENSORRAY_VALUE(bool);
+TENSORRAY_VALUE(int);
+TENSORRAY_VALUE(std::uint64_t);
+TENSORRAY_VALUE(double);
+TENSORRAY_VALUE(std::string);
+TENSORRAY_VALUE(std::filesystem::path);
+TENSORRAY_VALUE(Word);
+TENSORRAY_VALUE(Eigen::Matrix3d);      ///< A list of rows.
+TENSORRAY_VALUE(std::vector<double>);  ///< A list, or one number.
+using IntegerOrThree = std::variant<int, Eigen::Vector3i>;
+TENSORRAY_VALUE(IntegerOrThree);
+
+/// "a list of 3 numbers >= 0".
+std::string list_expectation(int size, const char* things, const Limits& limits);
+Json list_schema(int size, const Json& item);
+
+/// Limits of each number of a vector: `not_zero` is a limit of its length.
+Limits limits_of_each(Limits limits);
+
+template <class Scalar, int size>
+struct Value<Eigen::Matrix<Scalar, size, 1>> {
+  using Vector = Eigen::Matrix<Scalar, size, 1>;
+
+  static bool read(const Json& json, const Limits& limits, Vector& target) {
+    const Limits each = limits_of_each(limits);
+    if (limits.one_for_all && json.is_number()) {
+      if (!Value<Scalar>::read(json, each, target[0])) return false;
+      target.setConstant(target[0]);
+      return true;
+    }
+    if (!json.is_array() || json.size() != size) return false;
+    for (int i = 0; i < size; ++i) {
+      if (!Value<Scalar>::read(json[static_cast<std::size_t>(i)], each, target[i])) return false;
+    }
+    // The square must neither vanish nor overflow: the vector is to be normalised.
+    const double square = target.template cast<double>().squaredNorm();
+    return !limits.not_zero || (std::isnormal(square) && square > 0);
+  }
+
+  static std::string expectation(const Vector&, const Limits& limits) {
+    return list_expectation(size, std::is_integral_v<Scalar> ? "integers" : "numbers", limits);
+  }
+
+  static Json schema(const Vector&, const Limits& limits) {
+    const Json item = Value<Scalar>::schema(Scalar(), limits_of_each(limits));
+    Json schema = list_schema(size, item);
+    if (limits.not_zero) schema["not"] = {{"const", std::vector<int>(size, 0)}};
+    if (!limits.one_for_all) return schema;
+    return {{"anyOf", {item, schema}}};
+  }
+
+  static Json json(const Vector& value) { return std::vector<Scalar>(value.data(), value.data() + size); }
+};
+
+/// `"a", "b", "c"`.
+template <class Enum>
+std::string quoted_choices() {
+  std::string names;
+  for (const auto& choice : choices(Enum{})) names += fmt::format("{}\"{}\"", names.empty() ? "" : ", ", choice.name);
+  return names;
+}
+
+template <class Enum>
+struct Value<Enum, std::enable_if_t<std::is_enum_v<Enum>>> {
+  static bool read(const Json& json, const Limits&, Enum& target) {
+    for (const auto& choice : choices(target)) {
+      if (json != choice.name) continue;
+      target = choice.value;
+      return true;
+    }
+    return false;
+  }
+
+  static std::string expectation(const Enum& target, const Limits&) {
+    return (choices(target).size() == 1 ? "" : "one of ") + quoted_choices<Enum>();
+  }
+
+  static Json schema(const Enum& target, const Limits&) {
+    Json names = Json::array();
+    for (const auto& choice : choices(target)) names.push_back(choice.name);
+    return {{"enum", names}};
+  }
+
+  static Json json(const Enum& value) { return choice_name(value); }
+};
+
+/// Whether a text names a file rather than a word: it has an ending or a folder.
+bool names_file(const std::string& text);
+
+/// One of an enumeration's words, or a file.
+template <class Enum>
+struct Value<std::variant<Enum, std::filesystem::path>, std::enable_if_t<std::is_enum_v<Enum>>> {
+  using Variant = std::variant<Enum, std::filesystem::path>;
+
+  static bool read(const Json& json, const Limits& limits, Variant& target) {
+    Enum word{};
+    if (Value<Enum>::read(json, limits, word)) {
+      target = word;
+      return true;
+    }
+    return json.is_string() && names_file(json.get<std::string>()) &&
+           Value<std::filesystem::path>::read(json, limits, target.template emplace<std::filesystem::path>());
+  }
+
+  static std::string expectation(const Variant&, const Limits&) {
+    return fmt::format("one of {}, or a file (NAME.png)", quoted_choices<Enum>());
+  }
+
+  static Json schema(const Variant&, const Limits& limits) { return Value<std::filesystem::path>::schema({}, limits); }
+
+  static Json json(const Variant& value) {
+    const Enum* word = std::get_if<Enum>(&value);
+    return word ? Value<Enum>::json(*word) : Json(std::get<std::filesystem::path>(value).string());
+  }
+};
+
+template <class T>
+struct Value<std::optional<T>> {
+  static bool read(const Json& json, const Limits& limits, std::optional<T>& target) {
+    return Value<T>::read(json, limits, target.emplace());
+  }
+  static std::string expectation(const std::optional<T>&, const Limits& limits) {
+    return Value<T>::expectation(T(), limits);
+  }
+  static Json schema(const std::optional<T>&, const Limits& limits) { return Value<T>::schema(T(), limits); }
+  static Json json(const std::optional<T>& value) { return value ? Value<T>::json(*value) : Json(); }
+};
+
+/// `value` as it may stand in a message: short.
+std::string excerpt(const Json& value);
+
+}  // namespace tensorray

@@ -1,0 +1,238 @@
+#include "scenes/lens/lens_method.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include <Eigen/LU>
+#include <fmt/format.h>
+
+#include "base/constants.h"
+#include "integrators/lens/lens.h"
+#include "renderer/color/reflectance.h"
+#include "renderer/images/grid_lines.h"
+#include "scenes/description/check_scene.h"
+#include "scenes/lens/load_lens.h"
+#include "scenes/outputs/picture_outputs.h"
+
+namespace tensorray {
+namespace {
+
+constexpr double reference_wavelength = 550;  // nm: the channel next to it is that of the points.
+constexpr int overlay_cells = 16;             // Along the image's shorter side.
+constexpr double most_overlay_cells = 1e6;    // Too dense to be drawn.
+constexpr std::size_t exact_bands = 10;       // With so many a reflectance can have any colour of Rec. 709.
+constexpr int gap_part = 64;                  // Between pictures side by side: this part of one's width.
+
+/// How the image's colours become light, channel by channel.
+std::function<double(const Eigen::Vector3d&, std::size_t)> radiance_of(const Scene& scene) {
+  if (scene.description.bending.rgb) {
+    const Eigen::Matrix3d to_primaries = (scene.color.xyz_to_working() * rec709_to_xyz()).inverse();
+    return [to_primaries](const Eigen::Vector3d& rgb, std::size_t channel) {
+      return to_primaries.row(static_cast<Eigen::Index>(channel)).dot(rgb);
+    };
+  }
+  // Light that has no white cannot tell what spectrum a colour stands for: daylight does.
+  const std::vector<Band> bands = has_white(scene) ? scene.bands : make_bands(illuminant("D65"), 380, 730, 36);
+  Eigen::Vector3d white = Eigen::Vector3d::Zero();
+  for (const Band& band : bands) white += band.xyz;
+  const ReflectanceModel model(bands, scene.color.xyz_to_working_adapted(white));
+  return [model, &scene](const Eigen::Vector3d& rgb, std::size_t channel) {
+    return model.spectrum(rgb).at(scene.bands[channel].wavelength);
+  };
+}
+
+std::size_t reference_channel(const Scene& scene) {
+  if (scene.description.bending.rgb) return 1;
+  const auto nearest = std::min_element(scene.bands.begin(), scene.bands.end(), [](const Band& a, const Band& b) {
+    return std::abs(a.wavelength - reference_wavelength) < std::abs(b.wavelength - reference_wavelength);
+  });
+  return static_cast<std::size_t>(nearest - scene.bands.begin());
+}
+
+/// The points' channels, in this order.
+const std::vector<std::string> point_channels{"texture.s",
+                                              "texture.t",
+                                              "displacement.x",
+                                              "displacement.y",
+                                              "displacement.z",
+                                              "magnification.log",
+                                              "magnification.major",
+                                              "magnification.minor",
+                                              "folds",
+                                              "length",
+                                              "end"};
+
+void write_point(const LensPoint& point, float* values) {
+  const auto finite = [](double value) { return std::clamp(value, -100.0, 100.0); };
+  const auto next = [&values](double value) { *values++ = static_cast<float>(value); };
+  for (int i = 0; i < 2; ++i) next(point.st[i]);
+  for (int i = 0; i < 3; ++i) next(point.displacement[i]);
+  for (const double logarithm : {point.log_magnification, point.log_stretch[0], point.log_stretch[1]})
+    next(finite(logarithm));
+  next(point.folds);
+  next(point.length);
+  next(static_cast<int>(point.end));
+}
+
+/// R, G, B, A, and what the points say.
+Image make_image(const LensPicture& picture, const std::vector<Band>& bands, const Eigen::Matrix3d& to_rgb) {
+  const Image colors = linear_image(picture.radiance, bands, to_rgb);
+  std::vector<std::string> channels{"R", "G", "B", "A"};
+  channels.insert(channels.end(), point_channels.begin(), point_channels.end());
+  Image image(colors.width, colors.height, channels);
+  for (std::size_t i = 0; i < picture.points.size(); ++i) {
+    float* const pixel = &image.pixels[i * channels.size()];
+    std::copy_n(&colors.pixels[3 * i], 3, pixel);
+    pixel[3] = static_cast<float>(std::min(picture.alpha[i], 1.0));  // Rounding may sum to more than 1.
+    write_point(picture.points[i], pixel + 4);
+  }
+  return image;
+}
+
+/// Straight lines as without the field, and the image's own as the lens bends them.
+void draw_overlay(const LensPicture& picture, const Plate& plane, Image& image) {
+  std::vector<PixelCoordinates> straight, seen;
+  for (int y = 0; y < image.height; ++y)
+    for (int x = 0; x < image.width; ++x) {
+      const LensPoint& point = picture.points[static_cast<std::size_t>(y) * image.width + x];
+      straight.push_back({true, picture.straight * Eigen::Vector2d(x + 0.5, y + 0.5), picture.straight.linear()});
+      seen.push_back({point.end == LensEnd::image, point.st, point.per_pixel});
+    }
+  const Eigen::Array2d cells =
+      (overlay_cells * plane.size / plane.size.minCoeff()).array().round().min(most_overlay_cells);
+  GridLines lines;
+  lines.cells = cells.cast<int>();
+  lines.width = 1;
+  lines.color = {0.05, 0.3, 0.9};
+  lines.opacity = 0.5;
+  draw_grid_lines(image, straight, lines);
+  lines.width = 1.75;
+  lines.color = {0.9, 0.15, 0.02};
+  lines.opacity = 0.9;
+  draw_grid_lines(image, seen, lines);
+}
+
+/// Pictures side by side, with a gap in which everything is 0.
+Image side_by_side(const std::vector<Image>& images) {
+  if (images.size() == 1) return images.front();
+  const int width = images.front().width, gap = std::max(1, width / gap_part);
+  const int count = static_cast<int>(images.size());
+  Image all(count * width + (count - 1) * gap, images.front().height, images.front().channels);
+  for (int i = 0; i < count; ++i)
+    for (int y = 0; y < all.height; ++y)
+      std::copy_n(images[static_cast<std::size_t>(i)].pixel(0, y), width * all.channels.size(),
+                  all.pixel(i * (width + gap), y));
+  return all;
+}
+
+void add_statistics(const LensPicture& picture, Statistics& statistics) {
+  statistics.ends.resize(picture.ends.size());
+  for (std::size_t channel = 0; channel < picture.ends.size(); ++channel)
+    for (int end = 0; end < ray_end_count; ++end) statistics.ends[channel][end] += picture.ends[channel][end];
+  statistics.ray_steps += picture.counts.ray_steps;
+  statistics.tensor_samples += picture.counts.tensor_samples;
+  statistics.seconds_tracing += picture.seconds_tracing;
+}
+
+std::string end_codes() {
+  std::string text;
+  for (int end = 0; end < lens_end_count; ++end)
+    text += fmt::format("{}{} {}", end ? ", " : "", end, to_string(static_cast<LensEnd>(end)));
+  return text;
+}
+
+class LoadedLens : public LoadedMethod {
+ public:
+  LoadedLens(LensDescription settings, LensScene scene) : settings_(std::move(settings)), lens_(std::move(scene)) {}
+
+  Render render(const Scene& scene, const Progress& progress) const override;
+
+ private:
+  LensDescription settings_;
+  LensScene lens_;
+};
+
+/// The spectra of pictures side by side. A white image is a diffuse one in the light of the scene.
+SpectralImage spectra_side_by_side(std::vector<SpectralImage> spectra) {
+  std::vector<Image> images;
+  for (SpectralImage& spectrum : spectra) images.push_back(std::move(spectrum.image));
+  SpectralImage all{side_by_side(images), spectra.front().metadata};
+  all.metadata["emissiveUnits"] = "W.m^-2.sr^-1.nm^-1";
+  return all;
+}
+
+Render LoadedLens::render(const Scene& scene, const Progress& progress) const {
+  LensSettings settings;
+  settings.mode = settings_.mode;
+  settings.samples = settings_.samples;
+  settings.reference = reference_channel(scene);
+  LensImage image;
+  image.texture = &lens_.image;
+  image.wraps = lens_.wraps;
+  image.radiance = radiance_of(scene);
+
+  Render result;
+  const Eigen::Matrix3d matrix = to_working(scene);
+  std::vector<Image> pictures;
+  std::vector<SpectralImage> spectra;
+  for (const Plate& plane : lens_.planes) {
+    image.plane = plane;
+    const LensPicture picture = simulate_lens(scene.field, scene.geometry.surfaces(), scene.bending, scene.channels,
+                                              scene.beam.direction, lens_.receiver, image, settings, progress);
+    pictures.push_back(make_image(picture, scene.bands, matrix));
+    if (settings_.overlay == Overlay::grid) draw_overlay(picture, plane, pictures.back());
+    add_statistics(picture, result.statistics);
+    if (scene.description.output.wants("spectral"))
+      spectra.push_back(spectral_image(picture.radiance, scene.bands, scene.description.light.irradiance / pi, matrix));
+  }
+  result.linear = side_by_side(pictures);
+  if (!spectra.empty()) result.spectral = spectra_side_by_side(std::move(spectra));
+  for (const std::uint64_t count : result.statistics.ends[settings.reference]) result.statistics.positions += count;
+  result.metadata["tensorray:end"] = end_codes();
+  result.exposure = 0;  // The image is shown as it is.
+  if (nothing_arrived(result.statistics))
+    result.warnings.push_back("no ray found the image; look at `receiver` and `integrator.image_plane`");
+  return result;
+}
+
+class LensMethod : public MethodWith<LensDescription> {
+ public:
+  const char* name() const override { return "lens"; }
+
+  std::vector<Output> outputs() const override {
+    std::vector<Output> outputs = picture_outputs();
+    outputs.push_back(spectral_output());
+    return outputs;
+  }
+
+  std::vector<NamedFile> inputs() const override {
+    const auto* file = std::get_if<std::filesystem::path>(&settings().image);
+    return {{file ? *file : std::filesystem::path(), "`/integrator/image`"}};
+  }
+
+  void check(SceneDescription& scene, const Json& json, const SceneSource& source, bool chosen) const override {
+    check_normal(settings().plane.normal, "/integrator/image_plane", scene.light, source);
+    if (!chosen) return;
+    check_spectral_output(scene, source);
+    warn_unused(scene, json, "/light/spectrum", "/bending/rgb");
+    // Rays, their mesh, and two copies of the picture with all of its channels, for each depth.
+    const int channels = scene.bending.rgb ? 3 : scene.light.wavelength_count;
+    const auto& depth = settings().plane.depth;
+    const double pictures = depth ? static_cast<double>(depth->size()) : 1;
+    check_receiver_memory(scene, 600 + 2.0 * sizeof(float) * (15 + channels) * pictures, source);
+  }
+
+  std::unique_ptr<const LoadedMethod> load(const Scene& scene, std::vector<std::string>& notes) const override {
+    if (!scene.description.bending.rgb && scene.bands.size() > 1 && scene.bands.size() < exact_bands)
+      notes.push_back(
+          fmt::format("warning: with {} wavelengths saturated colours of the image may come out wrong; {} are enough",
+                      scene.bands.size(), exact_bands));
+    return std::make_unique<LoadedLens>(settings(), load_lens(scene, settings()));
+  }
+};
+
+}  // namespace
+
+std::shared_ptr<Method> lens_method() { return std::make_shared<LensMethod>(); }
+
+}  // namespace tensorray

@@ -1,0 +1,103 @@
+#include "scenes/outputs/picture_outputs.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include <fmt/format.h>
+
+#include "volumes/files/scalar_files.h"
+
+namespace tensorray {
+namespace {
+
+double exposure_of(const Scene& scene, const Render& render) {
+  if (scene.description.output.exposure) return *scene.description.output.exposure;
+  return render.exposure ? *render.exposure : automatic_exposure(render.linear);
+}
+
+void write_display(const std::filesystem::path& file, const Scene& scene, const Render& render) {
+  write_image(file, display_image(scene, render, holds_alpha(file)), provenance(scene, render));
+}
+
+void write_linear(const std::filesystem::path& file, const Scene& scene, const Render& render) {
+  write_image(file, render.linear, provenance(scene, render));
+}
+
+void write_spectral(const std::filesystem::path& file, const Scene& scene, const Render& render) {
+  ImageMetadata metadata = provenance(scene, render);
+  metadata.insert(render.spectral->metadata.begin(), render.spectral->metadata.end());
+  write_image(file, render.spectral->image, metadata);
+}
+
+}  // namespace
+
+std::vector<Output> picture_outputs() {
+  return {{"image", "display-referred picture", {".png", ".jpg", ".jpeg", ".tif", ".tiff"}, write_display},
+          {"exr", "scene-linear picture", {".exr"}, write_linear}};
+}
+
+Output spectral_output() {
+  return {"spectral", "spectral picture, a channel each band", {".exr"}, write_spectral, ".spectral.exr"};
+}
+
+ImageMetadata provenance(const Scene& scene, const Render& render) {
+  ImageMetadata metadata = render.metadata;
+  metadata.insert({{"Software", "tensorray " TENSORRAY_VERSION},
+                   {"tensorray:version", TENSORRAY_VERSION},
+                   {"tensorray:scene", scene.description.text},
+                   {"tensorray:seed", std::to_string(scene.description.seed)},
+
+                   {"tensorray:scale", fmt::format("{:.17g}", scene.scale.scale)},
+                   {"tensorray:ocio_config", scene.color.config_name()},
+                   {"tensorray:color_space", scene.color.working_space()}});
+  return metadata;
+}
+
+/// R, G, B as the display shows them, and the alpha if there is one. Formats with an alpha hold colours that are not
+/// multiplied by it; in others the picture is seen on black.
+Image display_image(const Scene& scene, const Render& render, bool holds_alpha) {
+  if (render.display) return *render.display;
+  const Image& linear = render.linear;
+  const auto gain = static_cast<float>(std::exp2(exposure_of(scene, render)));
+  const bool has_alpha = linear.channels.size() > 3 && linear.channels[3] == "A";
+  const bool divides = has_alpha && holds_alpha;
+  const std::size_t from = linear.channels.size(), to = has_alpha ? 4 : 3;
+  Image image(linear.width, linear.height,
+              {linear.channels.begin(), linear.channels.begin() + static_cast<std::ptrdiff_t>(to)});
+  for (std::size_t i = 0; i < image.pixels.size() / to; ++i) {
+    const float* const in = &linear.pixels[i * from];
+    float* const out = &image.pixels[i * to];
+    const float alpha = divides && in[3] > 0 ? in[3] : 1;
+    for (int c = 0; c < 3; ++c) out[c] = gain * in[c] / alpha;
+    if (has_alpha) out[3] = in[3];
+  }
+  if (render.annotate) render.annotate(image);
+  scene.color.to_display(image);
+  return image;
+}
+
+double automatic_exposure(const Image& linear) {
+  constexpr float lit = 0.02f;        // Of the undisturbed light, or of the brightest pixel where that is darker.
+  constexpr double brightest = 0.99;  // This fraction of the lit pixels is darker than ...
+  constexpr double shown_as = 0.9;    // ... this display-linear value.
+  const std::size_t channels = linear.channels.size();
+  std::vector<float> values;
+  for (std::size_t i = 0; i + 2 < linear.pixels.size(); i += channels) {
+    const float value = std::max({linear.pixels[i], linear.pixels[i + 1], linear.pixels[i + 2]});
+    values.push_back(value);
+  }
+  const float brightest_value = values.empty() ? 0 : *std::max_element(values.begin(), values.end());
+  if (!(brightest_value > 0)) return 0;
+  const float threshold = lit * std::min(1.0f, brightest_value);
+  values.erase(std::remove_if(values.begin(), values.end(), [&](float value) { return value <= threshold; }),
+               values.end());
+  const auto bright = values.begin() + static_cast<std::ptrdiff_t>(brightest * static_cast<double>(values.size() - 1));
+  std::nth_element(values.begin(), bright, values.end());
+  return std::log2(shown_as / *bright);
+}
+
+void write_grids(const std::filesystem::path& file, const Scene& scene, const Render& render) {
+  write_scalar_vdb(file, render.grids, provenance(scene, render));
+}
+
+}  // namespace tensorray

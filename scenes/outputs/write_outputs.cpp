@@ -1,0 +1,24 @@
+#include "scenes/outputs/write_outputs.h"
+
+#include <vector>
+
+#include <tbb/parallel_for_each.h>
+
+namespace tensorray {
+
+OutputFiles open_outputs(const OutputDescription& output) {
+  OutputFiles files;
+  for (const auto& [key, path] : output.files) files.emplace(key, OutputFile(path));
+  return files;
+}
+
+void write_outputs(const Render& render, const Scene& scene, OutputFiles& files) {
+  std::vector<Output> wanted;
+  for (const Output& output : scene.description.integrator.method().outputs())
+    if (files.count(output.key) > 0) wanted.push_back(output);
+  tbb::parallel_for_each(wanted, [&](const Output& output) {  // One thread compresses a file, most of the time.
+    files.at(output.key).write([&](const std::filesystem::path& path) { output.write(path, scene, render); });
+  });
+}
+
+}  // namespace tensorray

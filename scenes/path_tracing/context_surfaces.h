@@ -1,0 +1,23 @@
+#pragma once
+/// @file scenes/path_tracing/context_surfaces.h
+/// What a picture of paths shows beside them: the volume's edges, obstacles, the plate, a slice, isosurfaces.
+
+#include <vector>
+
+#include "base/progress.h"
+#include "renderer/materials/material.h"
+#include "renderer/surfaces/surface.h"
+#include "scenes/path_tracing/load_paths.h"
+
+namespace tensorray {
+
+/// A material of the description, in the light that shows the paths.
+/// @throw std::invalid_argument if a metal is unknown.
+Material load_material(const MaterialDescription& description, const ShownLight& light);
+
+/// Adds the scene's context to `surfaces`, and the materials that it needs to `materials`.
+/// @throw SceneError if a slice or an isosurface is empty; Cancelled (photons are traced for the plate).
+void add_context(const Scene& scene, const PathScene& paths, const Progress& progress,
+                 std::vector<ShadedSurface>& surfaces, std::vector<Material>& materials);
+
+}  // namespace tensorray

@@ -1,0 +1,180 @@
+#include "scenes/path_tracing/path_surfaces.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <utility>
+
+#include <tbb/parallel_for.h>
+
+#include "integrators/paths/cross_section.h"
+#include "renderer/color/color.h"
+#include "renderer/surfaces/mesh_files.h"
+
+namespace tensorray {
+namespace {
+
+constexpr double radius_per_spacing = 0.16;           // So that neighbours do not touch.
+constexpr double radius_per_extent = 0.01;            // At most, of the volume's diagonal.
+constexpr double thinnest = 0.2, thickest = 3;        // Of the typical radius.
+constexpr std::uint64_t most_triangles = 60'000'000;  // With the search tree some 6 GB.
+
+/// What is known at a vertex: the path's point before it, and how far it is to the next one.
+struct Place {
+  const Path* path = nullptr;
+  std::size_t point = 0;
+  double fraction = 0;
+
+  template <class Value>
+  auto interpolate(const Value& value) const {
+    const Way& way = path->points;
+    const auto before = value(way[point]), after = value(way[std::min(point + 1, way.size() - 1)]);
+    return static_cast<std::decay_t<decltype(before)>>((1 - fraction) * before + fraction * after);
+  }
+};
+
+Place place_on(const Path& path, double value) {
+  const double last = static_cast<double>(path.points.size() - 1);
+  const double clamped = std::clamp(value, 0.0, last);
+  const auto point = static_cast<std::size_t>(std::min(std::floor(clamped), std::max(0.0, last - 1)));
+  return {&path, point, clamped - static_cast<double>(point)};
+}
+
+/// Calls `visit(vertex, place)` for every vertex of the mesh, on all threads.
+template <class Visit>
+void for_each_vertex(const TubeMesh& mesh, const std::vector<Path>& paths, const Visit& visit) {
+  tbb::parallel_for(std::size_t{0}, paths.size(), [&](std::size_t tube) {
+    const std::uint32_t first = tube == 0 ? 0 : mesh.tube_ends[tube - 1];
+    for (std::uint32_t triangle = first; triangle < mesh.tube_ends[tube]; ++triangle)
+      for (const std::uint32_t vertex : mesh.mesh.triangles[triangle])
+        visit(vertex, place_on(paths[tube], static_cast<double>(mesh.values[vertex])));
+  });
+}
+
+Eigen::Vector3d color_at(const PathColors& colors, const Place& place) {
+  return place.interpolate([&](const Waypoint& point) -> Eigen::Vector3d { return colors.color(*place.path, point); });
+}
+
+Eigen::Vector3f reflectance(const Eigen::Matrix3d& to_working, const Eigen::Vector3d& rec709) {
+  return (to_working * rec709).cwiseMax(0).cwiseMin(1).cast<float>();
+}
+
+std::array<std::uint8_t, 3> bytes_of(const Eigen::Vector3d& rec709) {
+  const Eigen::Vector3d srgb = 255 * linear_to_srgb(rec709);
+  const auto byte = [](double value) { return static_cast<std::uint8_t>(std::lround(value)); };
+  return {byte(srgb.x()), byte(srgb.y()), byte(srgb.z())};
+}
+
+bool is_bare(const Way& way) {
+  return std::all_of(way.begin(), way.end(), [](const Waypoint& point) { return point.tensor.isZero(0); });
+}
+
+/// One number that changes where the colour, as displayed, does.
+double shade_of(const PathColors& colors, const Path& path, const Waypoint& point) {
+  if (!colors.color) return 0;
+  return linear_to_srgb(colors.color(path, point)).dot(Eigen::Vector3d(0.7, 1, 0.4));
+}
+
+/// The scale at which the median semi-axis of all paths is `typical`.
+double scale_for_radius(const std::vector<Path>& paths, double typical) {
+  std::vector<const Way*> ways;
+  for (const Path& path : paths) ways.push_back(&path.points);
+  return scale_for_radius(ways, typical);
+}
+
+TubeStyle tube_style(PathStyle style) {
+  if (style == PathStyle::wire) return TubeStyle::wire;
+  return style == PathStyle::ellipses ? TubeStyle::discs : TubeStyle::solid;
+}
+
+}  // namespace
+
+double typical_radius(const RadiusDescription& radius, std::size_t paths, const Eigen::AlignedBox3d& volume) {
+  const double face = std::pow(volume.diagonal().norm(), 2) / 3;  // Of a cube of this size.
+  const double spacing = std::sqrt(face / static_cast<double>(std::max<std::size_t>(1, paths)));
+  return radius.typical.value_or(std::min(radius_per_spacing * spacing, radius_per_extent * volume.diagonal().norm()));
+}
+
+TubeMesh path_mesh(const std::vector<Path>& paths, const PathTracingDescription& description, const PathColors& colors,
+                   double typical, double tolerance) {
+  CrossSectionSettings sections;
+  sections.scale = description.radius.scale ? *description.radius.scale : scale_for_radius(paths, typical);
+  sections.least_radius = description.radius.min.value_or(
+      std::min(thinnest * typical, description.radius.max.value_or(std::numeric_limits<double>::max())));
+  // Who gives a scale wants true sizes.
+  const double greatest = description.radius.scale ? std::numeric_limits<double>::max() : thickest * typical;
+  sections.greatest_radius = std::max(sections.least_radius, description.radius.max.value_or(greatest));
+  std::vector<Tube> tubes(paths.size());
+  tbb::parallel_for(std::size_t{0}, paths.size(), [&](std::size_t i) {
+    const Way& way = paths[i].points;
+    CrossSectionSettings section = sections;
+    if (is_bare(way)) section.least_radius = section.greatest_radius = typical;
+    const std::vector<CrossSection> ellipses = cross_sections(way, section);
+    tubes[i].reserve(ellipses.size());
+    for (std::size_t k = 0; k < ellipses.size(); ++k)
+      tubes[i].push_back(
+          {way[k].position, ellipses[k].x, ellipses[k].y, static_cast<double>(k), shade_of(colors, paths[i], way[k])});
+  });
+  TubeSettings settings;
+  settings.style = tube_style(description.style);
+  settings.caps = description.caps;
+  settings.tolerance = tolerance;
+  settings.least_segments = 4;  // Of tubes that are thinner than a pixel; there may be many.
+  settings.most_triangles = most_triangles;
+  return make_tube_mesh(std::move(tubes), settings);
+}
+
+ShadedSurface path_surface(TubeMesh mesh, const std::vector<Path>& paths, const PathColors& colors,
+                           const Eigen::Matrix3d& to_working) {
+  ShadedSurface surface;
+  const std::size_t count = mesh.mesh.vertices.size();
+  if (colors.color) surface.colors.resize(count);
+  surface.forces.resize(count);
+  surface.arc_lengths.resize(count);
+  for_each_vertex(mesh, paths, [&](std::uint32_t vertex, const Place& place) {
+    if (colors.color) surface.colors[vertex] = reflectance(to_working, color_at(colors, place));
+    surface.forces[vertex] = static_cast<float>(place.interpolate([](const Waypoint& p) { return p.force().norm(); }));
+    surface.arc_lengths[vertex] = static_cast<float>(place.interpolate([](const Waypoint& p) { return p.length; }));
+  });
+  surface.shape = std::move(mesh.mesh);
+  surface.normals = std::move(mesh.normals);
+  surface.path_ends = std::move(mesh.tube_ends);
+  return surface;
+}
+
+ShadedSurface line_surface(const std::vector<Path>& paths, double radius, const PathColors& colors,
+                           const Eigen::Matrix3d& to_working) {
+  ShadedSurface surface;
+  RoundCurves curves;
+  for (const Path& path : paths) {
+    for (const Waypoint& point : path.points) {
+      curves.points.push_back(point.position);
+      if (colors.color) surface.colors.push_back(reflectance(to_working, colors.color(path, point)));
+      surface.forces.push_back(static_cast<float>(point.force().norm()));
+      surface.arc_lengths.push_back(static_cast<float>(point.length));
+    }
+    curves.strand_ends.push_back(static_cast<std::uint32_t>(curves.points.size()));
+  }
+  curves.radii.assign(curves.points.size(), static_cast<float>(radius));
+  surface.shape = std::move(curves);
+  surface.strands_are_paths = true;
+  return surface;
+}
+
+void write_tubes(const std::filesystem::path& path, const TubeMesh& mesh, const std::vector<Path>& paths,
+                 const PathColors& colors) {
+  std::vector<std::array<std::uint8_t, 3>> rgb(mesh.mesh.vertices.size());
+  std::vector<float> forces(rgb.size());
+  for_each_vertex(mesh, paths, [&](std::uint32_t vertex, const Place& place) {
+    if (colors.color) rgb[vertex] = bytes_of(color_at(colors, place));
+    forces[vertex] = static_cast<float>(place.interpolate([](const Waypoint& p) { return p.force().norm(); }));
+  });
+  VertexAttributes attributes;
+  attributes.normals = &mesh.normals;
+  if (colors.color) attributes.colors = &rgb;
+  attributes.values = &forces;
+  attributes.value_name = "force";
+  write_mesh(path, mesh.mesh, attributes);
+}
+
+}  // namespace tensorray

@@ -1,0 +1,179 @@
+#pragma once
+/// @file scenes/path_tracing/path_tracing_keys.h
+/// The table of path tracing's keys. For visitors see scenes/description/scene_keys.h.
+
+#include <array>
+
+#include "renderer/color/spectrum.h"
+#include "scenes/description/choices.h"
+#include "scenes/keys/limits.h"
+#include "scenes/path_tracing/path_tracing_description.h"
+
+namespace tensorray {
+
+inline auto choices(SeedKind) {
+  using C = Choice<SeedKind>;
+  return std::array{C{"grid", SeedKind::grid},           C{"poisson_disk", SeedKind::poisson_disk},
+                    C{"line", SeedKind::line},           C{"sphere", SeedKind::sphere},
+                    C{"threshold", SeedKind::threshold}, C{"file", SeedKind::file}};
+}
+
+inline auto choices(PathStyle) {
+  using C = Choice<PathStyle>;
+  return std::array{C{"tube", PathStyle::tube}, C{"wire", PathStyle::wire}, C{"ellipses", PathStyle::ellipses},
+                    C{"lines", PathStyle::lines}};
+}
+
+inline auto choices(TubeCaps) {
+  using C = Choice<TubeCaps>;
+  return std::array{C{"open", TubeCaps::open}, C{"flat", TubeCaps::flat}, C{"round", TubeCaps::round}};
+}
+
+inline auto choices(PathColor) {
+  using C = Choice<PathColor>;
+  return std::array{C{"force", PathColor::force},           C{"transverse_force", PathColor::transverse_force},
+                    C{"curvature", PathColor::curvature},   C{"length", PathColor::length},
+                    C{"wavelength", PathColor::wavelength}, C{"direction", PathColor::direction},
+                    C{"invariant", PathColor::invariant},   C{"none", PathColor::none}};
+}
+
+inline auto choices(MaterialKind) {
+  using C = Choice<MaterialKind>;
+  return std::array{C{"diffuse", MaterialKind::diffuse}, C{"principled", MaterialKind::principled},
+                    C{"metal", MaterialKind::metal}, C{"glass", MaterialKind::glass}};
+}
+
+inline auto choices(Metal) {
+  using C = Choice<Metal>;
+  return std::array{C{"gold", Metal::gold}, C{"silver", Metal::silver}, C{"copper", Metal::copper},
+                    C{"aluminium", Metal::aluminium}};
+}
+
+inline auto choices(Shading) {
+  using C = Choice<Shading>;
+  return std::array{C{"path", Shading::path}, C{"ambient_occlusion", Shading::ambient_occlusion},
+                    C{"headlight", Shading::headlight}};
+}
+
+inline auto choices(PixelFilterShape) {
+  using C = Choice<PixelFilterShape>;
+  return std::array{C{"blackman_harris", PixelFilterShape::blackman_harris}, C{"gaussian", PixelFilterShape::gaussian},
+                    C{"box", PixelFilterShape::box}};
+}
+
+inline auto choices(Background) {
+  using C = Choice<Background>;
+  return std::array{C{"color", Background::color}, C{"lights", Background::lights},
+                    C{"transparent", Background::transparent}};
+}
+
+template <class Visitor>
+void describe(SeedDescription& seeds, Visitor& visit) {
+  visit("kind", seeds.kind, "how seeds are spread: on the entry plane (grid, poisson_disk), or in the volume");
+  visit("count", seeds.count, "about how many", between(1, 2e6));
+  visit("from", seeds.from, "line: one end, world; without both the line runs across the middle of the volume");
+  visit("to", seeds.to, "line: the other end, world");
+  visit("center", seeds.center, "sphere: middle, world; without it the volume's");
+  visit("radius", seeds.radius, "sphere: world units; default: a quarter of the volume's shortest side", above(0));
+  visit("invariant", seeds.invariant, "threshold: seeds are where this is above and below");
+  visit("above", seeds.above, "threshold: least value");
+  visit("below", seeds.below, "threshold: greatest value");
+  visit("file", seeds.file, "file: a text file with x y z in each line, and perhaps a direction");
+  visit.only_for({"from", "to"}, "kind", seeds.kind, {SeedKind::line});
+  visit.only_for({"center", "radius"}, "kind", seeds.kind, {SeedKind::sphere});
+  visit.only_for({"invariant", "above", "below"}, "kind", seeds.kind, {SeedKind::threshold});
+  visit.only_for({"file"}, "kind", seeds.kind, {SeedKind::file});
+}
+
+template <class Visitor>
+void describe(RadiusDescription& radius, Visitor& visit) {
+  visit.exclude("scale", {"typical"});
+  visit("scale", radius.scale, "world units for each unit of the tensor; without it the median semi-axis is typical",
+        above(0).or_word("auto"));
+  visit("typical", radius.typical, "median semi-axis, world units; default: by the distance between seeds", above(0));
+  visit("min", radius.min, "no semi-axis is shorter, so that flat ellipses can be seen; default: typical / 5",
+        above(0));
+  visit("max", radius.max, "larger ellipses shrink to it; default: 3 * typical", above(0));
+}
+
+template <class Visitor>
+void describe(PathColorDescription& color, Visitor& visit) {
+  visit("by", color.by, "what is shown as colour: force is |T V|, curvature |V'|");
+  visit("invariant", color.invariant, "by invariant: which");
+  visit("map", color.map, "colormap");
+  visit("range", color.range, "values of the map's ends; without it the 1st and the 99th percentile");
+  visit("logarithmic", color.logarithmic, "equal ratios are equally far apart");
+  visit("legend", color.legend, "draw a colour bar into output.image");
+}
+
+template <class Visitor>
+void describe(MaterialDescription& material, Visitor& visit) {
+  visit("kind", material.kind, "what the surface is made of");
+  visit("color", material.color, "where it has no colours of its own; linear Rec. 709", between(0, 1));
+  visit("roughness", material.roughness, "0 polished, 1 matt (not diffuse)", between(0, 1));
+  visit("metallic", material.metallic, "principled: 0 plastic, 1 metal", between(0, 1));
+  visit("specular", material.specular, "principled: reflection of plastic, 0.5 is 4 %", between(0, 1));
+  visit("clearcoat", material.clearcoat, "principled: lacquer", between(0, 1));
+  visit("metal", material.metal, "metal: which");
+  visit("index", material.index, "glass: index of refraction", between(1.01, 5));
+  visit.only_for({"roughness"}, "kind", material.kind,
+                 {MaterialKind::principled, MaterialKind::metal, MaterialKind::glass});
+  visit.only_for({"metallic", "specular", "clearcoat"}, "kind", material.kind, {MaterialKind::principled});
+  visit.only_for({"metal"}, "kind", material.kind, {MaterialKind::metal});
+  visit.only_for({"index"}, "kind", material.kind, {MaterialKind::glass});
+}
+
+template <class Visitor>
+void describe(SliceDescription& slice, Visitor& visit) {
+  visit("normal", slice.normal, "of the plane", not_zero());
+  visit("center", slice.center, "a point of the plane, world; without it the volume's middle");
+  visit("invariant", slice.invariant, "what colours it");
+  visit("map", slice.map, "colormap");
+  visit("range", slice.range, "values of the map's ends; without it the 1st and the 99th percentile");
+}
+
+template <class Visitor>
+void describe(IsosurfaceDescription& isosurface, Visitor& visit) {
+  visit.require({"value"});
+  visit("invariant", isosurface.invariant, "what is constant on it");
+  visit("value", isosurface.value, "where the surface is");
+  visit.section("material", isosurface.material, "of the surface");
+}
+
+template <class Visitor>
+void describe(ContextDescription& context, Visitor& visit) {
+  visit("box", context.box, "the volume's edges");
+  visit("obstacles", context.obstacles, "the scene's obstacles as surfaces");
+  visit("plate", context.plate, "the receiver, with the photons that fall on it");
+  visit.section("slice", context.slice, "a plane through the volume, coloured by an invariant");
+  visit.list("isosurfaces", context.isosurfaces, "surfaces on which an invariant has one value",
+             [](IsosurfaceDescription& item) -> IsosurfaceDescription& { return item; });
+}
+
+template <class Visitor>
+void describe(PathTracingDescription& paths, Visitor& visit) {
+  visit.section("seeds", paths.seeds, "path_tracing: where paths are caught");
+  visit("paths", paths.paths, "path_tracing: a file of paths that are drawn instead of traced",
+        endings({".vtp", ".tck"}));
+  visit("backwards", paths.backwards, "path_tracing: light is also followed back from seeds in the volume");
+  visit("outside", paths.outside, "path_tracing: draw the straight pieces before and behind the volume, too");
+  visit("style", paths.style, "path_tracing: how paths are drawn");
+  visit("caps", paths.caps, "path_tracing: ends of tubes");
+  visit.section("radius", paths.radius, "path_tracing: size of the ellipses");
+  visit.section("color", paths.color, "path_tracing: colour of the paths");
+  visit.section("material", paths.material, "path_tracing: of the paths");
+  visit.section("context", paths.context, "path_tracing: what else is shown");
+  visit("shading", paths.shading, "path_tracing: path is physically based; the others are fast previews");
+  visit("bands", paths.bands, "path_tracing: wavelengths of the light that shows the paths", between(3, 1000));
+  visit("max_depth", paths.max_depth, "path_tracing: surfaces that light meets at most; 1 is direct light alone",
+        between(1, 1000));
+  visit("max_samples", paths.samples, "path_tracing: samples of a pixel at most", between(1, 1e6));
+  visit("min_samples", paths.min_samples, "path_tracing: samples of a pixel at least", between(1, 1e6));
+  visit("noise", paths.noise, "path_tracing: a pixel is done at this relative error; 0: all have max_samples",
+        between(0, 1));
+  visit("filter", paths.filter, "path_tracing: pixel filter");
+  visit("background", paths.background, "path_tracing: what is seen where nothing is");
+  visit("background_color", paths.background_color, "path_tracing: linear Rec. 709", at_least(0));
+}
+
+}  // namespace tensorray

@@ -1,0 +1,338 @@
+#include "scenes/path_tracing/path_tracing_method.h"
+
+#include <algorithm>
+#include <chrono>
+
+#include <fmt/format.h>
+
+#include "base/progress.h"
+#include "integrators/paths/path_files.h"
+#include "integrators/paths/paths.h"
+#include "renderer/shading/path_tracer.h"
+#include "scenes/description/check_scene.h"
+#include "scenes/outputs/picture_outputs.h"
+#include "scenes/path_tracing/context_surfaces.h"
+#include "scenes/path_tracing/path_colors.h"
+#include "scenes/path_tracing/path_surfaces.h"
+#include "scenes/path_tracing/path_tracing_keys.h"
+#include "scenes/path_tracing/studio.h"
+
+namespace tensorray {
+namespace {
+
+constexpr double most_radii = 2e5;      // Rays start a 5e-7th of the diagonal off a surface: a tenth of a radius.
+constexpr double legend_width = 0.2;    // Of a picture's width; a chosen camera leaves it free.
+constexpr float nothing_depth = 1e10f;  // Where nothing is: behind everything.
+constexpr double tube_tolerance = 0.2;  // Pixels: how far a tube's triangles may be off its surface.
+
+/// Paths of a file may have a flexibility that is none of the scene's: they count as the first channel's.
+void count_ends(const Scene& scene, const std::vector<Path>& paths, Statistics& statistics) {
+  statistics.positions = paths.size();
+  statistics.ends.assign(scene.channels.size(), EndCounts{});
+  for (const Path& path : paths) {
+    const auto found = std::find_if(scene.channels.begin(), scene.channels.end(), [&](const LightChannel& channel) {
+      return channel.flexibility == path.flexibility;
+    });
+    const auto channel = found == scene.channels.end() ? 0 : found - scene.channels.begin();
+    ++statistics.ends[static_cast<std::size_t>(channel)][static_cast<std::size_t>(path.end)];
+  }
+}
+
+std::vector<Path> trace_scene(const Scene& scene, const PathScene& path_scene, const Progress& progress,
+                              Statistics& statistics) {
+  const PathTracingDescription& description = path_scene.settings;
+  PathSettings settings;
+  settings.backwards = description.backwards;
+  settings.outside = description.outside;
+  std::vector<Path> paths = path_scene.seeds.empty() ? path_scene.paths
+                                                     : trace_paths(scene.field, scene.geometry, scene.bending,
+                                                                   path_scene.seeds, settings, progress);
+  count_ends(scene, paths, statistics);
+  paths.erase(std::remove_if(paths.begin(), paths.end(), [](const Path& path) { return path.points.size() < 2; }),
+              paths.end());
+  if (paths.empty())
+    throw std::runtime_error(scene.description.path.string() +
+                             ": no path meets the volume; look at `/integrator/seeds` and `/light/direction`");
+  return paths;
+}
+
+/// What a camera that nobody has chosen shall see.
+std::vector<Eigen::Vector3d> points_of_interest(const Scene& scene, const ContextDescription& context,
+                                                const std::vector<Path>& paths) {
+  std::vector<Eigen::Vector3d> points;
+  for (const Path& path : paths)
+    for (const Waypoint& point : path.points) points.push_back(point.position);
+  const auto add = [&points](const std::vector<Eigen::Vector3d>& more) {
+    points.insert(points.end(), more.begin(), more.end());
+  };
+  if (context.box || context.slice) add(scene.field.corners());
+  if (context.obstacles)
+    for (const TriangleMesh& mesh : scene.geometry.surfaces().obstacles) add(mesh.vertices);
+  if (context.plate) add(scene.geometry.surfaces().plate->corners());
+  return points;
+}
+
+Eigen::AlignedBox3d world_box(const TensorField& field) {
+  Eigen::AlignedBox3d box;
+  for (const Eigen::Vector3d& corner : field.corners()) box.extend(corner);
+  return box;
+}
+
+/// How far before the camera the nearest tenth of the paths is: what is nearer may show its triangles.
+double near_depth(const std::vector<Path>& paths, const Camera& camera) {
+  std::vector<double> depths;
+  for (const Path& path : paths)
+    for (const Waypoint& point : path.points)
+      if (const double depth = (point.position - camera.position).dot(camera.forward); depth > 0)
+        depths.push_back(depth);
+  if (depths.empty()) return camera.focus_distance;
+  const auto tenth = depths.begin() + static_cast<std::ptrdiff_t>(depths.size() / 10);
+  std::nth_element(depths.begin(), tenth, depths.end());
+  return *tenth;
+}
+
+/// The paths' surface, and their mesh for the scene's `tubes`.
+struct PathShapes {
+  ShadedSurface surface;
+  TubeMesh tubes;  ///< If it is to be written.
+};
+
+PathShapes make_shapes(const Scene& scene, const PathScene& path_scene, const std::vector<Path>& paths,
+                       const PathColors& colors, const Camera& camera) {
+  const PathTracingDescription& description = path_scene.settings;
+  const double typical = typical_radius(description.radius, paths.size(), world_box(scene.field));
+  const double pixel = pixel_size(camera, camera.position + near_depth(paths, camera) * camera.forward);
+  const Eigen::Matrix3d& to_working = path_scene.light.rec709_to_working;
+  PathShapes shapes;
+  TubeMesh mesh;
+  const bool writes = scene.description.output.wants("tubes");
+  if (writes || description.style != PathStyle::lines)
+    mesh = path_mesh(paths, description, colors, typical, tube_tolerance * pixel);
+  if (writes) shapes.tubes = mesh;
+  shapes.surface = description.style == PathStyle::lines
+                       ? line_surface(paths, description.radius.typical.value_or(0.75 * pixel), colors, to_working)
+                       : path_surface(std::move(mesh), paths, colors, to_working);
+  return shapes;
+}
+
+Camera scene_camera(const Scene& scene, const ContextDescription& context, const std::vector<Path>& paths,
+                    double free) {
+  try {
+    return make_camera(scene.description.camera, points_of_interest(scene, context, paths), free);
+  } catch (const std::invalid_argument& error) {
+    throw SceneError(fmt::format("{}: `/camera`: {}", scene.description.path.string(), error.what()));
+  }
+}
+
+PathTracerSettings tracer_settings(const SceneDescription& scene, const PathTracingDescription& description) {
+  PathTracerSettings settings;
+  settings.shading.shading = description.shading;
+  settings.shading.max_depth = description.max_depth;
+  double strength = scene.lights.empty() ? 1 : 0;
+  for (const LightSourceDescription& light : scene.lights) strength = std::max(strength, light.strength);
+  settings.shading.indirect_clamp *= strength;  // A brighter light is no firefly.
+  settings.filter = PixelFilter(description.filter);
+  settings.transparent = description.background != Background::lights;
+  settings.min_samples = std::min(description.min_samples, description.samples);
+  settings.max_samples = description.samples;
+  settings.pass_samples = std::max(1, settings.min_samples);
+  settings.noise_threshold = settings.min_samples < 2 ? 0 : description.noise;
+  settings.seed = scene.seed;
+  return settings;
+}
+
+/// R, G, B, A, and what denoisers and compositors use.
+Image make_image(const SurfacePicture& picture, const ShownLight& light, const PathTracingDescription& description) {
+  const Image colors = linear_image(picture.radiance, light.bands, light.xyz_to_working);
+  Image image(colors.width, colors.height,
+              {"R", "G", "B", "A", "Z", "normal.X", "normal.Y", "normal.Z", "albedo.R", "albedo.G", "albedo.B", "path",
+               "force", "length", "samples", "variance"});
+  const Eigen::Vector3d background = description.background == Background::color
+                                         ? Eigen::Vector3d(light.rec709_to_working * description.background_color)
+                                         : Eigen::Vector3d::Zero();
+  for (std::size_t i = 0; i < picture.alpha.size(); ++i) {
+    float* out = &image.pixels[i * image.channels.size()];
+    const float alpha = picture.alpha[i];
+    for (int c = 0; c < 3; ++c)
+      *out++ = colors.pixels[3 * i + static_cast<std::size_t>(c)] + (1 - alpha) * static_cast<float>(background[c]);
+    *out++ = description.background == Background::color ? 1 : alpha;
+    *out++ = alpha > 0 ? picture.depth[i] : nothing_depth;
+    for (int c = 0; c < 3; ++c) *out++ = picture.normal[i][c];
+    for (int c = 0; c < 3; ++c) *out++ = picture.albedo[i][c];
+    for (const float value :
+         {picture.path[i], picture.force[i], picture.arc_length[i], picture.samples[i], picture.variance[i]})
+      *out++ = value;
+  }
+  return image;
+}
+
+/// Area lights are seen as well.
+void add_lamps(const std::vector<Light>& lights, const ShownLight& light, std::vector<ShadedSurface>& surfaces,
+               std::vector<Material>& materials) {
+  for (std::size_t i = 0; i < lights.size(); ++i) {
+    const auto* area = std::get_if<AreaLight>(&lights[i]);
+    if (!area) continue;
+    MaterialDescription black;
+    black.kind = MaterialKind::diffuse;
+    black.color.setZero();
+    ShadedSurface surface;
+    surface.shape = area->mesh;
+    surface.light = static_cast<int>(i);
+    surface.material = static_cast<int>(materials.size());
+    materials.push_back(load_material(black, light));
+    surfaces.push_back(std::move(surface));
+  }
+}
+
+/// Refuses what lies so far away that the renderer's precision, which goes by the size of everything, loses the paths.
+void require_fine(const Scene& scene, const RadiusDescription& radius, const SurfaceScene& stage,
+                  const std::vector<Path>& paths) {
+  const double typical = typical_radius(radius, paths.size(), world_box(scene.field));
+  if (stage.bounds().diagonal().norm() < most_radii * typical) return;
+  throw SceneError(fmt::format(
+      "{}: what is drawn is {:.3g} long, and paths are {:.3g} thick: too fine for it; bring lamps, obstacles and plate "
+      "nearer, or raise `/integrator/radius/typical`",
+      scene.description.path.string(), stage.bounds().diagonal().norm(), typical));
+}
+
+class LoadedPaths : public LoadedMethod {
+ public:
+  explicit LoadedPaths(PathScene paths) : paths_(std::move(paths)) {}
+
+  Render render(const Scene& scene, const Progress& progress) const override;
+
+ private:
+  PathScene paths_;
+};
+
+double seconds_since(std::chrono::steady_clock::time_point start) {
+  return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+}
+
+/// The picture of the paths, their context and the lamps.
+SurfacePicture render_stage(const Scene& scene, const PathScene& path_scene, const std::vector<Path>& paths,
+                            ShadedSurface path_surface, const Camera& camera, const Progress& progress) {
+  const ShownLight& light = path_scene.light;
+  std::vector<Material> materials{load_material(path_scene.settings.material, light)};
+  std::vector<ShadedSurface> surfaces{std::move(path_surface)};
+  add_context(scene, path_scene, progress, surfaces, materials);
+  const std::vector<Light> lights = make_lights(scene.description, path_scene, camera);
+  add_lamps(lights, light, surfaces, materials);
+  const SurfaceScene stage(std::move(surfaces));
+  require_fine(scene, path_scene.settings.radius, stage, paths);
+  std::vector<float> luminance;
+  for (const Band& band : light.bands) luminance.push_back(static_cast<float>(band.xyz.y()));
+  const LightSampler sampler(lights, luminance, stage.bounds());
+  const ReflectanceTable table(light.model, light.bands, light.xyz_to_working);
+  RenderCallbacks callbacks;
+  callbacks.progress = [&](std::uint64_t done, std::uint64_t total) { progress.update("rendering", done, total); };
+  return render_surfaces({stage, materials, sampler, table}, camera,
+                         tracer_settings(scene.description, path_scene.settings), callbacks);
+}
+
+Render LoadedPaths::render(const Scene& scene, const Progress& progress) const {
+  const PathTracingDescription& description = paths_.settings;
+  const ShownLight& light = paths_.light;
+  const auto start = std::chrono::steady_clock::now();
+  Render result;
+  result.paths = trace_scene(scene, paths_, progress, result.statistics);
+  result.statistics.seconds_tracing = seconds_since(start);
+
+  const auto drawing = std::chrono::steady_clock::now();
+  const PathColors colors = path_colors(description.color, result.paths);
+  const bool has_legend = description.color.legend && colors.legend;
+  const Camera camera = scene_camera(scene, description.context, result.paths, has_legend ? legend_width : 0);
+  PathShapes shapes = make_shapes(scene, paths_, result.paths, colors, camera);
+  const SurfacePicture picture = render_stage(scene, paths_, result.paths, std::move(shapes.surface), camera, progress);
+  result.linear = make_image(picture, light, description);
+  if (scene.description.output.wants("spectral"))
+    result.spectral = spectral_image(picture.radiance, light.bands, 1, light.xyz_to_working);
+  result.statistics.seconds_drawing = seconds_since(drawing);
+  result.exposure = 0;
+  if (has_legend)
+    result.annotate = [legend = colors.legend, matrix = light.rec709_to_working](Image& image) {
+      legend(image, matrix);
+    };
+  if (scene.description.output.wants("tubes"))
+    result.write_tubes = [tubes = std::move(shapes.tubes), colors](const std::filesystem::path& file,
+                                                                   const std::vector<Path>& paths) {
+      write_tubes(file, tubes, paths, colors);
+    };
+  return result;
+}
+
+void check_range(const std::optional<Eigen::Vector2d>& range, bool logarithmic, const char* pointer,
+                 const SceneSource& source) {
+  if (!range) return;
+  if (!(range->x() < range->y()))
+    source.fail(fmt::format("`{}` must rise, but is [{:g}, {:g}]", pointer, range->x(), range->y()));
+  if (logarithmic && !(range->x() > 0))
+    source.fail(fmt::format("`{}` is logarithmic and must be above 0, but begins at {:g}", pointer, range->x()));
+}
+
+void check_seeds(const SeedDescription& seeds, const SceneSource& source) {
+  if (seeds.from && seeds.to && *seeds.from == *seeds.to && seeds.count > 1)
+    source.fail(
+        "`/integrator/seeds`: `from` and `to` are one point, where there is room for one seed; set `count` to 1");
+  if (seeds.above && seeds.below && *seeds.above > *seeds.below)
+    source.fail("`/integrator/seeds`: `above` must not exceed `below`");
+}
+
+void write_path_file(const std::filesystem::path& file, const Scene&, const Render& render) {
+  write_paths(file, render.paths);
+}
+
+void write_tube_file(const std::filesystem::path& file, const Scene&, const Render& render) {
+  render.write_tubes(file, render.paths);
+}
+
+class PathTracingMethod : public MethodWith<PathTracingDescription> {
+ public:
+  const char* name() const override { return "path_tracing"; }
+
+  std::vector<Output> outputs() const override {
+    std::vector<Output> outputs = picture_outputs();
+    outputs.push_back(spectral_output());
+    outputs.push_back({"paths", "the bent rays, with all that is known along them", {".vtp", ".tck"}, write_path_file});
+    outputs.push_back({"tubes", "the bent rays as a mesh", {".ply", ".obj"}, write_tube_file});
+    return outputs;
+  }
+
+  std::vector<NamedFile> inputs() const override {
+    return {{settings().paths, "`/integrator/paths`"}, {settings().seeds.file, "`/integrator/seeds/file`"}};
+  }
+
+  void check(SceneDescription& scene, const Json& json, const SceneSource& source, bool chosen) const override;
+
+  std::unique_ptr<const LoadedMethod> load(const Scene& scene, std::vector<std::string>&) const override {
+    return std::make_unique<LoadedPaths>(load_paths(scene, settings()));
+  }
+};
+
+void PathTracingMethod::check(SceneDescription& scene, const Json& json, const SceneSource& source, bool chosen) const {
+  const PathTracingDescription& paths = settings();
+  check_seeds(paths.seeds, source);
+  check_range(paths.color.range, paths.color.logarithmic, "/integrator/color/range", source);
+  if (paths.context.slice) check_range(paths.context.slice->range, false, "/integrator/context/slice/range", source);
+  if (paths.radius.min && paths.radius.max && *paths.radius.min > *paths.radius.max)
+    source.fail("`/integrator/radius`: `min` must not exceed `max`");
+  if (!chosen) return;
+  if (scene.bending.settings.max_steps > 1'000'000)
+    source.fail("`/bending/max_steps` must be at most 1e6 with path_tracing, which keeps every step of a path");
+  check_memory(scene.camera.resolution.cast<double>().prod() * (200.0 + 24.0 * paths.bands), "`/camera/resolution`",
+               source);
+  warn_unused(scene, json, "/integrator/seeds", "/integrator/paths");
+  if (given(json, "/integrator/samples"))  // The name that other programs, and the lens, have for it.
+    scene.warnings.push_back(
+        "`/integrator/samples` is the lens's and has no effect with path_tracing; `max_samples` has");
+  if (scene.camera.target && !scene.camera.position)
+    scene.warnings.push_back(
+        "`/camera/target` has no effect without `/camera/position`: the camera is then chosen so that everything is "
+        "seen");
+}
+
+}  // namespace
+
+std::shared_ptr<Method> path_tracing_method() { return std::make_shared<PathTracingMethod>(); }
+
+}  // namespace tensorray

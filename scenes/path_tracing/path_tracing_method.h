@@ -1,0 +1,13 @@
+#pragma once
+/// @file scenes/path_tracing/path_tracing_method.h
+/// The method "path_tracing": the bent rays as lit tubes.
+
+#include <memory>
+
+#include "scenes/description/method.h"
+
+namespace tensorray {
+
+std::shared_ptr<Method> path_tracing_method();
+
+}  // namespace tensorray

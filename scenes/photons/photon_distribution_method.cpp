@@ -1,0 +1,156 @@
+#include "scenes/photons/photon_distribution_method.h"
+
+#include <chrono>
+#include <set>
+
+#include <fmt/format.h>
+
+#include "base/progress.h"
+#include "scenes/description/check_scene.h"
+#include "scenes/outputs/picture_outputs.h"
+#include "scenes/scene/render.h"
+#include "scenes/scene/scene.h"
+#include "volumes/files/point_files.h"
+
+namespace tensorray {
+namespace {
+
+/// Whether light is collected in colour: three bands need no more planes, and cost less.
+bool is_collected_in_color(const Scene& scene) {
+  return !scene.description.output.wants("spectral") && scene.bands.size() > 3;
+}
+
+/// "550nm", with as many decimals as tell the bands apart; in RGB mode "red", "green", "blue".
+std::vector<std::string> band_names(const Scene& scene) {
+  if (scene.description.bending.rgb) return {"red", "green", "blue"};
+  constexpr int most_decimals = 9;
+  for (int decimals = 0;; ++decimals) {
+    std::vector<std::string> names;
+    for (const Band& band : scene.bands) names.push_back(fmt::format("{:.{}f}nm", band.wavelength, decimals));
+    if (decimals == most_decimals || std::set<std::string>(names.begin(), names.end()).size() == names.size())
+      return names;
+  }
+}
+
+void name_fluence(const Scene& scene, std::vector<ScalarGrid>& grids) {
+  if (grids.empty()) return;
+  grids[0].name = "fluence";
+  grids[0].metadata["tensorray:units"] = "irradiance of the undisturbed beam";
+  if (grids.size() == 1) return;
+  const std::vector<std::string> names = band_names(scene);
+  for (std::size_t i = 0; i < names.size(); ++i) {
+    ScalarGrid& grid = grids[i + 1];
+    grid.name = "fluence_" + names[i];
+    grid.metadata["tensorray:units"] = "irradiance of the undisturbed beam in this band";
+    grid.metadata["tensorray:power"] = fmt::format("{}", scene.bands[i].power);
+    if (!scene.description.bending.rgb)
+      grid.metadata["tensorray:wavelength"] = fmt::format("{} nm", scene.bands[i].wavelength);
+  }
+}
+
+class LoadedPhotons : public LoadedMethod {
+ public:
+  Render render(const Scene& scene, const Progress& progress) const override;
+};
+
+Render LoadedPhotons::render(const Scene& scene, const Progress& progress) const {
+  const SceneDescription& description = scene.description;
+  PhotonDistribution light = distribute_photons(scene, progress);
+
+  const auto start = std::chrono::steady_clock::now();
+  Render result;
+  result.linear = light_image(scene, light.irradiance);
+  if (description.output.wants("spectral"))
+    result.spectral = spectral_image(light.irradiance, scene.bands, description.light.irradiance, to_working(scene));
+  result.photons = std::move(light.photons);
+  result.grids = std::move(light.fluence);
+  name_fluence(scene, result.grids);
+  result.metadata["tensorray:photons"] = std::to_string(light.positions);
+
+  Statistics& statistics = result.statistics;
+  statistics.positions = light.positions;
+  statistics.ends = std::move(light.ends);
+  for (const LightChannel& channel : scene.channels) statistics.channel_power.push_back(channel.power * light.ray_area);
+  statistics.ray_steps = light.ray_steps;
+  statistics.tensor_samples = light.tensor_samples;
+  statistics.seconds_tracing = light.seconds_tracing;
+  statistics.seconds_density = light.seconds_density;
+  statistics.seconds_color = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  if (nothing_arrived(statistics))
+    result.warnings.push_back("no light reached the plate; look at `receiver` and `light`");
+  return result;
+}
+
+PointCloud point_cloud(const PhotonMap& photons, const ImageMetadata& metadata) {
+  PointCloud points;
+  points.metadata = metadata;
+  std::vector<float>&wavelength = points.scalars["wavelength"], &power = points.scalars["power"];
+  std::vector<Eigen::Vector3f>&direction = points.vectors["direction"], &origin = points.vectors["origin"];
+  for (const Photon& photon : photons) {
+    points.positions.push_back(photon.position);
+    wavelength.push_back(photon.wavelength);
+    power.push_back(photon.power);
+    direction.push_back(photon.direction);
+    origin.push_back(photon.origin);
+  }
+  return points;
+}
+
+void write_photons(const std::filesystem::path& file, const Scene& scene, const Render& render) {
+  write_points(file, point_cloud(render.photons, provenance(scene, render)));
+}
+
+class PhotonDistributionMethod : public MethodWith<PhotonDescription> {
+ public:
+  const char* name() const override { return "photon_distribution"; }
+
+  std::vector<Output> outputs() const override {
+    std::vector<Output> outputs = picture_outputs();
+    outputs.push_back(spectral_output());
+    outputs.push_back({"photons", "the photons, one by one", {".vdb", ".vtp"}, write_photons});
+    outputs.push_back(
+        {"fluence", "the light inside the volume, as a fog volume", {".vdb"}, write_grids, ".fluence.vdb"});
+    return outputs;
+  }
+
+  void check(SceneDescription& scene, const Json& json, const SceneSource& source, bool chosen) const override {
+    if (!chosen) return;
+    check_spectral_output(scene, source);
+    warn_unused(scene, json, "/light/spectrum", "/bending/rgb");
+    if (scene.output.fluence_bands && !scene.output.wants("fluence"))
+      scene.warnings.push_back("`/output/fluence_bands` has no effect without `/output/fluence`");
+  }
+
+  std::unique_ptr<const LoadedMethod> load(const Scene&, std::vector<std::string>&) const override {
+    return std::make_unique<LoadedPhotons>();
+  }
+};
+
+}  // namespace
+
+std::shared_ptr<Method> photon_distribution_method() { return std::make_shared<PhotonDistributionMethod>(); }
+
+PhotonDistribution distribute_photons(const Scene& scene, const Progress& progress) {
+  const SceneDescription& description = scene.description;
+  PhotonSettings settings;
+  settings.photons = description.light.photons;
+  settings.pattern = description.light.pattern;
+  settings.channels_per_photon = description.bending.rgb ? 0 : description.light.wavelengths_per_photon;
+  settings.seed = description.seed;
+  settings.density = description.integrator.settings<PhotonDescription>().density;
+  settings.keep_photons = description.output.wants("photons");
+  if (description.output.wants("fluence"))
+    settings.fluence = description.output.fluence_bands ? FluenceKind::bands : FluenceKind::all_light;
+  if (is_collected_in_color(scene))
+    for (const Band& band : scene.bands) settings.colors.push_back(to_working(scene) * band.xyz);
+  return distribute_photons(scene.field, scene.geometry, scene.beam, scene.channels, scene.bending, settings, progress);
+}
+
+Image light_image(const Scene& scene, const Film& irradiance) {
+  if (!is_collected_in_color(scene)) return linear_image(irradiance, scene.bands, to_working(scene));
+  std::vector<Band> primaries(3);
+  for (int c = 0; c < 3; ++c) primaries[c].xyz = Eigen::Vector3d::Unit(c);
+  return linear_image(irradiance, primaries, Eigen::Matrix3d::Identity());
+}
+
+}  // namespace tensorray

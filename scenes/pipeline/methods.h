@@ -1,0 +1,12 @@
+#pragma once
+/// @file scenes/pipeline/methods.h
+/// The list of all methods.
+
+#include "scenes/description/description.h"
+
+namespace tensorray {
+
+/// A description with the defaults, of all methods, before a scene file is read into it.
+SceneDescription default_scene();
+
+}  // namespace tensorray

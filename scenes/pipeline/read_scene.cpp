@@ -1,0 +1,92 @@
+#include "scenes/pipeline/read_scene.h"
+
+#include <algorithm>
+#include <cstring>
+
+#include <fmt/core.h>
+
+#include "base/text.h"
+#include "scenes/description/check_scene.h"
+#include "scenes/description/scene_keys.h"
+#include "scenes/keys/overrides.h"
+#include "scenes/pipeline/methods.h"
+
+namespace tensorray {
+namespace {
+
+/// The ending by which the command line knows an output as of this kind; empty if it does not.
+std::string matching_ending(const Output& kind, const std::filesystem::path& file) {
+  const std::vector<std::string> endings =
+      kind.option_ending ? std::vector<std::string>{kind.option_ending} : kind.endings;
+  const auto found = std::find_if(endings.begin(), endings.end(),
+                                  [&](const std::string& ending) { return ends_with(file.string(), ending); });
+  return found == endings.end() ? "" : *found;
+}
+
+/// The output of the method whose ending fits the file best. @throw SceneError that lists the endings.
+Output kind_of(const std::filesystem::path& file, const Method& method) {
+  const std::vector<Output> kinds = method.outputs();
+  const auto best = std::max_element(kinds.begin(), kinds.end(), [&](const Output& a, const Output& b) {
+    return matching_ending(a, file).size() < matching_ending(b, file).size();
+  });
+  if (!matching_ending(*best, file).empty()) return *best;
+  std::vector<std::string> known;
+  for (const Output& kind : kinds) {
+    if (kind.option_ending) known.emplace_back(kind.option_ending);
+    if (!kind.option_ending) known.insert(known.end(), kind.endings.begin(), kind.endings.end());
+  }
+  throw SceneError(printable(fmt::format("-o {}: {} makes no such output; the endings that it knows are {}",
+                                         file.string(), method.name(), joined(known))));
+}
+
+/// Lets the files of the command line take the place of the scene's, also in its text.
+void replace_outputs(SceneDescription& scene, const std::vector<std::filesystem::path>& outputs, Json& json) {
+  if (outputs.empty()) return;
+  scene.output.files.clear();
+  for (const Output& kind : scene.output.kinds)
+    if (json.contains("output")) json["output"].erase(kind.key);
+  for (const std::filesystem::path& file : outputs) {
+    const Output kind = kind_of(file, scene.integrator.method());
+    const auto [other, is_new] = scene.output.files.emplace(kind.key, std::filesystem::absolute(file));
+    if (!is_new)
+      throw SceneError(printable(fmt::format("-o: {} and {} are of one kind; give one of them",
+                                             other->second.filename().string(), file.string())));
+    json["output"][kind.key] = other->second.string();
+  }
+}
+
+void choose_outputs(SceneDescription& scene) {
+  if (!scene.output.files.empty()) return;
+  scene.output.files["image"] = std::filesystem::path(scene.path).replace_extension(".png");
+  scene.output.files["exr"] = std::filesystem::path(scene.path).replace_extension(".exr");
+}
+
+}  // namespace
+
+SceneDescription read_scene(const std::filesystem::path& path, const SceneChanges& changes) {
+  Json json = read_json_object(path);
+  for (const std::string& change : changes.overrides) apply_override(json, change);
+
+  const SceneSource source{path};
+  SceneDescription scene = default_scene();
+  scene.path = path;
+  SectionReader reader(json, "", source);
+  describe(scene, reader);
+  reader.finish();
+  replace_outputs(scene, changes.outputs, json);
+  scene.text = json.dump();
+  choose_outputs(scene);
+  check_scene(scene, json, source);
+  return scene;
+}
+
+std::string scene_schema() {
+  SceneDescription scene = default_scene();
+  SchemaWriter writer;
+  describe(scene, writer);
+  Json schema = {{"$schema", "https://json-schema.org/draft/2020-12/schema"}, {"title", "tensorray scene"}};
+  schema.update(writer.finish("What tensorray renders. Lengths are in the field's world units, wavelengths in nm."));
+  return schema.dump(2);
+}
+
+}  // namespace tensorray

@@ -1,0 +1,36 @@
+#include "scenes/scene/render.h"
+
+#include <algorithm>
+
+#include <fmt/format.h>
+
+#include "scenes/scene/scene.h"
+
+namespace tensorray {
+namespace {
+
+void warn_of_step_limit(Render& render) {
+  std::uint64_t emitted = 0, limited = 0;
+  for (const EndCounts& counts : render.statistics.ends) {
+    for (const std::uint64_t count : counts) emitted += count;
+    limited += counts[static_cast<int>(RayEnd::step_limit)];
+  }
+  if (100 * limited > emitted)
+    render.warnings.push_back(fmt::format("{:.0f}% of the rays were given up after `bending.max_steps` steps; raise it",
+                                          100.0 * static_cast<double>(limited) / static_cast<double>(emitted)));
+}
+
+}  // namespace
+
+bool nothing_arrived(const Statistics& statistics) {
+  return std::all_of(statistics.ends.begin(), statistics.ends.end(),
+                     [](const EndCounts& counts) { return counts[static_cast<int>(RayEnd::plate)] == 0; });
+}
+
+Render render(const Scene& scene, const Progress& progress) {
+  Render result = scene.method->render(scene, progress);
+  warn_of_step_limit(result);
+  return result;
+}
+
+}  // namespace tensorray

@@ -1,0 +1,147 @@
+#include "scenes/stretch/stretch_method.h"
+
+#include <chrono>
+#include <cmath>
+#include <utility>
+
+#include <fmt/format.h>
+
+#include "base/progress.h"
+#include "integrators/probes/stretch.h"
+#include "renderer/color/color_bar.h"
+#include "renderer/color/colormap.h"
+#include "scenes/description/check_scene.h"
+#include "scenes/outputs/picture_outputs.h"
+
+namespace tensorray {
+namespace {
+
+constexpr double default_wavelength = 550;  // nm
+constexpr Colormap map = Colormap::viridis;
+
+/// Light passes obstacles as in the scene, and no plate.
+Geometry without_plate(const Scene& scene) {
+  Surfaces surfaces = scene.geometry.surfaces();
+  surfaces.plate.reset();
+  return Geometry(std::move(surfaces));
+}
+
+/// The beam's aperture, and where it meets the volume first.
+Plate entry_plane(const Scene& scene, int pixels) {
+  Eigen::AlignedBox2d aperture;
+  for (const Eigen::Vector2d& corner : scene.beam.aperture) aperture.extend(corner);
+  Plate plane;
+  plane.center = scene.beam.center +
+                 depth_range(scene.field, scene.beam.center, scene.beam.direction).near * scene.beam.direction +
+                 aperture.center().x() * scene.beam.right + aperture.center().y() * scene.beam.up;
+  plane.up = scene.beam.up;
+  plane.right = plane.up.cross(-scene.beam.direction);
+  plane.size = aperture.sizes();
+  plane.resolution = (pixels * plane.size / plane.size.maxCoeff()).array().round().max(1).matrix().cast<int>();
+  return plane;
+}
+
+/// Of light that goes into the volume, of one flexibility.
+StretchSettings settings_of(const Scene& scene, const StretchDescription& description) {
+  const BendingDescription& bending = scene.description.bending;
+  const DepthRange depths = depth_range(scene.field, scene.beam.center, scene.beam.direction);
+  StretchSettings settings;
+  settings.direction = scene.beam.direction;
+  settings.flexibility =
+      bending.rgb ? bending.rgb->y() : bending.flexibility.at(description.wavelength.value_or(default_wavelength));
+  settings.length = description.length.value_or(depths.far - depths.near);
+  if (!(settings.length > 0))
+    throw SceneError(scene.description.path.string() +
+                     ": `/integrator/stretch/length` is needed: the volume has no depth along the light");
+  return settings;
+}
+
+ImageMetadata metadata_of(const StretchSettings& settings) {
+  const Eigen::Vector3d& direction = settings.direction;
+  return {{"tensorray:units", "1/length"},
+          {"tensorray:length", fmt::format("{}", settings.length)},
+          {"tensorray:flexibility", fmt::format("{}", settings.flexibility)},
+          {"tensorray:direction", fmt::format("{} {} {}", direction.x(), direction.y(), direction.z())}};
+}
+
+/// From the plane across the light that touches the volume, where light comes to it: seen along the light, as the plate
+/// is. `linear` has R, G, B, A (0: light does not meet the volume, or does not come so far) and `stretch`.
+void draw(const Scene& scene, const std::vector<float>& values, const Eigen::Vector2i& resolution, Render& render) {
+  const ValueRange range = choose_range({values.begin(), values.end()});
+  const Eigen::Matrix3d to_working = scene.color.xyz_to_working() * rec709_to_xyz();
+  Image linear(resolution.x(), resolution.y(), {"R", "G", "B", "A", "stretch"});
+  Image display(resolution.x(), resolution.y(), {"R", "G", "B", "A"});
+  for (std::size_t i = 0; i < values.size(); ++i) {
+    if (std::isnan(values[i])) continue;
+    const double position = range.position(values[i]);
+    Eigen::Map<Eigen::Vector3f>(&linear.pixels[5 * i]) = (to_working * colormap_linear(map, position)).cast<float>();
+    Eigen::Map<Eigen::Vector3f>(&display.pixels[4 * i]) = colormap_srgb(map, position).cast<float>();
+    linear.pixels[5 * i + 3] = display.pixels[4 * i + 3] = 1;
+    linear.pixels[5 * i + 4] = values[i];
+  }
+  draw_color_bar(display, {"stretch", range, [](double position) { return colormap_srgb(map, position); }});
+  render.linear = std::move(linear);
+  render.display = std::move(display);
+}
+
+class LoadedStretch : public LoadedMethod {
+ public:
+  LoadedStretch(const StretchDescription& description, const StretchSettings& settings)
+      : description_(description), settings_(settings) {}
+
+  Render render(const Scene& scene, const Progress& progress) const override {
+    const auto start = std::chrono::steady_clock::now();
+    const OutputDescription& output = scene.description.output;
+    const Geometry geometry = without_plate(scene);
+    Render result;
+    result.metadata = metadata_of(settings_);
+    if (output.wants("stretch")) {
+      result.grids.push_back(
+          stretch_grid(scene.field, geometry, scene.bending, settings_, description_.resolution, progress));
+      const ImageMetadata metadata = provenance(scene, result);
+      result.grids.back().metadata.insert(metadata.begin(), metadata.end());
+    }
+    if (output.wants("image") || output.wants("exr")) {
+      const Plate plane = entry_plane(scene, description_.pixels);
+      draw(scene, stretch_picture(scene.field, geometry, scene.bending, settings_, plane, progress), plane.resolution,
+           result);
+    }
+    result.statistics.seconds_tracing = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+    return result;
+  }
+
+ private:
+  StretchDescription description_;
+  StretchSettings settings_;
+};
+
+class StretchMethod : public MethodWith<StretchKeys> {
+ public:
+  const char* name() const override { return "stretch"; }
+
+  std::vector<Output> outputs() const override {
+    std::vector<Output> outputs = picture_outputs();
+    outputs.push_back({"stretch", "the stretch in the volume, as a float grid", {".vdb"}, write_grids});
+    return outputs;
+  }
+
+  void check(SceneDescription& scene, const Json&, const SceneSource& source, bool chosen) const override {
+    if (chosen && scene.bending.rgb && settings().stretch.wavelength)
+      source.fail(
+          "`/integrator/stretch/wavelength`: light has no wavelength where `/bending/rgb` is given; remove one "
+          "of the two");
+  }
+
+  std::unique_ptr<const LoadedMethod> load(const Scene& scene, std::vector<std::string>& notes) const override {
+    const StretchSettings chosen = settings_of(scene, settings().stretch);
+    notes.push_back(
+        fmt::format("stretch: of light with s = {:.4g}, over a length of {:.6g}", chosen.flexibility, chosen.length));
+    return std::make_unique<LoadedStretch>(settings().stretch, chosen);
+  }
+};
+
+}  // namespace
+
+std::shared_ptr<Method> stretch_method() { return std::make_shared<StretchMethod>(); }
+
+}  // namespace tensorray

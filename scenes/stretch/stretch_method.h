@@ -1,0 +1,44 @@
+#pragma once
+/// @file scenes/stretch/stretch_method.h
+/// The method "stretch": how a scene's field stretches bundles of its light (integrators/probes/stretch.h), as a grid
+/// and as a picture.
+
+#include <memory>
+#include <optional>
+
+#include "renderer/color/spectrum.h"
+#include "scenes/description/method.h"
+
+namespace tensorray {
+
+/// `integrator.stretch`.
+struct StretchDescription {
+  std::optional<double> length;      ///< World units; none: the volume's depth along the light.
+  std::optional<double> wavelength;  ///< nm; none: 550, in RGB mode green.
+  int resolution = 64;               ///< Of the grid: voxels along the longest side.
+  int pixels = 512;                  ///< Of the picture: along the longer side.
+};
+
+/// `integrator`, as far as it is of this method.
+struct StretchKeys {
+  StretchDescription stretch;
+};
+
+template <class Visitor>
+void describe(StretchDescription& stretch, Visitor& visit) {
+  visit("length", stretch.length, "how far light is followed, world units; default: the volume's depth along the light",
+        above(0));
+  visit("wavelength", stretch.wavelength, "of the light, nm; default: 550, of RGB green",
+        between(observer_min, observer_max));
+  visit("resolution", stretch.resolution, "of the grid: voxels along the longest side", between(2, 4096));
+  visit("pixels", stretch.pixels, "of the picture: pixels along the longer side", between(1, 32768));
+}
+
+template <class Visitor>
+void describe(StretchKeys& keys, Visitor& visit) {
+  visit.section("stretch", keys.stretch, "stretch: of what light, and how finely");
+}
+
+std::shared_ptr<Method> stretch_method();
+
+}  // namespace tensorray
