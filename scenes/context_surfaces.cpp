@@ -130,7 +130,7 @@ ShadedSurface make_slice(const Scene& scene, const SliceDescription& slice) {
       mesh.vertices.push_back(center + at.x() * right + at.y() * up);
       const Eigen::Vector3d index = scene.field.to_index() * mesh.vertices.back();
       inside.push_back(extent.exteriorDistance(index) <= rounding);
-      values.push_back(invariant(slice.invariant, sampler.at(mesh.vertices.back()) / scene.scale.scale));
+      values.push_back(invariant(slice.invariant, sampler.at(mesh.vertices.back())));
     }
   add_lattice(
       cells.x() + 1, cells.y() + 1, [&](std::uint32_t vertex) { return inside[vertex]; }, mesh);
@@ -146,8 +146,7 @@ ShadedSurface make_slice(const Scene& scene, const SliceDescription& slice) {
 }
 
 ShadedSurface make_isosurface(const Scene& scene, const IsosurfaceDescription& description) {
-  const TensorField unscaled = scene.field.copy().scaled(1 / scene.scale.scale);
-  const Isosurface found = isosurface(unscaled, description.invariant, description.value);
+  const Isosurface found = isosurface(scene.field, description.invariant, description.value);
   if (found.triangles.empty())
     throw SceneError(fmt::format("{}: `/integrator/context/isosurfaces`: {} is nowhere {:g} in this field",
                                  scene.description.path.string(), choice_name(description.invariant),

@@ -45,14 +45,11 @@ std::vector<Eigen::Vector3d> line_positions(const SeedDescription& seeds, const 
                     seeds.to.value_or(box.center() + half * beam.right), seeds.count);
 }
 
-/// @param scale  Of the field, which the scene's thresholds do not know.
-std::vector<Eigen::Vector3d> threshold_positions(const SeedDescription& seeds, const TensorField& field, double scale,
+std::vector<Eigen::Vector3d> threshold_positions(const SeedDescription& seeds, const TensorField& field,
                                                  std::uint64_t seed) {
   if (!seeds.above && !seeds.below) throw std::invalid_argument("the kind \"threshold\" needs `above` or `below`");
   Threshold threshold;
-  threshold.value = [which = seeds.invariant, scale](const Eigen::Matrix3d& tensor) {
-    return invariant(which, tensor / scale);
-  };
+  threshold.value = [which = seeds.invariant](const Eigen::Matrix3d& tensor) { return invariant(which, tensor); };
   if (seeds.above) threshold.least = *seeds.above;
   if (seeds.below) threshold.greatest = *seeds.below;
   try {
@@ -62,7 +59,7 @@ std::vector<Eigen::Vector3d> threshold_positions(const SeedDescription& seeds, c
   }
 }
 
-SeedList seed_list(const SceneDescription& description, const TensorField& field, double scale, const Beam& beam) {
+SeedList seed_list(const SceneDescription& description, const TensorField& field, const Beam& beam) {
   const SeedDescription& seeds = description.integrator.paths.seeds;
   const Eigen::AlignedBox3d box = world_box(field);
   switch (seeds.kind) {
@@ -77,7 +74,7 @@ SeedList seed_list(const SceneDescription& description, const TensorField& field
                            seeds.count, description.seed),
               {}};
     case SeedKind::threshold:
-      return {threshold_positions(seeds, field, scale, description.seed), {}};
+      return {threshold_positions(seeds, field, description.seed), {}};
     case SeedKind::file:
       if (seeds.file.empty())
         throw std::invalid_argument("the kind \"file\" needs `file`, a text file with x y z in each line");
@@ -153,16 +150,15 @@ std::vector<float> ShownLight::radiance(const Eigen::Vector3d& rec709, double fa
   return values;
 }
 
-PathScene load_paths(const SceneDescription& description, const TensorField& field, double scale,
-                     const ColorManagement& color, const Spectrum& light, const std::vector<LightChannel>& channels,
-                     const Beam& beam) {
+PathScene load_paths(const SceneDescription& description, const TensorField& field, const ColorManagement& color,
+                     const Spectrum& light, const std::vector<LightChannel>& channels, const Beam& beam) {
   const PathTracingDescription& settings = description.integrator.paths;
   PathScene scene{{}, {}, shown_light(color, light, settings.bands), {}};
   if (!settings.paths.empty()) {
     scene.paths = read_paths(settings.paths);
   } else {
     try {
-      scene.seeds = seeds_of(seed_list(description, field, scale, beam),
+      scene.seeds = seeds_of(seed_list(description, field, beam),
                              followed(channels, description.bending.rgb.has_value(), settings.color.by), beam);
     } catch (const std::invalid_argument& error) {
       throw SceneError(fmt::format("{}: `/integrator/seeds`: {}", description.path.string(), error.what()));

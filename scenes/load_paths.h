@@ -33,11 +33,10 @@ struct PathScene {
   std::vector<EnvironmentLight> environments;  ///< Those of the scene's lights, in their order.
 };
 
-/// @param scale  That the field has been multiplied by. @param light  The spectrum of the light.
+/// @param light  The spectrum of the light.
 /// @throw std::runtime_error naming the file that cannot be read; SceneError where the scene's values do not go with
 /// what was loaded.
-PathScene load_paths(const SceneDescription& description, const TensorField& field, double scale,
-                     const ColorManagement& color, const Spectrum& light, const std::vector<LightChannel>& channels,
-                     const Beam& beam);
+PathScene load_paths(const SceneDescription& description, const TensorField& field, const ColorManagement& color,
+                     const Spectrum& light, const std::vector<LightChannel>& channels, const Beam& beam);
 
 }  // namespace tensorray

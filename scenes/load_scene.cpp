@@ -243,14 +243,16 @@ Scene load_scene(const SceneDescription& description, const Progress& progress) 
   else if (automatic)
     notes.push_back(
         fmt::format("scale: {:.6g} (at s = 0.2 the median ray turns by {:.3f} rad)", scale.scale, scale.median_turn));
-  field = std::move(field).scaled(scale.scale);
+  BendingSettings bending = description.bending.settings;
+  bending.scale = scale.scale;
 
-  Scene scene{description,     std::move(field), std::move(geometry), std::move(beam),     std::move(color),
-              std::move(lens), std::nullopt,     std::move(bands),    std::move(channels), eigenvalues,
-              scale,           automatic,        non_finite,          std::move(notes),    0};
+  Scene scene{description,      std::move(field),    bending,          std::move(geometry),
+              std::move(beam),  std::move(color),    std::move(lens),  std::nullopt,
+              std::move(bands), std::move(channels), eigenvalues,      scale,
+              automatic,        non_finite,          std::move(notes), 0};
   if (description.integrator.type == IntegratorType::path_tracing)
-    scene.paths.emplace(load_paths(description, scene.field, scale.scale, scene.color,
-                                   load_spectrum(description.light.spectrum), scene.channels, scene.beam));
+    scene.paths.emplace(load_paths(description, scene.field, scene.color, load_spectrum(description.light.spectrum),
+                                   scene.channels, scene.beam));
   scene.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
   return scene;
 }

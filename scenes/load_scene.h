@@ -24,7 +24,8 @@ namespace tensorray {
 /// All that a render needs. Immutable once loaded.
 struct Scene {
   SceneDescription description;
-  TensorField field;  ///< Preprocessed and scaled.
+  TensorField field;        ///< Preprocessed, in the units of its file.
+  BendingSettings bending;  ///< With the field's scale.
   Geometry geometry;
   Beam beam;
   ColorManagement color;

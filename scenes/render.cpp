@@ -87,8 +87,7 @@ PhotonDistribution distribute_photons(const Scene& scene, const Progress& progre
     settings.fluence = description.output.fluence_bands ? FluenceKind::bands : FluenceKind::all_light;
   if (is_collected_in_color(scene))
     for (const Band& band : scene.bands) settings.colors.push_back(to_working(scene) * band.xyz);
-  return distribute_photons(scene.field, scene.geometry, scene.beam, scene.channels, description.bending.settings,
-                            settings, progress);
+  return distribute_photons(scene.field, scene.geometry, scene.beam, scene.channels, scene.bending, settings, progress);
 }
 
 Image light_image(const Scene& scene, const Film& irradiance) {

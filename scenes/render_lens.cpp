@@ -157,9 +157,8 @@ Render render_lens(const Scene& scene, const Progress& progress) {
   std::vector<SpectralImage> spectra;
   for (const Plate& plane : scene.lens->planes) {
     image.plane = plane;
-    const LensPicture picture =
-        simulate_lens(scene.field, scene.geometry.surfaces(), description.bending.settings, scene.channels,
-                      scene.beam.direction, scene.lens->receiver, image, settings, progress);
+    const LensPicture picture = simulate_lens(scene.field, scene.geometry.surfaces(), scene.bending, scene.channels,
+                                              scene.beam.direction, scene.lens->receiver, image, settings, progress);
     pictures.push_back(make_image(picture, scene.bands, matrix));
     if (lens.overlay == Overlay::grid) draw_overlay(picture, plane, pictures.back());
     add_statistics(picture, result.statistics);

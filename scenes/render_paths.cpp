@@ -39,17 +39,12 @@ std::vector<Path> trace_scene(const Scene& scene, const Progress& progress, Stat
   PathSettings settings;
   settings.backwards = description.backwards;
   settings.outside = description.outside;
-  std::vector<Path> paths = scene.paths->seeds.empty()
-                                ? scene.paths->paths
-                                : trace_paths(scene.field, scene.geometry, scene.description.bending.settings,
-                                              scene.paths->seeds, settings, progress);
+  std::vector<Path> paths = scene.paths->seeds.empty() ? scene.paths->paths
+                                                       : trace_paths(scene.field, scene.geometry, scene.bending,
+                                                                     scene.paths->seeds, settings, progress);
   count_ends(scene, paths, statistics);
   paths.erase(std::remove_if(paths.begin(), paths.end(), [](const Path& path) { return path.points.size() < 2; }),
               paths.end());
-  // The scene's colours, and files, are in the units of the field's file.
-  if (!scene.paths->seeds.empty())
-    for (Path& path : paths)
-      for (Waypoint& point : path.points) point.tensor /= scene.scale.scale;
   if (paths.empty())
     throw std::runtime_error(scene.description.path.string() +
                              ": no path meets the volume; look at `/integrator/seeds` and `/light/direction`");

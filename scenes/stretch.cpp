@@ -76,8 +76,7 @@ std::map<std::string, std::string> stretch_metadata(const Scene& scene, const St
 }
 
 ScalarGrid stretch_grid(const Scene& scene, const StretchSettings& settings, int resolution, const Progress& progress) {
-  ScalarGrid grid = stretch_grid(scene.field, without_plate(scene), scene.description.bending.settings, settings,
-                                 resolution, progress);
+  ScalarGrid grid = stretch_grid(scene.field, without_plate(scene), scene.bending, settings, resolution, progress);
   grid.metadata = stretch_metadata(scene, settings);
   return grid;
 }
@@ -86,7 +85,7 @@ StretchPicture stretch_picture(const Scene& scene, const StretchSettings& settin
                                const Progress& progress) {
   const Plate plane = entry_plane(scene, pixels);
   const std::vector<float> values =
-      stretch_picture(scene.field, without_plate(scene), scene.description.bending.settings, settings, plane, progress);
+      stretch_picture(scene.field, without_plate(scene), scene.bending, settings, plane, progress);
   const ValueRange range = choose_range({values.begin(), values.end()});
   const Eigen::Matrix3d to_working = scene.color.xyz_to_working() * rec709_to_xyz();
   const int width = plane.resolution.x(), height = plane.resolution.y();

@@ -124,28 +124,6 @@ double TensorField::greatest_norm() const {
   return std::sqrt(greatest);
 }
 
-TensorField TensorField::copy() const {
-  TensorField result;
-  result.to_world_ = to_world_;
-  result.to_index_ = to_index_;
-  result.index_bounds_ = index_bounds_;
-  result.voxels_ = voxels_;
-  result.strongest_ = strongest_;
-  result.index_ = index_;
-  result.floats_ = allocate(brick_count());
-  std::copy_n(floats_.get(), brick_count() * TensorBrick::stored_floats, result.floats_.get());
-  return result;
-}
-
-TensorField TensorField::scaled(double factor) && {
-  tbb::parallel_for(std::size_t{0}, brick_count(), [&](std::size_t i) {
-    float* const floats = floats_.get() + i * TensorBrick::stored_floats;
-    for (int j = 0; j < TensorBrick::stored_floats; ++j) floats[j] = static_cast<float>(floats[j] * factor);
-    strongest_[i] = strongest_deviator(floats);
-  });
-  return std::move(*this);
-}
-
 std::size_t TensorField::memory_bytes() const {
   return brick_count() * (TensorBrick::stored_floats + 1) * sizeof(float) + index_.memory_bytes();
 }

@@ -66,11 +66,6 @@ class TensorField {
   /// The greatest Frobenius norm of a voxel.
   double greatest_norm() const;
 
-  TensorField copy() const;
-
-  /// This field with every tensor multiplied by `factor`, in place.
-  TensorField scaled(double factor) &&;
-
   std::size_t brick_count() const { return strongest_.size(); }
   std::size_t memory_bytes() const;
 
@@ -94,7 +89,6 @@ class TensorField {
   };
   using Floats = std::unique_ptr<float[], Release>;
 
-  TensorField() = default;
   template <class GiveBack>
   void make_bricks(const TensorGrid& grid, const GiveBack& give_back);
   static Floats allocate(std::size_t bricks);
