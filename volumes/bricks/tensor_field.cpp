@@ -80,16 +80,17 @@ void TensorField::make_bricks(const TensorGrid& grid, const GiveBack& give_back)
   voxels_ = Eigen::AlignedBox3d(active.min().cast<double>(), active.max().cast<double>());
 
   const BlockTable blocks(grid);
-  const std::vector<Eigen::Vector3i> bricks = active_bricks(blocks, bricks_of(active));
-  index_ = BrickIndex(bricks);
-  floats_ = allocate(bricks.size());
-  strongest_.resize(bricks.size());
-  for (std::size_t first = 0; first < bricks.size();) {
-    const std::size_t last = end_of_layer(bricks, first + enough_bricks);
+  bricks_ = active_bricks(blocks, bricks_of(active));
+  bricks_.shrink_to_fit();
+  index_ = BrickIndex(bricks_);
+  floats_ = allocate(bricks_.size());
+  strongest_.resize(bricks_.size());
+  for (std::size_t first = 0; first < bricks_.size();) {
+    const std::size_t last = end_of_layer(bricks_, first + enough_bricks);
     tbb::parallel_for(first, last, [&](std::size_t i) {
-      strongest_[i] = make_brick(blocks, bricks[i], floats_.get() + i * TensorBrick::stored_floats);
+      strongest_[i] = make_brick(blocks, bricks_[i], floats_.get() + i * TensorBrick::stored_floats);
     });
-    if (last < bricks.size()) give_back(bricks[last].x() * TensorBrick::cells);
+    if (last < bricks_.size()) give_back(bricks_[last].x() * TensorBrick::cells);
     first = last;
   }
 }
@@ -125,7 +126,8 @@ double TensorField::greatest_norm() const {
 }
 
 std::size_t TensorField::memory_bytes() const {
-  return brick_count() * (TensorBrick::stored_floats + 1) * sizeof(float) + index_.memory_bytes();
+  return brick_count() * ((TensorBrick::stored_floats + 1) * sizeof(float) + sizeof(Eigen::Vector3i)) +
+         index_.memory_bytes();
 }
 
 }  // namespace tensorray
