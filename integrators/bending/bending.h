@@ -1,7 +1,8 @@
 #pragma once
 /// @file integrators/bending/bending.h
 /// Bends light through a tensor field. Only bending_steps.h, and for packets packet_bending-inl.h and
-/// packet_stages-inl.h, know the rule (Zheng and Pang 2003, Eq. 5):  P' = V,  V' = s (T V − (VᵀTV) V),  |V| = 1.
+/// packet_stages-inl.h, know the rule (Zheng and Pang 2003, Eq. 5):  P' = V,  V' = σ (T V − (VᵀTV) V),  |V| = 1, with
+/// σ = s · scale.
 
 #include <array>
 #include <cstddef>
@@ -18,8 +19,8 @@
 namespace tensorray {
 
 enum class BendingMethod {
-  euler,      ///< The paper's Eq. 3–4: D ← normalize(D + s h T(P) D), P ← P + h D. Order 1.
-  splitting,  ///< Drift h/2, kick D ← normalize(exp(h s T(P)) D), drift h/2. Order 2; exact in V for constant T;
+  euler,      ///< The paper's Eq. 3–4: D ← normalize(D + σ h T(P) D), P ← P + h D. Order 1.
+  splitting,  ///< Drift h/2, kick D ← normalize(exp(h σ T(P)) D), drift h/2. Order 2; exact in V for constant T;
               ///< stable.
   rk4,        ///< Classical Runge–Kutta. Order 4.
   bs23,       ///< Bogacki–Shampine, adaptive. Order 3.
@@ -29,8 +30,10 @@ enum class BendingMethod {
 struct BendingSettings {
   BendingMethod method = BendingMethod::splitting;
 
+  double scale = 1;  ///< Factor on every ray's flexibility: light is bent by s · scale · T. Finite.
+
   /// Arc length per step, in voxels as the ray crosses them (a step of 1 is as long as the direction's unit in index
-  /// space); 0: automatic, which is ½ voxel, and shorter where the field is strong: s h ‖T − ⅓ tr(T) I‖ (Frobenius) ≤
+  /// space); 0: automatic, which is ½ voxel, and shorter where the field is strong: |σ| h ‖T − ⅓ tr(T) I‖ (Frobenius) ≤
   /// 0.2 with T as last sampled (Eq. 9, read dimensionally); of `splitting`, which is stable, never below 1/64 voxel.
   /// For the adaptive methods the first and the longest step; automatic ones are at most 2 voxels long.
   double step = 0;
@@ -48,7 +51,7 @@ enum class RayEnd : std::uint8_t {
   missed,      ///< Left the scene.
   obstacle,    ///< On an obstacle.
   step_limit,  ///< Took BendingSettings::max_steps steps.
-  degenerate,  ///< Its direction could not be followed: s·T is not finite, or annihilates it.
+  degenerate,  ///< Its direction could not be followed: σ·T is not finite, or annihilates it.
 };
 constexpr int ray_end_count = 5;
 const char* to_string(RayEnd end);
@@ -86,8 +89,8 @@ struct Waypoint {
   Eigen::Vector3d position = Eigen::Vector3d::Zero();
   Eigen::Vector3d direction = Eigen::Vector3d::Zero();  ///< V; unit.
   double length = 0;                                    ///< Of the way so far, world units.
-  Eigen::Matrix3d tensor = Eigen::Matrix3d::Zero();     ///< T here; zero where light is straight.
-  Eigen::Vector3d change = Eigen::Vector3d::Zero();     ///< V' here: its length is the way's curvature.
+  Eigen::Matrix3d tensor = Eigen::Matrix3d::Zero();     ///< T of the field here; zero where light is straight.
+  Eigen::Vector3d change = Eigen::Vector3d::Zero();     ///< V' here, by σ·T: its length is the way's curvature.
   bool in_field = false;                                ///< Whether the way bends here (inside the volume and the cut).
 
   Eigen::Vector3d force() const { return tensor * direction; }  ///< T V, whose length is Eq. 11.
@@ -112,7 +115,7 @@ using Track = std::vector<TrackPoint>;
 /// missed is left where it last crossed the bounds (or where it began), unless there is a `max_length`. Differentials
 /// are carried along by the variational equations, as the derivative of the method's own steps; on a surface they are
 /// those of the point where rays meet it, so that those of position lie in the surface.
-/// @param field     World frame; s·T in 1/length. Light goes straight outside its extent and outside the cut.
+/// @param field     World frame; s · scale · T in 1/length. Light goes straight outside its extent and outside the cut.
 /// @param geometry  Bounds (those of the field), cut, plate and obstacles.
 /// Accuracy: the method's order on smooth fields, 2 on trilinear data. Entry, exit and hits are located by repeating
 /// the step with the length that ends on the surface, which keeps the order.

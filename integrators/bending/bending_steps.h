@@ -38,7 +38,7 @@ State<N> operator*(double factor, const State<N>& a) {
 template <int N>
 struct Medium {
   TensorSampler& sampler;
-  double s;
+  double strength;                              ///< σ = s · scale: V' is that of σ T.
   Eigen::Matrix3d T = Eigen::Matrix3d::Zero();  ///< As last sampled ...
   std::array<Eigen::Matrix3d, N - 1> dT{};      ///< ... and its derivatives along the parameters.
 
@@ -70,7 +70,7 @@ struct Medium {
       const double change_along = (dV.dot(TV) + V.dot(dTV) - 2 * along * V.dot(dV)) / squared;
       change.col(i) -= along * dV + change_along * V;
     }
-    return {at.V, s * change};
+    return {at.V, strength * change};
   }
 };
 
@@ -87,7 +87,7 @@ State<N> normalized(const State<N>& state) {
 template <int N>
 State<N> euler(Medium<N>& medium, const State<N>& from, double h) {
   medium.sample(from.P);
-  const State<N> to = normalized<N>({from.P, from.V + medium.s * h * medium.apply(from.V)});
+  const State<N> to = normalized<N>({from.P, from.V + medium.strength * h * medium.apply(from.V)});
   return {from.P + h * to.V, to.V};
 }
 
@@ -95,7 +95,7 @@ template <int N>
 State<N> splitting(Medium<N>& medium, const State<N>& from, double h) {
   const Eigen::Matrix<double, 3, N> middle = from.P + h / 2 * from.V;
   medium.sample(middle);
-  const double factor = h * medium.s;
+  const double factor = h * medium.strength;
   if constexpr (N == 1) {
     const Eigen::Vector3d V = exponential_direction(factor * medium.T, from.V);
     return {middle + h / 2 * V, V};

@@ -47,7 +47,7 @@ void Tracer<N>::record(bool in_field) {
   here.length = length_;
   here.in_field = in_field;
   if (in_field) {
-    Medium<1> medium{sampler_, medium_.s};
+    Medium<1> medium{sampler_, medium_.strength};
     here.change = medium.derivative({here.position, here.direction}).V;
     here.tensor = medium.T;
   }
@@ -121,7 +121,7 @@ std::optional<RayEnd> Tracer<N>::cross_box() {
 /// In voxels.
 template <int N>
 double Tracer<N>::automatic_step() const {
-  const double kick = std::abs(medium_.s) * deviator_norm(medium_.T) * voxel_;
+  const double kick = std::abs(medium_.strength) * deviator_norm(medium_.T) * voxel_;
   if (kick * step_lengths::longest_automatic <= step_lengths::strongest_kick) return step_lengths::longest_automatic;
   const double shortest = settings_.method == BendingMethod::splitting ? step_lengths::shortest_splitting : 0.0;
   return std::max(step_lengths::strongest_kick / kick, shortest);
@@ -251,7 +251,7 @@ std::optional<RayEnd> Tracer<N>::bend(double first_step) {
 }
 
 template <int N>
-double Tracer<N>::strength() {
+double Tracer<N>::deviator_here() {
   medium_.sample(ray_.P);
   return deviator_norm(medium_.T);
 }
@@ -284,19 +284,19 @@ std::optional<RayEnd> Tracer<N>::approach(const State<N>& start, const Recording
 }
 
 template <int N>
-RayEnd Tracer<N>::trace(const State<N>& start, double flexibility, const Recording& recording) {
-  medium_.s = flexibility;
+RayEnd Tracer<N>::trace(const State<N>& start, double strength, const Recording& recording) {
+  medium_.strength = strength;
   const auto end = approach(start, recording);
-  if (!std::isfinite(flexibility)) return RayEnd::degenerate;
+  if (!std::isfinite(strength)) return RayEnd::degenerate;
   return end ? *end : follow();
 }
 
 template <int N>
-void Tracer<N>::take_over(const State<N>& state, double flexibility, const Travelled& travelled,
+void Tracer<N>::take_over(const State<N>& state, double strength, const Travelled& travelled,
                           const Recording& recording) {
   ray_ = state;
   recording_ = recording;
-  medium_.s = flexibility;
+  medium_.strength = strength;
   length_ = travelled.length;
   length_change_ = travelled.length_change;
   steps_ = travelled.steps;

@@ -48,13 +48,14 @@ class Tracer {
       : field_(field), geometry_(geometry), settings_(settings), sampler_(field) {}
 
   /// Follows a ray to its end; `state` says where that is, and `recording` how it came there.
-  RayEnd trace(const State<N>& start, double flexibility, const Recording& recording);
+  /// @param strength  σ of the ray: see `strength_of`.
+  RayEnd trace(const State<N>& start, double strength, const Recording& recording);
 
   /// Follows a ray to where its way begins to bend, or (if it does not come there) to its end.
   std::optional<RayEnd> approach(const State<N>& start, const Recording& recording);
 
   /// Takes a ray over that has come to `state`: to be followed where it bends, or, on the face of the box, to leave.
-  void take_over(const State<N>& state, double flexibility, const Travelled& travelled, const Recording& recording);
+  void take_over(const State<N>& state, double strength, const Travelled& travelled, const Recording& recording);
 
   /// From where its way bends to its end; `first_step` long, world units, is its first step; 0: as long as any.
   RayEnd follow(double first_step = 0);
@@ -66,7 +67,7 @@ class Tracer {
   void record(bool in_field);
 
   /// The Frobenius norm of the deviator of T here.
-  double strength();
+  double deviator_here();
 
   const State<N>& state() const { return ray_; }
   Travelled travelled() const { return {length_, length_change_, steps_}; }
@@ -110,6 +111,11 @@ class Tracer {
   double adaptive_step_ = 0;          // What the error control asks for next, in voxels.
   std::uint32_t steps_ = 0;
 };
+
+/// σ = s · scale: what ray i of a batch is bent by. Only here does the field's scale come in.
+inline double strength_of(const RayBatch& batch, std::size_t i, const BendingSettings& settings) {
+  return batch.flexibility[i] * settings.scale;
+}
 
 /// A ray of a batch as it starts; N = 3 if the batch has differentials.
 template <int N>

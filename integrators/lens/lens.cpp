@@ -7,6 +7,7 @@
 
 #include <Eigen/Geometry>
 #include <Eigen/LU>
+#include <Eigen/SVD>
 #include <tbb/parallel_for.h>
 #include <tbb/task_arena.h>
 
@@ -180,7 +181,7 @@ void gather(const Job& job, LensPicture& picture) {
 }
 
 /// The sheet whose start is nearest to that of straight light; of equal ones the first.
-const Sheet& nearest_sheet(const std::vector<Sheet>& sheets, const Eigen::Vector2d& straight) {
+Sheet nearest_sheet(const std::vector<Sheet>& sheets, const Eigen::Vector2d& straight) {
   return *std::min_element(sheets.begin(), sheets.end(), [&](const Sheet& a, const Sheet& b) {
     return (a.start - straight).squaredNorm() < (b.start - straight).squaredNorm();
   });
@@ -194,7 +195,7 @@ void scatter_row(const Job& job, int y, std::size_t channel, const SheetSearch& 
     for (const Eigen::Vector2d& sample : sample_points(job, x, y)) {
       search.find(receiver_point(job, sample), sheets);
       if (sheets.empty()) continue;
-      const Sheet& sheet = nearest_sheet(sheets, job.straight * sample);
+      const Sheet sheet = nearest_sheet(sheets, job.straight * sample);
       const Shade seen = shade(job, channel, sheet.start, sheet.jacobian.inverse());
       picture.radiance.plane(static_cast<int>(channel))[pixel] += seen.radiance;
       alpha += seen.alpha;
@@ -204,7 +205,7 @@ void scatter_row(const Job& job, int y, std::size_t channel, const SheetSearch& 
     const Eigen::Vector2d center(x + 0.5, y + 0.5);
     search.find(receiver_point(job, center), sheets);
     if (sheets.empty()) continue;
-    const Sheet& sheet = nearest_sheet(sheets, job.straight * center);
+    const Sheet sheet = nearest_sheet(sheets, job.straight * center);
     picture.points[pixel] = make_point(job, center, sheet.start, sheet.jacobian.inverse(),
                                        log_singular_values(sheet.jacobian), sheet.length);
     picture.points[pixel].folds = static_cast<int>(sheets.size());
@@ -228,20 +229,46 @@ Eigen::AlignedBox2d useful_starts(const Job& job, const TriangleMesh& volume, co
   return part.isEmpty() ? image : part;
 }
 
+/// The rotation next to how straight light takes directions in the image's plane to the receiver's.
+Eigen::Matrix2d straight_turn(const Job& job) {
+  const Eigen::Vector2d pixel = job.receiver.pixel_size();
+  const Eigen::Matrix2d image_by_receiver =
+      job.straight.linear() * Eigen::Vector2d(1 / pixel.x(), -1 / pixel.y()).asDiagonal();
+  const Eigen::JacobiSVD<Eigen::Matrix2d> svd(image_by_receiver, Eigen::ComputeFullU | Eigen::ComputeFullV);
+  return svd.matrixV() * svd.matrixU().transpose();
+}
+
+/// Looks up what the mesh shows, row by row.
+void scatter_rows(const Job& job, std::size_t channel, const LensMesh& mesh, const MeshReport& report,
+                  LensPicture& picture) {
+  const SheetSearch search(mesh, job.receiver.pixel_size().minCoeff());
+  const int height = job.receiver.resolution.y(), rows_at_once = 8 * tbb::this_task_arena::max_concurrency();
+  for (int first = 0; first < height; first += rows_at_once) {
+    report(static_cast<double>(first) / height);
+    tbb::parallel_for(first, std::min(first + rows_at_once, height), [&](int y) {
+      if (job.progress.cancelled) throw Cancelled();
+      scatter_row(job, y, channel, search, picture);
+    });
+  }
+}
+
 void scatter(const Job& job, const TriangleMesh& volume, const Eigen::Vector3d& direction, LensPicture& picture) {
   LensMeshSettings settings;
   settings.starts = useful_starts(job, volume, direction);
   settings.target = job.receiver.size;
-  settings.pixel = job.receiver.pixel_size().minCoeff();
+  settings.pixel = job.receiver.pixel_size();
+  settings.turn = straight_turn(job);
+  constexpr std::uint64_t parts = 1000;  // Of a channel: half for its mesh, and half for the picture's rows.
   for (std::size_t channel = 0; channel < job.channels.size(); ++channel) {
-    job.progress.update("tracing rays", channel, job.channels.size());
-    const LensMesh mesh = make_lens_mesh(job.map, job.flexibilities[channel], settings, picture.counts, job.progress);
+    const auto tell = [&](double part) {
+      job.progress.update("tracing rays", channel * parts + static_cast<std::uint64_t>(part * parts),
+                          job.channels.size() * parts);
+    };
+    const LensMesh mesh = make_lens_mesh(job.map, job.flexibilities[channel], settings, picture.counts, job.progress,
+                                         [&](double part) { tell(part / 2); });
     for (const Landing& landing : mesh.landings) ++picture.ends[channel][static_cast<int>(landing.end)];
-    const SheetSearch search(mesh, settings.pixel);
-    tbb::parallel_for(0, job.receiver.resolution.y(), [&](int y) {
-      if (job.progress.cancelled) throw Cancelled();
-      scatter_row(job, y, channel, search, picture);
-    });
+    scatter_rows(
+        job, channel, mesh, [&](double part) { tell((1 + part) / 2); }, picture);
   }
 }
 

@@ -8,12 +8,14 @@
 
 #include <tbb/parallel_for.h>
 #include <tbb/parallel_sort.h>
+#include <tbb/task_arena.h>
 
 namespace tensorray {
 namespace {
 
 constexpr double cell_pixels = 4;              // Of the first lattice.
-constexpr double most_cells = 4096;            // ... along either side, however large the image is.
+constexpr double most_cells = 4096;            // ... along either side, however large the image is,
+constexpr double most_skew = 4;                // and for each cell of that many pixels, where pixels lie askew.
 constexpr double short_pixels = 1.0 / 4;       // Edges shorter than this, in starts and landings, are not halved ...
 constexpr double shortest_pixels = 1.0 / 16;   // ... nor those shorter than this in the starts.
 constexpr std::size_t most_starts = 1u << 14;  // No edge is halved beyond so many starts ...
@@ -24,37 +26,85 @@ constexpr double torn_fraction = 0.5;          // ... and beyond which part of t
 
 using Triangle = std::array<std::uint32_t, 3>;
 
+/// Measures lengths so that pixels are squares: they are as the smaller side of a pixel has them.
+struct PixelMetric {
+  double pixel = 1;                                      // The smaller side, world units.
+  Eigen::Matrix2d starts = Eigen::Matrix2d::Identity();  // From directions in the plane of starts,
+  Eigen::Vector2d landings = Eigen::Vector2d(1, 1);      // and factors on those in the plane of landings.
+
+  Eigen::Vector2d of_landings(const Eigen::Vector2d& along) const { return landings.cwiseProduct(along); }
+};
+
+PixelMetric metric_of(const LensMeshSettings& settings) {
+  PixelMetric metric;
+  metric.pixel = settings.pixel.minCoeff();
+  metric.landings = metric.pixel * settings.pixel.cwiseInverse();
+  // Square pixels have the same lengths however they are turned.
+  if (settings.pixel.x() != settings.pixel.y()) metric.starts = metric.landings.asDiagonal() * settings.turn;
+  return metric;
+}
+
+/// Cells of the first lattice. Where pixels lie askew to it, cells as short as a pixel's shorter side both ways would
+/// be many more than pixels: those are larger, and refined where needed.
+Eigen::Array2i lattice_cells(const LensMeshSettings& settings, const PixelMetric& metric) {
+  const Eigen::Vector2d lengths = metric.starts.colwise().norm();
+  const double skew = lengths.prod() / std::abs(metric.starts.determinant());
+  const double larger = std::sqrt(std::max(1.0, skew / most_skew));
+  const Eigen::Array2d cells = settings.starts.sizes().cwiseProduct(lengths) / (cell_pixels * metric.pixel * larger);
+  return cells.ceil().max(1).min(most_cells).cast<int>();
+}
+
+/// What there is of a mesh, as it is refined.
+struct MeshWork {
+  const LensMap& map;
+  double flexibility;
+  const Progress& progress;
+  const MeshReport& report;
+  int rounds = 0;  // Of refinement, so far: nobody knows how many there will be.
+
+  void tell(double part_of_round) const {
+    if (report) report(1 - std::exp2(-(rounds + part_of_round)));
+  }
+};
+
 /// Follows the rays of `mesh` that have no landing yet.
-void trace_new(const LensMap& map, double flexibility, LensMesh& mesh, TraceCounts& counts, const Progress& progress) {
+void trace_new(MeshWork& work, LensMesh& mesh, TraceCounts& counts) {
   constexpr std::size_t task_size = 64;
+  const std::size_t tasks_at_once = 64 * static_cast<std::size_t>(tbb::this_task_arena::max_concurrency());
   const std::size_t first = mesh.landings.size(), count = mesh.starts.size() - first;
   mesh.landings.resize(mesh.starts.size());
   std::vector<TraceCounts> took((count + task_size - 1) / task_size);
-  tbb::parallel_for(std::size_t{0}, took.size(), [&](std::size_t task) {
-    if (progress.cancelled) throw Cancelled();
+  const auto trace_task = [&](std::size_t task) {
+    if (work.progress.cancelled) throw Cancelled();
     const auto from = mesh.starts.begin() + static_cast<std::ptrdiff_t>(first + task * task_size);
     const auto to = mesh.starts.begin() + static_cast<std::ptrdiff_t>(first + std::min(count, (task + 1) * task_size));
-    took[task] = map.trace({from, to}, {flexibility}, &mesh.landings[first + task * task_size]);
-  });
+    took[task] = work.map.trace({from, to}, {work.flexibility}, &mesh.landings[first + task * task_size]);
+  };
+  for (std::size_t task = 0; task < took.size(); task += tasks_at_once) {
+    work.tell(static_cast<double>(task) / static_cast<double>(took.size()));
+    tbb::parallel_for(task, std::min(task + tasks_at_once, took.size()), trace_task);
+  }
   for (const TraceCounts& each : took) counts += each;
+  ++work.rounds;
 }
 
 enum class Edge { fine, coarse, torn };
 
-Edge judge(const Landing& a, const Landing& b, const Eigen::Vector2d& along, double pixel) {
+Edge judge(const Landing& a, const Landing& b, const Eigen::Vector2d& along, const PixelMetric& metric) {
   const bool a_landed = a.end == RayEnd::plate, b_landed = b.end == RayEnd::plate;
   if (!a_landed && !b_landed) return Edge::fine;
   if (a_landed != b_landed) return Edge::torn;
   const Eigen::Vector2d edge = b.at - a.at;
-  const double gap = (edge - (a.jacobian + b.jacobian) / 2 * along).norm();
-  if (!(gap <= std::max(gap_pixels * pixel, torn_fraction * edge.norm()))) return Edge::torn;
+  const double pixel = metric.pixel, length = metric.of_landings(edge).norm();
+  const double gap = metric.of_landings(edge - (a.jacobian + b.jacobian) / 2 * along).norm();
+  if (!(gap <= std::max(gap_pixels * pixel, torn_fraction * length))) return Edge::torn;
   // The middle of the cubic that has these ends and slopes.
-  const double bend = ((a.jacobian - b.jacobian) * along / 8).norm();
+  const double bend = metric.of_landings((a.jacobian - b.jacobian) * along / 8).norm();
   return bend > bend_pixels * pixel || gap > gap_pixels * pixel ? Edge::coarse : Edge::fine;
 }
 
-Edge judge(const LensMesh& mesh, std::uint32_t a, std::uint32_t b, double pixel) {
-  return judge(mesh.landings[a], mesh.landings[b], mesh.starts[b] - mesh.starts[a], pixel);
+Edge judge(const LensMesh& mesh, std::uint32_t a, std::uint32_t b, const PixelMetric& metric) {
+  return judge(mesh.landings[a], mesh.landings[b], mesh.starts[b] - mesh.starts[a], metric);
 }
 
 /// Halves edges, round by round. With an edge of a triangle its longest one is halved, too, which keeps triangles from
@@ -63,9 +113,9 @@ class Refinement {
  public:
   Refinement(LensMesh& mesh, std::vector<Triangle>& triangles, const LensMeshSettings& settings,
              const Progress& progress)
-      : mesh_(mesh), triangles_(triangles), settings_(settings), progress_(progress) {
+      : mesh_(mesh), triangles_(triangles), settings_(settings), metric_(metric_of(settings)), progress_(progress) {
     most_starts_ = mesh.starts.size() + most_starts +
-                   static_cast<std::size_t>(starts_per_pixel * settings.target.prod() / std::pow(settings.pixel, 2));
+                   static_cast<std::size_t>(starts_per_pixel * settings.target.prod() / settings.pixel.prod());
   }
 
   /// Halves each edge that needs it once. @return false if none did. New starts have no landings yet.
@@ -115,7 +165,7 @@ class Refinement {
   std::uint32_t longest_edge(std::size_t triangle) const {
     const auto length = [&](int i) {
       const auto [a, b] = edges_[edges_of_[triangle][i]];
-      return (mesh_.starts[a] - mesh_.starts[b]).squaredNorm();
+      return (metric_.starts * (mesh_.starts[a] - mesh_.starts[b])).squaredNorm();
     };
     int longest = 0;
     for (const int i : {1, 2})
@@ -142,22 +192,22 @@ class Refinement {
     const Landing &from = mesh_.landings[a], &to = mesh_.landings[b];
     if (is_short(a, b)) return false;
     if (from.end == RayEnd::plate && to.end == RayEnd::plate) {
-      const Eigen::Array2d edge = settings_.target.array() / 2 + settings_.pixel;
+      const Eigen::Array2d edge = (settings_.target / 2 + settings_.pixel).array();
       const Eigen::Array2d low = from.at.cwiseMin(to.at).array(), high = from.at.cwiseMax(to.at).array();
       if ((low > edge).any() || (high < -edge).any()) return false;
     }
-    return judge(mesh_, a, b, settings_.pixel) != Edge::fine;
+    return judge(mesh_, a, b, metric_) != Edge::fine;
   }
 
   /// In the starts, and as far as the ends that landed know it in the landings.
   bool is_short(std::uint32_t a, std::uint32_t b) const {
     const Eigen::Vector2d along = mesh_.starts[b] - mesh_.starts[a];
-    double length = along.norm();
-    if (length < shortest_pixels * settings_.pixel) return true;
+    double length = (metric_.starts * along).norm();
+    if (length < shortest_pixels * metric_.pixel) return true;
     for (const std::uint32_t end : {a, b})
       if (mesh_.landings[end].end == RayEnd::plate)
-        length = std::max(length, (mesh_.landings[end].jacobian * along).norm());
-    return length < short_pixels * settings_.pixel;
+        length = std::max(length, metric_.of_landings(mesh_.landings[end].jacobian * along).norm());
+    return length < short_pixels * metric_.pixel;
   }
 
   /// The vertex in the middle of an edge, the same from both sides; `none` if it stays whole.
@@ -186,7 +236,8 @@ class Refinement {
       add({{a, ab, c}, {ab, b, c}});
     } else if (count == 3) {
       add({{a, ab, ca}, {ab, b, bc}, {ca, bc, c}, {ab, bc, ca}});
-    } else if ((mesh_.starts[a] - mesh_.starts[bc]).norm() < (mesh_.starts[ab] - mesh_.starts[c]).norm()) {
+    } else if ((metric_.starts * (mesh_.starts[a] - mesh_.starts[bc])).norm() <
+               (metric_.starts * (mesh_.starts[ab] - mesh_.starts[c])).norm()) {
       add({{ab, b, bc}, {a, ab, bc}, {a, bc, c}});
     } else {
       add({{ab, b, bc}, {a, ab, c}, {ab, bc, c}});
@@ -196,6 +247,7 @@ class Refinement {
   LensMesh& mesh_;
   std::vector<Triangle>& triangles_;
   const LensMeshSettings& settings_;
+  const PixelMetric metric_;
   const Progress& progress_;
   std::size_t most_starts_;
   std::vector<std::pair<std::uint32_t, std::uint32_t>> edges_;  // Their vertices, the lesser first.
@@ -215,13 +267,13 @@ std::vector<Triangle> lattice_triangles(int columns, int rows) {
 }
 
 /// Keeps what light covers: triangles whose rays all landed, next to each other.
-void finish(LensMesh& mesh, const std::vector<Triangle>& triangles, double pixel) {
+void finish(LensMesh& mesh, const std::vector<Triangle>& triangles, const PixelMetric& metric) {
   for (const Landing& landing : mesh.landings) mesh.mesh.vertices.push_back(landing.at);
   for (const Triangle& triangle : triangles) {
     const bool covered = std::all_of(triangle.begin(), triangle.end(), [&](std::uint32_t vertex) {
       return mesh.landings[vertex].end == RayEnd::plate && mesh.landings[vertex].at.allFinite();
     });
-    const auto is_torn = [&](int i) { return judge(mesh, triangle[i], triangle[(i + 1) % 3], pixel) == Edge::torn; };
+    const auto is_torn = [&](int i) { return judge(mesh, triangle[i], triangle[(i + 1) % 3], metric) == Edge::torn; };
     if (covered && !is_torn(0) && !is_torn(1) && !is_torn(2)) mesh.mesh.triangles.push_back(triangle);
   }
 }
@@ -229,20 +281,21 @@ void finish(LensMesh& mesh, const std::vector<Triangle>& triangles, double pixel
 }  // namespace
 
 LensMesh make_lens_mesh(const LensMap& map, double flexibility, const LensMeshSettings& settings, TraceCounts& counts,
-                        const Progress& progress) {
+                        const Progress& progress, const MeshReport& report) {
+  const PixelMetric metric = metric_of(settings);
   const Eigen::Vector2d extent = settings.starts.sizes();
-  const Eigen::Array2i cells =
-      (extent / (cell_pixels * settings.pixel)).array().ceil().max(1).min(most_cells).cast<int>();
+  const Eigen::Array2i cells = lattice_cells(settings, metric);
   LensMesh mesh;
   for (int y = 0; y <= cells.y(); ++y)
     for (int x = 0; x <= cells.x(); ++x)
       mesh.starts.emplace_back(settings.starts.min().array() +
                                Eigen::Array2d(x, y) / cells.cast<double>() * extent.array());
   std::vector<Triangle> triangles = lattice_triangles(cells.x() + 1, cells.y() + 1);
-  trace_new(map, flexibility, mesh, counts, progress);
+  MeshWork work{map, flexibility, progress, report};
+  trace_new(work, mesh, counts);
   Refinement refinement(mesh, triangles, settings, progress);
-  while (refinement.halve()) trace_new(map, flexibility, mesh, counts, progress);
-  finish(mesh, triangles, settings.pixel);
+  while (refinement.halve()) trace_new(work, mesh, counts);
+  finish(mesh, triangles, metric);
   return mesh;
 }
 
@@ -251,7 +304,9 @@ LensMesh lattice_mesh(std::vector<Eigen::Vector2d> starts, std::vector<Landing> 
   LensMesh mesh;
   mesh.starts = std::move(starts);
   mesh.landings = std::move(landings);
-  finish(mesh, lattice_triangles(columns, rows), pixel);
+  PixelMetric metric;
+  metric.pixel = pixel;
+  finish(mesh, lattice_triangles(columns, rows), metric);
   return mesh;
 }
 

@@ -3,6 +3,7 @@
 /// A mesh of neighbouring rays' landings, which may fold over itself.
 
 #include <cstdint>
+#include <functional>
 #include <vector>
 
 #include <Eigen/Geometry>
@@ -31,19 +32,28 @@ struct Sheet {
 struct LensMeshSettings {
   Eigen::AlignedBox2d starts{Eigen::Vector2d(-0.5, -0.5), Eigen::Vector2d(0.5, 0.5)};  ///< In their plane.
   Eigen::Vector2d target{1, 1};  ///< Of the rectangle about the other plane's centre in which accuracy matters.
-  double pixel = 1;              ///< Size of a pixel there, world units.
+  Eigen::Vector2d pixel{1, 1};   ///< Size of a pixel there, world units: pixels need not be square.
+
+  /// Takes directions in the plane of starts to those in the other plane that straight light has: a rotation.
+  Eigen::Matrix2d turn = Eigen::Matrix2d::Identity();
 };
 
+/// Told the part that is done, from 0 to 1, by the thread that called the long work.
+using MeshReport = std::function<void(double part)>;
+
 /// Triangulates the landings of a rectangle of starts: first a regular one, 4 pixels a cell (at most 4096 cells along
-/// either side); then, within `target`, edges are halved where the landing between their ends would lie more than a
-/// tenth of a pixel beside the straight line (by the Jacobians of both ends), and where one end landed and the other
-/// did not. That ends where edges are shorter than 1/4 pixel, in the starts and, by the Jacobians, in the landings, or
-/// than 1/16 pixel in the starts, or when there are some 4 starts for each pixel. An edge halved is halved for both of
-/// its triangles, so that there are no cracks. Edges that are torn (the landings are apart by a pixel more than the
-/// Jacobians explain: the volume's silhouette, an obstacle's shadow) have no triangles. The result does not depend on
-/// the number of threads. @throw Cancelled
+/// either side, and 4 for each 16 pixels); then, within `target`, edges are halved where the landing between their ends
+/// would lie more than a tenth of a pixel beside the straight line (by the Jacobians of both ends), and where one end
+/// landed and the other did not. That ends where edges are shorter than 1/4 pixel, in the starts and, by the Jacobians,
+/// in the landings, or than 1/16 pixel in the starts, or when there are some 4 starts for each pixel. All of these
+/// lengths are counted in pixels along each side of a pixel; those of the starts as straight light takes them to the
+/// landings. An edge halved is halved for both of its triangles, so that there are no cracks. Edges that are torn (the
+/// landings are apart by a pixel more than the Jacobians explain: the volume's silhouette, an obstacle's shadow) have
+/// no triangles. The result does not depend on the number of threads.
+/// @param report  May be empty. Of `progress` only `cancelled` is looked at.
+/// @throw Cancelled
 LensMesh make_lens_mesh(const LensMap& map, double flexibility, const LensMeshSettings& settings, TraceCounts& counts,
-                        const Progress& progress);
+                        const Progress& progress, const MeshReport& report = {});
 
 /// Triangulates landings that are there: starts on a lattice of `columns` × `rows`, row by row.
 LensMesh lattice_mesh(std::vector<Eigen::Vector2d> starts, std::vector<Landing> landings, int columns, int rows,

@@ -82,7 +82,7 @@ void Kernel<uniform, differentials>::enter(Packet& packet, int lane) {
         packet.dv[i][axis][lane] = batch_.differentials[packet.ray[lane]].direction[i][axis];
       }
   }
-  packet.kick[lane] = uniform ? ray.flexibility * medium_.voxel : ray.flexibility;
+  packet.kick[lane] = uniform ? ray.strength * medium_.voxel : ray.strength;
   packet.bending_rate[lane] = std::fabs(packet.kick[lane]) * ray.norm;
   packet.wanted[lane] = medium_.settings.step;
   packet.length[lane] = 0;

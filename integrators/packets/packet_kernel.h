@@ -20,7 +20,7 @@ struct KernelRay {
   std::array<std::int32_t, 3> brick;  ///< In units of bricks.
   std::array<float, 3> position;      ///< From the brick's first voxel, in voxels.
   std::array<float, 3> direction;     ///< V; unit, world axes.
-  float flexibility = 0;              ///< s.
+  float strength = 0;                 ///< σ = s · scale.
   float norm = 0;                     ///< Of the deviator of T as last sampled; 0 where that asks for no shorter step.
   double length = 0;                  ///< Of the way, world units; added to.
   std::uint32_t steps = 0;            ///< Added to.
@@ -60,7 +60,7 @@ struct KernelSettings {
 };
 
 /// Takes every ray to the face of the extent where it leaves (`axis` is set, and it is on that face), or to the point
-/// before a step that the kernel does not take: onto a surface, past the greatest length or number of steps, where s·T
+/// before a step that the kernel does not take: onto a surface, past the greatest length or number of steps, where σ·T
 /// cannot be followed, and, of rays with differentials, out of the extent. A ray's result depends on that ray alone,
 /// not on its neighbours; rays are fastest if those of one origin, or of neighbouring ones, stand next to each other.
 /// @return the number of tensor samples.

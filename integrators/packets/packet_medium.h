@@ -57,10 +57,10 @@ struct alignas(64) Packet {
   PerRay p[3];          // Position, voxels from the brick's first.
   PerRay v[3];          // V.
   PerRay u[3];          // The direction in index space; unused if voxels are uniform: it is V.
-  PerRay kick;          // s, times the voxel's edge if voxels are uniform.
+  PerRay kick;          // σ, times the voxel's edge if voxels are uniform.
   PerRay length;        // Of the way since the ray came, in units of the time that u is per.
-  PerRay bending_rate;  // s times the norm of T's deviator as last sampled, or 0.
-  PerRay reach;         // Bound on ‖s h T‖ in the brick.
+  PerRay bending_rate;  // σ times the norm of T's deviator as last sampled, or 0.
+  PerRay reach;         // Bound on ‖σ h T‖ in the brick.
   PerRay strongest;
   PerRay low[3], high[3];  // The voxels' box, relative to the brick.
   PerRay last[3];          // The last cell, likewise.
@@ -77,7 +77,7 @@ struct alignas(64) Packet {
   PerRay wanted, excess;  // Of adaptive methods: the next step, voxels, and this one's error over what is allowed.
 
   // Only of rays with differentials: p and v along two parameters, now, in the middle of the step and after it, the
-  // slopes of the tensor along x, y and z, and ‖s h T‖ or a bound on it.
+  // slopes of the tensor along x, y and z, and ‖σ h T‖ or a bound on it.
   PerRay dp[2][3], dv[2][3], dmiddle[2][3], dp_next[2][3], dv_next[2][3];
   PerRay slopes[3][8];
   PerRay size;

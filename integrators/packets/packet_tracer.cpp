@@ -82,7 +82,7 @@ Eigen::Vector3d index_position(const std::array<std::int32_t, 3>& brick, const s
 
 Eigen::Vector3d to_vector(const std::array<float, 3>& v) { return {v[0], v[1], v[2]}; }
 
-/// A ray where its way begins to bend, but for its flexibility.
+/// A ray where its way begins to bend, but for its strength.
 template <int N>
 KernelRay kernel_ray(const TensorField& field, Tracer<N>& tracer) {
   KernelRay ray;
@@ -98,10 +98,10 @@ KernelRay kernel_ray(const TensorField& field, Tracer<N>& tracer) {
 }
 
 /// Whether the field may be strong enough, where a ray begins to bend, to ask for shorter steps.
-bool may_be_strong(const TensorField& field, const KernelRay& ray, double flexibility) {
+bool may_be_strong(const TensorField& field, const KernelRay& ray, double strength) {
   const double longest_voxel = field.to_world().linear().norm();
   const TensorBrick brick = field.brick({ray.brick[0], ray.brick[1], ray.brick[2]});
-  return std::abs(flexibility) * longest_voxel * brick.strongest > 0.1;
+  return std::abs(strength) * longest_voxel * brick.strongest > 0.1;
 }
 
 packets::KernelDifferential kernel_differential(const TensorField& field, const State<3>& state) {
@@ -155,8 +155,8 @@ void copy_record(const Recordings& recordings, std::size_t from, std::size_t to)
 
 /// Takes the rays of the batch to where light bends, those of one origin together. Those that do not come there end.
 template <int N>
-void approach(const TensorField& field, RayBatch& batch, const Recordings& recordings, Tracer<N>& tracer,
-              Flight& flight) {
+void approach(const TensorField& field, const BendingSettings& settings, RayBatch& batch, const Recordings& recordings,
+              Tracer<N>& tracer, Flight& flight) {
   for (std::size_t i = 0; i < batch.size();) {
     const std::size_t first = i;
     const auto end = tracer.approach(start_of<N>(batch, first), recordings.of(first));
@@ -167,16 +167,16 @@ void approach(const TensorField& field, RayBatch& batch, const Recordings& recor
     const auto state = tracer.state();
     const Travelled travelled = tracer.travelled();
     for (; i < last; ++i) {
-      const double s = batch.flexibility[i];
-      if (end || !std::isfinite(s)) {
-        set_end(batch, i, std::isfinite(s) ? *end : RayEnd::degenerate, tracer);
+      const double strength = strength_of(batch, i, settings);
+      if (end || !std::isfinite(strength)) {
+        set_end(batch, i, std::isfinite(strength) ? *end : RayEnd::degenerate, tracer);
         continue;
       }
-      if (!sampled && may_be_strong(field, ray, s)) {
-        ray.norm = static_cast<float>(tracer.strength());
+      if (!sampled && may_be_strong(field, ray, strength)) {
+        ray.norm = static_cast<float>(tracer.deviator_here());
         sampled = true;
       }
-      ray.flexibility = static_cast<float>(s);
+      ray.strength = static_cast<float>(strength);
       ray.length = travelled.length;
       ray.steps = travelled.steps;
       flight.kernel.rays.push_back(ray);
@@ -184,7 +184,7 @@ void approach(const TensorField& field, RayBatch& batch, const Recordings& recor
       flight.numbers.push_back(i);
       flight.travelled.push_back(travelled);
       if (!recordings) continue;
-      tracer.take_over(state, s, travelled, recordings.of(i));
+      tracer.take_over(state, strength, travelled, recordings.of(i));
       tracer.record(true);
     }
   }
@@ -193,7 +193,7 @@ void approach(const TensorField& field, RayBatch& batch, const Recordings& recor
 /// Adds to a ray's record where the kernel has been. Its last point is not that of the ray, which is recorded when it
 /// goes on.
 template <int N>
-void record_points(const TensorField& field, const std::vector<packets::KernelPoint>& points, double flexibility,
+void record_points(const TensorField& field, const std::vector<packets::KernelPoint>& points, double strength,
                    Travelled travelled, const Recording& recording, Tracer<N>& tracer) {
   for (const packets::KernelPoint& point : points) {
     State<N> state;
@@ -202,7 +202,7 @@ void record_points(const TensorField& field, const std::vector<packets::KernelPo
     state.P.col(0) = field.to_world() * index_position(point.brick, point.position);
     state.V.col(0) = to_vector(point.direction);
     travelled.length = point.length;
-    tracer.take_over(bending_steps::normalized(state), flexibility, travelled, recording);
+    tracer.take_over(bending_steps::normalized(state), strength, travelled, recording);
     tracer.record(true);
   }
 }
@@ -214,15 +214,15 @@ void drop_last(Points* points) {
 
 /// From where the kernel has left a ray to its end.
 template <int N>
-RayEnd finish(const TensorField& field, const Flight& flight, std::size_t i, double flexibility,
+RayEnd finish(const TensorField& field, const Flight& flight, std::size_t i, double strength,
               const Recording& recording, Tracer<N>& tracer) {
   const KernelRay& ray = flight.kernel.rays[i];
   Travelled travelled = flight.travelled[i];
   if (!flight.kernel.points.empty())
-    record_points(field, flight.kernel.points[i], flexibility, travelled, recording, tracer);
+    record_points(field, flight.kernel.points[i], strength, travelled, recording, tracer);
   travelled.length = ray.length;
   travelled.steps = ray.steps;
-  tracer.take_over(state_of<N>(field, flight.kernel, i), flexibility, travelled, recording);
+  tracer.take_over(state_of<N>(field, flight.kernel, i), strength, travelled, recording);
   if (ray.axis >= 0) {
     if (tracer.state().direction().isZero()) return RayEnd::degenerate;
     tracer.record(true);
@@ -239,12 +239,12 @@ void trace_rays(const TensorField& field, const Geometry& geometry, const Bendin
   thread_local Flight flight;
   flight.clear();
   Tracer<N> tracer(field, geometry, settings);
-  approach(field, batch, recordings, tracer, flight);
+  approach(field, settings, batch, recordings, tracer, flight);
   if (recordings) flight.kernel.points.resize(flight.kernel.rays.size());
   batch.tensor_samples += packets::run(field, kernel_settings(field, geometry, settings), flight.kernel);
   for (std::size_t i = 0; i < flight.numbers.size(); ++i) {
     const std::size_t number = flight.numbers[i];
-    const RayEnd end = finish(field, flight, i, batch.flexibility[number], recordings.of(number), tracer);
+    const RayEnd end = finish(field, flight, i, strength_of(batch, number, settings), recordings.of(number), tracer);
     set_end(batch, number, end, tracer);
   }
   batch.tensor_samples += tracer.samples();

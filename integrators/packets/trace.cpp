@@ -15,13 +15,14 @@ void trace_rays(const TensorField& field, const Geometry& geometry, const Bendin
                 const Recordings& recordings) {
   Tracer<N> tracer(field, geometry, settings);
   for (std::size_t i = 0; i < batch.size(); ++i) {
-    const RayEnd end = tracer.trace(start_of<N>(batch, i), batch.flexibility[i], recordings.of(i));
+    const RayEnd end = tracer.trace(start_of<N>(batch, i), strength_of(batch, i, settings), recordings.of(i));
     set_end(batch, i, end, tracer);
   }
   batch.tensor_samples += tracer.samples();
 }
 
 void check(const BendingSettings& settings) {
+  if (!std::isfinite(settings.scale)) throw std::invalid_argument("the field's scale must be finite");
   if (!(settings.step >= 0) || !std::isfinite(settings.step))
     throw std::invalid_argument("bending.step must be automatic, or a positive number of voxels");
   if (!(settings.tolerance > 0)) throw std::invalid_argument("bending.tolerance must be positive");

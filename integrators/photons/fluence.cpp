@@ -25,6 +25,26 @@ double quantum_for(std::uint64_t rays) {
 
 Eigen::Vector3i block_of(const Eigen::Vector3i& voxel) { return {voxel.x() >> 3, voxel.y() >> 3, voxel.z() >> 3}; }
 
+/// The blocks that hold the voxels of the field's bricks, in order. Bricks have the voxels behind their far faces, too:
+/// on the far faces of the extent, these are of no other brick.
+std::vector<Eigen::Vector3i> blocks_of(const TensorField& field) {
+  const Eigen::Vector3i last_voxel = field.voxels().max().cast<int>(), last = block_of(last_voxel);
+  std::vector<Eigen::Vector3i> blocks;
+  blocks.reserve(field.brick_count());
+  for (const Eigen::Vector3i& brick : field.bricks())
+    for (int bits = 0; bits < 8; ++bits) {
+      const Eigen::Array3i step(bits & 1, bits >> 1 & 1, bits >> 2);
+      const Eigen::Array3i behind = brick.array() + step;  // Each step is to voxels that are the extent's last.
+      const auto is_last = behind == last.array() && TensorBlock::size * behind == last_voxel.array();
+      if ((step == 0 || is_last).all()) blocks.emplace_back(behind.matrix());
+    }
+  std::sort(blocks.begin(), blocks.end(), [](const Eigen::Vector3i& a, const Eigen::Vector3i& b) {
+    return std::lexicographical_compare(a.data(), a.data() + 3, b.data(), b.data() + 3);
+  });
+  blocks.erase(std::unique(blocks.begin(), blocks.end()), blocks.end());
+  return blocks;
+}
+
 /// The part of a voxel that lies within the bounds, of its volume.
 double part_within(const Eigen::AlignedBox3d& bounds, const Eigen::Vector3i& voxel) {
   const Eigen::Vector3d center = voxel.cast<double>(), half = Eigen::Vector3d::Constant(0.5);
@@ -40,9 +60,9 @@ FluenceSums::FluenceSums(const TensorField& field, std::vector<double> powers, b
       planes_(bands ? powers_.size() : 1),
       edge_(std::cbrt(std::abs(field.to_world().linear().determinant()))),
       quantum_(quantum_for(rays)),
-      first_block_(block_of(field.voxels().min().cast<int>())),
-      block_count_(block_of(field.voxels().max().cast<int>()) - first_block_ + Eigen::Vector3i::Ones()),
-      blocks_(block_count_.cast<std::size_t>().prod()) {
+      places_(blocks_of(field)),
+      index_(places_),
+      blocks_(places_.size()) {
   const double sum = std::accumulate(powers_.begin(), powers_.end(), 0.0);
   if (!(sum > 0)) throw std::invalid_argument("light without power has no fluence");
   for (double& power : powers_) power /= sum;
@@ -53,10 +73,8 @@ FluenceSums::~FluenceSums() {
   for (const std::atomic<Sum*>& block : blocks_) delete[] block.load();
 }
 
-FluenceSums::Sum* FluenceSums::block_at(const Eigen::Vector3i& voxel) {
-  const Eigen::Vector3i at = block_of(voxel) - first_block_;
-  const std::size_t row = static_cast<std::size_t>(at.x()) * block_count_.y() + at.y();
-  std::atomic<Sum*>& block = blocks_[row * block_count_.z() + at.z()];
+FluenceSums::Sum* FluenceSums::sums_of(std::uint32_t number) {
+  std::atomic<Sum*>& block = blocks_[number];
   Sum* sums = block.load(std::memory_order_acquire);
   if (sums) return sums;
   std::unique_ptr<Sum[]> made(new Sum[planes_ * TensorBlock::voxels]());
@@ -81,19 +99,14 @@ void FluenceSums::add(std::size_t channel, const Track& track) {
         const auto more = static_cast<std::uint64_t>(std::llround(way)) - added;
         if (more == 0) return;
         added += more;
+        const std::uint32_t block = index_.find(block_of(voxel));
+        if (block == BrickIndex::missing) return;
         const int offset = TensorBlock::offset(voxel.x() & 7, voxel.y() & 7, voxel.z() & 7);
-        block_at(voxel)[plane * TensorBlock::voxels + offset].fetch_add(more, std::memory_order_relaxed);
+        sums_of(block)[plane * TensorBlock::voxels + offset].fetch_add(more, std::memory_order_relaxed);
       });
     }
     from = to;
   }
-}
-
-/// The block's place in the table.
-Eigen::Vector3i FluenceSums::block_origin(std::size_t i) const {
-  const std::size_t ny = block_count_.y(), nz = block_count_.z();
-  const Eigen::Matrix<std::size_t, 3, 1> at(i / nz / ny, i / nz % ny, i % nz);
-  return TensorBlock::size * (first_block_ + at.cast<int>());
 }
 
 ScalarGrid FluenceSums::grid_of(std::size_t first_plane, const std::vector<double>& weights) const {
@@ -107,7 +120,7 @@ ScalarGrid FluenceSums::grid_of(std::size_t first_plane, const std::vector<doubl
   const double unit = quantum_ / (edge_ * edge_);  // quantum · edge / edge³
   tbb::parallel_for(std::size_t{0}, lit.size(), [&](std::size_t i) {
     ScalarBlock& block = grid.blocks[i];
-    block.origin = block_origin(lit[i]);
+    block.origin = TensorBlock::size * places_[lit[i]];
     const Sum* const sums = blocks_[lit[i]].load();
     for (int offset = 0; offset < TensorBlock::voxels; ++offset) {
       double value = 0;
@@ -124,6 +137,12 @@ ScalarGrid FluenceSums::grid_of(std::size_t first_plane, const std::vector<doubl
                                    [](const ScalarBlock& block) { return block.active.none(); }),
                     grid.blocks.end());
   return grid;
+}
+
+std::size_t FluenceSums::memory_bytes() const {
+  const auto lit = std::count_if(blocks_.begin(), blocks_.end(), [](const auto& block) { return block.load(); });
+  return static_cast<std::size_t>(lit) * planes_ * TensorBlock::voxels * sizeof(Sum) +
+         places_.size() * (sizeof(places_[0]) + sizeof(blocks_[0])) + index_.memory_bytes();
 }
 
 std::vector<ScalarGrid> FluenceSums::grids(double ray_area) const {

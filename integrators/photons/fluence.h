@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "integrators/bending/bending.h"
+#include "volumes/bricks/brick_index.h"
 #include "volumes/bricks/tensor_field.h"
 #include "volumes/grids/scalar_grid.h"
 
@@ -20,8 +21,9 @@ namespace tensorray {
 /// half by it): their volume is that part's, so that they, too, have 1.
 ///
 /// Sums are integers, of lengths rounded to 2^-32 of a voxel's edge (or more, where very many rays need the room), so
-/// that they are the same in whatever order rays come. Memory follows the voxels that light reaches: eight bytes for
-/// each of their sums.
+/// that they are the same in whatever order rays come. They are kept in the blocks of 8³ voxels that are in the field's
+/// memory: in the rest of the extent, where nothing bends light, none is. Memory follows those of them that light
+/// reaches, however large the extent: eight bytes for each sum.
 class FluenceSums {
  public:
   /// @param powers  Of the channels, any unit; >= 0, one of them > 0.
@@ -41,11 +43,13 @@ class FluenceSums {
   /// @param ray_area  Cross section of the beam that a ray of each channel stands for, world units².
   std::vector<ScalarGrid> grids(double ray_area) const;
 
+  /// Not while rays are added.
+  std::size_t memory_bytes() const;
+
  private:
   using Sum = std::atomic<std::uint64_t>;
 
-  Sum* block_at(const Eigen::Vector3i& voxel);
-  Eigen::Vector3i block_origin(std::size_t i) const;
+  Sum* sums_of(std::uint32_t block);
   ScalarGrid grid_of(std::size_t first_plane, const std::vector<double>& weights) const;
 
   const TensorField& field_;
@@ -55,8 +59,9 @@ class FluenceSums {
   double edge_;         // Of a voxel, world units: what lengths are measured by.
   double quantum_;      // Of a sum: this part of an edge.
   double greatest_power_;
-  Eigen::Vector3i first_block_, block_count_;
-  std::vector<std::atomic<Sum*>> blocks_;  // Of 8³ voxels, plane by plane; null where no light has been.
+  std::vector<Eigen::Vector3i> places_;    // Of the blocks, in steps of a block; in order.
+  BrickIndex index_;                       // Which of them is at a place.
+  std::vector<std::atomic<Sum*>> blocks_;  // Of each: 8³ sums, plane by plane; null where no light has been.
 };
 
 }  // namespace tensorray

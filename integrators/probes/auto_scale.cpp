@@ -22,16 +22,17 @@ std::vector<Eigen::Vector3d> probe_origins(const Beam& beam) {
   return origins;
 }
 
-/// How far the median ray turns if the field is multiplied by `scale`.
+/// How far the median ray turns with that scale.
 AutoScale probe(const TensorField& field, const Geometry& geometry, const Beam& beam,
                 const std::vector<Eigen::Vector3d>& origins, double scale, const Progress& progress) {
   BendingSettings settings;
+  settings.scale = scale;
   settings.step = 0.5;  // A fixed step: the splitting is stable however large the scale.
   std::vector<double> turns(origins.size());
   tbb::parallel_for(std::size_t{0}, origins.size(), [&](std::size_t i) {
     if (progress.cancelled) throw Cancelled();
     RayBatch batch;
-    batch.add(origins[i], beam.direction, probe_flexibility * scale);
+    batch.add(origins[i], beam.direction, probe_flexibility);
     trace(field, geometry, settings, batch);
     const Eigen::Vector3d& V = batch.direction[0];
     const bool followed = batch.end[0] == RayEnd::plate || batch.end[0] == RayEnd::missed;

@@ -1,6 +1,6 @@
 #pragma once
 /// @file integrators/probes/auto_scale.h
-/// Chooses by how much a field is multiplied so that light bends visibly but does not tangle.
+/// Chooses a field's scale (BendingSettings::scale) so that light bends visibly but does not tangle.
 
 #include "base/progress.h"
 #include "integrators/bending/bending.h"
@@ -14,8 +14,8 @@ struct AutoScale {
   double bent_fraction = 0;  ///< Of the probe rays, those that the field turns at all.
 };
 
-/// Finds the scale at which the median of the probe rays that turn at all, at s = 0.2, turns by 0.15 rad. By scaling
-/// invariance ((kT, s) is (T, ks)) the field itself is not touched. A field that turns no ray gets scale 1.
+/// Finds the scale at which the median of the probe rays that turn at all, at s = 0.2, turns by 0.15 rad. A field
+/// that turns no ray gets scale 1.
 /// Deterministic; runs on all threads.
 /// @throw Cancelled.
 AutoScale choose_scale(const TensorField& field, const Geometry& geometry, const Beam& beam, const Progress& progress);

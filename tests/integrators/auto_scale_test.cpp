@@ -24,7 +24,7 @@ TEST(AutoScale, TurnsTheMedianRayByTheWantedAngle) {
     const AutoScale chosen = scale_of(field);
     EXPECT_NEAR(chosen.median_turn, 0.15, 1e-3);
     EXPECT_GT(chosen.bent_fraction, 0.99);
-    // Scaling the field undoes scaling the field.
+    // The scale undoes the field's units.
     EXPECT_NEAR(chosen.scale * size / scale_of(cube_field(9, linear_tensor)).scale, 1, 1e-4);
   }
 }

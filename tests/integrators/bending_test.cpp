@@ -149,6 +149,29 @@ TEST(Bending, OnlyTheProductOfFlexibilityAndTensorCounts) {
   }
 }
 
+TEST(Bending, TheScaleIsAFactorOnTheFlexibility) {
+  const TensorField field = cube_field(9, linear_tensor);
+  const Geometry geometry(surfaces_of(field));
+  const TensorField strong = cube_field(9, [](const Vector3d& p) { return Matrix3d(8 * linear_tensor(p)); });
+  for (const BendingMethod method : all_methods)
+    for (const double step : {0.0, 0.25}) {  // Automatic steps follow the scale.
+      BendingSettings scaled = settings_of(method, step), plain = scaled;
+      scaled.scale = 8;
+      const Vector3d P(0.1, 0.2, -2), V(0, 0.1, 1);
+      const Ray ray = trace_one(field, geometry, scaled, P, V, 0.4);
+      for (const Ray& same :
+           {trace_one(field, geometry, plain, P, V, 3.2), trace_one(strong, geometry, plain, P, V, 0.4)}) {
+        EXPECT_EQ(ray.position, same.position);
+        EXPECT_EQ(ray.direction, same.direction);
+        EXPECT_EQ(ray.steps, same.steps);
+      }
+      scaled.scale = -2.9;
+      const Ray other = trace_one(field, geometry, scaled, P, V, 0.4);
+      EXPECT_LT((other.position - trace_one(field, geometry, plain, P, V, 0.4 * -2.9).position).norm(), 1e-12);
+      EXPECT_GT((other.position - ray.position).norm(), 0.1);
+    }
+}
+
 TEST(Bending, RotatingEverythingRotatesThePath) {
   Eigen::Affine3d turn = Eigen::Affine3d::Identity();
   turn.linear() = Eigen::AngleAxisd(0.7, Vector3d(1, -2, 3).normalized()).toRotationMatrix();
@@ -383,6 +406,9 @@ TEST(Bending, RejectsSettingsOutOfRange) {
   EXPECT_THROW(trace(field, geometry, settings, batch), std::invalid_argument);
   settings = {};
   settings.max_steps = 0;
+  EXPECT_THROW(trace(field, geometry, settings, batch), std::invalid_argument);
+  settings = {};
+  settings.scale = std::numeric_limits<double>::infinity();
   EXPECT_THROW(trace(field, geometry, settings, batch), std::invalid_argument);
 }
 

@@ -1,5 +1,6 @@
 #include "integrators/photons/fluence.h"
 
+#include <array>
 #include <cmath>
 #include <map>
 
@@ -172,6 +173,63 @@ TEST(Fluence, ASingleLayerOfVoxelsIsCrossedWhole) {
              ++voxels;
            });
   EXPECT_EQ(voxels, 81);
+}
+
+/// Blocks of 8³ voxels of a cube at its corners; and, with `filled`, zeros all over between them.
+TensorGrid corner_blocks(int size, bool filled) {
+  const auto value = [](const Vector3i& i) { return Matrix3d(0.05 * linear_tensor(i.cast<double>() / 40)); };
+  if (!filled) {
+    TensorGrid grid = dense_grid({Vector3i::Zero(), Vector3i::Constant(7)}, Affine3d::Identity(), value);
+    for (int corner = 1; corner < 8; ++corner) {
+      const Vector3i from = (size - 8) * Vector3i(corner >> 2, corner >> 1 & 1, corner & 1);
+      const TensorGrid more = dense_grid({from, from + Vector3i::Constant(7)}, Affine3d::Identity(), value);
+      grid.blocks.push_back(more.blocks.front());
+    }
+    return grid;
+  }
+  return dense_grid({Vector3i::Zero(), Vector3i::Constant(size - 1)}, Affine3d::Identity(), [&](const Vector3i& i) {
+    const Vector3i in_block = i.cwiseMin(Vector3i::Constant(size - 1) - i);
+    return in_block.maxCoeff() < 8 ? value(i) : Matrix3d::Zero().eval();
+  });
+}
+
+TEST(Fluence, OfASparseFieldIsThatOfAFullOneAtTheFieldsBlocks) {
+  const Bench sparse = make_bench(TensorField(corner_blocks(40, false)), {0.1, 0.2, -1});
+  const Bench full = make_bench(TensorField(corner_blocks(40, true)), {0.1, 0.2, -1});
+  const ScalarGrid found = distribute(sparse, FluenceKind::all_light, 5000, BeamPattern::stratified).fluence[0];
+  const ScalarGrid all = distribute(full, FluenceKind::all_light, 5000, BeamPattern::stratified).fluence[0];
+  std::map<std::array<int, 3>, const ScalarBlock*> blocks;
+  const auto key = [](const ScalarBlock& block) {
+    return std::array<int, 3>{block.origin.x(), block.origin.y(), block.origin.z()};
+  };
+  for (const ScalarBlock& block : all.blocks) blocks[key(block)] = &block;
+  EXPECT_EQ(blocks.size(), 125u);
+  std::size_t with_tensors = 0;
+  for (const ScalarBlock& block : found.blocks) {
+    ASSERT_TRUE(blocks.count(key(block)));
+    EXPECT_EQ(block.values, blocks.at(key(block))->values) << block.origin.transpose();
+    with_tensors += ((block.origin.array() == 0) || (block.origin.array() == 32)).all();
+  }
+  EXPECT_EQ(with_tensors, 8u);
+  EXPECT_LE(found.blocks.size(), 64u);  // And those whose cells reach to them.
+}
+
+TEST(Fluence, MemoryFollowsTheFieldsBlocksAndNotTheExtent) {
+  constexpr int size = 1 << 16;  // 2^39 blocks.
+  const TensorField field(corner_blocks(size, false));
+  FluenceSums sums(field, {1}, false, 10);
+  const std::size_t before = sums.memory_bytes();
+  EXPECT_LT(before, 10000u);
+  const Vector3d from(3, 4, -2), to(3, 4, size + 2);  // Through two of the blocks, and the gap between them.
+  sums.add(0, {{from, 0}, {to, (to - from).norm()}});
+  EXPECT_LE(sums.memory_bytes(), before + 3 * TensorBlock::voxels * sizeof(std::uint64_t));
+  int voxels = 0;
+  for_each(sums.grids(1)[0], [&](const Vector3i& voxel, float value) {
+    EXPECT_NEAR(value, 1, 1e-6);
+    EXPECT_EQ(voxel.head<2>(), Eigen::Vector2i(3, 4));
+    ++voxels;
+  });
+  EXPECT_EQ(voxels, 24);  // The block before the last, too: its cells reach to that.
 }
 
 TEST(Fluence, IsTheSameOnAnyNumberOfThreads) {

@@ -46,7 +46,11 @@ LensMesh make_mesh(const LensMap& map, double s, const LensMeshSettings& setting
 
 LensMeshSettings mesh_settings(double extent, double target, double pixel) {
   const Eigen::Vector2d corner = Eigen::Vector2d::Constant(extent / 2);
-  return {{-corner, corner}, {target, target}, pixel};
+  LensMeshSettings settings;
+  settings.starts = {-corner, corner};
+  settings.target.setConstant(target);
+  settings.pixel.setConstant(pixel);
+  return settings;
 }
 
 /// Spreads light along +z, in the middle about fivefold, towards its sides less and less.
@@ -112,11 +116,11 @@ TEST(LensMesh, SmoothMapsHaveNoCracks) {
 TEST(LensMesh, SheetsAreWithinAFractionOfAPixelOfTheMap) {
   const TensorField field = spreading_field();
   const LensMap map = make_map(field);
-  const LensMeshSettings settings = mesh_settings(0.4, 2, 0.05);
-  const LensMesh mesh = make_mesh(map, spreading_s, settings);
+  const double pixel = 0.05;
+  const LensMesh mesh = make_mesh(map, spreading_s, mesh_settings(0.4, 2, pixel));
   EXPECT_GT(land(map, {0, 0}, spreading_s).jacobian.determinant(), 9);  // It magnifies strongly,
   EXPECT_GT(mesh.mesh.triangles.size(), 50u);                           // and the first lattice had 8.
-  const SheetSearch search(mesh, settings.pixel);
+  const SheetSearch search(mesh, pixel);
   std::vector<Sheet> sheets;
   int inside = 0;
   double worst = 0;
@@ -126,7 +130,7 @@ TEST(LensMesh, SheetsAreWithinAFractionOfAPixelOfTheMap) {
       const Vector2d start = start_of(map, spreading_s, mesh, point);
       search.find(point, sheets);
       // The border of the mesh is that of the map within its accuracy.
-      const double margin = 0.2 * settings.pixel;
+      const double margin = 0.2 * pixel;
       if ((start.cwiseAbs().array() > 0.2 + margin).any()) {
         EXPECT_TRUE(sheets.empty());
       }
@@ -134,12 +138,66 @@ TEST(LensMesh, SheetsAreWithinAFractionOfAPixelOfTheMap) {
       ++inside;
       ASSERT_EQ(sheets.size(), 1u) << point.transpose();
       const Landing landing = land(map, start, spreading_s);
-      worst = std::max(worst, (landing.jacobian * (sheets[0].start - start)).norm() / settings.pixel);
+      worst = std::max(worst, (landing.jacobian * (sheets[0].start - start)).norm() / pixel);
       EXPECT_LT((sheets[0].jacobian - landing.jacobian).norm(), 0.1 * landing.jacobian.norm());
       EXPECT_NEAR(sheets[0].length, landing.length, 0.1 * landing.length);
     }
   EXPECT_GT(inside, 500);
   EXPECT_LT(worst, 0.2);  // A tenth on edges; within triangles somewhat more.
+}
+
+TEST(LensMesh, PixelsThatAreNotSquareTakeRaysByTheirNumber) {
+  const TensorField field = spreading_field();
+  const LensMap map = make_map(field);
+  LensMeshSettings settings = mesh_settings(0.4, 2, 0);
+  settings.pixel = {0.25, 0.25 / 128};  // 8192 pixels, and 33 million squares of their shorter side.
+  const LensMesh mesh = make_mesh(map, spreading_s, settings);
+  EXPECT_LT(mesh.starts.size(), 4 * 8192u);
+  const SheetSearch search(mesh, settings.pixel.minCoeff());
+  std::vector<Sheet> sheets;
+  double worst = 0;
+  for (int y = 0; y < 20; ++y)
+    for (int x = 0; x < 20; ++x) {
+      const Vector2d start = Vector2d(x - 9.7, y - 9.6) * (0.19 / 10);
+      const Landing landing = land(map, start, spreading_s);
+      if ((landing.at.array().abs() > 1).any()) continue;
+      search.find(landing.at, sheets);
+      ASSERT_EQ(sheets.size(), 1u) << start.transpose();
+      worst = std::max(worst, (landing.jacobian * (sheets[0].start - start)).cwiseQuotient(settings.pixel).norm());
+    }
+  EXPECT_LT(worst, 0.2);
+
+  // Where the starts' axes are others than the pixels', too. The map is that of this field again, turned.
+  Plate turned = map.from();
+  turned.right = map.from().up;
+  turned.up = -map.from().right;
+  const LensMap turned_map(field, surfaces_of(field), {}, turned, map.to(), Vector3d::UnitZ());
+  settings.turn << 0, -1, 1, 0;  // Right there is up here.
+  EXPECT_NEAR(static_cast<double>(make_mesh(turned_map, spreading_s, settings).starts.size()),
+              static_cast<double>(mesh.starts.size()), 0.1 * static_cast<double>(mesh.starts.size()));
+  settings.turn = Eigen::Rotation2Dd(0.7).matrix();
+  Plate askew = map.from();
+  askew.right = {std::cos(0.7), std::sin(0.7), 0};
+  askew.up = {-std::sin(0.7), std::cos(0.7), 0};
+  const LensMap askew_map(field, surfaces_of(field), {}, askew, map.to(), Vector3d::UnitZ());
+  EXPECT_LT(make_mesh(askew_map, spreading_s, settings).starts.size(), 8 * 8192u);
+}
+
+TEST(LensMesh, TellsHowFarItIs) {
+  const TensorField field = spreading_field();
+  const LensMap map = make_map(field);
+  std::vector<double> parts;
+  TraceCounts counts;
+  make_lens_mesh(map, spreading_s, mesh_settings(0.4, 2, 0.01), counts, Progress(),
+                 [&](double part) { parts.push_back(part); });
+  EXPECT_GT(parts.size(), 2u);
+  EXPECT_EQ(parts.front(), 0);
+  EXPECT_LT(parts.back(), 1);
+  EXPECT_TRUE(std::is_sorted(parts.begin(), parts.end()));
+  const auto stop = [](double part) {
+    if (part > 0) throw Cancelled();
+  };
+  EXPECT_THROW(make_lens_mesh(map, spreading_s, mesh_settings(0.4, 2, 0.01), counts, Progress(), stop), Cancelled);
 }
 
 /// Turns light along +z towards +y. The volume's silhouette tears the map: beside it light goes straight.

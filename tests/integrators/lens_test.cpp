@@ -437,6 +437,26 @@ TEST(Lens, CanBeCancelled) {
   }
 }
 
+TEST(Lens, PixelsThatAreNotSquareTakeRaysByTheirNumber) {
+  constexpr int width = 3, height = 3000;  // 81 million squares of a pixel's shorter side.
+  const Bench bench(no_field(), plate_at(1.5, {1, 1}, {width, height}), {1, 1}, uniform(1));
+  for (const LensMode mode : modes) {
+    std::vector<double> parts;
+    Progress progress;
+    progress.report = [&](const std::string&, std::uint64_t done, std::uint64_t total) {
+      parts.push_back(static_cast<double>(done) / static_cast<double>(total));
+    };
+    const LensPicture picture = bench.simulate(mode, progress);
+    EXPECT_GE(parts.size(), 10u);
+    EXPECT_TRUE(std::is_sorted(parts.begin(), parts.end()));
+    std::uint64_t rays = 0;
+    for (const std::uint64_t count : picture.ends[0]) rays += count;
+    EXPECT_LE(rays, std::uint64_t{width * height});
+    for (int y = 0; y < height; y += 100)
+      EXPECT_LT((point_at(picture, 1, y).st - Vector2d(0.5, 1 - (y + 0.5) / height)).norm(), 1e-6) << y;
+  }
+}
+
 TEST(Lens, SettingsOutOfRangeAreRefused) {
   const auto refused = [](const std::function<void(Bench&)>& change) {
     Bench bench(no_field(), plate_at(1.5, {1, 1}, {4, 4}), {1, 1}, uniform(1));

@@ -66,6 +66,29 @@ TEST_P(Packets, FollowStrongFieldsOnAnyLattice) {
   }
 }
 
+TEST_P(Packets, OnlyTheProductOfScaleFlexibilityAndTensorCounts) {
+  constexpr double factor = 8;  // A power of two, so that nothing is rounded otherwise.
+  const TensorFunction smooth = smooth_tensor(1);
+  const TensorFunction strong = [&](const Vector3d& p) { return Matrix3d(factor * smooth(p)); };
+  for (const Lattice& lattice : tested_lattices())
+    for (const double step : {0.0, 0.5}) {
+      const Scene plain = random_scene(lattice, step, 1, 20);
+      Scene scaled = random_scene(lattice, step, 1 / factor, 20);
+      scaled.settings.scale = factor;
+      const RayBatch expected = traced(plain, plain.rays), found = traced(scaled, scaled.rays);
+      Scene other = make_scene("", TensorField(lattice_grid(odd_box(), lattice, strong)), {}, step, scaled.rays);
+      other.settings.max_steps = plain.settings.max_steps;
+      const RayBatch of_strong = traced(other, other.rays);
+      EXPECT_NE(traced(plain, scaled.rays).position, found.position);
+      for (std::size_t i = 0; i < expected.size(); ++i) {
+        EXPECT_TRUE(identical(found, i, expected, i)) << lattice.name << " " << step << ", ray " << i;
+        EXPECT_TRUE(identical(of_strong, i, expected, i)) << lattice.name << " " << step << ", ray " << i;
+      }
+      scaled.settings.scale = -2.9;
+      expect_reference(scaled, 0.2);
+    }
+}
+
 TEST_P(Packets, TakeTheSameFewStepsInFieldsHoweverStrong) {
   // So few that nothing grows.
   for (const double kick : {1.0, 20.0, 50.0}) {

@@ -41,7 +41,7 @@ TensorGrid grid_of(const TensorField& field) {
   return grid;
 }
 
-/// Tells fields apart, also one from itself scaled: by where its first brick is, and how strong.
+/// Tells fields apart, also one that took another's memory: by where its first brick is, and how strong.
 struct FieldKey {
   const float* floats = nullptr;
   float strongest = 0;

@@ -72,6 +72,22 @@ double greatest_squared_deviator(const float* brick) {
   return greatest;
 }
 
+/// TensorBrick::strongest of a brick's floats.
+float strongest_deviator(const float* brick) {
+  // In single precision, which is off by less than 2e-6: the trace takes at most two thirds away from the squares.
+  float greatest = 0, sum = 0;
+  for (const float* T = brick; T != brick + TensorBrick::trailing_offset; T += TensorBrick::bending_floats) {
+    const Eigen::Map<const Eigen::Array4f> near(T), far(T + 4);  // A vector register each.
+    const float squares = (near * near + far * far).sum(), trace = T[0] + T[4];
+    greatest = std::max(greatest, squares - trace * trace * (1.0f / 3));
+    sum += squares;  // Not finite where any is not.
+  }
+  constexpr float least = 1e-25f, most = 1e30f;  // Beyond them squares would underflow or overflow.
+  const double squared = greatest > least && sum < most ? double{greatest} : greatest_squared_deviator(brick);
+  // Rounded up: interpolation between voxels, too, may round to a little more than any of them.
+  return static_cast<float>(std::sqrt(squared) * (1 + 1.2e-5));
+}
+
 }  // namespace
 
 BlockTable::BlockTable(const TensorGrid& grid) {
@@ -107,21 +123,6 @@ float make_brick(const BlockTable& table, const Eigen::Vector3i& brick, float* f
     if (const TensorBlock* const block = table.find(brick + corner(bits)))
       copy_shared_voxels(*block, corner(bits), floats);
   return strongest_deviator(floats);
-}
-
-float strongest_deviator(const float* brick) {
-  // In single precision, which is off by less than 2e-6: the trace takes at most two thirds away from the squares.
-  float greatest = 0, sum = 0;
-  for (const float* T = brick; T != brick + TensorBrick::trailing_offset; T += TensorBrick::bending_floats) {
-    const Eigen::Map<const Eigen::Array4f> near(T), far(T + 4);  // A vector register each.
-    const float squares = (near * near + far * far).sum(), trace = T[0] + T[4];
-    greatest = std::max(greatest, squares - trace * trace * (1.0f / 3));
-    sum += squares;  // Not finite where any is not.
-  }
-  constexpr float least = 1e-25f, most = 1e30f;  // Beyond them squares would underflow or overflow.
-  const double squared = greatest > least && sum < most ? double{greatest} : greatest_squared_deviator(brick);
-  // Rounded up: interpolation between voxels, too, may round to a little more than any of them.
-  return static_cast<float>(std::sqrt(squared) * (1 + 1.2e-5));
 }
 
 }  // namespace tensorray

@@ -34,7 +34,4 @@ std::vector<Eigen::Vector3i> active_bricks(const BlockTable& table, const Eigen:
 /// @return TensorBrick::strongest.
 float make_brick(const BlockTable& table, const Eigen::Vector3i& brick, float* floats);
 
-/// TensorBrick::strongest of a brick's floats.
-float strongest_deviator(const float* brick);
-
 }  // namespace tensorray

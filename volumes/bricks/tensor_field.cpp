@@ -80,16 +80,17 @@ void TensorField::make_bricks(const TensorGrid& grid, const GiveBack& give_back)
   voxels_ = Eigen::AlignedBox3d(active.min().cast<double>(), active.max().cast<double>());
 
   const BlockTable blocks(grid);
-  const std::vector<Eigen::Vector3i> bricks = active_bricks(blocks, bricks_of(active));
-  index_ = BrickIndex(bricks);
-  floats_ = allocate(bricks.size());
-  strongest_.resize(bricks.size());
-  for (std::size_t first = 0; first < bricks.size();) {
-    const std::size_t last = end_of_layer(bricks, first + enough_bricks);
+  bricks_ = active_bricks(blocks, bricks_of(active));
+  bricks_.shrink_to_fit();
+  index_ = BrickIndex(bricks_);
+  floats_ = allocate(bricks_.size());
+  strongest_.resize(bricks_.size());
+  for (std::size_t first = 0; first < bricks_.size();) {
+    const std::size_t last = end_of_layer(bricks_, first + enough_bricks);
     tbb::parallel_for(first, last, [&](std::size_t i) {
-      strongest_[i] = make_brick(blocks, bricks[i], floats_.get() + i * TensorBrick::stored_floats);
+      strongest_[i] = make_brick(blocks, bricks_[i], floats_.get() + i * TensorBrick::stored_floats);
     });
-    if (last < bricks.size()) give_back(bricks[last].x() * TensorBrick::cells);
+    if (last < bricks_.size()) give_back(bricks_[last].x() * TensorBrick::cells);
     first = last;
   }
 }
@@ -124,30 +125,9 @@ double TensorField::greatest_norm() const {
   return std::sqrt(greatest);
 }
 
-TensorField TensorField::copy() const {
-  TensorField result;
-  result.to_world_ = to_world_;
-  result.to_index_ = to_index_;
-  result.index_bounds_ = index_bounds_;
-  result.voxels_ = voxels_;
-  result.strongest_ = strongest_;
-  result.index_ = index_;
-  result.floats_ = allocate(brick_count());
-  std::copy_n(floats_.get(), brick_count() * TensorBrick::stored_floats, result.floats_.get());
-  return result;
-}
-
-TensorField TensorField::scaled(double factor) && {
-  tbb::parallel_for(std::size_t{0}, brick_count(), [&](std::size_t i) {
-    float* const floats = floats_.get() + i * TensorBrick::stored_floats;
-    for (int j = 0; j < TensorBrick::stored_floats; ++j) floats[j] = static_cast<float>(floats[j] * factor);
-    strongest_[i] = strongest_deviator(floats);
-  });
-  return std::move(*this);
-}
-
 std::size_t TensorField::memory_bytes() const {
-  return brick_count() * (TensorBrick::stored_floats + 1) * sizeof(float) + index_.memory_bytes();
+  return brick_count() * ((TensorBrick::stored_floats + 1) * sizeof(float) + sizeof(Eigen::Vector3i)) +
+         index_.memory_bytes();
 }
 
 }  // namespace tensorray

@@ -66,12 +66,11 @@ class TensorField {
   /// The greatest Frobenius norm of a voxel.
   double greatest_norm() const;
 
-  TensorField copy() const;
+  std::size_t brick_count() const { return bricks_.size(); }
 
-  /// This field with every tensor multiplied by `factor`, in place.
-  TensorField scaled(double factor) &&;
-
-  std::size_t brick_count() const { return strongest_.size(); }
+  /// Where the bricks in memory are, in steps of a brick, ordered by x, then y, then z: those that hold an active voxel
+  /// in a corner of one of their cells.
+  const std::vector<Eigen::Vector3i>& bricks() const { return bricks_; }
   std::size_t memory_bytes() const;
 
   /// The brick that holds the cells from `brick` * 8 on. Those within the extent that hold no active voxel, and all
@@ -94,7 +93,6 @@ class TensorField {
   };
   using Floats = std::unique_ptr<float[], Release>;
 
-  TensorField() = default;
   template <class GiveBack>
   void make_bricks(const TensorGrid& grid, const GiveBack& give_back);
   static Floats allocate(std::size_t bricks);
@@ -105,9 +103,10 @@ class TensorField {
 
   Eigen::Affine3d to_world_, to_index_;
   Eigen::AlignedBox3d index_bounds_, voxels_;
+  std::vector<Eigen::Vector3i> bricks_;
   Floats floats_;                 ///< Brick after brick.
   std::vector<float> strongest_;  ///< Of each brick.
-  BrickIndex index_;              ///< Where in them a brick is.
+  BrickIndex index_;              ///< Which of them is at a place.
 };
 
 }  // namespace tensorray
