@@ -3,12 +3,12 @@
 #include <map>
 #include <memory>
 #include <string>
-#include <system_error>
 #include <vector>
 
 #include <CLI/CLI.hpp>
 #include <fmt/core.h>
 
+#include "base/distinct_files.h"
 #include "base/output_file.h"
 #include "base/progress.h"
 #include "base/text.h"
@@ -26,12 +26,6 @@ struct DeriveOptions {
   std::string field;
   std::vector<std::string> invariants;
 };
-
-std::string joined(const std::vector<std::string>& words) {
-  std::string text;
-  for (const std::string& word : words) text += (text.empty() ? "" : ", ") + word;
-  return text;
-}
 
 /// Each once, in the order asked for. @throw std::invalid_argument that lists the invariants.
 std::vector<Invariant> chosen_invariants(const DeriveOptions& options) {
@@ -52,9 +46,7 @@ std::map<std::string, std::string> file_metadata(const TensorGrid& field) {
 
 void derive(const DeriveOptions& options, const Progress& progress) {
   const std::vector<Invariant> invariants = chosen_invariants(options);
-  std::error_code error;
-  if (std::filesystem::equivalent(options.input, options.output, error))
-    throw std::invalid_argument(options.output.string() + " is the field itself; choose another name for the output");
+  require_distinct_files({{options.input, "the field"}}, {{options.output, "-o"}});
   OutputFile file(options.output);
   progress.update("reading", 0, 1);
   TensorGrid field = read_tensor_vdb(options.input, options.field);

@@ -21,14 +21,17 @@ struct RenderOptions {
   RenderRun run;
 };
 
-/// ".png .jpg ... display-referred picture; .exr scene-linear picture; ...": from the table of outputs.
+/// The kinds of outputs with their endings, from the methods' table.
 std::string output_help() {
   std::string text =
       "Write this instead of the scene's outputs; one of each kind may be given. The ending says the kind";
-  for (const Output& kind : default_scene().output.kinds) {
-    const std::vector<std::string> endings =
-        kind.option_ending ? std::vector<std::string>{kind.option_ending} : kind.endings;
-    text += fmt::format("; {} {}", joined(endings, " "), kind.meaning);
+  for (const auto& method : default_scene().integrator.methods) {
+    text += fmt::format("; {}:", method->name());
+    for (const Output& kind : method->outputs()) {
+      const std::vector<std::string> endings =
+          kind.option_ending ? std::vector<std::string>{kind.option_ending} : kind.endings;
+      text += fmt::format(" {} ({})", joined(endings, " "), kind.key);
+    }
   }
   return text;
 }
