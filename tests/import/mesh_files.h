@@ -2,7 +2,6 @@
 /// @file tests/import/mesh_files.h
 /// Temporary files, the data sets, and bytes, for the tests of what reads meshes.
 
-#include <cstdlib>
 #include <filesystem>
 #include <fstream>
 #include <iterator>
@@ -11,6 +10,8 @@
 
 #include <gtest/gtest.h>
 #include <unistd.h>
+
+#include "tests/data_folder.h"
 
 namespace tensorray {
 
@@ -28,8 +29,7 @@ class TemporaryFolder : public std::filesystem::path {
 };
 
 inline std::filesystem::path data_file(const std::string& name) {
-  const char* const folder = std::getenv("TENSORRAY_DATA");
-  return std::filesystem::path(folder ? folder : TENSORRAY_SOURCE_DIR "/../shared/data") / name;
+  return test::data_folder() / name;
 }
 
 inline std::string bytes_of(const std::filesystem::path& path) {

@@ -4,7 +4,6 @@
 
 #include <array>
 #include <cmath>
-#include <cstdlib>
 #include <cstring>
 #include <filesystem>
 #include <fstream>
@@ -19,6 +18,7 @@
 #include <gtest/gtest.h>
 #include <unistd.h>
 
+#include "tests/data_folder.h"
 #include "tools/import/lattice.h"
 
 namespace tensorray::test {
@@ -38,8 +38,7 @@ class TemporaryFile : public std::filesystem::path {
 };
 
 inline std::filesystem::path data_file(const std::string& name) {
-  const char* folder = std::getenv("TENSORRAY_DATA");
-  return std::filesystem::path(folder ? folder : TENSORRAY_SOURCE_DIR "/../shared/data") / name;
+  return data_folder() / name;
 }
 
 #define TENSORRAY_NEEDS(path) \

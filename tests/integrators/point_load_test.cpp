@@ -1,7 +1,6 @@
 // Single rays through the analytic stress of a point load, computed independently, against rays through sampled fields.
 
 #include <cmath>
-#include <cstdlib>
 #include <filesystem>
 #include <fstream>
 #include <map>
@@ -9,6 +8,7 @@
 
 #include <gtest/gtest.h>
 
+#include "tests/data_folder.h"
 #include "tests/integrators/support.h"
 #include "volumes/tensors/eigenvalues.h"
 #include "volumes/tensors/generators.h"
@@ -26,9 +26,7 @@ struct Reference {
 };
 
 std::filesystem::path reference_file() {
-  const char* data = std::getenv("TENSORRAY_DATA");
-  const std::filesystem::path folder = data ? data : TENSORRAY_SOURCE_DIR "/../shared/data";
-  return folder / "../reference/point_load_rays.csv";
+  return data_folder() / "../reference/point_load_rays.csv";
 }
 
 std::vector<Reference> read_references() {

@@ -3,11 +3,11 @@
 
 #include <cctype>
 #include <cmath>
-#include <cstdlib>
 #include <iomanip>
 #include <sstream>
 
 #include "renderer/images/image.h"
+#include "tests/data_folder.h"
 #include "tests/program/support.h"
 
 namespace tensorray {
@@ -15,14 +15,9 @@ namespace {
 
 using namespace test;
 
-std::filesystem::path data_folder() {
-  const char* given = std::getenv("TENSORRAY_DATA");
-  return given ? std::filesystem::path(given) : std::filesystem::path(TENSORRAY_SOURCE_DIR) / ".." / "shared" / "data";
-}
-
 std::vector<std::filesystem::path> imported_scenes() {
   std::vector<std::filesystem::path> scenes;
-  for (const auto& entry : std::filesystem::directory_iterator(TENSORRAY_SOURCE_DIR "/scenes/imported"))
+  for (const auto& entry : std::filesystem::directory_iterator(source_folder() / "scenes" / "imported"))
     if (entry.path().extension() == ".json") scenes.push_back(entry.path());
   return scenes;
 }

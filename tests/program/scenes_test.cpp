@@ -5,6 +5,7 @@
 #include <Eigen/Core>
 
 #include "renderer/images/image.h"
+#include "tests/data_folder.h"
 #include "tests/program/support.h"
 
 namespace tensorray {
@@ -14,7 +15,7 @@ using namespace test;
 
 std::vector<std::filesystem::path> example_scenes() {
   std::vector<std::filesystem::path> scenes;
-  for (const auto& entry : std::filesystem::directory_iterator(TENSORRAY_SOURCE_DIR "/scenes"))
+  for (const auto& entry : std::filesystem::directory_iterator(source_folder() / "scenes"))
     if (entry.path().extension() == ".json") scenes.push_back(entry.path());
   return scenes;
 }
@@ -48,7 +49,7 @@ INSTANTIATE_TEST_SUITE_P(Scenes, ExampleScene, ::testing::ValuesIn(example_scene
 class PointLoadPicture : public Program {
  protected:
   Image picture(const std::string& scene, const std::vector<std::string>& light = {}) {
-    std::vector<std::string> arguments{"render", TENSORRAY_SOURCE_DIR "/scenes/" + scene, "-q", "-o", "out.exr"};
+    std::vector<std::string> arguments{"render", (source_folder() / "scenes" / scene).string(), "-q", "-o", "out.exr"};
     for (const char* value : {"light.photons=40000", "light.wavelengths.count=16", "receiver.resolution=[130,130]",
                               "receiver.size=[2.6,2.6]", "integrator.density.tau=1.5", "field.generate.resolution=49"})
       arguments.insert(arguments.end(), {"--set", value});

@@ -2,13 +2,13 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdlib>
 #include <fstream>
 #include <stdexcept>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "tests/data_folder.h"
 #include "tests/renderer/support.h"
 
 namespace tensorray {
@@ -61,8 +61,7 @@ TEST(ObserverTest, ThreeFunctionsHaveEqualArea) {
 }
 
 TEST(ObserverTest, EqualsTheReferenceTable) {
-  const char* const data = std::getenv("TENSORRAY_DATA");
-  const std::filesystem::path folder = data ? data : TENSORRAY_SOURCE_DIR "/../shared/data";
+  const std::filesystem::path folder = test::data_folder();
   std::ifstream file(folder / "../reference/cie1931_2deg_1nm.csv");
   if (!file) GTEST_SKIP() << "no reference table beside " << folder;
   std::string heading;

@@ -1,7 +1,6 @@
 #include "volumes/tensors/generators.h"
 
 #include <cmath>
-#include <cstdlib>
 #include <filesystem>
 #include <functional>
 
@@ -14,6 +13,7 @@
 #include <vtkPointData.h>
 #include <vtkXMLImageDataReader.h>
 
+#include "tests/data_folder.h"
 #include "volumes/tensors/eigenvalues.h"
 
 namespace tensorray {
@@ -25,8 +25,7 @@ using Eigen::Vector3d;
 constexpr double pi = 3.14159265358979323846;
 
 std::filesystem::path data_file(const std::string& name) {
-  const char* folder = std::getenv("TENSORRAY_DATA");
-  return std::filesystem::path(folder ? folder : TENSORRAY_SOURCE_DIR "/../shared/data") / name;
+  return test::data_folder() / name;
 }
 
 /// The tensor of a generated grid at an index.

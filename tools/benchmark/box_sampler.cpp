@@ -1,6 +1,11 @@
 /// @file tools/benchmark/box_sampler.cpp
-/// TensorSampler on OpenVDB's BoxSampler, and no packets: linked before the libraries it makes of `tensorray` the
-/// program that one would write without bricks.
+/// The program that one would write without bricks, for comparison: `tensorray` with OpenVDB's BoxSampler, and without
+/// packets. This file takes the place of two sources, and keeps the contracts of their headers as far as tracing
+/// photons needs them: volumes/bricks/tensor_sampler.cpp, with a TensorSampler on three grids of OpenVDB, one for each
+/// row of the tensor, and integrators/packets/packet_tracer.cpp, with a `trace_in_packets` that leaves every ray to the
+/// scalar tracer. CMakeLists.txt lists all other objects of `tensorray` and this one; a definition that this file
+/// lacks, or has too many, is an error of the linker. Both programs therefore run the same machine code but for
+/// sampling and packets.
 
 #include <array>
 #include <memory>

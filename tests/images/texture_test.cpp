@@ -12,7 +12,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "tests/renderer/picture_files.h"
+#include "tests/images/picture_files.h"
 #include "tests/renderer/support.h"
 
 namespace tensorray {

@@ -1,5 +1,5 @@
 #pragma once
-/// @file tests/renderer/picture_files.h
+/// @file tests/images/picture_files.h
 /// Picture files made byte by byte: what readers must know, and our own writer does not write.
 
 #include <cstdint>

@@ -1,0 +1,88 @@
+// Which of the sources may use which libraries, and what else ARCHITECTURE.md promises of them.
+
+#include <map>
+#include <regex>
+#include <set>
+#include <string>
+
+#include <gtest/gtest.h>
+
+#include "tests/structure/sources.h"
+
+namespace tensorray {
+namespace {
+
+using test::Line, test::lines_of, test::top_folders;
+
+/// The benchmark measures against these libraries' own samplers.
+bool is_benchmark(const Line& line) { return line.is_under("tools/benchmark"); }
+
+TEST(Structure, HeavyLibrariesStayOutOfHeadersAndInTheirFolder) {
+  const std::map<std::string, std::string> homes{{"openvdb", "volumes"},
+                                                 {"embree", "renderer"},
+                                                 {"OpenImageIO", "renderer"},
+                                                 {"OpenColorIO", "renderer"},
+                                                 {"assimp", "renderer"}};
+  const std::regex include("#include <(openvdb|embree|OpenImageIO|OpenColorIO|assimp)");
+  std::map<std::string, std::set<std::string>> users;
+  for (const std::string& folder : top_folders())
+    for (const Line& line : lines_of(folder)) {
+      std::smatch match;
+      if (!std::regex_search(line.text, match, include) || is_benchmark(line)) continue;
+      EXPECT_EQ(homes.at(match[1]), folder) << line.file;
+      users[match[1]].insert(line.file);
+      // Included by two .cpp of the same folder.
+      const bool private_header =
+          line.file == "volumes/files/vdb_archive.h" || line.file == "renderer/surfaces/embree_handles.h";
+      EXPECT_TRUE(private_header || !line.is_of_header()) << line.file << ": " << line.text;
+    }
+  const std::map<std::string, std::set<std::string>> only{
+      {"embree", {"renderer/surfaces/embree_handles.h"}},
+      {"OpenImageIO", {"renderer/images/image.cpp", "renderer/textures/texture.cpp"}},
+      {"OpenColorIO", {"renderer/color/color.cpp"}},
+      {"assimp", {"renderer/surfaces/mesh.cpp"}}};
+  for (const auto& [library, files] : only) EXPECT_EQ(users[library], files) << library;
+}
+
+TEST(Structure, ForeignFormatsStayInVolumesAndTheImporter) {
+  const std::regex include("#include <(vtk|teem|nifti|nrrd)");
+  for (const std::string& folder : top_folders())
+    for (const Line& line : lines_of(folder)) {
+      if (!std::regex_search(line.text, include) || is_benchmark(line)) continue;
+      const bool source_of_volumes = folder == "volumes" && !line.is_of_header();
+      EXPECT_TRUE(source_of_volumes || line.is_under("tools/import")) << line.file << ": " << line.text;
+    }
+}
+
+TEST(Structure, LibrariesNeitherPrintNorExit) {
+  const std::regex forbidden(R"(std::(cout|cerr|clog|exit|abort|quick_exit)\b|\b(printf|puts|perror)\(|fmt::print)");
+  for (const std::string& folder : top_folders()) {
+    // Of the tools, the importer is a library.
+    for (const Line& line : lines_of(folder == "tools" ? "tools/import" : folder))
+      EXPECT_FALSE(std::regex_search(line.text, forbidden)) << line.file << ": " << line.text;
+  }
+}
+
+/// Eq. 5 needs the tensor where a ray is: through a sampler, or through the bricks themselves as packets do.
+TEST(Structure, OnlyBendingKnowsTheRule) {
+  const std::regex tensor_at_a_point(R"(\b(TensorSampler|TensorBrick)\b|\bbrick\()");
+  std::set<std::string> readers;
+  for (const Line& line : lines_of("integrators"))
+    if (std::regex_search(line.text, tensor_at_a_point)) {
+      // Seeds only look at the field.
+      EXPECT_TRUE(line.is_under("integrators/bending") || line.is_under("integrators/packets") ||
+                  line.file == "integrators/paths/threshold_seeds.cpp")
+          << line.file << ": " << line.text;
+      readers.insert(line.folder());
+    }
+  // The names that this test looks for are those that both tracers use.
+  EXPECT_EQ(readers.count("integrators/bending") + readers.count("integrators/packets"), 2u);
+}
+
+TEST(Structure, IntegratorsNeverSeeAScene) {
+  for (const Line& line : lines_of("integrators"))
+    EXPECT_EQ(line.text.find("SceneDescription"), std::string::npos) << line.file << ": " << line.text;
+}
+
+}  // namespace
+}  // namespace tensorray
