@@ -21,10 +21,11 @@ using Identity = std::tuple<dev_t, ino_t, std::string>;
 Identity identity_of(const fs::path& path) {
   struct stat status {};
   if (stat(path.c_str(), &status) == 0) return {status.st_dev, status.st_ino, ""};
-  const fs::path target = behind_links(path);
-  const fs::path folder = target.has_parent_path() ? target.parent_path() : fs::path(".");
-  if (stat(folder.c_str(), &status) == 0) return {status.st_dev, status.st_ino, target.filename().string()};
-  return {0, 0, fs::absolute(target).lexically_normal().string()};
+  const fs::path target = fs::absolute(behind_links(path));
+  for (const fs::path& each : {target, target.lexically_normal()})  // "none/../file" needs no folder "none".
+    if (stat(each.parent_path().c_str(), &status) == 0)
+      return {status.st_dev, status.st_ino, each.filename().string()};
+  return {0, 0, target.lexically_normal().string()};
 }
 
 /// Whether it is neither a regular file nor absent.
