@@ -34,7 +34,7 @@ void describe(FieldDescription& field, Visitor& visit) {
   visit("derive", field.derive, "makes the tensor from a vector grid (gradient) or a scalar grid (hessian)");
   visit("eigenvalues", field.eigenvalues,
         "preprocessing: as they are, |T| or (T^2)^(1/2); auto is absolute where the field is symmetric, else raw");
-  visit("scale", field.scale, "factor on the tensors; auto makes the median ray turn by 0.15 rad at s = 0.2",
+  visit("scale", field.scale, "factor on the flexibility; auto makes the median ray turn by 0.15 rad at s = 0.2",
         not_zero().or_word("auto"));
   visit("bounds", field.bounds, "closed mesh that cuts the volume: light goes straight outside");
 }

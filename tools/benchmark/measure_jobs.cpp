@@ -38,7 +38,7 @@ Job lens_job(int resolution, int side) {
 Job path_job(int resolution, int seeds, int side) {
   return {fmt::format("path tracing, {} tubes, {}²", seeds, side),
           resolution,
-          {{"integrator", {{"type", "path_tracing"}, {"seeds", {{"kind", "grid"}, {"count", seeds}}}, {"samples", 16}}},
+          {{"integrator", {{"type", "path_tracing"}, {"seeds", {{"kind", "grid"}, {"count", seeds}}}}},
            {"camera", {{"resolution", {side, side}}}}}};
 }
 
