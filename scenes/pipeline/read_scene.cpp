@@ -23,35 +23,40 @@ std::string matching_ending(const Output& kind, const std::filesystem::path& fil
   return found == endings.end() ? "" : *found;
 }
 
-/// The output of the method whose ending fits the file best. @throw SceneError that lists the endings.
-Output kind_of(const std::filesystem::path& file, const Method& method) {
-  const std::vector<Output> kinds = method.outputs();
+/// Of these kinds, the one whose ending fits the file best.
+const Output* best_kind(const std::filesystem::path& file, const std::vector<Output>& kinds) {
   const auto best = std::max_element(kinds.begin(), kinds.end(), [&](const Output& a, const Output& b) {
     return matching_ending(a, file).size() < matching_ending(b, file).size();
   });
-  if (!matching_ending(*best, file).empty()) return *best;
+  return matching_ending(*best, file).empty() ? nullptr : &*best;
+}
+
+[[noreturn]] void refuse_ending(const std::filesystem::path& file, const std::vector<Output>& kinds,
+                                const Method& method) {
   std::vector<std::string> known;
   for (const Output& kind : kinds) {
     if (kind.option_ending) known.emplace_back(kind.option_ending);
     if (!kind.option_ending) known.insert(known.end(), kind.endings.begin(), kind.endings.end());
   }
-  throw SceneError(printable(fmt::format("-o {}: {} makes no such output; the endings that it knows are {}",
-                                         file.string(), method.name(), joined(known))));
+  throw SceneError(printable(fmt::format("-o {}: no output has such an ending; {} writes {}", file.string(),
+                                         method.name(), joined(known))));
 }
 
-/// Lets the files of the command line take the place of the scene's, also in its text.
-void replace_outputs(SceneDescription& scene, const std::vector<std::filesystem::path>& outputs, Json& json) {
+/// Lets the files of the command line take the place of the scene's. A file that only another method makes is
+/// reported with the scene's own.
+void replace_outputs(SceneDescription& scene, const std::vector<std::filesystem::path>& outputs) {
   if (outputs.empty()) return;
   scene.output.files.clear();
-  for (const Output& kind : scene.output.kinds)
-    if (json.contains("output")) json["output"].erase(kind.key);
+  const Method& method = scene.integrator.method();
+  const std::vector<Output> made = method.outputs();
   for (const std::filesystem::path& file : outputs) {
-    const Output kind = kind_of(file, scene.integrator.method());
-    const auto [other, is_new] = scene.output.files.emplace(kind.key, std::filesystem::absolute(file));
+    const Output* kind = best_kind(file, made);
+    if (!kind) kind = best_kind(file, scene.output.kinds);
+    if (!kind) refuse_ending(file, made, method);
+    const auto [other, is_new] = scene.output.files.emplace(kind->key, std::filesystem::absolute(file));
     if (!is_new)
       throw SceneError(printable(fmt::format("-o: {} and {} are of one kind; give one of them",
                                              other->second.filename().string(), file.string())));
-    json["output"][kind.key] = other->second.string();
   }
 }
 
@@ -70,11 +75,11 @@ SceneDescription read_scene(const std::filesystem::path& path, const SceneChange
   const SceneSource source{path};
   SceneDescription scene = default_scene();
   scene.path = path;
+  scene.text = json.dump();
   SectionReader reader(json, "", source);
   describe(scene, reader);
   reader.finish();
-  replace_outputs(scene, changes.outputs, json);
-  scene.text = json.dump();
+  replace_outputs(scene, changes.outputs);
   choose_outputs(scene);
   check_scene(scene, json, source);
   return scene;

@@ -120,9 +120,10 @@ TEST_F(Paths, EveryStyleIsAnotherPicture) {
 TEST_F(Paths, SeedsOfEveryKind) {
   write("seeds.txt", "# Two points\n0 0 0\n0.3, 0.2, -0.5\n");
   for (const std::string kind : {"grid", "poisson_disk", "line", "sphere", "threshold", "file"}) {
-    const Image image = render({"integrator.seeds.kind=" + kind, "integrator.seeds.file=seeds.txt",
-                                "integrator.seeds.above=0.5", transparent, without_box},
-                               {"out.tck"});
+    std::vector<std::string> changes{"integrator.seeds.kind=" + kind, transparent, without_box};
+    if (kind == "file") changes.emplace_back("integrator.seeds.file=seeds.txt");
+    if (kind == "threshold") changes.emplace_back("integrator.seeds.above=0.5");
+    const Image image = render(changes, {"out.tck"});
     EXPECT_GT(covered(image), 0) << kind;
     const std::string tracks = read_file(in_folder("out.tck"));
     EXPECT_NE(tracks.find(kind == "file" ? "count: 2\n" : "count: 16\n"), std::string::npos) << kind;

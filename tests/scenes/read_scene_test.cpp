@@ -368,7 +368,7 @@ TEST_F(ReadScene, OutputsOfTheCommandLineTakeThePlaceOfTheScenes) {
   };
   EXPECT_THAT(refusal({"a.png", "b.jpg"}), HasSubstr("one kind"));
   EXPECT_THAT(refusal({"a.gif"}), HasSubstr(".png, .jpg"));
-  EXPECT_THAT(refusal({"a.vdb"}, {"integrator.type=lens"}), HasSubstr("lens makes no such output"));
+  EXPECT_THAT(refusal({"a.vdb"}, {"integrator.type=lens"}), HasSubstr("lens makes no photons"));
 }
 
 /// Every key that names a file is known as an input, by whatever name the output has it.
