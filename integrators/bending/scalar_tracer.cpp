@@ -47,7 +47,7 @@ void Tracer<N>::record(bool in_field) {
   here.length = length_;
   here.in_field = in_field;
   if (in_field) {
-    Medium<1> medium{sampler_, medium_.strength};
+    RayMedium<1> medium{sampler_, medium_.strength};
     here.change = medium.derivative({here.position, here.direction}).V;
     here.tensor = medium.T;
   }

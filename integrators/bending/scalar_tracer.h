@@ -14,7 +14,7 @@
 
 namespace tensorray {
 
-using bending_steps::Medium;
+using bending_steps::RayMedium;
 using bending_steps::State;
 
 /// What is kept of a ray's way; null: nothing.
@@ -102,7 +102,7 @@ class Tracer {
   const BendingSettings& settings_;
   TensorSampler sampler_;
 
-  Medium<N> medium_{sampler_, 0};
+  RayMedium<N> medium_{sampler_, 0};
   State<N> ray_;
   Recording recording_;
   double length_ = 0;                 // Of the way so far, world units.

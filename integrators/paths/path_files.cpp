@@ -1,7 +1,6 @@
 #include "integrators/paths/path_files.h"
 
 #include <algorithm>
-#include <cctype>
 #include <stdexcept>
 #include <string>
 

@@ -15,15 +15,15 @@ constexpr std::size_t chunk_size = 1024;  // Paths between two progress reports.
 constexpr double closest = 1e-9;          // Points nearer than this, in voxels, are one.
 
 /// Everything that the threads share and do not change.
-struct Job {
+struct PathJob {
   const TensorField& field;
   const Geometry& geometry;
   const BendingSettings& bending;
   const PathSettings& settings;
-  double voxel;  // World units.
+  double voxel = 0;  // World units.
 };
 
-Way follow(const Job& job, const PathSeed& seed, bool backwards, RayEnd& end) {
+Way follow(const PathJob& job, const PathSeed& seed, bool backwards, RayEnd& end) {
   RayBatch batch;
   std::vector<Way> ways;
   const double sign = backwards ? -1 : 1;
@@ -103,7 +103,7 @@ Way thinned(const Way& way, double tolerance, double tensor_tolerance) {
   return kept;
 }
 
-Path trace_path(const Job& job, const PathSeed& seed) {
+Path trace_path(const PathJob& job, const PathSeed& seed) {
   Path path;
   path.flexibility = seed.flexibility;
   path.wavelength = seed.wavelength;
@@ -132,8 +132,8 @@ std::vector<Path> trace_paths(const TensorField& field, const Geometry& geometry
   if (!(settings.tolerance >= 0)) throw std::invalid_argument("the tolerance of paths must not be negative");
   if (!(settings.tensor_tolerance >= 0))
     throw std::invalid_argument("the tensor tolerance of paths must not be negative");
-  const double voxel = std::cbrt(std::abs(field.to_world().linear().determinant()));
-  const Job job{field, geometry, bending, settings, voxel};
+  PathJob job{field, geometry, bending, settings};
+  job.voxel = std::cbrt(std::abs(field.to_world().linear().determinant()));
   std::vector<Path> paths(seeds.size());
   for (std::size_t first = 0; first < seeds.size(); first += chunk_size) {
     progress.update("tracing paths", first, seeds.size());

@@ -280,7 +280,7 @@ struct Scan {
   Scan(const Bench& bench, double s) {
     const LensMap map(bench.field, bench.surfaces, bench.bending, bench.image.plane, bench.receiver, {0, 0, 1});
     for (double x = -1.5; x < 1.5; x += 1e-3) {
-      Landing landing;
+      LensLanding landing;
       map.trace({{x, 0}}, {s}, &landing);
       starts.push_back(x);
       landings.push_back(landing.at.x());
