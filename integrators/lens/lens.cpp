@@ -150,6 +150,19 @@ void gather_row(const LensJob& job, int y, LensPicture& picture, std::vector<Len
   }
 }
 
+/// Calls `work(y)` for each row of the picture on all threads, and `tell(y)` now and then on this one.
+template <class Tell, class Work>
+void for_rows(const LensJob& job, const Tell& tell, const Work& work) {
+  const int height = job.receiver.resolution.y(), rows_at_once = 8 * tbb::this_task_arena::max_concurrency();
+  for (int first = 0; first < height; first += rows_at_once) {
+    tell(first);
+    tbb::parallel_for(first, std::min(first + rows_at_once, height), [&](int y) {
+      if (job.progress.cancelled) throw Cancelled();
+      work(y);
+    });
+  }
+}
+
 /// How many places of the picture show what each pixel sees: the sheets of the picture, folded onto the image.
 void count_places(const LensJob& job, std::vector<LensLanding> references, LensPicture& picture) {
   const Eigen::Vector2i size = job.receiver.resolution;
@@ -159,24 +172,24 @@ void count_places(const LensJob& job, std::vector<LensLanding> references, LensP
   const double pixel = job.receiver.pixel_size().minCoeff();
   const LensMesh mesh = lattice_mesh(std::move(starts), std::move(references), size.x(), size.y(), pixel);
   const SheetSearch search(mesh, pixel);
-  tbb::parallel_for(std::size_t{0}, picture.points.size(), [&](std::size_t i) {
-    thread_local std::vector<Sheet> sheets;
-    if (mesh.landings[i].end != RayEnd::plate) return;
-    search.find(mesh.landings[i].at, sheets);
-    picture.points[i].folds = std::max(1, static_cast<int>(sheets.size()));  // The pixel itself, if none else.
+  const auto width = static_cast<std::size_t>(size.x());
+  const auto tell = [&](int y) { job.progress.update("counting folds", y, size.y()); };
+  for_rows(job, tell, [&](int y) {
+    std::vector<Sheet> sheets;
+    for (std::size_t i = y * width; i < (y + 1) * width; ++i) {
+      if (mesh.landings[i].end != RayEnd::plate) continue;
+      search.find(mesh.landings[i].at, sheets);
+      picture.points[i].folds = std::max(1, static_cast<int>(sheets.size()));  // The pixel itself, if none else.
+    }
   });
 }
 
 void gather(const LensJob& job, LensPicture& picture) {
-  const int rows_at_once = 8 * tbb::this_task_arena::max_concurrency();  // Between two progress reports.
   const int height = job.receiver.resolution.y();
   std::vector<LensLanding> references(picture.points.size());
   std::vector<GatheredRow> rows(static_cast<std::size_t>(height));
-  for (int first = 0; first < height; first += rows_at_once) {
-    job.progress.update("tracing rays", static_cast<std::uint64_t>(first), static_cast<std::uint64_t>(height));
-    tbb::parallel_for(first, std::min(first + rows_at_once, height),
-                      [&](int y) { gather_row(job, y, picture, references, rows[static_cast<std::size_t>(y)]); });
-  }
+  const auto tell = [&](int y) { job.progress.update("tracing rays", y, height); };
+  for_rows(job, tell, [&](int y) { gather_row(job, y, picture, references, rows[static_cast<std::size_t>(y)]); });
   for (const GatheredRow& row : rows) {
     picture.counts += row.counts;
     for (std::size_t channel = 0; channel < row.ends.size(); ++channel)
@@ -247,14 +260,8 @@ Eigen::Matrix2d straight_turn(const LensJob& job) {
 void scatter_rows(const LensJob& job, std::size_t channel, const LensMesh& mesh, const MeshReport& report,
                   LensPicture& picture) {
   const SheetSearch search(mesh, job.receiver.pixel_size().minCoeff());
-  const int height = job.receiver.resolution.y(), rows_at_once = 8 * tbb::this_task_arena::max_concurrency();
-  for (int first = 0; first < height; first += rows_at_once) {
-    report(static_cast<double>(first) / height);
-    tbb::parallel_for(first, std::min(first + rows_at_once, height), [&](int y) {
-      if (job.progress.cancelled) throw Cancelled();
-      scatter_row(job, y, channel, search, picture);
-    });
-  }
+  const auto tell = [&](int y) { report(static_cast<double>(y) / job.receiver.resolution.y()); };
+  for_rows(job, tell, [&](int y) { scatter_row(job, y, channel, search, picture); });
 }
 
 void scatter(const LensJob& job, const TriangleMesh& volume, const Eigen::Vector3d& direction, LensPicture& picture) {
