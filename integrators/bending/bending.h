@@ -41,7 +41,8 @@ struct BendingSettings {
                             ///< radians; > 0.
   int max_steps = 20000;    ///< Steps before a ray is given up; > 0.
 
-  /// Of the way, world units; > 0. A ray that has come so far ends there, in the volume or outside, as one that missed.
+  /// Of the path, world units; > 0. A ray that has come so far ends there, in the volume or outside, as one that
+  /// missed.
   double max_length = std::numeric_limits<double>::infinity();
 };
 
@@ -61,8 +62,8 @@ struct RayDifferential {
   Eigen::Matrix<double, 3, 2> position = Eigen::Matrix<double, 3, 2>::Zero();   ///< World units per parameter.
   Eigen::Matrix<double, 3, 2> direction = Eigen::Matrix<double, 3, 2>::Zero();  ///< Radians per parameter.
 
-  /// Set by `trace`: of the way's length, as on surfaces neighbouring rays have not come equally far. The rays at equal
-  /// lengths differ by `position` − V `length`.
+  /// Set by `trace`: of the path's length, as on surfaces neighbouring rays have not come equally far. The rays at
+  /// equal lengths differ by `position` − V `length`.
   Eigen::RowVector2d length = Eigen::RowVector2d::Zero();
 };
 
@@ -75,7 +76,7 @@ struct RayBatch {
 
   // Set by `trace`.
   std::vector<RayEnd> end;
-  std::vector<double> length;        ///< Of the way, world units.
+  std::vector<double> length;        ///< Of the path, world units.
   std::vector<std::uint32_t> steps;  ///< Steps in the field.
   std::uint64_t tensor_samples = 0;  ///< Added to.
 
@@ -84,22 +85,22 @@ struct RayBatch {
   void add(const Eigen::Vector3d& position, const Eigen::Vector3d& direction, double flexibility);
 };
 
-/// A point on the way of a ray.
-struct Waypoint {
+/// A recorded point of a ray's path.
+struct PathPoint {
   Eigen::Vector3d position = Eigen::Vector3d::Zero();
   Eigen::Vector3d direction = Eigen::Vector3d::Zero();  ///< V; unit.
-  double length = 0;                                    ///< Of the way so far, world units.
+  double length = 0;                                    ///< Of the path so far, world units.
   Eigen::Matrix3d tensor = Eigen::Matrix3d::Zero();     ///< T of the field here; zero where light is straight.
-  Eigen::Vector3d change = Eigen::Vector3d::Zero();     ///< V' here, by σ·T: its length is the way's curvature.
-  bool in_field = false;                                ///< Whether the way bends here (inside the volume and the cut).
+  Eigen::Vector3d change = Eigen::Vector3d::Zero();     ///< V' here, by σ·T: its length is the path's curvature.
+  bool in_field = false;  ///< Whether the path bends here (inside the volume and the cut).
 
   Eigen::Vector3d force() const { return tensor * direction; }  ///< T V, whose length is Eq. 11.
 };
 
-/// From the start to the end. A ray has a point at each step in the field, from where it enters to where it leaves, and
-/// one at either end of each straight piece that ends on something; two, of which one is in the field, where it
-/// enters or leaves. Empty if it meets nothing.
-using Way = std::vector<Waypoint>;
+/// A path: from the start to the end. A ray has a point at each step in the field, from where it enters to where it
+/// leaves, and one at either end of each straight piece that ends on something; two, of which one is in the field,
+/// where it enters or leaves. Empty if it meets nothing.
+using PathPoints = std::vector<PathPoint>;
 
 /// A corner of the polyline that a ray's steps are.
 struct TrackPoint {
@@ -127,9 +128,9 @@ void trace(const TensorField& field, const Geometry& geometry, const BendingSett
 void trace_reference(const TensorField& field, const Geometry& geometry, const BendingSettings& settings,
                      RayBatch& batch);
 
-/// The same, and records the ways, one a ray: the same rays, for one more tensor sample a step.
+/// The same, and records the paths, one a ray: the same rays, for one more tensor sample a step.
 void trace(const TensorField& field, const Geometry& geometry, const BendingSettings& settings, RayBatch& batch,
-           std::vector<Way>& ways);
+           std::vector<PathPoints>& paths);
 
 /// The same, and records the tracks, one a ray, at next to no cost.
 void trace(const TensorField& field, const Geometry& geometry, const BendingSettings& settings, RayBatch& batch,

@@ -36,7 +36,7 @@ State<N> operator*(double factor, const State<N>& a) {
 
 /// The field as one ray meets it.
 template <int N>
-struct Medium {
+struct RayMedium {
   TensorSampler& sampler;
   double strength;                              ///< σ = s · scale: V' is that of σ T.
   Eigen::Matrix3d T = Eigen::Matrix3d::Zero();  ///< As last sampled ...
@@ -85,14 +85,14 @@ State<N> normalized(const State<N>& state) {
 }
 
 template <int N>
-State<N> euler(Medium<N>& medium, const State<N>& from, double h) {
+State<N> euler(RayMedium<N>& medium, const State<N>& from, double h) {
   medium.sample(from.P);
   const State<N> to = normalized<N>({from.P, from.V + medium.strength * h * medium.apply(from.V)});
   return {from.P + h * to.V, to.V};
 }
 
 template <int N>
-State<N> splitting(Medium<N>& medium, const State<N>& from, double h) {
+State<N> splitting(RayMedium<N>& medium, const State<N>& from, double h) {
   const Eigen::Matrix<double, 3, N> middle = from.P + h / 2 * from.V;
   medium.sample(middle);
   const double factor = h * medium.strength;
@@ -108,7 +108,7 @@ State<N> splitting(Medium<N>& medium, const State<N>& from, double h) {
 
 /// `error` is set by the adaptive methods.
 template <int N>
-State<N> by_stages(const RungeKutta& method, Medium<N>& medium, const State<N>& from, double h, State<N>& error) {
+State<N> by_stages(const RungeKutta& method, RayMedium<N>& medium, const State<N>& from, double h, State<N>& error) {
   std::array<State<N>, RungeKutta::most_stages> k;
   const auto along = [&](const double* factors, int count, State<N> to) {
     for (int j = 0; j < count; ++j)
@@ -125,7 +125,7 @@ State<N> by_stages(const RungeKutta& method, Medium<N>& medium, const State<N>& 
 
 /// A step of arc length h. `error` is set by the adaptive methods.
 template <int N>
-State<N> advance(BendingMethod method, Medium<N>& medium, const State<N>& from, double h, State<N>& error) {
+State<N> advance(BendingMethod method, RayMedium<N>& medium, const State<N>& from, double h, State<N>& error) {
   if (const RungeKutta* const stages = runge_kutta(method)) return by_stages(*stages, medium, from, h, error);
   return method == BendingMethod::euler ? euler(medium, from, h) : splitting(medium, from, h);
 }

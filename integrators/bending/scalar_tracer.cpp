@@ -40,18 +40,18 @@ void Tracer<N>::meet_surface(const Eigen::Vector3d& normal, bool bends) {
 template <int N>
 void Tracer<N>::record(bool in_field) {
   if (recording_.track) recording_.track->push_back({position(), length_});
-  if (!recording_.way) return;
-  Waypoint here;
+  if (!recording_.path) return;
+  PathPoint here;
   here.position = position();
   here.direction = direction();
   here.length = length_;
   here.in_field = in_field;
   if (in_field) {
-    Medium<1> medium{sampler_, medium_.strength};
+    RayMedium<1> medium{sampler_, medium_.strength};
     here.change = medium.derivative({here.position, here.direction}).V;
     here.tensor = medium.T;
   }
-  recording_.way->push_back(here);
+  recording_.path->push_back(here);
 }
 
 /// In free space, to a surface.

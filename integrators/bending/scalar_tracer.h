@@ -14,22 +14,22 @@
 
 namespace tensorray {
 
-using bending_steps::Medium;
+using bending_steps::RayMedium;
 using bending_steps::State;
 
-/// What is kept of a ray's way; null: nothing.
+/// What is kept of a ray; null: nothing.
 struct Recording {
-  Way* way = nullptr;
+  PathPoints* path = nullptr;
   Track* track = nullptr;
 };
 
-/// What is kept of the ways of a batch.
+/// What is kept of a batch.
 struct Recordings {
-  std::vector<Way>* ways = nullptr;
+  std::vector<PathPoints>* paths = nullptr;
   std::vector<Track>* tracks = nullptr;
 
-  Recording of(std::size_t ray) const { return {ways ? &(*ways)[ray] : nullptr, tracks ? &(*tracks)[ray] : nullptr}; }
-  explicit operator bool() const { return ways || tracks; }
+  Recording of(std::size_t ray) const { return {paths ? &(*paths)[ray] : nullptr, tracks ? &(*tracks)[ray] : nullptr}; }
+  explicit operator bool() const { return paths || tracks; }
 };
 
 /// How far a ray has come.
@@ -102,7 +102,7 @@ class Tracer {
   const BendingSettings& settings_;
   TensorSampler sampler_;
 
-  Medium<N> medium_{sampler_, 0};
+  RayMedium<N> medium_{sampler_, 0};
   State<N> ray_;
   Recording recording_;
   double length_ = 0;                 // Of the way so far, world units.

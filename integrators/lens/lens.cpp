@@ -17,24 +17,26 @@ namespace tensorray {
 namespace {
 
 /// Everything that the threads share and do not change.
-struct Job {
+struct LensJob {
   const LensMap& map;
   const std::vector<LightChannel>& channels;
   const Plate& receiver;
   const LensImage& image;
   const LensSettings& settings;
   const Progress& progress;
-  std::vector<double> flexibilities;  // As the map's light has them.
-  Eigen::Affine2d straight;           // From pixels of the receiver to where straight light sees the image's plane.
+  std::vector<double> flexibilities{};  // As the map's light has them.
+
+  /// From pixels of the receiver to where straight light sees the image's plane.
+  Eigen::Affine2d straight = Eigen::Affine2d::Identity();
 };
 
 /// Where the position (in pixels) of the receiver lies in its plane.
-Eigen::Vector2d receiver_point(const Job& job, const Eigen::Vector2d& pixel) {
+Eigen::Vector2d receiver_point(const LensJob& job, const Eigen::Vector2d& pixel) {
   return plane_coordinates(job.receiver, job.receiver.to_world(pixel));
 }
 
 /// The positions of a pixel's samples, in pixels.
-std::vector<Eigen::Vector2d> sample_points(const Job& job, int x, int y) {
+std::vector<Eigen::Vector2d> sample_points(const LensJob& job, int x, int y) {
   std::vector<Eigen::Vector2d> points;
   const int n = job.settings.samples;
   for (int j = 0; j < n; ++j)
@@ -42,18 +44,18 @@ std::vector<Eigen::Vector2d> sample_points(const Job& job, int x, int y) {
   return points;
 }
 
-Eigen::Vector2d texture_coordinates(const Job& job, const Eigen::Vector2d& at) {
+Eigen::Vector2d texture_coordinates(const LensJob& job, const Eigen::Vector2d& at) {
   return (at.array() / job.image.plane.size.array() + 0.5).matrix();
 }
 
 /// Changes of (s, t) per pixel along x and y, from ∂image/∂receiver.
-Eigen::Matrix2d per_pixel(const Job& job, const Eigen::Matrix2d& image_by_receiver) {
+Eigen::Matrix2d per_pixel(const LensJob& job, const Eigen::Matrix2d& image_by_receiver) {
   const Eigen::Vector2d pixel = job.receiver.pixel_size();
   return job.image.plane.size.cwiseInverse().asDiagonal() * image_by_receiver *
          Eigen::Vector2d(pixel.x(), -pixel.y()).asDiagonal();
 }
 
-bool sees_image(const Job& job, const Eigen::Vector2d& st) {
+bool sees_image(const LensJob& job, const Eigen::Vector2d& st) {
   constexpr double rounding = 1e-9;
   return job.image.wraps || ((st.array() >= -rounding).all() && (st.array() <= 1 + rounding).all());
 }
@@ -63,7 +65,8 @@ struct Shade {
   double radiance = 0, alpha = 0;
 };
 
-Shade shade(const Job& job, std::size_t channel, const Eigen::Vector2d& at, const Eigen::Matrix2d& image_by_receiver) {
+Shade shade(const LensJob& job, std::size_t channel, const Eigen::Vector2d& at,
+            const Eigen::Matrix2d& image_by_receiver) {
   const Eigen::Vector2d st = texture_coordinates(job, at);
   if (!sees_image(job, st)) return {};
   const Eigen::Matrix2d footprint = per_pixel(job, image_by_receiver) / job.settings.samples;
@@ -83,7 +86,7 @@ Eigen::Vector2d log_singular_values(const Eigen::Matrix2d& m) {
 
 /// What a position (in pixels) of the receiver sees that shows the image's plane at `at`.
 /// @param log_stretch  ln σ₁ >= ln σ₂ of ∂receiver/∂image.
-LensPoint make_point(const Job& job, const Eigen::Vector2d& pixel, const Eigen::Vector2d& at,
+LensPoint make_point(const LensJob& job, const Eigen::Vector2d& pixel, const Eigen::Vector2d& at,
                      const Eigen::Matrix2d& image_by_receiver, const Eigen::Vector2d& log_stretch, double length) {
   LensPoint point;
   point.st = texture_coordinates(job, at);
@@ -96,7 +99,7 @@ LensPoint make_point(const Job& job, const Eigen::Vector2d& pixel, const Eigen::
   return point;
 }
 
-void count_ends(const std::vector<Landing>& landings, std::size_t channels, std::vector<EndCounts>& ends) {
+void count_ends(const std::vector<LensLanding>& landings, std::size_t channels, std::vector<EndCounts>& ends) {
   for (std::size_t i = 0; i < landings.size(); ++i) ++ends[i % channels][static_cast<int>(landings[i].end)];
 }
 
@@ -107,19 +110,21 @@ struct GatheredRow {
 };
 
 /// The landing of the pixel's centre in the reference channel.
-Landing reference_landing(const Job& job, int x, int y, const std::vector<Landing>& landings, TraceCounts& counts) {
+LensLanding reference_landing(const LensJob& job, int x, int y, const std::vector<LensLanding>& landings,
+                              TraceCounts& counts) {
   const int n = job.settings.samples;
   if (n % 2 == 1) return landings[(n * n / 2) * job.channels.size() + job.settings.reference];
-  Landing landing;
+  LensLanding landing;
   const Eigen::Vector2d center = receiver_point(job, {x + 0.5, y + 0.5});
   counts += job.map.trace({center}, {job.flexibilities[job.settings.reference]}, &landing);
   return landing;
 }
 
-void gather_row(const Job& job, int y, LensPicture& picture, std::vector<Landing>& references, GatheredRow& row) {
+void gather_row(const LensJob& job, int y, LensPicture& picture, std::vector<LensLanding>& references,
+                GatheredRow& row) {
   const std::size_t channels = job.channels.size();
   row.ends.assign(channels, EndCounts{});
-  std::vector<Landing> landings(static_cast<std::size_t>(job.settings.samples) * job.settings.samples * channels);
+  std::vector<LensLanding> landings(static_cast<std::size_t>(job.settings.samples) * job.settings.samples * channels);
   for (int x = 0; x < job.receiver.resolution.x(); ++x) {
     if (job.progress.cancelled) throw Cancelled();
     std::vector<Eigen::Vector2d> starts = sample_points(job, x, y);
@@ -136,7 +141,7 @@ void gather_row(const Job& job, int y, LensPicture& picture, std::vector<Landing
       alpha[channel] += seen.alpha;
     }
     picture.alpha[pixel] = *std::max_element(alpha.begin(), alpha.end());
-    const Landing& landing = references[pixel] = reference_landing(job, x, y, landings, row.counts);
+    const LensLanding& landing = references[pixel] = reference_landing(job, x, y, landings, row.counts);
     LensPoint& point = picture.points[pixel];
     point.end = static_cast<LensEnd>(landing.end);
     if (landing.end != RayEnd::plate) continue;
@@ -145,8 +150,21 @@ void gather_row(const Job& job, int y, LensPicture& picture, std::vector<Landing
   }
 }
 
+/// Calls `work(y)` for each row of the picture on all threads, and `tell(y)` now and then on this one.
+template <class Tell, class Work>
+void for_rows(const LensJob& job, const Tell& tell, const Work& work) {
+  const int height = job.receiver.resolution.y(), rows_at_once = 8 * tbb::this_task_arena::max_concurrency();
+  for (int first = 0; first < height; first += rows_at_once) {
+    tell(first);
+    tbb::parallel_for(first, std::min(first + rows_at_once, height), [&](int y) {
+      if (job.progress.cancelled) throw Cancelled();
+      work(y);
+    });
+  }
+}
+
 /// How many places of the picture show what each pixel sees: the sheets of the picture, folded onto the image.
-void count_places(const Job& job, std::vector<Landing> references, LensPicture& picture) {
+void count_places(const LensJob& job, std::vector<LensLanding> references, LensPicture& picture) {
   const Eigen::Vector2i size = job.receiver.resolution;
   std::vector<Eigen::Vector2d> starts;
   for (int y = 0; y < size.y(); ++y)
@@ -154,24 +172,24 @@ void count_places(const Job& job, std::vector<Landing> references, LensPicture& 
   const double pixel = job.receiver.pixel_size().minCoeff();
   const LensMesh mesh = lattice_mesh(std::move(starts), std::move(references), size.x(), size.y(), pixel);
   const SheetSearch search(mesh, pixel);
-  tbb::parallel_for(std::size_t{0}, picture.points.size(), [&](std::size_t i) {
-    thread_local std::vector<Sheet> sheets;
-    if (mesh.landings[i].end != RayEnd::plate) return;
-    search.find(mesh.landings[i].at, sheets);
-    picture.points[i].folds = std::max(1, static_cast<int>(sheets.size()));  // The pixel itself, if none else.
+  const auto width = static_cast<std::size_t>(size.x());
+  const auto tell = [&](int y) { job.progress.update("counting folds", y, size.y()); };
+  for_rows(job, tell, [&](int y) {
+    std::vector<Sheet> sheets;
+    for (std::size_t i = y * width; i < (y + 1) * width; ++i) {
+      if (mesh.landings[i].end != RayEnd::plate) continue;
+      search.find(mesh.landings[i].at, sheets);
+      picture.points[i].folds = std::max(1, static_cast<int>(sheets.size()));  // The pixel itself, if none else.
+    }
   });
 }
 
-void gather(const Job& job, LensPicture& picture) {
-  const int rows_at_once = 8 * tbb::this_task_arena::max_concurrency();  // Between two progress reports.
+void gather(const LensJob& job, LensPicture& picture) {
   const int height = job.receiver.resolution.y();
-  std::vector<Landing> references(picture.points.size());
+  std::vector<LensLanding> references(picture.points.size());
   std::vector<GatheredRow> rows(static_cast<std::size_t>(height));
-  for (int first = 0; first < height; first += rows_at_once) {
-    job.progress.update("tracing rays", static_cast<std::uint64_t>(first), static_cast<std::uint64_t>(height));
-    tbb::parallel_for(first, std::min(first + rows_at_once, height),
-                      [&](int y) { gather_row(job, y, picture, references, rows[static_cast<std::size_t>(y)]); });
-  }
+  const auto tell = [&](int y) { job.progress.update("tracing rays", y, height); };
+  for_rows(job, tell, [&](int y) { gather_row(job, y, picture, references, rows[static_cast<std::size_t>(y)]); });
   for (const GatheredRow& row : rows) {
     picture.counts += row.counts;
     for (std::size_t channel = 0; channel < row.ends.size(); ++channel)
@@ -187,7 +205,7 @@ Sheet nearest_sheet(const std::vector<Sheet>& sheets, const Eigen::Vector2d& str
   });
 }
 
-void scatter_row(const Job& job, int y, std::size_t channel, const SheetSearch& search, LensPicture& picture) {
+void scatter_row(const LensJob& job, int y, std::size_t channel, const SheetSearch& search, LensPicture& picture) {
   std::vector<Sheet> sheets;
   for (int x = 0; x < job.receiver.resolution.x(); ++x) {
     const std::size_t pixel = static_cast<std::size_t>(y) * job.receiver.resolution.x() + x;
@@ -213,7 +231,7 @@ void scatter_row(const Job& job, int y, std::size_t channel, const SheetSearch& 
 }
 
 /// The part of the image whose light may arrive: what is before the volume, and what straight light shows.
-Eigen::AlignedBox2d useful_starts(const Job& job, const TriangleMesh& volume, const Eigen::Vector3d& direction) {
+Eigen::AlignedBox2d useful_starts(const LensJob& job, const TriangleMesh& volume, const Eigen::Vector3d& direction) {
   const Plate& plane = job.image.plane;
   Eigen::AlignedBox2d useful;
   for (const Eigen::Vector3d& vertex : volume.vertices) {
@@ -230,7 +248,7 @@ Eigen::AlignedBox2d useful_starts(const Job& job, const TriangleMesh& volume, co
 }
 
 /// The rotation next to how straight light takes directions in the image's plane to the receiver's.
-Eigen::Matrix2d straight_turn(const Job& job) {
+Eigen::Matrix2d straight_turn(const LensJob& job) {
   const Eigen::Vector2d pixel = job.receiver.pixel_size();
   const Eigen::Matrix2d image_by_receiver =
       job.straight.linear() * Eigen::Vector2d(1 / pixel.x(), -1 / pixel.y()).asDiagonal();
@@ -239,20 +257,14 @@ Eigen::Matrix2d straight_turn(const Job& job) {
 }
 
 /// Looks up what the mesh shows, row by row.
-void scatter_rows(const Job& job, std::size_t channel, const LensMesh& mesh, const MeshReport& report,
+void scatter_rows(const LensJob& job, std::size_t channel, const LensMesh& mesh, const MeshReport& report,
                   LensPicture& picture) {
   const SheetSearch search(mesh, job.receiver.pixel_size().minCoeff());
-  const int height = job.receiver.resolution.y(), rows_at_once = 8 * tbb::this_task_arena::max_concurrency();
-  for (int first = 0; first < height; first += rows_at_once) {
-    report(static_cast<double>(first) / height);
-    tbb::parallel_for(first, std::min(first + rows_at_once, height), [&](int y) {
-      if (job.progress.cancelled) throw Cancelled();
-      scatter_row(job, y, channel, search, picture);
-    });
-  }
+  const auto tell = [&](int y) { report(static_cast<double>(y) / job.receiver.resolution.y()); };
+  for_rows(job, tell, [&](int y) { scatter_row(job, y, channel, search, picture); });
 }
 
-void scatter(const Job& job, const TriangleMesh& volume, const Eigen::Vector3d& direction, LensPicture& picture) {
+void scatter(const LensJob& job, const TriangleMesh& volume, const Eigen::Vector3d& direction, LensPicture& picture) {
   LensMeshSettings settings;
   settings.starts = useful_starts(job, volume, direction);
   settings.target = job.receiver.size;
@@ -266,7 +278,7 @@ void scatter(const Job& job, const TriangleMesh& volume, const Eigen::Vector3d& 
     };
     const LensMesh mesh = make_lens_mesh(job.map, job.flexibilities[channel], settings, picture.counts, job.progress,
                                          [&](double part) { tell(part / 2); });
-    for (const Landing& landing : mesh.landings) ++picture.ends[channel][static_cast<int>(landing.end)];
+    for (const LensLanding& landing : mesh.landings) ++picture.ends[channel][static_cast<int>(landing.end)];
     scatter_rows(
         job, channel, mesh, [&](double part) { tell((1 + part) / 2); }, picture);
   }
@@ -308,7 +320,8 @@ LensPicture simulate_lens(const TensorField& field, const Surfaces& surfaces, co
   // Light retraced from its end obeys the rule with the opposite sign.
   const LensMap map = gathers ? LensMap(field, surfaces, bending, receiver, image.plane, -direction)
                               : LensMap(field, surfaces, bending, image.plane, receiver, direction);
-  Job job{map, channels, receiver, image, settings, progress, {}, straight_map(receiver, image.plane, direction)};
+  LensJob job{map, channels, receiver, image, settings, progress};  // Each has a type of its own.
+  job.straight = straight_map(receiver, image.plane, direction);
   for (const LightChannel& channel : channels)
     job.flexibilities.push_back(gathers ? -channel.flexibility : channel.flexibility);
 

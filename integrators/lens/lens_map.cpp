@@ -60,7 +60,7 @@ LensMap::LensMap(const TensorField& field, const Surfaces& surfaces, const Bendi
       geometry_(make_geometry(surfaces, from, to, direction)) {}
 
 TraceCounts LensMap::trace(const std::vector<Eigen::Vector2d>& starts, const std::vector<double>& flexibilities,
-                           Landing* landings) const {
+                           LensLanding* landings) const {
   thread_local RayBatch batch;
   batch.clear();
   batch.tensor_samples = 0;

@@ -12,7 +12,7 @@
 namespace tensorray {
 
 /// Where one ray landed. Coordinates in a plane are along its plate's right and up, from its centre, world units.
-struct Landing {
+struct LensLanding {
   RayEnd end = RayEnd::missed;                             ///< `plate`: it landed.
   Eigen::Vector2d at = Eigen::Vector2d::Zero();            ///< If it landed.
   Eigen::Matrix2d jacobian = Eigen::Matrix2d::Identity();  ///< Of `at` by the start; if it landed.
@@ -49,7 +49,7 @@ class LensMap {
   /// Follows a ray for each of `starts` and each of `flexibilities`, those of one start next to each other, and writes
   /// starts.size() · flexibilities.size() landings. @return what it took.
   TraceCounts trace(const std::vector<Eigen::Vector2d>& starts, const std::vector<double>& flexibilities,
-                    Landing* landings) const;
+                    LensLanding* landings) const;
 
  private:
   const TensorField* field_;

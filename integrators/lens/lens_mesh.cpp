@@ -90,7 +90,7 @@ void trace_new(MeshWork& work, LensMesh& mesh, TraceCounts& counts) {
 
 enum class Edge { fine, coarse, torn };
 
-Edge judge(const Landing& a, const Landing& b, const Eigen::Vector2d& along, const PixelMetric& metric) {
+Edge judge(const LensLanding& a, const LensLanding& b, const Eigen::Vector2d& along, const PixelMetric& metric) {
   const bool a_landed = a.end == RayEnd::plate, b_landed = b.end == RayEnd::plate;
   if (!a_landed && !b_landed) return Edge::fine;
   if (a_landed != b_landed) return Edge::torn;
@@ -189,7 +189,7 @@ class Refinement {
   }
 
   bool needs_halving(std::uint32_t a, std::uint32_t b) const {
-    const Landing &from = mesh_.landings[a], &to = mesh_.landings[b];
+    const LensLanding &from = mesh_.landings[a], &to = mesh_.landings[b];
     if (is_short(a, b)) return false;
     if (from.end == RayEnd::plate && to.end == RayEnd::plate) {
       const Eigen::Array2d edge = (settings_.target / 2 + settings_.pixel).array();
@@ -268,7 +268,7 @@ std::vector<Triangle> lattice_triangles(int columns, int rows) {
 
 /// Keeps what light covers: triangles whose rays all landed, next to each other.
 void finish(LensMesh& mesh, const std::vector<Triangle>& triangles, const PixelMetric& metric) {
-  for (const Landing& landing : mesh.landings) mesh.mesh.vertices.push_back(landing.at);
+  for (const LensLanding& landing : mesh.landings) mesh.mesh.vertices.push_back(landing.at);
   for (const Triangle& triangle : triangles) {
     const bool covered = std::all_of(triangle.begin(), triangle.end(), [&](std::uint32_t vertex) {
       return mesh.landings[vertex].end == RayEnd::plate && mesh.landings[vertex].at.allFinite();
@@ -299,7 +299,7 @@ LensMesh make_lens_mesh(const LensMap& map, double flexibility, const LensMeshSe
   return mesh;
 }
 
-LensMesh lattice_mesh(std::vector<Eigen::Vector2d> starts, std::vector<Landing> landings, int columns, int rows,
+LensMesh lattice_mesh(std::vector<Eigen::Vector2d> starts, std::vector<LensLanding> landings, int columns, int rows,
                       double pixel) {
   LensMesh mesh;
   mesh.starts = std::move(starts);

@@ -16,7 +16,7 @@ namespace tensorray {
 
 struct LensMesh {
   std::vector<Eigen::Vector2d> starts;  ///< In the plane where rays start.
-  std::vector<Landing> landings;        ///< One for each start.
+  std::vector<LensLanding> landings;    ///< One for each start.
   PlanarMesh mesh;                      ///< Vertices are the landings' `at`; triangles are those whose rays all landed
                                         ///< and between whose rays the map is not torn.
 };
@@ -56,7 +56,7 @@ LensMesh make_lens_mesh(const LensMap& map, double flexibility, const LensMeshSe
                         const Progress& progress, const MeshReport& report = {});
 
 /// Triangulates landings that are there: starts on a lattice of `columns` × `rows`, row by row.
-LensMesh lattice_mesh(std::vector<Eigen::Vector2d> starts, std::vector<Landing> landings, int columns, int rows,
+LensMesh lattice_mesh(std::vector<Eigen::Vector2d> starts, std::vector<LensLanding> landings, int columns, int rows,
                       double pixel);
 
 /// Finds sheets. Immutable; any number of threads may query it at once. The mesh must outlive it.

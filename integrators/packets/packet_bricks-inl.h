@@ -17,7 +17,7 @@ HWY_BEFORE_NAMESPACE();
 namespace tensorray::packets::HWY_NAMESPACE {
 
 /// Finds the bricks of some lanes, given as bits.
-HWY_INLINE void find_bricks(const Medium& medium, Packet& packet, std::uint32_t wanted) {
+HWY_INLINE void find_bricks(const PacketMedium& medium, Packet& packet, std::uint32_t wanted) {
   while (wanted != 0) {
     const auto first = hwy::Num0BitsBelowLS1Bit_Nonzero32(wanted);
     const std::int32_t at[3] = {packet.brick[0][first], packet.brick[1][first], packet.brick[2][first]};
@@ -41,7 +41,7 @@ HWY_INLINE void find_bricks(const Medium& medium, Packet& packet, std::uint32_t 
 
 /// Sets what follows from how strong the lanes' bricks are.
 template <bool uniform>
-HWY_INLINE void find_reach(const Medium& medium, Packet& packet) {
+HWY_INLINE void find_reach(const PacketMedium& medium, Packet& packet) {
   const F most = set(1e30f);
   const F longest = set(medium.longest_step * (uniform ? 1.0f : medium.longest_voxel));
   const bool euler = medium.settings.method == BendingMethod::euler;  // It sees the trace of T, which has no bound.
@@ -65,7 +65,7 @@ HWY_INLINE void find_reach(const Medium& medium, Packet& packet) {
 
 /// Sets what follows from the lanes' bricks.
 template <bool uniform>
-HWY_INLINE void summarize(const Medium& medium, Packet& packet) {
+HWY_INLINE void summarize(const PacketMedium& medium, Packet& packet) {
   find_reach<uniform>(medium, packet);
   // A step may begin a little outside of its brick.
   const F near = set(-medium.longest_step - 1), far = set(TensorBrick::cells + medium.longest_step + 1);
@@ -90,7 +90,7 @@ HWY_INLINE void summarize(const Medium& medium, Packet& packet) {
 
 /// After lanes have been set: what follows from their rays.
 template <bool uniform>
-void begin(const Medium& medium, Packet& packet) {
+void begin(const PacketMedium& medium, Packet& packet) {
   for (int i = 0; i < packet.vectors * lanes; i += lanes)
     for (int axis = 0; axis < 3; ++axis) {
       const auto base = hn::Mul(hn::Load(ints, packet.brick[axis] + i), hn::Set(ints, TensorBrick::cells));
@@ -108,7 +108,7 @@ void begin(const Medium& medium, Packet& packet) {
 /// Takes the lanes whose point has left their brick to the point's. `point(i)` gives those of the vector at lane i,
 /// from the lanes' bricks.
 template <bool uniform, class Point>
-HWY_INLINE void move_to_bricks(const Medium& medium, Packet& packet, const Point& point) {
+HWY_INLINE void move_to_bricks(const PacketMedium& medium, Packet& packet, const Point& point) {
   const F zero = hn::Zero(floats), cells = set(TensorBrick::cells);
   std::uint32_t moved = 0;
   for (int i = 0; i < packet.vectors * lanes; i += lanes) {

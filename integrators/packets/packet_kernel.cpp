@@ -31,7 +31,7 @@ namespace tensorray::packets::HWY_NAMESPACE {
 template <bool uniform, bool differentials>
 class Kernel {
  public:
-  Kernel(const Medium& medium, KernelRays& batch) : medium_(medium), rays_(batch.rays), batch_(batch) {}
+  Kernel(const PacketMedium& medium, KernelRays& batch) : medium_(medium), rays_(batch.rays), batch_(batch) {}
 
   std::uint64_t run();
 
@@ -57,9 +57,9 @@ class Kernel {
   unsigned samples_per_step() const { return medium_.stages ? medium_.stages->stages : 1; }
   float to_world() const { return uniform ? medium_.voxel : 1.0f; }  // Of what u is per.
   void land(Packet& packet);
-  void arrive(Packet& packet, const Landing& landing);
+  void arrive(Packet& packet, const FaceLanding& landing);
 
-  const Medium& medium_;
+  const PacketMedium& medium_;
   std::vector<KernelRay>& rays_;
   KernelRays& batch_;
   std::size_t next_ = 0;  // The first ray that no packet has held yet.
@@ -340,7 +340,7 @@ HWY_NOINLINE void Kernel<uniform, differentials>::land(Packet& packet) {
   packet.vectors = packet_rays / lanes;
   close_ranks(packet);
   packet.clamps = true;
-  Landing landing;
+  FaceLanding landing;
   attempt(packet);
   aim(medium_, packet, landing);
   for (int n = 0; n < landing_steps; ++n) {
@@ -355,7 +355,7 @@ HWY_NOINLINE void Kernel<uniform, differentials>::land(Packet& packet) {
 
 /// Hands rays on that are on the extent's faces.
 template <bool uniform, bool differentials>
-void Kernel<uniform, differentials>::arrive(Packet& packet, const Landing& landing) {
+void Kernel<uniform, differentials>::arrive(Packet& packet, const FaceLanding& landing) {
   for (std::uint32_t rest = packet.alive; rest != 0; rest &= rest - 1) {
     const auto lane = hwy::Num0BitsBelowLS1Bit_Nonzero32(rest);
     KernelRay& ray = rays_[packet.ray[lane]];
@@ -395,7 +395,7 @@ std::uint64_t Kernel<uniform, differentials>::run() {
   return samples_;
 }
 
-std::uint64_t trace(const Medium& medium, KernelRays& batch) {
+std::uint64_t trace(const PacketMedium& medium, KernelRays& batch) {
   if (!batch.differentials.empty())
     return medium.uniform ? Kernel<true, true>(medium, batch).run() : Kernel<false, true>(medium, batch).run();
   return medium.uniform ? Kernel<true, false>(medium, batch).run() : Kernel<false, false>(medium, batch).run();
@@ -433,7 +433,7 @@ struct WithoutDenormals {};
 }  // namespace
 
 std::uint64_t run(const TensorField& field, const KernelSettings& settings, KernelRays& batch) {
-  const Medium medium(field, settings);
+  const PacketMedium medium(field, settings);
   [[maybe_unused]] const WithoutDenormals guard;
   return HWY_DYNAMIC_DISPATCH(trace)(medium, batch);
 }

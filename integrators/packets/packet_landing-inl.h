@@ -17,19 +17,19 @@ HWY_BEFORE_NAMESPACE();
 namespace tensorray::packets::HWY_NAMESPACE {
 
 /// Of rays that take their last step: the whole step, which is too long, its chord, and the axis that they leave along.
-struct alignas(64) Landing {
+struct alignas(64) FaceLanding {
   PerRay longest, chord[3], axis;
 };
 
 /// Where the extent's face across an axis is that rays along `chord` leave through.
-HWY_INLINE F face(const Medium& medium, const Packet& packet, const Landing& landing, int axis, int at) {
+HWY_INLINE F face(const PacketMedium& medium, const Packet& packet, const FaceLanding& landing, int axis, int at) {
   const F margin = set(medium.margin[axis]);
   return hn::IfThenElse(hn::Gt(load(landing.chord[axis], at), hn::Zero(floats)),
                         hn::Add(load(packet.high[axis], at), margin), hn::Sub(load(packet.low[axis], at), margin));
 }
 
 /// Finds the face that the whole step's chord meets, and about how long a step ends there.
-HWY_NOINLINE void aim(const Medium& medium, Packet& packet, Landing& landing) {
+HWY_NOINLINE void aim(const PacketMedium& medium, Packet& packet, FaceLanding& landing) {
   const F zero = hn::Zero(floats), one = set(1);
   for (int i = 0; i < packet.vectors * lanes; i += lanes) {
     const F longest = load(packet.time, i);
@@ -48,7 +48,7 @@ HWY_NOINLINE void aim(const Medium& medium, Packet& packet, Landing& landing) {
 
 /// How much longer, to first order, steps must be that end on the faces; 0 of light that grazes its face.
 template <bool uniform>
-HWY_INLINE F rest_of_way(const Medium& medium, const Packet& packet, const Landing& landing, int at) {
+HWY_INLINE F rest_of_way(const PacketMedium& medium, const Packet& packet, const FaceLanding& landing, int at) {
   const F zero = hn::Zero(floats), axis = load(landing.axis, at);
   const auto of_axis = [&](F a, F b, F c) HWY_ATTR {
     return hn::IfThenElse(hn::Eq(axis, zero), a, hn::IfThenElse(hn::Eq(axis, set(1)), b, c));
@@ -62,7 +62,7 @@ HWY_INLINE F rest_of_way(const Medium& medium, const Packet& packet, const Landi
 
 /// A step of Newton's method for the steps' lengths.
 template <bool uniform>
-HWY_NOINLINE void improve(const Medium& medium, Packet& packet, const Landing& landing) {
+HWY_NOINLINE void improve(const PacketMedium& medium, Packet& packet, const FaceLanding& landing) {
   for (int i = 0; i < packet.vectors * lanes; i += lanes) {
     const F time = hn::Add(load(packet.time, i), rest_of_way<uniform>(medium, packet, landing, i));
     store(hn::Min(hn::Max(time, hn::Zero(floats)), load(landing.longest, i)), packet.time, i);
@@ -71,7 +71,7 @@ HWY_NOINLINE void improve(const Medium& medium, Packet& packet, const Landing& l
 
 /// Straight on to the faces.
 template <bool uniform>
-HWY_NOINLINE void touch_down(const Medium& medium, Packet& packet, const Landing& landing) {
+HWY_NOINLINE void touch_down(const PacketMedium& medium, Packet& packet, const FaceLanding& landing) {
   for (int i = 0; i < packet.vectors * lanes; i += lanes) {
     const F rest = rest_of_way<uniform>(medium, packet, landing, i);
     const F3 u = uniform ? load(packet.v_next, i) : load(packet.u_next, i);

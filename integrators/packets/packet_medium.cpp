@@ -6,7 +6,8 @@
 
 namespace tensorray::packets {
 
-Medium::Medium(const TensorField& field_, const KernelSettings& settings_) : field(field_), settings(settings_) {
+PacketMedium::PacketMedium(const TensorField& field_, const KernelSettings& settings_)
+    : field(field_), settings(settings_) {
   const Eigen::Matrix3d M = field.to_index().linear();
   uniform = M == Eigen::Matrix3d(M(0, 0) * Eigen::Matrix3d::Identity()) && M(0, 0) > 0;
   voxel = static_cast<float>(1 / M(0, 0));
@@ -31,7 +32,7 @@ Medium::Medium(const TensorField& field_, const KernelSettings& settings_) : fie
   bounded = std::isfinite(settings.max_length);
 }
 
-bool Medium::near_surface(const std::int32_t at[3]) const {
+bool PacketMedium::near_surface(const std::int32_t at[3]) const {
   if (!settings.meets_surface) return false;
   const Eigen::Vector3d first_voxel = TensorBrick::cells * Eigen::Vector3d(at[0], at[1], at[2]);
   const Eigen::Vector3d margin_around = Eigen::Vector3d::Constant(longest_step + 1);
@@ -39,7 +40,7 @@ bool Medium::near_surface(const std::int32_t at[3]) const {
       {first_voxel - margin_around, first_voxel + Eigen::Vector3d::Constant(TensorBrick::cells) + margin_around});
 }
 
-bool Medium::meets_surface(const double from[3], const double to[3]) const {
+bool PacketMedium::meets_surface(const double from[3], const double to[3]) const {
   return settings.meets_surface(field.to_world() * Eigen::Vector3d(from[0], from[1], from[2]),
                                 field.to_world() * Eigen::Vector3d(to[0], to[1], to[2]));
 }

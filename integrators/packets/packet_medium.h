@@ -12,8 +12,8 @@
 namespace tensorray::packets {
 
 /// What all targets share. No function of it is inlined into code for a target that the processor may lack.
-struct Medium {
-  Medium(const TensorField& field, const KernelSettings& settings);
+struct PacketMedium {
+  PacketMedium(const TensorField& field, const KernelSettings& settings);
 
   const TensorField& field;
   const KernelSettings& settings;

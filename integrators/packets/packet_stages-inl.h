@@ -35,13 +35,13 @@ HWY_INLINE F3 combine(const PerRay (&rates)[RungeKutta::most_stages][3], const d
 
 /// Positions along a way whose direction is `v` in world axes, after `time`, from the start.
 template <bool uniform>
-HWY_INLINE F3 way(const Medium& medium, F time, const F3& v) {
+HWY_INLINE F3 way(const PacketMedium& medium, F time, const F3& v) {
   return mul(time, index_direction<uniform>(medium, v));
 }
 
 /// The state of a packet in a stage, but for its position, which is `ahead` of p.
 template <bool uniform, bool differentials>
-HWY_INLINE void begin_stage(const Medium& medium, const Packet& packet, int stage, Stages& stages) {
+HWY_INLINE void begin_stage(const PacketMedium& medium, const Packet& packet, int stage, Stages& stages) {
   const double* const factors = medium.stages->a[stage];
   for (int i = 0; i < packet.vectors * lanes; i += lanes) {
     const F time = load(packet.time, i);
@@ -61,7 +61,7 @@ HWY_INLINE void begin_stage(const Medium& medium, const Packet& packet, int stag
 
 /// Eq. 5 and its derivatives, with the tensors as last sampled.
 template <bool differentials>
-HWY_INLINE void end_stage(const Medium& medium, Packet& packet, int stage, Stages& stages) {
+HWY_INLINE void end_stage(const PacketMedium& medium, Packet& packet, int stage, Stages& stages) {
   for (int i = 0; i < packet.vectors * lanes; i += lanes) {
     const F kick = load(packet.kick, i);
     Tensor T;
@@ -86,7 +86,7 @@ HWY_INLINE void end_stage(const Medium& medium, Packet& packet, int stage, Stage
 
 /// Keeps v, taken to unit length, and its derivatives, as the packet's next.
 template <bool uniform, bool differentials>
-HWY_INLINE void keep_unit(const Medium& medium, Packet& packet, const F3& v, const F3 (&dv)[2], int at) {
+HWY_INLINE void keep_unit(const PacketMedium& medium, Packet& packet, const F3& v, const F3 (&dv)[2], int at) {
   const F inverse = hn::Div(set(1), hn::Sqrt(dot(v, v)));
   const F3 unit = mul(inverse, v);
   store(unit, packet.v_next, at);
@@ -100,7 +100,7 @@ HWY_INLINE void keep_unit(const Medium& medium, Packet& packet, const F3& v, con
 
 /// The error of an adaptive step over what is allowed: in voxels as the ray crosses them, or in radians.
 template <bool uniform>
-HWY_INLINE F find_excess(const Medium& medium, const Packet& packet, const Stages& stages, int at) {
+HWY_INLINE F find_excess(const PacketMedium& medium, const Packet& packet, const Stages& stages, int at) {
   const double* const factors = medium.stages->error;
   const int count = medium.stages->stages;
   const F3 by_v = combine(stages.v[0], factors, count, at), by_change = combine(stages.change[0], factors, count, at);
@@ -114,7 +114,7 @@ HWY_INLINE F find_excess(const Medium& medium, const Packet& packet, const Stage
 }
 
 template <bool uniform, bool differentials>
-HWY_INLINE void combine_stages(const Medium& medium, Packet& packet, const Stages& stages) {
+HWY_INLINE void combine_stages(const PacketMedium& medium, Packet& packet, const Stages& stages) {
   const double* const factors = medium.stages->b;
   const int count = medium.stages->stages;
   for (int i = 0; i < packet.vectors * lanes; i += lanes) {
@@ -138,7 +138,7 @@ HWY_INLINE void combine_stages(const Medium& medium, Packet& packet, const Stage
 
 /// A step of a Runge–Kutta method.
 template <bool uniform, bool differentials>
-HWY_NOINLINE void step_by_stages(const Medium& medium, Packet& packet) {
+HWY_NOINLINE void step_by_stages(const PacketMedium& medium, Packet& packet) {
   Stages stages;
   bool near_border = false, near_surface = false;  // In any brick where tensors are sampled.
   for (int stage = 0; stage < medium.stages->stages; ++stage) {
@@ -178,7 +178,7 @@ HWY_INLINE Slopes<F> sample_trailing(const Packet& packet, int at) {
 
 /// A step of Euler's method (Eq. 3–4), which sees the trace of T.
 template <bool uniform, bool differentials>
-HWY_NOINLINE void step_by_euler(const Medium& medium, Packet& packet) {
+HWY_NOINLINE void step_by_euler(const PacketMedium& medium, Packet& packet) {
   locate<uniform, differentials>(medium, packet, [&](int i) HWY_ATTR { return load(packet.p, i); });
   interpolate<uniform, differentials>(medium, packet);
   for (int i = 0; i < packet.vectors * lanes; i += lanes) {
@@ -208,7 +208,7 @@ HWY_NOINLINE void step_by_euler(const Medium& medium, Packet& packet) {
 
 /// Sets adaptive methods' first steps.
 template <bool uniform>
-HWY_NOINLINE void begin_steps(const Medium& medium, Packet& packet) {
+HWY_NOINLINE void begin_steps(const PacketMedium& medium, Packet& packet) {
   for (int i = 0; i < packet.vectors * lanes; i += lanes) {
     const F voxel = voxel_along<uniform>(packet, i);
     store(automatic_step(medium, load(packet.bending_rate, i), voxel), packet.wanted, i);
@@ -260,7 +260,7 @@ HWY_INLINE F growth(F excess, int order) {
 /// Sets the next adaptive steps by the errors of these; lanes that err by too much stay.
 /// @return these, as bits.
 template <bool uniform, bool differentials>
-HWY_NOINLINE std::uint32_t control_steps(const Medium& medium, Packet& packet) {
+HWY_NOINLINE std::uint32_t control_steps(const PacketMedium& medium, Packet& packet) {
   std::uint32_t staying = 0;
   for (int i = 0; i < packet.vectors * lanes; i += lanes) {
     const F excess = load(packet.excess, i), wanted = load(packet.wanted, i);

@@ -30,7 +30,7 @@ HWY_INLINE const PerRay (&direction(const Packet& packet))[3] {
 }
 
 template <bool uniform>
-HWY_INLINE F3 index_direction(const Medium& medium, const F3& v) {
+HWY_INLINE F3 index_direction(const PacketMedium& medium, const F3& v) {
   if (uniform) return {v.x, v.y, v.z};
   const auto& m = medium.to_index;
   const auto row = [&](int i) HWY_ATTR {
@@ -42,7 +42,7 @@ HWY_INLINE F3 index_direction(const Medium& medium, const F3& v) {
 /// The last step of lanes in bricks where nothing bends light ended a little behind them: takes these lanes to the
 /// bricks where they are now. (Others are taken there by their steps' middles, whatever their neighbours do.)
 template <bool uniform>
-HWY_NOINLINE void leave_straight_bricks(const Medium& medium, Packet& packet) {
+HWY_NOINLINE void leave_straight_bricks(const PacketMedium& medium, Packet& packet) {
   const F zero = hn::Zero(floats), end = set(TensorBrick::cells);
   const auto moves = [&](int i) HWY_ATTR {
     const F3 p = load(packet.p, i);
@@ -59,7 +59,7 @@ HWY_NOINLINE void leave_straight_bricks(const Medium& medium, Packet& packet) {
 
 /// How long an automatic step of fixed-step methods is, voxels, if one voxel is as long as `voxel`. @p bending_rate as
 /// a packet has it.
-HWY_INLINE F automatic_step(const Medium& medium, F bending_rate, F voxel) {
+HWY_INLINE F automatic_step(const PacketMedium& medium, F bending_rate, F voxel) {
   const bool splitting = medium.settings.method == BendingMethod::splitting;
   const F shortest = set(splitting ? static_cast<float>(step_lengths::shortest_splitting) : 0.0f);
   const F longest = set(static_cast<float>(step_lengths::longest_automatic));
@@ -78,7 +78,7 @@ HWY_INLINE F voxel_along(const Packet& packet, int at) {
 
 /// How long the next step is, in the units that u is per: voxels, or, if voxels are not uniform, world units.
 template <bool uniform>
-HWY_NOINLINE void find_times(const Medium& medium, Packet& packet) {
+HWY_NOINLINE void find_times(const PacketMedium& medium, Packet& packet) {
   if (packet.straight) leave_straight_bricks<uniform>(medium, packet);
   const bool automatic = medium.settings.step == 0 && !(packet.greatest_reach <= strongest_kick);
   const F zero = hn::Zero(floats), end = set(TensorBrick::cells);
@@ -142,7 +142,7 @@ HWY_INLINE bool find_cells(Packet& packet, bool forced, const Point& point_of) {
 
 /// Goes to points where tensors are wanted: takes lanes to the bricks of these.
 template <bool uniform, bool differentials, class Point>
-HWY_INLINE void locate(const Medium& medium, Packet& packet, const Point& point_of) {
+HWY_INLINE void locate(const PacketMedium& medium, Packet& packet, const Point& point_of) {
   const bool found = packet.clamps ? find_cells<differentials, true>(packet, false, point_of)
                                    : find_cells<differentials, false>(packet, false, point_of);
   if (HWY_LIKELY(found)) return;
@@ -156,7 +156,7 @@ HWY_INLINE void locate(const Medium& medium, Packet& packet, const Point& point_
 
 /// The first part of a step: to its middle.
 template <bool uniform, bool differentials>
-HWY_INLINE void locate_middles(const Medium& medium, Packet& packet) {
+HWY_INLINE void locate_middles(const PacketMedium& medium, Packet& packet) {
   locate<uniform, differentials>(medium, packet, [&](int i) HWY_ATTR {
     const F half = hn::Mul(set(0.5f), load(packet.time, i));
     return mul_add(half, load(direction<uniform>(packet), i), load(packet.p, i));
@@ -177,7 +177,7 @@ HWY_INLINE void prefetch_one(const Packet& packet, int lane) {
 
 /// Asks for the memory of the cells where the lanes of a vector will be after two long steps.
 template <bool uniform>
-HWY_INLINE void prefetch_all(const Medium& medium, const Packet& packet, int first) {
+HWY_INLINE void prefetch_all(const PacketMedium& medium, const Packet& packet, int first) {
   // Lanes are wavelengths in their order, mostly: where the outermost ones are close, so are the others.
   float between = packet.one_brick ? 0 : 2;
   for (const PerRay& middle : packet.middle)
@@ -224,7 +224,7 @@ HWY_INLINE bool in_one_cell(const Packet& packet, int first) {
 
 /// The second part: the tensors there.
 template <bool uniform, bool differentials>
-HWY_INLINE void interpolate(const Medium& medium, Packet& packet) {
+HWY_INLINE void interpolate(const PacketMedium& medium, Packet& packet) {
   if (!differentials && HWY_LIKELY(packet.one_cell)) {
     prefetch_one<uniform>(packet, 0);
     return sample_cell(cell_of(packet, 0), packet, 0, packet.vectors);
@@ -247,7 +247,7 @@ HWY_INLINE void interpolate(const Medium& medium, Packet& packet) {
 }
 
 /// A change of position, but across axes of a single voxel, where the tensor is the same.
-HWY_INLINE F3 along_slopes(const Medium& medium, const F3& dp) {
+HWY_INLINE F3 along_slopes(const PacketMedium& medium, const F3& dp) {
   return {hn::Mul(dp.x, set(medium.slope[0])), hn::Mul(dp.y, set(medium.slope[1])),
           hn::Mul(dp.z, set(medium.slope[2]))};
 }
@@ -263,7 +263,7 @@ HWY_INLINE Tensor tensor_along(const Packet& packet, const F3& along, int at) {
 /// The derivatives of exp(factor · T) V, normalised, along two parameters, and those of the positions at the end of the
 /// step: of the method's own steps. One term more than without, as the derivative of a series has one less.
 template <bool uniform>
-HWY_INLINE void bend_differentials(const Medium& medium, Packet& packet, const Tensor& T, const F3& v, F factor,
+HWY_INLINE void bend_differentials(const PacketMedium& medium, Packet& packet, const Tensor& T, const F3& v, F factor,
                                    int at) {
   const F size = load(packet.size, at), half = hn::Mul(set(0.5f), load(packet.time, at));
   for (int i = 0; i < 2; ++i) {
@@ -290,7 +290,8 @@ HWY_INLINE void bend_differentials(const Medium& medium, Packet& packet, const T
 /// The third part: bends, and on from the middle, to the positions and directions at the end, which may be the
 /// packet's. `weakly`: no lane needs more than two terms.
 template <bool uniform, bool differentials, bool weakly>
-HWY_INLINE void take_step_as(const Medium& medium, Packet& packet, PerRay (&p)[3], PerRay (&v)[3], PerRay (&u)[3]) {
+HWY_INLINE void take_step_as(const PacketMedium& medium, Packet& packet, PerRay (&p)[3], PerRay (&v)[3],
+                             PerRay (&u)[3]) {
   for (int i = 0; i < packet.vectors * lanes; i += lanes) {
     const F time = load(packet.time, i), factor = hn::Mul(time, load(packet.kick, i)), half = hn::Mul(set(0.5f), time);
     Tensor T;
@@ -313,7 +314,7 @@ HWY_INLINE void take_step_as(const Medium& medium, Packet& packet, PerRay (&p)[3
 }
 
 template <bool uniform, bool differentials>
-HWY_INLINE void take_step(const Medium& medium, Packet& packet, PerRay (&p)[3], PerRay (&v)[3], PerRay (&u)[3]) {
+HWY_INLINE void take_step(const PacketMedium& medium, Packet& packet, PerRay (&p)[3], PerRay (&v)[3], PerRay (&u)[3]) {
   if (!differentials && HWY_LIKELY(packet.greatest_reach <= series_reach[0]))
     return take_step_as<uniform, differentials, true>(medium, packet, p, v, u);
   take_step_as<uniform, differentials, false>(medium, packet, p, v, u);

@@ -149,7 +149,7 @@ bool same_start(const RayBatch& batch, std::size_t i, std::size_t j) {
 
 /// Lets a ray have the record of another.
 void copy_record(const Recordings& recordings, std::size_t from, std::size_t to) {
-  if (recordings.ways) (*recordings.ways)[to] = (*recordings.ways)[from];
+  if (recordings.paths) (*recordings.paths)[to] = (*recordings.paths)[from];
   if (recordings.tracks) (*recordings.tracks)[to] = (*recordings.tracks)[from];
 }
 
@@ -228,7 +228,7 @@ RayEnd finish(const TensorField& field, const Flight& flight, std::size_t i, dou
     tracer.record(true);
     return tracer.leave();
   }
-  drop_last(recording.way);  // It begins with that point.
+  drop_last(recording.path);  // It begins with that point.
   drop_last(recording.track);
   return tracer.follow(double{ray.step});
 }

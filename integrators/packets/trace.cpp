@@ -63,9 +63,9 @@ void trace(const TensorField& field, const Geometry& geometry, const BendingSett
 }
 
 void trace(const TensorField& field, const Geometry& geometry, const BendingSettings& settings, RayBatch& batch,
-           std::vector<Way>& ways) {
-  ways.assign(batch.size(), Way());
-  trace_batch(field, geometry, settings, batch, {&ways, nullptr});
+           std::vector<PathPoints>& paths) {
+  paths.assign(batch.size(), PathPoints());
+  trace_batch(field, geometry, settings, batch, {&paths, nullptr});
 }
 
 void trace(const TensorField& field, const Geometry& geometry, const BendingSettings& settings, RayBatch& batch,

@@ -97,19 +97,19 @@ Eigen::Vector3d transported(const Eigen::Vector3d& normal, const Eigen::Vector3d
   return (carried - carried.dot(to_direction) * to_direction).normalized();
 }
 
-std::vector<CrossSection> cross_sections(const Way& way, const CrossSectionSettings& settings) {
+std::vector<CrossSection> cross_sections(const PathPoints& points, const CrossSectionSettings& settings) {
   check(settings);
   std::vector<CrossSection> sections;
-  sections.reserve(way.size());
+  sections.reserve(points.size());
   Eigen::Vector3d frame = Eigen::Vector3d::Zero(), axis = Eigen::Vector3d::Zero();
-  for (std::size_t i = 0; i < way.size(); ++i) {
-    const Eigen::Vector3d& V = way[i].direction;
-    Clamped e = clamped(ellipse(way[i].tensor, V), V, settings);
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    const Eigen::Vector3d& V = points[i].direction;
+    Clamped e = clamped(ellipse(points[i].tensor, V), V, settings);
     if (i == 0) {
       frame = axis = e.major;
     } else {
       const auto carry = [&](const Eigen::Vector3d& normal) {
-        return transported(normal, way[i - 1].position, way[i - 1].direction, way[i].position, V);
+        return transported(normal, points[i - 1].position, points[i - 1].direction, points[i].position, V);
       };
       frame = carry(frame);
       axis = carry(axis);
@@ -126,10 +126,10 @@ std::vector<CrossSection> cross_sections(const Way& way, const CrossSectionSetti
   return sections;
 }
 
-double scale_for_radius(const std::vector<const Way*>& ways, double radius) {
+double scale_for_radius(const std::vector<const PathPoints*>& paths, double radius) {
   std::vector<double> lengths;
-  for (const Way* way : ways)
-    for (const Waypoint& point : *way) {
+  for (const PathPoints* points : paths)
+    for (const PathPoint& point : *points) {
       if (!point.in_field) continue;
       const Basis axes = ellipse(point.tensor, point.direction);
       for (int i = 0; i < 2; ++i)

@@ -44,9 +44,9 @@ Eigen::Vector3d transported(const Eigen::Vector3d& normal, const Eigen::Vector3d
 
 /// One cross section for each point.
 /// @throw std::invalid_argument if a setting is out of range.
-std::vector<CrossSection> cross_sections(const Way& way, const CrossSectionSettings& settings);
+std::vector<CrossSection> cross_sections(const PathPoints& points, const CrossSectionSettings& settings);
 
-/// The scale at which the median of all semi-axes of `ways` in the field is `radius`; 1 where there is none.
-double scale_for_radius(const std::vector<const Way*>& ways, double radius);
+/// The scale at which the median of all semi-axes of `paths` in the field is `radius`; 1 where there is none.
+double scale_for_radius(const std::vector<const PathPoints*>& paths, double radius);
 
 }  // namespace tensorray

@@ -1,7 +1,6 @@
 #include "integrators/paths/path_files.h"
 
 #include <algorithm>
-#include <cctype>
 #include <stdexcept>
 #include <string>
 
@@ -23,44 +22,44 @@ Eigen::Vector3d parabola_slope(const Eigen::Vector3d& before, double h, const Ei
   return slope.norm() > 0 ? Eigen::Vector3d(slope.normalized()) : behind;
 }
 
-void set_directions(Way& way) {
-  const std::size_t pieces = way.size() - 1;
-  const auto length = [&](std::size_t i) { return way[i + 1].length - way[i].length; };
+void set_directions(PathPoints& points) {
+  const std::size_t pieces = points.size() - 1;
+  const auto length = [&](std::size_t i) { return points[i + 1].length - points[i].length; };
   const auto piece = [&](std::size_t i) -> Eigen::Vector3d {
-    return (way[i + 1].position - way[i].position).normalized();
+    return (points[i + 1].position - points[i].position).normalized();
   };
   for (std::size_t i = 1; i < pieces; ++i)
-    way[i].direction = parabola_slope(piece(i - 1), length(i - 1), piece(i), length(i));
+    points[i].direction = parabola_slope(piece(i - 1), length(i - 1), piece(i), length(i));
   // At the ends the same parabola: its slopes at a piece's ends are those of the piece in the mean.
-  way.front().direction = pieces > 1 ? (2 * piece(0) - way[1].direction).normalized() : piece(0);
-  way.back().direction = pieces > 1 ? (2 * piece(pieces - 1) - way[pieces - 1].direction).normalized() : piece(0);
+  points.front().direction = pieces > 1 ? (2 * piece(0) - points[1].direction).normalized() : piece(0);
+  points.back().direction = pieces > 1 ? (2 * piece(pieces - 1) - points[pieces - 1].direction).normalized() : piece(0);
 }
 
-void set_changes(Way& way) {
-  for (std::size_t i = 0; i < way.size(); ++i) {
-    const Waypoint &before = way[i > 0 ? i - 1 : i], &behind = way[std::min(i + 1, way.size() - 1)];
+void set_changes(PathPoints& points) {
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    const PathPoint &before = points[i > 0 ? i - 1 : i], &behind = points[std::min(i + 1, points.size() - 1)];
     const Eigen::Vector3d slope = (behind.direction - before.direction) / (behind.length - before.length);
-    way[i].change = slope - way[i].direction.dot(slope) * way[i].direction;
+    points[i].change = slope - points[i].direction.dot(slope) * points[i].direction;
   }
 }
 
 }  // namespace
 
-Way bare_way(const std::vector<Eigen::Vector3d>& positions) {
-  Way way;
+PathPoints bare_way(const std::vector<Eigen::Vector3d>& positions) {
+  PathPoints points;
   for (const Eigen::Vector3d& position : positions) {
     // Lengths must grow, so points nearer than the rounding of the length are one.
-    const double length = way.empty() ? 0 : way.back().length + (position - way.back().position).norm();
-    if (!way.empty() && !(length > way.back().length)) continue;
-    way.emplace_back();
-    way.back().position = position;
-    way.back().length = length;
-    way.back().in_field = true;
+    const double length = points.empty() ? 0 : points.back().length + (position - points.back().position).norm();
+    if (!points.empty() && !(length > points.back().length)) continue;
+    points.emplace_back();
+    points.back().position = position;
+    points.back().length = length;
+    points.back().in_field = true;
   }
-  if (way.size() < 2) return {};
-  set_directions(way);
-  set_changes(way);
-  return way;
+  if (points.size() < 2) return {};
+  set_directions(points);
+  set_changes(points);
+  return points;
 }
 
 void write_paths(const std::filesystem::path& path, const std::vector<Path>& paths) {

@@ -39,6 +39,6 @@ std::vector<Path> read_paths(const std::filesystem::path& path);
 /// A way of which only the positions are known. Of points that coincide one is kept; directions, lengths and V' are
 /// those of the polyline (second order where points are dense), T = 0, and all points count as in the field. Empty if
 /// fewer than two points are left.
-Way bare_way(const std::vector<Eigen::Vector3d>& positions);
+PathPoints bare_way(const std::vector<Eigen::Vector3d>& positions);
 
 }  // namespace tensorray

@@ -30,11 +30,11 @@ struct PathSettings {
   double tensor_tolerance = 0.02;  ///< ... and in T, of the greater norm of its ends; >= 0.
 };
 
-/// One ray, in the light's direction. Its points are those of `Way`, thinned, with lengths that grow from zero at the
-/// first one. Where light enters or leaves the field, T jumps: one point is on the face, within the field, and another
-/// one before or behind it, nearer than the tolerance.
+/// What one ray has left, in the light's direction: points as `trace` records them, thinned, with lengths that grow
+/// from zero at the first one. Where light enters or leaves the field, T jumps: one point is on the face, within the
+/// field, and another one before or behind it, nearer than the tolerance.
 struct Path {
-  Way points;  ///< Two or more; or none, where the light does not meet the volume.
+  PathPoints points;  ///< Two or more; or none, where the light does not meet the volume.
   double flexibility = 0;
   double wavelength = 0;
   RayEnd end = RayEnd::missed;         ///< Why it ends.

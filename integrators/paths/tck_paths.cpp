@@ -149,7 +149,7 @@ void write_tck_paths(const std::filesystem::path& path, const std::vector<Path>&
   for (const Path& line : paths) {
     if (!has_points(line)) continue;
     track.clear();
-    for (const Waypoint& point : line.points) put(point.position, track);
+    for (const PathPoint& point : line.points) put(point.position, track);
     put(Eigen::Vector3d::Constant(std::numeric_limits<double>::quiet_NaN()), track);
     file.write(track.data(), static_cast<std::streamsize>(track.size()));
   }

@@ -18,13 +18,6 @@ constexpr std::uint32_t block = 1u << 16;              // Candidates that are ju
 constexpr std::uint32_t enough_to_give_up = 1u << 20;  // Candidates none of which is wanted.
 constexpr std::uint32_t most_candidates = 1u << 26;
 
-/// The part of a world box that the field's extent may reach into.
-Eigen::AlignedBox3d within_extent(const TensorField& field, const Eigen::AlignedBox3d& bounds) {
-  Eigen::AlignedBox3d box;
-  for (const Eigen::Vector3d& corner : field.corners()) box.extend(corner);
-  return box.intersection(bounds);
-}
-
 Eigen::Vector3d candidate(const Eigen::AlignedBox3d& box, std::uint64_t seed, std::uint32_t i) {
   const Eigen::Vector3d u(sobol(seed, i, 0), sobol(seed, i, 1), sobol(seed, i, 2));
   return box.min() + u.cwiseProduct(box.sizes());
@@ -62,7 +55,7 @@ std::vector<Eigen::Vector3d> threshold_seeds(const TensorField& field, const Eig
   if (count == 0) throw std::invalid_argument("seeds need a count of 1 or more");
   if (!(threshold.least <= threshold.greatest))
     throw std::invalid_argument("the threshold of seeds must not be less at most than at least");
-  const Eigen::AlignedBox3d box = within_extent(field, bounds);
+  const Eigen::AlignedBox3d box = field.world_box().intersection(bounds);
   if (box.isEmpty()) throw std::invalid_argument("the box of threshold seeds does not meet the field's extent");
   std::vector<Eigen::Vector3d> seeds;
   double smallest = std::numeric_limits<double>::infinity(), largest = -smallest;

@@ -39,7 +39,7 @@ template <class Number, class Get>
 DataArray per_point(const std::vector<Path>& paths, int components, const Get& get) {
   Column<Number> column(components);
   for (const Path& path : paths)
-    for (const Waypoint& point : path.points) column.add(get(point));
+    for (const PathPoint& point : path.points) column.add(get(point));
   return column.take();
 }
 
@@ -67,17 +67,17 @@ void add_axes(const std::vector<Path>& paths, PolylineData& data) {
 PolylineData data_of(const std::vector<Path>& paths) {
   PolylineData data;
   for (const Path& path : paths) {
-    for (const Waypoint& point : path.points) data.points.push_back(point.position);
+    for (const PathPoint& point : path.points) data.points.push_back(point.position);
     if (!path.points.empty()) data.line_ends.push_back(data.points.size());
   }
   auto& points = data.point_data;
-  points["direction"] = per_point<double>(paths, 3, [](const Waypoint& point) { return point.direction; });
-  points["length"] = per_point<double>(paths, 1, [](const Waypoint& point) { return point.length; });
-  points["tensor"] = per_point<double>(paths, 9, [](const Waypoint& point) { return RowMajorMatrix(point.tensor); });
-  points["change"] = per_point<double>(paths, 3, [](const Waypoint& point) { return point.change; });
-  points["in_field"] = per_point<std::uint8_t>(paths, 1, [](const Waypoint& point) { return point.in_field ? 1 : 0; });
-  points["force"] = per_point<float>(paths, 3, [](const Waypoint& point) { return point.force(); });
-  points["curvature"] = per_point<float>(paths, 1, [](const Waypoint& point) { return point.change.norm(); });
+  points["direction"] = per_point<double>(paths, 3, [](const PathPoint& point) { return point.direction; });
+  points["length"] = per_point<double>(paths, 1, [](const PathPoint& point) { return point.length; });
+  points["tensor"] = per_point<double>(paths, 9, [](const PathPoint& point) { return RowMajorMatrix(point.tensor); });
+  points["change"] = per_point<double>(paths, 3, [](const PathPoint& point) { return point.change; });
+  points["in_field"] = per_point<std::uint8_t>(paths, 1, [](const PathPoint& point) { return point.in_field ? 1 : 0; });
+  points["force"] = per_point<float>(paths, 3, [](const PathPoint& point) { return point.force(); });
+  points["curvature"] = per_point<float>(paths, 1, [](const PathPoint& point) { return point.change.norm(); });
   add_axes(paths, data);
 
   auto& lines = data.line_data;
@@ -114,8 +114,8 @@ PointArrays point_arrays(const PolylineData& data) {
           find(data.point_data, "change", 3), find(data.point_data, "in_field", 1)};
 }
 
-Waypoint waypoint(const PolylineData& data, const PointArrays& arrays, std::size_t i) {
-  Waypoint point;
+PathPoint path_point(const PolylineData& data, const PointArrays& arrays, std::size_t i) {
+  PathPoint point;
   point.position = data.points[i];
   point.direction = Eigen::Map<const Eigen::Vector3d>(arrays.direction + 3 * i);
   point.length = arrays.length[i];
@@ -129,11 +129,11 @@ Waypoint waypoint(const PolylineData& data, const PointArrays& arrays, std::size
   return point;
 }
 
-Way full_way(const PolylineData& data, const PointArrays& arrays, std::size_t begin, std::size_t end) {
-  Way way;
+PathPoints full_way(const PolylineData& data, const PointArrays& arrays, std::size_t begin, std::size_t end) {
+  PathPoints way;
   way.reserve(end - begin);
   for (std::size_t i = begin; i < end; ++i) {
-    way.push_back(waypoint(data, arrays, i));
+    way.push_back(path_point(data, arrays, i));
     way.back().length -= arrays.length[begin];
     if (i > begin && !(way[i - begin].length > way[i - begin - 1].length))
       throw std::runtime_error("the array \"length\" does not grow along a line, at point " + std::to_string(i) +
@@ -143,7 +143,7 @@ Way full_way(const PolylineData& data, const PointArrays& arrays, std::size_t be
   return way;
 }
 
-Way way_of(const PolylineData& data, const PointArrays& arrays, std::size_t begin, std::size_t end) {
+PathPoints way_of(const PolylineData& data, const PointArrays& arrays, std::size_t begin, std::size_t end) {
   if (arrays.direction && arrays.length && arrays.tensor && arrays.change && arrays.in_field)
     return full_way(data, arrays, begin, end);
   using Difference = std::vector<Eigen::Vector3d>::difference_type;

@@ -44,7 +44,7 @@ struct PixelMap {
 };
 
 /// Everything that the threads share and do not change.
-struct Job {
+struct PhotonJob {
   const TensorField& field;
   const Geometry& geometry;
   const Beam& beam;
@@ -52,12 +52,12 @@ struct Job {
   const BendingSettings& bending;
   const PhotonSettings& settings;
   const Progress& progress;
-  BeamSampler positions;
-  PixelMap to_pixel;
-  int rays_per_position;
-  int channels_per_ray;  // One of so many.
-  double ray_area;
-  FluenceSums* fluence;  // Null unless asked for.
+  const BeamSampler& positions;
+  const PixelMap to_pixel;
+  int rays_per_position = 0;
+  int channels_per_ray = 0;  // One of so many.
+  double ray_area = 0;
+  FluenceSums* fluence = nullptr;  // Null unless asked for.
 
   std::uint64_t chunk_size() const {
     return std::clamp(rays_in_chunk / rays_per_position, std::uint64_t{1}, largest_chunk);
@@ -82,7 +82,7 @@ struct Chunk {
 };
 
 /// The channel of the position's ray number `ray`: one in each of `rays_per_position` equal ranges of channels.
-int channel_of(const Job& job, int ray, double stratum) {
+int channel_of(const PhotonJob& job, int ray, double stratum) {
   const int range = job.channels_per_ray;
   return ray * range + std::min(static_cast<int>(stratum * range), range - 1);
 }
@@ -119,7 +119,7 @@ void emit(const BeamSampler& positions, std::uint64_t first, std::uint64_t last,
   for (const std::uint64_t key : order) emissions.push_back(sampled[static_cast<std::uint32_t>(key)]);
 }
 
-void fill_batch(const Job& job, const Emission* first, const Emission* last, Worker& worker) {
+void fill_batch(const PhotonJob& job, const Emission* first, const Emission* last, Worker& worker) {
   RayBatch& batch = worker.batch;
   batch.clear();
   worker.channels.clear();
@@ -134,21 +134,26 @@ void fill_batch(const Job& job, const Emission* first, const Emission* last, Wor
   batch.direction.assign(batch.position.size(), job.beam.direction);
 }
 
-void trace_batch(const Job& job, Worker& worker) {
+void trace_batch(const PhotonJob& job, Worker& worker) {
   if (!job.fluence) return trace(job.field, job.geometry, job.bending, worker.batch);
   trace(job.field, job.geometry, job.bending, worker.batch, worker.tracks);
   for (std::size_t i = 0; i < worker.batch.size(); ++i) job.fluence->add(worker.channels[i], worker.tracks[i]);
 }
 
-Photon make_photon(const Job& job, const Worker& worker, std::size_t ray, const Eigen::Vector3d& origin) {
+Photon make_photon(const PhotonJob& job, const Worker& worker, std::size_t ray, const Eigen::Vector3d& origin) {
   const LightChannel& channel = job.channels[worker.channels[ray]];
-  return {worker.batch.position[ray].cast<float>(), worker.batch.direction[ray].cast<float>(), origin.cast<float>(),
-          static_cast<float>(channel.wavelength), static_cast<float>(channel.power * job.ray_area)};
+  Photon photon;
+  photon.position = worker.batch.position[ray].cast<float>();
+  photon.direction = worker.batch.direction[ray].cast<float>();
+  photon.origin = origin.cast<float>();
+  photon.wavelength = static_cast<float>(channel.wavelength);
+  photon.power = static_cast<float>(channel.power * job.ray_area);
+  return photon;
 }
 
 /// Counts the rays of a batch, and writes the landings of its positions' first rays from `landings` on, those of their
 /// second rays `step` further, and so on: the same wavelength of neighbouring positions falls on the same pixels.
-void collect_batch(const Job& job, const DensityEstimator& estimator, Worker& worker, DensityPoint* landings,
+void collect_batch(const PhotonJob& job, const DensityEstimator& estimator, Worker& worker, DensityPoint* landings,
                    std::size_t step) {
   const std::size_t rays = job.rays_per_position;
   for (std::size_t i = 0, position = 0; i < worker.batch.size(); ++position)
@@ -163,7 +168,8 @@ void collect_batch(const Job& job, const DensityEstimator& estimator, Worker& wo
 }
 
 /// Traces the rays of a task's positions.
-void trace_task(const Job& job, const DensityEstimator& estimator, std::size_t task, Worker& worker, Chunk& chunk) {
+void trace_task(const PhotonJob& job, const DensityEstimator& estimator, std::size_t task, Worker& worker,
+                Chunk& chunk) {
   const std::size_t rays = job.rays_per_position, first = task * task_size;
   const std::size_t count = std::min<std::size_t>(task_size, chunk.emissions.size() - first);
   const std::size_t batch = std::max<std::size_t>(1, rays_in_batch / rays);
@@ -183,7 +189,7 @@ void trace_task(const Job& job, const DensityEstimator& estimator, std::size_t t
 }
 
 /// Traces a chunk's positions. Progress is told by the thread that called.
-void trace_chunk(const Job& job, const DensityEstimator& estimator, std::uint64_t first, std::uint64_t last,
+void trace_chunk(const PhotonJob& job, const DensityEstimator& estimator, std::uint64_t first, std::uint64_t last,
                  Workers& workers, Chunk& chunk) {
   emit(job.positions, first, last, chunk.emissions);
   const std::size_t count = chunk.emissions.size(), tasks = (count + task_size - 1) / task_size;
@@ -216,7 +222,7 @@ void add_counts(const Workers& workers, int rays_per_position, PhotonDistributio
 }
 
 /// Null unless it is asked for.
-std::unique_ptr<FluenceSums> make_fluence(const Job& job) {
+std::unique_ptr<FluenceSums> make_fluence(const PhotonJob& job) {
   if (job.settings.fluence == FluenceKind::none) return nullptr;
   std::vector<double> powers;
   for (const LightChannel& channel : job.channels) powers.push_back(channel.power);
@@ -241,19 +247,11 @@ PhotonDistribution distribute_photons(const TensorField& field, const Geometry& 
   if (!geometry.surfaces().plate) throw std::invalid_argument("photon distribution needs a receiver");
   const Plate& plate = *geometry.surfaces().plate;
   const int rays = rays_per_position(channels, settings);
-  Job job{field,
-          geometry,
-          beam,
-          channels,
-          bending,
-          settings,
-          progress,
-          BeamSampler(beam, settings.pattern, settings.photons, settings.seed),
-          PixelMap(plate),
-          rays,
-          static_cast<int>(channels.size()) / rays,
-          0,
-          nullptr};
+  const BeamSampler positions(beam, settings.pattern, settings.photons, settings.seed);
+  // Those that are references; each has a type of its own.
+  PhotonJob job{field, geometry, beam, channels, bending, settings, progress, positions, PixelMap(plate)};
+  job.rays_per_position = rays;
+  job.channels_per_ray = static_cast<int>(channels.size()) / rays;
   job.ray_area = job.positions.area_per_candidate() * static_cast<double>(channels.size()) / rays;
 
   const std::unique_ptr<FluenceSums> fluence = make_fluence(job);

@@ -18,23 +18,23 @@ constexpr double unseen = 0.5;          // Of wavelengths that the eye does not 
 constexpr double pale = 0.03;           // How much white makes a wavelength's colour reproducible.
 constexpr std::size_t judged = 200000;  // Points are enough to choose a range.
 
-double transverse_force(const Waypoint& point) {
+double transverse_force(const PathPoint& point) {
   const Eigen::Vector3d force = point.force();
   return (force - point.direction.dot(force) * point.direction).norm();
 }
 
-std::function<double(const Waypoint&)> value_of(const PathColorDescription& description) {
+std::function<double(const PathPoint&)> value_of(const PathColorDescription& description) {
   switch (description.by) {
     case PathColor::force:
-      return [](const Waypoint& point) { return point.force().norm(); };
+      return [](const PathPoint& point) { return point.force().norm(); };
     case PathColor::transverse_force:
       return transverse_force;
     case PathColor::curvature:
-      return [](const Waypoint& point) { return point.change.norm(); };
+      return [](const PathPoint& point) { return point.change.norm(); };
     case PathColor::length:
-      return [](const Waypoint& point) { return point.length; };
+      return [](const PathPoint& point) { return point.length; };
     case PathColor::invariant:
-      return [which = description.invariant](const Waypoint& point) { return invariant(which, point.tensor); };
+      return [which = description.invariant](const PathPoint& point) { return invariant(which, point.tensor); };
     default:
       return {};
   }
@@ -56,7 +56,7 @@ std::string title_of(const PathColorDescription& description) {
 }
 
 ValueRange range_of(const PathColorDescription& description, const std::vector<Path>& paths,
-                    const std::function<double(const Waypoint&)>& value) {
+                    const std::function<double(const PathPoint&)>& value) {
   if (description.range) return {description.range->x(), description.range->y(), description.logarithmic};
   std::size_t count = 0;
   for (const Path& path : paths) count += path.points.size();
@@ -64,7 +64,7 @@ ValueRange range_of(const PathColorDescription& description, const std::vector<P
   std::vector<double> values;
   std::size_t i = 0;
   for (const Path& path : paths)
-    for (const Waypoint& point : path.points)
+    for (const PathPoint& point : path.points)
       if (point.in_field && i++ % stride == 0) values.push_back(value(point));
   RangeChoice choice;
   choice.logarithmic = description.logarithmic;
@@ -83,7 +83,7 @@ Eigen::Vector3d wavelength_color(double wavelength) {
 
 PathColors wavelength_colors(const std::vector<Path>& paths) {
   PathColors colors;
-  colors.color = [](const Path& path, const Waypoint&) { return wavelength_color(path.wavelength); };
+  colors.color = [](const Path& path, const PathPoint&) { return wavelength_color(path.wavelength); };
   ValueRange range{380, 730};
   for (const Path& path : paths) {
     range.low = &path == &paths.front() ? path.wavelength : std::min(range.low, path.wavelength);
@@ -100,7 +100,7 @@ PathColors wavelength_colors(const std::vector<Path>& paths) {
 
 PathColors direction_colors() {
   PathColors colors;
-  colors.color = [](const Path&, const Waypoint& point) -> Eigen::Vector3d { return point.direction.cwiseAbs(); };
+  colors.color = [](const Path&, const PathPoint& point) -> Eigen::Vector3d { return point.direction.cwiseAbs(); };
   colors.legend = [](Image& image, const Eigen::Matrix3d& from_rec709) {
     ColorKey key = direction_key();
     for (ColorKeyEntry& entry : key.entries) entry.color = from_rec709 * entry.color;
@@ -118,7 +118,7 @@ PathColors path_colors(const PathColorDescription& description, const std::vecto
   const auto value = value_of(description);
   if (!value) return colors;
   const ValueRange range = range_of(description, paths, value);
-  colors.color = [value, range, map = description.map](const Path&, const Waypoint& point) {
+  colors.color = [value, range, map = description.map](const Path&, const PathPoint& point) {
     return colormap_linear(map, range.position(value(point)));
   };
   colors.legend = [range, map = description.map, title = title_of(description)](Image& image,

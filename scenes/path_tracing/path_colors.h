@@ -16,7 +16,7 @@ namespace tensorray {
 /// How the points of paths are coloured.
 struct PathColors {
   /// Of linear Rec. 709, 0 to 1; of a point of a path. Empty: paths have the colour of their material.
-  std::function<Eigen::Vector3d(const Path&, const Waypoint&)> color;
+  std::function<Eigen::Vector3d(const Path&, const PathPoint&)> color;
   /// Draws what the colours mean over a picture whose colours `from_rec709` makes of Rec. 709; empty if nothing is
   /// to be said.
   std::function<void(Image&, const Eigen::Matrix3d& from_rec709)> legend;

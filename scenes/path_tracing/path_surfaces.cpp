@@ -27,7 +27,7 @@ struct Place {
 
   template <class Value>
   auto interpolate(const Value& value) const {
-    const Way& way = path->points;
+    const PathPoints& way = path->points;
     const auto before = value(way[point]), after = value(way[std::min(point + 1, way.size() - 1)]);
     return static_cast<std::decay_t<decltype(before)>>((1 - fraction) * before + fraction * after);
   }
@@ -52,7 +52,7 @@ void for_each_vertex(const TubeMesh& mesh, const std::vector<Path>& paths, const
 }
 
 Eigen::Vector3d color_at(const PathColors& colors, const Place& place) {
-  return place.interpolate([&](const Waypoint& point) -> Eigen::Vector3d { return colors.color(*place.path, point); });
+  return place.interpolate([&](const PathPoint& point) -> Eigen::Vector3d { return colors.color(*place.path, point); });
 }
 
 Eigen::Vector3f reflectance(const Eigen::Matrix3d& to_working, const Eigen::Vector3d& rec709) {
@@ -65,19 +65,19 @@ std::array<std::uint8_t, 3> bytes_of(const Eigen::Vector3d& rec709) {
   return {byte(srgb.x()), byte(srgb.y()), byte(srgb.z())};
 }
 
-bool is_bare(const Way& way) {
-  return std::all_of(way.begin(), way.end(), [](const Waypoint& point) { return point.tensor.isZero(0); });
+bool is_bare(const PathPoints& way) {
+  return std::all_of(way.begin(), way.end(), [](const PathPoint& point) { return point.tensor.isZero(0); });
 }
 
 /// One number that changes where the colour, as displayed, does.
-double shade_of(const PathColors& colors, const Path& path, const Waypoint& point) {
+double shade_of(const PathColors& colors, const Path& path, const PathPoint& point) {
   if (!colors.color) return 0;
   return linear_to_srgb(colors.color(path, point)).dot(Eigen::Vector3d(0.7, 1, 0.4));
 }
 
 /// The scale at which the median semi-axis of all paths is `typical`.
 double scale_for_radius(const std::vector<Path>& paths, double typical) {
-  std::vector<const Way*> ways;
+  std::vector<const PathPoints*> ways;
   for (const Path& path : paths) ways.push_back(&path.points);
   return scale_for_radius(ways, typical);
 }
@@ -106,7 +106,7 @@ TubeMesh path_mesh(const std::vector<Path>& paths, const PathTracingDescription&
   sections.greatest_radius = std::max(sections.least_radius, description.radius.max.value_or(greatest));
   std::vector<Tube> tubes(paths.size());
   tbb::parallel_for(std::size_t{0}, paths.size(), [&](std::size_t i) {
-    const Way& way = paths[i].points;
+    const PathPoints& way = paths[i].points;
     CrossSectionSettings section = sections;
     if (is_bare(way)) section.least_radius = section.greatest_radius = typical;
     const std::vector<CrossSection> ellipses = cross_sections(way, section);
@@ -133,8 +133,8 @@ ShadedSurface path_surface(TubeMesh mesh, const std::vector<Path>& paths, const 
   surface.arc_lengths.resize(count);
   for_each_vertex(mesh, paths, [&](std::uint32_t vertex, const Place& place) {
     if (colors.color) surface.colors[vertex] = reflectance(to_working, color_at(colors, place));
-    surface.forces[vertex] = static_cast<float>(place.interpolate([](const Waypoint& p) { return p.force().norm(); }));
-    surface.arc_lengths[vertex] = static_cast<float>(place.interpolate([](const Waypoint& p) { return p.length; }));
+    surface.forces[vertex] = static_cast<float>(place.interpolate([](const PathPoint& p) { return p.force().norm(); }));
+    surface.arc_lengths[vertex] = static_cast<float>(place.interpolate([](const PathPoint& p) { return p.length; }));
   });
   surface.shape = std::move(mesh.mesh);
   surface.normals = std::move(mesh.normals);
@@ -147,7 +147,7 @@ ShadedSurface line_surface(const std::vector<Path>& paths, double radius, const 
   ShadedSurface surface;
   RoundCurves curves;
   for (const Path& path : paths) {
-    for (const Waypoint& point : path.points) {
+    for (const PathPoint& point : path.points) {
       curves.points.push_back(point.position);
       if (colors.color) surface.colors.push_back(reflectance(to_working, colors.color(path, point)));
       surface.forces.push_back(static_cast<float>(point.force().norm()));
@@ -167,7 +167,7 @@ void write_tubes(const std::filesystem::path& path, const TubeMesh& mesh, const 
   std::vector<float> forces(rgb.size());
   for_each_vertex(mesh, paths, [&](std::uint32_t vertex, const Place& place) {
     if (colors.color) rgb[vertex] = bytes_of(color_at(colors, place));
-    forces[vertex] = static_cast<float>(place.interpolate([](const Waypoint& p) { return p.force().norm(); }));
+    forces[vertex] = static_cast<float>(place.interpolate([](const PathPoint& p) { return p.force().norm(); }));
   });
   VertexAttributes attributes;
   attributes.normals = &mesh.normals;

@@ -61,7 +61,7 @@ std::vector<Eigen::Vector3d> points_of_interest(const Scene& scene, const Contex
                                                 const std::vector<Path>& paths) {
   std::vector<Eigen::Vector3d> points;
   for (const Path& path : paths)
-    for (const Waypoint& point : path.points) points.push_back(point.position);
+    for (const PathPoint& point : path.points) points.push_back(point.position);
   const auto add = [&points](const std::vector<Eigen::Vector3d>& more) {
     points.insert(points.end(), more.begin(), more.end());
   };
@@ -82,7 +82,7 @@ Eigen::AlignedBox3d world_box(const TensorField& field) {
 double near_depth(const std::vector<Path>& paths, const Camera& camera) {
   std::vector<double> depths;
   for (const Path& path : paths)
-    for (const Waypoint& point : path.points)
+    for (const PathPoint& point : path.points)
       if (const double depth = (point.position - camera.position).dot(camera.forward); depth > 0)
         depths.push_back(depth);
   if (depths.empty()) return camera.focus_distance;

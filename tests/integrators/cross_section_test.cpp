@@ -24,8 +24,8 @@ CrossSectionSettings radii(double least, double greatest = 1e300) {
 }
 
 /// A point of a way in the field.
-Waypoint point_of(const Vector3d& position, const Vector3d& direction, const Matrix3d& tensor) {
-  Waypoint point;
+PathPoint point_of(const Vector3d& position, const Vector3d& direction, const Matrix3d& tensor) {
+  PathPoint point;
   point.position = position;
   point.direction = direction.normalized();
   point.tensor = tensor;
@@ -34,18 +34,18 @@ Waypoint point_of(const Vector3d& position, const Vector3d& direction, const Mat
 }
 
 /// Along z from 0 to 1, with a tensor that depends on z.
-Way straight_way(int points, const std::function<Matrix3d(double)>& tensor) {
-  Way way;
+PathPoints straight_way(int points, const std::function<Matrix3d(double)>& tensor) {
+  PathPoints points;
   for (int i = 0; i < points; ++i) {
     const double z = double(i) / (points - 1);
-    way.push_back(point_of({0, 0, z}, {0, 0, 1}, tensor(z)));
+    points.push_back(point_of({0, 0, z}, {0, 0, 1}, tensor(z)));
   }
-  return way;
+  return points;
 }
 
 /// A helix of radius 1 about z, by its angle.
 constexpr double rise = 0.4;  // Per radian.
-Waypoint helix_point(double angle, const Matrix3d& tensor) {
+PathPoint helix_point(double angle, const Matrix3d& tensor) {
   return point_of({std::cos(angle), std::sin(angle), rise * angle}, {-std::sin(angle), std::cos(angle), rise}, tensor);
 }
 
@@ -91,9 +91,9 @@ TEST(CrossSection, DegenerateTensorsKeepAVisibleRadius) {
   EXPECT_NEAR(ellipse(rank_one, V).col(1).norm(), 0, 1e-12);
   EXPECT_NEAR(ellipse(annihilated, V).col(0).norm(), 4, 1e-12);
   EXPECT_NEAR(ellipse(annihilated, V).col(1).norm(), 3, 1e-12);
-  const Way way{point_of({0, 0, 0}, V, Matrix3d::Zero()), point_of({0, 0, 1}, V, rank_one),
-                point_of({0, 0, 2}, V, Matrix3d::Zero()), point_of({0, 0, 3}, V, 1e150 * annihilated)};
-  const std::vector<CrossSection> sections = cross_sections(way, radii(0.1, 0.5));
+  const PathPoints points{point_of({0, 0, 0}, V, Matrix3d::Zero()), point_of({0, 0, 1}, V, rank_one),
+                          point_of({0, 0, 2}, V, Matrix3d::Zero()), point_of({0, 0, 3}, V, 1e150 * annihilated)};
+  const std::vector<CrossSection> sections = cross_sections(points, radii(0.1, 0.5));
   const double major[] = {0.1, 0.5, 0.1, 0.5}, minor[] = {0.1, 0.1, 0.1, 0.375};
   for (int i = 0; i < 4; ++i) {
     EXPECT_NEAR(sections[i].major.norm(), major[i], 1e-12);
@@ -102,15 +102,15 @@ TEST(CrossSection, DegenerateTensorsKeepAVisibleRadius) {
 }
 
 TEST(CrossSection, BothPairsOfVectorsSpanTheSameEllipse) {
-  Way way;
+  PathPoints points;
   for (int i = 0; i < 40; ++i) {
     const double angle = 0.1 * i;
-    way.push_back(helix_point(angle, linear_tensor({std::sin(angle), std::cos(2 * angle), 0.1 * angle})));
+    points.push_back(helix_point(angle, linear_tensor({std::sin(angle), std::cos(2 * angle), 0.1 * angle})));
   }
-  const std::vector<CrossSection> sections = cross_sections(way, radii(0.01));
-  for (std::size_t i = 0; i < way.size(); ++i) {
+  const std::vector<CrossSection> sections = cross_sections(points, radii(0.01));
+  for (std::size_t i = 0; i < points.size(); ++i) {
     const CrossSection& s = sections[i];
-    const Vector3d& V = way[i].direction;
+    const Vector3d& V = points[i].direction;
     EXPECT_GE(s.major.norm(), s.minor.norm());
     EXPECT_NEAR(s.major.dot(s.minor), 0, 1e-12);
     EXPECT_NEAR(s.x.cross(s.y).dot(V), s.major.norm() * s.minor.norm(), 1e-12);
@@ -130,7 +130,7 @@ TEST(CrossSection, TransportAlongAHelixUnwindsItsTorsion) {
   const auto error = [&](int steps) {
     Vector3d normal = -Vector3d::UnitX();  // The principal normal at angle 0, and at 2 π.
     for (int i = 0; i < steps; ++i) {
-      const Waypoint from = helix_point(turns * i / steps, {}), to = helix_point(turns * (i + 1) / steps, {});
+      const PathPoint from = helix_point(turns * i / steps, {}), to = helix_point(turns * (i + 1) / steps, {});
       normal = transported(normal, from.position, from.direction, to.position, to.direction);
     }
     const Vector3d tangent = helix_point(turns, {}).direction;
@@ -142,25 +142,27 @@ TEST(CrossSection, TransportAlongAHelixUnwindsItsTorsion) {
 }
 
 TEST(CrossSection, CirclesAlongAHelixDoNotTwist) {
-  Way way;
-  for (int i = 0; i <= 200; ++i) way.push_back(helix_point(0.05 * i, Matrix3d::Identity()));
-  const std::vector<CrossSection> sections = cross_sections(way, radii(0.01));
-  for (std::size_t i = 1; i < way.size(); ++i) {
-    const Vector3d carried =
-        transported(sections[i - 1].x, way[i - 1].position, way[i - 1].direction, way[i].position, way[i].direction);
+  PathPoints points;
+  for (int i = 0; i <= 200; ++i) points.push_back(helix_point(0.05 * i, Matrix3d::Identity()));
+  const std::vector<CrossSection> sections = cross_sections(points, radii(0.01));
+  for (std::size_t i = 1; i < points.size(); ++i) {
+    const Vector3d carried = transported(sections[i - 1].x, points[i - 1].position, points[i - 1].direction,
+                                         points[i].position, points[i].direction);
     EXPECT_LT((sections[i].x - carried).norm(), 1e-12);
     EXPECT_LT((sections[i].major - sections[i].x).norm(), 1e-6);
     // No turn beyond the direction's own.
-    EXPECT_LT((sections[i].x - sections[i - 1].x).norm(), 1.0001 * (way[i].direction - way[i - 1].direction).norm());
+    EXPECT_LT((sections[i].x - sections[i - 1].x).norm(),
+              1.0001 * (points[i].direction - points[i - 1].direction).norm());
   }
 }
 
 TEST(CrossSection, PassingThroughACircleNeitherFlipsNorTwists) {
   // From 2 : 1 through a circle to 1 : 2: the longer axis changes places, the surface does not.
-  const Way way = straight_way(41, [](double z) -> Matrix3d { return Vector3d(2 - z, 1 + z, 1).asDiagonal(); });
-  const std::vector<CrossSection> sections = cross_sections(way, radii(0.01));
+  const PathPoints points =
+      straight_way(41, [](double z) -> Matrix3d { return Vector3d(2 - z, 1 + z, 1).asDiagonal(); });
+  const std::vector<CrossSection> sections = cross_sections(points, radii(0.01));
   const double step = 1.0 / 40;
-  for (std::size_t i = 1; i < way.size(); ++i) {
+  for (std::size_t i = 1; i < points.size(); ++i) {
     EXPECT_NEAR((sections[i].x - sections[i - 1].x).norm(), step, 1e-9);
     EXPECT_NEAR((sections[i].y - sections[i - 1].y).norm(), step, 1e-9);
   }
@@ -170,17 +172,17 @@ TEST(CrossSection, PassingThroughACircleNeitherFlipsNorTwists) {
 TEST(CrossSection, VanishingOnTheWayNeitherFlipsNorTwists) {
   // T is zero at z = 1/2, where the ellipse is clamped to a circle, and changes its sign there; the way is a helix.
   const Matrix3d T = Eigen::AngleAxisd(0.4, Vector3d(1, 2, 3).normalized()) * Vector3d(2, 1, 0.3).asDiagonal();
-  Way way;
+  PathPoints points;
   const int points = 401;
-  for (int i = 0; i < points; ++i) way.push_back(helix_point(0.01 * i, (double(i) / (points - 1) - 0.5) * T));
-  const std::vector<CrossSection> sections = cross_sections(way, radii(0.05));
-  for (std::size_t i = 1; i < way.size(); ++i) {
+  for (int i = 0; i < points; ++i) points.push_back(helix_point(0.01 * i, (double(i) / (points - 1) - 0.5) * T));
+  const std::vector<CrossSection> sections = cross_sections(points, radii(0.05));
+  for (std::size_t i = 1; i < points.size(); ++i) {
     // No faster than the tensor changes, and than a frame of this size turns; both with room for the turn of C.
-    const double allowed = 3 * ((way[i].tensor - way[i - 1].tensor).norm() +
-                                sections[i].major.norm() * (way[i].direction - way[i - 1].direction).norm());
+    const double allowed = 3 * ((points[i].tensor - points[i - 1].tensor).norm() +
+                                sections[i].major.norm() * (points[i].direction - points[i - 1].direction).norm());
     EXPECT_LT((sections[i].x - sections[i - 1].x).norm(), allowed) << i;
     EXPECT_LT((sections[i].y - sections[i - 1].y).norm(), allowed) << i;
-    EXPECT_GT(sections[i].x.cross(sections[i].y).dot(way[i].direction), 0);
+    EXPECT_GT(sections[i].x.cross(sections[i].y).dot(points[i].direction), 0);
   }
   EXPECT_NEAR(sections[200].x.norm(), 0.05, 1e-9);
   EXPECT_NEAR(sections[200].y.norm(), 0.05, 1e-9);
@@ -193,20 +195,20 @@ TEST(CrossSection, ATurningEllipseIsFollowedWithoutAFlip) {
     return turn * Vector3d(3, 1, 1).asDiagonal() * turn.transpose();
   };
   const int points = 301;
-  const Way way = straight_way(points, turned);
-  const std::vector<CrossSection> sections = cross_sections(way, radii(0.01));
+  const PathPoints points = straight_way(points, turned);
+  const std::vector<CrossSection> sections = cross_sections(points, radii(0.01));
   const double angle = 6 * pi / (points - 1);
-  for (std::size_t i = 1; i < way.size(); ++i) {
+  for (std::size_t i = 1; i < points.size(); ++i) {
     EXPECT_NEAR(sections[i].major.normalized().dot(sections[i - 1].major.normalized()), std::cos(angle), 1e-9);
-    const double change = (way[i].tensor - way[i - 1].tensor).norm();
+    const double change = (points[i].tensor - points[i - 1].tensor).norm();
     EXPECT_LT((sections[i].x - sections[i - 1].x).norm(), change);
     EXPECT_LT((sections[i].y - sections[i - 1].y).norm(), change);
   }
 }
 
 TEST(CrossSection, TheScaleSetsTheMedianRadius) {
-  const Way way = straight_way(11, [](double z) -> Matrix3d { return (1 + z) * Matrix3d::Identity(); });
-  EXPECT_NEAR(scale_for_radius({&way}, 0.3), 0.3 / 1.5, 1e-12);
+  const PathPoints points = straight_way(11, [](double z) -> Matrix3d { return (1 + z) * Matrix3d::Identity(); });
+  EXPECT_NEAR(scale_for_radius({&points}, 0.3), 0.3 / 1.5, 1e-12);
   EXPECT_EQ(scale_for_radius({}, 0.3), 1);
 }
 

@@ -113,12 +113,12 @@ std::vector<double> lengths_by_channel(const Bench& bench, std::uint64_t photons
     if (!positions.sample(i, emission)) continue;
     for (std::size_t channel = 0; channel < lengths.size(); ++channel) {
       RayBatch batch;
-      std::vector<Way> ways;
+      std::vector<PathPoints> paths;
       batch.add(emission.origin, bench.beam.direction, channels()[channel].flexibility);
-      trace(bench.field, bench.geometry, {}, batch, ways);
-      for (std::size_t k = 1; k < ways[0].size(); ++k)
-        if (ways[0][k].in_field && ways[0][k - 1].in_field)
-          lengths[channel] += ways[0][k].length - ways[0][k - 1].length;
+      trace(bench.field, bench.geometry, {}, batch, paths);
+      for (std::size_t k = 1; k < paths[0].size(); ++k)
+        if (paths[0][k].in_field && paths[0][k - 1].in_field)
+          lengths[channel] += paths[0][k].length - paths[0][k - 1].length;
     }
   }
   return lengths;

@@ -110,7 +110,7 @@ std::vector<Vector3d> path(const TensorField& field, const Vector3d& from, doubl
   const Geometry geometry{surfaces_of(field)};
   const std::vector<Path> paths = trace_paths(field, geometry, bending, {seed}, settings, Progress());
   std::vector<Vector3d> points;
-  for (const Waypoint& point : paths.at(0).points) points.push_back(point.position);
+  for (const PathPoint& point : paths.at(0).points) points.push_back(point.position);
   return points;
 }
 

@@ -49,8 +49,8 @@ LensMap make_map(const TensorField& field, const Plate& from, const Plate& to, c
   return LensMap(field, surfaces_of(field), settings, from, to, direction);
 }
 
-Landing land(const LensMap& map, const Vector2d& start, double flexibility) {
-  Landing landing;
+LensLanding land(const LensMap& map, const Vector2d& start, double flexibility) {
+  LensLanding landing;
   map.trace({start}, {flexibility}, &landing);
   return landing;
 }
@@ -106,7 +106,7 @@ TEST(LensMap, WithoutFieldLightIsProjected) {
     for (const Vector2d& start : {Vector2d(0, 0), Vector2d(0.4, -0.3), Vector2d(3, 2)}) {  // The last one: beside it.
       const Vector3d point = from.center + from_axes * start;
       const double distance = normal.dot(to.center - point) / normal.dot(direction);
-      const Landing landing = land(map, start, 0.4);
+      const LensLanding landing = land(map, start, 0.4);
       ASSERT_EQ(landing.end, RayEnd::plate);
       const double tolerance = method == BendingMethod::splitting ? single_precision : 1e-9;
       EXPECT_LT((plane_point(to, landing.at) - (point + distance * direction)).norm(), tolerance);
@@ -134,7 +134,7 @@ TEST(LensMap, NoPlaneStopsTheLightThatStartsOnIt) {
 TEST(LensMap, BetweenParallelPlanesWithoutFieldNothingChanges) {
   const TensorField field = constant_field(Matrix3d::Zero());
   for (const double distance : {1.0, 1.5}) {  // Touching the volume, and outside of it.
-    const Landing landing = land(make_map(field, plane_at(distance), plane_at(-distance), down), {0.3, -0.7}, 1);
+    const LensLanding landing = land(make_map(field, plane_at(distance), plane_at(-distance), down), {0.3, -0.7}, 1);
     ASSERT_EQ(landing.end, RayEnd::plate);
     EXPECT_LT((landing.at - Vector2d(0.3, -0.7)).norm(), 1e-12);
     EXPECT_LT((landing.jacobian - Matrix2d::Identity()).norm(), 1e-12);
@@ -152,7 +152,7 @@ TEST(LensMap, TurningFieldBendsLightToArcs) {
       for (const BendingMethod method : {BendingMethod::splitting, BendingMethod::dopri5}) {
         const bool is_precise = method == BendingMethod::dopri5;
         const BendingSettings settings = is_precise ? precise() : settings_of(method, 0);
-        const Landing landing = land(make_map(field, plane_at(above), plane_at(-below), down, settings), start, s);
+        const LensLanding landing = land(make_map(field, plane_at(above), plane_at(-below), down, settings), start, s);
         ASSERT_EQ(landing.end, RayEnd::plate);
         // A step of half a voxel replaces an arc by its chords: short by a factor of 1 − (s rate h)²/12.
         const double tolerance = is_precise ? 1e-7 : std::pow(s * rate * 0.5 * voxel_size(field), 2) * arc.aside;
@@ -165,7 +165,7 @@ TEST(LensMap, TurningFieldBendsLightToArcs) {
 
 TEST(LensMap, TurningAboutTheLightDoesNothing) {
   const TensorField field = turning_field(2 * Vector3d::UnitZ());
-  const Landing landing = land(make_map(field, plane_at(1.5), plane_at(-1.5), down), {0.4, 0.2}, 0.5);
+  const LensLanding landing = land(make_map(field, plane_at(1.5), plane_at(-1.5), down), {0.4, 0.2}, 0.5);
   ASSERT_EQ(landing.end, RayEnd::plate);
   EXPECT_LT((landing.at - Vector2d(0.4, 0.2)).norm(), 1e-9);
   EXPECT_LT((landing.jacobian - Matrix2d::Identity()).norm(), 1e-9);
@@ -177,8 +177,8 @@ TEST(LensMap, DiagonalFieldTurnsLightByItsClosedForm) {
   const Vector2d start(0.2, -0.1);
   for (const double s : {0.4, -0.4}) {
     // Between planes 1 and 2 behind the volume, light is straight: the two show its direction.
-    const Landing at_volume = land(make_map(field, plane_at(1), plane_at(-1), direction), start, s);
-    const Landing behind = land(make_map(field, plane_at(1), plane_at(-2), direction), start, s);
+    const LensLanding at_volume = land(make_map(field, plane_at(1), plane_at(-1), direction), start, s);
+    const LensLanding behind = land(make_map(field, plane_at(1), plane_at(-2), direction), start, s);
     ASSERT_EQ(at_volume.end, RayEnd::plate);
     ASSERT_EQ(behind.end, RayEnd::plate);
     const Vector3d V =
@@ -202,7 +202,7 @@ TEST(LensMap, LinearLensMagnifiesByItsClosedForm) {
     for (const double s : {0.4, -0.4})
       for (const double distance : {0.0, 0.8}) {
         const Plate from = plane_at(-1.25 * direction.z()), to = plane_at((1 + distance) * direction.z());
-        const Landing landing = land(make_map(field, from, to, direction), {0, 0}, s);
+        const LensLanding landing = land(make_map(field, from, to, direction), {0, 0}, s);
         ASSERT_EQ(landing.end, RayEnd::plate);
         EXPECT_LT(landing.at.norm(), 1e-9);
         const double expected = magnification(s * k * direction.z(), 2, distance);
@@ -215,7 +215,7 @@ TEST(LensMap, SplittingsJacobianIsOfSecondOrder) {
   double error[2];
   for (const int i : {0, 1}) {
     const BendingSettings settings = settings_of(BendingMethod::splitting, i == 0 ? 0.5 : 0.25);
-    const Landing landing = land(make_map(field, plane_at(-1), plane_at(1.5), up, settings), {0, 0}, 0.4);
+    const LensLanding landing = land(make_map(field, plane_at(-1), plane_at(1.5), up, settings), {0, 0}, 0.4);
     error[i] = std::abs(landing.jacobian(0, 0) - magnification(0.6, 2, 0.5));
   }
   EXPECT_LT(error[0], 0.01);
@@ -227,7 +227,7 @@ TEST(LensMap, SwirlTurnsTheImage) {
   const TensorField field = swirling_field(rate);
   for (const Vector3d& direction : {up, down}) {
     const Plate from = plane_at(-direction.z()), to = plane_at((1 + distance) * direction.z());
-    const Landing landing = land(make_map(field, from, to, direction), {0, 0}, s);
+    const LensLanding landing = land(make_map(field, from, to, direction), {0, 0}, s);
     ASSERT_EQ(landing.end, RayEnd::plate);
     // With z = x + iy: z'' = ± i s rate z.
     const std::complex<double> root = std::sqrt(std::complex<double>(0, s * rate * direction.z()));
@@ -249,7 +249,7 @@ TEST(LensMap, JacobianIsThatOfTheLandings) {
   for (int from : {0, 1})
     for (int to : {2, 3}) {
       const LensMap map = make_map(field, planes[from], planes[to], direction);
-      const Landing landing = land(map, start, 0.3);
+      const LensLanding landing = land(map, start, 0.3);
       ASSERT_EQ(landing.end, RayEnd::plate);
       for (int i = 0; i < 2; ++i) {
         const Vector2d step = delta * Vector2d::Unit(i);
@@ -267,7 +267,7 @@ TEST(LensMap, PlanesCutTheVolume) {
     for (const double below : {-0.2, 0.0, 0.4, 0.8, 1.6}) {  // Below the middle; the last one is outside.
       const double depth = std::min(1.0, above) + std::min(1.0, below);
       const Arc arc(depth, s * rate, std::max(0.0, below - 1));
-      const Landing landing = land(make_map(field, plane_at(above), plane_at(-below), down), start, s);
+      const LensLanding landing = land(make_map(field, plane_at(above), plane_at(-below), down), start, s);
       ASSERT_EQ(landing.end, RayEnd::plate);
       EXPECT_LT((landing.at - start - Vector2d(0, arc.aside)).norm(), 1e-6) << above << " " << below;
       EXPECT_LT((landing.jacobian - Matrix2d::Identity()).norm(), 1e-6);
@@ -280,12 +280,12 @@ TEST(LensMap, TurningLightReachesNeitherBeyondThePlaneNorBehindItsStart) {
   const TensorField field = turning_field(1 / radius * Vector3d::UnitX());
   const Vector2d start(0, -0.4);
   const Plate from = plane_at(0.5);
-  const Landing reached = land(make_map(field, from, plane_at(0.2), down), start, 1);
+  const LensLanding reached = land(make_map(field, from, plane_at(0.2), down), start, 1);
   ASSERT_EQ(reached.end, RayEnd::plate);
   EXPECT_LT((reached.at - start - Vector2d(0, Arc(0.3, 1 / radius, 0).aside)).norm(), 1e-6);
   // It turns back 0.4 below its start, and is stopped where it meets the plane that it came from.
   for (const double beyond : {0.0, 0.8, 1.5}) {
-    const Landing landing = land(make_map(field, from, plane_at(beyond), down), start, 1);
+    const LensLanding landing = land(make_map(field, from, plane_at(beyond), down), start, 1);
     EXPECT_EQ(landing.end, RayEnd::obstacle) << beyond;
     EXPECT_NEAR(landing.length, M_PI * radius, 1e-3);
   }
@@ -306,11 +306,11 @@ TEST(LensMap, LandingsAreOrderedByStartThenFlexibility) {
   const LensMap map = make_map(field, plane_at(1.5), plane_at(-1.5), down, {});
   const std::vector<Vector2d> starts = {{0.1, 0.2}, {-0.3, 0.1}, {0.2, -0.2}};
   const std::vector<double> flexibilities = {0, 0.2, -0.1};
-  std::vector<Landing> landings(9);
+  std::vector<LensLanding> landings(9);
   const TraceCounts counts = map.trace(starts, flexibilities, landings.data());
   TraceCounts sum;
   for (std::size_t i = 0; i < 9; ++i) {
-    Landing alone;
+    LensLanding alone;
     const TraceCounts took = map.trace({starts[i / 3]}, {flexibilities[i % 3]}, &alone);
     EXPECT_EQ(landings[i].at, alone.at);
     EXPECT_EQ(landings[i].jacobian, alone.jacobian);
@@ -357,7 +357,7 @@ double worst_return(const TensorField& field, double s, double tolerance, int& c
       const Ray back = trace_one(field, to_receiver, settings, there.position, -there.direction, s);
       EXPECT_EQ(back.end, RayEnd::plate);
       worst = std::max(worst, (back.position - plane_point(receiver, start)).norm() / voxel_size(field));
-      const Landing landing = land(gather, start, -s);
+      const LensLanding landing = land(gather, start, -s);
       // With differentials tensors are rounded otherwise, and error control may accept other steps.
       EXPECT_LT((plane_point(image, landing.at) - there.position).norm(), 1e-5 * voxel_size(field));
       ++count;

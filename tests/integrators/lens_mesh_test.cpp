@@ -33,8 +33,8 @@ LensMap make_map(const TensorField& field) {
   return LensMap(field, surfaces_of(field), {}, plane_at(-1.2), plane_at(1.2), {0, 0, 1});
 }
 
-Landing land(const LensMap& map, const Vector2d& start, double s) {
-  Landing landing;
+LensLanding land(const LensMap& map, const Vector2d& start, double s) {
+  LensLanding landing;
   map.trace({start}, {s}, &landing);
   return landing;
 }
@@ -75,7 +75,7 @@ Vector2d start_of(const LensMap& map, double s, const LensMesh& mesh, const Vect
     if ((mesh.landings[i].at - point).norm() < (mesh.landings[nearest].at - point).norm()) nearest = i;
   Vector2d start = mesh.starts[nearest];
   for (int i = 0; i < 8; ++i) {
-    const Landing landing = land(map, start, s);
+    const LensLanding landing = land(map, start, s);
     start -= landing.jacobian.inverse() * (landing.at - point);
   }
   EXPECT_LT((land(map, start, s).at - point).norm(), 10 * single_precision);  // Of a map of slope up to ten.
@@ -137,7 +137,7 @@ TEST(LensMesh, SheetsAreWithinAFractionOfAPixelOfTheMap) {
       if ((start.cwiseAbs().array() > 0.2 - margin).any()) continue;
       ++inside;
       ASSERT_EQ(sheets.size(), 1u) << point.transpose();
-      const Landing landing = land(map, start, spreading_s);
+      const LensLanding landing = land(map, start, spreading_s);
       worst = std::max(worst, (landing.jacobian * (sheets[0].start - start)).norm() / pixel);
       EXPECT_LT((sheets[0].jacobian - landing.jacobian).norm(), 0.1 * landing.jacobian.norm());
       EXPECT_NEAR(sheets[0].length, landing.length, 0.1 * landing.length);
@@ -159,7 +159,7 @@ TEST(LensMesh, PixelsThatAreNotSquareTakeRaysByTheirNumber) {
   for (int y = 0; y < 20; ++y)
     for (int x = 0; x < 20; ++x) {
       const Vector2d start = Vector2d(x - 9.7, y - 9.6) * (0.19 / 10);
-      const Landing landing = land(map, start, spreading_s);
+      const LensLanding landing = land(map, start, spreading_s);
       if ((landing.at.array().abs() > 1).any()) continue;
       search.find(landing.at, sheets);
       ASSERT_EQ(sheets.size(), 1u) << start.transpose();
@@ -264,8 +264,8 @@ TEST(LensMesh, ShadowsOfObstaclesAreSharp) {
     }
 }
 
-Landing landing_at(const Vector2d& at, double length = 1, RayEnd end = RayEnd::plate) {
-  Landing landing;
+LensLanding landing_at(const Vector2d& at, double length = 1, RayEnd end = RayEnd::plate) {
+  LensLanding landing;
   landing.end = end;
   landing.at = at;
   landing.length = length;
@@ -274,7 +274,7 @@ Landing landing_at(const Vector2d& at, double length = 1, RayEnd end = RayEnd::p
 
 TEST(LensMesh, LatticeLeavesOutRaysThatDidNotLand) {
   std::vector<Vector2d> starts;
-  std::vector<Landing> landings;
+  std::vector<LensLanding> landings;
   for (int y = 0; y < 3; ++y)
     for (int x = 0; x < 3; ++x) {
       starts.emplace_back(x, -y);
@@ -295,7 +295,7 @@ TEST(LensMesh, LatticeLeavesOutRaysThatDidNotLand) {
 TEST(LensMesh, SheetsOfAFoldedStrip) {
   // x lands at 1 − |x − 1|: a strip folded at x = 1 onto itself. Lengths tell the two halves apart.
   std::vector<Vector2d> starts;
-  std::vector<Landing> landings;
+  std::vector<LensLanding> landings;
   for (int y = 0; y < 2; ++y)
     for (int x = 0; x < 3; ++x) {
       starts.emplace_back(x, y);

@@ -31,7 +31,7 @@ std::vector<Path> some_paths(std::size_t count) {
   for (std::size_t i = 0; i < count; ++i) {
     Path path;
     for (std::size_t j = 0; j < i + 2; ++j) {
-      Waypoint point;
+      PathPoint point;
       const auto random = [&](Eigen::Index, Eigen::Index) { return uniform(engine); };
       point.position = Eigen::Vector3d(1e4, 0, 0) + Eigen::Vector3d::NullaryExpr(3, 1, random);
       point.direction = Eigen::Vector3d::NullaryExpr(3, 1, random).eval().normalized();
@@ -50,7 +50,7 @@ std::vector<Path> some_paths(std::size_t count) {
   return paths;
 }
 
-void expect_same(const Way& a, const Way& b) {
+void expect_same(const PathPoints& a, const PathPoints& b) {
   ASSERT_EQ(a.size(), b.size());
   for (std::size_t i = 0; i < a.size(); ++i) {
     EXPECT_EQ(a[i].position, b[i].position);
@@ -163,7 +163,7 @@ TEST(VtpPathsTest, LinesOfOtherPrograms) {
   ASSERT_EQ(paths[1].points.size(), 2u);
   EXPECT_EQ(paths[1].points[1].position, Eigen::Vector3d(2, 3, 0));
   EXPECT_EQ(paths[1].points[1].length, 3);
-  for (const Waypoint& point : paths[0].points) {
+  for (const PathPoint& point : paths[0].points) {
     EXPECT_EQ(point.direction, Eigen::Vector3d::UnitX());
     EXPECT_TRUE(point.tensor.isZero(0) && point.change.isZero(0));
   }
@@ -242,7 +242,7 @@ TEST(VtpPathsTest, VtkReadsThem) {
       " '%.6f' % points.GetArray('curvature').GetTuple1(4), points.GetArray('axis_minor').GetTuple3(2))\n");
   if (text.empty()) GTEST_SKIP() << "python3 has no VTK (python3-vtk9)";
 
-  const Waypoint& point = paths[2].points[2];  // The last one of the second polyline: point 4 of the file.
+  const PathPoint& point = paths[2].points[2];  // The last one of the second polyline: point 4 of the file.
   char expected[1000];
   const auto section = cross_sections(paths[2].points, {1, 1e-300, 1e300})[2];
   std::snprintf(
@@ -424,10 +424,10 @@ TEST(PathFilesTest, BareWayOfACircle) {
   std::vector<Eigen::Vector3d> positions;
   const auto angle = [](int i) { return 0.01 * i + 0.002 * std::sin(i); };
   for (int i = 0; i < 100; ++i) positions.push_back(2 * Eigen::Vector3d(std::cos(angle(i)), std::sin(angle(i)), 0));
-  const Way way = bare_way(positions);
-  ASSERT_EQ(way.size(), 100u);
+  const PathPoints points = bare_way(positions);
+  ASSERT_EQ(points.size(), 100u);
   for (int i = 0; i < 100; ++i) {
-    const Waypoint& point = way[static_cast<std::size_t>(i)];
+    const PathPoint& point = points[static_cast<std::size_t>(i)];
     const Eigen::Vector3d tangent(-std::sin(angle(i)), std::cos(angle(i)), 0);
     EXPECT_LE((point.direction - tangent).norm(), 1e-4) << i;
     EXPECT_LE((point.change + point.position / 4).norm(), 5e-3) << i;
@@ -435,7 +435,7 @@ TEST(PathFilesTest, BareWayOfACircle) {
   }
   EXPECT_TRUE(bare_way({}).empty());
   EXPECT_TRUE(bare_way({positions[0], positions[0]}).empty());
-  for (const Waypoint& point : bare_way({positions[0], positions[9], positions[0]}))  // There and back.
+  for (const PathPoint& point : bare_way({positions[0], positions[9], positions[0]}))  // There and back.
     EXPECT_NEAR(point.direction.norm(), 1, 1e-12);
 }
 

@@ -48,9 +48,9 @@ double distance_to_segment(const Vector3d& point, const Vector3d& a, const Vecto
 }
 
 /// The greatest distance of a point of `way` from the polyline `other`.
-double distance(const Way& way, const Way& other) {
+double distance(const PathPoints& points, const PathPoints& other) {
   double greatest = 0;
-  for (const Waypoint& point : way) {
+  for (const PathPoint& point : points) {
     double least = std::numeric_limits<double>::infinity();
     for (std::size_t i = 1; i < other.size(); ++i)
       least = std::min(least, distance_to_segment(point.position, other[i - 1].position, other[i].position));
@@ -68,7 +68,7 @@ TEST(Paths, AnIsotropicFieldGivesStraightPathsOfTwoPoints) {
   EXPECT_NEAR(path.points[1].position.z(), -1, 1e-9);
   EXPECT_EQ(path.points[0].length, 0);
   EXPECT_NEAR(path.points[1].length, 2 / -V.z(), single_precision);
-  for (const Waypoint& point : path.points) {
+  for (const PathPoint& point : path.points) {
     EXPECT_LT((point.direction - V).norm(), single_precision);
     EXPECT_LT((point.force() - 3 * V).norm(), 1e-6);
     EXPECT_LT(point.change.norm(), 1e-12);
@@ -80,19 +80,19 @@ TEST(Paths, RecordsWhatTheRayDoesWithoutChangingIt) {
   for (const BendingMethod method : {BendingMethod::splitting, BendingMethod::dopri5}) {
     const Geometry geometry(surfaces_of(field));
     RayBatch plain, recorded;
-    std::vector<Way> ways;
+    std::vector<PathPoints> paths;
     for (RayBatch* batch : {&plain, &recorded}) batch->add({0.2, -0.1, 2}, {0, 0, -1}, 0.5);
     const BendingSettings bending = settings_of(method, 0);
     trace(field, geometry, bending, plain);
-    trace(field, geometry, bending, recorded, ways);
+    trace(field, geometry, bending, recorded, paths);
     EXPECT_EQ(plain.position[0], recorded.position[0]);
     EXPECT_EQ(plain.steps[0], recorded.steps[0]);
-    ASSERT_EQ(ways.size(), 1u);
-    EXPECT_EQ(ways[0].back().position, recorded.position[0]);
-    EXPECT_EQ(ways[0].back().length, recorded.length[0]);
+    ASSERT_EQ(paths.size(), 1u);
+    EXPECT_EQ(paths[0].back().position, recorded.position[0]);
+    EXPECT_EQ(paths[0].back().length, recorded.length[0]);
     // The straight way's two ends, the entry into the field, and the steps; of splitting, which repeats none, all.
     if (method == BendingMethod::splitting) {
-      EXPECT_EQ(ways[0].size(), 3 + recorded.steps[0]);
+      EXPECT_EQ(paths[0].size(), 3 + recorded.steps[0]);
     }
   }
 }
@@ -105,7 +105,7 @@ TEST(Paths, PointsCarryTheTensorAndTheCurvature) {
   const Path path = trace_one_path(field, seed_at({0.2, -0.1, 2}, s / settings.scale), everything(), settings);
   ASSERT_GT(path.points.size(), 100u);
   for (std::size_t i = 0; i < path.points.size(); ++i) {
-    const Waypoint& point = path.points[i];
+    const PathPoint& point = path.points[i];
     const Matrix3d T = linear_tensor(point.position);
     const Vector3d V = point.direction;
     EXPECT_LT((point.tensor - T).norm(), 1e-6);
@@ -113,7 +113,7 @@ TEST(Paths, PointsCarryTheTensorAndTheCurvature) {
     EXPECT_LT((point.change - s * (T * V - V.dot(T * V) * V)).norm(), 1e-6);
     if (i == 0 || i + 2 >= path.points.size()) continue;
     // The curvature of the polyline itself: a central difference of h = 1/128 errs by h² |V'''| / 6, some 1e-5 · 10.
-    const Waypoint &before = path.points[i - 1], &behind = path.points[i + 1];
+    const PathPoint &before = path.points[i - 1], &behind = path.points[i + 1];
     const Vector3d measured = (behind.direction - before.direction) / (behind.length - before.length);
     EXPECT_LT((measured - point.change).norm(), 2e-4);
   }
@@ -129,7 +129,7 @@ TEST(Paths, AnIsotropicPartChangesTheEllipsesButNotThePaths) {
   const Path a = trace_it(plain), b = trace_it(shifted);
   ASSERT_EQ(a.points.size(), b.points.size());
   for (std::size_t i = 0; i < a.points.size(); ++i) {
-    const Waypoint &p = a.points[i], &q = b.points[i];
+    const PathPoint &p = a.points[i], &q = b.points[i];
     EXPECT_LT((p.position - q.position).norm(), 1e-5);  // Single precision of the voxels.
     EXPECT_LT((q.force() - p.force() - 2 * p.direction).norm(), 1e-4);
     EXPECT_GT(
@@ -144,7 +144,7 @@ TEST(Paths, BackwardsAndForwardsIsThePathFromItsStart) {
   for (const double s : {0.8, -0.8}) {
     const Path whole = trace_one_path(field, seed_at({0.2, -0.1, 2}, s), everything(), bending);
     for (const double fraction : {0.0, 0.3, 0.5, 0.9}) {
-      const Waypoint& middle = whole.points[static_cast<std::size_t>(fraction * double(whole.points.size()))];
+      const PathPoint& middle = whole.points[static_cast<std::size_t>(fraction * double(whole.points.size()))];
       const Path joined = trace_one_path(field, seed_at(middle.position, s, middle.direction), everything(), bending);
       // rk4's error is far below the chords' h² |V'| / 8 = 1e-4.
       EXPECT_LT(distance(joined.points, whole.points), 3e-4);
@@ -171,9 +171,9 @@ TEST(Paths, ThinningKeepsItsTolerances) {
   EXPECT_LT(few.points.size(), all.points.size() / 2);
   EXPECT_LE(distance(all.points, few.points), settings.tolerance * voxel_size(field));
   std::size_t next = 0;
-  for (const Waypoint& point : all.points) {
+  for (const PathPoint& point : all.points) {
     while (few.points[next + 1].length < point.length) ++next;
-    const Waypoint &a = few.points[next], &b = few.points[next + 1];
+    const PathPoint &a = few.points[next], &b = few.points[next + 1];
     const double t = (point.length - a.length) / (b.length - a.length);
     const double greatest = std::max({a.tensor.norm(), b.tensor.norm(), point.tensor.norm()});
     EXPECT_LE((a.tensor + t * (b.tensor - a.tensor) - point.tensor).norm(),
@@ -192,10 +192,10 @@ TEST(Paths, KeepsTheStraightPartsOnRequestAndSeparatesTheFaces) {
 
   EXPECT_EQ(inside.end, RayEnd::plate);
   EXPECT_EQ(inside.backward_end, RayEnd::missed);
-  for (const Waypoint& point : inside.points) EXPECT_TRUE(point.in_field);
+  for (const PathPoint& point : inside.points) EXPECT_TRUE(point.in_field);
   ASSERT_EQ(whole.points.size(), inside.points.size() + 4);
-  const Way& points = whole.points;
-  const auto straight = [](const Waypoint& p) { return !p.in_field && p.tensor.isZero() && p.change.isZero(); };
+  const PathPoints& points = whole.points;
+  const auto straight = [](const PathPoint& p) { return !p.in_field && p.tensor.isZero() && p.change.isZero(); };
   for (const std::size_t i : {std::size_t{0}, std::size_t{1}, points.size() - 2, points.size() - 1})
     EXPECT_TRUE(straight(points[i])) << i;
   EXPECT_NEAR(points[0].position.z(), 2, 1e-12);

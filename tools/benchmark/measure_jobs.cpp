@@ -12,14 +12,14 @@
 namespace tensorray::benchmark {
 namespace {
 
-struct Job {
+struct RenderJob {
   std::string name;
   int resolution = 64;  ///< Of the field.
   Json scene;           ///< Without the field.
 };
 
 /// @param side  Of the picture, pixels.
-Job photon_job(int resolution, std::uint64_t photons, int side) {
+RenderJob photon_job(int resolution, std::uint64_t photons, int side) {
   return {fmt::format("photon distribution, {} positions, {}²", photons, side),
           resolution,
           {{"light", {{"photons", photons}, {"wavelengths", {{"count", 32}}}}},
@@ -27,7 +27,7 @@ Job photon_job(int resolution, std::uint64_t photons, int side) {
            {"integrator", {{"type", "photon_distribution"}}}}};
 }
 
-Job lens_job(int resolution, int side) {
+RenderJob lens_job(int resolution, int side) {
   return {fmt::format("lens (gather), {}²", side),
           resolution,
           {{"light", {{"wavelengths", {{"count", 32}}}}},
@@ -35,7 +35,7 @@ Job lens_job(int resolution, int side) {
            {"integrator", {{"type", "lens"}, {"mode", "gather"}, {"image", "checkerboard"}}}}};
 }
 
-Job path_job(int resolution, int seeds, int side) {
+RenderJob path_job(int resolution, int seeds, int side) {
   return {fmt::format("path tracing, {} tubes, {}²", seeds, side),
           resolution,
           {{"integrator", {{"type", "path_tracing"}, {"seeds", {{"kind", "grid"}, {"count", seeds}}}}},
@@ -43,9 +43,9 @@ Job path_job(int resolution, int seeds, int side) {
 }
 
 /// Fewer rays in larger fields, so that all take a few seconds but for the fields.
-std::vector<Job> jobs(bool quick) {
+std::vector<RenderJob> jobs(bool quick) {
   if (quick) return {photon_job(16, 200, 32), lens_job(16, 32), path_job(16, 9, 32)};
-  std::vector<Job> result;
+  std::vector<RenderJob> result;
   for (const int resolution : {64, 128, 256, 512}) {
     result.push_back(photon_job(resolution, 4194304u / static_cast<unsigned>(resolution), 1024));
     result.push_back(lens_job(resolution, std::min(256, 32768 / resolution)));
@@ -55,7 +55,7 @@ std::vector<Job> jobs(bool quick) {
 }
 
 /// Runs the job. @return what it says of itself (`tensorray render --stats`).
-Json run_job(const TemporaryFolder& folder, const Job& job, int threads, const std::string& program = "tensorray",
+Json run_job(const TemporaryFolder& folder, const RenderJob& job, int threads, const std::string& program = "tensorray",
              const std::vector<std::string>& options = {}) {
   Json scene = job.scene;
   scene["field"] = {{"generate", {{"kind", "point_load"}, {"resolution", job.resolution}}}, {"eigenvalues", "raw"}};
@@ -73,7 +73,7 @@ Json run_job(const TemporaryFolder& folder, const Job& job, int threads, const s
   return Json::parse(file);
 }
 
-Json describe(const Job& job, int threads, const Json& statistics) {
+Json describe(const RenderJob& job, int threads, const Json& statistics) {
   return {{"name", job.name},
           {"resolution", job.resolution},
           {"threads", threads},
@@ -84,7 +84,7 @@ Json describe(const Job& job, int threads, const Json& statistics) {
 }
 
 /// What a job takes at its peak, roughly: the field as a grid and as bricks.
-bool fits_in_memory(const Job& job) {
+bool fits_in_memory(const RenderJob& job) {
   constexpr double bytes_per_voxel = 110;
   const double needed = bytes_per_voxel * job.resolution * job.resolution * job.resolution;
   const double there = static_cast<double>(sysconf(_SC_AVPHYS_PAGES)) * static_cast<double>(sysconf(_SC_PAGESIZE));
@@ -92,7 +92,7 @@ bool fits_in_memory(const Job& job) {
 }
 
 /// With one thread and with all.
-void add_job(const Options& options, const TemporaryFolder& folder, const Job& job, Json& results) {
+void add_job(const Options& options, const TemporaryFolder& folder, const RenderJob& job, Json& results) {
   if (!fits_in_memory(job)) {
     results.push_back({{"name", job.name}, {"resolution", job.resolution}, {"skipped", "not enough memory"}});
     return;
@@ -113,8 +113,8 @@ void add_job(const Options& options, const TemporaryFolder& folder, const Job& j
 /// How often faster a position is traced than with OpenVDB's sampler, which gets fewer positions.
 Json compare_box_sampler(const Options& options, const TemporaryFolder& folder) {
   const int resolution = options.quick ? 16 : 128, side = options.quick ? 32 : 1024, threads = processor().threads;
-  const Job few = photon_job(resolution, options.quick ? 100 : 2048, side),
-            many = photon_job(resolution, options.quick ? 100 : 262144, side);
+  const RenderJob few = photon_job(resolution, options.quick ? 100 : 2048, side),
+                  many = photon_job(resolution, options.quick ? 100 : 262144, side);
   options.announce("jobs: OpenVDB's BoxSampler in the tracer's place");
   const Json slow = run_job(folder, few, threads, "tensorray_box_sampler"), fast = run_job(folder, many, threads);
   const auto seconds_per_position = [](const Json& job) {
@@ -135,7 +135,7 @@ Json compare_box_sampler(const Options& options, const TemporaryFolder& folder) 
 Json measure_jobs(const Options& options) {
   const TemporaryFolder folder;
   Json results = Json::array();
-  for (const Job& job : jobs(options.quick)) add_job(options, folder, job, results);
+  for (const RenderJob& job : jobs(options.quick)) add_job(options, folder, job, results);
   if (options.million) add_job(options, folder, photon_job(128, options.quick ? 1000 : 1u << 20, 1024), results);
   return {{"renders", results}, {"box_sampler", compare_box_sampler(options, folder)}};
 }

@@ -30,13 +30,15 @@ std::vector<MeasuredField> fields_to_measure(bool quick) {
   const Eigen::Vector3d down(0.1, 0.07, -1), across(-1, 0.1, 0.05);
   const int small = quick ? 24 : 128, large = quick ? 32 : 256;
   const auto size = [](int n) { return std::to_string(n) + "³"; };
+  FieldRequest half_empty{PointLoad(), large, down, weakest};
+  half_empty.half_empty = true;
   return {
       {"point load, weakest", {PointLoad(), small, down, weakest}, {{"coherent " + size(small), Order::warm}}},
       {"point load, weakest",
        {PointLoad(), large, down, weakest},
        {{"coherent " + size(large), Order::warm}, {"cold cells " + size(large), Order::fresh}}},
       {"point load, weakest, every second cube of 64³ voxels inactive",
-       {PointLoad(), large, down, weakest, true},
+       half_empty,
        {{"half empty " + size(large), Order::warm}}},
       {"point load, weak", {PointLoad(), small, down, weak}, {{"parting " + size(small), Order::warm}}},
       {"point load as rendered", {PointLoad(), small, down, automatic}, {{"as rendered " + size(small), Order::fresh}}},

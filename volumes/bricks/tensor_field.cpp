@@ -115,6 +115,12 @@ std::vector<Eigen::Vector3d> TensorField::corners() const {
   return corners;
 }
 
+Eigen::AlignedBox3d TensorField::world_box() const {
+  Eigen::AlignedBox3d box;
+  for (const Eigen::Vector3d& corner : corners()) box.extend(corner);
+  return box;
+}
+
 double TensorField::greatest_norm() const {
   double greatest = 0;
   for (std::size_t i = 0; i < brick_count(); ++i) {

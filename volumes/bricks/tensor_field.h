@@ -60,6 +60,9 @@ class TensorField {
   /// The eight corners of the extent, world.
   std::vector<Eigen::Vector3d> corners() const;
 
+  /// The box about them, along the world's axes.
+  Eigen::AlignedBox3d world_box() const;
+
   /// Whether a point is inside the extent, its faces included.
   bool contains(const Eigen::Vector3d& world) const { return index_bounds_.contains(to_index_ * world); }
 
