@@ -6,10 +6,12 @@
 #include <fmt/format.h>
 #include <tbb/parallel_invoke.h>
 
+#include "base/text.h"
 #include "integrators/paths/path_files.h"
 #include "renderer/images/image.h"
 #include "volumes/files/point_files.h"
 #include "volumes/files/scalar_files.h"
+#include "volumes/files/vtk_files.h"
 
 namespace tensorray {
 namespace {
@@ -89,6 +91,8 @@ double automatic_exposure(const Image& linear) {
 }
 
 OutputFiles open_outputs(const OutputDescription& output) {
+  for (const std::filesystem::path& path : {output.photons, output.paths})
+    if (lower_case_ending(path) == ".vtp") require_vtk_program();
   OutputFiles files;
   if (!output.image.empty()) files.image.emplace(output.image);
   if (!output.exr.empty()) files.exr.emplace(output.exr);

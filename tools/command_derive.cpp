@@ -27,12 +27,6 @@ struct DeriveOptions {
   std::vector<std::string> invariants;
 };
 
-std::string joined(const std::vector<std::string>& words) {
-  std::string text;
-  for (const std::string& word : words) text += (text.empty() ? "" : ", ") + word;
-  return text;
-}
-
 /// Each once, in the order asked for. @throw std::invalid_argument that lists the invariants.
 std::vector<Invariant> chosen_invariants(const DeriveOptions& options) {
   std::vector<Invariant> chosen;

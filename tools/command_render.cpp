@@ -18,6 +18,7 @@
 #include "tools/commands.h"
 #include "tools/progress_bar.h"
 #include "tools/statistics_json.h"
+#include "tools/tell.h"
 
 namespace tensorray {
 namespace {
@@ -105,11 +106,6 @@ void write_text(OutputFile& file, const std::string& text) {
     if (!stream) throw std::runtime_error("cannot write " + path.string() + ": the disk may be full");
   });
   file.commit();
-}
-
-void tell(const std::vector<std::string>& lines, bool quiet) {
-  if (!quiet)
-    for (const std::string& line : lines) fmt::print(stderr, "{}\n", line);
 }
 
 void run(const RenderOptions& options, Progress& progress) {

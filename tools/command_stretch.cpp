@@ -21,6 +21,7 @@
 #include "scenes/stretch.h"
 #include "tools/commands.h"
 #include "tools/progress_bar.h"
+#include "tools/tell.h"
 #include "tools/vdb_output.h"
 #include "volumes/files/scalar_files.h"
 
@@ -59,11 +60,6 @@ void check_inputs(const StretchOptions& options, const SceneDescription& scene) 
     for (const std::filesystem::path& input : {scene.path, scene.field.file})
       if (!input.empty() && std::filesystem::equivalent(output, input, error))
         throw CLI::ValidationError("-o", output.string() + " is read by the scene; choose another name");
-}
-
-void tell(const std::vector<std::string>& lines, bool quiet) {
-  if (!quiet)
-    for (const std::string& line : lines) fmt::print(stderr, "{}\n", line);
 }
 
 void write_grid(OutputFile& file, const Scene& scene, const StretchSettings& settings, const ScalarGrid& grid) {

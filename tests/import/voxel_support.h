@@ -19,7 +19,7 @@
 #include <gtest/gtest.h>
 #include <unistd.h>
 
-#include "tools/import/lattice.h"
+#include "tools/import/lattices/lattice.h"
 
 namespace tensorray::test {
 
