@@ -23,8 +23,7 @@ Identity identity_of(const fs::path& path) {
   if (stat(path.c_str(), &status) == 0) return {status.st_dev, status.st_ino, ""};
   const fs::path target = fs::absolute(behind_links(path));
   for (const fs::path& each : {target, target.lexically_normal()})  // "none/../file" needs no folder "none".
-    if (stat(each.parent_path().c_str(), &status) == 0)
-      return {status.st_dev, status.st_ino, each.filename().string()};
+    if (stat(each.parent_path().c_str(), &status) == 0) return {status.st_dev, status.st_ino, each.filename().string()};
   return {0, 0, target.lexically_normal().string()};
 }
 

@@ -28,22 +28,31 @@ if(CMAKE_SYSTEM_PROCESSOR MATCHES "^(aarch64|arm64)" AND CMAKE_CXX_COMPILER_ID S
   target_compile_options(PkgConfig::Highway INTERFACE -march=armv8-a+crypto)
 endif()
 
-find_package(VTK REQUIRED COMPONENTS CommonCore CommonDataModel CommonExecutionModel FiltersCore FiltersGeneral
-             IOCore IOExodus IOGeometry IOLegacy IOParallelXML IOXML
-             OPTIONAL_COMPONENTS FiltersFlowPaths)
+if(TENSORRAY_IMPORT)
+  find_package(VTK REQUIRED COMPONENTS CommonCore CommonDataModel CommonExecutionModel FiltersCore FiltersGeneral
+               IOCore IOExodus IOGeometry IOLegacy IOParallelXML IOXML)
 
-find_path(NanoVDB_INCLUDE_DIR nanovdb/NanoVDB.h)
+  # Neither of these two comes with a CMake package that Debian's other packages leave usable.
+  find_path(Teem_INCLUDE_DIR teem/nrrd.h REQUIRED)
+  find_library(Teem_LIBRARY teem REQUIRED)
+  add_library(Teem::teem INTERFACE IMPORTED)
+  target_include_directories(Teem::teem INTERFACE ${Teem_INCLUDE_DIR})
+  target_link_libraries(Teem::teem INTERFACE ${Teem_LIBRARY})
 
-# Neither of these two comes with a CMake package that Debian's other packages leave usable.
-find_path(Teem_INCLUDE_DIR teem/nrrd.h REQUIRED)
-find_library(Teem_LIBRARY teem REQUIRED)
-add_library(Teem::teem INTERFACE IMPORTED)
-target_include_directories(Teem::teem INTERFACE ${Teem_INCLUDE_DIR})
-target_link_libraries(Teem::teem INTERFACE ${Teem_LIBRARY})
+  find_path(NIfTI_INCLUDE_DIR nifti/nifti2_io.h REQUIRED)
+  find_library(NIfTI_LIBRARY nifti2 REQUIRED)
+  find_library(NIfTI_znz_LIBRARY znz REQUIRED)
+  add_library(NIfTI::nifti2 INTERFACE IMPORTED)
+  target_include_directories(NIfTI::nifti2 INTERFACE ${NIfTI_INCLUDE_DIR}/nifti)
+  target_link_libraries(NIfTI::nifti2 INTERFACE ${NIfTI_LIBRARY} ${NIfTI_znz_LIBRARY})
+endif()
 
-find_path(NIfTI_INCLUDE_DIR nifti/nifti2_io.h REQUIRED)
-find_library(NIfTI_LIBRARY nifti2 REQUIRED)
-find_library(NIfTI_znz_LIBRARY znz REQUIRED)
-add_library(NIfTI::nifti2 INTERFACE IMPORTED)
-target_include_directories(NIfTI::nifti2 INTERFACE ${NIfTI_INCLUDE_DIR}/nifti)
-target_link_libraries(NIfTI::nifti2 INTERFACE ${NIfTI_LIBRARY} ${NIfTI_znz_LIBRARY})
+if(TENSORRAY_TESTS)
+  find_package(GTest REQUIRED)
+endif()
+
+# What the benchmark compares with, where it is installed.
+if(TENSORRAY_BENCHMARK)
+  find_path(NanoVDB_INCLUDE_DIR nanovdb/NanoVDB.h)
+  find_package(VTK QUIET OPTIONAL_COMPONENTS FiltersFlowPaths FiltersGeneral)
+endif()

@@ -8,8 +8,8 @@
 
 #include "base/text.h"
 #include "scenes/pipeline/methods.h"
-#include "tools/commands.h"
-#include "tools/render_scene.h"
+#include "tools/commands/commands.h"
+#include "tools/commands/render_scene.h"
 
 namespace tensorray {
 namespace {

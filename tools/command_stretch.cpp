@@ -6,8 +6,8 @@
 #include <fmt/format.h>
 
 #include "renderer/color/spectrum.h"
-#include "tools/commands.h"
-#include "tools/render_scene.h"
+#include "tools/commands/commands.h"
+#include "tools/commands/render_scene.h"
 
 namespace tensorray {
 namespace {

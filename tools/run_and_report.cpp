@@ -1,13 +1,14 @@
-#include "tools/run_and_report.h"
+#include "tools/command_line/run_and_report.h"
 
 #include <cstdio>
 #include <new>
 #include <stdexcept>
 
-#include <CLI/CLI.hpp>
+#include <CLI/Error.hpp>
 #include <fmt/format.h>
 
 #include "base/progress.h"
+#include "base/text.h"
 #include "scenes/keys/scene_source.h"
 
 namespace tensorray {
@@ -16,7 +17,7 @@ namespace {
 constexpr int failed = 1, wrong_input = 2, interrupted = 130;
 
 int report(const std::exception& error, int status) {
-  fmt::print(stderr, "tensorray: {}\n", error.what());
+  fmt::print(stderr, "tensorray: {}\n", escaped(error.what()));
   return status;
 }
 
@@ -30,7 +31,7 @@ int run_and_report(const std::function<void()>& work) {
   } catch (const CLI::RuntimeError& child) {  // Which has said why.
     return child.get_exit_code();
   } catch (const CLI::ParseError& error) {
-    fmt::print(stderr, "tensorray: {} (--help says more)\n", error.what());
+    fmt::print(stderr, "tensorray: {} (--help says more)\n", escaped(error.what()));
     return wrong_input;
   } catch (const Cancelled&) {
     fmt::print(stderr, "tensorray: interrupted; nothing was written\n");

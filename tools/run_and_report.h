@@ -1,5 +1,5 @@
 #pragma once
-/// @file tools/run_and_report.h
+/// @file tools/command_line/run_and_report.h
 /// Errors as users see them: one line, and an exit status.
 
 #include <functional>

@@ -1,25 +1,17 @@
 /// @file tools/tensorray.cpp
 /// The command line: picks the command.
 
-#include <csignal>
 #include <stdexcept>
 #include <string>
 
 #include <CLI/CLI.hpp>
 #include <fmt/format.h>
 
-#include "base/progress.h"
-#include "tools/commands.h"
-#include "tools/run_and_report.h"
+#include "tools/command_line/interrupts.h"
+#include "tools/command_line/run_and_report.h"
+#include "tools/commands/commands.h"
 
 namespace {
-
-tensorray::Progress progress;  // Global, as a signal handler can reach nothing else.
-
-void on_interrupt(int) {
-  progress.cancelled = true;
-  std::signal(SIGINT, SIG_DFL);  // A second Ctrl-C ends the program at once.
-}
 
 /// CLI11 says no more of an unknown command than that one is required.
 void require_known_command(const CLI::App& app, int argc, char** argv) {
@@ -35,10 +27,9 @@ void require_known_command(const CLI::App& app, int argc, char** argv) {
 }  // namespace
 
 int main(int argc, char** argv) {
-  std::signal(SIGINT, on_interrupt);
-  std::signal(SIGTERM, on_interrupt);
-  std::signal(SIGXFSZ, SIG_IGN);  // A file-size limit is then an error of the write, as a full disk is.
-  std::signal(SIGPIPE, SIG_IGN);
+  tensorray::Progress& progress = tensorray::progress_until_interrupted();
+  if (argc > 1 && std::string(argv[1]) == "import")
+    return tensorray::run_and_report([&] { tensorray::become_import_program(argv + 1); });
 
   CLI::App app("tensorray: light through tensor fields (Zheng and Pang 2003)", "tensorray");
   app.set_version_flag("--version", "tensorray " TENSORRAY_VERSION);
@@ -46,7 +37,7 @@ int main(int argc, char** argv) {
   tensorray::add_render_command(app, progress);
   tensorray::add_make_command(app, progress);
   tensorray::add_derive_command(app, progress);
-  tensorray::add_import_command(app, progress);
+  tensorray::add_import_command(app);
   tensorray::add_stretch_command(app, progress);
   tensorray::add_info_command(app);
   tensorray::add_schema_command(app);

@@ -5,6 +5,7 @@
 #include <string>
 
 #include "base/errors.h"
+#include "base/progress.h"
 #include "base/text.h"
 #include "integrators/paths/path_formats.h"
 
@@ -77,6 +78,8 @@ std::vector<Path> read_paths(const std::filesystem::path& path) {
     std::vector<Path> paths = ending == ".vtp" ? read_vtp_paths(path) : read_tck_paths(path);
     if (paths.empty()) throw std::runtime_error("it holds no path of two points or more");
     return paths;
+  } catch (const Cancelled&) {
+    throw;
   } catch (const std::exception& error) {
     throw std::runtime_error("cannot read the paths " + path.string() + ": " + one_line(error.what()));
   }

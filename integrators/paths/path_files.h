@@ -3,7 +3,7 @@
 /// Paths as files, by the file's ending:
 ///
 /// `.vtp`, VTK polydata (ParaView): a polyline a path. All that a path holds, so that what is read is what was written,
-/// bit for bit, and can be drawn without tracing again:
+/// bit for bit, and can be drawn without tracing again (by `tensorray-import`, see volumes/files/vtk_files.h):
 /// - point data, in double precision: `direction` (3), `length` (from the path's beginning), `tensor` (9, row by row),
 ///   `change` (3: V'); 0 or 1: `in_field`. Points are in double precision too: single precision would move them by more
 ///   than a millionth of a voxel where the origin is far away.
@@ -30,8 +30,8 @@ void write_paths(const std::filesystem::path& path, const std::vector<Path>& pat
 
 /// Reads what write_paths wrote, and other programs' files. A `.vtp` without one of `direction`, `length`, `tensor`,
 /// `change`, `in_field` (streamlines, say) gives bare paths, as every `.tck` does: see bare_way. Polylines of fewer
-/// than two different points are left out. A `.vtp` that is compressed or big-endian is refused. Per-path data that are
-/// missing are as in a new Path.
+/// than two different points are left out. A `.vtp` may have any of VTK's encodings. Per-path data that are missing are
+/// as in a new Path.
 /// @throw std::invalid_argument on another ending; std::runtime_error naming the file and the reason: missing, damaged,
 /// cut off, no path in it, a value that is not finite.
 std::vector<Path> read_paths(const std::filesystem::path& path);

@@ -9,8 +9,8 @@
 namespace tensorray {
 
 /// The scene file is wrong. The message is one line: what, where (file and JSON pointer, or line and column), the fix.
-struct SceneError : std::runtime_error {
-  using std::runtime_error::runtime_error;
+struct SceneError : std::invalid_argument {
+  using std::invalid_argument::invalid_argument;
 };
 
 /// `text` fit for a message of one line: control characters are escaped, and the middle of a long text is left out.

@@ -38,8 +38,8 @@ const Output* best_kind(const std::filesystem::path& file, const std::vector<Out
     if (kind.option_ending) known.emplace_back(kind.option_ending);
     if (!kind.option_ending) known.insert(known.end(), kind.endings.begin(), kind.endings.end());
   }
-  throw SceneError(printable(fmt::format("-o {}: no output has such an ending; {} writes {}", file.string(),
-                                         method.name(), joined(known))));
+  throw SceneError(printable(
+      fmt::format("-o {}: no output has such an ending; {} writes {}", file.string(), method.name(), joined(known))));
 }
 
 /// Lets the files of the command line take the place of the scene's. A file that only another method makes is

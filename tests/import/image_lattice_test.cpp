@@ -1,4 +1,4 @@
-#include "tools/import/image_lattice.h"
+#include "tools/import/vtk/image_lattice.h"
 
 #include <cmath>
 #include <fstream>

@@ -1,4 +1,4 @@
-#include "tools/import/lattice.h"
+#include "tools/import/lattices/lattice.h"
 
 #include <cmath>
 #include <limits>

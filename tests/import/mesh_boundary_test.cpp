@@ -1,4 +1,4 @@
-#include "tools/import/mesh_boundary.h"
+#include "tools/import/meshes/mesh_boundary.h"
 
 #include <cmath>
 #include <fstream>

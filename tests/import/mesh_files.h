@@ -28,9 +28,7 @@ class TemporaryFolder : public std::filesystem::path {
   TemporaryFolder& operator=(const TemporaryFolder&) = delete;
 };
 
-inline std::filesystem::path data_file(const std::string& name) {
-  return test::data_folder() / name;
-}
+inline std::filesystem::path data_file(const std::string& name) { return test::data_folder() / name; }
 
 inline std::string bytes_of(const std::filesystem::path& path) {
   std::ifstream file(path, std::ios::binary);

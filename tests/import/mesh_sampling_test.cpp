@@ -1,4 +1,4 @@
-#include "tools/import/mesh_sampling.h"
+#include "tools/import/meshes/mesh_sampling.h"
 
 #include <cmath>
 #include <limits>
@@ -10,7 +10,7 @@
 #include <vtkUnsignedCharArray.h>
 
 #include "tests/import/mesh_fixtures.h"
-#include "tools/import/mesh_tensors.h"
+#include "tools/import/meshes/mesh_tensors.h"
 
 namespace tensorray {
 namespace {

@@ -1,4 +1,4 @@
-#include "tools/import/mesh_tensors.h"
+#include "tools/import/meshes/mesh_tensors.h"
 
 #include <cmath>
 #include <limits>

@@ -5,7 +5,7 @@
 #include <nifti2.h>
 
 #include "tests/import/voxel_support.h"
-#include "tools/import/lattice_files.h"
+#include "tools/import/lattices/lattice_files.h"
 
 namespace tensorray {
 namespace {

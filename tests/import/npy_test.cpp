@@ -8,7 +8,7 @@
 #include <sys/wait.h>
 
 #include "tests/import/voxel_support.h"
-#include "tools/import/lattice_files.h"
+#include "tools/import/lattices/lattice_files.h"
 
 namespace tensorray {
 namespace {

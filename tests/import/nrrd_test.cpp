@@ -3,7 +3,7 @@
 #include <fmt/format.h>
 
 #include "tests/import/voxel_support.h"
-#include "tools/import/lattice_files.h"
+#include "tools/import/lattices/lattice_files.h"
 
 namespace tensorray {
 namespace {

@@ -1,4 +1,4 @@
-#include "tools/import/plot3d.h"
+#include "tools/import/vtk/plot3d.h"
 
 #include <algorithm>
 #include <cmath>
@@ -189,6 +189,19 @@ TEST(Plot3dTest, FilesThatDoNotFit) {
   write_bytes(folder / "grid.bin", grid);
   const std::string missing = error_of([&] { read_plot3d(folder / "grid.bin", folder / "none.bin"); });
   EXPECT_NE(missing.find("none.bin: does not exist"), std::string::npos) << missing;
+}
+
+/// 2⁶⁰ points of 16 bytes are 2⁶⁴ bytes, which 64 bits hold as 0: the bare header was taken for the whole file.
+TEST(Plot3dTest, SizesBeyondSixtyFourBitsAreDamage) {
+  const TemporaryFolder folder;
+  for (const bool count : {false, true}) {
+    Form form;
+    form.count = count;
+    Writer writer(form);
+    write_sizes(writer, form, {1 << 20, 1 << 20, 1 << 20});
+    const std::string error = error_of([&] { read(folder, writer.bytes(), q_bytes(form)); });
+    EXPECT_NE(error.find("grid.bin: is "), std::string::npos) << error;
+  }
 }
 
 TEST(Plot3dTest, SeveralBlocksAndTwoDimensionsAreNamed) {

@@ -1,4 +1,4 @@
-#include "tools/import/tensor_order.h"
+#include "tools/import/lattices/tensor_order.h"
 
 #include <stdexcept>
 

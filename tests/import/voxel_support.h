@@ -19,7 +19,7 @@
 #include <unistd.h>
 
 #include "tests/data_folder.h"
-#include "tools/import/lattice.h"
+#include "tools/import/lattices/lattice.h"
 
 namespace tensorray::test {
 
@@ -37,9 +37,7 @@ class TemporaryFile : public std::filesystem::path {
   void write(const std::string& contents) const { std::ofstream(*this, std::ios::binary) << contents; }
 };
 
-inline std::filesystem::path data_file(const std::string& name) {
-  return data_folder() / name;
-}
+inline std::filesystem::path data_file(const std::string& name) { return data_folder() / name; }
 
 #define TENSORRAY_NEEDS(path) \
   if (!std::filesystem::exists(path)) GTEST_SKIP() << path << " is not here: set TENSORRAY_DATA"

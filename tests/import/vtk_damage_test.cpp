@@ -9,7 +9,7 @@
 
 #include "tests/import/mesh_files.h"
 #include "tests/import/vtk_files.h"
-#include "tools/import/vtk_source.h"
+#include "tools/import/vtk/vtk_source.h"
 
 namespace tensorray {
 namespace {
@@ -40,6 +40,33 @@ TEST(VtkDamageTest, FilesThatAreNotWhatTheirEndingSays) {
   EXPECT_NE(error("surface.vtk").find("surfaces"), std::string::npos);
   write_bytes(folder / "surface.vtp", "<VTKFile type=\"PolyData\"></VTKFile>");
   EXPECT_NE(error("surface.vtp").find("'PolyData'"), std::string::npos);
+}
+
+TEST(VtkDamageTest, TypesAreQuotedOnOneLine) {
+  const TemporaryFolder folder;
+  write_bytes(folder / "a.vtu", "<VTKFile type=\"Poly\nData\x1b\"></VTKFile>");
+  EXPECT_NE(error_of([&] { read_vtk_source(folder / "a.vtu"); }).find("'Poly\\nData\\x1b'"), std::string::npos);
+}
+
+/// netCDF prints what it thinks of a header, besides failing.
+TEST(VtkDamageTest, NothingButTheErrorIsSaid) {
+  const std::filesystem::path data = data_file("disk_out_ref/disk_out_ref.ex2");
+  SKIP_WITHOUT(data);
+#ifdef __SANITIZE_ADDRESS__
+  GTEST_SKIP() << "the sanitizer's report is not to be lost, so that nothing is silenced";
+#endif
+  const TemporaryFolder folder;
+  using Change = std::pair<std::size_t, int>;
+  for (const std::vector<Change>& changes : std::vector<std::vector<Change>>{
+           {{4201, 185}, {1214, 174}, {2258, 47}}, {{2049, 233}, {5332, 215}, {1192, 28}}, {{5993, 67}, {873, 86}}}) {
+    std::string bytes = bytes_of(data);
+    for (const auto& [at, value] : changes) bytes[at] = static_cast<char>(value);
+    write_bytes(folder / "a.ex2", bytes);
+    testing::internal::CaptureStderr();
+    const std::string error = error_of([&] { read_vtk_source(folder / "a.ex2"); });
+    EXPECT_EQ(testing::internal::GetCapturedStderr(), "");
+    EXPECT_NE(error, "");
+  }
 }
 
 std::string tetrahedron(const std::string& points, const std::string& cells, const std::string& type = "10") {

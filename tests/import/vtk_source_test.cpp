@@ -1,4 +1,4 @@
-#include "tools/import/vtk_source.h"
+#include "tools/import/vtk/vtk_source.h"
 
 #include <cmath>
 #include <sstream>
@@ -12,8 +12,8 @@
 #include "tests/import/mesh_files.h"
 #include "tests/import/openfoam_case.h"
 #include "tests/import/vtk_files.h"
-#include "tools/import/image_lattice.h"
-#include "tools/import/mesh_tensors.h"
+#include "tools/import/meshes/mesh_tensors.h"
+#include "tools/import/vtk/image_lattice.h"
 
 namespace tensorray {
 namespace {

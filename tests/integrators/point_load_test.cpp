@@ -25,9 +25,7 @@ struct Reference {
   double flexibility = 0, plate = 0;
 };
 
-std::filesystem::path reference_file() {
-  return data_folder() / "../reference/point_load_rays.csv";
-}
+std::filesystem::path reference_file() { return data_folder() / "../reference/point_load_rays.csv"; }
 
 std::vector<Reference> read_references() {
   std::vector<Reference> references;

@@ -73,7 +73,8 @@ TEST_F(Grids, DeriveTellsWhatThereIs) {
   EXPECT_NE(run_well({"derive", "--help"}).out.find("fractional_anisotropy"), std::string::npos);
   run_well({"make", "vortex", "-o", "t.vdb", "--resolution", "9"});
   expect_wrong_input({"derive", "t.vdb", "--invariant", "curl", "-o", "i.vdb"}, {"curl", "norm", "vorticity"});
-  expect_wrong_input({"derive", "t.vdb", "--invariant", "norm", "-o", "t.vdb"}, {"-o (t.vdb)", "the same file as the field"});
+  expect_wrong_input({"derive", "t.vdb", "--invariant", "norm", "-o", "t.vdb"},
+                     {"-o (t.vdb)", "the same file as the field"});
   expect_wrong_input({"derive", "t.vdb", "--invariant", "norm", "-o", "i.nrrd"}, {".vdb"});
   expect_wrong_input({"derive", "t.vdb", "-o", "i.vdb"}, {"--invariant"});
   const Outcome other = run({"derive", "t.vdb", "--name", "stress", "--invariant", "norm", "-o", "i.vdb"});

@@ -1,10 +1,12 @@
 #include <functional>
+#include <limits>
 #include <random>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <openvdb/openvdb.h>
 
+#include "base/byte_order.h"
 #include "tests/volumes/file_support.h"
 #include "volumes/files/tensor_files.h"
 
@@ -53,7 +55,7 @@ TEST(DamagedFiles, DamageBeforeTheTreesNeverCrashes) {
   write_tensor_vdb(path, sparse_grid());
   const std::string bytes = bytes_of(path);
   std::mt19937 engine(3);
-  // What stands before the first grid's tree: header, metadata, table. (OpenVDB does not survive damaged trees.)
+  // What stands before the first grid's tree: header, metadata, table.
   const std::size_t end = bytes.find("AffineMap") + 9;
   for (int i = 0; i < 300; ++i) {
     std::string changed = bytes;
@@ -65,6 +67,65 @@ TEST(DamagedFiles, DamageBeforeTheTreesNeverCrashes) {
       EXPECT_THAT(error.what(), HasSubstr(damaged.string()));
     }
   }
+}
+
+/// Changes bytes all over a file, one at a time: in trees, a length or a mask that is wrong made OpenVDB write beyond
+/// its memory. (A change that leaves every length as it was is read: the format has no checksum.)
+TEST(DamagedFiles, FlippedBytesNeverCrash) {
+  using namespace openvdb::io;
+  const Temporary path("a.vdb"), stock("b.vdb"), damaged("c.vdb");
+  for (const bool half : {false, true}) {
+    write_tensor_vdb(path, sparse_grid(), half);
+    openvdb::io::File file(path.string());
+    file.open(/*delayLoad=*/false);
+    const auto grids = file.getGrids();
+    for (const std::uint32_t compression :
+         std::initializer_list<std::uint32_t>{COMPRESS_ACTIVE_MASK, COMPRESS_ZIP | COMPRESS_ACTIVE_MASK,
+                                              COMPRESS_BLOSC | COMPRESS_ACTIVE_MASK, COMPRESS_BLOSC}) {
+      write_stock(stock, *grids, compression);
+      const std::string bytes = bytes_of(stock);
+      int refused = 0;
+      constexpr std::size_t flips = 700;
+      for (std::size_t i = 0; i < flips; ++i) {
+        std::string changed = bytes;
+        char& flipped = changed[bytes.size() * i / flips];
+        flipped = static_cast<char>(flipped ^ (i % 4 == 3 ? 0xff : 1 << (i % 8)));
+        write_bytes(damaged, changed);
+        try {
+          read_tensor_vdb(damaged);
+        } catch (const std::runtime_error& error) {
+          ++refused;
+          EXPECT_THAT(error.what(), AllOf(HasSubstr(damaged.string()), testing::Not(HasSubstr("\n"))));
+        }
+      }
+      EXPECT_GT(refused, 0) << compressionToString(compression);
+    }
+  }
+}
+
+/// Each length in the trees, as the greatest and the least number, and a little off.
+TEST(DamagedFiles, WrongLengthsInTreesAreNoticed) {
+  const Temporary path("a.vdb"), damaged("b.vdb");
+  write_tensor_vdb(path, sparse_grid());
+  const std::string bytes = bytes_of(path);
+  // A chunk of Blosc begins with its version (2) and that of its format (1); its length stands before it.
+  int chunks = 0;
+  for (std::size_t at = bytes.find("AffineMap"); (at = bytes.find("\x02\x01", at + 1)) != std::string::npos;) {
+    const auto length = read_number<std::int64_t>(&bytes[at - 8], ByteOrder::little);
+    if (length != read_number<std::uint32_t>(&bytes[std::min(at + 12, bytes.size() - 4)], ByteOrder::little)) continue;
+    ++chunks;
+    if (chunks % 7 != 1) continue;
+    for (const std::int64_t wrong :
+         {std::int64_t{0}, -length, length - 1, length + 1, -length * 1000, std::int64_t{1} << 40,
+          std::int64_t{-1} << 40, std::numeric_limits<std::int64_t>::max(), std::numeric_limits<std::int64_t>::min()}) {
+      std::string number;
+      append_number(wrong, ByteOrder::little, number);
+      write_bytes(damaged, std::string(bytes).replace(at - 8, 8, number));
+      EXPECT_THAT([&] { read_tensor_vdb(damaged); }, ThrowsMessage<std::runtime_error>(HasSubstr(damaged.string())))
+          << at << " " << wrong;
+    }
+  }
+  EXPECT_GT(chunks, 20);
 }
 
 TEST(DamagedFiles, NotVdbFiles) {

@@ -3,7 +3,6 @@
 /// Temporary files, a tensor grid with all that files must keep, and grids written by OpenVDB itself.
 
 #include <cmath>
-#include <csignal>
 #include <filesystem>
 #include <fstream>
 #include <iterator>
@@ -11,9 +10,9 @@
 
 #include <gtest/gtest.h>
 #include <openvdb/openvdb.h>
-#include <sys/resource.h>
 #include <unistd.h>
 
+#include "tests/volumes/file_size_limit.h"
 #include "volumes/grids/tensor_grid.h"
 
 namespace tensorray {
@@ -27,25 +26,6 @@ class Temporary : public std::filesystem::path {
   ~Temporary() { std::filesystem::remove_all(*this); }
   Temporary(const Temporary&) = delete;
   Temporary& operator=(const Temporary&) = delete;
-};
-
-/// While alive, files cannot grow beyond `bytes`; writing then fails as on a full disk.
-class FileSizeLimit {
- public:
-  explicit FileSizeLimit(rlim_t bytes) {
-    handler_ = std::signal(SIGXFSZ, SIG_IGN);
-    getrlimit(RLIMIT_FSIZE, &before_);
-    const rlimit limit{bytes, before_.rlim_max};
-    setrlimit(RLIMIT_FSIZE, &limit);
-  }
-  ~FileSizeLimit() {
-    setrlimit(RLIMIT_FSIZE, &before_);
-    std::signal(SIGXFSZ, handler_);
-  }
-
- private:
-  rlimit before_;
-  void (*handler_)(int);
 };
 
 inline std::string bytes_of(const std::filesystem::path& path) {

@@ -24,9 +24,7 @@ using Eigen::Vector3d;
 
 constexpr double pi = 3.14159265358979323846;
 
-std::filesystem::path data_file(const std::string& name) {
-  return test::data_folder() / name;
-}
+std::filesystem::path data_file(const std::string& name) { return test::data_folder() / name; }
 
 /// The tensor of a generated grid at an index.
 Matrix3d at(const TensorGrid& grid, const Eigen::Vector3i& index) {

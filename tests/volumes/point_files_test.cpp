@@ -11,16 +11,9 @@
 #include <openvdb/points/PointConversion.h>
 #include <openvdb/points/PointCount.h>
 #include <openvdb/points/PointDataGrid.h>
-#include <vtkCellArray.h>
-#include <vtkDataArray.h>
-#include <vtkFieldData.h>
-#include <vtkNew.h>
-#include <vtkPointData.h>
-#include <vtkPolyData.h>
-#include <vtkStringArray.h>
-#include <vtkXMLPolyDataReader.h>
 
 #include "tests/volumes/file_support.h"
+#include "tests/volumes/point_support.h"
 
 namespace tensorray {
 namespace {
@@ -29,36 +22,6 @@ namespace fs = std::filesystem;
 using testing::AllOf;
 using testing::HasSubstr;
 using testing::ThrowsMessage;
-
-/// Points on a plate, as photons are, or in a box.
-PointCloud cloud_of(std::size_t count, float thickness) {
-  std::mt19937 engine(1);
-  std::uniform_real_distribution<float> uniform(-1, 1);
-  PointCloud cloud;
-  for (std::size_t i = 0; i < count; ++i) {
-    cloud.positions.emplace_back(uniform(engine), uniform(engine), 100 + thickness * uniform(engine));
-    cloud.scalars["wavelength"].push_back(380 + 350 * uniform(engine));
-    cloud.scalars["power"].push_back(static_cast<float>(i));
-    cloud.vectors["direction"].emplace_back(uniform(engine), uniform(engine), uniform(engine));
-  }
-  cloud.metadata = {{"seed", "7"}, {"scene", "<a> & \"b\"\nc"}};
-  return cloud;
-}
-
-/// The rank of a point by `power`, which is its index in the cloud.
-using Record = std::tuple<float, Eigen::Vector3f, float, Eigen::Vector3f>;
-
-void expect_records(std::vector<Record> records, const PointCloud& cloud, float tolerance) {
-  ASSERT_EQ(records.size(), cloud.positions.size());
-  std::sort(records.begin(), records.end(), [](auto& a, auto& b) { return std::get<0>(a) < std::get<0>(b); });
-  for (std::size_t i = 0; i < records.size(); ++i) {
-    const auto& [power, position, wavelength, direction] = records[i];
-    ASSERT_EQ(power, cloud.scalars.at("power")[i]);
-    ASSERT_EQ(wavelength, cloud.scalars.at("wavelength")[i]);
-    ASSERT_EQ(direction, cloud.vectors.at("direction")[i]);
-    ASSERT_LE((position - cloud.positions[i]).cwiseAbs().maxCoeff(), tolerance);
-  }
-}
 
 openvdb::points::PointDataGrid::Ptr read_points(const fs::path& path) {
   openvdb::initialize();
@@ -121,75 +84,32 @@ TEST(VdbPoints, FewOrEqualPoints) {
   expect_records(records_of(*read_points(path)), cloud, 1e-5f);
 }
 
-TEST(VtpPoints, HoldEveryPointAndAttribute) {
-  const PointCloud cloud = cloud_of(3000, 0);
-  const Temporary path("a.vtp");
-  write_points(path, cloud);
-  vtkNew<vtkXMLPolyDataReader> reader;
-  reader->SetFileName(path.c_str());
-  reader->Update();
-  vtkPolyData* read = reader->GetOutput();
-  ASSERT_EQ(read->GetNumberOfPoints(), 3000);
-  ASSERT_EQ(read->GetNumberOfVerts(), 3000);
-  vtkIdType size = 0;
-  const vtkIdType* points = nullptr;
-  read->GetVerts()->GetCellAtId(1234, size, points);
-  EXPECT_EQ(size, 1);
-  EXPECT_EQ(points[0], 1234);
-  std::vector<Record> records;
-  const auto vector = [](const double* v) { return Eigen::Vector3d(v[0], v[1], v[2]).cast<float>().eval(); };
-  for (vtkIdType i = 0; i < 3000; ++i)
-    records.emplace_back(static_cast<float>(read->GetPointData()->GetArray("power")->GetTuple1(i)),
-                         vector(read->GetPoint(i)),
-                         static_cast<float>(read->GetPointData()->GetArray("wavelength")->GetTuple1(i)),
-                         vector(read->GetPointData()->GetArray("direction")->GetTuple3(i)));
-  expect_records(records, cloud, 0);
-  for (const auto& [key, value] : cloud.metadata) {
-    auto* text = vtkStringArray::SafeDownCast(read->GetFieldData()->GetAbstractArray(key.c_str()));
-    ASSERT_NE(text, nullptr) << key;
-    EXPECT_EQ(text->GetValue(0), value);
-  }
-}
-
-TEST(VtpPoints, NoPoints) {
-  const Temporary path("a.vtp");
-  write_points(path, {});
-  vtkNew<vtkXMLPolyDataReader> reader;
-  reader->SetFileName(path.c_str());
-  reader->Update();
-  EXPECT_EQ(reader->GetOutput()->GetNumberOfPoints(), 0);
-}
-
 TEST(PointFiles, FullDiskIsNoticed) {
   const PointCloud cloud = cloud_of(20000, 0.5f);
-  for (const std::string name : {"a.vdb", "a.vtp"}) {
-    const Temporary path(name);
-    write_points(path, cloud);
-    const auto size = fs::file_size(path);
-    for (const auto limit : {std::uintmax_t{0}, size / 50, size / 3, size / 2, size * 9 / 10, size - 1}) {
-      fs::remove(path);
-      const FileSizeLimit limited(limit);
-      testing::internal::CaptureStderr();
-      EXPECT_THAT([&] { write_points(path, cloud); }, ThrowsMessage<std::runtime_error>(HasSubstr(path.string())))
-          << limit << " of " << size;
-      EXPECT_EQ(testing::internal::GetCapturedStderr(), "");
-    }
+  const Temporary path("a.vdb");
+  write_points(path, cloud);
+  const auto size = fs::file_size(path);
+  for (const auto limit : {std::uintmax_t{0}, size / 50, size / 3, size / 2, size * 9 / 10, size - 1}) {
+    fs::remove(path);
+    const FileSizeLimit limited(limit);
+    testing::internal::CaptureStderr();
+    EXPECT_THAT([&] { write_points(path, cloud); }, ThrowsMessage<std::runtime_error>(HasSubstr(path.string())))
+        << limit << " of " << size;
+    EXPECT_EQ(testing::internal::GetCapturedStderr(), "");
   }
 }
 
 TEST(PointFiles, UnwritableFilesAreNoticed) {
   const PointCloud cloud = cloud_of(10, 0);
-  for (const std::string name : {"a.vdb", "a.vtp"}) {
-    testing::internal::CaptureStderr();
-    const fs::path missing = Temporary("no_such_folder") / name;
-    EXPECT_THAT([&] { write_points(missing, cloud); }, ThrowsMessage<std::runtime_error>(HasSubstr(missing.string())));
-    if (fs::exists("/dev/full")) {
-      const Temporary link(name);  // Removing a link leaves the device.
-      fs::create_symlink("/dev/full", link);
-      EXPECT_THAT([&] { write_points(link, cloud); }, ThrowsMessage<std::runtime_error>(HasSubstr(link.string())));
-    }
-    EXPECT_EQ(testing::internal::GetCapturedStderr(), "");
+  testing::internal::CaptureStderr();
+  const fs::path missing = Temporary("no_such_folder") / "a.vdb";
+  EXPECT_THAT([&] { write_points(missing, cloud); }, ThrowsMessage<std::runtime_error>(HasSubstr(missing.string())));
+  if (fs::exists("/dev/full")) {
+    const Temporary link("a.vdb");  // Removing a link leaves the device.
+    fs::create_symlink("/dev/full", link);
+    EXPECT_THAT([&] { write_points(link, cloud); }, ThrowsMessage<std::runtime_error>(HasSubstr(link.string())));
   }
+  EXPECT_EQ(testing::internal::GetCapturedStderr(), "");
 }
 
 TEST(PointFiles, RefuseOtherEndingsAndMissingValues) {

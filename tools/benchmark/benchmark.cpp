@@ -12,7 +12,7 @@
 
 #include "tools/benchmark/parts.h"
 #include "tools/benchmark/tables.h"
-#include "tools/run_and_report.h"
+#include "tools/command_line/run_and_report.h"
 
 namespace tensorray::benchmark {
 namespace {

@@ -1,7 +1,6 @@
 #include "tools/import/import_file.h"
 
 #include <algorithm>
-#include <cctype>
 #include <stdexcept>
 #include <utility>
 #include <variant>
@@ -13,29 +12,22 @@
 #include <vtkPointData.h>
 #include <vtkSmartPointer.h>
 
-#include "tools/import/image_lattice.h"
-#include "tools/import/lattice_files.h"
-#include "tools/import/mesh_boundary.h"
-#include "tools/import/plot3d.h"
-#include "tools/import/vtk_source.h"
+#include "base/text.h"
+#include "tools/import/lattices/lattice_files.h"
+#include "tools/import/meshes/mesh_boundary.h"
+#include "tools/import/vtk/image_lattice.h"
+#include "tools/import/vtk/plot3d.h"
+#include "tools/import/vtk/vtk_messages.h"
+#include "tools/import/vtk/vtk_source.h"
 
 namespace tensorray {
 namespace {
-
-std::string lower(std::string text) {
-  std::transform(text.begin(), text.end(), text.begin(), [](unsigned char c) { return std::tolower(c); });
-  return text;
-}
-
-bool ends_with(const std::string& text, const std::string& ending) {
-  return text.size() >= ending.size() && text.compare(text.size() - ending.size(), ending.size(), ending) == 0;
-}
 
 /// The reader of a format of voxels, or null.
 using OpenLattice = Lattice (*)(const std::filesystem::path&);
 
 OpenLattice lattice_reader(const std::filesystem::path& path) {
-  const std::string name = lower(path.filename().string());
+  const std::string name = lower_case(path.filename().string());
   for (const char* ending : {".nrrd", ".nhdr"})
     if (ends_with(name, ending)) return open_nrrd;
   for (const char* ending : {".nii", ".nii.gz", ".hdr"})
@@ -84,6 +76,7 @@ TensorGrid import_lattice(const Lattice& lattice, const ImportSettings& settings
 
 TensorGrid import_mesh(vtkDataSet& data, const ArrayChoice& array, const ImportSettings& settings,
                        const Progress& progress, ImportReport& report) {
+  const SilentVtk silent;
   report.mesh_cells = static_cast<std::size_t>(data.GetNumberOfCells());
   if (!settings.boundary.empty()) {
     progress.update("finding the boundary", 0, 1);
@@ -118,7 +111,7 @@ TensorGrid import_any(const ImportSettings& settings, const Progress& progress, 
   if (settings.files.size() == 2) {
     return import_data_set(read_plot3d(file, settings.files[1]), settings, progress, report);
   }
-  if (lower(file.extension().string()) == ".img") {
+  if (lower_case_ending(file) == ".img") {
     ImportSettings with_header = settings;
     with_header.files = {std::filesystem::path(file).replace_extension(".hdr")};
     return import_any(with_header, progress, report);
@@ -130,8 +123,9 @@ TensorGrid import_any(const ImportSettings& settings, const Progress& progress, 
   return import_lattice(open(file), settings, report);
 }
 
-/// Errors name the file, whoever found them.
-std::string about(const std::filesystem::path& file, const std::string& message) {
+/// Errors name the file, whoever found them, and are one line whatever they quote of it.
+std::string about(const std::filesystem::path& file, const std::string& error) {
+  const std::string message = escaped(error);
   return message.find(file.string()) == std::string::npos ? file.string() + ": " + message : message;
 }
 

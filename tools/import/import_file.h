@@ -8,9 +8,9 @@
 #include <string>
 #include <vector>
 
-#include "tools/import/lattice.h"
-#include "tools/import/mesh_sampling.h"
-#include "tools/import/mesh_tensors.h"
+#include "tools/import/lattices/lattice.h"
+#include "tools/import/meshes/mesh_sampling.h"
+#include "tools/import/meshes/mesh_tensors.h"
 
 namespace tensorray {
 

@@ -10,10 +10,14 @@
 #include <utility>
 
 #include <openvdb/io/Archive.h>
+#include <openvdb/io/DelayedLoadMetadata.h>
 #include <openvdb/io/GridDescriptor.h>
 #include <tbb/parallel_for.h>
 
+#include "base/byte_order.h"
 #include "base/errors.h"
+#include "base/text.h"
+#include "volumes/files/vdb_tree_check.h"
 
 namespace tensorray {
 namespace {
@@ -26,18 +30,6 @@ constexpr std::streamoff version_offset = 8, tag_offset = 21;
 
 [[noreturn]] void fail_damaged(const std::filesystem::path& path, const std::string& how) {
   fail(path, "the file is truncated or damaged" + how + "; copy or write it again");
-}
-
-std::string one_line(std::string text) {
-  std::replace(text.begin(), text.end(), '\n', ' ');
-  return text;
-}
-
-template <class T>
-T read_number(std::istream& in) {
-  T value;
-  in.read(reinterpret_cast<char*>(&value), sizeof value);
-  return value;
 }
 
 /// Reads a table of grids itself rather than with GridDescriptor::read, which refuses the whole file for one grid of a
@@ -80,10 +72,17 @@ class Reader : private openvdb::io::Archive {
   }
 
  private:
+  template <class Number>
+  Number read_stored() {
+    std::array<char, sizeof(Number)> bytes;
+    in_.read(bytes.data(), bytes.size());
+    return read_number<Number>(bytes.data(), ByteOrder::little);
+  }
+
   void read_file_header() {
-    if (size_ < version_offset + 4 || read_number<std::int64_t>(in_) != openvdb::OPENVDB_MAGIC)
+    if (size_ < version_offset + 4 || read_stored<std::int64_t>() != openvdb::OPENVDB_MAGIC)
       fail(path_, "is not an OpenVDB file");
-    if (read_number<std::uint32_t>(in_) > openvdb::OPENVDB_FILE_VERSION)
+    if (read_stored<std::uint32_t>() > openvdb::OPENVDB_FILE_VERSION)
       fail(path_, "was written by a newer OpenVDB than this program has; write it in an older format");
     in_.seekg(0);
     readHeader(in_);
@@ -93,7 +92,7 @@ class Reader : private openvdb::io::Archive {
   }
 
   std::uint32_t read_length() {
-    const std::uint32_t length = read_number<std::uint32_t>(in_);
+    const std::uint32_t length = read_stored<std::uint32_t>();
     if (length > size_ - in_.tellg()) fail_damaged(path_, "");
     return length;
   }
@@ -110,8 +109,14 @@ class Reader : private openvdb::io::Archive {
     const std::streamoff before = in_.tellg();
     in_.seekg(start);
     const auto skip_string = [&] { in_.seekg(read_length(), std::ios::cur); };
-    for (std::uint32_t left = read_number<std::uint32_t>(in_); left > 0; --left)
-      for (int part = 0; part < 3; ++part) skip_string();  // Name, type, value.
+    for (std::uint32_t left = read_stored<std::uint32_t>(); left > 0; --left) {
+      skip_string();  // The name.
+      if (read_string() == openvdb::io::DelayedLoadMetadata::staticTypeName()) {
+        if (!delayed_load_fits(read_string(), size_)) fail_damaged(path_, "");
+      } else {
+        skip_string();
+      }
+    }
     for (int i = 0; i < strings; ++i) skip_string();
     in_.seekg(before);
   }
@@ -125,9 +130,9 @@ class Reader : private openvdb::io::Archive {
     if (half) type.resize(type.size() - half_suffix.size());
     openvdb::io::GridDescriptor descriptor(name, type, half);
     if (fileVersion() >= openvdb::OPENVDB_FILE_VERSION_GRID_INSTANCING) descriptor.setInstanceParentName(read_string());
-    descriptor.setGridPos(read_number<std::int64_t>(in_));
-    descriptor.setBlockPos(read_number<std::int64_t>(in_));
-    descriptor.setEndPos(read_number<std::int64_t>(in_));
+    descriptor.setGridPos(read_stored<std::int64_t>());
+    descriptor.setBlockPos(read_stored<std::int64_t>());
+    descriptor.setEndPos(read_stored<std::int64_t>());
     return descriptor;
   }
 
@@ -143,8 +148,27 @@ class Reader : private openvdb::io::Archive {
     grid->setSaveFloatAsHalf(descriptor.saveFloatAsHalf());
     const bool has_compression = fileVersion() >= openvdb::OPENVDB_FILE_VERSION_NODE_MASK_COMPRESSION;
     check_lengths(in_.tellg() + std::streamoff(has_compression ? 4 : 0), 1);  // The string is the transform's type.
+    if (has_compression && !descriptor.isInstance()) check_tree(descriptor);
     readGrid(grid, descriptor, in_);
     return grid;
+  }
+
+  /// Checks the tree of the grid that begins where the stream stands. Returns there.
+  void check_tree(const openvdb::io::GridDescriptor& descriptor) {
+    const std::streamoff begin = in_.tellg();
+    const auto compression = read_stored<std::uint32_t>();
+    const openvdb::GridBase::Ptr probe = openvdb::GridBase::createGrid(descriptor.gridType());
+    probe->readMeta(in_);
+    probe->readTransform(in_);
+    StoredTree tree;
+    tree.type = descriptor.gridType();
+    tree.half = descriptor.saveFloatAsHalf();
+    tree.blosc = compression & openvdb::io::COMPRESS_BLOSC;
+    tree.zip = compression & openvdb::io::COMPRESS_ZIP;
+    tree.active_only = compression & openvdb::io::COMPRESS_ACTIVE_MASK;
+    tree.file_size = size_;
+    if (!tree_fits(in_, tree)) fail_damaged(path_, "");
+    in_.seekg(begin);
   }
 
   /// Reads the wanted grids, and those whose trees they share: at once, each from a stream of its own.
@@ -223,7 +247,7 @@ VdbFile read_vdb(const std::filesystem::path& path, const std::set<std::string>&
     fail_damaged(path, " (" + one_line(error.what()) + ")");
   } catch (const std::bad_alloc&) {
     fail_damaged(path, ", or larger than the memory");
-  } catch (const std::length_error&) {
+  } catch (const std::logic_error&) {  // A length, or a name that is not in a table.
     fail_damaged(path, "");
   }
 }

@@ -1,9 +1,12 @@
 #pragma once
 /// @file volumes/files/vdb_archive.h
 /// Reads and writes OpenVDB files such that no damage and no full disk goes unnoticed. OpenVDB's own io::File does not
-/// check the state of its stream, so that uncompressed files cut short are read as if whole. (Bytes changed within the
-/// voxels of a file of the right length cannot be noticed: the format has no checksum.)
-/// Only .cpp files of this folder that use OpenVDB themselves include this header: it brings all of OpenVDB.
+/// check the state of its stream, so that uncompressed files cut short are read as if whole, and takes lengths in
+/// damaged trees as they are, which may end the process: vdb_tree_check.h looks at them before. What remains: bytes
+/// changed within the voxels, or within the masks of which are active, are not noticed where the lengths still fit, as
+/// the format has no checksum; and the lengths are not looked at in files older than format 222 (OpenVDB 3), and in
+/// trees of other types than this program reads, where a file without table of grids has such. Only .cpp files of this
+/// folder that use OpenVDB themselves include this header: it brings all of OpenVDB.
 
 #include <filesystem>
 #include <set>

@@ -1,171 +1,103 @@
 #include "volumes/files/vtk_files.h"
 
-#include <algorithm>
-#include <fstream>
-#include <numeric>
 #include <stdexcept>
 #include <system_error>
+#include <utility>
 
-#include <vtkAOSDataArrayTemplate.h>
-#include <vtkCallbackCommand.h>
-#include <vtkCellArray.h>
-#include <vtkCellData.h>
-#include <vtkCommand.h>
-#include <vtkDoubleArray.h>
-#include <vtkErrorCode.h>
-#include <vtkExecutive.h>
-#include <vtkFieldData.h>
-#include <vtkFloatArray.h>
-#include <vtkIntArray.h>
-#include <vtkNew.h>
-#include <vtkPointData.h>
-#include <vtkPoints.h>
-#include <vtkPolyData.h>
-#include <vtkSmartPointer.h>
-#include <vtkStringArray.h>
-#include <vtkTypeInt64Array.h>
-#include <vtkUnsignedCharArray.h>
-#include <vtkXMLPolyDataWriter.h>
+#include "base/child_program.h"
+#include "base/errors.h"
+#include "base/progress.h"
+#include "base/text.h"
 
 namespace tensorray {
 namespace {
 
-vtkSmartPointer<vtkAOSDataArrayTemplate<double>> new_array(double) { return vtkSmartPointer<vtkDoubleArray>::New(); }
-vtkSmartPointer<vtkAOSDataArrayTemplate<float>> new_array(float) { return vtkSmartPointer<vtkFloatArray>::New(); }
-vtkSmartPointer<vtkAOSDataArrayTemplate<int>> new_array(std::int32_t) { return vtkSmartPointer<vtkIntArray>::New(); }
-vtkSmartPointer<vtkAOSDataArrayTemplate<unsigned char>> new_array(std::uint8_t) {
-  return vtkSmartPointer<vtkUnsignedCharArray>::New();
-}
-
-/// A VTK array over memory that the caller keeps; VTK only reads it.
 template <class Number>
-vtkSmartPointer<vtkDataArray> view_of(const std::string& name, const Number* values, int components,
-                                      std::size_t count) {
-  const auto array = new_array(Number());
-  array->SetName(name.c_str());
-  array->SetNumberOfComponents(components);
-  array->SetArray(const_cast<Number*>(values), static_cast<vtkIdType>(count) * components, /*save=*/1);
-  return array;
-}
-
-vtkSmartPointer<vtkDataArray> view_of(const std::string& name, const DataArray& data) {
-  return std::visit(
-      [&](const auto& values) {
-        const auto components = static_cast<std::size_t>(data.components);
-        return view_of(name, values.data(), data.components, values.size() / components);
-      },
-      data.values);
-}
-
-template <class Number>
-const Number* numbers(const std::vector<Eigen::Matrix<Number, 3, 1>>& vectors) {
+DataView view_of_vectors(const std::vector<Eigen::Matrix<Number, 3, 1>>& vectors) {
   static_assert(sizeof(Eigen::Matrix<Number, 3, 1>) == 3 * sizeof(Number), "vectors are contiguous");
-  return reinterpret_cast<const Number*>(vectors.data());
+  return {3, NumberSpan<Number>{reinterpret_cast<const Number*>(vectors.data()), 3 * vectors.size()}};
 }
 
-void add_texts(vtkPolyData& polydata, const std::string& name, const std::vector<std::string>& lines) {
-  vtkNew<vtkStringArray> text;
-  text->SetName(name.c_str());
-  for (const std::string& line : lines) text->InsertNextValue(line);
-  polydata.GetFieldData()->AddArray(text);
-}
-
-vtkNew<vtkPolyData> polydata_of(const PointCloud& cloud) {
-  const std::size_t count = cloud.positions.size();
-  vtkNew<vtkPolyData> polydata;
-  vtkNew<vtkPoints> points;
-  points->SetData(view_of("Points", numbers(cloud.positions), 3, count));
-  polydata->SetPoints(points);
-
-  vtkNew<vtkCellArray> vertices;
-  vertices->AllocateExact(static_cast<vtkIdType>(count), static_cast<vtkIdType>(count));
-  for (std::size_t i = 0; i < count; ++i) {
-    const vtkIdType point = static_cast<vtkIdType>(i);
-    vertices->InsertNextCell(1, &point);
-  }
-  polydata->SetVerts(vertices);
-
+PolyDataView view_of_cloud(const PointCloud& cloud) {
+  PolyDataView view;
+  view.points = view_of_vectors(cloud.positions);
   for (const auto& [name, values] : cloud.scalars)
-    polydata->GetPointData()->AddArray(view_of(name, values.data(), 1, count));
-  for (const auto& [name, values] : cloud.vectors)
-    polydata->GetPointData()->AddArray(view_of(name, numbers(values), 3, count));
-  for (const auto& [key, value] : cloud.metadata) add_texts(*polydata, key, {value});
-  return polydata;
+    view.point_data.emplace_back(name, DataView{1, NumberSpan<float>{values.data(), values.size()}});
+  for (const auto& [name, values] : cloud.vectors) view.point_data.emplace_back(name, view_of_vectors(values));
+  for (const auto& [key, value] : cloud.metadata) view.texts.emplace_back(key, Texts{value});
+  return view;
 }
 
-vtkNew<vtkPolyData> polydata_of(const PolylineData& lines) {
-  vtkNew<vtkPolyData> polydata;
-  vtkNew<vtkPoints> points;
-  points->SetData(view_of("Points", numbers(lines.points), 3, lines.points.size()));
-  polydata->SetPoints(points);
-
-  vtkNew<vtkTypeInt64Array> ends, corners;
-  ends->SetNumberOfValues(static_cast<vtkIdType>(lines.line_ends.size() + 1));
-  ends->SetValue(0, 0);
-  std::transform(lines.line_ends.begin(), lines.line_ends.end(), ends->GetPointer(1),
-                 [](std::size_t end) { return static_cast<vtkTypeInt64>(end); });
-  corners->SetNumberOfValues(static_cast<vtkIdType>(lines.points.size()));
-  std::iota(corners->GetPointer(0), corners->GetPointer(0) + lines.points.size(), vtkTypeInt64{0});
-  vtkNew<vtkCellArray> cells;
-  cells->SetData(ends, corners);
-  polydata->SetLines(cells);
-
-  for (const auto& [name, data] : lines.point_data) polydata->GetPointData()->AddArray(view_of(name, data));
-  for (const auto& [name, data] : lines.line_data) polydata->GetCellData()->AddArray(view_of(name, data));
-  for (const auto& [name, texts] : lines.texts) add_texts(*polydata, name, texts);
-  return polydata;
+PolyDataView view_of_lines(const PolylineData& lines) {
+  PolyDataView view;
+  view.points = view_of_vectors(lines.points);
+  view.line_ends = &lines.line_ends;
+  for (const auto& [name, values] : lines.point_data) view.point_data.emplace_back(name, view_of(values));
+  for (const auto& [name, values] : lines.line_data) view.line_data.emplace_back(name, view_of(values));
+  view.texts.assign(lines.texts.begin(), lines.texts.end());
+  return view;
 }
 
-/// VTK leaves unnoticed what fails when it closes the file; the end is then missing.
-bool is_complete(const std::filesystem::path& path) {
-  static const std::string end = "</VTKFile>\n";
-  std::ifstream file(path, std::ios::binary);
-  file.seekg(-static_cast<std::streamoff>(end.size()), std::ios::end);
-  std::string last(end.size(), ' ');
-  file.read(&last[0], static_cast<std::streamsize>(last.size()));
-  return file && last == end;
+std::filesystem::path vtk_program() { return sibling_program("tensorray-import"); }
+
+/// @throw std::runtime_error with what the program said, or `on_crash` if it could say nothing.
+void run_vtk_program(const std::vector<std::string>& arguments, const UnnamedFile& shared,
+                     const std::string& on_crash) {
+  require_vtk_program();
+  const ProgramEnd end = run_program(vtk_program(), arguments, shared);
+  if (end.signal != 0) throw std::runtime_error(on_crash);
+  if (end.status == 0) return;
+  const std::string reason = one_line(end.error);
+  throw std::runtime_error(reason.empty() ? on_crash : reason);
 }
 
-std::string reason_of(unsigned long error) {
-  if (error == vtkErrorCode::CannotOpenFileError) return "it cannot be opened; check the path";
-  if (error == vtkErrorCode::NoError || error >= vtkErrorCode::FirstVTKErrorCode) return "the disk may be full";
-  return std::generic_category().message(static_cast<int>(error));  // VTK hands on errno.
-}
-
-enum class Compression { none, lz4 };
-
-void write(const std::filesystem::path& path, vtkPolyData& polydata, Compression compression) {
-  vtkNew<vtkXMLPolyDataWriter> writer;
-  // With an observer VTK reports errors to it instead of to the terminal.
-  vtkNew<vtkCallbackCommand> silent;
-  silent->SetCallback([](vtkObject*, unsigned long, void*, void*) {});
-  for (const unsigned long event : {vtkCommand::ErrorEvent, vtkCommand::WarningEvent}) {
-    writer->AddObserver(event, silent);
-    writer->GetExecutive()->AddObserver(event, silent);
+void write(const std::filesystem::path& path, const PolyDataView& data) {
+  try {
+    const UnnamedFile shared;
+    write_poly_data(shared.path(), data);
+    run_vtk_program({"--write-vtp", shared_file, path.string()}, shared,
+                    "the program that writes it ended; the memory may be short");
+  } catch (const Cancelled&) {
+    throw;
+  } catch (const std::runtime_error& error) {
+    fail(path, std::string("cannot be written: ") + error.what());
   }
-  writer->SetFileName(path.c_str());
-  writer->SetInputData(&polydata);
-  writer->SetDataModeToAppended();
-  writer->EncodeAppendedDataOff();
-  writer->SetHeaderTypeToUInt64();
-  if (compression == Compression::lz4)
-    writer->SetCompressorTypeToLZ4();
-  else
-    writer->SetCompressorTypeToNone();
-  const bool written = writer->Write() == 1;
-  const unsigned long error = writer->GetErrorCode();
-  if (!written || error != vtkErrorCode::NoError || !is_complete(path))
-    throw std::runtime_error(path.string() + ": cannot be written: " + reason_of(error));
+}
+
+std::vector<double>& doubles(DataArray& array) {
+  auto* const values = std::get_if<std::vector<double>>(&array.values);
+  if (!values) throw std::logic_error("tensorray-import hands back doubles");
+  return *values;
 }
 
 }  // namespace
 
-void write_vtp(const std::filesystem::path& path, const PointCloud& points) {
-  write(path, *polydata_of(points), Compression::lz4);
+void require_vtk_program() {
+  std::error_code none;
+  if (!std::filesystem::exists(vtk_program(), none))
+    throw std::runtime_error("files of VTK need " + vtk_program().string() +
+                             ", which is not built; run `tools/setup release import`");
 }
 
-void write_vtp(const std::filesystem::path& path, const PolylineData& lines) {
-  write(path, *polydata_of(lines), Compression::none);
+void write_vtp(const std::filesystem::path& path, const PointCloud& points) { write(path, view_of_cloud(points)); }
+
+void write_vtp(const std::filesystem::path& path, const PolylineData& lines) { write(path, view_of_lines(lines)); }
+
+PolylineData read_vtp_lines(const std::filesystem::path& path, const std::set<std::string>& wanted) {
+  const UnnamedFile shared;
+  std::vector<std::string> arguments{"--read-vtp", shared_file, path.string()};
+  arguments.insert(arguments.end(), wanted.begin(), wanted.end());
+  run_vtk_program(arguments, shared,
+                  "reading it ended the reader; the file is damaged or cut off, or does not fit in memory");
+  PolyData data = read_poly_data(shared.path());
+  PolylineData lines;
+  const std::vector<double>& points = doubles(data.points);
+  lines.points.reserve(points.size() / 3);
+  for (std::size_t i = 0; i + 2 < points.size(); i += 3) lines.points.emplace_back(&points[i]);
+  lines.line_ends = std::move(data.line_ends);
+  for (auto& [name, values] : data.point_data) lines.point_data[name] = std::move(values);
+  for (auto& [name, values] : data.line_data) lines.line_data[name] = std::move(values);
+  return lines;
 }
 
 }  // namespace tensorray

@@ -1,28 +1,22 @@
 #pragma once
 /// @file volumes/files/vtk_files.h
-/// Points and polylines as VTK polydata (.vtp). VTK itself stays in the .cpp; it writes, but does not read: VTK 9.1
-/// uses memory that it never set, prints, or ends the program on files that are damaged or cut off.
+/// Points and polylines as VTK polydata (.vtp). VTK itself is in another program, `tensorray-import`, which these
+/// functions start: rendering needs no VTK, and what VTK does to damaged files (it prints, or ends the process) is an
+/// error here. The data go there and come back in a file without a name (poly_data.h).
 
 #include <cstddef>
-#include <cstdint>
 #include <filesystem>
 #include <map>
 #include <set>
 #include <string>
-#include <variant>
 #include <vector>
 
 #include <Eigen/Core>
 
 #include "volumes/files/point_files.h"
+#include "volumes/files/poly_data.h"
 
 namespace tensorray {
-
-/// Values of `components` numbers each, one value after another, in the type that the file has or shall have.
-struct DataArray {
-  int components = 1;
-  std::variant<std::vector<double>, std::vector<float>, std::vector<std::int32_t>, std::vector<std::uint8_t>> values;
-};
 
 /// Polylines, and named values for their points and for themselves.
 struct PolylineData {
@@ -32,20 +26,23 @@ struct PolylineData {
   std::map<std::string, std::vector<std::string>> texts;   ///< Field data: notes to the whole file. Not read.
 };
 
+/// So that work whose result goes into a .vtp file, or that needs one, is not begun in vain.
+/// @throw std::runtime_error with the fix if `tensorray-import` is not built.
+void require_vtk_program();
+
 /// Writes a vertex a point, its scalars and vectors as point data and the metadata as string field data; appended raw
-/// binary, LZ4. @throw std::runtime_error naming the file and the reason, also when the disk is full.
+/// binary, LZ4. @throw std::runtime_error naming the file and the reason, also when the disk is full; Cancelled.
 void write_vtp(const std::filesystem::path& path, const PointCloud& points);
 
 /// Writes polylines; appended raw binary, not compressed, which the most programs read. Points are double precision.
 /// @throw as above.
 void write_vtp(const std::filesystem::path& path, const PolylineData& lines);
 
-/// Reads the polylines of a .vtp file as VTK, ParaView and others write it (ASCII, or binary that is little-endian and
-/// not compressed, inline or appended, raw or base64; in any number of pieces), and what it has of the `wanted` arrays
-/// of numbers, as doubles; passes over all else. Points that lines share are repeated, those of no line are dropped.
-/// No memory is taken for what a file announces and does not hold.
-/// @throw std::runtime_error with the reason (not the file): not VTK polydata, compressed, big-endian, damaged or cut
-/// off, a line names a point that is not there.
+/// Reads the polylines of a .vtp file in any of VTK's encodings (ASCII, binary or appended; compressed or not; either
+/// byte order; in any number of pieces), and what it has of the `wanted` arrays of numbers, as doubles; passes over all
+/// else. Points that lines share are repeated, those of no line are dropped.
+/// @throw std::runtime_error with the reason (not the file): not VTK polydata, damaged or cut off, a line names a point
+/// that is not there, more announced than memory holds; Cancelled.
 PolylineData read_vtp_lines(const std::filesystem::path& path, const std::set<std::string>& wanted);
 
 }  // namespace tensorray

@@ -1,0 +1,100 @@
+#include "base/child_program.h"
+
+#include <cerrno>
+#include <csignal>
+#include <cstdlib>
+#include <fstream>
+#include <iterator>
+#include <stdexcept>
+#include <system_error>
+
+#include <fcntl.h>
+#include <spawn.h>
+#ifdef __linux__
+#include <sys/prctl.h>
+#endif
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include "base/progress.h"
+
+namespace tensorray {
+namespace {
+
+/// Above those that the child's standard streams and the shared file take.
+constexpr int least_descriptor = 10;
+
+std::filesystem::path temporary_folder() {
+  std::error_code none;
+  const std::filesystem::path folder = std::filesystem::temp_directory_path(none);
+  return none ? "/tmp" : folder;
+}
+
+struct SpawnActions {
+  SpawnActions() { posix_spawn_file_actions_init(&actions); }
+  ~SpawnActions() { posix_spawn_file_actions_destroy(&actions); }
+  SpawnActions(const SpawnActions&) = delete;
+  SpawnActions& operator=(const SpawnActions&) = delete;
+  posix_spawn_file_actions_t actions;
+};
+
+int wait_for(pid_t child) {
+  int status = 0;
+  while (waitpid(child, &status, 0) < 0)
+    if (errno != EINTR) throw std::runtime_error("the child process got lost");
+  return status;
+}
+
+}  // namespace
+
+UnnamedFile::UnnamedFile() {
+  std::string name = (temporary_folder() / "tensorray_XXXXXX").string();
+  const int made = mkostemp(&name[0], O_CLOEXEC);
+  if (made < 0)
+    throw std::runtime_error("no temporary file can be made in " + temporary_folder().string() + ": " +
+                             std::generic_category().message(errno) + "; name another folder in TMPDIR");
+  unlink(name.c_str());
+  descriptor_ = fcntl(made, F_DUPFD_CLOEXEC, least_descriptor);
+  close(made);
+  if (descriptor_ < 0) throw std::runtime_error("too many files are open");
+}
+
+UnnamedFile::~UnnamedFile() { close(descriptor_); }
+
+std::filesystem::path UnnamedFile::path() const { return "/proc/self/fd/" + std::to_string(descriptor_); }
+
+std::filesystem::path sibling_program(const std::string& name) {
+  std::error_code none;
+  return std::filesystem::read_symlink("/proc/self/exe", none).replace_filename(name);
+}
+
+ProgramEnd run_program(const std::filesystem::path& program, const std::vector<std::string>& arguments,
+                       const UnnamedFile& shared) {
+  const UnnamedFile error;
+  SpawnActions spawn;
+  posix_spawn_file_actions_adddup2(&spawn.actions, error.descriptor(), 2);
+  posix_spawn_file_actions_adddup2(&spawn.actions, shared.descriptor(), 3);
+  const std::string name = program.string();
+  std::vector<char*> argv{const_cast<char*>(name.c_str())};
+  for (const std::string& argument : arguments) argv.push_back(const_cast<char*>(argument.c_str()));
+  argv.push_back(nullptr);
+  pid_t child = 0;
+  if (const int failed = posix_spawn(&child, name.c_str(), &spawn.actions, nullptr, argv.data(), environ))
+    throw std::runtime_error(name + " cannot be started: " + std::generic_category().message(failed));
+  const int status = wait_for(child);
+  ProgramEnd end;
+  if (WIFSIGNALED(status)) end.signal = WTERMSIG(status);
+  if (WIFEXITED(status)) end.status = WEXITSTATUS(status);
+  if (end.signal == SIGINT || end.signal == SIGTERM) throw Cancelled();
+  std::ifstream file(error.path(), std::ios::binary);
+  end.error.assign(std::istreambuf_iterator<char>(file), {});
+  return end;
+}
+
+void end_with_parent() {
+#ifdef __linux__
+  prctl(PR_SET_PDEATHSIG, SIGTERM);
+#endif
+}
+
+}  // namespace tensorray

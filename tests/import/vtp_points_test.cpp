@@ -1,0 +1,119 @@
+// Points as VTK polydata, through `tensorray-import`.
+
+#include <string>
+#include <vector>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <vtkCellArray.h>
+#include <vtkDataArray.h>
+#include <vtkFieldData.h>
+#include <vtkNew.h>
+#include <vtkPointData.h>
+#include <vtkPolyData.h>
+#include <vtkStringArray.h>
+#include <vtkXMLPolyDataReader.h>
+
+#include "base/child_program.h"
+#include "tests/import/mesh_files.h"
+#include "tests/volumes/file_size_limit.h"
+#include "tests/volumes/point_support.h"
+#include "tools/import/vtk/vtp_files.h"
+
+namespace tensorray {
+namespace {
+
+namespace fs = std::filesystem;
+using testing::HasSubstr;
+
+TEST(VtpPoints, HoldEveryPointAndAttribute) {
+  const PointCloud cloud = cloud_of(3000, 0);
+  const TemporaryFolder folder;
+  const std::filesystem::path path = folder / "a.vtp";
+  write_points(path, cloud);
+  vtkNew<vtkXMLPolyDataReader> reader;
+  reader->SetFileName(path.c_str());
+  reader->Update();
+  vtkPolyData* read = reader->GetOutput();
+  ASSERT_EQ(read->GetNumberOfPoints(), 3000);
+  ASSERT_EQ(read->GetNumberOfVerts(), 3000);
+  vtkIdType size = 0;
+  const vtkIdType* points = nullptr;
+  read->GetVerts()->GetCellAtId(1234, size, points);
+  EXPECT_EQ(size, 1);
+  EXPECT_EQ(points[0], 1234);
+  std::vector<Record> records;
+  const auto vector = [](const double* v) { return Eigen::Vector3d(v[0], v[1], v[2]).cast<float>().eval(); };
+  for (vtkIdType i = 0; i < 3000; ++i)
+    records.emplace_back(static_cast<float>(read->GetPointData()->GetArray("power")->GetTuple1(i)),
+                         vector(read->GetPoint(i)),
+                         static_cast<float>(read->GetPointData()->GetArray("wavelength")->GetTuple1(i)),
+                         vector(read->GetPointData()->GetArray("direction")->GetTuple3(i)));
+  expect_records(records, cloud, 0);
+  for (const auto& [key, value] : cloud.metadata) {
+    auto* text = vtkStringArray::SafeDownCast(read->GetFieldData()->GetAbstractArray(key.c_str()));
+    ASSERT_NE(text, nullptr) << key;
+    EXPECT_EQ(text->GetValue(0), value);
+  }
+}
+
+TEST(VtpPoints, NoPoints) {
+  const TemporaryFolder folder;
+  const std::filesystem::path path = folder / "a.vtp";
+  write_points(path, {});
+  vtkNew<vtkXMLPolyDataReader> reader;
+  reader->SetFileName(path.c_str());
+  reader->Update();
+  EXPECT_EQ(reader->GetOutput()->GetNumberOfPoints(), 0);
+}
+
+TEST(VtpPoints, FullDiskIsNoticed) {
+  const PointCloud cloud = cloud_of(20000, 0.5f);
+  const TemporaryFolder folder;
+  const fs::path path = folder / "a.vtp";
+  write_points(path, cloud);
+  const auto size = fs::file_size(path);
+  for (const auto limit : {std::uintmax_t{0}, size / 50, size / 3, size / 2, size * 9 / 10, size - 1}) {
+    fs::remove(path);
+    const FileSizeLimit limited(limit);
+    testing::internal::CaptureStderr();
+    const std::string error = error_of([&] { write_points(path, cloud); });
+    EXPECT_EQ(testing::internal::GetCapturedStderr(), "");
+    EXPECT_THAT(error, HasSubstr(path.string() + ": cannot be written: ")) << limit << " of " << size;
+  }
+}
+
+/// What of it `tensorray-import` does: the exchanged file above is larger than the one of VTK.
+TEST(VtpPoints, FullDiskIsNoticedByVtk) {
+  PolyData data;
+  data.points.values = std::vector<float>(3 * 5000, 1.5f);
+  data.point_data.emplace_back("power", DataArray{1, std::vector<float>(5000, 2.5f)});
+  const TemporaryFolder folder;
+  const fs::path path = folder / "a.vtp";
+  write_vtp_file(path, view_of(data));
+  const auto size = fs::file_size(path);
+  for (const auto limit : {std::uintmax_t{0}, size / 50, size / 3, size / 2, size * 9 / 10, size - 1}) {
+    fs::remove(path);
+    const FileSizeLimit limited(limit);
+    testing::internal::CaptureStderr();
+    EXPECT_NE(error_of([&] { write_vtp_file(path, view_of(data)); }), "") << limit << " of " << size;
+    EXPECT_EQ(testing::internal::GetCapturedStderr(), "");
+  }
+}
+
+TEST(VtpPoints, UnwritableFilesAreNoticed) {
+  const PointCloud cloud = cloud_of(10, 0);
+  const TemporaryFolder folder;
+  testing::internal::CaptureStderr();
+  const fs::path missing = folder / "no_such_folder" / "a.vtp";
+  EXPECT_THAT(error_of([&] { write_points(missing, cloud); }), HasSubstr(missing.string()));
+  if (fs::exists("/dev/full")) {
+    const fs::path link = folder / "full.vtp";
+    fs::create_symlink("/dev/full", link);
+    EXPECT_THAT(error_of([&] { write_points(link, cloud); }), HasSubstr(link.string()));
+  }
+  EXPECT_EQ(testing::internal::GetCapturedStderr(), "");
+}
+
+}  // namespace
+}  // namespace tensorray

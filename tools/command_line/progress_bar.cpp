@@ -1,0 +1,85 @@
+#include "tools/command_line/progress_bar.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <cstdio>
+
+#include <fmt/core.h>
+#include <sys/ioctl.h>
+#include <unistd.h>
+
+namespace tensorray {
+namespace {
+
+constexpr const char* clear_line = "\r\033[K";
+
+int terminal_width() {
+  winsize size{};
+  const bool known = ioctl(STDERR_FILENO, TIOCGWINSZ, &size) == 0 && size.ws_col > 0;
+  return known ? size.ws_col : 80;
+}
+
+std::string rate_text(double rate) {
+  if (rate >= 1e9) return fmt::format("{:.1f} G/s", rate / 1e9);
+  if (rate >= 1e6) return fmt::format("{:.1f} M/s", rate / 1e6);
+  if (rate >= 1e3) return fmt::format("{:.1f} k/s", rate / 1e3);
+  return fmt::format("{:.1f} /s", rate);
+}
+
+std::string time_text(double seconds) {
+  const auto whole = static_cast<long long>(std::ceil(std::min(seconds, 1e9)));
+  if (whole < 3600) return fmt::format("{}:{:02}", whole / 60, whole % 60);
+  return fmt::format("{}:{:02}:{:02}", whole / 3600, whole / 60 % 60, whole % 60);
+}
+
+/// "tracing photons   43% [##########..............]  1.2 M/s  0:12 left", cut to `width` columns.
+/// @param rate  Done per second; 0: not known yet.
+std::string progress_line(const std::string& phase, std::uint64_t done, std::uint64_t total, double rate, int width) {
+  constexpr std::size_t bar_width = 24;
+  const double fraction = total > 0 ? std::min(1.0, static_cast<double>(done) / static_cast<double>(total)) : 0;
+  const auto filled = static_cast<std::size_t>(fraction * bar_width);
+  std::string line = fmt::format("{}  {:3.0f}% [{}{}]", phase, std::floor(100 * fraction), std::string(filled, '#'),
+                                 std::string(bar_width - filled, '.'));
+  if (rate > 0) {
+    const auto left = static_cast<double>(total - std::min(done, total));
+    line += fmt::format("  {}  {} left", rate_text(rate), time_text(left / rate));
+  }
+  return line.substr(0, static_cast<std::size_t>(std::max(width, 0)));
+}
+
+}  // namespace
+
+ProgressBar::ProgressBar(Progress& progress, bool quiet) : progress_(progress) {
+  if (quiet || isatty(STDERR_FILENO) == 0) return;
+  progress_.report = [this](const std::string& phase, std::uint64_t done, std::uint64_t total) {
+    update(phase, done, total);
+  };
+}
+
+ProgressBar::~ProgressBar() {
+  progress_.report = nullptr;
+  if (!drawn_) return;
+  std::fputs(clear_line, stderr);
+  std::fflush(stderr);
+}
+
+void ProgressBar::update(const std::string& phase, std::uint64_t done, std::uint64_t total) {
+  const Clock::time_point now = Clock::now();
+  if (phase != phase_ || done < done_at_start_) {
+    phase_ = phase;
+    phase_start_ = now;
+    done_at_start_ = done;
+  } else if (now - last_drawn_ < std::chrono::milliseconds(100)) {
+    return;
+  }
+  last_drawn_ = now;
+  const double seconds = std::chrono::duration<double>(now - phase_start_).count();
+  const double rate = seconds > 0.2 ? static_cast<double>(done - done_at_start_) / seconds : 0;
+  // One column is left free, where some terminals would wrap.
+  fmt::print(stderr, "{}{}", clear_line, progress_line(phase, done, total, rate, terminal_width() - 1));
+  std::fflush(stderr);
+  drawn_ = true;
+}
+
+}  // namespace tensorray

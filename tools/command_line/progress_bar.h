@@ -1,0 +1,37 @@
+#pragma once
+/// @file tools/command_line/progress_bar.h
+/// How far long work is, on a terminal: one line that is drawn over and over, and erased at the end.
+
+#include <chrono>
+#include <cstdint>
+#include <string>
+
+#include "base/progress.h"
+
+namespace tensorray {
+
+/// While it lives it is the `report` of a Progress. Draws on standard error, and only if that is a terminal.
+class ProgressBar {
+ public:
+  /// @param progress  Must outlive the bar.
+  /// @param quiet     Draw nothing.
+  ProgressBar(Progress& progress, bool quiet);
+
+  /// Erases what was drawn, so that what is printed next begins on a clean line.
+  ~ProgressBar();
+  ProgressBar(const ProgressBar&) = delete;
+  ProgressBar& operator=(const ProgressBar&) = delete;
+
+ private:
+  using Clock = std::chrono::steady_clock;
+
+  void update(const std::string& phase, std::uint64_t done, std::uint64_t total);
+
+  Progress& progress_;
+  bool drawn_ = false;
+  std::string phase_;
+  std::uint64_t done_at_start_ = 0;
+  Clock::time_point phase_start_, last_drawn_;  // A new phase starts its rate anew.
+};
+
+}  // namespace tensorray

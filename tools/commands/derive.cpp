@@ -1,0 +1,96 @@
+#include <algorithm>
+#include <filesystem>
+#include <map>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include <CLI/CLI.hpp>
+#include <fmt/core.h>
+
+#include "base/distinct_files.h"
+#include "base/output_file.h"
+#include "base/progress.h"
+#include "base/text.h"
+#include "tools/command_line/vdb_output.h"
+#include "tools/commands/commands.h"
+#include "volumes/files/scalar_files.h"
+#include "volumes/files/tensor_files.h"
+#include "volumes/tensors/invariants.h"
+
+namespace tensorray {
+namespace {
+
+struct DeriveOptions {
+  std::filesystem::path input, output;
+  std::string field;
+  std::vector<std::string> invariants;
+};
+
+/// Each once, in the order asked for. @throw std::invalid_argument that lists the invariants.
+std::vector<Invariant> chosen_invariants(const DeriveOptions& options) {
+  std::vector<Invariant> chosen;
+  for (const std::string& name : options.invariants) {
+    const Invariant which = invariant_of(name);
+    if (std::find(chosen.begin(), chosen.end(), which) == chosen.end()) chosen.push_back(which);
+  }
+  return chosen;
+}
+
+/// What holds of all grids.
+std::map<std::string, std::string> file_metadata(const TensorGrid& field) {
+  std::map<std::string, std::string> metadata = field.metadata;
+  metadata.erase("tensorray:units");
+  return metadata;
+}
+
+void derive(const DeriveOptions& options, const Progress& progress) {
+  const std::vector<Invariant> invariants = chosen_invariants(options);
+  require_distinct_files({{options.input, "the field"}}, {{options.output, "-o"}});
+  OutputFile file(options.output);
+  progress.update("reading", 0, 1);
+  TensorGrid field = read_tensor_vdb(options.input, options.field);
+  const std::size_t removed = remove_non_finite(field);
+  if (field.blocks.empty()) throw std::runtime_error(options.input.string() + ": no voxel of the field is finite");
+  field.metadata.emplace("tensorray:field", field.name);
+  std::vector<ScalarGrid> grids;
+  for (const Invariant which : invariants) {
+    progress.update("deriving", grids.size(), invariants.size());
+    grids.push_back(invariant_grid(which, field));
+  }
+  progress.update("writing", 0, 1);
+  file.write([&](const std::filesystem::path& path) { write_scalar_vdb(path, grids, file_metadata(field)); });
+  const auto bytes = static_cast<double>(std::filesystem::file_size(file.path()));
+  progress.update("writing", 1, 1);
+  file.commit();
+
+  if (removed > 0)
+    fmt::print(stderr, "warning: {}: {} voxels are not finite and are left out\n", options.input.string(), removed);
+  std::vector<std::string> names;
+  for (const ScalarGrid& grid : grids) names.push_back(grid.name);
+  fmt::print("{}: {} of field \"{}\", {} voxels, {}\n", options.output.string(), joined(names), field.name,
+             field.active_voxels(), bytes_text(bytes));
+}
+
+}  // namespace
+
+void add_derive_command(CLI::App& program, Progress& progress) {
+  const auto options = std::make_shared<DeriveOptions>();
+  CLI::App* command = program.add_subcommand("derive", "Make float grids of a tensor field's invariants");
+  command->add_option("file", options->input, "The tensor field, FIELD.vdb")->required();
+  command
+      ->add_option("--invariant", options->invariants,
+                   "What to derive; may be given several times: " + joined(invariant_names()) +
+                       ". The grid has the invariant's name")
+      ->required()
+      ->type_name("NAME")
+      ->allow_extra_args(false);
+  command->add_option("--name", options->field, "Name of the field; not needed where there is only one");
+  command->add_option("-o,--output", options->output, "The file to write, FILE.vdb")
+      ->required()
+      ->check(check_vdb_output)
+      ->type_name("FILE");
+  command->callback([options, &progress] { derive(*options, progress); });
+}
+
+}  // namespace tensorray

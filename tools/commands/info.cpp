@@ -1,0 +1,215 @@
+#include <algorithm>
+#include <cmath>
+#include <csignal>
+#include <cstddef>
+#include <filesystem>
+#include <map>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include <CLI/CLI.hpp>
+#include <fmt/core.h>
+#include <nlohmann/json.hpp>
+
+#include "base/text.h"
+#include "tools/commands/commands.h"
+#include "volumes/files/tensor_files.h"
+#include "volumes/tensors/statistics.h"
+
+namespace tensorray {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+constexpr double voxel_step_flexibility = 0.3;  // The strongest of the paper's.
+
+struct InfoOptions {
+  std::filesystem::path file;
+  std::string field;
+  bool json = false;
+};
+
+/// All that is told of a field.
+struct FieldInfo {
+  std::string name;
+  Eigen::Matrix4d transform;  ///< Index to world.
+  std::map<std::string, std::string> metadata;
+  FieldStatistics statistics;
+
+  double stable_step_in_voxels() const {
+    return statistics.stable_step(voxel_step_flexibility) / statistics.voxel_size.minCoeff();
+  }
+};
+
+FieldInfo field_info(const std::filesystem::path& file, const std::string& name) {
+  const TensorGrid grid = read_tensor_vdb(file, name);
+  return {grid.name, grid.to_world.matrix(), grid.metadata, field_statistics(grid)};
+}
+
+std::vector<FieldInfo> field_infos(const InfoOptions& options, const std::vector<GridInfo>& grids) {
+  std::vector<std::string> names = tensor_names(grids);
+  if (!options.field.empty()) names = {options.field};
+  std::vector<FieldInfo> fields;
+  for (const std::string& name : names) fields.push_back(field_info(options.file, name));
+  return fields;
+}
+
+// As JSON.
+
+template <class Scalar, int size>
+Json to_json(const Eigen::Matrix<Scalar, size, 1>& vector) {
+  return std::vector<Scalar>(vector.data(), vector.data() + size);
+}
+
+template <class Box>
+Json box_to_json(const Box& box) {
+  if (box.isEmpty()) return nullptr;
+  return {{"min", to_json(typename Box::VectorType(box.min()))}, {"max", to_json(typename Box::VectorType(box.max()))}};
+}
+
+Json to_json(const Eigen::Matrix4d& matrix) {
+  Json rows = Json::array();
+  for (int i = 0; i < 4; ++i) rows.push_back(to_json(Eigen::Vector4d(matrix.row(i))));
+  return rows;
+}
+
+Json to_json(const FieldInfo& field) {
+  const FieldStatistics& s = field.statistics;
+  Json norm;
+  for (std::size_t i = 0; i < s.norm.size(); ++i) norm[fmt::format("p{}", s.percentiles[i])] = s.norm[i];
+  Json json;
+  json["name"] = field.name;
+  json["index_to_world"] = to_json(field.transform);
+  json["index_extent"] = box_to_json(s.index_box);
+  json["world_extent"] = box_to_json(s.world_box);
+  json["voxel_size"] = to_json(s.voxel_size);
+  json["active_voxels"] = s.active_voxels;
+  json["non_finite_voxels"] = s.non_finite;
+  json["memory_bytes"] = s.memory_bytes;
+  json["norm"] = norm;
+  json["eigenvalues"] = {{"real_min", s.real_min},
+                         {"real_max", s.real_max},
+                         {"imaginary_max", s.imaginary_max},
+                         {"complex_fraction", s.complex_fraction},
+                         {"negative_fraction", s.negative_fraction}};
+  json["asymmetry"] = s.asymmetry;
+  json["absolute_loss"] = s.absolute_loss;
+  json["deviator_max"] = s.deviator_max;
+  // Infinite for a field that does not bend light, which JSON has no number for: null.
+  json["stable_step"] = {{"world_at_flexibility_1", s.stable_step(1)},
+                         {"voxels_at_flexibility_0.3", field.stable_step_in_voxels()}};
+  json["metadata"] = field.metadata;
+  return json;
+}
+
+void print_json(const InfoOptions& options, const std::vector<GridInfo>& grids, const std::vector<FieldInfo>& fields) {
+  Json json = {{"file", options.file.string()}, {"grids", Json::array()}, {"fields", Json::array()}};
+  for (const GridInfo& grid : grids) {
+    json["grids"].push_back({{"name", grid.name}, {"type", grid.type}, {"storage", grid.storage}});
+  }
+  for (const FieldInfo& field : fields) json["fields"].push_back(to_json(field));
+  fmt::print("{}\n", json.dump(2, ' ', false, Json::error_handler_t::replace));
+}
+
+// As text.
+
+void print_row(const std::string& label, const std::string& value) { fmt::print("  {:<24}{}\n", label, value); }
+
+template <class Vector>
+std::string text(const Vector& vector) {
+  std::string numbers;
+  for (Eigen::Index i = 0; i < vector.size(); ++i) {
+    numbers += fmt::format("{}{:.6g}", i == 0 ? "" : " ", static_cast<double>(vector[i]));
+  }
+  return numbers;
+}
+
+template <class Box>
+std::string box_text(const Box& box) {
+  if (box.isEmpty()) return "none";
+  return fmt::format("({}) to ({})", text(box.min()), text(box.max()));
+}
+
+/// Rounded, so that what is 0 but for rounding errors says so; + 0 turns −0 into 0.
+std::string percent(double fraction) { return fmt::format("{:.4g} %", std::round(1e8 * fraction) / 1e6 + 0.0); }
+
+void print_grid(const FieldInfo& field) {
+  const FieldStatistics& s = field.statistics;
+  for (int i = 0; i < 4; ++i) {
+    print_row(i == 0 ? "index to world" : "", text(Eigen::Vector4d(field.transform.row(i))));
+  }
+  print_row("extent, index", box_text(s.index_box));
+  print_row("extent, world", box_text(s.world_box));
+  print_row("voxel size", text(s.voxel_size));
+  print_row("active voxels", fmt::format("{}", s.active_voxels));
+  print_row("not finite", fmt::format("{}", s.non_finite));
+  print_row("memory", bytes_text(static_cast<double>(s.memory_bytes)));
+}
+
+void print_tensors(const FieldStatistics& s) {
+  std::string heads, norms;
+  for (std::size_t i = 0; i < s.norm.size(); ++i) {
+    heads += fmt::format("{:>11}", fmt::format("{} %", s.percentiles[i]));
+    norms += fmt::format("{:>11.4g}", s.norm[i]);
+  }
+  print_row("percentile", heads);
+  print_row("norm", norms);
+  print_row("eigenvalues, real", fmt::format("{:.6g} to {:.6g}", s.real_min, s.real_max));
+  print_row("eigenvalues, imaginary", fmt::format("up to {:.6g}", s.imaginary_max));
+  print_row("complex", percent(s.complex_fraction) + " of the voxels");
+  print_row("negative", percent(s.negative_fraction) + " of the voxels have an eigenvalue with a negative real part");
+  print_row("asymmetry", fmt::format("{:.4g} (0 symmetric, 2 antisymmetric)", s.asymmetry));
+  print_row("absolute would erase", percent(s.absolute_loss) + " of the squared norm (rotation and shear)");
+}
+
+void print_field(const FieldInfo& field) {
+  const FieldStatistics& s = field.statistics;
+  fmt::print("\nfield \"{}\"\n", field.name);
+  print_grid(field);
+  if (s.active_voxels > s.non_finite) print_tensors(s);
+  const bool bends = std::isfinite(s.stable_step(1));
+  print_row("stable step, world", bends ? fmt::format("{:.4g} at s = 1", s.stable_step(1)) : "any");
+  print_row("stable step, voxels",
+            bends ? fmt::format("{:.4g} at s = {}", field.stable_step_in_voxels(), voxel_step_flexibility) : "any");
+  for (const auto& [key, value] : field.metadata) print_row(key, value);
+}
+
+void print_text(const InfoOptions& options, const std::vector<GridInfo>& grids, const std::vector<FieldInfo>& fields) {
+  std::size_t width = 4;
+  for (const GridInfo& grid : grids) width = std::max(width, grid.name.size());
+  fmt::print("{}\n  {:<{}}  {:<10}  {}\n", options.file.string(), "grid", width, "type", "stored as");
+  for (const GridInfo& grid : grids) fmt::print("  {:<{}}  {:<10}  {}\n", grid.name, width, grid.type, grid.storage);
+  for (const FieldInfo& field : fields) print_field(field);
+  if (fields.empty()) {
+    fmt::print(
+        "no tensor field; `field.derive` in a scene makes one of a vector (gradient) or scalar grid (hessian)\n");
+  }
+}
+
+void info(const InfoOptions& options) {
+  const std::vector<GridInfo> grids = list_vdb(options.file);
+  const std::vector<FieldInfo> fields = field_infos(options, grids);
+  if (options.json) {
+    print_json(options, grids, fields);
+  } else {
+    print_text(options, grids, fields);
+  }
+}
+
+}  // namespace
+
+void add_info_command(CLI::App& program) {
+  const auto options = std::make_shared<InfoOptions>();
+  CLI::App* command = program.add_subcommand("info", "Tell what an OpenVDB file holds");
+  command->add_option("file", options->file, "The file, FILE.vdb")->required();
+  command->add_option("--field", options->field, "Only this tensor field; without it, all");
+  command->add_flag("--json", options->json, "As JSON");
+  command->callback([options] {
+    std::signal(SIGINT, SIG_DFL);  // It writes nothing that could be left half.
+    std::signal(SIGTERM, SIG_DFL);
+    info(*options);
+  });
+}
+
+}  // namespace tensorray

@@ -1,0 +1,82 @@
+#include "tools/commands/render_scene.h"
+
+#include <algorithm>
+#include <chrono>
+#include <fstream>
+#include <optional>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include <fmt/format.h>
+#include <tbb/global_control.h>
+
+#include "renderer/images/image.h"
+#include "scenes/description/run_files.h"
+#include "scenes/outputs/write_outputs.h"
+#include "scenes/scene/render.h"
+#include "scenes/scene/scene.h"
+#include "tools/command_line/progress_bar.h"
+#include "tools/commands/statistics_json.h"
+
+namespace tensorray {
+namespace {
+
+/// Where the statistics go among the outputs, which are written together.
+const std::string statistics_key = "--stats";
+
+void write_text(OutputFile& file, const std::string& text) {
+  file.write([&](const std::filesystem::path& path) {
+    std::ofstream stream(path, std::ios::binary);
+    stream << text;
+    stream.close();
+    if (!stream) throw std::runtime_error("cannot write " + path.string() + ": the disk may be full");
+  });
+}
+
+OutputFiles open_files(const SceneDescription& description, const std::filesystem::path& statistics) {
+  check_files(description, {{statistics, statistics_key}});
+  OutputFiles files = open_outputs(description.output);
+  if (!statistics.empty()) files.emplace(statistics_key, OutputFile(statistics));
+  return files;
+}
+
+/// All files take their names, or none does.
+void commit(OutputFiles files) {
+  std::vector<OutputFile> complete;
+  for (auto& [key, file] : files) complete.push_back(std::move(file));
+  commit_all(complete);
+}
+
+}  // namespace
+
+void render_scene(const std::filesystem::path& scene_file, const SceneChanges& changes, const RenderRun& run,
+                  Progress& progress) {
+  const unsigned threads = run.threads > 0 ? run.threads : std::max(1u, std::thread::hardware_concurrency());
+  const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, threads);
+  set_image_threads(static_cast<int>(threads));
+  const auto tell = [&run](const std::string& line) {
+    if (!run.quiet) fmt::print(stderr, "{}\n", line);
+  };
+
+  const SceneDescription description = read_scene(scene_file, changes);
+  OutputFiles files = open_files(description, run.statistics);
+
+  std::optional<ProgressBar> bar(std::in_place, progress, run.quiet);
+  const Scene scene = load_scene(description, progress);
+  for (const std::string& note : scene.notes) tell(note);
+  const Render result = render(scene, progress);
+  bar.reset();  // Erased, so that what is printed next stands alone.
+  for (const std::string& warning : result.warnings) tell("warning: " + warning);
+
+  const auto start = std::chrono::steady_clock::now();
+  write_outputs(result, scene, files);
+  const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  if (!run.statistics.empty())
+    write_text(files.at(statistics_key), statistics_json(scene, result.statistics, seconds, static_cast<int>(threads)));
+  commit(std::move(files));
+  for (const auto& [key, path] : description.output.files)
+    if (!run.quiet) fmt::print("wrote {}\n", path.string());
+}
+
+}  // namespace tensorray

@@ -1,0 +1,77 @@
+#include "tools/commands/statistics_json.h"
+
+#include <cstdint>
+
+#include <nlohmann/json.hpp>
+#include <sys/resource.h>
+
+namespace tensorray {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+/// Counts, or powers, by the ends of rays. `emitted` is their sum, so that the balance is exact.
+template <class Number>
+Json balance(const std::array<Number, ray_end_count>& ends) {
+  Number emitted = 0;
+  for (const Number end : ends) emitted += end;
+  const auto of = [&](RayEnd end) { return ends[static_cast<int>(end)]; };
+  Json stopped;
+  for (const RayEnd end : {RayEnd::obstacle, RayEnd::step_limit, RayEnd::degenerate}) stopped[to_string(end)] = of(end);
+  return {{"emitted", emitted}, {"deposited", of(RayEnd::plate)}, {"missed", of(RayEnd::missed)}, {"stopped", stopped}};
+}
+
+std::uint64_t peak_memory_bytes() {
+  rusage usage{};
+  getrusage(RUSAGE_SELF, &usage);
+  return 1024 * static_cast<std::uint64_t>(usage.ru_maxrss);
+}
+
+}  // namespace
+
+std::string statistics_json(const Scene& scene, const Statistics& statistics, double seconds_writing, int threads) {
+  EndCounts rays{};
+  std::array<double, ray_end_count> power{};
+  Json channels = Json::array();
+  const bool has_power = !statistics.channel_power.empty();
+  for (std::size_t channel = 0; channel < statistics.ends.size(); ++channel) {
+    for (int end = 0; end < ray_end_count; ++end) {
+      const std::uint64_t count = statistics.ends[channel][end];
+      rays[end] += count;
+      if (has_power) power[end] += static_cast<double>(count) * statistics.channel_power[channel];
+    }
+    channels.push_back(
+        {{"wavelength", scene.channels[channel].wavelength}, {"flexibility", scene.channels[channel].flexibility}});
+    if (has_power) channels.back()["ray_power"] = statistics.channel_power[channel];
+    channels.back()["rays"] = balance(statistics.ends[channel]);
+  }
+  const double seconds = scene.seconds + statistics.seconds_tracing + statistics.seconds_density +
+                         statistics.seconds_drawing + statistics.seconds_color + seconds_writing;
+  Json json = {{"version", TENSORRAY_VERSION},
+               {"scene", scene.description.path.string()},
+               {"seed", scene.description.seed},
+               {"threads", threads},
+               {"positions", statistics.positions},
+               {"photons", balance(rays)},
+               {"ray_steps", statistics.ray_steps},
+               {"tensor_samples", statistics.tensor_samples},
+               {"field",
+                {{"scale", scene.scale.scale},
+                 {"non_finite_voxels", scene.non_finite},
+                 {"defective_voxels", scene.eigenvalues.defective},
+                 {"memory_bytes", scene.field.memory_bytes()}}},
+               {"seconds",
+                {{"load", scene.seconds},
+                 {"trace", statistics.seconds_tracing},
+                 {"density", statistics.seconds_density},
+                 {"draw", statistics.seconds_drawing},
+                 {"color", statistics.seconds_color},
+                 {"write", seconds_writing},
+                 {"total", seconds}}},
+               {"peak_memory_bytes", peak_memory_bytes()},
+               {"channels", channels}};
+  if (has_power) json["power"] = balance(power);
+  return json.dump(2) + "\n";
+}
+
+}  // namespace tensorray

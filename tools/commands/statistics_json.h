@@ -1,0 +1,17 @@
+#pragma once
+/// @file tools/commands/statistics_json.h
+/// The statistics of a render as JSON, for --stats.
+
+#include <string>
+
+#include "scenes/scene/render.h"
+#include "scenes/scene/scene.h"
+
+namespace tensorray {
+
+/// `photons` counts rays (a position emits one for each wavelength that it carries), `power` is theirs in the unit of
+/// the light's irradiance times area; both balance: emitted = deposited + missed + stopped. `channels` has the counts
+/// of each wavelength.
+std::string statistics_json(const Scene& scene, const Statistics& statistics, double seconds_writing, int threads);
+
+}  // namespace tensorray

@@ -1,0 +1,191 @@
+#include "tools/import/lattices/lattice.h"
+
+#include <algorithm>
+#include <iterator>
+#include <memory>
+#include <numeric>
+#include <stdexcept>
+#include <tuple>
+#include <utility>
+#include <vector>
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+#include <tbb/parallel_for.h>
+
+#include "volumes/tensors/finite_differences.h"
+
+namespace tensorray {
+namespace {
+
+using Eigen::Matrix3d;
+using Eigen::Vector3d;
+using Eigen::Vector3i;
+
+constexpr int width = TensorBlock::size;
+
+/// A block of the slab that is being read, made when it has an active voxel, and what became of its voxels.
+template <class Block>
+struct Place {
+  std::unique_ptr<Block> block;
+  std::size_t background = 0, non_finite = 0;
+};
+
+bool is_background(const Lattice& lattice, const double* components) {
+  if (lattice.masked && !(components[0] >= 0.5)) return true;  // A mask that is NaN is none.
+  return lattice.zero_is_background && std::all_of(components + (lattice.masked ? 1 : 0),
+                                                   components + lattice.components, [](double c) { return c == 0; });
+}
+
+/// Puts what slice `z` has of the block from (x0, y0) on.
+template <class Block, class ValueOf>
+void put(const Lattice& lattice, const ValueOf& value_of, const double* slice, const Vector3i& first, int z,
+         Place<Block>& place) {
+  for (int y = first.y(); y < std::min(first.y() + width, lattice.size.y()); ++y)
+    for (int x = first.x(); x < std::min(first.x() + width, lattice.size.x()); ++x) {
+      const auto voxel = static_cast<std::size_t>(y) * static_cast<std::size_t>(lattice.size.x()) + x;
+      const double* components = slice + voxel * lattice.components;
+      if (is_background(lattice, components)) {
+        ++place.background;
+        continue;
+      }
+      const auto value = value_of(components + (lattice.masked ? 1 : 0));
+      if (!value.allFinite()) {
+        ++place.non_finite;
+        continue;
+      }
+      if (!place.block) {
+        place.block = std::make_unique<Block>();
+        place.block->origin = first;
+      }
+      const int offset = TensorBlock::offset(x - first.x(), y - first.y(), z - first.z());
+      place.block->active.set(offset);
+      place.block->values[offset] = value;
+    }
+}
+
+/// Adds the slab of slices from `first_z` on to `blocks`.
+template <class Blocks, class ValueOf>
+void add_slab(const Lattice& lattice, const ValueOf& value_of, int first_z, std::vector<double>& slice, Blocks& blocks,
+              LatticeReport& report) {
+  const int columns = (lattice.size.x() - 1) / width + 1, rows = (lattice.size.y() - 1) / width + 1;
+  std::vector<Place<typename Blocks::value_type>> places(static_cast<std::size_t>(columns) * rows);
+  for (int z = std::min(first_z + width, lattice.size.z()) - 1; z >= first_z; --z) {
+    lattice.read_slice(z, slice.data());
+    tbb::parallel_for(std::size_t{0}, places.size(), [&](std::size_t i) {
+      const Vector3i first(static_cast<int>(i % columns) * width, static_cast<int>(i / columns) * width, first_z);
+      put(lattice, value_of, slice.data(), first, z, places[i]);
+    });
+  }
+  for (auto& place : places) {
+    report.background += place.background;
+    report.non_finite += place.non_finite;
+    if (!place.block) continue;
+    report.active += place.block->active.count();
+    blocks.push_back(std::move(*place.block));
+    place.block.reset();
+  }
+}
+
+/// Orders blocks by origin, moving each once: they are large.
+template <class Blocks>
+void sort(Blocks& blocks) {
+  const auto key = [&](std::size_t i) {
+    const Vector3i& origin = blocks[i].origin;
+    return std::tuple(origin.x(), origin.y(), origin.z());
+  };
+  std::vector<std::size_t> source(blocks.size());
+  std::iota(source.begin(), source.end(), std::size_t{0});
+  std::sort(source.begin(), source.end(), [&](std::size_t a, std::size_t b) { return key(a) < key(b); });
+  for (std::size_t i = 0; i < source.size(); ++i) {
+    if (source[i] == i) continue;
+    const auto first = std::make_unique<typename Blocks::value_type>(std::move(blocks[i]));
+    std::size_t to = i;
+    while (source[to] != i) {
+      blocks[to] = std::move(blocks[source[to]]);
+      to = std::exchange(source[to], to);
+    }
+    blocks[to] = std::move(*first);
+    source[to] = to;
+  }
+}
+
+/// Fills `blocks` with `value_of(components)` of all voxels that are active.
+template <class Blocks, class ValueOf>
+void read_blocks(const Lattice& lattice, const ValueOf& value_of, Blocks& blocks, LatticeReport& report) {
+  report = {};
+  const auto slice_voxels = static_cast<std::size_t>(lattice.size.x()) * lattice.size.y();
+  report.voxels = slice_voxels * lattice.size.z();
+  std::vector<double> slice(slice_voxels * lattice.components);
+  for (int first_z = (lattice.size.z() - 1) / width * width; first_z >= 0; first_z -= width)
+    add_slab(lattice, value_of, first_z, slice, blocks, report);
+  sort(blocks);
+}
+
+std::string called(const Lattice& lattice) {
+  return lattice.array.empty() ? "the file" : fmt::format("array \"{}\"", lattice.array);
+}
+
+int unmasked(const Lattice& lattice) { return lattice.components - (lattice.masked ? 1 : 0); }
+
+TensorOrder order_of(const Lattice& lattice, const std::optional<TensorOrder>& order) {
+  const int count = unmasked(lattice);
+  if (order && (count == 9 || (lattice.order && *lattice.order != *order)))
+    throw std::invalid_argument(called(lattice) + " says its order itself: leave --order out");
+  if (count == 9) return TensorOrder::full;
+  if (count == 3)
+    throw std::invalid_argument(
+        called(lattice) + " has three components, a vector: derive a tensor (--gradient-of), or choose another array");
+  if (count != 6 && count < 9)
+    throw std::invalid_argument(fmt::format("{} has {} component{} and a tensor six or nine: choose another array",
+                                            called(lattice), count, count == 1 ? "" : "s"));
+  const std::optional<TensorOrder> chosen = lattice.order ? lattice.order : order;
+  if (!chosen || *chosen == TensorOrder::full)
+    throw std::invalid_argument(
+        fmt::format("{} has six components of a symmetric tensor and does not say in which "
+                    "order: give it with --order {}",
+                    called(lattice), fmt::join(tensor_order_names(), "|")));
+  return *chosen;
+}
+
+TensorGrid empty_grid(const Lattice& lattice) {
+  TensorGrid grid;
+  grid.to_world = lattice.to_world;
+  if (!lattice.array.empty()) grid.name = lattice.array;
+  return grid;
+}
+
+}  // namespace
+
+TensorGrid tensors_of(const Lattice& lattice, const std::optional<TensorOrder>& order, LatticeReport& report) {
+  const TensorOrder chosen = order_of(lattice, order);
+  const Matrix3d frame = chosen == TensorOrder::fsl && lattice.fsl_frame ? *lattice.fsl_frame : lattice.frame;
+  TensorGrid grid = empty_grid(lattice);
+  const auto tensor = [&](const double* components) -> Eigen::Matrix3f {
+    const Matrix3d turned = frame * tensor_of(components, chosen) * frame.transpose();
+    if (chosen == TensorOrder::full) return turned.cast<float>();
+    return (0.5 * (turned + turned.transpose())).cast<float>();  // Rounding leaves symmetric ones symmetric.
+  };
+  read_blocks(lattice, tensor, grid.blocks, report);
+  return grid;
+}
+
+TensorGrid gradient_of(const Lattice& lattice, LatticeReport& report) {
+  if (unmasked(lattice) != 3)
+    throw std::invalid_argument(
+        fmt::format("a gradient or a strain needs a vector of three components: {} has {}; choose another",
+                    called(lattice), unmasked(lattice)));
+  std::vector<SampleBlock> vectors;
+  const Vector3i blocks = (lattice.size.array() - 1) / width + 1;
+  vectors.reserve(static_cast<std::size_t>(blocks.x()) * blocks.y() * blocks.z());  // Growing would need it twice.
+  const auto vector = [&](const double* components) -> Vector3d {
+    return lattice.frame * Eigen::Map<const Vector3d>(components);
+  };
+  read_blocks(lattice, vector, vectors, report);
+  TensorGrid grid = empty_grid(lattice);
+  auto tensors = gradient(vectors, lattice.to_world.linear().inverse());
+  grid.blocks.assign(std::make_move_iterator(tensors.begin()), std::make_move_iterator(tensors.end()));
+  return grid;
+}
+
+}  // namespace tensorray

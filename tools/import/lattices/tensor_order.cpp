@@ -1,0 +1,59 @@
+#include "tools/import/lattices/tensor_order.h"
+
+#include <algorithm>
+#include <array>
+#include <stdexcept>
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+namespace tensorray {
+namespace {
+
+using Positions = std::array<int, 6>;
+
+/// Where xx, yy, zz, xy, yz and xz stand among six components.
+Positions positions(TensorOrder order) {
+  switch (order) {
+    case TensorOrder::fsl:
+      return {0, 3, 5, 1, 4, 2};
+    case TensorOrder::mrtrix:
+      return {0, 1, 2, 3, 5, 4};
+    case TensorOrder::voigt:
+      return {0, 1, 2, 5, 3, 4};
+    case TensorOrder::lower_triangle:
+      return {0, 2, 5, 1, 4, 3};
+    case TensorOrder::vtk:
+    case TensorOrder::full:
+      break;
+  }
+  return {0, 1, 2, 3, 4, 5};
+}
+
+}  // namespace
+
+const std::vector<std::string>& tensor_order_names() {
+  static const std::vector<std::string> names = {"vtk", "fsl", "mrtrix", "voigt"};
+  return names;
+}
+
+TensorOrder tensor_order_of(const std::string& name) {
+  constexpr std::array orders = {TensorOrder::vtk, TensorOrder::fsl, TensorOrder::mrtrix, TensorOrder::voigt};
+  const auto& names = tensor_order_names();
+  const auto found = std::find(names.begin(), names.end(), name);
+  if (found == names.end())
+    throw std::invalid_argument(
+        fmt::format("--order: unknown order \"{}\"; there are {}", name, fmt::join(names, ", ")));
+  return orders[static_cast<std::size_t>(found - names.begin())];
+}
+
+Eigen::Matrix3d tensor_of(const double* components, TensorOrder order) {
+  if (order == TensorOrder::full) return Eigen::Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>(components);
+  const auto [xx, yy, zz, xy, yz, xz] = positions(order);
+  const double* c = components;
+  Eigen::Matrix3d tensor;
+  tensor << c[xx], c[xy], c[xz], c[xy], c[yy], c[yz], c[xz], c[yz], c[zz];
+  return tensor;
+}
+
+}  // namespace tensorray

@@ -1,0 +1,241 @@
+#include "tools/import/meshes/mesh_boundary.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdint>
+#include <fstream>
+#include <map>
+#include <stdexcept>
+#include <string>
+#include <tuple>
+#include <utility>
+#include <vector>
+
+#include <vtkDataSet.h>
+#include <vtkIdList.h>
+#include <vtkPoints.h>
+#include <vtkPolyData.h>
+#include <vtkStaticPointLocator.h>
+
+#include "base/constants.h"
+#include "tools/import/meshes/mesh_cell.h"
+
+namespace tensorray {
+namespace {
+
+using Eigen::Vector3d;
+
+/// The points of a mesh, and for each the one that stands for all at its position.
+struct Points {
+  std::vector<Vector3d> positions;
+  std::vector<vtkIdType> same;
+};
+
+/// A face of a cell, known by the lowest of its points: four of a polygon are enough to tell it from its neighbours.
+struct Face {
+  std::array<vtkIdType, 4> key;
+  vtkIdType cell = 0;
+  int index = 0;
+
+  bool operator<(const Face& other) const {
+    return std::tie(key, cell, index) < std::tie(other.key, other.cell, other.index);
+  }
+};
+
+struct Surface {
+  std::vector<Vector3d> vertices;
+  std::vector<std::array<std::uint32_t, 3>> triangles;
+};
+
+Points points_of(vtkDataSet& mesh) {
+  Points points;
+  const vtkIdType count = mesh.GetNumberOfPoints();
+  points.positions.resize(static_cast<std::size_t>(count));
+  points.same.resize(static_cast<std::size_t>(count));
+  vtkNew<vtkPoints> positions;
+  positions->SetDataTypeToDouble();
+  positions->SetNumberOfPoints(count);
+  for (vtkIdType i = 0; i < count; ++i) {
+    Vector3d& position = points.positions[static_cast<std::size_t>(i)];
+    mesh.GetPoint(i, position.data());
+    positions->SetPoint(i, position.data());
+  }
+  vtkNew<vtkPolyData> cloud;
+  cloud->SetPoints(positions);
+  vtkNew<vtkStaticPointLocator> locator;
+  locator->SetDataSet(cloud);
+  locator->BuildLocator();
+  locator->MergePoints(0, points.same.data());
+  return points;
+}
+
+/// @return false if the face has no area: of an edge or a point alone.
+bool find_key(vtkIdList& ids, const Points& points, std::array<vtkIdType, 4>& key) {
+  std::vector<vtkIdType> distinct;
+  for (vtkIdType i = 0; i < ids.GetNumberOfIds(); ++i)
+    distinct.push_back(points.same[static_cast<std::size_t>(ids.GetId(i))]);
+  std::sort(distinct.begin(), distinct.end());
+  distinct.erase(std::unique(distinct.begin(), distinct.end()), distinct.end());
+  if (distinct.size() < 3) return false;
+  key.fill(-1);
+  std::copy_n(distinct.begin(), std::min(distinct.size(), key.size()), key.begin());
+  return true;
+}
+
+/// The faces that one cell alone has.
+std::vector<Face> outer_faces(vtkDataSet& mesh, const Points& points) {
+  std::vector<Face> faces;
+  MeshCell cell;
+  for (vtkIdType id = 0; id < mesh.GetNumberOfCells(); ++id) {
+    if (!cell.load(mesh, id)) continue;
+    for (int i = 0; i < cell.vtk().GetNumberOfFaces(); ++i) {
+      Face face{{}, id, i};
+      if (find_key(*cell.vtk().GetFace(i)->GetPointIds(), points, face.key)) faces.push_back(face);
+    }
+  }
+  if (faces.empty()) throw std::invalid_argument("the mesh has no three-dimensional cells: it lies around no body");
+  std::sort(faces.begin(), faces.end());
+  std::vector<Face> outer;
+  for (std::size_t i = 0; i < faces.size();) {
+    std::size_t next = i + 1;
+    while (next < faces.size() && faces[next].key == faces[i].key) ++next;
+    if (next == i + 1) outer.push_back(faces[i]);
+    i = next;
+  }
+  std::sort(outer.begin(), outer.end(),
+            [](const Face& a, const Face& b) { return std::tie(a.cell, a.index) < std::tie(b.cell, b.index); });
+  return outer;
+}
+
+/// The points of the faces that are the farthest in one of many directions: of what is in front of any plane the
+/// farthest is found but for 1 − cos of half the directions' spacing (4e-4 of the diagonal), and nothing is invented.
+Eigen::Matrix3Xd extreme_points(vtkDataSet& mesh, const std::vector<Face>& faces, const Points& points) {
+  std::vector<Vector3d> candidates;
+  std::vector<bool> seen(points.positions.size(), false);
+  MeshCell cell;
+  for (const Face& face : faces) {
+    cell.load(mesh, face.cell);
+    vtkIdList& ids = *cell.vtk().GetFace(face.index)->GetPointIds();
+    for (vtkIdType i = 0; i < ids.GetNumberOfIds(); ++i) {
+      const auto id = static_cast<std::size_t>(points.same[static_cast<std::size_t>(ids.GetId(i))]);
+      if (!seen[id]) candidates.push_back(points.positions[id]);
+      seen[id] = true;
+    }
+  }
+  constexpr int directions = 4000;
+  const double golden_angle = pi * (3 - std::sqrt(5.0));
+  const Eigen::Map<const Eigen::Matrix3Xd> cloud(candidates.front().data(), 3,
+                                                 static_cast<Eigen::Index>(candidates.size()));
+  std::vector<Eigen::Index> farthest;
+  for (int i = 0; i < directions; ++i) {
+    const double z = 1 - (2 * i + 1.0) / directions, radius = std::sqrt(1 - z * z);
+    const Vector3d direction(radius * std::cos(golden_angle * i), radius * std::sin(golden_angle * i), z);
+    Eigen::Index point = 0;
+    (direction.transpose() * cloud).maxCoeff(&point);
+    farthest.push_back(point);
+  }
+  std::sort(farthest.begin(), farthest.end());
+  farthest.erase(std::unique(farthest.begin(), farthest.end()), farthest.end());
+  Eigen::Matrix3Xd extreme(3, static_cast<Eigen::Index>(farthest.size()));
+  for (std::size_t i = 0; i < farthest.size(); ++i) extreme.col(static_cast<Eigen::Index>(i)) = cloud.col(farthest[i]);
+  return extreme;
+}
+
+/// A face as triangles of points' indices, counter-clockwise as seen from inside the cell; none if it has no area.
+struct FacePlane {
+  std::vector<std::array<vtkIdType, 3>> triangles;
+  Vector3d normal = Vector3d::Zero();  ///< Of unit length, into the cell.
+  double outmost = 0;  ///< Along the normal, of the face's own points the one that is the farthest out of the cell.
+};
+
+FacePlane plane_of(const MeshCell& cell, int index, const Points& points) {
+  FacePlane plane;
+  Vector3d centre = Vector3d::Zero();
+  vtkNew<vtkIdList> ids;
+  vtkNew<vtkPoints> unused;
+  cell.vtk().GetFace(index)->Triangulate(0, ids, unused);
+  const auto position = [&](vtkIdType id) { return points.positions[static_cast<std::size_t>(id)]; };
+  for (vtkIdType i = 0; i + 2 < ids->GetNumberOfIds(); i += 3) {
+    std::array<vtkIdType, 3> triangle{};
+    for (std::size_t k = 0; k < 3; ++k)
+      triangle[k] = points.same[static_cast<std::size_t>(ids->GetId(i + static_cast<vtkIdType>(k)))];
+    const Vector3d a = position(triangle[0]), b = position(triangle[1]), c = position(triangle[2]);
+    const Vector3d area = (b - a).cross(c - a);
+    if (area.isZero(0)) continue;
+    plane.triangles.push_back(triangle);
+    plane.normal += area;
+    centre += (a + b + c) / 3;
+  }
+  if (plane.triangles.empty()) return plane;
+  centre /= static_cast<double>(plane.triangles.size());
+  plane.normal.normalize();
+  if (plane.normal.dot(cell.positions().rowwise().mean() - centre) < 0) {
+    plane.normal = -plane.normal;
+    for (auto& triangle : plane.triangles) std::swap(triangle[1], triangle[2]);
+  }
+  plane.outmost = plane.normal.dot(centre);
+  for (const auto& triangle : plane.triangles)
+    for (const vtkIdType id : triangle) plane.outmost = std::min(plane.outmost, plane.normal.dot(position(id)));
+  return plane;
+}
+
+Surface body_surface(vtkDataSet& mesh) {
+  const Points points = points_of(mesh);
+  const std::vector<Face> faces = outer_faces(mesh, points);
+  const Eigen::Matrix3Xd extreme = extreme_points(mesh, faces, points);
+  const double least_depth = 1e-3 * (extreme.rowwise().maxCoeff() - extreme.rowwise().minCoeff()).norm();
+  Surface surface;
+  std::map<vtkIdType, std::uint32_t> vertex_of_point;
+  MeshCell cell;
+  for (const Face& face : faces) {
+    cell.load(mesh, face.cell);
+    const FacePlane plane = plane_of(cell, face.index, points);
+    const double depth = plane.outmost - (plane.normal.transpose() * extreme).minCoeff();
+    if (!(depth > least_depth)) continue;
+    for (const auto& triangle : plane.triangles) {
+      std::array<std::uint32_t, 3> vertices{};
+      for (std::size_t k = 0; k < 3; ++k) {
+        const auto [vertex, is_new] =
+            vertex_of_point.try_emplace(triangle[k], static_cast<std::uint32_t>(surface.vertices.size()));
+        if (is_new) surface.vertices.push_back(points.positions[static_cast<std::size_t>(triangle[k])]);
+        vertices[k] = vertex->second;
+      }
+      surface.triangles.push_back(vertices);
+    }
+  }
+  return surface;
+}
+
+template <class Number>
+void append(std::string& bytes, const Number& number) {
+  static_assert(__BYTE_ORDER__ == __ORDER_LITTLE_ENDIAN__, "the file is little-endian, and written as memory has it");
+  bytes.append(reinterpret_cast<const char*>(&number), sizeof number);
+}
+
+void write_ply(const Surface& surface, const std::filesystem::path& path) {
+  std::string bytes =
+      "ply\nformat binary_little_endian 1.0\nelement vertex " + std::to_string(surface.vertices.size()) +
+      "\nproperty double x\nproperty double y\nproperty double z\nelement face " +
+      std::to_string(surface.triangles.size()) + "\nproperty list uchar int vertex_indices\nend_header\n";
+  for (const Vector3d& vertex : surface.vertices)
+    for (const double coordinate : vertex) append(bytes, coordinate);
+  for (const auto& triangle : surface.triangles) {
+    append(bytes, std::uint8_t{3});
+    for (const std::uint32_t vertex : triangle) append(bytes, vertex);
+  }
+  std::ofstream file(path, std::ios::binary);
+  file.write(bytes.data(), static_cast<std::streamsize>(bytes.size()));
+  file.close();
+  if (!file) throw std::runtime_error(path.string() + ": cannot be written; is there space, and the folder writable?");
+}
+
+}  // namespace
+
+std::size_t write_boundary(vtkDataSet& mesh, const std::filesystem::path& path) {
+  const Surface surface = body_surface(mesh);
+  if (!surface.triangles.empty()) write_ply(surface, path);
+  return surface.triangles.size();
+}
+
+}  // namespace tensorray

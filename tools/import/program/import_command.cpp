@@ -1,0 +1,202 @@
+#include "tools/import/program/import_command.h"
+
+#include <cmath>
+#include <filesystem>
+#include <memory>
+#include <optional>
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+#include <CLI/CLI.hpp>
+#include <fmt/core.h>
+
+#include "base/output_file.h"
+#include "base/progress.h"
+#include "base/text.h"
+#include "tools/command_line/progress_bar.h"
+#include "tools/command_line/vdb_output.h"
+#include "tools/import/import_file.h"
+#include "tools/import/program/child_process.h"
+#include "volumes/files/tensor_files.h"
+
+namespace tensorray {
+namespace {
+
+/// Of the sampled peak, what is left where no warning is needed.
+constexpr double kept_peak = 0.95;
+
+struct ImportOptions {
+  ImportSettings settings;
+  std::string array, gradient_of, strain_of, order;
+  std::vector<int> resolution;
+  double voxel_size = 0;
+  std::vector<double> bounds;
+  std::filesystem::path output, boundary;
+  std::string name, units;
+  bool half = false, quiet = false;
+};
+
+ImportSettings settings_of(const ImportOptions& options) {
+  ImportSettings settings = options.settings;
+  settings.array = options.array;
+  if (!options.gradient_of.empty()) {
+    settings.array = options.gradient_of;
+    settings.take = Take::gradient;
+  }
+  if (!options.strain_of.empty()) {
+    settings.array = options.strain_of;
+    settings.take = Take::strain;
+  }
+  if (!options.order.empty()) settings.order = tensor_order_of(options.order);
+  if (options.voxel_size > 0) settings.sampling.resolution = options.voxel_size;
+  if (options.resolution.size() == 1) settings.sampling.resolution = options.resolution[0];
+  if (options.resolution.size() == 3) settings.sampling.resolution = Eigen::Vector3i(options.resolution.data());
+  if (options.resolution.size() == 2) throw std::invalid_argument("--resolution needs one number, or three: x y z");
+  if (!options.bounds.empty()) {
+    const Eigen::Vector3d min(options.bounds[0], options.bounds[2], options.bounds[4]);
+    const Eigen::Vector3d max(options.bounds[1], options.bounds[3], options.bounds[5]);
+    if (!(min.array() <= max.array()).all())
+      throw std::invalid_argument("--bounds needs xmin xmax ymin ymax zmin zmax, each min below its max");
+    settings.sampling.bounds = Eigen::AlignedBox3d(min, max);
+  }
+  return settings;
+}
+
+void print_lattice(const LatticeReport& report) {
+  const auto percent = [&](std::size_t count) {
+    return 100.0 * static_cast<double>(count) / static_cast<double>(report.voxels);
+  };
+  fmt::print("  voxels as they were: {} of {} active ({:.1f}%); {} background, {} not finite\n", report.active,
+             report.voxels, percent(report.active), report.background, report.non_finite);
+}
+
+void print_sampling(const ImportReport& report) {
+  const SamplingReport& mesh = *report.mesh;
+  fmt::print("  sampled from {} cells at {} x {} x {} voxels of {:.4g} x {:.4g} x {:.4g}; {} active\n",
+             report.mesh_cells, mesh.size.x(), mesh.size.y(), mesh.size.z(), mesh.voxel.x(), mesh.voxel.y(),
+             mesh.voxel.z(), mesh.active);
+  fmt::print("  norm of the tensor, mesh -> grid: peak {:.4g} -> {:.4g}, median {:.4g} -> {:.4g}\n", mesh.native_peak,
+             mesh.sampled_peak, mesh.native_median, mesh.sampled_median);
+  if (mesh.non_finite_points > 0) fmt::print("  {} points of the mesh are not finite\n", mesh.non_finite_points);
+  if (mesh.sampled_peak < kept_peak * mesh.native_peak) {
+    std::fflush(stdout);
+    fmt::print(stderr,
+               "tensorray: warning: the grid holds {:.0f}% of the mesh's peak norm; a larger --resolution, or --bounds "
+               "around what matters, holds more\n",
+               100 * mesh.sampled_peak / mesh.native_peak);
+  }
+}
+
+/// The child's part: everything but giving the files their names.
+void import_to(const ImportOptions& options, const ImportSettings& settings, OutputFile& output, Progress& progress) {
+  ImportReport report;
+  std::optional<ProgressBar> bar(std::in_place, progress, options.quiet);
+  TensorGrid grid = import_tensors(settings, progress, report);
+  if (!options.name.empty()) grid.name = options.name;
+  grid.metadata["tensorray:field"] = grid.name;
+  if (!options.units.empty()) grid.metadata["tensorray:units"] = options.units;
+  progress.update("writing", 0, 1);
+  const std::string name = grid.name;
+  const Eigen::Vector3i size = grid.active_box().sizes() + Eigen::Vector3i::Ones();
+  output.write([&](const std::filesystem::path& path) { write_tensor_vdb(path, std::move(grid), options.half); });
+  bar.reset();
+  fmt::print("{}: field \"{}\", {} x {} x {} voxels, {}\n", options.output.string(), escaped(name), size.x(), size.y(),
+             size.z(), bytes_text(static_cast<double>(std::filesystem::file_size(output.path()))));
+  if (report.lattice) print_lattice(*report.lattice);
+  if (report.mesh) print_sampling(report);
+  if (report.boundary_triangles > 0)
+    fmt::print("{}: the body's surface, {} triangles\n", options.boundary.string(), report.boundary_triangles);
+}
+
+void import(const ImportOptions& options, Progress& progress) {
+  ImportSettings settings = settings_of(options);
+  for (const std::filesystem::path& file : settings.files)
+    if (!std::filesystem::exists(file)) throw std::runtime_error(file.string() + " does not exist");
+  std::vector<OutputFile> files;
+  files.emplace_back(options.output);
+  if (!options.boundary.empty()) {
+    files.emplace_back(options.boundary);
+    settings.boundary = files.back().path();
+  }
+  in_child_process([&] { import_to(options, settings, files.front(), progress); }, progress,
+                   settings.files.front().string() +
+                       ": reading it ended the reader; the file is damaged or cut off, or does not fit in memory");
+  commit_all(files);
+}
+
+std::string check_ply_output(const std::string& text) {
+  return std::filesystem::path(text).extension() == ".ply" ? "" : text + " must end in .ply";
+}
+
+std::string positive(const std::string& text) {
+  double value = 0;
+  const bool is_number = CLI::detail::lexical_cast(text, value);
+  return is_number && std::isfinite(value) && value > 0 ? "" : text + " is no size: give a number greater than 0";
+}
+
+void add_what(CLI::App& command, ImportOptions& options) {
+  auto* array = command.add_option("--array", options.array, "The array that is the tensor (default: the only one)");
+  auto* gradient =
+      command.add_option("--gradient-of", options.gradient_of,
+                         "Take the gradient of this vector array, T_ij = dv_i/dx_j, made on the mesh itself");
+  auto* strain = command.add_option("--strain-of", options.strain_of,
+                                    "Take the symmetric part of the gradient of this displacement");
+  array->excludes(gradient, strain);
+  gradient->excludes(strain);
+  command
+      .add_option("--order", options.order,
+                  "Order of six components: vtk (xx yy zz xy yz xz), fsl (xx xy xz yy yz zz), mrtrix (xx yy zz xy xz "
+                  "yz), voigt (xx yy zz yz xz xy)")
+      ->check(CLI::IsMember(tensor_order_names()))
+      ->option_text("ORDER");
+  for (CLI::Option* option : command.get_options({}))
+    if (option != command.get_help_ptr()) option->group("What to take");
+}
+
+void add_where(CLI::App& command, ImportOptions& options) {
+  auto* resolution = command
+                         .add_option("--resolution", options.resolution,
+                                     "Voxels along the longest edge, or along x, y and z (default: the median cell "
+                                     "is a voxel; data on voxels keep theirs)")
+                         ->expected(1, 3)
+                         ->check(CLI::Range(2, 8192))
+                         ->group("Grid");
+  command.add_option("--voxel-size", options.voxel_size, "Edge of a voxel")
+      ->check(positive)
+      ->excludes(resolution)
+      ->group("Grid");
+  command.add_option("--bounds", options.bounds, "Crop: xmin xmax ymin ymax zmin zmax")->expected(6)->group("Grid");
+}
+
+}  // namespace
+
+void add_import_options(CLI::App& program, Progress& progress) {
+  const auto options = std::make_shared<ImportOptions>();
+  add_what(program, *options);
+  add_where(program, *options);
+  program
+      .add_option("FILE", options->settings.files,
+                  "VTK (.vti .vtr .vts .vtu .vtk .pvti .pvtr .pvts .pvtu), ExodusII (.ex2 .exo .e .g), an OpenFOAM "
+                  "case (its folder, or a .foam in it), NRRD (.nrrd .nhdr), NIfTI (.nii .nii.gz .hdr), NumPy (.npy); "
+                  "of PLOT3D two, the grid and its q")
+      ->required()
+      ->expected(1, 2)
+      ->option_text("FILE...");
+  program.add_option("-o,--output", options->output, "The field to write, FILE.vdb")
+      ->required()
+      ->check(check_vdb_output)
+      ->option_text("FILE");
+  program
+      .add_option("--boundary", options->boundary,
+                  "Write the surface of the body that the mesh lies around, for `obstacles`: FILE.ply")
+      ->check(check_ply_output)
+      ->option_text("FILE");
+  program.add_option("--name", options->name, "Name of the field (default: the array's)");
+  program.add_option("--units", options->units, "Units of the tensor, noted in the file");
+  program.add_flag("--half", options->half, "Store 16-bit floats: three significant digits, half the size");
+  program.add_flag("-q,--quiet", options->quiet, "No progress bar");
+  program.callback([options, &progress] { import(*options, progress); });
+}
+
+}  // namespace tensorray

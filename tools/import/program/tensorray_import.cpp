@@ -1,0 +1,62 @@
+/// @file tools/import/program/tensorray_import.cpp
+/// The program `tensorray-import`: all that needs VTK, Teem and NIfTI's library.
+///   tensorray-import ARGUMENTS...                    does what `tensorray import ARGUMENTS...` promises
+///   tensorray-import --write-vtp EXCHANGE FILE       a file of poly_data.h → VTK polydata
+///   tensorray-import --read-vtp EXCHANGE FILE NAME...    VTK polydata, with the named arrays → a file of poly_data.h
+/// The last two are for volumes/files/vtk_files.h alone; an error is one line, without the program's name.
+
+#include <csignal>
+#include <cstdio>
+#include <exception>
+#include <set>
+#include <string>
+
+#include <CLI/CLI.hpp>
+#include <fmt/format.h>
+
+#include "base/child_program.h"
+#include "tools/command_line/interrupts.h"
+#include "tools/command_line/run_and_report.h"
+#include "tools/import/program/import_command.h"
+#include "tools/import/vtk/vtp_files.h"
+
+namespace {
+
+int convert(bool writes, int argc, char** argv) {
+  tensorray::end_with_parent();
+  std::signal(SIGXFSZ, SIG_IGN);
+  try {
+    if (argc < 4) throw std::runtime_error("--read-vtp and --write-vtp are for tensorray alone");
+    if (writes) {
+      const tensorray::PolyData data = tensorray::read_poly_data(argv[2]);
+      tensorray::write_vtp_file(argv[3], view_of(data));
+    } else {
+      const std::set<std::string> wanted(argv + 4, argv + argc);
+      const tensorray::PolyData data = tensorray::read_vtp_file(argv[3], wanted);
+      tensorray::write_poly_data(argv[2], view_of(data));
+    }
+    return 0;
+  } catch (const std::bad_alloc&) {
+    fmt::print(stderr, "it does not fit in memory\n");
+  } catch (const std::exception& error) {
+    fmt::print(stderr, "{}\n", error.what());
+  }
+  return 1;
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  const std::string first = argc > 1 ? argv[1] : "";
+  if (first == "--write-vtp" || first == "--read-vtp") return convert(first == "--write-vtp", argc, argv);
+  tensorray::Progress& progress = tensorray::progress_until_interrupted();
+  CLI::App app("Make a tensor field of another program's file", "tensorray import");
+  tensorray::add_import_options(app, progress);
+  return tensorray::run_and_report([&] {
+    try {
+      app.parse(argc, argv);
+    } catch (const CLI::Success& request) {  // --help
+      app.exit(request);
+    }
+  });
+}

@@ -1,0 +1,134 @@
+#include "tools/import/vtk/vtk_geometry.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <stdexcept>
+#include <string>
+
+#include <vtkCellArray.h>
+#include <vtkDataArray.h>
+#include <vtkGenericCell.h>
+#include <vtkIdTypeArray.h>
+#include <vtkImageData.h>
+#include <vtkPoints.h>
+#include <vtkRectilinearGrid.h>
+#include <vtkSmartPointer.h>
+#include <vtkStructuredGrid.h>
+#include <vtkUnsignedCharArray.h>
+#include <vtkUnstructuredGrid.h>
+
+namespace tensorray {
+namespace {
+
+using Path = std::filesystem::path;
+
+[[noreturn]] void fail(const Path& path, const std::string& what) {
+  throw std::runtime_error(path.string() + ": is damaged, or not of the form it seems: " + what + "; write it again");
+}
+
+/// False of NaN too. No unit makes larger ones sensible, and sampling cannot divide their span into voxels.
+bool is_coordinate(double x) { return std::abs(x) <= 1e30; }
+
+void check_coordinates(const Path& path, const std::string& name, vtkDataArray* values) {
+  for (vtkIdType i = 0; i < values->GetNumberOfTuples(); ++i) {
+    for (int axis = 0; axis < values->GetNumberOfComponents(); ++axis) {
+      if (is_coordinate(values->GetComponent(i, axis))) continue;
+      fail(path, name + " " + std::to_string(i) + " is not finite, or beyond 1e30");
+    }
+  }
+}
+
+void check_image(const Path& path, vtkImageData& image) {
+  const double* const bounds = image.GetBounds();
+  if (std::all_of(image.GetSpacing(), image.GetSpacing() + 3, is_coordinate) &&
+      std::all_of(image.GetOrigin(), image.GetOrigin() + 3, is_coordinate) &&
+      std::all_of(bounds, bounds + 6, is_coordinate))
+    return;
+  fail(path, "its origin or spacing is not finite, or beyond 1e30");
+}
+
+/// A legacy file may hold fewer points, or coordinates of an axis, than its dimensions say.
+void check_count(const Path& path, const std::string& name, vtkIdType count, vtkIdType needed) {
+  if (count < needed) fail(path, "it has " + std::to_string(count) + " of " + std::to_string(needed) + " " + name);
+}
+
+void check_rectilinear(const Path& path, vtkRectilinearGrid& grid) {
+  vtkDataArray* const coordinates[] = {grid.GetXCoordinates(), grid.GetYCoordinates(), grid.GetZCoordinates()};
+  for (int axis = 0; axis < 3; ++axis) {
+    const std::string name(1, static_cast<char>('x' + axis));
+    check_count(path, name + " coordinates", coordinates[axis]->GetNumberOfTuples(), grid.GetDimensions()[axis]);
+    check_coordinates(path, name + " coordinate", coordinates[axis]);
+  }
+}
+
+/// How many points a cell of each type has at least: those of fixed number have it when they are made.
+std::array<vtkIdType, 256> least_points() {
+  std::array<vtkIdType, 256> counts{};
+  for (int type = 0; type <= VTK_POLYHEDRON; ++type) {
+    vtkSmartPointer<vtkCell> cell;
+    cell.TakeReference(vtkGenericCell::InstantiateCell(type));
+    if (cell) counts[static_cast<std::size_t>(type)] = cell->GetNumberOfPoints();
+  }
+  return counts;
+}
+
+/// The faces of polyhedra: at each one's location their number, and of each face its points' number and the points.
+void check_faces(const Path& path, vtkUnstructuredGrid& grid) {
+  vtkIdTypeArray* const faces = grid.GetFaces();
+  vtkIdTypeArray* const locations = grid.GetFaceLocations();
+  const vtkIdType points = grid.GetNumberOfPoints();
+  for (vtkIdType id = 0; id < grid.GetNumberOfCells(); ++id) {
+    if (grid.GetCellType(id) != VTK_POLYHEDRON) continue;
+    vtkIdType at = faces && locations && id < locations->GetNumberOfValues() ? locations->GetValue(id) : -1;
+    const auto next = [&](vtkIdType limit) {
+      const vtkIdType value = at >= 0 && at < faces->GetNumberOfValues() ? faces->GetValue(at++) : -1;
+      if (value < 0 || value >= limit)
+        fail(path, "the faces of cell " + std::to_string(id) + " have points that are not there");
+      return value;
+    };
+    for (vtkIdType face = next(VTK_ID_MAX); face > 0; --face)
+      for (vtkIdType corner = next(VTK_ID_MAX); corner > 0; --corner) next(points);
+  }
+}
+
+/// VTK follows the cells' points wherever they lead.
+void check_cells(const Path& path, vtkUnstructuredGrid& grid) {
+  static const std::array<vtkIdType, 256> least = least_points();
+  vtkDataArray& offsets = *grid.GetCells()->GetOffsetsArray();
+  vtkDataArray& ids = *grid.GetCells()->GetConnectivityArray();
+  const vtkUnsignedCharArray* const types = grid.GetCellTypesArray();
+  const vtkIdType cells = grid.GetNumberOfCells();
+  if (!types || types->GetNumberOfValues() < cells) fail(path, "it has fewer types of cells than cells");
+  for (vtkIdType id = 0; id < cells; ++id) {
+    const auto begin = static_cast<vtkIdType>(offsets.GetComponent(id, 0));
+    const auto end = static_cast<vtkIdType>(offsets.GetComponent(id + 1, 0));
+    if (begin < 0 || end < begin || end > ids.GetNumberOfValues() || end - begin < least[types->GetValue(id)])
+      fail(path, "cell " + std::to_string(id) + " has fewer points than its type needs, or a wrong offset");
+  }
+  double range[2] = {0, 0};
+  if (ids.GetNumberOfValues() > 0) ids.GetRange(range, 0);
+  const vtkIdType points = grid.GetNumberOfPoints();
+  if (range[0] < 0 || (ids.GetNumberOfValues() > 0 && range[1] >= static_cast<double>(points))) {
+    const auto wrong = static_cast<vtkIdType>(range[0] < 0 ? range[0] : range[1]);
+    fail(path, "a cell has point " + std::to_string(wrong) + " of " + std::to_string(points) + " (from 0)");
+  }
+  check_faces(path, grid);
+}
+
+}  // namespace
+
+void check_geometry(vtkDataSet& data, const Path& path) {
+  if (auto* const image = vtkImageData::SafeDownCast(&data)) check_image(path, *image);
+  if (auto* const grid = vtkRectilinearGrid::SafeDownCast(&data)) check_rectilinear(path, *grid);
+  if (auto* const grid = vtkStructuredGrid::SafeDownCast(&data)) {
+    int size[3];
+    grid->GetDimensions(size);
+    check_count(path, "points", grid->GetNumberOfPoints(), vtkIdType{size[0]} * size[1] * size[2]);
+  }
+  if (auto* const set = vtkPointSet::SafeDownCast(&data); set && set->GetPoints())
+    check_coordinates(path, "point", set->GetPoints()->GetData());
+  if (auto* const grid = vtkUnstructuredGrid::SafeDownCast(&data)) check_cells(path, *grid);
+}
+
+}  // namespace tensorray

@@ -1,0 +1,169 @@
+#include "tools/import/vtk/vtk_source.h"
+
+#include <algorithm>
+#include <new>
+#include <stdexcept>
+#include <string>
+
+#include <vtkDataArray.h>
+#include <vtkDataSet.h>
+#include <vtkDataSetAttributes.h>
+#include <vtkDataSetReader.h>
+#include <vtkDoubleArray.h>
+#include <vtkExodusIIReader.h>
+#include <vtkMultiBlockDataSet.h>
+#include <vtkNew.h>
+#include <vtkOpenFOAMReader.h>
+#include <vtkSmartPointer.h>
+#include <vtkXMLImageDataReader.h>
+#include <vtkXMLPImageDataReader.h>
+#include <vtkXMLPRectilinearGridReader.h>
+#include <vtkXMLPStructuredGridReader.h>
+#include <vtkXMLRectilinearGridReader.h>
+#include <vtkXMLStructuredGridReader.h>
+#include <vtkXMLUnstructuredGridReader.h>
+
+#include "tools/import/vtk/silent_stderr.h"
+#include "tools/import/vtk/vtk_geometry.h"
+#include "tools/import/vtk/vtk_kind.h"
+#include "tools/import/vtk/vtk_messages.h"
+#include "tools/import/vtk/vtk_pieces.h"
+
+namespace tensorray {
+namespace {
+
+using Path = std::filesystem::path;
+
+template <typename Reader>
+vtkSmartPointer<vtkDataObject> read_xml(const Path& path) {
+  vtkNew<Reader> reader;
+  reader->SetFileName(path.c_str());
+  reader->Update();
+  return reader->GetOutputDataObject(0);
+}
+
+/// Piece by piece: VTK's own reader of pieces strings them together with every seam's points twice.
+vtkSmartPointer<vtkDataObject> read_unstructured_pieces(const Path& path) {
+  auto blocks = vtkSmartPointer<vtkMultiBlockDataSet>::New();
+  unsigned int index = 0;
+  for (const Path& piece : piece_files(path)) {
+    blocks->SetBlock(index++, read_xml<vtkXMLUnstructuredGridReader>(piece));
+  }
+  return blocks;
+}
+
+/// Without these the first array of each kind alone would be read.
+vtkSmartPointer<vtkDataObject> read_legacy(const Path& path) {
+  vtkNew<vtkDataSetReader> reader;
+  reader->SetFileName(path.c_str());
+  reader->ReadAllScalarsOn();
+  reader->ReadAllVectorsOn();
+  reader->ReadAllNormalsOn();
+  reader->ReadAllTensorsOn();
+  reader->ReadAllFieldsOn();
+  reader->Update();
+  return reader->GetOutputDataObject(0);
+}
+
+/// The mesh as it was meshed: VTK would move its points by an array that looks like a displacement.
+vtkSmartPointer<vtkDataObject> read_exodus(const Path& path) {
+  vtkNew<vtkExodusIIReader> reader;
+  reader->SetFileName(path.c_str());
+  reader->ApplyDisplacementsOff();
+  reader->UpdateInformation();
+  for (const auto kind : {vtkExodusIIReader::NODAL, vtkExodusIIReader::ELEM_BLOCK}) {
+    for (int i = 0; i < reader->GetNumberOfObjectArrays(kind); ++i) {
+      reader->SetObjectArrayStatus(kind, reader->GetObjectArrayName(kind, i), 1);
+    }
+  }
+  for (int i = 0; i < reader->GetNumberOfObjects(vtkExodusIIReader::ELEM_BLOCK); ++i) {
+    reader->SetObjectStatus(vtkExodusIIReader::ELEM_BLOCK, i, 1);
+  }
+  if (const int steps = reader->GetNumberOfTimeSteps(); steps > 0) reader->SetTimeStep(steps - 1);
+  reader->Update();
+  return reader->GetOutputDataObject(0);
+}
+
+vtkSmartPointer<vtkDataObject> read_openfoam(const Path& path) {
+  const Path dictionary = openfoam_case(path) / "system" / "controlDict";
+  vtkNew<vtkOpenFOAMReader> reader;
+  reader->SetFileName(dictionary.c_str());
+  reader->SkipZeroTimeOff();
+  reader->UpdateInformation();
+  reader->DisableAllPatchArrays();
+  reader->SetPatchArrayStatus("internalMesh", 1);
+  reader->EnableAllCellArrays();
+  reader->EnableAllPointArrays();
+  if (vtkDoubleArray* const times = reader->GetTimeValues(); times && times->GetNumberOfTuples() > 0) {
+    const double* const begin = times->GetPointer(0);
+    reader->UpdateTimeStep(*std::max_element(begin, begin + times->GetNumberOfTuples()));
+  }
+  reader->Update();
+  return reader->GetOutputDataObject(0);
+}
+
+vtkSmartPointer<vtkDataObject> read_kind(VtkKind kind, const Path& path) {
+  switch (kind) {
+    case VtkKind::legacy:
+      return read_legacy(path);
+    case VtkKind::image:
+      return read_xml<vtkXMLImageDataReader>(path);
+    case VtkKind::rectilinear:
+      return read_xml<vtkXMLRectilinearGridReader>(path);
+    case VtkKind::structured:
+      return read_xml<vtkXMLStructuredGridReader>(path);
+    case VtkKind::unstructured:
+      return read_xml<vtkXMLUnstructuredGridReader>(path);
+    case VtkKind::image_pieces:
+      return read_xml<vtkXMLPImageDataReader>(path);
+    case VtkKind::rectilinear_pieces:
+      return read_xml<vtkXMLPRectilinearGridReader>(path);
+    case VtkKind::structured_pieces:
+      return read_xml<vtkXMLPStructuredGridReader>(path);
+    case VtkKind::unstructured_pieces:
+      return read_unstructured_pieces(path);
+    case VtkKind::exodus:
+      return read_exodus(path);
+    case VtkKind::openfoam:
+      return read_openfoam(path);
+  }
+  throw std::logic_error("read_kind: unknown kind");
+}
+
+/// So that nobody need give the order that VTK has brought OpenFOAM's symmTensors into.
+void name_symmetric_components(vtkDataSet& data) {
+  const char* const names[] = {"XX", "YY", "ZZ", "XY", "YZ", "XZ"};
+  for (const auto type : {vtkDataObject::POINT, vtkDataObject::CELL}) {
+    for (int i = 0; i < data.GetAttributes(type)->GetNumberOfArrays(); ++i) {
+      vtkDataArray* const array = data.GetAttributes(type)->GetArray(i);
+      if (!array || array->GetNumberOfComponents() != 6) continue;
+      for (int component = 0; component < 6; ++component) array->SetComponentName(component, names[component]);
+    }
+  }
+}
+
+}  // namespace
+
+vtkSmartPointer<vtkDataSet> read_vtk_source(const Path& path) {
+  const VtkKind kind = vtk_kind(path);
+  const VtkMessages messages;
+  const SilentStderr silent;
+  vtkSmartPointer<vtkDataSet> result;
+  try {
+    const DataSets pieces = data_sets_in(read_kind(kind, path));
+    messages.throw_error(path);
+    for (vtkDataSet* const piece : pieces) check_geometry(*piece, path);
+    result = one_data_set(pieces);
+  } catch (const std::bad_alloc&) {
+    throw std::runtime_error(path.string() + ": is damaged, or too large: it announces more than memory holds");
+  }
+  messages.throw_error(path);
+  if (!result) {
+    const std::string& warning = messages.first_warning();
+    throw std::runtime_error(path.string() + ": holds no cells" + (warning.empty() ? "" : ": " + warning));
+  }
+  if (kind == VtkKind::openfoam) name_symmetric_components(*result);
+  return result;
+}
+
+}  // namespace tensorray

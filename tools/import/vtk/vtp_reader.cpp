@@ -1,0 +1,145 @@
+#include <algorithm>
+#include <fstream>
+#include <new>
+#include <stdexcept>
+#include <vector>
+
+#include <vtkCellArray.h>
+#include <vtkCellData.h>
+#include <vtkDataArray.h>
+#include <vtkDataArraySelection.h>
+#include <vtkNew.h>
+#include <vtkPointData.h>
+#include <vtkPoints.h>
+#include <vtkPolyData.h>
+#include <vtkXMLPolyDataReader.h>
+
+#include "base/text.h"
+#include "tools/import/vtk/vtk_messages.h"
+#include "tools/import/vtk/vtp_files.h"
+
+namespace tensorray {
+namespace {
+
+using Path = std::filesystem::path;
+using Indices = std::vector<vtkIdType>;
+
+[[noreturn]] void fail_damaged(const std::string& what) {
+  throw std::runtime_error(what + ": the file is damaged or cut off; write it again");
+}
+
+std::string read_part(const Path& path, std::uintmax_t offset, std::size_t count) {
+  std::ifstream file(path, std::ios::binary);
+  std::string text(count, '\0');
+  file.seekg(static_cast<std::streamoff>(offset));
+  file.read(&text[0], static_cast<std::streamsize>(count));
+  text.resize(static_cast<std::size_t>(std::max<std::streamsize>(file.gcount(), 0)));
+  return text;
+}
+
+/// VTK's own message about a file of another kind is no help, and it does not look for the end of appended data.
+void check_kind_and_end(const Path& path) {
+  constexpr std::size_t head_size = 4096, tail_size = 256;
+  const std::string head = read_part(path, 0, head_size);
+  const std::size_t root = head.find("<VTKFile");
+  if (root == std::string::npos) throw std::runtime_error("it is not VTK polydata in VTK's XML format");
+  const std::string tag = head.substr(root, head.find('>', root) - root);
+  const std::size_t type = tag.find("type=");
+  const std::string rest = type == std::string::npos ? "" : tag.substr(type + 5);
+  if (rest.size() < 2 || rest.compare(1, 9, std::string("PolyData") + rest[0]) != 0) {
+    const std::string found = rest.empty() ? "" : rest.substr(1, rest.find(rest[0], 1) - 1);
+    throw std::runtime_error("it is not VTK polydata but \"" + escaped(found) + "\"");
+  }
+  const std::uintmax_t size = std::filesystem::file_size(path),
+                       begin = size - std::min<std::uintmax_t>(size, tail_size);
+  std::string tail = read_part(path, begin, tail_size);
+  tail.erase(tail.find_last_not_of(" \t\r\n") + 1);
+  if (!ends_with(tail, "</VTKFile>")) fail_damaged("its end is missing");
+}
+
+void choose(vtkDataArraySelection& arrays, const std::set<std::string>& wanted) {
+  for (int i = 0; i < arrays.GetNumberOfArrays(); ++i)
+    if (wanted.count(arrays.GetArrayName(i)) == 0) arrays.DisableArray(arrays.GetArrayName(i));
+}
+
+/// Points and lines that `wanted` values are taken from; cells come in VTK's order: vertices, then lines.
+struct Selection {
+  Indices points, lines;
+  std::vector<std::size_t> line_ends;
+};
+
+/// VTK follows the lines' points wherever they lead.
+Selection selection_of(vtkPolyData& polydata) {
+  Selection selection;
+  vtkCellArray& lines = *polydata.GetLines();
+  vtkDataArray &offsets = *lines.GetOffsetsArray(), &corners = *lines.GetConnectivityArray();
+  const vtkIdType vertices = polydata.GetNumberOfVerts(), count = lines.GetNumberOfCells();
+  const auto offset = [&](vtkIdType line) { return static_cast<vtkIdType>(offsets.GetComponent(line, 0)); };
+  for (vtkIdType line = 0; line < count; ++line) {
+    if (offset(line) < 0 || offset(line + 1) < offset(line) || offset(line + 1) > corners.GetNumberOfTuples())
+      fail_damaged("the offsets of its lines do not grow, or are more than it holds");
+    for (vtkIdType i = offset(line); i < offset(line + 1); ++i) {
+      const auto point = static_cast<vtkIdType>(corners.GetComponent(i, 0));
+      if (point < 0 || point >= polydata.GetNumberOfPoints()) fail_damaged("a line names a point that is not there");
+      selection.points.push_back(point);
+    }
+    selection.lines.push_back(vertices + line);
+    selection.line_ends.push_back(selection.points.size());
+  }
+  return selection;
+}
+
+DataArray doubles(vtkDataArray& array, const Indices& selected) {
+  const int components = array.GetNumberOfComponents();
+  std::vector<double> values;
+  values.reserve(selected.size() * static_cast<std::size_t>(components));
+  for (const vtkIdType i : selected)
+    for (int component = 0; component < components; ++component) values.push_back(array.GetComponent(i, component));
+  return {components, std::move(values)};
+}
+
+/// Arrays of numbers with a value for each of `count`.
+Named<DataArray> chosen(vtkDataSetAttributes& attributes, const std::set<std::string>& wanted, vtkIdType count,
+                        const Indices& selected) {
+  Named<DataArray> arrays;
+  for (const std::string& name : wanted) {
+    vtkDataArray* const array = attributes.GetArray(name.c_str());
+    if (!array) continue;
+    if (array->GetNumberOfTuples() != count)
+      fail_damaged("the array \"" + name + "\" has not one value for each of what it describes");
+    arrays.emplace_back(name, doubles(*array, selected));
+  }
+  return arrays;
+}
+
+PolyData lines_of(vtkPolyData& polydata, const std::set<std::string>& wanted) {
+  PolyData data;
+  data.has_lines = true;
+  const Selection selection = selection_of(polydata);
+  if (!selection.points.empty()) data.points = doubles(*polydata.GetPoints()->GetData(), selection.points);
+  data.line_ends = selection.line_ends;
+  data.point_data = chosen(*polydata.GetPointData(), wanted, polydata.GetNumberOfPoints(), selection.points);
+  data.line_data = chosen(*polydata.GetCellData(), wanted, polydata.GetNumberOfCells(), selection.lines);
+  return data;
+}
+
+}  // namespace
+
+PolyData read_vtp_file(const Path& path, const std::set<std::string>& wanted) {
+  check_kind_and_end(path);
+  const VtkMessages messages;
+  try {
+    vtkNew<vtkXMLPolyDataReader> reader;
+    reader->SetFileName(path.c_str());
+    reader->UpdateInformation();
+    choose(*reader->GetPointDataArraySelection(), wanted);
+    choose(*reader->GetCellDataArraySelection(), wanted);
+    reader->Update();
+    if (!messages.first_error().empty()) fail_damaged("VTK cannot read it: " + messages.first_error());
+    return lines_of(*reader->GetOutput(), wanted);
+  } catch (const std::bad_alloc&) {
+    fail_damaged("it announces more than memory holds");
+  }
+}
+
+}  // namespace tensorray
