@@ -34,10 +34,10 @@ PathPoint point_of(const Vector3d& position, const Vector3d& direction, const Ma
 }
 
 /// Along z from 0 to 1, with a tensor that depends on z.
-PathPoints straight_way(int points, const std::function<Matrix3d(double)>& tensor) {
+PathPoints straight_way(int count, const std::function<Matrix3d(double)>& tensor) {
   PathPoints points;
-  for (int i = 0; i < points; ++i) {
-    const double z = double(i) / (points - 1);
+  for (int i = 0; i < count; ++i) {
+    const double z = double(i) / (count - 1);
     points.push_back(point_of({0, 0, z}, {0, 0, 1}, tensor(z)));
   }
   return points;
@@ -173,8 +173,8 @@ TEST(CrossSection, VanishingOnTheWayNeitherFlipsNorTwists) {
   // T is zero at z = 1/2, where the ellipse is clamped to a circle, and changes its sign there; the way is a helix.
   const Matrix3d T = Eigen::AngleAxisd(0.4, Vector3d(1, 2, 3).normalized()) * Vector3d(2, 1, 0.3).asDiagonal();
   PathPoints points;
-  const int points = 401;
-  for (int i = 0; i < points; ++i) points.push_back(helix_point(0.01 * i, (double(i) / (points - 1) - 0.5) * T));
+  const int count = 401;
+  for (int i = 0; i < count; ++i) points.push_back(helix_point(0.01 * i, (double(i) / (count - 1) - 0.5) * T));
   const std::vector<CrossSection> sections = cross_sections(points, radii(0.05));
   for (std::size_t i = 1; i < points.size(); ++i) {
     // No faster than the tensor changes, and than a frame of this size turns; both with room for the turn of C.
@@ -194,10 +194,10 @@ TEST(CrossSection, ATurningEllipseIsFollowedWithoutAFlip) {
     const Matrix3d turn = Eigen::AngleAxisd(6 * pi * z, Vector3d::UnitZ()).toRotationMatrix();
     return turn * Vector3d(3, 1, 1).asDiagonal() * turn.transpose();
   };
-  const int points = 301;
-  const PathPoints points = straight_way(points, turned);
+  const int count = 301;
+  const PathPoints points = straight_way(count, turned);
   const std::vector<CrossSection> sections = cross_sections(points, radii(0.01));
-  const double angle = 6 * pi / (points - 1);
+  const double angle = 6 * pi / (count - 1);
   for (std::size_t i = 1; i < points.size(); ++i) {
     EXPECT_NEAR(sections[i].major.normalized().dot(sections[i - 1].major.normalized()), std::cos(angle), 1e-9);
     const double change = (points[i].tensor - points[i - 1].tensor).norm();

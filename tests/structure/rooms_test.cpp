@@ -71,9 +71,15 @@ const std::vector<Room> rooms{
      {"scenes/photons", "scenes/lens", "scenes/stretch", "scenes/path_tracing", "scenes/description", "scenes/keys",
       "integrators/*", "renderer/*", "volumes/*"}},
 
-    {"tools/import", {"volumes/*"}},
-    {"tools", {"scenes/*", "integrators/*", "renderer/*", "volumes/*"}},
-    {"tools/benchmark", {"tools", "scenes/*", "integrators/*", "renderer/*", "volumes/*"}},
+    {"tools/command_line", {}},
+    {"tools/import/lattices", {"volumes/*"}},
+    {"tools/import/meshes", {"tools/import/lattices", "volumes/*"}},
+    {"tools/import/vtk", {"tools/import/lattices", "volumes/*"}},
+    {"tools/import", {"tools/import/lattices", "tools/import/meshes", "tools/import/vtk", "volumes/*"}},
+    {"tools/import/program", {"tools/import", "tools/import/vtk", "tools/command_line", "volumes/*"}},
+    {"tools/commands", {"tools/command_line", "scenes/*", "integrators/*", "renderer/*", "volumes/*"}},
+    {"tools", {"tools/commands", "tools/command_line"}},
+    {"tools/benchmark", {"tools/command_line", "scenes/*", "integrators/*", "renderer/*", "volumes/*"}},
 };
 
 /// Whether a room is meant by a name in `may_include`.

@@ -17,6 +17,7 @@
 #include "scenes/scene/render.h"
 #include "scenes/scene/scene.h"
 #include "tools/command_line/progress_bar.h"
+#include "tools/command_line/tell.h"
 #include "tools/commands/statistics_json.h"
 
 namespace tensorray {
@@ -55,19 +56,16 @@ void render_scene(const std::filesystem::path& scene_file, const SceneChanges& c
   const unsigned threads = run.threads > 0 ? run.threads : std::max(1u, std::thread::hardware_concurrency());
   const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, threads);
   set_image_threads(static_cast<int>(threads));
-  const auto tell = [&run](const std::string& line) {
-    if (!run.quiet) fmt::print(stderr, "{}\n", line);
-  };
 
   const SceneDescription description = read_scene(scene_file, changes);
   OutputFiles files = open_files(description, run.statistics);
 
   std::optional<ProgressBar> bar(std::in_place, progress, run.quiet);
   const Scene scene = load_scene(description, progress);
-  for (const std::string& note : scene.notes) tell(note);
+  tell(scene.notes, run.quiet);
   const Render result = render(scene, progress);
   bar.reset();  // Erased, so that what is printed next stands alone.
-  for (const std::string& warning : result.warnings) tell("warning: " + warning);
+  for (const std::string& warning : result.warnings) tell({"warning: " + warning}, run.quiet);
 
   const auto start = std::chrono::steady_clock::now();
   write_outputs(result, scene, files);

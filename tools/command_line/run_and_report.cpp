@@ -9,7 +9,6 @@
 
 #include "base/progress.h"
 #include "base/text.h"
-#include "scenes/keys/scene_source.h"
 
 namespace tensorray {
 namespace {
@@ -36,8 +35,6 @@ int run_and_report(const std::function<void()>& work) {
   } catch (const Cancelled&) {
     fmt::print(stderr, "tensorray: interrupted; nothing was written\n");
     return interrupted;
-  } catch (const SceneError& error) {
-    return report(error, wrong_input);
   } catch (const std::invalid_argument& error) {
     return report(error, wrong_input);
   } catch (const std::bad_alloc&) {
