@@ -94,10 +94,17 @@ std::optional<RayEnd> Tracer<N>::reach(const std::optional<Hit>& entry) {
   return std::nullopt;
 }
 
-/// Before the volume.
+/// Before the volume. Light from very far is rounded to a place beside the face that it meets; it goes on from the
+/// face.
 template <int N>
 std::optional<RayEnd> Tracer<N>::reach_box() {
-  return reach(geometry_.crossing(Surface::bounds, true, position(), direction()));
+  if (const auto end = reach(geometry_.crossing(Surface::bounds, true, position(), direction()))) return end;
+  constexpr double rounding = 1e-6;  // Voxels.
+  const Eigen::AlignedBox3d& box = field_.index_bounds();
+  const Eigen::Vector3d index = field_.to_index() * position();
+  if (box.squaredExteriorDistance(index) > rounding * rounding)
+    ray_.P.col(0) = field_.to_world() * index.cwiseMax(box.min()).cwiseMin(box.max());
+  return std::nullopt;
 }
 
 /// In free space behind the volume, which is convex: straight light does not meet it again.

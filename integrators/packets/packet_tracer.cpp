@@ -5,6 +5,7 @@
 
 #include <Eigen/Geometry>
 
+#include "base/box.h"
 #include "integrators/bending/runge_kutta.h"
 #include "integrators/bending/scalar_tracer.h"
 #include "integrators/packets/packet_kernel.h"
@@ -26,11 +27,7 @@ Eigen::AlignedBox3d surfaces_within(const TensorField& field, const Geometry& ge
   const Eigen::Vector3d margin = Eigen::Vector3d::Constant(surface_margin * volume.diagonal().norm());
   volume = Eigen::AlignedBox3d(volume.min() - margin, volume.max() + margin);
   const Eigen::AlignedBox3d world = geometry.absorbers_within(volume);
-  Eigen::AlignedBox3d index;
-  if (world.isEmpty()) return index;
-  for (int i = 0; i < 8; ++i)
-    index.extend(field.to_index() * world.corner(static_cast<Eigen::AlignedBox3d::CornerType>(i)));
-  return index;
+  return world.isEmpty() ? world : box_of(corners_of(world, field.to_index()));
 }
 
 /// Whether the step from one point to another is one that only the reference takes.

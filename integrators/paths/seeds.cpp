@@ -6,6 +6,7 @@
 
 #include <Eigen/Geometry>
 
+#include "base/box.h"
 #include "base/constants.h"
 #include "renderer/sampling/random.h"
 
@@ -73,8 +74,7 @@ std::vector<Eigen::Vector3d> poisson_disk_seeds(const Beam& beam, std::uint64_t 
   require_some(count);
   if (count > most_disks) throw std::invalid_argument("there are at most 10,000,000 Poisson disk seeds: use the grid");
   const double distance = disk_distance * std::sqrt(area(beam.aperture) / static_cast<double>(count));
-  Eigen::AlignedBox2d box;
-  for (const Eigen::Vector2d& corner : beam.aperture) box.extend(corner);
+  const Eigen::AlignedBox2d box = box_of(beam.aperture);
   NeighbourGrid grid(box.min(), box.sizes(), distance);
   const BeamSampler sampler(beam, BeamPattern::random, count, seed);
   Emission emission;

@@ -7,13 +7,15 @@
 #include <charconv>
 #include <cmath>
 #include <cstdint>
-#include <cstring>
 #include <fstream>
 #include <limits>
 #include <optional>
 #include <stdexcept>
 #include <string>
 
+#include "base/byte_order.h"
+#include "base/errors.h"
+#include "base/text.h"
 #include "integrators/paths/path_files.h"
 #include "integrators/paths/path_formats.h"
 
@@ -22,18 +24,8 @@ namespace {
 
 const std::string magic = "mrtrix tracks";
 
-/// Adds a number of `bytes` bytes, least byte first.
-void put_little_endian(std::uint64_t bits, int bytes, std::string& text) {
-  for (int i = 0; i < bytes; ++i) text += static_cast<char>(bits >> (8 * i) & 0xff);
-}
-
 void put(const Eigen::Vector3d& triplet, std::string& text) {
-  for (int axis = 0; axis < 3; ++axis) {
-    const auto value = static_cast<float>(triplet[axis]);
-    std::uint32_t bits;
-    std::memcpy(&bits, &value, sizeof bits);
-    put_little_endian(bits, 4, text);
-  }
+  for (const double x : triplet) append_number(static_cast<float>(x), ByteOrder::little, text);
 }
 
 std::string header_text(std::size_t count) {
@@ -47,7 +39,7 @@ std::string header_text(std::size_t count) {
 
 struct Header {
   int bytes = 0;  ///< Of a number.
-  bool little_endian = true;
+  ByteOrder order = ByteOrder::little;
   std::optional<std::uint64_t> count;  ///< Of tracks.
   std::uint64_t offset = 0;            ///< Of the first triplet.
 };
@@ -73,7 +65,7 @@ void parse_line(const std::string& line, Header& header) {
     if (value != "Float32LE" && value != "Float32BE" && value != "Float64LE" && value != "Float64BE")
       throw std::runtime_error("its datatype is not Float32LE, Float32BE, Float64LE or Float64BE");
     header.bytes = value.compare(5, 2, "32") == 0 ? 4 : 8;
-    header.little_endian = value.compare(7, 2, "LE") == 0;
+    header.order = ends_with(value, "LE") ? ByteOrder::little : ByteOrder::big;
   } else if (key == "count") {
     header.count = to_number(key, value);
   } else if (key == "file") {
@@ -109,30 +101,16 @@ Header read_header(std::ifstream& file, std::uint64_t file_size) {
   throw std::runtime_error(first ? "it is not a file of MRtrix tracks" : "its header is cut off");
 }
 
-double to_double(const char* bytes, const Header& header) {
-  std::uint64_t bits = 0;
-  for (int i = 0; i < header.bytes; ++i) {
-    const int place = header.little_endian ? i : header.bytes - 1 - i;
-    bits |= static_cast<std::uint64_t>(static_cast<unsigned char>(bytes[i])) << (8 * place);
-  }
-  if (header.bytes == 8) {
-    double value;
-    std::memcpy(&value, &bits, sizeof value);
-    return value;
-  }
-  const auto low = static_cast<std::uint32_t>(bits);
-  float value;
-  std::memcpy(&value, &low, sizeof value);
-  return value;
-}
-
 Eigen::Vector3d read_triplet(std::ifstream& file, const Header& header) {
   std::array<char, 24> bytes;
   if (!file.read(bytes.data(), 3 * header.bytes))
     throw std::runtime_error("the file is cut off: it ends before its tracks do");
   Eigen::Vector3d triplet;
-  for (int axis = 0; axis < 3; ++axis)
-    triplet[axis] = to_double(&bytes[static_cast<std::size_t>(axis * header.bytes)], header);
+  for (int axis = 0; axis < 3; ++axis) {
+    const char* const number = bytes.data() + axis * header.bytes;
+    triplet[axis] = header.bytes == 4 ? double{read_number<float>(number, header.order)}
+                                      : read_number<double>(number, header.order);
+  }
   return triplet;
 }
 
@@ -157,7 +135,7 @@ void write_tck_paths(const std::filesystem::path& path, const std::vector<Path>&
   put(Eigen::Vector3d::Constant(std::numeric_limits<double>::infinity()), track);
   file.write(track.data(), static_cast<std::streamsize>(track.size()));
   file.close();
-  if (!file) throw std::runtime_error(path.string() + ": cannot be written; check the path and the space on the disk");
+  if (!file) fail(path, "cannot be written; check the path and the space on the disk");
 }
 
 std::vector<Path> read_tck_paths(const std::filesystem::path& path) {

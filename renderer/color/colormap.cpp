@@ -141,21 +141,6 @@ void check(const RangeChoice& choice) {
 
 }  // namespace
 
-const std::vector<std::string>& colormap_names() {
-  static const std::vector<std::string> names{"viridis", "magma",     "inferno",  "plasma",
-                                              "cividis", "cool_warm", "twilight", "grey"};
-  return names;
-}
-
-Colormap colormap_of(const std::string& name) {
-  const std::vector<std::string>& names = colormap_names();
-  const auto found = std::find(names.begin(), names.end(), name);
-  if (found != names.end()) return static_cast<Colormap>(found - names.begin());
-  std::string known;
-  for (const std::string& each : names) known += (known.empty() ? "" : ", ") + each;
-  throw std::invalid_argument("there is no colormap \"" + name + "\"; the colormaps are: " + known);
-}
-
 Eigen::Vector3d colormap_srgb(Colormap map, double x) {
   x = clamped(x);
   if (map == Colormap::grey) return Eigen::Vector3d::Constant(to_srgb(grey_luminance(x)));

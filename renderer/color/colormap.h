@@ -1,8 +1,7 @@
 #pragma once
 /// @file renderer/color/colormap.h
-/// Colours for numbers: perceptually uniform maps by name, and the range of values that a map is laid over.
+/// Colours for numbers: perceptually uniform maps, and the range of values that a map is laid over.
 
-#include <string>
 #include <vector>
 
 #include <Eigen/Core>
@@ -19,12 +18,6 @@ namespace tensorray {
 /// - `twilight` (cyclic: 1 is the colour of 0, so for angles): B. Bechtold 2017, CC0, as in matplotlib.
 /// - `grey`: CIE lightness L* = 100 x.
 enum class Colormap { viridis, magma, inferno, plasma, cividis, cool_warm, twilight, grey };
-
-/// The names, in the order of the enumeration.
-const std::vector<std::string>& colormap_names();
-
-/// @throw std::invalid_argument listing the names if unknown.
-Colormap colormap_of(const std::string& name);
 
 /// The colour at x, from 0 to 1, as sRGB values from 0 to 1. Smooth (a cubic spline through the control points), within
 /// 1.5/255 of the published tables; of those that have corners within 2.5/255 (`twilight`) and 3.5/255 (`cividis`). x

@@ -7,6 +7,7 @@
 #include <stdexcept>
 
 #include "base/errors.h"
+#include "base/text.h"
 #include "renderer/color/cie_tables.h"
 
 namespace tensorray {
@@ -165,9 +166,7 @@ Spectrum illuminant(const std::string& name) {
     // The CIE defines A with the constant and the temperature of its time.
     return tabulate([](double wavelength) { return 100 * planck(wavelength, 1.435e7 / 2848); });
   }
-  std::string known;
-  for (const std::string& each : illuminant_names()) known += (known.empty() ? "" : ", ") + each;
-  throw std::invalid_argument("unknown illuminant \"" + name + "\"; known: " + known);
+  throw std::invalid_argument("unknown illuminant \"" + name + "\"; known: " + joined(illuminant_names()));
 }
 
 Spectrum blackbody(double kelvin) {

@@ -1,7 +1,6 @@
 #include "renderer/images/image.h"
 
 #include <algorithm>
-#include <cctype>
 #include <cerrno>
 #include <cmath>
 #include <cstdint>
@@ -33,15 +32,12 @@ struct Format {
 };
 
 Format find_format(const std::filesystem::path& path) {
-  std::string ending = path.extension().string();
-  std::transform(ending.begin(), ending.end(), ending.begin(), [](unsigned char c) { return std::tolower(c); });
+  const std::string ending = lower_case_ending(path);
   if (ending == ".exr") return {"openexr", OIIO::TypeDesc::FLOAT, false, true, true};
   if (ending == ".png") return {"png", OIIO::TypeDesc::UINT16, true, true, true};
   if (ending == ".jpg" || ending == ".jpeg") return {"jpeg", OIIO::TypeDesc::UINT8, true, false, false};
   if (ending == ".tif" || ending == ".tiff") return {"tiff", OIIO::TypeDesc::UINT16, true, true, false};
-  std::string known;
-  for (const std::string& each : image_endings()) known += (known.empty() ? "" : ", ") + each;
-  throw std::runtime_error("unknown picture ending \"" + ending + "\"; known: " + known);
+  throw std::runtime_error("unknown picture ending \"" + ending + "\"; known: " + joined(image_endings()));
 }
 
 void check_size(const Image& image) {

@@ -5,6 +5,7 @@
 #include <limits>
 #include <stdexcept>
 
+#include "base/box.h"
 #include "renderer/sampling/random.h"
 #include "renderer/surfaces/plate.h"
 
@@ -76,8 +77,7 @@ Beam silhouette_beam(const std::vector<Eigen::Vector3d>& points, const Eigen::Ve
 BeamSampler::BeamSampler(const Beam& beam, BeamPattern pattern, std::uint64_t count, std::uint64_t seed)
     : beam_(beam), pattern_(pattern), seed_(seed) {
   if (count < 1) throw std::invalid_argument("a beam needs at least one photon");
-  Eigen::AlignedBox2d box;
-  for (const Eigen::Vector2d& p : beam.aperture) box.extend(p);
+  const Eigen::AlignedBox2d box = box_of(beam.aperture);
   corner_ = box.min();
   extent_ = box.sizes();
   const double rectangle = extent_.prod();

@@ -68,9 +68,6 @@ bool is_background(const Light& light) {
   return !std::holds_alternative<AreaLight>(light);
 }
 
-/// Of the side that `cosine` (of the direction to the viewer with the normal) sees.
-bool shines(const AreaLight& light, double cosine) { return cosine > 0 || (light.two_sided && cosine < 0); }
-
 void add(double factor, const std::vector<float>& values, std::vector<float>& sum) {
   for (std::size_t i = 0; i < sum.size(); ++i) sum[i] += static_cast<float>(factor) * values[i];
 }
@@ -107,7 +104,7 @@ LightSampler::Prepared LightSampler::prepare(Light& light, const std::vector<flo
   if (auto* area = std::get_if<AreaLight>(&light)) {
     require_bands(area->radiance, bands_, "radiance");
     result.triangles = triangles_by_area(area->mesh);
-    result.power = pi * result.triangles->sum() * dot(area->radiance, importance) * (area->two_sided ? 2 : 1);
+    result.power = pi * result.triangles->sum() * dot(area->radiance, importance);
   } else if (auto* directional = std::get_if<DirectionalLight>(&light)) {
     require_bands(directional->irradiance, bands_, "irradiance");
     require(directional->direction.allFinite() && directional->direction.stableNorm() > 0,
@@ -173,14 +170,14 @@ double LightSampler::area_pdf(int light, const Vector3d& point, const Vector3d& 
                               const Vector3d& normal) const {
   const Vector3d way = point - position;
   const double distance = way.norm(), cosine = normal.dot(way) / distance;
-  if (!shines(std::get<AreaLight>(lights_[light]), cosine)) return 0;
+  if (!(cosine > 0)) return 0;  // The dark side.
   const double area = prepared_[light].triangles->sum();
-  return choice_->probability(light) * distance * distance / (std::abs(cosine) * area);
+  return choice_->probability(light) * distance * distance / (cosine * area);
 }
 
 const std::vector<float>* LightSampler::emitted(int light, const Vector3d& normal, const Vector3d& direction) const {
   const auto& area = std::get<AreaLight>(lights_[light]);
-  return shines(area, -normal.dot(direction)) ? &area.radiance : nullptr;
+  return normal.dot(direction) < 0 ? &area.radiance : nullptr;
 }
 
 void LightSampler::background(const Vector3d& direction, std::vector<float>& radiance) const {

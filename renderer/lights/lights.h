@@ -9,7 +9,7 @@
 
 #include <Eigen/Geometry>
 
-#include "renderer/surfaces/mesh.h"
+#include "base/triangle_mesh.h"
 #include "renderer/textures/environment_map.h"
 
 namespace tensorray {
@@ -18,7 +18,6 @@ namespace tensorray {
 struct AreaLight {
   TriangleMesh mesh;            ///< World; shines from the side on which its triangles are counter-clockwise.
   std::vector<float> radiance;  ///< Of every band.
-  bool two_sided = false;       ///< Whether the other side shines as well.
 };
 
 /// Parallel light, or that of a disk in the sky such as the sun.

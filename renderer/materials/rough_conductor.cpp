@@ -4,6 +4,8 @@
 #include <iterator>
 #include <stdexcept>
 
+#include "base/text.h"
+
 namespace tensorray {
 namespace {
 
@@ -72,18 +74,12 @@ double single_bounce_share(const ConductorScattering& metal, const Eigen::Vector
 
 }  // namespace
 
-std::vector<std::string> metal_names() {
-  std::vector<std::string> names;
-  for (const Metal& metal : metals()) names.emplace_back(metal.name);
-  return names;
-}
-
 ConductorIndex metal_index(const std::string& name, const std::vector<double>& wavelengths) {
   const auto metal = std::find_if(metals().begin(), metals().end(), [&](const Metal& m) { return name == m.name; });
   if (metal == metals().end()) {
-    std::string known;
-    for (const std::string& other : metal_names()) known += (known.empty() ? "" : ", ") + other;
-    throw std::invalid_argument("there is no metal \"" + name + "\"; known are: " + known);
+    std::vector<std::string> known;
+    for (const Metal& each : metals()) known.emplace_back(each.name);
+    throw std::invalid_argument("there is no metal \"" + name + "\"; known are: " + joined(known));
   }
   const auto bands = static_cast<Eigen::Index>(wavelengths.size());
   ConductorIndex index{BandValues(bands), BandValues(bands)};

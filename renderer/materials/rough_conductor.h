@@ -16,9 +16,6 @@ struct ConductorIndex {
   BandValues k;  ///< >= 0
 };
 
-/// The names that `metal_index` knows: "gold", "silver", "copper", "aluminium".
-std::vector<std::string> metal_names();
-
 /// Gold, silver and copper are of Johnson and Christy 1972 ("Optical constants of the noble metals", 342.5 to 892 nm),
 /// aluminium of Rakić 1995 ("Algorithm for the determination of intrinsic optical constants of metal films", 326 to
 /// 886 nm): the published values, linear between them; beyond them, the last value.

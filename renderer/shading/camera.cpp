@@ -147,13 +147,6 @@ Camera frame_points(const std::vector<Vector3d>& points, const Framing& framing)
   return camera;
 }
 
-Camera frame_box(const Eigen::AlignedBox3d& box, const Framing& framing) {
-  require(!box.isEmpty(), "the camera needs something to look at, and its box is empty: give a camera");
-  std::vector<Vector3d> corners;
-  for (int i = 0; i < 8; ++i) corners.push_back(box.corner(static_cast<Eigen::AlignedBox3d::CornerType>(i)));
-  return frame_points(corners, framing);
-}
-
 /// A ray through the lens' centre (or, of an orthographic camera, parallel to its axis) meets the plane of focus; the
 /// lens sends all rays of the pixel there. Without a lens the plane of focus makes no difference.
 CameraRay camera_ray(const Camera& camera, const Vector2d& pixel, const Vector2d& lens) {
@@ -165,18 +158,9 @@ CameraRay camera_ray(const Camera& camera, const Vector2d& pixel, const Vector2d
   CameraRay ray;
   ray.origin = camera.position + camera.lens_radius * (lens.x() * camera.right + lens.y() * camera.up);
   Vector3d towards = camera.forward;  // At distance 1 of the plane of focus.
-  Eigen::Matrix<double, 3, 2> towards_change = Eigen::Matrix<double, 3, 2>::Zero();
-  if (camera.projection == Projection::perspective) {
-    towards += across * window;
-    towards_change = across;
-  } else {
-    ray.origin += across * window;
-    ray.origin_change = across;
-  }
+  (camera.projection == Projection::perspective ? towards : ray.origin) += across * window;
   towards -= camera.lens_radius / camera.focus_distance * (lens.x() * camera.right + lens.y() * camera.up);
-  const double length = towards.norm();
-  ray.direction = towards / length;
-  ray.direction_change = (towards_change - ray.direction * (ray.direction.transpose() * towards_change)) / length;
+  ray.direction = towards / towards.norm();
   return ray;
 }
 

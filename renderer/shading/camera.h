@@ -28,12 +28,9 @@ struct Camera {
   Eigen::Vector2i resolution{512, 512};  ///< Pixels.
 };
 
-/// A ray, and how it changes from one pixel to the next (Igehy 1999, "Tracing Ray Differentials"): columns for x and y.
 struct CameraRay {
   Eigen::Vector3d origin = Eigen::Vector3d::Zero();
-  Eigen::Vector3d direction = Eigen::Vector3d::UnitY();                                ///< Unit.
-  Eigen::Matrix<double, 3, 2> origin_change = Eigen::Matrix<double, 3, 2>::Zero();     ///< World units per pixel.
-  Eigen::Matrix<double, 3, 2> direction_change = Eigen::Matrix<double, 3, 2>::Zero();  ///< Radians per pixel.
+  Eigen::Vector3d direction = Eigen::Vector3d::UnitY();  ///< Unit.
 };
 
 /// Looks from `position` at `target`, where it is focused; `up` (world +z if it is zero or along the view) is upwards
@@ -61,9 +58,6 @@ struct Framing {
 /// their depth; it has no lens. A single point is seen as a thing of size 1 would be.
 /// @throw std::invalid_argument if there are no points, one is not finite, or a setting is out of range.
 Camera frame_points(const std::vector<Eigen::Vector3d>& points, const Framing& framing);
-
-/// The same for the corners of a box. @throw std::invalid_argument also if the box is empty.
-Camera frame_box(const Eigen::AlignedBox3d& box, const Framing& framing);
 
 /// The ray that sees `pixel`. @param lens  In the unit disk: where it passes through the lens. Any thread may call it.
 CameraRay camera_ray(const Camera& camera, const Eigen::Vector2d& pixel, const Eigen::Vector2d& lens);

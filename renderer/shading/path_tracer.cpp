@@ -97,7 +97,6 @@ SurfacePicture Rendering::run() {
     pass(more);
     samples += more;
     if (samples == settings_.max_samples || finish_pixels()) break;
-    if (callbacks_.after_pass) callbacks_.after_pass(picture_, samples);
   }
   return std::move(picture_);
 }

@@ -47,13 +47,11 @@ struct SurfacePicture {
   std::vector<float> variance;  ///< Of the pixel's luminance: its squared standard error, had samples been independent.
 };
 
-/// What a caller wants to know meanwhile; both are called from the thread that called `render_surfaces`, may be empty,
-/// and may throw, which ends the work and is passed on.
+/// What a caller wants to know meanwhile.
 struct RenderCallbacks {
-  /// Now and then. `total` is the number of samples if no pixel stops early.
+  /// Called now and then from the thread that called `render_surfaces`. `total` is the number of samples if no pixel
+  /// stops early. May be empty, and may throw, which ends the work and is passed on.
   std::function<void(std::uint64_t done, std::uint64_t total)> progress;
-  /// After each pass but the last, with the picture so far.
-  std::function<void(const SurfacePicture& picture, int samples)> after_pass;
 };
 
 /// Runs on all threads; every byte of the result is the same on any number of them.

@@ -9,6 +9,7 @@
 #include <embree3/rtcore.h>
 #endif
 
+#include <cmath>
 #include <memory>
 #include <stdexcept>
 #include <string>
@@ -16,7 +17,18 @@
 
 namespace tensorray::embree {
 
+/// Whether Embree can compute with a coordinate: its square is a number in single precision. Not a number is not.
+inline bool fits(float x) { return std::abs(x) <= 1e18f; }
+
+/// Whether Embree can follow the ray: it ends the process on one that has a value that is no number or too large.
+inline bool is_valid(const RTCRay& ray) {
+  return fits(ray.org_x) && fits(ray.org_y) && fits(ray.org_z) && fits(ray.dir_x) && fits(ray.dir_y) &&
+         fits(ray.dir_z) && !std::isnan(ray.tfar);
+}
+
+/// Leaves a ray that is not valid as it is: it meets nothing.
 inline void intersect(RTCScene scene, RTCRayHit& ray) {
+  if (!is_valid(ray.ray)) return;
 #if RTC_VERSION_MAJOR >= 4
   rtcIntersect1(scene, &ray, nullptr);
 #else
@@ -26,8 +38,9 @@ inline void intersect(RTCScene scene, RTCRayHit& ray) {
 #endif
 }
 
-/// Sets tfar to −infinity if there is anything on the way.
+/// Sets tfar to −infinity if there is anything on the way. There is nothing on the way of a ray that is not valid.
 inline void occluded(RTCScene scene, RTCRay& ray) {
+  if (!is_valid(ray)) return;
 #if RTC_VERSION_MAJOR >= 4
   rtcOccluded1(scene, &ray, nullptr);
 #else

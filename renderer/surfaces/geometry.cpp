@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <stdexcept>
+#include <string>
 #include <utility>
 
 #include "renderer/surfaces/triangle_scene.h"
@@ -48,6 +50,7 @@ struct Geometry::State {
   // Scenes relative to the volume, so that their single precision is spent on it.
   Group bounds, cut, absorbers;
 
+  void require_within_reach(const TriangleMesh& mesh, const std::string& name) const;
   std::vector<Part> cut_parts() const;
   std::vector<Part> absorber_parts() const;
 
@@ -66,15 +69,30 @@ Geometry::State::State(Surfaces parts)
       cut(cut_parts(), volume.center(), size),
       absorbers(absorber_parts(), volume.center(), size) {}
 
+void Geometry::State::require_within_reach(const TriangleMesh& mesh, const std::string& name) const {
+  const double reach = TriangleScene::reach * size;
+  for (const Eigen::Vector3d& vertex : mesh.vertices)
+    if (!((vertex - volume.center()).array().abs() <= reach).all())
+      throw std::invalid_argument(name + " is more than 1e12 times the volume's size away from the volume, which is " +
+                                  "beyond single precision; move it nearer, or check its units");
+}
+
 std::vector<Part> Geometry::State::cut_parts() const {
   if (!surfaces.cut) return {};
+  require_within_reach(*surfaces.cut, "the mesh that cuts the volume");
   return {{&*surfaces.cut, Surface::cut}};
 }
 
 std::vector<Part> Geometry::State::absorber_parts() const {
   std::vector<Part> parts;
-  if (surfaces.plate) parts.push_back({&plate, Surface::plate});
-  for (const TriangleMesh& mesh : surfaces.obstacles) parts.push_back({&mesh, Surface::obstacle});
+  if (surfaces.plate) {
+    require_within_reach(plate, "the receiver");
+    parts.push_back({&plate, Surface::plate});
+  }
+  for (std::size_t i = 0; i < surfaces.obstacles.size(); ++i) {
+    require_within_reach(surfaces.obstacles[i], "obstacle " + std::to_string(i));
+    parts.push_back({&surfaces.obstacles[i], Surface::obstacle});
+  }
   return parts;
 }
 
@@ -143,7 +161,9 @@ std::optional<Hit> Geometry::crossing(Surface surface, bool inwards, const Eigen
       hit->distance = std::max(hit->distance, 0.0);
       return hit;
     }
-    from = std::max(hit->distance, from) + state_->margin;
+    const double next = std::max(hit->distance, from) + state_->margin;
+    if (!(next > from)) break;  // So far away that double precision does not resolve the margin.
+    from = next;
   }
   return std::nullopt;
 }

@@ -10,7 +10,7 @@
 
 #include <Eigen/Geometry>
 
-#include "renderer/surfaces/mesh.h"
+#include "base/triangle_mesh.h"
 #include "renderer/surfaces/plate.h"
 
 namespace tensorray {
@@ -39,11 +39,14 @@ struct Surfaces {
 /// An immutable Embree scene. Any number of threads may query it at once.
 ///
 /// Embree finds the triangle in single precision; the distance is then that to the triangle's plane in double
-/// precision. A surface behind the origin by less than about 1e-6 of the volume's size counts as hit at 0: light that
+/// precision. Light may start anywhere: what cannot be found in double precision either, from very far, is not met. A
+/// surface behind the origin by less than about 1e-6 of the volume's size counts as hit at 0: light that
 /// starts on a plate, or leaves the volume through one, meets it.
 class Geometry {
  public:
-  /// @throw std::runtime_error if Embree fails (out of memory, unsupported processor).
+  /// @throw std::invalid_argument naming the surface if it is not finite, or too far from the volume for single
+  /// precision (1e12 times the volume's size); std::runtime_error if Embree fails (out of memory, unsupported
+  /// processor).
   explicit Geometry(Surfaces surfaces);
   ~Geometry();
   Geometry(Geometry&&) noexcept;

@@ -1,7 +1,6 @@
 #include "renderer/surfaces/mesh.h"
 
 #include <algorithm>
-#include <cctype>
 #include <cmath>
 #include <functional>
 #include <iterator>
@@ -102,12 +101,6 @@ TriangleMesh import(const std::filesystem::path& path) {
   return mesh;
 }
 
-bool is_ply(const std::filesystem::path& path) {
-  std::string ending = path.extension().string();
-  std::transform(ending.begin(), ending.end(), ending.begin(), [](unsigned char c) { return std::tolower(c); });
-  return ending == ".ply";
-}
-
 /// Edges along which more triangles run one way than the other, each counted as often as triangles are missing.
 std::size_t open_edges(const TriangleMesh& mesh) {
   using Edge = std::pair<std::uint32_t, std::uint32_t>;
@@ -142,18 +135,13 @@ void turn_round(TriangleMesh& mesh) {
 
 }  // namespace
 
-Eigen::AlignedBox3d TriangleMesh::bounds() const {
-  Eigen::AlignedBox3d box;
-  for (const Eigen::Vector3d& vertex : vertices) box.extend(vertex);
-  return box;
-}
-
 TriangleMesh read_mesh(const std::filesystem::path& path) {
   require_readable(path);
   try {
-    const TriangleMesh raw = is_ply(path) ? read_ply(path) : import(path);
+    const TriangleMesh raw = lower_case_ending(path) == ".ply" ? read_ply(path) : import(path);
     for (std::size_t i = 0; i < raw.vertices.size(); ++i)
-      if (!raw.vertices[i].allFinite()) throw std::runtime_error("vertex " + std::to_string(i) + " is not finite");
+      if (!raw.vertices[i].cast<float>().allFinite())
+        throw std::runtime_error("vertex " + std::to_string(i) + " is not finite in single precision");
     TriangleMesh mesh = joined(raw);
     if (mesh.triangles.empty()) throw std::runtime_error("it holds no triangles");
     return mesh;
@@ -164,8 +152,7 @@ TriangleMesh read_mesh(const std::filesystem::path& path) {
 
 TriangleMesh box_mesh(const Eigen::AlignedBox3d& box, const Eigen::Affine3d& transform) {
   TriangleMesh mesh;
-  for (int i = 0; i < 8; ++i)  // Bit k of i: at the maximum of axis k.
-    mesh.vertices.push_back(transform * box.corner(static_cast<Eigen::AlignedBox3d::CornerType>(i)));
+  mesh.vertices = corners_of(box, transform);
   mesh.triangles = {{0, 2, 1}, {1, 2, 3}, {4, 5, 6}, {5, 7, 6}, {0, 1, 4}, {1, 5, 4},
                     {2, 6, 3}, {3, 6, 7}, {0, 4, 2}, {2, 4, 6}, {1, 3, 5}, {3, 7, 5}};
   if (transform.linear().determinant() < 0) turn_round(mesh);

@@ -2,26 +2,18 @@
 /// @file renderer/surfaces/mesh.h
 /// Triangle meshes and their files (.ply, .obj and what else assimp reads).
 
-#include <array>
-#include <cstdint>
 #include <filesystem>
-#include <vector>
 
 #include <Eigen/Geometry>
 
+#include "base/triangle_mesh.h"
+
 namespace tensorray {
-
-/// Triangles in world space; counter-clockwise from outside.
-struct TriangleMesh {
-  std::vector<Eigen::Vector3d> vertices;
-  std::vector<std::array<std::uint32_t, 3>> triangles;
-
-  Eigen::AlignedBox3d bounds() const;
-};
 
 /// Reads all meshes of a file as one, polygons triangulated, vertices at equal positions joined (and unused ones
 /// dropped), triangles of zero area dropped. Positions have the file's precision in .ply, and single precision else.
-/// @throw std::runtime_error naming the file and the reason: missing, unreadable, no triangles, a vertex not finite.
+/// @throw std::runtime_error naming the file and the reason: missing, unreadable, no triangles, a vertex that is not
+/// finite in single precision.
 TriangleMesh read_mesh(const std::filesystem::path& path);
 
 /// The parallelepiped that `transform` makes of the box: twelve triangles that look outwards.

@@ -2,31 +2,18 @@
 /// @file renderer/surfaces/mesh_files.h
 /// Writes triangle meshes with what their vertices carry; mesh.h reads them.
 
-#include <array>
-#include <cstdint>
 #include <filesystem>
-#include <string>
-#include <vector>
 
-#include <Eigen/Core>
-
-#include "renderer/surfaces/mesh.h"
+#include "base/ply_writer.h"
+#include "base/triangle_mesh.h"
 
 namespace tensorray {
 
-/// What the vertices of a mesh carry besides their positions; null: nothing. One entry a vertex.
-struct VertexAttributes {
-  const std::vector<Eigen::Vector3f>* normals = nullptr;             ///< Unit.
-  const std::vector<std::array<std::uint8_t, 3>>* colors = nullptr;  ///< RGB, as displayed (sRGB).
-  const std::vector<float>* values = nullptr;                        ///< Kept by .ply alone.
-  std::string value_name = "value";                                  ///< In .ply; one word.
-};
-
 /// Writes a mesh as the ending of `path` says, in place, in pieces: memory does not grow with the mesh.
-/// - `.ply`: binary, little-endian; x y z, nx ny nz, the value as float, red green blue as uchar; faces.
+/// - `.ply`: as base/ply_writer.h.
 /// - `.obj`: text; "v x y z" (with "r g b" from 0 to 1, which most programs read), "vn", "f a//a".
 /// Positions are in single precision in both, in the fewest digits that keep it (seven to nine); colours and normals
-/// are in .obj as exact as they can be seen: three and four decimals.
+/// are in .obj as exact as they can be seen: three and four decimals. Values are kept by .ply alone.
 /// @throw std::invalid_argument on another ending, attributes of another number than the vertices, a vertex that is not
 /// finite in single precision, a name of several words; std::runtime_error naming the file if it cannot be written
 /// (also when the disk is full).

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <charconv>
 #include <cmath>
-#include <cstring>
+#include <cstdint>
 #include <fstream>
 #include <iterator>
 #include <map>
@@ -11,16 +11,24 @@
 #include <stdexcept>
 #include <string>
 
+#include "base/byte_order.h"
+
 namespace tensorray {
 namespace {
 
 enum class Encoding { ascii, little_endian, big_endian };
 
-/// How a number is stored: signed or unsigned integer, or floating point.
+/// How a number is stored.
 struct NumberType {
-  enum Kind { integer, natural, real } kind = integer;
   int bytes = 0;
+  double (*decoded)(const char* bytes, ByteOrder order) = nullptr;
 };
+
+template <class Number>
+NumberType stored_as() {
+  return {sizeof(Number),
+          [](const char* bytes, ByteOrder order) { return static_cast<double>(read_number<Number>(bytes, order)); }};
+}
 
 struct Property {
   std::string name;
@@ -43,12 +51,14 @@ struct Header {
 
 NumberType find_type(const std::string& name) {
   static const std::map<std::string, NumberType> types{
-      {"char", {NumberType::integer, 1}},   {"int8", {NumberType::integer, 1}},   {"uchar", {NumberType::natural, 1}},
-      {"uint8", {NumberType::natural, 1}},  {"short", {NumberType::integer, 2}},  {"int16", {NumberType::integer, 2}},
-      {"ushort", {NumberType::natural, 2}}, {"uint16", {NumberType::natural, 2}}, {"int", {NumberType::integer, 4}},
-      {"int32", {NumberType::integer, 4}},  {"uint", {NumberType::natural, 4}},   {"uint32", {NumberType::natural, 4}},
-      {"float", {NumberType::real, 4}},     {"float32", {NumberType::real, 4}},   {"double", {NumberType::real, 8}},
-      {"float64", {NumberType::real, 8}}};
+      {"char", stored_as<std::int8_t>()},     {"int8", stored_as<std::int8_t>()},
+      {"uchar", stored_as<std::uint8_t>()},   {"uint8", stored_as<std::uint8_t>()},
+      {"short", stored_as<std::int16_t>()},   {"int16", stored_as<std::int16_t>()},
+      {"ushort", stored_as<std::uint16_t>()}, {"uint16", stored_as<std::uint16_t>()},
+      {"int", stored_as<std::int32_t>()},     {"int32", stored_as<std::int32_t>()},
+      {"uint", stored_as<std::uint32_t>()},   {"uint32", stored_as<std::uint32_t>()},
+      {"float", stored_as<float>()},          {"float32", stored_as<float>()},
+      {"double", stored_as<double>()},        {"float64", stored_as<double>()}};
   const auto found = types.find(name);
   if (found == types.end()) throw std::runtime_error("unknown type \"" + name + "\" in its header");
   return found->second;
@@ -135,30 +145,9 @@ class Numbers {
 
   double next_binary(const NumberType& type) {
     if (end_ - position_ < type.bytes) throw_cut_off();
-    std::uint64_t bits = 0;
-    for (int i = 0; i < type.bytes; ++i) {
-      const int place = encoding_ == Encoding::little_endian ? i : type.bytes - 1 - i;
-      bits |= static_cast<std::uint64_t>(static_cast<unsigned char>(position_[i])) << (8 * place);
-    }
+    const ByteOrder order = encoding_ == Encoding::little_endian ? ByteOrder::little : ByteOrder::big;
+    const double value = type.decoded(position_, order);
     position_ += type.bytes;
-    return decode(bits, type);
-  }
-
-  static double decode(std::uint64_t bits, const NumberType& type) {
-    if (type.kind == NumberType::natural) return static_cast<double>(bits);
-    if (type.kind == NumberType::integer) {
-      const double range = std::ldexp(1, 8 * type.bytes), value = static_cast<double>(bits);
-      return value < range / 2 ? value : value - range;
-    }
-    if (type.bytes == 8) return reinterpret<double>(bits);
-    return reinterpret<float>(static_cast<std::uint32_t>(bits));
-  }
-
-  template <class Real, class Bits>
-  static Real reinterpret(Bits bits) {
-    static_assert(sizeof(Real) == sizeof(Bits));
-    Real value;
-    std::memcpy(&value, &bits, sizeof(value));
     return value;
   }
 

@@ -4,7 +4,7 @@
 
 #include <filesystem>
 
-#include "renderer/surfaces/mesh.h"
+#include "base/triangle_mesh.h"
 
 namespace tensorray {
 

@@ -30,9 +30,11 @@ bool ascends_to(const std::vector<std::uint32_t>& ends, std::size_t last) {
   return std::is_sorted(ends.begin(), ends.end()) && (ends.empty() ? 0 : ends.back()) == last;
 }
 
+/// In single precision.
 template <class Values>
 bool all_finite(const Values& values) {
-  return std::all_of(values.begin(), values.end(), [](const auto& value) { return value.allFinite(); });
+  const auto is_finite = [](const auto& value) { return value.template cast<float>().allFinite(); };
+  return std::all_of(values.begin(), values.end(), is_finite);
 }
 
 bool all_finite(const std::vector<float>& values) {
@@ -40,7 +42,7 @@ bool all_finite(const std::vector<float>& values) {
 }
 
 void require_shape(const ShadedSurface& surface, const TriangleMesh& mesh) {
-  require(all_finite(mesh.vertices), "a vertex is not finite");
+  require(all_finite(mesh.vertices), "a vertex is not finite in single precision");
   for (const auto& triangle : mesh.triangles)
     for (const std::uint32_t corner : triangle)
       require(corner < mesh.vertices.size(), "a triangle has a corner that is none of the vertices");
@@ -49,7 +51,7 @@ void require_shape(const ShadedSurface& surface, const TriangleMesh& mesh) {
 }
 
 void require_shape(const ShadedSurface& surface, const RoundCurves& curves) {
-  require(all_finite(curves.points), "a point is not finite");
+  require(all_finite(curves.points), "a point is not finite in single precision");
   require(curves.radii.size() == curves.points.size(), "there must be one radius for each point");
   require(std::all_of(curves.radii.begin(), curves.radii.end(), [](float r) { return r >= 0 && std::isfinite(r); }),
           "a radius is not a finite value >= 0");

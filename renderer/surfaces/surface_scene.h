@@ -44,14 +44,15 @@ struct SurfaceData {
 class SurfaceScene {
  public:
   /// @throw std::invalid_argument naming the surface by its index and what is wrong: an index of a vertex or a count
-  /// out of range, a value that is not finite. std::runtime_error if Embree fails (out of memory, unsupported
-  /// processor).
+  /// out of range, a value that is not finite in single precision. std::runtime_error if Embree fails (out of memory,
+  /// unsupported processor).
   explicit SurfaceScene(std::vector<ShadedSurface> surfaces);
   ~SurfaceScene();
   SurfaceScene(SurfaceScene&&) noexcept;
   SurfaceScene& operator=(SurfaceScene&&) noexcept;
 
-  /// The nearest surface along the unit `direction`, from either side.
+  /// The nearest surface along the unit `direction`, from either side. Rays may start anywhere: from so far away that
+  /// double precision does not resolve the scene, and where a value is not finite, there is none.
   std::optional<SurfaceHit> intersect(const Eigen::Vector3d& origin, const Eigen::Vector3d& direction) const;
 
   /// Whether something is nearer than `distance` along the unit `direction`. What is within 5e-5 of the distance of its

@@ -1,6 +1,7 @@
 #include "renderer/surfaces/triangle_scene.h"
 
 #include <algorithm>
+#include <limits>
 #include <tuple>
 
 #include "renderer/surfaces/embree_handles.h"
@@ -25,11 +26,29 @@ bool add_candidate(RTCPointQueryFunctionArguments* arguments) {
   return false;  // The radius stays as it is.
 }
 
+/// Where a line enters the box; nothing if it does not meet the box.
+std::optional<double> entry(const Eigen::AlignedBox3d& box, const Eigen::Vector3d& from,
+                            const Eigen::Vector3d& direction) {
+  double first = -std::numeric_limits<double>::infinity(), last = std::numeric_limits<double>::infinity();
+  for (int axis = 0; axis < 3; ++axis) {
+    const double low = box.min()[axis] - from[axis], high = box.max()[axis] - from[axis];
+    if (direction[axis] == 0) {
+      if (!(low <= 0 && high >= 0)) return std::nullopt;
+      continue;
+    }
+    first = std::max(first, std::min(low / direction[axis], high / direction[axis]));
+    last = std::min(last, std::max(low / direction[axis], high / direction[axis]));
+  }
+  if (!(first <= last)) return std::nullopt;
+  return first;
+}
+
 }  // namespace
 
 struct TriangleScene::State {
   Eigen::Vector3d origin;
   double unit;
+  Eigen::AlignedBox3d box;  // Of the triangles, with a margin for single precision; empty where they are planar.
   Owned<RTCDevice> device;
   Owned<RTCScene> scene;  // Null if there are no triangles.
 
@@ -45,11 +64,26 @@ struct TriangleScene::State {
     check(device.get());
   }
 
+  void enclose(const std::vector<const TriangleMesh*>& meshes);
+
   float local(double coordinate, int axis) const { return static_cast<float>((coordinate - origin[axis]) / unit); }
 
+  bool is_far(const Eigen::Vector3d& point) const;
   RTCRayHit ray(const Eigen::Vector3d& from, const Eigen::Vector3d& direction, double min_distance,
                 double max_distance) const;
 };
+
+void TriangleScene::State::enclose(const std::vector<const TriangleMesh*>& meshes) {
+  for (const TriangleMesh* mesh : meshes) box.extend(mesh->bounds());
+  const Eigen::Vector3d margin = Eigen::Vector3d::Constant(unit + 1e-6 * (box.max() - box.min()).maxCoeff());
+  box = {box.min() - margin, box.max() + margin};
+}
+
+/// Whether single precision no longer resolves the triangles from here. Not a number is far.
+bool TriangleScene::State::is_far(const Eigen::Vector3d& point) const {
+  constexpr double near = 16;  // Units.
+  return !((point - origin).array().abs() <= near * unit).all();
+}
 
 void TriangleScene::State::start(RTCBuildQuality quality) {
   device = embree::make_device();
@@ -98,9 +132,10 @@ RTCRayHit TriangleScene::State::ray(const Eigen::Vector3d& from, const Eigen::Ve
 }
 
 TriangleScene::TriangleScene(const std::vector<const TriangleMesh*>& meshes, const Eigen::Vector3d& origin, double unit)
-    : state_(new State{origin, unit, nullptr, nullptr}) {
+    : state_(new State{origin, unit, {}, nullptr, nullptr}) {
   const auto has_triangles = [](const TriangleMesh* mesh) { return !mesh->triangles.empty(); };
   if (std::none_of(meshes.begin(), meshes.end(), has_triangles)) return;
+  state_->enclose(meshes);
   state_->start(RTC_BUILD_QUALITY_HIGH);
   for (std::size_t i = 0; i < meshes.size(); ++i)
     if (has_triangles(meshes[i])) state_->attach(static_cast<unsigned>(i), meshes[i]->vertices, meshes[i]->triangles);
@@ -110,7 +145,7 @@ TriangleScene::TriangleScene(const std::vector<const TriangleMesh*>& meshes, con
 TriangleScene::TriangleScene(const std::vector<Eigen::Vector2d>& vertices,
                              const std::vector<std::array<std::uint32_t, 3>>& triangles, const Eigen::Vector2d& origin,
                              double unit)
-    : state_(new State{{origin.x(), origin.y(), 0}, unit, nullptr, nullptr}) {
+    : state_(new State{{origin.x(), origin.y(), 0}, unit, {}, nullptr, nullptr}) {
   if (triangles.empty()) return;
   state_->start(RTC_BUILD_QUALITY_MEDIUM);
   state_->attach(0, vertices, triangles);
@@ -126,6 +161,11 @@ bool TriangleScene::empty() const { return !state_->scene; }
 std::optional<TriangleHit> TriangleScene::nearest(const Eigen::Vector3d& from, const Eigen::Vector3d& direction,
                                                   double min_distance, double max_distance) const {
   if (empty()) return std::nullopt;
+  if (state_->is_far(from + min_distance * direction)) {
+    const auto way = entry(state_->box, from, direction);
+    if (!way || *way > max_distance) return std::nullopt;
+    min_distance = std::max(min_distance, *way);
+  }
   RTCRayHit ray = state_->ray(from, direction, min_distance, max_distance);
   embree::intersect(state_->scene.get(), ray);
   if (ray.hit.geomID == RTC_INVALID_GEOMETRY_ID) return std::nullopt;
@@ -139,6 +179,7 @@ void TriangleScene::near(const Eigen::Vector3d& point, double radius, std::vecto
   query.x = state_->local(point.x(), 0);
   query.y = state_->local(point.y(), 1);
   query.z = state_->local(point.z(), 2);
+  if (!embree::fits(query.x) || !embree::fits(query.y) || !embree::fits(query.z)) return;
   query.radius = static_cast<float>(radius / state_->unit);
   RTCPointQueryContext context;
   rtcInitPointQueryContext(&context);

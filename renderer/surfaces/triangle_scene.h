@@ -10,7 +10,7 @@
 
 #include <Eigen/Core>
 
-#include "renderer/surfaces/mesh.h"
+#include "base/triangle_mesh.h"
 
 namespace tensorray {
 
@@ -26,8 +26,15 @@ struct TriangleHit {
 };
 
 /// Immutable; any number of threads may query it at once. It keeps no reference to the meshes.
+///
+/// A query may have any values: where it cannot meet a triangle in single precision, or is no number, it finds none.
+/// A ray that starts far away is first moved to the triangles, in double precision.
 class TriangleScene {
  public:
+  /// Units from the origin. Triangles that are farther away are never met: products of three of their coordinates
+  /// overflow in single precision.
+  static constexpr double reach = 1e12;
+
   /// @param meshes        Meshes without triangles are welcome; queries number the meshes in this order.
   /// @param origin, unit  Coordinates are taken relative to these before they become single precision, so that it is
   ///                      spent on what matters, whatever the world's units.

@@ -7,7 +7,7 @@
 
 #include <Eigen/Core>
 
-#include "renderer/surfaces/mesh.h"
+#include "base/triangle_mesh.h"
 
 namespace tensorray {
 

@@ -145,20 +145,14 @@ ShadedSurface make_slice(const Scene& scene, const ShownLight& light, const Slic
 }
 
 ShadedSurface make_isosurface(const Scene& scene, const IsosurfaceDescription& description) {
-  const Isosurface found = isosurface(scene.field, description.invariant, description.value);
-  if (found.triangles.empty())
+  Isosurface found = isosurface(scene.field, description.invariant, description.value);
+  if (found.mesh.triangles.empty())
     throw SceneError(fmt::format("{}: `/integrator/context/isosurfaces`: {} is nowhere {:g} in this field",
                                  scene.description.path.string(), choice_name(description.invariant),
                                  description.value));
-  TriangleMesh mesh;
-  mesh.vertices = found.vertices;
-  for (const Eigen::Vector3i& triangle : found.triangles) {
-    const auto corners = triangle.cast<std::uint32_t>();
-    mesh.triangles.push_back({corners.x(), corners.y(), corners.z()});
-  }
   ShadedSurface surface;
   for (const Eigen::Vector3d& normal : found.normals) surface.normals.push_back(normal.cast<float>());
-  surface.shape = std::move(mesh);
+  surface.shape = std::move(found.mesh);
   return surface;
 }
 

@@ -54,7 +54,7 @@ Light make_light(const LightSourceDescription& light, const ShownLight& shown) {
       const Eigen::Vector3d normal = light.direction.value_or(-Eigen::Vector3d::UnitZ()).normalized();
       const Eigen::Vector3d up = upright(normal, Eigen::Vector3d::UnitZ());
       return AreaLight{rectangle_mesh(light.center.value(), up.cross(normal), up, light.size),
-                       shown.radiance(light.color, light.strength), false};
+                       shown.radiance(light.color, light.strength)};
     }
     default:
       return ConstantLight{shown.radiance(light.color, light.strength)};

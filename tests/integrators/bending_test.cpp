@@ -394,6 +394,35 @@ TEST(Bending, APlateThatTouchesTheVolumeCatchesLight) {
   }
 }
 
+/// In packets and by the reference.
+TEST(Bending, LightMayStartAnywhere) {
+  const TensorField field = constant_field(general_tensor());
+  Surfaces surfaces = surfaces_of(field);
+  surfaces.plate = plate_across({0, 0, -1}, 2);
+  const Geometry geometry(std::move(surfaces));
+  const Vector3d near(0.3, 0.1, 3), down(0, 0, -1);
+  for (const auto& follow :
+       {static_cast<void (*)(const TensorField&, const Geometry&, const BendingSettings&, RayBatch&)>(&trace),
+        &trace_reference}) {
+    RayBatch batch;
+    batch.add(near, down, 0.2);
+    for (const double far : {1e3, 1e6, 1e9}) batch.add({near.x(), near.y(), far}, down, 0.2);
+    follow(field, geometry, {}, batch);
+    for (std::size_t i = 0; i < batch.size(); ++i) {
+      EXPECT_EQ(batch.end[i], RayEnd::plate);
+      EXPECT_LT((batch.position[i] - batch.position[0]).norm(), 1e-6);
+    }
+
+    RayBatch lost;
+    for (const double far : {1e12, 1e14, 1e15, 1e16, 1e17, 1e18, 1e19, 1e30, 1e40, 1e200, 1e300, INFINITY, NAN})
+      for (const Vector3d& from : {Vector3d(near.x(), near.y(), far), Vector3d(-far, 0.3 * far, 0.7 * far)})
+        for (const Vector3d& direction : {down, Vector3d(1, -0.3, -0.7).normalized()}) lost.add(from, direction, 0.2);
+    follow(field, geometry, {}, lost);  // To whatever end: it comes back.
+    for (std::size_t i = 0; i < lost.size(); ++i)
+      EXPECT_EQ(lost.end[i] == RayEnd::degenerate, i >= lost.size() - 8) << i;
+  }
+}
+
 TEST(Bending, RejectsSettingsOutOfRange) {
   const TensorField field = constant_field(general_tensor());
   const Geometry geometry(surfaces_of(field));

@@ -5,6 +5,9 @@
 
 #include <gtest/gtest.h>
 
+#include "renderer/surfaces/mesh.h"
+#include "tests/renderer/support.h"
+
 namespace tensorray {
 namespace {
 
@@ -71,6 +74,63 @@ TEST(Geometry, WorksInAnyUnit) {
     const auto hit = geometry.crossing(Surface::bounds, false, scaled * Vector3d(0.3, 0.2, 0), Vector3d(0, 0, -1));
     ASSERT_TRUE(hit) << unit;
     EXPECT_NEAR(hit->distance / unit, 1, 1e-12);
+  }
+}
+
+TEST(Geometry, LightMayStartAnywhere) {
+  Surfaces surfaces = box_surfaces();
+  surfaces.plate = Plate();
+  surfaces.plate->center = {0, 0, -3};
+  surfaces.cut = box_mesh(unit_box(), Eigen::Affine3d(Eigen::Scaling(0.5)));
+  const Geometry geometry(std::move(surfaces));
+  const Vector3d down(0, 0, -1);
+  for (const double far : {1e3, 1e6, 1e9}) {
+    const Vector3d from(0.3, 0.2, far);
+    EXPECT_NEAR(geometry.crossing(Surface::bounds, true, from, down)->distance, far - 1, 1e-15 * far);
+    EXPECT_NEAR(geometry.crossing(Surface::bounds, false, from, down)->distance, far + 1, 1e-15 * far);
+    EXPECT_NEAR(geometry.crossing(Surface::cut, true, from, down)->distance, far - 0.5, 1e-15 * far);
+    EXPECT_NEAR(geometry.absorber(from, down)->distance, far + 3, 1e-15 * far);
+    EXPECT_FALSE(geometry.inside_cut(from));
+  }
+  const double nan = std::nan("");
+  for (const double far : {1e13, 1e20, 1e40, 1e300, Geometry::infinite, nan})
+    for (const Vector3d& from : {Vector3d(far, 0, 0), Vector3d(0.3, 0.2, far)})
+      for (const Vector3d& direction : {down, Vector3d(0.6, 0, -0.8), Vector3d(nan, 0, 1)})
+        for (const bool inwards : {false, true}) {
+          const auto hit = geometry.crossing(Surface::bounds, inwards, from, direction);
+          if (from.x() == far && far > 1e100) {
+            EXPECT_FALSE(hit);
+          }
+          geometry.absorber(from, direction);
+          EXPECT_FALSE(geometry.inside_cut(from));
+        }
+}
+
+TEST(Geometry, RefusesSurfacesBeyondSinglePrecision) {
+  for (const double far : {1e14, 1e40, 1e300, std::nan("")}) {
+    Surfaces with_plate = box_surfaces(), with_obstacle = box_surfaces(), with_cut = box_surfaces();
+    with_plate.plate = Plate();
+    with_plate.plate->center = {0, 0, far};
+    const TriangleMesh box = box_mesh({Vector3d(far, 0, 0), Vector3d(far, 1, 1)}, Eigen::Affine3d::Identity());
+    with_obstacle.obstacles = {box_mesh(unit_box(), Eigen::Affine3d::Identity()), box};
+    with_cut.cut = box;
+    EXPECT_EQ(message([&] { Geometry(std::move(with_plate)); }).find("the receiver"), 0u) << far;
+    EXPECT_EQ(message([&] { Geometry(std::move(with_obstacle)); }).find("obstacle 1"), 0u) << far;
+    EXPECT_EQ(message([&] { Geometry(std::move(with_cut)); }).find("the mesh that cuts"), 0u) << far;
+  }
+}
+
+/// A plate may lie as far away as Geometry allows, and light meets it.
+TEST(Geometry, MeetsThePlateAsFarAsItIsAllowed) {
+  for (const double far : {1e3, 1e6, 1e9, 1e12}) {
+    Surfaces surfaces = box_surfaces();
+    surfaces.plate = Plate();
+    surfaces.plate->center = {0, 0, -far};
+    surfaces.plate->size = {far, far};
+    const Geometry geometry(std::move(surfaces));
+    const auto hit = geometry.absorber({0.1, 0.2, 0.5}, Vector3d(0.1, 0.2, -1).normalized());
+    ASSERT_TRUE(hit) << far;
+    EXPECT_NEAR(hit->distance, std::sqrt(1.05) * (far + 0.5), 1e-12 * far);
   }
 }
 

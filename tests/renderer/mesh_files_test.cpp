@@ -9,6 +9,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "renderer/surfaces/mesh.h"
 #include "tests/renderer/support.h"
 
 namespace tensorray {

@@ -251,6 +251,8 @@ TEST(ReadMeshTest, BadFilesAreOneClearLine) {
   std::string not_finite = tetrahedron_ply;
   not_finite.replace(not_finite.find("1 0 0"), 5, "nan 0 0");
   EXPECT_THAT(error("nan.ply", not_finite), HasSubstr("not finite"));
+  not_finite.replace(not_finite.find("nan 0 0"), 7, "1e39 0 0");
+  EXPECT_THAT(error("far.ply", not_finite), HasSubstr("vertex 1 is not finite in single precision"));
   EXPECT_EQ(message([] { read_mesh("/no/such.ply"); }), "cannot read /no/such.ply: no such file");
   EXPECT_THAT(message([] { read_mesh(::testing::TempDir()); }), HasSubstr("folder"));
 }

@@ -135,7 +135,8 @@ TEST(MetalTest, HaveTheirColours) {
 TEST(MetalTest, UnknownNamesAreRefused) {
   const std::string text = message([] { metal_index("gould", {500}); });
   EXPECT_NE(text.find("gould"), std::string::npos);
-  for (const std::string& name : metal_names()) EXPECT_NE(text.find(name), std::string::npos);
+  for (const char* const name : {"gold", "silver", "copper", "aluminium"})
+    EXPECT_NE(text.find(name), std::string::npos) << name;
 }
 
 }  // namespace

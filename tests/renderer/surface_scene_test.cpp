@@ -11,6 +11,7 @@
 #include "renderer/lights/lights.h"
 #include "renderer/sampling/random.h"
 #include "renderer/sampling/sampling.h"
+#include "renderer/surfaces/mesh.h"
 #include "tests/renderer/support.h"
 
 namespace tensorray {
@@ -334,6 +335,27 @@ TEST(SurfaceSceneTest, NothingMeetsAnEmptyScene) {
   EXPECT_TRUE(scene.bounds().isEmpty());
 }
 
+/// Embree ends the process on rays that it cannot follow.
+TEST(SurfaceSceneTest, RaysMayStartAnywhere) {
+  const SurfaceScene scene({surface_of(rectangle_mesh({0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {2, 2}))});
+  const Vector3d down(0, 0, -1);
+  for (const double far : {1e3, 1e9}) {
+    EXPECT_NEAR(scene.intersect({0.3, 0.2, far}, down)->distance, far, 1e-6 + 1e-15 * far);
+    EXPECT_TRUE(scene.occluded({0.3, 0.2, far}, down));
+  }
+  const double nan = std::nan(""), infinite = std::numeric_limits<double>::infinity();
+  for (const double far : {1e20, 1e40, 1e200, 1e300, infinite, nan})
+    for (const Vector3d& from : {Vector3d(far, 0, 0), Vector3d(0.3, 0.2, far), Vector3d(far, -far, far)})
+      for (const Vector3d& direction : {down, Vector3d(0.6, 0, -0.8), Vector3d(nan, 0, 1)}) {
+        const auto hit = scene.intersect(from, direction);  // Whatever it finds, it comes back.
+        const bool shadowed = scene.occluded(from, direction, 1e300);
+        if (from.x() == far || !direction.allFinite()) {
+          EXPECT_FALSE(hit);
+          EXPECT_FALSE(shadowed);
+        }
+      }
+}
+
 TEST(SurfaceSceneTest, BadSurfacesAreNamed) {
   const ShadedSurface good = surface_of(rectangle_mesh({0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {2, 2}));
   const auto error = [&](const ShadedSurface& bad) { return message([&] { SurfaceScene({good, bad}); }); };
@@ -345,7 +367,9 @@ TEST(SurfaceSceneTest, BadSurfacesAreNamed) {
   EXPECT_EQ(error(bad), "surface 1: a triangle has a corner that is none of the vertices");
   bad = good;
   std::get<TriangleMesh>(bad.shape).vertices[0].x() = std::nan("");
-  EXPECT_EQ(error(bad), "surface 1: a vertex is not finite");
+  EXPECT_EQ(error(bad), "surface 1: a vertex is not finite in single precision");
+  std::get<TriangleMesh>(bad.shape).vertices[0].x() = 1e39;
+  EXPECT_EQ(error(bad), "surface 1: a vertex is not finite in single precision");
   bad = good;
   bad.path_ends = {1};
   EXPECT_EQ(error(bad), "surface 1: path_ends must ascend to the number of triangles");

@@ -11,6 +11,8 @@
 #include <gtest/gtest.h>
 #include <tbb/parallel_for.h>
 
+#include "renderer/surfaces/mesh.h"
+
 namespace tensorray {
 namespace {
 
@@ -152,6 +154,36 @@ TEST(TriangleScene, WorksFarFromTheOriginAndInAnyUnit) {
     ASSERT_TRUE(hit) << unit;
     EXPECT_NEAR(hit->distance / unit, 1, 1e-6);
   }
+}
+
+/// Embree ends the process on rays that it cannot follow.
+TEST(TriangleScene, RaysMayStartAnywhere) {
+  const TriangleMesh box = box_mesh({Vector3d(-1, -1, -1), Vector3d(1, 1, 1)}, Eigen::Affine3d::Identity());
+  const TriangleScene scene({&box}, Vector3d::Zero(), 3);
+  const Vector3d down(0, 0, -1), oblique = Vector3d(-0.2, 0.3, -1).normalized();
+  for (const double far : {1e2, 1e5, 1e8, 1e11}) {
+    for (const Vector3d& direction : {down, oblique}) {
+      const auto hit = scene.nearest(Vector3d(0.3, 0.2, 1) - far * direction, direction, 0, infinite);
+      ASSERT_TRUE(hit) << far;
+      EXPECT_NEAR(hit->distance, far, 1e-6 + 1e-15 * far) << "found in double precision";
+    }
+    EXPECT_FALSE(scene.nearest({0.3, 0.2, far}, -down, 0, infinite)) << far;
+    EXPECT_FALSE(scene.nearest({3, 0.2, far}, down, 0, infinite)) << far;
+    EXPECT_FALSE(scene.nearest({0.3, 0.2, far}, down, 0, far - 3)) << far;
+    EXPECT_TRUE(scene.nearest({0.3, 0.2, 0}, down, -far, infinite)) << far;
+  }
+  const double nan = std::nan("");
+  for (const double far : {1e15, 1e19, 1e30, 1e50, 1e300, infinite, nan})
+    for (const Vector3d& from : {Vector3d(far, 0, 0), Vector3d(0.3, 0.2, far), Vector3d(-far, far, far)})
+      for (const Vector3d& direction : {down, oblique, Vector3d(0, nan, 1), Vector3d(nan, nan, nan)}) {
+        const auto hit = scene.nearest(from, direction, -1e-3, infinite);  // Whatever it finds, it comes back.
+        if (!std::isfinite(far) || !direction.allFinite()) {
+          EXPECT_FALSE(hit);
+        }
+        std::vector<TriangleId> candidates;
+        scene.near(from, 1e-6, candidates);
+        EXPECT_TRUE(candidates.empty());
+      }
 }
 
 TEST(TriangleScene, NearMissesNoBoxAndLeavesOutWhatIsFar) {

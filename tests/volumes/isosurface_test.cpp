@@ -30,27 +30,30 @@ TensorField cube(int n) {
   return distance_field({Vector3i::Constant(-n), Vector3i::Constant(n)}, Eigen::Affine3d(Eigen::Scaling(1.0 / n)));
 }
 
-Vector3d area_vector(const Isosurface& surface, const Vector3i& t) {
-  const Vector3d& a = surface.vertices[t[0]];
-  return (surface.vertices[t[1]] - a).cross(surface.vertices[t[2]] - a) / 2;
+using Triangle = std::array<std::uint32_t, 3>;
+
+Vector3d area_vector(const Isosurface& surface, const Triangle& t) {
+  const Vector3d& a = surface.mesh.vertices[t[0]];
+  return (surface.mesh.vertices[t[1]] - a).cross(surface.mesh.vertices[t[2]] - a) / 2;
 }
 
 double area(const Isosurface& surface) {
   double sum = 0;
-  for (const Vector3i& triangle : surface.triangles) sum += area_vector(surface, triangle).norm();
+  for (const Triangle& triangle : surface.mesh.triangles) sum += area_vector(surface, triangle).norm();
   return sum;
 }
 
 double greatest_radius_error(const Isosurface& surface, double radius) {
   double error = 0;
-  for (const Vector3d& vertex : surface.vertices) error = std::max(error, std::abs((vertex - center).norm() - radius));
+  for (const Vector3d& vertex : surface.mesh.vertices)
+    error = std::max(error, std::abs((vertex - center).norm() - radius));
   return error;
 }
 
 /// Edges that belong to one triangle only, taken in its direction.
 int open_edges(const Isosurface& surface) {
-  std::map<std::pair<int, int>, int> uses;
-  for (const Vector3i& t : surface.triangles)
+  std::map<std::pair<std::uint32_t, std::uint32_t>, int> uses;
+  for (const Triangle& t : surface.mesh.triangles)
     for (int i = 0; i < 3; ++i) {
       ++uses[{t[i], t[(i + 1) % 3]}];
       --uses[{t[(i + 1) % 3], t[i]}];
@@ -62,11 +65,11 @@ int open_edges(const Isosurface& surface) {
 
 /// Smaller values are inside: triangles and normals look to the middle.
 void expect_inwards(const Isosurface& surface, double tolerance) {
-  ASSERT_EQ(surface.normals.size(), surface.vertices.size());
-  for (const Vector3i& t : surface.triangles)
-    EXPECT_GE(area_vector(surface, t).dot(center - surface.vertices[t[0]]), 0);
-  for (std::size_t i = 0; i < surface.vertices.size(); ++i)
-    EXPECT_LT((surface.normals[i] - (center - surface.vertices[i]).normalized()).norm(), tolerance);
+  ASSERT_EQ(surface.normals.size(), surface.mesh.vertices.size());
+  for (const Triangle& t : surface.mesh.triangles)
+    EXPECT_GE(area_vector(surface, t).dot(center - surface.mesh.vertices[t[0]]), 0);
+  for (std::size_t i = 0; i < surface.mesh.vertices.size(); ++i)
+    EXPECT_LT((surface.normals[i] - (center - surface.mesh.vertices[i]).normalized()).norm(), tolerance);
 }
 
 TEST(IsosurfaceTest, SphereOfSecondOrder) {
@@ -113,7 +116,7 @@ TEST(IsosurfaceTest, IsOpenAtTheFacesOfTheExtentAndEndsOnThem) {
   const TensorField field = distance_field(box, Eigen::Affine3d(Eigen::Scaling(1.0 / n)));
   const Isosurface surface = isosurface(field, Invariant::largest_eigenvalue, 0.6);
   double furthest = -1;
-  for (const Vector3d& vertex : surface.vertices) furthest = std::max(furthest, vertex.x());
+  for (const Vector3d& vertex : surface.mesh.vertices) furthest = std::max(furthest, vertex.x());
   EXPECT_EQ(furthest, 0.25);
   EXPECT_GT(open_edges(surface), 40);
   const double exact = 2 * pi * 0.6 * (0.25 - center.x() + 0.6);
@@ -133,19 +136,18 @@ TEST(IsosurfaceTest, InactiveVoxelsCountAsZero) {
   }
   const Isosurface surface = isosurface(TensorField(grid), Invariant::trace, 3);
   EXPECT_EQ(open_edges(surface), 0);
-  Eigen::AlignedBox3d box;
-  for (const Vector3d& vertex : surface.vertices) box.extend(vertex);
+  const Eigen::AlignedBox3d box = surface.mesh.bounds();
   EXPECT_LT((box.min() - Vector3d(-4.5, 11.5, -4.5)).norm(), 1e-5);
   EXPECT_LT((box.max() - Vector3d(4.5, 20.5, 4.5)).norm(), 1e-5);
-  for (const Vector3i& t : surface.triangles)
-    EXPECT_GT(area_vector(surface, t).dot(surface.vertices[t[0]] - Vector3d(0, 16, 0)), 0);
+  for (const Triangle& t : surface.mesh.triangles)
+    EXPECT_GT(area_vector(surface, t).dot(surface.mesh.vertices[t[0]] - Vector3d(0, 16, 0)), 0);
 }
 
 TEST(IsosurfaceTest, EmptyWhereNothingIsOnTheOtherSide) {
   for (const double value : {-1.0, 9.0}) {
     const Isosurface surface = isosurface(cube(4), Invariant::largest_eigenvalue, value);
-    EXPECT_TRUE(surface.triangles.empty()) << value;
-    EXPECT_TRUE(surface.vertices.empty()) << value;
+    EXPECT_TRUE(surface.mesh.triangles.empty()) << value;
+    EXPECT_TRUE(surface.mesh.vertices.empty()) << value;
   }
 }
 

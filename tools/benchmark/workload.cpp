@@ -5,6 +5,7 @@
 
 #include "integrators/probes/auto_scale.h"
 #include "renderer/lights/beam.h"
+#include "renderer/surfaces/mesh.h"
 
 namespace tensorray::benchmark {
 namespace {

@@ -8,6 +8,7 @@
 #include <sys/mman.h>
 #include <tbb/parallel_for.h>
 
+#include "base/box.h"
 #include "volumes/bricks/brick_making.h"
 
 namespace tensorray {
@@ -108,18 +109,9 @@ TensorField::Floats TensorField::allocate(std::size_t bricks) {
 
 void TensorField::Release::operator()(float* floats) const { munmap(floats, bytes); }
 
-std::vector<Eigen::Vector3d> TensorField::corners() const {
-  std::vector<Eigen::Vector3d> corners;
-  for (int i = 0; i < 8; ++i)
-    corners.push_back(to_world_ * index_bounds_.corner(static_cast<Eigen::AlignedBox3d::CornerType>(i)));
-  return corners;
-}
+std::vector<Eigen::Vector3d> TensorField::corners() const { return corners_of(index_bounds_, to_world_); }
 
-Eigen::AlignedBox3d TensorField::world_box() const {
-  Eigen::AlignedBox3d box;
-  for (const Eigen::Vector3d& corner : corners()) box.extend(corner);
-  return box;
-}
+Eigen::AlignedBox3d TensorField::world_box() const { return box_of(corners()); }
 
 double TensorField::greatest_norm() const {
   double greatest = 0;

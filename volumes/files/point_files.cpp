@@ -8,6 +8,7 @@
 #include <openvdb/points/PointConversion.h>
 #include <openvdb/points/PointDataGrid.h>
 
+#include "base/box.h"
 #include "volumes/files/vdb_archive.h"
 #include "volumes/files/vtk_files.h"
 
@@ -43,8 +44,7 @@ using ScalarList = List<float, float>;
 /// The edge of voxels with about eight points each, were the points spread evenly over their box. Points in a plane or
 /// on a line fill fewer voxels: an axis counts only where the box is thicker than a voxel.
 double voxel_edge(const std::vector<Eigen::Vector3f>& positions) {
-  Eigen::AlignedBox3d box;
-  for (const Eigen::Vector3f& position : positions) box.extend(position.cast<double>().eval());
+  const Eigen::AlignedBox3d box = box_of(positions).cast<double>();
   if (box.isEmpty()) return 1;
   Eigen::Vector3d extent = box.sizes();
   std::sort(extent.data(), extent.data() + 3, std::greater<>());

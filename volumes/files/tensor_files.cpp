@@ -8,6 +8,7 @@
 #include <tbb/parallel_for.h>
 
 #include "base/errors.h"
+#include "base/text.h"
 #include "volumes/files/vdb_archive.h"
 #include "volumes/tensors/finite_differences.h"
 
@@ -82,16 +83,12 @@ const Layout& layout_of(const std::vector<GridInfo>& grids, const std::string& n
                        [&](const Layout& layout) { return has(grids, name, layout); });
 }
 
-std::string joined(const std::vector<std::string>& words) {
-  std::string text;
-  for (const std::string& word : words) text += (text.empty() ? "" : ", ") + word;
-  return text.empty() ? "none" : text;
-}
+std::string joined_or_none(const std::vector<std::string>& words) { return words.empty() ? "none" : joined(words); }
 
 std::string described(const std::vector<GridInfo>& grids) {
   std::vector<std::string> words;
   for (const GridInfo& grid : grids) words.push_back(grid.name + " (" + grid.type + ")");
-  return joined(words);
+  return joined_or_none(words);
 }
 
 /// What may be read with `derive`, by name.
@@ -111,8 +108,8 @@ std::string chosen_name(const std::filesystem::path& path, const std::vector<Gri
   const std::vector<std::string> names = names_for(grids, derive);
   if (!name.empty()) {
     if (std::find(names.begin(), names.end(), name) != names.end()) return name;
-    fail(path,
-         "has no " + kind + " \"" + name + "\"; there are: " + joined(names) + "; the grids are: " + described(grids));
+    fail(path, "has no " + kind + " \"" + name + "\"; there are: " + joined_or_none(names) +
+                   "; the grids are: " + described(grids));
   }
   if (names.size() == 1) return names.front();
   if (names.empty()) fail(path, "has no " + kind + "; the grids are: " + described(grids));

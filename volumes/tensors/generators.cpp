@@ -8,6 +8,7 @@
 
 #include "base/constants.h"
 #include "base/errors.h"
+#include "base/text.h"
 
 namespace tensorray {
 namespace {
@@ -205,9 +206,7 @@ Generator generator_of(const std::string& kind) {
   constexpr std::size_t count = std::variant_size_v<Generator>;
   for (std::size_t i = 0; i < count; ++i)
     if (generator_kinds()[i] == kind) return generator_at(i, std::make_index_sequence<count>());
-  std::string known;
-  for (const std::string& each : generator_kinds()) known += (known.empty() ? "" : ", ") + each;
-  throw std::invalid_argument("unknown kind of field \"" + kind + "\"; the kinds are " + known);
+  throw std::invalid_argument("unknown kind of field \"" + kind + "\"; the kinds are " + joined(generator_kinds()));
 }
 
 GridSettings default_grid(const Generator& generator, int resolution) {

@@ -10,6 +10,7 @@
 #include <Eigen/LU>
 #include <tbb/parallel_for.h>
 
+#include "base/text.h"
 #include "volumes/tensors/eigenvalues.h"
 
 namespace tensorray {
@@ -88,9 +89,7 @@ Invariant invariant_of(const std::string& name) {
   const std::vector<std::string>& names = invariant_names();
   const auto found = std::find(names.begin(), names.end(), name);
   if (found != names.end()) return static_cast<Invariant>(found - names.begin());
-  std::string known;
-  for (const std::string& each : names) known += (known.empty() ? "" : ", ") + each;
-  throw std::invalid_argument("there is no invariant \"" + name + "\"; the invariants are: " + known);
+  throw std::invalid_argument("there is no invariant \"" + name + "\"; the invariants are: " + joined(names));
 }
 
 double invariant(Invariant which, const Matrix3d& tensor) {

@@ -1,6 +1,7 @@
 #include "volumes/tensors/isosurface.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstdint>
 #include <limits>
@@ -82,34 +83,37 @@ Quads contours(const openvdb::FloatGrid& grid, double value) {
 
 /// Triangles of the quads that have a corner in the extent (the others close the contours beyond it), cut along the
 /// shorter diagonal, with the vertices moved onto the extent.
-Isosurface cut_to(const Eigen::AlignedBox3d& extent, const Quads& quads, const Eigen::Affine3d& to_world) {
-  Isosurface surface;
-  std::vector<int> renumbered(quads.vertices.size(), -1);
+TriangleMesh cut_to(const Eigen::AlignedBox3d& extent, const Quads& quads, const Eigen::Affine3d& to_world) {
+  TriangleMesh surface;
+  constexpr std::uint32_t unused = 0xffffffffu;
+  std::vector<std::uint32_t> renumbered(quads.vertices.size(), unused);
   const auto use = [&](int vertex) {
-    if (renumbered[vertex] < 0) {
-      renumbered[vertex] = static_cast<int>(surface.vertices.size());
+    if (renumbered[vertex] == unused) {
+      renumbered[vertex] = static_cast<std::uint32_t>(surface.vertices.size());
       surface.vertices.push_back(to_world * quads.vertices[vertex].cwiseMax(extent.min()).cwiseMin(extent.max()));
     }
     return renumbered[vertex];
   };
   for (const Eigen::Vector4i& quad : quads.corners) {
     if (std::none_of(quad.begin(), quad.end(), [&](int i) { return extent.contains(quads.vertices[i]); })) continue;
-    const Eigen::Vector4i q = quad.unaryExpr(use);
-    const auto length = [&](int i, int j) { return (surface.vertices[q[i]] - surface.vertices[q[j]]).squaredNorm(); };
-    const int turn = length(0, 2) <= length(1, 3) ? 0 : 1;
-    surface.triangles.emplace_back(q[turn], q[turn + 1], q[turn + 2]);
-    surface.triangles.emplace_back(q[turn], q[turn + 2], q[(turn + 3) % 4]);
+    const std::array<std::uint32_t, 4> q{use(quad[0]), use(quad[1]), use(quad[2]), use(quad[3])};
+    const auto length = [&](std::size_t i, std::size_t j) {
+      return (surface.vertices[q[i]] - surface.vertices[q[j]]).squaredNorm();
+    };
+    const std::size_t turn = length(0, 2) <= length(1, 3) ? 0 : 1;
+    surface.triangles.push_back({q[turn], q[turn + 1], q[turn + 2]});
+    surface.triangles.push_back({q[turn], q[turn + 2], q[(turn + 3) % 4]});
   }
   return surface;
 }
 
 /// Sums of the triangles' areas times their normals, at each vertex.
-std::vector<Vector3d> area_normals(const Isosurface& surface) {
+std::vector<Vector3d> area_normals(const TriangleMesh& surface) {
   std::vector<Vector3d> normals(surface.vertices.size(), Vector3d::Zero());
-  for (const Vector3i& t : surface.triangles) {
+  for (const auto& t : surface.triangles) {
     const Vector3d& a = surface.vertices[t[0]];
     const Vector3d normal = (surface.vertices[t[1]] - a).cross(surface.vertices[t[2]] - a);
-    for (const int vertex : t) normals[vertex] += normal;
+    for (const std::uint32_t vertex : t) normals[vertex] += normal;
   }
   return normals;
 }
@@ -133,9 +137,9 @@ Vector3d gradient(const TensorField& field, TensorSampler& sampler, Invariant wh
 /// The triangles' normals stand in where the gradient vanishes.
 void add_normals(const TensorField& field, Invariant which, Isosurface& surface) {
   TensorSampler sampler(field);
-  surface.normals = area_normals(surface);
+  surface.normals = area_normals(surface.mesh);
   for (std::size_t i = 0; i < surface.normals.size(); ++i) {
-    const Vector3d rise = gradient(field, sampler, which, surface.vertices[i]);
+    const Vector3d rise = gradient(field, sampler, which, surface.mesh.vertices[i]);
     if (rise.allFinite() && rise.norm() > 0) surface.normals[i] = -rise;
     surface.normals[i].stableNormalize();
     if (!(surface.normals[i].norm() > 0.5)) surface.normals[i] = Vector3d::UnitZ();
@@ -152,10 +156,11 @@ Isosurface isosurface(const TensorField& field, Invariant which, double value) {
     throw std::invalid_argument("an isosurface needs a field with at least two voxels along each axis");
   openvdb::initialize();
   const openvdb::FloatGrid::Ptr grid = invariant_grid(field, box, which);
-  Isosurface surface = cut_to(field.index_bounds(), contours(*grid, value), field.to_world());
+  Isosurface surface;
+  surface.mesh = cut_to(field.index_bounds(), contours(*grid, value), field.to_world());
   // OpenVDB's contours are counter-clockwise from the side of greater values.
   if (field.to_world().linear().determinant() > 0)
-    for (Vector3i& triangle : surface.triangles) std::swap(triangle[1], triangle[2]);
+    for (auto& triangle : surface.mesh.triangles) std::swap(triangle[1], triangle[2]);
   add_normals(field, which, surface);
   return surface;
 }

@@ -6,16 +6,16 @@
 
 #include <Eigen/Core>
 
+#include "base/triangle_mesh.h"
 #include "volumes/bricks/tensor_field.h"
 #include "volumes/tensors/invariants.h"
 
 namespace tensorray {
 
-/// Triangles in world space. They are counter-clockwise as seen from the side of smaller values.
+/// Triangles that are counter-clockwise as seen from the side of smaller values.
 struct Isosurface {
-  std::vector<Eigen::Vector3d> vertices;
+  TriangleMesh mesh;
   std::vector<Eigen::Vector3d> normals;  ///< One a vertex, unit, towards smaller values.
-  std::vector<Eigen::Vector3i> triangles;
 };
 
 /// Dual contours (OpenVDB's volumeToMesh) of the invariant at the voxels; inactive voxels have that of the zero tensor,

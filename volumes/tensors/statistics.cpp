@@ -94,7 +94,7 @@ void join(const std::vector<BlockStatistics>& blocks, FieldStatistics& result) {
 void describe_extent(const TensorGrid& grid, FieldStatistics& result) {
   const TensorField field(grid);
   result.index_box = grid.active_box();
-  for (const Eigen::Vector3d& corner : field.corners()) result.world_box.extend(corner);
+  result.world_box = field.world_box();
   result.memory_bytes = field.memory_bytes();
 }
 

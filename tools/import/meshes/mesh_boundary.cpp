@@ -4,10 +4,8 @@
 #include <array>
 #include <cmath>
 #include <cstdint>
-#include <fstream>
 #include <map>
 #include <stdexcept>
-#include <string>
 #include <tuple>
 #include <utility>
 #include <vector>
@@ -19,6 +17,8 @@
 #include <vtkStaticPointLocator.h>
 
 #include "base/constants.h"
+#include "base/ply_writer.h"
+#include "base/triangle_mesh.h"
 #include "tools/import/meshes/mesh_cell.h"
 
 namespace tensorray {
@@ -41,11 +41,6 @@ struct Face {
   bool operator<(const Face& other) const {
     return std::tie(key, cell, index) < std::tie(other.key, other.cell, other.index);
   }
-};
-
-struct Surface {
-  std::vector<Vector3d> vertices;
-  std::vector<std::array<std::uint32_t, 3>> triangles;
 };
 
 Points points_of(vtkDataSet& mesh) {
@@ -180,12 +175,12 @@ FacePlane plane_of(const MeshCell& cell, int index, const Points& points) {
   return plane;
 }
 
-Surface body_surface(vtkDataSet& mesh) {
+TriangleMesh body_surface(vtkDataSet& mesh) {
   const Points points = points_of(mesh);
   const std::vector<Face> faces = outer_faces(mesh, points);
   const Eigen::Matrix3Xd extreme = extreme_points(mesh, faces, points);
   const double least_depth = 1e-3 * (extreme.rowwise().maxCoeff() - extreme.rowwise().minCoeff()).norm();
-  Surface surface;
+  TriangleMesh surface;
   std::map<vtkIdType, std::uint32_t> vertex_of_point;
   MeshCell cell;
   for (const Face& face : faces) {
@@ -207,34 +202,11 @@ Surface body_surface(vtkDataSet& mesh) {
   return surface;
 }
 
-template <class Number>
-void append(std::string& bytes, const Number& number) {
-  static_assert(__BYTE_ORDER__ == __ORDER_LITTLE_ENDIAN__, "the file is little-endian, and written as memory has it");
-  bytes.append(reinterpret_cast<const char*>(&number), sizeof number);
-}
-
-void write_ply(const Surface& surface, const std::filesystem::path& path) {
-  std::string bytes =
-      "ply\nformat binary_little_endian 1.0\nelement vertex " + std::to_string(surface.vertices.size()) +
-      "\nproperty double x\nproperty double y\nproperty double z\nelement face " +
-      std::to_string(surface.triangles.size()) + "\nproperty list uchar int vertex_indices\nend_header\n";
-  for (const Vector3d& vertex : surface.vertices)
-    for (const double coordinate : vertex) append(bytes, coordinate);
-  for (const auto& triangle : surface.triangles) {
-    append(bytes, std::uint8_t{3});
-    for (const std::uint32_t vertex : triangle) append(bytes, vertex);
-  }
-  std::ofstream file(path, std::ios::binary);
-  file.write(bytes.data(), static_cast<std::streamsize>(bytes.size()));
-  file.close();
-  if (!file) throw std::runtime_error(path.string() + ": cannot be written; is there space, and the folder writable?");
-}
-
 }  // namespace
 
 std::size_t write_boundary(vtkDataSet& mesh, const std::filesystem::path& path) {
-  const Surface surface = body_surface(mesh);
-  if (!surface.triangles.empty()) write_ply(surface, path);
+  const TriangleMesh surface = body_surface(mesh);
+  if (!surface.triangles.empty()) write_ply(path, surface, PlyPositions::double_precision);
   return surface.triangles.size();
 }
 
