@@ -20,7 +20,7 @@ using Eigen::Vector3d;
 using Eigen::Vector3i;
 using Voxels = Eigen::AlignedBox3i;
 
-/// Index space.
+/// Quadrilaterals, in index space.
 struct Quads {
   std::vector<Vector3d> vertices;
   std::vector<Eigen::Vector4i> corners;
@@ -31,8 +31,8 @@ float as_float(double value) {
   return static_cast<float>(std::clamp(value, -most, most));
 }
 
-/// Sets a voxel, and those beyond the faces of the extent that are next to it, so that contours cross the faces at
-/// right angles instead of closing there.
+/// Sets a voxel, and its neighbours beyond the faces of the extent. Contours then cross the faces at right angles
+/// instead of closing there.
 void set_with_margin(openvdb::FloatGrid::Accessor& grid, const Voxels& box, const Vector3i& voxel, float value) {
   const Vector3i first = (voxel.array() == box.min().array()).select(voxel.array() - 1, voxel.array());
   const Vector3i last = (voxel.array() == box.max().array()).select(voxel.array() + 1, voxel.array());
@@ -80,8 +80,8 @@ Quads contours(const openvdb::FloatGrid& grid, double value) {
   return quads;
 }
 
-/// Triangles of the quads that have a corner in the extent (the others close the contours beyond it), cut along the
-/// shorter diagonal, with the vertices moved onto the extent.
+/// Triangles of the quads that have a corner in the extent; the other quads close the contours outside it. Each quad is
+/// cut along its shorter diagonal, and vertices outside the extent are moved onto its faces.
 Isosurface cut_to(const Eigen::AlignedBox3d& extent, const Quads& quads, const Eigen::Affine3d& to_world) {
   Isosurface surface;
   std::vector<int> renumbered(quads.vertices.size(), -1);
@@ -103,7 +103,7 @@ Isosurface cut_to(const Eigen::AlignedBox3d& extent, const Quads& quads, const E
   return surface;
 }
 
-/// Sums of the triangles' areas times their normals, at each vertex.
+/// At each vertex, the sum of its triangles' normals, each as long as twice the triangle's area.
 std::vector<Vector3d> area_normals(const Isosurface& surface) {
   std::vector<Vector3d> normals(surface.vertices.size(), Vector3d::Zero());
   for (const Vector3i& t : surface.triangles) {
@@ -114,7 +114,8 @@ std::vector<Vector3d> area_normals(const Isosurface& surface) {
   return normals;
 }
 
-/// The gradient in world space, from differences over a voxel to either side, as far as the extent goes.
+/// The gradient of the invariant in world space, from differences over one voxel to either side, or less at the faces
+/// of the extent.
 Vector3d gradient(const TensorField& field, TensorSampler& sampler, Invariant which, const Vector3d& world) {
   const Vector3d index = field.to_index() * world;
   const Eigen::AlignedBox3d& extent = field.index_bounds();
@@ -130,7 +131,7 @@ Vector3d gradient(const TensorField& field, TensorSampler& sampler, Invariant wh
   return field.to_index().linear().transpose() * slopes;
 }
 
-/// The triangles' normals stand in where the gradient vanishes.
+/// Sets normals from the gradient; where it vanishes, from the triangles.
 void add_normals(const TensorField& field, Invariant which, Isosurface& surface) {
   TensorSampler sampler(field);
   surface.normals = area_normals(surface);
@@ -153,7 +154,7 @@ Isosurface isosurface(const TensorField& field, Invariant which, double value) {
   openvdb::initialize();
   const openvdb::FloatGrid::Ptr grid = invariant_grid(field, box, which);
   Isosurface surface = cut_to(field.index_bounds(), contours(*grid, value), field.to_world());
-  // OpenVDB's contours are counter-clockwise from the side of greater values.
+  // OpenVDB's contours are counter-clockwise as seen from the side of greater values.
   if (field.to_world().linear().determinant() > 0)
     for (Vector3i& triangle : surface.triangles) std::swap(triangle[1], triangle[2]);
   add_normals(field, which, surface);

@@ -14,15 +14,15 @@ namespace tensorray {
 /// Triangles in world space. They are counter-clockwise as seen from the side of smaller values.
 struct Isosurface {
   std::vector<Eigen::Vector3d> vertices;
-  std::vector<Eigen::Vector3d> normals;  ///< One a vertex, unit, towards smaller values.
+  std::vector<Eigen::Vector3d> normals;  ///< One per vertex, of unit length, towards smaller values.
   std::vector<Eigen::Vector3i> triangles;
 };
 
-/// Dual contours (OpenVDB's volumeToMesh) of the invariant at the voxels; inactive voxels have that of the zero tensor,
-/// which is 0. Vertices lie on the surface to second order in the voxels' size; normals are the invariant's gradient,
-/// over a voxel to either side. The surface is open where it meets the faces of the field's extent, and ends on them.
-/// It is empty where no voxel is on the other side of `value`. In any affine transform; the same on any number of
-/// threads.
+/// Makes dual contours (OpenVDB's volumeToMesh) of the invariant at the voxels. Inactive voxels count as the zero
+/// tensor, whose invariant is 0. Vertices are on the surface to second order in the voxel size. Normals are along
+/// the gradient of the invariant, from differences over one voxel to either side. The surface ends on the faces of the
+/// field's extent and is open there. It is empty if all voxels are on the same side of `value`. Works with any affine
+/// transform. The result does not depend on the number of threads.
 /// @throw std::invalid_argument if `value` is not finite in single precision, or if the field has a single voxel along
 /// an axis.
 Isosurface isosurface(const TensorField& field, Invariant which, double value);
