@@ -23,7 +23,7 @@ CrossSectionSettings radii(double least, double greatest = 1e300) {
   return settings;
 }
 
-/// A point of a way in the field.
+/// A point of a path in the field.
 PathPoint point_of(const Vector3d& position, const Vector3d& direction, const Matrix3d& tensor) {
   PathPoint point;
   point.position = position;
@@ -33,7 +33,7 @@ PathPoint point_of(const Vector3d& position, const Vector3d& direction, const Ma
   return point;
 }
 
-/// Along z from 0 to 1, with a tensor that depends on z.
+/// A path along z from 0 to 1, with a tensor that depends on z.
 PathPoints straight_way(int points, const std::function<Matrix3d(double)>& tensor) {
   PathPoints points;
   for (int i = 0; i < points; ++i) {
@@ -43,7 +43,7 @@ PathPoints straight_way(int points, const std::function<Matrix3d(double)>& tenso
   return points;
 }
 
-/// A helix of radius 1 about z, by its angle.
+/// Parameters of a helix of radius 1 about z.
 constexpr double rise = 0.4;  // Per radian.
 PathPoint helix_point(double angle, const Matrix3d& tensor) {
   return point_of({std::cos(angle), std::sin(angle), rise * angle}, {-std::sin(angle), std::cos(angle), rise}, tensor);
@@ -125,7 +125,7 @@ TEST(CrossSection, BothPairsOfVectorsSpanTheSameEllipse) {
 }
 
 TEST(CrossSection, TransportAlongAHelixUnwindsItsTorsion) {
-  // Against Frenet's frame a frame without twist turns by −torsion · length: torsion = rise / (1 + rise²).
+  // Relative to the Frenet frame, a frame without twist turns by −torsion · length: torsion = rise / (1 + rise²).
   const double turns = 2 * pi, length = turns * std::sqrt(1 + rise * rise), torsion = rise / (1 + rise * rise);
   const auto error = [&](int steps) {
     Vector3d normal = -Vector3d::UnitX();  // The principal normal at angle 0, and at 2 π.
@@ -150,14 +150,14 @@ TEST(CrossSection, CirclesAlongAHelixDoNotTwist) {
                                          points[i].position, points[i].direction);
     EXPECT_LT((sections[i].x - carried).norm(), 1e-12);
     EXPECT_LT((sections[i].major - sections[i].x).norm(), 1e-6);
-    // No turn beyond the direction's own.
+    // The section turns no more than the direction.
     EXPECT_LT((sections[i].x - sections[i - 1].x).norm(),
               1.0001 * (points[i].direction - points[i - 1].direction).norm());
   }
 }
 
 TEST(CrossSection, PassingThroughACircleNeitherFlipsNorTwists) {
-  // From 2 : 1 through a circle to 1 : 2: the longer axis changes places, the surface does not.
+  // From 2 : 1 through a circle to 1 : 2: the longer axis becomes the shorter one, but the surface does not jump.
   const PathPoints points =
       straight_way(41, [](double z) -> Matrix3d { return Vector3d(2 - z, 1 + z, 1).asDiagonal(); });
   const std::vector<CrossSection> sections = cross_sections(points, radii(0.01));
@@ -170,14 +170,15 @@ TEST(CrossSection, PassingThroughACircleNeitherFlipsNorTwists) {
 }
 
 TEST(CrossSection, VanishingOnTheWayNeitherFlipsNorTwists) {
-  // T is zero at z = 1/2, where the ellipse is clamped to a circle, and changes its sign there; the way is a helix.
+  // T is zero in the middle of the path, a helix, and changes its sign there. The ellipse is clamped to a circle there.
   const Matrix3d T = Eigen::AngleAxisd(0.4, Vector3d(1, 2, 3).normalized()) * Vector3d(2, 1, 0.3).asDiagonal();
   PathPoints points;
   const int points = 401;
   for (int i = 0; i < points; ++i) points.push_back(helix_point(0.01 * i, (double(i) / (points - 1) - 0.5) * T));
   const std::vector<CrossSection> sections = cross_sections(points, radii(0.05));
   for (std::size_t i = 1; i < points.size(); ++i) {
-    // No faster than the tensor changes, and than a frame of this size turns; both with room for the turn of C.
+    // The section changes no faster than the tensor changes plus the frame turns. The factor 3 allows for the turn of
+    // C.
     const double allowed = 3 * ((points[i].tensor - points[i - 1].tensor).norm() +
                                 sections[i].major.norm() * (points[i].direction - points[i - 1].direction).norm());
     EXPECT_LT((sections[i].x - sections[i - 1].x).norm(), allowed) << i;
@@ -189,7 +190,7 @@ TEST(CrossSection, VanishingOnTheWayNeitherFlipsNorTwists) {
 }
 
 TEST(CrossSection, ATurningEllipseIsFollowedWithoutAFlip) {
-  // The ellipse makes three turns: its axis comes round with it, and the surface moves no faster than the tensor.
+  // The ellipse makes three turns. Its axis turns with it, and the surface moves no faster than the tensor.
   const auto turned = [](double z) -> Matrix3d {
     const Matrix3d turn = Eigen::AngleAxisd(6 * pi * z, Vector3d::UnitZ()).toRotationMatrix();
     return turn * Vector3d(3, 1, 1).asDiagonal() * turn.transpose();

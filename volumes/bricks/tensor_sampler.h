@@ -26,8 +26,9 @@ class TensorSampler {
   Eigen::Matrix3d at(const Eigen::Vector3d& world, const Eigen::Matrix<double, 3, 2>& along,
                      std::array<Eigen::Matrix3d, 2>& derivatives);
 
-  /// The distance along `direction` from `world` to where it leaves its brick, if nothing bends light in that brick nor
-  /// in the brick that was sampled last; otherwise 0. `direction` may have any length, which is the unit of the result.
+  /// The distance from `world` along `direction` to the face of the brick that contains `world`, if nothing bends light
+  /// in that brick nor in the brick that was sampled last; otherwise 0. `direction` may have any length, which is the
+  /// unit of the result.
   double way_through_straight_brick(const Eigen::Vector3d& world, const Eigen::Vector3d& direction);
 
   std::uint64_t samples() const { return samples_; }  ///< Calls of `at` so far.
