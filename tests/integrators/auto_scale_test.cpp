@@ -24,7 +24,7 @@ TEST(AutoScale, TurnsTheMedianRayByTheWantedAngle) {
     const AutoScale chosen = scale_of(field);
     EXPECT_NEAR(chosen.median_turn, 0.15, 1e-3);
     EXPECT_GT(chosen.bent_fraction, 0.99);
-    // The scale undoes the field's units.
+    // The scale cancels the units of the field.
     EXPECT_NEAR(chosen.scale * size / scale_of(cube_field(9, linear_tensor)).scale, 1, 1e-4);
   }
 }
@@ -34,7 +34,7 @@ TEST(AutoScale, AgreesWithTheClosedFormOfARotation) {
   T(1, 2) = -3;
   T(2, 1) = 3;
   const AutoScale chosen = scale_of(constant_field(T));
-  // Most rays cross the whole volume: on an arc of the angle 0.15 that spans a depth of 2.
+  // Most rays cross the whole volume: along an arc of angle 0.15 that spans a depth of 2.
   const double length = 2 * 0.15 / std::sin(0.15);
   EXPECT_NEAR(chosen.scale, 0.15 / (0.2 * 3 * length), 2e-3 * chosen.scale);
 }

@@ -81,7 +81,7 @@ TEST(Bending, AllMethodsFollowTheExactPathOfConstantTensors) {
       const Ray ray = trace_steps(field, settings_of(method, step), steps, P, V, 0.5);
       return (ray.position - exact.position).norm() + (ray.direction - exact.direction).norm();
     };
-    // ‖s T h‖ is about 0.02: errors are of that to the power of the order, times the path's length and a constant.
+    // ‖s T h‖ is about 0.02. The error is that value to the power of the order, times the path's length and a constant.
     EXPECT_LT(error(BendingMethod::euler), 0.04);
     EXPECT_LT(error(BendingMethod::splitting), 4e-4);
     EXPECT_LT(error(BendingMethod::rk4), 1e-7);
@@ -111,7 +111,7 @@ TEST(Bending, AddingAnIsotropicTensorChangesNoPath) {
   const TensorField field = cube_field(9, linear_tensor);
   const TensorField shifted =
       cube_field(9, [](const Vector3d& p) { return Matrix3d(linear_tensor(p) + 4 * Matrix3d::Identity()); });
-  // Not `euler`, which normalises only after the step, as the paper has it.
+  // Not `euler`, which normalises only after the step, as in the paper.
   for (const BendingMethod method :
        {BendingMethod::splitting, BendingMethod::rk4, BendingMethod::bs23, BendingMethod::dopri5}) {
     const auto path = [&](const TensorField& of) {
@@ -197,7 +197,7 @@ TEST(Bending, RotatingEverythingRotatesThePath) {
 }
 
 TEST(Bending, LinearFieldsGiveOnePathOnAnyGrid) {
-  // Trilinear interpolation is exact for them, whatever the voxels' shape.
+  // Trilinear interpolation is exact for these fields, whatever the shape of the voxels.
   const auto land = [](const TensorField& field) {
     BendingSettings settings = settings_of(BendingMethod::dopri5, 0);
     settings.tolerance = 1e-10;
@@ -219,7 +219,7 @@ TEST(Bending, StrongFlexibilityFollowsTheMajorEigenvector) {
   });
   const Ray ray = trace_steps(field, settings_of(BendingMethod::splitting, 0.125), 320, {-0.1, 0.1, -0.7},
                               Vector3d(1, 1, 1).normalized(), 300);
-  EXPECT_LT(ray.direction.cross(major(ray.position.z())).norm(), 2e-3);  // It lags by 0.4/(s (5 − 1)).
+  EXPECT_LT(ray.direction.cross(major(ray.position.z())).norm(), 2e-3);  // The direction lags by 0.4/(s (5 − 1)).
   // The streamline of e: x(z) has the slope tan 0.4 z.
   const double expected = -0.1 - (std::log(std::cos(0.4 * ray.position.z())) - std::log(std::cos(0.4 * 0.7))) / 0.4;
   EXPECT_NEAR(ray.position.x(), expected, 4e-3);
@@ -258,7 +258,7 @@ TEST(Bending, OrderOfConvergence) {
   EXPECT_NEAR(observed_order(errors_of(smooth, BendingMethod::splitting, 16, 4)), 2, 0.1);
   EXPECT_NEAR(observed_order(errors_of(smooth, BendingMethod::rk4, 4, 4)), 4, 0.3);
 
-  // Trilinear data have kinks at the cells' faces, which leave order 2 to any method.
+  // Trilinear data have kinks at the faces of cells, which limit every method to order 2.
   const TensorField kinked = cube_field(9, [](const Vector3d& p) {
     return Matrix3d(linear_tensor(p) * (1 + std::sin(7 * p.x() + 5 * p.y() + 9 * p.z())));
   });
@@ -303,7 +303,7 @@ TEST(Bending, AdaptiveMethodsKeepTheirTolerance) {
     for (const double tolerance : {1e-3, 1e-5, 1e-7}) {
       const Ray ray = land(method, tolerance);
       const double error = (ray.position - exact).norm() / voxel_size(field);
-      // Each step errs by `tolerance` voxels and radians, and it is about 20 voxels from the first to the plate.
+      // The error of each step is `tolerance` voxels and radians, and the plate is about 20 voxels from the first step.
       EXPECT_LT(error, (1 + 20) * tolerance * ray.steps);
       EXPECT_LT(error, last);
       last = error;
@@ -313,7 +313,7 @@ TEST(Bending, AdaptiveMethodsKeepTheirTolerance) {
 }
 
 TEST(Bending, AThinVoxelAcrossTheRayDoesNotShortenItsSteps) {
-  // Not zero, as fields of zeros are crossed brick by brick.
+  // Not zero, because a brick of zeros is crossed in one step.
   const auto weak = [](const Vector3d&) { return Matrix3d(1e-9 * general_tensor()); };
   const TensorField flat(cube_grid({9, 9, 4001}, weak));
   const auto steps = [&](const Vector3d& direction) {
@@ -328,7 +328,7 @@ TEST(Bending, AutomaticStepsShortenWhereTheFieldIsStrong) {
   const auto steps = [](const TensorField& field) {
     return trace_one(field, Geometry(surfaces_of(field)), {}, {0, 0, 2}, {0, 0, -1}, 0.5).steps;
   };
-  EXPECT_EQ(steps(weak), 17u);  // 8 voxels in halves, and the step that finds the face.
+  EXPECT_EQ(steps(weak), 17u);  // 8 voxels in half steps, and the step that finds the face.
   EXPECT_GT(steps(strong), 40u);
 }
 

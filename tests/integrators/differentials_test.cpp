@@ -78,12 +78,13 @@ void expect_equal(const RayDifferential& a, const RayDifferential& b, double tol
 
 class RayDifferentials : public ::testing::TestWithParam<BendingMethod> {
  protected:
-  // Linear in position, so that interpolation is exact and no cell's face is felt.
+  // Linear in position, so that interpolation is exact and has no kinks at the faces of cells.
   const TensorField field_ = test::cube_field(17, test::linear_tensor);
   const Vector3d direction_ = Vector3d(0.2, -0.3, -1).normalized();
   const Start outside_ = make_start(Vector3d(0.1, 0.2, 2), direction_, 0.3);
 
-  // Differentials are those of the steps; between surfaces they are exact, at a surface to the method's order.
+  // Differentials are the derivatives of the steps. They are exact between surfaces; at a surface they have the
+  // method's order.
   BendingSettings settings() const {
     BendingSettings settings = test::settings_of(GetParam(), GetParam() == BendingMethod::euler ? 1.0 / 128 : 0.25);
     settings.tolerance = 1e-7;
@@ -132,8 +133,8 @@ INSTANTIATE_TEST_SUITE_P(EveryMethod, RayDifferentials,
                          ::testing::Values(BendingMethod::euler, BendingMethod::splitting, BendingMethod::rk4,
                                            BendingMethod::bs23, BendingMethod::dopri5));
 
-/// T = diag(a, b, 0): light along z at the axis stays there, and a beam near it spreads by δV' = s diag(a, b) δV,
-/// which begins at 0 for parallel light: straight through. The beam that converges is magnified instead.
+/// T = diag(a, b, 0): light along the z axis stays on it, and a beam near the axis spreads by δV' = s diag(a, b) δV.
+/// For parallel light δV begins at 0, so that it stays parallel. A beam that is not parallel is magnified.
 TEST(RayDifferential, ParallelLightAlongAnEigenvectorStaysParallel) {
   const TensorField field = test::constant_field(Eigen::Vector3d(0.75, -0.5, 0).asDiagonal());
   Surfaces surfaces = test::surfaces_of(field);
@@ -145,18 +146,19 @@ TEST(RayDifferential, ParallelLightAlongAnEigenvectorStaysParallel) {
   EXPECT_NEAR(parallel.differential.position.col(0).norm(), 1, 1e-9);
   EXPECT_NEAR(parallel.differential.direction.norm(), 0, 1e-9);
 
-  // A turn grows by exp(0.75 · 2) along x within the volume of depth 2, and is carried ∫ exp(0.75 t) dt farther, after
-  // one unit of free way and before another.
+  // Within the volume, of depth 2, a turn grows along x by exp(0.75 · 2), and moves the ray sideways by the turn times
+  // ∫ exp(0.75 t) dt. The light is straight for one unit before the volume and for one unit behind it.
   const double turn = 0.1;
   const Traced turned =
       trace_with_differential(field, geometry, settings, make_start({0, 0, 2}, -Vector3d::UnitZ(), turn), 1);
   const double expected = 1 + turn * (1 + (std::exp(1.5) - 1) / 0.75 + std::exp(1.5));
-  // The drift of a step of ½ voxel (1/8) is of second order: (h²/24) of the integral's second derivative.
+  // The error of the drift, with a step of ½ voxel (1/8), is of second order: h²/24 times the integral of the second
+  // derivative.
   EXPECT_NEAR(turned.differential.position.col(0).norm(), expected, turn * 1e-2);
   EXPECT_NEAR(turned.differential.direction.col(0).norm(), turn * std::exp(1.5), 1e-9);
 }
 
-/// Strong kicks take another way through the exponential.
+/// Strong kicks use another branch of the exponential.
 TEST(RayDifferential, MatchesFiniteDifferencesWhereKicksAreStrong) {
   const TensorField field = test::cube_field(17, test::linear_tensor);
   Surfaces surfaces = test::surfaces_of(field);
@@ -164,7 +166,7 @@ TEST(RayDifferential, MatchesFiniteDifferencesWhereKicksAreStrong) {
   surfaces.plate = test::plate_across(direction, 1);
   const Geometry geometry(surfaces);
   const BendingSettings settings =
-      test::settings_of(BendingMethod::splitting, 4);  // One step of 0.5: ‖h s T‖ of some 8.
+      test::settings_of(BendingMethod::splitting, 4);  // One step of 0.5: ‖h s T‖ is about 8.
   const Start start = make_start({0.1, -0.2, 0.3}, direction, 0);
   RayBatch batch;
   batch.add(start.position, start.direction, 8);
@@ -181,7 +183,7 @@ TEST(RayDifferential, MatchesFiniteDifferencesWhereKicksAreStrong) {
     };
     const Vector3d position = (side(1).position - side(-1).position) / (2 * d);
     const Vector3d turned = (side(1).direction - side(-1).direction) / (2 * d);
-    // Both are of the same steps: what is left is the error of the differences.
+    // Both take the same steps, so that only the error of the finite differences remains.
     EXPECT_LT((batch.differentials[0].position.col(i) - position).norm(), 1e-6 * position.norm());
     EXPECT_LT((batch.differentials[0].direction.col(i) - turned).norm(), 1e-6 * (1 + turned.norm()));
   }
@@ -197,7 +199,7 @@ TEST(RayDifferential, LengthIsThatOfTheWay) {
   trace_reference(field, Geometry(surfaces), {}, batch);
   EXPECT_NEAR(batch.length[0], 5, 1e-9);
 
-  // A circle: an antisymmetric tensor turns light at a constant rate, and length is the angle over it.
+  // A circle: an antisymmetric tensor turns light at a constant rate, and the length is the angle divided by this rate.
   Eigen::Matrix3d turning = Eigen::Matrix3d::Zero();
   turning(0, 2) = 0.5;
   turning(2, 0) = -0.5;

@@ -34,7 +34,7 @@ Bench make_bench(TensorField field, const Vector3d& direction, Surfaces extra = 
   return {std::move(field), Geometry(std::move(surfaces)), std::move(beam)};
 }
 
-/// Weights are unlike, and sum to 1.
+/// The weights are different and sum to 1.
 std::vector<LightChannel> channels() { return {{0.1, 650, 0.5}, {0.2, 550, 0.125}, {-0.3, 450, 0.375}}; }
 
 PhotonDistribution distribute(const Bench& bench, FluenceKind kind, std::uint64_t photons, BeamPattern pattern,
@@ -58,7 +58,7 @@ void for_each(const ScalarGrid& grid, const Visit& visit) {
       if (block.active[offset]) visit(Vector3i(block.origin + TensorBlock::position(offset)), block.values[offset]);
 }
 
-/// Σ fluence · volume, world units³: of the outermost voxels the part within the extent.
+/// Σ fluence · volume, world units³. Of an outermost voxel only the part within the extent counts.
 double sum(const TensorField& field, const ScalarGrid& grid) {
   double total = 0;
   for_each(grid, [&](const Vector3i& voxel, double value) {
@@ -73,7 +73,7 @@ double sum(const TensorField& field, const ScalarGrid& grid) {
 
 TEST(Fluence, OfStraightLightIsOneAtEveryVoxel) {
   const Bench bench = make_bench(cube_field(9, zero), {0, 0, -1});
-  // 64 × 64 rays: 8 × 8 through a voxel, 4 through the halves at the sides.
+  // 64 × 64 rays: 8 across a voxel along each axis, 4 across the half voxels at the sides.
   const auto grids = distribute(bench, FluenceKind::bands, 64 * 64, BeamPattern::grid).fluence;
   ASSERT_EQ(grids.size(), 4u);
   for (const ScalarGrid& grid : grids) {
@@ -97,14 +97,14 @@ TEST(Fluence, OfObliqueLightThroughASkewVolumeIsOne) {
   ASSERT_EQ(grids.size(), 1u);
   int voxels = 0;
   for_each(grids[0], [&](const Vector3i& voxel, float value) {
-    // Stratified rays err by how many of them graze the voxel: a few of the hundreds that cross it.
+    // The error of stratified rays is the number of rays that graze the voxel: a few of the hundreds that cross it.
     EXPECT_NEAR(value, 1, 0.15) << voxel.transpose();
     ++voxels;
   });
   EXPECT_EQ(voxels, 12 * 7 * 9);
 }
 
-/// Σ power · length in the volume, of each channel, by tracing the same rays with all that is known of their ways.
+/// Σ power · length in the volume, of each channel, by tracing the same rays and recording their complete tracks.
 std::vector<double> lengths_by_channel(const Bench& bench, std::uint64_t photons, BeamPattern pattern) {
   const BeamSampler positions(bench.beam, pattern, photons, 0);
   std::vector<double> lengths(channels().size());
@@ -175,7 +175,7 @@ TEST(Fluence, ASingleLayerOfVoxelsIsCrossedWhole) {
   EXPECT_EQ(voxels, 81);
 }
 
-/// Blocks of 8³ voxels of a cube at its corners; and, with `filled`, zeros all over between them.
+/// Blocks of 8³ voxels at the corners of a cube; with `filled`, zeros everywhere between them.
 TensorGrid corner_blocks(int size, bool filled) {
   const auto value = [](const Vector3i& i) { return Matrix3d(0.05 * linear_tensor(i.cast<double>() / 40)); };
   if (!filled) {
@@ -211,7 +211,7 @@ TEST(Fluence, OfASparseFieldIsThatOfAFullOneAtTheFieldsBlocks) {
     with_tensors += ((block.origin.array() == 0) || (block.origin.array() == 32)).all();
   }
   EXPECT_EQ(with_tensors, 8u);
-  EXPECT_LE(found.blocks.size(), 64u);  // And those whose cells reach to them.
+  EXPECT_LE(found.blocks.size(), 64u);  // The blocks with tensors, and the blocks whose cells reach to them.
 }
 
 TEST(Fluence, MemoryFollowsTheFieldsBlocksAndNotTheExtent) {
@@ -220,7 +220,7 @@ TEST(Fluence, MemoryFollowsTheFieldsBlocksAndNotTheExtent) {
   FluenceSums sums(field, {1}, false, 10);
   const std::size_t before = sums.memory_bytes();
   EXPECT_LT(before, 10000u);
-  const Vector3d from(3, 4, -2), to(3, 4, size + 2);  // Through two of the blocks, and the gap between them.
+  const Vector3d from(3, 4, -2), to(3, 4, size + 2);  // Through two of the blocks and the gap between them.
   sums.add(0, {{from, 0}, {to, (to - from).norm()}});
   EXPECT_LE(sums.memory_bytes(), before + 3 * TensorBlock::voxels * sizeof(std::uint64_t));
   int voxels = 0;
@@ -229,7 +229,7 @@ TEST(Fluence, MemoryFollowsTheFieldsBlocksAndNotTheExtent) {
     EXPECT_EQ(voxel.head<2>(), Eigen::Vector2i(3, 4));
     ++voxels;
   });
-  EXPECT_EQ(voxels, 24);  // The block before the last, too: its cells reach to that.
+  EXPECT_EQ(voxels, 24);  // Two blocks with tensors, and the block before the last one, whose cells reach to it.
 }
 
 TEST(Fluence, IsTheSameOnAnyNumberOfThreads) {
@@ -256,7 +256,7 @@ TEST(Fluence, SomeChannelsPerPhotonEstimateTheSame) {
   const Bench bench = make_bench(cube_field(9, linear_tensor), {0.2, 0.1, -1});
   const auto all = distribute(bench, FluenceKind::bands, 20000, BeamPattern::stratified).fluence;
   const auto some = distribute(bench, FluenceKind::bands, 20000, BeamPattern::stratified, 1).fluence;
-  for (std::size_t i = 0; i < all.size(); ++i)  // 7000 rays a channel, which are spread evenly.
+  for (std::size_t i = 0; i < all.size(); ++i)  // 7000 rays per channel, spread evenly.
     EXPECT_NEAR(sum(bench.field, some[i]) / sum(bench.field, all[i]), 1, 0.01);
 }
 

@@ -26,7 +26,7 @@ using Eigen::Vector3d;
 
 constexpr int voxels = 17;
 
-/// Of the greatest eigenvalue: a field of gently winding lines.
+/// The eigenvector of the greatest eigenvalue: its lines wind gently.
 Vector3d major_direction(const Vector3d& p) {
   return Vector3d(-0.6 * p.y() + 0.2 * p.z(), 0.6 * p.x(), 1).normalized();
 }
@@ -82,8 +82,8 @@ std::string python_with_vtk() {
   return "";
 }
 
-/// The part of the hyperstreamline that light from the seed would follow, without the seed itself, where two parts
-/// meet.
+/// The part of the hyperstreamline that light from the seed would follow. Its two parts meet at the seed, which is left
+/// out.
 std::vector<Vector3d> hyperstreamline(const std::string& python, const std::string& files, double step,
                                       const Vector3d& seed) {
   std::ostringstream command;
@@ -142,8 +142,8 @@ TEST(Hyperstreamlines, ArePathsOfGreatFlexibility) {
     ASSERT_GT(fine.size(), 20u);
     ASSERT_GT((fine.back() - seed).norm(), 1.5);
     const std::vector<Vector3d> bent = path(field, seed, 200), more = path(field, seed, 400);
-    // Light lags behind the eigenvector as 1 / s: what doubling s changes is what is still missing. Of VTK's steps the
-    // same is assumed, and its numbers are of single precision.
+    // Light lags behind the eigenvector as 1 / s: the change when s is doubled is the lag that remains. The same is
+    // assumed of VTK's steps, and VTK's numbers are in single precision.
     const double lag = distance(bent, more), steps = distance(coarse, fine) + 1e-6;
     EXPECT_LT(distance(fine, more), 1.2 * lag + 1.2 * steps);
     EXPECT_LT(distance(fine, more), 0.6 * distance(fine, bent) + 1.2 * steps);

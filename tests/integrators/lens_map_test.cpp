@@ -1,4 +1,4 @@
-// Parallel light from plane to plane against closed forms.
+// Compares parallel light that goes from plane to plane with closed forms.
 
 #include "integrators/lens/lens_map.h"
 
@@ -37,7 +37,8 @@ Plate tilted_plane(const Vector3d& center, const Vector3d& normal) {
   return plate;
 }
 
-/// Steps are short as well: error control regards the ray, which is straight on a lens's axis, not its derivatives.
+/// Steps must also be short: error control considers the ray, which is straight on the axis of a lens, but not its
+/// derivatives.
 BendingSettings precise() {
   BendingSettings settings = settings_of(BendingMethod::dopri5, 0.25);
   settings.tolerance = 1e-9;
@@ -103,7 +104,7 @@ TEST(LensMap, WithoutFieldLightIsProjected) {
     from_axes << from.right, from.up;
     to_axes << to.right, to.up;
     const Matrix3d projection = Matrix3d::Identity() - direction * normal.transpose() / normal.dot(direction);
-    for (const Vector2d& start : {Vector2d(0, 0), Vector2d(0.4, -0.3), Vector2d(3, 2)}) {  // The last one: beside it.
+    for (const Vector2d& start : {Vector2d(0, 0), Vector2d(0.4, -0.3), Vector2d(3, 2)}) {  // The last: beside it.
       const Vector3d point = from.center + from_axes * start;
       const double distance = normal.dot(to.center - point) / normal.dot(direction);
       const LensLanding landing = land(map, start, 0.4);
@@ -154,7 +155,7 @@ TEST(LensMap, TurningFieldBendsLightToArcs) {
         const BendingSettings settings = is_precise ? precise() : settings_of(method, 0);
         const LensLanding landing = land(make_map(field, plane_at(above), plane_at(-below), down, settings), start, s);
         ASSERT_EQ(landing.end, RayEnd::plate);
-        // A step of half a voxel replaces an arc by its chords: short by a factor of 1 − (s rate h)²/12.
+        // A step of half a voxel replaces an arc by its chords: the length is less by a factor of 1 − (s rate h)²/12.
         const double tolerance = is_precise ? 1e-7 : std::pow(s * rate * 0.5 * voxel_size(field), 2) * arc.aside;
         EXPECT_LT((landing.at - start - Vector2d(0, arc.aside)).norm(), tolerance);
         EXPECT_LT((landing.jacobian - Matrix2d::Identity()).norm(), 1e-6);
@@ -176,7 +177,7 @@ TEST(LensMap, DiagonalFieldTurnsLightByItsClosedForm) {
   const TensorField field = constant_field(rates.asDiagonal());
   const Vector2d start(0.2, -0.1);
   for (const double s : {0.4, -0.4}) {
-    // Between planes 1 and 2 behind the volume, light is straight: the two show its direction.
+    // Light is straight between the planes 1 and 2 behind the volume: its landings on both give its direction.
     const LensLanding at_volume = land(make_map(field, plane_at(1), plane_at(-1), direction), start, s);
     const LensLanding behind = land(make_map(field, plane_at(1), plane_at(-2), direction), start, s);
     ASSERT_EQ(at_volume.end, RayEnd::plate);
@@ -264,7 +265,7 @@ TEST(LensMap, PlanesCutTheVolume) {
   const TensorField field = turning_field(rate * Vector3d::UnitX());
   const Vector2d start(0, -0.9);
   for (const double above : {1.5, 0.9, 0.3})
-    for (const double below : {-0.2, 0.0, 0.4, 0.8, 1.6}) {  // Below the middle; the last one is outside.
+    for (const double below : {-0.2, 0.0, 0.4, 0.8, 1.6}) {  // Distance below the middle; the last one is outside.
       const double depth = std::min(1.0, above) + std::min(1.0, below);
       const Arc arc(depth, s * rate, std::max(0.0, below - 1));
       const LensLanding landing = land(make_map(field, plane_at(above), plane_at(-below), down), start, s);
@@ -283,7 +284,7 @@ TEST(LensMap, TurningLightReachesNeitherBeyondThePlaneNorBehindItsStart) {
   const LensLanding reached = land(make_map(field, from, plane_at(0.2), down), start, 1);
   ASSERT_EQ(reached.end, RayEnd::plate);
   EXPECT_LT((reached.at - start - Vector2d(0, Arc(0.3, 1 / radius, 0).aside)).norm(), 1e-6);
-  // It turns back 0.4 below its start, and is stopped where it meets the plane that it came from.
+  // The ray turns back 0.4 below its start, and stops where it meets the plane from which it came.
   for (const double beyond : {0.0, 0.8, 1.5}) {
     const LensLanding landing = land(make_map(field, from, plane_at(beyond), down), start, 1);
     EXPECT_EQ(landing.end, RayEnd::obstacle) << beyond;
@@ -332,7 +333,7 @@ TEST(LensMap, SettingsOutOfRangeAreRefused) {
 }
 
 /// Gathers from `receiver` to `image` with −s, as the lens does, and follows the reversed light with +s.
-/// @return the largest distance of a return from its start, in voxels; `count` is that of the rays that arrived.
+/// @return the largest distance of a return from its start, in voxels; `count` becomes the number of rays that arrived.
 double worst_return(const TensorField& field, double s, double tolerance, int& count) {
   const Vector3d direction = Vector3d(0.1, -0.05, -1).normalized();
   const Plate receiver = plane_at(-1.5), image = plane_at(1.5);
@@ -358,7 +359,7 @@ double worst_return(const TensorField& field, double s, double tolerance, int& c
       EXPECT_EQ(back.end, RayEnd::plate);
       worst = std::max(worst, (back.position - plane_point(receiver, start)).norm() / voxel_size(field));
       const LensLanding landing = land(gather, start, -s);
-      // With differentials tensors are rounded otherwise, and error control may accept other steps.
+      // With differentials, tensors are rounded differently, and error control may accept other steps.
       EXPECT_LT((plane_point(image, landing.at) - there.position).norm(), 1e-5 * voxel_size(field));
       ++count;
     }

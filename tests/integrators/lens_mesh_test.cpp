@@ -1,4 +1,5 @@
-// Meshes of landings: no cracks, accurate, torn where the map is, and searched sheet by sheet.
+// Meshes of landings: they have no cracks, they are accurate, they are torn where the map is torn, and a search finds
+// every sheet.
 
 #include "integrators/lens/lens_mesh.h"
 
@@ -53,7 +54,7 @@ LensMeshSettings mesh_settings(double extent, double target, double pixel) {
   return settings;
 }
 
-/// Spreads light along +z, in the middle about fivefold, towards its sides less and less.
+/// Spreads light along +z: about fivefold in the middle, less and less towards the sides.
 TensorField spreading_field() {
   return cube_field(17, [](const Vector3d& p) {
     Matrix3d T = Matrix3d::Zero();
@@ -78,7 +79,7 @@ Vector2d start_of(const LensMap& map, double s, const LensMesh& mesh, const Vect
     const LensLanding landing = land(map, start, s);
     start -= landing.jacobian.inverse() * (landing.at - point);
   }
-  EXPECT_LT((land(map, start, s).at - point).norm(), 10 * single_precision);  // Of a map of slope up to ten.
+  EXPECT_LT((land(map, start, s).at - point).norm(), 10 * single_precision);  // The slope of the map is up to ten.
   return start;
 }
 
@@ -90,7 +91,7 @@ TEST(LensMesh, SmoothMapsHaveNoCracks) {
   ASSERT_EQ(mesh.starts.size(), mesh.landings.size());
   ASSERT_EQ(mesh.starts.size(), mesh.mesh.vertices.size());
 
-  // Of the starts, triangles cover the rectangle once. Their edges have a triangle on either side, but on its border.
+  // The triangles of starts cover the rectangle once. Every edge has a triangle on either side, except on the border.
   double covered = 0;
   std::map<std::pair<std::uint32_t, std::uint32_t>, int> edges;
   for (const auto& triangle : mesh.mesh.triangles) {
@@ -107,7 +108,7 @@ TEST(LensMesh, SmoothMapsHaveNoCracks) {
   };
   for (const auto& [edge, count] : edges)
     EXPECT_EQ(count, on_border(mesh.starts[edge.first], mesh.starts[edge.second]) ? 1 : 2);
-  // And no two vertices are at the same place: a crack of width zero.
+  // No two vertices are at the same place, which would be a crack of width zero.
   std::set<std::pair<double, double>> places;
   for (const Vector2d& start : mesh.starts) places.emplace(start.x(), start.y());
   EXPECT_EQ(places.size(), mesh.starts.size());
@@ -118,8 +119,8 @@ TEST(LensMesh, SheetsAreWithinAFractionOfAPixelOfTheMap) {
   const LensMap map = make_map(field);
   const double pixel = 0.05;
   const LensMesh mesh = make_mesh(map, spreading_s, mesh_settings(0.4, 2, pixel));
-  EXPECT_GT(land(map, {0, 0}, spreading_s).jacobian.determinant(), 9);  // It magnifies strongly,
-  EXPECT_GT(mesh.mesh.triangles.size(), 50u);                           // and the first lattice had 8.
+  EXPECT_GT(land(map, {0, 0}, spreading_s).jacobian.determinant(), 9);  // The map magnifies strongly.
+  EXPECT_GT(mesh.mesh.triangles.size(), 50u);                           // The first lattice had 8.
   const SheetSearch search(mesh, pixel);
   std::vector<Sheet> sheets;
   int inside = 0;
@@ -143,7 +144,7 @@ TEST(LensMesh, SheetsAreWithinAFractionOfAPixelOfTheMap) {
       EXPECT_NEAR(sheets[0].length, landing.length, 0.1 * landing.length);
     }
   EXPECT_GT(inside, 500);
-  EXPECT_LT(worst, 0.2);  // A tenth on edges; within triangles somewhat more.
+  EXPECT_LT(worst, 0.2);  // A tenth of a pixel on edges, somewhat more within triangles.
 }
 
 TEST(LensMesh, PixelsThatAreNotSquareTakeRaysByTheirNumber) {
@@ -167,12 +168,12 @@ TEST(LensMesh, PixelsThatAreNotSquareTakeRaysByTheirNumber) {
     }
   EXPECT_LT(worst, 0.2);
 
-  // Where the starts' axes are others than the pixels', too. The map is that of this field again, turned.
+  // The same with starts whose axes differ from the pixels' axes. The map is the one of this field, turned.
   Plate turned = map.from();
   turned.right = map.from().up;
   turned.up = -map.from().right;
   const LensMap turned_map(field, surfaces_of(field), {}, turned, map.to(), Vector3d::UnitZ());
-  settings.turn << 0, -1, 1, 0;  // Right there is up here.
+  settings.turn << 0, -1, 1, 0;  // Right in the starts is up in the pixels.
   EXPECT_NEAR(static_cast<double>(make_mesh(turned_map, spreading_s, settings).starts.size()),
               static_cast<double>(mesh.starts.size()), 0.1 * static_cast<double>(mesh.starts.size()));
   settings.turn = Eigen::Rotation2Dd(0.7).matrix();
@@ -226,7 +227,7 @@ TEST(LensMesh, TornMapsHaveNoTrianglesAcrossTheTear) {
   }
   const SheetSearch search(mesh, pixel);
   std::vector<Sheet> sheets;
-  const double margin = pixel / 4;  // The tear is found within an eighth of a pixel, and its triangles are lost.
+  const double margin = pixel / 4;  // The tear is located to 1/8 pixel; its triangles are left out.
   int lit = 0, dark = 0;
   for (double y = -1.47; y < 0.8; y += 0.021)
     for (double x = -1.47; x < 1.48; x += 0.037) {
@@ -293,7 +294,7 @@ TEST(LensMesh, LatticeLeavesOutRaysThatDidNotLand) {
 }
 
 TEST(LensMesh, SheetsOfAFoldedStrip) {
-  // x lands at 1 − |x − 1|: a strip folded at x = 1 onto itself. Lengths tell the two halves apart.
+  // x lands at 1 − |x − 1|: a strip that is folded onto itself at x = 1. The two halves have different lengths of path.
   std::vector<Vector2d> starts;
   std::vector<LensLanding> landings;
   for (int y = 0; y < 2; ++y)
@@ -316,9 +317,9 @@ TEST(LensMesh, SheetsOfAFoldedStrip) {
     EXPECT_NEAR(sheets[i].jacobian(0, 0), 1 - x, 1e-12);
     EXPECT_NEAR(sheets[i].jacobian(1, 1), 1, 1e-12);
   }
-  search.find({0.5, 0.5}, sheets);  // On the diagonals of both: each is one sheet.
+  search.find({0.5, 0.5}, sheets);  // On the diagonal of both halves, where each still counts as one sheet.
   EXPECT_EQ(sheets.size(), 2u);
-  search.find({1, 0.5}, sheets);  // The fold: where both sheets are the same place.
+  search.find({1, 0.5}, sheets);  // On the fold, where both sheets meet.
   EXPECT_EQ(sheets.size(), 1u);
   search.find({1.01, 0.5}, sheets);
   EXPECT_TRUE(sheets.empty());

@@ -1,4 +1,4 @@
-// Pictures seen through a tensor field, in both modes.
+// Tests pictures that are seen through a tensor field, in both modes.
 
 #include "integrators/lens/lens.h"
 
@@ -33,7 +33,7 @@ Plate plate_at(double z, const Vector2d& size, const Vector2i& resolution = {1, 
   return plate;
 }
 
-/// Noise without any pattern: SplitMix64.
+/// Noise without a pattern, from SplitMix64.
 Image noise(int width, int height) {
   Image image(width, height, {"R", "G", "B"});
   std::uint64_t state = 1;
@@ -242,8 +242,8 @@ TEST(Lens, PointsDescribeTheMapFromPixelsToTheImage) {
         Matrix2d difference;
         difference << (point_at(seen, x + 1, y).st - point_at(seen, x - 1, y).st) / 2,
             (point_at(seen, x, y + 1).st - point_at(seen, x, y - 1).st) / 2;
-        // In `scatter`, (s, t) is linear within a triangle: its slope is off by half of the Jacobian's change across
-        // it.
+        // In `scatter`, (s, t) is linear within a triangle: the error of its slope is half of the Jacobian's change
+        // across it.
         const double tolerance = mode == LensMode::gather ? 0.01 : 0.03;
         ASSERT_LT((difference - point.per_pixel).norm(), tolerance * point.per_pixel.norm()) << x << " " << y;
 
@@ -274,7 +274,7 @@ TensorField converging_field(double k) {
   });
 }
 
-/// The map x → x' of a field that acts on x alone: of closely spaced starts.
+/// The map x → x' of a field that acts on x alone, sampled at closely spaced starts.
 struct Scan {
   std::vector<double> starts, landings;
 
@@ -298,7 +298,7 @@ struct Scan {
     return found;
   }
 
-  /// How many there are; 0 where that changes within `margin`.
+  /// The number of starts that land at `at`; 0 if that number changes within `margin`.
   int count(double at, double margin) const {
     const std::size_t low = find(at - margin).size(), high = find(at + margin).size();
     return low == high ? static_cast<int>(low) : 0;
@@ -320,7 +320,8 @@ TEST(Lens, ThreeSheetsBeyondTheFocus) {
       ASSERT_EQ(point.end, LensEnd::image) << x;
       EXPECT_TRUE(std::isfinite(seen.radiance.plane(0)[5 * 60 + x]));
       const int count = scan.count(target, 0.5 * pixel);
-      // In `gather` the places are those of the picture, whose map is the same one: the planes are at equal distances.
+      // In `gather` the target is the point of the picture. The map is the same one, because the planes are at equal
+      // distances.
       if (count == 0) continue;
       EXPECT_EQ(point.folds, count) << x;
       ++(count == 3 ? threefold : single);

@@ -1,4 +1,5 @@
-// What packets promise beside being right: a ray's result is its own, and work is in proportion to its way.
+// Tests that the result of a ray does not depend on the other rays, and that the work is proportional to the length of
+// its path.
 
 #include "integrators/packets/packet_kernel.h"
 
@@ -20,7 +21,7 @@ using Eigen::Vector3i;
 using PacketKernel = EveryInstructionSet;
 INSTANTIATE_TEST_SUITE_P(All, PacketKernel, test::instruction_sets(), instruction_set_name);
 
-/// From none to what no series follows, so that neighbours take every way through the kernel.
+/// From zero to values for which no series converges, so that neighbouring rays take different branches of the kernel.
 std::vector<double> unlike_flexibilities() { return {1e-4, 0.3, -30, 0, 0.02, 5, 1e5, -0.1, 1e300, 0.002, 0.6}; }
 
 /// Scenes in which rays end in every way, after few steps and after many.
@@ -83,7 +84,7 @@ TEST_P(PacketKernel, RaysDoNotDependOnTheirNeighbours) {
     for (std::size_t i = order.size() - 1; i > 0; --i) std::swap(order[i], order[numbers.below(i + 1)]);
     expect_identical(scene, all, order);
 
-    // Next to rays that end at once, that stay long, and next to itself.
+    // The ray next to rays that end at once, next to rays that stay long, and next to itself.
     const auto latest = std::max_element(all.steps.begin(), all.steps.end()) - all.steps.begin();
     const auto earliest = std::min_element(all.steps.begin(), all.steps.end()) - all.steps.begin();
     std::vector<std::size_t> mixed;
@@ -133,7 +134,7 @@ TEST(PacketKernel, RefusesUnknownInstructionSets) {
 }
 
 TEST_P(PacketKernel, FieldsDependOnNothingBeyondTheBricksOfTheWay) {
-  // The far voxels, of which only the apron's may be read, differ as much as they can.
+  // The voxels outside the brick differ strongly between the fields; the kernel may read only those in the apron.
   const TensorFunction smooth = smooth_tensor(27);
   const auto field = [&](double far) {
     return TensorField(lattice_grid(index_box({-24, -24, -24}, {48, 48, 48}), lattices()[0], [&](const Vector3d& p) {
@@ -161,7 +162,7 @@ TEST_P(PacketKernel, FieldsDependOnNothingBeyondTheBricksOfTheWay) {
   }
 }
 
-/// Rays through a dense field, of which each has one voxel of its way before the field.
+/// Rays through a dense field. Each begins one voxel before the field.
 Scene dense_scene(int voxels) {
   TensorField field(lattice_grid(index_box({0, 0, 0}, Vector3i::Constant(voxels)), lattices()[0], smooth_tensor(29)));
   Numbers numbers(30);
@@ -174,7 +175,7 @@ Scene dense_scene(int voxels) {
   return make_scene("", std::move(field), {}, 0, std::move(rays));
 }
 
-/// Samples of the rays over those that their ways' lengths ask for.
+/// Number of samples, divided by the number that the lengths of the paths within the field require.
 double samples_over_expected(Scene& scene, double step) {
   scene.settings.step = step;
   const RayBatch ends = traced(scene, scene.rays);
@@ -188,7 +189,7 @@ double samples_over_expected(Scene& scene, double step) {
 }
 
 TEST_P(PacketKernel, SamplesAreInProportionToTheWay) {
-  // Where rays begin and end a few more are taken, of which there are too few steps of a voxel in 64.
+  // A few more samples are taken where rays begin and end. Steps of one voxel in 64 voxels are too few to hide these.
   Scene small = dense_scene(64), large = dense_scene(128);
   for (const double step : {0.0, 0.25, 0.5}) {
     EXPECT_NEAR(samples_over_expected(small, step), 1, 0.1) << step;
@@ -197,7 +198,7 @@ TEST_P(PacketKernel, SamplesAreInProportionToTheWay) {
   EXPECT_NEAR(samples_over_expected(large, 1), 1, 0.1);
 }
 
-/// Faces between bricks that the straight way from one point to another crosses, index space.
+/// The number of faces between bricks that the segment from one point to another crosses, index space.
 int faces_between_bricks(const Vector3d& from, const Vector3d& to) {
   int faces = 0;
   for (int axis = 0; axis < 3; ++axis)
@@ -220,7 +221,7 @@ TEST_P(PacketKernel, BricksOfZerosTakeOneStepEach) {
 
     const RayBatch oblique = random_rays(scene.field, 100, {0.1, 0.2, 0.3}, 31), ends = traced(scene, oblique);
     for (std::size_t i = 0; i < ends.size(); ++i) {
-      // From where light enters: the way is straight.
+      // From where light enters; the path is straight.
       const auto entry = scene.geometry.crossing(Surface::bounds, true, oblique.position[i], oblique.direction[i]);
       const Vector3d from = entry && !scene.field.contains(oblique.position[i])
                                 ? Vector3d(oblique.position[i] + entry->distance * oblique.direction[i])
@@ -246,7 +247,7 @@ TEST_P(PacketKernel, EmptyBricksAreNotSampled) {
     std::uint32_t most = 1;
     for (int brick = 0; brick < 16; ++brick) {
       const Vector3i at(brick, int(start.y()) / TensorBrick::cells, int(start.z()) / TensorBrick::cells);
-      most += scene.field.brick(at).strongest > 0 ? 17 : 1;  // Of ½ voxel, and one that both of two bricks see.
+      most += scene.field.brick(at).strongest > 0 ? 17 : 1;  // 16 steps of ½ voxel, and one that two bricks share.
     }
     EXPECT_LE(ends.steps[i], most) << "ray " << i;
   }

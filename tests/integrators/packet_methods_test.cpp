@@ -1,4 +1,4 @@
-// Each method by packets, in single precision, against the same method in double precision.
+// Compares each method in packets, in single precision, with the same method in double precision.
 
 #include <gtest/gtest.h>
 
@@ -29,14 +29,15 @@ Scene scene_of(BendingMethod method, const std::string& name, TensorField field,
                RayBatch rays) {
   Scene scene = make_scene(name_of(method) + ", " + name, std::move(field), surfaces, step, std::move(rays));
   scene.settings.method = method;
-  // Errors of a few hundred steps stay below those that are compared. The least that packets are for.
+  // The smallest tolerance that packets are made for. The errors of a few hundred steps stay below the differences that
+  // tests accept.
   scene.settings.tolerance = 1e-5;
   return scene;
 }
 
-/// Where tensors have kinks, an adaptive method's errors depend on where exactly its steps end, and these on rounding:
-/// packets then err as the reference does, but not by the same. The measure is the reference with a hundredth of the
-/// tolerance.
+/// Where tensors have kinks, the errors of an adaptive method depend on where exactly its steps end, and that depends
+/// on rounding. The errors of packets are then as large as those of the reference, but not equal to them. Both are
+/// compared with the reference at a hundredth of the tolerance.
 void expect_as_exact_as_reference(const Scene& scene) {
   SCOPED_TRACE(scene.name);
   const RayBatch fast = traced(scene, scene.rays), reference = traced_by_reference(scene, scene.rays);
@@ -116,7 +117,7 @@ TEST_P(PacketMethods, TakeTheSameFewStepsInStrongFields) {
   for (const Lattice& lattice : tested_lattices())
     for (const BendingMethod method : {BendingMethod::euler, BendingMethod::rk4}) {
       expect_few_steps(random_scene(method, lattice, 0, 5, 24));
-      expect_few_steps(random_scene(method, lattice, 0.25, 5, 24));  // Beyond what the method's order says.
+      expect_few_steps(random_scene(method, lattice, 0.25, 5, 24));  // Long steps for the order of the method.
       expect_few_steps(random_scene(method, lattice, 0, 1000, 24));  // Steps too short for single precision.
     }
 }
@@ -208,7 +209,7 @@ TEST_P(PacketMethods, EndAsTheReferenceDoesInOddFields) {
   for (const BendingMethod method : other_methods)
     for (const double factor : {1e-41, 1.0, 1e15, std::nan("")}) {
       TensorField field(lattice_grid(index_box({-3, 0, 2}, {20, 17, 19}), lattices()[0], [&](const Vector3d& p) {
-        // Of which a part has no deviator, but a trace that turns light about in Eq. 3.
+        // A part of the field has no deviator, but a trace that reverses light in Eq. 3.
         return p.x() < 5 ? Matrix3d(-30 * factor * Matrix3d::Identity()) : Matrix3d(factor * smooth(p));
       }));
       RayBatch rays = random_rays(field, 24, {0.1, -0.1, 0, 1e30, 1e300, std::nan("")}, 54);
@@ -263,7 +264,7 @@ TEST_P(PacketMethods, RecordTheSameTracks) {
     const RayBatch alone = traced(scene, scene.rays);
     for (std::size_t i = 0; i < alone.size(); ++i) {
       EXPECT_TRUE(identical(recorded, i, alone, i)) << name_of(method) << ", ray " << i;
-      // The two at either end are those of surfaces.
+      // The first two and the last two points are on surfaces or outside the field.
       for (std::size_t k = 3; k + 3 < tracks[i].size(); ++k) {
         const double chord = (tracks[i][k].position - tracks[i][k - 1].position).norm();
         const double length = tracks[i][k].length - tracks[i][k - 1].length;
@@ -274,7 +275,7 @@ TEST_P(PacketMethods, RecordTheSameTracks) {
   }
 }
 
-/// Rays with derivatives: moved across, and turned.
+/// Rays with derivatives, along a parallel shift and along a shift with a turn.
 RayBatch with_differentials(RayBatch rays) {
   for (const Vector3d& direction : rays.direction) {
     RayDifferential differential;
@@ -288,7 +289,7 @@ RayBatch with_differentials(RayBatch rays) {
 }
 
 TEST_P(PacketMethods, CarryDifferentials) {
-  // Derivatives jump where a ray crosses a cell's face; in a field that is linear in position there is nothing to jump.
+  // Derivatives jump where a ray crosses the face of a cell, except in a field that is linear in position.
   for (const Lattice& lattice : tested_lattices())
     for (const BendingMethod method : {BendingMethod::splitting, BendingMethod::euler, BendingMethod::rk4,
                                        BendingMethod::bs23, BendingMethod::dopri5}) {
@@ -312,7 +313,7 @@ TEST_P(PacketMethods, CarryDifferentials) {
           return std::max((of.position - right.position).norm() / right.position.norm(),
                           (of.direction - right.direction).norm() / (right.direction.norm() + right.position.norm()));
         };
-        if (moved.end[i] != exact.end[i] || apart(moved) > 1e-4) continue;  // Where light grazes a surface.
+        if (moved.end[i] != exact.end[i] || apart(moved) > 1e-4) continue;  // The light grazes a surface.
         ++compared;
         EXPECT_EQ(fast.end[i], exact.end[i]);
         EXPECT_LT(apart(fast), 1e-3) << "ray " << i << " after " << exact.steps[i] << " steps";

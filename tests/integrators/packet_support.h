@@ -1,6 +1,6 @@
 #pragma once
 /// @file tests/integrators/packet_support.h
-/// Random fields and rays, and the ways in which packets are compared with the reference.
+/// Random fields and rays, and functions that compare packets with the reference.
 
 #include <algorithm>
 #include <cmath>
@@ -69,7 +69,7 @@ inline TensorFunction smooth_tensor(unsigned seed) {
   };
 }
 
-/// Shapes of voxels, of which 0.05 is the mean edge.
+/// Shapes of voxels; their mean edge is 0.05.
 struct Lattice {
   std::string name;
   Eigen::Affine3d to_world = Eigen::Affine3d::Identity();
@@ -96,14 +96,15 @@ inline Eigen::AlignedBox3i index_box(const Eigen::Vector3i& first, const Eigen::
   return {first, Eigen::Vector3i(first + voxels - Eigen::Vector3i::Ones())};
 }
 
-/// `tensor` is per voxel, and a function of index positions: s times its norm is the kick of a step of one voxel.
+/// `tensor` takes an index position and returns T times the edge of a voxel: s times its norm is the kick of a step of
+/// one voxel.
 inline TensorGrid lattice_grid(const Eigen::AlignedBox3i& box, const Lattice& lattice, const TensorFunction& tensor) {
   return dense_grid(box, lattice.to_world, [&](const Eigen::Vector3i& index) {
     return Eigen::Matrix3d(tensor(index.cast<double>()) / mean_edge);
   });
 }
 
-/// Of the blocks some are taken away.
+/// Removes a fraction of the blocks.
 inline TensorGrid without_blocks(TensorGrid grid, double fraction, unsigned seed) {
   Numbers numbers(seed);
   const auto taken = [&](const TensorBlock&) { return numbers.next() < fraction; };
@@ -154,13 +155,13 @@ inline RayBatch random_rays(const TensorField& field, int bundles, const std::ve
   return batch;
 }
 
-/// Light of five wavelengths, the strongest with that kick per voxel where the field is strongest.
+/// Five flexibilities. The greatest one causes `kick` per voxel where the field is strongest.
 inline std::vector<double> wavelengths(double kick) { return {0.2 * kick, -0.4 * kick, 0.6 * kick, 0.8 * kick, kick}; }
 
 /// Extents that begin and end anywhere in a brick.
 inline Eigen::AlignedBox3i odd_box() { return index_box({-13, 5, -30}, {27, 34, 41}); }
 
-/// Towards the face of a point load's 48 voxels that it presses on, all over it; every tenth bundle right under it.
+/// Rays all over the loaded face of a point load of 48³ voxels; every tenth bundle is directly under the load.
 inline RayBatch rays_under_load(const TensorField& field, int bundles, unsigned seed) {
   Numbers numbers(seed);
   RayBatch rays;
@@ -172,7 +173,7 @@ inline RayBatch rays_under_load(const TensorField& field, int bundles, unsigned 
   return rays;
 }
 
-/// In mean edges of a voxel.
+/// Distance in mean edges of a voxel.
 inline double distance_in_voxels(const Eigen::Vector3d& a, const Eigen::Vector3d& b) {
   return (a - b).norm() / mean_edge;
 }
@@ -203,11 +204,12 @@ inline RayBatch traced_by_reference(const Scene& scene, RayBatch rays) {
   return rays;
 }
 
-/// The rays, turned by what single precision may turn them by on their way: 3e-7 radian, and more where a step's
-/// exponential, exp(h s T), is of a large tensor. s differs by as much, as if all tensors did.
+/// The rays, turned by as much as the errors of single precision may turn them along the path: 3e-7 radian, or more
+/// where the exponential of a step, exp(h s T), has a large argument. s changes by a factor of 1 + 3e-7, which stands
+/// for an error of all tensors.
 inline RayBatch turned_a_little(const Scene& scene) {
   RayBatch rays = scene.rays;
-  const double step = scene.settings.step > 0 ? scene.settings.step : 1.0 / 64;  // The shortest where it matters.
+  const double step = scene.settings.step > 0 ? scene.settings.step : 1.0 / 64;  // The shortest where turns matter.
   const double strength = step * mean_edge * std::abs(scene.settings.scale) * scene.field.greatest_norm();
   for (std::size_t i = 0; i < rays.size(); ++i) {
     const double turn = 3e-7 * std::max(1.0, strength * std::abs(rays.flexibility[i]));
@@ -219,17 +221,17 @@ inline RayBatch turned_a_little(const Scene& scene) {
 }
 
 constexpr double position_tolerance = 1e-3;  // Voxels.
-constexpr double length_tolerance = 1e-5;    // Of the length, and of a voxel.
+constexpr double length_tolerance = 1e-5;    // Relative to the length plus one voxel.
 
-/// Whether a method may repeat a step, which it does or does not where rounding decides.
+/// Whether a method may repeat steps. Rounding can decide whether it repeats one.
 inline bool is_adaptive(BendingMethod method) {
   return method == BendingMethod::bs23 || method == BendingMethod::dopri5;
 }
 
-/// Whether ray i has the same way in both, to single precision.
+/// Whether ray i has the same path in both, to single precision.
 inline bool agree(const RayBatch& a, const RayBatch& b, std::size_t i, double steps_allowed = 1) {
   const double steps_apart = std::abs(double(a.steps[i]) - double(b.steps[i]));
-  const double apart = (a.position[i] - b.position[i]).norm();  // Which is in the length where light grazes a surface.
+  const double apart = (a.position[i] - b.position[i]).norm();  // Lengths may differ by as much.
   return a.end[i] == b.end[i] && distance_in_voxels(a.position[i], b.position[i]) < position_tolerance &&
          std::abs(a.length[i] - b.length[i]) <= length_tolerance * (b.length[i] + mean_edge) + apart &&
          steps_apart <= steps_allowed;
@@ -242,8 +244,8 @@ inline std::string description(const TensorField& field, const RayBatch& rays, s
   return text.str();
 }
 
-/// Whether a ray that left the field ended beside its face: steps in which very strong fields turn light about have no
-/// length that ends on the face.
+/// Whether a ray that left the field did not end on its face. In very strong fields a step may turn light about, and
+/// then no length of that step ends on the face.
 inline bool ends_beside_face(const Scene& scene, const RayBatch& rays, std::size_t i) {
   if (rays.end[i] != RayEnd::missed || rays.steps[i] == 0) return false;
   if (scene.geometry.has_cut() || std::isfinite(scene.settings.max_length)) return false;
@@ -252,8 +254,8 @@ inline bool ends_beside_face(const Scene& scene, const RayBatch& rays, std::size
   return std::min((index - box.min()).cwiseAbs().minCoeff(), (index - box.max()).cwiseAbs().minCoeff()) > 1e-6;
 }
 
-/// Packets against the reference: every ray but those for which a start that differs by single precision's errors
-/// changes what the reference itself finds by as much, of which there may be `sensitive` (a fraction of all).
+/// Compares packets with the reference. A ray is left out if the result of the reference also changes when the start
+/// changes by the errors of single precision; `sensitive` is the greatest fraction of such rays.
 inline void expect_reference(const Scene& scene, double sensitive = 0) {
   SCOPED_TRACE(scene.name);
   const RayBatch fast = traced(scene, scene.rays), exact = traced_by_reference(scene, scene.rays);

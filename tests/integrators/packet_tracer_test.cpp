@@ -1,4 +1,4 @@
-// Rays by packets, in single precision, against the same rays one by one in double precision.
+// Compares rays in packets, in single precision, with the same rays one by one in double precision.
 
 #include "integrators/packets/packet_tracer.h"
 
@@ -56,9 +56,9 @@ TEST_P(Packets, FollowWeakAndMediumFieldsOnAnyLattice) {
 TEST_P(Packets, FollowStrongFieldsOnAnyLattice) {
   for (const Lattice& lattice : tested_lattices()) {
     for (const double step : {0.0, 0.25, 1.0, 2.0}) {
-      // s h ‖T‖ of up to 1, and of up to 50, where light goes along the major eigenvectors.
+      // s h ‖T‖ up to 1; then up to 50, where light goes along the major eigenvectors.
       expect_reference(random_scene(lattice, step, 1 / std::max(step, 0.5), 40), 0.2);
-      // Each step errs there by 50 roundings: fewer steps.
+      // There each step has an error of 50 roundings, so that few steps are compared.
       Scene scene = random_scene(lattice, step, 50 / std::max(step, 0.5), 40);
       scene.settings.max_steps = 20;
       expect_reference(scene, 0.5);
@@ -67,7 +67,7 @@ TEST_P(Packets, FollowStrongFieldsOnAnyLattice) {
 }
 
 TEST_P(Packets, OnlyTheProductOfScaleFlexibilityAndTensorCounts) {
-  constexpr double factor = 8;  // A power of two, so that nothing is rounded otherwise.
+  constexpr double factor = 8;  // A power of two, so that rounding does not change.
   const TensorFunction smooth = smooth_tensor(1);
   const TensorFunction strong = [&](const Vector3d& p) { return Matrix3d(factor * smooth(p)); };
   for (const Lattice& lattice : tested_lattices())
@@ -90,7 +90,7 @@ TEST_P(Packets, OnlyTheProductOfScaleFlexibilityAndTensorCounts) {
 }
 
 TEST_P(Packets, TakeTheSameFewStepsInFieldsHoweverStrong) {
-  // So few that nothing grows.
+  // So few steps that errors do not grow.
   for (const double kick : {1.0, 20.0, 50.0}) {
     for (const double step : {0.0, 1.0}) {
       Scene scene = random_scene(lattices()[2], step, kick, 60);
@@ -130,7 +130,7 @@ TEST_P(Packets, PassASingularCorner) {
   expect_reference(make_scene("point load", std::move(field), std::move(surfaces), 0, std::move(rays)), 0.1);
 }
 
-/// A field and rays for surfaces within it.
+/// A scene with surfaces within the field.
 Scene scene_with(const std::string& name, const Lattice& lattice, const Surfaces& surfaces, double step) {
   TensorField field(lattice_grid(odd_box(), lattice, smooth_tensor(11)));
   RayBatch rays = random_rays(field, 60, wavelengths(0.05), 12);
@@ -223,7 +223,7 @@ TEST_P(Packets, LeaveAndTurnBackAtFacesAsTheReferenceDoes) {
   }
 }
 
-/// The ends of rays through odd fields, and places that are numbers.
+/// Expects the same ends of rays as the reference through unusual fields, and finite positions.
 void expect_same_ends(const std::string& name, const TensorFunction& tensor, const std::vector<double>& flexibilities) {
   SCOPED_TRACE(name);
   TensorField field(lattice_grid(index_box({-3, 0, 2}, {20, 17, 19}), lattices()[0], tensor));
@@ -239,7 +239,7 @@ void expect_same_ends(const std::string& name, const TensorFunction& tensor, con
     EXPECT_TRUE(fast.position[i].allFinite() && fast.direction[i].allFinite()) << i;
     EXPECT_TRUE(std::isfinite(fast.length[i]) && fast.length[i] >= 0) << i;
     EXPECT_EQ(fast.end[i] == RayEnd::degenerate, exact.end[i] == RayEnd::degenerate) << "ray " << i;
-    // Where light turns by more in a step, by how much is chance.
+    // Where light turns by more in a step, the turn depends on rounding.
     const bool follows = std::abs(scene.rays.flexibility[i]) * scene.field.greatest_norm() * mean_edge < 10;
     if (moved.end[i] != exact.end[i] || !follows) continue;
     ++compared;
@@ -263,7 +263,8 @@ TEST_P(Packets, EndAsTheReferenceDoesInOddFields) {
 }
 
 TEST_P(Packets, BendHoweverStrongTheFieldIs) {
-  // A constant field takes light to the direction that its exponential stretches most: a shear's, and an eigenvector.
+  // A strong constant field turns light to the direction that its exponential stretches most: the direction of a shear,
+  // or an eigenvector.
   Matrix3d shear = Matrix3d::Zero();
   shear(0, 1) = 1;
   for (const Matrix3d& tensor : {shear, general_tensor(), Matrix3d(Vector3d(1, -2, 0.5).asDiagonal())}) {
@@ -272,7 +273,8 @@ TEST_P(Packets, BendHoweverStrongTheFieldIs) {
     Numbers numbers(17);
     RayBatch rays;
     for (int i = 0; i < 40; ++i) {
-      // The first along axes, and in planes of them: also of those that shrink, where only rounding lifts light out.
+      // The first six are along axes and in the planes between axes. Some of these shrink, and there only rounding
+      // makes light leave the axis or plane.
       const Vector3d towards = i < 3   ? Vector3d::Unit(i)
                                : i < 6 ? Vector3d(Vector3d::Ones() - Vector3d::Unit(i - 3))
                                        : numbers.direction();
@@ -284,7 +286,7 @@ TEST_P(Packets, BendHoweverStrongTheFieldIs) {
     const RayBatch fast = traced(scene, scene.rays), exact = traced_by_reference(scene, scene.rays);
     for (std::size_t i = 0; i < exact.size(); ++i) {
       EXPECT_EQ(fast.end[i], exact.end[i]) << "ray " << i << ", s " << scene.rays.flexibility[i];
-      // Where eigenvalues are complex light turns by more than single precision of s can say.
+      // Where eigenvalues are complex, the turn of light is too large for the precision of s.
       if (tensor == general_tensor() && scene.rays.flexibility[i] > 1e4) continue;
       EXPECT_LT((fast.direction[i] - exact.direction[i]).norm(), 1e-3)
           << "ray " << i << ", s " << scene.rays.flexibility[i];

@@ -23,7 +23,7 @@ using ::testing::AllOf;
 using ::testing::HasSubstr;
 using ::testing::StartsWith;
 
-/// Reads a file of these bytes, and what is written to the terminal meanwhile must be nothing.
+/// Reads a file of these bytes. Nothing may be written to the terminal meanwhile.
 /// @return the error's message; empty if it was read.
 std::string error_of(const std::string& name, const std::string& bytes) {
   const Temporary file(name, bytes);
@@ -81,7 +81,7 @@ TEST(TckPathsTest, ReadBack) {
   expect_same(read_paths(file.path()), read);
 }
 
-/// A number as bytes in the order that is named.
+/// A number as bytes, in the given order.
 template <class Number>
 std::string bytes_of(Number number, bool little_endian) {
   std::string bytes(sizeof number, ' ');

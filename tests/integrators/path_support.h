@@ -12,7 +12,7 @@
 
 namespace tensorray {
 
-/// Paths of 2, 3, ... points with numbers that no shorter type holds, after one that is empty.
+/// An empty path, then paths of 2, 3, ... points with numbers that need all digits of their type.
 inline std::vector<Path> some_paths(std::size_t count) {
   std::mt19937 engine(1);
   std::uniform_real_distribution<double> uniform(-1, 1);

@@ -47,7 +47,7 @@ double distance_to_segment(const Vector3d& point, const Vector3d& a, const Vecto
   return (a + t * (b - a) - point).norm();
 }
 
-/// The greatest distance of a point of `way` from the polyline `other`.
+/// The greatest distance of one of `points` from the polyline `other`.
 double distance(const PathPoints& points, const PathPoints& other) {
   double greatest = 0;
   for (const PathPoint& point : points) {
@@ -90,7 +90,8 @@ TEST(Paths, RecordsWhatTheRayDoesWithoutChangingIt) {
     ASSERT_EQ(paths.size(), 1u);
     EXPECT_EQ(paths[0].back().position, recorded.position[0]);
     EXPECT_EQ(paths[0].back().length, recorded.length[0]);
-    // The straight way's two ends, the entry into the field, and the steps; of splitting, which repeats none, all.
+    // Points are the two ends of the path, the entry into the field, and the steps. Only `splitting` never repeats a
+    // step.
     if (method == BendingMethod::splitting) {
       EXPECT_EQ(paths[0].size(), 3 + recorded.steps[0]);
     }
@@ -101,7 +102,7 @@ TEST(Paths, PointsCarryTheTensorAndTheCurvature) {
   const TensorField field = cube_field(9, linear_tensor);
   const double s = 0.7;
   BendingSettings settings = settings_of(BendingMethod::rk4, 1.0 / 32);
-  settings.scale = -2.5;  // Of T itself the points know nothing of it.
+  settings.scale = -2.5;  // The tensors of the points do not contain the scale.
   const Path path = trace_one_path(field, seed_at({0.2, -0.1, 2}, s / settings.scale), everything(), settings);
   ASSERT_GT(path.points.size(), 100u);
   for (std::size_t i = 0; i < path.points.size(); ++i) {
@@ -112,7 +113,8 @@ TEST(Paths, PointsCarryTheTensorAndTheCurvature) {
     EXPECT_LT((point.force() - T * V).norm(), 1e-6);
     EXPECT_LT((point.change - s * (T * V - V.dot(T * V) * V)).norm(), 1e-6);
     if (i == 0 || i + 2 >= path.points.size()) continue;
-    // The curvature of the polyline itself: a central difference of h = 1/128 errs by h² |V'''| / 6, some 1e-5 · 10.
+    // The curvature of the polyline itself: the error of a central difference with h = 1/128 is h² |V'''| / 6, about
+    // 1e-5 · 10.
     const PathPoint &before = path.points[i - 1], &behind = path.points[i + 1];
     const Vector3d measured = (behind.direction - before.direction) / (behind.length - before.length);
     EXPECT_LT((measured - point.change).norm(), 2e-4);

@@ -57,7 +57,7 @@ TEST(PhotonDistribution, UndisturbedLightIsUniform) {
   settings.pattern = BeamPattern::grid;
   settings.photons = 40000;
   const Film film = distribute(bench, channels(2), settings).irradiance;
-  // The value is 1 but for how many lattice points the plate happens to hold; the spread is the estimator's.
+  // The mean differs from 1 only by the number of lattice points on the plate. The spread comes from the estimator.
   double mean = 0;
   for (const double value : film.values) mean += value / static_cast<double>(film.values.size());
   EXPECT_NEAR(mean, 1, 0.02);
@@ -137,8 +137,8 @@ TEST(PhotonDistribution, SomeChannelsPerPhotonEstimateTheSame) {
       difference += std::abs(all.plane(channel)[i] - some.irradiance.plane(channel)[i]);
       sum += all.plane(channel)[i];
     }
-    // A kernel covers 4π τ² = 113 pixels, or 10 positions a pixel times 2/8 of them: 1100 rays; were they independent,
-    // they would deviate by 3%, and stratified ones deviate less.
+    // A kernel covers 4π τ² = 113 pixels. Each pixel has 10 positions, of which 2/8 count: 1100 rays. Independent rays
+    // would deviate by 3%; stratified rays deviate less.
     EXPECT_LT(difference / sum, 0.03);
   }
 }
@@ -173,8 +173,9 @@ TEST(PhotonDistribution, NeighboursFollowEachOther) {
     settings.pattern = pattern;
     const PhotonMap photons = distribute(bench, channels(1), settings).photons;
     ASSERT_GT(photons.size(), 3500u);
-    // Sixteen that follow each other on a Morton curve fill a square of 4 by 4 of the 64 by 64, or two halves of such
-    // ones; in the order of rows they would span a quarter of the beam's width, and at random nearly all of it.
+    // Sixteen successive positions on a Morton curve fill a square of 4 by 4 of the 64 by 64 positions, or two halves
+    // of such squares. In the order of rows they would span a quarter of the beam's width, and in random order nearly
+    // all of it.
     int small = 0, groups = 0;
     for (std::size_t first = 0; first + 16 <= photons.size(); first += 16, ++groups) {
       Eigen::AlignedBox3f box;

@@ -1,4 +1,5 @@
-// Single rays through the analytic stress of a point load, computed independently, against rays through sampled fields.
+// Compares rays through sampled fields with single rays through the analytic stress of a point load, which were
+// computed independently.
 
 #include <cmath>
 #include <filesystem>
@@ -80,7 +81,7 @@ TEST(PointLoad, SampledRaysConvergeToTheAnalyticOnesAtSecondOrder) {
   const std::vector<Reference> references = read_references();
   if (references.empty()) GTEST_SKIP() << "no reference rays at " << reference_file();
   ASSERT_EQ(references.size(), 12u);
-  std::map<Eigenvalues, std::vector<double>> errors;  // The greatest, by mode, for each grid.
+  std::map<Eigenvalues, std::vector<double>> errors;  // The greatest error, by mode, for each grid.
   for (const Eigenvalues mode : {Eigenvalues::raw, Eigenvalues::absolute})
     for (const int voxels : {41, 81, 161}) {
       const TensorField field = sampled(voxels, mode);
@@ -91,7 +92,8 @@ TEST(PointLoad, SampledRaysConvergeToTheAnalyticOnesAtSecondOrder) {
     }
   for (const auto& [mode, by_grid] : errors) {
     EXPECT_LT(by_grid.back(), 1e-3);
-    // A factor of 4 a halving; an eigenvalue that changes its sign leaves a kink in `absolute`, and scatter.
+    // Errors fall by a factor of 4 when voxels are halved. In `absolute` an eigenvalue that changes its sign causes a
+    // kink, and the errors scatter.
     EXPECT_GT(std::log2(by_grid.front() / by_grid.back()) / 2, 1.6) << "errors " << ::testing::PrintToString(by_grid);
   }
 }

@@ -41,9 +41,9 @@ double least_distance(const std::vector<Vector3d>& seeds) {
 TEST(Seeds, AGridFillsTheAperture) {
   const Beam beam = hexagonal_beam();
   const std::vector<Vector3d> seeds = grid_seeds(beam, 400);
-  EXPECT_NEAR(double(seeds.size()), 400, 40);  // A row of 20 more or less at each of two edges.
+  EXPECT_NEAR(double(seeds.size()), 400, 40);  // There may be one row of 20 more or less at each of two edges.
   expect_in_aperture(beam, seeds);
-  // Cells are nearly squares of area / 400, their edges off by half a cell in 20 at most.
+  // Cells are nearly squares of area / 400, and their edges differ by at most half a cell in 20.
   EXPECT_NEAR(least_distance(seeds), std::sqrt(area(beam.aperture) / 400), 0.1 * std::sqrt(area(beam.aperture) / 400));
 }
 
@@ -58,7 +58,7 @@ TEST(Seeds, PoissonDisksAreApartAndFillTheAperture) {
   const std::vector<Vector3d> seeds = poisson_disk_seeds(beam, 600, 5);
   EXPECT_EQ(seeds, poisson_disk_seeds(beam, 600, 5));
   EXPECT_NE(seeds, poisson_disk_seeds(beam, 600, 6));
-  // Half of the seeds in either half of the aperture: even a random choice is off by 12 only (one in √(600 / 4)).
+  // Each half of the aperture has half of the seeds. Even a random choice would differ by only 12, which is √(600 / 4).
   const auto right = std::count_if(seeds.begin(), seeds.end(),
                                    [&](const Vector3d& seed) { return (seed - beam.center).dot(beam.right) > 0; });
   EXPECT_NEAR(double(right), 300, 36);

@@ -1,4 +1,4 @@
-// The stretch of bundles of light against closed forms, and against neighbouring rays.
+// Compares the stretch of bundles of light with closed forms and with neighbouring rays.
 
 #include "integrators/probes/stretch.h"
 
@@ -24,7 +24,7 @@ StretchSettings along_minus_z(double length, double flexibility = 1) {
   return settings;
 }
 
-/// The only start's.
+/// The stretch of one start.
 double stretch_at(const TensorField& field, const StretchSettings& settings, const Vector3d& start, double step = 0.125,
                   Surfaces extra = {}) {
   extra.bounds = surfaces_of(field).bounds;
@@ -38,7 +38,7 @@ TEST(Stretch, OfStraightLightIsZero) {
     EXPECT_NEAR(stretch_at(field, along_minus_z(5), start), 0, 1e-7);
 }
 
-/// All light turns alike, wherever it is: neighbours stay where they are beside each other.
+/// All light turns alike everywhere: the distances between neighbours do not change.
 TEST(Stretch, OfRotationIsZero) {
   Matrix3d rotation;
   rotation << 0, -0.4, 0.7, 0.4, 0, 0.9, -0.7, -0.9, 0;
@@ -48,7 +48,7 @@ TEST(Stretch, OfRotationIsZero) {
 }
 
 /// T_xz = −c x: light along −z obeys x'' = s c x near x = 0, so that a distance grows as cosh(√(s c) L) if c > 0, and
-/// oscillates if c < 0, while one along y stays what it is.
+/// oscillates if c < 0. A distance along y does not change.
 Matrix3d lens_tensor(const Vector3d& p, double c) {
   Matrix3d T = Matrix3d::Zero();
   T(0, 2) = -c * p.x();
@@ -59,7 +59,7 @@ TEST(Stretch, OfADivergingFieldIsThatOfTheHyperbolicCosine) {
   const TensorField field = cube_field(17, [](const Vector3d& p) { return lens_tensor(p, 6); });
   for (const double length : {0.3, 0.9, 1.6}) {
     const double expected = std::log(std::cosh(std::sqrt(0.5 * 6) * length)) / length;
-    // The splitting errs by a part of (√3 h)²/12, h = 1/64.
+    // The relative error of splitting is a fraction of (√3 h)²/12, h = 1/64.
     EXPECT_NEAR(stretch_at(field, along_minus_z(length, 0.5), {0, 0.2, 0.9}), expected, 2e-4 * expected) << length;
   }
 }
@@ -70,7 +70,7 @@ TEST(Stretch, OfAConvergingFieldIsZeroAcrossIt) {
     EXPECT_NEAR(stretch_at(field, along_minus_z(length, 0.5), {0, 0.2, 0.9}), 0, 1e-6);
 }
 
-/// Behind the volume distances grow with what the directions differ by: cosh k d + k (L − d) sinh k d.
+/// Behind the volume, distances grow with the difference of directions: cosh k d + k (L − d) sinh k d.
 TEST(Stretch, GoesOnBehindTheVolume) {
   const TensorField field = cube_field(17, [](const Vector3d& p) { return lens_tensor(p, 6); });
   const double k = std::sqrt(0.5 * 6), depth = 2, length = 5;
@@ -82,8 +82,8 @@ TEST(Stretch, GoesOnBehindTheVolume) {
   }
 }
 
-/// The greatest of what a circle of neighbours becomes at equal lengths, of which many leave through another face than
-/// the one they came in through, at a slant.
+/// The stretch is the greatest distance that a circle of neighbours reaches at equal lengths. Many rays leave at a
+/// slant, through another face than the one through which they entered.
 TEST(Stretch, IsThatOfNeighbouringRaysAtEqualLengths) {
   const TensorField field = cube_field(17, linear_tensor);
   const Geometry geometry(surfaces_of(field));
@@ -108,7 +108,7 @@ TEST(Stretch, IsThatOfNeighbouringRaysAtEqualLengths) {
       }
       if (start.z() == 2 && length < 1) continue;  // Not yet in the volume.
       const double value = stretches(field, geometry, bending, settings, {start})[0];
-      // 64 directions miss the greatest by 1 − cos(π/128) = 3e-4 at most.
+      // The greatest of 64 directions is too small by at most 1 − cos(π/128) = 3e-4.
       EXPECT_NEAR(value * length, std::log(greatest), 1e-3) << start.transpose() << ", " << length;
     }
 }
@@ -190,7 +190,7 @@ TEST(Stretch, RefusesSettingsOutOfRangeAndStopsWhenCancelled) {
   EXPECT_THROW(stretch_grid(field, geometry, {}, along_minus_z(1), 9, progress), Cancelled);
 }
 
-/// The length that light is followed for ends it before the volume, in it, behind it, and not beyond what it meets.
+/// The greatest length ends rays before the volume, in it and behind it, but not behind a surface that they meet.
 TEST(GreatestLength, EndsRaysWhereverTheyAre) {
   const TensorField field = cube_field(9, linear_tensor);
   Surfaces surfaces = surfaces_of(field);

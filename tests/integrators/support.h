@@ -13,13 +13,13 @@
 
 namespace tensorray::test {
 
-/// What `trace` may differ by from exact arithmetic, in the units of these fields, whose edges are 2: half a unit in
-/// the last place of single precision, for each of some ten steps.
+/// The accepted difference of `trace` from exact arithmetic, in the units of these fields, whose edges are 2: half a
+/// unit in the last place of single precision, for each of about ten steps.
 constexpr double single_precision = 5e-7;
 
 using TensorFunction = std::function<Eigen::Matrix3d(const Eigen::Vector3d&)>;
 
-/// A grid of `voxels` centres along each axis of the cube [-1, 1]³, moved by `placement`; `tensor` is of world
+/// A grid of `voxels` centres along each axis of the cube [-1, 1]³, moved by `placement`; `tensor` takes world
 /// positions.
 inline TensorGrid cube_grid(const Eigen::Vector3i& voxels, const TensorFunction& tensor,
                             const Eigen::Affine3d& placement = Eigen::Affine3d::Identity()) {
@@ -66,8 +66,8 @@ struct Ray {
   std::uint32_t steps = 0;
 };
 
-/// By the reference: its mathematics is tested to double precision, and packet_tracer_test.cpp compares `trace` with
-/// it.
+/// Traces with the reference: these tests check its mathematics in double precision, and packet_tracer_test.cpp
+/// compares `trace` with it.
 inline Ray trace_one(const TensorField& field, const Geometry& geometry, const BendingSettings& settings,
                      const Eigen::Vector3d& position, const Eigen::Vector3d& direction, double flexibility) {
   RayBatch batch;
@@ -76,8 +76,7 @@ inline Ray trace_one(const TensorField& field, const Geometry& geometry, const B
   return {batch.position[0], batch.direction[0], batch.end[0], batch.steps[0]};
 }
 
-/// Follows a ray for `steps` steps and no further: where it is at the arc length steps · step · voxel_size, for cubic
-/// voxels.
+/// Follows a ray for exactly `steps` steps. For cubic voxels it is then at the arc length steps · step · voxel_size.
 inline Ray trace_steps(const TensorField& field, BendingSettings settings, int steps, const Eigen::Vector3d& position,
                        const Eigen::Vector3d& direction, double flexibility) {
   settings.max_steps = steps;

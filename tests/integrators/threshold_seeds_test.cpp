@@ -16,7 +16,7 @@ using Eigen::AlignedBox3d;
 using Eigen::Matrix3d;
 using Eigen::Vector3d;
 
-/// Its trace is x + 2 z.
+/// A tensor with the trace x + 2 z.
 Matrix3d traced(const Vector3d& p) { return Vector3d(p.x(), p.z(), p.z()).asDiagonal(); }
 
 Threshold trace_from(double least, double greatest = 1e300) {
@@ -39,8 +39,9 @@ TEST(ThresholdSeeds, AreWhereTheTensorIsWanted) {
 }
 
 TEST(ThresholdSeeds, AreEvenlySpread) {
-  // The half of a cube with x + 2 z > 0; its halves on either side of y = 0 and of x + 2 z = 1 / 2 hold their volume's
-  // part, nearer than independent points would (one standard deviation is 32 at a half of 4096).
+  // The seeds fill the half of a cube with x + 2 z > 0. The parts on either side of y = 0 and of x + 2 z = 1 / 2 have
+  // seeds in proportion to their volumes. The tolerance is one standard deviation of independent points: 32 at a half
+  // of 4096.
   const TensorField field = cube_field(9, traced);
   const std::vector<Vector3d> seeds = threshold_seeds(field, everything, trace_from(0), 4096, 7);
   int right = 0, inner = 0;
@@ -49,7 +50,7 @@ TEST(ThresholdSeeds, AreEvenlySpread) {
     inner += p.x() + 2 * p.z() < 0.5;
   }
   EXPECT_NEAR(right, 2048, 32);
-  EXPECT_NEAR(inner, 4096 / 4, 32);  // x + 2 z has the density 1/4 up to 1, for each unit of it and of x.
+  EXPECT_NEAR(inner, 4096 / 4, 32);  // In the cube, the probability density of x + 2 z is 1/4 up to 1.
 }
 
 TEST(ThresholdSeeds, StayInTheBoxOfATurnedField) {

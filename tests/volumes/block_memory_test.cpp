@@ -14,7 +14,7 @@
 namespace tensorray {
 namespace {
 
-/// As large as a block of tensors.
+/// An element as large as a block of tensors.
 struct Large {
   int number = 0;
   std::array<int, 4600> filling{};
@@ -38,7 +38,7 @@ Deque make(int first, int count) {
   return numbers;
 }
 
-/// Of the process, megabytes.
+/// Memory of the process, megabytes.
 double resident_megabytes() {
   std::ifstream file("/proc/self/statm");
   double pages = 0;

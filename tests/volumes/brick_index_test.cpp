@@ -11,7 +11,7 @@ namespace {
 
 using Eigen::Vector3i;
 
-/// Each has its number, and whatever lies about them has none.
+/// Expects that each brick has its number and that the places around the bricks have none.
 void expect_finds(const std::vector<Vector3i>& bricks) {
   const BrickIndex index(bricks);
   for (std::size_t i = 0; i < bricks.size(); ++i) ASSERT_EQ(index.find(bricks[i]), i) << bricks[i].transpose();
@@ -25,7 +25,7 @@ void expect_finds(const std::vector<Vector3i>& bricks) {
       }
 }
 
-/// Every brick of a box, in no order, but for a fraction of them.
+/// The bricks of a box in random order, without a fraction of them.
 std::vector<Vector3i> box_of_bricks(const Vector3i& first, const Vector3i& size, double taken) {
   std::mt19937 random(1);
   std::bernoulli_distribution leaves(taken);

@@ -18,7 +18,8 @@ using testing::AllOf;
 using testing::HasSubstr;
 using testing::ThrowsMessage;
 
-/// Runs `read` on every fiftieth of a file, and some lengths near its ends; each must throw one line with its name.
+/// Runs `read` on a file cut at every fiftieth of its length and at some lengths near its ends. Each call must throw
+/// one line that names the file.
 void expect_all_truncations_fail(const std::string& bytes, const std::string& label) {
   std::vector<std::size_t> lengths{1, 7, 8, 11, 12, 20, 21, 57, bytes.size() - 1, bytes.size() - 2, bytes.size() - 9};
   for (std::size_t i = 0; i < 50; ++i) lengths.push_back(bytes.size() * i / 50);
@@ -55,7 +56,7 @@ TEST(DamagedFiles, DamageBeforeTheTreesNeverCrashes) {
   write_tensor_vdb(path, sparse_grid());
   const std::string bytes = bytes_of(path);
   std::mt19937 engine(3);
-  // What stands before the first grid's tree: header, metadata, table.
+  // The bytes before the first grid's tree: header, metadata, table.
   const std::size_t end = bytes.find("AffineMap") + 9;
   for (int i = 0; i < 300; ++i) {
     std::string changed = bytes;
@@ -158,7 +159,7 @@ TEST(DamagedFiles, NotVdbFiles) {
 }
 
 TEST(DamagedFiles, ReadsFormatsThatHoldUnknownGrids) {
-  // An unknown type in the table of grids does not hide the others: rename that of an unrelated grid.
+  // An unknown type in the table of grids does not hide other grids: rename the type of an unrelated grid.
   const Temporary path("a.vdb");
   openvdb::GridPtrVec grids;
   for (int row = 0; row < 3; ++row) {

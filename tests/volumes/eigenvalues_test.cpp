@@ -43,7 +43,7 @@ class RandomTensors {
   std::normal_distribution<double> normal_;
 };
 
-/// E f(Λ) E⁻¹ by complex eigenvectors, and what rounding makes of it: cond(E)² or so.
+/// E f(Λ) E⁻¹ from complex eigenvectors, and its rounding error, about cond(E)².
 struct Reference {
   Matrix3d value;
   double tolerance;
@@ -69,7 +69,7 @@ TEST(Eigenvalues, AgreesWithComplexEigenvectorsOnRandomTensors) {
     pairs += eigenvalues(tensor)[0].imag() != 0 || eigenvalues(tensor)[1].imag() != 0;
     for (const Eigenvalues mode : both) {
       const Reference expected = reference(tensor, mode);
-      if (expected.value.norm() > 4 * tensor.norm()) continue;  // Near-nilpotent: faded on purpose.
+      if (expected.value.norm() > 4 * tensor.norm()) continue;  // Near-nilpotent: the result fades to zero on purpose.
       ++compared;
       bool defective = false;
       ASSERT_LE((with_eigenvalues(tensor, mode, &defective) - expected.value).norm(), expected.tolerance) << tensor;
@@ -219,7 +219,7 @@ TEST(Eigenvalues, AlmostSimpleShearBecomesIsotropic) {
   const double k = 2;
   for (const Eigenvalues mode : both)
     for (double epsilon = 0.1; epsilon > 1e-16; epsilon /= 10) {
-      // In the (x, z) plane, with an eigenvalue of zero across it.
+      // In the (x, z) plane, with an eigenvalue of zero perpendicular to it.
       const Matrix3d shear = matrix({0, 0, k, 0, 0, 0, epsilon, 0, 0});
       const Matrix3d expected = std::sqrt(k * epsilon) * Vector3d(1, 0, 1).asDiagonal().toDenseMatrix();
       EXPECT_LE((with_eigenvalues(shear, mode) - expected).norm(), 1.5e-6 * k) << epsilon;
@@ -291,8 +291,8 @@ TEST(ApplyEigenvalues, AutomaticIsAbsoluteForSymmetricFieldsOnly) {
 }
 
 TEST(ApplyEigenvalues, CountsDefectiveVoxelsAndLostNorm) {
-  // Half of the voxels simple shear, half a rotation of the same norm: both are erased, though the rotation leaves
-  // a strain of its own size behind.
+  // Half of the voxels hold a simple shear, half a rotation of the same norm. Both are erased, although the rotation
+  // becomes a strain of the same size.
   const auto value = [](const Eigen::Vector3i& i) {
     return i.y() % 2 == 0 ? matrix({0, 0, std::sqrt(2.0), 0, 0, 0, 0, 0, 0}) : matrix({0, -1, 0, 1, 0, 0, 0, 0, 0});
   };
@@ -304,7 +304,7 @@ TEST(ApplyEigenvalues, CountsDefectiveVoxelsAndLostNorm) {
   EXPECT_NEAR(report.norm_lost, 1, 1e-6);
 
   grid = grid_of(value);
-  EXPECT_NEAR(apply_eigenvalues(grid, Eigenvalues::positive).norm_lost, 0.5, 1e-6);  // It keeps rotation.
+  EXPECT_NEAR(apply_eigenvalues(grid, Eigenvalues::positive).norm_lost, 0.5, 1e-6);  // `positive` keeps rotation.
 }
 
 TEST(ApplyEigenvalues, DoesNotDependOnThreads) {

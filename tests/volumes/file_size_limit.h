@@ -1,6 +1,6 @@
 #pragma once
 /// @file tests/volumes/file_size_limit.h
-/// What a full disk is like.
+/// Simulates a full disk.
 
 #include <csignal>
 
@@ -8,7 +8,7 @@
 
 namespace tensorray {
 
-/// While alive, files cannot grow beyond `bytes`; writing then fails as on a full disk.
+/// While it exists, files cannot grow beyond `bytes`; writing then fails as on a full disk.
 class FileSizeLimit {
  public:
   explicit FileSizeLimit(rlim_t bytes) {

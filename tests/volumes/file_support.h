@@ -1,6 +1,6 @@
 #pragma once
 /// @file tests/volumes/file_support.h
-/// Temporary files, a tensor grid with all that files must keep, and grids written by OpenVDB itself.
+/// Temporary files, a tensor grid with everything that files must keep, and grids that OpenVDB itself writes.
 
 #include <cmath>
 #include <filesystem>
@@ -17,7 +17,7 @@
 
 namespace tensorray {
 
-/// A path in the tests' temporary folder that no other process uses; what is there is removed at the end.
+/// A path in the tests' temporary folder that no other process uses; the destructor removes the file.
 class Temporary : public std::filesystem::path {
  public:
   explicit Temporary(const std::string& name) : path(testing::TempDir()) {

@@ -79,7 +79,7 @@ TEST(PointLoad, IsInEquilibrium) {
         divergence +=
             (point_load_stress(p + step, 1, ratio) - point_load_stress(p - step, 1, ratio)).col(axis) / (2 * h);
       }
-      // Central differences err by h²/6 of a third derivative, which is of the order of 60 σ / |p|³.
+      // The error of central differences is h²/6 times a third derivative, which is of the order of 60 σ / |p|³.
       const double scale = point_load_stress(p, 1, ratio).norm() / std::pow(p.norm(), 3);
       EXPECT_LE(divergence.norm(), 60 * h * h * scale + 1e-10) << p.transpose();
     }
@@ -93,7 +93,8 @@ TEST(PointLoad, SurfaceIsFreeOfTraction) {
 }
 
 TEST(PointLoad, PlaneBelowCarriesTheLoad) {
-  // Force of the lower part on the upper one through z = −1, by quadrature in rings r = tan(θ); it holds the load.
+  // The force of the lower part on the upper part through z = −1, by quadrature in rings r = tan(θ). It balances the
+  // load.
   const double load = 3;
   Vector3d force = Vector3d::Zero();
   const int rings = 2000, spokes = 8;
@@ -322,7 +323,7 @@ TEST(Generators, ASliceHasOneVoxel) {
   const TensorGrid slice = generate(Constant{}, grid);
   EXPECT_EQ(slice.active_voxels(), 45u);
   EXPECT_NEAR((slice.to_world * Vector3d::Zero()).y(), 0.25, 1e-15);
-  EXPECT_NEAR(slice.to_world.linear()(1, 1), 0.25, 1e-15);  // As the finer of the other axes.
+  EXPECT_NEAR(slice.to_world.linear()(1, 1), 0.25, 1e-15);  // Equal to the smaller spacing of the other axes.
   grid.max.y() = 0.75;
   EXPECT_NEAR((generate(Constant{}, grid).to_world * Vector3d::Zero()).y(), 0.5, 1e-15);
 }

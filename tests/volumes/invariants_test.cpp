@@ -47,7 +47,7 @@ TEST(InvariantTest, DiagonalTensors) {
   EXPECT_NEAR(of("middle_eigenvalue", tensor), 2, 1e-14);
   EXPECT_NEAR(of("smallest_eigenvalue", tensor), -3, 1e-14);
   EXPECT_NEAR(of("max_shear", tensor), 4.5, 1e-14);
-  EXPECT_NEAR(of("von_mises", tensor), std::sqrt((25 + 81 + 16) / 2.0), 1e-14);  // Of the three differences.
+  EXPECT_NEAR(of("von_mises", tensor), std::sqrt((25 + 81 + 16) / 2.0), 1e-14);  // From the three differences.
   EXPECT_EQ(of("vorticity", tensor), 0);
   EXPECT_EQ(of("swirling_strength", tensor), 0);
   EXPECT_EQ(of("asymmetry", tensor), 0);
@@ -68,7 +68,7 @@ TEST(InvariantTest, AnisotropyOfLinePlaneAndSphere) {
 
 TEST(InvariantTest, RotationAndShear) {
   const Matrix3d rotation = cross_matrix({1, -2, 2});
-  EXPECT_NEAR(of("vorticity", rotation), 6, 1e-14);  // Twice the rate.
+  EXPECT_NEAR(of("vorticity", rotation), 6, 1e-14);  // Twice the rate of rotation.
   EXPECT_NEAR(of("swirling_strength", rotation), 3, 1e-14);
   EXPECT_NEAR(of("asymmetry", rotation), 2, 1e-15);
   EXPECT_EQ(of("fractional_anisotropy", rotation), 0);
@@ -98,7 +98,7 @@ TEST(InvariantTest, IsTheSameInAllAxesAndScalesWithItsDegree) {
     const Matrix3d q = turn.toRotationMatrix();
     for (const std::string& name : invariant_names()) {
       const double value = of(name, tensor);
-      // A pair of eigenvalues about to meet changes with the root of rounding.
+      // A pair of nearly equal eigenvalues changes with the square root of rounding errors.
       EXPECT_NEAR(of(name, q * tensor * q.transpose()), value, 1e-6 * (1 + std::abs(value))) << name;
       const double power = name == "determinant" ? 3 : value == 0 || of(name, 2 * tensor) == value ? 0 : 1;
       EXPECT_NEAR(of(name, 2 * tensor), std::pow(2, power) * value, 1e-12 * (1 + std::abs(value))) << name;

@@ -50,7 +50,7 @@ double greatest_radius_error(const Isosurface& surface, double radius) {
   return error;
 }
 
-/// Edges that belong to one triangle only, taken in its direction.
+/// Edges that belong to one triangle only, in the direction of the triangle.
 int open_edges(const Isosurface& surface) {
   std::map<std::pair<std::uint32_t, std::uint32_t>, int> uses;
   for (const Triangle& t : surface.mesh.triangles)
@@ -63,7 +63,7 @@ int open_edges(const Isosurface& surface) {
   return open;
 }
 
-/// Smaller values are inside: triangles and normals look to the middle.
+/// Smaller values are inside: triangles and normals face the middle.
 void expect_inwards(const Isosurface& surface, double tolerance) {
   ASSERT_EQ(surface.normals.size(), surface.mesh.vertices.size());
   for (const Triangle& t : surface.mesh.triangles)
@@ -109,7 +109,7 @@ TEST(IsosurfaceTest, AnyAffineTransform) {
   }
 }
 
-/// A sphere that sticks out of the extent is cut off there, and has no caps: what is left of it has Archimedes' area.
+/// A sphere that extends beyond the extent is cut off there and has no caps. The rest has the area by Archimedes.
 TEST(IsosurfaceTest, IsOpenAtTheFacesOfTheExtentAndEndsOnThem) {
   const int n = 16;
   const Eigen::AlignedBox3i box(Vector3i(-n, -n, -n), Vector3i(4, n, n));
@@ -124,7 +124,7 @@ TEST(IsosurfaceTest, IsOpenAtTheFacesOfTheExtentAndEndsOnThem) {
   EXPECT_LT(greatest_radius_error(surface, 0.6), 0.5 / n);
 }
 
-/// Far from the faces of the extent, missing voxels are zero: a block has a surface half a voxel about it.
+/// Missing voxels are zero, far from the faces of the extent: a block has a surface half a voxel outside it.
 TEST(IsosurfaceTest, InactiveVoxelsCountAsZero) {
   TensorGrid grid = dense_grid({Vector3i(-4, 12, -4), Vector3i(4, 20, 4)}, Eigen::Affine3d::Identity(),
                                [](const Vector3i&) { return Eigen::Matrix3d(2 * Eigen::Matrix3d::Identity()); });

@@ -13,7 +13,7 @@
 
 namespace tensorray {
 
-/// Points on a plate, as photons are, or in a box.
+/// Points on a plate, like photons, or in a box.
 inline PointCloud cloud_of(std::size_t count, float thickness) {
   std::mt19937 engine(1);
   std::uniform_real_distribution<float> uniform(-1, 1);
@@ -28,7 +28,7 @@ inline PointCloud cloud_of(std::size_t count, float thickness) {
   return cloud;
 }
 
-/// The rank of a point by `power`, which is its index in the cloud.
+/// Power, position, wavelength and direction of a point. Powers increase with the index in the cloud.
 using Record = std::tuple<float, Eigen::Vector3f, float, Eigen::Vector3f>;
 
 inline void expect_records(std::vector<Record> records, const PointCloud& cloud, float tolerance) {

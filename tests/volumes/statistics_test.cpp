@@ -51,7 +51,8 @@ TEST(FieldStatistics, PercentilesOfTheNorm) {
 }
 
 TEST(FieldStatistics, EigenvaluesAndFractions) {
-  // A tenth (x = −2): a pair −1 ± 3i and 4; the rest diag(5, 0, 0), which is neither complex nor negative.
+  // A tenth of the voxels (x = −2) has the eigenvalues −1 ± 3i and 4. The others are diag(5, 0, 0), neither complex nor
+  // negative.
   const TensorGrid grid = grid_of([](const Vector3i& i) -> Matrix3d {
     if (i.x() == -2) return matrix({-1, -3, 0, 3, -1, 0, 0, 0, 4});
     return Vector3d(5, 0, 0).asDiagonal();
@@ -62,14 +63,14 @@ TEST(FieldStatistics, EigenvaluesAndFractions) {
   EXPECT_NEAR(s.imaginary_max, 3, 1e-12);
   EXPECT_DOUBLE_EQ(s.complex_fraction, 0.1);
   EXPECT_DOUBLE_EQ(s.negative_fraction, 0.1);
-  // Sums of squares a voxel: 36, of whose antisymmetric part T − Tᵀ 72; and 25.
+  // Sums of squares per voxel: 36 (72 for T − Tᵀ), and 25.
   EXPECT_NEAR(s.asymmetry, std::sqrt(0.1 * 72 / (0.1 * 36 + 0.9 * 25)), 1e-6);
-  // The deviator of diag(5, 0, 0) is diag(10/3, −5/3, −5/3); that of the other has singular values
+  // The deviator of diag(5, 0, 0) is diag(10/3, −5/3, −5/3). The deviator of the other tensor has the singular values
   // |−5/3 ± 3i| (a normal block) and 10/3.
   const double deviator = std::hypot(5.0 / 3, 3.0);
   EXPECT_NEAR(s.deviator_max, deviator, 1e-12);
   EXPECT_NEAR(s.stable_step(-0.2), 1 / (0.2 * deviator), 1e-12);
-  // The pair becomes √10 on its plane: of the voxel's 36 the 18 of the antisymmetric part are gone.
+  // The pair becomes √10 on its plane: of the voxel's 36, the 18 of the antisymmetric part are erased.
   EXPECT_NEAR(s.absolute_loss, 0.1 * 18 / (0.1 * 36 + 0.9 * 25), 1e-12);
 }
 

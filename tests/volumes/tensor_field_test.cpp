@@ -18,7 +18,7 @@ using Eigen::Vector3i;
 
 Eigen::AlignedBox3i box(const Vector3i& min, const Vector3i& max) { return {min, max}; }
 
-/// Linear along each axis, but not together: what trilinear interpolation reproduces exactly.
+/// Linear along each axis, but not in all together: trilinear interpolation reproduces it exactly.
 Matrix3d trilinear(const Vector3d& p) {
   Matrix3d a, b, c;
   a << 1, 2, 3, 4, 5, 6, 7, 8, 9;
@@ -68,7 +68,8 @@ TEST(TensorField, GradientIsTheDerivativeOfTheInterpolation) {
     std::array<Matrix3d, 2> derivatives;
     EXPECT_TRUE(sampler.at(world, along, derivatives).isApprox(sampler.at(world), 1e-12));
     for (int i = 0; i < 2; ++i) {
-      // The analytic function's, along the index axes: central differences are exact for what is linear along each.
+      // Derivatives of the analytic function along the index axes: central differences are exact, because it is linear
+      // along each.
       const double h = 1e-4;
       const Vector3d by_index = oblique().linear().inverse() * along.col(i);
       Matrix3d expected = Matrix3d::Zero();
@@ -180,7 +181,7 @@ TEST(TensorField, IsTheSameIfItTakesTheBlocks) {
   }
 }
 
-/// Frobenius, in double precision, of the tensor of a voxel.
+/// The Frobenius norm, in double precision, of the tensor of a voxel.
 double deviator(const TensorBrick& brick, int voxel) {
   const Matrix3d T = brick.tensor(voxel);
   return (T - T.trace() / 3 * Matrix3d::Identity()).norm();
@@ -250,7 +251,7 @@ TEST(TensorGrid, NonFiniteVoxelsAreRemovedAndCounted) {
   });
   EXPECT_EQ(remove_non_finite(grid), 3u);
   EXPECT_EQ(grid.active_voxels(), 7u);
-  EXPECT_EQ(grid.blocks.size(), 1u);  // The second block has nothing left.
+  EXPECT_EQ(grid.blocks.size(), 1u);  // The second block has no active voxel left.
   EXPECT_EQ(remove_non_finite(grid), 0u);
 }
 

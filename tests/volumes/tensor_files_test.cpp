@@ -42,7 +42,8 @@ TEST(TensorFiles, HalfRoundTripErrsByHalfsPrecision) {
   ASSERT_EQ(read.blocks.size(), grid.blocks.size());
   for (std::size_t i = 0; i < grid.blocks.size(); ++i) {
     EXPECT_EQ(read.blocks[i].active, grid.blocks[i].active);
-    for (int offset = 0; offset < TensorBlock::voxels; ++offset)  // 11 bits; below 2^-14 steps of 2^-24.
+    // Half floats have 11 bits, and steps of 2^-24 below 2^-14.
+    for (int offset = 0; offset < TensorBlock::voxels; ++offset)
       for (int c = 0; c < 9; ++c) {
         const float value = grid.blocks[i].values[offset](c);
         ASSERT_NEAR(read.blocks[i].values[offset](c), value, std::max(std::abs(value) / 2048, 3e-8f));
@@ -155,7 +156,7 @@ TEST(TensorFiles, ActiveWhereAnyComponentIsAndZeroElsewhere) {
   for (int row = 0; row < 3; ++row) {
     const auto grid = stock_grid<openvdb::Vec3SGrid>("T_row" + std::to_string(row), openvdb::Vec3s(7));
     grid->tree().setValueOn({row, 0, 0}, openvdb::Vec3s(1, 2, 3));
-    grid->tree().setValueOff({5, 5, 5}, openvdb::Vec3s(9));  // Inactive: does not count, whatever its value.
+    grid->tree().setValueOff({5, 5, 5}, openvdb::Vec3s(9));  // Inactive voxels do not count, whatever their values.
     rows.push_back(grid);
   }
   const Temporary path("a.vdb");
@@ -172,7 +173,7 @@ TEST(TensorFiles, ActiveTilesAreVoxels) {
   openvdb::GridPtrVec rows;
   for (int row = 0; row < 3; ++row) {
     const auto grid = stock_grid<openvdb::Vec3SGrid>("T_row" + std::to_string(row), openvdb::Vec3s(0));
-    // One leaf-sized tile and one of 16 × 128³ … that is, of the next level, plus ragged voxels around.
+    // One tile of a leaf's size with voxels beside it, and one tile of the next level (128³).
     grid->sparseFill(openvdb::CoordBBox(-1, -8, 0, 8, -1, 7), openvdb::Vec3s(static_cast<float>(row + 1)));
     grid->tree().addTile(2, openvdb::Coord(128, 0, 0), openvdb::Vec3s(4), true);
     rows.push_back(grid);
@@ -194,7 +195,7 @@ TEST(TensorFiles, GridsThatShareATree) {
   first->tree().setValue({1, 1, 1}, 3);
   openvdb::GridPtrVec grids{first};
   for (const int i : {0, 2, 3, 4, 5, 6, 7, 8}) {
-    const openvdb::FloatGrid::Ptr shared = first->copy();  // Written once, referred to by the others.
+    const openvdb::FloatGrid::Ptr shared = first->copy();  // Grids share one tree, written once.
     shared->setName("T_" + std::to_string(i));
     grids.push_back(shared);
   }
@@ -269,7 +270,7 @@ TEST(TensorFiles, RefusesDifferentTransformsAndFrustums) {
   EXPECT_THAT([&] { read_tensor_vdb(path); }, ThrowsMessage<std::runtime_error>(HasSubstr("not affine")));
 }
 
-/// Values of `value(world)` at the voxels of a ball, so that every kind of edge occurs.
+/// A grid of `value(world)` at the voxels of a ball, so that every kind of edge occurs.
 template <class Grid, class Value>
 typename Grid::Ptr ball(const std::string& name, const openvdb::math::Transform::Ptr& transform, const Value& value) {
   const auto grid = stock_grid<Grid>(name, openvdb::zeroVal<typename Grid::ValueType>());
@@ -306,7 +307,7 @@ TEST(TensorFiles, GradientOfALinearFieldIsExactInWorldAxes) {
   for (const TensorBlock& block : read.blocks)
     for (int offset = 0; offset < TensorBlock::voxels; ++offset) {
       if (!block.active[offset]) continue;
-      // The ball's six poles have no neighbour along two axes, which count as constant.
+      // The six poles of the ball have no neighbour along two axes, where the field counts as constant.
       if ((block.origin + TensorBlock::position(offset)).cast<double>().norm() > 8.5) continue;
       ASSERT_LE((block.values[offset].cast<double>() - jacobian).norm(), 1e-5);
     }

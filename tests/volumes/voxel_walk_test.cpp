@@ -50,7 +50,7 @@ TEST(VoxelWalk, PartsAdjoinLieInTheirVoxelsAndAreAllThatIsInTheBounds) {
       }
     if (i % 5 == 0) b[i % 3] = a[i % 3];
     const std::vector<Part> parts = walk(a, b, bounds);
-    // The reference: how much of 1000 points is in the bounds.
+    // The reference: the fraction of 1000 points that is in the bounds.
     int within = 0;
     for (int k = 0; k < 1000; ++k) within += bounds.contains(Vector3d(a + (k + 0.5) / 1000 * (b - a)));
     double sum = 0;

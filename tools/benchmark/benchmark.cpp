@@ -1,5 +1,5 @@
 /// @file tools/benchmark/benchmark.cpp
-/// `tensorray_bench`: measures, prints.
+/// `tensorray_bench`: runs the benchmarks and prints the results.
 
 #include <cstdio>
 #include <map>
@@ -32,7 +32,7 @@ struct CommandLine {
   bool json = false;
 };
 
-/// On a terminal one line that is drawn over and over.
+/// Shows progress on a terminal, in one line that is overwritten each time.
 void announce(const std::string& what) {
   if (isatty(STDERR_FILENO) != 0) fmt::print(stderr, "\r\033[K{}", what.empty() ? "" : "measuring " + what + " ...");
 }
@@ -40,7 +40,7 @@ void announce(const std::string& what) {
 Json measure(const CommandLine& line) {
   const auto wanted = [&](const char* part) { return line.only.empty() || line.only == part; };
   Json results = {{"version", TENSORRAY_VERSION}, {"quick", line.options.quick}};
-  results["machine"] = measure_machine(line.options);  // Its bounds are part of the others' tables.
+  results["machine"] = measure_machine(line.options);  // The other tables need its limits.
   if (wanted("kernels")) results["kernels"] = measure_kernels(line.options, results["machine"]);
   if (wanted("loading")) results["loading"] = measure_loading(line.options, results["machine"]);
   if (wanted("jobs")) results["jobs"] = measure_jobs(line.options);

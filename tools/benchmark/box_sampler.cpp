@@ -1,11 +1,10 @@
 /// @file tools/benchmark/box_sampler.cpp
-/// The program that one would write without bricks, for comparison: `tensorray` with OpenVDB's BoxSampler, and without
-/// packets. This file takes the place of two sources, and keeps the contracts of their headers as far as tracing
-/// photons needs them: volumes/bricks/tensor_sampler.cpp, with a TensorSampler on three grids of OpenVDB, one for each
-/// row of the tensor, and integrators/packets/packet_tracer.cpp, with a `trace_in_packets` that leaves every ray to the
-/// scalar tracer. CMakeLists.txt lists all other objects of `tensorray` and this one; a definition that this file
-/// lacks, or has too many, is an error of the linker. Both programs therefore run the same machine code but for
-/// sampling and packets.
+/// For comparison: `tensorray` with OpenVDB's BoxSampler instead of bricks, and without packets. This file replaces two
+/// source files, and keeps the contracts of their headers as far as tracing photons needs them. It replaces
+/// volumes/bricks/tensor_sampler.cpp with a TensorSampler on three OpenVDB grids, one for each row of the tensor. It
+/// replaces integrators/packets/packet_tracer.cpp with a `trace_in_packets` that leaves every ray to the scalar tracer.
+/// CMakeLists.txt links all other objects of `tensorray` with this one; a missing or a second definition is an error of
+/// the linker. Except for sampling and packets, both programs therefore run the same machine code.
 
 #include <array>
 #include <memory>
@@ -24,7 +23,7 @@ namespace {
 
 using Rows = std::array<openvdb::Vec3SGrid::Ptr, 3>;
 
-/// The bricks of the field as blocks.
+/// A grid with the voxels of the field's bricks as blocks.
 TensorGrid grid_of(const TensorField& field) {
   TensorGrid grid;
   grid.to_world = field.to_world();
@@ -46,7 +45,8 @@ TensorGrid grid_of(const TensorField& field) {
   return grid;
 }
 
-/// Tells fields apart, also one that took another's memory: by where its first brick is, and how strong.
+/// Identifies a field by the address of its first brick and by that brick's `strongest`, because a new field may reuse
+/// the memory of another.
 struct FieldKey {
   const float* floats = nullptr;
   float strongest = 0;
@@ -60,11 +60,11 @@ FieldKey key_of(const TensorField& field) {
   return {brick.bending, brick.strongest};
 }
 
-/// The grids of the field that was last asked for, which all threads share.
+/// The grids of the field that was requested last. All threads share them.
 Rows shared_rows(const TensorField& field, const FieldKey& key) {
   static std::mutex mutex;
   static FieldKey made;
-  static Rows& rows = *new Rows;  // Never destroyed: OpenVDB does that with threads, which have ended by then.
+  static Rows& rows = *new Rows;  // Never destroyed: OpenVDB would use threads, which have ended by then.
   const std::lock_guard<std::mutex> lock(mutex);
   if (!(made == key)) {
     rows = benchmark::make_openvdb_rows(grid_of(field));
@@ -73,7 +73,7 @@ Rows shared_rows(const TensorField& field, const FieldKey& key) {
   return rows;
 }
 
-/// A thread's accessors; unregistered ones, as threads end after the grids do.
+/// The accessors of one thread. They are not registered with the grids, because threads end after the grids do.
 struct View {
   explicit View(const TensorField& field) : key(key_of(field)), rows(shared_rows(field, key)) {}
 
@@ -83,7 +83,7 @@ struct View {
       rows[0]->getConstUnsafeAccessor(), rows[1]->getConstUnsafeAccessor(), rows[2]->getConstUnsafeAccessor()};
 };
 
-thread_local std::optional<View> view;  // Of the field that this thread's sampler is of.
+thread_local std::optional<View> view;  // Of the field that this thread samples.
 
 void look_at(const TensorField& field) {
   if (!view || !(view->key == key_of(field))) view.emplace(field);
@@ -92,7 +92,7 @@ void look_at(const TensorField& field) {
 }  // namespace
 
 Eigen::Matrix3d TensorSampler::at(const Eigen::Vector3d& world) {
-  if (samples_++ == 0) look_at(*field_);  // A thread uses one sampler after another.
+  if (samples_++ == 0) look_at(*field_);  // Once per sampler: a thread uses its samplers one after another.
   const Eigen::AlignedBox3d& voxels = field_->voxels();
   const Eigen::Vector3d index = (field_->to_index() * world).cwiseMax(voxels.min()).cwiseMin(voxels.max());
   Eigen::Matrix3d T;

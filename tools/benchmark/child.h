@@ -1,6 +1,6 @@
 #pragma once
 /// @file tools/benchmark/child.h
-/// The programs that whole jobs are made with.
+/// Runs the programs that whole jobs need.
 
 #include <filesystem>
 #include <string>
@@ -8,10 +8,11 @@
 
 namespace tensorray::benchmark {
 
-/// A program beside this one. @throw std::runtime_error if there is none.
+/// The path of a program in the folder of this one. @throw std::runtime_error if it is missing.
 std::filesystem::path sibling(const std::string& program);
 
-/// Runs it to its end. @throw std::runtime_error if it cannot be started or fails; it has said why.
+/// Runs a program and waits for its end. @throw std::runtime_error if it cannot be started or fails; the program itself
+/// prints why it failed.
 void run_program(const std::filesystem::path& program, const std::vector<std::string>& arguments);
 
 }  // namespace tensorray::benchmark

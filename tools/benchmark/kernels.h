@@ -1,6 +1,6 @@
 #pragma once
 /// @file tools/benchmark/kernels.h
-/// The kernels that are compared: this program's, and what one would pick instead.
+/// The kernels that are compared: tensorray's, and those that other libraries offer instead.
 
 #include <functional>
 #include <optional>
@@ -11,19 +11,19 @@
 
 namespace tensorray::benchmark {
 
-/// Follows a batch's rays until they leave the field's bounds, as `tensorray::trace` does; sets positions and
-/// directions, adds to `tensor_samples`. One thread at a time.
+/// Follows the rays of a batch until they leave the field's bounds, as `tensorray::trace` does. Sets positions and
+/// directions, and adds to `tensor_samples`. Only one thread at a time may call it.
 using TraceFunction = std::function<void(RayBatch&)>;
 
 struct Kernel {
   std::string name;
-  /// Makes what the kernel samples of the field, which must outlive the function.
+  /// Converts the field to what the kernel samples. The field must outlive the returned function.
   std::function<TraceFunction(const TestField&)> make;
-  std::string instructions;                ///< Of this program's packet kernel; empty for the others.
-  std::string missing;                     ///< Why it cannot be measured here; empty if it can.
-  bool follows_the_rule = true;            ///< Whether its rays are those of Eq. 5, with the same ends.
-  bool on_one_field = false;               ///< Measured on the first only.
-  BendingSettings settings = splitting();  ///< Of the reference that its ends are compared with.
+  std::string instructions;                ///< Instruction set of tensorray's packet kernel; empty for other kernels.
+  std::string missing;                     ///< Why the kernel cannot be measured here; empty if it can.
+  bool follows_the_rule = true;            ///< Whether it traces rays by Eq. 5 to the same ends.
+  bool on_one_field = false;               ///< Whether it is measured on the first field only.
+  BendingSettings settings = splitting();  ///< Settings of the reference that it is compared with.
 
   static BendingSettings splitting() {
     BendingSettings settings;
@@ -32,7 +32,7 @@ struct Kernel {
   }
 };
 
-/// The first is what ratios are taken to.
+/// All kernels. Ratios are relative to the first one.
 std::vector<Kernel> all_kernels();
 
 Kernel openvdb_rows_kernel();    ///< Three Vec3S grids, BoxSampler, value accessors.

@@ -21,13 +21,13 @@ std::string model_name() {
   return "unknown";
 }
 
-/// Arrays that each part's own thread has touched first.
+/// Each thread was the first to touch the part that it works on, so that the part is in the memory near the thread.
 struct Arrays {
   std::size_t count;
   std::unique_ptr<double[]> a, b, c;
 };
 
-/// Calls `work(first, last)` for one range of [0, count) a thread.
+/// Calls `work(first, last)` on each thread, for one part of [0, count).
 template <class Work>
 void for_ranges(int threads, std::size_t count, const Work& work) {
   tbb::task_arena arena(threads);
@@ -56,7 +56,7 @@ Arrays make_arrays(int threads, std::size_t bytes) {
   return arrays;
 }
 
-/// Sixteen sums, so that additions do not wait for each other.
+/// Adds to sixteen sums, so that additions do not wait for each other.
 double sum(const double* values, std::size_t first, std::size_t last) {
   std::array<double, 16> sums{};
   for (std::size_t i = first; i + sums.size() <= last; i += sums.size())

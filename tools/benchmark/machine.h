@@ -1,6 +1,6 @@
 #pragma once
 /// @file tools/benchmark/machine.h
-/// What the machine is and can do at most: the bounds that kernels are held against.
+/// Describes the machine and measures its limits, which kernels are compared with.
 
 #include <cstddef>
 #include <string>
@@ -10,26 +10,27 @@ namespace tensorray::benchmark {
 
 struct Processor {
   std::string model, compiler;
-  int threads = 1;  ///< That a program may use.
+  int threads = 1;  ///< Number that a program may use.
 };
 
-/// Of one set of vector instructions.
+/// The speed of one set of vector instructions.
 struct VectorRate {
   std::string instructions;
-  int lanes = 0;             ///< Floats a vector.
-  double multiply_adds = 0;  ///< Vectors a second, one thread, from independent chains. Where there is no fused
-                             ///< instruction (before AVX2) a multiplication and an addition.
+  int lanes = 0;             ///< Floats per vector.
+  double multiply_adds = 0;  ///< Multiply-adds of vectors per second, one thread, independent chains. Without a fused
+                             ///< instruction (before AVX2) a multiplication and an addition count as one.
 };
 
-/// Bytes a second; arrays are far larger than caches.
+/// Memory bandwidth, bytes per second. The arrays are far larger than the caches.
 struct Bandwidth {
-  double read = 0;   ///< A sum.
-  double triad = 0;  ///< a = b + 3 c, three arrays counted.
+  double read = 0;   ///< Sum of an array.
+  double triad = 0;  ///< a = b + 3 c; the bytes of all three arrays count.
 };
 
 Processor processor();
 
-/// The widest first. @param seconds  That each repetition takes; the median of five counts.
+/// The rates of all instruction sets of the processor, the widest first. The rate is the median of five repetitions.
+/// @param seconds  Approximate length of a repetition.
 std::vector<VectorRate> vector_rates(double seconds);
 
 Bandwidth bandwidth(int threads, std::size_t array_bytes);

@@ -14,11 +14,11 @@ namespace {
 
 struct RenderJob {
   std::string name;
-  int resolution = 64;  ///< Of the field.
-  Json scene;           ///< Without the field.
+  int resolution = 64;  ///< Voxels along the longest axis of the field.
+  Json scene;           ///< The scene without its field.
 };
 
-/// @param side  Of the picture, pixels.
+/// @param side  Edge of the square picture, pixels.
 RenderJob photon_job(int resolution, std::uint64_t photons, int side) {
   return {fmt::format("photon distribution, {} positions, {}²", photons, side),
           resolution,
@@ -42,7 +42,7 @@ RenderJob path_job(int resolution, int seeds, int side) {
            {"camera", {{"resolution", {side, side}}}}}};
 }
 
-/// Fewer rays in larger fields, so that all take a few seconds but for the fields.
+/// Larger fields get fewer rays, so that each job takes a few seconds apart from loading its field.
 std::vector<RenderJob> jobs(bool quick) {
   if (quick) return {photon_job(16, 200, 32), lens_job(16, 32), path_job(16, 9, 32)};
   std::vector<RenderJob> result;
@@ -54,7 +54,7 @@ std::vector<RenderJob> jobs(bool quick) {
   return result;
 }
 
-/// Runs the job. @return what it says of itself (`tensorray render --stats`).
+/// Runs the job. @return its statistics (`tensorray render --stats`).
 Json run_job(const TemporaryFolder& folder, const RenderJob& job, int threads, const std::string& program = "tensorray",
              const std::vector<std::string>& options = {}) {
   Json scene = job.scene;
@@ -83,7 +83,7 @@ Json describe(const RenderJob& job, int threads, const Json& statistics) {
           {"peak_memory_bytes", statistics.at("peak_memory_bytes")}};
 }
 
-/// What a job takes at its peak, roughly: the field as a grid and as bricks.
+/// Whether the memory suffices, roughly: at its peak a job holds the field as a grid and as bricks.
 bool fits_in_memory(const RenderJob& job) {
   constexpr double bytes_per_voxel = 110;
   const double needed = bytes_per_voxel * job.resolution * job.resolution * job.resolution;
@@ -91,7 +91,7 @@ bool fits_in_memory(const RenderJob& job) {
   return needed < there;
 }
 
-/// With one thread and with all.
+/// Runs a job with one thread and with all threads, and appends the results.
 void add_job(const Options& options, const TemporaryFolder& folder, const RenderJob& job, Json& results) {
   if (!fits_in_memory(job)) {
     results.push_back({{"name", job.name}, {"resolution", job.resolution}, {"skipped", "not enough memory"}});
@@ -110,7 +110,8 @@ void add_job(const Options& options, const TemporaryFolder& folder, const Render
   }
 }
 
-/// How often faster a position is traced than with OpenVDB's sampler, which gets fewer positions.
+/// How many times faster a position is traced than with OpenVDB's sampler, which gets fewer positions because it is
+/// slow.
 Json compare_box_sampler(const Options& options, const TemporaryFolder& folder) {
   const int resolution = options.quick ? 16 : 128, side = options.quick ? 32 : 1024, threads = processor().threads;
   const RenderJob few = photon_job(resolution, options.quick ? 100 : 2048, side),

@@ -10,7 +10,8 @@
 namespace tensorray::benchmark {
 namespace {
 
-/// That a packet of rays reads of a cell that was not in the cache: the four voxels that its neighbour does not have.
+/// Bytes that a packet reads for a cell that is not in the cache: the four voxels that it does not share with its
+/// neighbour.
 constexpr double bytes_per_cold_cell = 4 * TensorBrick::bending_floats * sizeof(float);
 
 struct Measurement {
@@ -24,7 +25,7 @@ struct MeasuredField {
   std::vector<Measurement> measurements;
 };
 
-/// On their way the wavelengths of a packet part by a tenth of a voxel in the weakest field, by one in the weak one.
+/// The rays of a packet diverge by a tenth of a voxel in the weakest field, and by one voxel in the weak one.
 std::vector<MeasuredField> fields_to_measure(bool quick) {
   constexpr double weakest = 0.001, weak = 0.01, automatic = 0.15, strong = 1.5;
   const Eigen::Vector3d down(0.1, 0.07, -1), across(-1, 0.1, 0.05);
@@ -46,7 +47,7 @@ std::vector<MeasuredField> fields_to_measure(bool quick) {
   };
 }
 
-/// The greatest distance between the ends of the kernel's rays and of the reference's, in voxels.
+/// The greatest distance, in voxels, between where a ray ends by the kernel and by the reference.
 double greatest_difference(const TestField& test, Order order, const TraceFunction& kernel,
                            const BendingSettings& settings) {
   RayBatch rays = make_batches(test, order, 0, 1)[0], expected = rays;
@@ -64,7 +65,7 @@ struct KernelRate {
 };
 
 KernelRate measure_kernel(const TestField& test, Order order, const TraceFunction& kernel, double seconds) {
-  constexpr std::uint64_t packets = 16;  // A round.
+  constexpr std::uint64_t packets = 16;  // Packets per round.
   std::uint64_t next = 0, rays = 0, samples = 0;
   const auto prepare = [&](std::uint64_t rounds) {
     next += rounds * packets;
@@ -84,7 +85,7 @@ KernelRate measure_kernel(const TestField& test, Order order, const TraceFunctio
   return {rate, static_cast<double>(samples) / static_cast<double>(rays)};
 }
 
-/// Of the rate at which vectors of those instructions could be issued.
+/// The rate as a fraction of the highest one at which vectors of these instructions can be issued.
 double issue_fraction(double samples_per_second, const std::string& instructions, const Json& machine) {
   for (const Json& rate : machine.at("vectors"))
     if (rate.at("instructions") == instructions)

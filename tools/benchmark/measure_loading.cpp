@@ -30,13 +30,13 @@ Json measure_loading(const Options& options, const Json& machine) {
     reading[i] = wall_seconds() - start;
     voxels = static_cast<double>(grid.active_voxels());
     start = wall_seconds();
-    const TensorField field(std::move(grid));  // As jobs do.
+    const TensorField field(std::move(grid));  // Moved, as in jobs.
     bricks[i] = wall_seconds() - start;
     memory = static_cast<double>(field.memory_bytes());
   }
   const double seconds_reading = rate_of(reading).median, seconds_bricks = rate_of(bricks).median;
   const double bytes = voxels * voxel_bytes;
-  const double moved = (bytes + memory) / seconds_bricks;  // Read and written, as the triad counts.
+  const double moved = (bytes + memory) / seconds_bricks;  // Bytes read and written, as the triad counts them.
   const double triad = machine.at("memory").back().at("triad_bytes_per_second");
   return {{"field", fmt::format("point load, {}³, from a file that the system has in memory", resolution)},
           {"active_voxels", voxels},

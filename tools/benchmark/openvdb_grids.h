@@ -1,6 +1,7 @@
 #pragma once
 /// @file tools/benchmark/openvdb_grids.h
-/// Fields as OpenVDB's grids in memory. Private to the .cpp that measure OpenVDB: its headers are slow to compile.
+/// Fields as OpenVDB grids in memory. Only the .cpp files that measure OpenVDB include this header, because OpenVDB's
+/// headers are slow to compile.
 
 #include <array>
 
@@ -10,7 +11,7 @@
 
 namespace tensorray::benchmark {
 
-/// A grid of the blocks' active voxels; `value` makes a voxel's of its tensor. Positions are indices.
+/// A grid with the active voxels of the blocks, in index space. `value` converts a tensor to a value of the grid.
 template <class Grid, class Value>
 typename Grid::Ptr make_openvdb_grid(const TensorGrid& tensors, const Value& value) {
   typename Grid::Ptr grid = Grid::create();

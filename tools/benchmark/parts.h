@@ -1,6 +1,6 @@
 #pragma once
 /// @file tools/benchmark/parts.h
-/// The parts of the benchmark. Each measures, and returns everything as JSON; the tables are made of that.
+/// The parts of the benchmark. Each part returns its measurements as JSON, and the tables are made from that.
 
 #include <functional>
 #include <string>
@@ -12,22 +12,25 @@ namespace tensorray::benchmark {
 using Json = nlohmann::ordered_json;
 
 struct Options {
-  bool quick = false;    ///< Tiny sizes: shows that everything works, measures nothing.
-  bool million = false;  ///< Also the job of a million positions.
-  /// Told what is measured next.
+  bool quick = false;    ///< Tiny sizes: shows that everything works; the numbers have no meaning.
+  bool million = false;  ///< Also run the job of a million positions.
+  /// Called with a description of what is measured next.
   std::function<void(const std::string&)> announce;
 };
 
-/// The processor, what its vectors do a second, and its memory.
+/// Measures the processor, the rates of its vector instructions, and the memory bandwidth.
 Json measure_machine(const Options& options);
 
-/// All kernels on all fields. @param machine  What measure_machine returned.
+/// Measures the kernels on all fields.
+/// @param machine  The result of measure_machine.
 Json measure_kernels(const Options& options, const Json& machine);
 
-/// From a file to bricks in memory. @param machine  As above.
+/// Measures the time from a file to bricks in memory.
+/// @param machine  The result of measure_machine.
 Json measure_loading(const Options& options, const Json& machine);
 
-/// From scene file to picture, by phase. @throw std::runtime_error if the program is not beside this one, or fails.
+/// Measures the time from scene file to picture, by phase.
+/// @throw std::runtime_error if a program is not in the folder of this one, or fails.
 Json measure_jobs(const Options& options);
 
 }  // namespace tensorray::benchmark

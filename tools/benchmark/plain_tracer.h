@@ -1,7 +1,7 @@
 #pragma once
 /// @file tools/benchmark/plain_tracer.h
-/// The loop that one would write about a library's sampler: scalar, single precision, in index space, with the
-/// splitting step and the exponential's series up to the second order.
+/// A plain loop that traces rays with the sampler of another library: scalar, single precision, in index space, with
+/// the splitting step and the series of the exponential up to the second order.
 
 #include <Eigen/Core>
 
@@ -9,14 +9,15 @@
 
 namespace tensorray::benchmark {
 
-/// A ray in index space. `kick` is h·s in world units: what tensors are multiplied with.
+/// A ray in index space. Tensors are multiplied by `kick`, which is h·s in world units.
 struct PlainRay {
   Eigen::Vector3f P, V;
   float kick;
 };
 
-/// @param sample  Of an index position, the Matrix3f there.
-/// @return how many samples were taken. The ray ends on the face where it leaves `box`.
+/// Follows a ray to the face where it leaves `box`.
+/// @param sample  Returns the Matrix3f at an index position.
+/// @return the number of samples taken.
 template <class Sample>
 std::uint64_t follow_plainly(const Eigen::AlignedBox3f& box, const Sample& sample, PlainRay& ray) {
   constexpr auto half = static_cast<float>(step / 2);

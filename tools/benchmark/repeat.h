@@ -1,6 +1,6 @@
 #pragma once
 /// @file tools/benchmark/repeat.h
-/// Times work of any length, several times.
+/// Measures the rate of work of any length, in several repetitions.
 
 #include <algorithm>
 #include <array>
@@ -12,19 +12,19 @@ namespace tensorray::benchmark {
 
 constexpr int repetitions = 5;
 
-/// Units a second, of all repetitions.
+/// Units per second: the median, least and greatest of all repetitions.
 struct Rate {
   double median = 0, least = 0, most = 0;
 };
 
-/// Of an odd number of values.
+/// Takes an odd number of values.
 template <std::size_t Count>
 Rate rate_of(std::array<double, Count> values) {
   std::sort(values.begin(), values.end());
   return {values[Count / 2], values.front(), values.back()};
 }
 
-/// That this thread has worked: other programs on the machine do not count.
+/// Seconds of processor time of this thread, so that other programs on the machine do not count.
 inline double thread_seconds() {
   timespec time{};
   clock_gettime(CLOCK_THREAD_CPUTIME_ID, &time);
@@ -35,13 +35,13 @@ inline double wall_seconds() {
   return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
 }
 
-/// Where there is nothing to prepare: `work` is told the number of rounds.
+/// A `prepare` for work that needs no preparation: `work` then receives the number of rounds.
 inline std::uint64_t as_many(std::uint64_t rounds) { return rounds; }
 
-/// @param prepare  Makes what `work` needs for so many rounds; not timed.
-/// @param work     Does them, and returns how many units these were.
+/// @param prepare  Makes what `work` needs for a number of rounds; not timed.
+/// @param work     Does the rounds, and returns the number of units done.
 /// @param clock    thread_seconds, or wall_seconds where `work` uses several threads.
-/// @param seconds  That a repetition takes, about: the number of rounds is doubled until it does.
+/// @param seconds  Approximate length of a repetition. The number of rounds is doubled until it is reached.
 template <class Prepare, class Work>
 Rate repeat(const Prepare& prepare, const Work& work, double (*clock)(), double seconds) {
   std::array<double, repetitions> rates{};

@@ -1,6 +1,6 @@
 #pragma once
 /// @file tools/benchmark/tables.h
-/// What was measured, for people.
+/// Prints measurements as readable tables.
 
 #include <string>
 
@@ -8,7 +8,7 @@
 
 namespace tensorray::benchmark {
 
-/// One text of all parts that `results` holds.
+/// The tables of all parts in `results`, as one text.
 std::string tables(const Json& results);
 
 }  // namespace tensorray::benchmark

@@ -1,6 +1,6 @@
 #pragma once
 /// @file tools/benchmark/temporary_folder.h
-/// A place for files that nobody keeps.
+/// A folder for temporary files.
 
 #include <filesystem>
 #include <string>
@@ -9,14 +9,14 @@
 
 namespace tensorray::benchmark {
 
-/// A folder of its own, removed with all that is in it.
+/// A folder of this process. The destructor removes it with all its files.
 class TemporaryFolder {
  public:
   TemporaryFolder() : path_(std::filesystem::temp_directory_path() / ("tensorray_bench_" + std::to_string(getpid()))) {
     std::filesystem::create_directories(path_);
   }
   ~TemporaryFolder() {
-    std::error_code ignored;  // A folder that stays behind is no reason to lose what was measured.
+    std::error_code ignored;  // An error here must not discard the measurements.
     std::filesystem::remove_all(path_, ignored);
   }
   TemporaryFolder(const TemporaryFolder&) = delete;

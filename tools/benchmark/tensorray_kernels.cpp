@@ -14,7 +14,7 @@ std::function<TraceFunction(const TestField&)> packet_tracer(const BendingSettin
   };
 }
 
-/// By the processor's best instructions, with automatic steps.
+/// Another method, with the best instructions of the processor and automatic steps.
 Kernel other_method(const std::string& name, BendingMethod method) {
   Kernel kernel;
   kernel.name = "tensorray, packets, " + name;

@@ -1,7 +1,7 @@
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "tools/benchmark/vector_rates.cpp"
 #include <hwy/foreach_target.h>
-// After it, as it asks: this file is compiled once for every set of instructions.
+// highway.h must come after foreach_target.h, which compiles this file once for every set of instructions.
 #include <hwy/highway.h>
 
 #include "tools/benchmark/machine.h"
@@ -14,7 +14,8 @@ namespace hn = hwy::HWY_NAMESPACE;
 
 int lanes() { return static_cast<int>(hn::Lanes(hn::ScalableTag<float>())); }
 
-/// Ten chains hide the latency of five cycles on two ports. @return something of the result, so that it is computed.
+/// Ten independent chains hide the latency of five cycles on two ports.
+/// @return a value that depends on all chains, so that the compiler keeps them.
 float multiply_add(std::size_t rounds) {
   const hn::ScalableTag<float> tag;
   const auto factor = hn::Set(tag, 0.999f), term = hn::Set(tag, 0.001f);

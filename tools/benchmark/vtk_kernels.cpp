@@ -19,7 +19,7 @@ namespace {
 
 using Image = vtkNew<vtkImageData>;
 
-/// The field on an image, index space: `components` floats a point, which `values` makes of a tensor.
+/// The field as an image in index space, with `components` floats per point. `values` converts a tensor to these.
 template <class Values>
 std::shared_ptr<Image> make_image(const TestField& test, int components, const Values& values) {
   auto image = std::make_shared<Image>();
@@ -43,8 +43,8 @@ std::shared_ptr<Image> make_image(const TestField& test, int components, const V
 
 double way_through(const TestField& test) { return test.field.index_bounds().sizes().norm(); }
 
-/// Streamlines of the vector T·z of the same field, from the rays' origins, by Runge and Kutta's method of order 4.
-/// Counted are the steps, of which each samples four times.
+/// Streamlines of the vector T·z, from the origins of the rays, by the Runge–Kutta method of order 4. It counts steps,
+/// each of which takes four samples.
 TraceFunction stream_tracer(const TestField& test) {
   const auto image = make_image(test, 3, [](const Eigen::Matrix3f& T) -> Eigen::Vector3f { return T.col(2); });
   (*image)->GetPointData()->SetActiveVectors("field");
@@ -72,22 +72,23 @@ TraceFunction stream_tracer(const TestField& test) {
   };
 }
 
-/// Hyperstreamlines of the pressure from the rays' origins, a point for every step.
+/// Hyperstreamlines of the minor eigenvector, the direction of the greatest pressure, from the origins of the rays.
+/// They have one point for every step.
 TraceFunction hyperstreamline_tracer(const TestField& test) {
-  constexpr int sides = 3;  // Of the tube that comes with it: the least that VTK takes.
+  constexpr int sides = 3;  // Sides of the tube that VTK makes about the line: the least that it accepts.
   const auto image = make_image(test, 9, [](const Eigen::Matrix3f& T) { return T; });
   (*image)->GetPointData()->SetActiveTensors("field");
   return [&test, image](RayBatch& batch) {
     for (std::size_t i = 0; i < batch.size(); i += packet_rays) {
-      // From inside: VTK's does not begin on a face.
+      // Begin inside: vtkHyperStreamline does not begin on a face.
       const Eigen::Vector3d at = test.field.to_index() * batch.position[i] + test.direction;
       vtkNew<vtkHyperStreamline> tracer;
       tracer->SetInputData(*image);
       tracer->SetStartPosition(at.x(), at.y(), at.z());
       tracer->IntegrateMinorEigenvector();
       tracer->SetIntegrationDirectionToIntegrateBothDirections();
-      tracer->SetIntegrationStepLength(step / std::sqrt(3.0));  // In diagonals of a voxel, ...
-      tracer->SetStepLength(step / way_through(test));          // ... and the tube's, in diagonals of the field.
+      tracer->SetIntegrationStepLength(step / std::sqrt(3.0));  // In diagonals of a voxel.
+      tracer->SetStepLength(step / way_through(test));  // Spacing of the tube's points, in diagonals of the field.
       tracer->SetMaximumPropagationDistance(way_through(test));
       tracer->SetTerminalEigenvalue(0);
       tracer->SetNumberOfSides(sides);

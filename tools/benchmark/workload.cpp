@@ -11,10 +11,10 @@ namespace tensorray::benchmark {
 namespace {
 
 constexpr std::uint64_t batch_packets = 16;
-constexpr std::uint64_t warm_edge = 8;           // Origins of a warm square along an edge, a voxel apart.
-constexpr double least_s = 0.02, most_s = 0.37;  // Flexibilities of 730 and 380 nm by the paper's a and b.
+constexpr std::uint64_t warm_edge = 8;           // Origins along an edge of the square of Order::warm, one voxel apart.
+constexpr double least_s = 0.02, most_s = 0.37;  // Flexibilities of 730 and 380 nm with the paper's a and b.
 
-/// The standard generators' grids are scaled by what turns the median ray by `turn`; small turns grow in proportion.
+/// Scales a grid so that the median ray turns by `turn`. Small turns are proportional to the scale.
 void scale_to_turn(TensorGrid& grid, const Eigen::Vector3d& direction, double turn) {
   const TensorField field(grid);
   Surfaces surfaces;
@@ -38,7 +38,7 @@ void empty_every_second_cube(TensorGrid& grid, int edge) {
 /// A permutation of the numbers below 2^16.
 std::uint64_t shuffled(std::uint64_t i) { return (i * 40503 + 12345) & 0xffff; }
 
-/// Where packet number `packet` enters, as fractions of the face's edges.
+/// Where packet number `packet` enters the field, as fractions of the edges of the face.
 Eigen::Vector2d place(Order order, std::uint64_t packet, int voxels) {
   if (order == Order::warm) {
     const double x = static_cast<double>(packet % warm_edge), y = static_cast<double>(packet / warm_edge % warm_edge);

@@ -1,6 +1,6 @@
 #pragma once
 /// @file tools/benchmark/workload.h
-/// What is measured on: fields, and the packets of rays that go through them. The same for every kernel.
+/// The fields and the packets of rays of the measurements. They are the same for every kernel.
 
 #include <cstdint>
 #include <string>
@@ -13,36 +13,37 @@
 
 namespace tensorray::benchmark {
 
-constexpr double step = 0.5;     ///< Of every kernel, in voxels.
-constexpr int packet_rays = 32;  ///< Wavelengths of one origin.
+constexpr double step = 0.5;     ///< Step of the kernels, in voxels.
+constexpr int packet_rays = 32;  ///< Rays of one origin, one for each wavelength.
 
-/// A field in the forms that kernels are made of. Voxels are cubes.
+/// A field in the forms from which kernels are made. Voxels are cubes.
 struct TestField {
   TensorGrid grid;
   TensorField field;
-  Geometry geometry;          ///< The field's bounds, and nothing else: rays end where they leave them.
-  Eigen::Vector3d direction;  ///< Of the light; unit.
+  Geometry geometry;          ///< Only the bounds of the field: rays end where they leave them.
+  Eigen::Vector3d direction;  ///< Direction of the light, of unit length.
 
-  double voxel() const { return grid.to_world.linear().col(0).norm(); }  ///< World units.
+  double voxel() const { return grid.to_world.linear().col(0).norm(); }  ///< Edge of a voxel, world units.
 };
 
 struct FieldRequest {
   Generator generator;
   int resolution = 128;
-  Eigen::Vector3d direction;  ///< Of the light.
-  double turn = 0.15;         ///< Radians by which the median ray turns at s = 0.2, roughly: the field's scale.
-  bool half_empty = false;    ///< Without every second cube of 64³ voxels (16³ where `resolution` is below 128).
+  Eigen::Vector3d direction;  ///< Direction of the light, of any length.
+  double turn = 0.15;         ///< Approximate turn of the median ray at s = 0.2, radians. It sets the field's scale.
+  bool half_empty = false;    ///< Remove every second cube of 64³ voxels (16³ where `resolution` is below 128).
 };
 
 TestField make_field(const FieldRequest& request);
 
-/// How packets follow each other.
+/// The order of the packets' origins.
 enum class Order {
-  warm,   ///< 64 origins side by side, over and over: cells are in the cache.
-  fresh,  ///< All over the face where light enters, in no order.
+  warm,   ///< 64 neighbouring origins, repeated: their cells are in the cache.
+  fresh,  ///< All over the face where light enters, in a shuffled order.
 };
 
-/// The packets `first`, `first` + 1, ... in batches as the renderer's own: rays begin on the face where light enters.
+/// The packets `first`, `first` + 1, ... in batches like those of the renderer. Rays begin on the face where light
+/// enters.
 std::vector<RayBatch> make_batches(const TestField& test, Order order, std::uint64_t first, std::uint64_t packets);
 
 }  // namespace tensorray::benchmark

@@ -3,7 +3,7 @@
 namespace tensorray {
 namespace {
 
-constexpr double greatest_table = 64;  // Entries of four bytes a brick.
+constexpr double greatest_table = 64;  // Table entries per brick, at most; an entry takes four bytes.
 
 }  // namespace
 

@@ -1,6 +1,6 @@
 #pragma once
 /// @file volumes/bricks/brick_index.h
-/// Which of a list of bricks is at a place.
+/// Finds the brick that is at a given place.
 
 #include <array>
 #include <cstddef>
@@ -11,22 +11,22 @@
 
 namespace tensorray {
 
-/// Numbers of bricks by their coordinates, in steps of a brick. Memory follows the number of bricks, not their extent:
-/// a dense table over the box about them where that takes at most 256 bytes a brick (bricks themselves take 26,000), so
-/// that finding one is one load from a table that caches hold; else a hash table. Immutable; any number of threads may
-/// read it at once.
+/// Maps the coordinates of bricks (voxel index / 8) to their numbers in a list. Memory follows the number of bricks,
+/// not their extent. The index is a dense table over the box of all bricks where that takes at most 256 bytes per brick
+/// (a brick itself takes 26,000); finding a brick is then one load from a table that fits in caches. Otherwise it is a
+/// hash table. Immutable; any number of threads may read it at once.
 class BrickIndex {
  public:
   static constexpr std::uint32_t missing = 0xffffffffu;
 
   BrickIndex() = default;
 
-  /// @param bricks  No two at one place; fewer than `missing`.
+  /// @param bricks  All at different places; fewer than `missing`.
   explicit BrickIndex(const std::vector<Eigen::Vector3i>& bricks);
 
-  /// The number of the brick in the list that this was made of, or `missing`. Any coordinates may be asked for.
+  /// The number of the brick in the constructor's list, or `missing`. Any coordinates are allowed.
   std::uint32_t find(const Eigen::Vector3i& brick) const {
-    // Unsigned, what lies before the box is far behind it.
+    // Unsigned differences wrap: coordinates below the box become very large and fail the test.
     const auto from = [&](int axis) { return static_cast<std::uint32_t>(brick[axis]) - first_[axis]; };
     const std::uint32_t x = from(0), y = from(1), z = from(2);
     if (x < size_[0] && y < size_[1] && z < size_[2])
@@ -47,9 +47,10 @@ class BrickIndex {
   std::size_t home_slot(const Eigen::Vector3i& brick) const;
   std::uint32_t find_slot(const Eigen::Vector3i& brick) const;
 
-  std::array<std::uint32_t, 3> first_{}, size_{};  ///< Of the box that `table_` covers; without one its size is zero.
+  /// First brick and size of the box that `table_` covers; the size is zero if there is no table.
+  std::array<std::uint32_t, 3> first_{}, size_{};
   std::vector<std::uint32_t> table_;
-  std::vector<Slot> slots_;  ///< Open addressing; its size is a power of two, or zero where there is a table.
+  std::vector<Slot> slots_;  ///< Hash table, open addressing. Its size is a power of two, or zero if `table_` is used.
 };
 
 }  // namespace tensorray

@@ -15,10 +15,11 @@ namespace {
 constexpr int cells = TensorBrick::cells;
 static_assert(cells == TensorBlock::size, "a brick holds a block and the near faces of its neighbours");
 
-/// A neighbour's place, ahead or behind, as bits of x, y and z.
+/// The offset of a neighbour, 0 or 1 along each axis, from the bits of a number: bit 0 is x, bit 1 is y, bit 2 is z.
 Eigen::Vector3i corner(int bits) { return {bits & 1, bits >> 1 & 1, bits >> 2 & 1}; }
 
-/// The blocks before this one, as bits of x, y and z, whose aprons share an active voxel of it.
+/// The preceding bricks whose aprons contain an active voxel of `block`. Bit i is the brick at the place of the
+/// block minus corner(i).
 std::bitset<8> shared_faces(const TensorBlock& block) {
   std::bitset<8> touched;
   if (block.active.all()) return touched.set();
@@ -32,17 +33,18 @@ std::bitset<8> shared_faces(const TensorBlock& block) {
   return touched;
 }
 
-/// T − T₂₂ I, eight floats, and T₂₂.
+/// Writes T − T₂₂ I (eight floats) and T₂₂.
 void copy_voxel(const Eigen::Matrix3f& T, float* bending, float* trailing) {
   const float first = T(0, 0), middle = T(1, 1), last = T(2, 2);
   using Eight = Eigen::Array<float, TensorBrick::bending_floats, 1>;
-  Eigen::Map<Eight>{bending} = Eigen::Map<const Eight>(T.data());  // Two vectors; a memmove is a call.
+  Eigen::Map<Eight>{bending} = Eigen::Map<const Eight>(T.data());  // Two vector copies; memmove would be a call.
   bending[0] = first - last;
   bending[4] = middle - last;
   *trailing = last;
 }
 
-/// Copies the voxels that a block and a brick share. @param ahead  Of the block from the brick: 0 or 1 along each axis.
+/// Copies the voxels that a block and a brick share.
+/// @param ahead  Offset of the block from the brick, 0 or 1 along each axis.
 void copy_shared_voxels(const TensorBlock& block, const Eigen::Vector3i& ahead, float* floats) {
   const auto count = [&](int axis) { return ahead[axis] == 0 ? cells : 1; };
   const Eigen::Vector3i first = ahead * cells;
@@ -64,7 +66,7 @@ double squared_deviator(const float* bending) {
   return std::max(0.0, squares - trace * trace / 3);
 }
 
-/// For any values: what is not a number counts as zero.
+/// In double precision, for values of any size; NaN counts as zero.
 double greatest_squared_deviator(const float* brick) {
   double greatest = 0;
   for (int voxel = 0; voxel < TensorBrick::voxels; ++voxel)
@@ -72,19 +74,20 @@ double greatest_squared_deviator(const float* brick) {
   return greatest;
 }
 
-/// TensorBrick::strongest of a brick's floats.
+/// Computes TensorBrick::strongest from the floats of a brick.
 float strongest_deviator(const float* brick) {
-  // In single precision, which is off by less than 2e-6: the trace takes at most two thirds away from the squares.
+  // The relative error of single precision is below 2e-6 here, because the trace takes at most two thirds of the
+  // squares away.
   float greatest = 0, sum = 0;
   for (const float* T = brick; T != brick + TensorBrick::trailing_offset; T += TensorBrick::bending_floats) {
-    const Eigen::Map<const Eigen::Array4f> near(T), far(T + 4);  // A vector register each.
+    const Eigen::Map<const Eigen::Array4f> near(T), far(T + 4);  // One vector register each.
     const float squares = (near * near + far * far).sum(), trace = T[0] + T[4];
     greatest = std::max(greatest, squares - trace * trace * (1.0f / 3));
-    sum += squares;  // Not finite where any is not.
+    sum += squares;  // Not finite if any value is not.
   }
-  constexpr float least = 1e-25f, most = 1e30f;  // Beyond them squares would underflow or overflow.
+  constexpr float least = 1e-25f, most = 1e30f;  // Outside this range squares may underflow or overflow.
   const double squared = greatest > least && sum < most ? double{greatest} : greatest_squared_deviator(brick);
-  // Rounded up: interpolation between voxels, too, may round to a little more than any of them.
+  // Rounded up, because interpolation may round to slightly more than the tensor of any voxel.
   return static_cast<float>(std::sqrt(squared) * (1 + 1.2e-5));
 }
 

@@ -1,6 +1,6 @@
 #pragma once
 /// @file volumes/bricks/brick_making.h
-/// Makes a TensorField's bricks of a grid's blocks.
+/// Makes the bricks of a TensorField from the blocks of a grid.
 
 #include <vector>
 
@@ -11,11 +11,12 @@
 
 namespace tensorray {
 
-/// The blocks of a grid, found by where they are. Does not own them.
+/// Finds the blocks of a grid by their places. Does not own the blocks.
 struct BlockTable {
   explicit BlockTable(const TensorGrid& grid);
 
-  /// @param place  Of the block's first voxel, in steps of a block. @return nullptr if there is none.
+  /// @param place  Index of the block's first voxel / 8.
+  /// @return nullptr if there is no block.
   const TensorBlock* find(const Eigen::Vector3i& place) const {
     const std::uint32_t i = index.find(place);
     return i == BrickIndex::missing ? nullptr : blocks[i];
@@ -26,11 +27,13 @@ struct BlockTable {
   BrickIndex index;
 };
 
-/// The bricks of `extent` that hold an active voxel as a cell's corner, ordered by x, then y, then z: each block's own,
-/// and where a voxel lies on a near face of it the one before it, whose apron shares that voxel.
+/// The bricks within `extent` that have an active voxel at a corner of one of their cells, ordered by x, then y, then
+/// z. Each block gives the brick at its place. An active voxel on a near face of a block also gives the preceding
+/// brick, whose apron contains that voxel.
 std::vector<Eigen::Vector3i> active_bricks(const BlockTable& table, const Eigen::AlignedBox3i& extent);
 
-/// Writes a brick's voxels, TensorBrick's way, over zeros. Reads the blocks at `brick` and the seven behind it.
+/// Writes the voxels of a brick in the layout of TensorBrick. `floats` must hold zeros. Reads the block at `brick` and
+/// its seven following neighbours.
 /// @return TensorBrick::strongest.
 float make_brick(const BlockTable& table, const Eigen::Vector3i& brick, float* floats);
 

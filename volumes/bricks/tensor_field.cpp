@@ -19,17 +19,17 @@ struct alignas(64) ZeroBrick {
 };
 constexpr ZeroBrick zero_brick;
 
-/// The bricks of the cells between the voxels of a box (an axis of a single voxel has one cell).
+/// The range of bricks that hold the cells between the voxels of a box. An axis with a single voxel has one cell.
 Eigen::AlignedBox3i bricks_of(const Eigen::AlignedBox3i& voxels) {
   const auto brick_of = [](int cell) { return cell >> 3; };
   const Eigen::Vector3i last = (voxels.max().array() - 1).matrix().cwiseMax(voxels.min());
   return {voxels.min().unaryExpr(brick_of), last.unaryExpr(brick_of)};
 }
 
-/// How many bricks are made before blocks are given back: as many as keep all threads busy.
+/// Number of bricks that are made before blocks are freed; enough to keep all threads busy.
 constexpr std::size_t enough_bricks = 4096;
 
-/// The first one after `brick` that begins a new x.
+/// The first index from `brick` on where x differs from the x before it; at most the number of bricks.
 std::size_t end_of_layer(const std::vector<Eigen::Vector3i>& bricks, std::size_t brick) {
   while (brick < bricks.size() && bricks[brick].x() == bricks[brick - 1].x()) ++brick;
   return std::min(brick, bricks.size());
@@ -70,7 +70,7 @@ TensorField::TensorField(TensorGrid&& grid) : to_world_(grid.to_world), to_index
   grid.blocks.clear();
 }
 
-/// @param give_back  give_back(x) is called when no block whose origin is before x is needed any more.
+/// @param give_back  Called as give_back(x) when no block whose origin is below x is needed any more.
 template <class GiveBack>
 void TensorField::make_bricks(const TensorGrid& grid, const GiveBack& give_back) {
   const Eigen::AlignedBox3i active = grid.active_box();
@@ -96,7 +96,8 @@ void TensorField::make_bricks(const TensorGrid& grid, const GiveBack& give_back)
   }
 }
 
-/// Memory for `bricks` bricks, zero, from large pages where the system has them: bricks are visited far apart.
+/// Memory for `bricks` bricks, filled with zeros. It uses large pages where the system has them, because rays visit
+/// bricks that are far apart in memory.
 TensorField::Floats TensorField::allocate(std::size_t bricks) {
   const std::size_t bytes = bricks * TensorBrick::stored_floats * sizeof(float);
   void* const memory = mmap(nullptr, bytes, PROT_READ | PROT_WRITE, MAP_PRIVATE | MAP_ANONYMOUS, -1, 0);

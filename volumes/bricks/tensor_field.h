@@ -14,76 +14,78 @@
 
 namespace tensorray {
 
-/// 8³ cells with the far apron that interpolation needs: 9³ voxels. Bricks without an active voxel are all one brick of
-/// zeros.
+/// 8³ cells, with the far apron that interpolation needs: 9³ voxels. All bricks without an active voxel share one brick
+/// of zeros.
 ///
-/// A tensor T is kept in two parts. What bends light is T − T₂₂ I, as a multiple of the identity bends nothing (Zheng
-/// and Pang 2003, Eq. 5): its last component is zero, so that eight floats, one or two vector registers, are all that a
-/// tracer reads. T₂₂ lies apart.
+/// A tensor T is stored in two parts. T − T₂₂ I bends light as T does, because a multiple of the identity bends nothing
+/// (Zheng and Pang 2003, Eq. 5). Its last component is zero, so that a tracer reads only eight floats, which fill one
+/// or two vector registers. T₂₂ is stored separately.
 struct TensorBrick {
   static constexpr int cells = 8;
   static constexpr int width = cells + 1;  ///< Voxels along an edge, with the apron.
   static constexpr int voxels = width * width * width;
   static constexpr int bending_floats = 8;
-  static constexpr int trailing_offset = voxels * bending_floats;                  ///< Of `trailing`, in floats.
-  static constexpr int stored_floats = (trailing_offset + voxels + 15) / 16 * 16;  ///< Whole cache lines.
+  static constexpr int trailing_offset = voxels * bending_floats;  ///< Offset of `trailing` from `bending`, in floats.
+  static constexpr int stored_floats = (trailing_offset + voxels + 15) / 16 * 16;  ///< Rounded up to whole cache lines.
 
   static constexpr int voxel(int x, int y, int z) { return (x * width + y) * width + z; }
 
-  const float* bending;   ///< Eight a voxel: T − T₂₂ I column by column, aligned to 32 bytes.
-  const float* trailing;  ///< One a voxel: T₂₂.
-  float strongest;  ///< No tensor within the brick has a deviator, T − ⅓ tr(T) I, of a greater Frobenius norm.
+  const float* bending;   ///< Eight floats per voxel: T − T₂₂ I column by column, aligned to 32 bytes.
+  const float* trailing;  ///< One float per voxel: T₂₂.
+  float strongest;        ///< Upper bound in the brick of the Frobenius norm of the deviator, T − ⅓ tr(T) I.
 
-  Eigen::Matrix3d tensor(int voxel) const;  ///< T.
+  Eigen::Matrix3d tensor(int voxel) const;  ///< The tensor T at a voxel.
 };
 
-/// Bricks in memory, which grows with the active voxels and not with the extent. Immutable; any number of threads may
-/// read it at once.
+/// A field as bricks in memory. Its size grows with the number of active voxels, not with the extent. Immutable; any
+/// number of threads may read it at once.
 class TensorField {
  public:
   /// @throw std::invalid_argument if the grid has no active voxel or its transform cannot be inverted.
   explicit TensorField(const TensorGrid& grid);
 
-  /// The same, giving back the grid's blocks on the way, so that there is never twice the field in memory.
+  /// The same, but frees the blocks of the grid while it makes bricks, so that memory never holds the whole field
+  /// twice.
   explicit TensorField(TensorGrid&& grid);
 
   const Eigen::Affine3d& to_world() const { return to_world_; }
   const Eigen::Affine3d& to_index() const { return to_index_; }
 
   /// The volume's extent in index space: from the least to the greatest active voxel, so that N voxels span N − 1. An
-  /// axis with a single voxel spans that voxel, ±½, with the same tensor across.
+  /// axis with a single voxel spans that voxel ±½, and the tensor is constant along it.
   const Eigen::AlignedBox3d& index_bounds() const { return index_bounds_; }
 
-  /// The box of the active voxels' centres, index space: `index_bounds` but for axes with a single voxel.
+  /// The box of the centres of the active voxels, index space. It differs from `index_bounds` only along axes with a
+  /// single voxel.
   const Eigen::AlignedBox3d& voxels() const { return voxels_; }
 
-  /// The eight corners of the extent, world.
+  /// The eight corners of the extent, world space.
   std::vector<Eigen::Vector3d> corners() const;
 
-  /// The box about them, along the world's axes.
+  /// The axis-aligned box that encloses `corners`, world space.
   Eigen::AlignedBox3d world_box() const;
 
-  /// Whether a point is inside the extent, its faces included.
+  /// Whether a point is inside the extent or on its faces.
   bool contains(const Eigen::Vector3d& world) const { return index_bounds_.contains(to_index_ * world); }
 
-  /// The greatest Frobenius norm of a voxel.
+  /// The greatest Frobenius norm of all voxels.
   double greatest_norm() const;
 
   std::size_t brick_count() const { return bricks_.size(); }
 
-  /// Where the bricks in memory are, in steps of a brick, ordered by x, then y, then z: those that hold an active voxel
-  /// in a corner of one of their cells.
+  /// Coordinates (voxel index / 8) of the bricks in memory, ordered by x, then y, then z. A brick is in memory if an
+  /// active voxel is at a corner of one of its cells.
   const std::vector<Eigen::Vector3i>& bricks() const { return bricks_; }
   std::size_t memory_bytes() const;
 
-  /// The brick that holds the cells from `brick` * 8 on. Those within the extent that hold no active voxel, and all
-  /// others, are the brick of zeros.
+  /// The brick whose first cell is at `brick` * 8. It is the brick of zeros wherever no brick is in memory, also
+  /// outside the extent.
   TensorBrick brick(const Eigen::Vector3i& brick) const {
     const std::uint32_t index = index_.find(brick);
     return index == BrickIndex::missing ? zeros : stored(index);
   }
 
-  /// Whether the brick is in memory: if not, `brick` gives zeros.
+  /// Whether the brick is in memory. If not, `brick` returns the brick of zeros.
   bool is_stored(const Eigen::Vector3i& brick) const { return index_.find(brick) != BrickIndex::missing; }
 
  private:
@@ -107,9 +109,9 @@ class TensorField {
   Eigen::Affine3d to_world_, to_index_;
   Eigen::AlignedBox3d index_bounds_, voxels_;
   std::vector<Eigen::Vector3i> bricks_;
-  Floats floats_;                 ///< Brick after brick.
-  std::vector<float> strongest_;  ///< Of each brick.
-  BrickIndex index_;              ///< Which of them is at a place.
+  Floats floats_;                 ///< The bricks, in the order of `bricks_`.
+  std::vector<float> strongest_;  ///< TensorBrick::strongest of each brick.
+  BrickIndex index_;              ///< Finds a brick by its coordinates.
 };
 
 }  // namespace tensorray

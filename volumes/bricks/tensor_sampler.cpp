@@ -12,7 +12,7 @@ int TensorSampler::locate(const Eigen::Vector3d& world, Eigen::Vector3d& fractio
   Eigen::Vector3i cell;
   for (int axis = 0; axis < 3; ++axis) {
     const double first = voxels.min()[axis], last = voxels.max()[axis];
-    const double inside = std::min(std::max(first, index[axis]), last);  // In this order NaN goes to the first voxel.
+    const double inside = std::min(std::max(first, index[axis]), last);  // In this order NaN becomes the first voxel.
     const double near = std::max(std::min(std::floor(inside), last - 1), first);
     cell[axis] = static_cast<int>(near);
     fraction[axis] = inside - near;
@@ -30,7 +30,7 @@ namespace {
 
 constexpr int step_x = TensorBrick::voxel(1, 0, 0), step_y = TensorBrick::voxel(0, 1, 0);
 
-/// What bends light fills vector registers, T₂₂ goes alone.
+/// The eight floats that bend light fill vector registers; T₂₂ is interpolated separately.
 using Eight = Eigen::Array<double, 8, 1>;
 
 Eigen::Matrix3d to_matrix(const Eight& bending, double trailing) {
@@ -98,7 +98,7 @@ Eigen::Matrix3d TensorSampler::at(const Eigen::Vector3d& world, const Eigen::Mat
   const auto eight = interpolate<Eight>(voxel, f, [&](int at) { return bending(brick_, at); });
   const auto last = interpolate<double>(voxel, f, [&](int at) { return double{brick_.trailing[at]}; });
   Eigen::Matrix<double, 3, 2> by_index = field_->to_index().linear() * along;
-  // An axis of a single voxel has the same tensor across it.
+  // The tensor is constant along an axis with a single voxel.
   for (int axis = 0; axis < 3; ++axis)
     if (field_->voxels().sizes()[axis] == 0) by_index.row(axis).setZero();
   for (int i = 0; i < 2; ++i) {

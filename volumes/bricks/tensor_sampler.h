@@ -11,8 +11,9 @@
 
 namespace tensorray {
 
-/// Samples a field, which must outlive it. Cheap to make; one belongs to one thread (it remembers the last brick).
-/// Points outside the extent are taken to the nearest point on it: the tracer knows what is inside.
+/// Samples a field, which must outlive the sampler. Cheap to make. Each thread needs its own, because a sampler caches
+/// the last brick. A point outside the extent is moved to the nearest point of the extent; the tracer must check what
+/// is inside.
 class TensorSampler {
  public:
   explicit TensorSampler(const TensorField& field) : field_(&field) {}
@@ -20,14 +21,14 @@ class TensorSampler {
   /// Trilinear interpolation at a world position, in world axes; inactive voxels count as zero.
   Eigen::Matrix3d at(const Eigen::Vector3d& world);
 
-  /// The same, with the derivatives of the interpolation along two world vectors, the columns of `along`; at a cell's
-  /// face those of one side.
+  /// The same, with the derivatives of the interpolation along two world vectors, the columns of `along`. On the face
+  /// of a cell they are the derivatives on one side.
   Eigen::Matrix3d at(const Eigen::Vector3d& world, const Eigen::Matrix<double, 3, 2>& along,
                      std::array<Eigen::Matrix3d, 2>& derivatives);
 
-  /// If nothing bends light in the brick that was sampled last, nor in that of `world`, which may be the next one: how
-  /// far it is from `world` out of the latter, where one goes along `direction` (of any length, which is the unit of
-  /// the result). Otherwise 0.
+  /// The distance from `world` along `direction` to the face of the brick that contains `world`, if nothing bends light
+  /// in that brick nor in the brick that was sampled last; otherwise 0. `direction` may have any length, which is the
+  /// unit of the result.
   double way_through_straight_brick(const Eigen::Vector3d& world, const Eigen::Vector3d& direction);
 
   std::uint64_t samples() const { return samples_; }  ///< Calls of `at` so far.
@@ -36,7 +37,7 @@ class TensorSampler {
   int locate(const Eigen::Vector3d& world, Eigen::Vector3d& fraction);
 
   const TensorField* field_;
-  Eigen::Vector3i at_ = Eigen::Vector3i::Constant(INT32_MIN);  // Of the brick.
+  Eigen::Vector3i at_ = Eigen::Vector3i::Constant(INT32_MIN);  // Coordinates of `brick_`.
   TensorBrick brick_{};
   std::uint64_t samples_ = 0;
 };

@@ -11,10 +11,10 @@
 
 namespace tensorray {
 
-/// Calls `visit(voxel, from, to)` for each voxel in which the segment from `a` to `b` has a part within `bounds`; that
-/// part is from `from` to `to`, where 0 is `a` and 1 is `b`. Index space: voxel (i, j, k) is the cube of edge 1 about
-/// it. Parts adjoin exactly and come in order; the voxels are those that have a centre in `bounds`, or the only ones of
-/// an axis. A segment without length is all in one voxel.
+/// Calls `visit(voxel, from, to)` for each voxel that the segment from `a` to `b` crosses within `bounds`, in order.
+/// The part of the segment in that voxel is from `from` to `to`, where 0 is `a` and 1 is `b`. Each part begins exactly
+/// where the one before ends. Index space: voxel (i, j, k) is the cube of edge 1 about that point. Only voxels with a
+/// centre in `bounds`, or the only voxel of an axis, are visited. A segment without length is one part in one voxel.
 template <class Visit>
 void walk_voxels(const Eigen::Vector3d& a, const Eigen::Vector3d& b, const Eigen::AlignedBox3d& bounds,
                  const Visit& visit) {
@@ -34,7 +34,7 @@ void walk_voxels(const Eigen::Vector3d& a, const Eigen::Vector3d& b, const Eigen
 
   const Eigen::Array3d least = (bounds.min().array() + 0.5).floor(), greatest = (bounds.max().array() - 0.5).ceil();
   Eigen::Array3d voxel = ((a + from * along).array() + 0.5).floor().max(least).min(greatest);
-  // Rounding must not lead out of the bounds: their last voxel has no next one.
+  // The last voxel within the bounds has no next one, so that rounding cannot lead out of the bounds.
   const auto leaves = [&](int axis) {
     if (along[axis] == 0 || voxel[axis] == (along[axis] > 0 ? greatest : least)[axis]) return never;
     return (voxel[axis] + std::copysign(0.5, along[axis]) - a[axis]) / along[axis];

@@ -16,7 +16,8 @@ struct FreeSlot {
   FreeSlot* next;
 };
 
-/// A slab, at a multiple of its size, so that slots find it and the system can give it one large page.
+/// Maps a slab. Its address is a multiple of its size, so that the address of a slot gives its slab, and so that the
+/// system can use one large page.
 void* map_slab() {
   constexpr std::size_t reserved = 2 * slab_bytes;
   void* const memory = mmap(nullptr, reserved, PROT_READ | PROT_WRITE, MAP_PRIVATE | MAP_ANONYMOUS, -1, 0);
@@ -34,11 +35,11 @@ void* map_slab() {
 
 }  // namespace
 
-/// At the beginning of its memory; the slots follow.
+/// The header of a slab. It is at the beginning of the slab's memory, and the slots follow it.
 struct SlotPool::Slab {
-  Slab *before = nullptr, *after = nullptr;  // In the list of those with free slots.
-  std::size_t fresh = 0, used = 0;           // Slots that were ever taken, and those that are.
-  FreeSlot* free = nullptr;                  // Given back.
+  Slab *before = nullptr, *after = nullptr;  // Neighbours in the list of slabs with free slots.
+  std::size_t fresh = 0, used = 0;           // Slots that were ever taken; slots that are taken now.
+  FreeSlot* free = nullptr;                  // List of the slots that were given back.
 };
 
 SlotPool::SlotPool(std::size_t slot_bytes) : slot_bytes_(slot_bytes), slots_((slab_bytes - header_bytes) / slot_bytes) {
@@ -59,7 +60,7 @@ void SlotPool::unlink(Slab* slab) noexcept {
 
 void SlotPool::prepare(std::size_t slots) {
   tbb::parallel_for(std::size_t{0}, (slots + slots_ - 1) / slots_, [&](std::size_t) {
-    auto* const slab = new (map_slab()) Slab;  // Writing to it has its page cleared.
+    auto* const slab = new (map_slab()) Slab;  // The first write makes the system clear the page.
     const std::lock_guard<std::mutex> lock(mutex_);
     link(slab);
   });

@@ -1,6 +1,7 @@
 #pragma once
 /// @file volumes/grids/block_memory.h
-/// Memory for many large things of one type: on large pages, and given back to the system as they go.
+/// Memory for many large objects of one type. It uses large pages, and returns them to the system when objects are
+/// freed.
 
 #include <cstddef>
 #include <memory>
@@ -8,9 +9,10 @@
 
 namespace tensorray {
 
-/// Slots of one size, in slabs of 2 MB each of which is one large page where the system has them: the system clears
-/// such a page ten times as fast as the 512 small ones in its place. A slab goes back when none of its slots is used,
-/// but for one, so that a container that grows and shrinks does not ask for it over and over.
+/// A pool of slots of one size, in slabs of 2 MB. A slab is one large page where the system has such pages: the system
+/// clears one ten times as fast as the 512 small pages that it replaces. A slab without used slots is returned to the
+/// system unless no other slab has a free slot, so that a container that grows and shrinks does not map the same slab
+/// again and again.
 class SlotPool {
  public:
   /// @param slot_bytes  A multiple of 16, much less than a slab.
@@ -18,10 +20,11 @@ class SlotPool {
   SlotPool(const SlotPool&) = delete;
   SlotPool& operator=(const SlotPool&) = delete;
 
-  /// Has memory for so many slots at hand, which all threads have had the system clear: a container asks slot by slot.
+  /// Maps memory for `slots` slots in advance. All threads take part, so that the system clears pages in parallel;
+  /// without this a container maps memory slot by slot.
   void prepare(std::size_t slots);
 
-  /// Any thread may call these. @throw std::bad_alloc
+  /// Any thread may call these functions. @throw std::bad_alloc
   void* take();
   void give_back(void* slot) noexcept;
 
@@ -32,18 +35,19 @@ class SlotPool {
   void unlink(Slab* slab) noexcept;
 
   std::mutex mutex_;
-  const std::size_t slot_bytes_, slots_;  ///< Slots of a slab.
-  Slab* open_ = nullptr;                  ///< Slabs with free slots, as a list.
+  const std::size_t slot_bytes_, slots_;  ///< Size of a slot, bytes; slots per slab.
+  Slab* open_ = nullptr;                  ///< List of the slabs with free slots.
 };
 
-/// For containers that allocate their elements one by one, like a deque of large ones; other sizes come from the heap.
+/// An allocator for containers that allocate one element at a time, such as a deque of large elements. Single elements
+/// of at least 4096 bytes come from a SlotPool; everything else comes from the heap.
 template <class T>
 struct SlotAllocator {
   using value_type = T;
 
   SlotAllocator() = default;
   template <class Other>
-  SlotAllocator(const SlotAllocator<Other>&) noexcept {}  // NOLINT: containers convert them.
+  SlotAllocator(const SlotAllocator<Other>&) noexcept {}  // NOLINT: containers convert allocators implicitly.
 
   static void prepare(std::size_t count) { pool().prepare(count); }
 
@@ -62,7 +66,7 @@ struct SlotAllocator {
  private:
   static bool is_slot(std::size_t count) { return sizeof(T) >= 4096 && count == 1; }
   static SlotPool& pool() {
-    static auto* const shared = new SlotPool((sizeof(T) + 15) / 16 * 16);  // Outlives every container.
+    static auto* const shared = new SlotPool((sizeof(T) + 15) / 16 * 16);  // Never destroyed: outlives all containers.
     return *shared;
   }
 };

@@ -1,6 +1,7 @@
 #pragma once
 /// @file volumes/grids/scalar_grid.h
-/// Numbers at the voxels of a sparse grid: what is made of a tensor field, or of the light in it, for other programs.
+/// Numbers at the voxels of a sparse grid: values computed from a tensor field, or from the light in it, for other
+/// programs.
 
 #include <array>
 #include <bitset>
@@ -14,7 +15,7 @@
 
 namespace tensorray {
 
-/// 8³ voxels, laid out as those of a TensorBlock. Inactive voxels hold zero.
+/// 8³ voxels, in the order of a TensorBlock. Inactive voxels hold zero.
 struct ScalarBlock {
   Eigen::Vector3i origin = Eigen::Vector3i::Zero();  ///< Index of the first voxel; a multiple of 8 in each axis.
   std::bitset<TensorBlock::voxels> active;
@@ -25,8 +26,8 @@ struct ScalarBlock {
 struct ScalarGrid {
   std::string name;
   Eigen::Affine3d to_world = Eigen::Affine3d::Identity();  ///< From index to world space; invertible.
-  std::deque<ScalarBlock> blocks;               ///< Each has an active voxel; ordered by origin (x, then y, then z).
-  bool fog = false;                             ///< A density, zero where there is nothing: OpenVDB's fog volume.
+  std::deque<ScalarBlock> blocks;  ///< Each has at least one active voxel; ordered by origin (x, then y, then z).
+  bool fog = false;                ///< Whether values are a density that is zero in empty space (OpenVDB: fog volume).
   std::map<std::string, std::string> metadata;  ///< `tensorray:units`, `tensorray:source`, ...
 };
 

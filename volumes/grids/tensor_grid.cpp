@@ -10,7 +10,7 @@
 namespace tensorray {
 namespace {
 
-/// Whether all values are finite: then their products with zero are zeros. Inactive ones are zero.
+/// Whether all values are finite: only then is every product with zero a zero. Inactive voxels hold zero.
 bool has_only_finite(const TensorBlock& block) {
   Eigen::Map<const Eigen::Array<float, 9 * TensorBlock::voxels, 1>> values(block.values[0].data());
   return (0.0f * values).sum() == 0;
@@ -107,7 +107,7 @@ double asymmetry(const TensorGrid& grid) {
       blocks[i].norm += tensor.squaredNorm();
     }
   });
-  Sums all;  // In the blocks' order.
+  Sums all;  // Summed in the order of the blocks: the result does not depend on the number of threads.
   for (const Sums& block : blocks) {
     all.difference += block.difference;
     all.norm += block.norm;

@@ -14,17 +14,18 @@ namespace {
 using Eigen::Matrix3d;
 using Eigen::Vector3d;
 
-/// Eigenvalues closer to each other, or to an axis, than this (relative to the Frobenius norm) are taken to be there.
-/// Fields are single precision: what is below is noise.
+/// Eigenvalues that are closer than this to each other count as equal, and those that are closer to an axis of the
+/// complex plane count as on it. Relative to the Frobenius norm. Fields are in single precision, so that smaller
+/// differences are noise.
 constexpr double tolerance = 1e-6;
 
-/// A nilpotent Jordan block of three rows is recognised by eigenvalues below this (rounding moves them by its cube
-/// root) and a square above `chain_square`.
+/// A tensor counts as a nilpotent Jordan block of three rows if its eigenvalues are below this and the norm of its
+/// square is above `chain_square`. (Rounding moves such eigenvalues by the cube root of its size.)
 constexpr double chain_tolerance = 2e-5;
 constexpr double chain_square = 1e-3;
 
-/// Near such a block |·| has no limit, and may grow as 1/|λ|. A result beyond this many times
-/// the norm of the tensor is faded to zero, which is the value on the block itself.
+/// Near such a block |·| has no limit and may grow as 1/|λ|. A result whose norm is more than this multiple of the
+/// tensor's norm fades to zero, which is the value on the block itself.
 constexpr double greatest_growth = 4;
 
 const Matrix3d identity = Matrix3d::Identity();
@@ -33,7 +34,7 @@ double sign_of(double x) { return x < 0 ? -1 : 1; }
 
 bool is_symmetric(const Matrix3d& tensor) { return tensor == tensor.transpose(); }
 
-/// General eigenvalues, sorted by falling real part and, in a pair, by falling imaginary part.
+/// Eigenvalues of any tensor, sorted by falling real part; in a pair, by falling imaginary part.
 Eigen::Vector3cd sorted_eigenvalues(const Matrix3d& tensor) {
   Eigen::Vector3cd values = Eigen::EigenSolver<Matrix3d>(tensor, false).eigenvalues();
   std::sort(values.data(), values.data() + 3, [](const auto& a, const auto& b) {
@@ -48,8 +49,8 @@ Matrix3d symmetric_absolute(const Matrix3d& tensor) {
   return vectors * solver.eigenvalues().cwiseAbs().asDiagonal() * vectors.transpose();
 }
 
-/// Whether a tensor of unit norm with three real eigenvalues has a Jordan block: repeated eigenvalues, and no
-/// polynomial with simple zeros at the distinct ones that annihilates it.
+/// Whether a tensor of unit norm with three real eigenvalues has a Jordan block: eigenvalues repeat, and the polynomial
+/// with simple zeros at the distinct eigenvalues does not annihilate the tensor.
 bool has_jordan_block(const Matrix3d& tensor, const Vector3d& falling) {
   const bool first = falling[0] - falling[1] <= tolerance, second = falling[1] - falling[2] <= tolerance;
   const double rest = 4 * tolerance;
@@ -60,19 +61,20 @@ bool has_jordan_block(const Matrix3d& tensor, const Vector3d& falling) {
   return ((tensor - once * identity) * (tensor - twice * identity)).norm() > rest;
 }
 
-/// |T| of a tensor of unit norm with real eigenvalues, sorted falling: the Newton polynomial of |·| on them. Its
-/// divided differences [a, b] are ±1 where the signs agree and [a, b, c] is zero where all three do, so that repeated
-/// eigenvalues need no care; opposite signs leave c/(c − b), which lies in [0, 1].
+/// |T| of a tensor of unit norm with real eigenvalues, sorted falling: the Newton polynomial that interpolates |·| at
+/// the eigenvalues. Its divided difference [a, b] is ±1 where both signs agree, and [a, b, c] is zero where all three
+/// signs agree, so that repeated eigenvalues need no special case. Opposite signs leave c/(c − b), which is in [0, 1].
 Matrix3d absolute_of_real(const Matrix3d& tensor, const Vector3d& falling) {
   const int zeros = static_cast<int>((falling.array().abs() <= tolerance).count());
   if (zeros == 3) return Matrix3d::Zero();
-  if (zeros == 2) {  // Points (0, 0, a), with the derivative of |·| at zero taken as 0.
+  if (zeros == 2) {  // Interpolation points (0, 0, a), with the derivative of |·| at zero taken as 0.
     const double a = falling[0] > tolerance ? falling[0] : falling[2];
     return tensor * tensor / std::abs(a);
   }
   if (falling[2] >= 0) return tensor;
   if (falling[0] <= 0) return -tensor;
-  // One eigenvalue, `odd`, has the sign that the others have not: T sign(T) = ±(T − 2 odd Π), Π the projector on it.
+  // One eigenvalue, `odd`, differs in sign from the others: T sign(T) = ±(T − 2 odd Π), where Π is the projector on its
+  // eigenvector.
   const bool odd_negative = falling[1] >= 0;
   const double odd = odd_negative ? falling[2] : falling[0];
   const double near = falling[1], far = odd_negative ? falling[0] : falling[2];
@@ -124,7 +126,7 @@ Matrix3d general_with_eigenvalues(const Matrix3d& tensor, Eigenvalues mode, bool
   return result / (growth * growth);
 }
 
-/// What apply_eigenvalues counts, of one block.
+/// The counts and sums of apply_eigenvalues for one block.
 struct BlockReport {
   std::size_t defective = 0;
   double norm = 0, erased = 0;
@@ -152,7 +154,7 @@ Matrix3d with_eigenvalues(const Matrix3d& tensor, Eigenvalues mode, bool* defect
     throw std::invalid_argument("with_eigenvalues: mode must be absolute or positive");
   const double largest = tensor.cwiseAbs().maxCoeff();
   if (largest == 0) return Matrix3d::Zero();
-  const Matrix3d scaled = tensor / largest;  // Its norm neither overflows nor underflows.
+  const Matrix3d scaled = tensor / largest;  // The norm of `scaled` neither overflows nor underflows.
   if (is_symmetric(tensor)) return largest * symmetric_absolute(scaled);
   bool limit_taken = false;
   const double norm = scaled.norm();
@@ -178,7 +180,7 @@ EigenvalueReport apply_eigenvalues(TensorGrid& grid, Eigenvalues mode) {
   std::vector<BlockReport> blocks(grid.blocks.size());
   tbb::parallel_for(std::size_t{0}, blocks.size(),
                     [&](std::size_t i) { blocks[i] = apply_to_block(grid.blocks[i], report.chosen); });
-  double norm = 0, erased = 0;  // Summed in the blocks' order: the same for any number of threads.
+  double norm = 0, erased = 0;  // Summed in the order of the blocks, so that the number of threads does not matter.
   for (const BlockReport& block : blocks) {
     report.defective += block.defective;
     norm += block.norm;

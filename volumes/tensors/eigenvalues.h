@@ -15,32 +15,35 @@ enum class Eigenvalues {
   automatic,  ///< `absolute` where the field is symmetric (symmetric_tolerance), `raw` where it is not.
   raw,        ///< T as it is.
   absolute,   ///< E |Λ| E⁻¹. A complex pair r e^{±iφ} becomes r: its rotation is erased, and so is simple shear.
-  positive,   ///< (T²)^½: flips what has a negative real part and keeps rotation.
+  positive,   ///< (T²)^½: flips the sign where the real part is negative, and keeps rotation.
 };
 
-/// What happened to the voxels of a field.
+/// What preprocessing did to the voxels of a field.
 struct EigenvalueReport {
   Eigenvalues chosen = Eigenvalues::raw;  ///< Never `automatic`.
-  std::size_t defective = 0;  ///< Voxels with (numerically) repeated eigenvalues of a non-diagonalisable tensor, or on
-                              ///< the cut of `positive`.
-  double norm_lost = 0;  ///< Σ erased_norm / Σ‖T‖²: how much of the field was rotation or shear; 0 for `raw`.
+  std::size_t defective = 0;  ///< Voxels where a limit was taken (see with_eigenvalues): the tensor is (numerically)
+                              ///< not diagonalisable, or on the cut of `positive`.
+  double norm_lost = 0;  ///< Σ erased_norm / Σ‖T‖²: the part of the field (rotation, shear) that was erased;
+                         ///< 0 for `raw`.
 };
 
-/// One tensor's `absolute` or `positive` (mode must be one of these). The result is real; where the function has no
-/// value it is a limit: on a Jordan block of λ ≠ 0 ±T, of λ = 0 zero; on the cut of `positive` T. Near a nilpotent
-/// block of three rows, where |·| is unbounded, the result fades to zero and its norm stays below 4 ‖T‖. Eigenvalues
-/// within 1e-6 ‖T‖ of each other, or of an axis, count as being there: fields are single precision.
-/// @param defective  If given, set to true where such a limit was taken, left alone elsewhere.
+/// Computes `absolute` or `positive` of one tensor (`mode` must be one of these). The result is real. Where the
+/// function has no value the result is a limit: ±T on a Jordan block with λ ≠ 0, zero on one with λ = 0, and T on the
+/// cut of `positive` (a complex pair on the imaginary axis). Near a nilpotent block of three rows, where |·| is
+/// unbounded, the result fades to zero, and its norm stays below 4 ‖T‖. Eigenvalues within 1e-6 ‖T‖ of each other count
+/// as equal, and within 1e-6 ‖T‖ of an axis count as on it, because fields are in single precision.
+/// @param defective  If given, set to true if such a limit was taken, and left unchanged otherwise.
 Eigen::Matrix3d with_eigenvalues(const Eigen::Matrix3d& tensor, Eigenvalues mode, bool* defective = nullptr);
 
-/// What preprocessing erased of a tensor's squared norm: what its antisymmetric part (rotation, half of a simple shear)
-/// and its symmetric part have less than before, each by itself, as `absolute` puts strain in the place of rotation.
+/// The part of a tensor's squared norm that preprocessing erased: the decrease of the antisymmetric part (rotation,
+/// half of a simple shear) plus the decrease of the symmetric part. An increase counts as zero, because `absolute` may
+/// replace rotation by strain.
 double erased_norm(const Eigen::Matrix3d& before, const Eigen::Matrix3d& after);
 
 /// Preprocesses every voxel in place, on all threads. Voxels must be finite.
 EigenvalueReport apply_eigenvalues(TensorGrid& grid, Eigenvalues mode);
 
-/// The eigenvalues of a tensor, sorted by falling real part. Exactly real where the tensor is symmetric.
+/// The eigenvalues of a tensor, sorted by falling real part. They are exactly real if the tensor is symmetric.
 Eigen::Vector3cd eigenvalues(const Eigen::Matrix3d& tensor);
 
 }  // namespace tensorray

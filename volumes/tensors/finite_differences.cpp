@@ -12,7 +12,7 @@ using Eigen::Matrix3d;
 using Eigen::Vector3d;
 using Eigen::Vector3i;
 
-/// A value, or none where the voxel is inactive.
+/// The value at a voxel; inactive voxels have none.
 struct Sample {
   Vector3d value = Vector3d::Zero();
   bool active = false;
@@ -20,7 +20,7 @@ struct Sample {
 
 std::tuple<int, int, int> key(const Vector3i& origin) { return {origin.x(), origin.y(), origin.z()}; }
 
-/// A block and the 26 about it.
+/// A block and its 26 neighbours.
 class Neighbourhood {
  public:
   Neighbourhood(const std::vector<SampleBlock>& blocks, const Vector3i& origin) {
@@ -33,7 +33,7 @@ class Neighbourhood {
     }
   }
 
-  /// The sample at a position in the block, which may lie up to a block's width outside.
+  /// The sample at a position in the block. The position may be up to one block's width outside the block.
   Sample at(const Vector3i& position) const {
     constexpr int size = TensorBlock::size;
     const Vector3i shifted = position.array() + size;
@@ -61,7 +61,7 @@ Vector3d first_difference(const At& sample) {
   return inwards * (2 * one.value - 1.5 * here.value - 0.5 * two.value);
 }
 
-/// The second difference at 0 of `sample(n)`; at an edge that of the next voxel inwards.
+/// The second difference at 0 of `sample(n)`; at an edge, the one of the next voxel inwards.
 template <class At>
 Vector3d second_difference(const At& sample) {
   const Sample before = sample(-1), here = sample(0), after = sample(1);
@@ -96,7 +96,7 @@ Matrix3d hessian_at(const Neighbourhood& near, const Vector3i& position, const M
   Matrix3d differences;
   for (int i = 0; i < 3; ++i) {
     differences(i, i) = second_difference([&](int n) { return near.at(position + n * Vector3i::Unit(i)); }).x();
-    for (int j = 0; j < i; ++j)  // At ragged edges the order matters: take the mean.
+    for (int j = 0; j < i; ++j)  // At ragged edges the order of the two axes matters: take the mean.
       differences(i, j) = differences(j, i) =
           0.5 * (mixed_difference(near, position, i, j) + mixed_difference(near, position, j, i));
   }
@@ -104,7 +104,7 @@ Matrix3d hessian_at(const Neighbourhood& near, const Vector3i& position, const M
   return 0.5 * (tensor + tensor.transpose());
 }
 
-/// `tensor_at(neighbourhood, position, to_index)` at every active voxel.
+/// Evaluates `tensor_at(neighbourhood, position, to_index)` at every active voxel.
 template <class TensorAt>
 TensorBlocks derive(const std::vector<SampleBlock>& blocks, const Matrix3d& to_index, const TensorAt& tensor_at) {
   TensorBlocks result = make_blocks(blocks.size());

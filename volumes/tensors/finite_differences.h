@@ -12,7 +12,7 @@
 
 namespace tensorray {
 
-/// Vectors, or scalars in the first component, of 8³ voxels; laid out as in TensorBlock.
+/// Vectors at 8³ voxels, or scalars in the first component. Voxels are in the order of TensorBlock.
 struct SampleBlock {
   Eigen::Vector3i origin = Eigen::Vector3i::Zero();
   std::bitset<TensorBlock::voxels> active;
@@ -21,9 +21,10 @@ struct SampleBlock {
   SampleBlock() { values.fill(Eigen::Vector3d::Zero()); }
 };
 
-// Differences run over active voxels only: central ones inside; at the edge of the active region one-sided ones, of
-// second order where it is three voxels deep. A direction without an active neighbour counts as constant.
-// `blocks` are ordered by origin, and so is the result, which has the same active voxels. On all threads.
+// Differences use active voxels only. They are central inside the active region and one-sided at its edge, where they
+// are of second order if the region is three voxels deep. The field counts as constant along a direction without an
+// active neighbour.
+// `blocks` must be ordered by origin. The result has the same order and the same active voxels. Runs on all threads.
 // @param to_index  The linear part of the transform from world to index space.
 
 /// T(i, j) = ∂v_i/∂x_j, world axes.

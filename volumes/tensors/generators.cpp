@@ -44,7 +44,7 @@ void check_poisson_ratio(double ratio) {
   require(ratio >= -1 && ratio <= 0.5, "poisson_ratio must be between -1 and 0.5");
 }
 
-// What `describe` cannot say: the ranges of the parameters.
+// Checks the ranges of the parameters, which `describe` does not contain.
 void check(const PointLoad& g) { check_poisson_ratio(g.poisson_ratio); }
 void check(const TwoPointLoad& g) { check_poisson_ratio(g.poisson_ratio); }
 void check(const Constant&) {}
@@ -71,8 +71,8 @@ void check_generator(Generator& generator) {
       generator);
 }
 
-/// Distance between voxels along each axis. An axis with one voxel has the box's thickness there or, without one, the
-/// least distance along the others.
+/// Distance between voxels along each axis. An axis with one voxel has the thickness of the box or, if that is zero,
+/// the smallest distance along the other axes.
 Vector3d voxel_sizes(const GridSettings& grid) {
   require((grid.resolution.array() >= 1).all(), "resolution must be at least 1 along each axis");
   require(grid.min.allFinite() && grid.max.allFinite() && (grid.max.array() >= grid.min.array()).all(),
@@ -86,13 +86,13 @@ Vector3d voxel_sizes(const GridSettings& grid) {
 }
 
 Eigen::Affine3d grid_to_world(const GridSettings& grid, const Vector3d& sizes) {
-  // A single voxel sits in the middle of the box.
+  // A single voxel is in the middle of the box.
   const Vector3d middle = 0.5 * (grid.min + grid.max);
   const Vector3d origin = (grid.resolution.array() == 1).select(middle, grid.min);
   return Eigen::Translation3d(origin) * Eigen::Scaling(sizes);
 }
 
-/// Where a single load is: in the middle of the box's top, one voxel above it.
+/// The position of a single load: one voxel above the middle of the box's top face.
 Vector3d load_position(const GridSettings& grid) {
   const double top = grid.resolution.z() == 1 ? 0.5 * (grid.min.z() + grid.max.z()) : grid.max.z();
   return {0.5 * (grid.min.x() + grid.max.x()), 0.5 * (grid.min.y() + grid.max.y()), top + voxel_sizes(grid).z()};
@@ -131,7 +131,7 @@ Matrix3d sample(const Vortex& g, const GridSettings&, const Vector3d& position) 
   const double x = position.x(), y = position.y();
   const double q = (x * x + y * y) / (g.core * g.core);
   const double rate = g.circulation / (2 * pi * g.core * g.core);
-  // Series near the axis, where the closed forms lose their digits.
+  // Near the axis the closed forms lose accuracy, so that series are used.
   const double omega = rate * (q < 1e-8 ? 1 - q / 2 : -std::expm1(-q) / q);
   const double slope = q < 1e-2 ? -1.0 / 2 + q / 3 - q * q / 8 + q * q * q / 30 - q * q * q * q / 144
                                 : (std::exp(-q) * (1 + q) - 1) / (q * q);
@@ -145,8 +145,8 @@ Matrix3d sample(const Vortex& g, const GridSettings&, const Vector3d& position) 
   return tensor;
 }
 
-/// 1 on the helix, falling as a Gaussian of the distance to each of its turns; the turns are united so that the sum
-/// stays below 1 and smooth. Towards the axis all turns are equally far, whatever the angle.
+/// 1 on the helix, falling as a Gaussian of the distance to each turn. The turns are combined as 1 − Π(1 − Gaussian),
+/// which is smooth and at most 1. Towards the axis the distances to all turns become equal, whatever the angle.
 double helix_profile(const Helix& g, const Vector3d& position) {
   const double radial = std::hypot(position.x(), position.y());
   const double rise = g.pitch / (2 * pi);
@@ -165,7 +165,8 @@ double helix_profile(const Helix& g, const Vector3d& position) {
 }
 
 Matrix3d sample(const Helix& g, const GridSettings&, const Vector3d& position) {
-  // The screw motion's velocity: the helix's tangent at its radius, the axis in the middle, smooth between.
+  // The direction of a screw motion's velocity: the helix's tangent at the helix's radius, the axis in the middle,
+  // smooth between.
   const Vector3d tangent = Vector3d(-position.y(), position.x(), g.pitch / (2 * pi)).normalized();
   const double profile = helix_profile(g, position);
   return (g.background + profile * (g.across - g.background)) * Matrix3d::Identity() +
@@ -242,8 +243,8 @@ TensorGrid generate(const Generator& generator, const GridSettings& grid) {
 }
 
 Matrix3d point_load_stress(const Vector3d& position, double load, double poisson_ratio) {
-  // Timoshenko's cylindrical components, with depth = −z, regrouped so that none of them divides by the distance to
-  // the axis: the radial part is −3 depth p pᵀ/R⁵, the rest lies in the plane of the surface.
+  // Timoshenko's cylindrical components, with depth = −z, regrouped so that nothing is divided by the distance to the
+  // axis. The radial part is −3 depth p pᵀ/R⁵; the rest lies in the plane of the surface.
   const double depth = -position.z(), distance = position.norm();
   const double cube = distance * distance * distance, reach = distance + depth;
   Matrix3d tensor = -3 * depth / (cube * distance * distance) * position * position.transpose();

@@ -12,24 +12,25 @@
 
 namespace tensorray {
 
-/// Where a generator samples. Voxel centres lie on the box's faces; a single voxel along an axis lies in its middle.
+/// Where a generator samples. The outermost voxel centres are on the faces of the box; a single voxel along an axis is
+/// in the middle.
 struct GridSettings {
   Eigen::Vector3i resolution{64, 64, 64};  ///< Voxels along x, y, z; >= 1, and 1 where the box has no thickness.
-  Eigen::Vector3d min{-1, -1, -1};         ///< World.
-  Eigen::Vector3d max{1, 1, 1};            ///< World; >= min.
+  Eigen::Vector3d min{-1, -1, -1};         ///< Corner with the least coordinates, world units.
+  Eigen::Vector3d max{1, 1, 1};            ///< Corner with the greatest coordinates, world units; >= min.
 };
 
-// Each generator's parameters: plain data with defaults. `describe`, below, names them for scene files, command-line
-// flags and metadata alike.
+// The parameters of each generator: plain data with defaults. `describe`, below, names them for scene files,
+// command-line flags and metadata.
 
-/// Boussinesq's point load on the half space z < 0: stress, tension positive. The load is at the centre of the face
-/// z = max.z + one voxel, so that the singular point stays one voxel outside.
+/// Boussinesq's point load on the half space z < 0: stress, tension positive. The load is at the centre of the face z =
+/// max.z + one voxel, so that the singular point is one voxel outside the grid.
 struct PointLoad {
   double load = 1;             ///< Force pushing towards −z.
   double poisson_ratio = 0.3;  ///< In [-1, 0.5].
 };
 
-/// Two such loads side by side on the same face, `separation` apart along x; stresses add.
+/// Two point loads on the same face, `separation` apart along x. Their stresses add.
 struct TwoPointLoad {
   double load = 1;
   double second_load = 1;
@@ -42,14 +43,14 @@ struct Constant {
   Eigen::Matrix3d tensor = Eigen::Vector3d(1, 0, -1).asDiagonal();
 };
 
-/// Antisymmetric and constant: T V = axis × V · rate. V turns about the axis.
+/// A constant antisymmetric tensor: T V = rate · axis × V, with unit `axis`. V turns about the axis.
 struct Rotation {
-  Eigen::Vector3d axis{0, 0, 1};  ///< Any length but zero.
+  Eigen::Vector3d axis{0, 0, 1};  ///< Any length except zero.
   double rate = 1;                ///< Radians per unit of length at s = 1.
 };
 
 /// Gradient of a shear flow: T = rate · (1 + profile · (position · gradient)) · flow ⊗ gradient, with unit `flow` and
-/// unit `gradient`. Non-symmetric and nilpotent where the two are normal to each other.
+/// unit `gradient`. Non-symmetric; nilpotent if `flow` and `gradient` are perpendicular.
 struct Shear {
   Eigen::Vector3d flow{1, 0, 0};
   Eigen::Vector3d gradient{0, 0, 1};
@@ -57,23 +58,23 @@ struct Shear {
   double profile = 0;
 };
 
-/// Velocity gradient of a Burgers vortex about the z axis: axial strain `strain`, circulation Γ, core radius
-/// sqrt(4 ν / strain) = `core`. Non-symmetric.
+/// Velocity gradient of a Burgers vortex about the z axis: axial strain `strain`, circulation Γ = `circulation`, core
+/// radius sqrt(4 ν / strain) = `core`. Non-symmetric.
 struct Vortex {
   double circulation = 6.283185307179586;
   double core = 0.3;
   double strain = 0.2;
 };
 
-/// A diffusion-like field: anisotropic along a helix about the z axis, which passes through (radius, 0, 0); isotropic
-/// away from it. Continuous everywhere, smooth off the axis.
+/// A diffusion-like field: anisotropic along a helix about the z axis, isotropic away from it. The helix passes through
+/// (radius, 0, 0). The field is continuous everywhere, and smooth except on the axis.
 struct Helix {
   double radius = 0.6;
   double pitch = 1.0;       ///< Rise per turn; not zero, negative for a left-handed helix.
-  double thickness = 0.25;  ///< Standard deviation of the tube's profile.
-  double along = 1.7;       ///< Eigenvalue along the helix, in its middle.
-  double across = 0.3;      ///< The two others.
-  double background = 0.7;  ///< Isotropic, far from the helix.
+  double thickness = 0.25;  ///< Standard deviation of the Gaussian profile across the helix.
+  double along = 1.7;       ///< On the helix: the eigenvalue along it.
+  double across = 0.3;      ///< On the helix: the two other eigenvalues.
+  double background = 0.7;  ///< Far from the helix: all eigenvalues.
 };
 
 // `describe(generator, visit)` calls visit(key, member, meaning) for each parameter.
@@ -135,14 +136,15 @@ using Generator = std::variant<PointLoad, TwoPointLoad, Constant, Rotation, Shea
 const std::vector<std::string>& generator_kinds();
 std::string kind_of(const Generator& generator);
 
-/// The generator of that kind with its defaults. @throw std::invalid_argument listing the kinds if unknown.
+/// The generator of that kind with its defaults. @throw std::invalid_argument that lists the kinds if the kind is
+/// unknown.
 Generator generator_of(const std::string& kind);
 
-/// The default grid of a kind (the box differs: point loads occupy −1…1, −1…1, −2…−voxel). `resolution` is the number
-/// of voxels along the longest axis of the box; voxels are cubes.
+/// The default grid of a kind. The box of point loads is −1…1, −1…1, −2…−voxel; other boxes are −1…1 along each axis.
+/// `resolution` is the number of voxels along the longest axis of the box; voxels are cubes.
 GridSettings default_grid(const Generator& generator, int resolution = 64);
 
-/// Samples the field. The result's name is the kind; its metadata says kind and parameters (`tensorray:source`).
+/// Samples the field. The name of the result is the kind; its metadata hold kind and parameters (`tensorray:source`).
 /// @throw std::invalid_argument if a parameter is out of range; the message names it.
 TensorGrid generate(const Generator& generator, const GridSettings& grid);
 

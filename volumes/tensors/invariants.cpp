@@ -18,7 +18,7 @@ namespace {
 
 using Eigen::Matrix3d;
 
-/// Norms below this part of the tensor's are rounding.
+/// Norms below this fraction of the tensor's norm count as rounding errors.
 constexpr double significant = 1e-6;
 
 Matrix3d symmetric_part(const Matrix3d& tensor) { return (tensor + tensor.transpose()) / 2; }
@@ -48,11 +48,11 @@ double asymmetry(const Matrix3d& tensor) { return (tensor - tensor.transpose()).
 
 struct Definition {
   const char* name;
-  double (*value)(const Matrix3d&);  ///< Of a tensor whose greatest element is ±1.
-  int degree;                        ///< Of f(c T) = c^degree f(T), for c > 0.
+  double (*value)(const Matrix3d&);  ///< Takes a tensor whose greatest element is ±1.
+  int degree;                        ///< The degree in f(c T) = c^degree f(T), for c > 0.
 };
 
-/// In the order of the enumeration.
+/// In the order of Invariant.
 const Definition definitions[] = {
     {"norm", [](const Matrix3d& tensor) { return tensor.norm(); }, 1},
     {"trace", [](const Matrix3d& tensor) { return tensor.trace(); }, 1},
@@ -96,7 +96,7 @@ double invariant(Invariant which, const Matrix3d& tensor) {
   const Definition& definition = definitions[static_cast<std::size_t>(which)];
   const double largest = tensor.cwiseAbs().maxCoeff();
   if (largest == 0) return 0;
-  double value = definition.value(tensor / largest);  // Squares and cubes neither overflow nor underflow.
+  double value = definition.value(tensor / largest);  // Scaled: squares and cubes neither overflow nor underflow.
   for (int i = 0; i < definition.degree; ++i) value *= largest;
   return std::clamp(value, std::numeric_limits<double>::lowest(), std::numeric_limits<double>::max());
 }

@@ -15,7 +15,7 @@
 namespace tensorray {
 namespace {
 
-/// Imaginary parts, and negative real parts, below this fraction of a tensor's norm are rounding.
+/// Imaginary parts, and negative real parts, below this fraction of a tensor's norm count as rounding errors.
 constexpr double significant = 1e-6;
 
 double spectral_norm(const Eigen::Matrix3d& tensor) {
@@ -23,13 +23,13 @@ double spectral_norm(const Eigen::Matrix3d& tensor) {
   return std::sqrt(std::max(0.0, solver.eigenvalues()[2]));
 }
 
-/// What is gathered of the voxels of one block.
+/// What is gathered from the voxels of one block.
 struct BlockStatistics {
   std::vector<double> norms;
   double real_min = std::numeric_limits<double>::infinity(), real_max = -real_min;
   double imaginary_max = 0, deviator_max = 0;
   std::size_t complex = 0, negative = 0;
-  double norm = 0, erased = 0;  ///< Sums of ‖T‖², and of what `absolute` would erase of it.
+  double norm = 0, erased = 0;  ///< Sum of ‖T‖²; sum of the part of it that `absolute` would erase.
 };
 
 void add_voxel(const Eigen::Matrix3d& tensor, BlockStatistics& statistics) {
@@ -47,7 +47,7 @@ void add_voxel(const Eigen::Matrix3d& tensor, BlockStatistics& statistics) {
   statistics.negative += values[2].real() < -significant * norm;
 
   const Eigen::Matrix3d deviator = tensor - tensor.trace() / 3 * Eigen::Matrix3d::Identity();
-  if (deviator.norm() > statistics.deviator_max)  // The Frobenius norm bounds the spectral one.
+  if (deviator.norm() > statistics.deviator_max)  // The spectral norm is never above the Frobenius norm.
     statistics.deviator_max = std::max(statistics.deviator_max, spectral_norm(deviator));
 }
 
@@ -104,7 +104,7 @@ bool all_finite(const TensorGrid& grid) {
   });
 }
 
-/// All but the numbers of voxels and their size.
+/// Computes all statistics except the numbers of voxels and the voxel size.
 void describe_finite(const TensorGrid& grid, FieldStatistics& result) {
   if (grid.active_voxels() == 0) return;
   describe_extent(grid, result);
