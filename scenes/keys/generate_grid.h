@@ -18,12 +18,11 @@ struct GenerateDescription {
   GridSettings grid;
 };
 
-/// The keys of the grid in scene files (`field.generate`) and in `tensorray make`. Each generator has defaults for
-/// them.
+/// The keys of the grid, in scene files (`field.generate`) and in `tensorray make`.
 struct GridRequest {
   /// Voxels along the longest axis of the box (voxels are then cubes); or voxels along x, y and z.
   std::variant<int, Eigen::Vector3i> resolution = 64;
-  std::optional<Eigen::Vector3d> min, max;  ///< Centres of the outermost voxels, world.
+  std::optional<Eigen::Vector3d> min, max;  ///< Centres of the outermost voxels, world; none: the generator's.
 };
 
 constexpr int resolution_limit = 32768;       ///< Voxels along an axis.
