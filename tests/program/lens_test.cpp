@@ -182,8 +182,7 @@ TEST_F(Lens, TheSameBytesOnAnyNumberOfThreads) {
 }
 
 TEST_F(Lens, TheImageIsSeenUprightFromBehindTheReceiver) {
-  // Red is on the viewer's left, above green. Light travels down and the viewer looks up, so that the picture has +y
-  // up.
+  // Red is on the viewer's left, above green. Light travels down, and the viewer looks up with +y upwards.
   Image picture(2, 2, {"R", "G", "B"});
   picture.pixel(0, 0)[0] = 1;
   picture.pixel(0, 1)[1] = 1;

@@ -163,7 +163,7 @@ TEST_F(Paths, LightIsFollowedBackFromSeedsWithinTheVolume) {
 }
 
 TEST_F(Paths, PathsOfAFileGiveTheSamePictureWithoutTracing) {
-  // The default radius depends on the distance between seeds, which a file of paths does not contain.
+  // A given radius does not depend on the seeds, which a file of paths does not contain.
   const Settings settings{"integrator.radius.typical=0.04"};
   const Image traced = render(settings, {"out.vtp", "out.ply"});
   const std::string tubes = read_file(in_folder("out.ply")), paths = read_file(in_folder("out.vtp"));
