@@ -1,6 +1,6 @@
 #pragma once
 /// @file base/byte_order.h
-/// Numbers in files, in either byte order.
+/// Reads and appends numbers of files, in either byte order.
 
 #include <algorithm>
 #include <array>
@@ -20,7 +20,7 @@ constexpr ByteOrder host_byte_order() {
 #endif
 }
 
-/// The number whose bytes begin at `bytes`, which needs no alignment.
+/// Reads the number whose bytes begin at `bytes`. `bytes` need not be aligned.
 template <class Number>
 Number read_number(const void* bytes, ByteOrder order) {
   std::array<char, sizeof(Number)> copy;
@@ -40,7 +40,7 @@ void append_number(Number number, ByteOrder order, std::string& bytes) {
   bytes.append(copy.data(), copy.size());
 }
 
-/// Turns `count` numbers of `size` bytes each to the other byte order, in place.
+/// Changes `count` numbers of `size` bytes each to the other byte order, in place.
 inline void swap_bytes(char* numbers, std::size_t count, std::size_t size) {
   for (std::size_t i = 0; i < count; ++i) std::reverse(numbers + i * size, numbers + (i + 1) * size);
 }

@@ -21,7 +21,7 @@
 namespace tensorray {
 namespace {
 
-/// Above those that the child's standard streams and the shared file take.
+/// Greater than the descriptors of the child's standard streams and of the shared file.
 constexpr int least_descriptor = 10;
 
 std::filesystem::path temporary_folder() {

@@ -1,6 +1,6 @@
 #pragma once
 /// @file base/child_program.h
-/// Runs another program of this project, which lies beside the running one.
+/// Runs another program of this project, which is in the folder of the running program.
 
 #include <filesystem>
 #include <string>
@@ -8,8 +8,8 @@
 
 namespace tensorray {
 
-/// A file in the temporary folder that has no name, so that nothing is left of it when the last process that holds it
-/// ends, however that ends. Starts empty.
+/// A file in the temporary folder that has no name. The system removes it when the last process that holds it ends, for
+/// whatever reason. The file is empty at first.
 class UnnamedFile {
  public:
   /// @throw std::runtime_error naming the temporary folder.
@@ -18,7 +18,7 @@ class UnnamedFile {
   UnnamedFile(const UnnamedFile&) = delete;
   UnnamedFile& operator=(const UnnamedFile&) = delete;
 
-  /// By which this process, and only it, can open the file.
+  /// The path by which only this process can open the file.
   std::filesystem::path path() const;
   int descriptor() const { return descriptor_; }
 
@@ -26,27 +26,27 @@ class UnnamedFile {
   int descriptor_ = -1;
 };
 
-/// By which a program that run_program started can open the file that was shared with it.
+/// The path by which a program that run_program starts can open the shared file.
 constexpr const char* shared_file = "/proc/self/fd/3";
 
 /// How a program ended.
 struct ProgramEnd {
   int status = 0;     ///< Exit status.
-  int signal = 0;     ///< The signal that ended it, or 0.
-  std::string error;  ///< What it wrote to standard error.
+  int signal = 0;     ///< The signal that ended the program, or 0.
+  std::string error;  ///< The program's output to standard error.
 };
 
-/// Where a program of this project lies: in the folder of the running one. It need not exist.
+/// The path of a program of this project, in the folder of the running program. The file need not exist.
 std::filesystem::path sibling_program(const std::string& name);
 
-/// Runs a program and waits for it. It shares the working folder, the environment, standard output, and `shared` as
-/// `shared_file`; its standard error is kept. Any thread may call this.
-/// @throw std::runtime_error with the reason if it cannot be started; Cancelled if SIGINT or SIGTERM ended it: Ctrl-C
-/// on a terminal reaches it too.
+/// Runs a program and waits for its end. The program shares the working folder, the environment, standard output, and
+/// `shared` as `shared_file`. Its standard error is returned in ProgramEnd::error. Any thread may call this.
+/// @throw std::runtime_error with the reason if the program cannot be started; Cancelled if SIGINT or SIGTERM ended it
+/// (Ctrl-C on a terminal reaches both programs).
 ProgramEnd run_program(const std::filesystem::path& program, const std::vector<std::string>& arguments,
                        const UnnamedFile& shared);
 
-/// In a program that run_program started: have it end when the one that started it ends.
+/// For a program that run_program started: makes it end when the program that started it ends.
 void end_with_parent();
 
 }  // namespace tensorray

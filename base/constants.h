@@ -1,6 +1,6 @@
 #pragma once
 /// @file base/constants.h
-/// Numbers of mathematics.
+/// Mathematical constants.
 
 namespace tensorray {
 

@@ -14,20 +14,21 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// Device, inode and name: of a file that is there, no name; of one that is not, those of its folder and its name. A
-/// folder that is not there either has a name alone.
+/// Device, inode and name. A file that exists has an empty name. A file that does not exist has the device and inode of
+/// its folder, and its own name. If its folder does not exist either, device and inode are 0, and the name is the path.
 using Identity = std::tuple<dev_t, ino_t, std::string>;
 
 Identity identity_of(const fs::path& path) {
   struct stat status {};
   if (stat(path.c_str(), &status) == 0) return {status.st_dev, status.st_ino, ""};
   const fs::path target = fs::absolute(behind_links(path));
-  for (const fs::path& each : {target, target.lexically_normal()})  // "none/../file" needs no folder "none".
+  // The second form is for "none/../file": the folder "none" need not exist.
+  for (const fs::path& each : {target, target.lexically_normal()})
     if (stat(each.parent_path().c_str(), &status) == 0) return {status.st_dev, status.st_ino, each.filename().string()};
   return {0, 0, target.lexically_normal().string()};
 }
 
-/// Whether it is neither a regular file nor absent.
+/// Whether `path` exists and is neither a regular file nor a folder.
 bool is_device(const fs::path& path) {
   struct stat status {};
   return stat(path.c_str(), &status) == 0 && !S_ISREG(status.st_mode) && !S_ISDIR(status.st_mode);

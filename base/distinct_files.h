@@ -1,6 +1,6 @@
 #pragma once
 /// @file base/distinct_files.h
-/// No run may overwrite one of its inputs, or write two outputs into one file.
+/// Checks that a run does not overwrite one of its inputs, or write two outputs into one file.
 
 #include <filesystem>
 #include <string>
@@ -8,15 +8,15 @@
 
 namespace tensorray {
 
-/// A file that a run reads or writes, and what to call it in an error: "`/field/file`", "--stats".
+/// A file that a run reads or writes.
 struct NamedFile {
-  std::filesystem::path path;  ///< Empty: there is none.
-  std::string name;
+  std::filesystem::path path;  ///< Empty: no file.
+  std::string name;            ///< How an error names the file: "`/field/file`", "--stats".
 };
 
-/// Compares files by what they are (device and inode, links followed); a file that is not there yet by its folder and
-/// name. Devices and pipes may be written several times, one after the other.
-/// @throw std::invalid_argument that names both, if an output is the same file as an input or as another output.
+/// Compares files by device and inode, after following links. A file that does not exist yet is compared by its folder
+/// and name. Several outputs may go to the same device or pipe, one after the other.
+/// @throw std::invalid_argument that names both files, if an output is the same file as an input or another output.
 void require_distinct_files(const std::vector<NamedFile>& inputs, const std::vector<NamedFile>& outputs);
 
 }  // namespace tensorray

@@ -15,7 +15,7 @@ void require(bool condition, const std::string& message);
 /// @throw std::runtime_error "PATH: WHAT".
 [[noreturn]] void fail(const std::filesystem::path& path, const std::string& what);
 
-/// Checks what libraries report badly or not at all, before they are asked to read a file.
+/// Checks a file before a library reads it, because libraries report these errors badly or not at all.
 /// @throw std::runtime_error naming the file and the reason: missing, a folder, not permitted, empty.
 void require_readable(const std::filesystem::path& path);
 

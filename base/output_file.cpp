@@ -36,7 +36,7 @@ class Descriptor {
   int value_;
 };
 
-/// Makes an empty file in `folder` whose name nobody else has.
+/// Makes an empty file with a new name in `folder`.
 fs::path make_temporary(const fs::path& folder, const fs::path& target) {
   static std::atomic<unsigned> counter{0};
   const std::string ending = target.extension().string();
@@ -44,7 +44,7 @@ fs::path make_temporary(const fs::path& folder, const fs::path& target) {
     const fs::path path = folder / fmt::format(".tensorray-{}-{}{}", getpid(), counter++, ending);
     const Descriptor file(::open(path.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0666));
     if (file.is_open()) return path;
-    if (errno == EEXIST) continue;  // Left over by a process that was killed and had the same number.
+    if (errno == EEXIST) continue;  // A killed process with the same process number left this file.
     fail(target, fmt::format("cannot write to the folder {}: {}", folder.string(), std::strerror(errno)));
   }
 }
@@ -129,7 +129,7 @@ void OutputFile::copy_into_device() {
   if (is_device_) copy_into(temporary_, resolved_);
 }
 
-/// Gives what is at the target a second name, under which it can come back.
+/// Gives the old file at the target a second name, so that it can be restored.
 void OutputFile::keep_old() {
   if (is_device_) return;
   std::error_code error;
@@ -142,7 +142,7 @@ void OutputFile::keep_old() {
   fs::remove(backup_, error);
   fs::create_hard_link(resolved_, backup_, error);
   if (!error) return;
-  fs::rename(resolved_, backup_, error);  // A file system without hard links.
+  fs::rename(resolved_, backup_, error);  // The file system has no hard links.
   if (error) {
     backup_.clear();
     fail(target_, fmt::format("cannot be replaced: {}", error.message()));
@@ -157,14 +157,14 @@ void OutputFile::replace_old() {
   temporary_.clear();
 }
 
-/// Brings back what was at the target.
+/// Restores the old file at the target.
 void OutputFile::undo() noexcept {
   if (is_device_) return;
   std::error_code error;
   const bool replaced = temporary_.empty();
   if (!backup_.empty()) {
     fs::rename(backup_, resolved_, error);
-    // Two names of one file: rename does nothing then.
+    // If both names belong to one file, rename does nothing, and the backup is left.
     fs::remove(backup_, error);
   } else if (replaced) {
     fs::remove(resolved_, error);
@@ -181,7 +181,7 @@ void OutputFile::discard() noexcept {
 }
 
 fs::path behind_links(const fs::path& target) {
-  constexpr int longest_chain = 40;  // As in Linux.
+  constexpr int longest_chain = 40;  // The limit of Linux.
   fs::path path = target;
   for (int i = 0; i < longest_chain; ++i) {
     std::error_code error;

@@ -25,7 +25,7 @@ void check_wavelengths(const LightDescription& light, const SceneSource& source)
   }
 }
 
-/// s(λ) < 0 is allowed, and bends light the other way: more often than not the range was widened carelessly.
+/// s(λ) < 0 is allowed and bends light the other way. Usually it is a mistake: the range of wavelengths is too wide.
 void warn_of_negative_flexibility(SceneDescription& scene) {
   if (scene.bending.rgb) {
     if (scene.bending.rgb->minCoeff() < 0)
@@ -51,7 +51,7 @@ void check_lights(const SceneDescription& scene, const SceneSource& source) {
   }
 }
 
-/// Outputs that belong to another method are left out, unless nothing is left to write.
+/// Removes outputs that only another method can make, with a warning. @throw SceneError if no output is left.
 void drop_unmade_outputs(SceneDescription& scene, const SceneSource& source) {
   const Method& method = scene.integrator.method();
   const std::vector<Output> made = method.outputs();

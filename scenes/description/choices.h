@@ -1,6 +1,6 @@
 #pragma once
 /// @file scenes/description/choices.h
-/// The words of the enumerations that the whole scene, or several methods, use (see scenes/keys/choice.h).
+/// Names in scene files for the enumerations that several methods or the whole scene use (see scenes/keys/choice.h).
 
 #include <array>
 

@@ -1,7 +1,7 @@
 #pragma once
 /// @file scenes/description/description.h
-/// A scene file as plain data: what was written, with defaults for what was not. Nothing is loaded yet.
-/// Lengths are world units (the field's), wavelengths nm.
+/// A scene file as plain data: the values that the file gives, and defaults for the others. No other file is loaded.
+/// Lengths are in world units (those of the field), wavelengths in nm.
 
 #include <cstdint>
 #include <filesystem>
@@ -27,59 +27,61 @@
 namespace tensorray {
 
 struct FieldDescription {
-  std::filesystem::path file;                   ///< Either this ...
-  std::string name;                             ///< In the file; empty: the only one.
-  std::optional<GenerateDescription> generate;  ///< ... or this.
+  std::filesystem::path file;                   ///< OpenVDB file with the field; empty if `generate` is given.
+  std::string name;                             ///< Name of the field in the file; empty: the only field.
+  std::optional<GenerateDescription> generate;  ///< Generated field, instead of a file.
   Derive derive = Derive::none;
   Eigenvalues eigenvalues = Eigenvalues::automatic;
-  std::optional<double> scale;   ///< None: "auto".
+  std::optional<double> scale;   ///< Factor on the flexibility; none: "auto".
   std::filesystem::path bounds;  ///< A closed mesh that cuts the volume; empty: none.
 };
 
 struct BendingDescription {
   Flexibility flexibility;
-  std::optional<Eigen::Vector3d> rgb;  ///< Three flexibilities, one a colour channel, instead of wavelengths.
+  std::optional<Eigen::Vector3d> rgb;  ///< RGB mode: flexibilities of red, green and blue, instead of wavelengths.
   BendingSettings settings;
 };
 
 struct ApertureDescription {
-  std::optional<Eigen::Vector3d> center;  ///< None: the middle of the silhouette.
-  Eigen::Vector2d size{1, 1};             ///< Along right and up of the light's frame; > 0.
+  std::optional<Eigen::Vector3d> center;  ///< World; none: the middle of the volume's silhouette.
+  Eigen::Vector2d size{1, 1};             ///< Along the right and up axes of the light's frame; > 0.
 };
 
 struct LightDescription {
-  Eigen::Vector3d direction{0, 0, -1};  ///< Not zero; need not be unit.
-  std::optional<Eigen::Vector3d> up;    ///< Frame of aperture and receiver; none: +z, or +y for light along z.
-  std::uint64_t photons = 1u << 20;
+  Eigen::Vector3d direction{0, 0, -1};  ///< Direction in which light travels; not zero, any length.
+  std::optional<Eigen::Vector3d> up;    ///< Up axis of aperture and receiver; none: +z, or +y for light along z.
+  std::uint64_t photons = 1u << 20;     ///< Approximate number of positions that emit.
   BeamPattern pattern = BeamPattern::stratified;
   SpectrumDescription spectrum;
   double wavelength_min = 380, wavelength_max = 730;
   int wavelength_count = 32;
-  int wavelengths_per_photon = 0;               ///< 0: all.
-  double irradiance = 1;                        ///< W per world unit², of the undisturbed beam; > 0.
-  std::optional<ApertureDescription> aperture;  ///< None: the silhouette of the volume.
+  int wavelengths_per_photon = 0;               ///< Bands that one photon carries; 0: all.
+  double irradiance = 1;                        ///< Irradiance of the undisturbed beam, W per world unit²; > 0.
+  std::optional<ApertureDescription> aperture;  ///< Rectangle that light comes from; none: the volume's silhouette.
 };
 
 struct ReceiverDescription {
-  std::optional<double> distance;  ///< Behind the volume, along the light; none: a quarter of the volume's depth.
-  std::optional<Eigen::Vector3d> center;      ///< None: behind the middle of the volume, at `distance`.
-  std::optional<Eigen::Vector3d> normal;      ///< None: against the light.
-  std::optional<Eigen::Vector3d> up;          ///< None: the light's.
-  std::optional<Eigen::Vector2d> size;        ///< None: 1.25 times the extent of the beam.
-  std::optional<Eigen::Vector2i> resolution;  ///< Pixels; none: 512 along the longer side, square pixels.
+  /// Distance of the plate behind the volume, along the light; none: a quarter of the volume's depth.
+  std::optional<double> distance;
+  std::optional<Eigen::Vector3d> center;  ///< Middle, world; none: behind the middle of the volume, at `distance`.
+  std::optional<Eigen::Vector3d> normal;  ///< None: opposite to the light's direction.
+  std::optional<Eigen::Vector3d> up;      ///< Up axis of the plate; none: that of the light.
+  std::optional<Eigen::Vector2d> size;    ///< Width and height; none: 1.25 times the extent of the beam.
+  /// Pixels along width and height; none: 512 along the longer side, square pixels.
+  std::optional<Eigen::Vector2i> resolution;
 };
 
 struct CameraDescription {
   Projection projection = Projection::perspective;
-  std::optional<Eigen::Vector3d> position;   ///< None: chosen so that everything is seen.
-  std::optional<Eigen::Vector3d> target;     ///< Of a camera with a position; none: the middle of what there is.
-  std::optional<Eigen::Vector3d> direction;  ///< Of a chosen camera's view; none: from above, obliquely.
-  std::optional<Eigen::Vector3d> up;         ///< None: +z.
-  double angle = 30;
-  std::optional<double> height;  ///< Orthographic, with a position: of what is seen.
-  double lens_radius = 0;
-  std::optional<double> focus_distance;  ///< None: the target's.
-  Eigen::Vector2i resolution{800, 800};
+  std::optional<Eigen::Vector3d> position;   ///< World; none: chosen so that everything is visible.
+  std::optional<Eigen::Vector3d> target;     ///< If there is a position: what it looks at; none: the scene's middle.
+  std::optional<Eigen::Vector3d> direction;  ///< If there is no position: view direction; none: obliquely from above.
+  std::optional<Eigen::Vector3d> up;         ///< Up in the picture; none: +z.
+  double angle = 30;                         ///< Perspective: angle from lower to upper edge, degrees.
+  std::optional<double> height;  ///< Orthographic camera with a position: visible height; none: everything is visible.
+  double lens_radius = 0;        ///< Radius of a thin lens; 0: everything is sharp.
+  std::optional<double> focus_distance;  ///< Distance of what is sharp; none: that of the target.
+  Eigen::Vector2i resolution{800, 800};  ///< Pixels along width and height.
 };
 
 enum class LightKind { constant, environment, directional, area };
@@ -87,24 +89,24 @@ enum class LightKind { constant, environment, directional, area };
 /// An item of `lights`.
 struct LightSourceDescription {
   LightKind kind = LightKind::constant;
-  Eigen::Vector3d color{1, 1, 1};            ///< Linear Rec. 709; of `environment`, a factor of the picture.
-  double strength = 1;                       ///< Radiance; of `directional`, irradiance over π.
-  std::optional<Eigen::Vector3d> direction;  ///< directional: in which it travels; area: that it faces.
-  double angle = 0;                          ///< directional: of the disk, from rim to rim.
-  std::optional<Eigen::Vector3d> center;     ///< area.
-  Eigen::Vector2d size{1, 1};                ///< area.
+  Eigen::Vector3d color{1, 1, 1};            ///< Linear Rec. 709; environment: a factor on the picture.
+  double strength = 1;                       ///< Radiance; directional: irradiance / π.
+  std::optional<Eigen::Vector3d> direction;  ///< directional: where light travels to; area: where its front faces.
+  double angle = 0;                          ///< directional: angular diameter of the disk, degrees.
+  std::optional<Eigen::Vector3d> center;     ///< area: middle, world.
+  Eigen::Vector2d size{1, 1};                ///< area: width and height.
   std::filesystem::path file;                ///< environment: a latitude-longitude picture.
-  double rotation = 0;                       ///< environment: about +z.
+  double rotation = 0;                       ///< environment: rotation about +z, degrees.
 };
 
 /// `integrator`.
 struct IntegratorDescription {
-  Word type;                                     ///< The chosen method's name.
-  std::vector<std::shared_ptr<Method>> methods;  ///< All that there are, with their settings.
+  Word type;                                     ///< Name of the chosen method.
+  std::vector<std::shared_ptr<Method>> methods;  ///< All methods, with their settings.
 
-  const Method& method() const;  ///< The chosen one.
+  const Method& method() const;  ///< The chosen method.
 
-  /// The settings of one method. @throw std::logic_error if no method has such settings.
+  /// The settings of the method that has settings of this type. @throw std::logic_error if there is none.
   template <class Settings>
   const Settings& settings() const {
     for (const auto& method : methods)
@@ -114,20 +116,20 @@ struct IntegratorDescription {
 };
 
 struct OutputDescription {
-  std::vector<Output> kinds;                           ///< All that any method can write.
-  std::map<std::string, std::filesystem::path> files;  ///< What is wanted, by Output::key.
+  std::vector<Output> kinds;                           ///< All kinds of output that any method can write.
+  std::map<std::string, std::filesystem::path> files;  ///< Files to write, by Output::key.
   bool fluence_bands = false;                          ///< Whether `fluence` also has a grid for each band.
-  std::optional<double> exposure;                      ///< Stops, for `image`; none: "auto".
-  bool white_balance = true;                           ///< Adapt the light's white to the working space's.
-  std::filesystem::path ocio;                          ///< OCIO config; empty: $OCIO, or the built-in one.
-  std::string display, view;                           ///< Empty: the config's default.
+  std::optional<double> exposure;                      ///< Exposure of `image` in stops; none: "auto".
+  bool white_balance = true;   ///< Whether the white of the light is adapted to that of the working space.
+  std::filesystem::path ocio;  ///< OCIO config; empty: $OCIO, or the built-in one.
+  std::string display, view;   ///< Empty: the default of the config.
 
   bool wants(const std::string& key) const { return files.count(key) > 0; }
 };
 
 struct SceneDescription {
   std::filesystem::path path;  ///< The scene file.
-  std::string text;            ///< The scene as JSON, overrides applied: provenance of the pictures.
+  std::string text;            ///< The scene as JSON, with overrides applied; written into the headers of the outputs.
   std::uint64_t seed = 0;
   FieldDescription field;
   BendingDescription bending;
@@ -138,7 +140,7 @@ struct SceneDescription {
   CameraDescription camera;
   std::vector<LightSourceDescription> lights;  ///< Empty: a white sky and a lamp.
   OutputDescription output;
-  std::vector<std::string> warnings;  ///< Things that are allowed but likely a mistake, a line each.
+  std::vector<std::string> warnings;  ///< Likely mistakes that are allowed; one line each.
 };
 
 }  // namespace tensorray

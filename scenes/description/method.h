@@ -1,7 +1,8 @@
 #pragma once
 /// @file scenes/description/method.h
-/// The seam between a scene and the methods that make pictures of it. A method owns its keys, what it loads, how it
-/// renders and what it writes; all else asks it through this interface. scenes/pipeline/methods.cpp lists the methods.
+/// The interface between a scene and the methods that make pictures of it. A method defines its keys, what it loads,
+/// how it renders and what it writes. All other code uses a method through this interface. scenes/pipeline/methods.cpp
+/// lists the methods.
 
 #include <filesystem>
 #include <memory>
@@ -23,52 +24,53 @@ struct SceneDescription;
 
 /// A kind of file that a method can write.
 struct Output {
-  const char* key;                   ///< Under `output` in the scene file.
-  const char* meaning;               ///< For the schema and for `--help`.
-  std::vector<std::string> endings;  ///< Of its files.
+  const char* key;                   ///< Its key under `output` in the scene file.
+  const char* meaning;               ///< Description for the schema and for `--help`.
+  std::vector<std::string> endings;  ///< File name endings that are allowed.
 
   /// Writes the file. @throw std::runtime_error naming the file.
   void (*write)(const std::filesystem::path& file, const Scene& scene, const Render& render);
 
-  /// The ending by which `-o FILE` knows the kind, where another kind has the same endings: ".spectral.exr".
+  /// The ending that selects this kind with `-o FILE`, if other kinds have the same endings: ".spectral.exr".
+  /// Null: `endings` select it.
   const char* option_ending = nullptr;
 };
 
-/// A method with all that it needs of a scene loaded. Immutable: any number of threads may render with it.
+/// A method that has loaded everything that it needs for a scene. Immutable: any number of threads may render with it.
 class LoadedMethod {
  public:
   virtual ~LoadedMethod() = default;
 
-  /// @throw Cancelled; std::runtime_error; SceneError where the scene's values do not go with what was found.
+  /// @throw Cancelled; std::runtime_error; SceneError if a value of the scene does not fit the data.
   virtual Render render(const Scene& scene, const Progress& progress) const = 0;
 };
 
-/// A method's settings as the scene file gives them. All methods are read from every scene file, so that one file
-/// serves them all and `--set integrator.type=...` chooses among them.
+/// The settings of a method, as the scene file gives them. The settings of all methods are read from every scene file,
+/// so that `--set integrator.type=...` can choose another method for the same file.
 class Method {
  public:
   virtual ~Method() = default;
 
-  /// The word of `integrator.type`.
+  /// The value of `integrator.type` that chooses this method.
   virtual const char* name() const = 0;
 
-  /// Lets the visitor see the method's keys, which stand in `integrator`.
+  /// Shows the method's keys, which are in `integrator`, to the visitor.
   virtual void visit(SectionReader& reader) = 0;
   virtual void visit(SchemaWriter& writer) = 0;
 
-  /// What the method can write.
+  /// The kinds of output that the method can write.
   virtual std::vector<Output> outputs() const = 0;
 
-  /// Files that its keys name, and that it reads.
+  /// The files that the method reads, as its keys name them.
   virtual std::vector<NamedFile> inputs() const { return {}; }
 
-  /// Checks the method's keys beside each other and beside the rest of the scene, and adds to `scene.warnings`.
+  /// Checks the method's keys against each other and against the rest of the scene, and adds to `scene.warnings`.
   /// @param chosen  Whether this is the method that renders the scene.
   /// @throw SceneError through `source`.
   virtual void check(SceneDescription& scene, const Json& json, const SceneSource& source, bool chosen) const;
 
-  /// Loads what the method needs beside the scene. @param notes  Lines for the user to read are added.
-  /// @throw as load_scene.
+  /// Loads what the method needs in addition to the scene. @param notes  The method adds lines for the user.
+  /// @throw The same exceptions as load_scene.
   virtual std::unique_ptr<const LoadedMethod> load(const Scene& scene, std::vector<std::string>& notes) const = 0;
 };
 

@@ -1,16 +1,16 @@
 #pragma once
 /// @file scenes/description/scene_keys.h
-/// The table of all keys of a scene file but those of the methods, which have tables of their own. The reader
-/// (section_reader.h) and the schema (schema_writer.h) are visitors of it, so that neither can drift from the other.
+/// The table of all keys of a scene file except those of the methods, which have their own tables. The reader
+/// (section_reader.h) and the schema writer (schema_writer.h) are visitors of the same tables, so that they agree.
 ///
-/// A visitor has
+/// A visitor has these functions:
 ///   visit(key, member, meaning, limits)           a value;
 ///   visit.section(key, keys, meaning)             an object whose keys `describe(keys, inner)` visits;
 ///   visit.list(key, vector, meaning, keys_of)     a list of such objects, `keys_of(item)` each;
 ///   visit.generator(key, member, meaning)         an object whose keys depend on its `kind`;
 ///   visit.part(part)                              more keys of this object, which `part` describes;
-///   visit.only_for(keys, chooser, value, values)  keys that count only where another key has one of some values;
-///   visit.require(keys), visit.exactly_one(keys), visit.exclude(key, keys)    rules across keys of one object.
+///   visit.only_for(keys, chooser, value, values)  keys that are allowed only if another key has one of some values;
+///   visit.require(keys), visit.exactly_one(keys), visit.exclude(key, keys)    rules for several keys of one object.
 
 #include <filesystem>
 #include <string>
@@ -22,7 +22,7 @@
 
 namespace tensorray {
 
-/// Integers up to here are exact in every JSON reader.
+/// The largest integer that every JSON reader keeps exactly: 2^53.
 constexpr double largest_exact_integer = 9007199254740992.0;
 
 template <class Visitor>
@@ -168,7 +168,7 @@ void describe(ObstacleKeys& keys, Visitor& visit) {
 template <class Visitor>
 void describe(SceneDescription& scene, Visitor& visit) {
   visit.require({"field", "integrator"});
-  std::string schema;  // For editors alone.
+  std::string schema;  // Only editors use it.
   visit("$schema", schema, "where an editor finds this schema");
   visit("seed", scene.seed, "of the random numbers", between(0, largest_exact_integer));
   visit.section("field", scene.field, "the tensor field");

@@ -11,7 +11,7 @@ namespace {
 
 const std::string blackbody_word = "blackbody";
 
-/// The number that `text` is, without blanks before or behind it.
+/// Reads the whole `text`, except blanks at its ends, as a number. Returns false if it is not a number.
 bool read_decimal(std::string text, double& number) {
   const std::size_t first = text.find_first_not_of(' ');
   if (first == std::string::npos) return false;

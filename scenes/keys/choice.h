@@ -1,7 +1,7 @@
 #pragma once
 /// @file scenes/keys/choice.h
-/// The words by which scene files name the alternatives of an enumeration. `choices(Enum{})` is an array of all
-/// alternatives; the argument only selects the overload.
+/// Names in scene files for the values of an enumeration. `choices(Enum{})` returns an array of all values and their
+/// names; its argument only selects the overload.
 
 namespace tensorray {
 
@@ -11,7 +11,7 @@ struct Choice {
   Enum value;
 };
 
-/// The word for an alternative.
+/// The name of a value.
 template <class Enum>
 const char* choice_name(Enum value) {
   for (const auto& choice : choices(value)) {

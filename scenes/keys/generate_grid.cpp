@@ -9,7 +9,7 @@
 namespace tensorray {
 namespace {
 
-/// Voxels along each axis of `extent` such that the longest has `longest` and voxels are as nearly cubes as can be.
+/// Voxels along each axis of `extent`: `longest` along the longest axis, and voxels as close to cubes as possible.
 Eigen::Vector3i cubic_resolution(const Eigen::Vector3d& extent, int longest) {
   const double length = extent.maxCoeff();
   if (longest == 1 || !(length > 0)) return Eigen::Vector3i::Ones();
@@ -37,7 +37,7 @@ GridSettings choose_grid(const Generator& generator, const GridRequest& request)
   const int longest = each ? each->maxCoeff() : std::get<int>(request.resolution);
   if (longest < 1) throw std::invalid_argument("`resolution` must be at least 1");
 
-  GridSettings grid = default_grid(generator, std::max(longest, 2));  // Which has an extent along every axis.
+  GridSettings grid = default_grid(generator, std::max(longest, 2));  // With one voxel the box would have no extent.
   if (request.min) grid.min = *request.min;
   if (request.max) grid.max = *request.max;
   if (each) {

@@ -1,6 +1,6 @@
 #pragma once
 /// @file scenes/keys/generate_grid.h
-/// The grid on which a generator samples, from what the user asked for.
+/// Chooses the grid on which a generator makes tensors, from the user's keys.
 
 #include <optional>
 #include <variant>
@@ -18,17 +18,17 @@ struct GenerateDescription {
   GridSettings grid;
 };
 
-/// What scene files (`field.generate`) and `tensorray make` say of the grid. What is not given is the generator's.
+/// The keys of the grid, in scene files (`field.generate`) and in `tensorray make`.
 struct GridRequest {
-  /// Voxels along the longest axis of the box, all voxels cubes; or voxels along x, y and z.
+  /// Voxels along the longest axis of the box (voxels are then cubes); or voxels along x, y and z.
   std::variant<int, Eigen::Vector3i> resolution = 64;
-  std::optional<Eigen::Vector3d> min, max;  ///< World; centres of the outermost voxels.
+  std::optional<Eigen::Vector3d> min, max;  ///< Centres of the outermost voxels, world; none: the generator's.
 };
 
 constexpr int resolution_limit = 32768;       ///< Voxels along an axis.
 constexpr double voxel_limit = 2147483648.0;  ///< Voxels of a generated grid: 72 GiB of tensors.
 
-/// The grid's keys beside those of the generator. For visitors see scenes/description/scene_keys.h.
+/// The keys of the grid; the generator has further keys. For visitors see scenes/description/scene_keys.h.
 template <class Visitor>
 void describe(GridRequest& grid, Visitor& visit) {
   visit("resolution", grid.resolution,

@@ -16,7 +16,7 @@
 namespace tensorray {
 namespace {
 
-constexpr std::size_t largest_file = std::size_t{64} << 20;  // Bytes. Reached by a wrong file only, a VDB say.
+constexpr std::size_t largest_file = std::size_t{64} << 20;  // Bytes. Only a wrong file, such as a VDB, is larger.
 
 std::string read_text(const SceneSource& source) {
   std::error_code error;
@@ -37,7 +37,7 @@ std::string read_text(const SceneSource& source) {
   return text;
 }
 
-/// Follows the parser and refuses what JSON allows but no scene means.
+/// A callback of the parser that refuses repeated keys and deep nesting, which JSON allows.
 class StrictRules {
  public:
   bool operator()(int depth, Json::parse_event_t event, Json& parsed) {
@@ -59,7 +59,7 @@ class StrictRules {
   }
 
  private:
-  std::vector<std::set<std::string>> keys_;  // Of the objects that are open.
+  std::vector<std::set<std::string>> keys_;  // The keys of each object that has begun and not ended.
 };
 
 Json parse(const std::string& text, bool comments) {
@@ -70,7 +70,7 @@ Json parse(const std::string& text, bool comments) {
   return Json::parse(text, follow, true, comments);
 }
 
-/// "line 3, column 7" of the byte at `offset`.
+/// The position of the byte at `offset`, as "line 3, column 7".
 std::string position(const std::string& text, std::size_t offset) {
   const auto end = text.begin() + static_cast<std::ptrdiff_t>(std::min(offset, text.size()));
   const auto line = std::count(text.begin(), end, '\n') + 1;
@@ -78,7 +78,7 @@ std::string position(const std::string& text, std::size_t offset) {
   return fmt::format("line {}, column {}", line, end - start + 1);
 }
 
-/// The parser's own words on an error, without its prefixes and without bytes that are not text.
+/// The parser's text of an error, without its prefixes. Bytes that are not ASCII become '?'.
 std::string reason(const std::string& what) {
   const std::size_t column = what.find("column ");
   const std::size_t colon = what.find(": ", column == std::string::npos ? 0 : column);
@@ -111,7 +111,7 @@ Json read_json_object(const std::filesystem::path& path) {
   } catch (const SceneError& error) {
     source.fail(error.what());
   } catch (const Json::parse_error& error) {
-    const std::size_t read = error.byte;  // How many bytes the parser had read: the last of them is wrong.
+    const std::size_t read = error.byte;  // Number of bytes that the parser has read; the last byte is wrong.
     source.fail(fmt::format("{}: {}", position(text, read > 0 ? read - 1 : 0), reason(error.what())));
   } catch (const Json::exception& error) {
     source.fail(reason(error.what()));

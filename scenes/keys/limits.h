@@ -1,6 +1,6 @@
 #pragma once
 /// @file scenes/keys/limits.h
-/// What a value in a scene file must satisfy beyond its type.
+/// Limits of values in a scene file, in addition to their types.
 
 #include <limits>
 #include <string>
@@ -9,15 +9,15 @@
 
 namespace tensorray {
 
-/// Constraints on one key. Those that do not apply to the key's type are ignored.
+/// Limits of one key. Limits that do not apply to the type of the key are ignored.
 struct Limits {
-  double minimum = -std::numeric_limits<double>::infinity();  ///< Of a number, or of each number of a list.
+  double minimum = -std::numeric_limits<double>::infinity();  ///< Least value of a number, or of each number of a list.
   double maximum = std::numeric_limits<double>::infinity();
   bool minimum_excluded = false;
-  bool not_zero = false;               ///< A number other than 0; a vector whose length is not 0.
-  bool one_for_all = false;            ///< One number may stand for a list of equal ones.
-  const char* word = nullptr;          ///< "auto": a string allowed instead, read as 0 or no value.
-  std::vector<std::string> endings{};  ///< Of a file name, one of these; empty: any.
+  bool not_zero = false;       ///< A number must not be 0; the length of a vector must not be 0.
+  bool one_for_all = false;    ///< One number may be given instead of a list of equal numbers.
+  const char* word = nullptr;  ///< A string that is also allowed, for example "auto"; it is read as 0 or no value.
+  std::vector<std::string> endings{};  ///< Allowed endings of a file name; empty: any.
 
   Limits or_word(const char* allowed) && {
     word = allowed;

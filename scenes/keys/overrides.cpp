@@ -12,9 +12,9 @@
 namespace tensorray {
 namespace {
 
-/// An override, taken apart.
+/// An override, split into its parts.
 struct Override {
-  std::string key;  ///< As written.
+  std::string key;  ///< The whole key as written.
   std::vector<std::string> segments;
   Json value;
 
@@ -33,7 +33,7 @@ std::vector<std::string> split(const std::string& key) {
   return segments;
 }
 
-/// JSON, or where the text is none, the text.
+/// The JSON value of `text`; if `text` is not JSON, `text` as a string.
 Json value_of(const std::string& text) {
   try {
     return parse_value(text);
@@ -45,7 +45,7 @@ Json value_of(const std::string& text) {
 bool is_text(const std::string& bytes) {
   try {
     return !Json(bytes).dump().empty();
-  } catch (const Json::type_error&) {  // Not UTF-8.
+  } catch (const Json::type_error&) {  // `bytes` are not UTF-8.
     return false;
   }
 }
@@ -82,7 +82,7 @@ std::size_t index_in(const Json& list, const std::string& segment, const Overrid
   return index;
 }
 
-/// The value of `segment` in `parent`, made if there is none.
+/// The value of `segment` in `parent`. It is made if there is none.
 Json& child(Json& parent, const std::string& segment, const Override& change) {
   if (parent.is_null()) parent = segment == "0" ? Json::array() : Json::object();
   if (parent.is_object()) return parent[segment];
@@ -103,7 +103,7 @@ void remove(Json& scene, const Override& change) {
     } else if (parent->is_array() && index_in(*parent, segment, change) < parent->size()) {
       parent = &(*parent)[std::stoul(segment)];
     } else {
-      return;  // Nothing there to remove.
+      return;  // There is nothing to remove.
     }
   }
   const std::string& last = change.segments.back();

@@ -1,6 +1,6 @@
 #pragma once
 /// @file scenes/keys/overrides.h
-/// Changes to a scene from the command line.
+/// Applies changes to a scene from the command line.
 
 #include <string>
 
@@ -8,9 +8,10 @@
 
 namespace tensorray {
 
-/// Applies "KEY=VALUE" (see read_scene) to a scene. Objects on the way to KEY are made where there are none; an index
-/// one past the end of a list appends to it.
-/// @throw SceneError: not of that form, a way through a value that is no object or list, an index out of range.
+/// Applies "KEY=VALUE" (see read_scene) to a scene. Objects that KEY names and that do not exist are made. An index one
+/// past the end of a list appends an item.
+/// @throw SceneError: the text does not have that form, KEY leads through a value that is neither object nor list, or
+/// an index is out of range.
 void apply_override(Json& scene, const std::string& text);
 
 }  // namespace tensorray

@@ -1,6 +1,6 @@
 #pragma once
 /// @file scenes/keys/scene_source.h
-/// Where a scene was read from: named in errors, and what relative paths are relative to.
+/// The file from which a scene was read. Errors name it, and relative paths are relative to its folder.
 
 #include <filesystem>
 #include <stdexcept>
@@ -8,21 +8,22 @@
 
 namespace tensorray {
 
-/// The scene file is wrong. The message is one line: what, where (file and JSON pointer, or line and column), the fix.
+/// The scene file is wrong. The message is one line: what is wrong, where (file and JSON pointer, or line and column),
+/// and the fix.
 struct SceneError : std::invalid_argument {
   using std::invalid_argument::invalid_argument;
 };
 
-/// `text` fit for a message of one line: control characters are escaped, and the middle of a long text is left out.
+/// `text` for a message of one line: control characters are escaped, and the middle of a long text is left out.
 std::string printable(const std::string& text);
 
 struct SceneSource {
   std::filesystem::path path;  ///< The scene file.
 
-  /// A path of the scene file, relative ones taken relative to the scene file's folder.
+  /// The file that a path in the scene file means: a relative path is relative to the scene file's folder.
   std::filesystem::path resolve(const std::filesystem::path& written) const;
 
-  /// @throw SceneError "scene.json: what".
+  /// @throw SceneError "PATH: WHAT".
   [[noreturn]] void fail(const std::string& what) const;
 };
 

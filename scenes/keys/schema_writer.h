@@ -1,6 +1,6 @@
 #pragma once
 /// @file scenes/keys/schema_writer.h
-/// The visitor of scene_keys.h that writes the JSON Schema of one object.
+/// The visitor (see scene_keys.h) that writes the JSON Schema of one object.
 
 #include <initializer_list>
 #include <optional>
@@ -75,13 +75,13 @@ class SchemaWriter {
     for (const char* key : keys) rules_.push_back({{"anyOf", {chosen, {{"not", {{"required", {key}}}}}}}});
   }
 
-  /// The object's schema.
+  /// The schema of the object.
   Json finish(const std::string& meaning) const;
 
  private:
   bool is_required(const std::string& key) const;
 
-  // Whether a member holds what Limits::word stands for.
+  // Whether a member has the value that Limits::word means.
   template <class T>
   static bool is_word(const T& member) {
     if constexpr (std::is_arithmetic_v<T>) return member == T{};

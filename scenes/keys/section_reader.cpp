@@ -9,7 +9,7 @@
 namespace tensorray {
 namespace {
 
-/// How many letters must be inserted, removed, replaced or swapped with their neighbour to make `a` of `b`.
+/// How many letters must be inserted, removed, replaced or swapped with their neighbour to turn `b` into `a`.
 std::size_t edit_distance(const std::string& a, const std::string& b) {
   std::vector<std::vector<std::size_t>> distance(a.size() + 1, std::vector<std::size_t>(b.size() + 1));
   for (std::size_t i = 0; i <= a.size(); ++i) {
@@ -34,9 +34,9 @@ std::string quoted_list(const std::vector<std::string>& names, const char* separ
   return list;
 }
 
-/// "did you mean `light`?", or the known keys where none is like `key`.
+/// "did you mean `light`?"; if no known key is similar to `key`, the list of known keys.
 std::string suggestion(const std::string& key, const std::set<std::string>& known) {
-  constexpr std::size_t longest = 64;  // No key is as long; the distance takes quadratic time.
+  constexpr std::size_t longest = 64;  // All keys are shorter. edit_distance takes quadratic time.
   std::string nearest;
   std::size_t least = key.size() > longest ? 0 : std::max<std::size_t>(2, key.size() / 2);
   for (const std::string& name : known) {
@@ -63,7 +63,7 @@ const Json* SectionReader::find(const char* key) {
 
 std::string SectionReader::pointer_to(const std::string& key) const {
   std::string pointer = pointer_ + "/";
-  for (const char c : key) {  // As RFC 6901 has it.
+  for (const char c : key) {  // Escapes of RFC 6901.
     if (c == '~') {
       pointer += "~0";
     } else if (c == '/') {
@@ -102,7 +102,7 @@ void SectionReader::generator(const char* key, std::optional<GenerateDescription
   inner.finish();
   try {
     member->grid = choose_grid(member->generator, grid);
-    generate(member->generator, default_grid(member->generator, 4));  // Knows the ranges of the kind's parameters.
+    generate(member->generator, default_grid(member->generator, 4));  // Checks the ranges of the parameters.
   } catch (const std::invalid_argument& error) {
     source_.fail(fmt::format("`{}`: {}", pointer_to(key), error.what()));
   }

@@ -1,6 +1,6 @@
 #pragma once
 /// @file scenes/keys/section_reader.h
-/// The visitor of scene_keys.h that reads an object of the scene file into a description.
+/// The visitor (see scene_keys.h) that reads an object of the scene file into a description.
 
 #include <algorithm>
 #include <initializer_list>
@@ -20,8 +20,8 @@
 
 namespace tensorray {
 
-/// Reads one object. Values are read as they are visited; `finish` then applies the rules across keys and refuses keys
-/// that were not visited. Every error is a SceneError with the JSON pointer of what is wrong.
+/// Reads one object. Each value is read when it is visited. `finish` then checks the rules for several keys, and
+/// refuses keys that were not visited. Every error is a SceneError with the JSON pointer of the wrong value.
 class SectionReader {
  public:
   /// @param pointer  JSON pointer of `object`; empty for the whole scene.
@@ -62,7 +62,7 @@ class SectionReader {
     }
   }
 
-  /// Keys of this object that another class describes: it calls the reader back.
+  /// Keys of this object that another class describes. It calls this reader.
   template <class Part>
   void part(Part& part) {
     part.visit(*this);
@@ -74,7 +74,7 @@ class SectionReader {
   void exactly_one(std::initializer_list<const char*> keys);
   void exclude(const char* key, std::initializer_list<const char*> others);
 
-  /// Keys that have a meaning only where `value`, the member of the key `chooser`, is one of `values`.
+  /// Keys that are allowed only if `value`, the member of the key `chooser`, is one of `values`.
   template <class Enum>
   void only_for(std::initializer_list<const char*> keys, const char* chooser, Enum value,
                 std::initializer_list<Enum> values) {
@@ -93,7 +93,7 @@ class SectionReader {
     std::string key, other;
   };
 
-  /// A key of another kind of object.
+  /// A key that belongs to another kind of object.
   struct Stray {
     std::string key, chooser, value, allowed;
   };
@@ -103,7 +103,7 @@ class SectionReader {
   [[noreturn]] void refuse(const std::string& key, const std::string& expected, const char* word = nullptr) const;
   void refuse_unknown_keys() const;
 
-  // What Limits::word stands for: "auto" is no value, or 0.
+  // Sets the value that Limits::word means: no value, or 0.
   template <class T>
   static void set_word(T& member) {
     if constexpr (std::is_arithmetic_v<T>) member = 0;

@@ -14,7 +14,7 @@ bool within(double number, const Limits& limits) {
   return above && number <= limits.maximum;
 }
 
-/// Integers may be written as 1e6 or 4.0, as JSON Schema has it. All limits of integers are exact in a double.
+/// Integers may be written as 1e6 or 4.0, as JSON Schema allows. All limits of integers are exact in a double.
 template <class Integer>
 bool read_integer(const Json& json, const Limits& limits, Integer& target) {
   if (!json.is_number()) return false;

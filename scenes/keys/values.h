@@ -1,6 +1,6 @@
 #pragma once
 /// @file scenes/keys/values.h
-/// How each type of value stands in a scene file: one trait a type.
+/// How values of each type are written in a scene file: one trait for each type.
 
 #include <cstdint>
 #include <filesystem>
@@ -20,22 +20,22 @@
 namespace tensorray {
 
 /// A type that may be the value of a key has a specialisation `Value<T>` with four static functions:
-///   bool read(json, limits, target)       sets `target`, or returns false (and may have changed it) if the JSON value
-///                                         is of another type or breaks a limit;
-///   std::string expectation(target, limits)    what would have been right: "an integer >= 1";
-///   Json schema(target, limits)           what JSON Schema allows;
-///   Json json(value)                      the JSON of a default; null where there is none to be told.
-/// `target` is passed where only its type counts, too, because the allowed words of a `Word` are known at run time.
+///   bool read(json, limits, target)       sets `target`; returns false if the JSON value has another type or breaks a
+///                                         limit (`target` may then have changed);
+///   std::string expectation(target, limits)    describes the allowed values: "an integer >= 1";
+///   Json schema(target, limits)           the JSON Schema of allowed values;
+///   Json json(value)                      the JSON of a default; null if the schema shall show no default.
+/// `expectation` and `schema` also need `target`, because the allowed words of a `Word` are known only at run time.
 template <class T, class = void>
 struct Value;
 
-/// A word of a list that is known at run time.
+/// A word, and the list of allowed words, which is known only at run time.
 struct Word {
   std::string value;
   std::vector<std::string> allowed;
 };
 
-/// Declares the trait of a type whose functions are in values.cpp.
+/// Declares the trait of a type. A .cpp file defines its functions.
 #define TENSORRAY_VALUE(T)                                                 \
   template <>                                                              \
   struct Value<T> {                                                        \
@@ -57,11 +57,11 @@ TENSORRAY_VALUE(std::vector<double>);  ///< A list, or one number.
 using IntegerOrThree = std::variant<int, Eigen::Vector3i>;
 TENSORRAY_VALUE(IntegerOrThree);
 
-/// "a list of 3 numbers >= 0".
+/// Value::expectation of a list: "a list of 3 numbers >= 0".
 std::string list_expectation(int size, const char* things, const Limits& limits);
 Json list_schema(int size, const Json& item);
 
-/// Limits of each number of a vector: `not_zero` is a limit of its length.
+/// The limits of each number of a vector. They lack `not_zero`, which limits the length of the vector.
 Limits limits_of_each(Limits limits);
 
 template <class Scalar, int size>
@@ -79,7 +79,7 @@ struct Value<Eigen::Matrix<Scalar, size, 1>> {
     for (int i = 0; i < size; ++i) {
       if (!Value<Scalar>::read(json[static_cast<std::size_t>(i)], each, target[i])) return false;
     }
-    // The square must neither vanish nor overflow: the vector is to be normalised.
+    // The square must neither vanish nor overflow, because the vector will be normalised.
     const double square = target.template cast<double>().squaredNorm();
     return !limits.not_zero || (std::isnormal(square) && square > 0);
   }
@@ -99,7 +99,7 @@ struct Value<Eigen::Matrix<Scalar, size, 1>> {
   static Json json(const Vector& value) { return std::vector<Scalar>(value.data(), value.data() + size); }
 };
 
-/// `"a", "b", "c"`.
+/// The names of an enumeration: `"a", "b", "c"`.
 template <class Enum>
 std::string quoted_choices() {
   std::string names;
@@ -131,10 +131,10 @@ struct Value<Enum, std::enable_if_t<std::is_enum_v<Enum>>> {
   static Json json(const Enum& value) { return choice_name(value); }
 };
 
-/// Whether a text names a file rather than a word: it has an ending or a folder.
+/// Whether a text names a file and not a word: it has an ending or a folder.
 bool names_file(const std::string& text);
 
-/// One of an enumeration's words, or a file.
+/// The name of a value of an enumeration, or a file.
 template <class Enum>
 struct Value<std::variant<Enum, std::filesystem::path>, std::enable_if_t<std::is_enum_v<Enum>>> {
   using Variant = std::variant<Enum, std::filesystem::path>;
@@ -173,7 +173,7 @@ struct Value<std::optional<T>> {
   static Json json(const std::optional<T>& value) { return value ? Value<T>::json(*value) : Json(); }
 };
 
-/// `value` as it may stand in a message: short.
+/// A short form of `value` for messages.
 std::string excerpt(const Json& value);
 
 }  // namespace tensorray

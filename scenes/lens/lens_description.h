@@ -1,6 +1,6 @@
 #pragma once
 /// @file scenes/lens/lens_description.h
-/// The keys of `integrator` that the lens has. Lengths are world units.
+/// The keys of `integrator` that the lens has. Lengths are in world units.
 
 #include <array>
 #include <filesystem>
@@ -21,13 +21,14 @@ namespace tensorray {
 
 /// `integrator.image_plane`: at most one of distance, depth and center.
 struct ImagePlaneDescription {
-  std::optional<double> distance;  ///< Before the volume, along the light; none: a quarter of the volume's depth.
-  std::optional<std::vector<double>> depth;  ///< Into the volume, 0 where light enters it and 1 where it leaves: a
-                                             ///< picture for each, side by side.
-  std::optional<Eigen::Vector3d> center;     ///< None: on the line along the light through the receiver's.
-  std::optional<Eigen::Vector3d> normal;     ///< None: the receiver's.
-  std::optional<Eigen::Vector3d> up;         ///< None: the receiver's.
-  std::optional<Eigen::Vector2d> size;       ///< None: the least that covers the receiver, in the image's proportions.
+  /// Distance before the volume, along the light; none: a quarter of the volume's depth.
+  std::optional<double> distance;
+  /// Depths in the volume: 0 where light enters, 1 where it leaves. Each depth gives a picture; they are side by side.
+  std::optional<std::vector<double>> depth;
+  std::optional<Eigen::Vector3d> center;  ///< Middle; none: on the line along the light through the receiver's middle.
+  std::optional<Eigen::Vector3d> normal;  ///< None: that of the receiver.
+  std::optional<Eigen::Vector3d> up;      ///< None: that of the receiver.
+  std::optional<Eigen::Vector2d> size;    ///< None: the smallest in the image's proportions that covers the receiver.
 };
 
 enum class Overlay { none, grid };
@@ -35,10 +36,10 @@ enum class Overlay { none, grid };
 struct LensDescription {
   LensMode mode = LensMode::scatter;
   std::variant<TestImage, std::filesystem::path> image = TestImage::checkerboard;
-  std::string image_color_space;  ///< Empty: "auto".
+  std::string image_color_space;  ///< OpenColorIO colour space of the file; empty: "auto".
   ImagePlaneDescription plane;
   Wrap wrap = Wrap::none;
-  int samples = 1;  ///< Per pixel along x and y.
+  int samples = 1;  ///< Samples per pixel along x and along y.
   Overlay overlay = Overlay::none;
 };
 
@@ -58,7 +59,7 @@ inline auto choices(Overlay) {
   return std::array{C{"none", Overlay::none}, C{"grid", Overlay::grid}};
 }
 
-/// The built-in images, as `integrator.image` names them.
+/// Names of the built-in images for `integrator.image`.
 inline auto choices(TestImage) {
   using C = Choice<TestImage>;
   return std::array{C{"checkerboard", TestImage::checkerboard}, C{"grid", TestImage::grid},

@@ -17,13 +17,13 @@
 namespace tensorray {
 namespace {
 
-constexpr double reference_wavelength = 550;  // nm: the channel next to it is that of the points.
-constexpr int overlay_cells = 16;             // Along the image's shorter side.
-constexpr double most_overlay_cells = 1e6;    // Too dense to be drawn.
-constexpr std::size_t exact_bands = 10;       // With so many a reflectance can have any colour of Rec. 709.
-constexpr int gap_part = 64;                  // Between pictures side by side: this part of one's width.
+constexpr double reference_wavelength = 550;  // nm: LensPicture::points describes the nearest channel.
+constexpr int overlay_cells = 16;             // Cells along the image's shorter side.
+constexpr double most_overlay_cells = 1e6;    // A limit; grids are too dense to be visible long before.
+constexpr std::size_t exact_bands = 10;       // With this many bands a reflectance can have any colour of Rec. 709.
+constexpr int gap_part = 64;  // The gap between pictures side by side is the width of a picture divided by this.
 
-/// How the image's colours become light, channel by channel.
+/// A function that converts a colour of the image to its radiance in a channel.
 std::function<double(const Eigen::Vector3d&, std::size_t)> radiance_of(const Scene& scene) {
   if (scene.description.bending.rgb) {
     const Eigen::Matrix3d to_primaries = (scene.color.xyz_to_working() * rec709_to_xyz()).inverse();
@@ -31,7 +31,7 @@ std::function<double(const Eigen::Vector3d&, std::size_t)> radiance_of(const Sce
       return to_primaries.row(static_cast<Eigen::Index>(channel)).dot(rgb);
     };
   }
-  // Light that has no white cannot tell what spectrum a colour stands for: daylight does.
+  // Light that has no white does not define the spectrum of a colour. Daylight is used for it instead.
   const std::vector<Band> bands = has_white(scene) ? scene.bands : make_bands(illuminant("D65"), 380, 730, 36);
   Eigen::Vector3d white = Eigen::Vector3d::Zero();
   for (const Band& band : bands) white += band.xyz;
@@ -49,7 +49,7 @@ std::size_t reference_channel(const Scene& scene) {
   return static_cast<std::size_t>(nearest - scene.bands.begin());
 }
 
-/// The points' channels, in this order.
+/// The channels that write_point writes, in its order.
 const std::vector<std::string> point_channels{"texture.s",
                                               "texture.t",
                                               "displacement.x",
@@ -74,7 +74,7 @@ void write_point(const LensPoint& point, float* values) {
   next(static_cast<int>(point.end));
 }
 
-/// R, G, B, A, and what the points say.
+/// R, G, B, A, and the channels of the picture's points.
 Image make_image(const LensPicture& picture, const std::vector<Band>& bands, const Eigen::Matrix3d& to_rgb) {
   const Image colors = linear_image(picture.radiance, bands, to_rgb);
   std::vector<std::string> channels{"R", "G", "B", "A"};
@@ -83,13 +83,13 @@ Image make_image(const LensPicture& picture, const std::vector<Band>& bands, con
   for (std::size_t i = 0; i < picture.points.size(); ++i) {
     float* const pixel = &image.pixels[i * channels.size()];
     std::copy_n(&colors.pixels[3 * i], 3, pixel);
-    pixel[3] = static_cast<float>(std::min(picture.alpha[i], 1.0));  // Rounding may sum to more than 1.
+    pixel[3] = static_cast<float>(std::min(picture.alpha[i], 1.0));  // Rounding may make the sum greater than 1.
     write_point(picture.points[i], pixel + 4);
   }
   return image;
 }
 
-/// Straight lines as without the field, and the image's own as the lens bends them.
+/// Draws the lines of a grid on the image twice: straight as without the field, and distorted as the lens shows them.
 void draw_overlay(const LensPicture& picture, const Plate& plane, Image& image) {
   std::vector<PixelCoordinates> straight, seen;
   for (int y = 0; y < image.height; ++y)
@@ -112,7 +112,7 @@ void draw_overlay(const LensPicture& picture, const Plate& plane, Image& image) 
   draw_grid_lines(image, seen, lines);
 }
 
-/// Pictures side by side, with a gap in which everything is 0.
+/// Puts pictures side by side. All channels are 0 in the gaps.
 Image side_by_side(const std::vector<Image>& images) {
   if (images.size() == 1) return images.front();
   const int width = images.front().width, gap = std::max(1, width / gap_part);
@@ -152,7 +152,7 @@ class LoadedLens : public LoadedMethod {
   LensScene lens_;
 };
 
-/// The spectra of pictures side by side. A white image is a diffuse one in the light of the scene.
+/// Puts spectral pictures side by side. A white image has the radiance of a white diffuse surface in the scene's light.
 SpectralImage spectra_side_by_side(std::vector<SpectralImage> spectra) {
   std::vector<Image> images;
   for (SpectralImage& spectrum : spectra) images.push_back(std::move(spectrum.image));
@@ -189,7 +189,7 @@ Render LoadedLens::render(const Scene& scene, const Progress& progress) const {
   if (!spectra.empty()) result.spectral = spectra_side_by_side(std::move(spectra));
   for (const std::uint64_t count : result.statistics.ends[settings.reference]) result.statistics.positions += count;
   result.metadata["tensorray:end"] = end_codes();
-  result.exposure = 0;  // The image is shown as it is.
+  result.exposure = 0;  // Shows the colours of the image unchanged.
   if (nothing_arrived(result.statistics))
     result.warnings.push_back("no ray found the image; look at `receiver` and `integrator.image_plane`");
   return result;
@@ -215,7 +215,7 @@ class LensMethod : public MethodWith<LensDescription> {
     if (!chosen) return;
     check_spectral_output(scene, source);
     warn_unused(scene, json, "/light/spectrum", "/bending/rgb");
-    // Rays, their mesh, and two copies of the picture with all of its channels, for each depth.
+    // 600 bytes for rays and their mesh; and for each depth, two copies of the picture with all of its channels.
     const int channels = scene.bending.rgb ? 3 : scene.light.wavelength_count;
     const auto& depth = settings().plane.depth;
     const double pictures = depth ? static_cast<double>(depth->size()) : 1;

@@ -10,8 +10,8 @@
 namespace tensorray {
 namespace {
 
-constexpr double default_distance = 0.25;  // Of the image before the volume, in depths of the volume.
-constexpr int test_image_pixels = 4096;    // Along the longer side, at most: 8 to a pixel of the receiver.
+constexpr double default_distance = 0.25;  // Distance of the image before the volume, in depths of the volume.
+constexpr int test_image_pixels = 4096;    // Most pixels along the longer side; otherwise 8 per pixel of the receiver.
 
 Image load_test_image(TestImage which, const Plate& receiver, const ColorManagement& color) {
   const int longest = std::min(test_image_pixels, 8 * receiver.resolution.maxCoeff());
@@ -27,11 +27,11 @@ Image load_test_image(TestImage which, const Plate& receiver, const ColorManagem
   return image;
 }
 
-/// Light that leaves the image leaves from nowhere else.
+/// Whether the image continues beyond its edges. In the mode `scatter` light starts from the image only.
 bool goes_on(const LensDescription& lens) { return lens.wrap != Wrap::none && lens.mode == LensMode::gather; }
 
 Texture load_image(const LensDescription& lens, const Plate& receiver, const ColorManagement& color) {
-  const Wrap wrap = goes_on(lens) ? lens.wrap : Wrap::clamp;  // The lens itself cuts the others, sharply.
+  const Wrap wrap = goes_on(lens) ? lens.wrap : Wrap::clamp;  // The lens cuts clamped images sharply at their edges.
   if (const TestImage* which = std::get_if<TestImage>(&lens.image))
     return {load_test_image(*which, receiver, color), wrap};
   return {std::get<std::filesystem::path>(lens.image), color, lens.image_color_space, wrap};
@@ -43,11 +43,11 @@ Plate from_behind(Plate plate) {
   return plate;
 }
 
-/// The least rectangle of the image's proportions that covers the receiver.
+/// The smallest rectangle in the proportions of the image that covers the receiver.
 Eigen::Vector2d covering_size(const Plate& receiver, const Texture& image) {
   const double aspect = static_cast<double>(image.width()) / image.height();
   const Eigen::Vector2d size = receiver.size;
-  // Pixels of the same proportions as the receiver's: exactly its size, whatever the rounding.
+  // If the proportions agree up to rounding to pixels, the image has exactly the receiver's size.
   if (std::abs(aspect * size.y() / size.x() - 1) < 0.5 / std::max(image.width(), image.height())) return size;
   return {std::max(size.x(), size.y() * aspect), std::max(size.y(), size.x() / aspect)};
 }

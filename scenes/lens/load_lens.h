@@ -1,6 +1,6 @@
 #pragma once
 /// @file scenes/lens/load_lens.h
-/// What a lens needs beside the field: the image, where it stands, and from where it is seen.
+/// What a lens needs in addition to the field: the image, its position, and the plate from which it is seen.
 
 #include <vector>
 
@@ -11,15 +11,15 @@
 
 namespace tensorray {
 
-/// Rectangles are as the viewer sees them, who looks against the light: their normals point along it.
+/// The viewer looks against the light, so that the normals of both rectangles point along the light.
 struct LensScene {
   Texture image;
   Plate receiver;
-  std::vector<Plate> planes;  ///< Of the image: a picture each, side by side.
-  bool wraps = false;         ///< Whether the image goes on beyond its edges.
+  std::vector<Plate> planes;  ///< Planes of the image. Each gives a picture; they are side by side.
+  bool wraps = false;         ///< Whether the image continues beyond its edges.
 };
 
-/// @throw std::runtime_error if the image cannot be read; SceneError if it would stand behind the receiver.
+/// @throw std::runtime_error if the image cannot be read; SceneError if the image would be behind the receiver.
 LensScene load_lens(const Scene& scene, const LensDescription& lens);
 
 }  // namespace tensorray

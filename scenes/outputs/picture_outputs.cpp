@@ -53,8 +53,6 @@ ImageMetadata provenance(const Scene& scene, const Render& render) {
   return metadata;
 }
 
-/// R, G, B as the display shows them, and the alpha if there is one. Formats with an alpha hold colours that are not
-/// multiplied by it; in others the picture is seen on black.
 Image display_image(const Scene& scene, const Render& render, bool holds_alpha) {
   if (render.display) return *render.display;
   const Image& linear = render.linear;
@@ -77,9 +75,10 @@ Image display_image(const Scene& scene, const Render& render, bool holds_alpha) 
 }
 
 double automatic_exposure(const Image& linear) {
-  constexpr float lit = 0.02f;        // Of the undisturbed light, or of the brightest pixel where that is darker.
-  constexpr double brightest = 0.99;  // This fraction of the lit pixels is darker than ...
-  constexpr double shown_as = 0.9;    // ... this display-linear value.
+  // A pixel is lit above this part of the undisturbed light, or of the brightest pixel if that is darker.
+  constexpr float lit = 0.02f;
+  constexpr double brightest = 0.99;  // This fraction of the lit pixels is darker than `shown_as`.
+  constexpr double shown_as = 0.9;    // Display-linear.
   const std::size_t channels = linear.channels.size();
   std::vector<float> values;
   for (std::size_t i = 0; i + 2 < linear.pixels.size(); i += channels) {

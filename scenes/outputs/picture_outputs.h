@@ -1,6 +1,6 @@
 #pragma once
 /// @file scenes/outputs/picture_outputs.h
-/// The pictures that every method can write, and what the headers of all files say.
+/// The pictures that every method can write, and the header entries of all files.
 
 #include <vector>
 
@@ -14,21 +14,21 @@ namespace tensorray {
 /// "image" and "exr".
 std::vector<Output> picture_outputs();
 
-/// "spectral", of methods whose light has bands.
+/// "spectral", for methods whose light has bands.
 Output spectral_output();
 
 /// The picture as a display shows it: R, G, B, and A if there is one.
-/// @param holds_alpha  Whether colours are not multiplied by alpha, as formats with an alpha want them; otherwise the
-///                     picture is seen on black.
+/// @param holds_alpha  Whether the file format has an alpha. Colours are then divided by alpha, as such formats need
+///                     them. Otherwise they stay multiplied by it, which shows the picture on black.
 Image display_image(const Scene& scene, const Render& render, bool holds_alpha);
 
-/// The exposure, in stops, at which a scene-linear picture is well shown: its brightest hundredth just below white.
+/// The exposure, in stops, that shows the brightest hundredth of a scene-linear picture just below white.
 double automatic_exposure(const Image& linear);
 
-/// What a file's header tells of its origin: program, scene, seed, scale, colour.
+/// Header entries about the origin of a file: program, scene, seed, scale, colour, and Render::metadata.
 ImageMetadata provenance(const Scene& scene, const Render& render);
 
-/// Writes Render::grids: an Output::write.
+/// Writes Render::grids; for Output::write.
 void write_grids(const std::filesystem::path& file, const Scene& scene, const Render& render);
 
 }  // namespace tensorray

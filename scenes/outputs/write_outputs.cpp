@@ -22,7 +22,7 @@ void write_outputs(const Render& render, const Scene& scene, OutputFiles& files)
   std::vector<Output> wanted;
   for (const Output& output : scene.description.integrator.method().outputs())
     if (files.count(output.key) > 0) wanted.push_back(output);
-  tbb::parallel_for_each(wanted, [&](const Output& output) {  // One thread compresses a file, most of the time.
+  tbb::parallel_for_each(wanted, [&](const Output& output) {  // Most of the time one thread compresses a file.
     files.at(output.key).write([&](const std::filesystem::path& path) { output.write(path, scene, render); });
   });
 }

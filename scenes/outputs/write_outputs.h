@@ -1,6 +1,6 @@
 #pragma once
 /// @file scenes/outputs/write_outputs.h
-/// Render → files. All of them are complete, or none has changed (commit_all).
+/// Render → files. Either all files are complete, or none has changed (commit_all).
 
 #include <map>
 #include <string>
@@ -12,14 +12,14 @@
 
 namespace tensorray {
 
-/// Files being written, by the key of the output.
+/// Files that are being written, by the key of their output.
 using OutputFiles = std::map<std::string, OutputFile>;
 
-/// Opens the files of the scene's outputs, so that one that cannot be written is known before the work is done.
+/// Opens the files of the scene's outputs, so that a file that cannot be written is reported before the work begins.
 /// @throw std::runtime_error naming the file and the fix.
 OutputFiles open_outputs(const OutputDescription& output);
 
-/// Writes the files under their temporary names: commit_all then gives them their own.
+/// Writes the files under temporary names. commit_all then gives them their final names.
 /// @throw std::runtime_error naming the file and the reason.
 void write_outputs(const Render& render, const Scene& scene, OutputFiles& files);
 

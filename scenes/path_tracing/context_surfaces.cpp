@@ -16,9 +16,9 @@
 namespace tensorray {
 namespace {
 
-constexpr double edge_radius = 0.0012;  // Of the box's edges, in diagonals of the volume.
-constexpr int slice_cells = 256;        // Along the slice's longer side.
-constexpr double plate_white = 0.85;    // Reflectance of the plate where the brightest hundredth of its light falls.
+constexpr double edge_radius = 0.0012;  // Radius of the box's edges, in diagonals of the volume.
+constexpr int slice_cells = 256;        // Cells along the slice's longer side.
+constexpr double plate_white = 0.85;    // Reflectance of the plate at the 99th percentile of its light.
 
 MaterialDescription plain(double grey, double roughness) {
   MaterialDescription description;
@@ -35,7 +35,7 @@ void add(const ShownLight& light, ShadedSurface surface, const MaterialDescripti
   surfaces.push_back(std::move(surface));
 }
 
-/// The twelve edges of the volume. Corner i has x in bit 0, y in bit 1, z in bit 2.
+/// The twelve edges of the volume. Bits 0, 1 and 2 of a corner's number choose its x, y and z.
 ShadedSurface box_edges(const TensorField& field) {
   const Eigen::AlignedBox3d& box = field.index_bounds();
   RoundCurves curves;
@@ -53,7 +53,7 @@ ShadedSurface box_edges(const TensorField& field) {
   return surface;
 }
 
-/// Two triangles for each cell of a lattice of columns × rows vertices that `keeps` all four corners.
+/// Adds two triangles for each cell of a lattice of columns × rows vertices, if `keeps` is true for its four corners.
 template <class Keeps>
 void add_lattice(int columns, int rows, const Keeps& keeps, TriangleMesh& mesh) {
   for (int y = 0; y + 1 < rows; ++y)
@@ -66,7 +66,7 @@ void add_lattice(int columns, int rows, const Keeps& keeps, TriangleMesh& mesh) 
     }
 }
 
-/// The plate with the photons' light on it: a vertex in the middle of each pixel.
+/// The plate with the light of the photons as its colour: a vertex in the middle of each pixel.
 ShadedSurface lit_plate(const Scene& scene, const Progress& progress) {
   const PhotonDistribution light = distribute_photons(scene, progress);
   const Image image = light_image(scene, light.irradiance);
@@ -91,7 +91,7 @@ ShadedSurface lit_plate(const Scene& scene, const Progress& progress) {
   return surface;
 }
 
-/// Where the plane cuts the volume's edges.
+/// The points where the plane cuts the volume's edges.
 std::vector<Eigen::Vector3d> cut_points(const TensorField& field, const Eigen::Vector3d& center,
                                         const Eigen::Vector3d& normal) {
   const ShadedSurface edges = box_edges(field);
@@ -182,7 +182,7 @@ MaterialSettings settings_of(const MaterialDescription& description, const std::
 }  // namespace
 
 Material load_material(const MaterialDescription& description, const ShownLight& light) {
-  // What is a factor of metals and glass is left at 1 unless the scene gives another colour than the default.
+  // For metals and glass the colour is a factor: it is 1 unless the scene gives a colour that is not the default.
   const std::vector<float> color = light.radiance(description.color, 1);
   BandValues reflectance = BandValues::Ones(static_cast<Eigen::Index>(color.size()));
   const bool is_factor = description.kind == MaterialKind::metal || description.kind == MaterialKind::glass;

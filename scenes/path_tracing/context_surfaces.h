@@ -1,6 +1,6 @@
 #pragma once
 /// @file scenes/path_tracing/context_surfaces.h
-/// What a picture of paths shows beside them: the volume's edges, obstacles, the plate, a slice, isosurfaces.
+/// The other surfaces in a picture of paths: the volume's edges, obstacles, the plate, a slice, isosurfaces.
 
 #include <vector>
 
@@ -11,7 +11,7 @@
 
 namespace tensorray {
 
-/// A material of the description, in the light that shows the paths.
+/// Makes a material from its description, for the bands of the light that shows the paths.
 /// @throw std::invalid_argument if a metal is unknown.
 Material load_material(const MaterialDescription& description, const ShownLight& light);
 

@@ -17,11 +17,11 @@
 namespace tensorray {
 namespace {
 
-constexpr double shown_min = 380, shown_max = 730;  // nm, of the light that shows the paths.
-constexpr double reference_wavelength = 550;        // nm: unless paths are to show their wavelength, they are of this.
-constexpr std::size_t most_paths = 2'000'000;       // Some kilobytes each.
+constexpr double shown_min = 380, shown_max = 730;  // nm: range of the light that shows the paths.
+constexpr double reference_wavelength = 550;        // nm: wavelength of the rays, unless paths show their wavelength.
+constexpr std::size_t most_paths = 2'000'000;       // A path takes some kilobytes.
 
-/// Unlike the light that is bent, what shows the paths is always white.
+/// The light that shows the paths. Its white is always neutral, unlike that of the light that is bent.
 ShownLight shown_light(const ColorManagement& color, const Spectrum& light, int count) {
   std::vector<Band> bands = make_bands(light, shown_min, shown_max, count);
   Eigen::Vector3d white = Eigen::Vector3d::Zero();
@@ -84,8 +84,8 @@ SeedList seed_list(const Scene& scene, const SeedDescription& seeds) {
   throw std::logic_error("unknown kind of seeds");
 }
 
-/// The flexibilities that are followed from every seed: all, where the paths' colour is their wavelength. The three of
-/// RGB mode get the wavelengths for which the paper has them.
+/// The channels that are followed from every seed: all of them if the colour of paths is their wavelength, otherwise
+/// the one nearest to the reference wavelength. The three channels of RGB mode get the paper's wavelengths for them.
 std::vector<LightChannel> followed(std::vector<LightChannel> channels, bool rgb, PathColor by) {
   if (rgb)
     for (std::size_t i = 0; i < 3; ++i) channels[i].wavelength = 650 - 100 * static_cast<double>(i);
@@ -108,7 +108,7 @@ std::vector<PathSeed> seeds_of(const SeedList& list, const std::vector<LightChan
   return seeds;
 }
 
-/// A picture in linear Rec. 709.
+/// Reads a picture and converts it to linear Rec. 709.
 Image load_rec709(const std::filesystem::path& file, const ColorManagement& color, const Eigen::Matrix3d& to_rec709) {
   const NativeImage native = read_native_image(file);
   const ColorConversion to_working =
@@ -125,8 +125,8 @@ Image load_rec709(const std::filesystem::path& file, const ColorManagement& colo
   return image;
 }
 
-/// The primaries of Rec. 709, which reflectances can have, as spectra, so that every colour within is right: spectra
-/// and colours add alike.
+/// Gives each channel of the picture the spectrum of its primary of Rec. 709, which reflectances can have. Spectra add
+/// as colours do, so that every colour of the picture is then right.
 EnvironmentLight load_environment(const LightSourceDescription& description, const ColorManagement& color,
                                   const ShownLight& light) {
   EnvironmentLight environment;

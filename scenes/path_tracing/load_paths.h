@@ -1,6 +1,6 @@
 #pragma once
 /// @file scenes/path_tracing/load_paths.h
-/// What path tracing needs beside the field: the rays to follow, and the light that shows them.
+/// What path tracing needs in addition to the field: the rays to follow, and the light that shows their paths.
 
 #include <vector>
 
@@ -12,27 +12,27 @@
 
 namespace tensorray {
 
-/// The bands of the light that shows the paths, and what colours are in it.
+/// The bands of the light that shows the paths, and the conversion of colours to and from them.
 struct ShownLight {
   std::vector<Band> bands;
-  Eigen::Matrix3d xyz_to_working;     ///< The light's white is neutral.
-  Eigen::Matrix3d rec709_to_working;  ///< Of the colours that scene files give.
+  Eigen::Matrix3d xyz_to_working;     ///< The white of the light becomes neutral.
+  Eigen::Matrix3d rec709_to_working;  ///< For the colours that scene files give.
   ReflectanceModel model;
 
-  /// Of each band: the spectrum of a colour of linear Rec. 709, times a factor.
+  /// The spectrum of a colour of linear Rec. 709, times a factor; one value for each band.
   std::vector<float> radiance(const Eigen::Vector3d& rec709, double factor) const;
 };
 
 struct PathScene {
   PathTracingDescription settings;
   std::vector<PathSeed> seeds;
-  std::vector<Path> paths;  ///< If they were read from a file: there are no seeds then.
+  std::vector<Path> paths;  ///< Paths that were read from a file; there are no seeds then.
   ShownLight light;
-  std::vector<EnvironmentLight> environments;  ///< Those of the scene's lights, in their order.
+  std::vector<EnvironmentLight> environments;  ///< The environments among the scene's lights, in their order.
 };
 
-/// @throw std::runtime_error naming the file that cannot be read; SceneError where the scene's values do not go with
-/// what was loaded.
+/// @throw std::runtime_error naming the file that cannot be read; SceneError if a value of the scene does not fit the
+/// loaded data.
 PathScene load_paths(const Scene& scene, const PathTracingDescription& settings);
 
 }  // namespace tensorray

@@ -14,9 +14,9 @@
 namespace tensorray {
 namespace {
 
-constexpr double unseen = 0.5;          // Of wavelengths that the eye does not see.
-constexpr double pale = 0.03;           // How much white makes a wavelength's colour reproducible.
-constexpr std::size_t judged = 200000;  // Points are enough to choose a range.
+constexpr double unseen = 0.5;          // Grey of wavelengths that the eye does not see.
+constexpr double pale = 0.03;           // Part of white in the colour of a wavelength, which makes it reproducible.
+constexpr std::size_t judged = 200000;  // Number of points that is enough to choose a range.
 
 double transverse_force(const PathPoint& point) {
   const Eigen::Vector3d force = point.force();
@@ -72,7 +72,7 @@ ValueRange range_of(const PathColorDescription& description, const std::vector<P
   return choose_range(std::move(values), choice);
 }
 
-/// As the eye sees light of one wavelength, as saturated as a display shows it.
+/// The colour of light of one wavelength for the eye, linear Rec. 709, as saturated as a display can show it.
 Eigen::Vector3d wavelength_color(double wavelength) {
   Eigen::Vector3d rgb = rec709_to_xyz().inverse() * observer(wavelength);
   rgb.array() -= std::min(0.0, rgb.minCoeff());

@@ -1,6 +1,6 @@
 #pragma once
 /// @file scenes/path_tracing/path_colors.h
-/// What is known along a path, as colours.
+/// Colours for the values along a path.
 
 #include <functional>
 #include <optional>
@@ -15,14 +15,14 @@ namespace tensorray {
 
 /// How the points of paths are coloured.
 struct PathColors {
-  /// Of linear Rec. 709, 0 to 1; of a point of a path. Empty: paths have the colour of their material.
+  /// The colour of a point of a path, linear Rec. 709, 0 to 1. Empty: paths have the colour of their material.
   std::function<Eigen::Vector3d(const Path&, const PathPoint&)> color;
-  /// Draws what the colours mean over a picture whose colours `from_rec709` makes of Rec. 709; empty if nothing is
-  /// to be said.
+  /// Draws a legend of the colours over a picture. `from_rec709` converts colours of linear Rec. 709 to those of the
+  /// picture. Empty: no legend.
   std::function<void(Image&, const Eigen::Matrix3d& from_rec709)> legend;
 };
 
-/// Chooses the range of values where the description does not give it.
+/// Chooses the range of values if the description does not give it.
 PathColors path_colors(const PathColorDescription& description, const std::vector<Path>& paths);
 
 }  // namespace tensorray

@@ -14,12 +14,12 @@
 namespace tensorray {
 namespace {
 
-constexpr double radius_per_spacing = 0.16;           // So that neighbours do not touch.
-constexpr double radius_per_extent = 0.01;            // At most, of the volume's diagonal.
-constexpr double thinnest = 0.2, thickest = 3;        // Of the typical radius.
-constexpr std::uint64_t most_triangles = 60'000'000;  // With the search tree some 6 GB.
+constexpr double radius_per_spacing = 0.16;           // Neighbours then do not touch.
+constexpr double radius_per_extent = 0.01;            // Largest typical radius, in diagonals of the volume.
+constexpr double thinnest = 0.2, thickest = 3;        // In typical radii.
+constexpr std::uint64_t most_triangles = 60'000'000;  // About 6 GB with the search tree.
 
-/// What is known at a vertex: the path's point before it, and how far it is to the next one.
+/// The place of a vertex on a path: the point of the path before it, and the fraction of the distance to the next one.
 struct Place {
   const Path* path = nullptr;
   std::size_t point = 0;
@@ -69,7 +69,7 @@ bool is_bare(const PathPoints& way) {
   return std::all_of(way.begin(), way.end(), [](const PathPoint& point) { return point.tensor.isZero(0); });
 }
 
-/// One number that changes where the colour, as displayed, does.
+/// One number that changes where the displayed colour changes.
 double shade_of(const PathColors& colors, const Path& path, const PathPoint& point) {
   if (!colors.color) return 0;
   return linear_to_srgb(colors.color(path, point)).dot(Eigen::Vector3d(0.7, 1, 0.4));
@@ -90,7 +90,7 @@ TubeStyle tube_style(PathStyle style) {
 }  // namespace
 
 double typical_radius(const RadiusDescription& radius, std::size_t paths, const Eigen::AlignedBox3d& volume) {
-  const double face = std::pow(volume.diagonal().norm(), 2) / 3;  // Of a cube of this size.
+  const double face = std::pow(volume.diagonal().norm(), 2) / 3;  // Area of a face of a cube with this diagonal.
   const double spacing = std::sqrt(face / static_cast<double>(std::max<std::size_t>(1, paths)));
   return radius.typical.value_or(std::min(radius_per_spacing * spacing, radius_per_extent * volume.diagonal().norm()));
 }
@@ -101,7 +101,7 @@ TubeMesh path_mesh(const std::vector<Path>& paths, const PathTracingDescription&
   sections.scale = description.radius.scale ? *description.radius.scale : scale_for_radius(paths, typical);
   sections.least_radius = description.radius.min.value_or(
       std::min(thinnest * typical, description.radius.max.value_or(std::numeric_limits<double>::max())));
-  // Who gives a scale wants true sizes.
+  // A user who gives a scale wants true sizes.
   const double greatest = description.radius.scale ? std::numeric_limits<double>::max() : thickest * typical;
   sections.greatest_radius = std::max(sections.least_radius, description.radius.max.value_or(greatest));
   std::vector<Tube> tubes(paths.size());
@@ -119,7 +119,7 @@ TubeMesh path_mesh(const std::vector<Path>& paths, const PathTracingDescription&
   settings.style = tube_style(description.style);
   settings.caps = description.caps;
   settings.tolerance = tolerance;
-  settings.least_segments = 4;  // Of tubes that are thinner than a pixel; there may be many.
+  settings.least_segments = 4;  // For tubes that are thinner than a pixel; there may be many.
   settings.most_triangles = most_triangles;
   return make_tube_mesh(std::move(tubes), settings);
 }

@@ -1,6 +1,6 @@
 #pragma once
 /// @file scenes/path_tracing/path_surfaces.h
-/// Paths as surfaces: tubes, wires, ellipses or lines.
+/// Makes surfaces from paths: tubes, wires, ellipses or lines.
 
 #include <filesystem>
 #include <vector>
@@ -13,22 +13,23 @@
 
 namespace tensorray {
 
-/// The radius that is typical of the drawn paths, world units: where the scene does not say it, such that so many
-/// parallel paths through the volume would not touch.
+/// The typical radius of the drawn paths, world units. If the scene does not give it, it is small enough that this
+/// number of parallel paths through the volume would not touch.
+/// @param paths  Number of paths.
 double typical_radius(const RadiusDescription& radius, std::size_t paths, const Eigen::AlignedBox3d& volume);
 
-/// The paths' tubes, of any style but lines. `TubePoint::value` is the number of the path's point. Paths along which
-/// there is no tensor are round, of the typical radius.
-/// @param tolerance  How far triangles may be off the tube, world units.
+/// The tubes of the paths, for all styles except lines. `TubePoint::value` is the number of the path's point. Paths
+/// whose tensors are all zero become round tubes of the typical radius.
+/// @param tolerance  Greatest distance of triangles from the tube, world units.
 TubeMesh path_mesh(const std::vector<Path>& paths, const PathTracingDescription& description, const PathColors& colors,
                    double typical, double tolerance);
 
-/// The surface of that mesh, with colours and what else is known along paths.
-/// @param to_working  From linear Rec. 709.
+/// The surface of the mesh, with colours, forces and arc lengths at its vertices.
+/// @param to_working  Matrix from linear Rec. 709.
 ShadedSurface path_surface(TubeMesh mesh, const std::vector<Path>& paths, const PathColors& colors,
                            const Eigen::Matrix3d& to_working);
 
-/// Paths as round curves of one radius.
+/// The paths as round curves of one radius, world units.
 ShadedSurface line_surface(const std::vector<Path>& paths, double radius, const PathColors& colors,
                            const Eigen::Matrix3d& to_working);
 

@@ -1,7 +1,7 @@
 #pragma once
 /// @file scenes/path_tracing/path_tracing_description.h
 /// The keys of `integrator` that path tracing has.
-/// Lengths are world units, angles degrees.
+/// Lengths are in world units, angles in degrees.
 
 #include <cstdint>
 #include <filesystem>
@@ -23,32 +23,32 @@ enum class SeedKind { grid, poisson_disk, line, sphere, threshold, file };
 
 struct SeedDescription {
   SeedKind kind = SeedKind::grid;
-  std::uint64_t count = 400;                ///< About so many; `file` has its own number.
-  std::optional<Eigen::Vector3d> from, to;  ///< line; none: across the middle of the volume.
-  std::optional<Eigen::Vector3d> center;    ///< sphere; none: the middle of the volume.
-  std::optional<double> radius;             ///< sphere; none: a quarter of the volume's shortest side.
-  Invariant invariant = Invariant::norm;    ///< threshold: seeds are where this is ...
-  std::optional<double> above, below;       ///< ... above and below these.
-  std::filesystem::path file;               ///< file: points.
+  std::uint64_t count = 400;                ///< Approximate number of seeds; `file` has its own number.
+  std::optional<Eigen::Vector3d> from, to;  ///< line: its ends; none: across the middle of the volume.
+  std::optional<Eigen::Vector3d> center;    ///< sphere: its middle; none: the middle of the volume.
+  std::optional<double> radius;             ///< sphere: its radius; none: a quarter of the volume's shortest side.
+  Invariant invariant = Invariant::norm;    ///< threshold: seeds are where this has a value in the range.
+  std::optional<double> above, below;       ///< threshold: least and greatest value; none: no limit.
+  std::filesystem::path file;               ///< file: text with a point in each line.
 };
 
 enum class PathStyle { tube, wire, ellipses, lines };
 
 struct RadiusDescription {
-  std::optional<double> scale;     ///< World units per unit of T; none: so that the median semi-axis is `typical`.
-  std::optional<double> typical;   ///< None: by the distance between seeds. Of lines, their radius.
-  std::optional<double> min, max;  ///< None: a fifth of `typical`, and three times it.
+  std::optional<double> scale;     ///< World units per unit of T; none: the median semi-axis becomes `typical`.
+  std::optional<double> typical;   ///< Median semi-axis; none: by the number of paths. For lines, their radius.
+  std::optional<double> min, max;  ///< Limits of semi-axes; none: a fifth of `typical`, and three times it.
 };
 
 enum class PathColor { force, transverse_force, curvature, length, wavelength, direction, invariant, none };
 
 struct PathColorDescription {
   PathColor by = PathColor::force;
-  Invariant invariant = Invariant::norm;  ///< by invariant: which.
+  Invariant invariant = Invariant::norm;  ///< `by` invariant: the invariant that is shown.
   Colormap map = Colormap::viridis;
-  std::optional<Eigen::Vector2d> range;  ///< None: from the 1st to the 99th percentile.
+  std::optional<Eigen::Vector2d> range;  ///< Values at the ends of the map; none: the 1st and 99th percentiles.
   bool logarithmic = false;
-  bool legend = false;  ///< A colour bar in the display-referred picture.
+  bool legend = false;  ///< Whether a colour bar is drawn into the display-referred picture.
 };
 
 enum class MaterialKind { diffuse, principled, metal, glass };
@@ -56,11 +56,11 @@ enum class Metal { gold, silver, copper, aluminium };
 
 struct MaterialDescription {
   MaterialKind kind = MaterialKind::principled;
-  Eigen::Vector3d color{0.7, 0.7, 0.7};  ///< Where the surface has no colours of its own; linear Rec. 709.
+  Eigen::Vector3d color{0.7, 0.7, 0.7};  ///< Used if the surface has no colours of its own; linear Rec. 709.
   double roughness = 0.4;
   double metallic = 0, specular = 0.5, clearcoat = 0;  ///< principled.
   Metal metal = Metal::gold;                           ///< metal.
-  double index = 1.5;                                  ///< glass.
+  double index = 1.5;                                  ///< glass: index of refraction.
 };
 
 struct SliceDescription {
@@ -79,8 +79,8 @@ struct IsosurfaceDescription {
 
 struct ContextDescription {
   bool box = true;        ///< The volume's edges.
-  bool obstacles = true;  ///< The scene's, as surfaces.
-  bool plate = false;     ///< The receiver, with the photons' caustic.
+  bool obstacles = true;  ///< The obstacles of the scene, as surfaces.
+  bool plate = false;     ///< The receiver, with the light of the photons on it.
   std::optional<SliceDescription> slice;
   std::vector<IsosurfaceDescription> isosurfaces;
 };
@@ -89,9 +89,9 @@ enum class Background { color, lights, transparent };
 
 struct PathTracingDescription {
   SeedDescription seeds;
-  std::filesystem::path paths;  ///< Paths of a file instead of seeds; empty: none.
+  std::filesystem::path paths;  ///< File with paths, instead of seeds; empty: none.
   bool backwards = true;        ///< Whether light is also followed back from seeds within the volume.
-  bool outside = false;         ///< Whether the straight pieces before and behind the volume are drawn.
+  bool outside = false;         ///< Whether the straight parts before and behind the volume are drawn.
   PathStyle style = PathStyle::tube;
   TubeCaps caps = TubeCaps::round;
   RadiusDescription radius;
@@ -99,11 +99,11 @@ struct PathTracingDescription {
   MaterialDescription material;
   ContextDescription context;
   Shading shading = Shading::path;
-  int bands = 16;  ///< Wavelengths of the light that shows the paths.
+  int bands = 16;  ///< Number of bands of the light that shows the paths.
   int max_depth = 6;
   int samples = 64;
   int min_samples = 16;
-  double noise = 0.02;  ///< Relative; 0: all samples.
+  double noise = 0.02;  ///< Relative error at which a pixel is done; 0: every pixel gets all samples.
   PixelFilterShape filter = PixelFilterShape::blackman_harris;
   Background background = Background::color;
   Eigen::Vector3d background_color{1, 1, 1};  ///< Linear Rec. 709.

@@ -20,12 +20,13 @@
 namespace tensorray {
 namespace {
 
-constexpr double most_radii = 2e5;      // Rays start a 5e-7th of the diagonal off a surface: a tenth of a radius.
-constexpr double legend_width = 0.2;    // Of a picture's width; a chosen camera leaves it free.
-constexpr float nothing_depth = 1e10f;  // Where nothing is: behind everything.
-constexpr double tube_tolerance = 0.2;  // Pixels: how far a tube's triangles may be off its surface.
+constexpr double most_radii = 2e5;  // Rays start 5e-7 diagonals away from a surface, which is then a tenth of a radius.
+constexpr double legend_width = 0.2;    // Part of the picture's width that a chosen camera leaves free.
+constexpr float nothing_depth = 1e10f;  // Depth of pixels that show nothing: behind everything.
+constexpr double tube_tolerance = 0.2;  // Pixels: greatest distance of a tube's triangles from its surface.
 
-/// Paths of a file may have a flexibility that is none of the scene's: they count as the first channel's.
+/// Counts paths by channel and end. Paths of a file may have a flexibility that no channel of the scene has: they count
+/// for the first channel.
 void count_ends(const Scene& scene, const std::vector<Path>& paths, Statistics& statistics) {
   statistics.positions = paths.size();
   statistics.ends.assign(scene.channels.size(), EndCounts{});
@@ -56,7 +57,7 @@ std::vector<Path> trace_scene(const Scene& scene, const PathScene& path_scene, c
   return paths;
 }
 
-/// What a camera that nobody has chosen shall see.
+/// The points that a camera without a given position must show.
 std::vector<Eigen::Vector3d> points_of_interest(const Scene& scene, const ContextDescription& context,
                                                 const std::vector<Path>& paths) {
   std::vector<Eigen::Vector3d> points;
@@ -78,7 +79,7 @@ Eigen::AlignedBox3d world_box(const TensorField& field) {
   return box;
 }
 
-/// How far before the camera the nearest tenth of the paths is: what is nearer may show its triangles.
+/// A tenth of the path points before the camera are nearer than this depth. Triangles may be visible there.
 double near_depth(const std::vector<Path>& paths, const Camera& camera) {
   std::vector<double> depths;
   for (const Path& path : paths)
@@ -91,10 +92,10 @@ double near_depth(const std::vector<Path>& paths, const Camera& camera) {
   return *tenth;
 }
 
-/// The paths' surface, and their mesh for the scene's `tubes`.
+/// The surface of the paths, and their mesh for the output `tubes`.
 struct PathShapes {
   ShadedSurface surface;
-  TubeMesh tubes;  ///< If it is to be written.
+  TubeMesh tubes;  ///< Empty if it is not written.
 };
 
 PathShapes make_shapes(const Scene& scene, const PathScene& path_scene, const std::vector<Path>& paths,
@@ -130,7 +131,7 @@ PathTracerSettings tracer_settings(const SceneDescription& scene, const PathTrac
   settings.shading.max_depth = description.max_depth;
   double strength = scene.lights.empty() ? 1 : 0;
   for (const LightSourceDescription& light : scene.lights) strength = std::max(strength, light.strength);
-  settings.shading.indirect_clamp *= strength;  // A brighter light is no firefly.
+  settings.shading.indirect_clamp *= strength;  // The clamp removes fireflies, and must not darken bright lights.
   settings.filter = PixelFilter(description.filter);
   settings.transparent = description.background != Background::lights;
   settings.min_samples = std::min(description.min_samples, description.samples);
@@ -141,7 +142,7 @@ PathTracerSettings tracer_settings(const SceneDescription& scene, const PathTrac
   return settings;
 }
 
-/// R, G, B, A, and what denoisers and compositors use.
+/// R, G, B, A, and the channels that denoisers and compositors use.
 Image make_image(const SurfacePicture& picture, const ShownLight& light, const PathTracingDescription& description) {
   const Image colors = linear_image(picture.radiance, light.bands, light.xyz_to_working);
   Image image(colors.width, colors.height,
@@ -166,7 +167,7 @@ Image make_image(const SurfacePicture& picture, const ShownLight& light, const P
   return image;
 }
 
-/// Area lights are seen as well.
+/// Adds the area lights as surfaces, so that they are visible.
 void add_lamps(const std::vector<Light>& lights, const ShownLight& light, std::vector<ShadedSurface>& surfaces,
                std::vector<Material>& materials) {
   for (std::size_t i = 0; i < lights.size(); ++i) {
@@ -184,7 +185,8 @@ void add_lamps(const std::vector<Light>& lights, const ShownLight& light, std::v
   }
 }
 
-/// Refuses what lies so far away that the renderer's precision, which goes by the size of everything, loses the paths.
+/// Refuses a scene that is so large that the renderer would lose the paths, because its precision is relative to the
+/// size of the whole scene.
 void require_fine(const Scene& scene, const RadiusDescription& radius, const SurfaceScene& stage,
                   const std::vector<Path>& paths) {
   const double typical = typical_radius(radius, paths.size(), world_box(scene.field));
@@ -209,7 +211,7 @@ double seconds_since(std::chrono::steady_clock::time_point start) {
   return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
 }
 
-/// The picture of the paths, their context and the lamps.
+/// Renders the paths, their context and the lamps.
 SurfacePicture render_stage(const Scene& scene, const PathScene& path_scene, const std::vector<Path>& paths,
                             ShadedSurface path_surface, const Camera& camera, const Progress& progress) {
   const ShownLight& light = path_scene.light;
@@ -322,7 +324,7 @@ void PathTracingMethod::check(SceneDescription& scene, const Json& json, const S
   check_memory(scene.camera.resolution.cast<double>().prod() * (200.0 + 24.0 * paths.bands), "`/camera/resolution`",
                source);
   warn_unused(scene, json, "/integrator/seeds", "/integrator/paths");
-  if (given(json, "/integrator/samples"))  // The name that other programs, and the lens, have for it.
+  if (given(json, "/integrator/samples"))  // Other programs and the lens use this name.
     scene.warnings.push_back(
         "`/integrator/samples` is the lens's and has no effect with path_tracing; `max_samples` has");
   if (scene.camera.target && !scene.camera.position)

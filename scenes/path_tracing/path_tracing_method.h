@@ -1,6 +1,6 @@
 #pragma once
 /// @file scenes/path_tracing/path_tracing_method.h
-/// The method "path_tracing": the bent rays as lit tubes.
+/// The method "path_tracing": a picture of bent rays as tubes in light.
 
 #include <memory>
 

@@ -8,9 +8,9 @@
 namespace tensorray {
 namespace {
 
-constexpr double sky = 0.55;         // Radiance of the light that nobody has chosen: of the sky ...
-constexpr double lamp = 0.6;         // ... and its lamp's irradiance over π: a white wall across it is then at 1.15.
-constexpr double lamp_degrees = 12;  // Its size, for soft shadows.
+constexpr double sky = 0.55;  // Radiance of the default sky.
+constexpr double lamp = 0.6;  // Irradiance / π of the default lamp. A white wall that faces it has radiance 1.15.
+constexpr double lamp_degrees = 12;  // Angular diameter of the lamp, for soft shadows.
 
 Camera with_lens(Camera camera, const CameraDescription& description) {
   camera.lens_radius = description.lens_radius;
@@ -18,7 +18,8 @@ Camera with_lens(Camera camera, const CameraDescription& description) {
   return camera;
 }
 
-/// Frames the points in the left part of the picture: for a narrower one first, which is then moved along its plane.
+/// A camera that shows the points in the left part of the picture. It is made for a narrower picture and then moved
+/// along the plane of the picture.
 Camera chosen_camera(const CameraDescription& description, const std::vector<Eigen::Vector3d>& points, double free) {
   const double free_pixels = std::floor(free * description.resolution.x());
   Framing framing;
@@ -34,7 +35,6 @@ Camera chosen_camera(const CameraDescription& description, const std::vector<Eig
   return camera;
 }
 
-/// The middle and the half size of what there is.
 Eigen::AlignedBox3d box_of(const std::vector<Eigen::Vector3d>& points) {
   Eigen::AlignedBox3d box;
   for (const Eigen::Vector3d& point : points) box.extend(point);

@@ -1,6 +1,6 @@
 #pragma once
 /// @file scenes/path_tracing/studio.h
-/// Camera and lights of a picture of paths, where the scene gives them and where it does not.
+/// Camera and lights of a picture of paths: those of the scene, or defaults.
 
 #include <vector>
 
@@ -13,12 +13,12 @@
 
 namespace tensorray {
 
-/// The scene's camera; without a position, one that sees all of `points`.
-/// @param free  Part of the picture's width that it then leaves free at the right.
-/// @throw std::invalid_argument naming what does not go together.
+/// The camera of the scene; if it has no position, a camera that shows all of `points`.
+/// @param free  Part of the picture's width that such a camera leaves free at the right.
+/// @throw std::invalid_argument naming the values that do not fit together.
 Camera make_camera(const CameraDescription& description, const std::vector<Eigen::Vector3d>& points, double free);
 
-/// The scene's lights; without any, a white sky, brighter above, and a lamp at the viewer's upper left.
+/// The lights of the scene; if it has none, a white sky and a lamp at the viewer's upper left.
 std::vector<Light> make_lights(const SceneDescription& description, const PathScene& paths, const Camera& camera);
 
 }  // namespace tensorray

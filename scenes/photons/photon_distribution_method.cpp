@@ -15,12 +15,12 @@
 namespace tensorray {
 namespace {
 
-/// Whether light is collected in colour: three bands need no more planes, and cost less.
+/// Whether light is collected as red, green and blue. Up to three bands need no more planes, and cost less.
 bool is_collected_in_color(const Scene& scene) {
   return !scene.description.output.wants("spectral") && scene.bands.size() > 3;
 }
 
-/// "550nm", with as many decimals as tell the bands apart; in RGB mode "red", "green", "blue".
+/// "550nm", with as many decimals as all names need to differ; in RGB mode "red", "green", "blue".
 std::vector<std::string> band_names(const Scene& scene) {
   if (scene.description.bending.rgb) return {"red", "green", "blue"};
   constexpr int most_decimals = 9;

@@ -1,6 +1,6 @@
 #pragma once
 /// @file scenes/photons/photon_distribution_method.h
-/// The method "photon_distribution": the light that the field throws on the plate, and inside the volume.
+/// The method "photon_distribution": the bent light on the plate and inside the volume.
 
 #include <array>
 #include <memory>
@@ -34,11 +34,11 @@ void describe(PhotonDescription& photons, Visitor& visit) {
 
 std::shared_ptr<Method> photon_distribution_method();
 
-/// The light of the scene on its plate: a plane for each band, or if no output needs the bands, for red, green and
-/// blue. @throw Cancelled.
+/// Traces the light of the scene to its plate. The film has a plane for each band; if no output needs the bands, it has
+/// planes for red, green and blue. @throw Cancelled.
 PhotonDistribution distribute_photons(const Scene& scene, const Progress& progress);
 
-/// The picture of that light.
+/// The picture of the light that distribute_photons collects.
 Image light_image(const Scene& scene, const Film& irradiance);
 
 }  // namespace tensorray

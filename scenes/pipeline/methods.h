@@ -6,7 +6,7 @@
 
 namespace tensorray {
 
-/// A description with the defaults, of all methods, before a scene file is read into it.
+/// A description with the defaults of all methods. A scene file is then read into it.
 SceneDescription default_scene();
 
 }  // namespace tensorray

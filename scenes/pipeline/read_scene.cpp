@@ -14,7 +14,7 @@
 namespace tensorray {
 namespace {
 
-/// The ending by which the command line knows an output as of this kind; empty if it does not.
+/// The ending of `file` that selects this kind on the command line; empty if none does.
 std::string matching_ending(const Output& kind, const std::filesystem::path& file) {
   const std::vector<std::string> endings =
       kind.option_ending ? std::vector<std::string>{kind.option_ending} : kind.endings;
@@ -23,7 +23,7 @@ std::string matching_ending(const Output& kind, const std::filesystem::path& fil
   return found == endings.end() ? "" : *found;
 }
 
-/// Of these kinds, the one whose ending fits the file best.
+/// The kind with the longest matching ending; null if no ending matches.
 const Output* best_kind(const std::filesystem::path& file, const std::vector<Output>& kinds) {
   const auto best = std::max_element(kinds.begin(), kinds.end(), [&](const Output& a, const Output& b) {
     return matching_ending(a, file).size() < matching_ending(b, file).size();
@@ -42,8 +42,8 @@ const Output* best_kind(const std::filesystem::path& file, const std::vector<Out
       fmt::format("-o {}: no output has such an ending; {} writes {}", file.string(), method.name(), joined(known))));
 }
 
-/// Lets the files of the command line take the place of the scene's. A file that only another method makes is
-/// reported with the scene's own.
+/// Replaces the output files of the scene by those of the command line. A file that only another method makes is kept
+/// here; check_scene reports it, as it does for files of the scene.
 void replace_outputs(SceneDescription& scene, const std::vector<std::filesystem::path>& outputs) {
   if (outputs.empty()) return;
   scene.output.files.clear();

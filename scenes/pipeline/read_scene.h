@@ -1,6 +1,6 @@
 #pragma once
 /// @file scenes/pipeline/read_scene.h
-/// Scene file → SceneDescription. Touches no other file.
+/// Scene file → SceneDescription. Reads no other file.
 
 #include <filesystem>
 #include <string>
@@ -10,22 +10,22 @@
 
 namespace tensorray {
 
-/// What the command line says of a scene beside the scene file.
+/// Changes to a scene file from the command line.
 struct SceneChanges {
-  /// "KEY=VALUE", KEY a dotted path ("light.photons", "obstacles.0.file"), VALUE JSON or, where it is not JSON, a
-  /// string. Applied in order, before anything is checked; null removes a key, an index one past the end of a list
-  /// appends.
+  /// "KEY=VALUE". KEY is a list of keys with dots between them ("light.photons", "obstacles.0.file"). VALUE is JSON; if
+  /// it is not valid JSON, it is a string. Overrides are applied in order, before anything is checked. The value null
+  /// removes a key. An index one past the end of a list appends an item.
   std::vector<std::string> overrides;
 
-  /// Files to write instead of the scene's, relative to the working folder. The ending says which of the method's
-  /// outputs each one is.
+  /// Files to write instead of those of the scene, relative to the working folder. The ending of each file selects one
+  /// of the method's outputs.
   std::vector<std::filesystem::path> outputs;
 };
 
-/// Reads a scene file: JSON, comments allowed. Relative paths come out relative to the scene file's folder.
-/// Where no output file is named, `image` and `exr` are the scene file's name with .png and .exr, beside it.
-/// @throw SceneError: unreadable, not JSON, a key unknown (with the nearest valid one), missing, of the wrong type or
-/// out of range, or two keys that exclude each other.
+/// Reads a scene file: JSON with comments. Relative paths in it are relative to the scene file's folder.
+/// If no output file is named, `image` and `exr` are files beside the scene file, with its name and .png and .exr.
+/// @throw SceneError: the file is unreadable or not JSON; a key is unknown (with the nearest valid one), missing, of
+/// the wrong type or out of range; two keys exclude each other.
 SceneDescription read_scene(const std::filesystem::path& path, const SceneChanges& changes = {});
 
 /// The JSON Schema (draft 2020-12) of scene files, made from the same tables of keys that read_scene uses.

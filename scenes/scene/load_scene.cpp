@@ -13,11 +13,11 @@
 namespace tensorray {
 namespace {
 
-constexpr double default_margin = 1.25;    // Of the plate about the beam.
-constexpr double default_distance = 0.25;  // Of the plate behind the volume, in depths of the volume.
-constexpr double greatest_size = 1e5;      // Of the scene, in sizes of the volume: Embree is single precision.
-constexpr double narrowest_white = 100;    // nm: light of a smaller range is seen as a colour.
-constexpr int default_resolution = 512;    // Of the plate's longer side.
+constexpr double default_margin = 1.25;    // Size of the plate, in extents of the beam.
+constexpr double default_distance = 0.25;  // Distance of the plate behind the volume, in depths of the volume.
+constexpr double greatest_size = 1e5;  // Largest size of the scene, in sizes of the volume: Embree is single precision.
+constexpr double narrowest_white = 100;  // nm: light of a narrower range has no white.
+constexpr int default_resolution = 512;  // Pixels along the plate's longer side.
 
 TensorGrid load_grid(const SceneDescription& scene) {
   const FieldDescription& field = scene.field;
@@ -39,7 +39,7 @@ struct LoadedField {
   std::size_t non_finite = 0;
 };
 
-/// Reads or makes the field, without what is not finite, preprocessed.
+/// Reads or generates the field, removes voxels that are not finite, and preprocesses it.
 LoadedField load_field(const SceneDescription& description, std::vector<std::string>& notes) {
   TensorGrid grid = load_grid(description);
   const std::size_t active = grid.active_voxels();
@@ -73,7 +73,7 @@ TriangleMesh load_closed_mesh(const std::filesystem::path& path) {
   return mesh;
 }
 
-/// The primaries of linear Rec. 709 as three bands of light, so that RGB mode needs no colour path of its own.
+/// The primaries of linear Rec. 709 as three bands of light, so that RGB mode needs no separate code for colours.
 std::vector<Band> rgb_bands() {
   const Eigen::Matrix3d xyz = rec709_to_xyz();
   std::vector<Band> bands(3);
@@ -105,14 +105,14 @@ std::vector<Eigen::Vector2d> rectangle(const Eigen::Vector2d& center, const Eige
   return {center - x - y, center + x - y, center + x + y, center - x + y};
 }
 
-/// Moves the start of the beam so that it is before the points, too.
+/// Moves the start of the beam back, so that it is also before all `points`.
 void start_before(Beam& beam, const std::vector<Eigen::Vector3d>& points) {
   double before = 0;
   for (const Eigen::Vector3d& point : points) before = std::min(before, (point - beam.center).dot(beam.direction));
   beam.center += 1.01 * before * beam.direction;
 }
 
-/// The silhouette's beam, or that of the given aperture.
+/// The beam of the given aperture; without one, that of the volume's silhouette.
 Beam make_beam(const SceneDescription& description, const TensorField& field) {
   const LightDescription& light = description.light;
   const Eigen::Vector3d up = light.up.value_or(Eigen::Vector3d::UnitZ());
@@ -128,7 +128,8 @@ Beam make_beam(const SceneDescription& description, const TensorField& field) {
   return beam;
 }
 
-/// Where light that goes straight on through the aperture's corners meets the plate, from its centre along right, up.
+/// Size of the smallest rectangle about the plate's centre, along its right and up axes, that contains the straight
+/// projection of the aperture's corners along the light onto the plate.
 Eigen::Vector2d lit_extent(const Plate& plate, const Beam& beam) {
   Eigen::Vector2d half(0, 0);
   for (const Eigen::Vector2d& corner : beam.aperture) {
@@ -147,7 +148,8 @@ Plate make_plate(const SceneDescription& description, const TensorField& field, 
   const double distance = receiver.distance.value_or(default_distance * (far - near));
   plate.center = receiver.center.value_or(beam.center + (far + distance) * beam.direction);
   Eigen::Vector3d normal = receiver.normal.value_or(-beam.direction).normalized();
-  if (normal.dot(beam.direction) > 0) normal = -normal;  // Seen along the light, whichever side it was given by.
+  // The given normal may point to either side. The plate is seen along the light.
+  if (normal.dot(beam.direction) > 0) normal = -normal;
   plate.up = upright(normal, receiver.up.value_or(beam.up));
   plate.right = plate.up.cross(normal);
   plate.size = receiver.size ? *receiver.size : Eigen::Vector2d(default_margin * lit_extent(plate, beam));
@@ -175,7 +177,7 @@ void require_near(const Beam& beam, const SceneDescription& description, const T
     if (!(corner.norm() < greatest_distance(field))) fail_size(description, "/light/aperture");
 }
 
-/// The field's extent, its cut, the obstacles and the plate; and the beam, which starts before all of them.
+/// Loads the bounds of the field, its cut, the obstacles and the plate. Moves the start of `beam` before all of them.
 Surfaces load_surfaces(const SceneDescription& description, const TensorField& field, Beam& beam) {
   Surfaces surfaces;
   surfaces.bounds = box_mesh(field.index_bounds(), field.to_world());
@@ -189,8 +191,8 @@ Surfaces load_surfaces(const SceneDescription& description, const TensorField& f
   return surfaces;
 }
 
-/// The scene's scale, or one that bends light visibly. It goes by the field alone, so that pictures with and without
-/// obstacles or aperture can be compared.
+/// The scale of the scene; without one, a scale that bends light visibly. The choice ignores obstacles and aperture, so
+/// that pictures with and without them can be compared.
 AutoScale load_scale(const SceneDescription& description, const TensorField& field, const Geometry& geometry,
                      const Beam& beam, const Progress& progress, std::vector<std::string>& notes) {
   if (description.field.scale) return {*description.field.scale, 0, 0};

@@ -1,6 +1,6 @@
 #pragma once
 /// @file scenes/scene/scene.h
-/// All that a render needs. Immutable once loaded.
+/// Everything that a render needs. Immutable after loading.
 
 #include <cstddef>
 #include <memory>
@@ -25,46 +25,48 @@ struct Scene {
       : description(std::move(d)), field(std::move(f)), geometry(std::move(g)), color(std::move(c)) {}
 
   SceneDescription description;
-  TensorField field;  ///< Preprocessed; in the units of its file.
+  TensorField field;  ///< Preprocessed; values in the units of its file.
   Geometry geometry;
   ColorManagement color;
   Beam beam;
-  BendingSettings bending;  ///< With the field's scale.
+  BendingSettings bending;  ///< Settings of the scene file, with the scale of the field.
 
-  /// What travels: wavelength bands, or in RGB mode the three primaries (wavelength 0), and their flexibilities.
+  /// Bands of wavelengths, or in RGB mode the three primaries (wavelength 0).
   std::vector<Band> bands;
-  std::vector<LightChannel> channels;
+  std::vector<LightChannel> channels;  ///< Flexibility and power of each band.
 
-  std::shared_ptr<const LoadedMethod> method;  ///< Which renders the scene.
+  std::shared_ptr<const LoadedMethod> method;  ///< The method that renders the scene.
 
   EigenvalueReport eigenvalues;
   AutoScale scale;
-  std::size_t non_finite = 0;      ///< Voxels that were not finite, and are taken as empty.
-  std::vector<std::string> notes;  ///< What was chosen or found, a line each, for the user to read.
-  double seconds = 0;              ///< That loading took.
+  std::size_t non_finite = 0;      ///< Number of voxels that were not finite and were removed.
+  std::vector<std::string> notes;  ///< What was chosen or found, for the user; one line each.
+  double seconds = 0;              ///< Duration of loading.
 };
 
-/// SceneDescription → Scene: fields, meshes and spectra are loaded, and everything that was left to be chosen is.
-/// @throw std::runtime_error, one line that names the file and the fix; SceneError where the scene's values do not go
-/// with what was loaded; Cancelled.
+/// SceneDescription → Scene: loads fields, meshes and spectra, and chooses all values that the scene leaves open.
+/// @throw std::runtime_error, one line that names the file and the fix; SceneError if a value of the scene does not fit
+/// the loaded data; Cancelled.
 Scene load_scene(const SceneDescription& description, const Progress& progress);
 
-/// Where the volume begins and ends along a direction, as distances from `origin`.
+/// Where the volume begins and ends along a direction, as signed distances from an origin, world units.
 struct DepthRange {
   double near = 0, far = 0;
 };
+
+/// @param direction  Unit.
 DepthRange depth_range(const TensorField& field, const Eigen::Vector3d& origin, const Eigen::Vector3d& direction);
 
-/// @param pointer  Of the rectangle's keys in the scene file.
-/// @throw SceneError if the rectangle is so large, or so far from the volume, that single precision would lose it.
+/// @param pointer  JSON pointer of the rectangle in the scene file.
+/// @throw SceneError if the rectangle is too large, or too far from the volume, for single precision.
 void require_near(const Plate& plate, const char* pointer, const SceneDescription& description,
                   const TensorField& field);
 
-/// Whether the scene's light has a white that pictures can be adapted to: nearly monochromatic light has none, its
-/// colour is what one wants to see.
+/// Whether the light of the scene has a white that pictures can be adapted to. Nearly monochromatic light has none:
+/// pictures show its colour.
 bool has_white(const Scene& scene);
 
-/// From XYZ to the working space; the light's own white becomes neutral if the scene wants it so.
+/// Matrix from XYZ to the working space. The white of the light becomes neutral if the scene asks for white balance.
 Eigen::Matrix3d to_working(const Scene& scene);
 
 }  // namespace tensorray

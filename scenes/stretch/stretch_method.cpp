@@ -19,14 +19,14 @@ namespace {
 constexpr double default_wavelength = 550;  // nm
 constexpr Colormap map = Colormap::viridis;
 
-/// Light passes obstacles as in the scene, and no plate.
+/// The geometry of the scene without the plate, on which rays would end.
 Geometry without_plate(const Scene& scene) {
   Surfaces surfaces = scene.geometry.surfaces();
   surfaces.plate.reset();
   return Geometry(std::move(surfaces));
 }
 
-/// The beam's aperture, and where it meets the volume first.
+/// The bounding rectangle of the beam's aperture, in the plane where the light reaches the volume first.
 Plate entry_plane(const Scene& scene, int pixels) {
   Eigen::AlignedBox2d aperture;
   for (const Eigen::Vector2d& corner : scene.beam.aperture) aperture.extend(corner);
@@ -41,7 +41,7 @@ Plate entry_plane(const Scene& scene, int pixels) {
   return plane;
 }
 
-/// Of light that goes into the volume, of one flexibility.
+/// Settings for light of one flexibility along the beam. @throw SceneError if its length is 0.
 StretchSettings settings_of(const Scene& scene, const StretchDescription& description) {
   const BendingDescription& bending = scene.description.bending;
   const DepthRange depths = depth_range(scene.field, scene.beam.center, scene.beam.direction);
@@ -64,8 +64,8 @@ ImageMetadata metadata_of(const StretchSettings& settings) {
           {"tensorray:direction", fmt::format("{} {} {}", direction.x(), direction.y(), direction.z())}};
 }
 
-/// From the plane across the light that touches the volume, where light comes to it: seen along the light, as the plate
-/// is. `linear` has R, G, B, A (0: light does not meet the volume, or does not come so far) and `stretch`.
+/// Makes the pictures from the values at the pixels of the entry plane, which is seen along the light as the plate is.
+/// `linear` has R, G, B, A and `stretch`. A is 0 if the ray does not meet the volume, or ends before the length.
 void draw(const Scene& scene, const std::vector<float>& values, const Eigen::Vector2i& resolution, Render& render) {
   const ValueRange range = choose_range({values.begin(), values.end()});
   const Eigen::Matrix3d to_working = scene.color.xyz_to_working() * rec709_to_xyz();

@@ -1,7 +1,7 @@
 #pragma once
 /// @file scenes/stretch/stretch_method.h
-/// The method "stretch": how a scene's field stretches bundles of its light (integrators/probes/stretch.h), as a grid
-/// and as a picture.
+/// The method "stretch": how much the field of a scene stretches the distance of neighbouring rays
+/// (integrators/probes/stretch.h), as a grid and as a picture.
 
 #include <memory>
 #include <optional>
@@ -13,13 +13,13 @@ namespace tensorray {
 
 /// `integrator.stretch`.
 struct StretchDescription {
-  std::optional<double> length;      ///< World units; none: the volume's depth along the light.
-  std::optional<double> wavelength;  ///< nm; none: 550, in RGB mode green.
-  int resolution = 64;               ///< Of the grid: voxels along the longest side.
-  int pixels = 512;                  ///< Of the picture: along the longer side.
+  std::optional<double> length;      ///< Length over which rays are followed, world units; none: the volume's depth.
+  std::optional<double> wavelength;  ///< Wavelength of the light, nm; none: 550, in RGB mode green.
+  int resolution = 64;               ///< Voxels along the longest side of the grid.
+  int pixels = 512;                  ///< Pixels along the longer side of the picture.
 };
 
-/// `integrator`, as far as it is of this method.
+/// The keys of `integrator` that this method has.
 struct StretchKeys {
   StretchDescription stretch;
 };

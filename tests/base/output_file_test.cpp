@@ -151,7 +151,7 @@ TEST_F(OutputFileTest, CopiesIntoDevices) {
 TEST_F(OutputFileTest, CopiesIntoPipes) {
   const fs::path pipe = folder_ / "pipe.png";
   ASSERT_EQ(mkfifo(pipe.c_str(), 0600), 0);
-  const std::string sent(300000, 'x');  // More than a pipe holds.
+  const std::string sent(300000, 'x');  // More than the buffer of a pipe.
   OutputFile file(pipe);
   write(file.path(), sent);
   std::string received;

@@ -1,4 +1,4 @@
-// `tensorray_bench` in its quick form: that it measures the same rays with every kernel, and fails as programs do.
+// `tensorray_bench --quick` measures the same rays with every kernel, and reports wrong input in one line.
 
 #include <set>
 #include <string>
@@ -8,7 +8,7 @@
 namespace tensorray::test {
 namespace {
 
-/// As Program, with the benchmark in the program's place.
+/// Like Program, for the benchmark.
 class Benchmark : public Program {
  protected:
   Outcome measure(const std::string& options) const {
@@ -31,8 +31,8 @@ TEST_F(Benchmark, EveryKernelFollowsTheSameRays) {
     EXPECT_GE(measurement.at("kernels").size(), 4u) << name;
     for (const auto& row : measurement.at("kernels")) {
       EXPECT_GT(row.at("samples_per_second"), 0) << name << row;
-      // The step's own error: the plain kernels stop at the exponential's second order, and a strong vortex multiplies
-      // what is left of that.
+      // The limit is the error of a step: the plain kernels use the exponential only to second order, and a strong
+      // vortex multiplies the rest.
       if (row.contains("greatest_difference_in_voxels") && name.rfind("diverging", 0) != 0) {
         EXPECT_LT(row.at("greatest_difference_in_voxels"), 0.01) << name << row;
       }
@@ -51,7 +51,7 @@ TEST_F(Benchmark, WholeJobsSayWhatTheyTookByPhase) {
     EXPECT_GT(job.at("rays"), 0) << job;
     EXPECT_GT(job.at("seconds").at("total"), 0) << job;
   }
-  // The same photons, whoever samples the field.
+  // Both samplers of the field emit the same photons.
   const auto& positions = jobs.at("box_sampler").at("positions");
   EXPECT_EQ(positions[0], positions[1]);
 }

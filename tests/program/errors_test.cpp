@@ -1,4 +1,4 @@
-// What a user can get wrong, and what the program then says: one line, exit status 1 or 2, nothing written.
+// Errors of users. The program must print one line, end with exit status 1 or 2, and write no file.
 
 #include <regex>
 
@@ -50,7 +50,7 @@ TEST_F(Errors, SceneValues) {
   expect_scene_error(2, "/receiver/size", "receiver.size=[0,1]");
   expect_scene_error(2, "/receiver/size", "receiver.size=[-1,1]");
   expect_scene_error(2, "/receiver/resolution", "receiver.resolution=[0,5]");
-  expect_scene_error(2, "/receiver/normal", "receiver.normal=[1,0,0]");  // Parallel to light along −z.
+  expect_scene_error(2, "/receiver/normal", "receiver.normal=[1,0,0]");  // A plate parallel to the light.
   expect_scene_error(2, "/integrator/type.*photon_distribution", "integrator.type=magic");
   expect_scene_error(2, "/field/generate.*point_load", "field.generate.kind=cheese");
   expect_scene_error(2, "poisson_ratio", "field.generate.poisson_ratio=0.9");
@@ -143,7 +143,7 @@ TEST_F(Errors, AFullDiskLeavesTheOldPictureAndNoHalfOne) {
     write(name, "old");
     expect_error(1, name, {"render", "scene.json", "-q", "-o", name, "--set", "receiver.resolution=[300,300]"}, 8);
     EXPECT_EQ(read_file(in_folder(name)), "old") << name;
-    // A device that is full, behind a link.
+    // A link to a device that is full.
     std::filesystem::remove(in_folder(name));
     std::filesystem::create_symlink("/dev/full", in_folder(name));
     expect_error(1, name, {"render", "scene.json", "-q", "-o", name});

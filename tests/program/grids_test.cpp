@@ -1,4 +1,4 @@
-// What flows out into OpenVDB's tools: invariants, the light inside the volume, the stretch of its bundles.
+// Grids for other OpenVDB programs: invariants, the light inside the volume, the stretch of neighbouring rays.
 
 #include <algorithm>
 #include <cmath>
@@ -36,7 +36,7 @@ class Grids : public Program {
     return names;
   }
 
-  /// Fails with status 2 and one line that has all of `parts`.
+  /// Runs the program, which must fail with status 2 and one line that contains all of `parts`.
   void expect_wrong_input(const std::vector<std::string>& arguments, const std::vector<std::string>& parts) const {
     const auto before = files();
     const Outcome outcome = run(arguments);
@@ -109,7 +109,7 @@ TEST_F(Grids, FluenceHasAGridForEachBandIfAsked) {
   EXPECT_EQ(grid_names("f.vdb"), all);
   EXPECT_EQ(text(*read_grid("f.vdb", bands[1]), "tensorray:wavelength"), "511.25 nm");
 
-  // Together they are the light.
+  // The sum of the bands is all light.
   const auto together = read_grid("f.vdb", "fluence");
   std::vector<openvdb::FloatGrid::Ptr> grids;
   std::vector<double> powers;
@@ -180,7 +180,7 @@ TEST_F(Grids, StretchIsAGridAndAPicture) {
       {"rgb"});
 }
 
-/// What /usr/bin/python3 with OpenVDB's module prints; empty where there is none.
+/// The output of a program for /usr/bin/python3 with OpenVDB's module; empty if the module is missing.
 std::string ask_python(const std::string& program) {
   std::string printed;
   const std::string command = "/usr/bin/python3 -c '" + program + "' 2>/dev/null";

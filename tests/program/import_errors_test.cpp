@@ -1,4 +1,4 @@
-// What cannot be imported is one line, and leaves everything as it was.
+// An import that fails prints one line and changes no file.
 
 #include <sys/resource.h>
 #include <sys/stat.h>
@@ -12,7 +12,7 @@ using namespace test;
 
 class ImportErrors : public Import {
  protected:
-  /// The beginning of a data set's file; `part` of its bytes.
+  /// Writes the beginning of a data set's file: this part of its bytes.
   void cut(const std::string& data, const std::string& name, double part = 0.5) const {
     const std::string bytes = read_file(data_file(data));
     write(name, bytes.substr(0, static_cast<std::size_t>(part * static_cast<double>(bytes.size()))));
@@ -35,7 +35,7 @@ TEST_F(ImportErrors, FilesThatAreCutOff) {
   refuses({"half.vtk", "--array", "Nodal Stress", "--order", "vtk"}, 1, {"half.vtk"});
   cut("disk_out_ref/disk_out_ref.ex2", "half.ex2");
   refuses({"half.ex2", "--gradient-of", "V"}, 1, {"half.ex2", "cut off"});
-  cut("dt_helix/dt-helix-ref-RotationAndAffine.nrrd", "half.nrrd");  // Compressed.
+  cut("dt_helix/dt-helix-ref-RotationAndAffine.nrrd", "half.nrrd");  // This file is compressed.
   refuses({"half.nrrd"}, 1, {"half.nrrd", "cut off"});
   cut("dmri_crop/tensor.nii.gz", "half.nii.gz");
   refuses({"half.nii.gz", "--order", "mrtrix"}, 1, {"half.nii.gz", "cut off"});
@@ -58,7 +58,7 @@ TEST_F(ImportErrors, WrittenFilesThatAreCutOffOrEmpty) {
   }
 }
 
-/// VTK reads on beyond the faces where their numbers are wrong, and may or may not survive it.
+/// If the numbers of faces are wrong, VTK reads beyond the end of the faces and may crash.
 TEST_F(ImportErrors, FacesOfPolyhedraThatAreMiscounted) {
   const auto vtu = [](const std::string& faces) {
     const auto array = [](const std::string& name, const std::string& values, const std::string& type = "Int64") {
@@ -174,7 +174,7 @@ class ImportProcess : public Import {
     file << footer;
   }
 
-  /// The most memory that an import had resident, whichever of its processes had it.
+  /// The largest resident memory of any process of an import, bytes.
   double peak_bytes(const std::string& file) const {
     const pid_t program = start({"import", file, "-q", "-o", "field.vdb"});
     int status = 0;
@@ -184,7 +184,7 @@ class ImportProcess : public Import {
     return 1024.0 * static_cast<double>(usage.ru_maxrss);
   }
 
-  /// Starts an import that takes a while. @return its process and, once it is there, the one that reads; 0 if none.
+  /// Starts a long import. @return The processes of the program and of its reader; 0 if the reader does not start.
   std::array<pid_t, 2> start_reading() const {
     write_large("large.npy", npy_header("128, 128, 128, 3, 3"));
     const pid_t program = start({"import", "large.npy", "-q", "-o", "field.vdb"});

@@ -1,4 +1,4 @@
-// Imported tensors turn with their voxels: pictures of turned and mirrored files are turned and mirrored pictures.
+// Imported tensors turn with their voxels: files that are turned or mirrored give pictures that are turned or mirrored.
 
 #include "renderer/images/image.h"
 #include "tests/program/import_support.h"
@@ -10,7 +10,7 @@ using namespace test;
 
 class ImportPictures : public Import {
  protected:
-  /// The light that the field of FILE throws on a plate behind it: everything is turned with the field.
+  /// The light on a plate behind the field of FILE. The caller turns light and plate with the field.
   Image picture(const Arguments& file, const Vector3d& direction, const Vector3d& up,
                 const Vector3d& center = Vector3d::Zero()) {
     Arguments arguments{"import", "-q", "-o", "field.vdb"};
@@ -34,7 +34,7 @@ class ImportPictures : public Import {
   }
 };
 
-/// The greatest difference of pixels, in units of the undisturbed plate; `where` is the place in `b` of one in `a`.
+/// The greatest difference between pixels, in units of the undisturbed plate. `where` maps pixels of `a` to `b`.
 double difference(
     const Image& a, const Image& b, const std::function<std::array<int, 2>(int, int)>& where = [](int x, int y) {
       return std::array<int, 2>{x, y};
@@ -49,9 +49,10 @@ double difference(
   return greatest;
 }
 
-/// Photons lie on a grid that turns with the light, so that only rounding differs: that of 32-bit rays and pixels.
+/// Limit for equal pictures. Photons start on a grid that turns with the light, so that only the rounding of 32-bit
+/// rays and pixels differs.
 constexpr double same = 0.01;
-/// What tells pictures apart: much more than `same`.
+/// Limit for different pictures: much more than `same`.
 constexpr double different = 0.3;
 
 const Vector3d slanted(0.4, -0.3, -0.85), up(0, 1, 0);
@@ -105,8 +106,8 @@ TEST_F(ImportPictures, MirrorWithAHeadInEitherOrder) {
   };
   write("world.nii", nifti(place(Matrix3d::Identity()), components(Matrix3d::Identity(), mrtrix)));
   write("mirrored.nii", nifti(place(mirror), components(mirror, mrtrix)));
-  // FSL's first axis points left in both, so that the numbers of the mirrored head are those of its image in world
-  // axes.
+  // FSL's first axis points left in both files, so that the components of the mirrored head are the same as those of
+  // the other head in world axes.
   write("fsl.nii", nifti(place(mirror), components(Matrix3d::Identity(), row_by_row)));
   const Vector3d light = -Vector3d::UnitZ();
   const auto mirrored = [](int x, int y) { return std::array<int, 2>{63 - x, y}; };

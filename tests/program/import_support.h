@@ -1,6 +1,6 @@
 #pragma once
 /// @file tests/program/import_support.h
-/// Imports as a user does; and writes files to import: of a field of lumps without any symmetry.
+/// Imports files as a user does, and writes files to import. Their field consists of lumps without any symmetry.
 
 #include <algorithm>
 #include <array>
@@ -32,7 +32,7 @@ inline void for_each_voxel(const TensorGrid& grid,
       if (block.active[offset]) visit(block.origin + TensorBlock::position(offset), block.values[offset]);
 }
 
-/// The same voxels with the same numbers, bit for bit.
+/// Expects the same voxels with the same numbers, bit for bit.
 inline void expect_same(const TensorGrid& a, const TensorGrid& b) {
   EXPECT_LT((a.to_world.matrix() - b.to_world.matrix()).norm(), 1e-12 * a.to_world.matrix().norm());
   ASSERT_EQ(a.blocks.size(), b.blocks.size());
@@ -51,7 +51,7 @@ inline std::string bytes_of(const std::vector<Number>& numbers) {
 
 class Import : public Program {
  protected:
-  /// Imports into FIELD.vdb. @return what `info` says of the field.
+  /// Imports into FIELD.vdb. @return the report of `info` on the field.
   json import(Arguments arguments, const std::string& field) {
     arguments.insert(arguments.begin(), "import");
     arguments.insert(arguments.end(), {"-q", "-o", field + ".vdb"});
@@ -64,7 +64,7 @@ class Import : public Program {
   }
   TensorGrid field(const std::string& name) const { return read_tensor_vdb(in_folder(name + ".vdb")); }
 
-  /// Expects one line that has `parts`, `status`, and that all files stay as they were, the old output among them.
+  /// Expects `status`, one line that contains `parts`, and that all files stay unchanged, also an older output.
   void refuses(const Arguments& arguments, int status, const std::vector<std::string>& parts) const {
     write("old.vdb", "what was there before");
     const auto before = files();
@@ -81,7 +81,7 @@ class Import : public Program {
     EXPECT_EQ(read_file(in_folder("old.vdb")), "what was there before") << trace;
   }
 
-  Outcome imported_;  ///< What the last import said.
+  Outcome imported_;  ///< Result of the last import.
 };
 
 inline double at(const json& value, const char* group, const char* key) { return value[group][key].get<double>(); }
@@ -103,7 +103,8 @@ inline Vector3i voxels_of(const json& field) {
 constexpr int lump_size[3] = {18, 14, 12};
 inline const Vector3i lumps_size(lump_size[0], lump_size[1], lump_size[2]);
 
-/// @param p  From the lattice's centre. @return a symmetric tensor, nowhere zero.
+/// The field of lumps. @param p  Position relative to the centre of the lattice.
+/// @return A symmetric tensor that is nowhere zero.
 inline Matrix3d lumps(const Vector3d& p) {
   Matrix3d a, b, c;
   a << 0.2, 0.1, 0.35, 0.1, -0.1, 0.15, 0.35, 0.15, 0.3;
@@ -115,7 +116,7 @@ inline Matrix3d lumps(const Vector3d& p) {
   return a * lump(-3, 2, 1, 4) + b * lump(4, -2.5, -2, 3) + c * lump(1, 3, 0, 5);
 }
 
-/// `put(tensor)` for every voxel, x fastest.
+/// Calls `put(tensor)` for every voxel, x fastest.
 template <class Put>
 inline void for_lumps(const Put& put) {
   for (int z = 0; z < lumps_size.z(); ++z)
@@ -124,12 +125,12 @@ inline void for_lumps(const Put& put) {
         put(lumps(Vector3d(x, y, z) - 0.5 * (lumps_size.cast<double>() - Vector3d::Ones())));
 }
 
-/// World position of the first voxel, if the centre of the lattice, with axes `turn`, is the world's origin.
+/// World position of the first voxel of a lattice with axes `turn` whose centre is the origin of the world.
 inline Vector3d lumps_origin(const Matrix3d& turn) {
   return turn * (-0.5 * (lumps_size.cast<double>() - Vector3d::Ones()));
 }
 
-/// The components (row, column) of all tensors, after `turn` has turned their axes.
+/// The components (row, column) of all tensors, after a rotation by `turn`.
 inline std::vector<float> components(const Matrix3d& turn, const std::vector<std::array<int, 2>>& which) {
   std::vector<float> numbers;
   for_lumps([&](const Matrix3d& tensor) {
@@ -144,7 +145,8 @@ inline const std::vector<std::array<int, 2>> nine{{0, 0}, {0, 1}, {0, 2}, {1, 0}
 inline const std::vector<std::array<int, 2>> row_by_row{{0, 0}, {0, 1}, {0, 2}, {1, 1}, {1, 2}, {2, 2}};
 inline const std::vector<std::array<int, 2>> mrtrix{{0, 0}, {1, 1}, {2, 2}, {0, 1}, {0, 2}, {1, 2}};
 
-/// `turn` is where the axes of the voxels point; `frame` those of the components, which stay what they are.
+/// An NRRD file. The columns of `turn` are the axes of the voxels, those of `frame` the axes of the components. The
+/// components themselves do not depend on them.
 inline std::string nrrd_of_lumps(const Matrix3d& turn, const Matrix3d& frame) {
   const auto vector = [](const Vector3d& v) { return fmt::format("({:.17g},{:.17g},{:.17g})", v.x(), v.y(), v.z()); };
   const auto columns = [&](const Matrix3d& m) {
@@ -159,7 +161,7 @@ inline std::string nrrd_of_lumps(const Matrix3d& turn, const Matrix3d& frame) {
          bytes_of(components(Matrix3d::Identity(), row_by_row));
 }
 
-/// An image in ASCII XML with nine components in world axes.
+/// A VTK image in ASCII XML with nine components in world axes.
 inline std::string vti(const Vector3i& size, const Vector3d& origin, const Vector3d& spacing, const Matrix3d& direction,
                        const std::vector<float>& numbers) {
   const Eigen::Matrix<double, 3, 3, Eigen::RowMajor> rows = direction;
@@ -176,14 +178,14 @@ inline std::string vti(const Vector3i& size, const Vector3d& origin, const Vecto
       fmt::join(rows.data(), rows.data() + 9, " "), extent, values);
 }
 
-/// As numpy.save writes 32-bit floats.
+/// The header that numpy.save writes for 32-bit floats.
 inline std::string npy_header(const std::string& shape) {
   std::string header = "{'descr': '<f4', 'fortran_order': False, 'shape': (" + shape + "), }";
   header.resize(117, ' ');
   return std::string("\x93NUMPY\x01\x00\x76\x00", 10) + header + "\n";
 }
 
-/// A NIfTI-1 file of six volumes; `sform` is its three rows.
+/// A NIfTI-1 file with six volumes; `sform` has the three rows of its sform.
 inline std::string nifti(const Eigen::Matrix<float, 3, 4>& sform, const std::vector<float>& numbers) {
   std::string header(352, '\0');
   const auto put = [&](std::size_t offset, auto value) { std::memcpy(&header[offset], &value, sizeof value); };
@@ -207,7 +209,7 @@ inline std::string nifti(const Eigen::Matrix<float, 3, 4>& sform, const std::vec
   return header + bytes_of(volumes);
 }
 
-/// A turn about no axis in particular.
+/// A rotation about an oblique axis.
 inline const Matrix3d turn = Eigen::AngleAxisd(0.9, Vector3d(1, -2, 0.5).normalized()).toRotationMatrix();
 
 }  // namespace tensorray::test

@@ -1,4 +1,4 @@
-// Other programs' files come in with their numbers, places and axes.
+// Importing files of other programs keeps their numbers, places and axes.
 
 #include "tests/program/import_support.h"
 
@@ -11,7 +11,7 @@ TEST_F(Import, NotchWhoseMidSideNodesHoldNothing) {
   const std::string folder = data_file("notch_stress");
   SKIP_WITHOUT(folder);
   const json notch = import({folder + "/notch_stress.vtk", "--array", "Nodal Stress", "--order", "vtk"}, "notch");
-  // On the mesh the eigenvalues go from -3.402e5 to 8.1078e6; without a warning the grid has 95% of that.
+  // On the mesh the eigenvalues reach from -3.402e5 to 8.1078e6. No warning means that the grid has 95% of that.
   EXPECT_EQ(imported_.error, "");
   EXPECT_GT(at(notch, "eigenvalues", "real_max"), 0.94 * 8.1078e6);
   EXPECT_LE(at(notch, "eigenvalues", "real_max"), 8.1078e6);
@@ -80,7 +80,7 @@ TEST_F(Import, HelixInBothSpaces) {
 TEST_F(Import, BluntFinWhoseBoundaryLayerIsThinnerThanAVoxel) {
   const std::string folder = data_file("bluntfin");
   SKIP_WITHOUT(folder);
-  // With a number along each axis voxels are on the walls.
+  // With a number of voxels for each axis, voxels are on the walls.
   const json fin = import({folder + "/bluntfinxyz.bin", folder + "/bluntfinq.bin", "--gradient-of", "velocity",
                            "--resolution", "100", "38", "26", "--boundary", "fin.ply"},
                           "fin");
@@ -231,7 +231,7 @@ TEST_F(Import, OpenFoamsLastTimeStep) {
   OpenFoamCase::write(in_folder("case"));
   const json stress = import({"case", "--array", "sigma", "--order", "vtk", "--resolution", "4"}, "stress");
   EXPECT_EQ(stress["name"], "sigma");
-  EXPECT_GT(at(stress, "norm", "p0"), 1000);  // The values of the time before are below.
+  EXPECT_GT(at(stress, "norm", "p0"), 1000);  // The values of the time step before are smaller.
   EXPECT_EQ(import({"case", "--gradient-of", "U", "--resolution", "4"}, "flow")["name"], "U_gradient");
 }
 

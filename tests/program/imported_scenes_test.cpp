@@ -1,5 +1,5 @@
-// The scenes of measured and computed data, whose comments say how to import these: that, to the letter, on the data
-// sets of TENSORRAY_DATA.
+// The scenes of imported data. Their comments have the command that imports the data. These tests run exactly that
+// command on the data sets of TENSORRAY_DATA.
 
 #include <cctype>
 #include <cmath>
@@ -22,7 +22,7 @@ std::vector<std::filesystem::path> imported_scenes() {
   return scenes;
 }
 
-/// The words after `tensorray` in the comment of a scene, lines that end with a backslash joined.
+/// The words after `tensorray` in the comment of a scene. Lines that end with a backslash are joined with the next.
 std::vector<std::string> import_command(const std::filesystem::path& scene) {
   std::istringstream lines(read_file(scene));
   std::string command;
@@ -38,7 +38,7 @@ std::vector<std::string> import_command(const std::filesystem::path& scene) {
   return words;
 }
 
-/// Where a data set's file is, by its name alone; empty if it is not there.
+/// The path of a file of the data sets, by its name; empty if there is no such file.
 std::string data_file(const std::string& name) {
   for (const auto& entry : std::filesystem::recursive_directory_iterator(data_folder()))
     if (entry.path().filename() == name) return entry.path().string();

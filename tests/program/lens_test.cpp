@@ -1,4 +1,4 @@
-// Images seen through a field, as a user sees them.
+// The method lens: images seen through a field.
 
 #include <cmath>
 
@@ -14,7 +14,7 @@ namespace {
 
 using namespace test;
 
-/// A picture of random colours whose display values are those of 8 bits.
+/// A picture of random colours whose display values have 8 bits.
 Image random_picture(int width, int height) {
   Image image(width, height, {"R", "G", "B"});
   for (std::size_t i = 0; i < image.pixels.size(); ++i)
@@ -22,7 +22,7 @@ Image random_picture(int width, int height) {
   return image;
 }
 
-/// A lens that renders in a moment; `rest` are further keys of the integrator.
+/// A lens scene that renders quickly; `rest` contains further keys of the integrator.
 std::string small_lens(const std::string& rest, const std::string& kind = R"("kind": "point_load", "resolution": 17)") {
   return R"({"field": {"generate": {)" + kind + R"(}},
              "light": {"wavelengths": {"count": 10}},
@@ -83,7 +83,7 @@ TEST_F(Lens, WithoutAFieldThePictureIsTheImage) {
     for (std::size_t pixel = 0; pixel < 48 * 32; ++pixel)
       for (std::size_t c = 0; c < 3; ++c)
         difference = std::max<double>(difference, std::abs(seen.pixels[4 * pixel + c] - picture.pixels[3 * pixel + c]));
-    // Half a step of 8 bits is 0.002; 1e-4 is what sRGB's slope makes of single precision near black.
+    // Half a step of 8 bits is 0.002. The slope of sRGB near black makes an error of 1e-4 from single precision.
     EXPECT_LT(difference, 2e-4) << settings;
     for (const float alpha : channel(seen, "A")) EXPECT_EQ(alpha, 1);
   }
@@ -93,7 +93,7 @@ TEST_F(Lens, EveryChannelIsInTheExr) {
   write("scene.json", small_lens(R"("image": "checkerboard")"));
   for (const std::string mode : {"gather", "scatter"}) {
     const Image image = render({"integrator.mode=" + mode});
-    EXPECT_THAT(image.channels, ::testing::UnorderedElementsAreArray(all_channels));  // In the file they are sorted.
+    EXPECT_THAT(image.channels, ::testing::UnorderedElementsAreArray(all_channels));  // The file sorts them.
     for (const float value : image.pixels) ASSERT_TRUE(std::isfinite(value));
     const std::vector<float> length = channel(image, "length"), end = channel(image, "end");
     for (std::size_t i = 0; i < length.size(); ++i) EXPECT_EQ(length[i] > 0, end[i] == 0 || end[i] == 5) << i;
@@ -109,7 +109,7 @@ TEST_F(Lens, PixelsThatSeeNoImageAreTransparent) {
       for (int x = 0; x < 48; ++x) {
         const bool inside = x >= 12 && x < 36 && y >= 8 && y < 24;
         EXPECT_EQ(alpha[static_cast<std::size_t>(48 * y + x)], inside ? 1 : 0) << mode << " " << x << " " << y;
-        const float outside = mode == "gather" ? 5 : 1;  // Beside the image, or where none of its light lands.
+        const float outside = mode == "gather" ? 5 : 1;  // `outside`, or `missed`: no light lands there.
         EXPECT_EQ(end[static_cast<std::size_t>(48 * y + x)], inside ? 0 : outside);
       }
   }
@@ -117,7 +117,7 @@ TEST_F(Lens, PixelsThatSeeNoImageAreTransparent) {
   for (const float alpha : channel(repeated, "A")) EXPECT_EQ(alpha, 1);
 }
 
-/// The greatest distance of a pixel's chromaticity from that of the picture's sum.
+/// The greatest difference between the chromaticity of a pixel and that of the sum of all pixels.
 double colour_range(const Image& image) {
   Eigen::Vector3d sum = Eigen::Vector3d::Zero();
   std::vector<Eigen::Vector3d> pixels;
@@ -141,7 +141,7 @@ TEST_F(Lens, AWhiteLineBecomesAFringeOnlyWhereThereAreManyWavelengths) {
 }
 
 TEST_F(Lens, DepthsStandSideBySideAndLessOfTheVolumeBendsLess) {
-  // Turns light about z at a constant rate: the longer the way, the farther aside.
+  // The field turns light about z at a constant rate. A longer path is deflected more.
   write("scene.json", small_lens(R"("image": "grid", "image_plane": {"depth": [0, 0.25, 0.5, 0.75, 0.95]})",
                                  R"("kind": "constant", "resolution": 9,
                                     "tensor": [[0, 0.75, 0], [-0.75, 0, 0], [0, 0, 0]])"));
@@ -182,7 +182,7 @@ TEST_F(Lens, TheSameBytesOnAnyNumberOfThreads) {
 }
 
 TEST_F(Lens, TheImageIsSeenUprightFromBehindTheReceiver) {
-  // Red on the viewer's left, above green; the light travels down, and the viewer looks up: +y is up in the picture.
+  // Red is on the viewer's left, above green. Light travels down, and the viewer looks up with +y upwards.
   Image picture(2, 2, {"R", "G", "B"});
   picture.pixel(0, 0)[0] = 1;
   picture.pixel(0, 1)[1] = 1;

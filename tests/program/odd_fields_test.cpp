@@ -1,4 +1,4 @@
-// OpenVDB files that are valid, but not what a render needs: made with OpenVDB itself.
+// OpenVDB files that are valid but unusual, made with OpenVDB itself.
 
 #include <cmath>
 #include <limits>
@@ -17,7 +17,7 @@ class OddFields : public Program {
  protected:
   using Rows = std::vector<openvdb::Vec3SGrid::Ptr>;
 
-  /// The rows of a field "T": a dense cube of `voxels`³.
+  /// The grids of the three rows of a field "T": a dense cube of `voxels`³.
   static Rows rows(int voxels) {
     Rows grids;
     for (int row = 0; row < 3; ++row) {
@@ -96,7 +96,7 @@ TEST_F(OddFields, AFlatFieldSeenEdgeOn) {
   Rows grids = rows(0);
   for (auto& grid : grids) grid->denseFill({openvdb::Coord(0), openvdb::Coord(5, 5, 0)}, openvdb::Vec3f(1), true);
   save(grids);
-  EXPECT_EQ(render().status, 0);  // One voxel thick: see TensorField::index_bounds.
+  EXPECT_EQ(render().status, 0);  // The field is one voxel thick; see TensorField::index_bounds.
 }
 
 TEST_F(OddFields, HugeValuesEndTheRayNotTheProgram) {

@@ -1,4 +1,4 @@
-// Path tracing: what surrounds the bent rays in their pictures, lights them and is seen of them.
+// Path tracing: surroundings, lights and cameras of pictures of bent rays.
 
 #include <numeric>
 #include <set>
@@ -61,7 +61,7 @@ TEST_F(Paths, Backgrounds) {
 }
 
 TEST_F(Paths, Cameras) {
-  // What an orthographic camera sees does not depend on its distance.
+  // The picture of an orthographic camera does not depend on its distance.
   const auto seen = [&](int distance) {
     return render({transparent, "camera.projection=orthographic", "camera.target=[0,0,0]", "camera.height=3",
                    "camera.position=[0,-" + std::to_string(distance) + ",0]"});
@@ -73,7 +73,7 @@ TEST_F(Paths, Cameras) {
     if (channel(near, "A")[i] == 1 && channel(far, "A")[i] == 1) {
       EXPECT_NEAR(far_depth[i] - near_depth[i], 2, 0.3);
     }
-  // A thin lens: sharp at the focus alone.
+  // A thin lens is sharp only at its focus.
   const auto partly_covered = [&](const std::string& lens) {
     const Image image = render({transparent, without_box, "integrator.max_samples=16", "camera.lens_radius=" + lens,
                                 "camera.focus_distance=1", "camera.direction=[0,1,0]"});
@@ -103,7 +103,7 @@ TEST_F(Paths, LightsOfEveryKind) {
                                   R"("kind": "environment", "file": "white.exr")"}) {
     pictures.push_back(lit(light));
     EXPECT_GT(red(pictures.back()), 0.1) << light;
-    // Twice as strong, but reddish.
+    // Twice as strong, and reddish.
     const Image reddish = lit(light + R"(, "strength": 2, "color": [1, 0.1, 0.1])");
     EXPECT_NEAR(red(reddish) / red(pictures.back()), 2, 0.1) << light;
     EXPECT_NEAR(green(reddish) / green(pictures.back()), 0.2, 0.05) << light;
@@ -140,7 +140,7 @@ TEST_F(Paths, PreviewsNeedNoLights) {
 }
 
 TEST_F(Paths, TheLegendIsDrawnIntoThePictureAlone) {
-  // From here nothing depends on the room that a chosen camera leaves for a legend.
+  // A given camera leaves no space for a legend, so that both pictures show the same.
   const Settings settings{seen_from_the_side, "camera.resolution=[240,160]", "integrator.max_samples=1"};
   for (const std::string by : {"force", "direction"}) {
     Settings colored = settings, explained = settings;

@@ -1,6 +1,6 @@
 #pragma once
 /// @file tests/program/paths_support.h
-/// Small pictures of paths, and what to ask of them.
+/// Renders small pictures of paths, and measures them.
 
 #include <algorithm>
 #include <cmath>
@@ -19,7 +19,7 @@ using Settings = std::vector<std::string>;
 constexpr const char* point_load = R"("kind": "point_load", "resolution": 9)";
 constexpr const char* zero = R"("kind": "constant", "resolution": 9, "tensor": [[0, 0, 0], [0, 0, 0], [0, 0, 0]])";
 
-/// A scene that renders in a moment. The volume is from -1 to 1; of the point load, from -2 to 0 along z.
+/// A scene that renders quickly. The volume reaches from -1 to 1; that of the point load from -2 to 0 along z.
 inline std::string small_paths(const std::string& kind = point_load) {
   return R"({"field": {"generate": {)" + kind + R"(}, "scale": 6},
              "light": {"photons": 500, "wavelengths": {"count": 4}},
@@ -59,7 +59,7 @@ inline void expect_finite(const Image& image, const std::string& what) {
   for (const float value : image.pixels) ASSERT_TRUE(std::isfinite(value)) << what;
 }
 
-/// How much of the picture is covered, in pixels.
+/// The covered area of the picture, in pixels.
 inline double covered(const Image& image) { return sum(channel(image, "A")); }
 
 constexpr const char* seen_from_the_side =
@@ -81,7 +81,7 @@ class Paths : public Program {
     return result;
   }
 
-  /// The scene-linear picture; all of its values are finite.
+  /// Renders the scene-linear picture. All values must be finite.
   Image render(const Settings& settings, Settings outputs = {}) {
     outputs.push_back("out.exr");
     run_well(arguments(outputs, settings));
@@ -90,7 +90,7 @@ class Paths : public Program {
     return image;
   }
 
-  /// The program must fail with one line that matches `pattern`, and must leave nothing.
+  /// Runs the program, which must fail with one line that matches `pattern`, and must leave no new file.
   void expect_error(int status, const std::string& pattern, const Settings& settings,
                     const Settings& outputs = {"out.png", "out.exr", "out.vtp", "out.ply"}) {
     const auto before = files();

@@ -1,4 +1,4 @@
-// Path tracing: the bent rays that a user gets, as pictures and files.
+// Path tracing: pictures and files of the bent rays.
 
 #include <numeric>
 #include <set>
@@ -24,7 +24,7 @@ TEST_F(Paths, APictureWithEveryChannel) {
 }
 
 TEST_F(Paths, AuxiliaryPlanesSayWhatTheyShould) {
-  // Seen along y. Of the tubes and the box first, then of the tubes alone.
+  // Seen along y: first the tubes and the box, then only the tubes.
   const Settings settings{transparent, "camera.projection=orthographic", "camera.direction=[0,1,0]"};
   const Image with_box = render(settings);
   const std::vector<float> any = channel(with_box, "A"), id = channel(with_box, "path"),
@@ -148,7 +148,7 @@ TEST_F(Paths, ColoursOfEveryKind) {
 }
 
 TEST_F(Paths, LightIsFollowedBackFromSeedsWithinTheVolume) {
-  // Straight through the volume, from face to face: 2 long. Without backwards they begin near the middle.
+  // The paths go straight through the volume and are 2 long. Without `backwards` they begin near the middle.
   write("scene.json", small_paths(zero));
   const Settings settings{"integrator.seeds.kind=sphere", "integrator.seeds.radius=0.3", without_box};
   EXPECT_NEAR(greatest(channel(render(settings), "length")), 2, 0.2);
@@ -163,7 +163,7 @@ TEST_F(Paths, LightIsFollowedBackFromSeedsWithinTheVolume) {
 }
 
 TEST_F(Paths, PathsOfAFileGiveTheSamePictureWithoutTracing) {
-  // Without a radius it would be chosen by the distance between seeds, which no file of paths tells.
+  // A given radius does not depend on the seeds, which a file of paths does not contain.
   const Settings settings{"integrator.radius.typical=0.04"};
   const Image traced = render(settings, {"out.vtp", "out.ply"});
   const std::string tubes = read_file(in_folder("out.ply")), paths = read_file(in_folder("out.vtp"));
@@ -183,7 +183,7 @@ TEST_F(Paths, TracksAreWrittenAndRead) {
   Settings again = settings;
   again.push_back("integrator.paths=kept.tck");
   const Image read = render(again);
-  EXPECT_NEAR(covered(read), covered(traced), 0.5);  // Single precision.
+  EXPECT_NEAR(covered(read), covered(traced), 0.5);  // The file has single precision.
   EXPECT_EQ(greatest(channel(read, "force")), 0) << "tracks hold no tensors";
 }
 
@@ -204,7 +204,7 @@ TEST_F(Paths, WithoutAFieldTheyAreStraightRoundAndOfTheTypicalRadius) {
                 transparent, "camera.projection=orthographic", "camera.position=" + from, "camera.target=[0,0,0]",
                 "camera.height=1", "camera.resolution=[40,40]", "integrator.max_samples=16"},
                {"tube.obj"});
-    // 0.2 of a picture that is 1 high and has 40 pixels.
+    // The tube is 0.2 wide. The picture is 1 high and has 40 pixels, so that the tube covers 8 pixels.
     const std::vector<float> alpha = channel(image, "A");
     for (int row = 0; row < 40; ++row)
       EXPECT_NEAR(std::accumulate(alpha.begin() + 40 * row, alpha.begin() + 40 * (row + 1), 0.0), 8, 0.5)

@@ -17,7 +17,7 @@ TEST_F(Program, WritesPictureAndExrBesideTheScene) {
   const Outcome outcome = run_well({"render", "scene.json"});
   EXPECT_EQ(files(), (std::vector<std::string>{"scene.exr", "scene.json", "scene.png"}));
   EXPECT_NE(outcome.out.find("scene.png"), std::string::npos);
-  EXPECT_NE(outcome.error.find("scale"), std::string::npos);  // What "auto" chose is told.
+  EXPECT_NE(outcome.error.find("scale"), std::string::npos);  // The program reports what "auto" chose.
   const Image exr = read_image(in_folder("scene.exr"));
   EXPECT_EQ(exr.width, 32);
   EXPECT_EQ(exr.channels, (std::vector<std::string>{"R", "G", "B"}));
@@ -67,7 +67,7 @@ TEST_F(Program, ZeroFieldGivesANeutralUniformPlate) {
               "--set", "receiver.resolution=[64,64]"});
     const Image image = read_image(in_folder("out.exr"));
     double sum = 0, least = 1e9, greatest = 0;
-    for (int y = 12; y < 52; ++y)  // Six standard deviations of the estimate from where the plate ends.
+    for (int y = 12; y < 52; ++y)  // Six standard deviations of the estimate away from the edge of the plate.
       for (int x = 12; x < 52; ++x)
         for (int c = 0; c < 3; ++c) {
           const double value = image.pixel(x, y)[c];
@@ -125,7 +125,7 @@ TEST_F(Program, StatisticsBalance) {
     EXPECT_EQ(channel["rays"]["emitted"], stats["positions"]);
     EXPECT_GT(channel["ray_power"], 0);
   }
-  EXPECT_NEAR(stats["power"]["emitted"], 4, 1e-3);  // Irradiance 1 on the cross section of the beam.
+  EXPECT_NEAR(stats["power"]["emitted"], 4, 1e-3);  // Irradiance 1 times the area of the beam's cross section.
   for (const char* key : {"ray_steps", "tensor_samples", "peak_memory_bytes", "threads"})
     EXPECT_GT(stats[key], 0) << key;
   for (const char* phase : {"load", "trace", "density", "color", "write"})
@@ -136,7 +136,7 @@ TEST_F(Program, RgbModeIsThePapers) {
   write("scene.json", small_scene());
   run_well({"render", "scene.json", "-q", "-o", "out.exr", "--set", "bending.rgb=[0.1,0.2,0.3]"});
   EXPECT_EQ(read_image(in_folder("out.exr")).channels.size(), 3u);
-  // Equal flexibilities: no colour at all.
+  // Equal flexibilities give no colour at all.
   run_well({"render", "scene.json", "-q", "-o", "out.exr", "--set", "bending.rgb=[0.2,0.2,0.2]"});
   const Image grey = read_image(in_folder("out.exr"));
   for (int i = 0; i < 32 * 32; ++i) {
@@ -183,9 +183,9 @@ TEST_F(Program, APlateAnywhereIsSeenAlongTheLight) {
   };
   const std::string size = "receiver.size=[2,2]";
   EXPECT_NEAR(column_of_light({size}), 24, 0.2);
-  EXPECT_NEAR(column_of_light({size, "receiver.normal=[0,0,-1]"}), 24, 0.2);  // Given by its other side.
-  EXPECT_NEAR(column_of_light({size, "receiver.center=[0,0,5]"}), 24, 0.2);   // Before the volume.
-  EXPECT_NEAR(column_of_light({size, "receiver.center=[0,0,0]"}), 24, 0.2);   // In it.
+  EXPECT_NEAR(column_of_light({size, "receiver.normal=[0,0,-1]"}), 24, 0.2);  // The opposite normal.
+  EXPECT_NEAR(column_of_light({size, "receiver.center=[0,0,5]"}), 24, 0.2);   // A plate before the volume.
+  EXPECT_NEAR(column_of_light({size, "receiver.center=[0,0,0]"}), 24, 0.2);   // A plate in the volume.
   EXPECT_NEAR(column_of_light({"receiver.size=[4000,4000]", "receiver.distance=1e4"}), 16, 0.2);
 }
 
@@ -205,7 +205,7 @@ TEST_F(Program, FilesGoThroughMakeInfoAndRender) {
   EXPECT_NE(run_well({"info", "vortex.vdb"}).out.find("4096"), std::string::npos);
   write("scene.json", small_scene(R"({"file": "vortex.vdb"})"));
   run_well({"render", "scene.json", "-q"});
-  // The same field made in memory gives the same picture.
+  // The same field gives the same picture if it is made in memory.
   const std::vector<float> from_file = read_image(in_folder("scene.exr")).pixels;
   write("scene.json", small_scene(R"({"generate": {"kind": "vortex", "resolution": 16, "circulation": 3}})"));
   run_well({"render", "scene.json", "-q"});
@@ -220,7 +220,7 @@ TEST_F(Program, ObstaclesAndCutsAreLoaded) {
   EXPECT_EQ(read_json("stats.json")["photons"]["deposited"], 0);
   EXPECT_GT(read_json("stats.json")["photons"]["stopped"]["obstacle"], 0);
 
-  // A small closed box in a corner: the rest of the light goes straight.
+  // The volume is cut to a small box in a corner. Light outside the box goes straight.
   write("box.obj",
         "v 0.5 0.5 -1\nv 0.9 0.5 -1\nv 0.9 0.9 -1\nv 0.5 0.9 -1\n"
         "v 0.5 0.5 -0.5\nv 0.9 0.5 -0.5\nv 0.9 0.9 -0.5\nv 0.5 0.9 -0.5\n"
@@ -234,7 +234,7 @@ TEST_F(Program, AnInterruptLeavesNothingBehind) {
   write("scene.json", small_scene());
   write("scene.png", "an old picture");
   const pid_t child = start({"render", "scene.json", "--set", "light.photons=1e9"});
-  // It has begun to render once its temporary files are there.
+  // Rendering has begun when the temporary files exist.
   for (int i = 0; i < 500 && files().size() < 4; ++i) std::this_thread::sleep_for(std::chrono::milliseconds(20));
   ASSERT_GE(files().size(), 4u);
   kill(child, SIGINT);

@@ -1,4 +1,4 @@
-// The example scenes, and what their pictures show.
+// The example scenes render, and their pictures have the features of the paper's figures.
 
 #include <cmath>
 
@@ -27,7 +27,7 @@ TEST_P(ExampleScene, RendersAndBendsLight) {
   const Outcome outcome = run_well({"render", scene, "-o", "out.exr", "--set", "light.photons=4000", "--set",
                                     "receiver.resolution=[64,64]", "--set", "light.wavelengths.count=8", "--set",
                                     "camera.resolution=[64,64]", "--set", "integrator.max_samples=4"});
-  // "auto" found a scale at which the median ray turns as far as it should.
+  // With the scale that "auto" chooses, the median ray turns by 0.15 rad.
   if (read_file(scene).find("\"scale\"") == std::string::npos) {
     EXPECT_NE(outcome.error.find("turns by 0.150 rad"), std::string::npos) << outcome.error;
   }
@@ -45,7 +45,7 @@ TEST_P(ExampleScene, RendersAndBendsLight) {
 INSTANTIATE_TEST_SUITE_P(Scenes, ExampleScene, ::testing::ValuesIn(example_scenes()),
                          [](const auto& scene) { return scene.param.stem().string(); });
 
-/// A picture of a point load, the plate from −1.3 to 1.3 both ways.
+/// A picture of a point load. The plate reaches from −1.3 to 1.3 along both axes.
 class PointLoadPicture : public Program {
  protected:
   Image picture(const std::string& scene, const std::vector<std::string>& light = {}) {
@@ -77,7 +77,7 @@ TEST_F(PointLoadPicture, WithThePushThereIsADarkDiscWithARedRim) {
   for (const std::vector<std::string>& light : {std::vector<std::string>{}, {"--set", "bending.rgb=[0.1,0.2,0.3]"}}) {
     const Image image = picture("point_load_photons.json", light);
     EXPECT_LT(ring(image, 0, 0.2).maxCoeff(), 0.03);
-    // Red bends the least, so that it is pushed out the least: from inside the colours begin in their order.
+    // Red bends outwards the least. From the centre outwards red begins first, then green, then blue.
     Eigen::Vector3d begins = Eigen::Vector3d::Zero();
     for (int colour = 0; colour < 3; ++colour)
       for (double r = 0.02; begins[colour] == 0 && r < 1.2; r += 0.02)
@@ -87,7 +87,7 @@ TEST_F(PointLoadPicture, WithThePushThereIsADarkDiscWithARedRim) {
     EXPECT_GT(begins[2], begins[1] + 0.03);
     EXPECT_LT(begins[2], 1.2);
     if (light.empty()) continue;
-    // One flexibility a colour leaves a sharp edge: dark to bright within three standard deviations of the estimate.
+    // One flexibility per colour gives a sharp edge: dark to bright within three standard deviations of the estimate.
     EXPECT_LT(ring(image, begins[0] - 0.08, begins[0] - 0.06).x(), 0.05);
     EXPECT_GT(ring(image, begins[0] + 0.04, begins[0] + 0.06).x(), 0.9);
   }
@@ -111,7 +111,7 @@ TEST_F(PointLoadPicture, FromTheSideBlueLightGathersAtTheLoad) {
       row = y;
     }
   }
-  EXPECT_LT(row, 45);  // The upper third: the load is at the top.
+  EXPECT_LT(row, 45);  // The brightest pixel is in the upper third, because the load is at the top.
   EXPECT_GT(brightest.z(), 1.5);
   const Eigen::Vector3d far = Eigen::Vector3f(image.pixel(30, 95)).cast<double>();
   EXPECT_LT((far.array() / far.mean() - 1).abs().maxCoeff(), 0.1);  // Grey.

@@ -1,6 +1,6 @@
 #pragma once
 /// @file tests/program/support.h
-/// Runs the whole program as a user does.
+/// Runs the whole program, as a user does.
 
 #include <algorithm>
 #include <chrono>
@@ -27,11 +27,11 @@ inline std::string read_file(const std::filesystem::path& path) {
 }
 
 struct Outcome {
-  int status = -1;  ///< Exit status; 128 + the signal's number if one ended the program.
+  int status = -1;  ///< Exit status; 128 + the number of the signal if a signal ended the program.
   std::string out, error;
 };
 
-/// A folder of its own for each test, removed at the end.
+/// Makes a folder for each test, and removes it after the test.
 class Program : public ::testing::Test {
  protected:
   void SetUp() override {
@@ -71,7 +71,7 @@ class Program : public ::testing::Test {
             read_file(in_folder("stderr"))};
   }
 
-  /// @param file_size_limit  In blocks of 512 bytes: what a full disk is like; 0: none.
+  /// @param file_size_limit  Blocks of 512 bytes. Imitates a full disk; 0: no limit.
   Outcome run(const std::vector<std::string>& arguments, long file_size_limit = 0) const {
     return wait_for(start(arguments, file_size_limit));
   }
@@ -89,7 +89,7 @@ class Program : public ::testing::Test {
 
   nlohmann::json read_json(const std::string& name) const { return nlohmann::json::parse(read_file(in_folder(name))); }
 
-  /// Names of what is in the folder besides what `run` leaves there.
+  /// Names of the files in the folder, except those that `run` makes.
   std::vector<std::string> files() const {
     std::vector<std::string> names;
     for (const auto& entry : std::filesystem::directory_iterator(folder_)) {
@@ -104,7 +104,7 @@ class Program : public ::testing::Test {
   std::filesystem::path folder_;
 };
 
-/// A scene that renders in a moment; `field` is the value of the key.
+/// A scene that renders quickly; `field` is the value of the key `field`.
 inline std::string small_scene(const std::string& field = R"({"generate": {"kind": "point_load", "resolution": 17}})") {
   return R"({"field": )" + field + R"(,
              "light": {"photons": 2000, "wavelengths": {"count": 4}},

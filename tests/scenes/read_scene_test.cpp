@@ -29,7 +29,7 @@ using Files = std::map<std::string, fs::path>;
 
 const char* const smallest = R"({"field": {"file": "a.vdb"}, "integrator": {"type": "photon_distribution"}})";
 
-/// A folder of its own for each test, gone afterwards.
+/// Makes a folder for each test, and removes it after the test.
 class ReadScene : public ::testing::Test {
  protected:
   ReadScene() {
@@ -49,7 +49,7 @@ class ReadScene : public ::testing::Test {
     return read_scene(file(text), {overrides, {}});
   }
 
-  /// The message, one line of which is expected; empty if nothing is thrown.
+  /// The message of the error, which must be one line; empty if nothing is thrown.
   std::string error(const Overrides& overrides, const std::string& text = smallest) const {
     try {
       read(overrides, text);
@@ -372,7 +372,7 @@ TEST_F(ReadScene, OutputsOfTheCommandLineTakeThePlaceOfTheScenes) {
   EXPECT_THAT(refusal({"a.vdb"}, {"integrator.type=lens"}), HasSubstr("lens makes no photons"));
 }
 
-/// Every key that names a file is known as an input, by whatever name the output has it.
+/// input_files lists every key that names a file, and an output is refused under any name of the same file.
 TEST_F(ReadScene, NoOutputTakesThePlaceOfAnInput) {
   for (const char* name : {"body.ply", "cut.ply", "photo.png", "sky.exr", "lamp.txt", "config.ocio", "seeds.txt"})
     std::ofstream(folder_ / name) << name;

@@ -1,5 +1,5 @@
-// The schema and the reader are made from one table. Here every value that the schema speaks of is put through the
-// reader, so that both mean the same.
+// The schema and the reader use one table of keys. These tests give the values that the schema names to the reader, and
+// check that both accept and refuse the same.
 
 #include <filesystem>
 #include <fstream>
@@ -27,7 +27,7 @@ struct Leaf {
 
 Json smallest_scene() { return {{"field", {{"file", "a.vdb"}}}, {"integrator", {{"type", "photon_distribution"}}}}; }
 
-/// `scene` with the kind of object to which the key belongs, if it does not belong to all kinds.
+/// `scene`, with the kind of object that allows the key, if not all kinds do.
 Json with_chooser(const Json& schema, const Pointer& pointer, const std::string& key, Json scene) {
   for (const Json& rule : schema.value("allOf", Json::array())) {
     if (!rule.contains("anyOf") || rule.at("/anyOf/1/not/required/0"_json_pointer) != key) continue;
@@ -60,7 +60,7 @@ std::vector<Leaf> leaves() {
   return all;
 }
 
-/// The reader's message; empty where it accepts.
+/// The message of the reader; empty if it accepts the scene.
 std::string refusal(const Json& scene) {
   const auto path = std::filesystem::path(::testing::TempDir()) / ("schema_" + std::to_string(getpid()) + ".json");
   std::ofstream(path) << scene;
@@ -80,7 +80,7 @@ std::string refusal(const Leaf& leaf, const Json& value) {
   return refusal(scene);
 }
 
-/// Whether the reader refused the very key with what it expected, and not something else.
+/// Whether the reader refused the value of this key, and not something else.
 bool refused_for_its_value(const Leaf& leaf, const Json& value) {
   return refusal(leaf, value).find("`" + leaf.pointer.to_string() + "` must be ") != std::string::npos;
 }

@@ -1,4 +1,4 @@
-// Which of the sources may use which libraries, and what else ARCHITECTURE.md promises of them.
+// Which sources may use which libraries, and other invariants of ARCHITECTURE.md.
 
 #include <map>
 #include <regex>
@@ -14,7 +14,7 @@ namespace {
 
 using test::Line, test::lines_of, test::top_folders;
 
-/// The benchmark measures against these libraries' own samplers.
+/// The benchmark may include these libraries, because it compares with their samplers.
 bool is_benchmark(const Line& line) { return line.is_under("tools/benchmark"); }
 
 TEST(Structure, HeavyLibrariesStayOutOfHeadersAndInTheirFolder) {
@@ -31,7 +31,7 @@ TEST(Structure, HeavyLibrariesStayOutOfHeadersAndInTheirFolder) {
       if (!std::regex_search(line.text, match, include) || is_benchmark(line)) continue;
       EXPECT_EQ(homes.at(match[1]), folder) << line.file;
       users[match[1]].insert(line.file);
-      // Included by two .cpp of the same folder.
+      // Private headers, which only .cpp files of the same folder include.
       const bool private_header =
           line.file == "volumes/files/vdb_archive.h" || line.file == "renderer/surfaces/embree_handles.h";
       EXPECT_TRUE(private_header || !line.is_of_header()) << line.file << ": " << line.text;
@@ -57,25 +57,25 @@ TEST(Structure, ForeignFormatsStayInVolumesAndTheImporter) {
 TEST(Structure, LibrariesNeitherPrintNorExit) {
   const std::regex forbidden(R"(std::(cout|cerr|clog|exit|abort|quick_exit)\b|\b(printf|puts|perror)\(|fmt::print)");
   for (const std::string& folder : top_folders()) {
-    // Of the tools, the importer is a library.
+    // Among the tools, only the importer is a library.
     for (const Line& line : lines_of(folder == "tools" ? "tools/import" : folder))
       EXPECT_FALSE(std::regex_search(line.text, forbidden)) << line.file << ": " << line.text;
   }
 }
 
-/// Eq. 5 needs the tensor where a ray is: through a sampler, or through the bricks themselves as packets do.
+/// Eq. 5 needs the tensor at the position of a ray: from a sampler or, in packets, from the bricks.
 TEST(Structure, OnlyBendingKnowsTheRule) {
   const std::regex tensor_at_a_point(R"(\b(TensorSampler|TensorBrick)\b|\bbrick\()");
   std::set<std::string> readers;
   for (const Line& line : lines_of("integrators"))
     if (std::regex_search(line.text, tensor_at_a_point)) {
-      // Seeds only look at the field.
+      // Seeds only read the field.
       EXPECT_TRUE(line.is_under("integrators/bending") || line.is_under("integrators/packets") ||
                   line.file == "integrators/paths/threshold_seeds.cpp")
           << line.file << ": " << line.text;
       readers.insert(line.folder());
     }
-  // The names that this test looks for are those that both tracers use.
+  // Both tracers must use the names that this test looks for.
   EXPECT_EQ(readers.count("integrators/bending") + readers.count("integrators/packets"), 2u);
 }
 

@@ -1,4 +1,5 @@
-// tests/report.awk, by which tools/test reports: what GoogleTest and ctest write must come out as tests by name.
+// tests/report.awk, which makes the report of tools/test: a list of tests by name, from the output of GoogleTest
+// and ctest.
 
 #include <array>
 #include <cstdio>
@@ -15,7 +16,7 @@
 namespace tensorray {
 namespace {
 
-/// A shard in ctest's log: what its process printed, and whether ctest found it good.
+/// A shard in the log of ctest: the output of its process, and whether it passed.
 std::string in_log(const std::string& shard, const std::string& output, bool passed) {
   return "1/1 Testing: " + shard + "\n1/1 Test: " + shard + "\nOutput:\n" + output +
          "<end of output>\nTest time = 1\n" + (passed ? "Test Passed.\n" : "Test Failed.\n");
@@ -41,7 +42,7 @@ class Report : public ::testing::Test {
 
   void write(const std::string& name, const std::string& text) const { std::ofstream(folder_ / name) << text; }
 
-  /// Reports on the log, expected.txt and the given results. @return what it printed.
+  /// Runs the report on the log, expected.txt and the given results. @return Its output.
   std::string report(const std::string& results = "") {
     const std::string command = "cd '" + folder_.string() + "' && awk -f '" +
                                 (test::source_folder() / "tests" / "report.awk").string() +

@@ -1,4 +1,4 @@
-// Who may include whom: one line for each folder of sources ("room").
+// The includes that are allowed between folders of sources ("rooms"): one line for each room.
 
 #include <algorithm>
 #include <filesystem>
@@ -22,8 +22,8 @@ struct Room {
   std::vector<std::string> may_include;  ///< Rooms; "folder/*" is every room below a folder.
 };
 
-/// A room may also include itself, and base. It may include only what stands above it in this table: so no chain of
-/// includes leads back to where it began.
+/// A room may also include itself and base. It may only include rooms above it in this table: then no includes form
+/// a circle.
 const std::vector<Room> rooms{
     {"base", {}},
 
@@ -82,7 +82,7 @@ const std::vector<Room> rooms{
     {"tools/benchmark", {"tools/command_line", "scenes/*", "integrators/*", "renderer/*", "volumes/*"}},
 };
 
-/// Whether a room is meant by a name in `may_include`.
+/// Whether `name`, an item of `may_include`, means the room `folder`.
 bool is_meant(const std::string& folder, const std::string& name) {
   if (name.back() != '*') return folder == name;
   return folder.compare(0, name.size() - 1, name, 0, name.size() - 1) == 0;
@@ -99,8 +99,8 @@ bool may_include(const Room& room, const std::string& folder) {
          std::any_of(room.may_include.begin(), room.may_include.end(), allows);
 }
 
-/// The folder of what a line includes in quotation marks, which is of this project. Highway's sources name themselves
-/// in a macro, which includes them once more.
+/// The folder of the file that a line includes in quotation marks; such files belong to this project. Sources that use
+/// Highway name themselves in a macro, which includes them again.
 std::optional<std::string> included_folder(const Line& line) {
   static const std::regex include("^ *# *(?:include|define HWY_TARGET_INCLUDE) *\"([^\"]*)\"");
   std::smatch match;
@@ -124,7 +124,7 @@ TEST(Structure, EveryListedRoomHasSources) {
   }
 }
 
-/// So that no includes run in a circle.
+/// This makes circles of includes impossible.
 TEST(Structure, RoomsStandBelowWhatTheyInclude) {
   for (auto room = rooms.begin(); room != rooms.end(); ++room)
     for (const std::string& other : room->may_include) {

@@ -1,6 +1,6 @@
 #pragma once
 /// @file tests/structure/sources.h
-/// The project's own sources as lines of text, for rules that a machine can check on them.
+/// The sources of the project as lines of text, for tests of rules about sources.
 
 #include <filesystem>
 #include <fstream>
@@ -15,7 +15,7 @@
 namespace tensorray::test {
 
 struct Line {
-  std::string file;  ///< Path from the source folder.
+  std::string file;  ///< Path relative to the source folder.
   std::string text;
 
   std::string folder() const { return std::filesystem::path(file).parent_path().string(); }
@@ -23,7 +23,7 @@ struct Line {
   bool is_of_header() const { return std::filesystem::path(file).extension() == ".h"; }
 };
 
-/// The folders of the source folder that hold C++, each with a CMakeLists.txt; without the tests.
+/// The folders with C++ in the source folder. Each has a CMakeLists.txt. The folder tests is not among them.
 inline std::set<std::string> top_folders() {
   std::set<std::string> folders;
   for (const auto& entry : std::filesystem::directory_iterator(source_folder()))
@@ -32,7 +32,7 @@ inline std::set<std::string> top_folders() {
   return folders;
 }
 
-/// All lines of the headers and sources in a folder and in those below it.
+/// All lines of the headers and sources in a folder and in the folders below it.
 inline std::vector<Line> lines_of(const std::string& folder) {
   std::vector<Line> lines;
   for (const auto& entry : std::filesystem::recursive_directory_iterator(source_folder() / folder)) {
