@@ -1,6 +1,6 @@
 #pragma once
 /// @file integrators/bending/bending_steps.h
-/// One step along a bent ray, by each of the methods: a part of bending.cpp.
+/// One step along a bent ray by each of the methods. A part of scalar_tracer.h.
 
 #include <array>
 #include <cmath>
@@ -15,8 +15,9 @@
 
 namespace tensorray::bending_steps {
 
-/// A ray at a point of its way, or (N = 3) the ray and its derivatives along two parameters. Column 0 of P and V is the
-/// ray itself, the others are the derivatives, so that a method that is linear in states carries them along as it is.
+/// The state of a ray at one point: the ray alone (N = 1), or with its derivatives along two parameters (N = 3). Column
+/// 0 of P and V is the ray itself, the other columns are the derivatives. A method that is linear in states therefore
+/// carries the derivatives along without extra code.
 template <int N>
 struct State {
   Eigen::Matrix<double, 3, N> P, V;
@@ -34,13 +35,13 @@ State<N> operator*(double factor, const State<N>& a) {
   return {factor * a.P, factor * a.V};
 }
 
-/// The field as one ray meets it.
+/// The field as one ray samples it.
 template <int N>
 struct RayMedium {
   TensorSampler& sampler;
-  double strength;                              ///< σ = s · scale: V' is that of σ T.
-  Eigen::Matrix3d T = Eigen::Matrix3d::Zero();  ///< As last sampled ...
-  std::array<Eigen::Matrix3d, N - 1> dT{};      ///< ... and its derivatives along the parameters.
+  double strength;                              ///< σ = s · scale; V' is computed with σ T.
+  Eigen::Matrix3d T = Eigen::Matrix3d::Zero();  ///< T as last sampled.
+  std::array<Eigen::Matrix3d, N - 1> dT{};      ///< Derivatives of T along the parameters, as last sampled.
 
   void sample(const Eigen::Matrix<double, 3, N>& P) {
     if constexpr (N == 1) {
@@ -50,15 +51,15 @@ struct RayMedium {
     }
   }
 
-  /// T V and its derivatives, with the tensor as last sampled.
+  /// T V and its derivatives, with T as last sampled.
   Eigen::Matrix<double, 3, N> apply(const Eigen::Matrix<double, 3, N>& V) const {
     Eigen::Matrix<double, 3, N> TV = T * V;
     for (int i = 1; i < N; ++i) TV.col(i) += dT[i - 1] * V.col(0);
     return TV;
   }
 
-  /// Eq. 5, in a form that is blind to the trace of T also where V is not quite a unit vector (inside a step), and its
-  /// derivatives (the variational equations).
+  /// Eq. 5 and its derivatives (the variational equations). This form does not depend on the trace of T, even where V
+  /// is not quite a unit vector (inside a step).
   State<N> derivative(const State<N>& at) {
     sample(at.P);
     Eigen::Matrix<double, 3, N> change = apply(at.V);
@@ -74,7 +75,7 @@ struct RayMedium {
   }
 };
 
-/// Takes V to unit length (and its derivatives with it); to zero if it has no direction.
+/// Scales V to unit length and its derivatives with it. If V has no direction, the result is zero.
 template <int N>
 State<N> normalized(const State<N>& state) {
   const double length = state.direction().norm();
@@ -106,7 +107,7 @@ State<N> splitting(RayMedium<N>& medium, const State<N>& from, double h) {
   }
 }
 
-/// `error` is set by the adaptive methods.
+/// A step of a Runge–Kutta method. Adaptive methods set `error`.
 template <int N>
 State<N> by_stages(const RungeKutta& method, RayMedium<N>& medium, const State<N>& from, double h, State<N>& error) {
   std::array<State<N>, RungeKutta::most_stages> k;
@@ -123,7 +124,7 @@ State<N> by_stages(const RungeKutta& method, RayMedium<N>& medium, const State<N
   return normalized(along(method.b, method.stages, from));
 }
 
-/// A step of arc length h. `error` is set by the adaptive methods.
+/// A step of arc length h. Adaptive methods set `error`.
 template <int N>
 State<N> advance(BendingMethod method, RayMedium<N>& medium, const State<N>& from, double h, State<N>& error) {
   if (const RungeKutta* const stages = runge_kutta(method)) return by_stages(*stages, medium, from, h, error);

@@ -7,7 +7,7 @@ namespace tensorray {
 namespace {
 
 /// With k + 1 terms the power series of exp(A) is exact to 1e-12 for ‖A‖ up to entry k: (1e-12 (k + 2)!)^(1/(k + 2)).
-/// That is far below what the single precision of the voxels leaves.
+/// This error is far below the single precision of the voxels.
 constexpr double reach[] = {1.4142e-06, 0.00018171, 0.0022133, 0.010371, 0.029937, 0.065257, 0.11903,
                             0.19249,    0.28574,    0.3982,    0.52888,  0.67659,  0.84006,  1};
 constexpr int most_terms = sizeof reach / sizeof *reach;
@@ -18,7 +18,7 @@ int terms_for(double squared_norm) {
   return terms;
 }
 
-/// exp(A) v by its power series. In scalars, as this is the innermost loop of tracing.
+/// exp(A) v by its power series. It uses scalars because this is the innermost loop of tracing.
 Eigen::Vector3d series(const Eigen::Matrix3d& A, const Eigen::Vector3d& v, int terms) {
   constexpr double reciprocal[most_terms + 1] = {0,        1.0,      1.0 / 2,  1.0 / 3,  1.0 / 4,
                                                  1.0 / 5,  1.0 / 6,  1.0 / 7,  1.0 / 8,  1.0 / 9,
@@ -36,7 +36,7 @@ Eigen::Vector3d series(const Eigen::Matrix3d& A, const Eigen::Vector3d& v, int t
   return {sum_x, sum_y, sum_z};
 }
 
-/// exp(A) up to a factor, for ‖A‖ = `norm` > 1: scaling and squaring.
+/// exp(A) up to a factor, for ‖A‖ = `norm` > 1, by scaling and squaring.
 Eigen::Matrix3d squared(const Eigen::Matrix3d& A, double norm) {
   const int halvings = std::ilogb(norm) + 1;
   const Eigen::Matrix3d small = std::ldexp(1.0, -halvings) * A;
@@ -52,7 +52,8 @@ Eigen::Matrix3d squared(const Eigen::Matrix3d& A, double norm) {
 
 Eigen::Matrix3d deviator(const Eigen::Matrix3d& A) { return A - A.trace() / 3 * Eigen::Matrix3d::Identity(); }
 
-/// exp(A) v by its power series, with the derivatives along two parameters: columns as `exponential_derivatives` has.
+/// exp(A) v by its power series, with its derivatives along two parameters. Columns are those of
+/// `exponential_derivatives`.
 Eigen::Matrix3d series(const Eigen::Matrix3d& A, const std::array<Eigen::Matrix3d, 2>& dA, const Eigen::Matrix3d& v,
                        int terms) {
   Eigen::Matrix3d term = v, sum = v;
@@ -69,7 +70,7 @@ Eigen::Matrix3d series(const Eigen::Matrix3d& A, const std::array<Eigen::Matrix3
 }  // namespace
 
 Eigen::Vector3d exponential_direction(const Eigen::Matrix3d& A, const Eigen::Vector3d& v) {
-  // The trace only changes the length.
+  // The trace of A changes only the length.
   const Eigen::Matrix3d without_trace = deviator(A);
   const double squared_norm = without_trace.squaredNorm();
   Eigen::Vector3d result;
@@ -88,7 +89,7 @@ Eigen::Matrix3d exponential_derivatives(const Eigen::Matrix3d& A, const std::arr
                                         const Eigen::Matrix3d& v) {
   const Eigen::Matrix3d without_trace = deviator(A);
   const double squared_norm = without_trace.squaredNorm();
-  // One term more, as the derivative of a series has one less.
+  // One more term, because differentiation of the series removes one.
   if (squared_norm <= 1) return series(without_trace, dA, v, std::min(terms_for(squared_norm) + 1, most_terms));
   const int halvings = std::isfinite(squared_norm) ? std::ilogb(std::sqrt(squared_norm)) + 1 : 0;
   const double part = std::ldexp(1.0, -halvings);

@@ -1,12 +1,12 @@
 #pragma once
 /// @file integrators/bending/runge_kutta.h
-/// The coefficients of the Runge–Kutta methods, for both tracers.
+/// Coefficients of the Runge–Kutta methods, for both tracers.
 
 #include "integrators/bending/bending.h"
 
 namespace tensorray {
 
-/// An explicit method: stage i is at x + h Σ_j a[i][j] k_j, and the step's end at x + h Σ_j b[j] k_j.
+/// An explicit method: stage i is at x + h Σ_j a[i][j] k_j, and the step ends at x + h Σ_j b[j] k_j.
 struct RungeKutta {
   static constexpr int most_stages = 7;
 
@@ -14,7 +14,7 @@ struct RungeKutta {
   double a[most_stages][most_stages];
   double b[most_stages];
   bool adaptive;
-  double error[most_stages];  ///< If adaptive: h Σ_j error[j] k_j is the difference to the embedded method.
+  double error[most_stages];  ///< Adaptive methods: h Σ_j error[j] k_j is the difference from the embedded method.
 };
 
 inline constexpr RungeKutta rk4_method{/*stages*/ 4,
@@ -48,7 +48,7 @@ inline constexpr RungeKutta dopri5_method{
     /*adaptive*/ true,
     /*error*/ {71.0 / 57600, 0, -71.0 / 16695, 71.0 / 1920, -17253.0 / 339200, 22.0 / 525, -1.0 / 40}};
 
-/// The coefficients of a method; null if it is none of these.
+/// The coefficients of a method; null if it is not a Runge–Kutta method.
 inline const RungeKutta* runge_kutta(BendingMethod method) {
   switch (method) {
     case BendingMethod::rk4:

@@ -18,14 +18,14 @@ double deviator_norm(const Eigen::Matrix3d& T) {
 
 }  // namespace
 
-/// Derivatives are those at equal arc length; from a surface on they are those of the rays' crossings of it, as a ray's
-/// direction begins, or ceases, to change there. (Where light bends on one side only, its neighbours do so earlier or
-/// later: without this the derivatives would miss a finite amount.)
+/// The derivatives are those at equal arc length. From a surface on, they are those of the points where rays cross it,
+/// because a ray's direction begins (or ceases) to change there. (If light bends on one side only, neighbouring rays
+/// begin to bend earlier or later. Without this correction the derivatives would lack a finite term.)
 template <int N>
 void Tracer<N>::meet_surface(const Eigen::Vector3d& normal, bool bends) {
   if constexpr (N > 1) {
     const double approach = normal.dot(direction());
-    if (!(std::abs(approach) > 0)) return;  // Light along a surface has no crossing to speak of.
+    if (!(std::abs(approach) > 0)) return;  // Light along a surface does not cross it.
     const State<N> flow = bends ? medium_.derivative(ray_) : State<N>{ray_.V, Eigen::Matrix<double, 3, N>::Zero()};
     for (int i = 1; i < N; ++i) {
       const double later = -normal.dot(ray_.P.col(i)) / approach;
@@ -36,7 +36,7 @@ void Tracer<N>::meet_surface(const Eigen::Vector3d& normal, bool bends) {
   }
 }
 
-/// Leaves the medium as last sampled: the steps are the same, recorded or not.
+/// Does not change `medium_`, so that recorded rays take the same steps as others.
 template <int N>
 void Tracer<N>::record(bool in_field) {
   if (recording_.track) recording_.track->push_back({position(), length_});
@@ -54,7 +54,7 @@ void Tracer<N>::record(bool in_field) {
   recording_.path->push_back(here);
 }
 
-/// In free space, to a surface.
+/// Moves the ray straight to a surface, in free space.
 template <int N>
 void Tracer<N>::go_straight(const Hit& hit) {
   record(false);
@@ -64,7 +64,7 @@ void Tracer<N>::go_straight(const Hit& hit) {
   record(false);
 }
 
-/// In free space, where nothing is met. Behind a cut that is still within the volume.
+/// Ends a ray that meets nothing in free space. Behind a cut, such a ray may still be within the volume.
 template <int N>
 RayEnd Tracer<N>::miss() {
   if (std::isfinite(settings_.max_length)) {
@@ -80,7 +80,7 @@ RayEnd Tracer<N>::miss() {
   return RayEnd::missed;
 }
 
-/// In free space: to an absorber, or to where light enters the volume, if it does. Returns nothing in that case.
+/// Moves the ray, in free space, to the nearest absorber or to its entry into the volume. Returns nothing if it enters.
 template <int N>
 std::optional<RayEnd> Tracer<N>::reach(const std::optional<Hit>& entry) {
   const double free_way = entry ? entry->distance : Geometry::infinite;
@@ -94,8 +94,8 @@ std::optional<RayEnd> Tracer<N>::reach(const std::optional<Hit>& entry) {
   return std::nullopt;
 }
 
-/// Before the volume. Light from very far is rounded to a place beside the face that it meets; it goes on from the
-/// face.
+/// Moves the ray from outside to the volume. Rounding may put light from very far beside the face that it meets; it is
+/// then moved to the face.
 template <int N>
 std::optional<RayEnd> Tracer<N>::reach_box() {
   if (const auto end = reach(geometry_.crossing(Surface::bounds, true, position(), direction()))) return end;
@@ -107,7 +107,7 @@ std::optional<RayEnd> Tracer<N>::reach_box() {
   return std::nullopt;
 }
 
-/// In free space behind the volume, which is convex: straight light does not meet it again.
+/// The volume is convex: straight light that has left it does not meet it again.
 template <int N>
 RayEnd Tracer<N>::leave() {
   const auto hit = geometry_.absorber(position(), direction());
@@ -116,8 +116,8 @@ RayEnd Tracer<N>::leave() {
   return end_on(hit->surface);
 }
 
-/// Within the box, outside of the cut: straight on to the cut, an absorber, or out of the box. Returns nothing when
-/// light enters the cut.
+/// Moves the ray, which is within the box and outside the cut, straight to the cut, to an absorber, or out of the box.
+/// Returns nothing if it enters the cut.
 template <int N>
 std::optional<RayEnd> Tracer<N>::cross_box() {
   const auto exit = geometry_.crossing(Surface::bounds, false, position(), direction());
@@ -125,7 +125,7 @@ std::optional<RayEnd> Tracer<N>::cross_box() {
   return entry ? reach(entry) : leave();
 }
 
-/// In voxels.
+/// The length of an automatic step, in voxels.
 template <int N>
 double Tracer<N>::automatic_step() const {
   const double kick = std::abs(medium_.strength) * deviator_norm(medium_.T) * voxel_;
@@ -134,7 +134,7 @@ double Tracer<N>::automatic_step() const {
   return std::max(step_lengths::strongest_kick / kick, shortest);
 }
 
-/// The nearest thing that the chord from the ray to `next` meets. `hit.distance` is along the chord.
+/// What the chord from the ray to `next` meets first. `hit.distance` is along the chord.
 template <int N>
 typename Tracer<N>::Event Tracer<N>::meet(const State<N>& next, Hit& hit) const {
   const Eigen::Vector3d from = position(), to = next.position();
@@ -148,7 +148,7 @@ typename Tracer<N>::Event Tracer<N>::meet(const State<N>& next, Hit& hit) const 
   Event event = Event::none;
   if (leaves_box) {
     const auto exit = geometry_.crossing(Surface::bounds, false, from, along, length);
-    hit = exit ? *exit : Hit{};  // A chord so short that rounding hides the face leaves at once.
+    hit = exit ? *exit : Hit{};  // If rounding hides the face from a very short chord, the ray leaves at once.
     length = hit.distance;
     event = Event::leaves_box;
   }
@@ -179,7 +179,7 @@ double Tracer<N>::land(const State<N>& next, double h, const Hit& hit) {
   for (int i = 0; i < 4; ++i) {
     landed = step(length, unused);
     const double gap = (to_plane - hit.normal.dot(landed.position() - start)) / hit.normal.dot(landed.direction());
-    if (!(std::abs(gap) <= h)) break;  // Light that grazes the plane.
+    if (!(std::abs(gap) <= h)) break;  // The light is nearly parallel to the plane.
     if (std::abs(gap) <= 1e-10 * h || i == 3) {
       landed.P += gap * landed.V;
       length += gap;
@@ -192,7 +192,7 @@ double Tracer<N>::land(const State<N>& next, double h, const Hit& hit) {
   return length;
 }
 
-/// Sets the next adaptive step from this one's error. @return the error over what is allowed.
+/// Sets the next adaptive step from the error of this one. @return the error divided by the tolerance.
 template <int N>
 double Tracer<N>::control_step(const State<N>& error) {
   using namespace step_lengths;
@@ -205,8 +205,8 @@ double Tracer<N>::control_step(const State<N>& error) {
   return excess;
 }
 
-/// Where nothing in a brick bends light, a step goes through it to a little behind it, world units. (But by Eq. 3–4,
-/// which see the trace of T.)
+/// The length of the next step, world units. If nothing in the brick bends light, the step ends a little beyond the
+/// brick. (Euler's method, Eq. 3–4, does not skip bricks: the trace of T affects it.)
 template <int N>
 double Tracer<N>::next_step() {
   const double way =
@@ -218,7 +218,7 @@ double Tracer<N>::next_step() {
   return voxel_ * (settings_.step == 0 ? automatic_step() : settings_.step);
 }
 
-/// In the field: step by step to an absorber, out of the box or out of the cut. Returns nothing in the last case.
+/// Steps through the field to an absorber, out of the box or out of the cut. Returns nothing if the ray leaves the cut.
 template <int N>
 std::optional<RayEnd> Tracer<N>::bend(double first_step) {
   const RungeKutta* const stages = runge_kutta(settings_.method);

@@ -1,7 +1,7 @@
 #pragma once
 /// @file integrators/bending/scalar_tracer.h
-/// One ray at a time in double precision: the reference for the packets of packet_kernel.h, and what they leave to it.
-/// A part of bending.cpp and packet_tracer.cpp.
+/// Traces one ray at a time in double precision. This is the reference for the packets of packet_kernel.h, and it does
+/// what packets leave to it. A part of trace.cpp and packet_tracer.cpp.
 
 #include <cstdint>
 #include <optional>
@@ -17,13 +17,13 @@ namespace tensorray {
 using bending_steps::RayMedium;
 using bending_steps::State;
 
-/// What is kept of a ray; null: nothing.
+/// Where to record a ray; null: do not record.
 struct Recording {
   PathPoints* path = nullptr;
   Track* track = nullptr;
 };
 
-/// What is kept of a batch.
+/// Where to record a batch; null: do not record.
 struct Recordings {
   std::vector<PathPoints>* paths = nullptr;
   std::vector<Track>* tracks = nullptr;
@@ -32,14 +32,14 @@ struct Recordings {
   explicit operator bool() const { return paths || tracks; }
 };
 
-/// How far a ray has come.
+/// How far a ray has been traced.
 struct Travelled {
-  double length = 0;  // World units.
+  double length = 0;  // Length of the path so far, world units.
   Eigen::RowVector2d length_change = Eigen::RowVector2d::Zero();
   std::uint32_t steps = 0;
 };
 
-/// One ray on its way, alone (N = 1) or with its derivatives along two parameters (N = 3). The volume is the field's
+/// Traces one ray, alone (N = 1) or with its derivatives along two parameters (N = 3). The volume is the field's
 /// extent, a convex box, cut by a mesh of any shape.
 template <int N>
 class Tracer {
@@ -47,26 +47,27 @@ class Tracer {
   Tracer(const TensorField& field, const Geometry& geometry, const BendingSettings& settings)
       : field_(field), geometry_(geometry), settings_(settings), sampler_(field) {}
 
-  /// Follows a ray to its end; `state` says where that is, and `recording` how it came there.
+  /// Follows a ray to its end. Afterwards `state` is the end of the ray, and `recording` holds the points on its path.
   /// @param strength  σ of the ray: see `strength_of`.
   RayEnd trace(const State<N>& start, double strength, const Recording& recording);
 
-  /// Follows a ray to where its way begins to bend, or (if it does not come there) to its end.
+  /// Follows a ray to the point where it begins to bend. Returns nothing there; if the ray ends first, returns why.
   std::optional<RayEnd> approach(const State<N>& start, const Recording& recording);
 
-  /// Takes a ray over that has come to `state`: to be followed where it bends, or, on the face of the box, to leave.
+  /// Continues a ray at `state`. Call `follow` next if it bends there, or `leave` if it is on the face of the box.
   void take_over(const State<N>& state, double strength, const Travelled& travelled, const Recording& recording);
 
-  /// From where its way bends to its end; `first_step` long, world units, is its first step; 0: as long as any.
+  /// Follows the ray from a point in the field to its end. `first_step` is the length of the first step, world units;
+  /// 0: as any other step.
   RayEnd follow(double first_step = 0);
 
-  /// In free space behind the volume, to its end.
+  /// Follows the ray from a face of the volume, through free space, to its end.
   RayEnd leave();
 
-  /// Keeps the point where the ray is, if it is recorded.
+  /// Records the current point, if the ray is recorded.
   void record(bool in_field);
 
-  /// The Frobenius norm of the deviator of T here.
+  /// The Frobenius norm of the deviator of T at the current point.
   double deviator_here();
 
   const State<N>& state() const { return ray_; }
@@ -74,7 +75,7 @@ class Tracer {
   std::uint64_t samples() const { return sampler_.samples(); }
 
  private:
-  /// What light meets next; `none` while it travels freely.
+  /// What a step meets; `none`: nothing.
   enum class Event { none, absorber, leaves_box, leaves_cut };
 
   std::optional<RayEnd> reach(const std::optional<Hit>& entry);
@@ -105,19 +106,19 @@ class Tracer {
   RayMedium<N> medium_{sampler_, 0};
   State<N> ray_;
   Recording recording_;
-  double length_ = 0;                 // Of the way so far, world units.
-  Eigen::RowVector2d length_change_;  // Its derivatives.
+  double length_ = 0;                 // Length of the path so far, world units.
+  Eigen::RowVector2d length_change_;  // Derivatives of length_.
   double voxel_ = 0;                  // Length of a voxel along the ray, world units.
-  double adaptive_step_ = 0;          // What the error control asks for next, in voxels.
+  double adaptive_step_ = 0;          // The next step by the error control, in voxels.
   std::uint32_t steps_ = 0;
 };
 
-/// σ = s · scale: what ray i of a batch is bent by. Only here does the field's scale come in.
+/// σ = s · scale of ray i of a batch. Only this function uses the field's scale.
 inline double strength_of(const RayBatch& batch, std::size_t i, const BendingSettings& settings) {
   return batch.flexibility[i] * settings.scale;
 }
 
-/// A ray of a batch as it starts; N = 3 if the batch has differentials.
+/// The start of a ray of a batch; N = 3 if the batch has differentials.
 template <int N>
 State<N> start_of(const RayBatch& batch, std::size_t i) {
   State<N> start;
@@ -130,7 +131,7 @@ State<N> start_of(const RayBatch& batch, std::size_t i) {
   return start;
 }
 
-/// Writes where the tracer's ray has come to.
+/// Writes the end of the tracer's ray to the batch.
 template <int N>
 void set_end(RayBatch& batch, std::size_t i, RayEnd end, const Tracer<N>& tracer) {
   const Travelled travelled = tracer.travelled();

@@ -16,7 +16,7 @@
 namespace tensorray {
 namespace {
 
-/// Everything that the threads share and do not change.
+/// What the threads share and do not change.
 struct LensJob {
   const LensMap& map;
   const std::vector<LightChannel>& channels;
@@ -24,18 +24,18 @@ struct LensJob {
   const LensImage& image;
   const LensSettings& settings;
   const Progress& progress;
-  std::vector<double> flexibilities{};  // As the map's light has them.
+  std::vector<double> flexibilities{};  // Of the map's light: with opposite sign for `gather`.
 
-  /// From pixels of the receiver to where straight light sees the image's plane.
+  /// From pixels of the receiver to the point of the image's plane that straight light shows there.
   Eigen::Affine2d straight = Eigen::Affine2d::Identity();
 };
 
-/// Where the position (in pixels) of the receiver lies in its plane.
+/// Coordinates, in the receiver's plane, of a position in pixels.
 Eigen::Vector2d receiver_point(const LensJob& job, const Eigen::Vector2d& pixel) {
   return plane_coordinates(job.receiver, job.receiver.to_world(pixel));
 }
 
-/// The positions of a pixel's samples, in pixels.
+/// Positions of a pixel's samples, in pixels.
 std::vector<Eigen::Vector2d> sample_points(const LensJob& job, int x, int y) {
   std::vector<Eigen::Vector2d> points;
   const int n = job.settings.samples;
@@ -48,7 +48,7 @@ Eigen::Vector2d texture_coordinates(const LensJob& job, const Eigen::Vector2d& a
   return (at.array() / job.image.plane.size.array() + 0.5).matrix();
 }
 
-/// Changes of (s, t) per pixel along x and y, from ∂image/∂receiver.
+/// Change of (s, t) per pixel along x and y, from ∂image/∂receiver.
 Eigen::Matrix2d per_pixel(const LensJob& job, const Eigen::Matrix2d& image_by_receiver) {
   const Eigen::Vector2d pixel = job.receiver.pixel_size();
   return job.image.plane.size.cwiseInverse().asDiagonal() * image_by_receiver *
@@ -84,7 +84,7 @@ Eigen::Vector2d log_singular_values(const Eigen::Matrix2d& m) {
   return {std::log(greater), std::log(std::abs(m.determinant())) - std::log(greater)};
 }
 
-/// What a position (in pixels) of the receiver sees that shows the image's plane at `at`.
+/// The LensPoint of a position (in pixels) of the receiver that shows the point `at` of the image's plane.
 /// @param log_stretch  ln σ₁ >= ln σ₂ of ∂receiver/∂image.
 LensPoint make_point(const LensJob& job, const Eigen::Vector2d& pixel, const Eigen::Vector2d& at,
                      const Eigen::Matrix2d& image_by_receiver, const Eigen::Vector2d& log_stretch, double length) {
@@ -103,7 +103,7 @@ void count_ends(const std::vector<LensLanding>& landings, std::size_t channels, 
   for (std::size_t i = 0; i < landings.size(); ++i) ++ends[i % channels][static_cast<int>(landings[i].end)];
 }
 
-/// What the pixels of one row gathered.
+/// Counts of one row of pixels.
 struct GatheredRow {
   TraceCounts counts;
   std::vector<EndCounts> ends;
@@ -150,7 +150,8 @@ void gather_row(const LensJob& job, int y, LensPicture& picture, std::vector<Len
   }
 }
 
-/// Calls `work(y)` for each row of the picture on all threads, and `tell(y)` now and then on this one.
+/// Calls `work(y)` for each row of the picture on all threads. Between groups of rows it calls `tell(y)` on the calling
+/// thread.
 template <class Tell, class Work>
 void for_rows(const LensJob& job, const Tell& tell, const Work& work) {
   const int height = job.receiver.resolution.y(), rows_at_once = 8 * tbb::this_task_arena::max_concurrency();
@@ -163,7 +164,8 @@ void for_rows(const LensJob& job, const Tell& tell, const Work& work) {
   }
 }
 
-/// How many places of the picture show what each pixel sees: the sheets of the picture, folded onto the image.
+/// Counts the places of the picture that show what each pixel sees. The map from the picture to the image, as a mesh,
+/// may fold; each sheet is one place.
 void count_places(const LensJob& job, std::vector<LensLanding> references, LensPicture& picture) {
   const Eigen::Vector2i size = job.receiver.resolution;
   std::vector<Eigen::Vector2d> starts;
@@ -179,7 +181,7 @@ void count_places(const LensJob& job, std::vector<LensLanding> references, LensP
     for (std::size_t i = y * width; i < (y + 1) * width; ++i) {
       if (mesh.landings[i].end != RayEnd::plate) continue;
       search.find(mesh.landings[i].at, sheets);
-      picture.points[i].folds = std::max(1, static_cast<int>(sheets.size()));  // The pixel itself, if none else.
+      picture.points[i].folds = std::max(1, static_cast<int>(sheets.size()));  // At least the pixel itself.
     }
   });
 }
@@ -198,7 +200,7 @@ void gather(const LensJob& job, LensPicture& picture) {
   count_places(job, std::move(references), picture);
 }
 
-/// The sheet whose start is nearest to that of straight light; of equal ones the first.
+/// The sheet whose start is nearest to that of straight light; of equally near ones, the first.
 Sheet nearest_sheet(const std::vector<Sheet>& sheets, const Eigen::Vector2d& straight) {
   return *std::min_element(sheets.begin(), sheets.end(), [&](const Sheet& a, const Sheet& b) {
     return (a.start - straight).squaredNorm() < (b.start - straight).squaredNorm();
@@ -230,7 +232,8 @@ void scatter_row(const LensJob& job, int y, std::size_t channel, const SheetSear
   }
 }
 
-/// The part of the image whose light may arrive: what is before the volume, and what straight light shows.
+/// The part of the image whose light may reach the receiver: the part in front of the volume, and the part that
+/// straight light shows.
 Eigen::AlignedBox2d useful_starts(const LensJob& job, const TriangleMesh& volume, const Eigen::Vector3d& direction) {
   const Plate& plane = job.image.plane;
   Eigen::AlignedBox2d useful;
@@ -247,7 +250,7 @@ Eigen::AlignedBox2d useful_starts(const LensJob& job, const TriangleMesh& volume
   return part.isEmpty() ? image : part;
 }
 
-/// The rotation next to how straight light takes directions in the image's plane to the receiver's.
+/// The rotation that is nearest to the map of directions, by straight light, from the image's plane to the receiver's.
 Eigen::Matrix2d straight_turn(const LensJob& job) {
   const Eigen::Vector2d pixel = job.receiver.pixel_size();
   const Eigen::Matrix2d image_by_receiver =
@@ -256,7 +259,7 @@ Eigen::Matrix2d straight_turn(const LensJob& job) {
   return svd.matrixV() * svd.matrixU().transpose();
 }
 
-/// Looks up what the mesh shows, row by row.
+/// Adds to the picture what the mesh shows, row by row.
 void scatter_rows(const LensJob& job, std::size_t channel, const LensMesh& mesh, const MeshReport& report,
                   LensPicture& picture) {
   const SheetSearch search(mesh, job.receiver.pixel_size().minCoeff());
@@ -270,7 +273,8 @@ void scatter(const LensJob& job, const TriangleMesh& volume, const Eigen::Vector
   settings.target = job.receiver.size;
   settings.pixel = job.receiver.pixel_size();
   settings.turn = straight_turn(job);
-  constexpr std::uint64_t parts = 1000;  // Of a channel: half for its mesh, and half for the picture's rows.
+  // Progress steps of a channel: half for its mesh, and half for the rows of the picture.
+  constexpr std::uint64_t parts = 1000;
   for (std::size_t channel = 0; channel < job.channels.size(); ++channel) {
     const auto tell = [&](double part) {
       job.progress.update("tracing rays", channel * parts + static_cast<std::uint64_t>(part * parts),
@@ -284,7 +288,7 @@ void scatter(const LensJob& job, const TriangleMesh& volume, const Eigen::Vector
   }
 }
 
-/// From pixels of the receiver, along the light, to coordinates in the image's plane.
+/// Maps pixels of the receiver along the light to coordinates in the image's plane.
 Eigen::Affine2d straight_map(const Plate& receiver, const Plate& image, const Eigen::Vector3d& direction) {
   const auto seen = [&](const Eigen::Vector2d& pixel) {
     const Eigen::Vector3d point = receiver.to_world(pixel), normal = image.normal();
@@ -317,10 +321,10 @@ LensPicture simulate_lens(const TensorField& field, const Surfaces& surfaces, co
   check(channels, image, settings);
   const auto start = std::chrono::steady_clock::now();
   const bool gathers = settings.mode == LensMode::gather;
-  // Light retraced from its end obeys the rule with the opposite sign.
+  // Light that is traced back from its end obeys the rule with the opposite sign of s.
   const LensMap map = gathers ? LensMap(field, surfaces, bending, receiver, image.plane, -direction)
                               : LensMap(field, surfaces, bending, image.plane, receiver, direction);
-  LensJob job{map, channels, receiver, image, settings, progress};  // Each has a type of its own.
+  LensJob job{map, channels, receiver, image, settings, progress};  // Each has a different type.
   job.straight = straight_map(receiver, image.plane, direction);
   for (const LightChannel& channel : channels)
     job.flexibilities.push_back(gathers ? -channel.flexibility : channel.flexibility);

@@ -6,11 +6,11 @@
 namespace tensorray {
 namespace {
 
-constexpr double reach = 100;    // Of the planes, in sizes of the volume.
-constexpr double behind = 1e-5;  // Of the plane that stops light behind its start, in sizes of the volume: light that
-                                 // starts on a surface would meet it at once.
+constexpr double reach = 100;    // Size of the planes, in sizes of the volume.
+constexpr double behind = 1e-5;  // Distance, in sizes of the volume, from the start back to the plane that stops light.
+                                 // Without it, light that starts on a surface would meet that surface at once.
 
-/// Whether a part of the volume lies behind a plane, which looks along `normal`.
+/// Whether a part of the volume lies behind a plane that faces along `normal`.
 bool is_cut(const TriangleMesh& volume, const Plate& plane, const Eigen::Vector3d& normal, double size) {
   return std::any_of(volume.vertices.begin(), volume.vertices.end(),
                      [&](const Eigen::Vector3d& vertex) { return normal.dot(vertex - plane.center) < -behind * size; });
@@ -21,8 +21,8 @@ Plate enlarged(Plate plate, double size) {
   return plate;
 }
 
-/// Embree's surfaces: the plane where light lands is the plate, the one where it starts an obstacle if it cuts the
-/// volume. (Light does not return to one outside: it has left the volume for good.)
+/// The plane where light lands becomes the plate. The plane where it starts becomes an obstacle if it cuts the volume.
+/// (Light does not return to a plane outside the volume: light that has left the volume goes straight.)
 Geometry make_geometry(const Surfaces& surfaces, const Plate& from, const Plate& to, const Eigen::Vector3d& direction) {
   const double size = surfaces.bounds.bounds().diagonal().norm();
   Surfaces all = surfaces;

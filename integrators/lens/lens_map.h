@@ -1,6 +1,7 @@
 #pragma once
 /// @file integrators/lens/lens_map.h
-/// Parallel light from one plane to another through a tensor field: where it lands, and how that changes across it.
+/// Parallel light from one plane to another through a tensor field: where each ray lands, and how the landing changes
+/// with the start.
 
 #include <cstdint>
 #include <vector>
@@ -11,15 +12,15 @@
 
 namespace tensorray {
 
-/// Where one ray landed. Coordinates in a plane are along its plate's right and up, from its centre, world units.
+/// The landing of one ray. Coordinates in a plane are along its plate's right and up, from its centre, world units.
 struct LensLanding {
-  RayEnd end = RayEnd::missed;                             ///< `plate`: it landed.
-  Eigen::Vector2d at = Eigen::Vector2d::Zero();            ///< If it landed.
-  Eigen::Matrix2d jacobian = Eigen::Matrix2d::Identity();  ///< Of `at` by the start; if it landed.
-  double length = 0;                                       ///< Of the way, world units.
+  RayEnd end = RayEnd::missed;                             ///< `plate`: the ray landed.
+  Eigen::Vector2d at = Eigen::Vector2d::Zero();            ///< Coordinates of the landing, if the ray landed.
+  Eigen::Matrix2d jacobian = Eigen::Matrix2d::Identity();  ///< ∂at/∂start, if the ray landed.
+  double length = 0;                                       ///< Length of the ray, world units.
 };
 
-/// What tracing took.
+/// Cost of tracing.
 struct TraceCounts {
   std::uint64_t ray_steps = 0, tensor_samples = 0;
 
@@ -30,14 +31,14 @@ struct TraceCounts {
   }
 };
 
-/// A map from the plane of `from` to that of `to`, a function of the start and the flexibility. Light beyond both
-/// planes is not followed: they stand for an image and a receiver, both opaque, and cut the volume where they are
-/// within it. Both planes reach farther than their plates: to 100 times the volume's size. Immutable; any number of
-/// threads may trace at once.
+/// A map from the plane of `from` to the plane of `to`; a function of the start and the flexibility. The planes stand
+/// for an image and a receiver. Both are opaque: light is not followed beyond them, and a plane within the volume cuts
+/// it. Both planes extend beyond their plates, to 100 times the volume's size. Immutable; any number of threads may
+/// trace at once.
 class LensMap {
  public:
-  /// @param surfaces   Bounds, cut and obstacles; its plate plays no part.
-  /// @param direction  Of the light, unit, from one plane to the other.
+  /// @param surfaces   Bounds, cut and obstacles; its plate is not used.
+  /// @param direction  Direction of the light, unit, from one plane to the other.
   /// `field` must outlive the map.
   /// @throw std::runtime_error if Embree fails.
   LensMap(const TensorField& field, const Surfaces& surfaces, const BendingSettings& bending, const Plate& from,
@@ -46,8 +47,8 @@ class LensMap {
   const Plate& from() const { return from_; }
   const Plate& to() const { return to_; }
 
-  /// Follows a ray for each of `starts` and each of `flexibilities`, those of one start next to each other, and writes
-  /// starts.size() · flexibilities.size() landings. @return what it took.
+  /// Follows a ray for each of `starts` and each of `flexibilities` and writes starts.size() · flexibilities.size()
+  /// landings. The landings of one start are next to each other. @return the cost.
   TraceCounts trace(const std::vector<Eigen::Vector2d>& starts, const std::vector<double>& flexibilities,
                     LensLanding* landings) const;
 
@@ -59,7 +60,7 @@ class LensMap {
   Geometry geometry_;
 };
 
-/// The point of a plate's plane with the given coordinates, and the other way round.
+/// The world point with the given coordinates in a plate's plane, and the inverse.
 Eigen::Vector3d plane_point(const Plate& plate, const Eigen::Vector2d& at);
 Eigen::Vector2d plane_coordinates(const Plate& plate, const Eigen::Vector3d& point);
 

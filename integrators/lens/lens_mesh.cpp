@@ -13,24 +13,24 @@
 namespace tensorray {
 namespace {
 
-constexpr double cell_pixels = 4;              // Of the first lattice.
-constexpr double most_cells = 4096;            // ... along either side, however large the image is,
-constexpr double most_skew = 4;                // and for each cell of that many pixels, where pixels lie askew.
-constexpr double short_pixels = 1.0 / 4;       // Edges shorter than this, in starts and landings, are not halved ...
-constexpr double shortest_pixels = 1.0 / 16;   // ... nor those shorter than this in the starts.
-constexpr std::size_t most_starts = 1u << 14;  // No edge is halved beyond so many starts ...
-constexpr double starts_per_pixel = 4;         // ... and so many for each pixel: a chaotic field would need them all.
-constexpr double bend_pixels = 0.1;            // How far the landings may lie beside an edge.
-constexpr double gap_pixels = 1;               // How far an edge's length may be off what the Jacobians explain.
-constexpr double torn_fraction = 0.5;          // ... and beyond which part of the edge's length it is torn.
+constexpr double cell_pixels = 4;              // Size of a cell of the first lattice.
+constexpr double most_cells = 4096;            // Limit of cells along each side, for any image.
+constexpr double most_skew = 4;                // Limit of cells for each cell_pixels² pixels, where pixels are skewed.
+constexpr double short_pixels = 1.0 / 4;       // Edges shorter than this in starts and landings are not halved.
+constexpr double shortest_pixels = 1.0 / 16;   // Edges shorter than this in the starts are not halved.
+constexpr std::size_t most_starts = 1u << 14;  // No edge is halved beyond so many more starts,
+constexpr double starts_per_pixel = 4;         // plus so many for each pixel. A chaotic field could need any number.
+constexpr double bend_pixels = 0.1;            // Greatest distance of landings from an edge.
+constexpr double gap_pixels = 1;               // Greatest distance of landings that the Jacobians do not explain.
+constexpr double torn_fraction = 0.5;          // Beyond this part of an edge's length, it is a tear.
 
 using Triangle = std::array<std::uint32_t, 3>;
 
-/// Measures lengths so that pixels are squares: they are as the smaller side of a pixel has them.
+/// Measures lengths so that pixels are square: in units of which a pixel's smaller side has `pixel`.
 struct PixelMetric {
-  double pixel = 1;                                      // The smaller side, world units.
-  Eigen::Matrix2d starts = Eigen::Matrix2d::Identity();  // From directions in the plane of starts,
-  Eigen::Vector2d landings = Eigen::Vector2d(1, 1);      // and factors on those in the plane of landings.
+  double pixel = 1;                                      // The smaller side of a pixel, world units.
+  Eigen::Matrix2d starts = Eigen::Matrix2d::Identity();  // Maps directions in the plane of starts.
+  Eigen::Vector2d landings = Eigen::Vector2d(1, 1);      // Factors on directions in the plane of landings.
 
   Eigen::Vector2d of_landings(const Eigen::Vector2d& along) const { return landings.cwiseProduct(along); }
 };
@@ -39,13 +39,13 @@ PixelMetric metric_of(const LensMeshSettings& settings) {
   PixelMetric metric;
   metric.pixel = settings.pixel.minCoeff();
   metric.landings = metric.pixel * settings.pixel.cwiseInverse();
-  // Square pixels have the same lengths however they are turned.
+  // Lengths in square pixels do not depend on the rotation.
   if (settings.pixel.x() != settings.pixel.y()) metric.starts = metric.landings.asDiagonal() * settings.turn;
   return metric;
 }
 
-/// Cells of the first lattice. Where pixels lie askew to it, cells as short as a pixel's shorter side both ways would
-/// be many more than pixels: those are larger, and refined where needed.
+/// Number of cells of the first lattice. If pixels are skewed against the lattice, cells as short as a pixel's shorter
+/// side would be many more than pixels. Then cells are larger, and are refined where needed.
 Eigen::Array2i lattice_cells(const LensMeshSettings& settings, const PixelMetric& metric) {
   const Eigen::Vector2d lengths = metric.starts.colwise().norm();
   const double skew = lengths.prod() / std::abs(metric.starts.determinant());
@@ -54,20 +54,20 @@ Eigen::Array2i lattice_cells(const LensMeshSettings& settings, const PixelMetric
   return cells.ceil().max(1).min(most_cells).cast<int>();
 }
 
-/// What there is of a mesh, as it is refined.
+/// State of the refinement of a mesh.
 struct MeshWork {
   const LensMap& map;
   double flexibility;
   const Progress& progress;
   const MeshReport& report;
-  int rounds = 0;  // Of refinement, so far: nobody knows how many there will be.
+  int rounds = 0;  // Rounds of refinement so far; their total is not known.
 
   void tell(double part_of_round) const {
     if (report) report(1 - std::exp2(-(rounds + part_of_round)));
   }
 };
 
-/// Follows the rays of `mesh` that have no landing yet.
+/// Traces the rays of `mesh` that have no landing yet.
 void trace_new(MeshWork& work, LensMesh& mesh, TraceCounts& counts) {
   constexpr std::size_t task_size = 64;
   const std::size_t tasks_at_once = 64 * static_cast<std::size_t>(tbb::this_task_arena::max_concurrency());
@@ -98,7 +98,7 @@ Edge judge(const LensLanding& a, const LensLanding& b, const Eigen::Vector2d& al
   const double pixel = metric.pixel, length = metric.of_landings(edge).norm();
   const double gap = metric.of_landings(edge - (a.jacobian + b.jacobian) / 2 * along).norm();
   if (!(gap <= std::max(gap_pixels * pixel, torn_fraction * length))) return Edge::torn;
-  // The middle of the cubic that has these ends and slopes.
+  // Offset of the middle of the cubic that has these ends and slopes.
   const double bend = metric.of_landings((a.jacobian - b.jacobian) * along / 8).norm();
   return bend > bend_pixels * pixel || gap > gap_pixels * pixel ? Edge::coarse : Edge::fine;
 }
@@ -107,8 +107,8 @@ Edge judge(const LensMesh& mesh, std::uint32_t a, std::uint32_t b, const PixelMe
   return judge(mesh.landings[a], mesh.landings[b], mesh.starts[b] - mesh.starts[a], metric);
 }
 
-/// Halves edges, round by round. With an edge of a triangle its longest one is halved, too, which keeps triangles from
-/// becoming needles (Rivara 1984).
+/// Halves edges, round by round. If an edge of a triangle is halved, its longest edge is halved too, so that triangles
+/// do not become needles (Rivara 1984).
 class Refinement {
  public:
   Refinement(LensMesh& mesh, std::vector<Triangle>& triangles, const LensMeshSettings& settings,
@@ -118,7 +118,7 @@ class Refinement {
                    static_cast<std::size_t>(starts_per_pixel * settings.target.prod() / settings.pixel.prod());
   }
 
-  /// Halves each edge that needs it once. @return false if none did. New starts have no landings yet.
+  /// Halves once each edge that needs it. @return false if there was none. New starts have no landings yet.
   bool halve() {
     if (mesh_.starts.size() > most_starts_) return false;
     number_edges();
@@ -139,10 +139,10 @@ class Refinement {
   }
 
  private:
-  // What middles_ holds where there is no vertex: the edge stays whole, or is to be halved.
+  // Values of middles_ without a vertex: the edge stays whole, or is to be halved.
   static constexpr std::uint32_t none = 0xffffffffu, unset = 0xfffffffeu;
 
-  /// Edges by the order of their vertices: from both sides an edge has one number.
+  /// Numbers the edges in the order of their vertices. Both triangles of an edge get the same number.
   void number_edges() {
     if (progress_.cancelled) throw Cancelled();
     using Side = std::tuple<std::uint32_t, std::uint32_t, std::uint32_t>;  // The two vertices; 3 · triangle + side.
@@ -161,7 +161,7 @@ class Refinement {
     middles_.assign(edges_.size(), none);
   }
 
-  /// The number of the triangle's longest edge; of equal ones the first.
+  /// The number of the triangle's longest edge; of equally long ones, the first.
   std::uint32_t longest_edge(std::size_t triangle) const {
     const auto length = [&](int i) {
       const auto [a, b] = edges_[edges_of_[triangle][i]];
@@ -173,7 +173,7 @@ class Refinement {
     return edges_of_[triangle][longest];
   }
 
-  /// @return whether an edge was marked.
+  /// Marks the longest edge of each triangle that has a marked edge. @return whether any edge was newly marked.
   bool mark_longest() {
     if (progress_.cancelled) throw Cancelled();
     bool changed = false;
@@ -199,7 +199,7 @@ class Refinement {
     return judge(mesh_, a, b, metric_) != Edge::fine;
   }
 
-  /// In the starts, and as far as the ends that landed know it in the landings.
+  /// Whether the edge is short in the starts and, for the ends that landed, in the landings.
   bool is_short(std::uint32_t a, std::uint32_t b) const {
     const Eigen::Vector2d along = mesh_.starts[b] - mesh_.starts[a];
     double length = (metric_.starts * along).norm();
@@ -210,7 +210,7 @@ class Refinement {
     return length < short_pixels * metric_.pixel;
   }
 
-  /// The vertex in the middle of an edge, the same from both sides; `none` if it stays whole.
+  /// The vertex in the middle of an edge, the same for both triangles; `none` if the edge stays whole.
   std::uint32_t middle_of(std::uint32_t edge) {
     std::uint32_t& middle = middles_[edge];
     if (middle == unset) {
@@ -222,7 +222,7 @@ class Refinement {
 
   void divide(Triangle corner, Triangle middle, std::vector<Triangle>& into) const {
     const auto count = std::count_if(middle.begin(), middle.end(), [](std::uint32_t each) { return each != none; });
-    // Turned so that the first edge, or the first two, are the halved ones.
+    // Rotates the triangle so that the first edge, or the first two, are the halved ones.
     while ((count == 1 && middle[0] == none) || (count == 2 && middle[2] != none)) {
       std::rotate(corner.begin(), corner.begin() + 1, corner.end());
       std::rotate(middle.begin(), middle.begin() + 1, middle.end());
@@ -250,9 +250,9 @@ class Refinement {
   const PixelMetric metric_;
   const Progress& progress_;
   std::size_t most_starts_;
-  std::vector<std::pair<std::uint32_t, std::uint32_t>> edges_;  // Their vertices, the lesser first.
-  std::vector<std::array<std::uint32_t, 3>> edges_of_;          // Of each triangle; i joins its corners i and i + 1.
-  std::vector<std::uint32_t> middles_;                          // Of each edge.
+  std::vector<std::pair<std::uint32_t, std::uint32_t>> edges_;  // Vertices of each edge, the lesser first.
+  std::vector<std::array<std::uint32_t, 3>> edges_of_;  // Edges of each triangle; edge i joins its corners i and i + 1.
+  std::vector<std::uint32_t> middles_;                  // Middle vertex of each edge, none or unset.
 };
 
 std::vector<Triangle> lattice_triangles(int columns, int rows) {
@@ -266,7 +266,7 @@ std::vector<Triangle> lattice_triangles(int columns, int rows) {
   return triangles;
 }
 
-/// Keeps what light covers: triangles whose rays all landed, next to each other.
+/// Makes the final triangles: those whose three rays landed and whose edges are not torn.
 void finish(LensMesh& mesh, const std::vector<Triangle>& triangles, const PixelMetric& metric) {
   for (const LensLanding& landing : mesh.landings) mesh.mesh.vertices.push_back(landing.at);
   for (const Triangle& triangle : triangles) {

@@ -1,5 +1,5 @@
 /// @file integrators/packets/packet_bending-inl.h
-/// The kick of a step: exp(s h T) V, normalised. A part of packet_kernel.cpp.
+/// The kick of a step: exp(σ h T) V, normalised. A part of packet_kernel.cpp.
 
 // Included once for each instruction set: see Highway's foreach_target.h.
 #if defined(TENSORRAY_INTEGRATORS_PACKET_BENDING_TOGGLE) == defined(HWY_TARGET_TOGGLE)
@@ -16,7 +16,7 @@
 HWY_BEFORE_NAMESPACE();
 namespace tensorray::packets::HWY_NAMESPACE {
 
-/// 1 / √(1 + excess) for an excess below 0.006, to 7e-8: less than rounding, and corrected in the next step.
+/// 1 / √(1 + excess) for an excess below 0.006, to 7e-8: this error is below rounding, and the next step corrects it.
 HWY_INLINE F inverse_root_near_one(F excess) {
   return hn::MulAdd(hn::MulAdd(set(3.0f / 8), excess, set(-0.5f)), excess, set(1));
 }
@@ -24,19 +24,21 @@ HWY_INLINE F inverse_root_near_one(F excess) {
 /// |v|² − 1.
 HWY_INLINE F excess(const F3& v) { return hn::MulAdd(v.x, v.x, hn::MulAdd(v.y, v.y, hn::MulAdd(v.z, v.z, set(-1)))); }
 
-/// Two terms of exp(factor · T) v.
+/// exp(factor · T) v by two terms of the series; `inner` holds the further terms.
 HWY_INLINE F3 two_terms(const Tensor& T, const F3& v, const F3& inner, F factor) {
   const F3 half = mul_add(hn::Mul(set(0.5f), factor), apply(T, inner), v);
   return mul_add(factor, apply(T, half), v);
 }
 
-/// exp(factor · T) V, normalised, where ‖factor · T‖ is small in all lanes: two terms, and the square root as a series.
+/// exp(factor · T) V, normalised, where ‖factor · T‖ is small in all lanes: two terms of the series, and the square
+/// root as a series.
 HWY_INLINE F3 bend_weakly(const Tensor& T, const F3& v, F factor) {
   const F3 sum = two_terms(T, v, v, factor);
   return mul(inverse_root_near_one(excess(sum)), sum);
 }
 
-/// The Frobenius norm of the deviator of factor · T. T itself may be too large, or too small, for its square.
+/// The Frobenius norm of the deviator of factor · T. The factor comes first, because T itself may be too large, or too
+/// small, for its square.
 HWY_INLINE F deviator_norm(const Tensor& T, F factor) {
   F squares = hn::Zero(floats);
   for (int i = 0; i < 8; ++i) {
@@ -45,17 +47,17 @@ HWY_INLINE F deviator_norm(const Tensor& T, F factor) {
   }
   const F trace = hn::Mul(factor, hn::Add(T.c[0], T.c[4]));
   const F deviator = hn::Max(hn::NegMulAdd(hn::Mul(trace, trace), set(1.0f / 3), squares), hn::Zero(floats));
-  return hn::Sqrt(hn::IfThenElse(hn::Le(squares, set(1e38f)), deviator, squares));  // Infinity stays what it is.
+  return hn::Sqrt(hn::IfThenElse(hn::Le(squares, set(1e38f)), deviator, squares));  // Infinity stays infinite.
 }
 
-/// Keeps s times the norm of T's deviator, where steps may have to be shorter for it.
+/// Stores |kick| times the norm of T's deviator where it may make steps shorter.
 HWY_INLINE void keep_bending_rate(Packet& packet, const Tensor& T, int at) {
   if (packet.greatest_reach <= strongest_kick) return;
   store(deviator_norm(T, load(packet.kick, at)), packet.bending_rate, at);
 }
 
-/// The same for any strength, stored: as a value it would take a way through memory, in halves of vectors, that stalls.
-/// Which lane is computed how depends on that lane alone.
+/// exp(factor · T) V, normalised, for any strength. The result is stored: a returned value would pass through memory in
+/// halves of vectors, which stalls the processor. How a lane is computed depends on that lane alone.
 /// @param to  The packet's next directions; its present ones only if the field is weak in all lanes' bricks.
 template <bool differentials>
 HWY_INLINE void bend_strongly(Packet& packet, const Tensor& T, const F3& v, F factor, int at, PerRay (&to)[3]) {
@@ -79,7 +81,7 @@ HWY_INLINE void bend_strongly(Packet& packet, const Tensor& T, const F3& v, F fa
   const F exact = hn::Div(set(1), hn::Sqrt(hn::Add(e, set(1))));
   const Mask weak = hn::Le(size, set(series_reach[0])), fits = hn::Le(size, set(1));
   const F scale = hn::IfThenElse(weak, inverse_root_near_one(e), exact);
-  // Rays with differentials stop where no series fits.
+  // Rays with differentials stop where no series is exact enough.
   store(mul(differentials ? hn::IfThenElseZero(fits, scale) : scale, sum), to, at);
   if (!differentials && HWY_UNLIKELY(!hn::AllTrue(floats, fits)))
     bend_in_double(packet, to_bits(hn::Not(fits), at), to);

@@ -1,5 +1,5 @@
 /// @file integrators/packets/packet_bricks-inl.h
-/// The bricks that a packet's lanes are in. A part of packet_kernel.cpp.
+/// The bricks of a packet's lanes. A part of packet_kernel.cpp.
 
 // Included once for each instruction set: see Highway's foreach_target.h.
 #if defined(TENSORRAY_INTEGRATORS_PACKET_BRICKS_TOGGLE) == defined(HWY_TARGET_TOGGLE)
@@ -16,7 +16,7 @@
 HWY_BEFORE_NAMESPACE();
 namespace tensorray::packets::HWY_NAMESPACE {
 
-/// Finds the bricks of some lanes, given as bits.
+/// Finds the bricks of some lanes. `wanted` has one bit for each lane.
 HWY_INLINE void find_bricks(const PacketMedium& medium, Packet& packet, std::uint32_t wanted) {
   while (wanted != 0) {
     const auto first = hwy::Num0BitsBelowLS1Bit_Nonzero32(wanted);
@@ -39,12 +39,12 @@ HWY_INLINE void find_bricks(const PacketMedium& medium, Packet& packet, std::uin
   }
 }
 
-/// Sets what follows from how strong the lanes' bricks are.
+/// Sets the values that depend on the strength of the lanes' bricks.
 template <bool uniform>
 HWY_INLINE void find_reach(const PacketMedium& medium, Packet& packet) {
   const F most = set(1e30f);
   const F longest = set(medium.longest_step * (uniform ? 1.0f : medium.longest_voxel));
-  const bool euler = medium.settings.method == BendingMethod::euler;  // It sees the trace of T, which has no bound.
+  const bool euler = medium.settings.method == BendingMethod::euler;  // The trace of T, which has no bound, affects it.
   F greatest = hn::Zero(floats);
   packet.straight = false;
   for (int i = 0; i < packet.vectors * lanes; i += lanes) {
@@ -54,7 +54,7 @@ HWY_INLINE void find_reach(const PacketMedium& medium, Packet& packet) {
     store(reach, packet.reach, i);
     const Mask long_steps = hn::Le(reach, set(strongest_kick));
     store(hn::IfThenZeroElse(long_steps, load(packet.bending_rate, i)), packet.bending_rate, i);
-    greatest = hn::Max(greatest, hn::IfThenElse(hn::Le(reach, most), reach, most));  // NaN is strong.
+    greatest = hn::Max(greatest, hn::IfThenElse(hn::Le(reach, most), reach, most));  // NaN counts as strong.
     packet.straight |= !euler && !hn::AllFalse(floats, hn::Eq(strongest, hn::Zero(floats)));
   }
   packet.greatest_reach = hn::GetLane(hn::MaxOfLanes(floats, greatest));
@@ -63,11 +63,11 @@ HWY_INLINE void find_reach(const PacketMedium& medium, Packet& packet) {
   packet.timed = packet.timed && !packet.varied;
 }
 
-/// Sets what follows from the lanes' bricks.
+/// Sets the values that depend on the lanes' bricks.
 template <bool uniform>
 HWY_INLINE void summarize(const PacketMedium& medium, Packet& packet) {
   find_reach<uniform>(medium, packet);
-  // A step may begin a little outside of its brick.
+  // A step may begin a little outside its brick.
   const F near = set(-medium.longest_step - 1), far = set(TensorBrick::cells + medium.longest_step + 1);
   Mask border = hn::Lt(near, near), apart = border;
   for (int i = 0; i < packet.vectors * lanes; i += lanes)
@@ -88,7 +88,7 @@ HWY_INLINE void summarize(const PacketMedium& medium, Packet& packet) {
       packet.near_border || packet.near_surface || medium.bounded || !(packet.greatest_reach <= strongest_kick);
 }
 
-/// After lanes have been set: what follows from their rays.
+/// Sets the values that depend on the rays of the lanes. Call it after lanes have been set.
 template <bool uniform>
 void begin(const PacketMedium& medium, Packet& packet) {
   for (int i = 0; i < packet.vectors * lanes; i += lanes)
@@ -105,8 +105,8 @@ void begin(const PacketMedium& medium, Packet& packet) {
   summarize<uniform>(medium, packet);
 }
 
-/// Takes the lanes whose point has left their brick to the point's. `point(i)` gives those of the vector at lane i,
-/// from the lanes' bricks.
+/// Moves the lanes whose point is outside their brick to the brick of the point. `point(i)` gives the points of the
+/// vector at lane i, relative to the lanes' bricks.
 template <bool uniform, class Point>
 HWY_INLINE void move_to_bricks(const PacketMedium& medium, Packet& packet, const Point& point) {
   const F zero = hn::Zero(floats), cells = set(TensorBrick::cells);

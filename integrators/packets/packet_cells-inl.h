@@ -1,5 +1,5 @@
 /// @file integrators/packets/packet_cells-inl.h
-/// Vectors with a ray in each lane, and the tensor at them. A part of packet_kernel.cpp.
+/// Vectors with a ray in each lane, and the tensor at these rays. A part of packet_kernel.cpp.
 
 // Included once for each instruction set: see Highway's foreach_target.h.
 #if defined(TENSORRAY_INTEGRATORS_PACKET_CELLS_TOGGLE) == defined(HWY_TARGET_TOGGLE)
@@ -35,7 +35,7 @@ struct Tensor {
   F c[8];
 };
 
-// Vectors of a packet have the number of their first lane, `at`.
+// `at` is the first lane of a vector of a packet.
 
 HWY_INLINE F set(float value) { return hn::Set(floats, value); }
 HWY_INLINE F load(const PerRay& from, int at) { return hn::Load(floats, from + at); }
@@ -64,7 +64,7 @@ HWY_INLINE F3 clamp(const F3& p, const F3& low, const F3& high) {
   return {hn::Min(hn::Max(p.x, low.x), high.x), hn::Min(hn::Max(p.y, low.y), high.y),
           hn::Min(hn::Max(p.z, low.z), high.z)};
 }
-/// A bit for each lane of the packet.
+/// One bit for each lane of the packet.
 HWY_INLINE std::uint32_t to_bits(Mask mask, int at) {
   std::uint8_t bytes[8] = {};
   hn::StoreMaskBits(floats, mask, bytes);
@@ -80,7 +80,7 @@ HWY_INLINE F3 apply(const Tensor& T, const F3& v) {
           hn::MulAdd(T.c[5], v.y, hn::Mul(T.c[2], v.x))};
 }
 
-/// Of a cell's corners, from its first voxel on: z changes first, then y, then x.
+/// Offsets of a cell's corners from its first voxel, in floats: z changes first, then y, then x.
 constexpr int z_stride = TensorBrick::bending_floats, y_stride = TensorBrick::width * z_stride,
               x_stride = TensorBrick::width * y_stride;
 constexpr int corners[8] = {0,
@@ -92,7 +92,7 @@ constexpr int corners[8] = {0,
                             x_stride + y_stride,
                             x_stride + y_stride + z_stride};
 
-/// The weights of a cell's corners at a point within it, stored. 13 operations.
+/// Stores the weights of a cell's corners at a point within it. 13 operations.
 HWY_INLINE void make_weights(const F3& fraction, Packet& packet, int at) {
   const F yz = hn::Mul(fraction.y, fraction.z);
   const F y = hn::Sub(fraction.y, yz), z = hn::Sub(fraction.z, yz), neither = hn::Sub(hn::Sub(set(1), fraction.y), z);
@@ -112,12 +112,12 @@ HWY_INLINE const float* cell_of(const Packet& packet, int lane) {
   return packet.bending[lane] + static_cast<int>(packet.voxel[lane]) * TensorBrick::bending_floats;
 }
 
-/// The tensors of `count` vectors, one or two, whose lanes all are in one cell: each component of a corner is loaded
-/// once, goes to all lanes, and is multiplied by all vectors' weights. The same operations in the same order as in
-/// sample_own_cells.
+/// Samples the tensors of `count` vectors, one or two, whose lanes are all in one cell. Each component of a corner is
+/// loaded once, copied to all lanes, and multiplied by the weights of all vectors. Operations and their order are those
+/// of sample_own_cells.
 template <int count>
 HWY_INLINE void sample_cell(const float* HWY_RESTRICT cell, Packet& packet, int first) {
-  constexpr int together = 8 / count;  // Components: as many sums as registers hold with what they are made of.
+  constexpr int together = 8 / count;  // Components at a time: all sums and their factors fit in registers.
   for (int i = 0; i < 8; i += together) {
     F sums[together][count], weights[count];
 #pragma GCC unroll 8
@@ -136,13 +136,13 @@ HWY_INLINE void sample_cell(const float* HWY_RESTRICT cell, Packet& packet, int 
   }
 }
 
-/// The same of any number of vectors.
+/// The same for any number of vectors.
 HWY_INLINE void sample_cell(const float* cell, Packet& packet, int first, int count) {
   for (; count > 1; count -= 2, first += 2 * lanes) sample_cell<2>(cell, packet, first);
   if (count > 0) sample_cell<1>(cell, packet, first);
 }
 
-/// Keeps components of a lane's tensor: the first four of all lanes, then the last four.
+/// Stores components of a lane's tensor: first the first four components of all lanes, then the last four.
 template <class V>
 HWY_INLINE void store_components(V values, int i, int lane, float* components) {
   float* const first = components + (i / 4 * lanes + lane) * 4 + i % 4;
@@ -156,7 +156,7 @@ HWY_INLINE void store_components(V values, int i, int lane, float* components) {
   hn::Store(values, eight, first);
 }
 
-/// From lane after lane to component after component.
+/// Reorders components from lane after lane to component after component.
 HWY_INLINE void transpose(const float* components, PerRay (&tensor)[8], int at) {
   for (int half = 0; half < 2; ++half) {
     F a, b, c, d;
@@ -168,7 +168,8 @@ HWY_INLINE void transpose(const float* components, PerRay (&tensor)[8], int at) 
   }
 }
 
-/// The tensors of a vector whose lanes are in several cells: a vector holds the components of one lane at a time.
+/// Samples the tensors of a vector whose lanes are in several cells: a register holds the components of one lane at a
+/// time.
 HWY_INLINE void sample_own_cells(Packet& packet, int at) {
   for (int i = 0; i < 8; i += eight_lanes) {
     for (int lane = 0; lane < lanes; ++lane) {
@@ -183,14 +184,14 @@ HWY_INLINE void sample_own_cells(Packet& packet, int at) {
   transpose(packet.components, packet.tensor, at);
 }
 
-/// The trilinear polynomial of a cell: coefficients of 1, z, y, yz, x, xz, xy and xyz. Rays with differentials have it,
-/// as its slopes cost little more than its value.
+/// The trilinear polynomial of a cell: coefficients of 1, z, y, yz, x, xz, xy and xyz. Rays with differentials use it,
+/// because its slopes cost little more than its value.
 template <class V>
 struct Polynomial {
   V k[8];
 };
 
-/// `c(k)` is the value at corner k.
+/// The polynomial with the value `c(k)` at corner k.
 template <class V, class Corner>
 HWY_INLINE Polynomial<V> polynomial(const Corner& c) {
   const V z = hn::Sub(c(1), c(0)), y = hn::Sub(c(2), c(0)), x = hn::Sub(c(4), c(0));
@@ -200,7 +201,7 @@ HWY_INLINE Polynomial<V> polynomial(const Corner& c) {
   return {{c(0), z, y, yz, x, hn::Sub(far, z), hn::Sub(far_y, y), xyz}};
 }
 
-/// Of the components from `cell` on.
+/// The polynomials of the components from `cell` on.
 HWY_INLINE Polynomial<hn::Vec<Eight>> cell_polynomial(const float* cell) {
   return polynomial<hn::Vec<Eight>>([&](int k) HWY_ATTR { return hn::Load(eight, cell + corners[k]); });
 }
@@ -220,7 +221,7 @@ HWY_INLINE Slopes<V> evaluate(const Polynomial<V>& p, V x, V y, V z) {
           hn::MulAdd(hn::MulAdd(p.k[7], y, p.k[5]), x, hn::MulAdd(p.k[3], y, p.k[1]))};
 }
 
-/// The tensors and their slopes of a vector whose lanes are in one cell.
+/// Samples the tensors and their slopes for a vector whose lanes are in one cell.
 HWY_INLINE void sample_slopes(const float* cell, Packet& packet, int at) {
   alignas(64) float coefficients[8][8];
   for (int i = 0; i < 8; i += eight_lanes) {
@@ -239,7 +240,7 @@ HWY_INLINE void sample_slopes(const float* cell, Packet& packet, int at) {
   }
 }
 
-/// The same of a vector whose lanes are in several cells.
+/// The same for a vector whose lanes are in several cells.
 HWY_INLINE void sample_own_slopes(Packet& packet, int at) {
   alignas(64) float components[4][lanes * 8];
   for (int i = 0; i < 8; i += eight_lanes) {
@@ -257,7 +258,7 @@ HWY_INLINE void sample_own_slopes(Packet& packet, int at) {
   for (int axis = 0; axis < 3; ++axis) transpose(components[1 + axis], packet.slopes[axis], at);
 }
 
-/// Asks for the memory of a cell.
+/// Prefetches the memory of a cell.
 HWY_INLINE void prefetch_cell(const float* cell) {
   for (const int edge : {0, y_stride, x_stride, x_stride + y_stride}) {
     hwy::Prefetch(cell + edge);

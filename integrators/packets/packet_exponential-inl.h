@@ -1,5 +1,5 @@
 /// @file integrators/packets/packet_exponential-inl.h
-/// Kicks too strong for a series in single precision: scaling and squaring, in double precision. A part of
+/// Kicks that are too strong for a series in single precision, by scaling and squaring in double precision. A part of
 /// packet_kernel.cpp.
 
 // Included once for each instruction set: see Highway's foreach_target.h.
@@ -34,12 +34,13 @@ struct Matrix {
   D m[9];  // Row by row.
 };
 
-/// c[0] I + c[1] A + c[2] A² of a matrix without trace, of which, by Cayley and Hamilton, A³ = p A + q I.
+/// The polynomial c[0] I + c[1] A + c[2] A² of a matrix A without trace, for which A³ = p A + q I (Cayley and
+/// Hamilton).
 struct MatrixPolynomial {
   D p, q, c[3];
 };
 
-/// From a norm of 2^28 on exp(A) is taken for that of 2^28: single precision knows A to within 8 then.
+/// A norm above 2^28 counts as 2^28: in single precision, A of that norm is known only to within 8.
 constexpr int most_squarings = 31;
 
 HWY_INLINE D set_double(double value) { return hn::Set(doubles, value); }
@@ -64,14 +65,14 @@ HWY_INLINE D dot(const D3& a, const D3& b) {
   return hn::MulAdd(a.x[0], b.x[0], hn::MulAdd(a.x[1], b.x[1], hn::Mul(a.x[2], b.x[2])));
 }
 
-/// 1 over the greatest power of two that is no greater than a positive value: products with it are exact.
+/// 1 over the greatest power of two that is not greater than a positive value. Products with it are exact.
 HWY_INLINE D inverse_power_of_two(D value) {
   const hn::RebindToUnsigned<Doubles> integers;
   const auto power = hn::And(hn::BitCast(integers, value), hn::Set(integers, std::uint64_t{0x7FF} << 52));
   return hn::BitCast(doubles, hn::Sub(hn::Set(integers, std::uint64_t{2 * 1023} << 52), power));
 }
 
-/// s h times the deviator of T. (The trace only changes the length.)
+/// σ h times the deviator of T. (The trace changes only the length.)
 HWY_INLINE void strong_deviator(const Packet& packet, int at, Matrix& A) {
   const Singles singles;
   const D factor =
@@ -90,7 +91,8 @@ HWY_INLINE D norm(const Matrix& A) {
   return hn::Sqrt(hn::Add(hn::Add(row(0), row(3)), row(6)));
 }
 
-/// Scales A, of that norm, down to one below ¼. @return how many squarings each lane's exponential then needs.
+/// Scales A, whose norm is `norm`, to a norm below ¼. @return the number of squarings that each lane's exponential then
+/// needs.
 HWY_INLINE hn::Vec<Counts> halve(Matrix& A, D norm) {
   const Counts counts;
   const D inverse = inverse_power_of_two(norm);
@@ -120,9 +122,9 @@ HWY_INLINE MatrixPolynomial small_exponential(const Matrix& A) {
   return of;
 }
 
-/// Squares each lane as many times as it asks for: `squared()` gives the square of what `values` are; only their ratios
-/// are wanted. Every fourth time their size is taken away, but for a factor below two, so that it is exact: then
-/// nothing overflows; nor, of a shear of 2^28, does anything underflow.
+/// Squares each lane `times` times. `squared()` gives the square of what `values` represent; only the ratios of the
+/// values matter. Every fourth time the values are divided by a power of two near their greatest, which is exact. With
+/// this, nothing overflows, and for a shear of 2^28 nothing underflows.
 template <int count, class Squared>
 HWY_INLINE void square_repeatedly(hn::Vec<Counts> times, D (&values)[count], const Squared& squared) {
   alignas(64) std::int64_t of_lanes[double_lanes];
@@ -145,13 +147,14 @@ HWY_INLINE void square_repeatedly(hn::Vec<Counts> times, D (&values)[count], con
   }
 }
 
-/// exp(A) V for A as halved, with its exponential's polynomial squared. @return the lanes where its terms do not cancel
-/// but for a part of 1e-6: they do for light in a plane that shrinks, whose direction then is rounding errors.
+/// exp(A) V, where A is as scaled by `halve`: squares the polynomial of its exponential. @return the lanes whose terms
+/// do not cancel to less than 1e-6 of their size. They cancel for light in a plane that shrinks; its direction then
+/// consists of rounding errors.
 HWY_INLINE hn::Mask<Doubles> bend_by_polynomial(const Matrix& A, MatrixPolynomial of, hn::Vec<Counts> squarings,
                                                 const D3& before, D3& v) {
   const D doubled = hn::Add(of.p, of.p);
   square_repeatedly(squarings, of.c, [&](D(&product)[3]) HWY_ATTR {
-    // With A³ and A⁴ by the lower powers.
+    // A³ and A⁴ are replaced by lower powers.
     const D twice = hn::Add(of.c[0], of.c[0]), part = hn::Mul(of.q, of.c[2]);
     product[0] = hn::MulAdd(hn::Add(part, part), of.c[1], hn::Mul(of.c[0], of.c[0]));
     product[1] = hn::MulAdd(hn::MulAdd(doubled, of.c[2], twice), of.c[1], hn::Mul(part, of.c[2]));
@@ -165,7 +168,8 @@ HWY_INLINE hn::Mask<Doubles> bend_by_polynomial(const Matrix& A, MatrixPolynomia
   return hn::Gt(dot(v, v), hn::Mul(greatest, set_double(1e-12)));
 }
 
-/// The same by squaring the exponential itself: where planes that shrink are those of axes it keeps light there.
+/// The same by squaring the exponential itself. Where two coordinate axes span the plane that shrinks, this keeps the
+/// light in it.
 HWY_NOINLINE D3 bend_by_matrix(const Matrix& A, const MatrixPolynomial& of, hn::Vec<Counts> squarings,
                                const D3& before) {
   Matrix power;
@@ -176,7 +180,7 @@ HWY_NOINLINE D3 bend_by_matrix(const Matrix& A, const MatrixPolynomial& of, hn::
   return multiply(power, before);
 }
 
-/// exp(s h T) V, normalised, of some lanes, given as bits; zero if it has no direction.
+/// exp(σ h T) V, normalised, of some lanes, given as bits; zero if it has no direction.
 HWY_NOINLINE void bend_in_double(const Packet& packet, std::uint32_t which, PerRay (&to)[3]) {
   const Singles singles;
   for (int at = 0; at < packet.vectors * lanes; at += double_lanes) {

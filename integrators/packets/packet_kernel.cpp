@@ -7,13 +7,13 @@
 
 #include "integrators/packets/packet_medium.h"
 
-// Compiled once for each instruction set, of which the processor's best is chosen at run time.
+// The code below is compiled once for each instruction set. The best one of the processor is selected at run time.
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "integrators/packets/packet_kernel.cpp"  // NOLINT
-// Vectors are members of structs here, which those whose size is not known when compiling cannot be.
+// Structs below have vectors as members. That is not possible with vectors whose size is unknown at compile time.
 #define HWY_DISABLED_TARGETS (HWY_SSSE3 | HWY_SVE | HWY_SVE2 | HWY_SVE_256 | HWY_SVE2_128 | HWY_RVV)
 #include <hwy/foreach_target.h>  // IWYU pragma: keep
-// Must come after it:
+// Must come after foreach_target.h:
 #include <hwy/highway.h>
 
 #include "integrators/packets/packet_landing-inl.h"
@@ -26,8 +26,8 @@
 HWY_BEFORE_NAMESPACE();
 namespace tensorray::packets::HWY_NAMESPACE {
 
-/// The kernel, for voxels that are cubes along the axes (`uniform`) or any others, and for rays with or without
-/// differentials.
+/// The kernel, for voxels that are cubes along the axes (`uniform`) or have any other shape, and for rays with or
+/// without differentials.
 template <bool uniform, bool differentials>
 class Kernel {
  public:
@@ -36,7 +36,7 @@ class Kernel {
   std::uint64_t run();
 
  private:
-  // Packets that are stepped in turn: as many vectors as the processor needs to have work while one waits for another.
+  // Number of packets that are stepped in turn. With enough vectors, the processor has work while one of them waits.
   static constexpr int in_flight = lanes > 8 ? 2 : 1;
 
   void fill(Packet& packet);
@@ -55,7 +55,7 @@ class Kernel {
   void take_out(Packet& packet, std::uint32_t stop, std::uint32_t leave);
   void keep_points(const Packet& packet, std::uint32_t which);
   unsigned samples_per_step() const { return medium_.stages ? medium_.stages->stages : 1; }
-  float to_world() const { return uniform ? medium_.voxel : 1.0f; }  // Of what u is per.
+  float to_world() const { return uniform ? medium_.voxel : 1.0f; }  // World units per unit of `time`.
   void land(Packet& packet);
   void arrive(Packet& packet, const FaceLanding& landing);
 
@@ -65,10 +65,10 @@ class Kernel {
   std::size_t next_ = 0;  // The first ray that no packet has held yet.
   std::uint64_t samples_ = 0;
   Packet packets_[in_flight];
-  Packet leaving_[in_flight];  // Rays of these that leave the extent, as before their last step.
+  Packet leaving_[in_flight];  // Rays of these packets that leave the extent, as they were before their last step.
 };
 
-/// Brings a ray into a lane.
+/// Copies a ray into a lane.
 template <bool uniform, bool differentials>
 void Kernel<uniform, differentials>::enter(Packet& packet, int lane) {
   const KernelRay& ray = rays_[packet.ray[lane]];
@@ -88,7 +88,7 @@ void Kernel<uniform, differentials>::enter(Packet& packet, int lane) {
   packet.length[lane] = 0;
 }
 
-/// Copies what a ray is, but for what follows from its brick (see `begin`).
+/// Copies a ray, without the values that depend on its brick (see `begin`).
 template <bool uniform, bool differentials>
 void Kernel<uniform, differentials>::copy_lane(const Packet& from, int of, Packet& to, int lane) {
   for (int axis = 0; axis < 3; ++axis) {
@@ -110,7 +110,7 @@ void Kernel<uniform, differentials>::copy_lane(const Packet& from, int of, Packe
   to.ray[lane] = from.ray[of];
 }
 
-/// Brings the rays that go on to the front if that frees a vector, and lets the other lanes repeat one of them.
+/// Moves the remaining rays to the front if that frees a vector. The other lanes repeat one of these rays.
 template <bool uniform, bool differentials>
 void Kernel<uniform, differentials>::close_ranks(Packet& packet) {
   const int count = static_cast<int>(hwy::PopCount(packet.alive));
@@ -153,7 +153,7 @@ void Kernel<uniform, differentials>::fill(Packet& packet) {
     begin<uniform>(medium_, packet);
 }
 
-/// The lanes whose points are beyond the extent, as bits.
+/// The lanes whose points are outside the extent, as bits.
 template <bool uniform, bool differentials>
 HWY_INLINE std::uint32_t Kernel<uniform, differentials>::outside(const Packet& packet,
                                                                  const PerRay (&points)[3]) const {
@@ -174,12 +174,12 @@ HWY_NOINLINE std::uint32_t Kernel<uniform, differentials>::stopped(const Packet&
   std::uint32_t stop = 0;
   for (int i = 0; i < packet.vectors * lanes; i += lanes) {
     const F3 v = load(packet.v_next, i);
-    stop |= to_bits(hn::Not(hn::Gt(dot(v, v), set(0.5f))), i);  // No direction to go in.
+    stop |= to_bits(hn::Not(hn::Gt(dot(v, v), set(0.5f))), i);  // The ray has no direction.
   }
   if (!packet.near_surface && !medium_.bounded) return stop;
   for (std::uint32_t rest = packet.alive; rest != 0; rest &= rest - 1) {
     const auto lane = hwy::Num0BitsBelowLS1Bit_Nonzero32(rest);
-    const float before = static_cast<float>(rays_[packet.ray[lane]].length);  // Of the way to the field.
+    const float before = static_cast<float>(rays_[packet.ray[lane]].length);  // Length of the path up to the field.
     const float length = (packet.length[lane] + packet.time[lane]) * to_world() + before;
     bool stops = length >= medium_.settings.max_length;
     if (packet.near_surface) {
@@ -196,7 +196,8 @@ HWY_NOINLINE std::uint32_t Kernel<uniform, differentials>::stopped(const Packet&
   return stop;
 }
 
-/// The lanes that may take no further step, as bits: those of light that has come through a cut have taken more.
+/// The lanes that may take no further step, as bits. Rays that have crossed a cut have taken more steps than the
+/// packet counts.
 template <bool uniform, bool differentials>
 HWY_NOINLINE std::uint32_t Kernel<uniform, differentials>::spent(const Packet& packet) const {
   std::uint32_t result = 0;
@@ -207,7 +208,7 @@ HWY_NOINLINE std::uint32_t Kernel<uniform, differentials>::spent(const Packet& p
   return result;
 }
 
-/// Takes the middles of steps that lie beyond the extent to the nearest points on it, where the tensor is that of the
+/// Moves the middles of steps that lie outside the extent to the nearest points on it, where the tensor is that of the
 /// outermost voxels. Light may turn back into the extent from there.
 template <bool uniform, bool differentials>
 HWY_NOINLINE void Kernel<uniform, differentials>::locate_on_extent(Packet& packet) {
@@ -217,7 +218,7 @@ HWY_NOINLINE void Kernel<uniform, differentials>::locate_on_extent(Packet& packe
   packet.clamps = medium_.clamps;
 }
 
-/// Hands the rays of some lanes on, as they are before the step.
+/// Writes back the rays of some lanes, as they were before the step, and removes them from the packet.
 template <bool uniform, bool differentials>
 HWY_NOINLINE void Kernel<uniform, differentials>::take_out(Packet& packet, std::uint32_t stop, std::uint32_t leave) {
   Packet& leaving = leaving_[&packet - packets_];
@@ -260,8 +261,8 @@ HWY_NOINLINE void Kernel<uniform, differentials>::keep_points(const Packet& pack
   }
 }
 
-/// From the positions after a step. Takes out rays that it ends, as they were before it: those of `stop` and others,
-/// but for those that are `staying`.
+/// Ends a step. Takes out the rays that it ends, as they were before it: those of `stop` and those found here, except
+/// for lanes that are `staying`.
 template <bool uniform, bool differentials>
 void Kernel<uniform, differentials>::end_step(Packet& packet, std::uint32_t staying, std::uint32_t stop) {
   std::uint32_t leave = 0;
@@ -270,7 +271,7 @@ void Kernel<uniform, differentials>::end_step(Packet& packet, std::uint32_t stay
   if (may_fail || packet.near_surface || medium_.bounded || !(packet.greatest_reach <= strongest_kick))
     stop |= stopped(packet) & ~staying;
   if (packet.steps >= packet.most_steps) stop |= spent(packet);
-  if constexpr (differentials) {  // Those of a crossing are the reference's.
+  if constexpr (differentials) {  // The reference computes the differentials at a crossing.
     stop |= leave;
     leave = 0;
   }
@@ -293,7 +294,7 @@ void Kernel<uniform, differentials>::end_step(Packet& packet, std::uint32_t stay
   if ((stop | leave) != 0 && packet.alive != 0) close_ranks(packet);
 }
 
-/// A step that may end rays.
+/// The second part of a step that may end rays.
 template <bool uniform, bool differentials>
 HWY_NOINLINE void Kernel<uniform, differentials>::step_watched(Packet& packet) {
   if (packet.near_border && (outside(packet, packet.middle) & packet.alive) != 0) locate_on_extent(packet);
@@ -314,7 +315,7 @@ HWY_INLINE void Kernel<uniform, differentials>::step_split(Packet& packet) {
   if (HWY_UNLIKELY(!batch_.points.empty())) keep_points(packet, packet.alive);
 }
 
-/// To the positions after a step as long as `time` says. May take lanes to other bricks.
+/// Computes the positions after a step of length `time`. May move lanes to other bricks.
 template <bool uniform, bool differentials>
 void Kernel<uniform, differentials>::attempt(Packet& packet) {
   if (medium_.stages) return step_by_stages<uniform, differentials>(medium_, packet);
@@ -324,7 +325,7 @@ void Kernel<uniform, differentials>::attempt(Packet& packet) {
   take_step<uniform, differentials>(medium_, packet, packet.p_next, packet.v_next, packet.u_next);
 }
 
-/// A step by another method than splitting.
+/// A step of a method other than splitting.
 template <bool uniform, bool differentials>
 HWY_NOINLINE void Kernel<uniform, differentials>::step_otherwise(Packet& packet) {
   const std::uint32_t stop = too_short<uniform>(packet);
@@ -334,7 +335,7 @@ HWY_NOINLINE void Kernel<uniform, differentials>::step_otherwise(Packet& packet)
   end_step(packet, staying, stop);
 }
 
-/// The step that leaves the extent, repeated with the length that ends on its face (Newton's method).
+/// Repeats the step that leaves the extent, with the length that ends on its face (Newton's method).
 template <bool uniform, bool differentials>
 HWY_NOINLINE void Kernel<uniform, differentials>::land(Packet& packet) {
   packet.vectors = packet_rays / lanes;
@@ -353,7 +354,7 @@ HWY_NOINLINE void Kernel<uniform, differentials>::land(Packet& packet) {
   arrive(packet, landing);
 }
 
-/// Hands rays on that are on the extent's faces.
+/// Writes back the rays, which are on the extent's faces.
 template <bool uniform, bool differentials>
 void Kernel<uniform, differentials>::arrive(Packet& packet, const FaceLanding& landing) {
   for (std::uint32_t rest = packet.alive; rest != 0; rest &= rest - 1) {
@@ -415,7 +416,8 @@ HWY_EXPORT(vector_lanes);
 namespace {
 
 #if defined(__SSE__)
-/// Tiny numbers count as zero while it lives: arithmetic with them is many times slower.
+/// Denormal numbers count as zero during the lifetime of this object, because arithmetic with them is many times
+/// slower.
 class WithoutDenormals {
  public:
   WithoutDenormals() { _mm_setcsr(before_ | 0x8040); }

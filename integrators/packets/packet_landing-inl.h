@@ -1,5 +1,5 @@
 /// @file integrators/packets/packet_landing-inl.h
-/// The last step of rays in the extent, which ends on its face. A part of packet_kernel.cpp.
+/// The last step of rays in the extent, which ends on a face of the extent. A part of packet_kernel.cpp.
 
 // Included once for each instruction set: see Highway's foreach_target.h.
 #if defined(TENSORRAY_INTEGRATORS_PACKET_LANDING_TOGGLE) == defined(HWY_TARGET_TOGGLE)
@@ -16,19 +16,20 @@
 HWY_BEFORE_NAMESPACE();
 namespace tensorray::packets::HWY_NAMESPACE {
 
-/// Of rays that take their last step: the whole step, which is too long, its chord, and the axis that they leave along.
+/// The last step of rays: the length of the whole step, which is too long, its chord, and the axis of the face where
+/// they leave.
 struct alignas(64) FaceLanding {
   PerRay longest, chord[3], axis;
 };
 
-/// Where the extent's face across an axis is that rays along `chord` leave through.
+/// Position, along an axis, of the extent's face through which rays along `chord` leave.
 HWY_INLINE F face(const PacketMedium& medium, const Packet& packet, const FaceLanding& landing, int axis, int at) {
   const F margin = set(medium.margin[axis]);
   return hn::IfThenElse(hn::Gt(load(landing.chord[axis], at), hn::Zero(floats)),
                         hn::Add(load(packet.high[axis], at), margin), hn::Sub(load(packet.low[axis], at), margin));
 }
 
-/// Finds the face that the whole step's chord meets, and about how long a step ends there.
+/// Finds the face that the chord of the whole step meets, and the approximate length of a step that ends there.
 HWY_NOINLINE void aim(const PacketMedium& medium, Packet& packet, FaceLanding& landing) {
   const F zero = hn::Zero(floats), one = set(1);
   for (int i = 0; i < packet.vectors * lanes; i += lanes) {
@@ -46,7 +47,7 @@ HWY_NOINLINE void aim(const PacketMedium& medium, Packet& packet, FaceLanding& l
   }
 }
 
-/// How much longer, to first order, steps must be that end on the faces; 0 of light that grazes its face.
+/// How much longer, to first order, steps must be to end on the faces; 0 for light nearly parallel to its face.
 template <bool uniform>
 HWY_INLINE F rest_of_way(const PacketMedium& medium, const Packet& packet, const FaceLanding& landing, int at) {
   const F zero = hn::Zero(floats), axis = load(landing.axis, at);
@@ -60,7 +61,7 @@ HWY_INLINE F rest_of_way(const PacketMedium& medium, const Packet& packet, const
   return hn::IfThenElseZero(hn::Le(hn::Abs(rest), load(landing.longest, at)), rest);
 }
 
-/// A step of Newton's method for the steps' lengths.
+/// A step of Newton's method for the lengths of the steps.
 template <bool uniform>
 HWY_NOINLINE void improve(const PacketMedium& medium, Packet& packet, const FaceLanding& landing) {
   for (int i = 0; i < packet.vectors * lanes; i += lanes) {
@@ -69,7 +70,7 @@ HWY_NOINLINE void improve(const PacketMedium& medium, Packet& packet, const Face
   }
 }
 
-/// Straight on to the faces.
+/// Moves the rays straight to the faces.
 template <bool uniform>
 HWY_NOINLINE void touch_down(const PacketMedium& medium, Packet& packet, const FaceLanding& landing) {
   for (int i = 0; i < packet.vectors * lanes; i += lanes) {

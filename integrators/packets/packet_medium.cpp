@@ -12,7 +12,7 @@ PacketMedium::PacketMedium(const TensorField& field_, const KernelSettings& sett
   uniform = M == Eigen::Matrix3d(M(0, 0) * Eigen::Matrix3d::Identity()) && M(0, 0) > 0;
   voxel = static_cast<float>(1 / M(0, 0));
   const Eigen::Matrix3d to_world = field.to_world().linear();
-  longest_voxel = static_cast<float>(to_world.norm());  // Not less than the greatest singular value.
+  longest_voxel = static_cast<float>(to_world.norm());  // The norm is not less than the greatest singular value.
   for (int row = 0; row < 3; ++row)
     for (int column = 0; column < 3; ++column) to_index[row][column] = static_cast<float>(M(row, column));
   for (int axis = 0; axis < 3; ++axis) {

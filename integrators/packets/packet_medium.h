@@ -1,6 +1,6 @@
 #pragma once
 /// @file integrators/packets/packet_medium.h
-/// What the kernel's code for every instruction set shares: the field as it sees it, and a packet of rays. A part of
+/// Data that the kernel's code for all instruction sets shares: the field, and a packet of rays. A part of
 /// packet_kernel.cpp.
 
 #include <cstdint>
@@ -11,26 +11,28 @@
 
 namespace tensorray::packets {
 
-/// What all targets share. No function of it is inlined into code for a target that the processor may lack.
+/// The field and the settings as the kernel uses them. No member function is inlined into code for an instruction set
+/// that the processor may lack.
 struct PacketMedium {
   PacketMedium(const TensorField& field, const KernelSettings& settings);
 
   const TensorField& field;
   const KernelSettings& settings;
-  const RungeKutta* stages;  // Of the method; null if it has one, which is at a step's middle or (Euler's) beginning.
+  /// Stages of the method; null if it has one sample, at the middle of a step or (Euler) at its beginning.
+  const RungeKutta* stages;
   bool adaptive;
-  bool uniform;         // Voxels are cubes along the world's axes: index space is world space, scaled.
-  float voxel;          // If so, their edge.
-  float longest_voxel;  // Along any direction.
+  bool uniform;         // Whether voxels are cubes along the world's axes, so that index space is scaled world space.
+  float voxel;          // If uniform: edge of a voxel, world units.
+  float longest_voxel;  // No voxel is longer along any direction, world units.
   float to_index[3][3];
-  std::int32_t first[3], last[3];  // Voxels of the extent.
-  float margin[3];                 // Of the extent beyond these: ½ on an axis of a single voxel.
-  bool flat;                       // Whether an axis has a single voxel.
-  float slope[3];                  // 0 along those axes, 1 along the others.
-  bool clamps;                     // Whether points that are sampled may be beyond the voxels' box, always.
-  float longest_step;              // Voxels; but through straight bricks.
-  float past_straight_brick;       // Voxels.
-  bool bounded;                    // Whether rays may end within the field, by their length.
+  std::int32_t first[3], last[3];  // First and last voxels of the extent.
+  float margin[3];     // Distance of the extent's faces from these voxels: ½ on an axis of a single voxel, else 0.
+  bool flat;           // Whether an axis has a single voxel.
+  float slope[3];      // 0 along axes with a single voxel, 1 along the others.
+  bool clamps;         // Whether sample points of any step may be outside the box of the voxels.
+  float longest_step;  // Longest step, voxels; steps through straight bricks may be longer.
+  float past_straight_brick;  // How far a step through a straight brick goes beyond it, voxels.
+  bool bounded;               // Whether the limit of length may end rays within the field.
 
   TensorBrick brick(const std::int32_t at[3]) const { return field.brick({at[0], at[1], at[2]}); }
   bool near_surface(const std::int32_t at[3]) const;
@@ -38,46 +40,47 @@ struct PacketMedium {
 };
 
 constexpr float strongest_kick = static_cast<float>(step_lengths::strongest_kick);
-/// Voxels. Shorter steps, which only other methods than splitting take, are for double precision.
+/// Voxels. Shorter steps are taken in double precision; splitting never takes them.
 constexpr float shortest_step = 1.0f / 1024;
-constexpr int landing_steps = 4;  // Of Newton's method, to a face of the extent.
+constexpr int landing_steps = 4;  // Steps of Newton's method to a face of the extent.
 
 /// With n terms the power series of exp(A) V is exact to 3e-9 for ‖A‖ up to entry n − 2: (3e-9 (n + 1)!)^(1/(n + 1)).
-/// That is less than rounding, as the error is the same in every step where rounding is not.
+/// This error must be smaller than rounding errors: it is the same in every step, and they are not.
 constexpr float series_reach[] = {0.00262f, 0.0164f, 0.0514f, 0.1137f, 0.205f,
                                   0.3238f,  0.4688f, 0.6364f, 0.8246f, 1.03f};
 constexpr int most_terms = 11;
 
-constexpr int packet_rays = 32;  // A packet's: several vectors of them.
+constexpr int packet_rays = 32;  // Number of rays in a packet: several vectors.
 using PerRay = float[packet_rays];
 
-/// Rays side by side, a lane each. All lanes of its vectors hold a ray: those whose ray has ended repeat that of
-/// another, so that no step needs a mask.
+/// Rays side by side, one in each lane. All lanes of its vectors hold a ray, so that no step needs a mask: a lane whose
+/// ray has ended repeats another ray.
 struct alignas(64) Packet {
-  PerRay p[3];          // Position, voxels from the brick's first.
-  PerRay v[3];          // V.
-  PerRay u[3];          // The direction in index space; unused if voxels are uniform: it is V.
-  PerRay kick;          // σ, times the voxel's edge if voxels are uniform.
-  PerRay length;        // Of the way since the ray came, in units of the time that u is per.
-  PerRay bending_rate;  // σ times the norm of T's deviator as last sampled, or 0.
-  PerRay reach;         // Bound on ‖σ h T‖ in the brick.
+  PerRay p[3];          // Position, in voxels from the brick's first voxel.
+  PerRay v[3];          // V; unit, world axes.
+  PerRay u[3];          // The direction in index space; unused if voxels are uniform, where it is V.
+  PerRay kick;          // σ; times the voxel's edge if voxels are uniform.
+  PerRay length;        // Length of the path since the ray entered the packet, in units of `time`.
+  PerRay bending_rate;  // |kick| times the norm of T's deviator as last sampled, or 0.
+  PerRay reach;         // Upper bound of ‖σ h T‖ in the brick.
   PerRay strongest;
-  PerRay low[3], high[3];  // The voxels' box, relative to the brick.
-  PerRay last[3];          // The last cell, likewise.
+  PerRay low[3], high[3];  // Box of the voxels, relative to the brick.
+  PerRay last[3];          // Last cell, relative to the brick.
 
-  // Of the step being taken:
-  PerRay time;                        // In units of what u is per.
-  PerRay middle[3];                   // Positions there;
-  PerRay voxel;                       // the number, in the brick, of the cell's first voxel,
-  PerRay weights[8];                  // and the weights of the cell's corners, or,
-  PerRay fraction[3];                 // of rays with differentials, the position within the cell.
-  float components[packet_rays * 8];  // The tensors of lanes in several cells;
-  PerRay tensor[8];                   // of all, component after component.
+  // The step that is being taken:
+  PerRay time;                        // Length of the step: voxels if voxels are uniform, else world units.
+  PerRay middle[3];                   // Positions of the samples.
+  PerRay voxel;                       // Number, in the brick, of the first voxel of the sample's cell.
+  PerRay weights[8];                  // Weights of the cell's corners.
+  PerRay fraction[3];                 // Rays with differentials, instead of weights: position within the cell.
+  float components[packet_rays * 8];  // Tensors of lanes in several cells, lane after lane.
+  PerRay tensor[8];                   // Tensors of all lanes, component after component.
   PerRay p_next[3], v_next[3], u_next[3];
-  PerRay wanted, excess;  // Of adaptive methods: the next step, voxels, and this one's error over what is allowed.
+  // Adaptive methods: the next step, voxels, and the error of this one divided by the tolerance.
+  PerRay wanted, excess;
 
-  // Only of rays with differentials: p and v along two parameters, now, in the middle of the step and after it, the
-  // slopes of the tensor along x, y and z, and ‖σ h T‖ or a bound on it.
+  // Only for rays with differentials: derivatives of p and v along two parameters before the step, in its middle and
+  // after it; slopes of the tensor along x, y and z; and ‖σ h T‖ or an upper bound of it.
   PerRay dp[2][3], dv[2][3], dmiddle[2][3], dp_next[2][3], dv_next[2][3];
   PerRay slopes[3][8];
   PerRay size;
@@ -85,16 +88,16 @@ struct alignas(64) Packet {
   const float* bending[packet_rays] = {};
   alignas(64) std::int32_t brick[3][packet_rays];
   std::int32_t ray[packet_rays];
-  std::uint32_t alive = 0;  // A bit each.
-  int vectors = 0;          // In use.
+  std::uint32_t alive = 0;  // One bit for each lane.
+  int vectors = 0;          // Number of vectors in use.
   std::uint32_t steps = 0, most_steps = 0;
   float greatest_reach = 0;
   bool one_brick = false, one_cell = false;
   bool near_border = false, near_surface = false, straight = false;
-  bool varied = false;   // Whether steps are not all of the longest length, ...
-  bool timed = false;    // and whether `time` is that of the next step already.
-  bool watched = false;  // Whether a step may end a ray, but for their number.
-  bool clamps = false;   // Whether points beyond the voxels' box are taken to it.
+  bool varied = false;   // Whether some steps are not of the longest length.
+  bool timed = false;    // Whether `time` is already that of the next step.
+  bool watched = false;  // Whether a step may end a ray for another reason than the number of steps.
+  bool clamps = false;   // Whether points outside the box of the voxels are moved to it.
 };
 
 }  // namespace tensorray::packets

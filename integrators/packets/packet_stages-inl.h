@@ -17,12 +17,12 @@
 HWY_BEFORE_NAMESPACE();
 namespace tensorray::packets::HWY_NAMESPACE {
 
-/// The stages of a Runge–Kutta method: V in each, and s (T V − (VᵀTV) V / |V|²), and their derivatives along two
-/// parameters (of rays with differentials).
+/// The stages of a Runge–Kutta method: V in each stage, σ (T V − (VᵀTV) V / |V|²), and, for rays with differentials,
+/// their derivatives along two parameters.
 struct alignas(64) Stages {
   PerRay v[3][RungeKutta::most_stages][3], change[3][RungeKutta::most_stages][3];
-  PerRay ahead[3];  // Of the next stage's point, voxels.
-  PerRay dp[2][3];  // There.
+  PerRay ahead[3];  // Offset of the next stage's point from p, voxels.
+  PerRay dp[2][3];  // Derivatives of the position of that point.
 };
 
 /// Σ_j factors[j] · rates[j].
@@ -33,13 +33,13 @@ HWY_INLINE F3 combine(const PerRay (&rates)[RungeKutta::most_stages][3], const d
   return sum;
 }
 
-/// Positions along a way whose direction is `v` in world axes, after `time`, from the start.
+/// Offset, in index space, after `time` along the direction `v` in world axes.
 template <bool uniform>
 HWY_INLINE F3 way(const PacketMedium& medium, F time, const F3& v) {
   return mul(time, index_direction<uniform>(medium, v));
 }
 
-/// The state of a packet in a stage, but for its position, which is `ahead` of p.
+/// Sets the state of a packet in a stage. `ahead` is its offset from p.
 template <bool uniform, bool differentials>
 HWY_INLINE void begin_stage(const PacketMedium& medium, const Packet& packet, int stage, Stages& stages) {
   const double* const factors = medium.stages->a[stage];
@@ -75,7 +75,7 @@ HWY_INLINE void end_stage(const PacketMedium& medium, Packet& packet, int stage,
         const F3 dv = load(stages.v[k + 1][stage], i);
         const Tensor dT = tensor_along(packet, along_slopes(medium, load(stages.dp[k], i)), i);
         const F3 dTv = add(apply(T, dv), apply(dT, v));
-        // v·change is 0: Tv is along · v beside it.
+        // v·change is 0, because Tv = along · v + change.
         const F dalong = hn::Mul(inverse, hn::Sub(hn::Add(dot(dv, change), dot(v, dTv)), hn::Mul(along, dot(v, dv))));
         const F3 dchange = mul_add(hn::Neg(dalong), v, mul_add(hn::Neg(along), dv, dTv));
         store(mul(kick, dchange), stages.change[k + 1][stage], i);
@@ -84,7 +84,7 @@ HWY_INLINE void end_stage(const PacketMedium& medium, Packet& packet, int stage,
   }
 }
 
-/// Keeps v, taken to unit length, and its derivatives, as the packet's next.
+/// Stores v, scaled to unit length, and its derivatives as the packet's next.
 template <bool uniform, bool differentials>
 HWY_INLINE void keep_unit(const PacketMedium& medium, Packet& packet, const F3& v, const F3 (&dv)[2], int at) {
   const F inverse = hn::Div(set(1), hn::Sqrt(dot(v, v)));
@@ -98,7 +98,8 @@ HWY_INLINE void keep_unit(const PacketMedium& medium, Packet& packet, const F3& 
     }
 }
 
-/// The error of an adaptive step over what is allowed: in voxels as the ray crosses them, or in radians.
+/// The error of an adaptive step divided by the tolerance. The error is the greater of that in voxels along the ray and
+/// that in radians.
 template <bool uniform>
 HWY_INLINE F find_excess(const PacketMedium& medium, const Packet& packet, const Stages& stages, int at) {
   const double* const factors = medium.stages->error;
@@ -140,7 +141,7 @@ HWY_INLINE void combine_stages(const PacketMedium& medium, Packet& packet, const
 template <bool uniform, bool differentials>
 HWY_NOINLINE void step_by_stages(const PacketMedium& medium, Packet& packet) {
   Stages stages;
-  bool near_border = false, near_surface = false;  // In any brick where tensors are sampled.
+  bool near_border = false, near_surface = false;  // In any brick that is sampled.
   for (int stage = 0; stage < medium.stages->stages; ++stage) {
     begin_stage<uniform, differentials>(medium, packet, stage, stages);
     locate<uniform, differentials>(medium, packet,
@@ -155,7 +156,7 @@ HWY_NOINLINE void step_by_stages(const PacketMedium& medium, Packet& packet) {
   combine_stages<uniform, differentials>(medium, packet, stages);
 }
 
-/// T₂₂ of lanes as their tensors were sampled, and its slopes.
+/// T₂₂ and its slopes at the points where the lanes' tensors were sampled.
 template <bool differentials>
 HWY_INLINE Slopes<F> sample_trailing(const Packet& packet, int at) {
   alignas(64) float values[8][lanes];
@@ -176,7 +177,7 @@ HWY_INLINE Slopes<F> sample_trailing(const Packet& packet, int at) {
   return result;
 }
 
-/// A step of Euler's method (Eq. 3–4), which sees the trace of T.
+/// A step of Euler's method (Eq. 3–4), which the trace of T affects.
 template <bool uniform, bool differentials>
 HWY_NOINLINE void step_by_euler(const PacketMedium& medium, Packet& packet) {
   locate<uniform, differentials>(medium, packet, [&](int i) HWY_ATTR { return load(packet.p, i); });
@@ -206,7 +207,7 @@ HWY_NOINLINE void step_by_euler(const PacketMedium& medium, Packet& packet) {
   }
 }
 
-/// Sets adaptive methods' first steps.
+/// Sets the first steps of adaptive methods.
 template <bool uniform>
 HWY_NOINLINE void begin_steps(const PacketMedium& medium, Packet& packet) {
   for (int i = 0; i < packet.vectors * lanes; i += lanes) {
@@ -231,7 +232,7 @@ HWY_INLINE std::uint32_t too_short(const Packet& packet) {
   return result;
 }
 
-/// Lets a lane take no step.
+/// Leaves a lane where it is.
 template <bool uniform, bool differentials>
 HWY_INLINE void stay(Packet& packet, int lane) {
   packet.time[lane] = 0;
@@ -247,7 +248,7 @@ HWY_INLINE void stay(Packet& packet, int lane) {
   }
 }
 
-/// The next adaptive step over the last one: see step_lengths.h.
+/// The next adaptive step divided by the last one: see step_lengths.h.
 HWY_INLINE F growth(F excess, int order) {
   using namespace step_lengths;
   const auto single = [](double value) HWY_ATTR { return set(static_cast<float>(value)); };
@@ -257,15 +258,15 @@ HWY_INLINE F growth(F excess, int order) {
   return hn::IfThenElse(hn::Eq(excess, excess), hn::Min(hn::Max(factor, least), most), least);
 }
 
-/// Sets the next adaptive steps by the errors of these; lanes that err by too much stay.
-/// @return these, as bits.
+/// Sets the next adaptive steps from the errors of these. Lanes with too great an error stay.
+/// @return the lanes that stay, as bits.
 template <bool uniform, bool differentials>
 HWY_NOINLINE std::uint32_t control_steps(const PacketMedium& medium, Packet& packet) {
   std::uint32_t staying = 0;
   for (int i = 0; i < packet.vectors * lanes; i += lanes) {
     const F excess = load(packet.excess, i), wanted = load(packet.wanted, i);
     store(hn::Min(hn::Mul(wanted, growth(excess, medium.stages->order)), set(medium.longest_step)), packet.wanted, i);
-    const F3 v = load(packet.v_next, i);  // If it is none, no matter how it errs.
+    const F3 v = load(packet.v_next, i);  // A lane without a direction does not stay: it stops, whatever its error.
     staying |= to_bits(hn::And(hn::Gt(excess, set(1)), hn::Gt(dot(v, v), hn::Zero(floats))), i);
   }
   for (std::uint32_t rest = staying; rest != 0; rest &= rest - 1)

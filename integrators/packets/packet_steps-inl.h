@@ -1,5 +1,6 @@
 /// @file integrators/packets/packet_steps-inl.h
-/// A step of a packet, in three parts: to its middle, the tensors there, the kick and on. A part of packet_kernel.cpp.
+/// A step of a packet, in three parts: to its middle, the tensors there, the kick and the second half. A part of
+/// packet_kernel.cpp.
 
 // Included once for each instruction set: see Highway's foreach_target.h.
 #if defined(TENSORRAY_INTEGRATORS_PACKET_STEPS_TOGGLE) == defined(HWY_TARGET_TOGGLE)
@@ -21,9 +22,10 @@
 HWY_BEFORE_NAMESPACE();
 namespace tensorray::packets::HWY_NAMESPACE {
 
-// `uniform`: voxels are cubes along the axes. `differentials`: rays have them.
+// Template arguments: `uniform`: voxels are cubes along the axes. `differentials`: rays have differentials.
 
-/// The direction per unit of time, of which there are as many as `time` says: V in voxels, or in index space.
+/// The change of position per unit of `time`, in index space: V if voxels are uniform (time in voxels), else u (time in
+/// world units).
 template <bool uniform>
 HWY_INLINE const PerRay (&direction(const Packet& packet))[3] {
   return uniform ? packet.v : packet.u;
@@ -39,8 +41,9 @@ HWY_INLINE F3 index_direction(const PacketMedium& medium, const F3& v) {
   return {row(0), row(1), row(2)};
 }
 
-/// The last step of lanes in bricks where nothing bends light ended a little behind them: takes these lanes to the
-/// bricks where they are now. (Others are taken there by their steps' middles, whatever their neighbours do.)
+/// The last step of lanes in bricks where nothing bends light ended a little beyond these bricks. This moves the lanes
+/// to the bricks where they are now. (Other lanes move when the middles of their steps are located. What their
+/// neighbours do does not matter.)
 template <bool uniform>
 HWY_NOINLINE void leave_straight_bricks(const PacketMedium& medium, Packet& packet) {
   const F zero = hn::Zero(floats), end = set(TensorBrick::cells);
@@ -57,8 +60,8 @@ HWY_NOINLINE void leave_straight_bricks(const PacketMedium& medium, Packet& pack
   });
 }
 
-/// How long an automatic step of fixed-step methods is, voxels, if one voxel is as long as `voxel`. @p bending_rate as
-/// a packet has it.
+/// Length of an automatic step of methods with fixed steps, voxels, if one voxel has the length `voxel`. @p
+/// bending_rate is that of a packet.
 HWY_INLINE F automatic_step(const PacketMedium& medium, F bending_rate, F voxel) {
   const bool splitting = medium.settings.method == BendingMethod::splitting;
   const F shortest = set(splitting ? static_cast<float>(step_lengths::shortest_splitting) : 0.0f);
@@ -68,7 +71,7 @@ HWY_INLINE F automatic_step(const PacketMedium& medium, F bending_rate, F voxel)
                         longest);
 }
 
-/// How long a voxel is along the rays, in the units of the time.
+/// Length of a voxel along the rays, in the units of `time`.
 template <bool uniform>
 HWY_INLINE F voxel_along(const Packet& packet, int at) {
   if (uniform) return set(1);
@@ -76,7 +79,7 @@ HWY_INLINE F voxel_along(const Packet& packet, int at) {
   return hn::Div(set(1), hn::Sqrt(dot(u, u)));
 }
 
-/// How long the next step is, in the units that u is per: voxels, or, if voxels are not uniform, world units.
+/// Sets the length of the next step: in voxels, or, if voxels are not uniform, in world units.
 template <bool uniform>
 HWY_NOINLINE void find_times(const PacketMedium& medium, Packet& packet) {
   if (packet.straight) leave_straight_bricks<uniform>(medium, packet);
@@ -89,7 +92,8 @@ HWY_NOINLINE void find_times(const PacketMedium& medium, Packet& packet) {
                                     : set(medium.longest_step);
     F time = uniform ? steps : hn::Mul(steps, voxel);
     if (packet.straight) {
-      // Out of the brick where nothing bends light, and a little further, so that rounding does not keep it there.
+      // The step ends a little beyond the brick where nothing bends light, so that rounding does not keep the ray in
+      // the brick.
       const F3 p = load(packet.p, i), u = load(direction<uniform>(packet), i);
       const auto way = [&](F x, F along) HWY_ATTR {
         const F to = hn::Sub(hn::IfThenElse(hn::Gt(along, zero), end, zero), x);
@@ -106,10 +110,10 @@ HWY_NOINLINE void find_times(const PacketMedium& medium, Packet& packet) {
   packet.timed = !packet.varied;
 }
 
-/// Finds the points where tensors are wanted, `point_of(i)` of the vector at lane i, their cells, and what is needed to
-/// interpolate there. `careful`: where the packet clamps, or, with `forced`, points are beyond their bricks, on whose
-/// faces they then are taken to be.
-/// @return whether all are within their lanes' bricks.
+/// Finds the sample points (`point_of(i)` gives those of the vector at lane i), their cells, and the values that
+/// interpolation needs. `careful`: the packet clamps, or, with `forced`, points outside their bricks count as on the
+/// faces of the bricks.
+/// @return whether all points are within their lanes' bricks.
 template <bool differentials, bool careful, class Point>
 HWY_INLINE bool find_cells(Packet& packet, bool forced, const Point& point_of) {
   const F last = set(TensorBrick::cells - 1), width = set(TensorBrick::width);
@@ -140,7 +144,7 @@ HWY_INLINE bool find_cells(Packet& packet, bool forced, const Point& point_of) {
   return hn::AllFalse(bits, hn::Gt(greatest, hn::BitCast(bits, last)));
 }
 
-/// Goes to points where tensors are wanted: takes lanes to the bricks of these.
+/// Finds the sample points, and moves lanes to the bricks of these points.
 template <bool uniform, bool differentials, class Point>
 HWY_INLINE void locate(const PacketMedium& medium, Packet& packet, const Point& point_of) {
   const bool found = packet.clamps ? find_cells<differentials, true>(packet, false, point_of)
@@ -150,11 +154,11 @@ HWY_INLINE void locate(const PacketMedium& medium, Packet& packet, const Point& 
     const F3 point = load(packet.middle, i);
     return packet.clamps ? clamp(point, load(packet.low, i), load(packet.high, i)) : point;
   });
-  // Beyond the extent, or on the face that rounding took it to.
+  // The remaining points are outside the extent, or rounding put them on a face.
   find_cells<differentials, true>(packet, true, point_of);
 }
 
-/// The first part of a step: to its middle.
+/// The first part of a step: locates its middle.
 template <bool uniform, bool differentials>
 HWY_INLINE void locate_middles(const PacketMedium& medium, Packet& packet) {
   locate<uniform, differentials>(medium, packet, [&](int i) HWY_ATTR {
@@ -163,7 +167,7 @@ HWY_INLINE void locate_middles(const PacketMedium& medium, Packet& packet) {
   });
 }
 
-/// Asks for the memory of the cell where a lane will be after two long steps, if it is in its brick.
+/// Prefetches the cell where a lane will be after two long steps, if it is in the lane's brick.
 template <bool uniform>
 HWY_INLINE void prefetch_one(const Packet& packet, int lane) {
   int voxel = 0;
@@ -175,10 +179,10 @@ HWY_INLINE void prefetch_one(const Packet& packet, int lane) {
   prefetch_cell(packet.bending[lane] + voxel * TensorBrick::bending_floats);
 }
 
-/// Asks for the memory of the cells where the lanes of a vector will be after two long steps.
+/// Prefetches the cells where the lanes of a vector will be after two long steps.
 template <bool uniform>
 HWY_INLINE void prefetch_all(const PacketMedium& medium, const Packet& packet, int first) {
-  // Lanes are wavelengths in their order, mostly: where the outermost ones are close, so are the others.
+  // Lanes are mostly wavelengths in order: if the outermost ones are close, the others are too.
   float between = packet.one_brick ? 0 : 2;
   for (const PerRay& middle : packet.middle)
     between = std::max(between, std::fabs(middle[first] - middle[first + lanes - 1]));
@@ -222,7 +226,7 @@ HWY_INLINE bool in_one_cell(const Packet& packet, int first) {
   return hn::AllTrue(floats, same);
 }
 
-/// The second part: the tensors there.
+/// The second part of a step: samples the tensors there.
 template <bool uniform, bool differentials>
 HWY_INLINE void interpolate(const PacketMedium& medium, Packet& packet) {
   if (!differentials && HWY_LIKELY(packet.one_cell)) {
@@ -246,13 +250,13 @@ HWY_INLINE void interpolate(const PacketMedium& medium, Packet& packet) {
   }
 }
 
-/// A change of position, but across axes of a single voxel, where the tensor is the same.
+/// A change of position, without its components along axes of a single voxel, where the tensor does not change.
 HWY_INLINE F3 along_slopes(const PacketMedium& medium, const F3& dp) {
   return {hn::Mul(dp.x, set(medium.slope[0])), hn::Mul(dp.y, set(medium.slope[1])),
           hn::Mul(dp.z, set(medium.slope[2]))};
 }
 
-/// How the tensor changes if the position does by `along`.
+/// Change of the tensor if the position changes by `along`.
 HWY_INLINE Tensor tensor_along(const Packet& packet, const F3& along, int at) {
   Tensor dT;
   for (int c = 0; c < 8; ++c)
@@ -260,8 +264,9 @@ HWY_INLINE Tensor tensor_along(const Packet& packet, const F3& along, int at) {
   return dT;
 }
 
-/// The derivatives of exp(factor · T) V, normalised, along two parameters, and those of the positions at the end of the
-/// step: of the method's own steps. One term more than without, as the derivative of a series has one less.
+/// The derivatives along two parameters of exp(factor · T) V, normalised, and of the positions at the end of the step.
+/// They are the derivatives of the method's own steps. The series has one more term than without derivatives, because
+/// differentiation removes one.
 template <bool uniform>
 HWY_INLINE void bend_differentials(const PacketMedium& medium, Packet& packet, const Tensor& T, const F3& v, F factor,
                                    int at) {
@@ -287,8 +292,8 @@ HWY_INLINE void bend_differentials(const PacketMedium& medium, Packet& packet, c
   }
 }
 
-/// The third part: bends, and on from the middle, to the positions and directions at the end, which may be the
-/// packet's. `weakly`: no lane needs more than two terms.
+/// The third part of a step: bends the rays, and moves from the middle to the positions and directions at the end. The
+/// results may overwrite those of the packet. `weakly`: no lane needs more than two terms.
 template <bool uniform, bool differentials, bool weakly>
 HWY_INLINE void take_step_as(const PacketMedium& medium, Packet& packet, PerRay (&p)[3], PerRay (&v)[3],
                              PerRay (&u)[3]) {

@@ -16,11 +16,11 @@ namespace {
 using packets::KernelRay;
 using packets::KernelSettings;
 
-constexpr double face_margin = 1e-3;      // Voxels; more than single precision errs by.
-constexpr double least_tolerance = 1e-5;  // Of adaptive methods: below, single precision's errors would be seen.
-constexpr double surface_margin = 4e-6;   // In sizes of the volume; more than Geometry's own.
+constexpr double face_margin = 1e-3;      // Voxels; above the error of single precision.
+constexpr double least_tolerance = 1e-5;  // Of adaptive methods; below it, errors of single precision would show.
+constexpr double surface_margin = 4e-6;   // In sizes of the volume; above the margin of Geometry.
 
-/// Surfaces that rays may meet within the field, in index space; empty if there are none.
+/// A box around the surfaces that rays may meet within the field, in index space; empty if there are none.
 Eigen::AlignedBox3d surfaces_within(const TensorField& field, const Geometry& geometry) {
   if (geometry.has_cut()) return field.index_bounds();
   Eigen::AlignedBox3d volume = geometry.surfaces().bounds.bounds();
@@ -30,7 +30,7 @@ Eigen::AlignedBox3d surfaces_within(const TensorField& field, const Geometry& ge
   return world.isEmpty() ? world : box_of(corners_of(world, field.to_index()));
 }
 
-/// Whether the step from one point to another is one that only the reference takes.
+/// Whether the step from one point to another meets a surface, so that only the reference takes it.
 bool meets_surface(const Geometry& geometry, const Eigen::Vector3d& from, const Eigen::Vector3d& to) {
   const bool may_absorb = geometry.may_absorb(from, to);
   if (!may_absorb && !geometry.has_cut()) return false;
@@ -56,11 +56,11 @@ KernelSettings kernel_settings(const TensorField& field, const Geometry& geometr
   return result;
 }
 
-/// A batch on its way.
+/// A batch while it is traced.
 struct Flight {
   packets::KernelRays kernel;
-  std::vector<std::size_t> numbers;  // In the batch, of each of the kernel's rays.
-  std::vector<Travelled> travelled;  // Before the kernel.
+  std::vector<std::size_t> numbers;  // Number, in the batch, of each ray of the kernel.
+  std::vector<Travelled> travelled;  // State of each ray before the kernel.
 
   void clear() {
     kernel.rays.clear();
@@ -79,7 +79,7 @@ Eigen::Vector3d index_position(const std::array<std::int32_t, 3>& brick, const s
 
 Eigen::Vector3d to_vector(const std::array<float, 3>& v) { return {v[0], v[1], v[2]}; }
 
-/// A ray where its way begins to bend, but for its strength.
+/// A ray at the point where it begins to bend, except for its strength.
 template <int N>
 KernelRay kernel_ray(const TensorField& field, Tracer<N>& tracer) {
   KernelRay ray;
@@ -94,7 +94,7 @@ KernelRay kernel_ray(const TensorField& field, Tracer<N>& tracer) {
   return ray;
 }
 
-/// Whether the field may be strong enough, where a ray begins to bend, to ask for shorter steps.
+/// Whether the field may be so strong, where a ray begins to bend, that steps must be shorter.
 bool may_be_strong(const TensorField& field, const KernelRay& ray, double strength) {
   const double longest_voxel = field.to_world().linear().norm();
   const TensorBrick brick = field.brick({ray.brick[0], ray.brick[1], ray.brick[2]});
@@ -112,7 +112,7 @@ packets::KernelDifferential kernel_differential(const TensorField& field, const 
   return result;
 }
 
-/// Where the kernel has taken a ray.
+/// State of a ray after the kernel.
 template <int N>
 State<N> state_of(const TensorField& field, const packets::KernelRays& kernel, std::size_t i) {
   const KernelRay& ray = kernel.rays[i];
@@ -121,7 +121,8 @@ State<N> state_of(const TensorField& field, const packets::KernelRays& kernel, s
     const Eigen::AlignedBox3d& box = field.index_bounds();
     const int axis = ray.axis;
     const double face = index[axis] > box.center()[axis] ? box.max()[axis] : box.min()[axis];
-    if (std::abs(index[axis] - face) < face_margin) index[axis] = face;  // Light that grazes it may end beside it.
+    // Light nearly parallel to the face may end beside it.
+    if (std::abs(index[axis] - face) < face_margin) index[axis] = face;
   }
   State<N> state;
   state.P.col(0) = field.to_world() * index;
@@ -144,13 +145,14 @@ bool same_start(const RayBatch& batch, std::size_t i, std::size_t j) {
                                           batch.differentials[i].direction == batch.differentials[j].direction));
 }
 
-/// Lets a ray have the record of another.
+/// Copies the record of one ray to another.
 void copy_record(const Recordings& recordings, std::size_t from, std::size_t to) {
   if (recordings.paths) (*recordings.paths)[to] = (*recordings.paths)[from];
   if (recordings.tracks) (*recordings.tracks)[to] = (*recordings.tracks)[from];
 }
 
-/// Takes the rays of the batch to where light bends, those of one origin together. Those that do not come there end.
+/// Moves the rays of the batch to the points where they begin to bend; rays of one origin are moved together. Sets the
+/// end of rays that do not reach the field.
 template <int N>
 void approach(const TensorField& field, const BendingSettings& settings, RayBatch& batch, const Recordings& recordings,
               Tracer<N>& tracer, Flight& flight) {
@@ -187,8 +189,8 @@ void approach(const TensorField& field, const BendingSettings& settings, RayBatc
   }
 }
 
-/// Adds to a ray's record where the kernel has been. Its last point is not that of the ray, which is recorded when it
-/// goes on.
+/// Adds the points of the kernel to a ray's record. The ray's state after the kernel is recorded when the ray
+/// continues.
 template <int N>
 void record_points(const TensorField& field, const std::vector<packets::KernelPoint>& points, double strength,
                    Travelled travelled, const Recording& recording, Tracer<N>& tracer) {
@@ -209,7 +211,7 @@ void drop_last(Points* points) {
   if (points) points->pop_back();
 }
 
-/// From where the kernel has left a ray to its end.
+/// Follows a ray from the point where the kernel stopped to its end.
 template <int N>
 RayEnd finish(const TensorField& field, const Flight& flight, std::size_t i, double strength,
               const Recording& recording, Tracer<N>& tracer) {
@@ -225,7 +227,7 @@ RayEnd finish(const TensorField& field, const Flight& flight, std::size_t i, dou
     tracer.record(true);
     return tracer.leave();
   }
-  drop_last(recording.path);  // It begins with that point.
+  drop_last(recording.path);  // `follow` records this point again.
   drop_last(recording.track);
   return tracer.follow(double{ray.step});
 }

@@ -1,4 +1,4 @@
-// `trace` of bending.h: in packets where they serve, else ray by ray.
+// `trace` of bending.h: in packets where possible, otherwise ray by ray.
 
 #include <cmath>
 #include <stdexcept>
@@ -71,7 +71,7 @@ void trace(const TensorField& field, const Geometry& geometry, const BendingSett
 void trace(const TensorField& field, const Geometry& geometry, const BendingSettings& settings, RayBatch& batch,
            std::vector<Track>& tracks) {
   tracks.resize(batch.size());
-  for (Track& track : tracks) track.clear();  // Keeps what they have allocated.
+  for (Track& track : tracks) track.clear();  // Keeps the memory that they have allocated.
   trace_batch(field, geometry, settings, batch, {nullptr, &tracks});
 }
 

@@ -12,7 +12,7 @@
 namespace tensorray {
 namespace {
 
-constexpr double negligible = 1e-6;  // Of ‖T‖: the rounding of fields in single precision, with some room.
+constexpr double negligible = 1e-6;  // In units of ‖T‖: above the rounding of fields in single precision.
 
 using Basis = Eigen::Matrix<double, 3, 2>;
 
@@ -32,7 +32,7 @@ Basis circle_basis(const Eigen::Matrix3d& T, const Eigen::Vector3d& V) {
   return stretches.eigenvectors().rightCols<2>();
 }
 
-/// An ellipse, clamped: unit semi-axes and lengths, the longer one first.
+/// A clamped ellipse: unit semi-axes and their lengths, the longer one first.
 struct Clamped {
   Eigen::Vector3d major, minor;
   double major_length, minor_length;
@@ -43,7 +43,7 @@ Clamped clamped(const Basis& axes, const Eigen::Vector3d& V, const CrossSectionS
   const double shrink = longer > settings.greatest_radius ? settings.greatest_radius / longer : 1;
   Clamped result;
   const Eigen::Vector3d across = axes.col(0) - V.dot(axes.col(0)) * V;
-  // A vanished ellipse becomes a circle, of which any diameter is an axis.
+  // An ellipse of size zero becomes a circle, of which any diameter is an axis.
   result.major = across.norm() > 0 ? Eigen::Vector3d(across.normalized()) : upright(V, Eigen::Vector3d::UnitY());
   result.minor = V.cross(result.major);
   result.major_length = std::max(shrink * longer, settings.least_radius);
@@ -65,8 +65,8 @@ void check(const CrossSectionSettings& settings) {
 Basis ellipse(const Eigen::Matrix3d& tensor, const Eigen::Vector3d& direction) {
   const double norm = tensor.norm();
   if (!(norm > 0)) return Basis::Zero();
-  // In the plane normal to V, so that rounding does not tilt the axes; and of size one, so that squares do not
-  // overflow.
+  // Works in the plane normal to V, so that rounding does not tilt the axes, and with T scaled to norm one, so that
+  // squares do not overflow.
   const Eigen::Matrix3d T = tensor / norm;
   const Basis plane = plane_basis(direction);
   const Eigen::Matrix2d image = plane.transpose() * T * circle_basis(T, direction);
@@ -88,7 +88,7 @@ Eigen::Vector3d transported(const Eigen::Vector3d& normal, const Eigen::Vector3d
   const Eigen::Vector3d chord = to_position - from_position;
   Eigen::Vector3d carried;
   if (chord.dot(from_direction) > 0 && chord.dot(to_direction) > 0) {
-    // The second mirror takes the reflected direction to the next one; these two are never close here.
+    // The second mirror maps the reflected direction to the next one. These two directions are never close here.
     const Eigen::Vector3d mirror = to_direction - reflected(from_direction, chord);
     carried = reflected(reflected(normal, chord), mirror);
   } else {

@@ -16,8 +16,8 @@ namespace {
   throw std::invalid_argument(path.string() + ": the ending of a file of paths must be .vtp or .tck");
 }
 
-/// The slope at the middle one of three points, from those (unit) of the pieces before and behind it, of lengths `h`
-/// and `k`: that of the parabola through them.
+/// The slope of the parabola through three points at the middle point. `before` and `behind` are the unit slopes of the
+/// pieces before and after it, `h` and `k` their lengths.
 Eigen::Vector3d parabola_slope(const Eigen::Vector3d& before, double h, const Eigen::Vector3d& behind, double k) {
   const Eigen::Vector3d slope = (k * before + h * behind) / (h + k);
   return slope.norm() > 0 ? Eigen::Vector3d(slope.normalized()) : behind;
@@ -31,7 +31,7 @@ void set_directions(PathPoints& points) {
   };
   for (std::size_t i = 1; i < pieces; ++i)
     points[i].direction = parabola_slope(piece(i - 1), length(i - 1), piece(i), length(i));
-  // At the ends the same parabola: its slopes at a piece's ends are those of the piece in the mean.
+  // The ends use the same parabola: the mean of its slopes at a piece's ends is the slope of the piece.
   points.front().direction = pieces > 1 ? (2 * piece(0) - points[1].direction).normalized() : piece(0);
   points.back().direction = pieces > 1 ? (2 * piece(pieces - 1) - points[pieces - 1].direction).normalized() : piece(0);
 }
@@ -49,7 +49,7 @@ void set_changes(PathPoints& points) {
 PathPoints bare_way(const std::vector<Eigen::Vector3d>& positions) {
   PathPoints points;
   for (const Eigen::Vector3d& position : positions) {
-    // Lengths must grow, so points nearer than the rounding of the length are one.
+    // Lengths must increase. Points nearer than the rounding of the length therefore count as one.
     const double length = points.empty() ? 0 : points.back().length + (position - points.back().position).norm();
     if (!points.empty() && !(length > points.back().length)) continue;
     points.emplace_back();

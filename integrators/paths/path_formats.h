@@ -1,6 +1,6 @@
 #pragma once
 /// @file integrators/paths/path_formats.h
-/// The formats behind path_files.h.
+/// Readers and writers of the formats of path_files.h.
 
 #include <filesystem>
 #include <vector>
@@ -9,11 +9,11 @@
 
 namespace tensorray {
 
-/// @throw std::runtime_error naming the file and the reason.
+/// Write the file. @throw std::runtime_error naming the file and the reason.
 void write_vtp_paths(const std::filesystem::path& path, const std::vector<Path>& paths);
 void write_tck_paths(const std::filesystem::path& path, const std::vector<Path>& paths);
 
-/// @throw std::runtime_error with the reason (not the file).
+/// Read the file. @throw std::runtime_error with the reason (without the file's name).
 std::vector<Path> read_vtp_paths(const std::filesystem::path& path);
 std::vector<Path> read_tck_paths(const std::filesystem::path& path);
 

@@ -12,15 +12,15 @@ namespace tensorray {
 namespace {
 
 constexpr std::size_t chunk_size = 1024;  // Paths between two progress reports.
-constexpr double closest = 1e-9;          // Points nearer than this, in voxels, are one.
+constexpr double closest = 1e-9;          // Points nearer to each other than this, in voxels, count as one.
 
-/// Everything that the threads share and do not change.
+/// What the threads share and do not change.
 struct PathJob {
   const TensorField& field;
   const Geometry& geometry;
   const BendingSettings& bending;
   const PathSettings& settings;
-  double voxel = 0;  // World units.
+  double voxel = 0;  // Size of a voxel, world units.
 };
 
 PathPoints follow(const PathJob& job, const PathSeed& seed, bool backwards, RayEnd& end) {
@@ -33,8 +33,8 @@ PathPoints follow(const PathJob& job, const PathSeed& seed, bool backwards, RayE
   return std::move(paths[0]);
 }
 
-/// The way back, in the light's direction, and the way on. Both begin at the seed. (V' is the same seen from either
-/// end.)
+/// Joins the part behind the seed (`back`, traced backwards) and the part in front of it (`on`). Both begin at the
+/// seed. The result runs in the light's direction. (V' is the same from both directions.)
 PathPoints joined(const PathPoints& back, const PathPoints& on) {
   PathPoints points;
   const double before = back.empty() ? 0 : back.back().length;
@@ -57,8 +57,8 @@ void remove_outside(PathPoints& points) {
   points.erase(points.begin(), std::find_if(points.begin(), points.end(), in_field));
 }
 
-/// Moves the ends of the straight piece [first, last) off the faces where the field begins, by `gap`.
-/// @return false if it is too short for that.
+/// Moves the ends of the straight piece [first, last) by `gap` away from the faces where the field begins.
+/// @return false if the piece is too short.
 bool separate(PathPoints& points, std::size_t first, std::size_t last, double gap) {
   if (points[last - 1].length - points[first].length <= 2 * gap) return false;
   const auto move = [&](PathPoint& point, double by) {
@@ -70,8 +70,8 @@ bool separate(PathPoints& points, std::size_t first, std::size_t last, double ga
   return true;
 }
 
-/// Sees to it that lengths grow from point to point: separates the pairs where the field begins or ends, and drops
-/// points that coincide.
+/// Makes lengths increase from point to point: separates the pairs of points where the field begins or ends, and
+/// removes points that coincide.
 void remove_coincident(PathPoints& points, double gap, double least) {
   PathPoints kept;
   for (std::size_t first = 0; first < points.size();) {
@@ -92,13 +92,13 @@ PathPoints thinned(const PathPoints& points, double tolerance, double tensor_tol
     const double apart = (a.position + t * (b.position - a.position) - point.position).norm();
     const double unlike = (a.tensor + t * (b.tensor - a.tensor) - point.tensor).norm();
     const double norm = std::max({a.tensor.norm(), b.tensor.norm(), point.tensor.norm()});
-    // Zero is allowed zero.
+    // An error of zero is always allowed.
     const auto over = [](double value, double allowed) { return value > 0 ? value / allowed : 0; };
     return std::max(over(apart, tolerance), over(unlike, tensor_tolerance * norm));
   };
   const std::vector<std::size_t> needed = tensorray::thinned(points.size(), error);
   PathPoints kept;
-  kept.reserve(needed.size());  // There may be many paths.
+  kept.reserve(needed.size());  // Saves memory: there may be many paths.
   for (const std::size_t i : needed) kept.push_back(points[i]);
   return kept;
 }

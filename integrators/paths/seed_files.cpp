@@ -25,7 +25,7 @@ std::vector<std::string> words_of(std::string line) {
   return words;
 }
 
-/// Whatever the locale. @return false if `word` is not a number.
+/// Parses a number, independent of the locale. @return false if `word` is not a number.
 bool parse(const std::string& word, double& value) {
   const char* first = word.data() + (word.size() > 1 && word[0] == '+' ? 1 : 0);
   const char* last = word.data() + word.size();

@@ -13,14 +13,15 @@
 namespace tensorray {
 namespace {
 
-constexpr double disk_distance = 0.75;  // In √(area / count): below what random packing reaches, 0.83.
+constexpr double disk_distance = 0.75;  // In units of √(area / count); random packing reaches 0.83.
 constexpr std::uint64_t most_disks = 10'000'000;
 
 void require_some(std::uint64_t count) {
   if (count == 0) throw std::invalid_argument("seeds need a count of 1 or more");
 }
 
-/// Points in cells that are too small for two of them: finds whether any lies within a distance of another.
+/// Points in a grid whose cells are too small for two points. It finds whether a point lies within a distance of
+/// another one.
 class NeighbourGrid {
  public:
   NeighbourGrid(const Eigen::Vector2d& corner, const Eigen::Vector2d& extent, double distance)
@@ -31,7 +32,7 @@ class NeighbourGrid {
         rows_(static_cast<int>(extent.y() / cell_) + 1),
         cells_(static_cast<std::size_t>(columns_) * rows_, empty) {}
 
-  /// Adds `point` if there is none nearer than the distance. @return whether it did.
+  /// Adds `point` if no other point is nearer than the distance. @return whether it was added.
   bool add(const Eigen::Vector2d& point) {
     const Eigen::Vector2i at = ((point - corner_) / cell_).cast<int>();
     for (int y = std::max(at.y() - 2, 0); y <= std::min(at.y() + 2, rows_ - 1); ++y)
@@ -68,8 +69,8 @@ std::vector<Eigen::Vector3d> grid_seeds(const Beam& beam, std::uint64_t count) {
   return seeds;
 }
 
-/// Dart throwing. A fraction of 0.44 of the area is covered by discs that do not overlap; random darts reach 0.547
-/// before there is no room left, so that each finds its place.
+/// Dart throwing. The discs, which do not overlap, cover a fraction of 0.44 of the area. Random darts reach 0.547
+/// before no room is left, so that the loop ends.
 std::vector<Eigen::Vector3d> poisson_disk_seeds(const Beam& beam, std::uint64_t count, std::uint64_t seed) {
   require_some(count);
   if (count > most_disks) throw std::invalid_argument("there are at most 10,000,000 Poisson disk seeds: use the grid");

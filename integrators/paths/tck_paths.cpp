@@ -1,5 +1,5 @@
 // Tracks of MRtrix (mrtrix.readthedocs.io, "Image and other file formats", "Tracks file format"): a header of
-// `key: value` lines, then triplets; a track ends with NaNs, the file with infinities.
+// `key: value` lines, then triplets. A triplet of NaNs ends a track, a triplet of infinities ends the file.
 
 #include <algorithm>
 #include <array>
@@ -31,17 +31,17 @@ void put(const Eigen::Vector3d& triplet, std::string& text) {
 std::string header_text(std::size_t count) {
   const std::string before = magic + "\ndatatype: Float32LE\ncount: " + std::to_string(count) + "\nfile: . ";
   const std::string behind = "\nEND\n";
-  // The offset counts its own digits.
+  // The offset includes the digits of the offset itself.
   std::size_t offset = before.size() + behind.size();
   while (before.size() + std::to_string(offset).size() + behind.size() != offset) ++offset;
   return before + std::to_string(offset) + behind;
 }
 
 struct Header {
-  int bytes = 0;  ///< Of a number.
+  int bytes = 0;  ///< Size of a number.
   ByteOrder order = ByteOrder::little;
-  std::optional<std::uint64_t> count;  ///< Of tracks.
-  std::uint64_t offset = 0;            ///< Of the first triplet.
+  std::optional<std::uint64_t> count;  ///< Number of tracks.
+  std::uint64_t offset = 0;            ///< Offset of the first triplet in the file.
 };
 
 std::uint64_t to_number(const std::string& key, const std::string& text) {
@@ -76,7 +76,7 @@ void parse_line(const std::string& line, Header& header) {
 }
 
 Header read_header(std::ifstream& file, std::uint64_t file_size) {
-  constexpr std::size_t longest_first_line = 100, longest_line = 1 << 20;  // What is longer is another format.
+  constexpr std::size_t longest_first_line = 100, longest_line = 1 << 20;  // Longer lines mean another format.
   Header header;
   std::string line;
   bool first = true;

@@ -14,8 +14,8 @@
 namespace tensorray {
 namespace {
 
-constexpr std::uint32_t block = 1u << 16;              // Candidates that are judged before their number is looked at.
-constexpr std::uint32_t enough_to_give_up = 1u << 20;  // Candidates none of which is wanted.
+constexpr std::uint32_t block = 1u << 16;  // Candidates that are evaluated between two checks of their number.
+constexpr std::uint32_t enough_to_give_up = 1u << 20;  // Stop after so many candidates if none is selected.
 constexpr std::uint32_t most_candidates = 1u << 26;
 
 Eigen::Vector3d candidate(const Eigen::AlignedBox3d& box, std::uint64_t seed, std::uint32_t i) {
@@ -23,7 +23,7 @@ Eigen::Vector3d candidate(const Eigen::AlignedBox3d& box, std::uint64_t seed, st
   return box.min() + u.cwiseProduct(box.sizes());
 }
 
-/// What the candidates from `first` on are worth; NaN outside of the extent.
+/// Values of the candidates from `first` on; NaN outside the extent.
 std::vector<double> judge(const TensorField& field, const Eigen::AlignedBox3d& box, const Threshold& threshold,
                           std::uint64_t seed, std::uint32_t first) {
   std::vector<double> values(block, std::nan(""));

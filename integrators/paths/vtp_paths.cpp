@@ -14,7 +14,7 @@ namespace {
 
 using RowMajorMatrix = Eigen::Matrix<double, 3, 3, Eigen::RowMajor>;
 
-/// Makes a DataArray of values that are numbers, vectors or matrices.
+/// Makes a DataArray from numbers, vectors or matrices.
 template <class Number>
 class Column {
  public:
@@ -53,7 +53,7 @@ DataArray per_path(const std::vector<Path>& paths, const Get& get) {
 
 void add_axes(const std::vector<Path>& paths, PolylineData& data) {
   CrossSectionSettings bare;
-  bare.least_radius = 1e-300;  // Zero, once in single precision.
+  bare.least_radius = 1e-300;  // Becomes zero in single precision.
   Column<float> major(3), minor(3);
   for (const Path& path : paths)
     for (const CrossSection& section : cross_sections(path.points, bare)) {
@@ -90,7 +90,8 @@ PolylineData data_of(const std::vector<Path>& paths) {
   return data;
 }
 
-/// The values of an array that was read, if it is there and has that many components; all are finite.
+/// The values of an array of the file; null if it is missing or has another number of components.
+/// @throw std::runtime_error if a value is not finite.
 const double* find(const std::map<std::string, DataArray>& arrays, const std::string& name, int components) {
   const auto found = arrays.find(name);
   if (found == arrays.end() || found->second.components != components) return nullptr;
@@ -100,7 +101,7 @@ const double* find(const std::map<std::string, DataArray>& arrays, const std::st
   return values.data();
 }
 
-/// The arrays of which ways are made.
+/// The arrays that hold the points of paths; null if missing.
 struct PointArrays {
   const double* direction;
   const double* length;
@@ -124,7 +125,7 @@ PathPoint path_point(const PolylineData& data, const PointArrays& arrays, std::s
   point.in_field = arrays.in_field[i] != 0;
   const double norm = point.direction.norm();
   if (!(norm > 0)) throw std::runtime_error("the direction of point " + std::to_string(i) + " is zero");
-  // Other programs interpolate, or keep single precision; what is a unit vector stays as it is to the last bit.
+  // Other programs may interpolate, or use single precision. A unit vector keeps every bit.
   if (std::abs(norm - 1) > 1e-12) point.direction /= norm;
   return point;
 }

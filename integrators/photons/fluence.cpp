@@ -14,8 +14,8 @@
 namespace tensorray {
 namespace {
 
-constexpr int finest_bits = 32;  // The last bit of a sum is 2^-32 of a voxel's edge ...
-constexpr int room_bits = 60;    // ... unless sixteen edges of each ray need more than 64 bits.
+constexpr int finest_bits = 32;  // The last bit of a sum is 2^-32 of a voxel's edge.
+constexpr int room_bits = 60;    // It is larger if sixteen edges for each ray need more than 64 bits.
 
 double quantum_for(std::uint64_t rays) {
   int bits = 0;
@@ -25,8 +25,8 @@ double quantum_for(std::uint64_t rays) {
 
 Eigen::Vector3i block_of(const Eigen::Vector3i& voxel) { return {voxel.x() >> 3, voxel.y() >> 3, voxel.z() >> 3}; }
 
-/// The blocks that hold the voxels of the field's bricks, in order. Bricks have the voxels behind their far faces, too:
-/// on the far faces of the extent, these are of no other brick.
+/// The blocks that hold the voxels of the field's bricks, in order. A brick also has the voxels on its far faces. On
+/// the far faces of the extent, these belong to no other brick.
 std::vector<Eigen::Vector3i> blocks_of(const TensorField& field) {
   const Eigen::Vector3i last_voxel = field.voxels().max().cast<int>(), last = block_of(last_voxel);
   std::vector<Eigen::Vector3i> blocks;
@@ -34,7 +34,7 @@ std::vector<Eigen::Vector3i> blocks_of(const TensorField& field) {
   for (const Eigen::Vector3i& brick : field.bricks())
     for (int bits = 0; bits < 8; ++bits) {
       const Eigen::Array3i step(bits & 1, bits >> 1 & 1, bits >> 2);
-      const Eigen::Array3i behind = brick.array() + step;  // Each step is to voxels that are the extent's last.
+      const Eigen::Array3i behind = brick.array() + step;  // A step leads only to last voxels of the extent.
       const auto is_last = behind == last.array() && TensorBlock::size * behind == last_voxel.array();
       if ((step == 0 || is_last).all()) blocks.emplace_back(behind.matrix());
     }
@@ -45,7 +45,7 @@ std::vector<Eigen::Vector3i> blocks_of(const TensorField& field) {
   return blocks;
 }
 
-/// The part of a voxel that lies within the bounds, of its volume.
+/// The fraction of a voxel's volume that lies within the bounds.
 double part_within(const Eigen::AlignedBox3d& bounds, const Eigen::Vector3i& voxel) {
   const Eigen::Vector3d center = voxel.cast<double>(), half = Eigen::Vector3d::Constant(0.5);
   return Eigen::AlignedBox3d(center - half, center + half).intersection(bounds).sizes().prod();
@@ -78,7 +78,7 @@ FluenceSums::Sum* FluenceSums::sums_of(std::uint32_t number) {
   Sum* sums = block.load(std::memory_order_acquire);
   if (sums) return sums;
   std::unique_ptr<Sum[]> made(new Sum[planes_ * TensorBlock::voxels]());
-  // Unless another thread has been faster.
+  // Another thread may have set the block first.
   if (block.compare_exchange_strong(sums, made.get(), std::memory_order_acq_rel)) return made.release();
   return sums;
 }
@@ -86,7 +86,7 @@ FluenceSums::Sum* FluenceSums::sums_of(std::uint32_t number) {
 void FluenceSums::add(std::size_t channel, const Track& track) {
   const std::size_t plane = bands_ ? channel : 0;
   const double weight = (bands_ ? 1 : powers_[channel] / greatest_power_) / (edge_ * quantum_);
-  // What is added is rounded such that the whole way is right to one quantum.
+  // Rounds what is added so that the sum over the whole track is exact to one quantum.
   double way = 0;
   std::uint64_t added = 0;
   Eigen::Vector3d from;

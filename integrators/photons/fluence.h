@@ -1,6 +1,6 @@
 #pragma once
 /// @file integrators/photons/fluence.h
-/// The light inside the volume: how much of it there is at each voxel.
+/// The fluence of light inside the volume, for each voxel.
 
 #include <atomic>
 #include <cstdint>
@@ -14,36 +14,36 @@
 
 namespace tensorray {
 
-/// Sums the ways of rays voxel by voxel, in the field's own voxels:
-///   fluence = Σ power · length of the way in the voxel / volume of the voxel,
-/// with power and irradiance of the undisturbed beam as units: where light goes straight it is 1, throughout the beam.
-/// Of the outermost voxels only the part counts that the volume's extent leaves of them (those of an axis are cut in
-/// half by it): their volume is that part's, so that they, too, have 1.
+/// Sums the lengths of rays in each of the field's own voxels:
+///   fluence = Σ power · length of the ray in the voxel / volume of the voxel.
+/// The units are the power and irradiance of the undisturbed beam, so that the fluence is 1 where light goes straight
+/// within the beam. Only the part of a voxel within the volume's extent counts (the extent cuts the outermost voxels of
+/// an axis in half). Volumes are those of these parts, so that outermost voxels also have a fluence of 1.
 ///
-/// Sums are integers, of lengths rounded to 2^-32 of a voxel's edge (or more, where very many rays need the room), so
-/// that they are the same in whatever order rays come. They are kept in the blocks of 8³ voxels that are in the field's
-/// memory: in the rest of the extent, where nothing bends light, none is. Memory follows those of them that light
-/// reaches, however large the extent: eight bytes for each sum.
+/// Sums are integers: lengths are rounded to 2^-32 of a voxel's edge (or to more, if there are very many rays). The
+/// result therefore does not depend on the order of the rays. Sums are kept in blocks of 8³ voxels, for the blocks that
+/// are in the field's memory. The rest of the extent, where nothing bends light, has no sums. Memory grows with the
+/// number of blocks that light reaches, whatever the extent: eight bytes for each sum.
 class FluenceSums {
  public:
-  /// @param powers  Of the channels, any unit; >= 0, one of them > 0.
-  /// @param bands   Whether each channel has a sum of its own, for one grid each; or all share one.
-  /// @param rays    That will be added, about: sums have room for sixteen voxels' edges of each in one voxel.
+  /// @param powers  Power of each channel, any unit; >= 0, at least one > 0.
+  /// @param bands   Whether each channel has its own sums and its own grid; otherwise all channels share the sums.
+  /// @param rays    Approximate number of rays that will be added. A sum has room for sixteen voxel edges of each ray.
   /// `field` must outlive the sums. @throw std::invalid_argument if there is no power.
   FluenceSums(const TensorField& field, std::vector<double> powers, bool bands, std::uint64_t rays);
   ~FluenceSums();
   FluenceSums(const FluenceSums&) = delete;
   FluenceSums& operator=(const FluenceSums&) = delete;
 
-  /// Adds a ray of the channel. Any number of threads may add at once.
+  /// Adds a ray of the channel. Any number of threads may add rays at once.
   void add(std::size_t channel, const Track& track);
 
-  /// The grids, fog volumes, active where light has been: that of all channels, and then, with `bands`, that of each
-  /// one (1 is its own undisturbed beam). They are not named yet. Runs on all threads.
+  /// The grids, as fog volumes: the one of all channels, then, with `bands`, one for each channel (1 is the undisturbed
+  /// beam of that channel). Voxels that light has reached are active. The grids have no names yet. Runs on all threads.
   /// @param ray_area  Cross section of the beam that a ray of each channel stands for, world units².
   std::vector<ScalarGrid> grids(double ray_area) const;
 
-  /// Not while rays are added.
+  /// Do not call it while rays are added.
   std::size_t memory_bytes() const;
 
  private:
@@ -55,13 +55,13 @@ class FluenceSums {
   const TensorField& field_;
   std::vector<double> powers_;  // Their sum is 1.
   bool bands_;
-  std::size_t planes_;  // Sums of a voxel.
-  double edge_;         // Of a voxel, world units: what lengths are measured by.
-  double quantum_;      // Of a sum: this part of an edge.
+  std::size_t planes_;  // Number of sums of a voxel.
+  double edge_;         // Edge of a voxel, world units; the unit of lengths.
+  double quantum_;      // Value of the last bit of a sum, in edges.
   double greatest_power_;
-  std::vector<Eigen::Vector3i> places_;    // Of the blocks, in steps of a block; in order.
-  BrickIndex index_;                       // Which of them is at a place.
-  std::vector<std::atomic<Sum*>> blocks_;  // Of each: 8³ sums, plane by plane; null where no light has been.
+  std::vector<Eigen::Vector3i> places_;    // Positions of the blocks, in units of blocks; in order.
+  BrickIndex index_;                       // Finds the number of the block at a position.
+  std::vector<std::atomic<Sum*>> blocks_;  // 8³ sums for each plane of a block; null where no light has been.
 };
 
 }  // namespace tensorray

@@ -16,17 +16,18 @@
 namespace tensorray {
 namespace {
 
-// Positions whose landings are sorted and deposited together: many, so that all threads find work in it, and as light
-// that starts together lands together; but no more rays than these, whose landings take 16 MiB, and twice that sorted.
+// Largest number of positions whose landings are sorted and deposited together. Many positions give work to all
+// threads, and light that starts together lands together. The number of rays is also limited: their landings take 16
+// MiB, and twice that when they are sorted.
 constexpr std::uint64_t largest_chunk = 1u << 16, rays_in_chunk = 1u << 20;
-constexpr std::uint64_t task_size = 32;       // Positions that one thread traces before it takes others.
-constexpr std::uint64_t rays_in_batch = 512;  // About; all wavelengths of a position stay together.
+constexpr std::uint64_t task_size = 32;       // Number of positions that one thread traces as one task.
+constexpr std::uint64_t rays_in_batch = 512;  // Approximate; all wavelengths of a position stay together.
 
 double seconds_since(std::chrono::steady_clock::time_point start) {
   return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
 }
 
-/// From the world to pixels of a plate.
+/// Maps world positions to pixels of a plate.
 struct PixelMap {
   Eigen::Matrix<double, 2, 3> linear;
   Eigen::Vector2d offset, size;
@@ -37,13 +38,13 @@ struct PixelMap {
     linear.row(1) = -size.y() / plate.size.y() * plate.up.transpose();
   }
 
-  /// Rounding may take a hit on the plate's edge outside of it.
+  /// Clamps the result: rounding may move a hit on the plate's edge off the plate.
   Eigen::Vector2d operator()(const Eigen::Vector3d& world) const {
     return (linear * world + offset).cwiseMax(0).cwiseMin(size);
   }
 };
 
-/// Everything that the threads share and do not change.
+/// What the threads share and do not change.
 struct PhotonJob {
   const TensorField& field;
   const Geometry& geometry;
@@ -55,39 +56,39 @@ struct PhotonJob {
   const BeamSampler& positions;
   const PixelMap to_pixel;
   int rays_per_position = 0;
-  int channels_per_ray = 0;  // One of so many.
+  int channels_per_ray = 0;  // A ray carries one of this number of channels.
   double ray_area = 0;
-  FluenceSums* fluence = nullptr;  // Null unless asked for.
+  FluenceSums* fluence = nullptr;  // Null if no fluence is wanted.
 
   std::uint64_t chunk_size() const {
     return std::clamp(rays_in_chunk / rays_per_position, std::uint64_t{1}, largest_chunk);
   }
 };
 
-/// What a thread works with, and what it has counted.
+/// The buffers of a thread, and its counts.
 struct Worker {
   RayBatch batch;
   std::vector<Track> tracks;
-  std::vector<std::uint16_t> channels;  // Of the batch's rays.
+  std::vector<std::uint16_t> channels;  // The channel of each ray of the batch.
   std::vector<EndCounts> ends;
   std::uint64_t ray_steps = 0;
 };
 using Workers = tbb::enumerable_thread_specific<Worker>;
 
-/// A part of the emission, and what becomes of it.
+/// A part of the emission, with its landings.
 struct Chunk {
-  std::vector<Emission> emissions;           // Along a Morton curve.
-  std::vector<DensityPoint> landings;        // Nowhere: not on the plate.
-  std::vector<std::vector<Photon>> photons;  // By task, if they are kept.
+  std::vector<Emission> emissions;           // Ordered along a Morton curve.
+  std::vector<DensityPoint> landings;        // One for each ray; a default DensityPoint if it is not on the plate.
+  std::vector<std::vector<Photon>> photons;  // One list for each task, if photons are kept.
 };
 
-/// The channel of the position's ray number `ray`: one in each of `rays_per_position` equal ranges of channels.
+/// The channel of ray number `ray` of a position: one from each of `rays_per_position` equal ranges of channels.
 int channel_of(const PhotonJob& job, int ray, double stratum) {
   const int range = job.channels_per_ray;
   return ray * range + std::min(static_cast<int>(stratum * range), range - 1);
 }
 
-/// Puts zeros between the bits.
+/// Inserts a zero bit above each bit.
 std::uint64_t spread_bits(std::uint32_t value) {
   std::uint64_t bits = value;
   bits = (bits | bits << 8) & 0x00ff00ffu;
@@ -96,14 +97,14 @@ std::uint64_t spread_bits(std::uint32_t value) {
   return (bits | bits << 1) & 0x55555555u;
 }
 
-/// Where a position lies on a Morton curve across the beam.
+/// The position on a Morton curve across the beam.
 std::uint64_t morton_code(const Eigen::Vector2d& across) {
   const auto cell = [](double value) { return static_cast<std::uint32_t>(std::clamp(value, 0.0, 1.0) * 0xffff); };
   return spread_bits(cell(across.x())) | spread_bits(cell(across.y())) << 1;
 }
 
-/// The positions [first, last) that emit, in an order in which neighbours follow each other: their light crosses the
-/// same cells of the field, and falls on the same pixels.
+/// Samples the positions [first, last) that emit. Neighbours follow each other in the result, because their light
+/// crosses the same cells of the field and falls on the same pixels.
 void emit(const BeamSampler& positions, std::uint64_t first, std::uint64_t last, std::vector<Emission>& emissions) {
   constexpr std::uint64_t none = ~std::uint64_t{0};
   const std::size_t count = last - first;
@@ -151,8 +152,9 @@ Photon make_photon(const PhotonJob& job, const Worker& worker, std::size_t ray, 
   return photon;
 }
 
-/// Counts the rays of a batch, and writes the landings of its positions' first rays from `landings` on, those of their
-/// second rays `step` further, and so on: the same wavelength of neighbouring positions falls on the same pixels.
+/// Counts the rays of a batch and writes their landings: those of the first ray of each position from `landings` on,
+/// those of the second rays `step` further on, and so on. Landings of one wavelength from neighbouring positions, which
+/// fall on the same pixels, are then next to each other.
 void collect_batch(const PhotonJob& job, const DensityEstimator& estimator, Worker& worker, DensityPoint* landings,
                    std::size_t step) {
   const std::size_t rays = job.rays_per_position;
@@ -188,7 +190,7 @@ void trace_task(const PhotonJob& job, const DensityEstimator& estimator, std::si
   }
 }
 
-/// Traces a chunk's positions. Progress is told by the thread that called.
+/// Traces the positions of a chunk. Only the calling thread reports progress.
 void trace_chunk(const PhotonJob& job, const DensityEstimator& estimator, std::uint64_t first, std::uint64_t last,
                  Workers& workers, Chunk& chunk) {
   emit(job.positions, first, last, chunk.emissions);
@@ -206,7 +208,7 @@ void trace_chunk(const PhotonJob& job, const DensityEstimator& estimator, std::u
   });
 }
 
-/// Adds the counts, which are integers: their sum has no order.
+/// Adds the counts of all threads. They are integers, so that the order does not matter.
 void add_counts(const Workers& workers, int rays_per_position, PhotonDistribution& result) {
   std::uint64_t rays = 0;
   for (const Worker& worker : workers) {
@@ -221,7 +223,7 @@ void add_counts(const Workers& workers, int rays_per_position, PhotonDistributio
   result.positions = rays / rays_per_position;
 }
 
-/// Null unless it is asked for.
+/// Null if no fluence is wanted.
 std::unique_ptr<FluenceSums> make_fluence(const PhotonJob& job) {
   if (job.settings.fluence == FluenceKind::none) return nullptr;
   std::vector<double> powers;
@@ -248,7 +250,7 @@ PhotonDistribution distribute_photons(const TensorField& field, const Geometry& 
   const Plate& plate = *geometry.surfaces().plate;
   const int rays = rays_per_position(channels, settings);
   const BeamSampler positions(beam, settings.pattern, settings.photons, settings.seed);
-  // Those that are references; each has a type of its own.
+  // The references first; each has a different type, so that they cannot be confused.
   PhotonJob job{field, geometry, beam, channels, bending, settings, progress, positions, PixelMap(plate)};
   job.rays_per_position = rays;
   job.channels_per_ray = static_cast<int>(channels.size()) / rays;

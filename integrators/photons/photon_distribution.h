@@ -1,6 +1,6 @@
 #pragma once
 /// @file integrators/photons/photon_distribution.h
-/// The light that a field throws on a plate (Zheng and Pang 2003, section on photon distribution).
+/// Density of light on a plate behind a field (Zheng and Pang 2003, section on photon distribution).
 
 #include <cstdint>
 #include <vector>
@@ -15,36 +15,38 @@
 
 namespace tensorray {
 
-/// Whether to return the light inside the volume, and as how many grids.
+/// Which grids of the light inside the volume are returned.
 enum class FluenceKind { none, all_light, bands };
 
 struct PhotonSettings {
-  std::uint64_t photons = 1u << 20;  ///< About how many positions emit; > 0.
+  std::uint64_t photons = 1u << 20;  ///< Approximate number of positions that emit; > 0.
   BeamPattern pattern = BeamPattern::stratified;
-  int channels_per_photon =
-      0;  ///< How many channels each position carries, stratified; a divisor of their number; 0: all.
+
+  /// Number of channels that each position carries, stratified; a divisor of the number of channels; 0: all.
+  int channels_per_photon = 0;
   std::uint64_t seed = 0;
   DensitySettings density;
-  bool keep_photons = false;  ///< Whether to return the photon map: 44 bytes a photon and channel.
+  bool keep_photons = false;  ///< Whether to return the photon map, which takes 44 bytes for each photon and channel.
   FluenceKind fluence = FluenceKind::none;
 
-  /// Of the channels' light; or none. With colours the film is the light's picture, whose channels are red, green and
-  /// blue, and takes a third of the time and a tenth of the memory that 32 channels' own planes do.
+  /// Colour of each channel's light; or empty. With colours, the film has the channels red, green and blue instead of
+  /// one for each channel. Compared with 32 channels this takes a third of the time and a tenth of the memory.
   std::vector<Eigen::Vector3d> colors;
 };
 
 struct PhotonDistribution {
-  Film irradiance;    ///< A channel each, 1 being the undisturbed beam's irradiance in that channel; or
-                      ///< their sum in colour.
-  PhotonMap photons;  ///< Empty unless asked for; ordered by emission (neighbours together), then channel.
-  std::vector<ScalarGrid> fluence;  ///< Empty unless asked for: all channels, then each one; not named. See fluence.h.
+  Film irradiance;  ///< One plane for each channel, where 1 is the irradiance of the undisturbed beam in that channel;
+                    ///< or their sum in colour.
+  PhotonMap photons;  ///< Empty unless `keep_photons`; ordered by emission (neighbours together), then by channel.
+  std::vector<ScalarGrid> fluence;  ///< Empty unless `fluence` is set: all channels, then, for bands, each one; without
+                                    ///< names. See fluence.h.
 
-  std::uint64_t positions = 0;  ///< That emitted.
-  std::vector<EndCounts> ends;  ///< A channel each. Every ray of a channel has the same power, so that emitted =
-                                ///< deposited + missed + stopped holds exactly.
+  std::uint64_t positions = 0;  ///< Number of positions that emitted.
+  std::vector<EndCounts> ends;  ///< One entry for each channel. Every ray of a channel has the same power, so that
+                                ///< emitted = deposited + missed + stopped holds exactly.
   double ray_area = 0;          ///< Cross section of the beam that one ray stands for, world units².
   std::uint64_t ray_steps = 0, tensor_samples = 0;
-  double seconds_tracing = 0;  ///< With emission.
+  double seconds_tracing = 0;  ///< Includes emission.
   double seconds_density = 0;  ///< From landings to the film.
 };
 

@@ -10,7 +10,7 @@ namespace {
 
 constexpr double probe_flexibility = 0.2;
 constexpr double wanted_turn = 0.15;    // Radians.
-constexpr double smallest_turn = 1e-7;  // Of a ray that turns at all.
+constexpr double smallest_turn = 1e-7;  // Radians; a ray that turns less counts as straight.
 constexpr std::uint64_t probe_count = 1024;
 
 std::vector<Eigen::Vector3d> probe_origins(const Beam& beam) {
@@ -22,12 +22,12 @@ std::vector<Eigen::Vector3d> probe_origins(const Beam& beam) {
   return origins;
 }
 
-/// How far the median ray turns with that scale.
+/// The turn of the median ray with this scale.
 AutoScale probe(const TensorField& field, const Geometry& geometry, const Beam& beam,
                 const std::vector<Eigen::Vector3d>& origins, double scale, const Progress& progress) {
   BendingSettings settings;
   settings.scale = scale;
-  settings.step = 0.5;  // A fixed step: the splitting is stable however large the scale.
+  settings.step = 0.5;  // A fixed step, because the splitting method is stable at any scale.
   std::vector<double> turns(origins.size());
   tbb::parallel_for(std::size_t{0}, origins.size(), [&](std::size_t i) {
     if (progress.cancelled) throw Cancelled();
@@ -54,8 +54,8 @@ AutoScale choose_scale(const TensorField& field, const Geometry& geometry, const
   const std::vector<Eigen::Vector3d> origins = probe_origins(beam);
   const double depth = (field.to_world().linear() * field.index_bounds().sizes()).norm();
 
-  // No ray turns by more than s‖T‖ times its length: start where that is small, and go up to the first scale that
-  // turns enough.
+  // No ray turns by more than s‖T‖ times its length. Start where this bound is small, and double the scale until rays
+  // turn enough.
   AutoScale low{0.1 * wanted_turn / (probe_flexibility * norm * depth), 0, 0}, high = low;
   AutoScale best{1, 0, 0};
   for (int doubling = 0; doubling < 50 && high.median_turn < wanted_turn; ++doubling) {
@@ -63,7 +63,7 @@ AutoScale choose_scale(const TensorField& field, const Geometry& geometry, const
     high = probe(field, geometry, beam, origins, 2 * low.scale, progress);
     if (high.median_turn > best.median_turn) best = high;
   }
-  if (best.median_turn < wanted_turn) return best;  // It turns no ray, or never enough.
+  if (best.median_turn < wanted_turn) return best;  // No scale turns rays enough.
   for (int i = 0; i < 20; ++i) {
     const AutoScale middle = probe(field, geometry, beam, origins, (low.scale + high.scale) / 2, progress);
     (middle.median_turn < wanted_turn ? low : high) = middle;

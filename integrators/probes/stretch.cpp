@@ -22,7 +22,7 @@ double log_stretch(const Eigen::Matrix<double, 3, 2>& m) {
   return std::log(std::max(greatest, std::numeric_limits<double>::min())) / 2;
 }
 
-/// Calls `work(i)` for each i below `count` on all threads, and tells of it.
+/// Calls `work(i)` for each i below `count` on all threads, and reports progress.
 template <class Work>
 void in_parallel(std::size_t count, const Progress& progress, const Work& work) {
   for (std::size_t first = 0; first < count; first += chunk_size) {
@@ -37,7 +37,7 @@ void in_parallel(std::size_t count, const Progress& progress, const Work& work) 
 
 constexpr double most_voxels = 1 << 30;
 
-/// A lattice in the volume: its middle is the extent's.
+/// A lattice in the volume, with the same centre as the extent.
 struct Lattice {
   Eigen::Vector3i size;
   Eigen::Affine3d to_world;
@@ -56,7 +56,7 @@ Lattice make_lattice(const TensorField& field, int resolution) {
   return lattice;
 }
 
-/// Every block that a lattice needs, in order.
+/// All blocks of a lattice, in order.
 std::deque<ScalarBlock> blocks_of(const Lattice& lattice) {
   constexpr int size = TensorBlock::size;
   std::deque<ScalarBlock> blocks;
