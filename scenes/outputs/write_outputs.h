@@ -15,7 +15,8 @@ namespace tensorray {
 /// Files being written, by the key of the output.
 using OutputFiles = std::map<std::string, OutputFile>;
 
-/// Opens the files of the scene's outputs, so that one that cannot be written is known before the work is done.
+/// Opens the files of the scene's outputs, so that one that cannot be written is known before the work is done; so is
+/// a .vtp file that lacks its program (vtk_files.h).
 /// @throw std::runtime_error naming the file and the fix.
 OutputFiles open_outputs(const OutputDescription& output);
 
