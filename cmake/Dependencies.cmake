@@ -47,10 +47,6 @@ if(TENSORRAY_IMPORT)
   target_link_libraries(NIfTI::nifti2 INTERFACE ${NIfTI_LIBRARY} ${NIfTI_znz_LIBRARY})
 endif()
 
-if(TENSORRAY_TESTS)
-  find_package(GTest REQUIRED)
-endif()
-
 # What the benchmark compares with, where it is installed.
 if(TENSORRAY_BENCHMARK)
   find_path(NanoVDB_INCLUDE_DIR nanovdb/NanoVDB.h)

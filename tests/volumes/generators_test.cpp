@@ -1,19 +1,12 @@
 #include "volumes/tensors/generators.h"
 
 #include <cmath>
-#include <filesystem>
 #include <functional>
 
 #include <Eigen/Eigenvalues>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
-#include <vtkDataArray.h>
-#include <vtkImageData.h>
-#include <vtkNew.h>
-#include <vtkPointData.h>
-#include <vtkXMLImageDataReader.h>
 
-#include "tests/data_folder.h"
 #include "volumes/tensors/eigenvalues.h"
 
 namespace tensorray {
@@ -23,8 +16,6 @@ using Eigen::Matrix3d;
 using Eigen::Vector3d;
 
 constexpr double pi = 3.14159265358979323846;
-
-std::filesystem::path data_file(const std::string& name) { return test::data_folder() / name; }
 
 /// The tensor of a generated grid at an index.
 Matrix3d at(const TensorGrid& grid, const Eigen::Vector3i& index) {
@@ -46,27 +37,6 @@ void for_each(const TensorGrid& grid, const std::function<void(const Vector3d&, 
       if (block.active[offset])
         visit(grid.to_world * (block.origin + TensorBlock::position(offset)).cast<double>(),
               block.values[offset].cast<double>());
-}
-
-TEST(PointLoad, AgreesWithTheFieldOfVtk) {
-  const auto path = data_file("pointload/pointload_32.vti");
-  if (!std::filesystem::exists(path)) GTEST_SKIP() << "no " << path;
-  vtkNew<vtkXMLImageDataReader> reader;
-  reader->SetFileName(path.c_str());
-  reader->Update();
-  vtkImageData* image = reader->GetOutput();
-  vtkDataArray* stress = image->GetPointData()->GetArray("stress");
-  ASSERT_NE(stress, nullptr);
-  ASSERT_EQ(stress->GetNumberOfComponents(), 9);
-  ASSERT_EQ(image->GetNumberOfPoints(), 32 * 32 * 32);
-  for (vtkIdType i = 0; i < image->GetNumberOfPoints(); ++i) {
-    Vector3d position;
-    Matrix3d expected;
-    image->GetPoint(i, position.data());
-    stress->GetTuple(i, expected.data());
-    const Matrix3d tensor = point_load_stress(position - Vector3d(0, 0, 10), 100, 0.3);
-    ASSERT_LE((tensor - expected).norm(), 2e-7 * expected.norm()) << position.transpose();
-  }
 }
 
 TEST(PointLoad, IsInEquilibrium) {
