@@ -414,7 +414,8 @@ TEST(Bending, LightMayStartAnywhere) {
     }
 
     RayBatch lost;
-    for (const double far : {1e12, 1e14, 1e15, 1e16, 1e17, 1e18, 1e19, 1e30, 1e40, 1e200, 1e300, INFINITY, NAN})
+    for (const double far :
+         {1e12, 1e14, 1e15, 1e16, 1e17, 1e18, 1e19, 1e30, 1e40, 1e200, 1e300, double{INFINITY}, double{NAN}})
       for (const Vector3d& from : {Vector3d(near.x(), near.y(), far), Vector3d(-far, 0.3 * far, 0.7 * far)})
         for (const Vector3d& direction : {down, Vector3d(1, -0.3, -0.7).normalized()}) lost.add(from, direction, 0.2);
     follow(field, geometry, {}, lost);  // To whatever end: it comes back.
