@@ -153,7 +153,7 @@ TEST(LensMesh, PixelsThatAreNotSquareTakeRaysByTheirNumber) {
   LensMeshSettings settings = mesh_settings(0.4, 2, 0);
   settings.pixel = {0.25, 0.25 / 128};  // 8192 pixels, and 33 million squares of their shorter side.
   const LensMesh mesh = make_mesh(map, spreading_s, settings);
-  EXPECT_LT(mesh.starts.size(), 4 * 8192u);
+  EXPECT_LT(mesh.starts.size(), 5 * 8192u);
   const SheetSearch search(mesh, settings.pixel.minCoeff());
   std::vector<Sheet> sheets;
   double worst = 0;
