@@ -304,7 +304,8 @@ void check(const std::vector<LightChannel>& channels, const LensImage& image, co
   if (channels.empty()) throw std::invalid_argument("a lens needs at least one wavelength");
   if (!image.texture || !image.radiance) throw std::invalid_argument("a lens needs an image");
   if (settings.samples < 1) throw std::invalid_argument("integrator.samples must be positive");
-  if (settings.reference >= channels.size()) throw std::invalid_argument("there is no such reference channel");
+  if (settings.reference >= channels.size())
+    throw std::invalid_argument("the reference channel is out of range: it must be below the number of wavelengths");
 }
 
 }  // namespace

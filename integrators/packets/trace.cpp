@@ -35,7 +35,7 @@ bool has_differentials(const RayBatch& batch) { return !batch.differentials.empt
 void prepare(const BendingSettings& settings, RayBatch& batch) {
   check(settings);
   if (has_differentials(batch) && batch.differentials.size() != batch.size())
-    throw std::invalid_argument("a batch has differentials for every ray, or for none");
+    throw std::invalid_argument("a batch must have differentials for every ray or for none");
   batch.end.resize(batch.size());
   batch.length.resize(batch.size());
   batch.steps.resize(batch.size());

@@ -13,7 +13,7 @@ namespace tensorray {
 namespace {
 
 [[noreturn]] void throw_unknown_ending(const std::filesystem::path& path) {
-  throw std::invalid_argument(path.string() + ": the ending of a file of paths must be .vtp or .tck");
+  throw std::invalid_argument(path.string() + ": a file of paths must end in .vtp or .tck");
 }
 
 /// The slope of the parabola through three points at the middle point. `before` and `behind` are the unit slopes of the
@@ -76,7 +76,7 @@ std::vector<Path> read_paths(const std::filesystem::path& path) {
   require_readable(path);
   try {
     std::vector<Path> paths = ending == ".vtp" ? read_vtp_paths(path) : read_tck_paths(path);
-    if (paths.empty()) throw std::runtime_error("it holds no path of two points or more");
+    if (paths.empty()) throw std::runtime_error("it contains no path with two or more points");
     return paths;
   } catch (const Cancelled&) {
     throw;

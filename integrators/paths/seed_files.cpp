@@ -48,7 +48,7 @@ void add_seed(const std::vector<std::string>& words, SeedList& seeds) {
   seeds.positions.emplace_back(numbers[0], numbers[1], numbers[2]);
   if (words.size() == 3) return;
   const Eigen::Vector3d direction = Eigen::Vector3d(numbers[3], numbers[4], numbers[5]).stableNormalized();
-  if (direction.isZero()) throw std::runtime_error("the direction is zero: it must point somewhere");
+  if (direction.isZero()) throw std::runtime_error("the direction has length zero: give a vector that is not zero");
   seeds.directions.push_back(direction);
 }
 
@@ -69,7 +69,7 @@ SeedList read_seeds(const std::filesystem::path& path) {
         throw std::runtime_error("a seed is three numbers (x y z), or six (x y z and a direction), not " +
                                  std::to_string(words.size()));
       if (columns != 0 && words.size() != columns)
-        throw std::runtime_error("all lines must have equally many numbers: those before have " +
+        throw std::runtime_error("all lines must have the same number of values: the lines above have " +
                                  std::to_string(columns));
       const bool header = columns == 0 && is_header(words);
       columns = words.size();
@@ -79,7 +79,8 @@ SeedList read_seeds(const std::filesystem::path& path) {
     }
   }
   if (file.bad()) throw std::runtime_error(path.string() + ": cannot be read to its end");
-  if (seeds.positions.empty()) throw std::runtime_error(path.string() + ": holds no seeds: give a point x y z a line");
+  if (seeds.positions.empty())
+    throw std::runtime_error(path.string() + ": contains no seeds: write one point x y z in each line");
   return seeds;
 }
 

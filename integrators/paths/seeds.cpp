@@ -17,7 +17,7 @@ constexpr double disk_distance = 0.75;  // In units of √(area / count); random
 constexpr std::uint64_t most_disks = 10'000'000;
 
 void require_some(std::uint64_t count) {
-  if (count == 0) throw std::invalid_argument("seeds need a count of 1 or more");
+  if (count == 0) throw std::invalid_argument("the count of seeds must be 1 or more");
 }
 
 /// Points in a grid whose cells are too small for two points. It finds whether a point lies within a distance of

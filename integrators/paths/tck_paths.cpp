@@ -164,8 +164,8 @@ std::vector<Path> read_tck_paths(const std::filesystem::path& path) {
     if (ends) break;
   }
   if (header.count && *header.count != count)
-    throw std::runtime_error("its header announces " + std::to_string(*header.count) + " tracks, and it holds " +
-                             std::to_string(count) + "; it is damaged, or was cut off as it was written");
+    throw std::runtime_error("its header gives " + std::to_string(*header.count) + " tracks, but the file holds " +
+                             std::to_string(count) + "; the file is damaged or incomplete");
   return paths;
 }
 

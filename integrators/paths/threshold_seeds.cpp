@@ -52,9 +52,10 @@ std::vector<double> judge(const TensorField& field, const Eigen::AlignedBox3d& b
 
 std::vector<Eigen::Vector3d> threshold_seeds(const TensorField& field, const Eigen::AlignedBox3d& bounds,
                                              const Threshold& threshold, std::uint64_t count, std::uint64_t seed) {
-  if (count == 0) throw std::invalid_argument("seeds need a count of 1 or more");
+  if (count == 0) throw std::invalid_argument("the count of seeds must be 1 or more");
   if (!(threshold.least <= threshold.greatest))
-    throw std::invalid_argument("the threshold of seeds must not be less at most than at least");
+    throw std::invalid_argument(
+        "the threshold of seeds is empty: its greatest value must not be below its least value");
   const Eigen::AlignedBox3d box = field.world_box().intersection(bounds);
   if (box.isEmpty()) throw std::invalid_argument("the box of threshold seeds does not meet the field's extent");
   std::vector<Eigen::Vector3d> seeds;

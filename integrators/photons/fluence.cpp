@@ -64,7 +64,7 @@ FluenceSums::FluenceSums(const TensorField& field, std::vector<double> powers, b
       index_(places_),
       blocks_(places_.size()) {
   const double sum = std::accumulate(powers_.begin(), powers_.end(), 0.0);
-  if (!(sum > 0)) throw std::invalid_argument("light without power has no fluence");
+  if (!(sum > 0)) throw std::invalid_argument("fluence needs light with power above zero");
   for (double& power : powers_) power /= sum;
   greatest_power_ = *std::max_element(powers_.begin(), powers_.end());
 }

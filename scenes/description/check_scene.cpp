@@ -87,7 +87,9 @@ void check_normal(const std::optional<Eigen::Vector3d>& normal, const char* poin
                   const SceneSource& source) {
   if (!normal || std::abs(normal->normalized().dot(light.direction.normalized())) > 1e-6) return;
   source.fail(
-      fmt::format("`{}/normal` is across the light: it would be seen edge-on; turn it towards the light", pointer));
+      fmt::format("`{}/normal` is perpendicular to the light, so that the plane is seen edge-on; turn it "
+                  "towards the light",
+                  pointer));
 }
 
 void check_memory(double bytes, const std::string& what, const SceneSource& source) {
@@ -107,7 +109,7 @@ void check_receiver_memory(const SceneDescription& scene, double bytes_per_pixel
 
 void check_spectral_output(const SceneDescription& scene, const SceneSource& source) {
   if (scene.bending.rgb && scene.output.wants("spectral"))
-    source.fail("`/output/spectral` needs wavelengths, which `/bending/rgb` has none of; remove one of the two");
+    source.fail("`/output/spectral` needs wavelengths, but `/bending/rgb` has none; remove one of the two");
 }
 
 void check_scene(SceneDescription& scene, const Json& json, const SceneSource& source) {

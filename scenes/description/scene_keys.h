@@ -29,31 +29,32 @@ template <class Visitor>
 void describe(FieldDescription& field, Visitor& visit) {
   visit.exactly_one({"file", "generate"});
   visit("file", field.file, "OpenVDB file with the tensor field");
-  visit("name", field.name, "name of the field in the file; not needed where there is only one");
+  visit("name", field.name, "name of the field in the file; not needed if there is only one");
   visit.generator("generate", field.generate, "an analytic field instead of a file");
-  visit("derive", field.derive, "makes the tensor from a vector grid (gradient) or a scalar grid (hessian)");
+  visit("derive", field.derive,
+        "derivative that makes the tensor: gradient of a vector grid, hessian of a scalar grid");
   visit("eigenvalues", field.eigenvalues,
         "preprocessing: as they are, |T| or (T^2)^(1/2); auto is absolute where the field is symmetric, else raw");
   visit("scale", field.scale, "factor on the flexibility; auto makes the median ray turn by 0.15 rad at s = 0.2",
         not_zero().or_word("auto"));
-  visit("bounds", field.bounds, "closed mesh that cuts the volume: light goes straight outside");
+  visit("bounds", field.bounds, "closed mesh that limits the volume; light is straight outside it");
 }
 
 template <class Visitor>
 void describe(BendingDescription& bending, Visitor& visit) {
-  visit("a", bending.flexibility.a, "flexibility of light is s = a + b * wavelength");
-  visit("b", bending.flexibility.b, "flexibility of light is s = a + b * wavelength, per nm");
-  visit("rgb", bending.rgb, "three flexibilities, one a colour channel, instead of wavelengths");
+  visit("a", bending.flexibility.a, "constant part of the flexibility of light, s = a + b * wavelength");
+  visit("b", bending.flexibility.b, "slope of the flexibility of light, s = a + b * wavelength, per nm");
+  visit("rgb", bending.rgb, "three flexibilities, one for each colour channel, instead of wavelengths");
   visit("method", bending.settings.method, "how rays are integrated");
   visit("step", bending.settings.step, "arc length per step, in voxels; auto follows the strength of the field",
         above(0).or_word("auto"));
   visit("tolerance", bending.settings.tolerance, "adaptive methods: error per step, in voxels", above(0));
-  visit("max_steps", bending.settings.max_steps, "steps before a ray is given up", between(1, 1e9));
+  visit("max_steps", bending.settings.max_steps, "number of steps after which a ray is given up", between(1, 1e9));
 }
 
 template <class Visitor>
 void describe(ApertureDescription& aperture, Visitor& visit) {
-  visit("center", aperture.center, "middle of the aperture, world; without it that of the volume's silhouette");
+  visit("center", aperture.center, "middle of the aperture, world; default: that of the volume's silhouette");
   visit("size", aperture.size, "width and height, world units", above(0));
 }
 
@@ -74,26 +75,25 @@ void describe(WavelengthKeys& keys, Visitor& visit) {
 
 template <class Visitor>
 void describe(LightDescription& light, Visitor& visit) {
-  visit("direction", light.direction, "where light travels to; of any length", not_zero());
-  visit("up", light.up, "upwards in the frame of aperture and receiver; without it +z, or +y for light along z",
-        not_zero());
-  visit("photons", light.photons, "about how many positions emit", between(1, 1e12));
-  visit("pattern", light.pattern, "how these positions lie across the aperture");
+  visit("direction", light.direction, "direction in which light travels; its length has no effect", not_zero());
+  visit("up", light.up, "up axis of aperture and receiver; default: +z, or +y for light along z", not_zero());
+  visit("photons", light.photons, "approximate number of positions that emit", between(1, 1e12));
+  visit("pattern", light.pattern, "pattern of these positions on the aperture");
   visit("spectrum", light.spectrum,
         "an illuminant (D65, E, A), \"blackbody KELVIN\", or a text file with columns wavelength (nm) and value");
   visit.section("wavelengths", WavelengthKeys{light}, "the bands of light that are traced");
-  visit("irradiance", light.irradiance, "of the undisturbed beam, W per world unit squared", above(0));
+  visit("irradiance", light.irradiance, "irradiance of the undisturbed beam, W per world unit squared", above(0));
   visit.section("aperture", light.aperture, "a rectangle that light comes from, instead of the volume's silhouette");
 }
 
 template <class Visitor>
 void describe(ReceiverDescription& receiver, Visitor& visit) {
   visit.exclude("center", {"distance"});
-  visit("distance", receiver.distance, "of the plate behind the volume, along the light; default: 1/4 of its depth",
-        at_least(0));
+  visit("distance", receiver.distance,
+        "distance of the plate behind the volume, along the light; default: 1/4 of its depth", at_least(0));
   visit("center", receiver.center, "middle of the plate, world");
-  visit("normal", receiver.normal, "of the plate; without it against the light", not_zero());
-  visit("up", receiver.up, "upwards on the plate; without it the light's", not_zero());
+  visit("normal", receiver.normal, "normal of the plate; default: opposite to the light", not_zero());
+  visit("up", receiver.up, "up axis of the plate; default: that of the light", not_zero());
   visit("size", receiver.size, "width and height, world units; default: 1.25 times the extent of the beam", above(0));
   visit("resolution", receiver.resolution, "pixels, width and height; default: 512 along the longer side",
         between(1, 32768).or_one_for_all());
@@ -103,29 +103,30 @@ template <class Visitor>
 void describe(CameraDescription& camera, Visitor& visit) {
   visit.exclude("position", {"direction"});
   visit("projection", camera.projection, "perspective or orthographic");
-  visit("position", camera.position, "world; without it everything is seen");
-  visit("target", camera.target, "what the camera looks at; without it the middle of the scene");
-  visit("direction", camera.direction, "of the view, where there is no position", not_zero());
-  visit("up", camera.up, "upwards in the picture; without it +z", not_zero());
-  visit("angle", camera.angle, "of the view from lower to upper edge, degrees", between(0.01, 175));
-  visit("height", camera.height, "orthographic, with a position: of what is seen; default: everything", above(0));
-  visit("lens_radius", camera.lens_radius, "of a thin lens, world units; 0: everything is sharp", at_least(0));
-  visit("focus_distance", camera.focus_distance, "of what is sharp; default: the target's", above(0));
+  visit("position", camera.position, "position of the camera, world; default: everything is visible");
+  visit("target", camera.target, "point that the camera looks at, world; default: the middle of the scene");
+  visit("direction", camera.direction, "view direction, if there is no position", not_zero());
+  visit("up", camera.up, "up direction of the picture; default: +z", not_zero());
+  visit("angle", camera.angle, "vertical angle of view, degrees", between(0.01, 175));
+  visit("height", camera.height, "orthographic, with a position: visible height; default: everything", above(0));
+  visit("lens_radius", camera.lens_radius, "radius of a thin lens, world units; 0: everything is sharp", at_least(0));
+  visit("focus_distance", camera.focus_distance, "distance that is sharp; default: that of the target", above(0));
   visit("resolution", camera.resolution, "pixels, width and height", between(1, 32768).or_one_for_all());
 }
 
 template <class Visitor>
 void describe(LightSourceDescription& light, Visitor& visit) {
   visit.require({"kind"});
-  visit("kind", light.kind, "what shines");
-  visit("color", light.color, "linear Rec. 709; of an environment a factor", at_least(0));
-  visit("strength", light.strength, "radiance; of directional light irradiance / pi", at_least(0));
-  visit("direction", light.direction, "directional: where light travels to; area: what it faces", not_zero());
-  visit("angle", light.angle, "directional: of the disk, degrees (the sun: 0.53)", between(0, 180));
+  visit("kind", light.kind, "kind of light");
+  visit("color", light.color, "colour, linear Rec. 709; environment: a factor", at_least(0));
+  visit("strength", light.strength, "radiance; directional: irradiance / pi", at_least(0));
+  visit("direction", light.direction,
+        "directional: direction in which light travels; area: direction that the light faces", not_zero());
+  visit("angle", light.angle, "directional: angular diameter, degrees (the sun: 0.53)", between(0, 180));
   visit("center", light.center, "area: middle, world");
   visit("size", light.size, "area: width and height, world units", above(0));
   visit("file", light.file, "environment: a latitude-longitude picture");
-  visit("rotation", light.rotation, "environment: about +z, degrees");
+  visit("rotation", light.rotation, "environment: rotation about +z, degrees");
   visit.only_for({"direction"}, "kind", light.kind, {LightKind::directional, LightKind::area});
   visit.only_for({"angle"}, "kind", light.kind, {LightKind::directional});
   visit.only_for({"center", "size"}, "kind", light.kind, {LightKind::area});
@@ -135,7 +136,7 @@ void describe(LightSourceDescription& light, Visitor& visit) {
 template <class Visitor>
 void describe(IntegratorDescription& integrator, Visitor& visit) {
   visit.require({"type"});
-  visit("type", integrator.type, "the method: what is made of the light");
+  visit("type", integrator.type, "the method");
   for (const auto& method : integrator.methods) visit.part(*method);
 }
 
@@ -146,12 +147,12 @@ void describe(OutputDescription& output, Visitor& visit) {
     visit(kind.key, file, kind.meaning, endings(kind.endings));
     if (!file.empty()) output.files[kind.key] = file;
   }
-  visit("fluence_bands", output.fluence_bands, "`fluence` also has a grid for each band of wavelengths");
-  visit("exposure", output.exposure, "stops, for `image`", between(-100, 100).or_word("auto"));
+  visit("fluence_bands", output.fluence_bands, "write a further grid to `fluence` for each band of wavelengths");
+  visit("exposure", output.exposure, "exposure of `image`, stops", between(-100, 100).or_word("auto"));
   visit("white_balance", output.white_balance, "adapt the light's white to the working space's");
-  visit("ocio", output.ocio, "OpenColorIO config; without it $OCIO, or the built-in one");
-  visit("display", output.display, "OpenColorIO display; without it the config's default");
-  visit("view", output.view, "OpenColorIO view; without it the display's default");
+  visit("ocio", output.ocio, "OpenColorIO config; default: $OCIO, or the built-in one");
+  visit("display", output.display, "OpenColorIO display; default: that of the config");
+  visit("view", output.view, "OpenColorIO view; default: that of the display");
 }
 
 /// An item of `obstacles`.
@@ -169,8 +170,8 @@ template <class Visitor>
 void describe(SceneDescription& scene, Visitor& visit) {
   visit.require({"field", "integrator"});
   std::string schema;  // Only editors use it.
-  visit("$schema", schema, "where an editor finds this schema");
-  visit("seed", scene.seed, "of the random numbers", between(0, largest_exact_integer));
+  visit("$schema", schema, "path of this schema, for editors");
+  visit("seed", scene.seed, "seed of the random numbers", between(0, largest_exact_integer));
   visit.section("field", scene.field, "the tensor field");
   visit.section("bending", scene.bending, "how the field bends light");
   visit.section("light", scene.light, "parallel light through the volume");
@@ -178,8 +179,8 @@ void describe(SceneDescription& scene, Visitor& visit) {
              [](std::filesystem::path& file) { return ObstacleKeys{file}; });
   visit.section("receiver", scene.receiver, "the plate that collects light");
   visit.section("integrator", scene.integrator, "the method");
-  visit.section("camera", scene.camera, "path_tracing: from where the picture is taken");
-  visit.list("lights", scene.lights, "path_tracing: what lights the paths; default: a white sky and a lamp",
+  visit.section("camera", scene.camera, "path_tracing: the camera");
+  visit.list("lights", scene.lights, "path_tracing: lights that shine on the paths; default: a white sky and a lamp",
              [](LightSourceDescription& item) -> LightSourceDescription& { return item; });
   visit.section("output", scene.output, "files to write; default: the scene file's name with .png and .exr");
 }

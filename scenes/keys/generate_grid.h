@@ -34,8 +34,8 @@ void describe(GridRequest& grid, Visitor& visit) {
   visit("resolution", grid.resolution,
         "voxels along the longest axis of the box (voxels are then cubes), or along x, y and z",
         between(1, resolution_limit));
-  visit("min", grid.min, "least corner of the box, world; without it the kind's own");
-  visit("max", grid.max, "greatest corner of the box, world; without it the kind's own");
+  visit("min", grid.min, "least corner of the box, world; default: that of the kind");
+  visit("max", grid.max, "greatest corner of the box, world; default: that of the kind");
 }
 
 /// @throw std::invalid_argument that names the key: max below min, no voxel, too many voxels.

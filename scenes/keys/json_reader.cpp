@@ -92,7 +92,7 @@ std::string reason(const std::string& what) {
   }
   const bool closing =
       text.find("unexpected '}'") != std::string::npos || text.find("unexpected ']'") != std::string::npos;
-  return closing ? text + " (is there a comma too many before it?)" : text;
+  return closing ? text + " (is there an extra comma before it?)" : text;
 }
 
 bool is_blank(const std::string& text) {

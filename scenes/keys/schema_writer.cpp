@@ -10,7 +10,7 @@ void SchemaWriter::generator(const char* key, const std::optional<GenerateDescri
   for (const std::string& kind : generator_kinds()) {
     SchemaWriter inner;
     inner.require({"kind"});
-    inner.properties_["kind"] = {{"description", "what field"}, {"const", kind}};
+    inner.properties_["kind"] = {{"description", "kind of field"}, {"const", kind}};
     GridRequest grid;
     describe(grid, inner);
     Generator parameters = generator_of(kind);

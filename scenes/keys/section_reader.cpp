@@ -47,7 +47,7 @@ std::string suggestion(const std::string& key, const std::set<std::string>& know
     least = distance;
   }
   if (!nearest.empty()) return fmt::format("did you mean `{}`?", nearest);
-  return "known here are " + quoted_list({known.begin(), known.end()}, ", ");
+  return "known keys are " + quoted_list({known.begin(), known.end()}, ", ");
 }
 
 }  // namespace

@@ -72,14 +72,14 @@ template <class Visitor>
 void describe(ImagePlaneDescription& plane, Visitor& visit) {
   visit.exclude("distance", {"depth", "center"});
   visit.exclude("depth", {"center"});
-  visit("distance", plane.distance, "of the image before the volume, along the light; default: 1/4 of its depth",
-        at_least(0));
+  visit("distance", plane.distance,
+        "distance of the image before the volume, along the light; default: 1/4 of its depth", at_least(0));
   visit("depth", plane.depth,
-        "of the image in the volume, which it cuts: 0 where light enters, 1 where it leaves; a list gives a picture "
-        "for each, side by side");
+        "depth of the image in the volume: 0 where light enters, 1 where it leaves; a list gives a picture for each "
+        "depth, side by side");
   visit("center", plane.center, "middle of the image, world");
-  visit("normal", plane.normal, "of the image; without it the receiver's", not_zero());
-  visit("up", plane.up, "upwards in the image; without it the receiver's", not_zero());
+  visit("normal", plane.normal, "normal of the image; default: that of the receiver", not_zero());
+  visit("up", plane.up, "up axis of the image; default: that of the receiver", not_zero());
   visit("size", plane.size, "width and height, world units; default: the receiver's, in the image's proportions",
         above(0));
 }
@@ -87,10 +87,10 @@ void describe(ImagePlaneDescription& plane, Visitor& visit) {
 template <class Visitor>
 void describe(LensDescription& lens, Visitor& visit) {
   visit("mode", lens.mode, "lens: gather looks back from every pixel; scatter sends the image's light to the receiver");
-  visit("image", lens.image, "lens: the picture seen, a file or checkerboard, grid, color_wheel, line");
-  visit("image_color_space", lens.image_color_space, "lens: OpenColorIO space of the file; auto goes by its format",
+  visit("image", lens.image, "lens: the picture that is seen: a file, or checkerboard, grid, color_wheel, line");
+  visit("image_color_space", lens.image_color_space, "lens: OpenColorIO space of the file; auto: by its format",
         Limits().or_word("auto"));
-  visit.section("image_plane", lens.plane, "lens: where the image stands");
+  visit.section("image_plane", lens.plane, "lens: position and size of the image");
   visit("wrap", lens.wrap, "lens: how the image continues beyond its edges (gather)");
   visit("samples", lens.samples, "lens: samples of a pixel along x and along y", between(1, 16));
   visit("overlay", lens.overlay, "lens: grid draws straight and distorted grid lines over the picture");

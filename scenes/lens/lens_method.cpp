@@ -191,7 +191,7 @@ Render LoadedLens::render(const Scene& scene, const Progress& progress) const {
   result.metadata["tensorray:end"] = end_codes();
   result.exposure = 0;  // Shows the colours of the image unchanged.
   if (nothing_arrived(result.statistics))
-    result.warnings.push_back("no ray found the image; look at `receiver` and `integrator.image_plane`");
+    result.warnings.push_back("no ray met the image; check `receiver` and `integrator.image_plane`");
   return result;
 }
 

@@ -73,8 +73,8 @@ LensScene load_lens(const Scene& scene, const LensDescription& lens) {
   const auto add = [&](const Eigen::Vector3d& center) {
     if (!(receiver.normal().dot(receiver.center - center) > 0))
       throw SceneError(
-          fmt::format("{}: `/integrator/image_plane`: the image would not be before the receiver, which "
-                      "light reaches at depth {:.6g} of the volume",
+          fmt::format("{}: `/integrator/image_plane`: the image must be before the receiver, which is at depth {:.6g} "
+                      "of the volume; move the image or the receiver",
                       scene.description.path.string(), (receiver_at - depths.near) / depth));
     plane.center = center;
     require_near(plane, "/integrator/image_plane", scene.description, scene.field);

@@ -37,7 +37,7 @@ std::vector<Output> picture_outputs() {
 }
 
 Output spectral_output() {
-  return {"spectral", "spectral picture, a channel each band", {".exr"}, write_spectral, ".spectral.exr"};
+  return {"spectral", "spectral picture, one channel for each band", {".exr"}, write_spectral, ".spectral.exr"};
 }
 
 ImageMetadata provenance(const Scene& scene, const Render& render) {

@@ -70,15 +70,16 @@ inline auto choices(Background) {
 template <class Visitor>
 void describe(SeedDescription& seeds, Visitor& visit) {
   visit("kind", seeds.kind, "how seeds are spread: on the entry plane (grid, poisson_disk), or in the volume");
-  visit("count", seeds.count, "about how many", between(1, 2e6));
-  visit("from", seeds.from, "line: one end, world; without both the line runs across the middle of the volume");
-  visit("to", seeds.to, "line: the other end, world");
-  visit("center", seeds.center, "sphere: middle, world; without it the volume's");
-  visit("radius", seeds.radius, "sphere: world units; default: a quarter of the volume's shortest side", above(0));
-  visit("invariant", seeds.invariant, "threshold: seeds are where this is above and below");
-  visit("above", seeds.above, "threshold: least value");
-  visit("below", seeds.below, "threshold: greatest value");
-  visit("file", seeds.file, "file: a text file with x y z in each line, and perhaps a direction");
+  visit("count", seeds.count, "approximate number of seeds", between(1, 2e6));
+  visit("from", seeds.from, "line: one end, world; default: an end of a line across the middle of the volume");
+  visit("to", seeds.to, "line: the other end, world; default: as for `from`");
+  visit("center", seeds.center, "sphere: middle, world; default: that of the volume");
+  visit("radius", seeds.radius, "sphere: radius, world units; default: a quarter of the volume's shortest side",
+        above(0));
+  visit("invariant", seeds.invariant, "threshold: invariant whose value is limited");
+  visit("above", seeds.above, "threshold: least value of the invariant");
+  visit("below", seeds.below, "threshold: greatest value of the invariant");
+  visit("file", seeds.file, "file: a text file with x y z, and optionally a direction, in each line");
   visit.only_for({"from", "to"}, "kind", seeds.kind, {SeedKind::line});
   visit.only_for({"center", "radius"}, "kind", seeds.kind, {SeedKind::sphere});
   visit.only_for({"invariant", "above", "below"}, "kind", seeds.kind, {SeedKind::threshold});
@@ -88,33 +89,32 @@ void describe(SeedDescription& seeds, Visitor& visit) {
 template <class Visitor>
 void describe(RadiusDescription& radius, Visitor& visit) {
   visit.exclude("scale", {"typical"});
-  visit("scale", radius.scale, "world units for each unit of the tensor; without it the median semi-axis is typical",
+  visit("scale", radius.scale, "world units for each unit of the tensor; default: the median semi-axis is `typical`",
         above(0).or_word("auto"));
   visit("typical", radius.typical, "median semi-axis, world units; default: by the distance between seeds", above(0));
-  visit("min", radius.min, "no semi-axis is shorter, so that flat ellipses can be seen; default: typical / 5",
-        above(0));
-  visit("max", radius.max, "larger ellipses shrink to it; default: 3 * typical", above(0));
+  visit("min", radius.min, "least semi-axis, so that flat ellipses are visible; default: typical / 5", above(0));
+  visit("max", radius.max, "greatest semi-axis, to which larger ellipses shrink; default: 3 * typical", above(0));
 }
 
 template <class Visitor>
 void describe(PathColorDescription& color, Visitor& visit) {
-  visit("by", color.by, "what is shown as colour: force is |T V|, curvature |V'|");
-  visit("invariant", color.invariant, "by invariant: which");
+  visit("by", color.by, "quantity that is shown as colour: force is |T V|, curvature |V'|");
+  visit("invariant", color.invariant, "by invariant: the invariant");
   visit("map", color.map, "colormap");
-  visit("range", color.range, "values of the map's ends; without it the 1st and the 99th percentile");
-  visit("logarithmic", color.logarithmic, "equal ratios are equally far apart");
+  visit("range", color.range, "values at the ends of the map; default: the 1st and the 99th percentile");
+  visit("logarithmic", color.logarithmic, "logarithmic colour scale");
   visit("legend", color.legend, "draw a colour bar into output.image");
 }
 
 template <class Visitor>
 void describe(MaterialDescription& material, Visitor& visit) {
-  visit("kind", material.kind, "what the surface is made of");
-  visit("color", material.color, "where it has no colours of its own; linear Rec. 709", between(0, 1));
-  visit("roughness", material.roughness, "0 polished, 1 matt (not diffuse)", between(0, 1));
-  visit("metallic", material.metallic, "principled: 0 plastic, 1 metal", between(0, 1));
+  visit("kind", material.kind, "kind of material");
+  visit("color", material.color, "colour of a surface without colours of its own, linear Rec. 709", between(0, 1));
+  visit("roughness", material.roughness, "roughness: 0 polished, 1 matt (not diffuse)", between(0, 1));
+  visit("metallic", material.metallic, "principled: share of metal: 0 plastic, 1 metal", between(0, 1));
   visit("specular", material.specular, "principled: reflection of plastic, 0.5 is 4 %", between(0, 1));
-  visit("clearcoat", material.clearcoat, "principled: lacquer", between(0, 1));
-  visit("metal", material.metal, "metal: which");
+  visit("clearcoat", material.clearcoat, "principled: strength of the clear coat", between(0, 1));
+  visit("metal", material.metal, "metal: its kind");
   visit("index", material.index, "glass: index of refraction", between(1.01, 5));
   visit.only_for({"roughness"}, "kind", material.kind,
                  {MaterialKind::principled, MaterialKind::metal, MaterialKind::glass});
@@ -125,19 +125,19 @@ void describe(MaterialDescription& material, Visitor& visit) {
 
 template <class Visitor>
 void describe(SliceDescription& slice, Visitor& visit) {
-  visit("normal", slice.normal, "of the plane", not_zero());
-  visit("center", slice.center, "a point of the plane, world; without it the volume's middle");
-  visit("invariant", slice.invariant, "what colours it");
+  visit("normal", slice.normal, "normal of the plane", not_zero());
+  visit("center", slice.center, "a point of the plane, world; default: the middle of the volume");
+  visit("invariant", slice.invariant, "invariant that is shown as colour");
   visit("map", slice.map, "colormap");
-  visit("range", slice.range, "values of the map's ends; without it the 1st and the 99th percentile");
+  visit("range", slice.range, "values at the ends of the map; default: the 1st and the 99th percentile");
 }
 
 template <class Visitor>
 void describe(IsosurfaceDescription& isosurface, Visitor& visit) {
   visit.require({"value"});
-  visit("invariant", isosurface.invariant, "what is constant on it");
-  visit("value", isosurface.value, "where the surface is");
-  visit.section("material", isosurface.material, "of the surface");
+  visit("invariant", isosurface.invariant, "invariant that is constant on the surface");
+  visit("value", isosurface.value, "value of the invariant on the surface");
+  visit.section("material", isosurface.material, "material of the surface");
 }
 
 template <class Visitor>
@@ -152,28 +152,30 @@ void describe(ContextDescription& context, Visitor& visit) {
 
 template <class Visitor>
 void describe(PathTracingDescription& paths, Visitor& visit) {
-  visit.section("seeds", paths.seeds, "path_tracing: where paths are caught");
+  visit.section("seeds", paths.seeds, "path_tracing: where paths start");
   visit("paths", paths.paths, "path_tracing: a file of paths that are drawn instead of traced",
         endings({".vtp", ".tck"}));
-  visit("backwards", paths.backwards, "path_tracing: light is also followed back from seeds in the volume");
+  visit("backwards", paths.backwards, "path_tracing: also follow light back from seeds in the volume");
   visit("outside", paths.outside, "path_tracing: draw the straight pieces before and behind the volume, too");
   visit("style", paths.style, "path_tracing: how paths are drawn");
-  visit("caps", paths.caps, "path_tracing: ends of tubes");
+  visit("caps", paths.caps, "path_tracing: form of the ends of tubes");
   visit.section("radius", paths.radius, "path_tracing: size of the ellipses");
   visit.section("color", paths.color, "path_tracing: colour of the paths");
-  visit.section("material", paths.material, "path_tracing: of the paths");
-  visit.section("context", paths.context, "path_tracing: what else is shown");
+  visit.section("material", paths.material, "path_tracing: material of the paths");
+  visit.section("context", paths.context, "path_tracing: surfaces that are shown besides the paths");
   visit("shading", paths.shading, "path_tracing: path is physically based; the others are fast previews");
-  visit("bands", paths.bands, "path_tracing: wavelengths of the light that shows the paths", between(3, 1000));
-  visit("max_depth", paths.max_depth, "path_tracing: surfaces that light meets at most; 1 is direct light alone",
-        between(1, 1000));
-  visit("max_samples", paths.samples, "path_tracing: samples of a pixel at most", between(1, 1e6));
-  visit("min_samples", paths.min_samples, "path_tracing: samples of a pixel at least", between(1, 1e6));
-  visit("noise", paths.noise, "path_tracing: a pixel is done at this relative error; 0: all have max_samples",
-        between(0, 1));
+  visit("bands", paths.bands, "path_tracing: number of wavelengths of the light that shows the paths",
+        between(3, 1000));
+  visit("max_depth", paths.max_depth,
+        "path_tracing: greatest number of surfaces that light meets; 1: direct light only", between(1, 1000));
+  visit("max_samples", paths.samples, "path_tracing: greatest number of samples per pixel", between(1, 1e6));
+  visit("min_samples", paths.min_samples, "path_tracing: least number of samples per pixel", between(1, 1e6));
+  visit("noise", paths.noise,
+        "path_tracing: relative error at which a pixel is finished; 0: every pixel takes max_samples", between(0, 1));
   visit("filter", paths.filter, "path_tracing: pixel filter");
-  visit("background", paths.background, "path_tracing: what is seen where nothing is");
-  visit("background_color", paths.background_color, "path_tracing: linear Rec. 709", at_least(0));
+  visit("background", paths.background, "path_tracing: what pixels without a surface show");
+  visit("background_color", paths.background_color, "path_tracing: colour of the background, linear Rec. 709",
+        at_least(0));
 }
 
 }  // namespace tensorray

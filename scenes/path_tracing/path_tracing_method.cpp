@@ -192,9 +192,9 @@ void require_fine(const Scene& scene, const RadiusDescription& radius, const Sur
   const double typical = typical_radius(radius, paths.size(), world_box(scene.field));
   if (stage.bounds().diagonal().norm() < most_radii * typical) return;
   throw SceneError(fmt::format(
-      "{}: what is drawn is {:.3g} long, and paths are {:.3g} thick: too fine for it; bring lamps, obstacles and plate "
-      "nearer, or raise `/integrator/radius/typical`",
-      scene.description.path.string(), stage.bounds().diagonal().norm(), typical));
+      "{}: paths are too thin ({:.3g}) for the size of the scene ({:.3g}); bring lamps, obstacles and plate nearer, or "
+      "raise `/integrator/radius/typical`",
+      scene.description.path.string(), typical, stage.bounds().diagonal().norm()));
 }
 
 class LoadedPaths : public LoadedMethod {
@@ -274,8 +274,7 @@ void check_range(const std::optional<Eigen::Vector2d>& range, bool logarithmic, 
 
 void check_seeds(const SeedDescription& seeds, const SceneSource& source) {
   if (seeds.from && seeds.to && *seeds.from == *seeds.to && seeds.count > 1)
-    source.fail(
-        "`/integrator/seeds`: `from` and `to` are one point, where there is room for one seed; set `count` to 1");
+    source.fail("`/integrator/seeds`: `from` and `to` are equal, which allows only one seed; set `count` to 1");
   if (seeds.above && seeds.below && *seeds.above > *seeds.below)
     source.fail("`/integrator/seeds`: `above` must not exceed `below`");
 }
@@ -295,7 +294,7 @@ class PathTracingMethod : public MethodWith<PathTracingDescription> {
   std::vector<Output> outputs() const override {
     std::vector<Output> outputs = picture_outputs();
     outputs.push_back(spectral_output());
-    outputs.push_back({"paths", "the bent rays, with all that is known along them", {".vtp", ".tck"}, write_path_file});
+    outputs.push_back({"paths", "the bent rays, with all quantities along them", {".vtp", ".tck"}, write_path_file});
     outputs.push_back({"tubes", "the bent rays as a mesh", {".ply", ".obj"}, write_tube_file});
     return outputs;
   }
@@ -325,8 +324,7 @@ void PathTracingMethod::check(SceneDescription& scene, const Json& json, const S
                source);
   warn_unused(scene, json, "/integrator/seeds", "/integrator/paths");
   if (given(json, "/integrator/samples"))  // Other programs and the lens use this name.
-    scene.warnings.push_back(
-        "`/integrator/samples` is the lens's and has no effect with path_tracing; `max_samples` has");
+    scene.warnings.push_back("`/integrator/samples` has no effect with path_tracing; use `/integrator/max_samples`");
   if (scene.camera.target && !scene.camera.position)
     scene.warnings.push_back(
         "`/camera/target` has no effect without `/camera/position`: the camera is then chosen so that everything is "

@@ -23,7 +23,7 @@ inline auto choices(DensityKind) {
 
 template <class Visitor>
 void describe(DensitySettings& density, Visitor& visit) {
-  visit("kind", density.kind, "how photons become irradiance");
+  visit("kind", density.kind, "method that estimates irradiance from photons");
   visit("tau", density.tau, "standard deviation of the gaussian, in pixels", between(0.3, 1000));
 }
 

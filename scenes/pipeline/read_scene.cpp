@@ -38,8 +38,8 @@ const Output* best_kind(const std::filesystem::path& file, const std::vector<Out
     if (kind.option_ending) known.emplace_back(kind.option_ending);
     if (!kind.option_ending) known.insert(known.end(), kind.endings.begin(), kind.endings.end());
   }
-  throw SceneError(printable(
-      fmt::format("-o {}: no output has such an ending; {} writes {}", file.string(), method.name(), joined(known))));
+  throw SceneError(
+      printable(fmt::format("-o {}: unknown ending; {} can write {}", file.string(), method.name(), joined(known))));
 }
 
 /// Replaces the output files of the scene by those of the command line. A file that only another method makes is kept

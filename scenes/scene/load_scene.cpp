@@ -162,8 +162,10 @@ Plate make_plate(const SceneDescription& description, const TensorField& field, 
 }
 
 [[noreturn]] void fail_size(const SceneDescription& description, const char* pointer) {
-  throw SceneError(fmt::format("{}: `{}` lies, or reaches, more than {:g} times the volume's size away from it",
-                               description.path.string(), pointer, greatest_size));
+  throw SceneError(
+      fmt::format("{}: `{}` is too large or too far away: more than {:g} times the volume's size; make it smaller or "
+                  "move it nearer",
+                  description.path.string(), pointer, greatest_size));
 }
 
 double greatest_distance(const TensorField& field) {

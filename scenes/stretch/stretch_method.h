@@ -26,17 +26,17 @@ struct StretchKeys {
 
 template <class Visitor>
 void describe(StretchDescription& stretch, Visitor& visit) {
-  visit("length", stretch.length, "how far light is followed, world units; default: the volume's depth along the light",
-        above(0));
-  visit("wavelength", stretch.wavelength, "of the light, nm; default: 550, of RGB green",
+  visit("length", stretch.length,
+        "length over which light is followed, world units; default: the volume's depth along the light", above(0));
+  visit("wavelength", stretch.wavelength, "wavelength of the light, nm; default: 550, in RGB mode green",
         between(observer_min, observer_max));
-  visit("resolution", stretch.resolution, "of the grid: voxels along the longest side", between(2, 4096));
-  visit("pixels", stretch.pixels, "of the picture: pixels along the longer side", between(1, 32768));
+  visit("resolution", stretch.resolution, "resolution of the grid: voxels along the longest side", between(2, 4096));
+  visit("pixels", stretch.pixels, "resolution of the picture: pixels along the longer side", between(1, 32768));
 }
 
 template <class Visitor>
 void describe(StretchKeys& keys, Visitor& visit) {
-  visit.section("stretch", keys.stretch, "stretch: of what light, and how finely");
+  visit.section("stretch", keys.stretch, "stretch: light and resolution");
 }
 
 std::shared_ptr<Method> stretch_method();

@@ -148,7 +148,7 @@ TEST(TckPathsTest, ErrorsNameTheMend) {
   const std::string bytes = written("a.tck", some_paths(3));
   const auto error = [](const std::string& content) { return error_of("a.tck", content); };
   EXPECT_THAT(error(replaced(bytes, "mrtrix", "matrix")), HasSubstr("not a file of MRtrix tracks"));
-  EXPECT_THAT(error(replaced(bytes, "count: 3", "count: 4")), AllOf(HasSubstr("announces 4"), HasSubstr("holds 3")));
+  EXPECT_THAT(error(replaced(bytes, "count: 3", "count: 4")), AllOf(HasSubstr("gives 4"), HasSubstr("holds 3")));
   EXPECT_THAT(error(replaced(bytes, "count: 3", "count: x")), HasSubstr("\"count\""));
   EXPECT_THAT(error(replaced(bytes, "Float32LE", "Int32LE")), HasSubstr("datatype"));
   EXPECT_THAT(error(replaced(bytes, "datatype", "number")), HasSubstr("no datatype"));

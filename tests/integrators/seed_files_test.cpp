@@ -36,13 +36,13 @@ TEST(SeedFiles, SayWhichLineIsWrong) {
     EXPECT_NE(said.find(words), std::string::npos) << said;
   };
   expect("1 2 3\n4 5\n", "line 2: a seed is three numbers (x y z), or six (x y z and a direction), not 2");
-  expect("1 2 3\n1 2 3 0 0 1\n", "line 2: all lines must have equally many numbers: those before have 3");
+  expect("1 2 3\n1 2 3 0 0 1\n", "line 2: all lines must have the same number of values: the lines above have 3");
   expect("1 2 3\n4 five 6\n", "line 2: \"five\" is not a finite number");
   expect("1 2 nan\n", "line 1: \"nan\" is not a finite number");
-  expect("1 2 3 0 0 0\n", "line 1: the direction is zero");
+  expect("1 2 3 0 0 0\n", "line 1: the direction has length zero");
   expect("x y z\na b c\n", "line 2: \"a\" is not a finite number");
-  expect("x,y,z\n", "holds no seeds");
-  expect("# nothing\n", "holds no seeds");
+  expect("x,y,z\n", "contains no seeds");
+  expect("# nothing\n", "contains no seeds");
   EXPECT_NE(message([] { read_seeds("/nowhere/seeds.csv"); }).find("/nowhere/seeds.csv"), std::string::npos);
 }
 

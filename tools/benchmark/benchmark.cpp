@@ -20,11 +20,12 @@ namespace {
 constexpr const char* description =
     "Measures how fast this machine bends light through tensor fields.\n\n"
     "  machine  the processor, its vectors and its memory: the bounds\n"
-    "  kernels  this program's kernels beside what one would use instead, on the same fields, rays and step\n"
-    "  loading  a file of 256³ voxels to bricks in memory\n"
+    "  kernels  tensorray's kernels and those of other libraries, on the same fields, rays and step\n"
+    "  loading  reading a file of 256³ voxels and making bricks from it\n"
     "  jobs     whole renders, from scene file to picture, by phase, with one thread and with all\n\n"
     "A sample is one look-up of a tensor, with the step that uses it. Numbers are medians of five repetitions; ratios "
-    "are to the first row. All of it takes less than ten minutes on two cores; let nothing else run meanwhile.";
+    "are to the first row. A complete run takes less than ten minutes on two cores. Run no other programs at the same "
+    "time.";
 
 struct CommandLine {
   Options options;
@@ -52,12 +53,13 @@ void run(int argc, char** argv) {
   line.options.announce = announce;
   CLI::App app(description, "tensorray_bench");
   app.add_flag("--json", line.json, "Print everything as JSON instead of tables");
-  app.add_option("--only", line.only, "Measure this part alone")
+  app.add_option("--only", line.only, "Measure only this part")
       ->check(CLI::IsMember({"machine", "kernels", "loading", "jobs"}))
       ->type_name("PART");
-  app.add_flag("--quick", line.options.quick, "Tiny sizes, seconds: shows that all of it works, measures nothing");
+  app.add_flag("--quick", line.options.quick,
+               "Tiny sizes, takes seconds: checks that everything works; the numbers mean nothing");
   app.add_flag("--million", line.options.million,
-               "With the jobs, also a million positions of 32 wavelengths on a plate of 1024²");
+               "Also run a job with a million positions of 32 wavelengths on a plate of 1024² pixels");
   try {
     app.parse(argc, argv);
   } catch (const CLI::Success& request) {  // --help

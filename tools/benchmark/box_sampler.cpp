@@ -106,7 +106,7 @@ Eigen::Matrix3d TensorSampler::at(const Eigen::Vector3d& world) {
 
 Eigen::Matrix3d TensorSampler::at(const Eigen::Vector3d&, const Eigen::Matrix<double, 3, 2>&,
                                   std::array<Eigen::Matrix3d, 2>&) {
-  throw std::invalid_argument("OpenVDB's BoxSampler has no derivatives; use this program for photons");
+  throw std::invalid_argument("tensorray_box_sampler cannot trace derivatives; use it for photon_distribution only");
 }
 
 double TensorSampler::way_through_straight_brick(const Eigen::Vector3d&, const Eigen::Vector3d&) { return 0; }

@@ -91,7 +91,7 @@ double issue_fraction(double samples_per_second, const std::string& instructions
     if (rate.at("instructions") == instructions)
       return samples_per_second * packets::operations_per_step / rate.at("lanes").get<double>() /
              rate.at("multiply_adds_per_second").get<double>();
-  throw std::logic_error("no rate was measured of " + instructions);
+  throw std::logic_error("no rate was measured for " + instructions);
 }
 
 double bandwidth_fraction(double samples_per_second, const Json& machine) {

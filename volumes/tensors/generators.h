@@ -124,8 +124,8 @@ void describe(Helix& g, Visit&& visit) {
   visit("radius", g.radius, "radius of the helix");
   visit("pitch", g.pitch, "rise per turn");
   visit("thickness", g.thickness, "standard deviation of the tube's profile");
-  visit("along", g.along, "eigenvalue along the helix, in its middle");
-  visit("across", g.across, "the two other eigenvalues there");
+  visit("along", g.along, "on the helix: the eigenvalue along it");
+  visit("across", g.across, "on the helix: the two other eigenvalues");
   visit("background", g.background, "isotropic value far from the helix");
 }
 
