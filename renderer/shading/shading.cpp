@@ -18,7 +18,7 @@ constexpr std::uint32_t first_dimension = 2;
 constexpr std::uint32_t dimensions_per_vertex = 5;
 
 /// Least cosine between the shading normal and the direction to the viewer. Interpolated normals can place the viewer
-/// below a surface that he sees from above.
+/// below a surface that is seen from above.
 constexpr double least_cosine = 0.01;
 
 bool is_glass(const Material& material) { return std::holds_alternative<DielectricScattering>(material.scattering); }

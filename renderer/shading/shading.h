@@ -19,7 +19,7 @@ namespace tensorray {
 
 enum class Shading {
   path,               ///< All light, by path tracing.
-  ambient_occlusion,  ///< The reflectance times the visible fraction of a uniform white sky; one ray a sample.
+  ambient_occlusion,  ///< The reflectance times the visible fraction of a uniform white sky; one ray per sample.
   headlight,          ///< The reflectance times the cosine to the viewer; no further ray.
 };
 
