@@ -14,7 +14,7 @@ namespace {
 
 double cross(const Eigen::Vector2d& a, const Eigen::Vector2d& b) { return a.x() * b.y() - a.y() * b.x(); }
 
-/// Andrew's monotone chain; counter-clockwise, without collinear points.
+/// Andrew's monotone chain; the result is counter-clockwise, without collinear points.
 std::vector<Eigen::Vector2d> convex_hull(std::vector<Eigen::Vector2d> points) {
   std::sort(points.begin(), points.end(),
             [](auto& a, auto& b) { return a.x() < b.x() || (a.x() == b.x() && a.y() < b.y()); });
@@ -31,7 +31,8 @@ std::vector<Eigen::Vector2d> convex_hull(std::vector<Eigen::Vector2d> points) {
   return hull;
 }
 
-/// Inside or on the edge of a convex polygon, to rounding: a position on the edge of a rectangular beam is in it.
+/// Whether a point is inside a convex polygon or on its edge, to rounding: positions on the edge of a rectangular beam
+/// are in it.
 bool contains(const std::vector<Eigen::Vector2d>& polygon, const Eigen::Vector2d& point) {
   for (std::size_t i = 0; i < polygon.size(); ++i) {
     const Eigen::Vector2d& from = polygon[i];
@@ -121,8 +122,8 @@ Eigen::Vector3d BeamSampler::unit_sample(std::uint64_t index) const {
   return {uniform(0), uniform(1), uniform(2)};
 }
 
-/// A position in the cell of a lattice. The stratum is a rank-1 lattice of the cells: the cells of equal stratum are
-/// spread evenly, and so is the light of each wavelength if only some of them start from each cell.
+/// A position in a cell of a lattice. The stratum is a rank-1 lattice over the cells: cells with similar strata are
+/// evenly spread. So the light of each wavelength is evenly spread, even if only some wavelengths start from each cell.
 Eigen::Vector3d BeamSampler::cell_sample(std::uint64_t index, const Eigen::Vector2d& within) const {
   const auto column = static_cast<double>(index % columns_), row = static_cast<double>(index / columns_);
   constexpr double golden1 = 0.7548776662466927, golden2 = 0.5698402909980532;  // Roberts' R2 sequence.

@@ -1,6 +1,6 @@
 #pragma once
 /// @file renderer/lights/beam.h
-/// A parallel beam of light through an aperture.
+/// A parallel beam of light that passes through an aperture.
 
 #include <cstdint>
 #include <vector>
@@ -11,7 +11,8 @@ namespace tensorray {
 
 enum class BeamPattern { grid, stratified, sobol, random };
 
-/// Parallel light. Positions across it are in the frame (right, up) about `center`; it starts at `center`'s plane.
+/// Parallel light. It starts at the plane through `center`. Positions across it are in the frame (right, up) about
+/// `center`.
 struct Beam {
   Eigen::Vector3d direction = -Eigen::Vector3d::UnitZ();  ///< Unit.
   Eigen::Vector3d center = Eigen::Vector3d::Zero();       ///< World.
@@ -20,29 +21,29 @@ struct Beam {
   std::vector<Eigen::Vector2d> aperture;                  ///< Convex polygon, counter-clockwise in (right, up).
 };
 
-/// The beam whose aperture is the silhouette of `points` (their convex hull seen along `direction`) and which starts
-/// before all of them. `up` sets the frame (see `upright`).
+/// The beam whose aperture is the silhouette of `points` (their convex hull seen along `direction`). It starts in front
+/// of all points. `up` sets the frame (see `upright`).
 /// @throw std::invalid_argument if the silhouette has no area.
 Beam silhouette_beam(const std::vector<Eigen::Vector3d>& points, const Eigen::Vector3d& direction,
                      const Eigen::Vector3d& up);
 
 double area(const std::vector<Eigen::Vector2d>& polygon);
 
-/// One position of light.
+/// One position where light starts.
 struct Emission {
   Eigen::Vector3d origin = Eigen::Vector3d::Zero();  ///< World.
-  Eigen::Vector2d across = Eigen::Vector2d::Zero();  ///< Within the rectangle about the aperture, from 0 to 1.
-  double stratum = 0;  ///< In [0, 1): stratified jointly with the position; chooses among wavelengths.
+  Eigen::Vector2d across = Eigen::Vector2d::Zero();  ///< In the bounding rectangle of the aperture, from 0 to 1.
+  double stratum = 0;  ///< In [0, 1), stratified jointly with the position; chooses among wavelengths.
 };
 
-/// The positions from which a beam emits, as a function of the index. Immutable, shared by threads.
+/// The positions where the light of a beam starts, as a function of an index. Immutable; threads may share it.
 class BeamSampler {
  public:
-  /// @param count  About how many positions shall lie in the aperture.
-  /// @throw std::invalid_argument if count is 0, or above what the pattern has.
+  /// @param count  Approximate number of positions in the aperture.
+  /// @throw std::invalid_argument if count is 0, or above the pattern's limit.
   BeamSampler(const Beam& beam, BeamPattern pattern, std::uint64_t count, std::uint64_t seed);
 
-  std::uint64_t candidates() const { return candidates_; }  ///< Indices run from 0 to here.
+  std::uint64_t candidates() const { return candidates_; }  ///< Indices are below this.
   double area_per_candidate() const { return area_per_candidate_; }
 
   /// Sets `emission` and returns true if candidate `index` lies in the aperture.
@@ -55,7 +56,7 @@ class BeamSampler {
   Beam beam_;
   BeamPattern pattern_;
   std::uint64_t seed_;
-  Eigen::Vector2d corner_, extent_;  // Rectangle about the aperture.
+  Eigen::Vector2d corner_, extent_;  // Bounding rectangle of the aperture.
   std::uint64_t columns_ = 1, rows_ = 1, candidates_ = 0;
   double area_per_candidate_ = 0;
 };

@@ -40,7 +40,7 @@ double dot(const std::vector<float>& a, const std::vector<float>& b) {
   return sum;
 }
 
-/// Twice the area as its length, towards the side that shines.
+/// Normal of a triangle on the side that emits; its length is twice the area.
 Vector3d triangle_normal(const TriangleMesh& mesh, std::size_t triangle) {
   const auto [a, b, c] = mesh.triangles[triangle];
   return (mesh.vertices[b] - mesh.vertices[a]).cross(mesh.vertices[c] - mesh.vertices[a]);
@@ -55,12 +55,13 @@ Distribution1D triangles_by_area(const TriangleMesh& mesh) {
   return result;
 }
 
-/// Whether a direction towards the sky is in the light's disk. Compares chords, which small angles need.
+/// Whether a direction towards the sky is in the light's disk. It compares chords, which are accurate at small angles.
 bool in_disk(const DirectionalLight& light, const Vector3d& direction) {
   return (direction + light.direction).norm() <= 2 * std::sin(light.angle / 2);
 }
 
-/// That of an even disk which gives the light's irradiance to a surface that faces it: ∫ cos θ dω = π sin² angle.
+/// The radiance, for each unit of irradiance, of a uniform disk that gives this irradiance to a surface that faces it:
+/// ∫ cos θ dω = π sin² angle.
 double radiance_per_irradiance(const DirectionalLight& light) { return 1 / (pi * std::pow(std::sin(light.angle), 2)); }
 
 bool is_background(const Light& light) {
@@ -96,7 +97,7 @@ LightSampler::LightSampler(std::vector<Light> lights, const std::vector<float>& 
   if (!powers.empty()) choice_.emplace(powers);
 }
 
-/// The power of what is infinitely far away is that which passes through the ball about the scene.
+/// The power of a light that is infinitely far away is the power that passes through the bounding sphere of the scene.
 LightSampler::Prepared LightSampler::prepare(Light& light, const std::vector<float>& importance,
                                              double scene_radius) const {
   const double ball = pi * scene_radius * scene_radius;
@@ -170,7 +171,7 @@ double LightSampler::area_pdf(int light, const Vector3d& point, const Vector3d& 
                               const Vector3d& normal) const {
   const Vector3d way = point - position;
   const double distance = way.norm(), cosine = normal.dot(way) / distance;
-  if (!(cosine > 0)) return 0;  // The dark side.
+  if (!(cosine > 0)) return 0;  // This side does not emit.
   const double area = prepared_[light].triangles->sum();
   return choice_->probability(light) * distance * distance / (cosine * area);
 }
@@ -201,7 +202,7 @@ double LightSampler::background_pdf(const Vector3d& direction) const {
   return sum;
 }
 
-/// The density with which a light of the background, once chosen, chooses a direction.
+/// The density with which a background light, once chosen, chooses a direction.
 double LightSampler::directional_pdf(int light, const Vector3d& direction) const {
   if (const auto* disk = std::get_if<DirectionalLight>(&lights_[light]))
     return in_disk(*disk, direction) ? 1 / cone_solid_angle(disk->angle) : 0;

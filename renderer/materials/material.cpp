@@ -24,12 +24,12 @@ Eigen::Vector3d sample(const Diffuse&, const BandsIn&, const Eigen::Vector3d&, c
 
 bool is_glass(const Material& material) { return std::holds_alternative<DielectricScattering>(material.scattering); }
 
-/// Opaque materials are written for wo above the surface.
+/// Mirrors `w` in z if the material is opaque and wo is below the surface: opaque models need wo above it.
 Eigen::Vector3d seen(const Material& material, const Eigen::Vector3d& w, const Eigen::Vector3d& wo) {
   return wo.z() < 0 && !is_glass(material) ? Eigen::Vector3d(w.x(), w.y(), -w.z()) : w;
 }
 
-/// False where f is 0 because of the directions alone.
+/// False if f is 0 because of the directions alone.
 bool scatters(const Material& material, const Eigen::Vector3d& wi, const Eigen::Vector3d& wo) {
   const double sides = wi.z() * wo.z();
   return sides > 0 || (sides < 0 && is_glass(material));

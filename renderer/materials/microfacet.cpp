@@ -14,17 +14,17 @@ namespace {
 
 double square(double x) { return x * x; }
 
-/// The projected area of the facets that is seen is (cosine + spread) / 2, where Smith's Λ = (spread / cosine - 1) / 2.
-/// Writing G1 and G2 by it leaves no division by a cosine.
+/// The projected area of the visible facets is (cosine + spread) / 2, where Smith's Λ = (spread / cosine - 1) / 2. G1
+/// and G2 in terms of it need no division by a cosine.
 double spread(double alpha, double cosine) { return std::sqrt(square(alpha) + (1 - square(alpha)) * square(cosine)); }
 
-/// Fresnel's reflectance changes near the horizon even where masking does not.
+/// Greatest `horizon` of a table. Fresnel's reflectance changes near the horizon even where masking does not.
 constexpr double widest_horizon = 0.02;
 
-/// Knots are equally spaced in x, which is half the cosine and half a part that rises fast until the horizon's cosine.
+/// Knots are equally spaced in x: half of x is the cosine, the other half rises fast up to the cosine `horizon`.
 double to_knot(double horizon, double cosine) { return (cosine + cosine * (1 + horizon) / (cosine + horizon)) / 2; }
 double to_cosine(double horizon, double x) {
-  // The root of cosine² + linear · cosine = 2 horizon x, without cancellation.
+  // Solves cosine² + linear · cosine = 2 horizon x without cancellation.
   const double linear = 1 + 2 * horizon - 2 * x, root = std::sqrt(square(linear) + 8 * horizon * x);
   return linear > 0 ? 4 * horizon * x / (linear + root) : (root - linear) / 2;
 }
@@ -52,7 +52,7 @@ double ggx_facets(double alpha, const Eigen::Vector3d& m) {
 }
 
 Eigen::Vector3d ggx_sample_visible(double alpha, const Eigen::Vector3d& wo, const Eigen::Vector2d& u) {
-  // Stretched by 1 / alpha, the facets are those of a hemisphere, of which wo sees a disk whose lower part is squeezed.
+  // Stretched by 1 / alpha, the facets form a hemisphere. From wo it is a disk whose lower part is squeezed.
   const Eigen::Vector3d view = Eigen::Vector3d(alpha * wo.x(), alpha * wo.y(), wo.z()).normalized();
   const double across = std::hypot(view.x(), view.y());
   const Eigen::Vector3d right =
@@ -98,7 +98,7 @@ double fresnel_dielectric(double cosine, double index) {
 }
 
 double fresnel_conductor(double cosine, double n, double k) {
-  // Real arithmetic: a + ib is the root of (n + ik)² - sine².
+  // In real arithmetic: a + ib is the root of (n + ik)² - sine².
   const double c2 = square(cosine), s2 = 1 - c2;
   const double difference = square(n) - square(k) - s2;
   const double a2_b2 = std::sqrt(square(difference) + 4 * square(n * k));
@@ -123,14 +123,14 @@ double hemispherical_mean(const std::function<double(double cosine)>& fresnel) {
     const double cosine = (i + 0.5) / steps;
     sum += cosine * fresnel(cosine);
   }
-  return sum * 2 / steps;  // Exact for constants: the cosines' sum is steps / 2.
+  return sum * 2 / steps;  // Exact for constants: the cosines add up to steps / 2.
 }
 
 double visible_mean(double alpha, double cosine,
                     const std::function<double(const Eigen::Vector3d& wo, const Eigen::Vector3d& m)>& weight) {
-  // The disk's radius is the sine of an angle, which makes the integrand smooth at its rim, and one half of the disk
-  // mirrors the other one. The radii differ from one angle to the next by the golden ratio, so that a circle at which
-  // the weight jumps (total reflection) is met at all of its phases.
+  // The radius in the disk is the sine of an angle, which makes the integrand smooth at the rim. One half of the disk
+  // mirrors the other. The radii shift by the golden ratio from one angle to the next, so that they sample all phases
+  // of a circle at which the weight jumps (total reflection).
   constexpr int radii = 32, angles = 34;
   constexpr double golden = 0.6180339887498949;
   const Eigen::Vector3d wo(std::sqrt(std::max(0.0, 1 - square(cosine))), 0, cosine);
@@ -157,7 +157,7 @@ double CosineTable::pdf(double cosine) const {
 }
 
 Eigen::Vector3d CosineTable::sample(const Eigen::Vector2d& u) const {
-  // Within a segment cosine² is uniform.
+  // cosine² is uniform within a segment.
   const double wanted = u.x() * mean();
   const auto above = std::upper_bound(cumulative.begin() + 1, cumulative.end() - 1, wanted);
   const int segment = static_cast<int>(above - cumulative.begin()) - 1;
@@ -175,7 +175,7 @@ CosineTable make_cosine_table(double alpha, const std::function<double(double co
   for (int knot = 0; knot <= CosineTable::segments; ++knot)
     table.values[knot] = std::clamp(function(knot_cosine(horizon, knot)), 0.0, 1.0);
   for (int segment = 0; segment < CosineTable::segments; ++segment) {
-    // Simpson's rule over x of value · d(cosine²); its weights are normalised by those of the constant 1.
+    // Simpson's rule over x of value · d(cosine²). The weights are normalised so that the constant 1 is exact.
     const double first = knot_cosine(horizon, segment), last = knot_cosine(horizon, segment + 1);
     const double middle = to_cosine(horizon, (segment + 0.5) / CosineTable::segments);
     const auto density = [horizon](double cosine) {

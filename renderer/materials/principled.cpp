@@ -10,7 +10,7 @@ namespace {
 
 constexpr double coat_index = 1.5;
 
-/// Schlick's reflectance under uniform light: his fifth power has the mean 1/21.
+/// Schlick's reflectance under uniform light; the mean of his fifth power is 1/21.
 double mean_schlick(double normal_reflectance) { return (20 * normal_reflectance + 1) / 21; }
 
 double fraction(double value, const char* parameter) {
@@ -19,13 +19,13 @@ double fraction(double value, const char* parameter) {
   return value;
 }
 
-/// What the coat lets through on the way in and out. The smaller of both is reciprocal, and over a smooth metal, whose
-/// cosines agree, it is all that the coat does not reflect.
+/// The fraction that the coat transmits on the way in and out. The smaller of the two is reciprocal. Over a smooth
+/// metal both cosines are equal, and it is exactly what the coat does not reflect.
 double through_coat(const PrincipledScattering& layers, double cosine_o, double cosine_i) {
   return 1 - std::max(layers.coat.at(cosine_o), layers.coat.at(cosine_i));
 }
 
-/// What coat and base, of this Fresnel reflectance, do not reflect in one bounce.
+/// The fraction that the coat and a base with this Fresnel reflectance do not reflect in one bounce.
 template <class Fresnel>
 CosineTable missing_table(const PrincipledScattering& layers, const Fresnel& fresnel) {
   return make_cosine_table(std::min(layers.alpha, layers.coat_alpha), [&](double cosine) {
@@ -39,7 +39,8 @@ CosineTable missing_table(const PrincipledScattering& layers, const Fresnel& fre
   });
 }
 
-/// How often each lobe is sampled: by what it scatters in the band that is brightest, so that no weight is large.
+/// Sampling probability of each lobe, in proportion to what it scatters in the brightest band, so that no weight is
+/// large.
 struct LobeShares {
   double coat;
   double base;

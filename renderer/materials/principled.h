@@ -1,41 +1,41 @@
 #pragma once
 /// @file renderer/materials/principled.h
-/// One material for most things, with the parameters that artists know (Burley 2012, "Physically Based Shading at
-/// Disney"): from plastic to metal, with a coat of lacquer if wanted.
+/// A material for most purposes, with parameters that artists are used to (Burley 2012, "Physically Based Shading at
+/// Disney"): plastic to metal, optionally with a coat of lacquer.
 
 #include "renderer/materials/microfacet.h"
 #include "renderer/materials/scattering.h"
 
 namespace tensorray {
 
-/// All in 0 to 1. The base colour is the reflectance.
+/// All values are in 0 to 1. The reflectance is the base colour.
 struct Principled {
-  double metallic = 0;     ///< 0: a dielectric over a diffuse ground; 1: a metal of the base colour.
-  double roughness = 0.5;  ///< Below min_roughness: min_roughness.
-  double specular = 0.5;   ///< Of the dielectric: 0 no reflection, 0.5 index 1.5 (4 %), 1 index 1.8 (8 %).
-  double clearcoat = 0;    ///< How much of the surface is lacquered (index 1.5).
+  double metallic = 0;     ///< 0: a dielectric over a diffuse base; 1: a metal with the base colour.
+  double roughness = 0.5;  ///< Values below min_roughness count as min_roughness.
+  double specular = 0.5;   ///< Of the dielectric: 0: no reflection, 0.5: index 1.5 (4 %), 1: index 1.8 (8 %).
+  double clearcoat = 0;    ///< Fraction of the surface that is lacquered (index 1.5).
   double clearcoat_roughness = 0.1;
 };
 
-/// The material ready to scatter: the same from both sides. Reciprocal; energy is conserved layer by layer: what the
-/// coat reflects, the base does not get, and what both do not reflect in one bounce is returned by a lobe in the base
-/// colour, which is the diffuse ground of the dielectric, and the several bounces of the metal. A white base (1 in all
-/// bands) returns all light, to 2e-3, whatever the parameters.
+/// The prepared material, the same from both sides. It is reciprocal and conserves energy layer by layer: the base does
+/// not receive what the coat reflects. A lobe in the base colour returns what both do not reflect in one bounce; it is
+/// the diffuse base of the dielectric and the multiple bounces of the metal. A white base (1 in all bands) returns all
+/// light, to 2e-3, for all parameters.
 struct PrincipledScattering {
   double metallic = 0;
   double alpha = 1;
   double index = 1.5;  ///< Of the dielectric.
   double clearcoat = 0;
   double coat_alpha = 1;
-  CosineTable coat;                ///< What the coat reflects.
-  CosineTable missing_dielectric;  ///< What coat and dielectric do not reflect in one bounce,
-  CosineTable missing_metal;       ///< and what coat and perfect metal do not.
+  CosineTable coat;                ///< Fraction that the coat reflects.
+  CosineTable missing_dielectric;  ///< Fraction that coat and dielectric do not reflect in one bounce.
+  CosineTable missing_metal;       ///< Fraction that coat and perfect metal do not reflect in one bounce.
 };
 
 /// @throw std::invalid_argument naming the setting that is out of range.
 PrincipledScattering prepare(const Principled& settings);
 
-/// As for conductors: wi and wo with z > 0, u in [0, 1)³; `sample` may give a direction below the surface.
+/// As for conductors: wi and wo with z > 0, u in [0, 1)³. `sample` may give a direction below the surface.
 void evaluate(const PrincipledScattering& layers, const BandsIn& reflectance, const Eigen::Vector3d& wi,
               const Eigen::Vector3d& wo, BandsOut f);
 double pdf(const PrincipledScattering& layers, const BandsIn& reflectance, const Eigen::Vector3d& wi,

@@ -1,6 +1,6 @@
 #pragma once
 /// @file renderer/materials/reflectance_table.h
-/// Reflectances of colours in the bands that are rendered, fast enough for every surface that a path meets.
+/// Reflectances of colours in the rendered bands, fast enough for every surface that a path meets.
 
 #include <vector>
 
@@ -11,27 +11,30 @@
 
 namespace tensorray {
 
-/// The spectra of a ReflectanceModel at the nodes of a grid of colours, linear between them. A colour is linear in the
-/// spectrum, so that the interpolated spectrum gives the interpolated colour: exactly where the nodes' spectra do.
-/// Immutable; shared by threads.
+/// The spectra of a ReflectanceModel at the nodes of a grid of colours, with linear interpolation. Colour is linear in
+/// the spectrum, so the interpolated spectrum has the interpolated colour; it is exact if the spectra at the nodes are.
+/// Immutable; threads may share it.
 class ReflectanceTable {
  public:
-  /// @param bands, xyz_to_rgb  As those of the model. Takes 10 to 100 ms.
+  /// Takes 10 to 100 ms.
+  /// @param bands, xyz_to_rgb  The same as the model's.
   ReflectanceTable(const ReflectanceModel& model, const std::vector<Band>& bands, const Eigen::Matrix3d& xyz_to_rgb);
 
-  /// Of a colour of the working space; its components are clamped to [0, 1]. @param reflectance  One for each band.
+  /// Sets the reflectance of a colour in the working space.
+  /// @param color        Components are clamped to [0, 1].
+  /// @param reflectance  One value for each band.
   void reflectance(const Eigen::Vector3f& color, BandsOut reflectance) const;
 
-  /// The colour, in the working space, of bands with these values.
+  /// The colour, in the working space, of the values of all bands.
   Eigen::Vector3f color(const BandsIn& values) const { return (colors_ * values.matrix()).cast<float>(); }
 
-  /// The Y of bands with these values.
+  /// The luminance (Y) of the values of all bands.
   double luminance(const BandsIn& values) const { return luminance_.dot(values.matrix()); }
 
   Eigen::Index bands() const { return luminance_.size(); }
 
  private:
-  Eigen::ArrayXXf nodes_;  ///< Bands × nodes, red fastest.
+  Eigen::ArrayXXf nodes_;  ///< Bands × nodes; red varies fastest.
   Eigen::Matrix3Xd colors_;
   Eigen::VectorXd luminance_;
 };

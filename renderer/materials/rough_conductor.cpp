@@ -67,7 +67,7 @@ MetalSample interpolate(const std::vector<MetalSample>& samples, double waveleng
   return {wavelength, below->n + t * (above->n - below->n), below->k + t * (above->k - below->k)};
 }
 
-/// The lobes' shares are those of perfect mirrors; the colour is the same for both, nearly.
+/// The probability of each lobe is that for perfect mirrors, since both lobes have nearly the same colour.
 double single_bounce_share(const ConductorScattering& metal, const Eigen::Vector3d& wo) {
   return 1 - metal.missing.at(wo.z());
 }

@@ -12,18 +12,19 @@ namespace {
 
 double square(double x) { return x * x; }
 
-/// The surface as wo sees it, turned so that wo has z > 0.
+/// The surface seen from wo, turned so that wo has z > 0.
 struct View {
-  double index;               ///< Of the far side, relative to wo's.
-  const CosineTable& near;    ///< What is missing on wo's side,
-  const CosineTable& far;     ///< and on the other one.
-  double refracted;           ///< Of what is missing, the fraction that is refracted; the rest is reflected.
-  double refracted_radiance;  ///< The lobe's factor of near · far / π.
+  double index;               ///< Index of the far side relative to the side of wo.
+  const CosineTable& near;    ///< Fraction that is missing on the side of wo.
+  const CosineTable& far;     ///< Fraction that is missing on the other side.
+  double refracted;           ///< Fraction of the missing light that is refracted; the rest is reflected.
+  double refracted_radiance;  ///< The factor of near · far / π in the lobe.
 };
 
 View view_of(const DielectricScattering& glass, bool outside) {
-  // A lobe that refracts near · far · c / π for light that leaves to the inside is n² times that for light that leaves
-  // to the outside, by reciprocity; a cone of light from one side is compressed by the same factor on the other one.
+  // The refracting lobe is near · far · c / π. By reciprocity, it is n² times larger for light that leaves to the
+  // inside than for light that leaves to the outside. A cone of light from one side is compressed by the same factor on
+  // the other.
   const double index2 = square(glass.index);
   if (outside)
     return {glass.index, glass.missing_outside, glass.missing_inside,
@@ -36,7 +37,7 @@ Eigen::Vector3d turned(const Eigen::Vector3d& w, bool outside) {
   return outside ? w : Eigen::Vector3d(w.x(), w.y(), -w.z());
 }
 
-/// Zero if all is reflected. `index` as for Fresnel; wo and m on one side.
+/// The refracted direction; zero for total reflection. `index` is as for Fresnel; wo and m are on the same side.
 Eigen::Vector3d refracted(const Eigen::Vector3d& wo, const Eigen::Vector3d& m, double index) {
   const double cosine = wo.dot(m);
   const double cosine2 = 1 - (1 - square(cosine)) / square(index);
@@ -48,7 +49,7 @@ double fresnel(const Eigen::Vector3d& wo, const Eigen::Vector3d& m, double index
   return fresnel_dielectric(std::clamp(wo.dot(m), 0.0, 1.0), index);
 }
 
-/// A facet that refracts wi to wo, and how densely its normals lie over wi: d(m) / d(wi).
+/// A facet that refracts wi to wo, and the density of its normals over wi: d(m) / d(wi).
 struct Refraction {
   Eigen::Vector3d m;
   double jacobian = 0;  ///< 0 if there is no such facet.
@@ -67,7 +68,7 @@ Refraction refraction_between(const Eigen::Vector3d& wi, const Eigen::Vector3d& 
 
 double single_bounce_share(const View& view, const Eigen::Vector3d& wo) { return 1 - view.near.at(wo.z()); }
 
-/// Of light along wo, a facet's fraction that leaves it and is seen from outside the facets.
+/// The fraction of the light along wo that leaves a facet and is visible from outside the facets.
 double single_bounce(double alpha, double index, const Eigen::Vector3d& wo, const Eigen::Vector3d& m) {
   const double reflected = fresnel(wo, m, index);
   const Eigen::Vector3d above = mirrored(wo, m), below = refracted(wo, m, index);
@@ -99,8 +100,8 @@ DielectricScattering prepare(const RoughDielectric& settings) {
   glass.missing_inside = missing_table(glass.alpha, 1 / index);
 
   // From outside the lobes refract the fraction refracted · n² · mean(missing_inside), from inside refracted ·
-  // mean(missing_outside). Smooth glass refracts 1 - F, and n² (1 - F inside) of uniform light: the largest factor with
-  // which neither fraction is above that.
+  // mean(missing_outside). Smooth glass refracts the fractions 1 - F and 1 - F inside = (1 - F) / n² of uniform light.
+  // `refracted` is the largest factor with which neither fraction exceeds that of smooth glass.
   const double smooth = 1 - hemispherical_mean([=](double cosine) { return fresnel_dielectric(cosine, index); });
   const double missing = std::max(glass.missing_outside.mean(), glass.missing_inside.mean());
   glass.refracted = missing > 0 ? smooth / (square(index) * missing) : 0;
@@ -150,7 +151,7 @@ Eigen::Vector3d sample(const DielectricScattering& glass, const BandsIn&, const 
   if (u.x() < share) {
     const Eigen::Vector3d m = ggx_sample_visible(glass.alpha, o, u.tail<2>());
     const bool reflects = u.x() < share * fresnel(o, m, view.index);
-    // Light that leaves a facet on the wrong side has no density.
+    // Light that leaves a facet to the wrong side has no density.
     const Eigen::Vector3d wi = reflects ? mirrored(o, m) : refracted(o, m, view.index);
     return (reflects ? wi.z() > 0 : wi.z() < 0) ? turned(wi, outside) : Eigen::Vector3d::Zero();
   }

@@ -20,7 +20,7 @@ double height_of_angle(double angle) {
   return 2 * std::tan(angle / 2 * EIGEN_PI / 180);
 }
 
-/// Everything but the projection and the height.
+/// Makes a camera without its projection and height.
 Camera facing(const Vector3d& direction, const Vector3d& up, const Eigen::Vector2i& resolution) {
   require(direction.allFinite() && direction.stableNorm() > 0,
           "the camera must look somewhere: its direction must be finite and not zero");
@@ -46,18 +46,18 @@ Camera look_at(const Vector3d& position, const Vector3d& target, const Vector3d&
 
 double aspect(const Camera& camera) { return static_cast<double>(camera.resolution.x()) / camera.resolution.y(); }
 
-/// Right, up and forward parts: camera space as rows.
+/// Converts a vector to camera space: components along right, up and forward.
 Vector3d to_camera(const Camera& camera, const Vector3d& vector) {
   return {vector.dot(camera.right), vector.dot(camera.up), vector.dot(camera.forward)};
 }
 
-/// Points as (across, depth), and the eye that sees them all within `slope` of its axis on both sides.
-/// A point is within if |x − eye.x| <= slope (z − eye.z): two half planes, and the farthest points set both.
+/// Finds the eye that sees all points, given as (across, depth), within `slope` of its axis on both sides.
+/// A point is within if |x − eye.x| <= slope (z − eye.z). This gives two half planes; the farthest points set both.
 class Wedge {
  public:
   Wedge(const std::vector<Vector3d>& points, int axis) : points_(points), axis_(axis) {}
 
-  /// The eye that touches the points with both sides of the wedge: the nearest that sees them all.
+  /// The eye nearest to the points that sees them all: both sides of its wedge touch points.
   Vector2d eye(double slope) const {
     double right = -INFINITY, left = INFINITY;
     for (const Vector3d& p : points_) {
@@ -67,8 +67,8 @@ class Wedge {
     return {(left + right) / 2, (left - right) / (2 * slope)};
   }
 
-  /// The eye at a given depth that sees the points in its middle: of a wedge as narrow as can be. It is found by
-  /// bisection, as the depth of `eye` grows with the slope.
+  /// The position across, at a given depth, of the eye that sees all points in the narrowest wedge. Bisection finds it,
+  /// as the depth of `eye` grows with the slope.
   double middle(double depth, double widest) const {
     double low = 0, high = widest;
     for (int i = 0; i < 60; ++i) {
@@ -115,12 +115,12 @@ Camera frame_points(const std::vector<Vector3d>& points, const Framing& framing)
   }
   const Vector3d center = bounds.center();
   std::vector<Vector3d> seen;
-  Eigen::AlignedBox3d box;  // In camera space, about the center.
+  Eigen::AlignedBox3d box;  // In camera space, relative to the center.
   for (const Vector3d& point : points) {
     seen.push_back(to_camera(camera, point - center));
     box.extend(seen.back());
   }
-  // A perspective camera would go up to a point, or to a line along the view: they are seen as if they had a width.
+  // A perspective camera would move onto a single point, or onto a line along the view: such points get a small width.
   const double size = bounds.diagonal().stableNorm(), width = size > 0 ? 1e-6 * size : 1;
   const Vector3d widening = ((Vector3d(width, width, 0) - box.sizes()) / 2).cwiseMax(0);
   for (std::size_t i = points.size(); i-- > 0;) {
@@ -147,17 +147,17 @@ Camera frame_points(const std::vector<Vector3d>& points, const Framing& framing)
   return camera;
 }
 
-/// A ray through the lens' centre (or, of an orthographic camera, parallel to its axis) meets the plane of focus; the
-/// lens sends all rays of the pixel there. Without a lens the plane of focus makes no difference.
+/// A ray through the lens' centre (orthographic: a ray parallel to the axis) meets the plane of focus at a point. The
+/// lens sends all rays of the pixel to this point. Without a lens the plane of focus has no effect.
 CameraRay camera_ray(const Camera& camera, const Vector2d& pixel, const Vector2d& lens) {
   const double pixel_height = camera.height / camera.resolution.y();
   const Vector2d window = pixel - camera.resolution.cast<double>() / 2;
-  Eigen::Matrix<double, 3, 2> across;  // In the window, per pixel.
+  Eigen::Matrix<double, 3, 2> across;  // Size of a pixel in the window, as world vectors.
   across << pixel_height * camera.right, -pixel_height * camera.up;
 
   CameraRay ray;
   ray.origin = camera.position + camera.lens_radius * (lens.x() * camera.right + lens.y() * camera.up);
-  Vector3d towards = camera.forward;  // At distance 1 of the plane of focus.
+  Vector3d towards = camera.forward;  // From the lens to the point in focus, divided by the focus distance.
   (camera.projection == Projection::perspective ? towards : ray.origin) += across * window;
   towards -= camera.lens_radius / camera.focus_distance * (lens.x() * camera.right + lens.y() * camera.up);
   ray.direction = towards / towards.norm();

@@ -20,8 +20,8 @@ using Eigen::Vector2d;
 using Eigen::Vector3f;
 
 constexpr int tile_size = 16;
-constexpr int neighborhood = 2;           ///< Pixels in each direction that have a say in whether one is done.
-constexpr double least_luminance = 0.05;  ///< Of the picture's mean, to which errors are compared.
+constexpr int neighborhood = 2;           ///< Pixels in each direction that help decide whether a pixel is done.
+constexpr double least_luminance = 0.05;  ///< To which errors are compared; fraction of the picture's mean.
 
 void require_valid(const Camera& camera, const PathTracerSettings& settings) {
   require(camera.resolution.minCoeff() >= 1, "the camera's resolution must be >= 1");
@@ -46,18 +46,18 @@ SurfacePicture empty_picture(int width, int height, int bands) {
   return picture;
 }
 
-/// Takes one more value into a mean.
+/// Adds one value to a mean; `count` includes it.
 template <class Value>
 void extend_mean(Value& mean, int count, const Value& value) {
   mean += (value - mean) / static_cast<float>(count);
 }
 
-/// What a pixel must know beside the picture to go on.
+/// State of a pixel between passes that the picture does not hold.
 struct PixelState {
   int samples = 0, hits = 0, force_hits = 0, length_hits = 0;
   bool done = false;
   double luminance = 0, squares = 0;  ///< Mean, and the sum of squared differences from it (Welford 1962).
-  double nearest = std::numeric_limits<double>::infinity();  ///< Squared distance of the path from the centre.
+  double nearest = std::numeric_limits<double>::infinity();  ///< Squared distance from the centre to the path hit.
 };
 
 class Rendering {
@@ -161,6 +161,7 @@ void Rendering::add_surface(std::size_t index, const Vector2d& offset, const Fir
   }
 }
 
+/// Marks the pixels that are done.
 /// @return whether all are done.
 bool Rendering::finish_pixels() {
   if (settings_.noise_threshold == 0) return false;

@@ -12,7 +12,7 @@ namespace {
 
 constexpr int quantile_count = 256;
 
-/// All shapes are given on [−1, 1], with integral 1.
+/// All shapes are defined on [−1, 1] and have integral 1.
 struct Gaussian {
   static constexpr double steepness = 4.5;  ///< exp(−steepness x²): the radius is 3 σ.
 
@@ -86,7 +86,8 @@ double PixelFilter::sample(double u) const {
   return invert(u, quantiles_[i], quantiles_[i + 1]);
 }
 
-/// Where `cumulative` is u, between low and high: Newton's method, and bisection where that would leave the bracket.
+/// Finds x between low and high with cumulative(x) = u, by Newton's method; a step that leaves the bracket is replaced
+/// by bisection.
 double PixelFilter::invert(double u, double low, double high) const {
   double x = (low + high) / 2;
   for (int i = 0; i < 60; ++i) {

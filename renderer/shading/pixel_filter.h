@@ -1,6 +1,6 @@
 #pragma once
 /// @file renderer/shading/pixel_filter.h
-/// How the light about a pixel's centre makes up the pixel.
+/// Filters that weigh the light around a pixel's centre.
 
 #include <vector>
 
@@ -9,27 +9,28 @@
 namespace tensorray {
 
 enum class PixelFilterShape {
-  box,              ///< All alike.
+  box,              ///< Equal weight everywhere.
   gaussian,         ///< exp(−x²/(2σ²)), σ = radius / 3, lowered to 0 at the radius.
-  blackman_harris,  ///< Four cosines; side lobes of −92 dB: smooth, and nearly without aliasing.
+  blackman_harris,  ///< Four cosine terms; side lobes of −92 dB: smooth, with almost no aliasing.
 };
 
-/// The radius that suits the shape, in pixels: box ½, the others 1.5.
+/// The usual radius of the shape, in pixels: box ½, others 1.5.
 double default_radius(PixelFilterShape shape);
 
-/// A positive, separable filter on [−radius, radius]², for filter importance sampling: a sample's position is drawn
-/// with the filter as its density, and all samples of a pixel weigh 1. Immutable: any thread may use it.
+/// A positive, separable filter on [−radius, radius]², for filter importance sampling: the filter is the density of the
+/// samples' positions, and all samples of a pixel have weight 1. Immutable: any thread may use it.
 class PixelFilter {
  public:
-  /// @param radius  Pixels. @throw std::invalid_argument unless it is > 0 and finite.
+  /// @param radius  Pixels.
+  /// @throw std::invalid_argument unless the radius is > 0 and finite.
   PixelFilter(PixelFilterShape shape, double radius);
   explicit PixelFilter(PixelFilterShape shape) : PixelFilter(shape, default_radius(shape)) {}
 
   /// The density at an offset from the pixel's centre, in 1/pixel²; its integral is 1.
   double density(const Eigen::Vector2d& offset) const { return density(offset.x()) * density(offset.y()); }
 
-  /// An offset with this density, from evenly spread `u` of [0, 1)²; each of u's numbers sets one of the offset's,
-  /// monotonically. By inversion to rounding, in some 0.3 µs.
+  /// An offset with this density, from `u`, uniform in [0, 1)². Each component of the offset depends on the same
+  /// component of `u` only, and increases with it. Inverts the distribution to rounding, in about 0.3 µs.
   Eigen::Vector2d sample(const Eigen::Vector2d& u) const { return {sample(u.x()), sample(u.y())}; }
 
   PixelFilterShape shape() const { return shape_; }
@@ -43,7 +44,7 @@ class PixelFilter {
 
   PixelFilterShape shape_;
   double radius_;
-  std::vector<double> quantiles_;  ///< Where `cumulative` is i / (size − 1).
+  std::vector<double> quantiles_;  ///< Positions where `cumulative` is i / (size − 1).
 };
 
 }  // namespace tensorray

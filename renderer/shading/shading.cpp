@@ -13,11 +13,12 @@ namespace {
 
 using Eigen::Vector3d;
 
-/// Of the sampler: those before are the camera's.
+/// First dimension of the sampler for shading; the camera uses those before.
 constexpr std::uint32_t first_dimension = 2;
 constexpr std::uint32_t dimensions_per_vertex = 5;
 
-/// Where interpolated normals would have the viewer below the surface he is seen to be at this cosine above it.
+/// Least cosine between the shading normal and the direction to the viewer. Interpolated normals can place the viewer
+/// below a surface that is seen from above.
 constexpr double least_cosine = 0.01;
 
 bool is_glass(const Material& material) { return std::holds_alternative<DielectricScattering>(material.scattering); }
@@ -26,8 +27,8 @@ Eigen::Map<const Eigen::ArrayXf> as_array(const std::vector<float>& values) {
   return {values.data(), static_cast<Eigen::Index>(values.size())};
 }
 
-/// The shading normal on the side that `direction` comes from, turned up to where the viewer can be above it: without
-/// this, silhouettes of coarse meshes have black fringes. Geometric normals stay as they are.
+/// The shading normal on the side that `direction` comes from, turned so that the viewer is above the surface. Without
+/// this, silhouettes of coarse meshes have black fringes. The geometric normal does not change.
 Vector3d facing_normal(const SurfaceHit& hit, const Vector3d& direction, double side) {
   const Vector3d normal = side * hit.shading_normal;
   const double cosine = -normal.dot(direction), least = std::min(least_cosine, -side * hit.normal.dot(direction));
@@ -60,17 +61,17 @@ void require_shadable(const ShadedScene& scene, const ShadingSettings& settings)
     require(!is_area_light(i) || found.count(i), "light " + std::to_string(i) + " must have a surface of its mesh");
 }
 
-/// Where a path meets a surface. The frame is that of the material: +z is outwards.
+/// A point where a path meets a surface. The frame is the material's: +z points outwards.
 struct RayShader::Vertex {
   SurfaceHit hit;
   const Material* material;
   double side;     ///< 1: seen from outside, −1: from inside.
-  Vector3d point;  ///< That light reaches.
+  Vector3d point;  ///< The point that is lit.
   Vector3d normal;
   Eigen::Matrix3d frame;
   Vector3d wo;
 
-  /// Where a ray starts towards `wi`.
+  /// Start of a ray towards `wi`.
   Vector3d start(const SurfaceScene& surfaces, const Vector3d& wi) const {
     return surfaces.start(hit, point, wi.z() * wo.z() < 0 ? -side : side);
   }
@@ -111,7 +112,7 @@ std::optional<FirstSurface> RayShader::shade(const Vector3d& origin, const Vecto
   return FirstSurface{*hit, vertex.normal};
 }
 
-/// Sets `reflectance_` as well.
+/// Also sets `reflectance_`.
 RayShader::Vertex RayShader::make_vertex(const SurfaceHit& hit, const Vector3d& direction) {
   Vertex vertex;
   vertex.hit = hit;
@@ -133,8 +134,8 @@ void RayShader::set_reflectance(const SurfaceHit& hit, BandValues& reflectance) 
     scene_.colors.reflectance(hit.color, reflectance);
 }
 
-/// Directions below the geometric surface but above the shaded one are followed like all others, from the lifted point:
-/// of light, they find what the surface itself leaves to see.
+/// Directions below the geometric surface but above the shaded one are followed like all others, from the lifted point.
+/// They find the light that the surface itself does not block.
 void RayShader::shade_path(Vertex vertex, PathSampler& sampler) {
   double refraction = 1;
   for (int depth = 1; depth <= settings_.max_depth; ++depth) {
@@ -167,7 +168,7 @@ void RayShader::shade_path(Vertex vertex, PathSampler& sampler) {
   }
 }
 
-/// Of light that was met by chance.
+/// Weight of light that a sampled direction has found.
 template <class Density>
 double RayShader::material_weight(double material_pdf, const Density& light_pdf) const {
   if (settings_.direct == DirectLight::lights) return 0;
@@ -194,8 +195,9 @@ void RayShader::add_direct_light(const Vertex& vertex, int depth, PathSampler& s
   add(depth);
 }
 
-/// Of `light_`, which was chosen for `point`. The ray starts elsewhere, by a little, and must still end on the light:
-/// else it would meet the light itself, seen at a grazing angle, before its end.
+/// Whether something blocks the light from `light_`, which was sampled from `point`. The ray starts a little off
+/// `point`, so it must be aimed again at the position on the light: otherwise it would meet the light itself too early
+/// where it is seen at a grazing angle.
 bool RayShader::is_shadowed(const Vector3d& start, const Vector3d& point) const {
   if (std::isinf(light_.distance)) return scene_.surfaces.occluded(start, light_.direction);
   const Vector3d way = point + light_.distance * light_.direction - start;
@@ -219,7 +221,8 @@ void RayShader::add_emission(const SurfaceHit& hit, const Vector3d& direction, d
   add(depth);
 }
 
-/// Adds what was scattered `depth` times. What overflows is left out, as no mean would survive it.
+/// Adds light that was scattered `depth` times. Leaves out values that overflow, since one would make the mean
+/// infinite.
 void RayShader::add(int depth) {
   const double luminance = scene_.colors.luminance(contribution_);
   if (!std::isfinite(luminance)) return;

@@ -1,6 +1,6 @@
 #pragma once
 /// @file renderer/shading/shading.h
-/// The light that a ray sees: path tracing (Kajiya 1986; Veach 1997), and two fast previews.
+/// The light that a ray sees: path tracing (Kajiya 1986; Veach 1997) and two fast previews.
 
 #include <cstdint>
 #include <limits>
@@ -18,66 +18,66 @@
 namespace tensorray {
 
 enum class Shading {
-  path,               ///< All light, by paths.
-  ambient_occlusion,  ///< The reflectance, times the part of an evenly white sky that the surface sees: one ray a
-                      ///< sample.
-  headlight,          ///< The reflectance, times the cosine to the viewer: no ray at all.
+  path,               ///< All light, by path tracing.
+  ambient_occlusion,  ///< The reflectance times the visible fraction of a uniform white sky; one ray per sample.
+  headlight,          ///< The reflectance times the cosine to the viewer; no further ray.
 };
 
-/// How the light that reaches a surface directly is looked for. All have the same mean; `both` has the least noise.
+/// How direct light is sampled. All methods have the same mean; `both` has the least noise.
 enum class DirectLight {
-  both,      ///< Weighted by the power heuristic (Veach and Guibas 1995).
-  lights,    ///< Towards the lights only.
-  material,  ///< By what the material scatters only; but lights that only they themselves can find, towards them.
+  both,      ///< Both, weighted by the power heuristic (Veach and Guibas 1995).
+  lights,    ///< Samples the lights only.
+  material,  ///< Samples the material only, except for lights that only sampling the light can find.
 };
 
 struct ShadingSettings {
   Shading shading = Shading::path;
   DirectLight direct = DirectLight::both;
-  int max_depth = 8;       ///< Surfaces at which a path scatters; >= 0. 1: direct light alone.
-  int roulette_depth = 4;  ///< After so many of them a path may end by chance (Russian roulette); >= 1.
-  /// Light that is scattered twice or more counts with at most this luminance for each sample and surface, 1 being that
-  /// of the light the bands are made from; 0: no limit. It is what rare bright paths (fireflies) are made of. With the
-  /// default one of them adds at most 10 / samples to a pixel: at 64 samples, 0.16, which is 20 times its neighbours
-  /// only where these are below 0.008. Light that is scattered once, which lights most of what there is to see, is
-  /// never changed; light that many surfaces send to each other, rarely.
+  int max_depth = 8;       ///< Most surfaces at which a path scatters; >= 0. 1: direct light only.
+  int roulette_depth = 4;  ///< After this many surfaces, a path may end at random (Russian roulette); >= 1.
+  /// Greatest luminance that light scattered twice or more adds, for each sample and surface; 1 is the luminance of the
+  /// light that the bands are made from. 0: no limit. The limit removes rare bright paths (fireflies). With the
+  /// default, one such path adds at most 10 / samples to a pixel: at 64 samples 0.16, which is 20 times the
+  /// neighbouring pixels only if these are below 0.008. Light that is scattered once, which lights most of a picture,
+  /// is never changed. Light that many surfaces exchange is rarely changed.
   double indirect_clamp = 10;
-  double occlusion_distance = std::numeric_limits<double>::infinity();  ///< World units: what is farther hides no sky.
+  /// World units; beyond it nothing hides the sky.
+  double occlusion_distance = std::numeric_limits<double>::infinity();
 };
 
-/// What is drawn. It refers to its parts, which must outlive it.
+/// The scene to draw. It refers to its parts, which must outlive it.
 struct ShadedScene {
   const SurfaceScene& surfaces;
-  const std::vector<Material>& materials;  ///< ShadedSurface::material is an index of these.
-  const LightSampler& lights;              ///< Of the bands of `colors`.
+  const std::vector<Material>& materials;  ///< ShadedSurface::material is an index into these.
+  const LightSampler& lights;              ///< With the same bands as `colors`.
   const ReflectanceTable& colors;
 };
 
-/// @throw std::invalid_argument if a setting is out of range; naming the surface if it has no material, or a light that
-/// is no area light; naming the material if its bands are not those of `colors`; naming the area light if no surface
-/// has its mesh, as the light that paths find by chance would be missing.
+/// @throw std::invalid_argument if a setting is out of range; naming the surface if it has no material, or its light is
+/// no area light; naming the material if its bands are not those of `colors`; naming the area light if no surface has
+/// its mesh, since the light that paths find by chance would be missing.
 void require_shadable(const ShadedScene& scene, const ShadingSettings& settings);
 
-/// What the first surface looks like.
+/// The first surface that a ray meets.
 struct FirstSurface {
   SurfaceHit hit;
-  Eigen::Vector3d normal = Eigen::Vector3d::Zero();  ///< As shaded: towards the viewer.
+  Eigen::Vector3d normal = Eigen::Vector3d::Zero();  ///< As used for shading; towards the viewer.
 };
 
-/// Follows rays. Holds memory that it uses again and again: one for each thread.
+/// Follows rays. It reuses its memory: make one for each thread.
 class RayShader {
  public:
   RayShader(const ShadedScene& scene, const ShadingSettings& settings);
 
-  /// Sets `radiance()` to what the ray sees, an estimate whose mean is that (less what is clamped).
-  /// @param show_background  Otherwise a ray that meets nothing sees no light.
+  /// Sets `radiance()` to an estimate of what the ray sees. The mean of the estimate is exact, apart from clamping.
+  /// @param show_background  False: a ray that meets nothing sees no light.
   /// @return the first surface, if there is one.
   std::optional<FirstSurface> shade(const Eigen::Vector3d& origin, const Eigen::Vector3d& direction,
                                     bool show_background, PathSampler& sampler);
 
   const BandValues& radiance() const { return radiance_; }
 
-  /// Of the working space; what denoisers take for the albedo.
+  /// In the working space; the albedo that denoisers expect.
   Eigen::Vector3f albedo(const SurfaceHit& hit);
 
  private:

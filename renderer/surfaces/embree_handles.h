@@ -1,7 +1,7 @@
 #pragma once
 /// @file renderer/surfaces/embree_handles.h
-/// The one file that includes Embree, private to the scenes that are built on it: what differs between Embree 3 and 4,
-/// and handles that own.
+/// The only file that includes Embree; private to the scenes that use it. It hides the differences between Embree 3 and
+/// 4 and defines owning handles.
 
 #if __has_include(<embree4/rtcore.h>)
 #include <embree4/rtcore.h>
@@ -17,16 +17,16 @@
 
 namespace tensorray::embree {
 
-/// Whether Embree can compute with a coordinate: its square is a number in single precision. Not a number is not.
+/// Whether Embree can compute with a coordinate: its square fits in single precision. False for NaN.
 inline bool fits(float x) { return std::abs(x) <= 1e18f; }
 
-/// Whether Embree can follow the ray: it ends the process on one that has a value that is no number or too large.
+/// Whether Embree can trace the ray. Embree ends the process on a ray that has a NaN or a value that is too large.
 inline bool is_valid(const RTCRay& ray) {
   return fits(ray.org_x) && fits(ray.org_y) && fits(ray.org_z) && fits(ray.dir_x) && fits(ray.dir_y) &&
          fits(ray.dir_z) && !std::isnan(ray.tfar);
 }
 
-/// Leaves a ray that is not valid as it is: it meets nothing.
+/// Does not change a ray that is not valid: it meets nothing.
 inline void intersect(RTCScene scene, RTCRayHit& ray) {
   if (!is_valid(ray.ray)) return;
 #if RTC_VERSION_MAJOR >= 4
@@ -38,7 +38,7 @@ inline void intersect(RTCScene scene, RTCRayHit& ray) {
 #endif
 }
 
-/// Sets tfar to −infinity if there is anything on the way. There is nothing on the way of a ray that is not valid.
+/// Sets tfar to −infinity if the ray meets anything. A ray that is not valid meets nothing.
 inline void occluded(RTCScene scene, RTCRay& ray) {
   if (!is_valid(ray)) return;
 #if RTC_VERSION_MAJOR >= 4
@@ -59,13 +59,13 @@ struct Release {
 template <class Handle>
 using Owned = std::unique_ptr<std::remove_pointer_t<Handle>, Release>;
 
-/// @throw std::runtime_error if something has failed since the last check.
+/// @throw std::runtime_error if an Embree call has failed since the last check.
 inline void check(RTCDevice device) {
   if (const RTCError error = rtcGetDeviceError(device); error != RTC_ERROR_NONE)
     throw std::runtime_error("Embree cannot build the scene (error " + std::to_string(error) + ")");
 }
 
-/// A device costs a tenth of a millisecond, so that every scene has its own and no two share anything.
+/// A device costs a tenth of a millisecond, so every scene has its own and scenes share no state.
 inline Owned<RTCDevice> make_device() {
   Owned<RTCDevice> device(rtcNewDevice(nullptr));
   if (!device) throw std::runtime_error("Embree cannot start on this processor");

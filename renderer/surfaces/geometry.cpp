@@ -11,12 +11,12 @@
 namespace tensorray {
 namespace {
 
-constexpr double tolerance = 1e-6;  // Of the volume's size: what single precision resolves, with some room.
+constexpr double tolerance = 1e-6;  // Fraction of the volume's size; single precision resolves it, with some margin.
 
 TriangleMesh plate_mesh(const Plate& plate) { return {plate.corners(), {{0, 1, 2}, {0, 2, 3}}}; }
 
 struct Part {
-  const TriangleMesh* mesh;  // In double precision, beside the scene's copy.
+  const TriangleMesh* mesh;  // In double precision; the scene has a copy in single precision.
   Surface surface;
 };
 
@@ -26,7 +26,7 @@ std::vector<const TriangleMesh*> meshes(const std::vector<Part>& parts) {
   return result;
 }
 
-/// Some meshes in a scene of their own: queries name a group, as ray masks are not in every build of Embree.
+/// Some meshes in a separate scene. A query names a group, because some builds of Embree have no ray masks.
 struct Group {
   Group(std::vector<Part> meshes_and_surfaces, const Eigen::Vector3d& origin, double unit)
       : parts(std::move(meshes_and_surfaces)), scene(meshes(parts), origin, unit) {
@@ -34,7 +34,7 @@ struct Group {
   }
 
   std::vector<Part> parts;
-  std::vector<Eigen::AlignedBox3d> boxes;  // Of the parts.
+  std::vector<Eigen::AlignedBox3d> boxes;  // Bounding boxes of the parts.
   TriangleScene scene;
 };
 
@@ -47,14 +47,14 @@ struct Geometry::State {
   TriangleMesh plate;
   Eigen::AlignedBox3d volume;
   double size, margin;
-  // Scenes relative to the volume, so that their single precision is spent on it.
+  // The scenes' coordinates are relative to the volume, so that single precision resolves it well.
   Group bounds, cut, absorbers;
 
   void require_within_reach(const TriangleMesh& mesh, const std::string& name) const;
   std::vector<Part> cut_parts() const;
   std::vector<Part> absorber_parts() const;
 
-  /// The nearest hit of a group beyond `min_distance` (which may be negative).
+  /// The nearest hit of a group at more than `min_distance` (which may be negative).
   std::optional<Hit> nearest(const Group& group, const Eigen::Vector3d& from, const Eigen::Vector3d& direction,
                              double min_distance, double max_distance) const;
 };
@@ -117,7 +117,7 @@ std::optional<Hit> Geometry::State::nearest(const Group& group, const Eigen::Vec
   hit.surface = part.surface;
   hit.normal = (b - a).cross(c - a).normalized();
   const double exact = hit.normal.dot(a - from) / hit.normal.dot(direction);
-  // Where light grazes a plane the distance to it is ill-determined: keep what was seen.
+  // Where a ray grazes a plane, the distance to the plane is ill-conditioned: keep the distance from Embree.
   const double allowed = 10 * (margin + tolerance * std::abs(seen->distance));
   hit.distance = std::abs(exact - seen->distance) <= allowed ? exact : seen->distance;
   return hit;
@@ -152,7 +152,7 @@ Eigen::AlignedBox3d Geometry::absorbers_within(const Eigen::AlignedBox3d& region
 std::optional<Hit> Geometry::crossing(Surface surface, bool inwards, const Eigen::Vector3d& origin,
                                       const Eigen::Vector3d& direction, double max_distance) const {
   const Group& group = surface == Surface::bounds ? state_->bounds : state_->cut;
-  constexpr int most_crossings = 10000;  // Of one line and one mesh: rounding shall not keep it here for ever.
+  constexpr int most_crossings = 10000;  // Of one line with one mesh; rounding must not make this loop endless.
   double from = -state_->margin;
   for (int i = 0; i < most_crossings; ++i) {
     auto hit = state_->nearest(group, origin, direction, from, max_distance + state_->margin);
@@ -162,7 +162,7 @@ std::optional<Hit> Geometry::crossing(Surface surface, bool inwards, const Eigen
       return hit;
     }
     const double next = std::max(hit->distance, from) + state_->margin;
-    if (!(next > from)) break;  // So far away that double precision does not resolve the margin.
+    if (!(next > from)) break;  // Double precision does not resolve the margin at this distance.
     from = next;
   }
   return std::nullopt;
@@ -170,8 +170,8 @@ std::optional<Hit> Geometry::crossing(Surface surface, bool inwards, const Eigen
 
 bool Geometry::inside_cut(const Eigen::Vector3d& point) const {
   if (!has_cut()) return true;
-  // From inside a closed mesh the first surface along any direction is met from behind. This direction is unlikely to
-  // meet an edge.
+  // From inside a closed mesh, a ray in any direction meets the first surface from behind. This direction is unlikely
+  // to meet an edge.
   const Eigen::Vector3d direction = Eigen::Vector3d(0.5381, 0.3127, 0.7827).normalized();
   const auto hit = state_->nearest(state_->cut, point, direction, 0, infinite);
   return hit && hit->normal.dot(direction) > 0;

@@ -1,6 +1,6 @@
 #pragma once
 /// @file renderer/surfaces/geometry.h
-/// All surfaces that light can meet, in one Embree scene.
+/// Finds where light meets the surfaces of a scene: bounds, cut, plate and obstacles.
 
 #include <cstdint>
 #include <limits>
@@ -17,31 +17,31 @@ namespace tensorray {
 
 enum class Surface : std::uint8_t {
   bounds,    ///< The box of the volume.
-  cut,       ///< A closed mesh, inside of which the volume is.
-  plate,     ///< The receiver.
+  cut,       ///< A closed mesh; the volume is inside it.
+  plate,     ///< Collects light (scene key: receiver).
   obstacle,  ///< Absorbs light.
 };
 
 struct Hit {
-  double distance = 0;  ///< Along the unit direction, world units, in double precision: see Geometry.
+  double distance = 0;  ///< Along the unit direction, world units, in double precision; see Geometry.
   Surface surface = Surface::plate;
   Eigen::Vector3d normal = Eigen::Vector3d::Zero();  ///< Unit, geometric; outwards for bounds, cut and obstacles.
 };
 
 /// The parts of a Geometry.
 struct Surfaces {
-  TriangleMesh bounds;              ///< Closed, convex, looks outwards.
-  std::optional<TriangleMesh> cut;  ///< Closed, looks outwards.
+  TriangleMesh bounds;              ///< Closed, convex; normals point outwards.
+  std::optional<TriangleMesh> cut;  ///< Closed; normals point outwards.
   std::optional<Plate> plate;
   std::vector<TriangleMesh> obstacles;
 };
 
-/// An immutable Embree scene. Any number of threads may query it at once.
+/// Immutable Embree scenes. Any number of threads may query them at once.
 ///
-/// Embree finds the triangle in single precision; the distance is then that to the triangle's plane in double
-/// precision. Light may start anywhere: what cannot be found in double precision either, from very far, is not met. A
-/// surface behind the origin by less than about 1e-6 of the volume's size counts as hit at 0: light that
-/// starts on a plate, or leaves the volume through one, meets it.
+/// Embree finds the triangle in single precision; the distance to the triangle's plane is then computed in double
+/// precision. Light may start anywhere. A ray from so far away that double precision does not resolve a surface does
+/// not meet it. A surface that lies behind the origin by less than about 1e-6 of the volume's size counts as a hit at
+/// distance 0: light that starts on a plate, or leaves the volume through one, meets it.
 class Geometry {
  public:
   /// @throw std::invalid_argument naming the surface if it is not finite, or too far from the volume for single
@@ -56,20 +56,21 @@ class Geometry {
   std::optional<Hit> absorber(const Eigen::Vector3d& origin, const Eigen::Vector3d& direction,
                               double max_distance = infinite) const;
 
-  /// False only if no plate or obstacle can meet the segment; cheap.
+  /// Returns false only if no plate or obstacle can meet the segment; cheap.
   bool may_absorb(const Eigen::Vector3d& from, const Eigen::Vector3d& to) const;
 
   /// A box around all parts of plates and obstacles that may lie in `region`; empty if there are none.
   Eigen::AlignedBox3d absorbers_within(const Eigen::AlignedBox3d& region) const;
 
-  /// Where light crosses the bounds, or the cut, inwards or outwards; crossings in the other sense are passed over.
+  /// Where light first crosses the bounds or the cut in the given sense (inwards or outwards). Crossings in the other
+  /// sense are skipped.
   std::optional<Hit> crossing(Surface surface, bool inwards, const Eigen::Vector3d& origin,
                               const Eigen::Vector3d& direction, double max_distance = infinite) const;
 
   const Surfaces& surfaces() const;
   bool has_cut() const { return surfaces().cut.has_value(); }
 
-  /// Whether a point is inside the cut; true where there is none.
+  /// Whether a point is inside the cut; true if there is no cut.
   bool inside_cut(const Eigen::Vector3d& point) const;
 
   static constexpr double infinite = std::numeric_limits<double>::infinity();

@@ -31,8 +31,8 @@ struct PositionHash {
   }
 };
 
-/// Joins vertices at equal positions, which files repeat (for normals, or one for each mesh), and drops triangles of no
-/// area and vertices of no triangle.
+/// Joins vertices at equal positions, which files often repeat (for normals, or for each mesh). Drops triangles of zero
+/// area and vertices that no triangle uses.
 TriangleMesh joined(const TriangleMesh& mesh) {
   TriangleMesh result;
   std::unordered_map<Position, std::uint32_t, PositionHash> indices;
@@ -51,7 +51,7 @@ TriangleMesh joined(const TriangleMesh& mesh) {
   return result;
 }
 
-/// assimp's own processing relies on these.
+/// Checks what assimp's own processing assumes.
 /// @return whether a face has more than three corners.
 bool check_faces(const aiScene& scene) {
   bool polygons = false;
@@ -77,7 +77,7 @@ void add_mesh(const aiMesh& part, const aiMatrix4x4& to_world, TriangleMesh& mes
   const bool mirrored = to_world.Determinant() < 0;
   for (unsigned i = 0; i < part.mNumFaces; ++i) {
     const aiFace& face = part.mFaces[i];
-    if (face.mNumIndices != 3) continue;  // Points and lines, which have no surface.
+    if (face.mNumIndices != 3) continue;  // Points and lines have no surface.
     Triangle t{offset + face.mIndices[0], offset + face.mIndices[1], offset + face.mIndices[2]};
     if (mirrored) std::swap(t[1], t[2]);
     mesh.triangles.push_back(t);
@@ -90,7 +90,7 @@ void add_node(const aiScene& scene, const aiNode& node, const aiMatrix4x4& to_wo
   for (unsigned i = 0; i < node.mNumChildren; ++i) add_node(scene, *node.mChildren[i], here, mesh);
 }
 
-/// Its processing steps are kept to the least, since they abort the program on input that they do not expect.
+/// Uses as few of assimp's processing steps as possible, since they abort the program on unexpected input.
 TriangleMesh import(const std::filesystem::path& path) {
   Assimp::Importer importer;
   const aiScene* scene = importer.ReadFile(path.string(), 0);
@@ -101,10 +101,10 @@ TriangleMesh import(const std::filesystem::path& path) {
   return mesh;
 }
 
-/// Edges along which more triangles run one way than the other, each counted as often as triangles are missing.
+/// Number of edges where more triangles run one way than the other; each edge counts once for each missing triangle.
 std::size_t open_edges(const TriangleMesh& mesh) {
   using Edge = std::pair<std::uint32_t, std::uint32_t>;
-  std::vector<Edge> forwards, backwards;  // From the lower to the higher vertex, and the other way.
+  std::vector<Edge> forwards, backwards;  // From the lower to the higher vertex index, and the reverse.
   for (const Triangle& t : mesh.triangles)
     for (int i = 0; i < 3; ++i) {
       const std::uint32_t from = t[i], to = t[(i + 1) % 3];
@@ -118,9 +118,9 @@ std::size_t open_edges(const TriangleMesh& mesh) {
   return open.size();
 }
 
-/// Six times the enclosed volume; positive if the triangles look outwards.
+/// Six times the enclosed volume; positive if the triangles face outwards.
 double signed_volume(const TriangleMesh& mesh) {
-  const Eigen::Vector3d center = mesh.bounds().center();  // Near the origin nothing cancels.
+  const Eigen::Vector3d center = mesh.bounds().center();  // Coordinates relative to the centre avoid cancellation.
   double sum = 0;
   for (const Triangle& t : mesh.triangles) {
     const Eigen::Vector3d a = mesh.vertices[t[0]] - center, b = mesh.vertices[t[1]] - center;

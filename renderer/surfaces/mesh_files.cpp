@@ -15,7 +15,7 @@
 namespace tensorray {
 namespace {
 
-/// Appends the fewest digits that keep the number.
+/// Appends the fewest digits that reproduce the number exactly.
 template <class Number>
 void append_digits(Number number, std::string& text) {
   char digits[32];
@@ -23,7 +23,7 @@ void append_digits(Number number, std::string& text) {
 }
 
 void append_decimals(float number, int count, std::string& text) {
-  char digits[32];  // Enough for what is near one.
+  char digits[32];  // Enough for numbers near 1.
   text.append(digits, std::to_chars(digits, digits + sizeof digits, number, std::chars_format::fixed, count).ptr);
 }
 

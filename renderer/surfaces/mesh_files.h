@@ -1,6 +1,6 @@
 #pragma once
 /// @file renderer/surfaces/mesh_files.h
-/// Writes triangle meshes with what their vertices carry; mesh.h reads them.
+/// Writes triangle meshes with the attributes of their vertices; mesh.h reads meshes.
 
 #include <filesystem>
 
@@ -9,14 +9,15 @@
 
 namespace tensorray {
 
-/// Writes a mesh as the ending of `path` says, in place, in pieces: memory does not grow with the mesh.
+/// Writes a mesh in the format that the ending of `path` names. It writes in place and in pieces, so memory does not
+/// grow with the mesh.
 /// - `.ply`: as base/ply_writer.h.
 /// - `.obj`: text; "v x y z" (with "r g b" from 0 to 1, which most programs read), "vn", "f a//a".
-/// Positions are in single precision in both, in the fewest digits that keep it (seven to nine); colours and normals
-/// are in .obj as exact as they can be seen: three and four decimals. Values are kept by .ply alone.
-/// @throw std::invalid_argument on another ending, attributes of another number than the vertices, a vertex that is not
-/// finite in single precision, a name of several words; std::runtime_error naming the file if it cannot be written
-/// (also when the disk is full).
+/// Both formats keep positions in single precision, with the fewest digits that reproduce them (seven to nine). In
+/// .obj, colours have three decimals and normals four: the eye sees no finer difference. Only .ply keeps values.
+/// @throw std::invalid_argument if the ending is another one, the number of attributes differs from the number of
+/// vertices, a vertex is not finite in single precision, or a name has several words; std::runtime_error naming the
+/// file if it cannot be written (also when the disk is full).
 void write_mesh(const std::filesystem::path& path, const TriangleMesh& mesh, const VertexAttributes& attributes);
 
 }  // namespace tensorray

@@ -26,9 +26,9 @@ double size(const Eigen::AlignedBox2d& box) {
   return diagonal > 0 ? diagonal : 1;
 }
 
-/// A few roundings of the largest coordinate: points that callers compute on an edge are off it by as much. It is more
-/// than the errors of `weights` below, so that a point near an edge that two triangles share is in one of them at
-/// least.
+/// A few roundings of the largest coordinate: points that callers compute on an edge are off it by this much. It is
+/// more than the errors of `weights` below, so a point near an edge that two triangles share is in at least one of
+/// them.
 double rounding(const Eigen::AlignedBox2d& box) {
   if (box.isEmpty()) return 0;
   return 16 * epsilon * box.min().cwiseAbs().cwiseMax(box.max().cwiseAbs()).maxCoeff();
@@ -36,10 +36,10 @@ double rounding(const Eigen::AlignedBox2d& box) {
 
 double cross(const Vector2d& a, const Vector2d& b) { return a.x() * b.y() - a.y() * b.x(); }
 
-/// The barycentric weights of a point that is in the triangle, or outside by no more than the tolerance.
+/// The barycentric weights of a point that is in the triangle, or outside it by no more than the tolerance.
 std::optional<Eigen::Vector3d> weights(const Vector2d& point, const std::array<Vector2d, 3>& corners,
                                        double tolerance) {
-  // At an acute corner the lines of two edges stay within the tolerance far beyond the triangle; its box does not.
+  // At an acute corner, the lines of both edges stay within the tolerance far beyond the triangle. The box does not.
   const Vector2d low = corners[0].cwiseMin(corners[1]).cwiseMin(corners[2]);
   const Vector2d high = corners[0].cwiseMax(corners[1]).cwiseMax(corners[2]);
   if ((point.array() < low.array() - tolerance).any() || (point.array() > high.array() + tolerance).any()) return {};
@@ -50,7 +50,7 @@ std::optional<Eigen::Vector3d> weights(const Vector2d& point, const std::array<V
   for (int i = 0; i < 3; ++i) {
     const Vector2d& start = corners[(i + 1) % 3];
     const Vector2d edge = corners[(i + 2) % 3] - start;
-    const double inside = cross(edge, point - start) * (area < 0 ? -1 : 1);  // The distance to it, times its length.
+    const double inside = cross(edge, point - start) * (area < 0 ? -1 : 1);  // Distance to the edge, times its length.
     if (!(inside >= -tolerance * edge.norm())) return {};
     result[i] = std::max(inside, 0.0);
   }
@@ -66,10 +66,10 @@ PlanarMeshSearch::PlanarMeshSearch(const PlanarMesh& mesh)
       tolerance_(rounding(box_)),
       scene_(mesh.vertices, mesh.triangles, center(box_), size_) {}
 
-/// Embree proposes, double precision decides: a ray through the mesh would miss thin triangles and edges that single
-/// precision has moved, whereas the boxes around a point leave it room.
+/// Embree proposes triangles; double precision decides. A ray through the mesh would miss thin triangles, and edges
+/// that single precision has moved. A box around the point allows for such errors.
 void PlanarMeshSearch::find(const Vector2d& point, std::vector<PlanarHit>& hits) const {
-  constexpr double single_precision = 1e-6;  // Of the mesh's size, with some room.
+  constexpr double single_precision = 1e-6;  // As a fraction of the mesh's size, with some margin.
   hits.clear();
   if (!(box_.squaredExteriorDistance(point) <= tolerance_ * tolerance_)) return;
   std::vector<TriangleId> candidates;

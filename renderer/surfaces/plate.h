@@ -1,6 +1,6 @@
 #pragma once
 /// @file renderer/surfaces/plate.h
-/// The receiver: a rectangle that collects light.
+/// The plate (scene key: receiver): a rectangle that collects light.
 
 #include <vector>
 
@@ -8,13 +8,13 @@
 
 namespace tensorray {
 
-/// A rectangle in world space, divided into pixels. Pixel (0, 0) is the top left one as seen along `-normal`;
-/// pixel coordinates are continuous, and pixel (x, y) covers [x, x+1) × [y, y+1).
+/// A rectangle in world space, divided into pixels. Pixel (0, 0) is the top left one as seen along `-normal`. Pixel
+/// coordinates are continuous: pixel (x, y) covers [x, x+1) × [y, y+1).
 struct Plate {
   Eigen::Vector3d center = Eigen::Vector3d::Zero();
-  Eigen::Vector3d right = Eigen::Vector3d::UnitX();  ///< Unit; x grows along it.
-  Eigen::Vector3d up = Eigen::Vector3d::UnitY();     ///< Unit, normal to `right`; y falls along it.
-  Eigen::Vector2d size{1, 1};                        ///< Along right and up, world units; > 0.
+  Eigen::Vector3d right = Eigen::Vector3d::UnitX();  ///< Unit; x increases along it.
+  Eigen::Vector3d up = Eigen::Vector3d::UnitY();     ///< Unit, normal to `right`; y decreases along it.
+  Eigen::Vector2d size{1, 1};                        ///< Along `right` and `up`, world units; > 0.
   Eigen::Vector2i resolution{512, 512};              ///< Pixels; > 0.
 
   Eigen::Vector3d normal() const { return right.cross(up); }  ///< Unit, towards the viewer.
@@ -36,8 +36,8 @@ struct Plate {
   }
 };
 
-/// A unit vector normal to `direction`: the part across it of `up`, or of +z where the two are parallel (or `up` is
-/// zero), or of +y.
+/// A unit vector normal to `direction`: the normalised component of `up` across it. If `up` is parallel to `direction`
+/// or zero, +z replaces it, or +y if +z is also parallel.
 Eigen::Vector3d upright(const Eigen::Vector3d& direction, const Eigen::Vector3d& up);
 
 }  // namespace tensorray

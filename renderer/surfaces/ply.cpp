@@ -34,7 +34,7 @@ struct Property {
   std::string name;
   NumberType type;
   bool is_list = false;
-  NumberType count_type;  ///< Of a list.
+  NumberType count_type;  ///< Type of the count, if the property is a list.
 };
 
 struct Element {
@@ -205,7 +205,7 @@ void pass_over(const Element& element, Numbers& numbers) {
 }
 
 void read_element(const Element& element, Numbers& numbers, TriangleMesh& mesh) {
-  if (element.properties.empty()) return;  // Takes no bytes, however many the header promises.
+  if (element.properties.empty()) return;  // Such elements have no bytes, whatever count the header gives.
   for (std::size_t row = 0; row < element.count; ++row) {
     if (element.name == "vertex")
       read_vertex(element, numbers, mesh);

@@ -1,6 +1,6 @@
 #pragma once
 /// @file renderer/surfaces/surface.h
-/// What a picture of surfaces is made of: plain data.
+/// The surfaces that a picture shows, as plain data.
 
 #include <cstdint>
 #include <variant>
@@ -12,32 +12,32 @@
 
 namespace tensorray {
 
-/// Strands of round cones: spheres whose centre and radius go linearly from point to point, with round ends. They are
-/// shaded as if their axes were smooth. For opaque materials.
+/// Strands of round cones: the centre and the radius change linearly from point to point, and the ends are round.
+/// Shading treats their axes as smooth. For opaque materials.
 struct RoundCurves {
   std::vector<Eigen::Vector3d> points;     ///< World.
-  std::vector<float> radii;                ///< One a point; world units, >= 0.
-  std::vector<std::uint32_t> strand_ends;  ///< For each strand in order, how many points it and those before it have.
+  std::vector<float> radii;                ///< One for each point; world units, >= 0.
+  std::vector<std::uint32_t> strand_ends;  ///< For each strand: the number of points in it and all strands before.
 };
 
-/// A surface with all that shading and the auxiliary planes of a picture need. Vectors "a point" have a value for each
-/// vertex of a mesh or point of curves, linear between them; or they are empty.
+/// A surface with everything that shading and the auxiliary planes of a picture need. Vectors marked "for each point"
+/// have one value for each vertex of a mesh or point of curves, with linear interpolation between them; or they are
+/// empty.
 ///
-/// Memory: 140 bytes a triangle, measured on tubes of 5 million triangles with normals and colours, the building of
-/// SurfaceScene included.
+/// Memory: 140 bytes for each triangle, the build of SurfaceScene included; measured on tubes of 5 million triangles
+/// with normals and colours.
 struct ShadedSurface {
   std::variant<TriangleMesh, RoundCurves> shape;
-  std::vector<Eigen::Vector3f> normals;  ///< A point, of meshes only; any length. Empty: flat triangles.
-  int material = 0;                      ///< Index.
-  int light = -1;                        ///< Index of the AreaLight with this mesh, if it shines.
+  std::vector<Eigen::Vector3f> normals;  ///< For each point, meshes only; any length. Empty: flat triangles.
+  int material = 0;                      ///< Index of the material.
+  int light = -1;                        ///< Index of the AreaLight with this mesh, if the surface emits light.
 
-  std::vector<Eigen::Vector3f> colors;   ///< A point; of the working space, 0 to 1. Empty: the material's reflectance.
-  std::vector<float> forces;             ///< A point.
-  std::vector<float> arc_lengths;        ///< A point.
-  std::vector<std::uint32_t> path_ends;  ///< For each path, how many triangles it and those before it have, as in
-                                         ///< TubeMesh. Empty: no paths.
-  bool strands_are_paths = false;        ///< Of curves: each strand is a path.
-  std::uint32_t first_path = 0;          ///< The number of the first path; the others follow.
+  std::vector<Eigen::Vector3f> colors;   ///< For each point; working space, 0 to 1. Empty: the material's reflectance.
+  std::vector<float> forces;             ///< For each point.
+  std::vector<float> arc_lengths;        ///< For each point.
+  std::vector<std::uint32_t> path_ends;  ///< Triangles up to the end of each path, as in TubeMesh. Empty: no paths.
+  bool strands_are_paths = false;        ///< Curves only: each strand is a path.
+  std::uint32_t first_path = 0;          ///< Number of the first path; the others follow.
 };
 
 }  // namespace tensorray

@@ -18,19 +18,19 @@ using Eigen::Vector3f;
 using embree::check;
 using embree::Owned;
 
-/// Of the scene's size: above what single precision does to the coordinates of rays and surfaces.
+/// As a fraction of the scene's size: more than single precision moves the coordinates of rays and surfaces.
 constexpr double offset_fraction = 1e-6;
-/// Of the way to a target, left out at its end.
+/// Fraction of the distance to a target that is left out at its end.
 constexpr double end_fraction = 5e-5;
-/// Below this many triangles a slower build pays, as long thin triangles are then split; from it on, memory is what
-/// limits a picture, and the search tree does without copies of the triangles.
+/// With fewer triangles, a slower build is worth its time, as it splits long thin triangles. With more, memory limits
+/// the picture, so the search tree keeps no copies of the triangles.
 constexpr std::size_t large_scene = 2'000'000;
 
 bool ascends_to(const std::vector<std::uint32_t>& ends, std::size_t last) {
   return std::is_sorted(ends.begin(), ends.end()) && (ends.empty() ? 0 : ends.back()) == last;
 }
 
-/// In single precision.
+/// Tests the values in single precision.
 template <class Values>
 bool all_finite(const Values& values) {
   const auto is_finite = [](const auto& value) { return value.template cast<float>().allFinite(); };
@@ -89,7 +89,7 @@ Eigen::AlignedBox3d bounds_of(const std::vector<ShadedSurface>& surfaces) {
   return box;
 }
 
-/// The triangle or segment of a hit: which points it has, and how much of each is there.
+/// The points of the triangle or segment that was hit, and their interpolation weights.
 struct Corners {
   std::array<std::uint32_t, 3> point{};
   std::array<double, 3> weight{};
@@ -106,32 +106,32 @@ struct Corners {
   }
 };
 
-/// In which of the ranges that end at `ends` an index is.
+/// Index of the range that contains `index`; `ends` holds the ends of the ranges.
 std::uint32_t range_of(const std::vector<std::uint32_t>& ends, std::uint32_t index) {
   return static_cast<std::uint32_t>(std::upper_bound(ends.begin(), ends.end(), index) - ends.begin());
 }
 
-/// Above the planes that the normals at the corners make, where the smooth surface is. @param outwards  The triangle's
-/// normal on this side.
+/// Moves `position` above the tangent planes that the normals at the corners define: the smooth surface is there.
+/// @param outwards  The triangle's normal on this side.
 Vector3d lifted(const std::vector<Vector3d>& vertices, const std::vector<Vector3f>& normals, const Corners& corners,
                 const Vector3d& position, const Vector3d& outwards, double side) {
   Vector3d result = position;
   for (int i = 0; i < 3; ++i) {
     Vector3d normal = side * normals[corners.point[i]].cast<double>().normalized();
-    if (normal.dot(outwards) < 0) normal = -normal;  // Of a poor mesh.
+    if (normal.dot(outwards) < 0) normal = -normal;  // The mesh is poor here.
     const double below = std::min(0.0, (position - vertices[corners.point[i]]).dot(normal));
     result -= corners.weight[i] * below * normal;
   }
   return result;
 }
 
-/// The parts of curves that Embree sees, in buffers that it shares.
+/// The segments of curves that Embree traces, in buffers that Embree shares.
 struct Segments {
   std::vector<std::uint32_t> first_point;
-  std::vector<unsigned char> neighbors;  ///< RTC_CURVE_FLAG_...: on which sides the strand goes on.
+  std::vector<unsigned char> neighbors;  ///< RTC_CURVE_FLAG_...: the sides on which the strand continues.
 };
 
-/// Points that are there twice make no segment.
+/// Repeated points make no segment.
 Segments segments_of(const RoundCurves& curves) {
   Segments segments;
   std::uint32_t first = 0;
@@ -149,7 +149,7 @@ Segments segments_of(const RoundCurves& curves) {
   return segments;
 }
 
-/// Of the smooth axis, halfway between the directions of the segments that meet at a point.
+/// Tangent of the smooth axis: halfway between the directions of the segments that meet at a point.
 Vector3d tangent(const RoundCurves& curves, std::uint32_t point, const Vector3d& axis) {
   const Vector3d mean = (curves.points[point] - curves.points[point - 1]).stableNormalized() +
                         (curves.points[point + 1] - curves.points[point]).stableNormalized();
@@ -204,7 +204,7 @@ void SurfaceScene::State::commit(unsigned id, RTCGeometry geometry) {
   check(device.get());
 }
 
-/// Embree's own copy of the points, in the scene's coordinates.
+/// Makes Embree's own copy of the points, in the scene's coordinates.
 float* SurfaceScene::State::new_points(RTCGeometry geometry, const std::vector<Vector3d>& positions,
                                        const std::vector<float>* radii) {
   const std::size_t values = radii ? 4 : 3;
@@ -256,7 +256,7 @@ RTCRay SurfaceScene::State::ray(const Vector3d& start, const Vector3d& direction
   return result;
 }
 
-/// How far a ray goes before it comes near the scene: far from it single precision would not do.
+/// Distance that a ray travels before it comes near the scene. Far from the scene, single precision is not enough.
 double SurfaceScene::State::approach(const Vector3d& from, const Vector3d& direction) const {
   const Vector3d way = origin - from;
   return way.norm() > 2 * unit ? std::max(0.0, way.dot(direction) - 1.5 * unit) : 0.0;
@@ -284,7 +284,7 @@ void SurfaceScene::State::complete(const TriangleMesh& mesh, const Vector3d& dir
   hit.lifted_position = lifted(mesh.vertices, normals, corner, hit.position, side * hit.normal, side);
 }
 
-/// The normal is turned as the smooth axis is against the segment's.
+/// Tilts the shading normal as the smooth axis is tilted against the segment's axis.
 void SurfaceScene::State::complete(const RoundCurves& curves, SurfaceHit& hit) const {
   hit.lifted_position = hit.position;
   hit.shading_normal = hit.normal;

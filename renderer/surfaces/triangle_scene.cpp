@@ -12,7 +12,7 @@ namespace {
 using embree::check;
 using embree::Owned;
 
-/// By mesh and triangle. Embree may report a triangle more than once where its search tree has split it.
+/// Sorts by mesh and triangle. Embree may report a triangle more than once if its search tree has split it.
 void sort_and_join(std::vector<TriangleId>& triangles) {
   const auto key = [](const TriangleId& id) { return std::tie(id.mesh, id.triangle); };
   const auto before = [&](const TriangleId& a, const TriangleId& b) { return key(a) < key(b); };
@@ -23,10 +23,10 @@ void sort_and_join(std::vector<TriangleId>& triangles) {
 
 bool add_candidate(RTCPointQueryFunctionArguments* arguments) {
   static_cast<std::vector<TriangleId>*>(arguments->userPtr)->push_back({arguments->geomID, arguments->primID});
-  return false;  // The radius stays as it is.
+  return false;  // The query's radius does not change.
 }
 
-/// Where a line enters the box; nothing if it does not meet the box.
+/// Distance at which a line enters the box; nothing if it does not meet the box.
 std::optional<double> entry(const Eigen::AlignedBox3d& box, const Eigen::Vector3d& from,
                             const Eigen::Vector3d& direction) {
   double first = -std::numeric_limits<double>::infinity(), last = std::numeric_limits<double>::infinity();
@@ -48,7 +48,7 @@ std::optional<double> entry(const Eigen::AlignedBox3d& box, const Eigen::Vector3
 struct TriangleScene::State {
   Eigen::Vector3d origin;
   double unit;
-  Eigen::AlignedBox3d box;  // Of the triangles, with a margin for single precision; empty where they are planar.
+  Eigen::AlignedBox3d box;  // Of the triangles, with a margin for single precision; empty if the mesh is planar.
   Owned<RTCDevice> device;
   Owned<RTCScene> scene;  // Null if there are no triangles.
 
@@ -79,9 +79,9 @@ void TriangleScene::State::enclose(const std::vector<const TriangleMesh*>& meshe
   box = {box.min() - margin, box.max() + margin};
 }
 
-/// Whether single precision no longer resolves the triangles from here. Not a number is far.
+/// Whether single precision does not resolve the triangles from this point. NaN counts as far.
 bool TriangleScene::State::is_far(const Eigen::Vector3d& point) const {
-  constexpr double near = 16;  // Units.
+  constexpr double near = 16;  // In units.
   return !((point - origin).array().abs() <= near * unit).all();
 }
 
@@ -116,7 +116,7 @@ void TriangleScene::State::attach(unsigned id, const std::vector<Vertex>& vertic
 
 RTCRayHit TriangleScene::State::ray(const Eigen::Vector3d& from, const Eigen::Vector3d& direction, double min_distance,
                                     double max_distance) const {
-  // Embree sees no hits behind a ray's origin, so that the ray starts at `min_distance`.
+  // Embree finds no hits behind a ray's origin, so the ray starts at `min_distance`.
   const Eigen::Vector3d start = from + min_distance * direction;
   RTCRayHit result{};
   result.ray.org_x = local(start.x(), 0);

@@ -1,6 +1,6 @@
 #pragma once
 /// @file renderer/surfaces/triangle_scene.h
-/// Rays and points against triangles: the one place that knows Embree.
+/// Intersects rays and points with triangles, by Embree.
 
 #include <array>
 #include <cstdint>
@@ -27,21 +27,21 @@ struct TriangleHit {
 
 /// Immutable; any number of threads may query it at once. It keeps no reference to the meshes.
 ///
-/// A query may have any values: where it cannot meet a triangle in single precision, or is no number, it finds none.
+/// A query may have any values: if it cannot meet a triangle in single precision, or a value is NaN, it finds nothing.
 /// A ray that starts far away is first moved to the triangles, in double precision.
 class TriangleScene {
  public:
-  /// Units from the origin. Triangles that are farther away are never met: products of three of their coordinates
-  /// overflow in single precision.
+  /// In units from the origin. Triangles beyond this are never met: products of three of their coordinates overflow in
+  /// single precision.
   static constexpr double reach = 1e12;
 
-  /// @param meshes        Meshes without triangles are welcome; queries number the meshes in this order.
-  /// @param origin, unit  Coordinates are taken relative to these before they become single precision, so that it is
-  ///                      spent on what matters, whatever the world's units.
+  /// @param meshes        May include meshes without triangles; queries number the meshes in this order.
+  /// @param origin, unit  Coordinates are converted to single precision relative to these, so that its resolution suits
+  ///                      the scene, whatever the world's units.
   /// @throw std::runtime_error if Embree fails (out of memory, unsupported processor).
   TriangleScene(const std::vector<const TriangleMesh*>& meshes, const Eigen::Vector3d& origin, double unit);
 
-  /// One mesh, in the plane z = 0. It is built faster, as such a mesh may have millions of triangles.
+  /// One mesh, in the plane z = 0. The build is faster, as such a mesh may have millions of triangles.
   TriangleScene(const std::vector<Eigen::Vector2d>& vertices,
                 const std::vector<std::array<std::uint32_t, 3>>& triangles, const Eigen::Vector2d& origin, double unit);
 
@@ -49,15 +49,16 @@ class TriangleScene {
   TriangleScene(TriangleScene&&) noexcept;
   TriangleScene& operator=(TriangleScene&&) noexcept;
 
-  /// Whether it has no triangles.
+  /// Whether the scene has no triangles.
   bool empty() const;
 
-  /// The nearest triangle met between the two distances (world units; the first may be negative), from either side.
+  /// The nearest triangle between the two distances (world units; the first may be negative), from either side.
   std::optional<TriangleHit> nearest(const Eigen::Vector3d& from, const Eigen::Vector3d& direction, double min_distance,
                                      double max_distance) const;
 
-  /// All triangles whose bounding boxes come within `radius` of the point, and some further ones, ordered by mesh and
-  /// triangle. A radius of 1e-6 units makes up for single precision where coordinates are below one unit.
+  /// Sets `candidates` to all triangles whose bounding boxes come within `radius` of the point, and some others, in
+  /// order of mesh and triangle. A radius of 1e-6 units makes up for single precision if coordinates are below one
+  /// unit.
   void near(const Eigen::Vector3d& point, double radius, std::vector<TriangleId>& candidates) const;
 
  private:

@@ -17,32 +17,33 @@
 namespace tensorray {
 namespace {
 
-constexpr double value_steps = 128;  // Over the range of all values: a finer change needs no ring of its own.
-constexpr int most_pieces = 64;      // Of what is between two points.
-constexpr std::size_t chunk = 1024;  // Tubes that are made before they are put together.
+constexpr double value_steps = 128;  // Steps in the range of all values: a smaller change needs no ring of its own.
+constexpr int most_pieces = 64;      // Between two points.
+constexpr std::size_t chunk = 1024;  // Number of tubes whose meshes are made before they are joined.
 
 Eigen::Vector3d axis(const TubePoint& p) { return p.x.cross(p.y).normalized(); }
 Eigen::Vector3d rim(const TubePoint& p, double angle) { return std::cos(angle) * p.x + std::sin(angle) * p.y; }
 Eigen::Vector3d along_rim(const TubePoint& p, double angle) { return std::cos(angle) * p.y - std::sin(angle) * p.x; }
 
-/// In the ellipse's plane, normal to it.
+/// Normal to the rim, in the ellipse's plane.
 Eigen::Vector3d rim_normal(const TubePoint& p, double angle) { return along_rim(p, angle).cross(axis(p)).normalized(); }
 
-/// The greater semi-axis a: by Apollonius |x|² + |y|² = a² + b² and |x × y| = a b.
+/// The greater semi-axis a. By the theorem of Apollonius, |x|² + |y|² = a² + b² and |x × y| = a b.
 double greatest_radius(const TubePoint& p) {
   const double sum = p.x.squaredNorm() + p.y.squaredNorm(), product = p.x.cross(p.y).norm();
   return (std::sqrt(sum + 2 * product) + std::sqrt(std::max(0.0, sum - 2 * product))) / 2;
 }
 
-/// Segments of a polygon in a circle, so that it is nowhere farther inside than `tolerance`.
+/// Number of segments of a polygon inscribed in a circle that is nowhere more than `tolerance` inside the circle.
 int segments_for(double radius, double tolerance, const TubeSettings& settings) {
   const double half = std::acos(std::clamp(1 - tolerance / radius, -1.0, 1.0));
   const double wanted = half > 0 ? std::ceil(pi / half) : settings.most_segments;
   return static_cast<int>(std::clamp(wanted, double(settings.least_segments), double(settings.most_segments)));
 }
 
-/// What is between two points: the centre on the cubic that has the tube's direction at both, its speed there such that
-/// a circle's arc keeps its height; the ellipse turned with the direction, so that it keeps its size in a bend.
+/// A point between two points of a tube. The centre is on the cubic that has the tube's direction at both points, with
+/// such a speed there that a circle's arc keeps its height. The ellipse turns with the direction, so that it keeps its
+/// size in a bend.
 TubePoint between(const TubePoint& a, const TubePoint& b, double t) {
   const Eigen::Vector3d from = axis(a), to = axis(b), chord = b.center - a.center;
   const double half_turn = std::sqrt(std::max(0.0, (1 + from.dot(to)) / 2));  // Its cosine.
@@ -57,13 +58,13 @@ TubePoint between(const TubePoint& a, const TubePoint& b, double t) {
           (1 - t) * a.shade + t * b.shade};
 }
 
-/// How far the straight surface between two rings is off the tube.
+/// Distance between the straight surface that joins two rings and the tube.
 double deviation(const TubePoint& a, const TubePoint& b) {
   const double turn = (axis(b) - axis(a)).norm();
   return ((b.center - a.center).norm() + turn * std::max(greatest_radius(a), greatest_radius(b))) * turn / 8;
 }
 
-/// Leaves out the rings that others imply, to half the tolerance, and adds those that curvature asks for.
+/// Leaves out rings that interpolation gives to half the tolerance, and adds rings where the curvature needs them.
 Tube adapted(const Tube& tube, double tolerance, double value_tolerance, double shade_tolerance) {
   const auto error = [&](std::size_t i, std::size_t j, std::size_t k) {
     const TubePoint &a = tube[i], &b = tube[j], &point = tube[k];
@@ -94,7 +95,7 @@ Tube adapted(const Tube& tube, double tolerance, double value_tolerance, double 
   return result;
 }
 
-/// Points at even distances of about `spacing`, the ends among them.
+/// Points at even distances of about `spacing`, including both ends.
 Tube spaced(const Tube& tube, double spacing) {
   std::vector<double> lengths{0};
   for (std::size_t i = 1; i < tube.size(); ++i)
@@ -112,7 +113,7 @@ Tube spaced(const Tube& tube, double spacing) {
   return result;
 }
 
-/// Joins rings of equally many vertices into a surface.
+/// Joins rings with equal numbers of vertices into a surface.
 class Loft {
  public:
   Loft(const Tube& rings, int segments, bool closed, TubeMesh& mesh)
@@ -130,7 +131,7 @@ class Loft {
       }
   }
 
-  /// The polygon of ring `k`, which is the first or the last, with vertices of its own.
+  /// Adds the polygon of ring `k` (the first or the last), with its own vertices.
   void add_flat_cap(std::size_t k) {
     const Eigen::Vector3d outwards = k == 0 ? Eigen::Vector3d(-axis(rings_[k])) : axis(rings_[k]);
     const auto center = static_cast<std::uint32_t>(mesh_.mesh.vertices.size());
@@ -138,7 +139,7 @@ class Loft {
     for (int j = 1; j + 1 < segments_; ++j) add_oriented(k, center, center + j, center + j + 1);
   }
 
-  /// The cone to a point beyond ring `k`, with the ring's own vertices.
+  /// Adds the cone from ring `k` to a point beyond it, with the ring's vertices.
   void add_pole(std::size_t k, const Eigen::Vector3d& pole) {
     const Eigen::Vector3d outwards = k == 0 ? Eigen::Vector3d(-axis(rings_[k])) : axis(rings_[k]);
     const auto tip = static_cast<std::uint32_t>(mesh_.mesh.vertices.size());
@@ -153,7 +154,7 @@ class Loft {
     return static_cast<std::uint32_t>(first_ + k % rings_.size() * segments_ + j % segments_);
   }
 
-  /// Normal to the surface: along the rim, and from the ring before to the ring behind.
+  /// Normal to the surface: normal to the rim, and to the line from the ring before to the ring behind.
   Eigen::Vector3d normal(std::size_t k, int j) const {
     const std::size_t n = rings_.size();
     const std::size_t before = k > 0 ? k - 1 : closed_ ? n - 1 : 0, behind = k + 1 < n ? k + 1 : closed_ ? 0 : n - 1;
@@ -169,7 +170,7 @@ class Loft {
     mesh_.values.push_back(static_cast<float>(value));
   }
 
-  /// (a, b, c) is counter-clockwise about the tube's direction: right at its end, and the other way round at its start.
+  /// Adds the triangle (a, b, c), counter-clockwise about the tube's direction; reversed at the tube's start.
   void add_oriented(std::size_t k, std::uint32_t a, std::uint32_t b, std::uint32_t c) {
     if (k == 0) std::swap(b, c);
     mesh_.mesh.triangles.push_back({a, b, c});
@@ -182,7 +183,7 @@ class Loft {
   std::size_t first_;
 };
 
-/// The rings of half an ellipsoid from the pole to `end`, both left out; `sense` is −1 at a tube's start, 1 at its end.
+/// The rings of half an ellipsoid from the pole to `end`, without both; `sense` is −1 at a tube's start, 1 at its end.
 Tube dome(const TubePoint& end, double sense, double height, int segments) {
   Tube rings;
   const int count = std::max(2, segments / 4);
@@ -194,7 +195,7 @@ Tube dome(const TubePoint& end, double sense, double height, int segments) {
   return rings;
 }
 
-/// About the lesser semi-axis, and exactly the radius of a circle.
+/// About the lesser semi-axis; exactly the radius if the ellipse is a circle.
 double dome_height(const TubePoint& end) {
   return std::sqrt(2) * end.x.cross(end.y).norm() / std::sqrt(end.x.squaredNorm() + end.y.squaredNorm());
 }
@@ -218,7 +219,7 @@ void add_solid(const Tube& tube, int segments, TubeCaps caps, TubeMesh& mesh) {
   loft.add_pole(rings.size() - 1, end.center + dome_height(end) * axis(end));
 }
 
-/// Settings with nothing left to choose.
+/// The settings, with values in place of those that were automatic.
 struct Job {
   TubeSettings settings;
   double value_tolerance, shade_tolerance;
@@ -295,7 +296,7 @@ void append(const TubeMesh& part, TubeMesh& whole) {
   for (const std::uint32_t end : part.tube_ends) whole.tube_ends.push_back(end + triangles);
 }
 
-/// One mesh of many, in the memory that it needs and no more; each part is freed as soon as it is in.
+/// Joins many meshes into one that uses no more memory than it needs; frees each part after its copy.
 TubeMesh joined(std::vector<TubeMesh>& parts) {
   std::size_t vertices = 0, triangles = 0, tubes = 0;
   for (const TubeMesh& part : parts) {
@@ -326,7 +327,7 @@ double range_of(const std::vector<Tube>& tubes, double TubePoint::*member) {
   return std::max(0.0, greatest - least);
 }
 
-/// Before any is made: a small spacing asks for any number of them.
+/// Checks the number of ellipses before any is made: a small spacing could give any number of them.
 void require_few_ellipses(const std::vector<Tube>& tubes, const TubeSettings& settings) {
   if (settings.style == TubeStyle::solid) return;
   double ellipses = 0;
