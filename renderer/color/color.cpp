@@ -22,18 +22,18 @@ namespace {
 using Eigen::Matrix3d;
 using Eigen::Vector3d;
 
-/// XYZ (Y = 1) of a chromaticity.
+/// Converts a chromaticity to XYZ with Y = 1.
 Vector3d from_chromaticity(double x, double y) { return {x / y, 1, (1 - x - y) / y}; }
 
 const Vector3d white_d65 = from_chromaticity(0.3127, 0.3290);
 const Vector3d white_aces = from_chromaticity(0.32168, 0.33767);
 
-/// The matrix from linear RGB to XYZ, from the primaries' XYZ as columns and the white of (1, 1, 1).
+/// The matrix from linear RGB to XYZ. Columns of `primaries`: XYZ of the primaries; `white`: XYZ of RGB (1, 1, 1).
 Matrix3d rgb_to_xyz(const Matrix3d& primaries, const Vector3d& white) {
   return primaries * (primaries.inverse() * white).asDiagonal();
 }
 
-/// ACES2065-1 (SMPTE ST 2065-1); its blue primary has a negative y.
+/// From ACES2065-1 (SMPTE ST 2065-1) to XYZ. The blue primary has a negative y.
 Matrix3d aces_to_xyz() {
   Matrix3d primaries;
   primaries << from_chromaticity(0.7347, 0.2653), from_chromaticity(0, 1), from_chromaticity(0.0001, -0.0770);
@@ -46,7 +46,7 @@ Matrix3d bradford_cones() {
   return cones;
 }
 
-/// Bradford's chromatic adaptation from one white to another (XYZ, Y = 1); none if `from` is too saturated for it.
+/// Bradford's chromatic adaptation from one white to another (XYZ, Y = 1). Empty if `from` is too saturated for it.
 std::optional<Matrix3d> adaptation(const Vector3d& from, const Vector3d& to) {
   constexpr double least_response = 0.01;
   const Matrix3d cones = bradford_cones();
@@ -55,14 +55,14 @@ std::optional<Matrix3d> adaptation(const Vector3d& from, const Vector3d& to) {
   return cones.inverse() * response.cwiseInverse().asDiagonal() * cones;
 }
 
-/// A config and how to name it.
+/// A config and its name for messages and provenance.
 struct NamedConfig {
   OCIO::ConstConfigRcPtr config;
   std::string name;
 };
 
 NamedConfig open_config(const std::filesystem::path& path, const std::string& mend) {
-  // Newer versions of OpenColorIO have configs inside, named by such an address.
+  // Newer versions of OpenColorIO contain configs, which have addresses of this form.
   const bool is_file = path.string().rfind("ocio://", 0) != 0;
   try {
     if (is_file) require_readable(path);
@@ -83,8 +83,8 @@ NamedConfig find_config(const std::filesystem::path& path) {
 
 std::string in_quotes(const std::string& text) { return "\"" + text + "\""; }
 
-/// `wanted`, or `fallback` where nothing is wanted.
-/// @throw std::runtime_error if it is not among `known`; the message begins with `what`.
+/// Returns `wanted`, or `fallback` if `wanted` is empty.
+/// @throw std::runtime_error if the name is not among `known`; the message begins with `what`.
 std::string choose(const std::string& wanted, const std::string& fallback, const std::vector<std::string>& known,
                    const std::string& what) {
   const std::string& name = wanted.empty() ? fallback : wanted;
@@ -129,14 +129,14 @@ std::vector<std::string> color_spaces(const OCIO::Config& config) {
   return names;
 }
 
-/// The space that the first fitting file rule names; empty where none but the default rule fits.
+/// The space that the first matching file rule names. Empty if only the default rule matches.
 std::string space_by_rule(const OCIO::Config& config, const std::filesystem::path& file) {
   std::size_t rule = 0;
   const std::string space = config.getColorSpaceFromFilepath(file.string().c_str(), rule);
   return rule + 1 < config.getFileRules()->getNumEntries() ? space : "";
 }
 
-/// The name under which a config has the colours of ordinary picture files; empty if it has none of the usual ones.
+/// The config's name for the colour space of ordinary picture files. Empty if it has none of the usual names.
 std::string srgb_texture_space(const OCIO::Config& config) {
   for (const char* const name :
        {"texture_paint", "srgb_texture", "sRGB - Texture", "sRGB Encoded Rec.709 (sRGB)", "srgb_rec709_scene",
@@ -145,8 +145,8 @@ std::string srgb_texture_space(const OCIO::Config& config) {
   return "";
 }
 
-/// Reads the matrix from a space to scene_linear off the basis.
-/// @throw std::runtime_error if the way there is not linear.
+/// Finds the matrix from a space to scene_linear by converting the basis vectors.
+/// @throw std::runtime_error if the conversion is not linear.
 Matrix3d matrix_to_working(const OCIO::Config& config, const char* space) {
   const auto processor = config.getProcessor(space, OCIO::ROLE_SCENE_LINEAR)->getDefaultCPUProcessor();
   Matrix3d matrix;
@@ -159,7 +159,7 @@ Matrix3d matrix_to_working(const OCIO::Config& config, const char* space) {
   return matrix;
 }
 
-/// The way through ACES comes first: it stays on the scene's side, where no view transform can get in between.
+/// Tries ACES first: that conversion is scene-referred, so it cannot contain a view transform.
 Matrix3d find_xyz_to_working(const OCIO::Config& config) {
   if (config.hasRole("aces_interchange"))
     return matrix_to_working(config, "aces_interchange") * aces_to_xyz().inverse() *
@@ -184,7 +184,7 @@ struct ColorManagement::State {
 };
 
 ColorManagement::ColorManagement(const ColorSettings& settings) : state_(std::make_unique<State>()) {
-  OCIO::SetLoggingFunction([](const char*) {});  // Everything that matters is thrown.
+  OCIO::SetLoggingFunction([](const char*) {});  // Messages that matter also come as exceptions.
   const auto [config, name] = find_config(settings.config);
   const std::string subject = "OCIO config " + name;
   try {
@@ -248,14 +248,14 @@ std::string ColorManagement::texture_space(const std::filesystem::path& file, bo
 }
 
 ColorConversion ColorManagement::to_working(const std::string& space) const {
-  // Faster settings approximate powers and logarithms, and inverse tables.
+  // Faster settings approximate powers and logarithms, and invert tables inexactly.
   constexpr OCIO::OptimizationFlags exact = OCIO::OPTIMIZATION_LOSSLESS;
   try {
     const auto processor = state_->config->getProcessor(space.c_str(), OCIO::ROLE_SCENE_LINEAR);
     const OCIO::ConstCPUProcessorRcPtr cpu = processor->getOptimizedCPUProcessor(exact);
     if (cpu->isNoOp()) return {};
     return [cpu](float* rgba, std::size_t count) {
-      // As three channels: curves would leave alpha alone in name only, with a rounding error.
+      // Convert three channels: with four, curves would also pass alpha through, with a rounding error.
       const std::ptrdiff_t pixel_bytes = 4 * sizeof(float),
                            row_bytes = pixel_bytes * static_cast<std::ptrdiff_t>(count);
       OCIO::PackedImageDesc pixels(rgba, static_cast<long>(count), 1, 3, OCIO::BIT_DEPTH_F32, sizeof(float),

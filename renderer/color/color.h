@@ -1,6 +1,6 @@
 #pragma once
 /// @file renderer/color/color.h
-/// From CIE XYZ to the scene-linear working space, and from there to a display, through OpenColorIO.
+/// Conversion from CIE XYZ to the scene-linear working space, and from there to a display, by OpenColorIO.
 
 #include <cstddef>
 #include <filesystem>
@@ -14,54 +14,55 @@
 
 namespace tensorray {
 
-/// From linear Rec.709 (ITU-R BT.709, white D65) to XYZ, with the white at Y = 1.
+/// The matrix from linear Rec.709 (ITU-R BT.709, white D65) to XYZ. White has Y = 1.
 Eigen::Matrix3d rec709_to_xyz();
 
 struct ColorSettings {
-  std::filesystem::path config;  ///< An OCIO config; empty: $OCIO, and without it the built-in config.
-  std::string display;           ///< Empty: the config's default display.
-  std::string view;              ///< Empty: the display's default view.
+  std::filesystem::path config;  ///< An OCIO config. Empty: $OCIO, or the built-in config if that is not set.
+  std::string display;           ///< A display of the config. Empty: the config's default display.
+  std::string view;              ///< A view of the display. Empty: the display's default view.
 };
 
-/// Turns colours into the working space, in place: `count` pixels of R, G, B, A, the alpha not multiplied in, and left
-/// alone. Any thread may call it. Empty where the colours are in the working space already.
+/// Converts colours to the working space in place: `count` pixels of R, G, B, A. The colours are not multiplied by
+/// alpha; alpha does not change. Any thread may call it. Empty if the colours are already in the working space.
 using ColorConversion = std::function<void(float* rgba, std::size_t count)>;
 
-/// An OpenColorIO config with one display and view chosen. Immutable; any number of threads may use it.
+/// An OpenColorIO config with a chosen display and view. Immutable; any number of threads may use it.
 class ColorManagement {
  public:
-  /// @throw std::runtime_error naming the config and the mend: unreadable, not valid, no scene_linear role or not a
-  /// linear one, unknown display or view (the message lists the known ones).
+  /// @throw std::runtime_error naming the config and the fix if it is unreadable or not valid, has no scene_linear role
+  /// or one that is not linear, or does not have the display or view (the message lists the known ones).
   explicit ColorManagement(const ColorSettings& settings);
   ~ColorManagement();
   ColorManagement(ColorManagement&&) noexcept;
   ColorManagement& operator=(ColorManagement&&) noexcept;
 
-  /// The 3x3 matrix from XYZ to the working space (role `scene_linear`). The XYZ of the D65 white (Y = 1) and the
-  /// working space's white (1, 1, 1) are the same: XYZ is taken as relative to D65. The working space is found through
-  /// the config's role `aces_interchange` or `cie_xyz_d65_interchange`; where a config has neither, scene_linear is
-  /// taken to have the primaries of Rec.709.
+  /// The 3x3 matrix from XYZ to the working space (role `scene_linear`). XYZ is relative to D65: the XYZ of the D65
+  /// white (Y = 1) becomes the working space's white (1, 1, 1). The working space is found by the config's role
+  /// `aces_interchange` or `cie_xyz_d65_interchange`. If the config has neither, scene_linear is assumed to have the
+  /// primaries of Rec.709.
   Eigen::Matrix3d xyz_to_working() const;
 
-  /// The same, with `white` (XYZ, Y > 0) adapted to D65 first (Bradford), so that it becomes neutral. A white so
-  /// saturated that one of its cone responses is below 1 % of D65's (most monochromatic lights) leaves no colour to
-  /// adapt: everything then becomes neutral, with its own Y.
+  /// As xyz_to_working, but adapts `white` (XYZ, Y > 0) to D65 first (Bradford), so that it becomes neutral. If one of
+  /// the cone responses of the white is below 1 % of that of D65 (most monochromatic lights), adaptation is not
+  /// possible: every colour then becomes neutral and keeps its Y.
   /// @throw std::invalid_argument unless Y > 0.
   Eigen::Matrix3d xyz_to_working_adapted(const Eigen::Vector3d& white) const;
 
-  /// Applies the display and view to a scene-linear picture with channels R, G, B first, in place. Alpha and other
-  /// channels are left alone. Values outside what the display shows are clipped by the writer, not here. Runs on all
-  /// threads.
+  /// Applies the display and view in place to a scene-linear picture whose first channels are R, G, B. Alpha and other
+  /// channels do not change. Values outside the range of the display are not clipped here but by the writer. Runs on
+  /// all threads.
   /// @throw std::invalid_argument if the picture does not begin with R, G, B.
   void to_display(Image& image) const;
 
-  /// The colour space of a picture's file: `wanted` (a name, an alias or a role) if it is not empty. Else what the file
-  /// rules of the user's config say, unless only the default rule fits; else scene_linear for floats, and for integers
-  /// the piecewise sRGB curve on Rec.709 primaries under one of the names that configs give it.
-  /// @throw std::runtime_error if the config has no such space; the message lists those that it has.
+  /// The colour space of a picture file. If `wanted` (a name, an alias or a role) is not empty, it is that space.
+  /// Otherwise the file rules of the user's config decide, if one other than the default rule matches. Otherwise floats
+  /// are scene_linear, and integers have the piecewise sRGB curve on Rec.709 primaries, under one of the usual names of
+  /// that space in configs.
+  /// @throw std::runtime_error if the config does not have the space; the message lists the spaces that it has.
   std::string texture_space(const std::filesystem::path& file, bool integer, const std::string& wanted) const;
 
-  /// The way from a colour space of the config to the working space: exact to single precision where the config's
+  /// The conversion from a colour space of the config to the working space: exact to single precision if the config's
   /// transforms are formulas. It may outlive this object.
   /// @throw std::runtime_error naming the space if the config cannot convert it.
   ColorConversion to_working(const std::string& space) const;

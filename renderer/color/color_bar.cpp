@@ -15,11 +15,11 @@
 namespace tensorray {
 namespace {
 
-using Box = Eigen::AlignedBox2d;  // Pixels from the upper left corner, continuous.
+using Box = Eigen::AlignedBox2d;  // In pixels from the upper left corner, continuous.
 
 // --- Scales
 
-/// What is within this part of a step of the range's end counts as in it.
+/// Tolerance at the ends of the range, as a fraction of a step: a tick this close outside is still in the range.
 constexpr double rounding = 1e-9;
 
 std::string fixed(double value, int decimals) {
@@ -30,14 +30,14 @@ std::string fixed(double value, int decimals) {
 
 int decade_of(double value) { return static_cast<int>(std::floor(std::log10(std::abs(value)) + rounding)); }
 
-/// @param largest  Decade of the largest number of the scale. @param last  Decade of the last digit that is needed.
+/// @param largest  Decade of the largest number of the scale. @param last  Decade of the last digit to be written.
 std::string label_of(double value, int largest, int last) {
   if (value == 0) return "0";
   if (largest < 5 && last >= -4) return fixed(value, std::max(0, -last));
   return fixed(value / std::pow(10.0, largest), std::max(0, largest - last)) + "e" + std::to_string(largest);
 }
 
-/// The least of 1, 2, 5 times a power of ten that divides `size` into at most `most` steps.
+/// The smallest step of the form 1, 2 or 5 times a power of ten that divides `size` into at most `most` steps.
 double round_step(double size, int most) {
   const double raw = size / most * (1 - rounding), decade = std::pow(10.0, std::floor(std::log10(raw)));
   for (const double factor : {1.0, 2.0, 5.0})
@@ -54,7 +54,7 @@ std::vector<Tick> linear_ticks(const ValueRange& range, int most) {
   return ticks;
 }
 
-/// `factors` times the powers of ten within the range, every `stride`-th power.
+/// Ticks at `factors` times powers of ten within the range. Only every `stride`-th power is used.
 std::vector<Tick> decades(const ValueRange& range, const std::vector<double>& factors, int stride) {
   std::vector<Tick> ticks;
   for (int decade = decade_of(range.low); decade <= decade_of(range.high); ++decade)
@@ -76,7 +76,7 @@ std::vector<Tick> logarithmic_ticks(const ValueRange& range, int most) {
 
 // --- Drawing
 
-/// How far [low, high] covers the pixel from `at` to `at` + 1.
+/// Length of the part of [low, high] that lies in the pixel [at, at + 1].
 double overlap(double low, double high, int at) {
   return std::max(0.0, std::min(high, at + 1.0) - std::max(low, static_cast<double>(at)));
 }
@@ -88,7 +88,7 @@ Eigen::AlignedBox2i pixels_of(const Image& image, const Box& box) {
           (within(box.max()).array().ceil() - 1).cast<int>().matrix()};
 }
 
-/// Calls `visit(x, y, coverage)` for the pixels that a box covers.
+/// Calls `visit(x, y, coverage)` for each pixel that the box covers, also partly.
 template <class Visit>
 void for_each_pixel(const Image& image, const Box& box, const Visit& visit) {
   const Eigen::AlignedBox2i pixels = pixels_of(image, box);
@@ -101,7 +101,7 @@ void fill(Image& image, const Box& box, const Eigen::Vector3d& color, double opa
   for_each_pixel(image, box, [&](int x, int y, double coverage) { lay_over(image, x, y, color, opacity * coverage); });
 }
 
-/// A frame about a box.
+/// Draws a frame around a box.
 void frame(Image& image, const Box& box, double width, const Eigen::Vector3d& color) {
   const Eigen::Vector2d a = box.min(), b = box.max();
   const Eigen::Vector2d w(width, width);
@@ -111,24 +111,24 @@ void frame(Image& image, const Box& box, double width, const Eigen::Vector3d& co
   fill(image, {Eigen::Vector2d(b.x(), a.y()), Eigen::Vector2d(b.x() + width, b.y())}, color);
 }
 
-/// Sizes in pixels; all follow the height of a capital.
+/// Sizes in pixels. All are proportional to the height of a capital letter.
 struct Layout {
-  double letter;  ///< Height of a capital.
-  double line;    ///< Width of lines: whole pixels, so that they are sharp.
+  double letter;  ///< Height of a capital letter.
+  double line;    ///< Width of lines; a whole number of pixels, so that lines are sharp.
 
   explicit Layout(const Image& image)
       : letter(std::max(7.0, 0.024 * std::min(image.width, image.height))),
         line(std::max(1.0, std::round(0.09 * letter))) {}
 
   double padding() const { return 0.9 * letter; }
-  double gap() const { return 0.5 * letter; }                 ///< Between a mark and its label.
-  double title() const { return 2.1 * letter; }               ///< From the title's top to what follows.
-  double swatch() const { return std::round(1.5 * letter); }  ///< Width of the bar, and of a key's squares.
+  double gap() const { return 0.5 * letter; }    ///< Distance between a mark and its label.
+  double title() const { return 2.1 * letter; }  ///< Distance from the top of the title to the contents below.
+  double swatch() const { return std::round(1.5 * letter); }  ///< Width of the colour bar and of the squares of a key.
 };
 
-/// A legend's place, and the colour that is read there.
+/// The place of a legend, and the colour of its text.
 struct Panel {
-  Box inside;  ///< Without the padding; corners on whole pixels.
+  Box inside;  ///< The panel without padding; its corners lie on whole pixels.
   Eigen::Vector3d ink;
 };
 
@@ -144,13 +144,13 @@ double mean_brightness(const Image& image, const Box& box) {
   return weight > 0 ? sum / weight : 0;
 }
 
-/// Lays a panel for contents of a size over the picture, and writes the title at its top.
+/// Draws a panel at the right edge of the picture, with room for contents of the given size, and writes the title.
 Panel lay_panel(Image& image, const Layout& layout, const Eigen::Vector2d& size, const std::string& title) {
   const double padding = std::round(layout.padding());
   const Eigen::Vector2d full = (size + Eigen::Vector2d::Constant(2 * padding)).array().ceil();
   const Eigen::Vector2d corner(image.width - full.x() - padding, std::floor((image.height - full.y()) / 2));
   const Box outside(corner, Eigen::Vector2d(corner + full));
-  // Between what halves a display's range and what halves light.
+  // Middle grey is 0.5 in display-referred and about 0.2 in scene-linear pictures; the threshold suits both.
   const bool is_light = mean_brightness(image, outside) > 0.35;
   fill(image, outside, Eigen::Vector3d::Constant(is_light), is_light ? 0.75 : 0.6);
   const Eigen::Vector2d inset = Eigen::Vector2d::Constant(padding);
@@ -177,7 +177,7 @@ double widest(const Items& items, double height) {
   return width;
 }
 
-/// Writes to the right of `left`, with the middle of a small letter's line at `middle`.
+/// Writes to the right of `left`. Small letters are centred vertically on `middle`.
 void write_label(Image& image, const Layout& layout, double left, double middle, const std::string& label,
                  const Eigen::Vector3d& ink) {
   draw_text(image, {left, middle + layout.letter / 2}, layout.letter, label, ink);

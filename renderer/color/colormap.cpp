@@ -10,9 +10,9 @@
 namespace tensorray {
 namespace {
 
-/// Control points at equal distances, as sRGB in hexadecimal, six digits a colour, in the order of the enumeration:
-/// every fifth of the 256 colours of a table; of `twilight`, whose table has 510, 52 in the same way; of `cool_warm`
-/// all 33. The tables' sources are named in the header.
+/// Control points at equal distances, as hexadecimal sRGB with six digits per colour, in the order of the enumeration.
+/// They are every fifth of the 256 colours of a published table. Exceptions: `twilight`, 52 colours chosen the same way
+/// from a table of 510; and `cool_warm`, all 33 colours of its table. The header names the sources.
 constexpr std::array<const char*, 7> tables{
     // viridis
     "44015446085c471063481769481d6f482475472a7a46307e453781433d844142873f48893d4e8a3a538b38598c355e8d33638d"
@@ -49,7 +49,7 @@ constexpr std::array<const char*, 7> tables{
     "e2d9e2",
 };
 
-/// Control points, with one more at each end for the slopes there.
+/// Control points, with one additional point at each end for the slopes there.
 using Knots = std::vector<Eigen::Vector3d>;
 
 Eigen::Vector3d colour_of(const std::string& digits) {
@@ -63,7 +63,8 @@ Knots make_knots(const std::string& table, bool cyclic) {
   Knots knots(1);
   for (std::size_t i = 0; i < table.size(); i += 6) knots.push_back(colour_of(table.substr(i, 6)));
   const std::size_t last = knots.size() - 1;
-  // The parabola through three points goes on, so that the slopes at the ends are as good as elsewhere.
+  // The additional point continues the parabola through the last three, so that slopes at the ends are as accurate as
+  // inside.
   knots[0] = cyclic ? knots[last - 1] : Eigen::Vector3d(3 * (knots[1] - knots[2]) + knots[3]);
   knots.push_back(cyclic ? knots[2] : Eigen::Vector3d(3 * (knots[last] - knots[last - 1]) + knots[last - 2]));
   return knots;
@@ -79,7 +80,7 @@ const Knots& knots_of(Colormap map) {
   return all.at(static_cast<std::size_t>(map));
 }
 
-/// Catmull and Rom's cubic spline.
+/// A cubic Catmull-Rom spline.
 Eigen::Vector3d interpolate(const Knots& knots, double x) {
   const std::size_t intervals = knots.size() - 3;
   const double scaled = x * static_cast<double>(intervals);
@@ -102,10 +103,10 @@ double grey_luminance(double x) {
   return x > 0.08 ? root * root * root : x * 100 * 27 / 24389;
 }
 
-/// In this order what is not a number becomes 0.
+/// This order of min and max turns NaN into 0.
 double clamped(double x) { return std::min(std::max(0.0, x), 1.0); }
 
-/// Between the ranks of sorted values.
+/// Interpolates linearly between the ranks of sorted values.
 double percentile(const std::vector<double>& sorted, double percent) {
   const double rank = percent / 100 * static_cast<double>(sorted.size() - 1);
   const std::size_t below = static_cast<std::size_t>(rank), above = std::min(below + 1, sorted.size() - 1);
@@ -113,19 +114,19 @@ double percentile(const std::vector<double>& sorted, double percent) {
   return (1 - t) * sorted[below] + t * sorted[above];
 }
 
-/// Whether values between the two can be told apart well enough to be scaled.
+/// Whether the two values are far enough apart, relative to rounding, for a scale between them.
 bool is_wide(double low, double high) {
   return high - low > 1e-12 * std::max(std::abs(low), std::abs(high)) && std::isfinite(1 / (high - low));
 }
 
-/// A range about values that are all the same.
+/// A range around a single value.
 ValueRange range_about(double value, bool logarithmic) {
   if (logarithmic) return {value / 2, 2 * value, true};
   const double margin = std::abs(value) / 2;
   return is_wide(value - margin, value + margin) ? ValueRange{value - margin, value + margin} : ValueRange{};
 }
 
-/// What has no place on the scale is removed; the rest is sorted.
+/// Removes values that the scale cannot show and sorts the rest.
 void keep_sorted(std::vector<double>& values, bool logarithmic) {
   const auto is_left_out = [&](double value) { return !std::isfinite(value) || (logarithmic && value <= 0); };
   values.erase(std::remove_if(values.begin(), values.end(), is_left_out), values.end());

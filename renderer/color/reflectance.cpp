@@ -14,24 +14,24 @@ namespace {
 using Eigen::Matrix3d;
 using Eigen::Vector3d;
 
-/// The table has three cubes, one for each component that can be the largest. Their axes: the largest component, from
-/// `darkest` to 1, and the ratios of the other two to it.
+/// The table has three cubes, one for each component that can be the largest. The axes of a cube are the largest
+/// component, from `darkest` to 1, and the ratios of the other two components to it.
 constexpr int table_nodes = 16;
-/// Below it a colour gets the spectrum of a brighter one, scaled down: coefficients grow without bound towards black,
-/// while the spectrum's shape no longer changes.
+/// A colour whose largest component is below this limit gets the spectrum of a brighter colour, scaled down: towards
+/// black the coefficients grow without bound, while the shape of the spectrum no longer changes.
 constexpr double grey_tolerance = 1e-6;
 constexpr double darkest = 1.0 / 32;
 
-constexpr double tolerance = 1e-9;   ///< Differences in colour that are none.
-constexpr double noticeable = 1e-6;  ///< Differences that are worth a second search.
+constexpr double tolerance = 1e-9;   ///< Colours that differ by less are equal.
+constexpr double noticeable = 1e-6;  ///< A larger difference makes a second search worthwhile.
 constexpr double largest_coefficient = 1e5;
 
-/// 380 to 730 nm become −1 to 1, which makes the three coefficients alike in size.
+/// Maps 380 to 730 nm to −1 to 1, so that the three coefficients have similar sizes.
 double position(double wavelength) { return (wavelength - 555) / 175; }
 
-/// Space as a unit ball: c / √(1 + |c|²). A constant spectrum's place in it is linear in its value, and the
-/// coefficients of dark and saturated colours, which grow without bound, become points near its surface. So it is here
-/// that coefficients are interpolated.
+/// Maps space to the unit ball: c / √(1 + |c|²). For a constant spectrum the result is linear in the value of the
+/// spectrum. The coefficients of dark and saturated colours grow without bound; here they become points near the
+/// surface of the ball. For both reasons coefficients are interpolated in the ball.
 Vector3d to_ball(const Vector3d& coefficients) { return coefficients / std::sqrt(1 + coefficients.squaredNorm()); }
 
 Vector3d from_ball(const Vector3d& place) {
@@ -39,10 +39,10 @@ Vector3d from_ball(const Vector3d& place) {
   return place / std::sqrt(std::max(1 - place.squaredNorm(), least));
 }
 
-/// Coefficients, and the colour that they give.
+/// Coefficients, and the colour that they produce.
 struct Fit {
-  Vector3d coefficients, residual;  ///< The residual is the colour less the wanted one.
-  Matrix3d jacobian;                ///< Of the residual.
+  Vector3d coefficients, residual;  ///< The residual is the produced colour minus the wanted one.
+  Matrix3d jacobian;                ///< Derivative of the residual by the coefficients.
   double error = 0;                 ///< |residual|²
 };
 
@@ -62,8 +62,8 @@ Fit evaluate(const std::vector<BandColor>& bands, const Vector3d& rgb, const Vec
   return fit;
 }
 
-/// Where a Levenberg step leads. With few bands the colour leaves coefficients undetermined: these stay nearly as they
-/// are. A step from where nothing changes the colour is not a number.
+/// The coefficients after one Levenberg step. With few bands the colour does not determine all coefficients; the
+/// undetermined ones hardly change. The result is NaN if no coefficient affects the colour.
 Vector3d step(const Fit& fit, double damping) {
   const Matrix3d& jacobian = fit.jacobian;
   Matrix3d normal = jacobian.transpose() * jacobian;
@@ -73,10 +73,10 @@ Vector3d step(const Fit& fit, double damping) {
   return size > largest_coefficient ? Vector3d(next * (largest_coefficient / size)) : next;
 }
 
-/// Goes downhill from `start`, until the colour is met, nothing is gained any more, or `step_limit` steps are done.
-/// With enough bands there is nowhere to get stuck but at the border of what reflectances can do: two of these spectra
-/// cross at most twice, and spectra of the same colour must cross more often, as the locus of spectral colours is
-/// convex. So the colour belongs to one spectrum, and the Jacobian is regular everywhere.
+/// Minimises the error from `start` until the colour is met, the error no longer decreases, or `step_limit` steps are
+/// done. With enough bands the only local minima are at the border of the colours that reflectances can have: two of
+/// these spectra cross at most twice, but two spectra of the same colour must cross more often, because the locus of
+/// spectral colours is convex. So each colour has one spectrum, and the Jacobian is regular everywhere.
 Fit descend(const std::vector<BandColor>& bands, const Vector3d& rgb, const Vector3d& start) {
   constexpr int step_limit = 60;
   constexpr double least_damping = 1e-14, first_damping = 1e-8, undamped = 1e-6, most_damping = 1e6, least_gain = 1e-3;
@@ -96,8 +96,8 @@ Fit descend(const std::vector<BandColor>& bands, const Vector3d& rgb, const Vect
   return best;
 }
 
-/// Goes from grey to the colour, solving for colours on the way: slow, but it does not lose its way where few bands
-/// make the spectra abrupt.
+/// Goes from grey to the colour in steps and solves for each colour on the way. This is slow, but it also converges
+/// where few bands make the spectra abrupt.
 Fit march(const std::vector<BandColor>& bands, const Vector3d& rgb) {
   constexpr int parts = 8;
   const Vector3d grey = Vector3d::Constant(0.5);
@@ -133,7 +133,7 @@ std::vector<Vector3d> make_table(const std::vector<BandColor>& bands) {
   return table;
 }
 
-/// Coefficients near those of a colour whose largest component is within [darkest, 1].
+/// Approximate coefficients of a colour whose largest component is within [darkest, 1].
 Vector3d interpolate(const std::vector<Vector3d>& table, const Vector3d& rgb) {
   int largest = 0;
   const double brightness = rgb.maxCoeff(&largest);
@@ -172,7 +172,7 @@ ReflectanceSpectrum ReflectanceModel::spectrum(const Vector3d& rgb) const {
   if (!rgb.allFinite()) return {{}, 0};
   const Vector3d color = rgb.cwiseMax(0);
   const double brightness = color.maxCoeff();
-  // What filtering makes of a grey picture in single precision is still grey.
+  // Filtering a grey picture in single precision makes small differences between channels; the result is still grey.
   if (color.minCoeff() >= (1 - grey_tolerance) * brightness) return {{}, 2 * color.mean()};  // σ(0) = ½
   const double scale = brightness > 1 ? brightness : brightness < darkest ? brightness / darkest : 1;
   const Vector3d reflectance = color / scale;

@@ -20,7 +20,7 @@ std::string text(double number) {
   return std::string(digits, std::to_chars(digits, std::end(digits), number).ptr);
 }
 
-/// Samples `value(wavelength)` every nanometre from 300 to 830 nm.
+/// Samples `value(wavelength)` at every nanometre from 300 to 830 nm.
 template <class Value>
 Spectrum tabulate(const Value& value) {
   Spectrum spectrum;
@@ -31,8 +31,8 @@ Spectrum tabulate(const Value& value) {
   return spectrum;
 }
 
-/// Planck's law relative to 560 nm, `scale` being hc/(kT) in nm. Equal to (560/λ)⁵ (e^(scale/560) − 1)/(e^(scale/λ) −
-/// 1), written so that a cold body does not overflow.
+/// Planck's law relative to 560 nm; `scale` is hc/(kT) in nm. It equals (560/λ)⁵ (e^(scale/560) − 1)/(e^(scale/λ) − 1),
+/// in a form that does not overflow for cold bodies.
 double planck(double wavelength, double scale) {
   return std::pow(560 / wavelength, 5) * std::exp(scale / 560 - scale / wavelength) * std::expm1(-scale / 560) /
          std::expm1(-scale / wavelength);
@@ -47,13 +47,13 @@ Spectrum illuminant_d65() {
   return spectrum;
 }
 
-/// Light at a wavelength or in a band: its power, and its XYZ.
+/// The power and the XYZ of light at a wavelength or in a band.
 struct Amount {
   double power = 0;
   Eigen::Vector3d xyz = Eigen::Vector3d::Zero();
 };
 
-/// The wavelengths between which light and observer are both straight lines, within [min, max].
+/// The wavelengths within [min, max] between which light and observer are both linear.
 std::vector<double> knots(const Spectrum& light, double min, double max) {
   std::vector<double> result{min, max};
   const auto add = [&](double wavelength) {
@@ -65,8 +65,9 @@ std::vector<double> knots(const Spectrum& light, double min, double max) {
   return result;
 }
 
-/// Integrates over [min, max], exactly: between knots the product of light and observer is quadratic, for which two
-/// Gauss points suffice. They lie inside, so the jumps at the ends of the light and of the observer do no harm.
+/// Integrates exactly over [min, max]: between knots the product of light and observer is quadratic, so that two Gauss
+/// points suffice. They lie inside the intervals; therefore jumps at the ends of the light and of the observer do no
+/// harm.
 Amount integrate(const Spectrum& light, double min, double max) {
   Amount sum;
   const std::vector<double> ends = knots(light, min, max);
@@ -107,7 +108,7 @@ void normalize(std::vector<Band>& bands, const std::string& range) {
   }
 }
 
-/// Splits at blanks, commas and semicolons, and drops what follows '#'.
+/// Splits a line at blanks, commas and semicolons. Drops '#' and what follows it.
 std::vector<std::string> split_columns(const std::string& line) {
   const std::string content = line.substr(0, line.find('#'));
   constexpr const char* separators = " \t\r,;";
@@ -121,7 +122,7 @@ std::vector<std::string> split_columns(const std::string& line) {
   return columns;
 }
 
-/// Whatever the locale, the decimal sign is a point.
+/// Parses a number whose decimal sign is a point, in any locale.
 bool parse_number(const std::string& word, double& number) {
   const char* begin = word.data() + (word.front() == '+' ? 1 : 0);
   const char* end = word.data() + word.size();
@@ -129,7 +130,7 @@ bool parse_number(const std::string& word, double& number) {
   return result.ec == std::errc() && result.ptr == end;
 }
 
-/// @throw std::runtime_error with `where` in front.
+/// @throw std::runtime_error; the message begins with `where`.
 void append_sample(Spectrum& spectrum, const std::vector<std::string>& columns, const std::string& where) {
   double wavelength = 0, value = 0;
   if (columns.size() != 2)
@@ -163,7 +164,7 @@ Spectrum illuminant(const std::string& name) {
   if (name == "D65") return illuminant_d65();
   if (name == "E") return {{illuminant_min, illuminant_max}, {100, 100}};
   if (name == "A") {
-    // The CIE defines A with the constant and the temperature of its time.
+    // The CIE defines A with the value of hc/k and the temperature of that time.
     return tabulate([](double wavelength) { return 100 * planck(wavelength, 1.435e7 / 2848); });
   }
   throw std::invalid_argument("unknown illuminant \"" + name + "\"; known: " + joined(illuminant_names()));
@@ -183,7 +184,7 @@ Spectrum read_spectrum(const std::filesystem::path& path) {
   std::string line;
   bool heading_allowed = true;
   for (int number = 1; std::getline(file, line); ++number) {
-    if (number == 1 && line.rfind("\xEF\xBB\xBF", 0) == 0) line.erase(0, 3);  // A byte order mark.
+    if (number == 1 && line.rfind("\xEF\xBB\xBF", 0) == 0) line.erase(0, 3);  // UTF-8 byte order mark.
     const std::vector<std::string> columns = split_columns(line);
     if (columns.empty()) continue;
     double first = 0;

@@ -1,6 +1,6 @@
 #include "renderer/film/convolution.h"
 
-// What stands before HWY_AFTER_NAMESPACE is compiled once for each kind of processor.
+// The code before HWY_AFTER_NAMESPACE is compiled once for each kind of processor.
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "renderer/film/convolution.cpp"
 #include <hwy/foreach_target.h>  // Must come before highway.h.
@@ -11,7 +11,7 @@ namespace tensorray {
 namespace HWY_NAMESPACE {
 namespace hn = hwy::HWY_NAMESPACE;
 
-/// Four vectors of sums stay in registers.
+/// Computes four vectors of sums at a time, so that they stay in registers.
 void convolve(const double* in, std::size_t step, const double* filter, std::size_t radius, double* out,
               std::size_t count) {
   const hn::CappedTag<double, convolution_group / 4> d;

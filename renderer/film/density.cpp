@@ -13,12 +13,12 @@
 namespace tensorray {
 namespace {
 
-constexpr double smallest_spline_tau = 2;       // Below it the spline interpolant of the Gaussian is not good enough.
-constexpr double cut_off = 4.5;                 // In tau; the Gaussian is 4e-5 of its peak there.
-constexpr std::size_t most_buckets = 1u << 14;  // To sort points into.
-constexpr int largest_size = 65000;             // Of a plate: columns and rows of points are 16 bits.
+constexpr double smallest_spline_tau = 2;  // For less the spline interpolant of the Gaussian is not accurate enough.
+constexpr double cut_off = 4.5;            // In units of tau; the Gaussian is 4e-5 of its peak there.
+constexpr std::size_t most_buckets = 1u << 14;  // Largest number of buckets to sort points into.
+constexpr int largest_size = 65000;             // Largest width and height: columns and rows of points are 16 bits.
 
-/// Folds an index back into [0, size) as mirrors at the edges (between pixels) do.
+/// Reflects an index into [0, size), as mirrors at the outer edges of the first and last pixel would.
 int mirror(int index, int size) {
   const int period = 2 * size;
   index = ((index % period) + period) % period;
@@ -29,8 +29,9 @@ bool uses_splines(const DensitySettings& settings) {
   return settings.kind == DensityKind::gaussian && settings.tau >= smallest_spline_tau;
 }
 
-/// The filter k, indices −radius … radius, for which Σ k[n − m] B(x − m) interpolates the Gaussian at the integers: the
-/// sampled Gaussian divided by the sampled B-spline, as Fourier series (of period 2 radius; both are even).
+/// The filter k, for indices −radius … radius, for which Σ k[n − m] B(x − m) interpolates the Gaussian at the integers.
+/// As Fourier series it is the sampled Gaussian divided by the sampled B-spline (the period is 2 radius; both are
+/// even).
 std::vector<double> spline_filter(double tau) {
   constexpr double b[] = {66.0 / 120, 26.0 / 120, 1.0 / 120};  // The quintic B-spline at 0, 1 and 2.
   const int radius = static_cast<int>(std::ceil(cut_off * tau)) + 12;
@@ -52,7 +53,7 @@ std::vector<double> spline_filter(double tau) {
   return filter;
 }
 
-/// Convolves a line of `count` values; its edges mirror it.
+/// Convolves a line of `count` values, which is mirrored at its ends.
 void filter_line(double* line, int count, const std::vector<double>& filter) {
   thread_local std::vector<double> padded, result;
   const int radius = static_cast<int>(filter.size() / 2);
@@ -66,7 +67,7 @@ void filter_line(double* line, int count, const std::vector<double>& filter) {
   std::copy_n(result.data(), count, line);
 }
 
-/// Convolves the columns [first, last) of a plane, whose upper and lower edges mirror them.
+/// Convolves the columns [first, last) of a plane, which is mirrored at its upper and lower edges.
 void filter_columns(double* plane, int width, int height, int first, int last, const std::vector<double>& filter) {
   thread_local std::vector<double> padded, result;
   const int radius = static_cast<int>(filter.size() / 2), count = last - first;
@@ -92,14 +93,15 @@ void filter_columns(Film& film, const std::vector<double>& filter) {
   });
 }
 
-/// Two tiles that have one between them must not meet: a tile is as wide as a kernel, at least. A small one fits a
-/// cache together with what surrounds it; as many as there are let all threads find work where light is concentrated.
+/// Chooses the size of the tiles. A tile is at least as wide as a kernel, so that the kernels of two tiles with a third
+/// tile between them do not overlap. A small tile and its margin fit into a cache. Many tiles give all threads work
+/// even if the light is concentrated in a few places.
 PointBucketing make_bucketing(int width, int height, int planes, int least_tile_bits, int taps) {
   PointBucketing bucketing;
   bucketing.planes = static_cast<std::uint32_t>(planes);
   for (int bits = least_tile_bits;; ++bits) {
     bucketing.tile_bits = bits;
-    bucketing.columns = static_cast<std::uint32_t>(width >> bits) + 1;  // Points' columns are 0 to width.
+    bucketing.columns = static_cast<std::uint32_t>(width >> bits) + 1;  // Columns of points go from 0 to width.
     bucketing.rows = static_cast<std::uint32_t>(height >> bits) + 1;
     const bool is_one = bucketing.tiles() == 1;
     if ((1 << bits) >= taps && (is_one || std::size_t{bucketing.tiles()} * planes <= most_buckets)) return bucketing;
@@ -140,7 +142,7 @@ DensityEstimator::DensityEstimator(int width, int height, int channels, const De
   sums_.resize((values + 3) / 4);
 }
 
-/// In pixels, with the margins.
+/// Number of pixels of a plane, including the margins.
 std::size_t DensityEstimator::plane_size() const {
   return static_cast<std::size_t>(width_ + 2 * margin_) * (height_ + 2 * margin_);
 }
@@ -153,7 +155,7 @@ DensityPoint DensityEstimator::point(int channel, const Eigen::Vector2d& at) con
     point.row = static_cast<std::uint16_t>(std::clamp(static_cast<int>(at.y()), 0, height_ - 1));
     return point;
   }
-  // Of the pixels from −1 on: 0 is the one before the first. Its kernel begins where the margin does.
+  // Count pixels from the one before the first: column 0 is pixel −1. Its kernel begins where the margin begins.
   const int column = std::min(static_cast<int>(at.x() + 0.5), width_),
             row = std::min(static_cast<int>(at.y() + 0.5), height_);
   point.column = static_cast<std::uint16_t>(column);
@@ -163,7 +165,8 @@ DensityPoint DensityEstimator::point(int channel, const Eigen::Vector2d& at) con
   return point;
 }
 
-/// Tiles whose points' kernels do not meet are filled at the same time: of every two by two, one after the other.
+/// Adds tiles in four passes of every second tile along both axes: within a pass the kernels of different tiles do not
+/// overlap, so that tiles can be filled at the same time.
 void DensityEstimator::add(const std::vector<DensityPoint>& points) {
   sort_into_buckets(points, bucketing_, buckets_);
   for (const std::uint32_t first : {0u, 1u, 2u, 3u}) {
@@ -173,7 +176,7 @@ void DensityEstimator::add(const std::vector<DensityPoint>& points) {
       const std::uint32_t plane = task / (rows * columns), row = 2 * (task / columns % rows) + down;
       deposit((plane * bucketing_.rows + row) * bucketing_.columns + 2 * (task % columns) + right);
     };
-    // Each tile by itself: those that hold many points are next to each other.
+    // One task per tile: tiles with many points are often neighbours and should not fall to the same thread.
     tbb::parallel_for(std::uint32_t{0}, bucketing_.planes * rows * columns, deposit_tile, tbb::simple_partitioner());
   }
 }
@@ -193,7 +196,7 @@ void DensityEstimator::deposit(std::uint32_t bucket) {
   }
 }
 
-/// Adds the rows of the margins to those that they mirror.
+/// Adds each row of the margins to the row that it mirrors.
 void DensityEstimator::fold_rows(int plane) {
   const std::size_t values = (colors_.empty() ? 1 : 4) * static_cast<std::size_t>(width_ + 2 * margin_);
   double* const sums = sums_[0].values + plane * plane_size();

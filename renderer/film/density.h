@@ -1,6 +1,6 @@
 #pragma once
 /// @file renderer/film/density.h
-/// Density estimation: from points on a plate to power per pixel.
+/// Density estimation: computes power per pixel from points on a plate.
 
 #include <optional>
 #include <vector>
@@ -15,7 +15,7 @@ namespace tensorray {
 
 enum class DensityKind {
   gaussian,   ///< Zheng and Pang 2003, Eq. 10, corrected: normalised by 2πτ².
-  histogram,  ///< Every point counts in the pixel in which it lies.
+  histogram,  ///< Each point counts in the pixel that contains it.
 };
 
 struct DensitySettings {
@@ -23,33 +23,35 @@ struct DensitySettings {
   double tau = 6;  ///< Standard deviation of the Gaussian, in pixels; >= 0.3.
 };
 
-/// Sums points of equal weight; every pixel then holds the weight that falls on it. Points have a channel each. The
-/// film has a plane for each channel; or, if channels have colours, three planes: red, green and blue, to which each
-/// point adds its channel's colour. That is the same picture as colouring the channels' planes afterwards, in a third
-/// of the time for 32 channels.
+/// Sums points of equal weight, so that each pixel holds the weight that falls on it. Each point belongs to a channel.
+/// The film has one plane per channel. If the channels have colours, it has three planes instead (red, green and blue),
+/// and each point adds the colour of its channel. The picture is the same as if the planes of the channels were
+/// coloured afterwards, but takes a third of the time for 32 channels.
 ///
-/// The Gaussian is folded back at the edges of the plate, so that the sum over the pixels is exactly the number of
-/// points, and a uniformly lit plate is uniform up to its edges. For tau >= 2 points are deposited with quintic
-/// B-spline weights, and `finish` applies the separable filter that turns them into the spline interpolant of the
-/// Gaussian: within 1e-4 of the kernel's peak at τ = 2 and 1e-6 at τ = 6. (Cubic ones cost about half, but a
-/// lattice of points then shows as a ripple above 1e-6.) For a smaller tau each point is drawn with a separable kernel.
-/// Both are cut beyond 4.5 τ and normalised. A point's place is rounded to 2^-25 of a pixel.
+/// The Gaussian is mirrored at the edges of the plate, so that the sum over the pixels is exactly the number of points,
+/// and a uniformly lit plate is uniform up to its edges. For tau >= 2 points are deposited with quintic B-spline
+/// weights; `finish` then applies the separable filter that turns them into the spline interpolant of the Gaussian. The
+/// error is at most 1e-4 of the peak of the kernel at τ = 2 and 1e-6 at τ = 6. (Cubic splines cost about half, but a
+/// lattice of points then shows as a ripple above 1e-6.) For a smaller tau each point is drawn with a separable
+/// Gaussian. Both kernels are cut off beyond 4.5 τ and normalised. The position of a point is rounded to 2^-25 of a
+/// pixel.
 class DensityEstimator {
  public:
-  /// @param colors  A colour for each channel; or none.
-  /// @throw std::invalid_argument if a size is < 1 or > 65000, tau is out of range, or not all channels have a colour.
+  /// @param colors  One colour per channel, or empty.
+  /// @throw std::invalid_argument if a size is < 1 or > 65000, tau is out of range, or only some channels have a
+  /// colour.
   DensityEstimator(int width, int height, int channels, const DensitySettings& settings,
                    const std::vector<Eigen::Vector3d>& colors = {});
 
-  /// A point of a channel as `add` takes it. @param at  Pixel coordinates; within the plate. Any thread may call it.
+  /// Prepares a point of a channel for `add`. @param at  Pixel coordinates within the plate. Any thread may call it.
   DensityPoint point(int channel, const Eigen::Vector2d& at) const;
 
-  /// Adds points; those that are nowhere are left out. Runs on all threads; the sums are made in the points' order, so
-  /// that they do not depend on the number of threads.
+  /// Adds points. Points whose channel is DensityPoint::nowhere are ignored. Runs on all threads. Sums are made in the
+  /// order of the points, so that the result does not depend on the number of threads.
   void add(const std::vector<DensityPoint>& points);
 
-  /// Weight per pixel, `weight` being that of a point. The estimator is spent. Runs on all threads; the result does not
-  /// depend on their number.
+  /// Returns weight per pixel. @param weight  The weight of one point. The estimator cannot be used afterwards. Runs on
+  /// all threads; the result does not depend on their number.
   Film finish(double weight = 1) &&;
 
  private:
@@ -59,13 +61,12 @@ class DensityEstimator {
 
   DensitySettings settings_;
   int width_, height_, channels_;
-  std::optional<GaussianKernel> gaussian_;  // If points are drawn with it.
-  int margin_ = 0;                          // Pixels about the plate in which kernels end.
-  std::vector<PixelColor> colors_;          // By channel, or none.
+  std::optional<GaussianKernel> gaussian_;  // Set if points are drawn with Gaussians.
+  int margin_ = 0;                          // Width of the margin about the plate in which kernels end, pixels.
+  std::vector<PixelColor> colors_;          // One per channel, or empty.
   PointBucketing bucketing_;
   PointBuckets buckets_;
-  std::vector<PixelColor>
-      sums_;  // Planes with their margins: of single values, or if there are colours, one of colours.
+  std::vector<PixelColor> sums_;  // Planes with margins: one of single values per channel, or a single one of colours.
 };
 
 }  // namespace tensorray

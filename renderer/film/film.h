@@ -1,6 +1,6 @@
 #pragma once
 /// @file renderer/film/film.h
-/// Light collected by the pixels of a plate, one channel a wavelength band (or a colour, in RGB mode).
+/// Light collected by the pixels of a plate. Each channel is a wavelength band (or a colour, in RGB mode).
 
 #include <cstddef>
 #include <vector>

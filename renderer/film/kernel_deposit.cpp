@@ -3,8 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
-// What stands before HWY_AFTER_NAMESPACE is compiled once for each kind of processor. It calls no inline functions of
-// other headers: the linker would keep one of their copies, which may be for the wrong processor.
+// The code before HWY_AFTER_NAMESPACE is compiled once for each kind of processor. It calls no inline functions of
+// other headers: the linker would keep only one of their copies, which may be compiled for the wrong processor.
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "renderer/film/kernel_deposit.cpp"
 #include <hwy/foreach_target.h>  // Must come before highway.h.
@@ -15,14 +15,14 @@ namespace tensorray {
 namespace HWY_NAMESPACE {
 namespace hn = hwy::HWY_NAMESPACE;
 
-constexpr std::size_t block = 64;  // Points whose weights are computed together.
+constexpr std::size_t block = 64;  // Number of points whose weights are computed together.
 
-/// Weights along one axis: of each of the six pixels, those of all points of a block.
+/// Weights along one axis: for each of the six pixels, the weights of all points of a block.
 struct AxisWeights {
   alignas(64) double of[spline_taps][block];
 };
 
-/// The quintic B-spline at distances t, 1 + t and 2 + (1 − t) from its middle.
+/// The quintic B-spline at the distances t, 1 + t and 2 + (1 − t) from its centre.
 template <class V>
 void set_weights(V t, double* middle, double* flank, double* end) {
   const hn::DFromV<V> d;
@@ -44,7 +44,7 @@ void set_axis_weights(const double* beyond, std::size_t count, AxisWeights& weig
   }
 }
 
-/// Adds the outer product of `line` and the rows' weights, which stand `step` apart.
+/// Adds the outer product of `line` and the weights of the rows. These weights are `step` elements apart.
 HWY_INLINE void add_rows(double* pixels, std::size_t width, const double* line, const double* row_weights,
                          std::size_t step, std::size_t taps) {
   const hn::CappedTag<double, 4> d;
@@ -55,7 +55,7 @@ HWY_INLINE void add_rows(double* pixels, std::size_t width, const double* line, 
   }
 }
 
-/// Adds one kernel in colour. The weights stand `step` apart; `line` has room for four values a column.
+/// Adds one kernel in colour. The weights are `step` elements apart; `line` has room for four values per column.
 HWY_INLINE void add_colored(double* pixels, std::size_t width, const PixelColor& color, const double* column_weights,
                             const double* row_weights, std::size_t step, std::size_t taps, double* line) {
   const hn::CappedTag<double, 4> d;
@@ -94,7 +94,7 @@ void deposit_splines(const DensityPoint* points, std::size_t count, const Deposi
   }
 }
 
-/// @param x, y, line  Room for a value a column, a value a row, and four values a column.
+/// @param x, y, line  Work space: one value per column, one value per row, and four values per column.
 void deposit_gaussians(const DensityPoint* points, std::size_t count, const GaussianKernel& kernel, std::size_t taps,
                        double* x, double* y, double* line, const DepositTarget& target) {
   for (const DensityPoint* point = points; point != points + count; ++point) {
@@ -148,7 +148,7 @@ GaussianKernel::GaussianKernel(double tau, double reach) : tau_(tau), reach_(rea
   for (int i = 1 - half; i <= half; ++i) samples_.push_back(std::exp(-0.5 * i * i / (tau * tau)));
 }
 
-/// exp(−(i − t)²/2τ²) is exp(−i²/2τ²) exp(t/τ²)^i, up to a factor that normalising takes away.
+/// Uses exp(−(i − t)²/2τ²) = exp(−i²/2τ²) exp(t/τ²)^i, up to a factor that normalising removes.
 void GaussianKernel::weights(double beyond, double* out) const {
   const int half = taps() / 2;
   double* const middle = out + half - 1;

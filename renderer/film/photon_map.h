@@ -1,6 +1,6 @@
 #pragma once
 /// @file renderer/film/photon_map.h
-/// The photons that reached the plate, one by one.
+/// The photons that reached the plate, as a list.
 
 #include <vector>
 
@@ -8,13 +8,13 @@
 
 namespace tensorray {
 
-/// Single precision: seven digits of world coordinates.
+/// A photon where it reached the plate. Single precision: seven digits of world coordinates.
 struct Photon {
-  Eigen::Vector3f position;   ///< Where it landed, world.
-  Eigen::Vector3f direction;  ///< Unit, as it landed.
-  Eigen::Vector3f origin;     ///< Where its ray was emitted, world.
+  Eigen::Vector3f position;   ///< Landing, world.
+  Eigen::Vector3f direction;  ///< Unit direction at the landing, world.
+  Eigen::Vector3f origin;     ///< Where the ray was emitted, world.
   float wavelength = 0;       ///< nm; 0 in RGB mode.
-  float power = 0;            ///< In units of the light's irradiance times area.
+  float power = 0;            ///< In units of the irradiance of the light times area.
 };
 
 using PhotonMap = std::vector<Photon>;

@@ -10,7 +10,8 @@ namespace {
 
 constexpr std::size_t shortest_segment = 1u << 14, most_segments = 64;
 
-/// Calls `use(bucket, first, last)` for the runs of a segment's points that share a bucket: neighbours mostly do.
+/// Calls `use(bucket, first, last)` for each run of consecutive points of a segment that are in the same bucket.
+/// Consecutive points mostly are.
 template <class Use>
 void visit_runs(const std::vector<DensityPoint>& points, const PointBucketing& bucketing, std::size_t segment,
                 std::size_t length, const Use& use) {
@@ -28,7 +29,7 @@ void visit_runs(const std::vector<DensityPoint>& points, const PointBucketing& b
   }
 }
 
-/// From each segment's numbers of points in each bucket to where it puts its first one.
+/// Turns the number of points of each segment in each bucket into the place of the first of these points.
 void counts_to_places(std::vector<std::uint32_t>& counts, std::size_t segments, PointBuckets& buckets) {
   const std::size_t size = buckets.begin.size() - 1;
   std::uint32_t place = 0;
@@ -46,7 +47,7 @@ void counts_to_places(std::vector<std::uint32_t>& counts, std::size_t segments, 
 
 }  // namespace
 
-/// A counting sort: each segment of the points is counted, and then put in its places, by itself.
+/// A counting sort. Each segment of the points is counted, and later copied to its places, independently of the others.
 void sort_into_buckets(const std::vector<DensityPoint>& points, const PointBucketing& bucketing,
                        PointBuckets& buckets) {
   if (points.size() > 0xffffffffu) throw std::invalid_argument("too many points to sort at once");

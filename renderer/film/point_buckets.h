@@ -1,6 +1,6 @@
 #pragma once
 /// @file renderer/film/point_buckets.h
-/// Sorts points into buckets, so that threads can work on different ones.
+/// Sorts points into buckets, so that each thread can work on a different bucket.
 
 #include <cstdint>
 #include <vector>
@@ -9,11 +9,11 @@
 
 namespace tensorray {
 
-/// Which points belong together: those of a plane (a channel, or all of them) and of a square tile of it, 2^tile_bits
-/// columns and rows.
+/// Defines the buckets: a bucket has the points of one plane (a channel, or all channels) and of one square tile of it,
+/// with 2^tile_bits columns and rows.
 struct PointBucketing {
   int tile_bits = 0;
-  std::uint32_t columns = 1, rows = 1;  ///< Of tiles, in each plane.
+  std::uint32_t columns = 1, rows = 1;  ///< Number of columns and rows of tiles in each plane.
   std::uint32_t planes = 1;             ///< 1, or the number of channels.
 
   std::uint32_t tiles() const { return columns * rows; }
@@ -24,14 +24,14 @@ struct PointBucketing {
   }
 };
 
-/// Points in order of their buckets, within a bucket in the order in which they came.
+/// Points in the order of their buckets. Within a bucket they keep their original order.
 struct PointBuckets {
   std::vector<DensityPoint> points;
-  std::vector<std::uint32_t> begin;  ///< Where each bucket begins; one more for the end of the last.
+  std::vector<std::uint32_t> begin;  ///< Index of the first point of each bucket, and the end of the last bucket.
 };
 
-/// Sorts the points that are somewhere; at most 2^32. Runs on all threads.
-/// @param buckets  Is overwritten; its memory is used again.
+/// Sorts all points except unused ones; at most 2^32. Runs on all threads.
+/// @param buckets  Is overwritten; its memory is reused.
 void sort_into_buckets(const std::vector<DensityPoint>& points, const PointBucketing& bucketing, PointBuckets& buckets);
 
 }  // namespace tensorray

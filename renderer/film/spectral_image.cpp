@@ -15,7 +15,7 @@ void check_channels(const Film& film, const std::vector<Band>& bands) {
                                 std::to_string(bands.size()) + " bands");
 }
 
-/// Fills the channels R, G, B, which come first in `image`.
+/// Fills the channels R, G, B, which are the first channels of `image`.
 void fill_colors(const Film& film, const std::vector<Band>& bands, const Eigen::Matrix3d& xyz_to_rgb, Image& image) {
   std::vector<Eigen::Vector3d> colors;
   for (const Band& band : bands) colors.push_back(xyz_to_rgb * band.xyz);
@@ -29,7 +29,7 @@ void fill_colors(const Film& film, const std::vector<Band>& bands, const Eigen::
   });
 }
 
-/// "S0.550,000000nm": the layout takes a comma for the decimal sign, since a point separates layers in EXR.
+/// For example "S0.550,000000nm": the layout requires a comma as decimal sign, because a point separates layers in EXR.
 std::string channel_name(double wavelength) {
   const long long millionths = std::llround(wavelength * 1e6);
   const std::string fraction = std::to_string(1000000 + millionths % 1000000).substr(1);

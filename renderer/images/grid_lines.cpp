@@ -11,17 +11,19 @@
 namespace tensorray {
 namespace {
 
-constexpr double densest = 3, sparse = 6;     // Pixels from line to line where they are gone, and where they are full.
-constexpr double flat = 1e-3, sloped = 2e-3;  // Gradients, of the undistorted one, where lines are gone and full.
+// Distances between lines, in pixels, at which lines are invisible and fully visible.
+constexpr double densest = 3, sparse = 6;
+// Gradients, relative to an undistorted picture, at which lines are invisible and fully visible.
+constexpr double flat = 1e-3, sloped = 2e-3;
 
 double smooth_step(double from, double to, double value) {
   const double t = std::clamp((value - from) / (to - from), 0.0, 1.0);
   return t * t * (3 - 2 * t);
 }
 
-/// Coverage by the lines of one coordinate. Their distance is taken to first order, |Δs| / |∇s|: on a fold, where s
-/// changes with the square of the distance, a line is therefore at most twice as wide.
-/// @param size  Pixels along which an undistorted coordinate would go from 0 to 1.
+/// Coverage by the lines of one coordinate. The distance to a line is taken to first order, |Δs| / |∇s|. On a fold,
+/// where s changes with the square of the distance, a line is therefore up to twice as wide.
+/// @param size  Number of pixels over which an undistorted coordinate goes from 0 to 1.
 double coverage(double coordinate, double gradient, int cells, double width, int size) {
   if (!(gradient * size > flat) || !(gradient * cells * densest < 1)) return 0;
   const double nearest = std::clamp(std::round(coordinate * cells), 0.0, static_cast<double>(cells)) / cells;

@@ -22,7 +22,7 @@
 namespace tensorray {
 namespace {
 
-/// What a file format takes. OpenImageIO's name for it chooses the writer.
+/// Properties of a file format. OpenImageIO's name of the format chooses the writer.
 struct Format {
   std::string name;
   OIIO::TypeDesc type;
@@ -47,7 +47,7 @@ void check_size(const Image& image) {
     throw std::invalid_argument("a picture's number of values must be width * height * channels");
 }
 
-/// The channels that a display-referred format holds, clipped.
+/// The channels that a display-referred format stores, clipped to [0, 1].
 Image clipped(const Image& image, bool alpha) {
   const std::size_t from = image.channels.size();
   const std::size_t to = from < 3 ? 1 : (alpha && from > 3 && image.channels[3] == "A") ? 4 : 3;
@@ -55,12 +55,12 @@ Image clipped(const Image& image, bool alpha) {
   for (std::size_t pixel = 0; pixel * to < result.pixels.size(); ++pixel)
     for (std::size_t c = 0; c < to; ++c) {
       const float value = image.pixels[pixel * from + c];
-      result.pixels[pixel * to + c] = value > 0 ? std::min(value, 1.0f) : 0.0f;  // Not a number: 0.
+      result.pixels[pixel * to + c] = value > 0 ? std::min(value, 1.0f) : 0.0f;  // NaN becomes 0.
     }
   return result;
 }
 
-/// Attributes that TIFF and JPEG have a plain field for. Others would make OpenImageIO 2.4 write an Exif directory,
+/// Whether TIFF and JPEG have a plain field for an attribute. For others OpenImageIO 2.4 would write an Exif directory,
 /// which it cannot do in memory for TIFF.
 bool is_plain(const std::string& attribute) {
   static const std::set<std::string> names{"ImageDescription", "Software", "Artist", "Copyright"};
@@ -73,7 +73,7 @@ OIIO::ImageSpec make_spec(const Image& image, const Format& format, const ImageM
   if (image.channels.size() > 3 && image.channels[3] == "A") spec.alpha_channel = 3;
   if (format.display_referred) spec.attribute("oiio:UnassociatedAlpha", 1);
   if (format.name == "openexr") spec.attribute("compression", "zip");
-  // Three to four times as fast as the usual strategy at its usual level, for files 7% smaller to 2% larger.
+  // Three to four times as fast as the default strategy and level; files are from 2% larger to 7% smaller.
   if (format.name == "png") spec.attribute("compression", "rle");
   if (format.name == "jpeg") {
     spec.attribute("Compression", "jpeg:95");
@@ -83,7 +83,7 @@ OIIO::ImageSpec make_spec(const Image& image, const Format& format, const ImageM
   for (const auto& [name, value] : metadata)
     if (format.all_metadata || is_plain(name) || (format.name == "jpeg" && name == "oiio:ColorSpace"))
       spec.attribute(name, value);
-  spec.attribute("DateTime", "");  // Keeps OpenImageIO from writing the time, which would differ from run to run.
+  spec.attribute("DateTime", "");  // Prevents OpenImageIO from writing the time, which would differ between runs.
   return spec;
 }
 
@@ -103,7 +103,7 @@ std::vector<unsigned char> encode(const Image& image, const Format& format, cons
 
 [[noreturn]] void throw_errno() { throw std::runtime_error(std::generic_category().message(errno)); }
 
-/// A full disk may show as late as when the file is closed.
+/// Also checks the result of closing the file: a full disk may be reported only then.
 void write_bytes(const std::filesystem::path& path, const std::vector<unsigned char>& bytes) {
   std::FILE* const file = std::fopen(path.string().c_str(), "wb");
   if (!file) throw_errno();
@@ -118,7 +118,8 @@ bool begins_with(const std::string& bytes, const std::string& start) {
   return bytes.compare(0, start.size(), start) == 0;
 }
 
-/// Whether a JPEG or PNG lacks its end. libjpeg fills what is missing with grey and says nothing; libpng prints.
+/// Whether the end of a JPEG or PNG is missing. libjpeg fills the missing part with grey without an error; libpng
+/// prints a message.
 bool is_cut_off(const std::filesystem::path& path) {
   std::ifstream file(path, std::ios::binary);
   std::string bytes(4, '\0');
@@ -129,13 +130,13 @@ bool is_cut_off(const std::filesystem::path& path) {
   file.seekg(0).read(&bytes[0], static_cast<std::streamsize>(bytes.size()));
   if (png)
     return bytes.rfind("IEND\xAE\x42\x60\x82") == std::string::npos;  // The last chunk, which is always the same.
-  // In the compressed data 0xFF is always followed by 0 or a restart marker, so that the first end marker after the
-  // last start of a scan is the picture's own.
+  // In the compressed data 0xFF is always followed by 0 or a restart marker. Therefore the first end marker after the
+  // start of the last scan belongs to the picture itself, not to an embedded one.
   const std::size_t scan = bytes.rfind("\xFF\xDA");
   return scan == std::string::npos || bytes.find("\xFF\xD9", scan) == std::string::npos;
 }
 
-/// Some readers fail without a word where a file ends early.
+/// Throws the reader's message. Some readers give none if a file is cut off; the error then says so.
 [[noreturn]] void throw_read_error(const OIIO::ImageInput& input) {
   const std::string reason = one_line(input.geterror());
   throw std::runtime_error(reason.empty() ? "the file is cut off or damaged" : reason);
@@ -159,14 +160,14 @@ Image decode(const std::filesystem::path& path) {
   return image;
 }
 
-/// Where a channel is among those of a file, in any case; -1: nowhere.
+/// The index of a channel of a file, or -1 if there is none. Names match in upper and lower case.
 int find_channel(const OIIO::ImageSpec& spec, const std::string& name) {
   for (int i = 0; i < spec.nchannels; ++i)
     if (OIIO::Strutil::iequals(spec.channelnames[i], name)) return i;
   return -1;
 }
 
-/// The colours of the picture itself, or else of its first layer that has colours.
+/// Finds the colour channels without a layer's name, or those of the first layer that has colours.
 bool find_rgb(const OIIO::ImageSpec& spec, NativeImage& image) {
   std::vector<std::string> layers{""};
   for (const std::string& name : spec.channelnames) layers.push_back(name.substr(0, name.rfind('.') + 1));
@@ -194,8 +195,8 @@ bool find_grey(const OIIO::ImageSpec& spec, NativeImage& image) {
   return grey >= 0;
 }
 
-/// Finds the channels, and counts them from the first that is needed.
-/// @return the first one; `image.channels` is up to the last one.
+/// Finds the channels; their indices count from the first channel that is needed.
+/// @return the index of that first channel in the file; `image.channels` counts from it to the last one needed.
 int choose_channels(const OIIO::ImageSpec& spec, NativeImage& image) {
   if (!find_rgb(spec, image) && !find_grey(spec, image)) {
     std::string names;
@@ -223,8 +224,8 @@ OIIO::TypeDesc type_desc(SampleType type) {
   return type == SampleType::uint16 ? OIIO::TypeDesc::UINT16 : OIIO::TypeDesc::FLOAT;
 }
 
-/// The bytes of a picture's values. @throw std::runtime_error if they are more than we take, said before asking for
-/// them.
+/// The number of bytes of a picture's values. @throw std::runtime_error if there are more than the limit; this check
+/// comes before memory is allocated.
 std::size_t checked_bytes(const NativeImage& image) {
   constexpr double limit = 8.0 * (1 << 30);
   const double bytes = static_cast<double>(image.channels) * static_cast<double>(bytes_of(image.type));
@@ -258,7 +259,7 @@ NativeImage decode_native(const std::filesystem::path& path) {
   return image;
 }
 
-/// Reads a file by one of the functions above; whatever fails names the file.
+/// Reads a file with one of the functions above; errors name the file.
 template <class Decode>
 auto read(const std::filesystem::path& path, const Decode& decode_file) {
   require_readable(path);
@@ -271,7 +272,7 @@ auto read(const std::filesystem::path& path, const Decode& decode_file) {
   }
 }
 
-/// `full` is the stored value that means 1.
+/// @param full  The stored value that means 1.
 template <class Sample>
 void unpack(const NativeImage& image, std::size_t first_pixel, int count, float full, float* rgba) {
   const Sample* from = static_cast<const Sample*>(image.samples.get()) + first_pixel * image.channels;
@@ -293,7 +294,7 @@ bool holds_alpha(const std::filesystem::path& path) { return find_format(path).a
 
 void set_image_threads(int threads) {
   OIIO::attribute("threads", threads);
-  OIIO::attribute("exr_threads", threads > 1 ? threads : -1);  // -1: none but the caller.
+  OIIO::attribute("exr_threads", threads > 1 ? threads : -1);  // -1: use only the calling thread.
 }
 
 void write_image(const std::filesystem::path& path, const Image& image, const ImageMetadata& metadata) {

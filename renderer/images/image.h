@@ -1,6 +1,6 @@
 #pragma once
 /// @file renderer/images/image.h
-/// A picture in memory, and the one place where pictures are written (OpenImageIO).
+/// A picture in memory, and the only functions that read and write picture files (OpenImageIO).
 
 #include <array>
 #include <cstddef>
@@ -33,69 +33,71 @@ struct Image {
   }
 };
 
-/// Whether files with the ending of `path` hold an alpha: then as it is, not multiplied into the colours (EXR: it is).
+/// Whether files with the ending of `path` can store alpha. The colours are then not multiplied by it (in EXR they
+/// are).
 bool holds_alpha(const std::filesystem::path& path);
 
-/// Text that is written into a picture's header, by attribute name.
+/// Text for a picture's header, by attribute name.
 using ImageMetadata = std::map<std::string, std::string>;
 
-/// The endings that `write_image` knows: .exr .png .jpg .jpeg .tif .tiff (in any case).
+/// The endings that `write_image` accepts: .exr .png .jpg .jpeg .tif .tiff (in upper or lower case).
 std::vector<std::string> image_endings();
 
-/// How many threads writing and reading of pictures may use, from now on: all until this is called. OpenEXR compresses
-/// strips of a picture at once. Not while pictures are written or read.
+/// Sets how many threads may read and write pictures from now on; the default is all. (OpenEXR compresses strips of a
+/// picture in parallel.) Do not call it while pictures are read or written.
 void set_image_threads(int threads);
 
-/// Writes a picture; the ending of `path` chooses the format. The same picture gives the same bytes at any time.
-/// - EXR: all channels as 32-bit floats, ZIP-compressed, values and names as they are; all metadata.
-/// - PNG: 16 bits, all metadata. TIFF: 16 bits. JPEG: 8 bits, quality 95. TIFF and JPEG hold no metadata but
+/// Writes a picture in the format given by the ending of `path`. The same picture always gives the same bytes.
+/// - EXR: all channels as 32-bit floats, ZIP-compressed, with unchanged values and names; all metadata.
+/// - PNG: 16 bits, all metadata. TIFF: 16 bits. JPEG: 8 bits, quality 95. TIFF and JPEG store only the metadata
 ///   ImageDescription, Software, Artist and Copyright.
-/// Values of all but EXR are taken as display-referred and clipped to [0, 1] (not a number: 0); PNG and JPEG are marked
-/// as sRGB, unless the metadata `oiio:ColorSpace` says otherwise. They hold the first three channels, or the first
-/// alone if there are fewer than three; PNG and TIFF also a fourth one if it is "A": as it is, not multiplied into nor
-/// divided out of the others. The file is encoded in memory and then written in place: use an OutputFile
-/// (base/output_file.h) to never leave half of one.
-/// @throw std::invalid_argument if the picture has no pixels or not as many as its size and channels say.
-/// @throw std::runtime_error naming the file and the reason (also when the disk is full).
+/// All formats except EXR take the values as display-referred and clip them to [0, 1] (NaN: 0). PNG and JPEG are marked
+/// as sRGB, unless the metadata `oiio:ColorSpace` says otherwise. They store the first three channels, or only the
+/// first if there are fewer than three. PNG and TIFF also store the fourth channel if it is "A"; its values do not
+/// change, and the colours are neither multiplied nor divided by it. The file is encoded in memory and then written in
+/// place: use an OutputFile (base/output_file.h) to never leave an incomplete file.
+/// @throw std::invalid_argument if the picture has no pixels, or not as many as its size and channels require.
+/// @throw std::runtime_error naming the file and the reason (also if the disk is full).
 void write_image(const std::filesystem::path& path, const Image& image, const ImageMetadata& metadata = {});
 
-/// Reads a picture as floats, values as they are in the file (integers from 0 to 1): colours are not converted, and
-/// alpha is not multiplied in. Of several pictures in one file, the first.
-/// @throw std::runtime_error naming the file and the reason; a file that was cut off is refused.
+/// Reads a picture as floats with the values of the file (integers are scaled to 0 to 1). Colours are not converted and
+/// not multiplied by alpha. If a file has several pictures, reads the first.
+/// @throw std::runtime_error naming the file and the reason; also if the file is cut off.
 Image read_image(const std::filesystem::path& path);
 
 /// How a picture's values are stored.
 enum class SampleType { uint8, uint16, float32 };
 
-/// A picture as it is in its file, for pictures too large to be held as floats.
+/// A picture as its file stores it, for pictures that are too large to be held as floats.
 struct NativeImage {
-  int width = 0;  ///< Of the whole picture (the display window).
+  int width = 0;  ///< Width of the whole picture (the display window).
   int height = 0;
-  int data_x = 0;  ///< Where the stored pixels begin, from the picture's upper left corner (the data window).
+  int data_x = 0;  ///< Column where the stored pixels begin (the data window); 0 is the left edge of the picture.
   int data_y = 0;
   int data_width = 0;
   int data_height = 0;
   SampleType type = SampleType::float32;
-  int channels = 0;                     ///< Stored for each pixel, interleaved.
-  std::array<int, 3> rgb{};             ///< Which of them are red, green and blue; of a grey picture, the same one.
-  int alpha = -1;                       ///< Which one is alpha; -1: none.
+  int channels = 0;                     ///< Number of channels per pixel, interleaved.
+  std::array<int, 3> rgb{};             ///< Indices of red, green and blue; all equal for a grey picture.
+  int alpha = -1;                       ///< Index of alpha; -1: none.
   bool is_premultiplied = false;        ///< Whether the colours are multiplied by alpha.
   std::shared_ptr<const void> samples;  ///< data_width * data_height * channels values, rows from the top.
 };
 
-/// Reads a picture as it is in its file: integers of up to 8 bits and up to 16 bits, everything else as floats. The
-/// channels are found by their names: R, G, B (without a layer's name, or else of the first layer that has them), Y or
-/// a single channel of any name for grey, and A.
-/// @throw std::runtime_error naming the file and the reason; a file that was cut off, that has no such channels, or
-/// whose values take more than 8 GiB is refused.
+/// Reads a picture as its file stores it: integers of up to 8 bits as uint8, of up to 16 bits as uint16, everything
+/// else as floats. Channels are found by name: R, G, B (without a layer's name, or else of the first layer that has
+/// them); Y, or a single channel of any name, for grey; and A.
+/// @throw std::runtime_error naming the file and the reason; also if the file is cut off, has no such channels, or its
+/// values take more than 8 GiB.
 NativeImage read_native_image(const std::filesystem::path& path);
 
-/// The same in memory, without a copy. @throw std::invalid_argument unless the channels are R, G, B or R, G, B, A (with
-/// the alpha multiplied in) and all pixels are there.
+/// Converts a picture in memory without a copy. @throw std::invalid_argument unless the channels are R, G, B or R, G,
+/// B, A (with colours multiplied by alpha) and all pixels are there.
 NativeImage native_image(Image image);
 
-/// Writes R, G, B, A of `count` pixels, from (x, y) to the right, all within the picture. Integers become 0 to 1; alpha
-/// is 1 where the picture has none; all four are 0 where no pixels are stored; values that are not finite are 0.
+/// Writes R, G, B, A of `count` pixels to `rgba`, from (x, y) to the right, all within the picture. Integers are scaled
+/// to 0 to 1. Alpha is 1 if the picture has none. All four values are 0 where no pixels are stored. Values that are not
+/// finite become 0.
 void read_pixels(const NativeImage& image, int x, int y, int count, float* rgba);
 
 }  // namespace tensorray

@@ -13,20 +13,20 @@
 namespace tensorray {
 namespace {
 
-// The grid that letters are drawn on: lines are the middles of strokes, a capital goes from y = 0 to 28, a small letter
-// to 20, a descender to -6.
-constexpr double stroke = 4;  // The width of all of them.
-constexpr double gap = 6;     // Between the strokes of neighbouring characters.
+// The grid that letters are drawn on. Lines are the middles of strokes. A capital goes from y = 0 to 28, a small letter
+// to 20, a descender down to -6.
+constexpr double stroke = 4;  // Width of all strokes.
+constexpr double gap = 6;     // Distance between the strokes of neighbouring characters.
 constexpr double highest = 28, lowest = -6;
 constexpr char first = ' ', last = '~', box = last + 1;
 
-/// A character as text: polylines, separated by ";", of points "x,y" or "x,y/r" for a corner rounded with radius r.
+/// A character as text: polylines separated by ";". A point is "x,y", or "x,y/r" for a corner rounded with radius r.
 struct Outline {
-  int width;  ///< Between the middles of the leftmost and the rightmost stroke.
+  int width;  ///< From the middle of the leftmost stroke to the middle of the rightmost one.
   const char* strokes;
 };
 
-/// From ' ' to '~', and the box for all others.
+/// The characters from ' ' to '~', and the box that replaces all others.
 constexpr std::array<Outline, 96> outlines{{
     {2, ""},
     {0, "0,28 0,9 ; 0,0 0,0"},                                                                                // !
@@ -131,14 +131,14 @@ struct Segment {
 };
 
 struct Arc {
-  Eigen::Vector2d center, middle;  ///< `middle`: unit, from the centre to the middle of the arc.
-  double radius, cos_half;         ///< Of the half of its opening.
+  Eigen::Vector2d center, middle;  ///< `middle`: unit vector from the centre to the middle of the arc.
+  double radius, cos_half;         ///< `cos_half`: cosine of half the opening angle.
 };
 
 struct Glyph {
   double width = 0;
   std::vector<Segment> segments;
-  std::vector<Arc> arcs;  ///< Both ends of each are ends of segments.
+  std::vector<Arc> arcs;  ///< Both ends of each arc are ends of segments.
 };
 
 struct Corner {
@@ -146,7 +146,7 @@ struct Corner {
   double radius;
 };
 
-/// The corner's arc, and where it touches the lines to the points before and after.
+/// Adds the arc of a corner. Returns the points where it touches the lines to the points before and after.
 Segment round_corner(const Eigen::Vector2d& before, const Corner& corner, const Eigen::Vector2d& after, Glyph& glyph) {
   const Eigen::Vector2d a = (before - corner.point).normalized(), b = (after - corner.point).normalized();
   const Eigen::Vector2d inwards = (a + b).normalized();
@@ -196,7 +196,7 @@ const Glyph& glyph_of(char character) {
   return glyphs[character - first];
 }
 
-/// One printable character, or `box`, for each character of UTF-8.
+/// Replaces each character of the UTF-8 text that is not printable ASCII by `box`.
 std::string drawable(const std::string& text) {
   std::string result;
   for (const char character : text) {
@@ -213,7 +213,7 @@ double distance(const Segment& segment, const Eigen::Vector2d& point) {
   return (segment.from + t * along - point).norm();
 }
 
-/// From the middle of the nearest stroke, on the grid.
+/// Distance from a point to the middle of the nearest stroke, in units of the grid.
 double distance(const Glyph& glyph, const Eigen::Vector2d& point) {
   double nearest = INFINITY;
   for (const Segment& segment : glyph.segments) nearest = std::min(nearest, distance(segment, point));
@@ -225,13 +225,14 @@ double distance(const Glyph& glyph, const Eigen::Vector2d& point) {
   return nearest;
 }
 
-/// The whole numbers from floor(low) to ceil(high) that lie in [0, size]. Clamped first: huge ones are no integers.
+/// The range from floor(low) to ceil(high), limited to [0, size]. Clamps before converting: huge values do not fit into
+/// an int.
 Eigen::Vector2i pixel_range(double low, double high, int size) {
   return {static_cast<int>(std::floor(std::clamp(low, 0.0, static_cast<double>(size)))),
           static_cast<int>(std::ceil(std::clamp(high, 0.0, static_cast<double>(size))))};
 }
 
-/// @param origin  Where (0, 0) of the grid lies. @param unit  Of the grid, in pixels.
+/// @param origin  Position of (0, 0) of the grid. @param unit  Size of a grid unit, in pixels.
 void draw_glyph(Image& image, const Glyph& glyph, const Eigen::Vector2d& origin, double unit,
                 const Eigen::Vector3d& color) {
   const double margin = stroke / 2 * unit + 1;

@@ -37,7 +37,7 @@ Distribution1D::Distribution1D(const std::vector<double>& values) : cumulative_{
   }
   sum_ = cumulative_.back();
   if (!std::isfinite(sum_)) throw std::invalid_argument("the values of a distribution must be finite, and their sum");
-  // Sums below the normal numbers are as good as 0: dividing by them would not give probabilities.
+  // Treat sums below the smallest normal number as 0: dividing by them would not give probabilities.
   if (sum_ < std::numeric_limits<double>::min()) {
     for (std::size_t i = 0; i < cumulative_.size(); ++i)
       cumulative_[i] = static_cast<double>(i) / static_cast<double>(values.size());

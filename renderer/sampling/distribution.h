@@ -1,6 +1,7 @@
 #pragma once
 /// @file renderer/sampling/distribution.h
-/// Choice among cells in proportion to given values, on a line and in a picture. Immutable: any thread may sample.
+/// Random choice of cells, in one or two dimensions, with given relative probabilities. Immutable: any thread may
+/// sample.
 
 #include <vector>
 
@@ -8,36 +9,36 @@
 
 namespace tensorray {
 
-/// Cells 0 to size − 1. Seen as a piecewise constant density on [0, 1), that of cell i is probability(i) * size.
+/// Chooses among the cells 0 to size − 1. As a piecewise constant density on [0, 1), cell i has probability(i) * size.
 class Distribution1D {
  public:
-  /// @param values  Of the cells; finite, >= 0. If all are 0, every cell has the same probability.
-  /// @throw std::invalid_argument if there are none, or one is negative or not finite.
+  /// @param values  Relative probabilities of the cells; finite, >= 0. If all are 0, all cells are equally probable.
+  /// @throw std::invalid_argument if there are no values, or one is negative or not finite.
   explicit Distribution1D(const std::vector<double>& values);
 
   struct Sample {
     int cell = 0;
-    double within = 0;  ///< Evenly spread over [0, 1): the place in the cell, or a number for the next choice.
+    double within = 0;  ///< Uniform in [0, 1): the position in the cell, or a number for the next choice.
     double probability = 0;
   };
 
-  /// The cell that `u` of [0, 1) falls in, by inversion: monotonic, never a cell of probability 0.
+  /// The cell that contains `u` (in [0, 1)), by inversion: monotonic, and never a cell of probability 0.
   Sample sample(double u) const;
   double probability(int cell) const { return cumulative_[cell + 1] - cumulative_[cell]; }
 
   int size() const { return static_cast<int>(cumulative_.size()) - 1; }
-  double sum() const { return sum_; }  ///< Of the values.
+  double sum() const { return sum_; }  ///< Sum of the values.
 
  private:
-  std::vector<double> cumulative_;  ///< From 0 to 1.
+  std::vector<double> cumulative_;  ///< Cumulative probabilities, from 0 to 1.
   double sum_ = 0;
 };
 
-/// Cells (x, y) of a picture: first the row by its sum, then the cell in it.
+/// Chooses among the cells (x, y) of a picture: first a row by the sum of its values, then a cell in it.
 class Distribution2D {
  public:
-  /// @param values  width * height of them, row by row; as for Distribution1D.
-  /// @throw std::invalid_argument if there are not as many, or one is negative or not finite.
+  /// @param values  width * height relative probabilities, row by row, as for Distribution1D.
+  /// @throw std::invalid_argument if their number is not width * height, or one is negative or not finite.
   Distribution2D(const std::vector<double>& values, int width, int height);
 
   struct Sample {

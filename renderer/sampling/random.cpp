@@ -12,8 +12,9 @@ constexpr int sobol_bits = 32;
 
 using DirectionNumbers = std::array<std::array<std::uint32_t, sobol_bits>, sobol_dimensions>;
 
-/// The direction numbers of Joe and Kuo 2008, highest bit first. Dimension 0 is van der Corput's; 1 and 2 follow the
-/// recurrences of the primitive polynomials x + 1 (first number 1) and x² + x + 1 (first numbers 1, 3).
+/// The direction numbers of Joe and Kuo 2008, highest bit first. Dimension 0 is the van der Corput sequence. Dimensions
+/// 1 and 2 follow the recurrences of the primitive polynomials x + 1 (first number 1) and x² + x + 1 (first numbers 1,
+/// 3).
 constexpr DirectionNumbers make_direction_numbers() {
   DirectionNumbers v{};
   for (int i = 0; i < sobol_bits; ++i) v[0][i] = 0x80000000u >> i;
@@ -36,7 +37,7 @@ constexpr std::uint64_t mix(std::uint64_t x) {
   return x ^ (x >> 31);
 }
 
-/// Mixed after each key, so that equal sums of different keys do not meet.
+/// Mixes after each key, so that different keys with equal sums give different results.
 constexpr std::uint64_t hash(std::uint64_t seed, std::uint64_t index, std::uint32_t dimension) {
   return mix(mix(mix(seed) + index) + dimension);
 }
@@ -49,8 +50,8 @@ constexpr std::uint32_t reverse_bits(std::uint32_t x) {
   return ((x & 0x55555555u) << 1) | ((x & 0xaaaaaaaau) >> 1);
 }
 
-/// Owen's nested uniform scramble: every bit is flipped or not, at random, depending on the bits above it. On reversed
-/// bits that is a hash in which bits act upwards only (Laine and Karras 2011, with Vegdahl's constants of 2021).
+/// Owen's nested uniform scrambling: each bit is flipped or not, at random, depending on the bits above it. On reversed
+/// bits this is a hash in which bits only affect higher bits (Laine and Karras 2011, with Vegdahl's constants of 2021).
 constexpr std::uint32_t owen_scramble(std::uint32_t x, std::uint32_t seed) {
   x = reverse_bits(x);
   x ^= x * 0x3d20adeau;

@@ -1,7 +1,7 @@
 #pragma once
 /// @file renderer/sampling/random.h
-/// Random and low-discrepancy numbers as pure functions of (seed, index, dimension): the same picture on any number of
-/// threads. There is no state, so every function here is safe to call from any thread.
+/// Random and low-discrepancy numbers as pure functions of (seed, index, dimension), so that a picture does not depend
+/// on the number of threads. There is no state: any thread may call every function.
 
 #include <cstdint>
 
@@ -11,10 +11,10 @@ namespace tensorray {
 double random_uniform(std::uint64_t seed, std::uint64_t index, std::uint32_t dimension);
 
 /// Point `index` of the Sobol sequence, shuffled and Owen-scrambled by `seed` (Burley 2020, "Practical Hash-based Owen
-/// Scrambling"). The first 2^32 points are distinct, and the shuffle maps every aligned block of 2^k indices to another
-/// such block: the first 2^k points have one in each elementary interval (each box 2^-i by 2^-j, i + j = k) of
-/// dimensions (0, 1). With dimension 2, boxes of volume 2^(1-k) hold two each: no binary sequence does better in three
-/// dimensions. Further dimensions are refused.
+/// Scrambling"). The first 2^32 points are distinct. The shuffle maps each aligned block of 2^k indices to another such
+/// block. Therefore the first 2^k points have one point in each elementary interval (each box 2^-i by 2^-j, i + j = k)
+/// of dimensions (0, 1). In all three dimensions, boxes of volume 2^(1-k) contain two points each; no binary sequence
+/// does better in three dimensions. Higher dimensions are an error.
 /// @return a multiple of 2^-32 in [0, 1)
 /// @throw std::invalid_argument if dimension > 2.
 double sobol(std::uint64_t seed, std::uint32_t index, std::uint32_t dimension);

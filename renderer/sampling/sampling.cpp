@@ -9,12 +9,13 @@
 namespace tensorray {
 namespace {
 
-/// The seed of a dimension's own sequence: the 53 random bits of the hash.
+/// The seed of the sequence of the current dimension: the 53 random bits of the hash.
 std::uint64_t sequence_seed(const PathSampler& path) {
   return static_cast<std::uint64_t>(random_uniform(path.seed, path.pixel, path.dimension) * 0x1p53);
 }
 
-/// The direction about +z at 1 − cos θ = `height`. Computed from 1 − cos θ, which small angles need.
+/// The direction about +z with 1 − cos θ = `height`. Uses 1 − cos θ, because cos θ is not accurate enough for small
+/// angles.
 Eigen::Vector3d direction_at(double height, double turn) {
   const double across = std::sqrt(std::max(0.0, height * (2 - height)));
   return {across * std::cos(2 * pi * turn), across * std::sin(2 * pi * turn), 1 - height};

@@ -41,13 +41,14 @@ Vector2d to_pixel(const Image& picture, const Vector3d& d) {
   return {turn * picture.width, fall * picture.height};
 }
 
-/// The texel at a place; left and right edge are one, and rounding does not lead beyond the poles.
+/// The texel at a position. The left and right edges are joined; a position that rounding moves beyond a pole is
+/// clamped.
 Vector2i texel_at(const Image& picture, const Vector2d& pixel) {
   const int x = static_cast<int>(std::floor(pixel.x())) % picture.width;
   return {x < 0 ? x + picture.width : x, std::clamp(static_cast<int>(std::floor(pixel.y())), 0, picture.height - 1)};
 }
 
-/// The four texels about a place, and how much each counts.
+/// One of the four texels about a position, and its weight in the interpolation.
 struct Neighbour {
   const float* texel;
   float weight;
@@ -62,11 +63,11 @@ std::array<Neighbour, 4> neighbours(const Image& picture, const Vector2d& pixel)
            {picture.pixel(last.x(), last.y()), static_cast<float>(x * y)}}};
 }
 
-/// 1 − cos of the angle from +z to the upper edge of a row, so that small differences near +z keep their digits.
+/// 1 − cos of the angle from +z to the upper edge of a row, in a form that keeps small differences near +z accurate.
 double height_above(int row, int rows) { return 2 * std::pow(std::sin(pi / 2 * row / rows), 2); }
 
-/// A texel's part of importance(): its solid angle times the mean of the interpolated importance over it. That is a
-/// sum of its neighbours with the weights (1, 6, 1) / 8 along x and along y.
+/// A texel's part of importance(): its solid angle times the mean of the interpolated importance over the texel. The
+/// mean is a sum over the neighbours with the weights (1, 6, 1) / 8 along x and along y.
 std::vector<double> cell_importance(const EnvironmentLight& light, const std::vector<float>& band_importance) {
   const auto bands = static_cast<Eigen::Index>(band_importance.size());
   if (bands != light.channel_spectra.rows())

@@ -9,22 +9,23 @@
 namespace tensorray {
 namespace {
 
-/// Larger levels would take more memory than the picture itself; from the full picture they are quickly made.
+/// Storing larger levels would take more memory than the picture itself; they are quickly computed from the full
+/// picture.
 constexpr int first_stored = 3;
 
 int halved(int size, int level) { return std::max(1, size >> level); }
 
-/// What one pixel of a smaller level covers of a larger one, along one axis.
+/// The part of a larger level that one pixel of a smaller level covers, along one axis.
 struct Cover {
   int begin;     ///< The first pixel that it touches.
-  int end;       ///< Behind the last one.
+  int end;       ///< One after the last pixel.
   double first;  ///< How much of the first pixel is covered, from 0 to 1.
-  double last;   ///< Of the last one, if it is another.
+  double last;   ///< How much of the last pixel is covered, if it is not the first one.
 
   double weight(int i) const { return i == begin ? first : i + 1 == end ? last : 1.0; }
 };
 
-/// Pixel `i` of `small` covers the range [i, i + 1) * large / small: bounds in whole numbers, so that they never err.
+/// Pixel `i` of `small` covers the range [i, i + 1) * large / small. Integer arithmetic makes the bounds exact.
 Cover cover(int i, int small, int large) {
   const std::int64_t from = static_cast<std::int64_t>(i) * large, to = from + large;
   const int begin = static_cast<int>(from / small), end = static_cast<int>((to + small - 1) / small);
@@ -33,8 +34,9 @@ Cover cover(int i, int small, int large) {
   return {begin, end, part(first_end - from), part(to - (static_cast<std::int64_t>(end) - 1) * small)};
 }
 
-/// Converts and multiplies alpha in. Where it is already, it is taken out for the conversion, as curves want it; a
-/// colour of no alpha (a glow) is converted as it is.
+/// Converts colours to scene-linear and multiplies them by alpha. If they are already multiplied, divides by alpha
+/// before the conversion, because its curves need plain colours. Colours with alpha 0 (a glow) are converted without
+/// division.
 void convert(const NativeImage& image, const ColorConversion& conversion, int count, float* rgba) {
   const auto scale = [&](bool out) {
     for (float* pixel = rgba; pixel != rgba + static_cast<std::size_t>(count) * 4; pixel += 4)
@@ -92,7 +94,7 @@ void ImagePyramid::read_row(int level, int x, int y, int count, float* rgba) con
   }
 }
 
-/// Averages what the pixels of a row cover of the larger level `from`.
+/// Averages the pixels of the larger level `from` that each pixel of a row covers.
 void ImagePyramid::reduce_row(int from, int level, int x, int y, int count, float* rgba) const {
   const Cover rows = cover(y, height(level), height(from));
   const int begin = cover(x, width(level), width(from)).begin,

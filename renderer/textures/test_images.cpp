@@ -17,11 +17,11 @@
 namespace tensorray {
 namespace {
 
-constexpr int cells = 16;  // Along the shorter side.
+constexpr int cells = 16;  // Number of cells along the shorter side.
 
 double cell_size(const Image& image) { return std::min(image.width, image.height) / static_cast<double>(cells); }
 
-/// Calls `color(x, y)` for every pixel and stores what it returns.
+/// Sets each pixel (x, y) to `color(x, y)`.
 template <class Color>
 void fill(Image& image, const Color& color) {
   tbb::parallel_for(0, image.height, [&](int y) {
@@ -32,13 +32,13 @@ void fill(Image& image, const Color& color) {
   });
 }
 
-/// The part of [0, x] that lies in stripes [i period, i period + width); negative for negative x.
+/// Length of the part of [0, x] that lies in stripes [i period, i period + width); negative for negative x.
 double covered_length(double x, double period, double width) {
   const double before = std::floor(x / period);
   return before * width + std::min(x - before * period, width);
 }
 
-/// The share of each of `size` pixels in a row that stripes cover, exactly. One of them begins at `start`, measured
+/// The exact part of each of `size` pixels in a row that stripes cover. One of the stripes begins at `start`, measured
 /// from the middle of the row.
 std::vector<double> stripes(int size, double period, double width, double start) {
   std::vector<double> shares(size);
@@ -58,18 +58,18 @@ void draw_checkerboard(Image& image) {
   });
 }
 
-// The quadrants of the grid, row by row: their background, of nearly equal luminance, and the colour of their labels.
+// The quadrants of the grid, row by row: background colours of nearly equal luminance, and the colour of the labels.
 const std::array<Eigen::Vector3d, 4> tints{
     {{0.83, 0.91, 1.00}, {1.00, 0.90, 0.76}, {0.83, 0.94, 0.80}, {1.00, 0.86, 0.90}}};
 const std::array<Eigen::Vector3d, 4> inks{
     {{0.02, 0.08, 0.25}, {0.22, 0.09, 0.01}, {0.02, 0.13, 0.03}, {0.24, 0.03, 0.09}}};
-constexpr double legible = 5;  // Pixels; smaller labels are left out.
+constexpr double legible = 5;  // In pixels; smaller labels are left out.
 
-// The colour wheel.
-constexpr double surround = 0.2;             // Its grey.
-constexpr double graduation_strength = 0.5;  // Of its fine lines, to black.
+// Constants of the colour wheel.
+constexpr double surround = 0.2;             // Grey value around the wheel.
+constexpr double graduation_strength = 0.5;  // Opacity of the fine black lines.
 
-/// The share of each pixel in a row that lines at multiples of the cell, thicker every fourth time, cover.
+/// The part of each pixel in a row that is covered by lines at multiples of the cell. Every fourth line is thicker.
 std::vector<double> line_shares(int size, double cell) {
   const double thin = cell / 24, thick = cell / 12;
   std::vector<double> shares = stripes(size, cell, thin, -thin / 2);
@@ -79,13 +79,13 @@ std::vector<double> line_shares(int size, double cell) {
   return shares;
 }
 
-/// A, B ... Z, AA, AB ...
+/// Returns A, B ... Z, AA, AB ...
 std::string column_name(int column) {
   const std::string last(1, static_cast<char>('A' + column % 26));
   return column < 26 ? last : column_name(column / 26 - 1) + last;
 }
 
-/// Labels in the whole cells, in the middle of each, all of one height.
+/// Draws labels of equal height into the middle of all whole cells.
 void draw_labels(Image& image, double cell) {
   const int columns = 2 * static_cast<int>(image.width / (2 * cell));
   const int rows = 2 * static_cast<int>(image.height / (2 * cell));
@@ -106,7 +106,8 @@ void draw_grid(Image& image) {
   const double cell = cell_size(image);
   const std::vector<double> columns = line_shares(image.width, cell), rows = line_shares(image.height, cell);
   fill(image, [&](int x, int y) -> Eigen::Vector3d {
-    const double right = std::clamp(x + 1 - image.width / 2.0, 0.0, 1.0);  // The pixel's share of the right half.
+    // Part of the pixel that lies in the right half.
+    const double right = std::clamp(x + 1 - image.width / 2.0, 0.0, 1.0);
     const double lower = std::clamp(y + 1 - image.height / 2.0, 0.0, 1.0);
     const Eigen::Vector3d above = (1 - right) * tints[0] + right * tints[1];
     const Eigen::Vector3d below = (1 - right) * tints[2] + right * tints[3];
@@ -115,7 +116,7 @@ void draw_grid(Image& image) {
   draw_labels(image, cell);
 }
 
-// Colours are held as the cube roots of cone responses, in which Oklab (Ottosson 2020) is linear; white is (1, 1, 1).
+// Colours are stored as the cube roots of cone responses; Oklab (Ottosson 2020) is linear in these. White is (1, 1, 1).
 using Roots = Eigen::Array3d;
 
 Eigen::Matrix3d to_cones() {
@@ -146,7 +147,7 @@ Roots saturated(double position) {
 
 constexpr int hue_count = 720;
 
-/// The most saturated colours, from red on, evenly spaced in hue.
+/// The most saturated colours, starting with red, at equal distances in hue.
 std::vector<Roots> hue_circle() {
   std::vector<Roots> circle;
   const double red = oklab_hue(saturated(0));
@@ -161,7 +162,7 @@ std::vector<Roots> hue_circle() {
   return circle;
 }
 
-/// Without the creases at the primaries, which would look like lines that a lens had drawn.
+/// Removes the creases at the primaries, which would look like lines drawn by a lens.
 std::vector<Roots> smoothed(const std::vector<Roots>& circle) {
   const int reach = hue_count / 12;
   std::vector<Roots> result(hue_count, Roots::Zero());
@@ -173,7 +174,7 @@ std::vector<Roots> smoothed(const std::vector<Roots>& circle) {
   return result;
 }
 
-/// Linear Rec.709. @param angle  From red, in [0, 2π]. @param saturation  From 0, white, to 1.
+/// Returns linear Rec.709. @param angle  From red, in [0, 2π]. @param saturation  From 0 (white) to 1.
 Eigen::Vector3d wheel_color(const std::vector<Roots>& circle, const Eigen::Matrix3d& from_cones, double angle,
                             double saturation) {
   const double position = angle / (2 * pi) * hue_count;
@@ -183,12 +184,12 @@ Eigen::Vector3d wheel_color(const std::vector<Roots>& circle, const Eigen::Matri
   return (from_cones * roots.cube().matrix()).cwiseMax(0).cwiseMin(1);
 }
 
-/// Coverage by the wheel's fine lines, at a distance from its middle of `radius` pixels.
+/// Coverage by the fine lines of the wheel. @param radius  Distance from the middle of the wheel, in pixels.
 double graduation(double radius, double angle, double rim, double width) {
   const double ring = rim / 8, step = 2 * pi / 24;
   const double circle = line_coverage(radius - std::round(radius / ring) * ring, width);
   const double ray = line_coverage(radius * std::sin(angle - std::round(angle / step) * step), width);
-  // Rays end on the inmost circle, so that they do not run together; the middle is no circle.
+  // Radial lines end at the innermost circle, so that they do not merge. The centre has no circle.
   return radius < ring / 2 ? 0 : radius < ring ? circle : std::max(circle, ray);
 }
 

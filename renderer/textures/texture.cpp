@@ -31,9 +31,8 @@ using TextureSystemPtr = std::unique_ptr<OIIO::TextureSystem, DestroyTextureSyst
 
 const char* const pyramid_attribute = "tensorray:pyramid";
 
-/// Shows a pyramid to OpenImageIO's cache, tile by tile, each level as a picture of its own (a subimage) and not as a
-/// MIP level: OpenImageIO would choose the MIP level by the shorter side alone, which blurs pictures that are not
-/// square.
+/// Presents a pyramid to OpenImageIO's cache tile by tile. Each level is a separate picture (a subimage) and not a MIP
+/// level: OpenImageIO would choose the MIP level by the shorter side alone, which blurs pictures that are not square.
 class PyramidInput final : public OIIO::ImageInput {
  public:
   const char* format_name() const override { return "tensorray pyramid"; }
@@ -60,7 +59,7 @@ class PyramidInput final : public OIIO::ImageInput {
     return true;
   }
 
-  // The following need no lock: they do not look at the current subimage.
+  // The following functions need no lock: they do not use the current subimage.
   using OIIO::ImageInput::spec;
   OIIO::ImageSpec spec(int level, int miplevel) override { return spec_dimensions(level, miplevel); }
   OIIO::ImageSpec spec_dimensions(int level, int miplevel) override {
@@ -97,14 +96,14 @@ class PyramidInput final : public OIIO::ImageInput {
   int level_ = 0;
 };
 
-/// What a pixel sees of the picture, in texels: an ellipse.
+/// The ellipse of the picture that a pixel sees, in texels.
 struct Ellipse {
-  double major = 1;                       ///< Length of the longer axis (for a round pixel, its diameter).
-  double minor = 1;                       ///< Of the shorter one.
-  Vector2d direction = Vector2d::Zero();  ///< Of the longer axis.
+  double major = 1;                       ///< Length of the longer axis (for a circular pixel, its diameter).
+  double minor = 1;                       ///< Length of the shorter axis.
+  Vector2d direction = Vector2d::Zero();  ///< Direction of the longer axis, unit.
 };
 
-/// The image of the unit circle under `footprint`: its singular values.
+/// The image of the unit circle under `footprint`, by its singular values.
 Ellipse make_ellipse(const Matrix2d& footprint) {
   const Matrix2d square = footprint * footprint.transpose();
   const double middle = 0.5 * (square(0, 0) + square(1, 1)), difference = 0.5 * (square(0, 0) - square(1, 1));
@@ -112,10 +111,10 @@ Ellipse make_ellipse(const Matrix2d& footprint) {
   return {std::sqrt(middle + radius), std::sqrt(std::max(0.0, middle - radius)), {std::cos(angle), std::sin(angle)}};
 }
 
-/// Whether a footprint is a number, and not so much larger than the picture that only the picture's mean is left of it.
+/// Whether a footprint is finite and small enough for a filter; a larger one gives the mean of the picture.
 bool is_resolved(const Matrix2d& footprint) { return (footprint.array().abs() < 1e6).all(); }
 
-/// No axis is shorter than a texel, nor the shorter one so short that it takes too many probes along the longer one.
+/// Limits the ellipse: no axis is shorter than a texel, and the ratio of the axes does not need too many probes.
 Ellipse limit(Ellipse ellipse, double longest) {
   constexpr double largest_ratio = 32;
   ellipse.minor = std::max({ellipse.minor, 1.0, ellipse.major / largest_ratio});
@@ -135,28 +134,28 @@ OIIO::TextureOpt make_options(Wrap wrap) {
   return options;
 }
 
-/// The same place near the picture, where single precision resolves it.
+/// The equivalent coordinate near the picture, where single precision resolves it.
 double bring_near(double coordinate, Wrap wrap) {
   if (wrap == Wrap::repeat) return coordinate - std::floor(coordinate);
   if (wrap == Wrap::mirror) return coordinate - 2 * std::floor(coordinate / 2);
   return std::clamp(coordinate, -1.0, 2.0);
 }
 
-/// Whether single precision cannot tell a coordinate from that of a texel's centre.
+/// Whether a coordinate is equal to the centre of a texel in single precision.
 bool is_centre(double coordinate, int size) {
   const double texel = coordinate * size - 0.5;
   return std::abs(texel - std::round(texel)) <= size * 0x1p-22;
 }
 
-/// Which levels are mixed: `blend` of the one after `level`.
+/// The levels to mix: `blend` is the weight of level + 1.
 struct LevelChoice {
   int level;
   float blend;
 };
 
-/// Texels of level L are 2^L texels large; between two levels the weight goes linearly with the size.
+/// Texels of level L are 2^L texels large. Between two levels the weight is linear in the size.
 LevelChoice choose_level(double size, int levels) {
-  constexpr double rounding = 1e-3;  // A footprint of one texel is that also where it was computed with errors.
+  constexpr double rounding = 1e-3;  // Tolerance for a footprint of one texel that was computed with errors.
   if (size <= 1 + rounding) return {0, 0.0f};
   const int level = std::ilogb(size);
   if (level >= levels - 1) return {levels - 1, 0.0f};
@@ -169,7 +168,7 @@ struct Texture::State {
   State(NativeImage image, ColorConversion conversion, Wrap wrap_, std::string name_)
       : pyramid(std::move(image), std::move(conversion)), wrap(wrap_), name(std::move(name_)) {
     system->attribute("max_memory_MB", 1024.0f);
-    const OIIO::ustring file("picture");  // Every texture has a cache of its own.
+    const OIIO::ustring file("picture");  // Each texture has its own cache, so that the name need not be unique.
     const ImagePyramid* const pointer = &pyramid;
     OIIO::ImageSpec config;
     config.attribute(pyramid_attribute, OIIO::TypeDesc::PTR, &pointer);
@@ -190,13 +189,13 @@ struct Texture::State {
 
   ImagePyramid pyramid;
   Wrap wrap;
-  std::string name;  ///< For errors.
+  std::string name;  ///< For error messages.
   OIIO::TextureOpt options = make_options(wrap);
   TextureSystemPtr system{OIIO::TextureSystem::create(false)};
   OIIO::TextureSystem::TextureHandle* handle = nullptr;
 };
 
-/// @param st  OpenImageIO's: t goes down from the top.
+/// @param st  In OpenImageIO's coordinates: t goes from the top downwards.
 Vector4f Texture::State::sample(OIIO::TextureSystem::Perthread* thread, OIIO::TextureOpt& level_options, int level,
                                 const Vector2d& st) const {
   level_options.subimage = level;
@@ -236,14 +235,15 @@ Texture& Texture::operator=(Texture&&) noexcept = default;
 int Texture::width() const { return state_->pyramid.width(0); }
 int Texture::height() const { return state_->pyramid.height(0); }
 
-/// Beyond the edges of a picture that does not go on there is nothing to take the mean of.
+/// The mean of the picture, or transparent black outside a picture that does not continue beyond its edges.
 Vector4f Texture::State::mean(const Vector2d& st) const {
   const bool outside = (st.array() < 0).any() || (st.array() > 1).any();
   return outside && wrap == Wrap::none ? Vector4f::Zero() : pyramid.mean();
 }
 
-/// Probes stand along the longer axis, no further from each other than the shorter one is long. Each is a bilinear tent
-/// of the level whose texels are as large as the shorter axis; together they are a box of the longer axis's length.
+/// Probes lie along the longer axis, at distances of at most the length of the shorter axis. Each probe is a bilinear
+/// tent in the level whose texels are as large as the shorter axis. Together the probes form a box as long as the
+/// longer axis.
 Vector4f Texture::lookup(const Vector2d& st, const Matrix2d& footprint) const {
   if (!st.allFinite()) return Vector4f::Zero();
   if (!is_resolved(footprint)) return state_->mean(st);

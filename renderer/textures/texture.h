@@ -1,6 +1,6 @@
 #pragma once
 /// @file renderer/textures/texture.h
-/// A picture that is looked up with a filter as large as what a pixel sees of it.
+/// A picture whose look-ups are filtered over the area that a pixel sees.
 
 #include <filesystem>
 #include <memory>
@@ -15,31 +15,31 @@ namespace tensorray {
 
 /// How a picture continues beyond its edges.
 enum class Wrap {
-  none,    ///< Nothing there: transparent black.
-  clamp,   ///< The edge's colour goes on.
-  repeat,  ///< Tiles.
-  mirror,  ///< Tiles, every other one mirrored.
+  none,    ///< Nothing: transparent black.
+  clamp,   ///< The colour of the edge.
+  repeat,  ///< Repeated copies.
+  mirror,  ///< Repeated copies, every other one mirrored.
 };
 
 /// A picture in the scene-linear working space, filtered by OpenImageIO's TextureSystem over MIP maps.
 ///
-/// Coordinates are those of ST maps: (0, 0) is the lower left corner of the picture, (1, 1) the upper right one;
-/// of a picture of W pixels, pixel x has its centre at s = (x + ½) / W. Values that are not finite count as 0.
-/// Memory: the picture as it is in its file, and a cache of at most about 1 GiB of filtered tiles.
-/// Threads: any number may look up at once.
+/// Coordinates are those of ST maps: (0, 0) is the lower left corner of the picture and (1, 1) the upper right one. In
+/// a picture W pixels wide, the centre of pixel x is at s = (x + ½) / W. Values that are not finite count as 0.
+/// Memory: the picture as its file stores it, and a cache of at most about 1 GiB of filtered tiles.
+/// Threads: any number may look up at the same time.
 class Texture {
  public:
-  /// @param image  Scene-linear, working space; channels R, G, B, or R, G, B, A with the alpha multiplied in.
-  /// @throw std::invalid_argument unless these are its channels, in this order, and it has pixels.
+  /// @param image  Scene-linear, working space; channels R, G, B, or R, G, B, A with the colours multiplied by alpha.
+  /// @throw std::invalid_argument if the channels are different or in another order, or if there are no pixels.
   Texture(Image image, Wrap wrap);
 
-  /// Reads a file in any format that OpenImageIO knows: integers of 8 or 16 bits, floats; grey, grey with alpha, RGB,
-  /// RGBA, CMYK (converted by its reader). The picture is the file's display window, transparent black where that lies
-  /// outside the data window.
-  /// @param color_space  Of the file: a name, alias or role of the OCIO config; empty: see
-  ///                     `ColorManagement::texture_space`. A file's alpha stays as it is.
-  /// @throw std::runtime_error naming the file and the mend: missing, empty, cut off, not a picture, without colour
-  /// channels, too large for the memory.
+  /// Reads a file in any format that OpenImageIO supports: integers of 8 or 16 bits, floats; grey, grey with alpha,
+  /// RGB, RGBA, CMYK (converted by OpenImageIO's reader). The picture is the display window of the file; it is
+  /// transparent black outside the data window.
+  /// @param color_space  Colour space of the file: a name, alias or role of the OCIO config; empty: see
+  ///                     `ColorManagement::texture_space`. Alpha is not converted.
+  /// @throw std::runtime_error naming the file and the fix if the file is missing, empty, cut off, not a picture, has
+  /// no colour channels, or is too large for the memory.
   Texture(const std::filesystem::path& file, const ColorManagement& color, const std::string& color_space, Wrap wrap);
 
   ~Texture();
@@ -49,13 +49,13 @@ class Texture {
   int width() const;
   int height() const;
 
-  /// The picture's mean over a footprint: R, G, B with alpha multiplied in, and alpha.
-  /// @param st         Where. Where it is not finite, there is transparent black.
-  /// @param footprint  Columns: by how much (s, t) changes from one pixel to the next, along x and along y. Texels
-  ///                   larger than it are interpolated linearly (sharp), smaller ones averaged (no moiré). With the
-  ///                   footprint of one texel, a look-up at a texel's centre is that texel. A footprint that is not
-  ///                   finite, or larger than the picture, gives the mean of the picture; with `Wrap::none` only if
-  ///                   `st` is in [0, 1]², and transparent black outside.
+  /// The mean of the picture over a footprint: R, G, B multiplied by alpha, and alpha.
+  /// @param st         Position. If it is not finite, the result is transparent black.
+  /// @param footprint  Columns: change of (s, t) from one pixel to the next, along x and along y. Texels larger than
+  ///                   the footprint are interpolated linearly (sharp), smaller ones are averaged (no moiré). With the
+  ///                   footprint of one texel, a look-up at the centre of a texel returns that texel. A footprint that
+  ///                   is not finite, or larger than the picture, gives the mean of the picture. With `Wrap::none` it
+  ///                   does so only if `st` is in [0, 1]², and gives transparent black elsewhere.
   Eigen::Vector4f lookup(const Eigen::Vector2d& st, const Eigen::Matrix2d& footprint) const;
 
  private:

@@ -19,7 +19,7 @@ namespace {
 using ::testing::HasSubstr;
 using ::testing::Not;
 
-/// A picture whose values are all different and within [0, 1], and compress badly.
+/// A picture whose values are all different and within [0, 1], and which compresses badly.
 Image noise(int width, int height, std::vector<std::string> channels) {
   Image image(width, height, std::move(channels));
   std::uint32_t state = 1;
@@ -28,7 +28,7 @@ Image noise(int width, int height, std::vector<std::string> channels) {
   return image;
 }
 
-/// Smooth enough for JPEG.
+/// A picture that is smooth enough for JPEG.
 Image gradient() {
   Image image(64, 48, {"R", "G", "B"});
   for (int y = 0; y < 48; ++y)
@@ -60,7 +60,7 @@ TEST_P(EveryEnding, WritesAndReadsBack) {
   write_image(file.path(), image);
   const Image read = read_image(file.path());
   EXPECT_EQ(read.channels, image.channels);
-  // Half a step of the format; JPEG's error at this quality is a few steps.
+  // Half a step of the format; the error of JPEG at this quality is a few steps.
   const double tolerance = GetParam() == ".exr" ? 0 : GetParam()[1] == 'j' ? 5 / 255.0 : 0.51 / 65535;
   EXPECT_LE(largest_difference(read, image), tolerance);
 }
@@ -74,7 +74,8 @@ TEST_P(EveryEnding, KeepsDescriptions) {
 
 TEST_P(EveryEnding, FullDiskIsAnError) {
   if (!std::filesystem::exists("/dev/full")) GTEST_SKIP() << "no device that is always full";
-  for (const Image& image : {gradient(), noise(512, 512, {"R", "G", "B"})}) {  // Fails at the end, and in the middle.
+  // The disk becomes full when the file is closed (small picture) and while it is written.
+  for (const Image& image : {gradient(), noise(512, 512, {"R", "G", "B"})}) {
     const Temporary file("full_disk" + GetParam());
     std::filesystem::create_symlink("/dev/full", file.path());
     EXPECT_EQ(message([&] { write_image(file.path(), image); }),
@@ -125,7 +126,7 @@ TEST(ImageTest, TheSamePictureGivesTheSameBytesAtAnyTime) {
     return files;
   };
   const std::vector<std::string> first = write_all();
-  std::this_thread::sleep_for(std::chrono::milliseconds(1100));  // Time stamps count seconds.
+  std::this_thread::sleep_for(std::chrono::milliseconds(1100));  // Time stamps have a resolution of one second.
   const std::vector<std::string> second = write_all();
   for (std::size_t i = 0; i < first.size(); ++i) EXPECT_TRUE(first[i] == second[i]) << image_endings()[i];
 }

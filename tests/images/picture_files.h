@@ -1,6 +1,6 @@
 #pragma once
 /// @file tests/images/picture_files.h
-/// Picture files made byte by byte: what readers must know, and our own writer does not write.
+/// Picture files made byte by byte, for features that readers must support but that write_image does not use.
 
 #include <cstdint>
 #include <cstring>
@@ -9,7 +9,7 @@
 
 namespace tensorray {
 
-/// Numbers as bytes, the least significant first.
+/// The bytes of a number, least significant first.
 template <class Number>
 std::string little_endian(Number number) {
   std::string bytes(sizeof(Number), '\0');
@@ -31,7 +31,7 @@ inline std::string png_chunk(const std::string& name, const std::string& data) {
   return big_endian(static_cast<std::uint32_t>(data.size())) + name + data + big_endian(~crc);
 }
 
-/// Deflate's container, without compression.
+/// Wraps data in the container of Deflate (zlib), without compression.
 inline std::string zlib_stored(const std::string& data) {
   constexpr std::size_t longest = 65535;
   std::string result = "\x78\x01";
@@ -49,11 +49,13 @@ inline std::string zlib_stored(const std::string& data) {
   return result + big_endian(b << 16 | a);
 }
 
-/// A PNG of 1 (grey), 2 (grey, alpha), 3 (RGB) or 4 (RGBA) channels of 8 or 16 bits, `values` row by row from the top.
+/// A PNG of 1 (grey), 2 (grey, alpha), 3 (RGB) or 4 (RGBA) channels of 8 or 16 bits. `values` are row by row from the
+/// top.
 inline std::string png_file(int width, int height, int channels, int bits, const std::vector<int>& values) {
   std::string rows;
   for (std::size_t i = 0; i < values.size(); ++i) {
-    if (i % (static_cast<std::size_t>(width) * channels) == 0) rows += '\0';  // No prediction in this row.
+    // Filter type 0: no prediction in this row.
+    if (i % (static_cast<std::size_t>(width) * channels) == 0) rows += '\0';
     if (bits == 16) rows += static_cast<char>(values[i] >> 8);
     rows += static_cast<char>(values[i]);
   }
@@ -63,8 +65,8 @@ inline std::string png_file(int width, int height, int channels, int bits, const
   return "\x89PNG\r\n\x1A\n" + png_chunk("IHDR", header) + png_chunk("IDAT", zlib_stored(rows)) + png_chunk("IEND", "");
 }
 
-/// A TIFF of one row of 8-bit values. @param photometric  2: RGB, 5: CMYK. @param extra  What the channel after them
-/// is: 0: none, 1: alpha, multiplied in, 2: alpha, not multiplied in.
+/// A TIFF of one row of 8-bit values. @param photometric  2: RGB, 5: CMYK. @param extra  Meaning of the channel after
+/// the colours. 0: there is none, 1: alpha, colours multiplied by it, 2: alpha, colours not multiplied by it.
 inline std::string tiff_file(int width, int channels, int photometric, int extra, const std::string& values) {
   const auto entry = [](int tag, int type, std::uint32_t count, std::uint32_t value) {
     return little_endian(static_cast<std::uint16_t>(tag)) + little_endian(static_cast<std::uint16_t>(type)) +
@@ -83,13 +85,13 @@ inline std::string tiff_file(int width, int channels, int photometric, int extra
   return file + little_endian(std::uint32_t{0});
 }
 
-/// Bounds of pixels, both inclusive, as OpenEXR has them.
+/// Bounds of pixels, both inclusive, as in OpenEXR.
 struct ExrWindow {
   int x0, y0, x1, y1;
 };
 
-/// An OpenEXR file of 32-bit floats, not compressed.
-/// @param channels  Names in the order of the alphabet.
+/// An uncompressed OpenEXR file of 32-bit floats.
+/// @param channels  Names in alphabetical order.
 /// @param values    For each row of the data window, for each channel, its values along the row.
 inline std::string exr_file(const ExrWindow& display, const ExrWindow& data, const std::vector<std::string>& channels,
                             const std::vector<float>& values) {

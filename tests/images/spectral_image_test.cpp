@@ -90,7 +90,7 @@ TEST(SpectralImageTest, NamesHaveSixDecimalsInEveryLocale) {
   bands[0].wavelength = 380;
   bands[1].wavelength = 1000 / 3.0;
   bands[2].wavelength = 1250.0000004;
-  const char* const changed = std::setlocale(LC_NUMERIC, "de_DE.UTF-8");  // Where it is installed.
+  const char* const changed = std::setlocale(LC_NUMERIC, "de_DE.UTF-8");  // Null if the locale is not installed.
   for (Band& band : bands) band.width = 1;
   const Image image = spectral_image(Film(1, 1, 3), bands, 1, Eigen::Matrix3d::Identity()).image;
   std::setlocale(LC_NUMERIC, "C");

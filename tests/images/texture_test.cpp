@@ -26,7 +26,7 @@ using ::testing::HasSubstr;
 
 const std::vector<Wrap> every_wrap{Wrap::none, Wrap::clamp, Wrap::repeat, Wrap::mirror};
 
-/// Values that are all different.
+/// A picture whose values are all different.
 Image noise(int width, int height, std::vector<std::string> channels = {"R", "G", "B"}) {
   Image image(width, height, std::move(channels));
   std::uint32_t state = 1;
@@ -42,17 +42,17 @@ Image checkerboard(int width, int height) {
   return image;
 }
 
-/// The place of a texel's centre; y counts from the top, as in an Image.
+/// The coordinates of a texel's centre; y counts from the top, as in an Image.
 Vector2d centre(const Image& image, double x, double y) {
   return {(x + 0.5) / image.width, 1 - (y + 0.5) / image.height};
 }
 
-/// A footprint of so many texels along the picture's axes.
+/// A footprint of x by y texels along the picture's axes.
 Matrix2d texels(const Image& image, double x, double y) {
   return Vector2d(x / image.width, y / image.height).asDiagonal();
 }
 
-/// The colour of texel (x, y), as a look-up should have it.
+/// The colour that a look-up of texel (x, y) should return.
 Vector4f color_of(const Image& image, int x, int y) {
   const float* const pixel = image.pixel(x, y);
   return {pixel[0], pixel[1], pixel[2], image.channels.size() > 3 ? pixel[3] : 1.0f};
@@ -116,12 +116,12 @@ TEST(TextureTest, MinifiedCheckerboardsAreGrey) {
   for (const Image& image :
        {checkerboard(1000, 1000), checkerboard(1024, 512), checkerboard(1001, 999), checkerboard(777, 40)}) {
     const Texture texture(image, Wrap::repeat);
-    // Where an odd size wraps, two squares of one colour meet; and the mean is half a texel's off in a row.
+    // Where an odd size wraps, two squares of one colour are adjacent, and the mean of a row is off by half a texel.
     const double tolerance = image.width % 2 || image.height % 2 ? 0.02 : 0.01;
     for (double size = 2; size < std::min(image.height, 500); size *= 1.17)
       for (double x = 100; x < 700; x += 7.3)
         for (const double slant : {0.0, 0.4}) {
-          // A slanted footprint is narrower than its columns are long.
+          // A slanted footprint is narrower than the length of its columns.
           Matrix2d footprint = (1 + slant) * texels(image, size, size);
           footprint(0, 1) = slant * footprint(0, 0);
           const Vector4f seen = texture.lookup(centre(image, x, 0.37 * image.height + 0.01 * x), footprint);
@@ -131,7 +131,7 @@ TEST(TextureTest, MinifiedCheckerboardsAreGrey) {
 }
 
 TEST(TextureTest, LongFootprintsAverageAlongThemAndStaySharpAcross) {
-  Image image(512, 512, {"R", "G", "B"});  // One bright row, and stripes across it in the second channel.
+  Image image(512, 512, {"R", "G", "B"});  // One bright row; the second channel has stripes across it.
   for (int y = 0; y < 512; ++y)
     for (int x = 0; x < 512; ++x) {
       image.pixel(x, y)[0] = y == 256;
@@ -145,7 +145,7 @@ TEST(TextureTest, LongFootprintsAverageAlongThemAndStaySharpAcross) {
       EXPECT_NEAR(on[1], 0.5, 0.51 / length);
       EXPECT_NEAR(texture.lookup(centre(image, x, 257), texels(image, length, 1))[0], 0, 1e-4);
     }
-  // The same along the other axis, and along a diagonal, where the row is crossed.
+  // The same along the other axis, and along a diagonal that crosses the row.
   EXPECT_NEAR(texture.lookup(centre(image, 100, 256), texels(image, 1, 16))[0], 1.0 / 16, 0.01);
   EXPECT_NEAR(texture.lookup(centre(image, 101, 256), texels(image, 1, 16))[1], 1, 1e-4);
 }
@@ -161,7 +161,7 @@ TEST(TextureTest, ALinearRampStaysLinearAtEveryFootprint) {
       Matrix2d footprint = texels(image, size * stretch, size);
       footprint(1, 0) = footprint(1, 1);
       const Vector4f seen = texture.lookup(centre(image, 301.7, 222.2), footprint);
-      // Levels are exact means over areas of one shape, so that a ramp stays one; float places limit it.
+      // Levels are exact means over areas of equal shape, so a ramp stays a ramp; single precision limits the accuracy.
       EXPECT_NEAR(seen[0], 301.7, 1e-2) << size;
       EXPECT_NEAR(seen[1], 222.2, 1e-2) << size;
     }
@@ -245,13 +245,13 @@ TEST(TextureTest, PicturesInMemoryMustHaveColours) {
   EXPECT_THROW(Texture(Image(), Wrap::none), std::invalid_argument);
 }
 
-/// The texel of a file that is one row.
+/// Texel x of a file that has one row.
 Vector4f texel_of(const std::filesystem::path& file, int x, const std::string& space = "") {
   const Texture texture(file, ColorManagement({}), space, Wrap::clamp);
   return texture.lookup({(x + 0.5) / texture.width(), 0.5}, Matrix2d::Zero());
 }
 
-/// What 8-bit sRGB numbers are in linear light, with an alpha that was not multiplied in.
+/// Converts 8-bit sRGB values to linear light and multiplies them by alpha.
 Vector4f linear(int r, int g, int b, double alpha = 1) {
   return Eigen::Vector4d(alpha * decoded(r / 255.0), alpha * decoded(g / 255.0), alpha * decoded(b / 255.0), alpha)
       .cast<float>();
@@ -262,7 +262,7 @@ TEST(TextureFileTest, EveryEightBitNumberIsDecodedExactly) {
   for (int i = 0; i < 256; ++i) values.insert(values.end(), {i, 255 - i, i / 2});
   const Temporary file("all.png", png_file(256, 1, 3, 8, values));
   for (int i = 0; i < 256; ++i) EXPECT_LT(difference(texel_of(file.path(), i), linear(i, 255 - i, i / 2)), 1e-6) << i;
-  for (int i = 0; i < 256; i += 15)  // What is linear already stays as it is.
+  for (int i = 0; i < 256; i += 15)  // Values that are already linear do not change.
     EXPECT_LT(difference(texel_of(file.path(), i, "scene_linear"), Vector4f(i, 255 - i, i / 2, 255) / 255), 1e-7) << i;
 }
 
@@ -285,7 +285,7 @@ TEST(TextureFileTest, FormatsOfTiff) {
   EXPECT_LT(difference(texel_of(straight.path(), 0), linear(100, 50, 10, 0.2)), 1e-6);
   const Temporary multiplied("multiplied.tif", tiff_file(1, 4, 2, 1, "\x14\x0A\x02\x33"));
   EXPECT_LT(difference(texel_of(multiplied.path(), 0), linear(100, 50, 10, 0.2)), 1e-6);
-  // No ink, all of cyan, all of black.
+  // No ink, full cyan, full black.
   const Temporary cmyk("cmyk.tif", tiff_file(3, 4, 5, 0, std::string("\0\0\0\0\xFF\0\0\0\0\0\0\xFF", 12)));
   EXPECT_LT(difference(texel_of(cmyk.path(), 0), linear(255, 255, 255)), 1e-6);
   EXPECT_LT(difference(texel_of(cmyk.path(), 1), linear(0, 255, 255)), 1e-6);
@@ -299,7 +299,7 @@ TEST(TextureFileTest, FloatsAreTakenAsTheyAre) {
   write_image(file.path(), image);
   EXPECT_EQ(texel_of(file.path(), 0), Vector4f(-2, 1e-20f, 1e20f, 1));
   EXPECT_EQ(texel_of(file.path(), 1), Vector4f(0.25f, 0.5f, 0.75f, 0.5f));
-  EXPECT_EQ(texel_of(file.path(), 2), Vector4f(3, 2, 0, 0));  // Light of no alpha; what is not a number counts as 0.
+  EXPECT_EQ(texel_of(file.path(), 2), Vector4f(3, 2, 0, 0));  // Light with alpha 0; NaN counts as 0.
 }
 
 TEST(TextureFileTest, ChannelsOfExrAreFoundByName) {
@@ -317,7 +317,7 @@ TEST(TextureFileTest, ChannelsOfExrAreFoundByName) {
 }
 
 TEST(TextureFileTest, OutsideOfItsDataWindowAPictureIsTransparent) {
-  // Of a picture of 4 x 2, the right half's lower row, and one pixel beyond its edge.
+  // The lower row of the right half of a 4 x 2 picture, and one pixel beyond its edge.
   const Temporary file("window.exr", exr_file({10, 20, 13, 21}, {12, 21, 14, 21}, {"B", "G", "R"},
                                               {0.1f, 0.2f, 0.3f, 1, 2, 3, 4, 5, 6}));
   const Texture texture(file.path(), ColorManagement({}), "", Wrap::clamp);
@@ -340,7 +340,7 @@ TEST(TextureFileTest, FilteringIsOfLightNotOfNumbers) {
 }
 
 TEST(TextureFileTest, LevelsOfLargeFilesHaveTheirMean) {
-  constexpr int width = 3001, height = 1777;  // 48 x 28 tiles; odd at most levels.
+  constexpr int width = 3001, height = 1777;  // 48 x 28 tiles; most levels have odd sizes.
   std::vector<int> values;
   double sum = 0;
   for (int i = 0; i < width * height; ++i) {
@@ -375,7 +375,7 @@ TEST(TextureFileTest, BadFilesAreOneClearLine) {
       EXPECT_THAT(error_of(cut.path()), HasSubstr("cannot read " + cut.path().string() + ": ")) << part;
     }
   }
-  const Temporary silent("silent.ppm", "P6 9 9 255\nshort");  // A reader that does not say what is wrong.
+  const Temporary silent("silent.ppm", "P6 9 9 255\nshort");  // The reader of this format gives no error message.
   EXPECT_EQ(error_of(silent.path()), "cannot read " + silent.path().string() + ": the file is cut off or damaged");
   const Temporary good("good.png", png_file(1, 1, 1, 8, {7}));
   EXPECT_THAT(error_of(good.path(), "Technicolor"), AllOf(HasSubstr("\"Technicolor\""), HasSubstr("\"srgb_texture\"")));

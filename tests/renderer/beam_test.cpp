@@ -22,7 +22,7 @@ std::vector<Vector3d> cube_corners() {
 
 TEST(Beam, SilhouetteOfACube) {
   EXPECT_NEAR(area(silhouette_beam(cube_corners(), {0, 0, -1}, Vector3d::UnitY()).aperture), 4, 1e-12);
-  // Along a diagonal it is a regular hexagon of area 2 √3 times a face's area over 2.
+  // Along a diagonal it is a regular hexagon. Its area is 2 √3 times half the area of a face.
   const Beam hexagon = silhouette_beam(cube_corners(), {1, 1, 1}, Vector3d::UnitZ());
   EXPECT_EQ(hexagon.aperture.size(), 6u);
   EXPECT_NEAR(area(hexagon.aperture), 4 * std::sqrt(3.0), 1e-12);
@@ -51,7 +51,8 @@ TEST(Beam, PositionsFillTheAperture) {
       EXPECT_GE(emission.stratum, 0);
       EXPECT_LT(emission.stratum, 1);
     }
-    // Random positions deviate by sqrt(count): 5 standard deviations; the others by far less.
+    // The count of random positions has the standard deviation sqrt(count); allow 5 of them. Other patterns deviate far
+    // less.
     EXPECT_NEAR(static_cast<double>(inside), 20000, 5 * std::sqrt(20000.0));
     EXPECT_NEAR(static_cast<double>(inside) * sampler.area_per_candidate(), area(beam.aperture),
                 0.04 * area(beam.aperture));
@@ -83,7 +84,7 @@ TEST(Beam, SeedsChangeRandomPatternsAndNothingElseDoes) {
 }
 
 TEST(Beam, StrataSpreadOverThePositions) {
-  // Of the positions of a lattice, those with the stratum in one of 8 ranges are an eighth, in every part of the beam.
+  // In each part of the beam, an eighth of the positions of a lattice has its stratum in each of 8 ranges.
   const Beam beam = silhouette_beam(cube_corners(), {0, 0, -1}, Vector3d::UnitY());
   for (const BeamPattern pattern : {BeamPattern::stratified, BeamPattern::sobol}) {
     const BeamSampler sampler(beam, pattern, 4096, 3);
@@ -96,7 +97,8 @@ TEST(Beam, StrataSpreadOverThePositions) {
       ++counts[4 * y + x][static_cast<int>(emission.stratum * 8)];
     }
     for (const auto& part : counts)
-      for (const int count : part) EXPECT_NEAR(count, 32, 8);  // Independent draws would leave 32 ± 5.3 (one sigma).
+      // Independent samples would give a standard deviation of 5.3.
+      for (const int count : part) EXPECT_NEAR(count, 32, 8);
   }
 }
 

@@ -15,7 +15,7 @@ namespace {
 using Eigen::Vector2d;
 using Eigen::Vector3d;
 
-/// A few cameras of every kind.
+/// Several cameras of each kind.
 std::vector<Camera> cameras() {
   std::vector<Camera> result;
   for (const double lens : {0.0, 0.2}) {
@@ -41,7 +41,7 @@ TEST(Camera, LooksAtItsTarget) {
     EXPECT_NEAR(camera.right.z(), 0, 1e-14);
     EXPECT_GT(camera.up.z(), 0);
     EXPECT_NEAR(camera.focus_distance, (target - position).norm(), 1e-14);
-    // Pixels grow to the right and downwards.
+    // Pixel coordinates increase to the right and downwards.
     EXPECT_GT(to_pixel(camera, target + 0.1 * camera.right)->x(), 320);
     EXPECT_LT(to_pixel(camera, target + 0.1 * camera.up)->y(), 240);
   }
@@ -89,7 +89,7 @@ TEST(Camera, TheLensIsSharpInThePlaneOfFocus) {
     EXPECT_LT((*to_pixel(camera, sharp) - pixel).norm(), 1e-10);
     for (const Vector2d& lens : {Vector2d(1, 0), Vector2d(-0.6, 0.8), Vector2d(0.1, -0.4)}) {
       EXPECT_LT((in_plane(lens, camera.focus_distance) - sharp).norm(), 1e-12);
-      // At twice the distance the circle of confusion is as large as the lens.
+      // At twice the focus distance the circle of confusion is as large as the lens.
       const double blur =
           (in_plane(lens, 2 * camera.focus_distance) - in_plane({0, 0}, 2 * camera.focus_distance)).norm();
       EXPECT_NEAR(blur, camera.lens_radius * lens.norm(), 1e-12);
@@ -117,7 +117,7 @@ TEST(Camera, RefusesWhatIsNoView) {
     EXPECT_THROW(orthographic_camera({0, 0, 0}, {1, 2, 3}, up, height, {10, 10}), std::invalid_argument);
 }
 
-/// What the corners of a box take up of the picture, from 0 to 1 along both its axes.
+/// The extent of a box in the picture, from 0 to 1 along both axes of the picture.
 Eigen::AlignedBox2d extent_in_picture(const Camera& camera, const Eigen::AlignedBox3d& box) {
   Eigen::AlignedBox2d extent;
   for (const Vector3d& corner : corners_of(box)) {
@@ -148,7 +148,7 @@ TEST(Framing, ShowsTheWholeBoxAsLargeAsItCanBe) {
     EXPECT_GE(extent.min().minCoeff(), framing.margin - 1e-9) << i;
     EXPECT_LE(extent.max().maxCoeff(), 1 - framing.margin + 1e-9) << i;
     EXPECT_LT((extent.center() - Vector2d(0.5, 0.5)).norm(), 1e-6) << i;
-    // In one direction at least, the free space is the margin alone.
+    // In at least one direction there is no free space except the margin.
     EXPECT_NEAR(size_in_picture.maxCoeff(), 1 - 2 * framing.margin, 1e-6) << i;
     EXPECT_GT(camera.focus_distance, 0);
     EXPECT_EQ(camera.lens_radius, 0);
@@ -160,7 +160,7 @@ TEST(Framing, LooksFromAboveByDefault) {
   EXPECT_GT(camera.position.z(), 1);
   EXPECT_LT(camera.position.y(), -1);
   EXPECT_GT(camera.position.x(), 1);
-  // The three faces towards the viewer are all seen well.
+  // The three faces towards the viewer are all clearly visible.
   for (int axis = 0; axis < 3; ++axis) EXPECT_GT(std::abs(camera.forward[axis]), 0.4);
   EXPECT_GT(camera.up.z(), 0.8);
   const Vector2d origin = *to_pixel(camera, {0, 0, 0});

@@ -70,7 +70,7 @@ Image plain(int width, int height, float value) {
   return image;
 }
 
-/// Green rises with the position, red and blue are constant and found nowhere else.
+/// A colour bar whose green increases with the position. Its red and blue are constant and appear nowhere else.
 ColorBar green_bar() {
   return {"|T V|", {0, 4}, [](double x) { return Eigen::Vector3d(0.25, x, 0.125); }};
 }
@@ -91,14 +91,14 @@ TEST(ColorBarTest, ShowsAllPositionsFromTheBottomToTheTop) {
     ASSERT_FALSE(pixels.empty());
     const int top = pixels.front().y(), bottom = pixels.back().y();
     EXPECT_NEAR(bottom - top + 1, 0.6 * size, 1);
-    EXPECT_NEAR(top + bottom, size, 0.1 * size);  // In the middle.
+    EXPECT_NEAR(top + bottom, size, 0.1 * size);  // The bar is vertically centred.
     EXPECT_GT(pixels.front().x(), image.width * 0.75);
     for (const Eigen::Vector2i& p : pixels)
       EXPECT_NEAR(image.pixel(p.x(), p.y())[1], (bottom + 0.5 - p.y()) / (bottom - top + 1), 1e-6);
   }
 }
 
-/// The lines of the ticks are white at the heights of 0, 1, ... 4, right of the bar's frame.
+/// The lines of the ticks are white, at the heights of 0, 1, ... 4, to the right of the frame of the bar.
 TEST(ColorBarTest, TicksAreAtTheirValues) {
   Image image = plain(1000, 1000, 0);
   draw_color_bar(image, green_bar());
@@ -118,7 +118,7 @@ TEST(ColorBarTest, TicksAreAtTheirValues) {
   for (int i = 0; i < 5; ++i) EXPECT_NEAR(middles[i], top + (bottom - top) * i / 4, 1);
 }
 
-/// The greatest and the least brightness on the panel next to the bar.
+/// Compares the largest and the smallest brightness on the panel next to the bar.
 TEST(ColorBarTest, WritingContrastsWithAnyBackground) {
   for (const float background : {0.0f, 0.2f, 0.3f, 0.4f, 0.5f, 1.0f}) {
     Image image = plain(600, 400, background);

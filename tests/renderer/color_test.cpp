@@ -16,7 +16,7 @@ namespace {
 using ::testing::AllOf;
 using ::testing::HasSubstr;
 
-/// Each test sees $OCIO as it sets it, and unset at first.
+/// $OCIO is unset at the beginning of each test; a test may set it.
 class ColorTest : public ::testing::Test {
  protected:
   ColorTest() {
@@ -36,7 +36,7 @@ Eigen::Vector3d from_chromaticity(double x, double y) { return {x / y, 1, (1 - x
 
 Eigen::Vector3d xyz_of(const Spectrum& light) { return make_bands(light, observer_min, observer_max, 1).front().xyz; }
 
-/// What a display shows of scene-linear grey.
+/// The value that a display shows for scene-linear grey.
 double displayed_grey(const ColorManagement& color, float value) {
   Image image(1, 1, {"R", "G", "B"});
   image.pixels = {value, value, value};
@@ -50,7 +50,7 @@ std::string error_of(const ColorSettings& settings) {
   return message([&] { ColorManagement color(settings); });
 }
 
-/// A config whose working space is the ACEScg-like space of `space`, and that has the given roles.
+/// A config with the given roles. Its working space resembles ACEScg.
 std::string config_text(const std::string& roles) {
   return "ocio_profile_version: 2\n"
          "environment: {}\n"
@@ -118,7 +118,7 @@ TEST_F(ColorTest, AdaptedWhitesAreNeutral) {
 }
 
 TEST_F(ColorTest, AdaptationIsBradfords) {
-  // From A to D65, as published with the CIE's whites (Lindbloom); XYZ to linear sRGB by IEC 61966-2-1.
+  // The adaptation from A to D65 as published with the CIE's whites (Lindbloom); XYZ to linear sRGB by IEC 61966-2-1.
   Eigen::Matrix3d adaptation, to_rgb;
   adaptation << 0.8446965, -0.1179225, 0.3948108, -0.1366303, 1.1041226, 0.1291718, 0.0798489, -0.1348999, 3.1924009;
   to_rgb << 3.2404542, -1.5371385, -0.4985314, -0.9692660, 1.8760108, 0.0415560, 0.0556434, -0.2040259, 1.0572252;
@@ -156,7 +156,7 @@ TEST_F(ColorTest, ViewsAreMonotone) {
       double last = -1e-6;
       for (float value = 1e-4f; value < 1; value *= 1.3f) {
         const double shown = displayed_grey(color, value);
-        const bool black = value < 0.003f;  // The ACES transform shows less than that as black.
+        const bool black = value < 0.003f;  // The ACES transform shows smaller values as black.
         EXPECT_GT(shown, last - (black ? 1e-9 : 0)) << display << " " << view << " " << value;
         last = shown;
       }
@@ -205,12 +205,12 @@ TEST_F(ColorTest, ConfigsAreFoundByPathAndByEnvironment) {
 }
 
 TEST_F(ColorTest, EitherInterchangeRoleLeadsToTheWorkingSpace) {
-  // ACEScg's primaries and white (D60), adapted to D65 as Bradford has it.
+  // ACEScg's primaries and white (D60), adapted to D65 by Bradford's method.
   for (const std::string& roles : {aces_role, xyz_role, aces_role + xyz_role}) {
     const Temporary file("roles.ocio", config_text(linear_role + roles));
     const Eigen::Matrix3d matrix = ColorManagement({file.path(), "", ""}).xyz_to_working();
     EXPECT_TRUE((matrix * from_chromaticity(0.3127, 0.3290)).isApprox(Eigen::Vector3d::Ones(), 1e-4)) << roles;
-    // The published matrix from linear sRGB (D65) to ACEScg, of which these are the sums along red.
+    // The published matrix from linear sRGB (D65) to ACEScg; the expected values are its first column.
     const Eigen::Vector3d red = matrix * (0.2126390 * from_chromaticity(0.64, 0.33));
     EXPECT_LT((red - Eigen::Vector3d(0.613097, 0.070194, 0.020616)).norm(), 2e-4) << roles << red.transpose();
   }

@@ -76,11 +76,11 @@ std::vector<Colormap> all_maps() {
 struct Published {
   Colormap map;
   double x;
-  Eigen::Vector3d color;  ///< 0 to 255.
+  Eigen::Vector3d color;  ///< From 0 to 255.
   double tolerance;
 };
 
-/// Entries of the published tables that lie between the control points.
+/// Compares entries of the published tables that lie between the control points.
 TEST(ColormapTest, AgreesWithThePublishedTables) {
   const auto of256 = [](int i) { return i / 255.0; };
   const std::vector<Published> entries{{Colormap::viridis, of256(3), {69, 5, 89}, 1.5},
@@ -125,7 +125,7 @@ TEST(ColormapTest, LightIsTheDecodedColorAndOtherArgumentsAreClamped) {
   EXPECT_NEAR(srgb_to_linear({0.5, 0, 1})[0], 0.21404114, 1e-8);
 }
 
-/// The spline goes through its points, so that a step over one of them is not larger than steps elsewhere.
+/// The spline is continuous at its control points: a step across one is not larger than other steps.
 TEST(ColormapTest, HasNoJumps) {
   for (const Colormap map : all_maps())
     for (int i = 0; i < 4096; ++i)
@@ -143,7 +143,7 @@ struct Steps {
   double least, mean, greatest;
 };
 
-/// CIEDE2000 between neighbours of 33 colours; `color_at` gives linear Rec.709.
+/// CIEDE2000 differences between neighbours of 33 colours. `color_at` returns linear Rec.709.
 template <class Color>
 Steps steps_of(const Color& color_at) {
   constexpr int count = 32;
@@ -157,9 +157,9 @@ Steps steps_of(const Color& color_at) {
   return steps;
 }
 
-// No map is made to be uniform in this formula (viridis and its kin are in CAM02-UCS), so that steps differ; but they
-// do so by a factor that leaves a plain rainbow out.
-constexpr double least_step = 0.4, greatest_step = 2;  // Of the mean.
+// No map is designed to be uniform in this formula (viridis and its relatives are uniform in CAM02-UCS), so the steps
+// differ. A plain rainbow map would exceed these limits.
+constexpr double least_step = 0.4, greatest_step = 2;  // Relative to the mean step.
 
 TEST(ColormapTest, EqualStepsLookEqual) {
   for (const Colormap map : all_maps()) {
@@ -194,7 +194,7 @@ TEST(ColormapTest, DivergingAndCyclicMapsAreBalanced) {
     EXPECT_NEAR(lab(Colormap::twilight, x)[0], lab(Colormap::twilight, 1 - x)[0], 5);
   }
   EXPECT_EQ(colormap_srgb(Colormap::twilight, 0), colormap_srgb(Colormap::twilight, 1));
-  const double h = 1e-4;  // No kink where it closes.
+  const double h = 1e-4;  // The map has no kink where it closes.
   const Eigen::Vector3d before = colormap_srgb(Colormap::twilight, 1) - colormap_srgb(Colormap::twilight, 1 - h);
   const Eigen::Vector3d after = colormap_srgb(Colormap::twilight, h) - colormap_srgb(Colormap::twilight, 0);
   EXPECT_LT((before - after).norm(), 0.05 * after.norm());

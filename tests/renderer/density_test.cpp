@@ -31,7 +31,7 @@ Points random_points(int count, double width, double height) {
   return points;
 }
 
-/// Eq. 10, corrected, as it stands: a sum over all points and their mirror images in the plate's edges.
+/// Evaluates Eq. 10, corrected, directly: a sum over all points and their mirror images in the edges of the plate.
 Film direct_sum(int width, int height, double tau, const Points& points) {
   Film film(width, height, 1);
   const auto line = [tau](double at, double center, double size) {
@@ -66,8 +66,8 @@ TEST(Density, AgreesWithTheDirectSum) {
       greatest = std::max(greatest, direct.values[i]);
       error = std::max(error, std::abs(fast.values[i] - direct.values[i]));
     }
-    // Below tau = 1 the pixels' sum of a sampled Gaussian is not 1, and normalising it changes the values:
-    // 2 exp(−2π²τ²) an axis, 1.3e-4 at 0.7.
+    // Below tau = 1 the sum of a sampled Gaussian over the pixels is not 1, and normalising it changes the values: by 2
+    // exp(−2π²τ²) per axis, which is 1.3e-4 at 0.7.
     EXPECT_LT(error, (tau < 1 ? 1e-3 : tau < 6 ? 2e-4 : 5e-5) * greatest) << tau;
   }
 }
@@ -80,7 +80,7 @@ TEST(Density, ConservesEveryPoint) {
 }
 
 TEST(Density, UniformLightIsUniformUpToTheEdges) {
-  // Lattices of points that do not match the pixels, down to fewer points than pixels.
+  // Lattices of points that do not match the pixels. The coarsest ones have fewer points than pixels.
   for (const double spacing : {0.37, 0.95, 1.0, 1.05, 2.1, 4.0}) {
     const int count = static_cast<int>(120 / spacing);
     const double step = 120.0 / count;
@@ -110,14 +110,14 @@ TEST(Density, ChannelsAreSeparate) {
   }
 }
 
-/// Points of three channels, more than are sorted at once, most of them on a small part of the plate.
+/// Points of three channels: more than are sorted at once, and most of them on a small part of the plate.
 std::vector<DensityPoint> channel_points(const DensityEstimator& estimator, int width, int height) {
   const Points spread = random_points(20000, width, height), dense = random_points(60000, 30, 20);
   std::vector<DensityPoint> points;
   for (std::size_t i = 0; i < dense.size(); ++i) {
     const Eigen::Vector2d at = i < spread.size() ? spread[i] : Eigen::Vector2d(dense[i] + Eigen::Vector2d(40, 50));
     points.push_back(estimator.point(static_cast<int>(i % 3), at));
-    if (i % 5 == 0) points.push_back({});  // Nowhere.
+    if (i % 5 == 0) points.push_back({});  // An unused point.
   }
   return points;
 }

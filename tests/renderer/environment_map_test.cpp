@@ -19,7 +19,7 @@ using Eigen::Vector3d;
 
 constexpr double pi = 3.14159265358979323846;
 
-/// One channel is one band.
+/// A light whose only channel is its only band.
 EnvironmentLight grey(int width, int height) {
   EnvironmentLight light;
   light.picture = Image(width, height, {"Y"});
@@ -27,7 +27,7 @@ EnvironmentLight grey(int width, int height) {
   return light;
 }
 
-/// A dark, uneven sky with a row and some texels of nothing and one bright texel, turned somehow.
+/// A dark, uneven sky in a general orientation: one row and some texels are 0, and one texel is bright.
 EnvironmentLight uneven_sky() {
   EnvironmentLight light = grey(16, 9);
   for (int i = 0; i < 16 * 9; ++i) light.picture.pixels[i] = static_cast<float>(random_uniform(1, i, 0));
@@ -44,7 +44,7 @@ double radiance(const EnvironmentMap& map, const Vector3d& direction) {
   return result[0];
 }
 
-/// The integral over the sphere by the midpoint rule, in the world's own latitudes and longitudes.
+/// The integral over the sphere by the midpoint rule, in latitudes and longitudes of the world frame.
 template <class Function>
 double integrate(const Function& function, int rows) {
   double sum = 0;
@@ -57,14 +57,14 @@ double integrate(const Function& function, int rows) {
 }
 
 TEST(EnvironmentMap, UpIsZAndTheMiddleIsX) {
-  // 8 x 5 texels have centres at the poles' rows and at the axes' columns, up to half a texel.
+  // With 8 x 5 texels, centres are at most half a texel from the poles and the axes.
   EnvironmentLight light = grey(8, 5);
   const auto set = [&](int x, int y, float value) { *light.picture.pixel(x, y) = value; };
   for (int x = 0; x < 8; ++x) set(x, 0, 1), set(x, 4, 2);
-  set(3, 2, 10), set(4, 2, 10);  // About the middle.
+  set(3, 2, 10), set(4, 2, 10);  // On both sides of the middle.
   set(1, 2, 20), set(2, 2, 20);  // A quarter of the width to the left.
-  set(5, 2, 30), set(6, 2, 30);  // To the right.
-  set(0, 2, 40), set(7, 2, 40);  // The edges.
+  set(5, 2, 30), set(6, 2, 30);  // A quarter of the width to the right.
+  set(0, 2, 40), set(7, 2, 40);  // At the edges.
   const EnvironmentMap map(light, {1});
   EXPECT_FLOAT_EQ(radiance(map, {0, 0, 1}), 1);
   EXPECT_FLOAT_EQ(radiance(map, {0, 0, -1}), 2);
@@ -73,7 +73,8 @@ TEST(EnvironmentMap, UpIsZAndTheMiddleIsX) {
   EXPECT_FLOAT_EQ(radiance(map, {0, -1, 0}), 30);
   EXPECT_FLOAT_EQ(radiance(map, {-1, 0, 0}), 40);
 
-  light.to_world = Eigen::AngleAxisd(pi / 2, Vector3d::UnitZ()).toRotationMatrix();  // The middle becomes +y.
+  // The middle of the picture becomes +y.
+  light.to_world = Eigen::AngleAxisd(pi / 2, Vector3d::UnitZ()).toRotationMatrix();
   EXPECT_FLOAT_EQ(radiance(EnvironmentMap(light, {1}), {0, 1, 0}), 10);
   EXPECT_FLOAT_EQ(radiance(EnvironmentMap(light, {1}), {0, 0, 1}), 1);
 }
@@ -104,14 +105,14 @@ TEST(EnvironmentMap, ChannelsHaveSpectra) {
 
 TEST(EnvironmentMap, DensityIntegratesToOne) {
   const EnvironmentMap map(uneven_sky(), {1});
-  // It jumps at the texels' edges, where the midpoint rule errs by what lies in a row of its cells.
+  // The density jumps at the edges of texels. There the midpoint rule is off by up to one row of its cells.
   EXPECT_NEAR(integrate([&](const Vector3d& d) { return map.pdf(d); }, 1000), 1, 2e-3);
 }
 
 TEST(EnvironmentMap, SamplesFollowTheDensity) {
   const EnvironmentLight light = uneven_sky();
   const EnvironmentMap map(light, {1});
-  constexpr int rows = 12, columns = 24;  // Other bins than the texels, even in solid angle.
+  constexpr int rows = 12, columns = 24;  // Bins that differ from the texels and have equal solid angles.
   std::vector<double> weights(rows * columns);
   const auto bin = [](const Vector3d& d) {
     const int y = std::min(static_cast<int>((1 - d.z()) / 2 * rows), rows - 1);
@@ -124,7 +125,7 @@ TEST(EnvironmentMap, SamplesFollowTheDensity) {
     ASSERT_NEAR(d.norm(), 1, 1e-14);
     ++counts[bin(d)];
   }
-  // Bins in which few are expected would not be normal: they make one.
+  // Bins with few expected samples are not normally distributed: merge them into one.
   double total = 0, rare_weight = 0;
   for (const double w : weights) total += w;
   int rare_count = 0;
@@ -153,7 +154,7 @@ TEST(EnvironmentMap, SamplesIntegrateAsQuadratureDoes) {
   }
   EXPECT_NEAR(mean.mean(), exact, 4 * mean.error() + 1e-4 * exact);
   EXPECT_LT(mean.error(), 0.01 * exact);
-  // Choosing by the light must be far better than choosing evenly: a tenth of the variance.
+  // Sampling by the light must be far better than uniform sampling: at most a tenth of the variance.
   Mean even;
   for (int i = 0; i < 20000; ++i)
     even.add(4 * pi * integrand(square_to_sphere({random_uniform(4, i, 0), random_uniform(4, i, 1)})));
@@ -207,7 +208,7 @@ TEST(EnvironmentMap, RefusesWhatDoesNotFit) {
   light.channel_spectra(0, 0) = -1;
   EXPECT_THROW(EnvironmentMap(light, {1}), std::invalid_argument);
   light = grey(4, 2);
-  light.to_world(0, 0) = -1;  // A mirror.
+  light.to_world(0, 0) = -1;  // A reflection.
   EXPECT_THROW(EnvironmentMap(light, {1}), std::invalid_argument);
   light.to_world = 2 * Eigen::Matrix3d::Identity();
   EXPECT_THROW(EnvironmentMap(light, {1}), std::invalid_argument);

@@ -21,7 +21,7 @@ Surfaces box_surfaces(const Eigen::Affine3d& transform = Eigen::Affine3d::Identi
   return surfaces;
 }
 
-/// Where a line enters and leaves the box, by slabs.
+/// Where a line enters and leaves the box, by the slab method.
 bool slabs(const Vector3d& origin, const Vector3d& direction, double& near, double& far) {
   near = -1e300, far = 1e300;
   for (int axis = 0; axis < 3; ++axis) {
@@ -42,14 +42,14 @@ TEST(Geometry, BoxAgreesWithTheAnalyticOne) {
     const Vector3d direction = (0.5 * Vector3d(normal(random), normal(random), normal(random)) - origin).normalized();
     double near, far;
     const bool expected = slabs(origin, direction, near, far);
-    if (expected && far - near < 1e-4) continue;  // Grazes an edge: rounding decides.
+    if (expected && far - near < 1e-4) continue;  // The line grazes an edge: rounding decides.
     const auto entry = geometry.crossing(Surface::bounds, true, origin, direction);
     const auto exit = geometry.crossing(Surface::bounds, false, origin, direction);
     ASSERT_EQ(entry.has_value(), expected);
     ASSERT_EQ(exit.has_value(), expected);
     if (!expected) continue;
     ++hits;
-    EXPECT_NEAR(entry->distance, near, 1e-12);  // Double precision, though Embree's is single.
+    EXPECT_NEAR(entry->distance, near, 1e-12);  // The result has double precision, although Embree's is single.
     EXPECT_NEAR(exit->distance, far, 1e-12);
     EXPECT_LT(entry->normal.dot(direction), 0);
     EXPECT_GT(exit->normal.dot(direction), 0);
@@ -120,7 +120,7 @@ TEST(Geometry, RefusesSurfacesBeyondSinglePrecision) {
   }
 }
 
-/// A plate may lie as far away as Geometry allows, and light meets it.
+/// Rays hit a plate as far away as Geometry allows.
 TEST(Geometry, MeetsThePlateAsFarAsItIsAllowed) {
   for (const double far : {1e3, 1e6, 1e9, 1e12}) {
     Surfaces surfaces = box_surfaces();

@@ -22,7 +22,7 @@ const double nan_value = std::numeric_limits<double>::quiet_NaN();
 
 using Coordinate = std::function<double(double x, double y)>;
 
-/// Coordinates that are functions of the pixel's place; derivatives by central differences.
+/// Pixel coordinates from functions of the position; derivatives by central differences.
 std::vector<PixelCoordinates> seen(int width, int height, const Coordinate& s, const Coordinate& t) {
   std::vector<PixelCoordinates> result;
   const double h = 1e-4;
@@ -39,7 +39,7 @@ std::vector<PixelCoordinates> seen(int width, int height, const Coordinate& s, c
   return result;
 }
 
-/// A coordinate without lines.
+/// A coordinate that has no lines.
 double nothing(double, double) { return 0.5; }
 
 std::vector<PixelCoordinates> undistorted(int width, int height) {
@@ -47,7 +47,7 @@ std::vector<PixelCoordinates> undistorted(int width, int height) {
       width, height, [=](double x, double) { return x / width; }, [=](double, double y) { return y / height; });
 }
 
-/// White lines on black.
+/// Draws white lines on black.
 Image drawn(int width, int height, const std::vector<PixelCoordinates>& coordinates, const GridLines& lines) {
   Image image(width, height, {"R", "G", "B"});
   draw_grid_lines(image, coordinates, lines);
@@ -63,7 +63,7 @@ GridLines white_lines(int cells, double width) {
 
 double ink(const Image& image) { return std::accumulate(image.pixels.begin(), image.pixels.end(), 0.0) / 3; }
 
-/// Exact along the axes: 15 lines inside, and half of each of those on the border, minus what crossings share.
+/// Coverage is exact along the axes: 15 lines inside and half of each border line, minus the overlaps at crossings.
 TEST(GridLinesTest, UndistortedLinesHaveTheirWidth) {
   const int size = 160, cells = 16;
   for (const double width : {0.5, 1.0, 1.5, 3.0}) {
@@ -87,8 +87,8 @@ TEST(GridLinesTest, LinesLieAtMultiplesOfACell) {
     }
 }
 
-/// Lines at any angle and magnification cover width × length. Not exactly in each pixel, but on average over lines that
-/// meet the pixels in many ways (so the spacing is irrational).
+/// Lines at any angle and magnification cover width × length. This holds not exactly in each pixel, but on average over
+/// lines that cross pixels at many offsets (so the spacing is irrational).
 TEST(GridLinesTest, WidthDoesNotDependOnAngleOrMagnification) {
   const int size = 512;
   for (const double angle : {0.0, 0.2, 0.7853981633974483, 1.1, 2.5})
@@ -98,7 +98,7 @@ TEST(GridLinesTest, WidthDoesNotDependOnAngleOrMagnification) {
         return 0.5 + ((x - 256.1) * std::cos(angle) + (y - 256.2) * std::sin(angle)) / (spacing * cells);
       };
       const Image image = drawn(size, size, seen(size, size, s, nothing), white_lines(cells, 1.5));
-      // A line more or less at the border covers 1.5 size of size² pixels.
+      // One line more or less at the border covers 1.5 size of size² pixels.
       EXPECT_NEAR(ink(image) / (size * size), 1.5 / spacing, 1.5 / size) << angle << " " << spacing;
     }
 }
@@ -121,7 +121,7 @@ TEST(GridLinesTest, DenseLinesFadeAway) {
   }
 }
 
-/// On a fold s is stationary: a line there may be twice as wide, and one that is just not reached draws no more.
+/// On a fold s is stationary: a line there may be up to twice as wide, and a line just beyond the fold adds nothing.
 TEST(GridLinesTest, FoldsAreNotFlooded) {
   const int width = 401, height = 5;
   for (const double turning : {0.5, 0.5 - 1e-6, 0.5 - 1e-5, 0.5 - 1e-4}) {
@@ -154,7 +154,7 @@ TEST(GridLinesTest, LeavesAloneWhatIsNotValidOrNotFinite) {
   coordinates[4].per_pixel(1, 1) = std::numeric_limits<double>::infinity();
   coordinates[5].st.setConstant(1e300);
   coordinates[6].per_pixel.setConstant(1e300);
-  const Image image = drawn(8, 1, coordinates, white_lines(1, 100));  // So wide that all is line.
+  const Image image = drawn(8, 1, coordinates, white_lines(1, 100));  // Lines so wide that they cover everything.
   for (int x = 0; x < 8; ++x) EXPECT_EQ(*image.pixel(x, 0), x == 0 || x == 7) << x;
 }
 
@@ -171,7 +171,8 @@ TEST(GridLinesTest, BlendsByOpacityAndMakesOpaque) {
 }
 
 TEST(GridLinesTest, SinglePixelAndEmptyPicture) {
-  EXPECT_NEAR(ink(drawn(1, 1, undistorted(1, 1), white_lines(1, 1))), 0, 1e-9);  // Lines a pixel apart are too dense.
+  // Lines at a distance of one pixel are too dense.
+  EXPECT_NEAR(ink(drawn(1, 1, undistorted(1, 1), white_lines(1, 1))), 0, 1e-9);
   EXPECT_EQ(drawn(0, 0, {}, white_lines(1, 1)).pixels.size(), 0u);
 }
 

@@ -7,7 +7,7 @@
 namespace tensorray {
 namespace {
 
-/// The B-spline of a degree, centred, by its definition:  d B_d(x) = (x + (d+1)/2) B_{d−1}(x + ½) + ((d+1)/2 − x)
+/// The centred B-spline of a degree, by its definition:  d B_d(x) = (x + (d+1)/2) B_{d−1}(x + ½) + ((d+1)/2 − x)
 /// B_{d−1}(x − ½).
 double spline(int degree, double x) {
   if (degree == 0) return x >= -0.5 && x < 0.5 ? 1 : 0;
@@ -41,7 +41,7 @@ TEST(KernelDeposit, ColoursMultiplyTheKernel) {
   constexpr std::size_t width = 40, height = 8;
   const std::vector<PixelColor> colors{{{1, 2, 3, 0}}, {{0.5, 0, -1, 0}}};
   std::vector<DensityPoint> points;
-  for (int i = 0; i < 150; ++i)  // More than one group of points whose weights are computed together.
+  for (int i = 0; i < 150; ++i)  // More points than one group of points whose weights are computed together.
     points.push_back(make_point(static_cast<float>(i) / 150, 0.3f, i % 30, i % 2, i % 2));
   const GaussianKernel gaussian(1.5, 2.25);
   for (const bool splines : {true, false}) {
@@ -74,7 +74,7 @@ TEST(KernelDeposit, GaussiansAreCutAndNormalised) {
         const double distance = i - (kernel.taps() / 2 - 1) - beyond;
         return std::abs(distance) <= reach ? std::exp(-distance * distance / (2 * tau * tau)) : 0;
       };
-      for (int i = -2; i < kernel.taps() + 2; ++i) sum += value(i);  // What is cut off lies beyond the reach.
+      for (int i = -2; i < kernel.taps() + 2; ++i) sum += value(i);  // The part that is cut off lies beyond the reach.
       for (int i = 0; i < kernel.taps(); ++i) ASSERT_NEAR(weights[i], value(i) / sum, 1e-14) << tau << " " << beyond;
     }
   }

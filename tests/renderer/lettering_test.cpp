@@ -24,14 +24,14 @@ using ::testing::HasSubstr;
 const Eigen::Vector3d white(1, 1, 1);
 constexpr double pi = 3.14159265358979323846;
 
-/// White text on black, one channel; its lower left corner is `position`.
+/// Draws white text on black, in one channel; `position` is its lower left corner.
 Image drawn(const std::string& text, double height, const Eigen::Vector2d& position, int columns, int rows) {
   Image image(columns, rows, {"Y"});
   draw_text(image, position, height, text, white);
   return image;
 }
 
-/// With room on all sides.
+/// Draws text with a margin on all sides.
 Image drawn(const std::string& text, double height) {
   const int size = static_cast<int>(2 * height);
   return drawn(text, height, {height / 2, 1.5 * height}, size + static_cast<int>(text_width(text, height)), size);
@@ -59,8 +59,8 @@ TEST(LetteringTest, EveryPrintableCharacterIsDrawnAndDiffersFromAllOthers) {
   EXPECT_TRUE(seen.emplace(drawn("\n", 32, {16, 48}, 80, 64).pixels, '\n').second) << "the box looks like a character";
 }
 
-/// The ink fills the width that is announced, and no more; it stays between the base line and the capitals' height, or
-/// a quarter of it below where a character has a descender. (The digit 1 is narrower than its width.)
+/// The ink is as wide as text_width says. It stays between the base line and the height of a capital, or a quarter of
+/// that height below the base line if a character has a descender. (The digit 1 is narrower than its width.)
 TEST(LetteringTest, InkIsWithinTheLine) {
   for (char c = '!'; c <= '~'; ++c)
     for (const double height : {10.0, 33.7, 64.0}) {
@@ -91,7 +91,7 @@ TEST(LetteringTest, WidthsAddUp) {
   for (char digit = '1'; digit <= '9'; ++digit) EXPECT_EQ(text_width(std::string(1, digit), 32), text_width("0", 32));
 }
 
-/// Every character stands where the width of those before it says.
+/// The position of each character is the width of the text before it.
 TEST(LetteringTest, TextIsItsCharactersSideBySide) {
   const std::string text = "Ag 1e-3";
   const double height = 24.5;
@@ -104,8 +104,8 @@ TEST(LetteringTest, TextIsItsCharactersSideBySide) {
   for (std::size_t i = 0; i < apart.pixels.size(); ++i) ASSERT_NEAR(apart.pixels[i], together.pixels[i], 1e-5);
 }
 
-/// A stroke of width w and length l with round ends covers w l + π w² / 4; a closed one, w l. A capital O is two half
-/// circles of radius 10/32 of the height and straight lines of 8/32, and a stroke is 4/32 wide.
+/// A stroke of width w and length l with round ends covers w l + π w² / 4; a closed one covers w l. A capital O has two
+/// half circles with a radius of 10/32 of the height, and straight lines of 8/32; a stroke is 4/32 wide.
 TEST(LetteringTest, StrokesCoverTheirArea) {
   const double height = 160, unit = height / 32, end_caps = pi * 4 * unit * unit;
   EXPECT_NEAR(ink(drawn(".", height)), end_caps, 0.01 * end_caps);
@@ -128,7 +128,7 @@ TEST(LetteringTest, SymmetricLettersAreSymmetric) {
       for (int x = 0; x < 50; ++x) ASSERT_NEAR(*image.pixel(x, y), *image.pixel(99 - x, y), 1e-5) << c;
   }
   for (const char c :
-       std::string("IOXN0")) {  // Turned by 180° (not H and S: their middles lie higher, as they should).
+       std::string("IOXN0")) {  // Rotated by 180° (not H and S: their middles lie above the centre on purpose).
     const std::string text(1, c);
     const Image image = drawn(text, 40, {50 - text_width(text, 40) / 2, 60}, 100, 80);
     for (int y = 0; y < 80; ++y)

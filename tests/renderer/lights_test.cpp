@@ -22,14 +22,14 @@ constexpr double pi = 3.14159265358979323846;
 
 const Eigen::AlignedBox3d unit_scene(Vector3d(-1, -1, -1), Vector3d(1, 1, 1));
 
-/// A light of one band, 2 by 1.2, above the origin and tilted; it shines downwards.
+/// A light of one band, 2 by 1.2, above the origin and tilted; it emits downwards.
 AreaLight lamp(float radiance) {
   const Vector3d right(0.8, 0, -0.6), up(0, -1, 0);
   return {rectangle_mesh({0.3, -0.2, 1.5}, right, up, {2, 1.2}), {radiance}};
 }
 
-/// Lambert's formula (Schröder and Hanrahan 1993, "On the Form Factor Between Two Polygons"): the irradiance by a
-/// polygon of radiance 1, all of it above the receiver's horizon.
+/// Lambert's formula (Schröder and Hanrahan 1993, "On the Form Factor Between Two Polygons"): the irradiance from a
+/// polygon of radiance 1 that is completely above the horizon of the surface.
 double polygon_irradiance(const std::vector<Vector3d>& polygon, const Vector3d& point, const Vector3d& normal) {
   double sum = 0;
   for (std::size_t i = 0; i < polygon.size(); ++i) {
@@ -39,7 +39,7 @@ double polygon_irradiance(const std::vector<Vector3d>& polygon, const Vector3d& 
   return std::abs(sum);
 }
 
-/// The irradiance of a surface without occluders, as a renderer would estimate it.
+/// The irradiance of a surface without occluders, estimated as a renderer would do it.
 Mean irradiance(const LightSampler& lights, const Vector3d& point, const Vector3d& normal, std::size_t band = 0,
                 int samples = 20000) {
   Mean mean;
@@ -52,7 +52,7 @@ Mean irradiance(const LightSampler& lights, const Vector3d& point, const Vector3
   return mean;
 }
 
-/// A picture with a bright spot over a dim ground.
+/// A picture with a bright spot on a dim background.
 EnvironmentLight sky(int bands) {
   EnvironmentLight light;
   light.picture = Image(16, 8, {"Y"});
@@ -86,7 +86,7 @@ TEST(AreaLight, ShinesFromItsFrontOnlyUnlessBothSidesDo) {
 }
 
 TEST(AreaLight, SamplesLieOnTheMeshEvenly) {
-  // A strip of triangles of unequal areas; positions are told from the way to them.
+  // A strip of triangles of unequal areas. Positions are computed from the sampled direction and distance.
   AreaLight light;
   light.radiance = {1};
   light.mesh.vertices = {{0, 0, 2}, {0, 1, 2}, {0.25, 0, 2}, {1, 1, 2}, {1, 0, 2}};
@@ -121,7 +121,7 @@ TEST(AreaLight, DensityIntegratesToOne) {
       if (distance > 0 && std::abs(p.dot(right)) < 1 && std::abs(p.dot(up)) < 0.6)
         sum += lights.area_pdf(1, point, position, normal);
     }
-  EXPECT_NEAR(sum * 2 * pi / rows / rows, 0.75, 0.75 * 5e-3);  // The border's cells are all or nothing.
+  EXPECT_NEAR(sum * 2 * pi / rows / rows, 0.75, 0.75 * 5e-3);  // Cells at the border count either fully or not at all.
 }
 
 TEST(DirectionalLight, ParallelLightIsADelta) {
@@ -146,7 +146,7 @@ TEST(DirectionalLight, ADiskGivesItsIrradiance) {
     const Mean facing = irradiance(lights, Vector3d::Zero(), to_light);
     EXPECT_NEAR(facing.mean(), 5, 4 * facing.error() + 1e-5) << angle;
     if (angle > 0.5) continue;
-    // While it is above the horizon, an even disk shines as its middle would.
+    // A uniform disk that is completely above the horizon has the same effect as a point light at its centre.
     const Mean tilted = irradiance(lights, Vector3d::Zero(), {0, 0, 1});
     EXPECT_NEAR(tilted.mean(), 5 * 0.8, 4 * tilted.error() + 1e-5) << angle;
     LightSample sample;
@@ -211,7 +211,7 @@ TEST(LightSampler, SampledBackgroundIsWhatARayWouldSee) {
 }
 
 TEST(LightSampler, ChoosesByPower) {
-  // The ball about a scene of radius √3 has the cross section 3 π.
+  // The bounding sphere of the scene has the radius √3 and the cross section 3 π.
   const double lamp_power = pi * 2.4 * 3, parallel_power = 3 * pi * 2, constant_power = 3 * pi * 4 * pi * 0.1;
   const LightSampler lights({lamp(3), DirectionalLight{{0, 0, -1}, {2}, 0}, ConstantLight{{0.1f}}, lamp(0)}, {1},
                             unit_scene);
@@ -223,7 +223,7 @@ TEST(LightSampler, ChoosesByPower) {
 }
 
 TEST(LightSampler, PowerIsLuminanceAboveAll) {
-  // One light in a band that is hardly seen, one in a bright band.
+  // One light in a band that is hardly visible, one in a bright band.
   const LightSampler lights({ConstantLight{{1, 0}}, ConstantLight{{0, 1}}}, {0, 2}, unit_scene);
   EXPECT_NEAR(lights.choice_probability(0), 0.05, 1e-7);
   EXPECT_NEAR(lights.choice_probability(1), 0.95, 1e-7);

@@ -35,7 +35,7 @@ struct Named {
   Material material;
 };
 
-/// One of each kind, with one band.
+/// One material of each kind, with one band.
 std::vector<Named> materials(double roughness, double reflectance) {
   const BandValues color = BandValues::Constant(1, reflectance);
   const Principled coated_plastic{0, roughness, 1, 1, 0.03}, half{0.5, roughness, 0.5, 0.7, 0.6};
@@ -56,10 +56,11 @@ double f(const Material& material, const Eigen::Vector3d& wi, const Eigen::Vecto
   return value[0];
 }
 
-/// What is scattered of uniform light (radiance in proportion to n²).
+/// The scattered part of uniform light (radiance in proportion to n²).
 struct Albedo {
   double mean = 0;
-  double error = 0;  ///< One standard deviation, had the samples been independent; being a Sobol sequence, less.
+  // One standard deviation if the samples were independent; less, because they are a Sobol sequence.
+  double error = 0;
 };
 
 Albedo albedo(const Material& material, const Eigen::Vector3d& wo, int samples) {
@@ -89,7 +90,7 @@ TEST(MaterialFurnaceTest, WhiteMaterialsReturnAllLight) {
 }
 
 TEST(MaterialFurnaceTest, SeveralBouncesMatter) {
-  // Single bounces alone would fail the test above: of rough mirrors they return less than half.
+  // Without multiple scattering the test above would fail: single scattering of rough mirrors returns less than half.
   const auto material = make_material(mirror(1), BandValues::Ones(1));
   EXPECT_GT(std::get<ConductorScattering>(material.scattering).missing.at(1), 0.5);
 }
@@ -170,7 +171,8 @@ TEST(MaterialTest, SmoothGlassObeysSnellAndFresnel) {
       EXPECT_NEAR(scattered->refraction, 1 / (index * index), 1e-12);
     }
     EXPECT_NEAR(refracted / 4096.0, 1 - fresnel_dielectric(std::abs(cosine), index), 5e-3);
-    EXPECT_GT(near, 0.995 * refracted);  // GGX has long tails: of facets, alpha² / (alpha² + tan²) lie beyond an angle.
+    // GGX has long tails: alpha² / (alpha² + tan²) of the facets lie beyond an angle.
+    EXPECT_GT(near, 0.995 * refracted);
   }
 }
 
@@ -184,7 +186,7 @@ int bin_of(const Eigen::Vector3d& w) {
   return row * columns + std::min(columns - 1, static_cast<int>((azimuth < 0 ? azimuth + 1 : azimuth) * columns));
 }
 
-/// ∫ pdf over each bin by the midpoint rule.
+/// ∫ pdf over each bin, by the midpoint rule.
 std::vector<double> bin_probabilities(const Material& material, const Eigen::Vector3d& wo) {
   constexpr int fine = 12;
   std::vector<double> result(rows * columns);
@@ -198,7 +200,7 @@ std::vector<double> bin_probabilities(const Material& material, const Eigen::Vec
   return result;
 }
 
-/// Chi-square as standard deviations from its mean; bins that expect fewer than 8 samples are one.
+/// Chi-square in standard deviations from its mean. Bins with fewer than 8 expected samples are merged into one.
 double chi_square_score(const std::vector<int>& counts, const std::vector<double>& expected) {
   double sum = 0, rest_count = 0, rest_expected = 0;
   int bins = 0;
@@ -222,7 +224,7 @@ TEST(MaterialSamplingTest, DirectionsHaveTheirDensity) {
   for (const double roughness : {0.45, 1.0})
     for (const Named& any : materials(roughness, 0.7))
       for (const double cosine : {0.95, 0.3, -0.6}) {
-        if (any.name == "coated plastic") continue;  // Its coat is too sharp for these bins.
+        if (any.name == "coated plastic") continue;  // Its coat has highlights that are too sharp for these bins.
         const Eigen::Vector3d wo = direction(cosine, 0.4);
         std::vector<double> expected = bin_probabilities(any.material, wo);
         double total = 0;

@@ -18,7 +18,7 @@ namespace {
 using ::testing::HasSubstr;
 using ::testing::StartsWith;
 
-/// A closed mesh, no two vertices of which are equal, and what they carry.
+/// A closed mesh whose vertices are all different, and its attributes.
 struct Sample {
   TriangleMesh mesh;
   std::vector<Eigen::Vector3f> normals;
@@ -28,7 +28,7 @@ struct Sample {
   VertexAttributes attributes() const { return {&normals, &colors, &values, "force"}; }
 };
 
-/// A torus of rows times columns vertices, positions of which single precision holds.
+/// A torus of rows times columns vertices. Single precision represents the positions exactly.
 Sample torus(std::uint32_t rows, std::uint32_t columns) {
   Sample sample;
   for (std::uint32_t i = 0; i < rows * columns; ++i) {
@@ -36,7 +36,8 @@ Sample torus(std::uint32_t rows, std::uint32_t columns) {
     const Eigen::Vector3d normal(std::cos(v) * std::cos(u), std::cos(v) * std::sin(u), std::sin(v));
     Eigen::Vector3d position = Eigen::Vector3d(1000 + 3 * std::cos(u), 3 * std::sin(u), 0) + normal;
     for (double& coordinate : position) {
-      const volatile float rounded = static_cast<float>(coordinate);  // GCC 12 leaves the rounding out of vectors.
+      // Without volatile GCC 12 omits the rounding in vectorised code.
+      const volatile float rounded = static_cast<float>(coordinate);
       coordinate = static_cast<double>(rounded);
     }
     sample.mesh.vertices.push_back(position);
@@ -53,7 +54,7 @@ Sample torus(std::uint32_t rows, std::uint32_t columns) {
   return sample;
 }
 
-/// The mesh as read_mesh reads it: exactly from .ply; from .obj but for the last bits, which assimp rounds wrongly.
+/// Compares with what read_mesh reads: equal for .ply; for .obj up to the last bits, which assimp rounds incorrectly.
 void expect_same_surface(const std::filesystem::path& path, const TriangleMesh& mesh) {
   const double tolerance = path.extension() == ".obj" ? 4e-7 : 0;
   const TriangleMesh read = read_mesh(path);
@@ -104,7 +105,7 @@ TEST(MeshFilesTest, PlyHoldsAttributes) {
 }
 
 TEST(MeshFilesTest, ObjHoldsColorsAndNormals) {
-  const Sample sample = torus(16, 16);  // 256 colours: all that a channel has.
+  const Sample sample = torus(16, 16);  // 256 colours: all values of a channel.
   const Temporary file("a.obj");
   write_mesh(file.path(), sample.mesh, sample.attributes());
   std::istringstream text(read_bytes(file.path()));
@@ -169,7 +170,7 @@ TEST(MeshFilesTest, ErrorsNameTheMend) {
   EXPECT_THAT(error("a.stl"), HasSubstr(".ply or .obj"));
   EXPECT_THAT(error("/no/such/folder/a.ply"), HasSubstr("/no/such/folder/a.ply: cannot be written"));
   if (std::filesystem::exists("/dev/full")) {
-    const Temporary link("full.obj");  // Removing a link leaves the device.
+    const Temporary link("full.obj");  // Removing the link does not remove the device.
     std::filesystem::create_symlink("/dev/full", link.path());
     EXPECT_THAT(error(link.path()), HasSubstr("cannot be written"));
   }

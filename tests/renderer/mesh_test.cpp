@@ -40,7 +40,7 @@ std::string ply_header(const std::string& format, int vertices, int faces) {
          "\nproperty list uchar int vertex_indices\nend_header\n";
 }
 
-/// A tetrahedron of volume 1/6 that looks outwards.
+/// A tetrahedron of volume 1/6 whose triangles face outwards.
 const std::string tetrahedron_ply =
     ply_header("ascii", 4, 4) + "0 0 0\n1 0 0\n0 1 0\n0 0 1\n3 0 2 1\n3 0 1 3\n3 0 3 2\n3 1 2 3\n";
 
@@ -60,7 +60,7 @@ TEST(BoxMeshTest, FollowsTheTransform) {
   Eigen::Affine3d transform = Eigen::Translation3d(5, 6, 7) * Eigen::AngleAxisd(0.7, Vector3d(1, 2, 3).normalized()) *
                               Eigen::Scaling(2.0, 3.0, 0.5);
   EXPECT_NEAR(volume(box_mesh({Vector3d::Zero(), Vector3d::Ones()}, transform)), 3, 1e-12);
-  transform.linear().col(0) *= -1;  // A mirror turns the corners' order round.
+  transform.linear().col(0) *= -1;  // A reflection reverses the order of the corners.
   EXPECT_NEAR(volume(box_mesh({Vector3d::Zero(), Vector3d::Ones()}, transform)), 3, 1e-12);
 }
 
@@ -122,7 +122,8 @@ TEST(ReadMeshTest, AsciiPly) {
   EXPECT_NO_THROW(require_closed(mesh));
 }
 
-/// The tetrahedron in binary, moved so that its first byte is that of a line end, with more than is needed around it.
+/// The tetrahedron in binary, with properties and elements that are not needed. It is moved so that the first byte of
+/// its data is that of a line end.
 std::string binary_tetrahedron(bool big_endian, const std::string& line_end) {
   std::string content;
   for (const char c : ply_header(big_endian ? "binary_big_endian" : "binary_little_endian", 4, 4))
@@ -134,7 +135,7 @@ std::string binary_tetrahedron(bool big_endian, const std::string& line_end) {
     if (big_endian) std::reverse(bytes.begin(), bytes.end());
     content += bytes;
   };
-  const float odd = 1.0000012f;  // 0x3f80000a
+  const float odd = 1.0000012f;  // Its bits are 0x3f80000a; the lowest byte is a line feed.
   const float vertices[4][3] = {{odd, 0, 0}, {odd + 1, 0, 0}, {odd, 1, 0}, {odd, 0, 1}};
   for (const auto& vertex : vertices) {
     for (const float coordinate : vertex) append(coordinate);
@@ -177,8 +178,8 @@ TEST(ReadMeshTest, PlyKeepsDoublePrecisionAndFansPolygons) {
 }
 
 TEST(ReadMeshTest, ObjWithPolygonsAndSeveralObjects) {
-  // A unit cube of quadrilaterals, and a tetrahedron apart from it as a second object; both with normals, which differ
-  // at the corners that the faces share.
+  // A unit cube of quadrilaterals, and a separate tetrahedron as second object. Both have normals, which differ at the
+  // corners that faces share.
   const Temporary file("objects.obj",
                        "o cube\nv 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nv 0 0 1\nv 1 0 1\nv 1 1 1\nv 0 1 1\n"
                        "vn 0 0 -1\nvn 0 0 1\nvn 0 -1 0\nvn 0 1 0\nvn -1 0 0\nvn 1 0 0\n"
@@ -194,7 +195,8 @@ TEST(ReadMeshTest, ObjWithPolygonsAndSeveralObjects) {
 }
 
 TEST(ReadMeshTest, JoinsEqualPositionsAndDropsDegenerateTriangles) {
-  // The tetrahedron with a vertex of its own for every corner (once as -0), a triangle along a line and a point's.
+  // The tetrahedron with separate vertices for each corner (one coordinate is -0), and two degenerate triangles: a line
+  // and a point.
   std::string content = ply_header("ascii", 18, 6);
   const std::string corners[4] = {"0 0 0\n", "1 0 0\n", "0 1 0\n", "-0 0 1\n"};
   for (const int corner : {0, 2, 1, 0, 1, 3, 0, 3, 2, 1, 2, 3}) content += corners[corner];

@@ -20,7 +20,7 @@ Eigen::Vector3d direction(double cosine, double azimuth) {
   return {sine * std::cos(azimuth), sine * std::sin(azimuth), cosine};
 }
 
-/// ∫ over the hemisphere by the midpoint rule, with steps that are small near the pole, where highlights are.
+/// ∫ over the hemisphere by the midpoint rule. Steps are small near the pole, where highlights are.
 template <class Function>
 double hemisphere(const Function& function) {
   constexpr int rows = 1000, columns = 200;
@@ -88,7 +88,7 @@ TEST(MicrofacetTest, MeansUnderUniformLight) {
   EXPECT_NEAR(hemispherical_mean([](double) { return 1.0; }), 1, 1e-12);
   EXPECT_NEAR(hemispherical_mean([](double cosine) { return fresnel_schlick(cosine, 0.3); }), 0.3 + 0.7 / 21, 1e-4);
   EXPECT_NEAR(visible_mean(0.5, 0.3, [](const auto&, const auto&) { return 0.25; }), 0.25, 1e-12);
-  // With alpha 1 the facets are those of a hemisphere, which are seen from above by their cosine: ∫ cos² / π.
+  // With alpha 1 the facets have the normals of a hemisphere; from above they are visible by their cosine: ∫ cos² / π.
   EXPECT_NEAR(visible_mean(1, 1, [](const auto&, const Eigen::Vector3d& m) { return m.z(); }), 2.0 / 3, 1e-3);
 }
 
@@ -126,7 +126,7 @@ TEST(MetalTest, HaveTheirColours) {
   EXPECT_LT(reflectance("copper", 500), 0.62);
   for (double wavelength = 400; wavelength <= 700; wavelength += 25)
     EXPECT_GT(reflectance("silver", wavelength), 0.95) << wavelength;
-  // What handbooks give for fresh evaporated films.
+  // Handbook values for fresh evaporated films.
   EXPECT_NEAR(reflectance("aluminium", 400), 0.924, 0.005);
   EXPECT_NEAR(reflectance("aluminium", 550), 0.915, 0.005);
   EXPECT_NEAR(reflectance("aluminium", 700), 0.897, 0.005);

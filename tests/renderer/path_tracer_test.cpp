@@ -26,7 +26,7 @@ using Eigen::Vector3f;
 
 constexpr double pi = 3.14159265358979323846;
 
-/// Three bands that are red, green and blue themselves.
+/// Three bands whose colours are red, green and blue.
 std::vector<Band> rgb_bands() {
   return {
       {610, 80, 0.3, Vector3d(1, 0.3, 0)}, {545, 80, 0.4, Vector3d(0, 0.6, 0)}, {460, 80, 0.3, Vector3d(0, 0.1, 1)}};
@@ -56,7 +56,7 @@ ShadedSurface surface_of(TriangleMesh mesh, int material = 0, int light = -1) {
   return surface;
 }
 
-/// A smooth sphere of radius 1.
+/// A sphere of radius 1 with smooth normals.
 ShadedSurface sphere(int rings) {
   TriangleMesh mesh;
   ShadedSurface surface;
@@ -79,7 +79,7 @@ ShadedSurface sphere(int rings) {
 
 TriangleMesh floor_mesh(double size) { return rectangle_mesh({0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {size, size}); }
 
-/// A scene and all that it refers to.
+/// A scene and the objects that it refers to.
 struct World {
   World(std::vector<ShadedSurface> parts, std::vector<Material> materials_, const std::vector<Light>& lights_)
       : surfaces(std::move(parts)),
@@ -93,12 +93,12 @@ struct World {
   ShadedScene scene;
 };
 
-/// What a bundle of rays sees: between the bands, the first.
+/// The radiance in the first band, averaged over rays from `from` to `to`.
 Mean seen(const World& world, const ShadingSettings& settings, const Vector3d& from, const Vector3d& to, int samples) {
   RayShader shader(world.scene, settings);
   Mean mean;
   for (int i = 0; i < samples; ++i) {
-    // Every ray has a pixel of its own: samples are independent, and the error is honest.
+    // Each ray has its own pixel, so that samples are independent and the error estimate is valid.
     PathSampler sampler{11, static_cast<std::uint64_t>(i), 0, 0};
     shader.shade(from, (to - from).normalized(), true, sampler);
     mean.add(shader.radiance()[0]);
@@ -106,7 +106,7 @@ Mean seen(const World& world, const ShadingSettings& settings, const Vector3d& f
   return mean;
 }
 
-/// Irradiance by a polygon of radiance 1 (Lambert 1760), all of it above the horizon.
+/// Irradiance from a polygon of radiance 1 that is completely above the horizon (Lambert 1760).
 double polygon_irradiance(const std::vector<Vector3d>& polygon, const Vector3d& point, const Vector3d& normal) {
   double sum = 0;
   for (std::size_t i = 0; i < polygon.size(); ++i) {
@@ -118,7 +118,7 @@ double polygon_irradiance(const std::vector<Vector3d>& polygon, const Vector3d& 
 
 // --- Light ----------------------------------------------------------------------------------------------------------
 
-/// Deep enough for all light, without roulette's noise at first.
+/// Deep enough for all light; without noise from Russian roulette at the first bounces.
 ShadingSettings deep() {
   ShadingSettings settings;
   settings.max_depth = 200;
@@ -133,21 +133,21 @@ TEST(FurnaceTest, WhiteThingsInAWhiteSkyCannotBeSeen) {
       {"metal", make_material(Principled{1, 0.5, 0.5, 0, 0.1}, grey(1))},
       {"glass", make_material(RoughDielectric{0.2, 1.5}, grey(1))}};
   for (const auto& [name, material] : whites) {
-    // A coarse sphere with smooth normals on a floor: light that goes to and fro, and silhouettes.
+    // A coarse sphere with smooth normals on a floor, for interreflection and silhouettes.
     ShadedSurface coarse = sphere(8);
     TriangleMesh ground = rectangle_mesh({0, 0, -1.1}, {1, 0, 0}, {0, 1, 0}, {6, 6});
     const World world({coarse, surface_of(ground, 1)}, {material, make_material(Diffuse{}, grey(1))},
                       {ConstantLight{even(1)}});
     for (const Vector3d& target : {Vector3d(0, 0, 0), Vector3d(0.7, 0, 0.65), Vector3d(0.6, -0.5, -0.9)}) {
       const Mean mean = seen(world, deep(), {0.3, -4, 1}, target, 1500);
-      // White materials return all light to 2e-3 a bounce; glass to 1e-2 near the horizon.
+      // White materials return all light up to 2e-3 per bounce; glass up to 1e-2 near the horizon.
       EXPECT_NEAR(mean.mean(), 1, 4 * mean.error() + (name == "glass" ? 0.03 : 0.01)) << name << target.transpose();
       EXPECT_LT(mean.error(), 0.03) << name;
     }
   }
 }
 
-/// A box whose triangles look inwards, where it shines.
+/// A box whose triangles face inwards, where they emit light.
 TriangleMesh room(const Eigen::AlignedBox3d& box) {
   TriangleMesh mesh = box_mesh(box, Eigen::Affine3d::Identity());
   for (auto& triangle : mesh.triangles) std::swap(triangle[1], triangle[2]);
@@ -155,7 +155,7 @@ TriangleMesh room(const Eigen::AlignedBox3d& box) {
 }
 
 TEST(FurnaceTest, GreyBoxHasTheGeometricSeries) {
-  // Within a closed box of reflectance ρ whose walls shine with radiance e, radiance is e / (1 − ρ) everywhere.
+  // In a closed box of reflectance ρ whose walls emit radiance e, the radiance is e / (1 − ρ) everywhere.
   const TriangleMesh box = room({Vector3d(-1, -1, -1), Vector3d(1, 2, 1)});
   AreaLight light{box, even(0.5f)};
   const World world({surface_of(box, 0, 0)}, {make_material(Diffuse{}, grey(0.6))}, {light});
@@ -165,7 +165,8 @@ TEST(FurnaceTest, GreyBoxHasTheGeometricSeries) {
     settings.indirect_clamp = 0;
     const Mean mean = seen(world, settings, {0.2, 0.1, 0.3}, {1, 0.7, 0.2}, 3000);
     EXPECT_NEAR(mean.mean(), 0.5 / 0.4, 4 * mean.error());
-    EXPECT_LT(mean.error(), direct == DirectLight::lights ? 0.1 : 0.02);  // Lights alone: spikes in the corners.
+    // Sampling only lights makes noise in the corners.
+    EXPECT_LT(mean.error(), direct == DirectLight::lights ? 0.1 : 0.02);
   }
   ShadingSettings twice;
   twice.max_depth = 2;
@@ -211,7 +212,7 @@ TEST(DirectLightTest, ParallelLightHasTheCosineOnEverySide) {
     ShadingSettings settings;
     settings.direct = direct;
     EXPECT_NEAR(seen(world, settings, {0, 0, 3}, {1, 1, 0}, 4).mean(), 0.5 / pi * 2 * std::sqrt(0.5), 1e-6);
-    EXPECT_EQ(seen(world, settings, {0, 0, -3}, {1, 1, 0}, 4).mean(), 0);  // Nothing shines through.
+    EXPECT_EQ(seen(world, settings, {0, 0, -3}, {1, 1, 0}, 4).mean(), 0);  // No light passes through.
   }
 }
 
@@ -244,7 +245,7 @@ TEST(IndirectClampTest, LimitsWhatIsScatteredTwiceOnly) {
   const TriangleMesh box = room({Vector3d(-1, -1, -1), Vector3d(1, 1, 1)});
   const World world({surface_of(box, 0, 0)}, {make_material(Diffuse{}, grey(0.5))}, {AreaLight{box, even(8)}});
   ShadingSettings settings;
-  settings.direct = DirectLight::material;  // Every contribution is 8 / 2^depth.
+  settings.direct = DirectLight::material;  // Each contribution is 8 / 2^depth.
   settings.roulette_depth = 100;
   settings.max_depth = 3;
   settings.indirect_clamp = 0.5;
@@ -254,7 +255,7 @@ TEST(IndirectClampTest, LimitsWhatIsScatteredTwiceOnly) {
 }
 
 TEST(ShadingNormalTest, SmoothSpheresHaveNoFringesAndDoNotLeak) {
-  // The sun is behind the viewer, then beside him: a Lambertian sphere's shading follows the smooth normal.
+  // The sun is behind the viewer, then beside. The shading of a Lambertian sphere follows the smooth normal.
   for (const Vector3d& travels : {Vector3d(0, 1, 0), Vector3d(1, 0.2, 0)}) {
     const World world({sphere(10)}, {make_material(Diffuse{}, grey(1))}, {DirectionalLight{travels, even(1), 0}});
     ShadingSettings settings;
@@ -266,7 +267,7 @@ TEST(ShadingNormalTest, SmoothSpheresHaveNoFringesAndDoNotLeak) {
       const auto surface = shader.shade({x, -5, z}, {0, 1, 0}, false, sampler);
       if (!surface) continue;
       const double cosine = -surface->normal.dot(travels.normalized());
-      EXPECT_LT(surface->normal.y(), 0);  // The viewer is above it.
+      EXPECT_LT(surface->normal.y(), 0);  // The viewer is above the surface.
       EXPECT_NEAR(shader.radiance()[0] * pi, std::max(0.0, cosine), 1e-6) << x << " " << z;
     }
   }
@@ -281,8 +282,8 @@ TEST(AmbientOcclusionTest, HasItsClosedForms) {
   const World plane({surface_of(floor_mesh(4))}, {material}, {});
   EXPECT_NEAR(seen(plane, settings, {0, -3, 1}, {0, 0, 0}, 100).mean(), 0.8, 1e-12);
 
-  // A high wall hides half of the sky from its foot, and (1 − cos θ) / 2 at a distance, its upper edge θ above the
-  // floor.
+  // A high wall hides half of the sky from its foot. At a distance it hides (1 − cos θ) / 2, where θ is the elevation
+  // of its upper edge.
   const TriangleMesh wall = rectangle_mesh({0, 1, 1}, {1, 0, 0}, {0, 0, 1}, {4000, 2});
   const World corner({surface_of(floor_mesh(4)), surface_of(wall)}, {material}, {});
   const Mean mean = seen(corner, settings, {0, -3, 1}, {0, 0, 0}, 4000);
@@ -301,7 +302,7 @@ TEST(HeadlightTest, IsTheCosineToTheViewer) {
 
 // --- Pictures -------------------------------------------------------------------------------------------------------
 
-/// A sphere with data on a floor, under a lamp and a dim sky.
+/// A sphere with data on a floor, lit by a lamp and a dim sky.
 World still_life() {
   ShadedSurface ball = sphere(16);
   for (const Vector3f& n : ball.normals) {
@@ -380,7 +381,8 @@ TEST(PictureTest, AdaptiveSamplingKeepsTheMeanAndWorksWhereItIsNoisy) {
   const double samples = sum(adaptive.samples), pixels = 32 * 32;
   EXPECT_LT(samples, 0.7 * 128 * pixels);
   EXPECT_GT(samples, 17 * pixels);
-  // Of the mean over the picture, from the pixels' own variances (of the luminance, which all bands share nearly).
+  // Error of the mean over the picture, from the variances of the pixels (of the luminance, which is nearly common to
+  // all bands).
   const double error = std::sqrt(sum(full.variance) + sum(adaptive.variance)) / pixels;
   EXPECT_NEAR(sum(adaptive.radiance.values) / pixels / 3, sum(full.radiance.values) / pixels / 3, 5 * error);
 
@@ -419,13 +421,13 @@ TEST(PictureTest, AuxiliaryPlanesAreThoseOfTheFirstSurface) {
   EXPECT_EQ(picture.depth[sky], 0);
   EXPECT_EQ(picture.path[sky], -1);
   EXPECT_EQ(picture.radiance.plane(0)[sky], 0);
-  EXPECT_EQ(picture.alpha[ground], 0);  // The floor is seen from its edge.
+  EXPECT_EQ(picture.alpha[ground], 0);  // The floor is seen edge-on.
 
   settings.transparent = false;
   const SurfacePicture opaque = render_surfaces(world.scene, view, settings);
   EXPECT_EQ(opaque.alpha[sky], 1);
   EXPECT_NEAR(opaque.radiance.plane(0)[sky], 0.3, 1e-6);
-  // At the edge of the sphere values are those of the part that is hit.
+  // At the edge of the sphere, values are averages over the part of the pixel that hits it.
   for (std::size_t i = 0; i < picture.alpha.size(); ++i)
     if (picture.path[i] == 5) {
       EXPECT_EQ(picture.force[i], 2);

@@ -18,10 +18,10 @@ using Eigen::Vector2d;
 constexpr PixelFilterShape all_shapes[] = {PixelFilterShape::box, PixelFilterShape::gaussian,
                                            PixelFilterShape::blackman_harris};
 
-/// One of the filter's two factors at x, divided by its value at 0: all that a density on a line shows from outside.
+/// One of the two factors of the filter at x, divided by its value at 0. density() shows no more than this ratio.
 double profile(const PixelFilter& filter, double x) { return filter.density({x, 0}) / filter.density({0, 0}); }
 
-/// The midpoint rule: what it leaves out of these profiles is far below 1e-7.
+/// The midpoint rule; its error for these profiles is far below 1e-7.
 double integrate(const PixelFilter& filter, double from, double to) {
   constexpr int steps = 4000;
   double sum = 0;
@@ -50,8 +50,8 @@ TEST(PixelFilter, HasTheNamedShape) {
   EXPECT_NEAR(profile(gaussian, 1.5), 0, 1e-14);
   EXPECT_EQ(harris.radius(), 1.5);
   EXPECT_NEAR(harris.density({0, 0}), std::pow(1 / (2 * 0.35875 * 1.5), 2), 1e-14);
-  EXPECT_NEAR(profile(harris, 0.75), 0.35875 - 0.14128, 1e-14);  // Half way: the cosines are 0, −1, 0.
-  EXPECT_NEAR(profile(harris, 1.5), 6e-5, 1e-14);                // Harris' table.
+  EXPECT_NEAR(profile(harris, 0.75), 0.35875 - 0.14128, 1e-14);  // Half way the cosines are 0, −1, 0.
+  EXPECT_NEAR(profile(harris, 1.5), 6e-5, 1e-14);                // From Harris' table.
   for (const Vector2d& p : {Vector2d(0.3, 0.7), Vector2d(1.2, -0.1)}) {
     EXPECT_DOUBLE_EQ(harris.density(p), harris.density(-p));
     EXPECT_DOUBLE_EQ(harris.density(p), harris.density({p.y(), p.x()}));
@@ -83,7 +83,7 @@ TEST(PixelFilter, SampledHistogramIsTheFilter) {
       line.push_back(integrate(filter, -1.5 + 3.0 * i / bins, -1.5 + 3.0 * (i + 1) / bins));
     for (const double y : line)
       for (const double x : line) weights.push_back(x * y);
-    // Bins in which few are expected would not be normal: they make one.
+    // Bins with few expected samples are not normally distributed: merge them into one.
     const double whole = std::pow(integrate(filter, -1.5, 1.5), 2);
     std::vector<int> counts(bins * bins + 1);
     weights.push_back(0);

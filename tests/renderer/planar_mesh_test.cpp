@@ -18,7 +18,7 @@ double uniform(std::mt19937& random, double low, double high) {
   return std::uniform_real_distribution<double>(low, high)(random);
 }
 
-/// A grid of cells x cells squares over [0, 1]², two triangles each, whose vertices `map` moves.
+/// A grid of cells x cells squares over [0, 1]², two triangles each. `map` moves the vertices.
 PlanarMesh grid(std::uint32_t cells, const std::function<Vector2d(const Vector2d&)>& map) {
   PlanarMesh mesh;
   for (std::uint32_t y = 0; y <= cells; ++y)
@@ -32,7 +32,7 @@ PlanarMesh grid(std::uint32_t cells, const std::function<Vector2d(const Vector2d
   return mesh;
 }
 
-/// Covers the unit square, moved and scaled; inner vertices are off the grid, so that no two triangles are alike.
+/// A mesh of the unit square, moved and scaled. Inner vertices are jittered, so that all triangles are different.
 PlanarMesh jittered(std::uint32_t cells, std::mt19937& random, const Vector2d& offset = Vector2d::Zero(),
                     double scale = 1) {
   return grid(cells, [&](Vector2d p) {
@@ -78,7 +78,7 @@ std::vector<std::uint32_t> brute_force(const PlanarMesh& mesh, const Vector2d& p
   return result;
 }
 
-/// The triangles that have all of these vertices.
+/// The triangles that contain all of these vertices.
 std::vector<std::uint32_t> sharing(const PlanarMesh& mesh, const std::vector<std::uint32_t>& vertices) {
   std::vector<std::uint32_t> result;
   for (std::uint32_t t = 0; t < mesh.triangles.size(); ++t)
@@ -91,7 +91,7 @@ std::vector<std::uint32_t> sharing(const PlanarMesh& mesh, const std::vector<std
 
 TEST(PlanarMesh, AgreesWithBruteForceWhereTrianglesOverlap) {
   std::mt19937 random(1);
-  PlanarMesh mesh;  // Unconnected, of all sizes and either orientation.
+  PlanarMesh mesh;  // Unconnected triangles of all sizes and both orientations.
   for (std::uint32_t i = 0; i < 600; ++i) {
     const double size = std::pow(10, uniform(random, -3, -0.5));
     const Vector2d center(uniform(random, 0, 1), uniform(random, 0, 1));
@@ -117,7 +117,7 @@ TEST(PlanarMesh, AgreesWithBruteForceWhereTrianglesOverlap) {
 }
 
 TEST(PlanarMesh, AFoldHasThreeLayers) {
-  // x = u³ − u/4 on [−1, 1] runs forwards, back between its turning points u² = 1/12, and forwards again.
+  // x = u³ − u/4 on [−1, 1] goes forwards, then back between its turning points u² = 1/12, then forwards again.
   const double turning = 1 / (12 * std::sqrt(3));
   const std::uint32_t cells = 64;
   const PlanarMesh mesh = grid(cells, [](const Vector2d& p) {
@@ -129,7 +129,7 @@ TEST(PlanarMesh, AFoldHasThreeLayers) {
   for (int i = 0; i < 2000; ++i) {
     const Vector2d point(uniform(random, -0.15, 0.15), uniform(random, 0, 1));
     const double depth = turning - std::abs(point.x());
-    if (std::abs(depth) < 2e-3) continue;  // The mesh has chords there: it turns 2e-4 earlier at most.
+    if (std::abs(depth) < 2e-3) continue;  // The mesh has chords there and turns up to 2e-4 earlier.
     EXPECT_EQ(found(search, point).size(), depth > 0 ? 3u : 1u) << point.transpose();
   }
 }
@@ -170,7 +170,7 @@ TEST_P(PlanarMeshPlaces, NoPointFallsBetweenTriangles) {
   for (int i = 0; i < 50000; ++i) {
     const auto& triangle = mesh.triangles[random() % mesh.triangles.size()];
     const Vector2d &a = mesh.vertices[triangle[0]], &b = mesh.vertices[triangle[1]];
-    // Off an edge, or a vertex, by less than double precision resolves up to more than single precision does.
+    // Distance from an edge or a vertex, from below double precision to above single precision.
     const double away = scale * std::pow(10, uniform(random, -18, -5)), along = i % 3 ? uniform(random, 0, 1) : 0;
     Vector2d point = a + along * (b - a) + away * Vector2d(uniform(random, -1, 1), uniform(random, -1, 1));
     point = point.cwiseMax(mesh.vertices.front()).cwiseMin(mesh.vertices.back());
@@ -207,7 +207,8 @@ TEST(PlanarMesh, TrianglesThinnerThanSinglePrecisionAreTold) {
     ASSERT_TRUE(std::includes(hits.begin(), hits.end(), expected.begin(), expected.end()));
     on_edges += hits != expected;
   }
-  EXPECT_LT(on_edges, 25);  // Rounding is 1e-5 of a cell's width: one in a thousand points or so is on an edge.
+  // The rounding error is 1e-5 of a cell's width: about one in a thousand points is on an edge.
+  EXPECT_LT(on_edges, 25);
 }
 
 TEST(PlanarMesh, ANeedleDoesNotReachBeyondItsTip) {
@@ -224,7 +225,8 @@ TEST(PlanarMesh, ANeedleDoesNotReachBeyondItsTip) {
 }
 
 TEST(PlanarMesh, DegenerateTrianglesAreNeverFound) {
-  PlanarMesh mesh;  // Two triangles with one of no area between them, one that is a point, one with a repeated vertex.
+  // Two triangles with one of zero area between them, one that is a point, and one with a repeated vertex.
+  PlanarMesh mesh;
   mesh.vertices = {{0, 0}, {1, 1}, {0.25, 0.25}, {1, 0}, {0, 1}};
   mesh.triangles = {{0, 1, 2}, {2, 2, 2}, {0, 3, 1}, {0, 0, 1}, {0, 2, 4}, {2, 1, 4}};
   const PlanarMeshSearch search(mesh);
@@ -238,7 +240,7 @@ TEST(PlanarMesh, NothingIsFoundOutsideOrInAnEmptyMesh) {
   PlanarMesh empty, point, square = grid(1, [](const Vector2d&p) { return p; });
   point.vertices = {{2, 3}};
   point.triangles = {{0, 0, 0}};
-  square.vertices.emplace_back(nan, infinite);  // Of no triangle.
+  square.vertices.emplace_back(nan, infinite);  // Vertices that no triangle uses.
   for (const PlanarMesh* mesh : {&empty, &point, &square}) {
     const PlanarMeshSearch search(*mesh);
     for (const Vector2d& place : {Vector2d(2, 3), Vector2d(-1e-9, 0.5), Vector2d(0.5, 1 + 1e-9), Vector2d(1e300, 0),

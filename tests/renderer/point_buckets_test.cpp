@@ -23,7 +23,7 @@ TEST(PointBuckets, HoldTheirPointsInTheOrderInWhichTheyCame) {
     if (i % 7 == 0) points[i].channel = DensityPoint::nowhere;
   }
   PointBuckets buckets;
-  for (int round = 0; round < 2; ++round) {  // What the first left behind does not matter to the second.
+  for (int round = 0; round < 2; ++round) {  // The second round reuses the result of the first.
     sort_into_buckets(points, bucketing, buckets);
     ASSERT_EQ(buckets.begin.size(), 61u);
     std::size_t seen = 0;

@@ -10,7 +10,7 @@
 namespace tensorray {
 namespace {
 
-/// Chi-square of counts against equal expectation, as standard deviations from its mean (for many bins it is normal).
+/// Chi-square of counts against equal expectation, in standard deviations from its mean (normal for many bins).
 double chi_square_score(const std::vector<int>& counts) {
   double total = 0, sum = 0;
   for (const int count : counts) total += count;
@@ -20,7 +20,7 @@ double chi_square_score(const std::vector<int>& counts) {
   return (sum - freedom) / std::sqrt(2 * freedom);
 }
 
-/// Fills 32 x 32 bins with the pairs (first(i), second(i)): uniform only if both are, and if they are independent.
+/// Fills 32 x 32 bins with the pairs (first(i), second(i)). They are uniform only if both are uniform and independent.
 template <class First, class Second>
 double pair_score(const First& first, const Second& second) {
   std::vector<int> counts(32 * 32);
@@ -103,8 +103,8 @@ TEST(SobolTest, EachDimensionAloneIsStratified) {
 }
 
 TEST(SobolTest, SeedsAreIndependent) {
-  // One point of many seeds must itself be uniform, and two of them unrelated but for the stratification of the pair:
-  // points 0 and 1 lie in different halves, so the second is folded into a half first.
+  // One point of many seeds must be uniform, and two of them independent except for the stratification of the pair:
+  // points 0 and 1 lie in different halves, so the second is first mapped from its half to the whole interval.
   const auto first = [](int seed) { return sobol(seed, 0, 0); };
   EXPECT_LT(std::abs(pair_score(first, [](int seed) { return sobol(seed, 0, 1); })), 4);
   EXPECT_LT(std::abs(pair_score(first, [](int seed) { return std::fmod(2 * sobol(seed, 1, 0), 1.0); })), 4);
@@ -112,7 +112,8 @@ TEST(SobolTest, SeedsAreIndependent) {
 }
 
 TEST(SobolTest, SequencesOfTwoSeedsCanBePaired) {
-  // Their points come in unrelated orders. The marginals are stratified, so that 31 * 31 degrees of freedom remain.
+  // The points of two seeds come in unrelated orders. The marginals are stratified, so that 31 * 31 degrees of freedom
+  // remain.
   const auto first = [](int i) { return sobol(1, i, 0); };
   EXPECT_LT(std::abs(pair_score(first, [](int i) { return sobol(2, i, 0); })), 5.5);
   EXPECT_LT(std::abs(pair_score(first, [](int i) { return sobol(2, i, 1); })), 5.5);

@@ -20,13 +20,13 @@ namespace {
 using Eigen::Matrix3d;
 using Eigen::Vector3d;
 
-/// A light in bands, the colours of these in the working space, and the model made of them.
+/// A light in bands, the colours of the bands in the working space, and the model made from them.
 struct Scene {
   std::vector<Band> bands;
   Matrix3d xyz_to_rgb;
   ReflectanceModel model;
 
-  /// The colour of a spectrum (anything with at()) in this light.
+  /// The colour of a spectrum (any type with at()) in this light.
   template <class Reflectance>
   Vector3d color(const Reflectance& reflectance) const {
     Vector3d xyz = Vector3d::Zero();
@@ -35,7 +35,7 @@ struct Scene {
   }
 };
 
-/// Of the built-in config, whose working space has the primaries of Rec.709.
+/// The built-in config; its working space has the primaries of Rec.709.
 ColorManagement rec709() {
   unsetenv("OCIO");
   return ColorManagement({});
@@ -49,7 +49,7 @@ Scene make_scene(const Spectrum& light, int count, const Matrix3d& from_rec709 =
   return {bands, xyz_to_rgb, ReflectanceModel(bands, xyz_to_rgb)};
 }
 
-/// Linear Rec.709 to ACEScg, white to white (Bradford).
+/// The matrix from linear Rec.709 to ACEScg that maps white to white (Bradford).
 Matrix3d rec709_to_acescg() {
   Matrix3d matrix;
   matrix << 0.613097, 0.339523, 0.047379, 0.070194, 0.916354, 0.013452, 0.020616, 0.109570, 0.869815;
@@ -75,7 +75,7 @@ std::vector<Vector3d> cube(int steps, double least = 0, double most = 1) {
   return colors;
 }
 
-/// CIE 1976 L*a*b* of linear Rec.709 relative to its white.
+/// CIE 1976 L*a*b* of linear Rec.709, relative to its white.
 Vector3d lab(const Matrix3d& rgb_to_xyz, const Vector3d& rgb) {
   const Vector3d relative = (rgb_to_xyz * rgb).cwiseQuotient(rgb_to_xyz * Vector3d::Ones());
   const Vector3d f =
@@ -83,8 +83,8 @@ Vector3d lab(const Matrix3d& rgb_to_xyz, const Vector3d& rgb) {
   return {116 * f.y() - 16, 500 * (f.x() - f.y()), 200 * (f.y() - f.z())};
 }
 
-/// How near any reflectances of the bands within [0, 1], smooth or not, come to a colour: a convex problem, solved band
-/// by band in turn.
+/// The smallest distance to a colour that any reflectances of the bands within [0, 1], smooth or not, can reach. A
+/// convex problem, solved by optimising one band after the other.
 double least_distance(const Scene& scene, const Vector3d& rgb) {
   std::vector<double> reflectances(scene.bands.size(), 0);
   Vector3d residual = -rgb;
@@ -109,7 +109,7 @@ TEST(ReflectanceTest, ColorsComeBack) {
       const Scene scene = make_scene(light.spectrum, count);
       for (const Vector3d& rgb : cube(14)) {
         const Vector3d result = scene.color(scene.model.spectrum(rgb));
-        // OpenColorIO's matrices, and so the white, are in single precision.
+        // OpenColorIO's matrices, and therefore the white, are in single precision.
         ASSERT_LT((result - rgb).norm(), 3e-7) << light.name << ", " << count << " bands: " << rgb.transpose();
         ASSERT_LT((lab(rgb_to_xyz, result) - lab(rgb_to_xyz, rgb)).norm(), 0.1) << rgb.transpose();
       }
@@ -122,7 +122,7 @@ TEST(ReflectanceTest, FewBandsComeAsNearAsAnyReflectance) {
       const Scene scene = make_scene(light.spectrum, count);
       for (const Vector3d& rgb : cube(6)) {
         const double distance = (scene.color(scene.model.spectrum(rgb)) - rgb).norm();
-        // A band alone has the colour of white: all that is left to meet is the brightness.
+        // A single band has the colour of white: only the brightness can be matched.
         EXPECT_LT(distance, least_distance(scene, rgb) + 1e-3) << light.name << count << ": " << rgb.transpose();
       }
     }
@@ -151,7 +151,7 @@ TEST(ReflectanceTest, SpectraOfTheModelAreFoundAgain) {
   }
 }
 
-/// A smooth reflectance like those that are measured.
+/// A smooth reflectance similar to measured ones.
 struct Bump {
   double center, width;
   double at(double wavelength) const {
@@ -234,7 +234,7 @@ TEST(ReflectanceTest, ScalesAboveOneAndNearBlack) {
 
 TEST(ReflectanceTest, NeighboursAreAlike) {
   const Scene scene = make_scene(illuminant("D65"), 16);
-  // Across the borders between the table's parts, and between the scaled and the other colours.
+  // Across the borders between parts of the table, and between scaled and other colours.
   for (const Vector3d& rgb : {Vector3d(0.6, 0.6, 0.2), Vector3d(0.3, 0.7, 0.7), Vector3d(0.4, 0.1, 0.4),
                               Vector3d(1, 0.3, 0.2), Vector3d(1.0 / 32, 0.01, 0.02), Vector3d(0.5, 0.5, 0.5)})
     for (int channel = 0; channel < 3; ++channel) {
@@ -253,7 +253,7 @@ TEST(ReflectanceTest, NeedsBands) {
 TEST(ReflectanceTest, LightOfOneWavelength) {
   const std::vector<Band> bands = make_bands(illuminant("D65"), 550, 550, 1);
   const ReflectanceModel model(bands, rec709().xyz_to_working_adapted(bands.front().xyz));
-  // Its colours are neutral: the nearest to a colour is the mean of its components.
+  // All colours of this model are neutral: the nearest one to a colour is the mean of its components.
   EXPECT_NEAR(model.spectrum({0.9, 0.3, 0.6}).at(550), 0.6, 1e-5);
   EXPECT_NEAR(model.spectrum({0, 0, 0.3}).at(550), 0.1, 1e-5);
 }

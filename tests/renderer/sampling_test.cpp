@@ -18,7 +18,7 @@ using Eigen::Vector3d;
 
 constexpr double pi = 3.14159265358979323846;
 
-/// Counts in 32 x 32 bins of the unit square. Points on its far edges count to the last bins.
+/// Counts in 32 x 32 bins of the unit square. Points on the right and upper edges count in the last bins.
 template <class Point>
 double square_score(const Point& point) {
   std::vector<int> counts(32 * 32);
@@ -80,10 +80,10 @@ TEST(PathSampler, DimensionsAndPixelsAreUnrelated) {
   const auto number = [](std::uint64_t pixel, int sample, std::uint32_t dimension) {
     return PathSampler{5, pixel, static_cast<std::uint32_t>(sample), dimension}.next_1d();
   };
-  // Each number alone is stratified, which leaves 31 * 31 of 1023 degrees of freedom: 1.4 standard deviations less.
+  // Each number alone is stratified. This leaves 31 * 31 of 1023 degrees of freedom: 1.4 standard deviations less.
   EXPECT_LT(std::abs(square_score([&](int i) { return Vector2d(number(0, i, 0), number(0, i, 1)); })), 5.5);
   EXPECT_LT(std::abs(square_score([&](int i) { return Vector2d(number(0, i, 0), number(1, i, 0)); })), 5.5);
-  // The first sample of every pixel, and two dimensions of it.
+  // The first sample of each pixel, and two of its dimensions.
   EXPECT_LT(std::abs(square_score([&](int i) { return Vector2d(number(i, 0, 0), number(i, 0, 1)); })), 4);
   EXPECT_LT(std::abs(square_score([&](int i) { return Vector2d(number(i, 0, 0), number(i + 1, 0, 0)); })), 4);
   EXPECT_LT(std::abs(square_score([&](int i) {
@@ -104,7 +104,7 @@ TEST(FrameAbout, IsRightHandedAndOrthonormal) {
   }
 }
 
-// Each warp is undone by the textbook's inverse of its density, which must give an even square back.
+// Applies the textbook inverse to the result of each warp; the inverse must return a uniform square.
 
 TEST(Warps, DiskIsEven) {
   EXPECT_LT(std::abs(square_score([](int i) {
@@ -140,7 +140,7 @@ TEST(Warps, Cone) {
   for (const double angle : {pi, 1.0, 0.1, 0.00465, 1e-7}) {
     EXPECT_LT(std::abs(square_score([angle](int i) {
                 const Vector3d d = square_to_cone(uniform(i), angle);
-                // sin²(θ/2) over its largest value; from the sine of θ where θ is small.
+                // sin²(θ/2) relative to its largest value, computed from sin θ if θ is small.
                 const double sine = std::hypot(d.x(), d.y());
                 const double half = d.z() > 0 ? std::asin(sine) / 2 : (pi - std::asin(sine)) / 2;
                 return Vector2d(std::pow(std::sin(half) / std::sin(angle / 2), 2), turn(d.x(), d.y()));

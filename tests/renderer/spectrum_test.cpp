@@ -16,7 +16,7 @@ namespace {
 
 using ::testing::HasSubstr;
 
-/// The chromaticity of a light over the observer's whole range.
+/// The chromaticity of a light over the whole range of the observer.
 Eigen::Vector2d chromaticity(const Spectrum& light, int count = 1) {
   Eigen::Vector3d xyz = Eigen::Vector3d::Zero();
   for (const Band& band : make_bands(light, observer_min, observer_max, count)) xyz += band.xyz;
@@ -131,7 +131,7 @@ TEST(BandsTest, ColorDoesNotDependOnTheCount) {
 }
 
 TEST(BandsTest, EqualsAFineSum) {
-  // Midpoints of 1e-3 nm; the error is of second order in it, and of first order only at the jumps of the light.
+  // Midpoint rule with steps of 1e-3 nm; its error is second order, and first order only at jumps of the light.
   const Spectrum light{{450.25, 500, 612.5}, {1, 4, 2}};
   const std::vector<Band> bands = make_bands(light, 430, 650, 3);
   double total = 0, total_y = 0;

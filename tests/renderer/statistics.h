@@ -1,6 +1,6 @@
 #pragma once
 /// @file tests/renderer/statistics.h
-/// Tests of hypotheses, and means with their errors.
+/// Hypothesis tests, and means with standard errors.
 
 #include <cmath>
 #include <cstddef>
@@ -8,8 +8,8 @@
 
 namespace tensorray {
 
-/// Chi-square of counts against their expectation in proportion to `weights`, as standard deviations from its mean (for
-/// many bins it is normal). A count where the weight is 0 gives infinity.
+/// Chi-square of counts, whose expectation is proportional to `weights`, in standard deviations from its mean (normal
+/// for many bins). A count where the weight is 0 gives infinity.
 inline double chi_square_score(const std::vector<int>& counts, const std::vector<double>& weights) {
   double total = 0, weight = 0, sum = 0, freedom = -1;
   for (const int count : counts) total += count;
@@ -23,7 +23,7 @@ inline double chi_square_score(const std::vector<int>& counts, const std::vector
   return (sum - freedom) / std::sqrt(2 * freedom);
 }
 
-/// The same for counts that shall be equal.
+/// As above, for counts that should be equal.
 inline double chi_square_score(const std::vector<int>& counts) {
   return chi_square_score(counts, std::vector<double>(counts.size(), 1.0));
 }

@@ -1,6 +1,6 @@
 #pragma once
 /// @file tests/renderer/support.h
-/// What several tests of files and errors need.
+/// Functions that several tests of files and errors share.
 
 #include <exception>
 #include <filesystem>
@@ -22,7 +22,7 @@ inline std::string read_bytes(const std::filesystem::path& path) {
   return {std::istreambuf_iterator<char>(file), std::istreambuf_iterator<char>()};
 }
 
-/// The message of what `action` throws. Every message is one line.
+/// The message of the exception that `action` throws. Checks that it is one line.
 template <class Action>
 std::string message(const Action& action) {
   try {
@@ -35,7 +35,7 @@ std::string message(const Action& action) {
   return "nothing was thrown";
 }
 
-/// A path in the tests' temporary folder that no other process uses; what is there is removed at the end.
+/// A path in the temporary folder of the tests that no other process uses. The destructor removes what is there.
 class Temporary {
  public:
   explicit Temporary(const std::string& name)

@@ -31,7 +31,7 @@ Vector3d random_point(int index) {
          Vector3d::Ones();
 }
 
-/// Where a ray enters or, from within, leaves a box.
+/// Where a ray enters a box, or leaves it if it starts inside.
 struct BoxCrossing {
   double distance;
   Vector3d normal;
@@ -61,7 +61,7 @@ ShadedSurface surface_of(TriangleMesh mesh) {
   return surface;
 }
 
-/// A sphere of radius 1 with smooth normals, colours and data that are its z.
+/// A sphere of radius 1 with smooth normals; its colours and data are z.
 ShadedSurface sphere(int rings, const Vector3d& center = Vector3d::Zero()) {
   TriangleMesh mesh;
   ShadedSurface surface;
@@ -90,7 +90,7 @@ ShadedSurface curve(const std::vector<Vector3d>& points, const std::vector<float
 }
 
 TEST(SurfaceSceneTest, BoxIsMetWhereTheFormulaSays) {
-  // Also small and far from the world's origin, where single precision alone would not do.
+  // Also with small boxes far from the origin of the world, where single precision is not sufficient.
   for (const double scale : {1.0, 1e-4, 1e4})
     for (const Vector3d& shift : {Vector3d(0, 0, 0), Vector3d(300, -2000, 70)}) {
       const Vector3d center = scale * shift;
@@ -111,7 +111,7 @@ TEST(SurfaceSceneTest, BoxIsMetWhereTheFormulaSays) {
         ASSERT_EQ(hit.has_value(), exact.has_value()) << i;
         if (!hit) continue;
         ++hits;
-        if (hit->normal.dot(exact->normal) < 0.99) continue;  // The same edges, seen from within.
+        if (hit->normal.dot(exact->normal) < 0.99) continue;  // Edges seen from inside.
         EXPECT_NEAR(hit->distance, exact->distance, 2e-6 * scale);
         EXPECT_NEAR((origin + hit->distance * direction - hit->position).norm(), 0, 2e-6 * scale);
         EXPECT_NEAR((hit->normal - exact->normal).norm(), 0, 1e-9);
@@ -149,7 +149,7 @@ TEST(SurfaceSceneTest, StraightCurvesAreCylindersWithRoundEnds) {
       gap = (p - nearest(p)).norm() - radius;
       distance += gap;
     }
-    if (gap > 1e-10 && distance < 6) continue;  // All but a touch.
+    if (gap > 1e-10 && distance < 6) continue;  // The ray nearly touches the capsule: either result is correct.
     const auto hit = scene.intersect(origin, direction);
     if (distance >= 6) {
       EXPECT_FALSE(hit) << i;
@@ -168,7 +168,7 @@ TEST(SurfaceSceneTest, StraightCurvesAreCylindersWithRoundEnds) {
 }
 
 TEST(SurfaceSceneTest, TaperedCurvesAreCones) {
-  // Tangent to two spheres: the cone's half angle has the sine (r0 − r1) / length.
+  // Tangent to two spheres: the sine of the half angle of the cone is (r0 − r1) / length.
   const SurfaceScene scene({curve({{0, 0, 0}, {0, 0, 1}}, {0.3f, 0.1f})});
   const double sine = 0.2, cosine = std::sqrt(1 - sine * sine);
   for (int i = 0; i < 200; ++i) {
@@ -204,7 +204,7 @@ TEST(SurfaceSceneTest, BentCurvesHaveNoGapsAndSmoothNormals) {
     const Vector3d direction = random_direction(i);
     const auto hit = scene.intersect(std::cos(bend / 2) * axis - 0.5 * direction, direction);
     ASSERT_TRUE(hit) << i;
-    // Normals of the torus about the circle have nothing along it; the ends are round.
+    // Normals of the torus about the circle have no component along it; the ends are round.
     const Vector3d center = Vector3d(hit->position.x(), hit->position.y(), 0).normalized();
     const double at = std::atan2(center.y(), center.x());
     if (at < bend || at > pi / 2 - bend) continue;
@@ -214,7 +214,7 @@ TEST(SurfaceSceneTest, BentCurvesHaveNoGapsAndSmoothNormals) {
     count += 1;
     EXPECT_GT(hit->shading_normal.dot(hit->position - center) / 0.05, 0.95);
   }
-  // Those of facets are off by up to bend / 2, evenly. The spheres at the joints are not smoothed: a few percent.
+  // Normals of facets are off by up to bend / 2, uniformly. The spheres at the joints are not smoothed: a few percent.
   EXPECT_NEAR(std::sqrt(faceted / count), bend / std::sqrt(12), 0.1 * bend);
   EXPECT_LT(std::sqrt(smooth / count), 0.4 * std::sqrt(faceted / count));
 }
@@ -266,7 +266,7 @@ TEST(SurfaceSceneTest, RaysThatEnterASurfaceMeetItsFarSide) {
 TEST(SurfaceSceneTest, OccludersBehindTheTargetDoNotCount) {
   const SurfaceScene scene({surface_of(rectangle_mesh({0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {2, 2}))});
   const Vector3d down(0, 0, -1);
-  EXPECT_FALSE(scene.occluded({0.1, 0.2, 1}, down, 1));  // The target itself.
+  EXPECT_FALSE(scene.occluded({0.1, 0.2, 1}, down, 1));  // The surface hit is the target itself.
   EXPECT_FALSE(scene.occluded({0.1, 0.2, 1}, down, 0.9));
   EXPECT_TRUE(scene.occluded({0.1, 0.2, 1}, down, 1.01));
   EXPECT_TRUE(scene.occluded({0.1, 0.2, 1}, down));
@@ -284,10 +284,10 @@ TEST(SurfaceSceneTest, SmoothNormalsLiftPointsToTheSmoothSurface) {
     ASSERT_TRUE(outer && inner);
     flat = std::max(flat, 1 - outer->position.norm());
     EXPECT_NEAR((outer->shading_normal - outer->position.normalized()).norm(), 0, 0.03);
-    // The smooth surface is nearer to the sphere than the triangles are, and never below them.
+    // The smooth surface is closer to the sphere than the triangles are, and never below them.
     EXPECT_GE(outer->lifted_position.norm(), outer->position.norm());
     EXPECT_LT(std::abs(outer->lifted_position.norm() - 1), 0.035);
-    EXPECT_NEAR((inner->lifted_position - inner->position).norm(), 0, 1e-12);  // Seen from within it is hollow.
+    EXPECT_NEAR((inner->lifted_position - inner->position).norm(), 0, 1e-12);  // From inside, the surface is concave.
   }
   EXPECT_GT(flat, 0.015);
 }
@@ -299,7 +299,7 @@ TEST(SurfaceSceneTest, DataAreInterpolatedAndPathsAreCounted) {
     square.forces.push_back(static_cast<float>(3 + p.x() - p.y()));
     square.arc_lengths.push_back(static_cast<float>(5 + 2 * p.y()));
   }
-  square.path_ends = {0, 1, 1, 2};  // Of four paths two have no triangles.
+  square.path_ends = {0, 1, 1, 2};  // Two of the four paths have no triangles.
   square.first_path = 10;
   ShadedSurface curves;
   curves.shape = RoundCurves{{{5, 0, 0}, {6, 0, 0}, {7, 0, 0}, {5, 1, 0}, {6, 1, 0}, {6, 1, 0}, {7, 1, 0}},
@@ -325,7 +325,7 @@ TEST(SurfaceSceneTest, DataAreInterpolatedAndPathsAreCounted) {
   EXPECT_FALSE(data_at(5.75, 0.02).arc_length);
   EXPECT_EQ(data_at(6.5, 0).path, 0u);
   EXPECT_EQ(data_at(6.5, 1).path, 2u);
-  EXPECT_NEAR(*data_at(6.5, 1).force, 6.5, 1e-5);  // After a point that is there twice.
+  EXPECT_NEAR(*data_at(6.5, 1).force, 6.5, 1e-5);  // After a point that occurs twice.
 }
 
 TEST(SurfaceSceneTest, NothingMeetsAnEmptyScene) {
@@ -335,7 +335,7 @@ TEST(SurfaceSceneTest, NothingMeetsAnEmptyScene) {
   EXPECT_TRUE(scene.bounds().isEmpty());
 }
 
-/// Embree ends the process on rays that it cannot follow.
+/// Embree aborts the process on some rays; SurfaceScene must not pass them on.
 TEST(SurfaceSceneTest, RaysMayStartAnywhere) {
   const SurfaceScene scene({surface_of(rectangle_mesh({0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {2, 2}))});
   const Vector3d down(0, 0, -1);
@@ -347,7 +347,7 @@ TEST(SurfaceSceneTest, RaysMayStartAnywhere) {
   for (const double far : {1e20, 1e40, 1e200, 1e300, infinite, nan})
     for (const Vector3d& from : {Vector3d(far, 0, 0), Vector3d(0.3, 0.2, far), Vector3d(far, -far, far)})
       for (const Vector3d& direction : {down, Vector3d(0.6, 0, -0.8), Vector3d(nan, 0, 1)}) {
-        const auto hit = scene.intersect(from, direction);  // Whatever it finds, it comes back.
+        const auto hit = scene.intersect(from, direction);  // Any result is correct, but the call must return.
         const bool shadowed = scene.occluded(from, direction, 1e300);
         if (from.x() == far || !direction.allFinite()) {
           EXPECT_FALSE(hit);

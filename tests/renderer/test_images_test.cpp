@@ -26,7 +26,7 @@ double mean(const Image& image) {
   return std::accumulate(image.pixels.begin(), image.pixels.end(), 0.0) / static_cast<double>(image.pixels.size());
 }
 
-/// Each pixel the mean of `factor` × `factor` pixels.
+/// A smaller picture, each pixel of which is the mean of `factor` × `factor` pixels.
 Image reduced(const Image& image, int factor) {
   Image result(image.width / factor, image.height / factor, image.channels);
   for (int y = 0; y < result.height * factor; ++y)
@@ -67,8 +67,8 @@ TEST_P(EveryTestImage, RefusesEmptySizes) {
   }
 }
 
-/// Edges are anti-aliased exactly: a small picture is a large one, reduced. (The grid's are so small that neither has
-/// labels.)
+/// Edges are anti-aliased exactly: a small picture equals a large one after reduction. (The grids are so small that
+/// neither has labels.)
 TEST(TestImagesTest, SmallPicturesAreLargeOnesReduced) {
   for (const TestImage which : {TestImage::checkerboard, TestImage::grid, TestImage::line})
     for (const auto& [width, height] : {std::pair(1, 1), {5, 3}, {31, 47}, {32, 32}, {50, 41}})
@@ -118,7 +118,7 @@ TEST(TestImagesTest, LineIsASixtyFourthOfTheWidthInTheMiddle) {
   for (int x = 0; x < 128; ++x) EXPECT_EQ(*image.pixel(x, 1), x == 63 || x == 64 ? 1 : 0) << x;
 }
 
-/// The pixels of a cell of the grid but its lines, as text to be compared.
+/// The pixels of a cell of the grid without its lines, for comparison.
 std::vector<float> cell_of(const Image& image, int left, int top, int cell) {
   std::vector<float> pixels;
   for (int y = top + cell / 8; y < top + cell - cell / 8; ++y)
@@ -128,7 +128,7 @@ std::vector<float> cell_of(const Image& image, int left, int top, int cell) {
 }
 
 TEST(TestImagesTest, GridHasALabelOfItsOwnInEveryWholeCell) {
-  const int cell = 32, columns = 40, rows = 16;  // 40 columns: beyond Z.
+  const int cell = 32, columns = 40, rows = 16;  // With 40 columns, labels continue after Z.
   const Image image = test_image(TestImage::grid, columns * cell + 30, rows * cell);
   std::set<std::vector<float>> labels;
   for (int row = 0; row < rows; ++row)
@@ -153,7 +153,7 @@ TEST(TestImagesTest, GridOfOddSizeHasLabelsUpToTheEdges) {
 TEST(TestImagesTest, GridLinesAreDarkEvenAndThickerEveryFourthTime) {
   const int cell = 48, size = 16 * cell;
   const Image image = test_image(TestImage::grid, size, size);
-  const int y = cell + cell / 8;  // Below a line, above the labels.
+  const int y = cell + cell / 8;  // Below a line and above the labels.
   const auto line_width = [&](int index) {
     double dark = 0;
     for (int x = index * cell - cell / 4; x < index * cell + cell / 4; ++x)
@@ -179,11 +179,11 @@ TEST(TestImagesTest, GridQuadrantsDifferFaintly) {
   EXPECT_EQ(tints.size(), 4u);
 }
 
-/// Middle and size of the wheel in a square picture, as documented by its looks: it fills 92 %.
+/// Centre and size of the wheel in a square picture: it fills 92 %.
 struct Wheel {
   Image image = test_image(TestImage::color_wheel, 1024, 1024);
 
-  /// @param radius  Of the wheel's.
+  /// @param radius  Relative to the radius of the wheel.
   Eigen::Vector3d at(double radius, double angle) const {
     const double r = 0.46 * 1024 * radius;
     const float* pixel =
@@ -211,7 +211,7 @@ TEST(TestImagesTest, ColorWheelGoesFromWhiteToSaturatedColorsAndIsGreyAround) {
 
 TEST(TestImagesTest, ColorWheelHasRedAtTheRightAndGoesOnCounterClockwise) {
   const Wheel wheel;
-  const double shift = 0.06;  // Off the rays.
+  const double shift = 0.06;  // Away from the radial lines.
   const auto largest = [&](double angle) {
     Eigen::Index channel = 0;
     wheel.at(0.94, angle + shift).maxCoeff(&channel);
@@ -224,7 +224,7 @@ TEST(TestImagesTest, ColorWheelHasRedAtTheRightAndGoesOnCounterClockwise) {
   EXPECT_LT(yellow[2], 0.3 * std::min(yellow[0], yellow[1]));
 }
 
-/// Along a circle, colours change slowly but for the 24 rays.
+/// Along a circle, colours change slowly except at the 24 radial lines.
 TEST(TestImagesTest, ColorWheelHasRaysAndNoCreases) {
   const Wheel wheel;
   const int steps = 24 * 60;

@@ -41,7 +41,7 @@ TriangleMesh soup(Random& random, std::uint32_t count, double triangle_size) {
   return mesh;
 }
 
-/// Möller and Trumbore 1997, in double precision. `clear` turns false where rounding to single precision may decide.
+/// Möller and Trumbore 1997, in double precision. Sets `clear` to false if rounding to single precision may decide.
 bool meets(const TriangleMesh& mesh, std::uint32_t triangle, const Vector3d& from, const Vector3d& direction,
            double& distance, bool& clear) {
   const auto& [i, j, k] = mesh.triangles[triangle];
@@ -79,7 +79,7 @@ struct Soup {
   std::vector<TriangleMesh> meshes;
 };
 
-/// Hits or ids.
+/// Compares lists of hits or of ids.
 template <class A, class B>
 bool same(const A& a, const B& b) {
   return a.mesh == b.mesh && a.triangle == b.triangle;
@@ -118,7 +118,7 @@ TEST(TriangleScene, NearFindsEveryOneOfManyTrianglesInOnePlace) {
 }
 
 TEST(TriangleScene, NearReportsLongTrianglesOnce) {
-  TriangleMesh mesh;  // Long and askew, which a search tree splits into pieces.
+  TriangleMesh mesh;  // Long, diagonal triangles, which a search tree splits into pieces.
   for (std::uint32_t i = 0; i < 2000; ++i) {
     const double shift = i * 1e-3;
     mesh.vertices.insert(mesh.vertices.end(), {{shift, -1, 0}, {shift + 1e-3, -1, 0.1}, {shift + 2, 1, 2}});
@@ -156,7 +156,7 @@ TEST(TriangleScene, WorksFarFromTheOriginAndInAnyUnit) {
   }
 }
 
-/// Embree ends the process on rays that it cannot follow.
+/// Embree aborts the process on some rays; TriangleScene must not pass them on.
 TEST(TriangleScene, RaysMayStartAnywhere) {
   const TriangleMesh box = box_mesh({Vector3d(-1, -1, -1), Vector3d(1, 1, 1)}, Eigen::Affine3d::Identity());
   const TriangleScene scene({&box}, Vector3d::Zero(), 3);
@@ -176,7 +176,8 @@ TEST(TriangleScene, RaysMayStartAnywhere) {
   for (const double far : {1e15, 1e19, 1e30, 1e50, 1e300, infinite, nan})
     for (const Vector3d& from : {Vector3d(far, 0, 0), Vector3d(0.3, 0.2, far), Vector3d(-far, far, far)})
       for (const Vector3d& direction : {down, oblique, Vector3d(0, nan, 1), Vector3d(nan, nan, nan)}) {
-        const auto hit = scene.nearest(from, direction, -1e-3, infinite);  // Whatever it finds, it comes back.
+        // Any result is correct, but the call must return.
+        const auto hit = scene.nearest(from, direction, -1e-3, infinite);
         if (!std::isfinite(far) || !direction.allFinite()) {
           EXPECT_FALSE(hit);
         }

@@ -15,7 +15,7 @@ using Eigen::Vector3d;
 
 constexpr double pi = 3.14159265358979323846;
 
-/// Along z from 0 to `length`, with semi-axes a along x and b along y.
+/// A tube along z from 0 to `length`, with semi-axes a along x and b along y.
 Tube straight_tube(double a, double b, double length, int points) {
   Tube tube;
   for (int i = 0; i < points; ++i) {
@@ -25,7 +25,7 @@ Tube straight_tube(double a, double b, double length, int points) {
   return tube;
 }
 
-/// An arc of radius 1 in the plane z = 0; its points' ellipses are circles of radius r.
+/// An arc of radius 1 in the plane z = 0; the ellipses of its points are circles of radius r.
 Tube arc(double r, double angle, int points) {
   Tube tube;
   for (int i = 0; i < points; ++i) {
@@ -36,7 +36,7 @@ Tube arc(double r, double angle, int points) {
   return tube;
 }
 
-/// A helix with an ellipse that turns about it and changes its size.
+/// A helix with an ellipse that rotates about it and changes its size.
 Tube twisted_tube() {
   Tube tube;
   for (int i = 0; i <= 60; ++i) {
@@ -69,11 +69,11 @@ double volume(const TriangleMesh& mesh) {
   return sum;
 }
 
-/// How often each edge occurs in its direction less how often against it, and how often at all; vertices are told apart
-/// by their positions, which are equal to the last bit where caps meet sides.
+/// For each edge, how often it occurs in its direction minus how often in the opposite one, and how often in total.
+/// Vertices are identified by their positions, which are equal to the last bit where caps meet sides.
 struct Edges {
   int unbalanced = 0, not_twice = 0;
-  int characteristic = 0;  ///< Euler's: vertices − edges + triangles.
+  int characteristic = 0;  ///< Euler characteristic: vertices − edges + triangles.
 };
 
 Edges edges_of(const TriangleMesh& mesh) {
@@ -104,7 +104,7 @@ void expect_watertight(const TriangleMesh& mesh, int characteristic) {
   EXPECT_EQ(edges.characteristic, characteristic);
 }
 
-/// Every vertex has a unit normal on the outer side of its triangles.
+/// Each vertex has a unit normal that points outwards, as its triangles do.
 void expect_normals_outwards(const TubeMesh& tubes) {
   ASSERT_EQ(tubes.normals.size(), tubes.mesh.vertices.size());
   ASSERT_EQ(tubes.values.size(), tubes.mesh.vertices.size());
@@ -121,11 +121,12 @@ TEST(TubeMesh, AStraightTubeHasItsVolume) {
   for (const double tolerance : {0.1, 0.01, 0.001}) {
     const double a = 0.5, b = 0.2, length = 3;
     const TubeMesh tubes = solid(straight_tube(a, b, length, 10), TubeCaps::flat, tolerance);
-    // A polygon of n corners on a circle has n sin(2π/n) / (2π) of its area, and so has its affine image; n is what
-    // keeps the sagitta a (1 − cos(π/n)) within the tolerance.
+    // A polygon of n corners on a circle covers n sin(2π/n) / (2π) of the area of the circle. The same holds for its
+    // affine image. n is the smallest number that keeps the sagitta a (1 − cos(π/n)) within the tolerance.
     const double n = std::max(6.0, std::ceil(pi / std::acos(1 - tolerance / a)));
     EXPECT_NEAR(volume(tubes.mesh), pi * a * b * length * n * std::sin(2 * pi / n) / (2 * pi), 1e-12) << n;
-    // Two sides' triangles a segment, and the caps' fans; the value is linear along it, so two rings do.
+    // Two triangles per side of the only segment, and the fans of the caps; the value is linear along it, so two rings
+    // suffice.
     EXPECT_EQ(tubes.mesh.triangles.size(), std::size_t(2 * n + 2 * (n - 2)));
     expect_watertight(tubes.mesh, 2);
     expect_normals_outwards(tubes);
@@ -148,7 +149,7 @@ TEST(TubeMesh, RoundCapsAreHalfBalls) {
   TubeSettings settings = settings_of(TubeStyle::solid, TubeCaps::round, 1e-4);
   settings.most_segments = 200;
   const TubeMesh tubes = make_tube_mesh({straight_tube(r, r, length, 2)}, settings);
-  // The inscribed surface is off by up to the tolerance, in a dome by up to twice that.
+  // The inscribed surface is off by up to the tolerance, in a dome by up to twice the tolerance.
   EXPECT_NEAR(volume(tubes.mesh), pi * r * r * length + 4.0 / 3 * pi * r * r * r,
               2e-4 * (2 * pi * r * length + 4 * pi * r * r));
   EXPECT_NEAR(tubes.mesh.bounds().max().z(), length + r, 1e-12);
@@ -161,7 +162,7 @@ TEST(TubeMesh, RoundCapsAreHalfBalls) {
 }
 
 TEST(TubeMesh, RingsAreAddedWhereATubeBends) {
-  // Of a bend given by four points only: a quarter of a torus, of radius 1 and tube radius 0.25.
+  // A bend given by only four points: a quarter of a torus of radius 1 and tube radius 0.25.
   const double r = 0.25, exact = pi / 2 * pi * r * r;
   double last = 1;
   for (const double tolerance : {0.02, 0.002, 0.0002}) {
@@ -169,7 +170,7 @@ TEST(TubeMesh, RingsAreAddedWhereATubeBends) {
     settings.most_segments = 400;
     const TubeMesh tubes = make_tube_mesh({arc(r, pi / 2, 4)}, settings);
     const double error = std::abs(volume(tubes.mesh) - exact);
-    // The side, off by the tolerance.
+    // The side is off by the tolerance.
     EXPECT_LT(error, tolerance * 2 * pi * r * pi / 2);
     EXPECT_LT(error, last);
     last = error;
@@ -189,7 +190,8 @@ TEST(TubeMesh, RingsThatOthersImplyAreLeftOutButValuesAreKept) {
   EXPECT_EQ(plain, solid(straight_tube(0.1, 0.1, 1, 2)).mesh.vertices.size());
   for (TubePoint& point : tube) point.value = point.center.z() < 0.4 ? 0 : 1;
   const TubeMesh stepped = solid(tube);
-  EXPECT_EQ(stepped.mesh.vertices.size(), 2 * plain - 2 * plain / 4);  // Two rings more than two rings and two caps.
+  // Two more rings than the plain tube, which has two rings and two caps.
+  EXPECT_EQ(stepped.mesh.vertices.size(), 2 * plain - 2 * plain / 4);
   for (std::size_t i = 0; i < stepped.values.size(); ++i)
     EXPECT_EQ(stepped.values[i], stepped.mesh.vertices[i].z() < 0.3995 ? 0 : 1);
 }
@@ -210,11 +212,11 @@ TEST(TubeMesh, WiresAreHoopsAndLines) {
   settings.lines = 0;
   const Tube tube = straight_tube(0.3, 0.2, 2, 2);
   const TubeMesh hoops = make_tube_mesh({tube}, settings);
-  expect_watertight(hoops.mesh, 0);  // Tori; five of them.
+  expect_watertight(hoops.mesh, 0);  // Five tori.
   expect_normals_outwards(hoops);
   const double h = std::pow((0.3 - 0.2) / (0.3 + 0.2), 2);
   const double perimeter = pi * (0.3 + 0.2) * (1 + 3 * h / (10 + std::sqrt(4 - 3 * h)));  // Ramanujan 1914.
-  // A hexagon at least has 0.83 of its circle's area.
+  // A hexagon, the coarsest polygon, has 0.83 of the area of its circle.
   EXPECT_LT(volume(hoops.mesh), 5 * perimeter * pi * 1e-4);
   EXPECT_GT(volume(hoops.mesh), 0.8 * 5 * perimeter * pi * 1e-4);
 
@@ -226,7 +228,8 @@ TEST(TubeMesh, WiresAreHoopsAndLines) {
   EXPECT_GT(volume(both.mesh) - volume(hoops.mesh), 0.8 * 4 * 2 * pi * 1e-4);
   for (const Vector3d& p : both.mesh.vertices) {
     const double on = std::hypot(p.x() / 0.3, p.y() / 0.2);
-    EXPECT_NEAR(on, 1, 0.011 / 0.2 + 0.05);  // On the tube, but for the wire's radius and the polygons' sagitta.
+    // On the tube, up to the radius of the wire and the sagitta of the polygons.
+    EXPECT_NEAR(on, 1, 0.011 / 0.2 + 0.05);
   }
   expect_normals_outwards(make_tube_mesh({twisted_tube()}, settings_of(TubeStyle::wire, TubeCaps::flat)));
 }
@@ -281,7 +284,7 @@ TEST(TubeMesh, TheNumberOfTrianglesIsBounded) {
     settings.most_triangles = needed - 1;
     EXPECT_THROW(make_tube_mesh({tube, tube}, settings), std::runtime_error);
   }
-  // Refused at once: it would take weeks.
+  // The settings must be refused at once: building the mesh would take weeks.
   TubeSettings settings = settings_of(TubeStyle::discs, TubeCaps::flat);
   settings.spacing = 1e-15;
   EXPECT_THROW(make_tube_mesh({tube}, settings), std::runtime_error);
