@@ -1,8 +1,8 @@
 // FSL and MRtrix both write files of six volumes, but with different orders and different axes:
 // - MRtrix writes components in world (scanner) axes: https://mrtrix.readthedocs.io, "dwi2tensor".
 // - FSL's dtifit takes gradient directions in the image's axes, and flips the first axis if the transform has a
-// positive
-// determinant ("neurological" storage): https://fsl.fmrib.ox.ac.uk, "bvecs". Its components have the same axes.
+//   positive determinant ("neurological" storage): https://fsl.fmrib.ox.ac.uk, "bvecs". Its components have the
+//   same axes.
 // Hence FSL's frame is the rotation of the transform, with that flip. Vectors, nine components, and symmetric
 // matrices by intent code are read in world axes, because the format does not state their axes.
 
