@@ -29,13 +29,7 @@ double signed_volume(const TriangleMesh& mesh) {
   return volume;
 }
 
-/// The cubes of edge 2 / n of the shell 1 <= max
-/// x
-/// ,
-/// y
-/// ,
-/// z
-/// <= 3, which has a cubical hole of edge 2.
+/// The cubes of edge 2 / n of the shell 1 <= max |x|, |y|, |z| <= 3, which has a cubical hole of edge 2.
 Grid shell(int n) {
   const Grid cubes = unit_cube(VTK_HEXAHEDRON, 3 * n, [](const Vector3d& p) { return Vector3d(6 * p.array() - 3); });
   auto grid = Grid::New();

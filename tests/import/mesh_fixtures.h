@@ -98,10 +98,8 @@ inline Grid unit_cube(int cell_type, int n, const Map& map) {
   return grid;
 }
 
-/// A hollow cylinder about z: 1 <= r <= 2,
-/// z
-/// <= height / 2. Its grid is wrapped from one node line to itself, and the two faces at the seam have separate
-/// points.
+/// A hollow cylinder about z: 1 <= r <= 2, |z| <= height / 2. Its grid is wrapped from one node line to itself, and the
+/// two faces at the seam have separate points.
 inline vtkSmartPointer<vtkStructuredGrid> hollow_cylinder(int around, double height) {
   return curvilinear({around + 1, 5, 5}, [=](const Vector3d& p) {
     const double angle = static_cast<double>(std::lround(p.x() * around) % around) * (2 * 3.14159265358979 / around);

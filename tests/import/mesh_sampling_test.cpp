@@ -180,13 +180,8 @@ TEST(MeshSampling, BoundsCropTheLatticeAndTheReport) {
 }
 
 TEST(MeshSampling, ReportsThePeakThatCoarseVoxelsMiss) {
-  //
-  // T
-  // = √3 max(0, 1 − 8
-  // x − 1/16
-  // ) on cells of edge 1/16. Voxels of edge 1/8 miss the peak by half a tooth, where
-  // T
-  // has half its peak value.
+  // |T| = √3 max(0, 1 − 8 |x − 1/16|) on cells of edge 1/16. Voxels of edge 1/8 miss the peak by half a tooth, where
+  // |T| has half its peak value.
   const auto mesh = unit_cube(VTK_HEXAHEDRON, 16, identity);
   add_array<9>(*mesh, tensor_array, [](const Vector3d& p) {
     return flat(Matrix3d::Identity() * std::max(0.0, 1 - 8 * std::abs(p.x() - 0.0625)));

@@ -109,7 +109,7 @@ TEST(VtkSourceTest, ImagePiecesAreOneImage) {
   EXPECT_NEAR(peak, 1.4e-3, 0.1e-3);
   EXPECT_GT(asymmetry, 1e-4);
 
-  // The whole file's origin and spacing hold for each piece. Check a point of the last piece.
+  // Each piece is at the place that the whole file gives it. Check a point of the last piece.
   const vtkSmartPointer<vtkImageData> piece =
       vtkImageData::SafeDownCast(read_vtk_source(data_file("pv_tensors/tensors_3.vti")).Get());
   int from[3] = {310, 0, 140};
