@@ -1,4 +1,4 @@
-# Every library the program is built on, as imported targets. ARCHITECTURE.md says who may use which.
+# All libraries that the program uses, as imported targets. ARCHITECTURE.md lists which folder may use which library.
 
 find_package(PkgConfig REQUIRED)
 find_package(Eigen3 3.4 REQUIRED NO_MODULE)
@@ -8,7 +8,7 @@ find_package(fmt REQUIRED)
 find_package(CLI11 REQUIRED)
 find_package(assimp REQUIRED)
 
-# OpenVDB's find module sits outside CMake's search path on Debian.
+# On Debian, OpenVDB's find module is outside CMake's search path.
 file(GLOB OPENVDB_MODULE_PATHS /usr/lib/*/cmake/OpenVDB /usr/lib/cmake/OpenVDB /usr/local/lib*/cmake/OpenVDB)
 list(APPEND CMAKE_MODULE_PATH ${OPENVDB_MODULE_PATHS})
 find_package(OpenVDB REQUIRED COMPONENTS openvdb)
@@ -18,13 +18,13 @@ if(NOT embree_FOUND)
   find_package(embree 3 REQUIRED)
 endif()
 
-# The CMake packages of these two name folders that distributions do not install; their pkg-config modules are sound.
+# The CMake packages of these two refer to folders that distributions do not install; their pkg-config modules work.
 pkg_check_modules(OpenImageIO REQUIRED IMPORTED_TARGET OpenImageIO>=2.4)
 pkg_check_modules(OpenColorIO REQUIRED IMPORTED_TARGET OpenColorIO>=2.1)
 
 pkg_check_modules(Highway REQUIRED IMPORTED_TARGET libhwy>=1.0)
 if(CMAKE_SYSTEM_PROCESSOR MATCHES "^(aarch64|arm64)" AND CMAKE_CXX_COMPILER_ID STREQUAL "GNU")
-  # Highway's NEON code is for processors with these instructions, and GCC asks that its callers be so too.
+  # Highway's NEON code uses these instructions, and GCC requires that its callers are compiled for them too.
   target_compile_options(PkgConfig::Highway INTERFACE -march=armv8-a+crypto)
 endif()
 
@@ -32,7 +32,7 @@ if(TENSORRAY_IMPORT)
   find_package(VTK REQUIRED COMPONENTS CommonCore CommonDataModel CommonExecutionModel FiltersCore FiltersGeneral
                IOCore IOExodus IOGeometry IOLegacy IOParallelXML IOXML)
 
-  # Neither of these two comes with a CMake package that Debian's other packages leave usable.
+  # The CMake packages of these two libraries do not work with Debian's other packages.
   find_path(Teem_INCLUDE_DIR teem/nrrd.h REQUIRED)
   find_library(Teem_LIBRARY teem REQUIRED)
   add_library(Teem::teem INTERFACE IMPORTED)
@@ -47,7 +47,7 @@ if(TENSORRAY_IMPORT)
   target_link_libraries(NIfTI::nifti2 INTERFACE ${NIfTI_LIBRARY} ${NIfTI_znz_LIBRARY})
 endif()
 
-# What the benchmark compares with, where it is installed.
+# Libraries that the benchmark compares with, if they are installed.
 if(TENSORRAY_BENCHMARK)
   find_path(NanoVDB_INCLUDE_DIR nanovdb/NanoVDB.h)
   find_package(VTK QUIET OPTIONAL_COMPONENTS FiltersFlowPaths FiltersGeneral)

@@ -1,4 +1,4 @@
-# Strict warnings for the project's own code; `tensorray_library(NAME)` makes one static library of a folder.
+# Strict warnings for the project's own code, and `tensorray_library(NAME)`, which makes a static library from a folder.
 
 add_library(tensorray_options INTERFACE)
 target_compile_options(tensorray_options INTERFACE -Wall -Wextra -Wpedantic -Wshadow -Wnon-virtual-dtor
@@ -17,7 +17,7 @@ if(TENSORRAY_SANITIZE)
   target_link_options(tensorray_options INTERFACE -fsanitize=address,undefined)
 endif()
 
-# A static library of all sources in this folder and in its rooms (CONFIGURE_DEPENDS: a new file needs no mention).
+# A static library of all sources in this folder and its subfolders (CONFIGURE_DEPENDS finds new files by itself).
 function(tensorray_library name)
   file(GLOB sources CONFIGURE_DEPENDS *.cpp */*.cpp)
   add_library(${name} STATIC ${sources})

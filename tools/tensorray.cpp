@@ -1,5 +1,5 @@
 /// @file tools/tensorray.cpp
-/// The command line: picks the command.
+/// The program `tensorray`: selects the command.
 
 #include <stdexcept>
 #include <string>
@@ -13,7 +13,7 @@
 
 namespace {
 
-/// CLI11 says no more of an unknown command than that one is required.
+/// For an unknown command, CLI11 only reports that a command is required.
 void require_known_command(const CLI::App& app, int argc, char** argv) {
   if (argc < 2 || argv[1][0] == '-') return;
   std::string known;

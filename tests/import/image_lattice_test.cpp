@@ -152,7 +152,7 @@ TEST(ImageLatticeTest, MemoryIsGivenBackSliceBySlice) {
   for (int z = n - 1; z >= 0; --z) {
     lattice.read_slice(z, slice.data());
     EXPECT_EQ(slice[9 * 5 + 3], static_cast<float>(100.0 * (n * n * z + 5) + 3));
-    // What is left of the array, and a few pages and the slice more.
+    // What remains: the rest of the array, the slice, and a few pages.
     if (z % 32 == 0) {
       EXPECT_LT(resident(), before - data * (n - z) / n + 8e6) << z;
     }

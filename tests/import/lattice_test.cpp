@@ -14,7 +14,7 @@ using Eigen::Vector3i;
 
 using Components = std::function<std::vector<double>(const Vector3i&)>;
 
-/// A lattice of `components(index)`; expects that slices are asked for from the last to the first, once each.
+/// A lattice of `components(index)`. Expects that slices are read from the last to the first, once each.
 Lattice lattice_of(const Vector3i& size, const Components& components) {
   Lattice lattice;
   lattice.size = size;
@@ -117,8 +117,8 @@ TEST(Lattice, MaskedZeroAndNonFiniteVoxelsAreInactive) {
       {1, 0, 0, 0, 0, 0, 0},       // 3: zero
       {1, 1, nan, 3, 4, 5, 6},     // 4: not finite
       {1, 1, 2, 3, 4, -inf, 6},    // 5: not finite
-      {0.49, nan, 2, 3, 4, 5, 6},  // 6: masked, whatever it holds
-      {nan, 1, 2, 3, 4, 5, 6},     // 7: no mask
+      {0.49, nan, 2, 3, 4, 5, 6},  // 6: masked, whatever the other components are
+      {nan, 1, 2, 3, 4, 5, 6},     // 7: masked, because the mask is NaN
       {1, 1e300, 0, 0, 0, 0, 0},   // 8: beyond single precision
   };
   Lattice lattice = lattice_of({9, 1, 1}, [&](const Vector3i& index) { return voxels[index.x()]; });

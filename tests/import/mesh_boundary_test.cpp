@@ -29,7 +29,7 @@ double signed_volume(const TriangleMesh& mesh) {
   return volume;
 }
 
-/// The shell 1 <= max |x|, |y|, |z| <= 3 of cubes whose edge is 2 / n, with a cubical hole of edge 2 in it.
+/// The cubes of edge 2 / n of the shell 1 <= max |x|, |y|, |z| <= 3, which has a cubical hole of edge 2.
 Grid shell(int n) {
   const Grid cubes = unit_cube(VTK_HEXAHEDRON, 3 * n, [](const Vector3d& p) { return Vector3d(6 * p.array() - 3); });
   auto grid = Grid::New();
@@ -49,7 +49,7 @@ TEST(MeshBoundary, AHoleIsAClosedSurfaceThatLooksOutOfTheBody) {
   const auto path = file_name("hole");
   EXPECT_EQ(write_boundary(*shell(2), path), 6u * 4u * 2u);
   TriangleMesh mesh = read_mesh(path);
-  EXPECT_EQ(mesh.vertices.size(), 26u);  // shared, although each cell has points of its own
+  EXPECT_EQ(mesh.vertices.size(), 26u);  // shared, although each cell has its own points
   EXPECT_EQ(mesh.triangles.size(), 48u);
   EXPECT_NEAR(signed_volume(mesh), 8, 1e-12);
   EXPECT_TRUE(mesh.bounds().isApprox(Eigen::AlignedBox3d(Vector3d(-1, -1, -1), Vector3d(1, 1, 1))));
@@ -89,7 +89,7 @@ TEST(MeshBoundary, CurvedFacesKeepTheirMiddleNodes) {
     return Vector3d((1 + p.y()) * std::cos(angle), (1 + p.y()) * std::sin(angle), p.z());
   });
   const std::size_t triangles = write_boundary(*grid, path);
-  EXPECT_EQ(triangles, 16u * 6u);  // the concave side of a quarter of a pipe; VTK cuts a quadratic quad in six
+  EXPECT_EQ(triangles, 16u * 6u);  // the concave side of a quarter of a pipe; VTK divides a quadratic quad into six
   for (const Vector3d& vertex : read_mesh(path).vertices) EXPECT_NEAR(vertex.head<2>().norm(), 1, 1e-12);
 }
 
@@ -97,7 +97,7 @@ TEST(MeshBoundary, HiddenCellsBelongToTheBody) {
   const auto mesh = curvilinear({6, 6, 6}, [](const Vector3d& p) { return p; });
   const auto path = file_name("hidden");
   EXPECT_EQ(write_boundary(*mesh, path), 0u);
-  mesh->BlankCell(62);  // the middle
+  mesh->BlankCell(62);  // the middle cell
   EXPECT_EQ(write_boundary(*mesh, path), 12u);
   EXPECT_NEAR(signed_volume(read_mesh(path)), 0.008, 1e-12);
 }

@@ -1,6 +1,6 @@
 #pragma once
 /// @file tests/import/mesh_files.h
-/// Temporary files, the data sets, and bytes, for the tests of what reads meshes.
+/// Temporary files, the data sets, and reading and writing of bytes, for the tests of mesh readers.
 
 #include <filesystem>
 #include <fstream>
@@ -15,7 +15,7 @@
 
 namespace tensorray {
 
-/// A folder in the tests' temporary folder that no other process uses, removed at the end.
+/// A folder in the tests' temporary folder that no other process uses. Removed at the end.
 class TemporaryFolder : public std::filesystem::path {
  public:
   TemporaryFolder() : path(testing::TempDir()) {
@@ -40,7 +40,7 @@ inline void write_bytes(const std::filesystem::path& path, const std::string& by
   std::ofstream(path, std::ios::binary) << bytes;
 }
 
-/// What `act` throws, which must be a std::runtime_error of one line; empty if nothing.
+/// The message of the std::runtime_error that `act` throws, which must be one line; empty if it throws nothing.
 template <typename Act>
 std::string error_of(Act&& act) {
   try {

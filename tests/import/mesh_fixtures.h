@@ -1,6 +1,6 @@
 #pragma once
 /// @file tests/import/mesh_fixtures.h
-/// Meshes of a few cells whose shape and numbers are known.
+/// Meshes of a few cells with known shapes and values.
 
 #include <cmath>
 #include <functional>
@@ -29,7 +29,7 @@ using Eigen::Vector3i;
 using Map = std::function<Vector3d(const Vector3d&)>;
 using Grid = vtkSmartPointer<vtkUnstructuredGrid>;
 
-/// A curvilinear grid: `map` of the unit cube's nodes.
+/// A curvilinear grid: the nodes of the unit cube, moved by `map`.
 inline vtkSmartPointer<vtkStructuredGrid> curvilinear(const Vector3i& nodes, const Map& map) {
   vtkNew<vtkPoints> points;
   points->SetDataTypeToDouble();
@@ -44,15 +44,15 @@ inline vtkSmartPointer<vtkStructuredGrid> curvilinear(const Vector3i& nodes, con
   return grid;
 }
 
-/// Bends the unit cube: its inner nodes move, its faces stay where they are.
+/// Bends the unit cube: moves its inner nodes, and keeps its faces in place.
 inline Vector3d bent(const Vector3d& p) {
   const double s = 0.15 * std::sin(3.14159265358979 * p.x()) * std::sin(3.14159265358979 * p.y()) *
                    std::sin(3.14159265358979 * p.z());
   return p + s * Vector3d(1, -0.7, 0.5);
 }
 
-/// The cells of the unit cube cut into n³ cubes, each as hexahedra, wedges (2), pyramids (6), tetrahedra (6), or
-/// quadratic hexahedra; or quadratic tetrahedra.
+/// The unit cube, divided into n³ cubes. Each cube becomes a hexahedron, 2 wedges, 6 pyramids, 6 tetrahedra or a
+/// quadratic hexahedron, or is divided into quadratic tetrahedra.
 inline Grid unit_cube(int cell_type, int n, const Map& map) {
   auto grid = Grid::New();
   vtkNew<vtkPoints> points;
@@ -98,8 +98,8 @@ inline Grid unit_cube(int cell_type, int n, const Map& map) {
   return grid;
 }
 
-/// A hollow cylinder about z, wrapped from one node line to itself: 1 <= r <= 2, |z| <= height / 2. The faces at the
-/// seam have points of their own.
+/// A hollow cylinder about z: 1 <= r <= 2, |z| <= height / 2. Its grid is wrapped from one node line to itself, and the
+/// two faces at the seam have separate points.
 inline vtkSmartPointer<vtkStructuredGrid> hollow_cylinder(int around, double height) {
   return curvilinear({around + 1, 5, 5}, [=](const Vector3d& p) {
     const double angle = static_cast<double>(std::lround(p.x() * around) % around) * (2 * 3.14159265358979 / around);
@@ -107,7 +107,7 @@ inline vtkSmartPointer<vtkStructuredGrid> hollow_cylinder(int around, double hei
   });
 }
 
-/// Adds a point array of what `value` says at the points.
+/// Adds a point array with the values that `value` returns at the points.
 template <int components>
 void add_array(vtkDataSet& mesh, const std::string& name,
                const std::function<Eigen::Matrix<double, components, 1>(const Vector3d&)>& value) {
@@ -123,7 +123,7 @@ void add_array(vtkDataSet& mesh, const std::string& name,
   mesh.GetPointData()->AddArray(array);
 }
 
-/// A tensor whose nine components are different linear functions.
+/// A tensor with nine different linear functions as components.
 inline Matrix3d linear_tensor(const Vector3d& p) {
   Matrix3d a, b, c, d;
   a << 1, 2, 3, 4, 5, 6, 7, 8, 9;
@@ -133,7 +133,7 @@ inline Matrix3d linear_tensor(const Vector3d& p) {
   return a + p.x() * b + p.y() * c + p.z() * d;
 }
 
-/// Rows side by side.
+/// The rows side by side.
 inline Eigen::Matrix<double, 9, 1> flat(const Matrix3d& tensor) {
   const Matrix3d columns = tensor.transpose();
   return Eigen::Map<const Eigen::Matrix<double, 9, 1>>(columns.data());

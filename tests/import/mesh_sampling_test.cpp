@@ -46,7 +46,7 @@ void expect_linear(const TensorGrid& grid) {
   for_each_voxel(grid, [&](const Vector3d& p, const Matrix3d& tensor) {
     worst = std::max(worst, (tensor - linear_tensor(p)).cwiseAbs().maxCoeff());
   });
-  EXPECT_LT(worst, 5e-6);  // single precision of numbers up to 23, and a position within 1e-6 of the diagonal
+  EXPECT_LT(worst, 5e-6);  // single precision of numbers up to 23, and a position error of at most 1e-6 of the diagonal
 }
 
 struct CellCase {
@@ -57,7 +57,7 @@ struct CellCase {
 
 class EveryCell : public ::testing::TestWithParam<CellCase> {};
 
-// 1/(n − 1) and the cells' thirds have voxels on faces, edges and corners of cells and of the cube.
+// Spacings of 1/(n − 1), and cells of edge 1/3, put voxels on faces, edges and corners of the cells and of the cube.
 TEST_P(EveryCell, SamplesALinearFieldExactlyAtEveryVoxelOfACube) {
   const auto mesh = unit_cube(GetParam().type, 3, GetParam().is_bent ? Map(bent) : identity);
   add_linear_tensor(*mesh);
@@ -71,7 +71,7 @@ TEST_P(EveryCell, SamplesALinearFieldExactlyAtEveryVoxelOfACube) {
   }
 }
 
-// A bent quadratic cell has curved faces that fit their neighbours', as its middle nodes are bent as well.
+// The curved faces of a bent quadratic cell fit its neighbours, because its middle nodes are bent too.
 INSTANTIATE_TEST_SUITE_P(Types, EveryCell,
                          ::testing::Values(CellCase{"Hexahedron", VTK_HEXAHEDRON, false},
                                            CellCase{"BentHexahedron", VTK_HEXAHEDRON, true},
@@ -108,7 +108,7 @@ TEST(MeshSampling, HolesAndTheOutsideAreInactive) {
   const int around = 64;
   const auto mesh = hollow_cylinder(around, 1);
   add_linear_tensor(*mesh);
-  const double inner_flat = std::cos(3.14159265358979 / around);  // where the faceted circle is nearest to the axis
+  const double inner_flat = std::cos(3.14159265358979 / around);  // where the faceted circle is closest to the axis
   std::size_t inside = 0;
   for_each_voxel(sampled(*mesh, resolution(50)), [&](const Vector3d& p, const Matrix3d&) {
     const double radius = p.head<2>().norm();
@@ -151,7 +151,7 @@ TEST(MeshSampling, ResolutionIsOfTheLongestEdgeOrOfEachOrAVoxelOrChosen) {
 }
 
 TEST(MeshSampling, ChosenVoxelsAreAtMostTwoToThe21) {
-  // 200 thin slices beside a long cell: the median cell would ask for 10^7 voxels.
+  // 200 thin slices beside a long cell: for the median cell, 10^7 voxels would be needed.
   const auto mesh = curvilinear(
       {202, 2, 2}, [](const Vector3d& p) { return Vector3d(p.x() < 0.999 ? p.x() * 1e-4 : 1.0, p.y(), p.z()); });
   add_linear_tensor(*mesh);
@@ -180,8 +180,8 @@ TEST(MeshSampling, BoundsCropTheLatticeAndTheReport) {
 }
 
 TEST(MeshSampling, ReportsThePeakThatCoarseVoxelsMiss) {
-  // |T| = √3 max(0, 1 − 8 |x − 1/16|) on cells of 1/16: voxels of 1/8 fall half a tooth beside the peak, which is 1/2
-  // there.
+  // |T| = √3 max(0, 1 − 8 |x − 1/16|) on cells of edge 1/16. Voxels of edge 1/8 miss the peak by half a tooth, where
+  // |T| has half its peak value.
   const auto mesh = unit_cube(VTK_HEXAHEDRON, 16, identity);
   add_array<9>(*mesh, tensor_array, [](const Vector3d& p) {
     return flat(Matrix3d::Identity() * std::max(0.0, 1 - 8 * std::abs(p.x() - 0.0625)));
@@ -205,7 +205,8 @@ TEST(MeshSampling, VoxelsThatNeedAPointThatIsNotANumberAreInactive) {
   SamplingReport report;
   const TensorGrid grid = sampled(*mesh, resolution(17), report);
   EXPECT_EQ(report.non_finite_points, 1u);
-  EXPECT_EQ(report.active, 17u * 17u * 17u - 7u * 7u * 7u);  // those strictly within the eight cells around it
+  EXPECT_EQ(report.active,
+            17u * 17u * 17u - 7u * 7u * 7u);  // all points strictly within the eight cells around the hidden point
   expect_linear(grid);
 }
 
@@ -225,7 +226,7 @@ TEST(MeshSampling, OfCellsThatListMorePointsThanTheirTypeHasTheFirstCount) {
   SamplingReport report;
   expect_linear(sampled(*mesh, resolution(9), report));
   EXPECT_EQ(report.active, 9u * 9u * 9u);
-  EXPECT_GT(report.native_median, 10);  // the middle nodes' zeros do not count
+  EXPECT_GT(report.native_median, 10);  // the zeros at middle nodes do not count
 }
 
 TEST(MeshSampling, HiddenCellsAreNotThere) {

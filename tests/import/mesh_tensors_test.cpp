@@ -119,7 +119,7 @@ TEST(MeshTensors, SurfacesInAMeshDoNotChangeItsDerivatives) {
 TEST(MeshTensors, ADerivativeDoesNotLookAtHiddenPoints) {
   const auto mesh = curvilinear({5, 5, 5}, bent);
   add_linear_velocity(*mesh, velocity_gradient());
-  const vtkIdType hidden = 62;  // the middle
+  const vtkIdType hidden = 62;  // the middle point
   mesh->GetPointData()->GetArray("velocity")->SetTuple3(hidden, 1e9, -1e9, 1e9);
   hide_point(*mesh, hidden);
   const auto tensors = with_tensors(*mesh, {"velocity"}, Take::gradient, {});
@@ -172,7 +172,7 @@ TEST(MeshTensors, NineComponentsAreRowsWhateverTheOrder) {
 TEST(MeshTensors, CellArraysAreAveragedToPoints) {
   const auto mesh = curvilinear({3, 2, 2}, identity);
   add_constant_cell_array(*mesh, "T", 9, 2);
-  mesh->GetCellData()->GetArray("T")->SetComponent(1, 5, 8);  // of the second cell
+  mesh->GetCellData()->GetArray("T")->SetComponent(1, 5, 8);  // component 5 of the second cell
   const auto tensors = with_tensors(*mesh, {"T", true}, Take::tensor, {});
   EXPECT_EQ(tensor_at(*tensors, 0)(1, 2), 2);
   EXPECT_EQ(tensor_at(*tensors, 1)(1, 2), 5);
@@ -211,7 +211,7 @@ TEST(ChooseArray, TakesTheNamedOrTheOnlyOneThatSuits) {
   const ArrayChoice points = choose_array(*mesh, "grad", Take::tensor);
   EXPECT_EQ(points.name, "grad");
   EXPECT_FALSE(points.of_cells);
-  EXPECT_TRUE(choose_array(*mesh, "velocity", Take::tensor).of_cells);  // the points' array is none
+  EXPECT_TRUE(choose_array(*mesh, "velocity", Take::tensor).of_cells);  // the point array does not suit
 }
 
 TEST(ChooseArray, ErrorsListTheArrays) {

@@ -11,7 +11,7 @@
 namespace tensorray {
 namespace {
 
-/// A header of version 5, whose lengths have 64 bits: one dimension, no attribute, one variable of doubles.
+/// A header of version 5, with 64-bit lengths: one dimension, no attribute, one variable of doubles.
 struct Cdf5 {
   std::uint64_t records = 0, name_length = 1, dimension = 10, attributes = 0, begin = 200;
 
@@ -24,20 +24,20 @@ struct Cdf5 {
       bytes += std::string("x\0\0\0", 4);
     };
     put64(records);
-    put32(10);  // Dimensions.
+    put32(10);  // The list of dimensions.
     put64(1);
     put_name(name_length);
     put64(dimension);
     put32(attributes > 0 ? 12 : 0);
     put64(attributes);
-    put32(11);  // Variables.
+    put32(11);  // The list of variables.
     put64(1);
     put_name(1);
-    put64(1);  // Of one dimension: the first.
+    put64(1);  // It has one dimension: the first.
     put64(0);
     put32(0);
     put64(0);
-    put32(6);  // Doubles.
+    put32(6);  // Type: double.
     put64(80);
     put64(begin);
     return bytes;
@@ -52,7 +52,7 @@ std::optional<std::uint64_t> size_of(const Cdf5& header) {
 
 TEST(NetcdfSizeTest, IsTheEndOfTheLastVariable) { EXPECT_EQ(size_of({}), 280u); }
 
-/// As a number with a sign, a length of 2⁶⁴ − 8 goes back to where it was read from, again and again.
+/// If it were read as a signed number, a length of 2⁶⁴ − 8 would move the position back again and again.
 TEST(NetcdfSizeTest, LengthsBeyondTheFileAreDamage) {
   constexpr std::uint64_t greatest = std::numeric_limits<std::uint64_t>::max();
   for (const std::uint64_t length :
@@ -68,13 +68,13 @@ TEST(NetcdfSizeTest, LengthsBeyondTheFileAreDamage) {
 
 TEST(NetcdfSizeTest, SizesBeyondSixtyFourBitsAreDamage) {
   Cdf5 header;
-  header.dimension = std::uint64_t{1} << 61;  // Of eight bytes each.
+  header.dimension = std::uint64_t{1} << 61;  // Each element takes eight bytes.
   EXPECT_EQ(size_of(header), std::nullopt);
   header = {};
   header.begin = std::numeric_limits<std::uint64_t>::max() - 10;
   EXPECT_EQ(size_of(header), std::nullopt);
   header = {};
-  header.dimension = 0;  // The records.
+  header.dimension = 0;  // The record dimension.
   header.records = std::uint64_t{1} << 62;
   EXPECT_EQ(size_of(header), std::nullopt);
 }

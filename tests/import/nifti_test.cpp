@@ -46,7 +46,7 @@ std::vector<float> fsl(const Matrix3d& t) {
   return six;
 }
 
-/// Volume by volume, as the format has it, of `components(index)`.
+/// The values of `components(index)`, volume by volume, as the format stores them.
 std::string volumes_of(const Vector3i& size, const std::function<std::vector<float>(const Vector3i&)>& components) {
   std::vector<float> numbers;
   for (std::size_t c = 0; c < components(Vector3i::Zero()).size(); ++c)
@@ -56,7 +56,7 @@ std::string volumes_of(const Vector3i& size, const std::function<std::vector<flo
   return test::bytes_of(numbers);
 }
 
-/// The field of a file of one tensor, everywhere.
+/// Reads a file whose voxels all have one tensor, and returns that tensor.
 Matrix3d read_one(const nifti_1_header& header, const std::vector<float>& components, const std::string& order) {
   const Vector3i size(header.dim[1], header.dim[2], header.dim[3]);
   const test::TemporaryFile file("one.nii",
@@ -66,7 +66,7 @@ Matrix3d read_one(const nifti_1_header& header, const std::vector<float>& compon
   return tensor ? Matrix3d(tensor->cast<double>()) : Matrix3d(Matrix3d::Constant(NAN));
 }
 
-/// Oblique, anisotropic; its determinant is negative with a `sign` of −1.
+/// Oblique and anisotropic; the determinant is negative if `sign` is −1.
 Affine3d oblique(double sign) {
   Affine3d transform = Affine3d::Identity();
   transform.linear() = test::rotation() * Vector3d(sign * 2, 1.5, 3).asDiagonal();
@@ -132,7 +132,7 @@ TEST(Nifti, ComponentsOfMrtrixAreInWorldAxes) {
 
 TEST(Nifti, ComponentsOfFslTurnWithTheImageAndItsConvention) {
   const Matrix3d t = test::symmetric_tensor(), turn = test::rotation();
-  // Either way the first axis of FSL is the one that makes the frame left-handed.
+  // In both cases FSL's first axis makes the frame left-handed.
   const Matrix3d frame = turn * flip_x, expected = frame * t * frame.transpose();
   for (const double sign : {-1.0, 1.0})
     EXPECT_LT((read_one(header_of({2, 2, 2}, 6, oblique(sign)), fsl(t), "fsl") - expected).norm(), 1e-5);
@@ -166,8 +166,8 @@ TEST(Nifti, AnImageStoredFromTheOtherSideIsTheSameField) {
 }
 
 TEST(Nifti, AMirroredImageIsTheMirroredField) {
-  // A head mirrored left-right in the same storage: the voxels along x reversed, and the components that have one x
-  // in them negated, as the scanner would have measured.
+  // A head mirrored left to right in the same storage, as a scanner would measure it: the voxels along x are
+  // reversed, and the components with a single index x are negated.
   const Vector3i size(5, 3, 2);
   Affine3d to_world = Affine3d::Identity();
   to_world.linear() = Vector3d(-2, 2, 2).asDiagonal();

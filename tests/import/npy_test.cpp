@@ -16,7 +16,7 @@ namespace {
 using Eigen::Matrix3d;
 using Eigen::Vector3i;
 
-/// As numpy.save writes it: the header is filled with spaces up to a multiple of 64 bytes.
+/// A header as numpy.save writes it: padded with spaces to a multiple of 64 bytes.
 std::string header_of(const std::string& descr, bool fortran, const std::vector<std::size_t>& shape, char version = 1) {
   std::string dictionary = fmt::format("{{'descr': '{}', 'fortran_order': {}, 'shape': ({},), }}", descr,
                                        fortran ? "True" : "False", fmt::join(shape, ", "));
@@ -31,7 +31,7 @@ std::string header_of(const std::string& descr, bool fortran, const std::vector<
 /// Entry (row, column) at (x, y, z): exact in half precision.
 double entry(int x, int y, int z, int row, int column) { return x + 4 * y + 16 * z + 0.25 * row + 0.0625 * column; }
 
-/// The numbers of a field of shape (nz, ny, nx, 3, 3), as `put(value)` writes them.
+/// The numbers of a field of shape (nz, ny, nx, 3, 3), each written by `put(value)`.
 template <class Number, class Put>
 std::string numbers_of(const Vector3i& size, bool fortran, const Put& put) {
   const std::array<int, 5> shape = {size.z(), size.y(), size.x(), 3, 3};
@@ -96,7 +96,7 @@ TEST(Npy, HalfPrecisionIsRead) {
     std::memcpy(&bits, &number, 2);
     return bits;
   };
-  // Numbers of at most eleven bits: 1.5 in half precision is 0x3e00.
+  // The numbers need at most eleven bits: 1.5 in half precision is 0x3e00.
   ASSERT_EQ(half(1.5), 0x3e00);
   const Vector3i small(4, 2, 2);
   const test::TemporaryFile file("half.npy");
@@ -182,11 +182,11 @@ TEST(Npy, GarbledHeadersNeverCrash) {
   }
 }
 
-/// Megabytes at the greatest that importing takes, of a process of its own.
+/// Peak memory of an import in its own process, megabytes.
 double import_megabytes(const std::filesystem::path& path) {
   const pid_t child = fork();
   if (child == 0) {
-    {  // Threads and libraries take their own memory once.
+    {  // Threads and libraries allocate their own memory once.
       const test::TemporaryFile small("small.npy", header_of("<f4", false, {2, 2, 2, 3, 3}) + std::string(288, '\1'));
       test::tensors_of(open_npy(small));
     }

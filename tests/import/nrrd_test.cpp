@@ -14,7 +14,7 @@ using Eigen::Vector3i;
 
 const std::string oblique_fields = "space directions: none (0,2,0) (-1.5,0,0) (0,0.5,3)\nspace origin: (10,20,30)\n";
 
-/// The header of a file of single precision; `fields` are lines of their own.
+/// The header of a single-precision file. `fields` are further lines.
 std::string header_of(const std::string& kind, int components, const Vector3i& size, const std::string& fields,
                       const std::string& space = "right-anterior-superior") {
   return fmt::format(
@@ -31,13 +31,13 @@ std::vector<float> nine(const Matrix3d& t) {
   return floats({t(0, 0), t(0, 1), t(0, 2), t(1, 0), t(1, 1), t(1, 2), t(2, 0), t(2, 1), t(2, 2)});
 }
 
-/// The measurement frame of which the columns are those of `frame`.
+/// The header line of a measurement frame. Its vectors are the columns of `frame`.
 std::string measurement_frame(const Matrix3d& frame) {
   const auto vector = [&](int i) { return fmt::format("({},{},{})", frame(0, i), frame(1, i), frame(2, i)); };
   return "measurement frame: " + vector(0) + " " + vector(1) + " " + vector(2) + "\n";
 }
 
-/// The field of a file of one voxel.
+/// Reads a file of one voxel, and returns the tensor.
 Matrix3d read_one(const std::string& header, const std::vector<float>& components) {
   const test::TemporaryFile file("one.nrrd", header + test::bytes_of(components));
   const TensorGrid grid = test::tensors_of(open_nrrd(file));
@@ -67,7 +67,7 @@ TEST(Nrrd, HelixInLpsIsTurnedToRas) {
   const Lattice lattice = open_nrrd(path);
   EXPECT_LT((lattice.to_world.linear() - Matrix3d(Vector3d(0.126316, 0.123077, 0.12).asDiagonal())).norm(), 1e-9);
   EXPECT_LT((lattice.to_world.translation() - Vector3d(-2.336842, -2.338462, -2.34)).norm(), 1e-9);
-  // Without a mask, what is around the helix is next to zero.
+  // The file has no mask; the tensors around the helix are nearly zero.
   int inside = 0;
   test::for_each_voxel(test::tensors_of(lattice), [&](const Vector3i&, const Matrix3d& tensor) {
     const Vector3d values = Eigen::SelfAdjointEigenSolver<Matrix3d>(tensor).eigenvalues();
@@ -103,7 +103,7 @@ TEST(Nrrd, TheMeasurementFrameIsAppliedOnceAndNotTransposed) {
   const std::string fields = oblique_fields + measurement_frame(frame);
   const Matrix3d found = read_one(header_of("3D-matrix", 9, {1, 1, 1}, fields), nine(t));
   EXPECT_LT((found - expected).norm(), 1e-5);
-  // Were it left out, transposed or applied twice, that would not be near.
+  // The result must differ, so that leaving out, transposing or repeating the frame would be detected.
   EXPECT_GT((found - t).norm(), 0.1);
   EXPECT_GT((found - frame.transpose() * t * frame).norm(), 0.1);
   EXPECT_GT((found - frame * expected * frame.transpose()).norm(), 0.1);
@@ -112,7 +112,7 @@ TEST(Nrrd, TheMeasurementFrameIsAppliedOnceAndNotTransposed) {
 TEST(Nrrd, AnatomicalSpacesAreTurnedToRasWithTheMeasurementFrame) {
   const Matrix3d frame = test::rotation(), t = test::general_tensor();
   const std::string fields = oblique_fields + measurement_frame(frame);
-  Matrix3d directions;  // The file's vectors are columns.
+  Matrix3d directions;  // The vectors in the file are columns.
   directions << 0, -1.5, 0, 2, 0, 0.5, 0, 0, 3;
   const std::vector<std::pair<std::string, Vector3d>> spaces = {{"right-anterior-superior", {1, 1, 1}},
                                                                 {"left-anterior-superior", {-1, 1, 1}},
@@ -130,7 +130,7 @@ TEST(Nrrd, AnatomicalSpacesAreTurnedToRasWithTheMeasurementFrame) {
 }
 
 TEST(Nrrd, ComponentsMayStandAnywhereAmongTheAxes) {
-  // Components last, as some programs write: x fastest, then y, z, component.
+  // Some programs write components last: x fastest, then y, z, component.
   const Vector3i size(3, 2, 10);
   std::vector<float> numbers;
   for (int c = 0; c < 6; ++c)
@@ -185,7 +185,7 @@ TEST(Nrrd, TextDetachedDataAndIntegersAreRead) {
       "3D-symmetric-matrix space space space\nspace directions: none (1,0,0) (0,1,0) (0,0,1)\n";
   const auto expect = [](const std::filesystem::path& path) {
     const TensorGrid grid = test::tensors_of(open_nrrd(path));
-    EXPECT_EQ(grid.active_voxels(), 1u);  // Zero is background.
+    EXPECT_EQ(grid.active_voxels(), 1u);  // Exactly zero is background.
     test::expect_near((Matrix3d() << 1, 2, 3, 2, 4, 5, 3, 5, -6).finished(), test::voxel(grid, {0, 0, 1}));
   };
   const test::TemporaryFile text("text.nrrd", fields + "encoding: ascii\n\n0 0 0 0 0 0\n1 2 3 4 5 -6\n");

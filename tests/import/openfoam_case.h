@@ -15,7 +15,7 @@ class OpenFoamCase {
  public:
   static constexpr int cells = 8;
 
-  /// Components of a cell's value: `at_end` is the time, 0 or 1. The numbers are in OpenFOAM's order.
+  /// A component of a cell's value in OpenFOAM's order. `at_end` is the time, 0 or 1.
   static double value(int cell, int component, int at_end) { return 1000 * at_end + 10 * cell + component; }
 
   static void write(const std::filesystem::path& folder) {
@@ -67,7 +67,7 @@ class OpenFoamCase {
                           ";\nboundaryField\n{\n    walls\n    {\n        type zeroGradient;\n    }\n}\n");
   }
 
-  /// Faces as OpenFOAM orders them: inner ones by owner and then neighbour, then those of the boundary.
+  /// Makes the faces in OpenFOAM's order: inner faces by owner and then neighbour, then boundary faces.
   void make() {
     for (int cell = 0; cell < cells; ++cell) {
       const int i = cell % 2, j = cell / 2 % 2, k = cell / 4;

@@ -25,7 +25,7 @@ struct Form {
   bool big_endian = false, marks = false, count = false, blanking = false, doubles = false;
 };
 
-/// A PLOT3D writer: records of numbers, in any of the forms.
+/// Writes PLOT3D records in any of the forms.
 class Writer {
  public:
   explicit Writer(const Form& form) : form_(form) {}
@@ -46,7 +46,7 @@ class Writer {
  private:
   void put(const void* value, std::size_t size, std::string& to) {
     std::string bytes(static_cast<const char*>(value), size);
-    if (form_.big_endian) std::reverse(bytes.begin(), bytes.end());  // the tests run on little-endian hosts
+    if (form_.big_endian) std::reverse(bytes.begin(), bytes.end());  // the tests run on little-endian machines
     to += bytes;
   }
   Form form_;
@@ -137,7 +137,7 @@ TEST(Plot3dTest, PointsOfZeroDensityHaveNoVelocity) {
   const TemporaryFolder folder;
   const Form form;
   std::string q = q_bytes(form);
-  std::fill_n(q.begin() + 28, 4, '\0');  // the first density: after three sizes and four numbers
+  std::fill_n(q.begin() + 28, 4, '\0');  // the first density, which follows three sizes and four numbers
   const auto mesh = read(folder, grid_bytes(form), q);
   EXPECT_TRUE(std::isnan(mesh->GetPointData()->GetArray("velocity")->GetComponent(0, 0)));
   EXPECT_FALSE(std::isnan(mesh->GetPointData()->GetArray("velocity")->GetComponent(1, 0)));
@@ -191,7 +191,7 @@ TEST(Plot3dTest, FilesThatDoNotFit) {
   EXPECT_NE(missing.find("none.bin: does not exist"), std::string::npos) << missing;
 }
 
-/// 2⁶⁰ points of 16 bytes are 2⁶⁴ bytes, which 64 bits hold as 0: the bare header was taken for the whole file.
+/// 2⁶⁰ points of 16 bytes are 2⁶⁴ bytes, which overflows to 0 in 64 bits: the bare header looked like the whole file.
 TEST(Plot3dTest, SizesBeyondSixtyFourBitsAreDamage) {
   const TemporaryFolder folder;
   for (const bool count : {false, true}) {
@@ -231,7 +231,7 @@ TEST(Plot3dTest, SeveralBlocksAndTwoDimensionsAreNamed) {
   EXPECT_NE(error.find("two-dimensional"), std::string::npos) << error;
 }
 
-/// Facts of the data set: its gradient by VTK's own filter, of which this reader knows nothing.
+/// Known values of the data set. Its gradient is computed by VTK's own filter, which is independent of this reader.
 TEST(Plot3dTest, BluntFin) {
   const std::filesystem::path grid = data_file("bluntfin/bluntfinxyz.bin"), q = data_file("bluntfin/bluntfinq.bin");
   SKIP_WITHOUT(grid);

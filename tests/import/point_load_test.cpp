@@ -1,4 +1,4 @@
-// The generator of point loads beside the field that VTK's own source of point loads made.
+// Compares the generator of point loads with a field made by VTK's own source of point loads.
 
 #include <filesystem>
 

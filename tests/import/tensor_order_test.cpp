@@ -7,7 +7,7 @@
 namespace tensorray {
 namespace {
 
-/// Entry (i, j) is 10 i + j, 11 to 33, of the symmetric tensor the upper one.
+/// Entry (i, j) is 10 i + j (11 to 33); a symmetric tensor repeats its upper entries.
 Eigen::Matrix3d numbered(bool symmetric) {
   Eigen::Matrix3d tensor;
   tensor << 11, 12, 13, 21, 22, 23, 31, 32, 33;

@@ -1,6 +1,6 @@
 #pragma once
 /// @file tests/import/voxel_support.h
-/// Temporary files of voxels, the data sets, and looks at what was made of them.
+/// Temporary files of voxels, the data sets, and checks of the results.
 
 #include <array>
 #include <cmath>
@@ -23,7 +23,7 @@
 
 namespace tensorray::test {
 
-/// A path in the tests' temporary folder that no other process uses; what is there is removed at the end.
+/// A path in the tests' temporary folder that no other process uses. The file is removed at the end.
 class TemporaryFile : public std::filesystem::path {
  public:
   explicit TemporaryFile(const std::string& name) : path(testing::TempDir()) {
@@ -52,7 +52,7 @@ std::string bytes_of(const std::vector<Number>& numbers) {
   return {reinterpret_cast<const char*>(numbers.data()), numbers.size() * sizeof(Number)};
 }
 
-/// The tensor at an index, or null where it is inactive.
+/// The tensor at an index; null if the voxel is inactive.
 inline const Eigen::Matrix3f* voxel(const TensorGrid& grid, const Eigen::Vector3i& index) {
   for (const TensorBlock& block : grid.blocks) {
     const Eigen::Vector3i p = index - block.origin;
@@ -77,7 +77,7 @@ inline void for_each_voxel(const TensorGrid& grid,
         visit(block.origin + TensorBlock::position(offset), block.values[offset].cast<double>());
 }
 
-/// The least and the greatest eigenvalue of a symmetric field, and how many voxels have a negative one.
+/// The least and the greatest eigenvalue of a symmetric field, and the number of voxels with a negative eigenvalue.
 struct Spectrum {
   double least = INFINITY, greatest = -INFINITY;
   int negative = 0;
@@ -94,9 +94,10 @@ inline Spectrum spectrum_of(const TensorGrid& grid) {
   return spectrum;
 }
 
-/// How many fibres go on: of the voxels p with a fractional anisotropy above one half, how often the major eigenvector
-/// e, after `turn`, is within half a radian of that of such a voxel at p ± step e. Tensors in a wrong frame have fewer:
-/// fibres then point out of their bundles.
+/// Counts how often fibres continue. At each voxel p with a fractional anisotropy above 0.5, the major eigenvector e,
+/// rotated by `turn`, is compared with the major eigenvectors of such voxels at p ± step e; it counts if they differ
+/// by less than half a radian. Tensors in a wrong frame have a lower count, because their fibres point out of the
+/// bundles.
 inline int coherence(const TensorGrid& grid, const Eigen::Matrix3d& turn, double step) {
   const auto major = [&](const Eigen::Matrix3d& tensor) -> Eigen::Vector3d {
     const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> solver(tensor);
@@ -122,7 +123,7 @@ inline int coherence(const TensorGrid& grid, const Eigen::Matrix3d& turn, double
   return count;
 }
 
-/// Expects an error of one line with `words` in it, whatever its type is.
+/// Expects an exception of any type with a one-line message that contains `words`.
 inline void expect_error(const std::function<void()>& run, const std::vector<std::string>& words) {
   try {
     run();
@@ -139,7 +140,7 @@ inline Eigen::Matrix3d rotation() {
   return Eigen::AngleAxisd(0.7, Eigen::Vector3d(1, -2, 0.5).normalized()).toRotationMatrix();
 }
 
-/// A symmetric tensor without any symmetry of axes.
+/// A symmetric tensor that no permutation of the axes leaves unchanged.
 inline Eigen::Matrix3d symmetric_tensor() {
   Eigen::Matrix3d tensor;
   tensor << 1.5, 0.25, -0.5, 0.25, 0.75, 0.125, -0.5, 0.125, 2;

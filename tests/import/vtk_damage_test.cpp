@@ -1,4 +1,4 @@
-// Files that VTK would read wrongly, or die of, are an error before or after it has had them.
+// Files that VTK would read wrongly, or that would crash it, are errors before or after VTK reads them.
 
 #include <cmath>
 #include <string>
@@ -48,7 +48,7 @@ TEST(VtkDamageTest, TypesAreQuotedOnOneLine) {
   EXPECT_NE(error_of([&] { read_vtk_source(folder / "a.vtu"); }).find("'Poly\\nData\\x1b'"), std::string::npos);
 }
 
-/// netCDF prints what it thinks of a header, besides failing.
+/// netCDF fails on this header, and also prints messages about it.
 TEST(VtkDamageTest, NothingButTheErrorIsSaid) {
   const std::filesystem::path data = data_file("disk_out_ref/disk_out_ref.ex2");
   SKIP_WITHOUT(data);
@@ -89,12 +89,12 @@ TEST(VtkDamageTest, CellsOfPointsThatAreNotThere) {
   }
   EXPECT_NE(error("4\n3 0 1 2", "10").find("cell 0 has fewer points"), std::string::npos);
 
-  const std::string faces = "4 3 0 1 2 3 0 3 1 3 1 3 2 3 0 2 ";  // of a polyhedron
+  const std::string faces = "4 3 0 1 2 3 0 3 1 3 1 3 2 3 0 2 ";  // the faces of a polyhedron
   EXPECT_EQ(error("18\n17 " + faces + "3", "42"), "");
   EXPECT_NE(error("18\n17 " + faces + "9", "42").find("a.vtk: "), std::string::npos);
 }
 
-/// Faces that name other points than their cell, as only XML files can have them.
+/// Faces with other points than their cell has. Only XML files can contain such faces.
 TEST(VtkDamageTest, FacesOfPointsThatAreNotThere) {
   const TemporaryFolder folder;
   const auto grid = vtkSmartPointer<vtkUnstructuredGrid>::New();
@@ -108,7 +108,7 @@ TEST(VtkDamageTest, FacesOfPointsThatAreNotThere) {
   const std::string bytes = bytes_of(folder / "a.vtu");
   const std::size_t stream = bytes.find("4 3 0 1 2 3\n");
   ASSERT_NE(stream, std::string::npos) << bytes;
-  // Wrong counts in the stream are another matter: VTK itself reads on beyond its end.
+  // Wrong counts in the stream are not tested: there VTK itself reads beyond the end.
   std::string damaged = bytes;
   damaged[stream + 8] = '9';
   write_bytes(folder / "a.vtu", damaged);
@@ -161,7 +161,7 @@ TEST(VtkDamageTest, FewerPointsThanDimensions) {
   EXPECT_NE(error("RECTILINEAR_GRID\nDIMENSIONS 2 2 3\n" + axes).find("2 of 3 z coordinates"), std::string::npos);
 }
 
-/// An image in an XML file with those extents as its pieces, each with a number per point.
+/// An XML image whose pieces have these extents, with one number per point.
 std::string image_text(const std::string& whole, const std::vector<std::string>& pieces) {
   std::string text =
       "<VTKFile type=\"ImageData\" version=\"0.1\" byte_order=\"LittleEndian\">\n<ImageData WholeExtent=\"" + whole +
@@ -201,7 +201,7 @@ TEST(VtkDamageTest, PiecesInOtherFilesFillTheExtent) {
   const std::string whole = "WholeExtent=\"0 4 0 3 0 2\" Origin=\"0 0 0\" Spacing=\"1 1 1\"";
   const std::string first = "<Piece Extent=\"0 3 0 3 0 2\" Source=\"p0.vti\"/>\n",
                     second = "<Piece Extent=\"2 4 0 3 0 2\" Source=\"p1.vti\"/>\n";
-  write_bytes(folder / "p0.vti", image_text("0 4 0 3 0 2", {"0 3 0 3 0 2"}));  // with the extent of the whole
+  write_bytes(folder / "p0.vti", image_text("0 4 0 3 0 2", {"0 3 0 3 0 2"}));  // the piece has the extent of the whole
   write_bytes(folder / "p1.vti", image_text("2 4 0 3 0 2", {"2 4 0 3 0 2"}));
   const auto error = [&](const std::string& pieces) {
     write_bytes(folder / "a.pvti", "<VTKFile type=\"PImageData\" version=\"0.1\">\n<PImageData GhostLevel=\"1\" " +
@@ -233,10 +233,10 @@ TEST(VtkDamageTest, TruncatedLegacyFiles) {
   const TemporaryFolder folder;
   for (const auto& [ending, written] : data_sets()) {
     for (const bool binary : {false, true}) {
-      written->GetCellData()->Initialize();  // so that the file ends with the tensors
+      written->GetCellData()->Initialize();  // the tensors become the last array of the file
       write_legacy(*written, folder / "whole.vtk", binary);
       const std::string bytes = bytes_of(folder / "whole.vtk");
-      // Within the tensors: a file that ends between two arrays is a whole one of fewer arrays.
+      // Cut within the tensors: a file that ends between two arrays is a complete file with fewer arrays.
       for (const std::size_t cut : {20, 100, 300}) {
         write_bytes(folder / "cut.vtk", bytes.substr(0, bytes.size() - cut));
         EXPECT_FALSE(error_of([&] { read_vtk_source(folder / "cut.vtk"); }).empty()) << ending << binary << cut;
@@ -257,7 +257,7 @@ TEST(VtkDamageTest, TruncatedExodusFiles) {
   }
 }
 
-/// VTK's own complaints, which it would have printed.
+/// The message contains VTK's own errors, which VTK would have printed.
 TEST(VtkDamageTest, DamageInsideIsThrownAndNotPrinted) {
   const TemporaryFolder folder;
   write_xml(*image(), folder / "a.vti");

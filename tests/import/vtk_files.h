@@ -1,6 +1,6 @@
 #pragma once
 /// @file tests/import/vtk_files.h
-/// Small data sets of every kind with a point array "tensor" and a cell array "rate", and files of them.
+/// Small data sets of every kind with a point array "tensor" and a cell array "rate", and files that contain them.
 
 #include <filesystem>
 #include <string>
@@ -24,10 +24,10 @@
 
 namespace tensorray {
 
-/// Component c at a place.
+/// The value of component c at a position.
 inline double number(const double* x, int c) { return 3 * x[0] - 5 * x[1] + 7 * x[2] + c; }
 
-/// Point array "tensor" of nine and cell array "rate" of three components.
+/// Adds the point array "tensor" with nine components and the cell array "rate" with three.
 template <typename Set>
 inline vtkSmartPointer<Set> with_arrays(vtkSmartPointer<Set> set) {
   vtkNew<vtkDoubleArray> tensor, rate;
@@ -80,7 +80,7 @@ inline vtkSmartPointer<vtkStructuredGrid> structured() {
   return with_arrays(set);
 }
 
-/// A bar of unit cubes along x, from `first`.
+/// A bar of unit cubes along x that begins at `first`.
 inline vtkSmartPointer<vtkUnstructuredGrid> bar(int first, int cubes) {
   auto set = vtkSmartPointer<vtkUnstructuredGrid>::New();
   vtkNew<vtkPoints> points;

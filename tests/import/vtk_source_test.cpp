@@ -55,7 +55,7 @@ std::string pieces_text(const std::string& kind, const std::string& whole, const
 
 TEST(VtkSourceTest, UnstructuredPiecesAreMergedAndGhostCellsRemoved) {
   const TemporaryFolder folder;
-  const auto first = bar(0, 3), second = bar(2, 3);  // they share the cube from 2 to 3, which is the first's
+  const auto first = bar(0, 3), second = bar(2, 3);  // both have the cube from 2 to 3; the first owns it
   second->AllocateCellGhostArray()->SetValue(0, vtkDataSetAttributes::DUPLICATECELL);
   second->AllocatePointGhostArray()->SetValue(5, vtkDataSetAttributes::DUPLICATEPOINT);
   write_xml(*first, folder / "p0.vtu");
@@ -109,7 +109,7 @@ TEST(VtkSourceTest, ImagePiecesAreOneImage) {
   EXPECT_NEAR(peak, 1.4e-3, 0.1e-3);
   EXPECT_GT(asymmetry, 1e-4);
 
-  // Each piece stands where the whole says: a point of the last one.
+  // Each piece is at the place that the whole file gives it. Check a point of the last piece.
   const vtkSmartPointer<vtkImageData> piece =
       vtkImageData::SafeDownCast(read_vtk_source(data_file("pv_tensors/tensors_3.vti")).Get());
   int from[3] = {310, 0, 140};
@@ -221,7 +221,8 @@ TEST(VtkSourceTest, OpenFoamCase) {
     ASSERT_EQ(read->GetNumberOfCells(), OpenFoamCase::cells);
     ASSERT_EQ(read->GetNumberOfPoints(), 27);
     EXPECT_TRUE(Eigen::Vector3d(read->GetPoint(26)).isApprox(Eigen::Vector3d(2, 1, 4)));
-    const int symmetric[6] = {0, 3, 5, 1, 4, 2};  // VTK's xx yy zz xy yz xz among OpenFOAM's xx xy xz yy yz zz
+    const int symmetric[6] = {0, 3, 5,
+                              1, 4, 2};  // indices of VTK's xx yy zz xy yz xz among OpenFOAM's xx xy xz yy yz zz
     for (int cell = 0; cell < OpenFoamCase::cells; ++cell) {
       vtkCellData& data = *read->GetCellData();
       for (int c = 0; c < 9; ++c)
@@ -231,7 +232,7 @@ TEST(VtkSourceTest, OpenFoamCase) {
       }
       for (int c = 0; c < 3; ++c) EXPECT_EQ(data.GetArray("U")->GetComponent(cell, c), OpenFoamCase::value(cell, c, 1));
     }
-    // The order is known without being given, and that of OpenFOAM's own files is refused.
+    // The components' names tell the order. The order of OpenFOAM's own files is refused.
     const ArrayChoice sigma{"sigma", true};
     const auto tensors = with_tensors(*read, sigma, Take::tensor, {});
     const double* const corner =
@@ -242,7 +243,7 @@ TEST(VtkSourceTest, OpenFoamCase) {
     }
     EXPECT_NO_THROW(with_tensors(*read, {"sigma", false}, Take::tensor, {}));
     EXPECT_THROW(with_tensors(*read, sigma, Take::tensor, TensorOrder::fsl), std::invalid_argument);
-    // Points have the mean of their cells: the middle one that of all.
+    // Points have the mean of their cells; the middle point has the mean of all cells.
     EXPECT_NEAR(read->GetPointData()->GetArray("gradU")->GetComponent(13, 3), 1000 + 35 + 3, 1e-3);
   }
 }

@@ -1,4 +1,4 @@
-// Paths as VTK polydata: through `tensorray-import`, as the program writes and reads them, and files that are damaged.
+// Paths as VTK polydata: written and read by the program through `tensorray-import`, and damaged files.
 
 #include <array>
 #include <cmath>
@@ -32,8 +32,8 @@ using ::testing::AllOf;
 using ::testing::HasSubstr;
 using ::testing::StartsWith;
 
-/// Reads a file of these bytes, and what is written to the terminal meanwhile must be nothing.
-/// @return the error's message; empty if it was read.
+/// Reads a file with these bytes, and expects that nothing is written to the terminal meanwhile.
+/// @return the error message; empty if the file was read.
 std::string error_of_bytes(const std::string& bytes) {
   const TemporaryFolder folder;
   const std::filesystem::path file = folder / "a.vtp";
@@ -54,7 +54,7 @@ std::string written(const std::vector<Path>& paths) {
   return bytes_of(folder / "a.vtp");
 }
 
-/// Whether VTK takes a file of these bytes, in a process of its own, which is quick where the program's start is not.
+/// Whether VTK reads a file with these bytes. Runs VTK in a child process, which is faster than to start the program.
 bool is_taken(const std::string& bytes) {
   const TemporaryFolder folder;
   write_bytes(folder / "a.vtp", bytes);
@@ -73,7 +73,7 @@ bool is_taken(const std::string& bytes) {
   return status == 0;
 }
 
-/// A file as other programs write it: two lines that share a point, a vertex and a triangle besides.
+/// A file as other programs write it: two lines that share a point, and also a vertex and a triangle.
 std::string foreign_vtp(const std::string& connectivity = "0 1 2 2 3") {
   const auto cells = [](const std::string& corners, const std::string& offsets) {
     return "<DataArray type=\"Int32\" Name=\"connectivity\" format=\"ascii\">" + corners +
@@ -102,7 +102,7 @@ TEST(VtpPathsTest, CutFilesFail) {
     if (size % 500 != 1) continue;
     EXPECT_NE(error_of_bytes(bytes.substr(0, size)), "") << size;
   }
-  EXPECT_TRUE(is_taken(bytes.substr(0, bytes.size() - 1)));  // The last line end.
+  EXPECT_TRUE(is_taken(bytes.substr(0, bytes.size() - 1)));  // Only the last line end is missing.
 }
 
 TEST(VtpPathsTest, DamagedFilesNeverCrash) {
@@ -192,7 +192,7 @@ TEST(VtpPathsTest, UnwritableFilesAreNoticed) {
   EXPECT_THAT(error_of([&] { write_paths(folder / "a.vtp", paths); }), HasSubstr("cannot be written"));
 }
 
-/// What python3 prints for a program that reads the file with VTK; empty where it has no VTK.
+/// The output of a python3 program that reads the file with VTK; empty if python3 has no VTK.
 std::string printed_by_vtk(const std::filesystem::path& file, const std::string& program) {
   const TemporaryFolder folder;
   const std::filesystem::path script = folder / "read.py";
@@ -231,7 +231,7 @@ TEST(VtpPathsTest, VtkReadsThem) {
       " '%.6f' % points.GetArray('curvature').GetTuple1(4), points.GetArray('axis_minor').GetTuple3(2))\n");
   if (text.empty()) GTEST_SKIP() << "python3 has no VTK (python3-vtk9)";
 
-  const PathPoint& point = paths[2].points[2];  // The last one of the second polyline: point 4 of the file.
+  const PathPoint& point = paths[2].points[2];  // The last point of the second polyline: point 4 of the file.
   char expected[1000];
   const auto section = cross_sections(paths[2].points, {1, 1e-300, 1e300})[2];
   std::snprintf(
@@ -239,7 +239,7 @@ TEST(VtpPathsTest, VtkReadsThem) {
       "14 4 4\naxis_major axis_minor change curvature direction force in_field length tensor\n"
       "backward_end end flexibility wavelength\nobstacle -1.0\n4 %.17g %.17g\n%.6f %.6f %.6f (0.0, 0.0, 0.0)\n",
       point.position.x(), point.tensor(0, 1), point.force().x(), section.major.z(), point.change.norm());
-  // Python prints the fewest digits that keep a number; compare numbers as numbers.
+  // Python prints as few digits as possible. Compare the values, not the text.
   std::istringstream have(text), want(expected);
   for (std::string a, b; want >> b;) {
     ASSERT_TRUE(have >> a) << text;
@@ -274,7 +274,7 @@ void rewrite(const std::filesystem::path& from, const std::filesystem::path& to,
 
 TEST(VtpPathsTest, EveryEncodingOfVtk) {
   const std::vector<std::function<void(vtkXMLWriter&)>> settings{
-      [](vtkXMLWriter&) {},  // ZLib: what VTK and ParaView do unless they are told otherwise.
+      [](vtkXMLWriter&) {},  // ZLib, the default of VTK and ParaView.
       [](vtkXMLWriter& writer) { writer.SetCompressorTypeToNone(); },
       [](vtkXMLWriter& writer) { writer.SetCompressorTypeToLZ4(); },
       [](vtkXMLWriter& writer) { writer.SetCompressorTypeToLZMA(); },
@@ -292,7 +292,7 @@ TEST(VtpPathsTest, EveryEncodingOfVtk) {
       const std::vector<Path> read = read_paths(folder / "b.vtp");
       if (encoding != Encoding::ascii)
         expect_same(read, without_empty(paths));
-      else  // Of fewer digits.
+      else  // Written with fewer digits.
         EXPECT_NEAR(read.at(3).points.at(4).tensor(2, 0), paths[4].points[4].tensor(2, 0), 1e-6);
     }
 }

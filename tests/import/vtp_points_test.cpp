@@ -83,7 +83,7 @@ TEST(VtpPoints, FullDiskIsNoticed) {
   }
 }
 
-/// What of it `tensorray-import` does: the exchanged file above is larger than the one of VTK.
+/// The full disk for VTK's file. The exchanged file in the test above is larger than the file that VTK writes.
 TEST(VtpPoints, FullDiskIsNoticedByVtk) {
   PolyData data;
   data.points.values = std::vector<float>(3 * 5000, 1.5f);

@@ -41,7 +41,7 @@ void announce(const std::string& what) {
 Json measure(const CommandLine& line) {
   const auto wanted = [&](const char* part) { return line.only.empty() || line.only == part; };
   Json results = {{"version", TENSORRAY_VERSION}, {"quick", line.options.quick}};
-  results["machine"] = measure_machine(line.options);  // The other tables need its limits.
+  results["machine"] = measure_machine(line.options);  // The other measurements are compared with the machine's limits.
   if (wanted("kernels")) results["kernels"] = measure_kernels(line.options, results["machine"]);
   if (wanted("loading")) results["loading"] = measure_loading(line.options, results["machine"]);
   if (wanted("jobs")) results["jobs"] = measure_jobs(line.options);

@@ -1,6 +1,6 @@
 #pragma once
 /// @file tools/benchmark/kernels.h
-/// The kernels that are compared: tensorray's, and those that other libraries offer instead.
+/// The kernels that are compared: those of tensorray, and the alternatives in other libraries.
 
 #include <functional>
 #include <optional>
@@ -21,7 +21,7 @@ struct Kernel {
   std::function<TraceFunction(const TestField&)> make;
   std::string instructions;                ///< Instruction set of tensorray's packet kernel; empty for other kernels.
   std::string missing;                     ///< Why the kernel cannot be measured here; empty if it can.
-  bool follows_the_rule = true;            ///< Whether it traces rays by Eq. 5 to the same ends.
+  bool follows_the_rule = true;            ///< Whether it traces rays by Eq. 5, so that they end at the same positions.
   bool on_one_field = false;               ///< Whether it is measured on the first field only.
   BendingSettings settings = splitting();  ///< Settings of the reference that it is compared with.
 

@@ -110,8 +110,8 @@ void add_job(const Options& options, const TemporaryFolder& folder, const Render
   }
 }
 
-/// How many times faster a position is traced than with OpenVDB's sampler, which gets fewer positions because it is
-/// slow.
+/// How many times faster a position is traced than with OpenVDB's sampler. That sampler gets fewer positions, because
+/// it is slow.
 Json compare_box_sampler(const Options& options, const TemporaryFolder& folder) {
   const int resolution = options.quick ? 16 : 128, side = options.quick ? 32 : 1024, threads = processor().threads;
   const RenderJob few = photon_job(resolution, options.quick ? 100 : 2048, side),

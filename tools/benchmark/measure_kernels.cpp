@@ -47,7 +47,7 @@ std::vector<MeasuredField> fields_to_measure(bool quick) {
   };
 }
 
-/// The greatest distance, in voxels, between where a ray ends by the kernel and by the reference.
+/// The greatest distance, in voxels, between the ends of a ray traced by the kernel and by the reference.
 double greatest_difference(const TestField& test, Order order, const TraceFunction& kernel,
                            const BendingSettings& settings) {
   RayBatch rays = make_batches(test, order, 0, 1)[0], expected = rays;

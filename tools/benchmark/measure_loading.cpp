@@ -30,7 +30,7 @@ Json measure_loading(const Options& options, const Json& machine) {
     reading[i] = wall_seconds() - start;
     voxels = static_cast<double>(grid.active_voxels());
     start = wall_seconds();
-    const TensorField field(std::move(grid));  // Moved, as in jobs.
+    const TensorField field(std::move(grid));  // Moved, as in render jobs.
     bricks[i] = wall_seconds() - start;
     memory = static_cast<double>(field.memory_bytes());
   }

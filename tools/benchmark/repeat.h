@@ -1,6 +1,6 @@
 #pragma once
 /// @file tools/benchmark/repeat.h
-/// Measures the rate of work of any length, in several repetitions.
+/// Measures the rate of work, in several repetitions.
 
 #include <algorithm>
 #include <array>
@@ -17,7 +17,7 @@ struct Rate {
   double median = 0, least = 0, most = 0;
 };
 
-/// Takes an odd number of values.
+/// The rate from an odd number of values.
 template <std::size_t Count>
 Rate rate_of(std::array<double, Count> values) {
   std::sort(values.begin(), values.end());

@@ -10,12 +10,12 @@ namespace {
 
 using Row = std::vector<std::string>;
 
-/// Columns as a terminal shows them: bytes after the first one of a character take no room.
+/// The columns that a terminal needs: only the first byte of each character counts.
 std::size_t width_of(const std::string& text) {
   return static_cast<std::size_t>(std::count_if(text.begin(), text.end(), [](char c) { return (c & 0xc0) != 0x80; }));
 }
 
-/// The first row is the heading, the first column is flush left.
+/// The first row is the heading. The first column is flush left.
 std::string table(const std::vector<Row>& rows) {
   std::vector<std::size_t> widths(rows[0].size(), 0);
   for (const Row& row : rows)
@@ -56,7 +56,7 @@ std::string rate_and_ratio(const Json& row) {
   return fmt::format("{:.3g} ({:.3g}x)", number(row, "samples_per_second") / 1e6, number(row, "ratio"));
 }
 
-/// Kernels down, measurements across.
+/// One row per kernel, one column per measurement.
 std::string kernel_rates(const Json& measurements, const Json& missing) {
   std::vector<Row> rows{{"millions of samples a second, one thread"}};
   for (const Json& row : measurements[0].at("kernels")) rows.push_back({row.at("kernel")});

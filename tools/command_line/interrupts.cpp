@@ -5,7 +5,7 @@
 namespace tensorray {
 namespace {
 
-Progress progress;  // Global, as a signal handler can reach nothing else.
+Progress progress;  // Global, because a signal handler can reach nothing else.
 
 void on_interrupt(int) {
   progress.cancelled = true;

@@ -1,13 +1,13 @@
 #pragma once
 /// @file tools/command_line/interrupts.h
-/// What the programs do about signals.
+/// How the programs handle signals.
 
 #include "base/progress.h"
 
 namespace tensorray {
 
-/// Has Ctrl-C (SIGINT, SIGTERM) cancel the progress that is returned, which lives as long as the program; a second one
-/// ends the program at once. A broken pipe and a file-size limit become errors of the write that meets them.
+/// Makes SIGINT (Ctrl-C) and SIGTERM cancel the returned progress, which lives as long as the program. A second
+/// signal ends the program at once. Broken pipes and file-size limits become errors of the write that meets them.
 Progress& progress_until_interrupted();
 
 }  // namespace tensorray

@@ -34,7 +34,7 @@ std::string time_text(double seconds) {
 }
 
 /// "tracing photons   43% [##########..............]  1.2 M/s  0:12 left", cut to `width` columns.
-/// @param rate  Done per second; 0: not known yet.
+/// @param rate  Units per second; 0: not known yet.
 std::string progress_line(const std::string& phase, std::uint64_t done, std::uint64_t total, double rate, int width) {
   constexpr std::size_t bar_width = 24;
   const double fraction = total > 0 ? std::min(1.0, static_cast<double>(done) / static_cast<double>(total)) : 0;
@@ -76,7 +76,7 @@ void ProgressBar::update(const std::string& phase, std::uint64_t done, std::uint
   last_drawn_ = now;
   const double seconds = std::chrono::duration<double>(now - phase_start_).count();
   const double rate = seconds > 0.2 ? static_cast<double>(done - done_at_start_) / seconds : 0;
-  // One column is left free, where some terminals would wrap.
+  // Leave one column free, because some terminals wrap a full line.
   fmt::print(stderr, "{}{}", clear_line, progress_line(phase, done, total, rate, terminal_width() - 1));
   std::fflush(stderr);
   drawn_ = true;

@@ -1,6 +1,6 @@
 #pragma once
 /// @file tools/command_line/progress_bar.h
-/// How far long work is, on a terminal: one line that is drawn over and over, and erased at the end.
+/// Progress of long work on a terminal: one line that is redrawn, and erased at the end.
 
 #include <chrono>
 #include <cstdint>
@@ -10,14 +10,14 @@
 
 namespace tensorray {
 
-/// While it lives it is the `report` of a Progress. Draws on standard error, and only if that is a terminal.
+/// Becomes the `report` of a Progress until it is destroyed. Draws on standard error, and only if that is a terminal.
 class ProgressBar {
  public:
   /// @param progress  Must outlive the bar.
   /// @param quiet     Draw nothing.
   ProgressBar(Progress& progress, bool quiet);
 
-  /// Erases what was drawn, so that what is printed next begins on a clean line.
+  /// Erases the line, so that the next output begins on a clean line.
   ~ProgressBar();
   ProgressBar(const ProgressBar&) = delete;
   ProgressBar& operator=(const ProgressBar&) = delete;
@@ -31,7 +31,7 @@ class ProgressBar {
   bool drawn_ = false;
   std::string phase_;
   std::uint64_t done_at_start_ = 0;
-  Clock::time_point phase_start_, last_drawn_;  // A new phase starts its rate anew.
+  Clock::time_point phase_start_, last_drawn_;  // Each phase measures its own rate.
 };
 
 }  // namespace tensorray

@@ -27,7 +27,7 @@ int run_and_report(const std::function<void()>& work) {
     work();
     if (std::fflush(stdout) != 0) throw std::runtime_error("standard output cannot be written: the disk may be full");
     return 0;
-  } catch (const CLI::RuntimeError& child) {  // Which has said why.
+  } catch (const CLI::RuntimeError& child) {  // The child has printed the error.
     return child.get_exit_code();
   } catch (const CLI::ParseError& error) {
     fmt::print(stderr, "tensorray: {} (--help says more)\n", escaped(error.what()));

@@ -1,12 +1,12 @@
 #pragma once
 /// @file tools/command_line/run_and_report.h
-/// Errors as users see them: one line, and an exit status.
+/// Reports errors to the user: one line, and an exit status.
 
 #include <functional>
 
 namespace tensorray {
 
-/// Does `work`. What it throws becomes a line on standard error.
+/// Calls `work`, and prints an exception that it throws as one line on standard error.
 /// @return the exit status: 0 done, 1 failed, 2 the command line or the scene is wrong, 130 interrupted.
 int run_and_report(const std::function<void()>& work);
 

@@ -1,6 +1,6 @@
 #pragma once
 /// @file tools/command_line/tell.h
-/// What the commands say besides their results.
+/// Prints what the commands say in addition to their results.
 
 #include <string>
 #include <vector>
@@ -9,7 +9,7 @@
 
 namespace tensorray {
 
-/// Prints `lines` on standard error, unless it is to be quiet.
+/// Prints `lines` on standard error, unless `quiet` is set.
 inline void tell(const std::vector<std::string>& lines, bool quiet) {
   if (quiet) return;
   for (const std::string& line : lines) fmt::print(stderr, "{}\n", line);

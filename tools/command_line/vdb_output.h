@@ -1,6 +1,6 @@
 #pragma once
 /// @file tools/command_line/vdb_output.h
-/// The check of the command line that an output will be known as an OpenVDB file.
+/// Checks on the command line that other programs will recognize an output as an OpenVDB file.
 
 #include <filesystem>
 #include <string>
@@ -8,7 +8,7 @@
 
 namespace tensorray {
 
-/// Empty, or what is wrong: an ending that other programs will not know the file by. Devices and pipes have none.
+/// @return an error message if the name has another ending, else an empty string. Devices and pipes need no ending.
 inline std::string check_vdb_output(const std::string& text) {
   const std::filesystem::path path(text);
   std::error_code error;

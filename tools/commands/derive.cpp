@@ -27,7 +27,7 @@ struct DeriveOptions {
   std::vector<std::string> invariants;
 };
 
-/// Each once, in the order asked for. @throw std::invalid_argument that lists the invariants.
+/// Each invariant once, in the order of the options. @throw std::invalid_argument that lists the invariants.
 std::vector<Invariant> chosen_invariants(const DeriveOptions& options) {
   std::vector<Invariant> chosen;
   for (const std::string& name : options.invariants) {
@@ -37,7 +37,7 @@ std::vector<Invariant> chosen_invariants(const DeriveOptions& options) {
   return chosen;
 }
 
-/// What holds of all grids.
+/// Metadata that is the same for all grids.
 std::map<std::string, std::string> file_metadata(const TensorGrid& field) {
   std::map<std::string, std::string> metadata = field.metadata;
   metadata.erase("tensorray:units");

@@ -22,7 +22,7 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-constexpr double voxel_step_flexibility = 0.3;  // The strongest of the paper's.
+constexpr double voxel_step_flexibility = 0.3;  // The strongest flexibility in the paper.
 
 struct InfoOptions {
   std::filesystem::path file;
@@ -30,10 +30,10 @@ struct InfoOptions {
   bool json = false;
 };
 
-/// All that is told of a field.
+/// Everything that is printed about a field.
 struct FieldInfo {
   std::string name;
-  Eigen::Matrix4d transform;  ///< Index to world.
+  Eigen::Matrix4d transform;  ///< From voxel indices to world.
   std::map<std::string, std::string> metadata;
   FieldStatistics statistics;
 
@@ -96,7 +96,7 @@ Json to_json(const FieldInfo& field) {
   json["asymmetry"] = s.asymmetry;
   json["absolute_loss"] = s.absolute_loss;
   json["deviator_max"] = s.deviator_max;
-  // Infinite for a field that does not bend light, which JSON has no number for: null.
+  // Infinite for a field that does not bend light. JSON has no number for that and gets null.
   json["stable_step"] = {{"world_at_flexibility_1", s.stable_step(1)},
                          {"voxels_at_flexibility_0.3", field.stable_step_in_voxels()}};
   json["metadata"] = field.metadata;
@@ -131,7 +131,7 @@ std::string box_text(const Box& box) {
   return fmt::format("({}) to ({})", text(box.min()), text(box.max()));
 }
 
-/// Rounded, so that what is 0 but for rounding errors says so; + 0 turns −0 into 0.
+/// Rounded, so that a value that is 0 except for rounding errors is printed as 0; + 0 turns −0 into 0.
 std::string percent(double fraction) { return fmt::format("{:.4g} %", std::round(1e8 * fraction) / 1e6 + 0.0); }
 
 void print_grid(const FieldInfo& field) {
@@ -206,7 +206,7 @@ void add_info_command(CLI::App& program) {
   command->add_option("--field", options->field, "Only this tensor field; without it, all");
   command->add_flag("--json", options->json, "As JSON");
   command->callback([options] {
-    std::signal(SIGINT, SIG_DFL);  // It writes nothing that could be left half.
+    std::signal(SIGINT, SIG_DFL);  // This command writes no file, so Ctrl-C may end it at once.
     std::signal(SIGTERM, SIG_DFL);
     info(*options);
   });

@@ -47,7 +47,7 @@ const CLI::Validator finite(
     },
     "");
 
-/// The visitor of a generator's parameters that makes a flag of each: poisson_ratio becomes --poisson-ratio.
+/// Visits the parameters of a generator and adds a flag for each: poisson_ratio becomes --poisson-ratio.
 class FlagMaker {
  public:
   explicit FlagMaker(CLI::App& command) : command_(command) {}
@@ -163,7 +163,7 @@ void add_make_command(CLI::App& program, Progress& progress) {
     add_kind(*command, kind, progress);
     kinds += (kinds.empty() ? "" : ", ") + kind;
   }
-  // A word that is no kind would be an extra argument; instead of refusing it as that, list the kinds.
+  // CLI11 treats an unknown kind as an extra argument. Allow extras, so that the error can list the kinds.
   command->require_subcommand(0, 1)->allow_extras();
   command->callback([command, kinds] {
     if (!command->get_subcommands().empty()) return;

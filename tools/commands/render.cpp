@@ -21,7 +21,7 @@ struct RenderOptions {
   RenderRun run;
 };
 
-/// The kinds of outputs with their endings, from the methods' table.
+/// The kinds of outputs and their endings, from the table of methods.
 std::string output_help() {
   std::string text =
       "Write this instead of the scene's outputs; one of each kind may be given. The ending says the kind";

@@ -23,7 +23,7 @@
 namespace tensorray {
 namespace {
 
-/// Where the statistics go among the outputs, which are written together.
+/// The key of the statistics file among the outputs, because all files are committed together.
 const std::string statistics_key = "--stats";
 
 void write_text(OutputFile& file, const std::string& text) {
@@ -42,7 +42,7 @@ OutputFiles open_files(const SceneDescription& description, const std::filesyste
   return files;
 }
 
-/// All files take their names, or none does.
+/// Gives all files their final names, or none of them.
 void commit(OutputFiles files) {
   std::vector<OutputFile> complete;
   for (auto& [key, file] : files) complete.push_back(std::move(file));
@@ -64,7 +64,7 @@ void render_scene(const std::filesystem::path& scene_file, const SceneChanges& c
   const Scene scene = load_scene(description, progress);
   tell(scene.notes, run.quiet);
   const Render result = render(scene, progress);
-  bar.reset();  // Erased, so that what is printed next stands alone.
+  bar.reset();  // Erase the bar before the notes are printed.
   for (const std::string& warning : result.warnings) tell({"warning: " + warning}, run.quiet);
 
   const auto start = std::chrono::steady_clock::now();

@@ -1,6 +1,6 @@
 #pragma once
 /// @file tools/commands/render_scene.h
-/// From scene file to pictures.
+/// Renders a scene file and writes its outputs.
 
 #include <filesystem>
 
@@ -10,12 +10,12 @@
 namespace tensorray {
 
 struct RenderRun {
-  unsigned threads = 0;              ///< 0: all.
-  bool quiet = false;                ///< Prints nothing but errors.
-  std::filesystem::path statistics;  ///< JSON file to write; empty: none.
+  unsigned threads = 0;              ///< Number of threads; 0: all.
+  bool quiet = false;                ///< Print only errors.
+  std::filesystem::path statistics;  ///< JSON file for the statistics; empty: none.
 };
 
-/// Reads the scene file, loads the scene, renders it and writes its outputs, with a progress bar and notes.
+/// Reads the scene file, loads the scene, renders it and writes its outputs. Prints a progress bar and notes.
 /// @throw SceneError, std::invalid_argument, std::runtime_error, Cancelled.
 void render_scene(const std::filesystem::path& scene_file, const SceneChanges& changes, const RenderRun& run,
                   Progress& progress);

@@ -10,7 +10,7 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-/// Counts, or powers, by the ends of rays. `emitted` is their sum, so that the balance is exact.
+/// Counts or powers by where rays ended. `emitted` is computed as their sum, so that the balance is exact.
 template <class Number>
 Json balance(const std::array<Number, ray_end_count>& ends) {
   Number emitted = 0;

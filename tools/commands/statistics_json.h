@@ -9,9 +9,9 @@
 
 namespace tensorray {
 
-/// `photons` counts rays (a position emits one for each wavelength that it carries), `power` is theirs in the unit of
-/// the light's irradiance times area; both balance: emitted = deposited + missed + stopped. `channels` has the counts
-/// of each wavelength.
+/// `photons` counts rays; one position emits one ray for each wavelength. `power` is the power of these rays, in the
+/// unit of the light's irradiance times area. Both balance: emitted = deposited + missed + stopped. `channels` has
+/// the counts of each wavelength.
 std::string statistics_json(const Scene& scene, const Statistics& statistics, double seconds_writing, int threads);
 
 }  // namespace tensorray

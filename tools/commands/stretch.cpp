@@ -20,7 +20,7 @@ struct StretchOptions {
   RenderRun run;
 };
 
-/// The command is a short form of `render` with the method "stretch".
+/// The command is short for `render` with the method "stretch".
 SceneChanges changes_of(const StretchOptions& options) {
   SceneChanges changes = options.changes;
   const auto set = [&changes](const char* key, const auto& value) {

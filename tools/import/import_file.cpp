@@ -23,7 +23,7 @@
 namespace tensorray {
 namespace {
 
-/// The reader of a format of voxels, or null.
+/// The reader of a voxel format; null if the file is of another kind.
 using OpenLattice = Lattice (*)(const std::filesystem::path&);
 
 OpenLattice lattice_reader(const std::filesystem::path& path) {
@@ -39,7 +39,7 @@ bool wants_sampling(const ImportSettings& settings) {
   return !std::holds_alternative<std::monostate>(settings.sampling.resolution);
 }
 
-/// Leaves the voxels whose centres are in `bounds`, to rounding.
+/// Keeps only the voxels whose centres are in `bounds`, except for rounding.
 void crop(TensorGrid& grid, Eigen::AlignedBox3d bounds) {
   const Eigen::Vector3d rounding = Eigen::Vector3d::Constant(1e-6 * grid.to_world.linear().colwise().norm().minCoeff());
   bounds = {bounds.min() - rounding, bounds.max() + rounding};
@@ -92,13 +92,13 @@ TensorGrid import_mesh(vtkDataSet& data, const ArrayChoice& array, const ImportS
   return grid;
 }
 
-/// A VTK image's voxels are kept, unless others are asked for.
+/// Keeps the voxels of a VTK image, unless the user asks for other voxels.
 TensorGrid import_data_set(vtkSmartPointer<vtkDataSet> data, const ImportSettings& settings, const Progress& progress,
                            ImportReport& report) {
   const ArrayChoice array = choose_array(*data, settings.array, settings.take);
   auto image = vtkSmartPointer<vtkImageData>(vtkImageData::SafeDownCast(data));
   if (!image || wants_sampling(settings)) return import_mesh(*data, array, settings, progress, report);
-  data = nullptr;  // So that the lattice alone holds the numbers, and can give them back.
+  data = nullptr;  // Leave the lattice as the only owner of the numbers, so that it can free them.
   vtkDataSetAttributes* attributes = array.of_cells ? static_cast<vtkDataSetAttributes*>(image->GetCellData())
                                                     : static_cast<vtkDataSetAttributes*>(image->GetPointData());
   vtkSmartPointer<vtkDataArray> values = attributes->GetArray(array.name.c_str());
@@ -123,7 +123,7 @@ TensorGrid import_any(const ImportSettings& settings, const Progress& progress, 
   return import_lattice(open(file), settings, report);
 }
 
-/// Errors name the file, whoever found them, and are one line whatever they quote of it.
+/// An error message in one line that names the file.
 std::string about(const std::filesystem::path& file, const std::string& error) {
   const std::string message = escaped(error);
   return message.find(file.string()) == std::string::npos ? file.string() + ": " + message : message;

@@ -1,6 +1,6 @@
 #pragma once
 /// @file tools/import/import_file.h
-/// Other programs' files → a tensor grid: finds the format, and takes the way from there that it needs.
+/// Reads tensors from files of other programs: finds the format and calls its reader.
 
 #include <cstddef>
 #include <filesystem>
@@ -15,25 +15,25 @@
 namespace tensorray {
 
 struct ImportSettings {
-  /// One file; two for PLOT3D, the grid and its q.
+  /// One file. For PLOT3D two: the grid file and the q file.
   std::vector<std::filesystem::path> files;
-  std::string array;  ///< Empty: the only one that suits.
+  std::string array;  ///< Name of the array; empty: the only suitable one.
   Take take = Take::tensor;
-  std::optional<TensorOrder> order;  ///< Of six components, where the format does not say it.
-  SamplingSettings sampling;         ///< For data on voxels only `bounds`, but in VTK's files.
-  std::filesystem::path boundary;    ///< Where the body's surface goes; empty: nowhere.
+  std::optional<TensorOrder> order;  ///< Order of six components, where the file does not state it.
+  SamplingSettings sampling;         ///< For files of voxels only `bounds` is used, except for VTK files.
+  std::filesystem::path boundary;    ///< File for the surface of the body; empty: none.
 };
 
-/// What was found, and what became of it; of the two ways one.
+/// What was found in the files and how it was converted. Only one of the two reports is filled.
 struct ImportReport {
   std::optional<LatticeReport> lattice;
   std::optional<SamplingReport> mesh;
   std::size_t mesh_cells = 0, boundary_triangles = 0;
 };
 
-/// Voxels stay what they are; meshes are sampled. The grid has the array's name and, as metadata, its source.
-/// VTK's readers may end the process on damaged files: call it in a process that may die.
-/// @throw std::invalid_argument, std::runtime_error: one line that names the file or the flag, and the mend.
+/// Reads voxels as they are, and samples meshes. The grid gets the array's name, and its source as metadata. VTK's
+/// readers may end the process on damaged files: call this in a child process (child_process.h).
+/// @throw std::invalid_argument, std::runtime_error: one line that names the file or the flag, and the fix.
 TensorGrid import_tensors(const ImportSettings& settings, const Progress& progress, ImportReport& report);
 
 }  // namespace tensorray

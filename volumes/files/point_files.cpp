@@ -20,7 +20,7 @@ constexpr double points_per_voxel = 8;
 openvdb::Vec3f to_openvdb(const Eigen::Vector3f& v) { return {v.x(), v.y(), v.z()}; }
 float to_openvdb(float value) { return value; }
 
-/// What OpenVDB's conversions take as a list of points or of attributes; refers to the vector.
+/// The list of points or of attributes that OpenVDB's conversions take; it refers to the vector.
 template <class Stored, class Value>
 class List {
  public:
@@ -41,8 +41,8 @@ class List {
 using VectorList = List<Eigen::Vector3f, openvdb::Vec3f>;
 using ScalarList = List<float, float>;
 
-/// The edge of voxels with about eight points each, were the points spread evenly over their box. Points in a plane or
-/// on a line fill fewer voxels: an axis counts only where the box is thicker than a voxel.
+/// The edge of voxels that hold about eight points each if the points are spread evenly over their box. Points in a
+/// plane or on a line fill fewer voxels: an axis counts only where the box is thicker than a voxel.
 double voxel_edge(const std::vector<Eigen::Vector3f>& positions) {
   const Eigen::AlignedBox3d box = box_of(positions).cast<double>();
   if (box.isEmpty()) return 1;
@@ -56,7 +56,7 @@ double voxel_edge(const std::vector<Eigen::Vector3f>& positions) {
     edge = volume_edge;
   else if (extent[1] >= area_edge && extent[1] > 0)
     edge = area_edge;
-  // Indices must fit 32 bits, and voxels below the positions' precision hold nothing more.
+  // Indices must fit 32 bits. Voxels smaller than the precision of the positions separate no points.
   const double farthest = std::max(box.min().cwiseAbs().maxCoeff(), box.max().cwiseAbs().maxCoeff());
   edge = std::max(edge, 1e-7 * farthest);
   return edge > 0 ? edge : 1;

@@ -69,7 +69,7 @@ class Reader {
     return number;
   }
 
-  /// How many elements follow, of at least `size` bytes each.
+  /// Reads how many elements follow. Each takes at least `size` bytes.
   std::size_t count(std::size_t size) {
     const std::uint64_t count = number();
     if (count > left_ / size) fail();
@@ -130,7 +130,7 @@ class Reader {
   }
 
   std::ifstream file_;
-  std::uintmax_t left_;  ///< Bytes up to the end of the file.
+  std::uintmax_t left_;  ///< Bytes from here to the end of the file.
 };
 
 Named<DataView> views_of(const Named<DataArray>& arrays) {

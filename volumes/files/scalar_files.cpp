@@ -20,7 +20,8 @@ openvdb::FloatGrid::Ptr float_grid(const ScalarGrid& grid) {
   result->setTransform(linear_transform(grid.to_world));
   result->setGridClass(grid.fog ? openvdb::GRID_FOG_VOLUME : openvdb::GRID_UNKNOWN);
   for (const auto& [key, value] : grid.metadata)
-    if (!(*result)[key]) result->insertMeta(key, openvdb::StringMetadata(value));  // Not its name, class, ...
+    if (!(*result)[key])
+      result->insertMeta(key, openvdb::StringMetadata(value));  // Keep the grid's own entries: name, class, ...
   return result;
 }
 

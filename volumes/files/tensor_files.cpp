@@ -17,24 +17,24 @@ namespace {
 
 constexpr double greatest_half = 65504;
 
-/// More blocks than any machine holds: what an active tile at the root of a tree would expand to.
+/// More blocks than fit in any machine's memory. An active tile at the root of a tree would expand to as many.
 constexpr std::size_t greatest_block_count = std::size_t{1} << 25;
 
 bool is_vector(const GridInfo& grid) { return grid.type == "vec3s" || grid.type == "vec3d"; }
 bool is_scalar(const GridInfo& grid) { return grid.type == "float" || grid.type == "double"; }
 
-/// Where a component of a grid's value goes in the tensor.
+/// The tensor entry that a component of a grid's value is stored in.
 struct Entry {
   int component, row, column;
 };
 
-/// A grid of a field: the ending of its name, and what it holds.
+/// A grid of a field: the ending of its name, and the entries that it holds.
 struct Part {
   std::string suffix;
   std::vector<Entry> entries;
 };
 
-/// A way to lay a tensor out in grids.
+/// One way to store a tensor in grids.
 struct Layout {
   bool (*suits)(const GridInfo&);
   std::vector<Part> parts;
@@ -65,7 +65,7 @@ Layout lettered_layout(bool symmetric) {
   return layout;
 }
 
-/// In the order of preference, where a name has several.
+/// Sorted by preference, for names that fit several layouts.
 const std::vector<Layout>& layouts() {
   static const std::vector<Layout> all{rows_layout(), numbered_layout(), lettered_layout(false), lettered_layout(true)};
   return all;
@@ -91,7 +91,7 @@ std::string described(const std::vector<GridInfo>& grids) {
   return joined_or_none(words);
 }
 
-/// What may be read with `derive`, by name.
+/// The names that can be read with `derive`.
 std::vector<std::string> names_for(const std::vector<GridInfo>& grids, Derive derive) {
   if (derive == Derive::none) return tensor_names(grids);
   std::vector<std::string> names;
@@ -116,13 +116,13 @@ std::string chosen_name(const std::filesystem::path& path, const std::vector<Gri
   fail(path, "has several of what could be the " + kind + "; name one of: " + joined(names));
 }
 
-/// A grid and where its values go.
+/// A grid, and the tensor entries that its values are stored in.
 struct Source {
   openvdb::GridBase::ConstPtr grid;
   std::vector<Entry> entries;
 };
 
-/// Calls `visit(tree)` with the grid's tree in its type.
+/// Calls `visit(tree)` with the grid's tree as its actual type.
 template <class Visit>
 void with_tree(const openvdb::GridBase& grid, const Visit& visit) {
   using namespace openvdb;
@@ -147,7 +147,7 @@ void add_tile_origins(const Tree& tree, std::vector<openvdb::Coord>& origins) {
   }
 }
 
-/// The origins of all blocks with an active voxel, in order.
+/// The origins of all blocks that have an active voxel, sorted.
 std::vector<openvdb::Coord> block_origins(const std::vector<Source>& sources) {
   std::vector<openvdb::Coord> origins;
   for (const Source& source : sources)
@@ -192,8 +192,9 @@ void put(SampleBlock& block, int offset, const Entry& entry, double value) {
   block.values[offset][entry.component] = value;
 }
 
-/// Blocks (TensorBlock or SampleBlock) of all active voxels. Only blocks of active voxels are made, of tiles too.
-/// @param make  make(n) is n blocks without active voxels.
+/// Makes the blocks (TensorBlock or SampleBlock) of all active voxels, including those of active tiles, and no
+/// others.
+/// @param make  make(n) returns n blocks without active voxels.
 template <class Make>
 auto blocks_of(const std::vector<Source>& sources, const Make& make) {
   const std::vector<openvdb::Coord> origins = block_origins(sources);
@@ -228,7 +229,8 @@ Eigen::Affine3d transform_of(const std::filesystem::path& path, const openvdb::G
   return affine;
 }
 
-/// Whether two transforms differ by less than a millionth of a voxel a voxel, and a thousandth of a voxel in all.
+/// Whether two transforms differ by less than a millionth of a voxel per voxel, and by less than a thousandth of a
+/// voxel anywhere.
 bool same_transform(const Eigen::Affine3d& a, const Eigen::Affine3d& b) {
   const Eigen::Matrix4d difference = (a.inverse() * b).matrix() - Eigen::Matrix4d::Identity();
   return difference.leftCols<3>().norm() < 1e-6 && difference.col(3).norm() < 1e-3;
@@ -248,7 +250,8 @@ std::string text_of(const openvdb::Metadata& value) {
   return text ? text->value() : value.str();
 }
 
-/// The file's metadata and, for tools that keep only the grids', what we wrote there.
+/// The file's metadata, and the entries that this program writes on grids, because some tools keep only the grids'
+/// metadata.
 std::map<std::string, std::string> metadata_of(const openvdb::MetaMap& file, const openvdb::GridBase& grid) {
   std::map<std::string, std::string> metadata;
   for (auto i = file.beginMeta(); i != file.endMeta(); ++i) metadata[i->first] = text_of(*i->second);
@@ -280,7 +283,7 @@ TensorBlocks tensors_of(const std::vector<Source>& sources, Derive derive, const
   return derive == Derive::gradient ? gradient(samples, to_index) : hessian(samples, to_index);
 }
 
-/// The three grids of a field, still empty.
+/// The three grids of a field, without voxels.
 std::array<openvdb::Vec3SGrid::Ptr, 3> empty_rows(const TensorGrid& grid, bool half) {
   std::array<openvdb::Vec3SGrid::Ptr, 3> rows;
   for (int row = 0; row < 3; ++row) {
@@ -291,7 +294,8 @@ std::array<openvdb::Vec3SGrid::Ptr, 3> empty_rows(const TensorGrid& grid, bool h
     rows[row]->setVectorType(openvdb::VEC_INVARIANT);
     rows[row]->setSaveFloatAsHalf(half);
     for (const auto& [key, value] : grid.metadata)
-      if (!(*rows[row])[key]) rows[row]->insertMeta(key, openvdb::StringMetadata(value));  // Not its name, type, ...
+      if (!(*rows[row])[key])
+        rows[row]->insertMeta(key, openvdb::StringMetadata(value));  // Keep the grid's own entries: name, type, ...
   }
   return rows;
 }

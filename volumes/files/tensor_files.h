@@ -1,6 +1,6 @@
 #pragma once
 /// @file volumes/files/tensor_files.h
-/// Tensor fields in OpenVDB files. OpenVDB itself stays in the .cpp.
+/// Tensor fields in OpenVDB files. Only the .cpp file includes OpenVDB.
 
 #include <filesystem>
 #include <string>
@@ -10,48 +10,48 @@
 
 namespace tensorray {
 
-/// How a tensor is made from a grid that holds none.
+/// How a tensor is computed from a grid that does not store tensors.
 enum class Derive {
   none,      ///< The grids are the tensor's components.
   gradient,  ///< A Vec3 grid v: T(i, j) = ∂v_i/∂x_j, finite differences, world axes.
   hessian,   ///< A scalar grid f: T(i, j) = ∂²f/∂x_i∂x_j, finite differences, world axes.
 };
 
-/// What a VDB file holds, without its voxels.
+/// What a VDB file contains, apart from voxel values.
 struct GridInfo {
-  std::string name;     ///< Made unique: the second of two grids "T" is "T[1]".
+  std::string name;     ///< Unique in the file: the second of two grids "T" is "T[1]".
   std::string type;     ///< "vec3s", "float", ...
   std::string storage;  ///< "full", or "half" where the file stores 16-bit floats.
 };
 
-/// Reads a tensor field. Understood are three Vec3 grids NAME_row0, NAME_row1, NAME_row2 (the rows); nine scalar grids
-/// NAME_0 … NAME_8 (row by row); scalar grids NAME.xx … NAME.zz, all nine or the six of a symmetric tensor (.xx .xy .xz
-/// .yy .yz .zz); and with `derive` one Vec3 or scalar grid NAME. Single, half and double precision. A voxel is active
-/// where any component is; other components are zero there.
+/// Reads a tensor field. It accepts three Vec3 grids NAME_row0, NAME_row1, NAME_row2 (the rows); nine scalar grids
+/// NAME_0 … NAME_8 (row by row); scalar grids NAME.xx … NAME.zz, all nine or the six of a symmetric tensor (.xx .xy
+/// .xz .yy .yz .zz); and with `derive` one Vec3 or scalar grid NAME. Precision is single, half or double. A voxel is
+/// active where any component is active; the inactive components are zero there.
 /// @param name  Empty: the only tensor (or, with `derive`, the only suitable grid) in the file.
-/// @return the grid with the file's metadata as text, and what the first grid has of `tensorray:...` that the file has
-/// not. Values that are not finite are kept: see remove_non_finite.
-/// @throw std::runtime_error, one line that names the file and the mend: missing, not a VDB, truncated, no such field
-/// (the message lists the grids there are), several fields and no name, rows with different transforms, a transform
+/// @return the grid, with the file's metadata as text. Entries `tensorray:...` that the file lacks are taken from the
+/// first grid. Values that are not finite are kept: see remove_non_finite.
+/// @throw std::runtime_error, one line that names the file and the fix: missing, not a VDB, truncated, no such field
+/// (the message lists the grids of the file), several fields and no name, rows with different transforms, a transform
 /// that is not affine, no active voxel.
 TensorGrid read_tensor_vdb(const std::filesystem::path& path, const std::string& name = "",
                            Derive derive = Derive::none);
 
-/// Writes the rows of a field as three Vec3S grids NAME_row0 … NAME_row2, vector type invariant, one transform, with
-/// the grid's metadata on the file and on each grid.
-/// The same grid gives the same bytes.
+/// Writes the rows of a field as three Vec3S grids NAME_row0 … NAME_row2 with vector type "invariant" and one
+/// transform. Writes the grid's metadata on the file and on each grid. Equal grids give equal bytes. Writes the file
+/// in place.
 /// @param half  Store 16-bit floats: three significant digits between 6e-5 and 65504, steps of 6e-8 below.
 /// @throw std::runtime_error naming the file and the reason (also when the disk is full; with `half`, when a value
-/// exceeds 65504). The file is written in place.
+/// exceeds 65504).
 void write_tensor_vdb(const std::filesystem::path& path, const TensorGrid& grid, bool half = false);
 
-/// The same, giving back the grid's blocks on the way, so that there is never twice the field in memory.
+/// The same, but frees the grid's blocks one by one, so that memory never holds the field twice.
 void write_tensor_vdb(const std::filesystem::path& path, TensorGrid&& grid, bool half = false);
 
-/// The grids of a file, in its order. @throw std::runtime_error as read_tensor_vdb.
+/// The grids of a file, in the file's order. @throw std::runtime_error as read_tensor_vdb.
 std::vector<GridInfo> list_vdb(const std::filesystem::path& path);
 
-/// The names of the tensor fields that read_tensor_vdb would find without `derive`.
+/// The names of the tensor fields that read_tensor_vdb finds without `derive`.
 std::vector<std::string> tensor_names(const std::vector<GridInfo>& grids);
 
 }  // namespace tensorray

@@ -25,15 +25,15 @@ namespace {
 constexpr std::ios::iostate any_failure = std::ios::failbit | std::ios::badbit | std::ios::eofbit;
 constexpr std::size_t stream_buffer = 1 << 20;
 
-// OpenVDB's header: magic number, versions of format (4 bytes) and library (8), a flag, then the unique tag as text.
+// OpenVDB's header: magic number, versions of the format (4 bytes) and of the library (8 bytes), a flag, then the
+// unique tag as text.
 constexpr std::streamoff version_offset = 8, tag_offset = 21;
 
 [[noreturn]] void fail_damaged(const std::filesystem::path& path, const std::string& how) {
   fail(path, "the file is truncated or damaged" + how + "; copy or write it again");
 }
 
-/// Reads a table of grids itself rather than with GridDescriptor::read, which refuses the whole file for one grid of a
-/// type that it does not know.
+/// Reads the table of grids itself. GridDescriptor::read refuses the whole file if one grid has an unknown type.
 class Reader : private openvdb::io::Archive {
  public:
   explicit Reader(const std::filesystem::path& path) : path_(path), buffer_(stream_buffer) {
@@ -58,7 +58,7 @@ class Reader : private openvdb::io::Archive {
       table.push_back(read_descriptor());
       if (inputHasGridOffsets())
         skip(table.back());
-      else  // Written as a stream, in which only reading finds the end of a grid.
+      else  // Written as a stream: only reading a grid tells where it ends.
         grids[table.back().uniqueName()] = read_one(table.back());
     }
     if (inputHasGridOffsets()) read_wanted(table, wanted, grids);
@@ -103,14 +103,14 @@ class Reader : private openvdb::io::Archive {
     return text;
   }
 
-  /// Whether the metadata at `start`, and as many strings after them, fit in the file: OpenVDB allocates and fills
-  /// what a length says, up to 4 GB, before it reads. Returns to where the stream was.
+  /// Whether the metadata at `start` and the `strings` strings after them fit in the file. OpenVDB allocates and
+  /// fills as many bytes as a length says, up to 4 GB, before it reads. Restores the stream's position.
   void check_lengths(std::streamoff start, int strings) {
     const std::streamoff before = in_.tellg();
     in_.seekg(start);
     const auto skip_string = [&] { in_.seekg(read_length(), std::ios::cur); };
     for (std::uint32_t left = read_stored<std::uint32_t>(); left > 0; --left) {
-      skip_string();  // The name.
+      skip_string();  // Skips the name.
       if (read_string() == openvdb::io::DelayedLoadMetadata::staticTypeName()) {
         if (!delayed_load_fits(read_string(), size_)) fail_damaged(path_, "");
       } else {
@@ -153,7 +153,7 @@ class Reader : private openvdb::io::Archive {
     return grid;
   }
 
-  /// Checks the tree of the grid that begins where the stream stands. Returns there.
+  /// Checks the tree of the grid that begins at the stream's position. Restores that position.
   void check_tree(const openvdb::io::GridDescriptor& descriptor) {
     const std::streamoff begin = in_.tellg();
     const auto compression = read_stored<std::uint32_t>();
@@ -171,7 +171,7 @@ class Reader : private openvdb::io::Archive {
     in_.seekg(begin);
   }
 
-  /// Reads the wanted grids, and those whose trees they share: at once, each from a stream of its own.
+  /// Reads the wanted grids, and the grids whose trees they share, in parallel. Each grid has its own stream.
   void read_wanted(const std::vector<openvdb::io::GridDescriptor>& table, const std::set<std::string>& wanted,
                    NamedGridMap& grids) {
     std::set<std::string> needed;
@@ -207,20 +207,20 @@ class Writer : private openvdb::io::Archive {
   }
 
  private:
-  /// Replaces the random tag in the header by a hash of what follows it.
+  /// Replaces the random tag in the header by a hash of the bytes after the tag.
   void make_tag_of_contents(std::fstream& file) const {
     const std::streamoff end = file.tellp();
     std::string tag = getUniqueTag();
     std::string stored(tag.size(), ' ');
     file.seekg(tag_offset);
     file.read(&stored[0], static_cast<std::streamsize>(stored.size()));
-    if (stored != tag) return;  // Another format than we know.
+    if (stored != tag) return;  // The format is not the expected one.
     std::uint64_t low = 14695981039346656037u, high = 1099511628211u;
     std::vector<char> chunk(stream_buffer);
     for (std::streamoff at = file.tellg(); at < end; at += static_cast<std::streamoff>(chunk.size())) {
       chunk.resize(static_cast<std::size_t>(std::min<std::streamoff>(end - at, stream_buffer)));
       file.read(chunk.data(), static_cast<std::streamsize>(chunk.size()));
-      for (const char c : chunk) {  // Fowler–Noll–Vo, and a rotation of it for the other half.
+      for (const char c : chunk) {  // Fowler–Noll–Vo; the other half of the hash adds a rotation.
         low = (low ^ static_cast<unsigned char>(c)) * 1099511628211u;
         high = (high << 5 | high >> 59) ^ low;
       }
@@ -247,7 +247,7 @@ VdbFile read_vdb(const std::filesystem::path& path, const std::set<std::string>&
     fail_damaged(path, " (" + one_line(error.what()) + ")");
   } catch (const std::bad_alloc&) {
     fail_damaged(path, ", or larger than the memory");
-  } catch (const std::logic_error&) {  // A length, or a name that is not in a table.
+  } catch (const std::logic_error&) {  // A damaged length, or a name that is not in a table.
     fail_damaged(path, "");
   }
 }

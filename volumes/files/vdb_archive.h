@@ -1,12 +1,12 @@
 #pragma once
 /// @file volumes/files/vdb_archive.h
-/// Reads and writes OpenVDB files such that no damage and no full disk goes unnoticed. OpenVDB's own io::File does not
-/// check the state of its stream, so that uncompressed files cut short are read as if whole, and takes lengths in
-/// damaged trees as they are, which may end the process: vdb_tree_check.h looks at them before. What remains: bytes
-/// changed within the voxels, or within the masks of which are active, are not noticed where the lengths still fit, as
-/// the format has no checksum; and the lengths are not looked at in files older than format 222 (OpenVDB 3), and in
-/// trees of other types than this program reads, where a file without table of grids has such. Only .cpp files of this
-/// folder that use OpenVDB themselves include this header: it brings all of OpenVDB.
+/// Reads and writes OpenVDB files, and reports damage and full disks. OpenVDB's own io::File does neither: it does
+/// not check the state of its stream, so that it reads uncompressed files cut short as if they were whole, and it
+/// trusts the lengths in damaged trees, which may end the process. vdb_tree_check.h checks the lengths first.
+/// Not detected: changed bytes within voxel values or active masks where all lengths still fit, because the format
+/// has no checksum. Not checked: lengths in files older than format 222 (OpenVDB 3), and, in files without a table of
+/// grids, lengths in trees of types that this program does not read.
+/// Only .cpp files of this folder that use OpenVDB themselves include this header: it includes all of OpenVDB.
 
 #include <filesystem>
 #include <set>
@@ -20,27 +20,27 @@ namespace tensorray {
 
 /// A grid of a file.
 struct VdbGrid {
-  std::string name;             ///< Made unique: the second of two grids "T" is "T[1]".
-  std::string type;             ///< Of its tree: "Tree_vec3s_5_4_3".
+  std::string name;             ///< Unique in the file: the second of two grids "T" is "T[1]".
+  std::string type;             ///< Type of the tree: "Tree_vec3s_5_4_3".
   bool half = false;            ///< The file stores 16-bit floats.
-  openvdb::GridBase::Ptr grid;  ///< Null unless it was asked for.
+  openvdb::GridBase::Ptr grid;  ///< Null unless the caller asked for it.
 };
 
 struct VdbFile {
   openvdb::MetaMap metadata;
-  std::vector<VdbGrid> grids;  ///< All, in the file's order.
+  std::vector<VdbGrid> grids;  ///< All grids, in the file's order.
 };
 
-/// Reads the table of grids and, completely, the grids whose name is in `wanted`.
-/// @throw std::runtime_error, one line that names the file and the mend: missing, not a VDB, truncated, damaged.
+/// Reads the table of grids. Also reads the grids whose names are in `wanted`, with their voxels.
+/// @throw std::runtime_error, one line that names the file and the fix: missing, not a VDB, truncated, damaged.
 VdbFile read_vdb(const std::filesystem::path& path, const std::set<std::string>& wanted = {});
 
-/// Writes grids with OpenVDB's default compression, in place. The same grids give the same bytes: the file's unique
-/// tag, which OpenVDB draws at random, is made of the contents.
+/// Writes grids in place with OpenVDB's default compression. Equal grids give equal bytes: the file's unique tag,
+/// which OpenVDB draws at random, is replaced by a hash of the contents.
 /// @throw std::runtime_error naming the file and the reason, also when the disk is full.
 void write_vdb(const std::filesystem::path& path, const openvdb::GridCPtrVec& grids, const openvdb::MetaMap& metadata);
 
-/// A grid's transform from what takes its indices to the world.
+/// The transform of a grid. @param to_world  From voxel indices to world.
 openvdb::math::Transform::Ptr linear_transform(const Eigen::Affine3d& to_world);
 
 }  // namespace tensorray

@@ -15,7 +15,7 @@ constexpr int blosc_header = 16;
 
 struct Misfit {};
 
-/// Bytes of a value in memory, and as the file has it with 16-bit floats.
+/// Bytes of a value in memory, and in a file with 16-bit floats.
 struct ValueSize {
   std::int64_t full, half;
 };
@@ -29,7 +29,7 @@ std::optional<ValueSize> value_size(const std::string& type) {
   return found == sizes.end() ? std::nullopt : std::optional(found->second);
 }
 
-/// Which of a node's values it leaves out, and what it has instead: the flag before each chunk.
+/// The flag before each chunk: which values of a node the chunk leaves out, and what replaces them.
 enum NodeFlag : int {
   no_mask = 0,
   no_mask_minus_background = 1,
@@ -72,7 +72,7 @@ class Walker {
     if (in_.gcount() != bytes) throw Misfit();
   }
 
-  /// A bit for each of a node's values.
+  /// One bit for each value of a node.
   template <std::size_t Count>
   std::bitset<Count> mask() {
     std::array<char, Count / 8> bytes;
@@ -94,7 +94,7 @@ class Walker {
     const auto children = mask<count>();
     skip_values<count>(mask<count>());
     const auto leaves = static_cast<std::int64_t>(children.count());
-    skip(leaves * 64);  // Their masks, which stand again before their values.
+    skip(leaves * 64);  // The masks of the leaves, which are repeated before the leaves' values.
     leaves_ += leaves;
   }
 
@@ -111,11 +111,11 @@ class Walker {
     skip_chunk(count * (tree_.half ? size_.half : size_.full));
   }
 
-  /// @param expected  Bytes that OpenVDB has made room for.
+  /// @param expected  Bytes that OpenVDB has allocated.
   void skip_chunk(std::int64_t expected) {
     if (!tree_.blosc && !tree_.zip) return skip(expected);
     std::int64_t stored = number<std::int64_t>();
-    if (stored <= 0) {  // Not compressed.
+    if (stored <= 0) {  // The chunk is not compressed.
       if (stored != -expected) throw Misfit();
       return skip(expected);
     }
@@ -143,8 +143,8 @@ bool blosc_fits(const char* header, std::int64_t stored, std::int64_t expected) 
 }
 
 bool delayed_load_fits(const std::string& value, std::int64_t file_size) {
-  // The number of leaves; of each, one byte, and its length in eight: both with their length before them, packed if
-  // that is not 0.
+  // The format: the number of leaves; one byte for each leaf; eight bytes for each leaf's length. A length precedes
+  // each of the two lists, which is packed if that length is not 0.
   std::size_t at = 4;
   const auto number = [&](std::size_t offset) {
     return offset + 4 > value.size() ? 0 : read_number<std::uint32_t>(value.data() + offset, ByteOrder::little);

@@ -40,7 +40,7 @@ PolyDataView view_of_lines(const PolylineData& lines) {
 
 std::filesystem::path vtk_program() { return sibling_program("tensorray-import"); }
 
-/// @throw std::runtime_error with what the program said, or `on_crash` if it could say nothing.
+/// @throw std::runtime_error with the error that the program printed, or with `on_crash` if it printed none.
 void run_vtk_program(const std::vector<std::string>& arguments, const UnnamedFile& shared,
                      const std::string& on_crash) {
   require_vtk_program();

@@ -24,7 +24,8 @@ using Eigen::Vector3i;
 
 constexpr int width = TensorBlock::size;
 
-/// A block of the slab that is being read, made when it has an active voxel, and what became of its voxels.
+/// A block of the slab that is being read. It is made when the first active voxel is found. Counts its voxels by
+/// kind.
 template <class Block>
 struct Place {
   std::unique_ptr<Block> block;
@@ -32,12 +33,12 @@ struct Place {
 };
 
 bool is_background(const Lattice& lattice, const double* components) {
-  if (lattice.masked && !(components[0] >= 0.5)) return true;  // A mask that is NaN is none.
+  if (lattice.masked && !(components[0] >= 0.5)) return true;  // A NaN in the mask counts as masked.
   return lattice.zero_is_background && std::all_of(components + (lattice.masked ? 1 : 0),
                                                    components + lattice.components, [](double c) { return c == 0; });
 }
 
-/// Puts what slice `z` has of the block from (x0, y0) on.
+/// Stores the voxels that slice `z` has in the block that begins at (x0, y0).
 template <class Block, class ValueOf>
 void put(const Lattice& lattice, const ValueOf& value_of, const double* slice, const Vector3i& first, int z,
          Place<Block>& place) {
@@ -64,7 +65,7 @@ void put(const Lattice& lattice, const ValueOf& value_of, const double* slice, c
     }
 }
 
-/// Adds the slab of slices from `first_z` on to `blocks`.
+/// Appends the blocks of the slab whose first slice is `first_z` to `blocks`.
 template <class Blocks, class ValueOf>
 void add_slab(const Lattice& lattice, const ValueOf& value_of, int first_z, std::vector<double>& slice, Blocks& blocks,
               LatticeReport& report) {
@@ -87,7 +88,7 @@ void add_slab(const Lattice& lattice, const ValueOf& value_of, int first_z, std:
   }
 }
 
-/// Orders blocks by origin, moving each once: they are large.
+/// Sorts blocks by origin. Moves each block only once, because blocks are large.
 template <class Blocks>
 void sort(Blocks& blocks) {
   const auto key = [&](std::size_t i) {
@@ -110,7 +111,7 @@ void sort(Blocks& blocks) {
   }
 }
 
-/// Fills `blocks` with `value_of(components)` of all voxels that are active.
+/// Fills `blocks` with `value_of(components)` at all active voxels.
 template <class Blocks, class ValueOf>
 void read_blocks(const Lattice& lattice, const ValueOf& value_of, Blocks& blocks, LatticeReport& report) {
   report = {};
@@ -164,7 +165,8 @@ TensorGrid tensors_of(const Lattice& lattice, const std::optional<TensorOrder>& 
   const auto tensor = [&](const double* components) -> Eigen::Matrix3f {
     const Matrix3d turned = frame * tensor_of(components, chosen) * frame.transpose();
     if (chosen == TensorOrder::full) return turned.cast<float>();
-    return (0.5 * (turned + turned.transpose())).cast<float>();  // Rounding leaves symmetric ones symmetric.
+    return (0.5 * (turned + turned.transpose()))
+        .cast<float>();  // Symmetrizing removes rounding errors, so that symmetric tensors stay symmetric.
   };
   read_blocks(lattice, tensor, grid.blocks, report);
   return grid;
@@ -177,7 +179,8 @@ TensorGrid gradient_of(const Lattice& lattice, LatticeReport& report) {
                     called(lattice), unmasked(lattice)));
   std::vector<SampleBlock> vectors;
   const Vector3i blocks = (lattice.size.array() - 1) / width + 1;
-  vectors.reserve(static_cast<std::size_t>(blocks.x()) * blocks.y() * blocks.z());  // Growing would need it twice.
+  vectors.reserve(static_cast<std::size_t>(blocks.x()) * blocks.y() *
+                  blocks.z());  // Reserve, because growing would need the memory twice.
   const auto vector = [&](const double* components) -> Vector3d {
     return lattice.frame * Eigen::Map<const Vector3d>(components);
   };

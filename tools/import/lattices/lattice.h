@@ -1,6 +1,6 @@
 #pragma once
 /// @file tools/import/lattices/lattice.h
-/// Numbers at the voxels of a lattice, as a file of voxels has them, on their way to a tensor grid.
+/// Numbers at the voxels of a lattice, as read from a file of voxels, before they become a tensor grid.
 
 #include <cstddef>
 #include <functional>
@@ -14,46 +14,49 @@
 
 namespace tensorray {
 
-/// A lattice's numbers stay where they are until they are asked for, slice by slice from the last z to the first, so
-/// that a reader may give back the memory of what it has handed over: an import needs little more than its result.
+/// The numbers are read slice by slice, from the last z to the first, so that a reader can free each slice that it
+/// has delivered: an import needs little more memory than its result.
 struct Lattice {
   Eigen::Vector3i size = Eigen::Vector3i::Zero();          ///< Voxels along each axis; >= 1.
   Eigen::Affine3d to_world = Eigen::Affine3d::Identity();  ///< From voxel indices (0 ...) to world; invertible.
   Eigen::Matrix3d frame = Eigen::Matrix3d::Identity();     ///< From the axes of the components to world axes.
 
-  /// In the place of `frame` where the user says that the order is `fsl`: FSL and MRtrix write the same kind of file,
-  /// with components in the image's axes and in world axes. The order tells which, as nothing else in the file does.
+  /// Replaces `frame` if the user says that the order is `fsl`. FSL and MRtrix write the same kind of file, FSL with
+  /// components in the image's axes and MRtrix in world axes. Only the order tells the two apart.
   std::optional<Eigen::Matrix3d> fsl_frame;
 
-  std::string array;                 ///< Name of what the numbers are; may be empty.
-  int components = 0;                ///< Numbers a voxel, the mask included.
-  bool masked = false;               ///< The first component is a mask: below one half, the voxel is inactive.
-  bool zero_is_background = false;   ///< Voxels of which all components are exactly zero are inactive.
-  std::optional<TensorOrder> order;  ///< Where the format itself says it.
+  std::string array;                 ///< Name of the quantity; may be empty.
+  int components = 0;                ///< Numbers per voxel, including the mask.
+  bool masked = false;               ///< The first component is a mask: the voxel is inactive where it is below 0.5.
+  bool zero_is_background = false;   ///< Voxels whose components are all exactly zero are inactive.
+  std::optional<TensorOrder> order;  ///< Set where the format defines the order.
 
-  /// Puts the numbers of slice `z`, x fastest, one voxel's components side by side: size.x() * size.y() * components.
-  /// Called once for each z, from size.z() − 1 down to 0. @throw std::runtime_error naming the file.
+  /// Writes the numbers of slice `z` to `values`: x fastest, the components of a voxel side by side, size.x() *
+  /// size.y() * components numbers in all. Called once for each z, from size.z() − 1 down to 0.
+  /// @throw std::runtime_error naming the file.
   std::function<void(int z, double* values)> read_slice;
 };
 
-/// What became of the voxels.
+/// Counts of the voxels.
 struct LatticeReport {
   std::size_t voxels = 0, active = 0;
-  std::size_t non_finite = 0;  ///< Made inactive, for a component was NaN or infinite.
-  std::size_t background = 0;  ///< Inactive by the mask, or by being exactly zero.
+  std::size_t non_finite = 0;  ///< Made inactive, because a component was NaN or infinite.
+  std::size_t background = 0;  ///< Inactive because of the mask, or because they are exactly zero.
 };
 
-/// The tensors of a lattice with six or nine components (seven or ten if masked; of more than nine components the first
-/// six are the tensor and the others derived from it), in world axes: T = F C Fᵀ with the frame F, which need not be a
-/// rotation. Voxel (i, j, k) of the lattice is that of the grid. A grid without an active voxel is no error.
-/// @param order  Used where the lattice does not say its own; six components and neither is an error.
-/// Memory: the grid, a slice in double precision, and the blocks of eight slices. On all threads, while read_slice is
-/// called by one; the same result on any number.
-/// @throw std::invalid_argument naming the mend (--order; another array), or whatever read_slice throws.
+/// The tensors, in world axes, of a lattice with six or nine components (seven or ten if masked). If there are more
+/// than nine components, the first six are the tensor, and the others are derived from it. T = F C Fᵀ with the frame
+/// F, which need not be a rotation. Voxel (i, j, k) of the grid is voxel (i, j, k) of the lattice. A grid without
+/// active voxels is not an error.
+/// @param order  Used where the lattice has no order. Six components without any order are an error.
+/// Memory: the grid, a slice in double precision, and the blocks of eight slices.
+/// Threads: uses all threads, but calls read_slice from one. The result does not depend on their number.
+/// @throw std::invalid_argument naming the fix (--order, or another array), or whatever read_slice throws.
 TensorGrid tensors_of(const Lattice& lattice, const std::optional<TensorOrder>& order, LatticeReport& report);
 
-/// T(i, j) = ∂v_i/∂x_j of a lattice of three components (four if masked), world axes: v = F c with the frame F, by the
-/// differences of finite_differences.h. @throw std::invalid_argument naming the mend, or whatever read_slice throws.
+/// T(i, j) = ∂v_i/∂x_j, in world axes, of a lattice of three components c (four if masked): v = F c with the frame F,
+/// differentiated as in finite_differences.h.
+/// @throw std::invalid_argument naming the fix, or whatever read_slice throws.
 TensorGrid gradient_of(const Lattice& lattice, LatticeReport& report);
 
 }  // namespace tensorray

@@ -1,8 +1,9 @@
 #pragma once
 /// @file tools/import/lattices/lattice_files.h
-/// Files of voxels. All: @throw std::runtime_error, one line that names the file and the mend: missing, of another
-/// format, damaged or cut off, sizes that do not fit the data, a transform that cannot be inverted, no memory taken for
-/// what a file announces and does not hold.
+/// Readers of voxel files. All of them: @throw std::runtime_error, one line that names the file and the fix, if the
+/// file is missing, has another format, is damaged or cut off, has sizes that do not fit its data, or has a transform
+/// that cannot be inverted. They check that a file holds the data that it announces before they allocate memory for
+/// it.
 
 #include <filesystem>
 
@@ -10,23 +11,25 @@
 
 namespace tensorray {
 
-/// NRRD and NHDR (Teem's nrrd; raw, gzip, bzip2, ascii, hex; one data file): three axes of space and one of 6, 7
-/// (masked), 9 or 10 (masked) components, wherever it stands among the axes, or of 3 (a vector). World is the file's
-/// space turned to right-anterior-superior (RAS) where it is one of the anatomical ones, and the file's own otherwise.
-/// The measurement frame turns the components. Six ask for their order unless their kind is a symmetric matrix. Exactly
-/// zero is background. The numbers are held, and given back slice by slice where z is the slowest axis. One at a time.
+/// Reads NRRD and NHDR (Teem's nrrd; encodings raw, gzip, bzip2, ascii and hex; one data file). The data have three
+/// spatial axes and one axis of 6, 7 (masked), 9, 10 (masked) or 3 (a vector) components, at any position among the
+/// axes. World is right-anterior-superior (RAS) if the file's space is an anatomical one, else the file's own space.
+/// The measurement frame rotates the components. Six components need an order from the user, unless their kind is a
+/// symmetric matrix. Exactly zero is background. Holds all numbers in memory, and frees them slice by slice if z is
+/// the slowest axis.
+/// Threads: reads one file at a time.
 Lattice open_nrrd(const std::filesystem::path& path);
 
-/// NIfTI-1 and -2 (.nii, .nii.gz, .hdr/.img) of 6 volumes, 9, or 3 (a vector), along the fourth axis or the fifth.
-/// World is RAS millimetres, by sform, or qform, or voxel sizes. scl_slope and scl_inter are applied. The order is
-/// known where the intent code says symmetric matrix, and asked for otherwise. With `fsl` the components are in FSL's
-/// axes of the image (Lattice::fsl_frame), else in world axes. Exactly zero is background. The numbers are held, and
-/// given back slice by slice.
+/// Reads NIfTI-1 and NIfTI-2 (.nii, .nii.gz, .hdr/.img) with 6, 9 or 3 (a vector) volumes along the fourth or the
+/// fifth axis. World is RAS millimetres, from sform, else qform, else the voxel sizes. Applies scl_slope and
+/// scl_inter. The order is known if the intent code is "symmetric matrix"; otherwise the user must give it. With the
+/// order `fsl` the components are in FSL's axes of the image (Lattice::fsl_frame), otherwise in world axes. Exactly
+/// zero is background. Holds all numbers in memory, and frees them slice by slice.
 Lattice open_nifti(const std::filesystem::path& path);
 
-/// NumPy's .npy of shape (nz, ny, nx, 3, 3), (nz, ny, nx, 9), (nz, ny, nx, 6) or (nz, ny, nx, 3); C or Fortran order,
-/// float16, 32 or 64, either byte order. Voxels are at their indices: (i, j, k) in units of one. Slices are read from
-/// the file, which must stay as it is, when they are asked for.
+/// Reads NumPy's .npy of shape (nz, ny, nx, 3, 3), (nz, ny, nx, 9), (nz, ny, nx, 6) or (nz, ny, nx, 3), in C or
+/// Fortran order, as float16, 32 or 64, in either byte order. World coordinates are the voxel indices (i, j, k).
+/// Reads each slice from the file when it is needed, so the file must not change meanwhile.
 Lattice open_npy(const std::filesystem::path& path);
 
 }  // namespace tensorray

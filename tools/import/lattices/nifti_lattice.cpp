@@ -1,9 +1,10 @@
-// FSL and MRtrix write the same file, six volumes, with different orders, and different axes:
-// - MRtrix's components are those in world (scanner) axes: https://mrtrix.readthedocs.io, "dwi2tensor".
-// - FSL's dtifit takes gradient directions in the image's axes, of which the first is turned round where the transform
-//   has a positive determinant ("neurological" storage): https://fsl.fmrib.ox.ac.uk, "bvecs". So are its components.
-// Hence the frame for FSL: the transform's rotation, with that turn. Vectors, nine components and symmetric matrices
-// by intent code are taken to be in world axes, as the format says nothing of them.
+// FSL and MRtrix both write files of six volumes, but with different orders and different axes:
+// - MRtrix writes components in world (scanner) axes: https://mrtrix.readthedocs.io, "dwi2tensor".
+// - FSL's dtifit takes gradient directions in the image's axes, and flips the first axis if the transform has a
+//   positive determinant ("neurological" storage): https://fsl.fmrib.ox.ac.uk, "bvecs". Its components have the
+//   same axes.
+// Hence FSL's frame is the rotation of the transform, with that flip. Vectors, nine components, and symmetric
+// matrices by intent code are read in world axes, because the format does not state their axes.
 
 #include <array>
 #include <cmath>
@@ -69,7 +70,7 @@ NumberOf number_reader(int datatype, const std::filesystem::path& path) {
   }
 }
 
-/// Checks a header, in either byte order, for what the library would print about.
+/// Checks a header, in either byte order, for errors that the library would print.
 template <class Header>
 void check_header(Header& header, void (*swap)(Header*), const std::filesystem::path& path) {
   if (header.sizeof_hdr != static_cast<int>(sizeof header)) swap(&header);
@@ -84,8 +85,8 @@ struct Close {
 };
 using OpenFile = std::unique_ptr<znzptr, Close>;
 
-/// Whether the file begins with the size of a header. NIfTI with a header of text does not, which the library would
-/// read with messages.
+/// Whether the file begins with the size of a header. NIfTI files with a text header do not; the library would print
+/// messages while it reads them.
 bool begins_with_size(const std::string& name) {
   const OpenFile file(znzopen(name.c_str(), "rb", nifti_is_gzfile(name.c_str())));
   std::int32_t size = 0;
@@ -98,12 +99,12 @@ bool begins_with_size(const std::string& name) {
 Image read_header(const std::filesystem::path& path) {
   std::error_code none;
   if (!std::filesystem::is_regular_file(path, none)) fail(path, "no such file");
-  nifti_set_debug_level(0);  // The library would print.
+  nifti_set_debug_level(0);  // Stop the library from printing.
   const std::string name = path.string();
   if (!begins_with_size(name)) fail(path, "is not a NIfTI file, or cut off in its header");
   int version = 0;
   const std::unique_ptr<void, decltype(&std::free)> raw(nifti_read_header(name.c_str(), &version, 0), &std::free);
-  // ANALYZE, which says neither order nor orientation, has no magic word; it counts as version 0 or 1.
+  // ANALYZE files have no magic word, no order and no orientation; the library gives them version 0 or 1.
   const auto has_magic = [&](const char* magic, char number) {
     return magic[0] == 'n' && (magic[1] == '+' || magic[1] == 'i') && magic[2] == number && magic[3] == '\0';
   };
@@ -120,7 +121,8 @@ Image read_header(const std::filesystem::path& path) {
   return image;
 }
 
-/// Components along the fourth axis, or along the fifth, as the format wants vectors and matrices.
+/// Counts the components along the fourth axis, or along the fifth, which the format prescribes for vectors and
+/// matrices.
 int component_count(const nifti_image& image, const std::filesystem::path& path) {
   const auto extent = [&](int axis) { return axis <= image.dim[0] ? image.dim[axis] : 1; };
   const std::int64_t four = extent(4), five = extent(5);
@@ -131,7 +133,7 @@ int component_count(const nifti_image& image, const std::filesystem::path& path)
   return static_cast<int>(count);
 }
 
-/// Checked before memory is taken. zlib makes at most 1032 bytes of one.
+/// Checks the sizes before memory is allocated. zlib expands one byte to at most 1032.
 void check_sizes(const nifti_image& image, const std::filesystem::path& path, int components) {
   std::error_code none;
   const std::uintmax_t bytes = std::filesystem::file_size(image.iname, none);
@@ -148,8 +150,9 @@ void check_sizes(const nifti_image& image, const std::filesystem::path& path, in
                            needed, bytes));
 }
 
-/// The planes of each slice, component by component. Memory is taken as the numbers come. nifti_image_load is not used:
-/// it puts zero where a number is not finite, and one cannot give back parts of what it has read.
+/// The planes of each slice, one for each component. Allocates memory while the numbers are read. nifti_image_load is
+/// not used, because it replaces numbers that are not finite by zero, and because its memory cannot be freed in
+/// parts.
 std::vector<std::vector<Plane>> read_planes(const nifti_image& image, const std::filesystem::path& path,
                                             int components) {
   const OpenFile file(znzopen(image.iname, "rb", nifti_is_gzfile(image.iname)));
@@ -168,12 +171,12 @@ std::vector<std::vector<Plane>> read_planes(const nifti_image& image, const std:
                           image.swapsize, plane.data());
     }
   char beyond = 0;
-  if (znzread(&beyond, 1, 1, file.get()) > 1)  // Only at the end of a stream does zlib compare checksums.
+  if (znzread(&beyond, 1, 1, file.get()) > 1)  // zlib compares checksums only at the end of a stream.
     fail(path, "its compressed data are damaged");
   return slices;
 }
 
-/// To RAS millimetres. Files that do not say their unit are in millimetres.
+/// From voxel indices to RAS millimetres. Files that do not state their unit are in millimetres.
 Eigen::Affine3d to_world(const nifti_image& image, const std::filesystem::path& path) {
   Eigen::Matrix4d matrix = Eigen::Vector4d(image.dx, image.dy, image.dz, 1).asDiagonal();
   if (image.sform_code > 0 || image.qform_code > 0) {
@@ -193,7 +196,7 @@ Eigen::Affine3d to_world(const nifti_image& image, const std::filesystem::path& 
   return transform;
 }
 
-/// The rotation nearest to the directions of the voxel axes, with FSL's turn of the first.
+/// The rotation nearest to the directions of the voxel axes, with FSL's flip of the first axis.
 Matrix3d fsl_frame(const Matrix3d& linear) {
   const Matrix3d directions = linear.colwise().normalized();
   const Eigen::JacobiSVD<Matrix3d> svd(directions, Eigen::ComputeFullU | Eigen::ComputeFullV);
@@ -216,7 +219,7 @@ Lattice open_nifti(const std::filesystem::path& path) {
   lattice.zero_is_background = true;
   if (image->intent_code == NIFTI_INTENT_SYMMATRIX && lattice.components == 6)
     lattice.order = TensorOrder::lower_triangle;
-  // A slope of zero means that there is none; some programs write NaN for that.
+  // A slope of zero means no scaling; some programs write NaN instead.
   const bool scaled = std::isfinite(image->scl_slope) && image->scl_slope != 0;
   const double slope = scaled ? image->scl_slope : 1;
   const double intercept = scaled && std::isfinite(image->scl_inter) ? image->scl_inter : 0;

@@ -1,5 +1,5 @@
-// The format: https://numpy.org/doc/stable/reference/generated/numpy.lib.format.html. The numbers are read from the
-// file when they are asked for, and never held together.
+// The format: https://numpy.org/doc/stable/reference/generated/numpy.lib.format.html. Numbers are read from the file
+// slice by slice, and are never all in memory.
 
 #include <algorithm>
 #include <array>
@@ -25,13 +25,13 @@
 namespace tensorray {
 namespace {
 
-/// What the header says.
+/// The contents of the file's header.
 struct Header {
   std::size_t number_bytes = 0;
   ByteOrder order = host_byte_order();
   bool fortran = false;  ///< The first index runs fastest.
   std::vector<std::size_t> shape;
-  std::uint64_t data_start = 0;  ///< Bytes into the file.
+  std::uint64_t data_start = 0;  ///< Offset in the file, in bytes.
 };
 
 /// The header's text, a Python dictionary.
@@ -52,7 +52,7 @@ std::string read_dictionary(std::ifstream& file, const std::filesystem::path& pa
   return text;
 }
 
-/// What follows a key of the dictionary, from after the colon on.
+/// The text after a key of the dictionary and its colon.
 std::string value_of(const std::string& dictionary, const std::string& key, const std::filesystem::path& path) {
   const std::size_t found = dictionary.find("'" + key + "':");
   const std::size_t start =
@@ -98,7 +98,7 @@ Header read_header(std::ifstream& file, const std::filesystem::path& path) {
   return header;
 }
 
-/// Components of the shapes that are taken.
+/// The number of components of an accepted shape.
 std::size_t component_count(const Header& header, const std::filesystem::path& path) {
   const auto& shape = header.shape;
   if (shape.size() == 5 && shape[3] == 3 && shape[4] == 3) return 9;
@@ -123,7 +123,8 @@ double number(const char* bytes, ByteOrder order) {
   return static_cast<double>(read_number<Number>(bytes, order));
 }
 
-/// Reads slices of a file. In Fortran order a slice is scattered over all of it, so that several are read at once.
+/// Reads slices of a file. In Fortran order the numbers of a slice are scattered over the whole file, so several
+/// slices are read at once.
 class Slices {
  public:
   Slices(std::filesystem::path path, std::ifstream file, Header header, std::size_t components)
@@ -157,7 +158,7 @@ class Slices {
     for (std::size_t i = 0; i < slice_numbers(); ++i) values[i] = number_of_(&held_[i * bytes()], header_.order);
   }
 
-  /// A run is what the file has of all z at one x and y of one component.
+  /// A run is the numbers of one component at one x and y, for all z.
   void read_scattered(std::size_t z, double* values) {
     if (held_.empty() || z < first_held_) hold_up_to(z);
     const std::size_t ny = header_.shape[1], nx = header_.shape[2], held = held_.size() / slice_numbers();
@@ -169,7 +170,7 @@ class Slices {
     }
   }
 
-  /// Holds an eighth of the file's slices, up to `last`.
+  /// Reads an eighth of the file's slices, the last of which is `last`.
   void hold_up_to(std::size_t last) {
     const std::size_t nz = header_.shape[0], count = std::min(last + 1, (nz + 7) / 8);
     first_held_ = last + 1 - count;
@@ -190,8 +191,8 @@ class Slices {
   Header header_;
   std::size_t components_;
   double (*number_of_)(const char*, ByteOrder);
-  std::vector<char> held_;      ///< Bytes of a slice, or of several, run by run.
-  std::size_t first_held_ = 0;  ///< Of these slices the first.
+  std::vector<char> held_;      ///< Bytes of one slice or of several slices, run by run.
+  std::size_t first_held_ = 0;  ///< The first of the slices in `held_`.
 };
 
 }  // namespace

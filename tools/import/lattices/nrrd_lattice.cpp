@@ -1,5 +1,5 @@
-// Teem reads the header first, without the data; sizes are checked; then the data. Its errors are kept in a list of the
-// whole process, so files are read one at a time.
+// Teem reads the header first; then the sizes are checked; then Teem reads the data. Files are read one at a time,
+// because Teem keeps its errors in one list for the whole process.
 
 #include <algorithm>
 #include <array>
@@ -38,19 +38,19 @@ struct Free {
 using NrrdPointer = std::unique_ptr<Nrrd, Free>;
 using StatePointer = std::unique_ptr<NrrdIoState, Free>;
 
-/// Which axis of the file is what.
+/// The role of each axis of the file.
 struct Axes {
   unsigned int component = 0;
   std::array<unsigned int, 3> space{};
 };
 
-/// What the components are.
+/// The meaning of the components.
 struct Components {
   bool masked = false;
   std::optional<TensorOrder> order;
 };
 
-/// The innermost of Teem's errors, which says what is wrong, without the function's name.
+/// The innermost of Teem's errors, which gives the reason, without the name of the function.
 std::string last_error() {
   const std::unique_ptr<char, Free> text(biffGetDone(NRRD));
   std::string lines = text ? text.get() : "";
@@ -60,8 +60,9 @@ std::string last_error() {
   return colon == std::string::npos ? line : line.substr(colon + 2);
 }
 
-/// Refuses what Teem would take for a file of another kind (text, pictures), standard input, or a pattern of names,
-/// which it gives to printf. @return what the file says of its data file; empty if they are in the file itself.
+/// Refuses files that Teem would read as another kind (text, pictures), standard input, and patterns of file names,
+/// which Teem passes to printf. @return the header's entry for the data file; empty if the data are in the file
+/// itself.
 std::string check_header(const std::filesystem::path& path) {
   std::error_code none;
   if (!std::filesystem::is_regular_file(path, none)) fail(path, "no such file");
@@ -72,7 +73,7 @@ std::string check_header(const std::filesystem::path& path) {
   std::string data_file;
   while (file.getline(line.data(), static_cast<std::streamsize>(line.size())) && line[0] != '\0' && line[0] != '\r') {
     const std::string text = line.c_str();
-    std::string lower = text;  // Teem does not mind capitals.
+    std::string lower = text;  // Teem ignores case.
     std::transform(text.begin(), text.end(), lower.begin(), [](unsigned char c) { return std::tolower(c); });
     for (const std::string field : {"data file: ", "datafile: "})
       if (lower.compare(0, field.size(), field) == 0) data_file = text.substr(field.size());
@@ -96,8 +97,9 @@ std::string load(const std::filesystem::path& path, Nrrd& nrrd, bool header_only
   return state->encoding->name;
 }
 
-/// The most bytes of numbers that `bytes` of a file can hold. zlib makes at most 1032 of one, bzip2 at most some 20000;
-/// as text, two characters are a byte (hex), or at the least one number and a space (ascii).
+/// The greatest number of data bytes that `bytes` of a file can encode. zlib expands one byte to at most 1032, bzip2
+/// to about 20000. As hex text, a byte takes two characters; as ascii text, a number takes at least one digit and a
+/// space.
 double greatest_content(const std::string& encoding, double bytes, double element_size) {
   if (encoding == "gzip") return 1032 * bytes;
   if (encoding == "bzip2") return 20000 * bytes;
@@ -106,7 +108,7 @@ double greatest_content(const std::string& encoding, double bytes, double elemen
   return bytes;
 }
 
-/// Checked before memory is taken.
+/// Checks the sizes before memory is allocated.
 void check_sizes(const std::filesystem::path& path, const Nrrd& nrrd, const std::string& data_file,
                  const std::string& encoding) {
   const std::filesystem::path data = data_file.empty() ? path : path.parent_path() / data_file;
@@ -129,7 +131,7 @@ void check_sizes(const std::filesystem::path& path, const Nrrd& nrrd, const std:
 NrrdPointer read_nrrd(const std::filesystem::path& path) {
   static std::mutex mutex;
   const std::lock_guard lock(mutex);
-  nrrdStateVerboseIO = 0;  // Teem would print.
+  nrrdStateVerboseIO = 0;  // Stop Teem from printing.
   const std::string data_file = check_header(path);
   NrrdPointer nrrd(nrrdNew());
   const std::string encoding = load(path, *nrrd, true);
@@ -145,7 +147,7 @@ bool is_space(const Nrrd& nrrd, unsigned int axis) {
   return kind == nrrdKindSpace || kind == nrrdKindDomain;
 }
 
-/// The axis that is none of space is that of the components; where no axis says what it is, the first.
+/// The component axis is the one that is not spatial; if the file does not tell, it is the first axis.
 Axes find_axes(const Nrrd& nrrd, const std::filesystem::path& path) {
   if (nrrd.dim != 4 || (nrrd.spaceDim != 0 && nrrd.spaceDim != 3))
     fail(path, fmt::format("has {} axes in {} dimensions of space: a field of tensors has three axes and one of "
@@ -177,7 +179,7 @@ Components find_components(const Nrrd& nrrd, unsigned int axis, const std::files
     case 6:
       return {false, std::nullopt};
     case 7:
-      return {true, TensorOrder::fsl};  // What Teem itself takes seven to be.
+      return {true, TensorOrder::fsl};  // Teem itself reads seven components this way.
     case 9:
       return {false, TensorOrder::full};
     default:
@@ -186,7 +188,7 @@ Components find_components(const Nrrd& nrrd, unsigned int axis, const std::files
   }
 }
 
-/// From the file's space to RAS.
+/// The signs that take the file's space to RAS.
 Vector3d to_ras(const Nrrd& nrrd) {
   switch (nrrd.space) {
     case nrrdSpaceLeftPosteriorSuperior:
@@ -198,14 +200,14 @@ Vector3d to_ras(const Nrrd& nrrd) {
   }
 }
 
-/// Of an axis without a direction: voxels' distance, and the first one's place.
+/// For an axis without a direction: the voxel spacing, and the position of the first voxel.
 std::pair<double, double> spacing_and_start(const NrrdAxisInfo& axis) {
   const double spacing = std::isfinite(axis.spacing) ? axis.spacing : 1;
   if (!std::isfinite(axis.min)) return {spacing, 0};
   return {spacing, axis.center == nrrdCenterCell ? axis.min + 0.5 * spacing : axis.min};
 }
 
-/// The space origin is the centre of the first voxel, whatever the centering.
+/// The space origin is the centre of the first voxel, whatever the file's centering is.
 Eigen::Affine3d to_world(const Nrrd& nrrd, const Axes& axes, const std::filesystem::path& path) {
   Eigen::Affine3d transform = Eigen::Affine3d::Identity();
   for (int i = 0; i < 3; ++i) {
@@ -223,7 +225,7 @@ Eigen::Affine3d to_world(const Nrrd& nrrd, const Axes& axes, const std::filesyst
   return to_ras(nrrd).asDiagonal() * transform;
 }
 
-/// From the measurement frame, in which the components are, to RAS. The vectors that the file lists are the columns:
+/// From the measurement frame, which the components use, to RAS. The file lists the columns of the matrix:
 /// measurementFrame[i] is column i.
 Matrix3d frame_of(const Nrrd& nrrd, const std::filesystem::path& path) {
   Matrix3d frame = Matrix3d::Identity();
@@ -234,7 +236,7 @@ Matrix3d frame_of(const Nrrd& nrrd, const std::filesystem::path& path) {
   return to_ras(nrrd).asDiagonal() * frame;
 }
 
-/// Reads slices of what Teem has read, and gives its memory back where the slices lie one behind the other.
+/// Reads slices from Teem's array, and frees its memory slice by slice if each slice is contiguous.
 class Slices {
  public:
   Slices(NrrdPointer nrrd, const Axes& axes) : nrrd_(std::move(nrrd)), component_(axes.component), space_(axes.space) {
@@ -261,7 +263,7 @@ class Slices {
   NrrdPointer nrrd_;
   unsigned int component_;
   std::array<unsigned int, 3> space_;
-  std::array<std::size_t, 4> stride_{};  ///< Of each axis of the file, in numbers.
+  std::array<std::size_t, 4> stride_{};  ///< Stride of each axis of the file, counted in numbers.
 };
 
 }  // namespace

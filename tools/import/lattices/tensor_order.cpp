@@ -12,7 +12,7 @@ namespace {
 
 using Positions = std::array<int, 6>;
 
-/// Where xx, yy, zz, xy, yz and xz stand among six components.
+/// The positions of xx, yy, zz, xy, yz and xz among six components.
 Positions positions(TensorOrder order) {
   switch (order) {
     case TensorOrder::fsl:

@@ -1,6 +1,6 @@
 #pragma once
 /// @file tools/import/lattices/tensor_order.h
-/// The orders in which programs write a tensor's components.
+/// The orders in which programs write the components of a tensor.
 
 #include <string>
 #include <vector>
@@ -12,19 +12,19 @@ namespace tensorray {
 enum class TensorOrder {
   full,            ///< Nine: xx xy xz yx yy yz zx zy zz, row by row.
   vtk,             ///< Six: xx yy zz xy yz xz. VTK, ParaView, Ansys, CalculiX.
-  fsl,             ///< Six: xx xy xz yy yz zz. FSL, NRRD. OpenFOAM's files too, but VTK hands them over as `vtk`.
+  fsl,             ///< Six: xx xy xz yy yz zz. FSL, NRRD. OpenFOAM's files also use it, but VTK converts them to `vtk`.
   mrtrix,          ///< Six: xx yy zz xy xz yz. MRtrix.
   voigt,           ///< Six: xx yy zz yz xz xy. Continuum mechanics.
-  lower_triangle,  ///< Six: xx xy yy xz yz zz. NIfTI where it says "symmetric matrix"; never asked for by name.
+  lower_triangle,  ///< Six: xx xy yy xz yz zz. NIfTI with the intent "symmetric matrix"; users cannot choose it.
 };
 
-/// The names that a user may give: "vtk", "fsl", "mrtrix", "voigt".
+/// The names that users can choose: "vtk", "fsl", "mrtrix", "voigt".
 const std::vector<std::string>& tensor_order_names();
 
-/// @throw std::invalid_argument listing the names if unknown.
+/// @throw std::invalid_argument listing the names if `name` is unknown.
 TensorOrder tensor_order_of(const std::string& name);
 
-/// The tensor of nine (`full`) or six components. Six are those of a symmetric one.
+/// The tensor with nine (`full`) or six components. Six components make a symmetric tensor.
 Eigen::Matrix3d tensor_of(const double* components, TensorOrder order);
 
 }  // namespace tensorray

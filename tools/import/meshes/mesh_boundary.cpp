@@ -26,13 +26,13 @@ namespace {
 
 using Eigen::Vector3d;
 
-/// The points of a mesh, and for each the one that stands for all at its position.
+/// The points of a mesh, and for each point the one that represents all points at the same position.
 struct Points {
   std::vector<Vector3d> positions;
   std::vector<vtkIdType> same;
 };
 
-/// A face of a cell, known by the lowest of its points: four of a polygon are enough to tell it from its neighbours.
+/// A face of a cell. Its key is its four lowest points: four points of a polygon distinguish it from its neighbours.
 struct Face {
   std::array<vtkIdType, 4> key;
   vtkIdType cell = 0;
@@ -65,7 +65,7 @@ Points points_of(vtkDataSet& mesh) {
   return points;
 }
 
-/// @return false if the face has no area: of an edge or a point alone.
+/// @return false if the face has no area, because it is an edge or a point.
 bool find_key(vtkIdList& ids, const Points& points, std::array<vtkIdType, 4>& key) {
   std::vector<vtkIdType> distinct;
   for (vtkIdType i = 0; i < ids.GetNumberOfIds(); ++i)
@@ -78,7 +78,7 @@ bool find_key(vtkIdList& ids, const Points& points, std::array<vtkIdType, 4>& ke
   return true;
 }
 
-/// The faces that one cell alone has.
+/// The faces that belong to only one cell.
 std::vector<Face> outer_faces(vtkDataSet& mesh, const Points& points) {
   std::vector<Face> faces;
   MeshCell cell;
@@ -103,8 +103,9 @@ std::vector<Face> outer_faces(vtkDataSet& mesh, const Points& points) {
   return outer;
 }
 
-/// The points of the faces that are the farthest in one of many directions: of what is in front of any plane the
-/// farthest is found but for 1 − cos of half the directions' spacing (4e-4 of the diagonal), and nothing is invented.
+/// For each of many directions, the point of the faces that is farthest in that direction. For any plane, these
+/// include a point that is nearly the farthest in front of it: the error is at most 1 − cos of half the directions'
+/// spacing (4e-4 of the diagonal). All results are points of the mesh.
 Eigen::Matrix3Xd extreme_points(vtkDataSet& mesh, const std::vector<Face>& faces, const Points& points) {
   std::vector<Vector3d> candidates;
   std::vector<bool> seen(points.positions.size(), false);
@@ -137,11 +138,12 @@ Eigen::Matrix3Xd extreme_points(vtkDataSet& mesh, const std::vector<Face>& faces
   return extreme;
 }
 
-/// A face as triangles of points' indices, counter-clockwise as seen from inside the cell; none if it has no area.
+/// A face as triangles of point indices, counter-clockwise as seen from inside the cell; no triangles if it has no
+/// area.
 struct FacePlane {
   std::vector<std::array<vtkIdType, 3>> triangles;
-  Vector3d normal = Vector3d::Zero();  ///< Of unit length, into the cell.
-  double outmost = 0;  ///< Along the normal, of the face's own points the one that is the farthest out of the cell.
+  Vector3d normal = Vector3d::Zero();  ///< Unit length; points into the cell.
+  double outmost = 0;  ///< Position along the normal of the face's own point that is farthest out of the cell.
 };
 
 FacePlane plane_of(const MeshCell& cell, int index, const Points& points) {

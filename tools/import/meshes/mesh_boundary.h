@@ -1,6 +1,6 @@
 #pragma once
 /// @file tools/import/meshes/mesh_boundary.h
-/// The surface of the body around which a mesh lies.
+/// The surface of the body inside a mesh.
 
 #include <cstddef>
 #include <filesystem>
@@ -9,12 +9,13 @@ class vtkDataSet;
 
 namespace tensorray {
 
-/// Writes the surface of the body around which the mesh lies: of its outer faces, those that have points of the mesh in
-/// front of them, by more than a thousandth of its diagonal (a convex outer boundary has none; a hole's wall has),
-/// oriented out of the body, which is into the mesh's cells. Binary PLY of triangles (little-endian, double) with
-/// shared vertices. For a mesh that holds a whole hole the surface is closed. Points at equal positions count as one,
-/// so that the seam of a grid that is wrapped around a body is no face; hidden cells are part of the body.
-/// @return how many triangles; 0 (and no file) if there are none.
+/// Writes the surface of the body that the mesh surrounds. A face of the mesh's outside belongs to it if points of
+/// the mesh lie in front of the face by more than a thousandth of the mesh's diagonal: no face of a convex outer
+/// boundary has such points, but the wall of a hole has. Triangles are oriented out of the body, into the mesh's
+/// cells. The format is binary PLY (little-endian, double) of triangles with shared vertices. The surface is closed
+/// if the mesh contains the whole hole. Points at equal positions count as one, so that the seam of a grid that is
+/// wrapped around a body is not a face. Hidden cells belong to the body.
+/// @return the number of triangles; if 0, no file is written.
 /// @throw std::invalid_argument if the mesh has no three-dimensional cells; std::runtime_error naming the file.
 std::size_t write_boundary(vtkDataSet& mesh, const std::filesystem::path& path);
 

@@ -12,8 +12,8 @@
 namespace tensorray {
 namespace {
 
-/// How far a curved cell may reach beyond the box of its points, in parts of the box. A parabola through 0, 1, 1
-/// reaches 9/8; a surface of two such directions twice as far.
+/// How far a curved cell may extend beyond the box of its points, as a fraction of the box. A parabola through 0, 1,
+/// 1 reaches 9/8; a surface that is curved in two such directions reaches twice as far.
 constexpr double bulge = 0.25;
 
 Eigen::AlignedBox3d box_of(const Eigen::Matrix3Xd& points, bool linear) {
@@ -121,7 +121,7 @@ double MeshCell::volume() const {
   return volume;
 }
 
-/// The position and its derivatives at parametric coordinates.
+/// Computes the position and its derivatives at parametric coordinates.
 void MeshCell::evaluate(const Eigen::Vector3d& p) {
   cell_->InterpolateFunctions(p.data(), weights_.data());
   cell_->InterpolateDerivs(p.data(), derivatives_.data());
@@ -135,12 +135,12 @@ void MeshCell::evaluate(const Eigen::Vector3d& p) {
   }
 }
 
-/// Newton's method from `p`. @return whether it converged; what it finds may be outside of the cell.
+/// Newton's method from `p`. @return whether it converged; the solution may be outside the cell.
 bool MeshCell::solve(const Eigen::Vector3d& x, Eigen::Vector3d& p) {
   constexpr int iterations = 20;
-  constexpr double converged = 1e-6;  // of a step; the error is about its square
+  constexpr double converged = 1e-6;  // Length of a step; the error is about its square.
   constexpr double far_away = 8;
-  constexpr double below_top = 1 - 1e-7;  // at a pyramid's top itself the Jacobian is singular
+  constexpr double below_top = 1 - 1e-7;  // The Jacobian is singular at the top of a pyramid.
   for (int i = 0; i < iterations; ++i) {
     if (shape_ == Shape::pyramid) p.z() = std::min(p.z(), below_top);
     evaluate(p);

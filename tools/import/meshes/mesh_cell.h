@@ -1,6 +1,6 @@
 #pragma once
 /// @file tools/import/meshes/mesh_cell.h
-/// A cell of a mesh, and the way from a point in space to the cell's interpolation. Private to the importer.
+/// A cell of a mesh, and its interpolation at a point in space. Private to the importer.
 
 #include <vector>
 
@@ -11,16 +11,16 @@
 
 namespace tensorray {
 
-/// One three-dimensional cell at a time, of any type that VTK has. The mesh is only read: after one call of load() for
-/// it on one thread, cells may be loaded on several, each thread with a MeshCell of its own.
-///
-/// The position is found by Newton's method on VTK's own shape functions. VTK's EvaluatePosition stops at 1e-3 in
-/// parametric coordinates and takes several times as long; it is used for polyhedra alone, which have no derivatives.
+/// Holds one three-dimensional cell at a time, of any of VTK's types. Finds parametric coordinates by Newton's method
+/// on VTK's own shape functions. VTK's EvaluatePosition stops at an error of 1e-3 in parametric coordinates and takes
+/// several times as long; it is used only for polyhedra, which have no derivatives.
+/// Threads: the mesh is only read. After a first call of load() on one thread, several threads may load cells, each
+/// with its own MeshCell.
 class MeshCell {
  public:
-  /// Of a cell that lists more points than its type has (linear hexahedra with the middle nodes of quadratic ones, say)
-  /// the first count. @return false if the cell is not three-dimensional, hidden, or lists too few; then nothing else
-  /// may be called.
+  /// If a cell lists more points than its type has (for example linear hexahedra with the middle nodes of quadratic
+  /// ones), only the first ones count. @return false if the cell is not three-dimensional, is hidden, or lists too
+  /// few points; then call no other function.
   bool load(vtkDataSet& mesh, vtkIdType id);
 
   int points() const { return static_cast<int>(positions_.cols()); }
@@ -28,22 +28,23 @@ class MeshCell {
   const Eigen::Matrix3Xd& positions() const { return positions_; }
   vtkGenericCell& vtk() const { return *cell_; }
 
-  /// Contains the cell; that of a curved one is larger than that of its points.
+  /// Contains the cell. For a curved cell it is larger than the box of its points.
   Eigen::AlignedBox3d box() const;
   double volume() const;
 
-  /// Whether `x` is in the cell, or no farther than `tolerance` from it; weights() are then those of its points there.
+  /// Whether `x` is in the cell, or no farther than `tolerance` from it. weights() then returns the weights of the
+  /// points at `x`.
   bool find(const Eigen::Vector3d& x, double tolerance);
   const std::vector<double>& weights() const { return weights_; }
 
  private:
-  /// What parametric coordinates are inside: [0, 1]³; all >= 0 with a sum <= 1; a triangle times [0, 1]; [0, 1]³ of
-  /// which the top is one point; or unknown.
+  /// The parametric coordinates that are inside, by shape: box, [0, 1]³; simplex, all >= 0 with a sum <= 1; prism, a
+  /// triangle times [0, 1]; pyramid, [0, 1]³ whose top is one point; unknown.
   enum class Shape { box, simplex, prism, pyramid, unknown };
 
   struct Type {
     Shape shape = Shape::unknown;
-    int points = 0;  ///< That the shape functions are of; 0: as many as the cell has.
+    int points = 0;  ///< Number of points of the shape functions; 0: all points of the cell.
   };
 
   static Type type_of(int cell_type);
@@ -58,18 +59,18 @@ class MeshCell {
   bool linear_ = true;
   Eigen::Matrix3Xd positions_;
   std::vector<double> weights_, derivatives_;
-  Eigen::Vector3d position_;  ///< Of the last evaluate().
+  Eigen::Vector3d position_;  ///< Result of the last evaluate().
   Eigen::Matrix3d jacobian_;
 
-  // The affine map that agrees with the cell's at its middle: the first guess, and a box that is as oblique as the
-  // cell.
+  // The affine map that agrees with the cell's map at its centre. It gives the first guess, and a box as oblique as
+  // the cell.
   Eigen::Vector3d parametric_centre_, centre_;
   Eigen::Matrix3d to_frame_;
   Eigen::AlignedBox3d frame_box_;
   bool has_frame_ = false;
 };
 
-/// Whether a vtkGhostType of a point or a cell says that it is not there (duplicates are).
+/// Whether the vtkGhostType of a point or a cell marks it as absent. Duplicates are not absent.
 bool is_hidden(unsigned char ghost_type);
 
 }  // namespace tensorray

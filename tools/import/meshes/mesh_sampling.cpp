@@ -29,15 +29,15 @@ using Eigen::Vector3i;
 using CellRange = tbb::blocked_range<vtkIdType>;
 using Blocks = decltype(TensorGrid::blocks);
 
-constexpr double face_tolerance = 1e-6;         ///< In parts of the mesh's diagonal.
-constexpr double most_voxels = 1 << 30;         ///< Of any lattice.
-constexpr double most_chosen_voxels = 1 << 21;  ///< Of a lattice of which the user gave no size.
+constexpr double face_tolerance = 1e-6;         ///< As a fraction of the mesh's diagonal.
+constexpr double most_voxels = 1 << 30;         ///< Limit for any lattice.
+constexpr double most_chosen_voxels = 1 << 21;  ///< Limit for a lattice whose size the user did not set.
 
-/// The part of a mesh that has a volume.
+/// The three-dimensional part of a mesh.
 struct Solid {
-  std::vector<AlignedBox3d> boxes;  ///< Of each cell of the mesh; empty where it does not count.
-  AlignedBox3d bounds;              ///< Of the points of these cells.
-  std::vector<bool> points;         ///< Of the mesh: whether they are of these cells.
+  std::vector<AlignedBox3d> boxes;  ///< Box of each cell of the mesh; empty for cells that are not used.
+  AlignedBox3d bounds;              ///< Bounds of the points of the used cells.
+  std::vector<bool> points;         ///< For each point of the mesh: whether a used cell has it.
 };
 
 struct LatticeShape {
@@ -47,7 +47,7 @@ struct LatticeShape {
   Vector3d position(const Vector3i& index) const { return origin + voxel.cwiseProduct(index.cast<double>()); }
 };
 
-/// The lattice's blocks, and the cells that may have voxels in each, by ascending index: those of block b are
+/// For each block of the lattice, the cells that may have voxels in it, by ascending index: the cells of block b are
 /// cells[first[b]] to cells[first[b + 1] − 1].
 struct Bins {
   Vector3i blocks = Vector3i::Zero();
@@ -74,7 +74,7 @@ Solid solid_part(vtkDataSet& mesh) {
   std::vector<AlignedBox3d> hulls(solid.boxes.size());
   std::vector<std::atomic<bool>> used(static_cast<std::size_t>(mesh.GetNumberOfPoints()));
   MeshCell first;
-  if (count > 0) first.load(mesh, 0);  // what VTK keeps for later is now made, on one thread
+  if (count > 0) first.load(mesh, 0);  // makes VTK's cached data on one thread
   tbb::parallel_for(CellRange(0, count, 256), [&](const CellRange& range) {
     MeshCell cell;
     for (vtkIdType id = range.begin(); id < range.end(); ++id) {
@@ -112,9 +112,9 @@ double typical_edge(vtkDataSet& mesh, const Solid& solid, const AlignedBox3d& bo
   return std::cbrt(*middle);
 }
 
-/// Voxels from one end of an edge as far as it goes, in double, since it may be beyond all integers.
+/// Voxels that fit along edges, from one end. Doubles, because the numbers may exceed all integers.
 Vector3d voxels_along(const Vector3d& edges, double voxel) {
-  constexpr double rounding = 1e-6;  // a last voxel that is on the end but for rounding is wanted
+  constexpr double rounding = 1e-6;  // keeps a last voxel that is beyond the end only by rounding
   return (edges.array() / voxel + rounding).floor() + 1;
 }
 
@@ -165,7 +165,7 @@ LatticeShape shape_of(vtkDataSet& mesh, const Solid& solid, const SamplingSettin
                     "a larger --voxel-size or a lower --resolution",
                     size.x(), size.y(), size.z()));
   shape.size = size.cast<int>();
-  // What the voxels do not fill is left over on both sides alike.
+  // Centre the voxels, so that both sides have the same rest.
   shape.origin = box.center() - 0.5 * (shape.voxel.array() * (size.array() - 1)).matrix();
   return shape;
 }
@@ -183,7 +183,7 @@ AlignedBox3i voxels_in(const AlignedBox3d& box, const LatticeShape& shape, doubl
   return {from.cast<int>().matrix(), to.cast<int>().matrix()};
 }
 
-/// Calls `visit(block)` with the indices of the blocks that have voxels of `voxels`.
+/// Calls `visit(block)` with the index of each block that has voxels among `voxels`.
 template <class Visit>
 void for_each_block(const Bins& bins, const AlignedBox3i& voxels, const Visit& visit) {
   if (voxels.isEmpty()) return;
@@ -208,7 +208,8 @@ Bins bins_of(const Solid& solid, const LatticeShape& shape, double tolerance) {
   return bins;
 }
 
-/// The interpolated tensor of what `cell` has found last; not finite if a point that counts has none.
+/// The interpolated tensor at the position that `cell` found last; not finite if a point with a weight has no finite
+/// tensor.
 Eigen::Matrix3d interpolated(const MeshCell& cell, const double* tensors) {
   constexpr double rounding = 1e-9;
   Eigen::Matrix<double, 3, 3, Eigen::RowMajor> sum = Eigen::Matrix3d::Zero();
@@ -220,7 +221,7 @@ Eigen::Matrix3d interpolated(const MeshCell& cell, const double* tensors) {
   return sum;
 }
 
-/// What the blocks are filled from.
+/// The data that blocks are filled from.
 struct Source {
   vtkDataSet& mesh;
   const double* tensors;
@@ -229,7 +230,7 @@ struct Source {
   double tolerance;
 };
 
-/// Gives those voxels of a block that are in `cell`, and were in none before, their tensors.
+/// Sets the tensors of the block's voxels that are in `cell` and were in no earlier cell.
 void fill_from_cell(const Source& source, MeshCell& cell, const AlignedBox3i& voxels, TensorBlock& block,
                     std::bitset<TensorBlock::voxels>& taken) {
   const Vector3i from = (voxels.min() - block.origin).cwiseMax(0);

@@ -1,6 +1,6 @@
 #pragma once
 /// @file tools/import/meshes/mesh_sampling.h
-/// From tensors on a mesh to tensors on a lattice.
+/// Samples tensors on a mesh at the voxels of a lattice.
 
 #include <cstddef>
 #include <optional>
@@ -16,25 +16,26 @@ class vtkDataSet;
 namespace tensorray {
 
 struct SamplingSettings {
-  /// Voxels along the longest edge, or along x, y, z (>= 2 each); or a voxel's edge; or none of these: chosen so that
-  /// the median cell is about a voxel, within 2^21 voxels.
+  /// The number of voxels along the longest edge (int), the numbers along x, y, z (>= 2 each), or the edge of a voxel
+  /// (double). If none is given, a voxel is about as large as the median cell, with at most 2^21 voxels.
   std::variant<std::monostate, int, Eigen::Vector3i, double> resolution;
-  std::optional<Eigen::AlignedBox3d> bounds;  ///< World; default: those of the three-dimensional cells.
+  std::optional<Eigen::AlignedBox3d> bounds;  ///< World; default: bounds of the three-dimensional cells.
 };
 
 struct SamplingReport {
-  Eigen::Vector3i size = Eigen::Vector3i::Zero();   ///< Voxels of the lattice, active or not.
-  Eigen::Vector3d voxel = Eigen::Vector3d::Zero();  ///< Edges of a voxel.
+  Eigen::Vector3i size = Eigen::Vector3i::Zero();   ///< Voxels of the lattice along each axis, active or not.
+  Eigen::Vector3d voxel = Eigen::Vector3d::Zero();  ///< Edges of a voxel, world units.
   std::size_t active = 0;
-  double native_peak = 0, native_median = 0;    ///< Of ‖T‖ (Frobenius) at the cells' points in `bounds`.
-  double sampled_peak = 0, sampled_median = 0;  ///< At the active voxels.
-  std::size_t non_finite_points = 0;            ///< Of the cells' points in `bounds`.
+  double native_peak = 0, native_median = 0;    ///< ‖T‖ (Frobenius) at the cells' points in `bounds`.
+  double sampled_peak = 0, sampled_median = 0;  ///< ‖T‖ at the active voxels.
+  std::size_t non_finite_points = 0;            ///< Points of cells in `bounds` whose tensor is not finite.
 };
 
-/// Samples the tensors of with_tensors at the voxels' centres, by the interpolation of the cell that each is in (where
-/// cells overlap, the one of the lowest index); voxels in no cell, or in one with a NaN at a point that counts, are
-/// inactive. Voxels have the middle of the box as their middle as far as the box goes, and those within 1e-6 of the
-/// mesh's diagonal of a face count as inside. On all threads, with the same result on any number.
+/// Samples the tensors of with_tensors at the centres of voxels. Each voxel uses the interpolation of the cell that
+/// contains it; where cells overlap, the cell with the lowest index. A voxel is inactive if it is in no cell, or if a
+/// point with a weight has NaN. The lattice is centred in the box as far as the box extends. Voxels within 1e-6 of
+/// the mesh's diagonal of a face count as inside.
+/// Threads: uses all threads. The result does not depend on their number.
 /// @throw std::invalid_argument if the mesh has no three-dimensional cells, a setting is out of range, no voxel is
 /// inside, or the grid would exceed 2^30 voxels.
 TensorGrid sample_mesh(vtkDataSet& mesh, const SamplingSettings& settings, const Progress& progress,

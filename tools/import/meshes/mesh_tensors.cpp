@@ -41,7 +41,7 @@ vtkDataSetAttributes& attributes(vtkDataSet& mesh, bool of_cells) {
   return *mesh.GetPointData();
 }
 
-/// Visits the named numeric arrays as (array, of_cells), those of points first.
+/// Calls `visit(array, of_cells)` for the named numeric arrays, first those of points.
 template <class Visit>
 void for_each_array(vtkDataSet& mesh, const Visit& visit) {
   for (const bool of_cells : {false, true}) {
@@ -68,8 +68,8 @@ const char* wanted(Take take) {
   return take == Take::tensor ? "a tensor has 6, 9, or more than 9 components" : "a vector has 3 components";
 }
 
-/// The order that the names of the first six components say, as ParaView, CalculiX's converters and others give them:
-/// XX, S_YY, xy, S13, ... ; of a pair either comes first.
+/// The order that the names of the first six components tell, as ParaView, CalculiX's converters and others write
+/// them: XX, S_YY, xy, S13, ... The two indices may be swapped.
 std::optional<TensorOrder> order_of_names(vtkDataArray& array) {
   std::string names;
   for (int i = 0; i < 6; ++i) {
@@ -146,11 +146,11 @@ Array averaged_to_points(vtkDataSet& mesh, vtkDataArray& of_cells) {
   }
   for (vtkIdType point = 0; point < mesh.GetNumberOfPoints(); ++point)
     for (int k = 0; k < components; ++k)
-      *sums->GetPointer(point * components + k) /= counts[static_cast<std::size_t>(point)];  // 0/0 is NaN, as it should
+      *sums->GetPointer(point * components + k) /= counts[static_cast<std::size_t>(point)];  // 0/0 is NaN, as intended
   return sums;
 }
 
-/// The cells of a mesh, as far as they are three-dimensional and not hidden, on all its points.
+/// The cells of a mesh that are three-dimensional and not hidden, with all points of the mesh.
 vtkSmartPointer<vtkDataSet> visible_cells(vtkPointSet& mesh) {
   auto visible = vtkSmartPointer<vtkUnstructuredGrid>::New();
   visible->SetPoints(mesh.GetPoints());
@@ -161,8 +161,8 @@ vtkSmartPointer<vtkDataSet> visible_cells(vtkPointSet& mesh) {
   return visible;
 }
 
-/// The geometry to differentiate on. On a curvilinear grid VTK takes differences along the grid, whether points are
-/// hidden or not; on loose cells it takes the mean of the cells' own derivatives.
+/// The mesh to differentiate on. On a curvilinear grid VTK takes differences along the grid and ignores that points
+/// are hidden; on an unstructured grid it takes the mean of the cells' own derivatives.
 vtkSmartPointer<vtkDataSet> differentiable(vtkDataSet& mesh) {
   auto* const curvilinear = vtkStructuredGrid::SafeDownCast(&mesh);
   if (curvilinear && (curvilinear->HasAnyBlankPoints() || curvilinear->HasAnyBlankCells()))
@@ -172,7 +172,7 @@ vtkSmartPointer<vtkDataSet> differentiable(vtkDataSet& mesh) {
   return bare;
 }
 
-/// ∂v_i/∂x_j at component 3 i + j.
+/// ∂v_i/∂x_j as component 3 i + j.
 Array gradient_of(vtkDataSet& mesh, const Array& vectors) {
   const vtkSmartPointer<vtkDataSet> domain = differentiable(mesh);
   vectors->SetName("vector");
@@ -181,7 +181,7 @@ Array gradient_of(vtkDataSet& mesh, const Array& vectors) {
   filter->SetInputData(domain);
   filter->SetInputArrayToProcess(0, 0, 0, vtkDataObject::FIELD_ASSOCIATION_POINTS, "vector");
   filter->SetResultArrayName("gradient");
-  // A mesh may carry its surface as cells of two dimensions, whose derivatives are tangential alone.
+  // A mesh may list its surface as two-dimensional cells, which have only tangential derivatives.
   filter->SetContributingCellOption(vtkGradientFilter::DataSetMax);
   filter->Update();
   auto* const result = vtkDataSet::SafeDownCast(filter->GetOutputDataObject(0));

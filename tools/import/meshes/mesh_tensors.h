@@ -1,6 +1,6 @@
 #pragma once
 /// @file tools/import/meshes/mesh_tensors.h
-/// Tensors at the points of a mesh, of the arrays that solvers write.
+/// Makes tensors at the points of a mesh from the arrays that solvers write.
 
 #include <optional>
 #include <string>
@@ -13,14 +13,14 @@ class vtkSmartPointer;
 
 namespace tensorray {
 
-/// What is made of an array.
+/// How an array becomes tensors.
 enum class Take {
   tensor,    ///< The array's components are the tensor.
   gradient,  ///< T(i, j) = ∂v_i/∂x_j of a vector v.
   strain,    ///< The symmetric part of the gradient of a displacement.
 };
 
-/// An array of a data set.
+/// The chosen array of a data set.
 struct ArrayChoice {
   std::string name;
   bool of_cells = false;
@@ -29,22 +29,22 @@ struct ArrayChoice {
 /// The name of the array that with_tensors makes.
 constexpr const char* tensor_array = "tensor";
 
-/// The array called `name`; if empty, the only one that suits `take` (6, 9 or 10 and more components; 3 for a
-/// gradient). Point arrays come before cell arrays of the same name.
-/// @throw std::invalid_argument listing what arrays there are, with components and where they are.
+/// Finds the array called `name`; if `name` is empty, the only array that suits `take` (6, 9, or at least 10
+/// components; 3 for a gradient). If a point array and a cell array have the same name, the point array is chosen.
+/// @throw std::invalid_argument that lists the arrays with their components and whether they are at points or cells.
 ArrayChoice choose_array(vtkDataSet& mesh, const std::string& name, Take take);
 
-/// The points and cells of a mesh with one point array `tensor_array`: a vtkDoubleArray of nine components, row by row.
-/// It is made of six, nine or more components (of more than nine the first six are the tensor, the others derived from
-/// it), or by differentiating on the mesh itself, before any resampling. Cell arrays are averaged to points first, over
-/// the three-dimensional cells that are not hidden. Points whose tensor is not finite, and hidden ones (blanked:
-/// vtkGhostType with another bit than that of a duplicate), get NaN; a derivative never looks at hidden points of a
-/// curvilinear grid.
-/// @param order  Of six and more than nine components. Not needed where the names of the components say it (XX, YY,
-/// ...), and then not to contradict them.
-/// @return a mesh that shares the geometry, and keeps the vtkGhostType, of the given one.
-/// @throw std::invalid_argument if no order is known or it is another than the names', or std::runtime_error if VTK
-/// cannot differentiate on the mesh.
+/// The points and cells of a mesh with one point array `tensor_array`: a vtkDoubleArray of nine components, row by
+/// row. The tensors are the array's components (six, nine or more; of more than nine the first six are the tensor,
+/// and the others are derived from it), or derivatives that are computed on the mesh itself, before any resampling.
+/// Cell arrays are first averaged to points, over the three-dimensional cells that are not hidden. The result is NaN
+/// at points whose tensor is not finite, and at hidden points (blanked: vtkGhostType has another bit than the
+/// duplicate bit). Derivatives do not use hidden points of a curvilinear grid.
+/// @param order  Order of six components, and of more than nine. Not needed if the components' names tell it (XX, YY,
+/// ...); then it must not contradict them.
+/// @return a mesh that shares the geometry of the given one, and keeps its vtkGhostType.
+/// @throw std::invalid_argument if the order is not known or contradicts the names; std::runtime_error if VTK cannot
+/// differentiate on the mesh.
 vtkSmartPointer<vtkDataSet> with_tensors(vtkDataSet& mesh, const ArrayChoice& array, Take take,
                                          const std::optional<TensorOrder>& order);
 

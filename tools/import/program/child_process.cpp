@@ -20,7 +20,8 @@
 namespace tensorray {
 namespace {
 
-/// The child ends at once when it is told to, as the parent does away with what it leaves behind, and with its parent.
+/// Makes the child end at once on SIGINT and SIGTERM, because the parent removes the files that it leaves; and makes
+/// it end when its parent ends.
 void be_mortal() {
   for (const int signal : {SIGINT, SIGTERM}) std::signal(signal, SIG_DFL);
 #ifdef __linux__
@@ -42,12 +43,13 @@ int wait_for(pid_t child, const Progress& progress) {
 }  // namespace
 
 void in_child_process(const std::function<void()>& work, const Progress& progress, const std::string& on_crash) {
-  std::fflush(nullptr);  // What is in the buffers would be printed twice.
+  std::fflush(nullptr);  // Otherwise both processes would print what is in the buffers.
   const pid_t child = fork();
   if (child < 0) throw std::runtime_error("no child process can be started: the system has too many");
   if (child == 0) {
     be_mortal();
-    _exit(run_and_report(work));  // Not exit: some libraries' last rites wait for threads, which the child lacks.
+    _exit(run_and_report(
+        work));  // Not exit: the exit handlers of some libraries wait for threads that the child does not have.
   }
   const int status = wait_for(child, progress);
   if (progress.cancelled) throw Cancelled();

@@ -23,7 +23,7 @@
 namespace tensorray {
 namespace {
 
-/// Of the sampled peak, what is left where no warning is needed.
+/// The fraction of the peak that sampling must keep; below it a warning is printed.
 constexpr double kept_peak = 0.95;
 
 struct ImportOptions {
@@ -88,7 +88,7 @@ void print_sampling(const ImportReport& report) {
   }
 }
 
-/// The child's part: everything but giving the files their names.
+/// The work of the child: everything except giving the files their final names.
 void import_to(const ImportOptions& options, const ImportSettings& settings, OutputFile& output, Progress& progress) {
   ImportReport report;
   std::optional<ProgressBar> bar(std::in_place, progress, options.quiet);

@@ -1,6 +1,6 @@
 #pragma once
 /// @file tools/import/program/import_command.h
-/// The options of `tensorray import`, and its work.
+/// The options of `tensorray import`, and the command itself.
 
 namespace CLI {
 class App;
@@ -10,7 +10,7 @@ namespace tensorray {
 
 struct Progress;
 
-/// Adds the options, and the import itself as what is done when they are parsed. Errors are exceptions: CLI::Error and
+/// Adds the options to `program`. The import runs when they are parsed. Errors are exceptions: CLI::Error and
 /// std::invalid_argument where the user's input is wrong.
 void add_import_options(CLI::App& program, Progress& progress);
 

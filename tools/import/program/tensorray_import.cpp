@@ -1,9 +1,9 @@
 /// @file tools/import/program/tensorray_import.cpp
-/// The program `tensorray-import`: all that needs VTK, Teem and NIfTI's library.
-///   tensorray-import ARGUMENTS...                    does what `tensorray import ARGUMENTS...` promises
+/// The program `tensorray-import`: everything that needs VTK, Teem or the NIfTI library.
+///   tensorray-import ARGUMENTS...                    runs `tensorray import ARGUMENTS...`
 ///   tensorray-import --write-vtp EXCHANGE FILE       a file of poly_data.h → VTK polydata
 ///   tensorray-import --read-vtp EXCHANGE FILE NAME...    VTK polydata, with the named arrays → a file of poly_data.h
-/// The last two are for volumes/files/vtk_files.h alone; an error is one line, without the program's name.
+/// Only volumes/files/vtk_files.h uses the last two. Their errors are one line, without the program's name.
 
 #include <csignal>
 #include <cstdio>

@@ -17,22 +17,22 @@
 namespace tensorray {
 namespace {
 
-/// What is read from, until it has been.
+/// The arrays of the image, whose slices are freed as they are read.
 struct Source {
   vtkSmartPointer<vtkDataArray> values;
   vtkSmartPointer<vtkUnsignedCharArray> ghosts;  ///< May be null.
-  unsigned char hidden = 0;                      ///< The bit of ghosts that hides.
-  vtkIdType slice = 0;                           ///< Voxels a slice.
+  unsigned char hidden = 0;                      ///< The bit of `ghosts` that marks hidden voxels.
+  vtkIdType slice = 0;                           ///< Voxels per slice.
 };
 
 Eigen::Vector3i size_of(vtkImageData& image, bool of_cells) {
   Eigen::Vector3i size;
   image.GetDimensions(size.data());
-  if (of_cells) size = (size.array() - 1).max(1);  // along an axis of one point, VTK's cells are flat
+  if (of_cells) size = (size.array() - 1).max(1);  // along an axis with one point, VTK's cells are flat
   return size;
 }
 
-/// The edges of a voxel, as columns. A flat image may have no thickness: it gets that of its thinnest other edge.
+/// The edges of a voxel, as columns. If a flat image has no thickness, its thinnest other edge is used.
 Eigen::Matrix3d edges_of(vtkImageData& image) {
   Eigen::Vector3d spacing;
   image.GetSpacing(spacing.data());
@@ -81,7 +81,7 @@ void read_slice(Source& source, int z, double* out) {
       values.GetTuple(i, out);
     }
   }
-  // Shrinking keeps what is before, and gives whole pages back to the system.
+  // Resize keeps the front of the array, and returns whole pages to the system.
   if (values.GetReferenceCount() == 1) values.Resize(begin);
 }
 

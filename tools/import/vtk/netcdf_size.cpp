@@ -16,7 +16,7 @@ struct BadHeader : std::runtime_error {
   BadHeader() : std::runtime_error("damaged netCDF header") {}
 };
 
-/// @throw BadHeader where the result has more than 64 bits.
+/// @throw BadHeader if the result needs more than 64 bits.
 std::uint64_t sum(std::uint64_t a, std::uint64_t b) {
   if (a > std::numeric_limits<std::uint64_t>::max() - b) throw BadHeader();
   return a + b;
@@ -27,13 +27,13 @@ std::uint64_t product(std::uint64_t a, std::uint64_t b) {
   return a * b;
 }
 
-/// What netCDF fills to a multiple of four bytes.
+/// The size after netCDF's padding to a multiple of four bytes.
 std::uint64_t padded(std::uint64_t bytes) { return sum(bytes, 3) / 4 * 4; }
 
-/// Reads the header's numbers, big-endian, in the widths of its version.
+/// Reads the big-endian numbers of a header. Their sizes depend on the version.
 class Header {
  public:
-  /// @param size  Bytes of the file.
+  /// @param size  Size of the file, bytes.
   Header(std::istream& stream, std::uint64_t size) : stream_(stream), size_(size) {
     char magic[4];
     if (!stream_.read(magic, 4) || magic[0] != 'C' || magic[1] != 'D' || magic[2] != 'F') throw BadHeader();
@@ -52,22 +52,22 @@ class Header {
   std::uint64_t count() { return integer(version_ == 5 ? 8 : 4); }
   std::uint64_t offset() { return integer(version_ == 1 ? 4 : 8); }
 
-  /// A list's length; each of its elements takes some bytes, so that a damaged length runs into the end of the file:
-  /// whatever is read or skipped moves forward.
+  /// Reads the length of a list. Every element takes at least one byte and reading always moves forward, so a damaged
+  /// length ends at the end of the file.
   std::uint64_t list() {
-    integer(4);  // Its tag.
+    integer(4);  // The list's tag.
     return count();
   }
 
   void skip(std::uint64_t bytes) {
-    if (padded(bytes) > size_) throw BadHeader();  // A seek takes greater lengths for negative ones.
+    if (padded(bytes) > size_) throw BadHeader();  // A seek would read greater sizes as negative.
     stream_.seekg(static_cast<std::streamoff>(padded(bytes)), std::ios::cur);
     if (!stream_) throw BadHeader();
   }
 
   void skip_name() { skip(count()); }
 
-  /// @return bytes of a number of the type that comes next.
+  /// Reads a type. @return the size of a number of this type, bytes.
   std::uint64_t type_size() {
     static constexpr int sizes[] = {0, 1, 1, 2, 4, 4, 8, 1, 2, 4, 8, 8};
     const std::uint64_t type = integer(4);
@@ -98,7 +98,7 @@ std::vector<std::uint64_t> read_dimensions(Header& header) {
   std::vector<std::uint64_t> dimensions;
   for (std::uint64_t left = header.list(); left > 0; --left) {
     header.skip_name();
-    dimensions.push_back(header.count());  // 0: the record dimension.
+    dimensions.push_back(header.count());  // 0 marks the record dimension.
   }
   return dimensions;
 }
@@ -117,7 +117,7 @@ Variable read_variable(Header& header, const std::vector<std::uint64_t>& dimensi
   }
   header.skip_attributes();
   variable.size = product(elements, header.type_size());
-  header.count();  // The size as it was written, which overflows for large variables.
+  header.count();  // Ignore the stored size: it overflows for large variables.
   variable.begin = header.offset();
   return variable;
 }
@@ -125,7 +125,7 @@ Variable read_variable(Header& header, const std::vector<std::uint64_t>& dimensi
 std::uint64_t needed_size(std::istream& stream, std::uint64_t file_size) {
   Header header(stream, file_size);
   const std::uint64_t records = header.count();
-  if (records == 0xffffffffu) throw BadHeader();  // "Count them": of a file that was never closed.
+  if (records == 0xffffffffu) throw BadHeader();  // The value means "count the records": the file was never closed.
   const std::vector<std::uint64_t> dimensions = read_dimensions(header);
   header.skip_attributes();
   std::vector<Variable> variables;

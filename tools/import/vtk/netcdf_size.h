@@ -1,6 +1,6 @@
 #pragma once
 /// @file tools/import/vtk/netcdf_size.h
-/// How long a netCDF file must be. Its library reads what is missing at the end as zeros.
+/// Computes how long a netCDF file must be. The netCDF library reads missing data at the end of a file as zeros.
 
 #include <cstdint>
 #include <filesystem>
@@ -8,8 +8,9 @@
 
 namespace tensorray {
 
-/// The length that the header of a classic netCDF file ("CDF" 1, 2 or 5; ExodusII files are such) asks for, in bytes;
-/// nothing if it is no classic file (netCDF-4 is HDF5, which notices) or its header is cut off or damaged.
+/// The length in bytes that the header of a classic netCDF file announces ("CDF" 1, 2 or 5; ExodusII files are such
+/// files). Empty if the file is not classic (netCDF-4 is HDF5, which detects cut files), or if its header is cut off
+/// or damaged.
 std::optional<std::uint64_t> netcdf_size(const std::filesystem::path& path);
 
 }  // namespace tensorray

@@ -1,7 +1,7 @@
-// VTK has a reader of PLOT3D that finds a grid's form by itself. It is not used, for it takes the q file to be of the
-// grid's form (a grid with record marks beside a q file without them is an error), and says of every misfit that the
-// file "is corrupt". Here each file's length decides on its own form, to the byte, nothing is allocated before, and the
-// error says what does not fit.
+// VTK's PLOT3D reader can find the form of a grid, but it is not used: it requires the q file to have the grid's form
+// (a grid with record marks and a q file without them is an error), and it reports every mismatch as "is corrupt".
+// Here each file has its own form, found from its exact length before any memory is allocated, and the error message
+// says what does not fit.
 
 #include "tools/import/vtk/plot3d.h"
 
@@ -39,7 +39,7 @@ std::vector<Number> read_numbers(std::ifstream& file, const Path& path, bool big
   return numbers;
 }
 
-/// The next component of all points, which a file holds one after the other, into `array`.
+/// Reads the next component into `array`. A file stores the components one after the other, each for all points.
 void read_component(std::ifstream& file, const Path& path, const Plot3dLayout& layout, vtkDataArray& array,
                     int component) {
   const auto store = [&](const auto& numbers) {

@@ -1,6 +1,6 @@
 #pragma once
 /// @file tools/import/vtk/plot3d.h
-/// PLOT3D files, as VTK data sets.
+/// Reads PLOT3D files as VTK data sets.
 
 #include <filesystem>
 
@@ -10,10 +10,10 @@ class vtkSmartPointer;
 
 namespace tensorray {
 
-/// PLOT3D: a grid and its q file (single or multi-block with one block; with or without iblank; 2 or 3 dimensions is an
-/// error; raw or with Fortran record marks; either byte order; float or double), as a curvilinear grid with point
-/// arrays density, momentum, energy and velocity = momentum / density. Blanked points (iblank 0) are ghost points.
-/// What is after the last number is passed over.
+/// Reads PLOT3D: a grid file and its q file (single-block, or multi-block with one block; with or without iblank; raw
+/// or with Fortran record marks; either byte order; float or double; two-dimensional files are an error). The result
+/// is a curvilinear grid with the point arrays density, momentum, energy and velocity = momentum / density. Blanked
+/// points (iblank 0) are ghost points. Bytes after the last number are ignored.
 vtkSmartPointer<vtkDataSet> read_plot3d(const std::filesystem::path& grid, const std::filesystem::path& q);
 
 }  // namespace tensorray

@@ -20,10 +20,10 @@ using Path = std::filesystem::path;
 
 enum class Contents { grid, q };
 
-/// More points than any file holds; so many still have a length in bytes that fits 64 bits.
+/// More points than any file holds. The length of so many points in bytes still fits 64 bits.
 constexpr std::uintmax_t greatest_points = std::uintmax_t{1} << 50;
 
-/// What is needed of a file to find its layout.
+/// The bytes of a file that are needed to find its layout.
 struct Bytes {
   std::ifstream file;
   std::uintmax_t size = 0;
@@ -58,7 +58,7 @@ Bytes open_binary(const Path& path) {
   return bytes;
 }
 
-/// Lengths of the records of one block.
+/// The lengths of the records of one block.
 std::vector<std::uintmax_t> records_of(const Plot3dLayout& layout, Contents contents) {
   const auto real = static_cast<std::uintmax_t>(layout.real_size);
   const std::uintmax_t points = layout.points();
@@ -74,7 +74,7 @@ std::vector<std::uintmax_t> records_of(const Plot3dLayout& layout, Contents cont
   return records;
 }
 
-/// Bytes of the whole; sets `layout.numbers`.
+/// Returns the length of the whole file in bytes; sets `layout.numbers`.
 std::uintmax_t set_offsets(Plot3dLayout& layout, Contents contents) {
   const std::uintmax_t mark = layout.record_marks ? 4 : 0;
   std::uintmax_t end = 0;
@@ -97,11 +97,12 @@ bool marks_fit(Bytes& bytes, const Plot3dLayout& layout, Contents contents) {
   return true;
 }
 
-/// The beginning read as one of the eight kinds of headers (byte order, marks, count); none if it is not of that kind.
+/// The beginning of the file, read as one of the eight kinds of headers (byte order, marks, count); empty if it is
+/// not of that kind.
 struct Header {
-  Plot3dLayout layout;  ///< Without precision and blanking.
+  Plot3dLayout layout;  ///< Precision and blanking are not yet set.
   int blocks = 1;
-  bool flat = false;  ///< The sizes are two, not three: only record marks tell.
+  bool flat = false;  ///< There are two sizes, not three. Only record marks tell this.
 };
 
 std::optional<Header> read_header(Bytes& bytes, bool big_endian, bool marks, bool count) {
@@ -137,14 +138,15 @@ struct Candidate {
   std::uintmax_t length = 0;
 };
 
-/// Every layout that the headers allow.
+/// All layouts that the headers allow.
 std::vector<Candidate> candidates_of(const Path& path, Bytes& bytes, Contents contents) {
   std::vector<Candidate> candidates;
   for (const int bits : {0, 1, 2, 3, 4, 5, 6, 7}) {
     const bool marks = bits & 4;
     const auto header = read_header(bytes, bits & 1, marks, bits & 2);
     if (!header) continue;
-    // Without marks a count is but a guess; several blocks are then found by no layout's fitting.
+    // Without marks, a block count is only a guess. A file with several blocks then fits no layout, and is reported
+    // later.
     if (marks && header->flat) fail(path, "is two-dimensional; PLOT3D is read in three dimensions");
     if (marks && header->blocks > 1) {
       fail(path, "has " + std::to_string(header->blocks) + " blocks; write the one that matters alone");
@@ -164,7 +166,7 @@ std::vector<Candidate> candidates_of(const Path& path, Bytes& bytes, Contents co
   return candidates;
 }
 
-/// The number of blocks of a file without marks whose length is that of several; 0 otherwise.
+/// The number of blocks if a file without marks has the length of several blocks; 0 otherwise.
 int blocks_that_fit(Bytes& bytes, bool big_endian, Contents contents) {
   const auto blocks = bytes.integer(0, big_endian);
   if (!blocks || *blocks < 2 || *blocks > 100000) return 0;
@@ -208,7 +210,7 @@ Plot3dLayout find_layout(const Path& path, Contents contents, const Eigen::Vecto
     if (candidate.length > bytes.size || bytes.size - candidate.length >= page) continue;
     if (candidate.layout.record_marks && !marks_fit(bytes, candidate.layout, contents)) continue;
     if (bytes.size > candidate.length && !bytes.zeros_from(candidate.length)) continue;
-    // Of layouts that fit, those with marks have more to fit, and then those with less filling.
+    // Of the layouts that fit, prefer those with marks, because more must fit; then those with the least padding.
     const auto rank = [](const Candidate& c) { return std::pair(c.layout.record_marks, c.length); };
     if (!best || rank(candidate) > rank(*best)) best = &candidate;
   }

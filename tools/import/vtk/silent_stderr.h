@@ -1,11 +1,11 @@
 #pragma once
 /// @file tools/import/vtk/silent_stderr.h
-/// netCDF and the C++ runtime write to standard error by themselves. Private to the importer.
+/// Silences standard error, because netCDF and the C++ runtime write to it directly. Private to the importer.
 
 namespace tensorray {
 
-/// While alive, what the whole process writes to standard error is dropped. (Of a program built with the address
-/// sanitizer it is not: its report would be lost.)
+/// Until it is destroyed, drops everything that the process writes to standard error. (It does nothing in a program
+/// built with the address sanitizer, whose report would be lost.)
 class SilentStderr {
  public:
   SilentStderr();

@@ -27,7 +27,8 @@ using Path = std::filesystem::path;
   throw std::runtime_error(path.string() + ": is damaged, or not of the form it seems: " + what + "; write it again");
 }
 
-/// False of NaN too. No unit makes larger ones sensible, and sampling cannot divide their span into voxels.
+/// Also false for NaN. Greater coordinates make no sense in any unit, and sampling could not divide their range into
+/// voxels.
 bool is_coordinate(double x) { return std::abs(x) <= 1e30; }
 
 void check_coordinates(const Path& path, const std::string& name, vtkDataArray* values) {
@@ -48,7 +49,7 @@ void check_image(const Path& path, vtkImageData& image) {
   fail(path, "its origin or spacing is not finite, or beyond 1e30");
 }
 
-/// A legacy file may hold fewer points, or coordinates of an axis, than its dimensions say.
+/// A legacy file may hold fewer points or coordinates than its dimensions announce.
 void check_count(const Path& path, const std::string& name, vtkIdType count, vtkIdType needed) {
   if (count < needed) fail(path, "it has " + std::to_string(count) + " of " + std::to_string(needed) + " " + name);
 }
@@ -62,7 +63,8 @@ void check_rectilinear(const Path& path, vtkRectilinearGrid& grid) {
   }
 }
 
-/// How many points a cell of each type has at least: those of fixed number have it when they are made.
+/// The least number of points of a cell of each type. New cells of a type with a fixed number already have that
+/// number.
 std::array<vtkIdType, 256> least_points() {
   std::array<vtkIdType, 256> counts{};
   for (int type = 0; type <= VTK_POLYHEDRON; ++type) {
@@ -73,7 +75,8 @@ std::array<vtkIdType, 256> least_points() {
   return counts;
 }
 
-/// The faces of polyhedra: at each one's location their number, and of each face its points' number and the points.
+/// The faces of polyhedra. At each location: the number of faces, and for each face the number of its points and the
+/// points.
 void check_faces(const Path& path, vtkUnstructuredGrid& grid) {
   vtkIdTypeArray* const faces = grid.GetFaces();
   vtkIdTypeArray* const locations = grid.GetFaceLocations();
@@ -92,7 +95,7 @@ void check_faces(const Path& path, vtkUnstructuredGrid& grid) {
   }
 }
 
-/// VTK follows the cells' points wherever they lead.
+/// VTK does not check the point indices of cells.
 void check_cells(const Path& path, vtkUnstructuredGrid& grid) {
   static const std::array<vtkIdType, 256> least = least_points();
   vtkDataArray& offsets = *grid.GetCells()->GetOffsetsArray();

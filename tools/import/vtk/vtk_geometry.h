@@ -1,6 +1,6 @@
 #pragma once
 /// @file tools/import/vtk/vtk_geometry.h
-/// Whether what VTK has read can be used.
+/// Checks whether geometry that VTK has read can be used.
 
 #include <filesystem>
 
@@ -8,10 +8,10 @@ class vtkDataSet;
 
 namespace tensorray {
 
-/// VTK takes any geometry that a file holds, and then reads beyond its arrays, or never ends.
-/// @throw std::runtime_error naming `path`: coordinates, an origin or a spacing not finite or beyond 1e30; fewer points
-/// or coordinates than a grid's dimensions; cells of an unstructured grid with points that are not there, or with fewer
-/// than their type needs.
+/// VTK accepts any geometry that a file holds, and may then read beyond its arrays or never end.
+/// @throw std::runtime_error naming `path`: coordinates, an origin or a spacing not finite or beyond 1e30; fewer
+/// points or coordinates than a grid's dimensions announce; cells of an unstructured grid that refer to missing
+/// points, or that have fewer points than their type needs.
 void check_geometry(vtkDataSet& data, const std::filesystem::path& path);
 
 }  // namespace tensorray

@@ -27,7 +27,7 @@ namespace fs = std::filesystem;
 struct KindFacts {
   VtkKind kind;
   const char* text;                  ///< For messages.
-  const char* xml_type;              ///< Of <VTKFile type="...">; null if not XML.
+  const char* xml_type;              ///< The type in <VTKFile type="...">; null if the kind is not XML.
   std::vector<const char*> endings;  ///< Lower case.
 };
 
@@ -52,7 +52,7 @@ const KindFacts& facts_of(VtkKind kind) {
   return *std::find_if(kinds().begin(), kinds().end(), [&](const KindFacts& facts) { return facts.kind == kind; });
 }
 
-/// The kind that the ending promises.
+/// The kind that the file's ending names.
 std::optional<VtkKind> promised_kind(const fs::path& path) {
   const std::string ending = lower_case_ending(path);
   for (const KindFacts& facts : kinds()) {
@@ -73,7 +73,7 @@ std::string read_part(const fs::path& path, std::uintmax_t offset, std::uintmax_
 
 std::string read_head(const fs::path& path) { return read_part(path, 0, 4096); }
 
-/// The value of `name="value"` at or after `from`; moves `from` behind it. Empty if there is none.
+/// The value of `name="value"` at or after `from`; moves `from` past it. Empty if there is none.
 std::string attribute(const std::string& text, const std::string& name, std::size_t& from) {
   const std::size_t start = text.find(name + "=", from);
   if (start == std::string::npos || start + name.size() + 1 >= text.size()) return {};
@@ -124,7 +124,7 @@ void check_xml_end(const fs::path& path) {
 
 using Extent = std::array<int, 6>;
 
-/// None if the text is no extent, or that of nothing.
+/// Empty if the text is not an extent, or if the extent is empty.
 std::optional<Extent> extent_of(const std::string& text) {
   std::istringstream stream(text);
   Extent extent;
@@ -134,7 +134,7 @@ std::optional<Extent> extent_of(const std::string& text) {
   return extent;
 }
 
-/// VTK takes numbers that it cannot read for 0 or 1.
+/// VTK reads invalid numbers as 0 or 1.
 void check_placement(const fs::path& path, const std::string& tag) {
   for (const char* name : {"Origin", "Spacing"}) {
     std::size_t from = 0;
@@ -146,7 +146,7 @@ void check_placement(const fs::path& path, const std::string& tag) {
   }
 }
 
-/// VTK leaves the part of an extent that no piece covers as memory happens to be.
+/// VTK does not initialize the part of an extent that no piece covers.
 void check_extents(const fs::path& path) {
   std::ifstream file(path, std::ios::binary);
   vtkNew<vtkExtentSplitter> splitter;
@@ -189,7 +189,7 @@ void check_pieces(const fs::path& path, VtkKind kind) {
   }
 }
 
-/// A legacy file's kind of data set. Its title, on the second line, may be anything.
+/// The kind of data set in a legacy file. Its title, on the second line, may be any text.
 void check_legacy(const fs::path& path, const std::string& head) {
   std::size_t position = head.find('\n');
   if (position != std::string::npos) position = head.find('\n', position + 1);
@@ -201,7 +201,7 @@ void check_legacy(const fs::path& path, const std::string& head) {
   }
 }
 
-/// VTK takes a case without results for one of a single time without fields.
+/// VTK reads a case without results as a case with one time and no fields.
 bool has_times(const fs::path& folder) {
   return std::any_of(fs::directory_iterator(folder), fs::directory_iterator(), [](const fs::directory_entry& entry) {
     const std::string name = entry.path().filename().string();
@@ -228,7 +228,7 @@ void check_foam(const fs::path& path) {
   if (!has_times(folder)) fail(path, "has no time folder; run the case's solver first");
 }
 
-/// Of a piece as well, which may have the extent of the whole.
+/// Also checks pieces, which may have the extent of the whole.
 VtkKind checked_kind(const fs::path& path) {
   if (!fs::exists(path)) fail(path, "does not exist");
   if (fs::is_directory(path)) {

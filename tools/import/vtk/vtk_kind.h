@@ -1,7 +1,7 @@
 #pragma once
 /// @file tools/import/vtk/vtk_kind.h
-/// What a file is that VTK shall read, by its first bytes and not by its name alone; and the damage that can be seen
-/// cheaply, before VTK's readers meet it. Private to the importer.
+/// Finds the kind of a file for VTK from its first bytes, not only from its name, and finds damage that is cheap to
+/// detect before VTK reads the file. Private to the importer.
 
 #include <filesystem>
 #include <vector>
@@ -23,17 +23,17 @@ enum class VtkKind {
 };
 
 /// The kind of a file, or of a folder (an OpenFOAM case).
-/// @throw std::runtime_error naming the file: missing; empty; of no kind above; named by the ending of another kind;
-/// an XML image whose origin or spacing are no finite numbers; cut off (an XML file without its end; a piece that is
-/// missing, cut off or of another kind; a legacy file without its line DATASET); an image, rectilinear or structured
-/// grid with parts of its extent in none of its pieces; surfaces alone; an OpenFOAM case without mesh, times or
-/// controlDict, or decomposed.
+/// @throw std::runtime_error naming the file: missing; empty; none of the kinds above; an ending that belongs to
+/// another kind; an XML image whose origin or spacing is not finite numbers; cut off (an XML file without its end; a
+/// piece that is missing, cut off or of another kind; a legacy file without its line DATASET); an image, rectilinear
+/// or structured grid whose pieces do not cover its extent; only surfaces; an OpenFOAM case without mesh, times or
+/// controlDict, or a decomposed case.
 VtkKind vtk_kind(const std::filesystem::path& path);
 
-/// The files that a file in pieces names, in its order.
+/// The files that a file in pieces lists, in that order.
 std::vector<std::filesystem::path> piece_files(const std::filesystem::path& path);
 
-/// The folder of the OpenFOAM case of `path`: the folder itself, or of a .foam file or a system/controlDict in it.
+/// The folder of the OpenFOAM case of `path`, which is that folder, a .foam file in it, or its system/controlDict.
 std::filesystem::path openfoam_case(const std::filesystem::path& path);
 
 }  // namespace tensorray

@@ -22,7 +22,7 @@ std::string plain_text(std::string message) {
   }
   const auto is_control = [](char c) { return static_cast<unsigned char>(c) < ' ' || c == '\x7f'; };
   std::replace_if(message.begin(), message.end(), is_control, ' ');
-  constexpr std::size_t longest = 300;  // damaged files put their bytes into VTK's messages
+  constexpr std::size_t longest = 300;  // VTK's messages may quote the bytes of damaged files
   if (message.size() > longest) message = message.substr(0, longest) + " ...";
   while (!message.empty() && (message.back() == ' ' || message.back() == '.')) message.pop_back();
   return message;
@@ -59,7 +59,7 @@ VtkMessages::~VtkMessages() {
 
 void VtkMessages::keep(const char* message, bool is_error) {
   const std::string text = plain_text(message);
-  // The legacy readers only warn when a file ends too early, and go on with numbers that they have not read.
+  // The legacy readers only warn when a file ends too early, and continue with numbers that they have not read.
   const bool is_grave = is_error || text.find("rror reading") != std::string::npos;
   std::string& first = is_grave ? error_ : warning_;
   if (first.empty()) first = text;

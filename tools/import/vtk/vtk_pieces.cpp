@@ -20,7 +20,7 @@
 namespace tensorray {
 namespace {
 
-/// Copies, so that arrays may be added and removed.
+/// Collects shallow copies, so that arrays can be added and removed.
 void collect(vtkDataObject* data, DataSets& pieces) {
   if (auto* const tree = vtkCompositeDataSet::SafeDownCast(data)) {
     vtkSmartPointer<vtkCompositeDataIterator> leaf;
@@ -34,7 +34,7 @@ void collect(vtkDataObject* data, DataSets& pieces) {
   }
 }
 
-/// Keeps `bits` of the ghost array of `attributes`; removes the array if nothing is left.
+/// Keeps only `bits` of the ghost array of `attributes`; removes the array if all its values become zero.
 void keep_ghosts(vtkDataSetAttributes& attributes, unsigned char bits) {
   const char* const name = vtkDataSetAttributes::GhostArrayName();
   const auto* const ghosts = vtkUnsignedCharArray::SafeDownCast(attributes.GetArray(name));
@@ -56,7 +56,7 @@ void remove_ghosts(vtkDataSet& piece) {
     keep_ghosts(*grid->GetCellData(), vtkDataSetAttributes::DUPLICATECELL | vtkDataSetAttributes::HIDDENCELL);
     if (auto* const ghosts =
             vtkUnsignedCharArray::SafeDownCast(grid->GetCellData()->GetArray(vtkDataSetAttributes::GhostArrayName()))) {
-      // RemoveGhostCells looks for duplicates alone.
+      // RemoveGhostCells removes only duplicates.
       for (vtkIdType i = 0; i < ghosts->GetNumberOfValues(); ++i) {
         if (ghosts->GetValue(i) != 0) ghosts->SetValue(i, vtkDataSetAttributes::DUPLICATECELL);
       }
@@ -68,7 +68,7 @@ void remove_ghosts(vtkDataSet& piece) {
   keep_ghosts(*piece.GetPointData(), vtkDataSetAttributes::HIDDENPOINT);
 }
 
-/// vtkAppendFilter drops arrays that not all of its inputs have.
+/// Adds missing arrays, because vtkAppendFilter drops arrays that some of its inputs lack.
 void complete_arrays(const DataSets& pieces, vtkDataObject::AttributeTypes type) {
   std::map<std::string, vtkDataArray*> wanted;
   for (vtkDataSet* const piece : pieces) {

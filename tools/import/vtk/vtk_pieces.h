@@ -1,6 +1,6 @@
 #pragma once
 /// @file tools/import/vtk/vtk_pieces.h
-/// One data set of what VTK's readers give.
+/// Merges the data sets that VTK's readers return.
 
 #include <vector>
 
@@ -13,15 +13,16 @@ namespace tensorray {
 
 using DataSets = std::vector<vtkSmartPointer<vtkDataSet>>;
 
-/// The data sets with cells in `data`, which may be a tree of blocks: copies that share their arrays.
+/// The data sets with cells in `data`, which may be a tree of blocks. They are copies that share their arrays.
 DataSets data_sets_in(vtkDataObject* data);
 
-/// The one data set among `pieces`; if there are several, one unstructured grid of all, points of equal position
-/// merged. An array that some pieces lack is there NaN (or zero, if of integers). Null if there is none. The pieces'
-/// ghosts change. Their geometry must be sound: see check_geometry in vtk_source.h.
+/// Returns the only data set of `pieces`. If there are several, merges them into one unstructured grid, and merges
+/// points at equal positions. An array that a piece lacks is NaN there (zero if it holds integers). Null if `pieces`
+/// is empty. Changes the ghost arrays of the pieces. The geometry of the pieces must have passed check_geometry
+/// (vtk_geometry.h).
 ///
-/// Copies of neighbours' cells (duplicate ghosts) and hidden cells of unstructured grids are removed. Points are marked
-/// as ghosts only where they are hidden: a copy of a neighbour's point has the neighbour's value.
+/// Removes copies of neighbours' cells (duplicate ghosts), and hidden cells of unstructured grids. Points are marked
+/// as ghosts only if they are hidden, because a copy of a neighbour's point has the neighbour's value.
 vtkSmartPointer<vtkDataSet> one_data_set(const DataSets& pieces);
 
 }  // namespace tensorray

@@ -42,7 +42,7 @@ vtkSmartPointer<vtkDataObject> read_xml(const Path& path) {
   return reader->GetOutputDataObject(0);
 }
 
-/// Piece by piece: VTK's own reader of pieces strings them together with every seam's points twice.
+/// Reads piece by piece, because VTK's own reader of pieces duplicates the points on every seam.
 vtkSmartPointer<vtkDataObject> read_unstructured_pieces(const Path& path) {
   auto blocks = vtkSmartPointer<vtkMultiBlockDataSet>::New();
   unsigned int index = 0;
@@ -52,7 +52,7 @@ vtkSmartPointer<vtkDataObject> read_unstructured_pieces(const Path& path) {
   return blocks;
 }
 
-/// Without these the first array of each kind alone would be read.
+/// Requests all arrays of each kind; by default VTK reads only the first one.
 vtkSmartPointer<vtkDataObject> read_legacy(const Path& path) {
   vtkNew<vtkDataSetReader> reader;
   reader->SetFileName(path.c_str());
@@ -65,7 +65,7 @@ vtkSmartPointer<vtkDataObject> read_legacy(const Path& path) {
   return reader->GetOutputDataObject(0);
 }
 
-/// The mesh as it was meshed: VTK would move its points by an array that looks like a displacement.
+/// Reads the undisplaced mesh. By default VTK moves its points by any array that looks like a displacement.
 vtkSmartPointer<vtkDataObject> read_exodus(const Path& path) {
   vtkNew<vtkExodusIIReader> reader;
   reader->SetFileName(path.c_str());
@@ -130,7 +130,7 @@ vtkSmartPointer<vtkDataObject> read_kind(VtkKind kind, const Path& path) {
   throw std::logic_error("read_kind: unknown kind");
 }
 
-/// So that nobody need give the order that VTK has brought OpenFOAM's symmTensors into.
+/// Names the components, so that the user need not give the order. VTK has already reordered OpenFOAM's symmTensors.
 void name_symmetric_components(vtkDataSet& data) {
   const char* const names[] = {"XX", "YY", "ZZ", "XY", "YZ", "XZ"};
   for (const auto type : {vtkDataObject::POINT, vtkDataObject::CELL}) {

@@ -37,7 +37,8 @@ std::string read_part(const Path& path, std::uintmax_t offset, std::size_t count
   return text;
 }
 
-/// VTK's own message about a file of another kind is no help, and it does not look for the end of appended data.
+/// VTK's message about a file of another kind does not help the user, and VTK does not check the end of appended
+/// data.
 void check_kind_and_end(const Path& path) {
   constexpr std::size_t head_size = 4096, tail_size = 256;
   const std::string head = read_part(path, 0, head_size);
@@ -62,13 +63,13 @@ void choose(vtkDataArraySelection& arrays, const std::set<std::string>& wanted) 
     if (wanted.count(arrays.GetArrayName(i)) == 0) arrays.DisableArray(arrays.GetArrayName(i));
 }
 
-/// Points and lines that `wanted` values are taken from; cells come in VTK's order: vertices, then lines.
+/// The points and lines whose values are read. VTK orders cells as vertices, then lines.
 struct Selection {
   Indices points, lines;
   std::vector<std::size_t> line_ends;
 };
 
-/// VTK follows the lines' points wherever they lead.
+/// VTK does not check the point indices of lines.
 Selection selection_of(vtkPolyData& polydata) {
   Selection selection;
   vtkCellArray& lines = *polydata.GetLines();
@@ -98,7 +99,7 @@ DataArray doubles(vtkDataArray& array, const Indices& selected) {
   return {components, std::move(values)};
 }
 
-/// Arrays of numbers with a value for each of `count`.
+/// The wanted numeric arrays that have `count` values.
 Named<DataArray> chosen(vtkDataSetAttributes& attributes, const std::set<std::string>& wanted, vtkIdType count,
                         const Indices& selected) {
   Named<DataArray> arrays;

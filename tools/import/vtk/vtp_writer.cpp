@@ -36,7 +36,7 @@ vtkSmartPointer<vtkAOSDataArrayTemplate<unsigned char>> new_array(std::uint8_t) 
   return vtkSmartPointer<vtkUnsignedCharArray>::New();
 }
 
-/// A VTK array over memory that the caller keeps; VTK only reads it.
+/// A VTK array that refers to memory of the caller. VTK only reads it.
 template <class Number>
 vtkSmartPointer<vtkDataArray> vtk_view(const std::string& name, const NumberSpan<Number>& numbers, int components) {
   const auto array = new_array(Number());
@@ -55,7 +55,7 @@ vtkIdType value_count(const DataView& view) {
                     view.values);
 }
 
-/// A cell a point.
+/// One vertex cell per point.
 vtkSmartPointer<vtkCellArray> vertices(vtkIdType count) {
   const auto cells = vtkSmartPointer<vtkCellArray>::New();
   cells->AllocateExact(count, count);
@@ -63,7 +63,7 @@ vtkSmartPointer<vtkCellArray> vertices(vtkIdType count) {
   return cells;
 }
 
-/// Lines of consecutive points.
+/// Polylines of consecutive points.
 vtkSmartPointer<vtkCellArray> polylines(const std::vector<std::size_t>& line_ends, vtkIdType point_count) {
   vtkNew<vtkTypeInt64Array> ends, corners;
   ends->InsertNextValue(0);
@@ -97,7 +97,7 @@ vtkNew<vtkPolyData> polydata_of(const PolyDataView& data) {
   return polydata;
 }
 
-/// VTK leaves unnoticed what fails when it closes the file; the end is then missing.
+/// VTK does not notice errors when it closes the file. The end of the file is then missing.
 bool is_complete(const std::filesystem::path& path) {
   static const std::string end = "</VTKFile>\n";
   std::ifstream file(path, std::ios::binary);
@@ -110,14 +110,14 @@ bool is_complete(const std::filesystem::path& path) {
 std::string reason_of(unsigned long error) {
   if (error == vtkErrorCode::CannotOpenFileError) return "it cannot be opened; check the path";
   if (error == vtkErrorCode::NoError || error >= vtkErrorCode::FirstVTKErrorCode) return "the disk may be full";
-  return std::generic_category().message(static_cast<int>(error));  // VTK hands on errno.
+  return std::generic_category().message(static_cast<int>(error));  // VTK returns errno.
 }
 
 }  // namespace
 
 void write_vtp_file(const std::filesystem::path& path, const PolyDataView& data) {
   vtkNew<vtkXMLPolyDataWriter> writer;
-  // With an observer VTK reports errors to it instead of to the terminal.
+  // With an observer, VTK does not print errors on the terminal.
   vtkNew<vtkCallbackCommand> silent;
   silent->SetCallback([](vtkObject*, unsigned long, void*, void*) {});
   for (const unsigned long event : {vtkCommand::ErrorEvent, vtkCommand::WarningEvent}) {
