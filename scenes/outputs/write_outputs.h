@@ -15,8 +15,8 @@ namespace tensorray {
 /// Files that are being written, by the key of their output.
 using OutputFiles = std::map<std::string, OutputFile>;
 
-/// Opens the files of the scene's outputs, so that a file that cannot be written is reported before the work begins, and
-/// so is a .vtp file where its program is not built (vtk_files.h).
+/// Opens the files of the scene's outputs, so that a file that cannot be written is reported before the work begins,
+/// and so is a .vtp file where its program is not built (vtk_files.h).
 /// @throw std::runtime_error naming the file and the fix.
 OutputFiles open_outputs(const OutputDescription& output);
 

@@ -118,7 +118,8 @@ TEST(DamagedFiles, WrongLengthsInTreesAreNoticed) {
     if (chunks % 7 != 1) continue;
     for (const std::int64_t wrong :
          {std::int64_t{0}, -length, length - 1, length + 1, -length * 1000, std::int64_t{1} << 40,
-          -(std::int64_t{1} << 40), std::numeric_limits<std::int64_t>::max(), std::numeric_limits<std::int64_t>::min()}) {
+          -(std::int64_t{1} << 40), std::numeric_limits<std::int64_t>::max(),
+          std::numeric_limits<std::int64_t>::min()}) {
       std::string number;
       append_number(wrong, ByteOrder::little, number);
       write_bytes(damaged, std::string(bytes).replace(at - 8, 8, number));

@@ -63,6 +63,23 @@ void choose(vtkDataArraySelection& arrays, const std::set<std::string>& wanted) 
     if (wanted.count(arrays.GetArrayName(i)) == 0) arrays.DisableArray(arrays.GetArrayName(i));
 }
 
+std::size_t occurrences(const std::string& text, const std::string& part) {
+  std::size_t count = 0;
+  for (std::size_t at = text.find(part); at != std::string::npos; at = text.find(part, at + part.size())) ++count;
+  return count;
+}
+
+/// The arrays that each piece of the file has. VTK leaves the values of the other pieces undefined.
+std::set<std::string> in_every_piece(const Path& path, const std::set<std::string>& wanted) {
+  std::string text = read_part(path, 0, std::filesystem::file_size(path));
+  text.resize(std::min(text.size(), text.find("<AppendedData")));
+  const std::size_t pieces = occurrences(text, "<Piece");
+  std::set<std::string> complete;
+  for (const std::string& name : wanted)
+    if (pieces <= 1 || occurrences(text, "Name=\"" + name + "\"") >= pieces) complete.insert(name);
+  return complete;
+}
+
 /// The points and lines whose values are read. VTK orders cells as vertices, then lines.
 struct Selection {
   Indices points, lines;
@@ -126,8 +143,9 @@ PolyData lines_of(vtkPolyData& polydata, const std::set<std::string>& wanted) {
 
 }  // namespace
 
-PolyData read_vtp_file(const Path& path, const std::set<std::string>& wanted) {
+PolyData read_vtp_file(const Path& path, const std::set<std::string>& asked) {
   check_kind_and_end(path);
+  const std::set<std::string> wanted = in_every_piece(path, asked);
   const VtkMessages messages;
   try {
     vtkNew<vtkXMLPolyDataReader> reader;
