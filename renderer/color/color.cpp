@@ -61,14 +61,14 @@ struct NamedConfig {
   std::string name;
 };
 
-NamedConfig open_config(const std::filesystem::path& path, const std::string& mend) {
+NamedConfig open_config(const std::filesystem::path& path, const std::string& fix) {
   // Newer versions of OpenColorIO contain configs, which have addresses of this form.
   const bool is_file = path.string().rfind("ocio://", 0) != 0;
   try {
     if (is_file) require_readable(path);
     return {OCIO::Config::CreateFromFile(path.string().c_str()), path.string()};
   } catch (const std::exception& error) {
-    throw std::runtime_error("OCIO config " + path.string() + ": " + one_line(error.what()) + mend);
+    throw std::runtime_error("OCIO config " + path.string() + ": " + one_line(error.what()) + fix);
   }
 }
 
@@ -76,7 +76,7 @@ NamedConfig find_config(const std::filesystem::path& path) {
   if (!path.empty()) return open_config(path, "");
   const char* const environment = std::getenv("OCIO");
   if (environment && *environment)
-    return open_config(environment, "; mend or unset $OCIO (without it the built-in config is used)");
+    return open_config(environment, "; correct or unset $OCIO (without it the built-in config is used)");
   std::istringstream text(builtin_color_config);
   return {OCIO::Config::CreateFromStream(text), "built-in"};
 }
