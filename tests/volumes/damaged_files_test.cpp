@@ -86,7 +86,7 @@ TEST(DamagedFiles, FlippedBytesNeverCrash) {
       write_stock(stock, *grids, compression);
       const std::string bytes = bytes_of(stock);
       int refused = 0;
-      constexpr std::size_t flips = 700;
+      constexpr std::size_t flips = 250;
       for (std::size_t i = 0; i < flips; ++i) {
         std::string changed = bytes;
         char& flipped = changed[bytes.size() * i / flips];
