@@ -1,4 +1,7 @@
 #include <algorithm>
+#include <charconv>
+#include <cstdint>
+#include <cstring>
 #include <fstream>
 #include <new>
 #include <stdexcept>
@@ -69,10 +72,31 @@ std::size_t occurrences(const std::string& text, const std::string& part) {
   return count;
 }
 
-/// The arrays that each piece of the file has. VTK leaves the values of the other pieces undefined.
-std::set<std::string> in_every_piece(const Path& path, const std::set<std::string>& wanted) {
+/// The file without its appended data.
+std::string xml_of(const Path& path) {
   std::string text = read_part(path, 0, std::filesystem::file_size(path));
   text.resize(std::min(text.size(), text.find("<AppendedData")));
+  return text;
+}
+
+/// VTK takes a count that it cannot read for 0, and leaves out what it counts.
+void check_counts(const std::string& text) {
+  for (std::size_t at = text.find("<Piece"); at != std::string::npos; at = text.find("<Piece", at + 1)) {
+    const std::string tag = text.substr(at, text.find('>', at) - at);
+    for (const char* name : {"NumberOfPoints", "NumberOfVerts", "NumberOfLines", "NumberOfStrips", "NumberOfPolys"}) {
+      const std::size_t found = tag.find(name + std::string("="));
+      if (found == std::string::npos) continue;
+      const std::size_t begin = std::min(found + std::strlen(name) + 2, tag.size());  // Behind a quotation mark.
+      std::int64_t count = 0;
+      const auto result = std::from_chars(tag.data() + begin, tag.data() + tag.size(), count);
+      const bool ends = result.ptr != tag.data() + tag.size() && (*result.ptr == '"' || *result.ptr == '\'');
+      if (result.ec != std::errc() || count < 0 || !ends) fail_damaged(std::string("its ") + name + " is no count");
+    }
+  }
+}
+
+/// The arrays that each piece of the file has. VTK leaves the values of the other pieces undefined.
+std::set<std::string> in_every_piece(const std::string& text, const std::set<std::string>& wanted) {
   const std::size_t pieces = occurrences(text, "<Piece");
   std::set<std::string> complete;
   for (const std::string& name : wanted)
@@ -145,7 +169,9 @@ PolyData lines_of(vtkPolyData& polydata, const std::set<std::string>& wanted) {
 
 PolyData read_vtp_file(const Path& path, const std::set<std::string>& asked) {
   check_kind_and_end(path);
-  const std::set<std::string> wanted = in_every_piece(path, asked);
+  const std::string text = xml_of(path);
+  check_counts(text);
+  const std::set<std::string> wanted = in_every_piece(text, asked);
   const VtkMessages messages;
   try {
     vtkNew<vtkXMLPolyDataReader> reader;
