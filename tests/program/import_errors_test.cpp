@@ -58,6 +58,21 @@ TEST_F(ImportErrors, WrittenFilesThatAreCutOffOrEmpty) {
   }
 }
 
+TEST_F(ImportErrors, OutputsThatAreInputsByALink) {
+  write("field.vti", image());
+  for (const char* link : {"link.vdb", "link.ply"})
+    std::filesystem::create_symlink(in_folder("field.vti"), in_folder(link));
+  refuses({"field.vti", "--boundary", "link.ply"}, 2,
+          {"--boundary", "link.ply", "the same file as the file to import"});
+  const auto before = files();
+  const Outcome outcome = run({"import", "field.vti", "-q", "-o", "link.vdb"});
+  EXPECT_EQ(outcome.status, 2);
+  EXPECT_NE(outcome.error.find("-o (link.vdb) is the same file as the file to import"), std::string::npos)
+      << outcome.error;
+  EXPECT_EQ(read_file(in_folder("field.vti")), image());
+  EXPECT_EQ(files(), before);
+}
+
 /// If the numbers of faces are wrong, VTK reads beyond the end of the faces and may crash.
 TEST_F(ImportErrors, FacesOfPolyhedraThatAreMiscounted) {
   const auto vtu = [](const std::string& faces) {

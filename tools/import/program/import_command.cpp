@@ -11,6 +11,7 @@
 #include <CLI/CLI.hpp>
 #include <fmt/core.h>
 
+#include "base/distinct_files.h"
 #include "base/output_file.h"
 #include "base/progress.h"
 #include "base/text.h"
@@ -109,10 +110,17 @@ void import_to(const ImportOptions& options, const ImportSettings& settings, Out
     fmt::print("{}: the body's surface, {} triangles\n", options.boundary.string(), report.boundary_triangles);
 }
 
+void check_files(const ImportOptions& options, const std::vector<std::filesystem::path>& read) {
+  std::vector<NamedFile> inputs;
+  for (const std::filesystem::path& file : read) inputs.push_back({file, "the file to import"});
+  require_distinct_files(inputs, {{options.output, "-o"}, {options.boundary, "--boundary"}});
+}
+
 void import(const ImportOptions& options, Progress& progress) {
   ImportSettings settings = settings_of(options);
   for (const std::filesystem::path& file : settings.files)
     if (!std::filesystem::exists(file)) throw std::runtime_error(file.string() + " does not exist");
+  check_files(options, settings.files);
   std::vector<OutputFile> files;
   files.emplace_back(options.output);
   if (!options.boundary.empty()) {
