@@ -22,4 +22,7 @@ function(tensorray_library name)
   file(GLOB sources CONFIGURE_DEPENDS *.cpp */*.cpp)
   add_library(${name} STATIC ${sources})
   target_link_libraries(${name} PUBLIC Eigen3::Eigen PRIVATE tensorray_options)
+  # Half of the time to compile most files is the headers that nearly all of them include.
+  target_precompile_headers(${name} PRIVATE <Eigen/Geometry> <algorithm> <filesystem> <functional> <map> <memory>
+                            <optional> <string> <variant> <vector>)
 endfunction()

@@ -12,6 +12,7 @@ constexpr double probe_flexibility = 0.2;
 constexpr double wanted_turn = 0.15;    // Radians.
 constexpr double smallest_turn = 1e-7;  // Radians; a ray that turns less counts as straight.
 constexpr std::uint64_t probe_count = 1024;
+constexpr std::size_t batch_size = 64;  // Rays that one thread traces together.
 
 std::vector<Eigen::Vector3d> probe_origins(const Beam& beam) {
   const BeamSampler sampler(beam, BeamPattern::stratified, probe_count, 0);
@@ -29,14 +30,18 @@ AutoScale probe(const TensorField& field, const Geometry& geometry, const Beam& 
   settings.scale = scale;
   settings.step = 0.5;  // A fixed step, because the splitting method is stable at any scale.
   std::vector<double> turns(origins.size());
-  tbb::parallel_for(std::size_t{0}, origins.size(), [&](std::size_t i) {
+  const std::size_t batches = (origins.size() + batch_size - 1) / batch_size;
+  tbb::parallel_for(std::size_t{0}, batches, [&](std::size_t task) {
     if (progress.cancelled) throw Cancelled();
+    const std::size_t first = task * batch_size, count = std::min(batch_size, origins.size() - first);
     RayBatch batch;
-    batch.add(origins[i], beam.direction, probe_flexibility);
+    for (std::size_t i = 0; i < count; ++i) batch.add(origins[first + i], beam.direction, probe_flexibility);
     trace(field, geometry, settings, batch);
-    const Eigen::Vector3d& V = batch.direction[0];
-    const bool followed = batch.end[0] == RayEnd::plate || batch.end[0] == RayEnd::missed;
-    turns[i] = followed ? std::atan2(beam.direction.cross(V).norm(), beam.direction.dot(V)) : 0;
+    for (std::size_t i = 0; i < count; ++i) {
+      const Eigen::Vector3d& V = batch.direction[i];
+      const bool followed = batch.end[i] == RayEnd::plate || batch.end[i] == RayEnd::missed;
+      turns[first + i] = followed ? std::atan2(beam.direction.cross(V).norm(), beam.direction.dot(V)) : 0;
+    }
   });
   turns.erase(std::remove_if(turns.begin(), turns.end(), [](double turn) { return turn < smallest_turn; }),
               turns.end());

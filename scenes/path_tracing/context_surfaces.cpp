@@ -9,7 +9,7 @@
 #include "renderer/color/colormap.h"
 #include "renderer/film/spectral_image.h"
 #include "scenes/path_tracing/path_tracing_keys.h"
-#include "scenes/photons/photon_distribution_method.h"
+#include "scenes/photons/plate_light.h"
 #include "volumes/bricks/tensor_sampler.h"
 #include "volumes/tensors/isosurface.h"
 
@@ -68,8 +68,7 @@ void add_lattice(int columns, int rows, const Keeps& keeps, TriangleMesh& mesh) 
 
 /// The plate with the light of the photons as its colour: a vertex in the middle of each pixel.
 ShadedSurface lit_plate(const Scene& scene, const Progress& progress) {
-  const PhotonDistribution light = distribute_photons(scene, progress);
-  const Image image = light_image(scene, light.irradiance);
+  const Image image = light_on_plate(scene, progress).linear;
   std::vector<float> greatest;
   for (std::size_t i = 0; i < image.pixels.size(); i += 3)
     greatest.push_back(std::max({image.pixels[i], image.pixels[i + 1], image.pixels[i + 2]}));

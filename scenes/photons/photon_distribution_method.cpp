@@ -8,17 +8,13 @@
 #include "base/progress.h"
 #include "scenes/description/check_scene.h"
 #include "scenes/outputs/picture_outputs.h"
+#include "scenes/photons/plate_light.h"
 #include "scenes/scene/render.h"
 #include "scenes/scene/scene.h"
 #include "volumes/files/point_files.h"
 
 namespace tensorray {
 namespace {
-
-/// Whether light is collected as red, green and blue. Up to three bands need no more planes, and cost less.
-bool is_collected_in_color(const Scene& scene) {
-  return !scene.description.output.wants("spectral") && scene.bands.size() > 3;
-}
 
 /// "550nm", with as many decimals as all names need to differ; in RGB mode "red", "green", "blue".
 std::vector<std::string> band_names(const Scene& scene) {
@@ -55,28 +51,22 @@ class LoadedPhotons : public LoadedMethod {
 
 Render LoadedPhotons::render(const Scene& scene, const Progress& progress) const {
   const SceneDescription& description = scene.description;
-  PhotonDistribution light = distribute_photons(scene, progress);
+  PlateLight light = light_on_plate(scene, progress);
 
   const auto start = std::chrono::steady_clock::now();
   Render result;
-  result.linear = light_image(scene, light.irradiance);
+  result.linear = std::move(light.linear);
   if (description.output.wants("spectral"))
     result.spectral = spectral_image(light.irradiance, scene.bands, description.light.irradiance, to_working(scene));
   result.photons = std::move(light.photons);
   result.grids = std::move(light.fluence);
   name_fluence(scene, result.grids);
-  result.metadata["tensorray:photons"] = std::to_string(light.positions);
-
-  Statistics& statistics = result.statistics;
-  statistics.positions = light.positions;
-  statistics.ends = std::move(light.ends);
-  for (const LightChannel& channel : scene.channels) statistics.channel_power.push_back(channel.power * light.ray_area);
-  statistics.ray_steps = light.ray_steps;
-  statistics.tensor_samples = light.tensor_samples;
-  statistics.seconds_tracing = light.seconds_tracing;
-  statistics.seconds_density = light.seconds_density;
-  statistics.seconds_color = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
-  if (nothing_arrived(statistics))
+  result.statistics = std::move(light.statistics);
+  result.warnings = std::move(light.warnings);
+  if (result.statistics.error) result.metadata["tensorray:error"] = fmt::format("{:.3g}", *result.statistics.error);
+  result.metadata["tensorray:photons"] = std::to_string(result.statistics.positions);
+  result.statistics.seconds_color = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  if (nothing_arrived(result.statistics))
     result.warnings.push_back("no light reached the plate; look at `receiver` and `light`");
   return result;
 }
@@ -117,6 +107,8 @@ class PhotonDistributionMethod : public MethodWith<PhotonDescription> {
     if (!chosen) return;
     check_spectral_output(scene, source);
     warn_unused(scene, json, "/light/spectrum", "/bending/rgb");
+    if (settings().density.kind == PhotonDensityKind::mesh && given(json, "/integrator/density/tau"))
+      scene.warnings.push_back("`/integrator/density/tau` has no effect: it belongs to the density \"gaussian\"");
     if (scene.output.fluence_bands && !scene.output.wants("fluence"))
       scene.warnings.push_back("`/output/fluence_bands` has no effect without `/output/fluence`");
   }
@@ -129,28 +121,5 @@ class PhotonDistributionMethod : public MethodWith<PhotonDescription> {
 }  // namespace
 
 std::shared_ptr<Method> photon_distribution_method() { return std::make_shared<PhotonDistributionMethod>(); }
-
-PhotonDistribution distribute_photons(const Scene& scene, const Progress& progress) {
-  const SceneDescription& description = scene.description;
-  PhotonSettings settings;
-  settings.photons = description.light.photons;
-  settings.pattern = description.light.pattern;
-  settings.channels_per_photon = description.bending.rgb ? 0 : description.light.wavelengths_per_photon;
-  settings.seed = description.seed;
-  settings.density = description.integrator.settings<PhotonDescription>().density;
-  settings.keep_photons = description.output.wants("photons");
-  if (description.output.wants("fluence"))
-    settings.fluence = description.output.fluence_bands ? FluenceKind::bands : FluenceKind::all_light;
-  if (is_collected_in_color(scene))
-    for (const Band& band : scene.bands) settings.colors.push_back(to_working(scene) * band.xyz);
-  return distribute_photons(scene.field, scene.geometry, scene.beam, scene.channels, scene.bending, settings, progress);
-}
-
-Image light_image(const Scene& scene, const Film& irradiance) {
-  if (!is_collected_in_color(scene)) return linear_image(irradiance, scene.bands, to_working(scene));
-  std::vector<Band> primaries(3);
-  for (int c = 0; c < 3; ++c) primaries[c].xyz = Eigen::Vector3d::Unit(c);
-  return linear_image(irradiance, primaries, Eigen::Matrix3d::Identity());
-}
 
 }  // namespace tensorray

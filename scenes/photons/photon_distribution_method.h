@@ -4,41 +4,56 @@
 
 #include <array>
 #include <memory>
+#include <optional>
 
-#include "integrators/photons/photon_distribution.h"
 #include "renderer/film/density.h"
-#include "renderer/images/image.h"
 #include "scenes/description/method.h"
 
 namespace tensorray {
 
-struct PhotonDescription {
-  DensitySettings density;
+enum class PhotonDensityKind {
+  mesh,       ///< Exact: the light between neighbouring rays, spread over the area between their landings.
+  gaussian,   ///< Zheng and Pang 2003, Eq. 10: each photon is a Gaussian on the plate.
+  histogram,  ///< Each photon counts in its pixel.
 };
 
-inline auto choices(DensityKind) {
-  using C = Choice<DensityKind>;
-  return std::array{C{"gaussian", DensityKind::gaussian}, C{"histogram", DensityKind::histogram}};
+/// `integrator.density`.
+struct PhotonDensity {
+  PhotonDensityKind kind = PhotonDensityKind::mesh;
+  double tolerance = 0.5;
+  std::optional<double> error;  ///< Wanted relative error of the picture, instead of a tolerance.
+  double tau = 6;
+};
+
+struct PhotonDescription {
+  PhotonDensity density;
+};
+
+inline auto choices(PhotonDensityKind) {
+  using C = Choice<PhotonDensityKind>;
+  return std::array{C{"mesh", PhotonDensityKind::mesh}, C{"gaussian", PhotonDensityKind::gaussian},
+                    C{"histogram", PhotonDensityKind::histogram}};
+}
+
+/// The estimator for photons. `mesh` needs no photons; photons for other outputs are then only counted.
+inline DensitySettings estimator_of(const PhotonDensity& density) {
+  return {density.kind == PhotonDensityKind::gaussian ? DensityKind::gaussian : DensityKind::histogram, density.tau};
 }
 
 template <class Visitor>
-void describe(DensitySettings& density, Visitor& visit) {
-  visit("kind", density.kind, "method that estimates irradiance from photons");
-  visit("tau", density.tau, "standard deviation of the gaussian, in pixels", between(0.3, 1000));
+void describe(PhotonDensity& density, Visitor& visit) {
+  visit("kind", density.kind, "method that computes irradiance from rays");
+  visit("tolerance", density.tolerance, "mesh: wanted error of landings, in pixels", between(0.001, 100));
+  visit("error", density.error, "mesh: refine until the picture's relative error is below this, instead of `tolerance`",
+        between(1e-5, 1));
+  visit("tau", density.tau, "gaussian: standard deviation, in pixels", between(0.3, 1000));
 }
 
 template <class Visitor>
 void describe(PhotonDescription& photons, Visitor& visit) {
-  visit.section("density", photons.density, "photon_distribution: estimation of density on the plate");
+  visit.section("density", photons.density, "photon_distribution: estimation of irradiance on the plate");
 }
 
 std::shared_ptr<Method> photon_distribution_method();
-
-/// Traces the light of the scene to its plate. The film has a plane for each band; if no output needs the bands, it has
-/// planes for red, green and blue. @throw Cancelled.
-PhotonDistribution distribute_photons(const Scene& scene, const Progress& progress);
-
-/// The picture of the light that distribute_photons collects.
-Image light_image(const Scene& scene, const Film& irradiance);
 
 }  // namespace tensorray

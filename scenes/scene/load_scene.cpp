@@ -81,10 +81,9 @@ std::vector<Band> rgb_bands() {
   return bands;
 }
 
-std::vector<Band> load_bands(const SceneDescription& description) {
+std::vector<Band> bands_of(const Spectrum& spectrum, const SceneDescription& description) {
   if (description.bending.rgb) return rgb_bands();
   const LightDescription& light = description.light;
-  const Spectrum spectrum = load_spectrum(light.spectrum);
   try {
     return make_bands(spectrum, light.wavelength_min, light.wavelength_max, light.wavelength_count);
   } catch (const std::invalid_argument& error) {
@@ -234,7 +233,9 @@ Scene load_scene(const SceneDescription& description, const Progress& progress) 
   std::vector<std::string> notes;
   for (const std::string& warning : description.warnings) notes.push_back("warning: " + warning);
   ColorManagement color({description.output.ocio, description.output.display, description.output.view});
-  std::vector<Band> bands = load_bands(description);
+  Spectrum spectrum;
+  if (!description.bending.rgb) spectrum = load_spectrum(description.light.spectrum);
+  std::vector<Band> bands = bands_of(spectrum, description);
   progress.update("loading", 0, 1);
   LoadedField loaded = load_field(description, notes);
   Beam beam = make_beam(description, loaded.field);
@@ -245,6 +246,7 @@ Scene load_scene(const SceneDescription& description, const Progress& progress) 
   scene.non_finite = loaded.non_finite;
   scene.beam = std::move(beam);
   scene.channels = channels_of(bands, description.bending);
+  scene.spectrum = std::move(spectrum);
   scene.bands = std::move(bands);
   scene.scale = load_scale(description, scene.field, scene.geometry, scene.beam, progress, notes);
   scene.bending = description.bending.settings;

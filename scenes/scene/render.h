@@ -2,6 +2,7 @@
 /// @file scenes/scene/render.h
 /// The result of rendering a scene, ready to be written.
 
+#include <array>
 #include <cstdint>
 #include <filesystem>
 #include <functional>
@@ -26,6 +27,9 @@ struct Statistics {
   std::vector<EndCounts> ends;  ///< Numbers of rays by channel and end.
   /// Power of one ray of each channel, for a beam of irradiance 1; empty if rays carry no power.
   std::vector<double> channel_power;
+  /// Power by channel and end, for a beam of irradiance 1; if rays of a channel differ in power. Empty otherwise.
+  std::vector<std::array<double, ray_end_count>> power;
+  std::optional<double> error;  ///< Estimated relative error of the picture, if the scene bounds it.
   std::uint64_t ray_steps = 0, tensor_samples = 0;
   double seconds_tracing = 0, seconds_density = 0, seconds_drawing = 0, seconds_color = 0;
 };

@@ -31,6 +31,8 @@ struct Scene {
   Beam beam;
   BendingSettings bending;  ///< Settings of the scene file, with the scale of the field.
 
+  Spectrum spectrum;  ///< Of the light; empty in RGB mode.
+
   /// Bands of wavelengths, or in RGB mode the three primaries (wavelength 0).
   std::vector<Band> bands;
   std::vector<LightChannel> channels;  ///< Flexibility and power of each band.

@@ -56,6 +56,18 @@ TEST_F(Benchmark, WholeJobsSayWhatTheyTookByPhase) {
   EXPECT_EQ(positions[0], positions[1]);
 }
 
+TEST_F(Benchmark, CausticsHaveErrorsAndTimes) {
+  const Outcome outcome = measure("--quick --json --only caustics");
+  ASSERT_EQ(outcome.status, 0) << outcome.error;
+  const auto caustics = nlohmann::json::parse(outcome.out).at("caustics");
+  ASSERT_EQ(caustics.size(), 1u);
+  for (const auto& row : caustics[0].at("rows")) {
+    EXPECT_GT(row.at("error"), 0) << row;
+    EXPECT_GT(row.at("seconds"), 0) << row;
+  }
+  EXPECT_LT(caustics[0].at("rows")[0].at("error"), 0.2);
+}
+
 TEST_F(Benchmark, TablesNameEveryPart) {
   const Outcome outcome = measure("--quick --only loading");
   ASSERT_EQ(outcome.status, 0) << outcome.error;

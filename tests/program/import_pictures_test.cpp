@@ -27,7 +27,7 @@ class ImportPictures : public Import {
                       {"wavelengths", {{"count", 4}}},
                       {"aperture", {{"center", list(center)}, {"size", {24, 24}}}}};
     scene["receiver"] = {{"center", list(plate)}, {"up", list(up)}, {"size", {26, 26}}, {"resolution", {64, 64}}};
-    scene["integrator"] = {{"type", "photon_distribution"}, {"density", {{"tau", 1.5}}}};
+    scene["integrator"] = {{"type", "photon_distribution"}, {"density", {{"kind", "gaussian"}, {"tau", 1.5}}}};
     write("scene.json", scene.dump());
     run_well({"render", "scene.json", "-q", "-o", "picture.exr"});
     return read_image(in_folder("picture.exr"));

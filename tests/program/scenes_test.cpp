@@ -51,7 +51,7 @@ class PointLoadPicture : public Program {
   Image picture(const std::string& scene, const std::vector<std::string>& light = {}) {
     std::vector<std::string> arguments{"render", (source_folder() / "scenes" / scene).string(), "-q", "-o", "out.exr"};
     for (const char* value : {"light.photons=40000", "light.wavelengths.count=16", "receiver.resolution=[130,130]",
-                              "receiver.size=[2.6,2.6]", "integrator.density.tau=1.5", "field.generate.resolution=49"})
+                              "receiver.size=[2.6,2.6]", "field.generate.resolution=49"})
       arguments.insert(arguments.end(), {"--set", value});
     arguments.insert(arguments.end(), light.begin(), light.end());
     run_well(arguments);

@@ -109,7 +109,7 @@ inline std::string small_scene(const std::string& field = R"({"generate": {"kind
   return R"({"field": )" + field + R"(,
              "light": {"photons": 2000, "wavelengths": {"count": 4}},
              "receiver": {"resolution": [32, 32]},
-             "integrator": {"type": "photon_distribution", "density": {"tau": 2}}})";
+             "integrator": {"type": "photon_distribution", "density": {"kind": "gaussian", "tau": 2}}})";
 }
 
 }  // namespace tensorray::test

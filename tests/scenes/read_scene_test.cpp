@@ -120,8 +120,8 @@ TEST_F(ReadScene, ReadsEveryKindOfValue) {
   EXPECT_EQ(scene.receiver.center, Eigen::Vector3d(0, 0, -3));
   EXPECT_EQ(scene.receiver.size, Eigen::Vector2d(2, 3));
   EXPECT_EQ(scene.receiver.resolution, Eigen::Vector2i(64, 32));
-  const DensitySettings& density = scene.integrator.settings<PhotonDescription>().density;
-  EXPECT_EQ(density.kind, DensityKind::histogram);
+  const PhotonDensity& density = scene.integrator.settings<PhotonDescription>().density;
+  EXPECT_EQ(density.kind, PhotonDensityKind::histogram);
   EXPECT_EQ(density.tau, 2);
   EXPECT_EQ(scene.output.files, (Files{{"photons", folder_ / "out/photons.vtp"}}))
       << "one output is named, so that the others are not wanted";

@@ -45,6 +45,7 @@ const std::vector<Room> rooms{
 
     {"integrators/bending", {"renderer/*", "volumes/*"}},
     {"integrators/packets", {"integrators/bending", "renderer/*", "volumes/*"}},
+    {"integrators/flow", {"integrators/bending", "renderer/*", "volumes/*"}},
     {"integrators/lens", {"integrators/bending", "renderer/*", "volumes/*"}},
     {"integrators/paths", {"integrators/bending", "renderer/*", "volumes/*"}},
     {"integrators/photons", {"integrators/bending", "renderer/*", "volumes/*"}},

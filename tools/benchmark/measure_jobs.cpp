@@ -24,7 +24,7 @@ RenderJob photon_job(int resolution, std::uint64_t photons, int side) {
           resolution,
           {{"light", {{"photons", photons}, {"wavelengths", {{"count", 32}}}}},
            {"receiver", {{"resolution", {side, side}}}},
-           {"integrator", {{"type", "photon_distribution"}}}}};
+           {"integrator", {{"type", "photon_distribution"}, {"density", {{"kind", "gaussian"}}}}}}};
 }
 
 RenderJob lens_job(int resolution, int side) {

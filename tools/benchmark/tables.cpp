@@ -127,6 +127,28 @@ std::string jobs_text(const Json& jobs) {
                            against.at("positions")[0].get<std::uint64_t>());
 }
 
+std::string caustics_text(const Json& caustics) {
+  std::string text;
+  for (const Json& scene : caustics) {
+    std::vector<Row> rows{
+        {fmt::format("light on a plate: {}, {}²", scene.at("scene").get<std::string>(), scene.at("side").get<int>()),
+         "positions", "trace and draw", "total", "error", "estimate"}};
+    for (const Json& row : scene.at("rows")) {
+      rows.push_back({row.at("name"), fmt::format("{}", row.at("positions").get<std::uint64_t>()),
+                      fmt::format("{:.2f} s", number(row, "seconds_of_light")),
+                      fmt::format("{:.2f} s", number(row, "seconds")),
+                      fmt::format("{:.2f}%", 100 * number(row, "error"))});
+      if (row.contains("estimate")) rows.back().push_back(fmt::format("{:.2f}%", 100 * number(row, "estimate")));
+    }
+    text += table(rows);
+    if (scene.contains("photons_over_mesh"))
+      text += fmt::format("photons take {:.0f} times as long for the error of the first row\n",
+                          number(scene, "photons_over_mesh"));
+    text += "\n";
+  }
+  return text;
+}
+
 }  // namespace
 
 std::string tables(const Json& results) {
@@ -139,6 +161,7 @@ std::string tables(const Json& results) {
   }
   if (results.contains("loading")) text += "\n" + loading_text(results.at("loading"));
   if (results.contains("jobs")) text += "\n" + jobs_text(results.at("jobs"));
+  if (results.contains("caustics")) text += "\n" + caustics_text(results.at("caustics"));
   return text;
 }
 

@@ -1,5 +1,6 @@
 #include <memory>
 #include <optional>
+#include <stdexcept>
 #include <string>
 #include <vector>
 
@@ -18,6 +19,7 @@ struct RenderOptions {
   std::string scene;
   SceneChanges changes;
   std::optional<std::uint64_t> seed;
+  std::string error;
   RenderRun run;
 };
 
@@ -36,6 +38,15 @@ std::string output_help() {
   return text;
 }
 
+/// "1%" or "0.01" as a number. @throw std::invalid_argument if it is none.
+double parse_part(const std::string& text) {
+  const bool percent = !text.empty() && text.back() == '%';
+  double value = 0;
+  if (!CLI::detail::lexical_cast(percent ? text.substr(0, text.size() - 1) : text, value) || !(value > 0))
+    throw std::invalid_argument("--until-error " + text + ": give a part greater than 0, such as 1% or 0.01");
+  return percent ? value / 100 : value;
+}
+
 }  // namespace
 
 void add_render_command(CLI::App& program, Progress& progress) {
@@ -50,11 +61,15 @@ void add_render_command(CLI::App& program, Progress& progress) {
       ->allow_extra_args(false);
   command->add_option("--threads", options->run.threads, "Number of threads (all)")->check(CLI::Range(1, 4096));
   command->add_option("--seed", options->seed, "Seed of all random numbers (the scene's)");
+  command->add_option("--until-error", options->error,
+                      "photon_distribution: refine until the picture's relative error is below this, as 1%");
   command->add_option("--stats", options->run.statistics, "Write statistics of the render to this JSON file");
   command->add_flag("-q,--quiet", options->run.quiet, "Print nothing but errors");
   command->callback([options, &progress] {
     SceneChanges changes = options->changes;
     if (options->seed) changes.overrides.push_back(fmt::format("seed={}", *options->seed));
+    if (!options->error.empty())
+      changes.overrides.push_back(fmt::format("integrator.density.error={}", parse_part(options->error)));
     render_scene(options->scene, changes, options->run, progress);
   });
 }

@@ -33,16 +33,18 @@ std::string statistics_json(const Scene& scene, const Statistics& statistics, do
   EndCounts rays{};
   std::array<double, ray_end_count> power{};
   Json channels = Json::array();
-  const bool has_power = !statistics.channel_power.empty();
+  const bool has_power = !statistics.channel_power.empty() || !statistics.power.empty();
   for (std::size_t channel = 0; channel < statistics.ends.size(); ++channel) {
     for (int end = 0; end < ray_end_count; ++end) {
       const std::uint64_t count = statistics.ends[channel][end];
       rays[end] += count;
-      if (has_power) power[end] += static_cast<double>(count) * statistics.channel_power[channel];
+      if (!statistics.channel_power.empty())
+        power[end] += static_cast<double>(count) * statistics.channel_power[channel];
+      if (!statistics.power.empty()) power[end] += statistics.power[channel][end];
     }
     channels.push_back(
         {{"wavelength", scene.channels[channel].wavelength}, {"flexibility", scene.channels[channel].flexibility}});
-    if (has_power) channels.back()["ray_power"] = statistics.channel_power[channel];
+    if (!statistics.channel_power.empty()) channels.back()["ray_power"] = statistics.channel_power[channel];
     channels.back()["rays"] = balance(statistics.ends[channel]);
   }
   const double seconds = scene.seconds + statistics.seconds_tracing + statistics.seconds_density +
@@ -70,6 +72,7 @@ std::string statistics_json(const Scene& scene, const Statistics& statistics, do
                  {"total", seconds}}},
                {"peak_memory_bytes", peak_memory_bytes()},
                {"channels", channels}};
+  if (statistics.error) json["error"] = *statistics.error;
   if (has_power) json["power"] = balance(power);
   return json.dump(2) + "\n";
 }

@@ -1,0 +1,193 @@
+#include "integrators/flow/caustic.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+
+#include <tbb/parallel_for.h>
+#include <tbb/task_arena.h>
+
+#include "renderer/film/area_deposit.h"
+
+namespace tensorray {
+namespace {
+
+constexpr double even_part =
+    0.1;  // Densities of a square's halves that differ by less, as a part of their sum, are one.
+constexpr double swept_share = 0.99;  // The part of the positions whose light moves slowly enough from band to band.
+constexpr std::size_t bands_of_thread = 4;     // Bands that are drawn before their sums are added to the film.
+constexpr std::size_t most_memory = 1u << 28;  // Bytes for these, unless a band for each thread takes more.
+
+/// The landings of all positions at one place among the nodes.
+struct Landings {
+  std::vector<Eigen::Vector2d> at;  // Pixels.
+  std::vector<RayEnd> ends;
+};
+
+Landings landings_at(const FlowMap& map, double node) {
+  const auto before = std::min(static_cast<std::size_t>(node), map.nodes - 1);
+  const std::size_t after = std::min(before + 1, map.nodes - 1);
+  const double part = node - static_cast<double>(before);
+  Landings landings;
+  const std::size_t count = map.starts.size();
+  landings.at.resize(count);
+  landings.ends.resize(count);
+  for (std::size_t i = 0; i < count; ++i) {
+    const std::size_t a = i * map.nodes + before, b = i * map.nodes + after;
+    const std::size_t nearest = part < 0.5 ? a : b;
+    landings.ends[i] = map.ends[nearest];
+    const bool both = map.ends[a] == RayEnd::plate && map.ends[b] == RayEnd::plate;
+    landings.at[i] =
+        both ? Eigen::Vector2d((1 - part) * map.landings[a].cast<double>() + part * map.landings[b].cast<double>())
+             : Eigen::Vector2d(map.landings[nearest].cast<double>());
+  }
+  return landings;
+}
+
+/// The power of the light that does not land, by its end; and of the light that lands, beside the plate too.
+using Power = std::array<double, ray_end_count>;
+
+/// The density of a triangle for its edges. Light that is not spread over an area is added here.
+/// @param unit  The power of a triangle of unit area.
+double start_triangle(const FlowTriangle& triangle, const Landings& landings, double unit, AreaDeposit& deposit,
+                      Power& power) {
+  const auto [a, b, c] = triangle.corners;
+  const double carried = unit * triangle.area;
+  const auto landed = [&](std::uint32_t corner) { return landings.ends[corner] == RayEnd::plate; };
+  if (!triangle.is_torn && landed(a) && landed(b) && landed(c)) {
+    power[static_cast<int>(RayEnd::plate)] += carried;
+    return deposit.triangle(landings.at[a], landings.at[b], landings.at[c], carried);
+  }
+  for (const std::uint32_t corner : triangle.corners) {
+    if (landed(corner)) deposit.add_point(landings.at[corner], carried / 3);
+    power[static_cast<int>(landings.ends[corner])] += carried / 3;
+  }
+  return 0;
+}
+
+/// Gives the two triangles of a square one density if theirs are nearly the same: the edge between them need not be
+/// drawn then. Their power stays the same.
+void even_out(double& a, double& b, double area_a, double area_b) {
+  if (!(a * b > 0 && std::abs(a - b) < even_part * std::abs(a + b))) return;
+  a = b = (area_a + area_b) / (area_a / a + area_b / b);
+}
+
+EndCounts count_ends(const Landings& landings, const Plate& plate) {
+  EndCounts counts{};
+  for (std::size_t i = 0; i < landings.at.size(); ++i) {
+    const Eigen::Array2d at = landings.at[i].array();
+    const bool beside = (at < 0).any() || (at > plate.resolution.cast<double>().array()).any();
+    const RayEnd end = landings.ends[i] == RayEnd::plate && beside ? RayEnd::missed : landings.ends[i];
+    ++counts[static_cast<int>(end)];
+  }
+  return counts;
+}
+
+/// A band that is being drawn.
+struct Drawing {
+  AreaDeposit deposit;
+  Power power{};
+  EndCounts ends{};
+};
+
+void draw_band(const FlowMap& map, const Plate& plate, const CausticBand& band, double unit, Drawing& drawing) {
+  drawing.deposit.clear();
+  drawing.power = {};
+  const Landings landings = landings_at(map, band.node);
+  std::vector<double> densities;
+  densities.reserve(map.triangles.size());
+  for (const FlowTriangle& triangle : map.triangles)
+    densities.push_back(start_triangle(triangle, landings, unit, drawing.deposit, drawing.power));
+  for (const FlowEdge& edge : map.edges)
+    if (edge.is_diagonal)
+      even_out(densities[edge.along], densities[edge.against], map.triangles[edge.along].area,
+               map.triangles[edge.against].area);
+  const auto density = [&](std::uint32_t triangle) { return triangle == FlowEdge::none ? 0 : densities[triangle]; };
+  for (const FlowEdge& edge : map.edges) {
+    const double difference = density(edge.along) - density(edge.against);
+    if (difference != 0) drawing.deposit.add_edge(landings.at[edge.from], landings.at[edge.to], difference);
+  }
+  drawing.ends = count_ends(landings, plate);
+}
+
+/// Adds a group of bands to the films, in the order of the bands. @return the power on the plate, by band.
+std::vector<double> add_to_films(const std::vector<Drawing>& drawings, const CausticBand* bands, std::size_t count,
+                                 double gain, Caustic& caustic) {
+  const auto width = static_cast<std::size_t>(caustic.color.width),
+             height = static_cast<std::size_t>(caustic.color.height);
+  std::vector<double> rows(count * height);
+  tbb::parallel_for(std::size_t{0}, height, [&](std::size_t y) {
+    std::vector<double> row(width);
+    for (std::size_t k = 0; k < count; ++k) {
+      drawings[k].deposit.read_row(static_cast<int>(y), row.data());
+      rows[k * height + y] = std::accumulate(row.begin(), row.end(), 0.0);
+      const auto add = [&](double* plane, double weight) {
+        for (std::size_t x = 0; x < width; ++x) plane[y * width + x] += weight * row[x];
+      };
+      for (int c = 0; c < 3; ++c) add(caustic.color.plane(c), gain * bands[k].color[c]);
+      if (caustic.irradiance.channels > 0)
+        add(caustic.irradiance.plane(static_cast<int>(bands[k].channel)), gain * bands[k].weight);
+    }
+  });
+  std::vector<double> sums(count);
+  for (std::size_t i = 0; i < rows.size(); ++i) sums[i / height] += rows[i];
+  return sums;
+}
+
+}  // namespace
+
+int caustic_bands(const FlowMap& map, int channels, double step, int most) {
+  std::vector<float> sweeps;
+  for (std::size_t i = 0; i < map.starts.size(); ++i) {
+    float sweep = 0;
+    for (std::size_t node = 1; node < map.nodes; ++node) {
+      const std::size_t at = i * map.nodes + node;
+      if (map.ends[at] == RayEnd::plate && map.ends[at - 1] == RayEnd::plate)
+        sweep += (map.landings[at] - map.landings[at - 1]).norm();
+    }
+    sweeps.push_back(sweep);
+  }
+  const auto place = static_cast<std::ptrdiff_t>(swept_share * static_cast<double>(sweeps.size() - 1));
+  std::nth_element(sweeps.begin(), sweeps.begin() + place, sweeps.end());
+  const double wanted = std::ceil(sweeps[static_cast<std::size_t>(place)] / step / channels);
+  return channels * static_cast<int>(std::clamp(wanted, 1.0, std::max(1.0, std::floor(double(most) / channels))));
+}
+
+Caustic draw_caustic(const FlowMap& map, const Plate& plate, const std::vector<CausticBand>& bands,
+                     std::size_t channels, bool by_channel, const Progress& progress) {
+  const int width = plate.resolution.x(), height = plate.resolution.y();
+  Caustic caustic;
+  caustic.color = Film(width, height, 3);
+  if (by_channel) caustic.irradiance = Film(width, height, static_cast<int>(channels));
+  caustic.power.assign(channels, {});
+  caustic.ends.assign(channels, {});
+  double area = 0;
+  for (const FlowTriangle& triangle : map.triangles) area += triangle.area;
+  const auto threads = static_cast<std::size_t>(tbb::this_task_arena::max_concurrency());
+  const std::size_t fitting = most_memory / (8 * static_cast<std::size_t>(width) * static_cast<std::size_t>(height));
+  const std::size_t at_once = std::clamp(fitting, threads, bands_of_thread * threads);
+  std::vector<Drawing> drawings(std::min(at_once, bands.size()), Drawing{AreaDeposit(width, height)});
+  for (std::size_t first = 0; first < bands.size(); first += drawings.size()) {
+    progress.update("drawing light", first, bands.size());
+    const std::size_t count = std::min(drawings.size(), bands.size() - first);
+    tbb::parallel_for(std::size_t{0}, count, [&](std::size_t k) {
+      if (progress.cancelled) throw Cancelled();
+      draw_band(map, plate, bands[first + k], 1 / area, drawings[k]);
+    });
+    const std::vector<double> on_plate =
+        add_to_films(drawings, &bands[first], count, area / plate.pixel_area(), caustic);
+    for (std::size_t k = 0; k < count; ++k) {
+      const CausticBand& band = bands[first + k];
+      Power power = drawings[k].power;
+      double& landed = power[static_cast<int>(RayEnd::plate)];
+      power[static_cast<int>(RayEnd::missed)] += landed - on_plate[k];
+      landed = on_plate[k];
+      for (int end = 0; end < ray_end_count; ++end) caustic.power[band.channel][end] += band.weight * power[end];
+      caustic.ends[band.channel] = drawings[k].ends;
+    }
+  }
+  progress.update("drawing light", bands.size(), bands.size());
+  return caustic;
+}
+
+}  // namespace tensorray

@@ -1,0 +1,47 @@
+#pragma once
+/// @file integrators/flow/caustic.h
+/// The light of a flow map on the pixels of its plate: each triangle's light is spread evenly over the triangle between
+/// its landings, and each pixel gets the exact area that it shares with it.
+
+#include <array>
+#include <cstddef>
+#include <vector>
+
+#include <Eigen/Core>
+
+#include "base/progress.h"
+#include "integrators/flow/flow_map.h"
+#include "renderer/film/film.h"
+
+namespace tensorray {
+
+/// A part of the light that lands together: a narrow band of wavelengths, or a colour in RGB mode.
+struct CausticBand {
+  double node = 0;          ///< Its landings, as a position among the nodes of the map; between two nodes in a range.
+  std::size_t channel = 0;  ///< The channel that it belongs to.
+  double weight = 1;        ///< Its part of the channel's power; the sum over the bands of a channel is 1.
+  Eigen::Vector3d color =
+      Eigen::Vector3d::Zero();  ///< The colour that it adds where its irradiance is that of the undisturbed beam.
+};
+
+struct Caustic {
+  Film color;       ///< Red, green and blue: the sum of the bands' colours times their irradiance.
+  Film irradiance;  ///< If asked for: a plane for each channel, where 1 is the undisturbed beam in that channel.
+  std::vector<std::array<double, ray_end_count>> power;  ///< Parts of each channel's power by the end of its light.
+  std::vector<EndCounts> ends;                           ///< Number of positions by the end of each channel's light.
+};
+
+/// The number of bands, a multiple of `channels`, between which light moves by no more than `step` pixels for 99 of 100
+/// positions of the map. At most `most`, but at least one for each channel.
+int caustic_bands(const FlowMap& map, int channels, double step = 1, int most = 128);
+
+/// Draws the bands one after the other. Triangles of which not all corners land, and torn ones, leave their light at
+/// the corners: each corner takes a third. What lands beside the plate counts as missed.
+/// @param plate       The plate of the map.
+/// @param by_channel  Whether the result has the irradiance of each channel.
+/// The sums are integers, so that the result is the same for any number of threads. Memory: 8 bytes for each pixel and
+/// thread, and the films. @throw Cancelled.
+Caustic draw_caustic(const FlowMap& map, const Plate& plate, const std::vector<CausticBand>& bands,
+                     std::size_t channels, bool by_channel, const Progress& progress);
+
+}  // namespace tensorray

@@ -1,0 +1,422 @@
+#include "integrators/flow/flow_map.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <stdexcept>
+#include <unordered_map>
+
+#include <tbb/parallel_for.h>
+#include <tbb/parallel_sort.h>
+
+#include "integrators/flow/node_tracer.h"
+
+namespace tensorray {
+namespace {
+
+constexpr double margin = 1.0 / 8;         // Extension of the plate on each side, in sizes of the plate.
+constexpr double coarsest_pixels = 8;      // Size of the first squares, in pixels of straight light; also not more
+constexpr double coarsest_voxels = 1;      // than this, so that no part of the field is missed, ...
+constexpr double field_squares = 64;       // ... but for that at least this part of the beam's extent;
+constexpr double finest_pixels = 1.0 / 2;  // and of the smallest squares, unless the tolerance is less.
+constexpr double torn_part = 0.35;         // Beyond this part of a square's size, an error is a tear ...
+constexpr double torn_pixels = 1;          // ... if it is also greater than this.
+constexpr double inset = 3e-6;  // On the aperture's edge, it is a matter of rounding whether rays enter the volume.
+                                // There they start this part of a patch further inside.
+constexpr int most_levels = 14;
+constexpr int most_columns = 1 << 12;  // Number of first squares along a side.
+constexpr std::size_t task_size = 32;  // Positions that one thread traces as one task.
+
+/// A quadrilateral part of the aperture with a lattice of squares; corners counter-clockwise.
+struct Patch {
+  std::array<Eigen::Vector2d, 4> corners;
+  int columns = 1, rows = 1;
+
+  /// The point at (u, v) in [0, 1]²; bilinear.
+  Eigen::Vector2d at(double u, double v) const {
+    return (1 - v) * ((1 - u) * corners[0] + u * corners[1]) + v * ((1 - u) * corners[3] + u * corners[2]);
+  }
+};
+
+struct Square {
+  std::uint32_t patch = 0, x = 0, y = 0;                     // The lower left corner, on the finest lattice.
+  int level = 0;                                             // 0: a first square; each level halves the side.
+  float deviation = std::numeric_limits<float>::infinity();  // That of the parent's landings; see `deviation_of`.
+  float error = std::numeric_limits<float>::infinity();      // Estimated error of landings within, pixels.
+  std::array<std::uint32_t, 4> corners{};                    // Positions, counter-clockwise from the lower left.
+};
+
+bool is_parallelogram(const std::vector<Eigen::Vector2d>& polygon) {
+  if (polygon.size() != 4) return false;
+  const Eigen::Vector2d skew = polygon[0] - polygon[1] + polygon[2] - polygon[3];
+  return skew.norm() < 1e-9 * (polygon[2] - polygon[0]).norm();
+}
+
+/// One patch, or one about each corner of the polygon, which reaches to the middles of its sides and of the polygon.
+std::vector<Patch> patches_of(const std::vector<Eigen::Vector2d>& polygon, double square_size) {
+  std::vector<Patch> patches;
+  const std::size_t n = polygon.size();
+  if (is_parallelogram(polygon)) {
+    patches.push_back({{polygon[0], polygon[1], polygon[2], polygon[3]}});
+  } else {
+    Eigen::Vector2d center(0, 0);
+    for (const Eigen::Vector2d& corner : polygon) center += corner / static_cast<double>(n);
+    for (std::size_t i = 0; i < n; ++i) {
+      const Eigen::Vector2d &corner = polygon[i], &next = polygon[(i + 1) % n], &last = polygon[(i + n - 1) % n];
+      patches.push_back({{(last + corner) / 2, corner, (corner + next) / 2, center}});
+    }
+  }
+  for (Patch& patch : patches) {
+    const auto count = [&](int a, int b, int c, int d) {
+      const double length =
+          std::max((patch.corners[b] - patch.corners[a]).norm(), (patch.corners[d] - patch.corners[c]).norm());
+      return static_cast<int>(std::clamp(std::ceil(length / square_size), 1.0, double{most_columns}));
+    };
+    patch.columns = count(0, 1, 3, 2);
+    patch.rows = count(1, 2, 0, 3);
+  }
+  return patches;
+}
+
+/// The size of a pixel across the beam, as straight light projects it.
+double pixel_across(const Plate& plate, const Beam& beam) {
+  const double area = plate.pixel_area() * std::abs(plate.normal().dot(beam.direction));
+  return std::sqrt(std::max(area, 1e-6 * plate.pixel_area()));
+}
+
+Geometry extended(const Geometry& geometry) {
+  Surfaces surfaces = geometry.surfaces();
+  surfaces.plate->size *= 1 + 2 * margin;
+  return Geometry(std::move(surfaces));
+}
+
+class FlowMapBuilder {
+ public:
+  FlowMapBuilder(const TensorField& field, const Geometry& geometry, const Beam& beam, const BendingSettings& bending,
+                 const FlowSettings& settings, const Progress& progress)
+      : plate_(*geometry.surfaces().plate),
+        geometry_(extended(geometry)),
+        beam_(beam),
+        settings_(settings),
+        progress_(progress),
+        tracer_(field, geometry_, plate_, beam, bending, settings) {
+    map_.nodes = tracer_.nodes();
+    const double pixel = pixel_across(plate_, beam);
+    Eigen::Vector2d low = beam.aperture[0], high = low;
+    for (const Eigen::Vector2d& corner : beam.aperture) low = low.cwiseMin(corner), high = high.cwiseMax(corner);
+    const double voxel = field.to_world().linear().colwise().norm().minCoeff();
+    const double for_field = std::max(coarsest_voxels * voxel, (high - low).maxCoeff() / field_squares);
+    // A small budget means large squares: a quarter of it is for the first ones and their first division.
+    const double area = (high - low).prod(), budget = static_cast<double>(settings.most_starts);
+    const double size = std::max(std::min(coarsest_pixels * pixel, for_field), std::sqrt(16 * area / budget));
+    patches_ = patches_of(beam.aperture, size);
+    const double finest = std::min(finest_pixels, settings.tolerance) * pixel;
+    while (levels_ < most_levels && std::ldexp(size, -levels_) > finest) ++levels_;
+  }
+
+  FlowMap build() && {
+    add_first_squares();
+    trace_new();
+    while (divide_squares()) continue;
+    make_triangles();
+    map_.rays = tracer_.rays();
+    map_.ray_steps = tracer_.ray_steps();
+    map_.tensor_samples = tracer_.tensor_samples();
+    return std::move(map_);
+  }
+
+ private:
+  static std::uint64_t key(std::uint32_t patch, std::uint32_t x, std::uint32_t y) {
+    return std::uint64_t{patch} << 58 | std::uint64_t{x} << 29 | y;
+  }
+
+  std::uint32_t position(std::uint32_t patch, std::uint32_t x, std::uint32_t y) {
+    const auto [found, is_new] = positions_.emplace(key(patch, x, y), static_cast<std::uint32_t>(map_.starts.size()));
+    if (is_new) {
+      const Patch& p = patches_[patch];
+      const double u = std::ldexp(x, -levels_) / p.columns, v = std::ldexp(y, -levels_) / p.rows;
+      map_.starts.push_back(p.at(u, v));
+      origins_.push_back(p.at(std::clamp(u, inset, 1 - inset), std::clamp(v, inset, 1 - inset)));
+    }
+    return found->second;
+  }
+
+  void add_first_squares() {
+    const std::uint32_t side = 1u << levels_;
+    for (std::uint32_t p = 0; p < patches_.size(); ++p)
+      for (std::uint32_t row = 0; row < static_cast<std::uint32_t>(patches_[p].rows); ++row)
+        for (std::uint32_t column = 0; column < static_cast<std::uint32_t>(patches_[p].columns); ++column) {
+          Square square{p, column * side, row * side};
+          set_corners(square);
+          squares_.push_back(square);
+        }
+  }
+
+  std::uint32_t side_of(const Square& square) const { return 1u << (levels_ - square.level); }
+
+  void set_corners(Square& square) {
+    const std::uint32_t side = side_of(square), x = square.x, y = square.y, p = square.patch;
+    square.corners = {position(p, x, y), position(p, x + side, y), position(p, x + side, y + side),
+                      position(p, x, y + side)};
+  }
+
+  void trace_new() {
+    const std::size_t first = traced_, count = map_.starts.size();
+    map_.landings.resize(count * map_.nodes);
+    map_.ends.resize(count * map_.nodes);
+    const std::size_t tasks = (count - first + task_size - 1) / task_size;
+    tbb::parallel_for(std::size_t{0}, tasks, [&](std::size_t task) {
+      if (progress_.cancelled) throw Cancelled();
+      const std::size_t begin = first + task * task_size, end = std::min(begin + task_size, count);
+      std::vector<Eigen::Vector3d> origins;
+      for (std::size_t i = begin; i < end; ++i) {
+        origins.push_back(beam_.center + origins_[i].x() * beam_.right + origins_[i].y() * beam_.up);
+      }
+      tracer_.trace(origins, &map_.landings[begin * map_.nodes], &map_.ends[begin * map_.nodes]);
+    });
+    traced_ = count;
+    progress_.update("tracing rays", std::min(count, settings_.most_starts), settings_.most_starts);
+  }
+
+  bool landed(std::uint32_t position, std::size_t node) const {
+    return map_.ends[position * map_.nodes + node] == RayEnd::plate;
+  }
+  Eigen::Vector2f landing(std::uint32_t position, std::size_t node) const {
+    return map_.landings[position * map_.nodes + node];
+  }
+
+  /// Where the light of some positions lands at one node.
+  struct Reach {
+    Eigen::Array2f low = Eigen::Array2f::Constant(std::numeric_limits<float>::infinity()), high = -low;  // Pixels.
+    std::size_t landed = 0;  // Number of the positions whose light lands.
+  };
+
+  template <std::size_t count>
+  Reach reach_of(const std::array<std::uint32_t, count>& positions, std::size_t node) const {
+    Reach reach;
+    for (const std::uint32_t position : positions) {
+      if (!landed(position, node)) continue;
+      ++reach.landed;
+      reach.low = reach.low.min(landing(position, node).array());
+      reach.high = reach.high.max(landing(position, node).array());
+    }
+    return reach;
+  }
+
+  bool is_on_plate(const Reach& reach) const {
+    const Eigen::Array2f size = plate_.resolution.cast<float>().array();
+    return reach.landed > 0 && (reach.low < size).all() && (reach.high > 0).all();
+  }
+
+  bool needs_division(const Square& square) const {
+    if (square.level >= levels_) return false;
+    if (square.level == 0) return true;  // There is no estimate of its error yet.
+    bool is_seen = false;
+    float size = 0;
+    for (const std::size_t node : tracer_.check_nodes()) {
+      const Reach reach = reach_of(square.corners, node);
+      if (!is_on_plate(reach)) continue;
+      if (reach.landed < 4) return true;
+      is_seen = true;
+      size = std::max(size, (reach.high - reach.low).maxCoeff());
+    }
+    return is_seen && square.error > settings_.tolerance * std::sqrt(std::max(size, 1.0f));
+  }
+
+  /// Divides the squares that need it, those with the greatest errors first if there are too many.
+  /// @return whether there were any.
+  bool divide_squares() {
+    std::vector<std::size_t> chosen;
+    for (std::size_t i = 0; i < squares_.size(); ++i)
+      if (needs_division(squares_[i])) chosen.push_back(i);
+    // A division adds up to five positions, and about three as neighbours share them.
+    const std::size_t room = (settings_.most_starts - std::min(settings_.most_starts, map_.starts.size())) / 3;
+    if (chosen.size() > room) {
+      map_.is_complete = false;
+      std::stable_sort(chosen.begin(), chosen.end(),
+                       [&](std::size_t a, std::size_t b) { return squares_[a].error > squares_[b].error; });
+      chosen.resize(room);
+      std::sort(chosen.begin(), chosen.end());
+    }
+    if (chosen.empty()) return false;
+    std::vector<std::array<std::uint32_t, 5>> added;  // The middles of the four sides, and of the square.
+    for (const std::size_t i : chosen) added.push_back(middles_of(squares_[i]));
+    trace_new();
+    std::vector<Square> next;
+    std::size_t done = 0;
+    for (std::size_t i = 0; i < squares_.size(); ++i) {
+      if (done == chosen.size() || chosen[done] != i) {
+        next.push_back(squares_[i]);
+        continue;
+      }
+      const float deviation = deviation_of(squares_[i], added[done++]);
+      for (std::uint32_t quarter = 0; quarter < 4; ++quarter)
+        next.push_back(quarter_of(squares_[i], quarter, deviation));
+    }
+    squares_ = std::move(next);
+    return true;
+  }
+
+  std::array<std::uint32_t, 5> middles_of(const Square& square) {
+    const std::uint32_t side = side_of(square), half = side / 2, x = square.x, y = square.y, p = square.patch;
+    return {position(p, x + half, y), position(p, x + side, y + half), position(p, x + half, y + side),
+            position(p, x, y + half), position(p, x + half, y + half)};
+  }
+
+  /// Where landings are smooth, the deviation falls to a quarter from level to level; at singular places, by less. The
+  /// error of a square is what its own deviation will be if the last ratio stays.
+  Square quarter_of(const Square& square, std::uint32_t quarter, float deviation) {
+    const std::uint32_t half = side_of(square) / 2;
+    Square part{square.patch, square.x + quarter % 2 * half, square.y + quarter / 2 * half, square.level + 1};
+    const bool known = std::isfinite(deviation) && std::isfinite(square.deviation) && square.deviation > 0;
+    part.deviation = deviation;
+    part.error = deviation * (known ? std::clamp(deviation / square.deviation, 0.25f, 1.0f) : 1.0f);
+    set_corners(part);
+    return part;
+  }
+
+  /// The greatest distance of a middle's landing from the mean of the corners beside it, among the nodes whose light
+  /// falls on the plate; infinite if some of it does not land.
+  float deviation_of(const Square& square, const std::array<std::uint32_t, 5>& middles) const {
+    const auto& [a, b, c, d] = square.corners;
+    const std::array<std::uint32_t, 9> all{a, b, c, d, middles[0], middles[1], middles[2], middles[3], middles[4]};
+    float greatest = 0;
+    for (const std::size_t node : tracer_.check_nodes()) {
+      const Reach reach = reach_of(all, node);
+      if (!is_on_plate(reach)) continue;
+      if (reach.landed < all.size()) return std::numeric_limits<float>::infinity();
+      std::array<Eigen::Vector2f, 4> at;
+      for (int i = 0; i < 4; ++i) at[i] = landing(square.corners[i], node);
+      for (int i = 0; i < 4; ++i)
+        greatest = std::max(greatest, (landing(middles[i], node) - (at[i] + at[(i + 1) % 4]) / 2).norm());
+      greatest = std::max(greatest, (landing(middles[4], node) - (at[0] + at[1] + at[2] + at[3]) / 4).norm());
+    }
+    return greatest;
+  }
+
+  /// Whether the landings of the parent were far from where their neighbours predict, by the size of the square.
+  bool is_torn(const Square& square) const {
+    if (square.level < levels_) return false;
+    float size = 0;
+    for (const std::size_t node : tracer_.check_nodes()) {
+      const Reach reach = reach_of(square.corners, node);
+      if (reach.landed == 4) size = std::max(size, (reach.high - reach.low).maxCoeff());
+    }
+    return square.deviation > torn_pixels && square.deviation > torn_part * 2 * size && std::isfinite(square.deviation);
+  }
+
+  /// Appends the positions on a side between two corners, without its end. They are there if a neighbour is finer.
+  void add_side(const Square& square, std::uint32_t x0, std::uint32_t y0, std::uint32_t x1, std::uint32_t y1,
+                std::uint32_t from, std::vector<std::uint32_t>& outline) const {
+    const std::uint32_t x = (x0 + x1) / 2, y = (y0 + y1) / 2;
+    const auto middle =
+        (x != x0 || y != y0) && (x != x1 || y != y1) ? positions_.find(key(square.patch, x, y)) : positions_.end();
+    if (middle == positions_.end()) {
+      outline.push_back(from);
+      return;
+    }
+    add_side(square, x0, y0, x, y, from, outline);
+    add_side(square, x, y, x1, y1, middle->second, outline);
+  }
+
+  /// The mean of a square's corners, as a new position.
+  std::uint32_t add_center(const Square& square) {
+    const auto center = static_cast<std::uint32_t>(map_.starts.size());
+    Eigen::Vector2d start(0, 0);
+    for (const std::uint32_t corner : square.corners) start += map_.starts[corner] / 4;
+    map_.starts.push_back(start);
+    for (std::size_t node = 0; node < map_.nodes; ++node) {
+      Eigen::Vector2f at(0, 0);
+      RayEnd end = RayEnd::plate;
+      for (const std::uint32_t corner : square.corners) {
+        at += landing(corner, node) / 4;
+        if (!landed(corner, node)) end = map_.ends[corner * map_.nodes + node];
+      }
+      map_.landings.push_back(at);
+      map_.ends.push_back(end);
+    }
+    return center;
+  }
+
+  std::uint32_t add_triangle(std::uint32_t a, std::uint32_t b, std::uint32_t c, bool torn) {
+    const Eigen::Vector2d ab = map_.starts[b] - map_.starts[a], ac = map_.starts[c] - map_.starts[a];
+    map_.triangles.push_back({{a, b, c}, std::abs(ab.x() * ac.y() - ab.y() * ac.x()) / 2, torn});
+    return static_cast<std::uint32_t>(map_.triangles.size() - 1);
+  }
+
+  /// Adds a side of a square's outline; if the neighbour has added it already, joins the two.
+  void add_outline_edge(std::uint32_t from, std::uint32_t to, std::uint32_t triangle) {
+    const auto other = open_edges_.find(std::uint64_t{to} << 32 | from);
+    if (other != open_edges_.end()) {
+      map_.edges[other->second].against = triangle;
+      open_edges_.erase(other);
+      return;
+    }
+    open_edges_.emplace(std::uint64_t{from} << 32 | to, static_cast<std::uint32_t>(map_.edges.size()));
+    map_.edges.push_back({from, to, triangle, FlowEdge::none});
+  }
+
+  /// Two triangles, or as many as the outline has sides if there are positions between the corners.
+  void triangulate(const Square& square, const std::vector<std::uint32_t>& outline) {
+    const bool torn = is_torn(square);
+    if (outline.size() == 4) {
+      const std::uint32_t first = add_triangle(outline[0], outline[1], outline[2], torn);
+      const std::uint32_t second = add_triangle(outline[0], outline[2], outline[3], torn);
+      map_.edges.push_back({outline[2], outline[0], first, second, true});
+      for (std::size_t i = 0; i < 4; ++i) add_outline_edge(outline[i], outline[(i + 1) % 4], i < 2 ? first : second);
+      return;
+    }
+    const std::uint32_t center = add_center(square);
+    const auto first = static_cast<std::uint32_t>(map_.triangles.size()),
+               count = static_cast<std::uint32_t>(outline.size());
+    for (std::uint32_t i = 0; i < count; ++i) {
+      const std::uint32_t from = outline[i], to = outline[(i + 1) % count];
+      const std::uint32_t triangle = add_triangle(from, to, center, torn);
+      add_outline_edge(from, to, triangle);
+      map_.edges.push_back({to, center, triangle, first + (i + 1) % count});
+    }
+  }
+
+  void make_triangles() {
+    std::vector<std::uint32_t> outline;
+    for (const Square& square : squares_) {
+      const std::uint32_t x = square.x, y = square.y, side = side_of(square);
+      const auto& [a, b, c, d] = square.corners;
+      outline.clear();
+      add_side(square, x, y, x + side, y, a, outline);
+      add_side(square, x + side, y, x + side, y + side, b, outline);
+      add_side(square, x + side, y + side, x, y + side, c, outline);
+      add_side(square, x, y + side, x, y, d, outline);
+      triangulate(square, outline);
+    }
+  }
+
+  const Plate plate_;
+  const Geometry geometry_;
+  const Beam& beam_;
+  const FlowSettings& settings_;
+  const Progress& progress_;
+  NodeTracer tracer_;
+  std::vector<Patch> patches_;
+  int levels_ = 1;  // Number of divisions from the first squares to the smallest ones.
+  std::vector<Square> squares_;
+  std::unordered_map<std::uint64_t, std::uint32_t> positions_;
+  std::unordered_map<std::uint64_t, std::uint32_t> open_edges_;  // Edges with one triangle, by `from` and `to`.
+  std::vector<Eigen::Vector2d> origins_;  // Where the rays of the positions start, in the beam's frame.
+  std::size_t traced_ = 0;                // Number of positions that have landings.
+  FlowMap map_;
+};
+
+}  // namespace
+
+FlowMap trace_flow_map(const TensorField& field, const Geometry& geometry, const Beam& beam,
+                       const BendingSettings& bending, const FlowSettings& settings, const Progress& progress) {
+  if (!geometry.surfaces().plate) throw std::invalid_argument("a flow map needs a receiver");
+  if (settings.flexibilities.empty() || (settings.range && settings.flexibilities.size() != 2))
+    throw std::invalid_argument("a flow map needs flexibilities, and a range has two");
+  if (!(settings.tolerance > 0) || settings.most_starts < 1)
+    throw std::invalid_argument("a flow map needs a tolerance and a number of positions greater than 0");
+  return FlowMapBuilder(field, geometry, beam, bending, settings, progress).build();
+}
+
+}  // namespace tensorray

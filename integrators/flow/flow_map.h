@@ -1,0 +1,79 @@
+#pragma once
+/// @file integrators/flow/flow_map.h
+/// The flow map of a beam: where light from each point of the beam's aperture lands on a plate, for a range of
+/// flexibilities. It is a mesh of rays, finer where the map bends, folds or tears.
+
+#include <array>
+#include <cstdint>
+#include <vector>
+
+#include <Eigen/Core>
+
+#include "base/progress.h"
+#include "integrators/bending/bending.h"
+#include "integrators/bending/light_channel.h"
+#include "renderer/lights/beam.h"
+
+namespace tensorray {
+
+struct FlowSettings {
+  /// Flexibilities of the light that is followed. If they are the two ends of a `range`, the map holds a continuum
+  /// between them; otherwise each is on its own.
+  std::vector<double> flexibilities;
+  bool range = false;
+
+  double tolerance = 0.5;  ///< Wanted error of landings between positions, pixels; > 0.
+
+  std::size_t most_starts = std::size_t{1} << 20;  ///< Refinement stops at so many positions; > 0.
+};
+
+/// A triangle of neighbouring positions.
+struct FlowTriangle {
+  std::array<std::uint32_t, 3> corners{};  ///< Indices of positions.
+  double area = 0;                         ///< Area of the aperture, world units².
+  bool is_torn = false;                    ///< The landings of its corners have nothing to do with each other.
+};
+
+/// A side of one triangle, or of two.
+struct FlowEdge {
+  static constexpr std::uint32_t none = 0xffffffffu;
+  std::uint32_t from = 0, to = 0;              ///< Indices of positions.
+  std::uint32_t along = none, against = none;  ///< The triangle that has it in this sense, and in the other one.
+  bool is_diagonal = false;                    ///< Whether its triangles are the halves of a square.
+};
+
+/// Positions have landings at `nodes` flexibilities. In a range the nodes are evenly spaced, ends included, and
+/// landings between two nodes lie on the straight line between them.
+struct FlowMap {
+  std::size_t nodes = 1;
+  std::vector<Eigen::Vector2d> starts;    ///< In the beam's frame (right, up), world units.
+  std::vector<Eigen::Vector2f> landings;  ///< Pixel coordinates; node k of position i is at [i · nodes + k]. They may
+                                          ///< lie beyond the plate's edges.
+  std::vector<RayEnd> ends;               ///< In the same order; landings are valid where this is `plate`.
+  std::vector<FlowTriangle> triangles;    ///< They cover the aperture once; neighbours follow each other.
+  std::vector<FlowEdge> edges;            ///< All sides of the triangles, once.
+  std::size_t rays = 0;                   ///< Number of rays that were traced.
+  std::uint64_t ray_steps = 0, tensor_samples = 0;
+  bool is_complete = true;  ///< Whether every triangle is as fine as `tolerance` asks.
+};
+
+/// Traces the map from `beam` to the plate of `geometry`. The plate is extended by an eighth of its size on all sides,
+/// so that the map goes on beyond its edges.
+///
+/// Positions form a lattice of squares of 8 pixels, or of a voxel if that is less, but not more than 64 along a side
+/// for that (for an aperture that is no parallelogram, one lattice for each corner). Each is divided into four, and
+/// then again, down to half a pixel or the tolerance, if the landings within its parent were so far from where the
+/// parent's corners predict that an error greater than `tolerance` is likely, or if some of its corners' light lands
+/// and some does not. Where light is spread, so that the square's light covers n pixels along a side, the tolerance is
+/// √n times as large. Squares whose light falls beside the plate stay as they are.
+///
+/// In a range, each position first sends light at 5 of the 33 nodes. Where these are smooth, so
+/// that an error of half the tolerance is unlikely, the others are interpolated (cubic); where not, more nodes are
+/// traced, up to all.
+///
+/// The result is the same for any number of threads. @throw std::invalid_argument if a setting is out of range or
+/// `geometry` has no plate; Cancelled.
+FlowMap trace_flow_map(const TensorField& field, const Geometry& geometry, const Beam& beam,
+                       const BendingSettings& bending, const FlowSettings& settings, const Progress& progress);
+
+}  // namespace tensorray

@@ -1,0 +1,155 @@
+#include "integrators/flow/node_tracer.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <numeric>
+
+namespace tensorray {
+namespace {
+
+constexpr std::size_t range_nodes = 33, first_step = 8;  // 5 nodes come first.
+constexpr float gain_of_first =
+    8;  // The error of the cubic through the first nodes, as a part of that of the parabola.
+constexpr float gain_of_halving = 8;  // Halving the distance of nodes: 16 for smooth landings; less, to be safe.
+
+/// The polynomial through the `count` nodes from `first` on, `step` apart, at node `at`.
+Eigen::Vector2f interpolated(const Eigen::Vector2f* landings, std::size_t first, std::size_t step, int count,
+                             std::size_t at) {
+  const float t = (static_cast<float>(at) - static_cast<float>(first)) / static_cast<float>(step);
+  Eigen::Vector2f sum(0, 0);
+  for (int i = 0; i < count; ++i) {
+    float weight = 1;
+    for (int j = 0; j < count; ++j)
+      if (j != i) weight *= (t - static_cast<float>(j)) / static_cast<float>(i - j);
+    sum += weight * landings[first + static_cast<std::size_t>(i) * step];
+  }
+  return sum;
+}
+
+/// The first of the four nodes, `step` apart, that are nearest to `node`.
+std::size_t first_of_cubic(std::size_t step, std::size_t node) {
+  const std::size_t last = (range_nodes - 1) / step - 3, before = node / step;
+  return std::min(before > 0 ? before - 1 : 0, last) * step;
+}
+
+/// The landings of a position that are traced so far: every `step`-th node.
+struct TracedNodes {
+  Eigen::Vector2f* landings;
+  RayEnd* ends;
+  std::size_t step;
+  Eigen::Array2f plate;  // Width and height, pixels.
+
+  bool landed(std::size_t node) const { return ends[node] == RayEnd::plate; }
+  bool is_on_plate(std::size_t node) const {
+    return landed(node) && (landings[node].array() >= 0).all() && (landings[node].array() <= plate).all();
+  }
+
+  /// Whether light between this node and the next one may fall on the plate.
+  bool matters(std::size_t node) const {
+    const std::size_t next = node + step;
+    return (landed(node) && landed(next)) || is_on_plate(node) || is_on_plate(next);
+  }
+
+  /// The distance of a node from what the nodes of twice the step predict; infinite if one of these did not land.
+  float deviation(std::size_t node) const {
+    const bool first = step == first_step;
+    const int count = first ? 3 : 4;
+    const std::size_t from = first ? 0 : first_of_cubic(2 * step, node);
+    for (int i = 0; i < count; ++i)
+      if (!landed(from + static_cast<std::size_t>(i) * 2 * step)) return std::numeric_limits<float>::infinity();
+    return (landings[node] - interpolated(landings, from, 2 * step, count, node)).norm();
+  }
+
+  /// Whether the nodes between the traced ones can be interpolated to within `tolerance` where this matters.
+  bool is_smooth(double tolerance) const {
+    const float gain = step == first_step ? gain_of_first : gain_of_halving;
+    for (std::size_t node = step; node < range_nodes; node += 2 * step) {
+      const bool matters_here = matters(node - step) || matters(node);
+      if (matters_here && !(landed(node) && deviation(node) / gain <= tolerance)) return false;
+    }
+    return true;
+  }
+
+  /// Sets the nodes between the traced ones.
+  void fill() const {
+    for (std::size_t node = 0; node < range_nodes; ++node) {
+      if (node % step == 0) continue;
+      const std::size_t before = node / step * step, nearest = 2 * (node - before) < step ? before : before + step;
+      ends[node] = ends[nearest];
+      landings[node] = landings[nearest];
+      if (landed(before) && landed(before + step)) landings[node] = between(before, node);
+    }
+  }
+
+ private:
+  /// Cubic if four nodes about `node` landed, else linear.
+  Eigen::Vector2f between(std::size_t before, std::size_t node) const {
+    const std::size_t from = first_of_cubic(step, node);
+    for (std::size_t i = 0; i < 4; ++i)
+      if (!landed(from + i * step)) return interpolated(landings, before, step, 2, node);
+    return interpolated(landings, from, step, 4, node);
+  }
+};
+
+}  // namespace
+
+NodeTracer::NodeTracer(const TensorField& field, const Geometry& geometry, const Plate& plate, const Beam& beam,
+                       const BendingSettings& bending, const FlowSettings& settings)
+    : field_(field),
+      geometry_(geometry),
+      plate_(plate),
+      direction_(beam.direction),
+      bending_(bending),
+      tolerance_(settings.tolerance / 2),
+      flexibilities_(settings.flexibilities) {
+  if (settings.range) {
+    const double first = settings.flexibilities[0], last = settings.flexibilities[1];
+    flexibilities_.assign(1, first);
+    for (std::size_t i = 1; i < range_nodes && first != last; ++i)
+      flexibilities_.push_back(first + (last - first) * static_cast<double>(i) / (range_nodes - 1));
+  }
+  const std::size_t step = settings.range ? first_step : 1;
+  for (std::size_t node = 0; node < nodes(); node += step) check_nodes_.push_back(node);
+}
+
+void NodeTracer::trace(const std::vector<Eigen::Vector3d>& origins, Eigen::Vector2f* landings, RayEnd* ends) {
+  std::vector<std::size_t> which(origins.size());
+  std::iota(which.begin(), which.end(), std::size_t{0});
+  if (nodes() < range_nodes) return trace_nodes(origins, which, 0, 1, landings, ends);
+  trace_nodes(origins, which, 0, first_step, landings, ends);
+  for (std::size_t step = first_step;; step /= 2) {
+    std::vector<std::size_t> rough;
+    if (step == 1) return;
+    for (const std::size_t i : which) {
+      const TracedNodes traced{landings + i * nodes(), ends + i * nodes(), step, plate_.resolution.cast<float>()};
+      if (traced.is_smooth(tolerance_))
+        traced.fill();
+      else
+        rough.push_back(i);
+    }
+    if (rough.empty()) return;
+    which = std::move(rough);
+    trace_nodes(origins, which, step / 2, step, landings, ends);
+  }
+}
+
+void NodeTracer::trace_nodes(const std::vector<Eigen::Vector3d>& origins, const std::vector<std::size_t>& which,
+                             std::size_t first, std::size_t step, Eigen::Vector2f* landings, RayEnd* ends) {
+  RayBatch batch;
+  // Light of one node from neighbouring positions crosses the same cells of the field.
+  for (std::size_t node = first; node < nodes(); node += step)
+    for (const std::size_t i : which) batch.add(origins[i], direction_, flexibilities_[node]);
+  tensorray::trace(field_, geometry_, bending_, batch);
+  std::size_t ray = 0;
+  for (std::size_t node = first; node < nodes(); node += step)
+    for (const std::size_t i : which) {
+      landings[i * nodes() + node] = plate_.to_pixel(batch.position[ray]).cast<float>();
+      ends[i * nodes() + node] = batch.end[ray++];
+    }
+  rays_ += batch.size();
+  tensor_samples_ += batch.tensor_samples;
+  ray_steps_ += std::accumulate(batch.steps.begin(), batch.steps.end(), std::uint64_t{0});
+}
+
+}  // namespace tensorray

@@ -1,0 +1,50 @@
+#pragma once
+/// @file integrators/flow/node_tracer.h
+/// Landings of one position's light at all nodes of a range of flexibilities. A part of flow_map.cpp.
+
+#include <atomic>
+#include <cstdint>
+#include <vector>
+
+#include <Eigen/Core>
+
+#include "integrators/flow/flow_map.h"
+
+namespace tensorray {
+
+/// Traces as few nodes as the smoothness of the landings allows, and interpolates the others. Any number of threads may
+/// use it at once.
+class NodeTracer {
+ public:
+  /// @param geometry  With a plate in the plane of `plate`, maybe larger; `plate` defines pixels.
+  NodeTracer(const TensorField& field, const Geometry& geometry, const Plate& plate, const Beam& beam,
+             const BendingSettings& bending, const FlowSettings& settings);
+
+  std::size_t nodes() const { return flexibilities_.size(); }
+
+  /// The nodes that are traced for every position.
+  const std::vector<std::size_t>& check_nodes() const { return check_nodes_; }
+
+  /// Writes origins.size() · nodes() landings (pixel coordinates) and ends.
+  void trace(const std::vector<Eigen::Vector3d>& origins, Eigen::Vector2f* landings, RayEnd* ends);
+
+  std::uint64_t rays() const { return rays_; }
+  std::uint64_t ray_steps() const { return ray_steps_; }
+  std::uint64_t tensor_samples() const { return tensor_samples_; }
+
+ private:
+  void trace_nodes(const std::vector<Eigen::Vector3d>& origins, const std::vector<std::size_t>& which,
+                   std::size_t first, std::size_t step, Eigen::Vector2f* landings, RayEnd* ends);
+
+  const TensorField& field_;
+  const Geometry& geometry_;
+  const Plate plate_;
+  const Eigen::Vector3d direction_;
+  const BendingSettings& bending_;
+  double tolerance_;
+  std::vector<double> flexibilities_;  // One for each node.
+  std::vector<std::size_t> check_nodes_;
+  std::atomic<std::uint64_t> rays_{0}, ray_steps_{0}, tensor_samples_{0};
+};
+
+}  // namespace tensorray

@@ -1,0 +1,216 @@
+#include "scenes/photons/plate_light.h"
+
+#include <chrono>
+#include <cmath>
+
+#include <fmt/format.h>
+
+#include "integrators/flow/caustic.h"
+#include "integrators/photons/photon_distribution.h"
+#include "renderer/film/spectral_image.h"
+#include "scenes/photons/photon_distribution_method.h"
+
+namespace tensorray {
+namespace {
+
+constexpr int most_refined_bands = 2048;
+constexpr double least_tolerance = 1e-3;  // Pixels; landings are single precision.
+
+using Clock = std::chrono::steady_clock;
+
+double seconds_since(Clock::time_point start) { return std::chrono::duration<double>(Clock::now() - start).count(); }
+
+/// The picture of a film whose planes are red, green and blue.
+Image color_image(const Film& color) {
+  std::vector<Band> primaries(3);
+  for (int c = 0; c < 3; ++c) primaries[static_cast<std::size_t>(c)].xyz = Eigen::Vector3d::Unit(c);
+  return linear_image(color, primaries, Eigen::Matrix3d::Identity());
+}
+
+FlowMap trace_map(const Scene& scene, double tolerance, const Progress& progress) {
+  const BendingDescription& bending = scene.description.bending;
+  const LightDescription& light = scene.description.light;
+  FlowSettings settings;
+  settings.most_starts = static_cast<std::size_t>(light.photons);
+  settings.tolerance = tolerance;
+  if (bending.rgb) {
+    settings.flexibilities = {bending.rgb->x(), bending.rgb->y(), bending.rgb->z()};
+  } else {
+    settings.flexibilities = {bending.flexibility.at(light.wavelength_min),
+                              bending.flexibility.at(light.wavelength_max)};
+    settings.range = true;
+  }
+  return trace_flow_map(scene.field, scene.geometry, scene.beam, scene.bending, settings, progress);
+}
+
+/// How far light may move from band to band, and the greatest number of bands.
+struct BandStep {
+  double pixels = 1;
+  int most = 128;
+};
+
+/// The bands that are drawn: each band of the scene is divided, so that light moves little from one to the next.
+std::vector<CausticBand> bands_of(const Scene& scene, const FlowMap& map, const BandStep& step) {
+  const Eigen::Matrix3d xyz_to_working = to_working(scene);
+  std::vector<CausticBand> bands;
+  if (scene.description.bending.rgb) {
+    for (std::size_t k = 0; k < scene.bands.size(); ++k)
+      bands.push_back({static_cast<double>(k), k, 1, xyz_to_working * scene.bands[k].xyz});
+    return bands;
+  }
+  const LightDescription& light = scene.description.light;
+  const int count = caustic_bands(map, light.wavelength_count, step.pixels, step.most);
+  const std::vector<Band> fine = make_bands(scene.spectrum, light.wavelength_min, light.wavelength_max, count);
+  const std::size_t parts = fine.size() / scene.bands.size();
+  for (std::size_t i = 0; i < fine.size(); ++i) {
+    const std::size_t channel = i / parts;
+    const double power = scene.bands[channel].power;
+    const double node = (static_cast<double>(i) + 0.5) / count * static_cast<double>(map.nodes - 1);
+    bands.push_back({node, channel, power > 0 ? fine[i].power / power : 0, xyz_to_working * fine[i].xyz});
+  }
+  return bands;
+}
+
+/// Power by channel and end, for a beam of irradiance 1.
+std::vector<std::array<double, ray_end_count>> beam_power(const Scene& scene, const Caustic& caustic) {
+  std::vector<std::array<double, ray_end_count>> power = caustic.power;
+  for (std::size_t channel = 0; channel < power.size(); ++channel)
+    for (double& each : power[channel]) each *= scene.channels[channel].power * area(scene.beam.aperture);
+  return power;
+}
+
+struct DrawnLight {
+  PlateLight light;
+  bool is_complete = true;  // Whether the map is as fine as the tolerance asks.
+};
+
+DrawnLight draw_map(const Scene& scene, double tolerance, const BandStep& step, const Progress& progress) {
+  Clock::time_point start = Clock::now();
+  const FlowMap map = trace_map(scene, tolerance, progress);
+  PlateLight light;
+  light.statistics.seconds_tracing = seconds_since(start);
+  start = Clock::now();
+  Caustic caustic = draw_caustic(map, *scene.geometry.surfaces().plate, bands_of(scene, map, step), scene.bands.size(),
+                                 scene.description.output.wants("spectral"), progress);
+  light.linear = color_image(caustic.color);
+  light.irradiance = std::move(caustic.irradiance);
+  light.statistics.seconds_density = seconds_since(start);
+  light.statistics.positions = map.starts.size();
+  light.statistics.ends = caustic.ends;
+  light.statistics.power = beam_power(scene, caustic);
+  light.statistics.ray_steps = map.ray_steps;
+  light.statistics.tensor_samples = map.tensor_samples;
+  return {std::move(light), map.is_complete};
+}
+
+/// The distance of two pictures as a part of the first one's norm (root of the sum of squares).
+double relative_distance(const Image& image, const Image& other) {
+  double squares = 0, all = 0;
+  for (std::size_t i = 0; i < image.pixels.size(); ++i) {
+    const double value = image.pixels[i], difference = value - other.pixels[i];
+    squares += difference * difference;
+    all += value * value;
+  }
+  return all > 0 ? std::sqrt(squares / all) : 0;
+}
+
+void add_cost(const Statistics& more, Statistics& statistics) {
+  statistics.seconds_tracing += more.seconds_tracing;
+  statistics.seconds_density += more.seconds_density;
+  statistics.ray_steps += more.ray_steps;
+  statistics.tensor_samples += more.tensor_samples;
+}
+
+/// Halves the tolerance and the steps between bands until the picture changes by less than `bound`. The error falls at
+/// least as the tolerance does, so that what is left is less than the last change.
+PlateLight refine(const Scene& scene, double bound, const Progress& progress) {
+  std::string label;
+  Progress labelled;  // Shows the error behind the phase.
+  labelled.report = [&](const std::string& phase, std::uint64_t done, std::uint64_t total) {
+    progress.update(phase + label, done, total);
+    labelled.cancelled = progress.cancelled.load();
+  };
+  double tolerance = 1;
+  DrawnLight drawn = draw_map(scene, tolerance, {4 * tolerance, most_refined_bands}, labelled);
+  for (;;) {
+    tolerance /= 2;
+    DrawnLight finer = draw_map(scene, tolerance, {4 * tolerance, most_refined_bands}, labelled);
+    const double error = relative_distance(finer.light.linear, drawn.light.linear);
+    finer.light.statistics.error = error;
+    add_cost(drawn.light.statistics, finer.light.statistics);
+    drawn = std::move(finer);
+    label = fmt::format(" (error {:.2g}%)", 100 * error);
+    if (error <= bound) return std::move(drawn.light);
+    if (!drawn.is_complete || tolerance < least_tolerance) {
+      drawn.light.warnings.push_back(
+          fmt::format("the picture's error is {:.2g}%, not {:.2g}%: {}", 100 * error, 100 * bound,
+                      drawn.is_complete ? "positions are single precision" : "raise `light.photons`"));
+      return std::move(drawn.light);
+    }
+  }
+}
+
+PlateLight draw_light(const Scene& scene, const Progress& progress) {
+  const PhotonDensity& density = scene.description.integrator.settings<PhotonDescription>().density;
+  return density.error ? refine(scene, *density.error, progress)
+                       : draw_map(scene, density.tolerance, {}, progress).light;
+}
+
+/// Whether photons are collected as red, green and blue. Up to three bands need no more planes, and cost less.
+bool is_collected_in_color(const Scene& scene) {
+  return !scene.description.output.wants("spectral") && scene.bands.size() > 3;
+}
+
+PhotonSettings photon_settings(const Scene& scene) {
+  const SceneDescription& description = scene.description;
+  PhotonSettings settings;
+  settings.photons = description.light.photons;
+  settings.pattern = description.light.pattern;
+  settings.channels_per_photon = description.bending.rgb ? 0 : description.light.wavelengths_per_photon;
+  settings.seed = description.seed;
+  settings.density = estimator_of(description.integrator.settings<PhotonDescription>().density);
+  settings.keep_photons = description.output.wants("photons");
+  if (description.output.wants("fluence"))
+    settings.fluence = description.output.fluence_bands ? FluenceKind::bands : FluenceKind::all_light;
+  if (is_collected_in_color(scene))
+    for (const Band& band : scene.bands) settings.colors.push_back(to_working(scene) * band.xyz);
+  return settings;
+}
+
+PlateLight trace_photons(const Scene& scene, const Progress& progress) {
+  PhotonDistribution traced = distribute_photons(scene.field, scene.geometry, scene.beam, scene.channels, scene.bending,
+                                                 photon_settings(scene), progress);
+  PlateLight light;
+  light.linear = is_collected_in_color(scene) ? color_image(traced.irradiance)
+                                              : linear_image(traced.irradiance, scene.bands, to_working(scene));
+  light.irradiance = std::move(traced.irradiance);
+  light.photons = std::move(traced.photons);
+  light.fluence = std::move(traced.fluence);
+  Statistics& statistics = light.statistics;
+  statistics.positions = traced.positions;
+  statistics.ends = std::move(traced.ends);
+  for (const LightChannel& channel : scene.channels)
+    statistics.channel_power.push_back(channel.power * traced.ray_area);
+  statistics.ray_steps = traced.ray_steps;
+  statistics.tensor_samples = traced.tensor_samples;
+  statistics.seconds_tracing = traced.seconds_tracing;
+  statistics.seconds_density = traced.seconds_density;
+  return light;
+}
+
+}  // namespace
+
+PlateLight light_on_plate(const Scene& scene, const Progress& progress) {
+  if (scene.description.integrator.settings<PhotonDescription>().density.kind != PhotonDensityKind::mesh)
+    return trace_photons(scene, progress);
+  PlateLight light = draw_light(scene, progress);
+  const OutputDescription& output = scene.description.output;
+  if (!output.wants("photons") && !output.wants("fluence")) return light;
+  PlateLight photons = trace_photons(scene, progress);
+  light.photons = std::move(photons.photons);
+  light.fluence = std::move(photons.fluence);
+  add_cost(photons.statistics, light.statistics);
+  return light;
+}
+
+}  // namespace tensorray

@@ -1,0 +1,104 @@
+// The density "mesh" of the method photon_distribution, in the whole program.
+
+#include <cmath>
+
+#include "renderer/images/image.h"
+#include "tests/program/support.h"
+
+namespace tensorray {
+namespace {
+
+using namespace test;
+using nlohmann::json;
+
+class MeshLight : public Program {
+ protected:
+  void SetUp() override {
+    Program::SetUp();
+    write("scene.json", R"({
+      "field": { "generate": { "kind": "point_load", "resolution": 33 }, "eigenvalues": "absolute", "scale": 6 },
+      "light": { "direction": [0, 0, -1], "wavelengths": { "count": 8 } },
+      "receiver": { "distance": 0.5, "size": [2.6, 2.6], "resolution": [96, 96] },
+      "integrator": { "type": "photon_distribution" }
+    })");
+  }
+
+  Image picture(const std::vector<std::string>& more) {
+    std::vector<std::string> arguments{"render", "scene.json", "-o", "out.exr", "--stats", "stats.json", "-q"};
+    arguments.insert(arguments.end(), more.begin(), more.end());
+    run_well(arguments);
+    return read_image(in_folder("out.exr"));
+  }
+};
+
+double relative_distance(const Image& image, const Image& exact) {
+  double squares = 0, all = 0;
+  for (std::size_t i = 0; i < exact.pixels.size(); ++i) {
+    squares += std::pow(image.pixels[i] - exact.pixels[i], 2);
+    all += std::pow(exact.pixels[i], 2);
+  }
+  return std::sqrt(squares / all);
+}
+
+TEST_F(MeshLight, AllPowerIsAccountedFor) {
+  picture({});
+  const json power = read_json("stats.json")["power"];
+  double stopped = 0;
+  for (const auto& each : power["stopped"]) stopped += each.get<double>();
+  EXPECT_NEAR(power["emitted"].get<double>(), 4, 1e-6);  // The volume's silhouette is a square of edge 2.
+  EXPECT_NEAR(power["deposited"].get<double>() + power["missed"].get<double>() + stopped, 4, 1e-6);
+  EXPECT_GT(power["deposited"].get<double>(), 3);
+}
+
+TEST_F(MeshLight, TheErrorIsBelowTheOneAskedFor) {
+  const Image exact = picture({"--set", "integrator.density.error=0.004"});
+  for (const auto& [text, bound] : {std::pair("10%", 0.1), std::pair("0.03", 0.03)}) {
+    const double error = relative_distance(picture({"--until-error", text}), exact);
+    const double estimate = read_json("stats.json")["error"].get<double>();
+    EXPECT_LE(estimate, bound);
+    EXPECT_LT(error, estimate);
+    EXPECT_GT(error, estimate / 20);
+  }
+}
+
+TEST_F(MeshLight, ErrorsThatCannotBeReachedAreTold) {
+  const Outcome outcome =
+      run_well({"render", "scene.json", "-o", "out.exr", "--until-error", "0.1%", "--set", "light.photons=2000"});
+  EXPECT_NE(outcome.error.find("raise `light.photons`"), std::string::npos) << outcome.error;
+}
+
+TEST_F(MeshLight, TheNumberOfBandsHardlyChangesThePicture) {
+  const Image many = picture({"--set", "light.wavelengths.count=64"});
+  EXPECT_LT(relative_distance(picture({}), many), 0.02);
+  EXPECT_LT(relative_distance(picture({"--set", "light.wavelengths.count=2"}), many), 0.02);
+}
+
+TEST_F(MeshLight, OtherOutputsDoNotChangeThePicture) {
+  const Image alone = picture({});
+  const Image beside = picture({"-o", "out.spectral.exr", "-o", "photons.vdb", "-o", "light.fluence.vdb", "--set",
+                                "light.wavelengths.per_photon=1"});
+  EXPECT_EQ(alone.pixels, beside.pixels);
+  const Image spectral = read_image(in_folder("out.spectral.exr"));
+  EXPECT_EQ(spectral.channels.size(), 3 + 8u);
+  EXPECT_GT(std::filesystem::file_size(in_folder("photons.vdb")), 1000u);
+  EXPECT_GT(std::filesystem::file_size(in_folder("light.fluence.vdb")), 1000u);
+}
+
+TEST_F(MeshLight, ColoursOfRgbModeAreDrawnOnTheirOwn) {
+  const Image image = picture({"--set", "bending.rgb=[0.1,0.2,0.3]"});
+  for (const float value : image.pixels) ASSERT_TRUE(std::isfinite(value));
+  EXPECT_EQ(read_json("stats.json")["channels"].size(), 3u);
+}
+
+TEST_F(MeshLight, WrongSettingsAreRefused) {
+  for (const char* text : {"-1%", "0", "much", "%"}) {
+    const Outcome outcome = run({"render", "scene.json", "-o", "out.exr", "--until-error", text});
+    EXPECT_EQ(outcome.status, 2) << text;
+    EXPECT_NE(outcome.error.find("--until-error"), std::string::npos) << outcome.error;
+  }
+  const Outcome outcome = run_well({"render", "scene.json", "-o", "out.exr", "--set", "integrator.density.tau=3"});
+  EXPECT_NE(outcome.error.find("`/integrator/density/tau` has no effect"), std::string::npos) << outcome.error;
+}
+
+}  // namespace
+}  // namespace tensorray

@@ -1,0 +1,154 @@
+#include "renderer/film/area_deposit.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <random>
+
+#include <gtest/gtest.h>
+
+namespace tensorray {
+namespace {
+
+using Eigen::Vector2d;
+using Corners = std::array<Vector2d, 3>;
+
+constexpr int width = 13, height = 9;
+
+std::vector<double> pixels_of(const AreaDeposit& deposit) {
+  std::vector<double> pixels(width * height);
+  for (int y = 0; y < height; ++y) deposit.read_row(y, &pixels[static_cast<std::size_t>(y) * width]);
+  return pixels;
+}
+
+double sum(const std::vector<double>& values) {
+  double sum = 0;
+  for (const double value : values) sum += value;
+  return sum;
+}
+
+double area(const std::vector<Vector2d>& polygon) {
+  double twice = 0;
+  for (std::size_t i = 0; i < polygon.size(); ++i) {
+    const Vector2d &a = polygon[i], &b = polygon[(i + 1) % polygon.size()];
+    twice += a.x() * b.y() - a.y() * b.x();
+  }
+  return std::abs(twice) / 2;
+}
+
+/// The part of a convex polygon where `sign` · coordinate >= `sign` · limit.
+std::vector<Vector2d> clipped(const std::vector<Vector2d>& polygon, int axis, double sign, double limit) {
+  std::vector<Vector2d> part;
+  for (std::size_t i = 0; i < polygon.size(); ++i) {
+    const Vector2d &a = polygon[i], &b = polygon[(i + 1) % polygon.size()];
+    const double from = sign * (a[axis] - limit), to = sign * (b[axis] - limit);
+    if (from >= 0) part.push_back(a);
+    if ((from < 0) != (to < 0)) part.push_back(a + from / (from - to) * (b - a));
+  }
+  return part;
+}
+
+double area_in_pixel(const Corners& corners, int x, int y) {
+  std::vector<Vector2d> part(corners.begin(), corners.end());
+  part = clipped(part, 0, 1, x);
+  part = clipped(part, 0, -1, x + 1);
+  part = clipped(part, 1, 1, y);
+  return area(clipped(part, 1, -1, y + 1));
+}
+
+Corners random_triangle(std::mt19937& engine, double size) {
+  std::uniform_real_distribution<double> at(-4, 17), offset(-size, size);
+  const Vector2d middle(at(engine), at(engine) - 3);
+  Corners corners;
+  for (Vector2d& corner : corners) corner = middle + Vector2d(offset(engine), offset(engine));
+  return corners;
+}
+
+TEST(AreaDeposit, EachPixelGetsTheAreaThatItShares) {
+  std::mt19937 engine(1);
+  for (const double size : {0.2, 1.0, 4.0, 30.0})
+    for (int i = 0; i < 300; ++i) {
+      const Corners t = random_triangle(engine, size);
+      const double all = area({t.begin(), t.end()});
+      if (all < 1e-3) continue;
+      AreaDeposit deposit(width, height);
+      deposit.add_triangle(t[0], t[1], t[2], 0.5);
+      const std::vector<double> pixels = pixels_of(deposit);
+      for (int y = 0; y < height; ++y)
+        for (int x = 0; x < width; ++x)
+          ASSERT_NEAR(pixels[static_cast<std::size_t>(y) * width + x], 0.5 * area_in_pixel(t, x, y) / all, 1e-11)
+              << "size " << size << ", triangle " << i << ", pixel " << x << " " << y;
+    }
+}
+
+TEST(AreaDeposit, NeighboursMayShareTheirEdge) {
+  std::mt19937 engine(2);
+  for (int i = 0; i < 200; ++i) {
+    const Corners t = random_triangle(engine, 3);
+    const Vector2d d = random_triangle(engine, 3)[0];
+    AreaDeposit apart(width, height), joined(width, height);
+    apart.add_triangle(t[0], t[1], t[2], 0.3);
+    apart.add_triangle(t[0], t[2], d, 0.2);
+    const double first = joined.triangle(t[0], t[1], t[2], 0.3), second = joined.triangle(t[0], t[2], d, 0.2);
+    joined.add_edge(t[0], t[1], first);
+    joined.add_edge(t[1], t[2], first);
+    joined.add_edge(t[2], t[0], first - second);
+    joined.add_edge(t[2], d, second);
+    joined.add_edge(d, t[0], second);
+    const std::vector<double> a = pixels_of(apart), b = pixels_of(joined);
+    for (std::size_t k = 0; k < a.size(); ++k) ASSERT_NEAR(a[k], b[k], 1e-10) << i;
+  }
+}
+
+TEST(AreaDeposit, NoPowerIsLostWhereTrianglesHaveNoArea) {
+  std::mt19937 engine(3);
+  std::uniform_real_distribution<double> x(0, width), y(0, height), part(0, 1);
+  for (const double thickness : {0.0, 1e-12, 1e-9, 1e-7, 1e-5, 1e-3})
+    for (int i = 0; i < 300; ++i) {
+      const Vector2d a(x(engine), y(engine)), b(x(engine), y(engine));
+      const Vector2d across = Vector2d(b.y() - a.y(), a.x() - b.x()).normalized();
+      Vector2d c = a + part(engine) * (b - a) + thickness * across;
+      c = c.cwiseMax(0).cwiseMin(Vector2d(width, height));
+      AreaDeposit deposit(width, height);
+      deposit.add_triangle(a, b, c, 1);
+      const std::vector<double> pixels = pixels_of(deposit);
+      ASSERT_NEAR(sum(pixels), 1, 1e-6) << thickness;
+      ASSERT_GT(*std::min_element(pixels.begin(), pixels.end()), -1e-6) << thickness;
+    }
+  AreaDeposit deposit(width, height);
+  deposit.add_triangle({2.5, 3.5}, {2.5, 3.5}, {2.5, 3.5}, 1);
+  EXPECT_EQ(pixels_of(deposit)[3 * width + 2], 1);
+}
+
+/// The density along a triangle's longest side is that of the triangle, seen from the side.
+TEST(AreaDeposit, LinesAreWhatThinTrianglesTendTo) {
+  AreaDeposit line(width, height), thin(width, height);
+  const Vector2d a(0.25, 4.5), b(12.5, 4.5), c(4, 4.5);
+  line.add_triangle(a, b, c, 1);
+  thin.add_triangle(a, b, c + Vector2d(0, 1e-3), 1);
+  const std::vector<double> expected = pixels_of(thin), pixels = pixels_of(line);
+  for (std::size_t i = 0; i < pixels.size(); ++i) EXPECT_NEAR(pixels[i], expected[i], 0.02);
+}
+
+TEST(AreaDeposit, TheOrderDoesNotMatter) {
+  std::mt19937 engine(4);
+  std::vector<Corners> triangles;
+  for (int i = 0; i < 500; ++i) triangles.push_back(random_triangle(engine, 2));
+  std::vector<std::vector<double>> results;
+  for (int order = 0; order < 3; ++order) {
+    AreaDeposit deposit(width, height);
+    for (const Corners& t : triangles) deposit.add_triangle(t[0], t[1], t[2], 1e-3);
+    results.push_back(pixels_of(deposit));
+    std::shuffle(triangles.begin(), triangles.end(), engine);
+  }
+  EXPECT_EQ(results[0], results[1]);
+  EXPECT_EQ(results[0], results[2]);
+}
+
+TEST(AreaDeposit, BadSizesAreRefused) {
+  EXPECT_THROW(AreaDeposit(0, 5), std::invalid_argument);
+  EXPECT_THROW(AreaDeposit(5, -1), std::invalid_argument);
+}
+
+}  // namespace
+}  // namespace tensorray

@@ -1,0 +1,129 @@
+#include <cmath>
+#include <fstream>
+#include <limits>
+
+#include <fmt/format.h>
+
+#include "renderer/images/image.h"
+#include "tools/benchmark/child.h"
+#include "tools/benchmark/machine.h"
+#include "tools/benchmark/parts.h"
+#include "tools/benchmark/temporary_folder.h"
+
+namespace tensorray::benchmark {
+namespace {
+
+struct CausticScene {
+  const char* name;
+  Json field, direction;
+};
+
+std::vector<CausticScene> scenes(bool quick) {
+  const Json point_load = {{"generate", {{"kind", "point_load"}, {"resolution", quick ? 17 : 65}}},
+                           {"eigenvalues", "absolute"}};
+  if (quick) return {{"point load", point_load, {0, 0, -1}}};
+  return {{"point load", point_load, {0, 0, -1}},
+          {"two point loads", {{"generate", {{"kind", "two_point_load"}, {"resolution", 65}}}}, {0, 0, -1}},
+          {"vortex", {{"generate", {{"kind", "vortex"}}}}, {0, 0, -1}},
+          {"helix", {{"generate", {{"kind", "helix"}}}}, {0, 0, -1}}};
+}
+
+/// One way to compute the light on the plate.
+struct Estimate {
+  std::string name;
+  Json density;
+  std::uint64_t photons = 1u << 20;
+};
+
+std::vector<Estimate> estimates(bool quick) {
+  std::vector<Estimate> result{{"mesh", {{"kind", "mesh"}}},
+                               {"mesh, error 3%", {{"kind", "mesh"}, {"error", 0.03}}, 1u << 22}};
+  if (!quick) result.push_back({"mesh, error 1%", {{"kind", "mesh"}, {"error", 0.01}}, 1u << 22});
+  const std::vector<std::uint64_t> counts =
+      quick ? std::vector<std::uint64_t>{1024} : std::vector<std::uint64_t>{16384, 65536, 262144, 1048576};
+  for (const std::uint64_t photons : counts)
+    for (const double tau : {3.0, 1.0, 0.0}) {
+      Json density = {{"kind", "gaussian"}, {"tau", tau}};
+      if (tau == 0) density = {{"kind", "histogram"}};
+      result.push_back({tau == 0 ? "histogram" : fmt::format("gaussian, τ = {}", tau), density, photons});
+    }
+  return result;
+}
+
+struct Picture {
+  Image image;
+  Json statistics;
+};
+
+Picture render(const TemporaryFolder& folder, const CausticScene& scene, const Estimate& estimate, int side) {
+  const auto path = folder / "scene.json", picture = folder / "picture.exr", statistics = folder / "statistics.json";
+  std::ofstream(path) << Json{{"field", scene.field},
+                              {"light", {{"direction", scene.direction}, {"photons", estimate.photons}}},
+                              {"receiver", {{"resolution", {side, side}}}},
+                              {"integrator", {{"type", "photon_distribution"}, {"density", estimate.density}}}};
+  run_program(sibling("tensorray"), {"render", path.string(), "-o", picture.string(), "-o",
+                                     (folder / "picture.png").string(), "--stats", statistics.string(), "--quiet"});
+  std::ifstream file(statistics);
+  return {read_image(picture), Json::parse(file)};
+}
+
+/// The distance from `exact`, as a part of its norm.
+double error_of(const Image& image, const Image& exact) {
+  double squares = 0, all = 0;
+  for (std::size_t i = 0; i < exact.pixels.size(); ++i) {
+    squares += std::pow(image.pixels[i] - exact.pixels[i], 2);
+    all += std::pow(exact.pixels[i], 2);
+  }
+  return std::sqrt(squares / all);
+}
+
+Json row_of(const Estimate& estimate, const Picture& picture, const Image& exact) {
+  const Json& seconds = picture.statistics.at("seconds");
+  Json row = {{"name", estimate.name},
+              {"positions", picture.statistics.at("positions")},
+              {"seconds", seconds.at("total")},
+              {"seconds_of_light", seconds.at("trace").get<double>() + seconds.at("density").get<double>()},
+              {"error", error_of(picture.image, exact)}};
+  if (picture.statistics.contains("error")) row["estimate"] = picture.statistics.at("error");
+  return row;
+}
+
+/// How many times longer the best of the photon estimators takes than the first row, for the error of the first row. An
+/// estimator that does not reach this error gets more photons, if its error still falls: its noise falls with their
+/// square root. 0: none reaches it.
+double slowdown_of_photons(const Json& rows) {
+  const double error = rows[0].at("error"), seconds = rows[0].at("seconds_of_light");
+  double best = std::numeric_limits<double>::infinity();
+  for (const Json& row : rows) {
+    const std::string name = row.at("name");
+    if (name.rfind("mesh", 0) == 0) continue;
+    const double factor = std::pow(row.at("error").get<double>() / error, 2);
+    if (factor <= 1 || name == "histogram")
+      best = std::min(best, std::max(factor, 1.0) * row.at("seconds_of_light").get<double>());
+  }
+  return std::isfinite(best) ? best / seconds : 0;
+}
+
+}  // namespace
+
+Json measure_caustics(const Options& options) {
+  const TemporaryFolder folder;
+  const int side = options.quick ? 32 : 512;
+  Json results = Json::array();
+  for (const CausticScene& scene : scenes(options.quick)) {
+    options.announce(fmt::format("caustics: {}, reference", scene.name));
+    const Json exact_density = {{"kind", "mesh"}, {"error", 0.004}};
+    const Image exact = render(folder, scene, {"reference", exact_density, 1u << 23}, side).image;
+    Json rows = Json::array();
+    for (const Estimate& estimate : estimates(options.quick)) {
+      options.announce(fmt::format("caustics: {}, {}", scene.name, estimate.name));
+      rows.push_back(row_of(estimate, render(folder, scene, estimate, side), exact));
+    }
+    const double slowdown = slowdown_of_photons(rows);
+    results.push_back({{"scene", scene.name}, {"side", side}, {"rows", std::move(rows)}});
+    if (slowdown > 0) results.back()["photons_over_mesh"] = slowdown;
+  }
+  return results;
+}
+
+}  // namespace tensorray::benchmark
