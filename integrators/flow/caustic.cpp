@@ -136,7 +136,7 @@ std::vector<double> add_to_films(const std::vector<Drawing>& drawings, const Cau
 
 }  // namespace
 
-int caustic_bands(const FlowMap& map, int channels, double step, int most) {
+int caustic_bands(const FlowMap& map, int channels, const BandStep& step) {
   std::vector<float> sweeps;
   for (std::size_t i = 0; i < map.starts.size(); ++i) {
     float sweep = 0;
@@ -149,8 +149,9 @@ int caustic_bands(const FlowMap& map, int channels, double step, int most) {
   }
   const auto place = static_cast<std::ptrdiff_t>(swept_share * static_cast<double>(sweeps.size() - 1));
   std::nth_element(sweeps.begin(), sweeps.begin() + place, sweeps.end());
-  const double wanted = std::ceil(sweeps[static_cast<std::size_t>(place)] / step / channels);
-  return channels * static_cast<int>(std::clamp(wanted, 1.0, std::max(1.0, std::floor(double(most) / channels))));
+  const double wanted = std::max<double>(step.least, sweeps[static_cast<std::size_t>(place)] / step.pixels);
+  const double most = std::max(1.0, std::floor(static_cast<double>(step.most) / channels));
+  return channels * static_cast<int>(std::clamp(std::ceil(wanted / channels), 1.0, most));
 }
 
 Caustic draw_caustic(const FlowMap& map, const Plate& plate, const std::vector<CausticBand>& bands,

@@ -18,6 +18,7 @@ constexpr double margin = 1.0 / 8;         // Extension of the plate on each sid
 constexpr double coarsest_pixels = 8;      // Size of the first squares, in pixels of straight light; also not more
 constexpr double coarsest_voxels = 1;      // than this, so that no part of the field is missed, ...
 constexpr double field_squares = 64;       // ... but for that at least this part of the beam's extent;
+constexpr double usual_tolerance = 0.5;    // Pixels; the sizes of first squares are for this tolerance.
 constexpr double finest_pixels = 1.0 / 2;  // and of the smallest squares, unless the tolerance is less.
 constexpr double torn_part = 0.35;         // Beyond this part of a square's size, an error is a tear ...
 constexpr double torn_pixels = 1;          // ... if it is also greater than this.
@@ -104,11 +105,14 @@ class FlowMapBuilder {
     const double pixel = pixel_across(plate_, beam);
     Eigen::Vector2d low = beam.aperture[0], high = low;
     for (const Eigen::Vector2d& corner : beam.aperture) low = low.cwiseMin(corner), high = high.cwiseMax(corner);
+    // So that a finer tolerance always makes a finer map: landings between positions are of second order.
+    const double fineness = std::sqrt(settings.tolerance / usual_tolerance);
     const double voxel = field.to_world().linear().colwise().norm().minCoeff();
     const double for_field = std::max(coarsest_voxels * voxel, (high - low).maxCoeff() / field_squares);
     // A small budget means large squares: a quarter of it is for the first ones and their first division.
     const double area = (high - low).prod(), budget = static_cast<double>(settings.most_starts);
-    const double size = std::max(std::min(coarsest_pixels * pixel, for_field), std::sqrt(16 * area / budget));
+    const double size =
+        std::max(fineness * std::min(coarsest_pixels * pixel, for_field), std::sqrt(16 * area / budget));
     patches_ = patches_of(beam.aperture, size);
     const double finest = std::min(finest_pixels, settings.tolerance) * pixel;
     while (levels_ < most_levels && std::ldexp(size, -levels_) > finest) ++levels_;

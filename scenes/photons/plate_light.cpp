@@ -43,12 +43,6 @@ FlowMap trace_map(const Scene& scene, double tolerance, const Progress& progress
   return trace_flow_map(scene.field, scene.geometry, scene.beam, scene.bending, settings, progress);
 }
 
-/// How far light may move from band to band, and the greatest number of bands.
-struct BandStep {
-  double pixels = 1;
-  int most = 128;
-};
-
 /// The bands that are drawn: each band of the scene is divided, so that light moves little from one to the next.
 std::vector<CausticBand> bands_of(const Scene& scene, const FlowMap& map, const BandStep& step) {
   const Eigen::Matrix3d xyz_to_working = to_working(scene);
@@ -59,7 +53,7 @@ std::vector<CausticBand> bands_of(const Scene& scene, const FlowMap& map, const 
     return bands;
   }
   const LightDescription& light = scene.description.light;
-  const int count = caustic_bands(map, light.wavelength_count, step.pixels, step.most);
+  const int count = caustic_bands(map, light.wavelength_count, step);
   const std::vector<Band> fine = make_bands(scene.spectrum, light.wavelength_min, light.wavelength_max, count);
   const std::size_t parts = fine.size() / scene.bands.size();
   for (std::size_t i = 0; i < fine.size(); ++i) {
@@ -121,6 +115,11 @@ void add_cost(const Statistics& more, Statistics& statistics) {
   statistics.tensor_samples += more.tensor_samples;
 }
 
+/// Half the tolerance always has twice the bands.
+BandStep refined_step(double tolerance) {
+  return {4 * tolerance, static_cast<int>(std::ceil(16 / tolerance)), most_refined_bands};
+}
+
 /// Halves the tolerance and the steps between bands until the picture changes by less than `bound`. The error falls at
 /// least as the tolerance does, so that what is left is less than the last change.
 PlateLight refine(const Scene& scene, double bound, const Progress& progress) {
@@ -131,10 +130,10 @@ PlateLight refine(const Scene& scene, double bound, const Progress& progress) {
     labelled.cancelled = progress.cancelled.load();
   };
   double tolerance = 1;
-  DrawnLight drawn = draw_map(scene, tolerance, {4 * tolerance, most_refined_bands}, labelled);
+  DrawnLight drawn = draw_map(scene, tolerance, refined_step(tolerance), labelled);
   for (;;) {
     tolerance /= 2;
-    DrawnLight finer = draw_map(scene, tolerance, {4 * tolerance, most_refined_bands}, labelled);
+    DrawnLight finer = draw_map(scene, tolerance, refined_step(tolerance), labelled);
     const double error = relative_distance(finer.light.linear, drawn.light.linear);
     finer.light.statistics.error = error;
     add_cost(drawn.light.statistics, finer.light.statistics);
