@@ -23,7 +23,7 @@ std::vector<CausticScene> scenes(bool quick) {
                            {"eigenvalues", "absolute"}};
   if (quick) return {{"point load", point_load, {0, 0, -1}}};
   return {{"point load", point_load, {0, 0, -1}},
-          {"vortex", {{"generate", {{"kind", "vortex"}}}}, {0, 0, -1}},
+          {"vortex", {{"generate", {{"kind", "vortex"}}}}, {0, 1, 0}},
           {"helix", {{"generate", {{"kind", "helix"}}}}, {0, 0, -1}}};
 }
 
