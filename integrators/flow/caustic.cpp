@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <numeric>
+#include <thread>
 
 #include <tbb/parallel_for.h>
 #include <tbb/task_arena.h>
@@ -12,8 +13,8 @@
 namespace tensorray {
 namespace {
 
-constexpr double even_part =
-    0.1;  // Densities of a square's halves that differ by less, as a part of their sum, are one.
+constexpr double even_part = 0.1;  // Densities of a square's halves that differ by less than this part of their sum ...
+                                   // become one.
 constexpr double swept_share = 0.99;  // The part of the positions whose light moves slowly enough from band to band.
 constexpr std::size_t bands_of_thread = 4;     // Bands that are drawn before their sums are added to the film.
 constexpr std::size_t most_memory = 1u << 28;  // Bytes for these, unless a band for each thread takes more.
@@ -44,7 +45,7 @@ Landings landings_at(const FlowMap& map, double node) {
   return landings;
 }
 
-/// The power of the light that does not land, by its end; and of the light that lands, beside the plate too.
+/// Power by the end of its light. `plate` also has the light that lands beside the plate.
 using Power = std::array<double, ray_end_count>;
 
 /// The density of a triangle for its edges. Light that is not spread over an area is added here.
@@ -164,15 +165,16 @@ Caustic draw_caustic(const FlowMap& map, const Plate& plate, const std::vector<C
   caustic.ends.assign(channels, {});
   double area = 0;
   for (const FlowTriangle& triangle : map.triangles) area += triangle.area;
+  const std::thread::id caller = std::this_thread::get_id();
   const auto threads = static_cast<std::size_t>(tbb::this_task_arena::max_concurrency());
   const std::size_t fitting = most_memory / (8 * static_cast<std::size_t>(width) * static_cast<std::size_t>(height));
   const std::size_t at_once = std::clamp(fitting, threads, bands_of_thread * threads);
   std::vector<Drawing> drawings(std::min(at_once, bands.size()), Drawing{AreaDeposit(width, height)});
   for (std::size_t first = 0; first < bands.size(); first += drawings.size()) {
-    progress.update("drawing light", first, bands.size());
     const std::size_t count = std::min(drawings.size(), bands.size() - first);
     tbb::parallel_for(std::size_t{0}, count, [&](std::size_t k) {
       if (progress.cancelled) throw Cancelled();
+      if (std::this_thread::get_id() == caller) progress.update("drawing light", first + k, bands.size());
       draw_band(map, plate, bands[first + k], 1 / area, drawings[k]);
     });
     const std::vector<double> on_plate =

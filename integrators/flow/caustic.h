@@ -20,8 +20,8 @@ struct CausticBand {
   double node = 0;          ///< Its landings, as a position among the nodes of the map; between two nodes in a range.
   std::size_t channel = 0;  ///< The channel that it belongs to.
   double weight = 1;        ///< Its part of the channel's power; the sum over the bands of a channel is 1.
-  Eigen::Vector3d color =
-      Eigen::Vector3d::Zero();  ///< The colour that it adds where its irradiance is that of the undisturbed beam.
+  /// The colour that it adds where its irradiance is that of the undisturbed beam.
+  Eigen::Vector3d color = Eigen::Vector3d::Zero();
 };
 
 struct Caustic {
@@ -45,8 +45,9 @@ int caustic_bands(const FlowMap& map, int channels, const BandStep& step = {});
 /// the corners: each corner takes a third. What lands beside the plate counts as missed.
 /// @param plate       The plate of the map.
 /// @param by_channel  Whether the result has the irradiance of each channel.
-/// The sums are integers, so that the result is the same for any number of threads. Memory: 8 bytes for each pixel and
-/// thread, and the films. @throw Cancelled.
+/// The sums are integers, so that the result is the same for any number of threads. Memory: the films, and
+/// 8 bytes for each pixel and band that is drawn at the same time: up to 4 for each thread if this takes no more than
+/// 256 MiB, at least one. @throw Cancelled.
 Caustic draw_caustic(const FlowMap& map, const Plate& plate, const std::vector<CausticBand>& bands,
                      std::size_t channels, bool by_channel, const Progress& progress);
 

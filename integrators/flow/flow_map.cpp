@@ -1,26 +1,31 @@
 #include "integrators/flow/flow_map.h"
 
 #include <algorithm>
+#include <atomic>
 #include <cmath>
 #include <limits>
 #include <stdexcept>
+#include <thread>
 #include <unordered_map>
 
 #include <tbb/parallel_for.h>
-#include <tbb/parallel_sort.h>
 
+#include "base/box.h"
 #include "integrators/flow/node_tracer.h"
 
 namespace tensorray {
 namespace {
 
-constexpr double margin = 1.0 / 8;         // Extension of the plate on each side, in sizes of the plate.
-constexpr double coarsest_pixels = 8;      // Size of the first squares, in pixels of straight light; also not more
-constexpr double coarsest_voxels = 1;      // than this, so that no part of the field is missed, ...
-constexpr double field_squares = 64;       // ... but for that at least this part of the beam's extent;
-constexpr double usual_tolerance = 0.5;    // Pixels; the sizes of first squares are for this tolerance.
-constexpr double finest_pixels = 1.0 / 2;  // and of the smallest squares, unless the tolerance is less.
-constexpr double torn_part = 0.35;         // Beyond this part of a square's size, an error is a tear ...
+constexpr double margin = 1.0 / 8;  // Extension of the plate on each side, in sizes of the plate.
+
+// The first squares are of the lesser of these two sizes, for the usual tolerance.
+constexpr double first_pixels = 8;       // In pixels of straight light.
+constexpr double first_voxels = 1;       // In voxels, so that no part of the field is missed; but not more squares for
+constexpr double most_for_voxels = 64;   // this than so many along a side.
+constexpr double usual_tolerance = 0.5;  // Pixels.
+
+constexpr double finest_pixels = 1.0 / 2;  // Size of the smallest squares, unless the tolerance is less.
+constexpr double torn_part = 0.35;         // Beyond this part of a square's size, a deviation is a tear, ...
 constexpr double torn_pixels = 1;          // ... if it is also greater than this.
 constexpr double inset = 3e-6;  // On the aperture's edge, it is a matter of rounding whether rays enter the volume.
                                 // There they start this part of a patch further inside.
@@ -85,6 +90,18 @@ double pixel_across(const Plate& plate, const Beam& beam) {
   return std::sqrt(std::max(area, 1e-6 * plate.pixel_area()));
 }
 
+/// The size of the first squares, world units. Landings between positions are of second order, so that a finer
+/// tolerance has smaller squares. For a small number of positions squares are large: a quarter of the number is for the
+/// first squares and their first division.
+double first_size(const TensorField& field, const Beam& beam, double pixel, const FlowSettings& settings) {
+  const Eigen::Vector2d extent = box_of(beam.aperture).sizes();
+  const double voxel = field.to_world().linear().colwise().norm().minCoeff();
+  const double for_voxels = std::max(first_voxels * voxel, extent.maxCoeff() / most_for_voxels);
+  const double usual = std::min(first_pixels * pixel, for_voxels);
+  const double least = std::sqrt(16 * extent.prod() / static_cast<double>(settings.most_starts));
+  return std::max(usual * std::sqrt(settings.tolerance / usual_tolerance), least);
+}
+
 Geometry extended(const Geometry& geometry) {
   Surfaces surfaces = geometry.surfaces();
   surfaces.plate->size *= 1 + 2 * margin;
@@ -103,16 +120,7 @@ class FlowMapBuilder {
         tracer_(field, geometry_, plate_, beam, bending, settings) {
     map_.nodes = tracer_.nodes();
     const double pixel = pixel_across(plate_, beam);
-    Eigen::Vector2d low = beam.aperture[0], high = low;
-    for (const Eigen::Vector2d& corner : beam.aperture) low = low.cwiseMin(corner), high = high.cwiseMax(corner);
-    // So that a finer tolerance always makes a finer map: landings between positions are of second order.
-    const double fineness = std::sqrt(settings.tolerance / usual_tolerance);
-    const double voxel = field.to_world().linear().colwise().norm().minCoeff();
-    const double for_field = std::max(coarsest_voxels * voxel, (high - low).maxCoeff() / field_squares);
-    // A small budget means large squares: a quarter of it is for the first ones and their first division.
-    const double area = (high - low).prod(), budget = static_cast<double>(settings.most_starts);
-    const double size =
-        std::max(fineness * std::min(coarsest_pixels * pixel, for_field), std::sqrt(16 * area / budget));
+    const double size = first_size(field, beam, pixel, settings);
     patches_ = patches_of(beam.aperture, size);
     const double finest = std::min(finest_pixels, settings.tolerance) * pixel;
     while (levels_ < most_levels && std::ldexp(size, -levels_) > finest) ++levels_;
@@ -169,17 +177,20 @@ class FlowMapBuilder {
     map_.landings.resize(count * map_.nodes);
     map_.ends.resize(count * map_.nodes);
     const std::size_t tasks = (count - first + task_size - 1) / task_size;
+    std::atomic<std::size_t> done{first};
+    const std::thread::id caller = std::this_thread::get_id();
     tbb::parallel_for(std::size_t{0}, tasks, [&](std::size_t task) {
       if (progress_.cancelled) throw Cancelled();
       const std::size_t begin = first + task * task_size, end = std::min(begin + task_size, count);
       std::vector<Eigen::Vector3d> origins;
-      for (std::size_t i = begin; i < end; ++i) {
+      for (std::size_t i = begin; i < end; ++i)
         origins.push_back(beam_.center + origins_[i].x() * beam_.right + origins_[i].y() * beam_.up);
-      }
       tracer_.trace(origins, &map_.landings[begin * map_.nodes], &map_.ends[begin * map_.nodes]);
+      const std::size_t traced = done += end - begin;
+      if (std::this_thread::get_id() == caller)
+        progress_.update("tracing rays", std::min(traced, settings_.most_starts), settings_.most_starts);
     });
     traced_ = count;
-    progress_.update("tracing rays", std::min(count, settings_.most_starts), settings_.most_starts);
   }
 
   bool landed(std::uint32_t position, std::size_t node) const {

@@ -102,25 +102,24 @@ NodeTracer::NodeTracer(const TensorField& field, const Geometry& geometry, const
       direction_(beam.direction),
       bending_(bending),
       tolerance_(settings.tolerance / 2),
+      is_range_(settings.range && settings.flexibilities[0] != settings.flexibilities[1]),
       flexibilities_(settings.flexibilities) {
-  if (settings.range) {
-    const double first = settings.flexibilities[0], last = settings.flexibilities[1];
-    flexibilities_.assign(1, first);
-    for (std::size_t i = 1; i < range_nodes && first != last; ++i)
-      flexibilities_.push_back(first + (last - first) * static_cast<double>(i) / (range_nodes - 1));
+  if (settings.range) flexibilities_.resize(is_range_ ? range_nodes : 1);
+  for (std::size_t i = 0; is_range_ && i < range_nodes; ++i) {
+    const double part = static_cast<double>(i) / (range_nodes - 1);
+    flexibilities_[i] = (1 - part) * settings.flexibilities[0] + part * settings.flexibilities[1];
   }
-  const std::size_t step = settings.range ? first_step : 1;
+  const std::size_t step = is_range_ ? first_step : 1;
   for (std::size_t node = 0; node < nodes(); node += step) check_nodes_.push_back(node);
 }
 
 void NodeTracer::trace(const std::vector<Eigen::Vector3d>& origins, Eigen::Vector2f* landings, RayEnd* ends) {
   std::vector<std::size_t> which(origins.size());
   std::iota(which.begin(), which.end(), std::size_t{0});
-  if (nodes() < range_nodes) return trace_nodes(origins, which, 0, 1, landings, ends);
+  if (!is_range_) return trace_nodes(origins, which, 0, 1, landings, ends);
   trace_nodes(origins, which, 0, first_step, landings, ends);
-  for (std::size_t step = first_step;; step /= 2) {
+  for (std::size_t step = first_step; step > 1; step /= 2) {
     std::vector<std::size_t> rough;
-    if (step == 1) return;
     for (const std::size_t i : which) {
       const TracedNodes traced{landings + i * nodes(), ends + i * nodes(), step, plate_.resolution.cast<float>()};
       if (traced.is_smooth(tolerance_))

@@ -42,6 +42,7 @@ class NodeTracer {
   const Eigen::Vector3d direction_;
   const BendingSettings& bending_;
   double tolerance_;
+  bool is_range_;
   std::vector<double> flexibilities_;  // One for each node.
   std::vector<std::size_t> check_nodes_;
   std::atomic<std::uint64_t> rays_{0}, ray_steps_{0}, tensor_samples_{0};

@@ -104,10 +104,16 @@ class PhotonDistributionMethod : public MethodWith<PhotonDescription> {
   }
 
   void check(SceneDescription& scene, const Json& json, const SceneSource& source, bool chosen) const override {
+    const bool draws_mesh = settings().density.kind == PhotonDensityKind::mesh;
+    for (const char* key : {"/integrator/density/tolerance", "/integrator/density/error"})
+      if (chosen && !draws_mesh && given(json, key))
+        scene.warnings.push_back(fmt::format("`{}` has no effect: it belongs to the density \"mesh\"", key));
+    if (!chosen && given(json, "/integrator/density/error"))
+      scene.warnings.push_back("`/integrator/density/error` bounds only the error of the light on a plate");
     if (!chosen) return;
     check_spectral_output(scene, source);
     warn_unused(scene, json, "/light/spectrum", "/bending/rgb");
-    if (settings().density.kind == PhotonDensityKind::mesh && given(json, "/integrator/density/tau"))
+    if (draws_mesh && given(json, "/integrator/density/tau"))
       scene.warnings.push_back("`/integrator/density/tau` has no effect: it belongs to the density \"gaussian\"");
     if (scene.output.fluence_bands && !scene.output.wants("fluence"))
       scene.warnings.push_back("`/output/fluence_bands` has no effect without `/output/fluence`");

@@ -8,6 +8,7 @@
 #include "integrators/flow/caustic.h"
 #include "integrators/photons/photon_distribution.h"
 #include "renderer/film/spectral_image.h"
+#include "renderer/images/image_distance.h"
 #include "scenes/photons/photon_distribution_method.h"
 
 namespace tensorray {
@@ -97,17 +98,6 @@ DrawnLight draw_map(const Scene& scene, double tolerance, const BandStep& step, 
   return {std::move(light), map.is_complete};
 }
 
-/// The distance of two pictures as a part of the first one's norm (root of the sum of squares).
-double relative_distance(const Image& image, const Image& other) {
-  double squares = 0, all = 0;
-  for (std::size_t i = 0; i < image.pixels.size(); ++i) {
-    const double value = image.pixels[i], difference = value - other.pixels[i];
-    squares += difference * difference;
-    all += value * value;
-  }
-  return all > 0 ? std::sqrt(squares / all) : 0;
-}
-
 void add_cost(const Statistics& more, Statistics& statistics) {
   statistics.seconds_tracing += more.seconds_tracing;
   statistics.seconds_density += more.seconds_density;
@@ -134,7 +124,7 @@ PlateLight refine(const Scene& scene, double bound, const Progress& progress) {
   for (;;) {
     tolerance /= 2;
     DrawnLight finer = draw_map(scene, tolerance, refined_step(tolerance), labelled);
-    const double error = relative_distance(finer.light.linear, drawn.light.linear);
+    const double error = relative_distance(drawn.light.linear, finer.light.linear);
     finer.light.statistics.error = error;
     add_cost(drawn.light.statistics, finer.light.statistics);
     drawn = std::move(finer);
@@ -151,8 +141,12 @@ PlateLight refine(const Scene& scene, double bound, const Progress& progress) {
 
 PlateLight draw_light(const Scene& scene, const Progress& progress) {
   const PhotonDensity& density = scene.description.integrator.settings<PhotonDescription>().density;
-  return density.error ? refine(scene, *density.error, progress)
-                       : draw_map(scene, density.tolerance, {}, progress).light;
+  if (density.error) return refine(scene, *density.error, progress);
+  DrawnLight drawn = draw_map(scene, density.tolerance, {}, progress);
+  if (!drawn.is_complete)
+    drawn.light.warnings.push_back(
+        "the light on the plate is coarser than `integrator.density.tolerance` asks: raise `light.photons`");
+  return std::move(drawn.light);
 }
 
 /// Whether photons are collected as red, green and blue. Up to three bands need no more planes, and cost less.

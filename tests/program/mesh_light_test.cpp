@@ -2,7 +2,7 @@
 
 #include <cmath>
 
-#include "renderer/images/image.h"
+#include "renderer/images/image_distance.h"
 #include "tests/program/support.h"
 
 namespace tensorray {
@@ -30,15 +30,6 @@ class MeshLight : public Program {
     return read_image(in_folder("out.exr"));
   }
 };
-
-double relative_distance(const Image& image, const Image& exact) {
-  double squares = 0, all = 0;
-  for (std::size_t i = 0; i < exact.pixels.size(); ++i) {
-    squares += std::pow(image.pixels[i] - exact.pixels[i], 2);
-    all += std::pow(exact.pixels[i], 2);
-  }
-  return std::sqrt(squares / all);
-}
 
 TEST_F(MeshLight, AllPowerIsAccountedFor) {
   picture({});
@@ -98,6 +89,21 @@ TEST_F(MeshLight, WrongSettingsAreRefused) {
   }
   const Outcome outcome = run_well({"render", "scene.json", "-o", "out.exr", "--set", "integrator.density.tau=3"});
   EXPECT_NE(outcome.error.find("`/integrator/density/tau` has no effect"), std::string::npos) << outcome.error;
+}
+
+TEST_F(MeshLight, SettingsOfOtherKindsAreWarnedOf) {
+  const auto expect_warning = [&](const std::vector<std::string>& more, const std::string& warning) {
+    std::vector<std::string> arguments{"render", "scene.json", "-o", "out.exr"};
+    arguments.insert(arguments.end(), more.begin(), more.end());
+    const Outcome outcome = run_well(arguments);
+    EXPECT_NE(outcome.error.find(warning), std::string::npos) << outcome.error;
+  };
+  const std::string no_effect = "`/integrator/density/error` has no effect: it belongs to the density \"mesh\"";
+  expect_warning({"--until-error", "1%", "--set", "integrator.density.kind=histogram", "--set", "light.photons=2000"},
+                 no_effect);
+  expect_warning({"--until-error", "1%", "--set", "integrator.type=stretch"},
+                 "`/integrator/density/error` bounds only the error of the light on a plate");
+  expect_warning({"--set", "light.photons=2000"}, "raise `light.photons`");
 }
 
 }  // namespace

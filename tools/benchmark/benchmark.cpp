@@ -25,7 +25,8 @@ constexpr const char* description =
     "  jobs     whole renders, from scene file to picture, by phase, with one thread and with all\n"
     "  caustics the error of the light on a plate, with the flow map and with photons\n\n"
     "A sample is one look-up of a tensor, with the step that uses it. Numbers are medians of five repetitions; ratios "
-    "are to the first row. A complete run takes less than ten minutes on two cores. Run no other programs at the same "
+    "are to the first row. A complete run takes about a quarter of an hour on two cores. Run no other programs at the "
+    "same "
     "time.";
 
 struct CommandLine {

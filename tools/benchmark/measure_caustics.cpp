@@ -4,7 +4,7 @@
 
 #include <fmt/format.h>
 
-#include "renderer/images/image.h"
+#include "renderer/images/image_distance.h"
 #include "tools/benchmark/child.h"
 #include "tools/benchmark/machine.h"
 #include "tools/benchmark/parts.h"
@@ -65,23 +65,13 @@ Picture render(const TemporaryFolder& folder, const CausticScene& scene, const E
   return {read_image(picture), Json::parse(file)};
 }
 
-/// The distance from `exact`, as a part of its norm.
-double error_of(const Image& image, const Image& exact) {
-  double squares = 0, all = 0;
-  for (std::size_t i = 0; i < exact.pixels.size(); ++i) {
-    squares += std::pow(image.pixels[i] - exact.pixels[i], 2);
-    all += std::pow(exact.pixels[i], 2);
-  }
-  return std::sqrt(squares / all);
-}
-
 Json row_of(const Estimate& estimate, const Picture& picture, const Image& exact) {
   const Json& seconds = picture.statistics.at("seconds");
   Json row = {{"name", estimate.name},
               {"positions", picture.statistics.at("positions")},
               {"seconds", seconds.at("total")},
               {"seconds_of_light", seconds.at("trace").get<double>() + seconds.at("density").get<double>()},
-              {"error", error_of(picture.image, exact)}};
+              {"error", relative_distance(picture.image, exact)}};
   if (picture.statistics.contains("error")) row["estimate"] = picture.statistics.at("error");
   return row;
 }

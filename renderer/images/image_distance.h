@@ -1,0 +1,13 @@
+#pragma once
+/// @file renderer/images/image_distance.h
+/// How far two pictures are apart.
+
+#include "renderer/images/image.h"
+
+namespace tensorray {
+
+/// The root of the sum of squared differences of all values, as a part of that of `exact`; 0 if `exact` is black.
+/// @throw std::invalid_argument if the pictures differ in size or in their number of channels.
+double relative_distance(const Image& image, const Image& exact);
+
+}  // namespace tensorray

@@ -1,0 +1,20 @@
+#include "renderer/images/image_distance.h"
+
+#include <gtest/gtest.h>
+
+namespace tensorray {
+namespace {
+
+TEST(ImageDistance, IsAPartOfTheExactPicture) {
+  Image exact(2, 1, {"R"}), other(2, 1, {"R"});
+  exact.pixels = {3, 4};
+  other.pixels = {3, 5};
+  EXPECT_DOUBLE_EQ(relative_distance(other, exact), 0.2);
+  EXPECT_EQ(relative_distance(exact, exact), 0);
+  EXPECT_EQ(relative_distance(exact, Image(2, 1, {"R"})), 0);
+  EXPECT_THROW(relative_distance(exact, Image(1, 2, {"R"})), std::invalid_argument);
+  EXPECT_THROW(relative_distance(exact, Image(2, 1, {"R", "G"})), std::invalid_argument);
+}
+
+}  // namespace
+}  // namespace tensorray
