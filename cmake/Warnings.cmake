@@ -17,9 +17,14 @@ if(TENSORRAY_SANITIZE)
   target_link_options(tensorray_options INTERFACE -fsanitize=address,undefined)
 endif()
 
-# A static library of all sources in this folder and its subfolders (CONFIGURE_DEPENDS finds new files by itself).
+# tensorray_library(NAME [EXCEPT FOLDER]): a static library of all sources in this folder and its subfolders, without
+# those of one subfolder (CONFIGURE_DEPENDS finds new files by itself).
 function(tensorray_library name)
+  cmake_parse_arguments(PARSE_ARGV 1 ARG "" EXCEPT "")
   file(GLOB sources CONFIGURE_DEPENDS *.cpp */*.cpp)
+  if(ARG_EXCEPT)
+    list(FILTER sources EXCLUDE REGEX "/${ARG_EXCEPT}/")
+  endif()
   add_library(${name} STATIC ${sources})
   target_link_libraries(${name} PUBLIC Eigen3::Eigen PRIVATE tensorray_options)
   # Half of the time to compile most files is the headers that nearly all of them include.

@@ -26,21 +26,13 @@ struct Landings {
 };
 
 Landings landings_at(const FlowMap& map, double node) {
-  const auto before = std::min(static_cast<std::size_t>(node), map.nodes - 1);
-  const std::size_t after = std::min(before + 1, map.nodes - 1);
-  const double part = node - static_cast<double>(before);
   Landings landings;
-  const std::size_t count = map.starts.size();
-  landings.at.resize(count);
-  landings.ends.resize(count);
-  for (std::size_t i = 0; i < count; ++i) {
-    const std::size_t a = i * map.nodes + before, b = i * map.nodes + after;
-    const std::size_t nearest = part < 0.5 ? a : b;
-    landings.ends[i] = map.ends[nearest];
-    const bool both = map.ends[a] == RayEnd::plate && map.ends[b] == RayEnd::plate;
-    landings.at[i] =
-        both ? Eigen::Vector2d((1 - part) * map.landings[a].cast<double>() + part * map.landings[b].cast<double>())
-             : Eigen::Vector2d(map.landings[nearest].cast<double>());
+  landings.at.reserve(map.starts.size());
+  landings.ends.reserve(map.starts.size());
+  for (std::size_t i = 0; i < map.starts.size(); ++i) {
+    const FlowLanding landing = landing_at(map, i, node);
+    landings.at.push_back(landing.at);
+    landings.ends.push_back(landing.end);
   }
   return landings;
 }

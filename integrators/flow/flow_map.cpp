@@ -24,9 +24,8 @@ constexpr double first_voxels = 1;       // In voxels, so that no part of the fi
 constexpr double most_for_voxels = 64;   // this than so many along a side.
 constexpr double usual_tolerance = 0.5;  // Pixels.
 
-constexpr double finest_pixels = 1.0 / 2;  // Size of the smallest squares, unless the tolerance is less.
-constexpr double torn_part = 0.35;         // Beyond this part of a square's size, a deviation is a tear, ...
-constexpr double torn_pixels = 1;          // ... if it is also greater than this.
+constexpr float torn_pixels = 1;         // Landings at the ends of a smallest side that are farther apart are a tear ...
+constexpr float torn_ratio = 6;          // ... if those of the next side are so much nearer to each other.
 constexpr double inset = 3e-6;  // On the aperture's edge, it is a matter of rounding whether rays enter the volume.
                                 // There they start this part of a patch further inside.
 constexpr int most_levels = 14;
@@ -84,10 +83,11 @@ std::vector<Patch> patches_of(const std::vector<Eigen::Vector2d>& polygon, doubl
   return patches;
 }
 
-/// The size of a pixel across the beam, as straight light projects it.
-double pixel_across(const Plate& plate, const Beam& beam) {
-  const double area = plate.pixel_area() * std::abs(plate.normal().dot(beam.direction));
-  return std::sqrt(std::max(area, 1e-6 * plate.pixel_area()));
+/// The size of a pixel in the plane where light starts, as straight light projects it.
+double pixel_of_starts(const Plate& plate, const Beam& beam) {
+  const double slope = std::abs(plate.normal().dot(beam.direction)) /
+                       std::abs(beam.right.cross(beam.up).dot(beam.direction));
+  return std::sqrt(plate.pixel_area() * std::clamp(slope, 1e-6, 1e6));
 }
 
 /// The size of the first squares, world units. Landings between positions are of second order, so that a finer
@@ -110,19 +110,19 @@ Geometry extended(const Geometry& geometry) {
 
 class FlowMapBuilder {
  public:
-  FlowMapBuilder(const TensorField& field, const Geometry& geometry, const Beam& beam, const BendingSettings& bending,
-                 const FlowSettings& settings, const Progress& progress)
-      : plate_(*geometry.surfaces().plate),
-        geometry_(extended(geometry)),
+  FlowMapBuilder(const TensorField& field, const Geometry& geometry, const Plate& plate, const Beam& beam,
+                 const BendingSettings& bending, const FlowSettings& settings, const Progress& progress)
+      : plate_(plate),
         beam_(beam),
         settings_(settings),
         progress_(progress),
-        tracer_(field, geometry_, plate_, beam, bending, settings) {
+        tracer_(field, geometry, plate_, beam, bending, settings) {
     map_.nodes = tracer_.nodes();
-    const double pixel = pixel_across(plate_, beam);
+    map_.check_step = tracer_.check_step();
+    const double pixel = pixel_of_starts(plate_, beam);
     const double size = first_size(field, beam, pixel, settings);
     patches_ = patches_of(beam.aperture, size);
-    const double finest = std::min(finest_pixels, settings.tolerance) * pixel;
+    const double finest = std::min(settings.finest, settings.tolerance) * pixel;
     while (levels_ < most_levels && std::ldexp(size, -levels_) > finest) ++levels_;
   }
 
@@ -148,7 +148,8 @@ class FlowMapBuilder {
       const Patch& p = patches_[patch];
       const double u = std::ldexp(x, -levels_) / p.columns, v = std::ldexp(y, -levels_) / p.rows;
       map_.starts.push_back(p.at(u, v));
-      origins_.push_back(p.at(std::clamp(u, inset, 1 - inset), std::clamp(v, inset, 1 - inset)));
+      const double least = settings_.silhouette ? inset : 0;
+      origins_.push_back(p.at(std::clamp(u, least, 1 - least), std::clamp(v, least, 1 - least)));
     }
     return found->second;
   }
@@ -176,6 +177,8 @@ class FlowMapBuilder {
     const std::size_t first = traced_, count = map_.starts.size();
     map_.landings.resize(count * map_.nodes);
     map_.ends.resize(count * map_.nodes);
+    const std::size_t checks = tracer_.check_nodes().size();
+    map_.lengths.resize(count * checks);
     const std::size_t tasks = (count - first + task_size - 1) / task_size;
     std::atomic<std::size_t> done{first};
     const std::thread::id caller = std::this_thread::get_id();
@@ -185,7 +188,8 @@ class FlowMapBuilder {
       std::vector<Eigen::Vector3d> origins;
       for (std::size_t i = begin; i < end; ++i)
         origins.push_back(beam_.center + origins_[i].x() * beam_.right + origins_[i].y() * beam_.up);
-      tracer_.trace(origins, &map_.landings[begin * map_.nodes], &map_.ends[begin * map_.nodes]);
+      tracer_.trace(origins, &map_.landings[begin * map_.nodes], &map_.ends[begin * map_.nodes],
+                    &map_.lengths[begin * checks]);
       const std::size_t traced = done += end - begin;
       if (std::this_thread::get_id() == caller)
         progress_.update("tracing rays", std::min(traced, settings_.most_starts), settings_.most_starts);
@@ -220,7 +224,7 @@ class FlowMapBuilder {
 
   bool is_on_plate(const Reach& reach) const {
     const Eigen::Array2f size = plate_.resolution.cast<float>().array();
-    return reach.landed > 0 && (reach.low < size).all() && (reach.high > 0).all();
+    return reach.landed > 0 && (settings_.beside || ((reach.low < size).all() && (reach.high > 0).all()));
   }
 
   bool needs_division(const Square& square) const {
@@ -290,34 +294,62 @@ class FlowMapBuilder {
     return part;
   }
 
-  /// The greatest distance of a middle's landing from the mean of the corners beside it, among the nodes whose light
-  /// falls on the plate; infinite if some of it does not land.
-  float deviation_of(const Square& square, const std::array<std::uint32_t, 5>& middles) const {
-    const auto& [a, b, c, d] = square.corners;
-    const std::array<std::uint32_t, 9> all{a, b, c, d, middles[0], middles[1], middles[2], middles[3], middles[4]};
+  /// The greatest distance, at a node, of a middle's landing from the mean of the corners beside it; infinite if some
+  /// of the light does not land.
+  float deviation_at(const std::array<std::uint32_t, 4>& corners, const std::array<std::uint32_t, 5>& middles,
+                     std::size_t node) const {
+    std::array<Eigen::Vector2f, 4> at;
+    for (int i = 0; i < 4; ++i) {
+      if (!landed(corners[i], node)) return std::numeric_limits<float>::infinity();
+      at[i] = landing(corners[i], node);
+    }
     float greatest = 0;
-    for (const std::size_t node : tracer_.check_nodes()) {
-      const Reach reach = reach_of(all, node);
-      if (!is_on_plate(reach)) continue;
-      if (reach.landed < all.size()) return std::numeric_limits<float>::infinity();
-      std::array<Eigen::Vector2f, 4> at;
-      for (int i = 0; i < 4; ++i) at[i] = landing(square.corners[i], node);
-      for (int i = 0; i < 4; ++i)
-        greatest = std::max(greatest, (landing(middles[i], node) - (at[i] + at[(i + 1) % 4]) / 2).norm());
-      greatest = std::max(greatest, (landing(middles[4], node) - (at[0] + at[1] + at[2] + at[3]) / 4).norm());
+    for (int i = 0; i < 5; ++i) {
+      if (!landed(middles[i], node)) return std::numeric_limits<float>::infinity();
+      const Eigen::Vector2f mean = i < 4 ? Eigen::Vector2f((at[i] + at[(i + 1) % 4]) / 2)
+                                         : Eigen::Vector2f((at[0] + at[1] + at[2] + at[3]) / 4);
+      greatest = std::max(greatest, (landing(middles[i], node) - mean).norm());
     }
     return greatest;
   }
 
-  /// Whether the landings of the parent were far from where their neighbours predict, by the size of the square.
-  bool is_torn(const Square& square) const {
-    if (square.level < levels_) return false;
-    float size = 0;
-    for (const std::size_t node : tracer_.check_nodes()) {
-      const Reach reach = reach_of(square.corners, node);
-      if (reach.landed == 4) size = std::max(size, (reach.high - reach.low).maxCoeff());
+  /// The greatest deviation among the nodes whose light falls on the plate.
+  float deviation_of(const Square& square, const std::array<std::uint32_t, 5>& middles) const {
+    const auto& [a, b, c, d] = square.corners;
+    const std::array<std::uint32_t, 9> all{a, b, c, d, middles[0], middles[1], middles[2], middles[3], middles[4]};
+    float greatest = 0;
+    for (const std::size_t node : tracer_.check_nodes())
+      if (is_on_plate(reach_of(all, node))) greatest = std::max(greatest, deviation_at(square.corners, middles, node));
+    return greatest;
+  }
+
+  /// Whether the map jumps across a side of a smallest square. The landings at its ends are then far apart, and those at
+  /// the ends of the side's other half, in the parent, are not.
+  bool is_torn(const Square& square) {
+    if (square.level < levels_ || !(square.deviation > torn_pixels / 2)) return false;
+    const std::uint32_t half = side_of(square), left = square.x / (2 * half) * 2 * half,
+                        top = square.y / (2 * half) * 2 * half;
+    std::array<std::array<std::uint32_t, 3>, 3> grid;  // The positions of the parent, by row and column.
+    for (std::uint32_t row = 0; row < 3; ++row)
+      for (std::uint32_t column = 0; column < 3; ++column)
+        grid[row][column] = position(square.patch, left + column * half, top + row * half);
+    const std::size_t x = (square.x - left) / half, y = (square.y - top) / half;
+    for (const std::size_t i : {0, 1})
+      if (is_torn(grid[y + i][x], grid[y + i][x + 1], grid[y + i][2 * (1 - x)], grid[y + i][1]) ||
+          is_torn(grid[y][x + i], grid[y + 1][x + i], grid[2 * (1 - y)][x + i], grid[1][x + i]))
+        return true;
+    return false;
+  }
+
+  /// Whether the map jumps, at any node, between two positions, and not between the two of the next side.
+  bool is_torn(std::uint32_t a, std::uint32_t b, std::uint32_t next_a, std::uint32_t next_b) const {
+    for (std::size_t node = 0; node < map_.nodes; ++node) {
+      if (!landed(a, node) || !landed(b, node) || !landed(next_a, node) || !landed(next_b, node)) continue;
+      const float jump = (landing(a, node) - landing(b, node)).norm(),
+                  next = (landing(next_a, node) - landing(next_b, node)).norm();
+      if (jump > torn_pixels && jump > torn_ratio * next) return true;
     }
-    return square.deviation > torn_pixels && square.deviation > torn_part * 2 * size && std::isfinite(square.deviation);
+    return false;
   }
 
   /// Appends the positions on a side between two corners, without its end. They are there if a neighbour is finer.
@@ -349,6 +381,12 @@ class FlowMapBuilder {
       }
       map_.landings.push_back(at);
       map_.ends.push_back(end);
+    }
+    const std::size_t checks = tracer_.check_nodes().size();
+    for (std::size_t check = 0; check < checks; ++check) {
+      float length = 0;
+      for (const std::uint32_t corner : square.corners) length += map_.lengths[corner * checks + check] / 4;
+      map_.lengths.push_back(length);
     }
     return center;
   }
@@ -407,7 +445,6 @@ class FlowMapBuilder {
   }
 
   const Plate plate_;
-  const Geometry geometry_;
   const Beam& beam_;
   const FlowSettings& settings_;
   const Progress& progress_;
@@ -424,14 +461,30 @@ class FlowMapBuilder {
 
 }  // namespace
 
+FlowLanding landing_at(const FlowMap& map, std::size_t position, double node) {
+  const auto before = std::min(static_cast<std::size_t>(node), map.nodes - 1);
+  const std::size_t after = std::min(before + 1, map.nodes - 1);
+  const double part = node - static_cast<double>(before);
+  const std::size_t a = position * map.nodes + before, b = position * map.nodes + after;
+  const std::size_t nearest = part < 0.5 ? a : b;
+  if (map.ends[a] != RayEnd::plate || map.ends[b] != RayEnd::plate)
+    return {map.ends[nearest], map.landings[nearest].cast<double>()};
+  return {RayEnd::plate, (1 - part) * map.landings[a].cast<double>() + part * map.landings[b].cast<double>()};
+}
+
+FlowMap trace_flow_map(const TensorField& field, const Geometry& geometry, const Plate& plate, const Beam& beam,
+                       const BendingSettings& bending, const FlowSettings& settings, const Progress& progress) {
+  if (settings.flexibilities.empty() || (settings.range && settings.flexibilities.size() != 2))
+    throw std::invalid_argument("a flow map needs flexibilities, and a range has two");
+  if (!(settings.tolerance > 0) || !(settings.finest > 0) || settings.most_starts < 1)
+    throw std::invalid_argument("a flow map needs a tolerance and a number of positions greater than 0");
+  return FlowMapBuilder(field, geometry, plate, beam, bending, settings, progress).build();
+}
+
 FlowMap trace_flow_map(const TensorField& field, const Geometry& geometry, const Beam& beam,
                        const BendingSettings& bending, const FlowSettings& settings, const Progress& progress) {
   if (!geometry.surfaces().plate) throw std::invalid_argument("a flow map needs a receiver");
-  if (settings.flexibilities.empty() || (settings.range && settings.flexibilities.size() != 2))
-    throw std::invalid_argument("a flow map needs flexibilities, and a range has two");
-  if (!(settings.tolerance > 0) || settings.most_starts < 1)
-    throw std::invalid_argument("a flow map needs a tolerance and a number of positions greater than 0");
-  return FlowMapBuilder(field, geometry, beam, bending, settings, progress).build();
+  return trace_flow_map(field, extended(geometry), *geometry.surfaces().plate, beam, bending, settings, progress);
 }
 
 }  // namespace tensorray

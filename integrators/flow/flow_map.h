@@ -23,6 +23,11 @@ struct FlowSettings {
   bool range = false;
 
   double tolerance = 0.5;  ///< Wanted error of landings between positions, pixels; > 0.
+  double finest = 0.5;     ///< Size of the smallest squares, pixels of straight light, unless the tolerance is less; > 0.
+
+  bool silhouette = true;  ///< Whether the edge of the aperture is that of the volume. Rays from there start a little
+                           ///< further inside, as they must enter the volume.
+  bool beside = false;     ///< Whether light that lands beside the plate is as important as light on it.
 
   std::size_t most_starts = std::size_t{1} << 20;  ///< Refinement stops at so many positions; > 0.
 };
@@ -50,6 +55,8 @@ struct FlowMap {
   std::vector<Eigen::Vector2f> landings;  ///< Pixel coordinates; node k of position i is at [i · nodes + k]. They may
                                           ///< lie beyond the plate's edges.
   std::vector<RayEnd> ends;               ///< In the same order; landings are valid where this is `plate`.
+  std::size_t check_step = 1;   ///< Every so many nodes, light is traced for all positions, never interpolated.
+  std::vector<float> lengths;   ///< Length of the way, world units, at these nodes, in the same order.
   std::vector<FlowTriangle> triangles;    ///< They cover the aperture once; neighbours follow each other.
   std::vector<FlowEdge> edges;            ///< All sides of the triangles, once.
   std::size_t rays = 0;                   ///< Number of rays that were traced.
@@ -57,12 +64,22 @@ struct FlowMap {
   bool is_complete = true;  ///< Whether every triangle is as fine as `tolerance` asks.
 };
 
-/// Traces the map from `beam` to the plate of `geometry`. The plate is extended by an eighth of its size on all sides,
-/// so that the map goes on beyond its edges.
+/// Light of one position at a place among the nodes, in a range also between two of them.
+struct FlowLanding {
+  RayEnd end = RayEnd::missed;
+  Eigen::Vector2d at = Eigen::Vector2d::Zero();  ///< Pixels; valid if `end` is `plate`.
+};
+
+/// Between two nodes of which only one landed, the nearer one counts.
+FlowLanding landing_at(const FlowMap& map, std::size_t position, double node);
+
+/// Traces the map from `beam` to the plane of `plate`. The plate of `geometry` lies in the same plane and may be larger:
+/// the map goes on there. `right` and `up` of the beam need not be across its direction: its light may start on any
+/// plane.
 ///
 /// Positions form a lattice of squares of 8 pixels, or of a voxel if that is less, but not more than 64 along a side
 /// for that (for an aperture that is no parallelogram, one lattice for each corner). Each is divided into four, and
-/// then again, down to half a pixel or the tolerance, if the landings within its parent were so far from where the
+/// then again, down to the finest size, if the landings within its parent were so far from where the
 /// parent's corners predict that an error greater than `tolerance` is likely, or if some of its corners' light lands
 /// and some does not. Where light is spread, so that the square's light covers n pixels along a side, the tolerance is
 /// √n times as large. Squares whose light falls beside the plate stay as they are.
@@ -73,6 +90,11 @@ struct FlowMap {
 ///
 /// The result is the same for any number of threads. @throw std::invalid_argument if a setting is out of range or
 /// `geometry` has no plate; Cancelled.
+FlowMap trace_flow_map(const TensorField& field, const Geometry& geometry, const Plate& plate, const Beam& beam,
+                       const BendingSettings& bending, const FlowSettings& settings, const Progress& progress);
+
+/// The map to the plate of `geometry`, which goes on beyond its edges by an eighth of its size. @throw as above, and
+/// std::invalid_argument if there is no plate.
 FlowMap trace_flow_map(const TensorField& field, const Geometry& geometry, const Beam& beam,
                        const BendingSettings& bending, const FlowSettings& settings, const Progress& progress);
 

@@ -113,11 +113,12 @@ NodeTracer::NodeTracer(const TensorField& field, const Geometry& geometry, const
   for (std::size_t node = 0; node < nodes(); node += step) check_nodes_.push_back(node);
 }
 
-void NodeTracer::trace(const std::vector<Eigen::Vector3d>& origins, Eigen::Vector2f* landings, RayEnd* ends) {
+void NodeTracer::trace(const std::vector<Eigen::Vector3d>& origins, Eigen::Vector2f* landings, RayEnd* ends,
+                       float* lengths) {
   std::vector<std::size_t> which(origins.size());
   std::iota(which.begin(), which.end(), std::size_t{0});
-  if (!is_range_) return trace_nodes(origins, which, 0, 1, landings, ends);
-  trace_nodes(origins, which, 0, first_step, landings, ends);
+  if (!is_range_) return trace_nodes(origins, which, 0, 1, landings, ends, lengths);
+  trace_nodes(origins, which, 0, first_step, landings, ends, lengths);
   for (std::size_t step = first_step; step > 1; step /= 2) {
     std::vector<std::size_t> rough;
     for (const std::size_t i : which) {
@@ -129,12 +130,13 @@ void NodeTracer::trace(const std::vector<Eigen::Vector3d>& origins, Eigen::Vecto
     }
     if (rough.empty()) return;
     which = std::move(rough);
-    trace_nodes(origins, which, step / 2, step, landings, ends);
+    trace_nodes(origins, which, step / 2, step, landings, ends, nullptr);
   }
 }
 
 void NodeTracer::trace_nodes(const std::vector<Eigen::Vector3d>& origins, const std::vector<std::size_t>& which,
-                             std::size_t first, std::size_t step, Eigen::Vector2f* landings, RayEnd* ends) {
+                             std::size_t first, std::size_t step, Eigen::Vector2f* landings, RayEnd* ends,
+                             float* lengths) {
   RayBatch batch;
   // Light of one node from neighbouring positions crosses the same cells of the field.
   for (std::size_t node = first; node < nodes(); node += step)
@@ -144,7 +146,9 @@ void NodeTracer::trace_nodes(const std::vector<Eigen::Vector3d>& origins, const 
   for (std::size_t node = first; node < nodes(); node += step)
     for (const std::size_t i : which) {
       landings[i * nodes() + node] = plate_.to_pixel(batch.position[ray]).cast<float>();
-      ends[i * nodes() + node] = batch.end[ray++];
+      ends[i * nodes() + node] = batch.end[ray];
+      if (lengths) lengths[i * check_nodes_.size() + (node - first) / step] = static_cast<float>(batch.length[ray]);
+      ++ray;
     }
   rays_ += batch.size();
   tensor_samples_ += batch.tensor_samples;

@@ -25,8 +25,11 @@ class NodeTracer {
   /// The nodes that are traced for every position.
   const std::vector<std::size_t>& check_nodes() const { return check_nodes_; }
 
-  /// Writes origins.size() · nodes() landings (pixel coordinates) and ends.
-  void trace(const std::vector<Eigen::Vector3d>& origins, Eigen::Vector2f* landings, RayEnd* ends);
+  std::size_t check_step() const { return check_nodes_.size() > 1 ? check_nodes_[1] : 1; }
+
+  /// Writes origins.size() · nodes() landings (pixel coordinates) and ends, and the lengths of the ways at the check
+  /// nodes.
+  void trace(const std::vector<Eigen::Vector3d>& origins, Eigen::Vector2f* landings, RayEnd* ends, float* lengths);
 
   std::uint64_t rays() const { return rays_; }
   std::uint64_t ray_steps() const { return ray_steps_; }
@@ -34,7 +37,8 @@ class NodeTracer {
 
  private:
   void trace_nodes(const std::vector<Eigen::Vector3d>& origins, const std::vector<std::size_t>& which,
-                   std::size_t first, std::size_t step, Eigen::Vector2f* landings, RayEnd* ends);
+                   std::size_t first, std::size_t step, Eigen::Vector2f* landings, RayEnd* ends,
+                   float* lengths);
 
   const TensorField& field_;
   const Geometry& geometry_;

@@ -1,312 +1,494 @@
 #include "integrators/lens/lens.h"
 
 #include <algorithm>
+#include <atomic>
 #include <chrono>
 #include <cmath>
 #include <stdexcept>
+#include <thread>
 
 #include <Eigen/Geometry>
 #include <Eigen/LU>
-#include <Eigen/SVD>
 #include <tbb/parallel_for.h>
-#include <tbb/task_arena.h>
 
-#include "integrators/lens/lens_mesh.h"
+#include "integrators/flow/flow_view.h"
+#include "renderer/surfaces/planar_mesh.h"
 
 namespace tensorray {
 namespace {
 
-/// What the threads share and do not change.
-struct LensJob {
-  const LensMap& map;
-  const std::vector<LightChannel>& channels;
-  const Plate& receiver;
-  const LensImage& image;
-  const LensSettings& settings;
-  const Progress& progress;
-  std::vector<double> flexibilities{};  // Of the map's light: with opposite sign for `gather`.
+using Eigen::Affine2d;
+using Eigen::Matrix2d;
+using Eigen::Vector2d;
 
-  /// From pixels of the receiver to the point of the image's plane that straight light shows there.
-  Eigen::Affine2d straight = Eigen::Affine2d::Identity();
-};
+constexpr double tolerance = 0.25;          // Wanted error of landings, pixels.
+constexpr double finest_of_scatter = 0.25;  // Size of the smallest squares, pixels: gaps at tears are as wide.
+constexpr double finest_of_gather = 1;      // There, samples in torn squares are traced on their own.
+constexpr std::size_t most_starts = 1u << 14;  // The map has at most so many positions,
+constexpr std::size_t starts_per_pixel = 2;    // plus so many for each pixel. A chaotic field could need any number.
+constexpr double same_look = 0.25;  // Pixels: bands whose light sees points this near share a look at the image.
+constexpr double swept_pixels = 2;   // Of the image, over which a pixel's light is spread, so that one sample is enough.
+constexpr double joined_pixels = 16;  // Farther apart, the points that both ends of a band see are on different sheets.
+constexpr double same_place = 1e-3;  // Pixels: sheets whose starts are nearer than this count as one.
 
-/// Coordinates, in the receiver's plane, of a position in pixels.
-Eigen::Vector2d receiver_point(const LensJob& job, const Eigen::Vector2d& pixel) {
-  return plane_coordinates(job.receiver, job.receiver.to_world(pixel));
-}
+bool gathers(const LensLight& light) { return light.settings.mode == LensMode::gather; }
 
-/// Positions of a pixel's samples, in pixels.
-std::vector<Eigen::Vector2d> sample_points(const LensJob& job, int x, int y) {
-  std::vector<Eigen::Vector2d> points;
-  const int n = job.settings.samples;
-  for (int j = 0; j < n; ++j)
-    for (int i = 0; i < n; ++i) points.emplace_back(x + (i + 0.5) / n, y + (j + 0.5) / n);
-  return points;
-}
-
-Eigen::Vector2d texture_coordinates(const LensJob& job, const Eigen::Vector2d& at) {
-  return (at.array() / job.image.plane.size.array() + 0.5).matrix();
-}
-
-/// Change of (s, t) per pixel along x and y, from ∂image/∂receiver.
-Eigen::Matrix2d per_pixel(const LensJob& job, const Eigen::Matrix2d& image_by_receiver) {
-  const Eigen::Vector2d pixel = job.receiver.pixel_size();
-  return job.image.plane.size.cwiseInverse().asDiagonal() * image_by_receiver *
-         Eigen::Vector2d(pixel.x(), -pixel.y()).asDiagonal();
-}
-
-bool sees_image(const LensJob& job, const Eigen::Vector2d& st) {
-  constexpr double rounding = 1e-9;
-  return job.image.wraps || ((st.array() >= -rounding).all() && (st.array() <= 1 + rounding).all());
-}
-
-/// What one sample of a channel adds to its pixel.
-struct Shade {
-  double radiance = 0, alpha = 0;
-};
-
-Shade shade(const LensJob& job, std::size_t channel, const Eigen::Vector2d& at,
-            const Eigen::Matrix2d& image_by_receiver) {
-  const Eigen::Vector2d st = texture_coordinates(job, at);
-  if (!sees_image(job, st)) return {};
-  const Eigen::Matrix2d footprint = per_pixel(job, image_by_receiver) / job.settings.samples;
-  const Eigen::Vector4d texel = job.image.texture->lookup(st, footprint).cast<double>();
-  const double part = 1.0 / (job.settings.samples * job.settings.samples);
-  if (!(texel.w() > 0)) return {};
-  return {part * texel.w() * job.image.radiance(texel.head<3>() / texel.w(), channel), part * texel.w()};
-}
-
-/// ln σ₁ >= ln σ₂ of a matrix; −∞ where it is singular, 0 where it is not finite.
-Eigen::Vector2d log_singular_values(const Eigen::Matrix2d& m) {
-  if (!m.allFinite()) return Eigen::Vector2d::Zero();
-  const double greater =
-      (std::hypot(m(0, 0) + m(1, 1), m(0, 1) - m(1, 0)) + std::hypot(m(0, 0) - m(1, 1), m(0, 1) + m(1, 0))) / 2;
-  return {std::log(greater), std::log(std::abs(m.determinant())) - std::log(greater)};
-}
-
-/// The LensPoint of a position (in pixels) of the receiver that shows the point `at` of the image's plane.
-/// @param log_stretch  ln σ₁ >= ln σ₂ of ∂receiver/∂image.
-LensPoint make_point(const LensJob& job, const Eigen::Vector2d& pixel, const Eigen::Vector2d& at,
-                     const Eigen::Matrix2d& image_by_receiver, const Eigen::Vector2d& log_stretch, double length) {
-  LensPoint point;
-  point.st = texture_coordinates(job, at);
-  point.end = sees_image(job, point.st) ? LensEnd::image : LensEnd::outside;
-  point.per_pixel = per_pixel(job, image_by_receiver);
-  point.displacement = plane_point(job.image.plane, at) - plane_point(job.image.plane, job.straight * pixel);
-  point.log_stretch = log_stretch;
-  point.log_magnification = log_stretch.sum();
-  point.length = length;
-  return point;
-}
-
-void count_ends(const std::vector<LensLanding>& landings, std::size_t channels, std::vector<EndCounts>& ends) {
-  for (std::size_t i = 0; i < landings.size(); ++i) ++ends[i % channels][static_cast<int>(landings[i].end)];
-}
-
-/// Counts of one row of pixels.
-struct GatheredRow {
-  TraceCounts counts;
-  std::vector<EndCounts> ends;
-};
-
-/// The landing of the pixel's centre in the reference channel.
-LensLanding reference_landing(const LensJob& job, int x, int y, const std::vector<LensLanding>& landings,
-                              TraceCounts& counts) {
-  const int n = job.settings.samples;
-  if (n % 2 == 1) return landings[(n * n / 2) * job.channels.size() + job.settings.reference];
-  LensLanding landing;
-  const Eigen::Vector2d center = receiver_point(job, {x + 0.5, y + 0.5});
-  counts += job.map.trace({center}, {job.flexibilities[job.settings.reference]}, &landing);
-  return landing;
-}
-
-void gather_row(const LensJob& job, int y, LensPicture& picture, std::vector<LensLanding>& references,
-                GatheredRow& row) {
-  const std::size_t channels = job.channels.size();
-  row.ends.assign(channels, EndCounts{});
-  std::vector<LensLanding> landings(static_cast<std::size_t>(job.settings.samples) * job.settings.samples * channels);
-  for (int x = 0; x < job.receiver.resolution.x(); ++x) {
-    if (job.progress.cancelled) throw Cancelled();
-    std::vector<Eigen::Vector2d> starts = sample_points(job, x, y);
-    for (Eigen::Vector2d& start : starts) start = receiver_point(job, start);
-    row.counts += job.map.trace(starts, job.flexibilities, landings.data());
-    count_ends(landings, channels, row.ends);
-    const std::size_t pixel = static_cast<std::size_t>(y) * job.receiver.resolution.x() + x;
-    std::vector<double> alpha(channels);
-    for (std::size_t i = 0; i < landings.size(); ++i) {
-      if (landings[i].end != RayEnd::plate) continue;
-      const std::size_t channel = i % channels;
-      const Shade seen = shade(job, channel, landings[i].at, landings[i].jacobian);
-      picture.radiance.plane(static_cast<int>(channel))[pixel] += seen.radiance;
-      alpha[channel] += seen.alpha;
-    }
-    picture.alpha[pixel] = *std::max_element(alpha.begin(), alpha.end());
-    const LensLanding& landing = references[pixel] = reference_landing(job, x, y, landings, row.counts);
-    LensPoint& point = picture.points[pixel];
-    point.end = static_cast<LensEnd>(landing.end);
-    if (landing.end != RayEnd::plate) continue;
-    const Eigen::Vector2d log_stretch = -log_singular_values(landing.jacobian).reverse();
-    point = make_point(job, {x + 0.5, y + 0.5}, landing.at, landing.jacobian, log_stretch, landing.length);
-  }
-}
-
-/// Calls `work(y)` for each row of the picture on all threads. Between groups of rows it calls `tell(y)` on the calling
-/// thread.
-template <class Tell, class Work>
-void for_rows(const LensJob& job, const Tell& tell, const Work& work) {
-  const int height = job.receiver.resolution.y(), rows_at_once = 8 * tbb::this_task_arena::max_concurrency();
-  for (int first = 0; first < height; first += rows_at_once) {
-    tell(first);
-    tbb::parallel_for(first, std::min(first + rows_at_once, height), [&](int y) {
-      if (job.progress.cancelled) throw Cancelled();
-      work(y);
-    });
-  }
-}
-
-/// Counts the places of the picture that show what each pixel sees. The map from the picture to the image, as a mesh,
-/// may fold; each sheet is one place.
-void count_places(const LensJob& job, std::vector<LensLanding> references, LensPicture& picture) {
-  const Eigen::Vector2i size = job.receiver.resolution;
-  std::vector<Eigen::Vector2d> starts;
-  for (int y = 0; y < size.y(); ++y)
-    for (int x = 0; x < size.x(); ++x) starts.push_back(receiver_point(job, {x + 0.5, y + 0.5}));
-  const double pixel = job.receiver.pixel_size().minCoeff();
-  const LensMesh mesh = lattice_mesh(std::move(starts), std::move(references), size.x(), size.y(), pixel);
-  const SheetSearch search(mesh, pixel);
-  const auto width = static_cast<std::size_t>(size.x());
-  const auto tell = [&](int y) { job.progress.update("counting folds", y, size.y()); };
-  for_rows(job, tell, [&](int y) {
-    std::vector<Sheet> sheets;
-    for (std::size_t i = y * width; i < (y + 1) * width; ++i) {
-      if (mesh.landings[i].end != RayEnd::plate) continue;
-      search.find(mesh.landings[i].at, sheets);
-      picture.points[i].folds = std::max(1, static_cast<int>(sheets.size()));  // At least the pixel itself.
-    }
-  });
-}
-
-void gather(const LensJob& job, LensPicture& picture) {
-  const int height = job.receiver.resolution.y();
-  std::vector<LensLanding> references(picture.points.size());
-  std::vector<GatheredRow> rows(static_cast<std::size_t>(height));
-  const auto tell = [&](int y) { job.progress.update("tracing rays", y, height); };
-  for_rows(job, tell, [&](int y) { gather_row(job, y, picture, references, rows[static_cast<std::size_t>(y)]); });
-  for (const GatheredRow& row : rows) {
-    picture.counts += row.counts;
-    for (std::size_t channel = 0; channel < row.ends.size(); ++channel)
-      for (int end = 0; end < ray_end_count; ++end) picture.ends[channel][end] += row.ends[channel][end];
-  }
-  count_places(job, std::move(references), picture);
-}
-
-/// The sheet whose start is nearest to that of straight light; of equally near ones, the first.
-Sheet nearest_sheet(const std::vector<Sheet>& sheets, const Eigen::Vector2d& straight) {
-  return *std::min_element(sheets.begin(), sheets.end(), [&](const Sheet& a, const Sheet& b) {
-    return (a.start - straight).squaredNorm() < (b.start - straight).squaredNorm();
-  });
-}
-
-void scatter_row(const LensJob& job, int y, std::size_t channel, const SheetSearch& search, LensPicture& picture) {
-  std::vector<Sheet> sheets;
-  for (int x = 0; x < job.receiver.resolution.x(); ++x) {
-    const std::size_t pixel = static_cast<std::size_t>(y) * job.receiver.resolution.x() + x;
-    double alpha = 0;
-    for (const Eigen::Vector2d& sample : sample_points(job, x, y)) {
-      search.find(receiver_point(job, sample), sheets);
-      if (sheets.empty()) continue;
-      const Sheet sheet = nearest_sheet(sheets, job.straight * sample);
-      const Shade seen = shade(job, channel, sheet.start, sheet.jacobian.inverse());
-      picture.radiance.plane(static_cast<int>(channel))[pixel] += seen.radiance;
-      alpha += seen.alpha;
-    }
-    picture.alpha[pixel] = std::max(picture.alpha[pixel], alpha);
-    if (channel != job.settings.reference) continue;
-    const Eigen::Vector2d center(x + 0.5, y + 0.5);
-    search.find(receiver_point(job, center), sheets);
-    if (sheets.empty()) continue;
-    const Sheet sheet = nearest_sheet(sheets, job.straight * center);
-    picture.points[pixel] = make_point(job, center, sheet.start, sheet.jacobian.inverse(),
-                                       log_singular_values(sheet.jacobian), sheet.length);
-    picture.points[pixel].folds = static_cast<int>(sheets.size());
-  }
-}
-
-/// The part of the image whose light may reach the receiver: the part in front of the volume, and the part that
-/// straight light shows.
-Eigen::AlignedBox2d useful_starts(const LensJob& job, const TriangleMesh& volume, const Eigen::Vector3d& direction) {
-  const Plate& plane = job.image.plane;
-  Eigen::AlignedBox2d useful;
-  for (const Eigen::Vector3d& vertex : volume.vertices) {
-    const double ahead = plane.normal().dot(vertex - plane.center) / plane.normal().dot(direction);
-    useful.extend(plane_coordinates(plane, vertex - ahead * direction));
-  }
-  const Eigen::Vector2d size = job.receiver.resolution.cast<double>();
-  for (const Eigen::Vector2d& corner :
-       {Eigen::Vector2d(0, 0), Eigen::Vector2d(size.x(), 0), Eigen::Vector2d(0, size.y()), size})
-    useful.extend(job.straight * corner);
-  const Eigen::AlignedBox2d image(-plane.size / 2, plane.size / 2);
-  const Eigen::AlignedBox2d part = useful.intersection(image);
-  return part.isEmpty() ? image : part;
-}
-
-/// The rotation that is nearest to the map of directions, by straight light, from the image's plane to the receiver's.
-Eigen::Matrix2d straight_turn(const LensJob& job) {
-  const Eigen::Vector2d pixel = job.receiver.pixel_size();
-  const Eigen::Matrix2d image_by_receiver =
-      job.straight.linear() * Eigen::Vector2d(1 / pixel.x(), -1 / pixel.y()).asDiagonal();
-  const Eigen::JacobiSVD<Eigen::Matrix2d> svd(image_by_receiver, Eigen::ComputeFullU | Eigen::ComputeFullV);
-  return svd.matrixV() * svd.matrixU().transpose();
-}
-
-/// Adds to the picture what the mesh shows, row by row.
-void scatter_rows(const LensJob& job, std::size_t channel, const LensMesh& mesh, const MeshReport& report,
-                  LensPicture& picture) {
-  const SheetSearch search(mesh, job.receiver.pixel_size().minCoeff());
-  const auto tell = [&](int y) { report(static_cast<double>(y) / job.receiver.resolution.y()); };
-  for_rows(job, tell, [&](int y) { scatter_row(job, y, channel, search, picture); });
-}
-
-void scatter(const LensJob& job, const TriangleMesh& volume, const Eigen::Vector3d& direction, LensPicture& picture) {
-  LensMeshSettings settings;
-  settings.starts = useful_starts(job, volume, direction);
-  settings.target = job.receiver.size;
-  settings.pixel = job.receiver.pixel_size();
-  settings.turn = straight_turn(job);
-  // Progress steps of a channel: half for its mesh, and half for the rows of the picture.
-  constexpr std::uint64_t parts = 1000;
-  for (std::size_t channel = 0; channel < job.channels.size(); ++channel) {
-    const auto tell = [&](double part) {
-      job.progress.update("tracing rays", channel * parts + static_cast<std::uint64_t>(part * parts),
-                          job.channels.size() * parts);
-    };
-    const LensMesh mesh = make_lens_mesh(job.map, job.flexibilities[channel], settings, picture.counts, job.progress,
-                                         [&](double part) { tell(part / 2); });
-    for (const LensLanding& landing : mesh.landings) ++picture.ends[channel][static_cast<int>(landing.end)];
-    scatter_rows(
-        job, channel, mesh, [&](double part) { tell((1 + part) / 2); }, picture);
-  }
+/// From coordinates in a plate's plane to its pixels.
+Affine2d to_pixels(const Plate& plate) {
+  const Vector2d per_unit = plate.pixel_size().cwiseInverse();
+  Affine2d map;
+  map.linear() = Vector2d(per_unit.x(), -per_unit.y()).asDiagonal();
+  map.translation() = plate.resolution.cast<double>() / 2;
+  return map;
 }
 
 /// Maps pixels of the receiver along the light to coordinates in the image's plane.
-Eigen::Affine2d straight_map(const Plate& receiver, const Plate& image, const Eigen::Vector3d& direction) {
-  const auto seen = [&](const Eigen::Vector2d& pixel) {
+Affine2d straight_map(const Plate& receiver, const Plate& image, const Eigen::Vector3d& direction) {
+  const auto seen = [&](const Vector2d& pixel) {
     const Eigen::Vector3d point = receiver.to_world(pixel), normal = image.normal();
     return plane_coordinates(image, point + normal.dot(image.center - point) / normal.dot(direction) * direction);
   };
-  Eigen::Affine2d map;
+  Affine2d map;
   map.translation() = seen({0, 0});
   map.linear() << seen({1, 0}) - map.translation(), seen({0, 1}) - map.translation();
   return map;
 }
 
-void check(const std::vector<LightChannel>& channels, const LensImage& image, const LensSettings& settings) {
-  if (channels.empty()) throw std::invalid_argument("a lens needs at least one wavelength");
-  if (!image.texture || !image.radiance) throw std::invalid_argument("a lens needs an image");
-  if (settings.samples < 1) throw std::invalid_argument("integrator.samples must be positive");
-  if (settings.reference >= channels.size())
-    throw std::invalid_argument("the reference channel is out of range: it must be below the number of wavelengths");
+/// The part of the image whose light may reach the receiver: the part in front of the volume, and the part that
+/// straight light shows.
+Eigen::AlignedBox2d useful_starts(const LensLight& light, const TriangleMesh& volume) {
+  const Plate& plane = light.image.plane;
+  Eigen::AlignedBox2d useful;
+  for (const Eigen::Vector3d& vertex : volume.vertices) {
+    const double ahead = plane.normal().dot(vertex - plane.center) / plane.normal().dot(light.direction);
+    useful.extend(plane_coordinates(plane, vertex - ahead * light.direction));
+  }
+  const Vector2d size = light.receiver.resolution.cast<double>();
+  for (const Vector2d& corner : {Vector2d(0, 0), Vector2d(size.x(), 0), Vector2d(0, size.y()), size})
+    useful.extend(light.straight * corner);
+  const Eigen::AlignedBox2d image(-plane.size / 2, plane.size / 2);
+  const Eigen::AlignedBox2d part = useful.intersection(image);
+  return part.isEmpty() ? image : part;
 }
+
+/// The plate of the map. In `gather` its pixels are those of the receiver, as straight light projects them.
+Plate plate_of_landings(const LensLight& light) {
+  if (!gathers(light)) return light.receiver;
+  Plate plate = light.image.plane;
+  const double pixel = std::sqrt(std::abs(light.straight.linear().determinant()));
+  plate.resolution = (plate.size / pixel).array().ceil().max(1).min(1e6).cast<int>();
+  plate.size = pixel * plate.resolution.cast<double>();
+  return plate;
+}
+
+/// Parallel light that starts on a rectangle of a plane.
+Beam beam_from(const Plate& plane, const Eigen::AlignedBox2d& starts, const Eigen::Vector3d& direction) {
+  Beam beam;
+  beam.direction = direction;
+  beam.center = plane.center;
+  beam.right = plane.right;
+  beam.up = plane.up;
+  using Box = Eigen::AlignedBox2d;
+  for (const Box::CornerType corner : {Box::BottomLeft, Box::BottomRight, Box::TopRight, Box::TopLeft})
+    beam.aperture.push_back(starts.corner(corner));
+  return beam;
+}
+
+FlowSettings flow_settings(const LensLight& light) {
+  FlowSettings settings;
+  settings.flexibilities = light.settings.flexibilities;
+  // Light that is traced back from its end obeys the rule with the opposite sign of s.
+  if (gathers(light))
+    for (double& flexibility : settings.flexibilities) flexibility = -flexibility;
+  settings.range = light.settings.range;
+  settings.tolerance = tolerance;
+  settings.finest = gathers(light) ? finest_of_gather : finest_of_scatter;
+  settings.silhouette = false;
+  settings.beside = gathers(light) && light.image.wraps;
+  settings.most_starts = most_starts + starts_per_pixel * static_cast<std::size_t>(light.receiver.resolution.prod());
+  return settings;
+}
+
+/// What the threads share when the picture is drawn.
+struct Drawing {
+  const LensLight& light;
+  const std::vector<LensBand>& bands;
+  const LensRadiance& radiance;
+  Affine2d starts;    // From the coordinates of the map's starts to pixels of the receiver, in `gather`.
+  Affine2d landings;  // From coordinates to the map's landings.
+  struct Ends {
+    std::size_t begin, end;
+  };
+  std::vector<Ends> ends{};     // Of the bands, as indices of `nodes`.
+  std::vector<double> nodes{};  // Places among the map's nodes that are drawn: the ends of bands; the last: the reference.
+  FlowView view;
+};
+
+/// The view of a map whose `other` ends are pixels of the landings (gather) or coordinates of starts (scatter).
+FlowPicture flow_picture(const LensLight& light) {
+  FlowPicture picture;
+  picture.resolution = light.receiver.resolution;
+  picture.straight = light.straight;
+  if (!gathers(light)) return picture;
+  picture.side = FlowSide::starts;
+  picture.to_pixel = to_pixels(light.receiver);
+  picture.straight = to_pixels(light.landings) * light.straight;
+  return picture;
+}
+
+/// A place between the first and the last flexibility, as one among the nodes of the map.
+double node_at(const LensLight& light, double place) { return place * static_cast<double>(light.map.nodes - 1); }
+
+Drawing make_drawing(const LensLight& light, const std::vector<LensBand>& bands, const LensRadiance& radiance) {
+  std::vector<double> nodes;
+  std::vector<Drawing::Ends> ends;
+  const auto index_of = [&](double place) {
+    const double node = node_at(light, place);
+    if (nodes.empty() || nodes.back() != node) nodes.push_back(node);
+    return nodes.size() - 1;
+  };
+  for (const LensBand& band : bands) {
+    const std::size_t begin = index_of(band.begin);
+    ends.push_back({begin, index_of(band.end)});
+  }
+  nodes.push_back(node_at(light, light.settings.reference));
+  FlowView view(light.map, flow_picture(light), nodes, light.settings.samples);
+  return {light, bands, radiance, to_pixels(light.receiver), to_pixels(light.landings),
+          std::move(ends), std::move(nodes), std::move(view)};
+}
+
+double flexibility_at(const LensLight& light, double node) {
+  const std::vector<double>& s = light.settings.flexibilities;
+  if (!light.settings.range) return s[static_cast<std::size_t>(node)];
+  const double part = light.map.nodes > 1 ? node / static_cast<double>(light.map.nodes - 1) : 0;
+  return (1 - part) * s[0] + part * s[1];
+}
+
+/// What the samples of a tile see, by node and sample.
+using TileView = std::vector<std::vector<FlowPoint>>;
+
+/// Traces light that the map does not know, back from samples of a tile.
+/// @param first  The node that the first part of `points` shows.
+void trace_unknown(const Drawing& drawing, const Eigen::AlignedBox2i& pixels, int n, std::size_t first,
+                   TileView& points, TraceCounts& counts) {
+  std::vector<std::size_t> unknown;
+  std::vector<Vector2d> starts;
+  const int width = n * (pixels.sizes().x() + 1);
+  for (std::size_t i = 0; i < points.front().size(); ++i) {
+    if (std::none_of(points.begin(), points.end(), [&](const auto& each) { return each[i].is_unknown; })) continue;
+    const auto sample = static_cast<int>(i);
+    unknown.push_back(i);
+    starts.push_back(drawing.starts.inverse() *
+                     (pixels.min().cast<double>() + Vector2d(sample % width + 0.5, sample / width + 0.5) / n));
+  }
+  if (unknown.empty()) return;
+  std::vector<double> flexibilities;
+  for (std::size_t k = 0; k < points.size(); ++k)
+    flexibilities.push_back(-flexibility_at(drawing.light, drawing.nodes[first + k]));
+  std::vector<LensLanding> landings(starts.size() * points.size());
+  counts += drawing.light.planes.trace(starts, flexibilities, landings.data());
+  for (std::size_t i = 0; i < landings.size(); ++i) {
+    const LensLanding& landing = landings[i];
+    FlowPoint& point = points[i % points.size()][unknown[i / points.size()]];
+    point = FlowPoint();
+    point.end = landing.end;
+    point.sheets = 1;
+    point.other = (drawing.landings * landing.at).cast<float>();
+    point.jacobian = (drawing.landings.linear() * landing.jacobian).cast<float>();
+    point.length = static_cast<float>(landing.length);
+  }
+}
+
+/// Coordinates, in the image's plane, of what a point sees; its light landed.
+Vector2d image_point(const Drawing& drawing, const FlowPoint& point) {
+  const Vector2d other = point.other.cast<double>();
+  return gathers(drawing.light) ? Vector2d(drawing.landings.inverse() * other) : other;
+}
+
+/// The change of these coordinates per pixel, along x and y.
+Matrix2d image_by_pixel(const Drawing& drawing, const FlowPoint& point) {
+  const Matrix2d jacobian = point.jacobian.cast<double>();
+  if (!gathers(drawing.light)) return jacobian.inverse();
+  return drawing.landings.linear().inverse() * jacobian * drawing.starts.linear().inverse();
+}
+
+Vector2d texture_coordinates(const LensLight& light, const Vector2d& at) {
+  return (at.array() / light.image.plane.size.array() + 0.5).matrix();
+}
+
+bool sees_image(const LensLight& light, const Vector2d& st) {
+  const double rounding = 1e-6;  // Landings are single precision.
+  return light.image.wraps || ((st.array() >= -rounding).all() && (st.array() <= 1 + rounding).all());
+}
+
+/// The footprint of a sample whose point moves along `sweep`: each is a box whose variance adds to that of the other.
+Matrix2d swept(const Matrix2d& footprint, const Vector2d& sweep) {
+  const Matrix2d square = footprint * footprint.transpose() + sweep * sweep.transpose();
+  return square.llt().matrixL();
+}
+
+/// Light of a pixel while its samples are added.
+struct PixelLight {
+  Eigen::Vector3d color = Eigen::Vector3d::Zero();
+  std::vector<double> channels, alpha;  // By channel, and by band.
+};
+
+/// What one sample sees of the image.
+class SampleView {
+ public:
+  /// @param n  Samples per pixel along x and along y.
+  SampleView(const Drawing& drawing, const TileView& points, std::size_t sample, int n)
+      : drawing_(drawing), points_(points), sample_(sample), n_(n) {}
+
+  /// Adds the light of all bands. Bands whose light sees nearly the same points share a look at the image.
+  void shade(PixelLight& pixel) const {
+    for (std::size_t band = 0; band < drawing_.bands.size();) {
+      const auto [a, b] = drawing_.ends[band];
+      std::size_t next = band + 1;
+      if (!lands(a)) {
+        if (lands(b)) look(Glimpse(*this, b), b, 0.5, band, next, pixel);
+        band = next;
+        continue;
+      }
+      const Glimpse glimpse(*this, a);
+      if (!is_joined(glimpse, b)) {
+        look(glimpse, a, 0.5, band, next, pixel);
+        if (lands(b)) look(Glimpse(*this, b), b, 0.5, band, next, pixel);
+      } else {
+        const auto is_near = [&](std::size_t node) { return glimpse.distance(st(node)) <= same_look * n_; };
+        while (next < drawing_.bands.size() && lands(drawing_.ends[next].end) && is_near(drawing_.ends[next].end))
+          ++next;
+        look(glimpse, drawing_.ends[next - 1].end, 1, band, next, pixel);
+      }
+      band = next;
+    }
+  }
+
+  /// Whether the light of all bands is spread along one line of some pixels.
+  bool is_swept() const {
+    double length = 0;
+    for (const auto& [a, b] : drawing_.ends) {
+      if (!lands(a) || !lands(b)) return false;
+      const Glimpse glimpse(*this, a);
+      const double distance = glimpse.distance(st(b));
+      if (!(distance <= joined_pixels * n_)) return false;
+      length += distance;
+    }
+    return length >= swept_pixels * n_;
+  }
+
+ private:
+  const FlowPoint& point(std::size_t node) const { return points_[node][sample_]; }
+  bool lands(std::size_t node) const { return point(node).end == RayEnd::plate; }
+
+  Vector2d st(std::size_t node) const {
+    return texture_coordinates(drawing_.light, image_point(drawing_, point(node)));
+  }
+
+  /// A point of the image, and what a sample sees about it.
+  struct Glimpse {
+    Vector2d st;
+    Matrix2d footprint;   // Change of (s, t) per sample along x and y.
+    Matrix2d to_samples;  // Its inverse.
+
+    Glimpse(const SampleView& sample, std::size_t node)
+        : st(sample.st(node)),
+          footprint(sample.drawing_.light.image.plane.size.cwiseInverse().asDiagonal() *
+                    image_by_pixel(sample.drawing_, sample.point(node)) / sample.n_),
+          to_samples(footprint.inverse()) {}
+
+    /// In samples.
+    double distance(const Vector2d& other) const { return (to_samples * (other - st)).norm(); }
+  };
+
+  /// Whether the points that are seen at both ends of a band belong to one sheet.
+  bool is_joined(const Glimpse& begin, std::size_t end) const {
+    return lands(end) && begin.distance(st(end)) <= joined_pixels * n_;
+  }
+
+  /// Adds the light of the bands from `first` to `last`, which see the line to the point of node `to`.
+  void look(const Glimpse& from, std::size_t to, double share, std::size_t first, std::size_t last,
+            PixelLight& pixel) const {
+    const Vector2d end = st(to), middle = (from.st + end) / 2;
+    if (!sees_image(drawing_.light, middle)) return;
+    const bool is_long = from.distance(end) > same_look * n_;
+    const Eigen::Vector4d texel =
+        drawing_.light.image.texture
+            ->lookup(middle, is_long ? swept(from.footprint, end - from.st) : from.footprint)
+            .cast<double>();
+    if (!(texel.w() > 0)) return;
+    thread_local std::vector<double> radiances;
+    radiances.resize(last - first);
+    drawing_.radiance(texel.head<3>() / texel.w(), first, last, radiances.data());
+    const double part = share * texel.w() / (n_ * n_);
+    for (std::size_t i = first; i < last; ++i) {
+      const LensBand& band = drawing_.bands[i];
+      pixel.color += part * radiances[i - first] * band.color;
+      pixel.channels[band.channel] += part * radiances[i - first] * band.weight;
+      pixel.alpha[i] += part;
+    }
+  }
+
+  const Drawing& drawing_;
+  const TileView& points_;
+  const std::size_t sample_;
+  const double n_;
+};
+
+/// ln σ₁ >= ln σ₂ of a matrix; −∞ where it is singular, 0 where it is not finite.
+Vector2d log_singular_values(const Matrix2d& m) {
+  if (!m.allFinite()) return Vector2d::Zero();
+  const double greater =
+      (std::hypot(m(0, 0) + m(1, 1), m(0, 1) - m(1, 0)) + std::hypot(m(0, 0) - m(1, 1), m(0, 1) + m(1, 0))) / 2;
+  return {std::log(greater), std::log(std::abs(m.determinant())) - std::log(greater)};
+}
+
+/// The LensPoint of a position (in pixels) of the receiver.
+LensPoint make_point(const Drawing& drawing, const Vector2d& pixel, const FlowPoint& seen) {
+  const LensLight& light = drawing.light;
+  LensPoint point;
+  point.end = static_cast<LensEnd>(seen.end);
+  if (seen.end != RayEnd::plate) return point;
+  const Vector2d at = image_point(drawing, seen);
+  const Matrix2d by_pixel = image_by_pixel(drawing, seen);
+  point.st = texture_coordinates(light, at);
+  point.end = sees_image(light, point.st) ? LensEnd::image : LensEnd::outside;
+  point.per_pixel = light.image.plane.size.cwiseInverse().asDiagonal() * by_pixel;
+  point.displacement = plane_point(light.image.plane, at) - plane_point(light.image.plane, light.straight * pixel);
+  point.log_stretch = -log_singular_values(by_pixel * to_pixels(light.receiver).linear()).reverse();
+  point.log_magnification = point.log_stretch.sum();
+  point.length = seen.length;
+  point.folds = seen.sheets;
+  return point;
+}
+
+/// Counts the places of the picture that show what each pixel sees, in `gather`. The map from the picture to the image
+/// may fold; each sheet is one place.
+class PlaceCounter {
+ public:
+  explicit PlaceCounter(const LensLight& light) : light_(light), mesh_(mesh_of(light)), search_(mesh_) {}
+
+  /// @param landing  Pixels of the map.
+  int count(const Vector2d& landing) const {
+    thread_local std::vector<PlanarHit> hits;
+    thread_local std::vector<Vector2d> starts;
+    search_.find(landing, hits);
+    starts.clear();
+    const double least = same_place * light_.receiver.pixel_size().minCoeff();
+    for (const PlanarHit& hit : hits) {
+      Vector2d start(0, 0);
+      for (int i = 0; i < 3; ++i) start += hit.weights[i] * light_.map.starts[mesh_.triangles[hit.triangle][i]];
+      if (std::none_of(starts.begin(), starts.end(), [&](const Vector2d& s) { return (s - start).norm() < least; }))
+        starts.push_back(start);
+    }
+    return std::max(1, static_cast<int>(starts.size()));  // At least the pixel itself.
+  }
+
+ private:
+  static PlanarMesh mesh_of(const LensLight& light) {
+    PlanarMesh mesh;
+    const FlowMap& map = light.map;
+    std::vector<bool> landed;
+    for (std::size_t i = 0; i < map.starts.size(); ++i) {
+      const FlowLanding landing = landing_at(map, i, node_at(light, light.settings.reference));
+      mesh.vertices.push_back(landing.at);
+      landed.push_back(landing.end == RayEnd::plate);
+    }
+    for (const FlowTriangle& triangle : map.triangles) {
+      const auto& [a, b, c] = triangle.corners;
+      if (!triangle.is_torn && landed[a] && landed[b] && landed[c]) mesh.triangles.push_back(triangle.corners);
+    }
+    return mesh;
+  }
+
+  const LensLight& light_;
+  const PlanarMesh mesh_;
+  const PlanarMeshSearch search_;
+};
+
+/// @param n  Samples of a pixel along x and along y.
+/// @param first,last  The nodes that are seen: from `first` to `last`, without it.
+TileView view_tile(const Drawing& drawing, int tile, int n, std::size_t first, std::size_t last, TraceCounts& counts) {
+  TileView points(last - first);
+  for (std::size_t k = first; k < last; ++k) drawing.view.draw(tile, n, k, points[k - first]);
+  if (gathers(drawing.light)) trace_unknown(drawing, drawing.view.pixels(tile), n, first, points, counts);
+  return points;
+}
+
+/// Draws a tile. Where the light of a pixel is spread over several pixels of the image, one sample shows as much as
+/// many.
+void draw_tile(const Drawing& drawing, int tile, LensPicture& picture, TraceCounts& counts) {
+  const Eigen::AlignedBox2i box = drawing.view.pixels(tile);
+  const int n = drawing.light.settings.samples, columns = box.sizes().x() + 1, rows = box.sizes().y() + 1;
+  const std::size_t reference = drawing.nodes.size() - 1;
+  const TileView centers = view_tile(drawing, tile, 1, reference, reference + 1, counts);
+  const TileView coarse = view_tile(drawing, tile, 1, 0, reference, counts);
+  TileView fine;
+  PixelLight light;
+  for (int pixel = 0; pixel < rows * columns; ++pixel) {
+    const int x = pixel % columns, y = pixel / columns;
+    light.color.setZero();
+    light.channels.assign(picture.ends.size(), 0);
+    light.alpha.assign(drawing.bands.size(), 0);
+    const SampleView whole(drawing, coarse, static_cast<std::size_t>(pixel), 1);
+    if (n == 1 || whole.is_swept()) {
+      whole.shade(light);
+    } else {
+      if (fine.empty()) fine = view_tile(drawing, tile, n, 0, reference, counts);
+      for (int i = 0; i < n * n; ++i) {
+        const int sample = (y * n + i / n) * columns * n + x * n + i % n;
+        SampleView(drawing, fine, static_cast<std::size_t>(sample), n).shade(light);
+      }
+    }
+    const Eigen::Vector2i at = box.min() + Eigen::Vector2i(x, y);
+    const auto index = static_cast<std::size_t>(at.y()) * picture.color.width + at.x();
+    for (int c = 0; c < 3; ++c) picture.color.plane(c)[index] = light.color[c];
+    for (int c = 0; c < picture.radiance.channels; ++c)
+      picture.radiance.plane(c)[index] = light.channels[static_cast<std::size_t>(c)];
+    picture.alpha[index] = *std::max_element(light.alpha.begin(), light.alpha.end());
+    picture.points[index] = make_point(drawing, at.cast<double>() + Vector2d(0.5, 0.5),
+                                       centers.front()[static_cast<std::size_t>(pixel)]);
+  }
+}
+
+void count_places(const Drawing& drawing, LensPicture& picture) {
+  const PlaceCounter counter(drawing.light);
+  const Plate& plane = drawing.light.image.plane;
+  tbb::parallel_for(std::size_t{0}, picture.points.size(), [&](std::size_t i) {
+    LensPoint& point = picture.points[i];
+    if (point.end != LensEnd::image && point.end != LensEnd::outside) return;
+    const Vector2d at = ((point.st.array() - 0.5) * plane.size.array()).matrix();
+    point.folds = counter.count(drawing.landings * at);
+  });
+}
+
+/// The number of positions by end, at the middle of each channel.
+std::vector<EndCounts> count_ends(const LensLight& light, const std::vector<LensBand>& bands, std::size_t channels) {
+  std::vector<EndCounts> ends(channels, EndCounts{});
+  for (std::size_t channel = 0; channel < channels; ++channel) {
+    double first = 1, last = 0;
+    for (const LensBand& band : bands) {
+      if (band.channel != channel) continue;
+      first = std::min(first, band.begin);
+      last = std::max(last, band.end);
+    }
+    const double node = node_at(light, (first + last) / 2);
+    for (std::size_t i = 0; i < light.map.starts.size(); ++i)
+      ++ends[channel][static_cast<int>(landing_at(light.map, i, node).end)];
+  }
+  return ends;
+}
+
+void check(const LensImage& image, const LensSettings& settings) {
+  if (settings.flexibilities.empty()) throw std::invalid_argument("a lens needs at least one wavelength");
+  if (!image.texture) throw std::invalid_argument("a lens needs an image");
+  if (settings.samples < 1) throw std::invalid_argument("integrator.samples must be positive");
+  if (!(settings.reference >= 0 && settings.reference <= 1))
+    throw std::invalid_argument("the reference is out of range: it must be a place between two flexibilities, 0 to 1");
+}
+
+using Clock = std::chrono::steady_clock;
+double seconds_since(Clock::time_point start) { return std::chrono::duration<double>(Clock::now() - start).count(); }
 
 }  // namespace
 
@@ -315,35 +497,60 @@ const char* to_string(LensEnd end) {
   return names[static_cast<int>(end)];
 }
 
-LensPicture simulate_lens(const TensorField& field, const Surfaces& surfaces, const BendingSettings& bending,
-                          const std::vector<LightChannel>& channels, const Eigen::Vector3d& direction,
-                          const Plate& receiver, const LensImage& image, const LensSettings& settings,
-                          const Progress& progress) {
-  check(channels, image, settings);
-  const auto start = std::chrono::steady_clock::now();
-  const bool gathers = settings.mode == LensMode::gather;
-  // Light that is traced back from its end obeys the rule with the opposite sign of s.
-  const LensMap map = gathers ? LensMap(field, surfaces, bending, receiver, image.plane, -direction)
-                              : LensMap(field, surfaces, bending, image.plane, receiver, direction);
-  LensJob job{map, channels, receiver, image, settings, progress};  // Each has a different type.
-  job.straight = straight_map(receiver, image.plane, direction);
-  for (const LightChannel& channel : channels)
-    job.flexibilities.push_back(gathers ? -channel.flexibility : channel.flexibility);
+LensLight trace_lens(const TensorField& field, const Surfaces& surfaces, const BendingSettings& bending,
+                     const Eigen::Vector3d& direction, const Plate& receiver, const LensImage& image,
+                     const LensSettings& settings, const Progress& progress) {
+  check(image, settings);
+  const auto start = Clock::now();
+  const bool back = settings.mode == LensMode::gather;
+  const Plate &from = back ? receiver : image.plane, &to = back ? image.plane : receiver;
+  const Eigen::Vector3d along = back ? Eigen::Vector3d(-direction) : direction;
+  LensLight light{settings,
+                  direction,
+                  receiver,
+                  image,
+                  straight_map(receiver, image.plane, direction),
+                  LensMap(field, surfaces, bending, from, to, along),
+                  {},
+                  {}};
+  light.landings = plate_of_landings(light);
+  const Eigen::AlignedBox2d starts =
+      back ? Eigen::AlignedBox2d(-receiver.size / 2, receiver.size / 2) : useful_starts(light, surfaces.bounds);
+  light.map = trace_flow_map(field, light.planes.geometry(), light.landings, beam_from(from, starts, along), bending,
+                             flow_settings(light), progress);
+  light.seconds_tracing = seconds_since(start);
+  return light;
+}
 
-  const Eigen::Vector2i size = receiver.resolution;
+LensPicture draw_lens(const LensLight& light, const std::vector<LensBand>& bands, const LensRadiance& radiance,
+                      std::size_t channels, bool by_channel, const Progress& progress) {
+  const auto start = Clock::now();
+  const Eigen::Vector2i size = light.receiver.resolution;
   LensPicture picture;
-  picture.radiance = Film(size.x(), size.y(), static_cast<int>(channels.size()));
-  picture.alpha.resize(picture.radiance.plane_size());
-  picture.points.resize(picture.radiance.plane_size());
-  picture.ends.assign(channels.size(), EndCounts{});
-  for (int i = 0; i < 2; ++i) picture.straight.linear().row(i) = job.straight.linear().row(i) / image.plane.size[i];
-  picture.straight.translation() = texture_coordinates(job, job.straight.translation());
-  if (gathers) {
-    gather(job, picture);
-  } else {
-    scatter(job, surfaces.bounds, direction, picture);
-  }
-  picture.seconds_tracing = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  picture.color = Film(size.x(), size.y(), 3);
+  if (by_channel) picture.radiance = Film(size.x(), size.y(), static_cast<int>(channels));
+  picture.alpha.resize(picture.color.plane_size());
+  picture.points.resize(picture.color.plane_size());
+  picture.ends = count_ends(light, bands, channels);
+  for (int i = 0; i < 2; ++i)
+    picture.straight.linear().row(i) = light.straight.linear().row(i) / light.image.plane.size[i];
+  picture.straight.translation() = texture_coordinates(light, light.straight.translation());
+
+  const Drawing drawing = make_drawing(light, bands, radiance);
+  std::vector<TraceCounts> counts(static_cast<std::size_t>(drawing.view.tiles()));
+  std::atomic<std::uint64_t> done{0};
+  const std::thread::id caller = std::this_thread::get_id();
+  progress.update("drawing the picture", 0, counts.size());
+  tbb::parallel_for(0, drawing.view.tiles(), [&](int tile) {
+    if (progress.cancelled) throw Cancelled();
+    draw_tile(drawing, tile, picture, counts[static_cast<std::size_t>(tile)]);
+    const std::uint64_t drawn = ++done;
+    if (std::this_thread::get_id() == caller) progress.update("drawing the picture", drawn, counts.size());
+  });
+  if (gathers(light)) count_places(drawing, picture);
+  picture.counts = {light.map.ray_steps, light.map.tensor_samples};
+  for (const TraceCounts& each : counts) picture.counts += each;
+  picture.seconds_drawing = seconds_since(start);
   return picture;
 }
 

@@ -6,6 +6,7 @@
 /// Both rectangles are given as the viewer sees them: their normals point to the viewer, along the light. This medium
 /// has no n² radiance law: the radiance of the image arrives unchanged.
 
+#include <cstddef>
 #include <functional>
 #include <vector>
 
@@ -13,6 +14,7 @@
 
 #include "base/progress.h"
 #include "integrators/bending/light_channel.h"
+#include "integrators/flow/flow_map.h"
 #include "integrators/lens/lens_map.h"
 #include "renderer/film/film.h"
 #include "renderer/textures/texture.h"
@@ -34,15 +36,32 @@ struct LensImage {
   Plate plane;         ///< Its resolution is not used.
   bool wraps = false;  ///< Whether the image repeats beyond the edges of the plane, as the texture does (affects only
                        ///< `gather`). If not, the texture should clamp, so that its edges are as sharp as the samples.
-
-  /// The radiance of a colour (R, G, B in the working space) in a channel; white has 1.
-  std::function<double(const Eigen::Vector3d& rgb, std::size_t channel)> radiance;
 };
+
+/// A part of the light: a narrow band of wavelengths, or a colour in RGB mode. It is spread evenly over the points of
+/// the image that its light sees.
+struct LensBand {
+  double begin = 0, end = 0;  ///< Its ends, as places between the first (0) and the last (1) flexibility. They are equal
+                              ///< outside a range.
+  std::size_t channel = 0;    ///< The channel that it belongs to.
+  double weight = 1;          ///< Its part of the channel's radiance; the sum over the bands of a channel is 1.
+  Eigen::Vector3d color = Eigen::Vector3d::Zero();  ///< What a radiance of 1 adds to the picture (R, G, B).
+};
+
+/// Writes the radiances of a colour (R, G, B in the working space) in the bands from `first` to `last`, without it;
+/// white has 1.
+using LensRadiance =
+    std::function<void(const Eigen::Vector3d& rgb, std::size_t first, std::size_t last, double* radiances)>;
 
 struct LensSettings {
   LensMode mode = LensMode::scatter;
-  int samples = 1;            ///< Samples per pixel along x and along y; > 0.
-  std::size_t reference = 0;  ///< The channel that LensPicture::points describes.
+  int samples = 1;       ///< Samples per pixel along x and along y; > 0.
+  double reference = 0;  ///< The light that LensPicture::points describes: its place, from 0 to 1, between the first and
+                         ///< the last flexibility.
+
+  /// Flexibilities of the light: each on its own, or the two ends of a range.
+  std::vector<double> flexibilities;
+  bool range = false;
 };
 
 /// Why a pixel sees the image, or does not. The values are the ends of rays: `image` is a ray that landed on the image,
@@ -52,7 +71,7 @@ static_assert(static_cast<int>(LensEnd::degenerate) == static_cast<int>(RayEnd::
 constexpr int lens_end_count = 6;
 const char* to_string(LensEnd end);
 
-/// What the centre of a pixel sees, in the reference channel.
+/// What the centre of a pixel sees, at the reference.
 struct LensPoint {
   LensEnd end = LensEnd::missed;  ///< In `scatter`, a pixel where no light lands is `missed`.
 
@@ -69,26 +88,47 @@ struct LensPoint {
 };
 
 struct LensPicture {
-  Film radiance;              ///< One plane for each channel, multiplied by alpha.
-  std::vector<double> alpha;  ///< One value for each pixel: the part of it that sees the image, in the channel that
-                              ///< sees most of it. Where other channels do not see the image, their light is missing,
+  Film color;                 ///< Red, green and blue, multiplied by alpha.
+  Film radiance;              ///< If asked for: one plane for each channel, multiplied by alpha.
+  std::vector<double> alpha;  ///< One value for each pixel: the part of it that sees the image, in the band that
+                              ///< sees most of it. Where other bands do not see the image, their light is missing,
                               ///< and the remaining light is coloured.
   std::vector<LensPoint> points;                           ///< One for each pixel, row by row from the top.
   Eigen::Affine2d straight = Eigen::Affine2d::Identity();  ///< Maps pixels to the (s, t) that straight light shows.
-  std::vector<EndCounts> ends;  ///< Number of rays by channel and end; `plate` counts those that met the plane of the
-                                ///< image (gather) or of the receiver (scatter).
+  std::vector<EndCounts> ends;  ///< Number of positions of the map by channel and end; `plate` counts light that met
+                                ///< the plane of the image (gather) or of the receiver (scatter).
   TraceCounts counts;
+  double seconds_drawing = 0;
+};
+
+/// The light between an image and a receiver, before it is drawn.
+struct LensLight {
+  LensSettings settings;
+  Eigen::Vector3d direction;
+  Plate receiver;
+  LensImage image;
+  Eigen::Affine2d straight;  ///< From pixels to the point of the image's plane (its coordinates) that straight light shows.
+  LensMap planes;            ///< From the image to the receiver (scatter), or back (gather).
+  Plate landings;            ///< The plate of `map`, in whose pixels its landings are.
+  FlowMap map;               ///< Between the planes. Starts are coordinates in the plane where light starts.
   double seconds_tracing = 0;
 };
 
-/// The picture on `receiver`, with the resolution of `receiver`.
+/// Traces the light.
 /// @param surfaces   Bounds, cut and obstacles of the scene; its plate is not used.
 /// @param direction  Direction of the light, unit.
+/// @param receiver   With the resolution of the picture.
+/// `field` and the image's texture must outlive the result, which is the same for any number of threads.
 /// @throw std::invalid_argument if a setting is out of range; Cancelled.
-/// The result is the same for any number of threads.
-LensPicture simulate_lens(const TensorField& field, const Surfaces& surfaces, const BendingSettings& bending,
-                          const std::vector<LightChannel>& channels, const Eigen::Vector3d& direction,
-                          const Plate& receiver, const LensImage& image, const LensSettings& settings,
-                          const Progress& progress);
+LensLight trace_lens(const TensorField& field, const Surfaces& surfaces, const BendingSettings& bending,
+                     const Eigen::Vector3d& direction, const Plate& receiver, const LensImage& image,
+                     const LensSettings& settings, const Progress& progress);
+
+/// The picture that `bands` make up.
+/// @param channels    Number of channels; the bands of a channel follow each other.
+/// @param by_channel  Whether the result has the radiance of each channel.
+/// @throw Cancelled. The result is the same for any number of threads.
+LensPicture draw_lens(const LensLight& light, const std::vector<LensBand>& bands, const LensRadiance& radiance,
+                      std::size_t channels, bool by_channel, const Progress& progress);
 
 }  // namespace tensorray

@@ -44,8 +44,8 @@ class LensMap {
   LensMap(const TensorField& field, const Surfaces& surfaces, const BendingSettings& bending, const Plate& from,
           const Plate& to, const Eigen::Vector3d& direction);
 
-  const Plate& from() const { return from_; }
-  const Plate& to() const { return to_; }
+  /// The scene whose plate is the plane where light lands.
+  const Geometry& geometry() const { return geometry_; }
 
   /// Follows a ray for each of `starts` and each of `flexibilities` and writes starts.size() · flexibilities.size()
   /// landings. The landings of one start are next to each other. @return the cost.

@@ -45,6 +45,12 @@ Image linear_image(const Film& film, const std::vector<Band>& bands, const Eigen
   return image;
 }
 
+Image color_image(const Film& color) {
+  std::vector<Band> primaries(3);
+  for (int c = 0; c < 3; ++c) primaries[static_cast<std::size_t>(c)].xyz = Eigen::Vector3d::Unit(c);
+  return linear_image(color, primaries, Eigen::Matrix3d::Identity());
+}
+
 SpectralImage spectral_image(const Film& film, const std::vector<Band>& bands, double beam_irradiance,
                              const Eigen::Matrix3d& xyz_to_rgb) {
   check_channels(film, bands);

@@ -14,10 +14,12 @@ namespace tensorray {
 
 /// Converts a film whose channel k is `bands[k]` to colours relative to the undisturbed beam (1: undisturbed). The
 /// picture has the channels R, G, B; each pixel is `xyz_to_rgb` times Σ_k film_k xyz_k. Undisturbed light has Y = 1.
-/// For a film that already holds R, G and B, use three bands whose xyz are the unit vectors, and the identity.
 /// Runs on all threads; the result does not depend on their number.
 /// @throw std::invalid_argument unless the film has one channel per band.
 Image linear_image(const Film& film, const std::vector<Band>& bands, const Eigen::Matrix3d& xyz_to_rgb);
+
+/// The picture of a film whose channels are red, green and blue of the working space.
+Image color_image(const Film& color);
 
 struct SpectralImage {
   Image image;

@@ -47,6 +47,9 @@ std::vector<std::string> image_endings();
 /// picture in parallel.) Do not call it while pictures are read or written.
 void set_image_threads(int threads);
 
+/// Loads what is needed to read and write pictures, so that the first one does not wait for it. Any thread may call it.
+void prepare_images();
+
 /// Writes a picture in the format given by the ending of `path`. The same picture always gives the same bytes.
 /// - EXR: all channels as 32-bit floats, ZIP-compressed, with unchanged values and names; all metadata.
 /// - PNG: 16 bits, all metadata. TIFF: 16 bits. JPEG: 8 bits, quality 95. TIFF and JPEG store only the metadata

@@ -9,9 +9,12 @@
 namespace tensorray {
 namespace {
 
-/// Storing larger levels would take more memory than the picture itself; they are quickly computed from the full
-/// picture.
-constexpr int first_stored = 3;
+/// Pictures of up to so many pixels are stored at all sizes: 340 MiB.
+constexpr std::size_t small_picture = std::size_t{1} << 24;
+
+/// The first level that is stored of larger pictures. Storing larger levels would take more memory than the picture
+/// itself; they are quickly computed from the full picture.
+constexpr int first_of_large = 3;
 
 int halved(int size, int level) { return std::max(1, size >> level); }
 
@@ -52,15 +55,21 @@ void convert(const NativeImage& image, const ColorConversion& conversion, int co
 }  // namespace
 
 ImagePyramid::ImagePyramid(NativeImage image, ColorConversion conversion)
-    : image_(std::move(image)), conversion_(std::move(conversion)) {
-  for (int level = first_stored; level < levels(); ++level) {
+    : image_(std::move(image)),
+      conversion_(std::move(conversion)),
+      first_stored_(static_cast<std::size_t>(image_.width) * image_.height <= small_picture ? 0 : first_of_large) {
+  for (int level = first_stored_; level < levels(); ++level) {
     std::vector<float> pixels(static_cast<std::size_t>(width(level)) * height(level) * 4);
-    const int from = level == first_stored ? 0 : level - 1;
     tbb::parallel_for(0, height(level), [&](int y) {
-      reduce_row(from, level, 0, y, width(level), &pixels[static_cast<std::size_t>(y) * width(level) * 4]);
+      float* const row = &pixels[static_cast<std::size_t>(y) * width(level) * 4];
+      if (level == 0)
+        read_picture(0, y, width(0), row);
+      else
+        reduce_row(level == first_stored_ ? 0 : level - 1, level, 0, y, width(level), row);
     });
     stored_.push_back(std::move(pixels));
   }
+  if (first_stored_ == 0) image_.samples.reset();
 }
 
 int ImagePyramid::levels() const {
@@ -83,15 +92,24 @@ void ImagePyramid::read(int level, int x, int y, int columns, int rows, std::siz
 }
 
 void ImagePyramid::read_row(int level, int x, int y, int count, float* rgba) const {
-  if (level == 0) {
-    read_pixels(image_, x, y, count, rgba);
-    convert(image_, conversion_, count, rgba);
-  } else if (level < first_stored) {
-    reduce_row(0, level, x, y, count, rgba);
-  } else {
+  if (const float* const pixels = stored(level)) {
     const std::size_t first = static_cast<std::size_t>(y) * width(level) + x;
-    std::copy_n(&stored_[level - first_stored][first * 4], static_cast<std::size_t>(count) * 4, rgba);
+    std::copy_n(pixels + first * 4, static_cast<std::size_t>(count) * 4, rgba);
+  } else if (level == 0) {
+    read_picture(x, y, count, rgba);
+  } else {
+    reduce_row(0, level, x, y, count, rgba);
   }
+}
+
+const float* ImagePyramid::stored(int level) const {
+  const auto index = static_cast<std::size_t>(level - first_stored_);
+  return level < first_stored_ || index >= stored_.size() ? nullptr : stored_[index].data();
+}
+
+void ImagePyramid::read_picture(int x, int y, int count, float* rgba) const {
+  read_pixels(image_, x, y, count, rgba);
+  convert(image_, conversion_, count, rgba);
 }
 
 /// Averages the pixels of the larger level `from` that each pixel of a row covers.

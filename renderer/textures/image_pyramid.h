@@ -9,36 +9,41 @@
 
 #include "renderer/color/color.h"
 #include "renderer/images/image.h"
+#include "renderer/images/picture_library.h"
 
 namespace tensorray {
 
 /// Levels of R, G, B, A with the colours multiplied by alpha. Level 0 is the picture. Each further level has half the
 /// width and height (rounded down, at least 1); the last level is a single pixel. A pixel of a level is the exact mean
 /// over its area for any size of the picture, so that no level aliases and all levels have the same mean.
-/// Memory: the picture as it is stored, and a third of a byte per pixel. Levels 0 to 2 are converted when they are
-/// read; smaller levels are computed by the constructor, on all threads.
+/// Memory: 21 bytes for each pixel of a picture of up to 16 million pixels, of which all levels are stored. Of a larger
+/// one, the picture as its file stores it, and a third of a byte per pixel: its levels 0 to 2 are converted when they are
+/// read. The constructor computes stored levels on all threads.
 /// Immutable; any number of threads may read.
-class ImagePyramid {
+class ImagePyramid final : public TileSource {
  public:
   /// @param conversion  From the colours of the picture to scene-linear colours.
   ImagePyramid(NativeImage image, ColorConversion conversion);
 
-  int levels() const;
-  int width(int level) const;
-  int height(int level) const;
+  int levels() const override;
+  int width(int level) const override;
+  int height(int level) const override;
   Eigen::Vector4f mean() const;  ///< Mean of all pixels.
 
-  /// Writes the pixels of a rectangle within a level, row by row from the top.
-  /// @param row_pixels  Distance between the beginnings of consecutive rows in `rgba`, in pixels.
-  void read(int level, int x, int y, int columns, int rows, std::size_t row_pixels, float* rgba) const;
+  void read(int level, int x, int y, int columns, int rows, std::size_t row_pixels, float* rgba) const override;
+
+  /// The pixels of a level (R, G, B, A, row by row) if it is stored, otherwise null.
+  const float* stored(int level) const;
 
  private:
+  void read_picture(int x, int y, int count, float* rgba) const;
   void read_row(int level, int x, int y, int count, float* rgba) const;
   void reduce_row(int from, int level, int x, int y, int count, float* rgba) const;
 
   NativeImage image_;
   ColorConversion conversion_;
-  std::vector<std::vector<float>> stored_;  ///< Levels from 3 on.
+  int first_stored_;
+  std::vector<std::vector<float>> stored_;  ///< Levels from first_stored_ on.
 };
 
 }  // namespace tensorray

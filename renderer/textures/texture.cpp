@@ -6,11 +6,7 @@
 #include <stdexcept>
 #include <utility>
 
-#include <OpenImageIO/imagecache.h>
-#include <OpenImageIO/imageio.h>
-#include <OpenImageIO/texture.h>
-
-#include "base/text.h"
+#include "renderer/images/picture_library.h"
 #include "renderer/textures/image_pyramid.h"
 
 namespace tensorray {
@@ -19,82 +15,6 @@ namespace {
 using Eigen::Matrix2d;
 using Eigen::Vector2d;
 using Eigen::Vector4f;
-
-#if OIIO_VERSION_MAJOR >= 3
-using TextureSystemPtr = std::shared_ptr<OIIO::TextureSystem>;
-#else
-struct DestroyTextureSystem {
-  void operator()(OIIO::TextureSystem* system) const { OIIO::TextureSystem::destroy(system); }
-};
-using TextureSystemPtr = std::unique_ptr<OIIO::TextureSystem, DestroyTextureSystem>;
-#endif
-
-const char* const pyramid_attribute = "tensorray:pyramid";
-
-/// Presents a pyramid to OpenImageIO's cache tile by tile. Each level is a separate picture (a subimage) and not a MIP
-/// level: OpenImageIO would choose the MIP level by the shorter side alone, which blurs pictures that are not square.
-class PyramidInput final : public OIIO::ImageInput {
- public:
-  const char* format_name() const override { return "tensorray pyramid"; }
-  int supports(OIIO::string_view feature) const override { return feature == "procedural"; }
-
-  bool open(const std::string& name, OIIO::ImageSpec& spec) override { return open(name, spec, {}); }
-
-  bool open(const std::string&, OIIO::ImageSpec& spec, const OIIO::ImageSpec& config) override {
-    const OIIO::ParamValue* const parameter = config.find_attribute(pyramid_attribute, OIIO::TypeDesc::PTR);
-    if (!parameter) return false;
-    pyramid_ = *static_cast<const ImagePyramid* const*>(parameter->data());
-    m_spec = level_spec(0);
-    spec = m_spec;
-    return true;
-  }
-
-  bool close() override { return true; }
-  int current_subimage() const override { return level_; }
-
-  bool seek_subimage(int level, int miplevel) override {
-    if (level < 0 || level >= pyramid_->levels() || miplevel != 0) return false;
-    level_ = level;
-    m_spec = level_spec(level);
-    return true;
-  }
-
-  // The following functions need no lock: they do not use the current subimage.
-  using OIIO::ImageInput::spec;
-  OIIO::ImageSpec spec(int level, int miplevel) override { return spec_dimensions(level, miplevel); }
-  OIIO::ImageSpec spec_dimensions(int level, int miplevel) override {
-    return level < 0 || level >= pyramid_->levels() || miplevel != 0 ? OIIO::ImageSpec() : level_spec(level);
-  }
-
-  bool read_native_scanline(int, int, int, int, void*) override { return false; }
-
-  bool read_native_tile(int level, int, int x, int y, int, void* data) override {
-    try {
-      float* const rgba = static_cast<float*>(data);
-      std::fill_n(rgba, tile_size * tile_size * 4, 0.0f);
-      const int columns = std::min(tile_size, pyramid_->width(level) - x);
-      const int rows = std::min(tile_size, pyramid_->height(level) - y);
-      pyramid_->read(level, x, y, columns, rows, tile_size, rgba);
-      return true;
-    } catch (const std::exception& error) {
-      errorfmt("{}", error.what());
-      return false;
-    }
-  }
-
- private:
-  static constexpr int tile_size = 64;
-
-  OIIO::ImageSpec level_spec(int level) const {
-    OIIO::ImageSpec spec(pyramid_->width(level), pyramid_->height(level), 4, OIIO::TypeDesc::FLOAT);
-    spec.tile_width = spec.tile_height = tile_size;
-    spec.tile_depth = 1;
-    return spec;
-  }
-
-  const ImagePyramid* pyramid_ = nullptr;
-  int level_ = 0;
-};
 
 /// The ellipse of the picture that a pixel sees, in texels.
 struct Ellipse {
@@ -122,18 +42,6 @@ Ellipse limit(Ellipse ellipse, double longest) {
   return ellipse;
 }
 
-OIIO::TextureOpt make_options(Wrap wrap) {
-  OIIO::TextureOpt options;
-  options.mipmode = OIIO::TextureOpt::MipModeNoMIP;
-  options.interpmode = OIIO::TextureOpt::InterpBilinear;
-  options.swrap = wrap == Wrap::none     ? OIIO::TextureOpt::WrapBlack
-                  : wrap == Wrap::clamp  ? OIIO::TextureOpt::WrapClamp
-                  : wrap == Wrap::repeat ? OIIO::TextureOpt::WrapPeriodic
-                                         : OIIO::TextureOpt::WrapMirror;
-  options.twrap = options.swrap;
-  return options;
-}
-
 /// The equivalent coordinate near the picture, where single precision resolves it.
 double bring_near(double coordinate, Wrap wrap) {
   if (wrap == Wrap::repeat) return coordinate - std::floor(coordinate);
@@ -145,6 +53,32 @@ double bring_near(double coordinate, Wrap wrap) {
 bool is_centre(double coordinate, int size) {
   const double texel = coordinate * size - 0.5;
   return std::abs(texel - std::round(texel)) <= size * 0x1p-22;
+}
+
+/// The texel at an index along an axis of `size` texels, as the picture continues; -1: nothing.
+int wrapped(int index, int size, Wrap wrap) {
+  if (index >= 0 && index < size) return index;
+  if (wrap == Wrap::none) return -1;
+  if (wrap == Wrap::clamp) return index < 0 ? 0 : size - 1;
+  const int period = wrap == Wrap::mirror ? 2 * size : size, within = (index % period + period) % period;
+  return within < size ? within : 2 * size - 1 - within;
+}
+
+/// Linear between the texels of a level that is stored.
+Vector4f interpolate(const float* pixels, int width, int height, const Vector2d& st, Wrap wrap) {
+  const double x = st.x() * width - 0.5, y = st.y() * height - 0.5;
+  const double left = std::floor(x), top = std::floor(y);
+  const auto right_part = static_cast<float>(x - left), lower_part = static_cast<float>(y - top);
+  const auto texel = [&](int column, int row) -> Vector4f {
+    column = wrapped(column, width, wrap);
+    row = wrapped(row, height, wrap);
+    if (column < 0 || row < 0) return Vector4f::Zero();
+    return Eigen::Map<const Vector4f>(pixels + (static_cast<std::size_t>(row) * width + column) * 4);
+  };
+  const auto column = static_cast<int>(left), row = static_cast<int>(top);
+  const Vector4f upper = (1 - right_part) * texel(column, row) + right_part * texel(column + 1, row);
+  const Vector4f lower = (1 - right_part) * texel(column, row + 1) + right_part * texel(column + 1, row + 1);
+  return (1 - lower_part) * upper + lower_part * lower;
 }
 
 /// The levels to mix: `blend` is the weight of level + 1.
@@ -166,54 +100,37 @@ LevelChoice choose_level(double size, int levels) {
 
 struct Texture::State {
   State(NativeImage image, ColorConversion conversion, Wrap wrap_, std::string name_)
-      : pyramid(std::move(image), std::move(conversion)), wrap(wrap_), name(std::move(name_)) {
-    system->attribute("max_memory_MB", 1024.0f);
-    const OIIO::ustring file("picture");  // Each texture has its own cache, so that the name need not be unique.
-    const ImagePyramid* const pointer = &pyramid;
-    OIIO::ImageSpec config;
-    config.attribute(pyramid_attribute, OIIO::TypeDesc::PTR, &pointer);
-    const auto create = []() -> OIIO::ImageInput* { return new PyramidInput; };
-    if (!system->imagecache()->add_file(file, create, &config)) fail();
-    handle = system->get_texture_handle(file);
-    if (!system->good(handle)) fail();
-  }
+      : pyramid(std::move(image), std::move(conversion)), wrap(wrap_), name(std::move(name_)) {}
 
-  [[noreturn]] void fail() const {
-    throw std::runtime_error("cannot look up " + name + ": " + one_line(system->geterror()));
-  }
-
-  Vector4f sample(OIIO::TextureSystem::Perthread* thread, OIIO::TextureOpt& options, int level,
-                  const Vector2d& st) const;
+  Vector4f sample(void* thread, int level, bool closest, const Vector2d& st) const;
   Vector4f mean(const Vector2d& st) const;
-  Vector4f probe(OIIO::TextureSystem::Perthread* thread, const Vector2d& st, LevelChoice choice) const;
+  Vector4f probe(void* thread, const Vector2d& st, LevelChoice choice) const;
 
   ImagePyramid pyramid;
   Wrap wrap;
   std::string name;  ///< For error messages.
-  OIIO::TextureOpt options = make_options(wrap);
-  TextureSystemPtr system{OIIO::TextureSystem::create(false)};
-  OIIO::TextureSystem::TextureHandle* handle = nullptr;
+  std::unique_ptr<TileLookup> tiles = pyramid.stored(0) ? nullptr : picture_library().make_lookup(pyramid, wrap);
 };
 
-/// @param st  In OpenImageIO's coordinates: t goes from the top downwards.
-Vector4f Texture::State::sample(OIIO::TextureSystem::Perthread* thread, OIIO::TextureOpt& level_options, int level,
-                                const Vector2d& st) const {
-  level_options.subimage = level;
+/// @param st  Here t goes from the top downwards.
+Vector4f Texture::State::sample(void* thread, int level, bool closest, const Vector2d& st) const {
+  if (const float* const pixels = pyramid.stored(level))
+    return interpolate(pixels, pyramid.width(level), pyramid.height(level), st, wrap);
   alignas(16) float rgba[4];
-  if (!system->texture(handle, thread, level_options, static_cast<float>(st.x()), static_cast<float>(st.y()), 0, 0, 0,
-                       0, 4, rgba))
-    fail();
+  try {
+    tiles->lookup(thread, level, closest, static_cast<float>(st.x()), static_cast<float>(st.y()), rgba);
+  } catch (const std::exception& error) {
+    throw std::runtime_error("cannot look up " + name + ": " + error.what());
+  }
   return Eigen::Map<const Vector4f>(rgba);
 }
 
-Vector4f Texture::State::probe(OIIO::TextureSystem::Perthread* thread, const Vector2d& st, LevelChoice choice) const {
+Vector4f Texture::State::probe(void* thread, const Vector2d& st, LevelChoice choice) const {
   const Vector2d place(bring_near(st.x(), wrap), bring_near(1 - st.y(), wrap));
-  OIIO::TextureOpt level_options = options;
-  if (choice.level == 0 && choice.blend == 0 && is_centre(place.x(), pyramid.width(0)) &&
-      is_centre(place.y(), pyramid.height(0)))
-    level_options.interpmode = OIIO::TextureOpt::InterpClosest;
-  Vector4f result = sample(thread, level_options, choice.level, place);
-  if (choice.blend > 0) result += choice.blend * (sample(thread, level_options, choice.level + 1, place) - result);
+  const bool closest = choice.level == 0 && choice.blend == 0 && is_centre(place.x(), pyramid.width(0)) &&
+                       is_centre(place.y(), pyramid.height(0));
+  Vector4f result = sample(thread, choice.level, closest, place);
+  if (choice.blend > 0) result += choice.blend * (sample(thread, choice.level + 1, closest, place) - result);
   return result;
 }
 
@@ -253,7 +170,7 @@ Vector4f Texture::lookup(const Vector2d& st, const Matrix2d& footprint) const {
   const LevelChoice choice = choose_level(ellipse.minor, state_->pyramid.levels());
   const int probes = std::max(1, static_cast<int>(std::ceil(ellipse.major / ellipse.minor - 1e-3)));
   const Vector2d line = (ellipse.major - ellipse.minor) * ellipse.direction.cwiseQuotient(size);
-  OIIO::TextureSystem::Perthread* const thread = state_->system->get_perthread_info();
+  void* const thread = state_->tiles ? state_->tiles->this_thread() : nullptr;
   Vector4f sum = Vector4f::Zero();
   for (int i = 0; i < probes; ++i) sum += state_->probe(thread, st + ((i + 0.5) / probes - 0.5) * line, choice);
   return sum / static_cast<float>(probes);

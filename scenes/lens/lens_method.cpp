@@ -7,12 +7,14 @@
 #include <fmt/format.h>
 
 #include "base/constants.h"
+#include "integrators/flow/caustic.h"
 #include "integrators/lens/lens.h"
 #include "renderer/color/reflectance.h"
 #include "renderer/images/grid_lines.h"
 #include "scenes/description/check_scene.h"
 #include "scenes/lens/load_lens.h"
 #include "scenes/outputs/picture_outputs.h"
+#include "scenes/scene/fine_bands.h"
 
 namespace tensorray {
 namespace {
@@ -21,32 +23,54 @@ constexpr double reference_wavelength = 550;  // nm: LensPicture::points describ
 constexpr int overlay_cells = 16;             // Cells along the image's shorter side.
 constexpr double most_overlay_cells = 1e6;    // A limit; grids are too dense to be visible long before.
 constexpr std::size_t exact_bands = 10;       // With this many bands a reflectance can have any colour of Rec. 709.
+/// The light of a band is spread evenly over the points that it sees; so this step decides only how exact the colours
+/// within a fringe are.
+constexpr BandStep band_step{8, 12, 24};
 constexpr int gap_part = 64;  // The gap between pictures side by side is the width of a picture divided by this.
 
-/// A function that converts a colour of the image to its radiance in a channel.
-std::function<double(const Eigen::Vector3d&, std::size_t)> radiance_of(const Scene& scene) {
+/// A function that converts a colour of the image to its radiance in some bands.
+LensRadiance radiance_in(const std::vector<FineBand>& fine, const Scene& scene) {
   if (scene.description.bending.rgb) {
     const Eigen::Matrix3d to_primaries = (scene.color.xyz_to_working() * rec709_to_xyz()).inverse();
-    return [to_primaries](const Eigen::Vector3d& rgb, std::size_t channel) {
-      return to_primaries.row(static_cast<Eigen::Index>(channel)).dot(rgb);
+    return [to_primaries](const Eigen::Vector3d& rgb, std::size_t first, std::size_t last, double* radiances) {
+      const Eigen::Vector3d primaries = to_primaries * rgb;
+      std::copy(primaries.data() + first, primaries.data() + last, radiances);
     };
   }
+  std::vector<Band> bands;
+  for (const FineBand& each : fine) bands.push_back(each.band);
   // Light that has no white does not define the spectrum of a colour. Daylight is used for it instead.
-  const std::vector<Band> bands = has_white(scene) ? scene.bands : make_bands(illuminant("D65"), 380, 730, 36);
+  const std::vector<Band> light = has_white(scene) ? bands : make_bands(illuminant("D65"), 380, 730, 36);
   Eigen::Vector3d white = Eigen::Vector3d::Zero();
-  for (const Band& band : bands) white += band.xyz;
-  const ReflectanceModel model(bands, scene.color.xyz_to_working_adapted(white));
-  return [model, &scene](const Eigen::Vector3d& rgb, std::size_t channel) {
-    return model.spectrum(rgb).at(scene.bands[channel].wavelength);
+  for (const Band& band : light) white += band.xyz;
+  const ReflectanceModel model(light, scene.color.xyz_to_working_adapted(white));
+  return [model, bands](const Eigen::Vector3d& rgb, std::size_t first, std::size_t last, double* radiances) {
+    const ReflectanceSpectrum spectrum = model.spectrum(rgb);
+    for (std::size_t i = first; i < last; ++i) radiances[i - first] = spectrum.at(bands[i].wavelength);
   };
 }
 
+std::vector<LensBand> lens_bands(const std::vector<FineBand>& fine, const Scene& scene) {
+  const Eigen::Matrix3d xyz_to_working = to_working(scene);
+  std::vector<LensBand> bands;
+  for (const FineBand& each : fine)
+    bands.push_back({each.begin, each.end, each.channel, each.weight, xyz_to_working * each.band.xyz});
+  return bands;
+}
+
+/// The channel that LensPicture::points describes.
 std::size_t reference_channel(const Scene& scene) {
   if (scene.description.bending.rgb) return 1;
   const auto nearest = std::min_element(scene.bands.begin(), scene.bands.end(), [](const Band& a, const Band& b) {
     return std::abs(a.wavelength - reference_wavelength) < std::abs(b.wavelength - reference_wavelength);
   });
   return static_cast<std::size_t>(nearest - scene.bands.begin());
+}
+
+/// The middle of the reference channel, as a place in the range of the light.
+double reference_place(const Scene& scene) {
+  const auto channel = static_cast<double>(reference_channel(scene));
+  return scene.description.bending.rgb ? channel / 2 : (channel + 0.5) / static_cast<double>(scene.bands.size());
 }
 
 /// The channels that write_point writes, in its order.
@@ -75,8 +99,8 @@ void write_point(const LensPoint& point, float* values) {
 }
 
 /// R, G, B, A, and the channels of the picture's points.
-Image make_image(const LensPicture& picture, const std::vector<Band>& bands, const Eigen::Matrix3d& to_rgb) {
-  const Image colors = linear_image(picture.radiance, bands, to_rgb);
+Image make_image(const LensPicture& picture) {
+  const Image colors = color_image(picture.color);
   std::vector<std::string> channels{"R", "G", "B", "A"};
   channels.insert(channels.end(), point_channels.begin(), point_channels.end());
   Image image(colors.width, colors.height, channels);
@@ -131,7 +155,7 @@ void add_statistics(const LensPicture& picture, Statistics& statistics) {
     for (int end = 0; end < ray_end_count; ++end) statistics.ends[channel][end] += picture.ends[channel][end];
   statistics.ray_steps += picture.counts.ray_steps;
   statistics.tensor_samples += picture.counts.tensor_samples;
-  statistics.seconds_tracing += picture.seconds_tracing;
+  statistics.seconds_drawing += picture.seconds_drawing;
 }
 
 std::string end_codes() {
@@ -165,29 +189,37 @@ Render LoadedLens::render(const Scene& scene, const Progress& progress) const {
   LensSettings settings;
   settings.mode = settings_.mode;
   settings.samples = settings_.samples;
-  settings.reference = reference_channel(scene);
+  settings.reference = reference_place(scene);
+  const LightRange range = light_range(scene);
+  settings.flexibilities = range.flexibilities;
+  settings.range = range.is_range;
   LensImage image;
   image.texture = &lens_.image;
   image.wraps = lens_.wraps;
-  image.radiance = radiance_of(scene);
 
   Render result;
   const Eigen::Matrix3d matrix = to_working(scene);
+  const int channels = static_cast<int>(scene.bands.size());
+  const bool by_channel = scene.description.output.wants("spectral");
   std::vector<Image> pictures;
   std::vector<SpectralImage> spectra;
   for (const Plate& plane : lens_.planes) {
     image.plane = plane;
-    const LensPicture picture = simulate_lens(scene.field, scene.geometry.surfaces(), scene.bending, scene.channels,
-                                              scene.beam.direction, lens_.receiver, image, settings, progress);
-    pictures.push_back(make_image(picture, scene.bands, matrix));
+    const LensLight light = trace_lens(scene.field, scene.geometry.surfaces(), scene.bending, scene.beam.direction,
+                                       lens_.receiver, image, settings, progress);
+    const std::vector<FineBand> fine = fine_bands(scene, caustic_bands(light.map, channels, band_step));
+    const LensPicture picture =
+        draw_lens(light, lens_bands(fine, scene), radiance_in(fine, scene), scene.bands.size(), by_channel, progress);
+    pictures.push_back(make_image(picture));
     if (settings_.overlay == Overlay::grid) draw_overlay(picture, plane, pictures.back());
     add_statistics(picture, result.statistics);
-    if (scene.description.output.wants("spectral"))
+    result.statistics.seconds_tracing += light.seconds_tracing;
+    if (by_channel)
       spectra.push_back(spectral_image(picture.radiance, scene.bands, scene.description.light.irradiance / pi, matrix));
   }
   result.linear = side_by_side(pictures);
   if (!spectra.empty()) result.spectral = spectra_side_by_side(std::move(spectra));
-  for (const std::uint64_t count : result.statistics.ends[settings.reference]) result.statistics.positions += count;
+  for (const std::uint64_t count : result.statistics.ends[reference_channel(scene)]) result.statistics.positions += count;
   result.metadata["tensorray:end"] = end_codes();
   result.exposure = 0;  // Shows the colours of the image unchanged.
   if (nothing_arrived(result.statistics))

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include <fmt/format.h>
+#include <tbb/parallel_for.h>
 
 #include "renderer/textures/test_images.h"
 
@@ -11,19 +12,20 @@ namespace tensorray {
 namespace {
 
 constexpr double default_distance = 0.25;  // Distance of the image before the volume, in depths of the volume.
-constexpr int test_image_pixels = 4096;    // Most pixels along the longer side; otherwise 8 per pixel of the receiver.
+constexpr int test_image_pixels = 4096;    // Most pixels along the longer side; otherwise 4 per pixel of the receiver.
 
 Image load_test_image(TestImage which, const Plate& receiver, const ColorManagement& color) {
-  const int longest = std::min(test_image_pixels, 8 * receiver.resolution.maxCoeff());
+  const int longest = std::min(test_image_pixels, 4 * receiver.resolution.maxCoeff());
   const Eigen::Vector2d pixels = longest * receiver.size / receiver.size.maxCoeff();
   Image image = test_image(which, std::max(1, static_cast<int>(std::lround(pixels.x()))),
                            std::max(1, static_cast<int>(std::lround(pixels.y()))));
   const Eigen::Matrix3f to_working = (color.xyz_to_working() * rec709_to_xyz()).cast<float>();
-  for (int y = 0; y < image.height; ++y)
+  tbb::parallel_for(0, image.height, [&](int y) {
     for (int x = 0; x < image.width; ++x) {
       Eigen::Map<Eigen::Vector3f> pixel(image.pixel(x, y));
       pixel = to_working * pixel;
     }
+  });
   return image;
 }
 

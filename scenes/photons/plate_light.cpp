@@ -10,6 +10,7 @@
 #include "renderer/film/spectral_image.h"
 #include "renderer/images/image_distance.h"
 #include "scenes/photons/photon_distribution_method.h"
+#include "scenes/scene/fine_bands.h"
 
 namespace tensorray {
 namespace {
@@ -21,48 +22,24 @@ using Clock = std::chrono::steady_clock;
 
 double seconds_since(Clock::time_point start) { return std::chrono::duration<double>(Clock::now() - start).count(); }
 
-/// The picture of a film whose planes are red, green and blue.
-Image color_image(const Film& color) {
-  std::vector<Band> primaries(3);
-  for (int c = 0; c < 3; ++c) primaries[static_cast<std::size_t>(c)].xyz = Eigen::Vector3d::Unit(c);
-  return linear_image(color, primaries, Eigen::Matrix3d::Identity());
-}
-
 FlowMap trace_map(const Scene& scene, double tolerance, const Progress& progress) {
-  const BendingDescription& bending = scene.description.bending;
-  const LightDescription& light = scene.description.light;
   FlowSettings settings;
-  settings.most_starts = static_cast<std::size_t>(light.photons);
+  settings.most_starts = static_cast<std::size_t>(scene.description.light.photons);
   settings.tolerance = tolerance;
-  if (bending.rgb) {
-    settings.flexibilities = {bending.rgb->x(), bending.rgb->y(), bending.rgb->z()};
-  } else {
-    settings.flexibilities = {bending.flexibility.at(light.wavelength_min),
-                              bending.flexibility.at(light.wavelength_max)};
-    settings.range = true;
-  }
+  const LightRange range = light_range(scene);
+  settings.flexibilities = range.flexibilities;
+  settings.range = range.is_range;
   return trace_flow_map(scene.field, scene.geometry, scene.beam, scene.bending, settings, progress);
 }
 
 /// The bands that are drawn: each band of the scene is divided, so that light moves little from one to the next.
 std::vector<CausticBand> bands_of(const Scene& scene, const FlowMap& map, const BandStep& step) {
   const Eigen::Matrix3d xyz_to_working = to_working(scene);
+  const int channels = static_cast<int>(scene.bands.size());
   std::vector<CausticBand> bands;
-  if (scene.description.bending.rgb) {
-    for (std::size_t k = 0; k < scene.bands.size(); ++k)
-      bands.push_back({static_cast<double>(k), k, 1, xyz_to_working * scene.bands[k].xyz});
-    return bands;
-  }
-  const LightDescription& light = scene.description.light;
-  const int count = caustic_bands(map, light.wavelength_count, step);
-  const std::vector<Band> fine = make_bands(scene.spectrum, light.wavelength_min, light.wavelength_max, count);
-  const std::size_t parts = fine.size() / scene.bands.size();
-  for (std::size_t i = 0; i < fine.size(); ++i) {
-    const std::size_t channel = i / parts;
-    const double power = scene.bands[channel].power;
-    const double node = (static_cast<double>(i) + 0.5) / count * static_cast<double>(map.nodes - 1);
-    bands.push_back({node, channel, power > 0 ? fine[i].power / power : 0, xyz_to_working * fine[i].xyz});
-  }
+  for (const FineBand& fine : fine_bands(scene, caustic_bands(map, channels, step)))
+    bands.push_back({(fine.begin + fine.end) / 2 * static_cast<double>(map.nodes - 1), fine.channel, fine.weight,
+                     xyz_to_working * fine.band.xyz});
   return bands;
 }
 

@@ -78,13 +78,24 @@ struct Bench {
     image.texture = &texture;
     image.plane = plate_at(-1.5, image_size);
     image.wraps = wrap == Wrap::repeat || wrap == Wrap::mirror;
-    image.radiance = [](const Vector3d& rgb, std::size_t channel) { return rgb[static_cast<int>(channel)]; };
+  }
+
+  static void radiance(const Vector3d& rgb, std::size_t first, std::size_t last, double* radiances) {
+    std::copy(rgb.data() + first, rgb.data() + last, radiances);
   }
 
   LensPicture simulate(LensMode mode, const Progress& progress = Progress()) const {
     LensSettings with_mode = settings;
     with_mode.mode = mode;
-    return simulate_lens(field, surfaces, bending, channels, Vector3d::UnitZ(), receiver, image, with_mode, progress);
+    std::vector<LensBand> bands;
+    for (std::size_t i = 0; i < channels.size(); ++i) {
+      with_mode.flexibilities.push_back(channels[i].flexibility);
+      const double place = channels.size() > 1 ? static_cast<double>(i) / static_cast<double>(channels.size() - 1) : 0;
+      bands.push_back({place, place, i, 1, Vector3d::Unit(static_cast<int>(i))});
+    }
+    const LensLight light =
+        trace_lens(field, surfaces, bending, Vector3d::UnitZ(), receiver, image, with_mode, progress);
+    return draw_lens(light, bands, radiance, channels.size(), true, progress);
   }
 
   /// Of one channel with flexibility `s`.
@@ -97,7 +108,7 @@ struct Bench {
 TensorField no_field() { return constant_field(Matrix3d::Zero()); }
 
 const LensPoint& point_at(const LensPicture& picture, int x, int y) {
-  return picture.points[static_cast<std::size_t>(y * picture.radiance.width + x)];
+  return picture.points[static_cast<std::size_t>(y * picture.color.width + x)];
 }
 
 /// (s, t) at a pixel's centre.
@@ -105,15 +116,19 @@ Vector2d center_of(int x, int y, const Vector2i& resolution) {
   return {(x + 0.5) / resolution.x(), 1 - (y + 0.5) / resolution.y()};
 }
 
+/// Landings are single precision: an error of (s, t).
+constexpr double rounding = 5e-7;
+
 TEST(Lens, WithoutFieldThePictureIsTheImage) {
   const Vector2i size(48, 32);
   const Image picture = noise(size.x(), size.y());
   Bench bench(no_field(), plate_at(1.5, {1.5, 1}, size), {1.5, 1}, picture);
   bench.channels = {{0.1, 650, 1}, {0.2, 550, 1}, {-0.5, 450, 1}};
-  bench.settings.reference = 1;
+  bench.settings.reference = 0.5;
   for (const LensMode mode : modes) {
     const LensPicture seen = bench.simulate(mode);
     ASSERT_EQ(seen.radiance.channels, 3);
+    EXPECT_EQ(seen.color.values, seen.radiance.values);  // The bands' colours are red, green and blue.
     for (int y = 0; y < size.y(); ++y)
       for (int x = 0; x < size.x(); ++x) {
         const std::size_t pixel = static_cast<std::size_t>(y * size.x() + x);
@@ -122,15 +137,15 @@ TEST(Lens, WithoutFieldThePictureIsTheImage) {
         EXPECT_NEAR(seen.alpha[pixel], 1, 1e-6);
         const LensPoint& point = seen.points[pixel];
         ASSERT_EQ(point.end, LensEnd::image);
-        EXPECT_LT((point.st - center_of(x, y, size)).norm(), 1e-9);
-        EXPECT_LT((point.per_pixel - Matrix2d(Vector2d(1.0 / 48, -1.0 / 32).asDiagonal())).norm(), 1e-9);
-        EXPECT_LT(point.displacement.norm(), 1e-9);
-        EXPECT_NEAR(point.log_magnification, 0, 1e-9);
-        EXPECT_NEAR(point.log_stretch[0], 0, 1e-9);
-        EXPECT_NEAR(point.log_stretch[1], 0, 1e-9);
+        EXPECT_LT((point.st - center_of(x, y, size)).norm(), rounding);
+        EXPECT_LT((point.per_pixel - Matrix2d(Vector2d(1.0 / 48, -1.0 / 32).asDiagonal())).norm(), rounding);
+        EXPECT_LT(point.displacement.norm(), 3 * rounding);
+        EXPECT_NEAR(point.log_magnification, 0, 100 * rounding);
+        EXPECT_NEAR(point.log_stretch[0], 0, 100 * rounding);
+        EXPECT_NEAR(point.log_stretch[1], 0, 100 * rounding);
         EXPECT_EQ(point.folds, 1);
-        EXPECT_NEAR(point.length, 3, 1e-9);
-        EXPECT_LT((seen.straight * Vector2d(x + 0.5, y + 0.5) - point.st).norm(), 1e-9);
+        EXPECT_NEAR(point.length, 3, 3 * rounding);
+        EXPECT_LT((seen.straight * Vector2d(x + 0.5, y + 0.5) - point.st).norm(), rounding);
       }
     for (const EndCounts& ends : seen.ends)
       for (int end = 0; end < ray_end_count; ++end) {
@@ -157,7 +172,7 @@ TEST(Lens, ASmallerImageLeavesPixelsThatSeeNothing) {
         EXPECT_NEAR(seen.alpha[pixel], inside ? 1 : 0, 1e-6);
         EXPECT_NEAR(seen.radiance.plane(0)[pixel], inside ? picture.pixel(x - 12, y - 8)[0] : 0, 1e-5);
         if (!inside && mode == LensMode::gather) {
-          EXPECT_LT((seen.points[pixel].st - center_of(x - 12, y - 8, {24, 16})).norm(), 1e-9);
+          EXPECT_LT((seen.points[pixel].st - center_of(x - 12, y - 8, {24, 16})).norm(), 2 * rounding);
         }
       }
   }
@@ -449,7 +464,7 @@ TEST(Lens, PixelsThatAreNotSquareTakeRaysByTheirNumber) {
       parts[phase].push_back(static_cast<double>(done) / static_cast<double>(total));
     };
     const LensPicture picture = bench.simulate(mode, progress);
-    EXPECT_EQ(parts.size(), mode == LensMode::gather ? 2u : 1u);
+    EXPECT_EQ(parts.size(), 2u);
     for (const auto& [phase, each] : parts) {
       EXPECT_GE(each.size(), 10u) << phase;
       EXPECT_TRUE(std::is_sorted(each.begin(), each.end())) << phase;
@@ -470,9 +485,8 @@ TEST(Lens, SettingsOutOfRangeAreRefused) {
   };
   refused([](Bench& bench) { bench.channels.clear(); });
   refused([](Bench& bench) { bench.settings.samples = 0; });
-  refused([](Bench& bench) { bench.settings.reference = 1; });
+  refused([](Bench& bench) { bench.settings.reference = 1.5; });
   refused([](Bench& bench) { bench.image.texture = nullptr; });
-  refused([](Bench& bench) { bench.image.radiance = nullptr; });
   refused([](Bench& bench) { bench.bending.step = -1; });
   refused([](Bench& bench) { bench.bending.max_steps = 0; });
 }

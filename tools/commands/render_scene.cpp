@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <chrono>
 #include <fstream>
+#include <future>
 #include <optional>
 #include <string>
 #include <thread>
@@ -59,6 +60,8 @@ void render_scene(const std::filesystem::path& scene_file, const SceneChanges& c
 
   const SceneDescription description = read_scene(scene_file, changes);
   OutputFiles files = open_files(description, run.statistics);
+
+  const std::future<void> images = std::async(std::launch::async, prepare_images);  // Errors come with the first image.
 
   std::optional<ProgressBar> bar(std::in_place, progress, run.quiet);
   const Scene scene = load_scene(description, progress);

@@ -1,0 +1,320 @@
+#include "integrators/flow/flow_view.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <numeric>
+#include <utility>
+
+#include <Eigen/LU>
+#include <tbb/parallel_for.h>
+
+namespace tensorray {
+namespace {
+
+using Eigen::Matrix2d;
+using Eigen::Matrix2f;
+using Eigen::Vector2d;
+using Eigen::Vector2f;
+
+constexpr float most_curvature = 0.25f;  // The quadratic part is at most so much of a triangle's size.
+
+double cross(const Vector2d& a, const Vector2d& b) { return a.x() * b.y() - a.y() * b.x(); }
+
+/// ∂landing/∂start of a triangle at a node.
+Matrix2d slope_of(const FlowMap& map, const FlowTriangle& triangle, std::size_t node) {
+  const auto& [a, b, c] = triangle.corners;
+  const auto landing = [&](std::uint32_t i) -> Vector2d { return map.landings[i * map.nodes + node].cast<double>(); };
+  Matrix2d starts, landings;
+  starts << map.starts[b] - map.starts[a], map.starts[c] - map.starts[a];
+  landings << landing(b) - landing(a), landing(c) - landing(a);
+  return landings * starts.inverse();
+}
+
+/// A corner of a triangle at a node.
+struct Corner {
+  std::uint32_t position;
+  RayEnd end;
+  Vector2d start, landing;
+  Vector2d sample;  // In the picture, in samples.
+  Matrix2f jacobian = Matrix2f::Identity();
+  float length = 0;
+};
+
+/// A side of a triangle, for points: positive on its left. Both triangles of a side compute the same number, but for
+/// its sign, and one of them has the points on the side.
+class Side {
+ public:
+  Side(const Corner& from, const Corner& to)
+      : origin_(from.position < to.position ? from.sample : to.sample),
+        along_((from.position < to.position ? to.sample : from.sample) - origin_),
+        sign_(from.position < to.position ? 1 : -1) {
+    const Vector2d sense = sign_ * along_;
+    has_points_ = sense.y() > 0 || (sense.y() == 0 && sense.x() < 0);
+  }
+
+  double at(const Vector2d& point) const { return sign_ * cross(along_, point - origin_); }
+  double along_x() const { return -sign_ * along_.y(); }  ///< Its change for a step along x.
+  bool contains(double value) const { return value > 0 || (value == 0 && has_points_); }
+
+ private:
+  Vector2d origin_, along_;
+  double sign_;
+  bool has_points_;
+};
+
+/// Whether a box, in pixels, contains the middle of one of n × n samples of a pixel.
+bool has_samples(const Eigen::AlignedBox2d& box, int n) {
+  return ((n * box.min().array() - 0.5).ceil() <= (n * box.max().array() - 0.5).floor()).all();
+}
+
+/// The sides of a triangle of either orientation; side i is opposite corner i.
+struct Sides {
+  std::array<Side, 3> sides;
+  double sign, area;  // Orientation, and twice the area.
+
+  explicit Sides(const std::array<Corner, 3>& c)
+      : sides{Side(c[1], c[2]), Side(c[2], c[0]), Side(c[0], c[1])},
+        sign(cross(c[1].sample - c[0].sample, c[2].sample - c[0].sample) < 0 ? -1 : 1),
+        area(std::abs(cross(c[1].sample - c[0].sample, c[2].sample - c[0].sample))) {
+    if (sign < 0) sides = {Side(c[2], c[1]), Side(c[0], c[2]), Side(c[1], c[0])};
+  }
+
+  /// Narrows the points of a row that the triangle may contain: from (first, y) to (last, y).
+  void narrow(double y, double& first, double& last) const {
+    for (const Side& side : sides) {
+      const double slope = side.along_x();
+      const double zero = slope == 0 ? 0 : -side.at({0, y}) / slope;
+      constexpr double rounding = 1e-6;
+      if (slope > 0) first = std::max(first, zero - rounding);
+      if (slope < 0) last = std::min(last, zero + rounding);
+    }
+  }
+
+  /// Sets the weights of the corners at a point. @return whether the triangle contains it.
+  bool contains(const Vector2d& point, std::array<float, 3>& weights) const {
+    for (int i = 0; i < 3; ++i) {
+      const double value = sides[i].at(point);
+      if (!sides[i].contains(value)) return false;
+      weights[i] = static_cast<float>(value / area);
+    }
+    return true;
+  }
+};
+
+/// The landings within a triangle.
+class Facet {
+ public:
+  explicit Facet(const std::array<Corner, 3>& corners) : corners_(corners) {
+    float reach = 0, bent = 0;
+    for (int i = 0; i < 3; ++i) {
+      const Corner &a = corners[(i + 1) % 3], &b = corners[(i + 2) % 3];
+      // A cubic through both ends, with their slopes, has this distance from the straight line in its middle.
+      bends_[i] = (a.jacobian - b.jacobian) * (b.start - a.start).cast<float>() / 8;
+      reach = std::max(reach, (b.landing - a.landing).cast<float>().norm());
+      bent = std::max(bent, bends_[i].norm());
+    }
+    is_curved_ = bent <= most_curvature * reach;  // False for NaN.
+  }
+
+  Matrix2f jacobian(const std::array<float, 3>& w) const {
+    return w[0] * corners_[0].jacobian + w[1] * corners_[1].jacobian + w[2] * corners_[2].jacobian;
+  }
+
+  float length(const std::array<float, 3>& w) const {
+    return w[0] * corners_[0].length + w[1] * corners_[1].length + w[2] * corners_[2].length;
+  }
+
+  /// What the quadratic landing adds to the linear one.
+  Vector2f curve(const std::array<float, 3>& w) const {
+    if (!is_curved_) return {0, 0};
+    return 4 * (w[1] * w[2] * bends_[0] + w[2] * w[0] * bends_[1] + w[0] * w[1] * bends_[2]);
+  }
+
+  Vector2d landing(const std::array<float, 3>& w) const {
+    const Vector2d linear = corners_[0].landing + double{w[1]} * (corners_[1].landing - corners_[0].landing) +
+                            double{w[2]} * (corners_[2].landing - corners_[0].landing);
+    return linear + curve(w).cast<double>();
+  }
+
+  /// The start of the light that lands where the weights are those of the landing.
+  Vector2d start(const std::array<float, 3>& w) const {
+    const Vector2d b = corners_[1].start - corners_[0].start, c = corners_[2].start - corners_[0].start;
+    Vector2d start = corners_[0].start + double{w[1]} * b + double{w[2]} * c;
+    if (!is_curved_) return start;
+    const Vector2d back = (jacobian(w).inverse() * curve(w)).cast<double>();
+    if (back.squaredNorm() <= double{most_curvature * most_curvature} * std::abs(cross(b, c))) start -= back;
+    return start;
+  }
+
+ private:
+  const std::array<Corner, 3>& corners_;
+  std::array<Vector2f, 3> bends_;
+  bool is_curved_ = false;
+};
+
+}  // namespace
+
+FlowView::FlowView(const FlowMap& map, const FlowPicture& picture, std::vector<double> nodes, int samples)
+    : map_(map),
+      picture_(picture),
+      nodes_(std::move(nodes)),
+      samples_(samples),
+      columns_((picture.resolution.x() + tile_size - 1) / tile_size),
+      rows_((picture.resolution.y() + tile_size - 1) / tile_size),
+      checks_((map.nodes - 1) / map.check_step + 1),
+      sorted_(nodes_.size()) {
+  find_jacobians();
+  tbb::parallel_for(std::size_t{0}, nodes_.size(), [&](std::size_t node) { sort_triangles(node); });
+}
+
+Eigen::AlignedBox2i FlowView::pixels(int tile) const {
+  const Eigen::Vector2i first(tile % columns_ * tile_size, tile / columns_ * tile_size);
+  return {first, (first + Eigen::Vector2i(tile_size, tile_size)).cwiseMin(picture_.resolution) -
+                     Eigen::Vector2i(1, 1)};
+}
+
+/// The mean of the triangles about each position, by area.
+void FlowView::find_jacobians() {
+  jacobians_.assign(map_.starts.size() * checks_, Matrix2f::Zero());
+  tbb::parallel_for(std::size_t{0}, checks_, [&](std::size_t check) {
+    const std::size_t node = check * map_.check_step;
+    std::vector<double> areas(map_.starts.size());
+    std::vector<Matrix2d> sums(map_.starts.size(), Matrix2d::Zero());
+    for (const FlowTriangle& triangle : map_.triangles) {
+      const auto landed = [&](std::uint32_t i) { return map_.ends[i * map_.nodes + node] == RayEnd::plate; };
+      if (triangle.is_torn || !std::all_of(triangle.corners.begin(), triangle.corners.end(), landed)) continue;
+      const Matrix2d slope = triangle.area * slope_of(map_, triangle, node);
+      for (const std::uint32_t corner : triangle.corners) {
+        sums[corner] += slope;
+        areas[corner] += triangle.area;
+      }
+    }
+    for (std::size_t i = 0; i < areas.size(); ++i)
+      jacobians_[i * checks_ + check] = (sums[i] / areas[i]).cast<float>();  // NaN where there is none.
+  });
+}
+
+/// Sets ends and places of corners, in pixels. @return whether all light of the triangle is mapped to landings.
+template <class Corners>
+bool FlowView::find_corners(const FlowTriangle& triangle, double node, Corners& corners) const {
+  bool is_mapped = !triangle.is_torn;
+  for (std::size_t i = 0; i < 3; ++i) {
+    const std::uint32_t position = triangle.corners[i];
+    const FlowLanding landing = landing_at(map_, position, node);
+    is_mapped = is_mapped && landing.end == RayEnd::plate;
+    const Vector2d start = map_.starts[position];
+    const Vector2d pixel = picture_.to_pixel * (picture_.side == FlowSide::starts ? start : landing.at);
+    corners[i] = {position, landing.end, start, landing.at, pixel};
+  }
+  return is_mapped;
+}
+
+void FlowView::sort_triangles(std::size_t node) {
+  struct Tiles {
+    std::uint32_t triangle;
+    int left, top, right, bottom;
+  };
+  std::vector<Tiles> touched;
+  const Eigen::Array2d last = picture_.resolution.cast<double>().array() - 1;
+  for (std::uint32_t t = 0; t < map_.triangles.size(); ++t) {
+    std::array<Corner, 3> corners;
+    if (!find_corners(map_.triangles[t], nodes_[node], corners) && picture_.side == FlowSide::landings) continue;
+    Eigen::AlignedBox2d box;
+    for (const Corner& corner : corners) box.extend(corner.sample);
+    if (!has_samples(box, 1) && !has_samples(box, samples_)) continue;
+    if ((box.min().array() > last + 1).any() || (box.max().array() < 0).any()) continue;
+    const Eigen::Array2i first = (box.min().array().max(0.0).min(last) / tile_size).cast<int>(),
+                         end = (box.max().array().max(0.0).min(last) / tile_size).cast<int>();
+    touched.push_back({t, first.x(), first.y(), end.x(), end.y()});
+  }
+  const auto for_each_tile = [&](const auto& call) {
+    for (const Tiles& tiles : touched)
+      for (int y = tiles.top; y <= tiles.bottom; ++y)
+        for (int x = tiles.left; x <= tiles.right; ++x) call(static_cast<std::size_t>(y * columns_ + x), tiles.triangle);
+  };
+  Sorted& sorted = sorted_[node];
+  sorted.first_of_tile.assign(static_cast<std::size_t>(tiles()) + 1, 0);
+  for_each_tile([&](std::size_t tile, std::uint32_t) { ++sorted.first_of_tile[tile + 1]; });
+  std::partial_sum(sorted.first_of_tile.begin(), sorted.first_of_tile.end(), sorted.first_of_tile.begin());
+  sorted.triangles.resize(sorted.first_of_tile.back());
+  std::vector<std::uint32_t> next = sorted.first_of_tile;
+  for_each_tile([&](std::size_t tile, std::uint32_t t) { sorted.triangles[next[tile]++] = t; });
+}
+
+void FlowView::draw(int tile, int n, std::size_t node, std::vector<FlowPoint>& points) const {
+  const Eigen::AlignedBox2i box = pixels(tile);
+  const Eigen::AlignedBox2i samples(n * box.min(), n * (box.max() + Eigen::Vector2i(1, 1)) - Eigen::Vector2i(1, 1));
+  const Eigen::Vector2i size = samples.sizes() + Eigen::Vector2i(1, 1);
+  points.assign(static_cast<std::size_t>(size.prod()), FlowPoint());
+  thread_local std::vector<float> distances;
+  distances.assign(points.size(), std::numeric_limits<float>::infinity());
+  const Sorted& sorted = sorted_[node];
+  for (std::uint32_t i = sorted.first_of_tile[tile]; i < sorted.first_of_tile[tile + 1]; ++i)
+    draw_triangle(map_.triangles[sorted.triangles[i]], samples, n, nodes_[node], points, distances);
+}
+
+/// Sets the Jacobians and lengths of corners: linear between the nodes that have them.
+template <class Corners>
+void FlowView::find_slopes(const FlowTriangle& triangle, double node, Corners& corners) const {
+  const double place = node / static_cast<double>(map_.check_step);
+  const std::size_t before = std::min(static_cast<std::size_t>(place), checks_ - 1),
+                    after = std::min(before + 1, checks_ - 1);
+  const auto part = static_cast<float>(place - static_cast<double>(before));
+  bool is_known = true;
+  for (Corner& corner : corners) {
+    const std::size_t a = corner.position * checks_ + before, b = corner.position * checks_ + after;
+    corner.jacobian = (1 - part) * jacobians_[a] + part * jacobians_[b];
+    corner.length = (1 - part) * map_.lengths[a] + part * map_.lengths[b];
+    is_known = is_known && corner.jacobian.allFinite();
+  }
+  if (is_known) return;
+  const Matrix2f slope = slope_of(map_, triangle, static_cast<std::size_t>(node)).cast<float>();
+  for (Corner& corner : corners) corner.jacobian = slope;
+}
+
+void FlowView::draw_triangle(const FlowTriangle& triangle, const Eigen::AlignedBox2i& samples, int n, double node,
+                             std::vector<FlowPoint>& points, std::vector<float>& distances) const {
+  std::array<Corner, 3> corners;
+  const bool is_mapped = find_corners(triangle, node, corners);
+  if (!is_mapped && picture_.side == FlowSide::landings) return;
+  Eigen::AlignedBox2d box;
+  for (Corner& corner : corners) box.extend(corner.sample *= n);
+  // The middles of samples are at ½, 1½, ...
+  const Eigen::Array2d begin = (box.min().array() - 0.5).ceil().max(samples.min().array().cast<double>()),
+                       end = (box.max().array() - 0.5).floor().min(samples.max().array().cast<double>());
+  if ((begin > end).any()) return;
+  const Sides sides(corners);
+  if (sides.area == 0) return;
+  if (is_mapped) find_slopes(triangle, node, corners);
+  const Facet facet(corners);
+
+  const int width = samples.sizes().x() + 1;
+  std::array<float, 3> weights{};
+  for (int y = static_cast<int>(begin.y()); y <= static_cast<int>(end.y()); ++y) {
+    double first = begin.x() + 0.5, last = end.x() + 0.5;
+    sides.narrow(y + 0.5, first, last);
+    for (int x = static_cast<int>(std::ceil(first - 0.5)); x + 0.5 <= last; ++x) {
+      const Vector2d sample(x + 0.5, y + 0.5);
+      if (!sides.contains(sample, weights)) continue;
+      const auto index = static_cast<std::size_t>((y - samples.min().y()) * width + x - samples.min().x());
+      FlowPoint& point = points[index];
+      if (!is_mapped) {
+        point.end = corners[0].end;
+        point.is_unknown = triangle.is_torn || corners[1].end != point.end || corners[2].end != point.end;
+        continue;
+      }
+      const Vector2d other = picture_.side == FlowSide::starts ? facet.landing(weights) : facet.start(weights);
+      ++point.sheets;
+      const auto distance = static_cast<float>((other - picture_.straight * Vector2d(sample / n)).squaredNorm());
+      if (!(distance < distances[index])) continue;
+      distances[index] = distance;
+      point.end = RayEnd::plate;
+      point.other = other.cast<float>();
+      point.jacobian = facet.jacobian(weights);
+      point.length = facet.length(weights);
+    }
+  }
+}
+
+}  // namespace tensorray

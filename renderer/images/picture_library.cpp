@@ -1,0 +1,28 @@
+#include "renderer/images/picture_library.h"
+
+#include <stdexcept>
+#include <string>
+
+#include <dlfcn.h>
+
+namespace tensorray {
+namespace {
+
+/// The run path of the program, which `dlopen` searches, is its own folder (CMAKE_BUILD_RPATH).
+const PictureLibrary& load() {
+  constexpr const char* file = "libtensorray_pictures.so";
+  void* const library = dlopen(file, RTLD_LAZY | RTLD_LOCAL);
+  void* const functions = library ? dlsym(library, "tensorray_picture_library") : nullptr;
+  if (!functions)
+    throw std::runtime_error(std::string("cannot load ") + file + ", which must be beside the program: " + dlerror());
+  return *static_cast<const PictureLibrary*>(functions);
+}
+
+}  // namespace
+
+const PictureLibrary& picture_library() {
+  static const PictureLibrary& library = load();
+  return library;
+}
+
+}  // namespace tensorray

@@ -1,0 +1,17 @@
+#pragma once
+/// @file renderer/openimageio/picture_files.h
+/// Pictures in the formats of files; see PictureLibrary.
+
+#include <filesystem>
+#include <vector>
+
+#include "renderer/images/picture_library.h"
+
+namespace tensorray::openimageio {
+
+void set_threads(int threads);
+std::vector<unsigned char> encode(const Image& image, const PictureFormat& format, const ImageMetadata& metadata);
+Image decode(const std::filesystem::path& path);
+NativeImage decode_native(const std::filesystem::path& path);
+
+}  // namespace tensorray::openimageio
