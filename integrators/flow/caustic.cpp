@@ -15,7 +15,6 @@ namespace {
 
 constexpr double even_part = 0.1;  // Densities of a square's halves that differ by less than this part of their sum ...
                                    // become one.
-constexpr double swept_share = 0.99;  // The part of the positions whose light moves slowly enough from band to band.
 constexpr std::size_t bands_of_thread = 4;     // Bands that are drawn before their sums are added to the film.
 constexpr std::size_t most_memory = 1u << 28;  // Bytes for these, unless a band for each thread takes more.
 
@@ -128,24 +127,6 @@ std::vector<double> add_to_films(const std::vector<Drawing>& drawings, const Cau
 }
 
 }  // namespace
-
-int caustic_bands(const FlowMap& map, int channels, const BandStep& step) {
-  std::vector<float> sweeps;
-  for (std::size_t i = 0; i < map.starts.size(); ++i) {
-    float sweep = 0;
-    for (std::size_t node = 1; node < map.nodes; ++node) {
-      const std::size_t at = i * map.nodes + node;
-      if (map.ends[at] == RayEnd::plate && map.ends[at - 1] == RayEnd::plate)
-        sweep += (map.landings[at] - map.landings[at - 1]).norm();
-    }
-    sweeps.push_back(sweep);
-  }
-  const auto place = static_cast<std::ptrdiff_t>(swept_share * static_cast<double>(sweeps.size() - 1));
-  std::nth_element(sweeps.begin(), sweeps.begin() + place, sweeps.end());
-  const double wanted = std::max<double>(step.least, sweeps[static_cast<std::size_t>(place)] / step.pixels);
-  const double most = std::max(1.0, std::floor(static_cast<double>(step.most) / channels));
-  return channels * static_cast<int>(std::clamp(std::ceil(wanted / channels), 1.0, most));
-}
 
 Caustic draw_caustic(const FlowMap& map, const Plate& plate, const std::vector<CausticBand>& bands,
                      std::size_t channels, bool by_channel, const Progress& progress) {

@@ -31,16 +31,6 @@ struct Caustic {
   std::vector<EndCounts> ends;                           ///< Number of positions by the end of each channel's light.
 };
 
-/// How finely a spectrum is divided into bands.
-struct BandStep {
-  double pixels = 1;  ///< Light moves by no more than this from band to band, for 99 of 100 positions.
-  int least = 1;      ///< Number of bands, at least; ...
-  int most = 128;     ///< ... and at most.
-};
-
-/// The number of bands: a multiple of `channels`, whatever the limits are.
-int caustic_bands(const FlowMap& map, int channels, const BandStep& step = {});
-
 /// Draws the bands one after the other. Triangles of which not all corners land, and torn ones, leave their light at
 /// the corners: each corner takes a third. What lands beside the plate counts as missed.
 /// @param plate       The plate of the map.

@@ -24,10 +24,11 @@ constexpr double first_voxels = 1;       // In voxels, so that no part of the fi
 constexpr double most_for_voxels = 64;   // this than so many along a side.
 constexpr double usual_tolerance = 0.5;  // Pixels.
 
-constexpr float torn_pixels = 1;         // Landings at the ends of a smallest side that are farther apart are a tear ...
-constexpr float torn_ratio = 6;          // ... if those of the next side are so much nearer to each other.
-constexpr double inset = 3e-6;  // On the aperture's edge, it is a matter of rounding whether rays enter the volume.
-                                // There they start this part of a patch further inside.
+constexpr float torn_pixels = 1;  // Landings at the ends of a smallest side that are farther apart are a tear ...
+constexpr float torn_ratio = 6;   // ... if those of the next side are so much nearer to each other.
+constexpr double inset = 3e-6;    // On the aperture's edge, it is a matter of rounding whether rays enter the volume.
+                                  // There they start this part of a patch further inside.
+constexpr double swept_share = 0.99;  // The part of the positions whose light moves slowly enough from band to band.
 constexpr int most_levels = 14;
 constexpr int most_columns = 1 << 12;  // Number of first squares along a side.
 constexpr std::size_t task_size = 32;  // Positions that one thread traces as one task.
@@ -85,8 +86,8 @@ std::vector<Patch> patches_of(const std::vector<Eigen::Vector2d>& polygon, doubl
 
 /// The size of a pixel in the plane where light starts, as straight light projects it.
 double pixel_of_starts(const Plate& plate, const Beam& beam) {
-  const double slope = std::abs(plate.normal().dot(beam.direction)) /
-                       std::abs(beam.right.cross(beam.up).dot(beam.direction));
+  const double slope =
+      std::abs(plate.normal().dot(beam.direction)) / std::abs(beam.right.cross(beam.up).dot(beam.direction));
   return std::sqrt(plate.pixel_area() * std::clamp(slope, 1e-6, 1e6));
 }
 
@@ -306,8 +307,8 @@ class FlowMapBuilder {
     float greatest = 0;
     for (int i = 0; i < 5; ++i) {
       if (!landed(middles[i], node)) return std::numeric_limits<float>::infinity();
-      const Eigen::Vector2f mean = i < 4 ? Eigen::Vector2f((at[i] + at[(i + 1) % 4]) / 2)
-                                         : Eigen::Vector2f((at[0] + at[1] + at[2] + at[3]) / 4);
+      const Eigen::Vector2f mean =
+          i < 4 ? Eigen::Vector2f((at[i] + at[(i + 1) % 4]) / 2) : Eigen::Vector2f((at[0] + at[1] + at[2] + at[3]) / 4);
       greatest = std::max(greatest, (landing(middles[i], node) - mean).norm());
     }
     return greatest;
@@ -323,8 +324,8 @@ class FlowMapBuilder {
     return greatest;
   }
 
-  /// Whether the map jumps across a side of a smallest square. The landings at its ends are then far apart, and those at
-  /// the ends of the side's other half, in the parent, are not.
+  /// Whether the map jumps across a side of a smallest square. The landings at its ends are then far apart, and those
+  /// at the ends of the side's other half, in the parent, are not.
   bool is_torn(const Square& square) {
     if (square.level < levels_ || !(square.deviation > torn_pixels / 2)) return false;
     const std::uint32_t half = side_of(square), left = square.x / (2 * half) * 2 * half,
@@ -470,6 +471,25 @@ FlowLanding landing_at(const FlowMap& map, std::size_t position, double node) {
   if (map.ends[a] != RayEnd::plate || map.ends[b] != RayEnd::plate)
     return {map.ends[nearest], map.landings[nearest].cast<double>()};
   return {RayEnd::plate, (1 - part) * map.landings[a].cast<double>() + part * map.landings[b].cast<double>()};
+}
+
+int band_count(const FlowMap& map, int channels, const BandStep& step) {
+  if (map.nodes == 1) return channels;
+  std::vector<float> sweeps;
+  for (std::size_t i = 0; i < map.starts.size(); ++i) {
+    float sweep = 0;
+    for (std::size_t node = 1; node < map.nodes; ++node) {
+      const std::size_t at = i * map.nodes + node;
+      if (map.ends[at] == RayEnd::plate && map.ends[at - 1] == RayEnd::plate)
+        sweep += (map.landings[at] - map.landings[at - 1]).norm();
+    }
+    sweeps.push_back(sweep);
+  }
+  const auto place = static_cast<std::ptrdiff_t>(swept_share * static_cast<double>(sweeps.size() - 1));
+  std::nth_element(sweeps.begin(), sweeps.begin() + place, sweeps.end());
+  const double wanted = std::max<double>(step.least, sweeps[static_cast<std::size_t>(place)] / step.pixels);
+  const double most = std::max(1.0, std::floor(static_cast<double>(step.most) / channels));
+  return channels * static_cast<int>(std::clamp(std::ceil(wanted / channels), 1.0, most));
 }
 
 FlowMap trace_flow_map(const TensorField& field, const Geometry& geometry, const Plate& plate, const Beam& beam,

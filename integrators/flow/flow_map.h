@@ -23,7 +23,7 @@ struct FlowSettings {
   bool range = false;
 
   double tolerance = 0.5;  ///< Wanted error of landings between positions, pixels; > 0.
-  double finest = 0.5;     ///< Size of the smallest squares, pixels of straight light, unless the tolerance is less; > 0.
+  double finest = 0.5;  ///< Size of the smallest squares, pixels of straight light, unless the tolerance is less; > 0.
 
   bool silhouette = true;  ///< Whether the edge of the aperture is that of the volume. Rays from there start a little
                            ///< further inside, as they must enter the volume.
@@ -55,14 +55,24 @@ struct FlowMap {
   std::vector<Eigen::Vector2f> landings;  ///< Pixel coordinates; node k of position i is at [i · nodes + k]. They may
                                           ///< lie beyond the plate's edges.
   std::vector<RayEnd> ends;               ///< In the same order; landings are valid where this is `plate`.
-  std::size_t check_step = 1;   ///< Every so many nodes, light is traced for all positions, never interpolated.
-  std::vector<float> lengths;   ///< Length of the way, world units, at these nodes, in the same order.
-  std::vector<FlowTriangle> triangles;    ///< They cover the aperture once; neighbours follow each other.
-  std::vector<FlowEdge> edges;            ///< All sides of the triangles, once.
-  std::size_t rays = 0;                   ///< Number of rays that were traced.
+  std::size_t check_step = 1;           ///< Every so many nodes, light is traced for all positions, never interpolated.
+  std::vector<float> lengths;           ///< Length of the way, world units, at these nodes, in the same order.
+  std::vector<FlowTriangle> triangles;  ///< They cover the aperture once; neighbours follow each other.
+  std::vector<FlowEdge> edges;          ///< All sides of the triangles, once.
+  std::size_t rays = 0;                 ///< Number of rays that were traced.
   std::uint64_t ray_steps = 0, tensor_samples = 0;
   bool is_complete = true;  ///< Whether every triangle is as fine as `tolerance` asks.
 };
+
+/// How finely a spectrum is divided into bands.
+struct BandStep {
+  double pixels = 1;  ///< Light moves by no more than this from band to band, for 99 of 100 positions.
+  int least = 1;      ///< Number of bands, at least; ...
+  int most = 128;     ///< ... and at most.
+};
+
+/// The number of bands: a multiple of `channels`, whatever the limits are; one a channel if all light bends alike.
+int band_count(const FlowMap& map, int channels, const BandStep& step = {});
 
 /// Light of one position at a place among the nodes, in a range also between two of them.
 struct FlowLanding {
@@ -73,9 +83,9 @@ struct FlowLanding {
 /// Between two nodes of which only one landed, the nearer one counts.
 FlowLanding landing_at(const FlowMap& map, std::size_t position, double node);
 
-/// Traces the map from `beam` to the plane of `plate`. The plate of `geometry` lies in the same plane and may be larger:
-/// the map goes on there. `right` and `up` of the beam need not be across its direction: its light may start on any
-/// plane.
+/// Traces the map from `beam` to the plane of `plate`. The plate of `geometry` lies in the same plane and may be
+/// larger: the map goes on there. `right` and `up` of the beam need not be across its direction: its light may start on
+/// any plane.
 ///
 /// Positions form a lattice of squares of 8 pixels, or of a voxel if that is less, but not more than 64 along a side
 /// for that (for an aperture that is no parallelogram, one lattice for each corner). Each is divided into four, and

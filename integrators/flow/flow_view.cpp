@@ -170,8 +170,7 @@ FlowView::FlowView(const FlowMap& map, const FlowPicture& picture, std::vector<d
 
 Eigen::AlignedBox2i FlowView::pixels(int tile) const {
   const Eigen::Vector2i first(tile % columns_ * tile_size, tile / columns_ * tile_size);
-  return {first, (first + Eigen::Vector2i(tile_size, tile_size)).cwiseMin(picture_.resolution) -
-                     Eigen::Vector2i(1, 1)};
+  return {first, (first + Eigen::Vector2i(tile_size, tile_size)).cwiseMin(picture_.resolution) - Eigen::Vector2i(1, 1)};
 }
 
 /// The mean of the triangles about each position, by area.
@@ -231,7 +230,8 @@ void FlowView::sort_triangles(std::size_t node) {
   const auto for_each_tile = [&](const auto& call) {
     for (const Tiles& tiles : touched)
       for (int y = tiles.top; y <= tiles.bottom; ++y)
-        for (int x = tiles.left; x <= tiles.right; ++x) call(static_cast<std::size_t>(y * columns_ + x), tiles.triangle);
+        for (int x = tiles.left; x <= tiles.right; ++x)
+          call(static_cast<std::size_t>(y * columns_ + x), tiles.triangle);
   };
   Sorted& sorted = sorted_[node];
   sorted.first_of_tile.assign(static_cast<std::size_t>(tiles()) + 1, 0);

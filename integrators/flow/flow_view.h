@@ -17,12 +17,12 @@ enum class FlowSide { starts, landings };
 
 /// What a point of the picture sees: the light that starts or lands there.
 struct FlowPoint {
-  RayEnd end = RayEnd::missed;   ///< `plate`: the light landed, and the rest is valid.
-  bool is_unknown = false;       ///< Starts: the mesh does not tell what happens to the light. It has to be traced.
-  std::uint16_t sheets = 0;      ///< Number of sheets of the map that cover the point.
-  Eigen::Vector2f other{0, 0};   ///< The other end of the light: its landing (pixels of the plate) or its start (beam).
+  RayEnd end = RayEnd::missed;  ///< `plate`: the light landed, and the rest is valid.
+  bool is_unknown = false;      ///< Starts: the mesh does not tell what happens to the light. It has to be traced.
+  std::uint16_t sheets = 0;     ///< Number of sheets of the map that cover the point.
+  Eigen::Vector2f other{0, 0};  ///< The other end of the light: its landing (pixels of the plate) or its start (beam).
   Eigen::Matrix2f jacobian = Eigen::Matrix2f::Identity();  ///< ∂landing/∂start.
-  float length = 0;              ///< Length of the way, world units.
+  float length = 0;                                        ///< Length of the way, world units.
 };
 
 /// How a picture shows a flow map.

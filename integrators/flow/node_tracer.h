@@ -37,8 +37,7 @@ class NodeTracer {
 
  private:
   void trace_nodes(const std::vector<Eigen::Vector3d>& origins, const std::vector<std::size_t>& which,
-                   std::size_t first, std::size_t step, Eigen::Vector2f* landings, RayEnd* ends,
-                   float* lengths);
+                   std::size_t first, std::size_t step, Eigen::Vector2f* landings, RayEnd* ends, float* lengths);
 
   const TensorField& field_;
   const Geometry& geometry_;

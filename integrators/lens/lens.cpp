@@ -21,15 +21,15 @@ using Eigen::Affine2d;
 using Eigen::Matrix2d;
 using Eigen::Vector2d;
 
-constexpr double tolerance = 0.25;          // Wanted error of landings, pixels.
-constexpr double finest_of_scatter = 0.25;  // Size of the smallest squares, pixels: gaps at tears are as wide.
-constexpr double finest_of_gather = 1;      // There, samples in torn squares are traced on their own.
+constexpr double tolerance = 0.25;             // Wanted error of landings, pixels.
+constexpr double finest_of_scatter = 0.25;     // Size of the smallest squares, pixels: gaps at tears are as wide.
+constexpr double finest_of_gather = 1;         // There, samples in torn squares are traced on their own.
 constexpr std::size_t most_starts = 1u << 14;  // The map has at most so many positions,
 constexpr std::size_t starts_per_pixel = 2;    // plus so many for each pixel. A chaotic field could need any number.
 constexpr double same_look = 0.25;  // Pixels: bands whose light sees points this near share a look at the image.
-constexpr double swept_pixels = 2;   // Of the image, over which a pixel's light is spread, so that one sample is enough.
+constexpr double swept_pixels = 2;  // Of the image, over which a pixel's light is spread, so that one sample is enough.
 constexpr double joined_pixels = 16;  // Farther apart, the points that both ends of a band see are on different sheets.
-constexpr double same_place = 1e-3;  // Pixels: sheets whose starts are nearer than this count as one.
+constexpr double same_place = 1e-3;   // Pixels: sheets whose starts are nearer than this count as one.
 
 bool gathers(const LensLight& light) { return light.settings.mode == LensMode::gather; }
 
@@ -119,8 +119,9 @@ struct Drawing {
   struct Ends {
     std::size_t begin, end;
   };
-  std::vector<Ends> ends{};     // Of the bands, as indices of `nodes`.
-  std::vector<double> nodes{};  // Places among the map's nodes that are drawn: the ends of bands; the last: the reference.
+  std::vector<Ends> ends{};  // Of the bands, as indices of `nodes`.
+  std::vector<double>
+      nodes{};  // Places among the map's nodes that are drawn: the ends of bands; the last: the reference.
   FlowView view;
 };
 
@@ -153,8 +154,14 @@ Drawing make_drawing(const LensLight& light, const std::vector<LensBand>& bands,
   }
   nodes.push_back(node_at(light, light.settings.reference));
   FlowView view(light.map, flow_picture(light), nodes, light.settings.samples);
-  return {light, bands, radiance, to_pixels(light.receiver), to_pixels(light.landings),
-          std::move(ends), std::move(nodes), std::move(view)};
+  return {light,
+          bands,
+          radiance,
+          to_pixels(light.receiver),
+          to_pixels(light.landings),
+          std::move(ends),
+          std::move(nodes),
+          std::move(view)};
 }
 
 double flexibility_at(const LensLight& light, double node) {
@@ -313,8 +320,7 @@ class SampleView {
     if (!sees_image(drawing_.light, middle)) return;
     const bool is_long = from.distance(end) > same_look * n_;
     const Eigen::Vector4d texel =
-        drawing_.light.image.texture
-            ->lookup(middle, is_long ? swept(from.footprint, end - from.st) : from.footprint)
+        drawing_.light.image.texture->lookup(middle, is_long ? swept(from.footprint, end - from.st) : from.footprint)
             .cast<double>();
     if (!(texel.w() > 0)) return;
     thread_local std::vector<double> radiances;
@@ -446,8 +452,8 @@ void draw_tile(const Drawing& drawing, int tile, LensPicture& picture, TraceCoun
     for (int c = 0; c < picture.radiance.channels; ++c)
       picture.radiance.plane(c)[index] = light.channels[static_cast<std::size_t>(c)];
     picture.alpha[index] = *std::max_element(light.alpha.begin(), light.alpha.end());
-    picture.points[index] = make_point(drawing, at.cast<double>() + Vector2d(0.5, 0.5),
-                                       centers.front()[static_cast<std::size_t>(pixel)]);
+    picture.points[index] =
+        make_point(drawing, at.cast<double>() + Vector2d(0.5, 0.5), centers.front()[static_cast<std::size_t>(pixel)]);
   }
 }
 

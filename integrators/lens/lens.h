@@ -41,10 +41,10 @@ struct LensImage {
 /// A part of the light: a narrow band of wavelengths, or a colour in RGB mode. It is spread evenly over the points of
 /// the image that its light sees.
 struct LensBand {
-  double begin = 0, end = 0;  ///< Its ends, as places between the first (0) and the last (1) flexibility. They are equal
-                              ///< outside a range.
-  std::size_t channel = 0;    ///< The channel that it belongs to.
-  double weight = 1;          ///< Its part of the channel's radiance; the sum over the bands of a channel is 1.
+  double begin = 0, end = 0;  ///< Its ends, as places between the first (0) and the last (1) flexibility. They are
+                              ///< equal outside a range.
+  std::size_t channel = 0;  ///< The channel that it belongs to.
+  double weight = 1;        ///< Its part of the channel's radiance; the sum over the bands of a channel is 1.
   Eigen::Vector3d color = Eigen::Vector3d::Zero();  ///< What a radiance of 1 adds to the picture (R, G, B).
 };
 
@@ -56,8 +56,8 @@ using LensRadiance =
 struct LensSettings {
   LensMode mode = LensMode::scatter;
   int samples = 1;       ///< Samples per pixel along x and along y; > 0.
-  double reference = 0;  ///< The light that LensPicture::points describes: its place, from 0 to 1, between the first and
-                         ///< the last flexibility.
+  double reference = 0;  ///< The light that LensPicture::points describes: its place, from 0 to 1, between the first
+                         ///< and the last flexibility.
 
   /// Flexibilities of the light: each on its own, or the two ends of a range.
   std::vector<double> flexibilities;
@@ -88,12 +88,12 @@ struct LensPoint {
 };
 
 struct LensPicture {
-  Film color;                 ///< Red, green and blue, multiplied by alpha.
-  Film radiance;              ///< If asked for: one plane for each channel, multiplied by alpha.
-  std::vector<double> alpha;  ///< One value for each pixel: the part of it that sees the image, in the band that
-                              ///< sees most of it. Where other bands do not see the image, their light is missing,
-                              ///< and the remaining light is coloured.
-  std::vector<LensPoint> points;                           ///< One for each pixel, row by row from the top.
+  Film color;                     ///< Red, green and blue, multiplied by alpha.
+  Film radiance;                  ///< If asked for: one plane for each channel, multiplied by alpha.
+  std::vector<double> alpha;      ///< One value for each pixel: the part of it that sees the image, in the band that
+                                  ///< sees most of it. Where other bands do not see the image, their light is missing,
+                                  ///< and the remaining light is coloured.
+  std::vector<LensPoint> points;  ///< One for each pixel, row by row from the top.
   Eigen::Affine2d straight = Eigen::Affine2d::Identity();  ///< Maps pixels to the (s, t) that straight light shows.
   std::vector<EndCounts> ends;  ///< Number of positions of the map by channel and end; `plate` counts light that met
                                 ///< the plane of the image (gather) or of the receiver (scatter).
@@ -107,10 +107,11 @@ struct LensLight {
   Eigen::Vector3d direction;
   Plate receiver;
   LensImage image;
-  Eigen::Affine2d straight;  ///< From pixels to the point of the image's plane (its coordinates) that straight light shows.
-  LensMap planes;            ///< From the image to the receiver (scatter), or back (gather).
-  Plate landings;            ///< The plate of `map`, in whose pixels its landings are.
-  FlowMap map;               ///< Between the planes. Starts are coordinates in the plane where light starts.
+  Eigen::Affine2d
+      straight;    ///< From pixels to the point of the image's plane (its coordinates) that straight light shows.
+  LensMap planes;  ///< From the image to the receiver (scatter), or back (gather).
+  Plate landings;  ///< The plate of `map`, in whose pixels its landings are.
+  FlowMap map;     ///< Between the planes. Starts are coordinates in the plane where light starts.
   double seconds_tracing = 0;
 };
 

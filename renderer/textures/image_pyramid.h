@@ -17,9 +17,8 @@ namespace tensorray {
 /// width and height (rounded down, at least 1); the last level is a single pixel. A pixel of a level is the exact mean
 /// over its area for any size of the picture, so that no level aliases and all levels have the same mean.
 /// Memory: 21 bytes for each pixel of a picture of up to 16 million pixels, of which all levels are stored. Of a larger
-/// one, the picture as its file stores it, and a third of a byte per pixel: its levels 0 to 2 are converted when they are
-/// read. The constructor computes stored levels on all threads.
-/// Immutable; any number of threads may read.
+/// one, the picture as its file stores it, and a third of a byte per pixel: its levels 0 to 2 are converted when they
+/// are read. The constructor computes stored levels on all threads. Immutable; any number of threads may read.
 class ImagePyramid final : public TileSource {
  public:
   /// @param conversion  From the colours of the picture to scene-linear colours.

@@ -7,7 +7,6 @@
 #include <fmt/format.h>
 
 #include "base/constants.h"
-#include "integrators/flow/caustic.h"
 #include "integrators/lens/lens.h"
 #include "renderer/color/reflectance.h"
 #include "renderer/images/grid_lines.h"
@@ -22,9 +21,8 @@ namespace {
 constexpr double reference_wavelength = 550;  // nm: LensPicture::points describes the nearest channel.
 constexpr int overlay_cells = 16;             // Cells along the image's shorter side.
 constexpr double most_overlay_cells = 1e6;    // A limit; grids are too dense to be visible long before.
-constexpr std::size_t exact_bands = 10;       // With this many bands a reflectance can have any colour of Rec. 709.
 /// The light of a band is spread evenly over the points that it sees; so this step decides only how exact the colours
-/// within a fringe are.
+/// within a fringe are. With 10 bands or more a reflectance can have any colour of Rec. 709.
 constexpr BandStep band_step{8, 12, 24};
 constexpr int gap_part = 64;  // The gap between pictures side by side is the width of a picture divided by this.
 
@@ -207,7 +205,7 @@ Render LoadedLens::render(const Scene& scene, const Progress& progress) const {
     image.plane = plane;
     const LensLight light = trace_lens(scene.field, scene.geometry.surfaces(), scene.bending, scene.beam.direction,
                                        lens_.receiver, image, settings, progress);
-    const std::vector<FineBand> fine = fine_bands(scene, caustic_bands(light.map, channels, band_step));
+    const std::vector<FineBand> fine = fine_bands(scene, band_count(light.map, channels, band_step));
     const LensPicture picture =
         draw_lens(light, lens_bands(fine, scene), radiance_in(fine, scene), scene.bands.size(), by_channel, progress);
     pictures.push_back(make_image(picture));
@@ -219,7 +217,8 @@ Render LoadedLens::render(const Scene& scene, const Progress& progress) const {
   }
   result.linear = side_by_side(pictures);
   if (!spectra.empty()) result.spectral = spectra_side_by_side(std::move(spectra));
-  for (const std::uint64_t count : result.statistics.ends[reference_channel(scene)]) result.statistics.positions += count;
+  for (const std::uint64_t count : result.statistics.ends[reference_channel(scene)])
+    result.statistics.positions += count;
   result.metadata["tensorray:end"] = end_codes();
   result.exposure = 0;  // Shows the colours of the image unchanged.
   if (nothing_arrived(result.statistics))
@@ -247,18 +246,14 @@ class LensMethod : public MethodWith<LensDescription> {
     if (!chosen) return;
     check_spectral_output(scene, source);
     warn_unused(scene, json, "/light/spectrum", "/bending/rgb");
-    // 600 bytes for rays and their mesh; and for each depth, two copies of the picture with all of its channels.
+    // 1200 bytes for the flow map; and for each depth, two copies of the picture with all of its channels.
     const int channels = scene.bending.rgb ? 3 : scene.light.wavelength_count;
     const auto& depth = settings().plane.depth;
     const double pictures = depth ? static_cast<double>(depth->size()) : 1;
-    check_receiver_memory(scene, 600 + 2.0 * sizeof(float) * (15 + channels) * pictures, source);
+    check_receiver_memory(scene, 1200 + 2.0 * sizeof(float) * (15 + channels) * pictures, source);
   }
 
-  std::unique_ptr<const LoadedMethod> load(const Scene& scene, std::vector<std::string>& notes) const override {
-    if (!scene.description.bending.rgb && scene.bands.size() > 1 && scene.bands.size() < exact_bands)
-      notes.push_back(
-          fmt::format("warning: with {} wavelengths saturated colours of the image may come out wrong; {} are enough",
-                      scene.bands.size(), exact_bands));
+  std::unique_ptr<const LoadedMethod> load(const Scene& scene, std::vector<std::string>&) const override {
     return std::make_unique<LoadedLens>(settings(), load_lens(scene, settings()));
   }
 };

@@ -37,7 +37,7 @@ std::vector<CausticBand> bands_of(const Scene& scene, const FlowMap& map, const 
   const Eigen::Matrix3d xyz_to_working = to_working(scene);
   const int channels = static_cast<int>(scene.bands.size());
   std::vector<CausticBand> bands;
-  for (const FineBand& fine : fine_bands(scene, caustic_bands(map, channels, step)))
+  for (const FineBand& fine : fine_bands(scene, band_count(map, channels, step)))
     bands.push_back({(fine.begin + fine.end) / 2 * static_cast<double>(map.nodes - 1), fine.channel, fine.weight,
                      xyz_to_working * fine.band.xyz});
   return bands;

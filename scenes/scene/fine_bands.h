@@ -18,8 +18,8 @@ struct LightRange {
 
 LightRange light_range(const Scene& scene);
 
-/// A narrow part of a channel. `begin` and `end` are places in the range of the light, from 0 to 1 (in RGB mode both are
-/// the channel's place: 0, ½ or 1).
+/// A narrow part of a channel. `begin` and `end` are places in the range of the light, from 0 to 1 (in RGB mode both
+/// are the channel's place: 0, ½ or 1).
 struct FineBand {
   Band band;
   double begin = 0, end = 0;

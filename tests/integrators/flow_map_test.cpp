@@ -413,12 +413,12 @@ TEST(Caustic, LightThatMovesFarHasManyBands) {
   for (const Eigen::Vector2f& at : map.landings) landings.insert(landings.end(), {at, at + Eigen::Vector2f(21, 0)});
   map.landings = landings;
   map.ends.assign(landings.size(), RayEnd::plate);
-  EXPECT_EQ(caustic_bands(map, 1), 21);
-  EXPECT_EQ(caustic_bands(map, 4), 24);
-  EXPECT_EQ(caustic_bands(map, 32), 32);
-  EXPECT_EQ(caustic_bands(map, 1000), 1000);
+  EXPECT_EQ(band_count(map, 1), 21);
+  EXPECT_EQ(band_count(map, 4), 24);
+  EXPECT_EQ(band_count(map, 32), 32);
+  EXPECT_EQ(band_count(map, 1000), 1000);
   for (std::size_t i = 1; i < map.landings.size(); i += 2) map.landings[i].x() += 1000;
-  EXPECT_EQ(caustic_bands(map, 4), 128);
+  EXPECT_EQ(band_count(map, 4), 128);
 }
 
 }  // namespace

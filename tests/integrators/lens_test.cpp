@@ -442,6 +442,55 @@ TEST(Lens, TheSameOnAnyNumberOfThreads) {
   }
 }
 
+/// A few bands of a range show what many single wavelengths show together, without steps between them.
+TEST(Lens, ARangeIsAContinuumOfWavelengths) {
+  Image edge(256, 256, {"R", "G", "B"});  // White on its left side.
+  for (int y = 0; y < 256; ++y)
+    for (int x = 0; x < 128; ++x) std::fill_n(edge.pixel(x, y), 3, 1.0f);
+  Bench bench(cube_field(9,
+                         [](const Vector3d&) -> Matrix3d {
+                           Matrix3d T = Matrix3d::Zero();
+                           T(0, 2) = 1;  // Moves all light along x, by about s.
+                           return T;
+                         }),
+              plate_at(1.5, {1, 1}, {64, 16}), {4, 4}, edge);
+  for (const LensMode mode : modes) {
+    const auto seen = [&](std::vector<double> flexibilities, bool range, int count) {
+      LensSettings settings;
+      settings.mode = mode;
+      settings.samples = 2;
+      settings.flexibilities = std::move(flexibilities);
+      settings.range = range;
+      std::vector<LensBand> bands;
+      for (int i = 0; i < count; ++i) {
+        const double begin = range ? static_cast<double>(i) / count : static_cast<double>(i) / (count - 1),
+                     end = range ? (i + 1.0) / count : begin;
+        bands.push_back({begin, end, 0, 1.0 / count, Vector3d(1, 1, 1) / count});
+      }
+      const LensLight light = trace_lens(bench.field, bench.surfaces, bench.bending, Vector3d::UnitZ(), bench.receiver,
+                                         bench.image, settings, Progress());
+      const auto radiance = [](const Vector3d& rgb, std::size_t first, std::size_t last, double* radiances) {
+        std::fill(radiances, radiances + (last - first), rgb.x());
+      };
+      return draw_lens(light, bands, radiance, 1, true, Progress());
+    };
+    constexpr int many = 256;
+    std::vector<double> each;
+    for (int i = 0; i < many; ++i) each.push_back(-0.1 + 0.2 * (i + 0.5) / many);
+    const LensPicture continuum = seen({-0.1, 0.1}, true, 8), single = seen(each, false, many);
+    EXPECT_EQ(continuum.color.plane(0)[5], continuum.radiance.plane(0)[5]);
+    int between = 0;
+    for (int x = 0; x < 64; ++x) {
+      const double value = continuum.radiance.plane(0)[8 * 64 + x],
+                   step = x == 0 ? 0 : value - continuum.radiance.plane(0)[8 * 64 + x - 1];
+      EXPECT_NEAR(value, single.radiance.plane(0)[8 * 64 + x], 0.03) << x;
+      EXPECT_LT(std::abs(step), 0.1) << x;
+      between += value > 0.05 && value < 0.95;
+    }
+    EXPECT_GT(between, 10);
+  }
+}
+
 TEST(Lens, CanBeCancelled) {
   const Bench bench(no_field(), plate_at(1.5, {1, 1}, {32, 32}), {1, 1}, uniform(1));
   for (const LensMode mode : modes) {
