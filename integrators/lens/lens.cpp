@@ -4,6 +4,7 @@
 #include <atomic>
 #include <chrono>
 #include <cmath>
+#include <limits>
 #include <stdexcept>
 #include <thread>
 
@@ -21,14 +22,15 @@ using Eigen::Affine2d;
 using Eigen::Matrix2d;
 using Eigen::Vector2d;
 
-constexpr double tolerance = 0.25;             // Wanted error of landings, pixels.
+constexpr double tolerance = 0.5;              // Wanted error of landings, pixels.
 constexpr double finest_of_scatter = 0.25;     // Size of the smallest squares, pixels: gaps at tears are as wide.
 constexpr double finest_of_gather = 1;         // There, samples in torn squares are traced on their own.
 constexpr std::size_t most_starts = 1u << 14;  // The map has at most so many positions,
 constexpr std::size_t starts_per_pixel = 2;    // plus so many for each pixel. A chaotic field could need any number.
-constexpr double same_look = 0.25;  // Pixels: bands whose light sees points this near share a look at the image.
+constexpr double same_look = 0.25;    // Pixels: bands whose light sees points this near share a look at the image.
+constexpr std::size_t few_spans = 4;  // Of light that is spread over less than this:
 constexpr double swept_pixels = 2;  // Of the image, over which a pixel's light is spread, so that one sample is enough.
-constexpr double joined_pixels = 16;  // Farther apart, the points that both ends of a band see are on different sheets.
+constexpr double joined_pixels = 32;  // Farther apart, the points that both ends of a band see are on different sheets.
 constexpr double same_place = 1e-3;   // Pixels: sheets whose starts are nearer than this count as one.
 
 bool gathers(const LensLight& light) { return light.settings.mode == LensMode::gather; }
@@ -109,17 +111,21 @@ FlowSettings flow_settings(const LensLight& light) {
   return settings;
 }
 
+/// Bands that follow each other, from `first` to `last`, without it. Their light sees what the nodes `from` and `to`
+/// (indices) see, and what is between.
+struct Span {
+  std::size_t first, last, from, to;
+};
+
 /// What the threads share when the picture is drawn.
 struct Drawing {
   const LensLight& light;
   const std::vector<LensBand>& bands;
   const LensRadiance& radiance;
-  Affine2d starts;    // From the coordinates of the map's starts to pixels of the receiver, in `gather`.
-  Affine2d landings;  // From coordinates to the map's landings.
-  struct Ends {
-    std::size_t begin, end;
-  };
-  std::vector<Ends> ends{};  // Of the bands, as indices of `nodes`.
+  Affine2d starts;            // From the coordinates of the map's starts to pixels of the receiver, in `gather`.
+  Affine2d landings;          // From coordinates to the map's landings.
+  std::vector<Span> spans{};  // Each band.
+  std::vector<Span> few{};    // Some bands together, for light that moves little from band to band.
   std::vector<double>
       nodes{};  // Places among the map's nodes that are drawn: the ends of bands; the last: the reference.
   FlowView view;
@@ -140,26 +146,43 @@ FlowPicture flow_picture(const LensLight& light) {
 /// A place between the first and the last flexibility, as one among the nodes of the map.
 double node_at(const LensLight& light, double place) { return place * static_cast<double>(light.map.nodes - 1); }
 
+/// Some spans, together all. In a range they end where others begin; other lights have nothing in common.
+std::vector<Span> joined(const std::vector<Span>& spans) {
+  std::vector<Span> few;
+  for (std::size_t i = 0; i < spans.size(); ++i) {
+    const bool is_new = few.size() * spans.size() <= i * few_spans || few.empty();
+    if (is_new || spans[i].from != few.back().to || spans[i].from == spans[i].to) {
+      few.push_back(spans[i]);
+    } else {
+      few.back().last = spans[i].last;
+      few.back().to = spans[i].to;
+    }
+  }
+  return few;
+}
+
 Drawing make_drawing(const LensLight& light, const std::vector<LensBand>& bands, const LensRadiance& radiance) {
   std::vector<double> nodes;
-  std::vector<Drawing::Ends> ends;
+  std::vector<Span> spans;
   const auto index_of = [&](double place) {
     const double node = node_at(light, place);
     if (nodes.empty() || nodes.back() != node) nodes.push_back(node);
     return nodes.size() - 1;
   };
-  for (const LensBand& band : bands) {
-    const std::size_t begin = index_of(band.begin);
-    ends.push_back({begin, index_of(band.end)});
+  for (std::size_t band = 0; band < bands.size(); ++band) {
+    const std::size_t from = index_of(bands[band].begin);
+    spans.push_back({band, band + 1, from, index_of(bands[band].end)});
   }
   nodes.push_back(node_at(light, light.settings.reference));
   FlowView view(light.map, flow_picture(light), nodes, light.settings.samples);
+  std::vector<Span> few = joined(spans);
   return {light,
           bands,
           radiance,
           to_pixels(light.receiver),
           to_pixels(light.landings),
-          std::move(ends),
+          std::move(spans),
+          std::move(few),
           std::move(nodes),
           std::move(view)};
 }
@@ -171,32 +194,35 @@ double flexibility_at(const LensLight& light, double node) {
   return (1 - part) * s[0] + part * s[1];
 }
 
-/// What the samples of a tile see, by node and sample.
+/// What the samples of a tile see, by node and sample; empty for nodes that are not drawn.
 using TileView = std::vector<std::vector<FlowPoint>>;
 
 /// Traces light that the map does not know, back from samples of a tile.
-/// @param first  The node that the first part of `points` shows.
-void trace_unknown(const Drawing& drawing, const Eigen::AlignedBox2i& pixels, int n, std::size_t first,
-                   TileView& points, TraceCounts& counts) {
+void trace_unknown(const Drawing& drawing, const Eigen::AlignedBox2i& pixels, int n, TileView& points,
+                   TraceCounts& counts) {
+  std::vector<std::vector<FlowPoint>*> drawn;
+  std::vector<double> flexibilities;
+  for (std::size_t node = 0; node < points.size(); ++node) {
+    if (points[node].empty()) continue;
+    drawn.push_back(&points[node]);
+    flexibilities.push_back(-flexibility_at(drawing.light, drawing.nodes[node]));
+  }
   std::vector<std::size_t> unknown;
   std::vector<Vector2d> starts;
   const int width = n * (pixels.sizes().x() + 1);
-  for (std::size_t i = 0; i < points.front().size(); ++i) {
-    if (std::none_of(points.begin(), points.end(), [&](const auto& each) { return each[i].is_unknown; })) continue;
+  for (std::size_t i = 0; i < drawn.front()->size(); ++i) {
+    if (std::none_of(drawn.begin(), drawn.end(), [&](const auto* each) { return (*each)[i].is_unknown; })) continue;
     const auto sample = static_cast<int>(i);
     unknown.push_back(i);
     starts.push_back(drawing.starts.inverse() *
                      (pixels.min().cast<double>() + Vector2d(sample % width + 0.5, sample / width + 0.5) / n));
   }
   if (unknown.empty()) return;
-  std::vector<double> flexibilities;
-  for (std::size_t k = 0; k < points.size(); ++k)
-    flexibilities.push_back(-flexibility_at(drawing.light, drawing.nodes[first + k]));
-  std::vector<LensLanding> landings(starts.size() * points.size());
+  std::vector<LensLanding> landings(starts.size() * drawn.size());
   counts += drawing.light.planes.trace(starts, flexibilities, landings.data());
   for (std::size_t i = 0; i < landings.size(); ++i) {
     const LensLanding& landing = landings[i];
-    FlowPoint& point = points[i % points.size()][unknown[i / points.size()]];
+    FlowPoint& point = (*drawn[i % drawn.size()])[unknown[i / drawn.size()]];
     point = FlowPoint();
     point.end = landing.end;
     point.sheets = 1;
@@ -247,41 +273,39 @@ class SampleView {
   SampleView(const Drawing& drawing, const TileView& points, std::size_t sample, int n)
       : drawing_(drawing), points_(points), sample_(sample), n_(n) {}
 
-  /// Adds the light of all bands. Bands whose light sees nearly the same points share a look at the image.
-  void shade(PixelLight& pixel) const {
-    for (std::size_t band = 0; band < drawing_.bands.size();) {
-      const auto [a, b] = drawing_.ends[band];
-      std::size_t next = band + 1;
-      if (!lands(a)) {
-        if (lands(b)) look(Glimpse(*this, b), b, 0.5, band, next, pixel);
-        band = next;
+  /// Adds the light of all bands. Spans whose light sees nearly the same points share a look at the image.
+  void shade(const std::vector<Span>& spans, PixelLight& pixel) const {
+    for (std::size_t i = 0; i < spans.size();) {
+      const Span span = spans[i++];
+      if (!lands(span.from)) {
+        if (lands(span.to)) look(Glimpse(*this, span.to), span.to, 0.5, span.first, span.last, pixel);
         continue;
       }
-      const Glimpse glimpse(*this, a);
-      if (!is_joined(glimpse, b)) {
-        look(glimpse, a, 0.5, band, next, pixel);
-        if (lands(b)) look(Glimpse(*this, b), b, 0.5, band, next, pixel);
-      } else {
-        const auto is_near = [&](std::size_t node) { return glimpse.distance(st(node)) <= same_look * n_; };
-        while (next < drawing_.bands.size() && lands(drawing_.ends[next].end) && is_near(drawing_.ends[next].end))
-          ++next;
-        look(glimpse, drawing_.ends[next - 1].end, 1, band, next, pixel);
+      const Glimpse glimpse(*this, span.from);
+      if (!lands(span.to) || glimpse.distance(st(span.to)) > joined_pixels * n_) {
+        look(glimpse, span.from, 0.5, span.first, span.last, pixel);
+        if (lands(span.to)) look(Glimpse(*this, span.to), span.to, 0.5, span.first, span.last, pixel);
+        continue;
       }
-      band = next;
+      std::size_t last = i;
+      while (last < spans.size() && lands(spans[last].to) && glimpse.distance(st(spans[last].to)) <= same_look * n_)
+        ++last;
+      look(glimpse, spans[last - 1].to, 1, span.first, spans[last - 1].last, pixel);
+      i = last;
     }
   }
 
-  /// Whether the light of all bands is spread along one line of some pixels.
-  bool is_swept() const {
+  /// The length, in pixels, of the line of the image that the light of all bands comes from; infinite if it is not one
+  /// line.
+  double sweep() const {
     double length = 0;
-    for (const auto& [a, b] : drawing_.ends) {
-      if (!lands(a) || !lands(b)) return false;
-      const Glimpse glimpse(*this, a);
-      const double distance = glimpse.distance(st(b));
-      if (!(distance <= joined_pixels * n_)) return false;
+    for (const Span& span : drawing_.spans) {
+      if (!lands(span.from) || !lands(span.to)) return std::numeric_limits<double>::infinity();
+      const double distance = Glimpse(*this, span.from).distance(st(span.to)) / n_;
+      if (!(distance <= joined_pixels)) return std::numeric_limits<double>::infinity();
       length += distance;
     }
-    return length >= swept_pixels * n_;
+    return length;
   }
 
  private:
@@ -307,11 +331,6 @@ class SampleView {
     /// In samples.
     double distance(const Vector2d& other) const { return (to_samples * (other - st)).norm(); }
   };
-
-  /// Whether the points that are seen at both ends of a band belong to one sheet.
-  bool is_joined(const Glimpse& begin, std::size_t end) const {
-    return lands(end) && begin.distance(st(end)) <= joined_pixels * n_;
-  }
 
   /// Adds the light of the bands from `first` to `last`, which see the line to the point of node `to`.
   void look(const Glimpse& from, std::size_t to, double share, std::size_t first, std::size_t last,
@@ -413,48 +432,68 @@ class PlaceCounter {
 };
 
 /// @param n  Samples of a pixel along x and along y.
-/// @param first,last  The nodes that are seen: from `first` to `last`, without it.
-TileView view_tile(const Drawing& drawing, int tile, int n, std::size_t first, std::size_t last, TraceCounts& counts) {
-  TileView points(last - first);
-  for (std::size_t k = first; k < last; ++k) drawing.view.draw(tile, n, k, points[k - first]);
-  if (gathers(drawing.light)) trace_unknown(drawing, drawing.view.pixels(tile), n, first, points, counts);
+TileView view_tile(const Drawing& drawing, int tile, int n, const std::vector<Span>& spans, TraceCounts& counts) {
+  TileView points(drawing.nodes.size());
+  for (const Span& span : spans)
+    for (const std::size_t node : {span.from, span.to})
+      if (points[node].empty()) drawing.view.draw(tile, n, node, points[node]);
+  if (gathers(drawing.light)) trace_unknown(drawing, drawing.view.pixels(tile), n, points, counts);
   return points;
 }
 
-/// Draws a tile. Where the light of a pixel is spread over several pixels of the image, one sample shows as much as
-/// many.
+/// Shades the pixels of a tile.
+class TileShader {
+ public:
+  TileShader(const Drawing& drawing, int tile, TraceCounts& counts)
+      : drawing_(drawing), tile_(tile), counts_(counts), whole_(view_tile(drawing, tile, 1, drawing.spans, counts)) {}
+
+  /// @param x,y  In the tile. Where the light of a pixel is spread over several pixels of the image, one sample shows
+  /// as much as many; where it is hardly spread, few nodes show as much as all.
+  void shade(int x, int y, PixelLight& light) {
+    const int columns = drawing_.view.pixels(tile_).sizes().x() + 1, n = drawing_.light.settings.samples;
+    const SampleView pixel(drawing_, whole_, static_cast<std::size_t>(y * columns + x), 1);
+    const double sweep = pixel.sweep();
+    if (n == 1 || (sweep >= swept_pixels && std::isfinite(sweep))) return pixel.shade(drawing_.spans, light);
+    const bool is_still = sweep < swept_pixels;
+    const std::vector<Span>& spans = is_still ? drawing_.few : drawing_.spans;
+    TileView& view = is_still ? few_ : all_;
+    if (view.empty()) view = view_tile(drawing_, tile_, n, spans, counts_);
+    for (int i = 0; i < n * n; ++i) {
+      const int sample = (y * n + i / n) * columns * n + x * n + i % n;
+      SampleView(drawing_, view, static_cast<std::size_t>(sample), n).shade(spans, light);
+    }
+  }
+
+ private:
+  const Drawing& drawing_;
+  const int tile_;
+  TraceCounts& counts_;
+  const TileView whole_;  // A sample for each pixel.
+  TileView few_, all_;    // All samples, at few nodes and at all.
+};
+
 void draw_tile(const Drawing& drawing, int tile, LensPicture& picture, TraceCounts& counts) {
   const Eigen::AlignedBox2i box = drawing.view.pixels(tile);
-  const int n = drawing.light.settings.samples, columns = box.sizes().x() + 1, rows = box.sizes().y() + 1;
+  const int columns = box.sizes().x() + 1, rows = box.sizes().y() + 1;
   const std::size_t reference = drawing.nodes.size() - 1;
-  const TileView centers = view_tile(drawing, tile, 1, reference, reference + 1, counts);
-  const TileView coarse = view_tile(drawing, tile, 1, 0, reference, counts);
-  TileView fine;
+  const TileView centers = view_tile(drawing, tile, 1, {{0, 0, reference, reference}}, counts);
+  TileShader shader(drawing, tile, counts);
   PixelLight light;
-  for (int pixel = 0; pixel < rows * columns; ++pixel) {
-    const int x = pixel % columns, y = pixel / columns;
-    light.color.setZero();
-    light.channels.assign(picture.ends.size(), 0);
-    light.alpha.assign(drawing.bands.size(), 0);
-    const SampleView whole(drawing, coarse, static_cast<std::size_t>(pixel), 1);
-    if (n == 1 || whole.is_swept()) {
-      whole.shade(light);
-    } else {
-      if (fine.empty()) fine = view_tile(drawing, tile, n, 0, reference, counts);
-      for (int i = 0; i < n * n; ++i) {
-        const int sample = (y * n + i / n) * columns * n + x * n + i % n;
-        SampleView(drawing, fine, static_cast<std::size_t>(sample), n).shade(light);
-      }
+  for (int y = 0; y < rows; ++y)
+    for (int x = 0; x < columns; ++x) {
+      light.color.setZero();
+      light.channels.assign(picture.ends.size(), 0);
+      light.alpha.assign(drawing.bands.size(), 0);
+      shader.shade(x, y, light);
+      const Eigen::Vector2i at = box.min() + Eigen::Vector2i(x, y);
+      const auto pixel = static_cast<std::size_t>(at.y()) * picture.color.width + at.x();
+      for (int c = 0; c < 3; ++c) picture.color.plane(c)[pixel] = light.color[c];
+      for (int c = 0; c < picture.radiance.channels; ++c)
+        picture.radiance.plane(c)[pixel] = light.channels[static_cast<std::size_t>(c)];
+      picture.alpha[pixel] = *std::max_element(light.alpha.begin(), light.alpha.end());
+      picture.points[pixel] = make_point(drawing, at.cast<double>() + Vector2d(0.5, 0.5),
+                                         centers[reference][static_cast<std::size_t>(y * columns + x)]);
     }
-    const Eigen::Vector2i at = box.min() + Eigen::Vector2i(x, y);
-    const auto index = static_cast<std::size_t>(at.y()) * picture.color.width + at.x();
-    for (int c = 0; c < 3; ++c) picture.color.plane(c)[index] = light.color[c];
-    for (int c = 0; c < picture.radiance.channels; ++c)
-      picture.radiance.plane(c)[index] = light.channels[static_cast<std::size_t>(c)];
-    picture.alpha[index] = *std::max_element(light.alpha.begin(), light.alpha.end());
-    picture.points[index] =
-        make_point(drawing, at.cast<double>() + Vector2d(0.5, 0.5), centers.front()[static_cast<std::size_t>(pixel)]);
-  }
 }
 
 void count_places(const Drawing& drawing, LensPicture& picture) {

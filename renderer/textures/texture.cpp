@@ -27,8 +27,12 @@ struct Ellipse {
 Ellipse make_ellipse(const Matrix2d& footprint) {
   const Matrix2d square = footprint * footprint.transpose();
   const double middle = 0.5 * (square(0, 0) + square(1, 1)), difference = 0.5 * (square(0, 0) - square(1, 1));
-  const double radius = std::hypot(difference, square(0, 1)), angle = 0.5 * std::atan2(square(0, 1), difference);
-  return {std::sqrt(middle + radius), std::sqrt(std::max(0.0, middle - radius)), {std::cos(angle), std::sin(angle)}};
+  const double radius = std::sqrt(difference * difference + square(0, 1) * square(0, 1));
+  Vector2d direction(1, 0);
+  if (radius > 0)
+    direction = difference > 0 ? Vector2d(radius + difference, square(0, 1)).normalized()
+                               : Vector2d(square(0, 1), radius - difference).normalized();
+  return {std::sqrt(middle + radius), std::sqrt(std::max(0.0, middle - radius)), direction};
 }
 
 /// Whether a footprint is finite and small enough for a filter; a larger one gives the mean of the picture.

@@ -23,7 +23,7 @@ constexpr int overlay_cells = 16;             // Cells along the image's shorter
 constexpr double most_overlay_cells = 1e6;    // A limit; grids are too dense to be visible long before.
 /// The light of a band is spread evenly over the points that it sees; so this step decides only how exact the colours
 /// within a fringe are. With 10 bands or more a reflectance can have any colour of Rec. 709.
-constexpr BandStep band_step{8, 12, 24};
+constexpr BandStep band_step{16, 12, 24};
 constexpr int gap_part = 64;  // The gap between pictures side by side is the width of a picture divided by this.
 
 /// A function that converts a colour of the image to its radiance in some bands.
