@@ -392,9 +392,9 @@ class FlowMapBuilder {
     return center;
   }
 
-  std::uint32_t add_triangle(std::uint32_t a, std::uint32_t b, std::uint32_t c, bool torn) {
+  std::uint32_t add_triangle(std::uint32_t a, std::uint32_t b, std::uint32_t c, float error, bool torn) {
     const Eigen::Vector2d ab = map_.starts[b] - map_.starts[a], ac = map_.starts[c] - map_.starts[a];
-    map_.triangles.push_back({{a, b, c}, std::abs(ab.x() * ac.y() - ab.y() * ac.x()) / 2, torn});
+    map_.triangles.push_back({{a, b, c}, std::abs(ab.x() * ac.y() - ab.y() * ac.x()) / 2, error, torn});
     return static_cast<std::uint32_t>(map_.triangles.size() - 1);
   }
 
@@ -414,8 +414,8 @@ class FlowMapBuilder {
   void triangulate(const Square& square, const std::vector<std::uint32_t>& outline) {
     const bool torn = is_torn(square);
     if (outline.size() == 4) {
-      const std::uint32_t first = add_triangle(outline[0], outline[1], outline[2], torn);
-      const std::uint32_t second = add_triangle(outline[0], outline[2], outline[3], torn);
+      const std::uint32_t first = add_triangle(outline[0], outline[1], outline[2], square.error, torn);
+      const std::uint32_t second = add_triangle(outline[0], outline[2], outline[3], square.error, torn);
       map_.edges.push_back({outline[2], outline[0], first, second, true});
       for (std::size_t i = 0; i < 4; ++i) add_outline_edge(outline[i], outline[(i + 1) % 4], i < 2 ? first : second);
       return;
@@ -425,7 +425,7 @@ class FlowMapBuilder {
                count = static_cast<std::uint32_t>(outline.size());
     for (std::uint32_t i = 0; i < count; ++i) {
       const std::uint32_t from = outline[i], to = outline[(i + 1) % count];
-      const std::uint32_t triangle = add_triangle(from, to, center, torn);
+      const std::uint32_t triangle = add_triangle(from, to, center, square.error, torn);
       add_outline_edge(from, to, triangle);
       map_.edges.push_back({to, center, triangle, first + (i + 1) % count});
     }

@@ -36,6 +36,7 @@ struct FlowSettings {
 struct FlowTriangle {
   std::array<std::uint32_t, 3> corners{};  ///< Indices of positions.
   double area = 0;                         ///< Area of the aperture, world units².
+  float error = 0;                         ///< Estimated error of landings within, pixels.
   bool is_torn = false;                    ///< The landings of its corners have nothing to do with each other.
 };
 

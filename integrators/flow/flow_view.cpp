@@ -313,6 +313,7 @@ void FlowView::draw_triangle(const FlowTriangle& triangle, const Eigen::AlignedB
       point.other = other.cast<float>();
       point.jacobian = facet.jacobian(weights);
       point.length = facet.length(weights);
+      point.error = triangle.error;
     }
   }
 }

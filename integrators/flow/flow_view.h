@@ -23,6 +23,7 @@ struct FlowPoint {
   Eigen::Vector2f other{0, 0};  ///< The other end of the light: its landing (pixels of the plate) or its start (beam).
   Eigen::Matrix2f jacobian = Eigen::Matrix2f::Identity();  ///< ∂landing/∂start.
   float length = 0;                                        ///< Length of the way, world units.
+  float error = 0;                                         ///< Estimated error of the landing, pixels of the plate.
 };
 
 /// How a picture shows a flow map.

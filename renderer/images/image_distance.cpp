@@ -1,20 +1,22 @@
 #include "renderer/images/image_distance.h"
 
+#include <algorithm>
 #include <cmath>
 #include <stdexcept>
 
 namespace tensorray {
 
 double relative_distance(const Image& image, const Image& exact) {
-  if (image.width != exact.width || image.pixels.size() != exact.pixels.size())
-    throw std::invalid_argument("pictures of different sizes have no distance");
-  double squares = 0, all = 0;
+  const std::size_t channels = exact.channels.size(), colors = std::min<std::size_t>(channels, 3);
+  if (image.width != exact.width || image.height != exact.height || image.channels.size() != channels)
+    throw std::invalid_argument("pictures of different sizes or channels have no distance");
+  double difference = 0, all = 0;
   for (std::size_t i = 0; i < exact.pixels.size(); ++i) {
-    const double value = exact.pixels[i], difference = image.pixels[i] - value;
-    squares += difference * difference;
-    all += value * value;
+    if (i % channels >= colors) continue;
+    difference += std::pow(static_cast<double>(image.pixels[i]) - exact.pixels[i], 2);
+    all += std::pow(static_cast<double>(exact.pixels[i]), 2);
   }
-  return all > 0 ? std::sqrt(squares / all) : 0;
+  return all > 0 ? std::sqrt(difference / all) : 0;
 }
 
 }  // namespace tensorray

@@ -18,7 +18,6 @@
 namespace tensorray {
 namespace {
 
-constexpr double reference_wavelength = 550;  // nm: LensPicture::points describes the nearest channel.
 constexpr int overlay_cells = 16;             // Cells along the image's shorter side.
 constexpr double most_overlay_cells = 1e6;    // A limit; grids are too dense to be visible long before.
 /// The light of a band is spread evenly over the points that it sees; so this step decides only how exact the colours
@@ -54,21 +53,6 @@ std::vector<LensBand> lens_bands(const std::vector<FineBand>& fine, const Scene&
   for (const FineBand& each : fine)
     bands.push_back({each.begin, each.end, each.channel, each.weight, xyz_to_working * each.band.xyz});
   return bands;
-}
-
-/// The channel that LensPicture::points describes.
-std::size_t reference_channel(const Scene& scene) {
-  if (scene.description.bending.rgb) return 1;
-  const auto nearest = std::min_element(scene.bands.begin(), scene.bands.end(), [](const Band& a, const Band& b) {
-    return std::abs(a.wavelength - reference_wavelength) < std::abs(b.wavelength - reference_wavelength);
-  });
-  return static_cast<std::size_t>(nearest - scene.bands.begin());
-}
-
-/// The middle of the reference channel, as a place in the range of the light.
-double reference_place(const Scene& scene) {
-  const auto channel = static_cast<double>(reference_channel(scene));
-  return scene.description.bending.rgb ? channel / 2 : (channel + 0.5) / static_cast<double>(scene.bands.size());
 }
 
 /// The channels that write_point writes, in its order.

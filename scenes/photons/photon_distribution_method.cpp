@@ -1,5 +1,6 @@
 #include "scenes/photons/photon_distribution_method.h"
 
+#include <algorithm>
 #include <chrono>
 #include <set>
 
@@ -44,6 +45,19 @@ void name_fluence(const Scene& scene, std::vector<ScalarGrid>& grids) {
   }
 }
 
+/// The channels of two pictures of the same size.
+Image with_channels(const Image& first, const Image& second) {
+  std::vector<std::string> channels = first.channels;
+  channels.insert(channels.end(), second.channels.begin(), second.channels.end());
+  Image both(first.width, first.height, std::move(channels));
+  const std::size_t a = first.channels.size(), b = second.channels.size();
+  for (std::size_t i = 0; i * (a + b) < both.pixels.size(); ++i) {
+    std::copy_n(&first.pixels[i * a], a, &both.pixels[i * (a + b)]);
+    std::copy_n(&second.pixels[i * b], b, &both.pixels[i * (a + b) + a]);
+  }
+  return both;
+}
+
 class LoadedPhotons : public LoadedMethod {
  public:
   Render render(const Scene& scene, const Progress& progress) const override;
@@ -55,7 +69,7 @@ Render LoadedPhotons::render(const Scene& scene, const Progress& progress) const
 
   const auto start = std::chrono::steady_clock::now();
   Render result;
-  result.linear = std::move(light.linear);
+  result.linear = light.map.channels.empty() ? std::move(light.linear) : with_channels(light.linear, light.map);
   if (description.output.wants("spectral"))
     result.spectral = spectral_image(light.irradiance, scene.bands, description.light.irradiance, to_working(scene));
   result.photons = std::move(light.photons);

@@ -10,6 +10,7 @@
 #include "renderer/film/spectral_image.h"
 #include "renderer/images/image_distance.h"
 #include "scenes/photons/photon_distribution_method.h"
+#include "scenes/photons/plate_map.h"
 #include "scenes/scene/fine_bands.h"
 
 namespace tensorray {
@@ -66,6 +67,7 @@ DrawnLight draw_map(const Scene& scene, double tolerance, const BandStep& step, 
                                  scene.description.output.wants("spectral"), progress);
   light.linear = color_image(caustic.color);
   light.irradiance = std::move(caustic.irradiance);
+  if (scene.description.output.wants("exr")) light.map = plate_map(map, scene);
   light.statistics.seconds_density = seconds_since(start);
   light.statistics.positions = map.starts.size();
   light.statistics.ends = caustic.ends;

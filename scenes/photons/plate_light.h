@@ -17,6 +17,7 @@ namespace tensorray {
 
 struct PlateLight {
   Image linear;                     ///< R, G, B in the working space; 1 is the undisturbed light.
+  Image map;                        ///< See plate_map; of `mesh`, if the scene writes EXR.
   Film irradiance;                  ///< A plane for each band, if the scene writes spectral pictures.
   PhotonMap photons;                ///< If the scene writes photons.
   std::vector<ScalarGrid> fluence;  ///< If the scene writes the fluence; see PhotonDistribution.

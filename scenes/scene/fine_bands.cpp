@@ -1,5 +1,8 @@
 #include "scenes/scene/fine_bands.h"
 
+#include <algorithm>
+#include <cmath>
+
 namespace tensorray {
 
 LightRange light_range(const Scene& scene) {
@@ -7,6 +10,20 @@ LightRange light_range(const Scene& scene) {
   const LightDescription& light = scene.description.light;
   if (bending.rgb) return {{bending.rgb->x(), bending.rgb->y(), bending.rgb->z()}, false};
   return {{bending.flexibility.at(light.wavelength_min), bending.flexibility.at(light.wavelength_max)}, true};
+}
+
+std::size_t reference_channel(const Scene& scene) {
+  if (scene.description.bending.rgb) return 1;
+  constexpr double wavelength = 550;
+  const auto nearest = std::min_element(scene.bands.begin(), scene.bands.end(), [](const Band& a, const Band& b) {
+    return std::abs(a.wavelength - wavelength) < std::abs(b.wavelength - wavelength);
+  });
+  return static_cast<std::size_t>(nearest - scene.bands.begin());
+}
+
+double reference_place(const Scene& scene) {
+  const auto channel = static_cast<double>(reference_channel(scene));
+  return scene.description.bending.rgb ? channel / 2 : (channel + 0.5) / static_cast<double>(scene.bands.size());
 }
 
 std::vector<FineBand> fine_bands(const Scene& scene, int count) {

@@ -27,6 +27,12 @@ struct FineBand {
   double weight = 1;  ///< Its part of the channel's power.
 };
 
+/// The channel that maps of the light describe: the one nearest to 550 nm, or green.
+std::size_t reference_channel(const Scene& scene);
+
+/// Its middle, as a place in the range of the light, from 0 to 1.
+double reference_place(const Scene& scene);
+
 /// @param count  Number of bands: a multiple of that of the channels. In RGB mode there is one band a channel.
 std::vector<FineBand> fine_bands(const Scene& scene, int count);
 

@@ -32,8 +32,8 @@ FlowMap lattice(const Map& landing, int n) {
   for (int y = 0; y < n; ++y)
     for (int x = 0; x < n; ++x) {
       const auto a = static_cast<std::uint32_t>(y * (n + 1) + x), d = a + static_cast<std::uint32_t>(n) + 1;
-      map.triangles.push_back({{a, a + 1, d + 1}, area, false});
-      map.triangles.push_back({{a, d + 1, d}, area, false});
+      map.triangles.push_back({{a, a + 1, d + 1}, area, 0, false});
+      map.triangles.push_back({{a, d + 1, d}, area, 0, false});
     }
   return map;
 }

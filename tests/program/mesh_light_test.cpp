@@ -1,5 +1,6 @@
 // The density "mesh" of the method photon_distribution, in the whole program.
 
+#include <algorithm>
 #include <cmath>
 
 #include "renderer/images/image_distance.h"
@@ -50,6 +51,55 @@ TEST_F(MeshLight, TheErrorIsBelowTheOneAskedFor) {
     EXPECT_LT(error, estimate);
     EXPECT_GT(error, estimate / 20);
   }
+}
+
+TEST_F(MeshLight, WithoutBendingTheMapIsThatOfStraightLight) {
+  const Image image = picture({"--set", "bending.a=0", "--set", "bending.b=0"});
+  const auto at = [&](const std::string& name, int x, int y) {
+    const auto channel = std::find(image.channels.begin(), image.channels.end(), name) - image.channels.begin();
+    return image.pixel(x, y)[channel];
+  };
+  for (const int i : {20, 48, 70}) {
+    EXPECT_EQ(at("folds", i, 48), 1);
+    EXPECT_NEAR(at("displacement.x", i, 48), 0, 1e-5);
+    EXPECT_NEAR(at("magnification.log", i, 48), 0, 1e-4);
+    EXPECT_NEAR(at("magnification.major", i, 48), 0, 1e-4);
+    EXPECT_NEAR(at("length", i, 48), at("length", 48, 48), 1e-5);
+    EXPECT_LT(at("error", i, 48), 1e-3);
+  }
+  EXPECT_NEAR(at("length", 48, 48), 2.5, 0.05);  // The volume is nearly 2 high, and the plate half a unit below it.
+  EXPECT_EQ(at("folds", 2, 48), 0) << "beside the silhouette";
+  EXPECT_EQ(at("length", 2, 48), 0);
+}
+
+/// The magnification is that of the displacement, from pixel to pixel.
+TEST_F(MeshLight, TheMapsChannelsDescribeOneMap) {
+  const Image image = picture({});
+  const auto index = [&](const std::string& name) {
+    return std::find(image.channels.begin(), image.channels.end(), name) - image.channels.begin();
+  };
+  const auto dx = index("displacement.x"), dy = index("displacement.y"), log = index("magnification.log"),
+             major = index("magnification.major"), minor = index("magnification.minor"), folds = index("folds");
+  const double pixel = 2.6 / 96;
+  int compared = 0;
+  for (int y = 1; y < 95; ++y)
+    for (int x = 1; x < 95; ++x) {
+      const float* const here = image.pixel(x, y);
+      EXPECT_NEAR(here[log], here[major] + here[minor], 1e-4);
+      EXPECT_GE(here[major], here[minor]);
+      if (std::hypot(x - 47.5, y - 47.5) > 25 || here[folds] != 1) continue;  // Within the bright disc.
+      // By the position across the beam where the light of neighbouring pixels starts; y of the plate is along −y.
+      const auto slope = [&](const float* after, const float* before, int axis) {
+        return (axis == 0 ? after[dx] - before[dx] : after[dy] - before[dy]) / (2 * pixel);
+      };
+      const float *right = image.pixel(x + 1, y), *left = image.pixel(x - 1, y), *above = image.pixel(x, y - 1),
+                  *below = image.pixel(x, y + 1);
+      const double a = 1 - slope(right, left, 0), b = -slope(above, below, 0), c = -slope(right, left, 1),
+                   d = 1 - slope(above, below, 1);
+      EXPECT_NEAR(-std::log(std::abs(a * d - b * c)), here[log], 0.15) << x << " " << y;
+      ++compared;
+    }
+  EXPECT_GT(compared, 1000);
 }
 
 TEST_F(MeshLight, ErrorsThatCannotBeReachedAreTold) {
