@@ -141,7 +141,7 @@ TEST_F(Errors, AFullDiskLeavesTheOldPictureAndNoHalfOne) {
   write("scene.json", small_scene());
   for (const char* name : {"a.png", "a.exr", "a.spectral.exr", "a.vdb", "a.vtp", "a.jpg", "a.tif"}) {
     write(name, "old");
-    expect_error(1, name, {"render", "scene.json", "-q", "-o", name, "--set", "receiver.resolution=[300,300]"}, 8);
+    expect_error(1, name, {"render", "scene.json", "-q", "-o", name, "--set", "receiver.resolution=[200,200]"}, 8);
     EXPECT_EQ(read_file(in_folder(name)), "old") << name;
     // A link to a device that is full.
     std::filesystem::remove(in_folder(name));

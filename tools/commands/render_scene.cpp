@@ -61,11 +61,10 @@ void render_scene(const std::filesystem::path& scene_file, const SceneChanges& c
   const SceneDescription description = read_scene(scene_file, changes);
   OutputFiles files = open_files(description, run.statistics);
 
-  const std::future<void> images = std::async(std::launch::async, prepare_images);  // Errors come with the first image.
-
   std::optional<ProgressBar> bar(std::in_place, progress, run.quiet);
   const Scene scene = load_scene(description, progress);
   tell(scene.notes, run.quiet);
+  const std::future<void> images = std::async(std::launch::async, prepare_images);  // Errors come with the first image.
   const Render result = render(scene, progress);
   bar.reset();  // Erase the bar before the notes are printed.
   for (const std::string& warning : result.warnings) tell({"warning: " + warning}, run.quiet);
