@@ -43,8 +43,8 @@ struct LensImage {
 struct LensBand {
   double begin = 0, end = 0;  ///< Its ends, as places between the first (0) and the last (1) flexibility. They are
                               ///< equal outside a range.
-  std::size_t channel = 0;  ///< The channel that it belongs to.
-  double weight = 1;        ///< Its part of the channel's radiance; the sum over the bands of a channel is 1.
+  std::size_t channel = 0;    ///< The channel that it belongs to.
+  double weight = 1;          ///< Its part of the channel's radiance; the sum over the bands of a channel is 1.
   Eigen::Vector3d color = Eigen::Vector3d::Zero();  ///< What a radiance of 1 adds to the picture (R, G, B).
 };
 
