@@ -462,17 +462,6 @@ class FlowMapBuilder {
 
 }  // namespace
 
-FlowLanding landing_at(const FlowMap& map, std::size_t position, double node) {
-  const auto before = std::min(static_cast<std::size_t>(node), map.nodes - 1);
-  const std::size_t after = std::min(before + 1, map.nodes - 1);
-  const double part = node - static_cast<double>(before);
-  const std::size_t a = position * map.nodes + before, b = position * map.nodes + after;
-  const std::size_t nearest = part < 0.5 ? a : b;
-  if (map.ends[a] != RayEnd::plate || map.ends[b] != RayEnd::plate)
-    return {map.ends[nearest], map.landings[nearest].cast<double>()};
-  return {RayEnd::plate, (1 - part) * map.landings[a].cast<double>() + part * map.landings[b].cast<double>()};
-}
-
 int band_count(const FlowMap& map, int channels, const BandStep& step) {
   if (map.nodes == 1) return channels;
   std::vector<float> sweeps;

@@ -3,6 +3,7 @@
 /// The flow map of a beam: where light from each point of the beam's aperture lands on a plate, for a range of
 /// flexibilities. It is a mesh of rays, finer where the map bends, folds or tears.
 
+#include <algorithm>
 #include <array>
 #include <cstdint>
 #include <vector>
@@ -82,7 +83,16 @@ struct FlowLanding {
 };
 
 /// Between two nodes of which only one landed, the nearer one counts.
-FlowLanding landing_at(const FlowMap& map, std::size_t position, double node);
+inline FlowLanding landing_at(const FlowMap& map, std::size_t position, double node) {
+  const auto before = std::min(static_cast<std::size_t>(node), map.nodes - 1);
+  const std::size_t after = std::min(before + 1, map.nodes - 1);
+  const double part = node - static_cast<double>(before);
+  const std::size_t a = position * map.nodes + before, b = position * map.nodes + after;
+  const std::size_t nearest = part < 0.5 ? a : b;
+  if (map.ends[a] != RayEnd::plate || map.ends[b] != RayEnd::plate)
+    return {map.ends[nearest], map.landings[nearest].cast<double>()};
+  return {RayEnd::plate, (1 - part) * map.landings[a].cast<double>() + part * map.landings[b].cast<double>()};
+}
 
 /// Traces the map from `beam` to the plane of `plate`. The plate of `geometry` lies in the same plane and may be
 /// larger: the map goes on there. `right` and `up` of the beam need not be across its direction: its light may start on

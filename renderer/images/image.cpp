@@ -8,6 +8,7 @@
 #include <fstream>
 #include <iterator>
 #include <memory>
+#include <mutex>
 #include <new>
 #include <set>
 #include <stdexcept>
@@ -86,9 +87,15 @@ bool is_cut_off(const std::filesystem::path& path) {
 
 int image_threads = 0;  ///< 0: all.
 
+/// The library, with its number of threads. Several threads may write pictures at once, but OpenImageIO's threads must
+/// not be changed by two of them, nor while one works.
 const PictureLibrary& ready_library() {
   const PictureLibrary& library = picture_library();
-  library.set_threads(image_threads);
+  static std::mutex mutex;
+  static int threads = -1;
+  const std::lock_guard<std::mutex> lock(mutex);
+  if (threads != image_threads) library.set_threads(image_threads);
+  threads = image_threads;
   return library;
 }
 
