@@ -18,8 +18,8 @@
 namespace tensorray {
 namespace {
 
-constexpr int overlay_cells = 16;             // Cells along the image's shorter side.
-constexpr double most_overlay_cells = 1e6;    // A limit; grids are too dense to be visible long before.
+constexpr int overlay_cells = 16;           // Cells along the image's shorter side.
+constexpr double most_overlay_cells = 1e6;  // A limit; grids are too dense to be visible long before.
 /// The light of a band is spread evenly over the points that it sees; so this step decides only how exact the colours
 /// within a fringe are. With 10 bands or more a reflectance can have any colour of Rec. 709.
 constexpr BandStep band_step{16, 12, 24};
