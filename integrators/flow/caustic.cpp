@@ -46,7 +46,7 @@ double start_triangle(const FlowTriangle& triangle, const Landings& landings, do
   const auto [a, b, c] = triangle.corners;
   const double carried = unit * triangle.area;
   const auto landed = [&](std::uint32_t corner) { return landings.ends[corner] == RayEnd::plate; };
-  if (!triangle.is_torn && landed(a) && landed(b) && landed(c)) {
+  if (landed(a) && landed(b) && landed(c)) {
     power[static_cast<int>(RayEnd::plate)] += carried;
     return deposit.triangle(landings.at[a], landings.at[b], landings.at[c], carried);
   }

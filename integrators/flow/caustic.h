@@ -31,8 +31,9 @@ struct Caustic {
   std::vector<EndCounts> ends;                           ///< Number of positions by the end of each channel's light.
 };
 
-/// Draws the bands one after the other. Triangles of which not all corners land, and torn ones, leave their light at
-/// the corners: each corner takes a third. What lands beside the plate counts as missed.
+/// Draws the bands one after the other. Triangles of which not all corners land leave their light at the corners: each
+/// corner takes a third. The little light of triangles at a tear is spread across it. What lands beside the plate
+/// counts as missed.
 /// @param plate       The plate of the map.
 /// @param by_channel  Whether the result has the irradiance of each channel.
 /// The sums are integers, so that the result is the same for any number of threads. Memory: the films, and

@@ -24,10 +24,9 @@ constexpr double first_voxels = 1;       // In voxels, so that no part of the fi
 constexpr double most_for_voxels = 64;   // this than so many along a side.
 constexpr double usual_tolerance = 0.5;  // Pixels.
 
-constexpr float torn_pixels = 1;  // Landings at the ends of a smallest side that are farther apart are a tear ...
-constexpr float torn_ratio = 6;   // ... if those of the next side are so much nearer to each other.
-constexpr double inset = 3e-6;    // On the aperture's edge, it is a matter of rounding whether rays enter the volume.
-                                  // There they start this part of a patch further inside.
+constexpr float torn_ratio = 6;  // A side is torn if its landings are so much farther apart than those of the next.
+constexpr double inset = 3e-6;   // On the aperture's edge, it is a matter of rounding whether rays enter the volume.
+                                 // There they start this part of a patch further inside.
 constexpr double swept_share = 0.99;  // The part of the positions whose light moves slowly enough from band to band.
 constexpr int most_levels = 14;
 constexpr int most_columns = 1 << 12;  // Number of first squares along a side.

@@ -38,7 +38,7 @@ struct FlowTriangle {
   std::array<std::uint32_t, 3> corners{};  ///< Indices of positions.
   double area = 0;                         ///< Area of the aperture, world units².
   float error = 0;                         ///< Estimated error of landings within, pixels.
-  bool is_torn = false;                    ///< The landings of its corners have nothing to do with each other.
+  bool is_torn = false;                    ///< The map jumps within it, at some node; see `jumps`.
 };
 
 /// A side of one triangle, or of two.
@@ -92,6 +92,16 @@ inline FlowLanding landing_at(const FlowMap& map, std::size_t position, double n
   if (map.ends[a] != RayEnd::plate || map.ends[b] != RayEnd::plate)
     return {map.ends[nearest], map.landings[nearest].cast<double>()};
   return {RayEnd::plate, (1 - part) * map.landings[a].cast<double>() + part * map.landings[b].cast<double>()};
+}
+
+/// Landings at the ends of a smallest square's side that are farther apart may be a tear; pixels.
+constexpr double torn_pixels = 1;
+
+/// Whether the landings of a triangle's corners, at one place among the nodes, lie on two sides of a tear.
+inline bool jumps(const FlowTriangle& triangle, const Eigen::Vector2d& a, const Eigen::Vector2d& b,
+                  const Eigen::Vector2d& c) {
+  return triangle.is_torn &&
+         std::max({(b - a).squaredNorm(), (c - b).squaredNorm(), (a - c).squaredNorm()}) > torn_pixels * torn_pixels;
 }
 
 /// Traces the map from `beam` to the plane of `plate`. The plate of `geometry` lies in the same plane and may be

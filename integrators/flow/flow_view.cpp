@@ -153,7 +153,40 @@ class Facet {
   bool is_curved_ = false;
 };
 
+/// A triangle's corners at a node, without slopes; samples are pixels.
+struct Corners {
+  std::array<Corner, 3> corners;
+  bool is_mapped = true;  // Whether all light of the triangle is mapped to landings between those of the corners.
+
+  Corners(const FlowMap& map, const FlowPicture& picture, const FlowTriangle& triangle, double node) {
+    for (std::size_t i = 0; i < 3; ++i) {
+      const std::uint32_t position = triangle.corners[i];
+      const FlowLanding landing = landing_at(map, position, node);
+      const Vector2d start = map.starts[position];
+      const Vector2d pixel = picture.to_pixel * (picture.side == FlowSide::starts ? start : landing.at);
+      corners[i] = {position, landing.end, start, landing.at, pixel};
+      is_mapped = is_mapped && landing.end == RayEnd::plate;
+    }
+    is_mapped = is_mapped && !jumps(triangle, corners[0].landing, corners[1].landing, corners[2].landing);
+  }
+
+  Eigen::AlignedBox2d box() const {
+    Eigen::AlignedBox2d result;
+    for (const Corner& corner : corners) result.extend(corner.sample);
+    return result;
+  }
+};
+
 }  // namespace
+
+PrincipalStretch principal_stretch(const Matrix2d& m) {
+  if (!m.allFinite()) return {};
+  const double greater =
+      (std::hypot(m(0, 0) + m(1, 1), m(0, 1) - m(1, 0)) + std::hypot(m(0, 0) - m(1, 1), m(0, 1) + m(1, 0))) / 2;
+  const Matrix2d square = m * m.transpose();
+  return {{std::log(greater), std::log(std::abs(m.determinant())) - std::log(greater)},
+          std::atan2(2 * square(0, 1), square(0, 0) - square(1, 1)) / 2};
+}
 
 FlowView::FlowView(const FlowMap& map, const FlowPicture& picture, std::vector<double> nodes, int samples)
     : map_(map),
@@ -194,21 +227,6 @@ void FlowView::find_jacobians() {
   });
 }
 
-/// Sets ends and places of corners, in pixels. @return whether all light of the triangle is mapped to landings.
-template <class Corners>
-bool FlowView::find_corners(const FlowTriangle& triangle, double node, Corners& corners) const {
-  bool is_mapped = !triangle.is_torn;
-  for (std::size_t i = 0; i < 3; ++i) {
-    const std::uint32_t position = triangle.corners[i];
-    const FlowLanding landing = landing_at(map_, position, node);
-    is_mapped = is_mapped && landing.end == RayEnd::plate;
-    const Vector2d start = map_.starts[position];
-    const Vector2d pixel = picture_.to_pixel * (picture_.side == FlowSide::starts ? start : landing.at);
-    corners[i] = {position, landing.end, start, landing.at, pixel};
-  }
-  return is_mapped;
-}
-
 void FlowView::sort_triangles(std::size_t node) {
   struct Tiles {
     std::uint32_t triangle;
@@ -217,10 +235,9 @@ void FlowView::sort_triangles(std::size_t node) {
   std::vector<Tiles> touched;
   const Eigen::Array2d last = picture_.resolution.cast<double>().array() - 1;
   for (std::uint32_t t = 0; t < map_.triangles.size(); ++t) {
-    std::array<Corner, 3> corners;
-    if (!find_corners(map_.triangles[t], nodes_[node], corners) && picture_.side == FlowSide::landings) continue;
-    Eigen::AlignedBox2d box;
-    for (const Corner& corner : corners) box.extend(corner.sample);
+    const Corners corners(map_, picture_, map_.triangles[t], nodes_[node]);
+    if (!corners.is_mapped && picture_.side == FlowSide::landings) continue;
+    const Eigen::AlignedBox2d box = corners.box();
     if (!has_samples(box, 1) && !has_samples(box, samples_)) continue;
     if ((box.min().array() > last + 1).any() || (box.max().array() < 0).any()) continue;
     const Eigen::Array2i first = (box.min().array().max(0.0).min(last) / tile_size).cast<int>(),
@@ -254,67 +271,61 @@ void FlowView::draw(int tile, int n, std::size_t node, std::vector<FlowPoint>& p
     draw_triangle(map_.triangles[sorted.triangles[i]], samples, n, nodes_[node], points, distances);
 }
 
-/// Sets the Jacobians and lengths of corners: linear between the nodes that have them.
-template <class Corners>
-void FlowView::find_slopes(const FlowTriangle& triangle, double node, Corners& corners) const {
+/// Sets the slope and the length of a corner: linear between the nodes that have them.
+void FlowView::set_slope(double node, std::uint32_t position, Matrix2f& jacobian, float& length) const {
   const double place = node / static_cast<double>(map_.check_step);
   const std::size_t before = std::min(static_cast<std::size_t>(place), checks_ - 1),
                     after = std::min(before + 1, checks_ - 1);
   const auto part = static_cast<float>(place - static_cast<double>(before));
-  bool is_known = true;
-  for (Corner& corner : corners) {
-    const std::size_t a = corner.position * checks_ + before, b = corner.position * checks_ + after;
-    corner.jacobian = (1 - part) * jacobians_[a] + part * jacobians_[b];
-    corner.length = (1 - part) * map_.lengths[a] + part * map_.lengths[b];
-    is_known = is_known && corner.jacobian.allFinite();
-  }
-  if (is_known) return;
-  const Matrix2f slope = slope_of(map_, triangle, static_cast<std::size_t>(node)).cast<float>();
-  for (Corner& corner : corners) corner.jacobian = slope;
+  const std::size_t a = position * checks_ + before, b = position * checks_ + after;
+  jacobian = (1 - part) * jacobians_[a] + part * jacobians_[b];
+  length = (1 - part) * map_.lengths[a] + part * map_.lengths[b];
 }
 
 void FlowView::draw_triangle(const FlowTriangle& triangle, const Eigen::AlignedBox2i& samples, int n, double node,
                              std::vector<FlowPoint>& points, std::vector<float>& distances) const {
-  std::array<Corner, 3> corners;
-  const bool is_mapped = find_corners(triangle, node, corners);
-  if (!is_mapped && picture_.side == FlowSide::landings) return;
-  Eigen::AlignedBox2d box;
-  for (Corner& corner : corners) box.extend(corner.sample *= n);
+  Corners found(map_, picture_, triangle, node);
+  std::array<Corner, 3>& corners = found.corners;
+  for (Corner& corner : corners) corner.sample *= n;
   // The middles of samples are at ½, 1½, ...
+  const Eigen::AlignedBox2d box = found.box();
   const Eigen::Array2d begin = (box.min().array() - 0.5).ceil().max(samples.min().array().cast<double>()),
                        end = (box.max().array() - 0.5).floor().min(samples.max().array().cast<double>());
-  if ((begin > end).any()) return;
   const Sides sides(corners);
-  if (sides.area == 0) return;
-  if (is_mapped) find_slopes(triangle, node, corners);
+  if ((begin > end).any() || sides.area == 0) return;
+  for (Corner& corner : corners) {
+    set_slope(node, corner.position, corner.jacobian, corner.length);
+    if (!corner.jacobian.allFinite())
+      corner.jacobian = slope_of(map_, triangle, static_cast<std::size_t>(node)).cast<float>();
+  }
   const Facet facet(corners);
 
+  const auto show = [&](const Vector2d& sample, const std::array<float, 3>& weights, std::size_t index) {
+    FlowPoint& point = points[index];
+    if (!found.is_mapped) {
+      point.end = corners[0].end;
+      point.is_unknown = triangle.is_torn || corners[1].end != point.end || corners[2].end != point.end;
+      return;
+    }
+    const Vector2d other = picture_.side == FlowSide::starts ? facet.landing(weights) : facet.start(weights);
+    ++point.sheets;
+    const auto distance = static_cast<float>((other - picture_.straight * Vector2d(sample / n)).squaredNorm());
+    if (!(distance < distances[index])) return;
+    distances[index] = distance;
+    point.end = RayEnd::plate;
+    point.other = other.cast<float>();
+    point.jacobian = facet.jacobian(weights);
+    point.length = facet.length(weights);
+    point.error = triangle.error;
+  };
   const int width = samples.sizes().x() + 1;
   std::array<float, 3> weights{};
   for (int y = static_cast<int>(begin.y()); y <= static_cast<int>(end.y()); ++y) {
     double first = begin.x() + 0.5, last = end.x() + 0.5;
     sides.narrow(y + 0.5, first, last);
-    for (int x = static_cast<int>(std::ceil(first - 0.5)); x + 0.5 <= last; ++x) {
-      const Vector2d sample(x + 0.5, y + 0.5);
-      if (!sides.contains(sample, weights)) continue;
-      const auto index = static_cast<std::size_t>((y - samples.min().y()) * width + x - samples.min().x());
-      FlowPoint& point = points[index];
-      if (!is_mapped) {
-        point.end = corners[0].end;
-        point.is_unknown = triangle.is_torn || corners[1].end != point.end || corners[2].end != point.end;
-        continue;
-      }
-      const Vector2d other = picture_.side == FlowSide::starts ? facet.landing(weights) : facet.start(weights);
-      ++point.sheets;
-      const auto distance = static_cast<float>((other - picture_.straight * Vector2d(sample / n)).squaredNorm());
-      if (!(distance < distances[index])) continue;
-      distances[index] = distance;
-      point.end = RayEnd::plate;
-      point.other = other.cast<float>();
-      point.jacobian = facet.jacobian(weights);
-      point.length = facet.length(weights);
-      point.error = triangle.error;
-    }
+    for (int x = static_cast<int>(std::ceil(first - 0.5)); x + 0.5 <= last; ++x)
+      if (const Vector2d sample(x + 0.5, y + 0.5); sides.contains(sample, weights))
+        show(sample, weights, static_cast<std::size_t>((y - samples.min().y()) * width + x - samples.min().x()));
   }
 }
 

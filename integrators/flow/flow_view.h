@@ -37,6 +37,14 @@ struct FlowPicture {
   Eigen::Affine2d straight = Eigen::Affine2d::Identity();
 };
 
+/// The stretch of a linear map along its two principal directions.
+struct PrincipalStretch {
+  Eigen::Vector2d logs{0, 0};  ///< ln σ₁ >= ln σ₂ of the Jacobian; −∞ where it is singular, 0 where it is not finite.
+  double angle = 0;  ///< Of the greater one, in the image of the map: from −π/2 to π/2 from its first axis.
+};
+
+PrincipalStretch principal_stretch(const Eigen::Matrix2d& jacobian);
+
 /// Draws the triangles of a flow map, as a mesh over one side, on the samples of a picture, tile by tile. Between
 /// corners the map is quadratic: it has the slopes that the neighbouring triangles have in common.
 /// Immutable; any number of threads may draw. The map must outlive it.
@@ -61,10 +69,7 @@ class FlowView {
  private:
   void find_jacobians();
   void sort_triangles(std::size_t node);
-  template <class Corners>
-  bool find_corners(const FlowTriangle& triangle, double node, Corners& corners) const;
-  template <class Corners>
-  void find_slopes(const FlowTriangle& triangle, double node, Corners& corners) const;
+  void set_slope(double node, std::uint32_t position, Eigen::Matrix2f& jacobian, float& length) const;
   void draw_triangle(const FlowTriangle& triangle, const Eigen::AlignedBox2i& samples, int n, double node,
                      std::vector<FlowPoint>& points, std::vector<float>& distances) const;
 

@@ -10,6 +10,7 @@
 #include "scenes/description/check_scene.h"
 #include "scenes/outputs/picture_outputs.h"
 #include "scenes/photons/plate_light.h"
+#include "scenes/photons/plate_map.h"
 #include "scenes/scene/render.h"
 #include "scenes/scene/scene.h"
 #include "volumes/files/point_files.h"
@@ -69,7 +70,8 @@ Render LoadedPhotons::render(const Scene& scene, const Progress& progress) const
 
   const auto start = std::chrono::steady_clock::now();
   Render result;
-  result.linear = light.map.channels.empty() ? std::move(light.linear) : with_channels(light.linear, light.map);
+  const bool has_map = !light.map.triangles.empty() && description.output.wants("exr");
+  result.linear = has_map ? with_channels(light.linear, plate_map(light.map, scene)) : std::move(light.linear);
   if (description.output.wants("spectral"))
     result.spectral = spectral_image(light.irradiance, scene.bands, description.light.irradiance, to_working(scene));
   result.photons = std::move(light.photons);

@@ -10,7 +10,6 @@
 #include "renderer/film/spectral_image.h"
 #include "renderer/images/image_distance.h"
 #include "scenes/photons/photon_distribution_method.h"
-#include "scenes/photons/plate_map.h"
 #include "scenes/scene/fine_bands.h"
 
 namespace tensorray {
@@ -52,29 +51,24 @@ std::vector<std::array<double, ray_end_count>> beam_power(const Scene& scene, co
   return power;
 }
 
-struct DrawnLight {
-  PlateLight light;
-  bool is_complete = true;  // Whether the map is as fine as the tolerance asks.
-};
-
-DrawnLight draw_map(const Scene& scene, double tolerance, const BandStep& step, const Progress& progress) {
+PlateLight draw_map(const Scene& scene, double tolerance, const BandStep& step, const Progress& progress) {
   Clock::time_point start = Clock::now();
-  const FlowMap map = trace_map(scene, tolerance, progress);
   PlateLight light;
+  light.map = trace_map(scene, tolerance, progress);
+  const FlowMap& map = light.map;
   light.statistics.seconds_tracing = seconds_since(start);
   start = Clock::now();
   Caustic caustic = draw_caustic(map, *scene.geometry.surfaces().plate, bands_of(scene, map, step), scene.bands.size(),
                                  scene.description.output.wants("spectral"), progress);
   light.linear = color_image(caustic.color);
   light.irradiance = std::move(caustic.irradiance);
-  if (scene.description.output.wants("exr")) light.map = plate_map(map, scene);
   light.statistics.seconds_density = seconds_since(start);
   light.statistics.positions = map.starts.size();
   light.statistics.ends = caustic.ends;
   light.statistics.power = beam_power(scene, caustic);
   light.statistics.ray_steps = map.ray_steps;
   light.statistics.tensor_samples = map.tensor_samples;
-  return {std::move(light), map.is_complete};
+  return light;
 }
 
 void add_cost(const Statistics& more, Statistics& statistics) {
@@ -99,21 +93,21 @@ PlateLight refine(const Scene& scene, double bound, const Progress& progress) {
     labelled.cancelled = progress.cancelled.load();
   };
   double tolerance = 1;
-  DrawnLight drawn = draw_map(scene, tolerance, refined_step(tolerance), labelled);
+  PlateLight light = draw_map(scene, tolerance, refined_step(tolerance), labelled);
   for (;;) {
     tolerance /= 2;
-    DrawnLight finer = draw_map(scene, tolerance, refined_step(tolerance), labelled);
-    const double error = relative_distance(drawn.light.linear, finer.light.linear);
-    finer.light.statistics.error = error;
-    add_cost(drawn.light.statistics, finer.light.statistics);
-    drawn = std::move(finer);
+    PlateLight finer = draw_map(scene, tolerance, refined_step(tolerance), labelled);
+    const double error = relative_distance(light.linear, finer.linear);
+    finer.statistics.error = error;
+    add_cost(light.statistics, finer.statistics);
+    light = std::move(finer);
     label = fmt::format(" (error {:.2g}%)", 100 * error);
-    if (error <= bound) return std::move(drawn.light);
-    if (!drawn.is_complete || tolerance < least_tolerance) {
-      drawn.light.warnings.push_back(
+    if (error <= bound) return light;
+    if (!light.map.is_complete || tolerance < least_tolerance) {
+      light.warnings.push_back(
           fmt::format("the picture's error is {:.2g}%, not {:.2g}%: {}", 100 * error, 100 * bound,
-                      drawn.is_complete ? "positions are single precision" : "raise `light.photons`"));
-      return std::move(drawn.light);
+                      light.map.is_complete ? "positions are single precision" : "raise `light.photons`"));
+      return light;
     }
   }
 }
@@ -121,11 +115,11 @@ PlateLight refine(const Scene& scene, double bound, const Progress& progress) {
 PlateLight draw_light(const Scene& scene, const Progress& progress) {
   const PhotonDensity& density = scene.description.integrator.settings<PhotonDescription>().density;
   if (density.error) return refine(scene, *density.error, progress);
-  DrawnLight drawn = draw_map(scene, density.tolerance, {}, progress);
-  if (!drawn.is_complete)
-    drawn.light.warnings.push_back(
+  PlateLight light = draw_map(scene, density.tolerance, {}, progress);
+  if (!light.map.is_complete)
+    light.warnings.push_back(
         "the light on the plate is coarser than `integrator.density.tolerance` asks: raise `light.photons`");
-  return std::move(drawn.light);
+  return light;
 }
 
 /// Whether photons are collected as red, green and blue. Up to three bands need no more planes, and cost less.

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "base/progress.h"
+#include "integrators/flow/flow_map.h"
 #include "renderer/film/film.h"
 #include "renderer/film/photon_map.h"
 #include "renderer/images/image.h"
@@ -17,7 +18,7 @@ namespace tensorray {
 
 struct PlateLight {
   Image linear;                     ///< R, G, B in the working space; 1 is the undisturbed light.
-  Image map;                        ///< See plate_map; of `mesh`, if the scene writes EXR.
+  FlowMap map;                      ///< The map that `mesh` has drawn; empty for other estimators.
   Film irradiance;                  ///< A plane for each band, if the scene writes spectral pictures.
   PhotonMap photons;                ///< If the scene writes photons.
   std::vector<ScalarGrid> fluence;  ///< If the scene writes the fluence; see PhotonDistribution.

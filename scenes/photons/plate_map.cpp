@@ -1,10 +1,8 @@
 #include "scenes/photons/plate_map.h"
 
 #include <algorithm>
-#include <cmath>
 
 #include <Eigen/Geometry>
-#include <Eigen/SVD>
 #include <tbb/parallel_for.h>
 
 #include "integrators/flow/flow_view.h"
@@ -29,7 +27,7 @@ Eigen::Affine2d straight_starts(const Plate& plate, const Beam& beam) {
   return map;
 }
 
-double finite_log(double value) { return std::clamp(std::log(value), -100.0, 100.0); }
+double limited(double logarithm) { return std::clamp(logarithm, -100.0, 100.0); }
 
 void describe(const FlowPoint& point, const Vector2d& pixel, const Plate& plate, const Eigen::Affine2d& straight,
               float* values) {
@@ -40,12 +38,11 @@ void describe(const FlowPoint& point, const Vector2d& pixel, const Plate& plate,
   // World units on the plate, along right and up, by those across the beam.
   const Vector2d pixel_size = plate.pixel_size();
   const Matrix2d jacobian = Vector2d(pixel_size.x(), -pixel_size.y()).asDiagonal() * point.jacobian.cast<double>();
-  const Eigen::JacobiSVD<Matrix2d> svd(jacobian, Eigen::ComputeFullU);
-  const Vector2d stretch = svd.singularValues(), axis = svd.matrixU().col(0);
-  next(std::clamp(finite_log(stretch[0]) + finite_log(stretch[1]), -100.0, 100.0));
-  next(finite_log(stretch[0]));
-  next(finite_log(stretch[1]));
-  next(std::atan(axis.y() / axis.x()));
+  const PrincipalStretch stretch = principal_stretch(jacobian);
+  next(limited(stretch.logs.sum()));
+  next(limited(stretch.logs[0]));
+  next(limited(stretch.logs[1]));
+  next(stretch.angle);
   next(point.sheets);
   next(point.length);
   next(std::min(point.error, 100.0f));

@@ -100,7 +100,7 @@ Json measure_caustics(const Options& options) {
   Json results = Json::array();
   for (const CausticScene& scene : scenes(options.quick)) {
     options.announce(fmt::format("caustics: {}, reference", scene.name));
-    const Json exact_density = {{"kind", "mesh"}, {"error", 0.005}};
+    const Json exact_density = {{"kind", "mesh"}, {"error", options.quick ? 0.005 : 0.01}};
     const Image exact = render(folder, scene, {"reference", exact_density, 1u << 23}, side).image;
     Json rows = Json::array();
     for (const Estimate& estimate : estimates(options.quick)) {

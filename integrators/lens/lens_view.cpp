@@ -1,0 +1,155 @@
+#include "integrators/lens/lens_view.h"
+
+#include <algorithm>
+#include <utility>
+
+#include <Eigen/LU>
+
+namespace tensorray {
+namespace {
+
+using Eigen::Affine2d;
+using Eigen::Matrix2d;
+using Eigen::Vector2d;
+
+constexpr std::size_t few_spans = 4;  // Of light that is hardly spread.
+
+/// The view of a map whose `other` ends are pixels of the landings (gather) or coordinates of starts (scatter).
+FlowPicture flow_picture(const LensLight& light) {
+  FlowPicture picture;
+  picture.resolution = light.receiver.resolution;
+  picture.straight = light.straight;
+  if (!gathers(light)) return picture;
+  picture.side = FlowSide::starts;
+  picture.to_pixel = to_pixels(light.receiver);
+  picture.straight = to_pixels(light.landings) * light.straight;
+  return picture;
+}
+
+/// Some spans, together all. In a range they end where others begin; other lights have nothing in common.
+std::vector<Span> joined(const std::vector<Span>& spans) {
+  std::vector<Span> few;
+  for (std::size_t i = 0; i < spans.size(); ++i) {
+    const bool is_new = few.size() * spans.size() <= i * few_spans || few.empty();
+    if (is_new || spans[i].from != few.back().to || spans[i].from == spans[i].to) {
+      few.push_back(spans[i]);
+    } else {
+      few.back().last = spans[i].last;
+      few.back().to = spans[i].to;
+    }
+  }
+  return few;
+}
+
+double flexibility_at(const LensLight& light, double node) {
+  const std::vector<double>& s = light.settings.flexibilities;
+  if (!light.settings.range) return s[static_cast<std::size_t>(node)];
+  const double part = light.map.nodes > 1 ? node / static_cast<double>(light.map.nodes - 1) : 0;
+  return (1 - part) * s[0] + part * s[1];
+}
+
+/// Traces light that the map does not know, back from samples of a tile.
+void trace_unknown(const LensView& view, const Eigen::AlignedBox2i& pixels, int n, TileView& points,
+                   TraceCounts& counts) {
+  std::vector<std::vector<FlowPoint>*> drawn;
+  std::vector<double> flexibilities;
+  for (std::size_t node = 0; node < points.size(); ++node) {
+    if (points[node].empty()) continue;
+    drawn.push_back(&points[node]);
+    flexibilities.push_back(-flexibility_at(view.light, view.nodes[node]));
+  }
+  std::vector<std::size_t> unknown;
+  std::vector<Vector2d> starts;
+  const int width = n * (pixels.sizes().x() + 1);
+  for (std::size_t i = 0; i < drawn.front()->size(); ++i) {
+    if (std::none_of(drawn.begin(), drawn.end(), [&](const auto* each) { return (*each)[i].is_unknown; })) continue;
+    const auto sample = static_cast<int>(i);
+    unknown.push_back(i);
+    starts.push_back(view.starts.inverse() *
+                     (pixels.min().cast<double>() + Vector2d(sample % width + 0.5, sample / width + 0.5) / n));
+  }
+  if (unknown.empty()) return;
+  std::vector<LensLanding> landings(starts.size() * drawn.size());
+  counts += view.light.planes.trace(starts, flexibilities, landings.data());
+  for (std::size_t i = 0; i < landings.size(); ++i) {
+    const LensLanding& landing = landings[i];
+    FlowPoint& point = (*drawn[i % drawn.size()])[unknown[i / drawn.size()]];
+    point = FlowPoint();
+    point.end = landing.end;
+    point.sheets = 1;
+    point.other = (view.landings * landing.at).cast<float>();
+    point.jacobian = (view.landings.linear() * landing.jacobian).cast<float>();
+    point.length = static_cast<float>(landing.length);
+  }
+}
+
+}  // namespace
+
+bool gathers(const LensLight& light) { return light.settings.mode == LensMode::gather; }
+
+Affine2d to_pixels(const Plate& plate) {
+  const Vector2d per_unit = plate.pixel_size().cwiseInverse();
+  Affine2d map;
+  map.linear() = Vector2d(per_unit.x(), -per_unit.y()).asDiagonal();
+  map.translation() = plate.resolution.cast<double>() / 2;
+  return map;
+}
+
+double node_at(const LensLight& light, double place) { return place * static_cast<double>(light.map.nodes - 1); }
+
+LensView make_lens_view(const LensLight& light, const std::vector<LensBand>& bands, const LensRadiance& radiance) {
+  std::vector<double> nodes;
+  std::vector<Span> spans;
+  const auto index_of = [&](double place) {
+    const double node = node_at(light, place);
+    if (nodes.empty() || nodes.back() != node) nodes.push_back(node);
+    return nodes.size() - 1;
+  };
+  for (std::size_t band = 0; band < bands.size(); ++band) {
+    const std::size_t from = index_of(bands[band].begin);
+    spans.push_back({band, band + 1, from, index_of(bands[band].end)});
+  }
+  nodes.push_back(node_at(light, light.settings.reference));
+  FlowView flow(light.map, flow_picture(light), nodes, light.settings.samples);
+  std::vector<Span> few = joined(spans);
+  return {light,
+          bands,
+          radiance,
+          to_pixels(light.receiver),
+          to_pixels(light.landings),
+          std::move(spans),
+          std::move(few),
+          std::move(nodes),
+          std::move(flow)};
+}
+
+TileView view_tile(const LensView& view, int tile, int n, const std::vector<Span>& spans, TraceCounts& counts) {
+  TileView points(view.nodes.size());
+  for (const Span& span : spans)
+    for (const std::size_t node : {span.from, span.to})
+      if (points[node].empty()) view.flow.draw(tile, n, node, points[node]);
+  if (gathers(view.light)) trace_unknown(view, view.flow.pixels(tile), n, points, counts);
+  return points;
+}
+
+Vector2d image_point(const LensView& view, const FlowPoint& point) {
+  const Vector2d other = point.other.cast<double>();
+  return gathers(view.light) ? Vector2d(view.landings.inverse() * other) : other;
+}
+
+Matrix2d image_by_pixel(const LensView& view, const FlowPoint& point) {
+  const Matrix2d jacobian = point.jacobian.cast<double>();
+  if (!gathers(view.light)) return jacobian.inverse();
+  return view.landings.linear().inverse() * jacobian * view.starts.linear().inverse();
+}
+
+Vector2d texture_coordinates(const LensLight& light, const Vector2d& at) {
+  return (at.array() / light.image.plane.size.array() + 0.5).matrix();
+}
+
+bool sees_image(const LensLight& light, const Vector2d& st) {
+  const double rounding = 1e-6;  // Landings are single precision.
+  return light.image.wraps || ((st.array() >= -rounding).all() && (st.array() <= 1 + rounding).all());
+}
+
+}  // namespace tensorray

@@ -1,0 +1,63 @@
+#pragma once
+/// @file integrators/lens/lens_view.h
+/// What the points of a lens's picture see of the image, in all of its light.
+
+#include <cstddef>
+#include <vector>
+
+#include <Eigen/Geometry>
+
+#include "integrators/flow/flow_view.h"
+#include "integrators/lens/lens.h"
+
+namespace tensorray {
+
+/// Bands that follow each other, from `first` to `last`, without it. Their light sees what the nodes `from` and `to`
+/// (indices) see, and what is between.
+struct Span {
+  std::size_t first, last, from, to;
+};
+
+/// The light of a lens, ready to be looked at. Immutable; threads share it.
+struct LensView {
+  const LensLight& light;
+  const std::vector<LensBand>& bands;
+  const LensRadiance& radiance;
+  Eigen::Affine2d starts;     ///< From coordinates to pixels, in the plane where the map's light starts in `gather`.
+  Eigen::Affine2d landings;   ///< From coordinates to pixels, in the plane where it lands.
+  std::vector<Span> spans;    ///< Each band.
+  std::vector<Span> few;      ///< Some bands together, for light that moves little from band to band.
+  std::vector<double> nodes;  ///< Places among the map's nodes: the ends of bands, and as the last the reference.
+  FlowView flow;
+};
+
+/// `light`, `bands` and `radiance` must outlive the result.
+LensView make_lens_view(const LensLight& light, const std::vector<LensBand>& bands, const LensRadiance& radiance);
+
+/// What the samples of a tile see, by node and sample; empty for nodes that are not drawn.
+using TileView = std::vector<std::vector<FlowPoint>>;
+
+/// The nodes of `spans`, as the samples of a tile see them. In `gather`, light that the map does not know is traced.
+/// @param n  Samples of a pixel along x and along y.
+TileView view_tile(const LensView& view, int tile, int n, const std::vector<Span>& spans, TraceCounts& counts);
+
+/// Coordinates, in the image's plane, of what a point sees; its light landed.
+Eigen::Vector2d image_point(const LensView& view, const FlowPoint& point);
+
+/// The change of these coordinates per pixel, along x and y.
+Eigen::Matrix2d image_by_pixel(const LensView& view, const FlowPoint& point);
+
+/// (s, t) of coordinates in the image's plane.
+Eigen::Vector2d texture_coordinates(const LensLight& light, const Eigen::Vector2d& at);
+
+bool sees_image(const LensLight& light, const Eigen::Vector2d& st);
+
+bool gathers(const LensLight& light);
+
+/// From coordinates in a plate's plane to its pixels.
+Eigen::Affine2d to_pixels(const Plate& plate);
+
+/// A place between the first and the last flexibility, as one among the nodes of the map.
+double node_at(const LensLight& light, double place);
+
+}  // namespace tensorray
