@@ -1,7 +1,7 @@
 # Strict warnings for the project's own code, and `tensorray_library(NAME)`, which makes a static library from a folder.
 
 add_library(tensorray_options INTERFACE)
-target_compile_options(tensorray_options INTERFACE -Wall -Wextra -Wpedantic -Wshadow -Wnon-virtual-dtor
+target_compile_options(tensorray_options INTERFACE -Wall -Wextra -Wpedantic -Wnon-virtual-dtor
                        -Woverloaded-virtual -Wcast-align -Wunused -Wnull-dereference)
 if(TENSORRAY_WERROR)
   target_compile_options(tensorray_options INTERFACE -Werror)
@@ -10,6 +10,12 @@ if(CMAKE_CXX_COMPILER_ID STREQUAL "GNU")
   # False positives inside inlined Eigen and standard library code at -O3.
   target_compile_options(tensorray_options INTERFACE -Wno-maybe-uninitialized -Wno-null-dereference
                          -Wno-array-bounds -Wno-stringop-overflow)
+endif()
+if(TENSORRAY_UNITY)
+  # What is in the unnamed namespace of a source, its group may shadow, and its classes may contain.
+  target_compile_options(tensorray_options INTERFACE -Wshadow=local -Wno-subobject-linkage)
+else()
+  target_compile_options(tensorray_options INTERFACE -Wshadow)
 endif()
 if(TENSORRAY_SANITIZE)
   target_compile_options(tensorray_options INTERFACE -fsanitize=address,undefined -fno-omit-frame-pointer
@@ -26,6 +32,7 @@ function(tensorray_library name)
     list(FILTER sources EXCLUDE REGEX "/${ARG_EXCEPT}/")
   endif()
   add_library(${name} STATIC ${sources})
+  set_target_properties(${name} PROPERTIES UNITY_BUILD ${TENSORRAY_UNITY})
   target_link_libraries(${name} PUBLIC Eigen3::Eigen PRIVATE tensorray_options)
   # Half of the time to compile most files is the headers that nearly all of them include.
   target_precompile_headers(${name} PRIVATE <Eigen/Geometry> <algorithm> <filesystem> <functional> <map> <memory>

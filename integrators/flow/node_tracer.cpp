@@ -101,7 +101,7 @@ NodeTracer::NodeTracer(const TensorField& field, const Geometry& geometry, const
       plate_(plate),
       direction_(beam.direction),
       bending_(bending),
-      tolerance_(settings.tolerance / 2),
+      tolerance_(settings.tolerance / 16),
       is_range_(settings.range && settings.flexibilities[0] != settings.flexibilities[1]),
       flexibilities_(settings.flexibilities) {
   if (settings.range) flexibilities_.resize(is_range_ ? range_nodes : 1);

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <atomic>
-#include <chrono>
 #include <cmath>
 #include <stdexcept>
 #include <thread>
@@ -11,6 +10,7 @@
 #include <Eigen/LU>
 #include <tbb/parallel_for.h>
 
+#include "base/seconds.h"
 #include "integrators/flow/flow_view.h"
 #include "integrators/lens/lens_places.h"
 #include "integrators/lens/lens_shading.h"
@@ -174,9 +174,6 @@ void check(const LensImage& image, const LensSettings& settings) {
   if (!(settings.reference >= 0 && settings.reference <= 1))
     throw std::invalid_argument("the reference is out of range: it must be a place between two flexibilities, 0 to 1");
 }
-
-using Clock = std::chrono::steady_clock;
-double seconds_since(Clock::time_point start) { return std::chrono::duration<double>(Clock::now() - start).count(); }
 
 }  // namespace
 

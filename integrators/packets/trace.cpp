@@ -11,8 +11,8 @@ namespace tensorray {
 namespace {
 
 template <int N>
-void trace_rays(const TensorField& field, const Geometry& geometry, const BendingSettings& settings, RayBatch& batch,
-                const Recordings& recordings) {
+void trace_ray_by_ray(const TensorField& field, const Geometry& geometry, const BendingSettings& settings,
+                      RayBatch& batch, const Recordings& recordings) {
   Tracer<N> tracer(field, geometry, settings);
   for (std::size_t i = 0; i < batch.size(); ++i) {
     const RayEnd end = tracer.trace(start_of<N>(batch, i), strength_of(batch, i, settings), recordings.of(i));
@@ -44,9 +44,9 @@ void prepare(const BendingSettings& settings, RayBatch& batch) {
 void trace_one_by_one(const TensorField& field, const Geometry& geometry, const BendingSettings& settings,
                       RayBatch& batch, const Recordings& recordings) {
   if (has_differentials(batch))
-    trace_rays<3>(field, geometry, settings, batch, recordings);
+    trace_ray_by_ray<3>(field, geometry, settings, batch, recordings);
   else
-    trace_rays<1>(field, geometry, settings, batch, recordings);
+    trace_ray_by_ray<1>(field, geometry, settings, batch, recordings);
 }
 
 void trace_batch(const TensorField& field, const Geometry& geometry, const BendingSettings& settings, RayBatch& batch,

@@ -1,8 +1,9 @@
 #include "integrators/photons/photon_distribution.h"
 
 #include <algorithm>
-#include <chrono>
+#include <cmath>
 #include <memory>
+#include <optional>
 #include <stdexcept>
 #include <thread>
 
@@ -11,7 +12,9 @@
 #include <tbb/parallel_for.h>
 #include <tbb/parallel_sort.h>
 
+#include "base/seconds.h"
 #include "integrators/photons/fluence.h"
+#include "renderer/film/footprint_deposit.h"
 
 namespace tensorray {
 namespace {
@@ -22,10 +25,6 @@ namespace {
 constexpr std::uint64_t largest_chunk = 1u << 16, rays_in_chunk = 1u << 20;
 constexpr std::uint64_t task_size = 32;       // Number of positions that one thread traces as one task.
 constexpr std::uint64_t rays_in_batch = 512;  // Approximate; all wavelengths of a position stay together.
-
-double seconds_since(std::chrono::steady_clock::time_point start) {
-  return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
-}
 
 /// Maps world positions to pixels of a plate.
 struct PixelMap {
@@ -58,7 +57,9 @@ struct PhotonJob {
   int rays_per_position = 0;
   int channels_per_ray = 0;  // A ray carries one of this number of channels.
   double ray_area = 0;
-  FluenceSums* fluence = nullptr;  // Null if no fluence is wanted.
+  FluenceSums* fluence = nullptr;            // Null if no fluence is wanted.
+  const DensityEstimator* points = nullptr;  // Either this or `footprints` takes the photons on the plate.
+  FootprintDeposit* footprints = nullptr;
 
   std::uint64_t chunk_size() const {
     return std::clamp(rays_in_chunk / rays_per_position, std::uint64_t{1}, largest_chunk);
@@ -133,6 +134,10 @@ void fill_batch(const PhotonJob& job, const Emission* first, const Emission* las
     }
   }
   batch.direction.assign(batch.position.size(), job.beam.direction);
+  if (!job.footprints) return;
+  RayDifferential across;
+  across.position << job.beam.right, job.beam.up;
+  batch.differentials.assign(batch.position.size(), across);
 }
 
 void trace_batch(const PhotonJob& job, Worker& worker) {
@@ -152,11 +157,16 @@ Photon make_photon(const PhotonJob& job, const Worker& worker, std::size_t ray, 
   return photon;
 }
 
+/// The ellipse of a photon on the plate, in pixels: the image of a circle across the beam.
+Eigen::Matrix2d footprint(const PhotonJob& job, const RayDifferential& differential) {
+  const double radius = job.settings.density.footprint * std::sqrt(job.ray_area);
+  return radius * job.to_pixel.linear * differential.position;
+}
+
 /// Counts the rays of a batch and writes their landings: those of the first ray of each position from `landings` on,
 /// those of the second rays `step` further on, and so on. Landings of one wavelength from neighbouring positions, which
 /// fall on the same pixels, are then next to each other.
-void collect_batch(const PhotonJob& job, const DensityEstimator& estimator, Worker& worker, DensityPoint* landings,
-                   std::size_t step) {
+void collect_batch(const PhotonJob& job, Worker& worker, DensityPoint* landings, std::size_t step) {
   const std::size_t rays = job.rays_per_position;
   for (std::size_t i = 0, position = 0; i < worker.batch.size(); ++position)
     for (std::size_t ray = 0; ray < rays; ++ray, ++i) {
@@ -164,14 +174,18 @@ void collect_batch(const PhotonJob& job, const DensityEstimator& estimator, Work
       const std::uint16_t channel = worker.channels[i];
       ++worker.ends[channel][static_cast<int>(end)];
       worker.ray_steps += worker.batch.steps[i];
-      landings[ray * step + position] =
-          end == RayEnd::plate ? estimator.point(channel, job.to_pixel(worker.batch.position[i])) : DensityPoint();
+      landings[ray * step + position] = DensityPoint();
+      if (end != RayEnd::plate) continue;
+      const Eigen::Vector2d at = job.to_pixel(worker.batch.position[i]);
+      if (job.footprints)
+        job.footprints->add(channel, at, footprint(job, worker.batch.differentials[i]));
+      else
+        landings[ray * step + position] = job.points->point(channel, at);
     }
 }
 
 /// Traces the rays of a task's positions.
-void trace_task(const PhotonJob& job, const DensityEstimator& estimator, std::size_t task, Worker& worker,
-                Chunk& chunk) {
+void trace_task(const PhotonJob& job, std::size_t task, Worker& worker, Chunk& chunk) {
   const std::size_t rays = job.rays_per_position, first = task * task_size;
   const std::size_t count = std::min<std::size_t>(task_size, chunk.emissions.size() - first);
   const std::size_t batch = std::max<std::size_t>(1, rays_in_batch / rays);
@@ -182,7 +196,7 @@ void trace_task(const PhotonJob& job, const DensityEstimator& estimator, std::si
     const std::size_t end = std::min(begin + batch, count);
     fill_batch(job, emissions + begin, emissions + end, worker);
     trace_batch(job, worker);
-    collect_batch(job, estimator, worker, &chunk.landings[first * rays + begin], count);
+    collect_batch(job, worker, &chunk.landings[first * rays + begin], count);
     if (!job.settings.keep_photons) continue;
     for (std::size_t i = 0; i < worker.batch.size(); ++i)
       if (worker.batch.end[i] == RayEnd::plate)
@@ -191,8 +205,7 @@ void trace_task(const PhotonJob& job, const DensityEstimator& estimator, std::si
 }
 
 /// Traces the positions of a chunk. Only the calling thread reports progress.
-void trace_chunk(const PhotonJob& job, const DensityEstimator& estimator, std::uint64_t first, std::uint64_t last,
-                 Workers& workers, Chunk& chunk) {
+void trace_chunk(const PhotonJob& job, std::uint64_t first, std::uint64_t last, Workers& workers, Chunk& chunk) {
   emit(job.positions, first, last, chunk.emissions);
   const std::size_t count = chunk.emissions.size(), tasks = (count + task_size - 1) / task_size;
   chunk.landings.resize(count * job.rays_per_position);
@@ -201,7 +214,7 @@ void trace_chunk(const PhotonJob& job, const DensityEstimator& estimator, std::u
   const std::thread::id caller = std::this_thread::get_id();
   tbb::parallel_for(std::size_t{0}, tasks, [&](std::size_t task) {
     if (job.progress.cancelled) throw Cancelled();
-    trace_task(job, estimator, task, workers.local(), chunk);
+    trace_task(job, task, workers.local(), chunk);
     const std::uint64_t traced = done += std::min<std::uint64_t>(task_size, count - task * task_size);
     if (std::this_thread::get_id() == caller)
       job.progress.update("tracing photons", first + traced, job.positions.candidates());
@@ -262,19 +275,24 @@ PhotonDistribution distribute_photons(const TensorField& field, const Geometry& 
   PhotonDistribution result;
   result.ends.assign(channels.size(), EndCounts{});
   result.ray_area = job.ray_area;
-  DensityEstimator estimator(plate.resolution.x(), plate.resolution.y(), static_cast<int>(channels.size()),
-                             settings.density, settings.colors);
+  std::optional<DensityEstimator> points;
+  std::optional<FootprintDeposit> footprints;
+  const int width = plate.resolution.x(), height = plate.resolution.y(), count = static_cast<int>(channels.size());
+  if (settings.density.kind == DensityKind::photon_differential)
+    job.footprints = &footprints.emplace(width, height, count, settings.colors);
+  else
+    job.points = &points.emplace(width, height, count, settings.density, settings.colors);
   Workers workers;
   Chunk chunk;
   const std::uint64_t candidates = job.positions.candidates();
   for (std::uint64_t first = 0; first < candidates; first += job.chunk_size()) {
     const std::uint64_t last = std::min(first + job.chunk_size(), candidates);
     progress.update("tracing photons", first, candidates);
-    auto start = std::chrono::steady_clock::now();
-    trace_chunk(job, estimator, first, last, workers, chunk);
+    auto start = Clock::now();
+    trace_chunk(job, first, last, workers, chunk);
     result.seconds_tracing += seconds_since(start);
-    start = std::chrono::steady_clock::now();
-    estimator.add(chunk.landings);
+    start = Clock::now();
+    if (points) points->add(chunk.landings);
     for (const std::vector<Photon>& photons : chunk.photons)
       result.photons.insert(result.photons.end(), photons.begin(), photons.end());
     result.seconds_density += seconds_since(start);
@@ -283,8 +301,9 @@ PhotonDistribution distribute_photons(const TensorField& field, const Geometry& 
   add_counts(workers, rays, result);
   if (fluence) result.fluence = fluence->grids(job.ray_area);
 
-  const auto start = std::chrono::steady_clock::now();
-  result.irradiance = std::move(estimator).finish(job.ray_area / plate.pixel_area());
+  const auto start = Clock::now();
+  const double weight = job.ray_area / plate.pixel_area();
+  result.irradiance = points ? std::move(*points).finish(weight) : footprints->finish(weight);
   result.seconds_density += seconds_since(start);
   return result;
 }

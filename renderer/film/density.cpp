@@ -9,6 +9,7 @@
 
 #include "base/constants.h"
 #include "renderer/film/convolution.h"
+#include "renderer/film/mirror.h"
 
 namespace tensorray {
 namespace {
@@ -17,13 +18,6 @@ constexpr double smallest_spline_tau = 2;  // For less the spline interpolant of
 constexpr double cut_off = 4.5;            // In units of tau; the Gaussian is 4e-5 of its peak there.
 constexpr std::size_t most_buckets = 1u << 14;  // Largest number of buckets to sort points into.
 constexpr int largest_size = 65000;             // Largest width and height: columns and rows of points are 16 bits.
-
-/// Reflects an index into [0, size), as mirrors at the outer edges of the first and last pixel would.
-int mirror(int index, int size) {
-  const int period = 2 * size;
-  index = ((index % period) + period) % period;
-  return index < size ? index : period - 1 - index;
-}
 
 bool uses_splines(const DensitySettings& settings) {
   return settings.kind == DensityKind::gaussian && settings.tau >= smallest_spline_tau;
@@ -116,6 +110,8 @@ void check(int width, int height, int channels, const DensitySettings& settings,
     throw std::invalid_argument("a density estimate has at most 65000 x 65000 pixels and 65534 channels");
   if (!(settings.tau >= 0.3 && settings.tau <= 1000))
     throw std::invalid_argument("the width tau of the density estimate must be between 0.3 and 1000 pixels");
+  if (settings.kind == DensityKind::photon_differential)
+    throw std::invalid_argument("photon differentials are deposited by FootprintDeposit");
   if (!colors.empty() && colors.size() != static_cast<std::size_t>(channels))
     throw std::invalid_argument("a density estimate in colour needs a colour for each channel");
 }

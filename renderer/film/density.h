@@ -14,13 +14,15 @@
 namespace tensorray {
 
 enum class DensityKind {
-  gaussian,   ///< Zheng and Pang 2003, Eq. 10, corrected: normalised by 2πτ².
-  histogram,  ///< Each point counts in the pixel that contains it.
+  gaussian,             ///< Zheng and Pang 2003, Eq. 10, corrected: normalised by 2πτ².
+  histogram,            ///< Each point counts in the pixel that contains it.
+  photon_differential,  ///< Each photon covers the ellipse that the light about it covers; see FootprintDeposit.
 };
 
 struct DensitySettings {
   DensityKind kind = DensityKind::gaussian;
-  double tau = 6;  ///< Standard deviation of the Gaussian, in pixels; >= 0.3.
+  double tau = 6;        ///< gaussian: standard deviation, in pixels; >= 0.3.
+  double footprint = 1;  ///< photon_differential: standard deviation, in spacings of the photons; > 0.
 };
 
 /// Sums points of equal weight, so that each pixel holds the weight that falls on it. Each point belongs to a channel.
@@ -39,7 +41,7 @@ class DensityEstimator {
  public:
   /// @param colors  One colour per channel, or empty.
   /// @throw std::invalid_argument if a size is < 1 or > 65000, tau is out of range, or only some channels have a
-  /// colour.
+  /// colour, or if the kind is photon_differential.
   DensityEstimator(int width, int height, int channels, const DensitySettings& settings,
                    const std::vector<Eigen::Vector3d>& colors = {});
 

@@ -31,12 +31,6 @@ ShownLight shown_light(const ColorManagement& color, const Spectrum& light, int 
   return {std::move(bands), matrix, color.xyz_to_working() * rec709_to_xyz(), std::move(model)};
 }
 
-Eigen::AlignedBox3d world_box(const TensorField& field) {
-  Eigen::AlignedBox3d box;
-  for (const Eigen::Vector3d& corner : field.corners()) box.extend(corner);
-  return box;
-}
-
 std::vector<Eigen::Vector3d> line_positions(const SeedDescription& seeds, const Eigen::AlignedBox3d& box,
                                             const Beam& beam) {
   const double half = 0.45 * box.sizes().dot(beam.right.cwiseAbs());

@@ -1,11 +1,11 @@
 #include "scenes/path_tracing/path_tracing_method.h"
 
 #include <algorithm>
-#include <chrono>
 
 #include <fmt/format.h>
 
 #include "base/progress.h"
+#include "base/seconds.h"
 #include "integrators/paths/path_files.h"
 #include "integrators/paths/paths.h"
 #include "renderer/shading/path_tracer.h"
@@ -71,12 +71,6 @@ std::vector<Eigen::Vector3d> points_of_interest(const Scene& scene, const Contex
     for (const TriangleMesh& mesh : scene.geometry.surfaces().obstacles) add(mesh.vertices);
   if (context.plate) add(scene.geometry.surfaces().plate->corners());
   return points;
-}
-
-Eigen::AlignedBox3d world_box(const TensorField& field) {
-  Eigen::AlignedBox3d box;
-  for (const Eigen::Vector3d& corner : field.corners()) box.extend(corner);
-  return box;
 }
 
 /// A tenth of the path points before the camera are nearer than this depth. Triangles may be visible there.
@@ -207,10 +201,6 @@ class LoadedPaths : public LoadedMethod {
   PathScene paths_;
 };
 
-double seconds_since(std::chrono::steady_clock::time_point start) {
-  return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
-}
-
 /// Renders the paths, their context and the lamps.
 SurfacePicture render_stage(const Scene& scene, const PathScene& path_scene, const std::vector<Path>& paths,
                             ShadedSurface path_surface, const Camera& camera, const Progress& progress) {
@@ -235,12 +225,12 @@ SurfacePicture render_stage(const Scene& scene, const PathScene& path_scene, con
 Render LoadedPaths::render(const Scene& scene, const Progress& progress) const {
   const PathTracingDescription& description = paths_.settings;
   const ShownLight& light = paths_.light;
-  const auto start = std::chrono::steady_clock::now();
+  const auto start = Clock::now();
   Render result;
   result.paths = trace_scene(scene, paths_, progress, result.statistics);
   result.statistics.seconds_tracing = seconds_since(start);
 
-  const auto drawing = std::chrono::steady_clock::now();
+  const auto drawing = Clock::now();
   const PathColors colors = path_colors(description.color, result.paths);
   const bool has_legend = description.color.legend && colors.legend;
   const Camera camera = scene_camera(scene, description.context, result.paths, has_legend ? legend_width : 0);

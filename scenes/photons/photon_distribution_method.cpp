@@ -1,12 +1,12 @@
 #include "scenes/photons/photon_distribution_method.h"
 
 #include <algorithm>
-#include <chrono>
 #include <set>
 
 #include <fmt/format.h>
 
 #include "base/progress.h"
+#include "base/seconds.h"
 #include "scenes/description/check_scene.h"
 #include "scenes/outputs/picture_outputs.h"
 #include "scenes/photons/plate_light.h"
@@ -68,7 +68,7 @@ Render LoadedPhotons::render(const Scene& scene, const Progress& progress) const
   const SceneDescription& description = scene.description;
   PlateLight light = light_on_plate(scene, progress);
 
-  const auto start = std::chrono::steady_clock::now();
+  const auto start = Clock::now();
   Render result;
   const bool has_map = !light.map.triangles.empty() && description.output.wants("exr");
   result.linear = has_map ? with_channels(light.linear, plate_map(light.map, scene)) : std::move(light.linear);
@@ -81,7 +81,7 @@ Render LoadedPhotons::render(const Scene& scene, const Progress& progress) const
   result.warnings = std::move(light.warnings);
   if (result.statistics.error) result.metadata["tensorray:error"] = fmt::format("{:.3g}", *result.statistics.error);
   result.metadata["tensorray:photons"] = std::to_string(result.statistics.positions);
-  result.statistics.seconds_color = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  result.statistics.seconds_color = seconds_since(start);
   if (nothing_arrived(result.statistics))
     result.warnings.push_back("no light reached the plate; look at `receiver` and `light`");
   return result;
@@ -129,6 +129,10 @@ class PhotonDistributionMethod : public MethodWith<PhotonDescription> {
     if (!chosen) return;
     check_spectral_output(scene, source);
     warn_unused(scene, json, "/light/spectrum", "/bending/rgb");
+    if (settings().density.kind != PhotonDensityKind::photon_differential &&
+        given(json, "/integrator/density/footprint"))
+      scene.warnings.push_back(
+          "`/integrator/density/footprint` has no effect: it belongs to the density \"photon_differential\"");
     if (draws_mesh && given(json, "/integrator/density/tau"))
       scene.warnings.push_back("`/integrator/density/tau` has no effect: it belongs to the density \"gaussian\"");
     if (scene.output.fluence_bands && !scene.output.wants("fluence"))

@@ -12,9 +12,10 @@
 namespace tensorray {
 
 enum class PhotonDensityKind {
-  mesh,       ///< Exact: the light between neighbouring rays, spread over the area between their landings.
-  gaussian,   ///< Zheng and Pang 2003, Eq. 10: each photon is a Gaussian on the plate.
-  histogram,  ///< Each photon counts in its pixel.
+  mesh,                 ///< Exact: the light between neighbouring rays, spread over the area between their landings.
+  gaussian,             ///< Zheng and Pang 2003, Eq. 10: each photon is a Gaussian on the plate.
+  histogram,            ///< Each photon counts in its pixel.
+  photon_differential,  ///< Each photon covers the area that the light about it covers.
 };
 
 /// `integrator.density`.
@@ -23,6 +24,7 @@ struct PhotonDensity {
   double tolerance = 0.5;
   std::optional<double> error;  ///< Wanted relative error of the picture, instead of a tolerance.
   double tau = 6;
+  double footprint = 1;
 };
 
 struct PhotonDescription {
@@ -32,12 +34,16 @@ struct PhotonDescription {
 inline auto choices(PhotonDensityKind) {
   using C = Choice<PhotonDensityKind>;
   return std::array{C{"mesh", PhotonDensityKind::mesh}, C{"gaussian", PhotonDensityKind::gaussian},
-                    C{"histogram", PhotonDensityKind::histogram}};
+                    C{"histogram", PhotonDensityKind::histogram},
+                    C{"photon_differential", PhotonDensityKind::photon_differential}};
 }
 
 /// The estimator for photons. `mesh` needs no photons; photons for other outputs are then only counted.
 inline DensitySettings estimator_of(const PhotonDensity& density) {
-  return {density.kind == PhotonDensityKind::gaussian ? DensityKind::gaussian : DensityKind::histogram, density.tau};
+  DensitySettings settings{DensityKind::histogram, density.tau, density.footprint};
+  if (density.kind == PhotonDensityKind::gaussian) settings.kind = DensityKind::gaussian;
+  if (density.kind == PhotonDensityKind::photon_differential) settings.kind = DensityKind::photon_differential;
+  return settings;
 }
 
 template <class Visitor>
@@ -47,6 +53,8 @@ void describe(PhotonDensity& density, Visitor& visit) {
   visit("error", density.error, "mesh: refine until the picture's relative error is below this, instead of `tolerance`",
         between(1e-5, 1));
   visit("tau", density.tau, "gaussian: standard deviation, in pixels", between(0.3, 1000));
+  visit("footprint", density.footprint, "photon_differential: standard deviation, in spacings of the photons",
+        between(0.01, 100));
 }
 
 template <class Visitor>

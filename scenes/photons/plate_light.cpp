@@ -1,10 +1,10 @@
 #include "scenes/photons/plate_light.h"
 
-#include <chrono>
 #include <cmath>
 
 #include <fmt/format.h>
 
+#include "base/seconds.h"
 #include "integrators/flow/caustic.h"
 #include "integrators/photons/photon_distribution.h"
 #include "renderer/film/spectral_image.h"
@@ -17,10 +17,6 @@ namespace {
 
 constexpr int most_refined_bands = 2048;
 constexpr double least_tolerance = 1e-3;  // Pixels; landings are single precision.
-
-using Clock = std::chrono::steady_clock;
-
-double seconds_since(Clock::time_point start) { return std::chrono::duration<double>(Clock::now() - start).count(); }
 
 FlowMap trace_map(const Scene& scene, double tolerance, const Progress& progress) {
   FlowSettings settings;

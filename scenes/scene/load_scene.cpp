@@ -1,10 +1,10 @@
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 #include <limits>
 
 #include <fmt/format.h>
 
+#include "base/seconds.h"
 #include "renderer/surfaces/mesh.h"
 #include "scenes/description/choices.h"
 #include "scenes/scene/scene.h"
@@ -212,6 +212,12 @@ AutoScale load_scale(const SceneDescription& description, const TensorField& fie
 
 }  // namespace
 
+Eigen::AlignedBox3d world_box(const TensorField& field) {
+  Eigen::AlignedBox3d box;
+  for (const Eigen::Vector3d& corner : field.corners()) box.extend(corner);
+  return box;
+}
+
 DepthRange depth_range(const TensorField& field, const Eigen::Vector3d& origin, const Eigen::Vector3d& direction) {
   DepthRange range{std::numeric_limits<double>::infinity(), -std::numeric_limits<double>::infinity()};
   for (const Eigen::Vector3d& corner : field.corners()) {
@@ -229,7 +235,7 @@ void require_near(const Plate& plate, const char* pointer, const SceneDescriptio
 }
 
 Scene load_scene(const SceneDescription& description, const Progress& progress) {
-  const auto start = std::chrono::steady_clock::now();
+  const auto start = Clock::now();
   std::vector<std::string> notes;
   for (const std::string& warning : description.warnings) notes.push_back("warning: " + warning);
   ColorManagement color({description.output.ocio, description.output.display, description.output.view});
@@ -253,7 +259,7 @@ Scene load_scene(const SceneDescription& description, const Progress& progress) 
   scene.bending.scale = scene.scale.scale;
   scene.method = description.integrator.method().load(scene, notes);
   scene.notes = std::move(notes);
-  scene.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  scene.seconds = seconds_since(start);
   return scene;
 }
 

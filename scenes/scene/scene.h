@@ -56,6 +56,9 @@ struct DepthRange {
   double near = 0, far = 0;
 };
 
+/// The bounding box of a field's volume, world frame.
+Eigen::AlignedBox3d world_box(const TensorField& field);
+
 /// @param direction  Unit.
 DepthRange depth_range(const TensorField& field, const Eigen::Vector3d& origin, const Eigen::Vector3d& direction);
 

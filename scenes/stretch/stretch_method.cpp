@@ -1,12 +1,12 @@
 #include "scenes/stretch/stretch_method.h"
 
-#include <chrono>
 #include <cmath>
 #include <utility>
 
 #include <fmt/format.h>
 
 #include "base/progress.h"
+#include "base/seconds.h"
 #include "integrators/probes/stretch.h"
 #include "renderer/color/color_bar.h"
 #include "renderer/color/colormap.h"
@@ -90,7 +90,7 @@ class LoadedStretch : public LoadedMethod {
       : description_(description), settings_(settings) {}
 
   Render render(const Scene& scene, const Progress& progress) const override {
-    const auto start = std::chrono::steady_clock::now();
+    const auto start = Clock::now();
     const OutputDescription& output = scene.description.output;
     const Geometry geometry = without_plate(scene);
     Render result;
@@ -106,7 +106,7 @@ class LoadedStretch : public LoadedMethod {
       draw(scene, stretch_picture(scene.field, geometry, scene.bending, settings_, plane, progress), plane.resolution,
            result);
     }
-    result.statistics.seconds_tracing = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+    result.statistics.seconds_tracing = seconds_since(start);
     return result;
   }
 

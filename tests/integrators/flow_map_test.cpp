@@ -10,6 +10,7 @@
 
 #include "integrators/flow/caustic.h"
 #include "integrators/photons/photon_distribution.h"
+#include "renderer/color/spectrum.h"
 #include "tests/integrators/support.h"
 
 namespace tensorray {
@@ -207,6 +208,67 @@ TEST(FlowMap, InterpolatedLandingsAreThoseOfRays) {
   EXPECT_GT(compared, 100u);
   // Positions that were added in the middle of squares have the mean of the corners' landings.
   EXPECT_GT(static_cast<double>(near), 0.97 * static_cast<double>(compared));
+}
+
+/// The map with all nodes traced, of the positions that were traced at all (others lie in the middle of two).
+FlowMap with_all_nodes(const Bench& bench, const FlowSettings& settings, FlowMap map) {
+  RayBatch batch;
+  for (const Vector2d& start : map.starts)
+    for (std::size_t node = 0; node < map.nodes; ++node) {
+      const double part = static_cast<double>(node) / static_cast<double>(map.nodes - 1);
+      batch.add(bench.beam.center + start.x() * bench.beam.right + start.y() * bench.beam.up, bench.beam.direction,
+                (1 - part) * settings.flexibilities[0] + part * settings.flexibilities[1]);
+    }
+  trace(bench.field, bench.geometry, {}, batch);
+  for (std::size_t first = 0; first < batch.size(); first += map.nodes) {
+    const auto landing = [&](std::size_t node) -> Eigen::Vector2f {
+      return bench.plate().to_pixel(batch.position[first + node]).cast<float>();
+    };
+    bool was_traced = true;
+    for (std::size_t node = 0; node < map.nodes; node += map.check_step)
+      was_traced = was_traced && batch.end[first + node] == RayEnd::plate &&
+                   (landing(node) - map.landings[first + node]).norm() < 1e-3f;
+    for (std::size_t node = 0; was_traced && node < map.nodes; ++node)
+      if (map.ends[first + node] == RayEnd::plate) map.landings[first + node] = landing(node);
+  }
+  return map;
+}
+
+/// CIE L*a*b*, where `white` is white.
+Vector3d lab(const Vector3d& xyz, const Vector3d& white) {
+  Vector3d f;
+  for (int i = 0; i < 3; ++i) {
+    const double part = xyz[i] / white[i];
+    f[i] = part > 216.0 / 24389 ? std::cbrt(part) : (24389.0 / 27 * part + 16) / 116;
+  }
+  return {116 * f.y() - 16, 500 * (f.x() - f.y()), 200 * (f.y() - f.z())};
+}
+
+TEST(FlowMap, InterpolatedWavelengthsHardlyChangeColours) {
+  constexpr int count = 64;
+  std::vector<CausticBand> bands;
+  Vector3d white = Vector3d::Zero();
+  for (int i = 0; i < count; ++i) {
+    const double place = (i + 0.5) / count;
+    bands.push_back({32 * place, 0, 1.0 / count, observer(380 + 400 * place)});
+    white += bands.back().color;
+  }
+  const Bench bench = make_bench(lens, plate_at(2.2, 3, 64));
+  FlowSettings settings = range(0.1, 0.3);
+  settings.tolerance = 0.03;
+  const FlowMap few = map_of(bench, settings);
+  EXPECT_LT(static_cast<double>(few.rays), 0.3 * static_cast<double>(few.landings.size()));
+  const Film a = caustic_of(bench, few, bands).color,
+             b = caustic_of(bench, with_all_nodes(bench, settings, few), bands).color;
+  double greatest = 0;
+  for (std::size_t i = 0; i < a.plane_size(); ++i) {
+    const auto at = [&](const Film& film) {
+      return lab({film.plane(0)[i], film.plane(1)[i], film.plane(2)[i]}, white);
+    };
+    greatest = std::max(greatest, (at(a) - at(b)).norm());
+  }
+  EXPECT_LT(greatest, 0.5);
+  EXPECT_GT(greatest, 0);
 }
 
 TEST(FlowMap, TheSameOnAnyNumberOfThreads) {

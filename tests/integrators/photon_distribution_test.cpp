@@ -73,7 +73,7 @@ TEST(PhotonDistribution, EveryRayIsAccountedFor) {
   const Bench bench = Bench::make(linear_tensor, 1.5, 32, std::move(extra));
   PhotonSettings settings;
   settings.photons = 3000;
-  for (const DensityKind kind : {DensityKind::gaussian, DensityKind::histogram}) {
+  for (const DensityKind kind : {DensityKind::gaussian, DensityKind::histogram, DensityKind::photon_differential}) {
     settings.density.kind = kind;
     const PhotonDistribution light = distribute(bench, channels(4), settings);
     const Plate& plate = *bench.geometry.surfaces().plate;
@@ -102,6 +102,7 @@ TEST(PhotonDistribution, IsTheSameOnAnyNumberOfThreadsAndForTheSameSeed) {
   for (const BeamPattern pattern :
        {BeamPattern::grid, BeamPattern::stratified, BeamPattern::sobol, BeamPattern::random}) {
     settings.pattern = pattern;
+    settings.density.kind = pattern == BeamPattern::sobol ? DensityKind::photon_differential : DensityKind::gaussian;
     const auto on_threads = [&](int threads) {
       const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, threads);
       return distribute(bench, channels(4), settings);

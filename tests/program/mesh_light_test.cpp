@@ -114,6 +114,24 @@ TEST_F(MeshLight, TheNumberOfBandsHardlyChangesThePicture) {
   EXPECT_LT(relative_distance(picture({"--set", "light.wavelengths.count=2"}), many), 0.02);
 }
 
+TEST_F(MeshLight, PhotonDifferentialsAreNearerThanPointsOfFixedWidth) {
+  write("scene.json", R"({
+      "field": { "generate": { "kind": "helix" } },
+      "light": { "direction": [0, 0, -1], "wavelengths": { "count": 16 } },
+      "receiver": { "resolution": [128, 128] },
+      "integrator": { "type": "photon_distribution" }
+    })");
+  const Image exact = picture({"--set", "integrator.density.error=0.02"});
+  const auto error_of = [&](const std::string& kind, const std::string& tau) {
+    return relative_distance(picture({"--set", "integrator.density.kind=" + kind, "--set",
+                                      "integrator.density.tau=" + tau, "--set", "light.photons=2304"}),
+                             exact);
+  };
+  const double error = error_of("photon_differential", "1");
+  EXPECT_LT(error, 0.5 * error_of("histogram", "1"));
+  for (const char* tau : {"0.5", "1", "2", "4"}) EXPECT_LT(error, error_of("gaussian", tau)) << tau;
+}
+
 TEST_F(MeshLight, OtherOutputsDoNotChangeThePicture) {
   const Image alone = picture({"--set", "light.photons=50000"});
   const Image beside = picture({"-o", "out.spectral.exr", "-o", "photons.vdb", "-o", "light.fluence.vdb", "--set",

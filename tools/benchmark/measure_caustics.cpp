@@ -1,4 +1,5 @@
 #include <cmath>
+#include <filesystem>
 #include <fstream>
 #include <limits>
 
@@ -15,16 +16,36 @@ namespace {
 
 struct CausticScene {
   const char* name;
-  Json field, direction;
+  Json scene;
 };
 
-std::vector<CausticScene> scenes(bool quick) {
-  const Json point_load = {{"generate", {{"kind", "point_load"}, {"resolution", quick ? 17 : 65}}},
+CausticScene generated(const char* name, const Json& field, const Json& direction) {
+  return {name, {{"field", field}, {"light", {{"direction", direction}}}, {"receiver", Json::object()}}};
+}
+
+std::vector<CausticScene> scenes(const Options& options) {
+  const Json point_load = {{"generate", {{"kind", "point_load"}, {"resolution", options.quick ? 17 : 65}}},
                            {"eigenvalues", "absolute"}};
-  if (quick) return {{"point load", point_load, {0, 0, -1}}};
-  return {{"point load", point_load, {0, 0, -1}},
-          {"vortex", {{"generate", {{"kind", "vortex"}}}}, {0, 1, 0}},
-          {"helix", {{"generate", {{"kind", "helix"}}}}, {0, 0, -1}}};
+  if (options.quick) return {generated("point load", point_load, {0, 0, -1})};
+  const std::filesystem::path folder = TENSORRAY_SCENES;
+  std::vector<CausticScene> result = {generated("point load", point_load, {0, 0, -1}),
+                                      generated("vortex", {{"generate", {{"kind", "vortex"}}}}, {0, 1, 0}),
+                                      generated("helix", {{"generate", {{"kind", "helix"}}}}, {0, 0, -1})};
+  result.push_back({"hemisphere flow",
+                    {{"field", {{"file", folder / "data/hemisphere_flow.vdb"}, {"eigenvalues", "raw"}, {"scale", 2}}},
+                     {"obstacles", {{{"file", folder / "data/hemisphere_body.ply"}}}},
+                     {"light", {{"direction", {1, 0, 0}}, {"up", {0, 0, 1}}}},
+                     {"receiver", {{"distance", 1}, {"size", {7.2, 7.2}}}}}});
+  const std::filesystem::path brain = folder / "imported/brain.vdb";  // scenes/imported/brain.json tells how to get it.
+  if (!exists(brain)) {
+    options.announce("caustics: no brain, as " + brain.string() + " is not there");
+    return result;
+  }
+  result.push_back({"brain",
+                    {{"field", {{"file", brain}, {"scale", 80}}},
+                     {"light", {{"direction", {0, 0, 1}}, {"up", {0, 1, 0}}}},
+                     {"receiver", {{"distance", 40}}}}});
+  return result;
 }
 
 /// One way to compute the light on the plate.
@@ -39,12 +60,14 @@ std::vector<Estimate> estimates(bool quick) {
                                {"mesh, error 5%", {{"kind", "mesh"}, {"error", 0.05}}, 1u << 22}};
   const std::vector<std::uint64_t> counts =
       quick ? std::vector<std::uint64_t>{1024} : std::vector<std::uint64_t>{16384, 65536, 262144};
-  for (const std::uint64_t photons : counts)
+  for (const std::uint64_t photons : counts) {
+    result.push_back({"photon differentials", {{"kind", "photon_differential"}}, photons});
     for (const double tau : {3.0, 1.0, 0.0}) {
       Json density = {{"kind", "gaussian"}, {"tau", tau}};
       if (tau == 0) density = {{"kind", "histogram"}};
       result.push_back({tau == 0 ? "histogram" : fmt::format("gaussian, τ = {}", tau), density, photons});
     }
+  }
   return result;
 }
 
@@ -55,10 +78,11 @@ struct Picture {
 
 Picture render(const TemporaryFolder& folder, const CausticScene& scene, const Estimate& estimate, int side) {
   const auto path = folder / "scene.json", picture = folder / "picture.exr", statistics = folder / "statistics.json";
-  std::ofstream(path) << Json{{"field", scene.field},
-                              {"light", {{"direction", scene.direction}, {"photons", estimate.photons}}},
-                              {"receiver", {{"resolution", {side, side}}}},
-                              {"integrator", {{"type", "photon_distribution"}, {"density", estimate.density}}}};
+  Json json = scene.scene;
+  json["light"]["photons"] = estimate.photons;
+  json["receiver"]["resolution"] = {side, side};
+  json["integrator"] = {{"type", "photon_distribution"}, {"density", estimate.density}};
+  std::ofstream(path) << json;
   run_program(sibling("tensorray"), {"render", path.string(), "-o", picture.string(), "-o",
                                      (folder / "picture.png").string(), "--stats", statistics.string(), "--quiet"});
   std::ifstream file(statistics);
@@ -98,7 +122,7 @@ Json measure_caustics(const Options& options) {
   const TemporaryFolder folder;
   const int side = options.quick ? 32 : 512;
   Json results = Json::array();
-  for (const CausticScene& scene : scenes(options.quick)) {
+  for (const CausticScene& scene : scenes(options)) {
     options.announce(fmt::format("caustics: {}, reference", scene.name));
     const Json exact_density = {{"kind", "mesh"}, {"error", options.quick ? 0.005 : 0.01}};
     const Image exact = render(folder, scene, {"reference", exact_density, 1u << 23}, side).image;

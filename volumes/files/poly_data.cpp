@@ -9,9 +9,9 @@ namespace {
 
 const std::string magic = "tensorray poly data 1\n";
 
-class Writer {
+class PolyDataWriter {
  public:
-  explicit Writer(const std::filesystem::path& path) : file_(path, std::ios::binary | std::ios::trunc) {
+  explicit PolyDataWriter(const std::filesystem::path& path) : file_(path, std::ios::binary | std::ios::trunc) {
     file_.write(magic.data(), static_cast<std::streamsize>(magic.size()));
   }
 
@@ -54,9 +54,9 @@ class Writer {
   std::ofstream file_;
 };
 
-class Reader {
+class PolyDataReader {
  public:
-  explicit Reader(const std::filesystem::path& path)
+  explicit PolyDataReader(const std::filesystem::path& path)
       : file_(path, std::ios::binary), left_(std::filesystem::file_size(path)) {
     std::string begin(magic.size(), ' ');
     bytes(&begin[0], begin.size());
@@ -159,7 +159,7 @@ PolyDataView view_of(const PolyData& data) {
 }
 
 void write_poly_data(const std::filesystem::path& path, const PolyDataView& data) {
-  Writer writer(path);
+  PolyDataWriter writer(path);
   writer.array(data.points);
   writer.number(data.line_ends ? 1 : 0);
   writer.number(data.line_ends ? data.line_ends->size() : 0);
@@ -178,7 +178,7 @@ void write_poly_data(const std::filesystem::path& path, const PolyDataView& data
 
 PolyData read_poly_data(const std::filesystem::path& path) {
   static_assert(sizeof(std::size_t) == sizeof(std::uint64_t), "line ends are 64 bits in the file");
-  Reader reader(path);
+  PolyDataReader reader(path);
   PolyData data;
   data.points = reader.array();
   data.has_lines = reader.number() != 0;
