@@ -15,26 +15,23 @@ namespace {
 
 constexpr double even_part = 0.1;  // Densities of a square's halves that differ by less than this part of their sum ...
                                    // become one.
+constexpr double most_parts = 16;  // Of a band.
 constexpr std::size_t bands_of_thread = 4;     // Bands that are drawn before their sums are added to the film.
 constexpr std::size_t most_memory = 1u << 28;  // Bytes for these, unless a band for each thread takes more.
 
-/// The landings of all positions at one place among the nodes.
+/// The landings of positions at one place among the nodes.
 struct Landings {
   std::vector<Eigen::Vector2d> at;  // Pixels.
   std::vector<RayEnd> ends;
-};
 
-Landings landings_at(const FlowMap& map, double node) {
-  Landings landings;
-  landings.at.reserve(map.starts.size());
-  landings.ends.reserve(map.starts.size());
-  for (std::size_t i = 0; i < map.starts.size(); ++i) {
-    const FlowLanding landing = landing_at(map, i, node);
-    landings.at.push_back(landing.at);
-    landings.ends.push_back(landing.end);
+  explicit Landings(std::size_t positions) : at(positions), ends(positions) {}
+
+  void set(const FlowMap& map, std::size_t position, double node) {
+    const FlowLanding landing = landing_at(map, position, node);
+    at[position] = landing.at;
+    ends[position] = landing.end;
   }
-  return landings;
-}
+};
 
 /// Power by the end of its light. `plate` also has the light that lands beside the plate.
 using Power = std::array<double, ray_end_count>;
@@ -82,23 +79,80 @@ struct Drawing {
   EndCounts ends{};
 };
 
+/// The triangles of a band that are drawn in the same number of parts.
+struct Sweep {
+  std::vector<std::uint32_t> triangles, positions;
+  std::vector<const FlowEdge*> edges;  // All of which one side, at least, is one of the triangles.
+};
+
+/// Distance that the light of a position moves within a band, pixels; 0 if it does not land at both ends.
+double movement(const FlowMap& map, std::size_t position, const CausticBand& band) {
+  const double last = static_cast<double>(map.nodes - 1);
+  const FlowLanding begin = landing_at(map, position, std::max(band.node - band.width / 2, 0.0)),
+                    end = landing_at(map, position, std::min(band.node + band.width / 2, last));
+  return begin.end == RayEnd::plate && end.end == RayEnd::plate ? (end.at - begin.at).norm() : 0;
+}
+
+/// Sorts the triangles by the number of their parts: those of n parts are at [n - 1].
+std::vector<Sweep> sort_by_parts(const FlowMap& map, const CausticBand& band) {
+  std::vector<std::uint8_t> parts_of_position(map.starts.size(), 1);
+  for (std::size_t i = 0; band.width > 0 && i < map.starts.size(); ++i)
+    parts_of_position[i] = static_cast<std::uint8_t>(std::clamp(std::ceil(movement(map, i, band)), 1.0, most_parts));
+  std::vector<Sweep> sweeps(static_cast<std::size_t>(most_parts));
+  std::vector<std::uint8_t> parts(map.triangles.size());
+  std::vector<std::uint16_t> drawn_in(map.starts.size());  // A bit for each sweep.
+  for (std::uint32_t t = 0; t < map.triangles.size(); ++t) {
+    for (const std::uint32_t corner : map.triangles[t].corners)
+      parts[t] = std::max(parts[t], parts_of_position[corner]);
+    Sweep& sweep = sweeps[parts[t] - 1u];
+    sweep.triangles.push_back(t);
+    for (const std::uint32_t corner : map.triangles[t].corners) {
+      const auto bit = static_cast<std::uint16_t>(1u << (parts[t] - 1u));
+      if (!(drawn_in[corner] & bit)) sweep.positions.push_back(corner);
+      drawn_in[corner] |= bit;
+    }
+  }
+  for (const FlowEdge& edge : map.edges) {
+    const int along = edge.along == FlowEdge::none ? 0 : parts[edge.along],
+              against = edge.against == FlowEdge::none ? 0 : parts[edge.against];
+    if (along > 0) sweeps[along - 1].edges.push_back(&edge);
+    if (against > 0 && against != along) sweeps[against - 1].edges.push_back(&edge);
+  }
+  return sweeps;
+}
+
+/// Draws triangles at one place among the nodes.
+/// @param densities  One for each triangle of the map; 0, before and afterwards.
+void draw_triangles(const FlowMap& map, const Sweep& sweep, double node, double unit, Landings& landings,
+                    std::vector<double>& densities, Drawing& drawing) {
+  for (const std::uint32_t position : sweep.positions) landings.set(map, position, node);
+  for (const std::uint32_t t : sweep.triangles)
+    densities[t] = start_triangle(map.triangles[t], landings, unit, drawing.deposit, drawing.power);
+  for (const FlowEdge* edge : sweep.edges)
+    if (edge->is_diagonal)
+      even_out(densities[edge->along], densities[edge->against], map.triangles[edge->along].area,
+               map.triangles[edge->against].area);
+  const auto density = [&](std::uint32_t triangle) { return triangle == FlowEdge::none ? 0 : densities[triangle]; };
+  for (const FlowEdge* edge : sweep.edges) {
+    const double difference = density(edge->along) - density(edge->against);
+    if (difference != 0) drawing.deposit.add_edge(landings.at[edge->from], landings.at[edge->to], difference);
+  }
+  for (const std::uint32_t t : sweep.triangles) densities[t] = 0;
+}
+
 void draw_band(const FlowMap& map, const Plate& plate, const CausticBand& band, double unit, Drawing& drawing) {
   drawing.deposit.clear();
   drawing.power = {};
-  const Landings landings = landings_at(map, band.node);
-  std::vector<double> densities;
-  densities.reserve(map.triangles.size());
-  for (const FlowTriangle& triangle : map.triangles)
-    densities.push_back(start_triangle(triangle, landings, unit, drawing.deposit, drawing.power));
-  for (const FlowEdge& edge : map.edges)
-    if (edge.is_diagonal)
-      even_out(densities[edge.along], densities[edge.against], map.triangles[edge.along].area,
-               map.triangles[edge.against].area);
-  const auto density = [&](std::uint32_t triangle) { return triangle == FlowEdge::none ? 0 : densities[triangle]; };
-  for (const FlowEdge& edge : map.edges) {
-    const double difference = density(edge.along) - density(edge.against);
-    if (difference != 0) drawing.deposit.add_edge(landings.at[edge.from], landings.at[edge.to], difference);
-  }
+  Landings landings(map.starts.size());
+  std::vector<double> densities(map.triangles.size());
+  const std::vector<Sweep> sweeps = sort_by_parts(map, band);
+  for (std::size_t parts = 1; parts <= sweeps.size(); ++parts)
+    for (std::size_t part = 0; part < parts && !sweeps[parts - 1].triangles.empty(); ++part) {
+      const double place = (static_cast<double>(part) + 0.5) / static_cast<double>(parts) - 0.5;
+      draw_triangles(map, sweeps[parts - 1], band.node + place * band.width, unit / static_cast<double>(parts),
+                     landings, densities, drawing);
+    }
+  for (std::size_t i = 0; i < map.starts.size(); ++i) landings.set(map, i, band.node);
   drawing.ends = count_ends(landings, plate);
 }
 

@@ -18,6 +18,7 @@ namespace tensorray {
 /// A part of the light that lands together: a narrow band of wavelengths, or a colour in RGB mode.
 struct CausticBand {
   double node = 0;          ///< Its landings, as a position among the nodes of the map; between two nodes in a range.
+  double width = 0;         ///< In a range: it goes from half a width before `node` to half a width after it.
   std::size_t channel = 0;  ///< The channel that it belongs to.
   double weight = 1;        ///< Its part of the channel's power; the sum over the bands of a channel is 1.
   /// The colour that it adds where its irradiance is that of the undisturbed beam.
@@ -31,9 +32,10 @@ struct Caustic {
   std::vector<EndCounts> ends;                           ///< Number of positions by the end of each channel's light.
 };
 
-/// Draws the bands one after the other. Triangles of which not all corners land leave their light at the corners: each
-/// corner takes a third. The little light of triangles at a tear is spread across it. What lands beside the plate
-/// counts as missed.
+/// Draws the bands one after the other. A triangle that moves by more than a pixel within a band is drawn in as many
+/// parts as make steps of a pixel, at most 16. Triangles of which not all corners land leave their light at the
+/// corners: each corner takes a third. The little light of triangles at a tear is spread across it. What lands beside
+/// the plate counts as missed.
 /// @param plate       The plate of the map.
 /// @param by_channel  Whether the result has the irradiance of each channel.
 /// The sums are integers, so that the result is the same for any number of threads. Memory: the films, and

@@ -28,14 +28,24 @@ FlowMap trace_map(const Scene& scene, double tolerance, const Progress& progress
   return trace_flow_map(scene.field, scene.geometry, scene.beam, scene.bending, settings, progress);
 }
 
+constexpr double band_step = 2;  // Pixels between the middles of bands that are swept.
+
 /// The bands that are drawn: each band of the scene is divided, so that light moves little from one to the next.
-std::vector<CausticBand> bands_of(const Scene& scene, const FlowMap& map, const BandStep& step) {
+/// @param swept  Whether light is spread over the way that it moves within a band.
+std::vector<CausticBand> bands_of(const Scene& scene, const FlowMap& map, const BandStep& step, bool swept) {
   const Eigen::Matrix3d xyz_to_working = to_working(scene);
   const int channels = static_cast<int>(scene.bands.size());
   std::vector<CausticBand> bands;
-  for (const FineBand& fine : fine_bands(scene, band_count(map, channels, step)))
-    bands.push_back({(fine.begin + fine.end) / 2 * static_cast<double>(map.nodes - 1), fine.channel, fine.weight,
-                     xyz_to_working * fine.band.xyz});
+  const double last = static_cast<double>(map.nodes - 1);
+  for (const FineBand& fine : fine_bands(scene, band_count(map, channels, step))) {
+    CausticBand band;
+    band.node = last * (fine.begin + fine.end) / 2;
+    band.width = swept ? last * (fine.end - fine.begin) : 0;
+    band.channel = fine.channel;
+    band.weight = fine.weight;
+    band.color = xyz_to_working * fine.band.xyz;
+    bands.push_back(band);
+  }
   return bands;
 }
 
@@ -47,15 +57,15 @@ std::vector<std::array<double, ray_end_count>> beam_power(const Scene& scene, co
   return power;
 }
 
-PlateLight draw_map(const Scene& scene, double tolerance, const BandStep& step, const Progress& progress) {
+PlateLight draw_map(const Scene& scene, double tolerance, const BandStep& step, bool swept, const Progress& progress) {
   Clock::time_point start = Clock::now();
   PlateLight light;
   light.map = trace_map(scene, tolerance, progress);
   const FlowMap& map = light.map;
   light.statistics.seconds_tracing = seconds_since(start);
   start = Clock::now();
-  Caustic caustic = draw_caustic(map, *scene.geometry.surfaces().plate, bands_of(scene, map, step), scene.bands.size(),
-                                 scene.description.output.wants("spectral"), progress);
+  Caustic caustic = draw_caustic(map, *scene.geometry.surfaces().plate, bands_of(scene, map, step, swept),
+                                 scene.bands.size(), scene.description.output.wants("spectral"), progress);
   light.linear = color_image(caustic.color);
   light.irradiance = std::move(caustic.irradiance);
   light.statistics.seconds_density = seconds_since(start);
@@ -89,10 +99,10 @@ PlateLight refine(const Scene& scene, double bound, const Progress& progress) {
     labelled.cancelled = progress.cancelled.load();
   };
   double tolerance = 1;
-  PlateLight light = draw_map(scene, tolerance, refined_step(tolerance), labelled);
+  PlateLight light = draw_map(scene, tolerance, refined_step(tolerance), false, labelled);
   for (;;) {
     tolerance /= 2;
-    PlateLight finer = draw_map(scene, tolerance, refined_step(tolerance), labelled);
+    PlateLight finer = draw_map(scene, tolerance, refined_step(tolerance), false, labelled);
     const double error = relative_distance(light.linear, finer.linear);
     finer.statistics.error = error;
     add_cost(light.statistics, finer.statistics);
@@ -111,7 +121,7 @@ PlateLight refine(const Scene& scene, double bound, const Progress& progress) {
 PlateLight draw_light(const Scene& scene, const Progress& progress) {
   const PhotonDensity& density = scene.description.integrator.settings<PhotonDescription>().density;
   if (density.error) return refine(scene, *density.error, progress);
-  PlateLight light = draw_map(scene, density.tolerance, {}, progress);
+  PlateLight light = draw_map(scene, density.tolerance, {band_step}, true, progress);
   if (!light.map.is_complete)
     light.warnings.push_back(
         "the light on the plate is coarser than `integrator.density.tolerance` asks: raise `light.photons`");

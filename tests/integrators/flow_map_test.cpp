@@ -3,6 +3,7 @@
 #include "integrators/flow/flow_map.h"
 
 #include <cmath>
+#include <functional>
 #include <numeric>
 
 #include <gtest/gtest.h>
@@ -75,7 +76,7 @@ FlowMap map_of(const Bench& bench, const FlowSettings& settings) {
   return trace_flow_map(bench.field, bench.geometry, bench.beam, {}, settings, Progress());
 }
 
-Caustic caustic_of(const Bench& bench, const FlowMap& map, const std::vector<CausticBand>& bands = {{0, 0, 1, {}}}) {
+Caustic caustic_of(const Bench& bench, const FlowMap& map, const std::vector<CausticBand>& bands = {CausticBand{}}) {
   return draw_caustic(map, bench.plate(), bands, 1, true, Progress());
 }
 
@@ -250,7 +251,7 @@ TEST(FlowMap, InterpolatedWavelengthsHardlyChangeColours) {
   Vector3d white = Vector3d::Zero();
   for (int i = 0; i < count; ++i) {
     const double place = (i + 0.5) / count;
-    bands.push_back({32 * place, 0, 1.0 / count, observer(380 + 400 * place)});
+    bands.push_back({32 * place, 0, 0, 1.0 / count, observer(380 + 400 * place)});
     white += bands.back().color;
   }
   const Bench bench = make_bench(lens, plate_at(2.2, 3, 64));
@@ -278,7 +279,7 @@ TEST(FlowMap, TheSameOnAnyNumberOfThreads) {
     const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, threads);
     const FlowMap map = map_of(bench, range(0.1, 0.6));
     std::vector<CausticBand> bands;
-    for (int i = 0; i < 20; ++i) bands.push_back({(i + 0.5) / 20 * 32, 0, 0.05, Vector3d(0.05, 0.1, i)});
+    for (int i = 0; i < 20; ++i) bands.push_back({(i + 0.5) / 20 * 32, 1.6, 0, 0.05, Vector3d(0.05, 0.1, i)});
     caustics.push_back(caustic_of(bench, map, bands));
   }
   for (const Caustic& caustic : caustics) {
@@ -373,7 +374,7 @@ FlowMap lattice_map(int count, const Map& map) {
 
 /// L2 distance from `exact`, the power of each pixel, as a part of its norm. The power is exact.
 double distance(const FlowMap& map, const Plate& plate, const std::vector<double>& exact) {
-  const Caustic caustic = draw_caustic(map, plate, {{0, 0, 1, {}}}, 1, true, Progress());
+  const Caustic caustic = draw_caustic(map, plate, {CausticBand{}}, 1, true, Progress());
   EXPECT_NEAR(power_of(caustic, RayEnd::plate), sum(exact), 1e-6);
   double squares = 0, all = 0;
   for (std::size_t i = 0; i < exact.size(); ++i) {
@@ -466,6 +467,44 @@ TEST(Caustic, IsOfSecondOrderWhereNothingFolds) {
   const double coarse = error(128), fine = error(512);
   EXPECT_LT(coarse, 1e-3);
   EXPECT_LT(fine, coarse / 10);  // 16 for second order.
+}
+
+/// The light of one band between two nodes, of which each position moves by `moves`, and that of many narrow bands.
+std::pair<Film, Film> swept_and_narrow(const std::function<Vector2d(const Vector2d&)>& moves, int bands) {
+  FlowMap map = lattice_map(8, [](const Vector2d& at) { return Vector2d(5 + 20 * at.x(), 5 + 40 * at.y()); });
+  std::vector<Eigen::Vector2f> landings;
+  for (std::size_t i = 0; i < map.starts.size(); ++i)
+    landings.insert(landings.end(), {map.landings[i], map.landings[i] + moves(map.starts[i]).cast<float>()});
+  map.landings = landings;
+  map.nodes = 2;
+  map.ends.assign(landings.size(), RayEnd::plate);
+  CausticBand whole;
+  whole.node = 0.5;
+  whole.width = 1;
+  std::vector<CausticBand> narrow(bands);
+  for (int i = 0; i < bands; ++i) {
+    narrow[i].node = (i + 0.5) / bands;
+    narrow[i].weight = 1.0 / bands;
+  }
+  const auto draw = [&](const std::vector<CausticBand>& each) {
+    const Caustic caustic = draw_caustic(map, unit_plate(), each, 1, true, Progress());
+    EXPECT_NEAR(all_power(caustic), 1, 1e-9);
+    return caustic.irradiance;
+  };
+  return {draw({whole}), draw(narrow)};
+}
+
+TEST(Caustic, ABandIsSweptInStepsOfAPixel) {
+  const auto [swept, narrow] = swept_and_narrow([](const Vector2d&) { return Vector2d(12.5, 3); }, 13);
+  for (std::size_t i = 0; i < swept.values.size(); ++i) ASSERT_NEAR(swept.values[i], narrow.values[i], 1e-9) << i;
+  // Triangles that move by a different number of pixels still meet.
+  const auto [bent, exact] = swept_and_narrow([](const Vector2d& at) { return Vector2d(14 * at.y(), 0); }, 400);
+  double squares = 0, all = 0;
+  for (std::size_t i = 0; i < bent.values.size(); ++i) {
+    squares += std::pow(bent.values[i] - exact.values[i], 2);
+    all += std::pow(exact.values[i], 2);
+  }
+  EXPECT_LT(std::sqrt(squares / all), 0.02);
 }
 
 TEST(Caustic, LightThatMovesFarHasManyBands) {
