@@ -116,8 +116,8 @@ inline bool jumps(const FlowTriangle& triangle, const Eigen::Vector2d& a, const 
 /// √n times as large. Squares whose light falls beside the plate stay as they are.
 ///
 /// In a range, each position first sends light at 5 of the 33 nodes. Where these are smooth, so that an error of more
-/// than a sixteenth of the tolerance is unlikely, the others are interpolated (cubic); where not, more nodes are traced,
-/// up to all. (At a caustic a small error of the landing is a great one of the colour.)
+/// than a sixteenth of the tolerance is unlikely, the others are interpolated (cubic); where not, more nodes are
+/// traced, up to all. (At a caustic a small error of the landing is a great one of the colour.)
 ///
 /// The result is the same for any number of threads. @throw std::invalid_argument if a setting is out of range or
 /// `geometry` has no plate; Cancelled.
