@@ -35,6 +35,7 @@ int main(int argc, char** argv) {
   app.set_version_flag("--version", "tensorray " TENSORRAY_VERSION);
   app.require_subcommand(1);
   tensorray::add_render_command(app, progress);
+  tensorray::add_explore_command(app, progress);
   tensorray::add_make_command(app, progress);
   tensorray::add_derive_command(app, progress);
   tensorray::add_import_command(app);

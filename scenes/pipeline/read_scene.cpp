@@ -66,16 +66,32 @@ void choose_outputs(SceneDescription& scene) {
   scene.output.files["exr"] = std::filesystem::path(scene.path).replace_extension(".exr");
 }
 
+/// The scene of a field alone: the light that it bends, on a plate.
+Json scene_of_field(const std::filesystem::path& field) {
+  return {{"field", {{"file", std::filesystem::absolute(field).string()}}},
+          {"integrator", {{"type", "photon_distribution"}}}};
+}
+
+std::string text_of(const Json& json, const SceneSource& source) {
+  try {
+    return json.dump();
+  } catch (const Json::type_error&) {
+    source.fail("its path is not UTF-8; name the file in a scene file, or rename it");
+  }
+}
+
 }  // namespace
 
+bool is_field_file(const std::filesystem::path& path) { return path.extension() == ".vdb"; }
+
 SceneDescription read_scene(const std::filesystem::path& path, const SceneChanges& changes) {
-  Json json = read_json_object(path);
+  Json json = is_field_file(path) ? scene_of_field(path) : read_json_object(path);
   for (const std::string& change : changes.overrides) apply_override(json, change);
 
   const SceneSource source{path};
   SceneDescription scene = default_scene();
   scene.path = path;
-  scene.text = json.dump();
+  scene.text = text_of(json, source);
   SectionReader reader(json, "", source);
   describe(scene, reader);
   reader.finish();

@@ -210,6 +210,40 @@ AutoScale load_scale(const SceneDescription& description, const TensorField& fie
   return scale;
 }
 
+/// The light of a scene, and how its colours are shown.
+struct LoadedLight {
+  ColorManagement color;
+  Spectrum spectrum;
+  std::vector<Band> bands;
+};
+
+LoadedLight load_light(const SceneDescription& description) {
+  LoadedLight light{
+      ColorManagement({description.output.ocio, description.output.display, description.output.view}), {}, {}};
+  if (!description.bending.rgb) light.spectrum = load_spectrum(description.light.spectrum);
+  light.bands = bands_of(light.spectrum, description);
+  return light;
+}
+
+Scene make_scene(const SceneDescription& description, LoadedLight light, LoadedField loaded,
+                 std::vector<std::string> notes, const Progress& progress) {
+  Beam beam = make_beam(description, loaded.field);
+  Geometry geometry(load_surfaces(description, loaded.field, beam));
+  Scene scene(description, std::move(loaded.field), std::move(geometry), std::move(light.color));
+  scene.eigenvalues = loaded.eigenvalues;
+  scene.non_finite = loaded.non_finite;
+  scene.beam = std::move(beam);
+  scene.channels = channels_of(light.bands, description.bending);
+  scene.spectrum = std::move(light.spectrum);
+  scene.bands = std::move(light.bands);
+  scene.scale = load_scale(description, scene.field, scene.geometry, scene.beam, progress, notes);
+  scene.bending = description.bending.settings;
+  scene.bending.scale = scene.scale.scale;
+  scene.method = description.integrator.method().load(scene, notes);
+  scene.notes = std::move(notes);
+  return scene;
+}
+
 }  // namespace
 
 Eigen::AlignedBox3d world_box(const TensorField& field) {
@@ -238,27 +272,18 @@ Scene load_scene(const SceneDescription& description, const Progress& progress) 
   const auto start = Clock::now();
   std::vector<std::string> notes;
   for (const std::string& warning : description.warnings) notes.push_back("warning: " + warning);
-  ColorManagement color({description.output.ocio, description.output.display, description.output.view});
-  Spectrum spectrum;
-  if (!description.bending.rgb) spectrum = load_spectrum(description.light.spectrum);
-  std::vector<Band> bands = bands_of(spectrum, description);
+  LoadedLight light = load_light(description);
   progress.update("loading", 0, 1);
-  LoadedField loaded = load_field(description, notes);
-  Beam beam = make_beam(description, loaded.field);
-  Geometry geometry(load_surfaces(description, loaded.field, beam));
+  LoadedField field = load_field(description, notes);
+  Scene scene = make_scene(description, std::move(light), std::move(field), std::move(notes), progress);
+  scene.seconds = seconds_since(start);
+  return scene;
+}
 
-  Scene scene(description, std::move(loaded.field), std::move(geometry), std::move(color));
-  scene.eigenvalues = loaded.eigenvalues;
-  scene.non_finite = loaded.non_finite;
-  scene.beam = std::move(beam);
-  scene.channels = channels_of(bands, description.bending);
-  scene.spectrum = std::move(spectrum);
-  scene.bands = std::move(bands);
-  scene.scale = load_scale(description, scene.field, scene.geometry, scene.beam, progress, notes);
-  scene.bending = description.bending.settings;
-  scene.bending.scale = scene.scale.scale;
-  scene.method = description.integrator.method().load(scene, notes);
-  scene.notes = std::move(notes);
+Scene reload_scene(Scene loaded, const SceneDescription& description, const Progress& progress) {
+  const auto start = Clock::now();
+  Scene scene = make_scene(description, load_light(description),
+                           {std::move(loaded.field), loaded.eigenvalues, loaded.non_finite}, {}, progress);
   scene.seconds = seconds_since(start);
   return scene;
 }

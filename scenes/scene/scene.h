@@ -51,6 +51,10 @@ struct Scene {
 /// the loaded data; Cancelled.
 Scene load_scene(const SceneDescription& description, const Progress& progress);
 
+/// The same for another description of a scene whose field is loaded: its `field` may differ in `scale` and `bounds`.
+/// Notes about the field are left out.
+Scene reload_scene(Scene loaded, const SceneDescription& description, const Progress& progress);
+
 /// Where the volume begins and ends along a direction, as signed distances from an origin, world units.
 struct DepthRange {
   double near = 0, far = 0;

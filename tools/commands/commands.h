@@ -12,8 +12,9 @@ namespace tensorray {
 
 struct Progress;
 
-void add_render_command(CLI::App& program, Progress& progress);  ///< tensorray render SCENE.json: pictures of a scene.
-void add_make_command(CLI::App& program, Progress& progress);    ///< tensorray make KIND: an analytic field.
+void add_render_command(CLI::App& program, Progress& progress);   ///< tensorray render SCENE.json: pictures of a scene.
+void add_explore_command(CLI::App& program, Progress& progress);  ///< tensorray explore FIELD.vdb: a sheet of pictures.
+void add_make_command(CLI::App& program, Progress& progress);     ///< tensorray make KIND: an analytic field.
 void add_import_command(CLI::App& program);  ///< Lists `import` in --help; become_import_program runs it.
 void add_derive_command(CLI::App& program, Progress& progress);  ///< tensorray derive FIELD.vdb: its invariants.
 void add_stretch_command(CLI::App& program,

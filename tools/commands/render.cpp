@@ -51,8 +51,12 @@ double parse_part(const std::string& text) {
 
 void add_render_command(CLI::App& program, Progress& progress) {
   const auto options = std::make_shared<RenderOptions>();
-  CLI::App* command = program.add_subcommand("render", "Render a scene file to pictures");
-  command->add_option("SCENE", options->scene, "Scene file (JSON; `tensorray schema` prints its keys)")->required();
+  CLI::App* command = program.add_subcommand("render", "Render a scene file, or a field, to pictures");
+  command
+      ->add_option("SCENE", options->scene,
+                   "Scene file (JSON; `tensorray schema` prints its keys), or a field (.vdb): the light that it bends, "
+                   "with all defaults")
+      ->required();
   command->add_option("-o,--output", options->changes.outputs, output_help());
   command
       ->add_option(
@@ -64,6 +68,7 @@ void add_render_command(CLI::App& program, Progress& progress) {
   command->add_option("--until-error", options->error,
                       "photon_distribution: refine until the picture's relative error is below this, as 1%");
   command->add_option("--stats", options->run.statistics, "Write statistics of the render to this JSON file");
+  command->add_option("--save-scene", options->run.scene_copy, "Write the scene, with its changes, to this JSON file");
   command->add_flag("-q,--quiet", options->run.quiet, "Print nothing but errors");
   command->callback([options, &progress] {
     SceneChanges changes = options->changes;

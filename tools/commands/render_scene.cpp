@@ -14,6 +14,7 @@
 
 #include "renderer/images/image.h"
 #include "scenes/description/run_files.h"
+#include "scenes/keys/json_reader.h"
 #include "scenes/outputs/write_outputs.h"
 #include "scenes/scene/render.h"
 #include "scenes/scene/scene.h"
@@ -24,8 +25,8 @@
 namespace tensorray {
 namespace {
 
-/// The key of the statistics file among the outputs, because all files are committed together.
-const std::string statistics_key = "--stats";
+/// Keys among the outputs, because all files are committed together.
+const std::string statistics_key = "--stats", scene_key = "--save-scene";
 
 void write_text(OutputFile& file, const std::string& text) {
   file.write([&](const std::filesystem::path& path) {
@@ -36,10 +37,24 @@ void write_text(OutputFile& file, const std::string& text) {
   });
 }
 
-OutputFiles open_files(const SceneDescription& description, const std::filesystem::path& statistics) {
-  check_files(description, {{statistics, statistics_key}});
+/// Paths in a scene are relative to its folder. @throw SceneError if the copy is in another one.
+void check_scene_copy(const std::filesystem::path& scene, const std::filesystem::path& copy) {
+  if (copy.empty() || is_field_file(scene)) return;  // The scene of a field has no relative paths.
+  const auto folder = [](const std::filesystem::path& file) {
+    return std::filesystem::weakly_canonical(std::filesystem::absolute(file).parent_path());
+  };
+  if (folder(scene) != folder(copy))
+    throw SceneError(printable(fmt::format("{} {}: must be in the folder of {}, to which paths in it are relative",
+                                           scene_key, copy.string(), scene.string())));
+}
+
+OutputFiles open_files(const SceneDescription& description, const RenderRun& run) {
+  check_scene_copy(description.path, run.scene_copy);
+  const std::vector<NamedFile> more{{run.statistics, statistics_key}, {run.scene_copy, scene_key}};
+  check_files(description, more);
   OutputFiles files = open_outputs(description.output);
-  if (!statistics.empty()) files.emplace(statistics_key, OutputFile(statistics));
+  for (const NamedFile& file : more)
+    if (!file.path.empty()) files.emplace(file.name, OutputFile(file.path));
   return files;
 }
 
@@ -59,7 +74,8 @@ void render_scene(const std::filesystem::path& scene_file, const SceneChanges& c
   set_image_threads(static_cast<int>(threads));
 
   const SceneDescription description = read_scene(scene_file, changes);
-  OutputFiles files = open_files(description, run.statistics);
+  OutputFiles files = open_files(description, run);
+  if (is_field_file(scene_file)) tell({"scene: " + description.text}, run.quiet);
 
   std::optional<ProgressBar> bar(std::in_place, progress, run.quiet);
   const Scene scene = load_scene(description, progress);
@@ -74,6 +90,7 @@ void render_scene(const std::filesystem::path& scene_file, const SceneChanges& c
   const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
   if (!run.statistics.empty())
     write_text(files.at(statistics_key), statistics_json(scene, result.statistics, seconds, static_cast<int>(threads)));
+  if (!run.scene_copy.empty()) write_text(files.at(scene_key), parse_value(description.text).dump(2) + "\n");
   commit(std::move(files));
   for (const auto& [key, path] : description.output.files)
     if (!run.quiet) fmt::print("wrote {}\n", path.string());

@@ -1,0 +1,95 @@
+// `tensorray explore`: a sheet of pictures of a field, and the scene of one of them.
+
+#include <algorithm>
+#include <cmath>
+
+#include "renderer/images/image.h"
+#include "tests/program/support.h"
+
+namespace tensorray {
+namespace {
+
+using namespace test;
+using nlohmann::json;
+
+constexpr int size = 32, gap = 8, columns = 6;
+
+class Explore : public Program {
+ protected:
+  void SetUp() override {
+    Program::SetUp();
+    run_well({"make", "point_load", "-o", "stress.vdb", "--resolution", "17"});
+  }
+
+  const std::vector<std::string> few_{"--set", "light.wavelengths.count=4", "-q"};
+
+  Outcome explore(std::vector<std::string> arguments) const {
+    arguments.insert(arguments.begin(), {"explore", "stress.vdb"});
+    arguments.insert(arguments.end(), few_.begin(), few_.end());
+    return run(arguments);
+  }
+};
+
+TEST_F(Explore, ThePicturesAreThoseOfTheirScenes) {
+  ASSERT_EQ(explore({"-o", "sheet.png", "--size", "32"}).status, 0);
+  const Image sheet = read_image(in_folder("sheet.png"));
+  EXPECT_EQ(sheet.width, columns * (size + gap) + gap);
+  for (const int number : {5, 6, 12}) {
+    ASSERT_EQ(explore({"--pick", std::to_string(number), "--save-scene", "cell.json"}).status, 0);
+    run_well({"render", "cell.json", "--set", "receiver.resolution=[32,32]", "--set", "light.photons=32768", "--set",
+              "integrator.density={\"kind\":\"gaussian\",\"tau\":1}", "--set", "light.wavelengths.count=16", "--set",
+              "light.wavelengths.per_photon=4", "-o", "cell.png", "-q"});
+    const Image cell = read_image(in_folder("cell.png"));
+    const int left = gap + (number - 1) % columns * (size + gap);
+    const int top = gap + (number - 1) / columns * ((sheet.height - gap) / 3);
+    double brightest = 0;
+    for (int y = 0; y < size; ++y)
+      for (int x = 0; x < size; ++x)
+        for (int c = 0; c < 3; ++c) {
+          ASSERT_EQ(sheet.pixel(left + x, top + y)[c], cell.pixel(x, y)[c]) << number << ": " << x << " " << y;
+          brightest = std::max(brightest, double{cell.pixel(x, y)[c]});
+        }
+    EXPECT_GT(brightest, 0.2);
+  }
+}
+
+TEST_F(Explore, RowsAreScalesAndColumnsAreDirections) {
+  const auto picked = [&](int number) {
+    EXPECT_EQ(explore({"--pick", std::to_string(number), "--save-scene", "cell.json"}).status, 0);
+    return read_json("cell.json");
+  };
+  const json first = picked(6), second = picked(12), third = picked(18), other = picked(3);
+  EXPECT_EQ(first["light"]["direction"], json::array({0, 0, -1}));
+  EXPECT_EQ(third["light"]["direction"], json::array({0, 0, -1}));
+  EXPECT_EQ(other["light"]["direction"], json::array({0, 1, 0}));
+  EXPECT_NEAR(second["field"]["scale"].get<double>(), 2 * first["field"]["scale"].get<double>(), 1e-9);
+  EXPECT_NEAR(third["field"]["scale"].get<double>(), 4 * first["field"]["scale"].get<double>(), 1e-9);
+}
+
+TEST_F(Explore, OtherMethodsHaveSheets) {
+  for (const char* method : {"lens", "path_tracing"}) {
+    const Outcome outcome = explore({"-o", "sheet.png", "--size", "16", "--method", method, "--set",
+                                     "integrator.seeds.count=9", "--set", "integrator.samples=1"});
+    EXPECT_EQ(outcome.status, 0) << outcome.error;
+  }
+}
+
+TEST_F(Explore, WrongOptionsAreRefused) {
+  const auto expect_error = [&](const std::vector<std::string>& arguments, const std::string& text) {
+    const Outcome outcome = explore(arguments);
+    EXPECT_EQ(outcome.status, 2) << text;
+    EXPECT_NE(outcome.error.find(text), std::string::npos) << outcome.error;
+    EXPECT_EQ(std::count(outcome.error.begin(), outcome.error.end(), '\n'), 1) << outcome.error;
+  };
+  const std::string field = read_file(in_folder("stress.vdb"));
+  expect_error({}, "nothing to do");
+  expect_error({"-o", "sheet.exr"}, "sheet.exr");
+  expect_error({"-o", "sheet.png", "--pick", "3"}, "--save-scene");
+  expect_error({"--pick", "3", "--save-scene", "stress.vdb"}, "--save-scene");
+  expect_error({"-o", "sheet.png", "--method", "nothing"}, "nothing");
+  EXPECT_EQ(read_file(in_folder("stress.vdb")), field);
+  EXPECT_FALSE(exists(in_folder("sheet.png")));
+}
+
+}  // namespace
+}  // namespace tensorray

@@ -1,0 +1,221 @@
+#include <algorithm>
+#include <array>
+#include <fstream>
+#include <memory>
+#include <optional>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include <CLI/CLI.hpp>
+#include <fmt/format.h>
+#include <tbb/global_control.h>
+
+#include "base/output_file.h"
+#include "base/text.h"
+#include "renderer/images/image.h"
+#include "renderer/images/lettering.h"
+#include "scenes/description/run_files.h"
+#include "scenes/keys/json_reader.h"
+#include "scenes/outputs/picture_outputs.h"
+#include "scenes/pipeline/read_scene.h"
+#include "scenes/scene/render.h"
+#include "scenes/scene/scene.h"
+#include "tools/command_line/progress_bar.h"
+#include "tools/commands/commands.h"
+
+namespace tensorray {
+namespace {
+
+constexpr std::array<double, 3> factors{1, 2, 4};  // Of the scale; one row each.
+/// Small pictures of photons: quick, however chaotic the light is.
+const std::vector<std::string> quick{"integrator.density={\"kind\":\"gaussian\",\"tau\":1}", "light.photons=32768",
+                                     "light.wavelengths.count=16", "light.wavelengths.per_photon=4"};
+constexpr int gap = 8;  // Pixels about the pictures.
+
+struct Direction {
+  const char* name;
+  const char* vector;
+};
+
+constexpr std::array<Direction, 6> directions{{{"+x", "[1,0,0]"},
+                                               {"-x", "[-1,0,0]"},
+                                               {"+y", "[0,1,0]"},
+                                               {"-y", "[0,-1,0]"},
+                                               {"+z", "[0,0,1]"},
+                                               {"-z", "[0,0,-1]"}}};  // One column each.
+
+struct ExploreOptions {
+  std::string scene, method;
+  std::vector<std::string> overrides;
+  std::string sheet, scene_copy;
+  std::optional<int> pick;
+  int size = 200;
+  unsigned threads = 0;
+  bool quiet = false;
+};
+
+/// The pictures of the sheet, and its labels.
+class Sheet {
+ public:
+  explicit Sheet(int size)
+      : size_(size),
+        letters_(std::max(6.0, size / 20.0)),
+        row_(size + static_cast<int>(2 * letters_) + gap),
+        image_(static_cast<int>(directions.size()) * (size + gap) + gap, static_cast<int>(factors.size()) * row_ + gap,
+               {"R", "G", "B"}) {
+    std::fill(image_.pixels.begin(), image_.pixels.end(), 0.15f);
+  }
+
+  void draw(std::size_t column, std::size_t row, const Image& picture, const std::string& label) {
+    const int left = gap + static_cast<int>(column) * (size_ + gap), top = gap + static_cast<int>(row) * row_;
+    const int x0 = left + (size_ - picture.width) / 2, y0 = top + (size_ - picture.height) / 2;
+    for (int y = 0; y < size_; ++y)
+      for (int x = 0; x < size_; ++x) std::fill_n(image_.pixel(left + x, top + y), 3, 0.0f);
+    for (int y = 0; y < std::min(picture.height, size_); ++y)
+      for (int x = 0; x < std::min(picture.width, size_); ++x)
+        std::copy_n(picture.pixel(x, y), 3, image_.pixel(x0 + x, y0 + y));
+    const double height = letters_ * std::min(1.0, size_ / text_width(label, letters_));
+    draw_text(image_, Eigen::Vector2d(left, top + size_ + 1.5 * letters_), height, label, {0.9, 0.9, 0.9});
+  }
+
+  const Image& image() const { return image_; }
+
+ private:
+  int size_;
+  double letters_;  // Height, pixels.
+  int row_;         // Height with the label.
+  Image image_;
+};
+
+/// What all cells have in common. Keys that place things in one direction of light do not fit another.
+std::vector<std::string> common_changes(const ExploreOptions& options) {
+  std::vector<std::string> changes = options.overrides;
+  if (!options.method.empty()) changes.push_back("integrator.type=" + options.method);
+  for (const char* key : {"light.up", "light.aperture", "receiver.center", "receiver.normal", "receiver.up",
+                          "receiver.size", "receiver.resolution"})
+    changes.push_back(std::string(key) + "=null");
+  return changes;
+}
+
+SceneDescription with(const ExploreOptions& options, const std::vector<std::string>& more) {
+  SceneChanges changes{common_changes(options), {}};
+  changes.overrides.insert(changes.overrides.end(), more.begin(), more.end());
+  return read_scene(options.scene, changes);
+}
+
+/// Pixels of a picture that fits into a cell.
+std::string pixels_of(const Plate& plate, int size) {
+  const Eigen::Vector2i pixels =
+      (size * plate.size / plate.size.maxCoeff()).array().round().max(1).matrix().cast<int>();
+  return fmt::format("receiver.resolution=[{},{}]", pixels.x(), pixels.y());
+}
+
+/// Calls `visit(column, row, number, scene, description)` for each cell, with the field loaded once. `description` is
+/// the cell's scene with its pictures' size left open.
+template <class Visit>
+void for_each_cell(const ExploreOptions& options, const Progress& progress, const Visit& visit) {
+  std::optional<Scene> scene;
+  const auto load = [&](const SceneDescription& description) {
+    Scene next = scene ? reload_scene(std::move(*scene), description, progress) : load_scene(description, progress);
+    scene.emplace(std::move(next));
+  };
+  for (std::size_t column = 0; column < directions.size(); ++column) {
+    const std::string direction = fmt::format("light.direction={}", directions[column].vector);
+    load(with(options, {direction}));
+    const double scale = scene->scale.scale;
+    const std::string pixels = pixels_of(*scene->geometry.surfaces().plate, options.size);
+    for (std::size_t row = 0; row < factors.size(); ++row) {
+      const std::string scaled = fmt::format("field.scale={}", factors[row] * scale);
+      std::vector<std::string> changes = quick;
+      changes.insert(changes.end(),
+                     {direction, scaled, pixels, fmt::format("camera.resolution=[{0},{0}]", options.size)});
+      load(with(options, changes));
+      visit(column, row, static_cast<int>(row * directions.size() + column) + 1, *scene,
+            with(options, {direction, scaled}));
+    }
+  }
+}
+
+void check(const ExploreOptions& options, const SceneDescription& description) {
+  const std::vector<std::string> endings = image_endings();
+  if (!options.sheet.empty() &&
+      (ends_with(options.sheet, ".exr") || std::none_of(endings.begin(), endings.end(), [&](const std::string& ending) {
+         return ends_with(options.sheet, ending);
+       })))
+    throw std::invalid_argument("-o " + printable(options.sheet) + ": the sheet is a .png, .jpg or .tif picture");
+  if (options.sheet.empty() && options.scene_copy.empty())
+    throw std::invalid_argument("nothing to do: give -o SHEET.png, or --pick N --save-scene FILE.json");
+  if (options.pick.has_value() != !options.scene_copy.empty())
+    throw std::invalid_argument("--pick and --save-scene belong together");
+  if (!options.scene_copy.empty() && !is_field_file(options.scene))
+    throw std::invalid_argument("--save-scene: only for a field (.vdb); of a scene, change a copy by hand");
+  require_distinct_files(input_files(description), {{options.sheet, "-o"}, {options.scene_copy, "--save-scene"}});
+}
+
+void explore(const ExploreOptions& options, Progress& progress) {
+  const unsigned threads = options.threads > 0 ? options.threads : std::max(1u, std::thread::hardware_concurrency());
+  const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, threads);
+  set_image_threads(static_cast<int>(threads));
+  check(options, with(options, {}));
+  std::vector<OutputFile> files;
+  for (const std::string& file : {options.sheet, options.scene_copy})
+    if (!file.empty()) files.emplace_back(file);
+
+  std::optional<ProgressBar> bar(std::in_place, progress, options.quiet);
+  Sheet sheet(options.size);
+  std::string picked;
+  int done = 0;
+  Progress within;  // The bar shows cells, not the phases of each.
+  within.report = [&](const std::string&, std::uint64_t, std::uint64_t) {
+    progress.update("exploring", static_cast<std::uint64_t>(done), factors.size() * directions.size());
+  };
+  for_each_cell(
+      options, within,
+      [&](std::size_t column, std::size_t row, int number, const Scene& scene, const SceneDescription& description) {
+        if (options.pick == number) picked = description.text;
+        if (!options.sheet.empty()) {
+          const Render rendered = render(scene, within);
+          sheet.draw(column, row, display_image(scene, rendered, false),
+                     fmt::format("{}  {}  scale {:.3g}", number, directions[column].name, scene.scale.scale));
+        }
+        ++done;
+      });
+  bar.reset();
+  if (!options.sheet.empty())
+    files.front().write([&](const std::filesystem::path& path) { write_image(path, sheet.image()); });
+  if (!picked.empty())
+    files.back().write([&](const std::filesystem::path& path) {
+      std::ofstream stream(path, std::ios::binary);
+      stream << parse_value(picked).dump(2) << "\n";
+      stream.close();
+      if (!stream) throw std::runtime_error("cannot write " + path.string() + ": the disk may be full");
+    });
+  commit_all(files);
+  if (options.quiet) return;
+  for (const std::string& file : {options.sheet, options.scene_copy})
+    if (!file.empty()) fmt::print("wrote {}\n", file);
+}
+
+}  // namespace
+
+void add_explore_command(CLI::App& program, Progress& progress) {
+  const auto options = std::make_shared<ExploreOptions>();
+  CLI::App* command = program.add_subcommand(
+      "explore", "Show what a field does to light: one sheet of pictures, light from six sides, at three scales");
+  command->add_option("FIELD", options->scene, "Field (.vdb), or a scene file")->required();
+  command->add_option("-o,--output", options->sheet, "The sheet: .png .jpg .tif");
+  command->add_option("--method", options->method,
+                      "What to make of the light: photon_distribution, lens ... (the scene's)");
+  command->add_option("--set", options->overrides, "KEY=VALUE: change a value of all scenes")->allow_extra_args(false);
+  command->add_option("--size", options->size, "Of a picture: pixels along its longer side (200)")
+      ->check(CLI::Range(16, 2048));
+  command->add_option("--pick", options->pick, "Number of the picture whose scene --save-scene writes")
+      ->check(CLI::Range(1, static_cast<int>(factors.size() * directions.size())));
+  command->add_option("--save-scene", options->scene_copy, "Write the scene of --pick to this JSON file");
+  command->add_option("--threads", options->threads, "Number of threads (all)")->check(CLI::Range(1, 4096));
+  command->add_flag("-q,--quiet", options->quiet, "Print nothing but errors");
+  command->callback([options, &progress] { explore(*options, progress); });
+}
+
+}  // namespace tensorray
