@@ -16,7 +16,8 @@ struct RenderRun {
   std::filesystem::path scene_copy;  ///< File for the scene with its changes; empty: none.
 };
 
-/// Reads the scene file (or the field's; see read_scene), loads the scene, renders it and writes its outputs. Prints a progress bar and notes.
+/// Reads the scene file (or the field's; see read_scene), loads the scene, renders it and writes its outputs. Prints a
+/// progress bar and notes.
 /// @throw SceneError, std::invalid_argument, std::runtime_error, Cancelled.
 void render_scene(const std::filesystem::path& scene_file, const SceneChanges& changes, const RenderRun& run,
                   Progress& progress);
