@@ -4,6 +4,7 @@
 #include <cmath>
 #include <map>
 
+#include <Eigen/LU>
 #include <gtest/gtest.h>
 #include <tbb/global_control.h>
 
@@ -249,6 +250,50 @@ TEST(Lens, ARangeIsAContinuumOfWavelengths) {
       between += value > 0.05 && value < 0.95;
     }
     EXPECT_GT(between, 10);
+  }
+}
+
+/// Display values of smooth pictures are those of rays that are traced for each pixel, to within a step of 8 bits.
+TEST(Lens, PixelsHaveTheDisplayValueOfTheirRays) {
+  Image waves(256, 256, {"R", "G", "B"});
+  for (int y = 0; y < 256; ++y)
+    for (int x = 0; x < 256; ++x)
+      std::fill_n(waves.pixel(x, y), 3, static_cast<float>(0.5 + 0.2 * std::sin(0.2 * x) + 0.2 * std::cos(0.15 * y)));
+  const auto smooth = [](const Vector3d& at) -> Matrix3d {
+    Matrix3d T = Matrix3d::Zero();
+    T(0, 2) = std::sin(2 * at.x() + at.y());
+    T(1, 2) = std::cos(1.5 * at.y() - at.z());
+    T(2, 2) = 0.3 * at.x();
+    return T;
+  };
+  const Vector2i size(96, 96);
+  Bench bench(cube_field(33, smooth), plate_at(1.5, {1, 1}, size), {3, 3}, waves);
+  constexpr double s = 0.2;
+  const auto display = [](double radiance) { return std::pow(radiance, 1 / 2.4); };
+  for (const LensMode mode : modes) {
+    const LensPicture seen = bench.simulate(mode, s);
+    const bool back = mode == LensMode::gather;
+    const Plate &from = back ? bench.receiver : bench.image.plane, &to = back ? bench.image.plane : bench.receiver;
+    const LensMap map(bench.field, bench.surfaces, bench.bending, from, to, (back ? -1 : 1) * Vector3d::UnitZ());
+    double most = 0;
+    for (int y = 0; y < size.y(); ++y)
+      for (int x = 0; x < size.x(); ++x) {
+        const LensPoint& point = point_at(seen, x, y);
+        ASSERT_EQ(point.end, LensEnd::image);
+        const Vector2d at = plane_coordinates(bench.receiver, bench.receiver.to_world(Vector2d(x + 0.5, y + 0.5)));
+        Vector2d start = back ? at : Vector2d((point.st.array() - 0.5) * bench.image.plane.size.array());
+        LensLanding landing;
+        for (int i = 0; i < (back ? 1 : 4); ++i) {  // Newton's method finds the light that lands in the middle.
+          map.trace({start}, {back ? -s : s}, &landing);
+          ASSERT_EQ(landing.end, RayEnd::plate);
+          if (!back) start += landing.jacobian.inverse() * (at - landing.at);
+        }
+        const Vector2d st = ((back ? landing.at : start).array() / bench.image.plane.size.array() + 0.5).matrix();
+        const double expected = bench.texture.lookup(st, point.per_pixel)[0];
+        const double value = seen.radiance.plane(0)[static_cast<std::size_t>(y * size.x() + x)];
+        most = std::max(most, std::abs(display(value) - display(expected)));
+      }
+    EXPECT_LT(most, 1.0 / 255);
   }
 }
 
