@@ -46,6 +46,19 @@ Vector3d triangle_normal(const TriangleMesh& mesh, std::size_t triangle) {
   return (mesh.vertices[b] - mesh.vertices[a]).cross(mesh.vertices[c] - mesh.vertices[a]);
 }
 
+/// Distance along a ray to a triangle, if the ray meets it (Möller and Trumbore 1997).
+std::optional<double> distance_to(const TriangleMesh& mesh, std::size_t triangle, const Vector3d& origin,
+                                  const Vector3d& direction) {
+  const auto [a, b, c] = mesh.triangles[triangle];
+  const Vector3d ab = mesh.vertices[b] - mesh.vertices[a], ac = mesh.vertices[c] - mesh.vertices[a];
+  const Vector3d across = direction.cross(ac), from = origin - mesh.vertices[a], turned = from.cross(ab);
+  const double volume = ab.dot(across);
+  if (volume == 0) return std::nullopt;
+  const double u = from.dot(across) / volume, v = direction.dot(turned) / volume, distance = ac.dot(turned) / volume;
+  if (u < 0 || v < 0 || u + v > 1 || !(distance > 0)) return std::nullopt;
+  return distance;
+}
+
 Distribution1D triangles_by_area(const TriangleMesh& mesh) {
   std::vector<double> areas;
   for (std::size_t i = 0; i < mesh.triangles.size(); ++i) areas.push_back(triangle_normal(mesh, i).norm() / 2);
@@ -181,12 +194,12 @@ const std::vector<float>* LightSampler::emitted(int light, const Vector3d& norma
   return normal.dot(direction) < 0 ? &area.radiance : nullptr;
 }
 
-void LightSampler::background(const Vector3d& direction, std::vector<float>& radiance) const {
+void LightSampler::background(const Vector3d& direction, std::vector<float>& radiance, bool disks) const {
   radiance.assign(bands_, 0);
   for (std::size_t i = 0; i < lights_.size(); ++i) {
     if (!is_background(lights_[i])) continue;
     if (const auto* disk = std::get_if<DirectionalLight>(&lights_[i])) {
-      if (in_disk(*disk, direction)) add(radiance_per_irradiance(*disk), disk->irradiance, radiance);
+      if (disks && in_disk(*disk, direction)) add(radiance_per_irradiance(*disk), disk->irradiance, radiance);
     } else if (const auto* constant = std::get_if<ConstantLight>(&lights_[i])) {
       add(1, constant->radiance, radiance);
     } else {
@@ -200,6 +213,24 @@ double LightSampler::background_pdf(const Vector3d& direction) const {
   for (int i = 0; i < static_cast<int>(lights_.size()); ++i)
     if (is_background(lights_[i])) sum += choice_->probability(i) * directional_pdf(i, direction);
   return sum;
+}
+
+double LightSampler::direction_pdf(const Vector3d& point, const Vector3d& direction) const {
+  double sum = background_pdf(direction);
+  for (int i = 0; i < static_cast<int>(lights_.size()); ++i) {
+    const auto* area = std::get_if<AreaLight>(&lights_[i]);
+    if (!area) continue;
+    for (std::size_t t = 0; t < area->mesh.triangles.size(); ++t)
+      if (const auto distance = distance_to(area->mesh, t, point, direction))
+        sum += area_pdf(i, point, point + *distance * direction, triangle_normal(area->mesh, t).normalized());
+  }
+  return sum;
+}
+
+bool LightSampler::is_concentrated() const {
+  return std::any_of(lights_.begin(), lights_.end(), [](const Light& light) {
+    return std::holds_alternative<AreaLight>(light) || std::holds_alternative<EnvironmentLight>(light);
+  });
 }
 
 /// The density with which a background light, once chosen, chooses a direction.

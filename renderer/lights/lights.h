@@ -82,10 +82,19 @@ class LightSampler {
   const std::vector<float>* emitted(int light, const Eigen::Vector3d& normal, const Eigen::Vector3d& direction) const;
 
   /// Sets `radiance` to the background's in every band, seen along the unit `direction`.
-  void background(const Eigen::Vector3d& direction, std::vector<float>& radiance) const;
+  /// @param disks  Whether the disks of directional lights count.
+  void background(const Eigen::Vector3d& direction, std::vector<float>& radiance, bool disks = true) const;
 
   /// The density, per steradian, with which `sample` chooses the background in `direction`.
   double background_pdf(const Eigen::Vector3d& direction) const;
+
+  /// The density, per steradian, with which `sample` chooses `direction` from `point` in any way except delta lights:
+  /// the background's, and those of all area lights that a straight ray without obstacles meets.
+  double direction_pdf(const Eigen::Vector3d& point, const Eigen::Vector3d& direction) const;
+
+  /// Whether directions of this sampler find light that equally likely directions would hardly find: that of area lights
+  /// and of pictures. Disks do not count.
+  bool is_concentrated() const;
 
   const std::vector<Light>& lights() const { return lights_; }  ///< Environments here hold no pictures.
   double choice_probability(int light) const;

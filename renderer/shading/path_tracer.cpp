@@ -33,10 +33,16 @@ void require_valid(const Camera& camera, const PathTracerSettings& settings) {
           "min_samples must be >= 2 where there is a noise_threshold");
 }
 
-SurfacePicture empty_picture(int width, int height, int bands) {
+SurfacePicture empty_picture(int width, int height, const ShadedScene& scene) {
+  const int bands = static_cast<int>(scene.colors.bands());
   SurfacePicture picture;
   picture.radiance = Film(width, height, bands);
+  if (!scene.landed.empty()) picture.landed = Film(width, height, bands);
   const std::size_t size = picture.radiance.plane_size();
+  if (scene.region) {
+    picture.gain.assign(size, 1);
+    picture.deflection.assign(size, 0);
+  }
   for (auto* plane :
        {&picture.alpha, &picture.depth, &picture.force, &picture.arc_length, &picture.samples, &picture.variance})
     plane->assign(size, 0);
@@ -52,9 +58,17 @@ void extend_mean(Value& mean, int count, const Value& value) {
   mean += (value - mean) / static_cast<float>(count);
 }
 
+/// Sets the means of a pixel's bands after `samples` more of `count` samples.
+void extend_means(const BandValues& sum, int samples, double count, std::size_t index, Film& film) {
+  for (Eigen::Index band = 0; band < sum.size(); ++band) {
+    double& mean = film.plane(static_cast<int>(band))[index];
+    mean += (sum[band] - samples * mean) / count;
+  }
+}
+
 /// State of a pixel between passes that the picture does not hold.
 struct PixelState {
-  int samples = 0, hits = 0, force_hits = 0, length_hits = 0;
+  int samples = 0, hits = 0, force_hits = 0, length_hits = 0, bent = 0;
   bool done = false;
   double luminance = 0, squares = 0;  ///< Mean, and the sum of squared differences from it (Welford 1962).
   double nearest = std::numeric_limits<double>::infinity();  ///< Squared distance from the centre to the path hit.
@@ -68,14 +82,15 @@ class Rendering {
         camera_(camera),
         settings_(settings),
         callbacks_(callbacks),
-        picture_(empty_picture(camera.resolution.x(), camera.resolution.y(), static_cast<int>(scene.colors.bands()))),
+        picture_(empty_picture(camera.resolution.x(), camera.resolution.y(), scene)),
         pixels_(picture_.radiance.plane_size()) {}
 
   SurfacePicture run();
 
  private:
   void pass(int samples);
-  void render_pixel(int x, int y, int samples, RayShader& shader, BandValues& sum);
+  void render_pixel(int x, int y, int samples, RayShader& shader, BandValues& sum, BandValues& landed);
+  void add_bent_view(std::size_t index, const BentView& view);
   void add_surface(std::size_t index, const Vector2d& offset, const FirstSurface& surface, RayShader& shader);
   bool finish_pixels();
   bool is_precise(int x, int y, double floor) const;
@@ -108,19 +123,20 @@ void Rendering::pass(int samples) {
   const std::uint64_t total = pixels_.size() * static_cast<std::uint64_t>(settings_.max_samples);
   tbb::parallel_for(0, columns * rows, [&](int tile) {
     RayShader shader(scene_, settings_.shading);
-    BandValues sum(scene_.colors.bands());
+    BandValues sum(scene_.colors.bands()), landed(scene_.colors.bands());
     const int left = tile % columns * tile_size, top = tile / columns * tile_size;
     for (int y = top; y < std::min(top + tile_size, height); ++y)
-      for (int x = left; x < std::min(left + tile_size, width); ++x) render_pixel(x, y, samples, shader, sum);
+      for (int x = left; x < std::min(left + tile_size, width); ++x) render_pixel(x, y, samples, shader, sum, landed);
     if (callbacks_.progress && std::this_thread::get_id() == caller) callbacks_.progress(finished_samples_, total);
   });
 }
 
-void Rendering::render_pixel(int x, int y, int samples, RayShader& shader, BandValues& sum) {
+void Rendering::render_pixel(int x, int y, int samples, RayShader& shader, BandValues& sum, BandValues& landed) {
   const std::size_t index = static_cast<std::size_t>(y) * picture_.radiance.width + x;
   PixelState& pixel = pixels_[index];
   if (pixel.done) return;
   sum.setZero();
+  landed.setZero();
   for (int i = 0; i < samples; ++i) {
     PathSampler sampler{settings_.seed, index, static_cast<std::uint32_t>(pixel.samples), 0};
     const Vector2d offset = settings_.filter.sample(sampler.next_2d());
@@ -128,6 +144,8 @@ void Rendering::render_pixel(int x, int y, int samples, RayShader& shader, BandV
     const CameraRay ray = camera_ray(camera_, Vector2d(x + 0.5, y + 0.5) + offset, lens);
     const auto surface = shader.shade(ray.origin, ray.direction, !settings_.transparent, sampler);
     sum += shader.radiance();
+    if (!scene_.landed.empty()) landed += shader.landed();
+    if (shader.bent_view()) add_bent_view(index, *shader.bent_view());
     ++pixel.samples;
     const double luminance = scene_.colors.luminance(shader.radiance()), change = luminance - pixel.luminance;
     pixel.luminance += change / pixel.samples;
@@ -135,14 +153,18 @@ void Rendering::render_pixel(int x, int y, int samples, RayShader& shader, BandV
     if (surface) add_surface(index, offset, *surface, shader);
   }
   const double count = pixel.samples;
-  for (Eigen::Index band = 0; band < sum.size(); ++band) {
-    double& mean = picture_.radiance.plane(static_cast<int>(band))[index];
-    mean += (sum[band] - samples * mean) / count;
-  }
+  extend_means(sum, samples, count, index, picture_.radiance);
+  if (!scene_.landed.empty()) extend_means(landed, samples, count, index, picture_.landed);
   picture_.alpha[index] = settings_.transparent ? static_cast<float>(pixel.hits / count) : 1.0f;
   picture_.samples[index] = static_cast<float>(pixel.samples);
   picture_.variance[index] = pixel.samples > 1 ? static_cast<float>(pixel.squares / (count * (count - 1))) : 0.0f;
   finished_samples_ += static_cast<std::uint64_t>(samples);
+}
+
+void Rendering::add_bent_view(std::size_t index, const BentView& view) {
+  const int count = ++pixels_[index].bent;
+  extend_mean(picture_.gain[index], count, static_cast<float>(view.gain));
+  extend_mean(picture_.deflection[index], count, static_cast<float>(view.deflection));
 }
 
 void Rendering::add_surface(std::size_t index, const Vector2d& offset, const FirstSurface& surface, RayShader& shader) {

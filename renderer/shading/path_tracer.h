@@ -43,6 +43,9 @@ struct SurfacePicture {
   std::vector<Eigen::Vector3f> albedo;  ///< Working space: the reflectance; for metals, times Fresnel's reflectance.
   /// Means over the samples that hit a surface with this attribute; 0 where no sample did.
   std::vector<float> force, arc_length;
+  Film landed;  ///< The part of `radiance` that ShadedScene::landed has lit; empty if there is none.
+  /// If light bends: means over the samples that enter the region; 1 and 0 where none does. Otherwise empty.
+  std::vector<float> gain, deflection;  ///< See BentView.
   std::vector<float> path;      ///< Number of the path that was hit nearest to the pixel's centre; −1: none.
   std::vector<float> samples;   ///< Number of samples.
   std::vector<float> variance;  ///< Squared standard error of the pixel's luminance if samples were independent.

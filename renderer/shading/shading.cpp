@@ -16,6 +16,7 @@ using Eigen::Vector3d;
 /// First dimension of the sampler for shading; the camera uses those before.
 constexpr std::uint32_t first_dimension = 2;
 constexpr std::uint32_t dimensions_per_vertex = 5;
+constexpr std::uint32_t first_bent_dimension = 1u << 20;  ///< For wavelengths within their bands; one for each depth.
 
 /// Least cosine between the shading normal and the direction to the viewer. Interpolated normals can place the viewer
 /// below a surface that is seen from above.
@@ -59,6 +60,11 @@ void require_shadable(const ShadedScene& scene, const ShadingSettings& settings)
   }
   for (std::size_t i = 0; i < lights.size(); ++i)
     require(!is_area_light(i) || found.count(i), "light " + std::to_string(i) + " must have a surface of its mesh");
+  require(scene.bands_per_way >= 1 && scene.colors.bands() % scene.bands_per_way == 0,
+          "bands_per_way must divide the number of bands");
+  for (const LandedLight& light : scene.landed)
+    require(light.surface < scene.surfaces.surfaces().size() && light.bands == scene.colors.bands(),
+            "landed light must have a surface and the bands of the light");
 }
 
 /// A point where a path meets a surface. The frame is the material's: +z points outwards.
@@ -68,6 +74,7 @@ struct RayShader::Vertex {
   double side;     ///< 1: seen from outside, −1: from inside.
   Vector3d point;  ///< The point that is lit.
   Vector3d normal;
+  Vector3d direction;  ///< Of the ray that found it.
   Eigen::Matrix3d frame;
   Vector3d wo;
 
@@ -84,38 +91,48 @@ RayShader::RayShader(const ShadedScene& scene, const ShadingSettings& settings)
       throughput_(scene.colors.bands()),
       reflectance_(scene.colors.bands()),
       weight_(scene.colors.bands()),
-      contribution_(scene.colors.bands()) {}
+      contribution_(scene.colors.bands()),
+      landed_(scene.colors.bands()),
+      aims_bent_(scene.lights.is_concentrated()) {}
 
 std::optional<FirstSurface> RayShader::shade(const Vector3d& origin, const Vector3d& direction, bool show_background,
                                              PathSampler& sampler) {
   radiance_.setZero();
+  landed_.setZero();
   throughput_.setOnes();
+  bent_view_.reset();
+  band_ = -1;
   sampler.dimension = first_dimension;
   const std::optional<SurfaceHit> hit = scene_.surfaces.intersect(origin, direction);
+  if (bends(origin, direction, hit ? hit->distance : std::numeric_limits<double>::infinity()))
+    return shade_bent(origin, direction, 0, 1, show_background, sampler);
   if (!hit) {
     if (show_background) add_background(direction, 1, 0);
     return std::nullopt;
   }
+  if (settings_.shading == Shading::path) add_emission(*hit, direction, 1, 0);
   const Vertex vertex = make_vertex(*hit, direction);
+  shade_surface(vertex, 1, sampler);
+  return FirstSurface{*hit, vertex.normal};
+}
+
+/// @param depth  Number of surfaces that the path has met, with this one.
+void RayShader::shade_surface(const Vertex& vertex, int depth, PathSampler& sampler) {
   switch (settings_.shading) {
     case Shading::path:
-      add_emission(*hit, direction, 1, 0);
-      shade_path(vertex, sampler);
-      break;
+      return shade_path(vertex, depth, sampler);
     case Shading::ambient_occlusion:
-      shade_occlusion(vertex, sampler);
-      break;
+      return shade_occlusion(vertex, sampler);
     case Shading::headlight:
-      radiance_ = reflectance_ * -vertex.normal.dot(direction);
-      break;
+      radiance_ += throughput_ * (reflectance_ * -vertex.normal.dot(vertex.direction));
   }
-  return FirstSurface{*hit, vertex.normal};
 }
 
 /// Also sets `reflectance_`.
 RayShader::Vertex RayShader::make_vertex(const SurfaceHit& hit, const Vector3d& direction) {
   Vertex vertex;
   vertex.hit = hit;
+  vertex.direction = direction;
   vertex.material = &scene_.materials[scene_.surfaces.surfaces()[hit.surface].material];
   vertex.side = hit.normal.dot(direction) > 0 ? -1 : 1;
   vertex.point = is_glass(*vertex.material) ? hit.position : hit.lifted_position;
@@ -128,7 +145,7 @@ RayShader::Vertex RayShader::make_vertex(const SurfaceHit& hit, const Vector3d& 
 
 void RayShader::set_reflectance(const SurfaceHit& hit, BandValues& reflectance) const {
   const ShadedSurface& surface = scene_.surfaces.surfaces()[hit.surface];
-  if (surface.colors.empty())
+  if (surface.colors.empty() && !surface.texture)
     reflectance = scene_.materials[surface.material].reflectance;
   else
     scene_.colors.reflectance(hit.color, reflectance);
@@ -136,10 +153,11 @@ void RayShader::set_reflectance(const SurfaceHit& hit, BandValues& reflectance) 
 
 /// Directions below the geometric surface but above the shaded one are followed like all others, from the lifted point.
 /// They find the light that the surface itself does not block.
-void RayShader::shade_path(Vertex vertex, PathSampler& sampler) {
+void RayShader::shade_path(Vertex vertex, int depth, PathSampler& sampler) {
   double refraction = 1;
-  for (int depth = 1; depth <= settings_.max_depth; ++depth) {
+  for (; depth <= settings_.max_depth; ++depth) {
     sampler.dimension = first_dimension + dimensions_per_vertex * static_cast<std::uint32_t>(depth - 1);
+    if (!scene_.landed.empty()) add_landed_light(vertex, depth);
     add_direct_light(vertex, depth, sampler);
     const double lobe = sampler.next_1d();
     const Eigen::Vector2d place = sampler.next_2d();
@@ -154,7 +172,14 @@ void RayShader::shade_path(Vertex vertex, PathSampler& sampler) {
     }
 
     const Vector3d direction = vertex.frame * scattered->wi;
-    const auto hit = scene_.surfaces.intersect(vertex.start(scene_.surfaces, scattered->wi), direction);
+    const Vector3d start = vertex.start(scene_.surfaces, scattered->wi);
+    const auto hit = scene_.surfaces.intersect(start, direction);
+    if (bends(start, direction, hit ? hit->distance : std::numeric_limits<double>::infinity())) {
+      const auto light_pdf = [&] { return scene_.lights.direction_pdf(vertex.point, direction); };
+      const double weight = aims_bent_ ? material_weight(scattered->pdf, light_pdf) : 1;
+      shade_bent(start, direction, depth, weight, true, sampler);
+      return;
+    }
     if (!hit) {
       add_background(direction,
                      material_weight(scattered->pdf, [&] { return scene_.lights.background_pdf(direction); }), depth);
@@ -165,6 +190,128 @@ void RayShader::shade_path(Vertex vertex, PathSampler& sampler) {
       add_emission(*hit, direction, material_weight(scattered->pdf, light_pdf), depth);
     }
     if (depth < settings_.max_depth) vertex = make_vertex(*hit, direction);
+  }
+}
+
+/// Whether a ray enters the region before it meets something at `distance`.
+bool RayShader::bends(const Vector3d& origin, const Vector3d& direction, double distance) const {
+  return scene_.region && scene_.region->entry(origin, direction) < distance;
+}
+
+/// Follows a ray into the region, for the band of the path; for a path of all bands, for some of them, evenly spaced.
+/// Successive samples of a pixel take different bands.
+std::vector<BentWay> RayShader::follow_ways(const Vector3d& origin, const Vector3d& direction, int depth,
+                                            const PathSampler& sampler) const {
+  PathSampler places = sampler;
+  places.dimension = first_bent_dimension + static_cast<std::uint32_t>(depth);
+  BentWay way;
+  way.place = places.next_1d();
+  std::vector<BentWay> ways;
+  const int bands = static_cast<int>(throughput_.size()), parts = bands / scene_.bands_per_way;
+  const int first = static_cast<int>((sampler.pixel + sampler.sample) % static_cast<std::uint64_t>(parts));
+  for (int band = band_ < 0 ? first : band_; band < bands; band += band_ < 0 ? parts : bands) {
+    if (!(throughput_[band] > 0)) continue;
+    way.band = band;
+    ways.push_back(way);
+  }
+  scene_.region->follow_back(origin, direction, ways);
+  const double share = band_ < 0 ? parts : 1;  // Each way stands for the bands that are not followed.
+  for (BentWay& each : ways) each.gain *= share;
+  return ways;
+}
+
+/// The surface at the end of a way, if there is one.
+std::optional<SurfaceHit> RayShader::end_of(const BentWay& way) const {
+  constexpr double part = 1e-5;  // Of the scene: how far before the end the surface is looked for.
+  const double back = way.on_surface ? part * scene_.surfaces.bounds().diagonal().norm() : 0;
+  return scene_.surfaces.intersect(way.position - back * way.direction, way.direction);
+}
+
+/// Continues a path that enters the region as a path for each band.
+/// @param depth   Number of surfaces that the path has met.
+/// @param weight  Of the light that it meets next.
+/// @return the surface that the middle one of the bands meets.
+std::optional<FirstSurface> RayShader::shade_bent(const Vector3d& origin, const Vector3d& direction, int depth,
+                                                  double weight, bool show_background, PathSampler& sampler) {
+  const std::vector<BentWay> ways = follow_ways(origin, direction, depth, sampler);
+  const BandValues before = throughput_;
+  const int band_before = band_;
+  const double share = band_ < 0 ? static_cast<double>(throughput_.size()) / scene_.bands_per_way : 1;  // In gains.
+  const bool is_view = depth == 0;
+  std::optional<FirstSurface> seen;
+  BentView view{0, 0};
+  for (std::size_t i = 0; i < ways.size(); ++i) {
+    const BentWay& way = ways[i];
+    if (is_view && way.arrives) {
+      view.gain += way.gain / share / static_cast<double>(ways.size());
+      view.deflection += std::atan2(way.direction.cross(direction).norm(), way.direction.dot(direction)) /
+                         static_cast<double>(ways.size());
+    }
+    if (!way.arrives) continue;
+    band_ = way.band;
+    throughput_.setZero();
+    throughput_[way.band] = before[way.band] * way.gain;
+    const auto hit = end_of(way);
+    if (!hit) {
+      if (show_background) add_background(way.direction, weight, depth, is_view);
+      continue;
+    }
+    if (settings_.shading == Shading::path) add_emission(*hit, way.direction, weight, depth);
+    if (!is_view && depth == settings_.max_depth) continue;
+    const Vertex vertex = make_vertex(*hit, way.direction);
+    if (is_view && i <= ways.size() / 2) seen = FirstSurface{*hit, vertex.normal};
+    shade_surface(vertex, depth + 1, sampler);
+  }
+  throughput_ = before;
+  band_ = band_before;
+  if (is_view) bent_view_ = view;
+  return seen;
+}
+
+/// Follows the direction of `light_` through the region and adds the light that it meets, whatever that is: the density
+/// is that of the direction at the surface, so that bending does not change it. Needs f in `contribution_`.
+void RayShader::add_bent_light(const Vertex& vertex, const Vector3d& wi, const Vector3d& start, int depth,
+                               const PathSampler& sampler) {
+  if (!aims_bent_ || light_.is_delta) return;
+  const Vector3d& direction = light_.direction;
+  const double density = scene_.lights.direction_pdf(vertex.point, direction);
+  if (!(density > 0)) return;
+  if (scene_.surfaces.occluded(start, direction, scene_.region->entry(start, direction))) return;
+  double factor = std::abs(wi.z()) / density;
+  if (settings_.direct == DirectLight::both) {
+    const double ratio = pdf(*vertex.material, reflectance_, wi, vertex.wo) / density;
+    factor /= 1 + ratio * ratio;
+  }
+  const BandValues scattered = factor * contribution_ * throughput_;
+  for (const BentWay& way : follow_ways(start, direction, depth, sampler)) {
+    if (!way.arrives) continue;
+    const auto hit = end_of(way);
+    const std::vector<float>* found = nullptr;
+    if (!hit) {
+      scene_.lights.background(way.direction, background_, false);
+      found = &background_;
+    } else if (const int light = scene_.surfaces.surfaces()[hit->surface].light; light >= 0) {
+      found = scene_.lights.emitted(light, hit->normal, way.direction);
+    }
+    if (!found) continue;
+    contribution_.setZero();
+    contribution_[way.band] = scattered[way.band] * way.gain * (*found)[static_cast<std::size_t>(way.band)];
+    add(depth);
+  }
+}
+
+void RayShader::add_landed_light(const Vertex& vertex, int depth) {
+  for (const LandedLight& light : scene_.landed) {
+    if (light.surface != vertex.hit.surface) continue;
+    const bool from_above = light.plate.normal().dot(vertex.direction) < 0;
+    if (from_above != (light.side > 0)) continue;
+    evaluate(*vertex.material, reflectance_, vertex.frame.transpose() * light.towards, vertex.wo, contribution_);
+    weight_.setZero();
+    add_irradiance(light, vertex.hit.position, weight_);
+    contribution_ *= throughput_ * weight_;
+    if (!(contribution_.maxCoeff() > 0)) continue;
+    add(depth);
+    if (contribution_.allFinite()) landed_ += contribution_;
   }
 }
 
@@ -185,7 +332,10 @@ void RayShader::add_direct_light(const Vertex& vertex, int depth, PathSampler& s
   const Vector3d wi = vertex.frame.transpose() * light_.direction;
   evaluate(*vertex.material, reflectance_, wi, vertex.wo, contribution_);
   if (!(contribution_.maxCoeff() > 0)) return;
-  if (is_shadowed(vertex.start(scene_.surfaces, wi), vertex.point)) return;
+  const Vector3d start = vertex.start(scene_.surfaces, wi);
+  if (bends(start, light_.direction, light_.distance))
+    return add_bent_light(vertex, wi, start, depth, sampler);
+  if (is_shadowed(start, vertex.point)) return;
   double factor = std::abs(wi.z()) / light_.pdf;
   if (settings_.direct == DirectLight::both && !light_.is_delta) {
     const double ratio = pdf(*vertex.material, reflectance_, wi, vertex.wo) / light_.pdf;
@@ -205,9 +355,9 @@ bool RayShader::is_shadowed(const Vector3d& start, const Vector3d& point) const 
   return distance > 0 && scene_.surfaces.occluded(start, way / distance, distance);
 }
 
-void RayShader::add_background(const Vector3d& direction, double weight, int depth) {
+void RayShader::add_background(const Vector3d& direction, double weight, int depth, bool disks) {
   if (!(weight > 0)) return;
-  scene_.lights.background(direction, background_);
+  scene_.lights.background(direction, background_, disks);
   contribution_ = throughput_ * as_array(background_).cast<double>() * weight;
   add(depth);
 }
@@ -234,7 +384,8 @@ void RayShader::add(int depth) {
 void RayShader::shade_occlusion(const Vertex& vertex, PathSampler& sampler) {
   const Vector3d direction = frame_about(vertex.normal) * square_to_cosine_hemisphere(sampler.next_2d());
   const Vector3d start = scene_.surfaces.start(vertex.hit, vertex.hit.lifted_position, vertex.side);
-  if (!scene_.surfaces.occluded(start, direction, settings_.occlusion_distance)) radiance_ = reflectance_;
+  if (!scene_.surfaces.occluded(start, direction, settings_.occlusion_distance))
+    radiance_ += throughput_ * reflectance_;
 }
 
 Eigen::Vector3f RayShader::albedo(const SurfaceHit& hit) {

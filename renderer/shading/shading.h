@@ -13,6 +13,8 @@
 #include "renderer/materials/material.h"
 #include "renderer/materials/reflectance_table.h"
 #include "renderer/sampling/sampling.h"
+#include "renderer/shading/bending_region.h"
+#include "renderer/shading/landed_light.h"
 #include "renderer/surfaces/surface_scene.h"
 
 namespace tensorray {
@@ -51,6 +53,11 @@ struct ShadedScene {
   const std::vector<Material>& materials;  ///< ShadedSurface::material is an index into these.
   const LightSampler& lights;              ///< With the same bands as `colors`.
   const ReflectanceTable& colors;
+  /// Where light bends; null: it is straight everywhere. Light of directional lights that reaches surfaces through the
+  /// region is not looked for, except by rays that leave the camera: it is in `landed`.
+  const BendingRegion* region = nullptr;
+  int bands_per_way = 1;                 ///< Bands that a ray follows into the region; divides the number of bands.
+  std::vector<LandedLight> landed = {};  ///< Light that bends on its way to flat surfaces.
 };
 
 /// @throw std::invalid_argument if a setting is out of range; naming the surface if it has no material, or its light is
@@ -62,6 +69,12 @@ void require_shadable(const ShadedScene& scene, const ShadingSettings& settings)
 struct FirstSurface {
   SurfaceHit hit;
   Eigen::Vector3d normal = Eigen::Vector3d::Zero();  ///< As used for shading; towards the viewer.
+};
+
+/// What the region does to the light of a ray that leaves the camera; means over the bands that it follows.
+struct BentView {
+  double gain = 1;        ///< Of radiance.
+  double deflection = 0;  ///< Angle by which light turns, radians.
 };
 
 /// Follows rays. It reuses its memory: make one for each thread.
@@ -77,6 +90,11 @@ class RayShader {
 
   const BandValues& radiance() const { return radiance_; }
 
+  /// The part of `radiance()` that ShadedScene::landed has lit.
+  const BandValues& landed() const { return landed_; }
+
+  const std::optional<BentView>& bent_view() const { return bent_view_; }
+
   /// In the working space; the albedo that denoisers expect.
   Eigen::Vector3f albedo(const SurfaceHit& hit);
 
@@ -85,10 +103,20 @@ class RayShader {
 
   Vertex make_vertex(const SurfaceHit& hit, const Eigen::Vector3d& direction);
   void set_reflectance(const SurfaceHit& hit, BandValues& reflectance) const;
-  void shade_path(Vertex vertex, PathSampler& sampler);
+  void shade_surface(const Vertex& vertex, int depth, PathSampler& sampler);
+  void shade_path(Vertex vertex, int depth, PathSampler& sampler);
+  bool bends(const Eigen::Vector3d& origin, const Eigen::Vector3d& direction, double distance) const;
+  std::vector<BentWay> follow_ways(const Eigen::Vector3d& origin, const Eigen::Vector3d& direction, int depth,
+                                   const PathSampler& sampler) const;
+  std::optional<SurfaceHit> end_of(const BentWay& way) const;
+  std::optional<FirstSurface> shade_bent(const Eigen::Vector3d& origin, const Eigen::Vector3d& direction, int depth,
+                                         double weight, bool show_background, PathSampler& sampler);
+  void add_bent_light(const Vertex& vertex, const Eigen::Vector3d& wi, const Eigen::Vector3d& start, int depth,
+                      const PathSampler& sampler);
+  void add_landed_light(const Vertex& vertex, int depth);
   void add_direct_light(const Vertex& vertex, int depth, PathSampler& sampler);
   bool is_shadowed(const Eigen::Vector3d& start, const Eigen::Vector3d& point) const;
-  void add_background(const Eigen::Vector3d& direction, double weight, int depth);
+  void add_background(const Eigen::Vector3d& direction, double weight, int depth, bool disks = true);
   void add_emission(const SurfaceHit& hit, const Eigen::Vector3d& direction, double weight, int depth);
   template <class Density>
   double material_weight(double material_pdf, const Density& light_pdf) const;
@@ -98,8 +126,12 @@ class RayShader {
   const ShadedScene scene_;
   const ShadingSettings settings_;
   BandValues radiance_, throughput_, reflectance_, weight_, contribution_;
+  BandValues landed_;
   LightSample light_;
   std::vector<float> background_;
+  std::optional<BentView> bent_view_;
+  int band_ = -1;         ///< The only band of the path, after it was bent; −1: all bands.
+  bool aims_bent_ = true;  ///< Whether sampled lights are looked for through the region.
 };
 
 }  // namespace tensorray

@@ -3,12 +3,14 @@
 /// The surfaces that a picture shows, as plain data.
 
 #include <cstdint>
+#include <memory>
 #include <variant>
 #include <vector>
 
 #include <Eigen/Core>
 
 #include "base/triangle_mesh.h"
+#include "renderer/surfaces/surface_texture.h"
 
 namespace tensorray {
 
@@ -33,6 +35,7 @@ struct ShadedSurface {
   int light = -1;                        ///< Index of the AreaLight with this mesh, if the surface emits light.
 
   std::vector<Eigen::Vector3f> colors;   ///< For each point; working space, 0 to 1. Empty: the material's reflectance.
+  std::shared_ptr<const SurfaceTexture> texture;  ///< Colours of a flat surface, instead of `colors`; or null.
   std::vector<float> forces;             ///< For each point.
   std::vector<float> arc_lengths;        ///< For each point.
   std::vector<std::uint32_t> path_ends;  ///< Triangles up to the end of each path, as in TubeMesh. Empty: no paths.

@@ -354,7 +354,10 @@ std::optional<SurfaceHit> SurfaceScene::intersect(const Vector3d& origin, const 
     state.complete(std::get<RoundCurves>(surface.shape), hit);
   }
   hit.distance = (hit.position - origin).dot(direction);
-  if (!surface.colors.empty()) hit.color = state.corners(hit).mean(surface.colors);
+  if (surface.texture)
+    hit.color = color_at(*surface.texture, hit.position);
+  else if (!surface.colors.empty())
+    hit.color = state.corners(hit).mean(surface.colors);
   return hit;
 }
 

@@ -51,6 +51,15 @@ void check_lights(const SceneDescription& scene, const SceneSource& source) {
   }
 }
 
+void check_objects(const SceneDescription& scene, const SceneSource& source) {
+  for (std::size_t i = 0; i < scene.objects.size(); ++i) {
+    const ObjectDescription& object = scene.objects[i];
+    const auto* pattern = std::get_if<Pattern>(&object.texture);
+    if (!object.plate && !(pattern && *pattern == Pattern::none))
+      source.fail(fmt::format("`/objects/{}/texture`: only plates have textures; remove it", i));
+  }
+}
+
 /// Removes outputs that only another method can make, with a warning. @throw SceneError if no output is left.
 void drop_unmade_outputs(SceneDescription& scene, const SceneSource& source) {
   const Method& method = scene.integrator.method();
@@ -116,6 +125,7 @@ void check_scene(SceneDescription& scene, const Json& json, const SceneSource& s
   if (!scene.bending.rgb) check_wavelengths(scene.light, source);
   check_normal(scene.receiver.normal, "/receiver", scene.light, source);
   check_lights(scene, source);
+  check_objects(scene, source);
   check_receiver_memory(scene, 0, source);
   drop_unmade_outputs(scene, source);
   for (const auto& method : scene.integrator.methods)

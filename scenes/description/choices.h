@@ -50,6 +50,10 @@ inline auto choices(LightKind) {
                     C{"directional", LightKind::directional}, C{"area", LightKind::area}};
 }
 
+inline auto choices(Pattern) {
+  return std::array{Choice<Pattern>{"none", Pattern::none}, Choice<Pattern>{"checkerboard", Pattern::checkerboard}};
+}
+
 inline auto choices(Invariant) {
   using C = Choice<Invariant>;
   return std::array{C{"norm", Invariant::norm},

@@ -10,6 +10,7 @@
 #include <optional>
 #include <stdexcept>
 #include <string>
+#include <variant>
 #include <vector>
 
 #include <Eigen/Core>
@@ -18,6 +19,8 @@
 #include "integrators/bending/flexibility.h"
 #include "renderer/lights/beam.h"
 #include "renderer/shading/camera.h"
+#include "renderer/textures/test_images.h"
+#include "scenes/description/material_description.h"
 #include "scenes/description/method.h"
 #include "scenes/description/spectrum_description.h"
 #include "scenes/keys/generate_grid.h"
@@ -99,6 +102,25 @@ struct LightSourceDescription {
   double rotation = 0;                       ///< environment: rotation about +z, degrees.
 };
 
+/// A flat rectangle among the objects.
+struct PlateDescription {
+  Eigen::Vector3d center = Eigen::Vector3d::Zero();  ///< World.
+  Eigen::Vector3d normal{0, 0, 1};                   ///< Not zero, any length.
+  std::optional<Eigen::Vector3d> up;                 ///< Up axis of its texture; none: +z, or +y.
+  Eigen::Vector2d size{1, 1};                        ///< Width and height; > 0.
+};
+
+enum class Pattern { none, checkerboard };
+
+/// An item of `objects`: a plate or a mesh.
+struct ObjectDescription {
+  std::optional<PlateDescription> plate;
+  std::filesystem::path file;                                              ///< A mesh, if there is no plate.
+  std::variant<Pattern, std::filesystem::path> texture = Pattern::none;  ///< Of a plate; a pattern or a picture.
+  int squares = 16;  ///< checkerboard: along the shorter side.
+  MaterialDescription material;
+};
+
 /// `integrator`.
 struct IntegratorDescription {
   Word type;                                     ///< Name of the chosen method.
@@ -139,6 +161,7 @@ struct SceneDescription {
   IntegratorDescription integrator;
   CameraDescription camera;
   std::vector<LightSourceDescription> lights;  ///< Empty: a white sky and a lamp.
+  std::vector<ObjectDescription> objects;      ///< Empty: a floor.
   OutputDescription output;
   std::vector<std::string> warnings;  ///< Likely mistakes that are allowed; one line each.
 };

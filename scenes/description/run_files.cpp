@@ -18,6 +18,11 @@ std::vector<NamedFile> input_files(const SceneDescription& scene) {
     files.push_back({scene.obstacles[i], fmt::format("`/obstacles/{}/file`", i)});
   for (std::size_t i = 0; i < scene.lights.size(); ++i)
     files.push_back({scene.lights[i].file, fmt::format("`/lights/{}/file`", i)});
+  for (std::size_t i = 0; i < scene.objects.size(); ++i) {
+    files.push_back({scene.objects[i].file, fmt::format("`/objects/{}/file`", i)});
+    if (const auto* picture = std::get_if<std::filesystem::path>(&scene.objects[i].texture))
+      files.push_back({*picture, fmt::format("`/objects/{}/texture`", i)});
+  }
   for (const auto& method : scene.integrator.methods)
     for (NamedFile& file : method->inputs()) files.push_back(std::move(file));
   return files;

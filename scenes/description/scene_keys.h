@@ -134,6 +134,25 @@ void describe(LightSourceDescription& light, Visitor& visit) {
 }
 
 template <class Visitor>
+void describe(PlateDescription& plate, Visitor& visit) {
+  visit.require({"center"});
+  visit("center", plate.center, "middle of the plate, world");
+  visit("normal", plate.normal, "normal of the plate", not_zero());
+  visit("up", plate.up, "up axis of its texture; default: +z, or +y for a plate across z", not_zero());
+  visit("size", plate.size, "width and height, world units", above(0));
+}
+
+template <class Visitor>
+void describe(ObjectDescription& object, Visitor& visit) {
+  visit.exactly_one({"plate", "file"});
+  visit.section("plate", object.plate, "a flat rectangle");
+  visit("file", object.file, "a mesh");
+  visit("texture", object.texture, "of a plate: a pattern, or a picture whose colours are its reflectance");
+  visit("squares", object.squares, "checkerboard: squares along the shorter side", between(1, 4096));
+  visit.section("material", object.material, "material; the brighter squares of a checkerboard have its colour");
+}
+
+template <class Visitor>
 void describe(IntegratorDescription& integrator, Visitor& visit) {
   visit.require({"type"});
   visit("type", integrator.type, "the method");
@@ -179,9 +198,11 @@ void describe(SceneDescription& scene, Visitor& visit) {
              [](std::filesystem::path& file) { return ObstacleKeys{file}; });
   visit.section("receiver", scene.receiver, "the plate that collects light");
   visit.section("integrator", scene.integrator, "the method");
-  visit.section("camera", scene.camera, "path_tracing: the camera");
-  visit.list("lights", scene.lights, "path_tracing: lights that shine on the paths; default: a white sky and a lamp",
+  visit.section("camera", scene.camera, "path_tracing, scene: the camera");
+  visit.list("lights", scene.lights, "path_tracing, scene: lights; default: a white sky and a lamp, or a sky and the sun",
              [](LightSourceDescription& item) -> LightSourceDescription& { return item; });
+  visit.list("objects", scene.objects, "scene: what the light falls on; default: a checkerboard as floor",
+             [](ObjectDescription& item) -> ObjectDescription& { return item; });
   visit.section("output", scene.output, "files to write; default: the scene file's name with .png and .exr");
 }
 

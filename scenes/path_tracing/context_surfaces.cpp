@@ -197,7 +197,7 @@ void add_context(const Scene& scene, const PathScene& paths, const Progress& pro
                  std::vector<ShadedSurface>& surfaces, std::vector<Material>& materials) {
   const ContextDescription& context = paths.settings.context;
   const auto add_surface = [&](ShadedSurface surface, const MaterialDescription& material) {
-    add(paths.light, std::move(surface), material, surfaces, materials);
+    add(paths.lights.light, std::move(surface), material, surfaces, materials);
   };
   if (context.box) add_surface(box_edges(scene.field), plain(0.12, 1));
   if (context.obstacles)
@@ -207,7 +207,7 @@ void add_context(const Scene& scene, const PathScene& paths, const Progress& pro
       add_surface(std::move(surface), plain(0.6, 0.5));
     }
   if (context.plate) add_surface(lit_plate(scene, progress), plain(0.8, 1));
-  if (context.slice) add_surface(make_slice(scene, paths.light, *context.slice), plain(0.8, 1));
+  if (context.slice) add_surface(make_slice(scene, paths.lights.light, *context.slice), plain(0.8, 1));
   for (const IsosurfaceDescription& each : context.isosurfaces)
     add_surface(make_isosurface(scene, each), each.material);
 }

@@ -102,23 +102,6 @@ std::vector<PathSeed> seeds_of(const SeedList& list, const std::vector<LightChan
   return seeds;
 }
 
-/// Reads a picture and converts it to linear Rec. 709.
-Image load_rec709(const std::filesystem::path& file, const ColorManagement& color, const Eigen::Matrix3d& to_rec709) {
-  const NativeImage native = read_native_image(file);
-  const ColorConversion to_working =
-      color.to_working(color.texture_space(file, native.type != SampleType::float32, ""));
-  Image image(native.width, native.height, {"R", "G", "B"});
-  std::vector<float> row(4 * static_cast<std::size_t>(native.width));
-  for (int y = 0; y < native.height; ++y) {
-    read_pixels(native, 0, y, native.width, row.data());
-    if (to_working) to_working(row.data(), static_cast<std::size_t>(native.width));
-    for (int x = 0; x < native.width; ++x)
-      Eigen::Map<Eigen::Vector3f>(image.pixel(x, y)) =
-          to_rec709.cast<float>() * Eigen::Map<const Eigen::Vector3f>(&row[4 * static_cast<std::size_t>(x)]);
-  }
-  return image;
-}
-
 /// Gives each channel of the picture the spectrum of its primary of Rec. 709, which reflectances can have. Spectra add
 /// as colours do, so that every colour of the picture is then right.
 EnvironmentLight load_environment(const LightSourceDescription& description, const ColorManagement& color,
@@ -138,6 +121,31 @@ EnvironmentLight load_environment(const LightSourceDescription& description, con
 
 }  // namespace
 
+Image load_rec709(const std::filesystem::path& file, const ColorManagement& color, const Eigen::Matrix3d& to_rec709) {
+  const NativeImage native = read_native_image(file);
+  const ColorConversion to_working =
+      color.to_working(color.texture_space(file, native.type != SampleType::float32, ""));
+  Image image(native.width, native.height, {"R", "G", "B"});
+  std::vector<float> row(4 * static_cast<std::size_t>(native.width));
+  for (int y = 0; y < native.height; ++y) {
+    read_pixels(native, 0, y, native.width, row.data());
+    if (to_working) to_working(row.data(), static_cast<std::size_t>(native.width));
+    for (int x = 0; x < native.width; ++x)
+      Eigen::Map<Eigen::Vector3f>(image.pixel(x, y)) =
+          to_rec709.cast<float>() * Eigen::Map<const Eigen::Vector3f>(&row[4 * static_cast<std::size_t>(x)]);
+  }
+  return image;
+}
+
+ShownLights load_lights(const Scene& scene, int bands) {
+  const SceneDescription& description = scene.description;
+  ShownLights lights{shown_light(scene.color, load_spectrum(description.light.spectrum), bands), {}};
+  for (const LightSourceDescription& each : description.lights)
+    if (each.kind == LightKind::environment)
+      lights.environments.push_back(load_environment(each, scene.color, lights.light));
+  return lights;
+}
+
 std::vector<float> ShownLight::radiance(const Eigen::Vector3d& rec709, double factor) const {
   const ReflectanceSpectrum spectrum = model.spectrum(rec709_to_working * rec709);
   std::vector<float> values;
@@ -147,8 +155,7 @@ std::vector<float> ShownLight::radiance(const Eigen::Vector3d& rec709, double fa
 
 PathScene load_paths(const Scene& scene, const PathTracingDescription& settings) {
   const SceneDescription& description = scene.description;
-  const Spectrum spectrum = load_spectrum(description.light.spectrum);
-  PathScene paths{settings, {}, {}, shown_light(scene.color, spectrum, settings.bands), {}};
+  PathScene paths{settings, {}, {}, load_lights(scene, settings.bands)};
   if (!settings.paths.empty()) {
     paths.paths = read_paths(settings.paths);
   } else {
@@ -160,9 +167,6 @@ PathScene load_paths(const Scene& scene, const PathTracingDescription& settings)
       throw SceneError(fmt::format("{}: `/integrator/seeds`: {}", description.path.string(), error.what()));
     }
   }
-  for (const LightSourceDescription& each : description.lights)
-    if (each.kind == LightKind::environment)
-      paths.environments.push_back(load_environment(each, scene.color, paths.light));
   return paths;
 }
 

@@ -23,12 +23,24 @@ struct ShownLight {
   std::vector<float> radiance(const Eigen::Vector3d& rec709, double factor) const;
 };
 
+/// The lights that need loaded data.
+struct ShownLights {
+  ShownLight light;
+  std::vector<EnvironmentLight> environments;  ///< The environments among the scene's lights, in their order.
+};
+
+/// @param bands  Number of bands.
+/// @throw std::runtime_error naming the file that cannot be read.
+ShownLights load_lights(const Scene& scene, int bands);
+
+/// Reads a picture and converts it to linear Rec. 709. @throw std::runtime_error naming the file.
+Image load_rec709(const std::filesystem::path& file, const ColorManagement& color, const Eigen::Matrix3d& to_rec709);
+
 struct PathScene {
   PathTracingDescription settings;
   std::vector<PathSeed> seeds;
   std::vector<Path> paths;  ///< Paths that were read from a file; there are no seeds then.
-  ShownLight light;
-  std::vector<EnvironmentLight> environments;  ///< The environments among the scene's lights, in their order.
+  ShownLights lights;
 };
 
 /// @throw std::runtime_error naming the file that cannot be read; SceneError if a value of the scene does not fit the

@@ -15,6 +15,7 @@
 #include "renderer/shading/pixel_filter.h"
 #include "renderer/shading/shading.h"
 #include "renderer/surfaces/tube_mesh.h"
+#include "scenes/description/material_description.h"
 #include "volumes/tensors/invariants.h"
 
 namespace tensorray {
@@ -49,18 +50,6 @@ struct PathColorDescription {
   std::optional<Eigen::Vector2d> range;  ///< Values at the ends of the map; none: the 1st and 99th percentiles.
   bool logarithmic = false;
   bool legend = false;  ///< Whether a colour bar is drawn into the display-referred picture.
-};
-
-enum class MaterialKind { diffuse, principled, metal, glass };
-enum class Metal { gold, silver, copper, aluminium };
-
-struct MaterialDescription {
-  MaterialKind kind = MaterialKind::principled;
-  Eigen::Vector3d color{0.7, 0.7, 0.7};  ///< Used if the surface has no colours of its own; linear Rec. 709.
-  double roughness = 0.4;
-  double metallic = 0, specular = 0.5, clearcoat = 0;  ///< principled.
-  Metal metal = Metal::gold;                           ///< metal.
-  double index = 1.5;                                  ///< glass: index of refraction.
 };
 
 struct SliceDescription {

@@ -37,18 +37,6 @@ inline auto choices(PathColor) {
                     C{"invariant", PathColor::invariant},   C{"none", PathColor::none}};
 }
 
-inline auto choices(MaterialKind) {
-  using C = Choice<MaterialKind>;
-  return std::array{C{"diffuse", MaterialKind::diffuse}, C{"principled", MaterialKind::principled},
-                    C{"metal", MaterialKind::metal}, C{"glass", MaterialKind::glass}};
-}
-
-inline auto choices(Metal) {
-  using C = Choice<Metal>;
-  return std::array{C{"gold", Metal::gold}, C{"silver", Metal::silver}, C{"copper", Metal::copper},
-                    C{"aluminium", Metal::aluminium}};
-}
-
 inline auto choices(Shading) {
   using C = Choice<Shading>;
   return std::array{C{"path", Shading::path}, C{"ambient_occlusion", Shading::ambient_occlusion},
@@ -104,23 +92,6 @@ void describe(PathColorDescription& color, Visitor& visit) {
   visit("range", color.range, "values at the ends of the map; default: the 1st and the 99th percentile");
   visit("logarithmic", color.logarithmic, "logarithmic colour scale");
   visit("legend", color.legend, "draw a colour bar into output.image");
-}
-
-template <class Visitor>
-void describe(MaterialDescription& material, Visitor& visit) {
-  visit("kind", material.kind, "kind of material");
-  visit("color", material.color, "colour of a surface without colours of its own, linear Rec. 709", between(0, 1));
-  visit("roughness", material.roughness, "roughness: 0 polished, 1 matt (not diffuse)", between(0, 1));
-  visit("metallic", material.metallic, "principled: share of metal: 0 plastic, 1 metal", between(0, 1));
-  visit("specular", material.specular, "principled: reflection of plastic, 0.5 is 4 %", between(0, 1));
-  visit("clearcoat", material.clearcoat, "principled: strength of the clear coat", between(0, 1));
-  visit("metal", material.metal, "metal: its kind");
-  visit("index", material.index, "glass: index of refraction", between(1.01, 5));
-  visit.only_for({"roughness"}, "kind", material.kind,
-                 {MaterialKind::principled, MaterialKind::metal, MaterialKind::glass});
-  visit.only_for({"metallic", "specular", "clearcoat"}, "kind", material.kind, {MaterialKind::principled});
-  visit.only_for({"metal"}, "kind", material.kind, {MaterialKind::metal});
-  visit.only_for({"index"}, "kind", material.kind, {MaterialKind::glass});
 }
 
 template <class Visitor>

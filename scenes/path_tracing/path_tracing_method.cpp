@@ -15,6 +15,7 @@
 #include "scenes/path_tracing/path_colors.h"
 #include "scenes/path_tracing/path_surfaces.h"
 #include "scenes/path_tracing/path_tracing_keys.h"
+#include "scenes/path_tracing/stage.h"
 #include "scenes/path_tracing/studio.h"
 
 namespace tensorray {
@@ -22,7 +23,6 @@ namespace {
 
 constexpr double most_radii = 2e5;  // Rays start 5e-7 diagonals away from a surface, which is then a tenth of a radius.
 constexpr double legend_width = 0.2;    // Part of the picture's width that a chosen camera leaves free.
-constexpr float nothing_depth = 1e10f;  // Depth of pixels that show nothing: behind everything.
 constexpr double tube_tolerance = 0.2;  // Pixels: greatest distance of a tube's triangles from its surface.
 
 /// Counts paths by channel and end. Paths of a file may have a flexibility that no channel of the scene has: they count
@@ -97,7 +97,7 @@ PathShapes make_shapes(const Scene& scene, const PathScene& path_scene, const st
   const PathTracingDescription& description = path_scene.settings;
   const double typical = typical_radius(description.radius, paths.size(), world_box(scene.field));
   const double pixel = pixel_size(camera, camera.position + near_depth(paths, camera) * camera.forward);
-  const Eigen::Matrix3d& to_working = path_scene.light.rec709_to_working;
+  const Eigen::Matrix3d& to_working = path_scene.lights.light.rec709_to_working;
   PathShapes shapes;
   TubeMesh mesh;
   const bool writes = scene.description.output.wants("tubes");
@@ -116,66 +116,6 @@ Camera scene_camera(const Scene& scene, const ContextDescription& context, const
     return make_camera(scene.description.camera, points_of_interest(scene, context, paths), free);
   } catch (const std::invalid_argument& error) {
     throw SceneError(fmt::format("{}: `/camera`: {}", scene.description.path.string(), error.what()));
-  }
-}
-
-PathTracerSettings tracer_settings(const SceneDescription& scene, const PathTracingDescription& description) {
-  PathTracerSettings settings;
-  settings.shading.shading = description.shading;
-  settings.shading.max_depth = description.max_depth;
-  double strength = scene.lights.empty() ? 1 : 0;
-  for (const LightSourceDescription& light : scene.lights) strength = std::max(strength, light.strength);
-  settings.shading.indirect_clamp *= strength;  // The clamp removes fireflies, and must not darken bright lights.
-  settings.filter = PixelFilter(description.filter);
-  settings.transparent = description.background != Background::lights;
-  settings.min_samples = std::min(description.min_samples, description.samples);
-  settings.max_samples = description.samples;
-  settings.pass_samples = std::max(1, settings.min_samples);
-  settings.noise_threshold = settings.min_samples < 2 ? 0 : description.noise;
-  settings.seed = scene.seed;
-  return settings;
-}
-
-/// R, G, B, A, and the channels that denoisers and compositors use.
-Image make_image(const SurfacePicture& picture, const ShownLight& light, const PathTracingDescription& description) {
-  const Image colors = linear_image(picture.radiance, light.bands, light.xyz_to_working);
-  Image image(colors.width, colors.height,
-              {"R", "G", "B", "A", "Z", "normal.X", "normal.Y", "normal.Z", "albedo.R", "albedo.G", "albedo.B", "path",
-               "force", "length", "samples", "variance"});
-  const Eigen::Vector3d background = description.background == Background::color
-                                         ? Eigen::Vector3d(light.rec709_to_working * description.background_color)
-                                         : Eigen::Vector3d::Zero();
-  for (std::size_t i = 0; i < picture.alpha.size(); ++i) {
-    float* out = &image.pixels[i * image.channels.size()];
-    const float alpha = picture.alpha[i];
-    for (int c = 0; c < 3; ++c)
-      *out++ = colors.pixels[3 * i + static_cast<std::size_t>(c)] + (1 - alpha) * static_cast<float>(background[c]);
-    *out++ = description.background == Background::color ? 1 : alpha;
-    *out++ = alpha > 0 ? picture.depth[i] : nothing_depth;
-    for (int c = 0; c < 3; ++c) *out++ = picture.normal[i][c];
-    for (int c = 0; c < 3; ++c) *out++ = picture.albedo[i][c];
-    for (const float value :
-         {picture.path[i], picture.force[i], picture.arc_length[i], picture.samples[i], picture.variance[i]})
-      *out++ = value;
-  }
-  return image;
-}
-
-/// Adds the area lights as surfaces, so that they are visible.
-void add_lamps(const std::vector<Light>& lights, const ShownLight& light, std::vector<ShadedSurface>& surfaces,
-               std::vector<Material>& materials) {
-  for (std::size_t i = 0; i < lights.size(); ++i) {
-    const auto* area = std::get_if<AreaLight>(&lights[i]);
-    if (!area) continue;
-    MaterialDescription black;
-    black.kind = MaterialKind::diffuse;
-    black.color.setZero();
-    ShadedSurface surface;
-    surface.shape = area->mesh;
-    surface.light = static_cast<int>(i);
-    surface.material = static_cast<int>(materials.size());
-    materials.push_back(load_material(black, light));
-    surfaces.push_back(std::move(surface));
   }
 }
 
@@ -204,11 +144,11 @@ class LoadedPaths : public LoadedMethod {
 /// Renders the paths, their context and the lamps.
 SurfacePicture render_stage(const Scene& scene, const PathScene& path_scene, const std::vector<Path>& paths,
                             ShadedSurface path_surface, const Camera& camera, const Progress& progress) {
-  const ShownLight& light = path_scene.light;
+  const ShownLight& light = path_scene.lights.light;
   std::vector<Material> materials{load_material(path_scene.settings.material, light)};
   std::vector<ShadedSurface> surfaces{std::move(path_surface)};
   add_context(scene, path_scene, progress, surfaces, materials);
-  const std::vector<Light> lights = make_lights(scene.description, path_scene, camera);
+  const std::vector<Light> lights = make_lights(scene.description, path_scene.lights, camera);
   add_lamps(lights, light, surfaces, materials);
   const SurfaceScene stage(std::move(surfaces));
   require_fine(scene, path_scene.settings.radius, stage, paths);
@@ -224,7 +164,7 @@ SurfacePicture render_stage(const Scene& scene, const PathScene& path_scene, con
 
 Render LoadedPaths::render(const Scene& scene, const Progress& progress) const {
   const PathTracingDescription& description = paths_.settings;
-  const ShownLight& light = paths_.light;
+  const ShownLight& light = paths_.lights.light;
   const auto start = Clock::now();
   Render result;
   result.paths = trace_scene(scene, paths_, progress, result.statistics);

@@ -75,23 +75,23 @@ Camera make_camera(const CameraDescription& description, const std::vector<Eigen
   return with_lens(orthographic_camera(*description.position, target, up, height, description.resolution), description);
 }
 
-std::vector<Light> make_lights(const SceneDescription& description, const PathScene& paths, const Camera& camera) {
+std::vector<Light> make_lights(const SceneDescription& description, const ShownLights& shown, const Camera& camera) {
   if (description.lights.empty()) {
     const Eigen::Vector3d white = Eigen::Vector3d::Ones();
     DirectionalLight key;
     key.direction = camera.forward + 0.6 * camera.right - 0.9 * camera.up;
-    key.irradiance = paths.light.radiance(white, pi * lamp);
+    key.irradiance = shown.light.radiance(white, pi * lamp);
     key.angle = lamp_degrees / 2 * pi / 180;
-    return {ConstantLight{paths.light.radiance(white, sky)}, key};
+    return {ConstantLight{shown.light.radiance(white, sky)}, key};
   }
   std::vector<Light> lights;
   std::size_t environments = 0;
   for (std::size_t i = 0; i < description.lights.size(); ++i) {
     const LightSourceDescription& light = description.lights[i];
     if (light.kind == LightKind::environment)
-      lights.emplace_back(paths.environments[environments++]);
+      lights.emplace_back(shown.environments[environments++]);
     else
-      lights.push_back(make_light(light, paths.light));
+      lights.push_back(make_light(light, shown.light));
   }
   return lights;
 }

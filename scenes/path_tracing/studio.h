@@ -19,6 +19,6 @@ namespace tensorray {
 Camera make_camera(const CameraDescription& description, const std::vector<Eigen::Vector3d>& points, double free);
 
 /// The lights of the scene; if it has none, a white sky and a lamp at the viewer's upper left.
-std::vector<Light> make_lights(const SceneDescription& description, const PathScene& paths, const Camera& camera);
+std::vector<Light> make_lights(const SceneDescription& description, const ShownLights& shown, const Camera& camera);
 
 }  // namespace tensorray

@@ -50,6 +50,7 @@ const std::vector<Room> rooms{
     {"integrators/lens", {"integrators/bending", "integrators/flow", "renderer/*", "volumes/*"}},
     {"integrators/paths", {"integrators/bending", "renderer/*", "volumes/*"}},
     {"integrators/photons", {"integrators/bending", "renderer/*", "volumes/*"}},
+    {"integrators/view", {"integrators/bending", "renderer/*", "volumes/*"}},
     {"integrators/probes", {"integrators/bending", "renderer/*", "volumes/*"}},
 
     {"scenes/keys", {"integrators/*", "renderer/*", "volumes/*"}},
@@ -69,8 +70,11 @@ const std::vector<Room> rooms{
     {"scenes/path_tracing",
      {"scenes/photons", "scenes/outputs", "scenes/scene", "scenes/description", "scenes/keys", "integrators/*",
       "renderer/*", "volumes/*"}},
+    {"scenes/whole",
+     {"scenes/path_tracing", "scenes/outputs", "scenes/scene", "scenes/description", "scenes/keys", "integrators/*",
+      "renderer/*", "volumes/*"}},
     {"scenes/pipeline",
-     {"scenes/photons", "scenes/lens", "scenes/stretch", "scenes/path_tracing", "scenes/description", "scenes/keys",
+     {"scenes/photons", "scenes/lens", "scenes/stretch", "scenes/path_tracing", "scenes/whole", "scenes/description", "scenes/keys",
       "integrators/*", "renderer/*", "volumes/*"}},
 
     {"tools/command_line", {}},

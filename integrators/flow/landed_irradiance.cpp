@@ -1,0 +1,136 @@
+#include "integrators/flow/landed_irradiance.h"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "base/constants.h"
+#include "integrators/flow/caustic.h"
+#include "integrators/flow/flow_map.h"
+#include "renderer/lights/beam.h"
+
+namespace tensorray {
+namespace {
+
+using Eigen::Vector2d;
+using Eigen::Vector3d;
+
+constexpr int landing_probes = 96;          // Rays along each side of the aperture that find where light lands.
+constexpr double landing_margin = 0.02;     // Of the part where light lands, on each side.
+constexpr double landing_tolerance = 0.25;  // Pixels.
+
+/// Direction `pass` of a disk: the points of a spiral, each with the same part of the disk (Vogel 1979).
+Vector3d disk_direction(const DistantLight& light, int pass) {
+  if (light.angle == 0 || light.passes == 1) return light.direction;
+  const double golden = pi * (3 - std::sqrt(5.0));
+  const double radius = std::sin(light.angle) * std::sqrt((pass + 0.5) / light.passes);
+  const Vector3d up = upright(light.direction, Vector3d::UnitZ()), right = up.cross(light.direction);
+  return (light.direction + radius * (std::cos(pass * golden) * right + std::sin(pass * golden) * up)).normalized();
+}
+
+/// The silhouette of the volume; light starts before all surfaces.
+Beam beam_of(const TensorField& field, const Surfaces& surfaces, const Plate& plate, const Vector3d& direction) {
+  Beam beam = silhouette_beam(field.corners(), direction, Vector3d::UnitZ());
+  const auto start_before = [&](const std::vector<Vector3d>& points) {
+    for (const Vector3d& point : points)
+      beam.center += std::min(0.0, (point - beam.center).dot(direction) - 1e-3 * plate.size.norm()) * direction;
+  };
+  for (const TriangleMesh& mesh : surfaces.obstacles) start_before(mesh.vertices);
+  start_before(plate.corners());
+  return beam;
+}
+
+/// The box, in pixels of `plate`, in which light of the two ends of the spectrum lands.
+Eigen::AlignedBox2d landing_box(const TensorField& field, const Geometry& geometry, const Plate& plate,
+                                const Beam& beam, const BendingSettings& bending, const DistantLight& light) {
+  Eigen::AlignedBox2d aperture, landings;
+  for (const Vector2d& corner : beam.aperture) aperture.extend(corner);
+  const auto whole = plate.resolution.cast<double>();
+  for (int y = 0; y < landing_probes; ++y) {
+    RayBatch rays;
+    for (int x = 0; x < landing_probes; ++x) {
+      const Vector2d at = aperture.min().array() + aperture.sizes().array() * Eigen::Array2d(x + 0.5, y + 0.5) / landing_probes;
+      for (const double flexibility : {light.flexibilities.front(), light.flexibilities.back()})
+        rays.add(beam.center + at.x() * beam.right + at.y() * beam.up, beam.direction, flexibility);
+    }
+    trace(field, geometry, bending, rays);
+    for (std::size_t i = 0; i < rays.size(); ++i)
+      if (rays.end[i] == RayEnd::plate)
+        landings.extend(Vector2d(plate.to_pixel(rays.position[i]).cwiseMax(0).cwiseMin(whole)));
+  }
+  return landings;
+}
+
+/// A part of a plate. @param box  In pixels of the plate.
+Plate part_of(const Plate& plate, Eigen::AlignedBox2d box, int resolution) {
+  const Vector2d whole = plate.resolution.cast<double>(), more = (landing_margin * box.sizes()).cwiseMax(1e-3 * whole);
+  box = {(box.min() - more).cwiseMax(0), (box.max() + more).cwiseMin(whole)};
+  Plate part = plate;
+  part.center = plate.to_world(box.center());
+  part.size = box.sizes().cwiseProduct(plate.pixel_size());
+  part.resolution = (resolution * part.size / part.size.maxCoeff()).array().ceil().max(1).cast<int>();
+  return part;
+}
+
+/// The flexibilities of the light, as a range if there is one.
+FlowSettings flow_settings(const DistantLight& light, std::size_t rays) {
+  const auto [least, greatest] = std::minmax_element(light.flexibilities.begin(), light.flexibilities.end());
+  FlowSettings settings;
+  settings.range = *least < *greatest;
+  settings.flexibilities = settings.range ? std::vector<double>{*least, *greatest} : std::vector<double>{*least};
+  settings.tolerance = landing_tolerance;
+  settings.most_starts = rays;
+  return settings;
+}
+
+std::vector<CausticBand> bands_of(const DistantLight& light, const FlowMap& map, const FlowSettings& settings) {
+  const double least = settings.flexibilities.front(), whole = settings.flexibilities.back() - least;
+  const double last = static_cast<double>(map.nodes - 1);
+  const auto node = [&](double flexibility) { return settings.range ? last * (flexibility - least) / whole : 0; };
+  std::vector<CausticBand> bands;
+  for (std::size_t i = 0; i + 1 < light.flexibilities.size(); ++i) {
+    const double a = node(light.flexibilities[i]), b = node(light.flexibilities[i + 1]);
+    CausticBand band;
+    band.node = (a + b) / 2;
+    band.width = std::abs(b - a);
+    band.channel = i;
+    bands.push_back(band);
+  }
+  return bands;
+}
+
+}  // namespace
+
+std::optional<LandedIrradiance> landed_irradiance(const TensorField& field, const Surfaces& surfaces,
+                                                  const Plate& plate, const DistantLight& light,
+                                                  const BendingSettings& bending, int resolution, std::size_t rays,
+                                                  const Progress& progress) {
+  Surfaces parts = surfaces;
+  parts.plate = plate;
+  const Geometry geometry(std::move(parts));
+  Eigen::AlignedBox2d box;
+  for (int pass = 0; pass < light.passes; ++pass) {
+    const Beam beam = beam_of(field, surfaces, plate, disk_direction(light, pass));
+    box.extend(landing_box(field, geometry, plate, beam, bending, light));
+  }
+  if (box.isEmpty()) return std::nullopt;
+  LandedIrradiance result;
+  result.plate = part_of(plate, box, resolution);
+  const FlowSettings settings = flow_settings(light, rays);
+  const std::size_t channels = light.flexibilities.size() - 1;
+  for (int pass = 0; pass < light.passes; ++pass) {
+    const Beam beam = beam_of(field, surfaces, plate, disk_direction(light, pass));
+    const FlowMap map = trace_flow_map(field, geometry, result.plate, beam, bending, settings, progress);
+    Caustic caustic =
+        draw_caustic(map, result.plate, bands_of(light, map, settings), channels, true, progress);
+    if (pass == 0)
+      result.irradiance = std::move(caustic.irradiance);
+    else
+      for (std::size_t i = 0; i < result.irradiance.values.size(); ++i)
+        result.irradiance.values[i] += caustic.irradiance.values[i];
+  }
+  for (double& value : result.irradiance.values) value /= light.passes;
+  return result;
+}
+
+}  // namespace tensorray

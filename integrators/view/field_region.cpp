@@ -1,0 +1,75 @@
+#include "integrators/view/field_region.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <utility>
+
+#include "integrators/bending/radiance_change.h"
+
+namespace tensorray {
+namespace {
+
+using Eigen::Vector3d;
+
+/// The memory of one thread's calls.
+struct Ways {
+  RayBatch rays;
+  std::vector<Track> tracks;
+};
+
+}  // namespace
+
+FieldRegion::FieldRegion(const TensorField& field, const Geometry& geometry, FieldViewSettings settings)
+    : field_(field),
+      geometry_(geometry),
+      settings_(std::move(settings)),
+      rounding_(1e-9 * field.world_box().diagonal().norm()) {}
+
+/// Clips the ray against the box in index space, where its parameter stays the distance in the world.
+double FieldRegion::entry(const Vector3d& origin, const Vector3d& direction) const {
+  const Eigen::AlignedBox3d& box = field_.index_bounds();
+  const Vector3d from = field_.to_index() * origin, along = field_.to_index().linear() * direction;
+  constexpr double infinite = std::numeric_limits<double>::infinity();
+  double enters = 0, leaves = infinite;
+  for (int axis = 0; axis < 3; ++axis) {
+    if (along[axis] == 0) {
+      if (from[axis] < box.min()[axis] || from[axis] > box.max()[axis]) return infinite;
+      continue;
+    }
+    const double a = (box.min()[axis] - from[axis]) / along[axis], b = (box.max()[axis] - from[axis]) / along[axis];
+    enters = std::max(enters, std::min(a, b));
+    leaves = std::min(leaves, std::max(a, b));
+  }
+  return leaves - enters > rounding_ ? enters : infinite;
+}
+
+void FieldRegion::follow_back(const Vector3d& origin, const Vector3d& direction, std::vector<BentWay>& ways) const {
+  Ways memory;
+  RayBatch& rays = memory.rays;
+  for (const BentWay& way : ways) rays.add(origin, direction, -settings_.flexibility(way.band, way.place));
+  const bool gains = settings_.conserve == Conserve::power;
+  if (gains)
+    trace(field_, geometry_, settings_.bending, rays, memory.tracks);
+  else
+    trace(field_, geometry_, settings_.bending, rays);
+  for (std::size_t i = 0; i < ways.size(); ++i) {
+    BentWay& way = ways[i];
+    const RayEnd end = rays.end[i];
+    ++ends_[static_cast<std::size_t>(end)];
+    way.position = rays.position[i];
+    way.direction = rays.direction[i];
+    way.arrives = end == RayEnd::missed || end == RayEnd::obstacle;
+    way.on_surface = end == RayEnd::obstacle;
+    if (!gains || !way.arrives) continue;
+    const double strength = rays.flexibility[i] * settings_.bending.scale;
+    way.gain = std::exp(log_radiance_change(field_, geometry_, memory.tracks[i], strength));
+    if (settings_.most_gain > 0 && !(way.gain <= settings_.most_gain)) {
+      way.gain = settings_.most_gain;
+      ++limited_;
+    }
+    way.arrives = std::isfinite(way.gain);
+  }
+}
+
+}  // namespace tensorray

@@ -1,0 +1,53 @@
+#pragma once
+/// @file integrators/view/field_region.h
+/// A tensor field as the viewer of a scene sees through it: light is followed backwards, which is Eq. 5 with −s.
+
+#include <array>
+#include <atomic>
+#include <cstdint>
+#include <functional>
+
+#include "integrators/bending/bending.h"
+#include "renderer/shading/bending_region.h"
+
+namespace tensorray {
+
+/// What light keeps on its way through the field. Both are consistent, and differ in what they call physical.
+enum class Conserve {
+  power,     ///< A photon's power, as on the plates of this project: radiance changes by radiance_change.h.
+  radiance,  ///< Radiance, as in the lens of this project: a photon's power changes instead.
+};
+
+struct FieldViewSettings {
+  BendingSettings bending;  ///< With the scale of the field.
+  Conserve conserve = Conserve::power;
+  double most_gain = 0;  ///< Greatest factor on radiance, > 0, or 0: no limit. The limit loses light and is counted.
+  /// Flexibility of the light at a place, 0 to 1, within a band. Any thread may call it.
+  std::function<double(int band, double place)> flexibility;
+};
+
+/// Field and geometry must outlive it.
+class FieldRegion final : public BendingRegion {
+ public:
+  /// @param geometry  Bounds, cut, and all obstacles that lie in the volume. Ways end on them; those that leave the
+  ///                  volume may end on obstacles outside it, too.
+  FieldRegion(const TensorField& field, const Geometry& geometry, FieldViewSettings settings);
+
+  double entry(const Eigen::Vector3d& origin, const Eigen::Vector3d& direction) const override;
+  void follow_back(const Eigen::Vector3d& origin, const Eigen::Vector3d& direction,
+                   std::vector<BentWay>& ways) const override;
+
+  /// Ways so far, by their end; those that were limited.
+  std::uint64_t ways(RayEnd end) const { return ends_[static_cast<std::size_t>(end)]; }
+  std::uint64_t limited() const { return limited_; }
+
+ private:
+  const TensorField& field_;
+  const Geometry& geometry_;
+  FieldViewSettings settings_;
+  double rounding_;  ///< World units.
+  mutable std::array<std::atomic<std::uint64_t>, ray_end_count> ends_{};
+  mutable std::atomic<std::uint64_t> limited_{0};
+};
+
+}  // namespace tensorray

@@ -1,0 +1,87 @@
+#include "scenes/path_tracing/stage.h"
+
+#include <algorithm>
+#include <utility>
+
+#include "scenes/path_tracing/context_surfaces.h"
+
+namespace tensorray {
+namespace {
+
+constexpr float nothing_depth = 1e10f;  // Depth of pixels that show nothing: behind everything.
+
+}  // namespace
+
+PathTracerSettings tracer_settings(const SceneDescription& scene, const PathTracingDescription& description) {
+  PathTracerSettings settings;
+  settings.shading.shading = description.shading;
+  settings.shading.max_depth = description.max_depth;
+  double strength = scene.lights.empty() ? 1 : 0;
+  for (const LightSourceDescription& light : scene.lights) strength = std::max(strength, light.strength);
+  settings.shading.indirect_clamp *= strength;  // The clamp removes fireflies, and must not darken bright lights.
+  settings.filter = PixelFilter(description.filter);
+  settings.transparent = description.background != Background::lights;
+  settings.min_samples = std::min(description.min_samples, description.samples);
+  settings.max_samples = description.samples;
+  settings.pass_samples = std::max(1, settings.min_samples);
+  settings.noise_threshold = settings.min_samples < 2 ? 0 : description.noise;
+  settings.seed = scene.seed;
+  return settings;
+}
+
+Image make_image(const SurfacePicture& picture, const ShownLight& light, const PathTracingDescription& description) {
+  const Image colors = linear_image(picture.radiance, light.bands, light.xyz_to_working);
+  std::vector<std::string> channels{"R",        "G",        "B",        "A",    "Z",     "normal.X", "normal.Y", "normal.Z",
+                                    "albedo.R", "albedo.G", "albedo.B", "path", "force", "length",   "samples",  "variance"};
+  if (!picture.gain.empty()) channels.insert(channels.end(), {"gain", "deflection"});
+  Image landed;
+  if (!picture.landed.values.empty()) {
+    landed = linear_image(picture.landed, light.bands, light.xyz_to_working);
+    channels.insert(channels.end(),
+                    {"caustic.R", "caustic.G", "caustic.B", "straight.R", "straight.G", "straight.B"});
+  }
+  Image image(colors.width, colors.height, std::move(channels));
+  const Eigen::Vector3d background = description.background == Background::color
+                                         ? Eigen::Vector3d(light.rec709_to_working * description.background_color)
+                                         : Eigen::Vector3d::Zero();
+  for (std::size_t i = 0; i < picture.alpha.size(); ++i) {
+    float* out = &image.pixels[i * image.channels.size()];
+    const float alpha = picture.alpha[i];
+    for (int c = 0; c < 3; ++c)
+      *out++ = colors.pixels[3 * i + static_cast<std::size_t>(c)] + (1 - alpha) * static_cast<float>(background[c]);
+    *out++ = description.background == Background::color ? 1 : alpha;
+    *out++ = alpha > 0 ? picture.depth[i] : nothing_depth;
+    for (int c = 0; c < 3; ++c) *out++ = picture.normal[i][c];
+    for (int c = 0; c < 3; ++c) *out++ = picture.albedo[i][c];
+    for (const float value :
+         {picture.path[i], picture.force[i], picture.arc_length[i], picture.samples[i], picture.variance[i]})
+      *out++ = value;
+    if (!picture.gain.empty()) {
+      *out++ = picture.gain[i];
+      *out++ = picture.deflection[i];
+    }
+    if (landed.pixels.empty()) continue;
+    for (std::size_t c = 0; c < 3; ++c) *out++ = landed.pixels[3 * i + c];
+    for (std::size_t c = 0; c < 3; ++c) *out++ = colors.pixels[3 * i + c] - landed.pixels[3 * i + c];
+  }
+  return image;
+}
+
+void add_lamps(const std::vector<Light>& lights, const ShownLight& light, std::vector<ShadedSurface>& surfaces,
+               std::vector<Material>& materials) {
+  for (std::size_t i = 0; i < lights.size(); ++i) {
+    const auto* area = std::get_if<AreaLight>(&lights[i]);
+    if (!area) continue;
+    MaterialDescription black;
+    black.kind = MaterialKind::diffuse;
+    black.color.setZero();
+    ShadedSurface surface;
+    surface.shape = area->mesh;
+    surface.light = static_cast<int>(i);
+    surface.material = static_cast<int>(materials.size());
+    materials.push_back(load_material(black, light));
+    surfaces.push_back(std::move(surface));
+  }
+}
+
+}  // namespace tensorray

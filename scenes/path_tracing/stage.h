@@ -1,0 +1,27 @@
+#pragma once
+/// @file scenes/path_tracing/stage.h
+/// What all pictures of surfaces share: the settings of the path tracer, visible lamps, and the channels of the picture.
+
+#include <vector>
+
+#include "renderer/images/image.h"
+#include "renderer/lights/lights.h"
+#include "renderer/materials/material.h"
+#include "renderer/shading/path_tracer.h"
+#include "renderer/surfaces/surface.h"
+#include "scenes/description/description.h"
+#include "scenes/path_tracing/load_paths.h"
+
+namespace tensorray {
+
+PathTracerSettings tracer_settings(const SceneDescription& scene, const PathTracingDescription& description);
+
+/// R, G, B, A, and the channels that denoisers and compositors use. If light bends, also `gain` and `deflection`; if
+/// some has landed on flat surfaces, also `caustic` and `straight`, whose sum is the picture.
+Image make_image(const SurfacePicture& picture, const ShownLight& light, const PathTracingDescription& description);
+
+/// Adds the area lights as surfaces, so that they are visible.
+void add_lamps(const std::vector<Light>& lights, const ShownLight& light, std::vector<ShadedSurface>& surfaces,
+               std::vector<Material>& materials);
+
+}  // namespace tensorray

@@ -1,0 +1,51 @@
+#pragma once
+/// @file scenes/whole/whole_description.h
+/// The keys of `integrator` that only the method "scene" has. It shares those of path tracing: bands, samples, noise,
+/// max_depth, filter, shading, background.
+
+#include <array>
+
+#include "integrators/view/field_region.h"
+#include "scenes/keys/choice.h"
+#include "scenes/keys/limits.h"
+
+namespace tensorray {
+
+/// `integrator.caustic`.
+struct CausticDescription {
+  int resolution = 1024;          ///< Pixels along the longer side of the part of a plate where light lands.
+  int passes = 4;                 ///< Directions within the disk of a light that has one.
+  std::uint64_t rays = 1u << 17;  ///< Positions from which light starts, at most, for each direction.
+};
+
+struct WholeDescription {
+  Conserve conserve = Conserve::power;
+  int bands_per_sample = 8;  ///< Bands that a path follows into the volume; divides `bands`.
+  double most_gain = 20;     ///< Greatest factor on radiance; 0: no limit.
+  CausticDescription caustic;
+};
+
+inline auto choices(Conserve) {
+  using C = Choice<Conserve>;
+  return std::array{C{"power", Conserve::power}, C{"radiance", Conserve::radiance}};
+}
+
+template <class Visitor>
+void describe(CausticDescription& caustic, Visitor& visit) {
+  visit("resolution", caustic.resolution, "pixels along the longer side of the part of a plate where light lands",
+        between(16, 16384));
+  visit("passes", caustic.passes, "directions within the disk of a directional light with an angle", between(1, 1024));
+  visit("rays", caustic.rays, "positions from which light starts, at most, for each direction", between(64, 1e9));
+}
+
+template <class Visitor>
+void describe(WholeDescription& whole, Visitor& visit) {
+  visit("conserve", whole.conserve, "scene: what light keeps in the field: a photon's power, or radiance");
+  visit("bands_per_sample", whole.bands_per_sample,
+        "scene: bands that a sample follows into the volume; divides `bands`", between(1, 1000));
+  visit("max_gain", whole.most_gain,
+        "scene: greatest factor by which the field increases radiance (`conserve` power); 0: no limit", at_least(0));
+  visit.section("caustic", whole.caustic, "scene: the light of directional lights that the field throws on plates");
+}
+
+}  // namespace tensorray

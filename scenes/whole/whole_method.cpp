@@ -1,0 +1,209 @@
+#include "scenes/whole/whole_method.h"
+
+#include <algorithm>
+
+#include <fmt/format.h>
+
+#include "base/progress.h"
+#include "base/seconds.h"
+#include "integrators/view/field_region.h"
+#include "renderer/shading/path_tracer.h"
+#include "scenes/description/check_scene.h"
+#include "scenes/outputs/picture_outputs.h"
+#include "scenes/path_tracing/path_tracing_description.h"
+#include "scenes/path_tracing/stage.h"
+#include "scenes/path_tracing/studio.h"
+#include "scenes/whole/objects.h"
+#include "scenes/whole/sunlight.h"
+#include "scenes/whole/whole_description.h"
+
+namespace tensorray {
+namespace {
+
+using Eigen::Vector3d;
+
+/// What the method has loaded.
+struct WholeScene {
+  WholeDescription settings;
+  PathTracingDescription tracing;
+  ShownLights lights;
+  std::vector<SceneObject> objects;
+};
+
+/// Whether the field bends light anywhere. Where it does not, the picture is that of the straight path tracer.
+bool bends_light(const Scene& scene) {
+  const std::vector<Eigen::Vector3i>& bricks = scene.field.bricks();
+  return scene.bending.scale != 0 && std::any_of(bricks.begin(), bricks.end(), [&](const Eigen::Vector3i& brick) {
+           return scene.field.brick(brick).strongest > 0;
+         });
+}
+
+/// The points that an automatic camera shows: the volume, where straight light takes its corners on plates, and meshes.
+std::vector<Vector3d> points_of_interest(const Scene& scene, const std::vector<SceneObject>& objects,
+                                         const std::vector<Light>& lights) {
+  std::vector<Vector3d> points = scene.field.corners();
+  for (const SceneObject& object : objects) {
+    if (!object.plate) points.insert(points.end(), object.mesh.vertices.begin(), object.mesh.vertices.end());
+    for (const Light& each : lights) {
+      const auto* light = std::get_if<DirectionalLight>(&each);
+      if (!light || !object.plate) continue;
+      for (const Vector3d& corner : scene.field.corners()) {
+        const Vector3d normal = object.plate->normal();
+        const double way = normal.dot(object.plate->center - corner) / normal.dot(light->direction);
+        const Vector3d shadow = corner + way * light->direction;
+        const Eigen::Vector2d across((shadow - object.plate->center).dot(object.plate->right),
+                                     (shadow - object.plate->center).dot(object.plate->up));
+        if (way > 0 && (across.cwiseAbs().array() < object.plate->size.array() / 2).all()) points.push_back(shadow);
+      }
+    }
+  }
+  return points;
+}
+
+Camera whole_camera(const Scene& scene, const std::vector<Vector3d>& points) {
+  try {
+    return make_camera(scene.description.camera, points, 0);
+  } catch (const std::invalid_argument& error) {
+    throw SceneError(fmt::format("{}: `/camera`: {}", scene.description.path.string(), error.what()));
+  }
+}
+
+/// The volume for rays that are seen. Objects that reach into it stop light there; if there are any, all objects must.
+Geometry seen_geometry(const Scene& scene, const std::vector<SceneObject>& objects) {
+  Surfaces surfaces;
+  surfaces.bounds = scene.geometry.surfaces().bounds;
+  surfaces.cut = scene.geometry.surfaces().cut;
+  const Eigen::AlignedBox3d volume = scene.field.world_box();
+  const bool reach_in = std::any_of(objects.begin(), objects.end(), [&](const SceneObject& object) {
+    Eigen::AlignedBox3d box;
+    for (const Vector3d& vertex : object.mesh.vertices) box.extend(vertex);
+    return box.intersects(volume);
+  });
+  if (reach_in)
+    for (const SceneObject& object : objects) surfaces.obstacles.push_back(object.mesh);
+  return Geometry(std::move(surfaces));
+}
+
+FieldViewSettings view_settings(const Scene& scene, const WholeScene& whole) {
+  FieldViewSettings settings;
+  settings.bending = scene.bending;
+  settings.conserve = whole.settings.conserve;
+  settings.most_gain = whole.settings.most_gain;
+  settings.flexibility = [flexibility = flexibility_of(scene.description.bending),
+                          &bands = whole.lights.light.bands](int band, double place) {
+    const Band& each = bands[static_cast<std::size_t>(band)];
+    return flexibility(each.wavelength + (place - 0.5) * each.width);
+  };
+  return settings;
+}
+
+/// All bands must have as many samples.
+PathTracerSettings whole_tracer_settings(const Scene& scene, const WholeScene& whole) {
+  PathTracerSettings settings = tracer_settings(scene.description, whole.tracing);
+  settings.transparent = whole.tracing.background == Background::transparent;
+  const int parts = whole.tracing.bands / whole.settings.bands_per_sample;
+  for (int* samples : {&settings.min_samples, &settings.max_samples, &settings.pass_samples})
+    *samples = (*samples + parts - 1) / parts * parts;
+  return settings;
+}
+
+void report(const FieldRegion& region, const WholeScene& whole, Render& result) {
+  Statistics& statistics = result.statistics;
+  statistics.ends.assign(1, EndCounts{});
+  for (int end = 0; end < ray_end_count; ++end) {
+    statistics.ends[0][static_cast<std::size_t>(end)] = region.ways(static_cast<RayEnd>(end));
+    statistics.positions += region.ways(static_cast<RayEnd>(end));
+  }
+  if (region.limited() * 1000 > statistics.positions)
+    result.warnings.push_back(
+        fmt::format("the field increases radiance by more than `integrator.max_gain` ({:g}) on {:.2g}% of the ways "
+                    "through it; the picture lacks this light",
+                    whole.settings.most_gain,
+                    100.0 * static_cast<double>(region.limited()) / static_cast<double>(statistics.positions)));
+}
+
+class LoadedWhole : public LoadedMethod {
+ public:
+  explicit LoadedWhole(WholeScene whole) : whole_(std::move(whole)) {}
+
+  Render render(const Scene& scene, const Progress& progress) const override;
+
+ private:
+  WholeScene whole_;
+};
+
+Render LoadedWhole::render(const Scene& scene, const Progress& progress) const {
+  const ShownLight& light = whole_.lights.light;
+  Clock::time_point start = Clock::now();
+  Render result;
+  const std::vector<Light> lights = whole_lights(scene, whole_.lights, {});
+  const Camera camera = whole_camera(scene, points_of_interest(scene, whole_.objects, lights));
+  std::vector<ShadedSurface> surfaces;
+  std::vector<Material> materials;
+  add_objects(whole_.objects, light, surfaces, materials);
+  add_lamps(lights, light, surfaces, materials);
+  const SurfaceScene stage(std::move(surfaces));
+  std::vector<float> luminance;
+  for (const Band& band : light.bands) luminance.push_back(static_cast<float>(band.xyz.y()));
+  const LightSampler sampler(lights, luminance, stage.bounds());
+  const ReflectanceTable table(light.model, light.bands, light.xyz_to_working);
+  const Geometry geometry = seen_geometry(scene, whole_.objects);
+  const FieldRegion region(scene.field, geometry, view_settings(scene, whole_));
+  const bool bends = bends_light(scene);
+  ShadedScene shaded{stage, materials, sampler, table, bends ? &region : nullptr, whole_.settings.bands_per_sample, {}};
+  if (bends) shaded.landed = land_light(scene, lights, light, whole_.objects, whole_.settings.caustic, progress);
+  result.statistics.seconds_tracing = seconds_since(start);
+
+  start = Clock::now();
+  RenderCallbacks callbacks;
+  callbacks.progress = [&](std::uint64_t done, std::uint64_t total) { progress.update("rendering", done, total); };
+  const SurfacePicture picture = render_surfaces(shaded, camera, whole_tracer_settings(scene, whole_), callbacks);
+  result.linear = make_image(picture, light, whole_.tracing);
+  if (scene.description.output.wants("spectral"))
+    result.spectral = spectral_image(picture.radiance, light.bands, 1, light.xyz_to_working);
+  result.exposure = 0;
+  report(region, whole_, result);
+  result.statistics.seconds_drawing = seconds_since(start);
+  return result;
+}
+
+class WholeMethod : public MethodWith<WholeDescription> {
+ public:
+  const char* name() const override { return "scene"; }
+
+  std::vector<Output> outputs() const override {
+    std::vector<Output> outputs = picture_outputs();
+    outputs.push_back(spectral_output());
+    return outputs;
+  }
+
+  void check(SceneDescription& scene, const Json& json, const SceneSource& source, bool chosen) const override;
+
+  std::unique_ptr<const LoadedMethod> load(const Scene& scene, std::vector<std::string>&) const override {
+    const auto& tracing = scene.description.integrator.settings<PathTracingDescription>();
+    WholeScene whole{settings(), tracing, load_lights(scene, tracing.bands), {}};
+    whole.objects = load_objects(scene, whole.lights.light);
+    return std::make_unique<LoadedWhole>(std::move(whole));
+  }
+};
+
+void WholeMethod::check(SceneDescription& scene, const Json& json, const SceneSource& source, bool chosen) const {
+  if (!chosen) return;
+  const auto& tracing = scene.integrator.settings<PathTracingDescription>();
+  if (tracing.bands % settings().bands_per_sample != 0)
+    source.fail(fmt::format("`/integrator/bands_per_sample` must divide `/integrator/bands` ({}), but is {}",
+                            tracing.bands, settings().bands_per_sample));
+  check_memory(scene.camera.resolution.cast<double>().prod() * (250.0 + 48.0 * tracing.bands), "`/camera/resolution`",
+               source);
+  check_memory(12.0 * tracing.bands * settings().caustic.resolution * settings().caustic.resolution,
+               "`/integrator/caustic/resolution`", source);
+  if (given(json, "/integrator/conserve") && given(json, "/integrator/max_gain") &&
+      settings().conserve == Conserve::radiance)
+    scene.warnings.push_back("`/integrator/max_gain` has no effect where radiance is conserved");
+}
+
+}  // namespace
+
+std::shared_ptr<Method> whole_method() { return std::make_shared<WholeMethod>(); }
+
+}  // namespace tensorray
