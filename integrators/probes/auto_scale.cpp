@@ -3,52 +3,124 @@
 #include <algorithm>
 #include <cmath>
 
+#include <Eigen/LU>
 #include <tbb/parallel_for.h>
 
 namespace tensorray {
 namespace {
 
+using Eigen::Matrix2d;
+using Eigen::Vector3d;
+
 constexpr double probe_flexibility = 0.2;
-constexpr double wanted_turn = 0.15;    // Radians.
-constexpr double smallest_turn = 1e-7;  // Radians; a ray that turns less counts as straight.
+constexpr double wanted_part = 0.85;   // Of the greatest AutoScale::shown.
+constexpr double tangled_part = 0.75;  // A scale that shows less than this part of a lesser one tangles light.
+constexpr double most_turn = 0.4;      // AutoScale::median_turn; light that turns more leaves the plate.
+constexpr double visible_turn = 0.15;
+constexpr double first_turn = 0.015;  // No ray turns by more at the first scale, radians.
+constexpr int doublings = 30, halvings = 8;
+constexpr int patience = 12;             // Doublings after which light that has not turned at all will not.
+constexpr double smallest_turn = 1e-7;   // Radians; a ray that turns less counts as straight.
+constexpr double plane_distance = 0.25;  // Of the plane, behind the volume, in depths of the volume.
+constexpr double least_slope = 0.1;      // Cosine between light and the plane's normal, for light that lands.
 constexpr std::uint64_t probe_count = 1024;
 constexpr std::size_t batch_size = 64;  // Rays that one thread traces together.
 
-std::vector<Eigen::Vector3d> probe_origins(const Beam& beam) {
+/// Probe rays and the plane behind the volume on which they land.
+struct ProbeBeam {
+  const Beam& beam;
+  std::vector<Vector3d> origins;
+  double plane;  // Its place along the light.
+};
+
+ProbeBeam probe_beam(const TensorField& field, const Beam& beam) {
+  ProbeBeam probes{beam, {}, 0};
   const BeamSampler sampler(beam, BeamPattern::stratified, probe_count, 0);
-  std::vector<Eigen::Vector3d> origins;
   Emission emission;
   for (std::uint64_t i = 0; i < sampler.candidates(); ++i)
-    if (sampler.sample(i, emission)) origins.push_back(emission.origin);
-  return origins;
+    if (sampler.sample(i, emission)) probes.origins.push_back(emission.origin);
+  double near = 0, far = 0;
+  bool is_first = true;
+  for (const Vector3d& corner : field.corners()) {
+    const double place = corner.dot(beam.direction);
+    near = is_first ? place : std::min(near, place);
+    far = is_first ? place : std::max(far, place);
+    is_first = false;
+  }
+  probes.plane = far + plane_distance * (far - near);
+  return probes;
 }
 
-/// The turn of the median ray with this scale.
-AutoScale probe(const TensorField& field, const Geometry& geometry, const Beam& beam,
-                const std::vector<Eigen::Vector3d>& origins, double scale, const Progress& progress) {
+/// By how much the light about a ray is spread where it lands: ln |det ∂landing/∂start|. 0 if it does not land.
+double log_area(const ProbeBeam& probes, const RayBatch& batch, std::size_t i) {
+  const Beam& beam = probes.beam;
+  const Vector3d& V = batch.direction[i];
+  const double slope = V.dot(beam.direction);
+  if (slope < least_slope) return 0;
+  const RayDifferential& d = batch.differentials[i];
+  const double ahead = (probes.plane - batch.position[i].dot(beam.direction)) / slope;
+  const Eigen::Matrix<double, 3, 2> moved = d.position + ahead * d.direction;
+  const Eigen::Matrix<double, 3, 2> landed = moved - V * (beam.direction.transpose() * moved) / slope;
+  Matrix2d jacobian;
+  jacobian << beam.right.transpose() * landed, beam.up.transpose() * landed;
+  const double area = std::abs(jacobian.determinant());
+  return std::isfinite(area) ? std::log(std::max(area, 1e-300)) : 0;
+}
+
+/// Sets all values but the scale.
+/// @param turns    Of all rays.
+/// @param changes  |ln| of the change of area, by ray.
+AutoScale summary(double scale, std::vector<double> turns, const std::vector<double>& changes) {
+  AutoScale result;
+  result.scale = scale;
+  const auto rays = static_cast<double>(changes.size());
+  turns.erase(std::remove_if(turns.begin(), turns.end(), [](double turn) { return turn < smallest_turn; }),
+              turns.end());
+  if (turns.empty()) return result;
+  result.bent_fraction = static_cast<double>(turns.size()) / rays;
+  const auto median = turns.begin() + static_cast<std::ptrdiff_t>(turns.size() / 2);
+  std::nth_element(turns.begin(), median, turns.end());
+  result.median_turn = *median;
+  for (const double change : changes) result.shown += change * std::exp(1 - change) / rays;
+  return result;
+}
+
+AutoScale probe(const TensorField& field, const Geometry& geometry, const ProbeBeam& probes, double scale,
+                const Progress& progress) {
   BendingSettings settings;
   settings.scale = scale;
   settings.step = 0.5;  // A fixed step, because the splitting method is stable at any scale.
-  std::vector<double> turns(origins.size());
+  const Beam& beam = probes.beam;
+  const std::vector<Vector3d>& origins = probes.origins;
+  RayDifferential start;
+  start.position << beam.right, beam.up;
+  std::vector<double> turns(origins.size()), changes(origins.size());
   const std::size_t batches = (origins.size() + batch_size - 1) / batch_size;
   tbb::parallel_for(std::size_t{0}, batches, [&](std::size_t task) {
     if (progress.cancelled) throw Cancelled();
     const std::size_t first = task * batch_size, count = std::min(batch_size, origins.size() - first);
     RayBatch batch;
     for (std::size_t i = 0; i < count; ++i) batch.add(origins[first + i], beam.direction, probe_flexibility);
+    batch.differentials.assign(count, start);
     trace(field, geometry, settings, batch);
     for (std::size_t i = 0; i < count; ++i) {
-      const Eigen::Vector3d& V = batch.direction[i];
-      const bool followed = batch.end[i] == RayEnd::plate || batch.end[i] == RayEnd::missed;
-      turns[first + i] = followed ? std::atan2(beam.direction.cross(V).norm(), beam.direction.dot(V)) : 0;
+      if (batch.end[i] != RayEnd::plate && batch.end[i] != RayEnd::missed) continue;  // It was not followed.
+      const Vector3d& V = batch.direction[i];
+      turns[first + i] = std::atan2(beam.direction.cross(V).norm(), beam.direction.dot(V));
+      changes[first + i] = std::abs(log_area(probes, batch, i));
     }
   });
-  turns.erase(std::remove_if(turns.begin(), turns.end(), [](double turn) { return turn < smallest_turn; }),
-              turns.end());
-  if (turns.empty()) return {scale, 0, 0};
-  const auto median = turns.begin() + static_cast<std::ptrdiff_t>(turns.size() / 2);
-  std::nth_element(turns.begin(), median, turns.end());
-  return {scale, *median, static_cast<double>(turns.size()) / static_cast<double>(origins.size())};
+  return summary(scale, std::move(turns), changes);
+}
+
+/// For light that only turns: the first scale that turns it visibly, or the one that turns it most.
+AutoScale turned(const std::vector<AutoScale>& tried) {
+  AutoScale most;
+  for (const AutoScale& each : tried) {
+    if (each.median_turn > most.median_turn) most = each;
+    if (most.median_turn >= visible_turn) break;
+  }
+  return most;
 }
 
 }  // namespace
@@ -56,24 +128,44 @@ AutoScale probe(const TensorField& field, const Geometry& geometry, const Beam& 
 AutoScale choose_scale(const TensorField& field, const Geometry& geometry, const Beam& beam, const Progress& progress) {
   const double norm = field.greatest_norm();
   if (norm == 0) return {};
-  const std::vector<Eigen::Vector3d> origins = probe_origins(beam);
+  const ProbeBeam probes = probe_beam(field, beam);
   const double depth = (field.to_world().linear() * field.index_bounds().sizes()).norm();
-
-  // No ray turns by more than s‖T‖ times its length. Start where this bound is small, and double the scale until rays
-  // turn enough.
-  AutoScale low{0.1 * wanted_turn / (probe_flexibility * norm * depth), 0, 0}, high = low;
-  AutoScale best{1, 0, 0};
-  for (int doubling = 0; doubling < 50 && high.median_turn < wanted_turn; ++doubling) {
-    low = high;
-    high = probe(field, geometry, beam, origins, 2 * low.scale, progress);
-    if (high.median_turn > best.median_turn) best = high;
+  // No ray turns by more than s‖T‖ times its length.
+  double scale = first_turn / (probe_flexibility * norm * depth);
+  std::vector<AutoScale> tried;
+  AutoScale best;
+  for (int i = 0; i < doublings; ++i, scale *= 2) {
+    tried.push_back(probe(field, geometry, probes, scale, progress));
+    if (tried.size() > 1 && tried.back().median_turn > most_turn) break;
+    if (tried.back().shown > best.shown) best = tried.back();
+    if (tried.back().shown < tangled_part * best.shown) break;
+    if (i >= patience && tried.back().bent_fraction == 0) break;
   }
-  if (best.median_turn < wanted_turn) return best;  // No scale turns rays enough.
-  for (int i = 0; i < 20; ++i) {
-    const AutoScale middle = probe(field, geometry, beam, origins, (low.scale + high.scale) / 2, progress);
-    (middle.median_turn < wanted_turn ? low : high) = middle;
+  if (best.shown == 0) return turned(tried);
+  const double wanted = wanted_part * best.shown;
+  AutoScale low, high;
+  for (const AutoScale& each : tried) {
+    low = high;
+    high = each;
+    if (high.shown >= wanted) break;
+  }
+  for (int i = 0; i < halvings && low.shown > 0; ++i) {
+    const AutoScale middle = probe(field, geometry, probes, (low.scale + high.scale) / 2, progress);
+    (middle.shown < wanted ? low : high) = middle;
   }
   return high;
+}
+
+AutoDirection choose_direction(const TensorField& field, const Geometry& geometry, const Vector3d& up,
+                               const Progress& progress) {
+  AutoDirection best{-Vector3d::UnitZ(), {}};
+  for (const double sign : {-1.0, 1.0})
+    for (int axis = 2; axis >= 0; --axis) {
+      const Vector3d direction = sign * Vector3d::Unit(axis);
+      const AutoScale scale = choose_scale(field, geometry, silhouette_beam(field.corners(), direction, up), progress);
+      if (scale.shown > best.scale.shown) best = {direction, scale};
+    }
+  return best;
 }
 
 }  // namespace tensorray

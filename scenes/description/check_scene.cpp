@@ -94,7 +94,8 @@ void warn_unused(SceneDescription& scene, const Json& json, const char* key, con
 
 void check_normal(const std::optional<Eigen::Vector3d>& normal, const char* pointer, const LightDescription& light,
                   const SceneSource& source) {
-  if (!normal || std::abs(normal->normalized().dot(light.direction.normalized())) > 1e-6) return;
+  if (!normal || !light.direction) return;
+  if (std::abs(normal->normalized().dot(light.direction->normalized())) > 1e-6) return;
   source.fail(
       fmt::format("`{}/normal` is perpendicular to the light, so that the plane is seen edge-on; turn it "
                   "towards the light",

@@ -51,9 +51,10 @@ struct ApertureDescription {
 };
 
 struct LightDescription {
-  Eigen::Vector3d direction{0, 0, -1};  ///< Direction in which light travels; not zero, any length.
-  std::optional<Eigen::Vector3d> up;    ///< Up axis of aperture and receiver; none: +z, or +y for light along z.
-  std::uint64_t photons = 1u << 20;     ///< Approximate number of positions that emit.
+  /// Direction in which light travels; not zero, any length. None: "auto".
+  std::optional<Eigen::Vector3d> direction = Eigen::Vector3d(0, 0, -1);
+  std::optional<Eigen::Vector3d> up;  ///< Up axis of aperture and receiver; none: +z, or +y for light along z.
+  std::uint64_t photons = 1u << 20;   ///< Approximate number of positions that emit.
   BeamPattern pattern = BeamPattern::stratified;
   SpectrumDescription spectrum;
   double wavelength_min = 380, wavelength_max = 730;

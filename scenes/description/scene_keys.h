@@ -35,7 +35,8 @@ void describe(FieldDescription& field, Visitor& visit) {
         "derivative that makes the tensor: gradient of a vector grid, hessian of a scalar grid");
   visit("eigenvalues", field.eigenvalues,
         "preprocessing: as they are, |T| or (T^2)^(1/2); auto is absolute where the field is symmetric, else raw");
-  visit("scale", field.scale, "factor on the flexibility; auto makes the median ray turn by 0.15 rad at s = 0.2",
+  visit("scale", field.scale,
+        "factor on the flexibility; auto is where light shows the field's structure without tangling",
         not_zero().or_word("auto"));
   visit("bounds", field.bounds, "closed mesh that limits the volume; light is straight outside it");
 }
@@ -75,7 +76,9 @@ void describe(WavelengthKeys& keys, Visitor& visit) {
 
 template <class Visitor>
 void describe(LightDescription& light, Visitor& visit) {
-  visit("direction", light.direction, "direction in which light travels; its length has no effect", not_zero());
+  visit("direction", light.direction,
+        "direction in which light travels; its length has no effect. auto is the axis along which light shows most",
+        not_zero().or_word("auto"));
   visit("up", light.up, "up axis of aperture and receiver; default: +z, or +y for light along z", not_zero());
   visit("photons", light.photons, "approximate number of positions that emit", between(1, 1e12));
   visit("pattern", light.pattern, "pattern of these positions on the aperture");

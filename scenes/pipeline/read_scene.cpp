@@ -66,9 +66,10 @@ void choose_outputs(SceneDescription& scene) {
   scene.output.files["exr"] = std::filesystem::path(scene.path).replace_extension(".exr");
 }
 
-/// The scene of a field alone: the light that it bends, on a plate.
+/// The scene of a field alone: the light that it bends, on a plate, from the side that shows most.
 Json scene_of_field(const std::filesystem::path& field) {
   return {{"field", {{"file", std::filesystem::absolute(field).string()}}},
+          {"light", {{"direction", "auto"}}},
           {"integrator", {{"type", "photon_distribution"}}}};
 }
 

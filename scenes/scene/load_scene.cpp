@@ -115,7 +115,7 @@ void start_before(Beam& beam, const std::vector<Eigen::Vector3d>& points) {
 Beam make_beam(const SceneDescription& description, const TensorField& field) {
   const LightDescription& light = description.light;
   const Eigen::Vector3d up = light.up.value_or(Eigen::Vector3d::UnitZ());
-  Beam beam = silhouette_beam(field.corners(), light.direction, up);
+  Beam beam = silhouette_beam(field.corners(), *light.direction, up);
   if (light.aperture) {
     Eigen::Vector2d center(0, 0);
     if (light.aperture->center) {
@@ -178,11 +178,17 @@ void require_near(const Beam& beam, const SceneDescription& description, const T
     if (!(corner.norm() < greatest_distance(field))) fail_size(description, "/light/aperture");
 }
 
-/// Loads the bounds of the field, its cut, the obstacles and the plate. Moves the start of `beam` before all of them.
-Surfaces load_surfaces(const SceneDescription& description, const TensorField& field, Beam& beam) {
+/// Loads the bounds of the field and its cut.
+Surfaces load_volume(const SceneDescription& description, const TensorField& field) {
   Surfaces surfaces;
   surfaces.bounds = box_mesh(field.index_bounds(), field.to_world());
   if (!description.field.bounds.empty()) surfaces.cut = load_closed_mesh(description.field.bounds);
+  return surfaces;
+}
+
+/// Loads the volume, the obstacles and the plate. Moves the start of `beam` before all of them.
+Surfaces load_surfaces(const SceneDescription& description, const TensorField& field, Beam& beam) {
+  Surfaces surfaces = load_volume(description, field);
   for (const std::filesystem::path& path : description.obstacles) surfaces.obstacles.push_back(read_mesh(path));
   surfaces.plate = make_plate(description, field, beam);
   require_near(beam, description, field);
@@ -205,9 +211,21 @@ AutoScale load_scale(const SceneDescription& description, const TensorField& fie
         "warning: no probe ray is turned (the field is zero or isotropic, or light travels along its "
         "eigenvectors, or misses the volume); scale 1");
   else
-    notes.push_back(
-        fmt::format("scale: {:.6g} (at s = 0.2 the median ray turns by {:.3f} rad)", scale.scale, scale.median_turn));
+    notes.push_back(fmt::format("scale: {:.6g} (at s = 0.2 the median ray turns by {:.3f} rad; shown: {:.0f}%)",
+                                scale.scale, scale.median_turn, 100 * scale.shown));
   return scale;
+}
+
+/// The direction of the light, if the scene leaves it open. The choice ignores obstacles, too.
+Eigen::Vector3d load_direction(const SceneDescription& description, const TensorField& field, const Progress& progress,
+                               std::vector<std::string>& notes) {
+  if (description.light.direction) return *description.light.direction;
+  const AutoDirection chosen = choose_direction(field, Geometry(load_volume(description, field)),
+                                                description.light.up.value_or(Eigen::Vector3d::UnitZ()), progress);
+  const Eigen::Vector3d V = chosen.direction + Eigen::Vector3d::Zero();  // 0, not -0.
+  notes.push_back(
+      fmt::format("light: along [{:g}, {:g}, {:g}], where it shows most of the six axes", V.x(), V.y(), V.z()));
+  return V;
 }
 
 /// The light of a scene, and how its colours are shown.
@@ -225,8 +243,9 @@ LoadedLight load_light(const SceneDescription& description) {
   return light;
 }
 
-Scene make_scene(const SceneDescription& description, LoadedLight light, LoadedField loaded,
-                 std::vector<std::string> notes, const Progress& progress) {
+Scene make_scene(SceneDescription description, LoadedLight light, LoadedField loaded, std::vector<std::string> notes,
+                 const Progress& progress) {
+  description.light.direction = load_direction(description, loaded.field, progress, notes);
   Beam beam = make_beam(description, loaded.field);
   Geometry geometry(load_surfaces(description, loaded.field, beam));
   Scene scene(description, std::move(loaded.field), std::move(geometry), std::move(light.color));

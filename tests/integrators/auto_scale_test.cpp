@@ -18,25 +18,73 @@ AutoScale scale_of(const TensorField& field, const Vector3d& direction = {0, 0, 
                       silhouette_beam(field.corners(), direction, Vector3d::UnitY()), Progress());
 }
 
-TEST(AutoScale, TurnsTheMedianRayByTheWantedAngle) {
-  for (const double size : {1e-6, 1.0, 1e6}) {
+TEST(AutoScale, CancelsTheUnitsOfTheField) {
+  const AutoScale one = scale_of(cube_field(9, linear_tensor));
+  EXPECT_GT(one.shown, 0.3);
+  EXPECT_GT(one.bent_fraction, 0.99);
+  for (const double size : {1e-6, 1e6}) {
     const TensorField field = cube_field(9, [&](const Vector3d& p) { return Matrix3d(size * linear_tensor(p)); });
-    const AutoScale chosen = scale_of(field);
-    EXPECT_NEAR(chosen.median_turn, 0.15, 1e-3);
-    EXPECT_GT(chosen.bent_fraction, 0.99);
-    // The scale cancels the units of the field.
-    EXPECT_NEAR(chosen.scale * size / scale_of(cube_field(9, linear_tensor)).scale, 1, 1e-4);
+    EXPECT_NEAR(scale_of(field).scale * size / one.scale, 1, 1e-3);
   }
 }
 
-TEST(AutoScale, AgreesWithTheClosedFormOfARotation) {
-  Matrix3d T = Matrix3d::Zero();  // About x, with rate 3: light along −z turns by 3 s k times its path's length.
+/// A lens with x'' = −ω²x along the light, ω² = 0.2 · scale. Light converges to |cos 2ω − ω/2 sin 2ω| of its width on
+/// the plane, at a distance of half a unit behind a depth of 2.
+TEST(AutoScale, AgreesWithTheClosedFormOfALens) {
+  const AutoScale chosen = scale_of(cube_field(17, [](const Vector3d& p) {
+    Matrix3d T = Matrix3d::Zero();
+    T.col(2) = Vector3d(p.x(), p.y(), 0);
+    return T;
+  }));
+  const double omega = std::sqrt(0.2 * chosen.scale);
+  const double change = -2 * std::log(std::cos(2 * omega) - omega / 2 * std::sin(2 * omega));
+  const double shown = change * std::exp(1 - change);
+  // The best of scales a factor of 2 apart shows 0.9 to 1. The closed form is that of small angles: here 0.2, so that
+  // the turn is known to 4%, and so is the change.
+  EXPECT_NEAR(shown, chosen.shown, 0.05);
+  EXPECT_GT(chosen.shown, 0.84 * 0.9);
+  EXPECT_LT(chosen.shown, 0.88);
+}
+
+/// A structure that fills 2% of the cross section gets the scale that it has where it fills all of it.
+TEST(AutoScale, SmallStructuresAreSeen) {
+  const auto waves = [](double half_width) {
+    return scale_of(cube_field(65, [&](const Vector3d& p) {
+      Matrix3d T = Matrix3d::Zero();
+      if (std::abs(p.x()) < half_width && std::abs(p.y()) < half_width)
+        T.col(2) = Vector3d(std::sin(20 * p.x()), std::sin(20 * p.y()), 0);
+      return T;
+    }));
+  };
+  const AutoScale all = waves(2), small = waves(0.16);
+  EXPECT_LT(small.bent_fraction, 0.05);
+  EXPECT_NEAR(small.scale / all.scale, 1, 0.4);
+}
+
+TEST(AutoScale, LightThatOnlyTurnsTurnsVisibly) {
+  Matrix3d T = Matrix3d::Zero();  // About the light's right axis.
   T(1, 2) = -3;
   T(2, 1) = 3;
   const AutoScale chosen = scale_of(constant_field(T));
-  // Most rays cross the whole volume: along an arc of angle 0.15 that spans a depth of 2.
-  const double length = 2 * 0.15 / std::sin(0.15);
-  EXPECT_NEAR(chosen.scale, 0.15 / (0.2 * 3 * length), 2e-3 * chosen.scale);
+  EXPECT_LT(chosen.shown, 0.2);  // Only light that passes the volume's sides changes.
+  EXPECT_GT(chosen.median_turn, 0.1);
+  EXPECT_LE(chosen.median_turn, 0.4);
+}
+
+TEST(AutoDirection, IsTheOneThatShowsMost) {
+  for (int axis = 0; axis < 3; ++axis) {
+    const TensorField field = cube_field(17, [&](const Vector3d& p) {
+      Matrix3d T = Matrix3d::Zero();  // Bends light along one axis only.
+      T((axis + 1) % 3, axis) = std::sin(3 * p[(axis + 1) % 3]);
+      return T;
+    });
+    const AutoDirection chosen = choose_direction(field, Geometry(surfaces_of(field)), Vector3d::UnitZ(), Progress());
+    EXPECT_NEAR(std::abs(chosen.direction[axis]), 1, 1e-15);
+    EXPECT_GT(chosen.scale.shown, 0.2);
+  }
+  const TensorField nothing = constant_field(Matrix3d::Identity());
+  EXPECT_EQ(choose_direction(nothing, Geometry(surfaces_of(nothing)), Vector3d::UnitZ(), Progress()).direction,
+            -Vector3d::UnitZ());
 }
 
 TEST(AutoScale, FieldsThatTurnNoLightKeepTheirScale) {
@@ -55,16 +103,6 @@ TEST(AutoScale, StopsWhenCancelled) {
   progress.cancelled = true;
   const Beam beam = silhouette_beam(field.corners(), {0, 0, -1}, Vector3d::UnitY());
   EXPECT_THROW(choose_scale(field, Geometry(surfaces_of(field)), beam, progress), Cancelled);
-}
-
-TEST(AutoScale, RaysThatMeetNothingDoNotCount) {
-  // A quarter of the beam's cross section is bent.
-  const TensorField field = cube_field(33, [](const Vector3d& p) {
-    return Matrix3d(p.x() > 0 && p.y() > 0 ? linear_tensor(p) : Matrix3d::Zero().eval());
-  });
-  const AutoScale chosen = scale_of(field);
-  EXPECT_NEAR(chosen.median_turn, 0.15, 2e-3);
-  EXPECT_NEAR(chosen.bent_fraction, 0.25, 0.05);
 }
 
 }  // namespace

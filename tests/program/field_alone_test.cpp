@@ -2,6 +2,8 @@
 
 #include <algorithm>
 
+#include <fmt/format.h>
+
 #include "renderer/images/image.h"
 #include "tests/program/support.h"
 
@@ -71,6 +73,35 @@ TEST_F(FieldAlone, NothingIsOverwrittenOrMadeWrong) {
   expect_error({"render", "scene.json", "-q", "--save-scene", "scenes/scene.json"}, "must be in the folder of");
   run_well(with_small({"render", "scene.json", "-q", "-o", "b.png", "--save-scene", "small.json"}));
   EXPECT_EQ(read_json("small.json")["field"]["file"], "stress.vdb");
+}
+
+TEST_F(FieldAlone, FilesThatHaveToBeImportedAreRenderedAsTheyAreAfterAnImport) {
+  std::string numbers;
+  for (int i = 0; i < 5 * 5 * 5; ++i) numbers += fmt::format("{} 0 {} 2 0 3\n", i % 5, 0.3 * (i / 5 % 5));
+  write("tensors.nrrd",
+        "NRRD0005\ntype: float\ndimension: 4\nspace: right-anterior-superior\nsizes: 6 5 5 5\n"
+        "space directions: none (1,0,0) (0,1,0) (0,0,1)\nkinds: 3D-symmetric-matrix space space space\n"
+        "encoding: ascii\n\n" +
+            numbers);
+  const Outcome outcome = run_well(with_small({"render", "tensors.nrrd", "--stats", "stats.json"}));
+  EXPECT_NE(outcome.error.find("light: along ["), std::string::npos) << outcome.error;
+  run_well({"import", "tensors.nrrd", "-o", "tensors.vdb", "-q"});
+  run_well(with_small({"render", "tensors.vdb", "-o", "after.exr", "-q"}));
+  EXPECT_EQ(read_image(in_folder("tensors.exr")).pixels, read_image(in_folder("after.exr")).pixels);
+  EXPECT_TRUE(exists(in_folder("tensors.png")));
+
+  const auto expect_error = [&](const std::vector<std::string>& arguments, const std::string& text) {
+    const Outcome refused = run(arguments);
+    EXPECT_NE(refused.status, 0);
+    EXPECT_NE(refused.error.find(text), std::string::npos) << refused.error;
+    EXPECT_EQ(std::count(refused.error.begin(), refused.error.end(), '\n'), 1) << refused.error;
+  };
+  expect_error({"render", "tensors.nrrd", "--save-scene", "scene.json"}, "tensorray import");
+  expect_error({"render", "tensors.nrrd", "--stats", "tensors.nrrd"}, "--stats");
+  expect_error({"render", "tensors.nrrd", "--array", "stress"}, "tensors.nrrd");
+  expect_error({"render", "stress.vdb", "--order", "vtk"}, "have to be imported");
+  write("noise.vti", "noise");
+  expect_error({"render", "noise.vti"}, "noise.vti");
 }
 
 }  // namespace

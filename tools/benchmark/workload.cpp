@@ -20,9 +20,8 @@ void scale_to_turn(TensorGrid& grid, const Eigen::Vector3d& direction, double tu
   Surfaces surfaces;
   surfaces.bounds = box_mesh(field.index_bounds(), field.to_world());
   const Beam beam = silhouette_beam(field.corners(), direction, Eigen::Vector3d::UnitZ());
-  constexpr double automatic_turn = 0.15;
-  const double scale = choose_scale(field, Geometry(std::move(surfaces)), beam, Progress()).scale;
-  const auto factor = static_cast<float>(scale * turn / automatic_turn);
+  const AutoScale chosen = choose_scale(field, Geometry(std::move(surfaces)), beam, Progress());
+  const auto factor = static_cast<float>(chosen.scale * turn / chosen.median_turn);
   for (TensorBlock& block : grid.blocks)
     for (Eigen::Matrix3f& value : block.values) value *= factor;
 }

@@ -6,8 +6,8 @@
 #include <CLI/CLI.hpp>
 #include <unistd.h>
 
-#include "base/child_program.h"
 #include "tools/commands/commands.h"
+#include "tools/commands/imported_field.h"
 
 namespace tensorray {
 
@@ -16,11 +16,9 @@ void add_import_command(CLI::App& program) {
 }
 
 void become_import_program(char** arguments) {
-  const std::string program = sibling_program("tensorray-import").string();
+  const std::string program = import_program().string();
   arguments[0] = const_cast<char*>("tensorray-import");
   execv(program.c_str(), arguments);
-  if (errno == ENOENT)
-    throw std::runtime_error("imports need " + program + ", which is not built; run `tools/setup release import`");
   throw std::runtime_error(program + " cannot be started: " + std::generic_category().message(errno));
 }
 

@@ -7,9 +7,11 @@
 #include <CLI/CLI.hpp>
 #include <fmt/format.h>
 
+#include "base/distinct_files.h"
 #include "base/text.h"
 #include "scenes/pipeline/methods.h"
 #include "tools/commands/commands.h"
+#include "tools/commands/imported_field.h"
 #include "tools/commands/render_scene.h"
 
 namespace tensorray {
@@ -20,6 +22,7 @@ struct RenderOptions {
   SceneChanges changes;
   std::optional<std::uint64_t> seed;
   std::string error;
+  ImportChoices import;
   RenderRun run;
 };
 
@@ -47,6 +50,23 @@ double parse_part(const std::string& text) {
   return percent ? value / 100 : value;
 }
 
+/// Renders another program's file. Its pictures are named after the file.
+void render_import(const std::string& file, SceneChanges changes, const RenderOptions& options, Progress& progress) {
+  if (!options.run.scene_copy.empty())
+    throw std::invalid_argument("--save-scene: a scene needs a field that stays; make it with `tensorray import " +
+                                printable(file) + " -o FIELD.vdb`");
+  if (changes.outputs.empty()) {
+    std::filesystem::path name(file);
+    while (name.has_extension()) name.replace_extension();  // .nii.gz
+    changes.outputs = {name.string() + ".png", name.string() + ".exr"};
+  }
+  std::vector<NamedFile> outputs{{options.run.statistics, "--stats"}};
+  for (const std::filesystem::path& output : changes.outputs) outputs.push_back({output, "-o"});
+  require_distinct_files({{file, "the input"}}, outputs);
+  const ImportedField field(file, options.import, options.run.quiet);
+  render_scene(field.path(), changes, options.run, progress);
+}
+
 }  // namespace
 
 void add_render_command(CLI::App& program, Progress& progress) {
@@ -54,8 +74,8 @@ void add_render_command(CLI::App& program, Progress& progress) {
   CLI::App* command = program.add_subcommand("render", "Render a scene file, or a field, to pictures");
   command
       ->add_option("SCENE", options->scene,
-                   "Scene file (JSON; `tensorray schema` prints its keys), or a field (.vdb): the light that it bends, "
-                   "with all defaults")
+                   "Scene file (JSON; `tensorray schema` prints its keys); or a field, as .vdb or any file that "
+                   "`tensorray import` reads: the light that it bends, with all defaults")
       ->required();
   command->add_option("-o,--output", options->changes.outputs, output_help());
   command
@@ -69,12 +89,21 @@ void add_render_command(CLI::App& program, Progress& progress) {
                       "photon_distribution: refine until the picture's relative error is below this, as 1%");
   command->add_option("--stats", options->run.statistics, "Write statistics of the render to this JSON file");
   command->add_option("--save-scene", options->run.scene_copy, "Write the scene, with its changes, to this JSON file");
+  command->add_option("--order", options->import.order, "Of the tensor's components, as for `tensorray import`")
+      ->group("Import");
+  command->add_option("--array", options->import.array, "The array that is the tensor, likewise")->group("Import");
+  command->add_option("--gradient-of", options->import.gradient_of, "The velocity whose gradient it is, likewise")
+      ->group("Import");
   command->add_flag("-q,--quiet", options->run.quiet, "Print nothing but errors");
   command->callback([options, &progress] {
     SceneChanges changes = options->changes;
     if (options->seed) changes.overrides.push_back(fmt::format("seed={}", *options->seed));
     if (!options->error.empty())
       changes.overrides.push_back(fmt::format("integrator.density.error={}", parse_part(options->error)));
+    if (needs_import(options->scene)) return render_import(options->scene, changes, *options, progress);
+    const ImportChoices& import = options->import;
+    if (!import.order.empty() || !import.array.empty() || !import.gradient_of.empty())
+      throw std::invalid_argument("--order, --array and --gradient-of are for files that have to be imported");
     render_scene(options->scene, changes, options->run, progress);
   });
 }

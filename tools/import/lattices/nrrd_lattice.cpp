@@ -98,13 +98,13 @@ std::string load(const std::filesystem::path& path, Nrrd& nrrd, bool header_only
 }
 
 /// The greatest number of data bytes that `bytes` of a file can encode. zlib expands one byte to at most 1032, bzip2
-/// to about 20000. As hex text, a byte takes two characters; as ascii text, a number takes at least one digit and a
+/// to about 20000. As hex text, a byte takes two characters; as ASCII text, a number takes at least one digit and a
 /// space.
 double greatest_content(const std::string& encoding, double bytes, double element_size) {
   if (encoding == "gzip") return 1032 * bytes;
   if (encoding == "bzip2") return 20000 * bytes;
   if (encoding == "hex") return bytes / 2;
-  if (encoding == "ascii") return element_size * (bytes + 1) / 2;
+  if (encoding == "ASCII") return element_size * (bytes + 1) / 2;
   return bytes;
 }
 

@@ -1,0 +1,64 @@
+#include "tools/commands/imported_field.h"
+
+#include <fstream>
+#include <stdexcept>
+#include <vector>
+
+#include <fmt/format.h>
+
+#include "base/child_program.h"
+#include "base/text.h"
+#include "scenes/pipeline/read_scene.h"
+
+namespace tensorray {
+namespace {
+
+/// A scene begins with "{", or with a comment.
+bool begins_as_scene(const std::filesystem::path& path) {
+  std::ifstream stream(path, std::ios::binary);
+  char first = 0;
+  return !(stream >> first) || first == '{' || first == '/';
+}
+
+/// The last line of a program's errors, without its name.
+std::string last_line(std::string text) {
+  while (!text.empty() && text.back() == '\n') text.pop_back();
+  text.erase(0, text.find_last_of("\r\n") + 1);
+  const std::string name = "tensorray: ";
+  return text.rfind(name, 0) == 0 ? text.substr(name.size()) : text;
+}
+
+}  // namespace
+
+std::filesystem::path import_program() {
+  const std::filesystem::path program = sibling_program("tensorray-import");
+  if (!std::filesystem::exists(program))
+    throw std::runtime_error("imports need " + program.string() +
+                             ", which is not built; run `tools/setup release import`");
+  return program;
+}
+
+bool needs_import(const std::filesystem::path& path) {
+  if (is_field_file(path) || lower_case_ending(path) == ".json") return false;
+  std::error_code none;
+  // What is not a regular file, such as a pipe, cannot be looked into and read again.
+  return std::filesystem::is_regular_file(path, none) && !begins_as_scene(path);
+}
+
+ImportedField::ImportedField(const std::filesystem::path& file, const ImportChoices& choices, bool quiet)
+    : path_(folder_ / "field.vdb") {
+  std::vector<std::string> arguments{"-o", path_.string(), "-q"};
+  const auto add = [&](const char* option, const std::string& value) {
+    if (!value.empty()) arguments.insert(arguments.end(), {option, value});
+  };
+  add("--order", choices.order);
+  add("--array", choices.array);
+  add("--gradient-of", choices.gradient_of);
+  arguments.insert(arguments.end(), {"--", file.string()});
+  const ProgramEnd end = run_program(import_program(), arguments, UnnamedFile());
+  if (end.signal != 0) throw std::runtime_error(file.string() + ": the import crashed; the file may be damaged");
+  if (end.status != 0) throw std::runtime_error(last_line(end.error));
+  if (!quiet) fmt::print(stderr, "{}", end.error);
+}
+
+}  // namespace tensorray
