@@ -8,6 +8,7 @@
 #include "base/text.h"
 #include "scenes/description/check_scene.h"
 #include "scenes/description/scene_keys.h"
+#include "scenes/keys/frames.h"
 #include "scenes/keys/overrides.h"
 #include "scenes/pipeline/methods.h"
 
@@ -60,10 +61,12 @@ void replace_outputs(SceneDescription& scene, const std::vector<std::filesystem:
   }
 }
 
-void choose_outputs(SceneDescription& scene) {
+void choose_outputs(SceneDescription& scene, const std::optional<int>& frame) {
   if (!scene.output.files.empty()) return;
-  scene.output.files["image"] = std::filesystem::path(scene.path).replace_extension(".png");
-  scene.output.files["exr"] = std::filesystem::path(scene.path).replace_extension(".exr");
+  const std::string name = std::filesystem::path(scene.path).replace_extension().string();
+  const std::string number = frame ? numbered(".####", *frame) : "";
+  scene.output.files["image"] = name + number + ".png";
+  scene.output.files["exr"] = name + number + ".exr";
 }
 
 /// The scene of a field alone: the light that it bends, on a plate, from the side that shows most.
@@ -90,14 +93,21 @@ SceneDescription read_scene(const std::filesystem::path& path, const SceneChange
   for (const std::string& change : changes.overrides) apply_override(json, change);
 
   const SceneSource source{path};
+  std::vector<std::filesystem::path> outputs = changes.outputs;
+  if (changes.frame) {
+    set_frame(json, *changes.frame, source);
+    for (std::filesystem::path& output : outputs) output = numbered(output.string(), *changes.frame);
+  } else {
+    refuse_keyframes(json, source);
+  }
   SceneDescription scene = default_scene();
   scene.path = path;
   scene.text = text_of(json, source);
   SectionReader reader(json, "", source);
   describe(scene, reader);
   reader.finish();
-  replace_outputs(scene, changes.outputs);
-  choose_outputs(scene);
+  replace_outputs(scene, outputs);
+  choose_outputs(scene, changes.frame);
   check_scene(scene, json, source);
   return scene;
 }

@@ -3,6 +3,7 @@
 /// Scene file → SceneDescription. Reads no other file.
 
 #include <filesystem>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -20,6 +21,10 @@ struct SceneChanges {
   /// Files to write instead of those of the scene, relative to the working folder. The ending of each file selects one
   /// of the method's outputs.
   std::vector<std::filesystem::path> outputs;
+
+  /// The frame of a scene that changes (see set_frame); # in `outputs` is its number, too. None: the scene must not
+  /// have keyframes.
+  std::optional<int> frame = std::nullopt;
 };
 
 /// Whether a path names a field, an OpenVDB file, and not a scene.

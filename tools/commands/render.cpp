@@ -9,6 +9,7 @@
 
 #include "base/distinct_files.h"
 #include "base/text.h"
+#include "scenes/keys/frames.h"
 #include "scenes/pipeline/methods.h"
 #include "tools/commands/commands.h"
 #include "tools/commands/imported_field.h"
@@ -23,6 +24,8 @@ struct RenderOptions {
   std::optional<std::uint64_t> seed;
   std::string error;
   ImportChoices import;
+  std::string frames;
+  bool skip_existing = false;
   RenderRun run;
 };
 
@@ -52,6 +55,7 @@ double parse_part(const std::string& text) {
 
 /// Renders another program's file. Its pictures are named after the file.
 void render_import(const std::string& file, SceneChanges changes, const RenderOptions& options, Progress& progress) {
+  if (!options.frames.empty()) throw std::invalid_argument("--frames: import the files first, with `tensorray import`");
   if (!options.run.scene_copy.empty())
     throw std::invalid_argument("--save-scene: a scene needs a field that stays; make it with `tensorray import " +
                                 printable(file) + " -o FIELD.vdb`");
@@ -89,6 +93,11 @@ void add_render_command(CLI::App& program, Progress& progress) {
                       "photon_distribution: refine until the picture's relative error is below this, as 1%");
   command->add_option("--stats", options->run.statistics, "Write statistics of the render to this JSON file");
   command->add_option("--save-scene", options->run.scene_copy, "Write the scene, with its changes, to this JSON file");
+  CLI::Option* frames = command->add_option("--frames", options->frames,
+                                            "Render these frames, as 1-240 or 1-240x2: # in names of files is the "
+                                            "frame's number (flow.####.vdb), and numbers "
+                                            "of the scene may have keyframes");
+  command->add_flag("--skip-existing", options->skip_existing, "Leave out frames whose files exist")->needs(frames);
   command->add_option("--order", options->import.order, "Of the tensor's components, as for `tensorray import`")
       ->group("Import");
   command->add_option("--array", options->import.array, "The array that is the tensor, likewise")->group("Import");
@@ -104,7 +113,10 @@ void add_render_command(CLI::App& program, Progress& progress) {
     const ImportChoices& import = options->import;
     if (!import.order.empty() || !import.array.empty() || !import.gradient_of.empty())
       throw std::invalid_argument("--order, --array and --gradient-of are for files that have to be imported");
-    render_scene(options->scene, changes, options->run, progress);
+    if (options->frames.empty()) return render_scene(options->scene, changes, options->run, progress);
+    if (!options->run.scene_copy.empty()) throw std::invalid_argument("--save-scene: not for several frames");
+    render_frames(options->scene, changes, parse_frames(options->frames), options->skip_existing, options->run,
+                  progress);
   });
 }
 

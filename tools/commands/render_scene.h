@@ -3,6 +3,7 @@
 /// Renders a scene file and writes its outputs.
 
 #include <filesystem>
+#include <vector>
 
 #include "base/progress.h"
 #include "scenes/pipeline/read_scene.h"
@@ -21,5 +22,12 @@ struct RenderRun {
 /// @throw SceneError, std::invalid_argument, std::runtime_error, Cancelled.
 void render_scene(const std::filesystem::path& scene_file, const SceneChanges& changes, const RenderRun& run,
                   Progress& progress);
+
+/// Renders frames of a scene (see set_frame), one after the other. The scale and the direction `auto` are those of the
+/// first frame. A field that does not change is loaded once.
+/// @param skip_existing  Leaves out frames of which all files exist.
+/// @throw as render_scene; SceneError if the names of files do not count frames, so that one would replace another.
+void render_frames(const std::filesystem::path& scene_file, SceneChanges changes, const std::vector<int>& frames,
+                   bool skip_existing, const RenderRun& run, Progress& progress);
 
 }  // namespace tensorray

@@ -1,0 +1,84 @@
+// `tensorray render --frames`: sequences.
+
+#include <algorithm>
+
+#include "renderer/images/image.h"
+#include "tests/program/support.h"
+
+namespace tensorray {
+namespace {
+
+using namespace test;
+
+class Frames : public Program {
+ protected:
+  void SetUp() override {
+    Program::SetUp();
+    run_well({"make", "point_load", "-o", "load.0001.vdb", "--resolution", "9"});
+    run_well({"make", "vortex", "-o", "load.0003.vdb", "--resolution", "9"});
+  }
+
+  void expect_error(const std::vector<std::string>& arguments, const std::string& text) {
+    const Outcome outcome = run(arguments);
+    EXPECT_NE(outcome.status, 0);
+    EXPECT_NE(outcome.error.find(text), std::string::npos) << outcome.error;
+    EXPECT_EQ(std::count(outcome.error.begin(), outcome.error.end(), '\n'), 1) << outcome.error;
+  }
+
+  std::vector<float> pixels(const std::string& name) const { return read_image(in_folder(name)).pixels; }
+
+  const std::string rest_ = R"(, "light": {"photons": 500, "wavelengths": {"count": 4},
+      "direction": {"keys": [[1, [0, 0, -1]], [3, [0, 1, -1]]]}},
+      "receiver": {"resolution": [24, 24]}, "integrator": {"type": "photon_distribution"}})";
+};
+
+TEST_F(Frames, KeyframesAndNumberedFieldsAreFollowed) {
+  write("scene.json", R"({"field": {"file": "load.####.vdb", "scale": 2})" + rest_);
+  run_well({"render", "scene.json", "--frames", "1-3x2", "-o", "out.##.exr", "--stats", "out.##.json", "-q"});
+  for (const char* frame : {"1", "3"}) {
+    const std::string number(frame), direction = number == "1" ? "[0,0,-1]" : "[0,1,-1]";
+    run_well({"render", "scene.json", "--set", "light.direction=" + direction, "--set",
+              "field.file=load.000" + number + ".vdb", "-o", "alone.exr", "-q"});
+    EXPECT_EQ(pixels("out.0" + number + ".exr"), pixels("alone.exr")) << frame;
+    EXPECT_TRUE(exists(in_folder("out.0" + number + ".json")));
+  }
+  EXPECT_FALSE(exists(in_folder("out.02.exr")));
+  EXPECT_NE(pixels("out.01.exr"), pixels("out.03.exr"));
+  expect_error({"render", "scene.json", "--frames", "2", "-q"}, "load.0002.vdb");
+}
+
+TEST_F(Frames, TheAutomaticScaleIsThatOfTheFirstFrame) {
+  write("scene.json", R"({"field": {"file": "load.0001.vdb"})" + rest_);
+  run_well({"render", "scene.json", "--frames", "1-3", "-q"});  // The field is loaded once.
+  run_well({"render", "scene.json", "--frames", "1", "--stats", "stats.json", "-o", "first.exr", "-q"});
+  const double scale = read_json("stats.json")["field"]["scale"];
+  EXPECT_EQ(pixels("scene.0001.exr"), pixels("first.exr"));
+  run_well({"render", "scene.json", "--set", "light.direction=[0,1,-1]", "--set",
+            "field.scale=" + read_json("stats.json")["field"]["scale"].dump(), "-o", "last.exr", "-q"});
+  EXPECT_GT(scale, 0);
+  EXPECT_EQ(pixels("scene.0003.exr"), pixels("last.exr"));
+}
+
+TEST_F(Frames, ExistingFramesAreLeftOutOnRequest) {
+  write("scene.json", R"({"field": {"file": "load.0001.vdb"})" + rest_);
+  run_well({"render", "scene.json", "--frames", "1-2", "-o", "a.#.exr", "-q"});
+  const std::vector<float> second = pixels("a.2.exr");
+  write("a.1.exr", "kept");
+  std::filesystem::remove(in_folder("a.2.exr"));
+  run_well({"render", "scene.json", "--frames", "1-2", "-o", "a.#.exr", "--skip-existing", "-q"});
+  EXPECT_EQ(read_file(in_folder("a.1.exr")), "kept");
+  EXPECT_EQ(pixels("a.2.exr"), second);
+}
+
+TEST_F(Frames, MistakesAreNamed) {
+  write("scene.json", R"({"field": {"file": "load.0001.vdb"})" + rest_);
+  expect_error({"render", "scene.json", "-q"}, "`/light/direction` has keyframes: give --frames");
+  expect_error({"render", "scene.json", "--frames", "1-2", "-o", "one.exr"}, "each frame would replace it");
+  expect_error({"render", "scene.json", "--frames", "1-2", "-o", "a.#.exr", "--stats", "s.json"}, "s.json");
+  expect_error({"render", "scene.json", "--frames", "2-1"}, "--frames 2-1");
+  expect_error({"render", "scene.json", "--frames", "1-2", "--save-scene", "copy.json"}, "--save-scene");
+  EXPECT_FALSE(exists(in_folder("one.exr")));
+}
+
+}  // namespace
+}  // namespace tensorray
