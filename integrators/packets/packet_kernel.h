@@ -78,8 +78,10 @@ void use_instruction_set(const std::string& name);
 /// Number of lanes of a vector with the selected instruction set.
 int lane_count();
 
-/// Arithmetic vector operations in one step of a vector of rays in one cell, where the field is weak. They limit the
-/// speed. Middle of the step, cell and weights of the corners: 29; tensor: 64; kick and second half of the step: 37.
-constexpr int operations_per_step = 130;
+/// Vector operations in one step of a vector of rays in one cell, where the field is weak. They limit the speed.
+/// Multiplications and multiply-adds: middle, cell and weights 11, tensor 64, kick and second half of the step 36.
+constexpr int multiply_adds_per_step = 111;
+/// Additions, roundings, comparisons: middle, cell and weights 18, length 1.
+constexpr int adds_per_step = 19;
 
 }  // namespace tensorray::packets

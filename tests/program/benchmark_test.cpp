@@ -38,8 +38,38 @@ TEST_F(Benchmark, EveryKernelFollowsTheSameRays) {
       }
     }
   }
-  EXPECT_EQ(names,
-            (std::set<std::string>{"coherent", "cold cells", "half empty", "parting", "diverging", "as rendered"}));
+  EXPECT_EQ(names, (std::set<std::string>{"coherent", "cold cells", "half empty", "parting", "diverging", "as rendered",
+                                          "Morton order", "dense"}));
+}
+
+/// A kernel cannot be faster than the bound, and a bound that counts operations which the compiler removed is too high.
+TEST_F(Benchmark, VectorsAreNotFasterThanTheClockAndThePipes) {
+  const Outcome outcome = measure("--quick --json --only machine");
+  ASSERT_EQ(outcome.status, 0) << outcome.error;
+  const auto machine = nlohmann::json::parse(outcome.out).at("machine");
+#if defined(__x86_64__)
+  constexpr double pipes = 2, pipes_of_both = 4;
+#else
+  constexpr double pipes = 4, pipes_of_both = 4;
+#endif
+  // Programs beside this one, and a change of the clock, may make either measurement a little slower.
+  const double most = 1.15 * machine.at("cycles_per_second").get<double>();
+  for (const auto& rate : machine.at("vectors")) {
+    EXPECT_LT(rate.at("multiply_adds_per_second"), pipes * most) << machine;
+    EXPECT_LT(rate.at("adds_per_second"), pipes * most) << machine;
+    EXPECT_LT(rate.at("both_per_second"), pipes_of_both * most) << machine;
+  }
+}
+
+/// All instruction sets with fused multiply-adds give the same bits.
+TEST_F(Benchmark, KernelsOfAllWidthsEndAtTheSameBits) {
+  const Outcome outcome = measure("--quick --json --only kernels --kernels AVX");
+  if (outcome.error.find("no kernel") != std::string::npos) GTEST_SKIP() << "this processor has no AVX2";
+  ASSERT_EQ(outcome.status, 0) << outcome.error;
+  const auto results = nlohmann::json::parse(outcome.out);
+  for (const auto& measurement : results.at("kernels").at("measurements"))
+    for (const auto& row : measurement.at("kernels"))
+      EXPECT_EQ(row.at("ends"), measurement.at("kernels")[0].at("ends")) << measurement.at("name") << row;
 }
 
 TEST_F(Benchmark, WholeJobsSayWhatTheyTookByPhase) {

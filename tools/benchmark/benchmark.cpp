@@ -63,6 +63,8 @@ void run(int argc, char** argv) {
                "Tiny sizes, takes seconds: checks that everything works; the numbers mean nothing");
   app.add_flag("--million", line.options.million,
                "Also run a job with a million positions of 32 wavelengths on a plate of 1024² pixels");
+  app.add_option("--kernels", line.options.kernels, "Measure only kernels whose names contain this text, such as AVX2")
+      ->type_name("TEXT");
   try {
     app.parse(argc, argv);
   } catch (const CLI::Success& request) {  // --help

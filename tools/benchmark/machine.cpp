@@ -74,6 +74,19 @@ Processor processor() {
   return result;
 }
 
+double clock_rate(double seconds) {
+  constexpr std::uint64_t cycles = 3;  // Of a multiplication, from its factors to the product.
+  volatile std::uint64_t number = 0x9e3779b97f4a7c15;
+  const auto work = [&](std::uint64_t rounds) {
+    const std::uint64_t factor = number;  // The compiler does not know it, so that it multiplies.
+    std::uint64_t product = factor;
+    for (std::uint64_t round = 0; round < rounds; ++round) product *= factor;
+    number = product | 1;
+    return cycles * rounds;
+  };
+  return repeat(as_many, work, thread_seconds, seconds).most;
+}
+
 Bandwidth bandwidth(int threads, std::size_t array_bytes) {
   const Arrays arrays = make_arrays(threads, array_bytes);
   std::atomic<double> unused{0};

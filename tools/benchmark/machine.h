@@ -16,9 +16,12 @@ struct Processor {
 /// The speed of one set of vector instructions.
 struct VectorRate {
   std::string instructions;
-  int lanes = 0;             ///< Floats per vector.
-  double multiply_adds = 0;  ///< Multiply-adds of vectors per second, one thread, independent chains. Without a fused
-                             ///< instruction (before AVX2) a multiplication and an addition count as one.
+  int lanes = 0;  ///< Floats per vector.
+  // Operations of vectors per second, one thread, independent chains:
+  double multiply_adds = 0;  ///< Without a fused instruction (before AVX2), a multiplication and an addition count as
+                             ///< one.
+  double adds = 0;
+  double both = 0;  ///< As many multiply-adds as adds. Some processors add on pipes that do not multiply.
 };
 
 /// Memory bandwidth, bytes per second. The arrays are far larger than the caches.
@@ -29,7 +32,12 @@ struct Bandwidth {
 
 Processor processor();
 
-/// The rates of all instruction sets of the processor, the widest first. The rate is the median of five repetitions.
+/// Cycles per second: the highest rate of several repetitions of a chain of integer multiplications. On x86 each takes
+/// three cycles.
+/// @param seconds  Approximate length of a repetition.
+double clock_rate(double seconds);
+
+/// The rates of all instruction sets of the processor, the widest first. Rates are medians of five repetitions.
 /// @param seconds  Approximate length of a repetition.
 std::vector<VectorRate> vector_rates(double seconds);
 

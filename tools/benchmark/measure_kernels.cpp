@@ -1,5 +1,8 @@
 #include <algorithm>
+#include <cstring>
 #include <stdexcept>
+
+#include <fmt/format.h>
 
 #include "integrators/packets/packet_kernel.h"
 #include "tools/benchmark/kernels.h"
@@ -42,7 +45,11 @@ std::vector<MeasuredField> fields_to_measure(bool quick) {
        half_empty,
        {{"half empty " + size(large), Order::warm}}},
       {"point load, weak", {PointLoad(), small, down, weak}, {{"parting " + size(small), Order::warm}}},
-      {"point load as rendered", {PointLoad(), small, down, automatic}, {{"as rendered " + size(small), Order::fresh}}},
+      {"point load as rendered",
+       {PointLoad(), small, down, automatic},
+       {{"as rendered " + size(small), Order::fresh},
+        {"Morton order " + size(small), Order::morton},
+        {"dense " + size(small), Order::dense}}},
       {"vortex, strong", {Vortex(), small, across, strong}, {{"diverging " + size(small), Order::fresh}}},
   };
 }
@@ -57,6 +64,30 @@ double greatest_difference(const TestField& test, Order order, const TraceFuncti
   for (std::size_t i = 0; i < rays.size(); ++i)
     greatest = std::max(greatest, (rays.position[i] - expected.position[i]).norm() / test.voxel());
   return greatest;
+}
+
+void add_to_hash(const Eigen::Vector3d& values, std::uint64_t& hash) {
+  for (const double value : values) {
+    std::uint64_t bits;
+    std::memcpy(&bits, &value, sizeof bits);
+    hash = (hash ^ bits) * 0x100000001b3;
+    hash ^= hash >> 32;
+  }
+}
+
+/// A number of the positions and directions where some rays end. Two kernels have the same one if these are the same,
+/// bit for bit.
+std::string ends(const TestField& test, Order order, const TraceFunction& kernel) {
+  constexpr std::uint64_t packets = 64;
+  std::uint64_t hash = 0xcbf29ce484222325;
+  for (RayBatch& rays : make_batches(test, order, 0, packets)) {
+    kernel(rays);
+    for (std::size_t i = 0; i < rays.size(); ++i) {
+      add_to_hash(rays.position[i], hash);
+      add_to_hash(rays.direction[i], hash);
+    }
+  }
+  return fmt::format("{:016x}", hash);
 }
 
 struct KernelRate {
@@ -85,12 +116,18 @@ KernelRate measure_kernel(const TestField& test, Order order, const TraceFunctio
   return {rate, static_cast<double>(samples) / static_cast<double>(rays)};
 }
 
-/// The rate as a fraction of the highest one at which vectors of these instructions can be issued.
+/// The rate as a fraction of the highest one at which vectors of these instructions can be issued: the pipes that
+/// multiply limit it, those that add, or all of them together.
 double issue_fraction(double samples_per_second, const std::string& instructions, const Json& machine) {
   for (const Json& rate : machine.at("vectors"))
-    if (rate.at("instructions") == instructions)
-      return samples_per_second * packets::operations_per_step / rate.at("lanes").get<double>() /
-             rate.at("multiply_adds_per_second").get<double>();
+    if (rate.at("instructions") == instructions) {
+      const auto seconds = [&](int operations, const char* kind) { return operations / rate.at(kind).get<double>(); };
+      const double least =
+          std::max({seconds(packets::multiply_adds_per_step, "multiply_adds_per_second"),
+                    seconds(packets::adds_per_step, "adds_per_second"),
+                    seconds(packets::multiply_adds_per_step + packets::adds_per_step, "both_per_second")});
+      return samples_per_second * least / rate.at("lanes").get<double>();
+    }
   throw std::logic_error("no rate was measured for " + instructions);
 }
 
@@ -109,6 +146,7 @@ Json describe_kernel(const TestField& test, Order order, const Kernel& kernel, c
   if (!kernel.follows_the_rule) return row;
   row["rays_per_second"] = rate.samples.median / rate.samples_per_ray;
   row["samples_per_ray"] = rate.samples_per_ray;
+  row["ends"] = ends(test, order, function);
   row["greatest_difference_in_voxels"] = greatest_difference(test, order, function, kernel.settings);
   if (!kernel.instructions.empty())
     row["issue_fraction"] = issue_fraction(rate.samples.median, kernel.instructions, machine);
@@ -120,6 +158,15 @@ void add_ratios(Json& rows) {
   if (rows.empty()) return;
   const double first = rows[0].at("samples_per_second");
   for (Json& row : rows) row["ratio"] = row.at("samples_per_second").get<double>() / first;
+}
+
+/// The kernels whose names contain a text.
+std::vector<Kernel> kernels_named(const std::string& text) {
+  std::vector<Kernel> kernels = all_kernels();
+  const auto differs = [&](const Kernel& kernel) { return kernel.name.find(text) == std::string::npos; };
+  kernels.erase(std::remove_if(kernels.begin(), kernels.end(), differs), kernels.end());
+  if (kernels.empty()) throw std::invalid_argument("no kernel's name contains \"" + text + "\"");
+  return kernels;
 }
 
 }  // namespace
@@ -135,7 +182,7 @@ Json measure_kernels(const Options& options, const Json& machine) {
   const double seconds = options.quick ? 0.001 : 0.25;
   Json result = {{"step_in_voxels", step}, {"rays_per_packet", packet_rays}, {"not_measured", Json::object()}};
   Json& measured = result["measurements"] = Json::array();
-  const std::vector<Kernel> kernels = all_kernels();
+  const std::vector<Kernel> kernels = kernels_named(options.kernels);
   bool first = true;
   for (const MeasuredField& field : fields_to_measure(options.quick)) {
     options.announce(field.measurements[0].name + ": making the field");

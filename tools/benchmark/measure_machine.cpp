@@ -1,3 +1,5 @@
+#include <algorithm>
+
 #include "tools/benchmark/machine.h"
 #include "tools/benchmark/parts.h"
 
@@ -7,9 +9,16 @@ Json measure_machine(const Options& options) {
   options.announce("the processor");
   const Processor machine = processor();
   Json vectors = Json::array();
-  for (const VectorRate& rate : vector_rates(options.quick ? 0.001 : 0.1))
-    vectors.push_back(
-        {{"instructions", rate.instructions}, {"lanes", rate.lanes}, {"multiply_adds_per_second", rate.multiply_adds}});
+  const double seconds = options.quick ? 0.001 : 0.1;
+  const double seconds_of_clock = std::max(seconds, 0.01);
+  double clock = clock_rate(seconds_of_clock);
+  for (const VectorRate& rate : vector_rates(seconds))
+    vectors.push_back({{"instructions", rate.instructions},
+                       {"lanes", rate.lanes},
+                       {"multiply_adds_per_second", rate.multiply_adds},
+                       {"adds_per_second", rate.adds},
+                       {"both_per_second", rate.both}});
+  clock = std::max(clock, clock_rate(seconds_of_clock));  // Clocks change: before the vectors and after them.
   options.announce("the memory");
   const std::size_t array_bytes = std::size_t{options.quick ? 1u : 256u} << 20;
   Json memory = Json::array();
@@ -18,11 +27,8 @@ Json measure_machine(const Options& options) {
     memory.push_back(
         {{"threads", threads}, {"read_bytes_per_second", rate.read}, {"triad_bytes_per_second", rate.triad}});
   }
-  return {{"processor", machine.model},
-          {"threads", machine.threads},
-          {"compiler", machine.compiler},
-          {"vectors", vectors},
-          {"memory", memory}};
+  return {{"processor", machine.model}, {"threads", machine.threads}, {"compiler", machine.compiler},
+          {"cycles_per_second", clock}, {"vectors", vectors},         {"memory", memory}};
 }
 
 }  // namespace tensorray::benchmark

@@ -41,10 +41,14 @@ std::string percent(const Json& json, const char* key) {
 std::string machine_text(const Json& machine) {
   std::string text = fmt::format("{}, {} threads, {}\n", machine.at("processor").get<std::string>(),
                                  machine.at("threads").get<int>(), machine.at("compiler").get<std::string>());
+  text += fmt::format("clock: {:.2f} GHz\n", number(machine, "cycles_per_second") / 1e9);
   for (const Json& rate : machine.at("vectors"))
-    text += fmt::format("{}: {:.2f} billion vectors of {} floats multiplied and added a second, on one thread\n",
-                        rate.at("instructions").get<std::string>(), number(rate, "multiply_adds_per_second") / 1e9,
-                        rate.at("lanes").get<int>());
+    text += fmt::format(
+        "{}, vectors of {} floats, billions a second on one thread: {:.2f} multiply-adds, {:.2f} adds, {:.2f} of "
+        "both\n",
+        rate.at("instructions").get<std::string>(), rate.at("lanes").get<int>(),
+        number(rate, "multiply_adds_per_second") / 1e9, number(rate, "adds_per_second") / 1e9,
+        number(rate, "both_per_second") / 1e9);
   for (const Json& rate : machine.at("memory"))
     text += fmt::format("memory, {} thread{}: {:.1f} GB/s read, {:.1f} GB/s triad\n", rate.at("threads").get<int>(),
                         rate.at("threads") == 1 ? "" : "s", number(rate, "read_bytes_per_second") / 1e9,
@@ -75,15 +79,15 @@ std::string kernel_rates(const Json& measurements, const Json& missing) {
 
 std::string kernel_details(const Json& measurements) {
   std::vector<Row> rows{{"", "kernel", "rays/s", "samples/ray", "of issue bound", "of memory read",
-                         "difference, voxels", "least to most"}};
+                         "difference, voxels", "least to most", "ends"}};
   for (const Json& measurement : measurements)
     for (const Json& row : measurement.at("kernels")) {
       if (!row.contains("rays_per_second")) continue;
-      rows.push_back({measurement.at("name"), row.at("kernel"), fmt::format("{:.0f}", number(row, "rays_per_second")),
-                      fmt::format("{:.0f}", number(row, "samples_per_ray")), percent(row, "issue_fraction"),
-                      percent(row, "bandwidth_fraction"),
-                      fmt::format("{:.1e}", number(row, "greatest_difference_in_voxels")),
-                      fmt::format("{:.3g} to {:.3g}", number(row, "least") / 1e6, number(row, "most") / 1e6)});
+      rows.push_back(
+          {measurement.at("name"), row.at("kernel"), fmt::format("{:.0f}", number(row, "rays_per_second")),
+           fmt::format("{:.0f}", number(row, "samples_per_ray")), percent(row, "issue_fraction"),
+           percent(row, "bandwidth_fraction"), fmt::format("{:.1e}", number(row, "greatest_difference_in_voxels")),
+           fmt::format("{:.3g} to {:.3g}", number(row, "least") / 1e6, number(row, "most") / 1e6), row.at("ends")});
     }
   return table(rows);
 }

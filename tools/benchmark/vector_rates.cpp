@@ -14,27 +14,44 @@ namespace hn = hwy::HWY_NAMESPACE;
 
 int lanes() { return static_cast<int>(hn::Lanes(hn::ScalableTag<float>())); }
 
-/// Ten independent chains hide the latency of five cycles on two ports.
+/// Independent chains of operations. Their number hides the latency, of at most five cycles on two pipes.
+constexpr int chains = 12;
+
+/// @param start  A number that the compiler does not know. Each chain starts at another multiple of it: the compiler
+///               would make one of chains that it knows to be equal.
 /// @return a value that depends on all chains, so that the compiler keeps them.
-float multiply_add(std::size_t rounds) {
+template <class Operation>
+HWY_INLINE float run_chains(std::size_t rounds, float start, const Operation& operation) {
   const hn::ScalableTag<float> tag;
-  const auto factor = hn::Set(tag, 0.999f), term = hn::Set(tag, 0.001f);
-  auto a = hn::Zero(tag), b = a, c = a, d = a, e = a, f = a, g = a, h = a, i = a, j = a;
+  hn::Vec<decltype(tag)> chain[chains];
+  for (int i = 0; i < chains; ++i) chain[i] = hn::Set(tag, start * static_cast<float>(i + 1));
   for (std::size_t round = 0; round < rounds; ++round) {
-    a = hn::MulAdd(a, factor, term);
-    b = hn::MulAdd(b, factor, term);
-    c = hn::MulAdd(c, factor, term);
-    d = hn::MulAdd(d, factor, term);
-    e = hn::MulAdd(e, factor, term);
-    f = hn::MulAdd(f, factor, term);
-    g = hn::MulAdd(g, factor, term);
-    h = hn::MulAdd(h, factor, term);
-    i = hn::MulAdd(i, factor, term);
-    j = hn::MulAdd(j, factor, term);
+#pragma GCC unroll 12
+    for (int i = 0; i < chains; ++i) chain[i] = operation(i, chain[i]);
   }
-  const auto sum =
-      hn::Add(hn::Add(hn::Add(a, b), hn::Add(c, d)), hn::Add(hn::Add(e, f), hn::Add(hn::Add(g, h), hn::Add(i, j))));
+  auto sum = chain[0];
+  for (int i = 1; i < chains; ++i) sum = hn::Add(sum, chain[i]);
   return hn::GetLane(hn::SumOfLanes(tag, sum));
+}
+
+float multiply_add(std::size_t rounds, float start) {
+  const hn::ScalableTag<float> tag;
+  const auto factor = hn::Set(tag, 0.999f), term = hn::Set(tag, start);
+  return run_chains(rounds, start, [&](int, auto x) HWY_ATTR { return hn::MulAdd(x, factor, term); });
+}
+
+float add(std::size_t rounds, float start) {
+  const hn::ScalableTag<float> tag;
+  const auto term = hn::Set(tag, start);
+  return run_chains(rounds, start, [&](int, auto x) HWY_ATTR { return hn::Add(x, term); });
+}
+
+float both(std::size_t rounds, float start) {
+  const hn::ScalableTag<float> tag;
+  const auto factor = hn::Set(tag, 0.999f), term = hn::Set(tag, start);
+  return run_chains(rounds, start, [&](int i, auto x) HWY_ATTR {
+    return i % 2 == 0 ? hn::MulAdd(x, factor, term) : hn::Add(x, term);
+  });
 }
 
 }  // namespace tensorray::benchmark::HWY_NAMESPACE
@@ -45,9 +62,27 @@ namespace tensorray::benchmark {
 
 HWY_EXPORT(lanes);
 HWY_EXPORT(multiply_add);
+HWY_EXPORT(add);
+HWY_EXPORT(both);
+
+namespace {
+
+constexpr std::uint64_t operations_per_round = 12;  // The chains.
+
+/// Operations per second of `run(rounds, start)`.
+template <class Run>
+double rate_of_chains(const Run& run, double seconds) {
+  volatile float start = 0.001f, unused = 0;
+  const auto work = [&](std::uint64_t rounds) {
+    unused = run(rounds, start);
+    return operations_per_round * rounds;
+  };
+  return repeat(as_many, work, thread_seconds, seconds).median;
+}
+
+}  // namespace
 
 std::vector<VectorRate> vector_rates(double seconds) {
-  constexpr std::size_t chains = 10;
   std::vector<VectorRate> rates;
   for (const std::int64_t target : hwy::SupportedAndGeneratedTargets()) {
     hwy::SetSupportedTargetsForTest(target);
@@ -55,12 +90,11 @@ std::vector<VectorRate> vector_rates(double seconds) {
     VectorRate rate;
     rate.instructions = hwy::TargetName(target);
     rate.lanes = HWY_DYNAMIC_DISPATCH(lanes)();
-    volatile float unused = 0;
-    const auto work = [&](std::uint64_t rounds) {
-      unused = HWY_DYNAMIC_DISPATCH(multiply_add)(rounds);
-      return chains * rounds;
-    };
-    rate.multiply_adds = repeat(as_many, work, thread_seconds, seconds).median;
+    const auto measured = [&](const auto& run) { return rate_of_chains(run, seconds); };
+    rate.multiply_adds =
+        measured([](std::size_t n, float start) { return HWY_DYNAMIC_DISPATCH(multiply_add)(n, start); });
+    rate.adds = measured([](std::size_t n, float start) { return HWY_DYNAMIC_DISPATCH(add)(n, start); });
+    rate.both = measured([](std::size_t n, float start) { return HWY_DYNAMIC_DISPATCH(both)(n, start); });
     rates.push_back(rate);
   }
   hwy::SetSupportedTargetsForTest(0);

@@ -38,8 +38,11 @@ TestField make_field(const FieldRequest& request);
 
 /// The order of the packets' origins.
 enum class Order {
-  warm,   ///< 64 neighbouring origins, repeated: their cells are in the cache.
-  fresh,  ///< All over the face where light enters, in a shuffled order.
+  warm,    ///< 64 neighbouring origins, repeated: their cells are in the cache.
+  fresh,   ///< All over the face where light enters, in a shuffled order.
+  morton,  ///< As photon jobs trace them: squares of 32² neighbouring origins of 256² on the face, each along a Morton
+           ///< curve. The order of the squares is shuffled, so that few packets see all of the field.
+  dense,  ///< The same, of 1024² origins.
 };
 
 /// The packets `first`, `first` + 1, ... in batches like those of the renderer. Rays begin on the face where light
