@@ -9,10 +9,10 @@
 
 namespace tensorray {
 
-/// Λ along a recorded ray: one tensor sample for each piece of about a voxel, at its middle, with the direction of its
-/// chord. The error falls with the square of a voxel. Pieces outside the volume do not count.
+/// Λ along a recorded ray: one tensor sample for each piece of about 1.5 voxels (less where light turns), at its
+/// middle, with the direction of its chord. The error falls with the square of a voxel. Pieces outside the volume do
+/// not count.
 /// @param strength  σ = s · scale of the ray as it was traced.
-double log_radiance_change(const TensorField& field, const Geometry& geometry, const Track& track,
-                           double strength);
+double log_radiance_change(const TensorField& field, const Geometry& geometry, const Track& track, double strength);
 
 }  // namespace tensorray

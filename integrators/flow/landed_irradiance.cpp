@@ -28,7 +28,7 @@ Vector3d disk_direction(const DistantLight& light, int pass) {
   return (light.direction + radius * (std::cos(pass * golden) * right + std::sin(pass * golden) * up)).normalized();
 }
 
-/// The silhouette of the volume; light starts before all surfaces.
+/// The silhouette of the volume; light starts before all obstacles.
 Beam beam_of(const TensorField& field, const Surfaces& surfaces, const Plate& plate, const Vector3d& direction) {
   Beam beam = silhouette_beam(field.corners(), direction, Vector3d::UnitZ());
   const auto start_before = [&](const std::vector<Vector3d>& points) {
@@ -36,8 +36,14 @@ Beam beam_of(const TensorField& field, const Surfaces& surfaces, const Plate& pl
       beam.center += std::min(0.0, (point - beam.center).dot(direction) - 1e-3 * plate.size.norm()) * direction;
   };
   for (const TriangleMesh& mesh : surfaces.obstacles) start_before(mesh.vertices);
-  start_before(plate.corners());
   return beam;
+}
+
+/// Whether straight light through the middle of the volume meets the plane of the plate before the volume. It would
+/// have to turn back to land on the plate.
+bool is_before(const Plate& plate, const TensorField& field, const Vector3d& direction) {
+  const double height = plate.normal().dot(field.world_box().center() - plate.center);
+  return height * plate.normal().dot(direction) > 0;
 }
 
 /// The box, in pixels of `plate`, in which light of the two ends of the spectrum lands.
@@ -49,7 +55,8 @@ Eigen::AlignedBox2d landing_box(const TensorField& field, const Geometry& geomet
   for (int y = 0; y < landing_probes; ++y) {
     RayBatch rays;
     for (int x = 0; x < landing_probes; ++x) {
-      const Vector2d at = aperture.min().array() + aperture.sizes().array() * Eigen::Array2d(x + 0.5, y + 0.5) / landing_probes;
+      const Vector2d at =
+          aperture.min().array() + aperture.sizes().array() * Eigen::Array2d(x + 0.5, y + 0.5) / landing_probes;
       for (const double flexibility : {light.flexibilities.front(), light.flexibilities.back()})
         rays.add(beam.center + at.x() * beam.right + at.y() * beam.up, beam.direction, flexibility);
     }
@@ -105,6 +112,7 @@ std::optional<LandedIrradiance> landed_irradiance(const TensorField& field, cons
                                                   const Plate& plate, const DistantLight& light,
                                                   const BendingSettings& bending, int resolution, std::size_t rays,
                                                   const Progress& progress) {
+  if (is_before(plate, field, light.direction)) return std::nullopt;
   Surfaces parts = surfaces;
   parts.plate = plate;
   const Geometry geometry(std::move(parts));
@@ -121,8 +129,7 @@ std::optional<LandedIrradiance> landed_irradiance(const TensorField& field, cons
   for (int pass = 0; pass < light.passes; ++pass) {
     const Beam beam = beam_of(field, surfaces, plate, disk_direction(light, pass));
     const FlowMap map = trace_flow_map(field, geometry, result.plate, beam, bending, settings, progress);
-    Caustic caustic =
-        draw_caustic(map, result.plate, bands_of(light, map, settings), channels, true, progress);
+    Caustic caustic = draw_caustic(map, result.plate, bands_of(light, map, settings), channels, true, progress);
     if (pass == 0)
       result.irradiance = std::move(caustic.irradiance);
     else

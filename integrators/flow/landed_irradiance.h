@@ -14,8 +14,8 @@ namespace tensorray {
 
 struct DistantLight {
   Eigen::Vector3d direction = -Eigen::Vector3d::UnitZ();  ///< Unit; in which the light of the disk's centre travels.
-  double angle = 0;  ///< Angle from the disk's centre to its rim, radians.
-  int passes = 1;    ///< Directions within the disk that are traced; >= 1. A light without a disk needs one.
+  double angle = 0;                                       ///< Angle from the disk's centre to its rim, radians.
+  int passes = 1;  ///< Directions within the disk that are traced; >= 1. A light without a disk needs one.
   std::vector<double> flexibilities;  ///< At the ends of the bands: one more than there are bands; monotonic.
 };
 
@@ -24,12 +24,13 @@ struct LandedIrradiance {
   Film irradiance;  ///< A plane for each band; 1 is the irradiance of the beam on a surface that faces it.
 };
 
-/// Traces the flow map of the light that enters the volume to the plane of `plate`. Surfaces of `surfaces` (bounds, cut,
-/// obstacles; its plate is ignored) stop light.
+/// Traces the flow map of the light that enters the volume to the plane of `plate`. Surfaces of `surfaces` (bounds,
+/// cut, obstacles; its plate is ignored) stop light.
 /// @param plate       The whole surface.
 /// @param resolution  Pixels along the longer side of the part of `plate` where light lands.
 /// @param rays        Positions from which light starts, at most, for each direction.
-/// @return nothing if no light lands. The same for any number of threads. @throw Cancelled.
+/// @return nothing if no light lands, or if the light meets the plane before the volume. The same for any number of
+/// threads. @throw Cancelled.
 std::optional<LandedIrradiance> landed_irradiance(const TensorField& field, const Surfaces& surfaces,
                                                   const Plate& plate, const DistantLight& light,
                                                   const BendingSettings& bending, int resolution, std::size_t rays,

@@ -8,17 +8,8 @@
 #include "integrators/bending/radiance_change.h"
 
 namespace tensorray {
-namespace {
 
 using Eigen::Vector3d;
-
-/// The memory of one thread's calls.
-struct Ways {
-  RayBatch rays;
-  std::vector<Track> tracks;
-};
-
-}  // namespace
 
 FieldRegion::FieldRegion(const TensorField& field, const Geometry& geometry, FieldViewSettings settings)
     : field_(field),
@@ -45,8 +36,9 @@ double FieldRegion::entry(const Vector3d& origin, const Vector3d& direction) con
 }
 
 void FieldRegion::follow_back(const Vector3d& origin, const Vector3d& direction, std::vector<BentWay>& ways) const {
-  Ways memory;
+  Memory& memory = memory_.local();
   RayBatch& rays = memory.rays;
+  rays.clear();
   for (const BentWay& way : ways) rays.add(origin, direction, -settings_.flexibility(way.band, way.place));
   const bool gains = settings_.conserve == Conserve::power;
   if (gains)

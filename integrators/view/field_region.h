@@ -7,6 +7,8 @@
 #include <cstdint>
 #include <functional>
 
+#include <tbb/enumerable_thread_specific.h>
+
 #include "integrators/bending/bending.h"
 #include "renderer/shading/bending_region.h"
 
@@ -42,10 +44,17 @@ class FieldRegion final : public BendingRegion {
   std::uint64_t limited() const { return limited_; }
 
  private:
+  /// The memory of one thread's calls.
+  struct Memory {
+    RayBatch rays;
+    std::vector<Track> tracks;
+  };
+
   const TensorField& field_;
   const Geometry& geometry_;
   FieldViewSettings settings_;
   double rounding_;  ///< World units.
+  mutable tbb::enumerable_thread_specific<Memory> memory_;
   mutable std::array<std::atomic<std::uint64_t>, ray_end_count> ends_{};
   mutable std::atomic<std::uint64_t> limited_{0};
 };

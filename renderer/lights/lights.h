@@ -92,8 +92,8 @@ class LightSampler {
   /// the background's, and those of all area lights that a straight ray without obstacles meets.
   double direction_pdf(const Eigen::Vector3d& point, const Eigen::Vector3d& direction) const;
 
-  /// Whether directions of this sampler find light that equally likely directions would hardly find: that of area lights
-  /// and of pictures. Disks do not count.
+  /// Whether directions of this sampler find light that equally likely directions would hardly find: that of area
+  /// lights and of pictures. Disks do not count.
   bool is_concentrated() const;
 
   const std::vector<Light>& lights() const { return lights_; }  ///< Environments here hold no pictures.

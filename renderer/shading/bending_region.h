@@ -16,7 +16,7 @@ struct BentWay {
   // Set by `follow_back`.
   Eigen::Vector3d position = Eigen::Vector3d::Zero();   ///< Where it leaves the region, or meets a surface.
   Eigen::Vector3d direction = Eigen::Vector3d::Zero();  ///< Unit; the direction in which it is followed.
-  double gain = 1;          ///< Factor on the radiance that is found at the end of the way.
+  double gain = 1;                                      ///< Factor on the radiance that is found at the end of the way.
   bool arrives = false;     ///< False: nothing is known of light along this way, which counts as none.
   bool on_surface = false;  ///< Whether the way ends on a surface; otherwise it goes on straight from `position`.
 };

@@ -46,8 +46,8 @@ struct SurfacePicture {
   Film landed;  ///< The part of `radiance` that ShadedScene::landed has lit; empty if there is none.
   /// If light bends: means over the samples that enter the region; 1 and 0 where none does. Otherwise empty.
   std::vector<float> gain, deflection;  ///< See BentView.
-  std::vector<float> path;      ///< Number of the path that was hit nearest to the pixel's centre; −1: none.
-  std::vector<float> samples;   ///< Number of samples.
+  std::vector<float> path;              ///< Number of the path that was hit nearest to the pixel's centre; −1: none.
+  std::vector<float> samples;           ///< Number of samples.
   std::vector<float> variance;  ///< Squared standard error of the pixel's luminance if samples were independent.
 };
 

@@ -60,8 +60,9 @@ void require_shadable(const ShadedScene& scene, const ShadingSettings& settings)
   }
   for (std::size_t i = 0; i < lights.size(); ++i)
     require(!is_area_light(i) || found.count(i), "light " + std::to_string(i) + " must have a surface of its mesh");
-  require(scene.bands_per_way >= 1 && scene.colors.bands() % scene.bands_per_way == 0,
-          "bands_per_way must divide the number of bands");
+  for (const int bands : {scene.bands_per_view, scene.bands_per_bounce})
+    require(bands >= 1 && scene.colors.bands() % bands == 0,
+            "bands_per_view and bands_per_bounce must divide the number of bands");
   for (const LandedLight& light : scene.landed)
     require(light.surface < scene.surfaces.surfaces().size() && light.bands == scene.colors.bands(),
             "landed light must have a surface and the bands of the light");
@@ -198,6 +199,12 @@ bool RayShader::bends(const Vector3d& origin, const Vector3d& direction, double 
   return scene_.region && scene_.region->entry(origin, direction) < distance;
 }
 
+/// The number of bands for which one that is followed into the region stands.
+double RayShader::bands_per_followed(int depth) const {
+  if (band_ >= 0) return 1;
+  return static_cast<double>(throughput_.size()) / (depth == 0 ? scene_.bands_per_view : scene_.bands_per_bounce);
+}
+
 /// Follows a ray into the region, for the band of the path; for a path of all bands, for some of them, evenly spaced.
 /// Successive samples of a pixel take different bands.
 std::vector<BentWay> RayShader::follow_ways(const Vector3d& origin, const Vector3d& direction, int depth,
@@ -207,7 +214,8 @@ std::vector<BentWay> RayShader::follow_ways(const Vector3d& origin, const Vector
   BentWay way;
   way.place = places.next_1d();
   std::vector<BentWay> ways;
-  const int bands = static_cast<int>(throughput_.size()), parts = bands / scene_.bands_per_way;
+  const double share = bands_per_followed(depth);
+  const int bands = static_cast<int>(throughput_.size()), parts = static_cast<int>(share);
   const int first = static_cast<int>((sampler.pixel + sampler.sample) % static_cast<std::uint64_t>(parts));
   for (int band = band_ < 0 ? first : band_; band < bands; band += band_ < 0 ? parts : bands) {
     if (!(throughput_[band] > 0)) continue;
@@ -215,7 +223,6 @@ std::vector<BentWay> RayShader::follow_ways(const Vector3d& origin, const Vector
     ways.push_back(way);
   }
   scene_.region->follow_back(origin, direction, ways);
-  const double share = band_ < 0 ? parts : 1;  // Each way stands for the bands that are not followed.
   for (BentWay& each : ways) each.gain *= share;
   return ways;
 }
@@ -236,7 +243,7 @@ std::optional<FirstSurface> RayShader::shade_bent(const Vector3d& origin, const 
   const std::vector<BentWay> ways = follow_ways(origin, direction, depth, sampler);
   const BandValues before = throughput_;
   const int band_before = band_;
-  const double share = band_ < 0 ? static_cast<double>(throughput_.size()) / scene_.bands_per_way : 1;  // In gains.
+  const double share = bands_per_followed(depth);
   const bool is_view = depth == 0;
   std::optional<FirstSurface> seen;
   BentView view{0, 0};
@@ -333,8 +340,7 @@ void RayShader::add_direct_light(const Vertex& vertex, int depth, PathSampler& s
   evaluate(*vertex.material, reflectance_, wi, vertex.wo, contribution_);
   if (!(contribution_.maxCoeff() > 0)) return;
   const Vector3d start = vertex.start(scene_.surfaces, wi);
-  if (bends(start, light_.direction, light_.distance))
-    return add_bent_light(vertex, wi, start, depth, sampler);
+  if (bends(start, light_.direction, light_.distance)) return add_bent_light(vertex, wi, start, depth, sampler);
   if (is_shadowed(start, vertex.point)) return;
   double factor = std::abs(wi.z()) / light_.pdf;
   if (settings_.direct == DirectLight::both && !light_.is_delta) {

@@ -56,7 +56,9 @@ struct ShadedScene {
   /// Where light bends; null: it is straight everywhere. Light of directional lights that reaches surfaces through the
   /// region is not looked for, except by rays that leave the camera: it is in `landed`.
   const BendingRegion* region = nullptr;
-  int bands_per_way = 1;                 ///< Bands that a ray follows into the region; divides the number of bands.
+  /// Bands that a ray of the camera, and one that surfaces have scattered, follows into the region. Both divide the
+  /// number of bands.
+  int bands_per_view = 1, bands_per_bounce = 1;
   std::vector<LandedLight> landed = {};  ///< Light that bends on its way to flat surfaces.
 };
 
@@ -106,6 +108,7 @@ class RayShader {
   void shade_surface(const Vertex& vertex, int depth, PathSampler& sampler);
   void shade_path(Vertex vertex, int depth, PathSampler& sampler);
   bool bends(const Eigen::Vector3d& origin, const Eigen::Vector3d& direction, double distance) const;
+  double bands_per_followed(int depth) const;
   std::vector<BentWay> follow_ways(const Eigen::Vector3d& origin, const Eigen::Vector3d& direction, int depth,
                                    const PathSampler& sampler) const;
   std::optional<SurfaceHit> end_of(const BentWay& way) const;
@@ -130,7 +133,7 @@ class RayShader {
   LightSample light_;
   std::vector<float> background_;
   std::optional<BentView> bent_view_;
-  int band_ = -1;         ///< The only band of the path, after it was bent; −1: all bands.
+  int band_ = -1;          ///< The only band of the path, after it was bent; −1: all bands.
   bool aims_bent_ = true;  ///< Whether sampled lights are looked for through the region.
 };
 

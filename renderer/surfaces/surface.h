@@ -34,10 +34,10 @@ struct ShadedSurface {
   int material = 0;                      ///< Index of the material.
   int light = -1;                        ///< Index of the AreaLight with this mesh, if the surface emits light.
 
-  std::vector<Eigen::Vector3f> colors;   ///< For each point; working space, 0 to 1. Empty: the material's reflectance.
+  std::vector<Eigen::Vector3f> colors;  ///< For each point; working space, 0 to 1. Empty: the material's reflectance.
   std::shared_ptr<const SurfaceTexture> texture;  ///< Colours of a flat surface, instead of `colors`; or null.
-  std::vector<float> forces;             ///< For each point.
-  std::vector<float> arc_lengths;        ///< For each point.
+  std::vector<float> forces;                      ///< For each point.
+  std::vector<float> arc_lengths;                 ///< For each point.
   std::vector<std::uint32_t> path_ends;  ///< Triangles up to the end of each path, as in TubeMesh. Empty: no paths.
   bool strands_are_paths = false;        ///< Curves only: each strand is a path.
   std::uint32_t first_path = 0;          ///< Number of the first path; the others follow.

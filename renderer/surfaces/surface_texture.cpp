@@ -13,8 +13,8 @@ Eigen::Vector3f color_at(const SurfaceTexture& texture, const Eigen::Vector3d& p
                           static_cast<std::size_t>(inside.x())];
   };
   // Far beyond the edges all colours are those of the edge, and integers do not overflow.
-  const Eigen::Vector2d at = texture.plate.to_pixel(point).cwiseMax(-1.0).cwiseMin(last.cast<double>().array().matrix() +
-                                                                                   Eigen::Vector2d(2, 2));
+  const Eigen::Vector2d at = texture.plate.to_pixel(point).cwiseMax(-1.0).cwiseMin(
+      last.cast<double>().array().matrix() + Eigen::Vector2d(2, 2));
   if (!texture.smooth) return pixel(at.array().floor().cast<int>());
   const Eigen::Array2d corner = (at.array() - 0.5).floor();
   const Eigen::Array2f part = (at.array() - 0.5 - corner).cast<float>();

@@ -116,9 +116,9 @@ enum class Pattern { none, checkerboard };
 /// An item of `objects`: a plate or a mesh.
 struct ObjectDescription {
   std::optional<PlateDescription> plate;
-  std::filesystem::path file;                                              ///< A mesh, if there is no plate.
+  std::filesystem::path file;                                            ///< A mesh, if there is no plate.
   std::variant<Pattern, std::filesystem::path> texture = Pattern::none;  ///< Of a plate; a pattern or a picture.
-  int squares = 16;  ///< checkerboard: along the shorter side.
+  int squares = 16;                                                      ///< checkerboard: along the shorter side.
   MaterialDescription material;
 };
 

@@ -202,7 +202,8 @@ void describe(SceneDescription& scene, Visitor& visit) {
   visit.section("receiver", scene.receiver, "the plate that collects light");
   visit.section("integrator", scene.integrator, "the method");
   visit.section("camera", scene.camera, "path_tracing, scene: the camera");
-  visit.list("lights", scene.lights, "path_tracing, scene: lights; default: a white sky and a lamp, or a sky and the sun",
+  visit.list("lights", scene.lights,
+             "path_tracing, scene: lights; default: a white sky and a lamp, or a sky and the sun",
              [](LightSourceDescription& item) -> LightSourceDescription& { return item; });
   visit.list("objects", scene.objects, "scene: what the light falls on; default: a checkerboard as floor",
              [](ObjectDescription& item) -> ObjectDescription& { return item; });

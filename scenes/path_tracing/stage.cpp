@@ -31,14 +31,14 @@ PathTracerSettings tracer_settings(const SceneDescription& scene, const PathTrac
 
 Image make_image(const SurfacePicture& picture, const ShownLight& light, const PathTracingDescription& description) {
   const Image colors = linear_image(picture.radiance, light.bands, light.xyz_to_working);
-  std::vector<std::string> channels{"R",        "G",        "B",        "A",    "Z",     "normal.X", "normal.Y", "normal.Z",
-                                    "albedo.R", "albedo.G", "albedo.B", "path", "force", "length",   "samples",  "variance"};
+  std::vector<std::string> channels{"R",        "G",        "B",        "A",        "Z",        "normal.X",
+                                    "normal.Y", "normal.Z", "albedo.R", "albedo.G", "albedo.B", "path",
+                                    "force",    "length",   "samples",  "variance"};
   if (!picture.gain.empty()) channels.insert(channels.end(), {"gain", "deflection"});
   Image landed;
   if (!picture.landed.values.empty()) {
     landed = linear_image(picture.landed, light.bands, light.xyz_to_working);
-    channels.insert(channels.end(),
-                    {"caustic.R", "caustic.G", "caustic.B", "straight.R", "straight.G", "straight.B"});
+    channels.insert(channels.end(), {"caustic.R", "caustic.G", "caustic.B", "straight.R", "straight.G", "straight.B"});
   }
   Image image(colors.width, colors.height, std::move(channels));
   const Eigen::Vector3d background = description.background == Background::color

@@ -1,6 +1,7 @@
 #pragma once
 /// @file scenes/path_tracing/stage.h
-/// What all pictures of surfaces share: the settings of the path tracer, visible lamps, and the channels of the picture.
+/// What all pictures of surfaces share: the settings of the path tracer, visible lamps, and the channels of the
+/// picture.
 
 #include <vector>
 

@@ -12,9 +12,9 @@ namespace {
 
 using Eigen::Vector3d;
 
-constexpr double dark_square = 0.12;    // Reflectance of a dark square, by that of a bright one.
-constexpr double floor_below = 0.35;    // Distance of the default floor from the volume, in heights of the volume.
-constexpr double floor_size = 5;        // Its size, in the greatest horizontal extent of the volume.
+constexpr double dark_square = 0.12;  // Reflectance of a dark square, by that of a bright one.
+constexpr double floor_below = 0.35;  // Distance of the default floor from the volume, in heights of the volume.
+constexpr double floor_size = 5;      // Its size, in the greatest horizontal extent of the volume.
 constexpr int floor_squares = 20;
 
 ObjectDescription default_floor(const TensorField& field) {
@@ -79,8 +79,7 @@ SceneObject load_object(const ObjectDescription& description, const Scene& scene
   const Eigen::Vector3f bright =
       (light.rec709_to_working * description.material.color).cwiseMax(0).cwiseMin(1).cast<float>();
   if (const auto* file = std::get_if<std::filesystem::path>(&description.texture))
-    object.texture =
-        std::make_shared<SurfaceTexture>(picture(plate, *file, scene.color, light.rec709_to_working));
+    object.texture = std::make_shared<SurfaceTexture>(picture(plate, *file, scene.color, light.rec709_to_working));
   else if (std::get<Pattern>(description.texture) == Pattern::checkerboard)
     object.texture = std::make_shared<SurfaceTexture>(checkerboard(plate, description.squares, bright));
   return object;
@@ -101,8 +100,8 @@ std::vector<SceneObject> load_objects(const Scene& scene, const ShownLight& ligh
   return objects;
 }
 
-void add_objects(const std::vector<SceneObject>& objects, const ShownLight& light,
-                 std::vector<ShadedSurface>& surfaces, std::vector<Material>& materials) {
+void add_objects(const std::vector<SceneObject>& objects, const ShownLight& light, std::vector<ShadedSurface>& surfaces,
+                 std::vector<Material>& materials) {
   for (const SceneObject& object : objects) {
     ShadedSurface surface;
     surface.shape = object.mesh;

@@ -26,7 +26,7 @@ struct SceneObject {
 std::vector<SceneObject> load_objects(const Scene& scene, const ShownLight& light);
 
 /// Adds their surfaces and materials.
-void add_objects(const std::vector<SceneObject>& objects, const ShownLight& light,
-                 std::vector<ShadedSurface>& surfaces, std::vector<Material>& materials);
+void add_objects(const std::vector<SceneObject>& objects, const ShownLight& light, std::vector<ShadedSurface>& surfaces,
+                 std::vector<Material>& materials);
 
 }  // namespace tensorray

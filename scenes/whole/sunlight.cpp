@@ -83,7 +83,8 @@ std::vector<Light> whole_lights(const Scene& scene, const ShownLights& shown, co
 }
 
 std::function<double(double)> flexibility_of(const BendingDescription& bending) {
-  if (!bending.rgb) return [flexibility = bending.flexibility](double wavelength) { return flexibility.at(wavelength); };
+  if (!bending.rgb)
+    return [flexibility = bending.flexibility](double wavelength) { return flexibility.at(wavelength); };
   return [rgb = *bending.rgb](double wavelength) {
     const int from = wavelength > 550 ? 0 : 1;
     const double part = (650 - 100 * from - wavelength) / 100;
@@ -105,8 +106,7 @@ std::vector<LandedLight> land_light(const Scene& scene, const std::vector<Light>
       plate.resolution.setConstant(caustic.resolution);
       const auto landed = landed_irradiance(scene.field, surfaces_before(scene, objects, i), plate, distant,
                                             scene.bending, caustic.resolution, caustic.rays, progress);
-      if (landed)
-        result.push_back(landed_light(*landed, *light, i, lit_side(plate, scene.field, distant.direction)));
+      if (landed) result.push_back(landed_light(*landed, *light, i, lit_side(plate, scene.field, distant.direction)));
     }
   }
   return result;

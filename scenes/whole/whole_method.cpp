@@ -89,19 +89,24 @@ FieldViewSettings view_settings(const Scene& scene, const WholeScene& whole) {
   settings.bending = scene.bending;
   settings.conserve = whole.settings.conserve;
   settings.most_gain = whole.settings.most_gain;
-  settings.flexibility = [flexibility = flexibility_of(scene.description.bending),
-                          &bands = whole.lights.light.bands](int band, double place) {
+  settings.flexibility = [flexibility = flexibility_of(scene.description.bending), &bands = whole.lights.light.bands](
+                             int band, double place) {
     const Band& each = bands[static_cast<std::size_t>(band)];
     return flexibility(each.wavelength + (place - 0.5) * each.width);
   };
   return settings;
 }
 
+/// Light that surfaces have scattered is smooth, so that fewer bands do.
+int bands_per_bounce(const WholeDescription& settings) {
+  return settings.bands_per_sample % 2 == 0 ? settings.bands_per_sample / 2 : settings.bands_per_sample;
+}
+
 /// All bands must have as many samples.
 PathTracerSettings whole_tracer_settings(const Scene& scene, const WholeScene& whole) {
   PathTracerSettings settings = tracer_settings(scene.description, whole.tracing);
   settings.transparent = whole.tracing.background == Background::transparent;
-  const int parts = whole.tracing.bands / whole.settings.bands_per_sample;
+  const int parts = whole.tracing.bands / bands_per_bounce(whole.settings);
   for (int* samples : {&settings.min_samples, &settings.max_samples, &settings.pass_samples})
     *samples = (*samples + parts - 1) / parts * parts;
   return settings;
@@ -150,7 +155,10 @@ Render LoadedWhole::render(const Scene& scene, const Progress& progress) const {
   const Geometry geometry = seen_geometry(scene, whole_.objects);
   const FieldRegion region(scene.field, geometry, view_settings(scene, whole_));
   const bool bends = bends_light(scene);
-  ShadedScene shaded{stage, materials, sampler, table, bends ? &region : nullptr, whole_.settings.bands_per_sample, {}};
+  ShadedScene shaded{stage, materials, sampler, table};
+  if (bends) shaded.region = &region;
+  shaded.bands_per_view = whole_.settings.bands_per_sample;
+  shaded.bands_per_bounce = bands_per_bounce(whole_.settings);
   if (bends) shaded.landed = land_light(scene, lights, light, whole_.objects, whole_.settings.caustic, progress);
   result.statistics.seconds_tracing = seconds_since(start);
 

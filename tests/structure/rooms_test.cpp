@@ -74,8 +74,8 @@ const std::vector<Room> rooms{
      {"scenes/path_tracing", "scenes/outputs", "scenes/scene", "scenes/description", "scenes/keys", "integrators/*",
       "renderer/*", "volumes/*"}},
     {"scenes/pipeline",
-     {"scenes/photons", "scenes/lens", "scenes/stretch", "scenes/path_tracing", "scenes/whole", "scenes/description", "scenes/keys",
-      "integrators/*", "renderer/*", "volumes/*"}},
+     {"scenes/photons", "scenes/lens", "scenes/stretch", "scenes/path_tracing", "scenes/whole", "scenes/description",
+      "scenes/keys", "integrators/*", "renderer/*", "volumes/*"}},
 
     {"tools/command_line", {}},
     {"tools/import/lattices", {"volumes/*"}},

@@ -1,0 +1,222 @@
+#include "integrators/view/field_region.h"
+
+#include <cmath>
+
+#include <Eigen/Eigenvalues>
+#include <Eigen/LU>
+#include <gtest/gtest.h>
+
+#include "integrators/bending/radiance_change.h"
+#include "renderer/sampling/random.h"
+#include "renderer/sampling/sampling.h"
+#include "tests/integrators/support.h"
+
+namespace tensorray {
+namespace {
+
+using namespace test;
+using Eigen::Matrix3d;
+using Eigen::Vector3d;
+
+constexpr double pi = 3.14159265358979323846;
+
+FieldViewSettings view(Conserve conserve, double flexibility) {
+  FieldViewSettings settings;
+  settings.conserve = conserve;
+  settings.flexibility = [flexibility](int, double) { return flexibility; };
+  return settings;
+}
+
+/// A ray that enters the cube [−1, 1]³: positions are uniform on its surface, directions have the density cos θ / π.
+void sample_entry(std::uint64_t index, Vector3d& position, Vector3d& direction) {
+  PathSampler sampler{5, index, 0, 0};
+  const int face = static_cast<int>(6 * sampler.next_1d());
+  const Eigen::Vector2d at = 2 * sampler.next_2d() - Eigen::Vector2d(1, 1);
+  const double side = face % 2 == 0 ? 1 : -1;
+  const int axis = face / 2;
+  position[axis] = side;
+  position[(axis + 1) % 3] = at.x();
+  position[(axis + 2) % 3] = at.y();
+  direction = frame_about(-side * Vector3d::Unit(axis)) * square_to_cosine_hemisphere(sampler.next_2d());
+}
+
+BentWay follow(const FieldRegion& region, const Vector3d& position, const Vector3d& direction) {
+  std::vector<BentWay> ways(1);
+  region.follow_back(position, direction, ways);
+  return ways[0];
+}
+
+/// Mean and standard error.
+struct Average {
+  double sum = 0, squares = 0, count = 0;
+  void add(double x) {
+    sum += x;
+    squares += x * x;
+    ++count;
+  }
+  double mean() const { return sum / count; }
+  double error() const { return std::sqrt((squares / count - mean() * mean()) / count); }
+};
+
+TEST(FieldRegionTest, EntersWhereStraightLightMeetsTheBox) {
+  const TensorField field = constant_field(general_tensor());
+  const Geometry geometry(surfaces_of(field));
+  const FieldRegion region(field, geometry, view(Conserve::power, 0.1));
+  EXPECT_NEAR(region.entry({0, 0, 3}, {0, 0, -1}), 2, 1e-12);
+  EXPECT_EQ(region.entry({0, 0, 0}, {0, 0, -1}), 0);
+  EXPECT_EQ(region.entry({0, 0, 3}, {0, 0, 1}), INFINITY);
+  EXPECT_EQ(region.entry({0, 0, 1}, {0, 0, 1}), INFINITY);  // Leaves.
+  EXPECT_EQ(region.entry({2, 0, 3}, {0, 0, -1}), INFINITY);
+}
+
+/// Photons keep their power; radiance is still constant if the symmetric part of T is a multiple of the identity,
+/// however strong light bends.
+TEST(FieldRegionTest, RotationKeepsRadiance) {
+  const TensorField field = cube_field(17, [](const Vector3d& p) {
+    Matrix3d T;
+    T << 0, p.x() - 2, 1, 2 - p.x(), 0, p.y(), -1, -p.y(), 0;
+    return Matrix3d(T + p.z() * Matrix3d::Identity());
+  });
+  const Geometry geometry(surfaces_of(field));
+  const FieldRegion region(field, geometry, view(Conserve::power, 1));
+  for (std::uint64_t i = 0; i < 50; ++i) {
+    Vector3d position, direction;
+    sample_entry(i, position, direction);
+    const BentWay way = follow(region, position, direction);
+    ASSERT_TRUE(way.arrives);
+    EXPECT_NEAR(way.gain, 1, 1e-5);
+    EXPECT_LT(way.direction.dot(direction), 0.999999);
+  }
+}
+
+TEST(FieldRegionTest, RadianceIsKeptOnRequestInAnyField) {
+  const TensorField field = cube_field(17, linear_tensor);
+  const Geometry geometry(surfaces_of(field));
+  const FieldRegion region(field, geometry, view(Conserve::radiance, 0.5));
+  for (std::uint64_t i = 0; i < 20; ++i) {
+    Vector3d position, direction;
+    sample_entry(i, position, direction);
+    EXPECT_EQ(follow(region, position, direction).gain, 1);
+  }
+}
+
+/// L_end / L_start = |M V|³ / det M with M = exp(s ℓ T) for light of constant T; the gain of the way back is that of
+/// the light that comes along it.
+TEST(FieldRegionTest, ConstantTensorsHaveTheGainOfTheClosedForm) {
+  const double s = 0.4;
+  for (const auto& [voxels, tolerance] : {std::pair(9, 8e-3), std::pair(33, 5e-4)}) {
+    const TensorField field = cube_field(voxels, [](const Vector3d&) { return general_tensor(); });
+    const Geometry geometry(surfaces_of(field));
+    for (const Vector3d& direction : {Vector3d(0, 0, 1), Vector3d(0.3, -0.2, 0.9), Vector3d(1, 0.1, 0.1)}) {
+      RayBatch rays;
+      rays.add(-0.99 * direction, direction.normalized(), -s);
+      std::vector<Track> tracks;
+      trace(field, geometry, {}, rays, tracks);
+      const double change = log_radiance_change(field, geometry, tracks[0], -s);
+      const double length = rays.length[0];
+      // exp(A) by its series of A / 2^20.
+      Matrix3d M = Matrix3d::Identity() + std::ldexp(1, -20) * length * s * general_tensor();
+      for (int i = 0; i < 20; ++i) M = M * M;
+      const Vector3d light = -rays.direction[0];  // Where the light enters the volume.
+      EXPECT_NEAR(std::exp(change), std::pow((M * light).norm(), 3) / M.determinant(), tolerance);
+      EXPECT_GT(std::abs(change), 0.02);
+    }
+  }
+}
+
+/// What leaves a convex boundary fills it once, so that the mean of the gain is 1.
+TEST(FieldRegionTest, TheMeanGainOverAConvexBoundaryIsOne) {
+  const TensorField field = cube_field(17, linear_tensor);
+  const Geometry geometry(surfaces_of(field));
+  const FieldRegion region(field, geometry, view(Conserve::power, 0.5));
+  Average gain;
+  for (std::uint64_t i = 0; i < 60000; ++i) {
+    Vector3d position, direction;
+    sample_entry(i, position, direction);
+    gain.add(follow(region, position, direction).gain);
+  }
+  EXPECT_NEAR(gain.mean(), 1, 5 * gain.error());
+  EXPECT_LT(gain.error(), 0.01);
+}
+
+/// Light from a textured Lambertian plate below the field to a sensor above it, once as photons and once as rays that
+/// are followed back from the sensor.
+class Sensor : public ::testing::Test {
+ protected:
+  const double size_ = 4, sensor_size_ = 1.2;
+  const TensorField field_ = cube_field(17, linear_tensor);
+
+  Plate plate(double z, double size, double tilt) const {
+    Plate plate;
+    plate.center = {0, 0, z};
+    plate.up = Vector3d(0, std::cos(tilt), std::sin(tilt));
+    plate.size = {size, size};
+    return plate;
+  }
+
+  static double radiance(const Vector3d& point) { return 1 + std::sin(2 * point.x()) * std::cos(point.y()); }
+
+  static bool is_on(const Plate& plate, const Vector3d& point) {
+    const Eigen::Array2d at = plate.to_pixel(point).array();
+    return (at > 0).all() && (at < plate.resolution.cast<double>().array()).all();
+  }
+
+  /// A point of the plate and a direction on the side of its normal, with the density cos θ / π.
+  static void start(const Plate& plate, double side, std::uint64_t index, Vector3d& point, Vector3d& direction) {
+    PathSampler sampler{7, index, 0, 0};
+    point = plate.to_world(sampler.next_2d().cwiseProduct(plate.resolution.cast<double>()));
+    direction = frame_about(side * plate.normal()) * square_to_cosine_hemisphere(sampler.next_2d());
+  }
+
+  /// Flux on the sensor by photons.
+  Average forwards(double s) const {
+    const Plate emitter = plate(-1.5, size_, 0), sensor = plate(1.4, sensor_size_, 0.3);
+    Surfaces surfaces = surfaces_of(field_);
+    surfaces.plate = sensor;
+    const Geometry geometry(std::move(surfaces));
+    Average flux;
+    for (std::uint64_t i = 0; i < 300000; ++i) {
+      Vector3d point, direction;
+      start(emitter, 1, i, point, direction);
+      RayBatch rays;
+      rays.add(point, direction, s);
+      trace(field_, geometry, {}, rays);
+      // The sensor sees one side.
+      const bool arrives = rays.end[0] == RayEnd::plate && rays.direction[0].dot(sensor.normal()) > 0;
+      flux.add(arrives ? pi * size_ * size_ * radiance(point) : 0);
+    }
+    return flux;
+  }
+
+  /// The same, followed back. @param s  Of the light; the region takes −s.
+  Average backwards(double s, Conserve conserve) const {
+    const Plate emitter = plate(-1.5, size_, 0), sensor = plate(1.4, sensor_size_, 0.3);
+    const Geometry geometry(surfaces_of(field_));
+    const FieldRegion region(field_, geometry, view(conserve, s));
+    Average flux;
+    for (std::uint64_t i = 0; i < 100000; ++i) {
+      BentWay way;
+      start(sensor, -1, i, way.position, way.direction);
+      if (region.entry(way.position, way.direction) < INFINITY) way = follow(region, way.position, way.direction);
+      const double distance = (emitter.center.z() - way.position.z()) / way.direction.z();
+      const Vector3d hit = way.position + distance * way.direction;
+      const bool arrives = way.direction.z() < 0 && is_on(emitter, hit);
+      flux.add(arrives ? pi * sensor_size_ * sensor_size_ * way.gain * radiance(hit) : 0);
+    }
+    return flux;
+  }
+};
+
+TEST_F(Sensor, SeesTheSameForwardsAndBackwards) {
+  const double s = 0.35;
+  const Average photons = forwards(s), rays = backwards(s, Conserve::power);
+  const double error = std::hypot(photons.error(), rays.error());
+  EXPECT_NEAR(photons.mean(), rays.mean(), 4 * error);
+  EXPECT_LT(error, 0.02 * rays.mean());
+  // The test can fail: with the wrong sign of s, and without the gain.
+  EXPECT_GT(std::abs(photons.mean() - backwards(-s, Conserve::power).mean()), 6 * error);
+  EXPECT_GT(std::abs(photons.mean() - backwards(s, Conserve::radiance).mean()), 6 * error);
+}
+
+}  // namespace
+}  // namespace tensorray

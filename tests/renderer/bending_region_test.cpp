@@ -1,0 +1,173 @@
+#include "renderer/shading/bending_region.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include <gtest/gtest.h>
+
+#include "renderer/shading/path_tracer.h"
+#include "tests/renderer/statistics.h"
+
+namespace tensorray {
+namespace {
+
+using Eigen::Vector3d;
+
+constexpr int bands = 4;
+
+/// The ball of radius ½ about the origin. All light that passes through it turns about z by one angle for each band, at
+/// its centre, which keeps radiance; the ray goes on from the ball's centre.
+class TurningBall : public BendingRegion {
+ public:
+  explicit TurningBall(double angle, double gain = 1) : angle_(angle), gain_(gain) {}
+
+  double entry(const Vector3d& origin, const Vector3d& direction) const override {
+    const double along = -origin.dot(direction);
+    const double half = 0.25 - (origin + along * direction).squaredNorm();
+    return half > 0 && along + std::sqrt(half) > 1e-9 ? std::max(0.0, along - std::sqrt(half)) : INFINITY;
+  }
+
+  void follow_back(const Vector3d& origin, const Vector3d& direction, std::vector<BentWay>& ways) const override {
+    for (BentWay& way : ways) {
+      way.direction = Eigen::AngleAxisd(angle_ * (1 + way.band), Vector3d::UnitZ()) * direction;
+      const double along = entry(origin, direction);
+      way.position = origin + along * direction;
+      way.arrives = true;
+      way.gain = gain_;
+    }
+  }
+
+ private:
+  double angle_, gain_;
+};
+
+std::vector<Band> test_bands() {
+  return {{620, 60, 0.25, Vector3d(1, 0.3, 0)},
+          {560, 60, 0.25, Vector3d(0.2, 0.5, 0)},
+          {500, 60, 0.25, Vector3d(0, 0.15, 0.2)},
+          {440, 60, 0.25, Vector3d(0.1, 0.05, 0.8)}};
+}
+
+const ReflectanceTable& colors() {
+  static const Eigen::Matrix3d matrix = Eigen::Matrix3d::Identity();
+  static const ReflectanceTable table(ReflectanceModel(test_bands(), matrix), test_bands(), matrix);
+  return table;
+}
+
+std::vector<float> even(float value) { return std::vector<float>(bands, value); }
+
+/// A floor below the ball, lit by `lights`, of which the first may be the area light of a lamp.
+struct Stage {
+  explicit Stage(const std::vector<Light>& light_list, double albedo = 0.6)
+      : materials{make_material(Diffuse{}, BandValues::Constant(bands, albedo)),
+                  make_material(Diffuse{}, BandValues::Zero(bands))},
+        surfaces(parts(light_list)),
+        lights(light_list, {0.3f, 0.5f, 0.15f, 0.05f}, surfaces.bounds()),
+        scene{surfaces, materials, lights, colors()} {}
+
+  static std::vector<ShadedSurface> parts(const std::vector<Light>& lights) {
+    std::vector<ShadedSurface> result(1);
+    result[0].shape = rectangle_mesh({0, 0, -0.8}, {1, 0, 0}, {0, 1, 0}, {8, 8});
+    if (const auto* lamp = std::get_if<AreaLight>(&lights[0])) {
+      ShadedSurface surface;
+      surface.shape = lamp->mesh;
+      surface.material = 1;
+      surface.light = 0;
+      result.push_back(surface);
+    }
+    return result;
+  }
+
+  std::vector<Material> materials;
+  SurfaceScene surfaces;
+  LightSampler lights;
+  ShadedScene scene;
+};
+
+/// The mean over the bands, averaged over rays from one point to another.
+Mean seen(const ShadedScene& scene, const ShadingSettings& settings, const Vector3d& from, const Vector3d& to,
+          std::uint64_t samples) {
+  RayShader shader(scene, settings);
+  Mean mean;
+  for (std::uint64_t i = 0; i < samples; ++i) {
+    PathSampler sampler{3, i, 0, 0};
+    shader.shade(from, (to - from).normalized(), true, sampler);
+    mean.add(shader.radiance().mean());
+  }
+  return mean;
+}
+
+AreaLight lamp() { return {rectangle_mesh({0.3, 0, 1.2}, {1, 0, 0}, {0, -1, 0}, {0.8, 0.8}), even(5)}; }
+
+TEST(BendingRegionTest, AWhiteFloorInAWhiteSkyCannotBeSeen) {
+  Stage stage({ConstantLight{even(1)}}, 1);
+  const TurningBall ball(0.3);
+  stage.scene.region = &ball;
+  stage.scene.bands_per_view = 4;
+  stage.scene.bands_per_bounce = 4;
+  RayShader shader(stage.scene, {});
+  for (const Vector3d& to : {Vector3d(0, 0, 0), Vector3d(0.1, 0, -0.8), Vector3d(0.9, 0.4, -0.8)}) {
+    const Mean mean = seen(stage.scene, {}, {0, -3, 1.5}, to, 4000);
+    EXPECT_NEAR(mean.mean(), 1, 5 * mean.error() + 1e-9);
+  }
+}
+
+/// Turns about z keep everything about a lit point, if all bands turn by less than the lamp is large or not.
+TEST(BendingRegionTest, EverySubsetOfTechniquesHasTheSameMean) {
+  for (const double angle : {0.2, 1.3}) {
+    Stage stage({lamp(), ConstantLight{even(0.2f)}});
+    const TurningBall ball(angle);
+    stage.scene.region = &ball;
+    stage.scene.bands_per_view = 2;
+    stage.scene.bands_per_bounce = 1;
+    std::vector<Mean> means;
+    for (const DirectLight direct : {DirectLight::both, DirectLight::lights, DirectLight::material}) {
+      ShadingSettings settings;
+      settings.direct = direct;
+      settings.max_depth = 2;
+      settings.indirect_clamp = 0;
+      means.push_back(seen(stage.scene, settings, {1, -3, 0.4}, {0.05, 0.1, -0.8}, 60000));
+    }
+    for (std::size_t i = 1; i < means.size(); ++i)
+      EXPECT_NEAR(means[i].mean(), means[0].mean(), 4.5 * std::hypot(means[i].error(), means[0].error())) << i;
+  }
+}
+
+TEST(BendingRegionTest, BandsThatAreFollowedStandForAll) {
+  Stage stage({lamp(), ConstantLight{even(0.2f)}});
+  const TurningBall ball(0.4, 1.5);
+  stage.scene.region = &ball;
+  std::vector<Mean> means;
+  for (const int count : {1, 2, 4}) {
+    stage.scene.bands_per_view = stage.scene.bands_per_bounce = count;
+    means.push_back(seen(stage.scene, {}, {0, -3, 0.7}, {0, 0, 0.02}, 40000));
+  }
+  for (std::size_t i = 1; i < means.size(); ++i)
+    EXPECT_NEAR(means[i].mean(), means[0].mean(), 4.5 * std::hypot(means[i].error(), means[0].error())) << i;
+}
+
+/// A directional light reaches no surface through the region, because landed light has it; the camera still sees it.
+TEST(BendingRegionTest, LandedLightReplacesTheSunBehindTheRegion) {
+  DirectionalLight sun;
+  sun.irradiance = even(2);
+  Stage stage({sun});
+  const TurningBall ball(0.1);
+  stage.scene.region = &ball;
+  const auto radiance = [&](const Vector3d& to) { return seen(stage.scene, {}, {0, -3, 1}, to, 100).mean(); };
+  const Vector3d below(0.1, 0.1, -0.8), beside(0.9, 0.1, -0.8);
+  EXPECT_EQ(radiance(below), 0);
+  EXPECT_NEAR(radiance(beside), 2 * 0.6 / 3.14159265, 1e-6);
+
+  LandedLight landed;
+  landed.plate.center = {0, 0, -0.8};
+  landed.plate.resolution = {4, 4};
+  landed.bands = bands;
+  landed.irradiance.assign(16 * bands, 3);
+  stage.scene.landed = {landed};
+  EXPECT_NEAR(radiance(below), 3 * 0.6 / 3.14159265, 1e-6);
+  stage.scene.landed[0].side = -1;
+  EXPECT_EQ(radiance(below), 0);
+}
+
+}  // namespace
+}  // namespace tensorray
