@@ -31,11 +31,13 @@ struct WholeScene {
 };
 
 /// Whether the field bends light anywhere. Where it does not, the picture is that of the straight path tracer.
-bool bends_light(const Scene& scene) {
+bool bends_light(const Scene& scene, const std::vector<Band>& bands) {
   const std::vector<Eigen::Vector3i>& bricks = scene.field.bricks();
-  return scene.bending.scale != 0 && std::any_of(bricks.begin(), bricks.end(), [&](const Eigen::Vector3i& brick) {
-           return scene.field.brick(brick).strongest > 0;
-         });
+  const auto flexibility = flexibility_of(scene.description.bending);
+  const auto is_flexible = [&](const Band& band) { return flexibility(band.wavelength) != 0; };
+  return std::any_of(bands.begin(), bands.end(), is_flexible) &&
+         std::any_of(bricks.begin(), bricks.end(),
+                     [&](const Eigen::Vector3i& brick) { return scene.field.brick(brick).strongest > 0; });
 }
 
 /// The points that an automatic camera shows: the volume, where straight light takes its corners on plates, and meshes.
@@ -154,7 +156,7 @@ Render LoadedWhole::render(const Scene& scene, const Progress& progress) const {
   const ReflectanceTable table(light.model, light.bands, light.xyz_to_working);
   const Geometry geometry = seen_geometry(scene, whole_.objects);
   const FieldRegion region(scene.field, geometry, view_settings(scene, whole_));
-  const bool bends = bends_light(scene);
+  const bool bends = bends_light(scene, light.bands);
   ShadedScene shaded{stage, materials, sampler, table};
   if (bends) shaded.region = &region;
   shaded.bands_per_view = whole_.settings.bands_per_sample;

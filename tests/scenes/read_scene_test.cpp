@@ -252,9 +252,9 @@ TEST_F(ReadScene, WrongTypesSayWhatIsExpectedAndFound) {
               AllOf(HasSubstr("`/light/photons` must be an integer"), EndsWith("but is \"many\"")));
   EXPECT_THAT(error({"bending.method=rk5"}),
               HasSubstr("must be one of \"euler\", \"splitting\", \"rk4\", \"bs23\", \"dopri5\", but is \"rk5\""));
-  EXPECT_THAT(
-      error({"integrator.type=lenses"}),
-      HasSubstr("must be one of \"photon_distribution\", \"lens\", \"path_tracing\", \"stretch\", but is \"lenses\""));
+  EXPECT_THAT(error({"integrator.type=lenses"}),
+              HasSubstr("must be one of \"photon_distribution\", \"lens\", \"path_tracing\", \"stretch\", \"scene\", "
+                        "but is \"lenses\""));
   EXPECT_THAT(error({"light=[]"}), HasSubstr("`/light` must be an object"));
   EXPECT_THAT(error({"obstacles={}"}), HasSubstr("`/obstacles` must be a list of objects"));
   EXPECT_THAT(error({"obstacles=[1]"}), HasSubstr("`/obstacles/0` must be an object"));

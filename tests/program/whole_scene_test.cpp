@@ -1,0 +1,132 @@
+// The method "scene": surfaces in light that a field bends, seen through the field.
+
+#include <cmath>
+
+#include <fmt/core.h>
+
+#include "renderer/images/image.h"
+#include "tests/data_folder.h"
+#include "tests/program/support.h"
+
+namespace tensorray {
+namespace {
+
+using namespace test;
+
+class WholeScene : public Program {
+ protected:
+  /// A small point load with all default objects and lights.
+  void SetUp() override {
+    Program::SetUp();
+    write("scene.json", R"({
+      "field": {"generate": {"kind": "point_load", "resolution": 17}, "eigenvalues": "absolute"},
+      "integrator": {"type": "scene", "max_samples": 4, "min_samples": 4, "noise": 0,
+                     "caustic": {"resolution": 64, "rays": 4000, "passes": 1}},
+      "camera": {"resolution": [40, 32]}})");
+  }
+
+  Image picture(const std::vector<std::string>& sets, const std::string& threads = "2") {
+    std::vector<std::string> arguments{"render", "scene.json", "-q", "-o", "out.exr", "--threads", threads};
+    for (const std::string& set : sets) arguments.insert(arguments.end(), {"--set", set});
+    run_well(arguments);
+    return read_image(in_folder("out.exr"));
+  }
+
+  static double mean(const Image& image, const std::string& channel) {
+    const auto at = std::find(image.channels.begin(), image.channels.end(), channel) - image.channels.begin();
+    double sum = 0;
+    for (std::size_t i = static_cast<std::size_t>(at); i < image.pixels.size(); i += image.channels.size())
+      sum += image.pixels[i];
+    return sum / image.width / image.height;
+  }
+
+  void expect_error(const std::string& set, const std::string& part) {
+    const Outcome outcome = run({"render", "scene.json", "-q", "--set", set});
+    EXPECT_NE(outcome.status, 0) << set;
+    EXPECT_NE(outcome.error.find(part), std::string::npos) << outcome.error;
+    EXPECT_EQ(std::count(outcome.error.begin(), outcome.error.end(), '\n'), 1) << outcome.error;
+  }
+};
+
+TEST_F(WholeScene, HasTheSameBytesOnAnyNumberOfThreads) {
+  const Image one = picture({}, "1");
+  for (const char* threads : {"2", "7"}) EXPECT_EQ(one.pixels, picture({}, threads).pixels) << threads;
+}
+
+TEST_F(WholeScene, BendsWhatTheCameraSeesAndTheSunsLight) {
+  const Image image = picture({});
+  for (const float value : image.pixels) ASSERT_TRUE(std::isfinite(value));
+  EXPECT_GT(mean(image, "deflection"), 0.01);
+  EXPECT_GT(mean(image, "caustic.G"), 0.01);
+  EXPECT_NEAR(mean(image, "caustic.G") + mean(image, "straight.G"), mean(image, "G"), 1e-4);
+}
+
+/// A field that bends nothing, of either kind, gives the picture of the straight path tracer, bit for bit.
+TEST_F(WholeScene, AnIsotropicFieldIsNotThere) {
+  const std::string grid =
+      "field.generate={\"kind\":\"constant\",\"resolution\":9,\"tensor\":[[{0},0,0],[0,{0},0],[0,0,{0}]]}";
+  std::vector<Image> images;
+  for (const char* value : {"0", "3.7"}) {
+    std::string set = grid;
+    for (std::size_t at; (at = set.find("{0}")) != std::string::npos;) set.replace(at, 3, value);
+    images.push_back(picture({set, "field.scale=1", "field.eigenvalues=raw"}));
+  }
+  EXPECT_EQ(images[0].pixels, images[1].pixels);
+  EXPECT_EQ(mean(images[0], "R") > 0.05, true);
+}
+
+/// Light that hardly bends must give that picture, too, though it is found in other ways: the sun by its flow map, the
+/// rest band by band.
+TEST_F(WholeScene, AWeakFieldGivesThePictureWithoutIt) {
+  const std::vector<std::string> many{"integrator.max_samples=64", "integrator.min_samples=64"};
+  std::vector<std::string> weak = many, none = many;
+  weak.push_back("field.scale=1e-7");
+  none.insert(none.end(), {"bending.a=0", "bending.b=0"});
+  const Image with = picture(weak), without = picture(none);
+  for (const char* channel : {"R", "G", "B"})
+    EXPECT_NEAR(mean(with, channel) / mean(without, channel), 1, 0.01) << channel;
+}
+
+/// In an even sky, conserved radiance makes the volume invisible; conserved power does not.
+TEST_F(WholeScene, AnEvenSkyThroughTheFieldIsEvenIfRadianceIsConserved) {
+  const std::vector<std::string> sky{"lights=[{\"kind\":\"constant\"}]", "integrator.max_depth=1",
+                                     "objects=[{\"plate\":{\"center\":[0,0,-50],\"size\":[0.01,0.01]}}]",
+                                     "camera.position=[0,-6,0]", "camera.target=[0,0,0]"};
+  std::vector<std::string> radiance = sky;
+  radiance.push_back("integrator.conserve=radiance");
+  const auto differs = [](const Image& image) {
+    double most = 0;
+    for (std::size_t i = 0; i < image.pixels.size(); i += image.channels.size())
+      most = std::max<double>(most, std::abs(image.pixels[i + 1] - 1));
+    return most;
+  };
+  // At the volume's edge, straight and bent samples of a pixel share the bands unevenly: noise, not a bias.
+  EXPECT_LT(differs(picture(radiance)), 0.02);
+  EXPECT_GT(differs(picture(sky)), 0.1);
+}
+
+TEST_F(WholeScene, RefusesWhatDoesNotFit) {
+  expect_error("integrator.bands_per_sample=7", "/integrator/bands_per_sample");
+  expect_error("integrator.conserve=light", "/integrator/conserve");
+  expect_error("objects=[{\"file\":\"none.ply\"}]", "none.ply");
+  expect_error("objects=[{}]", "/objects/0");
+  expect_error("objects=[{\"plate\":{}}]", "/objects/0/plate");
+  expect_error("objects=[{\"file\":\"none.ply\",\"texture\":\"checkerboard\"}]", "/objects/0/texture");
+  expect_error("objects=[{\"plate\":{\"center\":[0,0,0]},\"texture\":\"none.png\"}]", "none.png");
+  expect_error("objects=[{\"plate\":{\"center\":[0,0,0],\"colour\":1}}]", "/objects/0/plate/colour");
+}
+
+/// A sun in the plane of the floor, a floor through the volume, and a camera inside the volume.
+TEST_F(WholeScene, OddPlacesGiveAPicture) {
+  for (const std::vector<std::string>& sets : std::vector<std::vector<std::string>>{
+           {"lights=[{\"kind\":\"directional\",\"direction\":[1,0,0]}]"},
+           {"objects=[{\"plate\":{\"center\":[0,0,0],\"size\":[8,8]},\"texture\":\"checkerboard\"}]"},
+           {"camera.position=[0.1,0.2,-0.4]", "camera.target=[0,0,-3]"}}) {
+    const Image image = picture(sets);
+    for (const float value : image.pixels) ASSERT_TRUE(std::isfinite(value)) << sets[0];
+    EXPECT_GT(mean(image, "A"), 0.99) << sets[0];
+  }
+}
+
+}  // namespace
+}  // namespace tensorray
