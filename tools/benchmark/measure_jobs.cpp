@@ -15,7 +15,7 @@ namespace {
 struct RenderJob {
   std::string name;
   int resolution = 64;  ///< Voxels along the longest axis of the field.
-  Json scene;           ///< The scene without its field.
+  Json scene;           ///< The scene without the tensors of its field.
 };
 
 /// @param side  Edge of the square picture, pixels.
@@ -58,7 +58,8 @@ std::vector<RenderJob> jobs(bool quick) {
 Json run_job(const TemporaryFolder& folder, const RenderJob& job, int threads, const std::string& program = "tensorray",
              const std::vector<std::string>& options = {}) {
   Json scene = job.scene;
-  scene["field"] = {{"generate", {{"kind", "point_load"}, {"resolution", job.resolution}}}, {"eigenvalues", "raw"}};
+  scene["field"]["generate"] = {{"kind", "point_load"}, {"resolution", job.resolution}};
+  scene["field"]["eigenvalues"] = "raw";
   const auto scene_path = folder / "scene.json", statistics_path = folder / "statistics.json";
   std::ofstream(scene_path) << scene;
   std::vector<std::string> arguments{"render",    scene_path.string(),
@@ -114,8 +115,9 @@ void add_job(const Options& options, const TemporaryFolder& folder, const Render
 /// it is slow.
 Json compare_box_sampler(const Options& options, const TemporaryFolder& folder) {
   const int resolution = options.quick ? 16 : 128, side = options.quick ? 32 : 1024, threads = processor().threads;
-  const RenderJob few = photon_job(resolution, options.quick ? 100 : 2048, side),
-                  many = photon_job(resolution, options.quick ? 100 : 262144, side);
+  RenderJob few = photon_job(resolution, options.quick ? 100 : 2048, side),
+            many = photon_job(resolution, options.quick ? 100 : 262144, side);
+  few.scene["field"]["scale"] = many.scene["field"]["scale"] = 5;  // The automatic scale needs derivatives of rays.
   options.announce("jobs: OpenVDB's BoxSampler in the tracer's place");
   const Json slow = run_job(folder, few, threads, "tensorray_box_sampler"), fast = run_job(folder, many, threads);
   const auto seconds_per_position = [](const Json& job) {
