@@ -91,6 +91,13 @@ ProgramEnd run_program(const std::filesystem::path& program, const std::vector<s
   return end;
 }
 
+void become_program(const std::filesystem::path& program, char** arguments) {
+  std::string name = program.filename().string();
+  arguments[0] = name.data();
+  execv(program.c_str(), arguments);
+  throw std::runtime_error(program.string() + " cannot be started: " + std::generic_category().message(errno));
+}
+
 void end_with_parent() {
 #ifdef __linux__
   prctl(PR_SET_PDEATHSIG, SIGTERM);

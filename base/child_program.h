@@ -46,6 +46,10 @@ std::filesystem::path sibling_program(const std::string& name);
 ProgramEnd run_program(const std::filesystem::path& program, const std::vector<std::string>& arguments,
                        const UnnamedFile& shared);
 
+/// Replaces the running program. @param arguments  As for execv; the first, its name, is set.
+/// @throw std::runtime_error with the reason if the program cannot be started.
+[[noreturn]] void become_program(const std::filesystem::path& program, char** arguments);
+
 /// For a program that run_program started: makes it end when the program that started it ends.
 void end_with_parent();
 

@@ -47,6 +47,10 @@ if(TENSORRAY_IMPORT)
   target_link_libraries(NIfTI::nifti2 INTERFACE ${NIfTI_LIBRARY} ${NIfTI_znz_LIBRARY})
 endif()
 
+if(TENSORRAY_VIEW)
+  find_package(Boost 1.74 REQUIRED)  # Headers alone: Asio and Beast.
+endif()
+
 # Libraries that the benchmark compares with, if they are installed.
 if(TENSORRAY_BENCHMARK)
   find_path(NanoVDB_INCLUDE_DIR nanovdb/NanoVDB.h)

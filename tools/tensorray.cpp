@@ -30,12 +30,15 @@ int main(int argc, char** argv) {
   tensorray::Progress& progress = tensorray::progress_until_interrupted();
   if (argc > 1 && std::string(argv[1]) == "import")
     return tensorray::run_and_report([&] { tensorray::become_import_program(argv + 1); });
+  if (argc > 1 && std::string(argv[1]) == "view")
+    return tensorray::run_and_report([&] { tensorray::become_view_program(argv + 1); });
 
   CLI::App app("tensorray: light through tensor fields (Zheng and Pang 2003)", "tensorray");
   app.set_version_flag("--version", "tensorray " TENSORRAY_VERSION);
   app.require_subcommand(1);
   tensorray::add_render_command(app, progress);
   tensorray::add_explore_command(app, progress);
+  tensorray::add_view_command(app);
   tensorray::add_make_command(app, progress);
   tensorray::add_derive_command(app, progress);
   tensorray::add_import_command(app);

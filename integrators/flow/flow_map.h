@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <array>
 #include <cstdint>
+#include <memory>
 #include <vector>
 
 #include <Eigen/Core>
@@ -16,6 +17,8 @@
 #include "renderer/lights/beam.h"
 
 namespace tensorray {
+
+class RayMemory;
 
 struct FlowSettings {
   /// Flexibilities of the light that is followed. If they are the two ends of a `range`, the map holds a continuum
@@ -31,6 +34,9 @@ struct FlowSettings {
   bool beside = false;     ///< Whether light that lands beside the plate is as important as light on it.
 
   std::size_t most_starts = std::size_t{1} << 20;  ///< Refinement stops at so many positions; > 0.
+
+  /// Rays of maps that differ only in plate and range of flexibilities; null: none is remembered. The map is the same.
+  std::shared_ptr<RayMemory> memory;
 };
 
 /// A triangle of neighbouring positions.

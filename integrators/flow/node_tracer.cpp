@@ -5,6 +5,8 @@
 #include <limits>
 #include <numeric>
 
+#include "integrators/flow/ray_memory.h"
+
 namespace tensorray {
 namespace {
 
@@ -109,6 +111,10 @@ NodeTracer::NodeTracer(const TensorField& field, const Geometry& geometry, const
     const double part = static_cast<double>(i) / (range_nodes - 1);
     flexibilities_[i] = (1 - part) * settings.flexibilities[0] + part * settings.flexibilities[1];
   }
+  if (settings.memory && RayMemory::serves(field, geometry, beam.direction, bending)) {
+    memory_ = settings.memory;
+    volume_.emplace(without_plate(geometry));
+  }
   const std::size_t step = is_range_ ? first_step : 1;
   for (std::size_t node = 0; node < nodes(); node += step) check_nodes_.push_back(node);
 }
@@ -141,7 +147,10 @@ void NodeTracer::trace_nodes(const std::vector<Eigen::Vector3d>& origins, const 
   // Light of one node from neighbouring positions crosses the same cells of the field.
   for (std::size_t node = first; node < nodes(); node += step)
     for (const std::size_t i : which) batch.add(origins[i], direction_, flexibilities_[node]);
-  tensorray::trace(field_, geometry_, bending_, batch);
+  if (memory_)
+    memory_->trace(field_, *volume_, geometry_, bending_, batch);
+  else
+    tensorray::trace(field_, geometry_, bending_, batch);
   std::size_t ray = 0;
   for (std::size_t node = first; node < nodes(); node += step)
     for (const std::size_t i : which) {

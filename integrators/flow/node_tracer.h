@@ -4,6 +4,8 @@
 
 #include <atomic>
 #include <cstdint>
+#include <memory>
+#include <optional>
 #include <vector>
 
 #include <Eigen/Core>
@@ -44,6 +46,8 @@ class NodeTracer {
   const Plate plate_;
   const Eigen::Vector3d direction_;
   const BendingSettings& bending_;
+  std::shared_ptr<RayMemory> memory_;  // Null: rays are not remembered.
+  std::optional<Geometry> volume_;     // With `memory_`: the geometry without its plate.
   double tolerance_;
   bool is_range_;
   std::vector<double> flexibilities_;  // One for each node.

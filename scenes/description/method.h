@@ -61,6 +61,12 @@ class Method {
   /// The kinds of output that the method can write.
   virtual std::vector<Output> outputs() const = 0;
 
+  /// Whether its pictures have noise, which `integrator.max_samples` samples a pixel average.
+  virtual bool is_sampled() const { return false; }
+
+  /// Whether the pixels of its pictures are those of the plate.
+  virtual bool shows_plate() const { return false; }
+
   /// The files that the method reads, as its keys name them.
   virtual std::vector<NamedFile> inputs() const { return {}; }
 

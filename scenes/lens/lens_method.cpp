@@ -213,6 +213,7 @@ Render LoadedLens::render(const Scene& scene, const Progress& progress) const {
 class LensMethod : public MethodWith<LensDescription> {
  public:
   const char* name() const override { return "lens"; }
+  bool shows_plate() const override { return true; }
 
   std::vector<Output> outputs() const override {
     std::vector<Output> outputs = picture_outputs();

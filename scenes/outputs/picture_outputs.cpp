@@ -10,11 +10,6 @@
 namespace tensorray {
 namespace {
 
-double exposure_of(const Scene& scene, const Render& render) {
-  if (scene.description.output.exposure) return *scene.description.output.exposure;
-  return render.exposure ? *render.exposure : automatic_exposure(render.linear);
-}
-
 void write_display(const std::filesystem::path& file, const Scene& scene, const Render& render) {
   write_image(file, display_image(scene, render, holds_alpha(file)), provenance(scene, render));
 }
@@ -53,10 +48,15 @@ ImageMetadata provenance(const Scene& scene, const Render& render) {
   return metadata;
 }
 
+double display_exposure(const Scene& scene, const Render& render) {
+  if (scene.description.output.exposure) return *scene.description.output.exposure;
+  return render.exposure ? *render.exposure : automatic_exposure(render.linear);
+}
+
 Image display_image(const Scene& scene, const Render& render, bool holds_alpha) {
   if (render.display) return *render.display;
   const Image& linear = render.linear;
-  const auto gain = static_cast<float>(std::exp2(exposure_of(scene, render)));
+  const auto gain = static_cast<float>(std::exp2(display_exposure(scene, render)));
   const bool has_alpha = linear.channels.size() > 3 && linear.channels[3] == "A";
   const bool divides = has_alpha && holds_alpha;
   const std::size_t from = linear.channels.size(), to = has_alpha ? 4 : 3;

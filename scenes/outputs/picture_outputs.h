@@ -22,6 +22,9 @@ Output spectral_output();
 ///                     them. Otherwise they stay multiplied by it, which shows the picture on black.
 Image display_image(const Scene& scene, const Render& render, bool holds_alpha);
 
+/// The exposure of the picture that a display shows, in stops: the scene's, or the one that "auto" chooses.
+double display_exposure(const Scene& scene, const Render& render);
+
 /// The exposure, in stops, that shows the brightest hundredth of a scene-linear picture just below white.
 double automatic_exposure(const Image& linear);
 

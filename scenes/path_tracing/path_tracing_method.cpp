@@ -220,6 +220,7 @@ void write_tube_file(const std::filesystem::path& file, const Scene&, const Rend
 class PathTracingMethod : public MethodWith<PathTracingDescription> {
  public:
   const char* name() const override { return "path_tracing"; }
+  bool is_sampled() const override { return true; }
 
   std::vector<Output> outputs() const override {
     std::vector<Output> outputs = picture_outputs();

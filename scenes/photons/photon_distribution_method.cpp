@@ -109,6 +109,7 @@ void write_photons(const std::filesystem::path& file, const Scene& scene, const 
 class PhotonDistributionMethod : public MethodWith<PhotonDescription> {
  public:
   const char* name() const override { return "photon_distribution"; }
+  bool shows_plate() const override { return true; }
 
   std::vector<Output> outputs() const override {
     std::vector<Output> outputs = picture_outputs();

@@ -25,6 +25,7 @@ FlowMap trace_map(const Scene& scene, double tolerance, const Progress& progress
   const LightRange range = light_range(scene);
   settings.flexibilities = range.flexibilities;
   settings.range = range.is_range;
+  settings.memory = scene.rays;
   return trace_flow_map(scene.field, scene.geometry, scene.beam, scene.bending, settings, progress);
 }
 

@@ -88,10 +88,17 @@ std::string text_of(const Json& json, const SceneSource& source) {
 
 bool is_field_file(const std::filesystem::path& path) { return path.extension() == ".vdb"; }
 
-SceneDescription read_scene(const std::filesystem::path& path, const SceneChanges& changes) {
+Json scene_json(const std::filesystem::path& path, const std::vector<std::string>& overrides) {
   Json json = is_field_file(path) ? scene_of_field(path) : read_json_object(path);
-  for (const std::string& change : changes.overrides) apply_override(json, change);
+  for (const std::string& change : overrides) apply_override(json, change);
+  return json;
+}
 
+SceneDescription read_scene(const std::filesystem::path& path, const SceneChanges& changes) {
+  return read_scene_json(scene_json(path, changes.overrides), path, changes);
+}
+
+SceneDescription read_scene_json(Json json, const std::filesystem::path& path, const SceneChanges& changes) {
   const SceneSource source{path};
   std::vector<std::filesystem::path> outputs = changes.outputs;
   if (changes.frame) {

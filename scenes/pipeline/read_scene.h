@@ -37,6 +37,12 @@ bool is_field_file(const std::filesystem::path& path);
 /// the wrong type or out of range; two keys exclude each other.
 SceneDescription read_scene(const std::filesystem::path& path, const SceneChanges& changes = {});
 
+/// The first step of read_scene: the scene as JSON, with `overrides` applied, and otherwise unchecked.
+Json scene_json(const std::filesystem::path& path, const std::vector<std::string>& overrides = {});
+
+/// The other step: JSON → SceneDescription. @param changes  Its overrides have no effect.
+SceneDescription read_scene_json(Json json, const std::filesystem::path& path, const SceneChanges& changes = {});
+
 /// The JSON Schema (draft 2020-12) of scene files, made from the same tables of keys that read_scene uses.
 std::string scene_schema();
 

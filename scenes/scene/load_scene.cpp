@@ -299,10 +299,10 @@ Scene load_scene(const SceneDescription& description, const Progress& progress) 
   return scene;
 }
 
-Scene reload_scene(Scene loaded, const SceneDescription& description, const Progress& progress) {
+Scene reload_scene(const Scene& loaded, const SceneDescription& description, const Progress& progress) {
   const auto start = Clock::now();
   Scene scene = make_scene(description, load_light(description),
-                           {std::move(loaded.field), loaded.eigenvalues, loaded.non_finite}, {}, progress);
+                           {loaded.field, loaded.eigenvalues, loaded.non_finite}, {}, progress);
   scene.seconds = seconds_since(start);
   return scene;
 }

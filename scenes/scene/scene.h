@@ -20,6 +20,8 @@
 
 namespace tensorray {
 
+class RayMemory;
+
 struct Scene {
   Scene(SceneDescription d, TensorField f, Geometry g, ColorManagement c)
       : description(std::move(d)), field(std::move(f)), geometry(std::move(g)), color(std::move(c)) {}
@@ -37,6 +39,9 @@ struct Scene {
   std::vector<Band> bands;
   std::vector<LightChannel> channels;  ///< Flexibility and power of each band.
 
+  /// Rays of the scene's light on the plate, kept from the scene before; null: none is kept.
+  std::shared_ptr<RayMemory> rays;
+
   std::shared_ptr<const LoadedMethod> method;  ///< The method that renders the scene.
 
   EigenvalueReport eigenvalues;
@@ -52,8 +57,8 @@ struct Scene {
 Scene load_scene(const SceneDescription& description, const Progress& progress);
 
 /// The same for another description of a scene whose field is loaded: its `field` may differ in `scale` and `bounds`.
-/// Notes about the field are left out.
-Scene reload_scene(Scene loaded, const SceneDescription& description, const Progress& progress);
+/// Both scenes share the voxels. Notes about the field are left out.
+Scene reload_scene(const Scene& loaded, const SceneDescription& description, const Progress& progress);
 
 /// Where the volume begins and ends along a direction, as signed distances from an origin, world units.
 struct DepthRange {

@@ -180,6 +180,7 @@ Render LoadedWhole::render(const Scene& scene, const Progress& progress) const {
 class WholeMethod : public MethodWith<WholeDescription> {
  public:
   const char* name() const override { return "scene"; }
+  bool is_sampled() const override { return true; }
 
   std::vector<Output> outputs() const override {
     std::vector<Output> outputs = picture_outputs();

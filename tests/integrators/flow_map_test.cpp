@@ -10,6 +10,7 @@
 #include <tbb/global_control.h>
 
 #include "integrators/flow/caustic.h"
+#include "integrators/flow/ray_memory.h"
 #include "integrators/photons/photon_distribution.h"
 #include "renderer/color/spectrum.h"
 #include "tests/integrators/support.h"
@@ -126,6 +127,41 @@ void expect_same_light(const Bench& bench, double flexibility, const char* label
     }
   EXPECT_LT(squares / static_cast<double>(expected.values.size()), 1) << label;
   EXPECT_NEAR(sum(caustic.irradiance.values) / sum(expected.values), 1, 2e-3) << label;
+}
+
+/// With a memory, light to another plate is traced only where it was not traced before.
+TEST(FlowMap, RememberedRaysGiveTheSameMap) {
+  FlowSettings settings;
+  settings.flexibilities = {0.1, 0.4};
+  settings.range = true;
+  FlowSettings remembering = settings;
+  remembering.memory = std::make_shared<RayMemory>();
+  std::vector<std::uint64_t> samples;
+  for (const double distance : {2.0, 2.1, 2.0}) {
+    const Bench bench = make_bench(lens, plate_at(distance, 4, 64));
+    const FlowMap map = trace_flow_map(bench.field, bench.geometry, bench.beam, {}, remembering, Progress());
+    const FlowMap expected = trace_flow_map(bench.field, bench.geometry, bench.beam, {}, settings, Progress());
+    EXPECT_EQ(map.landings, expected.landings);
+    EXPECT_EQ(map.ends, expected.ends);
+    EXPECT_EQ(map.lengths, expected.lengths);
+    EXPECT_EQ(map.starts, expected.starts);
+    samples.push_back(map.tensor_samples);
+  }
+  EXPECT_LT(2 * samples[1], samples[0]);
+  EXPECT_EQ(samples[2], 0u);
+}
+
+TEST(FlowMap, RaysAreRememberedOnlyWhereTheyMeetNothingElse) {
+  const auto serves = [](const Bench& bench) {
+    return RayMemory::serves(bench.field, bench.geometry, bench.beam.direction, {});
+  };
+  EXPECT_TRUE(serves(make_bench(lens, plate_at(2, 4, 64))));
+  EXPECT_FALSE(serves(make_bench(lens, plate_at(0.5, 4, 64))));  // Inside.
+  EXPECT_FALSE(serves(make_bench(lens, plate_at(-2, 4, 64))));   // In front.
+  Surfaces extra;
+  extra.obstacles.push_back(
+      box_mesh(Eigen::AlignedBox3d(Vector3d(-0.2, -0.2, -2), Vector3d(0.2, 0.2, -1.8)), Eigen::Affine3d::Identity()));
+  EXPECT_FALSE(serves(make_bench(lens, plate_at(3, 4, 64), extra)));
 }
 
 TEST(FlowMap, CoversTheApertureOnce) {

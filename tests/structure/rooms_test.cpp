@@ -83,9 +83,11 @@ const std::vector<Room> rooms{
     {"tools/import/vtk", {"tools/import/lattices", "volumes/*"}},
     {"tools/import", {"tools/import/lattices", "tools/import/meshes", "tools/import/vtk", "volumes/*"}},
     {"tools/import/program", {"tools/import", "tools/import/vtk", "tools/command_line", "volumes/*"}},
+    {"tools/viewer", {"scenes/*", "integrators/*", "renderer/*", "volumes/*"}},
+    {"tools/viewer/program", {"tools/viewer", "tools/command_line", "renderer/*"}},
     {"tools/commands", {"tools/command_line", "scenes/*", "integrators/*", "renderer/*", "volumes/*"}},
     {"tools", {"tools/commands", "tools/command_line"}},
-    {"tools/benchmark", {"tools/command_line", "scenes/*", "integrators/*", "renderer/*", "volumes/*"}},
+    {"tools/benchmark", {"tools/command_line", "tools/viewer", "scenes/*", "integrators/*", "renderer/*", "volumes/*"}},
 };
 
 /// Whether `name`, an item of `may_include`, means the room `folder`.

@@ -5,11 +5,11 @@
 
 #include <fmt/format.h>
 
+#include "base/temporary_folder.h"
 #include "renderer/images/image_distance.h"
 #include "tools/benchmark/child.h"
 #include "tools/benchmark/machine.h"
 #include "tools/benchmark/parts.h"
-#include "tools/benchmark/temporary_folder.h"
 
 namespace tensorray::benchmark {
 namespace {

@@ -4,10 +4,10 @@
 #include <fmt/format.h>
 #include <unistd.h>
 
+#include "base/temporary_folder.h"
 #include "tools/benchmark/child.h"
 #include "tools/benchmark/machine.h"
 #include "tools/benchmark/parts.h"
-#include "tools/benchmark/temporary_folder.h"
 
 namespace tensorray::benchmark {
 namespace {

@@ -3,9 +3,9 @@
 
 #include <fmt/format.h>
 
+#include "base/temporary_folder.h"
 #include "tools/benchmark/parts.h"
 #include "tools/benchmark/repeat.h"
-#include "tools/benchmark/temporary_folder.h"
 #include "volumes/bricks/tensor_field.h"
 #include "volumes/files/tensor_files.h"
 #include "volumes/tensors/generators.h"

@@ -38,4 +38,7 @@ Json measure_jobs(const Options& options);
 /// @throw as measure_jobs.
 Json measure_caustics(const Options& options);
 
+/// Measures how soon a live view shows a change: from a page's message to the picture's bytes, without the network.
+Json measure_view(const Options& options);
+
 }  // namespace tensorray::benchmark

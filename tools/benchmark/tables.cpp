@@ -131,6 +131,21 @@ std::string jobs_text(const Json& jobs) {
                            against.at("positions")[0].get<std::uint64_t>());
 }
 
+std::string view_text(const Json& view) {
+  std::vector<Row> rows{{"live view, seconds after a change", "pixels", "first picture", "pictures a second, dragging",
+                         "finished picture", "of it: load", "trace", "light", "color", "encode"}};
+  for (const Json& job : view) {
+    const Json& phases = job.at("phases");
+    rows.push_back({job.at("scene"), fmt::format("{}²", job.at("side").get<int>()),
+                    fmt::format("{:.3f}", number(job, "first_picture")),
+                    fmt::format("{:.1f}", number(job, "pictures_per_second")),
+                    fmt::format("{:.2f}", number(job, "final_picture"))});
+    for (const char* phase : {"load", "trace", "light", "color", "encode"})
+      rows.back().push_back(fmt::format("{:.2f}", number(phases, phase)));
+  }
+  return table(rows);
+}
+
 std::string caustics_text(const Json& caustics) {
   std::string text;
   for (const Json& scene : caustics) {
@@ -166,6 +181,7 @@ std::string tables(const Json& results) {
   if (results.contains("loading")) text += "\n" + loading_text(results.at("loading"));
   if (results.contains("jobs")) text += "\n" + jobs_text(results.at("jobs"));
   if (results.contains("caustics")) text += "\n" + caustics_text(results.at("caustics"));
+  if (results.contains("view")) text += "\n" + view_text(results.at("view"));
   return text;
 }
 

@@ -16,6 +16,7 @@ void add_render_command(CLI::App& program, Progress& progress);   ///< tensorray
 void add_explore_command(CLI::App& program, Progress& progress);  ///< tensorray explore FIELD.vdb: a sheet of pictures.
 void add_make_command(CLI::App& program, Progress& progress);     ///< tensorray make KIND: an analytic field.
 void add_import_command(CLI::App& program);  ///< Lists `import` in --help; become_import_program runs it.
+void add_view_command(CLI::App& program);    ///< Lists `view` in --help; become_view_program runs it.
 void add_derive_command(CLI::App& program, Progress& progress);  ///< tensorray derive FIELD.vdb: its invariants.
 void add_stretch_command(CLI::App& program,
                          Progress& progress);  ///< tensorray stretch SCENE.json: how far the field spreads light.
@@ -27,5 +28,8 @@ void add_schema_command(CLI::App& program);    ///< tensorray schema: the JSON S
 /// @param arguments  Those of main, from "import" on.
 /// @throw std::runtime_error with the fix if `tensorray-import` is not built.
 [[noreturn]] void become_import_program(char** arguments);
+
+/// The same for `tensorray view` and `tensorray-view`, which contains the web server.
+[[noreturn]] void become_view_program(char** arguments);
 
 }  // namespace tensorray

@@ -117,7 +117,7 @@ template <class Visit>
 void for_each_cell(const ExploreOptions& options, const Progress& progress, const Visit& visit) {
   std::optional<Scene> scene;
   const auto load = [&](const SceneDescription& description) {
-    Scene next = scene ? reload_scene(std::move(*scene), description, progress) : load_scene(description, progress);
+    Scene next = scene ? reload_scene(*scene, description, progress) : load_scene(description, progress);
     scene.emplace(std::move(next));
   };
   for (std::size_t column = 0; column < directions.size(); ++column) {

@@ -1,11 +1,6 @@
-#include <cerrno>
-#include <stdexcept>
-#include <string>
-#include <system_error>
-
 #include <CLI/CLI.hpp>
-#include <unistd.h>
 
+#include "base/child_program.h"
 #include "tools/commands/commands.h"
 #include "tools/commands/imported_field.h"
 
@@ -16,10 +11,7 @@ void add_import_command(CLI::App& program) {
 }
 
 void become_import_program(char** arguments) {
-  const std::string program = import_program().string();
-  arguments[0] = const_cast<char*>("tensorray-import");
-  execv(program.c_str(), arguments);
-  throw std::runtime_error(program + " cannot be started: " + std::generic_category().message(errno));
+  become_program(import_program(), arguments);
 }
 
 }  // namespace tensorray

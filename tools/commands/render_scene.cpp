@@ -83,7 +83,7 @@ Scene load(const SceneDescription& description, std::optional<Scene>& loaded, co
     loaded.reset();  // Its memory is needed.
     return load_scene(description, progress);
   }
-  return reload_scene(std::move(*loaded), description, progress);
+  return reload_scene(*loaded, description, progress);
 }
 
 /// Renders a scene to its files. @return the loaded scene.

@@ -105,7 +105,7 @@ TensorField::Floats TensorField::allocate(std::size_t bricks) {
 #ifdef MADV_HUGEPAGE
   madvise(memory, bytes, MADV_HUGEPAGE);
 #endif
-  return {static_cast<float*>(memory), {bytes}};
+  return {static_cast<float*>(memory), Release{bytes}};
 }
 
 void TensorField::Release::operator()(float* floats) const { munmap(floats, bytes); }

@@ -38,7 +38,7 @@ struct TensorBrick {
 };
 
 /// A field as bricks in memory. Its size grows with the number of active voxels, not with the extent. Immutable; any
-/// number of threads may read it at once.
+/// number of threads may read it at once. Copies share the voxels.
 class TensorField {
  public:
   /// @throw std::invalid_argument if the grid has no active voxel or its transform cannot be inverted.
@@ -96,7 +96,7 @@ class TensorField {
 
     void operator()(float* floats) const;
   };
-  using Floats = std::unique_ptr<float[], Release>;
+  using Floats = std::shared_ptr<float[]>;
 
   template <class GiveBack>
   void make_bricks(const TensorGrid& grid, const GiveBack& give_back);

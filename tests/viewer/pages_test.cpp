@@ -1,0 +1,168 @@
+// What pages are sent for their messages.
+
+#include "tools/viewer/pages.h"
+
+#include "renderer/images/image.h"
+#include "scenes/outputs/picture_outputs.h"
+#include "tests/viewer/view_support.h"
+
+namespace tensorray {
+namespace {
+
+class PagesTest : public test::ViewTest {
+ protected:
+  Progress progress_;
+  test::Mailbox mailbox_, other_mailbox_;  // Pages' thread sends to them until Pages ends.
+  Pages pages_{viewed(), progress_};
+  Pages::Id page_ = pages_.open(mailbox_.sender());
+
+  void send(const Json& message) { pages_.receive(page_, message.dump()); }
+  void send_scene(int id, const Json& scene) { send({{"type", "scene"}, {"id", id}, {"scene", scene}}); }
+
+  Image picture_of(const test::Received& message, const std::string& ending) {
+    const std::filesystem::path file = in_folder("received" + ending);
+    std::ofstream(file, std::ios::binary) << message.bytes;
+    return read_image(file);
+  }
+};
+
+TEST_F(PagesTest, GreetsWithSceneAndSchema) {
+  const Json hello = mailbox_.wait([](const Json& json) { return json.value("type", "") == "hello"; }).json;
+  EXPECT_EQ(hello.at("scene"), test::small_scene());
+  EXPECT_TRUE(hello.at("schema").at("properties").contains("light"));
+  EXPECT_EQ(hello.at("field").at("corners").size(), 8u);
+  EXPECT_EQ(hello.at("field").at("voxels")[0], 12);
+}
+
+TEST_F(PagesTest, SendsACoarsePictureThenTheOneOfRender) {
+  send_scene(1, test::small_scene());
+  const test::Received last = mailbox_.final_picture(1);
+  std::vector<Json> pictures;
+  for (const test::Received& message : mailbox_.all())
+    if (message.json.at("type") == "picture") pictures.push_back(message.json);
+  EXPECT_EQ(pictures.front().at("stage"), 0);
+  EXPECT_LT(pictures.front().at("width"), 64);
+  EXPECT_EQ(last.json.at("width"), 64);
+  EXPECT_EQ(last.json.at("scale"), 4);
+
+  LiveScene anew(scene_file());
+  anew.load(test::small_scene(), {in_folder("p.png"), in_folder("p.exr")}, progress_);
+  const auto render = anew.render(progress_);
+  write_image(in_folder("expected.png"), display_image(anew.scene(), *render, false));
+  EXPECT_EQ(picture_of(last, ".png").pixels, read_image(in_folder("expected.png")).pixels);
+
+  send({{"type", "export"}, {"id", 2}, {"file", "exr"}});
+  const test::Received file = mailbox_.wait("file", 2);
+  EXPECT_EQ(file.json.at("name"), "scene.exr");
+  write_image(in_folder("expected.exr"), render->linear);
+  const Image exported = picture_of(file, ".exr"), expected = read_image(in_folder("expected.exr"));
+  EXPECT_EQ(exported.channels, expected.channels);
+  EXPECT_EQ(exported.pixels, expected.pixels);
+}
+
+TEST_F(PagesTest, TheNewestSceneWins) {
+  Json scene = test::small_scene();
+  for (int id = 1; id <= 40; ++id) {
+    scene["field"]["scale"] = 4 + 0.01 * id;
+    send_scene(id, scene);
+  }
+  EXPECT_NEAR(mailbox_.final_picture(40).json.at("scale"), 4.4, 1e-9);
+  std::size_t finals = 0;
+  for (const test::Received& message : mailbox_.all()) finals += message.json.value("final", false) ? 1 : 0;
+  EXPECT_LT(finals, 20u);
+}
+
+TEST_F(PagesTest, TellsAboutAPixelAndTheLightThere) {
+  send_scene(1, test::small_scene());
+  mailbox_.final_picture(1);
+  // The spectrum comes with a further picture, which is made while nothing else is to be done.
+  Json answer;
+  for (int id = 2; id < 200; ++id) {
+    send({{"type", "look"}, {"id", id}, {"x", 0.3}, {"y", 0.4}});
+    answer = mailbox_.wait("look", id).json;
+    if (!answer.at("spectrum").is_null()) break;
+    std::this_thread::sleep_for(std::chrono::milliseconds(50));
+  }
+  EXPECT_EQ(answer.at("spectrum").at("nm").size(), 8u);
+  ASSERT_GE(answer.at("rays").size(), 3u);
+  // Each ray ends at the place of the plate that was asked for.
+  send({{"type", "space"}, {"id", 300}});
+  const Json plate = mailbox_.wait("space", 300).json.at("plate");
+  const auto vector = [](const Json& json) { return Eigen::Vector3d(json[0], json[1], json[2]); };
+  const Eigen::Vector3d right = vector(plate[1]) - vector(plate[0]), up = vector(plate[3]) - vector(plate[0]);
+  const Eigen::Vector3d expected = vector(plate[3]) + 0.3 * right - 0.4 * up;
+  for (const Json& ray : answer.at("rays"))
+    EXPECT_LT((vector(ray.at("points").back()) - expected).norm(), 0.03 * right.norm()) << ray;
+}
+
+TEST_F(PagesTest, SavesToItsOwnFileAlone) {
+  Json scene = test::small_scene();
+  scene["field"]["scale"] = 7;
+  send({{"type", "save"}, {"id", 5}, {"scene", scene}});
+  EXPECT_EQ(mailbox_.wait("saved", 5).json.at("file"), in_folder("scene.view.json").string());
+  EXPECT_EQ(read_json_object(in_folder("scene.view.json")), scene);
+  EXPECT_EQ(read_json_object(scene_file()), test::small_scene());
+  Json wrong = scene;
+  wrong["nonsense"] = 1;
+  send({{"type", "save"}, {"id", 6}, {"scene", wrong}});
+  mailbox_.wait("error", 6);
+  EXPECT_EQ(read_json_object(in_folder("scene.view.json")), scene);
+  EXPECT_THROW(Pages({scene_file(), {}, scene_file()}, progress_), std::invalid_argument);
+}
+
+TEST_F(PagesTest, RefusesInOneLineAndGoesOn) {
+  Json foreign = test::small_scene(), huge = foreign, unknown = foreign;
+  foreign["obstacles"] = {{{"file", "/etc/passwd"}}};
+  huge["receiver"]["resolution"] = {30000, 30000};
+  unknown["ligth"] = 1;
+  Json field = test::small_scene();
+  field["field"] = {{"file", "/dev/zero"}};
+  int id = 10;
+  for (const Json& scene : {foreign, huge, unknown, field}) {
+    send_scene(++id, scene);
+    const std::string text = mailbox_.wait("error", id).json.at("message");
+    EXPECT_EQ(text.find('\n'), std::string::npos);
+  }
+  const std::vector<std::string> wrong{"",
+                                       "{",
+                                       "[]",
+                                       "null",
+                                       "17",
+                                       "{}",
+                                       R"({"type":1})",
+                                       R"({"type":"shutdown"})",
+                                       R"({"type":"scene"})",
+                                       R"({"type":"scene","scene":[]})",
+                                       R"({"type":"look"})",
+                                       R"({"type":"look","x":"a","y":1})",
+                                       R"({"type":"export","file":7})",
+                                       R"({"type":"export","file":"../x"})",
+                                       R"({"type":"space"})",
+                                       std::string(100000, '['),
+                                       std::string("\0\xff\xfe", 3)};
+  for (const std::string& text : wrong) pages_.receive(page_, text);
+  for (int i = 0; i < 1000; ++i) send({{"type", "look"}, {"id", 1000 + i}, {"x", 1e308}, {"y", -1e308}});
+  send_scene(20, test::small_scene());
+  EXPECT_TRUE(mailbox_.final_picture(20).json.at("final"));
+  std::size_t errors = 0;
+  for (const test::Received& message : mailbox_.all()) errors += message.json.at("type") == "error" ? 1 : 0;
+  EXPECT_GE(errors, 4 + wrong.size());
+}
+
+TEST_F(PagesTest, PagesDoNotDisturbEachOther) {
+  const Pages::Id other = pages_.open(other_mailbox_.sender());
+  Json scene = test::small_scene();
+  scene["field"]["generate"]["kind"] = "two_point_load";
+  pages_.receive(other, Json{{"type", "scene"}, {"id", 1}, {"scene", scene}}.dump());
+  send_scene(1, test::small_scene());
+  const test::Received mine = mailbox_.final_picture(1), theirs = other_mailbox_.final_picture(1);
+  EXPECT_NE(mine.bytes, theirs.bytes);
+  send_scene(2, test::small_scene());
+  EXPECT_EQ(mailbox_.final_picture(2).bytes, mine.bytes);
+  pages_.close(other);
+  send_scene(3, test::small_scene());
+  mailbox_.final_picture(3);
+}
+
+}  // namespace
+}  // namespace tensorray

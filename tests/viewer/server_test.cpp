@@ -1,0 +1,206 @@
+// The web server, by real connections: what it refuses, and that it lives on.
+
+#include "tools/viewer/server.h"
+
+#include <thread>
+
+#include <boost/asio/connect.hpp>
+#include <boost/asio/ip/tcp.hpp>
+#include <boost/asio/read.hpp>
+#include <boost/asio/write.hpp>
+#include <boost/beast/core.hpp>
+#include <boost/beast/http.hpp>
+#include <boost/beast/websocket.hpp>
+
+#include "tests/viewer/view_support.h"
+#include "tools/viewer/token.h"
+
+namespace tensorray {
+namespace {
+
+namespace asio = boost::asio;
+namespace beast = boost::beast;
+namespace http = beast::http;
+using tcp = asio::ip::tcp;
+using Socket = beast::websocket::stream<tcp::socket>;
+
+class ServerTest : public test::ViewTest {
+ protected:
+  ServerTest() {
+    for (const char* file : {"index.html", "view.js", "view.css"})
+      std::ofstream(in_folder(file)) << "content of " << file;
+    ServerSettings settings;
+    settings.token = token_;
+    settings.page = in_folder("");
+    settings.hosts = {"workstation"};
+    pages_.emplace(viewed(), progress_);
+    server_.emplace(settings, *pages_);
+    const std::string url = server_->url();
+    port_ = url.substr(17, url.find('/', 17) - 17);
+    thread_ = std::thread([this] { server_->run(progress_); });
+  }
+  ~ServerTest() override {
+    progress_.cancelled = true;
+    thread_.join();
+    server_.reset();
+    pages_.reset();
+  }
+
+  tcp::socket connect() {
+    tcp::socket socket(io_);
+    socket.connect({asio::ip::make_address("127.0.0.1"), static_cast<std::uint16_t>(std::stoi(port_))});
+    return socket;
+  }
+
+  std::string own_host() const { return "127.0.0.1:" + port_; }
+
+  http::response<http::string_body> get(const std::string& path, const std::string& host,
+                                        http::verb verb = http::verb::get) {
+    tcp::socket socket = connect();
+    http::request<http::empty_body> request(verb, path, 11);
+    request.set(http::field::host, host);
+    http::write(socket, request);
+    beast::flat_buffer buffer;
+    http::response<http::string_body> response;
+    http::read(socket, buffer, response);
+    return response;
+  }
+
+  /// Sends bytes and reads until the server closes. @return What came.
+  std::string exchange(const std::string& bytes) {
+    tcp::socket socket = connect();
+    beast::error_code error;
+    asio::write(socket, asio::buffer(bytes), error);
+    std::string answer;
+    asio::read(socket, asio::dynamic_buffer(answer), error);
+    return answer;
+  }
+
+  /// @throw boost::system::system_error if the server refuses it.
+  Socket open_socket(const std::string& origin, const std::string& path) {
+    Socket socket(connect());
+    socket.set_option(beast::websocket::stream_base::decorator([&](beast::websocket::request_type& request) {
+      if (!origin.empty()) request.set(http::field::origin, origin);
+    }));
+    socket.read_message_max(64 << 20);
+    socket.handshake(own_host(), path);
+    return socket;
+  }
+  Socket open_socket() { return open_socket("http://" + own_host(), path("socket")); }
+
+  std::string path(const std::string& name) const { return "/" + token_ + "/" + name; }
+
+  Json read_json(Socket& socket) {
+    beast::flat_buffer buffer;
+    socket.read(buffer);
+    PageMessage message{socket.got_binary(), false, beast::buffers_to_string(buffer.data())};
+    return test::received(message).json;
+  }
+
+  /// Asks for a picture on a new socket.
+  void expect_alive() {
+    Socket socket = open_socket();
+    EXPECT_EQ(read_json(socket).at("type"), "hello");
+    socket.write(asio::buffer(Json{{"type", "scene"}, {"id", 1}, {"scene", test::small_scene()}}.dump()));
+    for (Json json = Json::object(); !json.value("final", false);) json = read_json(socket);
+  }
+
+  const std::string token_ = random_token();
+  std::string port_;
+
+ private:
+  Progress progress_;
+  std::optional<Pages> pages_;
+  std::optional<Server> server_;
+  std::thread thread_;
+  asio::io_context io_;
+};
+
+TEST_F(ServerTest, ServesItsFilesAndNoOthers) {
+  const auto page = get(path(""), own_host());
+  EXPECT_EQ(page.result_int(), 200u);
+  EXPECT_EQ(page.body(), "content of index.html");
+  EXPECT_NE(std::string(page["Content-Security-Policy"]).find("default-src 'self'"), std::string::npos);
+  EXPECT_EQ(page["Referrer-Policy"], "no-referrer");
+  EXPECT_EQ(get(path("view.js"), "localhost:" + port_).body(), "content of view.js");
+  EXPECT_EQ(get(path("view.css"), "workstation:" + port_).body(), "content of view.css");
+  for (const char* name : {"scene.json", "../scene.json", "%2e%2e/scene.json", "view.js/", "/etc/passwd", "socket"})
+    EXPECT_EQ(get(path(name), own_host()).result_int(), 404u) << name;
+  EXPECT_EQ(get(path(""), own_host(), http::verb::post).result_int(), 405u);
+}
+
+TEST_F(ServerTest, RefusesAWrongToken) {
+  std::string near_token = token_;
+  near_token.back() = near_token.back() == '0' ? '1' : '0';
+  for (const std::string& token : {std::string("x"), near_token, token_ + "0", token_.substr(1)})
+    EXPECT_EQ(get("/" + token + "/", own_host()).result_int(), 404u) << token;
+  for (const char* target : {"/", "//", "*", "/index.html"})
+    EXPECT_EQ(get(target, own_host()).result_int(), 404u) << target;
+  EXPECT_THROW(open_socket("http://" + own_host(), "/" + near_token + "/socket"), boost::system::system_error);
+}
+
+/// Another site must reach the server neither by its own name nor by one that it makes to mean this machine.
+TEST_F(ServerTest, RefusesForeignHostAndOrigin) {
+  for (const std::string& host : {std::string("evil.example"), "evil.example:" + port_, std::string("127.0.0.1"),
+                                  std::string("127.0.0.1:1"), own_host() + ".evil.example", std::string()})
+    EXPECT_EQ(get(path(""), host).result_int(), 403u) << host;
+  for (const std::string& origin : {std::string("http://evil.example"), "https://" + own_host(), std::string("null"),
+                                    "http://" + own_host() + ".evil.example", std::string()})
+    EXPECT_THROW(open_socket(origin, path("socket")), boost::system::system_error) << origin;
+  expect_alive();
+}
+
+TEST_F(ServerTest, SurvivesHostileBytes) {
+  EXPECT_EQ(exchange("nonsense\r\n\r\n").substr(0, 12), "HTTP/1.1 400");
+  exchange("GET /" + std::string(100000, 'a') + " HTTP/1.1\r\n\r\n");
+  exchange("GET / HTTP/1.1\r\nHost: " + std::string(100000, 'b') + "\r\n\r\n");
+  exchange("POST " + path("") + " HTTP/1.1\r\nHost: " + own_host() + "\r\nContent-Length: 99999999999\r\n\r\n");
+  exchange(std::string(1000, '\0'));
+  {
+    Socket socket = open_socket();
+    socket.write(asio::buffer(std::string(Server::most_message_bytes + 1, ' ')));
+    EXPECT_THROW(
+        {
+          for (;;) read_json(socket);
+        },
+        boost::system::system_error);
+  }
+  {
+    Socket socket = open_socket();
+    for (const std::string& text : {std::string("{"), std::string(100000, '['), std::string("\"\0\"", 3)})
+      socket.write(asio::buffer(text));
+    socket.binary(true);
+    socket.write(asio::buffer(std::string("\xff\xfe\xfd")));
+  }
+  expect_alive();
+}
+
+TEST_F(ServerTest, BoundsConnectionsAndPages) {
+  {
+    std::vector<tcp::socket> idle;
+    for (int i = 0; i < 1000; ++i) idle.push_back(connect());
+  }
+  expect_alive();
+  std::vector<Socket> sockets;
+  EXPECT_THROW(
+      {
+        for (std::size_t i = 0; i < Server::most_pages + 2; ++i) sockets.push_back(open_socket());
+      },
+      boost::system::system_error);
+  EXPECT_GE(sockets.size(), Server::most_pages - 1);
+}
+
+/// A page that asks and never reads.
+TEST_F(ServerTest, DoesNotWaitForASlowReader) {
+  Socket slow = open_socket();
+  for (int id = 1; id <= 300; ++id) {
+    Json scene = test::small_scene();
+    scene["field"]["scale"] = 1 + 0.01 * id;
+    slow.write(asio::buffer(Json{{"type", "scene"}, {"id", id}, {"scene", scene}}.dump()));
+    slow.write(asio::buffer(Json{{"type", "space"}, {"id", id}}.dump()));
+  }
+  expect_alive();
+}
+
+}  // namespace
+}  // namespace tensorray

@@ -1,0 +1,239 @@
+#include "tools/viewer/answers.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+
+#include <fmt/format.h>
+
+#include "integrators/bending/bending.h"
+
+namespace tensorray {
+namespace {
+
+using Eigen::Vector2d;
+using Eigen::Vector3d;
+
+constexpr int cells = 40;                      // Along a side of the lattice of LandedRays.
+constexpr int shown_rays = 7;                  // Along a side of the beam, for each colour.
+constexpr std::size_t most_points = 40;        // Of a drawn ray.
+constexpr std::size_t most_ways = 4;           // To one pixel, for each colour.
+constexpr std::size_t most_triangles = 60000;  // Of all meshes: a page is no place for more.
+
+Json to_json(const Vector3d& p) { return {p.x(), p.y(), p.z()}; }
+
+std::string hex(const Vector3d& color) {
+  const auto byte = [](double value) { return static_cast<int>(std::lround(255 * std::clamp(value, 0.0, 1.0))); };
+  return fmt::format("#{:02x}{:02x}{:02x}", byte(color[0]), byte(color[1]), byte(color[2]));
+}
+
+/// Three channels of a scene: the first, a middle and the last.
+std::vector<std::size_t> shown_channels(const Scene& scene) {
+  const std::size_t last = scene.channels.size() - 1;
+  std::vector<std::size_t> channels{0, last / 2, last};
+  channels.erase(std::unique(channels.begin(), channels.end()), channels.end());
+  return channels;
+}
+
+/// The colour of a channel, as bright as a display can show it.
+std::string color_of(const Scene& scene, std::size_t channel) {
+  Vector3d color = (scene.color.xyz_to_working() * scene.bands[channel].xyz).cwiseMax(0.0);
+  color = (color / std::max(color.maxCoeff(), 1e-12)).array().pow(1 / 2.2);
+  return hex(0.85 * color + Vector3d::Constant(0.15));  // Also dark violet must be seen.
+}
+
+/// Every few points of a path, and its last one.
+Json polyline(const PathPoints& path) {
+  Json points = Json::array();
+  const std::size_t step = std::max<std::size_t>(1, (path.size() + most_points - 1) / most_points);
+  for (std::size_t i = 0; i < path.size(); i += step) points.push_back(to_json(path[i].position));
+  if (!path.empty() && (path.size() - 1) % step != 0) points.push_back(to_json(path.back().position));
+  return points;
+}
+
+/// The paths of light from `starts`, as `rays`.
+void add_rays(const Scene& scene, std::size_t channel, double flexibility, const std::vector<Vector3d>& starts,
+              Json& rays) {
+  RayBatch batch;
+  for (const Vector3d& start : starts) batch.add(start, scene.beam.direction, flexibility);
+  std::vector<PathPoints> paths;
+  trace(scene.field, scene.geometry, scene.bending, batch, paths);
+  for (const PathPoints& path : paths)
+    if (!path.empty()) rays.push_back({{"points", polyline(path)}, {"color", color_of(scene, channel)}});
+}
+
+/// Positions of a lattice over the beam's aperture, its outline included, row by row.
+std::vector<Vector3d> lattice(const Beam& beam, int along_side) {
+  Eigen::AlignedBox2d box;
+  for (const Vector2d& corner : beam.aperture) box.extend(corner);
+  const Vector2d size = 0.998 * box.sizes(), first = box.center() - size / 2;  // Light beside the volume is straight.
+  std::vector<Vector3d> positions;
+  for (int y = 0; y < along_side; ++y)
+    for (int x = 0; x < along_side; ++x) {
+      const Vector2d across = first + size.cwiseProduct(Vector2d(x, y) / std::max(along_side - 1, 1));
+      positions.push_back(beam.center + across.x() * beam.right + across.y() * beam.up);
+    }
+  return positions;
+}
+
+Json describe_mesh(const TriangleMesh& mesh, const std::string& name) {
+  Json positions = Json::array(), triangles = Json::array();
+  for (const Vector3d& vertex : mesh.vertices)
+    for (int i = 0; i < 3; ++i) positions.push_back(static_cast<float>(vertex[i]));
+  for (const auto& triangle : mesh.triangles)
+    for (int i = 0; i < 3; ++i) triangles.push_back(triangle[i]);
+  return {{"name", name}, {"positions", std::move(positions)}, {"triangles", std::move(triangles)}};
+}
+
+Json describe_meshes(const Scene& scene) {
+  Json meshes = Json::array();
+  std::size_t left = most_triangles;
+  const auto add = [&](const TriangleMesh& mesh, const std::string& name) {
+    if (mesh.triangles.size() > left) return;
+    left -= mesh.triangles.size();
+    meshes.push_back(describe_mesh(mesh, name));
+  };
+  const Surfaces& surfaces = scene.geometry.surfaces();
+  if (surfaces.cut) add(*surfaces.cut, "bounds");
+  for (std::size_t i = 0; i < surfaces.obstacles.size(); ++i) add(surfaces.obstacles[i], fmt::format("obstacle {}", i));
+  return meshes;
+}
+
+Json describe_beam(const Scene& scene) {
+  const Eigen::AlignedBox3d box = world_box(scene.field);
+  const Vector3d start = box.center() - 0.75 * box.diagonal().norm() * scene.beam.direction;
+  double radius = 0;
+  for (const Vector2d& corner : scene.beam.aperture) radius = std::max(radius, corner.norm());
+  return {{"origin", to_json(start)}, {"direction", to_json(scene.beam.direction)}, {"radius", radius / std::sqrt(2.0)}};
+}
+
+Json describe_camera(const Scene& scene) {
+  const CameraDescription& camera = scene.description.camera;
+  if (!camera.position) return nullptr;
+  return {{"eye", to_json(*camera.position)},
+          {"target", to_json(camera.target.value_or(world_box(scene.field).center()))},
+          {"up", to_json(camera.up.value_or(Vector3d::UnitZ()))},
+          {"fov", camera.angle}};
+}
+
+/// Coordinates of `point` in a triangle; none if it is outside.
+std::optional<Vector3d> barycentric(const std::array<Vector2d, 3>& corners, const Vector2d& point) {
+  const Vector2d a = corners[1] - corners[0], b = corners[2] - corners[0], p = point - corners[0];
+  const double area = a.x() * b.y() - a.y() * b.x();
+  if (!(std::abs(area) > 1e-12)) return std::nullopt;  // Also where a corner is NaN.
+  const double u = (p.x() * b.y() - p.y() * b.x()) / area, v = (a.x() * p.y() - a.y() * p.x()) / area;
+  if (u < 0 || v < 0 || u + v > 1) return std::nullopt;
+  return Vector3d(1 - u - v, u, v);
+}
+
+const float* pixel_at(const Image& image, const Vector2d& place) {
+  const auto index = [](double part, int size) {
+    return std::min(static_cast<int>(std::clamp(part, 0.0, 1.0) * size), size - 1);
+  };
+  return image.pixel(index(place.x(), image.width), index(place.y(), image.height));
+}
+
+Json spectrum_at(const Scene& scene, const Render& render, const Vector2d& place) {
+  if (!render.spectral) return nullptr;
+  const Image& image = render.spectral->image;
+  const float* const pixel = pixel_at(image, place);
+  Json wavelengths = Json::array(), values = Json::array();
+  const std::size_t first = image.channels.size() - scene.bands.size();
+  for (std::size_t i = 0; i < scene.bands.size(); ++i) {
+    wavelengths.push_back(scene.bands[i].wavelength);
+    values.push_back(pixel[first + i]);
+  }
+  return {{"nm", std::move(wavelengths)}, {"values", std::move(values)}};
+}
+
+}  // namespace
+
+Json describe_field(const Scene& scene) {
+  const Eigen::AlignedBox3d& voxels = scene.field.voxels();
+  const Vector3d counts = voxels.sizes() + Vector3d::Ones();
+  const Eigen::AlignedBox3d& bounds = scene.field.index_bounds();
+  Json corners = Json::array();
+  for (int i = 0; i < 8; ++i) {
+    const Vector3d corner((i & 1 ? bounds.max() : bounds.min()).x(), (i & 2 ? bounds.max() : bounds.min()).y(),
+                          (i & 4 ? bounds.max() : bounds.min()).z());
+    corners.push_back(to_json(scene.field.to_world() * corner));
+  }
+  Json size = Json::array();
+  for (int i = 0; i < 3; ++i) size.push_back(static_cast<int>(std::lround(counts[i])));
+  return {{"voxels", std::move(size)}, {"corners", std::move(corners)}};
+}
+
+Json describe_space(const Scene& scene, bool with_meshes) {
+  Json rays = Json::array();
+  const std::vector<Vector3d> starts = lattice(scene.beam, shown_rays);
+  for (const std::size_t channel : shown_channels(scene))
+    add_rays(scene, channel, scene.channels[channel].flexibility, starts, rays);
+  Json plate = Json::array();
+  for (const Vector3d& corner : scene.geometry.surfaces().plate->corners()) plate.push_back(to_json(corner));
+  return {{"plate", std::move(plate)},
+          {"beam", describe_beam(scene)},
+          {"rays", std::move(rays)},
+          {"meshes", with_meshes ? describe_meshes(scene) : Json()},
+          {"camera", describe_camera(scene)}};
+}
+
+LandedRays::LandedRays(const Scene& scene) : starts_(lattice(scene.beam, cells + 1)) {
+  const Plate& plate = *scene.geometry.surfaces().plate;
+  const Vector2d pixels = plate.resolution.cast<double>();
+  for (const std::size_t channel : shown_channels(scene)) {
+    Colour colour{scene.channels[channel].flexibility, {}};
+    RayBatch batch;
+    for (const Vector3d& start : starts_) batch.add(start, scene.beam.direction, colour.flexibility);
+    trace(scene.field, scene.geometry, scene.bending, batch);
+    for (std::size_t i = 0; i < batch.size(); ++i)
+      colour.landings.push_back(batch.end[i] == RayEnd::plate
+                                    ? Vector2d(plate.to_pixel(batch.position[i]).cwiseQuotient(pixels))
+                                    : Vector2d::Constant(std::numeric_limits<double>::quiet_NaN()));
+    colours_.push_back(std::move(colour));
+  }
+}
+
+Json LandedRays::to(const Scene& scene, const Vector2d& place) const {
+  Json rays = Json::array();
+  const std::vector<std::size_t> channels = shown_channels(scene);
+  for (std::size_t c = 0; c < colours_.size(); ++c) {
+    const std::vector<Vector2d>& landings = colours_[c].landings;
+    std::vector<Vector3d> starts;
+    const auto try_triangle = [&](int i, int j, int k) {
+      const auto part = barycentric({landings[i], landings[j], landings[k]}, place);
+      if (part && starts.size() < most_ways)
+        starts.push_back((*part)[0] * starts_[i] + (*part)[1] * starts_[j] + (*part)[2] * starts_[k]);
+    };
+    for (int y = 0; y < cells; ++y)
+      for (int x = 0; x < cells; ++x) {
+        const int i = y * (cells + 1) + x, above = i + cells + 1;
+        try_triangle(i, i + 1, above + 1);
+        try_triangle(i, above + 1, above);
+      }
+    add_rays(scene, channels[c], colours_[c].flexibility, starts, rays);
+  }
+  return rays;
+}
+
+Json describe_pixel(const Scene& scene, const Render& render, const Image& display, const Vector2d& place) {
+  Json lines = Json::array();
+  const Image& linear = render.linear;
+  const float* const pixel = pixel_at(linear, place);
+  lines.push_back({"R, G, B", fmt::format("{:.4g}, {:.4g}, {:.4g}", pixel[0], pixel[1], pixel[2])});
+  if (render.spectral) {
+    const Image& spectral = render.spectral->image;
+    const float* const bands = pixel_at(spectral, place) + (spectral.channels.size() - scene.bands.size());
+    double sum = 0;
+    for (std::size_t i = 0; i < scene.bands.size(); ++i) sum += bands[i] * scene.bands[i].width;
+    lines.push_back({"irradiance", fmt::format("{:.4g}", sum)});
+  }
+  for (std::size_t i = 3; i < linear.channels.size(); ++i)
+    lines.push_back({linear.channels[i], fmt::format("{:.4g}", pixel[i])});
+  const float* const shown = pixel_at(display, place);
+  return {{"lines", std::move(lines)},
+          {"color", hex(Vector3d(shown[0], shown[1], shown[2]))},
+          {"spectrum", spectrum_at(scene, render, place)}};
+}
+
+}  // namespace tensorray

@@ -1,0 +1,91 @@
+#include "tools/viewer/live_scene.h"
+
+#include <utility>
+
+#include "integrators/flow/ray_memory.h"
+#include "scenes/pipeline/read_scene.h"
+
+namespace tensorray {
+namespace {
+
+Json section(const Json& scene, const char* key) {
+  const auto found = scene.find(key);
+  return found == scene.end() || !found->is_object() ? Json::object() : *found;
+}
+
+Json without(Json section, const std::vector<const char*>& keys) {
+  for (const char* key : keys) section.erase(key);
+  return section;
+}
+
+/// What the voxels depend on.
+Json field_keys(const Json& scene) { return without(section(scene, "field"), {"scale", "bounds"}); }
+
+/// What automatic scale and direction depend on.
+Json choice_keys(const Json& scene) {
+  const Json light = section(scene, "light");
+  return {without(section(scene, "field"), {"scale"}), light.value("direction", Json()), light.value("up", Json())};
+}
+
+Json with_names(Json scene, const std::vector<std::filesystem::path>& outputs) {
+  Json files = Json::array();
+  for (const std::filesystem::path& output : outputs) files.push_back(output.string());
+  return {std::move(scene), std::move(files)};
+}
+
+/// What the way of a ray through the volume depends on.
+Json ray_keys(const Json& json, const Scene& scene) {
+  const Eigen::Vector3d& V = scene.beam.direction;
+  return {section(json, "field"), section(json, "bending"), scene.scale.scale, V.x(), V.y(), V.z()};
+}
+
+/// What the picture in linear light depends on.
+Json picture_keys(Json scene, const std::vector<std::filesystem::path>& outputs) {
+  scene["output"] = without(section(scene, "output"), {"exposure", "display", "view"});
+  return with_names(std::move(scene), outputs);
+}
+
+}  // namespace
+
+const Scene& LiveScene::load(const Json& json, const std::vector<std::filesystem::path>& outputs,
+                             const Progress& progress) {
+  const Json loaded = with_names(json, outputs);
+  if (scene_ && loaded == loaded_) return *scene_;
+  SceneDescription description = read_scene_json(json, file_, {{}, outputs});
+  if (Json keys = choice_keys(json); keys != chosen_for_) {
+    scale_.reset();
+    direction_.reset();
+    chosen_for_ = std::move(keys);
+  }
+  const bool chooses_scale = !description.field.scale, chooses_direction = !description.light.direction;
+  if (chooses_scale) description.field.scale = scale_;
+  if (chooses_direction) description.light.direction = direction_;
+
+  if (!has_picture(json, outputs)) render_.reset();
+  Json field = field_keys(json);
+  if (scene_ && field != field_) scene_.reset();  // Its memory is needed.
+  Scene scene = scene_ ? reload_scene(*scene_, description, progress) : load_scene(description, progress);
+  if (chooses_scale) scale_ = scene.scale.scale;
+  if (chooses_direction) direction_ = scene.description.light.direction;
+  // A change that moves all rays begins without a memory: it would cost time and give nothing.
+  if (Json keys = ray_keys(json, scene); keys != rays_of_)
+    rays_of_ = std::move(keys);
+  else
+    scene.rays = scene_ && scene_->rays ? scene_->rays : std::make_shared<RayMemory>();
+  scene_.emplace(std::move(scene));
+  loaded_ = loaded;
+  field_ = std::move(field);
+  rendered_ = picture_keys(json, outputs);
+  return *scene_;
+}
+
+std::shared_ptr<const Render> LiveScene::render(const Progress& progress) {
+  if (!render_) render_ = std::make_shared<const Render>(tensorray::render(*scene_, progress));
+  return render_;
+}
+
+bool LiveScene::has_picture(const Json& json, const std::vector<std::filesystem::path>& outputs) const {
+  return render_ && picture_keys(json, outputs) == rendered_;
+}
+
+}  // namespace tensorray

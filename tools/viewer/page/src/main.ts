@@ -1,0 +1,266 @@
+// The live view: joins the connection, the scene, and the parts of the page.
+
+import "./view.css";
+import "uplot/dist/uPlot.min.css";
+import { fragment_of, patch_of } from "./address";
+import { command_line } from "./command_line";
+import { Connection } from "./connection";
+import { by_id } from "./dom";
+import { copy, download } from "./files";
+import { apply_patch, type JsonObject } from "./json";
+import { Knobs } from "./knobs";
+import { Picture } from "./picture";
+import type { BinaryMessage, Failure, FieldInformation, Hello, PictureHeader, TextMessage } from "./protocol";
+import { ReadOut } from "./read_out";
+import { SchemaForm } from "./schema_form";
+import { SpacePane } from "./space_pane";
+import { State } from "./state";
+import { StatusLine } from "./status_line";
+import { make_tabs } from "./tabs";
+import { Theme } from "./theme";
+import { Throttle } from "./throttle";
+import { show_toast } from "./toast";
+
+const space_interval = 250;  // ms, between requests for the content of the 3D pane
+const address_delay = 250;  // ms, before the address shows a change
+
+const state = new State();
+const theme = new Theme(by_id<HTMLButtonElement>("theme"));
+const picture = new Picture(by_id<HTMLCanvasElement>("picture"), by_id("picture-frame"), by_id("cross-hair"));
+const read_out = new ReadOut(by_id("read-out"));
+const status_line = new StatusLine();
+const knobs = new Knobs(by_id("knobs"), state);
+const form = new SchemaForm(by_id("all-keys"), state);
+const space_pane = make_space_pane();
+
+let hello: Hello | null = null;
+let shown_field = "";
+let sent_scene: JsonObject | null = null;
+/** Ids of requests whose errors are told to the user. */
+const told_ids = new Set<number>();
+
+const connection = new Connection({ on_text, on_binary, on_state: on_connection });
+
+const scenes = new Throttle<JsonObject>((scene) => {
+  const id = connection.next_id();
+  if (!connection.send({ type: "scene", id, scene })) return null;
+  sent_scene = scene;
+  told_ids.add(id);
+  return id;
+});
+const looks = new Throttle<[number, number]>(([x, y]) => {
+  const id = connection.next_id();
+  return connection.send({ type: "look", id, x, y }) ? id : null;
+});
+const spaces = new Throttle<true>(() => {
+  const id = connection.next_id();
+  return connection.send({ type: "space", id }) ? id : null;
+});
+
+function make_space_pane(): SpacePane | null {
+  try {
+    return new SpacePane(by_id("space-frame"), picture.canvas);
+  } catch {
+    const frame = by_id("space-frame");
+    frame.textContent = "This browser has no WebGL, so there is no view in space.";
+    frame.classList.add("hint");
+    return null;
+  }
+}
+
+function on_connection(connected: boolean): void {
+  by_id("banner").hidden = connected;
+  document.body.classList.toggle("disconnected", !connected);
+  for (const queue of [scenes, looks, spaces]) queue.reset();
+}
+
+function on_text(message: TextMessage): void {
+  switch (message.type) {
+    case "hello":
+      on_hello(message);
+      break;
+    case "progress":
+      status_line.show_progress(message);
+      break;
+    case "details":
+      if (picture.mark) looks.ask(picture.mark);
+      break;
+    case "error":
+      on_error(message);
+      break;
+    case "look":
+      looks.answered(message.id);
+      status_line.settle();
+      read_out.show(message);
+      space_pane?.show_look(message.rays);
+      break;
+    case "space":
+      spaces.answered(message.id);
+      status_line.settle();
+      if (message.field) on_field(message.field);
+      space_pane?.show_space(message, ["photon_distribution", "lens"].includes(rendered_method()));
+      break;
+    case "saved":
+      show_toast("Saved as " + message.file);
+      break;
+  }
+}
+
+function on_binary({ header, content }: BinaryMessage): void {
+  if (header.type === "file") {
+    download(header.name, content);
+  } else {
+    on_picture(header, content);
+  }
+}
+
+function on_hello(message: Hello): void {
+  const again = hello !== null;
+  hello = message;
+  by_id("file-name").textContent = message.file;
+  by_id("file-name").title = `${message.file}, ${message.field.voxels.join(" × ")} voxels, tensorray ${message.version}`;
+  by_id("save").title = "Write the scene to " + message.saves;
+  document.title = message.file.replace(/^.*\//, "") + " – tensorray";
+  on_field(message.field);
+  if (again) {
+    // After a reconnection the user's scene stays.
+    state.original = message.scene;
+    scenes.ask(state.scene);
+    return;
+  }
+  knobs.build(message.schema);
+  form.build(message.schema);
+  const patch = patch_of(location.hash);
+  if (location.hash.length > 1 && !patch) show_toast("The address has no readable scene. The scene of the file is shown.");
+  state.begin(message.scene, patch ?? {});
+}
+
+/** The field of the scene is another one, if a key of it was changed. */
+function on_field(field: FieldInformation): void {
+  if (JSON.stringify(field) === shown_field) return;
+  shown_field = JSON.stringify(field);
+  space_pane?.show_field(field);
+  knobs.show_field(field);
+}
+
+function on_picture(header: PictureHeader, content: Uint8Array<ArrayBuffer>): void {
+  scenes.answered(header.id);
+  by_id("picture-waiting").hidden = true;
+  status_line.show_picture(header);
+  knobs.show_picture(header);
+  void picture.draw(header, content).catch(() => status_line.show_error("The picture cannot be decoded."));
+  by_id<HTMLButtonElement>("export-png").disabled = !header.final;
+  by_id<HTMLButtonElement>("export-exr").disabled = !header.final;
+  if (header.final) {
+    ask_space(true);
+    if (picture.mark) looks.ask(picture.mark);
+  } else if (header.stage === 0) {
+    read_out.age();
+    ask_space(false);
+  }
+}
+
+function on_error(failure: Failure): void {
+  if (looks.is_outstanding(failure.id)) {
+    status_line.settle();
+    read_out.show_fault(failure.message);
+    space_pane?.show_look([]);
+  } else if (told_ids.has(failure.id)) {
+    status_line.show_error(failure.message);
+  }
+  for (const queue of [scenes, looks, spaces]) if (queue.is_outstanding(failure.id)) queue.answered(failure.id);
+}
+
+function rendered_method(): string {
+  const integrator = (sent_scene ?? state.scene)["integrator"] as JsonObject | undefined;
+  return String(integrator?.["type"] ?? "");
+}
+
+let last_space = 0;
+let space_timer = 0;
+
+/** @param late  The content is of a finished picture: it is asked for in any case, later if need be. */
+function ask_space(late: boolean): void {
+  const wait = last_space + space_interval - Date.now();
+  if (wait > 0) {
+    if (late) {
+      clearTimeout(space_timer);
+      space_timer = window.setTimeout(() => ask_space(true), wait);
+    }
+    return;
+  }
+  last_space = Date.now();
+  spaces.ask(true);
+}
+
+let address_timer = 0;
+
+state.on_change(() => {
+  scenes.ask(state.scene);
+  knobs.update();
+  form.update();
+  by_id<HTMLButtonElement>("undo").disabled = !state.can_undo();
+  by_id<HTMLButtonElement>("redo").disabled = !state.can_redo();
+  clearTimeout(address_timer);
+  address_timer = window.setTimeout(() => {
+    history.replaceState(null, "", location.pathname + location.search + fragment_of(state.patch()));
+  }, address_delay);
+});
+
+picture.on_pointer = (x, y) => looks.ask([x, y]);
+picture.on_drawn = () => space_pane?.picture_changed();
+if (space_pane) {
+  space_pane.on_plate = (x, y) => picture.point(x, y);
+  space_pane.on_view = (right, up, toward) => knobs.set_view(right, up, toward);
+}
+theme.on_change(() => {
+  read_out.restyle();
+  space_pane?.restyle();
+  knobs.update();
+});
+make_tabs(by_id("tabs"), () => form.update());
+
+by_id("undo").addEventListener("click", () => state.undo());
+by_id("redo").addEventListener("click", () => state.redo());
+by_id("space-reset").addEventListener("click", () => space_pane?.reset_view());
+by_id("space-rays").addEventListener("click", (event) => {
+  const button = event.currentTarget as HTMLElement;
+  const shown = button.getAttribute("aria-pressed") !== "true";
+  button.setAttribute("aria-pressed", String(shown));
+  space_pane?.show_rays(shown);
+});
+by_id("save").addEventListener("click", () => {
+  const id = connection.next_id();
+  told_ids.add(id);
+  connection.send({ type: "save", id, scene: state.scene });
+});
+by_id("copy-command").addEventListener("click", () => {
+  if (!hello) return;
+  const text = command_line(hello.file, state.patch());
+  by_id("copy-command").dataset["command"] = text;
+  void copy(text).then((done) => show_toast(done ? "Copied: " + text : text));
+});
+for (const file of ["png", "exr"] as const) {
+  by_id("export-" + file).addEventListener("click", () => {
+    const id = connection.next_id();
+    told_ids.add(id);
+    connection.send({ type: "export", id, file });
+  });
+}
+
+window.addEventListener("hashchange", () => {
+  const patch = patch_of(location.hash);
+  if (hello && patch) state.replace(apply_patch(state.original, patch));
+});
+
+document.addEventListener("keydown", (event) => {
+  if (!(event.ctrlKey || event.metaKey) || event.altKey) return;
+  const key = event.key.toLowerCase();
+  // In a text, these keys belong to the browser.
+  const target = event.target;
+  const in_text = target instanceof HTMLTextAreaElement || (target instanceof HTMLInputElement && target.type !== "range");
+  if (in_text || !(key === "z" || key === "y")) return;
+  event.preventDefault();
+  if (key === "y" || event.shiftKey) state.redo();
+  else state.undo();
+});

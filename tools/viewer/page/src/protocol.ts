@@ -1,0 +1,132 @@
+// The messages between the page and the server.
+
+import type { Json, JsonObject } from "./json";
+
+export type Vector = [number, number, number];
+
+export type Request =
+  | { type: "scene"; id: number; scene: JsonObject }
+  | { type: "look"; id: number; x: number; y: number }
+  | { type: "space"; id: number }
+  | { type: "save"; id: number; scene: JsonObject }
+  | { type: "export"; id: number; file: "png" | "exr" };
+
+export interface FieldInformation {
+  voxels: Vector;
+  /** World; bit 0 of the index is x, bit 1 is y, bit 2 is z. */
+  corners: Vector[];
+}
+
+export interface Hello {
+  type: "hello";
+  version: string;
+  scene: JsonObject;
+  schema: JsonObject;
+  /** The path of the file, as the user gave it. */
+  file: string;
+  /** Where "save" writes. */
+  saves: string;
+  field: FieldInformation;
+}
+
+export interface Progress {
+  type: "progress";
+  id: number;
+  phase: string;
+  done: number;
+  total: number;
+}
+
+/** Spectrum and maps of the last picture can be asked for now. */
+export interface Details {
+  type: "details";
+  id: number;
+}
+
+export interface Failure {
+  type: "error";
+  id: number;
+  message: string;
+}
+
+export interface Ray {
+  points: Vector[];
+  color: string;
+}
+
+export interface Look {
+  type: "look";
+  id: number;
+  lines: [string, string][];
+  color: string | null;
+  spectrum: { nm: number[]; values: number[] } | null;
+  rays: Ray[];
+}
+
+export interface Mesh {
+  name: string;
+  positions: number[];
+  triangles: number[];
+}
+
+export interface Space {
+  type: "space";
+  id: number;
+  /** Corners: bottom left, bottom right, top right and top left of the picture. */
+  plate: Vector[] | null;
+  beam: { origin: Vector; direction: Vector; radius: number } | null;
+  /** null: those of the last answer. */
+  meshes: Mesh[] | null;
+  rays: Ray[];
+  camera: { eye: Vector; target: Vector; up: Vector; fov: number } | null;
+  /** The field, which a change of the scene may replace. */
+  field?: FieldInformation;
+}
+
+export interface Saved {
+  type: "saved";
+  id: number;
+  file: string;
+}
+
+export type TextMessage = Hello | Progress | Details | Failure | Look | Space | Saved;
+
+export interface PictureHeader {
+  type: "picture";
+  id: number;
+  /** 0 is the coarsest. */
+  stage: number;
+  final: boolean;
+  width: number;
+  height: number;
+  /** Of the finished picture. */
+  full_width: number;
+  full_height: number;
+  format: string;
+  seconds: number;
+  /** The scale and the direction that were used, where the scene says "auto". */
+  scale: number;
+  direction: Vector;
+  /** In stops; where the scene says "auto", the one that was chosen. */
+  exposure: number;
+  notes?: string[];
+  warnings?: string[];
+}
+
+export interface FileHeader {
+  type: "file";
+  id: number;
+  name: string;
+}
+
+export interface BinaryMessage {
+  header: PictureHeader | FileHeader;
+  content: Uint8Array<ArrayBuffer>;
+}
+
+/** Splits a binary message: the length of the header (4 bytes, little-endian), the header as JSON, the content. */
+export function parse_binary(data: ArrayBuffer): BinaryMessage {
+  const length = new DataView(data).getUint32(0, true);
+  const header = JSON.parse(new TextDecoder().decode(new Uint8Array(data, 4, length))) as Json;
+  return { header: header as unknown as BinaryMessage["header"], content: new Uint8Array(data, 4 + length) };
+}

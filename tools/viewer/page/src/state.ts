@@ -1,0 +1,109 @@
+// The present scene, with undo and redo. One gesture, such as a drag, is one step.
+
+import { apply_patch, equal, merge_patch, value_at, with_value, without_value } from "./json";
+import type { Json, JsonObject, Path } from "./json";
+
+/** Repeated key presses on one control within this time are one step; ms. */
+const repeat_time = 600;
+const most_steps = 500;
+
+export class State {
+  original: JsonObject = {};
+  scene: JsonObject = {};
+  private past: JsonObject[] = [];
+  private future: JsonObject[] = [];
+  private gesture: string | null = null;
+  private gesture_open = false;
+  private last_change = 0;
+  private listeners: (() => void)[] = [];
+
+  on_change(listener: () => void): void {
+    this.listeners.push(listener);
+  }
+
+  /** Begins with the scene of the server, changed by `patch`. */
+  begin(original: JsonObject, patch: JsonObject): void {
+    this.original = original;
+    this.scene = apply_patch(original, patch);
+    this.past = [];
+    this.future = [];
+    this.gesture = null;
+    this.notify();
+  }
+
+  get(path: Path): Json | undefined {
+    return value_at(this.scene, path);
+  }
+
+  patch(): JsonObject {
+    return merge_patch(this.original, this.scene);
+  }
+
+  /**
+   * Replaces the scene. Changes with the same `gesture` are one step until finish() is called.
+   * Without `gesture`, the change is a step of its own.
+   */
+  replace(scene: JsonObject, gesture: string | null = null): void {
+    if (equal(scene, this.scene)) return;
+    const now = Date.now();
+    const same = gesture !== null && gesture === this.gesture;
+    const continues = same && (this.gesture_open || now - this.last_change < repeat_time);
+    if (!continues) {
+      this.past.push(this.scene);
+      if (this.past.length > most_steps) this.past.shift();
+    }
+    this.future = [];
+    this.gesture = gesture;
+    this.gesture_open = gesture !== null;
+    this.last_change = now;
+    this.scene = scene;
+    this.notify();
+  }
+
+  set(path: Path, value: Json, gesture: string | null = null): void {
+    this.replace(with_value(this.scene, path, value), gesture);
+  }
+
+  remove(path: Path, gesture: string | null = null): void {
+    this.replace(without_value(this.scene, path), gesture);
+  }
+
+  /**
+   * Ends the gesture: the hand has let go.
+   * @param may_continue  The same gesture may go on soon, as key presses do.
+   */
+  finish(may_continue = false): void {
+    this.gesture_open = false;
+    if (!may_continue) this.gesture = null;
+    this.last_change = Date.now();
+  }
+
+  can_undo(): boolean {
+    return this.past.length > 0;
+  }
+
+  can_redo(): boolean {
+    return this.future.length > 0;
+  }
+
+  undo(): void {
+    this.move(this.past, this.future);
+  }
+
+  redo(): void {
+    this.move(this.future, this.past);
+  }
+
+  private move(from: JsonObject[], to: JsonObject[]): void {
+    const scene = from.pop();
+    if (!scene) return;
+    to.push(this.scene);
+    this.scene = scene;
+    this.gesture = null;
+    this.notify();
+  }
+
+  private notify(): void {
+    for (const listener of this.listeners) listener();
+  }
+}

@@ -1,0 +1,393 @@
+#include "tools/viewer/pages.h"
+
+#include <algorithm>
+#include <chrono>
+#include <fstream>
+#include <future>
+#include <iterator>
+#include <set>
+#include <stdexcept>
+
+#include <fmt/format.h>
+
+#include "base/output_file.h"
+#include "base/seconds.h"
+#include "base/text.h"
+#include "scenes/description/run_files.h"
+#include "scenes/outputs/picture_outputs.h"
+#include "scenes/pipeline/read_scene.h"
+
+namespace tensorray {
+namespace {
+
+constexpr std::size_t most_requests = 32;  // Of one page, waiting.
+constexpr int coarsest = 16;
+constexpr double soon = 0.1, very_soon = 0.03;  // Seconds that a first picture may take, and that allow a finer one.
+
+const std::set<std::string> request_types{"look", "space", "save", "export"};
+
+PageMessage text_message(Json message) {
+  return {false, false, message.dump(-1, ' ', false, Json::error_handler_t::replace)};
+}
+
+PageMessage binary_message(const Json& header, const std::string& bytes, bool is_picture) {
+  const std::string text = header.dump(-1, ' ', false, Json::error_handler_t::replace);
+  std::string data;
+  for (int i = 0; i < 4; ++i) data += static_cast<char>(text.size() >> (8 * i) & 0xff);
+  return {true, is_picture, data + text + bytes};
+}
+
+PageMessage error_message(const Json& id, const std::string& text) {
+  return text_message({{"type", "error"}, {"id", id}, {"message", one_line(text)}});
+}
+
+Json answer_to(const Json& request, const char* type, Json content) {
+  Json message{{"type", type}, {"id", request.value("id", Json())}};
+  message.update(content);
+  return message;
+}
+
+std::string bytes_of(const std::filesystem::path& file) {
+  std::ifstream stream(file, std::ios::binary);
+  return {std::istreambuf_iterator<char>(stream), {}};
+}
+
+/// The message as an object with a known type.
+Json parsed(const std::string& text) {
+  Json message;
+  try {
+    message = parse_value(text);
+  } catch (const Json::exception&) {
+    throw std::invalid_argument("a message is not JSON");
+  }
+  if (!message.is_object() || !message.contains("type") || !message["type"].is_string())
+    throw std::invalid_argument("a message has no `type`");
+  const std::string type = message["type"];
+  if (type != "scene" && request_types.count(type) == 0)
+    throw std::invalid_argument("unknown message `" + printable(type) +
+                                "`; there are scene, look, space, save, export");
+  if ((type == "scene" || type == "save") && !(message.contains("scene") && message["scene"].is_object()))
+    throw std::invalid_argument("the message `" + type + "` has no `scene`");
+  return message;
+}
+
+double number(const Json& message, const char* key) {
+  const auto found = message.find(key);
+  if (found == message.end() || !found->is_number())
+    throw std::invalid_argument(fmt::format("the message has no number `{}`", key));
+  return found->get<double>();
+}
+
+}  // namespace
+
+Pages::Pages(const ViewedScene& viewed, const Progress& progress)
+    : viewed_(viewed),
+      scene_(scene_json(viewed.file, viewed.overrides)),
+      allowed_(read_scene_json(scene_, viewed.file)),
+      live_(viewed.file) {
+  const SceneDescription description = read_scene_json(scene_, viewed.file);
+  require_distinct_files(input_files(description), {{viewed.copy, "the file that a page saves to"}});
+  const auto images = std::async(std::launch::async, prepare_images);  // Errors come with the first picture.
+  live_.load(scene_, outputs_of(description, {}, folder_ / ""), progress);
+  thread_ = std::thread([this] { work(); });
+}
+
+Pages::~Pages() {
+  {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    ends_ = true;
+    progress_.cancelled = true;
+  }
+  wake_.notify_all();
+  thread_.join();
+}
+
+Json Pages::hello() const {
+  return {{"type", "hello"},
+          {"version", TENSORRAY_VERSION},
+          {"scene", scene_},
+          {"schema", Json::parse(scene_schema())},
+          {"file", viewed_.file.string()},
+          {"saves", viewed_.copy.string()}};
+}
+
+Pages::Id Pages::open(Send send) {
+  const auto page = std::make_shared<Page>();
+  page->send = std::move(send);
+  page->requests.push_back({"hello", Json::object()});
+  {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    page->id = next_id_++;
+    pages_.push_back(page);
+  }
+  wake_.notify_all();
+  return page->id;
+}
+
+void Pages::close(Id id) {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  pages_.remove_if([&](const PagePointer& page) { return page->id == id; });
+  if (rendering_ && rendering_->id == id) progress_.cancelled = true;
+}
+
+void Pages::receive(Id id, const std::string& text) {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  const auto found =
+      std::find_if(pages_.begin(), pages_.end(), [&](const PagePointer& page) { return page->id == id; });
+  if (found == pages_.end()) return;
+  Page& page = **found;
+  Json message_id;
+  try {
+    Json message = parsed(text);
+    message_id = message.value("id", Json());
+    const std::string type = message["type"];
+    if (type == "scene") {
+      page.scene = Request{type, std::move(message)};
+      if (rendering_ == *found) progress_.cancelled = true;
+    } else {
+      if (page.requests.size() >= most_requests) throw std::invalid_argument("too many requests are waiting");
+      page.requests.push_back({type, std::move(message)});
+    }
+  } catch (const std::exception& error) {
+    page.send(error_message(message_id, error.what()));
+  }
+  wake_.notify_all();
+}
+
+/// The first page with something to do; it goes to the end of the list. Null: the thread ends.
+Pages::PagePointer Pages::next_page() {
+  std::unique_lock<std::mutex> lock(mutex_);
+  for (;;) {
+    if (ends_) return nullptr;
+    for (auto page = pages_.begin(); page != pages_.end(); ++page) {
+      const PagePointer chosen = *page;
+      if (chosen->requests.empty() && !chosen->scene && chosen->stages.empty()) continue;
+      pages_.splice(pages_.end(), pages_, page);
+      return chosen;
+    }
+    wake_.wait(lock);
+  }
+}
+
+void Pages::work() {
+  while (const PagePointer page = next_page()) serve(page);
+}
+
+void Pages::serve(const PagePointer& page) {
+  std::optional<Request> scene;
+  {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    scene.swap(page->scene);
+  }
+  if (scene) begin_scene(*page, *scene);
+  if (!page->stages.empty()) make_stage(page);
+  answer_requests(page, false);
+}
+
+void Pages::check(const Json& scene) const {
+  const SceneDescription description = read_scene_json(scene, viewed_.file);
+  allowed_.require(description);
+  require_moderate(description);
+}
+
+void Pages::begin_scene(Page& page, const Request& request) {
+  const Json id = request.message.value("id", Json());
+  page.stages.clear();
+  try {
+    check(request.message["scene"]);
+    page.shown = request.message["scene"];
+    page.shown_id = id;
+    page.landed.reset();
+    const SceneDescription description = read_scene_json(page.shown, viewed_.file);
+    page.stages = stages_of(coarseness_, description.integrator.method().is_sampled());
+    const auto is_there = [&](const Stage& stage) {
+      return stage.is_final() && live_.has_picture(page.shown, outputs_of(description, stage, folder_ / ""));
+    };
+    // Where only colours change, only the finished picture is sent again.
+    const auto first = std::find_if(page.stages.begin(), page.stages.end(), is_there);
+    if (first == page.stages.end()) return;
+    page.stages.erase(page.stages.begin(), first);
+    page.stages.front().is_known = false;
+  } catch (const std::exception& error) {
+    page.send(error_message(id, error.what()));
+  }
+}
+
+/// Loads the scene that the page shows, for a stage.
+void Pages::load_for(Page& page, const Stage& stage) {
+  const SceneDescription description = read_scene_json(page.shown, viewed_.file);
+  const auto outputs = outputs_of(description, stage, folder_ / "");
+  if (stage.coarseness > 1 && resolution_of_ != page.shown) {
+    resolution_ = live_.load(page.shown, outputs, progress_).geometry.surfaces().plate->resolution;
+    resolution_of_ = page.shown;
+  }
+  live_.load(at_stage(page.shown, description, resolution_, stage), outputs, progress_);
+}
+
+/// Makes the page's next picture. A new scene of the page cancels all but the first.
+void Pages::make_stage(const PagePointer& page) {
+  const Stage stage = page->stages.front();
+  page->stages.pop_front();
+  const bool is_first = stage.coarseness > 1 && stage.samples == 1;
+  {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    if (page->scene && !is_first) return;
+    progress_.cancelled = ends_;
+    rendering_ = is_first ? nullptr : page;
+  }
+  auto last = Clock::now();
+  progress_.report = [&](const std::string& phase, std::uint64_t done, std::uint64_t total) {
+    if (is_first || seconds_since(last) < 0.2) return;
+    last = Clock::now();
+    if (!stage.is_known)
+      page->send(text_message(
+          {{"type", "progress"}, {"id", page->shown_id}, {"phase", phase}, {"done", done}, {"total", total}}));
+    answer_requests(page, true);
+  };
+  try {
+    const auto start = Clock::now();
+    load_for(*page, stage);
+    const double seconds_loading = seconds_since(start);
+    page->render = live_.render(progress_);
+    if (stage.is_known)
+      page->send(text_message({{"type", "details"}, {"id", page->shown_id}}));
+    else
+      send_picture(*page, stage, seconds_loading);
+    if (is_first && seconds_since(start) > soon) coarseness_ = std::min(2 * coarseness_, coarsest);
+    if (is_first && seconds_since(start) < very_soon) coarseness_ = std::max(coarseness_ / 2, 2);
+  } catch (const Cancelled&) {
+    page->stages.clear();
+  } catch (const std::exception& error) {
+    page->stages.clear();
+    page->send(error_message(page->shown_id, error.what()));
+  }
+  const std::lock_guard<std::mutex> lock(mutex_);
+  rendering_.reset();
+  progress_.report = {};
+  progress_.cancelled = ends_;
+}
+
+void Pages::send_picture(Page& page, const Stage& stage, double seconds_loading) {
+  const Scene& scene = live_.scene();
+  const Render& render = *page.render;
+  const char* const ending = stage.is_final() ? ".png" : ".jpg";
+  const std::filesystem::path file = folder_ / (std::string("shown") + ending);
+  auto start = Clock::now();
+  page.display = display_image(scene, render, false);
+  const Statistics& statistics = render.statistics;
+  Json phases{{"load", seconds_loading},
+              {"trace", statistics.seconds_tracing},
+              {"light", statistics.seconds_density + statistics.seconds_drawing},
+              {"color", statistics.seconds_color + seconds_since(start)}};
+  start = Clock::now();
+  write_image(file, page.display);
+  phases["encode"] = seconds_since(start);
+  double seconds = 0;
+  for (const Json& phase : phases) seconds += phase.get<double>();
+  const Json header{{"type", "picture"},
+                    {"id", page.shown_id},
+                    {"stage", stage.coarseness > 1 && stage.samples == 1 ? 0
+                              : stage.is_final()                         ? 2
+                                                                         : 1},
+                    {"final", stage.is_final()},
+                    {"width", page.display.width},
+                    {"height", page.display.height},
+                    {"full_width", page.display.width * stage.coarseness},
+                    {"full_height", page.display.height * stage.coarseness},
+                    {"format", stage.is_final() ? "image/png" : "image/jpeg"},
+                    {"seconds", seconds},
+                    {"phases", phases},
+                    {"scale", scene.scale.scale},
+                    {"exposure", display_exposure(scene, render)},
+                    {"direction", {scene.beam.direction.x(), scene.beam.direction.y(), scene.beam.direction.z()}},
+                    {"notes", scene.notes},
+                    {"warnings", render.warnings}};
+  page.send(binary_message(header, bytes_of(file), true));
+}
+
+/// @param renders  Whether a picture of this page is being made: only requests that need no other scene are answered.
+void Pages::answer_requests(const PagePointer& page, bool renders) {
+  const auto is_possible = [&](const Request& request) {
+    return !renders || request.type == "look" || request.type == "space";
+  };
+  for (;;) {
+    Request request;
+    {
+      const std::lock_guard<std::mutex> lock(mutex_);
+      const auto next = std::find_if(page->requests.begin(), page->requests.end(), is_possible);
+      if (next == page->requests.end()) return;
+      request = std::move(*next);
+      page->requests.erase(next);
+    }
+    try {
+      if (!renders && page->shown.is_object()) load_for(*page, {1, 0, true});  // It may be another page's scene.
+      answer(*page, request);
+    } catch (const std::exception& error) {
+      page->send(error_message(request.message.value("id", Json()), error.what()));
+    }
+  }
+}
+
+void Pages::answer(Page& page, const Request& request) {
+  if (request.type == "hello") {
+    Json message = hello();
+    message["field"] = describe_field(live_.scene());
+    page.send(text_message(std::move(message)));
+  }
+  if (request.type == "look") look(page, request.message);
+  if (request.type == "space") space(page, request.message);
+  if (request.type == "save") save(page, request.message);
+  if (request.type == "export") export_file(page, request.message);
+}
+
+void Pages::look(Page& page, const Json& message) {
+  const Eigen::Vector2d place(number(message, "x"), number(message, "y"));
+  if (!page.render) throw std::invalid_argument("there is no picture yet");
+  const Scene& scene = live_.scene();
+  Json content = describe_pixel(scene, *page.render, page.display, place);
+  content["rays"] = Json::array();
+  if (scene.description.integrator.method().shows_plate()) {
+    if (!page.landed) page.landed = std::make_shared<const LandedRays>(scene);
+    content["rays"] = page.landed->to(scene, place);
+  }
+  page.send(text_message(answer_to(message, "look", std::move(content))));
+}
+
+void Pages::space(Page& page, const Json& message) {
+  if (!page.shown.is_object()) throw std::invalid_argument("there is no scene yet");
+  Json meshes_of{page.shown.value("obstacles", Json()),
+                 page.shown.value("field", Json::object()).value("bounds", Json())};
+  Json content = describe_space(live_.scene(), page.meshes_of != meshes_of);
+  content["field"] = describe_field(live_.scene());
+  page.meshes_of = std::move(meshes_of);
+  page.send(text_message(answer_to(message, "space", std::move(content))));
+}
+
+void Pages::save(Page& page, const Json& message) {
+  check(message["scene"]);
+  OutputFile file(viewed_.copy);
+  file.write([&](const std::filesystem::path& path) {
+    std::ofstream stream(path, std::ios::binary);
+    stream << message["scene"].dump(2) << "\n";
+    stream.close();
+    if (!stream) throw std::runtime_error("cannot write " + path.string() + ": the disk may be full");
+  });
+  file.commit();
+  page.send(text_message(answer_to(message, "saved", {{"file", viewed_.copy.string()}})));
+}
+
+/// Sends the picture as a file, as `tensorray render` would write it.
+void Pages::export_file(Page& page, const Json& message) {
+  const std::string ending = "." + message.value("file", "");
+  if (ending != ".png" && ending != ".exr") throw std::invalid_argument("a page can have `png` and `exr`");
+  if (!page.shown.is_object()) throw std::invalid_argument("there is no picture yet");
+  page.render = live_.render(progress_);
+  const std::filesystem::path file = folder_ / ("export" + ending);
+  for (const Output& output : picture_outputs())
+    if (std::find(output.endings.begin(), output.endings.end(), ending) != output.endings.end())
+      output.write(file, live_.scene(), *page.render);
+  const std::string name = viewed_.file.stem().string() + ending;
+  page.send(binary_message(answer_to(message, "file", {{"name", name}}), bytes_of(file), false));
+}
+
+}  // namespace tensorray

@@ -1,0 +1,111 @@
+/// @file tools/viewer/program/tensorray_view.cpp
+/// The program `tensorray-view`: a web server for the live view. `tensorray view` starts it.
+
+#include <algorithm>
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include <CLI/CLI.hpp>
+#include <fmt/format.h>
+#include <tbb/global_control.h>
+
+#include "base/child_program.h"
+#include "renderer/images/image.h"
+#include "tools/command_line/interrupts.h"
+#include "tools/command_line/progress_bar.h"
+#include "tools/command_line/run_and_report.h"
+#include "tools/viewer/pages.h"
+#include "tools/viewer/server.h"
+#include "tools/viewer/token.h"
+
+namespace {
+
+using namespace tensorray;
+
+constexpr std::uint16_t usual_port = 8787;
+constexpr int ports_to_try = 20;
+
+struct ViewOptions {
+  ViewedScene viewed;
+  ServerSettings server;
+  std::optional<std::uint16_t> port;
+  unsigned threads = 0;
+  bool quiet = false;
+};
+
+/// NAME.view.json, beside the scene.
+std::filesystem::path default_copy(std::filesystem::path scene) { return scene.replace_extension(".view.json"); }
+
+/// Paths in a scene are relative to its folder, and stay so in its copy.
+void require_same_folder(const ViewedScene& viewed) {
+  const auto folder = [](const std::filesystem::path& file) {
+    return std::filesystem::weakly_canonical(std::filesystem::absolute(file).parent_path());
+  };
+  if (viewed.file.extension() != ".vdb" && folder(viewed.file) != folder(viewed.copy))
+    throw std::invalid_argument("--save-scene " + viewed.copy.string() + ": must be in the folder of " +
+                                viewed.file.string() + ", to which paths in it are relative");
+}
+
+/// The usual port, or if another program has it, one of the next.
+Server listen(const ViewOptions& options, Pages& pages) {
+  ServerSettings settings = options.server;
+  for (int next = 0;; ++next) {
+    settings.port = options.port.value_or(static_cast<std::uint16_t>(usual_port + next));
+    try {
+      return Server(settings, pages);
+    } catch (const std::runtime_error&) {
+      if (options.port || next + 1 == ports_to_try) throw;
+    }
+  }
+}
+
+void view(ViewOptions options, Progress& progress) {
+  const unsigned threads = options.threads > 0 ? options.threads : std::max(1u, std::thread::hardware_concurrency());
+  const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, threads);
+  set_image_threads(static_cast<int>(threads));
+  if (options.viewed.copy.empty()) options.viewed.copy = default_copy(options.viewed.file);
+  require_same_folder(options.viewed);
+  options.server.token = token_of_user();
+  options.server.page = sibling_program("tensorray-view").parent_path().parent_path() / "view";
+
+  std::optional<ProgressBar> bar(std::in_place, progress, options.quiet);
+  Pages pages(options.viewed, progress);
+  bar.reset();
+  Server server = listen(options, pages);
+  fmt::print("{}\n", server.url());
+  if (!options.quiet) fmt::print("Open this address in a browser. Ctrl-C ends the view.\n");
+  std::fflush(stdout);
+  server.run(progress);
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  Progress& progress = progress_until_interrupted();
+  ViewOptions options;
+  CLI::App app("Look at a scene in a browser and change it there: the picture follows", "tensorray view");
+  app.add_option("SCENE", options.viewed.file, "Scene (.json) or field (.vdb)")->required();
+  app.add_option("--set", options.viewed.overrides, "KEY=VALUE: change a value of the scene")->allow_extra_args(false);
+  app.add_option("--save-scene", options.viewed.copy,
+                 "The file to which the page may save its scene (NAME.view.json beside the scene)");
+  app.add_option("--port", options.port, "Port to listen on (8787, or the next that is free)");
+  app.add_option("--listen", options.server.address,
+                 "Address to listen on (127.0.0.1: this machine alone). With 0.0.0.0 all machines of the network reach "
+                 "the view; its address is then the only secret, and is sent unencrypted");
+  app.add_option("--host", options.server.hosts, "A further name by which browsers may call this machine")
+      ->allow_extra_args(false);
+  app.add_option("--threads", options.threads, "Number of threads (all)")->check(CLI::Range(1, 4096));
+  app.add_flag("-q,--quiet", options.quiet, "Print only the address");
+  return run_and_report([&] {
+    try {
+      app.parse(argc, argv);
+    } catch (const CLI::Success& request) {  // --help
+      app.exit(request);
+      return;
+    }
+    view(options, progress);
+  });
+}
