@@ -98,6 +98,16 @@ TEST_F(Benchmark, CausticsHaveErrorsAndTimes) {
   EXPECT_LT(caustics[0].at("rows")[0].at("error"), 0.2);
 }
 
+TEST_F(Benchmark, ALiveViewHasAFirstAndAFinishedPicture) {
+  const Outcome outcome = measure("--quick --json --only view");
+  ASSERT_EQ(outcome.status, 0) << outcome.error;
+  const auto view = nlohmann::json::parse(outcome.out).at("view");
+  ASSERT_EQ(view.size(), 1u);
+  EXPECT_GT(view[0].at("first_picture"), 0);
+  EXPECT_GT(view[0].at("final_picture"), 0);
+  EXPECT_GT(view[0].at("phases").at("trace"), 0);
+}
+
 TEST_F(Benchmark, TablesNameEveryPart) {
   const Outcome outcome = measure("--quick --only loading");
   ASSERT_EQ(outcome.status, 0) << outcome.error;

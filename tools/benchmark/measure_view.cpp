@@ -81,7 +81,7 @@ Json drag(TimedPage& page, Json scene, double scale, int steps) {
 
 Json measure_job(const Options& options, const ViewJob& job) {
   options.announce("view: " + job.name);
-  const int side = options.quick ? 64 : job.resolution, steps = options.quick ? 3 : 40, repeats = options.quick ? 1 : 5;
+  const int side = options.quick ? 64 : job.resolution, steps = options.quick ? 3 : 20, repeats = options.quick ? 1 : 3;
   const ViewedScene viewed{std::filesystem::path(TENSORRAY_SCENES) / job.file,
                            {fmt::format("receiver.resolution=[{0},{0}]", side)},
                            std::filesystem::temp_directory_path() / "tensorray_bench.view.json"};

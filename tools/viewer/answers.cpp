@@ -7,6 +7,7 @@
 
 #include <fmt/format.h>
 
+#include "base/text.h"
 #include "integrators/bending/bending.h"
 
 namespace tensorray {
@@ -220,7 +221,7 @@ Json describe_pixel(const Scene& scene, const Render& render, const Image& displ
   Json lines = Json::array();
   const Image& linear = render.linear;
   const float* const pixel = pixel_at(linear, place);
-  lines.push_back({"R, G, B", fmt::format("{:.4g}, {:.4g}, {:.4g}", pixel[0], pixel[1], pixel[2])});
+  lines.push_back({"R, G, B", fmt::format("{:.3g}, {:.3g}, {:.3g}", pixel[0], pixel[1], pixel[2])});
   if (render.spectral) {
     const Image& spectral = render.spectral->image;
     const float* const bands = pixel_at(spectral, place) + (spectral.channels.size() - scene.bands.size());
@@ -228,8 +229,11 @@ Json describe_pixel(const Scene& scene, const Render& render, const Image& displ
     for (std::size_t i = 0; i < scene.bands.size(); ++i) sum += bands[i] * scene.bands[i].width;
     lines.push_back({"irradiance", fmt::format("{:.4g}", sum)});
   }
-  for (std::size_t i = 3; i < linear.channels.size(); ++i)
-    lines.push_back({linear.channels[i], fmt::format("{:.4g}", pixel[i])});
+  // What differs most from pixel to pixel is seen without scrolling.
+  for (const bool vectors : {false, true})
+    for (std::size_t i = 3; i < linear.channels.size(); ++i)
+      if (starts_with(linear.channels[i], "displacement") == vectors)
+        lines.push_back({linear.channels[i], fmt::format("{:.4g}", pixel[i])});
   const float* const shown = pixel_at(display, place);
   return {{"lines", std::move(lines)},
           {"color", hex(Vector3d(shown[0], shown[1], shown[2]))},

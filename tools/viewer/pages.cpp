@@ -217,7 +217,10 @@ void Pages::begin_scene(Page& page, const Request& request) {
 void Pages::load_for(Page& page, const Stage& stage) {
   const SceneDescription description = read_scene_json(page.shown, viewed_.file);
   const auto outputs = outputs_of(description, stage, folder_ / "");
-  if (stage.coarseness > 1 && resolution_of_ != page.shown) {
+  if (description.receiver.resolution) {
+    resolution_ = *description.receiver.resolution;
+  } else if (stage.coarseness > 1 && resolution_of_ != page.shown) {
+    // It follows from the size of the plate, which the scene may leave open, too.
     resolution_ = live_.load(page.shown, outputs, progress_).geometry.surfaces().plate->resolution;
     resolution_of_ = page.shown;
   }

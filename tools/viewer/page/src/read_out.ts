@@ -3,6 +3,7 @@
 import uPlot from "uplot";
 import { element, style_value } from "./dom";
 import type { Look } from "./protocol";
+import { short_text } from "./numbers";
 import { spectrum_color } from "./spectrum_color";
 
 export class ReadOut {
@@ -84,7 +85,7 @@ export class ReadOut {
       scales: { x: { time: false }, y: { range: (_plot, low, high) => [Math.min(0, low), high > 0 ? high * 1.05 : 1] } },
       axes: [
         { stroke: ink, grid, ticks: grid, font, size: 24, space: 50, values: (_p, ticks) => ticks.map((nm) => `${nm}`) },
-        { stroke: ink, grid, ticks: grid, font, size: 46, space: 28 },
+        { stroke: ink, grid, ticks: grid, font, size: 46, space: 28, values: (_p, ticks) => ticks.map((y) => short_text(y, 2)) },
       ],
       series: [{}, { stroke: ink, width: 1.5, points: { show: false }, fill: rainbow }],
     };
