@@ -70,15 +70,18 @@ bool Server::State::is_own_origin(const HttpRequest& request) const {
 }
 
 Server::Server(const ServerSettings& settings, Pages& pages) : state_(std::make_shared<State>(settings, pages)) {
+  boost::system::error_code is_no_address;
+  const tcp::endpoint endpoint(asio::ip::make_address(settings.address, is_no_address), settings.port);
+  if (is_no_address)
+    throw std::invalid_argument("--listen " + settings.address + ": not an IP address, such as 127.0.0.1");
   try {
-    const tcp::endpoint endpoint(asio::ip::make_address(settings.address), settings.port);
     state_->acceptor->open(endpoint.protocol());
     state_->acceptor->set_option(asio::socket_base::reuse_address(true));
     state_->acceptor->bind(endpoint);
     state_->acceptor->listen();
   } catch (const boost::system::system_error& error) {
-    throw std::runtime_error(fmt::format("cannot listen on {}:{}: {}; choose another --port", settings.address,
-                                         settings.port, error.code().message()));
+    throw std::runtime_error(fmt::format("cannot listen on {}:{}: {}; choose another --port or --listen",
+                                         settings.address, settings.port, error.code().message()));
   }
   const int port = state_->acceptor->local_endpoint().port();
   std::vector<std::string> names = settings.hosts;
