@@ -301,8 +301,8 @@ Scene load_scene(const SceneDescription& description, const Progress& progress) 
 
 Scene reload_scene(const Scene& loaded, const SceneDescription& description, const Progress& progress) {
   const auto start = Clock::now();
-  Scene scene = make_scene(description, load_light(description),
-                           {loaded.field, loaded.eigenvalues, loaded.non_finite}, {}, progress);
+  Scene scene = make_scene(description, load_light(description), {loaded.field, loaded.eigenvalues, loaded.non_finite},
+                           {}, progress);
   scene.seconds = seconds_since(start);
   return scene;
 }

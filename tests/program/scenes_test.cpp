@@ -15,8 +15,11 @@ using namespace test;
 
 std::vector<std::filesystem::path> example_scenes() {
   std::vector<std::filesystem::path> scenes;
-  for (const auto& entry : std::filesystem::directory_iterator(source_folder() / "scenes"))
-    if (entry.path().extension() == ".json") scenes.push_back(entry.path());
+  for (const char* folder : {"scenes", "scenes/whole"})
+    for (const auto& entry : std::filesystem::directory_iterator(source_folder() / folder)) {
+      const bool is_copy = entry.path().stem().extension() == ".view";  // Of a live view.
+      if (entry.path().extension() == ".json" && !is_copy) scenes.push_back(entry.path());
+    }
   return scenes;
 }
 

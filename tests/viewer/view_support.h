@@ -73,7 +73,8 @@ class Mailbox {
         }
       return false;
     });
-    EXPECT_TRUE(found) << "the message did not come";
+    EXPECT_TRUE(found) << "the message did not come; the last one is "
+                       << (messages_.empty() ? Json() : messages_.back().json).dump().substr(0, 1000);
     return result;
   }
 

@@ -10,8 +10,6 @@ void add_import_command(CLI::App& program) {
   program.add_subcommand("import", "Make a tensor field of another program's file");
 }
 
-void become_import_program(char** arguments) {
-  become_program(import_program(), arguments);
-}
+void become_import_program(char** arguments) { become_program(import_program(), arguments); }
 
 }  // namespace tensorray

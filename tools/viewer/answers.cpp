@@ -106,7 +106,8 @@ Json describe_beam(const Scene& scene) {
   const Vector3d start = box.center() - 0.75 * box.diagonal().norm() * scene.beam.direction;
   double radius = 0;
   for (const Vector2d& corner : scene.beam.aperture) radius = std::max(radius, corner.norm());
-  return {{"origin", to_json(start)}, {"direction", to_json(scene.beam.direction)}, {"radius", radius / std::sqrt(2.0)}};
+  return {
+      {"origin", to_json(start)}, {"direction", to_json(scene.beam.direction)}, {"radius", radius / std::sqrt(2.0)}};
 }
 
 Json describe_camera(const Scene& scene) {
