@@ -1,13 +1,16 @@
 #include "integrators/flow/caustic.h"
 
 #include <algorithm>
+#include <atomic>
 #include <cmath>
-#include <numeric>
+#include <cstdint>
 #include <thread>
 
+#include <tbb/enumerable_thread_specific.h>
 #include <tbb/parallel_for.h>
 #include <tbb/task_arena.h>
 
+#include "integrators/flow/flow_pieces.h"
 #include "renderer/film/area_deposit.h"
 
 namespace tensorray {
@@ -15,41 +18,106 @@ namespace {
 
 constexpr double even_part = 0.1;  // Densities of a square's halves that differ by less than this part of their sum ...
                                    // become one.
-constexpr double most_parts = 16;  // Of a band.
-constexpr std::size_t bands_of_thread = 4;     // Bands that are drawn before their sums are added to the film.
-constexpr std::size_t most_memory = 1u << 28;  // Bytes for these, unless a band for each thread takes more.
+constexpr std::size_t most_memory = 1u << 28;  // Bytes for the deposits of all threads, if a row of each takes less.
+constexpr std::size_t planes = DepositPlanes::count;
 
-/// The landings of positions at one place among the nodes.
-struct Landings {
-  std::vector<Eigen::Vector2d> at;  // Pixels.
-  std::vector<RayEnd> ends;
-
-  explicit Landings(std::size_t positions) : at(positions), ends(positions) {}
-
-  void set(const FlowMap& map, std::size_t position, double node) {
-    const FlowLanding landing = landing_at(map, position, node);
-    at[position] = landing.at;
-    ends[position] = landing.end;
-  }
+/// What is drawn together on the planes of a deposit: the colours, or the irradiance of some channels.
+struct Pass {
+  std::vector<AreaDeposit::Shares> shares;         // Of each band.
+  std::array<double*, planes> targets{};           // The films' planes; null: none.
+  double gain = 1;                                 // Of what was deposited.
+  std::size_t first_channel = 0, end_channel = 0;  // The channels whose power is counted.
 };
 
-/// Power by the end of its light. `plate` also has the light that lands beside the plate.
+/// Bands in a row that are drawn as light of one place among the nodes, or in parts of a band.
+struct BandRun {
+  std::size_t first = 0, count = 1;
+  double node = 0, width = 0;
+};
+
+/// Power by channel and end, in units of 2^-54 of a channel's power: sums of integers have no order.
+using PowerSums = std::vector<std::array<std::uint64_t, ray_end_count>>;
+constexpr double power_unit = 18014398509481984.0;
+
+/// A thread's part of a pass.
+struct Worker {
+  AreaDeposit deposit;
+  PowerSums power;
+  std::vector<Eigen::Vector2d> at;  // Landings of a piece's positions, pixels.
+  std::vector<RayEnd> ends;
+  std::vector<double> densities;
+};
+
+struct Job {
+  const FlowMap& map;
+  const FlowPieces& pieces;
+  const Eigen::Vector2i plate;
+  const std::vector<CausticBand>& bands;
+  double beam_area = 0;
+};
+
+/// The least detail, at which a run is the whole spectrum. Bands that are apart stay apart.
+Detail least_detail(const std::vector<CausticBand>& bands) {
+  const bool are_together = std::all_of(bands.begin(), bands.end(), [&](const CausticBand& band) {
+    return band.width > 0 || band.node == bands[0].node;
+  });
+  return are_together ? -static_cast<Detail>(std::ceil(std::log2(static_cast<double>(bands.size())))) : 0;
+}
+
+std::vector<BandRun> runs_at(Detail detail, const std::vector<CausticBand>& bands) {
+  const std::size_t longest = std::size_t{1} << std::max(-detail, 0);
+  std::vector<BandRun> runs;
+  for (std::size_t first = 0; first < bands.size(); first += longest) {
+    const std::size_t count = std::min(longest, bands.size() - first);
+    runs.push_back({first, count, (bands[first].node + bands[first + count - 1].node) / 2, bands[first].width});
+  }
+  return runs;
+}
+
+void set_landings(const Job& job, const FlowPiece& piece, double node, Worker& worker) {
+  const std::size_t count = piece.positions.size();
+  worker.at.resize(count);
+  if (!piece.always_lands) {
+    worker.ends.resize(count);
+    for (std::size_t i = 0; i < count; ++i) {
+      const FlowLanding landing = landing_at(job.map, piece.positions[i], node);
+      worker.at[i] = landing.at;
+      worker.ends[i] = landing.end;
+    }
+    return;
+  }
+  const auto before = std::min(static_cast<std::size_t>(node), job.map.nodes - 1);
+  const Eigen::Vector2f *const a = &piece.landings[before * count],
+                               *const b = &piece.landings[std::min(before + 1, job.map.nodes - 1) * count];
+  const double part = node - static_cast<double>(before);
+  for (std::size_t i = 0; i < count; ++i) worker.at[i] = (1 - part) * a[i].cast<double>() + part * b[i].cast<double>();
+}
+
+/// Power by the end of its light.
 using Power = std::array<double, ray_end_count>;
 
 /// The density of a triangle for its edges. Light that is not spread over an area is added here.
-/// @param unit  The power of a triangle of unit area.
-double start_triangle(const FlowTriangle& triangle, const Landings& landings, double unit, AreaDeposit& deposit,
-                      Power& power) {
+/// @param carried  Its power.
+double start_triangle(const Job& job, const FlowPiece& piece, const FlowPiece::Triangle& triangle, double carried,
+                      Worker& worker, Power& power) {
   const auto [a, b, c] = triangle.corners;
-  const double carried = unit * triangle.area;
-  const auto landed = [&](std::uint32_t corner) { return landings.ends[corner] == RayEnd::plate; };
+  const std::vector<Eigen::Vector2d>& at = worker.at;
+  const auto landed = [&](std::uint16_t corner) { return piece.always_lands || worker.ends[corner] == RayEnd::plate; };
+  const auto count = [&](RayEnd end, double part) { power[static_cast<int>(end)] += part * carried; };
   if (landed(a) && landed(b) && landed(c)) {
-    power[static_cast<int>(RayEnd::plate)] += carried;
-    return deposit.triangle(landings.at[a], landings.at[b], landings.at[c], carried);
+    const double on_plate = part_on_plate(at[a], at[b], at[c], job.plate);
+    count(RayEnd::plate, on_plate);
+    count(RayEnd::missed, 1 - on_plate);
+    return worker.deposit.triangle(at[a], at[b], at[c], carried);
   }
-  for (const std::uint32_t corner : triangle.corners) {
-    if (landed(corner)) deposit.add_point(landings.at[corner], carried / 3);
-    power[static_cast<int>(landings.ends[corner])] += carried / 3;
+  for (const std::uint16_t corner : triangle.corners) {
+    if (!landed(corner)) {
+      count(worker.ends[corner], 1.0 / 3);
+      continue;
+    }
+    const bool is_on_plate = part_on_plate(at[corner], at[corner], at[corner], job.plate) > 0;
+    count(is_on_plate ? RayEnd::plate : RayEnd::missed, 1.0 / 3);
+    worker.deposit.add_point(at[corner], carried / 3);
   }
   return 0;
 }
@@ -61,162 +129,206 @@ void even_out(double& a, double& b, double area_a, double area_b) {
   a = b = (area_a + area_b) / (area_a / a + area_b / b);
 }
 
-EndCounts count_ends(const Landings& landings, const Plate& plate) {
-  EndCounts counts{};
-  for (std::size_t i = 0; i < landings.at.size(); ++i) {
-    const Eigen::Array2d at = landings.at[i].array();
-    const bool beside = (at < 0).any() || (at > plate.resolution.cast<double>().array()).any();
-    const RayEnd end = landings.ends[i] == RayEnd::plate && beside ? RayEnd::missed : landings.ends[i];
-    ++counts[static_cast<int>(end)];
+/// Draws a piece at one place among the nodes.
+/// @param unit  The power of a triangle of unit area.
+void draw_piece(const Job& job, const FlowPiece& piece, double node, double unit, Worker& worker, Power& power) {
+  set_landings(job, piece, node, worker);
+  std::vector<double>& densities = worker.densities;
+  densities.clear();
+  for (const FlowPiece::Triangle& triangle : piece.triangles)
+    densities.push_back(start_triangle(job, piece, triangle, unit * triangle.area, worker, power));
+  for (const FlowPiece::Edge& edge : piece.edges)
+    if (edge.is_diagonal)
+      even_out(densities[edge.along], densities[edge.against], piece.triangles[edge.along].area,
+               piece.triangles[edge.against].area);
+  const auto density = [&](std::uint16_t triangle) {
+    return triangle == FlowPiece::Edge::none ? 0 : densities[triangle];
+  };
+  for (const FlowPiece::Edge& edge : piece.edges) {
+    const double difference = density(edge.along) - density(edge.against);
+    if (difference != 0) worker.deposit.add_edge(worker.at[edge.from], worker.at[edge.to], difference);
   }
-  return counts;
 }
 
-/// A band that is being drawn.
-struct Drawing {
-  AreaDeposit deposit;
-  Power power{};
-  EndCounts ends{};
+AreaDeposit::Shares shares_of(const Pass& pass, const BandRun& run) {
+  AreaDeposit::Shares shares{};
+  for (std::size_t i = run.first; i < run.first + run.count; ++i)
+    for (std::size_t k = 0; k < planes; ++k) shares[k] += pass.shares[i][k];
+  return shares;
+}
+
+void add_power(const Job& job, const Pass& pass, const BandRun& run, const Power& power, PowerSums& sums) {
+  for (std::size_t i = run.first; i < run.first + run.count; ++i) {
+    const CausticBand& band = job.bands[i];
+    if (band.channel < pass.first_channel || band.channel >= pass.end_channel) continue;
+    for (int end = 0; end < ray_end_count; ++end)
+      sums[band.channel][end] += static_cast<std::uint64_t>(power_unit * band.weight * power[end]);
+  }
+}
+
+/// Draws the triangles of a group at all their places.
+/// @param counts  Whether their power is counted.
+void draw_group(const Job& job, const Pass& pass, std::size_t group, bool counts, Worker& worker) {
+  for (const FlowPiece& piece : pieces_of(job.pieces, group))
+    for (const BandRun& run : runs_at(piece.detail, job.bands)) {
+      const AreaDeposit::Shares shares = shares_of(pass, run);
+      if (shares == AreaDeposit::Shares{}) continue;
+      worker.deposit.set_shares(shares);
+      Power power{};
+      const int parts = std::max(piece.detail, 0) + 1;
+      for (int part = 0; part < parts; ++part)
+        draw_piece(job, piece, run.node + ((part + 0.5) / parts - 0.5) * run.width, 1 / job.beam_area / parts, worker,
+                   power);
+      if (counts) add_power(job, pass, run, power, worker.power);
+    }
+}
+
+/// Rows of the plate that are drawn together.
+struct Strip {
+  int first = 0, end = 0;
+
+  /// Whether it is the first one with light of a group: there its power is counted.
+  bool counts(std::pair<float, float> rows, int height) const {
+    const float row = std::clamp(rows.first, 0.0f, static_cast<float>(height - 1));
+    return row >= static_cast<float>(first) && row < static_cast<float>(end);
+  }
+  bool has_light(std::pair<float, float> rows) const {
+    return rows.first <= static_cast<float>(end) && rows.second >= static_cast<float>(first);
+  }
 };
 
-/// The triangles of a band that are drawn in the same number of parts.
-struct Sweep {
-  std::vector<std::uint32_t> triangles, positions;
-  std::vector<const FlowEdge*> edges;  // All of which one side, at least, is one of the triangles.
-};
-
-/// Distance that the light of a position moves within a band, pixels; 0 if it does not land at both ends.
-double movement(const FlowMap& map, std::size_t position, const CausticBand& band) {
-  const double last = static_cast<double>(map.nodes - 1);
-  const FlowLanding begin = landing_at(map, position, std::max(band.node - band.width / 2, 0.0)),
-                    end = landing_at(map, position, std::min(band.node + band.width / 2, last));
-  return begin.end == RayEnd::plate && end.end == RayEnd::plate ? (end.at - begin.at).norm() : 0;
+/// As many rows as the memory of all threads allows. The result does not depend on it.
+std::vector<Strip> strips_of(const Eigen::Vector2i& plate) {
+  const auto threads = static_cast<std::size_t>(tbb::this_task_arena::max_concurrency());
+  const std::size_t row = 8 * planes * (static_cast<std::size_t>(plate.x()) + 3);
+  const int rows = static_cast<int>(std::clamp<std::size_t>(most_memory / (threads * row), 1, plate.y()));
+  std::vector<Strip> strips;
+  for (int first = 0; first < plate.y(); first += rows) strips.push_back({first, std::min(first + rows, plate.y())});
+  return strips;
 }
 
-/// Sorts the triangles by the number of their parts: those of n parts are at [n - 1].
-std::vector<Sweep> sort_by_parts(const FlowMap& map, const CausticBand& band) {
-  std::vector<std::uint8_t> parts_of_position(map.starts.size(), 1);
-  for (std::size_t i = 0; band.width > 0 && i < map.starts.size(); ++i)
-    parts_of_position[i] = static_cast<std::uint8_t>(std::clamp(std::ceil(movement(map, i, band)), 1.0, most_parts));
-  std::vector<Sweep> sweeps(static_cast<std::size_t>(most_parts));
-  std::vector<std::uint8_t> parts(map.triangles.size());
-  std::vector<std::uint16_t> drawn_in(map.starts.size());  // A bit for each sweep.
-  for (std::uint32_t t = 0; t < map.triangles.size(); ++t) {
-    for (const std::uint32_t corner : map.triangles[t].corners)
-      parts[t] = std::max(parts[t], parts_of_position[corner]);
-    Sweep& sweep = sweeps[parts[t] - 1u];
-    sweep.triangles.push_back(t);
-    for (const std::uint32_t corner : map.triangles[t].corners) {
-      const auto bit = static_cast<std::uint16_t>(1u << (parts[t] - 1u));
-      if (!(drawn_in[corner] & bit)) sweep.positions.push_back(corner);
-      drawn_in[corner] |= bit;
-    }
-  }
-  for (const FlowEdge& edge : map.edges) {
-    const int along = edge.along == FlowEdge::none ? 0 : parts[edge.along],
-              against = edge.against == FlowEdge::none ? 0 : parts[edge.against];
-    if (along > 0) sweeps[along - 1].edges.push_back(&edge);
-    if (against > 0 && against != along) sweeps[against - 1].edges.push_back(&edge);
-  }
-  return sweeps;
-}
-
-/// Draws triangles at one place among the nodes.
-/// @param densities  One for each triangle of the map; 0, before and afterwards.
-void draw_triangles(const FlowMap& map, const Sweep& sweep, double node, double unit, Landings& landings,
-                    std::vector<double>& densities, Drawing& drawing) {
-  for (const std::uint32_t position : sweep.positions) landings.set(map, position, node);
-  for (const std::uint32_t t : sweep.triangles)
-    densities[t] = start_triangle(map.triangles[t], landings, unit, drawing.deposit, drawing.power);
-  for (const FlowEdge* edge : sweep.edges)
-    if (edge->is_diagonal)
-      even_out(densities[edge->along], densities[edge->against], map.triangles[edge->along].area,
-               map.triangles[edge->against].area);
-  const auto density = [&](std::uint32_t triangle) { return triangle == FlowEdge::none ? 0 : densities[triangle]; };
-  for (const FlowEdge* edge : sweep.edges) {
-    const double difference = density(edge->along) - density(edge->against);
-    if (difference != 0) drawing.deposit.add_edge(landings.at[edge->from], landings.at[edge->to], difference);
-  }
-  for (const std::uint32_t t : sweep.triangles) densities[t] = 0;
-}
-
-void draw_band(const FlowMap& map, const Plate& plate, const CausticBand& band, double unit, Drawing& drawing) {
-  drawing.deposit.clear();
-  drawing.power = {};
-  Landings landings(map.starts.size());
-  std::vector<double> densities(map.triangles.size());
-  const std::vector<Sweep> sweeps = sort_by_parts(map, band);
-  for (std::size_t parts = 1; parts <= sweeps.size(); ++parts)
-    for (std::size_t part = 0; part < parts && !sweeps[parts - 1].triangles.empty(); ++part) {
-      const double place = (static_cast<double>(part) + 0.5) / static_cast<double>(parts) - 0.5;
-      draw_triangles(map, sweeps[parts - 1], band.node + place * band.width, unit / static_cast<double>(parts),
-                     landings, densities, drawing);
-    }
-  for (std::size_t i = 0; i < map.starts.size(); ++i) landings.set(map, i, band.node);
-  drawing.ends = count_ends(landings, plate);
-}
-
-/// Adds a group of bands to the films, in the order of the bands. @return the power on the plate, by band.
-std::vector<double> add_to_films(const std::vector<Drawing>& drawings, const CausticBand* bands, std::size_t count,
-                                 double gain, Caustic& caustic) {
-  const auto width = static_cast<std::size_t>(caustic.color.width),
-             height = static_cast<std::size_t>(caustic.color.height);
-  std::vector<double> rows(count * height);
-  tbb::parallel_for(std::size_t{0}, height, [&](std::size_t y) {
-    std::vector<double> row(width);
-    for (std::size_t k = 0; k < count; ++k) {
-      drawings[k].deposit.read_row(static_cast<int>(y), row.data());
-      rows[k * height + y] = std::accumulate(row.begin(), row.end(), 0.0);
-      const auto add = [&](double* plane, double weight) {
-        for (std::size_t x = 0; x < width; ++x) plane[y * width + x] += weight * row[x];
-      };
-      for (int c = 0; c < 3; ++c) add(caustic.color.plane(c), gain * bands[k].color[c]);
-      if (caustic.irradiance.channels > 0)
-        add(caustic.irradiance.plane(static_cast<int>(bands[k].channel)), gain * bands[k].weight);
+/// Adds what the threads have deposited to the films.
+void add_to_films(const Pass& pass, const std::vector<const AreaDeposit*>& deposits, const Strip& strip, int width) {
+  tbb::parallel_for(strip.first, strip.end, [&](int y) {
+    std::vector<double> row(static_cast<std::size_t>(width));
+    for (std::size_t k = 0; k < planes; ++k) {
+      if (!pass.targets[k]) continue;
+      AreaDeposit::read_row(deposits, y, static_cast<int>(k), row.data());
+      double* const target = pass.targets[k] + static_cast<std::size_t>(y) * row.size();
+      for (std::size_t x = 0; x < row.size(); ++x) target[x] += pass.gain * row[x];
     }
   });
-  std::vector<double> sums(count);
-  for (std::size_t i = 0; i < rows.size(); ++i) sums[i / height] += rows[i];
-  return sums;
+}
+
+/// The greatest sum of parts that a plane gets: shares are divided by it, so that no sum of integers is too great.
+double greatest_sum(const std::vector<AreaDeposit::Shares>& shares) {
+  AreaDeposit::Shares sums{};
+  for (const AreaDeposit::Shares& each : shares)
+    for (std::size_t k = 0; k < planes; ++k) sums[k] += std::abs(each[k]);
+  return *std::max_element(sums.begin(), sums.end());
+}
+
+/// The passes that fill the films. Without irradiance the power of all channels is counted with the colours.
+std::vector<Pass> passes_of(const std::vector<CausticBand>& bands, double gain, Caustic& caustic) {
+  const auto channels = caustic.power.size();
+  std::vector<Pass> passes;
+  const auto add = [&](Pass pass) {
+    const double greatest = greatest_sum(pass.shares);
+    if (greatest == 0) return;
+    for (AreaDeposit::Shares& shares : pass.shares)
+      for (double& share : shares) share /= greatest;
+    pass.gain = gain * greatest;
+    passes.push_back(std::move(pass));
+  };
+  Pass colors;
+  for (const CausticBand& band : bands) colors.shares.push_back({band.color[0], band.color[1], band.color[2], 0});
+  for (int c = 0; c < 3; ++c) colors.targets[static_cast<std::size_t>(c)] = caustic.color.plane(c);
+  if (caustic.irradiance.channels == 0) colors.end_channel = channels;
+  add(std::move(colors));
+  for (std::size_t first = 0; first < channels && caustic.irradiance.channels > 0; first += planes) {
+    Pass pass;
+    pass.first_channel = first;
+    pass.end_channel = std::min(first + planes, channels);
+    for (std::size_t channel = first; channel < pass.end_channel; ++channel)
+      pass.targets[channel - first] = caustic.irradiance.plane(static_cast<int>(channel));
+    for (const CausticBand& band : bands) {
+      AreaDeposit::Shares shares{};
+      if (band.channel >= first && band.channel < pass.end_channel) shares[band.channel - first] = band.weight;
+      pass.shares.push_back(shares);
+    }
+    add(std::move(pass));
+  }
+  return passes;
+}
+
+/// The ends of each channel's light, at its last band.
+void count_ends(const FlowMap& map, const Plate& plate, const std::vector<CausticBand>& bands, Caustic& caustic) {
+  std::vector<double> nodes(caustic.ends.size(), -1);
+  for (const CausticBand& band : bands) nodes[band.channel] = band.node;
+  tbb::parallel_for(std::size_t{0}, nodes.size(), [&](std::size_t channel) {
+    for (std::size_t i = 0; i < map.starts.size() && nodes[channel] >= 0; ++i) {
+      const FlowLanding landing = landing_at(map, i, nodes[channel]);
+      const bool beside =
+          (landing.at.array() < 0).any() || (landing.at.array() > plate.resolution.cast<double>().array()).any();
+      const RayEnd end = landing.end == RayEnd::plate && beside ? RayEnd::missed : landing.end;
+      ++caustic.ends[channel][static_cast<int>(end)];
+    }
+  });
+}
+
+/// Draws a strip of a pass.
+/// @param done,all  Groups, for the progress.
+void draw_strip(const Job& job, const Pass& pass, const Strip& strip, std::atomic<std::size_t>& done, std::size_t all,
+                PowerSums& power, const Progress& progress) {
+  const std::thread::id caller = std::this_thread::get_id();
+  const int width = job.plate.x(), height = job.plate.y();
+  tbb::enumerable_thread_specific<Worker> workers([&] {
+    return Worker{AreaDeposit(width, height, strip.first, strip.end), PowerSums(power.size()), {}, {}, {}};
+  });
+  tbb::parallel_for(std::size_t{0}, job.pieces.groups(), [&](std::size_t group) {
+    if (progress.cancelled) throw Cancelled();
+    const bool counts = strip.counts(job.pieces.rows[group], height);
+    if (counts || strip.has_light(job.pieces.rows[group])) draw_group(job, pass, group, counts, workers.local());
+    const std::size_t drawn = ++done;
+    if (std::this_thread::get_id() == caller) progress.update("drawing light", drawn, all);
+  });
+  std::vector<const AreaDeposit*> deposits;
+  for (Worker& worker : workers) {
+    worker.deposit.flush();
+    deposits.push_back(&worker.deposit);
+    for (std::size_t channel = 0; channel < power.size(); ++channel)
+      for (int end = 0; end < ray_end_count; ++end) power[channel][end] += worker.power[channel][end];
+  }
+  if (!deposits.empty()) add_to_films(pass, deposits, strip, width);
 }
 
 }  // namespace
 
 Caustic draw_caustic(const FlowMap& map, const Plate& plate, const std::vector<CausticBand>& bands,
-                     std::size_t channels, bool by_channel, const Progress& progress) {
+                     std::size_t channels, bool by_channel, const Progress& progress, double step) {
   const int width = plate.resolution.x(), height = plate.resolution.y();
   Caustic caustic;
   caustic.color = Film(width, height, 3);
   if (by_channel) caustic.irradiance = Film(width, height, static_cast<int>(channels));
   caustic.power.assign(channels, {});
   caustic.ends.assign(channels, {});
-  double area = 0;
+  count_ends(map, plate, bands, caustic);
+  double area = 0, widest = 0;
   for (const FlowTriangle& triangle : map.triangles) area += triangle.area;
-  const std::thread::id caller = std::this_thread::get_id();
-  const auto threads = static_cast<std::size_t>(tbb::this_task_arena::max_concurrency());
-  const std::size_t fitting = most_memory / (8 * static_cast<std::size_t>(width) * static_cast<std::size_t>(height));
-  const std::size_t at_once = std::clamp(fitting, threads, bands_of_thread * threads);
-  std::vector<Drawing> drawings(std::min(at_once, bands.size()), Drawing{AreaDeposit(width, height)});
-  for (std::size_t first = 0; first < bands.size(); first += drawings.size()) {
-    const std::size_t count = std::min(drawings.size(), bands.size() - first);
-    tbb::parallel_for(std::size_t{0}, count, [&](std::size_t k) {
-      if (progress.cancelled) throw Cancelled();
-      if (std::this_thread::get_id() == caller) progress.update("drawing light", first + k, bands.size());
-      draw_band(map, plate, bands[first + k], 1 / area, drawings[k]);
-    });
-    const std::vector<double> on_plate =
-        add_to_films(drawings, &bands[first], count, area / plate.pixel_area(), caustic);
-    for (std::size_t k = 0; k < count; ++k) {
-      const CausticBand& band = bands[first + k];
-      Power power = drawings[k].power;
-      double& landed = power[static_cast<int>(RayEnd::plate)];
-      power[static_cast<int>(RayEnd::missed)] += landed - on_plate[k];
-      landed = on_plate[k];
-      for (int end = 0; end < ray_end_count; ++end) caustic.power[band.channel][end] += band.weight * power[end];
-      caustic.ends[band.channel] = drawings[k].ends;
-    }
-  }
-  progress.update("drawing light", bands.size(), bands.size());
+  for (const CausticBand& band : bands) widest = std::max(widest, band.width);
+  const FlowPieces pieces = divide(map, widest / step, least_detail(bands));
+  const Job job{map, pieces, plate.resolution, bands, area};
+  const std::vector<Pass> passes = passes_of(bands, area / plate.pixel_area(), caustic);
+  const std::vector<Strip> strips = strips_of(plate.resolution);
+  const std::size_t all = passes.size() * strips.size() * pieces.groups();
+  std::atomic<std::size_t> done{0};
+  PowerSums power(channels);
+  for (const Pass& pass : passes)
+    for (const Strip& strip : strips) draw_strip(job, pass, strip, done, all, power, progress);
+  for (std::size_t channel = 0; channel < channels; ++channel)
+    for (int end = 0; end < ray_end_count; ++end)
+      caustic.power[channel][end] = static_cast<double>(power[channel][end]) / power_unit;
+  progress.update("drawing light", all, all);
   return caustic;
 }
 

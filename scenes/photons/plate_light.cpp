@@ -29,11 +29,14 @@ FlowMap trace_map(const Scene& scene, double tolerance, const Progress& progress
   return trace_flow_map(scene.field, scene.geometry, scene.beam, scene.bending, settings, progress);
 }
 
-constexpr double band_step = 2;  // Pixels between the middles of bands that are swept.
+/// How finely light is spread over the way that it moves from wavelength to wavelength.
+struct Sweep {
+  BandStep bands = {2};
+  double step = 1;  // Between the places where a triangle is drawn, pixels.
+};
 
 /// The bands that are drawn: each band of the scene is divided, so that light moves little from one to the next.
-/// @param swept  Whether light is spread over the way that it moves within a band.
-std::vector<CausticBand> bands_of(const Scene& scene, const FlowMap& map, const BandStep& step, bool swept) {
+std::vector<CausticBand> bands_of(const Scene& scene, const FlowMap& map, const BandStep& step) {
   const Eigen::Matrix3d xyz_to_working = to_working(scene);
   const int channels = static_cast<int>(scene.bands.size());
   std::vector<CausticBand> bands;
@@ -41,7 +44,7 @@ std::vector<CausticBand> bands_of(const Scene& scene, const FlowMap& map, const 
   for (const FineBand& fine : fine_bands(scene, band_count(map, channels, step))) {
     CausticBand band;
     band.node = last * (fine.begin + fine.end) / 2;
-    band.width = swept ? last * (fine.end - fine.begin) : 0;
+    band.width = last * (fine.end - fine.begin);
     band.channel = fine.channel;
     band.weight = fine.weight;
     band.color = xyz_to_working * fine.band.xyz;
@@ -58,15 +61,15 @@ std::vector<std::array<double, ray_end_count>> beam_power(const Scene& scene, co
   return power;
 }
 
-PlateLight draw_map(const Scene& scene, double tolerance, const BandStep& step, bool swept, const Progress& progress) {
+PlateLight draw_map(const Scene& scene, double tolerance, const Sweep& sweep, const Progress& progress) {
   Clock::time_point start = Clock::now();
   PlateLight light;
   light.map = trace_map(scene, tolerance, progress);
   const FlowMap& map = light.map;
   light.statistics.seconds_tracing = seconds_since(start);
   start = Clock::now();
-  Caustic caustic = draw_caustic(map, *scene.geometry.surfaces().plate, bands_of(scene, map, step, swept),
-                                 scene.bands.size(), scene.description.output.wants("spectral"), progress);
+  Caustic caustic = draw_caustic(map, *scene.geometry.surfaces().plate, bands_of(scene, map, sweep.bands),
+                                 scene.bands.size(), scene.description.output.wants("spectral"), progress, sweep.step);
   light.linear = color_image(caustic.color);
   light.irradiance = std::move(caustic.irradiance);
   light.statistics.seconds_density = seconds_since(start);
@@ -86,11 +89,11 @@ void add_cost(const Statistics& more, Statistics& statistics) {
 }
 
 /// Half the tolerance always has twice the bands.
-BandStep refined_step(double tolerance) {
-  return {4 * tolerance, static_cast<int>(std::ceil(16 / tolerance)), most_refined_bands};
+Sweep refined_sweep(double tolerance) {
+  return {{4 * tolerance, static_cast<int>(std::ceil(16 / tolerance)), most_refined_bands}, 4 * tolerance};
 }
 
-/// Halves the tolerance and the steps between bands until the picture changes by less than `bound`. The error falls at
+/// Halves the tolerance and the steps of wavelengths until the picture changes by less than `bound`. The error falls at
 /// least as the tolerance does, so that what is left is less than the last change.
 PlateLight refine(const Scene& scene, double bound, const Progress& progress) {
   std::string label;
@@ -100,10 +103,10 @@ PlateLight refine(const Scene& scene, double bound, const Progress& progress) {
     labelled.cancelled = progress.cancelled.load();
   };
   double tolerance = 1;
-  PlateLight light = draw_map(scene, tolerance, refined_step(tolerance), false, labelled);
+  PlateLight light = draw_map(scene, tolerance, refined_sweep(tolerance), labelled);
   for (;;) {
     tolerance /= 2;
-    PlateLight finer = draw_map(scene, tolerance, refined_step(tolerance), false, labelled);
+    PlateLight finer = draw_map(scene, tolerance, refined_sweep(tolerance), labelled);
     const double error = relative_distance(light.linear, finer.linear);
     finer.statistics.error = error;
     add_cost(light.statistics, finer.statistics);
@@ -122,7 +125,7 @@ PlateLight refine(const Scene& scene, double bound, const Progress& progress) {
 PlateLight draw_light(const Scene& scene, const Progress& progress) {
   const PhotonDensity& density = scene.description.integrator.settings<PhotonDescription>().density;
   if (density.error) return refine(scene, *density.error, progress);
-  PlateLight light = draw_map(scene, density.tolerance, {band_step}, true, progress);
+  PlateLight light = draw_map(scene, density.tolerance, {}, progress);
   if (!light.map.is_complete)
     light.warnings.push_back(
         "the light on the plate is coarser than `integrator.density.tolerance` asks: raise `light.photons`");

@@ -15,9 +15,11 @@ using Corners = std::array<Vector2d, 3>;
 
 constexpr int width = 13, height = 9;
 
-std::vector<double> pixels_of(const AreaDeposit& deposit) {
+std::vector<double> pixels_of(AreaDeposit& deposit, int plane = 0) {
+  deposit.flush();
   std::vector<double> pixels(width * height);
-  for (int y = 0; y < height; ++y) deposit.read_row(y, &pixels[static_cast<std::size_t>(y) * width]);
+  for (int y = 0; y < height; ++y)
+    AreaDeposit::read_row({&deposit}, y, plane, &pixels[static_cast<std::size_t>(y) * width]);
   return pixels;
 }
 
@@ -72,11 +74,11 @@ TEST(AreaDeposit, EachPixelGetsTheAreaThatItShares) {
       const double all = area({t.begin(), t.end()});
       if (all < 1e-3) continue;
       AreaDeposit deposit(width, height);
-      deposit.add_triangle(t[0], t[1], t[2], 0.5);
+      deposit.add_triangle(t[0], t[1], t[2], 0.5e-4);
       const std::vector<double> pixels = pixels_of(deposit);
       for (int y = 0; y < height; ++y)
         for (int x = 0; x < width; ++x)
-          ASSERT_NEAR(pixels[static_cast<std::size_t>(y) * width + x], 0.5 * area_in_pixel(t, x, y) / all, 1e-11)
+          ASSERT_NEAR(pixels[static_cast<std::size_t>(y) * width + x], 0.5e-4 * area_in_pixel(t, x, y) / all, 1e-13)
               << "size " << size << ", triangle " << i << ", pixel " << x << " " << y;
     }
 }
@@ -124,10 +126,10 @@ TEST(AreaDeposit, NoPowerIsLostWhereTrianglesHaveNoArea) {
 TEST(AreaDeposit, LinesAreWhatThinTrianglesTendTo) {
   AreaDeposit line(width, height), thin(width, height);
   const Vector2d a(0.25, 4.5), b(12.5, 4.5), c(4, 4.5);
-  line.add_triangle(a, b, c, 1);
-  thin.add_triangle(a, b, c + Vector2d(0, 1e-3), 1);
+  line.add_triangle(a, b, c, 1e-3);
+  thin.add_triangle(a, b, c + Vector2d(0, 1e-3), 1e-3);
   const std::vector<double> expected = pixels_of(thin), pixels = pixels_of(line);
-  for (std::size_t i = 0; i < pixels.size(); ++i) EXPECT_NEAR(pixels[i], expected[i], 0.02);
+  for (std::size_t i = 0; i < pixels.size(); ++i) EXPECT_NEAR(pixels[i], expected[i], 0.02e-3);
 }
 
 TEST(AreaDeposit, TheOrderDoesNotMatter) {
