@@ -43,9 +43,10 @@ constexpr double power_unit = 18014398509481984.0;
 struct Worker {
   AreaDeposit deposit;
   PowerSums power;
-  std::vector<Eigen::Vector2d> at;  // Landings of a piece's positions, pixels.
-  std::vector<RayEnd> ends;
-  std::vector<double> densities;
+  std::vector<Eigen::Vector2d> at{};  // Landings of a piece's positions, pixels.
+  std::vector<RayEnd> ends{};
+  Eigen::AlignedBox2d box{};  // Of the landings, if all of them are on the plate's plane.
+  std::vector<double> densities{};
 };
 
 struct Job {
@@ -56,12 +57,12 @@ struct Job {
   double beam_area = 0;
 };
 
-/// The least detail, at which a run is the whole spectrum. Bands that are apart stay apart.
-Detail least_detail(const std::vector<CausticBand>& bands) {
+/// The number of bands that may be drawn as one: all if there is none between them.
+std::size_t joined_bands(const std::vector<CausticBand>& bands) {
   const bool are_together = std::all_of(bands.begin(), bands.end(), [&](const CausticBand& band) {
     return band.width > 0 || band.node == bands[0].node;
   });
-  return are_together ? -static_cast<Detail>(std::ceil(std::log2(static_cast<double>(bands.size())))) : 0;
+  return are_together ? bands.size() : 1;
 }
 
 std::vector<BandRun> runs_at(Detail detail, const std::vector<CausticBand>& bands) {
@@ -77,6 +78,7 @@ std::vector<BandRun> runs_at(Detail detail, const std::vector<CausticBand>& band
 void set_landings(const Job& job, const FlowPiece& piece, double node, Worker& worker) {
   const std::size_t count = piece.positions.size();
   worker.at.resize(count);
+  worker.box.setEmpty();
   if (!piece.always_lands) {
     worker.ends.resize(count);
     for (std::size_t i = 0; i < count; ++i) {
@@ -90,7 +92,10 @@ void set_landings(const Job& job, const FlowPiece& piece, double node, Worker& w
   const Eigen::Vector2f *const a = &piece.landings[before * count],
                                *const b = &piece.landings[std::min(before + 1, job.map.nodes - 1) * count];
   const double part = node - static_cast<double>(before);
-  for (std::size_t i = 0; i < count; ++i) worker.at[i] = (1 - part) * a[i].cast<double>() + part * b[i].cast<double>();
+  for (std::size_t i = 0; i < count; ++i) {
+    worker.at[i] = (1 - part) * a[i].cast<double>() + part * b[i].cast<double>();
+    worker.box.extend(worker.at[i]);
+  }
 }
 
 /// Power by the end of its light.
@@ -99,13 +104,13 @@ using Power = std::array<double, ray_end_count>;
 /// The density of a triangle for its edges. Light that is not spread over an area is added here.
 /// @param carried  Its power.
 double start_triangle(const Job& job, const FlowPiece& piece, const FlowPiece::Triangle& triangle, double carried,
-                      Worker& worker, Power& power) {
+                      bool is_all_on_plate, Worker& worker, Power& power) {
   const auto [a, b, c] = triangle.corners;
   const std::vector<Eigen::Vector2d>& at = worker.at;
   const auto landed = [&](std::uint16_t corner) { return piece.always_lands || worker.ends[corner] == RayEnd::plate; };
   const auto count = [&](RayEnd end, double part) { power[static_cast<int>(end)] += part * carried; };
   if (landed(a) && landed(b) && landed(c)) {
-    const double on_plate = part_on_plate(at[a], at[b], at[c], job.plate);
+    const double on_plate = is_all_on_plate ? 1 : part_on_plate(at[a], at[b], at[c], job.plate);
     count(RayEnd::plate, on_plate);
     count(RayEnd::missed, 1 - on_plate);
     return worker.deposit.triangle(at[a], at[b], at[c], carried);
@@ -133,10 +138,16 @@ void even_out(double& a, double& b, double area_a, double area_b) {
 /// @param unit  The power of a triangle of unit area.
 void draw_piece(const Job& job, const FlowPiece& piece, double node, double unit, Worker& worker, Power& power) {
   set_landings(job, piece, node, worker);
+  const Eigen::AlignedBox2d plate(Eigen::Vector2d::Zero(), job.plate.cast<double>());
+  if (piece.always_lands && !plate.intersects(worker.box)) {
+    power[static_cast<int>(RayEnd::missed)] += unit * piece.area;
+    return;
+  }
+  const bool is_all_on_plate = piece.always_lands && plate.contains(worker.box);
   std::vector<double>& densities = worker.densities;
   densities.clear();
   for (const FlowPiece::Triangle& triangle : piece.triangles)
-    densities.push_back(start_triangle(job, piece, triangle, unit * triangle.area, worker, power));
+    densities.push_back(start_triangle(job, piece, triangle, unit * triangle.area, is_all_on_plate, worker, power));
   for (const FlowPiece::Edge& edge : piece.edges)
     if (edge.is_diagonal)
       even_out(densities[edge.along], densities[edge.against], piece.triangles[edge.along].area,
@@ -316,7 +327,7 @@ Caustic draw_caustic(const FlowMap& map, const Plate& plate, const std::vector<C
   double area = 0, widest = 0;
   for (const FlowTriangle& triangle : map.triangles) area += triangle.area;
   for (const CausticBand& band : bands) widest = std::max(widest, band.width);
-  const FlowPieces pieces = divide(map, widest / step, least_detail(bands));
+  const FlowPieces pieces = divide(map, widest / step, joined_bands(bands));
   const Job job{map, pieces, plate.resolution, bands, area};
   const std::vector<Pass> passes = passes_of(bands, area / plate.pixel_area(), caustic);
   const std::vector<Strip> strips = strips_of(plate.resolution);

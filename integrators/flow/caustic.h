@@ -33,16 +33,15 @@ struct Caustic {
 };
 
 /// Draws each triangle as often as its light moves by `step` from the first band to the last: once for several bands
-/// in a row where light moves less, at most 16 times for each band where it moves more. Triangles of which not all
-/// corners land leave their light at the corners: each corner takes a third. The little light of triangles at a tear is
-/// spread across it. What lands beside the plate counts as missed.
+/// in a row where light moves less, at most 16 times for each band where it moves more (every two steps where these are
+/// more than 128). Triangles of which not all corners land leave their light at the corners: each corner takes a third.
+/// The little light of triangles at a tear is spread across it. What lands beside the plate counts as missed.
 /// @param plate       The plate of the map.
 /// @param bands       In the order of their nodes, without gaps between those that have a width.
 /// @param by_channel  Whether the result has the irradiance of each channel.
 /// @param step        Pixels.
-/// The sums are integers, so that the result is the same for any number of threads. Memory: the films, and
-/// 8 bytes for each pixel and run of bands that is drawn at the same time: up to 4 for each thread if this takes no
-/// more than 256 MiB, at least one. @throw Cancelled.
+/// The sums are integers, so that the result is the same for any number of threads. Memory: the films, and 32 bytes for
+/// each pixel and thread, if this is no more than 256 MiB; else the plate is drawn in strips. @throw Cancelled.
 Caustic draw_caustic(const FlowMap& map, const Plate& plate, const std::vector<CausticBand>& bands,
                      std::size_t channels, bool by_channel, const Progress& progress, double step = 1);
 

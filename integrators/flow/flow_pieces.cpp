@@ -13,6 +13,9 @@ namespace {
 constexpr std::size_t group_size = 512;  // Triangles; their landings stay in the cache while they are drawn.
 constexpr Detail most_detail = 15;
 
+// Light that is drawn at more places than this is faint at each: then it may move by up to two steps between them.
+constexpr double many_places = 128;
+
 /// Distance that the light of a position moves from node to node, at most, pixels; infinite if it does not always end
 /// on the same thing.
 float movement(const FlowMap& map, std::size_t position) {
@@ -26,9 +29,10 @@ float movement(const FlowMap& map, std::size_t position) {
   return std::sqrt(greatest);
 }
 
-/// @param steps  The steps that light moves within a band.
-Detail detail_for(double steps, Detail least) {
+/// @param steps  The steps that light moves within each of `bands` bands.
+Detail detail_for(double steps, std::size_t bands, Detail least) {
   if (!std::isfinite(steps)) return 0;
+  steps /= std::clamp(steps * static_cast<double>(bands) / many_places, 1.0, 2.0);
   if (steps > 1) return static_cast<Detail>(std::min<double>(std::ceil(steps) - 1, most_detail));
   Detail detail = 0;
   while (detail > least && std::ldexp(steps, 1 - detail) <= 1) --detail;
@@ -101,6 +105,7 @@ class PieceBuilder {
     FlowPiece::Triangle added;
     for (std::size_t i = 0; i < 3; ++i) added.corners[i] = position(piece, triangle.corners[i]);
     added.area = triangle.area;
+    result_[piece].area += triangle.area;
     result_[piece].triangles.push_back(added);
   }
 
@@ -137,13 +142,14 @@ class PieceBuilder {
 
 }  // namespace
 
-FlowPieces divide(const FlowMap& map, double steps, Detail least) {
+FlowPieces divide(const FlowMap& map, double steps, std::size_t bands) {
+  const auto least = -static_cast<Detail>(std::ceil(std::log2(static_cast<double>(bands))));
   FlowPieces pieces;
   pieces.map = &map;
   pieces.edges = edges_of_triangles(map);
   std::vector<std::int8_t> of_position(map.starts.size());
   tbb::parallel_for(std::size_t{0}, map.starts.size(), [&](std::size_t i) {
-    of_position[i] = static_cast<std::int8_t>(detail_for(steps * movement(map, i), least));
+    of_position[i] = static_cast<std::int8_t>(detail_for(steps * movement(map, i), bands, least));
   });
   for (const FlowTriangle& triangle : map.triangles) {
     const auto& [a, b, c] = triangle.corners;

@@ -29,6 +29,7 @@ struct FlowPiece {
   };
 
   Detail detail = 0;
+  double area = 0;                       ///< Of all triangles, in the aperture.
   std::vector<std::uint32_t> positions;  ///< Their indices in the map.
   std::vector<Triangle> triangles;
   std::vector<Edge> edges;  ///< All of which one side, at least, is one of the triangles.
@@ -48,9 +49,9 @@ struct FlowPieces {
 
 /// @param steps  The number of steps in the distance that light moves within a band, if it moves 1 pixel from node to
 ///               node.
-/// @param least  The least detail.
+/// @param bands  Their number, or 1 if they are apart.
 /// The map must outlive the result.
-FlowPieces divide(const FlowMap& map, double steps, Detail least);
+FlowPieces divide(const FlowMap& map, double steps, std::size_t bands);
 
 /// The pieces of a group. Any number of threads may call it.
 std::vector<FlowPiece> pieces_of(const FlowPieces& pieces, std::size_t group);

@@ -61,9 +61,7 @@ LensMap::LensMap(const TensorField& field, const Surfaces& surfaces, const Bendi
 
 TraceCounts LensMap::trace(const std::vector<Eigen::Vector2d>& starts, const std::vector<double>& flexibilities,
                            LensLanding* landings) const {
-  thread_local RayBatch batch;
-  batch.clear();
-  batch.tensor_samples = 0;
+  RayBatch batch;
   RayDifferential differential;
   differential.position = axes(from_);
   for (const Eigen::Vector2d& start : starts)

@@ -61,14 +61,6 @@ struct Flight {
   packets::KernelRays kernel;
   std::vector<std::size_t> numbers;  // Number, in the batch, of each ray of the kernel.
   std::vector<Travelled> travelled;  // State of each ray before the kernel.
-
-  void clear() {
-    kernel.rays.clear();
-    kernel.differentials.clear();
-    kernel.points.clear();
-    numbers.clear();
-    travelled.clear();
-  }
 };
 
 Eigen::Vector3d index_position(const std::array<std::int32_t, 3>& brick, const std::array<float, 3>& position) {
@@ -235,8 +227,7 @@ RayEnd finish(const TensorField& field, const Flight& flight, std::size_t i, dou
 template <int N>
 void trace_rays(const TensorField& field, const Geometry& geometry, const BendingSettings& settings, RayBatch& batch,
                 const Recordings& recordings) {
-  thread_local Flight flight;
-  flight.clear();
+  Flight flight;
   Tracer<N> tracer(field, geometry, settings);
   approach(field, settings, batch, recordings, tracer, flight);
   if (recordings) flight.kernel.points.resize(flight.kernel.rays.size());
