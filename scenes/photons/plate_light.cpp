@@ -32,7 +32,7 @@ FlowMap trace_map(const Scene& scene, double tolerance, const Progress& progress
 /// How finely light is spread over the way that it moves from wavelength to wavelength.
 struct Sweep {
   BandStep bands = {2};
-  double step = 1;  // Between the places where a triangle is drawn, pixels.
+  double step = usual_step;  // Between the places where a triangle is drawn, pixels.
 };
 
 /// The bands that are drawn: each band of the scene is divided, so that light moves little from one to the next.

@@ -523,7 +523,7 @@ std::pair<Film, Film> swept_and_narrow(const std::function<Vector2d(const Vector
     narrow[i].weight = 1.0 / bands;
   }
   const auto draw = [&](const std::vector<CausticBand>& each) {
-    const Caustic caustic = draw_caustic(map, unit_plate(), each, 1, true, Progress());
+    const Caustic caustic = draw_caustic(map, unit_plate(), each, 1, true, Progress(), 1);
     EXPECT_NEAR(all_power(caustic), 1, 1e-9);
     return caustic.irradiance;
   };
@@ -541,6 +541,35 @@ TEST(Caustic, ABandIsSweptInStepsOfAPixel) {
     all += std::pow(exact.values[i], 2);
   }
   EXPECT_LT(std::sqrt(squares / all), 0.02);
+}
+
+/// The picture does not depend on whether the channels' irradiance is wanted, and is what the channels add up to.
+TEST(Caustic, ChannelsAddUpToTheColours) {
+  const Bench bench = make_bench(lens, plate_at(2.2, 3, 96));
+  const FlowMap map = map_of(bench, range(0.1, 0.4));
+  constexpr std::size_t channels = 6, parts = 5;
+  std::vector<CausticBand> bands(channels * parts);
+  for (std::size_t i = 0; i < bands.size(); ++i) {
+    const double width = static_cast<double>(map.nodes - 1) / static_cast<double>(bands.size());
+    bands[i].node = (static_cast<double>(i) + 0.5) * width;
+    bands[i].width = width;
+    bands[i].channel = i / parts;
+    bands[i].weight = 1.0 / parts;
+    bands[i].color = Eigen::Vector3d(1, 0.5, -0.1) * static_cast<double>(1 + i / parts) / parts;
+  }
+  const Caustic colors = draw_caustic(map, bench.plate(), bands, channels, false, Progress());
+  const Caustic both = draw_caustic(map, bench.plate(), bands, channels, true, Progress());
+  EXPECT_EQ(colors.color.values, both.color.values);
+  EXPECT_EQ(colors.power, both.power);
+  for (std::size_t channel = 0; channel < channels; ++channel)
+    EXPECT_NEAR(std::accumulate(both.power[channel].begin(), both.power[channel].end(), 0.0), 1, 1e-9);
+  for (std::size_t pixel = 0; pixel < both.color.plane_size(); ++pixel) {
+    double red = 0;
+    for (std::size_t channel = 0; channel < channels; ++channel)
+      red += static_cast<double>(channel + 1) * both.irradiance.plane(static_cast<int>(channel))[pixel];
+    ASSERT_NEAR(both.color.plane(0)[pixel], red, 1e-6 * (1 + red));
+    ASSERT_NEAR(both.color.plane(1)[pixel], 0.5 * red, 1e-6 * (1 + red));
+  }
 }
 
 TEST(Caustic, LightThatMovesFarHasManyBands) {

@@ -102,6 +102,84 @@ TEST(AreaDeposit, NeighboursMayShareTheirEdge) {
   }
 }
 
+/// Four planes get their shares of the same light.
+TEST(AreaDeposit, PlanesHaveShares) {
+  std::mt19937 engine(5);
+  AreaDeposit shared(width, height), single(width, height);
+  const AreaDeposit::Shares shares{0.25, -1, 0, 0.7};
+  shared.set_shares(shares);
+  for (int i = 0; i < 300; ++i) {
+    const Corners t = random_triangle(engine, i % 7 == 0 ? 6 : 0.7);
+    shared.add_triangle(t[0], t[1], t[2], 1e-5);
+    single.add_triangle(t[0], t[1], t[2], 1e-5);
+  }
+  const std::vector<double> expected = pixels_of(single);
+  for (int plane = 0; plane < 4; ++plane) {
+    const std::vector<double> pixels = pixels_of(shared, plane);
+    for (std::size_t i = 0; i < pixels.size(); ++i)
+      ASSERT_NEAR(pixels[i], shares[static_cast<std::size_t>(plane)] * expected[i], 1e-11) << plane;
+  }
+}
+
+/// Rows are the same, bit for bit, if a deposit keeps only some of them, and if several deposits share the triangles.
+TEST(AreaDeposit, PartsAddUpToTheWhole) {
+  std::mt19937 engine(6);
+  AreaDeposit whole(width, height), first(width, height), second(width, height), middle(width, height, 3, 6);
+  for (int i = 0; i < 400; ++i) {
+    const Corners t = random_triangle(engine, i % 5 == 0 ? 8 : 1);
+    whole.add_triangle(t[0], t[1], t[2], 1e-5);
+    middle.add_triangle(t[0], t[1], t[2], 1e-5);
+    (i % 3 == 0 ? first : second).add_triangle(t[0], t[1], t[2], 1e-5);
+  }
+  const std::vector<double> expected = pixels_of(whole);
+  for (AreaDeposit* deposit : {&first, &second, &middle}) deposit->flush();
+  std::vector<double> row(width);
+  for (int y = 0; y < height; ++y) {
+    const std::vector<double> wanted(expected.begin() + y * width, expected.begin() + (y + 1) * width);
+    AreaDeposit::read_row({&first, &second}, y, 0, row.data());
+    EXPECT_EQ(row, wanted) << y;
+    if (y < 3 || y >= 6) continue;
+    AreaDeposit::read_row({&middle}, y, 0, row.data());
+    EXPECT_EQ(row, wanted) << y;
+  }
+}
+
+/// Edges in batches are computed in vectors, edges that leave the plate sideways one by one. A triangle that is moved
+/// by whole pixels so that it does not leave the plate gives the same light.
+TEST(AreaDeposit, EdgesBeyondTheSidesAreCutOff) {
+  std::mt19937 engine(7);
+  for (int i = 0; i < 200; ++i) {
+    const Corners t = random_triangle(engine, 3);
+    AreaDeposit cut(width, height), wide(width + 40, height);
+    cut.add_triangle(t[0], t[1], t[2], 1e-5);
+    const Vector2d shift(20, 0);
+    wide.add_triangle(t[0] + shift, t[1] + shift, t[2] + shift, 1e-5);
+    const std::vector<double> pixels = pixels_of(cut);
+    wide.flush();
+    std::vector<double> row(width + 40);
+    for (int y = 0; y < height; ++y) {
+      AreaDeposit::read_row({&wide}, y, 0, row.data());
+      for (int x = 0; x < width; ++x)
+        ASSERT_NEAR(pixels[static_cast<std::size_t>(y * width + x)], row[static_cast<std::size_t>(x + 20)], 1e-13);
+    }
+  }
+}
+
+TEST(AreaDeposit, KnowsThePartOnThePlate) {
+  std::mt19937 engine(8);
+  int partly = 0;
+  for (int i = 0; i < 400; ++i) {
+    Corners t = random_triangle(engine, 5);
+    if (i % 10 == 0) t[2] = (t[0] + t[1]) / 2;  // Without area.
+    AreaDeposit deposit(width, height);
+    deposit.add_triangle(t[0], t[1], t[2], 1e-5);
+    const double part = part_on_plate(t[0], t[1], t[2], {width, height});
+    EXPECT_NEAR(sum(pixels_of(deposit)) / 1e-5, part, 1e-6) << i;
+    partly += part > 0.01 && part < 0.99 ? 1 : 0;
+  }
+  EXPECT_GT(partly, 50);
+}
+
 TEST(AreaDeposit, NoPowerIsLostWhereTrianglesHaveNoArea) {
   std::mt19937 engine(3);
   std::uniform_real_distribution<double> x(0, width), y(0, height), part(0, 1);
@@ -150,6 +228,8 @@ TEST(AreaDeposit, TheOrderDoesNotMatter) {
 TEST(AreaDeposit, BadSizesAreRefused) {
   EXPECT_THROW(AreaDeposit(0, 5), std::invalid_argument);
   EXPECT_THROW(AreaDeposit(5, -1), std::invalid_argument);
+  EXPECT_THROW(AreaDeposit(5, 5, 3, 3), std::invalid_argument);
+  EXPECT_THROW(AreaDeposit(5, 5, 3, 6), std::invalid_argument);
 }
 
 }  // namespace
