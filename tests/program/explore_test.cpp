@@ -36,7 +36,7 @@ TEST_F(Explore, ThePicturesAreThoseOfTheirScenes) {
   EXPECT_EQ(sheet.width, columns * (size + gap) + gap);
   for (const int number : {5, 6, 12}) {
     ASSERT_EQ(explore({"--pick", std::to_string(number), "--save-scene", "cell.json"}).status, 0);
-    run_well({"render", "cell.json", "--set", "receiver.resolution=[32,32]", "--set", "light.photons=24576", "--set",
+    run_well({"render", "cell.json", "--set", "receiver.resolution=[32,32]", "--set", "light.photons=20480", "--set",
               "integrator.density={\"kind\":\"gaussian\",\"tau\":1}", "--set", "light.wavelengths.count=16", "--set",
               "light.wavelengths.per_photon=4", "-o", "cell.png", "-q"});
     const Image cell = read_image(in_folder("cell.png"));

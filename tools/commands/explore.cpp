@@ -29,7 +29,7 @@ namespace {
 
 constexpr std::array<double, 3> factors{0.5, 1, 2};  // Of the scale; one row each.
 /// Small pictures of photons: quick, however chaotic the light is.
-const std::vector<std::string> quick{"integrator.density={\"kind\":\"gaussian\",\"tau\":1}", "light.photons=24576",
+const std::vector<std::string> quick{"integrator.density={\"kind\":\"gaussian\",\"tau\":1}", "light.photons=20480",
                                      "light.wavelengths.count=16", "light.wavelengths.per_photon=4"};
 constexpr int gap = 8;  // Pixels about the pictures.
 
