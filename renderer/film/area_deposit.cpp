@@ -127,7 +127,7 @@ void AreaDeposit::add_edge(const Vector2d& from, const Vector2d& to, double dens
 }
 
 void AreaDeposit::flush() {
-  deposit_edges(batch_, shares_.data(), {sums_.data(), stride_, first_row_, end_row_});
+  deposit_edges(batch_, shares_.data(), {sums_.data(), stride_, width_, first_row_, end_row_});
   batch_.count = 0;
 }
 
@@ -146,6 +146,7 @@ void AreaDeposit::add_edge_now(const Vector2d& from, const Vector2d& to, double 
   if (from.y() > to.y()) return add_edge_now(to, from, -density);
   const double slope = (to.x() - from.x()) / (to.y() - from.y()), end = std::min<double>(to.y(), end_row_);
   double y = std::max<double>(from.y(), first_row_);
+  if (!(y < end)) return;
   for (int line = static_cast<int>(y); y < end; ++line) {
     const double next = std::min(line + 1.0, end);
     const double x = from.x() + (y - from.y()) * slope, next_x = from.x() + (next - from.y()) * slope;

@@ -101,6 +101,7 @@ HWY_INLINE void add_spans(Values a, Values b, Values weight, Values row, Lanes l
 void deposit_edges(const EdgeBatch& batch, const double* shares, const DepositPlanes& planes) {
   const Doubles d;
   const auto first_row = hn::Set(d, planes.first_row), end_row = hn::Set(d, planes.end_row);
+  const auto width = hn::Set(d, planes.width);
   for (std::size_t i = 0; i < batch.count; i += hn::Lanes(d)) {
     const auto from_y = hn::Load(d, batch.from_y + i), to_y = hn::Load(d, batch.to_y + i);
     const auto from_x = hn::Load(d, batch.from_x + i), to_x = hn::Load(d, batch.to_x + i);
@@ -111,14 +112,18 @@ void deposit_edges(const EdgeBatch& batch, const double* shares, const DepositPl
     const auto top_x = hn::IfThenElse(goes_up, to_x, from_x), bottom_x = hn::IfThenElse(goes_up, from_x, to_x);
     const auto slope = hn::Div(hn::Sub(bottom_x, top_x), hn::Sub(bottom, top));
     const auto end = hn::Min(bottom, end_row);
+    // Rounding may take it over a border: by as much as long edges are long.
+    const auto x_at = [&](Values at_y) {
+      const auto x = hn::Add(top_x, hn::Mul(hn::Sub(at_y, top), slope));
+      return hn::Min(hn::Max(x, hn::Zero(d)), width);
+    };
     auto y = hn::Max(top, first_row), line = hn::Floor(y);
     auto lanes = hn::And(hn::Lt(y, end), hn::FirstN(d, batch.count - i));
     while (!hn::AllFalse(d, lanes)) {
       const auto row = hn::Sub(line, first_row);
       line = hn::Add(line, hn::Set(d, 1));
       const auto next = hn::Min(line, end);
-      const auto x = hn::Add(top_x, hn::Mul(hn::Sub(y, top), slope));
-      const auto next_x = hn::Add(top_x, hn::Mul(hn::Sub(next, top), slope));
+      const auto x = x_at(y), next_x = x_at(next);
       add_spans(x, next_x, hn::Mul(density, hn::Sub(next, y)), row, lanes, shares, planes);
       y = next;
       lanes = hn::And(lanes, hn::Lt(y, end));

@@ -12,7 +12,8 @@ namespace tensorray {
 struct DepositPlanes {
   static constexpr std::size_t count = 4;
   std::uint64_t* sums = nullptr;
-  std::size_t stride = 0;          ///< Pixels from row to row.
+  std::size_t stride = 0;          ///< Pixels from row to row; at least three more than the width.
+  int width = 0;                   ///< Of the plate, pixels.
   int first_row = 0, end_row = 0;  ///< Other rows are not kept.
 };
 

@@ -165,6 +165,20 @@ TEST(AreaDeposit, EdgesBeyondTheSidesAreCutOff) {
   }
 }
 
+/// Rounding takes points of long edges over the borders of the plate.
+TEST(AreaDeposit, EdgesMayBeLong) {
+  std::mt19937 engine(9);
+  std::uniform_real_distribution<double> x(0, width), y(-1e6, 1e6);
+  const auto corner = [&](int i) { return Vector2d(i % 3 == 0 ? 0 : i % 3 == 1 ? width : x(engine), y(engine)); };
+  for (int i = 0; i < 3000; ++i) {
+    const Corners t{corner(i), corner(i / 3), corner(i / 9)};
+    AreaDeposit deposit(width, height);
+    deposit.add_triangle(t[0], t[1], t[2], 1e-5);
+    EXPECT_NEAR(sum(pixels_of(deposit)) / 1e-5, part_on_plate(t[0], t[1], t[2], {width, height}), 1e-7)
+        << i;  // Units of 2^-48.
+  }
+}
+
 TEST(AreaDeposit, KnowsThePartOnThePlate) {
   std::mt19937 engine(8);
   int partly = 0;
