@@ -27,6 +27,8 @@ struct Pass {
   std::array<double*, planes> targets{};           // The films' planes; null: none.
   double gain = 1;                                 // Of what was deposited.
   std::size_t first_channel = 0, end_channel = 0;  // The channels whose power is counted.
+
+  bool counts(const CausticBand& band) const { return band.channel >= first_channel && band.channel < end_channel; }
 };
 
 /// Bands in a row that are drawn as light of one place among the nodes, or in parts of a band.
@@ -120,8 +122,7 @@ double start_triangle(const Job& job, const FlowPiece& piece, const FlowPiece::T
       count(worker.ends[corner], 1.0 / 3);
       continue;
     }
-    const bool is_on_plate = part_on_plate(at[corner], at[corner], at[corner], job.plate) > 0;
-    count(is_on_plate ? RayEnd::plate : RayEnd::missed, 1.0 / 3);
+    count(is_on_plate(at[corner], job.plate) ? RayEnd::plate : RayEnd::missed, 1.0 / 3);
     worker.deposit.add_point(at[corner], carried / 3);
   }
   return 0;
@@ -168,10 +169,17 @@ AreaDeposit::Shares shares_of(const Pass& pass, const BandRun& run) {
   return shares;
 }
 
+/// Light without colour has power, too.
+bool counts_power(const Job& job, const Pass& pass, const BandRun& run) {
+  const auto first = job.bands.begin() + static_cast<std::ptrdiff_t>(run.first);
+  return std::any_of(first, first + static_cast<std::ptrdiff_t>(run.count),
+                     [&](const CausticBand& band) { return pass.counts(band); });
+}
+
 void add_power(const Job& job, const Pass& pass, const BandRun& run, const Power& power, PowerSums& sums) {
   for (std::size_t i = run.first; i < run.first + run.count; ++i) {
     const CausticBand& band = job.bands[i];
-    if (band.channel < pass.first_channel || band.channel >= pass.end_channel) continue;
+    if (!pass.counts(band)) continue;
     for (int end = 0; end < ray_end_count; ++end)
       sums[band.channel][end] += static_cast<std::uint64_t>(power_unit * band.weight * power[end]);
   }
@@ -183,7 +191,7 @@ void draw_group(const Job& job, const Pass& pass, std::size_t group, bool counts
   for (const FlowPiece& piece : pieces_of(job.pieces, group))
     for (const BandRun& run : runs_at(piece.detail, job.bands)) {
       const AreaDeposit::Shares shares = shares_of(pass, run);
-      if (shares == AreaDeposit::Shares{}) continue;
+      if (shares == AreaDeposit::Shares{} && !(counts && counts_power(job, pass, run))) continue;
       worker.deposit.set_shares(shares);
       Power power{};
       const int parts = std::max(piece.detail, 0) + 1;
@@ -245,9 +253,9 @@ std::vector<Pass> passes_of(const std::vector<CausticBand>& bands, double gain, 
   std::vector<Pass> passes;
   const auto add = [&](Pass pass) {
     const double greatest = greatest_sum(pass.shares);
-    if (greatest == 0) return;
+    if (greatest == 0 && pass.first_channel == pass.end_channel) return;
     for (AreaDeposit::Shares& shares : pass.shares)
-      for (double& share : shares) share /= greatest;
+      for (double& share : shares) share /= greatest > 0 ? greatest : 1;
     pass.gain = gain * greatest;
     passes.push_back(std::move(pass));
   };
@@ -279,10 +287,8 @@ void count_ends(const FlowMap& map, const Plate& plate, const std::vector<Causti
   tbb::parallel_for(std::size_t{0}, nodes.size(), [&](std::size_t channel) {
     for (std::size_t i = 0; i < map.starts.size() && nodes[channel] >= 0; ++i) {
       const FlowLanding landing = landing_at(map, i, nodes[channel]);
-      const bool beside =
-          (landing.at.array() < 0).any() || (landing.at.array() > plate.resolution.cast<double>().array()).any();
-      const RayEnd end = landing.end == RayEnd::plate && beside ? RayEnd::missed : landing.end;
-      ++caustic.ends[channel][static_cast<int>(end)];
+      const bool is_beside = landing.end == RayEnd::plate && !is_on_plate(landing.at, plate.resolution);
+      ++caustic.ends[channel][static_cast<int>(is_beside ? RayEnd::missed : landing.end)];
     }
   });
 }
@@ -294,7 +300,7 @@ void draw_strip(const Job& job, const Pass& pass, const Strip& strip, std::atomi
   const std::thread::id caller = std::this_thread::get_id();
   const int width = job.plate.x(), height = job.plate.y();
   tbb::enumerable_thread_specific<Worker> workers([&] {
-    return Worker{AreaDeposit(width, height, strip.first, strip.end), PowerSums(power.size()), {}, {}, {}};
+    return Worker{AreaDeposit(width, height, strip.first, strip.end), PowerSums(power.size())};
   });
   tbb::parallel_for(std::size_t{0}, job.pieces.groups(), [&](std::size_t group) {
     if (progress.cancelled) throw Cancelled();
@@ -327,7 +333,7 @@ Caustic draw_caustic(const FlowMap& map, const Plate& plate, const std::vector<C
   double area = 0, widest = 0;
   for (const FlowTriangle& triangle : map.triangles) area += triangle.area;
   for (const CausticBand& band : bands) widest = std::max(widest, band.width);
-  const FlowPieces pieces = divide(map, widest / step, joined_bands(bands));
+  const FlowPieces pieces = divide_map(map, widest / step, joined_bands(bands));
   const Job job{map, pieces, plate.resolution, bands, area};
   const std::vector<Pass> passes = passes_of(bands, area / plate.pixel_area(), caustic);
   const std::vector<Strip> strips = strips_of(plate.resolution);

@@ -142,7 +142,7 @@ class PieceBuilder {
 
 }  // namespace
 
-FlowPieces divide(const FlowMap& map, double steps, std::size_t bands) {
+FlowPieces divide_map(const FlowMap& map, double steps, std::size_t bands) {
   const auto least = -static_cast<Detail>(std::ceil(std::log2(static_cast<double>(bands))));
   FlowPieces pieces;
   pieces.map = &map;

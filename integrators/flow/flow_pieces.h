@@ -4,6 +4,7 @@
 
 #include <array>
 #include <cstdint>
+#include <utility>
 #include <vector>
 
 #include <Eigen/Core>
@@ -41,8 +42,9 @@ struct FlowPiece {
 struct FlowPieces {
   const FlowMap* map = nullptr;
   std::vector<std::int8_t> details;                 ///< One for each triangle.
-  std::vector<std::array<std::uint32_t, 3>> edges;  ///< The edges of each triangle.
-  std::vector<std::pair<float, float>> rows;        ///< Where the light of each group lands, pixels.
+  std::vector<std::array<std::uint32_t, 3>> edges;  ///< The three edges of each triangle.
+  std::vector<std::pair<float, float>>
+      rows;  ///< From the first to the last one in which the light of each group lands, pixels.
 
   std::size_t groups() const { return rows.size(); }
 };
@@ -51,7 +53,7 @@ struct FlowPieces {
 ///               node.
 /// @param bands  Their number, or 1 if they are apart.
 /// The map must outlive the result.
-FlowPieces divide(const FlowMap& map, double steps, std::size_t bands);
+FlowPieces divide_map(const FlowMap& map, double steps, std::size_t bands);
 
 /// The pieces of a group. Any number of threads may call it.
 std::vector<FlowPiece> pieces_of(const FlowPieces& pieces, std::size_t group);

@@ -24,10 +24,6 @@ std::uint64_t integer(double value) {
   return bits;
 }
 
-bool is_inside(const Vector2d& at, int width, int height) {
-  return at.x() >= 0 && at.y() >= 0 && at.x() <= width && at.y() <= height;
-}
-
 double twice_area_of(const Vector2d& a, const Vector2d& b, const Vector2d& c) {
   const Vector2d ab = b - a, ac = c - a;
   return ab.x() * ac.y() - ab.y() * ac.x();
@@ -108,7 +104,7 @@ void AreaDeposit::add_triangle(const Vector2d& a, const Vector2d& b, const Vecto
 }
 
 void AreaDeposit::add_point(const Vector2d& at, double power) {
-  if (!is_inside(at, width_, height_)) return;
+  if (!is_on_plate(at, {width_, height_})) return;
   const int x = std::min(static_cast<int>(at.x()), width_ - 1), y = std::min(static_cast<int>(at.y()), height_ - 1);
   if (y < first_row_ || y >= end_row_) return;
   add_difference(x, y, unit * power, 0);
@@ -192,16 +188,19 @@ void AreaDeposit::add_difference(int x, int y, double covered, double before) {
     sums[k] += integer(shares_[k] * covered) - integer(shares_[k] * before);
 }
 
+bool is_on_plate(const Vector2d& at, const Eigen::Vector2i& plate) {
+  return at.x() >= 0 && at.y() >= 0 && at.x() <= plate.x() && at.y() <= plate.y();
+}
+
 double part_on_plate(const Vector2d& a, const Vector2d& b, const Vector2d& c, const Eigen::Vector2i& plate) {
-  const int width = plate.x(), height = plate.y();
-  if (is_inside(a, width, height) && is_inside(b, width, height) && is_inside(c, width, height)) return 1;
+  if (is_on_plate(a, plate) && is_on_plate(b, plate) && is_on_plate(c, plate)) return 1;
   const Vector2d low = a.cwiseMin(b).cwiseMin(c), high = a.cwiseMax(b).cwiseMax(c);
-  if (!(low.x() < width && low.y() < height && high.x() > 0 && high.y() > 0)) return 0;
+  if (!(low.x() < plate.x() && low.y() < plate.y() && high.x() > 0 && high.y() > 0)) return 0;
   const double twice_area = twice_area_of(a, b, c);
   if (is_line(high - low, twice_area)) {
     const std::vector<Vector2d> points = points_of_line(a, b, c);
     const auto on_plate =
-        std::count_if(points.begin(), points.end(), [&](const Vector2d& at) { return is_inside(at, width, height); });
+        std::count_if(points.begin(), points.end(), [&](const Vector2d& at) { return is_on_plate(at, plate); });
     return static_cast<double>(on_plate) / static_cast<double>(points.size());
   }
   std::vector<Vector2d> part{a, b, c};

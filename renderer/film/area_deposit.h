@@ -78,6 +78,9 @@ class AreaDeposit {
   std::vector<std::uint64_t> sums_;  // The power of a pixel is the sum from the beginning of its row up to it.
 };
 
+/// Whether AreaDeposit gives the power of a point to a pixel of a plate: also on the plate's right and lower edges.
+bool is_on_plate(const Eigen::Vector2d& at, const Eigen::Vector2i& plate);
+
 /// The part of a triangle's power that AreaDeposit gives to the pixels of a plate.
 double part_on_plate(const Eigen::Vector2d& a, const Eigen::Vector2d& b, const Eigen::Vector2d& c,
                      const Eigen::Vector2i& plate);

@@ -29,7 +29,8 @@ struct EdgeBatch {
   alignas(64) double density[capacity];
 };
 
-/// Adds the edges, with the part `shares` of them to each plane. The sums are those of single edges, bit for bit.
+/// Adds the edges, with the part `shares` of them to each plane. An edge has the same sums, bit for bit, in any batch,
+/// whatever rows are kept.
 void deposit_edges(const EdgeBatch& batch, const double* shares, const DepositPlanes& planes);
 
 }  // namespace tensorray

@@ -230,11 +230,13 @@ Json describe_pixel(const Scene& scene, const Render& render, const Image& displ
     for (std::size_t i = 0; i < scene.bands.size(); ++i) sum += bands[i] * scene.bands[i].width;
     lines.push_back({"irradiance", fmt::format("{:.4g}", sum)});
   }
-  // What differs most from pixel to pixel is seen without scrolling.
-  for (const bool vectors : {false, true})
+  // What one looks for first is seen without scrolling.
+  const auto rank = [](const std::string& channel) {
+    return channel == "folds" ? 0 : starts_with(channel, "displacement") ? 2 : 1;
+  };
+  for (const int wanted : {0, 1, 2})
     for (std::size_t i = 3; i < linear.channels.size(); ++i)
-      if (starts_with(linear.channels[i], "displacement") == vectors)
-        lines.push_back({linear.channels[i], fmt::format("{:.4g}", pixel[i])});
+      if (rank(linear.channels[i]) == wanted) lines.push_back({linear.channels[i], fmt::format("{:.4g}", pixel[i])});
   const float* const shown = pixel_at(display, place);
   return {{"lines", std::move(lines)},
           {"color", hex(Vector3d(shown[0], shown[1], shown[2]))},

@@ -23,15 +23,16 @@ export class ReadOut {
   show(look: Look): void {
     this.hint.hidden = true;
     this.container.classList.remove("stale");
-    this.values.replaceChildren(
-      ...look.lines.flatMap(([name, value]) => [element("dt", {}, name), element("dd", {}, value)]),
-    );
+    this.values.replaceChildren();
     if (look.color !== null) {
       this.values.append(element("dt", {}, "colour"), this.swatch);
       this.swatch.style.backgroundColor = look.color;
       this.swatch.setAttribute("aria-label", "colour " + look.color);
       this.swatch.title = look.color;
     }
+    this.values.append(
+      ...look.lines.flatMap(([name, value]) => [element("dt", {}, name), element("dd", {}, value)]),
+    );
     this.spectrum = look.spectrum;
     this.draw();
   }
