@@ -158,10 +158,12 @@ struct Corners {
   std::array<Corner, 3> corners;
   bool is_mapped = true;  // Whether all light of the triangle is mapped to landings between those of the corners.
 
-  Corners(const FlowMap& map, const FlowPicture& picture, const FlowTriangle& triangle, double node) {
+  /// @param landing_of  The FlowLanding of a position at the node.
+  template <typename LandingOf>
+  Corners(const FlowMap& map, const FlowPicture& picture, const FlowTriangle& triangle, const LandingOf& landing_of) {
     for (std::size_t i = 0; i < 3; ++i) {
       const std::uint32_t position = triangle.corners[i];
-      const FlowLanding landing = landing_at(map, position, node);
+      const FlowLanding& landing = landing_of(position);
       const Vector2d start = map.starts[position];
       const Vector2d pixel = picture.to_pixel * (picture.side == FlowSide::starts ? start : landing.at);
       corners[i] = {position, landing.end, start, landing.at, pixel};
@@ -233,9 +235,12 @@ void FlowView::sort_triangles(std::size_t node) {
     int left, top, right, bottom;
   };
   std::vector<Tiles> touched;
+  std::vector<FlowLanding> landings(map_.starts.size());
+  for (std::size_t i = 0; i < landings.size(); ++i) landings[i] = landing_at(map_, i, nodes_[node]);
   const Eigen::Array2d last = picture_.resolution.cast<double>().array() - 1;
   for (std::uint32_t t = 0; t < map_.triangles.size(); ++t) {
-    const Corners corners(map_, picture_, map_.triangles[t], nodes_[node]);
+    const Corners corners(
+        map_, picture_, map_.triangles[t], [&](auto i) -> const auto& { return landings[i]; });
     if (!corners.is_mapped && picture_.side == FlowSide::landings) continue;
     const Eigen::AlignedBox2d box = corners.box();
     if (!has_samples(box, 1) && !has_samples(box, samples_)) continue;
@@ -259,16 +264,31 @@ void FlowView::sort_triangles(std::size_t node) {
   for_each_tile([&](std::size_t tile, std::uint32_t t) { sorted.triangles[next[tile]++] = t; });
 }
 
-void FlowView::draw(int tile, int n, std::size_t node, std::vector<FlowPoint>& points) const {
+/// The samples of a tile, while triangles are drawn on them.
+struct FlowView::TileSamples {
+  Eigen::AlignedBox2i box;  // Of the samples, in samples of the picture.
+  int n;                    // Samples of a pixel along x and along y.
+  const std::vector<char>& wanted;
+  std::vector<FlowPoint>& points;
+  std::vector<float> distances;  // Squares, from straight light, of what the points show.
+
+  bool is_wanted(int x, int y) const {
+    if (wanted.empty()) return true;
+    const int column = (x - box.min().x()) / n, row = (y - box.min().y()) / n;
+    return wanted[static_cast<std::size_t>(row * ((box.sizes().x() + 1) / n) + column)] != 0;
+  }
+};
+
+void FlowView::draw(int tile, int n, std::size_t node, const std::vector<char>& wanted,
+                    std::vector<FlowPoint>& points) const {
   const Eigen::AlignedBox2i box = pixels(tile);
   const Eigen::AlignedBox2i samples(n * box.min(), n * (box.max() + Eigen::Vector2i(1, 1)) - Eigen::Vector2i(1, 1));
-  const Eigen::Vector2i size = samples.sizes() + Eigen::Vector2i(1, 1);
-  points.assign(static_cast<std::size_t>(size.prod()), FlowPoint());
-  thread_local std::vector<float> distances;
-  distances.assign(points.size(), std::numeric_limits<float>::infinity());
+  const auto count = static_cast<std::size_t>((samples.sizes() + Eigen::Vector2i(1, 1)).prod());
+  points.assign(count, FlowPoint());
+  TileSamples drawn{samples, n, wanted, points, std::vector<float>(count, std::numeric_limits<float>::infinity())};
   const Sorted& sorted = sorted_[node];
   for (std::uint32_t i = sorted.first_of_tile[tile]; i < sorted.first_of_tile[tile + 1]; ++i)
-    draw_triangle(map_.triangles[sorted.triangles[i]], samples, n, nodes_[node], points, distances);
+    draw_triangle(map_.triangles[sorted.triangles[i]], nodes_[node], drawn);
 }
 
 /// Sets the slope and the length of a corner: linear between the nodes that have them.
@@ -282,15 +302,14 @@ void FlowView::set_slope(double node, std::uint32_t position, Matrix2f& jacobian
   length = (1 - part) * map_.lengths[a] + part * map_.lengths[b];
 }
 
-void FlowView::draw_triangle(const FlowTriangle& triangle, const Eigen::AlignedBox2i& samples, int n, double node,
-                             std::vector<FlowPoint>& points, std::vector<float>& distances) const {
-  Corners found(map_, picture_, triangle, node);
+void FlowView::draw_triangle(const FlowTriangle& triangle, double node, TileSamples& tile) const {
+  Corners found(map_, picture_, triangle, [&](std::uint32_t i) { return landing_at(map_, i, node); });
   std::array<Corner, 3>& corners = found.corners;
-  for (Corner& corner : corners) corner.sample *= n;
+  for (Corner& corner : corners) corner.sample *= tile.n;
   // The middles of samples are at ½, 1½, ...
   const Eigen::AlignedBox2d box = found.box();
-  const Eigen::Array2d begin = (box.min().array() - 0.5).ceil().max(samples.min().array().cast<double>()),
-                       end = (box.max().array() - 0.5).floor().min(samples.max().array().cast<double>());
+  const Eigen::Array2d begin = (box.min().array() - 0.5).ceil().max(tile.box.min().array().cast<double>()),
+                       end = (box.max().array() - 0.5).floor().min(tile.box.max().array().cast<double>());
   const Sides sides(corners);
   if ((begin > end).any() || sides.area == 0) return;
   for (Corner& corner : corners) {
@@ -301,7 +320,7 @@ void FlowView::draw_triangle(const FlowTriangle& triangle, const Eigen::AlignedB
   const Facet facet(corners);
 
   const auto show = [&](const Vector2d& sample, const std::array<float, 3>& weights, std::size_t index) {
-    FlowPoint& point = points[index];
+    FlowPoint& point = tile.points[index];
     if (!found.is_mapped) {
       point.end = corners[0].end;
       point.is_unknown = triangle.is_torn || corners[1].end != point.end || corners[2].end != point.end;
@@ -309,23 +328,23 @@ void FlowView::draw_triangle(const FlowTriangle& triangle, const Eigen::AlignedB
     }
     const Vector2d other = picture_.side == FlowSide::starts ? facet.landing(weights) : facet.start(weights);
     ++point.sheets;
-    const auto distance = static_cast<float>((other - picture_.straight * Vector2d(sample / n)).squaredNorm());
-    if (!(distance < distances[index])) return;
-    distances[index] = distance;
+    const auto distance = static_cast<float>((other - picture_.straight * Vector2d(sample / tile.n)).squaredNorm());
+    if (!(distance < tile.distances[index])) return;
+    tile.distances[index] = distance;
     point.end = RayEnd::plate;
     point.other = other.cast<float>();
     point.jacobian = facet.jacobian(weights);
     point.length = facet.length(weights);
     point.error = triangle.error;
   };
-  const int width = samples.sizes().x() + 1;
+  const int width = tile.box.sizes().x() + 1;
   std::array<float, 3> weights{};
   for (int y = static_cast<int>(begin.y()); y <= static_cast<int>(end.y()); ++y) {
     double first = begin.x() + 0.5, last = end.x() + 0.5;
     sides.narrow(y + 0.5, first, last);
     for (int x = static_cast<int>(std::ceil(first - 0.5)); x + 0.5 <= last; ++x)
-      if (const Vector2d sample(x + 0.5, y + 0.5); sides.contains(sample, weights))
-        show(sample, weights, static_cast<std::size_t>((y - samples.min().y()) * width + x - samples.min().x()));
+      if (const Vector2d sample(x + 0.5, y + 0.5); tile.is_wanted(x, y) && sides.contains(sample, weights))
+        show(sample, weights, static_cast<std::size_t>((y - tile.box.min().y()) * width + x - tile.box.min().x()));
   }
 }
 

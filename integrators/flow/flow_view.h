@@ -63,15 +63,16 @@ class FlowView {
 
   /// Sets `points` to what the samples of a tile see, row by row: n × n samples of each pixel, at the middles of its
   /// equal parts.
-  /// @param node  Index in the list of nodes.
-  void draw(int tile, int n, std::size_t node, std::vector<FlowPoint>& points) const;
+  /// @param node    Index in the list of nodes.
+  /// @param wanted  By pixel of the tile: whether its samples are drawn. Empty: all are.
+  void draw(int tile, int n, std::size_t node, const std::vector<char>& wanted, std::vector<FlowPoint>& points) const;
 
  private:
   void find_jacobians();
   void sort_triangles(std::size_t node);
   void set_slope(double node, std::uint32_t position, Eigen::Matrix2f& jacobian, float& length) const;
-  void draw_triangle(const FlowTriangle& triangle, const Eigen::AlignedBox2i& samples, int n, double node,
-                     std::vector<FlowPoint>& points, std::vector<float>& distances) const;
+  struct TileSamples;
+  void draw_triangle(const FlowTriangle& triangle, double node, TileSamples& tile) const;
 
   /// Triangles that contain samples, by the tile that they touch.
   struct Sorted {

@@ -119,7 +119,7 @@ void draw_tile(const LensView& view, int tile, LensPicture& picture, TraceCounts
   const Eigen::AlignedBox2i box = view.flow.pixels(tile);
   const int columns = box.sizes().x() + 1, rows = box.sizes().y() + 1;
   const std::size_t reference = view.nodes.size() - 1;
-  const TileView centers = view_tile(view, tile, 1, {{0, 0, reference, reference}}, counts);
+  const TileView centers = view_tile(view, tile, 1, {{0, 0, reference, reference}}, {}, counts);
   TileShader shader(view, tile, counts);
   PixelLight light;
   for (int y = 0; y < rows; ++y)

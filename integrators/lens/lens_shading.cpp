@@ -1,5 +1,6 @@
 #include "integrators/lens/lens_shading.h"
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
 
@@ -12,14 +13,37 @@ namespace {
 using Eigen::Matrix2d;
 using Eigen::Vector2d;
 
-constexpr double same_look = 0.25;  // Pixels: bands whose light sees points this near share a look at the image.
+constexpr double same_look = 0.25;     // Pixels: bands whose light sees points this near share a look at the image.
+constexpr std::size_t few_spans = 4;   // Of light that is hardly spread.
+constexpr double span_pixels = 0.5;    // Over which light moves within a span.
+constexpr double smooth_pixels = 0.5;  // From the parabola through three of five nodes, at the others: how far light
+                                       // may be, so that light between the nodes can be interpolated.
 constexpr double swept_pixels = 2;  // Of the image, over which a pixel's light is spread, so that one sample is enough.
-constexpr double joined_pixels = 32;  // Farther apart, the points that both ends of a band see are on different sheets.
+constexpr double joined_pixels = 32;  // A band. Farther apart, the points that both ends see are on different sheets.
 
 /// The footprint of a sample whose point moves along `sweep`: each is a box whose variance adds to that of the other.
 Matrix2d swept(const Matrix2d& footprint, const Vector2d& sweep) {
   const Matrix2d square = footprint * footprint.transpose() + sweep * sweep.transpose();
   return square.llt().matrixL();
+}
+
+/// The weight of each of the places `at` in the polynomial through them, at x (Lagrange).
+std::vector<double> polynomial_weights(const std::vector<double>& at, double x) {
+  std::vector<double> weights(at.size(), 1);
+  for (std::size_t i = 0; i < at.size(); ++i)
+    for (std::size_t j = 0; j < at.size(); ++j)
+      if (j != i) weights[i] *= (x - at[j]) / (at[i] - at[j]);
+  return weights;
+}
+
+/// The nodes of spans of which each begins where the one before it ends; empty if one does not.
+std::vector<std::size_t> chain(const std::vector<Span>& spans) {
+  std::vector<std::size_t> nodes{spans.front().from};
+  for (const Span& span : spans) {
+    if (span.from != nodes.back() || span.to == span.from) return {};
+    nodes.push_back(span.to);
+  }
+  return nodes;
 }
 
 /// What one sample sees of the image.
@@ -38,7 +62,7 @@ class SampleView {
         continue;
       }
       const Glimpse glimpse(*this, span.from);
-      if (!lands(span.to) || glimpse.distance(st(span.to)) > joined_pixels * n_) {
+      if (!lands(span.to) || !are_joined(span, glimpse.distance(st(span.to)) / n_)) {
         look(glimpse, span.from, 0.5, span.first, span.last, pixel);
         if (lands(span.to)) look(Glimpse(*this, span.to), span.to, 0.5, span.first, span.last, pixel);
         continue;
@@ -53,20 +77,38 @@ class SampleView {
 
   /// The length, in pixels, of the line of the image that the light of all bands comes from; infinite if it is not one
   /// line.
-  double sweep() const {
+  double sweep(const std::vector<Span>& spans) const {
     double length = 0;
-    for (const Span& span : view_.spans) {
+    for (const Span& span : spans) {
       if (!lands(span.from) || !lands(span.to)) return std::numeric_limits<double>::infinity();
       const double distance = Glimpse(*this, span.from).distance(st(span.to)) / n_;
-      if (!(distance <= joined_pixels)) return std::numeric_limits<double>::infinity();
+      if (!are_joined(span, distance)) return std::numeric_limits<double>::infinity();
       length += distance;
     }
     return length;
   }
 
+  /// Whether the points seen at `nodes` are at most `distance` (pixels) from the parabola through every second of them.
+  bool is_smooth(const std::vector<std::size_t>& nodes, double distance) const {
+    std::vector<double> places;
+    for (std::size_t i = 0; i < nodes.size(); i += 2) places.push_back(view_.nodes[nodes[i]]);
+    for (std::size_t i = 1; i < nodes.size(); i += 2) {
+      const std::vector<double> weights = polynomial_weights(places, view_.nodes[nodes[i]]);
+      Vector2d predicted(0, 0);
+      for (std::size_t k = 0; k < weights.size(); ++k) predicted += weights[k] * st(nodes[2 * k]);
+      if (!(Glimpse(*this, nodes[i]).distance(predicted) <= distance * n_)) return false;
+    }
+    return true;
+  }
+
  private:
   const FlowPoint& point(std::size_t node) const { return points_[node][sample_]; }
   bool lands(std::size_t node) const { return point(node).end == RayEnd::plate; }
+
+  /// Whether the points that both ends of a span see, so many pixels apart, are on one sheet.
+  static bool are_joined(const Span& span, double distance) {
+    return distance <= joined_pixels * static_cast<double>(span.last - span.first);
+  }
 
   Vector2d st(std::size_t node) const { return texture_coordinates(view_.light, image_point(view_, point(node))); }
 
@@ -116,17 +158,83 @@ class SampleView {
 
 }  // namespace
 
+TileShader::TileShader(const LensView& view, int tile, TraceCounts& counts)
+    : view_(view),
+      tile_(tile),
+      columns_(view.flow.pixels(tile).sizes().x() + 1),
+      counts_(counts),
+      few_(joined(view.spans, few_spans)),
+      spans_(few_),
+      whole_(view_tile(view, tile, 1, few_, {}, counts)) {
+  find_sweeps();
+  double greatest = 0;
+  for (const double sweep : sweeps_)
+    if (std::isfinite(sweep)) greatest = std::max(greatest, sweep);
+  if (greatest <= same_look) few_ = spans_ = joined(view.spans, 1);
+  const double wanted = std::min(std::ceil(greatest / span_pixels), static_cast<double>(view.spans.size()));
+  if (wanted <= static_cast<double>(few_.size())) return;
+  spans_ = joined(view.spans, static_cast<std::size_t>(wanted));
+  if (moves_smoothly()) {
+    interpolate();
+  } else {
+    whole_ = view_tile(view, tile, 1, spans_, {}, counts);
+    find_sweeps();
+  }
+}
+
+void TileShader::find_sweeps() {
+  sweeps_.resize(whole_[spans_.front().from].size());
+  for (std::size_t i = 0; i < sweeps_.size(); ++i) sweeps_[i] = SampleView(view_, whole_, i, 1).sweep(spans_);
+}
+
+bool TileShader::moves_smoothly() const {
+  const std::vector<std::size_t> nodes = chain(few_);
+  if (nodes.size() != few_spans + 1) return false;
+  for (std::size_t i = 0; i < sweeps_.size(); ++i)
+    if (std::isfinite(sweeps_[i]) && !SampleView(view_, whole_, i, 1).is_smooth(nodes, smooth_pixels)) return false;
+  return true;
+}
+
+/// Sets what pixels see at the nodes of `spans_` that are not drawn. It is valid where the sweep is finite.
+void TileShader::interpolate() {
+  const std::vector<std::size_t> known = chain(few_);
+  std::vector<double> places;
+  for (const std::size_t node : known) places.push_back(view_.nodes[node]);
+  for (const std::size_t node : chain(spans_)) {
+    if (!whole_[node].empty()) continue;
+    const std::vector<double> weights = polynomial_weights(places, view_.nodes[node]);
+    whole_[node] = whole_[known.front()];
+    for (std::size_t i = 0; i < sweeps_.size(); ++i) {
+      FlowPoint& point = whole_[node][i];
+      point.other.setZero();
+      point.jacobian.setZero();
+      for (std::size_t k = 0; k < known.size(); ++k) {
+        point.other += static_cast<float>(weights[k]) * whole_[known[k]][i].other;
+        point.jacobian += static_cast<float>(weights[k]) * whole_[known[k]][i].jacobian;
+      }
+    }
+  }
+}
+
+/// All samples of the pixels whose light is still, or of those whose light is torn.
+TileView TileShader::view_samples(const std::vector<Span>& spans, bool still) {
+  std::vector<char> wanted(sweeps_.size());
+  for (std::size_t i = 0; i < wanted.size(); ++i)
+    wanted[i] = still ? sweeps_[i] < swept_pixels : !std::isfinite(sweeps_[i]);
+  return view_tile(view_, tile_, view_.light.settings.samples, spans, wanted, counts_);
+}
+
 void TileShader::shade(int x, int y, PixelLight& light) {
-  const int columns = view_.flow.pixels(tile_).sizes().x() + 1, n = view_.light.settings.samples;
-  const SampleView pixel(view_, whole_, static_cast<std::size_t>(y * columns + x), 1);
-  const double sweep = pixel.sweep();
-  if (n == 1 || (sweep >= swept_pixels && std::isfinite(sweep))) return pixel.shade(view_.spans, light);
-  const bool is_still = sweep < swept_pixels;
-  const std::vector<Span>& spans = is_still ? view_.few : view_.spans;
-  TileView& points = is_still ? few_ : all_;
-  if (points.empty()) points = view_tile(view_, tile_, n, spans, counts_);
+  const int n = view_.light.settings.samples;
+  const auto pixel = static_cast<std::size_t>(y * columns_ + x);
+  const bool is_still = sweeps_[pixel] < swept_pixels;
+  if (std::isfinite(sweeps_[pixel]) && (n == 1 || !is_still))
+    return SampleView(view_, whole_, pixel, 1).shade(spans_, light);
+  const std::vector<Span>& spans = is_still ? few_ : view_.spans;
+  TileView& points = is_still ? few_samples_ : samples_;
+  if (points.empty()) points = view_samples(spans, is_still);
   for (int i = 0; i < n * n; ++i) {
-    const int sample = (y * n + i / n) * columns * n + x * n + i % n;
+    const int sample = (y * n + i / n) * columns_ * n + x * n + i % n;
     SampleView(view_, points, static_cast<std::size_t>(sample), n).shade(spans, light);
   }
 }

@@ -16,23 +16,29 @@ struct PixelLight {
   std::vector<double> channels, alpha;  // By channel, and by band.
 };
 
-/// Shades the pixels of a tile.
+/// Shades the pixels of a tile. Light that hardly moves from band to band is looked at for several bands together.
 class TileShader {
  public:
-  TileShader(const LensView& view, int tile, TraceCounts& counts)
-      : view_(view), tile_(tile), counts_(counts), whole_(view_tile(view, tile, 1, view.spans, counts)) {}
+  TileShader(const LensView& view, int tile, TraceCounts& counts);
 
   /// Adds the light of a pixel to `light`. Where it is spread over several pixels of the image, one sample shows as
-  /// much as many; where it is hardly spread, few nodes show as much as all.
+  /// much as many.
   /// @param x,y  In the tile.
   void shade(int x, int y, PixelLight& light);
 
  private:
+  void find_sweeps();
+  bool moves_smoothly() const;
+  void interpolate();
+  TileView view_samples(const std::vector<Span>& spans, bool still);
+
   const LensView& view_;
-  const int tile_;
+  const int tile_, columns_;
   TraceCounts& counts_;
-  const TileView whole_;  // A sample for each pixel.
-  TileView few_, all_;    // All samples, at few nodes and at all.
+  std::vector<Span> few_, spans_;  // For light that is hardly spread, and for all light of the tile.
+  TileView whole_;                 // A sample for each pixel, at the nodes of `few_` and `spans_`.
+  std::vector<double> sweeps_;     // By pixel: the length of the line that it sees, in pixels. Infinite: it is not one.
+  TileView few_samples_, samples_;  // All samples of the pixels that need them: at the nodes of `few_`, and at all.
 };
 
 }  // namespace tensorray

@@ -12,8 +12,6 @@ using Eigen::Affine2d;
 using Eigen::Matrix2d;
 using Eigen::Vector2d;
 
-constexpr std::size_t few_spans = 4;  // Of light that is hardly spread.
-
 /// The view of a map whose `other` ends are pixels of the landings (gather) or coordinates of starts (scatter).
 FlowPicture flow_picture(const LensLight& light) {
   FlowPicture picture;
@@ -24,21 +22,6 @@ FlowPicture flow_picture(const LensLight& light) {
   picture.to_pixel = to_pixels(light.receiver);
   picture.straight = to_pixels(light.landings) * light.straight;
   return picture;
-}
-
-/// Some spans, together all. In a range they end where others begin; other lights have nothing in common.
-std::vector<Span> joined(const std::vector<Span>& spans) {
-  std::vector<Span> few;
-  for (std::size_t i = 0; i < spans.size(); ++i) {
-    const bool is_new = few.size() * spans.size() <= i * few_spans || few.empty();
-    if (is_new || spans[i].from != few.back().to || spans[i].from == spans[i].to) {
-      few.push_back(spans[i]);
-    } else {
-      few.back().last = spans[i].last;
-      few.back().to = spans[i].to;
-    }
-  }
-  return few;
 }
 
 double flexibility_at(const LensLight& light, double node) {
@@ -111,23 +94,36 @@ LensView make_lens_view(const LensLight& light, const std::vector<LensBand>& ban
   }
   nodes.push_back(node_at(light, light.settings.reference));
   FlowView flow(light.map, flow_picture(light), nodes, light.settings.samples);
-  std::vector<Span> few = joined(spans);
   return {light,
           bands,
           radiance,
           to_pixels(light.receiver),
           to_pixels(light.landings),
           std::move(spans),
-          std::move(few),
           std::move(nodes),
           std::move(flow)};
 }
 
-TileView view_tile(const LensView& view, int tile, int n, const std::vector<Span>& spans, TraceCounts& counts) {
+std::vector<Span> joined(const std::vector<Span>& spans, std::size_t count) {
+  std::vector<Span> result;
+  for (std::size_t i = 0; i < spans.size(); ++i) {
+    const bool is_new = result.empty() || result.size() * spans.size() <= i * count;
+    if (is_new || spans[i].from != result.back().to || spans[i].from == spans[i].to) {
+      result.push_back(spans[i]);
+    } else {
+      result.back().last = spans[i].last;
+      result.back().to = spans[i].to;
+    }
+  }
+  return result;
+}
+
+TileView view_tile(const LensView& view, int tile, int n, const std::vector<Span>& spans,
+                   const std::vector<char>& wanted, TraceCounts& counts) {
   TileView points(view.nodes.size());
   for (const Span& span : spans)
     for (const std::size_t node : {span.from, span.to})
-      if (points[node].empty()) view.flow.draw(tile, n, node, points[node]);
+      if (points[node].empty()) view.flow.draw(tile, n, node, wanted, points[node]);
   if (gathers(view.light)) trace_unknown(view, view.flow.pixels(tile), n, points, counts);
   return points;
 }

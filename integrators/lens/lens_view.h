@@ -26,7 +26,6 @@ struct LensView {
   Eigen::Affine2d starts;     ///< From coordinates to pixels, in the plane where the map's light starts in `gather`.
   Eigen::Affine2d landings;   ///< From coordinates to pixels, in the plane where it lands.
   std::vector<Span> spans;    ///< Each band.
-  std::vector<Span> few;      ///< Some bands together, for light that moves little from band to band.
   std::vector<double> nodes;  ///< Places among the map's nodes: the ends of bands, and as the last the reference.
   FlowView flow;
 };
@@ -34,12 +33,18 @@ struct LensView {
 /// `light`, `bands` and `radiance` must outlive the result.
 LensView make_lens_view(const LensLight& light, const std::vector<LensBand>& bands, const LensRadiance& radiance);
 
+/// About `count` spans, which together are all of `spans`. In a range spans end where others begin; other lights have
+/// nothing in common and stay apart.
+std::vector<Span> joined(const std::vector<Span>& spans, std::size_t count);
+
 /// What the samples of a tile see, by node and sample; empty for nodes that are not drawn.
 using TileView = std::vector<std::vector<FlowPoint>>;
 
 /// The nodes of `spans`, as the samples of a tile see them. In `gather`, light that the map does not know is traced.
-/// @param n  Samples of a pixel along x and along y.
-TileView view_tile(const LensView& view, int tile, int n, const std::vector<Span>& spans, TraceCounts& counts);
+/// @param n       Samples of a pixel along x and along y.
+/// @param wanted  By pixel of the tile: whether its samples are wanted. Empty: all are.
+TileView view_tile(const LensView& view, int tile, int n, const std::vector<Span>& spans,
+                   const std::vector<char>& wanted, TraceCounts& counts);
 
 /// Coordinates, in the image's plane, of what a point sees; its light landed.
 Eigen::Vector2d image_point(const LensView& view, const FlowPoint& point);

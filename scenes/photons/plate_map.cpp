@@ -61,7 +61,7 @@ Image plate_map(const FlowMap& map, const Scene& scene) {
                "magnification.minor", "magnification.angle", "folds", "length", "error"});
   tbb::parallel_for(0, view.tiles(), [&](int tile) {
     std::vector<FlowPoint> points;
-    view.draw(tile, 1, 0, points);
+    view.draw(tile, 1, 0, {}, points);
     const Eigen::AlignedBox2i box = view.pixels(tile);
     std::size_t i = 0;
     for (int y = box.min().y(); y <= box.max().y(); ++y)

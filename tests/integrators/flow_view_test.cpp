@@ -44,7 +44,7 @@ std::vector<FlowPoint> draw(const FlowMap& map, const FlowPicture& picture, int 
   const Vector2i size = n * picture.resolution;
   std::vector<FlowPoint> all(static_cast<std::size_t>(size.prod())), points;
   for (int tile = 0; tile < view.tiles(); ++tile) {
-    view.draw(tile, n, 0, points);
+    view.draw(tile, n, 0, {}, points);
     const Eigen::AlignedBox2i box = view.pixels(tile);
     const int columns = n * (box.sizes().x() + 1);
     for (int i = 0; i < static_cast<int>(points.size()); ++i)
