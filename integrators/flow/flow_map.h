@@ -125,6 +125,10 @@ inline bool jumps(const FlowTriangle& triangle, const Eigen::Vector2d& a, const 
 /// than a sixteenth of the tolerance is unlikely, the others are interpolated (cubic); where not, more nodes are
 /// traced, up to all. (At a caustic a small error of the landing is a great one of the colour.)
 ///
+/// If `geometry` has a body instead of a plate, the landings of light from the volume are the projections of
+/// the points of the body on `plate`. Light counts as landed only where nothing of the body is between its point and
+/// the plane, on the side of the plate's normal: other points have the same projection.
+///
 /// The result is the same for any number of threads. @throw std::invalid_argument if a setting is out of range or
 /// `geometry` has no plate; Cancelled.
 FlowMap trace_flow_map(const TensorField& field, const Geometry& geometry, const Plate& plate, const Beam& beam,

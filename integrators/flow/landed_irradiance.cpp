@@ -36,6 +36,7 @@ Beam beam_of(const TensorField& field, const Surfaces& surfaces, const Plate& pl
       beam.center += std::min(0.0, (point - beam.center).dot(direction) - 1e-3 * plate.size.norm()) * direction;
   };
   for (const TriangleMesh& mesh : surfaces.obstacles) start_before(mesh.vertices);
+  if (surfaces.body) start_before(surfaces.body->vertices);
   return beam;
 }
 
@@ -114,7 +115,7 @@ std::optional<LandedIrradiance> landed_irradiance(const TensorField& field, cons
                                                   const Progress& progress) {
   if (is_before(plate, field, light.direction)) return std::nullopt;
   Surfaces parts = surfaces;
-  parts.plate = plate;
+  if (!parts.body) parts.plate = plate;
   const Geometry geometry(std::move(parts));
   Eigen::AlignedBox2d box;
   for (int pass = 0; pass < light.passes; ++pass) {

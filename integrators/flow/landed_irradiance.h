@@ -1,6 +1,6 @@
 #pragma once
 /// @file integrators/flow/landed_irradiance.h
-/// The irradiance that a distant light's disk gives a flat surface through the field, band by band.
+/// The irradiance that a distant light's disk gives a surface through the field, band by band.
 
 #include <optional>
 #include <vector>
@@ -24,9 +24,10 @@ struct LandedIrradiance {
   Film irradiance;  ///< A plane for each band; 1 is the irradiance of the beam on a surface that faces it.
 };
 
-/// Traces the flow map of the light that enters the volume to the plane of `plate`. Surfaces of `surfaces` (bounds,
-/// cut, obstacles; its plate is ignored) stop light.
-/// @param plate       The whole surface.
+/// Traces the flow map of the light that enters the volume to the plane of `plate`, or to the body of `surfaces`.
+/// Surfaces of `surfaces` (bounds, cut, obstacles; its plate is ignored) stop light.
+/// @param plate       The whole surface; or a plane behind the whole body that faces the light, on which the body's
+///                    points are projected.
 /// @param resolution  Pixels along the longer side of the part of `plate` where light lands.
 /// @param rays        Positions from which light starts, at most, for each direction.
 /// @return nothing if no light lands, or if the light meets the plane before the volume. The same for any number of

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <limits>
 #include <numeric>
+#include <utility>
 
 #include "integrators/flow/ray_memory.h"
 
@@ -11,6 +12,7 @@ namespace tensorray {
 namespace {
 
 constexpr std::size_t range_nodes = 33, first_step = 8;  // 5 nodes come first.
+constexpr double off_surface = 1e-4;  // Distance, in sizes of a body, at which it is looked for about its own points.
 constexpr float gain_of_first =
     8;  // The error of the cubic through the first nodes, as a part of that of the parabola.
 constexpr float gain_of_halving = 8;  // Halving the distance of nodes: 16 for smooth landings; less, to be safe.
@@ -115,6 +117,13 @@ NodeTracer::NodeTracer(const TensorField& field, const Geometry& geometry, const
     memory_ = settings.memory;
     volume_.emplace(without_plate(geometry));
   }
+  if (geometry.surfaces().body) {
+    Surfaces alone;
+    alone.bounds = geometry.surfaces().bounds;
+    alone.body = geometry.surfaces().body;
+    off_body_ = off_surface * alone.body->bounds().diagonal().norm();
+    body_.emplace(std::move(alone));
+  }
   const std::size_t step = is_range_ ? first_step : 1;
   for (std::size_t node = 0; node < nodes(); node += step) check_nodes_.push_back(node);
 }
@@ -140,6 +149,14 @@ void NodeTracer::trace(const std::vector<Eigen::Vector3d>& origins, Eigen::Vecto
   }
 }
 
+/// Of light that lands on a body, that on its first layer counts as landed, if it comes from the volume.
+RayEnd NodeTracer::end_of(const RayBatch& rays, std::size_t ray, const Eigen::Vector3d& origin) const {
+  if (!body_ || rays.end[ray] != RayEnd::plate) return rays.end[ray];
+  if (!geometry_.crossing(Surface::bounds, true, origin, direction_, rays.length[ray])) return RayEnd::missed;
+  const Eigen::Vector3d back = plate_.normal();
+  return body_->absorber(rays.position[ray] + off_body_ * back, back) ? RayEnd::obstacle : RayEnd::plate;
+}
+
 void NodeTracer::trace_nodes(const std::vector<Eigen::Vector3d>& origins, const std::vector<std::size_t>& which,
                              std::size_t first, std::size_t step, Eigen::Vector2f* landings, RayEnd* ends,
                              float* lengths) {
@@ -155,7 +172,7 @@ void NodeTracer::trace_nodes(const std::vector<Eigen::Vector3d>& origins, const 
   for (std::size_t node = first; node < nodes(); node += step)
     for (const std::size_t i : which) {
       landings[i * nodes() + node] = plate_.to_pixel(batch.position[ray]).cast<float>();
-      ends[i * nodes() + node] = batch.end[ray];
+      ends[i * nodes() + node] = end_of(batch, ray, origins[i]);
       if (lengths) lengths[i * check_nodes_.size() + (node - first) / step] = static_cast<float>(batch.length[ray]);
       ++ray;
     }

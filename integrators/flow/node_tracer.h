@@ -40,6 +40,7 @@ class NodeTracer {
  private:
   void trace_nodes(const std::vector<Eigen::Vector3d>& origins, const std::vector<std::size_t>& which,
                    std::size_t first, std::size_t step, Eigen::Vector2f* landings, RayEnd* ends, float* lengths);
+  RayEnd end_of(const RayBatch& rays, std::size_t ray, const Eigen::Vector3d& origin) const;
 
   const TensorField& field_;
   const Geometry& geometry_;
@@ -48,6 +49,8 @@ class NodeTracer {
   const BendingSettings& bending_;
   std::shared_ptr<RayMemory> memory_;  // Null: rays are not remembered.
   std::optional<Geometry> volume_;     // With `memory_`: the geometry without its plate.
+  std::optional<Geometry> body_;       // The body alone, if it collects the light.
+  double off_body_ = 0;                // Distance from its surface at which it is looked for.
   double tolerance_;
   bool is_range_;
   std::vector<double> flexibilities_;  // One for each node.

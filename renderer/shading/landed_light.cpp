@@ -4,6 +4,12 @@
 
 namespace tensorray {
 
+bool is_lit(const LandedLight& light, const Eigen::Vector3d& point, const Eigen::Vector3d& ray) {
+  if (!light.body) return (light.plate.normal().dot(ray) < 0) == (light.side > 0);
+  const double off = 1e-4 * light.body->bounds().diagonal().norm();
+  return !light.body->occluded(point + off * light.towards, light.towards);
+}
+
 void add_irradiance(const LandedLight& light, const Eigen::Vector3d& point, Eigen::ArrayXd& sum) {
   const Eigen::Vector2d at = light.plate.to_pixel(point) - Eigen::Vector2d(0.5, 0.5);
   const Eigen::Vector2i& size = light.plate.resolution;

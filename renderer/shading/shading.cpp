@@ -309,10 +309,10 @@ void RayShader::add_bent_light(const Vertex& vertex, const Vector3d& wi, const V
 
 void RayShader::add_landed_light(const Vertex& vertex, int depth) {
   for (const LandedLight& light : scene_.landed) {
-    if (light.surface != vertex.hit.surface) continue;
-    const bool from_above = light.plate.normal().dot(vertex.direction) < 0;
-    if (from_above != (light.side > 0)) continue;
-    evaluate(*vertex.material, reflectance_, vertex.frame.transpose() * light.towards, vertex.wo, contribution_);
+    if (light.surface != vertex.hit.surface || !is_lit(light, vertex.hit.position, vertex.direction)) continue;
+    const Vector3d wi = vertex.frame.transpose() * light.towards;
+    evaluate(*vertex.material, reflectance_, wi, vertex.wo, contribution_);
+    if (light.body) contribution_ *= std::abs(wi.z());
     weight_.setZero();
     add_irradiance(light, vertex.hit.position, weight_);
     contribution_ *= throughput_ * weight_;

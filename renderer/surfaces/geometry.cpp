@@ -13,7 +13,12 @@ namespace {
 
 constexpr double tolerance = 1e-6;  // Fraction of the volume's size; single precision resolves it, with some margin.
 
-TriangleMesh plate_mesh(const Plate& plate) { return {plate.corners(), {{0, 1, 2}, {0, 2, 3}}}; }
+/// What collects light; empty if nothing does.
+TriangleMesh receiver_mesh(const Surfaces& surfaces) {
+  if (surfaces.body) return *surfaces.body;
+  if (surfaces.plate) return {surfaces.plate->corners(), {{0, 1, 2}, {0, 2, 3}}};
+  return {};
+}
 
 struct Part {
   const TriangleMesh* mesh;  // In double precision; the scene has a copy in single precision.
@@ -44,7 +49,7 @@ struct Geometry::State {
   explicit State(Surfaces parts);
 
   Surfaces surfaces;
-  TriangleMesh plate;
+  TriangleMesh receiver;
   Eigen::AlignedBox3d volume;
   double size, margin;
   // The scenes' coordinates are relative to the volume, so that single precision resolves it well.
@@ -61,7 +66,7 @@ struct Geometry::State {
 
 Geometry::State::State(Surfaces parts)
     : surfaces(std::move(parts)),
-      plate(surfaces.plate ? plate_mesh(*surfaces.plate) : TriangleMesh()),
+      receiver(receiver_mesh(surfaces)),
       volume(surfaces.bounds.bounds()),
       size(volume.diagonal().norm()),
       margin(tolerance * size),
@@ -85,9 +90,9 @@ std::vector<Part> Geometry::State::cut_parts() const {
 
 std::vector<Part> Geometry::State::absorber_parts() const {
   std::vector<Part> parts;
-  if (surfaces.plate) {
-    require_within_reach(plate, "the receiver");
-    parts.push_back({&plate, Surface::plate});
+  if (!receiver.triangles.empty()) {
+    require_within_reach(receiver, "the receiver");
+    parts.push_back({&receiver, Surface::plate});
   }
   for (std::size_t i = 0; i < surfaces.obstacles.size(); ++i) {
     require_within_reach(surfaces.obstacles[i], "obstacle " + std::to_string(i));

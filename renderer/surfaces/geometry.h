@@ -18,7 +18,7 @@ namespace tensorray {
 enum class Surface : std::uint8_t {
   bounds,    ///< The box of the volume.
   cut,       ///< A closed mesh; the volume is inside it.
-  plate,     ///< Collects light (scene key: receiver).
+  plate,     ///< Collects light (scene key: receiver); or the body that does.
   obstacle,  ///< Absorbs light.
 };
 
@@ -33,7 +33,8 @@ struct Surfaces {
   TriangleMesh bounds;              ///< Closed, convex; normals point outwards.
   std::optional<TriangleMesh> cut;  ///< Closed; normals point outwards.
   std::optional<Plate> plate;
-  std::vector<TriangleMesh> obstacles;
+  std::vector<TriangleMesh> obstacles = {};
+  std::optional<TriangleMesh> body = std::nullopt;  ///< Collects light instead of the plate.
 };
 
 /// Immutable Embree scenes. Any number of threads may query them at once.

@@ -111,12 +111,18 @@ struct PlateDescription {
   Eigen::Vector2d size{1, 1};                        ///< Width and height; > 0.
 };
 
+/// Paths of light among the objects, as tubes. Seeds, style, radius and colours are those of `integrator`.
+struct PathsDescription {
+  std::optional<std::uint64_t> count;  ///< Approximate number of seeds; none: that of `integrator.seeds`.
+};
+
 enum class Pattern { none, checkerboard };
 
-/// An item of `objects`: a plate or a mesh.
+/// An item of `objects`: a plate, a mesh, or paths.
 struct ObjectDescription {
   std::optional<PlateDescription> plate;
-  std::filesystem::path file;                                            ///< A mesh, if there is no plate.
+  std::filesystem::path file;  ///< A mesh.
+  std::optional<PathsDescription> paths;
   std::variant<Pattern, std::filesystem::path> texture = Pattern::none;  ///< Of a plate; a pattern or a picture.
   int squares = 16;                                                      ///< checkerboard: along the shorter side.
   MaterialDescription material;

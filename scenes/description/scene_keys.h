@@ -146,10 +146,17 @@ void describe(PlateDescription& plate, Visitor& visit) {
 }
 
 template <class Visitor>
+void describe(PathsDescription& paths, Visitor& visit) {
+  visit("count", paths.count, "number of seeds; default: that of integrator.seeds", between(1, 1e6));
+}
+
+template <class Visitor>
 void describe(ObjectDescription& object, Visitor& visit) {
-  visit.exactly_one({"plate", "file"});
+  visit.exactly_one({"plate", "file", "paths"});
   visit.section("plate", object.plate, "a flat rectangle");
   visit("file", object.file, "a mesh");
+  visit.section("paths", object.paths,
+                "bent rays as tubes, with the seeds, style, radius and colours of `integrator` (path_tracing)");
   visit("texture", object.texture, "of a plate: a pattern, or a picture whose colours are its reflectance");
   visit("squares", object.squares, "checkerboard: squares along the shorter side", between(1, 4096));
   visit.section("material", object.material, "material; the brighter squares of a checkerboard have its colour");

@@ -119,6 +119,20 @@ EnvironmentLight load_environment(const LightSourceDescription& description, con
   return environment;
 }
 
+/// Counts paths by channel and end. Paths of a file may have a flexibility that no channel of the scene has: they count
+/// for the first channel.
+void count_ends(const Scene& scene, const std::vector<Path>& paths, Statistics& statistics) {
+  statistics.positions = paths.size();
+  statistics.ends.assign(scene.channels.size(), EndCounts{});
+  for (const Path& path : paths) {
+    const auto found = std::find_if(scene.channels.begin(), scene.channels.end(), [&](const LightChannel& channel) {
+      return channel.flexibility == path.flexibility;
+    });
+    const auto channel = found == scene.channels.end() ? 0 : found - scene.channels.begin();
+    ++statistics.ends[static_cast<std::size_t>(channel)][static_cast<std::size_t>(path.end)];
+  }
+}
+
 }  // namespace
 
 Image load_rec709(const std::filesystem::path& file, const ColorManagement& color, const Eigen::Matrix3d& to_rec709) {
@@ -167,6 +181,24 @@ PathScene load_paths(const Scene& scene, const PathTracingDescription& settings)
       throw SceneError(fmt::format("{}: `/integrator/seeds`: {}", description.path.string(), error.what()));
     }
   }
+  return paths;
+}
+
+std::vector<Path> follow_paths(const Scene& scene, const PathScene& path_scene, const Progress& progress,
+                               Statistics& statistics) {
+  const PathTracingDescription& description = path_scene.settings;
+  PathSettings settings;
+  settings.backwards = description.backwards;
+  settings.outside = description.outside;
+  std::vector<Path> paths = path_scene.seeds.empty() ? path_scene.paths
+                                                     : trace_paths(scene.field, scene.geometry, scene.bending,
+                                                                   path_scene.seeds, settings, progress);
+  count_ends(scene, paths, statistics);
+  paths.erase(std::remove_if(paths.begin(), paths.end(), [](const Path& path) { return path.points.size() < 2; }),
+              paths.end());
+  if (paths.empty())
+    throw std::runtime_error(scene.description.path.string() +
+                             ": no path meets the volume; look at `/integrator/seeds` and `/light/direction`");
   return paths;
 }
 

@@ -4,10 +4,12 @@
 
 #include <vector>
 
+#include "base/progress.h"
 #include "integrators/paths/paths.h"
 #include "renderer/color/reflectance.h"
 #include "renderer/lights/lights.h"
 #include "scenes/path_tracing/path_tracing_description.h"
+#include "scenes/scene/render.h"
 #include "scenes/scene/scene.h"
 
 namespace tensorray {
@@ -46,5 +48,10 @@ struct PathScene {
 /// @throw std::runtime_error naming the file that cannot be read; SceneError if a value of the scene does not fit the
 /// loaded data.
 PathScene load_paths(const Scene& scene, const PathTracingDescription& settings);
+
+/// Follows the rays, counts them by channel and end, and leaves out those that do not meet the volume.
+/// @throw std::runtime_error if no path is left; Cancelled.
+std::vector<Path> follow_paths(const Scene& scene, const PathScene& paths, const Progress& progress,
+                               Statistics& statistics);
 
 }  // namespace tensorray

@@ -25,38 +25,6 @@ constexpr double most_radii = 2e5;  // Rays start 5e-7 diagonals away from a sur
 constexpr double legend_width = 0.2;    // Part of the picture's width that a chosen camera leaves free.
 constexpr double tube_tolerance = 0.2;  // Pixels: greatest distance of a tube's triangles from its surface.
 
-/// Counts paths by channel and end. Paths of a file may have a flexibility that no channel of the scene has: they count
-/// for the first channel.
-void count_ends(const Scene& scene, const std::vector<Path>& paths, Statistics& statistics) {
-  statistics.positions = paths.size();
-  statistics.ends.assign(scene.channels.size(), EndCounts{});
-  for (const Path& path : paths) {
-    const auto found = std::find_if(scene.channels.begin(), scene.channels.end(), [&](const LightChannel& channel) {
-      return channel.flexibility == path.flexibility;
-    });
-    const auto channel = found == scene.channels.end() ? 0 : found - scene.channels.begin();
-    ++statistics.ends[static_cast<std::size_t>(channel)][static_cast<std::size_t>(path.end)];
-  }
-}
-
-std::vector<Path> trace_scene(const Scene& scene, const PathScene& path_scene, const Progress& progress,
-                              Statistics& statistics) {
-  const PathTracingDescription& description = path_scene.settings;
-  PathSettings settings;
-  settings.backwards = description.backwards;
-  settings.outside = description.outside;
-  std::vector<Path> paths = path_scene.seeds.empty() ? path_scene.paths
-                                                     : trace_paths(scene.field, scene.geometry, scene.bending,
-                                                                   path_scene.seeds, settings, progress);
-  count_ends(scene, paths, statistics);
-  paths.erase(std::remove_if(paths.begin(), paths.end(), [](const Path& path) { return path.points.size() < 2; }),
-              paths.end());
-  if (paths.empty())
-    throw std::runtime_error(scene.description.path.string() +
-                             ": no path meets the volume; look at `/integrator/seeds` and `/light/direction`");
-  return paths;
-}
-
 /// The points that a camera without a given position must show.
 std::vector<Eigen::Vector3d> points_of_interest(const Scene& scene, const ContextDescription& context,
                                                 const std::vector<Path>& paths) {
@@ -167,7 +135,7 @@ Render LoadedPaths::render(const Scene& scene, const Progress& progress) const {
   const ShownLight& light = paths_.lights.light;
   const auto start = Clock::now();
   Render result;
-  result.paths = trace_scene(scene, paths_, progress, result.statistics);
+  result.paths = follow_paths(scene, paths_, progress, result.statistics);
   result.statistics.seconds_tracing = seconds_since(start);
 
   const auto drawing = Clock::now();

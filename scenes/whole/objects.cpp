@@ -6,6 +6,8 @@
 #include "renderer/lights/lights.h"
 #include "renderer/surfaces/mesh.h"
 #include "scenes/path_tracing/context_surfaces.h"
+#include "scenes/path_tracing/path_colors.h"
+#include "scenes/path_tracing/path_surfaces.h"
 
 namespace tensorray {
 namespace {
@@ -66,46 +68,70 @@ Plate make_plate(const PlateDescription& description) {
   return plate;
 }
 
-SceneObject load_object(const ObjectDescription& description, const Scene& scene, const ShownLight& light) {
+/// Paths with all that `integrator` says of them, but for their number.
+PathScene load_path_object(const PathsDescription& description, const Scene& scene, PathTracingDescription tracing) {
+  if (description.count) tracing.seeds.count = *description.count;
+  return load_paths(scene, tracing);
+}
+
+SceneObject load_object(const ObjectDescription& description, const Scene& scene, const PathTracingDescription& tracing,
+                        const ShownLight& light) {
   SceneObject object;
   object.material = description.material;
+  if (description.paths) {
+    object.paths = load_path_object(*description.paths, scene, tracing);
+    return object;
+  }
   if (!description.plate) {
-    object.mesh = read_mesh(description.file);
+    object.surface.shape = read_mesh(description.file);
     return object;
   }
   const Plate plate = make_plate(*description.plate);
   object.plate = plate;
-  object.mesh = rectangle_mesh(plate.center, plate.right, plate.up, plate.size);
+  object.surface.shape = rectangle_mesh(plate.center, plate.right, plate.up, plate.size);
   const Eigen::Vector3f bright =
       (light.rec709_to_working * description.material.color).cwiseMax(0).cwiseMin(1).cast<float>();
   if (const auto* file = std::get_if<std::filesystem::path>(&description.texture))
-    object.texture = std::make_shared<SurfaceTexture>(picture(plate, *file, scene.color, light.rec709_to_working));
+    object.surface.texture =
+        std::make_shared<SurfaceTexture>(picture(plate, *file, scene.color, light.rec709_to_working));
   else if (std::get<Pattern>(description.texture) == Pattern::checkerboard)
-    object.texture = std::make_shared<SurfaceTexture>(checkerboard(plate, description.squares, bright));
+    object.surface.texture = std::make_shared<SurfaceTexture>(checkerboard(plate, description.squares, bright));
   return object;
 }
 
 }  // namespace
 
-std::vector<SceneObject> load_objects(const Scene& scene, const ShownLight& light) {
+std::vector<SceneObject> load_objects(const Scene& scene, const PathTracingDescription& tracing,
+                                      const ShownLights& lights) {
   std::vector<ObjectDescription> descriptions = scene.description.objects;
   if (descriptions.empty()) descriptions.push_back(default_floor(scene.field));
   std::vector<SceneObject> objects;
-  for (const ObjectDescription& each : descriptions) objects.push_back(load_object(each, scene, light));
+  for (const ObjectDescription& each : descriptions) objects.push_back(load_object(each, scene, tracing, lights.light));
   for (const TriangleMesh& mesh : scene.geometry.surfaces().obstacles) {
     SceneObject obstacle;
-    obstacle.mesh = mesh;
+    obstacle.surface.shape = mesh;
     objects.push_back(std::move(obstacle));
   }
   return objects;
 }
 
+void make_tubes(const Scene& scene, double tolerance, const Progress& progress, std::vector<SceneObject>& objects) {
+  for (SceneObject& object : objects) {
+    if (!object.paths) continue;
+    Statistics ends;
+    const PathTracingDescription& tracing = object.paths->settings;
+    const std::vector<Path> paths = follow_paths(scene, *object.paths, progress, ends);
+    const PathColors colors = path_colors(tracing.color, paths);
+    const double radius = typical_radius(tracing.radius, paths.size(), world_box(scene.field));
+    object.surface = path_surface(path_mesh(paths, tracing, colors, radius, tolerance), paths, colors,
+                                  object.paths->lights.light.rec709_to_working);
+  }
+}
+
 void add_objects(const std::vector<SceneObject>& objects, const ShownLight& light, std::vector<ShadedSurface>& surfaces,
                  std::vector<Material>& materials) {
   for (const SceneObject& object : objects) {
-    ShadedSurface surface;
-    surface.shape = object.mesh;
-    surface.texture = object.texture;
+    ShadedSurface surface = object.surface;
     surface.material = static_cast<int>(materials.size());
     materials.push_back(load_material(object.material, light));
     surfaces.push_back(std::move(surface));

@@ -6,6 +6,7 @@
 #include <optional>
 #include <vector>
 
+#include "base/progress.h"
 #include "renderer/materials/material.h"
 #include "renderer/surfaces/surface.h"
 #include "scenes/path_tracing/load_paths.h"
@@ -13,17 +14,25 @@
 
 namespace tensorray {
 
-/// A plate or a mesh.
+/// A plate, a mesh, or paths of light.
 struct SceneObject {
   std::optional<Plate> plate;  ///< If it is flat.
-  TriangleMesh mesh;
-  std::shared_ptr<const SurfaceTexture> texture;
+  ShadedSurface surface;       ///< A mesh.
   MaterialDescription material;
+  std::optional<PathScene> paths;  ///< If its mesh are tubes about paths: `surface` is empty until these are followed.
+
+  const TriangleMesh& mesh() const { return std::get<TriangleMesh>(surface.shape); }
 };
 
 /// The objects of the scene (without any, a checkerboard as floor below the volume), then its obstacles.
-/// @throw std::runtime_error naming the file that cannot be read.
-std::vector<SceneObject> load_objects(const Scene& scene, const ShownLight& light);
+/// @throw std::runtime_error naming the file that cannot be read; SceneError if seeds of paths are wrong.
+std::vector<SceneObject> load_objects(const Scene& scene, const PathTracingDescription& tracing,
+                                      const ShownLights& lights);
+
+/// Follows the paths of objects that consist of paths, and makes their tubes.
+/// @param tolerance  Greatest distance of triangles from the tubes, world units.
+/// @throw SceneError if no path meets the volume; Cancelled.
+void make_tubes(const Scene& scene, double tolerance, const Progress& progress, std::vector<SceneObject>& objects);
 
 /// Adds their surfaces and materials.
 void add_objects(const std::vector<SceneObject>& objects, const ShownLight& light, std::vector<ShadedSurface>& surfaces,

@@ -27,13 +27,15 @@ std::vector<Light> default_lights(const Scene& scene, const ShownLight& shown) {
   return {ConstantLight{shown.radiance(sky_color, sky_strength)}, sun};
 }
 
-/// All surfaces that stop light on its way to the plate of object `receiver`.
+/// All surfaces that stop light on its way to object `receiver`, and the object itself, if it is no plate. Paths show
+/// light, and do not stop it.
 Surfaces surfaces_before(const Scene& scene, const std::vector<SceneObject>& objects, std::size_t receiver) {
   Surfaces surfaces;
   surfaces.bounds = scene.geometry.surfaces().bounds;
   surfaces.cut = scene.geometry.surfaces().cut;
   for (std::size_t i = 0; i < objects.size(); ++i)
-    if (i != receiver) surfaces.obstacles.push_back(objects[i].mesh);
+    if (i != receiver && !objects[i].paths) surfaces.obstacles.push_back(objects[i].mesh());
+  if (!objects[receiver].plate) surfaces.body = objects[receiver].mesh();
   return surfaces;
 }
 
@@ -56,14 +58,23 @@ double lit_side(const Plate& plate, const TensorField& field, const Vector3d& di
   return (is_middle ? -plate.normal().dot(direction) : height) < 0 ? -1 : 1;
 }
 
-LandedLight landed_light(const LandedIrradiance& landed, const DirectionalLight& light, std::size_t surface,
-                         double side) {
+/// A plane behind a body that faces the light; each point of the body has its place on it.
+Plate plane_behind(const TriangleMesh& body, const Vector3d& direction) {
+  Plate plate;
+  plate.up = upright(direction, Vector3d::UnitZ());
+  plate.right = plate.up.cross(-direction);
+  Eigen::AlignedBox3d box;  // Along right, up, and the light.
+  for (const Vector3d& vertex : body.vertices)
+    box.extend(Vector3d(plate.right.dot(vertex), plate.up.dot(vertex), direction.dot(vertex)));
+  plate.center = box.center().x() * plate.right + box.center().y() * plate.up + box.max().z() * direction;
+  plate.size = box.sizes().head<2>();
+  return plate;
+}
+
+LandedLight landed_light(const LandedIrradiance& landed, const DirectionalLight& light) {
   LandedLight result;
-  result.surface = static_cast<std::uint32_t>(surface);
   result.plate = landed.plate;
-  result.side = side;
-  const Vector3d normal = side * landed.plate.normal(), towards = -light.direction.normalized();
-  result.towards = towards.dot(normal) > 0.05 ? towards : normal;
+  result.towards = -light.direction.normalized();
   result.bands = landed.irradiance.channels;
   const std::size_t pixels = landed.irradiance.plane_size(), bands = light.irradiance.size();
   result.irradiance.resize(pixels * bands);
@@ -73,6 +84,13 @@ LandedLight landed_light(const LandedIrradiance& landed, const DirectionalLight&
       result.irradiance[i * bands + band] = static_cast<float>(plane[i] * light.irradiance[band]);
   }
   return result;
+}
+
+/// Gives light to one side of a plate. Light that grazes it straight may come from above it when it is bent.
+void face(double side, LandedLight& light) {
+  light.side = side;
+  const Vector3d normal = side * light.plate.normal();
+  if (!(light.towards.dot(normal) > 0.05)) light.towards = normal;
 }
 
 }  // namespace
@@ -101,12 +119,18 @@ std::vector<LandedLight> land_light(const Scene& scene, const std::vector<Light>
     if (!light) continue;
     const DistantLight distant = distant_light(*light, shown, scene.description.bending, caustic.passes);
     for (std::size_t i = 0; i < objects.size(); ++i) {
-      if (!objects[i].plate) continue;
-      Plate plate = *objects[i].plate;
+      if (objects[i].mesh().triangles.empty()) continue;
+      Plate plate = objects[i].plate ? *objects[i].plate : plane_behind(objects[i].mesh(), distant.direction);
       plate.resolution.setConstant(caustic.resolution);
       const auto landed = landed_irradiance(scene.field, surfaces_before(scene, objects, i), plate, distant,
                                             scene.bending, caustic.resolution, caustic.rays, progress);
-      if (landed) result.push_back(landed_light(*landed, *light, i, lit_side(plate, scene.field, distant.direction)));
+      if (!landed) continue;
+      result.push_back(landed_light(*landed, *light));
+      result.back().surface = static_cast<std::uint32_t>(i);
+      if (objects[i].plate)
+        face(lit_side(plate, scene.field, distant.direction), result.back());
+      else
+        result.back().body = std::make_shared<SurfaceScene>(std::vector{objects[i].surface});
     }
   }
   return result;

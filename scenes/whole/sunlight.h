@@ -20,7 +20,7 @@ std::vector<Light> whole_lights(const Scene& scene, const ShownLights& shown, co
 /// 550 and 450 nm, to which the paper gives its three flexibilities.
 std::function<double(double)> flexibility_of(const BendingDescription& bending);
 
-/// The light of all directional lights that lands on the plates among `objects`. The surface of object i must have the
+/// The light of all directional lights that lands on `objects` through the field. The surface of object i must have the
 /// index i. @throw Cancelled.
 std::vector<LandedLight> land_light(const Scene& scene, const std::vector<Light>& lights, const ShownLight& shown,
                                     const std::vector<SceneObject>& objects, const CausticDescription& caustic,

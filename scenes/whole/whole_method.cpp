@@ -22,6 +22,8 @@ namespace {
 
 using Eigen::Vector3d;
 
+constexpr double tube_tolerance = 0.2;  // Pixels: greatest distance of a tube's triangles from its surface.
+
 /// What the method has loaded.
 struct WholeScene {
   WholeDescription settings;
@@ -45,7 +47,7 @@ std::vector<Vector3d> points_of_interest(const Scene& scene, const std::vector<S
                                          const std::vector<Light>& lights) {
   std::vector<Vector3d> points = scene.field.corners();
   for (const SceneObject& object : objects) {
-    if (!object.plate) points.insert(points.end(), object.mesh.vertices.begin(), object.mesh.vertices.end());
+    if (!object.plate) points.insert(points.end(), object.mesh().vertices.begin(), object.mesh().vertices.end());
     for (const Light& each : lights) {
       const auto* light = std::get_if<DirectionalLight>(&each);
       if (!light || !object.plate) continue;
@@ -78,11 +80,11 @@ Geometry seen_geometry(const Scene& scene, const std::vector<SceneObject>& objec
   const Eigen::AlignedBox3d volume = scene.field.world_box();
   const bool reach_in = std::any_of(objects.begin(), objects.end(), [&](const SceneObject& object) {
     Eigen::AlignedBox3d box;
-    for (const Vector3d& vertex : object.mesh.vertices) box.extend(vertex);
+    for (const Vector3d& vertex : object.mesh().vertices) box.extend(vertex);
     return box.intersects(volume);
   });
   if (reach_in)
-    for (const SceneObject& object : objects) surfaces.obstacles.push_back(object.mesh);
+    for (const SceneObject& object : objects) surfaces.obstacles.push_back(object.mesh());
   return Geometry(std::move(surfaces));
 }
 
@@ -145,23 +147,25 @@ Render LoadedWhole::render(const Scene& scene, const Progress& progress) const {
   Render result;
   const std::vector<Light> lights = whole_lights(scene, whole_.lights, {});
   const Camera camera = whole_camera(scene, points_of_interest(scene, whole_.objects, lights));
+  std::vector<SceneObject> objects = whole_.objects;
+  make_tubes(scene, tube_tolerance * pixel_size(camera, scene.field.world_box().center()), progress, objects);
   std::vector<ShadedSurface> surfaces;
   std::vector<Material> materials;
-  add_objects(whole_.objects, light, surfaces, materials);
+  add_objects(objects, light, surfaces, materials);
   add_lamps(lights, light, surfaces, materials);
   const SurfaceScene stage(std::move(surfaces));
   std::vector<float> luminance;
   for (const Band& band : light.bands) luminance.push_back(static_cast<float>(band.xyz.y()));
   const LightSampler sampler(lights, luminance, stage.bounds());
   const ReflectanceTable table(light.model, light.bands, light.xyz_to_working);
-  const Geometry geometry = seen_geometry(scene, whole_.objects);
+  const Geometry geometry = seen_geometry(scene, objects);
   const FieldRegion region(scene.field, geometry, view_settings(scene, whole_));
   const bool bends = bends_light(scene, light.bands);
   ShadedScene shaded{stage, materials, sampler, table};
   if (bends) shaded.region = &region;
   shaded.bands_per_view = whole_.settings.bands_per_sample;
   shaded.bands_per_bounce = bands_per_bounce(whole_.settings);
-  if (bends) shaded.landed = land_light(scene, lights, light, whole_.objects, whole_.settings.caustic, progress);
+  if (bends) shaded.landed = land_light(scene, lights, light, objects, whole_.settings.caustic, progress);
   result.statistics.seconds_tracing = seconds_since(start);
 
   start = Clock::now();
@@ -193,7 +197,7 @@ class WholeMethod : public MethodWith<WholeDescription> {
   std::unique_ptr<const LoadedMethod> load(const Scene& scene, std::vector<std::string>&) const override {
     const auto& tracing = scene.description.integrator.settings<PathTracingDescription>();
     WholeScene whole{settings(), tracing, load_lights(scene, tracing.bands), {}};
-    whole.objects = load_objects(scene, whole.lights.light);
+    whole.objects = load_objects(scene, tracing, whole.lights);
     return std::make_unique<LoadedWhole>(std::move(whole));
   }
 };
@@ -201,6 +205,12 @@ class WholeMethod : public MethodWith<WholeDescription> {
 void WholeMethod::check(SceneDescription& scene, const Json& json, const SceneSource& source, bool chosen) const {
   if (!chosen) return;
   const auto& tracing = scene.integrator.settings<PathTracingDescription>();
+  for (std::size_t i = 0; i < scene.objects.size(); ++i)
+    if (scene.objects[i].paths && tracing.style == PathStyle::lines)
+      source.fail(
+          fmt::format("`/objects/{}/paths` cannot have the `/integrator/style` \"lines\"; use \"tube\", "
+                      "\"wire\" or \"ellipses\"",
+                      i));
   if (tracing.bands % settings().bands_per_sample != 0)
     source.fail(fmt::format("`/integrator/bands_per_sample` must divide `/integrator/bands` ({}), but is {}",
                             tracing.bands, settings().bands_per_sample));

@@ -88,6 +88,92 @@ TEST(LandedIrradianceTest, IsTheSameOnAnyNumberOfThreads) {
   }
 }
 
+/// A plane across the light, behind all of a body within 3 units of (0, 0, −2).
+Plate plane_behind(const Vector3d& direction) {
+  Plate plate;
+  plate.up = upright(direction, Vector3d::UnitY());
+  plate.right = plate.up.cross(-direction);
+  plate.center = Vector3d(0, 0, -2) + 4 * direction;
+  plate.size = {6, 6};
+  plate.resolution = {64, 64};
+  return plate;
+}
+
+std::optional<LandedIrradiance> land_on(const TriangleMesh& body, const TensorField& field, const DistantLight& light) {
+  Surfaces surfaces = surfaces_of(field);
+  surfaces.body = body;
+  return landed_irradiance(field, surfaces, plane_behind(light.direction), light, {}, 192, 40000, {});
+}
+
+/// The irradiance, on a surface that faces the light, of a point.
+double irradiance_at(const LandedIrradiance& landed, int band, const Vector3d& point) {
+  const Eigen::Vector2i at = landed.plate.to_pixel(point).array().floor().cast<int>();
+  if (at.minCoeff() < 0 || (at.array() >= landed.plate.resolution.array()).any()) return 0;
+  return landed.irradiance.plane(band)[at.y() * landed.irradiance.width + at.x()];
+}
+
+TEST(LandedIrradianceTest, ABodyHasTheLightOfAPlateInItsPlace) {
+  const TensorField field = cube_field(17, [](const Vector3d& p) {
+    Matrix3d T = Matrix3d::Zero();
+    T(0, 0) = p.x();
+    T(1, 0) = 0.5;
+    return T;
+  });
+  const DistantLight light = sun({0.2, 0.1, -1});
+  Plate plate = floor_plate(8);
+  const Vector3d normal = Vector3d(0.3, -0.2, 1).normalized();
+  plate.center = {0, 0, -2};
+  plate.up = upright(normal, Vector3d::UnitY());
+  plate.right = plate.up.cross(normal);
+  const LandedIrradiance flat = land(field, light, plate);
+  const auto body = land_on({plate.corners(), {{0, 1, 2}, {0, 2, 3}}}, field, light);
+  ASSERT_TRUE(body);
+  const double cosine = -normal.dot(light.direction);
+  for (const double x : {-0.5, 0.0, 0.4}) {  // Means over squares; within a triangle of the map light is even.
+    double with_body = 0, with_plate = 0;
+    for (int i = 0; i < 400; ++i) {
+      const Vector3d point = plate.center + (x + (i % 20 - 9.5) / 50) * plate.right + ((i / 20 - 9.5) / 50) * plate.up;
+      with_body += irradiance_at(*body, 0, point) * cosine / 400;
+      with_plate += irradiance_at(flat, 0, point) / 400;
+    }
+    EXPECT_NEAR(with_body, with_plate, 0.02) << x;
+  }
+  EXPECT_NEAR(power(*body, 0), power(flat, 0), 0.01 * power(flat, 0));
+}
+
+TEST(LandedIrradianceTest, OnlyTheFirstLayerOfABodyHasLight) {
+  const TensorField field = constant_field(Matrix3d::Zero());
+  const auto square = [](double x, double z, std::uint32_t first, TriangleMesh& mesh) {
+    for (const auto& [a, b] : {std::pair{-0.25, -0.25}, {0.25, -0.25}, {0.25, 0.25}, {-0.25, 0.25}})
+      mesh.vertices.emplace_back(x + a, b, z);
+    mesh.triangles.push_back({first, first + 1, first + 2});
+    mesh.triangles.push_back({first, first + 2, first + 3});
+  };
+  TriangleMesh body;  // The second square is below the first, half of the third is.
+  square(0, -2, 0, body);
+  square(0, -2.5, 4, body);
+  square(0.25, -2.25, 8, body);
+  const auto landed = land_on(body, field, sun({0, 0, -1}));
+  ASSERT_TRUE(landed);
+  EXPECT_NEAR(irradiance_at(*landed, 0, {0, 0, 0}), 1, 2e-3);
+  EXPECT_NEAR(irradiance_at(*landed, 0, {0.35, 0, 0}), 1, 2e-3);
+  EXPECT_NEAR(power(*landed, 0), 0.75 * 0.5, 0.005);
+}
+
+TEST(LandedIrradianceTest, LightThatMeetsABodyBeforeTheVolumeIsNotCounted) {
+  const TensorField field = constant_field(Matrix3d::Zero());
+  TriangleMesh body;  // Above the left half of the volume, and below its right half.
+  for (const double x : {-1.0, 0.0})
+    for (const auto& [a, b] : {std::pair{0.0, -1.0}, {1.0, -1.0}, {1.0, 1.0}, {0.0, 1.0}})
+      body.vertices.emplace_back(x + a, b, x < 0 ? 1.5 : -1.5);
+  body.triangles = {{0, 1, 2}, {0, 2, 3}, {4, 5, 6}, {4, 6, 7}};
+  const auto landed = land_on(body, field, sun({0, 0, -1}));
+  ASSERT_TRUE(landed);
+  EXPECT_EQ(irradiance_at(*landed, 0, {-0.5, 0, 0}), 0);
+  EXPECT_NEAR(irradiance_at(*landed, 0, {0.5, 0, 0}), 1, 2e-3);
+  EXPECT_NEAR(power(*landed, 0), 2, 0.02);
+}
+
 TEST(LandedIrradianceTest, LightThatGoesAwayFromAPlateDoesNotLand) {
   const TensorField field = constant_field(Matrix3d::Zero());
   EXPECT_FALSE(landed_irradiance(field, surfaces_of(field), floor_plate(12), sun({0, 0, 1}), {}, 64, 20000, {}));

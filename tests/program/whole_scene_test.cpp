@@ -40,6 +40,18 @@ class WholeScene : public Program {
     return sum / image.width / image.height;
   }
 
+  /// A wedge with a roof's slopes, whose ridge is at (x, y, z).
+  void write_roof(const std::string& name, double x, double y, double z) {
+    std::string text =
+        "ply\nformat ascii 1.0\nelement vertex 6\nproperty float x\nproperty float y\nproperty float z\n"
+        "element face 8\nproperty list uchar int vertex_indices\nend_header\n";
+    for (const double side : {-1.0, 1.0}) {
+      text += fmt::format("{} {} {}\n{} {} {}\n", x - 0.5, y + 0.5 * side, z - 0.4, x + 0.5, y + 0.5 * side, z - 0.4);
+      text += fmt::format("{} {} {}\n", x, y + 0.5 * side, z);
+    }
+    write(name, text + "3 0 1 2\n3 3 5 4\n3 0 2 3\n3 2 5 3\n3 1 4 2\n3 2 4 5\n3 0 3 1\n3 1 3 4\n");
+  }
+
   void expect_error(const std::string& set, const std::string& part) {
     const Outcome outcome = run({"render", "scene.json", "-q", "--set", set});
     EXPECT_NE(outcome.status, 0) << set;
@@ -85,6 +97,43 @@ TEST_F(WholeScene, AWeakFieldGivesThePictureWithoutIt) {
   const Image with = picture(weak), without = picture(none);
   for (const char* channel : {"R", "G", "B"})
     EXPECT_NEAR(mean(with, channel) / mean(without, channel), 1, 0.01) << channel;
+}
+
+/// Bodies below the volume, within it, and through its side, in light that goes through the volume and past it.
+TEST_F(WholeScene, AWeakFieldLightsBodiesAsIfItWereNotThere) {
+  write_roof("below.ply", 0.5, 0, -2.5);
+  write_roof("within.ply", -0.4, 0.3, -1);
+  write_roof("through.ply", 0, -1, -1.4);
+  const std::vector<std::string> sets{
+      "objects=[{\"file\":\"below.ply\"},{\"file\":\"within.ply\"},{\"file\":\"through.ply\"}]",
+      "lights=[{\"kind\":\"directional\",\"direction\":[0.3,0.2,-1]}]",
+      "integrator.max_samples=64",
+      "integrator.min_samples=64",
+      "integrator.max_depth=1",
+      "camera.position=[3,-6,3]",
+      "camera.target=[0,0,-1.5]",
+      "integrator.caustic={\"resolution\":256,\"rays\":20000,\"passes\":1}"};
+  std::vector<std::string> weak = sets, none = sets;
+  weak.push_back("field.scale=1e-7");
+  none.insert(none.end(), {"bending.a=0", "bending.b=0"});
+  const Image with = picture(weak), without = picture(none);
+  EXPECT_GT(mean(with, "caustic.G"), 0.3 * mean(with, "G"));
+  for (const char* channel : {"R", "G", "B"})
+    EXPECT_NEAR(mean(with, channel) / mean(without, channel), 1, 0.02) << channel;
+}
+
+TEST_F(WholeScene, PathsAreObjects) {
+  const std::string floor = "{\"plate\":{\"center\":[0,0,-2.6],\"size\":[8,8]}}";
+  const Image with = picture({"objects=[" + floor + ",{\"paths\":{\"count\":9}}]"});
+  const Image without = picture({"objects=[" + floor + "]"});
+  EXPECT_GT(mean(with, "force"), 0);
+  EXPECT_EQ(mean(without, "force"), 0);
+  EXPECT_NE(with.pixels, without.pixels);
+  expect_error("objects=[{\"paths\":{\"count\":0}}]", "/objects/0/paths/count");
+  expect_error("objects=[{\"paths\":{},\"file\":\"a.ply\"}]", "/objects/0");
+  const Outcome lines =
+      run({"render", "scene.json", "-q", "--set", "objects=[{\"paths\":{}}]", "--set", "integrator.style=lines"});
+  EXPECT_NE(lines.error.find("`/integrator/style`"), std::string::npos) << lines.error;
 }
 
 /// In an even sky, conserved radiance makes the volume invisible; conserved power does not.
