@@ -82,7 +82,9 @@ void add_merge_command(CLI::App& program, Progress& progress) {
   const auto options = std::make_shared<MergeOptions>();
   CLI::App* command = program.add_subcommand("merge", "Make the pictures of shards that `render --shard` wrote");
   command->add_option("SHARD", options->shards, "All shards of a render, in any order")->required();
-  command->add_option("-o,--output", options->outputs, "Pictures, as for `tensorray render`")->required();
+  command->add_option("-o,--output", options->outputs, "Pictures, as for `tensorray render`")
+      ->required()
+      ->allow_extra_args(false);
   command->add_option("--threads", options->run.threads, "Number of threads (all)")->check(CLI::Range(1, 4096));
   command->add_option("--stats", options->run.statistics, "Write statistics of the merging to this JSON file");
   command->add_flag("-q,--quiet", options->run.quiet, "Print nothing but errors");

@@ -1,5 +1,6 @@
 #include "tools/commands/work_keeper.h"
 
+#include <algorithm>
 #include <chrono>
 #include <stdexcept>
 
@@ -13,7 +14,7 @@
 namespace tensorray {
 namespace {
 
-constexpr double tick = 0.2;  // Seconds after which a signal is noticed.
+constexpr double longest_tick = 0.2;  // Seconds after which a signal is noticed.
 
 }  // namespace
 
@@ -66,9 +67,11 @@ void WorkKeeper::begin() {
 }
 
 void WorkKeeper::run() {
+  const std::chrono::duration<double> tick(settings_.interval > 0 ? std::min(longest_tick, settings_.interval / 2)
+                                                                  : longest_tick);
   Clock::time_point written = Clock::now(), shown = written;
   std::unique_lock lock(waiting_);
-  while (!wake_.wait_for(lock, std::chrono::duration<double>(tick), [this] { return ends_; })) {
+  while (!wake_.wait_for(lock, tick, [this] { return ends_; })) {
     lock.unlock();
     begin();
     const bool is_asked = take_picture_request();
