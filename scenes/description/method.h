@@ -66,8 +66,8 @@ class Method {
   /// Whether its pictures have noise, which `integrator.max_samples` samples a pixel average.
   virtual bool is_sampled() const { return false; }
 
-  /// Whether its work has units, which can be kept and divided among machines (RenderJob).
-  virtual bool has_units() const { return false; }
+  /// Whether its work has units that can be divided among machines (RenderJob).
+  virtual bool is_divided() const { return false; }
 
   /// Whether the pixels of its pictures are those of the plate.
   virtual bool shows_plate() const { return false; }

@@ -196,7 +196,7 @@ class PathTracingMethod : public MethodWith<PathTracingDescription> {
  public:
   const char* name() const override { return "path_tracing"; }
   bool is_sampled() const override { return true; }
-  bool has_units() const override { return true; }
+  bool is_divided() const override { return true; }
 
   std::vector<Output> outputs() const override {
     std::vector<Output> outputs = picture_outputs();

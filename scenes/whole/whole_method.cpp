@@ -190,7 +190,7 @@ class WholeMethod : public MethodWith<WholeDescription> {
  public:
   const char* name() const override { return "scene"; }
   bool is_sampled() const override { return true; }
-  bool has_units() const override { return true; }
+  bool is_divided() const override { return true; }
 
   std::vector<Output> outputs() const override {
     std::vector<Output> outputs = picture_outputs();

@@ -141,7 +141,7 @@ KeepSettings keep_settings(const SceneDescription& description, const RenderRun&
   settings.watch = run.keeping.watch ? watch_interval : 0;
   settings.quiet = run.quiet;
   const Method& method = description.integrator.method();
-  if (run.keeping.shard && !method.has_units())
+  if (run.keeping.shard && !method.is_divided())
     throw SceneError(
         fmt::format("--shard: the work of {} is one piece; divide a sequence by --frames instead", method.name()));
   if (!run.keeping.resume && !settings.file.empty() && std::filesystem::exists(settings.file))
@@ -184,6 +184,17 @@ void write_so_far(Render render, const Scene& scene, const Work& work) {
   throw Interrupted(fmt::format("interrupted at {:.0f}%; {}", std::floor(100 * work.fraction), kept));
 }
 
+/// @throw Interrupted if the render is cancelled, but some of its work is kept.
+Render render_or_keep(const Scene& scene, const Progress& progress, RenderJob& job, WorkKeeper& keeper,
+                      const std::filesystem::path& checkpoint) {
+  try {
+    return render(scene, progress, &job);
+  } catch (const Cancelled&) {
+    if (!keeper.write()) throw;
+    throw Interrupted(fmt::format("interrupted; --resume continues from {}", checkpoint.string()));
+  }
+}
+
 /// Renders what is left of the work of `job`, and writes all files.
 void complete(const Scene& scene, RenderJob& job, OutputFiles files, const KeepSettings& keep, const RenderRun& run,
               Progress& progress) {
@@ -197,7 +208,7 @@ void complete(const Scene& scene, RenderJob& job, OutputFiles files, const KeepS
     }
   };
   WorkKeeper keeper(scene, job.work, keep);
-  Render result = render(scene, progress, &job);
+  Render result = render_or_keep(scene, progress, job, keeper, keep.file);
   bar.reset();  // Erase the bar before the notes are printed.
   if (job.work.stopping) end_early(std::move(result), scene, job.work, keeper, run, keep.file);
   for (const std::string& warning : result.warnings) tell({"warning: " + warning}, run.quiet);
