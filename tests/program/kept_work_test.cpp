@@ -48,15 +48,16 @@ class KeptWork : public Program {
     return stat(in_folder(file).c_str(), &status) == 0 ? status.st_ino : 0;
   }
 
+  static bool is_running(pid_t child) {
+    siginfo_t info{};
+    return waitid(P_PID, static_cast<id_t>(child), &info, WEXITED | WNOHANG | WNOWAIT) == 0 && info.si_pid == 0;
+  }
+
   /// Starts a render and waits until it has written a file, or has ended. @return the process.
   pid_t start_until(const std::string& file, const std::vector<std::string>& arguments) const {
     const ino_t before = number_of(file);
     const pid_t child = start(arguments);
-    const auto runs = [child] {
-      siginfo_t info{};
-      return waitid(P_PID, static_cast<id_t>(child), &info, WEXITED | WNOHANG | WNOWAIT) == 0 && info.si_pid == 0;
-    };
-    while (number_of(file) == before && runs()) std::this_thread::sleep_for(std::chrono::milliseconds(1));
+    while (number_of(file) == before && is_running(child)) std::this_thread::sleep_for(std::chrono::milliseconds(1));
     return child;
   }
 
@@ -152,15 +153,17 @@ TEST_F(KeptWork, AnInterruptedRenderWritesWhatItHas) {
 }
 
 TEST_F(KeptWork, ARequestWritesAPictureAndTheRenderGoesOn) {
-  std::vector<std::string> arguments = render("a", {"--checkpoint", "0.01"});
-  const pid_t child = start_until("a.png.checkpoint", arguments);
-  const ino_t before = number_of("a.exr");
-  kill(child, SIGUSR1);
-  while (number_of("a.exr") == before) std::this_thread::sleep_for(std::chrono::milliseconds(1));
-  EXPECT_TRUE(has("a.png") && has("a.exr"));
-  EXPECT_FALSE(is_equal("a.exr", "whole.exr"));
-  EXPECT_EQ(wait_for(child).status, 0);
-  expect_same("a");
+  bool is_seen = false;
+  for (int i = 0; i < 20 && !is_seen; ++i) {  // A render that was quicker is tried again.
+    std::filesystem::remove(in_folder("a.exr"));
+    const pid_t child = start_until("a.png.checkpoint", render("a", {"--checkpoint", "0.01"}));
+    kill(child, SIGUSR1);
+    while (!has("a.exr") && is_running(child)) std::this_thread::sleep_for(std::chrono::milliseconds(1));
+    is_seen = has("a.exr") && !is_equal("a.exr", "whole.exr");
+    EXPECT_EQ(wait_for(child).status, 0);
+    expect_same("a");
+  }
+  EXPECT_TRUE(is_seen);
 }
 
 TEST_F(KeptWork, ACheckpointOfAnotherRenderIsRefused) {
