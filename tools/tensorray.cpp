@@ -37,6 +37,7 @@ int main(int argc, char** argv) {
   app.set_version_flag("--version", "tensorray " TENSORRAY_VERSION);
   app.require_subcommand(1);
   tensorray::add_render_command(app, progress);
+  tensorray::add_merge_command(app, progress);
   tensorray::add_explore_command(app, progress);
   tensorray::add_view_command(app);
   tensorray::add_make_command(app, progress);

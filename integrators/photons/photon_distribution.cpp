@@ -14,6 +14,7 @@
 
 #include "base/seconds.h"
 #include "integrators/photons/fluence.h"
+#include "integrators/photons/photon_state.h"
 #include "renderer/film/footprint_deposit.h"
 
 namespace tensorray {
@@ -222,19 +223,46 @@ void trace_chunk(const PhotonJob& job, std::uint64_t first, std::uint64_t last, 
 }
 
 /// Adds the counts of all threads. They are integers, so that the order does not matter.
-void add_counts(const Workers& workers, int rays_per_position, PhotonDistribution& result) {
-  std::uint64_t rays = 0;
+void add_counts(const Workers& workers, PhotonState& counts) {
   for (const Worker& worker : workers) {
-    result.ray_steps += worker.ray_steps;
-    result.tensor_samples += worker.batch.tensor_samples;
+    counts.ray_steps += worker.ray_steps;
+    counts.tensor_samples += worker.batch.tensor_samples;
     for (std::size_t channel = 0; channel < worker.ends.size(); ++channel)
-      for (int end = 0; end < ray_end_count; ++end) {
-        result.ends[channel][end] += worker.ends[channel][end];
-        rays += worker.ends[channel][end];
-      }
+      for (int end = 0; end < ray_end_count; ++end) counts.ends[channel][end] += worker.ends[channel][end];
   }
-  result.positions = rays / rays_per_position;
 }
+
+void set_counts(const PhotonState& counts, int rays_per_position, PhotonDistribution& result) {
+  result.ray_steps = counts.ray_steps;
+  result.tensor_samples = counts.tensor_samples;
+  result.ends = counts.ends;
+  std::uint64_t rays = 0;
+  for (const EndCounts& ends : counts.ends)
+    for (const std::uint64_t count : ends) rays += count;
+  result.positions = rays / static_cast<std::uint64_t>(rays_per_position);
+}
+
+/// Keeps states of the photons in a Work, so that keeping takes a small part of the time.
+class PhotonKeeper {
+ public:
+  explicit PhotonKeeper(Work* work) : work_(work) {}
+
+  bool is_due() const { return work_ && seconds_since(kept_) > std::max(least_interval, 20 * seconds_); }
+
+  void keep(const PhotonState& state) {
+    const auto start = Clock::now();
+    work_->keep(0, bytes_of(state), false);
+    seconds_ = seconds_since(start);
+    kept_ = Clock::now();
+  }
+
+ private:
+  static constexpr double least_interval = 0.2;
+
+  Work* const work_;
+  Clock::time_point kept_ = Clock::now();
+  double seconds_ = 0;
+};
 
 /// Null if no fluence is wanted.
 std::unique_ptr<FluenceSums> make_fluence(const PhotonJob& job) {
@@ -258,7 +286,7 @@ int rays_per_position(const std::vector<LightChannel>& channels, const PhotonSet
 
 PhotonDistribution distribute_photons(const TensorField& field, const Geometry& geometry, const Beam& beam,
                                       const std::vector<LightChannel>& channels, const BendingSettings& bending,
-                                      const PhotonSettings& settings, const Progress& progress) {
+                                      const PhotonSettings& settings, const Progress& progress, Work* work) {
   if (!geometry.surfaces().plate) throw std::invalid_argument("photon distribution needs a receiver");
   const Plate& plate = *geometry.surfaces().plate;
   const int rays = rays_per_position(channels, settings);
@@ -273,7 +301,6 @@ PhotonDistribution distribute_photons(const TensorField& field, const Geometry& 
   job.fluence = fluence.get();
 
   PhotonDistribution result;
-  result.ends.assign(channels.size(), EndCounts{});
   result.ray_area = job.ray_area;
   std::optional<DensityEstimator> points;
   std::optional<FootprintDeposit> footprints;
@@ -285,7 +312,16 @@ PhotonDistribution distribute_photons(const TensorField& field, const Geometry& 
   Workers workers;
   Chunk chunk;
   const std::uint64_t candidates = job.positions.candidates();
-  for (std::uint64_t first = 0; first < candidates; first += job.chunk_size()) {
+  PhotonState before;
+  before.ends.assign(channels.size(), EndCounts{});
+  if (fluence || settings.keep_photons) work = nullptr;  // They are not kept.
+  if (work) work->begin(1);
+  if (const auto state = work ? work->state(0) : nullptr) {
+    before = photon_state(*state, channels.size());
+    points ? points->set_sums(before.sums) : footprints->set_sums(before.sums);
+  }
+  PhotonKeeper keeper(work);
+  for (std::uint64_t first = before.next; first < candidates; first += job.chunk_size()) {
     const std::uint64_t last = std::min(first + job.chunk_size(), candidates);
     progress.update("tracing photons", first, candidates);
     auto start = Clock::now();
@@ -296,9 +332,17 @@ PhotonDistribution distribute_photons(const TensorField& field, const Geometry& 
     for (const std::vector<Photon>& photons : chunk.photons)
       result.photons.insert(result.photons.end(), photons.begin(), photons.end());
     result.seconds_density += seconds_since(start);
+    if (!keeper.is_due()) continue;
+    PhotonState state = before;
+    add_counts(workers, state);
+    state.next = last;
+    state.sums = points ? points->sums() : footprints->sums();
+    keeper.keep(state);
+    work->fraction = static_cast<double>(last) / static_cast<double>(candidates);
   }
   progress.update("tracing photons", candidates, candidates);
-  add_counts(workers, rays, result);
+  add_counts(workers, before);
+  set_counts(before, rays, result);
   if (fluence) result.fluence = fluence->grids(job.ray_area);
 
   const auto start = Clock::now();

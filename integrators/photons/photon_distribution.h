@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "base/progress.h"
+#include "base/work.h"
 #include "integrators/bending/bending.h"
 #include "integrators/bending/light_channel.h"
 #include "renderer/film/density.h"
@@ -52,9 +53,11 @@ struct PhotonDistribution {
 
 /// Emits parallel light, bends it through the field and estimates its density on the plate of `geometry`.
 /// The result is the same for any number of threads.
+/// @param work  Keeps the work so far, every now and then, as its only unit, if neither photons nor fluence are wanted;
+///              null: nothing is kept.
 /// @throw std::invalid_argument if a setting is out of range or `geometry` has no plate; Cancelled.
 PhotonDistribution distribute_photons(const TensorField& field, const Geometry& geometry, const Beam& beam,
                                       const std::vector<LightChannel>& channels, const BendingSettings& bending,
-                                      const PhotonSettings& settings, const Progress& progress);
+                                      const PhotonSettings& settings, const Progress& progress, Work* work = nullptr);
 
 }  // namespace tensorray

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstring>
 #include <stdexcept>
 
 #include <tbb/parallel_for.h>
@@ -202,6 +203,18 @@ void DensityEstimator::fold_rows(int plane) {
     double* const to = sums + (mirror(y, height_) + margin_) * values;
     for (std::size_t i = 0; i < values; ++i) to[i] += from[i];
   }
+}
+
+std::string DensityEstimator::sums() const {
+  std::string bytes(sums_.size() * sizeof(PixelColor), 0);
+  std::memcpy(bytes.data(), sums_.data(), bytes.size());
+  return bytes;
+}
+
+void DensityEstimator::set_sums(const std::string& bytes) {
+  if (bytes.size() != sums_.size() * sizeof(PixelColor))
+    throw std::runtime_error("sums that were kept have another size");
+  std::memcpy(sums_.data(), bytes.data(), bytes.size());
 }
 
 Film DensityEstimator::finish(double weight) && {

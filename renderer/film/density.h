@@ -3,6 +3,7 @@
 /// Density estimation: computes power per pixel from points on a plate.
 
 #include <optional>
+#include <string>
 #include <vector>
 
 #include <Eigen/Core>
@@ -51,6 +52,10 @@ class DensityEstimator {
   /// Adds points. Points whose channel is DensityPoint::nowhere are ignored. Runs on all threads. Sums are made in the
   /// order of the points, so that the result does not depend on the number of threads.
   void add(const std::vector<DensityPoint>& points);
+
+  /// The sums so far as bytes, and back. @throw std::runtime_error if they are those of another estimator.
+  std::string sums() const;
+  void set_sums(const std::string& bytes);
 
   /// Returns weight per pixel. @param weight  The weight of one point. The estimator cannot be used afterwards. Runs on
   /// all threads; the result does not depend on their number.

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstring>
 #include <stdexcept>
 
 #include <Eigen/Eigenvalues>
@@ -83,6 +84,25 @@ void FootprintDeposit::add(int channel, const Vector2d& at, const Matrix2d& axes
   thread_local std::vector<Tap> taps;
   find_taps(at, precision_of(axes, widest * std::max(width_, height_)), taps);
   for (const Tap& tap : taps) add_to_pixel(channel, tap.x, tap.y, tap.weight);
+}
+
+std::string FootprintDeposit::sums() const {
+  std::string bytes;
+  for (const auto& sum : sums_) {
+    const std::int64_t value = sum;
+    bytes.append(reinterpret_cast<const char*>(&value), sizeof value);
+  }
+  return bytes;
+}
+
+void FootprintDeposit::set_sums(const std::string& bytes) {
+  if (bytes.size() != sums_.size() * sizeof(std::int64_t))
+    throw std::runtime_error("sums that were kept have another size");
+  for (std::size_t i = 0; i < sums_.size(); ++i) {
+    std::int64_t value = 0;
+    std::memcpy(&value, bytes.data() + i * sizeof value, sizeof value);
+    sums_[i] = value;
+  }
 }
 
 Film FootprintDeposit::finish(double weight) const {

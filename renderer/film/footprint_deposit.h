@@ -5,6 +5,7 @@
 
 #include <atomic>
 #include <cstdint>
+#include <string>
 #include <vector>
 
 #include <Eigen/Core>
@@ -28,6 +29,11 @@ class FootprintDeposit {
   ///              widened by 0.4 pixels, so that pixels can be sampled in their middles, and cut off at a sixteenth of
   ///              the plate, beyond which light is not linear in its start. Values that are not finite count as 0.
   void add(int channel, const Eigen::Vector2d& at, const Eigen::Matrix2d& axes);
+
+  /// The sums so far as bytes, and back; not while photons are added. @throw std::runtime_error if they are those of
+  /// another deposit.
+  std::string sums() const;
+  void set_sums(const std::string& bytes);
 
   /// Weight per pixel. @param weight  The weight of one photon.
   Film finish(double weight) const;

@@ -4,14 +4,17 @@
 #include <atomic>
 #include <cmath>
 #include <limits>
+#include <numeric>
+#include <optional>
 #include <stdexcept>
 #include <string>
 #include <thread>
-#include <utility>
+#include <vector>
 
 #include <tbb/parallel_for.h>
 
 #include "base/errors.h"
+#include "renderer/shading/picture_tile.h"
 
 namespace tensorray {
 namespace {
@@ -19,7 +22,7 @@ namespace {
 using Eigen::Vector2d;
 using Eigen::Vector3f;
 
-constexpr int tile_size = 16;
+constexpr int tile_size = 16;             ///< Pixels.
 constexpr int neighborhood = 2;           ///< Pixels in each direction that help decide whether a pixel is done.
 constexpr double least_luminance = 0.05;  ///< To which errors are compared; fraction of the picture's mean.
 
@@ -33,191 +36,243 @@ void require_valid(const Camera& camera, const PathTracerSettings& settings) {
           "min_samples must be >= 2 where there is a noise_threshold");
 }
 
-SurfacePicture empty_picture(int width, int height, const ShadedScene& scene) {
-  const int bands = static_cast<int>(scene.colors.bands());
-  SurfacePicture picture;
-  picture.radiance = Film(width, height, bands);
-  if (!scene.landed.empty()) picture.landed = Film(width, height, bands);
-  const std::size_t size = picture.radiance.plane_size();
-  if (scene.region) {
-    picture.gain.assign(size, 1);
-    picture.deflection.assign(size, 0);
-  }
-  for (auto* plane :
-       {&picture.alpha, &picture.depth, &picture.force, &picture.arc_length, &picture.samples, &picture.variance})
-    plane->assign(size, 0);
-  picture.path.assign(size, -1);
-  picture.normal.assign(size, Vector3f::Zero());
-  picture.albedo.assign(size, Vector3f::Zero());
-  return picture;
-}
-
 /// Adds one value to a mean; `count` includes it.
-template <class Value>
-void extend_mean(Value& mean, int count, const Value& value) {
+template <class Mean, class Value>
+void extend_mean(Mean&& mean, int count, const Value& value) {
   mean += (value - mean) / static_cast<float>(count);
 }
 
 /// Sets the means of a pixel's bands after `samples` more of `count` samples.
-void extend_means(const BandValues& sum, int samples, double count, std::size_t index, Film& film) {
-  for (Eigen::Index band = 0; band < sum.size(); ++band) {
-    double& mean = film.plane(static_cast<int>(band))[index];
-    mean += (sum[band] - samples * mean) / count;
-  }
+void extend_means(const BandValues& sum, int samples, double count, double* means) {
+  for (Eigen::Index band = 0; band < sum.size(); ++band) means[band] += (sum[band] - samples * means[band]) / count;
 }
-
-/// State of a pixel between passes that the picture does not hold.
-struct PixelState {
-  int samples = 0, hits = 0, force_hits = 0, length_hits = 0, bent = 0;
-  bool done = false;
-  double luminance = 0, squares = 0;  ///< Mean, and the sum of squared differences from it (Welford 1962).
-  double nearest = std::numeric_limits<double>::infinity();  ///< Squared distance from the centre to the path hit.
-};
 
 class Rendering {
  public:
   Rendering(const ShadedScene& scene, const Camera& camera, const PathTracerSettings& settings,
-            const RenderCallbacks& callbacks)
+            const RenderCallbacks& callbacks, Work& work)
       : scene_(scene),
         camera_(camera),
         settings_(settings),
         callbacks_(callbacks),
-        picture_(empty_picture(camera.resolution.x(), camera.resolution.y(), scene)),
-        pixels_(picture_.radiance.plane_size()) {}
+        work_(work),
+        width_(camera.resolution.x()),
+        height_(camera.resolution.y()),
+        columns_((width_ + tile_size - 1) / tile_size),
+        tiles_(static_cast<std::size_t>(columns_) * ((height_ + tile_size - 1) / tile_size)),
+        light_values_(scene.colors.bands() * (scene.landed.empty() ? 1 : 2)) {}
 
   SurfacePicture run();
 
  private:
-  void pass(int samples);
-  void render_pixel(int x, int y, int samples, RayShader& shader, BandValues& sum, BandValues& landed);
-  void add_bent_view(std::size_t index, const BentView& view);
-  void add_surface(std::size_t index, const Vector2d& offset, const FirstSurface& surface, RayShader& shader);
-  bool finish_pixels();
-  bool is_precise(int x, int y, double floor) const;
+  /// The memory of one thread.
+  struct Worker {
+    Worker(const ShadedScene& scene, const ShadingSettings& settings)
+        : shader(scene, settings), sum(scene.colors.bands()), landed(scene.colors.bands()) {}
+    RayShader shader;
+    BandValues sum, landed;
+  };
+
+  Tile load(std::size_t number) const;
+  std::vector<std::size_t> wanted() const;
+  double mean_luminance() const;
+  void count_samples();
+  std::optional<FirstSurface> shade(int x, int y, PathSampler& sampler, RayShader& shader, Vector2d& offset) const;
+  void pass(const std::vector<std::size_t>& tiles);
+  void extend(std::size_t number, Worker& worker);
+  void render_pixel(Tile& tile, int x, int y, int samples, Worker& worker);
+  void add_surface(PixelState& pixel, const Vector2d& offset, const FirstSurface& surface, RayShader& shader) const;
+  bool finish_pixels(Tile& tile);
+  bool is_precise(Tile& tile, int x, int y) const;
+  SurfacePicture picture() const;
 
   const ShadedScene& scene_;
   const Camera& camera_;
   const PathTracerSettings& settings_;
   const RenderCallbacks& callbacks_;
-  SurfacePicture picture_;
-  std::vector<PixelState> pixels_;
+  Work& work_;
+  const int width_, height_, columns_;  ///< Columns of tiles.
+  const std::size_t tiles_;
+  const std::size_t light_values_;  ///< For each pixel.
+  double floor_ = 0;                ///< Least luminance to which errors are compared.
+  std::uint64_t total_samples_ = 0;
   std::atomic<std::uint64_t> finished_samples_{0};
 };
 
 SurfacePicture Rendering::run() {
-  int samples = 0;
-  while (true) {
-    const int more =
-        samples == 0 ? settings_.min_samples : std::min(settings_.pass_samples, settings_.max_samples - samples);
-    pass(more);
-    samples += more;
-    if (samples == settings_.max_samples || finish_pixels()) break;
+  work_.begin(tiles_);
+  if (settings_.noise_threshold > 0) floor_ = least_luminance * mean_luminance();
+  count_samples();
+  while (!work_.stopping) {
+    const std::vector<std::size_t> tiles = wanted();
+    if (tiles.empty()) break;
+    pass(tiles);
   }
-  return std::move(picture_);
+  return picture();
 }
 
-void Rendering::pass(int samples) {
-  const int width = picture_.radiance.width, height = picture_.radiance.height;
-  const int columns = (width + tile_size - 1) / tile_size, rows = (height + tile_size - 1) / tile_size;
-  const auto caller = std::this_thread::get_id();
-  const std::uint64_t total = pixels_.size() * static_cast<std::uint64_t>(settings_.max_samples);
-  tbb::parallel_for(0, columns * rows, [&](int tile) {
+/// An estimate of the picture's mean luminance from one sample of some pixels. It is the same for every part of the
+/// work, and takes less than a hundredth of its time, but for tiny pictures.
+double Rendering::mean_luminance() const {
+  const int step = 1 + std::max(width_, height_) / 128;
+  const int columns = (width_ + step - 1) / step, rows = (height_ + step - 1) / step;
+  std::vector<double> luminances(static_cast<std::size_t>(columns) * rows);
+  tbb::parallel_for(0, rows, [&](int row) {
     RayShader shader(scene_, settings_.shading);
-    BandValues sum(scene_.colors.bands()), landed(scene_.colors.bands());
-    const int left = tile % columns * tile_size, top = tile / columns * tile_size;
-    for (int y = top; y < std::min(top + tile_size, height); ++y)
-      for (int x = left; x < std::min(left + tile_size, width); ++x) render_pixel(x, y, samples, shader, sum, landed);
-    if (callbacks_.progress && std::this_thread::get_id() == caller) callbacks_.progress(finished_samples_, total);
+    for (int column = 0; column < columns; ++column) {
+      const std::size_t index = static_cast<std::size_t>(row * step) * width_ + column * step;
+      PathSampler sampler{settings_.seed, index, 0, 0};
+      Vector2d offset;
+      shade(column * step, row * step, sampler, shader, offset);
+      luminances[static_cast<std::size_t>(row) * columns + column] = scene_.colors.luminance(shader.radiance());
+    }
+  });
+  return std::accumulate(luminances.begin(), luminances.end(), 0.0) / static_cast<double>(luminances.size());
+}
+
+/// For the progress: counts the samples of the part, and those that are kept.
+void Rendering::count_samples() {
+  const auto most = static_cast<std::uint64_t>(settings_.max_samples);
+  for (std::size_t number = 0; number < tiles_; ++number) {
+    if (!work_.is_in_part(number)) continue;
+    const Tile tile = load(number);
+    total_samples_ += tile.pixels.size() * most;
+    for (const PixelState& pixel : tile.pixels)
+      finished_samples_ += pixel.done != 0 ? most : static_cast<std::uint64_t>(pixel.samples);
+  }
+}
+
+/// A tile as it is kept.
+Tile Rendering::load(std::size_t number) const {
+  const int left = static_cast<int>(number) % columns_ * tile_size,
+            top = static_cast<int>(number) / columns_ * tile_size;
+  Tile tile(left, top, std::min(tile_size, width_ - left), std::min(tile_size, height_ - top), light_values_);
+  if (const auto state = work_.state(number)) tile.set_bytes(*state);
+  return tile;
+}
+
+std::vector<std::size_t> Rendering::wanted() const {
+  std::vector<std::size_t> tiles;
+  for (std::size_t number = 0; number < tiles_; ++number)
+    if (work_.wants(number)) tiles.push_back(number);
+  return tiles;
+}
+
+/// Gives all `tiles` more samples.
+void Rendering::pass(const std::vector<std::size_t>& tiles) {
+  const auto caller = std::this_thread::get_id();
+  tbb::parallel_for(std::size_t{0}, tiles.size(), [&](std::size_t i) {
+    if (work_.stopping) return;
+    Worker worker(scene_, settings_.shading);
+    extend(tiles[i], worker);
+    if (std::this_thread::get_id() != caller) return;
+    if (callbacks_.progress) callbacks_.progress(finished_samples_, total_samples_);
+    if (callbacks_.show && work_.picture_wanted.exchange(false)) callbacks_.show(picture());
   });
 }
 
-void Rendering::render_pixel(int x, int y, int samples, RayShader& shader, BandValues& sum, BandValues& landed) {
-  const std::size_t index = static_cast<std::size_t>(y) * picture_.radiance.width + x;
-  PixelState& pixel = pixels_[index];
-  if (pixel.done) return;
-  sum.setZero();
-  landed.setZero();
+void Rendering::extend(std::size_t number, Worker& worker) {
+  Tile tile = load(number);
+  const int before = tile.samples();
+  const int more =
+      before == 0 ? settings_.min_samples : std::min(settings_.pass_samples, settings_.max_samples - before);
+  for (int y = 0; y < tile.height; ++y)
+    for (int x = 0; x < tile.width; ++x) render_pixel(tile, x, y, more, worker);
+  const bool done = before + more == settings_.max_samples || finish_pixels(tile);
+  work_.keep(number, tile.bytes(), done);
+}
+
+/// Sets the radiance of `shader` to that of a sample of pixel x, y of the picture. @param offset  Becomes its place.
+std::optional<FirstSurface> Rendering::shade(int x, int y, PathSampler& sampler, RayShader& shader,
+                                             Vector2d& offset) const {
+  offset = settings_.filter.sample(sampler.next_2d());
+  const Vector2d lens = camera_.lens_radius > 0 ? square_to_disk(sampler.next_2d()) : Vector2d(0, 0);
+  const CameraRay ray = camera_ray(camera_, Vector2d(x + 0.5, y + 0.5) + offset, lens);
+  return shader.shade(ray.origin, ray.direction, !settings_.transparent, sampler);
+}
+
+void Rendering::render_pixel(Tile& tile, int x, int y, int samples, Worker& worker) {
+  PixelState& pixel = tile.pixel(x, y);
+  if (pixel.done != 0) return;
+  const std::size_t index = static_cast<std::size_t>(tile.top + y) * width_ + tile.left + x;
+  RayShader& shader = worker.shader;
+  worker.sum.setZero();
+  worker.landed.setZero();
   for (int i = 0; i < samples; ++i) {
     PathSampler sampler{settings_.seed, index, static_cast<std::uint32_t>(pixel.samples), 0};
-    const Vector2d offset = settings_.filter.sample(sampler.next_2d());
-    const Vector2d lens = camera_.lens_radius > 0 ? square_to_disk(sampler.next_2d()) : Vector2d(0, 0);
-    const CameraRay ray = camera_ray(camera_, Vector2d(x + 0.5, y + 0.5) + offset, lens);
-    const auto surface = shader.shade(ray.origin, ray.direction, !settings_.transparent, sampler);
-    sum += shader.radiance();
-    if (!scene_.landed.empty()) landed += shader.landed();
-    if (shader.bent_view()) add_bent_view(index, *shader.bent_view());
+    Vector2d offset;
+    const auto surface = shade(tile.left + x, tile.top + y, sampler, shader, offset);
+    worker.sum += shader.radiance();
+    if (!scene_.landed.empty()) worker.landed += shader.landed();
+    if (const auto& view = shader.bent_view()) {
+      extend_mean(pixel.gain, ++pixel.bent, static_cast<float>(view->gain));
+      extend_mean(pixel.deflection, pixel.bent, static_cast<float>(view->deflection));
+    }
     ++pixel.samples;
     const double luminance = scene_.colors.luminance(shader.radiance()), change = luminance - pixel.luminance;
     pixel.luminance += change / pixel.samples;
     pixel.squares += change * (luminance - pixel.luminance);
-    if (surface) add_surface(index, offset, *surface, shader);
+    if (surface) add_surface(pixel, offset, *surface, shader);
   }
-  const double count = pixel.samples;
-  extend_means(sum, samples, count, index, picture_.radiance);
-  if (!scene_.landed.empty()) extend_means(landed, samples, count, index, picture_.landed);
-  picture_.alpha[index] = settings_.transparent ? static_cast<float>(pixel.hits / count) : 1.0f;
-  picture_.samples[index] = static_cast<float>(pixel.samples);
-  picture_.variance[index] = pixel.samples > 1 ? static_cast<float>(pixel.squares / (count * (count - 1))) : 0.0f;
+  double* const light = tile.light_of(x, y);
+  extend_means(worker.sum, samples, pixel.samples, light);
+  if (!scene_.landed.empty()) extend_means(worker.landed, samples, pixel.samples, light + worker.sum.size());
   finished_samples_ += static_cast<std::uint64_t>(samples);
 }
 
-void Rendering::add_bent_view(std::size_t index, const BentView& view) {
-  const int count = ++pixels_[index].bent;
-  extend_mean(picture_.gain[index], count, static_cast<float>(view.gain));
-  extend_mean(picture_.deflection[index], count, static_cast<float>(view.deflection));
-}
-
-void Rendering::add_surface(std::size_t index, const Vector2d& offset, const FirstSurface& surface, RayShader& shader) {
-  PixelState& pixel = pixels_[index];
+void Rendering::add_surface(PixelState& pixel, const Vector2d& offset, const FirstSurface& surface,
+                            RayShader& shader) const {
   const double depth = (surface.hit.position - camera_.position).dot(camera_.forward);
   ++pixel.hits;
-  extend_mean(picture_.depth[index], pixel.hits, static_cast<float>(depth));
-  extend_mean(picture_.normal[index], pixel.hits, Vector3f(surface.normal.cast<float>()));
-  extend_mean(picture_.albedo[index], pixel.hits, shader.albedo(surface.hit));
+  extend_mean(pixel.depth, pixel.hits, static_cast<float>(depth));
+  extend_mean(Eigen::Map<Vector3f>(pixel.normal), pixel.hits, Vector3f(surface.normal.cast<float>()));
+  extend_mean(Eigen::Map<Vector3f>(pixel.albedo), pixel.hits, shader.albedo(surface.hit));
   const SurfaceData data = scene_.surfaces.data(surface.hit);
-  if (data.force) extend_mean(picture_.force[index], ++pixel.force_hits, *data.force);
-  if (data.arc_length) extend_mean(picture_.arc_length[index], ++pixel.length_hits, *data.arc_length);
+  if (data.force) extend_mean(pixel.force, ++pixel.force_hits, *data.force);
+  if (data.arc_length) extend_mean(pixel.arc_length, ++pixel.length_hits, *data.arc_length);
   if (data.path && offset.squaredNorm() < pixel.nearest) {
     pixel.nearest = offset.squaredNorm();
-    picture_.path[index] = static_cast<float>(*data.path);
+    pixel.path = static_cast<float>(*data.path);
   }
 }
 
-/// Marks the pixels that are done.
+/// Marks the pixels that are done. Pixels of other tiles do not matter.
 /// @return whether all are done.
-bool Rendering::finish_pixels() {
+bool Rendering::finish_pixels(Tile& tile) {
   if (settings_.noise_threshold == 0) return false;
-  double sum = 0;
-  for (const PixelState& pixel : pixels_) sum += pixel.luminance;
-  const double floor = least_luminance * sum / static_cast<double>(pixels_.size());
   bool all_done = true;
-  for (int y = 0; y < picture_.radiance.height; ++y)
-    for (int x = 0; x < picture_.radiance.width; ++x) {
-      PixelState& pixel = pixels_[static_cast<std::size_t>(y) * picture_.radiance.width + x];
-      if (pixel.done) continue;
-      pixel.done = is_precise(x, y, floor);
-      all_done = all_done && pixel.done;
-      if (pixel.done) finished_samples_ += static_cast<std::uint64_t>(settings_.max_samples - pixel.samples);
+  for (int y = 0; y < tile.height; ++y)
+    for (int x = 0; x < tile.width; ++x) {
+      PixelState& pixel = tile.pixel(x, y);
+      if (pixel.done != 0) continue;
+      pixel.done = is_precise(tile, x, y) ? 1 : 0;
+      all_done = all_done && pixel.done != 0;
+      if (pixel.done != 0) finished_samples_ += static_cast<std::uint64_t>(settings_.max_samples - pixel.samples);
     }
   return all_done;
 }
 
-bool Rendering::is_precise(int x, int y, double floor) const {
+bool Rendering::is_precise(Tile& tile, int x, int y) const {
   const auto precise = [&](double variance, double luminance) {
-    return std::sqrt(variance) <= settings_.noise_threshold * std::max(luminance, floor);
+    return std::sqrt(variance) <= settings_.noise_threshold * std::max(luminance, floor_);
   };
-  const int width = picture_.radiance.width, height = picture_.radiance.height;
-  const std::size_t index = static_cast<std::size_t>(y) * width + x;
-  if (!precise(picture_.variance[index], pixels_[index].luminance)) return false;
+  if (!precise(tile.pixel(x, y).variance(), tile.pixel(x, y).luminance)) return false;
   double variance = 0, luminance = 0, count = 0;
-  for (int row = std::max(y - neighborhood, 0); row <= std::min(y + neighborhood, height - 1); ++row)
-    for (int column = std::max(x - neighborhood, 0); column <= std::min(x + neighborhood, width - 1); ++column) {
-      const std::size_t neighbor = static_cast<std::size_t>(row) * width + column;
-      variance += picture_.variance[neighbor];
-      luminance += pixels_[neighbor].luminance;
+  for (int row = std::max(y - neighborhood, 0); row <= std::min(y + neighborhood, tile.height - 1); ++row)
+    for (int column = std::max(x - neighborhood, 0); column <= std::min(x + neighborhood, tile.width - 1); ++column) {
+      variance += tile.pixel(column, row).variance();
+      luminance += tile.pixel(column, row).luminance;
       count += 1;
     }
   return precise(variance / count, luminance / count);
+}
+
+/// The picture of the tiles as they are kept.
+SurfacePicture Rendering::picture() const {
+  SurfacePicture picture = empty_picture(width_, height_, static_cast<int>(scene_.colors.bands()),
+                                         scene_.region != nullptr, !scene_.landed.empty());
+  for (std::size_t number = 0; number < tiles_; ++number) add_tile(load(number), settings_.transparent, picture);
+  return picture;
 }
 
 }  // namespace
@@ -226,7 +281,8 @@ SurfacePicture render_surfaces(const ShadedScene& scene, const Camera& camera, c
                                const RenderCallbacks& callbacks) {
   require_valid(camera, settings);
   require_shadable(scene, settings.shading);
-  return Rendering(scene, camera, settings, callbacks).run();
+  Work own;
+  return Rendering(scene, camera, settings, callbacks, callbacks.work ? *callbacks.work : own).run();
 }
 
 }  // namespace tensorray

@@ -8,6 +8,7 @@
 
 #include <Eigen/Core>
 
+#include "base/work.h"
 #include "renderer/film/film.h"
 #include "renderer/shading/camera.h"
 #include "renderer/shading/pixel_filter.h"
@@ -24,9 +25,9 @@ struct PathTracerSettings {
   int max_samples = 64;   ///< >= min_samples
   int pass_samples = 16;  ///< For each pixel, in every pass after the first; >= 1.
   /// A pixel is done when its standard error is below this fraction of its luminance, both by its own estimate and by
-  /// the mean over the 5 × 5 pixels around it. The mean keeps a pixel from stopping when its samples have missed a
-  /// bright feature by chance. Pixels darker than 5 % of the picture's mean are treated as if they had that luminance.
-  /// 0: all pixels take all samples.
+  /// the mean over the 5 × 5 pixels around it that belong to its tile. The mean keeps a pixel from stopping when its
+  /// samples have missed a bright feature by chance. Pixels darker than 5 % of the picture's mean, which a few samples
+  /// estimate beforehand, are treated as if they had that luminance. 0: all pixels take all samples.
   double noise_threshold = 0;
 
   std::uint64_t seed = 0;
@@ -56,6 +57,14 @@ struct RenderCallbacks {
   /// Called from time to time, on the thread that called `render_surfaces`. `total` is the number of samples if no
   /// pixel stops early. May be empty. An exception that it throws ends the render and reaches the caller.
   std::function<void(std::uint64_t done, std::uint64_t total)> progress;
+
+  /// Keeps the tiles of the picture, its units; null: they are not needed. Only tiles of its part are rendered, and
+  /// only until it is stopping: others of the result are black, with 0 samples. The state of a tile depends on scene,
+  /// camera and settings alone.
+  Work* work = nullptr;
+
+  /// Gets the picture so far if `work` wants it; on the thread that called `render_surfaces`, while others go on.
+  std::function<void(const SurfacePicture&)> show;
 };
 
 /// Runs on all threads; every byte of the result is the same on any number of threads.

@@ -19,6 +19,7 @@ namespace tensorray {
 
 struct Progress;
 struct Render;
+struct RenderJob;
 struct Scene;
 struct SceneDescription;
 
@@ -41,8 +42,9 @@ class LoadedMethod {
  public:
   virtual ~LoadedMethod() = default;
 
+  /// @param job  Keeps the units of the work; null: they are not needed. Methods that are not divided ignore it.
   /// @throw Cancelled; std::runtime_error; SceneError if a value of the scene does not fit the data.
-  virtual Render render(const Scene& scene, const Progress& progress) const = 0;
+  virtual Render render(const Scene& scene, const Progress& progress, RenderJob* job) const = 0;
 };
 
 /// The settings of a method, as the scene file gives them. The settings of all methods are read from every scene file,
@@ -63,6 +65,9 @@ class Method {
 
   /// Whether its pictures have noise, which `integrator.max_samples` samples a pixel average.
   virtual bool is_sampled() const { return false; }
+
+  /// Whether its work has units that can be divided among machines (RenderJob).
+  virtual bool is_divided() const { return false; }
 
   /// Whether the pixels of its pictures are those of the plate.
   virtual bool shows_plate() const { return false; }

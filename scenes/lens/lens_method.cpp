@@ -151,7 +151,7 @@ class LoadedLens : public LoadedMethod {
  public:
   LoadedLens(LensDescription settings, LensScene scene) : settings_(std::move(settings)), lens_(std::move(scene)) {}
 
-  Render render(const Scene& scene, const Progress& progress) const override;
+  Render render(const Scene& scene, const Progress& progress, RenderJob*) const override;
 
  private:
   LensDescription settings_;
@@ -167,7 +167,7 @@ SpectralImage spectra_side_by_side(std::vector<SpectralImage> spectra) {
   return all;
 }
 
-Render LoadedLens::render(const Scene& scene, const Progress& progress) const {
+Render LoadedLens::render(const Scene& scene, const Progress& progress, RenderJob*) const {
   LensSettings settings;
   settings.mode = settings_.mode;
   settings.samples = settings_.samples;

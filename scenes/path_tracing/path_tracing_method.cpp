@@ -103,7 +103,7 @@ class LoadedPaths : public LoadedMethod {
  public:
   explicit LoadedPaths(PathScene paths) : paths_(std::move(paths)) {}
 
-  Render render(const Scene& scene, const Progress& progress) const override;
+  Render render(const Scene& scene, const Progress& progress, RenderJob* job) const override;
 
  private:
   PathScene paths_;
@@ -111,7 +111,8 @@ class LoadedPaths : public LoadedMethod {
 
 /// Renders the paths, their context and the lamps.
 SurfacePicture render_stage(const Scene& scene, const PathScene& path_scene, const std::vector<Path>& paths,
-                            ShadedSurface path_surface, const Camera& camera, const Progress& progress) {
+                            ShadedSurface path_surface, const Camera& camera, const Progress& progress,
+                            const RenderCallbacks& callbacks) {
   const ShownLight& light = path_scene.lights.light;
   std::vector<Material> materials{load_material(path_scene.settings.material, light)};
   std::vector<ShadedSurface> surfaces{std::move(path_surface)};
@@ -124,13 +125,11 @@ SurfacePicture render_stage(const Scene& scene, const PathScene& path_scene, con
   for (const Band& band : light.bands) luminance.push_back(static_cast<float>(band.xyz.y()));
   const LightSampler sampler(lights, luminance, stage.bounds());
   const ReflectanceTable table(light.model, light.bands, light.xyz_to_working);
-  RenderCallbacks callbacks;
-  callbacks.progress = [&](std::uint64_t done, std::uint64_t total) { progress.update("rendering", done, total); };
   return render_surfaces({stage, materials, sampler, table}, camera,
                          tracer_settings(scene.description, path_scene.settings), callbacks);
 }
 
-Render LoadedPaths::render(const Scene& scene, const Progress& progress) const {
+Render LoadedPaths::render(const Scene& scene, const Progress& progress, RenderJob* job) const {
   const PathTracingDescription& description = paths_.settings;
   const ShownLight& light = paths_.lights.light;
   const auto start = Clock::now();
@@ -143,11 +142,6 @@ Render LoadedPaths::render(const Scene& scene, const Progress& progress) const {
   const bool has_legend = description.color.legend && colors.legend;
   const Camera camera = scene_camera(scene, description.context, result.paths, has_legend ? legend_width : 0);
   PathShapes shapes = make_shapes(scene, paths_, result.paths, colors, camera);
-  const SurfacePicture picture = render_stage(scene, paths_, result.paths, std::move(shapes.surface), camera, progress);
-  result.linear = make_image(picture, light, description);
-  if (scene.description.output.wants("spectral"))
-    result.spectral = spectral_image(picture.radiance, light.bands, 1, light.xyz_to_working);
-  result.statistics.seconds_drawing = seconds_since(drawing);
   result.exposure = 0;
   if (has_legend)
     result.annotate = [legend = colors.legend, matrix = light.rec709_to_working](Image& image) {
@@ -158,6 +152,19 @@ Render LoadedPaths::render(const Scene& scene, const Progress& progress) const {
                                                                    const std::vector<Path>& paths) {
       write_tubes(file, tubes, paths, colors);
     };
+  const auto add_picture = [&](const SurfacePicture& picture, Render& render) {
+    render.linear = make_image(picture, light, description);
+    if (scene.description.output.wants("spectral"))
+      render.spectral = spectral_image(picture.radiance, light.bands, 1, light.xyz_to_working);
+  };
+  const RenderCallbacks callbacks = callbacks_of(progress, job, [&](const SurfacePicture& picture) {
+    Render shown = result;
+    add_picture(picture, shown);
+    return shown;
+  });
+  add_picture(render_stage(scene, paths_, result.paths, std::move(shapes.surface), camera, progress, callbacks),
+              result);
+  result.statistics.seconds_drawing = seconds_since(drawing);
   return result;
 }
 
@@ -189,6 +196,7 @@ class PathTracingMethod : public MethodWith<PathTracingDescription> {
  public:
   const char* name() const override { return "path_tracing"; }
   bool is_sampled() const override { return true; }
+  bool is_divided() const override { return true; }
 
   std::vector<Output> outputs() const override {
     std::vector<Output> outputs = picture_outputs();

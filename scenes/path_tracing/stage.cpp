@@ -67,6 +67,22 @@ Image make_image(const SurfacePicture& picture, const ShownLight& light, const P
   return image;
 }
 
+RenderCallbacks callbacks_of(const Progress& progress, RenderJob* job,
+                             const std::function<Render(const SurfacePicture&)>& finish) {
+  RenderCallbacks callbacks;
+  callbacks.progress = [&progress, job](std::uint64_t done, std::uint64_t total) {
+    if (job) job->work.fraction = static_cast<double>(done) / static_cast<double>(total);
+    if (job && progress.cancelled)
+      job->work.stopping = true;
+    else
+      progress.update("rendering", done, total);
+  };
+  if (!job) return callbacks;
+  callbacks.work = &job->work;
+  if (job->show) callbacks.show = [job, finish](const SurfacePicture& picture) { job->show(finish(picture)); };
+  return callbacks;
+}
+
 void add_lamps(const std::vector<Light>& lights, const ShownLight& light, std::vector<ShadedSurface>& surfaces,
                std::vector<Material>& materials) {
   for (std::size_t i = 0; i < lights.size(); ++i) {

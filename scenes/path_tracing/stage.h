@@ -3,8 +3,10 @@
 /// What all pictures of surfaces share: the settings of the path tracer, visible lamps, and the channels of the
 /// picture.
 
+#include <functional>
 #include <vector>
 
+#include "base/progress.h"
 #include "renderer/images/image.h"
 #include "renderer/lights/lights.h"
 #include "renderer/materials/material.h"
@@ -12,6 +14,7 @@
 #include "renderer/surfaces/surface.h"
 #include "scenes/description/description.h"
 #include "scenes/path_tracing/load_paths.h"
+#include "scenes/scene/render.h"
 
 namespace tensorray {
 
@@ -20,6 +23,10 @@ PathTracerSettings tracer_settings(const SceneDescription& scene, const PathTrac
 /// R, G, B, A, and the channels that denoisers and compositors use. If light bends, also `gain` and `deflection`; if
 /// some has landed on flat surfaces, also `caustic` and `straight`, whose sum is the picture.
 Image make_image(const SurfacePicture& picture, const ShownLight& light, const PathTracingDescription& description);
+
+/// @param finish  Completes a render, which is then shown, by the picture so far.
+RenderCallbacks callbacks_of(const Progress& progress, RenderJob* job,
+                             const std::function<Render(const SurfacePicture&)>& finish);
 
 /// Adds the area lights as surfaces, so that they are visible.
 void add_lamps(const std::vector<Light>& lights, const ShownLight& light, std::vector<ShadedSurface>& surfaces,

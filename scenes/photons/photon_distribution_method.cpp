@@ -61,12 +61,12 @@ Image with_channels(const Image& first, const Image& second) {
 
 class LoadedPhotons : public LoadedMethod {
  public:
-  Render render(const Scene& scene, const Progress& progress) const override;
+  Render render(const Scene& scene, const Progress& progress, RenderJob* job) const override;
 };
 
-Render LoadedPhotons::render(const Scene& scene, const Progress& progress) const {
+Render LoadedPhotons::render(const Scene& scene, const Progress& progress, RenderJob* job) const {
   const SceneDescription& description = scene.description;
-  PlateLight light = light_on_plate(scene, progress);
+  PlateLight light = light_on_plate(scene, progress, job ? &job->work : nullptr);
 
   const auto start = Clock::now();
   Render result;

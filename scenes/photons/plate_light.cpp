@@ -153,9 +153,9 @@ PhotonSettings photon_settings(const Scene& scene) {
   return settings;
 }
 
-PlateLight trace_photons(const Scene& scene, const Progress& progress) {
+PlateLight trace_photons(const Scene& scene, const Progress& progress, Work* work = nullptr) {
   PhotonDistribution traced = distribute_photons(scene.field, scene.geometry, scene.beam, scene.channels, scene.bending,
-                                                 photon_settings(scene), progress);
+                                                 photon_settings(scene), progress, work);
   PlateLight light;
   light.linear = is_collected_in_color(scene) ? color_image(traced.irradiance)
                                               : linear_image(traced.irradiance, scene.bands, to_working(scene));
@@ -176,9 +176,9 @@ PlateLight trace_photons(const Scene& scene, const Progress& progress) {
 
 }  // namespace
 
-PlateLight light_on_plate(const Scene& scene, const Progress& progress) {
+PlateLight light_on_plate(const Scene& scene, const Progress& progress, Work* work) {
   if (scene.description.integrator.settings<PhotonDescription>().density.kind != PhotonDensityKind::mesh)
-    return trace_photons(scene, progress);
+    return trace_photons(scene, progress, work);
   PlateLight light = draw_light(scene, progress);
   const OutputDescription& output = scene.description.output;
   if (!output.wants("photons") && !output.wants("fluence")) return light;

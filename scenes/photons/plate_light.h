@@ -29,6 +29,6 @@ struct PlateLight {
 /// Traces the light with the density estimator of the method photon_distribution. `mesh` draws the flow map of the
 /// beam; photons and fluence, if the scene asks for them, are then traced as for the other estimators. @throw
 /// Cancelled.
-PlateLight light_on_plate(const Scene& scene, const Progress& progress);
+PlateLight light_on_plate(const Scene& scene, const Progress& progress, Work* work = nullptr);
 
 }  // namespace tensorray

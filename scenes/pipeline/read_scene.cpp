@@ -9,6 +9,7 @@
 #include "scenes/description/check_scene.h"
 #include "scenes/description/scene_keys.h"
 #include "scenes/keys/frames.h"
+#include "scenes/keys/keyframe_schema.h"
 #include "scenes/keys/overrides.h"
 #include "scenes/pipeline/methods.h"
 
@@ -119,12 +120,13 @@ SceneDescription read_scene_json(Json json, const std::filesystem::path& path, c
   return scene;
 }
 
-std::string scene_schema() {
+std::string scene_schema(SchemaKind kind) {
   SceneDescription scene = default_scene();
   SchemaWriter writer;
   describe(scene, writer);
   Json schema = {{"$schema", "https://json-schema.org/draft/2020-12/schema"}, {"title", "tensorray scene"}};
   schema.update(writer.finish("What tensorray renders. Lengths are in the field's world units, wavelengths in nm."));
+  if (kind == SchemaKind::with_keyframes) allow_keyframes(schema);
   return schema.dump(2);
 }
 

@@ -43,7 +43,10 @@ Json scene_json(const std::filesystem::path& path, const std::vector<std::string
 /// The other step: JSON → SceneDescription. @param changes  Its overrides have no effect.
 SceneDescription read_scene_json(Json json, const std::filesystem::path& path, const SceneChanges& changes = {});
 
+/// Whether numbers may have keyframes, as in a scene of which frames are rendered.
+enum class SchemaKind { one_frame, with_keyframes };
+
 /// The JSON Schema (draft 2020-12) of scene files, made from the same tables of keys that read_scene uses.
-std::string scene_schema();
+std::string scene_schema(SchemaKind kind = SchemaKind::one_frame);
 
 }  // namespace tensorray

@@ -27,8 +27,8 @@ bool nothing_arrived(const Statistics& statistics) {
                      [](const EndCounts& counts) { return counts[static_cast<int>(RayEnd::plate)] == 0; });
 }
 
-Render render(const Scene& scene, const Progress& progress) {
-  Render result = scene.method->render(scene, progress);
+Render render(const Scene& scene, const Progress& progress, RenderJob* job) {
+  Render result = scene.method->render(scene, progress, job);
   warn_of_step_limit(result);
   return result;
 }

@@ -10,6 +10,7 @@
 #include <string>
 #include <vector>
 
+#include "base/work.h"
 #include "integrators/bending/light_channel.h"
 #include "integrators/paths/paths.h"
 #include "renderer/film/photon_map.h"
@@ -55,7 +56,17 @@ struct Render {
   std::vector<std::string> warnings;  ///< Problems that the picture does not show by itself; one line each.
 };
 
-/// Renders the scene with its method. @throw Cancelled; std::runtime_error; SceneError.
-Render render(const Scene& scene, const Progress& progress);
+/// A render whose work is kept. Where Progress is cancelled while units are done, the work stops, and the result is
+/// what there is.
+struct RenderJob {
+  Work work;  ///< Has no units if the method is not divided into units.
+
+  /// Gets what there is so far when `work` wants a picture; may be empty.
+  std::function<void(Render)> show;
+};
+
+/// Renders the scene with its method. @param job  Null: nothing is kept.
+/// @throw Cancelled; std::runtime_error; SceneError.
+Render render(const Scene& scene, const Progress& progress, RenderJob* job = nullptr);
 
 }  // namespace tensorray

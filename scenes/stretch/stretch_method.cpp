@@ -89,7 +89,7 @@ class LoadedStretch : public LoadedMethod {
   LoadedStretch(const StretchDescription& description, const StretchSettings& settings)
       : description_(description), settings_(settings) {}
 
-  Render render(const Scene& scene, const Progress& progress) const override {
+  Render render(const Scene& scene, const Progress& progress, RenderJob*) const override {
     const auto start = Clock::now();
     const OutputDescription& output = scene.description.output;
     const Geometry geometry = without_plate(scene);

@@ -135,13 +135,13 @@ class LoadedWhole : public LoadedMethod {
  public:
   explicit LoadedWhole(WholeScene whole) : whole_(std::move(whole)) {}
 
-  Render render(const Scene& scene, const Progress& progress) const override;
+  Render render(const Scene& scene, const Progress& progress, RenderJob* job) const override;
 
  private:
   WholeScene whole_;
 };
 
-Render LoadedWhole::render(const Scene& scene, const Progress& progress) const {
+Render LoadedWhole::render(const Scene& scene, const Progress& progress, RenderJob* job) const {
   const ShownLight& light = whole_.lights.light;
   Clock::time_point start = Clock::now();
   Render result;
@@ -169,13 +169,18 @@ Render LoadedWhole::render(const Scene& scene, const Progress& progress) const {
   result.statistics.seconds_tracing = seconds_since(start);
 
   start = Clock::now();
-  RenderCallbacks callbacks;
-  callbacks.progress = [&](std::uint64_t done, std::uint64_t total) { progress.update("rendering", done, total); };
-  const SurfacePicture picture = render_surfaces(shaded, camera, whole_tracer_settings(scene, whole_), callbacks);
-  result.linear = make_image(picture, light, whole_.tracing);
-  if (scene.description.output.wants("spectral"))
-    result.spectral = spectral_image(picture.radiance, light.bands, 1, light.xyz_to_working);
+  const auto add_picture = [&](const SurfacePicture& picture, Render& render) {
+    render.linear = make_image(picture, light, whole_.tracing);
+    if (scene.description.output.wants("spectral"))
+      render.spectral = spectral_image(picture.radiance, light.bands, 1, light.xyz_to_working);
+  };
   result.exposure = 0;
+  const RenderCallbacks callbacks = callbacks_of(progress, job, [&](const SurfacePicture& picture) {
+    Render shown = result;
+    add_picture(picture, shown);
+    return shown;
+  });
+  add_picture(render_surfaces(shaded, camera, whole_tracer_settings(scene, whole_), callbacks), result);
   report(region, whole_, result);
   result.statistics.seconds_drawing = seconds_since(start);
   return result;
@@ -185,6 +190,7 @@ class WholeMethod : public MethodWith<WholeDescription> {
  public:
   const char* name() const override { return "scene"; }
   bool is_sampled() const override { return true; }
+  bool is_divided() const override { return true; }
 
   std::vector<Output> outputs() const override {
     std::vector<Output> outputs = picture_outputs();

@@ -367,6 +367,41 @@ TEST(PictureTest, PassesAddUpToThePictureThatOnePassMakes) {
   EXPECT_THROW(render_surfaces(world.scene, camera(20), settings, callbacks), Stop);
 }
 
+/// Work that is divided, stopped after each pass of a tile, and continued, gives the picture of one render.
+TEST(PictureTest, PartsThatStopAndContinueGiveTheSamePicture) {
+  const World world = still_life();
+  PathTracerSettings settings;
+  settings.min_samples = settings.pass_samples = 4;
+  settings.max_samples = 16;
+  settings.noise_threshold = 0.1;
+  const SurfacePicture whole = render_surfaces(world.scene, camera(40), settings);
+  std::vector<WorkUnit> all(9);
+  for (std::size_t part = 0; part < 2; ++part) {
+    std::vector<WorkUnit> units;
+    for (bool is_done = false; !is_done;) {
+      Work work({part, 2}, units);
+      RenderCallbacks callbacks;
+      callbacks.work = &work;
+      callbacks.progress = [&](std::uint64_t, std::uint64_t) { work.stopping = true; };
+      const SurfacePicture some = render_surfaces(world.scene, camera(40), settings, callbacks);
+      EXPECT_LT(std::count(some.samples.begin(), some.samples.end(), 0), 40 * 40);
+      units = work.units();
+      is_done = true;
+      for (std::size_t i = part; i < units.size(); i += 2) is_done = is_done && units[i].done;
+    }
+    for (std::size_t i = 0; i < units.size(); ++i) EXPECT_EQ(units[i].done, i % 2 == part);
+    for (std::size_t i = part; i < units.size(); i += 2) all[i] = units[i];
+  }
+  Work united({}, all);
+  RenderCallbacks callbacks;
+  callbacks.work = &united;
+  const SurfacePicture picture = render_surfaces(world.scene, camera(40), settings, callbacks);
+  EXPECT_EQ(picture.radiance.values, whole.radiance.values);
+  EXPECT_EQ(picture.samples, whole.samples);
+  EXPECT_EQ(picture.path, whole.path);
+  EXPECT_EQ(picture.variance, whole.variance);
+}
+
 TEST(PictureTest, AdaptiveSamplingKeepsTheMeanAndWorksWhereItIsNoisy) {
   const World world = still_life();
   PathTracerSettings settings;

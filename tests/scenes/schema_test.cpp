@@ -85,6 +85,36 @@ bool refused_for_its_value(const Leaf& leaf, const Json& value) {
   return refusal(leaf, value).find("`" + leaf.pointer.to_string() + "` must be ") != std::string::npos;
 }
 
+/// Every default that the schema allows to have keyframes is accepted as such, and others are not allowed to.
+TEST(Schema, KeyframesTakeThePlaceOfNumbersAndListsOfNumbers) {
+  const Json schema = Json::parse(scene_schema(SchemaKind::with_keyframes));
+  EXPECT_EQ(schema.at("/$defs/keyframes/required"_json_pointer), Json::array({"keys"}));
+  std::vector<Leaf> all;
+  collect(schema, Pointer(), smallest_scene(), all);
+  const Json reference = {{"$ref", "#/$defs/keyframes"}};
+  int allowed = 0, others = 0;
+  for (const Leaf& leaf : all) {
+    const Json standard = leaf.schema.value("default", Json());
+    const bool is_of_numbers =
+        standard.is_number() || (standard.is_array() && !standard.empty() && standard[0].is_number());
+    const Json alternatives = leaf.schema.value("anyOf", Json::array());
+    const bool is_allowed = std::count(alternatives.begin(), alternatives.end(), reference) == 1;
+    const std::string where = leaf.pointer.to_string();
+    if (standard.is_boolean() || leaf.schema.contains("enum")) {
+      EXPECT_FALSE(is_allowed) << where;
+      ++others;
+    }
+    if (!is_of_numbers) continue;
+    EXPECT_TRUE(is_allowed) << where;
+    Json scene = leaf.scene;
+    scene[leaf.pointer] = {{"keys", {{1, standard}, {5, standard}}}};
+    EXPECT_NO_THROW(read_scene_json(nlohmann::ordered_json::parse(scene.dump()), "a.json", {{}, {}, 3})) << where;
+    ++allowed;
+  }
+  EXPECT_GE(allowed, 40);
+  EXPECT_GE(others, 6);
+}
+
 TEST(Schema, IsOfTheDraftAndClosed) {
   const Json schema = Json::parse(scene_schema());
   EXPECT_EQ(schema.at("$schema"), "https://json-schema.org/draft/2020-12/schema");

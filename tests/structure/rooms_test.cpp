@@ -58,6 +58,7 @@ const std::vector<Room> rooms{
     {"scenes/scene", {"scenes/description", "scenes/keys", "integrators/*", "renderer/*", "volumes/*"}},
     {"scenes/outputs",
      {"scenes/scene", "scenes/description", "scenes/keys", "integrators/*", "renderer/*", "volumes/*"}},
+    {"scenes/jobs", {"scenes/scene", "scenes/description", "scenes/keys", "integrators/*", "renderer/*", "volumes/*"}},
     {"scenes/photons",
      {"scenes/outputs", "scenes/scene", "scenes/description", "scenes/keys", "integrators/*", "renderer/*",
       "volumes/*"}},

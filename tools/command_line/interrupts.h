@@ -10,4 +10,8 @@ namespace tensorray {
 /// signal ends the program at once. Broken pipes and file-size limits become errors of the write that meets them.
 Progress& progress_until_interrupted();
 
+/// Whether SIGUSR1, which asks for a picture of what there is so far, has come since the last call. It does nothing
+/// else.
+bool take_picture_request();
+
 }  // namespace tensorray

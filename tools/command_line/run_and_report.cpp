@@ -35,6 +35,8 @@ int run_and_report(const std::function<void()>& work) {
   } catch (const Cancelled&) {
     fmt::print(stderr, "tensorray: interrupted; nothing was written\n");
     return interrupted;
+  } catch (const Interrupted& error) {
+    return report(error, interrupted);
   } catch (const std::invalid_argument& error) {
     return report(error, wrong_input);
   } catch (const std::bad_alloc&) {

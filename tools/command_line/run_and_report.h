@@ -3,8 +3,14 @@
 /// Reports errors to the user: one line, and an exit status.
 
 #include <functional>
+#include <stdexcept>
 
 namespace tensorray {
+
+/// Work that was interrupted, and kept what it had: exit status 130.
+struct Interrupted : std::runtime_error {
+  using std::runtime_error::runtime_error;
+};
 
 /// Calls `work`, and prints an exception that it throws as one line on standard error.
 /// @return the exit status: 0 done, 1 failed, 2 the command line or the scene is wrong, 130 interrupted.

@@ -14,6 +14,7 @@ struct Progress;
 
 void add_render_command(CLI::App& program, Progress& progress);   ///< tensorray render SCENE.json: pictures of a scene.
 void add_explore_command(CLI::App& program, Progress& progress);  ///< tensorray explore FIELD.vdb: a sheet of pictures.
+void add_merge_command(CLI::App& program, Progress& progress);    ///< tensorray merge SHARD...: pictures of shards.
 void add_make_command(CLI::App& program, Progress& progress);     ///< tensorray make KIND: an analytic field.
 void add_import_command(CLI::App& program);  ///< Lists `import` in --help; become_import_program runs it.
 void add_view_command(CLI::App& program);    ///< Lists `view` in --help; become_view_program runs it.

@@ -24,10 +24,12 @@ struct RenderOptions {
   std::optional<std::uint64_t> seed;
   std::string error;
   ImportChoices import;
-  std::string frames;
+  std::string frames, shard;
   bool skip_existing = false;
   RenderRun run;
 };
+
+constexpr std::size_t most_shards = 100000;
 
 /// The kinds of outputs and their endings, from the table of methods.
 std::string output_help() {
@@ -53,9 +55,28 @@ double parse_part(const std::string& text) {
   return percent ? value / 100 : value;
 }
 
+/// "3/16" as a part of work; takes its file from the outputs. @throw std::invalid_argument.
+void take_shard(const std::string& text, SceneChanges& changes, RunKeeping& keeping) {
+  const std::size_t slash = text.find('/');
+  std::size_t number = 0, count = 0;
+  const bool is_read = slash != std::string::npos && CLI::detail::lexical_cast(text.substr(0, slash), number) &&
+                       CLI::detail::lexical_cast(text.substr(slash + 1), count);
+  if (!is_read || number < 1 || number > count || count > most_shards)
+    throw std::invalid_argument(
+        fmt::format("--shard {}: give number and count, as 3/16; numbers begin with 1, and there may be {}",
+                    printable(text), most_shards));
+  if (changes.outputs.size() != 1)
+    throw std::invalid_argument("--shard: name one file for the shard, as -o part" + std::to_string(number) + ".shard");
+  keeping.shard = WorkPart{number - 1, count};
+  keeping.shard_file = changes.outputs.front();
+  changes.outputs.clear();
+}
+
 /// Renders another program's file. Its pictures are named after the file.
 void render_import(const std::string& file, SceneChanges changes, const RenderOptions& options, Progress& progress) {
   if (!options.frames.empty()) throw std::invalid_argument("--frames: import the files first, with `tensorray import`");
+  if (!options.shard.empty() || options.run.keeping.resume)
+    throw std::invalid_argument("--shard, --resume: import the file first, with `tensorray import`");
   if (!options.run.scene_copy.empty())
     throw std::invalid_argument("--save-scene: a scene needs a field that stays; make it with `tensorray import " +
                                 printable(file) + " -o FIELD.vdb`");
@@ -68,7 +89,9 @@ void render_import(const std::string& file, SceneChanges changes, const RenderOp
   for (const std::filesystem::path& output : changes.outputs) outputs.push_back({output, "-o"});
   require_distinct_files({{file, "the input"}}, outputs);
   const ImportedField field(file, options.import, options.run.quiet);
-  render_scene(field.path(), changes, options.run, progress);
+  RenderRun run = options.run;
+  run.keeping.is_on = false;  // The field does not stay.
+  render_scene(field.path(), changes, run, progress);
 }
 
 }  // namespace
@@ -98,6 +121,15 @@ void add_render_command(CLI::App& program, Progress& progress) {
                                             "frame's number (flow.####.vdb), and numbers "
                                             "of the scene may have keyframes");
   command->add_flag("--skip-existing", options->skip_existing, "Leave out frames whose files exist")->needs(frames);
+  command
+      ->add_option("--checkpoint", options->run.keeping.interval,
+                   "Seconds after which the work is kept again, in PICTURE.checkpoint (60); 0: only when interrupted")
+      ->check(CLI::Range(0.0, 1e9));
+  command->add_flag("--resume", options->run.keeping.resume, "Continue from the checkpoint, if there is one");
+  command->add_option(
+      "--shard", options->shard,
+      "K/N: do part K of N of the work, from 1 to N, and write it to the file of -o, for `tensorray merge`");
+  command->add_flag("--watch", options->run.keeping.watch, "Keep the pictures up to date while they are rendered");
   command->add_option("--order", options->import.order, "Of the tensor's components, as for `tensorray import`")
       ->group("Import");
   command->add_option("--array", options->import.array, "The array that is the tensor, likewise")->group("Import");
@@ -113,10 +145,11 @@ void add_render_command(CLI::App& program, Progress& progress) {
     const ImportChoices& import = options->import;
     if (!import.order.empty() || !import.array.empty() || !import.gradient_of.empty())
       throw std::invalid_argument("--order, --array and --gradient-of are for files that have to be imported");
-    if (options->frames.empty()) return render_scene(options->scene, changes, options->run, progress);
-    if (!options->run.scene_copy.empty()) throw std::invalid_argument("--save-scene: not for several frames");
-    render_frames(options->scene, changes, parse_frames(options->frames), options->skip_existing, options->run,
-                  progress);
+    RenderRun run = options->run;
+    if (!options->shard.empty()) take_shard(options->shard, changes, run.keeping);
+    if (options->frames.empty()) return render_scene(options->scene, changes, run, progress);
+    if (!run.scene_copy.empty()) throw std::invalid_argument("--save-scene: not for several frames");
+    render_frames(options->scene, changes, parse_frames(options->frames), options->skip_existing, run, progress);
   });
 }
 

@@ -3,14 +3,28 @@
 /// Renders a scene file and writes its outputs.
 
 #include <filesystem>
+#include <optional>
 #include <vector>
 
 #include "base/progress.h"
+#include "base/work.h"
+#include "scenes/jobs/work_file.h"
 #include "scenes/pipeline/read_scene.h"
 
 namespace tensorray {
 
+/// How a run keeps its work.
+struct RunKeeping {
+  bool is_on = true;                 ///< Whether there are checkpoints.
+  double interval = 60;              ///< Seconds between checkpoints; 0: only where the run is interrupted.
+  bool resume = false;               ///< Continue from the checkpoint, if there is one.
+  bool watch = false;                ///< Keep the pictures up to date while they are rendered.
+  std::optional<WorkPart> shard;     ///< Do only this part of the work,
+  std::filesystem::path shard_file;  ///< and write it to this file, and no picture.
+};
+
 struct RenderRun {
+  RunKeeping keeping;
   unsigned threads = 0;              ///< Number of threads; 0: all.
   bool quiet = false;                ///< Print only errors.
   std::filesystem::path statistics;  ///< JSON file for the statistics; empty: none.
@@ -19,15 +33,21 @@ struct RenderRun {
 
 /// Reads the scene file (or the field's; see read_scene), loads the scene, renders it and writes its outputs. Prints a
 /// progress bar and notes.
-/// @throw SceneError, std::invalid_argument, std::runtime_error, Cancelled.
+/// The work is kept in a checkpoint beside the first output, PICTURE.checkpoint, while the render runs, and where it is
+/// interrupted, with the picture so far.
+/// @throw SceneError, std::invalid_argument, std::runtime_error, Cancelled; Interrupted.
 void render_scene(const std::filesystem::path& scene_file, const SceneChanges& changes, const RenderRun& run,
                   Progress& progress);
 
 /// Renders frames of a scene (see set_frame), one after the other. The scale and the direction `auto` are those of the
 /// first frame. A field that does not change is loaded once.
-/// @param skip_existing  Leaves out frames of which all files exist.
+/// @param skip_existing  Leaves out frames of which all files exist, but no checkpoint.
 /// @throw as render_scene; SceneError if the names of files do not count frames, so that one would replace another.
 void render_frames(const std::filesystem::path& scene_file, SceneChanges changes, const std::vector<int>& frames,
                    bool skip_existing, const RenderRun& run, Progress& progress);
+
+/// Makes the pictures of a scene of work that is done. The work must be all of it, and that of the scene.
+/// @throw as render_scene.
+void write_merged(const SceneDescription& description, const WorkFile& work, const RenderRun& run, Progress& progress);
 
 }  // namespace tensorray

@@ -8,7 +8,7 @@ namespace tensorray {
 
 void add_schema_command(CLI::App& program) {
   CLI::App* command = program.add_subcommand("schema", "Print the JSON Schema of scene files");
-  command->callback([] { fmt::print("{}\n", scene_schema()); });
+  command->callback([] { fmt::print("{}\n", scene_schema(SchemaKind::with_keyframes)); });
 }
 
 }  // namespace tensorray

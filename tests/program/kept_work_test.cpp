@@ -1,0 +1,287 @@
+// Renders that are killed, interrupted, continued and divided: the files are always those of one render.
+
+#include <fmt/core.h>
+#include <sys/stat.h>
+
+#include "tests/data_folder.h"
+#include "tests/program/support.h"
+
+namespace tensorray {
+namespace {
+
+using namespace test;
+
+const char* const whole_scene = R"({
+  "field": {"file": "field.vdb", "eigenvalues": "absolute", "scale": 4},
+  "integrator": {"type": "scene", "max_samples": 16, "min_samples": 8, "bands": 4, "bands_per_sample": 4,
+                 "caustic": {"resolution": 32, "rays": 1000, "passes": 1}},
+  "camera": {"resolution": [70, 50]}})";
+
+const char* const path_scene = R"({
+  "field": {"file": "field.vdb", "eigenvalues": "absolute", "scale": 4},
+  "integrator": {"type": "path_tracing", "max_samples": 64, "min_samples": 8, "noise": 0.01},
+  "camera": {"resolution": [60, 50]}})";
+
+class KeptWork : public Program {
+ protected:
+  void SetUp() override {
+    Program::SetUp();
+    make(whole_scene);
+  }
+
+  /// Makes the scene, its field, and the files of one render.
+  void make(const char* scene) const {
+    write("scene.json", scene);
+    run_well({"make", "point_load", "-o", "field.vdb", "--resolution", "17"});
+    run_well(render("whole"));
+  }
+
+  static std::vector<std::string> render(const std::string& name, const std::vector<std::string>& more = {}) {
+    std::vector<std::string> arguments{"render", "scene.json", "-q", "-o", name + ".png", "-o", name + ".exr"};
+    arguments.insert(arguments.end(), more.begin(), more.end());
+    return arguments;
+  }
+
+  /// The number of a file on its disk; 0 if there is none. A file that is replaced has another one.
+  ino_t number_of(const std::string& file) const {
+    struct stat status {};
+    return stat(in_folder(file).c_str(), &status) == 0 ? status.st_ino : 0;
+  }
+
+  static bool is_running(pid_t child) {
+    siginfo_t info{};
+    return waitid(P_PID, static_cast<id_t>(child), &info, WEXITED | WNOHANG | WNOWAIT) == 0 && info.si_pid == 0;
+  }
+
+  /// Starts a render and waits until it has written a file, or has ended. @return the process.
+  pid_t start_until(const std::string& file, const std::vector<std::string>& arguments) const {
+    const ino_t before = number_of(file);
+    const pid_t child = start(arguments);
+    while (number_of(file) == before && is_running(child)) std::this_thread::sleep_for(std::chrono::milliseconds(1));
+    return child;
+  }
+
+  /// A run that a signal ends as soon as it has written a file. A run that was quicker is tried again.
+  Outcome end_by(int signal, const std::string& file, const std::vector<std::string>& arguments) const {
+    Outcome outcome;
+    for (int i = 0; i < 20 && outcome.status <= 0; ++i) {
+      const pid_t child = start_until(file, arguments);
+      kill(child, signal);
+      outcome = wait_for(child);
+    }
+    return outcome;
+  }
+
+  /// The same for a render of the pictures a.*, of which none is there before it.
+  Outcome end_by(int signal, const std::vector<std::string>& more = {}) const {
+    for (const char* picture : {"a.png", "a.exr"}) std::filesystem::remove(in_folder(picture));
+    std::vector<std::string> arguments = render("a", more);
+    arguments.insert(arguments.end(), {"--checkpoint", "0.01"});
+    return end_by(signal, "a.png.checkpoint", arguments);
+  }
+
+  bool is_equal(const std::string& a, const std::string& b) const {
+    return has(a) && has(b) && read_file(in_folder(a)) == read_file(in_folder(b));
+  }
+
+  void expect_same(const std::string& name) const {
+    for (const char* ending : {".png", ".exr"})
+      EXPECT_TRUE(is_equal(name + ending, "whole" + std::string(ending))) << ending;
+  }
+
+  void expect_error(const std::string& part, const std::vector<std::string>& arguments, int status = 2) const {
+    const Outcome outcome = run(arguments);
+    EXPECT_EQ(outcome.status, status) << part;
+    EXPECT_NE(outcome.error.find(part), std::string::npos) << outcome.error;
+    EXPECT_EQ(std::count(outcome.error.begin(), outcome.error.end(), '\n'), 1) << outcome.error;
+  }
+
+  bool has(const std::string& name) const { return std::filesystem::exists(in_folder(name)); }
+
+  void make_shards(int count) const {
+    for (int i = 1; i <= count; ++i)
+      run_well({"render", "scene.json", "-q", "--shard", fmt::format("{}/{}", i, count), "-o", shard(i)});
+  }
+
+  static std::string shard(int i) { return fmt::format("{}.shard", i); }
+
+  static std::vector<std::string> merge(std::vector<std::string> shards) {
+    shards.insert(shards.begin(), {"merge", "-q", "-o", "a.png", "-o", "a.exr"});
+    return shards;
+  }
+};
+
+TEST_F(KeptWork, AKilledRenderContinuesToTheSameFiles) {
+  for (const char* scene : {whole_scene, path_scene}) {
+    make(scene);
+    EXPECT_EQ(end_by(SIGKILL).status, 128 + SIGKILL);
+    EXPECT_FALSE(is_equal("a.png", "whole.png"));
+    EXPECT_EQ(end_by(SIGKILL, {"--resume", "--threads", "1"}).status, 128 + SIGKILL);
+    run_well(render("a", {"--resume"}));
+    expect_same("a");
+    EXPECT_FALSE(has("a.png.checkpoint"));
+  }
+}
+
+/// Their sums on the plate are kept, of each estimator.
+TEST_F(KeptWork, KilledPhotonsContinueToTheSameFiles) {
+  for (const char* density : {R"({"kind": "gaussian", "tau": 2})", R"({"kind": "photon_differential"})"}) {
+    make(fmt::format(R"({{"field": {{"file": "field.vdb"}}, "light": {{"photons": 2e6, "wavelengths": {{"count": 8}}}},
+                         "receiver": {{"resolution": [64, 64]}},
+                         "integrator": {{"type": "photon_distribution", "density": {}}}}})",
+                     density)
+             .c_str());
+    EXPECT_EQ(end_by(SIGKILL).status, 128 + SIGKILL);
+    const Outcome interrupted = end_by(SIGINT, {"--resume", "--threads", "1"});
+    EXPECT_EQ(interrupted.status, 130);
+    EXPECT_NE(interrupted.error.find("--resume continues from"), std::string::npos) << interrupted.error;
+    run_well(render("a", {"--resume"}));
+    expect_same("a");
+  }
+}
+
+TEST_F(KeptWork, AnInterruptedRenderWritesWhatItHas) {
+  for (const int signal : {SIGINT, SIGTERM}) {
+    const Outcome outcome = end_by(signal, {"--resume"});
+    EXPECT_EQ(outcome.status, 130);
+    EXPECT_NE(outcome.error.find("--resume continues from"), std::string::npos) << outcome.error;
+    EXPECT_TRUE(has("a.png") && has("a.exr"));
+    EXPECT_FALSE(is_equal("a.exr", "whole.exr"));
+  }
+  run_well(render("a", {"--resume"}));
+  expect_same("a");
+}
+
+TEST_F(KeptWork, ARequestWritesAPictureAndTheRenderGoesOn) {
+  bool is_seen = false;
+  for (int i = 0; i < 20 && !is_seen; ++i) {  // A render that was quicker is tried again.
+    std::filesystem::remove(in_folder("a.exr"));
+    const pid_t child = start_until("a.png.checkpoint", render("a", {"--checkpoint", "0.01"}));
+    kill(child, SIGUSR1);
+    while (!has("a.exr") && is_running(child)) std::this_thread::sleep_for(std::chrono::milliseconds(1));
+    is_seen = has("a.exr") && !is_equal("a.exr", "whole.exr");
+    EXPECT_EQ(wait_for(child).status, 0);
+    expect_same("a");
+  }
+  EXPECT_TRUE(is_seen);
+}
+
+TEST_F(KeptWork, ACheckpointOfAnotherRenderIsRefused) {
+  end_by(SIGKILL);
+  expect_error("continue it with --resume", render("a"));
+  expect_error("`/seed` is not given there, 7 here", render("a", {"--resume", "--seed", "7"}));
+  expect_error("`/camera/resolution`", render("a", {"--resume", "--set", "camera.resolution=[9,9]"}));
+  expect_error("method is", render("a", {"--resume", "--set", "integrator.type=lens"}));
+  const std::string field = read_file(in_folder("field.vdb")), kept = read_file(in_folder("a.png.checkpoint"));
+  run_well({"make", "vortex", "-o", "field.vdb", "--resolution", "17"});
+  expect_error("the file `/field/file` has other contents", render("a", {"--resume"}));
+  write("field.vdb", field);
+  write("a.png.checkpoint", kept.substr(0, kept.size() - 100));
+  expect_error("a.png.checkpoint: is cut off", render("a", {"--resume"}), 1);
+  std::string damaged = kept;
+  damaged[damaged.size() / 2] = static_cast<char>(damaged[damaged.size() / 2] + 1);
+  write("a.png.checkpoint", damaged);
+  expect_error("a.png.checkpoint: is damaged", render("a", {"--resume"}), 1);
+  write("a.png.checkpoint", kept);
+  run_well(render("a", {"--resume"}));
+  expect_same("a");
+}
+
+/// The render goes on, and the old checkpoint stays.
+TEST_F(KeptWork, AFullDiskLeavesTheOldCheckpoint) {
+  end_by(SIGKILL);
+  const std::string kept = read_file(in_folder("a.png.checkpoint"));
+  std::vector<std::string> arguments = render("a", {"--resume", "--checkpoint", "0.01"});
+  const Outcome outcome = run(arguments, 16);
+  EXPECT_EQ(outcome.status, 1) << outcome.error;  // There is no room for the picture, either.
+  EXPECT_NE(outcome.error.find("warning: no checkpoint"), std::string::npos) << outcome.error;
+  EXPECT_TRUE(read_file(in_folder("a.png.checkpoint")) == kept);
+  EXPECT_FALSE(has("a.png.checkpoint.new"));
+  EXPECT_FALSE(has("a.exr"));
+  run_well(render("a", {"--resume"}));
+  expect_same("a");
+}
+
+TEST_F(KeptWork, ShardsMergeToTheSameFiles) {
+  for (const int count : {1, 16, 3}) {
+    if (count == 3) make(path_scene);
+    make_shards(count);
+    std::vector<std::string> shards;
+    for (int i = count; i >= 1; --i) shards.push_back(shard(i));
+    run_well(merge(shards));
+    expect_same("a");
+  }
+}
+
+TEST_F(KeptWork, ShardsThatDoNotFitAreNamed) {
+  make_shards(3);
+  expect_error("missing shard 2/3", merge({"1.shard", "3.shard"}));
+  expect_error("3.shard and 3.shard are both shard 3/3", merge({"1.shard", "2.shard", "3.shard", "3.shard"}));
+  const std::string good = read_file(in_folder("2.shard"));
+  write("2.shard", good.substr(0, good.size() / 2));
+  expect_error("2.shard: is cut off", merge({"1.shard", "2.shard", "3.shard"}), 1);
+  run_well({"render", "scene.json", "-q", "--shard", "2/3", "-o", "2.shard", "--seed", "3"});
+  expect_error("2.shard: is of another render than the first shard: `/seed`", merge({"1.shard", "2.shard", "3.shard"}));
+  run_well({"render", "scene.json", "-q", "--shard", "2/4", "-o", "2.shard"});
+  expect_error("2.shard: is one of 4 shards", merge({"1.shard", "2.shard", "3.shard"}));
+  expect_error("scene.json: is no checkpoint or shard", merge({"scene.json"}), 1);
+  expect_error("--shard 4/3", {"render", "scene.json", "--shard", "4/3", "-o", "2.shard"});
+  expect_error("--shard: name one file", render("a", {"--shard", "1/3"}));
+  run_well({"render", "scene.json", "-q", "--shard", "2/3", "-o", "2.shard"});
+  run_well(merge({"1.shard", "2.shard", "3.shard"}));
+  expect_same("a");
+}
+
+TEST_F(KeptWork, AShardContinues) {
+  make_shards(2);
+  const std::string whole = read_file(in_folder("2.shard"));
+  std::filesystem::remove(in_folder("2.shard"));
+  std::vector<std::string> arguments{"render", "scene.json", "-q",           "--shard", "2/2",
+                                     "-o",     "2.shard",    "--checkpoint", "0.01"};
+  EXPECT_EQ(end_by(SIGKILL, "2.shard.checkpoint", arguments).status, 128 + SIGKILL);
+  expect_error("missing shard 2/2", merge({"1.shard"}));
+  arguments.push_back("--resume");
+  run_well(arguments);
+  EXPECT_TRUE(read_file(in_folder("2.shard")) == whole);
+}
+
+TEST_F(KeptWork, TasksOfAnArrayMakeTheShards) {
+  const std::string script = fmt::format("cd '{}' && TENSORRAY='{}' %s '{}' 2 scene.json -q", in_folder("").string(),
+                                         TENSORRAY_BINARY, (source_folder() / "tools/render_array").string());
+  for (const char* task : {"TASK=1", "SLURM_ARRAY_TASK_ID=2 SLURM_CPUS_PER_TASK=2"}) {
+    std::string command = script;
+    command.replace(command.find("%s"), 2, task);
+    EXPECT_EQ(std::system(command.c_str()), 0) << command;
+  }
+  std::filesystem::rename(in_folder("part1.shard"), in_folder("1.shard"));
+  std::filesystem::rename(in_folder("part2.shard"), in_folder("2.shard"));
+  run_well(merge({"1.shard", "2.shard"}));
+  expect_same("a");
+  // A task whose shard is there has nothing to do.
+  write("part1.shard", "");
+  std::string again = script;
+  again.replace(again.find("%s"), 2, "TASK=1");
+  EXPECT_EQ(std::system(again.c_str()), 0);
+  EXPECT_EQ(read_file(in_folder("part1.shard")), "");
+}
+
+/// A frame that was interrupted has files, which are not its picture.
+TEST_F(KeptWork, ASequenceContinuesAtTheFrameThatWasInterrupted) {
+  const std::vector<std::string> turn{"--set", R"(camera.angle={"keys":[[1,20],[3,30]]})"};
+  const auto frames = [&](const std::string& name, const std::vector<std::string>& more = {}) {
+    std::vector<std::string> arguments = render(name + ".#", turn);
+    arguments.insert(arguments.end(), {"--frames", "1-3"});
+    arguments.insert(arguments.end(), more.begin(), more.end());
+    return arguments;
+  };
+  run_well(frames("all"));
+  EXPECT_EQ(end_by(SIGINT, "a.2.png.checkpoint", frames("a", {"--checkpoint", "0.01"})).status, 130);
+  EXPECT_TRUE(has("a.2.png"));
+  EXPECT_FALSE(has("a.3.png"));
+  run_well(frames("a", {"--skip-existing", "--resume"}));
+  for (const char* name : {".1.png", ".2.png", ".3.png", ".1.exr", ".2.exr", ".3.exr"})
+    EXPECT_TRUE(is_equal("a" + std::string(name), "all" + std::string(name))) << name;
+}
+
+}  // namespace
+}  // namespace tensorray

@@ -1,0 +1,90 @@
+#include "tools/commands/work_keeper.h"
+
+#include <algorithm>
+#include <chrono>
+#include <stdexcept>
+
+#include <fmt/format.h>
+
+#include "base/seconds.h"
+#include "scenes/jobs/origin.h"
+#include "tools/command_line/interrupts.h"
+#include "tools/command_line/tell.h"
+
+namespace tensorray {
+namespace {
+
+constexpr double longest_tick = 0.2;  // Seconds after which a signal is noticed.
+
+}  // namespace
+
+WorkKeeper::WorkKeeper(const Scene& scene, Work& work, const KeepSettings& settings)
+    : scene_(scene), work_(work), settings_(settings), thread_([this] { run(); }) {}
+
+WorkKeeper::~WorkKeeper() {
+  {
+    const std::lock_guard lock(waiting_);
+    ends_ = true;
+  }
+  wake_.notify_all();
+  thread_.join();
+}
+
+WorkFile WorkKeeper::work_file() {
+  if (!origin_) origin_ = origin_of(scene_);
+  return {*origin_, std::filesystem::absolute(scene_.description.path), work_.part(), work_.units()};
+}
+
+bool WorkKeeper::write() {
+  const std::lock_guard lock(writing_);
+  if (settings_.file.empty()) return false;
+  try {
+    const WorkFile file = work_file();
+    if (file.units.empty()) return false;
+    write_work(settings_.file, file);
+    is_written_ = true;
+  } catch (const std::runtime_error& error) {
+    if (!has_failed_) tell({fmt::format("warning: no checkpoint: {}", error.what())}, false);
+    has_failed_ = true;
+  }
+  return is_written_ || std::filesystem::exists(settings_.file);
+}
+
+void WorkKeeper::remove() {
+  const std::lock_guard lock(writing_);
+  std::error_code error;
+  if (!settings_.file.empty()) std::filesystem::remove(settings_.file, error);
+}
+
+/// Finds what the work belongs to while the files are those that were loaded.
+void WorkKeeper::begin() {
+  const std::lock_guard lock(writing_);
+  if (origin_ || settings_.file.empty() || work_.units().empty()) return;
+  try {
+    origin_ = origin_of(scene_);
+  } catch (const std::runtime_error&) {  // write() reports it.
+  }
+}
+
+void WorkKeeper::run() {
+  const std::chrono::duration<double> tick(settings_.interval > 0 ? std::min(longest_tick, settings_.interval / 2)
+                                                                  : longest_tick);
+  Clock::time_point written = Clock::now(), shown = written;
+  std::unique_lock lock(waiting_);
+  while (!wake_.wait_for(lock, tick, [this] { return ends_; })) {
+    lock.unlock();
+    begin();
+    const bool is_asked = take_picture_request();
+    if (is_asked || (settings_.watch > 0 && seconds_since(shown) > settings_.watch)) {
+      work_.picture_wanted = true;
+      shown = Clock::now();
+    }
+    if (is_asked || (settings_.interval > 0 && seconds_since(written) > settings_.interval)) {
+      write();
+      written = Clock::now();
+    }
+    lock.lock();
+  }
+}
+
+}  // namespace tensorray
