@@ -16,12 +16,12 @@
 #include "scenes/description/run_files.h"
 #include "scenes/keys/frames.h"
 #include "scenes/keys/json_reader.h"
+#include "scenes/outputs/statistics_json.h"
 #include "scenes/outputs/write_outputs.h"
 #include "scenes/scene/render.h"
 #include "scenes/scene/scene.h"
 #include "tools/command_line/progress_bar.h"
 #include "tools/command_line/tell.h"
-#include "tools/commands/statistics_json.h"
 
 namespace tensorray {
 namespace {
@@ -57,13 +57,6 @@ OutputFiles open_files(const SceneDescription& description, const RenderRun& run
   for (const NamedFile& file : more)
     if (!file.path.empty()) files.emplace(file.name, OutputFile(file.path));
   return files;
-}
-
-/// Gives all files their final names, or none of them.
-void commit(OutputFiles files) {
-  std::vector<OutputFile> complete;
-  for (auto& [key, file] : files) complete.push_back(std::move(file));
-  commit_all(complete);
 }
 
 unsigned threads_of(const RenderRun& run) {
@@ -104,7 +97,7 @@ Scene render_to_files(const SceneDescription& description, const RenderRun& run,
     write_text(files.at(statistics_key),
                statistics_json(scene, result.statistics, seconds_since(start), static_cast<int>(threads_of(run))));
   if (!run.scene_copy.empty()) write_text(files.at(scene_key), parse_value(description.text).dump(2) + "\n");
-  commit(std::move(files));
+  commit_outputs(std::move(files));
   for (const auto& [key, path] : description.output.files)
     if (!run.quiet) fmt::print("wrote {}\n", path.string());
   return scene;
