@@ -7,12 +7,12 @@ from . import _tensorray
 
 
 def folder():
-    """The folder of the programs: `bin` beside the package in a build folder, or that of an installed `tensorray`."""
-    beside = os.path.join(os.path.dirname(os.path.dirname(os.path.dirname(os.path.abspath(__file__)))), "bin")
-    built = os.path.join(os.path.dirname(os.path.abspath(_tensorray.__file__)), "..", "..", "bin")
-    for candidate in (built, beside):
-        if os.path.exists(os.path.join(candidate, "tensorray")):
-            return os.path.realpath(candidate)
+    """The folder `bin` of the build folder, or of the prefix, that has this package; or that of another `tensorray`."""
+    parent = os.path.dirname(os.path.abspath(_tensorray.__file__))
+    while parent != os.path.dirname(parent):
+        if os.path.exists(os.path.join(parent, "bin", "tensorray")):
+            return os.path.join(parent, "bin")
+        parent = os.path.dirname(parent)
     installed = shutil.which("tensorray")
     return os.path.dirname(installed) if installed else "/usr/bin"
 

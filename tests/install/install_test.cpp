@@ -1,0 +1,73 @@
+// What `cmake --install` installs works where it is installed: programs, the C++ library, the Python package.
+
+#include <cstdlib>
+#include <filesystem>
+#include <string>
+
+#include <gtest/gtest.h>
+#include <unistd.h>
+
+#include "tests/data_folder.h"
+
+namespace tensorray {
+namespace {
+
+namespace fs = std::filesystem;
+
+class Install : public testing::Test {
+ protected:
+  void SetUp() override {
+    folder_ = fs::path(testing::TempDir()) / ("tensorray_install_" + std::to_string(getpid()));
+    fs::create_directories(folder_);
+  }
+  void TearDown() override { fs::remove_all(folder_); }
+
+  /// Runs a command of the shell in the test's folder, with `prefix` as the variable of that name.
+  void run(const std::string& command) const {
+    const std::string shell = "cd '" + folder_.string() + "' && prefix='" + prefix().string() + "' && " + command;
+    EXPECT_EQ(std::system(shell.c_str()), 0) << command;
+  }
+
+  void install(const std::string& component) const {
+    run("cmake --install '" TENSORRAY_BUILD_FOLDER "' --prefix \"$prefix\" --component " + component + " >install.log");
+  }
+
+  fs::path prefix() const { return folder_ / "prefix"; }
+
+ private:
+  fs::path folder_;
+};
+
+TEST_F(Install, ProgramsRun) {
+  install("programs");
+  const std::string scene = (test::source_folder() / "scenes" / "constant.json").string();
+  run("\"$prefix/bin/tensorray\" render '" + scene +
+      "' --set light.photons=1000 -q -o a.png -o a.vtp && test -s a.png");
+  EXPECT_TRUE(fs::exists(prefix() / "share" / "doc" / "tensorray" / "scenes" / "vortex.json"));
+}
+
+TEST_F(Install, AProjectFindsTheLibrary) {
+  install("programs");
+  install("development");
+  const std::string project = (test::source_folder() / "tests" / "install" / "example").string();
+  run("cmake -S '" + project +
+      "' -B build -DCMAKE_PREFIX_PATH=\"$prefix\" >configure.log && cmake --build build >build.log");
+  run("echo '{\"field\": {\"generate\": {\"kind\": \"vortex\", \"resolution\": 8}}, \"light\": {\"photons\": 1000},"
+      " \"integrator\": {\"type\": \"photon_distribution\"}}' >scene.json");
+  run("build/example scene.json | grep -qx 'tensorray [0-9.]*: 0.500 radians per unit of length' && test -s scene.png");
+  run("\"$prefix/bin/tensorray\" render scene.json -q -o b.exr && cmp scene.exr b.exr");
+}
+
+TEST_F(Install, PythonFindsThePackage) {
+  if (std::system("'" TENSORRAY_PYTHON_PROGRAM "' -c 'import numpy' 2>/dev/null") != 0)
+    GTEST_SKIP() << "NumPy is not installed";
+  install("programs");
+  install("python");
+  run("PYTHONPATH=\"$prefix/" TENSORRAY_PYTHON_FOLDER "\" PYTHONDONTWRITEBYTECODE=1 '" TENSORRAY_PYTHON_PROGRAM
+      "' -c \"import tensorray as tr; assert tr.__file__.startswith('$prefix'); "
+      "tr.render(field=tr.make('vortex', resolution=8), changes={'light.photons': 1000}, outputs=['a.png', "
+      "'a.vtp'])\"");
+}
+
+}  // namespace
+}  // namespace tensorray
