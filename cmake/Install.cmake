@@ -30,6 +30,25 @@ if(TARGET _tensorray)
           FILES_MATCHING PATTERN "*.py" PATTERN "*.pyi" PATTERN "py.typed" PATTERN "__pycache__" EXCLUDE)
 endif()
 
+# Manual pages and completion of shells, made from what all programs say to --help.
+if(Python3_EXECUTABLE AND TARGET tensorray-import AND TARGET tensorray-view AND NOT TENSORRAY_SANITIZE)
+  set(manual ${CMAKE_BINARY_DIR}/manual)
+  file(GLOB manual_sources CONFIGURE_DEPENDS tools/manual/*)
+  add_custom_command(OUTPUT ${manual}/tensorray.fish
+                     COMMAND ${Python3_EXECUTABLE} ${PROJECT_SOURCE_DIR}/tools/manual/make $<TARGET_FILE:tensorray>
+                             ${PROJECT_VERSION} ${manual}
+                     DEPENDS ${manual_sources} tensorray tensorray-import tensorray-view VERBATIM)
+  add_custom_target(manual ALL DEPENDS ${manual}/tensorray.fish)
+  install(DIRECTORY ${manual}/man1 DESTINATION ${CMAKE_INSTALL_MANDIR} COMPONENT programs)
+  install(FILES ${manual}/tensorray.bash DESTINATION ${CMAKE_INSTALL_DATADIR}/bash-completion/completions
+          RENAME tensorray COMPONENT programs)
+  install(FILES ${manual}/_tensorray DESTINATION ${CMAKE_INSTALL_DATADIR}/zsh/vendor-completions COMPONENT programs)
+  install(FILES ${manual}/tensorray.fish DESTINATION ${CMAKE_INSTALL_DATADIR}/fish/vendor_completions.d
+          COMPONENT programs)
+endif()
+
 if(TENSORRAY_LIBRARY)
   include(Library)
 endif()
+
+include(Packages)

@@ -69,5 +69,38 @@ TEST_F(Install, PythonFindsThePackage) {
       "'a.vtp'])\"");
 }
 
+bool has(const std::string& program) { return std::system(("command -v " + program + " >/dev/null").c_str()) == 0; }
+
+TEST_F(Install, ManualPagesAreRead) {
+  if (!has("man")) GTEST_SKIP() << "man is not installed";
+  install("programs");
+  for (const char* page : {"tensorray", "tensorray-render", "tensorray-import", "tensorray-view", "tensorray-make"}) {
+    const std::string file = "\"$prefix/share/man/man1/" + std::string(page) + ".1\"";
+    run("man --warnings -l " + file + " >page.txt 2>warnings.txt && test -s page.txt && ! test -s warnings.txt");
+  }
+  run("man -l \"$prefix/share/man/man1/tensorray-make.1\" | col -b | grep -q -- --circulation");
+}
+
+TEST_F(Install, ShellsComplete) {
+  install("programs");
+  const std::string words = "$prefix/share/";
+  const std::string bash =
+      "source \"$0\"; COMP_CWORD=$(($# - 1)); COMP_WORDS=(\"$@\"); _tensorray; echo \"${COMPREPLY[@]}\"";
+  const auto completes = [&](const std::string& typed, const std::string& expected) {
+    run("test \"$(bash -c '" + bash + "' \"" + words + "bash-completion/completions/tensorray\" " + typed + ")\" = '" +
+        expected + "'");
+  };
+  completes("tensorray re", "render");
+  completes("tensorray make vor", "vortex");
+  completes("tensorray make vortex --ci", "--circulation");
+  completes("tensorray render --until", "--until-error");
+  completes("tensorray render scene.js", "");  // Left to the names of files.
+  if (has("zsh")) run("zsh -n \"" + words + "zsh/vendor-completions/_tensorray\"");
+  if (has("fish"))
+    run("fish -c 'source '\"" + words +
+        "fish/vendor_completions.d/tensorray.fish\"'; complete -C \"tensorray make vortex "
+        "--ci\"' | grep -q '^--circulation'");
+}
+
 }  // namespace
 }  // namespace tensorray
