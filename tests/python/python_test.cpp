@@ -26,5 +26,13 @@ TEST(Python, LongCalls) { run("long_calls_test.py"); }
 TEST(Python, Rays) { run("rays_test.py"); }
 TEST(Python, Package) { run("package_test.py"); }
 
+TEST(Python, ParaView) {
+  if (std::system("pvpython --version >/dev/null 2>&1") != 0) GTEST_SKIP() << "ParaView (pvpython) is not installed";
+  const std::filesystem::path test = test::source_folder() / "tests" / "python" / "paraview_test.py";
+  const std::string command =
+      "PYTHONPATH='" TENSORRAY_PYTHON_FOLDER "' PYTHONDONTWRITEBYTECODE=1 pvpython '" + test.string() + "'";
+  EXPECT_EQ(std::system(command.c_str()), 0);
+}
+
 }  // namespace
 }  // namespace tensorray
