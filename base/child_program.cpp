@@ -38,6 +38,11 @@ struct SpawnActions {
   posix_spawn_file_actions_t actions;
 };
 
+std::filesystem::path& program_folder() {
+  static std::filesystem::path folder;  // Empty: that of the running program.
+  return folder;
+}
+
 int wait_for(pid_t child) {
   int status = 0;
   while (waitpid(child, &status, 0) < 0)
@@ -63,7 +68,10 @@ UnnamedFile::~UnnamedFile() { close(descriptor_); }
 
 std::filesystem::path UnnamedFile::path() const { return "/proc/self/fd/" + std::to_string(descriptor_); }
 
+void use_programs_in(const std::filesystem::path& folder) { program_folder() = folder; }
+
 std::filesystem::path sibling_program(const std::string& name) {
+  if (!program_folder().empty()) return program_folder() / name;
   std::error_code none;
   return std::filesystem::read_symlink("/proc/self/exe", none).replace_filename(name);
 }

@@ -1,6 +1,7 @@
 #pragma once
 /// @file base/child_program.h
-/// Runs another program of this project, which is in the folder of the running program.
+/// Runs another program of this project, which is in the folder of the running program, or, where the running program
+/// is another one's (an interpreter that has loaded this code), in a folder that is named.
 
 #include <filesystem>
 #include <string>
@@ -36,7 +37,11 @@ struct ProgramEnd {
   std::string error;  ///< The program's output to standard error.
 };
 
-/// The path of a program of this project, in the folder of the running program. The file need not exist.
+/// Names the folder of this project's programs, for a process that is not one of them. Call it before other threads
+/// start work.
+void use_programs_in(const std::filesystem::path& folder);
+
+/// The path of a program of this project. The file need not exist.
 std::filesystem::path sibling_program(const std::string& name);
 
 /// Runs a program and waits for its end. The program shares the working folder, the environment, standard output, and

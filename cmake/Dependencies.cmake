@@ -51,6 +51,14 @@ if(TENSORRAY_VIEW)
   find_package(Boost 1.74 REQUIRED)  # Headers alone: Asio and Beast.
 endif()
 
+if(TENSORRAY_PYTHON)
+  if(NOT Python3_EXECUTABLE AND EXISTS /usr/bin/python3)
+    set(Python3_EXECUTABLE /usr/bin/python3)  # The system's, whose packages the module uses, and no other in PATH.
+  endif()
+  find_package(Python3 3.9 REQUIRED COMPONENTS Interpreter Development.Module)
+  find_package(pybind11 2.10 REQUIRED)
+endif()
+
 # Libraries that the benchmark compares with, if they are installed.
 if(TENSORRAY_BENCHMARK)
   find_path(NanoVDB_INCLUDE_DIR nanovdb/NanoVDB.h)

@@ -23,6 +23,13 @@ if(TENSORRAY_SANITIZE)
   target_link_options(tensorray_options INTERFACE -fsanitize=address,undefined)
 endif()
 
+# Objects of a library are linked into programs and into the Python module, which is a shared library. The second option
+# lets the compiler inline as it does for programs.
+function(tensorray_relocatable name)
+  set_target_properties(${name} PROPERTIES POSITION_INDEPENDENT_CODE ON)
+  target_compile_options(${name} PRIVATE -fno-semantic-interposition)
+endfunction()
+
 # tensorray_library(NAME [EXCEPT FOLDER]): a static library of all sources in this folder and its subfolders, without
 # those of one subfolder (CONFIGURE_DEPENDS finds new files by itself).
 function(tensorray_library name)
@@ -33,6 +40,7 @@ function(tensorray_library name)
   endif()
   add_library(${name} STATIC ${sources})
   set_target_properties(${name} PROPERTIES UNITY_BUILD ${TENSORRAY_UNITY})
+  tensorray_relocatable(${name})
   target_link_libraries(${name} PUBLIC Eigen3::Eigen PRIVATE tensorray_options)
   # Half of the time to compile most files is the headers that nearly all of them include.
   target_precompile_headers(${name} PRIVATE <Eigen/Geometry> <algorithm> <filesystem> <functional> <map> <memory>

@@ -27,4 +27,10 @@ void write_outputs(const Render& render, const Scene& scene, OutputFiles& files)
   });
 }
 
+void commit_outputs(OutputFiles files) {
+  std::vector<OutputFile> complete;
+  for (auto& [key, file] : files) complete.push_back(std::move(file));
+  commit_all(complete);
+}
+
 }  // namespace tensorray

@@ -20,8 +20,11 @@ using OutputFiles = std::map<std::string, OutputFile>;
 /// @throw std::runtime_error naming the file and the fix.
 OutputFiles open_outputs(const OutputDescription& output);
 
-/// Writes the files under temporary names. commit_all then gives them their final names.
+/// Writes the files under temporary names. commit_outputs then gives them their final names.
 /// @throw std::runtime_error naming the file and the reason.
 void write_outputs(const Render& render, const Scene& scene, OutputFiles& files);
+
+/// Gives all files their final names, or none of them (commit_all). @throw std::runtime_error.
+void commit_outputs(OutputFiles files);
 
 }  // namespace tensorray

@@ -33,36 +33,6 @@ std::string source_of(const FieldDescription& field) {
   return field.generate ? kind_of(field.generate->generator) : field.file.string();
 }
 
-struct LoadedField {
-  TensorField field;
-  EigenvalueReport eigenvalues;
-  std::size_t non_finite = 0;
-};
-
-/// Reads or generates the field, removes voxels that are not finite, and preprocesses it.
-LoadedField load_field(const SceneDescription& description, std::vector<std::string>& notes) {
-  TensorGrid grid = load_grid(description);
-  const std::size_t active = grid.active_voxels();
-  const std::size_t non_finite = remove_non_finite(grid);
-  const std::string source = source_of(description.field);
-  if (non_finite > 0)
-    notes.push_back(fmt::format("warning: {}: {} of {} voxels are not finite; light goes straight there", source,
-                                non_finite, active));
-  if (grid.blocks.empty())
-    throw std::runtime_error(source + ": no voxel of the field is finite; nothing can be traced");
-  const EigenvalueReport eigenvalues = apply_eigenvalues(grid, description.field.eigenvalues);
-  notes.push_back(fmt::format("field: {}, {} voxels, eigenvalues {}", source, grid.active_voxels(),
-                              choice_name(eigenvalues.chosen)));
-  if (eigenvalues.defective > 0)
-    notes.push_back(fmt::format("{} voxels hold a defective tensor, preprocessed by its limit", eigenvalues.defective));
-  if (eigenvalues.norm_lost > 0.01)
-    notes.push_back(
-        fmt::format("preprocessing erased {:.0f}% of the field's squared norm (rotation and shear); "
-                    "\"eigenvalues\": \"raw\" keeps it",
-                    100 * eigenvalues.norm_lost));
-  return {TensorField(std::move(grid)), eigenvalues, non_finite};
-}
-
 TriangleMesh load_closed_mesh(const std::filesystem::path& path) {
   TriangleMesh mesh = read_mesh(path);
   try {
@@ -243,6 +213,14 @@ LoadedLight load_light(const SceneDescription& description) {
   return light;
 }
 
+/// The first notes of a scene: what its description and its field have to say.
+std::vector<std::string> notes_of(const SceneDescription& description, const LoadedField& field) {
+  std::vector<std::string> notes;
+  for (const std::string& warning : description.warnings) notes.push_back("warning: " + warning);
+  notes.insert(notes.end(), field.notes.begin(), field.notes.end());
+  return notes;
+}
+
 Scene make_scene(SceneDescription description, LoadedLight light, LoadedField loaded, std::vector<std::string> notes,
                  const Progress& progress) {
   description.light.direction = load_direction(description, loaded.field, progress, notes);
@@ -287,22 +265,52 @@ void require_near(const Plate& plate, const char* pointer, const SceneDescriptio
     fail_size(description, pointer);
 }
 
+LoadedField prepare_field(TensorGrid grid, Eigenvalues mode, const std::string& source) {
+  std::vector<std::string> notes;
+  const std::size_t active = grid.active_voxels();
+  const std::size_t non_finite = remove_non_finite(grid);
+  if (non_finite > 0)
+    notes.push_back(fmt::format("warning: {}: {} of {} voxels are not finite; light goes straight there", source,
+                                non_finite, active));
+  if (grid.blocks.empty())
+    throw std::runtime_error(source + ": no voxel of the field is finite; nothing can be traced");
+  const EigenvalueReport eigenvalues = apply_eigenvalues(grid, mode);
+  notes.push_back(fmt::format("field: {}, {} voxels, eigenvalues {}", source, grid.active_voxels(),
+                              choice_name(eigenvalues.chosen)));
+  if (eigenvalues.defective > 0)
+    notes.push_back(fmt::format("{} voxels hold a defective tensor, preprocessed by its limit", eigenvalues.defective));
+  if (eigenvalues.norm_lost > 0.01)
+    notes.push_back(
+        fmt::format("preprocessing erased {:.0f}% of the field's squared norm (rotation and shear); "
+                    "\"eigenvalues\": \"raw\" keeps it",
+                    100 * eigenvalues.norm_lost));
+  return {TensorField(std::move(grid)), eigenvalues, non_finite, std::move(notes)};
+}
+
 Scene load_scene(const SceneDescription& description, const Progress& progress) {
   const auto start = Clock::now();
-  std::vector<std::string> notes;
-  for (const std::string& warning : description.warnings) notes.push_back("warning: " + warning);
   LoadedLight light = load_light(description);
   progress.update("loading", 0, 1);
-  LoadedField field = load_field(description, notes);
-  Scene scene = make_scene(description, std::move(light), std::move(field), std::move(notes), progress);
+  const FieldDescription& field = description.field;
+  LoadedField loaded = prepare_field(load_grid(description), field.eigenvalues, source_of(field));
+  std::vector<std::string> notes = notes_of(description, loaded);
+  Scene scene = make_scene(description, std::move(light), std::move(loaded), std::move(notes), progress);
+  scene.seconds = seconds_since(start);
+  return scene;
+}
+
+Scene load_scene(const SceneDescription& description, LoadedField field, const Progress& progress) {
+  const auto start = Clock::now();
+  std::vector<std::string> notes = notes_of(description, field);
+  Scene scene = make_scene(description, load_light(description), std::move(field), std::move(notes), progress);
   scene.seconds = seconds_since(start);
   return scene;
 }
 
 Scene reload_scene(const Scene& loaded, const SceneDescription& description, const Progress& progress) {
   const auto start = Clock::now();
-  Scene scene = make_scene(description, load_light(description), {loaded.field, loaded.eigenvalues, loaded.non_finite},
-                           {}, progress);
+  Scene scene = make_scene(description, load_light(description),
+                           {loaded.field, loaded.eigenvalues, loaded.non_finite, {}}, {}, progress);
   scene.seconds = seconds_since(start);
   return scene;
 }

@@ -51,10 +51,25 @@ struct Scene {
   double seconds = 0;              ///< Duration of loading.
 };
 
+/// A field that light can be traced through, and what its preparation found.
+struct LoadedField {
+  TensorField field;
+  EigenvalueReport eigenvalues;
+  std::size_t non_finite = 0;
+  std::vector<std::string> notes;
+};
+
+/// Removes voxels that are not finite, and preprocesses the others.
+/// @param source  Names the field in notes and errors. @throw std::runtime_error if no voxel is left.
+LoadedField prepare_field(TensorGrid grid, Eigenvalues mode, const std::string& source);
+
 /// SceneDescription → Scene: loads fields, meshes and spectra, and chooses all values that the scene leaves open.
 /// @throw std::runtime_error, one line that names the file and the fix; SceneError if a value of the scene does not fit
 /// the loaded data; Cancelled.
 Scene load_scene(const SceneDescription& description, const Progress& progress);
+
+/// The same with a field that is already in memory. Of `description.field` only `scale` and `bounds` are used.
+Scene load_scene(const SceneDescription& description, LoadedField field, const Progress& progress);
 
 /// The same for another description of a scene whose field is loaded: its `field` may differ in `scale` and `bounds`.
 /// Both scenes share the voxels. Notes about the field are left out.

@@ -78,6 +78,8 @@ const std::vector<Room> rooms{
      {"scenes/photons", "scenes/lens", "scenes/stretch", "scenes/path_tracing", "scenes/whole", "scenes/description",
       "scenes/keys", "integrators/*", "renderer/*", "volumes/*"}},
 
+    {"python/module", {"scenes/*", "integrators/*", "renderer/*", "volumes/*"}},
+
     {"tools/command_line", {}},
     {"tools/import/lattices", {"volumes/*"}},
     {"tools/import/meshes", {"tools/import/lattices", "volumes/*"}},

@@ -18,13 +18,13 @@
 #include "scenes/jobs/origin.h"
 #include "scenes/keys/frames.h"
 #include "scenes/keys/json_reader.h"
+#include "scenes/outputs/statistics_json.h"
 #include "scenes/outputs/write_outputs.h"
 #include "scenes/scene/render.h"
 #include "scenes/scene/scene.h"
 #include "tools/command_line/progress_bar.h"
 #include "tools/command_line/run_and_report.h"
 #include "tools/command_line/tell.h"
-#include "tools/commands/statistics_json.h"
 #include "tools/commands/work_keeper.h"
 
 namespace tensorray {
@@ -64,13 +64,6 @@ OutputFiles open_files(const SceneDescription& description, const RenderRun& run
   for (const NamedFile& file : more)
     if (!file.path.empty()) files.emplace(file.name, OutputFile(file.path));
   return files;
-}
-
-/// Gives all files their final names, or none of them.
-void commit(OutputFiles files) {
-  std::vector<OutputFile> complete;
-  for (auto& [key, file] : files) complete.push_back(std::move(file));
-  commit_all(complete);
 }
 
 RenderRun at_frame(RenderRun run, int frame) {
@@ -171,7 +164,7 @@ void write_so_far(Render render, const Scene& scene, const Work& work) {
   render.metadata["tensorray:done"] = fmt::format("{:.4f}", work.fraction.load());
   OutputFiles files = open_outputs(scene.description.output);
   write_outputs(render, scene, files);
-  commit(std::move(files));
+  commit_outputs(std::move(files));
 }
 
 /// Ends an interrupted run: with a checkpoint, and with the picture so far.
@@ -221,7 +214,7 @@ void complete(const Scene& scene, RenderJob& job, OutputFiles files, const KeepS
       write_text(files.at(statistics_key),
                  statistics_json(scene, result.statistics, seconds_since(start), static_cast<int>(threads_of(run))));
     if (!run.scene_copy.empty()) write_text(files.at(scene_key), parse_value(scene.description.text).dump(2) + "\n");
-    commit(std::move(files));
+    commit_outputs(std::move(files));
   } catch (const std::runtime_error&) {  // The disk may be full.
     if (keeper.write()) tell({"the work is kept: --resume continues from " + keep.file.string()}, run.quiet);
     throw;

@@ -36,6 +36,13 @@ struct ViewOptions {
   bool quiet = false;
 };
 
+/// Where the page is: beside the folder of the programs in a build folder, or else where it is installed.
+std::filesystem::path page_folder() {
+  const std::filesystem::path prefix = sibling_program("tensorray-view").parent_path().parent_path();
+  const std::filesystem::path installed = prefix / "share" / "tensorray" / "view";
+  return std::filesystem::exists(installed) ? installed : prefix / "view";
+}
+
 /// NAME.view.json, beside the scene.
 std::filesystem::path default_copy(std::filesystem::path scene) { return scene.replace_extension(".view.json"); }
 
@@ -69,7 +76,7 @@ void view(ViewOptions options, Progress& progress) {
   if (options.viewed.copy.empty()) options.viewed.copy = default_copy(options.viewed.file);
   require_same_folder(options.viewed);
   options.server.token = token_of_user();
-  options.server.page = sibling_program("tensorray-view").parent_path().parent_path() / "view";
+  options.server.page = page_folder();
 
   std::optional<ProgressBar> bar(std::in_place, progress, options.quiet);
   Pages pages(options.viewed, progress);

@@ -1,6 +1,6 @@
 #pragma once
-/// @file tools/commands/statistics_json.h
-/// The statistics of a render as JSON, for --stats.
+/// @file scenes/outputs/statistics_json.h
+/// The statistics of a render as JSON.
 
 #include <string>
 

@@ -1,4 +1,4 @@
-#include "tools/commands/statistics_json.h"
+#include "scenes/outputs/statistics_json.h"
 
 #include <cstdint>
 

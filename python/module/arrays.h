@@ -1,0 +1,61 @@
+#pragma once
+/// @file python/module/arrays.h
+/// NumPy arrays of C++ memory, and the other way round. All functions need the GIL.
+
+#include <cstddef>
+#include <memory>
+#include <utility>
+#include <vector>
+
+#include <Eigen/Geometry>
+#include <pybind11/numpy.h>
+
+namespace tensorray {
+
+namespace py = pybind11;
+
+using Shape = std::vector<py::ssize_t>;
+
+/// Doubles in C order; other types and orders are converted.
+using Doubles = py::array_t<double, py::array::c_style | py::array::forcecast>;
+
+/// A read-only array of memory that `owner` keeps alive, and that the array keeps alive in turn. Nothing is copied.
+/// @param strides  In bytes; empty: C order.
+template <class T>
+py::array view(const T* data, const Shape& shape, const py::object& owner, const Shape& strides = {}) {
+  py::array array = strides.empty() ? py::array(py::dtype::of<T>(), shape, data, owner)
+                                    : py::array(py::dtype::of<T>(), shape, strides, data, owner);
+  array.attr("flags").attr("writeable") = false;
+  return array;
+}
+
+/// An array that takes over a vector of values.
+template <class T>
+py::array taken(std::vector<T> values, const Shape& shape) {
+  auto owned = std::make_unique<std::vector<T>>(std::move(values));
+  const T* const data = owned->data();
+  const py::capsule owner(owned.release(), [](void* vector) { delete static_cast<std::vector<T>*>(vector); });
+  return py::array(py::dtype::of<T>(), shape, data, owner);
+}
+
+/// The same for vectors of fixed-size Eigen matrices, whose numbers become further axes: `shape` has them, with the
+/// columns of a matrix before its rows.
+template <class Matrix>
+py::array taken_matrices(std::vector<Matrix> values, const Shape& shape) {
+  using Number = typename Matrix::Scalar;
+  static_assert(sizeof(Matrix) == sizeof(Number) * Matrix::SizeAtCompileTime, "no padding");
+  auto owned = std::make_unique<std::vector<Matrix>>(std::move(values));
+  const auto* const data = reinterpret_cast<const Number*>(owned->data());
+  const py::capsule owner(owned.release(), [](void* vector) { delete static_cast<std::vector<Matrix>*>(vector); });
+  return py::array(py::dtype::of<Number>(), shape, data, owner);
+}
+
+inline Eigen::Vector3d vector3(const Doubles& numbers) { return Eigen::Vector3d(numbers.data()); }
+
+/// A matrix as an array with rows first.
+inline py::array rows_first(const Eigen::Matrix4d& matrix) {
+  const Eigen::Matrix<double, 4, 4, Eigen::RowMajor> rows = matrix;
+  return py::array(py::dtype::of<double>(), Shape{4, 4}, rows.data());
+}
+
+}  // namespace tensorray

@@ -1,0 +1,45 @@
+#pragma once
+/// @file python/module/field.h
+/// A tensor field as Python holds it.
+
+#include <functional>
+#include <mutex>
+#include <optional>
+#include <string>
+
+#include <pybind11/numpy.h>
+
+#include "scenes/keys/json_reader.h"
+#include "scenes/scene/scene.h"
+#include "volumes/grids/tensor_grid.h"
+
+namespace tensorray {
+
+/// Where voxels come from, and, once light was traced through them, their bricks. Any number of threads may use one.
+class Field {
+ public:
+  /// @param keys    `field` of a scene that has this field. Renders write it into the headers of their files.
+  /// @param make    Makes the voxels. It must not touch Python's objects.
+  /// @param memory  What `make` reads; kept alive. None: nothing.
+  Field(Json keys, std::function<TensorGrid()> make, pybind11::object memory = pybind11::none())
+      : keys_(std::move(keys)), make_(std::move(make)), memory_(std::move(memory)) {}
+
+  const Json& keys() const { return keys_; }
+  TensorGrid grid() const { return make_(); }
+
+  /// The field without voxels that are not finite, and preprocessed. Made anew if the choice differs from the last one.
+  LoadedField loaded(Eigenvalues mode) const;
+
+ private:
+  Json keys_;
+  std::function<TensorGrid()> make_;
+  pybind11::object memory_;
+  mutable std::mutex mutex_;
+  mutable Eigenvalues mode_ = Eigenvalues::automatic;
+  mutable std::optional<LoadedField> loaded_;
+};
+
+/// Adds Field and its functions to the module.
+void add_fields(pybind11::module_& module);
+
+}  // namespace tensorray

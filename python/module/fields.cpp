@@ -1,0 +1,187 @@
+#include <cmath>
+#include <cstdint>
+#include <limits>
+#include <memory>
+#include <stdexcept>
+#include <utility>
+
+#include <pybind11/stl.h>
+#include <pybind11/stl/filesystem.h>
+
+#include "base/errors.h"
+#include "base/output_file.h"
+#include "python/module/arrays.h"
+#include "python/module/choices.h"
+#include "python/module/field.h"
+#include "python/module/work.h"
+#include "scenes/pipeline/read_scene.h"
+#include "volumes/files/tensor_files.h"
+#include "volumes/tensors/invariants.h"
+
+namespace tensorray {
+
+LoadedField Field::loaded(Eigenvalues mode) const {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  if (!loaded_ || mode_ != mode) {
+    loaded_.reset();  // Its memory is needed.
+    const std::string source = keys_.contains("file") ? keys_["file"] : keys_["generate"]["kind"];
+    loaded_ = prepare_field(make_(), mode, source);
+    mode_ = mode;
+  }
+  return *loaded_;
+}
+
+namespace {
+
+/// A field of an array (nz, ny, nx, 3, 3) of floats or doubles with any strides. The array is not copied: the field
+/// keeps it, and reads it when its bricks are made.
+template <class Number>
+std::shared_ptr<Field> field_of_array(const py::array_t<Number, 0>& tensors, const Doubles& to_world, Json keys) {
+  require(tensors.ndim() == 5 && tensors.shape(3) == 3 && tensors.shape(4) == 3,
+          "the tensors must be an array of shape (nz, ny, nx, 3, 3)");
+  require(tensors.size() > 0, "the array of tensors is empty");
+  Eigen::Vector3i size;
+  for (int axis = 0; axis < 3; ++axis) {
+    require(tensors.shape(axis) < std::numeric_limits<int>::max() / 2, "the array of tensors is too large");
+    size[2 - axis] = static_cast<int>(tensors.shape(axis));
+  }
+  Eigen::Affine3d transform(Eigen::Map<const Eigen::Matrix<double, 4, 4, Eigen::RowMajor>>(to_world.data()));
+  require(transform.matrix().allFinite() && transform.matrix().row(3) == Eigen::RowVector4d(0, 0, 0, 1) &&
+              std::abs(transform.linear().determinant()) > 0,
+          "voxel_size, origin or to_world: not an affine transform that can be inverted");
+  const auto* const data = reinterpret_cast<const char*>(tensors.data());
+  const Eigen::Matrix<std::ptrdiff_t, 5, 1> strides =
+      Eigen::Map<const Eigen::Matrix<py::ssize_t, 5, 1>>(tensors.strides()).template cast<std::ptrdiff_t>();
+  const auto tensor = [data, strides](const Eigen::Vector3i& at) {
+    const char* const voxel = data + at.z() * strides[0] + at.y() * strides[1] + at.x() * strides[2];
+    Eigen::Matrix3d result;
+    for (int i = 0; i < 3; ++i)
+      for (int j = 0; j < 3; ++j)
+        result(i, j) = *reinterpret_cast<const Number*>(voxel + i * strides[3] + j * strides[4]);
+    return result;
+  };
+  const auto make = [=, name = keys.value("name", std::string("tensor"))] {
+    TensorGrid grid = dense_grid({Eigen::Vector3i::Zero(), size - Eigen::Vector3i::Ones()}, transform, tensor);
+    grid.name = name;
+    return grid;
+  };
+  return std::make_shared<Field>(std::move(keys), make, tensors);
+}
+
+/// A field whose voxels are already made. Loading copies them, as it changes them.
+std::shared_ptr<Field> field_of_grid(Json keys, TensorGrid grid) {
+  const auto kept = std::make_shared<const TensorGrid>(std::move(grid));
+  return std::make_shared<Field>(std::move(keys), [kept] { return *kept; });
+}
+
+std::shared_ptr<Field> read_field(const std::filesystem::path& file, const std::string& keys, const std::string& name,
+                                  const std::string& derive, const py::object& report) {
+  TensorGrid grid;
+  run(
+      [&](const Progress& progress) {
+        progress.update("reading", 0, 1);
+        grid = read_tensor_vdb(file, name, value_of<Derive>("derive", derive));
+      },
+      report, 0);
+  return field_of_grid(parse_value(keys), std::move(grid));
+}
+
+/// @param generator  `field.generate` of a scene, as JSON.
+std::shared_ptr<Field> make_field(const std::string& generator, const py::object& report) {
+  Json keys = {{"generate", parse_value(generator)}};
+  const SceneDescription description =
+      read_scene_json({{"field", keys}, {"integrator", {{"type", "photon_distribution"}}}}, "make");
+  TensorGrid grid;
+  run(
+      [&](const Progress& progress) {
+        progress.update("making", 0, 1);
+        grid = generate(description.field.generate->generator, description.field.generate->grid);
+      },
+      report, 0);
+  return field_of_grid(std::move(keys), std::move(grid));
+}
+
+/// The voxels of a grid as an array (nz, ny, nx, ...) over the box of its active voxels. `set(from, to)` copies one.
+template <class Blocks, class Set>
+py::array dense_array(const Blocks& blocks, const Eigen::AlignedBox3i& box, Shape inner, float fill, const Set& set) {
+  const Eigen::Vector3i size = box.sizes() + Eigen::Vector3i::Ones();
+  Shape shape{size.z(), size.y(), size.x()};
+  std::size_t numbers = 1;
+  for (const py::ssize_t count : inner) numbers *= static_cast<std::size_t>(count);
+  shape.insert(shape.end(), inner.begin(), inner.end());
+  std::vector<float> values(size.cast<std::size_t>().prod() * numbers, fill);
+  for (const auto& block : blocks)
+    for (int offset = 0; offset < TensorBlock::voxels; ++offset) {
+      if (!block.active[static_cast<std::size_t>(offset)]) continue;
+      const Eigen::Vector3i at = block.origin + TensorBlock::position(offset) - box.min();
+      const std::size_t row = static_cast<std::size_t>(at.z()) * size.y() + at.y();
+      set(block.values[static_cast<std::size_t>(offset)], &values[(row * size.x() + at.x()) * numbers]);
+    }
+  return taken(std::move(values), shape);
+}
+
+/// The tensors over the box of the active voxels, and the transform of its indices (x, y, z) to the world.
+py::tuple tensors_of(const Field& field) {
+  TensorGrid grid;
+  run([&](const Progress&) { grid = field.grid(); }, py::none(), 0);
+  const Eigen::AlignedBox3i box = grid.active_box();
+  const Eigen::Affine3d to_world = grid.to_world * Eigen::Translation3d(box.min().cast<double>());
+  const py::array tensors = dense_array(grid.blocks, box, {3, 3}, 0, [](const Eigen::Matrix3f& tensor, float* to) {
+    Eigen::Map<Eigen::Matrix<float, 3, 3, Eigen::RowMajor>>{to} = tensor;
+  });
+  return py::make_tuple(tensors, rows_first(to_world.matrix()), grid.name, grid.metadata);
+}
+
+py::array invariant_of_field(const Field& field, const std::string& name, const py::object& report) {
+  const Invariant which = invariant_of(name);
+  ScalarGrid invariant;
+  Eigen::AlignedBox3i box;
+  run(
+      [&](const Progress& progress) {
+        progress.update("deriving", 0, 1);
+        TensorGrid grid = field.grid();
+        box = grid.active_box();
+        remove_non_finite(grid);
+        invariant = invariant_grid(which, grid);
+      },
+      report, 0);
+  const float none = std::numeric_limits<float>::quiet_NaN();
+  return dense_array(invariant.blocks, box, {}, none, [](float value, float* to) { *to = value; });
+}
+
+void write_field(const Field& field, const std::filesystem::path& path, bool half, const py::object& report) {
+  require(path.extension() == ".vdb", path.string() + " must end in .vdb");
+  run(
+      [&](const Progress& progress) {
+        progress.update("writing", 0, 1);
+        OutputFile file(path);
+        TensorGrid grid = field.grid();
+        if (remove_non_finite(grid) > 0 && grid.blocks.empty())
+          throw std::runtime_error(path.string() + ": no voxel of the field is finite");
+        file.write([&](const std::filesystem::path& temporary) { write_tensor_vdb(temporary, std::move(grid), half); });
+        file.commit();
+      },
+      report, 0);
+}
+
+}  // namespace
+
+void add_fields(py::module_& module) {
+  py::class_<Field, std::shared_ptr<Field>>(module, "Field");
+  module.def("field_of_floats",
+             [](const py::array_t<float, 0>& tensors, const Doubles& to_world, const std::string& keys) {
+               return field_of_array<float>(tensors, to_world, parse_value(keys));
+             });
+  module.def("field_of_doubles",
+             [](const py::array_t<double, 0>& tensors, const Doubles& to_world, const std::string& keys) {
+               return field_of_array<double>(tensors, to_world, parse_value(keys));
+             });
+  module.def("read_field", &read_field);
+  module.def("make_field", &make_field);
+  module.def("write_field", &write_field);
+  module.def("tensors_of", &tensors_of);
+  module.def("invariant", &invariant_of_field);
+  module.def("invariant_names", &invariant_names);
+}
+
+}  // namespace tensorray

@@ -1,0 +1,59 @@
+/// @file python/module/module.cpp
+/// The module tensorray._tensorray. The package beside it (python/tensorray) has the functions for users; it makes
+/// their arguments plain, so that the functions here have no defaults.
+
+#include <filesystem>
+#include <new>
+#include <stdexcept>
+
+#include <pybind11/pybind11.h>
+#include <pybind11/stl/filesystem.h>
+
+#include "base/child_program.h"
+#include "base/progress.h"
+#include "base/text.h"
+#include "python/module/field.h"
+#include "python/module/renders.h"
+#include "python/module/traces.h"
+#include "renderer/images/image.h"
+#include "scenes/keys/scene_source.h"
+
+namespace tensorray {
+namespace {
+
+namespace py = pybind11;
+
+/// Exceptions with the line that the command line prints after its name.
+void add_exceptions(py::module_& module) {
+  static const py::object scene_error = py::exception<SceneError>(module, "SceneError", PyExc_ValueError);
+  py::register_exception_translator([](std::exception_ptr error) {
+    try {
+      if (error) std::rethrow_exception(error);
+    } catch (const SceneError& wrong) {
+      PyErr_SetString(scene_error.ptr(), escaped(wrong.what()).c_str());
+    } catch (const std::invalid_argument& wrong) {
+      PyErr_SetString(PyExc_ValueError, escaped(wrong.what()).c_str());
+    } catch (const Cancelled&) {
+      PyErr_SetString(PyExc_KeyboardInterrupt, "interrupted; nothing was written");
+    } catch (const std::bad_alloc&) {
+      PyErr_SetString(PyExc_MemoryError, "out of memory; lower the resolution, or the number of wavelengths");
+    } catch (const py::builtin_exception&) {
+      throw;  // pybind11's own.
+    } catch (const std::runtime_error& failed) {
+      PyErr_SetString(PyExc_RuntimeError, escaped(failed.what()).c_str());
+    }
+  });
+}
+
+}  // namespace
+}  // namespace tensorray
+
+PYBIND11_MODULE(_tensorray, module) {
+  using namespace tensorray;
+  add_exceptions(module);
+  add_fields(module);
+  add_renders(module);
+  add_traces(module);
+  module.def("use_programs_in", &use_programs_in);
+  module.attr("version") = TENSORRAY_VERSION;
+}

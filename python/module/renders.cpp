@@ -1,0 +1,160 @@
+#include "python/module/renders.h"
+
+#include <algorithm>
+#include <map>
+#include <memory>
+#include <optional>
+#include <thread>
+#include <utility>
+
+#include <pybind11/stl.h>
+#include <pybind11/stl/filesystem.h>
+
+#include "base/seconds.h"
+#include "base/text.h"
+#include "python/module/arrays.h"
+#include "python/module/scene_request.h"
+#include "python/module/work.h"
+#include "scenes/outputs/picture_outputs.h"
+#include "scenes/outputs/statistics_json.h"
+#include "scenes/outputs/write_outputs.h"
+#include "scenes/pipeline/read_scene.h"
+#include "scenes/scene/render.h"
+
+namespace tensorray {
+namespace {
+
+/// A scene and its render. Arrays that Python gets are its memory. Immutable.
+struct Rendered {
+  Scene scene;
+  Render render;
+  Image display;
+  std::string statistics;  ///< JSON.
+};
+
+SceneRequest scene_request(const std::filesystem::path& file, const std::string& json,
+                           const std::vector<std::string>& changes, const Field* field) {
+  SceneRequest request;
+  request.file = file;
+  request.json = json;
+  request.changes = changes;
+  request.field = field;
+  return request;
+}
+
+int threads_of(int threads) {
+  return threads > 0 ? threads : static_cast<int>(std::max(1u, std::thread::hardware_concurrency()));
+}
+
+/// What `tensorray render` does, with the scene of a request.
+std::shared_ptr<Rendered> render_request(const SceneRequest& request, int threads, const Progress& progress) {
+  const RequestedScene requested = read_request(request);
+  OutputDescription written = requested.description.output;
+  written.files = requested.files;
+  OutputFiles files = open_outputs(written);
+  Scene scene = load_request(request, requested, progress);
+  Render result = render(scene, progress);
+  const auto start = Clock::now();
+  write_outputs(result, scene, files);
+  Image display = display_image(scene, result, true);
+  std::string statistics = statistics_json(scene, result.statistics, seconds_since(start), threads_of(threads));
+  auto rendered = std::make_shared<Rendered>(
+      Rendered{std::move(scene), std::move(result), std::move(display), std::move(statistics)});
+  commit_outputs(std::move(files));
+  return rendered;
+}
+
+std::shared_ptr<Rendered> render_for_python(const std::filesystem::path& file, const std::string& json,
+                                            const std::vector<std::string>& changes, const Field* field,
+                                            const std::vector<std::filesystem::path>& outputs,
+                                            const std::vector<std::string>& keep, int threads,
+                                            const py::object& report) {
+  SceneRequest request = scene_request(file, json, changes, field);
+  request.outputs = outputs;
+  request.keep = keep;
+  std::shared_ptr<Rendered> rendered;
+  run([&](const Progress& progress) { rendered = render_request(request, threads, progress); }, report, threads);
+  return rendered;
+}
+
+/// Writes further files of a render: of kinds that it has made.
+void write_more(const Rendered& rendered, const std::vector<std::filesystem::path>& outputs) {
+  const SceneDescription& made = rendered.scene.description;
+  const SceneDescription description = read_scene_json(parse_value(made.text), made.path, {{}, outputs});
+  for (const auto& [key, path] : description.output.files)
+    if (!made.output.wants(key))
+      throw std::invalid_argument(printable(path.string()) + ": the render has not kept its `" + key +
+                                  "`; render with keep=[\"" + key + "\"]");
+  run(
+      [&](const Progress&) {
+        OutputFiles files = open_outputs(description.output);
+        write_outputs(rendered.render, rendered.scene, files);
+        commit_outputs(std::move(files));
+      },
+      py::none(), 0);
+}
+
+py::array pixels(const Image& image, const py::object& owner) {
+  const auto channels = static_cast<py::ssize_t>(image.channels.size());
+  return view(image.pixels.data(), {image.height, image.width, channels}, owner);
+}
+
+py::object spectral(const py::object& self) {
+  const auto& render = self.cast<const Rendered&>().render;
+  if (!render.spectral) return py::none();
+  return py::make_tuple(pixels(render.spectral->image, self), render.spectral->image.channels);
+}
+
+/// Photons as rows of 11 floats, which Python names.
+py::array photons(const py::object& self) {
+  static_assert(sizeof(Photon) == 11 * sizeof(float), "a photon is 11 floats");
+  const PhotonMap& photons = self.cast<const Rendered&>().render.photons;
+  return view(reinterpret_cast<const float*>(photons.data()), {static_cast<py::ssize_t>(photons.size()), 11}, self);
+}
+
+/// A path as a dictionary of arrays, one row a point.
+py::dict path_arrays(const Path& path, const py::object& self) {
+  const auto count = static_cast<py::ssize_t>(path.points.size());
+  constexpr py::ssize_t stride = sizeof(PathPoint), number = sizeof(double);
+  const PathPoint none;
+  const PathPoint& first = path.points.empty() ? none : path.points.front();
+  py::dict arrays;
+  arrays["position"] = view(first.position.data(), {count, 3}, self, {stride, number});
+  arrays["direction"] = view(first.direction.data(), {count, 3}, self, {stride, number});
+  arrays["length"] = view(&first.length, {count}, self, {stride});
+  arrays["tensor"] = view(first.tensor.data(), {count, 3, 3}, self, {stride, number, 3 * number});
+  arrays["change"] = view(first.change.data(), {count, 3}, self, {stride, number});
+  arrays["in_field"] = view(&first.in_field, {count}, self, {stride});
+  arrays["flexibility"] = path.flexibility;
+  arrays["wavelength"] = path.wavelength;
+  arrays["end"] = to_string(path.end);
+  return arrays;
+}
+
+py::list paths(const py::object& self) {
+  py::list list;
+  for (const Path& path : self.cast<const Rendered&>().render.paths) list.append(path_arrays(path, self));
+  return list;
+}
+
+}  // namespace
+
+void add_renders(py::module_& module) {
+  py::class_<Rendered, std::shared_ptr<Rendered>>(module, "Rendered")
+      .def("linear", [](const py::object& self) { return pixels(self.cast<const Rendered&>().render.linear, self); })
+      .def("channels", [](const Rendered& self) { return self.render.linear.channels; })
+      .def("display", [](const py::object& self) { return pixels(self.cast<const Rendered&>().display, self); })
+      .def("spectral", &spectral)
+      .def("photons", &photons)
+      .def("paths", &paths)
+      .def("statistics", [](const Rendered& self) { return self.statistics; })
+      .def("scene", [](const Rendered& self) { return self.scene.description.text; })
+      .def("scale", [](const Rendered& self) { return self.scene.scale.scale; })
+      .def("notes", [](const Rendered& self) { return self.scene.notes; })
+      .def("warnings", [](const Rendered& self) { return self.render.warnings; })
+      .def("write", &write_more);
+  module.def("render", &render_for_python);
+  module.def("schema", &scene_schema);
+}
+
+}  // namespace tensorray

@@ -1,0 +1,285 @@
+#include "python/module/traces.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <iterator>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include <pybind11/stl.h>
+#include <pybind11/stl/filesystem.h>
+#include <tbb/blocked_range.h>
+#include <tbb/parallel_for.h>
+
+#include "base/errors.h"
+#include "integrators/flow/flow_map.h"
+#include "python/module/arrays.h"
+#include "python/module/choices.h"
+#include "python/module/field.h"
+#include "python/module/scene_request.h"
+#include "python/module/work.h"
+#include "renderer/surfaces/mesh.h"
+#include "scenes/scene/fine_bands.h"
+
+namespace tensorray {
+namespace {
+
+/// What `trace` needs beside the field; Python fills it.
+struct TraceRequest {
+  Doubles positions, directions, flexibilities;  ///< (n, 3), (n, 3) unit, (n).
+  std::optional<Doubles> along, turning;         ///< (n, 3, 2): derivatives of the starts.
+  std::optional<Plate> plate;
+  std::string eigenvalues = "auto", method = "splitting";
+  BendingSettings bending;
+  bool paths = false;
+};
+
+struct Traced {
+  RayBatch rays;
+  std::vector<PathPoints> paths;
+};
+
+Eigen::Matrix<double, 3, 2> columns(const double* numbers) {
+  return Eigen::Map<const Eigen::Matrix<double, 3, 2, Eigen::RowMajor>>(numbers);
+}
+
+void check(const TraceRequest& request) {
+  const py::ssize_t rays = request.flexibilities.size();
+  require(request.positions.size() == 3 * rays && request.directions.size() == 3 * rays,
+          "trace: positions and directions must have the shape (n, 3), and s one number a ray");
+  for (const auto& derivatives : {request.along, request.turning})
+    require(!derivatives || derivatives->size() == 6 * rays, "trace: derivatives must have the shape (n, 3, 2)");
+  for (py::ssize_t i = 0; i < rays; ++i) {
+    const Eigen::Vector3d P(request.positions.data() + 3 * i), V(request.directions.data() + 3 * i);
+    require(P.allFinite() && V.allFinite() && std::isfinite(request.flexibilities.data()[i]),
+            "trace: positions, directions and s must be finite");
+    require(std::abs(V.norm() - 1) < 1e-6, "trace: directions must not be zero");
+  }
+}
+
+RayBatch batch_of(const TraceRequest& request) {
+  RayBatch rays;
+  for (py::ssize_t i = 0; i < request.flexibilities.size(); ++i) {
+    rays.add(Eigen::Vector3d(request.positions.data() + 3 * i), Eigen::Vector3d(request.directions.data() + 3 * i),
+             request.flexibilities.data()[i]);
+    if (!request.along && !request.turning) continue;
+    RayDifferential differential;
+    if (request.along) differential.position = columns(request.along->data() + 6 * i);
+    if (request.turning) differential.direction = columns(request.turning->data() + 6 * i);
+    rays.differentials.push_back(differential);
+  }
+  return rays;
+}
+
+template <class T>
+std::vector<T> slice(const std::vector<T>& all, std::size_t begin, std::size_t end) {
+  if (all.empty()) return {};
+  return {all.begin() + static_cast<std::ptrdiff_t>(begin), all.begin() + static_cast<std::ptrdiff_t>(end)};
+}
+
+template <class T>
+void put(std::vector<T>& all, std::size_t begin, std::vector<T>& part) {
+  std::move(part.begin(), part.end(), all.begin() + static_cast<std::ptrdiff_t>(begin));
+}
+
+/// Follows all rays, on all threads: in batches, as a batch belongs to one thread.
+void trace_all(const TensorField& field, const Geometry& geometry, const BendingSettings& bending, bool with_paths,
+               Traced& traced, const Progress& progress) {
+  constexpr std::size_t batch_size = 512;
+  RayBatch& rays = traced.rays;
+  rays.end.resize(rays.size());
+  rays.length.resize(rays.size());
+  rays.steps.resize(rays.size());
+  traced.paths.resize(with_paths ? rays.size() : 0);
+  tbb::parallel_for(tbb::blocked_range<std::size_t>(0, rays.size(), batch_size), [&](const auto& range) {
+    if (progress.cancelled) throw Cancelled();
+    RayBatch batch;
+    batch.position = slice(rays.position, range.begin(), range.end());
+    batch.direction = slice(rays.direction, range.begin(), range.end());
+    batch.flexibility = slice(rays.flexibility, range.begin(), range.end());
+    batch.differentials = slice(rays.differentials, range.begin(), range.end());
+    std::vector<PathPoints> paths;
+    with_paths ? trace(field, geometry, bending, batch, paths) : trace(field, geometry, bending, batch);
+    put(rays.position, range.begin(), batch.position);
+    put(rays.direction, range.begin(), batch.direction);
+    if (!rays.differentials.empty()) put(rays.differentials, range.begin(), batch.differentials);
+    put(rays.end, range.begin(), batch.end);
+    put(rays.length, range.begin(), batch.length);
+    put(rays.steps, range.begin(), batch.steps);
+    put(traced.paths, range.begin(), paths);
+  });
+}
+
+py::array ends_array(std::vector<RayEnd> ends, const Shape& shape) {
+  std::vector<std::uint8_t> numbers(ends.size());
+  std::transform(ends.begin(), ends.end(), numbers.begin(), [](RayEnd end) { return static_cast<std::uint8_t>(end); });
+  return taken(std::move(numbers), shape);
+}
+
+/// The positions of a path's points.
+py::array way(const PathPoints& points) {
+  std::vector<Eigen::Vector3d> positions;
+  for (const PathPoint& point : points) positions.push_back(point.position);
+  const auto count = static_cast<py::ssize_t>(positions.size());
+  return taken_matrices(std::move(positions), {count, 3});
+}
+
+py::dict arrays_of(Traced traced) {
+  RayBatch& rays = traced.rays;
+  const auto count = static_cast<py::ssize_t>(rays.size());
+  py::dict arrays;
+  if (!rays.differentials.empty()) {
+    std::vector<Eigen::Matrix<double, 3, 2>> positions, directions;
+    for (const RayDifferential& differential : rays.differentials) {
+      positions.push_back(differential.position);
+      directions.push_back(differential.direction);
+    }
+    arrays["position_jacobians"] = taken_matrices(std::move(positions), {count, 2, 3}).attr("swapaxes")(1, 2);
+    arrays["direction_jacobians"] = taken_matrices(std::move(directions), {count, 2, 3}).attr("swapaxes")(1, 2);
+  }
+  if (!traced.paths.empty()) {
+    py::list ways;
+    for (const PathPoints& points : traced.paths) ways.append(way(points));
+    arrays["ways"] = ways;
+  }
+  arrays["positions"] = taken_matrices(std::move(rays.position), {count, 3});
+  arrays["directions"] = taken_matrices(std::move(rays.direction), {count, 3});
+  arrays["lengths"] = taken(std::move(rays.length), {count});
+  arrays["steps"] = taken(std::move(rays.steps), {count});
+  arrays["ends"] = ends_array(std::move(rays.end), {count});
+  return arrays;
+}
+
+py::dict trace_for_python(const Field& field, const TraceRequest& request, int threads, const py::object& report) {
+  check(request);
+  Traced traced;
+  traced.rays = batch_of(request);
+  BendingSettings bending = request.bending;
+  bending.method = value_of<BendingMethod>("method", request.method);
+  const Eigenvalues mode = value_of<Eigenvalues>("eigenvalues", request.eigenvalues);
+  run(
+      [&](const Progress& progress) {
+        progress.update("loading", 0, 1);
+        const TensorField bricks = field.loaded(mode).field;
+        Surfaces surfaces;
+        surfaces.bounds = box_mesh(bricks.index_bounds(), bricks.to_world());
+        surfaces.plate = request.plate;
+        progress.update("tracing", 0, 1);
+        trace_all(bricks, Geometry(std::move(surfaces)), bending, request.paths, traced, progress);
+      },
+      report, threads);
+  return arrays_of(std::move(traced));
+}
+
+Plate plate_of(const Doubles& center, const Doubles& normal, const Doubles& up, const Doubles& size) {
+  Plate plate;
+  plate.center = vector3(center);
+  const Eigen::Vector3d across = vector3(normal).normalized();
+  plate.up = upright(across, vector3(up));
+  plate.right = plate.up.cross(across);
+  plate.size = Eigen::Vector2d(size.data());
+  require(plate.center.allFinite() && plate.right.allFinite() && plate.size.minCoeff() > 0,
+          "plate: center and normal must be finite, normal not zero, and size greater than 0");
+  return plate;
+}
+
+void put_plate(py::dict& arrays, const Plate& plate) {
+  const auto three = [](const Eigen::Vector3d& v) { return py::array(py::dtype::of<double>(), Shape{3}, v.data()); };
+  arrays["center"] = three(plate.center);
+  arrays["right"] = three(plate.right);
+  arrays["up"] = three(plate.up);
+  arrays["size"] = py::make_tuple(plate.size.x(), plate.size.y());
+  arrays["resolution"] = py::make_tuple(plate.resolution.x(), plate.resolution.y());
+}
+
+/// World positions of starts, which are in the beam's frame.
+std::vector<Eigen::Vector3d> world_starts(const FlowMap& map, const Beam& beam) {
+  std::vector<Eigen::Vector3d> starts;
+  for (const Eigen::Vector2d& start : map.starts)
+    starts.push_back(beam.center + start.x() * beam.right + start.y() * beam.up);
+  return starts;
+}
+
+py::dict arrays_of(FlowMap map, const Scene& scene, std::vector<double> flexibilities) {
+  const auto starts = static_cast<py::ssize_t>(map.starts.size()), nodes = static_cast<py::ssize_t>(map.nodes);
+  const auto triangles = static_cast<py::ssize_t>(map.triangles.size());
+  std::vector<std::uint32_t> corners;
+  std::vector<double> areas;
+  for (const FlowTriangle& triangle : map.triangles) {
+    corners.insert(corners.end(), triangle.corners.begin(), triangle.corners.end());
+    areas.push_back(triangle.area);
+  }
+  py::dict arrays;
+  put_plate(arrays, *scene.geometry.surfaces().plate);
+  arrays["starts"] = taken_matrices(world_starts(map, scene.beam), {starts, 3});
+  arrays["landings"] = taken_matrices(std::move(map.landings), {starts, nodes, 2});
+  arrays["ends"] = ends_array(std::move(map.ends), {starts, nodes});
+  arrays["triangles"] = taken(std::move(corners), {triangles, 3});
+  arrays["areas"] = taken(std::move(areas), {triangles});
+  arrays["flexibilities"] = taken(std::move(flexibilities), {nodes});
+  return arrays;
+}
+
+/// The flow map of a scene's light. @param flexibilities  Empty: those of the scene's light, between its two ends.
+py::dict landings(const std::filesystem::path& file, const std::string& json, const std::vector<std::string>& changes,
+                  const Field* field, std::vector<double> flexibilities, double tolerance, int threads,
+                  const py::object& report) {
+  SceneRequest request;
+  request.file = file;
+  request.json = json;
+  request.changes = changes;
+  request.field = field;
+  std::optional<Scene> scene;
+  FlowMap map;
+  run(
+      [&](const Progress& progress) {
+        scene.emplace(load_request(request, read_request(request), progress));
+        FlowSettings settings;
+        settings.most_starts = static_cast<std::size_t>(scene->description.light.photons);
+        settings.tolerance = tolerance;
+        const LightRange range = light_range(*scene);
+        settings.range = flexibilities.empty() && range.is_range;
+        settings.flexibilities = flexibilities.empty() ? range.flexibilities : flexibilities;
+        map = trace_flow_map(scene->field, scene->geometry, scene->beam, scene->bending, settings, progress);
+        if (settings.range) {
+          const double first = range.flexibilities.front(), last = range.flexibilities.back();
+          for (std::size_t node = 0; node < map.nodes; ++node)
+            flexibilities.push_back(map.nodes < 2 ? first : first + (last - first) * node / (map.nodes - 1.0));
+        } else {
+          flexibilities = settings.flexibilities;
+        }
+      },
+      report, threads);
+  return arrays_of(std::move(map), *scene, std::move(flexibilities));
+}
+
+}  // namespace
+
+void add_traces(py::module_& module) {
+  py::class_<Plate>(module, "Plate").def(py::init(&plate_of));
+  py::class_<TraceRequest>(module, "TraceRequest")
+      .def(py::init<>())
+      .def_readwrite("positions", &TraceRequest::positions)
+      .def_readwrite("directions", &TraceRequest::directions)
+      .def_readwrite("flexibilities", &TraceRequest::flexibilities)
+      .def_readwrite("along", &TraceRequest::along)
+      .def_readwrite("turning", &TraceRequest::turning)
+      .def_readwrite("plate", &TraceRequest::plate)
+      .def_readwrite("eigenvalues", &TraceRequest::eigenvalues)
+      .def_readwrite("method", &TraceRequest::method)
+      .def_readwrite("paths", &TraceRequest::paths)
+      .def_property("scale", nullptr, [](TraceRequest& self, double value) { self.bending.scale = value; })
+      .def_property("step", nullptr, [](TraceRequest& self, double value) { self.bending.step = value; })
+      .def_property("max_steps", nullptr, [](TraceRequest& self, int value) { self.bending.max_steps = value; })
+      .def_property("max_length", nullptr, [](TraceRequest& self, double value) { self.bending.max_length = value; });
+  module.def("trace", &trace_for_python);
+  module.def("landings", &landings);
+  std::vector<std::string> ends;
+  for (int end = 0; end < ray_end_count; ++end) ends.emplace_back(to_string(static_cast<RayEnd>(end)));
+  module.attr("ray_ends") = py::tuple(py::cast(ends));
+}
+
+}  // namespace tensorray

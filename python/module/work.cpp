@@ -1,0 +1,88 @@
+#include "python/module/work.h"
+
+#include <chrono>
+#include <condition_variable>
+#include <cstdint>
+#include <exception>
+#include <mutex>
+#include <string>
+#include <thread>
+
+#include <tbb/task_arena.h>
+
+namespace tensorray {
+namespace {
+
+namespace py = pybind11;
+
+constexpr std::chrono::milliseconds interval(50);
+
+/// What the working thread and the waiting one share.
+struct Work {
+  Progress progress;
+  std::mutex mutex;
+  std::condition_variable ended;
+  bool is_done = false;
+  std::exception_ptr error;
+  std::string phase;
+  std::uint64_t done = 0, total = 0;
+};
+
+void do_work(Work& shared, const std::function<void(const Progress&)>& work, int threads) {
+  std::exception_ptr error;
+  try {
+    tbb::task_arena arena(threads > 0 ? threads : tbb::task_arena::automatic);
+    arena.execute([&] { work(shared.progress); });
+  } catch (...) {
+    error = std::current_exception();
+  }
+  const std::lock_guard<std::mutex> lock(shared.mutex);
+  shared.error = error;
+  shared.is_done = true;
+  shared.ended.notify_one();
+}
+
+/// @throw py::error_already_set if a signal or `report` raised an exception.
+void look_up(Work& shared, const py::object& report) {
+  std::unique_lock<std::mutex> lock(shared.mutex);
+  const std::string phase = shared.phase;
+  const std::uint64_t done = shared.done, total = shared.total;
+  lock.unlock();
+  const py::gil_scoped_acquire gil;
+  if (PyErr_CheckSignals() != 0) throw py::error_already_set();
+  if (!report.is_none() && total > 0) report(phase, done, total);
+}
+
+}  // namespace
+
+void run(const std::function<void(const Progress&)>& work, const py::object& report, int threads) {
+  Work shared;
+  shared.progress.report = [&shared](const std::string& phase, std::uint64_t done, std::uint64_t total) {
+    const std::lock_guard<std::mutex> lock(shared.mutex);
+    shared.phase = phase;
+    shared.done = done;
+    shared.total = total;
+  };
+  std::exception_ptr interrupt;
+  {
+    const py::gil_scoped_release released;
+    std::thread thread([&] { do_work(shared, work, threads); });
+    std::unique_lock<std::mutex> lock(shared.mutex);
+    while (!shared.ended.wait_for(lock, interval, [&] { return shared.is_done; })) {
+      lock.unlock();
+      try {
+        if (!interrupt) look_up(shared, report);
+      } catch (const py::error_already_set&) {
+        interrupt = std::current_exception();
+        shared.progress.cancelled = true;
+      }
+      lock.lock();
+    }
+    lock.unlock();
+    thread.join();
+  }
+  if (interrupt) std::rethrow_exception(interrupt);
+  if (shared.error) std::rethrow_exception(shared.error);
+}
+
+}  // namespace tensorray

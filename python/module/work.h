@@ -1,0 +1,20 @@
+#pragma once
+/// @file python/module/work.h
+/// Long work for Python: without the GIL, with progress, and ended by Ctrl-C.
+
+#include <functional>
+
+#include <pybind11/pybind11.h>
+
+#include "base/progress.h"
+
+namespace tensorray {
+
+/// Calls `work` on a thread of its own. Meanwhile this thread has released the GIL; twenty times a second it takes it
+/// to call `report(phase, done, total)`, and to see whether a signal has come. An exception of `report` or of a signal
+/// handler (KeyboardInterrupt) cancels the work, and is thrown when it has ended.
+/// @param report   A function, or None. @param threads  Greatest number of threads that the work uses; 0: all.
+/// @throw whatever `work` throws. It must not touch Python's objects.
+void run(const std::function<void(const Progress&)>& work, const pybind11::object& report, int threads);
+
+}  // namespace tensorray

@@ -1,0 +1,169 @@
+"""Tensor fields."""
+
+import os
+import subprocess
+import tempfile
+
+import numpy as np
+
+from . import _programs, _tensorray
+from ._arguments import json_of
+from ._progress import shown
+
+
+class Field:
+    """A tensor field of an array.
+
+    T           Tensors, shape (nz, ny, nx, 3, 3), world axes: T[k, j, i] is the tensor at voxel (i, j, k), with rows
+                before columns, so that T[k, j, i] @ V is T V. float32 and float64 of any strides are not copied: the
+                field shares the array's memory, so do not change the array afterwards; make another field, which costs
+                nothing. Other types are converted. Tensors that are not finite bend no light.
+    voxel_size  Distance of neighbouring voxels' centres, world units: a number, or three (x, y, z).
+    origin      Centre of the voxel T[0, 0, 0], world (x, y, z).
+    to_world    Instead of these two: a (4, 4) matrix from voxel indices (i, j, k, 1) to the world.
+    name        Name of the field in files.
+
+    The volume reaches from the first to the last voxel's centre along each axis; light is straight outside it.
+    """
+
+    def __init__(self, T, voxel_size=1.0, origin=(0.0, 0.0, 0.0), *, to_world=None, name="tensor"):
+        tensors = np.asarray(T)
+        if tensors.dtype not in (np.float32, np.float64) or not tensors.dtype.isnative or not tensors.flags.aligned:
+            tensors = tensors.astype(np.float64)
+        if to_world is None:
+            to_world = np.diag(np.append(np.broadcast_to(np.asarray(voxel_size, float), 3), 1.0))
+            to_world[:3, 3] = origin
+        to_world = np.array(to_world, float)
+        if to_world.shape != (4, 4):
+            raise ValueError("to_world must be an array of shape (4, 4)")
+        make_field = _tensorray.field_of_floats if tensors.dtype == np.float32 else _tensorray.field_of_doubles
+        self._field = make_field(tensors, to_world, json_of({"file": "array", "name": name}))
+        self._set(tensors, to_world, name, {})
+
+    @classmethod
+    def _of(cls, field):
+        self = cls.__new__(cls)
+        self._field = field
+        self._set(*_tensorray.tensors_of(field))
+        return self
+
+    def _set(self, tensors, to_world, name, metadata):
+        self._tensors = tensors.view()
+        self._tensors.flags.writeable = False
+        self._to_world, self._name, self._metadata = to_world, name, metadata
+
+    @property
+    def tensors(self):
+        """The tensors, shape (nz, ny, nx, 3, 3); read-only. Voxels that a file does not have are zero."""
+        return self._tensors
+
+    @property
+    def to_world(self):
+        """The (4, 4) matrix from indices (i, j, k, 1) of `tensors[k, j, i]` to the world (x, y, z, 1)."""
+        return self._to_world.copy()
+
+    @property
+    def name(self):
+        """Name of the field in files."""
+        return self._name
+
+    @property
+    def metadata(self):
+        """What the file says about the field: a dictionary of texts (`tensorray:units`, ...)."""
+        return dict(self._metadata)
+
+    @property
+    def bounds(self):
+        """The least and the greatest corner of the volume's axis-aligned box, world; shape (2, 3)."""
+        size = np.array(self._tensors.shape[2::-1], float) - 1
+        corners = np.array([[x, y, z, 1] for x in (0, size[0]) for y in (0, size[1]) for z in (0, size[2])])
+        world = corners @ self._to_world[:3].T
+        return np.array([world.min(axis=0), world.max(axis=0)])
+
+    def write(self, file, *, half=False, progress=None):
+        """Writes the field as FILE.vdb, for the program `tensorray` and others that read OpenVDB.
+
+        half  Store 16-bit floats: three significant digits, half the size.
+        """
+        with shown(progress) as report:
+            _tensorray.write_field(self._field, os.fspath(file), half, report)
+
+    def __repr__(self):
+        nz, ny, nx = self._tensors.shape[:3]
+        return f"<tensorray.Field {self._name!r}: {nx} x {ny} x {nz} voxels>"
+
+
+def read_vdb(file, name="", *, derive="none", progress=None):
+    """Reads a field of an OpenVDB file.
+
+    name    Name of the field; not needed if the file has one.
+    derive  "gradient" of a vector grid, "hessian" of a scalar grid, or "none": the grids are the tensor's components.
+    """
+    keys = {"file": os.fspath(file)}
+    if name:
+        keys["name"] = name
+    if derive != "none":
+        keys["derive"] = derive
+    with shown(progress) as report:
+        return Field._of(_tensorray.read_field(os.fspath(file), json_of(keys), name, derive, report))
+
+
+def make(kind, resolution=None, *, min=None, max=None, progress=None, **parameters):
+    """Makes an analytic field: point_load, two_point_load, constant, rotation, shear, vortex or helix.
+
+    resolution  Voxels along the longest axis of the box (voxels are then cubes), or along x, y and z.
+    min, max    Corners of the box, world; default: those of the kind.
+    parameters  Those of the kind, as `field.generate` of a scene has them: tr.make("vortex", core=0.2).
+    """
+    keys = {"kind": kind, "resolution": resolution, "min": min, "max": max, **parameters}
+    keys = {key: value for key, value in keys.items() if value is not None}
+    with shown(progress) as report:
+        return Field._of(_tensorray.make_field(json_of(keys), report))
+
+
+def import_file(*files, array=None, gradient_of=None, strain_of=None, order=None, resolution=None, voxel_size=None,
+                bounds=None, name=None, units=None):
+    """Makes a field of other programs' files: VTK, ExodusII, OpenFOAM, PLOT3D, NRRD, NIfTI, NumPy.
+
+    files        One file, or several that belong together (a PLOT3D grid and its solution).
+    array        Name of the array that is the tensor; default: the only one.
+    gradient_of  Name of the velocity whose gradient is the tensor.
+    strain_of    Name of the displacement whose strain is the tensor.
+    order        Order of six components: vtk, fsl, mrtrix or voigt.
+    resolution   Voxels along the longest edge, or along x, y and z; default: the median cell is a voxel.
+    voxel_size   Edge of a voxel, world units.
+    bounds       Crop: (xmin, xmax, ymin, ymax, zmin, zmax).
+    name, units  Name of the field (default: the array's), and units of the tensor.
+
+    Runs `tensorray-import`, which is a part of the package `tensorray`, or is built by `tools/setup release import`.
+    """
+    program = os.path.join(_programs.folder(), "tensorray-import")
+    if not os.path.exists(program):
+        raise RuntimeError(f"imports need {program}, which is not built; run `tools/setup release import`")
+    options = {"--array": array, "--gradient-of": gradient_of, "--strain-of": strain_of, "--order": order,
+               "--resolution": resolution, "--voxel-size": voxel_size, "--bounds": bounds, "--name": name,
+               "--units": units}
+    with tempfile.TemporaryDirectory() as folder:
+        vdb = os.path.join(folder, "field.vdb")
+        command = [program, "-q", "-o", vdb]
+        for option, value in options.items():
+            if value is not None:
+                command += [option, *(map(str, value) if isinstance(value, (tuple, list, np.ndarray)) else [str(value)])]
+        ended = subprocess.run([*command, "--", *map(os.fspath, files)], stdout=subprocess.DEVNULL,
+                               stderr=subprocess.PIPE, text=True, check=False)
+        if ended.returncode != 0:
+            lines = ended.stderr.strip().splitlines() or ["the import crashed; the file may be damaged"]
+            raise (ValueError if ended.returncode == 2 else RuntimeError)(lines[-1].removeprefix("tensorray: "))
+        keys = {"file": os.fspath(files[0])}
+        return Field._of(_tensorray.read_field(vdb, json_of(keys), "", "none", None))
+
+
+def invariant(field, name, *, progress=None):
+    """A number that describes the tensor at each voxel, whatever the axes: an array (nz, ny, nx) of float32.
+
+    name  One of tr.INVARIANTS: "norm", "trace", "von_mises", "vorticity", ...
+
+    Its unit is that of the tensor, to the power of the invariant's degree. Voxels without a tensor are NaN.
+    """
+    with shown(progress) as report:
+        return _tensorray.invariant(field._field, name, report)

@@ -1,0 +1,157 @@
+"""Renders of scenes."""
+
+import functools
+import json
+import os
+
+import numpy as np
+
+from . import _png, _tensorray
+from ._arguments import changes_of, scene_of
+from ._fields import Field
+from ._progress import shown
+
+#: The scene of a field alone: the light that it bends, on a plate, from the side that shows most.
+_FIELD_ALONE = {"light": {"direction": "auto"}, "integrator": {"type": "photon_distribution"}}
+
+_PHOTON = np.dtype([("position", "f4", 3), ("direction", "f4", 3), ("origin", "f4", 3), ("wavelength", "f4"),
+                    ("power", "f4")])
+
+
+def render(scene=None, field=None, *, outputs=(), keep=(), changes=None, seed=None, threads=0, folder=None,
+           progress=None):
+    """Renders a scene, as `tensorray render` does.
+
+    scene     A dictionary with the keys of a scene file (docs/scenes.md, tr.schema()), or the name of a scene file or
+              of a field's file (.vdb). None: the light that `field` bends, on a plate.
+    field     A Field, instead of the scene's own `field.file` or `field.generate`. Other keys of the scene's `field`
+              (scale, eigenvalues, bounds) stay.
+    outputs   Names of files to write: their endings say what they hold, as with -o. The bytes are those that the
+              command line writes. Without them nothing is written, whatever the scene's `output` says.
+    keep      What else the result holds, beside the picture: "spectral", "photons", and other keys of `output`.
+    changes   Changes of the scene, as {"light.photons": 1e5, "integrator.type": "lens"}.
+    seed      Seed of all random numbers; None: the scene's.
+    threads   Greatest number of threads; 0: all. The result does not depend on it.
+    folder    Relative paths in a dictionary are relative to this folder; None: the working folder.
+    progress  True or False: whether to show a bar; or a function of (phase, done, total); None: show a bar if standard
+              error is a terminal, or in a notebook.
+
+    Returns a Render. Several threads may render at once, also with one field.
+    """
+    if isinstance(scene, Field) and field is None:
+        scene, field = None, scene
+    if scene is None:
+        if field is None:
+            raise ValueError("render: give a scene, a field, or both")
+        scene = _FIELD_ALONE
+    file, text = scene_of(scene, folder)
+    files = [outputs] if isinstance(outputs, (str, os.PathLike)) else outputs
+    kinds = [keep] if isinstance(keep, str) else keep
+    with shown(progress) as report:
+        return Render(_tensorray.render(file, text, changes_of(changes, seed), field._field if field else None,
+                                        [os.fspath(name) for name in files], list(dict.fromkeys(["image", "exr", *kinds])),
+                                        threads, report))
+
+
+class Render:
+    """The result of `render`. Its arrays are read-only and are not copies; they may outlive it.
+
+    A notebook shows it as its picture.
+    """
+
+    def __init__(self, rendered):
+        self._rendered = rendered
+
+    @functools.cached_property
+    def linear(self):
+        """The picture in scene-linear light: float32, shape (height, width, 3), R, G, B of the working space, rows from
+        the top. 1 is the undisturbed light."""
+        return self._linear[:, :, :3]
+
+    @functools.cached_property
+    def alpha(self):
+        """Opacity, shape (height, width); None if the method's picture covers everything."""
+        return self._linear[:, :, 3] if self.channels[3:4] == ["A"] else None
+
+    @functools.cached_property
+    def aovs(self):
+        """The other channels of the EXR file, by name: {"folds": array (height, width), ...}."""
+        return {name: self._linear[:, :, i] for i, name in enumerate(self.channels) if name not in ("R", "G", "B", "A")}
+
+    @functools.cached_property
+    def display(self):
+        """The picture for a screen (sRGB, unless the scene says otherwise): float32 from 0 to 1, shape
+        (height, width, 3), or 4 with opacity. For Matplotlib: plt.imshow(render.display)."""
+        return np.clip(np.nan_to_num(self._rendered.display()), 0, 1)
+
+    @property
+    def channels(self):
+        """Names of the channels of the EXR file: R, G, B, perhaps A, and those of `aovs`."""
+        return self._rendered.channels()
+
+    @functools.cached_property
+    def spectral(self):
+        """Spectral irradiance, unit of the light's irradiance per nm: float32, shape (height, width, bands). Needs
+        keep=["spectral"]; else None."""
+        spectral = self._rendered.spectral()
+        return None if spectral is None else spectral[0][:, :, 3:]
+
+    @functools.cached_property
+    def wavelengths(self):
+        """The middle wavelengths of the bands of `spectral`, nm: shape (bands,); None without them."""
+        spectral = self._rendered.spectral()
+        if spectral is None:
+            return None
+        return np.array([float(name.split(".", 1)[1][:-2].replace(",", ".")) for name in spectral[1][3:]])
+
+    @functools.cached_property
+    def photons(self):
+        """The photons on the plate, a structured array with position, direction and origin (world), wavelength (nm) and
+        power: photons["position"] has the shape (n, 3). Needs keep=["photons"]; else empty."""
+        return self._rendered.photons().view(_PHOTON)[:, 0]
+
+    @functools.cached_property
+    def paths(self):
+        """The paths of the method path_tracing, a list of dictionaries: position, direction, change (n, 3), tensor
+        (n, 3, 3), length, in_field (n,); and flexibility, wavelength and end of each."""
+        return self._rendered.paths()
+
+    @functools.cached_property
+    def statistics(self):
+        """What `--stats` writes: counts of photons by where they ended, power, steps, seconds; a dictionary."""
+        return json.loads(self._rendered.statistics())
+
+    @property
+    def scene(self):
+        """The scene that was rendered, a dictionary, with all changes."""
+        return json.loads(self._rendered.scene())
+
+    @property
+    def scale(self):
+        """The scale of the field: chosen, where the scene leaves it open."""
+        return self._rendered.scale()
+
+    @property
+    def notes(self):
+        """What was chosen or found while loading, one line each."""
+        return self._rendered.notes()
+
+    @property
+    def warnings(self):
+        """Problems that the picture does not show by itself, one line each."""
+        return self._rendered.warnings()
+
+    def write(self, *files):
+        """Writes files as `outputs` of `render` does, later: either all are complete, or none has changed."""
+        self._rendered.write([os.fspath(file) for file in files])
+
+    @functools.cached_property
+    def _linear(self):
+        return self._rendered.linear()
+
+    def _repr_png_(self):
+        return _png.encode(self.display)
+
+    def __repr__(self):
+        height, width = self._linear.shape[:2]
+        return f"<tensorray.Render: {width} x {height} pixels, channels {', '.join(self.channels)}>"

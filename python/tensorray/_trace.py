@@ -1,0 +1,158 @@
+"""Single rays, and the landings of a scene's light."""
+
+import dataclasses
+import math
+from typing import Optional
+
+import numpy as np
+
+from . import _tensorray
+from ._arguments import changes_of, scene_of
+from ._progress import shown
+from ._render import _FIELD_ALONE
+
+
+@dataclasses.dataclass
+class Plate:
+    """A rectangle on which rays end. Any side of it collects light.
+
+    center  Its middle, world. normal: any length. size: width and height, world units. up: its upper edge.
+    """
+
+    center: tuple
+    normal: tuple = (0, 0, 1)
+    size: tuple = (1, 1)
+    up: tuple = (0, 0, 1)
+
+
+@dataclasses.dataclass
+class Trace:
+    """The result of `trace`: arrays with one row a ray."""
+
+    positions: np.ndarray  #: Where rays ended, world: (n, 3). Rays that missed: where they left the volume.
+    directions: np.ndarray  #: Unit directions there: (n, 3).
+    lengths: np.ndarray  #: Lengths of the ways, world units: (n,).
+    ends: np.ndarray  #: Why they ended, numbers for tr.RAY_ENDS: (n,); 0 is on the plate.
+    steps: np.ndarray  #: Numbers of steps: (n,).
+    along: Optional[np.ndarray] = None  #: The vectors along which starts were moved: (n, 3, 2).
+    position_jacobians: Optional[np.ndarray] = None  #: Derivatives of `positions` along them: (n, 3, 2).
+    direction_jacobians: Optional[np.ndarray] = None  #: Derivatives of `directions` along them: (n, 3, 2).
+    ways: Optional[list] = None  #: A polyline a ray: a list of arrays (points, 3).
+
+    @property
+    def landed(self):
+        """Whether each ray ended on the plate: (n,) of bool."""
+        return self.ends == _tensorray.ray_ends.index("plate")
+
+
+def trace(field, positions, directions, s, *, scale=1.0, plate=None, jacobians=False, along=None, turning=None,
+          ways=False, method="splitting", step=None, max_steps=20000, max_length=None, eigenvalues="auto", threads=0,
+          progress=None):
+    """Follows single rays through a field.
+
+    positions    Starts, world: (n, 3), or (3,) for one ray or for all.
+    directions   Directions there, of any length but zero: (n, 3), or (3,) for all.
+    s            Flexibilities: a number for all, or (n,).
+    scale        Factor on s; 1: s T is in 1/length. `Render.scale` is the one that a scene has chosen.
+    plate        A Plate that rays end on. Without one they end where they leave the volume.
+    jacobians    Whether to compute the derivatives of the ends along two vectors for each start.
+    along        These vectors, world: (n, 3, 2), or (3, 2) for all. Default: two unit vectors across the ray.
+    turning      How the directions change along them: the same shapes; default: not at all (parallel light).
+    ways         Whether to record the way of each ray.
+    method       splitting, euler, rk4, bs23 or dopri5.
+    step         Voxels a step; None: chosen along the ray.
+    max_steps    Steps after which a ray is given up.
+    max_length   Length after which a ray ends, world units; None: no limit.
+    eigenvalues  Preprocessing: auto (absolute where the field is symmetric, else raw), raw, absolute or positive.
+    threads      Greatest number of threads; 0: all. The result does not depend on it.
+
+    Returns a Trace. The light of a small area about a start fills |J0 x J1| times that area on the plate, where J0, J1
+    are the columns of its position's Jacobian: where this is zero there is a caustic.
+    """
+    starts, headings, flexibilities = _rays(positions, directions, s)
+    request = _tensorray.TraceRequest()
+    request.positions, request.directions, request.flexibilities = starts, headings, flexibilities
+    if jacobians or along is not None or turning is not None:
+        along = _across(headings) if along is None else _for_all(along, len(starts))
+        request.along = along
+        request.turning = None if turning is None else _for_all(turning, len(starts))
+    if plate is not None:
+        request.plate = _tensorray.Plate(*(np.asarray(part, float).ravel() for part in
+                                           (plate.center, plate.normal, plate.up, plate.size)))
+    request.eigenvalues, request.method, request.paths = eigenvalues, method, ways
+    request.scale, request.step, request.max_steps = float(scale), float(step or 0), int(max_steps)
+    request.max_length = math.inf if max_length is None else float(max_length)
+    with shown(progress) as report:
+        return Trace(**_tensorray.trace(field._field, request, threads, report), along=along)
+
+
+def _rays(positions, directions, s):
+    headings = np.atleast_2d(np.asarray(directions, float))
+    starts = np.atleast_2d(np.asarray(positions, float))
+    flexibilities = np.atleast_1d(np.asarray(s, float))
+    if starts.shape[-1] != 3 or headings.shape[-1] != 3 or starts.ndim != 2 or headings.ndim != 2:
+        raise ValueError("trace: positions and directions must have the shape (n, 3)")
+    count = max(len(starts), len(headings), len(flexibilities))
+    try:
+        starts = np.broadcast_to(starts, (count, 3))
+        headings = np.broadcast_to(headings, (count, 3))
+        flexibilities = np.broadcast_to(flexibilities, (count,))
+    except ValueError:
+        raise ValueError("trace: positions, directions and s must be for the same number of rays") from None
+    lengths = np.linalg.norm(headings, axis=1, keepdims=True)
+    return starts, np.divide(headings, lengths, out=np.zeros_like(headings), where=lengths > 0), flexibilities
+
+
+def _for_all(vectors, count):
+    return np.ascontiguousarray(np.broadcast_to(np.asarray(vectors, float), (count, 3, 2)))
+
+
+def _across(directions):
+    """Two unit vectors across each direction, as columns: (n, 3, 2)."""
+    helper = np.where(np.abs(directions[:, 2:]) < 0.9, [[0.0, 0.0, 1.0]], [[0.0, 1.0, 0.0]])
+    first = np.cross(helper, directions)
+    first /= np.maximum(np.linalg.norm(first, axis=1, keepdims=True), 1e-300)
+    return np.stack([first, np.cross(directions, first)], axis=2)
+
+
+@dataclasses.dataclass
+class Landings:
+    """The result of `landings`: where the light of a scene lands on its plate, as a mesh over its starts."""
+
+    starts: np.ndarray  #: Where light starts, world: (n, 3).
+    landings: np.ndarray  #: Where it lands, for each flexibility, in pixels from the plate's top left: (n, k, 2).
+    ends: np.ndarray  #: Why it ended, numbers for tr.RAY_ENDS: (n, k); landings are valid where this is 0.
+    flexibilities: np.ndarray  #: (k,)
+    triangles: np.ndarray  #: Indices of neighbouring starts: (m, 3). They cover the beam once.
+    areas: np.ndarray  #: Area of the beam in each triangle, world units squared: (m,).
+    center: np.ndarray  #: Middle of the plate, world.
+    right: np.ndarray  #: Unit vector along its width.
+    up: np.ndarray  #: Unit vector along its height.
+    size: tuple  #: Width and height, world units.
+    resolution: tuple  #: Pixels along both.
+
+    def world(self):
+        """The landings in the world: (n, k, 3)."""
+        x = (self.landings[..., :1] / self.resolution[0] - 0.5) * self.size[0]
+        y = (0.5 - self.landings[..., 1:] / self.resolution[1]) * self.size[1]
+        return self.center + x * self.right + y * self.up
+
+
+def landings(scene=None, field=None, s=None, *, tolerance=0.5, changes=None, threads=0, folder=None, progress=None):
+    """Where the light of a scene lands on its plate: the map whose light `photon_distribution` draws.
+
+    scene, field, changes, threads, folder, progress    As those of `render`.
+    s          Flexibilities: a number or several. None: those of the scene's light, evenly spaced between its ends.
+    tolerance  Wanted error of landings between starts, pixels. Where the map bends or folds, starts are closer.
+
+    Returns Landings.
+    """
+    if scene is None:
+        if field is None:
+            raise ValueError("landings: give a scene, a field, or both")
+        scene = _FIELD_ALONE
+    file, text = scene_of(scene, folder)
+    flexibilities = [] if s is None else [float(value) for value in np.atleast_1d(s)]
+    with shown(progress) as report:
+        return Landings(**_tensorray.landings(file, text, changes_of(changes), field._field if field else None,
+                                              flexibilities, float(tolerance), threads, report))

@@ -1,0 +1,118 @@
+"""Long calls: the GIL, threads, progress, Ctrl-C."""
+
+import os
+import signal
+import subprocess
+import sys
+import tempfile
+import threading
+import time
+import unittest
+
+import numpy as np
+
+import tensorray as tr
+
+SCENE = {"light": {"photons": 20000, "wavelengths": {"count": 8}}, "receiver": {"resolution": 64},
+         "integrator": {"type": "photon_distribution", "density": {"kind": "gaussian"}}}
+LONG = {**SCENE, "light": {"photons": 1e9}}  # Hours.
+
+
+class LongCallsTest(unittest.TestCase):
+    def test_several_threads_render_at_once(self):
+        field = tr.make("vortex", resolution=24)
+        expected = [tr.render(SCENE, field=field, seed=seed).linear for seed in range(4)]
+        results = [None] * 4
+
+        def work(seed):
+            results[seed] = tr.render(SCENE, field=field, seed=seed, threads=1 + seed % 2).linear
+
+        threads = [threading.Thread(target=work, args=(seed,)) for seed in range(4)]
+        for thread in threads:
+            thread.start()
+        for thread in threads:
+            thread.join()
+        for result, wanted in zip(results, expected):
+            np.testing.assert_array_equal(result, wanted)
+
+    def test_threads_use_one_new_field_at_once(self):
+        field = tr.Field(tr.make("helix", resolution=24).tensors)
+        ends = [None] * 6
+
+        def work(i):
+            ends[i] = tr.trace(field, [10.0, 11.0, 30.0], [0, 0, -1], 0.1, eigenvalues=("raw", "absolute")[i % 2]).positions
+
+        threads = [threading.Thread(target=work, args=(i,)) for i in range(6)]
+        for thread in threads:
+            thread.start()
+        for thread in threads:
+            thread.join()
+        for i in range(2, 6):
+            np.testing.assert_array_equal(ends[i], ends[i % 2])
+
+    def test_other_threads_run_meanwhile(self):
+        counted, done = [0], threading.Event()
+
+        def count():
+            while not done.is_set():
+                counted[0] += 1
+                time.sleep(0.001)
+
+        thread = threading.Thread(target=count)
+        thread.start()
+        before = counted[0]
+        tr.render(SCENE, field=tr.make("vortex", resolution=24), changes={"light.photons": 3e5})
+        during = counted[0] - before
+        done.set()
+        thread.join()
+        self.assertGreater(during, 10)
+
+    def test_progress(self):
+        seen = []
+        tr.render(SCENE, field=tr.make("vortex", resolution=24), changes={"light.photons": 3e5},
+                  progress=lambda *report: seen.append(report))
+        self.assertTrue(seen)
+        for phase, done, total in seen:
+            self.assertIsInstance(phase, str)
+            self.assertLessEqual(done, total)
+
+    def test_an_exception_of_the_progress_ends_the_call(self):
+        def stop(*_):
+            raise LookupError("enough")
+
+        with tempfile.TemporaryDirectory() as folder:
+            with self.assertRaisesRegex(LookupError, "enough"):
+                tr.render(LONG, field=tr.make("vortex", resolution=24), progress=stop,
+                          outputs=os.path.join(folder, "a.exr"))
+            self.assertEqual(os.listdir(folder), [])
+
+    def test_bars(self):
+        program = "import tensorray as tr; tr.render({}, field=tr.make('vortex', resolution=16), progress=True)".format(
+            {**SCENE, "light": {"photons": 2e5, "wavelengths": {"count": 8}}})
+        ended = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True)
+        self.assertEqual(ended.returncode, 0, ended.stderr)
+        self.assertIn("%", ended.stderr)
+        without = subprocess.run([sys.executable, "-c", program.replace("progress=True", "progress=None")],
+                                 capture_output=True, text=True)
+        self.assertEqual(without.stderr, "")
+        plain = subprocess.run([sys.executable, "-c", "import sys; sys.modules['tqdm.auto'] = None; " + program],
+                               capture_output=True, text=True)
+        self.assertEqual(plain.returncode, 0, plain.stderr)
+        self.assertIn("%", plain.stderr)
+
+    def test_interrupts(self):
+        with tempfile.TemporaryDirectory() as folder:
+            program = ("import tensorray as tr\n"
+                       f"tr.render({LONG}, field=tr.make('vortex', resolution=24), outputs='a.exr',\n"
+                       "          progress=lambda *report: print('working', flush=True))\n")
+            child = subprocess.Popen([sys.executable, "-c", program], cwd=folder, stdout=subprocess.PIPE,
+                                     stderr=subprocess.PIPE, text=True)
+            self.assertEqual(child.stdout.readline(), "working\n")
+            child.send_signal(signal.SIGINT)
+            _, error = child.communicate(timeout=60)
+            self.assertEqual(error.strip().splitlines()[-1], "KeyboardInterrupt")
+            self.assertEqual(os.listdir(folder), [])
+
+
+if __name__ == "__main__":
+    unittest.main()

@@ -1,0 +1,38 @@
+// The Python package, in the Python that it was built for. The tests themselves are the *_test.py in this folder.
+
+#include <cstdlib>
+#include <filesystem>
+#include <string>
+
+#include <gtest/gtest.h>
+
+#include "tests/data_folder.h"
+
+namespace tensorray {
+namespace {
+
+void run(const std::string& file) {
+  const std::string python = "PYTHONDONTWRITEBYTECODE=1 '" TENSORRAY_PYTHON_PROGRAM "' ";
+  if (std::system((python + "-c 'import numpy' 2>/dev/null").c_str()) != 0) GTEST_SKIP() << "NumPy is not installed";
+  const std::filesystem::path test = test::source_folder() / "tests" / "python" / file;
+  const std::string command = "PYTHONPATH='" TENSORRAY_PYTHON_FOLDER "' TENSORRAY_BINARY='" TENSORRAY_BINARY "' " +
+                              python + "'" + test.string() + "' -v";
+  EXPECT_EQ(std::system(command.c_str()), 0);
+}
+
+TEST(Python, Fields) { run("fields_test.py"); }
+TEST(Python, Renders) { run("renders_test.py"); }
+TEST(Python, LongCalls) { run("long_calls_test.py"); }
+TEST(Python, Rays) { run("rays_test.py"); }
+TEST(Python, Package) { run("package_test.py"); }
+
+TEST(Python, ParaView) {
+  if (std::system("pvpython --version >/dev/null 2>&1") != 0) GTEST_SKIP() << "ParaView (pvpython) is not installed";
+  const std::filesystem::path test = test::source_folder() / "tests" / "python" / "paraview_test.py";
+  const std::string command =
+      "PYTHONPATH='" TENSORRAY_PYTHON_FOLDER "' PYTHONDONTWRITEBYTECODE=1 pvpython '" + test.string() + "'";
+  EXPECT_EQ(std::system(command.c_str()), 0);
+}
+
+}  // namespace
+}  // namespace tensorray
