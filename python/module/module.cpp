@@ -25,12 +25,14 @@ namespace py = pybind11;
 
 /// Exceptions with the line that the command line prints after its name.
 void add_exceptions(py::module_& module) {
-  static const py::object scene_error = py::exception<SceneError>(module, "SceneError", PyExc_ValueError);
+  // Never released: it must outlive the interpreter.
+  static PyObject* const scene_error =
+      py::exception<SceneError>(module, "SceneError", PyExc_ValueError).release().ptr();
   py::register_exception_translator([](std::exception_ptr error) {
     try {
       if (error) std::rethrow_exception(error);
     } catch (const SceneError& wrong) {
-      PyErr_SetString(scene_error.ptr(), escaped(wrong.what()).c_str());
+      PyErr_SetString(scene_error, escaped(wrong.what()).c_str());
     } catch (const std::invalid_argument& wrong) {
       PyErr_SetString(PyExc_ValueError, escaped(wrong.what()).c_str());
     } catch (const Cancelled&) {

@@ -18,7 +18,7 @@ namespace py = pybind11;
 constexpr std::chrono::milliseconds interval(50);
 
 /// What the working thread and the waiting one share.
-struct Work {
+struct Call {
   Progress progress;
   std::mutex mutex;
   std::condition_variable ended;
@@ -28,7 +28,7 @@ struct Work {
   std::uint64_t done = 0, total = 0;
 };
 
-void do_work(Work& shared, const std::function<void(const Progress&)>& work, int threads) {
+void do_work(Call& shared, const std::function<void(const Progress&)>& work, int threads) {
   std::exception_ptr error;
   try {
     tbb::task_arena arena(threads > 0 ? threads : tbb::task_arena::automatic);
@@ -43,7 +43,7 @@ void do_work(Work& shared, const std::function<void(const Progress&)>& work, int
 }
 
 /// @throw py::error_already_set if a signal or `report` raised an exception.
-void look_up(Work& shared, const py::object& report) {
+void look_up(Call& shared, const py::object& report) {
   std::unique_lock<std::mutex> lock(shared.mutex);
   const std::string phase = shared.phase;
   const std::uint64_t done = shared.done, total = shared.total;
@@ -56,7 +56,7 @@ void look_up(Work& shared, const py::object& report) {
 }  // namespace
 
 void run(const std::function<void(const Progress&)>& work, const py::object& report, int threads) {
-  Work shared;
+  Call shared;
   shared.progress.report = [&shared](const std::string& phase, std::uint64_t done, std::uint64_t total) {
     const std::lock_guard<std::mutex> lock(shared.mutex);
     shared.phase = phase;

@@ -31,6 +31,7 @@ from ._tensorray import SceneError
 from ._trace import Landings, Plate, Trace, landings, trace
 
 __version__ = _tensorray.version
+SceneError.__module__ = __name__
 
 #: Why a ray ended; index it with the numbers in `Trace.ends` and `Landings.ends`.
 RAY_ENDS = _tensorray.ray_ends
