@@ -148,7 +148,8 @@ def import_file(*files, array=None, gradient_of=None, strain_of=None, order=None
         command = [program, "-q", "-o", vdb]
         for option, value in options.items():
             if value is not None:
-                command += [option, *(map(str, value) if isinstance(value, (tuple, list, np.ndarray)) else [str(value)])]
+                values = value if isinstance(value, (tuple, list, np.ndarray)) else [value]
+                command += [option, *map(str, values)]
         ended = subprocess.run([*command, "--", *map(os.fspath, files)], stdout=subprocess.DEVNULL,
                                stderr=subprocess.PIPE, text=True, check=False)
         if ended.returncode != 0:

@@ -46,11 +46,11 @@ def render(scene=None, field=None, *, outputs=(), keep=(), changes=None, seed=No
         scene = _FIELD_ALONE
     file, text = scene_of(scene, folder)
     files = [outputs] if isinstance(outputs, (str, os.PathLike)) else outputs
-    kinds = [keep] if isinstance(keep, str) else keep
+    kinds = ["image", "exr", *([keep] if isinstance(keep, str) else keep)]
     with shown(progress) as report:
         return Render(_tensorray.render(file, text, changes_of(changes, seed), field._field if field else None,
-                                        [os.fspath(name) for name in files], list(dict.fromkeys(["image", "exr", *kinds])),
-                                        threads, report))
+                                        [os.fspath(name) for name in files], list(dict.fromkeys(kinds)), threads,
+                                        report))
 
 
 class Render:

@@ -40,7 +40,8 @@ class LongCallsTest(unittest.TestCase):
         ends = [None] * 6
 
         def work(i):
-            ends[i] = tr.trace(field, [10.0, 11.0, 30.0], [0, 0, -1], 0.1, eigenvalues=("raw", "absolute")[i % 2]).positions
+            mode = ("raw", "absolute")[i % 2]
+            ends[i] = tr.trace(field, [10.0, 11.0, 30.0], [0, 0, -1], 0.1, eigenvalues=mode).positions
 
         threads = [threading.Thread(target=work, args=(i,)) for i in range(6)]
         for thread in threads:

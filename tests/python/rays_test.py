@@ -57,8 +57,8 @@ class RaysTest(unittest.TestCase):
     def test_turning_starts(self):
         still = np.zeros((3, 2))
         turning = np.array([[1, 0], [0, 1], [0, 0.0]])
-        ray = tr.trace(tr.make("constant", resolution=4), [0, 0, 2.0], [0, 0, -1], 0.0, plate=tr.Plate((0, 0, -2), size=(9, 9)),
-                       along=still, turning=turning)
+        ray = tr.trace(tr.make("constant", resolution=4), [0, 0, 2.0], [0, 0, -1], 0.0, along=still, turning=turning,
+                       plate=tr.Plate((0, 0, -2), size=(9, 9)))
         np.testing.assert_allclose(ray.position_jacobians[0], 4 * turning, atol=1e-6)
 
     def test_landings_are_where_rays_land(self):

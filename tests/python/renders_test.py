@@ -53,7 +53,8 @@ class RendersTest(unittest.TestCase):
         self.assertEqual(ended.returncode, 0, ended.stderr)
         tr.render(scene_for_python or scene, field=field, outputs=[self.path("python" + ending) for ending in endings])
         for ending in endings:
-            self.assertEqual(bytes_of(self.folder, "python" + ending), bytes_of(self.folder, "program" + ending), ending)
+            written = [bytes_of(self.folder, name + ending) for name in ("python", "program")]
+            self.assertEqual(written[0], written[1], ending)
 
     def test_the_bytes_are_those_of_the_command_line(self):
         self.same_files(PHOTONS, [".png", ".exr", ".spectral.exr", ".fluence.vdb", ".vdb"])
@@ -150,7 +151,8 @@ class RendersTest(unittest.TestCase):
         self.assertNotIn("b.png", os.listdir(self.folder))
 
     def test_errors_are_the_lines_of_the_command_line(self):
-        bad = [{**PHOTONS, "lihgt": {}}, {**PHOTONS, "light": {"photons": -1}}, {**PHOTONS, "integrator": {"type": "lnes"}},
+        bad = [{**PHOTONS, "lihgt": {}}, {**PHOTONS, "light": {"photons": -1}},
+               {**PHOTONS, "integrator": {"type": "lnes"}},
                {**PHOTONS, "field": {"file": "nowhere.vdb"}}, {"integrator": {"type": "lens"}},
                {**PHOTONS, "receiver": {"size": [1e9, 1]}}]
         for scene in bad:

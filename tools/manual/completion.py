@@ -58,7 +58,8 @@ def zsh_function(command):
         return "\n".join([f"{name}() {{", *lines, "}"])
     described = " ".join(f"'{below.name}:{zsh_text(below.summary)}'" for below in command.commands)
     cases = "\n".join(f"    {below.name}) {name}_{below.name.replace('-', '_')} ;;" for below in command.commands)
-    lines = ["  local context state line", "  _arguments -C \\", *(f"    {argument} \\" for argument in arguments),
+    lines = ["  local context state line", "  _arguments -C \\",
+             *(f"    {argument} \\" for argument in arguments),
              "    '1: :->command' '*:: :->rest'", f"  local -a commands=({described})", "  case $state in",
              "  command) _describe command commands ;;", "  rest) case $words[1] in", cases, "    esac ;;", "  esac"]
     return "\n".join([f"{name}() {{", *lines, "}"])
@@ -66,7 +67,8 @@ def zsh_function(command):
 
 def zsh(program):
     functions = "\n\n".join(zsh_function(command) for command in reversed(all_commands(program)))
-    return f'#compdef tensorray\n# zsh completion for tensorray, made from its --help\n\n{functions}\n\n_tensorray "$@"\n'
+    head = "#compdef tensorray\n# zsh completion for tensorray, made from its --help"
+    return f'{head}\n\n{functions}\n\n_tensorray "$@"\n'
 
 
 def fish_quoted(text):
@@ -75,7 +77,8 @@ def fish_quoted(text):
 
 def fish_line(condition, option):
     flags = "".join(f" -l {name[2:]}" if name.startswith("--") else f" -s {name[1:]}" for name in option.names)
-    return f"complete -c tensorray -n {fish_quoted(condition)}{flags}{' -r' if option.argument else ''} -d {fish_quoted(option.text)}"
+    value = " -r" if option.argument else ""
+    return f"complete -c tensorray -n {fish_quoted(condition)}{flags}{value} -d {fish_quoted(option.text)}"
 
 
 def fish(program):
@@ -85,6 +88,7 @@ def fish(program):
         names = " ".join(below.name for below in command.commands)
         here = "; and ".join(seen + ([f"not __fish_seen_subcommand_from {names}"] if names else [])) or "true"
         for below in command.commands:
-            lines.append(f"complete -c tensorray -f -n {fish_quoted(here)} -a {below.name} -d {fish_quoted(below.summary)}")
+            meaning = fish_quoted(below.summary)
+            lines.append(f"complete -c tensorray -f -n {fish_quoted(here)} -a {below.name} -d {meaning}")
         lines += [fish_line(here, option) for option in command.options]
     return "\n".join(lines) + "\n"

@@ -24,8 +24,8 @@ def sections_of(command, heading):
 def page(command, version):
     """The page of a command. Commands below a command of the program are parts of its page."""
     name = "-".join(command.words)
-    lines = [f'.TH "{name.upper()}" 1 "" "tensorray {version}"', ".SH NAME", f"{escaped(name)} \\- {escaped(command.summary)}",
-             ".SH SYNOPSIS", escaped(command.usage)]
+    lines = [f'.TH "{name.upper()}" 1 "" "tensorray {version}"', ".SH NAME",
+             f"{escaped(name)} \\- {escaped(command.summary)}", ".SH SYNOPSIS", escaped(command.usage)]
     lines += sections_of(command, ".SH")
     if command.commands and len(command.words) == 1:
         lines.append(".SH COMMANDS")
@@ -33,7 +33,8 @@ def page(command, version):
             lines += [".TP", f"\\fB{escaped('-'.join(below.words))}\\fR(1)", escaped(below.summary)]
     elif command.commands:
         for below in command.commands:
-            lines += [f'.SH "{" ".join(below.words[1:]).upper()}"', escaped(below.summary) + ".", ".PP", escaped(below.usage)]
+            lines += [f'.SH "{" ".join(below.words[1:]).upper()}"', escaped(below.summary) + ".", ".PP",
+                      escaped(below.usage)]
             lines += sections_of(below, ".SS")
     lines += [".SH EXIT STATUS", "0 done; 1 it failed; 2 the command line or the scene is wrong; 130 interrupted."]
     return "\n".join(lines) + "\n"
