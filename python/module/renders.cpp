@@ -154,7 +154,7 @@ void add_renders(py::module_& module) {
       .def("warnings", [](const Rendered& self) { return self.render.warnings; })
       .def("write", &write_more);
   module.def("render", &render_for_python);
-  module.def("schema", &scene_schema);
+  module.def("schema", [] { return scene_schema(); });
 }
 
 }  // namespace tensorray
