@@ -11,6 +11,9 @@ namespace {
 /// The run path of the program, which `dlopen` searches, is its own folder (CMAKE_BUILD_RPATH).
 const PictureLibrary& load() {
   constexpr const char* file = "libtensorray_pictures.so";
+#ifdef TENSORRAY_LOADED_FIRST
+  dlopen(TENSORRAY_LOADED_FIRST, RTLD_LAZY | RTLD_LOCAL);  // For speed (CMakeLists.txt); without it all works, too.
+#endif
   void* const library = dlopen(file, RTLD_LAZY | RTLD_LOCAL);
   void* const functions = library ? dlsym(library, "tensorray_picture_library") : nullptr;
   if (!functions)
