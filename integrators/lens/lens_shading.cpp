@@ -61,16 +61,23 @@ class SampleView {
         if (lands(span.to)) look(Glimpse(*this, span.to), span.to, 0.5, span.first, span.last, pixel);
         continue;
       }
-      const Glimpse glimpse(*this, span.from);
-      if (!lands(span.to) || !are_joined(span, glimpse.distance(st(span.to)) / n_)) {
-        look(glimpse, span.from, 0.5, span.first, span.last, pixel);
-        if (lands(span.to)) look(Glimpse(*this, span.to), span.to, 0.5, span.first, span.last, pixel);
+      const Glimpse from(*this, span.from);
+      if (!lands(span.to)) {
+        look(from, span.from, 0.5, span.first, span.last, pixel);
         continue;
       }
+      const Glimpse to(*this, span.to);
+      if (!are_joined(span, distance(from, to) / n_)) {
+        look(from, span.from, 0.5, span.first, span.last, pixel);
+        look(to, span.to, 0.5, span.first, span.last, pixel);
+        continue;
+      }
+      // At a fold, what a sample sees grows without limit: the other end tells how near points are.
+      Glimpse finer = from.area() < to.area() ? from : to;
+      finer.st = from.st;
       std::size_t last = i;
-      while (last < spans.size() && lands(spans[last].to) && glimpse.distance(st(spans[last].to)) <= same_look * n_)
-        ++last;
-      look(glimpse, spans[last - 1].to, 1, span.first, spans[last - 1].last, pixel);
+      while (last < spans.size() && lands(spans[last].to) && finer.distance(st(spans[last].to)) <= same_look * n_) ++last;
+      look(finer, spans[last - 1].to, 1, span.first, spans[last - 1].last, pixel);
       i = last;
     }
   }
@@ -81,9 +88,9 @@ class SampleView {
     double length = 0;
     for (const Span& span : spans) {
       if (!lands(span.from) || !lands(span.to)) return std::numeric_limits<double>::infinity();
-      const double distance = Glimpse(*this, span.from).distance(st(span.to)) / n_;
-      if (!are_joined(span, distance)) return std::numeric_limits<double>::infinity();
-      length += distance;
+      const double way = distance(Glimpse(*this, span.from), Glimpse(*this, span.to)) / n_;
+      if (!are_joined(span, way)) return std::numeric_limits<double>::infinity();
+      length += way;
     }
     return length;
   }
@@ -126,7 +133,13 @@ class SampleView {
 
     /// In samples.
     double distance(const Vector2d& other) const { return (to_samples * (other - st)).norm(); }
+
+    /// Of the footprint.
+    double area() const { return std::abs(footprint.determinant()); }
   };
+
+  /// In samples, as the end sees it where it is greater.
+  static double distance(const Glimpse& a, const Glimpse& b) { return std::max(a.distance(b.st), b.distance(a.st)); }
 
   /// Adds the light of the bands from `first` to `last`, which see the line to the point of node `to`.
   void look(const Glimpse& from, std::size_t to, double share, std::size_t first, std::size_t last,
