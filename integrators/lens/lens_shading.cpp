@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <optional>
 
 #include <Eigen/Cholesky>
 #include <Eigen/LU>
@@ -19,6 +20,8 @@ constexpr double span_pixels = 0.5;    // Over which light moves within a span.
 constexpr double smooth_pixels = 0.5;  // From the parabola through three of five nodes, at the others: how far light
                                        // may be, so that light between the nodes can be interpolated.
 constexpr double swept_pixels = 2;  // Of the image, over which a pixel's light is spread, so that one sample is enough.
+constexpr double wide_pixels = 2;   // Of the image, that a sample sees: where it may be at a fold.
+constexpr double fold_ratio = 0.95;   // Of the slope's determinants at the end of a torn span and beyond it, at a fold.
 constexpr double joined_pixels = 32;  // A band. Farther apart, the points that both ends see are on different sheets.
 
 /// The footprint of a sample whose point moves along `sweep`: each is a box whose variance adds to that of the other.
@@ -49,35 +52,37 @@ std::vector<std::size_t> chain(const std::vector<Span>& spans) {
 /// What one sample sees of the image.
 class SampleView {
  public:
-  /// @param n  Samples per pixel along x and along y.
-  SampleView(const LensView& view, const TileView& points, std::size_t sample, int n)
-      : view_(view), points_(points), sample_(sample), n_(n) {}
+  /// @param n      Samples per pixel along x and along y.
+  /// @param width  Samples in a row of the tile.
+  SampleView(const LensView& view, const TileView& points, std::size_t sample, int n, int width)
+      : view_(view), points_(points), sample_(sample), n_(n), width_(static_cast<std::size_t>(width)) {}
 
   /// Adds the light of all bands. Spans whose light sees nearly the same points share a look at the image.
   void shade(const std::vector<Span>& spans, PixelLight& pixel) const {
     for (std::size_t i = 0; i < spans.size();) {
       const Span span = spans[i++];
       if (!lands(span.from)) {
-        if (lands(span.to)) look(Glimpse(*this, span.to), span.to, 0.5, span.first, span.last, pixel);
+        const Glimpse to(*this, span.to);
+        if (lands(span.to)) look(to, to.st, 0.5, span, pixel);
         continue;
       }
       const Glimpse from(*this, span.from);
       if (!lands(span.to)) {
-        look(from, span.from, 0.5, span.first, span.last, pixel);
+        look(from, from.st, 0.5, span, pixel);
         continue;
       }
       const Glimpse to(*this, span.to);
       if (!are_joined(span, distance(from, to) / n_)) {
-        look(from, span.from, 0.5, span.first, span.last, pixel);
-        look(to, span.to, 0.5, span.first, span.last, pixel);
+        shade_torn(span, i > 1 ? &spans[i - 2] : nullptr, i < spans.size() ? &spans[i] : nullptr, pixel);
         continue;
       }
       // At a fold, what a sample sees grows without limit: the other end tells how near points are.
-      Glimpse finer = from.area() < to.area() ? from : to;
+      Glimpse finer = std::abs(from.to_samples.determinant()) < std::abs(to.to_samples.determinant()) ? to : from;
       finer.st = from.st;
       std::size_t last = i;
-      while (last < spans.size() && lands(spans[last].to) && finer.distance(st(spans[last].to)) <= same_look * n_) ++last;
-      look(finer, spans[last - 1].to, 1, span.first, spans[last - 1].last, pixel);
+      while (last < spans.size() && lands(spans[last].to) && finer.distance(st(spans[last].to)) <= same_look * n_)
+        ++last;
+      look(finer, st(spans[last - 1].to), 1, {span.first, spans[last - 1].last, 0, 0}, pixel);
       i = last;
     }
   }
@@ -110,6 +115,31 @@ class SampleView {
 
  private:
   const FlowPoint& point(std::size_t node) const { return points_[node][sample_]; }
+
+  /// The change of (s, t) per sample along x and y, as the map's slope says.
+  Matrix2d by_slope(std::size_t node) const {
+    return view_.light.image.plane.size.cwiseInverse().asDiagonal() * image_by_pixel(view_, point(node)) / n_;
+  }
+
+  /// The same, but for a fold, where the slope has no limit: no more than what is between a sample and the next ones.
+  Matrix2d footprint(std::size_t node) const {
+    Matrix2d by_sample = by_slope(node);
+    const auto limit = [&](int axis, bool exists, std::size_t neighbor) {
+      if (!exists || points_[node][neighbor].end != RayEnd::plate) return;
+      const Vector2d change = texture_coordinates(view_.light, image_point(view_, points_[node][neighbor])) - st(node);
+      if (change.squaredNorm() < by_sample.col(axis).squaredNorm()) by_sample.col(axis) = change;
+    };
+    const double wide = wide_pixels * view_.straight_pixel / n_;
+    if (by_sample.col(0).norm() > wide) {
+      limit(0, sample_ % width_ > 0, sample_ - 1);
+      limit(0, (sample_ + 1) % width_ > 0, sample_ + 1);
+    }
+    if (by_sample.col(1).norm() > wide) {
+      limit(1, sample_ >= width_, sample_ - width_);
+      limit(1, sample_ + width_ < points_[node].size(), sample_ + width_);
+    }
+    return by_sample;
+  }
   bool lands(std::size_t node) const { return point(node).end == RayEnd::plate; }
 
   /// Whether the points that both ends of a span see, so many pixels apart, are on one sheet.
@@ -121,44 +151,69 @@ class SampleView {
 
   /// A point of the image, and what a sample sees about it.
   struct Glimpse {
+    std::size_t node;
     Vector2d st;
-    Matrix2d footprint;   // Change of (s, t) per sample along x and y.
-    Matrix2d to_samples;  // Its inverse.
+    Matrix2d to_samples;  // The change of the sample per (s, t), as the map's slope says.
 
-    Glimpse(const SampleView& sample, std::size_t node)
-        : st(sample.st(node)),
-          footprint(sample.view_.light.image.plane.size.cwiseInverse().asDiagonal() *
-                    image_by_pixel(sample.view_, sample.point(node)) / sample.n_),
-          to_samples(footprint.inverse()) {}
+    Glimpse(const SampleView& sample, std::size_t at)
+        : node(at), st(sample.st(at)), to_samples(sample.by_slope(at).inverse()) {}
 
     /// In samples.
     double distance(const Vector2d& other) const { return (to_samples * (other - st)).norm(); }
-
-    /// Of the footprint.
-    double area() const { return std::abs(footprint.determinant()); }
   };
 
   /// In samples, as the end sees it where it is greater.
   static double distance(const Glimpse& a, const Glimpse& b) { return std::max(a.distance(b.st), b.distance(a.st)); }
 
-  /// Adds the light of the bands from `first` to `last`, which see the line to the point of node `to`.
-  void look(const Glimpse& from, std::size_t to, double share, std::size_t first, std::size_t last,
-            PixelLight& pixel) const {
-    const Vector2d end = st(to), middle = (from.st + end) / 2;
+  /// The part of a torn span that sees the sheet of one of its ends, and where on this sheet it begins.
+  struct Part {
+    double share;
+    Vector2d beginning;
+  };
+
+  /// This part if the sheet begins at a fold. Light sees points whose distance from the fold's grows as the root of the
+  /// light's own distance, and so does the determinant of the map's slope.
+  /// @param beyond  The next node after the end, on the same sheet.
+  std::optional<Part> part_at_fold(const Span& next, std::size_t end, std::size_t beyond) const {
+    if (!lands(beyond)) return std::nullopt;
+    const Glimpse at(*this, end), after(*this, beyond);
+    const double ratio = std::abs(at.to_samples.determinant() / after.to_samples.determinant());
+    if (!(ratio < fold_ratio) || !are_joined(next, distance(at, after) / n_)) return std::nullopt;
+    const double part = ratio * ratio / (1 - ratio * ratio), share = std::min(part, 1.0);
+    return Part{share, at.st - std::sqrt(share) / (std::sqrt(share + 1) - std::sqrt(share)) * (after.st - at.st)};
+  }
+
+  /// Adds the light of a span whose ends see two sheets. @param before,after  The spans beside it, or null.
+  void shade_torn(const Span& span, const Span* before, const Span* after, PixelLight& pixel) const {
+    const Glimpse from(*this, span.from), to(*this, span.to);
+    const auto at_from =
+        before && before->to == span.from ? part_at_fold(*before, span.from, before->from) : std::nullopt;
+    const auto at_to = after && after->from == span.to ? part_at_fold(*after, span.to, after->to) : std::nullopt;
+    double share = 0.5;  // Of the first sheet.
+    if (at_from || at_to)
+      share = at_from && at_to ? (1 + at_from->share - at_to->share) / 2 : at_from ? at_from->share : 1 - at_to->share;
+    look(from, at_from ? at_from->beginning : from.st, share, span, pixel);
+    look(to, at_to ? at_to->beginning : to.st, 1 - share, span, pixel);
+  }
+
+  /// Adds the light of a span's bands, which see the line from a point to `end`.
+  void look(const Glimpse& from, const Vector2d& end, double share, const Span& span, PixelLight& pixel) const {
+    if (share == 0) return;
+    const Vector2d middle = (from.st + end) / 2;
     if (!sees_image(view_.light, middle)) return;
     const bool is_long = from.distance(end) > same_look * n_;
+    const Matrix2d box = footprint(from.node);
     const Eigen::Vector4d texel =
-        view_.light.image.texture->lookup(middle, is_long ? swept(from.footprint, end - from.st) : from.footprint)
-            .cast<double>();
+        view_.light.image.texture->lookup(middle, is_long ? swept(box, end - from.st) : box).cast<double>();
     if (!(texel.w() > 0)) return;
     thread_local std::vector<double> radiances;
-    radiances.resize(last - first);
-    view_.radiance(texel.head<3>() / texel.w(), first, last, radiances.data());
+    radiances.resize(span.last - span.first);
+    view_.radiance(texel.head<3>() / texel.w(), span.first, span.last, radiances.data());
     const double part = share * texel.w() / (n_ * n_);
-    for (std::size_t i = first; i < last; ++i) {
+    for (std::size_t i = span.first; i < span.last; ++i) {
       const LensBand& band = view_.bands[i];
-      pixel.color += part * radiances[i - first] * band.color;
-      pixel.channels[band.channel] += part * radiances[i - first] * band.weight;
+      pixel.color += part * radiances[i - span.first] * band.color;
+      pixel.channels[band.channel] += part * radiances[i - span.first] * band.weight;
       pixel.alpha[i] += part;
     }
   }
@@ -167,6 +222,7 @@ class SampleView {
   const TileView& points_;
   const std::size_t sample_;
   const double n_;
+  const std::size_t width_;
 };
 
 }  // namespace
@@ -197,14 +253,15 @@ TileShader::TileShader(const LensView& view, int tile, TraceCounts& counts)
 
 void TileShader::find_sweeps() {
   sweeps_.resize(whole_[spans_.front().from].size());
-  for (std::size_t i = 0; i < sweeps_.size(); ++i) sweeps_[i] = SampleView(view_, whole_, i, 1).sweep(spans_);
+  for (std::size_t i = 0; i < sweeps_.size(); ++i) sweeps_[i] = SampleView(view_, whole_, i, 1, columns_).sweep(spans_);
 }
 
 bool TileShader::moves_smoothly() const {
   const std::vector<std::size_t> nodes = chain(few_);
   if (nodes.size() != few_spans + 1) return false;
   for (std::size_t i = 0; i < sweeps_.size(); ++i)
-    if (std::isfinite(sweeps_[i]) && !SampleView(view_, whole_, i, 1).is_smooth(nodes, smooth_pixels)) return false;
+    if (std::isfinite(sweeps_[i]) && !SampleView(view_, whole_, i, 1, columns_).is_smooth(nodes, smooth_pixels))
+      return false;
   return true;
 }
 
@@ -242,13 +299,13 @@ void TileShader::shade(int x, int y, PixelLight& light) {
   const auto pixel = static_cast<std::size_t>(y * columns_ + x);
   const bool is_still = sweeps_[pixel] < swept_pixels;
   if (std::isfinite(sweeps_[pixel]) && (n == 1 || !is_still))
-    return SampleView(view_, whole_, pixel, 1).shade(spans_, light);
+    return SampleView(view_, whole_, pixel, 1, columns_).shade(spans_, light);
   const std::vector<Span>& spans = is_still ? few_ : view_.spans;
   TileView& points = is_still ? few_samples_ : samples_;
   if (points.empty()) points = view_samples(spans, is_still);
   for (int i = 0; i < n * n; ++i) {
     const int sample = (y * n + i / n) * columns_ * n + x * n + i % n;
-    SampleView(view_, points, static_cast<std::size_t>(sample), n).shade(spans, light);
+    SampleView(view_, points, static_cast<std::size_t>(sample), n, columns_ * n).shade(spans, light);
   }
 }
 

@@ -94,6 +94,7 @@ LensView make_lens_view(const LensLight& light, const std::vector<LensBand>& ban
   }
   nodes.push_back(node_at(light, light.settings.reference));
   FlowView flow(light.map, flow_picture(light), nodes, light.settings.samples);
+  const Eigen::Matrix2d st_by_pixel = light.image.plane.size.cwiseInverse().asDiagonal() * light.straight.linear();
   return {light,
           bands,
           radiance,
@@ -101,6 +102,7 @@ LensView make_lens_view(const LensLight& light, const std::vector<LensBand>& ban
           to_pixels(light.landings),
           std::move(spans),
           std::move(nodes),
+          st_by_pixel.colwise().norm().maxCoeff(),
           std::move(flow)};
 }
 

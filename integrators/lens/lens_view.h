@@ -27,6 +27,7 @@ struct LensView {
   Eigen::Affine2d landings;   ///< From coordinates to pixels, in the plane where it lands.
   std::vector<Span> spans;    ///< Each band.
   std::vector<double> nodes;  ///< Places among the map's nodes: the ends of bands, and as the last the reference.
+  double straight_pixel;      ///< The change of (s, t) per pixel for straight light, at most.
   FlowView flow;
 };
 
