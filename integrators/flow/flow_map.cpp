@@ -83,11 +83,29 @@ std::vector<Patch> patches_of(const std::vector<Eigen::Vector2d>& polygon, doubl
   return patches;
 }
 
+/// The ratio of lengths where light starts to those at a point, as straight light projects them.
+double start_ratio(const Beam& beam, const Eigen::Vector3d& point) {
+  if (!beam.source) return 1;
+  const auto distance = [&](const Eigen::Vector3d& p) { return (p - *beam.source).dot(beam.direction); };
+  return distance(beam.center) / std::max(distance(point), distance(beam.center));
+}
+
+/// The area of a triangle of starts, or the solid angle that it covers as seen from the light's source (van Oosterom
+/// and Strackee 1983).
+double start_area(const Beam& beam, const Eigen::Vector2d& a, const Eigen::Vector2d& b, const Eigen::Vector2d& c) {
+  if (!beam.source) return std::abs((b - a).x() * (c - a).y() - (b - a).y() * (c - a).x()) / 2;
+  const auto direction = [&](const Eigen::Vector2d& at) -> Eigen::Vector3d {
+    return beam.direction_at(beam.center + at.x() * beam.right + at.y() * beam.up);
+  };
+  const Eigen::Vector3d A = direction(a), AB = direction(b) - A, AC = direction(c) - A;
+  return 2 * std::atan2(std::abs(A.dot(AB.cross(AC))), 1 + A.dot(A + AB) + (A + AB).dot(A + AC) + (A + AC).dot(A));
+}
+
 /// The size of a pixel in the plane where light starts, as straight light projects it.
 double pixel_of_starts(const Plate& plate, const Beam& beam) {
   const double slope =
       std::abs(plate.normal().dot(beam.direction)) / std::abs(beam.right.cross(beam.up).dot(beam.direction));
-  return std::sqrt(plate.pixel_area() * std::clamp(slope, 1e-6, 1e6));
+  return start_ratio(beam, plate.center) * std::sqrt(plate.pixel_area() * std::clamp(slope, 1e-6, 1e6));
 }
 
 /// The size of the first squares, world units. Landings between positions are of second order, so that a finer
@@ -95,7 +113,8 @@ double pixel_of_starts(const Plate& plate, const Beam& beam) {
 /// first squares and their first division.
 double first_size(const TensorField& field, const Beam& beam, double pixel, const FlowSettings& settings) {
   const Eigen::Vector2d extent = box_of(beam.aperture).sizes();
-  const double voxel = field.to_world().linear().colwise().norm().minCoeff();
+  const double voxel =
+      start_ratio(beam, field.world_box().center()) * field.to_world().linear().colwise().norm().minCoeff();
   const double for_voxels = std::max(first_voxels * voxel, extent.maxCoeff() / most_for_voxels);
   const double usual = std::min(first_pixels * pixel, for_voxels);
   const double least = std::sqrt(16 * extent.prod() / static_cast<double>(settings.most_starts));
@@ -392,8 +411,8 @@ class FlowMapBuilder {
   }
 
   std::uint32_t add_triangle(std::uint32_t a, std::uint32_t b, std::uint32_t c, float error, bool torn) {
-    const Eigen::Vector2d ab = map_.starts[b] - map_.starts[a], ac = map_.starts[c] - map_.starts[a];
-    map_.triangles.push_back({{a, b, c}, std::abs(ab.x() * ac.y() - ab.y() * ac.x()) / 2, error, torn});
+    const double area = start_area(beam_, map_.starts[a], map_.starts[b], map_.starts[c]);
+    map_.triangles.push_back({{a, b, c}, area, error, torn});
     return static_cast<std::uint32_t>(map_.triangles.size() - 1);
   }
 

@@ -42,9 +42,9 @@ struct FlowSettings {
 /// A triangle of neighbouring positions.
 struct FlowTriangle {
   std::array<std::uint32_t, 3> corners{};  ///< Indices of positions.
-  double area = 0;                         ///< Area of the aperture, world units².
-  float error = 0;                         ///< Estimated error of landings within, pixels.
-  bool is_torn = false;                    ///< The map jumps within it, at some node; see `jumps`.
+  double area = 0;       ///< Area of the aperture, world units²; of a point's light, the solid angle.
+  float error = 0;       ///< Estimated error of landings within, pixels.
+  bool is_torn = false;  ///< The map jumps within it, at some node; see `jumps`.
 };
 
 /// A side of one triangle, or of two.
@@ -126,8 +126,9 @@ inline bool jumps(const FlowTriangle& triangle, const Eigen::Vector2d& a, const 
 /// traced, up to all. (At a caustic a small error of the landing is a great one of the colour.)
 ///
 /// If `geometry` has a body instead of a plate, the landings of light from the volume are the projections of
-/// the points of the body on `plate`. Light counts as landed only where nothing of the body is between its point and
-/// the plane, on the side of the plate's normal: other points have the same projection.
+/// the points of the body on `plate`: along its normal, or from the beam's source if it has one. Light counts as landed
+/// only where nothing of the body is between its point and the light, on the side of the plate's normal: other points
+/// have the same projection.
 ///
 /// The result is the same for any number of threads. @throw std::invalid_argument if a setting is out of range or
 /// `geometry` has no plate; Cancelled.

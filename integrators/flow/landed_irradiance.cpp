@@ -4,9 +4,12 @@
 #include <cmath>
 #include <utility>
 
+#include <tbb/parallel_for.h>
+
 #include "base/constants.h"
 #include "integrators/flow/caustic.h"
 #include "integrators/flow/flow_map.h"
+#include "integrators/flow/flow_view.h"
 #include "renderer/lights/beam.h"
 
 namespace tensorray {
@@ -20,7 +23,7 @@ constexpr double landing_margin = 0.02;     // Of the part where light lands, on
 constexpr double landing_tolerance = 0.25;  // Pixels.
 
 /// Direction `pass` of a disk: the points of a spiral, each with the same part of the disk (Vogel 1979).
-Vector3d disk_direction(const DistantLight& light, int pass) {
+Vector3d disk_direction(const LandingLight& light, int pass) {
   if (light.angle == 0 || light.passes == 1) return light.direction;
   const double golden = pi * (3 - std::sqrt(5.0));
   const double radius = std::sin(light.angle) * std::sqrt((pass + 0.5) / light.passes);
@@ -29,7 +32,10 @@ Vector3d disk_direction(const DistantLight& light, int pass) {
 }
 
 /// The silhouette of the volume; light starts before all obstacles.
-Beam beam_of(const TensorField& field, const Surfaces& surfaces, const Plate& plate, const Vector3d& direction) {
+Beam beam_of(const TensorField& field, const Surfaces& surfaces, const Plate& plate, const LandingLight& light,
+             int pass) {
+  if (light.source) return point_beam(field.corners(), *light.source);
+  const Vector3d direction = disk_direction(light, pass);
   Beam beam = silhouette_beam(field.corners(), direction, Vector3d::UnitZ());
   const auto start_before = [&](const std::vector<Vector3d>& points) {
     for (const Vector3d& point : points)
@@ -42,29 +48,33 @@ Beam beam_of(const TensorField& field, const Surfaces& surfaces, const Plate& pl
 
 /// Whether straight light through the middle of the volume meets the plane of the plate before the volume. It would
 /// have to turn back to land on the plate.
-bool is_before(const Plate& plate, const TensorField& field, const Vector3d& direction) {
-  const double height = plate.normal().dot(field.world_box().center() - plate.center);
-  return height * plate.normal().dot(direction) > 0;
+bool is_before(const Plate& plate, const TensorField& field, const LandingLight& light) {
+  const Vector3d middle = field.world_box().center();
+  const double height = plate.normal().dot(middle - plate.center);
+  return height * plate.normal().dot(light.source ? Vector3d(middle - *light.source) : light.direction) > 0;
 }
 
 /// The box, in pixels of `plate`, in which light of the two ends of the spectrum lands.
 Eigen::AlignedBox2d landing_box(const TensorField& field, const Geometry& geometry, const Plate& plate,
-                                const Beam& beam, const BendingSettings& bending, const DistantLight& light) {
+                                const Beam& beam, const BendingSettings& bending, const LandingLight& light) {
   Eigen::AlignedBox2d aperture, landings;
   for (const Vector2d& corner : beam.aperture) aperture.extend(corner);
   const auto whole = plate.resolution.cast<double>();
+  const bool is_projected = beam.source && geometry.surfaces().body;
+  const auto place = [&](const Vector3d& p) { return is_projected ? projected_from(*beam.source, plate, p) : p; };
   for (int y = 0; y < landing_probes; ++y) {
     RayBatch rays;
     for (int x = 0; x < landing_probes; ++x) {
       const Vector2d at =
           aperture.min().array() + aperture.sizes().array() * Eigen::Array2d(x + 0.5, y + 0.5) / landing_probes;
+      const Vector3d start = beam.center + at.x() * beam.right + at.y() * beam.up;
       for (const double flexibility : {light.flexibilities.front(), light.flexibilities.back()})
-        rays.add(beam.center + at.x() * beam.right + at.y() * beam.up, beam.direction, flexibility);
+        rays.add(start, beam.direction_at(start), flexibility);
     }
     trace(field, geometry, bending, rays);
     for (std::size_t i = 0; i < rays.size(); ++i)
       if (rays.end[i] == RayEnd::plate)
-        landings.extend(Vector2d(plate.to_pixel(rays.position[i]).cwiseMax(0).cwiseMin(whole)));
+        landings.extend(Vector2d(plate.to_pixel(place(rays.position[i])).cwiseMax(0).cwiseMin(whole)));
   }
   return landings;
 }
@@ -81,7 +91,7 @@ Plate part_of(const Plate& plate, Eigen::AlignedBox2d box, int resolution) {
 }
 
 /// The flexibilities of the light, as a range if there is one.
-FlowSettings flow_settings(const DistantLight& light, std::size_t rays) {
+FlowSettings flow_settings(const LandingLight& light, std::size_t rays) {
   const auto [least, greatest] = std::minmax_element(light.flexibilities.begin(), light.flexibilities.end());
   FlowSettings settings;
   settings.range = *least < *greatest;
@@ -91,7 +101,7 @@ FlowSettings flow_settings(const DistantLight& light, std::size_t rays) {
   return settings;
 }
 
-std::vector<CausticBand> bands_of(const DistantLight& light, const FlowMap& map, const FlowSettings& settings) {
+std::vector<CausticBand> bands_of(const LandingLight& light, const FlowMap& map, const FlowSettings& settings) {
   const double least = settings.flexibilities.front(), whole = settings.flexibilities.back() - least;
   const double last = static_cast<double>(map.nodes - 1);
   const auto node = [&](double flexibility) { return settings.range ? last * (flexibility - least) / whole : 0; };
@@ -107,19 +117,38 @@ std::vector<CausticBand> bands_of(const DistantLight& light, const FlowMap& map,
   return bands;
 }
 
+/// The number of sheets of the map at each pixel's middle, at the middle of its nodes.
+std::vector<float> sheets_of(const FlowMap& map, const Eigen::Vector2i& resolution) {
+  FlowPicture picture;
+  picture.resolution = resolution;
+  const FlowView view(map, picture, {static_cast<double>(map.nodes - 1) / 2}, 1);
+  std::vector<float> sheets(static_cast<std::size_t>(resolution.x()) * static_cast<std::size_t>(resolution.y()));
+  tbb::parallel_for(0, view.tiles(), [&](int tile) {
+    std::vector<FlowPoint> points;
+    view.draw(tile, 1, 0, {}, points);
+    const Eigen::AlignedBox2i box = view.pixels(tile);
+    auto point = points.begin();
+    for (int y = box.min().y(); y <= box.max().y(); ++y)
+      for (int x = box.min().x(); x <= box.max().x(); ++x, ++point)
+        sheets[static_cast<std::size_t>(y) * static_cast<std::size_t>(resolution.x()) + static_cast<std::size_t>(x)] =
+            point->sheets;
+  });
+  return sheets;
+}
+
 }  // namespace
 
 std::optional<LandedIrradiance> landed_irradiance(const TensorField& field, const Surfaces& surfaces,
-                                                  const Plate& plate, const DistantLight& light,
+                                                  const Plate& plate, const LandingLight& light,
                                                   const BendingSettings& bending, int resolution, std::size_t rays,
                                                   const Progress& progress) {
-  if (is_before(plate, field, light.direction)) return std::nullopt;
+  if (is_before(plate, field, light)) return std::nullopt;
   Surfaces parts = surfaces;
   if (!parts.body) parts.plate = plate;
   const Geometry geometry(std::move(parts));
   Eigen::AlignedBox2d box;
   for (int pass = 0; pass < light.passes; ++pass) {
-    const Beam beam = beam_of(field, surfaces, plate, disk_direction(light, pass));
+    const Beam beam = beam_of(field, surfaces, plate, light, pass);
     box.extend(landing_box(field, geometry, plate, beam, bending, light));
   }
   if (box.isEmpty()) return std::nullopt;
@@ -128,14 +157,16 @@ std::optional<LandedIrradiance> landed_irradiance(const TensorField& field, cons
   const FlowSettings settings = flow_settings(light, rays);
   const std::size_t channels = light.flexibilities.size() - 1;
   for (int pass = 0; pass < light.passes; ++pass) {
-    const Beam beam = beam_of(field, surfaces, plate, disk_direction(light, pass));
+    const Beam beam = beam_of(field, surfaces, plate, light, pass);
     const FlowMap map = trace_flow_map(field, geometry, result.plate, beam, bending, settings, progress);
     Caustic caustic = draw_caustic(map, result.plate, bands_of(light, map, settings), channels, true, progress);
-    if (pass == 0)
+    if (pass == 0) {
       result.irradiance = std::move(caustic.irradiance);
-    else
-      for (std::size_t i = 0; i < result.irradiance.values.size(); ++i)
-        result.irradiance.values[i] += caustic.irradiance.values[i];
+      result.folds = sheets_of(map, result.plate.resolution);
+      continue;
+    }
+    for (std::size_t i = 0; i < result.irradiance.values.size(); ++i)
+      result.irradiance.values[i] += caustic.irradiance.values[i];
   }
   for (double& value : result.irradiance.values) value /= light.passes;
   return result;

@@ -1,6 +1,6 @@
 #pragma once
 /// @file integrators/flow/landed_irradiance.h
-/// The irradiance that a distant light's disk gives a surface through the field, band by band.
+/// The irradiance that the disk of a distant light, or a point light, gives a surface through the field, band by band.
 
 #include <optional>
 #include <vector>
@@ -12,8 +12,9 @@
 
 namespace tensorray {
 
-struct DistantLight {
-  Eigen::Vector3d direction = -Eigen::Vector3d::UnitZ();  ///< Unit; in which the light of the disk's centre travels.
+struct LandingLight {
+  std::optional<Eigen::Vector3d> source;                  ///< Of a point light: where it is, outside the volume.
+  Eigen::Vector3d direction = -Eigen::Vector3d::UnitZ();  ///< Unit; in which the light of a disk's centre travels.
   double angle = 0;                                       ///< Angle from the disk's centre to its rim, radians.
   int passes = 1;  ///< Directions within the disk that are traced; >= 1. A light without a disk needs one.
   std::vector<double> flexibilities;  ///< At the ends of the bands: one more than there are bands; monotonic.
@@ -21,19 +22,22 @@ struct DistantLight {
 
 struct LandedIrradiance {
   Plate plate;      ///< The part of the surface where light lands, with its pixels.
-  Film irradiance;  ///< A plane for each band; 1 is the irradiance of the beam on a surface that faces it.
+  Film irradiance;  ///< A plane for each band; 1 is the irradiance of the beam on a surface that faces it; of a point
+                    ///< light, that at a distance of 1.
+  std::vector<float> folds;  ///< Number of sheets of the map at the middle of each pixel, for light of the middle of
+                             ///< the range, from the first direction.
 };
 
 /// Traces the flow map of the light that enters the volume to the plane of `plate`, or to the body of `surfaces`.
 /// Surfaces of `surfaces` (bounds, cut, obstacles; its plate is ignored) stop light.
 /// @param plate       The whole surface; or a plane behind the whole body that faces the light, on which the body's
-///                    points are projected.
+///                    points are projected; from the source, if there is one.
 /// @param resolution  Pixels along the longer side of the part of `plate` where light lands.
 /// @param rays        Positions from which light starts, at most, for each direction.
 /// @return nothing if no light lands, or if the light meets the plane before the volume. The same for any number of
 /// threads. @throw Cancelled.
 std::optional<LandedIrradiance> landed_irradiance(const TensorField& field, const Surfaces& surfaces,
-                                                  const Plate& plate, const DistantLight& light,
+                                                  const Plate& plate, const LandingLight& light,
                                                   const BendingSettings& bending, int resolution, std::size_t rays,
                                                   const Progress& progress);
 

@@ -103,7 +103,7 @@ NodeTracer::NodeTracer(const TensorField& field, const Geometry& geometry, const
     : field_(field),
       geometry_(geometry),
       plate_(plate),
-      direction_(beam.direction),
+      beam_(beam),
       bending_(bending),
       tolerance_(settings.tolerance / 16),
       is_range_(settings.range && settings.flexibilities[0] != settings.flexibilities[1]),
@@ -113,7 +113,7 @@ NodeTracer::NodeTracer(const TensorField& field, const Geometry& geometry, const
     const double part = static_cast<double>(i) / (range_nodes - 1);
     flexibilities_[i] = (1 - part) * settings.flexibilities[0] + part * settings.flexibilities[1];
   }
-  if (settings.memory && RayMemory::serves(field, geometry, beam.direction, bending)) {
+  if (settings.memory && !beam.source && RayMemory::serves(field, geometry, beam.direction, bending)) {
     memory_ = settings.memory;
     volume_.emplace(without_plate(geometry));
   }
@@ -149,11 +149,18 @@ void NodeTracer::trace(const std::vector<Eigen::Vector3d>& origins, Eigen::Vecto
   }
 }
 
+/// The place on the plate of a point where light lands.
+Eigen::Vector3d NodeTracer::place_of(const Eigen::Vector3d& point) const {
+  return body_ && beam_.source ? projected_from(*beam_.source, plate_, point) : point;
+}
+
 /// Of light that lands on a body, that on its first layer counts as landed, if it comes from the volume.
 RayEnd NodeTracer::end_of(const RayBatch& rays, std::size_t ray, const Eigen::Vector3d& origin) const {
   if (!body_ || rays.end[ray] != RayEnd::plate) return rays.end[ray];
-  if (!geometry_.crossing(Surface::bounds, true, origin, direction_, rays.length[ray])) return RayEnd::missed;
-  const Eigen::Vector3d back = plate_.normal();
+  if (!geometry_.crossing(Surface::bounds, true, origin, beam_.direction_at(origin), rays.length[ray]))
+    return RayEnd::missed;
+  const Eigen::Vector3d back =
+      beam_.source ? Eigen::Vector3d((*beam_.source - rays.position[ray]).normalized()) : plate_.normal();
   return body_->absorber(rays.position[ray] + off_body_ * back, back) ? RayEnd::obstacle : RayEnd::plate;
 }
 
@@ -163,7 +170,7 @@ void NodeTracer::trace_nodes(const std::vector<Eigen::Vector3d>& origins, const 
   RayBatch batch;
   // Light of one node from neighbouring positions crosses the same cells of the field.
   for (std::size_t node = first; node < nodes(); node += step)
-    for (const std::size_t i : which) batch.add(origins[i], direction_, flexibilities_[node]);
+    for (const std::size_t i : which) batch.add(origins[i], beam_.direction_at(origins[i]), flexibilities_[node]);
   if (memory_)
     memory_->trace(field_, *volume_, geometry_, bending_, batch);
   else
@@ -171,7 +178,7 @@ void NodeTracer::trace_nodes(const std::vector<Eigen::Vector3d>& origins, const 
   std::size_t ray = 0;
   for (std::size_t node = first; node < nodes(); node += step)
     for (const std::size_t i : which) {
-      landings[i * nodes() + node] = plate_.to_pixel(batch.position[ray]).cast<float>();
+      landings[i * nodes() + node] = plate_.to_pixel(place_of(batch.position[ray])).cast<float>();
       ends[i * nodes() + node] = end_of(batch, ray, origins[i]);
       if (lengths) lengths[i * check_nodes_.size() + (node - first) / step] = static_cast<float>(batch.length[ray]);
       ++ray;

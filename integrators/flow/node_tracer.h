@@ -40,12 +40,13 @@ class NodeTracer {
  private:
   void trace_nodes(const std::vector<Eigen::Vector3d>& origins, const std::vector<std::size_t>& which,
                    std::size_t first, std::size_t step, Eigen::Vector2f* landings, RayEnd* ends, float* lengths);
+  Eigen::Vector3d place_of(const Eigen::Vector3d& point) const;
   RayEnd end_of(const RayBatch& rays, std::size_t ray, const Eigen::Vector3d& origin) const;
 
   const TensorField& field_;
   const Geometry& geometry_;
   const Plate plate_;
-  const Eigen::Vector3d direction_;
+  const Beam& beam_;
   const BendingSettings& bending_;
   std::shared_ptr<RayMemory> memory_;  // Null: rays are not remembered.
   std::optional<Geometry> volume_;     // With `memory_`: the geometry without its plate.

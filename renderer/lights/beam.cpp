@@ -75,6 +75,33 @@ Beam silhouette_beam(const std::vector<Eigen::Vector3d>& points, const Eigen::Ve
   return beam;
 }
 
+Beam point_beam(const std::vector<Eigen::Vector3d>& points, const Eigen::Vector3d& source) {
+  constexpr double least_cosine = 0.02, start_part = 1e-4;
+  Eigen::Vector3d axis(0, 0, 0);
+  for (const Eigen::Vector3d& point : points) axis += (point - source).normalized();
+  Beam beam;
+  beam.source = source;
+  beam.direction = axis.normalized();
+  beam.up = upright(beam.direction, Eigen::Vector3d::UnitZ());
+  beam.right = beam.direction.cross(beam.up);
+  double nearest = std::numeric_limits<double>::infinity();
+  for (const Eigen::Vector3d& point : points) {
+    const double along = (point - source).dot(beam.direction);
+    if (!(along > least_cosine * (point - source).norm()))
+      throw std::invalid_argument("the light is within the volume, or too near; move it away");
+    nearest = std::min(nearest, along);
+  }
+  const double start = start_part * nearest;
+  beam.center = source + start * beam.direction;
+  std::vector<Eigen::Vector2d> seen;
+  for (const Eigen::Vector3d& point : points) {
+    const Eigen::Vector3d way = point - source;
+    seen.push_back(start / way.dot(beam.direction) * Eigen::Vector2d(way.dot(beam.right), way.dot(beam.up)));
+  }
+  beam.aperture = convex_hull(seen);
+  return beam;
+}
+
 BeamSampler::BeamSampler(const Beam& beam, BeamPattern pattern, std::uint64_t count, std::uint64_t seed)
     : beam_(beam), pattern_(pattern), seed_(seed) {
   if (count < 1) throw std::invalid_argument("a beam needs at least one photon");

@@ -1,8 +1,9 @@
 #pragma once
 /// @file renderer/lights/beam.h
-/// A parallel beam of light that passes through an aperture.
+/// A beam of light that passes through an aperture.
 
 #include <cstdint>
+#include <optional>
 #include <vector>
 
 #include <Eigen/Geometry>
@@ -19,6 +20,13 @@ struct Beam {
   Eigen::Vector3d right = Eigen::Vector3d::UnitX();       ///< Unit, across the beam.
   Eigen::Vector3d up = Eigen::Vector3d::UnitY();          ///< Unit, across the beam.
   std::vector<Eigen::Vector2d> aperture;                  ///< Convex polygon, counter-clockwise in (right, up).
+  std::optional<Eigen::Vector3d>
+      source;  ///< If the light comes from a point: where it is; `direction` is the beam's axis.
+
+  /// Unit; of the light that starts at a point of the plane.
+  Eigen::Vector3d direction_at(const Eigen::Vector3d& start) const {
+    return source ? Eigen::Vector3d((start - *source).normalized()) : direction;
+  }
 };
 
 /// The beam whose aperture is the silhouette of `points` (their convex hull seen along `direction`). It starts in front
@@ -26,6 +34,10 @@ struct Beam {
 /// @throw std::invalid_argument if the silhouette has no area.
 Beam silhouette_beam(const std::vector<Eigen::Vector3d>& points, const Eigen::Vector3d& direction,
                      const Eigen::Vector3d& up);
+
+/// The beam from `source` whose aperture is the silhouette of `points`. It starts near the source.
+/// @throw std::invalid_argument if the source is among the points, or so near that they are all around it.
+Beam point_beam(const std::vector<Eigen::Vector3d>& points, const Eigen::Vector3d& source);
 
 double area(const std::vector<Eigen::Vector2d>& polygon);
 

@@ -79,7 +79,7 @@ double radiance_per_irradiance(const DirectionalLight& light) { return 1 / (pi *
 
 bool is_background(const Light& light) {
   if (const auto* directional = std::get_if<DirectionalLight>(&light)) return directional->angle > 0;
-  return !std::holds_alternative<AreaLight>(light);
+  return !std::holds_alternative<AreaLight>(light) && !std::holds_alternative<PointLight>(light);
 }
 
 void add(double factor, const std::vector<float>& values, std::vector<float>& sum) {
@@ -126,6 +126,10 @@ LightSampler::Prepared LightSampler::prepare(Light& light, const std::vector<flo
     require(directional->angle >= 0 && directional->angle <= pi / 2, "angle must be 0 to pi / 2");
     directional->direction.stableNormalize();
     result.power = ball * dot(directional->irradiance, importance);
+  } else if (auto* point = std::get_if<PointLight>(&light)) {
+    require_bands(point->intensity, bands_, "intensity");
+    require(point->position.allFinite(), "position must be finite");
+    result.power = 4 * pi * dot(point->intensity, importance);
   } else if (auto* constant = std::get_if<ConstantLight>(&light)) {
     require_bands(constant->radiance, bands_, "radiance");
     result.power = ball * 4 * pi * dot(constant->radiance, importance);
@@ -144,9 +148,11 @@ bool LightSampler::sample(const Vector3d& point, double choice, const Vector2d& 
   const Light& light = lights_[chosen.cell];
   if (std::holds_alternative<AreaLight>(light)) return sample_area(chosen.cell, point, chosen.within, u, sample);
 
+  sample.is_delta = !is_background(light);
+  sample.light = sample.is_delta ? chosen.cell : -1;
+  if (const auto* lamp = std::get_if<PointLight>(&light)) return sample_point(*lamp, point, chosen.probability, sample);
   const auto* directional = std::get_if<DirectionalLight>(&light);
   sample.distance = std::numeric_limits<double>::infinity();
-  sample.is_delta = !is_background(light);
   if (sample.is_delta) {
     sample.direction = -directional->direction;
     sample.radiance = directional->irradiance;
@@ -164,6 +170,18 @@ bool LightSampler::sample(const Vector3d& point, double choice, const Vector2d& 
   return sample.pdf > 0;
 }
 
+bool LightSampler::sample_point(const PointLight& light, const Vector3d& point, double probability,
+                                LightSample& sample) const {
+  const Vector3d way = light.position - point;
+  sample.distance = way.norm();
+  if (!(sample.distance > 0)) return false;
+  sample.direction = way / sample.distance;
+  sample.radiance.assign(bands_, 0);
+  add(1 / way.squaredNorm(), light.intensity, sample.radiance);
+  sample.pdf = probability;
+  return true;
+}
+
 bool LightSampler::sample_area(int light, const Vector3d& point, double choice, const Vector2d& u,
                                LightSample& sample) const {
   const auto& area = std::get<AreaLight>(lights_[light]);
@@ -176,6 +194,7 @@ bool LightSampler::sample_area(int light, const Vector3d& point, double choice, 
   sample.direction = (position - point) / sample.distance;
   sample.radiance = area.radiance;
   sample.is_delta = false;
+  sample.light = light;
   sample.pdf = area_pdf(light, point, position, triangle_normal(area.mesh, triangle).normalized());
   return sample.pdf > 0;
 }
@@ -194,10 +213,10 @@ const std::vector<float>* LightSampler::emitted(int light, const Vector3d& norma
   return normal.dot(direction) < 0 ? &area.radiance : nullptr;
 }
 
-void LightSampler::background(const Vector3d& direction, std::vector<float>& radiance, bool disks) const {
+void LightSampler::background(const Vector3d& direction, std::vector<float>& radiance, bool disks, int only) const {
   radiance.assign(bands_, 0);
   for (std::size_t i = 0; i < lights_.size(); ++i) {
-    if (!is_background(lights_[i])) continue;
+    if (!is_background(lights_[i]) || (only >= 0 && static_cast<std::size_t>(only) != i)) continue;
     if (const auto* disk = std::get_if<DirectionalLight>(&lights_[i])) {
       if (disks && in_disk(*disk, direction)) add(radiance_per_irradiance(*disk), disk->irradiance, radiance);
     } else if (const auto* constant = std::get_if<ConstantLight>(&lights_[i])) {

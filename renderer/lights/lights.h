@@ -27,12 +27,18 @@ struct DirectionalLight {
   double angle = 0;  ///< Angle from the disk's centre to its rim, radians (the sun: 0.00465); 0 to π/2; 0: parallel.
 };
 
+/// Light of a point, equal in all directions.
+struct PointLight {
+  Eigen::Vector3d position = Eigen::Vector3d::Zero();  ///< World.
+  std::vector<float> intensity;  ///< Irradiance, at a distance of 1, of a surface that faces the light, in every band.
+};
+
 /// Equal light from all directions.
 struct ConstantLight {
   std::vector<float> radiance;  ///< In every band.
 };
 
-using Light = std::variant<AreaLight, DirectionalLight, ConstantLight, EnvironmentLight>;
+using Light = std::variant<AreaLight, DirectionalLight, ConstantLight, EnvironmentLight, PointLight>;
 
 /// A rectangle of two triangles that faces right × up.
 /// @param right, up  Unit, normal to each other.
@@ -46,11 +52,13 @@ struct LightSample {
   std::vector<float> radiance;  ///< In every band. For a delta light: irradiance on a surface normal to `direction`.
   double pdf = 0;  ///< Per steradian, with the probability of the light. For a delta light: that probability alone.
   bool is_delta = false;  ///< True if no other way to choose directions can find this light.
+  int light = -1;         ///< Its index; −1: the background.
 };
 
 /// Chooses lights by their power, and then directions by the light. Immutable: any thread may use it.
 ///
-/// All lights that are infinitely far away and not deltas form the background. The caller sees it as one light: its
+/// Lights without a size, parallel light and points, are deltas.
+/// All other lights that are infinitely far away form the background. The caller sees it as one light: its
 /// radiance is the sum over these lights, and its density is that of choosing a direction by any of them. A caller that
 /// also has its own way to choose directions (multiple importance sampling) weighs `sample` against `area_pdf` where
 /// its ray meets an area light, and against `background_pdf` where it meets nothing.
@@ -83,7 +91,9 @@ class LightSampler {
 
   /// Sets `radiance` to the background's in every band, seen along the unit `direction`.
   /// @param disks  Whether the disks of directional lights count.
-  void background(const Eigen::Vector3d& direction, std::vector<float>& radiance, bool disks = true) const;
+  /// @param only   The index of the light that counts; −1: all do.
+  void background(const Eigen::Vector3d& direction, std::vector<float>& radiance, bool disks = true,
+                  int only = -1) const;
 
   /// The density, per steradian, with which `sample` chooses the background in `direction`.
   double background_pdf(const Eigen::Vector3d& direction) const;
@@ -108,6 +118,8 @@ class LightSampler {
   };
 
   Prepared prepare(Light& light, const std::vector<float>& importance, double scene_radius) const;
+  bool sample_point(const PointLight& light, const Eigen::Vector3d& point, double probability,
+                    LightSample& sample) const;
   bool sample_area(int light, const Eigen::Vector3d& point, double choice, const Eigen::Vector2d& u,
                    LightSample& sample) const;
   double directional_pdf(int light, const Eigen::Vector3d& direction) const;

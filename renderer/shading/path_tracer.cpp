@@ -20,6 +20,7 @@ namespace tensorray {
 namespace {
 
 using Eigen::Vector2d;
+using Eigen::Vector2f;
 using Eigen::Vector3f;
 
 constexpr int tile_size = 16;             ///< Pixels.
@@ -60,7 +61,7 @@ class Rendering {
         height_(camera.resolution.y()),
         columns_((width_ + tile_size - 1) / tile_size),
         tiles_(static_cast<std::size_t>(columns_) * ((height_ + tile_size - 1) / tile_size)),
-        light_values_(scene.colors.bands() * (scene.landed.empty() ? 1 : 2)) {}
+        light_values_(scene.colors.bands() + 3 * static_cast<std::size_t>(scene.layers())) {}
 
   SurfacePicture run();
 
@@ -68,9 +69,10 @@ class Rendering {
   /// The memory of one thread.
   struct Worker {
     Worker(const ShadedScene& scene, const ShadingSettings& settings)
-        : shader(scene, settings), sum(scene.colors.bands()), landed(scene.colors.bands()) {}
+        : shader(scene, settings), sum(scene.colors.bands()), layers(shader.layers()) {}
     RayShader shader;
-    BandValues sum, landed;
+    BandValues sum;
+    std::vector<BandValues> layers;  // Sums.
   };
 
   Tile load(std::size_t number) const;
@@ -82,6 +84,7 @@ class Rendering {
   void extend(std::size_t number, Worker& worker);
   void render_pixel(Tile& tile, int x, int y, int samples, Worker& worker);
   void add_surface(PixelState& pixel, const Vector2d& offset, const FirstSurface& surface, RayShader& shader) const;
+  void add_place(PixelState& pixel, const FirstSurface& surface) const;
   bool finish_pixels(Tile& tile);
   bool is_precise(Tile& tile, int x, int y) const;
   SurfacePicture picture() const;
@@ -197,16 +200,17 @@ void Rendering::render_pixel(Tile& tile, int x, int y, int samples, Worker& work
   const std::size_t index = static_cast<std::size_t>(tile.top + y) * width_ + tile.left + x;
   RayShader& shader = worker.shader;
   worker.sum.setZero();
-  worker.landed.setZero();
+  for (BandValues& layer : worker.layers) layer.setZero();
   for (int i = 0; i < samples; ++i) {
     PathSampler sampler{settings_.seed, index, static_cast<std::uint32_t>(pixel.samples), 0};
     Vector2d offset;
     const auto surface = shade(tile.left + x, tile.top + y, sampler, shader, offset);
     worker.sum += shader.radiance();
-    if (!scene_.landed.empty()) worker.landed += shader.landed();
+    for (std::size_t k = 0; k < worker.layers.size(); ++k) worker.layers[k] += shader.layers()[k];
     if (const auto& view = shader.bent_view()) {
       extend_mean(pixel.gain, ++pixel.bent, static_cast<float>(view->gain));
       extend_mean(pixel.deflection, pixel.bent, static_cast<float>(view->deflection));
+      extend_mean(pixel.arrives, pixel.bent, static_cast<float>(view->arrives));
     }
     ++pixel.samples;
     const double luminance = scene_.colors.luminance(shader.radiance()), change = luminance - pixel.luminance;
@@ -214,9 +218,13 @@ void Rendering::render_pixel(Tile& tile, int x, int y, int samples, Worker& work
     pixel.squares += change * (luminance - pixel.luminance);
     if (surface) add_surface(pixel, offset, *surface, shader);
   }
-  double* const light = tile.light_of(x, y);
+  double* light = tile.light_of(x, y);
   extend_means(worker.sum, samples, pixel.samples, light);
-  if (!scene_.landed.empty()) extend_means(worker.landed, samples, pixel.samples, light + worker.sum.size());
+  light += worker.sum.size();
+  for (const BandValues& layer : worker.layers) {
+    extend_means(scene_.colors.color(layer).cast<double>().array(), samples, pixel.samples, light);
+    light += 3;
+  }
   finished_samples_ += static_cast<std::uint64_t>(samples);
 }
 
@@ -234,6 +242,26 @@ void Rendering::add_surface(PixelState& pixel, const Vector2d& offset, const Fir
     pixel.nearest = offset.squaredNorm();
     pixel.path = static_cast<float>(*data.path);
   }
+  if (scene_.region) add_place(pixel, surface);
+}
+
+/// The place in a texture, and the sheets of light that have landed there.
+void Rendering::add_place(PixelState& pixel, const FirstSurface& surface) const {
+  const SurfaceHit& hit = surface.hit;
+  if (const auto& texture = scene_.surfaces.surfaces()[hit.surface].texture) {
+    const Vector2d place =
+        texture->plate.to_pixel(hit.position).cwiseQuotient(texture->plate.resolution.cast<double>());
+    extend_mean(Eigen::Map<Vector2f>(pixel.texture), ++pixel.texture_hits,
+                Vector2f(Vector2d(place.x(), 1 - place.y()).cast<float>()));
+  }
+  float folds = 0;
+  bool is_landed = false;
+  for (const LandedLight& light : scene_.landed) {
+    if (light.surface != hit.surface || !is_lit(light, hit.position, surface.direction)) continue;
+    folds += folds_at(light, hit.position);
+    is_landed = true;
+  }
+  if (is_landed) extend_mean(pixel.folds, ++pixel.folds_hits, folds);
 }
 
 /// Marks the pixels that are done. Pixels of other tiles do not matter.
@@ -269,8 +297,7 @@ bool Rendering::is_precise(Tile& tile, int x, int y) const {
 
 /// The picture of the tiles as they are kept.
 SurfacePicture Rendering::picture() const {
-  SurfacePicture picture = empty_picture(width_, height_, static_cast<int>(scene_.colors.bands()),
-                                         scene_.region != nullptr, !scene_.landed.empty());
+  SurfacePicture picture = empty_picture(width_, height_, scene_);
   for (std::size_t number = 0; number < tiles_; ++number) add_tile(load(number), settings_.transparent, picture);
   return picture;
 }

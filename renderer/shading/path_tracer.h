@@ -44,11 +44,15 @@ struct SurfacePicture {
   std::vector<Eigen::Vector3f> albedo;  ///< Working space: the reflectance; for metals, times Fresnel's reflectance.
   /// Means over the samples that hit a surface with this attribute; 0 where no sample did.
   std::vector<float> force, arc_length;
-  Film landed;  ///< The part of `radiance` that ShadedScene::landed has lit; empty if there is none.
-  /// If light bends: means over the samples that enter the region; 1 and 0 where none does. Otherwise empty.
-  std::vector<float> gain, deflection;  ///< See BentView.
-  std::vector<float> path;              ///< Number of the path that was hit nearest to the pixel's centre; −1: none.
-  std::vector<float> samples;           ///< Number of samples.
+  Film landed;  ///< The part of it that ShadedScene::landed has lit: red, green, blue (working space). May be empty.
+  Film groups;  ///< The light of each group: red, green and blue of the first, then of the next. May be empty.
+  /// If light bends: means over the samples that enter the region; 1, 0 and 1 where none does. Otherwise empty.
+  std::vector<float> gain, deflection, arrives;  ///< See BentView.
+  /// If light bends: means over the samples that hit a plate with a texture, or one on which light has landed.
+  std::vector<Eigen::Vector2f> texture;  ///< Place in its texture: 0, 0 is its lower left, 1, 1 its upper right corner.
+  std::vector<float> folds;              ///< Sheets of landed light.
+  std::vector<float> path;               ///< Number of the path that was hit nearest to the pixel's centre; −1: none.
+  std::vector<float> samples;            ///< Number of samples.
   std::vector<float> variance;  ///< Squared standard error of the pixel's luminance if samples were independent.
 };
 

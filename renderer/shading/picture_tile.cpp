@@ -38,14 +38,18 @@ void Tile::set_bytes(const std::string& bytes) {
   std::memcpy(light.data(), bytes.data() + of_pixels, of_light);
 }
 
-SurfacePicture empty_picture(int width, int height, int bands, bool bends, bool lands) {
+SurfacePicture empty_picture(int width, int height, const ShadedScene& scene) {
   SurfacePicture picture;
-  picture.radiance = Film(width, height, bands);
-  if (lands) picture.landed = Film(width, height, bands);
+  picture.radiance = Film(width, height, static_cast<int>(scene.colors.bands()));
+  if (!scene.landed.empty()) picture.landed = Film(width, height, 3);
+  if (scene.groups > 0) picture.groups = Film(width, height, 3 * scene.groups);
   const std::size_t size = picture.radiance.plane_size();
-  if (bends) {
+  if (scene.region) {
     picture.gain.assign(size, 1);
+    picture.arrives.assign(size, 1);
     picture.deflection.assign(size, 0);
+    picture.folds.assign(size, 0);
+    picture.texture.assign(size, Eigen::Vector2f::Zero());
   }
   for (auto* plane :
        {&picture.alpha, &picture.depth, &picture.force, &picture.arc_length, &picture.samples, &picture.variance})
@@ -62,8 +66,8 @@ void add_tile(const Tile& tile, bool transparent, SurfacePicture& picture) {
     const int x = tile.left + static_cast<int>(i) % tile.width, y = tile.top + static_cast<int>(i) / tile.width;
     const std::size_t index = static_cast<std::size_t>(y) * picture.radiance.width + x;
     const double* light = &tile.light[i * tile.light_values];
-    for (int band = 0; band < picture.radiance.channels; ++band) picture.radiance.plane(band)[index] = *light++;
-    for (int band = 0; band < picture.landed.channels; ++band) picture.landed.plane(band)[index] = *light++;
+    for (Film* film : {&picture.radiance, &picture.landed, &picture.groups})
+      for (int channel = 0; channel < film->channels; ++channel) film->plane(channel)[index] = *light++;
     const bool is_opaque = !transparent && pixel.samples > 0;
     picture.alpha[index] = is_opaque ? 1.0f : static_cast<float>(pixel.hits / std::max(1.0, 1.0 * pixel.samples));
     picture.depth[index] = pixel.depth;
@@ -74,6 +78,9 @@ void add_tile(const Tile& tile, bool transparent, SurfacePicture& picture) {
     if (!picture.gain.empty()) {
       picture.gain[index] = pixel.gain;
       picture.deflection[index] = pixel.deflection;
+      picture.arrives[index] = pixel.arrives;
+      picture.folds[index] = pixel.folds;
+      picture.texture[index] = Eigen::Map<const Eigen::Vector2f>(pixel.texture);
     }
     picture.path[index] = pixel.path;
     picture.samples[index] = static_cast<float>(pixel.samples);

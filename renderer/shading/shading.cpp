@@ -66,6 +66,7 @@ void require_shadable(const ShadedScene& scene, const ShadingSettings& settings)
   for (const LandedLight& light : scene.landed)
     require(light.surface < scene.surfaces.surfaces().size() && light.bands == scene.colors.bands(),
             "landed light must have a surface and the bands of the light");
+  require(scene.groups == 0 || scene.group_of_light.size() == lights.size(), "each light must have a group, or −1");
 }
 
 /// A point where a path meets a surface. The frame is the material's: +z points outwards.
@@ -93,13 +94,13 @@ RayShader::RayShader(const ShadedScene& scene, const ShadingSettings& settings)
       reflectance_(scene.colors.bands()),
       weight_(scene.colors.bands()),
       contribution_(scene.colors.bands()),
-      landed_(scene.colors.bands()),
+      layers_(static_cast<std::size_t>(scene.layers()), BandValues(scene.colors.bands())),
       aims_bent_(scene.lights.is_concentrated()) {}
 
 std::optional<FirstSurface> RayShader::shade(const Vector3d& origin, const Vector3d& direction, bool show_background,
                                              PathSampler& sampler) {
   radiance_.setZero();
-  landed_.setZero();
+  for (BandValues& layer : layers_) layer.setZero();
   throughput_.setOnes();
   bent_view_.reset();
   band_ = -1;
@@ -114,7 +115,7 @@ std::optional<FirstSurface> RayShader::shade(const Vector3d& origin, const Vecto
   if (settings_.shading == Shading::path) add_emission(*hit, direction, 1, 0);
   const Vertex vertex = make_vertex(*hit, direction);
   shade_surface(vertex, 1, sampler);
-  return FirstSurface{*hit, vertex.normal};
+  return FirstSurface{*hit, vertex.normal, direction};
 }
 
 /// @param depth  Number of surfaces that the path has met, with this one.
@@ -246,13 +247,14 @@ std::optional<FirstSurface> RayShader::shade_bent(const Vector3d& origin, const 
   const double share = bands_per_followed(depth);
   const bool is_view = depth == 0;
   std::optional<FirstSurface> seen;
-  BentView view{0, 0};
+  BentView view{0, 0, 0};
   for (std::size_t i = 0; i < ways.size(); ++i) {
     const BentWay& way = ways[i];
     if (is_view && way.arrives) {
       view.gain += way.gain / share / static_cast<double>(ways.size());
       view.deflection += std::atan2(way.direction.cross(direction).norm(), way.direction.dot(direction)) /
                          static_cast<double>(ways.size());
+      view.arrives += 1 / static_cast<double>(ways.size());
     }
     if (!way.arrives) continue;
     band_ = way.band;
@@ -266,7 +268,7 @@ std::optional<FirstSurface> RayShader::shade_bent(const Vector3d& origin, const 
     if (settings_.shading == Shading::path) add_emission(*hit, way.direction, weight, depth);
     if (!is_view && depth == settings_.max_depth) continue;
     const Vertex vertex = make_vertex(*hit, way.direction);
-    if (is_view && i <= ways.size() / 2) seen = FirstSurface{*hit, vertex.normal};
+    if (is_view && i <= ways.size() / 2) seen = FirstSurface{*hit, vertex.normal, way.direction};
     shade_surface(vertex, depth + 1, sampler);
   }
   throughput_ = before;
@@ -293,32 +295,30 @@ void RayShader::add_bent_light(const Vertex& vertex, const Vector3d& wi, const V
   for (const BentWay& way : follow_ways(start, direction, depth, sampler)) {
     if (!way.arrives) continue;
     const auto hit = end_of(way);
-    const std::vector<float>* found = nullptr;
-    if (!hit) {
-      scene_.lights.background(way.direction, background_, false);
-      found = &background_;
-    } else if (const int light = scene_.surfaces.surfaces()[hit->surface].light; light >= 0) {
-      found = scene_.lights.emitted(light, hit->normal, way.direction);
-    }
+    const int light = hit ? scene_.surfaces.surfaces()[hit->surface].light : -1;
+    if (hit && light < 0) continue;
+    if (!hit) scene_.lights.background(way.direction, background_, false);
+    const std::vector<float>* const found =
+        hit ? scene_.lights.emitted(light, hit->normal, way.direction) : &background_;
     if (!found) continue;
     contribution_.setZero();
     contribution_[way.band] = scattered[way.band] * way.gain * (*found)[static_cast<std::size_t>(way.band)];
-    add(depth);
+    add(depth, {light, way.direction, false, found});
   }
 }
 
 void RayShader::add_landed_light(const Vertex& vertex, int depth) {
   for (const LandedLight& light : scene_.landed) {
     if (light.surface != vertex.hit.surface || !is_lit(light, vertex.hit.position, vertex.direction)) continue;
-    const Vector3d wi = vertex.frame.transpose() * light.towards;
+    const Vector3d wi = vertex.frame.transpose() * direction_towards(light, vertex.hit.position);
     evaluate(*vertex.material, reflectance_, wi, vertex.wo, contribution_);
     if (light.body) contribution_ *= std::abs(wi.z());
     weight_.setZero();
     add_irradiance(light, vertex.hit.position, weight_);
     contribution_ *= throughput_ * weight_;
     if (!(contribution_.maxCoeff() > 0)) continue;
-    add(depth);
-    if (contribution_.allFinite()) landed_ += contribution_;
+    add(depth, {light.light});
+    if (contribution_.allFinite()) layers_.front() += contribution_;
   }
 }
 
@@ -348,7 +348,7 @@ void RayShader::add_direct_light(const Vertex& vertex, int depth, PathSampler& s
     factor /= 1 + ratio * ratio;
   }
   contribution_ *= throughput_ * as_array(light_.radiance).cast<double>() * factor;
-  add(depth);
+  add(depth, {light_.light, light_.direction, true, &light_.radiance});
 }
 
 /// Whether something blocks the light from `light_`, which was sampled from `point`. The ray starts a little off
@@ -365,7 +365,7 @@ void RayShader::add_background(const Vector3d& direction, double weight, int dep
   if (!(weight > 0)) return;
   scene_.lights.background(direction, background_, disks);
   contribution_ = throughput_ * as_array(background_).cast<double>() * weight;
-  add(depth);
+  add(depth, {-1, direction, disks, &background_});
 }
 
 void RayShader::add_emission(const SurfaceHit& hit, const Vector3d& direction, double weight, int depth) {
@@ -374,17 +374,37 @@ void RayShader::add_emission(const SurfaceHit& hit, const Vector3d& direction, d
   const std::vector<float>* emitted = scene_.lights.emitted(light, hit.normal, direction);
   if (emitted == nullptr) return;
   contribution_ = throughput_ * as_array(*emitted).cast<double>() * weight;
-  add(depth);
+  add(depth, {light});
 }
 
 /// Adds light that was scattered `depth` times. Leaves out values that overflow, since one would make the mean
 /// infinite.
-void RayShader::add(int depth) {
+void RayShader::add(int depth, const LightSource& source) {
   const double luminance = scene_.colors.luminance(contribution_);
   if (!std::isfinite(luminance)) return;
   if (depth >= 2 && settings_.indirect_clamp > 0 && luminance > settings_.indirect_clamp)
     contribution_ *= settings_.indirect_clamp / luminance;
   radiance_ += contribution_;
+  if (scene_.groups > 0) add_to_groups(source);
+}
+
+/// The background's light is divided as the radiances of its lights.
+void RayShader::add_to_groups(const LightSource& source) {
+  const std::size_t first = layers_.size() - static_cast<std::size_t>(scene_.groups);
+  const auto group_of = [&](int light) { return scene_.group_of_light[static_cast<std::size_t>(light)]; };
+  if (source.light >= 0) {
+    if (group_of(source.light) >= 0) layers_[first + group_of(source.light)] += contribution_;
+    return;
+  }
+  for (int light = 0; light < static_cast<int>(scene_.group_of_light.size()); ++light) {
+    if (group_of(light) < 0) continue;
+    scene_.lights.background(source.direction, of_one_light_, source.disks, light);
+    BandValues& layer = layers_[first + group_of(light)];
+    for (std::size_t band = 0; band < of_one_light_.size(); ++band)
+      if (of_one_light_[band] > 0)
+        layer[static_cast<Eigen::Index>(band)] +=
+            contribution_[static_cast<Eigen::Index>(band)] * of_one_light_[band] / (*source.radiance)[band];
+  }
 }
 
 void RayShader::shade_occlusion(const Vertex& vertex, PathSampler& sampler) {

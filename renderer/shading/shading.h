@@ -59,7 +59,11 @@ struct ShadedScene {
   /// Bands that a ray of the camera, and one that surfaces have scattered, follows into the region. Both divide the
   /// number of bands.
   int bands_per_view = 1, bands_per_bounce = 1;
-  std::vector<LandedLight> landed = {};  ///< Light that bends on its way to flat surfaces.
+  std::vector<LandedLight> landed = {};  ///< Light that bends on its way to surfaces.
+  std::vector<int> group_of_light = {};  ///< Of each light: the number of its group; −1: it has none. Empty: none has.
+  int groups = 0;                        ///< The number of groups, whose light is also added up apart.
+
+  int layers() const { return (landed.empty() ? 0 : 1) + groups; }
 };
 
 /// @throw std::invalid_argument if a setting is out of range; naming the surface if it has no material, or its light is
@@ -70,16 +74,18 @@ void require_shadable(const ShadedScene& scene, const ShadingSettings& settings)
 /// The first surface that a ray meets.
 struct FirstSurface {
   SurfaceHit hit;
-  Eigen::Vector3d normal = Eigen::Vector3d::Zero();  ///< As used for shading; towards the viewer.
+  Eigen::Vector3d normal = Eigen::Vector3d::Zero();     ///< As used for shading; towards the viewer.
+  Eigen::Vector3d direction = Eigen::Vector3d::Zero();  ///< Of the ray that met it.
 };
 
 /// What the region does to the light of a ray that leaves the camera; means over the bands that it follows.
 struct BentView {
   double gain = 1;        ///< Of radiance.
   double deflection = 0;  ///< Angle by which light turns, radians.
+  double arrives = 1;     ///< The part of the bands whose way could be followed to its end.
 };
 
-/// Follows rays. It reuses its memory: make one for each thread.
+/// Follows rays. It reuses its memory: make one for each thread. The scene must outlive it.
 class RayShader {
  public:
   RayShader(const ShadedScene& scene, const ShadingSettings& settings);
@@ -92,8 +98,8 @@ class RayShader {
 
   const BandValues& radiance() const { return radiance_; }
 
-  /// The part of `radiance()` that ShadedScene::landed has lit.
-  const BandValues& landed() const { return landed_; }
+  /// Parts of `radiance()`: if there is ShadedScene::landed, what that has lit; then the light of each group.
+  const std::vector<BandValues>& layers() const { return layers_; }
 
   const std::optional<BentView>& bent_view() const { return bent_view_; }
 
@@ -124,14 +130,22 @@ class RayShader {
   template <class Density>
   double material_weight(double material_pdf, const Density& light_pdf) const;
   void shade_occlusion(const Vertex& vertex, PathSampler& sampler);
-  void add(int depth);
+  /// Where light comes from that is added: a light, or the background in a direction.
+  struct LightSource {
+    int light = -1;
+    Eigen::Vector3d direction = Eigen::Vector3d::Zero();
+    bool disks = true;                             ///< See LightSampler::background.
+    const std::vector<float>* radiance = nullptr;  ///< Of the background.
+  };
+  void add(int depth, const LightSource& source);
+  void add_to_groups(const LightSource& source);
 
-  const ShadedScene scene_;
+  const ShadedScene& scene_;
   const ShadingSettings settings_;
   BandValues radiance_, throughput_, reflectance_, weight_, contribution_;
-  BandValues landed_;
+  std::vector<BandValues> layers_;
   LightSample light_;
-  std::vector<float> background_;
+  std::vector<float> background_, of_one_light_;
   std::optional<BentView> bent_view_;
   int band_ = -1;          ///< The only band of the path, after it was bent; −1: all bands.
   bool aims_bent_ = true;  ///< Whether sampled lights are looked for through the region.

@@ -10,4 +10,9 @@ Eigen::Vector3d upright(const Eigen::Vector3d& direction, const Eigen::Vector3d&
   return across(Eigen::Vector3d::UnitY()).normalized();
 }
 
+Eigen::Vector3d projected_from(const Eigen::Vector3d& source, const Plate& plate, const Eigen::Vector3d& point) {
+  const Eigen::Vector3d normal = plate.normal(), way = point - source;
+  return source + normal.dot(plate.center - source) / normal.dot(way) * way;
+}
+
 }  // namespace tensorray

@@ -36,6 +36,9 @@ struct Plate {
   }
 };
 
+/// Where the line from `source` through a point meets the plane of the plate.
+Eigen::Vector3d projected_from(const Eigen::Vector3d& source, const Plate& plate, const Eigen::Vector3d& point);
+
 /// A unit vector normal to `direction`: the normalised component of `up` across it. If `up` is parallel to `direction`
 /// or zero, +z replaces it, or +y if +z is also parallel.
 Eigen::Vector3d upright(const Eigen::Vector3d& direction, const Eigen::Vector3d& up);

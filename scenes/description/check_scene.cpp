@@ -1,7 +1,10 @@
 #include "scenes/description/check_scene.h"
 
 #include <algorithm>
+#include <cctype>
 #include <cmath>
+#include <set>
+#include <string>
 
 #include <fmt/core.h>
 
@@ -41,6 +44,13 @@ void warn_of_negative_flexibility(SceneDescription& scene) {
                   at_min, scene.light.wavelength_min, at_max, scene.light.wavelength_max));
 }
 
+/// Whether a group's name can be that of a layer of the picture, and is not the name of another one.
+bool is_layer(const std::string& name) {
+  static const std::set<std::string> others{"normal", "albedo", "texture", "caustic", "straight"};
+  const auto allowed = [](unsigned char c) { return std::isalnum(c) || c == '_' || c == '-'; };
+  return !others.count(name) && std::all_of(name.begin(), name.end(), allowed);
+}
+
 void check_lights(const SceneDescription& scene, const SceneSource& source) {
   for (std::size_t i = 0; i < scene.lights.size(); ++i) {
     const LightSourceDescription& light = scene.lights[i];
@@ -48,6 +58,13 @@ void check_lights(const SceneDescription& scene, const SceneSource& source) {
       source.fail(fmt::format("`/lights/{}` is an environment and needs its `file`", i));
     if (light.kind == LightKind::area && !light.center)
       source.fail(fmt::format("`/lights/{}` is an area and needs its `center`", i));
+    if (light.kind == LightKind::point && !light.position)
+      source.fail(fmt::format("`/lights/{}` is a point and needs its `position`", i));
+    if (!is_layer(light.group))
+      source.fail(
+          fmt::format("`/lights/{}/group` must consist of letters, digits, `_` and `-`, and not be the name of "
+                      "another layer (normal, albedo, texture, caustic, straight)",
+                      i));
   }
 }
 

@@ -47,7 +47,7 @@ inline auto choices(Projection) {
 inline auto choices(LightKind) {
   using C = Choice<LightKind>;
   return std::array{C{"constant", LightKind::constant}, C{"environment", LightKind::environment},
-                    C{"directional", LightKind::directional}, C{"area", LightKind::area}};
+                    C{"directional", LightKind::directional}, C{"area", LightKind::area}, C{"point", LightKind::point}};
 }
 
 inline auto choices(Pattern) {

@@ -88,19 +88,21 @@ struct CameraDescription {
   Eigen::Vector2i resolution{800, 800};  ///< Pixels along width and height.
 };
 
-enum class LightKind { constant, environment, directional, area };
+enum class LightKind { constant, environment, directional, area, point };
 
 /// An item of `lights`.
 struct LightSourceDescription {
   LightKind kind = LightKind::constant;
-  Eigen::Vector3d color{1, 1, 1};            ///< Linear Rec. 709; environment: a factor on the picture.
-  double strength = 1;                       ///< Radiance; directional: irradiance / π.
+  Eigen::Vector3d color{1, 1, 1};  ///< Linear Rec. 709; environment: a factor on the picture.
+  double strength = 1;  ///< Radiance; directional: irradiance / π; point: the same at a distance of 1 world unit.
   std::optional<Eigen::Vector3d> direction;  ///< directional: where light travels to; area: where its front faces.
   double angle = 0;                          ///< directional: angular diameter of the disk, degrees.
   std::optional<Eigen::Vector3d> center;     ///< area: middle, world.
   Eigen::Vector2d size{1, 1};                ///< area: width and height.
+  std::optional<Eigen::Vector3d> position;   ///< point: world.
   std::filesystem::path file;                ///< environment: a latitude-longitude picture.
   double rotation = 0;                       ///< environment: rotation about +z, degrees.
+  std::string group;                         ///< Its light is also a layer of the EXR with this name; empty: it is not.
 };
 
 /// A flat rectangle among the objects.

@@ -122,17 +122,21 @@ void describe(LightSourceDescription& light, Visitor& visit) {
   visit.require({"kind"});
   visit("kind", light.kind, "kind of light");
   visit("color", light.color, "colour, linear Rec. 709; environment: a factor", at_least(0));
-  visit("strength", light.strength, "radiance; directional: irradiance / pi", at_least(0));
+  visit("strength", light.strength, "radiance; directional: irradiance / pi; point: the same at a distance of 1",
+        at_least(0));
   visit("direction", light.direction,
         "directional: direction in which light travels; area: direction that the light faces", not_zero());
   visit("angle", light.angle, "directional: angular diameter, degrees (the sun: 0.53)", between(0, 180));
   visit("center", light.center, "area: middle, world");
   visit("size", light.size, "area: width and height, world units", above(0));
+  visit("position", light.position, "point: where it is, world");
   visit("file", light.file, "environment: a latitude-longitude picture");
   visit("rotation", light.rotation, "environment: rotation about +z, degrees");
+  visit("group", light.group, "name of a layer of the .exr that has the light of all lights of this group");
   visit.only_for({"direction"}, "kind", light.kind, {LightKind::directional, LightKind::area});
   visit.only_for({"angle"}, "kind", light.kind, {LightKind::directional});
   visit.only_for({"center", "size"}, "kind", light.kind, {LightKind::area});
+  visit.only_for({"position"}, "kind", light.kind, {LightKind::point});
   visit.only_for({"file", "rotation"}, "kind", light.kind, {LightKind::environment});
 }
 

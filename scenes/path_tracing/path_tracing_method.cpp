@@ -125,8 +125,9 @@ SurfacePicture render_stage(const Scene& scene, const PathScene& path_scene, con
   for (const Band& band : light.bands) luminance.push_back(static_cast<float>(band.xyz.y()));
   const LightSampler sampler(lights, luminance, stage.bounds());
   const ReflectanceTable table(light.model, light.bands, light.xyz_to_working);
-  return render_surfaces({stage, materials, sampler, table}, camera,
-                         tracer_settings(scene.description, path_scene.settings), callbacks);
+  ShadedScene shaded{stage, materials, sampler, table};
+  set_groups(light_groups(scene.description), shaded);
+  return render_surfaces(shaded, camera, tracer_settings(scene.description, path_scene.settings), callbacks);
 }
 
 Render LoadedPaths::render(const Scene& scene, const Progress& progress, RenderJob* job) const {
@@ -152,8 +153,9 @@ Render LoadedPaths::render(const Scene& scene, const Progress& progress, RenderJ
                                                                    const std::vector<Path>& paths) {
       write_tubes(file, tubes, paths, colors);
     };
+  const LightGroups groups = light_groups(scene.description);
   const auto add_picture = [&](const SurfacePicture& picture, Render& render) {
-    render.linear = make_image(picture, light, description);
+    render.linear = make_image(picture, light, description, groups);
     if (scene.description.output.wants("spectral"))
       render.spectral = spectral_image(picture.radiance, light.bands, 1, light.xyz_to_working);
   };

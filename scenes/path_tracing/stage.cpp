@@ -29,17 +29,34 @@ PathTracerSettings tracer_settings(const SceneDescription& scene, const PathTrac
   return settings;
 }
 
-Image make_image(const SurfacePicture& picture, const ShownLight& light, const PathTracingDescription& description) {
+LightGroups light_groups(const SceneDescription& scene) {
+  LightGroups groups;
+  for (const LightSourceDescription& light : scene.lights) {
+    const auto found = std::find(groups.names.begin(), groups.names.end(), light.group);
+    groups.of_light.push_back(light.group.empty() ? -1 : static_cast<int>(found - groups.names.begin()));
+    if (!light.group.empty() && found == groups.names.end()) groups.names.push_back(light.group);
+  }
+  return groups;
+}
+
+void set_groups(const LightGroups& groups, ShadedScene& scene) {
+  scene.groups = static_cast<int>(groups.names.size());
+  if (scene.groups > 0) scene.group_of_light = groups.of_light;
+}
+
+Image make_image(const SurfacePicture& picture, const ShownLight& light, const PathTracingDescription& description,
+                 const LightGroups& groups) {
   const Image colors = linear_image(picture.radiance, light.bands, light.xyz_to_working);
   std::vector<std::string> channels{"R",        "G",        "B",        "A",        "Z",        "normal.X",
                                     "normal.Y", "normal.Z", "albedo.R", "albedo.G", "albedo.B", "path",
                                     "force",    "length",   "samples",  "variance"};
-  if (!picture.gain.empty()) channels.insert(channels.end(), {"gain", "deflection"});
-  Image landed;
-  if (!picture.landed.values.empty()) {
-    landed = linear_image(picture.landed, light.bands, light.xyz_to_working);
-    channels.insert(channels.end(), {"caustic.R", "caustic.G", "caustic.B", "straight.R", "straight.G", "straight.B"});
-  }
+  if (!picture.gain.empty())
+    channels.insert(channels.end(), {"gain", "deflection", "arrives", "folds", "texture.s", "texture.t"});
+  std::vector<std::string> layers;
+  if (!picture.landed.values.empty()) layers = {"caustic", "straight"};
+  layers.insert(layers.end(), groups.names.begin(), groups.names.end());
+  for (const std::string& layer : layers)
+    for (const char* color : {".R", ".G", ".B"}) channels.push_back(layer + color);
   Image image(colors.width, colors.height, std::move(channels));
   const Eigen::Vector3d background = description.background == Background::color
                                          ? Eigen::Vector3d(light.rec709_to_working * description.background_color)
@@ -56,13 +73,14 @@ Image make_image(const SurfacePicture& picture, const ShownLight& light, const P
     for (const float value :
          {picture.path[i], picture.force[i], picture.arc_length[i], picture.samples[i], picture.variance[i]})
       *out++ = value;
-    if (!picture.gain.empty()) {
-      *out++ = picture.gain[i];
-      *out++ = picture.deflection[i];
-    }
-    if (landed.pixels.empty()) continue;
-    for (std::size_t c = 0; c < 3; ++c) *out++ = landed.pixels[3 * i + c];
-    for (std::size_t c = 0; c < 3; ++c) *out++ = colors.pixels[3 * i + c] - landed.pixels[3 * i + c];
+    if (!picture.gain.empty())
+      for (const float value : {picture.gain[i], picture.deflection[i], picture.arrives[i], picture.folds[i],
+                                picture.texture[i].x(), picture.texture[i].y()})
+        *out++ = value;
+    for (int c = 0; c < picture.landed.channels; ++c) *out++ = static_cast<float>(picture.landed.plane(c)[i]);
+    for (int c = 0; c < picture.landed.channels; ++c)
+      *out++ = colors.pixels[3 * i + static_cast<std::size_t>(c)] - static_cast<float>(picture.landed.plane(c)[i]);
+    for (int c = 0; c < picture.groups.channels; ++c) *out++ = static_cast<float>(picture.groups.plane(c)[i]);
   }
   return image;
 }

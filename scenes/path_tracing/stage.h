@@ -4,6 +4,7 @@
 /// picture.
 
 #include <functional>
+#include <string>
 #include <vector>
 
 #include "base/progress.h"
@@ -20,9 +21,20 @@ namespace tensorray {
 
 PathTracerSettings tracer_settings(const SceneDescription& scene, const PathTracingDescription& description);
 
+/// The groups of the scene's lights.
+struct LightGroups {
+  std::vector<std::string> names;
+  std::vector<int> of_light;  ///< Index of each light's group, or −1.
+};
+
+LightGroups light_groups(const SceneDescription& scene);
+
+void set_groups(const LightGroups& groups, ShadedScene& scene);
+
 /// R, G, B, A, and the channels that denoisers and compositors use. If light bends, also `gain` and `deflection`; if
-/// some has landed on flat surfaces, also `caustic` and `straight`, whose sum is the picture.
-Image make_image(const SurfacePicture& picture, const ShownLight& light, const PathTracingDescription& description);
+/// some has landed on surfaces, also `caustic` and `straight`, whose sum is the picture; and the light of each group.
+Image make_image(const SurfacePicture& picture, const ShownLight& light, const PathTracingDescription& description,
+                 const LightGroups& groups);
 
 /// @param finish  Completes a render, which is then shown, by the picture so far.
 RenderCallbacks callbacks_of(const Progress& progress, RenderJob* job,

@@ -56,6 +56,8 @@ Light make_light(const LightSourceDescription& light, const ShownLight& shown) {
       return AreaLight{rectangle_mesh(light.center.value(), up.cross(normal), up, light.size),
                        shown.radiance(light.color, light.strength)};
     }
+    case LightKind::point:
+      return PointLight{light.position.value(), shown.radiance(light.color, pi * light.strength)};
     default:
       return ConstantLight{shown.radiance(light.color, light.strength)};
   }

@@ -2,6 +2,10 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
+#include <stdexcept>
+
+#include <fmt/format.h>
 
 #include "base/constants.h"
 #include "integrators/flow/landed_irradiance.h"
@@ -39,12 +43,19 @@ Surfaces surfaces_before(const Scene& scene, const std::vector<SceneObject>& obj
   return surfaces;
 }
 
-DistantLight distant_light(const DirectionalLight& light, const ShownLight& shown, const BendingDescription& bending,
-                           int passes) {
-  DistantLight result;
-  result.direction = light.direction.normalized();
-  result.angle = light.angle;
-  result.passes = light.angle > 0 ? passes : 1;
+/// Parallel light, that of a disk, and that of a point; nothing for other lights.
+std::optional<LandingLight> landing_light(const Light& light, const ShownLight& shown,
+                                          const BendingDescription& bending, int passes) {
+  LandingLight result;
+  if (const auto* point = std::get_if<PointLight>(&light)) {
+    result.source = point->position;
+  } else if (const auto* sun = std::get_if<DirectionalLight>(&light)) {
+    result.direction = sun->direction.normalized();
+    result.angle = sun->angle;
+    result.passes = sun->angle > 0 ? passes : 1;
+  } else {
+    return std::nullopt;
+  }
   const auto flexibility = flexibility_of(bending);
   for (const Band& band : shown.bands) result.flexibilities.push_back(flexibility(band.wavelength - band.width / 2));
   result.flexibilities.push_back(flexibility(shown.bands.back().wavelength + shown.bands.back().width / 2));
@@ -52,14 +63,19 @@ DistantLight distant_light(const DirectionalLight& light, const ShownLight& show
 }
 
 /// The side of the plate that faces the middle of the volume; if the plate goes through the middle, that of the light.
-double lit_side(const Plate& plate, const TensorField& field, const Vector3d& direction) {
-  const double height = plate.normal().dot(field.world_box().center() - plate.center);
+double lit_side(const Plate& plate, const TensorField& field, const LandingLight& light) {
+  const Vector3d middle = field.world_box().center();
+  const Vector3d direction = light.source ? Vector3d(middle - *light.source) : light.direction;
+  const double height = plate.normal().dot(middle - plate.center);
   const bool is_middle = std::abs(height) < 1e-9 * field.world_box().diagonal().norm();
   return (is_middle ? -plate.normal().dot(direction) : height) < 0 ? -1 : 1;
 }
 
 /// A plane behind a body that faces the light; each point of the body has its place on it.
-Plate plane_behind(const TriangleMesh& body, const Vector3d& direction) {
+Plate plane_behind(const TriangleMesh& body, const LandingLight& light) {
+  Eigen::AlignedBox3d bounds;
+  for (const Vector3d& vertex : body.vertices) bounds.extend(vertex);
+  const Vector3d direction = light.source ? Vector3d((bounds.center() - *light.source).normalized()) : light.direction;
   Plate plate;
   plate.up = upright(direction, Vector3d::UnitZ());
   plate.right = plate.up.cross(-direction);
@@ -68,29 +84,58 @@ Plate plane_behind(const TriangleMesh& body, const Vector3d& direction) {
     box.extend(Vector3d(plate.right.dot(vertex), plate.up.dot(vertex), direction.dot(vertex)));
   plate.center = box.center().x() * plate.right + box.center().y() * plate.up + box.max().z() * direction;
   plate.size = box.sizes().head<2>();
+  if (!light.source) return plate;
+  Eigen::AlignedBox2d seen;
+  for (const Vector3d& vertex : body.vertices) {
+    const Vector3d place = projected_from(*light.source, plate, vertex) - plate.center;
+    seen.extend(Eigen::Vector2d(plate.right.dot(place), plate.up.dot(place)));
+  }
+  plate.center += seen.center().x() * plate.right + seen.center().y() * plate.up;
+  plate.size = seen.sizes();
   return plate;
 }
 
-LandedLight landed_light(const LandedIrradiance& landed, const DirectionalLight& light) {
+/// @param strength  In every band.
+LandedLight landed_light(const LandedIrradiance& landed, const LandingLight& light,
+                         const std::vector<float>& strength) {
   LandedLight result;
   result.plate = landed.plate;
-  result.towards = -light.direction.normalized();
+  result.source = light.source;
+  result.towards = -light.direction;
   result.bands = landed.irradiance.channels;
-  const std::size_t pixels = landed.irradiance.plane_size(), bands = light.irradiance.size();
+  result.folds = landed.folds;
+  const std::size_t pixels = landed.irradiance.plane_size(), bands = strength.size();
   result.irradiance.resize(pixels * bands);
   for (std::size_t band = 0; band < bands; ++band) {
     const double* plane = landed.irradiance.plane(static_cast<int>(band));
     for (std::size_t i = 0; i < pixels; ++i)
-      result.irradiance[i * bands + band] = static_cast<float>(plane[i] * light.irradiance[band]);
+      result.irradiance[i * bands + band] = static_cast<float>(plane[i] * strength[band]);
   }
   return result;
 }
 
-/// Gives light to one side of a plate. Light that grazes it straight may come from above it when it is bent.
+const std::vector<float>& strength_of(const Light& light) {
+  if (const auto* point = std::get_if<PointLight>(&light)) return point->intensity;
+  return std::get<DirectionalLight>(light).irradiance;
+}
+
+/// @throw SceneError if light `number` is where it cannot be.
+std::optional<LandedIrradiance> land(const Scene& scene, const Surfaces& surfaces, const Plate& plate,
+                                     const LandingLight& light, std::size_t number, const CausticDescription& caustic,
+                                     const Progress& progress) {
+  try {
+    return landed_irradiance(scene.field, surfaces, plate, light, scene.bending, caustic.resolution, caustic.rays,
+                             progress);
+  } catch (const std::invalid_argument& error) {
+    throw SceneError(fmt::format("{}: `/lights/{}`: {}", scene.description.path.string(), number, error.what()));
+  }
+}
+
+/// Gives light to one side of a plate.
 void face(double side, LandedLight& light) {
   light.side = side;
   const Vector3d normal = side * light.plate.normal();
-  if (!(light.towards.dot(normal) > 0.05)) light.towards = normal;
+  if (!(light.towards.dot(normal) > grazing_cosine)) light.towards = normal;
 }
 
 }  // namespace
@@ -114,21 +159,20 @@ std::vector<LandedLight> land_light(const Scene& scene, const std::vector<Light>
                                     const std::vector<SceneObject>& objects, const CausticDescription& caustic,
                                     const Progress& progress) {
   std::vector<LandedLight> result;
-  for (const Light& each : lights) {
-    const auto* light = std::get_if<DirectionalLight>(&each);
+  for (std::size_t number = 0; number < lights.size(); ++number) {
+    const auto light = landing_light(lights[number], shown, scene.description.bending, caustic.passes);
     if (!light) continue;
-    const DistantLight distant = distant_light(*light, shown, scene.description.bending, caustic.passes);
     for (std::size_t i = 0; i < objects.size(); ++i) {
       if (objects[i].mesh().triangles.empty()) continue;
-      Plate plate = objects[i].plate ? *objects[i].plate : plane_behind(objects[i].mesh(), distant.direction);
+      Plate plate = objects[i].plate ? *objects[i].plate : plane_behind(objects[i].mesh(), *light);
       plate.resolution.setConstant(caustic.resolution);
-      const auto landed = landed_irradiance(scene.field, surfaces_before(scene, objects, i), plate, distant,
-                                            scene.bending, caustic.resolution, caustic.rays, progress);
+      const auto landed = land(scene, surfaces_before(scene, objects, i), plate, *light, number, caustic, progress);
       if (!landed) continue;
-      result.push_back(landed_light(*landed, *light));
+      result.push_back(landed_light(*landed, *light, strength_of(lights[number])));
       result.back().surface = static_cast<std::uint32_t>(i);
+      result.back().light = static_cast<int>(number);
       if (objects[i].plate)
-        face(lit_side(plate, scene.field, distant.direction), result.back());
+        face(lit_side(plate, scene.field, *light), result.back());
       else
         result.back().body = std::make_shared<SurfaceScene>(std::vector{objects[i].surface});
     }

@@ -49,12 +49,14 @@ std::vector<Vector3d> points_of_interest(const Scene& scene, const std::vector<S
   for (const SceneObject& object : objects) {
     if (!object.plate) points.insert(points.end(), object.mesh().vertices.begin(), object.mesh().vertices.end());
     for (const Light& each : lights) {
-      const auto* light = std::get_if<DirectionalLight>(&each);
-      if (!light || !object.plate) continue;
+      const auto* sun = std::get_if<DirectionalLight>(&each);
+      const auto* point = std::get_if<PointLight>(&each);
+      if ((!sun && !point) || !object.plate) continue;
       for (const Vector3d& corner : scene.field.corners()) {
         const Vector3d normal = object.plate->normal();
-        const double way = normal.dot(object.plate->center - corner) / normal.dot(light->direction);
-        const Vector3d shadow = corner + way * light->direction;
+        const Vector3d direction = sun ? sun->direction : Vector3d(corner - point->position);
+        const double way = normal.dot(object.plate->center - corner) / normal.dot(direction);
+        const Vector3d shadow = corner + way * direction;
         const Eigen::Vector2d across((shadow - object.plate->center).dot(object.plate->right),
                                      (shadow - object.plate->center).dot(object.plate->up));
         if (way > 0 && (across.cwiseAbs().array() < object.plate->size.array() / 2).all()) points.push_back(shadow);
@@ -163,6 +165,8 @@ Render LoadedWhole::render(const Scene& scene, const Progress& progress, RenderJ
   const bool bends = bends_light(scene, light.bands);
   ShadedScene shaded{stage, materials, sampler, table};
   if (bends) shaded.region = &region;
+  const LightGroups groups = light_groups(scene.description);
+  set_groups(groups, shaded);
   shaded.bands_per_view = whole_.settings.bands_per_sample;
   shaded.bands_per_bounce = bands_per_bounce(whole_.settings);
   if (bends) shaded.landed = land_light(scene, lights, light, objects, whole_.settings.caustic, progress);
@@ -170,7 +174,7 @@ Render LoadedWhole::render(const Scene& scene, const Progress& progress, RenderJ
 
   start = Clock::now();
   const auto add_picture = [&](const SurfacePicture& picture, Render& render) {
-    render.linear = make_image(picture, light, whole_.tracing);
+    render.linear = make_image(picture, light, whole_.tracing, groups);
     if (scene.description.output.wants("spectral"))
       render.spectral = spectral_image(picture.radiance, light.bands, 1, light.xyz_to_working);
   };

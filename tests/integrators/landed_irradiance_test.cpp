@@ -1,10 +1,12 @@
 #include "integrators/flow/landed_irradiance.h"
 
 #include <cmath>
+#include <memory>
 
 #include <gtest/gtest.h>
 #include <tbb/global_control.h>
 
+#include "renderer/shading/landed_light.h"
 #include "tests/integrators/support.h"
 
 namespace tensorray {
@@ -22,14 +24,14 @@ Plate floor_plate(double size) {
   return plate;
 }
 
-LandedIrradiance land(const TensorField& field, const DistantLight& light, const Plate& plate) {
+LandedIrradiance land(const TensorField& field, const LandingLight& light, const Plate& plate) {
   const auto landed = landed_irradiance(field, surfaces_of(field), plate, light, {}, 64, 20000, {});
   if (!landed) throw std::runtime_error("no light landed");
   return *landed;
 }
 
-DistantLight sun(const Vector3d& direction) {
-  DistantLight light;
+LandingLight sun(const Vector3d& direction) {
+  LandingLight light;
   light.direction = direction.normalized();
   light.flexibilities = {0.1, 0.2, 0.3};
   return light;
@@ -66,7 +68,7 @@ TEST(LandedIrradianceTest, BentLightKeepsItsPower) {
     T(1, 0) = 0.5;
     return T;
   });
-  DistantLight light = sun({0.2, 0.1, -1});
+  LandingLight light = sun({0.2, 0.1, -1});
   const double straight = 4 + 2 * (2 * 0.2 + 2 * 0.1);  // Area of the shadow.
   for (const double angle : {0.0, 0.03}) {
     light.angle = angle;
@@ -75,6 +77,56 @@ TEST(LandedIrradianceTest, BentLightKeepsItsPower) {
     for (int band = 0; band < 2; ++band)
       EXPECT_NEAR(power(landed, band), straight * -light.direction.z(), 0.01 * straight) << band;
   }
+}
+
+LandingLight lamp(const Vector3d& source) {
+  LandingLight light = sun({0, 0, -1});
+  light.source = source;
+  return light;
+}
+
+/// The solid angle of the square from −1 to 1 at z = 1, as seen from a point above it.
+double solid_angle_of_top(const Vector3d& from) {
+  double sum = 0;
+  for (const double x : {1 - from.x(), 1 + from.x()})
+    for (const double y : {1 - from.y(), 1 + from.y()}) {
+      const double z = from.z() - 1;
+      sum += std::atan(x * y / (z * std::sqrt(x * x + y * y + z * z)));
+    }
+  return sum;
+}
+
+TEST(LandedIrradianceTest, LightOfAPointFallsWithTheSquareOfTheDistance) {
+  const TensorField field = constant_field(Matrix3d::Zero());
+  const Vector3d source(0.3, 0.2, 4);
+  const LandedIrradiance landed = land(field, lamp(source), floor_plate(12));
+  for (int y = 0; y < landed.irradiance.height; ++y)
+    for (int x = 0; x < landed.irradiance.width; ++x) {
+      const Vector3d point = landed.plate.to_world({x + 0.5, y + 0.5}), way = point - source;
+      const Vector3d on_top = source + 3 / 5.5 * way;  // Where straight light enters the cube.
+      const double edge = on_top.head<2>().cwiseAbs().maxCoeff();
+      if (std::abs(edge - 1) < 0.05) continue;
+      const double expected = edge < 1 ? 5.5 / std::pow(way.norm(), 3) : 0;
+      EXPECT_NEAR(landed.irradiance.plane(0)[y * landed.irradiance.width + x], expected, 1e-3 * expected + 1e-9);
+    }
+  EXPECT_NEAR(power(landed, 0), solid_angle_of_top(source), 1e-4 * solid_angle_of_top(source));
+}
+
+TEST(LandedIrradianceTest, BentLightOfAPointKeepsItsPower) {
+  const TensorField field = cube_field(17, [](const Vector3d& p) {
+    Matrix3d T = Matrix3d::Zero();
+    T(0, 0) = p.x();
+    T(1, 0) = 0.5;
+    return T;
+  });
+  const Vector3d source(0.3, 0.2, 4);
+  const LandedIrradiance landed = land(field, lamp(source), floor_plate(40));
+  for (int band = 0; band < 2; ++band)
+    EXPECT_NEAR(power(landed, band), solid_angle_of_top(source), 0.01 * solid_angle_of_top(source)) << band;
+}
+
+TEST(LandedIrradianceTest, APointWithinTheVolumeIsRefused) {
+  EXPECT_THROW(land(constant_field(Matrix3d::Zero()), lamp({0.5, 0, 0}), floor_plate(12)), std::invalid_argument);
 }
 
 TEST(LandedIrradianceTest, IsTheSameOnAnyNumberOfThreads) {
@@ -99,7 +151,7 @@ Plate plane_behind(const Vector3d& direction) {
   return plate;
 }
 
-std::optional<LandedIrradiance> land_on(const TriangleMesh& body, const TensorField& field, const DistantLight& light) {
+std::optional<LandedIrradiance> land_on(const TriangleMesh& body, const TensorField& field, const LandingLight& light) {
   Surfaces surfaces = surfaces_of(field);
   surfaces.body = body;
   return landed_irradiance(field, surfaces, plane_behind(light.direction), light, {}, 192, 40000, {});
@@ -119,7 +171,7 @@ TEST(LandedIrradianceTest, ABodyHasTheLightOfAPlateInItsPlace) {
     T(1, 0) = 0.5;
     return T;
   });
-  const DistantLight light = sun({0.2, 0.1, -1});
+  const LandingLight light = sun({0.2, 0.1, -1});
   Plate plate = floor_plate(8);
   const Vector3d normal = Vector3d(0.3, -0.2, 1).normalized();
   plate.center = {0, 0, -2};
@@ -139,6 +191,53 @@ TEST(LandedIrradianceTest, ABodyHasTheLightOfAPlateInItsPlace) {
     EXPECT_NEAR(with_body, with_plate, 0.02) << x;
   }
   EXPECT_NEAR(power(*body, 0), power(flat, 0), 0.01 * power(flat, 0));
+}
+
+TEST(LandedIrradianceTest, ABodyHasAPointsLightOfAPlateInItsPlace) {
+  const TensorField field = cube_field(17, [](const Vector3d& p) {
+    Matrix3d T = Matrix3d::Zero();
+    T(0, 0) = p.x();
+    T(1, 0) = 0.5;
+    return T;
+  });
+  const LandingLight light = lamp({0.5, 0.3, 4});
+  Plate plate = floor_plate(5);
+  const Vector3d normal = Vector3d(0.3, -0.2, 1).normalized();
+  plate.center = {0, 0, -2.2};
+  plate.up = upright(normal, Vector3d::UnitY());
+  plate.right = plate.up.cross(normal);
+  const LandedIrradiance flat = land(field, light, plate);
+  Surfaces surfaces = surfaces_of(field);
+  surfaces.body = TriangleMesh{plate.corners(), {{0, 1, 2}, {0, 2, 3}}};
+  Plate behind = plane_behind((plate.center - *light.source).normalized());
+  behind.size = {16, 16};
+  const auto body = landed_irradiance(field, surfaces, behind, light, {}, 192, 40000, {});
+  ASSERT_TRUE(body);
+  const auto landed = [&](const LandedIrradiance& from, bool is_body) {
+    LandedLight result;
+    result.plate = from.plate;
+    result.source = light.source;
+    result.bands = 1;
+    ShadedSurface shown;
+    shown.shape = *surfaces.body;
+    if (is_body) result.body = std::make_shared<SurfaceScene>(std::vector{shown});
+    for (std::size_t i = 0; i < from.irradiance.plane_size(); ++i)
+      result.irradiance.push_back(static_cast<float>(from.irradiance.plane(0)[i]));
+    return result;
+  };
+  const LandedLight on_body = landed(*body, true), on_plate = landed(flat, false);
+  for (const double x : {-0.5, 0.0, 0.4}) {  // Means over squares; within a triangle of the map light is even.
+    Eigen::ArrayXd with_body = Eigen::ArrayXd::Zero(1), with_plate = with_body;
+    for (int i = 0; i < 400; ++i) {
+      const Vector3d point = plate.center + (x + (i % 20 - 9.5) / 50) * plate.right + ((i / 20 - 9.5) / 50) * plate.up;
+      Eigen::ArrayXd facing = Eigen::ArrayXd::Zero(1);
+      add_irradiance(on_body, point, facing);
+      with_body += normal.dot((*light.source - point).normalized()) * facing;
+      add_irradiance(on_plate, point, with_plate);
+    }
+    EXPECT_GT(with_plate[0], 4) << x;
+    EXPECT_NEAR(with_body[0], with_plate[0], 0.02 * with_plate[0]) << x;
+  }
 }
 
 TEST(LandedIrradianceTest, OnlyTheFirstLayerOfABodyHasLight) {

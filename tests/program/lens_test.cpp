@@ -160,6 +160,30 @@ TEST_F(Lens, DepthsStandSideBySideAndLessOfTheVolumeBendsLess) {
   }
 }
 
+/// Pixels that are brighter than all their neighbours, in one colour: a fold's light has none.
+TEST_F(Lens, NoPixelStandsOutBesideAFold) {
+  write("scene.json", R"({
+    "field": {"generate": {"kind": "point_load", "resolution": 65}, "eigenvalues": "absolute"},
+    "bending": {"a": 0.3, "b": -0.0002}, "light": {"wavelengths": {"count": 12}},
+    "receiver": {"distance": 0.1, "size": [2.2, 2.2], "resolution": [256, 256]},
+    "integrator": {"type": "lens", "image": "checkerboard", "image_plane": {"distance": 0.1}, "samples": 2}})");
+  const Image image = render({});
+  int count = 0;
+  for (const char* name : {"R", "G", "B"}) {
+    std::vector<float> values = channel(image, name);
+    for (float& value : values) value = std::min(value, 1.0f);
+    for (int y = 1; y < 255; ++y)
+      for (int x = 1; x < 255; ++x) {
+        float greatest = 0;
+        for (int i = 0; i < 9; ++i)
+          if (i != 4)
+            greatest = std::max(greatest, values[static_cast<std::size_t>(256 * (y + i / 3 - 1) + x + i % 3 - 1)]);
+        count += values[static_cast<std::size_t>(256 * y + x)] > greatest + 0.04f;
+      }
+  }
+  EXPECT_EQ(count, 0);
+}
+
 TEST_F(Lens, OverlayDrawsOverThePictureAlone) {
   write("scene.json", small_lens(R"("image": "color_wheel", "mode": "gather")"));
   const Image plain = render({}), drawn = render({"integrator.overlay=grid"});

@@ -154,6 +154,56 @@ TEST_F(WholeScene, AnEvenSkyThroughTheFieldIsEvenIfRadianceIsConserved) {
   EXPECT_GT(differs(picture(sky)), 0.1);
 }
 
+/// The light of points, traced forwards to the floor, is that of a lamp that the path tracer finds backwards.
+TEST_F(WholeScene, TheLightOfPointsThroughTheFieldIsThatOfALamp) {
+  const std::string common = R"({
+    "field": {"generate": {"kind": "point_load", "resolution": 17}, "eigenvalues": "raw", "scale": 1},
+    "integrator": {"type": "scene", "max_samples": 512, "min_samples": 512, "noise": 0, "max_gain": 0, "bands": 8,
+                   "max_depth": 1, "caustic": {"resolution": 256, "rays": 20000}},
+    "objects": [{"plate": {"center": [0, 0, -1.5], "size": [1.6, 1.6]}, "material": {"kind": "diffuse"}}],
+    "camera": {"projection": "orthographic", "position": [0, 0.001, -1.2], "target": [0, 0, -1.5], "height": 1.4,
+               "resolution": [20, 20]},
+    "lights": [)";
+  // A square of 3 × 3 with the intensity π 100, as nine points and as a lamp, which is darker by 1% towards the edges.
+  std::string points;
+  for (const int x : {-1, 0, 1})
+    for (const int y : {-1, 0, 1})
+      points += fmt::format(R"({}{{"kind": "point", "position": [{}, {}, 12], "strength": 11.111}})",
+                            points.empty() ? "" : ", ", x, y);
+  write("scene.json", common + points + "]}");
+  const Image forwards = picture({});
+  write("scene.json", common + R"({"kind": "area", "center": [0, 0, 12], "size": [3, 3], "strength": 34.907}]})");
+  const Image backwards = picture({}), other_law = picture({"integrator.conserve=radiance"});
+  EXPECT_GT(mean(forwards, "G"), 0.2);
+  EXPECT_NEAR(mean(forwards, "G"), mean(backwards, "G"), 0.03 * mean(backwards, "G"));
+  EXPECT_GT(std::abs(mean(other_law, "G") / mean(backwards, "G") - 1), 0.1);
+}
+
+TEST_F(WholeScene, GroupsOfLightsAddUpToThePicture) {
+  write("scene.json", R"({
+    "field": {"generate": {"kind": "point_load", "resolution": 17}, "eigenvalues": "absolute"},
+    "integrator": {"type": "scene", "max_samples": 8, "min_samples": 8, "noise": 0,
+                   "caustic": {"resolution": 64, "rays": 4000, "passes": 1}},
+    "camera": {"resolution": [40, 32]},
+    "lights": [{"kind": "constant", "color": [0.2, 0.3, 0.6], "group": "around"},
+               {"kind": "directional", "direction": [0.2, 0, -1], "angle": 2, "group": "sun"},
+               {"kind": "point", "position": [1, 1, 3], "strength": 5, "group": "lamps"},
+               {"kind": "area", "center": [-1, 0, 3], "group": "lamps"}]})");
+  const Image all = picture({});
+  for (const char* color : {"R", "G", "B"}) {
+    double sum = 0;
+    for (const std::string group : {"around.", "sun.", "lamps."}) {
+      EXPECT_GT(mean(all, group + color), 0.01) << group;
+      sum += mean(all, group + color);
+    }
+    EXPECT_NEAR(sum, mean(all, color), 1e-4 * sum) << color;
+  }
+  EXPECT_GE(mean(all, "folds"), 0.05);
+  // A group has the light that the picture has if all others are dark.
+  const Image sun = picture({"lights.0.strength=0", "lights.2.strength=0", "lights.3.strength=0"});
+  EXPECT_NEAR(mean(all, "sun.G"), mean(sun, "G"), 0.1 * mean(sun, "G"));
+}
+
 TEST_F(WholeScene, RefusesWhatDoesNotFit) {
   expect_error("integrator.bands_per_sample=7", "/integrator/bands_per_sample");
   expect_error("integrator.conserve=light", "/integrator/conserve");
@@ -163,6 +213,9 @@ TEST_F(WholeScene, RefusesWhatDoesNotFit) {
   expect_error("objects=[{\"file\":\"none.ply\",\"texture\":\"checkerboard\"}]", "/objects/0/texture");
   expect_error("objects=[{\"plate\":{\"center\":[0,0,0]},\"texture\":\"none.png\"}]", "none.png");
   expect_error("objects=[{\"plate\":{\"center\":[0,0,0],\"colour\":1}}]", "/objects/0/plate/colour");
+  expect_error("lights=[{\"kind\":\"point\"}]", "/lights/0` is a point and needs its `position`");
+  expect_error("lights=[{\"kind\":\"point\",\"position\":[0,0,-0.9]}]", "/lights/0`: the light is within the volume");
+  expect_error("lights=[{\"kind\":\"constant\",\"group\":\"albedo\"}]", "/lights/0/group");
 }
 
 /// A sun in the plane of the floor, a floor through the volume, and a camera inside the volume.
