@@ -34,5 +34,36 @@ TEST(ImportFileTest, FlatCellsAreTakenInSilence) {
   EXPECT_EQ(testing::internal::GetCapturedStderr(), "");
 }
 
+TEST(ImportFileTest, NumPyVoxelsAreWhereTheUserSays) {
+  const TemporaryFolder folder;
+  std::string header = "{'descr': '<f4', 'fortran_order': False, 'shape': (2, 3, 4, 3, 3), }";
+  header.resize(117, ' ');
+  const std::vector<float> ones(2 * 3 * 4 * 9, 1.0F);
+  write_bytes(folder / "a.npy", std::string("\x93NUMPY\x01\x00\x76\x00", 10) + header + "\n" +
+                                    std::string(reinterpret_cast<const char*>(ones.data()), ones.size() * 4));
+  ImportSettings settings;
+  settings.files = {folder / "a.npy"};
+  ImportReport report;
+  EXPECT_TRUE(import_tensors(settings, Progress(), report).to_world.matrix().isIdentity());
+  settings.sampling.resolution = 0.25;
+  settings.origin = Eigen::Vector3d(-1, 2, 5);
+  const TensorGrid grid = import_tensors(settings, Progress(), report);
+  EXPECT_EQ(Eigen::Vector3d(grid.to_world * Eigen::Vector3d::Zero()), Eigen::Vector3d(-1, 2, 5));
+  EXPECT_EQ(Eigen::Vector3d(grid.to_world * Eigen::Vector3d(3, 2, 1)), Eigen::Vector3d(-0.25, 2.5, 5.25));
+  EXPECT_EQ(grid.active_voxels(), 24u);
+  settings.sampling.bounds = Eigen::AlignedBox3d(Eigen::Vector3d(-1, 2, 5), Eigen::Vector3d(-0.75, 2.5, 5));
+  EXPECT_EQ(import_tensors(settings, Progress(), report).active_voxels(), 6u);  // The bounds are in world space.
+}
+
+TEST(ImportFileTest, OnlyNumPyFilesTakeAnOrigin) {
+  const TemporaryFolder folder;
+  write_xml(*image(), folder / "a.vti");
+  ImportSettings settings;
+  settings.files = {folder / "a.vti"};
+  settings.origin = Eigen::Vector3d::Zero();
+  ImportReport report;
+  EXPECT_THROW(import_tensors(settings, Progress(), report), std::invalid_argument);
+}
+
 }  // namespace
 }  // namespace tensorray

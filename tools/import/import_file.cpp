@@ -14,6 +14,7 @@
 
 #include "base/text.h"
 #include "tools/import/lattices/lattice_files.h"
+#include "tools/import/meshes/component_arrays.h"
 #include "tools/import/meshes/mesh_boundary.h"
 #include "tools/import/vtk/image_lattice.h"
 #include "tools/import/vtk/plot3d.h"
@@ -95,15 +96,30 @@ TensorGrid import_mesh(vtkDataSet& data, const ArrayChoice& array, const ImportS
 /// Keeps the voxels of a VTK image, unless the user asks for other voxels.
 TensorGrid import_data_set(vtkSmartPointer<vtkDataSet> data, const ImportSettings& settings, const Progress& progress,
                            ImportReport& report) {
-  const ArrayChoice array = choose_array(*data, settings.array, settings.take);
+  const bool is_list = settings.take == Take::tensor && is_array_list(*data, settings.array);
+  const ArrayChoice array =
+      is_list ? join_arrays(*data, settings.array) : choose_array(*data, settings.array, settings.take);
   auto image = vtkSmartPointer<vtkImageData>(vtkImageData::SafeDownCast(data));
   if (!image || wants_sampling(settings)) return import_mesh(*data, array, settings, progress, report);
   data = nullptr;  // Leave the lattice as the only owner of the numbers, so that it can free them.
   vtkDataSetAttributes* attributes = array.of_cells ? static_cast<vtkDataSetAttributes*>(image->GetCellData())
                                                     : static_cast<vtkDataSetAttributes*>(image->GetPointData());
   vtkSmartPointer<vtkDataArray> values = attributes->GetArray(array.name.c_str());
-  const Lattice lattice = lattice_of(std::move(image), std::move(values), array.of_cells);
+  std::optional<TensorOrder> order;
+  if (is_list) order = order_in(*values, settings.order);
+  Lattice lattice = lattice_of(std::move(image), std::move(values), array.of_cells);
+  if (is_list) lattice.order = order;
   return import_lattice(lattice, settings, report);
+}
+
+/// A lattice of a file that does not say where its voxels are: --voxel-size and --origin do.
+Lattice placed(Lattice lattice, const ImportSettings& settings) {
+  const double* const size = std::get_if<double>(&settings.sampling.resolution);
+  if (wants_sampling(settings) && !size)
+    throw std::invalid_argument("has voxels of its own, which are kept: give --voxel-size instead of --resolution");
+  lattice.to_world = Eigen::Translation3d(settings.origin.value_or(Eigen::Vector3d::Zero())) *
+                     Eigen::Affine3d(Eigen::Scaling(size ? *size : 1.0));
+  return lattice;
 }
 
 TensorGrid import_any(const ImportSettings& settings, const Progress& progress, ImportReport& report) {
@@ -118,6 +134,7 @@ TensorGrid import_any(const ImportSettings& settings, const Progress& progress, 
   }
   const OpenLattice open = lattice_reader(file);
   if (!open) return import_data_set(read_vtk_source(file), settings, progress, report);
+  if (open == open_npy) return import_lattice(placed(open(file), settings), settings, report);
   if (wants_sampling(settings))
     throw std::invalid_argument("has voxels of its own, which are kept: leave --resolution and --voxel-size out");
   return import_lattice(open(file), settings, report);
@@ -141,6 +158,8 @@ TensorGrid import_tensors(const ImportSettings& settings, const Progress& progre
   if (settings.files.empty() || settings.files.size() > 2)
     throw std::invalid_argument("give one file, or PLOT3D's two: the grid and its q");
   const std::filesystem::path& file = settings.files.front();
+  if (settings.origin && lattice_reader(file) != open_npy)
+    throw std::invalid_argument(file.string() + ": says itself where it is, only .npy does not: leave --origin out");
   progress.update("reading", 0, 1);
   TensorGrid grid;
   try {

@@ -17,11 +17,13 @@ namespace tensorray {
 struct ImportSettings {
   /// One file. For PLOT3D two: the grid file and the q file.
   std::vector<std::filesystem::path> files;
-  std::string array;  ///< Name of the array; empty: the only suitable one.
+  std::string array;  ///< Name of the array, or of six or nine scalar arrays; empty: the only suitable one.
   Take take = Take::tensor;
   std::optional<TensorOrder> order;  ///< Order of six components, where the file does not state it.
-  SamplingSettings sampling;         ///< For files of voxels only `bounds` is used, except for VTK files.
-  std::filesystem::path boundary;    ///< File for the surface of the body; empty: none.
+  /// For files of voxels only `bounds` is used, except for VTK files; for .npy also a voxel size, that of the file.
+  SamplingSettings sampling;
+  std::optional<Eigen::Vector3d> origin;  ///< World position of the first voxel's centre; of .npy only.
+  std::filesystem::path boundary;         ///< File for the surface of the body; empty: none.
 };
 
 /// What was found in the files and how it was converted. Only one of the two reports is filled.

@@ -28,7 +28,8 @@ Lattice open_nrrd(const std::filesystem::path& path);
 Lattice open_nifti(const std::filesystem::path& path);
 
 /// Reads NumPy's .npy of shape (nz, ny, nx, 3, 3), (nz, ny, nx, 9), (nz, ny, nx, 6) or (nz, ny, nx, 3), in C or
-/// Fortran order, as float16, 32 or 64, in either byte order. World coordinates are the voxel indices (i, j, k).
+/// Fortran order, as float16, 32 or 64, in either byte order. World coordinates are the voxel indices (i, j, k), which
+/// the caller may scale and move.
 /// Reads each slice from the file when it is needed, so the file must not change meanwhile.
 Lattice open_npy(const std::filesystem::path& path);
 

@@ -54,16 +54,6 @@ void for_each_array(vtkDataSet& mesh, const Visit& visit) {
   }
 }
 
-std::string list_of_arrays(vtkDataSet& mesh) {
-  std::string list;
-  for_each_array(mesh, [&](vtkDataArray& array, bool of_cells) {
-    const int components = array.GetNumberOfComponents();
-    list += fmt::format("{}{} ({} component{}, {})", list.empty() ? "" : ", ", array.GetName(), components,
-                        components == 1 ? "" : "s", of_cells ? "cells" : "points");
-  });
-  return list.empty() ? "there are no arrays" : "there are: " + list;
-}
-
 const char* wanted(Take take) {
   return take == Take::tensor ? "a tensor has 6, 9, or more than 9 components" : "a vector has 3 components";
 }
@@ -95,24 +85,6 @@ std::string component_names(vtkDataArray& array) {
   std::string names;
   for (int i = 0; i < 6; ++i) names += (names.empty() ? "" : " ") + std::string(array.GetComponentName(i));
   return names;
-}
-
-TensorOrder order_in(vtkDataArray& array, const std::optional<TensorOrder>& given) {
-  if (array.GetNumberOfComponents() == 9) return TensorOrder::full;
-  const std::optional<TensorOrder> said = order_of_names(array);
-  if (given && said && *given != *said)
-    throw std::invalid_argument(
-        fmt::format("the file itself names the components of array \"{}\": they are {}, of which --order says "
-                    "otherwise; leave --order out",
-                    array.GetName(), component_names(array)));
-  if (said) return *said;
-  if (given) return *given;
-  std::string names;
-  for (const std::string& name : tensor_order_names()) names += (names.empty() ? "" : ", ") + name;
-  throw std::invalid_argument(
-      fmt::format("array \"{}\" has {} components, of which the first six are a symmetric tensor, in an order that it "
-                  "does not say: give --order, one of {}",
-                  array.GetName(), array.GetNumberOfComponents(), names));
 }
 
 Array new_array(vtkIdType points, int components) {
@@ -227,6 +199,34 @@ vtkSmartPointer<vtkDataSet> with_array(vtkDataSet& mesh, vtkDoubleArray& tensors
 }
 
 }  // namespace
+
+std::string list_of_arrays(vtkDataSet& mesh) {
+  std::string list;
+  for_each_array(mesh, [&](vtkDataArray& array, bool of_cells) {
+    const int components = array.GetNumberOfComponents();
+    list += fmt::format("{}{} ({} component{}, {})", list.empty() ? "" : ", ", array.GetName(), components,
+                        components == 1 ? "" : "s", of_cells ? "cells" : "points");
+  });
+  return list.empty() ? "there are no arrays" : "there are: " + list;
+}
+
+TensorOrder order_in(vtkDataArray& array, const std::optional<TensorOrder>& given) {
+  if (array.GetNumberOfComponents() == 9) return TensorOrder::full;
+  const std::optional<TensorOrder> said = order_of_names(array);
+  if (given && said && *given != *said)
+    throw std::invalid_argument(
+        fmt::format("the file itself names the components of array \"{}\": they are {}, of which --order says "
+                    "otherwise; leave --order out",
+                    array.GetName(), component_names(array)));
+  if (said) return *said;
+  if (given) return *given;
+  std::string names;
+  for (const std::string& name : tensor_order_names()) names += (names.empty() ? "" : ", ") + name;
+  throw std::invalid_argument(
+      fmt::format("array \"{}\" has {} components, of which the first six are a symmetric tensor, in an order that it "
+                  "does not say: give --order, one of {}",
+                  array.GetName(), array.GetNumberOfComponents(), names));
+}
 
 ArrayChoice choose_array(vtkDataSet& mesh, const std::string& name, Take take) {
   std::vector<ArrayChoice> choices;

@@ -7,6 +7,7 @@
 
 #include "tools/import/lattices/tensor_order.h"
 
+class vtkDataArray;
 class vtkDataSet;
 template <class T>
 class vtkSmartPointer;
@@ -28,6 +29,13 @@ struct ArrayChoice {
 
 /// The name of the array that with_tensors makes.
 constexpr const char* tensor_array = "tensor";
+
+/// The arrays of a mesh in words, for messages: "there are: velocity (3 components, points), ...".
+std::string list_of_arrays(vtkDataSet& mesh);
+
+/// The order of an array of six, nine or more components, by their names or as `given`.
+/// @throw std::invalid_argument if it is not known, or if the names contradict `given`.
+TensorOrder order_in(vtkDataArray& array, const std::optional<TensorOrder>& given);
 
 /// Finds the array called `name`; if `name` is empty, the only array that suits `take` (6, 9, or at least 10
 /// components; 3 for a gradient). If a point array and a cell array have the same name, the point array is chosen.

@@ -32,7 +32,7 @@ struct ImportOptions {
   std::string array, gradient_of, strain_of, order;
   std::vector<int> resolution;
   double voxel_size = 0;
-  std::vector<double> bounds;
+  std::vector<double> bounds, origin;
   std::filesystem::path output, boundary;
   std::string name, units;
   bool half = false, quiet = false;
@@ -54,6 +54,8 @@ ImportSettings settings_of(const ImportOptions& options) {
   if (options.resolution.size() == 1) settings.sampling.resolution = options.resolution[0];
   if (options.resolution.size() == 3) settings.sampling.resolution = Eigen::Vector3i(options.resolution.data());
   if (options.resolution.size() == 2) throw std::invalid_argument("--resolution needs one number, or three: x y z");
+  if (!options.origin.empty()) settings.origin = Eigen::Vector3d(options.origin.data());
+  if (settings.origin && !settings.origin->allFinite()) throw std::invalid_argument("--origin needs finite numbers");
   if (!options.bounds.empty()) {
     const Eigen::Vector3d min(options.bounds[0], options.bounds[2], options.bounds[4]);
     const Eigen::Vector3d max(options.bounds[1], options.bounds[3], options.bounds[5]);
@@ -144,7 +146,10 @@ std::string positive(const std::string& text) {
 }
 
 void add_what(CLI::App& command, ImportOptions& options) {
-  auto* array = command.add_option("--array", options.array, "The array that is the tensor (default: the only one)");
+  auto* array =
+      command.add_option("--array", options.array,
+                         "The array that is the tensor (default: the only one), or six or nine scalar arrays that "
+                         "are its components: sxx,syy,szz,sxy,syz,sxz");
   auto* gradient =
       command.add_option("--gradient-of", options.gradient_of,
                          "Take the gradient of this vector array, T_ij = dv_i/dx_j, made on the mesh itself");
@@ -170,9 +175,15 @@ void add_where(CLI::App& command, ImportOptions& options) {
                          ->expected(1, 3)
                          ->check(CLI::Range(2, 8192))
                          ->group("Grid");
-  command.add_option("--voxel-size", options.voxel_size, "Edge of a voxel")
+  command
+      .add_option("--voxel-size", options.voxel_size,
+                  "Edge of a voxel; of .npy, the distance of its voxels (default: 1)")
       ->check(positive)
       ->excludes(resolution)
+      ->group("Grid");
+  command
+      .add_option("--origin", options.origin, "World x y z of the centre of the first voxel of .npy (default: 0 0 0)")
+      ->expected(3)
       ->group("Grid");
   command.add_option("--bounds", options.bounds, "Crop: xmin xmax ymin ymax zmin zmax")->expected(6)->group("Grid");
 }
@@ -184,10 +195,11 @@ void add_import_options(CLI::App& program, Progress& progress) {
   add_what(program, *options);
   add_where(program, *options);
   program
-      .add_option("FILE", options->settings.files,
-                  "VTK (.vti .vtr .vts .vtu .vtk .pvti .pvtr .pvts .pvtu), ExodusII (.ex2 .exo .e .g), an OpenFOAM "
-                  "case (its folder, or a .foam in it), NRRD (.nrrd .nhdr), NIfTI (.nii .nii.gz .hdr), NumPy (.npy); "
-                  "of PLOT3D two, the grid and its q")
+      .add_option(
+          "FILE", options->settings.files,
+          "VTK (.vti .vtr .vts .vtu .vtk .pvti .pvtr .pvts .pvtu .vtm .pvd), ExodusII (.ex2 .exo .e .g), an OpenFOAM "
+          "case (its folder, or a .foam in it), NRRD (.nrrd .nhdr), NIfTI (.nii .nii.gz .hdr), NumPy (.npy); "
+          "of PLOT3D two, the grid and its q")
       ->required()
       ->expected(1, 2)
       ->option_text("FILE...");

@@ -44,6 +44,8 @@ const std::vector<KindFacts>& kinds() {
       {VtkKind::unstructured_pieces, "a VTK unstructured grid in pieces", "PUnstructuredGrid", {".pvtu"}},
       {VtkKind::exodus, "an ExodusII file", nullptr, {".ex2", ".exo", ".e", ".g"}},
       {VtkKind::openfoam, "an OpenFOAM case", nullptr, {".foam"}},
+      {VtkKind::blocks, "a VTK multi-block file", "vtkMultiBlockDataSet", {".vtm"}},
+      {VtkKind::time_series, "a ParaView collection", "Collection", {".pvd"}},
   };
   return table;
 }
@@ -239,6 +241,9 @@ VtkKind checked_kind(const fs::path& path) {
   const std::optional<VtkKind> promised = promised_kind(path), found = kind_of_contents(path, head);
   if (head.empty() && promised != VtkKind::openfoam) fail(path, "is empty; write it again");
   if (!found && promised) fail(path, std::string("is not ") + facts_of(*promised).text + ", as its ending says");
+  const std::string ending = lower_case_ending(path);
+  if (ending == ".xdmf" || ending == ".xmf" || ending == ".cgns")
+    fail(path, "is a file of XDMF or CGNS, which is not read; open it in ParaView and save it as .vtu or .vtm");
   if (!found)
     fail(path,
          "is no file of VTK, ExodusII or OpenFOAM, nor named as NRRD (.nrrd), NIfTI (.nii) or NumPy (.npy); PLOT3D "

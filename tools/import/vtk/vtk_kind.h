@@ -20,6 +20,8 @@ enum class VtkKind {
   unstructured_pieces,
   exodus,
   openfoam,
+  blocks,       ///< .vtm, which names files of the kinds above.
+  time_series,  ///< .pvd, which names files of the kinds above, also .vtm.
 };
 
 /// The kind of a file, or of a folder (an OpenFOAM case).

@@ -23,7 +23,10 @@
 #include <vtkXMLStructuredGridReader.h>
 #include <vtkXMLUnstructuredGridReader.h>
 
+#include "base/errors.h"
+#include "base/text.h"
 #include "tools/import/vtk/silent_stderr.h"
+#include "tools/import/vtk/vtk_collection.h"
 #include "tools/import/vtk/vtk_geometry.h"
 #include "tools/import/vtk/vtk_kind.h"
 #include "tools/import/vtk/vtk_messages.h"
@@ -126,8 +129,29 @@ vtkSmartPointer<vtkDataObject> read_kind(VtkKind kind, const Path& path) {
       return read_exodus(path);
     case VtkKind::openfoam:
       return read_openfoam(path);
+    case VtkKind::blocks:
+    case VtkKind::time_series:
+      break;  // read_data_sets reads them file by file.
   }
   throw std::logic_error("read_kind: unknown kind");
+}
+
+/// The sound data sets with cells of a file, or of the files that it names.
+DataSets read_data_sets(VtkKind kind, const Path& path, const VtkMessages& messages) {
+  DataSets sets;
+  if (kind != VtkKind::blocks && kind != VtkKind::time_series) {
+    sets = data_sets_in(read_kind(kind, path));
+    messages.throw_error(path);
+    for (vtkDataSet* const set : sets) check_geometry(*set, path);
+    return sets;
+  }
+  for (const Path& file : collection_files(path)) {
+    const VtkKind kind_of_file = vtk_kind(file);
+    if (kind_of_file >= kind) fail(path, "names the collection " + escaped(file.string()) + "; import that one");
+    const DataSets more = read_data_sets(kind_of_file, file, messages);
+    sets.insert(sets.end(), more.begin(), more.end());
+  }
+  return sets;
 }
 
 /// Names the components, so that the user need not give the order. VTK has already reordered OpenFOAM's symmTensors.
@@ -150,10 +174,7 @@ vtkSmartPointer<vtkDataSet> read_vtk_source(const Path& path) {
   const SilentStderr silent;
   vtkSmartPointer<vtkDataSet> result;
   try {
-    const DataSets pieces = data_sets_in(read_kind(kind, path));
-    messages.throw_error(path);
-    for (vtkDataSet* const piece : pieces) check_geometry(*piece, path);
-    result = one_data_set(pieces);
+    result = one_data_set(read_data_sets(kind, path, messages));
   } catch (const std::bad_alloc&) {
     throw std::runtime_error(path.string() + ": is damaged, or too large: it announces more than memory holds");
   }

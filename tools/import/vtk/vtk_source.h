@@ -12,6 +12,7 @@ namespace tensorray {
 
 /// Reads a data set. Several blocks or pieces become one unstructured grid, whose points are merged where they meet.
 ///   .vtk (legacy)  .vti .vtr .vts .vtu  .pvti .pvtr .pvts .pvtu  .ex2 .exo .e .g (ExodusII: last time step)
+///   .vtm (blocks)  .pvd (ParaView's collection: last time)  of the files above
 ///   .foam, controlDict or a folder with system/controlDict (OpenFOAM: last time step, internal mesh)
 /// OpenFOAM stores fields at cells; VTK adds point arrays of the same names with the mean of the cells. A symmTensor
 /// (xx xy xz yy yz zz in OpenFOAM's files) is read in VTK's order, with its components named XX YY ZZ XY YZ XZ. A
