@@ -13,6 +13,9 @@
 
 namespace tensorray {
 
+class Follower;
+class Leader;
+
 /// How a run keeps its work.
 struct RunKeeping {
   bool is_on = true;                 ///< Whether there are checkpoints.
@@ -25,7 +28,9 @@ struct RunKeeping {
 
 struct RenderRun {
   RunKeeping keeping;
+  Leader* leader = nullptr;          ///< Other processes that render, too; null: there are none.
   unsigned threads = 0;              ///< Number of threads; 0: all.
+  bool skip_existing = false;        ///< Leave out frames of which all files exist, but no checkpoint.
   bool quiet = false;                ///< Print only errors.
   std::filesystem::path statistics;  ///< JSON file for the statistics; empty: none.
   std::filesystem::path scene_copy;  ///< File for the scene with its changes; empty: none.
@@ -40,11 +45,16 @@ void render_scene(const std::filesystem::path& scene_file, const SceneChanges& c
                   Progress& progress);
 
 /// Renders frames of a scene (see set_frame), one after the other. The scale and the direction `auto` are those of the
-/// first frame. A field that does not change is loaded once.
-/// @param skip_existing  Leaves out frames of which all files exist, but no checkpoint.
+/// first frame. A field that does not change is loaded once. Where there are other ranks, and the method's work is not
+/// divided, each takes the next frame.
 /// @throw as render_scene; SceneError if the names of files do not count frames, so that one would replace another.
 void render_frames(const std::filesystem::path& scene_file, SceneChanges changes, const std::vector<int>& frames,
-                   bool skip_existing, const RenderRun& run, Progress& progress);
+                   const RenderRun& run, Progress& progress);
+
+/// Renders what rank 0 asks for, which calls render_scene or render_frames with the same arguments, until it has no
+/// more: units of its scenes, or frames. @throw as render_scene.
+void follow(const std::filesystem::path& scene_file, const SceneChanges& changes, const RenderRun& run,
+            Follower& follower, Progress& progress);
 
 /// Makes the pictures of a scene of work that is done. The work must be all of it, and that of the scene.
 /// @throw as render_scene.

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <chrono>
 #include <stdexcept>
+#include <utility>
 
 #include <fmt/format.h>
 
@@ -70,10 +71,13 @@ void WorkKeeper::run() {
   const std::chrono::duration<double> tick(settings_.interval > 0 ? std::min(longest_tick, settings_.interval / 2)
                                                                   : longest_tick);
   Clock::time_point written = Clock::now(), shown = written;
+  bool is_cancelled = false;
   std::unique_lock lock(waiting_);
   while (!wake_.wait_for(lock, tick, [this] { return ends_; })) {
     lock.unlock();
     begin();
+    // Soon after SIGTERM, mpirun and queues kill a process, which may still be busy with units.
+    if (settings_.cancelled && *settings_.cancelled && !std::exchange(is_cancelled, true)) write();
     const bool is_asked = take_picture_request();
     if (is_asked || (settings_.watch > 0 && seconds_since(shown) > settings_.watch)) {
       work_.picture_wanted = true;

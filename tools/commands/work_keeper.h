@@ -2,6 +2,7 @@
 /// @file tools/commands/work_keeper.h
 /// Checkpoints of a render while it runs.
 
+#include <atomic>
 #include <condition_variable>
 #include <filesystem>
 #include <mutex>
@@ -19,6 +20,8 @@ struct KeepSettings {
   double interval = 60;        ///< Seconds between checkpoints; 0: only those that are asked for.
   double watch = 0;            ///< Seconds between pictures of what there is so far; 0: only those that are asked for.
   bool quiet = false;
+  const std::atomic<bool>* cancelled =
+      nullptr;  ///< When it becomes true, a checkpoint is written at once; may be null.
 };
 
 /// While it lives, a thread writes the work of a render to a checkpoint, and asks the work for pictures, after each
