@@ -182,6 +182,12 @@ void add_render_command(CLI::App& program, Progress& progress) {
   command->add_option(
       "--shard", options->shard,
       "K/N: do part K of N of the work, from 1 to N, and write it to the file of -o, for `tensorray merge`");
+  command
+      ->add_option("--memory", options->run.memory,
+                   "Bound of what is in memory, as 8G or 500M: a field that is larger is kept on the disk of the "
+                   "pictures, and read from there in parts")
+      ->transform(CLI::AsSizeValue(false))
+      ->option_text("SIZE");
   command->add_flag("--watch", options->run.keeping.watch, "Keep the pictures up to date while they are rendered");
   command->add_option("--order", options->import.order, "Of the tensor's components, as for `tensorray import`")
       ->group("Import");

@@ -29,6 +29,7 @@
 #include "tools/commands/work_keeper.h"
 #include "tools/ranks/follower.h"
 #include "tools/ranks/leader.h"
+#include "volumes/grids/page_memory.h"
 
 namespace tensorray {
 namespace {
@@ -219,6 +220,12 @@ void check_names(const std::filesystem::path& scene_file, SceneChanges changes, 
                                 name.string())));
 }
 
+/// Pages of a field that is larger than the memory are on the disk of the result.
+void bound_memory_of(const RenderRun& run, const SceneDescription& description) {
+  if (run.memory > 0)
+    bound_memory(run.memory, std::filesystem::absolute(written_by(description, run).front()).parent_path());
+}
+
 /// Renders a frame of a sequence. @param job  Its number, and what its scene leaves open.
 void render_frame(const std::filesystem::path& scene_file, SceneChanges changes, const Json& job, const RenderRun& run,
                   std::optional<Scene>& loaded, Progress& progress) {
@@ -226,6 +233,7 @@ void render_frame(const std::filesystem::path& scene_file, SceneChanges changes,
   changes.frame = frame;
   SceneDescription description = read_scene(scene_file, changes);
   set_chosen(job, description);
+  bound_memory_of(run, description);
   const RenderRun with_number = at_frame(run, frame);
   const std::vector<std::filesystem::path> files = files_of(description, with_number);
   const auto exists = [](const std::filesystem::path& file) { return std::filesystem::exists(file); };
@@ -243,6 +251,7 @@ void render_units(const RankJob& job, const Json& order, const RenderRun& run, s
   const Json& origin = order.at("origin");
   SceneDescription description = read_scene_json(origin.at("scene"), order.at("scene_file").get<std::string>());
   set_chosen(origin, description);
+  bound_memory_of(run, description);
   Scene scene = load(description, loaded, progress);
   const std::string other = difference(origin, origin_of(scene));
   if (!other.empty())
@@ -260,6 +269,7 @@ void render_scene(const std::filesystem::path& scene_file, const SceneChanges& c
   const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, threads_of(run));
   set_image_threads(static_cast<int>(threads_of(run)));
   const SceneDescription description = read_scene(scene_file, changes);
+  bound_memory_of(run, description);
   const Method& method = description.integrator.method();
   if (run.leader && !method.is_divided())
     tell({fmt::format("note: the work of {} is one piece, which one rank does; mpirun divides a sequence (--frames)",
@@ -276,6 +286,7 @@ void render_frames(const std::filesystem::path& scene_file, SceneChanges changes
   check_names(scene_file, changes, frames, run);
   changes.frame = frames.front();
   const SceneDescription first = read_scene(scene_file, changes);
+  bound_memory_of(run, first);
   std::optional<Scene> loaded;
   if (!first.field.scale || !first.light.direction) loaded = load_scene(first, progress);
   const Eigen::Vector3d direction = loaded ? *loaded->description.light.direction : *first.light.direction;

@@ -29,6 +29,7 @@ struct RunKeeping {
 struct RenderRun {
   RunKeeping keeping;
   Leader* leader = nullptr;          ///< Other processes that render, too; null: there are none.
+  std::size_t memory = 0;            ///< What may be resident, in bytes; 0: without a bound.
   unsigned threads = 0;              ///< Number of threads; 0: all.
   bool skip_existing = false;        ///< Leave out frames of which all files exist, but no checkpoint.
   bool quiet = false;                ///< Print only errors.
