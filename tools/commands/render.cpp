@@ -14,6 +14,7 @@
 #include "tools/commands/commands.h"
 #include "tools/commands/imported_field.h"
 #include "tools/commands/render_scene.h"
+#include "tools/commands/tev_display.h"
 #include "tools/ranks/follower.h"
 #include "tools/ranks/leader.h"
 #include "tools/ranks/ranks.h"
@@ -116,6 +117,7 @@ void render(const RenderOptions& options, Leader* leader, Progress& progress) {
     throw std::invalid_argument("--order, --array and --gradient-of are for files that have to be imported");
   RenderRun run = options.run;
   run.leader = leader;
+  if (!run.keeping.display.empty()) check_display_address(run.keeping.display);
   if (!options.shard.empty()) take_shard(options.shard, changes, run.keeping);
   if (options.frames.empty()) return render_scene(options.scene, changes, run, progress);
   if (!run.scene_copy.empty()) throw std::invalid_argument("--save-scene: not for several frames");
@@ -182,6 +184,10 @@ void add_render_command(CLI::App& program, Progress& progress) {
   command->add_option(
       "--shard", options->shard,
       "K/N: do part K of N of the work, from 1 to N, and write it to the file of -o, for `tensorray merge`");
+  command
+      ->add_option("--display", options->run.keeping.display,
+                   "Show the picture in the viewer tev while it is rendered (14158)")
+      ->option_text("HOST:PORT");
   command
       ->add_option("--memory", options->run.memory,
                    "Bound of what is in memory, as 8G or 500M: a field that is larger is kept on the disk of the "

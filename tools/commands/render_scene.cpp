@@ -26,6 +26,7 @@
 #include "tools/command_line/run_and_report.h"
 #include "tools/command_line/tell.h"
 #include "tools/commands/run_outputs.h"
+#include "tools/commands/tev_display.h"
 #include "tools/commands/work_keeper.h"
 #include "tools/ranks/follower.h"
 #include "tools/ranks/leader.h"
@@ -34,7 +35,7 @@
 namespace tensorray {
 namespace {
 
-constexpr double watch_interval = 5;  // Seconds.
+constexpr double watch_interval = 5, display_interval = 1;  // Seconds.
 
 unsigned threads_of(const RenderRun& run) {
   return run.threads > 0 ? run.threads : std::max(1u, std::thread::hardware_concurrency());
@@ -61,6 +62,7 @@ KeepSettings keep_settings(const SceneDescription& description, const RenderRun&
   settings.file = checkpoint_of(description, run.keeping);
   settings.interval = run.keeping.interval;
   settings.watch = run.keeping.watch ? watch_interval : 0;
+  settings.display = run.keeping.display.empty() ? 0 : display_interval;
   settings.quiet = run.quiet;
   const Method& method = description.integrator.method();
   if (run.keeping.shard && !method.is_divided())
@@ -154,19 +156,24 @@ std::string run_statistics(const Scene& scene, const Statistics& statistics, dou
 void complete(const Scene& scene, RenderJob& job, OutputFiles files, const KeepSettings& keep, const RenderRun& run,
               Progress& progress) {
   std::optional<ProgressBar> bar(std::in_place, progress, run.quiet);
+  std::optional<TevDisplay> display;
+  if (!run.keeping.display.empty())
+    display.emplace(run.keeping.display, written_by(scene.description, run).front().filename().string());
+  const bool is_divided = scene.description.integrator.method().is_divided();
+  const SharedWork shared(is_divided ? run.leader : nullptr, scene, job.work, threads_of(run));
+  WorkKeeper keeper(scene, job.work, keep);
   job.show = [&](Render picture) {
-    if (run.keeping.shard) return;
+    if (display) display->show(picture.linear);
+    if (!keeper.take_file_request() || run.keeping.shard) return;
     try {
       write_so_far(std::move(picture), scene, job.work);
     } catch (const std::runtime_error& error) {
       tell({fmt::format("warning: no picture: {}", error.what())}, false);
     }
   };
-  const bool is_divided = scene.description.integrator.method().is_divided();
-  const SharedWork shared(is_divided ? run.leader : nullptr, scene, job.work, threads_of(run));
-  WorkKeeper keeper(scene, job.work, keep);
   Render result = render_or_keep(scene, progress, job, keeper, keep.file);
   bar.reset();  // Erase the bar before the notes are printed.
+  if (display) display->show(result.linear);
   if (job.work.stopping) end_early(std::move(result), scene, job.work, keeper, run, keep.file);
   for (const std::string& warning : result.warnings) tell({"warning: " + warning}, run.quiet);
   const auto start = Clock::now();

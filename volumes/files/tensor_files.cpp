@@ -322,7 +322,7 @@ std::vector<openvdb::CoordBBox> slabs_of(const std::filesystem::path& path, cons
   const double leaves = voxels / TensorBlock::voxels * static_cast<double>(sources.size());
   require_room(brick_part * voxel_bytes * voxels, leaf_bytes * leaves);
   const double slab = slab_part * static_cast<double>(*memory_bound()) / voxel_bytes;
-  const double width = std::clamp(slab / std::max(1.0, voxels) * (double{last} - first + 1), 8.0, 1e9);
+  const double width = std::clamp(slab / std::max(1.0, voxels) * (static_cast<double>(last) - first + 1), 8.0, 1e9);
   std::vector<CoordBBox> slabs;
   for (double x = (first >> 3) * 8.0; x <= last; x += std::floor(width / 8) * 8) {
     slabs.push_back(all);
