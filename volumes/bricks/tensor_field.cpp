@@ -88,6 +88,7 @@ void TensorField::make_bricks(const TensorGrid& grid, const GiveBack& give_back)
   for (std::size_t first = 0; first < bricks_.size();) {
     const std::size_t last = end_of_layer(bricks_, first + enough_bricks);
     tbb::parallel_for(first, last, [&](std::size_t i) {
+      make_room();
       strongest_[i] = make_brick(blocks, bricks_[i], floats_.get() + i * TensorBrick::stored_floats);
     });
     if (last < bricks_.size()) give_back(bricks_[last].x() * TensorBrick::cells);

@@ -6,6 +6,7 @@
 #include <stdexcept>
 #include <type_traits>
 
+#include <malloc.h>
 #include <tbb/parallel_for.h>
 
 #include "base/errors.h"
@@ -203,6 +204,7 @@ void add_blocks(const std::vector<Source>& sources, Blocks& blocks) {
   if constexpr (std::is_same_v<Blocks, TensorBlocks>) TensorBlocks::allocator_type::prepare(origins.size());
   blocks.resize(first + origins.size());
   tbb::parallel_for(std::size_t{0}, origins.size(), [&](std::size_t i) {
+    make_room();
     auto& block = blocks[first + i];
     block.origin = {origins[i].x(), origins[i].y(), origins[i].z()};
     for (const Source& source : sources)
@@ -305,7 +307,7 @@ std::vector<Source> sources_of(const VdbFile& file, const std::string& name, con
 std::vector<openvdb::CoordBBox> slabs_of(const std::filesystem::path& path, const std::vector<Source>& sources) {
   using openvdb::CoordBBox, openvdb::GridBase;
   CoordBBox all = CoordBBox::inf();
-  constexpr double voxel_bytes = 36, brick_part = 1.5, leaf_bytes = 200, slab_part = 0.25;
+  constexpr double voxel_bytes = 36, brick_part = 1.5, leaf_bytes = 700, slab_part = 0.08;
   double voxels = 0;
   openvdb::Int32 first = all.max().x(), last = all.min().x();
   for (const Source& source : sources) {
@@ -415,6 +417,7 @@ TensorGrid read_tensor_vdb(const std::filesystem::path& path, const std::string&
       for (const openvdb::CoordBBox& slab : slabs_of(path, sources)) {
         sources.clear();
         file = {};  // Before the next one is read.
+        malloc_trim(0);
         file = read_vdb(path, wanted, &slab);
         sources = sources_of(file, result.name, parts);
         add_blocks(sources, result.blocks);

@@ -1,10 +1,10 @@
 #include "volumes/grids/page_memory.h"
 
 #include <algorithm>
+#include <array>
 #include <chrono>
 #include <cstdint>
 #include <cstdlib>
-#include <fstream>
 #include <map>
 #include <mutex>
 #include <new>
@@ -24,14 +24,17 @@ namespace {
 
 constexpr std::size_t dropped_at_once = std::size_t{1} << 22;
 constexpr std::chrono::milliseconds pause(3);
+constexpr std::size_t least_bound = std::size_t{1} << 28;
 constexpr double high = 0.85, low = 0.75;  ///< Parts of the bound: pages are dropped at `high`, until it is `low`.
 
 /// What is resident of this process.
 std::size_t resident() {
-  std::ifstream file("/proc/self/statm");
-  std::size_t size = 0, pages = 0;
-  file >> size >> pages;
-  return pages * static_cast<std::size_t>(sysconf(_SC_PAGESIZE));
+  static const int file = open("/proc/self/statm", O_RDONLY | O_CLOEXEC);
+  std::array<char, 128> text{};
+  if (pread(file, text.data(), text.size() - 1, 0) <= 0) return 0;
+  char* second = nullptr;
+  std::strtoull(text.data(), &second, 10);
+  return std::strtoull(second, nullptr, 10) * static_cast<std::size_t>(sysconf(_SC_PAGESIZE));
 }
 
 std::string text_of(double bytes) { return bytes_text(bytes); }
@@ -60,10 +63,16 @@ class PageStore {
 
   const std::filesystem::path& folder() const { return folder_; }
 
+  void make_room() {
+    if (!is_near()) return;
+    const std::lock_guard lock(mutex_);
+    if (is_near()) drop_pages();
+  }
+
   /// Replaces memory by pages of the file.
   void place(char* memory, std::size_t bytes) {
     const std::lock_guard lock(mutex_);
-    make_room();
+    if (is_near()) drop_pages();
     if (resident() > bound_)
       throw std::runtime_error("--memory " + text_of(static_cast<double>(bound_)) +
                                ": what is beside the field takes " + text_of(static_cast<double>(resident())) +
@@ -95,17 +104,17 @@ class PageStore {
     off_t offset;
   };
 
+  bool is_near() const { return static_cast<double>(resident()) > high * static_cast<double>(bound_); }
+
   void watch() {
     for (;;) {
       std::this_thread::sleep_for(pause);
-      const std::lock_guard lock(mutex_);
       make_room();
     }
   }
 
   /// Drops pages in turn, as a clock does: those that are used come back soon. The file keeps their bytes.
-  void make_room() {
-    if (resident() < high * static_cast<double>(bound_)) return;
+  void drop_pages() {
     std::size_t dropped = 0, all = 0;
     for (const auto& [memory, region] : regions_) all += region.bytes;
     while (dropped < all && resident() > low * static_cast<double>(bound_)) {
@@ -138,14 +147,18 @@ PageStore* store = nullptr;
 
 void bound_memory(std::size_t bytes, const std::filesystem::path& folder) {
   if (store) return;
-  const std::size_t now = resident();
-  if (now > bytes / 2)
-    throw std::runtime_error("--memory " + text_of(static_cast<double>(bytes)) + ": the program alone takes " +
-                             text_of(static_cast<double>(now)) + "; give twice that at least");
+  if (bytes < least_bound)
+    throw std::invalid_argument("--memory " + text_of(static_cast<double>(bytes)) +
+                                ": a render takes as much beside its field; give " +
+                                text_of(static_cast<double>(least_bound)) + " at least");
   store = new PageStore(bytes, folder);
 }
 
 std::optional<std::size_t> memory_bound() { return store ? std::optional(store->bound()) : std::nullopt; }
+
+void make_room() {
+  if (store) store->make_room();
+}
 
 void require_room(double stored, double needed) {
   if (!store) return;

@@ -12,11 +12,16 @@ namespace tensorray {
 /// From now on, what is resident of this process, with everything, stays below `bytes`: pages of fields are in a file
 /// without a name in `folder`, and return from there when they are needed. The bound holds but for what is used within
 /// a few milliseconds. Called once, before fields are made; later calls have no effect.
-/// @throw std::runtime_error if the folder cannot have such a file, or the process takes too much of it already.
+/// @throw std::invalid_argument if the bound is below what a render takes beside its field; std::runtime_error if the
+/// folder cannot have such a file.
 void bound_memory(std::size_t bytes, const std::filesystem::path& folder);
 
 /// The bound, if there is one.
 std::optional<std::size_t> memory_bound();
+
+/// Waits, where there is a bound and it is near, until there is room below it. Code that goes through a whole field
+/// calls it from time to time: it is faster than what watches the bound. Any thread may call it.
+void make_room();
 
 /// Checks, where there is a bound, that a field can be loaded within it.
 /// @param stored  Bytes of the field's pages. @param resident  Bytes that it needs beside them.

@@ -7,6 +7,8 @@
 
 #include <tbb/parallel_for.h>
 
+#include "volumes/grids/page_memory.h"
+
 namespace tensorray {
 namespace {
 
@@ -68,6 +70,7 @@ TensorGrid dense_grid(const Eigen::AlignedBox3i& box, const Eigen::Affine3d& to_
   tbb::parallel_for(std::size_t{0}, grid.blocks.size(), [&](std::size_t i) {
     const Eigen::Vector3i block(static_cast<int>(i / slice), static_cast<int>(i / count.z() % count.y()),
                                 static_cast<int>(i % count.z()));
+    make_room();
     grid.blocks[i].origin = first + size * block;
     fill(grid.blocks[i], box, value);
   });
@@ -77,6 +80,7 @@ TensorGrid dense_grid(const Eigen::AlignedBox3i& box, const Eigen::Affine3d& to_
 std::size_t remove_non_finite(TensorGrid& grid) {
   std::atomic<std::size_t> removed{0};
   tbb::parallel_for(std::size_t{0}, grid.blocks.size(), [&](std::size_t i) {
+    make_room();
     TensorBlock& block = grid.blocks[i];
     if (has_only_finite(block)) return;
     const std::size_t before = block.active.count();
@@ -99,6 +103,7 @@ double asymmetry(const TensorGrid& grid) {
   };
   std::vector<Sums> blocks(grid.blocks.size());
   tbb::parallel_for(std::size_t{0}, blocks.size(), [&](std::size_t i) {
+    make_room();
     const TensorBlock& block = grid.blocks[i];
     for (int offset = 0; offset < TensorBlock::voxels; ++offset) {
       if (!block.active[offset]) continue;
