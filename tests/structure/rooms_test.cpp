@@ -82,7 +82,6 @@ const std::vector<Room> rooms{
 
     {"tools/command_line", {}},
     {"tools/ranks", {}},
-    {"tools/ranks/mpi", {"tools/ranks"}},
     {"tools/import/lattices", {"volumes/*"}},
     {"tools/import/meshes", {"tools/import/lattices", "volumes/*"}},
     {"tools/import/vtk", {"tools/import/lattices", "volumes/*"}},

@@ -113,6 +113,7 @@ Eigen::AlignedBox3d TensorField::world_box() const { return box_of(corners()); }
 double TensorField::greatest_norm() const {
   double greatest = 0;
   for (std::size_t i = 0; i < brick_count(); ++i) {
+    make_room();
     const TensorBrick brick = stored(i);
     for (int voxel = 0; voxel < TensorBrick::voxels; ++voxel)
       greatest = std::max(greatest, brick.tensor(voxel).squaredNorm());

@@ -307,7 +307,7 @@ std::vector<Source> sources_of(const VdbFile& file, const std::string& name, con
 std::vector<openvdb::CoordBBox> slabs_of(const std::filesystem::path& path, const std::vector<Source>& sources) {
   using openvdb::CoordBBox, openvdb::GridBase;
   CoordBBox all = CoordBBox::inf();
-  constexpr double voxel_bytes = 36, brick_part = 1.5, leaf_bytes = 700, slab_part = 0.08;
+  constexpr double voxel_bytes = 36, brick_part = 1.5, leaf_bytes = 700, slab_part = 0.12;
   double voxels = 0;
   openvdb::Int32 first = all.max().x(), last = all.min().x();
   for (const Source& source : sources) {

@@ -39,13 +39,17 @@ TensorBlocks make_blocks(std::size_t count) {
 
 std::size_t TensorGrid::active_voxels() const {
   std::size_t count = 0;
-  for (const TensorBlock& block : blocks) count += block.active.count();
+  for (const TensorBlock& block : blocks) {
+    make_room();
+    count += block.active.count();
+  }
   return count;
 }
 
 Eigen::AlignedBox3i TensorGrid::active_box() const {
   Eigen::AlignedBox3i box;
   for (const TensorBlock& block : blocks) {
+    make_room();
     const Eigen::Vector3i last = block.origin + Eigen::Vector3i::Constant(TensorBlock::size - 1);
     if (box.contains(block.origin) && box.contains(last)) continue;
     if (block.active.all()) {
@@ -92,7 +96,10 @@ std::size_t remove_non_finite(TensorGrid& grid) {
     removed += before - block.active.count();
   });
   grid.blocks.erase(std::remove_if(grid.blocks.begin(), grid.blocks.end(),
-                                   [](const TensorBlock& block) { return block.active.none(); }),
+                                   [](const TensorBlock& block) {
+                                     make_room();
+                                     return block.active.none();
+                                   }),
                     grid.blocks.end());
   return removed;
 }
