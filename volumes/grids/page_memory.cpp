@@ -23,9 +23,9 @@ namespace tensorray {
 namespace {
 
 constexpr std::size_t dropped_at_once = std::size_t{1} << 22;
-constexpr std::chrono::milliseconds pause(3);
+constexpr std::chrono::milliseconds pause(1);
 constexpr std::size_t least_bound = std::size_t{1} << 28;
-constexpr double high = 0.85, low = 0.75;  ///< Parts of the bound: pages are dropped at `high`, until it is `low`.
+constexpr double high = 0.75, low = 0.55;  ///< Parts of the bound: pages are dropped at `high`, until it is `low`.
 
 /// What is resident of this process.
 std::size_t resident() {
