@@ -24,12 +24,14 @@ TEST_F(Memory, AFieldOfFourTimesTheBoundGivesTheSameFiles) {
   run_well({"make", "point_load", "-o", "field.vdb", "--resolution", "280"});
   write("scene.json", scene(R"({"file": "field.vdb", "eigenvalues": "raw", "scale": 4})"));
   run_well({"render", "scene.json", "-q", "-o", "all.exr", "--stats", "all.json"});
-  run_well({"render", "scene.json", "-q", "-o", "part.exr", "--stats", "part.json", "--memory", "256M"});
+  run_well(
+      {"render", "scene.json", "-q", "-o", "part.exr", "--stats", "part.json", "--memory", "256M", "--threads", "1"});
   EXPECT_TRUE(read_file(in_folder("all.exr")) == read_file(in_folder("part.exr")));
   const nlohmann::json all = read_json("all.json"), part = read_json("part.json");
   EXPECT_GE(part["field"]["memory_bytes"], 4 * bound);
   EXPECT_GT(all["peak_memory_bytes"], 4 * bound);
-  EXPECT_LE(part["peak_memory_bytes"], bound);
+  constexpr double of_thread = 64.0 * (1 << 20);  // What the rays of a batch touch before pages are dropped.
+  EXPECT_LE(part["peak_memory_bytes"], bound + of_thread);
   RecordProperty("seconds_without", all["seconds"].dump());
   RecordProperty("seconds_with", part["seconds"].dump());
   for (const std::string& name : files()) EXPECT_NE(name.rfind(".tensorray", 0), 0u) << name;

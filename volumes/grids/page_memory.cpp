@@ -166,10 +166,10 @@ void require_room(double stored, double needed) {
     throw std::runtime_error("--memory: the field needs " + text_of(stored) + " on the disk of " +
                              store->folder().string() + ", where " + text_of(store->free_bytes()) + " are free");
   const double all = static_cast<double>(resident()) + needed;
-  if (all > low * static_cast<double>(store->bound()))
+  if (all > high * static_cast<double>(store->bound()))
     throw std::runtime_error("--memory " + text_of(static_cast<double>(store->bound())) +
                              ": the program and the tables of the field take " + text_of(all) + "; give " +
-                             text_of(all / low) + " at least");
+                             text_of(all / high) + " at least");
 }
 
 void* map_pages(std::size_t bytes, std::size_t alignment) {
