@@ -26,8 +26,8 @@ struct KeptJob {
 };
 
 std::vector<KeptJob> kept_jobs(bool quick) {
-  const int side = quick ? 32 : 512, samples = quick ? 16 : 96;
-  const double photons = quick ? 2e4 : 1e6;
+  const int side = quick ? 32 : 512, samples = quick ? 16 : 24;
+  const double photons = quick ? 2e4 : 1.2e5;
   const Json field = {{"generate", {{"kind", "point_load"}, {"resolution", quick ? 17 : 65}}}, {"scale", 5}};
   return {{fmt::format("path tracing, {}², 32 bands", side),
            {{"field", field},

@@ -24,7 +24,6 @@ namespace {
 
 constexpr std::ios::iostate any_failure = std::ios::failbit | std::ios::badbit | std::ios::eofbit;
 constexpr std::size_t stream_buffer = 1 << 20;
-constexpr std::size_t skipping_buffer = 1 << 12;  // A stream fills its buffer anew wherever it skips voxels.
 
 // OpenVDB's header: magic number, versions of the format (4 bytes) and of the library (8 bytes), a flag, then the
 // unique tag as text.
@@ -38,7 +37,7 @@ constexpr std::streamoff version_offset = 8, tag_offset = 21;
 class Reader : private openvdb::io::Archive {
  public:
   Reader(const std::filesystem::path& path, const openvdb::CoordBBox* box)
-      : path_(path), box_(box), buffer_(box ? skipping_buffer : stream_buffer) {
+      : path_(path), box_(box), buffer_(stream_buffer) {
     if (std::filesystem::is_directory(path)) fail(path, "is a folder; name an OpenVDB file");
     in_.rdbuf()->pubsetbuf(buffer_.data(), static_cast<std::streamsize>(buffer_.size()));
     errno = 0;

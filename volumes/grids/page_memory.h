@@ -11,7 +11,8 @@ namespace tensorray {
 
 /// From now on, what is resident of this process, with everything, stays below `bytes`: pages of fields are in a file
 /// without a name in `folder`, and return from there when they are needed. The bound holds but for what is used within
-/// a few milliseconds. Called once, before fields are made; later calls have no effect.
+/// a few milliseconds, up to some 64 MB for each thread. Called once, before fields are made; later calls have no
+/// effect.
 /// @throw std::invalid_argument if the bound is below what a render takes beside its field; std::runtime_error if the
 /// folder cannot have such a file.
 void bound_memory(std::size_t bytes, const std::filesystem::path& folder);
