@@ -38,7 +38,7 @@ WorkFile WorkKeeper::work_file() {
 
 bool WorkKeeper::write() {
   const std::lock_guard lock(writing_);
-  if (settings_.file.empty()) return false;
+  if (settings_.file.empty() || is_over_) return false;
   try {
     const WorkFile file = work_file();
     if (file.units.empty()) return false;
@@ -53,6 +53,7 @@ bool WorkKeeper::write() {
 
 void WorkKeeper::remove() {
   const std::lock_guard lock(writing_);
+  is_over_ = true;  // The thread may be about to write.
   std::error_code error;
   if (!settings_.file.empty()) std::filesystem::remove(settings_.file, error);
 }

@@ -39,7 +39,7 @@ class WorkKeeper {
   /// Writes the checkpoint now. @return whether there is one of this work, new or old.
   bool write();
 
-  /// Removes the checkpoint: the work is in other files.
+  /// Removes the checkpoint, and writes no other: the work is in other files.
   void remove();
 
   /// Whether the picture that was asked for shall be in files; else it is for a display alone. Forgets it.
@@ -57,7 +57,7 @@ class WorkKeeper {
   const KeepSettings& settings_;
   std::mutex writing_;
   std::optional<Json> origin_;
-  bool is_written_ = false, has_failed_ = false;
+  bool is_written_ = false, has_failed_ = false, is_over_ = false;
   std::atomic<bool> files_wanted_{false};
 
   std::mutex waiting_;
