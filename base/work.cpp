@@ -14,6 +14,11 @@ void Work::begin(std::size_t units) {
   units_.resize(units);
 }
 
+std::size_t Work::size() const {
+  const std::lock_guard lock(mutex_);
+  return units_.size();
+}
+
 bool Work::wants(std::size_t unit) const {
   const std::lock_guard lock(mutex_);
   return is_in_part(unit) && !units_.at(unit).done;

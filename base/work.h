@@ -6,6 +6,7 @@
 
 #include <atomic>
 #include <cstddef>
+#include <functional>
 #include <memory>
 #include <mutex>
 #include <string>
@@ -36,6 +37,9 @@ class Work {
 
   bool is_in_part(std::size_t unit) const { return unit % part_.count == part_.index; }
 
+  /// The number of units; 0 before `begin`. Any thread may call this.
+  std::size_t size() const;
+
   /// Whether a unit is in the part and is not done. Any thread may call this, `state`, `keep` and `units`.
   bool wants(std::size_t unit) const;
 
@@ -49,6 +53,11 @@ class Work {
   std::vector<WorkUnit> units() const;
 
   WorkPart part() const { return part_; }
+
+  /// Set from outside, before the work begins, where other processes do units, too: waits for the units that this one
+  /// is to do next, until there are none left. Units that it gave and that are not done, it gives again. Empty: this
+  /// process does all units that are wanted.
+  std::function<std::vector<std::size_t>()> next;
 
   std::atomic<bool> stopping{false};        ///< Set from outside: the work ends soon, with the units that it has.
   std::atomic<double> fraction{0};          ///< Set by the work: how much of it is done.

@@ -59,6 +59,13 @@ if(TENSORRAY_PYTHON)
   find_package(pybind11 2.10 REQUIRED)
 endif()
 
+if(TENSORRAY_MPI AND NOT TENSORRAY_SANITIZE)  # MPI itself would have to be built with the sanitizers.
+  find_package(MPI QUIET COMPONENTS C)
+  if(NOT MPI_C_FOUND)
+    message(STATUS "No MPI: mpirun cannot divide renders")
+  endif()
+endif()
+
 # Libraries that the benchmark compares with, if they are installed.
 if(TENSORRAY_BENCHMARK)
   find_path(NanoVDB_INCLUDE_DIR nanovdb/NanoVDB.h)

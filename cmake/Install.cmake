@@ -1,10 +1,13 @@
 # What `cmake --install build/release` installs. Its components are those of the packages (cmake/Packages.cmake):
-# programs, development (headers of libtensorray), python.
+# programs, development (headers of libtensorray), mpi, python.
 include(GNUInstallDirs)
 
 # tensorray_pictures is loaded by programs, by libtensorray and by the Python module.
 set(private_folder ${CMAKE_INSTALL_LIBDIR}/tensorray)
 install(TARGETS tensorray_pictures LIBRARY DESTINATION ${private_folder} COMPONENT programs)
+if(TARGET tensorray_mpi)
+  install(TARGETS tensorray_mpi LIBRARY DESTINATION ${private_folder} COMPONENT mpi)
+endif()
 foreach(program tensorray tensorray-import tensorray-view)
   if(TARGET ${program})
     set_target_properties(${program} PROPERTIES INSTALL_RPATH "$ORIGIN/../${private_folder}")

@@ -6,6 +6,7 @@
 #include "integrators/bending/bending.h"
 #include "integrators/bending/scalar_tracer.h"
 #include "integrators/packets/packet_tracer.h"
+#include "volumes/grids/page_memory.h"
 
 namespace tensorray {
 namespace {
@@ -34,6 +35,7 @@ bool has_differentials(const RayBatch& batch) { return !batch.differentials.empt
 
 void prepare(const BendingSettings& settings, RayBatch& batch) {
   check(settings);
+  make_room();  // Rays bring pages of a field that has a bound into memory.
   if (has_differentials(batch) && batch.differentials.size() != batch.size())
     throw std::invalid_argument("a batch must have differentials for every ray or for none");
   batch.end.resize(batch.size());

@@ -79,6 +79,7 @@ class Rendering {
   std::vector<std::size_t> wanted() const;
   double mean_luminance() const;
   void count_samples();
+  void count_tiles();
   std::optional<FirstSurface> shade(int x, int y, PathSampler& sampler, RayShader& shader, Vector2d& offset) const;
   void pass(const std::vector<std::size_t>& tiles);
   void extend(std::size_t number, Worker& worker);
@@ -107,8 +108,9 @@ SurfacePicture Rendering::run() {
   if (settings_.noise_threshold > 0) floor_ = least_luminance * mean_luminance();
   count_samples();
   while (!work_.stopping) {
-    const std::vector<std::size_t> tiles = wanted();
+    const std::vector<std::size_t> tiles = work_.next ? work_.next() : wanted();
     if (tiles.empty()) break;
+    if (work_.next) count_tiles();
     pass(tiles);
   }
   return picture();
@@ -143,6 +145,16 @@ void Rendering::count_samples() {
     for (const PixelState& pixel : tile.pixels)
       finished_samples_ += pixel.done != 0 ? most : static_cast<std::uint64_t>(pixel.samples);
   }
+}
+
+/// For the progress where other processes render tiles, too: counts the tiles of the part that are done.
+void Rendering::count_tiles() {
+  std::uint64_t done = 0, all = 0;
+  for (std::size_t number = 0; number < tiles_; ++number) {
+    all += work_.is_in_part(number) ? 1 : 0;
+    done += work_.is_in_part(number) && !work_.wants(number) ? 1 : 0;
+  }
+  if (all > 0) finished_samples_ = total_samples_ * done / all;
 }
 
 /// A tile as it is kept.

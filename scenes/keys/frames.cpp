@@ -113,16 +113,6 @@ std::vector<int> parse_frames(const std::string& text) {
   return frames;
 }
 
-bool counts_frames(const std::string& name) { return name.find('#') != std::string::npos; }
-
-std::string numbered(std::string text, int frame) {
-  for (std::size_t at = text.find('#'); at != std::string::npos; at = text.find('#')) {
-    const std::size_t end = std::min(text.find_first_not_of('#', at), text.size());
-    text.replace(at, end - at, fmt::format("{:0{}d}", frame, end - at));
-  }
-  return text;
-}
-
 void set_frame(Json& scene, int frame, const SceneSource& source) {
   for_each_value(scene, "", [&](Json& value, const std::string& pointer) {
     value = value.is_string() ? Json(numbered(value.get<std::string>(), frame))

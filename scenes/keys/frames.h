@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "base/numbered_name.h"
 #include "scenes/keys/json_reader.h"
 #include "scenes/keys/scene_source.h"
 
@@ -13,13 +14,6 @@ namespace tensorray {
 /// The frames of "7", "1-240" or "1-240x2" (every second one), in order; from 0 to 10^9.
 /// @throw std::invalid_argument if the text does not have that form, or names more than a million frames.
 std::vector<int> parse_frames(const std::string& text);
-
-/// `text` with each run of the character # replaced by the frame's number, which has at least as many digits:
-/// "flow.####.vdb" becomes "flow.0007.vdb".
-std::string numbered(std::string text, int frame);
-
-/// Whether a name has a number that counts frames.
-bool counts_frames(const std::string& name);
 
 /// Replaces, everywhere in a scene, keyframes by their value at a frame, and # in texts by the frame's number.
 ///

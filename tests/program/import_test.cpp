@@ -235,5 +235,35 @@ TEST_F(Import, OpenFoamsLastTimeStep) {
   EXPECT_EQ(import({"case", "--gradient-of", "U", "--resolution", "4"}, "flow")["name"], "U_gradient");
 }
 
+TEST_F(Import, StepsOfTime) {
+  OpenFoamCase::write(in_folder("case"));
+  const std::vector<std::string> sigma{"import", "case",         "--array", "sigma", "--order",
+                                       "vtk",    "--resolution", "4",       "-q"};
+  const auto steps = [&](const std::string& which, const std::string& output) {
+    std::vector<std::string> arguments = sigma;
+    arguments.insert(arguments.end(), {"--steps", which, "-o", output});
+    return run(arguments);
+  };
+  EXPECT_EQ(steps("all", "all.##.vdb").status, 0);
+  EXPECT_EQ(steps("first", "first.vdb").status, 0);
+  EXPECT_EQ(steps("last", "last.vdb").status, 0);
+  EXPECT_EQ(steps("2", "second.vdb").status, 0);
+  const auto bytes = [&](const std::string& name) { return read_file(in_folder(name)); };
+  EXPECT_FALSE(std::filesystem::exists(in_folder("all.03.vdb")));
+  EXPECT_TRUE(bytes("all.01.vdb") == bytes("first.vdb"));
+  EXPECT_TRUE(bytes("all.02.vdb") == bytes("last.vdb") && bytes("second.vdb") == bytes("last.vdb"));
+  EXPECT_FALSE(bytes("first.vdb") == bytes("last.vdb"));
+  const std::pair<const char*, const char*> wrong[] = {{"3", "there are 2 steps"},
+                                                       {"0", "a number from 1 on"},
+                                                       {"some", "a number from 1 on"},
+                                                       {"all", "flow.####.vdb"}};
+  for (const auto& [which, text] : wrong) {
+    const Outcome outcome = steps(which, "none.vdb");
+    EXPECT_NE(outcome.status, 0) << which;
+    EXPECT_NE(outcome.error.find(text), std::string::npos) << outcome.error;
+    EXPECT_FALSE(std::filesystem::exists(in_folder("none.vdb")));
+  }
+}
+
 }  // namespace
 }  // namespace tensorray

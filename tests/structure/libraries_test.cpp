@@ -54,6 +54,14 @@ TEST(Structure, ForeignFormatsStayInTheImporter) {
     }
 }
 
+/// So that programs start without MPI, and run where it is not installed.
+TEST(Structure, OnlyALibraryOfItsOwnUsesMpi) {
+  const std::regex include("#include <mpi");
+  for (const std::string& folder : top_folders())
+    for (const Line& line : lines_of(folder))
+      EXPECT_FALSE(std::regex_search(line.text, include) && line.file != "tools/ranks/mpi_ranks.cpp") << line.file;
+}
+
 TEST(Structure, LibrariesNeitherPrintNorExit) {
   const std::regex forbidden(R"(std::(cout|cerr|clog|exit|abort|quick_exit)\b|\b(printf|puts|perror)\(|fmt::print)");
   // Among the tools, only the importer and the viewer are libraries, without their programs.

@@ -81,6 +81,7 @@ const std::vector<Room> rooms{
     {"python/module", {"scenes/*", "integrators/*", "renderer/*", "volumes/*"}},
 
     {"tools/command_line", {}},
+    {"tools/ranks", {}},
     {"tools/import/lattices", {"volumes/*"}},
     {"tools/import/meshes", {"tools/import/lattices", "volumes/*"}},
     {"tools/import/vtk", {"tools/import/lattices", "volumes/*"}},
@@ -88,7 +89,7 @@ const std::vector<Room> rooms{
     {"tools/import/program", {"tools/import", "tools/import/vtk", "tools/command_line", "volumes/*"}},
     {"tools/viewer", {"scenes/*", "integrators/*", "renderer/*", "volumes/*"}},
     {"tools/viewer/program", {"tools/viewer", "tools/command_line", "renderer/*"}},
-    {"tools/commands", {"tools/command_line", "scenes/*", "integrators/*", "renderer/*", "volumes/*"}},
+    {"tools/commands", {"tools/command_line", "tools/ranks", "scenes/*", "integrators/*", "renderer/*", "volumes/*"}},
     {"tools", {"tools/commands", "tools/command_line"}},
     {"tools/benchmark", {"tools/command_line", "tools/viewer", "scenes/*", "integrators/*", "renderer/*", "volumes/*"}},
 };

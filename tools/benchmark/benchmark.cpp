@@ -23,6 +23,7 @@ constexpr const char* description =
     "  kernels  tensorray's kernels and those of other libraries, on the same fields, rays and step\n"
     "  loading  reading a file of 256³ voxels and making bricks from it\n"
     "  jobs     whole renders, from scene file to picture, by phase, with one thread and with all\n"
+    "  keeping  what checkpoints cost, and sums in a fixed order\n"
     "  caustics the error of the light on a plate, with the flow map and with photons\n"
     "  view     a live view: from a change to its first and its finished picture\n\n"
     "A sample is one look-up of a tensor, with the step that uses it. Numbers are medians of five repetitions; ratios "
@@ -48,6 +49,7 @@ Json measure(const CommandLine& line) {
   if (wanted("kernels")) results["kernels"] = measure_kernels(line.options, results["machine"]);
   if (wanted("loading")) results["loading"] = measure_loading(line.options, results["machine"]);
   if (wanted("jobs")) results["jobs"] = measure_jobs(line.options);
+  if (wanted("keeping")) results["keeping"] = measure_keeping(line.options);
   if (wanted("caustics")) results["caustics"] = measure_caustics(line.options);
   if (wanted("view")) results["view"] = measure_view(line.options);
   return results;
@@ -59,7 +61,7 @@ void run(int argc, char** argv) {
   CLI::App app(description, "tensorray_bench");
   app.add_flag("--json", line.json, "Print everything as JSON instead of tables");
   app.add_option("--only", line.only, "Measure only this part")
-      ->check(CLI::IsMember({"machine", "kernels", "loading", "jobs", "caustics", "view"}))
+      ->check(CLI::IsMember({"machine", "kernels", "loading", "jobs", "keeping", "caustics", "view"}))
       ->type_name("PART");
   app.add_flag("--quick", line.options.quick,
                "Tiny sizes, takes seconds: checks that everything works; the numbers mean nothing");

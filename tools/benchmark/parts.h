@@ -34,6 +34,10 @@ Json measure_loading(const Options& options, const Json& machine);
 /// @throw std::runtime_error if a program is not in the folder of this one, or fails.
 Json measure_jobs(const Options& options);
 
+/// Measures what it costs to keep work in checkpoints, and to make sums in a fixed order.
+/// @throw as measure_jobs.
+Json measure_keeping(const Options& options);
+
 /// Measures the error of the light on a plate, and the time for it, with the flow map and with photons.
 /// @throw as measure_jobs.
 Json measure_caustics(const Options& options);

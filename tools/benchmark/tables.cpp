@@ -131,6 +131,23 @@ std::string jobs_text(const Json& jobs) {
                            against.at("positions")[0].get<std::uint64_t>());
 }
 
+std::string keeping_text(const Json& keeping) {
+  std::vector<Row> rows{{"checkpoints", "without", "every", "with", "one takes", "of 60 s"}};
+  for (const Json& job : keeping.at("checkpoints"))
+    rows.push_back({job.at("name"), fmt::format("{:.2f} s", number(job, "seconds")),
+                    fmt::format("{:g} s", number(job, "interval")),
+                    fmt::format("{:.2f} s", number(job, "seconds_with_checkpoints")),
+                    fmt::format("{:.3f} s", number(job, "seconds_of_one")),
+                    fmt::format("{:.3f}%", 100 * number(job, "part_at_default_interval"))});
+  const Json& sums = keeping.at("determinism");
+  return table(rows) +
+         fmt::format(
+             "sums of photons in a fixed order: {:.1f} ns each; in any order, by atomic additions: {:.1f} ns; the "
+             "difference is {:.2f}% of {}; all of it would be {:.2f}%\n",
+             1e9 * number(sums, "seconds_of_photon_in_order"), 1e9 * number(sums, "seconds_of_photon_in_any_order"),
+             100 * number(sums, "part"), sums.at("job").get<std::string>(), 100 * number(sums, "most"));
+}
+
 std::string view_text(const Json& view) {
   std::vector<Row> rows{{"live view, seconds after a change", "pixels", "first picture", "pictures a second, dragging",
                          "finished picture", "of it: load", "trace", "light", "color", "encode"}};
@@ -180,6 +197,7 @@ std::string tables(const Json& results) {
   }
   if (results.contains("loading")) text += "\n" + loading_text(results.at("loading"));
   if (results.contains("jobs")) text += "\n" + jobs_text(results.at("jobs"));
+  if (results.contains("keeping")) text += "\n" + keeping_text(results.at("keeping"));
   if (results.contains("caustics")) text += "\n" + caustics_text(results.at("caustics"));
   if (results.contains("view")) text += "\n" + view_text(results.at("view"));
   return text;

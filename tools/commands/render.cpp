@@ -14,6 +14,10 @@
 #include "tools/commands/commands.h"
 #include "tools/commands/imported_field.h"
 #include "tools/commands/render_scene.h"
+#include "tools/commands/tev_display.h"
+#include "tools/ranks/follower.h"
+#include "tools/ranks/leader.h"
+#include "tools/ranks/ranks.h"
 
 namespace tensorray {
 namespace {
@@ -25,7 +29,6 @@ struct RenderOptions {
   std::string error;
   ImportChoices import;
   std::string frames, shard;
-  bool skip_existing = false;
   RenderRun run;
 };
 
@@ -72,6 +75,14 @@ void take_shard(const std::string& text, SceneChanges& changes, RunKeeping& keep
   changes.outputs.clear();
 }
 
+SceneChanges changes_of(const RenderOptions& options) {
+  SceneChanges changes = options.changes;
+  if (options.seed) changes.overrides.push_back(fmt::format("seed={}", *options.seed));
+  if (!options.error.empty())
+    changes.overrides.push_back(fmt::format("integrator.density.error={}", parse_part(options.error)));
+  return changes;
+}
+
 /// Renders another program's file. Its pictures are named after the file.
 void render_import(const std::string& file, SceneChanges changes, const RenderOptions& options, Progress& progress) {
   if (!options.frames.empty()) throw std::invalid_argument("--frames: import the files first, with `tensorray import`");
@@ -92,6 +103,50 @@ void render_import(const std::string& file, SceneChanges changes, const RenderOp
   RenderRun run = options.run;
   run.keeping.is_on = false;  // The field does not stay.
   render_scene(field.path(), changes, run, progress);
+}
+
+/// @param leader  Null: there are no other ranks.
+void render(const RenderOptions& options, Leader* leader, Progress& progress) {
+  SceneChanges changes = changes_of(options);
+  if (needs_import(options.scene)) {
+    if (leader) throw std::invalid_argument("mpirun: import the file first, with `tensorray import`");
+    return render_import(options.scene, changes, options, progress);
+  }
+  const ImportChoices& import = options.import;
+  if (!import.order.empty() || !import.array.empty() || !import.gradient_of.empty())
+    throw std::invalid_argument("--order, --array and --gradient-of are for files that have to be imported");
+  RenderRun run = options.run;
+  run.leader = leader;
+  if (!run.keeping.display.empty()) check_display_address(run.keeping.display);
+  if (!options.shard.empty()) take_shard(options.shard, changes, run.keeping);
+  if (options.frames.empty()) return render_scene(options.scene, changes, run, progress);
+  if (!run.scene_copy.empty()) throw std::invalid_argument("--save-scene: not for several frames");
+  render_frames(options.scene, changes, parse_frames(options.frames), run, progress);
+}
+
+/// Rank 0 checks everything, and says it; the others do what it asks for.
+void follow(const RenderOptions& options, Ranks& ranks, Progress& progress) {
+  Follower follower(ranks, progress, options.run.keeping.interval);
+  try {
+    follow(options.scene, changes_of(options), options.run, follower, progress);
+  } catch (const Cancelled&) {
+    throw CLI::RuntimeError(130);  // Without a word.
+  } catch (const std::exception& error) {
+    throw std::runtime_error(fmt::format("rank {}: {}", ranks.rank(), error.what()));
+  }
+}
+
+void render_alone_or_with_others(const RenderOptions& options, Progress& progress) {
+  const std::unique_ptr<Ranks> ranks = join_ranks();
+  if (!ranks) return render(options, nullptr, progress);
+  if (ranks->rank() == 0) {
+    Leader leader(*ranks, progress);
+    render(options, &leader, progress);
+    leader.finish();
+  } else {
+    follow(options, *ranks, progress);
+  }
+  ranks->finish();
 }
 
 }  // namespace
@@ -120,7 +175,7 @@ void add_render_command(CLI::App& program, Progress& progress) {
                                             "Render these frames, as 1-240 or 1-240x2: # in names of files is the "
                                             "frame's number (flow.####.vdb), and numbers "
                                             "of the scene may have keyframes");
-  command->add_flag("--skip-existing", options->skip_existing, "Leave out frames whose files exist")->needs(frames);
+  command->add_flag("--skip-existing", options->run.skip_existing, "Leave out frames whose files exist")->needs(frames);
   command
       ->add_option("--checkpoint", options->run.keeping.interval,
                    "Seconds after which the work is kept again, in PICTURE.checkpoint (60); 0: only when interrupted")
@@ -129,6 +184,16 @@ void add_render_command(CLI::App& program, Progress& progress) {
   command->add_option(
       "--shard", options->shard,
       "K/N: do part K of N of the work, from 1 to N, and write it to the file of -o, for `tensorray merge`");
+  command
+      ->add_option("--display", options->run.keeping.display,
+                   "Show the picture in the viewer tev while it is rendered (14158)")
+      ->option_text("HOST:PORT");
+  command
+      ->add_option("--memory", options->run.memory,
+                   "Bound of what is in memory, as 8G or 500M: a field that is larger is kept on the disk of the "
+                   "pictures, and read from there in parts")
+      ->transform(CLI::AsSizeValue(false))
+      ->option_text("SIZE");
   command->add_flag("--watch", options->run.keeping.watch, "Keep the pictures up to date while they are rendered");
   command->add_option("--order", options->import.order, "Of the tensor's components, as for `tensorray import`")
       ->group("Import");
@@ -136,21 +201,7 @@ void add_render_command(CLI::App& program, Progress& progress) {
   command->add_option("--gradient-of", options->import.gradient_of, "The velocity whose gradient it is, likewise")
       ->group("Import");
   command->add_flag("-q,--quiet", options->run.quiet, "Print nothing but errors");
-  command->callback([options, &progress] {
-    SceneChanges changes = options->changes;
-    if (options->seed) changes.overrides.push_back(fmt::format("seed={}", *options->seed));
-    if (!options->error.empty())
-      changes.overrides.push_back(fmt::format("integrator.density.error={}", parse_part(options->error)));
-    if (needs_import(options->scene)) return render_import(options->scene, changes, *options, progress);
-    const ImportChoices& import = options->import;
-    if (!import.order.empty() || !import.array.empty() || !import.gradient_of.empty())
-      throw std::invalid_argument("--order, --array and --gradient-of are for files that have to be imported");
-    RenderRun run = options->run;
-    if (!options->shard.empty()) take_shard(options->shard, changes, run.keeping);
-    if (options->frames.empty()) return render_scene(options->scene, changes, run, progress);
-    if (!run.scene_copy.empty()) throw std::invalid_argument("--save-scene: not for several frames");
-    render_frames(options->scene, changes, parse_frames(options->frames), options->skip_existing, run, progress);
-  });
+  command->callback([options, &progress] { render_alone_or_with_others(*options, progress); });
 }
 
 }  // namespace tensorray

@@ -2,11 +2,12 @@
 
 #include <algorithm>
 #include <cmath>
-#include <fstream>
+#include <deque>
 #include <future>
 #include <optional>
 #include <string>
 #include <thread>
+#include <utility>
 #include <vector>
 
 #include <fmt/format.h>
@@ -14,7 +15,6 @@
 
 #include "base/seconds.h"
 #include "renderer/images/image.h"
-#include "scenes/description/run_files.h"
 #include "scenes/jobs/origin.h"
 #include "scenes/keys/frames.h"
 #include "scenes/keys/json_reader.h"
@@ -25,72 +25,17 @@
 #include "tools/command_line/progress_bar.h"
 #include "tools/command_line/run_and_report.h"
 #include "tools/command_line/tell.h"
+#include "tools/commands/run_outputs.h"
+#include "tools/commands/tev_display.h"
 #include "tools/commands/work_keeper.h"
+#include "tools/ranks/follower.h"
+#include "tools/ranks/leader.h"
+#include "volumes/grids/page_memory.h"
 
 namespace tensorray {
 namespace {
 
-/// Keys among the outputs, because all files are committed together.
-const std::string statistics_key = "--stats", scene_key = "--save-scene", shard_key = "--shard";
-constexpr double watch_interval = 5;  // Seconds.
-
-void write_text(OutputFile& file, const std::string& text) {
-  file.write([&](const std::filesystem::path& path) {
-    std::ofstream stream(path, std::ios::binary);
-    stream << text;
-    stream.close();
-    if (!stream) throw std::runtime_error("cannot write " + path.string() + ": the disk may be full");
-  });
-}
-
-/// Paths in a scene are relative to its folder. @throw SceneError if the copy is in another one.
-void check_scene_copy(const std::filesystem::path& scene, const std::filesystem::path& copy) {
-  if (copy.empty() || is_field_file(scene)) return;  // The scene of a field has no relative paths.
-  const auto folder = [](const std::filesystem::path& file) {
-    return std::filesystem::weakly_canonical(std::filesystem::absolute(file).parent_path());
-  };
-  if (folder(scene) != folder(copy))
-    throw SceneError(printable(fmt::format("{} {}: must be in the folder of {}, to which paths in it are relative",
-                                           scene_key, copy.string(), scene.string())));
-}
-
-OutputFiles open_files(const SceneDescription& description, const RenderRun& run) {
-  check_scene_copy(description.path, run.scene_copy);
-  const std::vector<NamedFile> more{
-      {run.statistics, statistics_key}, {run.scene_copy, scene_key}, {run.keeping.shard_file, shard_key}};
-  check_files(description, more);
-  OutputFiles files;
-  if (!run.keeping.shard) files = open_outputs(description.output);
-  for (const NamedFile& file : more)
-    if (!file.path.empty()) files.emplace(file.name, OutputFile(file.path));
-  return files;
-}
-
-RenderRun at_frame(RenderRun run, int frame) {
-  run.statistics = numbered(run.statistics.string(), frame);
-  run.keeping.shard_file = numbered(run.keeping.shard_file.string(), frame);
-  return run;
-}
-
-/// The files of the result.
-std::vector<std::filesystem::path> written_by(const SceneDescription& description, const RenderRun& run) {
-  std::vector<std::filesystem::path> files;
-  if (run.keeping.shard) return {run.keeping.shard_file};
-  for (const auto& [key, path] : description.output.files) files.push_back(path);
-  return files;
-}
-
-std::vector<std::filesystem::path> files_of(const SceneDescription& description, const RenderRun& run) {
-  std::vector<std::filesystem::path> files = written_by(description, run);
-  if (!run.statistics.empty()) files.push_back(run.statistics);
-  return files;
-}
-
-bool is_device(const std::filesystem::path& file) {
-  std::error_code error;
-  const std::filesystem::file_status status = std::filesystem::status(file, error);
-  return std::filesystem::exists(status) && !std::filesystem::is_regular_file(status);
-}
+constexpr double watch_interval = 5, display_interval = 1;  // Seconds.
 
 unsigned threads_of(const RenderRun& run) {
   return run.threads > 0 ? run.threads : std::max(1u, std::thread::hardware_concurrency());
@@ -112,26 +57,12 @@ Scene load(const SceneDescription& description, std::optional<Scene>& loaded, co
   return reload_scene(*loaded, description, progress);
 }
 
-/// Where a run keeps its work; empty: nowhere.
-std::filesystem::path checkpoint_of(const SceneDescription& description, const RunKeeping& keeping) {
-  const auto beside = [](const std::filesystem::path& file) {
-    return std::filesystem::path(file.string() + ".checkpoint");
-  };
-  if (!keeping.is_on) return {};
-  if (keeping.shard) return beside(keeping.shard_file);
-  const auto& files = description.output.files;
-  const auto picture = files.find("image");
-  if (picture != files.end() && !is_device(picture->second)) return beside(picture->second);
-  for (const auto& [key, path] : files)
-    if (!is_device(path)) return beside(path);
-  return {};
-}
-
 KeepSettings keep_settings(const SceneDescription& description, const RenderRun& run) {
   KeepSettings settings;
   settings.file = checkpoint_of(description, run.keeping);
   settings.interval = run.keeping.interval;
   settings.watch = run.keeping.watch ? watch_interval : 0;
+  settings.display = run.keeping.display.empty() ? 0 : display_interval;
   settings.quiet = run.quiet;
   const Method& method = description.integrator.method();
   if (run.keeping.shard && !method.is_divided())
@@ -188,21 +119,61 @@ Render render_or_keep(const Scene& scene, const Progress& progress, RenderJob& j
   }
 }
 
+/// While it lives, all ranks do units of the work. They get what the work belongs to, as `merge` does from shards.
+class SharedWork {
+ public:
+  SharedWork(Leader* leader, const Scene& scene, Work& work, unsigned threads) : leader_(leader) {
+    if (!leader_) return;
+    const Json job = {{"origin", origin_of(scene)},
+                      {"scene_file", std::filesystem::absolute(scene.description.path).string()},
+                      {"part", {work.part().index, work.part().count}}};
+    leader_->share(job.dump(), work, threads);
+  }
+  ~SharedWork() {
+    if (leader_) leader_->end();
+  }
+  SharedWork(const SharedWork&) = delete;
+  SharedWork& operator=(const SharedWork&) = delete;
+
+ private:
+  Leader* const leader_;
+};
+
+std::string run_statistics(const Scene& scene, const Statistics& statistics, double seconds, const RenderRun& run) {
+  std::string text = statistics_json(scene, statistics, seconds, static_cast<int>(threads_of(run)));
+  if (!run.leader) return text;
+  const RankTraffic traffic = run.leader->traffic();
+  auto json = nlohmann::ordered_json::parse(text);
+  json["ranks"] = {{"count", traffic.units.size()},
+                   {"units", traffic.units},
+                   {"messages", traffic.messages},
+                   {"bytes_sent", traffic.bytes_sent},
+                   {"bytes_received", traffic.bytes_received}};
+  return json.dump(2) + "\n";
+}
+
 /// Renders what is left of the work of `job`, and writes all files.
 void complete(const Scene& scene, RenderJob& job, OutputFiles files, const KeepSettings& keep, const RenderRun& run,
               Progress& progress) {
   std::optional<ProgressBar> bar(std::in_place, progress, run.quiet);
+  std::optional<TevDisplay> display;
+  if (!run.keeping.display.empty())
+    display.emplace(run.keeping.display, written_by(scene.description, run).front().filename().string());
+  const bool is_divided = scene.description.integrator.method().is_divided();
+  const SharedWork shared(is_divided ? run.leader : nullptr, scene, job.work, threads_of(run));
+  WorkKeeper keeper(scene, job.work, keep);
   job.show = [&](Render picture) {
-    if (run.keeping.shard) return;
+    if (display) display->show(picture.linear);
+    if (!keeper.take_file_request() || run.keeping.shard) return;
     try {
       write_so_far(std::move(picture), scene, job.work);
     } catch (const std::runtime_error& error) {
       tell({fmt::format("warning: no picture: {}", error.what())}, false);
     }
   };
-  WorkKeeper keeper(scene, job.work, keep);
   Render result = render_or_keep(scene, progress, job, keeper, keep.file);
   bar.reset();  // Erase the bar before the notes are printed.
+  if (display) display->show(result.linear);
   if (job.work.stopping) end_early(std::move(result), scene, job.work, keeper, run, keep.file);
   for (const std::string& warning : result.warnings) tell({"warning: " + warning}, run.quiet);
   const auto start = Clock::now();
@@ -211,8 +182,7 @@ void complete(const Scene& scene, RenderJob& job, OutputFiles files, const KeepS
     files.erase(shard_key);
     write_outputs(result, scene, files);
     if (!run.statistics.empty())
-      write_text(files.at(statistics_key),
-                 statistics_json(scene, result.statistics, seconds_since(start), static_cast<int>(threads_of(run))));
+      write_text(files.at(statistics_key), run_statistics(scene, result.statistics, seconds_since(start), run));
     if (!run.scene_copy.empty()) write_text(files.at(scene_key), parse_value(scene.description.text).dump(2) + "\n");
     commit_outputs(std::move(files));
   } catch (const std::runtime_error&) {  // The disk may be full.
@@ -225,7 +195,8 @@ void complete(const Scene& scene, RenderJob& job, OutputFiles files, const KeepS
 /// Renders a scene to its files. @return the loaded scene.
 Scene render_to_files(const SceneDescription& description, const RenderRun& run, std::optional<Scene> loaded,
                       Progress& progress) {
-  const KeepSettings keep = keep_settings(description, run);
+  KeepSettings keep = keep_settings(description, run);
+  keep.cancelled = &progress.cancelled;
   OutputFiles files = open_files(description, run);
   std::optional<ProgressBar> bar(std::in_place, progress, run.quiet);
   Scene scene = load(description, loaded, progress);
@@ -256,6 +227,48 @@ void check_names(const std::filesystem::path& scene_file, SceneChanges changes, 
                                 name.string())));
 }
 
+/// Pages of a field that is larger than the memory are on the disk of the result.
+void bound_memory_of(const RenderRun& run, const SceneDescription& description) {
+  if (run.memory > 0)
+    bound_memory(run.memory, std::filesystem::absolute(written_by(description, run).front()).parent_path());
+}
+
+/// Renders a frame of a sequence. @param job  Its number, and what its scene leaves open.
+void render_frame(const std::filesystem::path& scene_file, SceneChanges changes, const Json& job, const RenderRun& run,
+                  std::optional<Scene>& loaded, Progress& progress) {
+  const int frame = job.at("frame").get<int>();
+  changes.frame = frame;
+  SceneDescription description = read_scene(scene_file, changes);
+  set_chosen(job, description);
+  bound_memory_of(run, description);
+  const RenderRun with_number = at_frame(run, frame);
+  const std::vector<std::filesystem::path> files = files_of(description, with_number);
+  const auto exists = [](const std::filesystem::path& file) { return std::filesystem::exists(file); };
+  const std::filesystem::path checkpoint = checkpoint_of(description, with_number.keeping);
+  const bool is_done = std::all_of(files.begin(), files.end(), exists) && (checkpoint.empty() || !exists(checkpoint));
+  if (run.skip_existing && is_done) return;
+  tell({fmt::format("frame {}", frame)}, run.quiet);
+  Scene rendered = render_to_files(description, with_number, std::move(loaded), progress);
+  loaded.emplace(std::move(rendered));
+}
+
+/// Does units of a render of rank 0, until there are none left. @throw SceneError if its files are not those of rank 0.
+void render_units(const RankJob& job, const Json& order, const RenderRun& run, std::optional<Scene>& loaded,
+                  Follower& follower, const Progress& progress) {
+  const Json& origin = order.at("origin");
+  SceneDescription description = read_scene_json(origin.at("scene"), order.at("scene_file").get<std::string>());
+  set_chosen(origin, description);
+  bound_memory_of(run, description);
+  Scene scene = load(description, loaded, progress);
+  const std::string other = difference(origin, origin_of(scene));
+  if (!other.empty())
+    throw SceneError(printable(fmt::format("{}: is not that of rank 0: {}", description.path.string(), other)));
+  RenderJob units{Work({order.at("part").at(0).get<std::size_t>(), order.at("part").at(1).get<std::size_t>()}), {}};
+  follower.share(job, units.work, threads_of(run));
+  render(scene, progress, &units);
+  loaded.emplace(std::move(scene));
+}
+
 }  // namespace
 
 void render_scene(const std::filesystem::path& scene_file, const SceneChanges& changes, const RenderRun& run,
@@ -263,35 +276,58 @@ void render_scene(const std::filesystem::path& scene_file, const SceneChanges& c
   const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, threads_of(run));
   set_image_threads(static_cast<int>(threads_of(run)));
   const SceneDescription description = read_scene(scene_file, changes);
+  bound_memory_of(run, description);
+  const Method& method = description.integrator.method();
+  if (run.leader && !method.is_divided())
+    tell({fmt::format("note: the work of {} is one piece, which one rank does; mpirun divides a sequence (--frames)",
+                      method.name())},
+         run.quiet);
   if (is_field_file(scene_file)) tell({"scene: " + description.text}, run.quiet);
   render_to_files(description, run, {}, progress);
 }
 
 void render_frames(const std::filesystem::path& scene_file, SceneChanges changes, const std::vector<int>& frames,
-                   bool skip_existing, const RenderRun& run, Progress& progress) {
+                   const RenderRun& run, Progress& progress) {
   const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, threads_of(run));
   set_image_threads(static_cast<int>(threads_of(run)));
   check_names(scene_file, changes, frames, run);
   changes.frame = frames.front();
   const SceneDescription first = read_scene(scene_file, changes);
+  bound_memory_of(run, first);
   std::optional<Scene> loaded;
   if (!first.field.scale || !first.light.direction) loaded = load_scene(first, progress);
-  const std::optional<double> scale = loaded ? loaded->scale.scale : first.field.scale;
-  const std::optional<Eigen::Vector3d> direction = loaded ? loaded->description.light.direction : first.light.direction;
+  const Eigen::Vector3d direction = loaded ? *loaded->description.light.direction : *first.light.direction;
+  Json job = {{"scale", loaded ? loaded->scale.scale : *first.field.scale},
+              {"direction", {direction.x(), direction.y(), direction.z()}}};
+  std::deque<std::string> jobs;
   for (const int frame : frames) {
-    changes.frame = frame;
-    SceneDescription description = read_scene(scene_file, changes);
-    if (!description.field.scale) description.field.scale = scale;
-    if (!description.light.direction) description.light.direction = direction;
-    const RenderRun with_number = at_frame(run, frame);
-    const std::vector<std::filesystem::path> files = files_of(description, with_number);
-    const auto exists = [](const std::filesystem::path& file) { return std::filesystem::exists(file); };
-    const std::filesystem::path checkpoint = checkpoint_of(description, with_number.keeping);
-    const bool is_done = std::all_of(files.begin(), files.end(), exists) && (checkpoint.empty() || !exists(checkpoint));
-    if (skip_existing && is_done) continue;
-    tell({fmt::format("frame {}", frame)}, run.quiet);
-    Scene rendered = render_to_files(description, with_number, std::move(loaded), progress);
-    loaded.emplace(std::move(rendered));
+    job["frame"] = frame;
+    jobs.push_back(job.dump());
+  }
+  const bool is_handed_out = run.leader && !first.integrator.method().is_divided();
+  if (is_handed_out) run.leader->offer(std::exchange(jobs, {}));
+  for (;;) {
+    std::optional<std::string> next = is_handed_out ? run.leader->take() : std::nullopt;
+    if (!is_handed_out && !jobs.empty()) {
+      next = jobs.front();
+      jobs.pop_front();
+    }
+    if (!next) return;
+    render_frame(scene_file, changes, parse_value(*next), run, loaded, progress);
+  }
+}
+
+void follow(const std::filesystem::path& scene_file, const SceneChanges& changes, const RenderRun& run,
+            Follower& follower, Progress& progress) {
+  const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, threads_of(run));
+  set_image_threads(static_cast<int>(threads_of(run)));
+  std::optional<Scene> loaded;
+  while (const std::optional<RankJob> job = follower.next_job()) {
+    const Json order = parse_value(job->text);
+    if (order.contains("frame"))
+      render_frame(scene_file, changes, order, run, loaded, progress);
+    else
+      render_units(*job, order, run, loaded, follower, progress);
   }
 }
 

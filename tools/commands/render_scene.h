@@ -4,6 +4,7 @@
 
 #include <filesystem>
 #include <optional>
+#include <string>
 #include <vector>
 
 #include "base/progress.h"
@@ -13,11 +14,15 @@
 
 namespace tensorray {
 
+class Follower;
+class Leader;
+
 /// How a run keeps its work.
 struct RunKeeping {
   bool is_on = true;                 ///< Whether there are checkpoints.
   double interval = 60;              ///< Seconds between checkpoints; 0: only where the run is interrupted.
   bool resume = false;               ///< Continue from the checkpoint, if there is one.
+  std::string display;               ///< Address of a viewer that shows the picture; empty: none.
   bool watch = false;                ///< Keep the pictures up to date while they are rendered.
   std::optional<WorkPart> shard;     ///< Do only this part of the work,
   std::filesystem::path shard_file;  ///< and write it to this file, and no picture.
@@ -25,7 +30,10 @@ struct RunKeeping {
 
 struct RenderRun {
   RunKeeping keeping;
+  Leader* leader = nullptr;          ///< Other processes that render, too; null: there are none.
+  std::size_t memory = 0;            ///< What may be resident, in bytes; 0: without a bound.
   unsigned threads = 0;              ///< Number of threads; 0: all.
+  bool skip_existing = false;        ///< Leave out frames of which all files exist, but no checkpoint.
   bool quiet = false;                ///< Print only errors.
   std::filesystem::path statistics;  ///< JSON file for the statistics; empty: none.
   std::filesystem::path scene_copy;  ///< File for the scene with its changes; empty: none.
@@ -40,11 +48,16 @@ void render_scene(const std::filesystem::path& scene_file, const SceneChanges& c
                   Progress& progress);
 
 /// Renders frames of a scene (see set_frame), one after the other. The scale and the direction `auto` are those of the
-/// first frame. A field that does not change is loaded once.
-/// @param skip_existing  Leaves out frames of which all files exist, but no checkpoint.
+/// first frame. A field that does not change is loaded once. Where there are other ranks, and the method's work is not
+/// divided, each takes the next frame.
 /// @throw as render_scene; SceneError if the names of files do not count frames, so that one would replace another.
 void render_frames(const std::filesystem::path& scene_file, SceneChanges changes, const std::vector<int>& frames,
-                   bool skip_existing, const RenderRun& run, Progress& progress);
+                   const RenderRun& run, Progress& progress);
+
+/// Renders what rank 0 asks for, which calls render_scene or render_frames with the same arguments, until it has no
+/// more: units of its scenes, or frames. @throw as render_scene.
+void follow(const std::filesystem::path& scene_file, const SceneChanges& changes, const RenderRun& run,
+            Follower& follower, Progress& progress);
 
 /// Makes the pictures of a scene of work that is done. The work must be all of it, and that of the scene.
 /// @throw as render_scene.

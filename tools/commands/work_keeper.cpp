@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <chrono>
 #include <stdexcept>
+#include <utility>
 
 #include <fmt/format.h>
 
@@ -37,7 +38,7 @@ WorkFile WorkKeeper::work_file() {
 
 bool WorkKeeper::write() {
   const std::lock_guard lock(writing_);
-  if (settings_.file.empty()) return false;
+  if (settings_.file.empty() || is_over_) return false;
   try {
     const WorkFile file = work_file();
     if (file.units.empty()) return false;
@@ -52,6 +53,7 @@ bool WorkKeeper::write() {
 
 void WorkKeeper::remove() {
   const std::lock_guard lock(writing_);
+  is_over_ = true;  // The thread may be about to write.
   std::error_code error;
   if (!settings_.file.empty()) std::filesystem::remove(settings_.file, error);
 }
@@ -69,15 +71,23 @@ void WorkKeeper::begin() {
 void WorkKeeper::run() {
   const std::chrono::duration<double> tick(settings_.interval > 0 ? std::min(longest_tick, settings_.interval / 2)
                                                                   : longest_tick);
-  Clock::time_point written = Clock::now(), shown = written;
+  Clock::time_point written = Clock::now(), shown = written, displayed = written;
+  bool is_cancelled = false;
   std::unique_lock lock(waiting_);
   while (!wake_.wait_for(lock, tick, [this] { return ends_; })) {
     lock.unlock();
     begin();
+    // Soon after SIGTERM, mpirun and queues kill a process, which may still be busy with units.
+    if (settings_.cancelled && *settings_.cancelled && !std::exchange(is_cancelled, true)) write();
     const bool is_asked = take_picture_request();
     if (is_asked || (settings_.watch > 0 && seconds_since(shown) > settings_.watch)) {
+      files_wanted_ = true;
       work_.picture_wanted = true;
       shown = Clock::now();
+    }
+    if (settings_.display > 0 && seconds_since(displayed) > settings_.display) {
+      work_.picture_wanted = true;
+      displayed = Clock::now();
     }
     if (is_asked || (settings_.interval > 0 && seconds_since(written) > settings_.interval)) {
       write();

@@ -2,6 +2,7 @@
 /// @file tools/commands/work_keeper.h
 /// Checkpoints of a render while it runs.
 
+#include <atomic>
 #include <condition_variable>
 #include <filesystem>
 #include <mutex>
@@ -18,7 +19,10 @@ struct KeepSettings {
   std::filesystem::path file;  ///< The checkpoint; empty: none is written.
   double interval = 60;        ///< Seconds between checkpoints; 0: only those that are asked for.
   double watch = 0;            ///< Seconds between pictures of what there is so far; 0: only those that are asked for.
+  double display = 0;          ///< Seconds between pictures for a display; 0: none.
   bool quiet = false;
+  const std::atomic<bool>* cancelled =
+      nullptr;  ///< When it becomes true, a checkpoint is written at once; may be null.
 };
 
 /// While it lives, a thread writes the work of a render to a checkpoint, and asks the work for pictures, after each
@@ -35,8 +39,11 @@ class WorkKeeper {
   /// Writes the checkpoint now. @return whether there is one of this work, new or old.
   bool write();
 
-  /// Removes the checkpoint: the work is in other files.
+  /// Removes the checkpoint, and writes no other: the work is in other files.
   void remove();
+
+  /// Whether the picture that was asked for shall be in files; else it is for a display alone. Forgets it.
+  bool take_file_request() { return files_wanted_.exchange(false); }
 
   /// The work so far, as a file has it.
   WorkFile work_file();
@@ -50,7 +57,8 @@ class WorkKeeper {
   const KeepSettings& settings_;
   std::mutex writing_;
   std::optional<Json> origin_;
-  bool is_written_ = false, has_failed_ = false;
+  bool is_written_ = false, has_failed_ = false, is_over_ = false;
+  std::atomic<bool> files_wanted_{false};
 
   std::mutex waiting_;
   std::condition_variable wake_;

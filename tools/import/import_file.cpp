@@ -124,6 +124,9 @@ Lattice placed(Lattice lattice, const ImportSettings& settings) {
 
 TensorGrid import_any(const ImportSettings& settings, const Progress& progress, ImportReport& report) {
   const std::filesystem::path& file = settings.files.front();
+  const bool has_steps = settings.files.size() == 1 && !lattice_reader(file);
+  if (!has_steps && settings.step.value_or(0) > 0)
+    throw std::invalid_argument("has one step of time; leave --steps out");
   if (settings.files.size() == 2) {
     return import_data_set(read_plot3d(file, settings.files[1]), settings, progress, report);
   }
@@ -133,7 +136,7 @@ TensorGrid import_any(const ImportSettings& settings, const Progress& progress, 
     return import_any(with_header, progress, report);
   }
   const OpenLattice open = lattice_reader(file);
-  if (!open) return import_data_set(read_vtk_source(file), settings, progress, report);
+  if (!open) return import_data_set(read_vtk_source(file, settings.step), settings, progress, report);
   if (open == open_npy) return import_lattice(placed(open(file), settings), settings, report);
   if (wants_sampling(settings))
     throw std::invalid_argument("has voxels of its own, which are kept: leave --resolution and --voxel-size out");
@@ -177,6 +180,11 @@ TensorGrid import_tensors(const ImportSettings& settings, const Progress& progre
   grid.name = tensor_name(grid.name, settings.take);
   grid.metadata["tensorray:source"] = file.filename().string();
   return grid;
+}
+
+int time_steps(const ImportSettings& settings) {
+  const std::filesystem::path& file = settings.files.front();
+  return settings.files.size() == 1 && !lattice_reader(file) ? time_steps(file) : 1;
 }
 
 }  // namespace tensorray

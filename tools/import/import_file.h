@@ -23,6 +23,7 @@ struct ImportSettings {
   /// For files of voxels only `bounds` is used, except for VTK files; for .npy also a voxel size, that of the file.
   SamplingSettings sampling;
   std::optional<Eigen::Vector3d> origin;  ///< World position of the first voxel's centre; of .npy only.
+  std::optional<int> step;                ///< Of the steps of time, from 0 on; none: the last one.
   std::filesystem::path boundary;         ///< File for the surface of the body; empty: none.
 };
 
@@ -37,5 +38,8 @@ struct ImportReport {
 /// readers may end the process on damaged files: call this in a child process (child_process.h).
 /// @throw std::invalid_argument, std::runtime_error: one line that names the file or the flag, and the fix.
 TensorGrid import_tensors(const ImportSettings& settings, const Progress& progress, ImportReport& report);
+
+/// The number of steps of time in the files. @throw as import_tensors.
+int time_steps(const ImportSettings& settings);
 
 }  // namespace tensorray

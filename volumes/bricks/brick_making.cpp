@@ -8,6 +8,7 @@
 #include <tbb/parallel_sort.h>
 
 #include "volumes/bricks/tensor_field.h"
+#include "volumes/grids/page_memory.h"
 
 namespace tensorray {
 namespace {
@@ -97,6 +98,7 @@ BlockTable::BlockTable(const TensorGrid& grid) {
   places.reserve(grid.blocks.size());
   blocks.reserve(grid.blocks.size());
   for (const TensorBlock& block : grid.blocks) {
+    make_room();
     places.emplace_back(block.origin / cells);
     blocks.push_back(&block);
   }
@@ -107,6 +109,7 @@ std::vector<Eigen::Vector3i> active_bricks(const BlockTable& table, const Eigen:
   std::vector<Eigen::Vector3i> bricks;
   bricks.reserve(table.places.size());
   for (std::size_t i = 0; i < table.places.size(); ++i) {
+    make_room();
     if (extent.contains(table.places[i])) bricks.push_back(table.places[i]);
     for (int before = 1; before < 8; ++before) {
       const Eigen::Vector3i brick = table.places[i] - corner(before);

@@ -2,14 +2,13 @@
 
 #include <algorithm>
 #include <cmath>
-#include <new>
 #include <stdexcept>
 
-#include <sys/mman.h>
 #include <tbb/parallel_for.h>
 
 #include "base/box.h"
 #include "volumes/bricks/brick_making.h"
+#include "volumes/grids/page_memory.h"
 
 namespace tensorray {
 namespace {
@@ -89,6 +88,7 @@ void TensorField::make_bricks(const TensorGrid& grid, const GiveBack& give_back)
   for (std::size_t first = 0; first < bricks_.size();) {
     const std::size_t last = end_of_layer(bricks_, first + enough_bricks);
     tbb::parallel_for(first, last, [&](std::size_t i) {
+      make_room();
       strongest_[i] = make_brick(blocks, bricks_[i], floats_.get() + i * TensorBrick::stored_floats);
     });
     if (last < bricks_.size()) give_back(bricks_[last].x() * TensorBrick::cells);
@@ -100,15 +100,11 @@ void TensorField::make_bricks(const TensorGrid& grid, const GiveBack& give_back)
 /// bricks that are far apart in memory.
 TensorField::Floats TensorField::allocate(std::size_t bricks) {
   const std::size_t bytes = bricks * TensorBrick::stored_floats * sizeof(float);
-  void* const memory = mmap(nullptr, bytes, PROT_READ | PROT_WRITE, MAP_PRIVATE | MAP_ANONYMOUS, -1, 0);
-  if (memory == MAP_FAILED) throw std::bad_alloc();
-#ifdef MADV_HUGEPAGE
-  madvise(memory, bytes, MADV_HUGEPAGE);
-#endif
-  return {static_cast<float*>(memory), Release{bytes}};
+  constexpr std::size_t alignment = 4096;
+  return {static_cast<float*>(map_pages(bytes, alignment)), Release{bytes}};
 }
 
-void TensorField::Release::operator()(float* floats) const { munmap(floats, bytes); }
+void TensorField::Release::operator()(float* floats) const { unmap_pages(floats, bytes); }
 
 std::vector<Eigen::Vector3d> TensorField::corners() const { return corners_of(index_bounds_, to_world_); }
 
@@ -117,6 +113,7 @@ Eigen::AlignedBox3d TensorField::world_box() const { return box_of(corners()); }
 double TensorField::greatest_norm() const {
   double greatest = 0;
   for (std::size_t i = 0; i < brick_count(); ++i) {
+    make_room();
     const TensorBrick brick = stored(i);
     for (int voxel = 0; voxel < TensorBrick::voxels; ++voxel)
       greatest = std::max(greatest, brick.tensor(voxel).squaredNorm());

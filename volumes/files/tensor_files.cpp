@@ -4,12 +4,15 @@
 #include <array>
 #include <cmath>
 #include <stdexcept>
+#include <type_traits>
 
+#include <malloc.h>
 #include <tbb/parallel_for.h>
 
 #include "base/errors.h"
 #include "base/text.h"
 #include "volumes/files/vdb_archive.h"
+#include "volumes/grids/page_memory.h"
 #include "volumes/tensors/finite_differences.h"
 
 namespace tensorray {
@@ -192,24 +195,26 @@ void put(SampleBlock& block, int offset, const Entry& entry, double value) {
   block.values[offset][entry.component] = value;
 }
 
-/// Makes the blocks (TensorBlock or SampleBlock) of all active voxels, including those of active tiles, and no
+/// Appends the blocks (TensorBlock or SampleBlock) of all active voxels, including those of active tiles, and no
 /// others.
-/// @param make  make(n) returns n blocks without active voxels.
-template <class Make>
-auto blocks_of(const std::vector<Source>& sources, const Make& make) {
+template <class Blocks>
+void add_blocks(const std::vector<Source>& sources, Blocks& blocks) {
   const std::vector<openvdb::Coord> origins = block_origins(sources);
-  auto blocks = make(origins.size());
-  tbb::parallel_for(std::size_t{0}, blocks.size(), [&](std::size_t i) {
-    blocks[i].origin = {origins[i].x(), origins[i].y(), origins[i].z()};
+  const std::size_t first = blocks.size();
+  if constexpr (std::is_same_v<Blocks, TensorBlocks>) TensorBlocks::allocator_type::prepare(origins.size());
+  blocks.resize(first + origins.size());
+  tbb::parallel_for(std::size_t{0}, origins.size(), [&](std::size_t i) {
+    make_room();
+    auto& block = blocks[first + i];
+    block.origin = {origins[i].x(), origins[i].y(), origins[i].z()};
     for (const Source& source : sources)
       with_tree(*source.grid, [&](const auto& tree) {
         for_each_in_block(tree, origins[i], [&](int offset, const auto& value) {
-          blocks[i].active.set(offset);
-          for (const Entry& entry : source.entries) put(blocks[i], offset, entry, component(value, entry.component));
+          block.active.set(offset);
+          for (const Entry& entry : source.entries) put(block, offset, entry, component(value, entry.component));
         });
       });
   });
-  return blocks;
 }
 
 /// OpenVDB multiplies row vectors from the left, Eigen column vectors from the right.
@@ -278,9 +283,57 @@ std::vector<Part> parts_of(const std::vector<GridInfo>& grids, const std::string
 }
 
 TensorBlocks tensors_of(const std::vector<Source>& sources, Derive derive, const Eigen::Matrix3d& to_index) {
-  if (derive == Derive::none) return blocks_of(sources, make_blocks);
-  const auto samples = blocks_of(sources, [](std::size_t count) { return std::vector<SampleBlock>(count); });
+  TensorBlocks blocks;
+  if (derive == Derive::none) {
+    add_blocks(sources, blocks);
+    return blocks;
+  }
+  std::vector<SampleBlock> samples;
+  add_blocks(sources, samples);
   return derive == Derive::gradient ? gradient(samples, to_index) : hessian(samples, to_index);
+}
+
+/// The grids of a field in a file.
+std::vector<Source> sources_of(const VdbFile& file, const std::string& name, const std::vector<Part>& parts) {
+  std::vector<Source> sources;
+  for (const Part& part : parts)
+    for (const VdbGrid& grid : file.grids)
+      if (grid.name == name + part.suffix) sources.push_back({grid.grid, part.entries});
+  return sources;
+}
+
+/// Where there is a bound of memory, slabs across x of which each has its part of it; else one with everything.
+/// @param sources  Grids without voxels. Their metadata say where they have some.
+std::vector<openvdb::CoordBBox> slabs_of(const std::filesystem::path& path, const std::vector<Source>& sources) {
+  using openvdb::CoordBBox, openvdb::GridBase;
+  CoordBBox all = CoordBBox::inf();
+  constexpr double voxel_bytes = 36, brick_part = 1.5, leaf_bytes = 700, slab_part = 0.12;
+  double voxels = 0;
+  openvdb::Int32 first = all.max().x(), last = all.min().x();
+  for (const Source& source : sources) {
+    const GridBase& grid = *source.grid;
+    const auto count = grid.getMetadata<openvdb::Int64Metadata>(GridBase::META_FILE_VOXEL_COUNT);
+    const auto min = grid.getMetadata<openvdb::Vec3IMetadata>(GridBase::META_FILE_BBOX_MIN);
+    const auto max = grid.getMetadata<openvdb::Vec3IMetadata>(GridBase::META_FILE_BBOX_MAX);
+    if (!count || !min || !max)
+      fail(path, "does not say how many voxels it has, which --memory needs; write it again with this program");
+    voxels = std::max(voxels, static_cast<double>(count->value()));
+    first = std::min(first, min->value().x());
+    last = std::max(last, max->value().x());
+  }
+  const double leaves = voxels / TensorBlock::voxels * static_cast<double>(sources.size());
+  require_room(brick_part * voxel_bytes * voxels, leaf_bytes * leaves);
+  const double slab = slab_part * static_cast<double>(*memory_bound()) / voxel_bytes;
+  const double width = std::clamp(slab / std::max(1.0, voxels) * (static_cast<double>(last) - first + 1), 8.0, 1e9);
+  std::vector<CoordBBox> slabs;
+  for (double x = (first >> 3) * 8.0; x <= last; x += std::floor(width / 8) * 8) {
+    slabs.push_back(all);
+    slabs.back().min().x() = static_cast<openvdb::Int32>(x);
+    if (slabs.size() > 1) slabs[slabs.size() - 2].max().x() = static_cast<openvdb::Int32>(x) - 1;
+  }
+  if (slabs.empty()) slabs.push_back(all);
+  slabs.front().min().x() = all.min().x();  // Whatever the metadata say, no voxel is lost.
+  return slabs;
 }
 
 /// The three grids of a field, without voxels.
@@ -348,20 +401,27 @@ TensorGrid read_tensor_vdb(const std::filesystem::path& path, const std::string&
   const std::vector<GridInfo> infos = list_vdb(path);
   TensorGrid result;
   result.name = chosen_name(path, infos, name, derive);
-
   const std::vector<Part> parts = parts_of(infos, result.name, derive);
   std::set<std::string> wanted;
   for (const Part& part : parts) wanted.insert(result.name + part.suffix);
-  const VdbFile file = read_vdb(path, wanted);
-  std::vector<Source> sources;
-  for (const Part& part : parts)
-    for (const VdbGrid& grid : file.grids)
-      if (grid.name == result.name + part.suffix) sources.push_back({grid.grid, part.entries});
 
+  const bool is_bounded = memory_bound() && derive == Derive::none;
+  const openvdb::CoordBBox nothing(openvdb::Coord::max(), openvdb::Coord::max());
+  VdbFile file = read_vdb(path, wanted, is_bounded ? &nothing : nullptr);
+  std::vector<Source> sources = sources_of(file, result.name, parts);
   result.to_world = common_transform(path, sources);
   result.metadata = metadata_of(file.metadata, *sources.front().grid);
   try {
-    result.blocks = tensors_of(sources, derive, result.to_world.inverse().linear());
+    if (!is_bounded) result.blocks = tensors_of(sources, derive, result.to_world.inverse().linear());
+    if (is_bounded)
+      for (const openvdb::CoordBBox& slab : slabs_of(path, sources)) {
+        sources.clear();
+        file = {};  // Before the next one is read.
+        malloc_trim(0);
+        file = read_vdb(path, wanted, &slab);
+        sources = sources_of(file, result.name, parts);
+        add_blocks(sources, result.blocks);
+      }
   } catch (const std::bad_alloc&) {
     fail(path, "the active voxels of \"" + result.name + "\" do not fit in memory; resample it more coarsely");
   }

@@ -36,7 +36,8 @@ constexpr std::streamoff version_offset = 8, tag_offset = 21;
 /// Reads the table of grids itself. GridDescriptor::read refuses the whole file if one grid has an unknown type.
 class Reader : private openvdb::io::Archive {
  public:
-  explicit Reader(const std::filesystem::path& path) : path_(path), buffer_(stream_buffer) {
+  Reader(const std::filesystem::path& path, const openvdb::CoordBBox* box)
+      : path_(path), box_(box), buffer_(stream_buffer) {
     if (std::filesystem::is_directory(path)) fail(path, "is a folder; name an OpenVDB file");
     in_.rdbuf()->pubsetbuf(buffer_.data(), static_cast<std::streamsize>(buffer_.size()));
     errno = 0;
@@ -149,7 +150,10 @@ class Reader : private openvdb::io::Archive {
     const bool has_compression = fileVersion() >= openvdb::OPENVDB_FILE_VERSION_NODE_MASK_COMPRESSION;
     check_lengths(in_.tellg() + std::streamoff(has_compression ? 4 : 0), 1);  // The string is the transform's type.
     if (has_compression && !descriptor.isInstance()) check_tree(descriptor);
-    readGrid(grid, descriptor, in_);
+    if (box_)
+      readGrid(grid, descriptor, in_, *box_);
+    else
+      readGrid(grid, descriptor, in_);
     return grid;
   }
 
@@ -184,7 +188,7 @@ class Reader : private openvdb::io::Archive {
     for (const auto& descriptor : table)
       if (needed.count(descriptor.uniqueName())) read.emplace_back(&descriptor, nullptr);
     tbb::parallel_for(std::size_t{0}, read.size(), [&](std::size_t i) {
-      Reader reader(path_);
+      Reader reader(path_, box_);
       reader.read_file_header();
       read[i].first->seekToGrid(reader.in_);
       read[i].second = reader.read_one(*read[i].first);
@@ -193,6 +197,7 @@ class Reader : private openvdb::io::Archive {
   }
 
   std::filesystem::path path_;
+  const openvdb::CoordBBox* box_;  // Null: all voxels.
   std::vector<char> buffer_;
   std::ifstream in_;
   std::int64_t size_ = 0;
@@ -237,10 +242,11 @@ class Writer : private openvdb::io::Archive {
 
 }  // namespace
 
-VdbFile read_vdb(const std::filesystem::path& path, const std::set<std::string>& wanted) {
+VdbFile read_vdb(const std::filesystem::path& path, const std::set<std::string>& wanted,
+                 const openvdb::CoordBBox* box) {
   openvdb::initialize();
   try {
-    return Reader(path).read(wanted);
+    return Reader(path, box).read(wanted);
   } catch (const std::ios_base::failure&) {
     fail_damaged(path, "");
   } catch (const openvdb::Exception& error) {

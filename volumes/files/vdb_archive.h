@@ -32,8 +32,10 @@ struct VdbFile {
 };
 
 /// Reads the table of grids. Also reads the grids whose names are in `wanted`, with their voxels.
+/// @param box  Only the voxels in this box, whose faces are those of leaves; null: all. Others do not come into memory.
 /// @throw std::runtime_error, one line that names the file and the fix: missing, not a VDB, truncated, damaged.
-VdbFile read_vdb(const std::filesystem::path& path, const std::set<std::string>& wanted = {});
+VdbFile read_vdb(const std::filesystem::path& path, const std::set<std::string>& wanted = {},
+                 const openvdb::CoordBBox* box = nullptr);
 
 /// Writes grids in place with OpenVDB's default compression. Equal grids give equal bytes: the file's unique tag,
 /// which OpenVDB draws at random, is replaced by a hash of the contents.

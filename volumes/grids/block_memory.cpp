@@ -3,8 +3,9 @@
 #include <cstdint>
 #include <new>
 
-#include <sys/mman.h>
 #include <tbb/parallel_for.h>
+
+#include "volumes/grids/page_memory.h"
 
 namespace tensorray {
 namespace {
@@ -18,20 +19,7 @@ struct FreeSlot {
 
 /// Maps a slab. Its address is a multiple of its size, so that the address of a slot gives its slab, and so that the
 /// system can use one large page.
-void* map_slab() {
-  constexpr std::size_t reserved = 2 * slab_bytes;
-  void* const memory = mmap(nullptr, reserved, PROT_READ | PROT_WRITE, MAP_PRIVATE | MAP_ANONYMOUS, -1, 0);
-  if (memory == MAP_FAILED) throw std::bad_alloc();
-  char* const begin = static_cast<char*>(memory);
-  const std::size_t before = -reinterpret_cast<std::uintptr_t>(memory) % slab_bytes;
-  char* const slab = begin + before;
-  if (before > 0) munmap(begin, before);
-  munmap(slab + slab_bytes, slab_bytes - before);
-#ifdef MADV_HUGEPAGE
-  madvise(slab, slab_bytes, MADV_HUGEPAGE);
-#endif
-  return slab;
-}
+void* map_slab() { return map_pages(slab_bytes, slab_bytes); }
 
 }  // namespace
 
@@ -86,7 +74,7 @@ void SlotPool::give_back(void* slot) noexcept {
   const bool only_one = !slab->before && !slab->after;
   if (slab->used > 0 || only_one) return;
   unlink(slab);
-  munmap(slab, slab_bytes);
+  unmap_pages(slab, slab_bytes);
 }
 
 }  // namespace tensorray

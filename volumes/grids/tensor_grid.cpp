@@ -7,6 +7,8 @@
 
 #include <tbb/parallel_for.h>
 
+#include "volumes/grids/page_memory.h"
+
 namespace tensorray {
 namespace {
 
@@ -37,13 +39,17 @@ TensorBlocks make_blocks(std::size_t count) {
 
 std::size_t TensorGrid::active_voxels() const {
   std::size_t count = 0;
-  for (const TensorBlock& block : blocks) count += block.active.count();
+  for (const TensorBlock& block : blocks) {
+    make_room();
+    count += block.active.count();
+  }
   return count;
 }
 
 Eigen::AlignedBox3i TensorGrid::active_box() const {
   Eigen::AlignedBox3i box;
   for (const TensorBlock& block : blocks) {
+    make_room();
     const Eigen::Vector3i last = block.origin + Eigen::Vector3i::Constant(TensorBlock::size - 1);
     if (box.contains(block.origin) && box.contains(last)) continue;
     if (block.active.all()) {
@@ -68,6 +74,7 @@ TensorGrid dense_grid(const Eigen::AlignedBox3i& box, const Eigen::Affine3d& to_
   tbb::parallel_for(std::size_t{0}, grid.blocks.size(), [&](std::size_t i) {
     const Eigen::Vector3i block(static_cast<int>(i / slice), static_cast<int>(i / count.z() % count.y()),
                                 static_cast<int>(i % count.z()));
+    make_room();
     grid.blocks[i].origin = first + size * block;
     fill(grid.blocks[i], box, value);
   });
@@ -77,6 +84,7 @@ TensorGrid dense_grid(const Eigen::AlignedBox3i& box, const Eigen::Affine3d& to_
 std::size_t remove_non_finite(TensorGrid& grid) {
   std::atomic<std::size_t> removed{0};
   tbb::parallel_for(std::size_t{0}, grid.blocks.size(), [&](std::size_t i) {
+    make_room();
     TensorBlock& block = grid.blocks[i];
     if (has_only_finite(block)) return;
     const std::size_t before = block.active.count();
@@ -88,7 +96,10 @@ std::size_t remove_non_finite(TensorGrid& grid) {
     removed += before - block.active.count();
   });
   grid.blocks.erase(std::remove_if(grid.blocks.begin(), grid.blocks.end(),
-                                   [](const TensorBlock& block) { return block.active.none(); }),
+                                   [](const TensorBlock& block) {
+                                     make_room();
+                                     return block.active.none();
+                                   }),
                     grid.blocks.end());
   return removed;
 }
@@ -99,6 +110,7 @@ double asymmetry(const TensorGrid& grid) {
   };
   std::vector<Sums> blocks(grid.blocks.size());
   tbb::parallel_for(std::size_t{0}, blocks.size(), [&](std::size_t i) {
+    make_room();
     const TensorBlock& block = grid.blocks[i];
     for (int offset = 0; offset < TensorBlock::voxels; ++offset) {
       if (!block.active[offset]) continue;

@@ -8,6 +8,8 @@
 #include <Eigen/Eigenvalues>
 #include <tbb/parallel_for.h>
 
+#include "volumes/grids/page_memory.h"
+
 namespace tensorray {
 namespace {
 
@@ -182,8 +184,10 @@ EigenvalueReport apply_eigenvalues(TensorGrid& grid, Eigenvalues mode) {
   if (report.chosen == Eigenvalues::raw) return report;
 
   std::vector<BlockReport> blocks(grid.blocks.size());
-  tbb::parallel_for(std::size_t{0}, blocks.size(),
-                    [&](std::size_t i) { blocks[i] = apply_to_block(grid.blocks[i], report.chosen); });
+  tbb::parallel_for(std::size_t{0}, blocks.size(), [&](std::size_t i) {
+    make_room();
+    blocks[i] = apply_to_block(grid.blocks[i], report.chosen);
+  });
   double norm = 0, erased = 0;  // Summed in the order of the blocks, so that the number of threads does not matter.
   for (const BlockReport& block : blocks) {
     report.defective += block.defective;

@@ -2,6 +2,7 @@
 
 #include <cmath>
 #include <filesystem>
+#include <fstream>
 #include <memory>
 #include <optional>
 #include <stdexcept>
@@ -12,8 +13,10 @@
 #include <fmt/core.h>
 
 #include "base/distinct_files.h"
+#include "base/numbered_name.h"
 #include "base/output_file.h"
 #include "base/progress.h"
+#include "base/temporary_folder.h"
 #include "base/text.h"
 #include "tools/command_line/progress_bar.h"
 #include "tools/command_line/vdb_output.h"
@@ -34,7 +37,7 @@ struct ImportOptions {
   double voxel_size = 0;
   std::vector<double> bounds, origin;
   std::filesystem::path output, boundary;
-  std::string name, units;
+  std::string name, units, steps = "last";
   bool half = false, quiet = false;
 };
 
@@ -118,10 +121,12 @@ void check_files(const ImportOptions& options, const std::vector<std::filesystem
   require_distinct_files(inputs, {{options.output, "-o"}, {options.boundary, "--boundary"}});
 }
 
-void import(const ImportOptions& options, Progress& progress) {
-  ImportSettings settings = settings_of(options);
-  for (const std::filesystem::path& file : settings.files)
-    if (!std::filesystem::exists(file)) throw std::runtime_error(file.string() + " does not exist");
+std::string crash_message(const ImportSettings& settings) {
+  return settings.files.front().string() +
+         ": reading it ended the reader; the file is damaged or cut off, or does not fit in memory";
+}
+
+void import_step(const ImportOptions& options, ImportSettings settings, Progress& progress) {
   check_files(options, settings.files);
   std::vector<OutputFile> files;
   files.emplace_back(options.output);
@@ -129,10 +134,46 @@ void import(const ImportOptions& options, Progress& progress) {
     files.emplace_back(options.boundary);
     settings.boundary = files.back().path();
   }
-  in_child_process([&] { import_to(options, settings, files.front(), progress); }, progress,
-                   settings.files.front().string() +
-                       ": reading it ended the reader; the file is damaged or cut off, or does not fit in memory");
+  in_child_process([&] { import_to(options, settings, files.front(), progress); }, progress, crash_message(settings));
   commit_all(files);
+}
+
+/// Counts in a child process, too, which leaves the number in a file.
+int count_steps(const ImportSettings& settings, Progress& progress) {
+  const TemporaryFolder folder;
+  const std::filesystem::path file = folder / "steps";
+  in_child_process([&] { std::ofstream(file) << time_steps(settings); }, progress, crash_message(settings));
+  int steps = 1;
+  std::ifstream(file) >> steps;
+  return steps;
+}
+
+/// One file for each step of time, which is there when the next step is read.
+void import_all_steps(ImportOptions options, ImportSettings settings, Progress& progress) {
+  const std::filesystem::path output = options.output;
+  if (!has_number_sign(output.filename().string()))
+    throw std::invalid_argument(output.string() +
+                                ": all steps would have this name; count them by #, as in flow.####.vdb");
+  const int steps = count_steps(settings, progress);
+  for (int step = 0; step < steps; ++step) {
+    settings.step = step;
+    options.output = output.parent_path() / numbered(output.filename().string(), step + 1);
+    import_step(options, settings, progress);
+    options.boundary.clear();  // The body is the same.
+  }
+}
+
+void import(const ImportOptions& options, Progress& progress) {
+  ImportSettings settings = settings_of(options);
+  for (const std::filesystem::path& file : settings.files)
+    if (!std::filesystem::exists(file)) throw std::runtime_error(file.string() + " does not exist");
+  if (options.steps == "all") return import_all_steps(options, settings, progress);
+  int step = 1;
+  if (options.steps != "last" && options.steps != "first" &&
+      (!CLI::detail::lexical_cast(options.steps, step) || step < 1))
+    throw std::invalid_argument("--steps " + escaped(options.steps) + ": give all, first, last, or a number from 1 on");
+  if (options.steps != "last") settings.step = step - 1;
+  import_step(options, settings, progress);
 }
 
 std::string check_ply_output(const std::string& text) {
@@ -212,6 +253,12 @@ void add_import_options(CLI::App& program, Progress& progress) {
                   "Write the surface of the body that the mesh lies around, for `obstacles`: FILE.ply")
       ->check(check_ply_output)
       ->option_text("FILE");
+  program
+      .add_option(
+          "--steps", options->steps,
+          "Steps of time of an OpenFOAM case or an ExodusII file: last, first, a number from 1 on, or all, each "
+          "in a file of its own (-o flow.####.vdb) (last)")
+      ->option_text("STEPS");
   program.add_option("--name", options->name, "Name of the field (default: the array's)");
   program.add_option("--units", options->units, "Units of the tensor, noted in the file");
   program.add_flag("--half", options->half, "Store 16-bit floats: three significant digits, half the size");

@@ -68,8 +68,16 @@ vtkSmartPointer<vtkDataObject> read_legacy(const Path& path) {
   return reader->GetOutputDataObject(0);
 }
 
+/// Checks a number that the user gives. @return the step, from 0 on.
+int chosen_step(std::optional<int> step, int steps) {
+  if (step && *step >= steps)
+    throw std::invalid_argument("--steps " + std::to_string(*step + 1) + ": there are " + std::to_string(steps) +
+                                " steps of time");
+  return step.value_or(steps - 1);
+}
+
 /// Reads the undisplaced mesh. By default VTK moves its points by any array that looks like a displacement.
-vtkSmartPointer<vtkDataObject> read_exodus(const Path& path) {
+vtkSmartPointer<vtkDataObject> read_exodus(const Path& path, std::optional<int> step) {
   vtkNew<vtkExodusIIReader> reader;
   reader->SetFileName(path.c_str());
   reader->ApplyDisplacementsOff();
@@ -82,30 +90,40 @@ vtkSmartPointer<vtkDataObject> read_exodus(const Path& path) {
   for (int i = 0; i < reader->GetNumberOfObjects(vtkExodusIIReader::ELEM_BLOCK); ++i) {
     reader->SetObjectStatus(vtkExodusIIReader::ELEM_BLOCK, i, 1);
   }
-  if (const int steps = reader->GetNumberOfTimeSteps(); steps > 0) reader->SetTimeStep(steps - 1);
+  if (const int steps = reader->GetNumberOfTimeSteps(); steps > 0 || step)
+    reader->SetTimeStep(chosen_step(step, std::max(steps, 1)));
   reader->Update();
   return reader->GetOutputDataObject(0);
 }
 
-vtkSmartPointer<vtkDataObject> read_openfoam(const Path& path) {
+/// The times of an OpenFOAM case, in order.
+std::vector<double> open_case(const Path& path, vtkOpenFOAMReader& reader) {
   const Path dictionary = openfoam_case(path) / "system" / "controlDict";
+  reader.SetFileName(dictionary.c_str());
+  reader.SkipZeroTimeOff();
+  reader.UpdateInformation();
+  std::vector<double> times;
+  if (vtkDoubleArray* const values = reader.GetTimeValues())
+    for (vtkIdType i = 0; i < values->GetNumberOfTuples(); ++i) times.push_back(values->GetValue(i));
+  std::sort(times.begin(), times.end());
+  return times;
+}
+
+vtkSmartPointer<vtkDataObject> read_openfoam(const Path& path, std::optional<int> step) {
   vtkNew<vtkOpenFOAMReader> reader;
-  reader->SetFileName(dictionary.c_str());
-  reader->SkipZeroTimeOff();
-  reader->UpdateInformation();
+  const std::vector<double> times = open_case(path, *reader);
   reader->DisableAllPatchArrays();
   reader->SetPatchArrayStatus("internalMesh", 1);
   reader->EnableAllCellArrays();
   reader->EnableAllPointArrays();
-  if (vtkDoubleArray* const times = reader->GetTimeValues(); times && times->GetNumberOfTuples() > 0) {
-    const double* const begin = times->GetPointer(0);
-    reader->UpdateTimeStep(*std::max_element(begin, begin + times->GetNumberOfTuples()));
-  }
+  const int count = static_cast<int>(times.size());
+  if (count > 0 || step) reader->UpdateTimeStep(times.at(static_cast<std::size_t>(chosen_step(step, count))));
   reader->Update();
   return reader->GetOutputDataObject(0);
 }
 
-vtkSmartPointer<vtkDataObject> read_kind(VtkKind kind, const Path& path) {
+vtkSmartPointer<vtkDataObject> read_kind(VtkKind kind, const Path& path, std::optional<int> step) {
+  if (kind != VtkKind::exodus && kind != VtkKind::openfoam) chosen_step(step, 1);
   switch (kind) {
     case VtkKind::legacy:
       return read_legacy(path);
@@ -126,9 +144,9 @@ vtkSmartPointer<vtkDataObject> read_kind(VtkKind kind, const Path& path) {
     case VtkKind::unstructured_pieces:
       return read_unstructured_pieces(path);
     case VtkKind::exodus:
-      return read_exodus(path);
+      return read_exodus(path, step);
     case VtkKind::openfoam:
-      return read_openfoam(path);
+      return read_openfoam(path, step);
     case VtkKind::blocks:
     case VtkKind::time_series:
       break;  // read_data_sets reads them file by file.
@@ -137,18 +155,19 @@ vtkSmartPointer<vtkDataObject> read_kind(VtkKind kind, const Path& path) {
 }
 
 /// The sound data sets with cells of a file, or of the files that it names.
-DataSets read_data_sets(VtkKind kind, const Path& path, const VtkMessages& messages) {
+DataSets read_data_sets(VtkKind kind, const Path& path, const VtkMessages& messages, std::optional<int> step) {
   DataSets sets;
   if (kind != VtkKind::blocks && kind != VtkKind::time_series) {
-    sets = data_sets_in(read_kind(kind, path));
+    sets = data_sets_in(read_kind(kind, path, step));
     messages.throw_error(path);
     for (vtkDataSet* const set : sets) check_geometry(*set, path);
     return sets;
   }
+  chosen_step(step, 1);
   for (const Path& file : collection_files(path)) {
     const VtkKind kind_of_file = vtk_kind(file);
     if (kind_of_file >= kind) fail(path, "names the collection " + escaped(file.string()) + "; import that one");
-    const DataSets more = read_data_sets(kind_of_file, file, messages);
+    const DataSets more = read_data_sets(kind_of_file, file, messages, std::nullopt);
     sets.insert(sets.end(), more.begin(), more.end());
   }
   return sets;
@@ -168,13 +187,13 @@ void name_symmetric_components(vtkDataSet& data) {
 
 }  // namespace
 
-vtkSmartPointer<vtkDataSet> read_vtk_source(const Path& path) {
+vtkSmartPointer<vtkDataSet> read_vtk_source(const Path& path, std::optional<int> step) {
   const VtkKind kind = vtk_kind(path);
   const VtkMessages messages;
   const SilentStderr silent;
   vtkSmartPointer<vtkDataSet> result;
   try {
-    result = one_data_set(read_data_sets(kind, path, messages));
+    result = one_data_set(read_data_sets(kind, path, messages, step));
   } catch (const std::bad_alloc&) {
     throw std::runtime_error(path.string() + ": is damaged, or too large: it announces more than memory holds");
   }
@@ -185,6 +204,22 @@ vtkSmartPointer<vtkDataSet> read_vtk_source(const Path& path) {
   }
   if (kind == VtkKind::openfoam) name_symmetric_components(*result);
   return result;
+}
+
+int time_steps(const Path& path) {
+  const VtkKind kind = vtk_kind(path);
+  const VtkMessages messages;
+  const SilentStderr silent;
+  int steps = 1;
+  if (kind == VtkKind::openfoam) steps = static_cast<int>(open_case(path, *vtkNew<vtkOpenFOAMReader>()).size());
+  if (kind == VtkKind::exodus) {
+    vtkNew<vtkExodusIIReader> reader;
+    reader->SetFileName(path.c_str());
+    reader->UpdateInformation();
+    steps = reader->GetNumberOfTimeSteps();
+  }
+  messages.throw_error(path);
+  return std::max(steps, 1);
 }
 
 }  // namespace tensorray

@@ -1,0 +1,62 @@
+// tools/clip: makes a clip of the frames of a sequence.
+
+#include <fmt/core.h>
+
+#include "tests/data_folder.h"
+#include "tests/program/support.h"
+
+namespace tensorray {
+namespace {
+
+using namespace test;
+
+class Clip : public Program {
+ protected:
+  void SetUp() override {
+    Program::SetUp();
+    write("scene.json", R"({"field": {"generate": {"kind": "point_load", "resolution": 9}, "scale": 2},
+        "light": {"photons": 500, "wavelengths": {"count": 4}, "direction": {"keys": [[1, [0, 0, -1]], [9, [0, 1, -1]]]}},
+        "receiver": {"resolution": [33, 24]}, "integrator": {"type": "photon_distribution"}})");
+    run_well({"render", "scene.json", "-q", "--frames", "1-9x4", "-o", "frame.##.png"});
+  }
+
+  Outcome clip(const std::string& arguments, const std::string& before = "") const {
+    const std::string command = fmt::format("cd '{}' && {} '{}' {} >out 2>error", in_folder("").string(), before,
+                                            (source_folder() / "tools/clip").string(), arguments);
+    const int status = std::system(command.c_str());
+    return {WIFEXITED(status) ? WEXITSTATUS(status) : -1, read_file(in_folder("out")), read_file(in_folder("error"))};
+  }
+};
+
+TEST_F(Clip, HasAllFrames) {
+  if (std::system("command -v ffmpeg >/dev/null && command -v ffprobe >/dev/null") != 0)
+    GTEST_SKIP() << "ffmpeg is not installed";
+  for (const char* name : {"a.mp4", "a.gif"}) {
+    const Outcome outcome = clip(fmt::format("'frame.##.png' {} 12", name));
+    ASSERT_EQ(outcome.status, 0) << outcome.error;
+    EXPECT_EQ(outcome.out, fmt::format("wrote {}, 3 frames\n", name));
+    const std::string probe = fmt::format(
+        "cd '{}' && ffprobe -v error -count_frames -select_streams v -show_entries stream=nb_read_frames,r_frame_rate "
+        "-of csv=p=0 {} >probe",
+        in_folder("").string(), name);
+    ASSERT_EQ(std::system(probe.c_str()), 0);
+    EXPECT_EQ(read_file(in_folder("probe")).substr(0, 7), "12/1,3\n") << name;
+  }
+}
+
+TEST_F(Clip, ErrorsAreOneLine) {
+  const std::pair<std::string, std::string> wrong[] = {{"frame.01.png a.mp4", "the number of a frame is #"},
+                                                       {"'none.##.png' a.mp4", "there is no such file"},
+                                                       {"'frame.##.png' a.mp4 fast", "is no number of frames a second"},
+                                                       {"'frame.##.png' frame.05.png", "is one of the frames"},
+                                                       {"'frame.##.png'", "give the frames"}};
+  for (const auto& [arguments, text] : wrong) {
+    const Outcome outcome = clip(arguments);
+    EXPECT_EQ(outcome.status, 2) << arguments;
+    EXPECT_NE(outcome.error.find(text), std::string::npos) << outcome.error;
+    EXPECT_EQ(std::count(outcome.error.begin(), outcome.error.end(), '\n'), 1) << outcome.error;
+  }
+}
+
+}  // namespace
+}  // namespace tensorray

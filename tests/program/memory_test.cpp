@@ -1,0 +1,63 @@
+// `tensorray render --memory`: fields that are larger than what may be resident.
+
+#include "tests/program/support.h"
+
+namespace tensorray {
+namespace {
+
+using namespace test;
+
+constexpr double bound = 256.0 * (1 << 20);
+
+class Memory : public Program {
+ protected:
+  static std::string scene(const std::string& field) {
+    return R"({"field": )" + field + R"(, "light": {"photons": 20000, "wavelengths": {"count": 8}},
+               "receiver": {"resolution": [128, 128]},
+               "integrator": {"type": "photon_distribution", "density": {"kind": "gaussian"}}})";
+  }
+};
+
+TEST_F(Memory, AFieldOfFourTimesTheBoundGivesTheSameFiles) {
+  if (std::filesystem::space(in_folder("")).available < (std::uintmax_t{5} << 30))
+    GTEST_SKIP() << "the test needs 5 GB on the disk of " << in_folder("");
+  run_well({"make", "point_load", "-o", "field.vdb", "--resolution", "280"});
+  write("scene.json", scene(R"({"file": "field.vdb", "eigenvalues": "raw", "scale": 4})"));
+  run_well({"render", "scene.json", "-q", "-o", "all.exr", "--stats", "all.json"});
+  run_well(
+      {"render", "scene.json", "-q", "-o", "part.exr", "--stats", "part.json", "--memory", "256M", "--threads", "1"});
+  EXPECT_TRUE(read_file(in_folder("all.exr")) == read_file(in_folder("part.exr")));
+  const nlohmann::json all = read_json("all.json"), part = read_json("part.json");
+  EXPECT_GE(part["field"]["memory_bytes"], 4 * bound);
+  EXPECT_GT(all["peak_memory_bytes"], 4 * bound);
+  constexpr double of_thread = 64.0 * (1 << 20);  // What the rays of a batch touch before pages are dropped.
+  EXPECT_LE(part["peak_memory_bytes"], bound + of_thread);
+  RecordProperty("seconds_without", all["seconds"].dump());
+  RecordProperty("seconds_with", part["seconds"].dump());
+  for (const std::string& name : files()) EXPECT_NE(name.rfind(".tensorray", 0), 0u) << name;
+}
+
+/// A field that fits is not slower, and also fields that are made within the bound are the same.
+TEST_F(Memory, SmallFieldsAreTheSame) {
+  write("scene.json", scene(R"({"generate": {"kind": "vortex", "resolution": 40}})"));
+  run_well({"render", "scene.json", "-q", "-o", "all.exr"});
+  run_well({"render", "scene.json", "-q", "-o", "part.exr", "--memory", "1G"});
+  EXPECT_TRUE(read_file(in_folder("all.exr")) == read_file(in_folder("part.exr")));
+}
+
+TEST_F(Memory, WhatCannotFitIsSaid) {
+  write("scene.json", scene(R"({"generate": {"kind": "vortex", "resolution": 9}})"));
+  const std::pair<const char*, const char*> wrong[] = {
+      {"100M", "--memory 100.0 MiB: a render takes as much beside its field; give 256.0 MiB at least"},
+      {"much", "--memory"}};
+  for (const auto& [size, text] : wrong) {
+    const Outcome outcome = run({"render", "scene.json", "-o", "a.exr", "--memory", size});
+    EXPECT_EQ(outcome.status, 2) << size;
+    EXPECT_NE(outcome.error.find(text), std::string::npos) << outcome.error;
+    EXPECT_EQ(std::count(outcome.error.begin(), outcome.error.end(), '\n'), 1) << outcome.error;
+    EXPECT_FALSE(std::filesystem::exists(in_folder("a.exr")));
+  }
+}
+
+}  // namespace
+}  // namespace tensorray

@@ -1,0 +1,168 @@
+// `mpirun -n 4 tensorray render`: the files are those of one process, whatever happens.
+
+#include <cstdlib>
+#include <optional>
+
+#include <fmt/core.h>
+
+#include "tests/program/support.h"
+
+namespace tensorray {
+namespace {
+
+using namespace test;
+
+const char* const whole_scene = R"({
+  "field": {"file": "field.vdb", "eigenvalues": "absolute", "scale": 4},
+  "integrator": {"type": "scene", "max_samples": 16, "min_samples": 8, "bands": 4, "bands_per_sample": 4,
+                 "caustic": {"resolution": 32, "rays": 1000, "passes": 1}},
+  "camera": {"resolution": [70, 50]}})";
+
+const char* const path_scene = R"({
+  "field": {"file": "field.vdb", "eigenvalues": "absolute"},
+  "integrator": {"type": "path_tracing", "max_samples": 64, "min_samples": 8, "noise": 0.01},
+  "camera": {"resolution": [60, 50]}})";
+
+std::string mpirun() {
+#ifdef TENSORRAY_MPIRUN
+  return TENSORRAY_MPIRUN;
+#else
+  return "";
+#endif
+}
+
+class RanksProgram : public Program {
+ protected:
+  void SetUp() override {
+    Program::SetUp();
+    if (mpirun().empty() || !std::filesystem::exists(mpirun())) GTEST_SKIP() << "mpirun is not installed";
+    setenv("OMPI_ALLOW_RUN_AS_ROOT", "1", 1);
+    setenv("OMPI_ALLOW_RUN_AS_ROOT_CONFIRM", "1", 1);
+    run_well({"make", "point_load", "-o", "field.vdb", "--resolution", "17"});
+  }
+
+  /// Starts ranks with the test's folder as working folder. @return mpirun's process.
+  pid_t start_ranks(int ranks, const std::string& arguments) const {
+    const std::string command =
+        fmt::format("cd '{}' && exec '{}' --oversubscribe --bind-to none -n {} '{}' render scene.json {} >out 2>error",
+                    in_folder("").string(), mpirun(), ranks, TENSORRAY_BINARY, arguments);
+    const pid_t child = fork();
+    if (child != 0) return child;
+    execl("/bin/sh", "sh", "-c", command.c_str(), nullptr);
+    _exit(127);
+  }
+
+  int wait_for_ranks(pid_t child) const {
+    int status = 0;
+    waitpid(child, &status, 0);
+    return WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status);
+  }
+
+  void render_with_ranks(int ranks, const std::string& arguments) const {
+    EXPECT_EQ(wait_for_ranks(start_ranks(ranks, arguments)), 0) << error();
+  }
+
+  std::string error() const { return read_file(in_folder("error")); }
+
+  void expect_same(const std::string& a, const std::string& b) const {
+    ASSERT_TRUE(std::filesystem::exists(in_folder(a))) << a;
+    EXPECT_TRUE(read_file(in_folder(a)) == read_file(in_folder(b))) << a << ", " << b;
+  }
+
+  /// The process that is a rank of mpirun's process; none if it has not begun.
+  static std::optional<pid_t> process_of(pid_t parent, int rank) {
+    const std::string name = fmt::format("OMPI_COMM_WORLD_RANK={}", rank) + '\0';
+    std::error_code error;
+    for (const auto& entry : std::filesystem::directory_iterator("/proc", error)) {
+      const std::string number = entry.path().filename().string();
+      if (number.find_first_not_of("0123456789") != std::string::npos) continue;
+      const std::string stat = read_file(entry.path() / "stat");
+      const std::size_t end = stat.rfind(')');
+      if (end == std::string::npos || end + 4 >= stat.size() || std::atoi(stat.c_str() + end + 4) != parent) continue;
+      if (read_file(entry.path() / "environ").find(name) != std::string::npos) return std::atoi(number.c_str());
+    }
+    return std::nullopt;
+  }
+};
+
+TEST_F(RanksProgram, GiveTheFilesOfOneProcess) {
+  for (const char* scene : {whole_scene, path_scene}) {
+    write("scene.json", scene);
+    run_well({"render", "scene.json", "-q", "-o", "one.png", "-o", "one.exr"});
+    for (const int ranks : {1, 2, 3, 4}) {
+      render_with_ranks(ranks, "-q -o a.png -o a.exr --threads 1 --stats stats.json");
+      expect_same("a.png", "one.png");
+      expect_same("a.exr", "one.exr");
+      if (ranks == 1) continue;  // This one has not loaded MPI.
+      // Each pixel crosses once: 96 bytes and 8 for each band, of the light and of what has landed, and few words.
+      const nlohmann::json traffic = read_json("stats.json")["ranks"];
+      EXPECT_EQ(traffic["count"], ranks);
+      std::uint64_t units = 0;
+      for (const std::uint64_t each : traffic["units"]) units += each;
+      EXPECT_EQ(units, scene == whole_scene ? 5u * 4u : 4u * 4u);
+      const std::uint64_t words = 24 * traffic["messages"].get<std::uint64_t>();
+      const int bands = scene == whole_scene ? 2 * 4 : 32;
+      EXPECT_LE(traffic["bytes_received"], 70u * 50u * (96u + 8u * bands) + words);
+      EXPECT_LE(traffic["bytes_sent"], 4000u * ranks + words);
+    }
+  }
+}
+
+/// Methods whose work is one piece.
+TEST_F(RanksProgram, DivideTheFramesOfASequence) {
+  for (const char* method :
+       {R"({"type": "photon_distribution"})", R"({"type": "lens", "samples": 1})", R"({"type": "stretch"})"}) {
+    write("scene.json", fmt::format(R"({{"field": {{"file": "field.vdb"}}, "integrator": {},
+        "light": {{"photons": 500, "wavelengths": {{"count": 4}},
+                   "direction": {{"keys": [[1, [0, 0, -1]], [5, [0, 1, -1]]]}}}},
+        "receiver": {{"resolution": [24, 24]}}}})",
+                                    method));
+    run_well({"render", "scene.json", "-q", "--frames", "1-5", "-o", "one.#.exr"});
+    render_with_ranks(3, "--frames 1-5 -o a.#.exr");
+    for (int frame = 1; frame <= 5; ++frame)
+      expect_same(fmt::format("a.{}.exr", frame), fmt::format("one.{}.exr", frame));
+    for (const auto& entry : std::filesystem::directory_iterator(in_folder("")))
+      if (entry.path().extension() == ".exr") std::filesystem::remove(entry.path());
+  }
+}
+
+TEST_F(RanksProgram, AKilledRankEndsTheJobWhichContinuesToTheSameFiles) {
+  write("scene.json", whole_scene);
+  const std::string more = " --set integrator.max_samples=192 --set integrator.min_samples=192 -q -o a.png -o a.exr";
+  run_well({"render", "scene.json", "--set", "integrator.max_samples=192", "--set", "integrator.min_samples=192", "-q",
+            "-o", "one.png", "-o", "one.exr"});
+  for (const int rank : {2, 0}) {
+    const pid_t job = start_ranks(3, "--threads 1 --checkpoint 0.05 --resume" + more);
+    const auto checkpoint = in_folder("a.png.checkpoint");
+    const auto before = std::filesystem::exists(checkpoint) ? read_file(checkpoint) : std::string();
+    while (waitpid(job, nullptr, WNOHANG) == 0 &&
+           (!std::filesystem::exists(checkpoint) || read_file(checkpoint) == before))
+      std::this_thread::sleep_for(std::chrono::milliseconds(5));
+    const std::optional<pid_t> process = process_of(job, rank);
+    ASSERT_TRUE(process) << error();
+    const auto killed = std::chrono::steady_clock::now();
+    kill(*process, SIGKILL);
+    EXPECT_NE(wait_for_ranks(job), 0);
+    EXPECT_LT(std::chrono::steady_clock::now() - killed, std::chrono::seconds(10));
+    EXPECT_NE(error().find(fmt::format("rank {}", rank)), std::string::npos) << error();
+    EXPECT_TRUE(std::filesystem::exists(checkpoint));
+    EXPECT_FALSE(std::filesystem::exists(in_folder("a.exr")) &&
+                 read_file(in_folder("a.exr")) == read_file(in_folder("one.exr")));
+  }
+  render_with_ranks(2, "--resume" + more);
+  expect_same("a.png", "one.png");
+  expect_same("a.exr", "one.exr");
+  EXPECT_FALSE(std::filesystem::exists(in_folder("a.png.checkpoint")));
+}
+
+TEST_F(RanksProgram, ErrorsOfASceneAreSaidOnce) {
+  write("scene.json", R"({"field": {"file": "none.vdb"}, "integrator": {"type": "lens"}})");
+  EXPECT_NE(wait_for_ranks(start_ranks(3, "-o a.png")), 0);
+  const std::string text = error();
+  const std::size_t first = text.find("none.vdb");
+  EXPECT_NE(first, std::string::npos) << text;
+  EXPECT_EQ(text.find("none.vdb", first + 1), std::string::npos) << text;
+}
+
+}  // namespace
+}  // namespace tensorray

@@ -1,0 +1,95 @@
+#pragma once
+/// @file tools/ranks/leader.h
+/// What rank 0 does for the others: it hands out jobs, and units of them, in small numbers, so that a slow rank does
+/// not hold the others, and takes the units that are done. It renders, too.
+
+#include <cstdint>
+#include <deque>
+#include <exception>
+#include <mutex>
+#include <optional>
+#include <set>
+#include <string>
+#include <thread>
+#include <utility>
+#include <vector>
+
+#include "base/progress.h"
+#include "base/work.h"
+#include "tools/ranks/rank_message.h"
+#include "tools/ranks/ranks.h"
+
+namespace tensorray {
+
+/// What the ranks have sent each other.
+struct RankTraffic {
+  std::uint64_t messages = 0, bytes_sent = 0, bytes_received = 0;  ///< By rank 0; numbers of messages of both ways.
+  std::vector<std::uint64_t> units;                                ///< The units that each rank has done.
+};
+
+/// A thread of it uses `ranks`; nobody else may, before `finish`.
+class Leader {
+ public:
+  /// Both must outlive it.
+  Leader(Ranks& ranks, const Progress& progress);
+  ~Leader();
+  Leader(const Leader&) = delete;
+  Leader& operator=(const Leader&) = delete;
+
+  /// All ranks do units of `work` from now on, this one with `threads` threads, until all are done. The work ends early
+  /// when the progress is cancelled. @param job  What the others need to begin. Ends with `end`.
+  void share(const std::string& job, Work& work, std::size_t threads);
+
+  /// No rank uses the work of `share` from now on.
+  void end();
+
+  /// Jobs that one rank each does by itself, whichever has time.
+  void offer(std::deque<std::string> jobs);
+
+  /// One of them, for this rank; nothing: there are none left.
+  std::optional<std::string> take();
+
+  /// Waits until all ranks have done what they have, and ends them. @throw Cancelled.
+  void finish();
+
+  RankTraffic traffic() const;
+
+ private:
+  /// Work that all ranks do.
+  struct Shared {
+    std::uint32_t number = 0;
+    std::string text;
+    Work* work = nullptr;
+    std::size_t next = 0;                              ///< The units before it were handed out.
+    std::size_t away = 0;                              ///< Units that other ranks have.
+    std::vector<std::size_t> mine;                     ///< Units that this rank has.
+    std::vector<std::pair<int, std::size_t>> waiting;  ///< Ranks that need units, and their threads, before it begins.
+  };
+
+  void run();
+  void rethrow() const;
+  void receive(int from, RankMessage message);
+  void answer();
+  void send(int to, const RankMessage& message);
+  bool has_begun() const { return shared_->work->size() > 0; }
+  bool has_units() const { return !has_begun() || shared_->next < shared_->work->size(); }
+  std::vector<std::size_t> take_units(std::size_t threads);
+  void send_units(int to, std::uint32_t job, std::size_t threads);
+  std::vector<std::size_t> next_units(std::size_t threads);
+
+  Ranks& ranks_;
+  const Progress& progress_;
+  mutable std::mutex mutex_;  ///< For all that follows.
+  RankTraffic traffic_;
+  std::uint32_t jobs_ = 0;  ///< The number of jobs so far.
+  std::optional<Shared> shared_;
+  std::deque<std::string> offered_;
+  std::set<int> idle_;                ///< Ranks that wait for a job.
+  std::vector<std::uint32_t> given_;  ///< The last job of each rank.
+  int finished_ = 0;                  ///< Ranks that were told that there are no more jobs.
+  bool is_finishing_ = false, ends_ = false;
+  std::exception_ptr error_;
+  std::thread thread_;
+};
+
+}  // namespace tensorray

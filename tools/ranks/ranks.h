@@ -1,0 +1,40 @@
+#pragma once
+/// @file tools/ranks/ranks.h
+/// The processes of one job that `mpirun` started together. Each has a number, its rank, from 0 on.
+
+#include <memory>
+#include <optional>
+#include <string>
+
+namespace tensorray {
+
+struct RankBytes {
+  int from = 0;  ///< The rank that sent them.
+  std::string bytes;
+};
+
+/// This process among the others. One thread at a time may use it. Messages from one rank to another keep their order.
+/// Where a rank ends before `finish`, whether by an error or a signal, mpirun ends all others, and names it.
+class Ranks {
+ public:
+  virtual ~Ranks() = default;
+
+  virtual int rank() const = 0;
+  virtual int count() const = 0;
+
+  /// Waits until the other rank receives. It does not keep the processor busy.
+  virtual void send(int to, const std::string& bytes) = 0;
+
+  /// A message that has come, if there is one. Does not wait.
+  virtual std::optional<RankBytes> receive() = 0;
+
+  /// Waits until all ranks have called it. None can be used afterwards.
+  virtual void finish() = 0;
+};
+
+/// Joins the other processes. @return null if this process was started alone, or is the only one: MPI, which takes half
+/// a second to start, is not loaded then.
+/// @throw std::runtime_error with the fix if there are others, but the part of the program that uses MPI is not built.
+std::unique_ptr<Ranks> join_ranks();
+
+}  // namespace tensorray

@@ -1,0 +1,38 @@
+#pragma once
+/// @file volumes/grids/page_memory.h
+/// Memory of fields, in whole pages. It may have a bound: its pages are then those of a file, and of those that were
+/// not used lately the process keeps only as many as the bound allows. Code that reads and writes it does not notice.
+
+#include <cstddef>
+#include <filesystem>
+#include <optional>
+
+namespace tensorray {
+
+/// From now on, what is resident of this process, with everything, stays below `bytes`: pages of fields are in a file
+/// without a name in `folder`, and return from there when they are needed. The bound holds but for what is used within
+/// a few milliseconds, up to some 64 MB for each thread. Called once, before fields are made; later calls have no
+/// effect.
+/// @throw std::invalid_argument if the bound is below what a render takes beside its field; std::runtime_error if the
+/// folder cannot have such a file.
+void bound_memory(std::size_t bytes, const std::filesystem::path& folder);
+
+/// The bound, if there is one.
+std::optional<std::size_t> memory_bound();
+
+/// Waits, where there is a bound and it is near, until there is room below it. Code that goes through a whole field
+/// calls it from time to time: it is faster than what watches the bound. Any thread may call it.
+void make_room();
+
+/// Checks, where there is a bound, that a field can be loaded within it.
+/// @param stored  Bytes of the field's pages. @param resident  Bytes that it needs beside them.
+/// @throw std::runtime_error with the numbers, if the disk has less space, or the bound is too small.
+void require_room(double stored, double resident);
+
+/// Maps pages of zeros. @param alignment  Of the address: a power of two. Any thread may call this and `unmap_pages`.
+/// @throw std::bad_alloc; std::runtime_error with the numbers if there is a bound and the disk is full.
+void* map_pages(std::size_t bytes, std::size_t alignment);
+
+void unmap_pages(void* memory, std::size_t bytes) noexcept;
+
+}  // namespace tensorray
