@@ -69,6 +69,9 @@ void run(int argc, char** argv) {
                "Also run a job with a million positions of 32 wavelengths on a plate of 1024² pixels");
   app.add_option("--kernels", line.options.kernels, "Measure only kernels whose names contain this text, such as AVX2")
       ->type_name("TEXT");
+  app.add_option("--field", line.options.field,
+                 "Measure caustics only of fields whose names contain this text, such as vortex")
+      ->type_name("TEXT");
   try {
     app.parse(argc, argv);
   } catch (const CLI::Success& request) {  // --help

@@ -123,6 +123,7 @@ Json measure_caustics(const Options& options) {
   const int side = options.quick ? 32 : 512;
   Json results = Json::array();
   for (const CausticScene& scene : scenes(options)) {
+    if (std::string(scene.name).find(options.field) == std::string::npos) continue;
     options.announce(fmt::format("caustics: {}, reference", scene.name));
     const Json exact_density = {{"kind", "mesh"}, {"error", options.quick ? 0.005 : 0.01}};
     const Image exact = render(folder, scene, {"reference", exact_density, 1u << 23}, side).image;

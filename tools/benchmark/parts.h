@@ -15,6 +15,7 @@ struct Options {
   bool quick = false;    ///< Tiny sizes: shows that everything works; the numbers have no meaning.
   bool million = false;  ///< Also run the job of a million positions.
   std::string kernels;   ///< Measure only kernels whose names contain this.
+  std::string field;     ///< Measure caustics only of fields whose names contain this.
   /// Called with a description of what is measured next.
   std::function<void(const std::string&)> announce;
 };
