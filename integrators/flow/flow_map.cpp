@@ -83,24 +83,6 @@ std::vector<Patch> patches_of(const std::vector<Eigen::Vector2d>& polygon, doubl
   return patches;
 }
 
-/// The ratio of lengths where light starts to those at a point, as straight light projects them.
-double start_ratio(const Beam& beam, const Eigen::Vector3d& point) {
-  if (!beam.source) return 1;
-  const auto distance = [&](const Eigen::Vector3d& p) { return (p - *beam.source).dot(beam.direction); };
-  return distance(beam.center) / std::max(distance(point), distance(beam.center));
-}
-
-/// The area of a triangle of starts, or the solid angle that it covers as seen from the light's source (van Oosterom
-/// and Strackee 1983).
-double start_area(const Beam& beam, const Eigen::Vector2d& a, const Eigen::Vector2d& b, const Eigen::Vector2d& c) {
-  if (!beam.source) return std::abs((b - a).x() * (c - a).y() - (b - a).y() * (c - a).x()) / 2;
-  const auto direction = [&](const Eigen::Vector2d& at) -> Eigen::Vector3d {
-    return beam.direction_at(beam.center + at.x() * beam.right + at.y() * beam.up);
-  };
-  const Eigen::Vector3d A = direction(a), AB = direction(b) - A, AC = direction(c) - A;
-  return 2 * std::atan2(std::abs(A.dot(AB.cross(AC))), 1 + A.dot(A + AB) + (A + AB).dot(A + AC) + (A + AC).dot(A));
-}
-
 /// The size of a pixel in the plane where light starts, as straight light projects it.
 double pixel_of_starts(const Plate& plate, const Beam& beam) {
   const double slope =
@@ -205,8 +187,7 @@ class FlowMapBuilder {
       if (progress_.cancelled) throw Cancelled();
       const std::size_t begin = first + task * task_size, end = std::min(begin + task_size, count);
       std::vector<Eigen::Vector3d> origins;
-      for (std::size_t i = begin; i < end; ++i)
-        origins.push_back(beam_.center + origins_[i].x() * beam_.right + origins_[i].y() * beam_.up);
+      for (std::size_t i = begin; i < end; ++i) origins.push_back(beam_.start(origins_[i]));
       tracer_.trace(origins, &map_.landings[begin * map_.nodes], &map_.ends[begin * map_.nodes],
                     &map_.lengths[begin * checks]);
       const std::size_t traced = done += end - begin;

@@ -10,6 +10,7 @@
 #include "integrators/flow/caustic.h"
 #include "integrators/flow/flow_map.h"
 #include "integrators/flow/flow_view.h"
+#include "integrators/flow/node_tracer.h"
 #include "renderer/lights/beam.h"
 
 namespace tensorray {
@@ -60,21 +61,20 @@ Eigen::AlignedBox2d landing_box(const TensorField& field, const Geometry& geomet
   Eigen::AlignedBox2d aperture, landings;
   for (const Vector2d& corner : beam.aperture) aperture.extend(corner);
   const auto whole = plate.resolution.cast<double>();
-  const bool is_projected = beam.source && geometry.surfaces().body;
-  const auto place = [&](const Vector3d& p) { return is_projected ? projected_from(*beam.source, plate, p) : p; };
   for (int y = 0; y < landing_probes; ++y) {
     RayBatch rays;
     for (int x = 0; x < landing_probes; ++x) {
       const Vector2d at =
           aperture.min().array() + aperture.sizes().array() * Eigen::Array2d(x + 0.5, y + 0.5) / landing_probes;
-      const Vector3d start = beam.center + at.x() * beam.right + at.y() * beam.up;
+      const Vector3d start = beam.start(at);
       for (const double flexibility : {light.flexibilities.front(), light.flexibilities.back()})
         rays.add(start, beam.direction_at(start), flexibility);
     }
     trace(field, geometry, bending, rays);
     for (std::size_t i = 0; i < rays.size(); ++i)
       if (rays.end[i] == RayEnd::plate)
-        landings.extend(Vector2d(plate.to_pixel(place(rays.position[i])).cwiseMax(0).cwiseMin(whole)));
+        landings.extend(
+            Vector2d(plate.to_pixel(place_on(plate, geometry, beam, rays.position[i])).cwiseMax(0).cwiseMin(whole)));
   }
   return landings;
 }

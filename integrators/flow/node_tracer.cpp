@@ -98,6 +98,10 @@ struct TracedNodes {
 
 }  // namespace
 
+Eigen::Vector3d place_on(const Plate& plate, const Geometry& geometry, const Beam& beam, const Eigen::Vector3d& point) {
+  return geometry.surfaces().body && beam.source ? projected_from(*beam.source, plate, point) : point;
+}
+
 NodeTracer::NodeTracer(const TensorField& field, const Geometry& geometry, const Plate& plate, const Beam& beam,
                        const BendingSettings& bending, const FlowSettings& settings)
     : field_(field),
@@ -149,11 +153,6 @@ void NodeTracer::trace(const std::vector<Eigen::Vector3d>& origins, Eigen::Vecto
   }
 }
 
-/// The place on the plate of a point where light lands.
-Eigen::Vector3d NodeTracer::place_of(const Eigen::Vector3d& point) const {
-  return body_ && beam_.source ? projected_from(*beam_.source, plate_, point) : point;
-}
-
 /// Of light that lands on a body, that on its first layer counts as landed, if it comes from the volume.
 RayEnd NodeTracer::end_of(const RayBatch& rays, std::size_t ray, const Eigen::Vector3d& origin) const {
   if (!body_ || rays.end[ray] != RayEnd::plate) return rays.end[ray];
@@ -178,7 +177,8 @@ void NodeTracer::trace_nodes(const std::vector<Eigen::Vector3d>& origins, const 
   std::size_t ray = 0;
   for (std::size_t node = first; node < nodes(); node += step)
     for (const std::size_t i : which) {
-      landings[i * nodes() + node] = plate_.to_pixel(place_of(batch.position[ray])).cast<float>();
+      landings[i * nodes() + node] =
+          plate_.to_pixel(place_on(plate_, geometry_, beam_, batch.position[ray])).cast<float>();
       ends[i * nodes() + node] = end_of(batch, ray, origins[i]);
       if (lengths) lengths[i * check_nodes_.size() + (node - first) / step] = static_cast<float>(batch.length[ray]);
       ++ray;

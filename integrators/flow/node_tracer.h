@@ -14,6 +14,10 @@
 
 namespace tensorray {
 
+/// The place on the plane of `plate` of a point where light lands. That of a body's point is as the beam's source sees
+/// it; parallel light needs no projection, since pixels are those of the point's projection along the plate's normal.
+Eigen::Vector3d place_on(const Plate& plate, const Geometry& geometry, const Beam& beam, const Eigen::Vector3d& point);
+
 /// Traces as few nodes as the smoothness of the landings allows, and interpolates the others. Any number of threads may
 /// use it at once.
 class NodeTracer {
@@ -40,7 +44,6 @@ class NodeTracer {
  private:
   void trace_nodes(const std::vector<Eigen::Vector3d>& origins, const std::vector<std::size_t>& which,
                    std::size_t first, std::size_t step, Eigen::Vector2f* landings, RayEnd* ends, float* lengths);
-  Eigen::Vector3d place_of(const Eigen::Vector3d& point) const;
   RayEnd end_of(const RayBatch& rays, std::size_t ray, const Eigen::Vector3d& origin) const;
 
   const TensorField& field_;

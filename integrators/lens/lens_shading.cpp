@@ -62,8 +62,7 @@ class SampleView {
     for (std::size_t i = 0; i < spans.size();) {
       const Span span = spans[i++];
       if (!lands(span.from)) {
-        const Glimpse to(*this, span.to);
-        if (lands(span.to)) look(to, to.st, 0.5, span, pixel);
+        if (lands(span.to)) look(Glimpse(*this, span.to), st(span.to), 0.5, span, pixel);
         continue;
       }
       const Glimpse from(*this, span.from);
@@ -140,6 +139,7 @@ class SampleView {
     }
     return by_sample;
   }
+
   bool lands(std::size_t node) const { return point(node).end == RayEnd::plate; }
 
   /// Whether the points that both ends of a span see, so many pixels apart, are on one sheet.

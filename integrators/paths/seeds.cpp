@@ -85,7 +85,7 @@ std::vector<Eigen::Vector3d> poisson_disk_seeds(const Beam& beam, std::uint64_t 
     grid.add({from_center.dot(beam.right), from_center.dot(beam.up)});
   }
   std::vector<Eigen::Vector3d> seeds;
-  for (const Eigen::Vector2d& at : grid.points()) seeds.push_back(beam.center + at.x() * beam.right + at.y() * beam.up);
+  for (const Eigen::Vector2d& at : grid.points()) seeds.push_back(beam.start(at));
   return seeds;
 }
 

@@ -102,6 +102,21 @@ Beam point_beam(const std::vector<Eigen::Vector3d>& points, const Eigen::Vector3
   return beam;
 }
 
+double start_ratio(const Beam& beam, const Eigen::Vector3d& point) {
+  if (!beam.source) return 1;
+  const auto distance = [&](const Eigen::Vector3d& p) { return (p - *beam.source).dot(beam.direction); };
+  return distance(beam.center) / std::max(distance(point), distance(beam.center));
+}
+
+/// The solid angle is that of van Oosterom and Strackee (1983).
+double start_area(const Beam& beam, const Eigen::Vector2d& a, const Eigen::Vector2d& b, const Eigen::Vector2d& c) {
+  if (!beam.source) return std::abs(cross(b - a, c - a)) / 2;
+  const auto direction = [&](const Eigen::Vector2d& across) { return beam.direction_at(beam.start(across)); };
+  const Eigen::Vector3d A = direction(a), B = direction(b), C = direction(c);
+  // Of differences, which keep the digits of small triangles.
+  return 2 * std::atan2(std::abs(A.dot((B - A).cross(C - A))), 1 + A.dot(B) + B.dot(C) + C.dot(A));
+}
+
 BeamSampler::BeamSampler(const Beam& beam, BeamPattern pattern, std::uint64_t count, std::uint64_t seed)
     : beam_(beam), pattern_(pattern), seed_(seed) {
   if (count < 1) throw std::invalid_argument("a beam needs at least one photon");
@@ -126,7 +141,7 @@ bool BeamSampler::sample(std::uint64_t index, Emission& emission) const {
   const Eigen::Vector3d u = unit_sample(index);
   const Eigen::Vector2d position = corner_ + u.head<2>().cwiseProduct(extent_);
   if (!contains(beam_.aperture, position)) return false;
-  emission.origin = beam_.center + position.x() * beam_.right + position.y() * beam_.up;
+  emission.origin = beam_.start(position);
   emission.across = u.head<2>();
   emission.stratum = u.z();
   return true;

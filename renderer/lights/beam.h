@@ -12,16 +12,18 @@ namespace tensorray {
 
 enum class BeamPattern { grid, stratified, sobol, random };
 
-/// Parallel light. It starts at the plane through `center`. Positions across it are in the frame (right, up) about
-/// `center`.
+/// Parallel light, or that of a point. It starts at the plane through `center`. Positions across it are in the frame
+/// (right, up) about `center`.
 struct Beam {
-  Eigen::Vector3d direction = -Eigen::Vector3d::UnitZ();  ///< Unit.
+  Eigen::Vector3d direction = -Eigen::Vector3d::UnitZ();  ///< Unit; of a point's light, the axis of the beam.
   Eigen::Vector3d center = Eigen::Vector3d::Zero();       ///< World.
   Eigen::Vector3d right = Eigen::Vector3d::UnitX();       ///< Unit, across the beam.
   Eigen::Vector3d up = Eigen::Vector3d::UnitY();          ///< Unit, across the beam.
   std::vector<Eigen::Vector2d> aperture;                  ///< Convex polygon, counter-clockwise in (right, up).
-  std::optional<Eigen::Vector3d>
-      source;  ///< If the light comes from a point: where it is; `direction` is the beam's axis.
+  std::optional<Eigen::Vector3d> source;                  ///< The point that the light comes from; none: parallel.
+
+  /// World, of a position across the beam.
+  Eigen::Vector3d start(const Eigen::Vector2d& across) const { return center + across.x() * right + across.y() * up; }
 
   /// Unit; of the light that starts at a point of the plane.
   Eigen::Vector3d direction_at(const Eigen::Vector3d& start) const {
@@ -38,6 +40,13 @@ Beam silhouette_beam(const std::vector<Eigen::Vector3d>& points, const Eigen::Ve
 /// The beam from `source` whose aperture is the silhouette of `points`. It starts near the source.
 /// @throw std::invalid_argument if the source is among the points, or so near that they are all around it.
 Beam point_beam(const std::vector<Eigen::Vector3d>& points, const Eigen::Vector3d& source);
+
+/// How much smaller lengths are where light starts than at a point, as straight light projects them; 1 if it is
+/// parallel.
+double start_ratio(const Beam& beam, const Eigen::Vector3d& point);
+
+/// The area of a triangle of positions across the beam, or, seen from its source, the solid angle.
+double start_area(const Beam& beam, const Eigen::Vector2d& a, const Eigen::Vector2d& b, const Eigen::Vector2d& c);
 
 double area(const std::vector<Eigen::Vector2d>& polygon);
 

@@ -57,11 +57,10 @@ struct LightSample {
 
 /// Chooses lights by their power, and then directions by the light. Immutable: any thread may use it.
 ///
-/// Lights without a size, parallel light and points, are deltas.
-/// All other lights that are infinitely far away form the background. The caller sees it as one light: its
-/// radiance is the sum over these lights, and its density is that of choosing a direction by any of them. A caller that
-/// also has its own way to choose directions (multiple importance sampling) weighs `sample` against `area_pdf` where
-/// its ray meets an area light, and against `background_pdf` where it meets nothing.
+/// Parallel light and points are deltas. All other lights that are infinitely far away form the background. The caller
+/// sees it as one light: its radiance is the sum over these lights, and its density is that of choosing a direction by
+/// any of them. A caller that also has its own way to choose directions (multiple importance sampling) weighs `sample`
+/// against `area_pdf` where its ray meets an area light, and against `background_pdf` where it meets nothing.
 class LightSampler {
  public:
   /// @param lights      Other functions refer to a light by its index here.

@@ -44,8 +44,8 @@ struct SurfacePicture {
   std::vector<Eigen::Vector3f> albedo;  ///< Working space: the reflectance; for metals, times Fresnel's reflectance.
   /// Means over the samples that hit a surface with this attribute; 0 where no sample did.
   std::vector<float> force, arc_length;
-  Film landed;  ///< The part of it that ShadedScene::landed has lit: red, green, blue (working space). May be empty.
-  Film groups;  ///< The light of each group: red, green and blue of the first, then of the next. May be empty.
+  Film landed;  ///< The part of `radiance` that ShadedScene::landed has lit, in the working space; empty if none has.
+  Film groups;  ///< The part of each group of lights: red, green, blue of the first, then of the next. May be empty.
   /// If light bends: means over the samples that enter the region; 1, 0 and 1 where none does. Otherwise empty.
   std::vector<float> gain, deflection, arrives;  ///< See BentView.
   /// If light bends: means over the samples that hit a plate with a texture, or one on which light has landed.

@@ -53,8 +53,8 @@ struct ShadedScene {
   const std::vector<Material>& materials;  ///< ShadedSurface::material is an index into these.
   const LightSampler& lights;              ///< With the same bands as `colors`.
   const ReflectanceTable& colors;
-  /// Where light bends; null: it is straight everywhere. Light of directional lights that reaches surfaces through the
-  /// region is not looked for, except by rays that leave the camera: it is in `landed`.
+  /// Where light bends; null: it is straight everywhere. Light of directional lights and points that reaches surfaces
+  /// through the region is not looked for, except by rays that leave the camera: it is in `landed`.
   const BendingRegion* region = nullptr;
   /// Bands that a ray of the camera, and one that surfaces have scattered, follows into the region. Both divide the
   /// number of bands.
@@ -130,6 +130,7 @@ class RayShader {
   template <class Density>
   double material_weight(double material_pdf, const Density& light_pdf) const;
   void shade_occlusion(const Vertex& vertex, PathSampler& sampler);
+
   /// Where light comes from that is added: a light, or the background in a direction.
   struct LightSource {
     int light = -1;

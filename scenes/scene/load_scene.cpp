@@ -102,7 +102,7 @@ Beam make_beam(const SceneDescription& description, const TensorField& field) {
 Eigen::Vector2d lit_extent(const Plate& plate, const Beam& beam) {
   Eigen::Vector2d half(0, 0);
   for (const Eigen::Vector2d& corner : beam.aperture) {
-    const Eigen::Vector3d origin = beam.center + corner.x() * beam.right + corner.y() * beam.up - plate.center;
+    const Eigen::Vector3d origin = beam.start(corner) - plate.center;
     const Eigen::Vector3d landing =
         origin - origin.dot(plate.normal()) / beam.direction.dot(plate.normal()) * beam.direction;
     half = half.cwiseMax(Eigen::Vector2d(landing.dot(plate.right), landing.dot(plate.up)).cwiseAbs());

@@ -1,6 +1,6 @@
 #pragma once
 /// @file scenes/whole/sunlight.h
-/// The directional lights of a whole scene, and the light that they throw through the field on its plates.
+/// The lights of a whole scene, and the light that suns and points throw through the field on its objects.
 
 #include <functional>
 #include <vector>
@@ -20,8 +20,8 @@ std::vector<Light> whole_lights(const Scene& scene, const ShownLights& shown, co
 /// 550 and 450 nm, to which the paper gives its three flexibilities.
 std::function<double(double)> flexibility_of(const BendingDescription& bending);
 
-/// The light of all directional lights that lands on `objects` through the field. The surface of object i must have the
-/// index i. @throw Cancelled.
+/// The light of all directional lights and points that lands on `objects` through the field. The surface of object i
+/// must have the index i. @throw Cancelled.
 std::vector<LandedLight> land_light(const Scene& scene, const std::vector<Light>& lights, const ShownLight& shown,
                                     const std::vector<SceneObject>& objects, const CausticDescription& caustic,
                                     const Progress& progress);

@@ -45,7 +45,8 @@ void describe(WholeDescription& whole, Visitor& visit) {
         "scene: bands that a sample follows into the volume; divides `bands`", between(1, 1000));
   visit("max_gain", whole.most_gain,
         "scene: greatest factor by which the field increases radiance (`conserve` power); 0: no limit", at_least(0));
-  visit.section("caustic", whole.caustic, "scene: the light of directional lights that the field throws on plates");
+  visit.section("caustic", whole.caustic,
+                "scene: the light of directional lights and points that the field throws on objects");
 }
 
 }  // namespace tensorray

@@ -4,23 +4,13 @@
 #include <sys/stat.h>
 
 #include "tests/data_folder.h"
+#include "tests/program/divided_scenes.h"
 #include "tests/program/support.h"
 
 namespace tensorray {
 namespace {
 
 using namespace test;
-
-const char* const whole_scene = R"({
-  "field": {"file": "field.vdb", "eigenvalues": "absolute", "scale": 4},
-  "integrator": {"type": "scene", "max_samples": 16, "min_samples": 8, "bands": 4, "bands_per_sample": 4,
-                 "caustic": {"resolution": 32, "rays": 1000, "passes": 1}},
-  "camera": {"resolution": [70, 50]}})";
-
-const char* const path_scene = R"({
-  "field": {"file": "field.vdb", "eigenvalues": "absolute", "scale": 4},
-  "integrator": {"type": "path_tracing", "max_samples": 64, "min_samples": 8, "noise": 0.01},
-  "camera": {"resolution": [60, 50]}})";
 
 class KeptWork : public Program {
  protected:

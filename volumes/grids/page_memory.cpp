@@ -37,8 +37,6 @@ std::size_t resident() {
   return std::strtoull(second, nullptr, 10) * static_cast<std::size_t>(sysconf(_SC_PAGESIZE));
 }
 
-std::string text_of(double bytes) { return bytes_text(bytes); }
-
 int open_nameless(const std::filesystem::path& folder) {
   std::string name = (folder / ".tensorray-XXXXXX").string();
   const int file = mkostemp(name.data(), O_CLOEXEC);
@@ -74,13 +72,13 @@ class PageStore {
     const std::lock_guard lock(mutex_);
     if (is_near()) drop_pages();
     if (resident() > bound_)
-      throw std::runtime_error("--memory " + text_of(static_cast<double>(bound_)) +
-                               ": what is beside the field takes " + text_of(static_cast<double>(resident())) +
+      throw std::runtime_error("--memory " + bytes_text(static_cast<double>(bound_)) +
+                               ": what is beside the field takes " + bytes_text(static_cast<double>(resident())) +
                                "; give more");
     // The disk must have the space now: a page that cannot be stored would end the process.
     if (posix_fallocate(file_, end_, static_cast<off_t>(bytes)) != 0)
       throw std::runtime_error("--memory: the disk of " + folder_.string() + " has no space for " +
-                               text_of(static_cast<double>(bytes)) + " more of the field");
+                               bytes_text(static_cast<double>(bytes)) + " more of the field");
     if (mmap(memory, bytes, PROT_READ | PROT_WRITE, MAP_SHARED | MAP_FIXED, file_, end_) == MAP_FAILED)
       throw std::bad_alloc();
     regions_[memory] = {bytes, end_};
@@ -148,9 +146,9 @@ PageStore* store = nullptr;
 void bound_memory(std::size_t bytes, const std::filesystem::path& folder) {
   if (store) return;
   if (bytes < least_bound)
-    throw std::invalid_argument("--memory " + text_of(static_cast<double>(bytes)) +
+    throw std::invalid_argument("--memory " + bytes_text(static_cast<double>(bytes)) +
                                 ": a render takes as much beside its field; give " +
-                                text_of(static_cast<double>(least_bound)) + " at least");
+                                bytes_text(static_cast<double>(least_bound)) + " at least");
   store = new PageStore(bytes, folder);
 }
 
@@ -163,13 +161,13 @@ void make_room() {
 void require_room(double stored, double needed) {
   if (!store) return;
   if (stored > store->free_bytes())
-    throw std::runtime_error("--memory: the field needs " + text_of(stored) + " on the disk of " +
-                             store->folder().string() + ", where " + text_of(store->free_bytes()) + " are free");
+    throw std::runtime_error("--memory: the field needs " + bytes_text(stored) + " on the disk of " +
+                             store->folder().string() + ", where " + bytes_text(store->free_bytes()) + " are free");
   const double all = static_cast<double>(resident()) + needed;
   if (all > high * static_cast<double>(store->bound()))
-    throw std::runtime_error("--memory " + text_of(static_cast<double>(store->bound())) +
-                             ": the program and the tables of the field take " + text_of(all) + "; give " +
-                             text_of(all / high) + " at least");
+    throw std::runtime_error("--memory " + bytes_text(static_cast<double>(store->bound())) +
+                             ": the program and the tables of the field take " + bytes_text(all) + "; give " +
+                             bytes_text(all / high) + " at least");
 }
 
 void* map_pages(std::size_t bytes, std::size_t alignment) {

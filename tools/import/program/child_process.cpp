@@ -20,10 +20,18 @@
 namespace tensorray {
 namespace {
 
+sigset_t interrupts() {
+  sigset_t signals;
+  sigemptyset(&signals);
+  for (const int signal : {SIGINT, SIGTERM}) sigaddset(&signals, signal);
+  return signals;
+}
+
 /// Makes the child end at once on SIGINT and SIGTERM, because the parent removes the files that it leaves; and makes
-/// it end when its parent ends.
-void be_mortal() {
+/// it end when its parent ends. @param mask  The signals that the parent had blocked before it forked.
+void be_mortal(const sigset_t& mask) {
   for (const int signal : {SIGINT, SIGTERM}) std::signal(signal, SIG_DFL);
+  pthread_sigmask(SIG_SETMASK, &mask, nullptr);
 #ifdef __linux__
   prctl(PR_SET_PDEATHSIG, SIGTERM);
 #endif
@@ -44,10 +52,15 @@ int wait_for(pid_t child, const Progress& progress) {
 
 void in_child_process(const std::function<void()>& work, const Progress& progress, const std::string& on_crash) {
   std::fflush(nullptr);  // Otherwise both processes would print what is in the buffers.
+  // A signal that comes before the child has its own handlers waits for them.
+  const sigset_t blocked = interrupts();
+  sigset_t mask;
+  pthread_sigmask(SIG_BLOCK, &blocked, &mask);
   const pid_t child = fork();
+  if (child != 0) pthread_sigmask(SIG_SETMASK, &mask, nullptr);
   if (child < 0) throw std::runtime_error("no child process can be started: the system has too many");
   if (child == 0) {
-    be_mortal();
+    be_mortal(mask);
     _exit(run_and_report(
         work));  // Not exit: the exit handlers of some libraries wait for threads that the child does not have.
   }
