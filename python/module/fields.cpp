@@ -158,7 +158,7 @@ void write_field(const Field& field, const std::filesystem::path& path, bool hal
         TensorGrid grid = field.grid();
         if (remove_non_finite(grid) > 0 && grid.blocks.empty())
           throw std::runtime_error(path.string() + ": no voxel of the field is finite");
-        file.write([&](const std::filesystem::path& temporary) { write_tensor_vdb(temporary, std::move(grid), half); });
+        file.write([&](const std::filesystem::path& temporary) { write_tensor_vdb(temporary, grid, half); });
         file.commit();
       },
       report, 0);

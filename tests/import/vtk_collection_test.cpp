@@ -52,6 +52,10 @@ TEST(VtkCollection, OfATimeSeriesTheLastTimeWithAllItsParts) {
                                            "<DataSet timestep=\"9\" part=\"0\" file=\"early.vtu\"/>\n"
                                            "<DataSet timestep=\"10\" part=\"1\" file=\"late1.vtu\"/>\n"));
   EXPECT_EQ(read_vtk_source(folder / "parts.pvd")->GetNumberOfCells(), 5);
+  EXPECT_EQ(time_steps(folder / "parts.pvd"), 2);
+  EXPECT_EQ(read_vtk_source(folder / "parts.pvd", 0)->GetNumberOfCells(), 1);
+  EXPECT_EQ(read_vtk_source(folder / "parts.pvd", 1)->GetNumberOfCells(), 5);
+  EXPECT_THROW(read_vtk_source(folder / "parts.pvd", 2), std::invalid_argument);
   write_bytes(folder / "blocks.pvd", series("<DataSet timestep=\"-2\" file=\"early.vtu\"/>\n"
                                             "<DataSet timestep=\"-1\" file=\"late.vtm\"/>\n"));
   EXPECT_EQ(read_vtk_source(folder / "blocks.pvd")->GetNumberOfCells(), 5);

@@ -174,15 +174,18 @@ TEST_F(ImportErrors, HelpNamesEveryFlagAndFormat) {
 }
 
 constexpr std::size_t large_numbers = 128 * 128 * 128 * 9;
+constexpr std::size_t larger_numbers = 220 * 220 * 220 * 9;
 
 class ImportProcess : public Import {
  protected:
-  /// A file of 128³ tensors: `header`, then numbers, then `footer`.
-  void write_large(const std::string& name, const std::string& header, const std::string& footer = "") const {
+  /// A file of tensors: `header`, then numbers, then `footer`.
+  void write_large(const std::string& name, const std::string& header, const std::string& footer = "",
+                   std::size_t numbers = large_numbers) const {
     std::ofstream file(in_folder(name), std::ios::binary);
     file << header;
-    std::vector<float> slice(large_numbers / 128);
-    for (int z = 0; z < 128; ++z) {
+    constexpr int slices = 4;
+    std::vector<float> slice(numbers / slices);
+    for (int z = 0; z < slices; ++z) {
       for (std::size_t i = 0; i < slice.size(); ++i) slice[i] = static_cast<float>((i * 2654435761u + 97u * z) % 1024);
       file << bytes_of(slice);
     }
@@ -190,8 +193,10 @@ class ImportProcess : public Import {
   }
 
   /// The largest resident memory of any process of an import, bytes.
-  double peak_bytes(const std::string& file) const {
-    const pid_t program = start({"import", file, "-q", "-o", "field.vdb"});
+  double peak_bytes(const std::string& file, const Arguments& more = {}) const {
+    Arguments arguments{"import", file, "-q", "-o", "field.vdb"};
+    arguments.insert(arguments.end(), more.begin(), more.end());
+    const pid_t program = start(arguments);
     int status = 0;
     rusage usage{};
     wait4(program, &status, 0, &usage);
@@ -256,6 +261,27 @@ TEST_F(ImportProcess, TakesLessThanTwiceTheData) {
   image += bytes_of(std::vector<std::uint64_t>{4 * large_numbers});
   write_large("large.vti", image, "</AppendedData></VTKFile>");
   EXPECT_LT(peak_bytes("large.vti") - peak_bytes("small.vti"), 2 * data);
+}
+
+TEST_F(ImportProcess, OfWhatIsLargerThanItsMemoryGivesTheSameFile) {
+#ifdef __SANITIZE_ADDRESS__
+  GTEST_SKIP() << "the sanitizer's own memory is larger";
+#endif
+  if (std::filesystem::space(in_folder("")).available < (std::uintmax_t{3} << 30))
+    GTEST_SKIP() << "the test needs 3 GB on the disk of " << in_folder("");
+  write_large("large.npy", npy_header("220, 220, 220, 3, 3"), "", larger_numbers);
+  constexpr double bound = 256.0 * (1 << 20), of_threads = 128.0 * (1 << 20);
+  EXPECT_GT(peak_bytes("large.npy"), bound + of_threads);
+  std::filesystem::rename(in_folder("field.vdb"), in_folder("all.vdb"));
+  EXPECT_LE(peak_bytes("large.npy", {"--memory", "256M"}), bound + of_threads);
+  EXPECT_TRUE(read_file(in_folder("field.vdb")) == read_file(in_folder("all.vdb")));
+}
+
+/// Readers of other formats than .npy and NIfTI hold whole files.
+TEST_F(ImportErrors, AFileThatIsReadAsAWholeMustFit) {
+  write("large.vti", "<VTKFile type=\"ImageData\">");
+  std::filesystem::resize_file(in_folder("large.vti"), std::uintmax_t{1} << 30);
+  refuses({"large.vti", "--memory", "256M"}, 1, {"large.vti: --memory 256.0 MiB: ", "give "});
 }
 
 }  // namespace

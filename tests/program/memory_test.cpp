@@ -8,6 +8,7 @@ namespace {
 using namespace test;
 
 constexpr double bound = 256.0 * (1 << 20);
+constexpr double of_thread = 64.0 * (1 << 20);  ///< What a thread touches before pages are dropped.
 
 class Memory : public Program {
  protected:
@@ -30,11 +31,24 @@ TEST_F(Memory, AFieldOfFourTimesTheBoundGivesTheSameFiles) {
   const nlohmann::json all = read_json("all.json"), part = read_json("part.json");
   EXPECT_GE(part["field"]["memory_bytes"], 4 * bound);
   EXPECT_GT(all["peak_memory_bytes"], 4 * bound);
-  constexpr double of_thread = 64.0 * (1 << 20);  // What the rays of a batch touch before pages are dropped.
   EXPECT_LE(part["peak_memory_bytes"], bound + of_thread);
   RecordProperty("seconds_without", all["seconds"].dump());
   RecordProperty("seconds_with", part["seconds"].dump());
   for (const std::string& name : files()) EXPECT_NE(name.rfind(".tensorray", 0), 0u) << name;
+}
+
+/// The samples that tensors are derived from have the bound, too.
+TEST_F(Memory, DerivedTensorsAreTheSame) {
+  run_well({"make", "point_load", "-o", "field.vdb", "--resolution", "190"});
+  write("scene.json",
+        scene(R"({"file": "field.vdb", "name": "point_load_row0", "derive": "gradient", "eigenvalues": "raw",
+                  "scale": 0.5})"));
+  run_well({"render", "scene.json", "-q", "-o", "all.exr", "--stats", "all.json"});
+  run_well(
+      {"render", "scene.json", "-q", "-o", "part.exr", "--stats", "part.json", "--memory", "256M", "--threads", "1"});
+  EXPECT_TRUE(read_file(in_folder("all.exr")) == read_file(in_folder("part.exr")));
+  EXPECT_GT(read_json("all.json")["peak_memory_bytes"], bound + of_thread);
+  EXPECT_LE(read_json("part.json")["peak_memory_bytes"], bound + of_thread);
 }
 
 /// A field that fits is not slower, and also fields that are made within the bound are the same.
@@ -48,7 +62,7 @@ TEST_F(Memory, SmallFieldsAreTheSame) {
 TEST_F(Memory, WhatCannotFitIsSaid) {
   write("scene.json", scene(R"({"generate": {"kind": "vortex", "resolution": 9}})"));
   const std::pair<const char*, const char*> wrong[] = {
-      {"100M", "--memory 100.0 MiB: a render takes as much beside its field; give 256.0 MiB at least"},
+      {"100M", "--memory 100.0 MiB: the program takes as much beside its field; give 256.0 MiB at least"},
       {"much", "--memory"}};
   for (const auto& [size, text] : wrong) {
     const Outcome outcome = run({"render", "scene.json", "-o", "a.exr", "--memory", size});

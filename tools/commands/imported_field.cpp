@@ -54,6 +54,7 @@ ImportedField::ImportedField(const std::filesystem::path& file, const ImportChoi
   add("--order", choices.order);
   add("--array", choices.array);
   add("--gradient-of", choices.gradient_of);
+  if (choices.memory > 0) add("--memory", std::to_string(choices.memory));
   arguments.insert(arguments.end(), {"--", file.string()});
   const ProgramEnd end = run_program(import_program(), arguments, UnnamedFile());
   if (end.signal != 0) throw std::runtime_error(file.string() + ": the import crashed; the file may be damaged");

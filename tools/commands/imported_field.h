@@ -2,6 +2,7 @@
 /// @file tools/commands/imported_field.h
 /// Renders another program's file without a separate import.
 
+#include <cstddef>
 #include <filesystem>
 #include <string>
 
@@ -12,6 +13,7 @@ namespace tensorray {
 /// The choices of an import that a render offers, as the options of `tensorray import`; empty: none.
 struct ImportChoices {
   std::string order, array, gradient_of;
+  std::size_t memory = 0;  ///< What may be resident, in bytes; 0: without a bound.
 };
 
 /// Whether a path names a file that is neither a scene nor an OpenVDB file.

@@ -129,7 +129,7 @@ void make(const MakeOptions& options, const Progress& progress) {
   if (remove_non_finite(grid) > 0)
     throw std::invalid_argument("with these parameters the field is too large for single precision");
   progress.update("writing", 0, 1);
-  file.write([&](const std::filesystem::path& path) { write_tensor_vdb(path, std::move(grid), options.half); });
+  file.write([&](const std::filesystem::path& path) { write_tensor_vdb(path, grid, options.half); });
   const auto bytes = static_cast<double>(std::filesystem::file_size(file.path()));
   progress.update("writing", 1, 1);
   file.commit();

@@ -99,7 +99,9 @@ void render_import(const std::string& file, SceneChanges changes, const RenderOp
   std::vector<NamedFile> outputs{{options.run.statistics, "--stats"}};
   for (const std::filesystem::path& output : changes.outputs) outputs.push_back({output, "-o"});
   require_distinct_files({{file, "the input"}}, outputs);
-  const ImportedField field(file, options.import, options.run.quiet);
+  ImportChoices choices = options.import;
+  choices.memory = options.run.memory;
+  const ImportedField field(file, choices, options.run.quiet);
   RenderRun run = options.run;
   run.keeping.is_on = false;  // The field does not stay.
   render_scene(field.path(), changes, run, progress);

@@ -20,6 +20,7 @@
 #include "tools/import/vtk/plot3d.h"
 #include "tools/import/vtk/vtk_messages.h"
 #include "tools/import/vtk/vtk_source.h"
+#include "volumes/grids/page_memory.h"
 
 namespace tensorray {
 namespace {
@@ -122,11 +123,23 @@ Lattice placed(Lattice lattice, const ImportSettings& settings) {
   return lattice;
 }
 
+/// Checks, where there is a bound of memory, that it holds the files: readers of other formats than .npy and NIfTI
+/// read them as a whole.
+void require_room_for(const std::vector<std::filesystem::path>& files) {
+  double bytes = 0;
+  std::error_code none;
+  for (const std::filesystem::path& file : files)
+    if (std::filesystem::is_regular_file(file, none)) bytes += static_cast<double>(std::filesystem::file_size(file));
+  require_room(0, bytes);
+}
+
 TensorGrid import_any(const ImportSettings& settings, const Progress& progress, ImportReport& report) {
   const std::filesystem::path& file = settings.files.front();
-  const bool has_steps = settings.files.size() == 1 && !lattice_reader(file);
+  const OpenLattice open = lattice_reader(file);
+  const bool has_steps = settings.files.size() == 1 && !open;
   if (!has_steps && settings.step.value_or(0) > 0)
     throw std::invalid_argument("has one step of time; leave --steps out");
+  if (open != open_npy && open != open_nifti) require_room_for(settings.files);
   if (settings.files.size() == 2) {
     return import_data_set(read_plot3d(file, settings.files[1]), settings, progress, report);
   }
@@ -135,7 +148,6 @@ TensorGrid import_any(const ImportSettings& settings, const Progress& progress, 
     with_header.files = {std::filesystem::path(file).replace_extension(".hdr")};
     return import_any(with_header, progress, report);
   }
-  const OpenLattice open = lattice_reader(file);
   if (!open) return import_data_set(read_vtk_source(file, settings.step), settings, progress, report);
   if (open == open_npy) return import_lattice(placed(open(file), settings), settings, report);
   if (wants_sampling(settings))

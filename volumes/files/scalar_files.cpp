@@ -32,7 +32,7 @@ void write_scalar_vdb(const std::filesystem::path& path, const std::vector<Scala
   openvdb::initialize();
   openvdb::MetaMap of_file;
   for (const auto& [key, value] : metadata) of_file.insertMeta(key, openvdb::StringMetadata(value));
-  openvdb::GridCPtrVec all;
+  openvdb::GridPtrVec all;
   for (const ScalarGrid& grid : grids) all.push_back(float_grid(grid));
   write_vdb(path, all, of_file);
 }

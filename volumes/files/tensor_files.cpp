@@ -3,8 +3,10 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <memory>
 #include <stdexcept>
 #include <type_traits>
+#include <unordered_map>
 
 #include <malloc.h>
 #include <tbb/parallel_for.h>
@@ -201,7 +203,7 @@ template <class Blocks>
 void add_blocks(const std::vector<Source>& sources, Blocks& blocks) {
   const std::vector<openvdb::Coord> origins = block_origins(sources);
   const std::size_t first = blocks.size();
-  if constexpr (std::is_same_v<Blocks, TensorBlocks>) TensorBlocks::allocator_type::prepare(origins.size());
+  Blocks::allocator_type::prepare(origins.size());
   blocks.resize(first + origins.size());
   tbb::parallel_for(std::size_t{0}, origins.size(), [&](std::size_t i) {
     make_room();
@@ -282,17 +284,6 @@ std::vector<Part> parts_of(const std::vector<GridInfo>& grids, const std::string
   return {{"", {{0, 0, 0}, {1, 0, 0}, {2, 0, 0}}}};
 }
 
-TensorBlocks tensors_of(const std::vector<Source>& sources, Derive derive, const Eigen::Matrix3d& to_index) {
-  TensorBlocks blocks;
-  if (derive == Derive::none) {
-    add_blocks(sources, blocks);
-    return blocks;
-  }
-  std::vector<SampleBlock> samples;
-  add_blocks(sources, samples);
-  return derive == Derive::gradient ? gradient(samples, to_index) : hessian(samples, to_index);
-}
-
 /// The grids of a field in a file.
 std::vector<Source> sources_of(const VdbFile& file, const std::string& name, const std::vector<Part>& parts) {
   std::vector<Source> sources;
@@ -304,10 +295,12 @@ std::vector<Source> sources_of(const VdbFile& file, const std::string& name, con
 
 /// Where there is a bound of memory, slabs across x of which each has its part of it; else one with everything.
 /// @param sources  Grids without voxels. Their metadata say where they have some.
-std::vector<openvdb::CoordBBox> slabs_of(const std::filesystem::path& path, const std::vector<Source>& sources) {
+/// @param derives  Whether the tensors are made of the samples of all slabs, which are then in memory as well.
+std::vector<openvdb::CoordBBox> slabs_of(const std::filesystem::path& path, const std::vector<Source>& sources,
+                                         bool derives) {
   using openvdb::CoordBBox, openvdb::GridBase;
   CoordBBox all = CoordBBox::inf();
-  constexpr double voxel_bytes = 36, brick_part = 1.5, leaf_bytes = 700, slab_part = 0.12;
+  constexpr double voxel_bytes = 36, sample_bytes = 24, brick_part = 1.5, leaf_bytes = 700, slab_part = 0.12;
   double voxels = 0;
   openvdb::Int32 first = all.max().x(), last = all.min().x();
   for (const Source& source : sources) {
@@ -322,7 +315,7 @@ std::vector<openvdb::CoordBBox> slabs_of(const std::filesystem::path& path, cons
     last = std::max(last, max->value().x());
   }
   const double leaves = voxels / TensorBlock::voxels * static_cast<double>(sources.size());
-  require_room(brick_part * voxel_bytes * voxels, leaf_bytes * leaves);
+  require_room((brick_part * voxel_bytes + (derives ? sample_bytes : 0)) * voxels, leaf_bytes * leaves);
   const double slab = slab_part * static_cast<double>(*memory_bound()) / voxel_bytes;
   const double width = std::clamp(slab / std::max(1.0, voxels) * (static_cast<double>(last) - first + 1), 8.0, 1e9);
   std::vector<CoordBBox> slabs;
@@ -336,42 +329,60 @@ std::vector<openvdb::CoordBBox> slabs_of(const std::filesystem::path& path, cons
   return slabs;
 }
 
-/// The three grids of a field, without voxels.
-std::array<openvdb::Vec3SGrid::Ptr, 3> empty_rows(const TensorGrid& grid, bool half) {
-  std::array<openvdb::Vec3SGrid::Ptr, 3> rows;
-  for (int row = 0; row < 3; ++row) {
-    rows[row] = openvdb::Vec3SGrid::create();
-    rows[row]->setName(grid.name + "_row" + std::to_string(row));
-    rows[row]->setTransform(linear_transform(grid.to_world));
-    rows[row]->setGridClass(openvdb::GRID_UNKNOWN);
-    rows[row]->setVectorType(openvdb::VEC_INVARIANT);
-    rows[row]->setSaveFloatAsHalf(half);
-    for (const auto& [key, value] : grid.metadata)
-      if (!(*rows[row])[key])
-        rows[row]->insertMeta(key, openvdb::StringMetadata(value));  // Keep the grid's own entries: name, type, ...
-  }
-  return rows;
-}
+openvdb::Coord coord(const Eigen::Vector3i& index) { return {index.x(), index.y(), index.z()}; }
 
-void add_block(const TensorBlock& block, const std::array<openvdb::Vec3SGrid::Ptr, 3>& rows) {
-  for (int row = 0; row < 3; ++row) {
-    auto* leaf =
-        new openvdb::Vec3STree::LeafNodeType(openvdb::Coord(block.origin.x(), block.origin.y(), block.origin.z()));
-    rows[row]->tree().addLeaf(leaf);  // The tree owns it.
-    for (int offset = 0; offset < TensorBlock::voxels; ++offset) {
-      if (!block.active[offset]) continue;
-      const auto values = block.values[offset].row(row);
-      leaf->setValueOn(static_cast<openvdb::Index>(offset), openvdb::Vec3s(values[0], values[1], values[2]));
+/// One row of the tensors of a grid, which must outlive it, as a grid of vectors that is only for writing: its leaves
+/// have masks, and get their values when they are written, one at a time.
+class RowGrid : public openvdb::Vec3SGrid {
+ public:
+  using Leaf = openvdb::Vec3STree::LeafNodeType;
+
+  RowGrid(const TensorGrid& grid, int row, bool half) : row_(row) {
+    setName(grid.name + "_row" + std::to_string(row));
+    setTransform(linear_transform(grid.to_world));
+    setGridClass(openvdb::GRID_UNKNOWN);
+    setVectorType(openvdb::VEC_INVARIANT);
+    setSaveFloatAsHalf(half);
+    for (const auto& [key, value] : grid.metadata)
+      if (!(*this)[key])
+        insertMeta(key, openvdb::StringMetadata(value));  // Keep the grid's own entries: name, type, ...
+    for (const TensorBlock& block : grid.blocks) {
+      make_room();
+      auto* const leaf = new Leaf(openvdb::PartialCreate(), coord(block.origin));
+      tree().addLeaf(leaf);  // The tree owns it.
+      blocks_.emplace(leaf, &block);
+      for (int offset = 0; offset < TensorBlock::voxels; ++offset)
+        leaf->setActiveState(static_cast<openvdb::Index>(offset), block.active[offset]);
     }
   }
-}
 
-void write_rows(const std::filesystem::path& path, const TensorGrid& grid,
-                const std::array<openvdb::Vec3SGrid::Ptr, 3>& rows) {
-  openvdb::MetaMap metadata;
-  for (const auto& [key, value] : grid.metadata) metadata.insertMeta(key, openvdb::StringMetadata(value));
-  write_vdb(path, {rows.begin(), rows.end()}, metadata);
-}
+  /// What the file says that its voxels take.
+  openvdb::Index64 memUsage() const override {
+    return openvdb::Vec3SGrid::memUsage() + tree().leafCount() * Leaf::SIZE * sizeof(openvdb::Vec3s);
+  }
+
+  /// The format: the buffers of all leaves, in their order in the tree.
+  void writeBuffers(std::ostream& file) const override {
+    for (auto leaf = tree().cbeginLeaf(); leaf; ++leaf) {
+      make_room();
+      filled(*blocks_.at(&*leaf)).writeBuffers(file, saveFloatAsHalf());
+    }
+  }
+
+ private:
+  Leaf filled(const TensorBlock& block) const {
+    Leaf leaf(coord(block.origin));
+    for (int offset = 0; offset < TensorBlock::voxels; ++offset) {
+      if (!block.active[offset]) continue;
+      const auto values = block.values[offset].row(row_);
+      leaf.setValueOn(static_cast<openvdb::Index>(offset), openvdb::Vec3s(values[0], values[1], values[2]));
+    }
+    return leaf;
+  }
+
+  const int row_;
+  std::unordered_map<const Leaf*, const TensorBlock*> blocks_;
+};
 
 void check_half_range(const std::filesystem::path& path, const TensorGrid& grid) {
   for (const TensorBlock& block : grid.blocks)
@@ -398,6 +409,7 @@ std::vector<std::string> tensor_names(const std::vector<GridInfo>& grids) {
 std::vector<GridInfo> list_vdb(const std::filesystem::path& path) { return infos_of(read_vdb(path)); }
 
 TensorGrid read_tensor_vdb(const std::filesystem::path& path, const std::string& name, Derive derive) {
+  const bool is_bounded = memory_bound().has_value(), derives = derive != Derive::none;
   const std::vector<GridInfo> infos = list_vdb(path);
   TensorGrid result;
   result.name = chosen_name(path, infos, name, derive);
@@ -405,23 +417,30 @@ TensorGrid read_tensor_vdb(const std::filesystem::path& path, const std::string&
   std::set<std::string> wanted;
   for (const Part& part : parts) wanted.insert(result.name + part.suffix);
 
-  const bool is_bounded = memory_bound() && derive == Derive::none;
   const openvdb::CoordBBox nothing(openvdb::Coord::max(), openvdb::Coord::max());
   VdbFile file = read_vdb(path, wanted, is_bounded ? &nothing : nullptr);
   std::vector<Source> sources = sources_of(file, result.name, parts);
   result.to_world = common_transform(path, sources);
   result.metadata = metadata_of(file.metadata, *sources.front().grid);
+  const auto read = [&](auto& blocks) {
+    if (!is_bounded) return add_blocks(sources, blocks);
+    for (const openvdb::CoordBBox& slab : slabs_of(path, sources, derives)) {
+      sources.clear();
+      file = {};  // Before the next one is read.
+      malloc_trim(0);
+      file = read_vdb(path, wanted, &slab);
+      sources = sources_of(file, result.name, parts);
+      add_blocks(sources, blocks);
+    }
+  };
   try {
-    if (!is_bounded) result.blocks = tensors_of(sources, derive, result.to_world.inverse().linear());
-    if (is_bounded)
-      for (const openvdb::CoordBBox& slab : slabs_of(path, sources)) {
-        sources.clear();
-        file = {};  // Before the next one is read.
-        malloc_trim(0);
-        file = read_vdb(path, wanted, &slab);
-        sources = sources_of(file, result.name, parts);
-        add_blocks(sources, result.blocks);
-      }
+    if (!derives) read(result.blocks);
+    if (derives) {
+      SampleBlocks samples;
+      read(samples);
+      const Eigen::Matrix3d to_index = result.to_world.inverse().linear();
+      result.blocks = derive == Derive::gradient ? gradient(samples, to_index) : hessian(samples, to_index);
+    }
   } catch (const std::bad_alloc&) {
     fail(path, "the active voxels of \"" + result.name + "\" do not fit in memory; resample it more coarsely");
   }
@@ -431,16 +450,11 @@ TensorGrid read_tensor_vdb(const std::filesystem::path& path, const std::string&
 
 void write_tensor_vdb(const std::filesystem::path& path, const TensorGrid& grid, bool half) {
   if (half) check_half_range(path, grid);
-  const auto rows = empty_rows(grid, half);
-  for (const TensorBlock& block : grid.blocks) add_block(block, rows);
-  write_rows(path, grid, rows);
-}
-
-void write_tensor_vdb(const std::filesystem::path& path, TensorGrid&& grid, bool half) {
-  if (half) check_half_range(path, grid);
-  const auto rows = empty_rows(grid, half);
-  for (; !grid.blocks.empty(); grid.blocks.pop_front()) add_block(grid.blocks.front(), rows);
-  write_rows(path, grid, rows);
+  openvdb::GridPtrVec rows;
+  for (int row = 0; row < 3; ++row) rows.push_back(std::make_shared<RowGrid>(grid, row, half));
+  openvdb::MetaMap metadata;
+  for (const auto& [key, value] : grid.metadata) metadata.insertMeta(key, openvdb::StringMetadata(value));
+  write_vdb(path, rows, metadata);
 }
 
 }  // namespace tensorray

@@ -39,14 +39,11 @@ TensorGrid read_tensor_vdb(const std::filesystem::path& path, const std::string&
 
 /// Writes the rows of a field as three Vec3S grids NAME_row0 … NAME_row2 with vector type "invariant" and one
 /// transform. Writes the grid's metadata on the file and on each grid. Equal grids give equal bytes. Writes the file
-/// in place.
+/// in place, block by block, so that memory does not hold the field twice.
 /// @param half  Store 16-bit floats: three significant digits between 6e-5 and 65504, steps of 6e-8 below.
 /// @throw std::runtime_error naming the file and the reason (also when the disk is full; with `half`, when a value
 /// exceeds 65504).
 void write_tensor_vdb(const std::filesystem::path& path, const TensorGrid& grid, bool half = false);
-
-/// The same, but frees the grid's blocks one by one, so that memory never holds the field twice.
-void write_tensor_vdb(const std::filesystem::path& path, TensorGrid&& grid, bool half = false);
 
 /// The grids of a file, in the file's order. @throw std::runtime_error as read_tensor_vdb.
 std::vector<GridInfo> list_vdb(const std::filesystem::path& path);

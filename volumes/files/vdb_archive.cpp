@@ -205,13 +205,42 @@ class Reader : private openvdb::io::Archive {
 
 class Writer : private openvdb::io::Archive {
  public:
-  void write_file(std::fstream& file, const openvdb::GridCPtrVec& grids, const openvdb::MetaMap& metadata) {
-    Archive::write(file, grids, /*seekable=*/true, metadata);
+  void write_file(std::fstream& file, const openvdb::GridPtrVec& grids, const openvdb::MetaMap& metadata) {
+    auto stream_metadata = std::make_shared<openvdb::io::StreamMetadata>();
+    openvdb::io::setStreamMetadataPtr(file, stream_metadata, /*transfer=*/false);
+    writeHeader(file, /*seekable=*/true);
+    metadata.writeMeta(file);
+    const auto count = static_cast<std::int32_t>(grids.size());
+    file.write(reinterpret_cast<const char*>(&count), sizeof count);
+    for (const openvdb::GridBase::Ptr& grid : grids) write_grid(file, *grid);
     file.flush();
     make_tag_of_contents(file);
   }
 
  private:
+  /// As Archive::writeGrid, which also writes a table for delayed loading: for that, all values must be in memory, and
+  /// are compressed twice.
+  void write_grid(std::ostream& file, openvdb::GridBase& grid) const {
+    openvdb::io::GridDescriptor descriptor(grid.getName(), grid.type(), grid.saveFloatAsHalf());
+    descriptor.writeHeader(file);
+    const std::streampos positions = file.tellp();
+    descriptor.writeStreamPos(file);
+    descriptor.setGridPos(file.tellp());
+    setGridCompression(file, grid);
+    grid.addStatsMetadata();
+    const std::string compressed = openvdb::io::compressionToString(openvdb::io::getDataCompression(file));
+    grid.insertMeta(openvdb::GridBase::META_FILE_COMPRESSION, openvdb::StringMetadata(compressed));
+    grid.writeMeta(file);
+    grid.writeTransform(file);
+    grid.writeTopology(file);
+    descriptor.setBlockPos(file.tellp());
+    grid.writeBuffers(file);
+    descriptor.setEndPos(file.tellp());
+    file.seekp(positions);
+    descriptor.writeStreamPos(file);
+    descriptor.seekToEnd(file);
+  }
+
   /// Replaces the random tag in the header by a hash of the bytes after the tag.
   void make_tag_of_contents(std::fstream& file) const {
     const std::streamoff end = file.tellp();
@@ -258,7 +287,7 @@ VdbFile read_vdb(const std::filesystem::path& path, const std::set<std::string>&
   }
 }
 
-void write_vdb(const std::filesystem::path& path, const openvdb::GridCPtrVec& grids, const openvdb::MetaMap& metadata) {
+void write_vdb(const std::filesystem::path& path, const openvdb::GridPtrVec& grids, const openvdb::MetaMap& metadata) {
   openvdb::initialize();
   std::vector<char> buffer(stream_buffer);
   std::fstream file;

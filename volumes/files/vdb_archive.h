@@ -37,10 +37,11 @@ struct VdbFile {
 VdbFile read_vdb(const std::filesystem::path& path, const std::set<std::string>& wanted = {},
                  const openvdb::CoordBBox* box = nullptr);
 
-/// Writes grids in place with OpenVDB's default compression. Equal grids give equal bytes: the file's unique tag,
-/// which OpenVDB draws at random, is replaced by a hash of the contents.
+/// Writes grids in place with OpenVDB's default compression, and adds their statistics to their metadata; writeBuffers
+/// is called once for each, and is the only one of their functions that needs voxels' values. Equal grids give equal
+/// bytes: the file's unique tag, which OpenVDB draws at random, is replaced by a hash of the contents.
 /// @throw std::runtime_error naming the file and the reason, also when the disk is full.
-void write_vdb(const std::filesystem::path& path, const openvdb::GridCPtrVec& grids, const openvdb::MetaMap& metadata);
+void write_vdb(const std::filesystem::path& path, const openvdb::GridPtrVec& grids, const openvdb::MetaMap& metadata);
 
 /// The transform of a grid. @param to_world  From voxel indices to world.
 openvdb::math::Transform::Ptr linear_transform(const Eigen::Affine3d& to_world);

@@ -147,7 +147,7 @@ void bound_memory(std::size_t bytes, const std::filesystem::path& folder) {
   if (store) return;
   if (bytes < least_bound)
     throw std::invalid_argument("--memory " + bytes_text(static_cast<double>(bytes)) +
-                                ": a render takes as much beside its field; give " +
+                                ": the program takes as much beside its field; give " +
                                 bytes_text(static_cast<double>(least_bound)) + " at least");
   store = new PageStore(bytes, folder);
 }

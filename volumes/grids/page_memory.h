@@ -5,6 +5,7 @@
 
 #include <cstddef>
 #include <filesystem>
+#include <memory>
 #include <optional>
 
 namespace tensorray {
@@ -34,5 +35,28 @@ void require_room(double stored, double resident);
 void* map_pages(std::size_t bytes, std::size_t alignment);
 
 void unmap_pages(void* memory, std::size_t bytes) noexcept;
+
+/// An allocator of large arrays, which are pages where there is a bound. The bound must not come between an array and
+/// its end.
+template <class T>
+struct PageAllocator {
+  using value_type = T;
+
+  PageAllocator() = default;
+  template <class Other>
+  PageAllocator(const PageAllocator<Other>&) noexcept {}  // NOLINT: containers convert allocators implicitly.
+
+  T* allocate(std::size_t count) {
+    if (!memory_bound()) return std::allocator<T>().allocate(count);
+    return static_cast<T*>(map_pages(count * sizeof(T), 4096));
+  }
+  void deallocate(T* memory, std::size_t count) noexcept {
+    if (!memory_bound()) return std::allocator<T>().deallocate(memory, count);
+    unmap_pages(memory, count * sizeof(T));
+  }
+
+  friend bool operator==(const PageAllocator&, const PageAllocator&) { return true; }
+  friend bool operator!=(const PageAllocator&, const PageAllocator&) { return false; }
+};
 
 }  // namespace tensorray

@@ -5,6 +5,8 @@
 
 #include <tbb/parallel_for.h>
 
+#include "volumes/grids/page_memory.h"
+
 namespace tensorray {
 namespace {
 
@@ -23,7 +25,7 @@ std::tuple<int, int, int> key(const Vector3i& origin) { return {origin.x(), orig
 /// A block and its 26 neighbours.
 class Neighbourhood {
  public:
-  Neighbourhood(const std::vector<SampleBlock>& blocks, const Vector3i& origin) {
+  Neighbourhood(const SampleBlocks& blocks, const Vector3i& origin) {
     for (int i = 0; i < 27; ++i) {
       const Vector3i wanted = origin + TensorBlock::size * (Vector3i(i / 9, i / 3 % 3, i % 3) - Vector3i::Ones());
       const auto found =
@@ -106,9 +108,10 @@ Matrix3d hessian_at(const Neighbourhood& near, const Vector3i& position, const M
 
 /// Evaluates `tensor_at(neighbourhood, position, to_index)` at every active voxel.
 template <class TensorAt>
-TensorBlocks derive(const std::vector<SampleBlock>& blocks, const Matrix3d& to_index, const TensorAt& tensor_at) {
+TensorBlocks derive(const SampleBlocks& blocks, const Matrix3d& to_index, const TensorAt& tensor_at) {
   TensorBlocks result = make_blocks(blocks.size());
   tbb::parallel_for(std::size_t{0}, blocks.size(), [&](std::size_t i) {
+    make_room();
     const Neighbourhood near(blocks, blocks[i].origin);
     result[i].origin = blocks[i].origin;
     result[i].active = blocks[i].active;
@@ -121,11 +124,11 @@ TensorBlocks derive(const std::vector<SampleBlock>& blocks, const Matrix3d& to_i
 
 }  // namespace
 
-TensorBlocks gradient(const std::vector<SampleBlock>& blocks, const Matrix3d& to_index) {
+TensorBlocks gradient(const SampleBlocks& blocks, const Matrix3d& to_index) {
   return derive(blocks, to_index, gradient_at);
 }
 
-TensorBlocks hessian(const std::vector<SampleBlock>& blocks, const Matrix3d& to_index) {
+TensorBlocks hessian(const SampleBlocks& blocks, const Matrix3d& to_index) {
   return derive(blocks, to_index, hessian_at);
 }
 

@@ -4,10 +4,11 @@
 
 #include <array>
 #include <bitset>
-#include <vector>
+#include <deque>
 
 #include <Eigen/Core>
 
+#include "volumes/grids/block_memory.h"
 #include "volumes/grids/tensor_grid.h"
 
 namespace tensorray {
@@ -21,6 +22,8 @@ struct SampleBlock {
   SampleBlock() { values.fill(Eigen::Vector3d::Zero()); }
 };
 
+using SampleBlocks = std::deque<SampleBlock, SlotAllocator<SampleBlock>>;
+
 // Differences use active voxels only. They are central inside the active region and one-sided at its edge, where they
 // are of second order if the region is three voxels deep. The field counts as constant along a direction without an
 // active neighbour.
@@ -28,9 +31,9 @@ struct SampleBlock {
 // @param to_index  The linear part of the transform from world to index space.
 
 /// T(i, j) = ∂v_i/∂x_j, world axes.
-TensorBlocks gradient(const std::vector<SampleBlock>& blocks, const Eigen::Matrix3d& to_index);
+TensorBlocks gradient(const SampleBlocks& blocks, const Eigen::Matrix3d& to_index);
 
 /// T(i, j) = ∂²f/∂x_i∂x_j, world axes; exactly symmetric.
-TensorBlocks hessian(const std::vector<SampleBlock>& blocks, const Eigen::Matrix3d& to_index);
+TensorBlocks hessian(const SampleBlocks& blocks, const Eigen::Matrix3d& to_index);
 
 }  // namespace tensorray

@@ -1,9 +1,7 @@
 #include "tools/import/lattices/lattice.h"
 
 #include <algorithm>
-#include <iterator>
 #include <memory>
-#include <numeric>
 #include <stdexcept>
 #include <tuple>
 #include <utility>
@@ -13,6 +11,7 @@
 #include <fmt/ranges.h>
 #include <tbb/parallel_for.h>
 
+#include "volumes/grids/page_memory.h"
 #include "volumes/tensors/finite_differences.h"
 
 namespace tensorray {
@@ -91,15 +90,15 @@ void add_slab(const Lattice& lattice, const ValueOf& value_of, int first_z, std:
 /// Sorts blocks by origin. Moves each block only once, because blocks are large.
 template <class Blocks>
 void sort(Blocks& blocks) {
-  const auto key = [&](std::size_t i) {
-    const Vector3i& origin = blocks[i].origin;
-    return std::tuple(origin.x(), origin.y(), origin.z());
-  };
-  std::vector<std::size_t> source(blocks.size());
-  std::iota(source.begin(), source.end(), std::size_t{0});
-  std::sort(source.begin(), source.end(), [&](std::size_t a, std::size_t b) { return key(a) < key(b); });
+  std::vector<std::tuple<int, int, int, std::size_t>> order;
+  for (const auto& block : blocks)
+    order.emplace_back(block.origin.x(), block.origin.y(), block.origin.z(), order.size());
+  std::sort(order.begin(), order.end());
+  std::vector<std::size_t> source;
+  for (const auto& place : order) source.push_back(std::get<3>(place));
   for (std::size_t i = 0; i < source.size(); ++i) {
     if (source[i] == i) continue;
+    make_room();
     const auto first = std::make_unique<typename Blocks::value_type>(std::move(blocks[i]));
     std::size_t to = i;
     while (source[to] != i) {
@@ -111,12 +110,23 @@ void sort(Blocks& blocks) {
   }
 }
 
+/// Checks, where there is a bound of memory, that it holds what is beside the blocks: those of the slab that is being
+/// read, a slice, and the leaves of the file that is written.
+template <class Block>
+void require_room_for(const Lattice& lattice) {
+  constexpr double leaf_bytes = 600;
+  const Eigen::Array3d blocks = ((lattice.size.array() - 1) / width + 1).cast<double>();
+  const double slice = lattice.size.x() * sizeof(double) * lattice.size.y() * lattice.components;
+  require_room(0, blocks.x() * blocks.y() * sizeof(Block) + slice + leaf_bytes * blocks.prod());
+}
+
 /// Fills `blocks` with `value_of(components)` at all active voxels.
 template <class Blocks, class ValueOf>
 void read_blocks(const Lattice& lattice, const ValueOf& value_of, Blocks& blocks, LatticeReport& report) {
   report = {};
   const auto slice_voxels = static_cast<std::size_t>(lattice.size.x()) * lattice.size.y();
   report.voxels = slice_voxels * lattice.size.z();
+  require_room_for<typename Blocks::value_type>(lattice);
   std::vector<double> slice(slice_voxels * lattice.components);
   for (int first_z = (lattice.size.z() - 1) / width * width; first_z >= 0; first_z -= width)
     add_slab(lattice, value_of, first_z, slice, blocks, report);
@@ -177,17 +187,13 @@ TensorGrid gradient_of(const Lattice& lattice, LatticeReport& report) {
     throw std::invalid_argument(
         fmt::format("a gradient or a strain needs a vector of three components: {} has {}; choose another",
                     called(lattice), unmasked(lattice)));
-  std::vector<SampleBlock> vectors;
-  const Vector3i blocks = (lattice.size.array() - 1) / width + 1;
-  vectors.reserve(static_cast<std::size_t>(blocks.x()) * blocks.y() *
-                  blocks.z());  // Reserve, because growing would need the memory twice.
+  SampleBlocks vectors;
   const auto vector = [&](const double* components) -> Vector3d {
     return lattice.frame * Eigen::Map<const Vector3d>(components);
   };
   read_blocks(lattice, vector, vectors, report);
   TensorGrid grid = empty_grid(lattice);
-  auto tensors = gradient(vectors, lattice.to_world.linear().inverse());
-  grid.blocks.assign(std::make_move_iterator(tensors.begin()), std::make_move_iterator(tensors.end()));
+  grid.blocks = gradient(vectors, lattice.to_world.linear().inverse());
   return grid;
 }
 

@@ -23,6 +23,7 @@
 
 #include "base/errors.h"
 #include "tools/import/lattices/lattice_files.h"
+#include "volumes/grids/page_memory.h"
 
 namespace tensorray {
 namespace {
@@ -32,7 +33,7 @@ using Eigen::Matrix3d;
 using Image = std::unique_ptr<nifti_image, decltype(&nifti_image_free)>;
 
 /// The bytes of one component of one slice.
-using Plane = std::vector<char>;
+using Plane = std::vector<char, PageAllocator<char>>;
 
 template <class Number>
 double number(const char* bytes, std::size_t index) {
@@ -163,6 +164,7 @@ std::vector<std::vector<Plane>> read_planes(const nifti_image& image, const std:
   const auto values = static_cast<std::size_t>(image.nx) * static_cast<std::size_t>(image.ny);
   for (int component = 0; component < components; ++component)
     for (std::vector<Plane>& slice : slices) {
+      make_room();
       Plane& plane = slice.emplace_back(values * static_cast<std::size_t>(image.nbyper));
       if (znzread(plane.data(), 1, plane.size(), file.get()) != plane.size())
         fail(path, "is cut off, or its compressed data are damaged");

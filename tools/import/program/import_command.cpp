@@ -23,6 +23,7 @@
 #include "tools/import/import_file.h"
 #include "tools/import/program/child_process.h"
 #include "volumes/files/tensor_files.h"
+#include "volumes/grids/page_memory.h"
 
 namespace tensorray {
 namespace {
@@ -38,6 +39,7 @@ struct ImportOptions {
   std::vector<double> bounds, origin;
   std::filesystem::path output, boundary;
   std::string name, units, steps = "last";
+  std::size_t memory = 0;  ///< Bytes; 0: without a bound.
   bool half = false, quiet = false;
 };
 
@@ -96,6 +98,7 @@ void print_sampling(const ImportReport& report) {
 
 /// The work of the child: everything except giving the files their final names.
 void import_to(const ImportOptions& options, const ImportSettings& settings, OutputFile& output, Progress& progress) {
+  if (options.memory > 0) bound_memory(options.memory, std::filesystem::absolute(options.output).parent_path());
   ImportReport report;
   std::optional<ProgressBar> bar(std::in_place, progress, options.quiet);
   TensorGrid grid = import_tensors(settings, progress, report);
@@ -105,7 +108,7 @@ void import_to(const ImportOptions& options, const ImportSettings& settings, Out
   progress.update("writing", 0, 1);
   const std::string name = grid.name;
   const Eigen::Vector3i size = grid.active_box().sizes() + Eigen::Vector3i::Ones();
-  output.write([&](const std::filesystem::path& path) { write_tensor_vdb(path, std::move(grid), options.half); });
+  output.write([&](const std::filesystem::path& path) { write_tensor_vdb(path, grid, options.half); });
   bar.reset();
   fmt::print("{}: field \"{}\", {} x {} x {} voxels, {}\n", options.output.string(), escaped(name), size.x(), size.y(),
              size.z(), bytes_text(static_cast<double>(std::filesystem::file_size(output.path()))));
@@ -254,11 +257,17 @@ void add_import_options(CLI::App& program, Progress& progress) {
       ->check(check_ply_output)
       ->option_text("FILE");
   program
-      .add_option(
-          "--steps", options->steps,
-          "Steps of time of an OpenFOAM case or an ExodusII file: last, first, a number from 1 on, or all, each "
-          "in a file of its own (-o flow.####.vdb) (last)")
+      .add_option("--steps", options->steps,
+                  "Steps of time of an OpenFOAM case, an ExodusII file or a .pvd: last, first, a number from 1 on, or "
+                  "all, each "
+                  "in a file of its own (-o flow.####.vdb) (last)")
       ->option_text("STEPS");
+  program
+      .add_option("--memory", options->memory,
+                  "Bound of what is in memory, as 8G or 500M; of .npy and NIfTI the rest is kept on the disk of the "
+                  "output, and files of other kinds must be smaller")
+      ->transform(CLI::AsSizeValue(false))
+      ->option_text("SIZE");
   program.add_option("--name", options->name, "Name of the field (default: the array's)");
   program.add_option("--units", options->units, "Units of the tensor, noted in the file");
   program.add_flag("--half", options->half, "Store 16-bit floats: three significant digits, half the size");

@@ -4,6 +4,7 @@
 #include <new>
 #include <stdexcept>
 #include <string>
+#include <vector>
 
 #include <vtkDataArray.h>
 #include <vtkDataSet.h>
@@ -123,7 +124,7 @@ vtkSmartPointer<vtkDataObject> read_openfoam(const Path& path, std::optional<int
 }
 
 vtkSmartPointer<vtkDataObject> read_kind(VtkKind kind, const Path& path, std::optional<int> step) {
-  if (kind != VtkKind::exodus && kind != VtkKind::openfoam) chosen_step(step, 1);
+  if (kind != VtkKind::exodus && kind != VtkKind::openfoam) chosen_step(step, 1);  // The others have one.
   switch (kind) {
     case VtkKind::legacy:
       return read_legacy(path);
@@ -163,8 +164,8 @@ DataSets read_data_sets(VtkKind kind, const Path& path, const VtkMessages& messa
     for (vtkDataSet* const set : sets) check_geometry(*set, path);
     return sets;
   }
-  chosen_step(step, 1);
-  for (const Path& file : collection_files(path)) {
+  const std::vector<std::vector<Path>> steps = collection_steps(path);
+  for (const Path& file : steps[static_cast<std::size_t>(chosen_step(step, static_cast<int>(steps.size())))]) {
     const VtkKind kind_of_file = vtk_kind(file);
     if (kind_of_file >= kind) fail(path, "names the collection " + escaped(file.string()) + "; import that one");
     const DataSets more = read_data_sets(kind_of_file, file, messages, std::nullopt);
@@ -218,6 +219,7 @@ int time_steps(const Path& path) {
     reader->UpdateInformation();
     steps = reader->GetNumberOfTimeSteps();
   }
+  if (kind == VtkKind::time_series) steps = static_cast<int>(collection_steps(path).size());
   messages.throw_error(path);
   return std::max(steps, 1);
 }
