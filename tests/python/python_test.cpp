@@ -49,5 +49,15 @@ TEST(Python, ParaView) {
   EXPECT_EQ(std::system(command.c_str()), 0);
 }
 
+TEST(Python, Blender) {
+  if (std::system("blender --version >/dev/null 2>&1") != 0) GTEST_SKIP() << "Blender is not installed";
+  const std::filesystem::path test = test::source_folder() / "tests" / "python" / "blender_test.py";
+  const std::string command = "PYTHONPATH='" TENSORRAY_PYTHON_FOLDER
+                              "' PYTHONDONTWRITEBYTECODE=1 blender --background --factory-startup --python-exit-code 1 "
+                              "--python '" +
+                              test.string() + "'";
+  EXPECT_EQ(std::system(command.c_str()), 0);
+}
+
 }  // namespace
 }  // namespace tensorray
