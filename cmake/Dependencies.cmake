@@ -30,7 +30,7 @@ endif()
 
 if(TENSORRAY_IMPORT)
   find_package(VTK REQUIRED COMPONENTS CommonCore CommonDataModel CommonExecutionModel FiltersCore FiltersGeneral
-               IOCore IOExodus IOGeometry IOLegacy IOParallelXML IOXML)
+               IOCGNSReader IOCore IOExodus IOGeometry IOLegacy IOParallelXML IOXML cgns)
 
   # The CMake packages of these two libraries do not work with Debian's other packages.
   find_path(Teem_INCLUDE_DIR teem/nrrd.h REQUIRED)

@@ -4,7 +4,9 @@
 #include <nifti1.h>
 #include <nifti2.h>
 
+#include "base/progress.h"
 #include "tests/import/voxel_support.h"
+#include "tools/import/import_file.h"
 #include "tools/import/lattices/lattice_files.h"
 
 namespace tensorray {
@@ -214,6 +216,26 @@ TEST(Nifti, ThreeVolumesAreAVector) {
   expected(1, 0) = 3;
   test::expect_near(expected, test::voxel(grid, {2, 2, 2}));
   test::expect_error([&] { test::tensors_of(open_nifti(file)); }, {"--gradient-of"});
+}
+
+TEST(Nifti, DisplacementsOfItkAreInLps) {
+  const Vector3i size(4, 4, 4);
+  const test::TemporaryFile file("warp.nii", file_of(header_of(size, 3, Affine3d::Identity()),
+                                                     volumes_of(size, [](const Vector3i& i) -> std::vector<float> {
+                                                       return {2.0f * i.y(), 3.0f * i.x(), 5.0f * i.x() + 1};
+                                                     })));
+  ImportSettings settings;
+  settings.files = {file};
+  settings.take = Take::gradient;
+  settings.lps = true;
+  ImportReport report;
+  Matrix3d expected = Matrix3d::Zero();
+  expected(0, 1) = -2;
+  expected(1, 0) = -3;
+  expected(2, 0) = 5;
+  test::expect_near(expected, test::voxel(import_tensors(settings, Progress(), report), {2, 2, 2}));
+  settings.order = TensorOrder::fsl;
+  test::expect_error([&] { import_tensors(settings, Progress(), report); }, {"warp.nii", "--frame"});
 }
 
 TEST(Nifti, SlopeAndInterceptAreApplied) {

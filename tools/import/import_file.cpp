@@ -152,7 +152,9 @@ TensorGrid import_any(const ImportSettings& settings, const Progress& progress, 
   if (open == open_npy) return import_lattice(placed(open(file), settings), settings, report);
   if (wants_sampling(settings))
     throw std::invalid_argument("has voxels of its own, which are kept: leave --resolution and --voxel-size out");
-  return import_lattice(open(file), settings, report);
+  Lattice lattice = open(file);
+  if (settings.lps) lattice.frame = Eigen::Vector3d(-1, -1, 1).asDiagonal() * lattice.frame;
+  return import_lattice(lattice, settings, report);
 }
 
 /// An error message in one line that names the file.
@@ -175,6 +177,10 @@ TensorGrid import_tensors(const ImportSettings& settings, const Progress& progre
   const std::filesystem::path& file = settings.files.front();
   if (settings.origin && lattice_reader(file) != open_npy)
     throw std::invalid_argument(file.string() + ": says itself where it is, only .npy does not: leave --origin out");
+  if (settings.lps && (lattice_reader(file) != open_nifti || settings.order == TensorOrder::fsl))
+    throw std::invalid_argument(file.string() + (settings.order == TensorOrder::fsl
+                                                     ? ": --order fsl has a frame of its own: leave --frame out"
+                                                     : ": is no NIfTI file: leave --frame out"));
   progress.update("reading", 0, 1);
   TensorGrid grid;
   try {

@@ -33,7 +33,7 @@ constexpr double kept_peak = 0.95;
 
 struct ImportOptions {
   ImportSettings settings;
-  std::string array, gradient_of, strain_of, order;
+  std::string array, gradient_of, strain_of, order, frame = "ras";
   std::vector<int> resolution;
   double voxel_size = 0;
   std::vector<double> bounds, origin;
@@ -55,6 +55,7 @@ ImportSettings settings_of(const ImportOptions& options) {
     settings.take = Take::strain;
   }
   if (!options.order.empty()) settings.order = tensor_order_of(options.order);
+  settings.lps = options.frame == "lps";
   if (options.voxel_size > 0) settings.sampling.resolution = options.voxel_size;
   if (options.resolution.size() == 1) settings.sampling.resolution = options.resolution[0];
   if (options.resolution.size() == 3) settings.sampling.resolution = Eigen::Vector3i(options.resolution.data());
@@ -207,6 +208,12 @@ void add_what(CLI::App& command, ImportOptions& options) {
                   "yz), voigt (xx yy zz yz xz xy)")
       ->check(CLI::IsMember(tensor_order_names()))
       ->option_text("ORDER");
+  command
+      .add_option("--frame", options.frame,
+                  "Frame of a NIfTI file's vectors and tensors: ras, or lps, in which ITK and ANTs write displacements "
+                  "(ras)")
+      ->check(CLI::IsMember({"ras", "lps"}))
+      ->option_text("FRAME");
   for (CLI::Option* option : command.get_options({}))
     if (option != command.get_help_ptr()) option->group("What to take");
 }
@@ -239,11 +246,11 @@ void add_import_options(CLI::App& program, Progress& progress) {
   add_what(program, *options);
   add_where(program, *options);
   program
-      .add_option(
-          "FILE", options->settings.files,
-          "VTK (.vti .vtr .vts .vtu .vtk .pvti .pvtr .pvts .pvtu .vtm .pvd), ExodusII (.ex2 .exo .e .g), an OpenFOAM "
-          "case (its folder, or a .foam in it), NRRD (.nrrd .nhdr), NIfTI (.nii .nii.gz .hdr), NumPy (.npy); "
-          "of PLOT3D two, the grid and its q")
+      .add_option("FILE", options->settings.files,
+                  "VTK (.vti .vtr .vts .vtu .vtk .pvti .pvtr .pvts .pvtu .vtm .pvd), ExodusII (.ex2 .exo .e .g), CGNS "
+                  "(.cgns), an OpenFOAM "
+                  "case (its folder, or a .foam in it), NRRD (.nrrd .nhdr), NIfTI (.nii .nii.gz .hdr), NumPy (.npy); "
+                  "of PLOT3D two, the grid and its q")
       ->required()
       ->expected(1, 2)
       ->option_text("FILE...");
@@ -257,10 +264,11 @@ void add_import_options(CLI::App& program, Progress& progress) {
       ->check(check_ply_output)
       ->option_text("FILE");
   program
-      .add_option("--steps", options->steps,
-                  "Steps of time of an OpenFOAM case, an ExodusII file or a .pvd: last, first, a number from 1 on, or "
-                  "all, each "
-                  "in a file of its own (-o flow.####.vdb) (last)")
+      .add_option(
+          "--steps", options->steps,
+          "Steps of time of an OpenFOAM case, an ExodusII or CGNS file, or a .pvd: last, first, a number from 1 on, or "
+          "all, each "
+          "in a file of its own (-o flow.####.vdb) (last)")
       ->option_text("STEPS");
   program
       .add_option("--memory", options->memory,

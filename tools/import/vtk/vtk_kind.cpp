@@ -43,6 +43,7 @@ const std::vector<KindFacts>& kinds() {
       {VtkKind::structured_pieces, "a VTK structured grid in pieces", "PStructuredGrid", {".pvts"}},
       {VtkKind::unstructured_pieces, "a VTK unstructured grid in pieces", "PUnstructuredGrid", {".pvtu"}},
       {VtkKind::exodus, "an ExodusII file", nullptr, {".ex2", ".exo", ".e", ".g"}},
+      {VtkKind::cgns, "a CGNS file", nullptr, {".cgns"}},
       {VtkKind::openfoam, "an OpenFOAM case", nullptr, {".foam"}},
       {VtkKind::blocks, "a VTK multi-block file", "vtkMultiBlockDataSet", {".vtm"}},
       {VtkKind::time_series, "a ParaView collection", "Collection", {".pvd"}},
@@ -104,7 +105,9 @@ std::optional<VtkKind> kind_of_contents(const fs::path& path, const std::string&
   for (const char version : {'\x01', '\x02', '\x05'}) {
     if (begins_with(std::string("CDF") + version)) return VtkKind::exodus;
   }
-  if (begins_with("\x89HDF\r\n\x1a\n")) return VtkKind::exodus;
+  if (begins_with("\x89HDF\r\n\x1a\n"))  // Of both kinds; their readers tell what else is in the file.
+    return lower_case_ending(path) == ".cgns" ? VtkKind::cgns : VtkKind::exodus;
+  if (head.find("ADF Database") == 4) return VtkKind::cgns;
   if (const std::optional<VtkKind> kind = xml_kind(path, head)) return kind;
   if (path.filename() == "controlDict" || path.extension() == ".foam") return VtkKind::openfoam;
   return {};
@@ -242,11 +245,12 @@ VtkKind checked_kind(const fs::path& path) {
   if (head.empty() && promised != VtkKind::openfoam) fail(path, "is empty; write it again");
   if (!found && promised) fail(path, std::string("is not ") + facts_of(*promised).text + ", as its ending says");
   const std::string ending = lower_case_ending(path);
-  if (ending == ".xdmf" || ending == ".xmf" || ending == ".cgns")
-    fail(path, "is a file of XDMF or CGNS, which is not read; open it in ParaView and save it as .vtu or .vtm");
+  if (ending == ".xdmf" || ending == ".xmf")
+    fail(path, "is a file of XDMF, which is not read; open it in ParaView and save it as .vtu or .vtm");
   if (!found)
     fail(path,
-         "is no file of VTK, ExodusII or OpenFOAM, nor named as NRRD (.nrrd), NIfTI (.nii) or NumPy (.npy); PLOT3D "
+         "is no file of VTK, ExodusII, CGNS or OpenFOAM, nor named as NRRD (.nrrd), NIfTI (.nii) or NumPy (.npy); "
+         "PLOT3D "
          "needs two files, the grid and its q");
   if (promised && *promised != *found) {
     fail(path, std::string("its ending says ") + facts_of(*promised).text + ", its contents are " +

@@ -19,6 +19,7 @@ enum class VtkKind {
   structured_pieces,
   unstructured_pieces,
   exodus,
+  cgns,
   openfoam,
   blocks,       ///< .vtm, which names files of the kinds above.
   time_series,  ///< .pvd, which names files of the kinds above, also .vtm.

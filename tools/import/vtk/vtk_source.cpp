@@ -6,16 +6,19 @@
 #include <string>
 #include <vector>
 
+#include <vtkCGNSReader.h>
 #include <vtkDataArray.h>
 #include <vtkDataSet.h>
 #include <vtkDataSetAttributes.h>
 #include <vtkDataSetReader.h>
 #include <vtkDoubleArray.h>
 #include <vtkExodusIIReader.h>
+#include <vtkInformation.h>
 #include <vtkMultiBlockDataSet.h>
 #include <vtkNew.h>
 #include <vtkOpenFOAMReader.h>
 #include <vtkSmartPointer.h>
+#include <vtkStreamingDemandDrivenPipeline.h>
 #include <vtkXMLImageDataReader.h>
 #include <vtkXMLPImageDataReader.h>
 #include <vtkXMLPRectilinearGridReader.h>
@@ -97,6 +100,34 @@ vtkSmartPointer<vtkDataObject> read_exodus(const Path& path, std::optional<int> 
   return reader->GetOutputDataObject(0);
 }
 
+/// The times of a CGNS file, in order; none if it has no results in time.
+std::vector<double> open_cgns(const Path& path, vtkCGNSReader& reader) {
+  if (!reader.CanReadFile(path.c_str())) fail(path, "is damaged or cut off, or no CGNS file; copy or write it again");
+  reader.SetFileName(path.c_str());
+  reader.SetDoublePrecisionMesh(1);
+  reader.UpdateInformation();
+  vtkInformation& facts = *reader.GetOutputInformation(0);
+  std::vector<double> times(
+      static_cast<std::size_t>(std::max(0, facts.Length(vtkStreamingDemandDrivenPipeline::TIME_STEPS()))));
+  if (!times.empty()) facts.Get(vtkStreamingDemandDrivenPipeline::TIME_STEPS(), times.data());
+  return times;
+}
+
+/// Only volumes, with all arrays. By default VTK reads none.
+vtkSmartPointer<vtkDataObject> read_cgns(const Path& path, std::optional<int> step) {
+  vtkNew<vtkCGNSReader> reader;
+  const std::vector<double> times = open_cgns(path, *reader);
+  reader->LoadBndPatchOff();
+  reader->EnableAllBases();
+  reader->EnableAllFamilies();
+  reader->EnableAllPointArrays();
+  reader->EnableAllCellArrays();
+  const int count = static_cast<int>(times.size()), chosen = chosen_step(step, std::max(count, 1));
+  if (count > 0) reader->UpdateTimeStep(times[static_cast<std::size_t>(chosen)]);
+  reader->Update();
+  return reader->GetOutputDataObject(0);
+}
+
 /// The times of an OpenFOAM case, in order.
 std::vector<double> open_case(const Path& path, vtkOpenFOAMReader& reader) {
   const Path dictionary = openfoam_case(path) / "system" / "controlDict";
@@ -124,7 +155,8 @@ vtkSmartPointer<vtkDataObject> read_openfoam(const Path& path, std::optional<int
 }
 
 vtkSmartPointer<vtkDataObject> read_kind(VtkKind kind, const Path& path, std::optional<int> step) {
-  if (kind != VtkKind::exodus && kind != VtkKind::openfoam) chosen_step(step, 1);  // The others have one.
+  if (kind != VtkKind::exodus && kind != VtkKind::cgns && kind != VtkKind::openfoam)
+    chosen_step(step, 1);  // The others have one.
   switch (kind) {
     case VtkKind::legacy:
       return read_legacy(path);
@@ -146,6 +178,8 @@ vtkSmartPointer<vtkDataObject> read_kind(VtkKind kind, const Path& path, std::op
       return read_unstructured_pieces(path);
     case VtkKind::exodus:
       return read_exodus(path, step);
+    case VtkKind::cgns:
+      return read_cgns(path, step);
     case VtkKind::openfoam:
       return read_openfoam(path, step);
     case VtkKind::blocks:
@@ -213,6 +247,7 @@ int time_steps(const Path& path) {
   const SilentStderr silent;
   int steps = 1;
   if (kind == VtkKind::openfoam) steps = static_cast<int>(open_case(path, *vtkNew<vtkOpenFOAMReader>()).size());
+  if (kind == VtkKind::cgns) steps = static_cast<int>(open_cgns(path, *vtkNew<vtkCGNSReader>()).size());
   if (kind == VtkKind::exodus) {
     vtkNew<vtkExodusIIReader> reader;
     reader->SetFileName(path.c_str());

@@ -13,6 +13,7 @@ namespace tensorray {
 
 /// Reads a data set. Several blocks or pieces become one unstructured grid, whose points are merged where they meet.
 ///   .vtk (legacy)  .vti .vtr .vts .vtu  .pvti .pvtr .pvts .pvtu  .ex2 .exo .e .g (ExodusII)
+///   .cgns (CGNS: the volumes of all zones)
 ///   .vtm (blocks)  .pvd (ParaView's collection, with steps of time)  of the files above
 ///   .foam, controlDict or a folder with system/controlDict (OpenFOAM: internal mesh)
 /// OpenFOAM stores fields at cells; VTK adds point arrays of the same names with the mean of the cells. A symmTensor
