@@ -121,9 +121,9 @@ def make(kind, resolution=None, *, min=None, max=None, progress=None, **paramete
         return Field._of(_tensorray.make_field(json_of(keys), report))
 
 
-def import_file(*files, array=None, gradient_of=None, strain_of=None, order=None, resolution=None, voxel_size=None,
-                origin=None, bounds=None, name=None, units=None):
-    """Makes a field of other programs' files: VTK, ExodusII, OpenFOAM, PLOT3D, NRRD, NIfTI, NumPy.
+def import_file(*files, array=None, gradient_of=None, strain_of=None, order=None, frame=None, resolution=None,
+                voxel_size=None, origin=None, bounds=None, name=None, units=None):
+    """Makes a field of other programs' files: VTK, ExodusII, CGNS, OpenFOAM, PLOT3D, NRRD, NIfTI, NumPy.
 
     files        One file, or several that belong together (a PLOT3D grid and its solution).
     array        Name of the array that is the tensor, or of six or nine scalar arrays that are its components, with
@@ -131,8 +131,9 @@ def import_file(*files, array=None, gradient_of=None, strain_of=None, order=None
     gradient_of  Name of the velocity whose gradient is the tensor.
     strain_of    Name of the displacement whose strain is the tensor.
     order        Order of six components: vtk, fsl, mrtrix or voigt.
+    frame        Frame of a NIfTI file's components: ras (the default) or lps (displacements of ITK and ANTs).
     resolution   Voxels along the longest edge, or along x, y and z; default: the median cell is a voxel.
-    voxel_size   Edge of a voxel, world units.
+    voxel_size   Edge of a voxel, world units; of .npy also three, along x, y and z.
     origin       World (x, y, z) of the centre of the first voxel of a .npy file; default: (0, 0, 0).
     bounds       Crop: (xmin, xmax, ymin, ymax, zmin, zmax).
     name, units  Name of the field (default: the array's), and units of the tensor.
@@ -143,6 +144,7 @@ def import_file(*files, array=None, gradient_of=None, strain_of=None, order=None
     if not os.path.exists(program):
         raise RuntimeError(f"imports need {program}, which is not built; run `tools/setup release import`")
     options = {"--array": array, "--gradient-of": gradient_of, "--strain-of": strain_of, "--order": order,
+               "--frame": frame,
                "--resolution": resolution, "--voxel-size": voxel_size, "--origin": origin, "--bounds": bounds,
                "--name": name, "--units": units}
     with tempfile.TemporaryDirectory() as folder:

@@ -51,6 +51,10 @@ TEST(ImportFileTest, NumPyVoxelsAreWhereTheUserSays) {
   EXPECT_EQ(Eigen::Vector3d(grid.to_world * Eigen::Vector3d::Zero()), Eigen::Vector3d(-1, 2, 5));
   EXPECT_EQ(Eigen::Vector3d(grid.to_world * Eigen::Vector3d(3, 2, 1)), Eigen::Vector3d(-0.25, 2.5, 5.25));
   EXPECT_EQ(grid.active_voxels(), 24u);
+  settings.voxel = Eigen::Vector3d(0.5, 0.25, 2);
+  EXPECT_EQ(Eigen::Vector3d(import_tensors(settings, Progress(), report).to_world * Eigen::Vector3d(3, 2, 1)),
+            Eigen::Vector3d(0.5, 2.5, 7));
+  settings.voxel.reset();
   settings.sampling.bounds = Eigen::AlignedBox3d(Eigen::Vector3d(-1, 2, 5), Eigen::Vector3d(-0.75, 2.5, 5));
   EXPECT_EQ(import_tensors(settings, Progress(), report).active_voxels(), 6u);  // The bounds are in world space.
 }

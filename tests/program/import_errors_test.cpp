@@ -133,6 +133,8 @@ TEST_F(ImportErrors, WrongArguments) {
   refuses({"image.vti", "--array", "lumps", "--gradient-of", "v"}, 2, {"--array", "--gradient-of"});
   refuses({"image.vti", "--order", "xyz"}, 2, {"--order", "vtk", "fsl", "mrtrix", "voigt"});
   refuses({"image.vti", "--voxel-size", "0"}, 2, {"--voxel-size"});
+  refuses({"image.vti", "--voxel-size", "1", "2"}, 2, {"--voxel-size", "three"});
+  refuses({"image.vti", "--voxel-size", "1", "2", "3"}, 2, {"image.vti", "--voxel-size", "one"});
   refuses({"image.vti", "--voxel-size", "1e-6"}, 2, {"--voxel-size", "limit"});
   refuses({"image.vti", "--resolution", "8", "8"}, 2, {"--resolution"});
   refuses({"image.vti", "--bounds", "1", "0", "0", "1", "0", "1"}, 2, {"--bounds"});

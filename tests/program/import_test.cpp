@@ -265,5 +265,21 @@ TEST_F(Import, StepsOfTime) {
   }
 }
 
+/// ParaView's collections name a file for each time, and a .vtm its blocks.
+TEST_F(Import, StepsOfCollections) {
+  for (const double value : {1.0, 2.0})
+    write(fmt::format("{}.vti", value), vti({2, 2, 2}, Vector3d::Zero(), Vector3d::Ones(), Matrix3d::Identity(),
+                                            std::vector<float>(72, static_cast<float>(value))));
+  write("block.vtm", R"(<VTKFile type="vtkMultiBlockDataSet"><vtkMultiBlockDataSet><DataSet index="0" file="2.vti"/>)"
+                     "</vtkMultiBlockDataSet></VTKFile>");
+  write("all.pvd", R"(<VTKFile type="Collection"><Collection><DataSet timestep="3" file="block.vtm"/>)"
+                   R"(<DataSet timestep="1.5" file="1.vti"/></Collection></VTKFile>)");
+  run_well({"import", "all.pvd", "--steps", "all", "-q", "-o", "all.#.vdb"});
+  for (const int step : {1, 2}) {
+    const json field = info(fmt::format("all.{}", step));
+    EXPECT_EQ(at(field, "norm", "p0"), 3 * step) << field;  // Of nine equal components.
+  }
+}
+
 }  // namespace
 }  // namespace tensorray

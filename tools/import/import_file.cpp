@@ -119,7 +119,7 @@ Lattice placed(Lattice lattice, const ImportSettings& settings) {
   if (wants_sampling(settings) && !size)
     throw std::invalid_argument("has voxels of its own, which are kept: give --voxel-size instead of --resolution");
   lattice.to_world = Eigen::Translation3d(settings.origin.value_or(Eigen::Vector3d::Zero())) *
-                     Eigen::Affine3d(Eigen::Scaling(size ? *size : 1.0));
+                     Eigen::Scaling(settings.voxel.value_or(Eigen::Vector3d::Constant(size ? *size : 1.0)));
   return lattice;
 }
 
@@ -177,6 +177,8 @@ TensorGrid import_tensors(const ImportSettings& settings, const Progress& progre
   const std::filesystem::path& file = settings.files.front();
   if (settings.origin && lattice_reader(file) != open_npy)
     throw std::invalid_argument(file.string() + ": says itself where it is, only .npy does not: leave --origin out");
+  if (settings.voxel && lattice_reader(file) != open_npy)
+    throw std::invalid_argument(file.string() + ": --voxel-size: only the voxels of .npy have three edges; give one");
   if (settings.lps && (lattice_reader(file) != open_nifti || settings.order == TensorOrder::fsl))
     throw std::invalid_argument(file.string() + (settings.order == TensorOrder::fsl
                                                      ? ": --order fsl has a frame of its own: leave --frame out"

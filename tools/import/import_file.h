@@ -22,6 +22,7 @@ struct ImportSettings {
   std::optional<TensorOrder> order;  ///< Order of six components, where the file does not state it.
   /// For files of voxels only `bounds` is used, except for VTK files; for .npy also a voxel size, that of the file.
   SamplingSettings sampling;
+  std::optional<Eigen::Vector3d> voxel;   ///< Distances of voxels along x, y and z; of .npy only.
   std::optional<Eigen::Vector3d> origin;  ///< World position of the first voxel's centre; of .npy only.
   bool lps = false;                       ///< The components are in LPS instead of RAS; of NIfTI only.
   std::optional<int> step;                ///< Of the steps of time, from 0 on; none: the last one.

@@ -35,8 +35,7 @@ struct ImportOptions {
   ImportSettings settings;
   std::string array, gradient_of, strain_of, order, frame = "ras";
   std::vector<int> resolution;
-  double voxel_size = 0;
-  std::vector<double> bounds, origin;
+  std::vector<double> voxel_size, bounds, origin;
   std::filesystem::path output, boundary;
   std::string name, units, steps = "last";
   std::size_t memory = 0;  ///< Bytes; 0: without a bound.
@@ -56,7 +55,9 @@ ImportSettings settings_of(const ImportOptions& options) {
   }
   if (!options.order.empty()) settings.order = tensor_order_of(options.order);
   settings.lps = options.frame == "lps";
-  if (options.voxel_size > 0) settings.sampling.resolution = options.voxel_size;
+  if (options.voxel_size.size() == 1) settings.sampling.resolution = options.voxel_size[0];
+  if (options.voxel_size.size() == 2) throw std::invalid_argument("--voxel-size needs one number, or three: x y z");
+  if (options.voxel_size.size() == 3) settings.voxel = Eigen::Vector3d(options.voxel_size.data());
   if (options.resolution.size() == 1) settings.sampling.resolution = options.resolution[0];
   if (options.resolution.size() == 3) settings.sampling.resolution = Eigen::Vector3i(options.resolution.data());
   if (options.resolution.size() == 2) throw std::invalid_argument("--resolution needs one number, or three: x y z");
@@ -228,7 +229,8 @@ void add_where(CLI::App& command, ImportOptions& options) {
                          ->group("Grid");
   command
       .add_option("--voxel-size", options.voxel_size,
-                  "Edge of a voxel; of .npy, the distance of its voxels (default: 1)")
+                  "Edge of a voxel; of .npy, the distance of its voxels, or three: x y z (default: 1)")
+      ->expected(1, 3)
       ->check(positive)
       ->excludes(resolution)
       ->group("Grid");
