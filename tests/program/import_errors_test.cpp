@@ -176,7 +176,7 @@ TEST_F(ImportErrors, HelpNamesEveryFlagAndFormat) {
 }
 
 constexpr std::size_t large_numbers = 128 * 128 * 128 * 9;
-constexpr std::size_t larger_numbers = 220 * 220 * 220 * 9;
+constexpr std::size_t larger_numbers = 256 * 256 * 256 * 9;
 
 class ImportProcess : public Import {
  protected:
@@ -271,8 +271,8 @@ TEST_F(ImportProcess, OfWhatIsLargerThanItsMemoryGivesTheSameFile) {
 #endif
   if (std::filesystem::space(in_folder("")).available < (std::uintmax_t{3} << 30))
     GTEST_SKIP() << "the test needs 3 GB on the disk of " << in_folder("");
-  write_large("large.npy", npy_header("220, 220, 220, 3, 3"), "", larger_numbers);
-  constexpr double bound = 256.0 * (1 << 20), of_threads = 128.0 * (1 << 20);
+  write_large("large.npy", npy_header("256, 256, 256, 3, 3"), "", larger_numbers);
+  constexpr double bound = 256.0 * (1 << 20), of_threads = 256.0 * (1 << 20);
   EXPECT_GT(peak_bytes("large.npy"), bound + of_threads);
   std::filesystem::rename(in_folder("field.vdb"), in_folder("all.vdb"));
   EXPECT_LE(peak_bytes("large.npy", {"--memory", "256M"}), bound + of_threads);
