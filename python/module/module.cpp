@@ -14,6 +14,7 @@
 #include "base/text.h"
 #include "python/module/field.h"
 #include "python/module/renders.h"
+#include "python/module/scene_request.h"
 #include "python/module/traces.h"
 #include "renderer/images/image.h"
 #include "scenes/keys/scene_source.h"
@@ -54,6 +55,7 @@ PYBIND11_MODULE(_tensorray, module) {
   using namespace tensorray;
   add_exceptions(module);
   add_fields(module);
+  add_scene_request(module);
   add_renders(module);
   add_traces(module);
   module.def("use_programs_in", &use_programs_in);

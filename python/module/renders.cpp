@@ -29,18 +29,9 @@ struct Rendered {
   Scene scene;
   Render render;
   Image display;
-  std::string statistics;  ///< JSON.
+  std::string statistics;    ///< JSON.
+  std::optional<int> frame;  ///< Of a scene with keyframes.
 };
-
-SceneRequest scene_request(const std::filesystem::path& file, const std::string& json,
-                           const std::vector<std::string>& changes, const Field* field) {
-  SceneRequest request;
-  request.file = file;
-  request.json = json;
-  request.changes = changes;
-  request.field = field;
-  return request;
-}
 
 int threads_of(int threads) {
   return threads > 0 ? threads : static_cast<int>(std::max(1u, std::thread::hardware_concurrency()));
@@ -59,19 +50,12 @@ std::shared_ptr<Rendered> render_request(const SceneRequest& request, int thread
   Image display = display_image(scene, result, true);
   std::string statistics = statistics_json(scene, result.statistics, seconds_since(start), threads_of(threads));
   auto rendered = std::make_shared<Rendered>(
-      Rendered{std::move(scene), std::move(result), std::move(display), std::move(statistics)});
+      Rendered{std::move(scene), std::move(result), std::move(display), std::move(statistics), request.frame});
   commit_outputs(std::move(files));
   return rendered;
 }
 
-std::shared_ptr<Rendered> render_for_python(const std::filesystem::path& file, const std::string& json,
-                                            const std::vector<std::string>& changes, const Field* field,
-                                            const std::vector<std::filesystem::path>& outputs,
-                                            const std::vector<std::string>& keep, int threads,
-                                            const py::object& report) {
-  SceneRequest request = scene_request(file, json, changes, field);
-  request.outputs = outputs;
-  request.keep = keep;
+std::shared_ptr<Rendered> render_for_python(const SceneRequest& request, int threads, const py::object& report) {
   std::shared_ptr<Rendered> rendered;
   run([&](const Progress& progress) { rendered = render_request(request, threads, progress); }, report, threads);
   return rendered;
@@ -80,7 +64,8 @@ std::shared_ptr<Rendered> render_for_python(const std::filesystem::path& file, c
 /// Writes further files of a render: of kinds that it has made.
 void write_more(const Rendered& rendered, const std::vector<std::filesystem::path>& outputs) {
   const SceneDescription& made = rendered.scene.description;
-  const SceneDescription description = read_scene_json(parse_value(made.text), made.path, {{}, outputs});
+  const SceneDescription description =
+      read_scene_json(parse_value(made.text), made.path, {{}, outputs, rendered.frame});
   for (const auto& [key, path] : description.output.files)
     if (!made.output.wants(key))
       throw std::invalid_argument(printable(path.string()) + ": the render has not kept its `" + key +

@@ -3,6 +3,9 @@
 #include <stdexcept>
 #include <utility>
 
+#include <pybind11/stl.h>
+#include <pybind11/stl/filesystem.h>
+
 #include "base/text.h"
 #include "scenes/keys/overrides.h"
 #include "scenes/pipeline/read_scene.h"
@@ -57,12 +60,12 @@ RequestedScene read_request(const SceneRequest& request) {
   Json json = json_of(request);
   if (request.field) json = with_field(json, request.field->keys());
   RequestedScene scene;
-  scene.description = read_scene_json(json, request.file, {{}, request.outputs});
+  scene.description = read_scene_json(json, request.file, {{}, request.outputs, request.frame});
   if (!request.outputs.empty()) scene.files = scene.description.output.files;
   std::vector<std::filesystem::path> made = request.outputs;
   for (const std::string& key : request.keep)
     if (scene.files.count(key) == 0) made.push_back(name_of(key, scene.description.output));
-  scene.description = read_scene_json(json, request.file, {{}, made});
+  scene.description = read_scene_json(json, request.file, {{}, made, request.frame});
   return scene;
 }
 
@@ -70,6 +73,18 @@ Scene load_request(const SceneRequest& request, const RequestedScene& scene, con
   if (!request.field) return load_scene(scene.description, progress);
   progress.update("loading", 0, 1);
   return load_scene(scene.description, request.field->loaded(scene.description.field.eigenvalues), progress);
+}
+
+void add_scene_request(pybind11::module_& module) {
+  pybind11::class_<SceneRequest>(module, "SceneRequest")
+      .def(pybind11::init<>())
+      .def_readwrite("file", &SceneRequest::file)
+      .def_readwrite("json", &SceneRequest::json)
+      .def_readwrite("changes", &SceneRequest::changes)
+      .def_readwrite("frame", &SceneRequest::frame)
+      .def_readwrite("field", &SceneRequest::field)
+      .def_readwrite("outputs", &SceneRequest::outputs)
+      .def_readwrite("keep", &SceneRequest::keep);
 }
 
 }  // namespace tensorray

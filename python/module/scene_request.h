@@ -4,6 +4,8 @@
 
 #include <filesystem>
 #include <map>
+#include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -13,11 +15,13 @@
 
 namespace tensorray {
 
+/// Python fills it.
 struct SceneRequest {
   std::filesystem::path file;        ///< The scene's file, or a field's; without `json`, it is read.
   std::string json;                  ///< The scene itself. Relative paths are relative to the folder of `file`.
   std::vector<std::string> changes;  ///< "KEY=VALUE", as SceneChanges::overrides.
-  const Field* field = nullptr;      ///< Replaces the scene's own field; null: the scene has one.
+  std::optional<int> frame;          ///< Of a scene with keyframes.
+  std::shared_ptr<Field> field;      ///< Replaces the scene's own field; null: the scene has one.
   std::vector<std::filesystem::path> outputs;  ///< Files that are written.
   std::vector<std::string> keep;               ///< Kinds of output, by key, that are made but not written.
 };
@@ -32,5 +36,8 @@ RequestedScene read_request(const SceneRequest& request);
 
 /// Loads it. @throw as load_scene.
 Scene load_request(const SceneRequest& request, const RequestedScene& scene, const Progress& progress);
+
+/// Adds SceneRequest to the module.
+void add_scene_request(pybind11::module_& module);
 
 }  // namespace tensorray

@@ -224,14 +224,8 @@ py::dict arrays_of(FlowMap map, const Scene& scene, std::vector<double> flexibil
 }
 
 /// The flow map of a scene's light. @param flexibilities  Empty: those of the scene's light, between its two ends.
-py::dict landings(const std::filesystem::path& file, const std::string& json, const std::vector<std::string>& changes,
-                  const Field* field, std::vector<double> flexibilities, double tolerance, int threads,
+py::dict landings(const SceneRequest& request, std::vector<double> flexibilities, double tolerance, int threads,
                   const py::object& report) {
-  SceneRequest request;
-  request.file = file;
-  request.json = json;
-  request.changes = changes;
-  request.field = field;
   std::optional<Scene> scene;
   FlowMap map;
   run(

@@ -1,9 +1,15 @@
 """Python's objects as the plain arguments of the module."""
 
+import collections.abc
 import json
 import os
 
 import numpy as np
+
+from . import _tensorray
+
+#: The scene of a field alone: the light that it bends, on a plate, from the side that shows most.
+_FIELD_ALONE = {"light": {"direction": "auto"}, "integrator": {"type": "photon_distribution"}}
 
 
 def json_of(value):
@@ -13,6 +19,8 @@ def json_of(value):
             return item.tolist()
         if isinstance(item, os.PathLike):
             return os.fspath(item)
+        if isinstance(item, collections.abc.Mapping):
+            return dict(item)
         raise TypeError(f"a scene cannot contain {type(item).__name__}")
     return json.dumps(value, default=plain, allow_nan=False)
 
@@ -23,10 +31,27 @@ def changes_of(changes, seed=None):
     return texts if seed is None else texts + [f"seed={int(seed)}"]
 
 
-def scene_of(scene, folder):
-    """A scene, as a dictionary or a file, as (file, JSON). JSON is empty where the file is to be read."""
-    if isinstance(scene, dict):
-        return os.path.join(os.fspath(folder) if folder else "", "scene"), json_of(scene)
-    if folder:
+def module_field(function, field):
+    """The module's part of a Field."""
+    if not hasattr(field, "_field"):
+        raise TypeError(f"{function}: field must be a tensorray.Field, not {type(field).__name__}; tr.Field(T) makes one "
+                        "of an array")
+    return field._field
+
+
+def request_of(function, scene, field, *, changes, frame, folder, seed=None):
+    """A scene, as a dictionary or a file, or the scene of a field alone, as the module takes it."""
+    if scene is None:
+        if field is None:
+            raise ValueError(f"{function}: give a scene, a field, or both")
+        scene = _FIELD_ALONE
+    request = _tensorray.SceneRequest()
+    if isinstance(scene, collections.abc.Mapping):
+        request.file, request.json = os.path.join(os.fspath(folder) if folder else "", "scene"), json_of(scene)
+    elif folder:
         raise ValueError("folder: only for scenes that are dictionaries; a file's own folder is that of its paths")
-    return os.fspath(scene), ""
+    else:
+        request.file = os.fspath(scene)
+    request.changes, request.frame = changes_of(changes, seed), frame
+    request.field = None if field is None else module_field(function, field)
+    return request

@@ -3,11 +3,12 @@
 import os
 import subprocess
 import tempfile
+import warnings
 
 import numpy as np
 
 from . import _programs, _tensorray
-from ._arguments import json_of
+from ._arguments import json_of, module_field
 from ._progress import shown
 
 
@@ -122,7 +123,8 @@ def make(kind, resolution=None, *, min=None, max=None, progress=None, **paramete
 
 
 def import_file(*files, array=None, gradient_of=None, strain_of=None, order=None, frame=None, resolution=None,
-                voxel_size=None, origin=None, bounds=None, name=None, units=None):
+                voxel_size=None, origin=None, bounds=None, step=None, boundary=None, name=None, units=None,
+                progress=None):
     """Makes a field of other programs' files: VTK, ExodusII, CGNS, OpenFOAM, PLOT3D, NRRD, NIfTI, NumPy.
 
     files        One file, or several that belong together (a PLOT3D grid and its solution).
@@ -136,31 +138,53 @@ def import_file(*files, array=None, gradient_of=None, strain_of=None, order=None
     voxel_size   Edge of a voxel, world units; of .npy also three, along x, y and z.
     origin       World (x, y, z) of the centre of the first voxel of a .npy file; default: (0, 0, 0).
     bounds       Crop: (xmin, xmax, ymin, ymax, zmin, zmax).
+    step         Step of time: a number from 1 on, "first" or "last" (the default).
+    boundary     File.ply to write: the surface of the body that the mesh lies around, for `obstacles` of a scene.
     name, units  Name of the field (default: the array's), and units of the tensor.
 
-    Runs `tensorray-import`, which is a part of the package `tensorray`, or is built by `tools/setup release import`.
+    Warns (UserWarning) where sampling loses much of the tensor's peak. Runs `tensorray-import`, which is a part of the
+    package `tensorray`, or is built by `tools/setup release import`.
     """
+    if not files:
+        raise ValueError("import_file: give a file")
     program = os.path.join(_programs.folder(), "tensorray-import")
     if not os.path.exists(program):
         raise RuntimeError(f"imports need {program}, which is not built; run `tools/setup release import`")
     options = {"--array": array, "--gradient-of": gradient_of, "--strain-of": strain_of, "--order": order,
-               "--frame": frame,
-               "--resolution": resolution, "--voxel-size": voxel_size, "--origin": origin, "--bounds": bounds,
-               "--name": name, "--units": units}
+               "--frame": frame, "--resolution": resolution, "--voxel-size": voxel_size, "--origin": origin,
+               "--bounds": bounds, "--steps": step, "--boundary": boundary, "--name": name, "--units": units}
     with tempfile.TemporaryDirectory() as folder:
         vdb = os.path.join(folder, "field.vdb")
-        command = [program, "-q", "-o", vdb]
+        command = [program, "--tell-progress", "-q", "-o", vdb]
         for option, value in options.items():
             if value is not None:
                 values = value if isinstance(value, (tuple, list, np.ndarray)) else [value]
                 command += [option, *map(str, values)]
-        ended = subprocess.run([*command, "--", *map(os.fspath, files)], stdout=subprocess.DEVNULL,
-                               stderr=subprocess.PIPE, text=True, check=False)
-        if ended.returncode != 0:
-            lines = ended.stderr.strip().splitlines() or ["the import crashed; the file may be damaged"]
-            raise (ValueError if ended.returncode == 2 else RuntimeError)(lines[-1].removeprefix("tensorray: "))
+        with shown(progress) as report:
+            status, messages = _run([*command, "--", *map(os.fspath, files)], report)
+        if status != 0:
+            error = messages[-1] if messages else "the import crashed; the file may be damaged"
+            raise (ValueError if status == 2 else RuntimeError)(error)
+        for message in messages:
+            warnings.warn(message.removeprefix("warning: "), stacklevel=2)
         keys = {"file": os.fspath(files[0])}
         return Field._of(_tensorray.read_field(vdb, json_of(keys), "", "none", None))
+
+
+def _run(command, report):
+    """Runs tensorray-import. Returns its status, and the lines of its standard error."""
+    with tempfile.TemporaryFile("w+") as errors:
+        with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=errors, text=True) as child:
+            try:
+                for line in child.stdout:
+                    phase, *counts = line.rstrip().split("\t")
+                    if report and len(counts) == 2 and int(counts[1]) > 0:
+                        report(phase, int(counts[0]), int(counts[1]))
+            except BaseException:
+                child.terminate()
+                raise
+        errors.seek(0)
+        return child.returncode, [line.removeprefix("tensorray: ") for line in errors.read().splitlines()]
 
 
 def invariant(field, name, *, progress=None):
@@ -171,4 +195,4 @@ def invariant(field, name, *, progress=None):
     Its unit is that of the tensor, to the power of the invariant's degree. Voxels without a tensor are NaN.
     """
     with shown(progress) as report:
-        return _tensorray.invariant(field._field, name, report)
+        return _tensorray.invariant(module_field("invariant", field), name, report)

@@ -2,9 +2,12 @@
 
 import contextlib
 import sys
+import warnings
 
 try:
-    from tqdm.auto import tqdm
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # Without ipywidgets a notebook has tqdm's bar of text.
+        from tqdm.auto import tqdm
 except ImportError:
     tqdm = None
 

@@ -7,18 +7,15 @@ import os
 import numpy as np
 
 from . import _png, _tensorray
-from ._arguments import changes_of, scene_of
+from ._arguments import request_of
 from ._fields import Field
 from ._progress import shown
-
-#: The scene of a field alone: the light that it bends, on a plate, from the side that shows most.
-_FIELD_ALONE = {"light": {"direction": "auto"}, "integrator": {"type": "photon_distribution"}}
 
 _PHOTON = np.dtype([("position", "f4", 3), ("direction", "f4", 3), ("origin", "f4", 3), ("wavelength", "f4"),
                     ("power", "f4")])
 
 
-def render(scene=None, field=None, *, outputs=(), keep=(), changes=None, seed=None, threads=0, folder=None,
+def render(scene=None, field=None, *, outputs=(), keep=(), changes=None, frame=None, seed=None, threads=0, folder=None,
            progress=None):
     """Renders a scene, as `tensorray render` does.
 
@@ -30,6 +27,7 @@ def render(scene=None, field=None, *, outputs=(), keep=(), changes=None, seed=No
               command line writes. Without them nothing is written, whatever the scene's `output` says.
     keep      What else the result holds, beside the picture: "spectral", "photons", and other keys of `output`.
     changes   Changes of the scene, as {"light.photons": 1e5, "integrator.type": "lens"}.
+    frame     Number of the frame, if the scene has keyframes; # in names of files is this number ("flow.####.vdb").
     seed      Seed of all random numbers; None: the scene's.
     threads   Greatest number of threads; 0: all. The result does not depend on it.
     folder    Relative paths in a dictionary are relative to this folder; None: the working folder.
@@ -40,17 +38,12 @@ def render(scene=None, field=None, *, outputs=(), keep=(), changes=None, seed=No
     """
     if isinstance(scene, Field) and field is None:
         scene, field = None, scene
-    if scene is None:
-        if field is None:
-            raise ValueError("render: give a scene, a field, or both")
-        scene = _FIELD_ALONE
-    file, text = scene_of(scene, folder)
+    request = request_of("render", scene, field, changes=changes, frame=frame, folder=folder, seed=seed)
     files = [outputs] if isinstance(outputs, (str, os.PathLike)) else outputs
-    kinds = ["image", "exr", *([keep] if isinstance(keep, str) else keep)]
+    request.outputs = [os.fspath(name) for name in files]
+    request.keep = list(dict.fromkeys(["image", "exr", *([keep] if isinstance(keep, str) else keep)]))
     with shown(progress) as report:
-        return Render(_tensorray.render(file, text, changes_of(changes, seed), field._field if field else None,
-                                        [os.fspath(name) for name in files], list(dict.fromkeys(kinds)), threads,
-                                        report))
+        return Render(_tensorray.render(request, threads, report))
 
 
 class Render:

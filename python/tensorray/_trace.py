@@ -7,9 +7,8 @@ from typing import Optional
 import numpy as np
 
 from . import _tensorray
-from ._arguments import changes_of, scene_of
+from ._arguments import module_field, request_of
 from ._progress import shown
-from ._render import _FIELD_ALONE
 
 
 @dataclasses.dataclass
@@ -83,7 +82,7 @@ def trace(field, positions, directions, s, *, scale=1.0, plate=None, jacobians=F
     request.scale, request.step, request.max_steps = float(scale), float(step or 0), int(max_steps)
     request.max_length = math.inf if max_length is None else float(max_length)
     with shown(progress) as report:
-        return Trace(**_tensorray.trace(field._field, request, threads, report), along=along)
+        return Trace(**_tensorray.trace(module_field("trace", field), request, threads, report), along=along)
 
 
 def _rays(positions, directions, s):
@@ -138,21 +137,17 @@ class Landings:
         return self.center + x * self.right + y * self.up
 
 
-def landings(scene=None, field=None, s=None, *, tolerance=0.5, changes=None, threads=0, folder=None, progress=None):
+def landings(scene=None, field=None, s=None, *, tolerance=0.5, changes=None, frame=None, threads=0, folder=None,
+             progress=None):
     """Where the light of a scene lands on its plate: the map whose light `photon_distribution` draws.
 
-    scene, field, changes, threads, folder, progress    As those of `render`.
+    scene, field, changes, frame, threads, folder, progress    As those of `render`.
     s          Flexibilities: a number or several. None: those of the scene's light, evenly spaced between its ends.
     tolerance  Wanted error of landings between starts, pixels. Where the map bends or folds, starts are closer.
 
     Returns Landings.
     """
-    if scene is None:
-        if field is None:
-            raise ValueError("landings: give a scene, a field, or both")
-        scene = _FIELD_ALONE
-    file, text = scene_of(scene, folder)
+    request = request_of("landings", scene, field, changes=changes, frame=frame, folder=folder)
     flexibilities = [] if s is None else [float(value) for value in np.atleast_1d(s)]
     with shown(progress) as report:
-        return Landings(**_tensorray.landings(file, text, changes_of(changes), field._field if field else None,
-                                              flexibilities, float(tolerance), threads, report))
+        return Landings(**_tensorray.landings(request, flexibilities, float(tolerance), threads, report))

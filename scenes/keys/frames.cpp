@@ -123,7 +123,8 @@ void set_frame(Json& scene, int frame, const SceneSource& source) {
 void refuse_keyframes(const Json& scene, const SceneSource& source) {
   Json copy = scene;
   for_each_value(copy, "", [&](const Json& value, const std::string& pointer) {
-    if (!value.is_string()) source.fail("`" + pointer + "` has keyframes: give --frames, as --frames 1-240");
+    if (!value.is_string())
+      source.fail("`" + pointer + "` has keyframes: give --frames, as --frames 1-240 (frame=1 in Python)");
   });
 }
 

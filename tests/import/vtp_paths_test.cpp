@@ -134,7 +134,7 @@ TEST(VtpPathsTest, LinesOfOtherPrograms) {
 }
 
 TEST(VtpPathsTest, ErrorsNameTheFix) {
-  const std::string bytes = written(some_paths(3)), foreign = foreign_vtp();
+  const std::string foreign = foreign_vtp();
   const auto error = [](const std::string& content) { return error_of_bytes(content); };
   EXPECT_THAT(error("solid nothing of the kind\n"), HasSubstr("not VTK polydata"));
   EXPECT_THAT(error(replaced(foreign, "type=\"PolyData\"", "type=\"Image\nData\"")),
@@ -149,18 +149,13 @@ TEST(VtpPathsTest, ErrorsNameTheFix) {
   EXPECT_THAT(error(replaced(foreign, "NumberOfPoints=\"4\"", "NumberOfPoints=\"4000000000\"")), HasSubstr("damaged"));
   EXPECT_THAT(error(replaced(foreign, "NumberOfLines=\"2\"", "NumberOfLines=\"99999999999999999999999\"")),
               HasSubstr("NumberOfLines is no count"));
-  std::string moved = bytes;
-  moved.insert(bytes.find("offset=\"", bytes.find("Name=\"tensor\"")) + 8, "9");
-  EXPECT_THAT(error(moved), HasSubstr("damaged"));
-  moved.insert(bytes.find("offset=\"", bytes.find("Name=\"tensor\"")) + 8, "9999999999999");
-  EXPECT_THAT(error(moved), HasSubstr("damaged"));
   EXPECT_THAT(error(replaced(foreign, "NumberOfLines=\"2\"", "NumberOfLines=\"0\"")), HasSubstr("no path"));
 
   std::vector<Path> paths = some_paths(3);
   paths[2].points[1].position.y() = std::numeric_limits<double>::quiet_NaN();
   EXPECT_THAT(error(written(paths)), HasSubstr("point 3 of its lines is not finite"));
   paths = some_paths(3);
-  paths[2].points[1].tensor(0, 1) = std::numeric_limits<double>::infinity();
+  paths[2].points[1].tensor(0, 1) = std::numeric_limits<double>::quiet_NaN();
   EXPECT_THAT(error(written(paths)), HasSubstr("\"tensor\" has a value that is not finite"));
   paths = some_paths(3);
   paths[2].points[1].length = 0;
@@ -295,6 +290,20 @@ TEST(VtpPathsTest, EveryEncodingOfVtk) {
       else  // Written with fewer digits.
         EXPECT_NEAR(read.at(3).points.at(4).tensor(2, 0), paths[4].points[4].tensor(2, 0), 1e-6);
     }
+}
+
+TEST(VtpPathsTest, AppendedDataThatAreElsewhere) {
+  const TemporaryFolder folder;
+  write_paths(folder / "a.vtp", some_paths(3));
+  rewrite(folder / "a.vtp", folder / "b.vtp", Encoding::appended_raw, [](vtkXMLWriter&) {});
+  const std::string bytes = bytes_of(folder / "b.vtp");
+  const std::size_t offset = bytes.find("offset=\"", bytes.find("Name=\"tensor\""));
+  ASSERT_NE(offset, std::string::npos);
+  for (const char* more : {"9", "99999999999999"}) {
+    std::string moved = bytes;
+    moved.insert(offset + 8, more);
+    EXPECT_THAT(error_of_bytes(moved), HasSubstr("damaged"));
+  }
 }
 
 }  // namespace

@@ -37,6 +37,7 @@ TEST(VtpPoints, HoldEveryPointAndAttribute) {
   vtkPolyData* read = reader->GetOutput();
   ASSERT_EQ(read->GetNumberOfPoints(), 3000);
   ASSERT_EQ(read->GetNumberOfVerts(), 3000);
+  EXPECT_STREQ(read->GetPointData()->GetScalars()->GetName(), "wavelength");  // What ParaView shows at first.
   vtkIdType size = 0;
   const vtkIdType* points = nullptr;
   read->GetVerts()->GetCellAtId(1234, size, points);

@@ -19,6 +19,10 @@ def stub():
     return {node.name: node for node in body if isinstance(node, (ast.FunctionDef, ast.ClassDef))}
 
 
+def stop(*_):
+    raise LookupError("enough")
+
+
 def names_of(arguments):
     names = [argument.arg for argument in arguments.args + arguments.kwonlyargs]
     return names + [extra.arg for extra in (arguments.vararg, arguments.kwarg) if extra]
@@ -84,9 +88,15 @@ class PackageTest(unittest.TestCase):
             field = tr.import_file(file)
             with self.assertRaisesRegex(RuntimeError, "nothing.vtu"):
                 tr.import_file(os.path.join(folder, "nothing.vtu"))
-            with self.assertRaises((ValueError, RuntimeError)) as caught:
-                tr.import_file(file, order="wrong")
-            self.assertNotIn("\n", str(caught.exception))
+            for arguments, options in [((file,), {"order": "wrong"}), ((file,), {"step": "late"}), ((), {})]:
+                with self.assertRaises((ValueError, RuntimeError)) as caught:
+                    tr.import_file(*arguments, **options)
+                self.assertNotIn("\n", str(caught.exception))
+            seen = []
+            tr.import_file(file, progress=lambda *report: seen.append(report))
+            self.assertIn(("reading", 0, 1), seen)
+            with self.assertRaisesRegex(LookupError, "enough"):
+                tr.import_file(file, progress=stop)
         self.assertEqual(sorted(field.tensors.shape), sorted(tensors.shape))
         self.assertAlmostEqual(float(np.linalg.norm(field.tensors)), float(np.linalg.norm(tensors)), places=3)
 

@@ -2,12 +2,13 @@
 
 import os
 import sys
+import tempfile
 import unittest
 
 import numpy as np
 from paraview import simple
 from paraview.vtk.util import numpy_support
-from vtkmodules.vtkCommonDataModel import vtkImageData
+from vtkmodules.vtkCommonDataModel import vtkImageData, vtkMultiBlockDataSet, vtkPolyData
 
 import tensorray as tr
 
@@ -70,6 +71,31 @@ class PluginTest(unittest.TestCase):
                   for each in (plate, self.bent(self.source(), Scale=3)[1])]
         self.assertGreater(lights[1].max(), 1.5)
         self.assertLess(np.abs(lights[0] - lights[1]).mean(), 0.02)
+
+    def test_blocks_are_taken_together(self):
+        blocks = vtkMultiBlockDataSet()
+        blocks.SetBlock(0, vtkPolyData())  # Without the tensor.
+        blocks.SetBlock(1, image_of(self.field))
+        producer = simple.TrivialProducer()
+        producer.GetClientSideObject().SetOutput(blocks)
+        lights = [numpy_support.vtk_to_numpy(self.bent(source, Scale=3)[1].GetCellData().GetArray("light"))
+                  for source in (producer, self.source())]
+        np.testing.assert_array_equal(lights[0], lights[1])
+
+    def test_files_open_with_colours(self):
+        with tempfile.TemporaryDirectory() as folder:
+            for method, array in (("path_tracing", "force"), ("photon_distribution", "wavelength")):
+                file = os.path.join(folder, method + ".vtp")
+                scene = {"integrator": {"type": method}, "light": {"photons": 500}, "camera": {"resolution": 4}}
+                try:
+                    tr.render(scene, field=self.field, outputs=file, progress=False)
+                except RuntimeError as error:
+                    self.skipTest(str(error))  # Without tensorray-import.
+                reader = simple.OpenDataFile(file)
+                shown = simple.Show(reader, simple.CreateRenderView())
+                self.assertEqual(list(shown.ColorArrayName), ["POINTS", array])
+                points = reader.GetClientSideObject().GetOutputDataObject(0).GetPointData()
+                self.assertEqual(points.GetVectors().GetName(), "direction")
 
 
 if __name__ == "__main__":

@@ -44,18 +44,20 @@ TEST(Python, Notebooks) {
 TEST(Python, ParaView) {
   if (std::system("pvpython --version >/dev/null 2>&1") != 0) GTEST_SKIP() << "ParaView (pvpython) is not installed";
   const std::filesystem::path test = test::source_folder() / "tests" / "python" / "paraview_test.py";
-  const std::string command =
-      "PYTHONPATH='" TENSORRAY_PYTHON_FOLDER "' PYTHONDONTWRITEBYTECODE=1 pvpython '" + test.string() + "'";
+  const std::filesystem::path compatibility = test::source_folder() / "tools" / "paraview" / "compatibility";
+  const std::string command = "PYTHONPATH='" TENSORRAY_PYTHON_FOLDER ":" + compatibility.string() +
+                              "' PYTHONDONTWRITEBYTECODE=1 pvpython '" + test.string() + "'";
   EXPECT_EQ(std::system(command.c_str()), 0);
 }
 
 TEST(Python, Blender) {
   if (std::system("blender --version >/dev/null 2>&1") != 0) GTEST_SKIP() << "Blender is not installed";
   const std::filesystem::path test = test::source_folder() / "tests" / "python" / "blender_test.py";
-  const std::string command = "PYTHONPATH='" TENSORRAY_PYTHON_FOLDER
-                              "' PYTHONDONTWRITEBYTECODE=1 blender --background --factory-startup --python-exit-code 1 "
-                              "--python '" +
-                              test.string() + "'";
+  const std::string command =
+      "PYTHONPATH='" TENSORRAY_PYTHON_FOLDER
+      "' PYTHONDONTWRITEBYTECODE=1 blender --background --python-use-system-env --factory-startup --python-exit-code 1 "
+      "--python '" +
+      test.string() + "'";
   EXPECT_EQ(std::system(command.c_str()), 0);
 }
 

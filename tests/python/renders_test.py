@@ -91,6 +91,23 @@ class RendersTest(unittest.TestCase):
         self.assertEqual(a.scene["seed"], 3)
         self.assertEqual(os.listdir(self.folder), ["scene.json"])  # Nothing is written unless asked for.
 
+    def test_frames_of_keyframes(self):
+        turning = {**PHOTONS, "light": {**PHOTONS["light"], "direction": {"keys": [[1, [0, 0, -1]], [3, [0, 2, -1]]]}}}
+        with open(self.path("scene.json"), "w") as file:
+            json.dump(turning, file)
+        ended = command_line(self.folder, "render", "scene.json", "-q", "--frames", "2", "--set", "field.scale=2",
+                             "-o", "program.##.exr")
+        self.assertEqual(ended.returncode, 0, ended.stderr)
+        changes = {"field.scale": 2}
+        picture = tr.render(turning, frame=2, changes=changes, outputs=self.path("python.##.exr"))
+        self.assertEqual(bytes_of(self.folder, "python.02.exr"), bytes_of(self.folder, "program.02.exr"))
+        picture.write(self.path("later.##.exr"))
+        self.assertEqual(bytes_of(self.folder, "later.02.exr"), bytes_of(self.folder, "program.02.exr"))
+        map_ = tr.landings(turning, s=0.2, frame=3, changes=changes)
+        np.testing.assert_allclose(np.cross(map_.right, map_.up) @ [0, 2, -1], -np.sqrt(5), rtol=1e-9)
+        with self.assertRaisesRegex(tr.SceneError, "frame=1"):
+            tr.render(turning)
+
     def test_numpy_values_and_relative_paths(self):
         tr.make("vortex", resolution=8).write(self.path("f.vdb"))
         scene = {**PHOTONS, "field": {"file": "f.vdb"},
@@ -173,6 +190,10 @@ class RendersTest(unittest.TestCase):
                 tr.render(**arguments)
         with self.assertRaises(ValueError):
             tr.render({**PHOTONS, "seed": float("nan")})
+        for call in (lambda: tr.render(PHOTONS, field=np.zeros((2, 2, 2, 3, 3))), lambda: tr.invariant(PHOTONS, "norm"),
+                     lambda: tr.trace(None, [0, 0, 0], [0, 0, 1], 1)):
+            with self.assertRaisesRegex(TypeError, "must be a tensorray.Field"):
+                call()
         with self.assertRaisesRegex(TypeError, "object"):
             tr.render({**PHOTONS, "seed": object()})
 

@@ -3,7 +3,8 @@
 File > Import > tensorray (.json, .vdb) loads a scene's tubes, its plate with the caustic, and its bodies.
 Render > tensorray renders the scene file as it is into an image.
 Install it with Edit > Preferences > Add-ons > Install. It needs the Python package `tensorray` in the Python that
-Blender uses: an installed python3-tensorray, or PYTHONPATH=build/release/python. For Blender 3.4 (Debian's) and newer.
+Blender uses: an installed python3-tensorray, or PYTHONPATH=build/release/python and blender --python-use-system-env.
+For Blender 3.4 and newer.
 """
 
 import json
@@ -38,7 +39,7 @@ def package():
         import tensorray
     except ImportError as error:
         raise RuntimeError("the Python package tensorray is missing: install python3-tensorray, or start Blender with "
-                           "PYTHONPATH=.../build/release/python") from error
+                           "PYTHONPATH=.../build/release/python and --python-use-system-env") from error
     return tensorray
 
 

@@ -9,12 +9,50 @@ import numpy as np
 from paraview.util.vtkAlgorithm import VTKPythonAlgorithmBase, smdomain, smproperty, smproxy
 from vtkmodules.util import numpy_support
 from vtkmodules.vtkCommonCore import vtkPoints
-from vtkmodules.vtkCommonDataModel import vtkCellArray, vtkDataObject, vtkDataSet, vtkPolyData, vtkStructuredGrid
+from vtkmodules.vtkCommonDataModel import vtkCellArray, vtkDataObject, vtkPolyData, vtkStructuredGrid
 
 import tensorray as tr
 
 #: Columns of a full tensor in the six components of VTK's symmetric ones: xx yy zz xy yz xz.
 SYMMETRIC = [0, 3, 5, 3, 1, 4, 5, 4, 2]
+
+
+def blocks_of(data):
+    """The data set, or those of composite data, as readers of ExodusII, CGNS and OpenFOAM make them."""
+    if data.IsA("vtkDataSet"):
+        return [data]
+    blocks, iterator = [], data.NewIterator()
+    while not iterator.IsDoneWithTraversal():
+        block = iterator.GetCurrentDataObject()
+        if block.IsA("vtkDataSet") and block.GetNumberOfCells() > 0:
+            blocks.append(block)
+        iterator.GoToNextItem()
+    return blocks
+
+
+def first_tensor(blocks):
+    """Name of the first array with 9 or 6 components."""
+    for block in blocks:
+        for attributes in (block.GetPointData(), block.GetCellData()):
+            for i in range(attributes.GetNumberOfArrays()):
+                if attributes.GetArray(i) and attributes.GetArray(i).GetNumberOfComponents() in (6, 9):
+                    return attributes.GetArrayName(i)
+    raise ValueError("the data have no array with 9 or 6 components")
+
+
+def one_data_set(blocks, array):
+    """The blocks that have the array, as one data set."""
+    blocks = [block for block in blocks if block.GetPointData().HasArray(array) or block.GetCellData().HasArray(array)]
+    if not blocks:
+        raise ValueError(f"the data have no array {array}")
+    if len(blocks) == 1:
+        return blocks[0]
+    from vtkmodules.vtkFiltersCore import vtkAppendDataSets
+    append = vtkAppendDataSets()
+    for block in blocks:
+        append.AddInputData(block)
+    append.Update()
+    return append.GetOutput()
 
 
 def image_of(data, array, resolution):
@@ -99,7 +137,7 @@ def plate_of(output, place, picture):
 
 @smproxy.filter(label="Bent Light")
 @smproperty.input(name="Input")
-@smdomain.datatype(dataTypes=["vtkDataSet"], composite_data_supported=False)
+@smdomain.datatype(dataTypes=["vtkDataSet", "vtkCompositeDataSet"], composite_data_supported=True)
 class BentLight(VTKPythonAlgorithmBase):
     """Light that a tensor field bends: rays (output 0), and a plate with its caustic (output 1)."""
 
@@ -110,6 +148,7 @@ class BentLight(VTKPythonAlgorithmBase):
 
     def FillInputPortInformation(self, port, info):
         info.Set(self.INPUT_REQUIRED_DATA_TYPE(), "vtkDataSet")
+        info.Append(self.INPUT_REQUIRED_DATA_TYPE(), "vtkCompositeDataSet")
         return 1
 
     def FillOutputPortInformation(self, port, info):
@@ -152,9 +191,9 @@ class BentLight(VTKPythonAlgorithmBase):
         self._set("_resolution", count)
 
     def RequestData(self, request, inputs, outputs):
-        data = vtkDataSet.GetData(inputs[0])
-        array = self._array or self._first_tensor(data)
-        field = field_of(image_of(data, array, self._resolution), array)
+        blocks = blocks_of(vtkDataObject.GetData(inputs[0]))
+        array = self._array or first_tensor(blocks)
+        field = field_of(image_of(one_data_set(blocks, array), array, self._resolution), array)
         scene = {"field": {"scale": self._scale} if self._scale else {},
                  "light": {"direction": self._direction}, "receiver": {"resolution": self._pixels},
                  "integrator": {"type": "photon_distribution"}}
@@ -172,14 +211,6 @@ class BentLight(VTKPythonAlgorithmBase):
         if getattr(self, name) != value:
             setattr(self, name, value)
             self.Modified()
-
-    @staticmethod
-    def _first_tensor(data):
-        for attributes in (data.GetPointData(), data.GetCellData()):
-            for i in range(attributes.GetNumberOfArrays()):
-                if attributes.GetArray(i) and attributes.GetArray(i).GetNumberOfComponents() in (6, 9):
-                    return attributes.GetArrayName(i)
-        raise ValueError("the data have no array with 9 or 6 components")
 
     def _starts(self, place):
         """Starts on a lattice over the beam, and wavelengths, nm."""

@@ -33,12 +33,12 @@ struct PolylineData {
 void require_vtk_program();
 
 /// Writes one vertex per point, the scalars and vectors as point data, and the metadata as string field data;
-/// encoding: appended raw binary, LZ4.
+/// encoding: binary (base64), LZ4.
 /// @throw std::runtime_error naming the file and the reason, also when the disk is full; Cancelled.
 void write_vtp(const std::filesystem::path& path, const PointCloud& points);
 
-/// Writes polylines with points in double precision; encoding: appended raw binary, not compressed, which most
-/// programs can read.
+/// Writes polylines with points in double precision; encoding: binary (base64), not compressed, which most programs
+/// can read.
 /// @throw as above.
 void write_vtp(const std::filesystem::path& path, const PolylineData& lines);
 

@@ -39,7 +39,7 @@ struct ImportOptions {
   std::filesystem::path output, boundary;
   std::string name, units, steps = "last";
   std::size_t memory = 0;  ///< Bytes; 0: without a bound.
-  bool half = false, quiet = false;
+  bool half = false, quiet = false, tells_progress = false;
 };
 
 ImportSettings settings_of(const ImportOptions& options) {
@@ -98,11 +98,18 @@ void print_sampling(const ImportReport& report) {
   }
 }
 
+/// Progress as a line of phase, done and total, for a program that has started this one.
+void tell_progress(const std::string& phase, std::uint64_t done, std::uint64_t total) {
+  fmt::print("{}\t{}\t{}\n", phase, done, total);
+  std::fflush(stdout);
+}
+
 /// The work of the child: everything except giving the files their final names.
 void import_to(const ImportOptions& options, const ImportSettings& settings, OutputFile& output, Progress& progress) {
   if (options.memory > 0) bound_memory(options.memory, std::filesystem::absolute(options.output).parent_path());
   ImportReport report;
   std::optional<ProgressBar> bar(std::in_place, progress, options.quiet);
+  if (options.tells_progress) progress.report = tell_progress;
   TensorGrid grid = import_tensors(settings, progress, report);
   if (!options.name.empty()) grid.name = options.name;
   grid.metadata["tensorray:field"] = grid.name;
@@ -282,6 +289,7 @@ void add_import_options(CLI::App& program, Progress& progress) {
   program.add_option("--units", options->units, "Units of the tensor, noted in the file");
   program.add_flag("--half", options->half, "Store 16-bit floats: three significant digits, half the size");
   program.add_flag("-q,--quiet", options->quiet, "No progress bar");
+  program.add_flag("--tell-progress", options->tells_progress)->group("");  // For the Python package.
   program.callback([options, &progress] { import(*options, progress); });
 }
 

@@ -246,7 +246,8 @@ VtkKind checked_kind(const fs::path& path) {
   if (!found && promised) fail(path, std::string("is not ") + facts_of(*promised).text + ", as its ending says");
   const std::string ending = lower_case_ending(path);
   if (ending == ".xdmf" || ending == ".xmf")
-    fail(path, "is a file of XDMF, which is not read; open it in ParaView and save it as .vtu or .vtm");
+    fail(path, "is a file of XDMF, which is not read; run `meshio convert " + path.filename().string() +
+                   " FILE.vtu`, or open it in ParaView and save it as .vtu");
   if (!found)
     fail(path,
          "is no file of VTK, ExodusII, CGNS or OpenFOAM, nor named as NRRD (.nrrd), NIfTI (.nii) or NumPy (.npy); "

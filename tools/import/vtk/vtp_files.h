@@ -10,7 +10,7 @@
 
 namespace tensorray {
 
-/// Writes vertices (appended raw binary, LZ4) or polylines (appended raw binary, not compressed). Writes in place.
+/// Writes vertices (binary, LZ4) or polylines (binary, not compressed). Writes in place.
 /// @throw std::runtime_error with the reason (without the file), also when the disk is full.
 void write_vtp_file(const std::filesystem::path& path, const PolyDataView& data);
 

@@ -82,6 +82,14 @@ void add_texts(vtkPolyData& polydata, const std::string& name, const Texts& line
   polydata.GetFieldData()->AddArray(text);
 }
 
+/// Names what ParaView shows at first, and what its filters of vectors and tensors take.
+void activate_arrays(vtkPolyData& polydata) {
+  vtkPointData& points = *polydata.GetPointData();
+  points.SetActiveScalars(points.HasArray("force") ? "force" : "wavelength");
+  points.SetActiveVectors("direction");
+  points.SetActiveTensors("tensor");
+}
+
 vtkNew<vtkPolyData> polydata_of(const PolyDataView& data) {
   vtkNew<vtkPolyData> polydata;
   vtkNew<vtkPoints> points;
@@ -94,6 +102,7 @@ vtkNew<vtkPolyData> polydata_of(const PolyDataView& data) {
   for (const auto& [name, values] : data.point_data) polydata->GetPointData()->AddArray(vtk_view(name, values));
   for (const auto& [name, values] : data.line_data) polydata->GetCellData()->AddArray(vtk_view(name, values));
   for (const auto& [name, texts] : data.texts) add_texts(*polydata, name, texts);
+  activate_arrays(*polydata);
   return polydata;
 }
 
@@ -107,6 +116,19 @@ bool is_complete(const std::filesystem::path& path) {
   return file && last == end;
 }
 
+/// Writes data where their arrays are. Data at the end of the file stop Debian 12's ParaView, whose libexpat is newer
+/// than itself.
+class InlineWriter : public vtkXMLPolyDataWriter {
+ public:
+  static InlineWriter* New() { VTK_STANDARD_NEW_BODY(InlineWriter); }
+
+ protected:
+  InlineWriter() { SetDataModeToBinary(); }
+
+  /// Where the disk is full, VTK would delete arrays that it makes for data at the end of the file alone.
+  void DeletePositionArrays() override {}
+};
+
 std::string reason_of(unsigned long error) {
   if (error == vtkErrorCode::CannotOpenFileError) return "it cannot be opened; check the path";
   if (error == vtkErrorCode::NoError || error >= vtkErrorCode::FirstVTKErrorCode) return "the disk may be full";
@@ -116,7 +138,7 @@ std::string reason_of(unsigned long error) {
 }  // namespace
 
 void write_vtp_file(const std::filesystem::path& path, const PolyDataView& data) {
-  vtkNew<vtkXMLPolyDataWriter> writer;
+  vtkNew<InlineWriter> writer;
   // With an observer, VTK does not print errors on the terminal.
   vtkNew<vtkCallbackCommand> silent;
   silent->SetCallback([](vtkObject*, unsigned long, void*, void*) {});
@@ -127,8 +149,6 @@ void write_vtp_file(const std::filesystem::path& path, const PolyDataView& data)
   const vtkNew<vtkPolyData> polydata = polydata_of(data);
   writer->SetFileName(path.c_str());
   writer->SetInputData(polydata);
-  writer->SetDataModeToAppended();
-  writer->EncodeAppendedDataOff();
   writer->SetHeaderTypeToUInt64();
   if (data.line_ends)
     writer->SetCompressorTypeToNone();
