@@ -126,12 +126,6 @@ Matrix3d general_with_eigenvalues(const Matrix3d& tensor, Eigenvalues mode, bool
   return result / (growth * growth);
 }
 
-/// The counts and sums of apply_eigenvalues for one block.
-struct BlockReport {
-  std::size_t defective = 0;
-  double norm = 0, erased = 0;
-};
-
 /// The tensors of some active voxels side by side, and the offsets of these voxels in their block.
 struct VoxelVectors {
   TensorVectors tensors{};
@@ -152,7 +146,7 @@ int take_voxels(const TensorBlock& block, int offset, VoxelVectors& voxels) {
 }
 
 /// Writes the result of one tensor to its voxel.
-void put_back(const VoxelVectors& voxels, int i, Eigenvalues mode, TensorBlock& block, BlockReport& report) {
+void put_back(const VoxelVectors& voxels, int i, Eigenvalues mode, TensorBlock& block, EigenvalueSums& report) {
   const TensorVectors& tensors = voxels.tensors;
   Eigen::Matrix3f& value = block.values[voxels.offsets[i]];
   report.norm += tensors.squared_norm[i];
@@ -168,17 +162,6 @@ void put_back(const VoxelVectors& voxels, int i, Eigenvalues mode, TensorBlock& 
   value = result.cast<float>();
   report.erased += erased_norm(tensor, result);
   report.defective += defective;
-}
-
-BlockReport apply_to_block(TensorBlock& block, Eigenvalues mode) {
-  BlockReport report;
-  VoxelVectors voxels;
-  for (int offset = 0; offset < TensorBlock::voxels;) {
-    offset = take_voxels(block, offset, voxels);
-    compute_with_eigenvalues(voxels.tensors, voxels.count, mode == Eigenvalues::positive);
-    for (int i = 0; i < voxels.count; ++i) put_back(voxels, i, mode, block, report);
-  }
-  return report;
 }
 
 }  // namespace
@@ -204,26 +187,42 @@ double erased_norm(const Matrix3d& before, const Matrix3d& after) {
   return std::max(0.0, part(before, -1) - part(after, -1)) + std::max(0.0, part(before, 1) - part(after, 1));
 }
 
-EigenvalueReport apply_eigenvalues(TensorGrid& grid, Eigenvalues mode) {
-  EigenvalueReport report;
-  report.chosen = mode;
-  if (mode == Eigenvalues::automatic)
-    report.chosen = asymmetry(grid) < symmetric_tolerance ? Eigenvalues::absolute : Eigenvalues::raw;
-  if (report.chosen == Eigenvalues::raw) return report;
+void EigenvalueSums::add(const EigenvalueSums& other) {
+  defective += other.defective;
+  norm += other.norm;
+  erased += other.erased;
+}
 
-  std::vector<BlockReport> blocks(grid.blocks.size());
+EigenvalueSums apply_eigenvalues(TensorBlock& block, Eigenvalues mode) {
+  EigenvalueSums sums;
+  VoxelVectors voxels;
+  for (int offset = 0; offset < TensorBlock::voxels;) {
+    offset = take_voxels(block, offset, voxels);
+    compute_with_eigenvalues(voxels.tensors, voxels.count, mode == Eigenvalues::positive);
+    for (int i = 0; i < voxels.count; ++i) put_back(voxels, i, mode, block, sums);
+  }
+  return sums;
+}
+
+EigenvalueReport report_of(const EigenvalueSums& sums, Eigenvalues chosen) {
+  return {chosen, sums.defective, sums.norm > 0 ? sums.erased / sums.norm : 0};
+}
+
+Eigenvalues automatic_choice(double asymmetry) {
+  return asymmetry < symmetric_tolerance ? Eigenvalues::absolute : Eigenvalues::raw;
+}
+
+EigenvalueReport apply_eigenvalues(TensorGrid& grid, Eigenvalues mode) {
+  const Eigenvalues chosen = mode == Eigenvalues::automatic ? automatic_choice(asymmetry(grid)) : mode;
+  if (chosen == Eigenvalues::raw) return report_of({}, chosen);
+  std::vector<EigenvalueSums> blocks(grid.blocks.size());
   tbb::parallel_for(std::size_t{0}, blocks.size(), [&](std::size_t i) {
     make_room();
-    blocks[i] = apply_to_block(grid.blocks[i], report.chosen);
+    blocks[i] = apply_eigenvalues(grid.blocks[i], chosen);
   });
-  double norm = 0, erased = 0;  // Summed in the order of the blocks, so that the number of threads does not matter.
-  for (const BlockReport& block : blocks) {
-    report.defective += block.defective;
-    norm += block.norm;
-    erased += block.erased;
-  }
-  report.norm_lost = norm > 0 ? erased / norm : 0;
-  return report;
+  EigenvalueSums all;  // Summed in the order of the blocks, so that the number of threads does not matter.
+  for (const EigenvalueSums& block : blocks) all.add(block);
+  return report_of(all, chosen);
 }
 
 Eigen::Vector3cd eigenvalues(const Matrix3d& tensor) {
