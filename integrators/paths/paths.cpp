@@ -40,6 +40,7 @@ RayBatch follow(const PathJob& job, const PathSeed* seeds, std::size_t count, bo
 /// seed. The result runs in the light's direction. (V' is the same from both directions.)
 PathPoints joined(const PathPoints& back, const PathPoints& on) {
   PathPoints points;
+  points.reserve(back.size() + on.size());
   const double before = back.empty() ? 0 : back.back().length;
   for (auto point = back.rbegin(); point != back.rend(); ++point) {
     points.push_back(*point);
@@ -76,25 +77,31 @@ bool separate(PathPoints& points, std::size_t first, std::size_t last, double ga
 /// Makes lengths increase from point to point: separates the pairs of points where the field begins or ends, and
 /// removes points that coincide.
 void remove_coincident(PathPoints& points, double gap, double least) {
-  PathPoints kept;
+  std::size_t kept = 0;  // Points that stay, at the front.
   for (std::size_t first = 0; first < points.size();) {
     std::size_t last = first + 1;
     while (last < points.size() && points[last].in_field == points[first].in_field) ++last;
     if (points[first].in_field || separate(points, first, last, gap))
       for (std::size_t i = first; i < last; ++i)
-        if (kept.empty() || points[i].length - kept.back().length > least) kept.push_back(points[i]);
+        if (kept == 0 || points[i].length - points[kept - 1].length > least) {
+          if (kept != i) points[kept] = points[i];
+          ++kept;
+        }
     first = last;
   }
-  points = std::move(kept);
+  points.resize(kept);
 }
 
 PathPoints thinned(const PathPoints& points, double tolerance, double tensor_tolerance) {
+  std::vector<double> norms;
+  norms.reserve(points.size());
+  for (const PathPoint& point : points) norms.push_back(point.tensor.norm());
   const auto error = [&](std::size_t i, std::size_t j, std::size_t k) {
     const PathPoint &a = points[i], &b = points[j], &point = points[k];
     const double t = (point.length - a.length) / (b.length - a.length);
     const double apart = (a.position + t * (b.position - a.position) - point.position).norm();
     const double unlike = (a.tensor + t * (b.tensor - a.tensor) - point.tensor).norm();
-    const double norm = std::max({a.tensor.norm(), b.tensor.norm(), point.tensor.norm()});
+    const double norm = std::max({norms[i], norms[j], norms[k]});
     // An error of zero is always allowed.
     const auto over = [](double value, double allowed) { return value > 0 ? value / allowed : 0; };
     return std::max(over(apart, tolerance), over(unlike, tensor_tolerance * norm));
