@@ -66,7 +66,8 @@ void trace(const TensorField& field, const Geometry& geometry, const BendingSett
 
 void trace(const TensorField& field, const Geometry& geometry, const BendingSettings& settings, RayBatch& batch,
            std::vector<PathPoints>& paths) {
-  paths.assign(batch.size(), PathPoints());
+  paths.resize(batch.size());
+  for (PathPoints& path : paths) path.clear();  // Keeps the memory that they have allocated.
   trace_batch(field, geometry, settings, batch, {&paths, nullptr});
 }
 

@@ -6,6 +6,7 @@
 
 #include <Eigen/Eigenvalues>
 #include <Eigen/Geometry>
+#include <tbb/parallel_for.h>
 
 #include "renderer/surfaces/plate.h"
 
@@ -127,14 +128,17 @@ std::vector<CrossSection> cross_sections(const PathPoints& points, const CrossSe
 }
 
 double scale_for_radius(const std::vector<const PathPoints*>& paths, double radius) {
-  std::vector<double> lengths;
-  for (const PathPoints* points : paths)
-    for (const PathPoint& point : *points) {
+  std::vector<std::vector<double>> of_paths(paths.size());
+  tbb::parallel_for(std::size_t{0}, paths.size(), [&](std::size_t path) {
+    for (const PathPoint& point : *paths[path]) {
       if (!point.in_field) continue;
       const Basis axes = ellipse(point.tensor, point.direction);
       for (int i = 0; i < 2; ++i)
-        if (const double length = axes.col(i).norm(); length > 0) lengths.push_back(length);
+        if (const double length = axes.col(i).norm(); length > 0) of_paths[path].push_back(length);
     }
+  });
+  std::vector<double> lengths;
+  for (const std::vector<double>& of_path : of_paths) lengths.insert(lengths.end(), of_path.begin(), of_path.end());
   if (lengths.empty()) return 1;
   const auto middle = lengths.begin() + static_cast<std::ptrdiff_t>(lengths.size() / 2);
   std::nth_element(lengths.begin(), middle, lengths.end());

@@ -49,7 +49,8 @@ Eigen::Vector3d transported(const Eigen::Vector3d& normal, const Eigen::Vector3d
 /// @throw std::invalid_argument if a setting is out of range.
 std::vector<CrossSection> cross_sections(const PathPoints& points, const CrossSectionSettings& settings);
 
-/// The scale at which the median of all semi-axes of `paths` in the field is `radius`; 1 if there are none.
+/// The scale at which the median of all semi-axes of `paths` in the field is `radius`; 1 if there are none. Runs on all
+/// threads.
 double scale_for_radius(const std::vector<const PathPoints*>& paths, double radius);
 
 }  // namespace tensorray

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <stdexcept>
 
+#include <tbb/enumerable_thread_specific.h>
 #include <tbb/parallel_for.h>
 
 #include "renderer/surfaces/polyline.h"
@@ -11,7 +12,8 @@
 namespace tensorray {
 namespace {
 
-constexpr std::size_t chunk_size = 1024;  // Paths between two progress reports.
+constexpr std::size_t chunk_size = 4096;  // Paths between two progress reports.
+constexpr std::size_t batch_size = 32;    // Paths that are traced together: a packet of rays.
 constexpr double closest = 1e-9;          // Points nearer to each other than this, in voxels, count as one.
 
 /// What the threads share and do not change.
@@ -23,20 +25,22 @@ struct PathJob {
   double voxel = 0;  // Size of a voxel, world units.
 };
 
-PathPoints follow(const PathJob& job, const PathSeed& seed, bool backwards, RayEnd& end) {
+/// Follows the light of some seeds. @param paths  Their points; each begins at its seed.
+RayBatch follow(const PathJob& job, const PathSeed* seeds, std::size_t count, bool backwards,
+                std::vector<PathPoints>& paths) {
   RayBatch batch;
-  std::vector<PathPoints> paths;
   const double sign = backwards ? -1 : 1;
-  batch.add(seed.position, sign * seed.direction, sign * seed.flexibility);
+  for (std::size_t i = 0; i < count; ++i)
+    batch.add(seeds[i].position, sign * seeds[i].direction, sign * seeds[i].flexibility);
   trace(job.field, job.geometry, job.bending, batch, paths);
-  end = batch.end[0];
-  return std::move(paths[0]);
+  return batch;
 }
 
 /// Joins the part behind the seed (`back`, traced backwards) and the part in front of it (`on`). Both begin at the
 /// seed. The result runs in the light's direction. (V' is the same from both directions.)
 PathPoints joined(const PathPoints& back, const PathPoints& on) {
   PathPoints points;
+  points.reserve(back.size() + on.size());
   const double before = back.empty() ? 0 : back.back().length;
   for (auto point = back.rbegin(); point != back.rend(); ++point) {
     points.push_back(*point);
@@ -73,25 +77,31 @@ bool separate(PathPoints& points, std::size_t first, std::size_t last, double ga
 /// Makes lengths increase from point to point: separates the pairs of points where the field begins or ends, and
 /// removes points that coincide.
 void remove_coincident(PathPoints& points, double gap, double least) {
-  PathPoints kept;
+  std::size_t kept = 0;  // Points that stay, at the front.
   for (std::size_t first = 0; first < points.size();) {
     std::size_t last = first + 1;
     while (last < points.size() && points[last].in_field == points[first].in_field) ++last;
     if (points[first].in_field || separate(points, first, last, gap))
       for (std::size_t i = first; i < last; ++i)
-        if (kept.empty() || points[i].length - kept.back().length > least) kept.push_back(points[i]);
+        if (kept == 0 || points[i].length - points[kept - 1].length > least) {
+          if (kept != i) points[kept] = points[i];
+          ++kept;
+        }
     first = last;
   }
-  points = std::move(kept);
+  points.resize(kept);
 }
 
 PathPoints thinned(const PathPoints& points, double tolerance, double tensor_tolerance) {
+  std::vector<double> norms;
+  norms.reserve(points.size());
+  for (const PathPoint& point : points) norms.push_back(point.tensor.norm());
   const auto error = [&](std::size_t i, std::size_t j, std::size_t k) {
     const PathPoint &a = points[i], &b = points[j], &point = points[k];
     const double t = (point.length - a.length) / (b.length - a.length);
     const double apart = (a.position + t * (b.position - a.position) - point.position).norm();
     const double unlike = (a.tensor + t * (b.tensor - a.tensor) - point.tensor).norm();
-    const double norm = std::max({a.tensor.norm(), b.tensor.norm(), point.tensor.norm()});
+    const double norm = std::max({norms[i], norms[j], norms[k]});
     // An error of zero is always allowed.
     const auto over = [](double value, double allowed) { return value > 0 ? value / allowed : 0; };
     return std::max(over(apart, tolerance), over(unlike, tensor_tolerance * norm));
@@ -103,25 +113,35 @@ PathPoints thinned(const PathPoints& points, double tolerance, double tensor_tol
   return kept;
 }
 
-Path trace_path(const PathJob& job, const PathSeed& seed) {
-  Path path;
-  path.flexibility = seed.flexibility;
-  path.wavelength = seed.wavelength;
-  PathPoints points, back;
-  points = follow(job, seed, false, path.end);
-  if (job.settings.backwards) {
-    path.backward_end.emplace();
-    back = follow(job, seed, true, *path.backward_end);
-  }
-  points = joined(back, points);
+/// What `Path` keeps of the points of a ray.
+PathPoints kept_points(const PathJob& job, PathPoints points) {
   if (!job.settings.outside) remove_outside(points);
   const double gap = std::max(0.5 * job.settings.tolerance, 10 * closest) * job.voxel;
   remove_coincident(points, gap, closest * job.voxel);
-  if (points.size() < 2) return path;
+  if (points.size() < 2) return {};
   const double start = points.front().length;
   for (PathPoint& point : points) point.length -= start;
-  path.points = thinned(points, job.settings.tolerance * job.voxel, job.settings.tensor_tolerance);
-  return path;
+  return thinned(points, job.settings.tolerance * job.voxel, job.settings.tensor_tolerance);
+}
+
+/// Recorded points of rays; kept from batch to batch, with their memory.
+struct Recorded {
+  std::vector<PathPoints> back, on;
+};
+
+/// Traces the paths of some seeds. Their rays are traced together.
+void trace_batch(const PathJob& job, const PathSeed* seeds, std::size_t count, Recorded& recorded, Path* paths) {
+  const RayBatch on = follow(job, seeds, count, false, recorded.on);
+  RayBatch back;
+  recorded.back.resize(count);  // Empty if light is not followed back.
+  if (job.settings.backwards) back = follow(job, seeds, count, true, recorded.back);
+  for (std::size_t i = 0; i < count; ++i) {
+    paths[i].flexibility = seeds[i].flexibility;
+    paths[i].wavelength = seeds[i].wavelength;
+    paths[i].end = on.end[i];
+    if (job.settings.backwards) paths[i].backward_end = back.end[i];
+    paths[i].points = kept_points(job, joined(recorded.back[i], recorded.on[i]));
+  }
 }
 
 }  // namespace
@@ -135,11 +155,14 @@ std::vector<Path> trace_paths(const TensorField& field, const Geometry& geometry
   PathJob job{field, geometry, bending, settings};
   job.voxel = std::cbrt(std::abs(field.to_world().linear().determinant()));
   std::vector<Path> paths(seeds.size());
+  tbb::enumerable_thread_specific<Recorded> recorded;
   for (std::size_t first = 0; first < seeds.size(); first += chunk_size) {
     progress.update("tracing paths", first, seeds.size());
-    tbb::parallel_for(first, std::min(first + chunk_size, seeds.size()), [&](std::size_t i) {
+    const std::size_t count = std::min(chunk_size, seeds.size() - first);
+    tbb::parallel_for(std::size_t{0}, (count + batch_size - 1) / batch_size, [&](std::size_t batch) {
       if (progress.cancelled) throw Cancelled();
-      paths[i] = trace_path(job, seeds[i]);
+      const std::size_t begin = first + batch * batch_size, end = std::min(begin + batch_size, first + count);
+      trace_batch(job, &seeds[begin], end - begin, recorded.local(), &paths[begin]);
     });
   }
   progress.update("tracing paths", seeds.size(), seeds.size());

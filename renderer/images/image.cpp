@@ -17,6 +17,7 @@
 #include "base/errors.h"
 #include "base/text.h"
 #include "renderer/images/picture_library.h"
+#include "renderer/images/png_encoder.h"
 
 namespace tensorray {
 namespace {
@@ -29,6 +30,8 @@ PictureFormat find_format(const std::filesystem::path& path) {
   if (ending == ".tif" || ending == ".tiff") return {"tiff", SampleType::uint16, true, true, false};
   throw std::runtime_error("unknown picture ending \"" + ending + "\"; known: " + joined(image_endings()));
 }
+
+bool is_png(const PictureFormat& format) { return format.name == "png"; }
 
 void check_size(const Image& image) {
   if (image.width < 1 || image.height < 1 || image.channels.empty())
@@ -135,14 +138,22 @@ bool holds_alpha(const std::filesystem::path& path) { return find_format(path).a
 
 void set_image_threads(int threads) { image_threads = threads; }
 
-void prepare_images() { picture_library(); }
+void prepare_images(const std::vector<std::filesystem::path>& files) {
+  for (const std::filesystem::path& file : files) {
+    const std::vector<std::string> known = image_endings();
+    const bool is_picture = std::find(known.begin(), known.end(), lower_case_ending(file)) != known.end();
+    if (is_picture && !is_png(find_format(file))) picture_library();
+  }
+}
 
 void write_image(const std::filesystem::path& path, const Image& image, const ImageMetadata& metadata) {
   check_size(image);
   try {
     const PictureFormat format = find_format(path);
     const bool clip = format.display_referred;
-    write_bytes(path, ready_library().encode(clip ? clipped(image, format.alpha) : image, format, metadata));
+    const Image clipped_image = clip ? clipped(image, format.alpha) : Image();
+    const Image& stored = clip ? clipped_image : image;
+    write_bytes(path, is_png(format) ? encode_png(stored, metadata) : ready_library().encode(stored, format, metadata));
   } catch (const std::exception& error) {
     throw std::runtime_error("cannot write " + path.string() + ": " + error.what());
   }

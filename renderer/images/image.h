@@ -1,6 +1,7 @@
 #pragma once
 /// @file renderer/images/image.h
-/// A picture in memory, and the only functions that read and write picture files (OpenImageIO).
+/// A picture in memory, and the only functions that read and write picture files (by OpenImageIO; PNG is written
+/// without it).
 
 #include <array>
 #include <cstddef>
@@ -47,8 +48,9 @@ std::vector<std::string> image_endings();
 /// picture in parallel.) Do not call it while pictures are read or written.
 void set_image_threads(int threads);
 
-/// Loads what is needed to read and write pictures, so that the first one does not wait for it. Any thread may call it.
-void prepare_images();
+/// Loads what is needed to write the pictures among `files`, so that the first one does not wait for it. (PNG needs
+/// nothing.) Any thread may call it.
+void prepare_images(const std::vector<std::filesystem::path>& files);
 
 /// Writes a picture in the format given by the ending of `path`. The same picture always gives the same bytes.
 /// - EXR: all channels as 32-bit floats, ZIP-compressed, with unchanged values and names; all metadata.

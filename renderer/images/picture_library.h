@@ -1,8 +1,9 @@
 #pragma once
 /// @file renderer/images/picture_library.h
 /// Everything that the program does with OpenImageIO. It is a library of its own, which is loaded when the first
-/// picture is read, looked up or written: Debian's OpenImageIO brings 260 libraries, which take a quarter of a second
-/// to load, and several seconds from a cold disk. Commands and errors without a picture do not wait for them.
+/// picture is read, looked up or written (but PNG is written without it): Debian's OpenImageIO brings 260 libraries,
+/// which take a quarter of a second to load, and several seconds from a cold disk. Commands and errors without a
+/// picture do not wait for them.
 
 #include <cstddef>
 #include <filesystem>

@@ -33,13 +33,11 @@ OIIO::ImageSpec make_spec(const Image& image, const PictureFormat& format, const
   if (image.channels.size() > 3 && image.channels[3] == "A") spec.alpha_channel = 3;
   if (format.display_referred) spec.attribute("oiio:UnassociatedAlpha", 1);
   if (format.name == "openexr") spec.attribute("compression", "zip");
-  // Three to four times as fast as the default strategy and level; files are from 2% larger to 7% smaller.
-  if (format.name == "png") spec.attribute("compression", "rle");
   if (format.name == "jpeg") {
     spec.attribute("Compression", "jpeg:95");
     spec.attribute("jpeg:subsampling", "4:4:4");
   }
-  if (format.name == "png" || format.name == "jpeg") spec.attribute("oiio:ColorSpace", "sRGB");
+  if (format.name == "jpeg") spec.attribute("oiio:ColorSpace", "sRGB");
   for (const auto& [name, value] : metadata)
     if (format.all_metadata || is_plain(name) || (format.name == "jpeg" && name == "oiio:ColorSpace"))
       spec.attribute(name, value);

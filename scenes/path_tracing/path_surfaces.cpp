@@ -21,38 +21,53 @@ constexpr std::uint64_t most_triangles = 60'000'000;  // About 6 GB with the sea
 
 /// The place of a vertex on a path: the point of the path before it, and the fraction of the distance to the next one.
 struct Place {
-  const Path* path = nullptr;
   std::size_t point = 0;
   double fraction = 0;
 
+  /// @param values  One for each point of the path.
   template <class Value>
-  auto interpolate(const Value& value) const {
-    const PathPoints& way = path->points;
-    const auto before = value(way[point]), after = value(way[std::min(point + 1, way.size() - 1)]);
-    return static_cast<std::decay_t<decltype(before)>>((1 - fraction) * before + fraction * after);
+  Value interpolate(const std::vector<Value>& values) const {
+    const Value &before = values[point], &after = values[std::min(point + 1, values.size() - 1)];
+    return (1 - fraction) * before + fraction * after;
   }
 };
 
-Place place_on(const Path& path, double value) {
-  const double last = static_cast<double>(path.points.size() - 1);
+Place place_on(const PathPoints& way, double value) {
+  const double last = static_cast<double>(way.size() - 1);
   const double clamped = std::clamp(value, 0.0, last);
   const auto point = static_cast<std::size_t>(std::min(std::floor(clamped), std::max(0.0, last - 1)));
-  return {&path, point, clamped - static_cast<double>(point)};
+  return {point, clamped - static_cast<double>(point)};
 }
 
-/// Calls `visit(vertex, place)` for every vertex of the mesh, on all threads.
+/// What surfaces show of the points of a path.
+struct PointValues {
+  std::vector<Eigen::Vector3d> colors;  ///< Linear Rec. 709; empty without colours.
+  std::vector<double> forces, lengths;
+};
+
+PointValues values_of(const Path& path, const PathColors& colors) {
+  PointValues values;
+  for (const PathPoint& point : path.points) {
+    if (colors.color) values.colors.push_back(colors.color(path, point));
+    values.forces.push_back(point.force().norm());
+    values.lengths.push_back(point.length);
+  }
+  return values;
+}
+
+/// Calls `visit(vertex, place, values)` once for every vertex of the mesh, on all threads.
 template <class Visit>
-void for_each_vertex(const TubeMesh& mesh, const std::vector<Path>& paths, const Visit& visit) {
+void for_each_vertex(const TubeMesh& mesh, const std::vector<Path>& paths, const PathColors& colors,
+                     const Visit& visit) {
+  std::vector<std::uint8_t> visited(mesh.mesh.vertices.size());  // No two tubes have a vertex in common.
   tbb::parallel_for(std::size_t{0}, paths.size(), [&](std::size_t tube) {
+    const PointValues values = values_of(paths[tube], colors);
     const std::uint32_t first = tube == 0 ? 0 : mesh.tube_ends[tube - 1];
     for (std::uint32_t triangle = first; triangle < mesh.tube_ends[tube]; ++triangle)
       for (const std::uint32_t vertex : mesh.mesh.triangles[triangle])
-        visit(vertex, place_on(paths[tube], static_cast<double>(mesh.values[vertex])));
+        if (!std::exchange(visited[vertex], std::uint8_t{1}))
+          visit(vertex, place_on(paths[tube].points, static_cast<double>(mesh.values[vertex])), values);
   });
-}
-
-Eigen::Vector3d color_at(const PathColors& colors, const Place& place) {
-  return place.interpolate([&](const PathPoint& point) -> Eigen::Vector3d { return colors.color(*place.path, point); });
 }
 
 Eigen::Vector3f reflectance(const Eigen::Matrix3d& to_working, const Eigen::Vector3d& rec709) {
@@ -131,10 +146,10 @@ ShadedSurface path_surface(TubeMesh mesh, const std::vector<Path>& paths, const 
   if (colors.color) surface.colors.resize(count);
   surface.forces.resize(count);
   surface.arc_lengths.resize(count);
-  for_each_vertex(mesh, paths, [&](std::uint32_t vertex, const Place& place) {
-    if (colors.color) surface.colors[vertex] = reflectance(to_working, color_at(colors, place));
-    surface.forces[vertex] = static_cast<float>(place.interpolate([](const PathPoint& p) { return p.force().norm(); }));
-    surface.arc_lengths[vertex] = static_cast<float>(place.interpolate([](const PathPoint& p) { return p.length; }));
+  for_each_vertex(mesh, paths, colors, [&](std::uint32_t vertex, const Place& place, const PointValues& values) {
+    if (colors.color) surface.colors[vertex] = reflectance(to_working, place.interpolate(values.colors));
+    surface.forces[vertex] = static_cast<float>(place.interpolate(values.forces));
+    surface.arc_lengths[vertex] = static_cast<float>(place.interpolate(values.lengths));
   });
   surface.shape = std::move(mesh.mesh);
   surface.normals = std::move(mesh.normals);
@@ -165,9 +180,9 @@ void write_tubes(const std::filesystem::path& path, const TubeMesh& mesh, const 
                  const PathColors& colors) {
   std::vector<std::array<std::uint8_t, 3>> rgb(mesh.mesh.vertices.size());
   std::vector<float> forces(rgb.size());
-  for_each_vertex(mesh, paths, [&](std::uint32_t vertex, const Place& place) {
-    if (colors.color) rgb[vertex] = bytes_of(color_at(colors, place));
-    forces[vertex] = static_cast<float>(place.interpolate([](const PathPoint& p) { return p.force().norm(); }));
+  for_each_vertex(mesh, paths, colors, [&](std::uint32_t vertex, const Place& place, const PointValues& values) {
+    if (colors.color) rgb[vertex] = bytes_of(place.interpolate(values.colors));
+    forces[vertex] = static_cast<float>(place.interpolate(values.forces));
   });
   VertexAttributes attributes;
   attributes.normals = &mesh.normals;

@@ -1,6 +1,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <optional>
 
 #include <fmt/format.h>
 
@@ -9,6 +10,8 @@
 #include "scenes/description/choices.h"
 #include "scenes/scene/scene.h"
 #include "volumes/files/tensor_files.h"
+#include "volumes/grids/page_memory.h"
+#include "volumes/tensors/field_making.h"
 
 namespace tensorray {
 namespace {
@@ -19,18 +22,39 @@ constexpr double greatest_size = 1e5;  // Largest size of the scene, in sizes of
 constexpr double narrowest_white = 100;  // nm: light of a narrower range has no white.
 constexpr int default_resolution = 512;  // Pixels along the plate's longer side.
 
-TensorGrid load_grid(const SceneDescription& scene) {
-  const FieldDescription& field = scene.field;
-  if (!field.generate) return read_tensor_vdb(field.file, field.name, field.derive);
+/// Calls make(generator, grid) with what a scene generates.
+template <class Make>
+auto generated(const SceneDescription& scene, const Make& make) {
   try {
-    return generate(field.generate->generator, field.generate->grid);
+    return make(scene.field.generate->generator, scene.field.generate->grid);
   } catch (const std::invalid_argument& error) {
     throw SceneError(fmt::format("{}: `/field/generate`: {}", scene.path.string(), error.what()));
   }
 }
 
+TensorGrid load_grid(const SceneDescription& scene) {
+  const FieldDescription& field = scene.field;
+  if (!field.generate) return read_tensor_vdb(field.file, field.name, field.derive);
+  return generated(scene, generate);
+}
+
+/// The blocks of the field; nothing if it must be read as a whole.
+std::optional<BlockSource> load_blocks(const SceneDescription& scene) {
+  const FieldDescription& field = scene.field;
+  if (memory_bound()) return std::nullopt;
+  if (field.generate) return generated(scene, generator_source);
+  return field.derive == Derive::none ? open_tensor_vdb(field.file, field.name) : std::nullopt;
+}
+
 std::string source_of(const FieldDescription& field) {
   return field.generate ? kind_of(field.generate->generator) : field.file.string();
+}
+
+LoadedField load_field(const SceneDescription& scene) {
+  const FieldDescription& field = scene.field;
+  if (const std::optional<BlockSource> blocks = load_blocks(scene))
+    return prepare_field(*blocks, field.eigenvalues, source_of(field));
+  return prepare_field(load_grid(scene), field.eigenvalues, source_of(field));
 }
 
 TriangleMesh load_closed_mesh(const std::filesystem::path& path) {
@@ -213,6 +237,25 @@ LoadedLight load_light(const SceneDescription& description) {
   return light;
 }
 
+LoadedField with_notes(MadeField made, const std::string& source) {
+  std::vector<std::string> notes;
+  if (made.non_finite > 0)
+    notes.push_back(fmt::format("warning: {}: {} of {} voxels are not finite; light goes straight there", source,
+                                made.non_finite, made.voxels + made.non_finite));
+  if (!made.field) throw std::runtime_error(source + ": no voxel of the field is finite; nothing can be traced");
+  const EigenvalueReport& eigenvalues = made.eigenvalues;
+  notes.push_back(
+      fmt::format("field: {}, {} voxels, eigenvalues {}", source, made.voxels, choice_name(eigenvalues.chosen)));
+  if (eigenvalues.defective > 0)
+    notes.push_back(fmt::format("{} voxels hold a defective tensor, preprocessed by its limit", eigenvalues.defective));
+  if (eigenvalues.norm_lost > 0.01)
+    notes.push_back(
+        fmt::format("preprocessing erased {:.0f}% of the field's squared norm (rotation and shear); "
+                    "\"eigenvalues\": \"raw\" keeps it",
+                    100 * eigenvalues.norm_lost));
+  return {std::move(*made.field), eigenvalues, made.non_finite, std::move(notes)};
+}
+
 /// The first notes of a scene: what its description and its field have to say.
 std::vector<std::string> notes_of(const SceneDescription& description, const LoadedField& field) {
   std::vector<std::string> notes;
@@ -266,33 +309,23 @@ void require_near(const Plate& plate, const char* pointer, const SceneDescriptio
 }
 
 LoadedField prepare_field(TensorGrid grid, Eigenvalues mode, const std::string& source) {
-  std::vector<std::string> notes;
-  const std::size_t active = grid.active_voxels();
-  const std::size_t non_finite = remove_non_finite(grid);
-  if (non_finite > 0)
-    notes.push_back(fmt::format("warning: {}: {} of {} voxels are not finite; light goes straight there", source,
-                                non_finite, active));
-  if (grid.blocks.empty())
-    throw std::runtime_error(source + ": no voxel of the field is finite; nothing can be traced");
-  const EigenvalueReport eigenvalues = apply_eigenvalues(grid, mode);
-  notes.push_back(fmt::format("field: {}, {} voxels, eigenvalues {}", source, grid.active_voxels(),
-                              choice_name(eigenvalues.chosen)));
-  if (eigenvalues.defective > 0)
-    notes.push_back(fmt::format("{} voxels hold a defective tensor, preprocessed by its limit", eigenvalues.defective));
-  if (eigenvalues.norm_lost > 0.01)
-    notes.push_back(
-        fmt::format("preprocessing erased {:.0f}% of the field's squared norm (rotation and shear); "
-                    "\"eigenvalues\": \"raw\" keeps it",
-                    100 * eigenvalues.norm_lost));
-  return {TensorField(std::move(grid)), eigenvalues, non_finite, std::move(notes)};
+  MadeField made;
+  made.non_finite = remove_non_finite(grid);
+  made.voxels = grid.active_voxels();
+  made.eigenvalues = apply_eigenvalues(grid, mode);
+  if (made.voxels > 0) made.field.emplace(std::move(grid));
+  return with_notes(std::move(made), source);
+}
+
+LoadedField prepare_field(const BlockSource& blocks, Eigenvalues mode, const std::string& source) {
+  return with_notes(make_field(blocks, mode), source);
 }
 
 Scene load_scene(const SceneDescription& description, const Progress& progress) {
   const auto start = Clock::now();
   LoadedLight light = load_light(description);
   progress.update("loading", 0, 1);
-  const FieldDescription& field = description.field;
-  LoadedField loaded = prepare_field(load_grid(description), field.eigenvalues, source_of(field));
+  LoadedField loaded = load_field(description);
   std::vector<std::string> notes = notes_of(description, loaded);
   Scene scene = make_scene(description, std::move(light), std::move(loaded), std::move(notes), progress);
   scene.seconds = seconds_since(start);

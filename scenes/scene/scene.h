@@ -62,6 +62,7 @@ struct LoadedField {
 /// Removes voxels that are not finite, and preprocesses the others.
 /// @param source  Names the field in notes and errors. @throw std::runtime_error if no voxel is left.
 LoadedField prepare_field(TensorGrid grid, Eigenvalues mode, const std::string& source);
+LoadedField prepare_field(const BlockSource& blocks, Eigenvalues mode, const std::string& source);
 
 /// SceneDescription → Scene: loads fields, meshes and spectra, and chooses all values that the scene leaves open.
 /// @throw std::runtime_error, one line that names the file and the fix; SceneError if a value of the scene does not fit

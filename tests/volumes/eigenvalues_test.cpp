@@ -307,6 +307,76 @@ TEST(ApplyEigenvalues, CountsDefectiveVoxelsAndLostNorm) {
   EXPECT_NEAR(apply_eigenvalues(grid, Eigenvalues::positive).norm_lost, 0.5, 1e-6);  // `positive` keeps rotation.
 }
 
+/// Tensors of every kind that with_eigenvalues treats apart, in single precision.
+Matrix3d any_kind(RandomTensors& random, int kind) {
+  static const Matrix3d special[] = {
+      Matrix3d::Zero(),
+      Matrix3d::Identity(),
+      matrix({2, 1, 0, 0, 2, 0, 0, 0, 5}),  // Jordan blocks.
+      matrix({-2, 1, 0, 0, -2, 1, 0, 0, -2}),
+      matrix({-2, 1, 0, 0, -2, 0, 0, 0, 5}),
+      matrix({0, 0, 3, 0, 7, 0, 0, 0, 0}),
+      matrix({0, 1, 0, 0, 0, 1, 0, 0, 0}),
+      matrix({0, 0, 3, 0, 0, 0, 1e-5, 0, 0}),  // Almost a simple shear.
+      matrix({0, -2, 0, 2, 0, 0, 0, 0, 0}),    // Pairs: on the cut of `positive`, and on both sides of it.
+      matrix({0, -2, 0, 2, 0, 0, 0, 0, -3}),
+      matrix({-1, -2, 0, 2, -1, 0, 0, 0, 3}),
+      matrix({1, -2, 0, 2, 1, 0, 0, 0, -3}),
+      Vector3d(3, 3, -2).asDiagonal(),
+      Vector3d(1, 0, 0).asDiagonal(),
+      Vector3d(-1, 1, 0).asDiagonal(),
+      Vector3d(-4, -2, -1).asDiagonal()};
+  constexpr int count = sizeof special / sizeof special[0];
+  const double scale = std::pow(10, random.exponent(-30, 30));
+  if (kind % 3 == 1) return scale * random.general();
+  if (kind % 3 == 2) return scale * random.symmetric();
+  const Matrix3d rotation = kind % 2 == 0 ? random.rotation() : Matrix3d(Matrix3d::Identity());
+  Matrix3d tensor = rotation * special[kind / 3 % count] * rotation.transpose();
+  if (special[kind / 3 % count].isApprox(special[kind / 3 % count].transpose()))
+    tensor = ((tensor + tensor.transpose()) / 2).eval();
+  if (kind % 5 == 0) tensor += std::pow(10, random.exponent(-9, -1)) * random.symmetric();
+  return scale * tensor;
+}
+
+/// Fields are preprocessed in vectors, tensors one by one. Both are in double precision.
+TEST(ApplyEigenvalues, AgreesWithSingleTensors) {
+  RandomTensors random;
+  std::vector<Matrix3d> tensors;
+  for (int i = 0; i < 24 * 18 * 26; ++i) tensors.push_back(any_kind(random, i).cast<float>().cast<double>());
+  const auto at = [&](const Eigen::Vector3i& i) {
+    return tensors[static_cast<std::size_t>(((i.x() + 3) * 18 + i.y()) * 26 + i.z() - 5)];
+  };
+  for (const Eigenvalues mode : both) {
+    TensorGrid grid;
+    {
+      const tbb::global_control single(tbb::global_control::max_allowed_parallelism, 1);
+      grid = grid_of(at);
+    }
+    const TensorGrid before = grid;
+    const EigenvalueReport report = apply_eigenvalues(grid, mode);
+    std::size_t defective = 0;
+    double norm = 0, erased = 0;
+    for (std::size_t b = 0; b < grid.blocks.size(); ++b)
+      for (int offset = 0; offset < TensorBlock::voxels; ++offset) {
+        if (!before.blocks[b].active[offset]) continue;
+        const Matrix3d tensor = before.blocks[b].values[offset].cast<double>();
+        bool is_defective = false;
+        const Matrix3d expected = with_eigenvalues(tensor, mode, &is_defective);
+        const Matrix3d result = grid.blocks[b].values[offset].cast<double>();
+        ASSERT_LE((result - expected).norm(), 2e-7 * tensor.norm() + 1e-44) << tensor;
+        defective += is_defective;
+        norm += tensor.squaredNorm();
+        erased += erased_norm(tensor, expected);
+        if (tensor == tensor.transpose()) {
+          EXPECT_EQ(result, result.transpose());
+        }
+      }
+    EXPECT_EQ(report.defective, defective);
+    EXPECT_GT(report.defective, 300u);
+    EXPECT_NEAR(report.norm_lost, erased / norm, 1e-9);
+  }
+}
+
 TEST(ApplyEigenvalues, DoesNotDependOnThreads) {
   const auto value = [](const Eigen::Vector3i& i) {
     return matrix({0.1 * i.x(), 1, -2, 0.3 * i.y(), -4, 0.5, 0.7, 0.2 * i.z(), -1});

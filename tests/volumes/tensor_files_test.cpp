@@ -169,6 +169,43 @@ TEST(TensorFiles, ActiveWhereAnyComponentIsAndZeroElsewhere) {
   EXPECT_EQ(read.blocks[0].values[TensorBlock::offset(5, 5, 5)], Matrix3f(Matrix3f::Zero()));
 }
 
+TEST(TensorFiles, BlocksAreReadInAnyOrder) {
+  const TensorGrid grid = sparse_grid();
+  const Temporary path("a.vdb");
+  for (const bool half : {false, true}) {
+    write_tensor_vdb(path, grid, half);
+    const std::optional<BlockSource> source = open_tensor_vdb(path, grid.name);
+    ASSERT_TRUE(source);
+    EXPECT_EQ(source->metadata.at("tensorray:units"), "Pa/m");
+    EXPECT_TRUE(source->to_world.isApprox(grid.to_world, 1e-15));
+    ASSERT_EQ(source->shapes.size(), grid.blocks.size());
+    TensorBlock block;
+    for (int turn = 0; turn < 2; ++turn)
+      for (std::size_t i = grid.blocks.size(); i-- > 0;) {
+        read_block(*source, i, block);
+        EXPECT_EQ(block.origin, grid.blocks[i].origin);
+        EXPECT_EQ(block.active, grid.blocks[i].active);
+        for (int offset = 0; offset < TensorBlock::voxels; ++offset)
+          ASSERT_LE((block.values[offset] - grid.blocks[i].values[offset]).norm(), half ? 1e-3 : 0);
+      }
+  }
+}
+
+TEST(TensorFiles, DamagedVoxelsAreNoticedWhenTheyAreRead) {
+  const Temporary path("a.vdb"), damaged("b.vdb");
+  write_tensor_vdb(path, sparse_grid());
+  std::string bytes = bytes_of(path);
+  // The values of the last leaf end with the file. Its chunk of Blosc begins with the versions of Blosc and its format.
+  const std::size_t chunk = bytes.rfind("\x02\x01");
+  ASSERT_NE(chunk, std::string::npos);
+  for (std::size_t i = chunk + 16; i < bytes.size(); ++i) bytes[i] = static_cast<char>(0xff);
+  write_bytes(damaged, bytes);
+  const std::optional<BlockSource> source = open_tensor_vdb(damaged);
+  ASSERT_TRUE(source);
+  EXPECT_THAT([&] { to_grid(*source); }, testing::ThrowsMessage<std::runtime_error>(testing::AllOf(
+                                             testing::HasSubstr(damaged.string()), testing::HasSubstr("damaged"))));
+}
+
 TEST(TensorFiles, ActiveTilesAreVoxels) {
   openvdb::GridPtrVec rows;
   for (int row = 0; row < 3; ++row) {
@@ -181,6 +218,7 @@ TEST(TensorFiles, ActiveTilesAreVoxels) {
   EXPECT_GT(openvdb::gridPtrCast<openvdb::Vec3SGrid>(rows[0])->tree().activeTileCount(), 1u);
   const Temporary path("a.vdb");
   write_stock(path, rows);
+  EXPECT_FALSE(open_tensor_vdb(path));  // It would need a block for each part of a tile.
   const TensorGrid read = read_tensor_vdb(path);
   EXPECT_EQ(read.active_voxels(), 10u * 8 * 8 + 128u * 128 * 128);
   EXPECT_EQ((*find(read, {3, -4, 4}))(2, 0), 3.0f);

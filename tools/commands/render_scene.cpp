@@ -202,7 +202,8 @@ Scene render_to_files(const SceneDescription& description, const RenderRun& run,
   Scene scene = load(description, loaded, progress);
   bar.reset();
   tell(scene.notes, run.quiet);
-  const std::future<void> images = std::async(std::launch::async, prepare_images);  // Errors come with the first image.
+  // Errors come with the first image.
+  const std::future<void> images = std::async(std::launch::async, prepare_images, written_by(description, run));
   RenderJob job{Work(run.keeping.shard.value_or(WorkPart{}), kept_units(keep.file, run, scene)), {}};
   complete(scene, job, std::move(files), keep, run, progress);
   for (const std::filesystem::path& file : written_by(description, run))

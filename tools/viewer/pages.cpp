@@ -87,7 +87,8 @@ Pages::Pages(const ViewedScene& viewed, const Progress& progress)
       live_(viewed.file) {
   const SceneDescription description = read_scene_json(scene_, viewed.file);
   require_distinct_files(input_files(description), {{viewed.copy, "the file that a page saves to"}});
-  const auto images = std::async(std::launch::async, prepare_images);  // Errors come with the first picture.
+  // Coarse pictures are JPEG. Errors come with the first one.
+  const auto images = std::async(std::launch::async, prepare_images, std::vector<std::filesystem::path>{"page.jpg"});
   live_.load(scene_, outputs_of(description, {}, folder_ / ""), progress);
   thread_ = std::thread([this] { work(); });
 }

@@ -3,25 +3,23 @@
 #include <algorithm>
 #include <bitset>
 #include <cmath>
+#include <cstring>
 #include <tuple>
 
 #include <tbb/parallel_sort.h>
 
 #include "volumes/bricks/tensor_field.h"
-#include "volumes/grids/page_memory.h"
 
 namespace tensorray {
 namespace {
 
 constexpr int cells = TensorBrick::cells;
+constexpr float least = 1e-25f, most = 1e30f;  // Outside this range squares may underflow or overflow.
 static_assert(cells == TensorBlock::size, "a brick holds a block and the near faces of its neighbours");
-
-/// The offset of a neighbour, 0 or 1 along each axis, from the bits of a number: bit 0 is x, bit 1 is y, bit 2 is z.
-Eigen::Vector3i corner(int bits) { return {bits & 1, bits >> 1 & 1, bits >> 2 & 1}; }
 
 /// The preceding bricks whose aprons contain an active voxel of `block`. Bit i is the brick at the place of the
 /// block minus corner(i).
-std::bitset<8> shared_faces(const TensorBlock& block) {
+std::bitset<8> shared_faces(const BlockShape& block) {
   std::bitset<8> touched;
   if (block.active.all()) return touched.set();
   for (int offset = 0; offset < TensorBlock::voxels; ++offset) {
@@ -34,29 +32,77 @@ std::bitset<8> shared_faces(const TensorBlock& block) {
   return touched;
 }
 
-/// Writes T − T₂₂ I (eight floats) and T₂₂.
-void copy_voxel(const Eigen::Matrix3f& T, float* bending, float* trailing) {
-  const float first = T(0, 0), middle = T(1, 1), last = T(2, 2);
-  using Eight = Eigen::Array<float, TensorBrick::bending_floats, 1>;
-  Eigen::Map<Eight>{bending} = Eigen::Map<const Eight>(T.data());  // Two vector copies; memmove would be a call.
-  bending[0] = first - last;
-  bending[4] = middle - last;
-  *trailing = last;
+/// The voxels of a block as bricks hold them.
+struct BlockVoxels {
+  alignas(64) float bending[TensorBlock::voxels * TensorBrick::bending_floats];
+  alignas(64) float trailing[TensorBlock::voxels];
+  alignas(64) float deviator[TensorBlock::voxels];  // Squared norm.
+  alignas(64) float squares[TensorBlock::voxels];   // Sum of the squares of `bending`.
+};
+
+/// T − T₂₂ I (eight floats) and T₂₂ of each voxel. @return the greatest squared norm of T.
+float convert(const TensorBlock& block, BlockVoxels& voxels) {
+  using Four = Eigen::Array4f;  // A vector register.
+  float greatest = 0;
+  for (int i = 0; i < TensorBlock::voxels; ++i) {
+    const float* const T = block.values[i].data();
+    float* const bending = voxels.bending + i * TensorBrick::bending_floats;
+    Four near = Eigen::Map<const Four>(T), far = Eigen::Map<const Four>(T + 4);
+    const float last = T[8];
+    greatest = std::max(greatest, (near * near + far * far).sum() + last * last);
+    const Four diagonal(last, 0, 0, 0);
+    near -= diagonal;
+    far -= diagonal;
+    Eigen::Map<Four>{bending} = near;
+    Eigen::Map<Four>{bending + 4} = far;
+    const float squares = (near * near + far * far).sum(), trace = near[0] + far[0];
+    // The relative error of single precision is below 2e-6 here, because the trace takes at most two thirds of the
+    // squares away.
+    voxels.deviator[i] = squares - trace * trace * (1.0f / 3);
+    voxels.squares[i] = squares;
+    voxels.trailing[i] = last;
+  }
+  return greatest;
 }
 
-/// Copies the voxels that a block and a brick share.
+/// In double precision, for values of any size; NaN counts as zero.
+double greatest_squared_norm(const TensorBlock& block) {
+  double greatest = 0;
+  for (const Eigen::Matrix3f& value : block.values) greatest = std::max(greatest, value.cast<double>().squaredNorm());
+  return greatest;
+}
+
+/// Calls visit(offset, voxel) for the voxels that a block and a brick share: the offset of a row's first voxel in the
+/// block, and its number in the brick. Rows along z are of eight voxels, or of one.
 /// @param ahead  Offset of the block from the brick, 0 or 1 along each axis.
-void copy_shared_voxels(const TensorBlock& block, const Eigen::Vector3i& ahead, float* floats) {
+template <class Visit>
+void for_shared_rows(const Eigen::Vector3i& ahead, const Visit& visit) {
   const auto count = [&](int axis) { return ahead[axis] == 0 ? cells : 1; };
   const Eigen::Vector3i first = ahead * cells;
   for (int x = 0; x < count(0); ++x)
-    for (int y = 0; y < count(1); ++y) {
-      const Eigen::Matrix3f* const from = &block.values[static_cast<std::size_t>(TensorBlock::offset(x, y, 0))];
-      const int to = TensorBrick::voxel(x + first.x(), y + first.y(), first.z());
-      for (int z = 0; z < count(2); ++z)
-        copy_voxel(from[z], floats + (to + z) * TensorBrick::bending_floats,
-                   floats + TensorBrick::trailing_offset + to + z);
-    }
+    for (int y = 0; y < count(1); ++y)
+      visit(TensorBlock::offset(x, y, 0), TensorBrick::voxel(x + first.x(), y + first.y(), first.z()));
+}
+
+/// Copies `length` voxels.
+template <int length>
+void copy_row(const BlockVoxels& voxels, int from, float* brick, int to) {
+  constexpr int floats = TensorBrick::bending_floats;
+  std::memcpy(brick + to * floats, voxels.bending + from * floats, length * floats * sizeof(float));
+  std::memcpy(brick + TensorBrick::trailing_offset + to, voxels.trailing + from, length * sizeof(float));
+}
+
+/// Sets what the brick that is corner(bits) before the block needs to know.
+template <int length>
+void set_share(const BlockVoxels& voxels, int bits, BlockShare& share) {
+  float strongest = 0, squares = 0;
+  for_shared_rows(corner(bits), [&](int from, int) {
+    using Row = Eigen::Map<const Eigen::Array<float, length, 1>>;
+    strongest = std::max(strongest, Row(voxels.deviator + from).maxCoeff());
+    squares += Row(voxels.squares + from).sum();
+  });
+  share.strongest[static_cast<std::size_t>(bits)] = strongest;
+  share.squares[static_cast<std::size_t>(bits)] = squares;
 }
 
 /// The squared Frobenius norm of the deviator of T, from the eight floats of T − T₂₂ I.
@@ -75,33 +121,11 @@ double greatest_squared_deviator(const float* brick) {
   return greatest;
 }
 
-/// Computes TensorBrick::strongest from the floats of a brick.
-float strongest_deviator(const float* brick) {
-  // The relative error of single precision is below 2e-6 here, because the trace takes at most two thirds of the
-  // squares away.
-  float greatest = 0, sum = 0;
-  for (const float* T = brick; T != brick + TensorBrick::trailing_offset; T += TensorBrick::bending_floats) {
-    const Eigen::Map<const Eigen::Array4f> near(T), far(T + 4);  // One vector register each.
-    const float squares = (near * near + far * far).sum(), trace = T[0] + T[4];
-    greatest = std::max(greatest, squares - trace * trace * (1.0f / 3));
-    sum += squares;  // Not finite if any value is not.
-  }
-  constexpr float least = 1e-25f, most = 1e30f;  // Outside this range squares may underflow or overflow.
-  const double squared = greatest > least && sum < most ? double{greatest} : greatest_squared_deviator(brick);
-  // Rounded up, because interpolation may round to slightly more than the tensor of any voxel.
-  return static_cast<float>(std::sqrt(squared) * (1 + 1.2e-5));
-}
-
 }  // namespace
 
-BlockTable::BlockTable(const TensorGrid& grid) {
-  places.reserve(grid.blocks.size());
-  blocks.reserve(grid.blocks.size());
-  for (const TensorBlock& block : grid.blocks) {
-    make_room();
-    places.emplace_back(block.origin / cells);
-    blocks.push_back(&block);
-  }
+BlockTable::BlockTable(const std::vector<BlockShape>& all) : shapes(all) {
+  places.reserve(shapes.size());
+  for (const BlockShape& shape : shapes) places.emplace_back(shape.origin / cells);
   index = BrickIndex(places);
 }
 
@@ -109,11 +133,11 @@ std::vector<Eigen::Vector3i> active_bricks(const BlockTable& table, const Eigen:
   std::vector<Eigen::Vector3i> bricks;
   bricks.reserve(table.places.size());
   for (std::size_t i = 0; i < table.places.size(); ++i) {
-    make_room();
     if (extent.contains(table.places[i])) bricks.push_back(table.places[i]);
-    for (int before = 1; before < 8; ++before) {
+    for (int before = 1; before < bricks_of_block; ++before) {
       const Eigen::Vector3i brick = table.places[i] - corner(before);
-      if (extent.contains(brick) && !table.find(brick) && shared_faces(*table.blocks[i])[before])
+      if (extent.contains(brick) && table.index.find(brick) == BrickIndex::missing &&
+          shared_faces(table.shapes[i])[before])
         bricks.push_back(brick);
     }
   }
@@ -124,11 +148,35 @@ std::vector<Eigen::Vector3i> active_bricks(const BlockTable& table, const Eigen:
   return bricks;
 }
 
-float make_brick(const BlockTable& table, const Eigen::Vector3i& brick, float* floats) {
-  for (int bits = 0; bits < 8; ++bits)
-    if (const TensorBlock* const block = table.find(brick + corner(bits)))
-      copy_shared_voxels(*block, corner(bits), floats);
-  return strongest_deviator(floats);
+BlockShare place_block(const TensorBlock& block, const std::array<float*, bricks_of_block>& bricks) {
+  BlockVoxels voxels;
+  BlockShare share;
+  const float norm = convert(block, voxels);
+  share.norm = norm > least && norm < most ? double{norm} : greatest_squared_norm(block);
+  for (int bits = 0; bits < bricks_of_block; ++bits) {
+    const bool is_row = corner(bits).z() == 0;
+    is_row ? set_share<cells>(voxels, bits, share) : set_share<1>(voxels, bits, share);
+    float* const brick = bricks[static_cast<std::size_t>(bits)];
+    if (!brick) continue;
+    for_shared_rows(corner(bits), [&](int from, int to) {
+      is_row ? copy_row<cells>(voxels, from, brick, to) : copy_row<1>(voxels, from, brick, to);
+    });
+  }
+  return share;
+}
+
+float strongest_deviator(const BlockTable& table, const std::vector<BlockShare>& shares, const Eigen::Vector3i& brick,
+                         const float* floats) {
+  float greatest = 0, sum = 0;
+  for (int bits = 0; bits < bricks_of_block; ++bits) {
+    const std::uint32_t block = table.index.find(brick + corner(bits));
+    if (block == BrickIndex::missing) continue;
+    greatest = std::max(greatest, shares[block].strongest[static_cast<std::size_t>(bits)]);
+    sum += shares[block].squares[static_cast<std::size_t>(bits)];
+  }
+  const double squared = greatest > least && sum < most ? double{greatest} : greatest_squared_deviator(floats);
+  // Rounded up, because interpolation may round to slightly more than the tensor of any voxel.
+  return static_cast<float>(std::sqrt(squared) * (1 + 1.2e-5));
 }
 
 }  // namespace tensorray

@@ -1,7 +1,8 @@
 #pragma once
 /// @file volumes/bricks/brick_making.h
-/// Makes the bricks of a TensorField from the blocks of a grid.
+/// Makes the bricks of a TensorField from blocks, one block at a time and in any order.
 
+#include <array>
 #include <vector>
 
 #include <Eigen/Geometry>
@@ -11,19 +12,20 @@
 
 namespace tensorray {
 
-/// Finds the blocks of a grid by their places. Does not own the blocks.
+/// Number of bricks that hold voxels of one block: that at its place, and seven preceding ones, whose aprons its near
+/// faces are.
+constexpr int bricks_of_block = 8;
+
+/// The offset of a block from one of its bricks, 0 or 1 along each axis, from the bits of a number: bit 0 is x, bit 1
+/// is y, bit 2 is z.
+inline Eigen::Vector3i corner(int bits) { return {bits & 1, bits >> 1 & 1, bits >> 2 & 1}; }
+
+/// Finds blocks by their places (index of the first voxel / 8). Does not own the shapes.
 struct BlockTable {
-  explicit BlockTable(const TensorGrid& grid);
+  explicit BlockTable(const std::vector<BlockShape>& shapes);
 
-  /// @param place  Index of the block's first voxel / 8.
-  /// @return nullptr if there is no block.
-  const TensorBlock* find(const Eigen::Vector3i& place) const {
-    const std::uint32_t i = index.find(place);
-    return i == BrickIndex::missing ? nullptr : blocks[i];
-  }
-
+  const std::vector<BlockShape>& shapes;
   std::vector<Eigen::Vector3i> places;
-  std::vector<const TensorBlock*> blocks;
   BrickIndex index;
 };
 
@@ -32,9 +34,20 @@ struct BlockTable {
 /// brick, whose apron contains that voxel.
 std::vector<Eigen::Vector3i> active_bricks(const BlockTable& table, const Eigen::AlignedBox3i& extent);
 
-/// Writes the voxels of a brick in the layout of TensorBrick. `floats` must hold zeros. Reads the block at `brick` and
-/// its seven following neighbours.
-/// @return TensorBrick::strongest.
-float make_brick(const BlockTable& table, const Eigen::Vector3i& brick, float* floats);
+/// What the bricks need to know of a block's voxels: entry i is for the brick that is corner(i) before it.
+struct BlockShare {
+  std::array<float, bricks_of_block> strongest;  ///< Greatest squared norm of a deviator.
+  std::array<float, bricks_of_block> squares;    ///< Sum of the squares; not finite if one is not.
+  double norm;                                   ///< Greatest squared norm of a tensor.
+};
+
+/// Copies the voxels of a block to its bricks, in the layout of TensorBrick.
+/// @param bricks  Entry i is the brick that is corner(i) before the block; null: there is no such brick.
+BlockShare place_block(const TensorBlock& block, const std::array<float*, bricks_of_block>& bricks);
+
+/// TensorBrick::strongest of a brick. @param shares  Of the blocks, in the order of the table.
+/// @param floats  The brick, which is complete.
+float strongest_deviator(const BlockTable& table, const std::vector<BlockShare>& shares, const Eigen::Vector3i& brick,
+                         const float* floats);
 
 }  // namespace tensorray

@@ -1,9 +1,12 @@
 #include "volumes/bricks/tensor_field.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <functional>
 #include <stdexcept>
 
+#include <tbb/blocked_range.h>
 #include <tbb/parallel_for.h>
 
 #include "base/box.h"
@@ -25,14 +28,11 @@ Eigen::AlignedBox3i bricks_of(const Eigen::AlignedBox3i& voxels) {
   return {voxels.min().unaryExpr(brick_of), last.unaryExpr(brick_of)};
 }
 
-/// Number of bricks that are made before blocks are freed; enough to keep all threads busy.
-constexpr std::size_t enough_bricks = 4096;
+/// Number of blocks that are placed before they are freed; enough to keep all threads busy.
+constexpr std::size_t part_size = 4096;
 
-/// The first index from `brick` on where x differs from the x before it; at most the number of bricks.
-std::size_t end_of_layer(const std::vector<Eigen::Vector3i>& bricks, std::size_t brick) {
-  while (brick < bricks.size() && bricks[brick].x() == bricks[brick - 1].x()) ++brick;
-  return std::min(brick, bricks.size());
-}
+/// Number of blocks that a thread places in a row. Neighbours along z share bricks.
+constexpr std::size_t grain = 16;
 
 Eigen::AlignedBox3d extent_of(const Eigen::AlignedBox3i& active) {
   Eigen::AlignedBox3d extent(active.min().cast<double>(), active.max().cast<double>());
@@ -58,42 +58,77 @@ Eigen::Matrix3d TensorBrick::tensor(int voxel) const {
   return T;
 }
 
+/// Where the blocks of a field come from.
+struct TensorField::Blocks {
+  /// Gives block i, which may be `own`, a block of the calling thread.
+  std::function<const TensorBlock&(std::size_t i, TensorBlock& own)> get;
+  /// Called when the blocks before `end` are not needed any more.
+  std::function<void(std::size_t end)> give_back = [](std::size_t) {};
+};
+
 TensorField::TensorField(const TensorGrid& grid) : to_world_(grid.to_world), to_index_(grid.to_world.inverse()) {
-  make_bricks(grid, [](int) {});
+  Blocks blocks;
+  blocks.get = [&](std::size_t i, TensorBlock&) -> const TensorBlock& { return grid.blocks[i]; };
+  make_bricks(grid.shapes(), blocks);
 }
 
 TensorField::TensorField(TensorGrid&& grid) : to_world_(grid.to_world), to_index_(grid.to_world.inverse()) {
-  make_bricks(grid, [&](int x) {
-    while (!grid.blocks.empty() && grid.blocks.front().origin.x() < x) grid.blocks.pop_front();
-  });
-  grid.blocks.clear();
+  std::size_t freed = 0;
+  Blocks blocks;
+  blocks.get = [&](std::size_t i, TensorBlock&) -> const TensorBlock& { return grid.blocks[i - freed]; };
+  blocks.give_back = [&](std::size_t end) {
+    for (; freed < end; ++freed) grid.blocks.pop_front();
+  };
+  make_bricks(grid.shapes(), blocks);
 }
 
-/// @param give_back  Called as give_back(x) when no block whose origin is below x is needed any more.
-template <class GiveBack>
-void TensorField::make_bricks(const TensorGrid& grid, const GiveBack& give_back) {
-  const Eigen::AlignedBox3i active = grid.active_box();
+TensorField::TensorField(const BlockSource& source) : to_world_(source.to_world), to_index_(source.to_world.inverse()) {
+  Blocks blocks;
+  blocks.get = [&](std::size_t i, TensorBlock& own) -> const TensorBlock& {
+    read_block(source, i, own);
+    return own;
+  };
+  make_bricks(source.shapes, blocks);
+}
+
+void TensorField::make_bricks(const std::vector<BlockShape>& shapes, const Blocks& blocks) {
+  const Eigen::AlignedBox3i active = active_box(shapes);
   if (active.isEmpty()) throw std::invalid_argument("the tensor field has no active voxel");
   if (!to_world_.matrix().allFinite() || !to_index_.matrix().allFinite())
     throw std::invalid_argument("the tensor field's transform cannot be inverted");
   index_bounds_ = extent_of(active);
   voxels_ = Eigen::AlignedBox3d(active.min().cast<double>(), active.max().cast<double>());
 
-  const BlockTable blocks(grid);
-  bricks_ = active_bricks(blocks, bricks_of(active));
+  const BlockTable table(shapes);
+  bricks_ = active_bricks(table, bricks_of(active));
   bricks_.shrink_to_fit();
   index_ = BrickIndex(bricks_);
   floats_ = allocate(bricks_.size());
-  strongest_.resize(bricks_.size());
-  for (std::size_t first = 0; first < bricks_.size();) {
-    const std::size_t last = end_of_layer(bricks_, first + enough_bricks);
-    tbb::parallel_for(first, last, [&](std::size_t i) {
+  const auto floats_of = [&](std::size_t brick) { return floats_.get() + brick * TensorBrick::stored_floats; };
+  std::vector<BlockShare> shares(shapes.size());
+  const auto place = [&](const tbb::blocked_range<std::size_t>& range) {
+    TensorBlock own;
+    for (std::size_t i = range.begin(); i < range.end(); ++i) {
       make_room();
-      strongest_[i] = make_brick(blocks, bricks_[i], floats_.get() + i * TensorBrick::stored_floats);
-    });
-    if (last < bricks_.size()) give_back(bricks_[last].x() * TensorBrick::cells);
-    first = last;
+      std::array<float*, bricks_of_block> bricks{};
+      for (int bits = 0; bits < bricks_of_block; ++bits)
+        if (const std::uint32_t brick = index_.find(table.places[i] - corner(bits)); brick != BrickIndex::missing)
+          bricks[static_cast<std::size_t>(bits)] = floats_of(brick);
+      shares[i] = place_block(blocks.get(i, own), bricks);
+    }
+  };
+  for (std::size_t first = 0; first < shapes.size(); first += part_size) {
+    const std::size_t end = std::min(first + part_size, shapes.size());
+    tbb::parallel_for(tbb::blocked_range<std::size_t>(first, end, grain), place);
+    blocks.give_back(end);
   }
+  strongest_.resize(bricks_.size());
+  tbb::parallel_for(std::size_t{0}, bricks_.size(), [&](std::size_t i) {
+    strongest_[i] = strongest_deviator(table, shares, bricks_[i], floats_of(i));
+  });
+  double norm = 0;
+  for (const BlockShare& share : shares) norm = std::max(norm, share.norm);
+  greatest_norm_ = std::sqrt(norm);
 }
 
 /// Memory for `bricks` bricks, filled with zeros. It uses large pages where the system has them, because rays visit
@@ -109,17 +144,6 @@ void TensorField::Release::operator()(float* floats) const { unmap_pages(floats,
 std::vector<Eigen::Vector3d> TensorField::corners() const { return corners_of(index_bounds_, to_world_); }
 
 Eigen::AlignedBox3d TensorField::world_box() const { return box_of(corners()); }
-
-double TensorField::greatest_norm() const {
-  double greatest = 0;
-  for (std::size_t i = 0; i < brick_count(); ++i) {
-    make_room();
-    const TensorBrick brick = stored(i);
-    for (int voxel = 0; voxel < TensorBrick::voxels; ++voxel)
-      greatest = std::max(greatest, brick.tensor(voxel).squaredNorm());
-  }
-  return std::sqrt(greatest);
-}
 
 std::size_t TensorField::memory_bytes() const {
   return brick_count() * ((TensorBrick::stored_floats + 1) * sizeof(float) + sizeof(Eigen::Vector3i)) +

@@ -10,6 +10,7 @@
 #include <Eigen/Geometry>
 
 #include "volumes/bricks/brick_index.h"
+#include "volumes/grids/block_source.h"
 #include "volumes/grids/tensor_grid.h"
 
 namespace tensorray {
@@ -48,6 +49,9 @@ class TensorField {
   /// twice.
   explicit TensorField(TensorGrid&& grid);
 
+  /// The same from blocks that are read once each, on all threads. @throw also what `source` throws.
+  explicit TensorField(const BlockSource& source);
+
   const Eigen::Affine3d& to_world() const { return to_world_; }
   const Eigen::Affine3d& to_index() const { return to_index_; }
 
@@ -69,7 +73,7 @@ class TensorField {
   bool contains(const Eigen::Vector3d& world) const { return index_bounds_.contains(to_index_ * world); }
 
   /// The greatest Frobenius norm of all voxels.
-  double greatest_norm() const;
+  double greatest_norm() const { return greatest_norm_; }
 
   std::size_t brick_count() const { return bricks_.size(); }
 
@@ -89,6 +93,8 @@ class TensorField {
   bool is_stored(const Eigen::Vector3i& brick) const { return index_.find(brick) != BrickIndex::missing; }
 
  private:
+  struct Blocks;
+
   static const TensorBrick zeros;
 
   struct Release {
@@ -98,8 +104,7 @@ class TensorField {
   };
   using Floats = std::shared_ptr<float[]>;
 
-  template <class GiveBack>
-  void make_bricks(const TensorGrid& grid, const GiveBack& give_back);
+  void make_bricks(const std::vector<BlockShape>& shapes, const Blocks& blocks);
   static Floats allocate(std::size_t bricks);
   TensorBrick stored(std::size_t index) const {
     const float* const floats = floats_.get() + index * TensorBrick::stored_floats;
@@ -111,7 +116,8 @@ class TensorField {
   std::vector<Eigen::Vector3i> bricks_;
   Floats floats_;                 ///< The bricks, in the order of `bricks_`.
   std::vector<float> strongest_;  ///< TensorBrick::strongest of each brick.
-  BrickIndex index_;              ///< Finds a brick by its coordinates.
+  double greatest_norm_ = 0;
+  BrickIndex index_;  ///< Finds a brick by its coordinates.
 };
 
 }  // namespace tensorray

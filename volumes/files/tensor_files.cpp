@@ -4,16 +4,20 @@
 #include <array>
 #include <cmath>
 #include <memory>
+#include <optional>
 #include <stdexcept>
+#include <tuple>
 #include <type_traits>
 #include <unordered_map>
 
 #include <malloc.h>
 #include <tbb/parallel_for.h>
+#include <tbb/parallel_sort.h>
 
 #include "base/errors.h"
 #include "base/text.h"
 #include "volumes/files/vdb_archive.h"
+#include "volumes/files/vdb_leaves.h"
 #include "volumes/grids/page_memory.h"
 #include "volumes/tensors/finite_differences.h"
 
@@ -28,10 +32,7 @@ constexpr std::size_t greatest_block_count = std::size_t{1} << 25;
 bool is_vector(const GridInfo& grid) { return grid.type == "vec3s" || grid.type == "vec3d"; }
 bool is_scalar(const GridInfo& grid) { return grid.type == "float" || grid.type == "double"; }
 
-/// The tensor entry that a component of a grid's value is stored in.
-struct Entry {
-  int component, row, column;
-};
+using Entry = TensorEntry;
 
 /// A grid of a field: the ending of its name, and the entries that it holds.
 struct Part {
@@ -329,6 +330,68 @@ std::vector<openvdb::CoordBBox> slabs_of(const std::filesystem::path& path, cons
   return slabs;
 }
 
+/// A field whose leaves can be read in any order.
+struct StoredField {
+  struct Grid {
+    StoredTree tree;
+    std::vector<StoredLeaf> leaves;
+    std::vector<Entry> entries;
+  };
+  std::filesystem::path path;
+  FileBytes file;
+  std::vector<Grid> grids;
+  /// For each block of the field, and in it for each grid, the number of the leaf with its voxels; `missing`: none.
+  std::vector<std::uint32_t> leaves;
+
+  static constexpr std::uint32_t missing = 0xffffffffu;
+
+  explicit StoredField(const std::filesystem::path& p) : path(p), file(p) {}
+};
+
+/// The blocks of all grids, by their origins.
+std::vector<BlockShape> find_blocks(StoredField& field) {
+  struct Place {
+    Eigen::Vector3i origin;
+    std::uint32_t grid, leaf;
+  };
+  std::vector<Place> places;
+  for (std::size_t grid = 0; grid < field.grids.size(); ++grid)
+    for (std::size_t leaf = 0; leaf < field.grids[grid].leaves.size(); ++leaf)
+      if (const StoredLeaf& stored = field.grids[grid].leaves[leaf]; stored.active.any())
+        places.push_back({stored.origin, static_cast<std::uint32_t>(grid), static_cast<std::uint32_t>(leaf)});
+  tbb::parallel_sort(places.begin(), places.end(), [](const Place& a, const Place& b) {
+    const auto key = [](const Place& place) {
+      return std::make_tuple(place.origin.x(), place.origin.y(), place.origin.z(), place.grid, place.leaf);
+    };
+    return key(a) < key(b);
+  });
+  std::vector<BlockShape> shapes;
+  for (const Place& place : places) {
+    if (shapes.empty() || shapes.back().origin != place.origin) {
+      shapes.push_back({place.origin, {}});
+      field.leaves.resize(field.leaves.size() + field.grids.size(), StoredField::missing);
+    }
+    shapes.back().active |= field.grids[place.grid].leaves[place.leaf].active;
+    field.leaves[field.leaves.size() - field.grids.size() + place.grid] = place.leaf;
+  }
+  return shapes;
+}
+
+void fill_block(const StoredField& field, std::size_t i, TensorBlock& block) {
+  try {
+    for (std::size_t grid = 0; grid < field.grids.size(); ++grid) {
+      const std::uint32_t leaf = field.leaves[i * field.grids.size() + grid];
+      if (leaf == StoredField::missing) continue;
+      const StoredField::Grid& stored = field.grids[grid];
+      LeafReader(field.file, stored.tree).read(stored.leaves[leaf], stored.entries, block);
+    }
+  } catch (const Misfit&) {
+    fail_damaged_voxels(field.path);
+  } catch (const openvdb::Exception&) {
+    fail_damaged_voxels(field.path);
+  }
+}
+
 openvdb::Coord coord(const Eigen::Vector3i& index) { return {index.x(), index.y(), index.z()}; }
 
 /// One row of the tensors of a grid, which must outlive it, as a grid of vectors that is only for writing: its leaves
@@ -408,8 +471,44 @@ std::vector<std::string> tensor_names(const std::vector<GridInfo>& grids) {
 
 std::vector<GridInfo> list_vdb(const std::filesystem::path& path) { return infos_of(read_vdb(path)); }
 
+std::optional<BlockSource> open_tensor_vdb(const std::filesystem::path& path, const std::string& name) {
+  const std::vector<GridInfo> infos = list_vdb(path);
+  BlockSource result;
+  result.name = chosen_name(path, infos, name, Derive::none);
+  const std::vector<Part> parts = parts_of(infos, result.name, Derive::none);
+  std::set<std::string> wanted;
+  for (const Part& part : parts) wanted.insert(result.name + part.suffix);
+  std::optional<VdbLeafFile> file = read_vdb_leaves(path, wanted);
+  if (!file) return std::nullopt;
+
+  const auto field = std::make_shared<StoredField>(path);
+  std::vector<Source> sources;
+  for (const Part& part : parts) {
+    VdbLeafGrid& grid = file->grids.at(result.name + part.suffix);
+    sources.push_back({grid.grid, part.entries});
+    field->grids.push_back({grid.tree, std::move(grid.leaves), part.entries});
+  }
+  result.to_world = common_transform(path, sources);
+  result.metadata = metadata_of(file->file.metadata, *sources.front().grid);
+  result.shapes = find_blocks(*field);
+  if (result.shapes.empty()) fail(path, "\"" + result.name + "\" has no active voxel");
+  result.fill = [field](std::size_t i, TensorBlock& block) { fill_block(*field, i, block); };
+  return result;
+}
+
 TensorGrid read_tensor_vdb(const std::filesystem::path& path, const std::string& name, Derive derive) {
   const bool is_bounded = memory_bound().has_value(), derives = derive != Derive::none;
+  const auto fail_too_large = [&](const std::string& field) {
+    fail(path, "the active voxels of \"" + field + "\" do not fit in memory; resample it more coarsely");
+  };
+  if (!is_bounded && !derives)
+    if (const std::optional<BlockSource> source = open_tensor_vdb(path, name)) {
+      try {
+        return to_grid(*source);
+      } catch (const std::bad_alloc&) {
+        fail_too_large(source->name);
+      }
+    }
   const std::vector<GridInfo> infos = list_vdb(path);
   TensorGrid result;
   result.name = chosen_name(path, infos, name, derive);
@@ -442,7 +541,7 @@ TensorGrid read_tensor_vdb(const std::filesystem::path& path, const std::string&
       result.blocks = derive == Derive::gradient ? gradient(samples, to_index) : hessian(samples, to_index);
     }
   } catch (const std::bad_alloc&) {
-    fail(path, "the active voxels of \"" + result.name + "\" do not fit in memory; resample it more coarsely");
+    fail_too_large(result.name);
   }
   if (result.blocks.empty()) fail(path, "\"" + result.name + "\" has no active voxel");
   return result;

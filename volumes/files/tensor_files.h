@@ -3,10 +3,11 @@
 /// Tensor fields in OpenVDB files. Only the .cpp file includes OpenVDB.
 
 #include <filesystem>
+#include <optional>
 #include <string>
 #include <vector>
 
-#include "volumes/grids/tensor_grid.h"
+#include "volumes/grids/block_source.h"
 
 namespace tensorray {
 
@@ -36,6 +37,11 @@ struct GridInfo {
 /// that is not affine, no active voxel.
 TensorGrid read_tensor_vdb(const std::filesystem::path& path, const std::string& name = "",
                            Derive derive = Derive::none);
+
+/// The same field block by block. Its blocks are read when they are needed; the file stays open.
+/// @return nothing if the file cannot be read so (tiles, trees that grids share, files of OpenVDB 2): use
+/// read_tensor_vdb. @throw as read_tensor_vdb. Damage within the values of voxels shows when blocks are read.
+std::optional<BlockSource> open_tensor_vdb(const std::filesystem::path& path, const std::string& name = "");
 
 /// Writes the rows of a field as three Vec3S grids NAME_row0 … NAME_row2 with vector type "invariant" and one
 /// transform. Writes the grid's metadata on the file and on each grid. Equal grids give equal bytes. Writes the file

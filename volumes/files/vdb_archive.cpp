@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <atomic>
 #include <cerrno>
 #include <cstdint>
 #include <fstream>
@@ -70,6 +71,39 @@ class Reader : private openvdb::io::Archive {
       if (wanted.count(name)) file.grids.back().grid = grids.at(descriptor.uniqueName());
     }
     return file;
+  }
+
+  /// @return nothing if the wanted grids cannot be read leaf by leaf.
+  std::optional<VdbLeafFile> read_leaves(const std::set<std::string>& wanted) {
+    VdbLeafFile result;
+    read_file_header();
+    check_lengths(in_.tellg(), 0);
+    result.file.metadata.readMeta(in_);
+    if (!inputHasGridOffsets() || !has_node_compression()) return std::nullopt;
+    std::vector<openvdb::io::GridDescriptor> found;
+    for (std::int32_t left = readGridCount(in_); left > 0; --left) {
+      const openvdb::io::GridDescriptor descriptor = read_descriptor();
+      skip(descriptor);
+      const std::string name = openvdb::io::GridDescriptor::nameAsString(descriptor.uniqueName());
+      result.file.grids.push_back({name, descriptor.gridType(), descriptor.saveFloatAsHalf(), nullptr});
+      if (!wanted.count(name)) continue;
+      if (descriptor.isInstance()) return std::nullopt;
+      found.push_back(descriptor);
+      result.grids[name];
+    }
+    std::atomic<bool> complete{true};
+    tbb::parallel_for(std::size_t{0}, found.size(), [&](std::size_t i) {
+      Reader reader(path_, box_);
+      reader.read_file_header();
+      found[i].seekToGrid(reader.in_);
+      StoredLeaves leaves;
+      VdbLeafGrid& grid = result.grids.at(openvdb::io::GridDescriptor::nameAsString(found[i].uniqueName()));
+      grid = reader.read_without_voxels(found[i], leaves);
+      if (!leaves.complete) complete = false;
+      grid.leaves = std::move(leaves.leaves);
+    });
+    if (!complete) return std::nullopt;
+    return result;
   }
 
  private:
@@ -147,9 +181,14 @@ class Reader : private openvdb::io::Archive {
   openvdb::GridBase::Ptr read_one(const openvdb::io::GridDescriptor& descriptor) {
     const openvdb::GridBase::Ptr grid = openvdb::GridBase::createGrid(descriptor.gridType());
     grid->setSaveFloatAsHalf(descriptor.saveFloatAsHalf());
-    const bool has_compression = fileVersion() >= openvdb::OPENVDB_FILE_VERSION_NODE_MASK_COMPRESSION;
-    check_lengths(in_.tellg() + std::streamoff(has_compression ? 4 : 0), 1);  // The string is the transform's type.
-    if (has_compression && !descriptor.isInstance()) check_tree(descriptor);
+    if (has_node_compression() && !descriptor.isInstance()) {
+      const std::streamoff begin = in_.tellg();
+      StoredLeaves unused;
+      read_without_voxels(descriptor, unused);
+      in_.seekg(begin);
+    } else {
+      check_lengths(in_.tellg() + std::streamoff(has_node_compression() ? 4 : 0), 1);
+    }
     if (box_)
       readGrid(grid, descriptor, in_, *box_);
     else
@@ -157,22 +196,24 @@ class Reader : private openvdb::io::Archive {
     return grid;
   }
 
-  /// Checks the tree of the grid that begins at the stream's position. Restores that position.
-  void check_tree(const openvdb::io::GridDescriptor& descriptor) {
-    const std::streamoff begin = in_.tellg();
+  bool has_node_compression() const { return fileVersion() >= openvdb::OPENVDB_FILE_VERSION_NODE_MASK_COMPRESSION; }
+
+  /// Reads metadata and transform of the grid that begins at the stream's position, and checks its tree.
+  VdbLeafGrid read_without_voxels(const openvdb::io::GridDescriptor& descriptor, StoredLeaves& leaves) {
+    check_lengths(in_.tellg() + std::streamoff(4), 1);  // Behind the compression. The string is the transform's type.
     const auto compression = read_stored<std::uint32_t>();
-    const openvdb::GridBase::Ptr probe = openvdb::GridBase::createGrid(descriptor.gridType());
-    probe->readMeta(in_);
-    probe->readTransform(in_);
-    StoredTree tree;
+    VdbLeafGrid result;
+    result.grid = openvdb::GridBase::createGrid(descriptor.gridType());
+    result.grid->readMeta(in_);
+    result.grid->readTransform(in_);
+    StoredTree& tree = result.tree;
     tree.type = descriptor.gridType();
     tree.half = descriptor.saveFloatAsHalf();
     tree.blosc = compression & openvdb::io::COMPRESS_BLOSC;
     tree.zip = compression & openvdb::io::COMPRESS_ZIP;
     tree.active_only = compression & openvdb::io::COMPRESS_ACTIVE_MASK;
-    tree.file_size = size_;
-    if (!tree_fits(in_, tree)) fail_damaged(path_, "");
-    in_.seekg(begin);
+    if (!tree_fits(FileBytes(path_), in_.tellg(), tree, leaves)) fail_damaged(path_, "");
+    return result;
   }
 
   /// Reads the wanted grids, and the grids whose trees they share, in parallel. Each grid has its own stream.
@@ -271,11 +312,15 @@ class Writer : private openvdb::io::Archive {
 
 }  // namespace
 
-VdbFile read_vdb(const std::filesystem::path& path, const std::set<std::string>& wanted,
-                 const openvdb::CoordBBox* box) {
+namespace {
+
+/// Calls read(reader) and reports what it throws.
+template <class Read>
+auto read_with(const std::filesystem::path& path, const openvdb::CoordBBox* box, const Read& read) {
   openvdb::initialize();
   try {
-    return Reader(path, box).read(wanted);
+    Reader reader(path, box);
+    return read(reader);
   } catch (const std::ios_base::failure&) {
     fail_damaged(path, "");
   } catch (const openvdb::Exception& error) {
@@ -286,6 +331,19 @@ VdbFile read_vdb(const std::filesystem::path& path, const std::set<std::string>&
     fail_damaged(path, "");
   }
 }
+
+}  // namespace
+
+VdbFile read_vdb(const std::filesystem::path& path, const std::set<std::string>& wanted,
+                 const openvdb::CoordBBox* box) {
+  return read_with(path, box, [&](Reader& reader) { return reader.read(wanted); });
+}
+
+std::optional<VdbLeafFile> read_vdb_leaves(const std::filesystem::path& path, const std::set<std::string>& wanted) {
+  return read_with(path, nullptr, [&](Reader& reader) { return reader.read_leaves(wanted); });
+}
+
+void fail_damaged_voxels(const std::filesystem::path& path) { fail_damaged(path, ""); }
 
 void write_vdb(const std::filesystem::path& path, const openvdb::GridPtrVec& grids, const openvdb::MetaMap& metadata) {
   openvdb::initialize();

@@ -9,12 +9,16 @@
 /// Only .cpp files of this folder that use OpenVDB themselves include this header: it includes all of OpenVDB.
 
 #include <filesystem>
+#include <map>
+#include <optional>
 #include <set>
 #include <string>
 #include <vector>
 
 #include <Eigen/Geometry>
 #include <openvdb/openvdb.h>
+
+#include "volumes/files/vdb_tree_check.h"
 
 namespace tensorray {
 
@@ -36,6 +40,27 @@ struct VdbFile {
 /// @throw std::runtime_error, one line that names the file and the fix: missing, not a VDB, truncated, damaged.
 VdbFile read_vdb(const std::filesystem::path& path, const std::set<std::string>& wanted = {},
                  const openvdb::CoordBBox* box = nullptr);
+
+/// A grid of a file, without its voxels.
+struct VdbLeafGrid {
+  openvdb::GridBase::Ptr grid;
+  StoredTree tree;
+  std::vector<StoredLeaf> leaves;
+};
+
+/// The file as read_vdb gives it without grids, and where the voxels of the wanted grids are, by the grids' names.
+struct VdbLeafFile {
+  VdbFile file;
+  std::map<std::string, VdbLeafGrid> grids;
+};
+
+/// Reads where the voxels of the wanted grids are.
+/// @return nothing if they cannot be read leaf by leaf: some are in tiles, in a tree that another grid shares or of
+/// another type than tree_fits knows, or the file is of OpenVDB 2 or has no table of grids. @throw as read_vdb.
+std::optional<VdbLeafFile> read_vdb_leaves(const std::filesystem::path& path, const std::set<std::string>& wanted);
+
+/// Reports damage in the voxels of a leaf. @throw std::runtime_error as read_vdb.
+[[noreturn]] void fail_damaged_voxels(const std::filesystem::path& path);
 
 /// Writes grids in place with OpenVDB's default compression, and adds their statistics to their metadata; writeBuffers
 /// is called once for each, and is the only one of their functions that needs voxels' values. Equal grids give equal

@@ -4,27 +4,66 @@
 /// allocates memory for the values that a chunk should have, and then writes as many bytes as the chunk claims to
 /// have.
 
+#include <bitset>
 #include <cstdint>
-#include <istream>
+#include <optional>
 #include <string>
+#include <vector>
+
+#include "volumes/files/file_bytes.h"
+#include "volumes/grids/tensor_grid.h"
 
 namespace tensorray {
 
 /// How a file stores a tree.
 struct StoredTree {
-  std::string type;            ///< "Tree_vec3s_5_4_3".
-  bool half = false;           ///< Values of voxels are 16-bit floats.
-  bool blosc = false;          ///< Chunks of values are compressed by Blosc.
-  bool zip = false;            ///< If `blosc` is false: chunks of values are compressed by zlib.
-  bool active_only = false;    ///< Chunks may leave out inactive values.
-  std::int64_t file_size = 0;  ///< Bytes.
+  std::string type;          ///< "Tree_vec3s_5_4_3".
+  bool half = false;         ///< Values of voxels are 16-bit floats.
+  bool blosc = false;        ///< Chunks of values are compressed by Blosc.
+  bool zip = false;          ///< If `blosc` is false: chunks of values are compressed by zlib.
+  bool active_only = false;  ///< Chunks may leave out inactive values.
 };
 
-/// Reads through a tree whose topology begins at the position of `in`, and through the values that follow it.
-/// Afterwards `in` is at their end. Only for files of OpenVDB 3 (format 222) and later. It accepts without a check
-/// trees of other types than float, double, vec3s and vec3d with nodes of 5, 4 and 3.
-/// @return whether all lengths fit. @throw whatever `in` throws at its end, if its exceptions are enabled.
-bool tree_fits(std::istream& in, const StoredTree& tree);
+/// A leaf, which has the voxels of a TensorBlock, and where the file has its values.
+struct StoredLeaf {
+  Eigen::Vector3i origin;
+  std::bitset<TensorBlock::voxels> active;
+  std::int64_t at = 0;     ///< Position of the flag before its values.
+  std::int32_t bytes = 0;  ///< From there on.
+};
+
+struct StoredLeaves {
+  std::vector<StoredLeaf> leaves;  ///< In the file's order.
+  bool complete = false;           ///< Whether all active voxels are in leaves, and none in tiles.
+};
+
+/// Reads through a tree whose topology begins at position `at`, and through the values that follow it. Only for files
+/// of OpenVDB 3 (format 222) and later. It accepts without a check trees of other types than float, double, vec3s and
+/// vec3d with nodes of 5, 4 and 3, and finds no leaves in them.
+/// @return whether all lengths fit.
+bool tree_fits(const FileBytes& file, std::int64_t at, const StoredTree& tree, StoredLeaves& leaves);
+
+/// What a leaf leaves out, and what follows the flag before its values.
+enum NodeFlag : int {
+  no_mask = 0,
+  no_mask_minus_background = 1,
+  no_mask_one_value = 2,
+  mask_no_value = 3,
+  mask_one_value = 4,
+  mask_two_values = 5,
+  all_values = 6
+};
+
+/// Bytes of a value in memory, and in a file with 16-bit floats.
+struct ValueSize {
+  std::int64_t full, half;
+};
+
+/// Nothing for a type that tree_fits does not check.
+std::optional<ValueSize> value_size(const std::string& type);
+
+/// Bytes between the flag before the values of a node of `count` values and these values.
+std::int64_t bytes_behind_flag(int flag, const ValueSize& size, std::size_t count);
 
 /// Whether the lengths in the value of a grid's metadata "file_delayed_load" fit. OpenVDB unpacks this value when it
 /// reads the metadata.

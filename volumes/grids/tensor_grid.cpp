@@ -3,10 +3,10 @@
 #include <algorithm>
 #include <atomic>
 #include <cmath>
-#include <vector>
 
 #include <tbb/parallel_for.h>
 
+#include "volumes/grids/block_source.h"
 #include "volumes/grids/page_memory.h"
 
 namespace tensorray {
@@ -18,82 +18,76 @@ bool has_only_finite(const TensorBlock& block) {
   return (0.0f * values).sum() == 0;
 }
 
-int floor_to_block(int index) { return index - (index & (TensorBlock::size - 1)); }
-
-void fill(TensorBlock& block, const Eigen::AlignedBox3i& box,
-          const std::function<Eigen::Matrix3d(const Eigen::Vector3i&)>& value) {
-  for (int offset = 0; offset < TensorBlock::voxels; ++offset) {
-    const Eigen::Vector3i index = block.origin + TensorBlock::position(offset);
-    if (!box.contains(index)) continue;
-    block.active.set(offset);
-    block.values[offset] = value(index).cast<float>();
-  }
-}
-
 }  // namespace
 
-TensorBlocks make_blocks(std::size_t count) {
+TensorBlocks unset_blocks(std::size_t count) {
   SlotAllocator<TensorBlock>::prepare(count);
-  return TensorBlocks(count);
+  TensorBlocks blocks;
+  for (std::size_t i = 0; i < count; ++i) blocks.emplace_back(TensorBlock::Unset());
+  return blocks;
 }
 
-std::size_t TensorGrid::active_voxels() const {
-  std::size_t count = 0;
-  for (const TensorBlock& block : blocks) {
+TensorBlocks make_blocks(std::size_t count) {
+  TensorBlocks blocks = unset_blocks(count);
+  tbb::parallel_for(std::size_t{0}, count, [&](std::size_t i) {
     make_room();
-    count += block.active.count();
-  }
+    blocks[i].values.fill(Eigen::Matrix3f::Zero());
+  });
+  return blocks;
+}
+
+std::size_t active_voxels(const std::vector<BlockShape>& shapes) {
+  std::size_t count = 0;
+  for (const BlockShape& shape : shapes) count += shape.active.count();
   return count;
 }
 
-Eigen::AlignedBox3i TensorGrid::active_box() const {
+Eigen::AlignedBox3i active_box(const std::vector<BlockShape>& shapes) {
   Eigen::AlignedBox3i box;
-  for (const TensorBlock& block : blocks) {
-    make_room();
-    const Eigen::Vector3i last = block.origin + Eigen::Vector3i::Constant(TensorBlock::size - 1);
-    if (box.contains(block.origin) && box.contains(last)) continue;
-    if (block.active.all()) {
-      box.extend(block.origin).extend(last);
+  for (const BlockShape& shape : shapes) {
+    const Eigen::Vector3i last = shape.origin + Eigen::Vector3i::Constant(TensorBlock::size - 1);
+    if (box.contains(shape.origin) && box.contains(last)) continue;
+    if (shape.active.all()) {
+      box.extend(shape.origin).extend(last);
       continue;
     }
     for (int offset = 0; offset < TensorBlock::voxels; ++offset)
-      if (block.active[offset]) box.extend(Eigen::Vector3i(block.origin + TensorBlock::position(offset)));
+      if (shape.active[offset]) box.extend(Eigen::Vector3i(shape.origin + TensorBlock::position(offset)));
   }
   return box;
 }
 
+std::vector<BlockShape> TensorGrid::shapes() const {
+  std::vector<BlockShape> result;
+  result.reserve(blocks.size());
+  for (const TensorBlock& block : blocks) {
+    make_room();
+    result.push_back({block.origin, block.active});
+  }
+  return result;
+}
+
 TensorGrid dense_grid(const Eigen::AlignedBox3i& box, const Eigen::Affine3d& to_world,
                       const std::function<Eigen::Matrix3d(const Eigen::Vector3i&)>& value) {
-  TensorGrid grid;
-  grid.to_world = to_world;
-  const Eigen::Vector3i first = box.min().unaryExpr(&floor_to_block);
-  constexpr int size = TensorBlock::size;
-  const Eigen::Vector3i count = (box.max() - first) / size + Eigen::Vector3i::Ones();
-  grid.blocks = make_blocks(static_cast<std::size_t>(count.x()) * count.y() * count.z());
-  const std::size_t slice = static_cast<std::size_t>(count.y()) * count.z();
-  tbb::parallel_for(std::size_t{0}, grid.blocks.size(), [&](std::size_t i) {
-    const Eigen::Vector3i block(static_cast<int>(i / slice), static_cast<int>(i / count.z() % count.y()),
-                                static_cast<int>(i % count.z()));
-    make_room();
-    grid.blocks[i].origin = first + size * block;
-    fill(grid.blocks[i], box, value);
-  });
-  return grid;
+  return to_grid(dense_source(box, to_world, value));
+}
+
+std::size_t remove_non_finite(TensorBlock& block) {
+  if (has_only_finite(block)) return 0;
+  const std::size_t before = block.active.count();
+  for (int offset = 0; offset < TensorBlock::voxels; ++offset) {
+    if (block.values[offset].allFinite()) continue;
+    block.values[offset].setZero();
+    block.active.reset(offset);
+  }
+  return before - block.active.count();
 }
 
 std::size_t remove_non_finite(TensorGrid& grid) {
   std::atomic<std::size_t> removed{0};
   tbb::parallel_for(std::size_t{0}, grid.blocks.size(), [&](std::size_t i) {
     make_room();
-    TensorBlock& block = grid.blocks[i];
-    if (has_only_finite(block)) return;
-    const std::size_t before = block.active.count();
-    for (int offset = 0; offset < TensorBlock::voxels; ++offset) {
-      if (!block.active[offset] || block.values[offset].allFinite()) continue;
-      block.values[offset].setZero();
-      block.active.reset(offset);
-    }
-    removed += before - block.active.count();
+    removed += remove_non_finite(grid.blocks[i]);
   });
   grid.blocks.erase(std::remove_if(grid.blocks.begin(), grid.blocks.end(),
                                    [](const TensorBlock& block) {
@@ -104,27 +98,35 @@ std::size_t remove_non_finite(TensorGrid& grid) {
   return removed;
 }
 
+void AsymmetrySums::add(const AsymmetrySums& other) {
+  difference += other.difference;
+  norm += other.norm;
+}
+
+double AsymmetrySums::asymmetry() const { return norm > 0 ? std::sqrt(difference / norm) : 0; }
+
+AsymmetrySums asymmetry_sums(const TensorBlock& block) {
+  AsymmetrySums sums;  // Inactive voxels hold zero.
+  sums.norm = Eigen::Map<const Eigen::Array<float, 9 * TensorBlock::voxels, 1>>(block.values[0].data())
+                  .cast<double>()
+                  .square()
+                  .sum();
+  for (const Eigen::Matrix3f& T : block.values) {
+    if (T(0, 1) == T(1, 0) && T(0, 2) == T(2, 0) && T(1, 2) == T(2, 1)) continue;
+    sums.difference += (T - T.transpose()).cast<double>().squaredNorm();
+  }
+  return sums;
+}
+
 double asymmetry(const TensorGrid& grid) {
-  struct Sums {
-    double difference = 0, norm = 0;
-  };
-  std::vector<Sums> blocks(grid.blocks.size());
+  std::vector<AsymmetrySums> blocks(grid.blocks.size());
   tbb::parallel_for(std::size_t{0}, blocks.size(), [&](std::size_t i) {
     make_room();
-    const TensorBlock& block = grid.blocks[i];
-    for (int offset = 0; offset < TensorBlock::voxels; ++offset) {
-      if (!block.active[offset]) continue;
-      const Eigen::Matrix3d tensor = block.values[offset].cast<double>();
-      blocks[i].difference += (tensor - tensor.transpose()).squaredNorm();
-      blocks[i].norm += tensor.squaredNorm();
-    }
+    blocks[i] = asymmetry_sums(grid.blocks[i]);
   });
-  Sums all;  // Summed in the order of the blocks: the result does not depend on the number of threads.
-  for (const Sums& block : blocks) {
-    all.difference += block.difference;
-    all.norm += block.norm;
-  }
-  return all.norm > 0 ? std::sqrt(all.difference / all.norm) : 0;
+  AsymmetrySums all;  // Summed in the order of the blocks: the result does not depend on the number of threads.
+  for (const AsymmetrySums& block : blocks) all.add(block);
+  return all.asymmetry();
 }
 
 }  // namespace tensorray

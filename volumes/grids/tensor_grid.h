@@ -10,6 +10,7 @@
 #include <functional>
 #include <map>
 #include <string>
+#include <vector>
 
 #include <Eigen/Geometry>
 
@@ -26,7 +27,10 @@ struct TensorBlock {
   std::bitset<voxels> active;
   std::array<Eigen::Matrix3f, voxels> values;  ///< World axes, (T V)_i = Σ_j T(i, j) V_j.
 
+  struct Unset {};
+
   TensorBlock() { values.fill(Eigen::Matrix3f::Zero()); }
+  explicit TensorBlock(Unset) {}  ///< Whoever makes it sets all values.
 
   /// Offset of a voxel from its position in the block (0 to 7 along each axis): x slowest, z fastest, as in OpenVDB's
   /// leaves.
@@ -34,11 +38,23 @@ struct TensorBlock {
   static Eigen::Vector3i position(int offset) { return {offset / (size * size), offset / size % size, offset % size}; }
 };
 
+/// The place of a block, and which of its voxels are active.
+struct BlockShape {
+  Eigen::Vector3i origin = Eigen::Vector3i::Zero();
+  std::bitset<TensorBlock::voxels> active;
+};
+
+std::size_t active_voxels(const std::vector<BlockShape>& shapes);
+
+/// Index box from the least to the greatest active voxel; isEmpty() where there is none.
+Eigen::AlignedBox3i active_box(const std::vector<BlockShape>& shapes);
+
 /// A deque, so that blocks can be freed one by one while something else is made from them.
 using TensorBlocks = std::deque<TensorBlock, SlotAllocator<TensorBlock>>;
 
-/// `count` blocks without active voxels. Runs on all threads.
+/// `count` blocks without active voxels; `unset_blocks`: blocks whose values are not set. Run on all threads.
 TensorBlocks make_blocks(std::size_t count);
+TensorBlocks unset_blocks(std::size_t count);
 
 /// A sparse grid of tensors. Plain data; voxel (i, j, k) has its centre at `to_world` * (i, j, k).
 struct TensorGrid {
@@ -47,10 +63,9 @@ struct TensorGrid {
   TensorBlocks blocks;                          ///< Each has at least one active voxel; ordered by origin (x, y, z).
   std::map<std::string, std::string> metadata;  ///< `tensorray:field`, `tensorray:units`, `tensorray:source`, ...
 
-  std::size_t active_voxels() const;
-
-  /// Index box from the least to the greatest active voxel; isEmpty() where there is none.
-  Eigen::AlignedBox3i active_box() const;
+  std::vector<BlockShape> shapes() const;  ///< Of all blocks, in their order.
+  std::size_t active_voxels() const { return tensorray::active_voxels(shapes()); }
+  Eigen::AlignedBox3i active_box() const { return tensorray::active_box(shapes()); }
 };
 
 /// A dense grid: `value(index)` at every index of `box` (inclusive), all active.
@@ -63,8 +78,20 @@ TensorGrid dense_grid(const Eigen::AlignedBox3i& box, const Eigen::Affine3d& to_
 /// @return the number of voxels that were not finite.
 std::size_t remove_non_finite(TensorGrid& grid);
 
-/// sqrt(Σ‖T − Tᵀ‖² / Σ‖T‖²) (Frobenius) over the active voxels: 0 where symmetric, 2 where antisymmetric. Runs on all
-/// threads; the result does not depend on their number.
+/// The same for a block, which may then be without active voxels.
+std::size_t remove_non_finite(TensorBlock& block);
+
+/// Σ‖T − Tᵀ‖² and Σ‖T‖² (Frobenius) over active voxels.
+struct AsymmetrySums {
+  double difference = 0, norm = 0;
+
+  void add(const AsymmetrySums& other);
+  double asymmetry() const;  ///< sqrt(difference / norm): 0 where symmetric, 2 where antisymmetric.
+};
+
+AsymmetrySums asymmetry_sums(const TensorBlock& block);
+
+/// The asymmetry of all active voxels. Runs on all threads; the result does not depend on their number.
 double asymmetry(const TensorGrid& grid);
 
 /// A field whose `asymmetry` is below this counts as symmetric: rounding to single precision can cause that much.

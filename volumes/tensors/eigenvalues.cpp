@@ -1,6 +1,7 @@
 #include "volumes/tensors/eigenvalues.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <stdexcept>
 #include <vector>
@@ -9,6 +10,7 @@
 #include <tbb/parallel_for.h>
 
 #include "volumes/grids/page_memory.h"
+#include "volumes/tensors/eigenvalue_vectors.h"
 
 namespace tensorray {
 namespace {
@@ -16,19 +18,10 @@ namespace {
 using Eigen::Matrix3d;
 using Eigen::Vector3d;
 
-/// Eigenvalues that are closer than this to each other count as equal, and those that are closer to an axis of the
-/// complex plane count as on it. Relative to the Frobenius norm. Fields are in single precision, so that smaller
-/// differences are noise.
-constexpr double tolerance = 1e-6;
-
 /// A tensor counts as a nilpotent Jordan block of three rows if its eigenvalues are below this and the norm of its
 /// square is above `chain_square`. (Rounding moves such eigenvalues by the cube root of its size.)
 constexpr double chain_tolerance = 2e-5;
 constexpr double chain_square = 1e-3;
-
-/// Near such a block |·| has no limit and may grow as 1/|λ|. A result whose norm is more than this multiple of the
-/// tensor's norm fades to zero, which is the value on the block itself.
-constexpr double greatest_growth = 4;
 
 const Matrix3d identity = Matrix3d::Identity();
 
@@ -48,8 +41,9 @@ Eigen::Vector3cd sorted_eigenvalues(const Matrix3d& tensor) {
 /// Whether a tensor of unit norm with three real eigenvalues has a Jordan block: eigenvalues repeat, and the polynomial
 /// with simple zeros at the distinct eigenvalues does not annihilate the tensor.
 bool has_jordan_block(const Matrix3d& tensor, const Vector3d& falling) {
-  const bool first = falling[0] - falling[1] <= tolerance, second = falling[1] - falling[2] <= tolerance;
-  const double rest = 4 * tolerance;
+  const bool first = falling[0] - falling[1] <= eigenvalue_tolerance,
+             second = falling[1] - falling[2] <= eigenvalue_tolerance;
+  const double rest = 4 * eigenvalue_tolerance;
   if (first && second) return (tensor - falling.mean() * identity).norm() > rest;
   if (!first && !second) return false;
   const double twice = first ? 0.5 * (falling[0] + falling[1]) : 0.5 * (falling[1] + falling[2]);
@@ -61,10 +55,10 @@ bool has_jordan_block(const Matrix3d& tensor, const Vector3d& falling) {
 /// the eigenvalues. Its divided difference [a, b] is ±1 where both signs agree, and [a, b, c] is zero where all three
 /// signs agree, so that repeated eigenvalues need no special case. Opposite signs leave c/(c − b), which is in [0, 1].
 Matrix3d absolute_of_real(const Matrix3d& tensor, const Vector3d& falling) {
-  const int zeros = static_cast<int>((falling.array().abs() <= tolerance).count());
+  const int zeros = static_cast<int>((falling.array().abs() <= eigenvalue_tolerance).count());
   if (zeros == 3) return Matrix3d::Zero();
   if (zeros == 2) {  // Interpolation points (0, 0, a), with the derivative of |·| at zero taken as 0.
-    const double a = falling[0] > tolerance ? falling[0] : falling[2];
+    const double a = falling[0] > eigenvalue_tolerance ? falling[0] : falling[2];
     return tensor * tensor / std::abs(a);
   }
   if (falling[2] >= 0) return tensor;
@@ -102,7 +96,7 @@ Matrix3d absolute_of_pair(const Matrix3d& tensor, double real, std::complex<doub
 
 /// sign(α) T on the plane of the pair, |λ| on the real eigenvector. On the cut, α = 0, T is kept on the plane.
 Matrix3d positive_of_pair(const Matrix3d& tensor, double real, std::complex<double> pair, bool& on_cut) {
-  on_cut = std::abs(pair.real()) <= tolerance;
+  on_cut = std::abs(pair.real()) <= eigenvalue_tolerance;
   const double plane = on_cut ? 1 : sign_of(pair.real());
   if (plane == sign_of(real)) return plane * tensor;
   return plane * tensor + 2 * std::abs(real) * real_projector(tensor, real, pair);
@@ -118,7 +112,7 @@ Matrix3d general_with_eigenvalues(const Matrix3d& tensor, Eigenvalues mode, bool
   Eigen::Index upper = 0;
   const double beta = values.imag().maxCoeff(&upper);
   Matrix3d result;
-  if (beta <= tolerance) {
+  if (beta <= eigenvalue_tolerance) {
     limit_taken = has_jordan_block(tensor, values.real());
     result = absolute_of_real(tensor, values.real());
   } else {
@@ -132,25 +126,42 @@ Matrix3d general_with_eigenvalues(const Matrix3d& tensor, Eigenvalues mode, bool
   return result / (growth * growth);
 }
 
-/// The counts and sums of apply_eigenvalues for one block.
-struct BlockReport {
-  std::size_t defective = 0;
-  double norm = 0, erased = 0;
+/// The tensors of some active voxels side by side, and the offsets of these voxels in their block.
+struct VoxelVectors {
+  TensorVectors tensors{};
+  std::array<int, TensorVectors::capacity> offsets{};
+  int count = 0;
 };
 
-BlockReport apply_to_block(TensorBlock& block, Eigenvalues mode) {
-  BlockReport report;
-  for (int offset = 0; offset < TensorBlock::voxels; ++offset) {
+/// Takes active voxels from `offset` on, as many as there is space for. @return the offset behind them.
+int take_voxels(const TensorBlock& block, int offset, VoxelVectors& voxels) {
+  voxels.count = 0;
+  for (; offset < TensorBlock::voxels && voxels.count < TensorVectors::capacity; ++offset) {
     if (!block.active[offset]) continue;
-    const Matrix3d tensor = block.values[offset].cast<double>();
-    bool defective = false;
-    const Matrix3d result = with_eigenvalues(tensor, mode, &defective);
-    block.values[offset] = result.cast<float>();
-    report.defective += defective;
-    report.norm += tensor.squaredNorm();
-    report.erased += erased_norm(tensor, result);
+    const float* const components = block.values[offset].data();
+    for (int i = 0; i < 9; ++i) voxels.tensors.tensor[i][voxels.count] = components[i];
+    voxels.offsets[voxels.count++] = offset;
   }
-  return report;
+  return offset;
+}
+
+/// Writes the result of one tensor to its voxel.
+void put_back(const VoxelVectors& voxels, int i, Eigenvalues mode, TensorBlock& block, EigenvalueSums& report) {
+  const TensorVectors& tensors = voxels.tensors;
+  Eigen::Matrix3f& value = block.values[voxels.offsets[i]];
+  report.norm += tensors.squared_norm[i];
+  if (tensors.left[i] == 0) {
+    for (int k = 0; k < 9; ++k) value.data()[k] = static_cast<float>(tensors.result[k][i]);
+    report.erased += tensors.erased[i];
+    report.defective += tensors.defective[i] != 0;
+    return;
+  }
+  const Matrix3d tensor = value.cast<double>();
+  bool defective = false;
+  const Matrix3d result = with_eigenvalues(tensor, mode, &defective);
+  value = result.cast<float>();
+  report.erased += erased_norm(tensor, result);
+  report.defective += defective;
 }
 
 }  // namespace
@@ -176,26 +187,42 @@ double erased_norm(const Matrix3d& before, const Matrix3d& after) {
   return std::max(0.0, part(before, -1) - part(after, -1)) + std::max(0.0, part(before, 1) - part(after, 1));
 }
 
-EigenvalueReport apply_eigenvalues(TensorGrid& grid, Eigenvalues mode) {
-  EigenvalueReport report;
-  report.chosen = mode;
-  if (mode == Eigenvalues::automatic)
-    report.chosen = asymmetry(grid) < symmetric_tolerance ? Eigenvalues::absolute : Eigenvalues::raw;
-  if (report.chosen == Eigenvalues::raw) return report;
+void EigenvalueSums::add(const EigenvalueSums& other) {
+  defective += other.defective;
+  norm += other.norm;
+  erased += other.erased;
+}
 
-  std::vector<BlockReport> blocks(grid.blocks.size());
+EigenvalueSums apply_eigenvalues(TensorBlock& block, Eigenvalues mode) {
+  EigenvalueSums sums;
+  VoxelVectors voxels;
+  for (int offset = 0; offset < TensorBlock::voxels;) {
+    offset = take_voxels(block, offset, voxels);
+    compute_with_eigenvalues(voxels.tensors, voxels.count, mode == Eigenvalues::positive);
+    for (int i = 0; i < voxels.count; ++i) put_back(voxels, i, mode, block, sums);
+  }
+  return sums;
+}
+
+EigenvalueReport report_of(const EigenvalueSums& sums, Eigenvalues chosen) {
+  return {chosen, sums.defective, sums.norm > 0 ? sums.erased / sums.norm : 0};
+}
+
+Eigenvalues automatic_choice(double asymmetry) {
+  return asymmetry < symmetric_tolerance ? Eigenvalues::absolute : Eigenvalues::raw;
+}
+
+EigenvalueReport apply_eigenvalues(TensorGrid& grid, Eigenvalues mode) {
+  const Eigenvalues chosen = mode == Eigenvalues::automatic ? automatic_choice(asymmetry(grid)) : mode;
+  if (chosen == Eigenvalues::raw) return report_of({}, chosen);
+  std::vector<EigenvalueSums> blocks(grid.blocks.size());
   tbb::parallel_for(std::size_t{0}, blocks.size(), [&](std::size_t i) {
     make_room();
-    blocks[i] = apply_to_block(grid.blocks[i], report.chosen);
+    blocks[i] = apply_eigenvalues(grid.blocks[i], chosen);
   });
-  double norm = 0, erased = 0;  // Summed in the order of the blocks, so that the number of threads does not matter.
-  for (const BlockReport& block : blocks) {
-    report.defective += block.defective;
-    norm += block.norm;
-    erased += block.erased;
-  }
-  report.norm_lost = norm > 0 ? erased / norm : 0;
-  return report;
+  EigenvalueSums all;  // Summed in the order of the blocks, so that the number of threads does not matter.
+  for (const EigenvalueSums& block : blocks) all.add(block);
+  return report_of(all, chosen);
 }
 
 Eigen::Vector3cd eigenvalues(const Matrix3d& tensor) {

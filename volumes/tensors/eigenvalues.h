@@ -40,6 +40,23 @@ Eigen::Matrix3d with_eigenvalues(const Eigen::Matrix3d& tensor, Eigenvalues mode
 /// replace rotation by strain.
 double erased_norm(const Eigen::Matrix3d& before, const Eigen::Matrix3d& after);
 
+/// What preprocessing did to some voxels, as sums.
+struct EigenvalueSums {
+  std::size_t defective = 0;
+  double norm = 0, erased = 0;  ///< Σ‖T‖², Σ erased_norm.
+
+  void add(const EigenvalueSums& other);
+};
+
+/// Preprocesses the active voxels of a block in place. Voxels must be finite. @param mode  `absolute` or `positive`.
+EigenvalueSums apply_eigenvalues(TensorBlock& block, Eigenvalues mode);
+
+/// @param sums  Of all voxels. @param chosen  What was done to them; `raw` has no sums.
+EigenvalueReport report_of(const EigenvalueSums& sums, Eigenvalues chosen);
+
+/// What `automatic` means for a field with this asymmetry.
+Eigenvalues automatic_choice(double asymmetry);
+
 /// Preprocesses every voxel in place, on all threads. Voxels must be finite.
 EigenvalueReport apply_eigenvalues(TensorGrid& grid, Eigenvalues mode);
 

@@ -98,36 +98,35 @@ Vector3d load_position(const GridSettings& grid) {
   return {0.5 * (grid.min.x() + grid.max.x()), 0.5 * (grid.min.y() + grid.max.y()), top + voxel_sizes(grid).z()};
 }
 
-// `sample(generator, grid, position)` is the tensor at a world position.
+// `sample(generator, position)` is the tensor at a world position; for loads, relative to the load.
 
-Matrix3d sample(const PointLoad& g, const GridSettings& grid, const Vector3d& position) {
-  return point_load_stress(position - load_position(grid), g.load, g.poisson_ratio);
+Matrix3d sample(const PointLoad& g, const Vector3d& position) {
+  return point_load_stress(position, g.load, g.poisson_ratio);
 }
 
-Matrix3d sample(const TwoPointLoad& g, const GridSettings& grid, const Vector3d& position) {
-  const Vector3d from_middle = position - load_position(grid);
+Matrix3d sample(const TwoPointLoad& g, const Vector3d& from_middle) {
   const Vector3d half = 0.5 * g.separation * Vector3d::UnitX();
   return point_load_stress(from_middle + half, g.load, g.poisson_ratio) +
          point_load_stress(from_middle - half, g.second_load, g.poisson_ratio);
 }
 
-Matrix3d sample(const Constant& g, const GridSettings&, const Vector3d&) { return g.tensor; }
+Matrix3d sample(const Constant& g, const Vector3d&) { return g.tensor; }
 
-Matrix3d sample(const Rotation& g, const GridSettings&, const Vector3d&) {
+Matrix3d sample(const Rotation& g, const Vector3d&) {
   const Vector3d w = g.rate * g.axis.normalized();
   Matrix3d tensor;
   tensor << 0, -w.z(), w.y(), w.z(), 0, -w.x(), -w.y(), w.x(), 0;
   return tensor;
 }
 
-Matrix3d sample(const Shear& g, const GridSettings&, const Vector3d& position) {
+Matrix3d sample(const Shear& g, const Vector3d& position) {
   const Vector3d gradient = g.gradient.normalized();
   const double rate = g.rate * (1 + g.profile * position.dot(gradient));
   return rate * g.flow.normalized() * gradient.transpose();
 }
 
 /// The velocity is (−½ strain x − Ω y, −½ strain y + Ω x, strain z), Ω = Γ/(2π core²) · (1 − e^{−q})/q, q = r²/core².
-Matrix3d sample(const Vortex& g, const GridSettings&, const Vector3d& position) {
+Matrix3d sample(const Vortex& g, const Vector3d& position) {
   const double x = position.x(), y = position.y();
   const double q = (x * x + y * y) / (g.core * g.core);
   const double rate = g.circulation / (2 * pi * g.core * g.core);
@@ -164,7 +163,7 @@ double helix_profile(const Helix& g, const Vector3d& position) {
   return 1 - outside;
 }
 
-Matrix3d sample(const Helix& g, const GridSettings&, const Vector3d& position) {
+Matrix3d sample(const Helix& g, const Vector3d& position) {
   // The direction of a screw motion's velocity: the helix's tangent at the helix's radius, the axis in the middle,
   // smooth between.
   const Vector3d tangent = Vector3d(-position.y(), position.x(), g.pitch / (2 * pi)).normalized();
@@ -184,6 +183,14 @@ std::string source_of(Generator generator, const GridSettings& grid) {
 
 bool is_point_load(const Generator& generator) {
   return std::holds_alternative<PointLoad>(generator) || std::holds_alternative<TwoPointLoad>(generator);
+}
+
+/// The tensor of a generator by world position.
+template <class Kind>
+auto sampler_of(const Kind& g, const GridSettings& grid) {
+  constexpr bool is_load = std::is_same_v<Kind, PointLoad> || std::is_same_v<Kind, TwoPointLoad>;
+  const Vector3d origin = is_load ? load_position(grid) : Vector3d(0, 0, 0);
+  return [g, origin](const Vector3d& position) { return sample(g, Vector3d(position - origin)); };
 }
 
 template <std::size_t... I>
@@ -223,15 +230,15 @@ GridSettings default_grid(const Generator& generator, int resolution) {
   return grid;
 }
 
-TensorGrid generate(const Generator& generator, const GridSettings& grid) {
+BlockSource generator_source(const Generator& generator, const GridSettings& grid) {
   Generator checked = generator;
   check_generator(checked);
   const Eigen::Affine3d to_world = grid_to_world(grid, voxel_sizes(grid));
   const Eigen::AlignedBox3i box(Eigen::Vector3i::Zero(), Eigen::Vector3i(grid.resolution.array() - 1));
-  TensorGrid result = std::visit(
+  BlockSource result = std::visit(
       [&](const auto& g) {
-        return dense_grid(box, to_world, [&](const Eigen::Vector3i& index) {
-          return sample(g, grid, to_world * index.cast<double>());
+        return dense_source(box, to_world, [sampled = sampler_of(g, grid), to_world](const Eigen::Vector3i& index) {
+          return sampled(to_world * index.cast<double>());
         });
       },
       checked);
@@ -240,6 +247,10 @@ TensorGrid generate(const Generator& generator, const GridSettings& grid) {
   result.metadata["tensorray:units"] = "1/length";
   result.metadata["tensorray:source"] = source_of(generator, grid);
   return result;
+}
+
+TensorGrid generate(const Generator& generator, const GridSettings& grid) {
+  return to_grid(generator_source(generator, grid));
 }
 
 Matrix3d point_load_stress(const Vector3d& position, double load, double poisson_ratio) {

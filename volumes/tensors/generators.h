@@ -8,7 +8,7 @@
 
 #include <Eigen/Core>
 
-#include "volumes/grids/tensor_grid.h"
+#include "volumes/grids/block_source.h"
 
 namespace tensorray {
 
@@ -147,6 +147,9 @@ GridSettings default_grid(const Generator& generator, int resolution = 64);
 /// Samples the field. The name of the result is the kind; its metadata hold kind and parameters (`tensorray:source`).
 /// @throw std::invalid_argument if a parameter is out of range; the message names it.
 TensorGrid generate(const Generator& generator, const GridSettings& grid);
+
+/// The same, block by block.
+BlockSource generator_source(const Generator& generator, const GridSettings& grid);
 
 /// The stress of a unit-less Boussinesq load at the origin, acting on the half space z < 0, at `position` (z <= 0,
 /// not the origin); tension positive (Boussinesq 1885; Timoshenko & Goodier, Theory of Elasticity, §138).

@@ -1,0 +1,48 @@
+#include "volumes/files/file_bytes.h"
+
+#include <algorithm>
+#include <cerrno>
+#include <system_error>
+
+#include <fcntl.h>
+#include <unistd.h>
+
+#include "base/errors.h"
+
+namespace tensorray {
+
+FileBytes::FileBytes(const std::filesystem::path& path) : file_(open(path.c_str(), O_RDONLY | O_CLOEXEC)) {
+  if (file_ < 0) fail(path, "cannot be opened: " + std::generic_category().message(errno) + "; check the path");
+  size_ = static_cast<std::int64_t>(std::filesystem::file_size(path));
+}
+
+FileBytes::~FileBytes() { close(file_); }
+
+bool FileBytes::read(std::int64_t at, void* bytes, std::size_t count) const {
+  for (std::size_t done = 0; done < count;) {
+    const ssize_t got =
+        pread(file_, static_cast<char*>(bytes) + done, count - done, static_cast<off_t>(at + std::int64_t(done)));
+    if (got <= 0) return false;
+    done += static_cast<std::size_t>(got);
+  }
+  return true;
+}
+
+void ByteCursor::skip(std::int64_t bytes) {
+  if (bytes < 0 || bytes > file_.size() - at_) throw Misfit();
+  at_ += bytes;
+}
+
+const char* ByteCursor::next(std::size_t count) {
+  const auto wanted = static_cast<std::int64_t>(count);
+  if (wanted > file_.size() - at_) throw Misfit();
+  if (at_ < first_ || at_ + wanted > first_ + static_cast<std::int64_t>(bytes_.size())) {
+    first_ = at_;
+    bytes_.resize(std::min(std::max(count, window_), static_cast<std::size_t>(file_.size() - at_)));
+    if (!file_.read(first_, bytes_.data(), bytes_.size())) throw Misfit();
+  }
+  at_ += wanted;
+  return bytes_.data() + (at_ - wanted - first_);
+}
+
+}  // namespace tensorray

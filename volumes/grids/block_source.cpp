@@ -1,0 +1,68 @@
+#include "volumes/grids/block_source.h"
+
+#include <tbb/parallel_for.h>
+
+#include "volumes/grids/page_memory.h"
+
+namespace tensorray {
+namespace {
+
+constexpr int size = TensorBlock::size;
+
+/// The voxels of the block at `origin` that are in `box`.
+std::bitset<TensorBlock::voxels> voxels_within(const Eigen::Vector3i& origin, const Eigen::AlignedBox3i& box) {
+  std::bitset<TensorBlock::voxels> active;
+  if (box.contains(origin) && box.contains(Eigen::Vector3i(origin.array() + (size - 1)))) return active.set();
+  for (int offset = 0; offset < TensorBlock::voxels; ++offset)
+    active[static_cast<std::size_t>(offset)] = box.contains(Eigen::Vector3i(origin + TensorBlock::position(offset)));
+  return active;
+}
+
+/// The shapes of the blocks of a dense grid.
+std::vector<BlockShape> dense_shapes(const Eigen::AlignedBox3i& box) {
+  const Eigen::Vector3i first = box.min().unaryExpr([](int index) { return index - (index & (size - 1)); });
+  std::vector<BlockShape> shapes;
+  for (int x = first.x(); x <= box.max().x(); x += size)
+    for (int y = first.y(); y <= box.max().y(); y += size)
+      for (int z = first.z(); z <= box.max().z(); z += size)
+        shapes.push_back({{x, y, z}, voxels_within({x, y, z}, box)});
+  return shapes;
+}
+
+void fill_block(TensorBlock& block, const std::function<Eigen::Matrix3d(const Eigen::Vector3i&)>& value) {
+  for (int offset = 0; offset < TensorBlock::voxels; ++offset)
+    if (block.active[offset]) block.values[offset] = value(block.origin + TensorBlock::position(offset)).cast<float>();
+}
+
+}  // namespace
+
+void read_block(const BlockSource& source, std::size_t i, TensorBlock& block) {
+  block.origin = source.shapes[i].origin;
+  block.active = source.shapes[i].active;
+  if (!block.active.all()) block.values.fill(Eigen::Matrix3f::Zero());
+  source.fill(i, block);
+}
+
+BlockSource dense_source(const Eigen::AlignedBox3i& box, const Eigen::Affine3d& to_world,
+                         const std::function<Eigen::Matrix3d(const Eigen::Vector3i&)>& value) {
+  BlockSource source;
+  source.to_world = to_world;
+  source.shapes = dense_shapes(box);
+  source.fill = [value](std::size_t, TensorBlock& block) { fill_block(block, value); };
+  return source;
+}
+
+TensorGrid to_grid(const BlockSource& source) {
+  TensorGrid grid;
+  grid.name = source.name;
+  grid.to_world = source.to_world;
+  grid.metadata = source.metadata;
+  grid.blocks = unset_blocks(source.shapes.size());
+  tbb::parallel_for(std::size_t{0}, source.shapes.size(), [&](std::size_t i) {
+    make_room();
+    read_block(source, i, grid.blocks[i]);
+  });
+  return grid;
+}
+
+}  // namespace tensorray

@@ -1,0 +1,39 @@
+#pragma once
+/// @file volumes/grids/block_source.h
+/// Tensors block by block: those of a file or a generator, from which a field is made without a grid in between.
+
+#include <cstddef>
+#include <functional>
+#include <map>
+#include <string>
+#include <vector>
+
+#include "volumes/grids/tensor_grid.h"
+
+namespace tensorray {
+
+/// A sparse grid of tensors whose blocks are made when they are needed. Name, transform and metadata are those of a
+/// TensorGrid.
+struct BlockSource {
+  std::string name = "tensor";
+  Eigen::Affine3d to_world = Eigen::Affine3d::Identity();
+  std::vector<BlockShape> shapes;  ///< Each has at least one active voxel; ordered by origin (x, y, z).
+  std::map<std::string, std::string> metadata;
+
+  /// Writes the values of the active voxels of block i to `block`, whose shape is set and whose other voxels are zero.
+  /// Any thread may call it, any number of times. @throw std::runtime_error that names the file.
+  std::function<void(std::size_t i, TensorBlock& block)> fill;
+};
+
+/// Empties `block`, and fills it with block i of `source`.
+void read_block(const BlockSource& source, std::size_t i, TensorBlock& block);
+
+/// A dense grid: `value(index)` at every index of `box` (inclusive), all active. `value` may be called from several
+/// threads at once.
+BlockSource dense_source(const Eigen::AlignedBox3i& box, const Eigen::Affine3d& to_world,
+                         const std::function<Eigen::Matrix3d(const Eigen::Vector3i&)>& value);
+
+/// All blocks in memory. Runs on all threads. @throw as `fill`.
+TensorGrid to_grid(const BlockSource& source);
+
+}  // namespace tensorray

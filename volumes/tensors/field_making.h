@@ -1,0 +1,25 @@
+#pragma once
+/// @file volumes/tensors/field_making.h
+/// Makes a field of the blocks of a file or a generator in one pass: each block is read, cleaned, preprocessed and
+/// placed in its bricks while it is in the processor's caches, and there is no grid in between.
+
+#include <optional>
+
+#include "volumes/bricks/tensor_field.h"
+#include "volumes/tensors/eigenvalues.h"
+
+namespace tensorray {
+
+struct MadeField {
+  std::optional<TensorField> field;  ///< Nothing if no voxel is finite.
+  EigenvalueReport eigenvalues;
+  std::size_t voxels = 0;      ///< Active voxels of the field.
+  std::size_t non_finite = 0;  ///< Active voxels that were not finite and are not in the field.
+};
+
+/// The field of `TensorField` after remove_non_finite and apply_eigenvalues, bit for bit. Runs on all threads. Blocks
+/// are read a second time if some are not finite, or if `automatic` is not what some of them made it look like.
+/// @throw what `source` throws.
+MadeField make_field(const BlockSource& source, Eigenvalues mode);
+
+}  // namespace tensorray
