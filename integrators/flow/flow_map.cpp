@@ -29,8 +29,8 @@ constexpr double inset = 3e-6;   // On the aperture's edge, it is a matter of ro
                                  // There they start this part of a patch further inside.
 constexpr double swept_share = 0.99;  // The part of the positions whose light moves slowly enough from band to band.
 constexpr int most_levels = 14;
-constexpr int most_columns = 1 << 12;  // Number of first squares along a side.
-constexpr std::size_t task_size = 32;  // Positions that one thread traces as one task.
+constexpr int most_columns = 1 << 12;   // Number of first squares along a side.
+constexpr std::size_t task_size = 64;  // Positions that one thread traces as one task.
 
 /// A quadrilateral part of the aperture with a lattice of squares; corners counter-clockwise.
 struct Patch {
@@ -143,7 +143,7 @@ class FlowMapBuilder {
     return std::uint64_t{patch} << 58 | std::uint64_t{x} << 29 | y;
   }
 
-  std::uint32_t position(std::uint32_t patch, std::uint32_t x, std::uint32_t y) {
+  std::uint32_t position(std::uint32_t patch, std::uint32_t x, std::uint32_t y, const Parents& parents = {}) {
     const auto [found, is_new] = positions_.emplace(key(patch, x, y), static_cast<std::uint32_t>(map_.starts.size()));
     if (is_new) {
       const Patch& p = patches_[patch];
@@ -151,6 +151,7 @@ class FlowMapBuilder {
       map_.starts.push_back(p.at(u, v));
       const double least = settings_.silhouette ? inset : 0;
       origins_.push_back(p.at(std::clamp(u, least, 1 - least), std::clamp(v, least, 1 - least)));
+      parents_.push_back(parents);
     }
     return found->second;
   }
@@ -178,18 +179,16 @@ class FlowMapBuilder {
     const std::size_t first = traced_, count = map_.starts.size();
     map_.landings.resize(count * map_.nodes);
     map_.ends.resize(count * map_.nodes);
-    const std::size_t checks = tracer_.check_nodes().size();
-    map_.lengths.resize(count * checks);
+    map_.lengths.resize(count * tracer_.check_nodes().size());
     const std::size_t tasks = (count - first + task_size - 1) / task_size;
     std::atomic<std::size_t> done{first};
     const std::thread::id caller = std::this_thread::get_id();
     tbb::parallel_for(std::size_t{0}, tasks, [&](std::size_t task) {
       if (progress_.cancelled) throw Cancelled();
       const std::size_t begin = first + task * task_size, end = std::min(begin + task_size, count);
-      std::vector<Eigen::Vector3d> origins;
-      for (std::size_t i = begin; i < end; ++i) origins.push_back(beam_.start(origins_[i]));
-      tracer_.trace(origins, &map_.landings[begin * map_.nodes], &map_.ends[begin * map_.nodes],
-                    &map_.lengths[begin * checks]);
+      std::vector<NewPosition> positions;
+      for (std::size_t i = begin; i < end; ++i) positions.push_back({beam_.start(origins_[i]), parents_[i]});
+      tracer_.trace(map_, begin, positions);
       const std::size_t traced = done += end - begin;
       if (std::this_thread::get_id() == caller)
         progress_.update("tracing rays", std::min(traced, settings_.most_starts), settings_.most_starts);
@@ -276,10 +275,23 @@ class FlowMapBuilder {
     return true;
   }
 
+  bool is_on_border(const Square& square) const {
+    const Patch& patch = patches_[square.patch];
+    const std::uint32_t side = side_of(square), right = static_cast<std::uint32_t>(patch.columns) << levels_,
+                        top = static_cast<std::uint32_t>(patch.rows) << levels_;
+    return square.x == 0 || square.y == 0 || square.x + side == right || square.y + side == top;
+  }
+
   std::array<std::uint32_t, 5> middles_of(const Square& square) {
     const std::uint32_t side = side_of(square), half = side / 2, x = square.x, y = square.y, p = square.patch;
-    return {position(p, x + half, y), position(p, x + side, y + half), position(p, x + half, y + side),
-            position(p, x, y + half), position(p, x + half, y + half)};
+    const auto& [a, b, c, d] = square.corners;
+    // At the silhouette, landings are singular: neighbours say little about each other.
+    if (settings_.silhouette && is_on_border(square))
+      return {position(p, x + half, y), position(p, x + side, y + half), position(p, x + half, y + side),
+              position(p, x, y + half), position(p, x + half, y + half)};
+    return {position(p, x + half, y, {{a, b}, 2}), position(p, x + side, y + half, {{b, c}, 2}),
+            position(p, x + half, y + side, {{c, d}, 2}), position(p, x, y + half, {{d, a}, 2}),
+            position(p, x + half, y + half, {{a, b, c, d}, 4})};
   }
 
   /// Where landings are smooth, the deviation falls to a quarter from level to level; at singular places, by less. The
@@ -455,6 +467,7 @@ class FlowMapBuilder {
   std::unordered_map<std::uint64_t, std::uint32_t> positions_;
   std::unordered_map<std::uint64_t, std::uint32_t> open_edges_;  // Edges with one triangle, by `from` and `to`.
   std::vector<Eigen::Vector2d> origins_;  // Where the rays of the positions start, in the beam's frame.
+  std::vector<Parents> parents_;          // Of the positions.
   std::size_t traced_ = 0;                // Number of positions that have landings.
   FlowMap map_;
 };

@@ -63,11 +63,11 @@ struct FlowMap {
   std::vector<Eigen::Vector2f> landings;  ///< Pixel coordinates; node k of position i is at [i · nodes + k]. They may
                                           ///< lie beyond the plate's edges.
   std::vector<RayEnd> ends;               ///< In the same order; landings are valid where this is `plate`.
-  std::size_t check_step = 1;           ///< Every so many nodes, light is traced for all positions, never interpolated.
-  std::vector<float> lengths;           ///< Length of the way, world units, at these nodes, in the same order.
-  std::vector<FlowTriangle> triangles;  ///< They cover the aperture once; neighbours follow each other.
-  std::vector<FlowEdge> edges;          ///< All sides of the triangles, once.
-  std::size_t rays = 0;                 ///< Number of rays that were traced.
+  std::size_t check_step = 1;             ///< At every so many nodes there are lengths.
+  std::vector<float> lengths;             ///< Length of the way, world units, at these nodes, in the same order.
+  std::vector<FlowTriangle> triangles;    ///< They cover the aperture once; neighbours follow each other.
+  std::vector<FlowEdge> edges;            ///< All sides of the triangles, once.
+  std::size_t rays = 0;                   ///< Number of rays that were traced.
   std::uint64_t ray_steps = 0, tensor_samples = 0;
   bool is_complete = true;  ///< Whether every triangle is as fine as `tolerance` asks.
 };
@@ -121,9 +121,10 @@ inline bool jumps(const FlowTriangle& triangle, const Eigen::Vector2d& a, const 
 /// and some does not. Where light is spread, so that the square's light covers n pixels along a side, the tolerance is
 /// √n times as large. Squares whose light falls beside the plate stay as they are.
 ///
-/// In a range, each position first sends light at 5 of the 33 nodes. Where these are smooth, so that an error of more
-/// than a sixteenth of the tolerance is unlikely, the others are interpolated (cubic); where not, more nodes are
-/// traced, up to all. (At a caustic a small error of the landing is a great one of the colour.)
+/// In a range, each position first sends light at 5 of the 33 nodes, or at 3 where the positions beside it agree in
+/// what lies between. Where these are smooth, so that an error of more than a hundredth of the tolerance is unlikely,
+/// the others are predicted (node_prediction.h); where not, more nodes are traced, up to all. (At a caustic a small
+/// error of the landing is a great one of the colour.)
 ///
 /// If `geometry` has a body instead of a plate, the landings of light from the volume are the projections of
 /// the points of the body on `plate`: along its normal, or from the beam's source if it has one. Light counts as landed

@@ -6,95 +6,16 @@
 #include <numeric>
 #include <utility>
 
+#include "integrators/flow/node_prediction.h"
 #include "integrators/flow/ray_memory.h"
 
 namespace tensorray {
 namespace {
 
-constexpr std::size_t range_nodes = 33, first_step = 8;  // 5 nodes come first.
+constexpr double node_part = 100;          // Landings are predicted to within this part of the tolerance.
+constexpr std::size_t first_step = 8;      // 5 nodes come first, ...
+constexpr std::size_t coarsest_step = 16;  // ... or 3, where the parents agree in what is between them.
 constexpr double off_surface = 1e-4;  // Distance, in sizes of a body, at which it is looked for about its own points.
-constexpr float gain_of_first =
-    8;  // The error of the cubic through the first nodes, as a part of that of the parabola.
-constexpr float gain_of_halving = 8;  // Halving the distance of nodes: 16 for smooth landings; less, to be safe.
-
-/// The polynomial through the `count` nodes from `first` on, `step` apart, at node `at`.
-Eigen::Vector2f interpolated(const Eigen::Vector2f* landings, std::size_t first, std::size_t step, int count,
-                             std::size_t at) {
-  const float t = (static_cast<float>(at) - static_cast<float>(first)) / static_cast<float>(step);
-  Eigen::Vector2f sum(0, 0);
-  for (int i = 0; i < count; ++i) {
-    float weight = 1;
-    for (int j = 0; j < count; ++j)
-      if (j != i) weight *= (t - static_cast<float>(j)) / static_cast<float>(i - j);
-    sum += weight * landings[first + static_cast<std::size_t>(i) * step];
-  }
-  return sum;
-}
-
-/// The first of the four nodes, `step` apart, that are nearest to `node`.
-std::size_t first_of_cubic(std::size_t step, std::size_t node) {
-  const std::size_t last = (range_nodes - 1) / step - 3, before = node / step;
-  return std::min(before > 0 ? before - 1 : 0, last) * step;
-}
-
-/// The landings of a position that are traced so far: every `step`-th node.
-struct TracedNodes {
-  Eigen::Vector2f* landings;
-  RayEnd* ends;
-  std::size_t step;
-  Eigen::Array2f plate;  // Width and height, pixels.
-
-  bool landed(std::size_t node) const { return ends[node] == RayEnd::plate; }
-  bool is_on_plate(std::size_t node) const {
-    return landed(node) && (landings[node].array() >= 0).all() && (landings[node].array() <= plate).all();
-  }
-
-  /// Whether light between this node and the next one may fall on the plate.
-  bool matters(std::size_t node) const {
-    const std::size_t next = node + step;
-    return (landed(node) && landed(next)) || is_on_plate(node) || is_on_plate(next);
-  }
-
-  /// The distance of a node from what the nodes of twice the step predict; infinite if one of these did not land.
-  float deviation(std::size_t node) const {
-    const bool first = step == first_step;
-    const int count = first ? 3 : 4;
-    const std::size_t from = first ? 0 : first_of_cubic(2 * step, node);
-    for (int i = 0; i < count; ++i)
-      if (!landed(from + static_cast<std::size_t>(i) * 2 * step)) return std::numeric_limits<float>::infinity();
-    return (landings[node] - interpolated(landings, from, 2 * step, count, node)).norm();
-  }
-
-  /// Whether the nodes between the traced ones can be interpolated to within `tolerance` where this matters.
-  bool is_smooth(double tolerance) const {
-    const float gain = step == first_step ? gain_of_first : gain_of_halving;
-    for (std::size_t node = step; node < range_nodes; node += 2 * step) {
-      const bool matters_here = matters(node - step) || matters(node);
-      if (matters_here && !(landed(node) && deviation(node) / gain <= tolerance)) return false;
-    }
-    return true;
-  }
-
-  /// Sets the nodes between the traced ones.
-  void fill() const {
-    for (std::size_t node = 0; node < range_nodes; ++node) {
-      if (node % step == 0) continue;
-      const std::size_t before = node / step * step, nearest = 2 * (node - before) < step ? before : before + step;
-      ends[node] = ends[nearest];
-      landings[node] = landings[nearest];
-      if (landed(before) && landed(before + step)) landings[node] = between(before, node);
-    }
-  }
-
- private:
-  /// Cubic if four nodes about `node` landed, else linear.
-  Eigen::Vector2f between(std::size_t before, std::size_t node) const {
-    const std::size_t from = first_of_cubic(step, node);
-    for (std::size_t i = 0; i < 4; ++i)
-      if (!landed(from + i * step)) return interpolated(landings, before, step, 2, node);
-    return interpolated(landings, from, step, 4, node);
-  }
-};
 
 }  // namespace
 
@@ -109,7 +30,7 @@ NodeTracer::NodeTracer(const TensorField& field, const Geometry& geometry, const
       plate_(plate),
       beam_(beam),
       bending_(bending),
-      tolerance_(settings.tolerance / 16),
+      tolerance_(static_cast<float>(settings.tolerance / node_part)),
       is_range_(settings.range && settings.flexibilities[0] != settings.flexibilities[1]),
       flexibilities_(settings.flexibilities) {
   if (settings.range) flexibilities_.resize(is_range_ ? range_nodes : 1);
@@ -132,24 +53,52 @@ NodeTracer::NodeTracer(const TensorField& field, const Geometry& geometry, const
   for (std::size_t node = 0; node < nodes(); node += step) check_nodes_.push_back(node);
 }
 
-void NodeTracer::trace(const std::vector<Eigen::Vector3d>& origins, Eigen::Vector2f* landings, RayEnd* ends,
-                       float* lengths) {
-  std::vector<std::size_t> which(origins.size());
-  std::iota(which.begin(), which.end(), std::size_t{0});
-  if (!is_range_) return trace_nodes(origins, which, 0, 1, landings, ends, lengths);
-  trace_nodes(origins, which, 0, first_step, landings, ends, lengths);
-  for (std::size_t step = first_step; step > 1; step /= 2) {
-    std::vector<std::size_t> rough;
-    for (const std::size_t i : which) {
-      const TracedNodes traced{landings + i * nodes(), ends + i * nodes(), step, plate_.resolution.cast<float>()};
-      if (traced.is_smooth(tolerance_))
-        traced.fill();
-      else
-        rough.push_back(i);
-    }
-    if (rough.empty()) return;
-    which = std::move(rough);
-    trace_nodes(origins, which, step / 2, step, landings, ends, nullptr);
+/// Adds every `step`-th node of each position, or, unless it is the first time, those of them that are not traced yet.
+/// Light of one node from neighbouring positions crosses the same cells of the field.
+void NodeTracer::add_rays(const std::vector<PartlyTraced>& positions, bool is_first, std::vector<NodeRay>& rays) {
+  rays.clear();
+  for (std::size_t node = 0; node < range_nodes; ++node)
+    for (const PartlyTraced& each : positions)
+      if (is_first ? node % each.step == 0 : node % (2 * each.step) == each.step) rays.push_back({each.position, node});
+}
+
+/// The lengths between those of three nodes: the parents' ways tell how they bend.
+void NodeTracer::predict_lengths(FlowMap& map, std::size_t position, const Parents& parents) const {
+  const auto missed = [&](std::size_t of, std::size_t check) {
+    const float* lengths = &map.lengths[of * check_nodes_.size()];
+    return lengths[check] - (lengths[check - 1] + lengths[check + 1]) / 2;
+  };
+  for (std::size_t check = 1; check < check_nodes_.size(); check += 2) {
+    float& length = map.lengths[position * check_nodes_.size() + check];
+    length -= missed(position, check);
+    for (std::size_t i = 0; i < parents.count; ++i)
+      length += missed(parents.positions[i], check) / static_cast<float>(parents.count);
+  }
+}
+
+void NodeTracer::trace(FlowMap& map, std::size_t first, const std::vector<NewPosition>& positions) {
+  std::vector<NodeRay> rays;
+  if (!is_range_) {
+    for (std::size_t node = 0; node < nodes(); ++node)
+      for (std::size_t i = 0; i < positions.size(); ++i) rays.push_back({first + i, node});
+    return trace_rays(map, first, positions, rays);
+  }
+  std::vector<PartlyTraced> rest;
+  for (std::size_t i = 0; i < positions.size(); ++i) {
+    const NodePrediction prediction(map, first + i, positions[i].parents, plate_.resolution.cast<float>());
+    const bool agree = prediction.parents_agree(coarsest_step, tolerance_);
+    rest.push_back({first + i, agree ? coarsest_step : first_step, prediction});
+  }
+  for (bool is_first = true; !rest.empty(); is_first = false) {
+    add_rays(rest, is_first, rays);
+    trace_rays(map, first, positions, rays);
+    const auto is_done = [&](const PartlyTraced& each) {
+      if (each.step > 1 && !each.prediction.predict(each.step, tolerance_)) return false;
+      if (each.step == coarsest_step) predict_lengths(map, each.position, positions[each.position - first].parents);
+      return true;
+    };
+    rest.erase(std::remove_if(rest.begin(), rest.end(), is_done), rest.end());
+    for (PartlyTraced& each : rest) each.step /= 2;
   }
 }
 
@@ -163,26 +112,25 @@ RayEnd NodeTracer::end_of(const RayBatch& rays, std::size_t ray, const Eigen::Ve
   return body_->absorber(rays.position[ray] + off_body_ * back, back) ? RayEnd::obstacle : RayEnd::plate;
 }
 
-void NodeTracer::trace_nodes(const std::vector<Eigen::Vector3d>& origins, const std::vector<std::size_t>& which,
-                             std::size_t first, std::size_t step, Eigen::Vector2f* landings, RayEnd* ends,
-                             float* lengths) {
+void NodeTracer::trace_rays(FlowMap& map, std::size_t first, const std::vector<NewPosition>& positions,
+                            const std::vector<NodeRay>& rays) {
   RayBatch batch;
-  // Light of one node from neighbouring positions crosses the same cells of the field.
-  for (std::size_t node = first; node < nodes(); node += step)
-    for (const std::size_t i : which) batch.add(origins[i], beam_.direction_at(origins[i]), flexibilities_[node]);
+  for (const NodeRay& ray : rays) {
+    const Eigen::Vector3d& origin = positions[ray.position - first].origin;
+    batch.add(origin, beam_.direction_at(origin), flexibilities_[ray.node]);
+  }
   if (memory_)
     memory_->trace(field_, *volume_, geometry_, bending_, batch);
   else
     tensorray::trace(field_, geometry_, bending_, batch);
-  std::size_t ray = 0;
-  for (std::size_t node = first; node < nodes(); node += step)
-    for (const std::size_t i : which) {
-      landings[i * nodes() + node] =
-          plate_.to_pixel(place_on(plate_, geometry_, beam_, batch.position[ray])).cast<float>();
-      ends[i * nodes() + node] = end_of(batch, ray, origins[i]);
-      if (lengths) lengths[i * check_nodes_.size() + (node - first) / step] = static_cast<float>(batch.length[ray]);
-      ++ray;
-    }
+  for (std::size_t i = 0; i < rays.size(); ++i) {
+    const auto& [position, node] = rays[i];
+    const std::size_t at = position * nodes() + node;
+    map.landings[at] = plate_.to_pixel(place_on(plate_, geometry_, beam_, batch.position[i])).cast<float>();
+    map.ends[at] = end_of(batch, i, positions[position - first].origin);
+    if (node % map.check_step == 0)
+      map.lengths[position * check_nodes_.size() + node / map.check_step] = static_cast<float>(batch.length[i]);
+  }
   rays_ += batch.size();
   tensor_samples_ += batch.tensor_samples;
   ray_steps_ += std::accumulate(batch.steps.begin(), batch.steps.end(), std::uint64_t{0});

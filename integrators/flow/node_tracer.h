@@ -11,6 +11,7 @@
 #include <Eigen/Core>
 
 #include "integrators/flow/flow_map.h"
+#include "integrators/flow/node_prediction.h"
 
 namespace tensorray {
 
@@ -18,7 +19,13 @@ namespace tensorray {
 /// it; parallel light needs no projection, since pixels are those of the point's projection along the plate's normal.
 Eigen::Vector3d place_on(const Plate& plate, const Geometry& geometry, const Beam& beam, const Eigen::Vector3d& point);
 
-/// Traces as few nodes as the smoothness of the landings allows, and interpolates the others. Any number of threads may
+/// A position whose light is to be traced.
+struct NewPosition {
+  Eigen::Vector3d origin;
+  Parents parents;
+};
+
+/// Traces as few nodes as the smoothness of the landings allows, and predicts the others. Any number of threads may
 /// use it at once.
 class NodeTracer {
  public:
@@ -28,22 +35,33 @@ class NodeTracer {
 
   std::size_t nodes() const { return flexibilities_.size(); }
 
-  /// The nodes that are traced for every position.
+  /// The nodes at which there are lengths.
   const std::vector<std::size_t>& check_nodes() const { return check_nodes_; }
 
   std::size_t check_step() const { return check_nodes_.size() > 1 ? check_nodes_[1] : 1; }
 
-  /// Writes origins.size() · nodes() landings (pixel coordinates) and ends, and the lengths of the ways at the check
-  /// nodes.
-  void trace(const std::vector<Eigen::Vector3d>& origins, Eigen::Vector2f* landings, RayEnd* ends, float* lengths);
+  /// Sets landings, ends and lengths of the positions from `first` on, for which the map has room. Different positions
+  /// may be traced at once; their parents must be traced already.
+  void trace(FlowMap& map, std::size_t first, const std::vector<NewPosition>& positions);
 
   std::uint64_t rays() const { return rays_; }
   std::uint64_t ray_steps() const { return ray_steps_; }
   std::uint64_t tensor_samples() const { return tensor_samples_; }
 
  private:
-  void trace_nodes(const std::vector<Eigen::Vector3d>& origins, const std::vector<std::size_t>& which,
-                   std::size_t first, std::size_t step, Eigen::Vector2f* landings, RayEnd* ends, float* lengths);
+  struct NodeRay {
+    std::size_t position, node;
+  };
+  /// A position of which every `step`-th node is traced next.
+  struct PartlyTraced {
+    std::size_t position, step;
+    NodePrediction prediction;
+  };
+
+  static void add_rays(const std::vector<PartlyTraced>& positions, bool is_first, std::vector<NodeRay>& rays);
+  void trace_rays(FlowMap& map, std::size_t first, const std::vector<NewPosition>& positions,
+                  const std::vector<NodeRay>& rays);
+  void predict_lengths(FlowMap& map, std::size_t position, const Parents& parents) const;
   RayEnd end_of(const RayBatch& rays, std::size_t ray, const Eigen::Vector3d& origin) const;
 
   const TensorField& field_;
@@ -55,7 +73,7 @@ class NodeTracer {
   std::optional<Geometry> volume_;     // With `memory_`: the geometry without its plate.
   std::optional<Geometry> body_;       // The body alone, if it collects the light.
   double off_body_ = 0;                // Distance from its surface at which it is looked for.
-  double tolerance_;
+  float tolerance_;                    // Of predicted landings, pixels.
   bool is_range_;
   std::vector<double> flexibilities_;  // One for each node.
   std::vector<std::size_t> check_nodes_;

@@ -1,0 +1,60 @@
+#pragma once
+/// @file integrators/flow/node_prediction.h
+/// Landings of a position at the nodes of a range that are not traced: they follow from those that are, and from the
+/// positions between which it lies. A part of node_tracer.cpp.
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+
+#include <Eigen/Core>
+
+#include "integrators/flow/flow_map.h"
+
+namespace tensorray {
+
+constexpr std::size_t range_nodes = 33;
+
+/// The positions in whose middle a new one lies, all of them traced: the ends of a side, or the corners of a square.
+struct Parents {
+  std::array<std::uint32_t, 4> positions{};
+  std::size_t count = 0;  ///< 0, 2 or 4.
+};
+
+/// The landings of a position at all nodes, of which every `step`-th is traced; step: 16, 8, 4 or 2.
+///
+/// A polynomial through the nearest traced nodes (a parabola through three, else a cubic through four) predicts the
+/// others. Where all light of the parents lands, the mean of what this would have missed of theirs is added: then only
+/// what differs from position to position is left as an error.
+class NodePrediction {
+ public:
+  /// @param plate  Width and height of the plate, pixels.
+  NodePrediction(FlowMap& map, std::size_t position, const Parents& parents, const Eigen::Array2f& plate);
+
+  /// Whether the parents differ so little in what the polynomials miss that the mean is good to within `tolerance`,
+  /// pixels.
+  bool parents_agree(std::size_t step, float tolerance) const;
+
+  /// Sets the nodes that are not traced, if they can be predicted to within `tolerance`, pixels, wherever light may
+  /// fall on the plate. The greatest of the traced nodes' distances from what every second one of them predicts tells:
+  /// where landings are smooth, the next one is an eighth of it, at most.
+  bool predict(std::size_t step, float tolerance) const;
+
+ private:
+  bool landed(std::size_t node) const { return ends_[node] == RayEnd::plate; }
+  bool all_landed(std::size_t step) const;
+  bool is_on_plate(std::size_t node) const;
+  bool matters(std::size_t node, std::size_t step) const;
+  bool is_smooth(std::size_t step, float tolerance) const;
+  bool is_smooth_beside_parents(std::size_t step, float tolerance) const;
+  Eigen::Vector2f between(std::size_t node, std::size_t step) const;
+
+  Eigen::Vector2f* landings_;
+  RayEnd* ends_;
+  std::array<const Eigen::Vector2f*, 4> parents_{};
+  std::size_t parent_count_ = 0;                   // 0 if some of their light does not land.
+  std::array<Eigen::Vector2f, range_nodes> mean_;  // Of the parents' landings, if their light lands.
+  Eigen::Array2f plate_;
+};
+
+}  // namespace tensorray

@@ -1,0 +1,104 @@
+// Landings at the nodes that are not traced.
+
+#include "integrators/flow/node_prediction.h"
+
+#include <cmath>
+#include <functional>
+
+#include <gtest/gtest.h>
+
+namespace tensorray {
+namespace {
+
+using Eigen::Vector2f;
+
+/// A map of positions on a line; their light moves with the node t, from 0 to 1, as `landing` says.
+FlowMap map_of(const std::vector<double>& positions, const std::function<Vector2f(double, double)>& landing) {
+  FlowMap map;
+  map.nodes = range_nodes;
+  for (const double x : positions)
+    for (std::size_t node = 0; node < range_nodes; ++node) {
+      map.landings.push_back(landing(x, static_cast<double>(node) / (range_nodes - 1)));
+      map.ends.push_back(RayEnd::plate);
+    }
+  return map;
+}
+
+/// Forgets what is not traced of the last of three positions, predicts it, and returns the greatest error; -1 if it is
+/// not predicted.
+double error_of(FlowMap map, const Parents& parents, std::size_t step, float tolerance) {
+  const FlowMap exact = map;
+  const std::size_t first = 2 * range_nodes;
+  for (std::size_t node = 0; node < range_nodes; ++node) {
+    if (node % step == 0) continue;
+    map.landings[first + node].setConstant(std::nanf(""));
+    map.ends[first + node] = RayEnd::missed;
+  }
+  if (!NodePrediction(map, 2, parents, {100, 100}).predict(step, tolerance)) return -1;
+  float greatest = 0;
+  for (std::size_t node = 0; node < range_nodes; ++node) {
+    EXPECT_EQ(map.ends[first + node], RayEnd::plate);
+    greatest = std::max(greatest, (map.landings[first + node] - exact.landings[first + node]).norm());
+  }
+  return greatest;
+}
+
+const Parents both{{0, 1}, 2};
+
+Vector2f smooth(double x, double t) {
+  return Vector2f(static_cast<float>(40 + 3 * x + 10 * std::sin(2 * t + 0.2 * x)), static_cast<float>(50 - 20 * t * t));
+}
+
+TEST(NodePrediction, CubicsAreExact) {
+  const FlowMap map = map_of({0, 1, 0.5}, [](double x, double t) {
+    return Vector2f(static_cast<float>(40 + x + 10 * t * t * t), static_cast<float>(50 - 20 * t * t));
+  });
+  // Five nodes: the second one deviates from a parabola by 10 · 3/64 pixels, an eighth of which is allowed.
+  EXPECT_EQ(error_of(map, {}, 8, 0.058f), -1);
+  EXPECT_NEAR(error_of(map, {}, 8, 0.06f), 0, 1e-5);
+}
+
+/// The error of a cubic through nodes at a distance h is at most 1/24 h⁴ times the fourth derivative, here 160: it falls
+/// to a sixteenth with half the distance.
+TEST(NodePrediction, IsOfFourthOrder) {
+  const FlowMap map = map_of({0, 1, 0.5}, smooth);
+  const double coarse = error_of(map, {}, 8, 10), fine = error_of(map, {}, 4, 10);
+  EXPECT_LT(coarse, 160.0 / 24 * std::pow(0.25, 4));
+  EXPECT_GT(coarse, 1e-3);
+  EXPECT_NEAR(coarse / fine, 16, 5);
+}
+
+/// What the polynomials miss is the same of neighbours, to second order in their distance.
+TEST(NodePrediction, ParentsLeaveOnlyWhatDiffers) {
+  const double alone = error_of(map_of({0, 1, 0.5}, smooth), {}, 8, 10);
+  const FlowMap far = map_of({0, 1, 0.5}, smooth), near = map_of({0, 0.5, 0.25}, smooth);
+  EXPECT_LT(error_of(far, both, 8, 10), alone / 50);
+  EXPECT_NEAR(error_of(far, both, 16, 10) / error_of(near, both, 16, 10), 4, 0.5);
+}
+
+TEST(NodePrediction, ThreeNodesNeedParentsThatAgree) {
+  const FlowMap map = map_of({0, 1, 0.5}, smooth);
+  EXPECT_EQ(error_of(map, {}, 16, 10), -1);
+  EXPECT_GE(error_of(map, both, 16, 0.1f), 0);
+  EXPECT_LT(error_of(map, both, 16, 0.1f), 0.1);
+  const FlowMap apart = map_of({0, 100, 50}, smooth);  // A parent of another phase.
+  EXPECT_EQ(error_of(apart, both, 16, 0.1f), -1);
+}
+
+TEST(NodePrediction, AJumpIsNoticed) {
+  const FlowMap map = map_of({0, 1, 0.5}, [](double x, double t) {
+    return Vector2f(static_cast<float>(40 + x + (t > 0.6 && x == 0.5 ? 1 : 0)), static_cast<float>(50 * t));
+  });
+  for (const std::size_t step : {16, 8, 4, 2}) EXPECT_EQ(error_of(map, both, step, 0.03f), -1) << step;
+}
+
+/// Light of a parent that does not land says nothing about others.
+TEST(NodePrediction, ParentsWhoseLightEndsElsewhereAreLeftOut) {
+  FlowMap map = map_of({0, 1, 0.5}, smooth);
+  map.ends[5] = RayEnd::obstacle;
+  EXPECT_FALSE(NodePrediction(map, 2, both, {100, 100}).parents_agree(16, 10));
+  EXPECT_EQ(error_of(map, both, 8, 10), error_of(map, {}, 8, 10));
+}
+
+}  // namespace
+}  // namespace tensorray
