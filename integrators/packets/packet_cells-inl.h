@@ -92,18 +92,6 @@ constexpr int corners[8] = {0,
                             x_stride + y_stride,
                             x_stride + y_stride + z_stride};
 
-/// Stores the weights of a cell's corners at a point within it. 13 operations.
-HWY_INLINE void make_weights(const F3& fraction, Packet& packet, int at) {
-  const F yz = hn::Mul(fraction.y, fraction.z);
-  const F y = hn::Sub(fraction.y, yz), z = hn::Sub(fraction.z, yz), neither = hn::Sub(hn::Sub(set(1), fraction.y), z);
-  const F of_face[4] = {neither, z, y, yz};
-  for (int i = 0; i < 4; ++i) {
-    const F far = hn::Mul(fraction.x, of_face[i]);
-    store(hn::Sub(of_face[i], far), packet.weights[i], at);
-    store(far, packet.weights[4 + i], at);
-  }
-}
-
 using Eight = hn::CappedTag<float, 8>;  // For the components of one voxel.
 constexpr Eight eight;
 constexpr int eight_lanes = static_cast<int>(hn::MaxLanes(Eight()));
@@ -112,34 +100,52 @@ HWY_INLINE const float* cell_of(const Packet& packet, int lane) {
   return packet.bending[lane] + static_cast<int>(packet.voxel[lane]) * TensorBrick::bending_floats;
 }
 
-/// Samples the tensors of `count` vectors, one or two, whose lanes are all in one cell. Each component of a corner is
-/// loaded once, copied to all lanes, and multiplied by the weights of all vectors. Operations and their order are those
-/// of sample_own_cells.
+/// The edges of a cell along y: offsets, in floats, of their near ends from the cell's first voxel.
+constexpr int edges[4] = {0, z_stride, x_stride, x_stride + z_stride};
+
+template <class V>
+HWY_INLINE V between(V near, V far, V fraction) {
+  return hn::MulAdd(hn::Sub(far, near), fraction, near);
+}
+
+/// Trilinear interpolation along y, then x, then z. `near(i)` is the value at the near end of edge i, and `rise(i)`
+/// that at its far end minus that. The operations and their order are the same wherever they are done, and so are the
+/// results, bit for bit.
+template <class V, class Near, class Rise>
+HWY_INLINE V trilinear(const Near& near, const Rise& rise, V x, V y, V z) {
+  const auto edge = [&](int i) HWY_ATTR { return hn::MulAdd(rise(i), y, near(i)); };
+  const V first = between(edge(0), edge(2), x);
+  return between(first, between(edge(1), edge(3), x), z);
+}
+
+/// Samples the tensors of `count` vectors, one or two, whose lanes are all in one cell. `rises` are those of the cell's
+/// edges. Each value is loaded once for all vectors, and copied to all lanes.
 template <int count>
-HWY_INLINE void sample_cell(const float* HWY_RESTRICT cell, Packet& packet, int first) {
-  constexpr int together = 8 / count;  // Components at a time: all sums and their factors fit in registers.
-  for (int i = 0; i < 8; i += together) {
-    F sums[together][count], weights[count];
+HWY_INLINE void sample_cell(const float* HWY_RESTRICT cell, const float (&rises)[4][8], Packet& packet, int first) {
+  F3 at[count];
+  for (int n = 0; n < count; ++n) at[n] = load(packet.fraction, first + n * lanes);
 #pragma GCC unroll 8
-    for (int k = 7; k >= 0; --k) {
-      for (int n = 0; n < count; ++n) weights[n] = load(packet.weights[k], first + n * lanes);
-#pragma GCC unroll 8
-      for (int j = 0; j < together; ++j) {
-        const F corner = set(cell[corners[k] + i + j]);
-        for (int n = 0; n < count; ++n)
-          sums[j][n] = k == 7 ? hn::Mul(corner, weights[n]) : hn::MulAdd(corner, weights[n], sums[j][n]);
-      }
-    }
-#pragma GCC unroll 8
-    for (int j = 0; j < together; ++j)
-      for (int n = 0; n < count; ++n) store(sums[j][n], packet.tensor[i + j], first + n * lanes);
+  for (int c = 0; c < 8; ++c) {
+    F values[count];
+#pragma GCC unroll 2
+    for (int n = 0; n < count; ++n)
+      values[n] = trilinear([&](int i) HWY_ATTR { return set(cell[edges[i] + c]); },
+                            [&](int i) HWY_ATTR { return set(rises[i][c]); }, at[n].x, at[n].y, at[n].z);
+#pragma GCC unroll 2
+    for (int n = 0; n < count; ++n) store(values[n], packet.tensor[c], first + n * lanes);
   }
 }
 
 /// The same for any number of vectors.
 HWY_INLINE void sample_cell(const float* cell, Packet& packet, int first, int count) {
-  for (; count > 1; count -= 2, first += 2 * lanes) sample_cell<2>(cell, packet, first);
-  if (count > 0) sample_cell<1>(cell, packet, first);
+  alignas(64) float rises[4][8];
+  for (int i = 0; i < 4; ++i)
+    for (int c = 0; c < 8; c += eight_lanes) {
+      const float* const edge = cell + edges[i] + c;
+      hn::Store(hn::Sub(hn::Load(eight, edge + y_stride), hn::Load(eight, edge)), eight, rises[i] + c);
+    }
+  for (; count > 1; count -= 2, first += 2 * lanes) sample_cell<2>(cell, rises, packet, first);
+  if (count > 0) sample_cell<1>(cell, rises, packet, first);
 }
 
 /// Stores components of a lane's tensor: first the first four components of all lanes, then the last four.
@@ -171,14 +177,16 @@ HWY_INLINE void transpose(const float* components, PerRay (&tensor)[8], int at) 
 /// Samples the tensors of a vector whose lanes are in several cells: a register holds the components of one lane at a
 /// time.
 HWY_INLINE void sample_own_cells(Packet& packet, int at) {
-  for (int i = 0; i < 8; i += eight_lanes) {
+  for (int c = 0; c < 8; c += eight_lanes) {
+#pragma GCC unroll 16
     for (int lane = 0; lane < lanes; ++lane) {
-      const float* const cell = cell_of(packet, at + lane) + i;
-      const auto weight = [&](int k) HWY_ATTR { return hn::Set(eight, packet.weights[k][at + lane]); };
-      auto sum = hn::Mul(hn::Load(eight, cell + corners[7]), weight(7));
-#pragma GCC unroll 8
-      for (int k = 6; k >= 0; --k) sum = hn::MulAdd(hn::Load(eight, cell + corners[k]), weight(k), sum);
-      store_components(sum, i, lane, packet.components);
+      const float* const cell = cell_of(packet, at + lane) + c;
+      const auto fraction = [&](int axis) HWY_ATTR { return hn::Set(eight, packet.fraction[axis][at + lane]); };
+      const auto near = [&](int i) HWY_ATTR { return hn::Load(eight, cell + edges[i]); };
+      const auto rise = [&](int i) HWY_ATTR {
+        return hn::Sub(hn::Load(eight, cell + edges[i] + y_stride), hn::Load(eight, cell + edges[i]));
+      };
+      store_components(trilinear(near, rise, fraction(0), fraction(1), fraction(2)), c, lane, packet.components);
     }
   }
   transpose(packet.components, packet.tensor, at);

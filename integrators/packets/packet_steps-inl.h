@@ -131,10 +131,7 @@ HWY_INLINE bool find_cells(Packet& packet, bool forced, const Point& point_of) {
                        hn::Max(hn::BitCast(bits, near.y), hn::BitCast(bits, near.z)));
     if (careful && forced) near = clamp(near, zeros(), {last, last, last});
     const F3 fraction = sub(point, near);
-    if constexpr (differentials)
-      store(fraction, packet.fraction, i);
-    else
-      make_weights(fraction, packet, i);
+    store(fraction, packet.fraction, i);
     const F voxel = hn::MulAdd(hn::MulAdd(near.x, width, near.y), width, near.z);
     store(voxel, packet.voxel, i);
     if (i == 0) first = set(hn::GetLane(voxel));
@@ -243,7 +240,7 @@ HWY_INLINE void interpolate(const PacketMedium& medium, Packet& packet) {
         sample_own_slopes(packet, i);
     } else {
       if (together)
-        sample_cell<1>(cell_of(packet, i), packet, i);
+        sample_cell(cell_of(packet, i), packet, i, 1);
       else
         sample_own_cells(packet, i);
     }
