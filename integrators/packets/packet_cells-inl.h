@@ -174,12 +174,21 @@ HWY_INLINE void transpose(const float* components, PerRay (&tensor)[8], int at) 
   }
 }
 
+/// Prefetches the memory of a cell.
+HWY_INLINE void prefetch_cell(const float* cell) {
+  for (const int edge : {0, y_stride, x_stride, x_stride + y_stride}) {
+    hwy::Prefetch(cell + edge);
+    hwy::Prefetch(cell + edge + z_stride);
+  }
+}
+
 /// Samples the tensors of a vector whose lanes are in several cells: a register holds the components of one lane at a
-/// time.
-HWY_INLINE void sample_own_cells(Packet& packet, int at) {
+/// time. Prefetches the cells `ahead` of the lanes.
+HWY_INLINE void sample_own_cells(Packet& packet, int at, const std::int32_t (&ahead)[lanes]) {
   for (int c = 0; c < 8; c += eight_lanes) {
 #pragma GCC unroll 16
     for (int lane = 0; lane < lanes; ++lane) {
+      if (c == 0) prefetch_cell(packet.bending[at + lane] + ahead[lane]);
       const float* const cell = cell_of(packet, at + lane) + c;
       const auto fraction = [&](int axis) HWY_ATTR { return hn::Set(eight, packet.fraction[axis][at + lane]); };
       const auto near = [&](int i) HWY_ATTR { return hn::Load(eight, cell + edges[i]); };
@@ -249,10 +258,11 @@ HWY_INLINE void sample_slopes(const float* cell, Packet& packet, int at) {
 }
 
 /// The same for a vector whose lanes are in several cells.
-HWY_INLINE void sample_own_slopes(Packet& packet, int at) {
+HWY_INLINE void sample_own_slopes(Packet& packet, int at, const std::int32_t (&ahead)[lanes]) {
   alignas(64) float components[4][lanes * 8];
   for (int i = 0; i < 8; i += eight_lanes) {
     for (int lane = 0; lane < lanes; ++lane) {
+      if (i == 0) prefetch_cell(packet.bending[at + lane] + ahead[lane]);
       const float* const cell = cell_of(packet, at + lane) + i;
       const auto fraction = [&](int axis) HWY_ATTR { return hn::Set(eight, packet.fraction[axis][at + lane]); };
       const auto sampled = evaluate(cell_polynomial(cell), fraction(0), fraction(1), fraction(2));
@@ -264,14 +274,6 @@ HWY_INLINE void sample_own_slopes(Packet& packet, int at) {
   }
   transpose(components[0], packet.tensor, at);
   for (int axis = 0; axis < 3; ++axis) transpose(components[1 + axis], packet.slopes[axis], at);
-}
-
-/// Prefetches the memory of a cell.
-HWY_INLINE void prefetch_cell(const float* cell) {
-  for (const int edge : {0, y_stride, x_stride, x_stride + y_stride}) {
-    hwy::Prefetch(cell + edge);
-    hwy::Prefetch(cell + edge + z_stride);
-  }
 }
 
 }  // namespace tensorray::packets::HWY_NAMESPACE

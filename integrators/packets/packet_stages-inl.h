@@ -148,7 +148,7 @@ HWY_NOINLINE void step_by_stages(const PacketMedium& medium, Packet& packet) {
                                    [&](int i) HWY_ATTR { return add(load(packet.p, i), load(stages.ahead, i)); });
     near_border |= packet.near_border;
     near_surface |= packet.near_surface;
-    interpolate<uniform, differentials>(medium, packet);
+    interpolate<uniform, differentials>(packet);
     end_stage<differentials>(medium, packet, stage, stages);
   }
   packet.near_border |= near_border;
@@ -174,7 +174,7 @@ HWY_INLINE Slopes<F> sample_trailing(const Packet& packet, int at) {
 template <bool uniform, bool differentials>
 HWY_NOINLINE void step_by_euler(const PacketMedium& medium, Packet& packet) {
   locate<uniform, differentials>(medium, packet, [&](int i) HWY_ATTR { return load(packet.p, i); });
-  interpolate<uniform, differentials>(medium, packet);
+  interpolate<uniform, differentials>(packet);
   for (int i = 0; i < packet.vectors * lanes; i += lanes) {
     const F time = load(packet.time, i), factor = hn::Mul(time, load(packet.kick, i));
     Tensor T;
