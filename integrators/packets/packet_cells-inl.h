@@ -148,32 +148,6 @@ HWY_INLINE void sample_cell(const float* cell, Packet& packet, int first, int co
   if (count > 0) sample_cell<1>(cell, rises, packet, first);
 }
 
-/// Stores components of a lane's tensor: first the first four components of all lanes, then the last four.
-template <class V>
-HWY_INLINE void store_components(V values, int i, int lane, float* components) {
-  float* const first = components + (i / 4 * lanes + lane) * 4 + i % 4;
-#if HWY_TARGET != HWY_SCALAR
-  if constexpr (eight_lanes == 8) {
-    const hn::Half<Eight> four;
-    hn::Store(hn::LowerHalf(four, values), four, first);
-    return hn::Store(hn::UpperHalf(four, values), four, first + lanes * 4);
-  }
-#endif
-  hn::Store(values, eight, first);
-}
-
-/// Reorders components from lane after lane to component after component.
-HWY_INLINE void transpose(const float* components, PerRay (&tensor)[8], int at) {
-  for (int half = 0; half < 2; ++half) {
-    F a, b, c, d;
-    hn::LoadInterleaved4(floats, components + half * lanes * 4, a, b, c, d);
-    store(a, tensor[4 * half], at);
-    store(b, tensor[4 * half + 1], at);
-    store(c, tensor[4 * half + 2], at);
-    store(d, tensor[4 * half + 3], at);
-  }
-}
-
 /// Prefetches the memory of a cell.
 HWY_INLINE void prefetch_cell(const float* cell) {
   for (const int edge : {0, y_stride, x_stride, x_stride + y_stride}) {
@@ -182,23 +156,72 @@ HWY_INLINE void prefetch_cell(const float* cell) {
   }
 }
 
-/// Samples the tensors of a vector whose lanes are in several cells: a register holds the components of one lane at a
-/// time. Prefetches the cells `ahead` of the lanes.
-HWY_INLINE void sample_own_cells(Packet& packet, int at, const std::int32_t (&ahead)[lanes]) {
-  for (int c = 0; c < 8; c += eight_lanes) {
-#pragma GCC unroll 16
-    for (int lane = 0; lane < lanes; ++lane) {
-      if (c == 0) prefetch_cell(packet.bending[at + lane] + ahead[lane]);
-      const float* const cell = cell_of(packet, at + lane) + c;
-      const auto fraction = [&](int axis) HWY_ATTR { return hn::Set(eight, packet.fraction[axis][at + lane]); };
-      const auto near = [&](int i) HWY_ATTR { return hn::Load(eight, cell + edges[i]); };
-      const auto rise = [&](int i) HWY_ATTR {
-        return hn::Sub(hn::Load(eight, cell + edges[i] + y_stride), hn::Load(eight, cell + edges[i]));
-      };
-      store_components(trilinear(near, rise, fraction(0), fraction(1), fraction(2)), c, lane, packet.components);
+/// Components `c` and following of a lane's tensor.
+HWY_INLINE hn::Vec<Eight> sample_lane(const Packet& packet, int lane, int c) {
+  const float* const cell = cell_of(packet, lane) + c;
+  const auto fraction = [&](int axis) HWY_ATTR { return hn::Set(eight, packet.fraction[axis][lane]); };
+  const auto near = [&](int i) HWY_ATTR { return hn::Load(eight, cell + edges[i]); };
+  const auto rise = [&](int i) HWY_ATTR {
+    return hn::Sub(hn::Load(eight, cell + edges[i] + y_stride), hn::Load(eight, cell + edges[i]));
+  };
+  return trilinear(near, rise, fraction(0), fraction(1), fraction(2));
+}
+
+/// Four rows to four columns in each block of four.
+HWY_INLINE void transpose_blocks(F* rows) {
+#if HWY_TARGET != HWY_SCALAR
+  const hn::Repartition<double, Floats> pairs;
+  const auto lower = [&](F a, F b) HWY_ATTR { return hn::BitCast(pairs, hn::InterleaveLower(floats, a, b)); };
+  const auto upper = [&](F a, F b) HWY_ATTR { return hn::BitCast(pairs, hn::InterleaveUpper(floats, a, b)); };
+  const auto near = lower(rows[0], rows[1]), near_2 = lower(rows[2], rows[3]);
+  const auto far = upper(rows[0], rows[1]), far_2 = upper(rows[2], rows[3]);
+  rows[0] = hn::BitCast(floats, hn::InterleaveLower(pairs, near, near_2));
+  rows[1] = hn::BitCast(floats, hn::InterleaveUpper(pairs, near, near_2));
+  rows[2] = hn::BitCast(floats, hn::InterleaveLower(pairs, far, far_2));
+  rows[3] = hn::BitCast(floats, hn::InterleaveUpper(pairs, far, far_2));
+#endif
+}
+
+/// Rows of the components of lanes to a vector for each component.
+HWY_INLINE void transpose_rows(F (&rows)[eight_lanes]) {
+#if HWY_TARGET != HWY_SCALAR
+  transpose_blocks(rows);
+  if constexpr (eight_lanes == 8) {
+    transpose_blocks(rows + 4);
+    for (int i = 0; i < 4; ++i) {
+      const F first = rows[i], second = rows[4 + i];
+      rows[i] = hn::OddEvenBlocks(hn::SwapAdjacentBlocks(second), first);
+      rows[4 + i] = hn::OddEvenBlocks(second, hn::SwapAdjacentBlocks(first));
     }
   }
-  transpose(packet.components, packet.tensor, at);
+#endif
+}
+
+/// A row: components of a lane, and, if vectors hold more, those of the lane that is eight further.
+template <class Sample>
+HWY_INLINE F row_of(const Sample& sample, int lane) {
+#if HWY_TARGET != HWY_SCALAR
+  if constexpr (lanes > eight_lanes)
+    return hn::Combine(floats, sample(lane + eight_lanes), sample(lane));
+  else
+#endif
+    return sample(lane);
+}
+
+/// Samples the tensors of a vector whose lanes are in several cells: a register holds the components of one lane at a
+/// time. Prefetches the cells `ahead` (offsets, in floats, within the lanes' bricks).
+HWY_INLINE void sample_own_cells(Packet& packet, int at, const std::int32_t (&ahead)[lanes]) {
+  for (int c = 0; c < 8; c += eight_lanes) {
+    F rows[eight_lanes];
+#pragma GCC unroll 8
+    for (int row = 0; row < eight_lanes; ++row)
+      rows[row] = row_of([&](int lane) HWY_ATTR { return sample_lane(packet, at + lane, c); }, row);
+    if (c == 0)
+      for (int lane = 0; lane < lanes; ++lane) prefetch_cell(packet.bending[at + lane] + ahead[lane]);
+    transpose_rows(rows);
+#pragma GCC unroll 8
+    for (int row = 0; row < eight_lanes; ++row) store(rows[row], packet.tensor[c + row], at);
+  }
 }
 
 /// The trilinear polynomial of a cell: coefficients of 1, z, y, yz, x, xz, xy and xyz. Rays with differentials use it,
@@ -236,6 +259,32 @@ HWY_INLINE Slopes<V> evaluate(const Polynomial<V>& p, V x, V y, V z) {
   const V slope = hn::MulAdd(y_far, y, hn::MulAdd(p.k[5], z, p.k[4]));
   return {hn::MulAdd(slope, x, near), slope, hn::MulAdd(y_far, x, y_near),
           hn::MulAdd(hn::MulAdd(p.k[7], y, p.k[5]), x, hn::MulAdd(p.k[3], y, p.k[1]))};
+}
+
+/// Stores components of a lane's tensor: first the first four components of all lanes, then the last four.
+template <class V>
+HWY_INLINE void store_components(V values, int i, int lane, float* components) {
+  float* const first = components + (i / 4 * lanes + lane) * 4 + i % 4;
+#if HWY_TARGET != HWY_SCALAR
+  if constexpr (eight_lanes == 8) {
+    const hn::Half<Eight> four;
+    hn::Store(hn::LowerHalf(four, values), four, first);
+    return hn::Store(hn::UpperHalf(four, values), four, first + lanes * 4);
+  }
+#endif
+  hn::Store(values, eight, first);
+}
+
+/// Reorders components from lane after lane to component after component.
+HWY_INLINE void transpose(const float* components, PerRay (&tensor)[8], int at) {
+  for (int half = 0; half < 2; ++half) {
+    F a, b, c, d;
+    hn::LoadInterleaved4(floats, components + half * lanes * 4, a, b, c, d);
+    store(a, tensor[4 * half], at);
+    store(b, tensor[4 * half + 1], at);
+    store(c, tensor[4 * half + 2], at);
+    store(d, tensor[4 * half + 3], at);
+  }
 }
 
 /// Samples the tensors and their slopes for a vector whose lanes are in one cell.
