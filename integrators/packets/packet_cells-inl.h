@@ -92,18 +92,6 @@ constexpr int corners[8] = {0,
                             x_stride + y_stride,
                             x_stride + y_stride + z_stride};
 
-/// Stores the weights of a cell's corners at a point within it. 13 operations.
-HWY_INLINE void make_weights(const F3& fraction, Packet& packet, int at) {
-  const F yz = hn::Mul(fraction.y, fraction.z);
-  const F y = hn::Sub(fraction.y, yz), z = hn::Sub(fraction.z, yz), neither = hn::Sub(hn::Sub(set(1), fraction.y), z);
-  const F of_face[4] = {neither, z, y, yz};
-  for (int i = 0; i < 4; ++i) {
-    const F far = hn::Mul(fraction.x, of_face[i]);
-    store(hn::Sub(of_face[i], far), packet.weights[i], at);
-    store(far, packet.weights[4 + i], at);
-  }
-}
-
 using Eight = hn::CappedTag<float, 8>;  // For the components of one voxel.
 constexpr Eight eight;
 constexpr int eight_lanes = static_cast<int>(hn::MaxLanes(Eight()));
@@ -112,76 +100,128 @@ HWY_INLINE const float* cell_of(const Packet& packet, int lane) {
   return packet.bending[lane] + static_cast<int>(packet.voxel[lane]) * TensorBrick::bending_floats;
 }
 
-/// Samples the tensors of `count` vectors, one or two, whose lanes are all in one cell. Each component of a corner is
-/// loaded once, copied to all lanes, and multiplied by the weights of all vectors. Operations and their order are those
-/// of sample_own_cells.
+/// The edges of a cell along y: offsets, in floats, of their near ends from the cell's first voxel.
+constexpr int edges[4] = {0, z_stride, x_stride, x_stride + z_stride};
+
+template <class V>
+HWY_INLINE V between(V near, V far, V fraction) {
+  return hn::MulAdd(hn::Sub(far, near), fraction, near);
+}
+
+/// Trilinear interpolation along y, then x, then z. `near(i)` is the value at the near end of edge i, and `rise(i)`
+/// that at its far end minus that. The operations and their order are the same wherever they are done, and so are the
+/// results, bit for bit.
+template <class V, class Near, class Rise>
+HWY_INLINE V trilinear(const Near& near, const Rise& rise, V x, V y, V z) {
+  const auto edge = [&](int i) HWY_ATTR { return hn::MulAdd(rise(i), y, near(i)); };
+  const V first = between(edge(0), edge(2), x);
+  return between(first, between(edge(1), edge(3), x), z);
+}
+
+/// Samples the tensors of `count` vectors, one or two, whose lanes are all in one cell. `rises` are those of the cell's
+/// edges. Each value is loaded once for all vectors, and copied to all lanes.
 template <int count>
-HWY_INLINE void sample_cell(const float* HWY_RESTRICT cell, Packet& packet, int first) {
-  constexpr int together = 8 / count;  // Components at a time: all sums and their factors fit in registers.
-  for (int i = 0; i < 8; i += together) {
-    F sums[together][count], weights[count];
+HWY_INLINE void sample_cell(const float* HWY_RESTRICT cell, const float (&rises)[4][8], Packet& packet, int first) {
+  F3 at[count];
+  for (int n = 0; n < count; ++n) at[n] = load(packet.fraction, first + n * lanes);
 #pragma GCC unroll 8
-    for (int k = 7; k >= 0; --k) {
-      for (int n = 0; n < count; ++n) weights[n] = load(packet.weights[k], first + n * lanes);
-#pragma GCC unroll 8
-      for (int j = 0; j < together; ++j) {
-        const F corner = set(cell[corners[k] + i + j]);
-        for (int n = 0; n < count; ++n)
-          sums[j][n] = k == 7 ? hn::Mul(corner, weights[n]) : hn::MulAdd(corner, weights[n], sums[j][n]);
-      }
-    }
-#pragma GCC unroll 8
-    for (int j = 0; j < together; ++j)
-      for (int n = 0; n < count; ++n) store(sums[j][n], packet.tensor[i + j], first + n * lanes);
+  for (int c = 0; c < 8; ++c) {
+    F values[count];
+#pragma GCC unroll 2
+    for (int n = 0; n < count; ++n)
+      values[n] = trilinear([&](int i) HWY_ATTR { return set(cell[edges[i] + c]); },
+                            [&](int i) HWY_ATTR { return set(rises[i][c]); }, at[n].x, at[n].y, at[n].z);
+#pragma GCC unroll 2
+    for (int n = 0; n < count; ++n) store(values[n], packet.tensor[c], first + n * lanes);
   }
 }
 
 /// The same for any number of vectors.
 HWY_INLINE void sample_cell(const float* cell, Packet& packet, int first, int count) {
-  for (; count > 1; count -= 2, first += 2 * lanes) sample_cell<2>(cell, packet, first);
-  if (count > 0) sample_cell<1>(cell, packet, first);
+  alignas(64) float rises[4][8];
+  for (int i = 0; i < 4; ++i)
+    for (int c = 0; c < 8; c += eight_lanes) {
+      const float* const edge = cell + edges[i] + c;
+      hn::Store(hn::Sub(hn::Load(eight, edge + y_stride), hn::Load(eight, edge)), eight, rises[i] + c);
+    }
+  for (; count > 1; count -= 2, first += 2 * lanes) sample_cell<2>(cell, rises, packet, first);
+  if (count > 0) sample_cell<1>(cell, rises, packet, first);
 }
 
-/// Stores components of a lane's tensor: first the first four components of all lanes, then the last four.
-template <class V>
-HWY_INLINE void store_components(V values, int i, int lane, float* components) {
-  float* const first = components + (i / 4 * lanes + lane) * 4 + i % 4;
+/// Prefetches the memory of a cell.
+HWY_INLINE void prefetch_cell(const float* cell) {
+  for (const int edge : {0, y_stride, x_stride, x_stride + y_stride}) {
+    hwy::Prefetch(cell + edge);
+    hwy::Prefetch(cell + edge + z_stride);
+  }
+}
+
+/// Components `c` and following of a lane's tensor.
+HWY_INLINE hn::Vec<Eight> sample_lane(const Packet& packet, int lane, int c) {
+  const float* const cell = cell_of(packet, lane) + c;
+  const auto fraction = [&](int axis) HWY_ATTR { return hn::Set(eight, packet.fraction[axis][lane]); };
+  const auto near = [&](int i) HWY_ATTR { return hn::Load(eight, cell + edges[i]); };
+  const auto rise = [&](int i) HWY_ATTR {
+    return hn::Sub(hn::Load(eight, cell + edges[i] + y_stride), hn::Load(eight, cell + edges[i]));
+  };
+  return trilinear(near, rise, fraction(0), fraction(1), fraction(2));
+}
+
+/// Four rows to four columns in each block of four.
+HWY_INLINE void transpose_blocks(F* rows) {
 #if HWY_TARGET != HWY_SCALAR
+  const hn::Repartition<double, Floats> pairs;
+  const auto lower = [&](F a, F b) HWY_ATTR { return hn::BitCast(pairs, hn::InterleaveLower(floats, a, b)); };
+  const auto upper = [&](F a, F b) HWY_ATTR { return hn::BitCast(pairs, hn::InterleaveUpper(floats, a, b)); };
+  const auto near = lower(rows[0], rows[1]), near_2 = lower(rows[2], rows[3]);
+  const auto far = upper(rows[0], rows[1]), far_2 = upper(rows[2], rows[3]);
+  rows[0] = hn::BitCast(floats, hn::InterleaveLower(pairs, near, near_2));
+  rows[1] = hn::BitCast(floats, hn::InterleaveUpper(pairs, near, near_2));
+  rows[2] = hn::BitCast(floats, hn::InterleaveLower(pairs, far, far_2));
+  rows[3] = hn::BitCast(floats, hn::InterleaveUpper(pairs, far, far_2));
+#endif
+}
+
+/// Rows of the components of lanes to a vector for each component.
+HWY_INLINE void transpose_rows(F (&rows)[eight_lanes]) {
+#if HWY_TARGET != HWY_SCALAR
+  transpose_blocks(rows);
   if constexpr (eight_lanes == 8) {
-    const hn::Half<Eight> four;
-    hn::Store(hn::LowerHalf(four, values), four, first);
-    return hn::Store(hn::UpperHalf(four, values), four, first + lanes * 4);
+    transpose_blocks(rows + 4);
+    for (int i = 0; i < 4; ++i) {
+      const F first = rows[i], second = rows[4 + i];
+      rows[i] = hn::OddEvenBlocks(hn::SwapAdjacentBlocks(second), first);
+      rows[4 + i] = hn::OddEvenBlocks(second, hn::SwapAdjacentBlocks(first));
+    }
   }
 #endif
-  hn::Store(values, eight, first);
 }
 
-/// Reorders components from lane after lane to component after component.
-HWY_INLINE void transpose(const float* components, PerRay (&tensor)[8], int at) {
-  for (int half = 0; half < 2; ++half) {
-    F a, b, c, d;
-    hn::LoadInterleaved4(floats, components + half * lanes * 4, a, b, c, d);
-    store(a, tensor[4 * half], at);
-    store(b, tensor[4 * half + 1], at);
-    store(c, tensor[4 * half + 2], at);
-    store(d, tensor[4 * half + 3], at);
-  }
+/// A row: components of a lane, and, if vectors hold more, those of the lane that is eight further.
+template <class Sample>
+HWY_INLINE F row_of(const Sample& sample, int lane) {
+#if HWY_TARGET != HWY_SCALAR
+  if constexpr (lanes > eight_lanes)
+    return hn::Combine(floats, sample(lane + eight_lanes), sample(lane));
+  else
+#endif
+    return sample(lane);
 }
 
 /// Samples the tensors of a vector whose lanes are in several cells: a register holds the components of one lane at a
-/// time.
-HWY_INLINE void sample_own_cells(Packet& packet, int at) {
-  for (int i = 0; i < 8; i += eight_lanes) {
-    for (int lane = 0; lane < lanes; ++lane) {
-      const float* const cell = cell_of(packet, at + lane) + i;
-      const auto weight = [&](int k) HWY_ATTR { return hn::Set(eight, packet.weights[k][at + lane]); };
-      auto sum = hn::Mul(hn::Load(eight, cell + corners[7]), weight(7));
+/// time. Prefetches the cells `ahead` (offsets, in floats, within the lanes' bricks).
+HWY_INLINE void sample_own_cells(Packet& packet, int at, const std::int32_t (&ahead)[lanes]) {
+  for (int c = 0; c < 8; c += eight_lanes) {
+    F rows[eight_lanes];
 #pragma GCC unroll 8
-      for (int k = 6; k >= 0; --k) sum = hn::MulAdd(hn::Load(eight, cell + corners[k]), weight(k), sum);
-      store_components(sum, i, lane, packet.components);
-    }
+    for (int row = 0; row < eight_lanes; ++row)
+      rows[row] = row_of([&](int lane) HWY_ATTR { return sample_lane(packet, at + lane, c); }, row);
+    if (c == 0)
+      for (int lane = 0; lane < lanes; ++lane) prefetch_cell(packet.bending[at + lane] + ahead[lane]);
+    transpose_rows(rows);
+#pragma GCC unroll 8
+    for (int row = 0; row < eight_lanes; ++row) store(rows[row], packet.tensor[c + row], at);
   }
-  transpose(packet.components, packet.tensor, at);
 }
 
 /// The trilinear polynomial of a cell: coefficients of 1, z, y, yz, x, xz, xy and xyz. Rays with differentials use it,
@@ -221,6 +261,32 @@ HWY_INLINE Slopes<V> evaluate(const Polynomial<V>& p, V x, V y, V z) {
           hn::MulAdd(hn::MulAdd(p.k[7], y, p.k[5]), x, hn::MulAdd(p.k[3], y, p.k[1]))};
 }
 
+/// Stores components of a lane's tensor: first the first four components of all lanes, then the last four.
+template <class V>
+HWY_INLINE void store_components(V values, int i, int lane, float* components) {
+  float* const first = components + (i / 4 * lanes + lane) * 4 + i % 4;
+#if HWY_TARGET != HWY_SCALAR
+  if constexpr (eight_lanes == 8) {
+    const hn::Half<Eight> four;
+    hn::Store(hn::LowerHalf(four, values), four, first);
+    return hn::Store(hn::UpperHalf(four, values), four, first + lanes * 4);
+  }
+#endif
+  hn::Store(values, eight, first);
+}
+
+/// Reorders components from lane after lane to component after component.
+HWY_INLINE void transpose(const float* components, PerRay (&tensor)[8], int at) {
+  for (int half = 0; half < 2; ++half) {
+    F a, b, c, d;
+    hn::LoadInterleaved4(floats, components + half * lanes * 4, a, b, c, d);
+    store(a, tensor[4 * half], at);
+    store(b, tensor[4 * half + 1], at);
+    store(c, tensor[4 * half + 2], at);
+    store(d, tensor[4 * half + 3], at);
+  }
+}
+
 /// Samples the tensors and their slopes for a vector whose lanes are in one cell.
 HWY_INLINE void sample_slopes(const float* cell, Packet& packet, int at) {
   alignas(64) float coefficients[8][8];
@@ -241,10 +307,11 @@ HWY_INLINE void sample_slopes(const float* cell, Packet& packet, int at) {
 }
 
 /// The same for a vector whose lanes are in several cells.
-HWY_INLINE void sample_own_slopes(Packet& packet, int at) {
+HWY_INLINE void sample_own_slopes(Packet& packet, int at, const std::int32_t (&ahead)[lanes]) {
   alignas(64) float components[4][lanes * 8];
   for (int i = 0; i < 8; i += eight_lanes) {
     for (int lane = 0; lane < lanes; ++lane) {
+      if (i == 0) prefetch_cell(packet.bending[at + lane] + ahead[lane]);
       const float* const cell = cell_of(packet, at + lane) + i;
       const auto fraction = [&](int axis) HWY_ATTR { return hn::Set(eight, packet.fraction[axis][at + lane]); };
       const auto sampled = evaluate(cell_polynomial(cell), fraction(0), fraction(1), fraction(2));
@@ -256,14 +323,6 @@ HWY_INLINE void sample_own_slopes(Packet& packet, int at) {
   }
   transpose(components[0], packet.tensor, at);
   for (int axis = 0; axis < 3; ++axis) transpose(components[1 + axis], packet.slopes[axis], at);
-}
-
-/// Prefetches the memory of a cell.
-HWY_INLINE void prefetch_cell(const float* cell) {
-  for (const int edge : {0, y_stride, x_stride, x_stride + y_stride}) {
-    hwy::Prefetch(cell + edge);
-    hwy::Prefetch(cell + edge + z_stride);
-  }
 }
 
 }  // namespace tensorray::packets::HWY_NAMESPACE

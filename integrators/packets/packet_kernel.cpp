@@ -214,7 +214,7 @@ template <bool uniform, bool differentials>
 HWY_NOINLINE void Kernel<uniform, differentials>::locate_on_extent(Packet& packet) {
   packet.clamps = true;
   locate_middles<uniform, differentials>(medium_, packet);
-  interpolate<uniform, differentials>(medium_, packet);
+  interpolate<uniform, differentials>(packet);
   packet.clamps = medium_.clamps;
 }
 
@@ -305,7 +305,7 @@ HWY_NOINLINE void Kernel<uniform, differentials>::step_watched(Packet& packet) {
 template <bool uniform, bool differentials>
 HWY_INLINE void Kernel<uniform, differentials>::step_split(Packet& packet) {
   locate_middles<uniform, differentials>(medium_, packet);
-  interpolate<uniform, differentials>(medium_, packet);
+  interpolate<uniform, differentials>(packet);
   samples_ += hwy::PopCount(packet.alive);
   if (differentials || HWY_UNLIKELY(packet.watched || packet.steps >= packet.most_steps)) return step_watched(packet);
   take_step<uniform, differentials>(medium_, packet, packet.p, packet.v, packet.u);
@@ -321,7 +321,7 @@ void Kernel<uniform, differentials>::attempt(Packet& packet) {
   if (medium_.stages) return step_by_stages<uniform, differentials>(medium_, packet);
   if (medium_.settings.method == BendingMethod::euler) return step_by_euler<uniform, differentials>(medium_, packet);
   locate_middles<uniform, differentials>(medium_, packet);
-  interpolate<uniform, differentials>(medium_, packet);
+  interpolate<uniform, differentials>(packet);
   take_step<uniform, differentials>(medium_, packet, packet.p_next, packet.v_next, packet.u_next);
 }
 

@@ -71,9 +71,7 @@ struct alignas(64) Packet {
   PerRay time;                        // Length of the step: voxels if voxels are uniform, else world units.
   PerRay middle[3];                   // Positions of the samples.
   PerRay voxel;                       // Number, in the brick, of the first voxel of the sample's cell.
-  PerRay weights[8];                  // Weights of the cell's corners.
-  PerRay fraction[3];                 // Rays with differentials, instead of weights: position within the cell.
-  float components[packet_rays * 8];  // Tensors of lanes in several cells, lane after lane.
+  PerRay fraction[3];                 // Position within the cell.
   PerRay tensor[8];                   // Tensors of all lanes, component after component.
   PerRay p_next[3], v_next[3], u_next[3];
   // Adaptive methods: the next step, voxels, and the error of this one divided by the tolerance.

@@ -148,7 +148,7 @@ HWY_NOINLINE void step_by_stages(const PacketMedium& medium, Packet& packet) {
                                    [&](int i) HWY_ATTR { return add(load(packet.p, i), load(stages.ahead, i)); });
     near_border |= packet.near_border;
     near_surface |= packet.near_surface;
-    interpolate<uniform, differentials>(medium, packet);
+    interpolate<uniform, differentials>(packet);
     end_stage<differentials>(medium, packet, stage, stages);
   }
   packet.near_border |= near_border;
@@ -157,7 +157,6 @@ HWY_NOINLINE void step_by_stages(const PacketMedium& medium, Packet& packet) {
 }
 
 /// T₂₂ and its slopes at the points where the lanes' tensors were sampled.
-template <bool differentials>
 HWY_INLINE Slopes<F> sample_trailing(const Packet& packet, int at) {
   alignas(64) float values[8][lanes];
   const auto corner = [&](int lane, int k) HWY_ATTR {
@@ -167,26 +166,20 @@ HWY_INLINE Slopes<F> sample_trailing(const Packet& packet, int at) {
   for (int lane = 0; lane < (packet.one_cell ? 0 : lanes); ++lane)
     for (int k = 0; k < 8; ++k) values[k][lane] = corner(lane, k);
   const auto value = [&](int k) HWY_ATTR { return packet.one_cell ? set(corner(0, k)) : hn::Load(floats, values[k]); };
-  if constexpr (differentials) {
-    const F3 fraction = load(packet.fraction, at);
-    return evaluate(polynomial<F>(value), fraction.x, fraction.y, fraction.z);
-  }
-  Slopes<F> result{};
-  result.value = hn::Mul(value(7), load(packet.weights[7], at));
-  for (int k = 6; k >= 0; --k) result.value = hn::MulAdd(value(k), load(packet.weights[k], at), result.value);
-  return result;
+  const F3 fraction = load(packet.fraction, at);
+  return evaluate(polynomial<F>(value), fraction.x, fraction.y, fraction.z);
 }
 
 /// A step of Euler's method (Eq. 3–4), which the trace of T affects.
 template <bool uniform, bool differentials>
 HWY_NOINLINE void step_by_euler(const PacketMedium& medium, Packet& packet) {
   locate<uniform, differentials>(medium, packet, [&](int i) HWY_ATTR { return load(packet.p, i); });
-  interpolate<uniform, differentials>(medium, packet);
+  interpolate<uniform, differentials>(packet);
   for (int i = 0; i < packet.vectors * lanes; i += lanes) {
     const F time = load(packet.time, i), factor = hn::Mul(time, load(packet.kick, i));
     Tensor T;
     for (int c = 0; c < 8; ++c) T.c[c] = load(packet.tensor[c], i);
-    const Slopes<F> trailing = sample_trailing<differentials>(packet, i);
+    const Slopes<F> trailing = sample_trailing(packet, i);
     const F3 v = load(packet.v, i);
     F3 dv[2];
     if constexpr (differentials)

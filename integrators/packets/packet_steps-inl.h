@@ -131,10 +131,7 @@ HWY_INLINE bool find_cells(Packet& packet, bool forced, const Point& point_of) {
                        hn::Max(hn::BitCast(bits, near.y), hn::BitCast(bits, near.z)));
     if (careful && forced) near = clamp(near, zeros(), {last, last, last});
     const F3 fraction = sub(point, near);
-    if constexpr (differentials)
-      store(fraction, packet.fraction, i);
-    else
-      make_weights(fraction, packet, i);
+    store(fraction, packet.fraction, i);
     const F voxel = hn::MulAdd(hn::MulAdd(near.x, width, near.y), width, near.z);
     store(voxel, packet.voxel, i);
     if (i == 0) first = set(hn::GetLane(voxel));
@@ -167,54 +164,15 @@ HWY_INLINE void locate_middles(const PacketMedium& medium, Packet& packet) {
   });
 }
 
-/// Prefetches the cell where a lane will be after two long steps, if it is in the lane's brick.
+/// Offsets, in floats within the lanes' bricks, of the cells where the lanes of a vector will be after two long steps;
+/// beyond a brick, of the last cell on the way.
 template <bool uniform>
-HWY_INLINE void prefetch_one(const Packet& packet, int lane) {
-  int voxel = 0;
-  for (int axis = 0; axis < 3; ++axis) {
-    const float ahead = packet.middle[axis][lane] + direction<uniform>(packet)[axis][lane];
-    const int cell = static_cast<int>(std::min(std::max(ahead, 0.0f), TensorBrick::cells - 0.5f));
-    voxel = voxel * TensorBrick::width + cell;
-  }
-  prefetch_cell(packet.bending[lane] + voxel * TensorBrick::bending_floats);
-}
-
-/// Prefetches the cells where the lanes of a vector will be after two long steps.
-template <bool uniform>
-HWY_INLINE void prefetch_all(const PacketMedium& medium, const Packet& packet, int first) {
-  // Lanes are mostly wavelengths in order: if the outermost ones are close, the others are too.
-  float between = packet.one_brick ? 0 : 2;
-  for (const PerRay& middle : packet.middle)
-    between = std::max(between, std::fabs(middle[first] - middle[first + lanes - 1]));
-  if (between < 1) {
-    prefetch_one<uniform>(packet, first);
-    return prefetch_one<uniform>(packet, first + lanes - 1);
-  }
-  const F3 ahead = add(load(packet.middle, first), load(direction<uniform>(packet), first));
-  const F zero = hn::Zero(floats), cells = set(TensorBrick::cells), part = set(1.0f / TensorBrick::cells);
-  const auto bricks = [&](F x) HWY_ATTR { return hn::Floor(hn::Mul(x, part)); };
-  const F3 offset{bricks(ahead.x), bricks(ahead.y), bricks(ahead.z)};
-  const auto cell = [&](F x, F of) HWY_ATTR { return hn::Floor(hn::NegMulAdd(of, cells, x)); };
-  const F width = set(TensorBrick::width);
-  const F voxel =
-      hn::MulAdd(hn::MulAdd(cell(ahead.x, offset.x), width, cell(ahead.y, offset.y)), width, cell(ahead.z, offset.z));
-  alignas(64) std::int32_t voxels[lanes], offsets[3][lanes];
-  hn::Store(hn::ConvertTo(ints, voxel), ints, voxels);
-  hn::Store(hn::ConvertTo(ints, offset.x), ints, offsets[0]);
-  hn::Store(hn::ConvertTo(ints, offset.y), ints, offsets[1]);
-  hn::Store(hn::ConvertTo(ints, offset.z), ints, offsets[2]);
-  const std::uint32_t moves =
-      to_bits(hn::Or(hn::Ne(offset.x, zero), hn::Or(hn::Ne(offset.y, zero), hn::Ne(offset.z, zero))), 0);
-  for (int lane = 0; lane < lanes; ++lane) {
-    const float* brick = packet.bending[first + lane];
-    if (moves >> lane & 1) {
-      const std::int32_t at[3] = {packet.brick[0][first + lane] + offsets[0][lane],
-                                  packet.brick[1][first + lane] + offsets[1][lane],
-                                  packet.brick[2][first + lane] + offsets[2][lane]};
-      brick = medium.brick(at).bending;
-    }
-    prefetch_cell(brick + voxels[lane] * TensorBrick::bending_floats);
-  }
+HWY_INLINE void find_cells_ahead(const Packet& packet, int at, std::int32_t (&ahead)[lanes]) {
+  const F3 there = add(load(packet.middle, at), load(direction<uniform>(packet), at));
+  const F last = set(TensorBrick::cells - 1), width = set(TensorBrick::width);
+  const F3 cell = clamp(floor(there), zeros(), {last, last, last});
+  const F voxel = hn::MulAdd(hn::MulAdd(cell.x, width, cell.y), width, cell.z);
+  hn::Store(hn::ConvertTo(ints, hn::Mul(voxel, set(TensorBrick::bending_floats))), ints, ahead);
 }
 
 /// Whether all lanes of a vector are in one cell.
@@ -228,24 +186,26 @@ HWY_INLINE bool in_one_cell(const Packet& packet, int first) {
 
 /// The second part of a step: samples the tensors there.
 template <bool uniform, bool differentials>
-HWY_INLINE void interpolate(const PacketMedium& medium, Packet& packet) {
+HWY_INLINE void interpolate(Packet& packet) {
+  alignas(64) std::int32_t ahead[lanes];
   if (!differentials && HWY_LIKELY(packet.one_cell)) {
-    prefetch_one<uniform>(packet, 0);
+    find_cells_ahead<uniform>(packet, 0, ahead);
+    prefetch_cell(packet.bending[0] + ahead[0]);
     return sample_cell(cell_of(packet, 0), packet, 0, packet.vectors);
   }
   for (int i = 0; i < packet.vectors * lanes; i += lanes) {
     const bool together = in_one_cell(packet, i);
-    if (!together) prefetch_all<uniform>(medium, packet, i);
+    if (!together) find_cells_ahead<uniform>(packet, i, ahead);
     if constexpr (differentials) {
       if (together)
         sample_slopes(cell_of(packet, i), packet, i);
       else
-        sample_own_slopes(packet, i);
+        sample_own_slopes(packet, i, ahead);
     } else {
       if (together)
-        sample_cell<1>(cell_of(packet, i), packet, i);
+        sample_cell(cell_of(packet, i), packet, i, 1);
       else
-        sample_own_cells(packet, i);
+        sample_own_cells(packet, i, ahead);
     }
   }
 }
