@@ -68,15 +68,6 @@ Distribution1D triangles_by_area(const TriangleMesh& mesh) {
   return result;
 }
 
-/// Whether a direction towards the sky is in the light's disk. It compares chords, which are accurate at small angles.
-bool in_disk(const DirectionalLight& light, const Vector3d& direction) {
-  return (direction + light.direction).norm() <= 2 * std::sin(light.angle / 2);
-}
-
-/// The radiance, for each unit of irradiance, of a uniform disk that gives this irradiance to a surface that faces it:
-/// ∫ cos θ dω = π sin² angle.
-double radiance_per_irradiance(const DirectionalLight& light) { return 1 / (pi * std::pow(std::sin(light.angle), 2)); }
-
 bool is_background(const Light& light) {
   if (const auto* directional = std::get_if<DirectionalLight>(&light)) return directional->angle > 0;
   return !std::holds_alternative<AreaLight>(light) && !std::holds_alternative<PointLight>(light);
@@ -107,10 +98,19 @@ LightSampler::LightSampler(std::vector<Light> lights, const std::vector<float>& 
     }
     powers.push_back(prepared_.back().power);
   }
-  if (!powers.empty()) choice_.emplace(powers);
+  if (std::any_of(powers.begin(), powers.end(), [](double power) { return power > 0; })) choice_.emplace(powers);
+}
+
+LightSampler::Disk LightSampler::make_disk(double angle) {
+  Disk disk;
+  disk.chord2 = std::pow(2 * std::sin(angle / 2), 2);
+  disk.pdf = 1 / cone_solid_angle(angle);
+  disk.radiance = 1 / (pi * std::pow(std::sin(angle), 2));  // ∫ cos θ dω = π sin² angle.
+  return disk;
 }
 
 /// The power of a light that is infinitely far away is the power that passes through the bounding sphere of the scene.
+/// Constant light has none here, so that it is not chosen.
 LightSampler::Prepared LightSampler::prepare(Light& light, const std::vector<float>& importance,
                                              double scene_radius) const {
   const double ball = pi * scene_radius * scene_radius;
@@ -126,13 +126,13 @@ LightSampler::Prepared LightSampler::prepare(Light& light, const std::vector<flo
     require(directional->angle >= 0 && directional->angle <= pi / 2, "angle must be 0 to pi / 2");
     directional->direction.stableNormalize();
     result.power = ball * dot(directional->irradiance, importance);
+    if (directional->angle > 0) result.disk = make_disk(directional->angle);
   } else if (auto* point = std::get_if<PointLight>(&light)) {
     require_bands(point->intensity, bands_, "intensity");
     require(point->position.allFinite(), "position must be finite");
     result.power = 4 * pi * dot(point->intensity, importance);
   } else if (auto* constant = std::get_if<ConstantLight>(&light)) {
     require_bands(constant->radiance, bands_, "radiance");
-    result.power = ball * 4 * pi * dot(constant->radiance, importance);
   } else {
     result.environment.emplace(std::move(std::get<EnvironmentLight>(light)), importance);
     result.power = ball * result.environment->importance();
@@ -140,7 +140,7 @@ LightSampler::Prepared LightSampler::prepare(Light& light, const std::vector<flo
   return result;
 }
 
-double LightSampler::choice_probability(int light) const { return choice_->probability(light); }
+double LightSampler::choice_probability(int light) const { return choice_ ? choice_->probability(light) : 0; }
 
 bool LightSampler::sample(const Vector3d& point, double choice, const Vector2d& u, LightSample& sample) const {
   if (!choice_) return false;
@@ -159,12 +159,9 @@ bool LightSampler::sample(const Vector3d& point, double choice, const Vector2d& 
     sample.pdf = chosen.probability;
     return true;
   }
-  if (directional) {
-    sample.direction = frame_about(-directional->direction) * square_to_cone(u, directional->angle);
-  } else {
-    const auto& environment = prepared_[chosen.cell].environment;
-    sample.direction = environment ? environment->sample(u) : square_to_sphere(u);
-  }
+  sample.direction = directional
+                         ? Vector3d(frame_about(-directional->direction) * square_to_cone(u, directional->angle))
+                         : prepared_[chosen.cell].environment->sample(u);
   sample.pdf = background_pdf(sample.direction);
   background(sample.direction, sample.radiance);
   return sample.pdf > 0;
@@ -205,7 +202,7 @@ double LightSampler::area_pdf(int light, const Vector3d& point, const Vector3d& 
   const double distance = way.norm(), cosine = normal.dot(way) / distance;
   if (!(cosine > 0)) return 0;  // This side does not emit.
   const double area = prepared_[light].triangles->sum();
-  return choice_->probability(light) * distance * distance / (cosine * area);
+  return choice_probability(light) * distance * distance / (cosine * area);
 }
 
 const std::vector<float>* LightSampler::emitted(int light, const Vector3d& normal, const Vector3d& direction) const {
@@ -217,8 +214,9 @@ void LightSampler::background(const Vector3d& direction, std::vector<float>& rad
   radiance.assign(bands_, 0);
   for (std::size_t i = 0; i < lights_.size(); ++i) {
     if (!is_background(lights_[i]) || (only >= 0 && static_cast<std::size_t>(only) != i)) continue;
-    if (const auto* disk = std::get_if<DirectionalLight>(&lights_[i])) {
-      if (disks && in_disk(*disk, direction)) add(radiance_per_irradiance(*disk), disk->irradiance, radiance);
+    if (const auto* sun = std::get_if<DirectionalLight>(&lights_[i])) {
+      const Disk& disk = *prepared_[i].disk;
+      if (disks && disk.contains(*sun, direction)) add(disk.radiance, sun->irradiance, radiance);
     } else if (const auto* constant = std::get_if<ConstantLight>(&lights_[i])) {
       add(1, constant->radiance, radiance);
     } else {
@@ -230,7 +228,8 @@ void LightSampler::background(const Vector3d& direction, std::vector<float>& rad
 double LightSampler::background_pdf(const Vector3d& direction) const {
   double sum = 0;
   for (int i = 0; i < static_cast<int>(lights_.size()); ++i)
-    if (is_background(lights_[i])) sum += choice_->probability(i) * directional_pdf(i, direction);
+    if (const double chosen = choice_probability(i); chosen > 0 && is_background(lights_[i]))
+      sum += chosen * directional_pdf(i, direction);
   return sum;
 }
 
@@ -254,10 +253,11 @@ bool LightSampler::is_concentrated() const {
 
 /// The density with which a background light, once chosen, chooses a direction.
 double LightSampler::directional_pdf(int light, const Vector3d& direction) const {
-  if (const auto* disk = std::get_if<DirectionalLight>(&lights_[light]))
-    return in_disk(*disk, direction) ? 1 / cone_solid_angle(disk->angle) : 0;
-  const auto& environment = prepared_[light].environment;
-  return environment ? environment->pdf(direction) : 1 / (4 * pi);
+  if (const auto* sun = std::get_if<DirectionalLight>(&lights_[light])) {
+    const Disk& disk = *prepared_[light].disk;
+    return disk.contains(*sun, direction) ? disk.pdf : 0;
+  }
+  return prepared_[light].environment->pdf(direction);
 }
 
 }  // namespace tensorray

@@ -57,6 +57,9 @@ struct LightSample {
 
 /// Chooses lights by their power, and then directions by the light. Immutable: any thread may use it.
 ///
+/// Constant light is never chosen: rays in the directions in which a material scatters find it with the least noise,
+/// and all choices are left for the other lights.
+///
 /// Parallel light and points are deltas. All other lights that are infinitely far away form the background. The caller
 /// sees it as one light: its radiance is the sum over these lights, and its density is that of choosing a direction by
 /// any of them. A caller that also has its own way to choose directions (multiple importance sampling) weighs `sample`
@@ -73,9 +76,9 @@ class LightSampler {
   LightSampler(std::vector<Light> lights, const std::vector<float>& luminance, const Eigen::AlignedBox3d& scene);
 
   /// Samples light that reaches `point` if nothing is in between. The expectation of radiance · f(direction) / pdf is
-  /// the integral of f over all light.
+  /// the integral of f over all light, but for constant light where no other light is chosen.
   /// @param choice, u  Uniform in [0, 1).
-  /// @return false if there is no light in the chosen direction: count it as 0.
+  /// @return false if there is no light in the chosen direction, or none to choose: count it as 0.
   bool sample(const Eigen::Vector3d& point, double choice, const Eigen::Vector2d& u, LightSample& sample) const;
 
   /// The density, per steradian, with which `sample` finds `position` on an area light from `point`.
@@ -109,8 +112,21 @@ class LightSampler {
   double choice_probability(int light) const;
 
  private:
+  /// The disk of a directional light.
+  struct Disk {
+    double chord2 = 0;    ///< Squared chord from its centre to its rim: chords are accurate at small angles.
+    double pdf = 0;       ///< Per steradian, within the disk.
+    double radiance = 0;  ///< For each unit of irradiance that it gives to a surface that faces it.
+
+    bool contains(const DirectionalLight& light, const Eigen::Vector3d& towards) const {
+      return (towards + light.direction).squaredNorm() <= chord2;
+    }
+  };
+  static Disk make_disk(double angle);
+
   /// What `sample` needs for each light, in addition to the light.
   struct Prepared {
+    std::optional<Disk> disk;
     std::optional<Distribution1D> triangles;  ///< Distribution over triangles, by area.
     std::optional<EnvironmentMap> environment;
     double power = 0;
@@ -126,7 +142,7 @@ class LightSampler {
   std::size_t bands_ = 0;
   std::vector<Light> lights_;
   std::vector<Prepared> prepared_;
-  std::optional<Distribution1D> choice_;  ///< Empty if there are no lights.
+  std::optional<Distribution1D> choice_;  ///< Empty if there are no lights to choose.
 };
 
 }  // namespace tensorray

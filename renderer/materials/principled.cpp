@@ -102,6 +102,10 @@ void evaluate(const PrincipledScattering& layers, const BandsIn& reflectance, co
   double uncolored = (1 - layers.metallic) * fresnel_dielectric(cosine, layers.index) * base;
   if (layers.clearcoat > 0)
     uncolored += layers.clearcoat * fresnel_dielectric(cosine, coat_index) * ggx_reflection(layers.coat_alpha, wi, wo);
+  if (layers.metallic == 0) {
+    f = uncolored + diffuse * reflectance;
+    return;
+  }
   for (Eigen::Index band = 0; band < f.size(); ++band)
     f[band] = uncolored + diffuse * reflectance[band] +
               layers.metallic * base * fresnel_schlick(cosine, reflectance[band]) +

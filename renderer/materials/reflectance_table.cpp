@@ -1,6 +1,7 @@
 #include "renderer/materials/reflectance_table.h"
 
 #include <algorithm>
+#include <array>
 
 namespace tensorray {
 namespace {
@@ -29,12 +30,17 @@ void ReflectanceTable::reflectance(const Eigen::Vector3f& color, BandsOut reflec
   const Eigen::Array3f place = color.array().max(0).min(1) * cells;
   const Eigen::Array3i node = place.cast<int>().min(cells - 1);
   const Eigen::Array3f above = place - node.cast<float>(), below = 1 - above;
-  reflectance.setZero();
+  std::array<const float*, 8> spectra;
+  std::array<float, 8> weights;
   for (int corner = 0; corner < 8; ++corner) {
     const int x = corner & 1, y = corner >> 1 & 1, z = corner >> 2;
-    const float weight = (x ? above : below)[0] * (y ? above : below)[1] * (z ? above : below)[2];
-    const int index = node[0] + x + stride * (node[1] + y + stride * (node[2] + z));
-    if (weight > 0) reflectance += (weight * nodes_.col(index)).cast<double>();
+    weights[corner] = (x ? above : below)[0] * (y ? above : below)[1] * (z ? above : below)[2];
+    spectra[corner] = nodes_.col(node[0] + x + stride * (node[1] + y + stride * (node[2] + z))).data();
+  }
+  for (Eigen::Index band = 0; band < reflectance.size(); ++band) {
+    float sum = 0;
+    for (int corner = 0; corner < 8; ++corner) sum += weights[corner] * spectra[corner][band];
+    reflectance[band] = sum;
   }
 }
 

@@ -1,6 +1,5 @@
 #include "renderer/sampling/random.h"
 
-#include <array>
 #include <stdexcept>
 #include <string>
 
@@ -8,25 +7,6 @@ namespace tensorray {
 namespace {
 
 constexpr int sobol_dimensions = 3;
-constexpr int sobol_bits = 32;
-
-using DirectionNumbers = std::array<std::array<std::uint32_t, sobol_bits>, sobol_dimensions>;
-
-/// The direction numbers of Joe and Kuo 2008, highest bit first. Dimension 0 is the van der Corput sequence. Dimensions
-/// 1 and 2 follow the recurrences of the primitive polynomials x + 1 (first number 1) and x² + x + 1 (first numbers 1,
-/// 3).
-constexpr DirectionNumbers make_direction_numbers() {
-  DirectionNumbers v{};
-  for (int i = 0; i < sobol_bits; ++i) v[0][i] = 0x80000000u >> i;
-  v[1][0] = 0x80000000u;
-  for (int i = 1; i < sobol_bits; ++i) v[1][i] = v[1][i - 1] ^ (v[1][i - 1] >> 1);
-  v[2][0] = 0x80000000u;
-  v[2][1] = 3u << 30;
-  for (int i = 2; i < sobol_bits; ++i) v[2][i] = v[2][i - 1] ^ v[2][i - 2] ^ (v[2][i - 2] >> 2);
-  return v;
-}
-
-constexpr DirectionNumbers direction_numbers = make_direction_numbers();
 
 /// The finalizer of SplitMix64 (Steele, Lea and Flood 2014; constants of Stafford's variant 13): a bijection in which
 /// every bit of the argument changes every bit of the result with probability about ½.
@@ -50,16 +30,64 @@ constexpr std::uint32_t reverse_bits(std::uint32_t x) {
   return ((x & 0x55555555u) << 1) | ((x & 0xaaaaaaaau) >> 1);
 }
 
-/// Owen's nested uniform scrambling: each bit is flipped or not, at random, depending on the bits above it. On reversed
-/// bits this is a hash in which bits only affect higher bits (Laine and Karras 2011, with Vegdahl's constants of 2021).
-constexpr std::uint32_t owen_scramble(std::uint32_t x, std::uint32_t seed) {
-  x = reverse_bits(x);
+/// Owen's nested uniform scrambling of a number whose bits are reversed: each bit is flipped or not, at random,
+/// depending on the bits below it, which are above it in the number. A hash in which bits only affect higher bits does
+/// that (Laine and Karras 2011, with Vegdahl's constants of 2021).
+constexpr std::uint32_t scramble_reversed(std::uint32_t x, std::uint32_t seed) {
   x ^= x * 0x3d20adeau;
   x += seed;
   x *= (seed >> 16) | 1u;
   x ^= x * 0x05526c56u;
   x ^= x * 0x53a22864u;
-  return reverse_bits(x);
+  return x;
+}
+
+/// The seeds of a sequence: of its shuffle, and of each of its dimensions.
+class SequenceKeys {
+ public:
+  explicit constexpr SequenceKeys(std::uint64_t seed) : mixed_(mix(mix(seed))) {}
+
+  constexpr std::uint32_t shuffle() const { return of_dimension(sobol_dimensions); }
+  constexpr std::uint32_t of_dimension(std::uint32_t dimension) const {
+    return static_cast<std::uint32_t>(mix(mixed_ + dimension) >> 32);  // That of hash(seed, 0, dimension).
+  }
+
+ private:
+  std::uint64_t mixed_;
+};
+
+/// A coordinate of a Sobol point, with the direction numbers of Joe and Kuo 2008, from its index with reversed bits.
+/// Dimension 0 is the van der Corput sequence.
+constexpr std::uint32_t sobol_0(std::uint32_t reversed) { return reversed; }
+
+/// Dimension 1 has the primitive polynomial x + 1, first number 1: bit j of the coordinate, counted from above, is the
+/// sum of those bits i of the index for which the binomial coefficient of i and j is odd. By Lucas, these are the i
+/// that have all the ones of j: a sum over supersets, one digit of the bits' numbers after the other.
+constexpr std::uint32_t sobol_1(std::uint32_t reversed) {
+  std::uint32_t x = reversed;
+  x ^= (x << 1) & 0xaaaaaaaau;
+  x ^= (x << 2) & 0xccccccccu;
+  x ^= (x << 4) & 0xf0f0f0f0u;
+  x ^= (x << 8) & 0xff00ff00u;
+  x ^= (x << 16) & 0xffff0000u;
+  return x;
+}
+
+/// Dimension 2 has the primitive polynomial x² + x + 1, first numbers 1 and 3: its direction numbers follow a
+/// recurrence.
+constexpr std::uint32_t sobol_2(std::uint32_t reversed) {
+  std::uint32_t x = 0, number = 0x80000000u, next = 3u << 30;
+  for (; reversed != 0; reversed <<= 1) {
+    x ^= number & (0u - (reversed >> 31));
+    const std::uint32_t after = next ^ number ^ (number >> 2);
+    number = next;
+    next = after;
+  }
+  return x;
+}
+
+double scrambled(std::uint32_t x, std::uint32_t key) {
+  return reverse_bits(scramble_reversed(reverse_bits(x), key)) * 0x1p-32;
 }
 
 }  // namespace
@@ -71,11 +99,16 @@ double random_uniform(std::uint64_t seed, std::uint64_t index, std::uint32_t dim
 double sobol(std::uint64_t seed, std::uint32_t index, std::uint32_t dimension) {
   if (dimension >= sobol_dimensions)
     throw std::invalid_argument("the Sobol sequence has dimensions 0 to 2 here, not " + std::to_string(dimension));
-  const auto key = [seed](std::uint32_t use) { return static_cast<std::uint32_t>(hash(seed, 0, use) >> 32); };
-  const std::uint32_t shuffled = owen_scramble(index, key(sobol_dimensions));
-  std::uint32_t x = 0;
-  for (int bit = 0; bit < sobol_bits; ++bit) x ^= direction_numbers[dimension][bit] & (0u - ((shuffled >> bit) & 1u));
-  return owen_scramble(x, key(dimension)) * 0x1p-32;
+  const SequenceKeys keys(seed);
+  const std::uint32_t reversed = scramble_reversed(reverse_bits(index), keys.shuffle());
+  const std::uint32_t x = dimension == 0 ? sobol_0(reversed) : dimension == 1 ? sobol_1(reversed) : sobol_2(reversed);
+  return scrambled(x, keys.of_dimension(dimension));
+}
+
+std::array<double, 2> sobol_pair(std::uint64_t seed, std::uint32_t index) {
+  const SequenceKeys keys(seed);
+  const std::uint32_t reversed = scramble_reversed(reverse_bits(index), keys.shuffle());
+  return {scrambled(sobol_0(reversed), keys.of_dimension(0)), scrambled(sobol_1(reversed), keys.of_dimension(1))};
 }
 
 }  // namespace tensorray

@@ -3,6 +3,7 @@
 /// Random and low-discrepancy numbers as pure functions of (seed, index, dimension), so that a picture does not depend
 /// on the number of threads. There is no state: any thread may call every function.
 
+#include <array>
 #include <cstdint>
 
 namespace tensorray {
@@ -18,5 +19,8 @@ double random_uniform(std::uint64_t seed, std::uint64_t index, std::uint32_t dim
 /// @return a multiple of 2^-32 in [0, 1)
 /// @throw std::invalid_argument if dimension > 2.
 double sobol(std::uint64_t seed, std::uint32_t index, std::uint32_t dimension);
+
+/// Dimensions 0 and 1 of `sobol`, in two thirds of the time.
+std::array<double, 2> sobol_pair(std::uint64_t seed, std::uint32_t index);
 
 }  // namespace tensorray

@@ -34,7 +34,8 @@ double PathSampler::next_1d() {
 Eigen::Vector2d PathSampler::next_2d() {
   const std::uint64_t sequence = sequence_seed(*this);
   ++dimension;
-  return {sobol(sequence, sample, 0), sobol(sequence, sample, 1)};
+  const auto [x, y] = sobol_pair(sequence, sample);
+  return {x, y};
 }
 
 Eigen::Matrix3d frame_about(const Eigen::Vector3d& axis) {

@@ -14,6 +14,7 @@
 #include <tbb/parallel_for.h>
 
 #include "base/errors.h"
+#include "base/seconds.h"
 #include "renderer/shading/picture_tile.h"
 
 namespace tensorray {
@@ -35,6 +36,9 @@ void require_valid(const Camera& camera, const PathTracerSettings& settings) {
   require(settings.noise_threshold >= 0 && std::isfinite(settings.noise_threshold), "noise_threshold must be >= 0");
   require(settings.noise_threshold == 0 || settings.min_samples >= 2,
           "min_samples must be >= 2 where there is a noise_threshold");
+  require(settings.max_seconds >= 0, "max_seconds must be >= 0");
+  require(settings.first_samples >= 1 && settings.first_samples <= settings.min_samples,
+          "first_samples must be 1 to min_samples");
 }
 
 /// Adds one value to a mean; `count` includes it.
@@ -80,11 +84,13 @@ class Rendering {
   double mean_luminance() const;
   void count_samples();
   void count_tiles();
+  double time_used() const;
+  int next_samples(int before) const;
   std::optional<FirstSurface> shade(int x, int y, PathSampler& sampler, RayShader& shader, Vector2d& offset) const;
   void pass(const std::vector<std::size_t>& tiles);
   void extend(std::size_t number, Worker& worker);
   void render_pixel(Tile& tile, int x, int y, int samples, Worker& worker);
-  void add_surface(PixelState& pixel, const Vector2d& offset, const FirstSurface& surface, RayShader& shader) const;
+  void add_surface(PixelState& pixel, const Vector2d& offset, const FirstSurface& surface) const;
   void add_place(PixelState& pixel, const FirstSurface& surface) const;
   bool finish_pixels(Tile& tile);
   bool is_precise(Tile& tile, int x, int y) const;
@@ -99,6 +105,7 @@ class Rendering {
   const std::size_t tiles_;
   const std::size_t light_values_;  ///< For each pixel.
   double floor_ = 0;                ///< Least luminance to which errors are compared.
+  Clock::time_point start_ = Clock::now();
   std::uint64_t total_samples_ = 0;
   std::atomic<std::uint64_t> finished_samples_{0};
 };
@@ -157,6 +164,19 @@ void Rendering::count_tiles() {
   if (all > 0) finished_samples_ = total_samples_ * done / all;
 }
 
+/// The fraction of the time that is used up.
+double Rendering::time_used() const {
+  return std::isinf(settings_.max_seconds) ? 0 : seconds_since(start_) / std::max(settings_.max_seconds, 1e-300);
+}
+
+/// How many more samples pixels of a tile get that have `before`; 0: none, as the time is over.
+int Rendering::next_samples(int before) const {
+  const int most = std::min(settings_.pass_samples, settings_.max_samples - before);
+  if (std::isinf(settings_.max_seconds)) return before == 0 ? settings_.min_samples : most;
+  if (before == 0) return settings_.first_samples;
+  return time_used() < 1 ? std::min(before, most) : 0;
+}
+
 /// A tile as it is kept.
 Tile Rendering::load(std::size_t number) const {
   const int left = static_cast<int>(number) % columns_ * tile_size,
@@ -181,19 +201,21 @@ void Rendering::pass(const std::vector<std::size_t>& tiles) {
     Worker worker(scene_, settings_.shading);
     extend(tiles[i], worker);
     if (std::this_thread::get_id() != caller) return;
-    if (callbacks_.progress) callbacks_.progress(finished_samples_, total_samples_);
+    if (callbacks_.progress) {
+      const auto by_time = static_cast<std::uint64_t>(std::min(1.0, time_used()) * static_cast<double>(total_samples_));
+      callbacks_.progress(std::max(finished_samples_.load(), by_time), total_samples_);
+    }
     if (callbacks_.show && work_.picture_wanted.exchange(false)) callbacks_.show(picture());
   });
 }
 
 void Rendering::extend(std::size_t number, Worker& worker) {
   Tile tile = load(number);
-  const int before = tile.samples();
-  const int more =
-      before == 0 ? settings_.min_samples : std::min(settings_.pass_samples, settings_.max_samples - before);
+  const int before = tile.samples(), more = next_samples(before), after = before + more;
   for (int y = 0; y < tile.height; ++y)
     for (int x = 0; x < tile.width; ++x) render_pixel(tile, x, y, more, worker);
-  const bool done = before + more == settings_.max_samples || finish_pixels(tile);
+  const bool has_enough = after == settings_.max_samples || (after >= settings_.min_samples && finish_pixels(tile));
+  const bool done = has_enough || more == 0;
   work_.keep(number, tile.bytes(), done);
 }
 
@@ -228,7 +250,7 @@ void Rendering::render_pixel(Tile& tile, int x, int y, int samples, Worker& work
     const double luminance = scene_.colors.luminance(shader.radiance()), change = luminance - pixel.luminance;
     pixel.luminance += change / pixel.samples;
     pixel.squares += change * (luminance - pixel.luminance);
-    if (surface) add_surface(pixel, offset, *surface, shader);
+    if (surface) add_surface(pixel, offset, *surface);
   }
   double* light = tile.light_of(x, y);
   extend_means(worker.sum, samples, pixel.samples, light);
@@ -240,13 +262,12 @@ void Rendering::render_pixel(Tile& tile, int x, int y, int samples, Worker& work
   finished_samples_ += static_cast<std::uint64_t>(samples);
 }
 
-void Rendering::add_surface(PixelState& pixel, const Vector2d& offset, const FirstSurface& surface,
-                            RayShader& shader) const {
+void Rendering::add_surface(PixelState& pixel, const Vector2d& offset, const FirstSurface& surface) const {
   const double depth = (surface.hit.position - camera_.position).dot(camera_.forward);
   ++pixel.hits;
   extend_mean(pixel.depth, pixel.hits, static_cast<float>(depth));
   extend_mean(Eigen::Map<Vector3f>(pixel.normal), pixel.hits, Vector3f(surface.normal.cast<float>()));
-  extend_mean(Eigen::Map<Vector3f>(pixel.albedo), pixel.hits, shader.albedo(surface.hit));
+  extend_mean(Eigen::Map<Vector3f>(pixel.albedo), pixel.hits, surface.albedo);
   const SurfaceData data = scene_.surfaces.data(surface.hit);
   if (data.force) extend_mean(pixel.force, ++pixel.force_hits, *data.force);
   if (data.arc_length) extend_mean(pixel.arc_length, ++pixel.length_hits, *data.arc_length);

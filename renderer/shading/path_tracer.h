@@ -4,6 +4,7 @@
 
 #include <cstdint>
 #include <functional>
+#include <limits>
 #include <vector>
 
 #include <Eigen/Core>
@@ -29,6 +30,12 @@ struct PathTracerSettings {
   /// samples have missed a bright feature by chance. Pixels darker than 5 % of the picture's mean, which a few samples
   /// estimate beforehand, are treated as if they had that luminance. 0: all pixels take all samples.
   double noise_threshold = 0;
+
+  /// When so much time has passed, tiles get no more samples; only those without any get `first_samples`. Unless it is
+  /// infinite, the first passes are short: `first_samples`, and then as many as a pixel has. What a picture has after
+  /// its time depends on the machine, and differs from run to run.
+  double max_seconds = std::numeric_limits<double>::infinity();
+  int first_samples = 1;  ///< 1 to min_samples.
 
   std::uint64_t seed = 0;
 };

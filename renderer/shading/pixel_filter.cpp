@@ -10,7 +10,11 @@
 namespace tensorray {
 namespace {
 
-constexpr int quantile_count = 256;
+/// The quantiles are tabulated at this many equal steps.
+constexpr int steps = 1024;
+/// Steps at each end in which the quantile is searched for: it has no finite derivative at an end where the density is
+/// 0.
+constexpr int searched_steps = 12;
 
 /// All shapes are defined on [−1, 1] and have integral 1.
 struct Gaussian {
@@ -48,10 +52,11 @@ double default_radius(PixelFilterShape shape) { return shape == PixelFilterShape
 PixelFilter::PixelFilter(PixelFilterShape shape, double radius) : shape_(shape), radius_(radius) {
   if (!(radius > 0 && std::isfinite(radius)))
     throw std::invalid_argument("the pixel filter's radius must be above 0, not " + std::to_string(radius));
-  quantiles_.push_back(-radius);
-  for (int i = 1; i < quantile_count; ++i)
-    quantiles_.push_back(invert(static_cast<double>(i) / quantile_count, quantiles_.back(), radius));
-  quantiles_.push_back(radius);
+  quantiles_.push_back({-radius, 0});
+  for (int i = 1; i <= steps; ++i) {
+    const double x = i < steps ? invert(static_cast<double>(i) / steps, quantiles_.back().position, radius) : radius;
+    quantiles_.push_back({x, 1 / (steps * density(x))});
+  }
 }
 
 double PixelFilter::density(double x) const {
@@ -81,9 +86,15 @@ double PixelFilter::cumulative(double x) const {
   return 0.5 + t / 2;
 }
 
+/// Interpolates the quantiles by the cubic polynomials that also have their derivatives (Hermite).
 double PixelFilter::sample(double u) const {
-  const int i = std::clamp(static_cast<int>(u * quantile_count), 0, quantile_count - 1);
-  return invert(u, quantiles_[i], quantiles_[i + 1]);
+  const int i = std::clamp(static_cast<int>(u * steps), 0, steps - 1);
+  const Quantile& low = quantiles_[i];
+  const Quantile& high = quantiles_[i + 1];
+  if (i < searched_steps || i >= steps - searched_steps) return invert(u, low.position, high.position);
+  const double t = u * steps - i, rest = 1 - t;
+  return low.position + t * t * (3 - 2 * t) * (high.position - low.position) +
+         t * rest * (rest * low.slope - t * high.slope);
 }
 
 /// Finds x between low and high with cumulative(x) = u, by Newton's method; a step that leaves the bracket is replaced

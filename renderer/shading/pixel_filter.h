@@ -30,7 +30,7 @@ class PixelFilter {
   double density(const Eigen::Vector2d& offset) const { return density(offset.x()) * density(offset.y()); }
 
   /// An offset with this density, from `u`, uniform in [0, 1)². Each component of the offset depends on the same
-  /// component of `u` only, and increases with it. Inverts the distribution to rounding, in about 0.3 µs.
+  /// component of `u` only, and increases with it. Inverts the distribution to 1e-8, in about 20 ns.
   Eigen::Vector2d sample(const Eigen::Vector2d& u) const { return {sample(u.x()), sample(u.y())}; }
 
   PixelFilterShape shape() const { return shape_; }
@@ -42,9 +42,14 @@ class PixelFilter {
   double sample(double u) const;
   double invert(double u, double low, double high) const;
 
+  struct Quantile {
+    double position = 0;
+    double slope = 0;  ///< Derivative of the position, for each step of the table.
+  };
+
   PixelFilterShape shape_;
   double radius_;
-  std::vector<double> quantiles_;  ///< Positions where `cumulative` is i / (size − 1).
+  std::vector<Quantile> quantiles_;  ///< Where `cumulative` is i / (size − 1).
 };
 
 }  // namespace tensorray

@@ -114,8 +114,9 @@ std::optional<FirstSurface> RayShader::shade(const Vector3d& origin, const Vecto
   }
   if (settings_.shading == Shading::path) add_emission(*hit, direction, 1, 0);
   const Vertex vertex = make_vertex(*hit, direction);
+  const FirstSurface surface = first_surface(vertex);
   shade_surface(vertex, 1, sampler);
-  return FirstSurface{*hit, vertex.normal, direction};
+  return surface;
 }
 
 /// @param depth  Number of surfaces that the path has met, with this one.
@@ -128,6 +129,14 @@ void RayShader::shade_surface(const Vertex& vertex, int depth, PathSampler& samp
     case Shading::headlight:
       radiance_ += throughput_ * (reflectance_ * -vertex.normal.dot(vertex.direction));
   }
+}
+
+/// Needs the vertex's `reflectance_`.
+FirstSurface RayShader::first_surface(const Vertex& vertex) {
+  contribution_ = reflectance_;
+  if (const auto* metal = std::get_if<ConductorScattering>(&vertex.material->scattering))
+    contribution_ *= metal->mean_fresnel;
+  return {vertex.hit, vertex.normal, vertex.direction, scene_.colors.color(contribution_)};
 }
 
 /// Also sets `reflectance_`.
@@ -268,7 +277,7 @@ std::optional<FirstSurface> RayShader::shade_bent(const Vector3d& origin, const 
     if (settings_.shading == Shading::path) add_emission(*hit, way.direction, weight, depth);
     if (!is_view && depth == settings_.max_depth) continue;
     const Vertex vertex = make_vertex(*hit, way.direction);
-    if (is_view && i <= ways.size() / 2) seen = FirstSurface{*hit, vertex.normal, way.direction};
+    if (is_view && i <= ways.size() / 2) seen = first_surface(vertex);
     shade_surface(vertex, depth + 1, sampler);
   }
   throughput_ = before;
@@ -325,8 +334,8 @@ void RayShader::add_landed_light(const Vertex& vertex, int depth) {
 /// Weight of light that a sampled direction has found.
 template <class Density>
 double RayShader::material_weight(double material_pdf, const Density& light_pdf) const {
-  if (settings_.direct == DirectLight::lights) return 0;
   if (settings_.direct == DirectLight::material) return 1;
+  if (settings_.direct == DirectLight::lights) return light_pdf() > 0 ? 0 : 1;
   const double ratio = light_pdf() / material_pdf;
   return 1 / (1 + ratio * ratio);
 }
@@ -412,13 +421,6 @@ void RayShader::shade_occlusion(const Vertex& vertex, PathSampler& sampler) {
   const Vector3d start = scene_.surfaces.start(vertex.hit, vertex.hit.lifted_position, vertex.side);
   if (!scene_.surfaces.occluded(start, direction, settings_.occlusion_distance))
     radiance_ += throughput_ * reflectance_;
-}
-
-Eigen::Vector3f RayShader::albedo(const SurfaceHit& hit) {
-  set_reflectance(hit, contribution_);
-  const Material& material = scene_.materials[scene_.surfaces.surfaces()[hit.surface].material];
-  if (const auto* metal = std::get_if<ConductorScattering>(&material.scattering)) contribution_ *= metal->mean_fresnel;
-  return scene_.colors.color(contribution_);
 }
 
 }  // namespace tensorray

@@ -28,7 +28,7 @@ enum class Shading {
 /// How direct light is sampled. All methods have the same mean; `both` has the least noise.
 enum class DirectLight {
   both,      ///< Both, weighted by the power heuristic (Veach and Guibas 1995).
-  lights,    ///< Samples the lights only.
+  lights,    ///< Samples the lights only, except for light that only sampling the material can find.
   material,  ///< Samples the material only, except for lights that only sampling the light can find.
 };
 
@@ -76,6 +76,7 @@ struct FirstSurface {
   SurfaceHit hit;
   Eigen::Vector3d normal = Eigen::Vector3d::Zero();     ///< As used for shading; towards the viewer.
   Eigen::Vector3d direction = Eigen::Vector3d::Zero();  ///< Of the ray that met it.
+  Eigen::Vector3f albedo = Eigen::Vector3f::Zero();     ///< In the working space, as denoisers expect it.
 };
 
 /// What the region does to the light of a ray that leaves the camera; means over the bands that it follows.
@@ -103,12 +104,10 @@ class RayShader {
 
   const std::optional<BentView>& bent_view() const { return bent_view_; }
 
-  /// In the working space; the albedo that denoisers expect.
-  Eigen::Vector3f albedo(const SurfaceHit& hit);
-
  private:
   struct Vertex;
 
+  FirstSurface first_surface(const Vertex& vertex);
   Vertex make_vertex(const SurfaceHit& hit, const Eigen::Vector3d& direction);
   void set_reflectance(const SurfaceHit& hit, BandValues& reflectance) const;
   void shade_surface(const Vertex& vertex, int depth, PathSampler& sampler);

@@ -117,7 +117,7 @@ Vector3d lifted(const std::vector<Vector3d>& vertices, const std::vector<Vector3
                 const Vector3d& position, const Vector3d& outwards, double side) {
   Vector3d result = position;
   for (int i = 0; i < 3; ++i) {
-    Vector3d normal = side * normals[corners.point[i]].cast<double>().normalized();
+    Vector3d normal = side * normals[corners.point[i]].cast<double>();
     if (normal.dot(outwards) < 0) normal = -normal;  // The mesh is poor here.
     const double below = std::min(0.0, (position - vertices[corners.point[i]]).dot(normal));
     result -= corners.weight[i] * below * normal;
@@ -311,6 +311,7 @@ SurfaceScene::SurfaceScene(std::vector<ShadedSurface> surfaces) : state_(new Sta
     } catch (const std::invalid_argument& error) {
       throw std::invalid_argument("surface " + std::to_string(i) + ": " + error.what());
     }
+    for (Vector3f& normal : surfaces[i].normals) normal.normalize();
   }
   state_->surfaces = std::move(surfaces);
   state_->bounds = bounds_of(state_->surfaces);

@@ -92,7 +92,8 @@ struct PathTracingDescription {
   int max_depth = 6;
   int samples = 64;
   int min_samples = 16;
-  double noise = 0.02;  ///< Relative error at which a pixel is done; 0: every pixel gets all samples.
+  double noise = 0.02;                ///< Relative error at which a pixel is done; 0: every pixel gets all samples.
+  std::optional<double> max_seconds;  ///< After this time no pixel gets more samples; none: no limit.
   PixelFilterShape filter = PixelFilterShape::blackman_harris;
   Background background = Background::color;
   Eigen::Vector3d background_color{1, 1, 1};  ///< Linear Rec. 709.

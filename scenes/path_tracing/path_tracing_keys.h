@@ -143,6 +143,9 @@ void describe(PathTracingDescription& paths, Visitor& visit) {
   visit("min_samples", paths.min_samples, "path_tracing: least number of samples per pixel", between(1, 1e6));
   visit("noise", paths.noise,
         "path_tracing: relative error at which a pixel is finished; 0: every pixel takes max_samples", between(0, 1));
+  visit("max_seconds", paths.max_seconds,
+        "path_tracing: time after which no pixel takes more samples, seconds; the picture then depends on the machine",
+        above(0));
   visit("filter", paths.filter, "path_tracing: pixel filter");
   visit("background", paths.background, "path_tracing: what pixels without a surface show");
   visit("background_color", paths.background_color, "path_tracing: colour of the background, linear Rec. 709",

@@ -25,6 +25,7 @@ PathTracerSettings tracer_settings(const SceneDescription& scene, const PathTrac
   settings.max_samples = description.samples;
   settings.pass_samples = std::max(1, settings.min_samples);
   settings.noise_threshold = settings.min_samples < 2 ? 0 : description.noise;
+  if (description.max_seconds) settings.max_seconds = *description.max_seconds;
   settings.seed = scene.seed;
   return settings;
 }

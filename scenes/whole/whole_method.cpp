@@ -108,13 +108,15 @@ int bands_per_bounce(const WholeDescription& settings) {
   return settings.bands_per_sample % 2 == 0 ? settings.bands_per_sample / 2 : settings.bands_per_sample;
 }
 
-/// All bands must have as many samples.
-PathTracerSettings whole_tracer_settings(const Scene& scene, const WholeScene& whole) {
+/// All bands must have as many samples. @param seconds  That have passed.
+PathTracerSettings whole_tracer_settings(const Scene& scene, const WholeScene& whole, double seconds) {
   PathTracerSettings settings = tracer_settings(scene.description, whole.tracing);
   settings.transparent = whole.tracing.background == Background::transparent;
   const int parts = whole.tracing.bands / bands_per_bounce(whole.settings);
   for (int* samples : {&settings.min_samples, &settings.max_samples, &settings.pass_samples})
     *samples = (*samples + parts - 1) / parts * parts;
+  settings.first_samples = parts;
+  settings.max_seconds = std::max(0.0, settings.max_seconds - seconds);
   return settings;
 }
 
@@ -184,7 +186,8 @@ Render LoadedWhole::render(const Scene& scene, const Progress& progress, RenderJ
     add_picture(picture, shown);
     return shown;
   });
-  add_picture(render_surfaces(shaded, camera, whole_tracer_settings(scene, whole_), callbacks), result);
+  const PathTracerSettings settings = whole_tracer_settings(scene, whole_, result.statistics.seconds_tracing);
+  add_picture(render_surfaces(shaded, camera, settings, callbacks), result);
   report(region, whole_, result);
   result.statistics.seconds_drawing = seconds_since(start);
   return result;
@@ -226,8 +229,19 @@ void WholeMethod::check(SceneDescription& scene, const Json& json, const SceneSo
                             tracing.bands, settings().bands_per_sample));
   check_memory(scene.camera.resolution.cast<double>().prod() * (250.0 + 48.0 * tracing.bands), "`/camera/resolution`",
                source);
-  check_memory(12.0 * tracing.bands * settings().caustic.resolution * settings().caustic.resolution,
-               "`/integrator/caustic/resolution`", source);
+  const double picture = 1.0 * tracing.bands * settings().caustic.resolution * settings().caustic.resolution;
+  check_memory(12 * picture, "`/integrator/caustic/resolution`", source);
+  // Each light of these kinds may have a picture on each object; most cover a part of it.
+  const auto lands = [](const LightSourceDescription& light) {
+    return light.kind == LightKind::directional || light.kind == LightKind::point;
+  };
+  const auto landing = std::count_if(scene.lights.begin(), scene.lights.end(), lands);
+  const double objects = static_cast<double>(std::max<std::size_t>(1, scene.objects.size()) + scene.obstacles.size());
+  check_memory(static_cast<double>(landing) * objects * picture,
+               fmt::format("the light of {} `/lights` through the field, on {:.0f} objects at "
+                           "`/integrator/caustic/resolution` {},",
+                           landing, objects, settings().caustic.resolution),
+               source);
   if (given(json, "/integrator/conserve") && given(json, "/integrator/max_gain") &&
       settings().conserve == Conserve::radiance)
     scene.warnings.push_back("`/integrator/max_gain` has no effect where radiance is conserved");

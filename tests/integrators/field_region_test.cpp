@@ -1,5 +1,6 @@
 #include "integrators/view/field_region.h"
 
+#include <array>
 #include <cmath>
 
 #include <Eigen/Eigenvalues>
@@ -144,7 +145,8 @@ TEST(FieldRegionTest, TheMeanGainOverAConvexBoundaryIsOne) {
 class Sensor : public ::testing::Test {
  protected:
   const double size_ = 4, sensor_size_ = 1.2;
-  const TensorField field_ = cube_field(17, linear_tensor);
+  TensorField field_ = cube_field(17, linear_tensor);
+  double tilt_ = 0.3;
 
   Plate plate(double z, double size, double tilt) const {
     Plate plate;
@@ -169,13 +171,13 @@ class Sensor : public ::testing::Test {
   }
 
   /// Flux on the sensor by photons.
-  Average forwards(double s) const {
-    const Plate emitter = plate(-1.5, size_, 0), sensor = plate(1.4, sensor_size_, 0.3);
+  Average forwards(double s, int photons = 300000) const {
+    const Plate emitter = plate(-1.5, size_, 0), sensor = plate(1.4, sensor_size_, tilt_);
     Surfaces surfaces = surfaces_of(field_);
     surfaces.plate = sensor;
     const Geometry geometry(std::move(surfaces));
     Average flux;
-    for (std::uint64_t i = 0; i < 300000; ++i) {
+    for (std::uint64_t i = 0; i < static_cast<std::uint64_t>(photons); ++i) {
       Vector3d point, direction;
       start(emitter, 1, i, point, direction);
       RayBatch rays;
@@ -189,12 +191,12 @@ class Sensor : public ::testing::Test {
   }
 
   /// The same, followed back. @param s  Of the light; the region takes −s.
-  Average backwards(double s, Conserve conserve) const {
-    const Plate emitter = plate(-1.5, size_, 0), sensor = plate(1.4, sensor_size_, 0.3);
+  Average backwards(double s, Conserve conserve, int rays = 100000) const {
+    const Plate emitter = plate(-1.5, size_, 0), sensor = plate(1.4, sensor_size_, tilt_);
     const Geometry geometry(surfaces_of(field_));
     const FieldRegion region(field_, geometry, view(conserve, s));
     Average flux;
-    for (std::uint64_t i = 0; i < 100000; ++i) {
+    for (std::uint64_t i = 0; i < static_cast<std::uint64_t>(rays); ++i) {
       BentWay way;
       start(sensor, -1, i, way.position, way.direction);
       if (region.entry(way.position, way.direction) < INFINITY) way = follow(region, way.position, way.direction);
@@ -216,6 +218,27 @@ TEST_F(Sensor, SeesTheSameForwardsAndBackwards) {
   // The test can fail: with the wrong sign of s, and without the gain.
   EXPECT_GT(std::abs(photons.mean() - backwards(-s, Conserve::power).mean()), 6 * error);
   EXPECT_GT(std::abs(photons.mean() - backwards(s, Conserve::radiance).mean()), 6 * error);
+}
+
+/// Random linear fields of general tensors, sensors and flexibilities of both signs.
+TEST_F(Sensor, SeesTheSameForwardsAndBackwardsInRandomScenes) {
+  double squares = 0, wrong_squares = 0;
+  constexpr int scenes = 6;
+  for (std::uint64_t scene = 0; scene < scenes; ++scene) {
+    std::array<Matrix3d, 4> T;
+    for (std::uint32_t i = 0; i < 36; ++i) T[i / 9](i % 9) = 2 * random_uniform(11, scene, i) - 1;
+    field_ = cube_field(
+        9, [&](const Vector3d& p) { return Matrix3d(T[0] + 0.5 * (p.x() * T[1] + p.y() * T[2] + p.z() * T[3])); });
+    tilt_ = 0.8 * random_uniform(11, scene, 36) - 0.4;
+    const double s = (scene % 2 == 0 ? 1 : -1) * (0.2 + 0.2 * random_uniform(11, scene, 37));
+    const Average photons = forwards(s, 120000), rays = backwards(s, Conserve::power, 40000);
+    const Average wrong = backwards(-s, Conserve::power, 40000);
+    squares += std::pow((photons.mean() - rays.mean()) / std::hypot(photons.error(), rays.error()), 2);
+    wrong_squares += std::pow((photons.mean() - wrong.mean()) / std::hypot(photons.error(), wrong.error()), 2);
+  }
+  // The sum of `scenes` squares of standard normal numbers is above 28 once in 10,000 times.
+  EXPECT_LT(squares, 28);
+  EXPECT_GT(wrong_squares, 100);  // The test can fail.
 }
 
 }  // namespace

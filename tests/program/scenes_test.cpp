@@ -47,6 +47,38 @@ TEST_P(ExampleScene, RendersAndBendsLight) {
 INSTANTIATE_TEST_SUITE_P(Scenes, ExampleScene, ::testing::ValuesIn(example_scenes()),
                          [](const auto& scene) { return scene.param.stem().string(); });
 
+double luminance(const Image& image, int x, int y) {
+  const float* pixel = &image.pixels[(static_cast<std::size_t>(y) * image.width + x) * image.channels.size()];
+  return 0.2126 * pixel[0] + 0.7152 * pixel[1] + 0.0722 * pixel[2];
+}
+
+class WholeExample : public ExampleScene {};
+
+/// No pixel is above 20 times the median of those around it.
+TEST_P(WholeExample, HasNoFireflies) {
+  run_well({"render", GetParam().string(), "-q", "-o", "out.exr", "--set", "camera.resolution=[64,48]", "--set",
+            "integrator.max_samples=32"});
+  const Image image = read_image(in_folder("out.exr"));
+  for (int y = 1; y + 1 < image.height; ++y)
+    for (int x = 1; x + 1 < image.width; ++x) {
+      std::vector<double> around;
+      for (int i = 0; i < 9; ++i)
+        if (i != 4) around.push_back(luminance(image, x - 1 + i % 3, y - 1 + i / 3));
+      std::nth_element(around.begin(), around.begin() + 4, around.end());
+      EXPECT_LE(luminance(image, x, y), 20 * std::max(around[4], 1e-3)) << x << " " << y;
+    }
+}
+
+std::vector<std::filesystem::path> whole_scenes() {
+  std::vector<std::filesystem::path> scenes = example_scenes();
+  const auto is_other = [](const auto& scene) { return scene.parent_path().filename() != "whole"; };
+  scenes.erase(std::remove_if(scenes.begin(), scenes.end(), is_other), scenes.end());
+  return scenes;
+}
+
+INSTANTIATE_TEST_SUITE_P(Scenes, WholeExample, ::testing::ValuesIn(whole_scenes()),
+                         [](const auto& scene) { return scene.param.stem().string(); });
+
 /// A picture of a point load. The plate reaches from −1.3 to 1.3 along both axes.
 class PointLoadPicture : public Program {
  protected:

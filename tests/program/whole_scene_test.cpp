@@ -218,12 +218,37 @@ TEST_F(WholeScene, RefusesWhatDoesNotFit) {
   expect_error("lights=[{\"kind\":\"constant\",\"group\":\"albedo\"}]", "/lights/0/group");
 }
 
-/// A sun in the plane of the floor, a floor through the volume, and a camera inside the volume.
+/// Too little time for more than the first samples, in which all bands have as many.
+TEST_F(WholeScene, StopsByTime) {
+  const Image image = picture({"integrator.max_seconds=1e-6", "integrator.max_samples=16"});
+  EXPECT_EQ(mean(image, "samples"), 4);
+  EXPECT_GT(mean(image, "A"), 0.99);
+  expect_error("integrator.max_seconds=0", "/integrator/max_seconds");
+}
+
+TEST_F(WholeScene, RefusesMoreLightThanFitsIntoMemory) {
+  std::string lights;
+  for (int i = 0; i < 10000; ++i) lights += "{\"kind\":\"point\",\"position\":[0,0,3]},";
+  lights.back() = ']';
+  std::string scene = read_file(in_folder("scene.json"));
+  scene.insert(scene.find("\"camera\""), "\"lights\": [" + lights + ", ");
+  write("scene.json", scene);
+  expect_error("integrator.caustic.resolution=1024", "`/lights`");
+}
+
+/// A sun in the plane of the floor, a floor through the volume, a camera inside the volume, one inside a body, one that
+/// looks away, one that looks into the point under the load, where the stress is singular, and a lamp inside a body.
 TEST_F(WholeScene, OddPlacesGiveAPicture) {
+  write_roof("body.ply", 0, 0, -2.3);
   for (const std::vector<std::string>& sets : std::vector<std::vector<std::string>>{
            {"lights=[{\"kind\":\"directional\",\"direction\":[1,0,0]}]"},
            {"objects=[{\"plate\":{\"center\":[0,0,0],\"size\":[8,8]},\"texture\":\"checkerboard\"}]"},
-           {"camera.position=[0.1,0.2,-0.4]", "camera.target=[0,0,-3]"}}) {
+           {"camera.position=[0.1,0.2,-0.4]", "camera.target=[0,0,-3]"},
+           {"obstacles=[{\"file\":\"body.ply\"}]", "camera.position=[0,0,-2.5]", "camera.target=[0,0,-3]"},
+           {"camera.position=[0,-6,0]", "camera.target=[0,-9,0]"},
+           {"camera.position=[0,-3,0.4]", "camera.target=[0,0,0]", "camera.angle=3"},
+           {"obstacles=[{\"file\":\"body.ply\"}]",
+            "lights=[{\"kind\":\"constant\"},{\"kind\":\"point\",\"position\":[0,0,-2.5]}]"}}) {
     const Image image = picture(sets);
     for (const float value : image.pixels) ASSERT_TRUE(std::isfinite(value)) << sets[0];
     EXPECT_GT(mean(image, "A"), 0.99) << sets[0];

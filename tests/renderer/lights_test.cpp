@@ -157,13 +157,19 @@ TEST(DirectionalLight, ADiskGivesItsIrradiance) {
   }
 }
 
-TEST(ConstantLight, IrradianceIsPiTimesRadiance) {
-  const LightSampler lights({ConstantLight{{2, 0.5f}}}, {1, 1}, unit_scene);
-  for (std::size_t band = 0; band < 2; ++band) {
-    const Mean mean = irradiance(lights, Vector3d::Zero(), {0, 0.6, -0.8}, band);
-    EXPECT_NEAR(mean.mean(), pi * (band == 0 ? 2 : 0.5), 4 * mean.error());
+TEST(ConstantLight, IsLeftToTheMaterial) {
+  for (const bool has_other : {false, true}) {
+    std::vector<Light> list{ConstantLight{{2, 0.5f}}};
+    if (has_other) list.emplace_back(DirectionalLight{{0, 0, -1}, {1, 1}, 0.1});
+    const LightSampler lights(list, {1, 1}, unit_scene);
+    LightSample sample;
+    EXPECT_EQ(lights.sample(Vector3d::Zero(), 0.3, {0.5, 0.5}, sample), has_other);
+    EXPECT_EQ(lights.choice_probability(0), 0);
+    EXPECT_EQ(lights.background_pdf({0.6, 0, 0.8}), 0);
+    std::vector<float> radiance;
+    lights.background({0.6, 0, 0.8}, radiance);
+    EXPECT_EQ(radiance, (std::vector<float>{2, 0.5f}));
   }
-  EXPECT_EQ(lights.background_pdf({0, 0, 1}), 1 / (4 * pi));
 }
 
 TEST(LightSampler, IrradianceOfAllLightsIsTheSum) {
@@ -212,19 +218,19 @@ TEST(LightSampler, SampledBackgroundIsWhatARayWouldSee) {
 
 TEST(LightSampler, ChoosesByPower) {
   // The bounding sphere of the scene has the radius √3 and the cross section 3 π.
-  const double lamp_power = pi * 2.4 * 3, parallel_power = 3 * pi * 2, constant_power = 3 * pi * 4 * pi * 0.1;
-  const LightSampler lights({lamp(3), DirectionalLight{{0, 0, -1}, {2}, 0}, ConstantLight{{0.1f}}, lamp(0)}, {1},
-                            unit_scene);
-  const double sum = lamp_power + parallel_power + constant_power;
+  const double lamp_power = pi * 2.4 * 3, parallel_power = 3 * pi * 2, point_power = 4 * pi * 0.1;
+  const LightSampler lights({lamp(3), DirectionalLight{{0, 0, -1}, {2}, 0}, PointLight{{0, 0, 3}, {0.1f}}, lamp(0)},
+                            {1}, unit_scene);
+  const double sum = lamp_power + parallel_power + point_power;
   EXPECT_NEAR(lights.choice_probability(0), lamp_power / sum, 1e-7);
   EXPECT_NEAR(lights.choice_probability(1), parallel_power / sum, 1e-7);
-  EXPECT_NEAR(lights.choice_probability(2), constant_power / sum, 1e-7);
+  EXPECT_NEAR(lights.choice_probability(2), point_power / sum, 1e-7);
   EXPECT_EQ(lights.choice_probability(3), 0);
 }
 
 TEST(LightSampler, PowerIsLuminanceAboveAll) {
   // One light in a band that is hardly visible, one in a bright band.
-  const LightSampler lights({ConstantLight{{1, 0}}, ConstantLight{{0, 1}}}, {0, 2}, unit_scene);
+  const LightSampler lights({PointLight{{0, 0, 1}, {1, 0}}, PointLight{{0, 0, 1}, {0, 1}}}, {0, 2}, unit_scene);
   EXPECT_NEAR(lights.choice_probability(0), 0.05, 1e-7);
   EXPECT_NEAR(lights.choice_probability(1), 0.95, 1e-7);
 }

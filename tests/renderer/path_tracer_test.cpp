@@ -367,6 +367,32 @@ TEST(PictureTest, PassesAddUpToThePictureThatOnePassMakes) {
   EXPECT_THROW(render_surfaces(world.scene, camera(20), settings, callbacks), Stop);
 }
 
+/// Without time, each pixel gets its first samples, whoever renders its tile; with more time than it takes, it gets
+/// all.
+TEST(PictureTest, TimeLimitsTheSamples) {
+  const World world = still_life();
+  PathTracerSettings settings;
+  settings.min_samples = settings.pass_samples = 6;
+  settings.max_samples = 12;
+  const SurfacePicture all = render_surfaces(world.scene, camera(20), settings);
+  settings.max_seconds = 1e9;
+  settings.first_samples = 2;
+  const SurfacePicture in_time = render_surfaces(world.scene, camera(20), settings);
+  EXPECT_EQ(in_time.samples, all.samples);
+  for (std::size_t i = 0; i < all.radiance.values.size(); ++i)
+    EXPECT_NEAR(in_time.radiance.values[i], all.radiance.values[i], 1e-12);
+
+  settings.max_seconds = 0;
+  Work work({1, 2});
+  RenderCallbacks callbacks;
+  callbacks.work = &work;
+  const SurfacePicture part = render_surfaces(world.scene, camera(20), settings, callbacks);
+  EXPECT_TRUE(work.units()[1].done);
+  EXPECT_FALSE(work.units()[0].done);
+  EXPECT_EQ(*std::max_element(part.samples.begin(), part.samples.end()), 2);
+  EXPECT_EQ(render_surfaces(world.scene, camera(20), settings).samples, std::vector<float>(20 * 20, 2));
+}
+
 /// Work that is divided, stopped after each pass of a tile, and continued, gives the picture of one render.
 TEST(PictureTest, PartsThatStopAndContinueGiveTheSamePicture) {
   const World world = still_life();

@@ -74,6 +74,24 @@ TEST(PixelFilter, SamplesAreQuantilesOfTheDensity) {
   }
 }
 
+/// Between the nodes of its table, too, and in each of its steps.
+TEST(PixelFilter, SamplesAscendEvenly) {
+  for (const PixelFilterShape shape : all_shapes) {
+    const PixelFilter filter(shape, 1.5);
+    double last = -1.5, sum = 0;
+    constexpr int count = 10000;
+    for (int i = 0; i < count; ++i) {
+      const double x = filter.sample({(i + 0.5) / count, 0.5}).x();
+      EXPECT_GE(x, last);
+      // Where the density is p, neighbours are 1 / (count p) apart.
+      const double step = filter.density({(x + last) / 2, 0}) / filter.density({0, 0}) * (x - last);
+      if (i > 0) sum += std::pow(step * count * std::sqrt(filter.density({0, 0})) - 1, 2);
+      last = x;
+    }
+    EXPECT_LT(std::sqrt(sum / count), 1e-2);
+  }
+}
+
 TEST(PixelFilter, SampledHistogramIsTheFilter) {
   constexpr int bins = 24;
   for (const PixelFilterShape shape : all_shapes) {

@@ -63,6 +63,15 @@ TEST(RandomUniformTest, KeysAreIndependent) {
   EXPECT_LT(std::abs(pair_score(by_seed, [](int i) { return random_uniform(i, 0, 1); })), 4) << "dimensions by seed";
 }
 
+TEST(SobolTest, PairsAreItsFirstDimensions) {
+  for (const std::uint64_t seed : {0u, 1u, 12345u})
+    for (const std::uint32_t index : {0u, 1u, 2u, 77u, 4096u, 3000000000u, 0xffffffffu}) {
+      const auto [x, y] = sobol_pair(seed, index);
+      EXPECT_EQ(x, sobol(seed, index, 0));
+      EXPECT_EQ(y, sobol(seed, index, 1));
+    }
+}
+
 TEST(SobolTest, FirstPointsFillEveryElementaryInterval) {
   for (const std::uint64_t seed : {0u, 1u, 12345u})
     for (int k = 0; k <= 10; ++k)
