@@ -79,9 +79,9 @@ void use_instruction_set(const std::string& name);
 int lane_count();
 
 /// Vector operations in one step of a vector of rays in one cell, where the field is weak. They limit the speed.
-/// Multiplications and multiply-adds: middle, cell and weights 11, tensor 64, kick and second half of the step 36.
-constexpr int multiply_adds_per_step = 111;
-/// Additions, roundings, comparisons: middle, cell and weights 18, length 1.
-constexpr int adds_per_step = 19;
+/// Multiplications and multiply-adds: middle and cell 6, tensor 56, kick and second half of the step 36.
+constexpr int multiply_adds_per_step = 98;
+/// Additions, roundings, comparisons: middle and cell 10, tensor 24, length 1.
+constexpr int adds_per_step = 35;
 
 }  // namespace tensorray::packets
