@@ -7,7 +7,7 @@ find_package(nlohmann_json REQUIRED)
 find_package(fmt REQUIRED)
 find_package(CLI11 REQUIRED)
 find_package(assimp REQUIRED)
-find_package(ZLIB REQUIRED)
+find_package(PNG REQUIRED)
 
 # On Debian, OpenVDB's find module is outside CMake's search path.
 file(GLOB OPENVDB_MODULE_PATHS /usr/lib/*/cmake/OpenVDB /usr/lib/cmake/OpenVDB /usr/local/lib*/cmake/OpenVDB)

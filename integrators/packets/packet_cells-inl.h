@@ -168,7 +168,7 @@ HWY_INLINE hn::Vec<Eight> sample_lane(const Packet& packet, int lane, int c) {
 }
 
 /// Four rows to four columns in each block of four.
-HWY_INLINE void transpose_blocks(F* rows) {
+HWY_INLINE void transpose_blocks([[maybe_unused]] F* rows) {
 #if HWY_TARGET != HWY_SCALAR
   const hn::Repartition<double, Floats> pairs;
   const auto lower = [&](F a, F b) HWY_ATTR { return hn::BitCast(pairs, hn::InterleaveLower(floats, a, b)); };
@@ -183,7 +183,7 @@ HWY_INLINE void transpose_blocks(F* rows) {
 }
 
 /// Rows of the components of lanes to a vector for each component.
-HWY_INLINE void transpose_rows(F (&rows)[eight_lanes]) {
+HWY_INLINE void transpose_rows([[maybe_unused]] F (&rows)[eight_lanes]) {
 #if HWY_TARGET != HWY_SCALAR
   transpose_blocks(rows);
   if constexpr (eight_lanes == 8) {

@@ -1,7 +1,7 @@
 #pragma once
 /// @file renderer/images/png_encoder.h
-/// Encodes PNG files with zlib alone, because most renders write one picture, and OpenImageIO takes longer to load than
-/// a small render takes (picture_library.h).
+/// Encodes PNG files with libpng, because most renders write one picture, and OpenImageIO, which would use libpng too,
+/// takes longer to load than a small render takes (picture_library.h).
 
 #include <vector>
 
@@ -9,12 +9,10 @@
 
 namespace tensorray {
 
-/// A PNG of 16 bits, marked as sRGB unless the metadata `oiio:ColorSpace` says otherwise. Strips of rows are compressed
-/// on all threads; the bytes do not depend on their number.
+/// A PNG of 16 bits, marked as sRGB unless the metadata `oiio:ColorSpace` says otherwise.
 /// @param image     One channel (grey), three (RGB) or four (RGBA, colours not multiplied by alpha); values in [0, 1].
-/// @param metadata  All becomes text; names longer than 79 characters are left out, as the format has no place for
-/// them.
-/// @throw std::runtime_error if the picture is too large for the format, or zlib fails.
+/// @param metadata  All becomes text; names longer than 79 characters are left out: the format has no place for them.
+/// @throw std::runtime_error if the picture is too large for the format.
 std::vector<unsigned char> encode_png(const Image& image, const ImageMetadata& metadata);
 
 }  // namespace tensorray

@@ -10,7 +10,6 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
-#include <tbb/global_control.h>
 
 #include "tests/renderer/support.h"
 
@@ -154,23 +153,17 @@ TEST(ImageTest, PngKeepsAllMetadataAndIsMarkedAsSrgb) {
   EXPECT_THAT(read_bytes(file.path()), Not(HasSubstr("sRGB")));
 }
 
-/// Rows are compressed in strips, on all threads.
-TEST(ImageTest, PngOfManyStripsIsReadBack) {
+TEST(ImageTest, PngIsReadBack) {
   for (const std::vector<std::string>& channels :
        {std::vector<std::string>{"Y"}, std::vector<std::string>{"R", "G", "B"},
         std::vector<std::string>{"R", "G", "B", "A"}}) {
-    const Temporary file("strips.png"), again("again.png");
+    const Temporary file("picture.png");
     Image image = noise(700, 500, channels);
     for (int y = 100; y < 300; ++y)  // Parts that are plain, and parts that are smooth.
       for (int x = 0; x < 700; ++x)
         for (std::size_t c = 0; c < channels.size(); ++c) image.pixel(x, y)[c] = y < 200 ? 0.5f : 0.001f * float(x);
-    write_image(file.path(), image, {{"ImageDescription", "strips"}});
-    {
-      const tbb::global_control single(tbb::global_control::max_allowed_parallelism, 1);
-      write_image(again.path(), image, {{"ImageDescription", "strips"}});
-    }
-    EXPECT_EQ(read_bytes(file.path()), read_bytes(again.path()));
-    EXPECT_THAT(read_bytes(file.path()), HasSubstr(std::string("Description\0strips", 18)));
+    write_image(file.path(), image, {{"ImageDescription", "a picture"}});
+    EXPECT_THAT(read_bytes(file.path()), HasSubstr(std::string("Description\0a picture", 21)));
     const Image read = read_image(file.path());
     ASSERT_EQ(read.pixels.size(), image.pixels.size());
     for (std::size_t i = 0; i < read.pixels.size(); ++i)
