@@ -29,7 +29,7 @@ constexpr double inset = 3e-6;   // On the aperture's edge, it is a matter of ro
                                  // There they start this part of a patch further inside.
 constexpr double swept_share = 0.99;  // The part of the positions whose light moves slowly enough from band to band.
 constexpr int most_levels = 14;
-constexpr int most_columns = 1 << 12;   // Number of first squares along a side.
+constexpr int most_columns = 1 << 12;  // Number of first squares along a side.
 constexpr std::size_t task_size = 64;  // Positions that one thread traces as one task.
 
 /// A quadrilateral part of the aperture with a lattice of squares; corners counter-clockwise.

@@ -68,11 +68,11 @@ struct alignas(64) Packet {
   PerRay last[3];          // Last cell, relative to the brick.
 
   // The step that is being taken:
-  PerRay time;                        // Length of the step: voxels if voxels are uniform, else world units.
-  PerRay middle[3];                   // Positions of the samples.
-  PerRay voxel;                       // Number, in the brick, of the first voxel of the sample's cell.
-  PerRay fraction[3];                 // Position within the cell.
-  PerRay tensor[8];                   // Tensors of all lanes, component after component.
+  PerRay time;         // Length of the step: voxels if voxels are uniform, else world units.
+  PerRay middle[3];    // Positions of the samples.
+  PerRay voxel;        // Number, in the brick, of the first voxel of the sample's cell.
+  PerRay fraction[3];  // Position within the cell.
+  PerRay tensor[8];    // Tensors of all lanes, component after component.
   PerRay p_next[3], v_next[3], u_next[3];
   // Adaptive methods: the next step, voxels, and the error of this one divided by the tolerance.
   PerRay wanted, excess;

@@ -58,8 +58,8 @@ TEST(NodePrediction, CubicsAreExact) {
   EXPECT_NEAR(error_of(map, {}, 8, 0.06f), 0, 1e-5);
 }
 
-/// The error of a cubic through nodes at a distance h is at most 1/24 h⁴ times the fourth derivative, here 160: it falls
-/// to a sixteenth with half the distance.
+/// The error of a cubic through nodes at a distance h is at most 1/24 h⁴ times the fourth derivative, here 160: it
+/// falls to a sixteenth with half the distance.
 TEST(NodePrediction, IsOfFourthOrder) {
   const FlowMap map = map_of({0, 1, 0.5}, smooth);
   const double coarse = error_of(map, {}, 8, 10), fine = error_of(map, {}, 4, 10);
