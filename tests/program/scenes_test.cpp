@@ -29,7 +29,8 @@ TEST_P(ExampleScene, RendersAndBendsLight) {
   const std::string scene = GetParam().string();
   const Outcome outcome = run_well({"render", scene, "-o", "out.exr", "--set", "light.photons=4000", "--set",
                                     "receiver.resolution=[64,64]", "--set", "light.wavelengths.count=8", "--set",
-                                    "camera.resolution=[64,64]", "--set", "integrator.max_samples=4"});
+                                    "camera.resolution=[64,64]", "--set", "integrator.max_samples=4", "--set",
+                                    "integrator.caustic.resolution=256", "--set", "integrator.caustic.rays=16384"});
   if (read_file(scene).find("\"scale\"") == std::string::npos) {
     EXPECT_NE(outcome.error.find("the median ray turns by"), std::string::npos) << outcome.error;
   }
@@ -57,7 +58,8 @@ class WholeExample : public ExampleScene {};
 /// No pixel is above 20 times the median of those around it.
 TEST_P(WholeExample, HasNoFireflies) {
   run_well({"render", GetParam().string(), "-q", "-o", "out.exr", "--set", "camera.resolution=[64,48]", "--set",
-            "integrator.max_samples=32"});
+            "integrator.max_samples=32", "--set", "integrator.caustic.resolution=256", "--set",
+            "integrator.caustic.rays=16384"});
   const Image image = read_image(in_folder("out.exr"));
   for (int y = 1; y + 1 < image.height; ++y)
     for (int x = 1; x + 1 < image.width; ++x) {
