@@ -286,12 +286,13 @@ class FlowMapBuilder {
     const std::uint32_t side = side_of(square), half = side / 2, x = square.x, y = square.y, p = square.patch;
     const auto& [a, b, c, d] = square.corners;
     // At the silhouette, landings are singular: neighbours say little about each other.
-    if (settings_.silhouette && is_on_border(square))
-      return {position(p, x + half, y), position(p, x + side, y + half), position(p, x + half, y + side),
-              position(p, x, y + half), position(p, x + half, y + half)};
-    return {position(p, x + half, y, {{a, b}, 2}), position(p, x + side, y + half, {{b, c}, 2}),
-            position(p, x + half, y + side, {{c, d}, 2}), position(p, x, y + half, {{d, a}, 2}),
-            position(p, x + half, y + half, {{a, b, c, d}, 4})};
+    const bool has_parents = !settings_.silhouette || !is_on_border(square);
+    const auto middle = [&](std::uint32_t at_x, std::uint32_t at_y, const Parents& parents) {
+      return position(p, at_x, at_y, has_parents ? parents : Parents());
+    };
+    return {middle(x + half, y, {{a, b}, 2}), middle(x + side, y + half, {{b, c}, 2}),
+            middle(x + half, y + side, {{c, d}, 2}), middle(x, y + half, {{d, a}, 2}),
+            middle(x + half, y + half, {{a, b, c, d}, 4})};
   }
 
   /// Where landings are smooth, the deviation falls to a quarter from level to level; at singular places, by less. The
