@@ -5,9 +5,19 @@
 namespace tensorray {
 namespace {
 
-constexpr float gain = 8;         // Halving the distance of nodes: 16 for smooth landings; less, to be safe.
-constexpr float parent_part = 4;  // The parents' distance from their mean, over the error of the mean in their middle,
-                                  // which is of second order.
+constexpr std::size_t quarters = 4, quarter_nodes = (range_nodes - 1) / quarters;
+constexpr float gain = 4;         // Halving the distance of nodes: 16 for smooth landings; less, to be safe.
+constexpr float parent_part = 1;  // The parents' distance from their mean, over the error of the mean in their middle,
+                                  // which is of second order: 4 and more; less, to be safe.
+
+/// The first node of a quarter, and its last one, which is also the first one of the next quarter.
+std::size_t first_of(std::size_t quarter) { return quarter * quarter_nodes; }
+std::size_t last_of(std::size_t quarter) { return (quarter + 1) * quarter_nodes; }
+
+/// Whether the nodes from `first` to `last` have some of a quarter's between them.
+bool overlaps(std::size_t first, std::size_t last, std::size_t quarter) {
+  return first < last_of(quarter) && last > first_of(quarter);
+}
 
 /// The value at a node of the polynomial through `count` nodes from `first` on.
 struct Stencil {
@@ -56,6 +66,15 @@ Eigen::Vector2f missed(const Eigen::Vector2f* landings, std::size_t step, std::s
   return landings[node] - polynomials(step).at(landings, node);
 }
 
+/// Whether the nodes from which a quarter's are predicted have one face.
+bool is_one_face(std::size_t quarter, std::size_t step, const ExitFaces& faces) {
+  const Polynomials& all = polynomials(step);
+  const std::size_t first = all.stencils[first_of(quarter) + 1].first, last = all.stencils[last_of(quarter) - 1].first;
+  for (std::size_t node = first + step; node < last + all.count * step; node += step)
+    if (faces[node] != faces[first]) return false;
+  return true;
+}
+
 }  // namespace
 
 NodePrediction::NodePrediction(FlowMap& map, std::size_t position, const Parents& parents, const Eigen::Array2f& plate)
@@ -74,12 +93,6 @@ NodePrediction::NodePrediction(FlowMap& map, std::size_t position, const Parents
   }
 }
 
-bool NodePrediction::all_landed(std::size_t step) const {
-  for (std::size_t node = 0; node < range_nodes; node += step)
-    if (!landed(node)) return false;
-  return true;
-}
-
 bool NodePrediction::is_on_plate(std::size_t node) const {
   return landed(node) && (landings_[node].array() >= 0).all() && (landings_[node].array() <= plate_).all();
 }
@@ -90,21 +103,34 @@ bool NodePrediction::matters(std::size_t node, std::size_t step) const {
   return (landed(node) && landed(next)) || is_on_plate(node) || is_on_plate(next);
 }
 
+bool NodePrediction::is_open(std::size_t node) const {
+  for (std::size_t quarter = 0; quarter < quarters; ++quarter)
+    if (!is_predicted_[quarter] && first_of(quarter) <= node && node <= last_of(quarter)) return true;
+  return false;
+}
+
 bool NodePrediction::parents_agree(std::size_t step, float tolerance) const {
+  for (std::size_t quarter = 0; quarter < quarters; ++quarter)
+    if (!parents_agree(quarter, step, tolerance)) return false;
+  return true;
+}
+
+bool NodePrediction::parents_agree(std::size_t quarter, std::size_t step, float tolerance) const {
   if (parent_count_ == 0) return false;
   // Of two, each differs from the mean as much as the other one.
   for (std::size_t i = parent_count_ == 2 ? 1 : 0; i < parent_count_; ++i) {
-    std::array<Eigen::Vector2f, range_nodes> difference;
-    for (std::size_t node = 0; node < range_nodes; ++node) difference[node] = parents_[i][node] - mean_[node];
-    for (std::size_t node = 0; node < range_nodes; ++node)
-      if (!(missed(difference.data(), step, node).norm() <= parent_part * tolerance)) return false;
+    for (std::size_t node = first_of(quarter); node <= last_of(quarter); ++node) {
+      const Eigen::Vector2f difference = missed(parents_[i], step, node) - missed(mean_.data(), step, node);
+      if (!(difference.norm() <= parent_part * tolerance)) return false;
+    }
   }
   return true;
 }
 
-bool NodePrediction::is_smooth(std::size_t step, float tolerance) const {
+bool NodePrediction::is_smooth(std::size_t quarter, std::size_t step, float tolerance) const {
   const std::size_t coarse = 2 * step;
   for (std::size_t node = step; node < range_nodes; node += coarse) {
+    if (!overlaps(node - step, node + step, quarter)) continue;
     if (!matters(node - step, step) && !matters(node, step)) continue;
     const Stencil& stencil = polynomials(coarse).stencils[node];
     for (std::size_t i = 0; i < polynomials(coarse).count; ++i)
@@ -114,9 +140,12 @@ bool NodePrediction::is_smooth(std::size_t step, float tolerance) const {
   return true;
 }
 
-bool NodePrediction::is_smooth_beside_parents(std::size_t step, float tolerance) const {
-  if (!all_landed(step) || !parents_agree(step, tolerance)) return false;
+bool NodePrediction::is_smooth_beside_parents(std::size_t quarter, std::size_t step, float tolerance) const {
+  for (std::size_t node = 0; node < range_nodes; node += step)
+    if (!landed(node)) return false;
+  if (!parents_agree(quarter, step, tolerance)) return false;
   for (std::size_t node = step; node < range_nodes; node += 2 * step) {
+    if (!overlaps(node - step, node + step, quarter)) continue;
     const Eigen::Vector2f differs = missed(landings_, 2 * step, node) - missed(mean_.data(), 2 * step, node);
     if (!(differs.norm() / gain <= tolerance)) return false;
   }
@@ -136,18 +165,35 @@ Eigen::Vector2f NodePrediction::between(std::size_t node, std::size_t step) cons
   return all.at(landings_, node);
 }
 
-bool NodePrediction::predict(std::size_t step, float tolerance) const {
-  const bool beside_parents = is_smooth_beside_parents(step, tolerance);
-  // Three nodes do not tell by themselves how smooth landings are.
-  if (!beside_parents && (step > 8 || !is_smooth(step, tolerance))) return false;
-  for (std::size_t node = 0; node < range_nodes; ++node) {
+/// Sets the nodes of a quarter that are not traced.
+void NodePrediction::set(std::size_t quarter, std::size_t step, bool beside_parents, ExitFaces& faces) {
+  for (std::size_t node = first_of(quarter); node <= last_of(quarter); ++node) {
     if (node % step == 0) continue;
     const std::size_t before = node / step * step;
     ends_[node] = ends_[2 * (node - before) < step ? before : before + step];
+    faces[node] = faces[before];
     landings_[node] = between(node, step);
     if (beside_parents) landings_[node] += missed(mean_.data(), step, node);
   }
-  return true;
+}
+
+bool NodePrediction::predict(std::size_t step, float tolerance, ExitFaces& faces) {
+  if (step == 1) return true;
+  std::array<bool, quarters> is_ready{}, beside_parents{};
+  for (std::size_t quarter = 0; quarter < quarters; ++quarter) {
+    if (is_predicted_[quarter] || !is_one_face(quarter, step, faces)) continue;
+    beside_parents[quarter] = is_smooth_beside_parents(quarter, step, tolerance);
+    // Three nodes do not tell by themselves how smooth landings are.
+    is_ready[quarter] = beside_parents[quarter] || (step <= quarter_nodes && is_smooth(quarter, step, tolerance));
+  }
+  const auto is_true = [](bool each) { return each; };
+  if (step > quarter_nodes && !std::all_of(is_ready.begin(), is_ready.end(), is_true)) return false;
+  for (std::size_t quarter = 0; quarter < quarters; ++quarter) {
+    if (!is_ready[quarter]) continue;
+    set(quarter, step, beside_parents[quarter], faces);
+    is_predicted_[quarter] = true;
+  }
+  return std::all_of(is_predicted_.begin(), is_predicted_.end(), is_true);
 }
 
 }  // namespace tensorray

@@ -15,17 +15,21 @@ namespace tensorray {
 
 constexpr std::size_t range_nodes = 33;
 
+/// The face of the volume through which light leaves it, at each node.
+using ExitFaces = std::array<std::uint8_t, range_nodes>;
+
 /// The positions in whose middle a new one lies, all of them traced: the ends of a side, or the corners of a square.
 struct Parents {
   std::array<std::uint32_t, 4> positions{};
   std::size_t count = 0;  ///< 0, 2 or 4.
 };
 
-/// The landings of a position at all nodes, of which every `step`-th is traced; step: 16, 8, 4 or 2.
+/// The landings of a position at all nodes, of which every `step`-th is traced; step: 16, 8, 4, 2 or 1.
 ///
-/// A polynomial through the nearest traced nodes (a parabola through three, else a cubic through four) predicts the
+/// A polynomial through the nearest known nodes (a parabola through three, else a cubic through four) predicts the
 /// others. Where all light of the parents lands, the mean of what this would have missed of theirs is added: then only
-/// what differs from position to position is left as an error.
+/// what differs from position to position is left as an error. Each quarter of the range is predicted on its own, as
+/// soon as it can be: a kink needs all nodes only about its place.
 class NodePrediction {
  public:
   /// @param plate  Width and height of the plate, pixels.
@@ -35,19 +39,26 @@ class NodePrediction {
   /// pixels.
   bool parents_agree(std::size_t step, float tolerance) const;
 
-  /// Sets the nodes that are not traced, if they can be predicted to within `tolerance`, pixels, wherever light may
-  /// fall on the plate. The greatest of the traced nodes' distances from what every second one of them predicts tells:
-  /// where landings are smooth, the next one is an eighth of it, at most.
-  bool predict(std::size_t step, float tolerance) const;
+  /// Sets the nodes that are not traced in each quarter where they can be predicted to within `tolerance`, pixels,
+  /// wherever light may fall on the plate. The greatest of the traced nodes' distances from what every second one of
+  /// them predicts tells: where landings are smooth, the next one is a quarter of it, at most. They are not smooth
+  /// where light of the nodes leaves the volume through different faces.
+  /// @param faces  Of the nodes that are known; sets those of the others.
+  /// @return Whether all nodes are known.
+  bool predict(std::size_t step, float tolerance, ExitFaces& faces);
+
+  /// Whether a node is in a quarter that is not predicted yet.
+  bool is_open(std::size_t node) const;
 
  private:
   bool landed(std::size_t node) const { return ends_[node] == RayEnd::plate; }
-  bool all_landed(std::size_t step) const;
   bool is_on_plate(std::size_t node) const;
   bool matters(std::size_t node, std::size_t step) const;
-  bool is_smooth(std::size_t step, float tolerance) const;
-  bool is_smooth_beside_parents(std::size_t step, float tolerance) const;
+  bool is_smooth(std::size_t quarter, std::size_t step, float tolerance) const;
+  bool parents_agree(std::size_t quarter, std::size_t step, float tolerance) const;
+  bool is_smooth_beside_parents(std::size_t quarter, std::size_t step, float tolerance) const;
   Eigen::Vector2f between(std::size_t node, std::size_t step) const;
+  void set(std::size_t quarter, std::size_t step, bool beside_parents, ExitFaces& faces);
 
   Eigen::Vector2f* landings_;
   RayEnd* ends_;
@@ -55,6 +66,7 @@ class NodePrediction {
   std::size_t parent_count_ = 0;                   // 0 if some of their light does not land.
   std::array<Eigen::Vector2f, range_nodes> mean_;  // Of the parents' landings, if their light lands.
   Eigen::Array2f plate_;
+  std::array<bool, 4> is_predicted_{};  // By quarter.
 };
 
 }  // namespace tensorray

@@ -53,13 +53,14 @@ NodeTracer::NodeTracer(const TensorField& field, const Geometry& geometry, const
   for (std::size_t node = 0; node < nodes(); node += step) check_nodes_.push_back(node);
 }
 
-/// Adds every `step`-th node of each position, or, unless it is the first time, those of them that are not traced yet.
+/// Adds every `step`-th node of each position, or, unless it is the first time, those of them that are not known yet.
 /// Light of one node from neighbouring positions crosses the same cells of the field.
 void NodeTracer::add_rays(const std::vector<PartlyTraced>& positions, bool is_first, std::vector<NodeRay>& rays) {
   rays.clear();
   for (std::size_t node = 0; node < range_nodes; ++node)
     for (const PartlyTraced& each : positions)
-      if (is_first ? node % each.step == 0 : node % (2 * each.step) == each.step) rays.push_back({each.position, node});
+      if (is_first ? node % each.step == 0 : node % (2 * each.step) == each.step && each.prediction.is_open(node))
+        rays.push_back({each.position, node});
 }
 
 /// The lengths between those of three nodes: the parents' ways tell how they bend.
@@ -78,10 +79,11 @@ void NodeTracer::predict_lengths(FlowMap& map, std::size_t position, const Paren
 
 void NodeTracer::trace(FlowMap& map, std::size_t first, const std::vector<NewPosition>& positions) {
   std::vector<NodeRay> rays;
+  std::vector<ExitFaces> faces(positions.size());
   if (!is_range_) {
     for (std::size_t node = 0; node < nodes(); ++node)
       for (std::size_t i = 0; i < positions.size(); ++i) rays.push_back({first + i, node});
-    return trace_rays(map, first, positions, rays);
+    return trace_rays(map, first, positions, rays, faces);
   }
   std::vector<PartlyTraced> rest;
   for (std::size_t i = 0; i < positions.size(); ++i) {
@@ -91,9 +93,9 @@ void NodeTracer::trace(FlowMap& map, std::size_t first, const std::vector<NewPos
   }
   for (bool is_first = true; !rest.empty(); is_first = false) {
     add_rays(rest, is_first, rays);
-    trace_rays(map, first, positions, rays);
-    const auto is_done = [&](const PartlyTraced& each) {
-      if (each.step > 1 && !each.prediction.predict(each.step, tolerance_)) return false;
+    trace_rays(map, first, positions, rays, faces);
+    const auto is_done = [&](PartlyTraced& each) {
+      if (!each.prediction.predict(each.step, tolerance_, faces[each.position - first])) return false;
       if (each.step == coarsest_step) predict_lengths(map, each.position, positions[each.position - first].parents);
       return true;
     };
@@ -112,8 +114,18 @@ RayEnd NodeTracer::end_of(const RayBatch& rays, std::size_t ray, const Eigen::Ve
   return body_->absorber(rays.position[ray] + off_body_ * back, back) ? RayEnd::obstacle : RayEnd::plate;
 }
 
+/// The face of the volume's box through which the straight end of a ray left it, 0 to 5.
+std::uint8_t NodeTracer::exit_face(const Eigen::Vector3d& position, const Eigen::Vector3d& direction) const {
+  const Eigen::Array3d at = field_.to_index() * position, along = field_.to_index().linear() * direction;
+  const Eigen::AlignedBox3d& box = field_.index_bounds();
+  const Eigen::Array3d face = (along > 0).select(box.max().array(), box.min().array());
+  Eigen::Index axis = 0;
+  (along != 0).select((face - at) / along, std::numeric_limits<double>::infinity()).minCoeff(&axis);
+  return static_cast<std::uint8_t>(2 * axis + (along[axis] > 0 ? 1 : 0));
+}
+
 void NodeTracer::trace_rays(FlowMap& map, std::size_t first, const std::vector<NewPosition>& positions,
-                            const std::vector<NodeRay>& rays) {
+                            const std::vector<NodeRay>& rays, std::vector<ExitFaces>& faces) {
   RayBatch batch;
   for (const NodeRay& ray : rays) {
     const Eigen::Vector3d& origin = positions[ray.position - first].origin;
@@ -128,6 +140,7 @@ void NodeTracer::trace_rays(FlowMap& map, std::size_t first, const std::vector<N
     const std::size_t at = position * nodes() + node;
     map.landings[at] = plate_.to_pixel(place_on(plate_, geometry_, beam_, batch.position[i])).cast<float>();
     map.ends[at] = end_of(batch, i, positions[position - first].origin);
+    if (is_range_) faces[position - first][node] = exit_face(batch.position[i], batch.direction[i]);
     if (node % map.check_step == 0)
       map.lengths[position * check_nodes_.size() + node / map.check_step] = static_cast<float>(batch.length[i]);
   }

@@ -60,9 +60,10 @@ class NodeTracer {
 
   static void add_rays(const std::vector<PartlyTraced>& positions, bool is_first, std::vector<NodeRay>& rays);
   void trace_rays(FlowMap& map, std::size_t first, const std::vector<NewPosition>& positions,
-                  const std::vector<NodeRay>& rays);
+                  const std::vector<NodeRay>& rays, std::vector<ExitFaces>& faces);
   void predict_lengths(FlowMap& map, std::size_t position, const Parents& parents) const;
   RayEnd end_of(const RayBatch& rays, std::size_t ray, const Eigen::Vector3d& origin) const;
+  std::uint8_t exit_face(const Eigen::Vector3d& position, const Eigen::Vector3d& direction) const;
 
   const TensorField& field_;
   const Geometry& geometry_;
