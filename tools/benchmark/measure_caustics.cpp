@@ -1,7 +1,9 @@
+#include <algorithm>
 #include <cmath>
 #include <filesystem>
 #include <fstream>
 #include <limits>
+#include <vector>
 
 #include <fmt/format.h>
 
@@ -89,13 +91,42 @@ Picture render(const TemporaryFolder& folder, const CausticScene& scene, const E
   return {read_image(picture), Json::parse(file)};
 }
 
-Json row_of(const Estimate& estimate, const Picture& picture, const Image& exact) {
+/// Whether the light of a pixel differs from that of each of its neighbours by less than a tenth of the mean: there is
+/// no fold and no singular line.
+std::vector<bool> even_pixels(const Image& exact) {
+  const auto light = [&](int x, int y) {
+    const float* const pixel = exact.pixel(x, y);
+    return pixel[0] + pixel[1] + pixel[2];
+  };
+  double mean = 0;
+  for (int y = 0; y < exact.height; ++y)
+    for (int x = 0; x < exact.width; ++x) mean += light(x, y) / (double(exact.width) * exact.height);
+  std::vector<bool> is_even(static_cast<std::size_t>(exact.width) * exact.height, true);
+  for (int y = 0; y < exact.height; ++y)
+    for (int x = 0; x < exact.width; ++x)
+      for (int v = std::max(y - 1, 0); v <= std::min(y + 1, exact.height - 1); ++v)
+        for (int u = std::max(x - 1, 0); u <= std::min(x + 1, exact.width - 1); ++u)
+          if (std::abs(light(u, v) - light(x, y)) > 0.1 * mean)
+            is_even[static_cast<std::size_t>(y) * exact.width + x] = false;
+  return is_even;
+}
+
+/// The picture, black where `keeps` is false.
+Image parts_of(Image image, const std::vector<bool>& keeps) {
+  const std::size_t channels = image.channels.size();
+  for (std::size_t i = 0; i < image.pixels.size(); ++i)
+    if (!keeps[i / channels]) image.pixels[i] = 0;
+  return image;
+}
+
+Json row_of(const Estimate& estimate, const Picture& picture, const Image& exact, const std::vector<bool>& is_even) {
   const Json& seconds = picture.statistics.at("seconds");
   Json row = {{"name", estimate.name},
               {"positions", picture.statistics.at("positions")},
               {"seconds", seconds.at("total")},
               {"seconds_of_light", seconds.at("trace").get<double>() + seconds.at("density").get<double>()},
-              {"error", relative_distance(picture.image, exact)}};
+              {"error", relative_distance(picture.image, exact)},
+              {"even_error", relative_distance(parts_of(picture.image, is_even), parts_of(exact, is_even))}};
   if (picture.statistics.contains("error")) row["estimate"] = picture.statistics.at("error");
   return row;
 }
@@ -127,13 +158,15 @@ Json measure_caustics(const Options& options) {
     options.announce(fmt::format("caustics: {}, reference", scene.name));
     const Json exact_density = {{"kind", "mesh"}, {"error", options.quick ? 0.005 : 0.01}};
     const Image exact = render(folder, scene, {"reference", exact_density, 1u << 23}, side).image;
+    const std::vector<bool> is_even = even_pixels(exact);
+    const double even_part = static_cast<double>(std::count(is_even.begin(), is_even.end(), true)) / (side * side);
     Json rows = Json::array();
     for (const Estimate& estimate : estimates(options.quick)) {
       options.announce(fmt::format("caustics: {}, {}", scene.name, estimate.name));
-      rows.push_back(row_of(estimate, render(folder, scene, estimate, side), exact));
+      rows.push_back(row_of(estimate, render(folder, scene, estimate, side), exact, is_even));
     }
     const double slowdown = slowdown_of_photons(rows);
-    results.push_back({{"scene", scene.name}, {"side", side}, {"rows", std::move(rows)}});
+    results.push_back({{"scene", scene.name}, {"side", side}, {"even_part", even_part}, {"rows", std::move(rows)}});
     if (slowdown > 0) results.back()["photons_over_mesh"] = slowdown;
   }
   return results;

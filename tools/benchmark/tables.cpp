@@ -167,15 +167,20 @@ std::string caustics_text(const Json& caustics) {
   for (const Json& scene : caustics) {
     std::vector<Row> rows{
         {fmt::format("light on a plate: {}, {}²", scene.at("scene").get<std::string>(), scene.at("side").get<int>()),
-         "positions", "trace and draw", "total", "error", "estimate"}};
+         "positions", "trace and draw", "total", "error", "where even", "estimate"}};
     for (const Json& row : scene.at("rows")) {
       rows.push_back({row.at("name"), fmt::format("{}", row.at("positions").get<std::uint64_t>()),
                       fmt::format("{:.2f} s", number(row, "seconds_of_light")),
                       fmt::format("{:.2f} s", number(row, "seconds")),
-                      fmt::format("{:.2f}%", 100 * number(row, "error"))});
+                      fmt::format("{:.2f}%", 100 * number(row, "error")),
+                      fmt::format("{:.2f}%", 100 * number(row, "even_error"))});
       if (row.contains("estimate")) rows.back().push_back(fmt::format("{:.2f}%", 100 * number(row, "estimate")));
     }
     text += table(rows);
+    text += fmt::format(
+        "even: {:.0f}% of the pixels, whose light differs from their neighbours' by less than a tenth of "
+        "the mean\n",
+        100 * number(scene, "even_part"));
     if (scene.contains("photons_over_mesh"))
       text += fmt::format("photons take {:.0f} times as long for the error of the first row\n",
                           number(scene, "photons_over_mesh"));
