@@ -33,7 +33,7 @@ struct Caustic {
 };
 
 /// Distance, in pixels, between the places where a triangle is drawn: an error of about 1% of a picture.
-constexpr double usual_step = 0.7;
+constexpr double usual_step = 0.65;
 
 /// Draws each triangle as often as its light moves by `step` from the first band to the last: once for several bands
 /// in a row where light moves less, at most 16 times for each band where it moves more (every two steps where these are
