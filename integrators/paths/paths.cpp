@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <stdexcept>
 
 #include <tbb/enumerable_thread_specific.h>
@@ -92,21 +93,68 @@ void remove_coincident(PathPoints& points, double gap, double least) {
   points.resize(kept);
 }
 
+/// What is interpolated between the points that stay, and how far it may be off. Single precision, in vectors.
+class Interpolation {
+ public:
+  Interpolation(const PathPoints& points, double tolerance, double tensor_tolerance)
+      : values_(points.size(), 12), lengths_(points.size()), norms_(points.size()) {
+    const auto factor = [](double allowed) { return std::min(static_cast<float>(1 / (allowed * allowed)), strict); };
+    position_factor_ = factor(tolerance);
+    tensor_factor_ = factor(tensor_tolerance);
+    double greatest = std::numeric_limits<double>::min();  // The error is relative to it: squares stay in range.
+    for (const PathPoint& point : points) greatest = std::max(greatest, point.tensor.norm());
+    for (Eigen::Index i = 0; i < lengths_.size(); ++i) {
+      const PathPoint& point = points[static_cast<std::size_t>(i)];
+      values_.row(i).head<3>() = (point.position - points[0].position).cast<float>().array();
+      values_.row(i).tail<9>() =
+          (Eigen::Map<const Eigen::Array<double, 1, 9>>(point.tensor.data()) * (1 / greatest)).cast<float>();
+      lengths_[i] = point.length;
+      norms_[i] = values_.row(i).tail<9>().square().sum();
+    }
+  }
+
+  /// The error is the square of the one in the tolerances' units.
+  Worst worst(std::size_t first, std::size_t last) const {
+    Worst found;
+    for (std::size_t begin = first + 1; begin < last && found.error < strict; begin += block) {
+      Eigen::Index at = 0;
+      const float error = errors(first, last, begin, std::min(begin + block, last)).maxCoeff(&at);
+      if (!(error <= found.error)) found = {error, begin + static_cast<std::size_t>(at)};
+    }
+    return found;
+  }
+
+ private:
+  static constexpr std::size_t block = 64;  // Points that are compared together.
+  static constexpr float strict = 1e30f;    // The factor of an error that is not allowed.
+  using Block = Eigen::Array<float, Eigen::Dynamic, 1, 0, block, 1>;
+
+  Block errors(std::size_t first, std::size_t last, std::size_t begin, std::size_t end) const {
+    const auto i = static_cast<Eigen::Index>(first), j = static_cast<Eigen::Index>(last),
+               from = static_cast<Eigen::Index>(begin), count = static_cast<Eigen::Index>(end - begin);
+    const Block t = ((lengths_.segment(from, count) - lengths_[i]) / (lengths_[j] - lengths_[i])).cast<float>();
+    const auto squared = [&](Eigen::Index value) {
+      const auto column = values_.col(value);
+      return (column[i] + t * (column[j] - column[i]) - column.segment(from, count)).square();
+    };
+    Block apart = squared(0), unlike = squared(3);
+    for (Eigen::Index value = 1; value < 3; ++value) apart += squared(value);
+    for (Eigen::Index value = 4; value < 12; ++value) unlike += squared(value);
+    const Block norm = norms_.segment(from, count).max(std::max({norms_[i], norms_[j], least_norm}));
+    return (apart * position_factor_).max(unlike * tensor_factor_ / norm);
+  }
+
+  static constexpr float least_norm = std::numeric_limits<float>::min();  // No division by zero.
+  Eigen::Array<float, Eigen::Dynamic, 12> values_;  // A row for each point: its position, and its tensor's components.
+  Eigen::ArrayXd lengths_;
+  Eigen::ArrayXf norms_;  // Squares of the tensors' norms.
+  float position_factor_ = 0, tensor_factor_ = 0;
+};
+
 PathPoints thinned(const PathPoints& points, double tolerance, double tensor_tolerance) {
-  std::vector<double> norms;
-  norms.reserve(points.size());
-  for (const PathPoint& point : points) norms.push_back(point.tensor.norm());
-  const auto error = [&](std::size_t i, std::size_t j, std::size_t k) {
-    const PathPoint &a = points[i], &b = points[j], &point = points[k];
-    const double t = (point.length - a.length) / (b.length - a.length);
-    const double apart = (a.position + t * (b.position - a.position) - point.position).norm();
-    const double unlike = (a.tensor + t * (b.tensor - a.tensor) - point.tensor).norm();
-    const double norm = std::max({norms[i], norms[j], norms[k]});
-    // An error of zero is always allowed.
-    const auto over = [](double value, double allowed) { return value > 0 ? value / allowed : 0; };
-    return std::max(over(apart, tolerance), over(unlike, tensor_tolerance * norm));
-  };
-  const std::vector<std::size_t> needed = tensorray::thinned(points.size(), error);
+  const Interpolation interpolation(points, tolerance, tensor_tolerance);
+  const std::vector<std::size_t> needed = tensorray::thinned(
+      points.size(), [&](std::size_t first, std::size_t last) { return interpolation.worst(first, last); });
   PathPoints kept;
   kept.reserve(needed.size());  // Saves memory: there may be many paths.
   for (const std::size_t i : needed) kept.push_back(points[i]);

@@ -82,8 +82,15 @@ Tube adapted(const Tube& tube, double tolerance, double value_tolerance, double 
     return std::max(
         {apart / (tolerance / 2), off(&TubePoint::value, value_tolerance), off(&TubePoint::shade, shade_tolerance)});
   };
+  const auto worst = [&](std::size_t i, std::size_t j) {
+    Worst found;
+    // Where no error is allowed, the first one is enough.
+    for (std::size_t k = i + 1; k < j && !std::isinf(found.error); ++k)
+      if (const double each = error(i, j, k); !(each <= found.error)) found = {each, k};
+    return found;
+  };
   Tube result;
-  for (const std::size_t i : thinned(tube.size(), error)) {
+  for (const std::size_t i : thinned(tube.size(), worst)) {
     if (!result.empty()) {
       const TubePoint last = result.back();
       const double wanted = std::ceil(std::sqrt(deviation(last, tube[i]) / (tolerance / 2)));

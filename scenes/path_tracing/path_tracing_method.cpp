@@ -132,11 +132,14 @@ SurfacePicture render_stage(const Scene& scene, const PathScene& path_scene, con
 
 Render LoadedPaths::render(const Scene& scene, const Progress& progress, RenderJob* job) const {
   const PathTracingDescription& description = paths_.settings;
+  const OutputDescription& output = scene.description.output;
+  const bool has_picture = output.wants("image") || output.wants("exr") || output.wants("spectral");
   const ShownLight& light = paths_.lights.light;
   const auto start = Clock::now();
   Render result;
   result.paths = follow_paths(scene, paths_, progress, result.statistics);
   result.statistics.seconds_tracing = seconds_since(start);
+  if (!has_picture && !output.wants("tubes")) return result;
 
   const auto drawing = Clock::now();
   const PathColors colors = path_colors(description.color, result.paths);
@@ -148,15 +151,17 @@ Render LoadedPaths::render(const Scene& scene, const Progress& progress, RenderJ
     result.annotate = [legend = colors.legend, matrix = light.rec709_to_working](Image& image) {
       legend(image, matrix);
     };
-  if (scene.description.output.wants("tubes"))
+  if (output.wants("tubes"))
     result.write_tubes = [tubes = std::move(shapes.tubes), colors](const std::filesystem::path& file,
                                                                    const std::vector<Path>& paths) {
       write_tubes(file, tubes, paths, colors);
     };
+  if (!has_picture) return result;
+
   const LightGroups groups = light_groups(scene.description);
   const auto add_picture = [&](const SurfacePicture& picture, Render& render) {
     render.linear = make_image(picture, light, description, groups);
-    if (scene.description.output.wants("spectral"))
+    if (output.wants("spectral"))
       render.spectral = spectral_image(picture.radiance, light.bands, 1, light.xyz_to_working);
   };
   const RenderCallbacks callbacks = callbacks_of(progress, job, [&](const SurfacePicture& picture) {

@@ -187,6 +187,19 @@ TEST_F(Paths, TracksAreWrittenAndRead) {
   EXPECT_EQ(greatest(channel(read, "force")), 0) << "tracks hold no tensors";
 }
 
+TEST_F(Paths, FilesOfPathsNeedNoPicture) {
+  render({}, {"out.vtp", "out.ply"});
+  for (const char* ending : {".ply", ".vtp"}) {
+    std::vector<std::string> all = arguments({std::string("alone") + ending}, {});
+    all.insert(all.end(), {"--stats", "stats.json"});
+    run_well(all);
+    EXPECT_TRUE(read_file(in_folder(std::string("alone") + ending)) ==
+                read_file(in_folder(std::string("out") + ending)))
+        << ending;
+  }
+  EXPECT_EQ(read_json("stats.json")["seconds"]["draw"], 0);
+}
+
 TEST_F(Paths, TubesAreObstaclesOfAnotherScene) {
   run_well(arguments({"tube.ply"}, {"integrator.seeds.count=1", "integrator.radius.typical=0.1"}));
   EXPECT_EQ(read_file(in_folder("tube.ply")).compare(0, 4, "ply\n"), 0);

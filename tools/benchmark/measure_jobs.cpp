@@ -16,6 +16,7 @@ struct RenderJob {
   std::string name;
   int resolution = 64;  ///< Voxels along the longest axis of the field.
   Json scene;           ///< The scene without the tensors of its field.
+  std::vector<std::string> outputs{"picture.png", "picture.exr"};
 };
 
 /// @param side  Edge of the square picture, pixels.
@@ -42,14 +43,23 @@ RenderJob path_job(int resolution, int seeds, int side) {
            {"camera", {{"resolution", {side, side}}}}}};
 }
 
+/// The bent rays alone, as a file.
+RenderJob track_job(int resolution, int seeds) {
+  return {fmt::format("{} paths, .tck", seeds),
+          resolution,
+          {{"integrator", {{"type", "path_tracing"}, {"seeds", {{"kind", "grid"}, {"count", seeds}}}}}},
+          {"paths.tck"}};
+}
+
 /// Larger fields get fewer rays, so that each job takes a few seconds apart from loading its field.
 std::vector<RenderJob> jobs(bool quick) {
-  if (quick) return {photon_job(16, 200, 32), lens_job(16, 32), path_job(16, 9, 32)};
+  if (quick) return {photon_job(16, 200, 32), lens_job(16, 32), path_job(16, 9, 32), track_job(16, 9)};
   std::vector<RenderJob> result;
   for (const int resolution : {64, 128, 256, 512}) {
     result.push_back(photon_job(resolution, 4194304u / static_cast<unsigned>(resolution), 1024));
     result.push_back(lens_job(resolution, std::min(256, 32768 / resolution)));
     result.push_back(path_job(resolution, 1000, 256));
+    result.push_back(track_job(resolution, 200000));
   }
   return result;
 }
@@ -62,12 +72,12 @@ Json run_job(const TemporaryFolder& folder, const RenderJob& job, int threads, c
   scene["field"]["eigenvalues"] = "raw";
   const auto scene_path = folder / "scene.json", statistics_path = folder / "statistics.json";
   std::ofstream(scene_path) << scene;
-  std::vector<std::string> arguments{"render",    scene_path.string(),
-                                     "-o",        (folder / "picture.png").string(),
-                                     "-o",        (folder / "picture.exr").string(),
-                                     "--stats",   statistics_path.string(),
-                                     "--threads", std::to_string(threads),
-                                     "--quiet"};
+  std::vector<std::string> arguments{"render",    scene_path.string(),     "--stats", statistics_path.string(),
+                                     "--threads", std::to_string(threads), "--quiet"};
+  for (const std::string& output : job.outputs) {
+    arguments.push_back("-o");
+    arguments.push_back((folder / output).string());
+  }
   arguments.insert(arguments.end(), options.begin(), options.end());
   run_program(sibling(program), arguments);
   std::ifstream file(statistics_path);
