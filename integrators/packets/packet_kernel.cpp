@@ -440,18 +440,45 @@ std::uint64_t run(const TensorField& field, const KernelSettings& settings, Kern
   return HWY_DYNAMIC_DISPATCH(trace)(medium, batch);
 }
 
+namespace {
+
+/// Instruction sets with which the kernel is slower than with narrower vectors. Zen 4 does the operations of AVX-512 in
+/// two halves, and waits longer for loads into one lane after the other.
+std::int64_t slow_targets() {
+#if defined(__x86_64__) && defined(__GNUC__)
+  __builtin_cpu_init();
+  const bool is_zen4 = __builtin_cpu_is("amd") && __builtin_cpu_supports("avx512f") &&
+                       !__builtin_cpu_supports("avx512vp2intersect");  // Zen 5 has it.
+  return is_zen4 ? HWY_AVX3 : 0;
+#else
+  return 0;
+#endif
+}
+
+/// The processor's instruction sets, before any is disabled.
+const std::vector<std::int64_t>& targets() {
+  static const std::vector<std::int64_t> all = hwy::SupportedAndGeneratedTargets();
+  return all;
+}
+
+/// Selects an instruction set before any ray is traced.
+[[maybe_unused]] const bool is_selected = (use_instruction_set(""), true);
+
+}  // namespace
+
 std::vector<std::string> instruction_sets() {
   std::vector<std::string> names;
-  for (const std::int64_t target : hwy::SupportedAndGeneratedTargets()) names.push_back(hwy::TargetName(target));
+  for (const std::int64_t target : targets()) names.push_back(hwy::TargetName(target));
   return names;
 }
 
 void use_instruction_set(const std::string& name) {
-  hwy::SetSupportedTargetsForTest(0);
-  if (name.empty()) return;
-  for (const std::int64_t target : hwy::SupportedAndGeneratedTargets())
-    if (name == hwy::TargetName(target)) return hwy::SetSupportedTargetsForTest(target);
-  throw std::invalid_argument("this processor has no instruction set \"" + name + "\"");
+  const auto found = std::find_if(targets().begin(), targets().end(),
+                                  [&](std::int64_t target) { return name == hwy::TargetName(target); });
+  if (found == targets().end() && !name.empty())
+    throw std::invalid_argument("this processor has no instruction set \"" + name + "\"");
+  hwy::DisableTargets(name.empty() ? slow_targets() : 0);
+  hwy::SetSupportedTargetsForTest(name.empty() ? 0 : *found);
 }
 
 int lane_count() { return HWY_DYNAMIC_DISPATCH(vector_lanes)(); }

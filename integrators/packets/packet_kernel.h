@@ -68,10 +68,11 @@ struct KernelSettings {
 /// @return the number of tensor samples.
 std::uint64_t run(const TensorField& field, const KernelSettings& settings, KernelRays& batch);
 
-/// Names of the processor's vector instruction sets for which the kernel is compiled, best first. The first is used.
+/// Names of the processor's vector instruction sets for which the kernel is compiled, the widest first. It is used,
+/// unless a narrower one is faster.
 std::vector<std::string> instruction_sets();
 
-/// Selects one of `instruction_sets()`; empty: the best. For tests and benchmarks.
+/// Selects one of `instruction_sets()`; empty: the fastest. For tests and benchmarks.
 /// Threads: do not call it while rays are traced.
 void use_instruction_set(const std::string& name);
 
