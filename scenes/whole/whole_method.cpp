@@ -14,6 +14,7 @@
 #include "scenes/path_tracing/stage.h"
 #include "scenes/path_tracing/studio.h"
 #include "scenes/whole/objects.h"
+#include "scenes/whole/photons.h"
 #include "scenes/whole/sunlight.h"
 #include "scenes/whole/whole_description.h"
 
@@ -171,7 +172,16 @@ Render LoadedWhole::render(const Scene& scene, const Progress& progress, RenderJ
   set_groups(groups, shaded);
   shaded.bands_per_view = whole_.settings.bands_per_sample;
   shaded.bands_per_bounce = bands_per_bounce(whole_.settings);
-  if (bends) shaded.landed = land_light(scene, lights, light, objects, whole_.settings.caustic, progress);
+  const PathTracerSettings samples = whole_tracer_settings(scene, whole_, 0);
+  shaded.samples_per_photons = samples.first_samples;
+  TracedPhotons photons;
+  if (bends) {
+    const PhotonPairs pairs = photon_pairs(scene, lights, objects, whole_.settings);
+    photons = photons_of(scene, region, stage, lights, pairs, whole_.settings.photons,
+                         samples.max_samples / samples.first_samples, progress);
+    shaded.photons = &photons.passes;
+    shaded.landed = land_light(scene, lights, light, objects, whole_.settings.caustic, pairs, progress);
+  }
   result.statistics.seconds_tracing = seconds_since(start);
 
   start = Clock::now();
