@@ -72,12 +72,34 @@ std::vector<Chunk> chunks_of(const std::vector<Source>& sources) {
   return chunks;
 }
 
+/// Adds a photon, and its images beyond the edges of its plate that light points of the plate.
+void add_mirrored(const LandedPhoton& photon, const Plate& plate, double radius, std::vector<LandedPhoton>& photons) {
+  const Vector3d from = photon.position.cast<double>() - plate.center;
+  std::vector<LandedPhoton> images{photon};
+  for (const auto& [axis, size] : {std::pair(plate.right, plate.size.x()), std::pair(plate.up, plate.size.y())})
+    for (const double side : {-0.5, 0.5}) {
+      const double beyond = side * size - from.dot(axis);
+      if (std::abs(beyond) >= radius) continue;
+      for (std::size_t i = 0, count = images.size(); i < count; ++i) {
+        images.push_back(images[i]);
+        images.back().position += (2 * beyond * axis).cast<float>();
+      }
+    }
+  photons.insert(photons.end(), images.begin(), images.end());
+}
+
+/// Traces the photons of a pass.
 class PhotonTracer {
  public:
-  PhotonTracer(const BendingRegion& region, const SurfaceScene& surfaces, const PhotonSettings& settings)
-      : region_(region), surfaces_(surfaces), settings_(settings) {}
+  PhotonTracer(const BendingRegion& region, const SurfaceScene& surfaces, const PhotonSettings& settings, int pass)
+      : region_(region),
+        surfaces_(surfaces),
+        settings_(settings),
+        pass_(pass),
+        radius_(photon_radius(settings.radius, pass)) {}
 
-  ChunkPhotons trace(const Source& source, const Chunk& chunk, int pass) const;
+  ChunkPhotons trace(const Source& source, const Chunk& chunk) const;
+  double radius() const { return radius_; }
 
  private:
   void trace(const Source& source, PathSampler sampler, ChunkPhotons& result) const;
@@ -86,11 +108,13 @@ class PhotonTracer {
   const BendingRegion& region_;
   const SurfaceScene& surfaces_;
   const PhotonSettings& settings_;
+  int pass_;
+  double radius_;
 };
 
-ChunkPhotons PhotonTracer::trace(const Source& source, const Chunk& chunk, int pass) const {
+ChunkPhotons PhotonTracer::trace(const Source& source, const Chunk& chunk) const {
   ChunkPhotons result;
-  const std::uint64_t stream = static_cast<std::uint64_t>(source.light) * settings_.passes + pass;
+  const std::uint64_t stream = static_cast<std::uint64_t>(source.light) * settings_.passes + pass_;
   for (std::uint64_t i = chunk.first; i < chunk.last; ++i)
     trace(source, {settings_.seed ^ photon_seed, stream, static_cast<std::uint32_t>(i), 0}, result);
   return result;
@@ -132,7 +156,10 @@ PhotonEnd PhotonTracer::land(const Source& source, const BentWay& way, double po
   photon.surface = hit->surface;
   photon.light = source.light;
   photon.band = way.band;
-  result.landed.push_back(photon);
+  if (hit->surface < settings_.plates.size() && settings_.plates[hit->surface])
+    add_mirrored(photon, *settings_.plates[hit->surface], radius_, result.landed);
+  else
+    result.landed.push_back(photon);
   return PhotonEnd::landed;
 }
 
@@ -146,18 +173,18 @@ TracedPhotons trace_photons(const BendingRegion& region, const std::vector<Vecto
   const std::vector<Source> sources = sources_of(corners, surfaces, lights, settings);
   if (sources.empty()) return result;
   const std::vector<Chunk> chunks = chunks_of(sources);
-  const PhotonTracer tracer(region, surfaces, settings);
   for (int pass = 0; pass < settings.passes; ++pass) {
     progress.update("tracing photons", static_cast<std::uint64_t>(pass), static_cast<std::uint64_t>(settings.passes));
+    const PhotonTracer tracer(region, surfaces, settings, pass);
     std::vector<ChunkPhotons> parts(chunks.size());
     tbb::parallel_for(std::size_t{0}, chunks.size(),
-                      [&](std::size_t i) { parts[i] = tracer.trace(sources[chunks[i].source], chunks[i], pass); });
+                      [&](std::size_t i) { parts[i] = tracer.trace(sources[chunks[i].source], chunks[i]); });
     std::vector<LandedPhoton> landed;
     for (const ChunkPhotons& part : parts) {
       landed.insert(landed.end(), part.landed.begin(), part.landed.end());
       for (std::size_t end = 0; end < part.counts.size(); ++end) result.counts[end] += part.counts[end];
     }
-    result.passes.emplace_back(std::move(landed), photon_radius(settings.radius, pass));
+    result.passes.emplace_back(std::move(landed), tracer.radius());
   }
   return result;
 }

@@ -5,6 +5,7 @@
 #include <array>
 #include <cstdint>
 #include <functional>
+#include <optional>
 #include <vector>
 
 #include <Eigen/Core>
@@ -13,6 +14,7 @@
 #include "renderer/lights/lights.h"
 #include "renderer/shading/bending_region.h"
 #include "renderer/shading/landed_photons.h"
+#include "renderer/surfaces/plate.h"
 #include "renderer/surfaces/surface_scene.h"
 
 namespace tensorray {
@@ -25,6 +27,9 @@ struct PhotonSettings {
   std::uint64_t seed = 0;
   /// Whether a light lights a surface by photons.
   std::function<bool(int light, std::uint32_t surface)> serves;
+  /// Of surfaces that are rectangles, by their index: photons near an edge are mirrored at it, so that the light that
+  /// their radius takes beyond it comes back.
+  std::vector<std::optional<Plate>> plates;
 };
 
 /// Where photons went: they met a surface before the region (straight light, which photons do not count), landed on a

@@ -61,8 +61,9 @@ PhotonPairs photon_pairs(const Scene& scene, const std::vector<Light>& lights, c
 }
 
 TracedPhotons photons_of(const Scene& scene, const BendingRegion& region, const SurfaceScene& stage,
-                         const std::vector<Light>& lights, const PhotonPairs& pairs,
-                         const PhotonsDescription& description, int passes, const Progress& progress) {
+                         const std::vector<Light>& lights, const std::vector<SceneObject>& objects,
+                         const PhotonPairs& pairs, const PhotonsDescription& description, int passes,
+                         const Progress& progress) {
   PhotonSettings settings;
   settings.per_pass = description.per_pass;
   if (settings.per_pass == 0) return {};
@@ -70,6 +71,7 @@ TracedPhotons photons_of(const Scene& scene, const BendingRegion& region, const 
   settings.radius =
       description.max_radius.value_or(automatic_radius(scene.field, static_cast<double>(settings.per_pass)));
   settings.seed = scene.description.seed;
+  for (const SceneObject& object : objects) settings.plates.push_back(object.plate);
   settings.serves = [&pairs](int light, std::uint32_t surface) {
     const std::vector<bool>& of_light = pairs[static_cast<std::size_t>(light)];
     return surface < of_light.size() && of_light[surface];

@@ -23,7 +23,8 @@ PhotonPairs photon_pairs(const Scene& scene, const std::vector<Light>& lights, c
 /// @param passes  Of photons.
 /// @throw SceneError if a point light is within the volume; Cancelled.
 TracedPhotons photons_of(const Scene& scene, const BendingRegion& region, const SurfaceScene& stage,
-                         const std::vector<Light>& lights, const PhotonPairs& pairs,
-                         const PhotonsDescription& description, int passes, const Progress& progress);
+                         const std::vector<Light>& lights, const std::vector<SceneObject>& objects,
+                         const PhotonPairs& pairs, const PhotonsDescription& description, int passes,
+                         const Progress& progress);
 
 }  // namespace tensorray

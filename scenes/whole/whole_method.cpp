@@ -177,7 +177,7 @@ Render LoadedWhole::render(const Scene& scene, const Progress& progress, RenderJ
   TracedPhotons photons;
   if (bends) {
     const PhotonPairs pairs = photon_pairs(scene, lights, objects, whole_.settings);
-    photons = photons_of(scene, region, stage, lights, pairs, whole_.settings.photons,
+    photons = photons_of(scene, region, stage, lights, objects, pairs, whole_.settings.photons,
                          samples.max_samples / samples.first_samples, progress);
     shaded.photons = &photons.passes;
     shaded.landed = land_light(scene, lights, light, objects, whole_.settings.caustic, pairs, progress);
