@@ -17,7 +17,8 @@ using Eigen::Vector3d;
 /// First dimension of the sampler for shading; the camera uses those before.
 constexpr std::uint32_t first_dimension = 2;
 constexpr std::uint32_t dimensions_per_vertex = 5;
-constexpr std::uint32_t first_bent_dimension = 1u << 20;  ///< For wavelengths within their bands; one for each depth.
+constexpr std::uint32_t first_bent_dimension = 1u << 20;    ///< For wavelengths within their bands; one for each depth.
+constexpr std::uint32_t first_photon_dimension = 1u << 21;  ///< For passes of photons; one for each depth.
 
 /// Least cosine between the shading normal and the direction to the viewer. Interpolated normals can place the viewer
 /// below a surface that is seen from above.
@@ -67,7 +68,6 @@ void require_shadable(const ShadedScene& scene, const ShadingSettings& settings)
   for (const LandedLight& light : scene.landed)
     require(light.surface < scene.surfaces.surfaces().size() && light.bands == scene.colors.bands(),
             "landed light must have a surface and the bands of the light");
-  require(scene.samples_per_photons >= 1, "samples_per_photons must be >= 1");
   require(scene.groups == 0 || scene.group_of_light.size() == lights.size(), "each light must have a group, or −1");
 }
 
@@ -333,27 +333,29 @@ void RayShader::add_landed(int depth, int light) {
   if (contribution_.allFinite()) layers_.front() += contribution_;
 }
 
-/// A diffuse surface scatters all photons of its side alike.
-void RayShader::add_photons(const Vertex& vertex, int depth, const PathSampler& sampler) {
+/// A diffuse surface scatters all photons of its side alike. Each sample takes a pass by chance, so that the noise of
+/// photons is seen as that of samples.
+void RayShader::add_photons(const Vertex& vertex, int depth, PathSampler sampler) {
+  sampler.dimension = first_photon_dimension + static_cast<std::uint32_t>(depth);
   const std::vector<PhotonPass>& passes = *scene_.photons;
+  const auto pass = static_cast<std::size_t>(sampler.next_1d() * static_cast<double>(passes.size()));
   const bool is_diffuse = std::holds_alternative<Diffuse>(vertex.material->scattering);
   for (PhotonSum& sum : photon_sums_) sum.light = -1;
-  passes[sampler.sample / static_cast<std::uint32_t>(scene_.samples_per_photons) % passes.size()].visit(
-      vertex.hit, band_, [&](const LandedPhoton& photon, double density) {
-        const Vector3d wi = vertex.frame.transpose() * -photon.direction.cast<double>();
-        double scattered = density * photon.power;
-        if (!is_diffuse) {
-          evaluate(*vertex.material, reflectance_, wi, vertex.wo, contribution_);
-          scattered *= contribution_[photon.band];
-        } else if (!(wi.z() * vertex.wo.z() > 0)) {
-          return;
-        }
-        const int group = scene_.groups > 0 ? scene_.group_of_light[static_cast<std::size_t>(photon.light)] : -1;
-        PhotonSum& sum = photon_sums_[static_cast<std::size_t>(group + 1)];
-        if (sum.light < 0) sum.scattered.setZero();
-        sum.light = photon.light;
-        sum.scattered[photon.band] += scattered;
-      });
+  passes[pass].visit(vertex.hit, band_, [&](const LandedPhoton& photon, double density) {
+    const Vector3d wi = vertex.frame.transpose() * -photon.direction.cast<double>();
+    double scattered = density * photon.power;
+    if (!is_diffuse) {
+      evaluate(*vertex.material, reflectance_, wi, vertex.wo, contribution_);
+      scattered *= contribution_[photon.band];
+    } else if (!(wi.z() * vertex.wo.z() > 0)) {
+      return;
+    }
+    const int group = scene_.groups > 0 ? scene_.group_of_light[static_cast<std::size_t>(photon.light)] : -1;
+    PhotonSum& sum = photon_sums_[static_cast<std::size_t>(group + 1)];
+    if (sum.light < 0) sum.scattered.setZero();
+    sum.light = photon.light;
+    sum.scattered[photon.band] += scattered;
+  });
   for (const PhotonSum& sum : photon_sums_) {
     if (sum.light < 0) continue;
     contribution_ = throughput_ * sum.scattered;

@@ -61,9 +61,8 @@ struct ShadedScene {
   /// number of bands.
   int bands_per_view = 1, bands_per_bounce = 1;
   std::vector<LandedLight> landed = {};              ///< Light that bends on its way to surfaces.
-  const std::vector<PhotonPass>* photons = nullptr;  ///< Light that bends, too, on other surfaces; null or empty: none.
-  int samples_per_photons = 1;  ///< Successive samples of a pixel that see the same pass of photons; all bands must be
-                                ///< among those that they follow.
+  const std::vector<PhotonPass>* photons = nullptr;  ///< Light that bends, too, on other surfaces. Samples choose
+                                                     ///< among the passes. Null or empty: none.
   std::vector<int> group_of_light = {};  ///< Of each light: the number of its group; −1: it has none. Empty: none has.
   int groups = 0;                        ///< The number of groups, whose light is also added up apart.
 
@@ -128,7 +127,7 @@ class RayShader {
   void add_bent_light(const Vertex& vertex, const Eigen::Vector3d& wi, const Eigen::Vector3d& start, int depth,
                       const PathSampler& sampler);
   void add_landed_light(const Vertex& vertex, int depth);
-  void add_photons(const Vertex& vertex, int depth, const PathSampler& sampler);
+  void add_photons(const Vertex& vertex, int depth, PathSampler sampler);
   void add_landed(int depth, int light);
   void add_direct_light(const Vertex& vertex, int depth, PathSampler& sampler);
   bool is_shadowed(const Eigen::Vector3d& start, const Eigen::Vector3d& point) const;

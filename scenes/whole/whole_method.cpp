@@ -173,7 +173,6 @@ Render LoadedWhole::render(const Scene& scene, const Progress& progress, RenderJ
   shaded.bands_per_view = whole_.settings.bands_per_sample;
   shaded.bands_per_bounce = bands_per_bounce(whole_.settings);
   const PathTracerSettings samples = whole_tracer_settings(scene, whole_, 0);
-  shaded.samples_per_photons = samples.first_samples;
   TracedPhotons photons;
   if (bends) {
     const PhotonPairs pairs = photon_pairs(scene, lights, objects, whole_.settings);
@@ -216,6 +215,8 @@ class WholeMethod : public MethodWith<WholeDescription> {
   }
 
   void check(SceneDescription& scene, const Json& json, const SceneSource& source, bool chosen) const override;
+  void check_photons(const SceneDescription& scene, const PathTracingDescription& tracing,
+                     const SceneSource& source) const;
 
   std::unique_ptr<const LoadedMethod> load(const Scene& scene, std::vector<std::string>&) const override {
     const auto& tracing = scene.description.integrator.settings<PathTracingDescription>();
@@ -224,6 +225,19 @@ class WholeMethod : public MethodWith<WholeDescription> {
     return std::make_unique<LoadedWhole>(std::move(whole));
   }
 };
+
+/// Photons of all passes are kept; most lights have none.
+void WholeMethod::check_photons(const SceneDescription& scene, const PathTracingDescription& tracing,
+                                const SceneSource& source) const {
+  const bool wanted = std::any_of(scene.lights.begin(), scene.lights.end(), [&](const LightSourceDescription& light) {
+    return light.caustic == LightCaustic::photons;
+  });
+  if (!wanted && settings().conserve == Conserve::power) return;
+  const double passes = std::max(1, tracing.samples * bands_per_bounce(settings()) / tracing.bands);
+  check_memory(passes * static_cast<double>(settings().photons.per_pass) * tracing.bands * sizeof(LandedPhoton),
+               fmt::format("`/integrator/photons/per_pass`, with {:.0f} passes of {} bands,", passes, tracing.bands),
+               source);
+}
 
 void WholeMethod::check(SceneDescription& scene, const Json& json, const SceneSource& source, bool chosen) const {
   if (!chosen) return;
@@ -239,6 +253,7 @@ void WholeMethod::check(SceneDescription& scene, const Json& json, const SceneSo
                             tracing.bands, settings().bands_per_sample));
   check_memory(scene.camera.resolution.cast<double>().prod() * (250.0 + 48.0 * tracing.bands), "`/camera/resolution`",
                source);
+  check_photons(scene, tracing, source);
   const double picture = 1.0 * tracing.bands * settings().caustic.resolution * settings().caustic.resolution;
   check_memory(12 * picture, "`/integrator/caustic/resolution`", source);
   // Each light of these kinds may have a picture on each object; most cover a part of it.

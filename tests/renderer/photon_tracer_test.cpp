@@ -198,7 +198,6 @@ TEST(PhotonTracerTest, ShadingIsThatOfStraightLight) {
   ShadedScene straight{floor, materials, sampler, colors}, bent = straight;
   bent.region = &cube;
   bent.photons = &photons.passes;
-  bent.samples_per_photons = 8;
   const auto mean_of = [&](const ShadedScene& scene, double x) {
     RayShader shader(scene, {});
     Mean mean;
