@@ -1,6 +1,7 @@
 #include "scenes/whole/whole_method.h"
 
 #include <algorithm>
+#include <numeric>
 
 #include <fmt/format.h>
 
@@ -136,6 +137,14 @@ void report(const FieldRegion& region, const WholeScene& whole, Render& result) 
                     100.0 * static_cast<double>(region.limited()) / static_cast<double>(statistics.positions)));
 }
 
+void report(const PhotonCounts& counts, Render& result) {
+  const std::uint64_t stopped = counts[static_cast<std::size_t>(PhotonEnd::stopped)];
+  const std::uint64_t emitted = std::accumulate(counts.begin(), counts.end(), std::uint64_t{0});
+  if (stopped * 1000 > emitted)
+    result.warnings.push_back(fmt::format("{:.1f}% of the photons could not be followed; the picture lacks their light",
+                                          100.0 * static_cast<double>(stopped) / static_cast<double>(emitted)));
+}
+
 class LoadedWhole : public LoadedMethod {
  public:
   explicit LoadedWhole(WholeScene whole) : whole_(std::move(whole)) {}
@@ -179,6 +188,7 @@ Render LoadedWhole::render(const Scene& scene, const Progress& progress, RenderJ
     photons = photons_of(scene, region, stage, lights, objects, pairs, whole_.settings.photons,
                          samples.max_samples / samples.first_samples, progress);
     shaded.photons = &photons.passes;
+    report(photons.counts, result);
     shaded.landed = land_light(scene, lights, light, objects, whole_.settings.caustic, pairs, progress);
   }
   result.statistics.seconds_tracing = seconds_since(start);

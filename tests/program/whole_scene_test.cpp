@@ -254,6 +254,16 @@ TEST_F(WholeScene, AWeakFieldLightsPlatesWithinTheVolume) {
   EXPECT_EQ(picture(weak, "7").pixels, with.pixels);
 }
 
+TEST_F(WholeScene, SaysWhenPhotonsAreLost) {
+  const auto errors = [&](const std::string& steps) {
+    return run({"render", "scene.json", "-o", "out.exr", "--set",
+                "lights=[{\"kind\":\"directional\",\"caustic\":\"photons\"}]", "--set", "bending.max_steps=" + steps})
+        .error;
+  };
+  EXPECT_NE(errors("5").find("of the photons could not be followed"), std::string::npos);
+  EXPECT_EQ(errors("20000").find("of the photons could not be followed"), std::string::npos);
+}
+
 TEST_F(WholeScene, GroupsOfLightsAddUpToThePicture) {
   write("scene.json", R"({
     "field": {"generate": {"kind": "point_load", "resolution": 17}, "eigenvalues": "absolute"},
