@@ -35,12 +35,13 @@ double FieldRegion::entry(const Vector3d& origin, const Vector3d& direction) con
   return leaves - enters > rounding_ ? enters : infinite;
 }
 
-void FieldRegion::follow_back(const Vector3d& origin, const Vector3d& direction, std::vector<BentWay>& ways) const {
-  Memory& memory = memory_.local();
+/// @param sign   Of the flexibility: 1 for light, −1 for light that is followed back.
+/// @param gains  Whether the gain of a way is that along its ray; otherwise it is 1.
+void FieldRegion::follow(const Vector3d& origin, const Vector3d& direction, double sign, bool gains, Memory& memory,
+                         std::vector<BentWay>& ways) const {
   RayBatch& rays = memory.rays;
   rays.clear();
-  for (const BentWay& way : ways) rays.add(origin, direction, -settings_.flexibility(way.band, way.place));
-  const bool gains = settings_.conserve == Conserve::power;
+  for (const BentWay& way : ways) rays.add(origin, direction, sign * settings_.flexibility(way.band, way.place));
   if (gains)
     trace(field_, geometry_, settings_.bending, rays, memory.tracks);
   else
@@ -48,20 +49,35 @@ void FieldRegion::follow_back(const Vector3d& origin, const Vector3d& direction,
   for (std::size_t i = 0; i < ways.size(); ++i) {
     BentWay& way = ways[i];
     const RayEnd end = rays.end[i];
-    ++ends_[static_cast<std::size_t>(end)];
     way.position = rays.position[i];
     way.direction = rays.direction[i];
     way.arrives = end == RayEnd::missed || end == RayEnd::obstacle;
     way.on_surface = end == RayEnd::obstacle;
+    way.gain = 1;
     if (!gains || !way.arrives) continue;
     const double strength = rays.flexibility[i] * settings_.bending.scale;
     way.gain = std::exp(log_radiance_change(field_, geometry_, memory.tracks[i], strength));
-    if (settings_.most_gain > 0 && !(way.gain <= settings_.most_gain)) {
+  }
+}
+
+void FieldRegion::follow_back(const Vector3d& origin, const Vector3d& direction, std::vector<BentWay>& ways) const {
+  Memory& memory = memory_.local();
+  follow(origin, direction, -1, settings_.conserve == Conserve::power, memory, ways);
+  for (std::size_t i = 0; i < ways.size(); ++i) {
+    BentWay& way = ways[i];
+    ++ends_[static_cast<std::size_t>(memory.rays.end[i])];
+    if (way.arrives && settings_.most_gain > 0 && !(way.gain <= settings_.most_gain)) {
       way.gain = settings_.most_gain;
       ++limited_;
     }
-    way.arrives = std::isfinite(way.gain);
+    way.arrives = way.arrives && std::isfinite(way.gain);
   }
+}
+
+/// Where radiance stays, the power of a photon changes as the radiance of a photon of constant power, the other way.
+void FieldRegion::follow_light(const Vector3d& origin, const Vector3d& direction, std::vector<BentWay>& ways) const {
+  follow(origin, direction, 1, settings_.conserve == Conserve::radiance, memory_.local(), ways);
+  for (BentWay& way : ways) way.arrives = way.arrives && std::isfinite(way.gain);
 }
 
 }  // namespace tensorray

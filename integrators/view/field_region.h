@@ -38,8 +38,10 @@ class FieldRegion final : public BendingRegion {
   double entry(const Eigen::Vector3d& origin, const Eigen::Vector3d& direction) const override;
   void follow_back(const Eigen::Vector3d& origin, const Eigen::Vector3d& direction,
                    std::vector<BentWay>& ways) const override;
+  void follow_light(const Eigen::Vector3d& origin, const Eigen::Vector3d& direction,
+                    std::vector<BentWay>& ways) const override;
 
-  /// Ways so far, by their end; those that were limited.
+  /// Ways followed back so far, by their end; those that were limited.
   std::uint64_t ways(RayEnd end) const { return ends_[static_cast<std::size_t>(end)]; }
   std::uint64_t limited() const { return limited_; }
 
@@ -49,6 +51,9 @@ class FieldRegion final : public BendingRegion {
     RayBatch rays;
     std::vector<Track> tracks;
   };
+
+  void follow(const Eigen::Vector3d& origin, const Eigen::Vector3d& direction, double sign, bool gains, Memory& memory,
+              std::vector<BentWay>& ways) const;
 
   const TensorField& field_;
   const Geometry& geometry_;

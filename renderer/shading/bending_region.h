@@ -2,21 +2,24 @@
 /// @file renderer/shading/bending_region.h
 /// A region of space in which light does not go straight, as shading sees it.
 
+#include <optional>
 #include <vector>
 
 #include <Eigen/Core>
 
+#include "renderer/surfaces/surface_scene.h"
+
 namespace tensorray {
 
-/// The way of one band's light through the region, followed back from the viewer.
+/// The way of one band's light through the region.
 struct BentWay {
   int band = 0;
   double place = 0.5;  ///< The wavelength: 0 and 1 are the ends of the band.
 
-  // Set by `follow_back`.
+  // Set by `follow_back` and `follow_light`.
   Eigen::Vector3d position = Eigen::Vector3d::Zero();   ///< Where it leaves the region, or meets a surface.
   Eigen::Vector3d direction = Eigen::Vector3d::Zero();  ///< Unit; the direction in which it is followed.
-  double gain = 1;                                      ///< Factor on the radiance that is found at the end of the way.
+  double gain = 1;  ///< Followed back: factor on the radiance found at its end; followed by light: on a photon's power.
   bool arrives = false;     ///< False: nothing is known of light along this way, which counts as none.
   bool on_surface = false;  ///< Whether the way ends on a surface; otherwise it goes on straight from `position`.
 };
@@ -32,6 +35,13 @@ class BendingRegion {
   /// Follows a ray that enters, once for each of `ways`.
   virtual void follow_back(const Eigen::Vector3d& origin, const Eigen::Vector3d& direction,
                            std::vector<BentWay>& ways) const = 0;
+
+  /// Follows light that travels in `direction` and enters, once for each of `ways`.
+  virtual void follow_light(const Eigen::Vector3d& origin, const Eigen::Vector3d& direction,
+                            std::vector<BentWay>& ways) const = 0;
 };
+
+/// The surface at the end of a way, or the one that it meets behind the region, if there is one.
+std::optional<SurfaceHit> surface_at_end(const SurfaceScene& surfaces, const BentWay& way);
 
 }  // namespace tensorray

@@ -41,7 +41,7 @@ void Tile::set_bytes(const std::string& bytes) {
 SurfacePicture empty_picture(int width, int height, const ShadedScene& scene) {
   SurfacePicture picture;
   picture.radiance = Film(width, height, static_cast<int>(scene.colors.bands()));
-  if (!scene.landed.empty()) picture.landed = Film(width, height, 3);
+  if (scene.has_landed_light()) picture.landed = Film(width, height, 3);
   if (scene.groups > 0) picture.groups = Film(width, height, 3 * scene.groups);
   const std::size_t size = picture.radiance.plane_size();
   if (scene.region) {

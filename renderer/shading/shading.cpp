@@ -6,6 +6,7 @@
 #include <stdexcept>
 #include <string>
 
+#include "base/constants.h"
 #include "base/errors.h"
 
 namespace tensorray {
@@ -16,7 +17,8 @@ using Eigen::Vector3d;
 /// First dimension of the sampler for shading; the camera uses those before.
 constexpr std::uint32_t first_dimension = 2;
 constexpr std::uint32_t dimensions_per_vertex = 5;
-constexpr std::uint32_t first_bent_dimension = 1u << 20;  ///< For wavelengths within their bands; one for each depth.
+constexpr std::uint32_t first_bent_dimension = 1u << 20;    ///< For wavelengths within their bands; one for each depth.
+constexpr std::uint32_t first_photon_dimension = 1u << 21;  ///< For passes of photons; one for each depth.
 
 /// Least cosine between the shading normal and the direction to the viewer. Interpolated normals can place the viewer
 /// below a surface that is seen from above.
@@ -95,6 +97,7 @@ RayShader::RayShader(const ShadedScene& scene, const ShadingSettings& settings)
       weight_(scene.colors.bands()),
       contribution_(scene.colors.bands()),
       layers_(static_cast<std::size_t>(scene.layers()), BandValues(scene.colors.bands())),
+      photon_sums_(static_cast<std::size_t>(scene.groups + 1), {BandValues(scene.colors.bands())}),
       aims_bent_(scene.lights.is_concentrated()) {}
 
 std::optional<FirstSurface> RayShader::shade(const Vector3d& origin, const Vector3d& direction, bool show_background,
@@ -169,6 +172,7 @@ void RayShader::shade_path(Vertex vertex, int depth, PathSampler& sampler) {
   for (; depth <= settings_.max_depth; ++depth) {
     sampler.dimension = first_dimension + dimensions_per_vertex * static_cast<std::uint32_t>(depth - 1);
     if (!scene_.landed.empty()) add_landed_light(vertex, depth);
+    if (scene_.has_photons()) add_photons(vertex, depth, sampler);
     add_direct_light(vertex, depth, sampler);
     const double lobe = sampler.next_1d();
     const Eigen::Vector2d place = sampler.next_2d();
@@ -237,13 +241,6 @@ std::vector<BentWay> RayShader::follow_ways(const Vector3d& origin, const Vector
   return ways;
 }
 
-/// The surface at the end of a way, if there is one.
-std::optional<SurfaceHit> RayShader::end_of(const BentWay& way) const {
-  constexpr double part = 1e-5;  // Of the scene: how far before the end the surface is looked for.
-  const double back = way.on_surface ? part * scene_.surfaces.bounds().diagonal().norm() : 0;
-  return scene_.surfaces.intersect(way.position - back * way.direction, way.direction);
-}
-
 /// Continues a path that enters the region as a path for each band.
 /// @param depth   Number of surfaces that the path has met.
 /// @param weight  Of the light that it meets next.
@@ -269,7 +266,7 @@ std::optional<FirstSurface> RayShader::shade_bent(const Vector3d& origin, const 
     band_ = way.band;
     throughput_.setZero();
     throughput_[way.band] = before[way.band] * way.gain;
-    const auto hit = end_of(way);
+    const auto hit = surface_at_end(scene_.surfaces, way);
     if (!hit) {
       if (show_background) add_background(way.direction, weight, depth, is_view);
       continue;
@@ -303,7 +300,7 @@ void RayShader::add_bent_light(const Vertex& vertex, const Vector3d& wi, const V
   const BandValues scattered = factor * contribution_ * throughput_;
   for (const BentWay& way : follow_ways(start, direction, depth, sampler)) {
     if (!way.arrives) continue;
-    const auto hit = end_of(way);
+    const auto hit = surface_at_end(scene_.surfaces, way);
     const int light = hit ? scene_.surfaces.surfaces()[hit->surface].light : -1;
     if (hit && light < 0) continue;
     if (!hit) scene_.lights.background(way.direction, background_, false);
@@ -326,8 +323,44 @@ void RayShader::add_landed_light(const Vertex& vertex, int depth) {
     add_irradiance(light, vertex.hit.position, weight_);
     contribution_ *= throughput_ * weight_;
     if (!(contribution_.maxCoeff() > 0)) continue;
-    add(depth, {light.light});
-    if (contribution_.allFinite()) layers_.front() += contribution_;
+    add_landed(depth, light.light);
+  }
+}
+
+/// Adds `contribution_`, the light of a light that has landed.
+void RayShader::add_landed(int depth, int light) {
+  add(depth, {light});
+  if (contribution_.allFinite()) layers_.front() += contribution_;
+}
+
+/// A diffuse surface scatters all photons of its side alike. Each sample takes a pass by chance, so that the noise of
+/// photons is seen as that of samples.
+void RayShader::add_photons(const Vertex& vertex, int depth, PathSampler sampler) {
+  sampler.dimension = first_photon_dimension + static_cast<std::uint32_t>(depth);
+  const std::vector<PhotonPass>& passes = *scene_.photons;
+  const auto pass = static_cast<std::size_t>(sampler.next_1d() * static_cast<double>(passes.size()));
+  const bool is_diffuse = std::holds_alternative<Diffuse>(vertex.material->scattering);
+  for (PhotonSum& sum : photon_sums_) sum.light = -1;
+  passes[pass].visit(vertex.hit, band_, [&](const LandedPhoton& photon, double density) {
+    const Vector3d wi = vertex.frame.transpose() * -photon.direction.cast<double>();
+    double scattered = density * photon.power;
+    if (!is_diffuse) {
+      evaluate(*vertex.material, reflectance_, wi, vertex.wo, contribution_);
+      scattered *= contribution_[photon.band];
+    } else if (!(wi.z() * vertex.wo.z() > 0)) {
+      return;
+    }
+    const int group = scene_.groups > 0 ? scene_.group_of_light[static_cast<std::size_t>(photon.light)] : -1;
+    PhotonSum& sum = photon_sums_[static_cast<std::size_t>(group + 1)];
+    if (sum.light < 0) sum.scattered.setZero();
+    sum.light = photon.light;
+    sum.scattered[photon.band] += scattered;
+  });
+  for (const PhotonSum& sum : photon_sums_) {
+    if (sum.light < 0) continue;
+    contribution_ = throughput_ * sum.scattered;
+    if (is_diffuse) contribution_ *= reflectance_ / pi;
+    add_landed(depth, sum.light);
   }
 }
 

@@ -15,6 +15,7 @@
 #include "renderer/sampling/sampling.h"
 #include "renderer/shading/bending_region.h"
 #include "renderer/shading/landed_light.h"
+#include "renderer/shading/landed_photons.h"
 #include "renderer/surfaces/surface_scene.h"
 
 namespace tensorray {
@@ -54,16 +55,20 @@ struct ShadedScene {
   const LightSampler& lights;              ///< With the same bands as `colors`.
   const ReflectanceTable& colors;
   /// Where light bends; null: it is straight everywhere. Light of directional lights and points that reaches surfaces
-  /// through the region is not looked for, except by rays that leave the camera: it is in `landed`.
+  /// through the region is not looked for, except by rays that leave the camera: it is in `landed`, or in `photons`.
   const BendingRegion* region = nullptr;
   /// Bands that a ray of the camera, and one that surfaces have scattered, follows into the region. Both divide the
   /// number of bands.
   int bands_per_view = 1, bands_per_bounce = 1;
-  std::vector<LandedLight> landed = {};  ///< Light that bends on its way to surfaces.
+  std::vector<LandedLight> landed = {};              ///< Light that bends on its way to surfaces.
+  const std::vector<PhotonPass>* photons = nullptr;  ///< Light that bends, too, on other surfaces. Samples choose
+                                                     ///< among the passes. Null or empty: none.
   std::vector<int> group_of_light = {};  ///< Of each light: the number of its group; −1: it has none. Empty: none has.
   int groups = 0;                        ///< The number of groups, whose light is also added up apart.
 
-  int layers() const { return (landed.empty() ? 0 : 1) + groups; }
+  bool has_photons() const { return photons && !photons->empty(); }
+  bool has_landed_light() const { return !landed.empty() || has_photons(); }
+  int layers() const { return (has_landed_light() ? 1 : 0) + groups; }
 };
 
 /// @throw std::invalid_argument if a setting is out of range; naming the surface if it has no material, or its light is
@@ -99,7 +104,8 @@ class RayShader {
 
   const BandValues& radiance() const { return radiance_; }
 
-  /// Parts of `radiance()`: if there is ShadedScene::landed, what that has lit; then the light of each group.
+  /// Parts of `radiance()`: if there are ShadedScene::landed or photons, what these have lit; then the light of each
+  /// group.
   const std::vector<BandValues>& layers() const { return layers_; }
 
   const std::optional<BentView>& bent_view() const { return bent_view_; }
@@ -116,12 +122,13 @@ class RayShader {
   double bands_per_followed(int depth) const;
   std::vector<BentWay> follow_ways(const Eigen::Vector3d& origin, const Eigen::Vector3d& direction, int depth,
                                    const PathSampler& sampler) const;
-  std::optional<SurfaceHit> end_of(const BentWay& way) const;
   std::optional<FirstSurface> shade_bent(const Eigen::Vector3d& origin, const Eigen::Vector3d& direction, int depth,
                                          double weight, bool show_background, PathSampler& sampler);
   void add_bent_light(const Vertex& vertex, const Eigen::Vector3d& wi, const Eigen::Vector3d& start, int depth,
                       const PathSampler& sampler);
   void add_landed_light(const Vertex& vertex, int depth);
+  void add_photons(const Vertex& vertex, int depth, PathSampler sampler);
+  void add_landed(int depth, int light);
   void add_direct_light(const Vertex& vertex, int depth, PathSampler& sampler);
   bool is_shadowed(const Eigen::Vector3d& start, const Eigen::Vector3d& point) const;
   void add_background(const Eigen::Vector3d& direction, double weight, int depth, bool disks = true);
@@ -144,6 +151,13 @@ class RayShader {
   const ShadingSettings settings_;
   BandValues radiance_, throughput_, reflectance_, weight_, contribution_;
   std::vector<BandValues> layers_;
+
+  /// The light of photons, for each group and for all others; and one of the lights that it comes from, or −1.
+  struct PhotonSum {
+    BandValues scattered;
+    int light = -1;
+  };
+  std::vector<PhotonSum> photon_sums_;
   LightSample light_;
   std::vector<float> background_, of_one_light_;
   std::optional<BentView> bent_view_;

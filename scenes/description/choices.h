@@ -50,6 +50,12 @@ inline auto choices(LightKind) {
                     C{"directional", LightKind::directional}, C{"area", LightKind::area}, C{"point", LightKind::point}};
 }
 
+inline auto choices(LightCaustic) {
+  using C = Choice<LightCaustic>;
+  return std::array{C{"auto", LightCaustic::automatic}, C{"map", LightCaustic::map},
+                    C{"photons", LightCaustic::photons}};
+}
+
 inline auto choices(Pattern) {
   return std::array{Choice<Pattern>{"none", Pattern::none}, Choice<Pattern>{"checkerboard", Pattern::checkerboard}};
 }

@@ -90,6 +90,9 @@ struct CameraDescription {
 
 enum class LightKind { constant, environment, directional, area, point };
 
+/// How light of a directional light or a point is found that comes to objects through the field.
+enum class LightCaustic { automatic, map, photons };
+
 /// An item of `lights`.
 struct LightSourceDescription {
   LightKind kind = LightKind::constant;
@@ -102,7 +105,8 @@ struct LightSourceDescription {
   std::optional<Eigen::Vector3d> position;   ///< point: world.
   std::filesystem::path file;                ///< environment: a latitude-longitude picture.
   double rotation = 0;                       ///< environment: rotation about +z, degrees.
-  std::string group;                         ///< Its light is also a layer of the EXR with this name; empty: it is not.
+  LightCaustic caustic = LightCaustic::automatic;
+  std::string group;  ///< Its light is also a layer of the EXR with this name; empty: it is not.
 };
 
 /// A flat rectangle among the objects.

@@ -157,13 +157,13 @@ std::function<double(double)> flexibility_of(const BendingDescription& bending) 
 
 std::vector<LandedLight> land_light(const Scene& scene, const std::vector<Light>& lights, const ShownLight& shown,
                                     const std::vector<SceneObject>& objects, const CausticDescription& caustic,
-                                    const Progress& progress) {
+                                    const PhotonPairs& photons, const Progress& progress) {
   std::vector<LandedLight> result;
   for (std::size_t number = 0; number < lights.size(); ++number) {
     const auto light = landing_light(lights[number], shown, scene.description.bending, caustic.passes);
     if (!light) continue;
     for (std::size_t i = 0; i < objects.size(); ++i) {
-      if (objects[i].mesh().triangles.empty()) continue;
+      if (photons[number][i] || objects[i].mesh().triangles.empty()) continue;
       Plate plate = objects[i].plate ? *objects[i].plate : plane_behind(objects[i].mesh(), *light);
       plate.resolution.setConstant(caustic.resolution);
       const auto landed = land(scene, surfaces_before(scene, objects, i), plate, *light, number, caustic, progress);

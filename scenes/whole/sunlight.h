@@ -9,6 +9,7 @@
 #include "renderer/shading/landed_light.h"
 #include "scenes/path_tracing/load_paths.h"
 #include "scenes/whole/objects.h"
+#include "scenes/whole/photons.h"
 #include "scenes/whole/whole_description.h"
 
 namespace tensorray {
@@ -20,10 +21,10 @@ std::vector<Light> whole_lights(const Scene& scene, const ShownLights& shown, co
 /// 550 and 450 nm, to which the paper gives its three flexibilities.
 std::function<double(double)> flexibility_of(const BendingDescription& bending);
 
-/// The light of all directional lights and points that lands on `objects` through the field. The surface of object i
-/// must have the index i. @throw Cancelled.
+/// The light of directional lights and points that lands on `objects` through the field, by flow maps: of all pairs but
+/// those that have photons. The surface of object i must have the index i. @throw Cancelled.
 std::vector<LandedLight> land_light(const Scene& scene, const std::vector<Light>& lights, const ShownLight& shown,
                                     const std::vector<SceneObject>& objects, const CausticDescription& caustic,
-                                    const Progress& progress);
+                                    const PhotonPairs& photons, const Progress& progress);
 
 }  // namespace tensorray

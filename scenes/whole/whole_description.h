@@ -4,6 +4,8 @@
 /// max_depth, filter, shading, background.
 
 #include <array>
+#include <cstdint>
+#include <optional>
 
 #include "integrators/view/field_region.h"
 #include "scenes/keys/choice.h"
@@ -18,11 +20,18 @@ struct CausticDescription {
   std::uint64_t rays = 1u << 17;  ///< Positions from which light starts, at most, for each direction.
 };
 
+/// `integrator.photons`.
+struct PhotonsDescription {
+  std::uint64_t per_pass = 16384;    ///< Positions from which photons start; each has one of every band. 0: none.
+  std::optional<double> max_radius;  ///< Within which photons of the first pass light a surface; none: "auto".
+};
+
 struct WholeDescription {
   Conserve conserve = Conserve::power;
   int bands_per_sample = 8;  ///< Bands that a path follows into the volume; divides `bands`.
   double most_gain = 20;     ///< Greatest factor on radiance; 0: no limit.
   CausticDescription caustic;
+  PhotonsDescription photons;
 };
 
 inline auto choices(Conserve) {
@@ -39,6 +48,14 @@ void describe(CausticDescription& caustic, Visitor& visit) {
 }
 
 template <class Visitor>
+void describe(PhotonsDescription& photons, Visitor& visit) {
+  visit("per_pass", photons.per_pass, "positions from which photons start in each pass; 0: no photons",
+        between(0, 4e9));
+  visit("max_radius", photons.max_radius, "radius about photons of the first pass, world units",
+        above(0).or_word("auto"));
+}
+
+template <class Visitor>
 void describe(WholeDescription& whole, Visitor& visit) {
   visit("conserve", whole.conserve, "scene: what light keeps in the field: a photon's power, or radiance");
   visit("bands_per_sample", whole.bands_per_sample,
@@ -47,6 +64,7 @@ void describe(WholeDescription& whole, Visitor& visit) {
         "scene: greatest factor by which the field increases radiance (`conserve` power); 0: no limit", at_least(0));
   visit.section("caustic", whole.caustic,
                 "scene: the light of directional lights and points that the field throws on objects");
+  visit.section("photons", whole.photons, "scene: photons, where that light has no map: see `caustic` of `lights`");
 }
 
 }  // namespace tensorray

@@ -1,6 +1,7 @@
 #include "scenes/whole/whole_method.h"
 
 #include <algorithm>
+#include <numeric>
 
 #include <fmt/format.h>
 
@@ -14,6 +15,7 @@
 #include "scenes/path_tracing/stage.h"
 #include "scenes/path_tracing/studio.h"
 #include "scenes/whole/objects.h"
+#include "scenes/whole/photons.h"
 #include "scenes/whole/sunlight.h"
 #include "scenes/whole/whole_description.h"
 
@@ -135,6 +137,14 @@ void report(const FieldRegion& region, const WholeScene& whole, Render& result) 
                     100.0 * static_cast<double>(region.limited()) / static_cast<double>(statistics.positions)));
 }
 
+void report(const PhotonCounts& counts, Render& result) {
+  const std::uint64_t stopped = counts[static_cast<std::size_t>(PhotonEnd::stopped)];
+  const std::uint64_t emitted = std::accumulate(counts.begin(), counts.end(), std::uint64_t{0});
+  if (stopped * 1000 > emitted)
+    result.warnings.push_back(fmt::format("{:.1f}% of the photons could not be followed; the picture lacks their light",
+                                          100.0 * static_cast<double>(stopped) / static_cast<double>(emitted)));
+}
+
 class LoadedWhole : public LoadedMethod {
  public:
   explicit LoadedWhole(WholeScene whole) : whole_(std::move(whole)) {}
@@ -171,7 +181,16 @@ Render LoadedWhole::render(const Scene& scene, const Progress& progress, RenderJ
   set_groups(groups, shaded);
   shaded.bands_per_view = whole_.settings.bands_per_sample;
   shaded.bands_per_bounce = bands_per_bounce(whole_.settings);
-  if (bends) shaded.landed = land_light(scene, lights, light, objects, whole_.settings.caustic, progress);
+  const PathTracerSettings samples = whole_tracer_settings(scene, whole_, 0);
+  TracedPhotons photons;
+  if (bends) {
+    const PhotonPairs pairs = photon_pairs(scene, lights, objects, whole_.settings);
+    photons = photons_of(scene, region, stage, lights, objects, pairs, whole_.settings.photons,
+                         samples.max_samples / samples.first_samples, progress);
+    shaded.photons = &photons.passes;
+    report(photons.counts, result);
+    shaded.landed = land_light(scene, lights, light, objects, whole_.settings.caustic, pairs, progress);
+  }
   result.statistics.seconds_tracing = seconds_since(start);
 
   start = Clock::now();
@@ -206,6 +225,8 @@ class WholeMethod : public MethodWith<WholeDescription> {
   }
 
   void check(SceneDescription& scene, const Json& json, const SceneSource& source, bool chosen) const override;
+  void check_photons(const SceneDescription& scene, const PathTracingDescription& tracing,
+                     const SceneSource& source) const;
 
   std::unique_ptr<const LoadedMethod> load(const Scene& scene, std::vector<std::string>&) const override {
     const auto& tracing = scene.description.integrator.settings<PathTracingDescription>();
@@ -214,6 +235,19 @@ class WholeMethod : public MethodWith<WholeDescription> {
     return std::make_unique<LoadedWhole>(std::move(whole));
   }
 };
+
+/// Photons of all passes are kept; most lights have none.
+void WholeMethod::check_photons(const SceneDescription& scene, const PathTracingDescription& tracing,
+                                const SceneSource& source) const {
+  const bool wanted = std::any_of(scene.lights.begin(), scene.lights.end(), [&](const LightSourceDescription& light) {
+    return light.caustic == LightCaustic::photons;
+  });
+  if (!wanted && settings().conserve == Conserve::power) return;
+  const double passes = std::max(1, tracing.samples * bands_per_bounce(settings()) / tracing.bands);
+  check_memory(passes * static_cast<double>(settings().photons.per_pass) * tracing.bands * sizeof(LandedPhoton),
+               fmt::format("`/integrator/photons/per_pass`, with {:.0f} passes of {} bands,", passes, tracing.bands),
+               source);
+}
 
 void WholeMethod::check(SceneDescription& scene, const Json& json, const SceneSource& source, bool chosen) const {
   if (!chosen) return;
@@ -229,6 +263,7 @@ void WholeMethod::check(SceneDescription& scene, const Json& json, const SceneSo
                             tracing.bands, settings().bands_per_sample));
   check_memory(scene.camera.resolution.cast<double>().prod() * (250.0 + 48.0 * tracing.bands), "`/camera/resolution`",
                source);
+  check_photons(scene, tracing, source);
   const double picture = 1.0 * tracing.bands * settings().caustic.resolution * settings().caustic.resolution;
   check_memory(12 * picture, "`/integrator/caustic/resolution`", source);
   // Each light of these kinds may have a picture on each object; most cover a part of it.

@@ -179,6 +179,91 @@ TEST_F(WholeScene, TheLightOfPointsThroughTheFieldIsThatOfALamp) {
   EXPECT_GT(std::abs(mean(other_law, "G") / mean(backwards, "G") - 1), 0.1);
 }
 
+/// Photons and the flow map are two ways to the same light.
+TEST_F(WholeScene, PhotonsGiveTheLightOfTheFlowMap) {
+  const std::vector<std::string> sets{
+      "lights=[{\"kind\":\"directional\",\"direction\":[0.1,0.15,-1],\"caustic\":\"map\"}]",
+      "integrator.max_samples=64",
+      "integrator.min_samples=64",
+      "integrator.max_depth=1",
+      "integrator.caustic={\"resolution\":256,\"rays\":40000,\"passes\":1}",
+      "objects=[{\"plate\":{\"center\":[0,0,-2.6],\"size\":[6,6]},\"material\":{\"kind\":\"diffuse\"}}]",
+      "camera={\"projection\":\"orthographic\",\"position\":[0,0.001,-2.1],\"target\":[0,0,-2.6],\"height\":5,"
+      "\"resolution\":[32,32]}"};
+  std::vector<std::string> other = sets;
+  other.push_back("lights.0.caustic=photons");
+  const Image map = picture(sets), photons = picture(other);
+  other.push_back("integrator.photons.per_pass=2048");
+  const Image few = picture(other);
+  const auto difference = [&](const Image& image) {
+    double sum = 0;
+    for (std::size_t i = 0; i < image.pixels.size(); i += image.channels.size())
+      sum += std::pow(image.pixels[i + 1] - map.pixels[i + 1], 2);
+    return std::sqrt(sum / image.width / image.height);
+  };
+  for (const char* channel : {"caustic.R", "caustic.G", "caustic.B"})
+    EXPECT_NEAR(mean(photons, channel), mean(map, channel), 0.01 * mean(map, channel)) << channel;
+  EXPECT_NEAR(mean(photons, "straight.G"), mean(map, "straight.G"), 1e-3 * mean(map, "straight.G"));
+  EXPECT_LT(difference(photons), 0.02 * mean(map, "G"));
+  EXPECT_LT(difference(photons), 0.7 * difference(few));
+}
+
+/// Where radiance is conserved, light of points gains as the lamp's does.
+TEST_F(WholeScene, PhotonsConserveRadianceOnRequest) {
+  const std::string common = R"({
+    "field": {"generate": {"kind": "point_load", "resolution": 17}, "eigenvalues": "raw", "scale": 1},
+    "integrator": {"type": "scene", "max_samples": 64, "min_samples": 64, "noise": 0, "max_gain": 0, "bands": 8,
+                   "max_depth": 1, "conserve": "radiance"},
+    "objects": [{"plate": {"center": [0, 0, -1.5], "size": [1.6, 1.6]}, "material": {"kind": "diffuse"}}],
+    "camera": {"projection": "orthographic", "position": [0, 0.001, -1.2], "target": [0, 0, -1.5], "height": 1.4,
+               "resolution": [20, 20]},
+    "lights": [)";
+  std::string points;
+  for (const int x : {-1, 0, 1})
+    for (const int y : {-1, 0, 1})
+      points += fmt::format(R"({}{{"kind": "point", "position": [{}, {}, 12], "strength": 11.111}})",
+                            points.empty() ? "" : ", ", x, y);
+  write("scene.json", common + points + "]}");
+  const Image forwards = picture({}), map = picture({"integrator.photons.per_pass=0"});
+  write("scene.json", common + R"({"kind": "area", "center": [0, 0, 12], "size": [3, 3], "strength": 34.907}]})");
+  const Image backwards = picture({});
+  EXPECT_NEAR(mean(forwards, "G"), mean(backwards, "G"), 0.03 * mean(backwards, "G"));
+  EXPECT_GT(std::abs(mean(map, "G") / mean(backwards, "G") - 1), 0.1);  // A flow map keeps power.
+}
+
+/// A plate that light meets before the middle of the volume, and one along the light, which both sides of light meet.
+TEST_F(WholeScene, AWeakFieldLightsPlatesWithinTheVolume) {
+  const std::vector<std::string> sets{
+      "objects=[{\"plate\":{\"center\":[0,0,-0.4],\"size\":[1.2,1.2]},\"material\":{\"kind\":\"diffuse\"}},"
+      "{\"plate\":{\"center\":[0,0.4,-1],\"normal\":[0,1,0],\"size\":[1.6,1]},\"material\":{\"kind\":\"diffuse\"}}]",
+      "lights=[{\"kind\":\"directional\",\"direction\":[0.3,0.2,-1],\"caustic\":\"photons\"},"
+      "{\"kind\":\"point\",\"position\":[0.4,-0.8,2],\"strength\":5}]",
+      "integrator.max_samples=32",
+      "integrator.min_samples=32",
+      "integrator.max_depth=1",
+      "camera.position=[1,-3,2]",
+      "camera.target=[0,0,-0.6]"};
+  std::vector<std::string> weak = sets, none = sets;
+  weak.push_back("field.scale=1e-7");
+  none.insert(none.end(), {"bending.a=0", "bending.b=0"});
+  const Image with = picture(weak), without = picture(none);
+  EXPECT_GT(mean(with, "caustic.G"), 0.9 * mean(with, "G"));
+  for (const char* channel : {"R", "G", "B"})
+    EXPECT_NEAR(mean(with, channel) / mean(without, channel), 1, 0.02) << channel;
+  EXPECT_EQ(picture(weak, "1").pixels, with.pixels);
+  EXPECT_EQ(picture(weak, "7").pixels, with.pixels);
+}
+
+TEST_F(WholeScene, SaysWhenPhotonsAreLost) {
+  const auto errors = [&](const std::string& steps) {
+    return run({"render", "scene.json", "-o", "out.exr", "--set",
+                "lights=[{\"kind\":\"directional\",\"caustic\":\"photons\"}]", "--set", "bending.max_steps=" + steps})
+        .error;
+  };
+  EXPECT_NE(errors("5").find("of the photons could not be followed"), std::string::npos);
+  EXPECT_EQ(errors("20000").find("of the photons could not be followed"), std::string::npos);
+}
+
 TEST_F(WholeScene, GroupsOfLightsAddUpToThePicture) {
   write("scene.json", R"({
     "field": {"generate": {"kind": "point_load", "resolution": 17}, "eigenvalues": "absolute"},
@@ -189,7 +274,9 @@ TEST_F(WholeScene, GroupsOfLightsAddUpToThePicture) {
                {"kind": "directional", "direction": [0.2, 0, -1], "angle": 2, "group": "sun"},
                {"kind": "point", "position": [1, 1, 3], "strength": 5, "group": "lamps"},
                {"kind": "area", "center": [-1, 0, 3], "group": "lamps"}]})");
-  const Image all = picture({});
+  const Image photons = picture({"lights.1.caustic=photons", "lights.2.caustic=photons"}), all = picture({});
+  for (const std::string color : {"sun.G", "lamps.G"})
+    EXPECT_NEAR(mean(photons, color), mean(all, color), 0.03 * mean(all, color)) << color;
   for (const char* color : {"R", "G", "B"}) {
     double sum = 0;
     for (const std::string group : {"around.", "sun.", "lamps."}) {
@@ -215,6 +302,11 @@ TEST_F(WholeScene, RefusesWhatDoesNotFit) {
   expect_error("objects=[{\"plate\":{\"center\":[0,0,0],\"colour\":1}}]", "/objects/0/plate/colour");
   expect_error("lights=[{\"kind\":\"point\"}]", "/lights/0` is a point and needs its `position`");
   expect_error("lights=[{\"kind\":\"point\",\"position\":[0,0,-0.9]}]", "/lights/0`: the light is within the volume");
+  expect_error("lights=[{\"kind\":\"point\",\"position\":[0,0,-0.9],\"caustic\":\"photons\"}]",
+               "/lights`: the light is within the volume");
+  expect_error("lights=[{\"kind\":\"point\",\"position\":[0,0,3],\"caustic\":\"none\"}]", "/lights/0/caustic");
+  expect_error("lights=[{\"kind\":\"area\",\"center\":[0,0,3],\"caustic\":\"map\"}]", "caustic");
+  expect_error("integrator.photons.max_radius=0", "/integrator/photons/max_radius");
   expect_error("lights=[{\"kind\":\"constant\",\"group\":\"albedo\"}]", "/lights/0/group");
 }
 
@@ -234,6 +326,9 @@ TEST_F(WholeScene, RefusesMoreLightThanFitsIntoMemory) {
   scene.insert(scene.find("\"camera\""), "\"lights\": [" + lights + ", ");
   write("scene.json", scene);
   expect_error("integrator.caustic.resolution=1024", "`/lights`");
+  scene.insert(scene.find("{\"kind\":\"point\","), "{\"kind\":\"directional\",\"caustic\":\"photons\"},");
+  write("scene.json", scene);
+  expect_error("integrator.photons.per_pass=4000000000", "/integrator/photons/per_pass");
 }
 
 /// A sun in the plane of the floor, a floor through the volume, a camera inside the volume, one inside a body, one that

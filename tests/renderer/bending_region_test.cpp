@@ -37,6 +37,15 @@ class TurningBall : public BendingRegion {
     }
   }
 
+  /// Light that passes the ball at its centre height turns back.
+  void follow_light(const Vector3d& origin, const Vector3d& direction, std::vector<BentWay>& ways) const override {
+    for (BentWay& way : ways) {
+      way.direction = Eigen::AngleAxisd(-angle_ * (1 + way.band), Vector3d::UnitZ()) * direction;
+      way.position = origin + entry(origin, direction) * direction;
+      way.arrives = true;
+    }
+  }
+
  private:
   double angle_, gain_;
 };

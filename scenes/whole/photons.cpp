@@ -1,0 +1,86 @@
+#include "scenes/whole/photons.h"
+
+#include <cmath>
+#include <optional>
+
+#include <fmt/format.h>
+
+#include "base/constants.h"
+
+namespace tensorray {
+namespace {
+
+using Eigen::Vector3d;
+
+constexpr double photons_in_reach = 10;  // Of a band, within the automatic radius, where light is undisturbed.
+
+/// The direction in which light comes to a point; nothing if it is of a kind that does not land.
+std::optional<Vector3d> direction_at(const Light& light, const Vector3d& point) {
+  if (const auto* sun = std::get_if<DirectionalLight>(&light)) return sun->direction;
+  if (const auto* source = std::get_if<PointLight>(&light)) return Vector3d(point - source->position);
+  return std::nullopt;
+}
+
+LightCaustic caustic_of(const Scene& scene, std::size_t light) {
+  const std::vector<LightSourceDescription>& lights = scene.description.lights;
+  return light < lights.size() ? lights[light].caustic : LightCaustic::automatic;
+}
+
+/// Whether a plate reaches into the volume, and light meets its plane before the middle of the volume.
+bool is_early_within(const SceneObject& object, const TensorField& field, const Vector3d& direction) {
+  if (!object.plate) return false;
+  Eigen::AlignedBox3d box;
+  for (const Vector3d& vertex : object.mesh().vertices) box.extend(vertex);
+  const Vector3d normal = object.plate->normal();
+  const double height = normal.dot(field.world_box().center() - object.plate->center);
+  return box.intersects(field.world_box()) && height * normal.dot(direction) > 0;
+}
+
+/// The radius about which there are enough photons: by Cauchy, a convex body of area A has the mean silhouette A / 4.
+double automatic_radius(const TensorField& field, double per_pass) {
+  const Vector3d size = field.world_box().sizes();
+  const double silhouette = (size.x() * size.y() + size.y() * size.z() + size.z() * size.x()) / 2;
+  return std::sqrt(photons_in_reach * silhouette / (pi * per_pass));
+}
+
+}  // namespace
+
+PhotonPairs photon_pairs(const Scene& scene, const std::vector<Light>& lights, const std::vector<SceneObject>& objects,
+                         const WholeDescription& settings) {
+  PhotonPairs pairs(lights.size(), std::vector<bool>(objects.size(), false));
+  if (settings.photons.per_pass == 0) return pairs;
+  for (std::size_t i = 0; i < lights.size(); ++i) {
+    const auto direction = direction_at(lights[i], scene.field.world_box().center());
+    const LightCaustic caustic = caustic_of(scene, i);
+    if (!direction || caustic == LightCaustic::map) continue;
+    const bool always = caustic == LightCaustic::photons || settings.conserve == Conserve::radiance;
+    for (std::size_t k = 0; k < objects.size(); ++k)
+      pairs[i][k] = always || is_early_within(objects[k], scene.field, *direction);
+  }
+  return pairs;
+}
+
+TracedPhotons photons_of(const Scene& scene, const BendingRegion& region, const SurfaceScene& stage,
+                         const std::vector<Light>& lights, const std::vector<SceneObject>& objects,
+                         const PhotonPairs& pairs, const PhotonsDescription& description, int passes,
+                         const Progress& progress) {
+  PhotonSettings settings;
+  settings.per_pass = description.per_pass;
+  if (settings.per_pass == 0) return {};
+  settings.passes = passes;
+  settings.radius =
+      description.max_radius.value_or(automatic_radius(scene.field, static_cast<double>(settings.per_pass)));
+  settings.seed = scene.description.seed;
+  for (const SceneObject& object : objects) settings.plates.push_back(object.plate);
+  settings.serves = [&pairs](int light, std::uint32_t surface) {
+    const std::vector<bool>& of_light = pairs[static_cast<std::size_t>(light)];
+    return surface < of_light.size() && of_light[surface];
+  };
+  try {
+    return trace_photons(region, scene.field.corners(), stage, lights, settings, progress);
+  } catch (const std::invalid_argument& error) {
+    throw SceneError(fmt::format("{}: `/lights`: {}", scene.description.path.string(), error.what()));
+  }
+}
+
+}  // namespace tensorray

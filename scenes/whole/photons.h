@@ -1,0 +1,30 @@
+#pragma once
+/// @file scenes/whole/photons.h
+/// Which lights of a whole scene light which objects by photons, and these photons. Each pair of a light and an object
+/// has either photons or a flow map (sunlight.h).
+
+#include <cstdint>
+#include <vector>
+
+#include "base/progress.h"
+#include "renderer/shading/photon_tracer.h"
+#include "scenes/whole/objects.h"
+#include "scenes/whole/whole_description.h"
+
+namespace tensorray {
+
+/// For each light, for each object (the surface of object i has the index i): whether photons are its light through the
+/// field. A light whose `caustic` is "auto" has photons where no flow map can be right: on plates within the volume
+/// that it meets before the middle, and on all objects where radiance is conserved, since a flow map keeps power.
+using PhotonPairs = std::vector<std::vector<bool>>;
+PhotonPairs photon_pairs(const Scene& scene, const std::vector<Light>& lights, const std::vector<SceneObject>& objects,
+                         const WholeDescription& settings);
+
+/// @param passes  Of photons.
+/// @throw SceneError if a point light is within the volume; Cancelled.
+TracedPhotons photons_of(const Scene& scene, const BendingRegion& region, const SurfaceScene& stage,
+                         const std::vector<Light>& lights, const std::vector<SceneObject>& objects,
+                         const PhotonPairs& pairs, const PhotonsDescription& description, int passes,
+                         const Progress& progress);
+
+}  // namespace tensorray
