@@ -5,8 +5,6 @@
 #include <limits>
 #include <utility>
 
-#include "integrators/bending/radiance_change.h"
-
 namespace tensorray {
 
 using Eigen::Vector3d;
@@ -36,15 +34,12 @@ double FieldRegion::entry(const Vector3d& origin, const Vector3d& direction) con
 }
 
 void FieldRegion::follow_back(const Vector3d& origin, const Vector3d& direction, std::vector<BentWay>& ways) const {
-  Memory& memory = memory_.local();
-  RayBatch& rays = memory.rays;
+  RayBatch& rays = memory_.local();
   rays.clear();
   for (const BentWay& way : ways) rays.add(origin, direction, -settings_.flexibility(way.band, way.place));
   const bool gains = settings_.conserve == Conserve::power;
-  if (gains)
-    trace(field_, geometry_, settings_.bending, rays, memory.tracks);
-  else
-    trace(field_, geometry_, settings_.bending, rays);
+  rays.wants_radiance_change = gains;
+  trace(field_, geometry_, settings_.bending, rays);
   for (std::size_t i = 0; i < ways.size(); ++i) {
     BentWay& way = ways[i];
     const RayEnd end = rays.end[i];
@@ -54,8 +49,7 @@ void FieldRegion::follow_back(const Vector3d& origin, const Vector3d& direction,
     way.arrives = end == RayEnd::missed || end == RayEnd::obstacle;
     way.on_surface = end == RayEnd::obstacle;
     if (!gains || !way.arrives) continue;
-    const double strength = rays.flexibility[i] * settings_.bending.scale;
-    way.gain = std::exp(log_radiance_change(field_, geometry_, memory.tracks[i], strength));
+    way.gain = std::exp(rays.radiance_change[i]);
     if (settings_.most_gain > 0 && !(way.gain <= settings_.most_gain)) {
       way.gain = settings_.most_gain;
       ++limited_;
