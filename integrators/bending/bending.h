@@ -75,11 +75,17 @@ struct RayBatch {
   std::vector<Eigen::Vector3d> direction;      ///< Unit.
   std::vector<double> flexibility;             ///< s; any sign.
   std::vector<RayDifferential> differentials;  ///< One for every ray, or empty. They cost about as much as three rays.
+  bool wants_radiance_change = false;          ///< Only without differentials.
 
   // Set by `trace`.
   std::vector<RayEnd> end;
   std::vector<double> length;        ///< Length of the path, world units.
   std::vector<std::uint32_t> steps;  ///< Number of steps in the field.
+  /// If wanted: Λ = ∫ σ (tr T − 3 VᵀTV) dt along each ray, the divergence of Eq. 5 in phase space. Where photons keep
+  /// their power, light of strength σ has L_end = L_start e^(−Λ). A ray that is traced backwards, from the viewer, has
+  /// −σ, and the radiance that it finds is multiplied by e^(+Λ). A step of `splitting` has exactly the change
+  /// hσ tr T − 3 ln |exp(hσT) V|. Rays are the same with and without it.
+  std::vector<double> radiance_change;
   std::uint64_t tensor_samples = 0;  ///< `trace` adds to it.
 
   std::size_t size() const { return position.size(); }

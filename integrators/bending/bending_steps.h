@@ -21,6 +21,7 @@ namespace tensorray::bending_steps {
 template <int N>
 struct State {
   Eigen::Matrix<double, 3, N> P, V;
+  double radiance_change = 0;  ///< Λ of the ray: see RayBatch. Not computed by `splitting` with N = 3.
 
   auto position() const { return P.template leftCols<1>(); }
   auto direction() const { return V.template leftCols<1>(); }
@@ -28,11 +29,11 @@ struct State {
 
 template <int N>
 State<N> operator+(const State<N>& a, const State<N>& b) {
-  return {a.P + b.P, a.V + b.V};
+  return {a.P + b.P, a.V + b.V, a.radiance_change + b.radiance_change};
 }
 template <int N>
 State<N> operator*(double factor, const State<N>& a) {
-  return {factor * a.P, factor * a.V};
+  return {factor * a.P, factor * a.V, factor * a.radiance_change};
 }
 
 /// The field as one ray samples it.
@@ -71,7 +72,7 @@ struct RayMedium {
       const double change_along = (dV.dot(TV) + V.dot(dTV) - 2 * along * V.dot(dV)) / squared;
       change.col(i) -= along * dV + change_along * V;
     }
-    return {at.V, strength * change};
+    return {at.V, strength * change, strength * (T.trace() - 3 * along)};
   }
 };
 
@@ -79,8 +80,8 @@ struct RayMedium {
 template <int N>
 State<N> normalized(const State<N>& state) {
   const double length = state.direction().norm();
-  if (!(length > 0) || !std::isfinite(length)) return {state.P, Eigen::Matrix<double, 3, N>::Zero()};
-  State<N> unit{state.P, state.V / length};
+  if (!(length > 0) || !std::isfinite(length)) return {state.P, Eigen::Matrix<double, 3, N>::Zero(), 0};
+  State<N> unit{state.P, state.V / length, state.radiance_change};
   for (int i = 1; i < N; ++i) unit.V.col(i) -= unit.V.col(0).dot(unit.V.col(i)) * unit.V.col(0);
   return unit;
 }
@@ -88,8 +89,11 @@ State<N> normalized(const State<N>& state) {
 template <int N>
 State<N> euler(RayMedium<N>& medium, const State<N>& from, double h) {
   medium.sample(from.P);
-  const State<N> to = normalized<N>({from.P, from.V + medium.strength * h * medium.apply(from.V)});
-  return {from.P + h * to.V, to.V};
+  const double factor = medium.strength * h;
+  const Eigen::Matrix<double, 3, N> TV = medium.apply(from.V);
+  const double change = factor * (medium.T.trace() - 3 * from.V.col(0).dot(TV.col(0)));
+  const State<N> to = normalized<N>({from.P, from.V + factor * TV, from.radiance_change + change});
+  return {from.P + h * to.V, to.V, to.radiance_change};
 }
 
 template <int N>
@@ -98,12 +102,13 @@ State<N> splitting(RayMedium<N>& medium, const State<N>& from, double h) {
   medium.sample(middle);
   const double factor = h * medium.strength;
   if constexpr (N == 1) {
-    const Eigen::Vector3d V = exponential_direction(factor * medium.T, from.V);
-    return {middle + h / 2 * V, V};
+    const auto [V, log_length] = exponential_direction(factor * medium.T, from.V);
+    return {middle + h / 2 * V, V, from.radiance_change - 3 * log_length};
   } else {
     const State<N> to = normalized<N>(
-        {middle, exponential_derivatives(factor * medium.T, {factor * medium.dT[0], factor * medium.dT[1]}, from.V)});
-    return {middle + h / 2 * to.V, to.V};
+        {middle, exponential_derivatives(factor * medium.T, {factor * medium.dT[0], factor * medium.dT[1]}, from.V),
+         0});
+    return {middle + h / 2 * to.V, to.V, 0};
   }
 }
 
@@ -119,7 +124,7 @@ State<N> by_stages(const RungeKutta& method, RayMedium<N>& medium, const State<N
   for (int i = 0; i < method.stages; ++i) k[i] = medium.derivative(along(method.a[i], i, from));
   if (method.adaptive) {
     const auto zero = Eigen::Matrix<double, 3, N>::Zero();
-    error = along(method.error, method.stages, {zero, zero});
+    error = along(method.error, method.stages, {zero, zero, 0});
   }
   return normalized(along(method.b, method.stages, from));
 }

@@ -36,16 +36,19 @@ Eigen::Vector3d series(const Eigen::Matrix3d& A, const Eigen::Vector3d& v, int t
   return {sum_x, sum_y, sum_z};
 }
 
-/// exp(A) up to a factor, for ‖A‖ = `norm` > 1, by scaling and squaring.
-Eigen::Matrix3d squared(const Eigen::Matrix3d& A, double norm) {
+/// exp(A) = result · exp(log_scale), for ‖A‖ = `norm` > 1, by scaling and squaring.
+Eigen::Matrix3d squared(const Eigen::Matrix3d& A, double norm, double& log_scale) {
   const int halvings = std::ilogb(norm) + 1;
   const Eigen::Matrix3d small = std::ldexp(1.0, -halvings) * A;
   Eigen::Matrix3d power;
   for (int column = 0; column < 3; ++column)
     power.col(column) = series(small, Eigen::Vector3d::Unit(column), most_terms);
+  log_scale = 0;
   for (int i = 0; i < halvings; ++i) {
     power = (power * power).eval();
-    power /= power.norm();  // Only the direction is wanted, so that nothing overflows.
+    const double size = power.norm();
+    power /= size;  // So that nothing overflows.
+    log_scale = 2 * log_scale + std::log(size);
   }
   return power;
 }
@@ -69,20 +72,22 @@ Eigen::Matrix3d series(const Eigen::Matrix3d& A, const std::array<Eigen::Matrix3
 
 }  // namespace
 
-Eigen::Vector3d exponential_direction(const Eigen::Matrix3d& A, const Eigen::Vector3d& v) {
+ExponentialDirection exponential_direction(const Eigen::Matrix3d& A, const Eigen::Vector3d& v) {
   // The trace of A changes only the length.
   const Eigen::Matrix3d without_trace = deviator(A);
   const double squared_norm = without_trace.squaredNorm();
   Eigen::Vector3d result;
+  double log_scale = 0;
   if (squared_norm <= 1) {
     result = series(without_trace, v, terms_for(squared_norm));
   } else if (std::isfinite(squared_norm)) {
-    result = squared(without_trace, std::sqrt(squared_norm)) * v;
+    result = squared(without_trace, std::sqrt(squared_norm), log_scale) * v;
   } else {
-    return Eigen::Vector3d::Zero();
+    return {};
   }
   const double length = result.norm();
-  return length > 0 && std::isfinite(length) ? Eigen::Vector3d(result / length) : Eigen::Vector3d::Zero();
+  if (!(length > 0) || !std::isfinite(length)) return {};
+  return {result / length, std::log(length) + log_scale};
 }
 
 Eigen::Matrix3d exponential_derivatives(const Eigen::Matrix3d& A, const std::array<Eigen::Matrix3d, 2>& dA,

@@ -26,7 +26,7 @@ void Tracer<N>::meet_surface(const Eigen::Vector3d& normal, bool bends) {
   if constexpr (N > 1) {
     const double approach = normal.dot(direction());
     if (!(std::abs(approach) > 0)) return;  // Light along a surface does not cross it.
-    const State<N> flow = bends ? medium_.derivative(ray_) : State<N>{ray_.V, Eigen::Matrix<double, 3, N>::Zero()};
+    const State<N> flow = bends ? medium_.derivative(ray_) : State<N>{ray_.V, Eigen::Matrix<double, 3, N>::Zero(), 0};
     for (int i = 1; i < N; ++i) {
       const double later = -normal.dot(ray_.P.col(i)) / approach;
       ray_.P.col(i) += later * flow.P.col(0);
@@ -48,7 +48,7 @@ void Tracer<N>::record(bool in_field) {
   here.in_field = in_field;
   if (in_field) {
     RayMedium<1> medium{sampler_, medium_.strength};
-    here.change = medium.derivative({here.position, here.direction}).V;
+    here.change = medium.derivative({here.position, here.direction, 0}).V;
     here.tensor = medium.T;
   }
   recording_.path->push_back(here);

@@ -141,6 +141,7 @@ void set_end(RayBatch& batch, std::size_t i, RayEnd end, const Tracer<N>& tracer
   if constexpr (N == 3)
     batch.differentials[i] = {tracer.state().P.template rightCols<2>(), tracer.state().V.template rightCols<2>(),
                               travelled.length_change};
+  if (batch.wants_radiance_change) batch.radiance_change[i] = tracer.state().radiance_change;
   batch.length[i] = travelled.length;
   batch.steps[i] = travelled.steps;
 }

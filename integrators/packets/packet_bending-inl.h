@@ -9,6 +9,7 @@
 #define TENSORRAY_INTEGRATORS_PACKET_BENDING_TOGGLE
 #endif
 
+#include <hwy/contrib/math/math-inl.h>
 #include <hwy/highway.h>
 
 #include "integrators/packets/packet_exponential-inl.h"
@@ -30,11 +31,26 @@ HWY_INLINE F3 two_terms(const Tensor& T, const F3& v, const F3& inner, F factor)
   return mul_add(factor, apply(T, half), v);
 }
 
+/// ln(1 + excess) for an excess below 0.006, to 1e-9.
+HWY_INLINE F log_near_one(F excess) {
+  const F inner = hn::MulAdd(hn::MulAdd(set(-0.25f), excess, set(1.0f / 3)), excess, set(-0.5f));
+  return hn::Mul(hn::MulAdd(inner, excess, set(1)), excess);
+}
+
+/// Λ of a kick: factor tr T − 3 ln |exp(factor · T) V|. Adding c I to T does not change it. @param log_squared
+/// ln |exp(factor · T) V|².
+HWY_INLINE F radiance_change(const Tensor& T, F factor, F log_squared) {
+  return hn::MulAdd(factor, hn::Add(T.c[0], T.c[4]), hn::Mul(set(-1.5f), log_squared));
+}
+
 /// exp(factor · T) V, normalised, where ‖factor · T‖ is small in all lanes: two terms of the series, and the square
-/// root as a series.
-HWY_INLINE F3 bend_weakly(const Tensor& T, const F3& v, F factor) {
+/// root as a series. `changes`: stores Λ of the kick.
+template <bool changes>
+HWY_INLINE F3 bend_weakly(Packet& packet, const Tensor& T, const F3& v, F factor, int at) {
   const F3 sum = two_terms(T, v, v, factor);
-  return mul(inverse_root_near_one(excess(sum)), sum);
+  const F e = excess(sum);
+  if constexpr (changes) store(radiance_change(T, factor, log_near_one(e)), packet.change_of_step, at);
+  return mul(inverse_root_near_one(e), sum);
 }
 
 /// The Frobenius norm of the deviator of factor · T. The factor comes first, because T itself may be too large, or too
@@ -59,7 +75,8 @@ HWY_INLINE void keep_bending_rate(Packet& packet, const Tensor& T, int at) {
 /// exp(factor · T) V, normalised, for any strength. The result is stored: a returned value would pass through memory in
 /// halves of vectors, which stalls the processor. How a lane is computed depends on that lane alone.
 /// @param to  The packet's next directions; its present ones only if the field is weak in all lanes' bricks.
-template <bool differentials>
+/// `changes`: stores Λ of the kick.
+template <bool differentials, bool changes>
 HWY_INLINE void bend_strongly(Packet& packet, const Tensor& T, const F3& v, F factor, int at, PerRay (&to)[3]) {
   const F reach = load(packet.reach, at);
   F size = reach;
@@ -81,10 +98,15 @@ HWY_INLINE void bend_strongly(Packet& packet, const Tensor& T, const F3& v, F fa
   const F exact = hn::Div(set(1), hn::Sqrt(hn::Add(e, set(1))));
   const Mask weak = hn::Le(size, set(series_reach[0])), fits = hn::Le(size, set(1));
   const F scale = hn::IfThenElse(weak, inverse_root_near_one(e), exact);
+  if constexpr (changes) {
+    F log_squared = log_near_one(e);
+    if (!hn::AllTrue(floats, weak)) log_squared = hn::IfThenElse(weak, log_squared, hn::Log1p(floats, e));
+    store(radiance_change(T, factor, log_squared), packet.change_of_step, at);
+  }
   // Rays with differentials stop where no series is exact enough.
   store(mul(differentials ? hn::IfThenElseZero(fits, scale) : scale, sum), to, at);
   if (!differentials && HWY_UNLIKELY(!hn::AllTrue(floats, fits)))
-    bend_in_double(packet, to_bits(hn::Not(fits), at), to);
+    bend_in_double<changes>(packet, to_bits(hn::Not(fits), at), to);
 }
 
 }  // namespace tensorray::packets::HWY_NAMESPACE

@@ -180,8 +180,24 @@ HWY_NOINLINE D3 bend_by_matrix(const Matrix& A, const MatrixPolynomial& of, hn::
   return multiply(power, before);
 }
 
-/// exp(σ h T) V, normalised, of some lanes, given as bits; zero if it has no direction.
-HWY_NOINLINE void bend_in_double(const Packet& packet, std::uint32_t which, PerRay (&to)[3]) {
+/// Stores Λ of the strong kicks of some lanes, given as bits: −3 ln |exp(A) V|, where A is σ h times the deviator of T.
+/// Only few lanes have such kicks.
+HWY_NOINLINE void change_in_double(Packet& packet, std::uint32_t which) {
+  for (; which != 0; which &= which - 1) {
+    const auto lane = hwy::Num0BitsBelowLS1Bit_Nonzero32(which);
+    const float v[3] = {packet.v[0][lane], packet.v[1][lane], packet.v[2][lane]};
+    float T[9];
+    for (int i = 0; i < 8; ++i) T[i] = packet.tensor[i][lane];
+    T[8] = 0;
+    packet.change_of_step[lane] = strong_radiance_change(T, packet.time[lane] * packet.kick[lane], v);
+  }
+}
+
+/// exp(σ h T) V, normalised, of some lanes, given as bits; zero if it has no direction. `changes`: stores Λ of the
+/// kick.
+template <bool changes>
+HWY_NOINLINE void bend_in_double(Packet& packet, std::uint32_t which, PerRay (&to)[3]) {
+  if constexpr (changes) change_in_double(packet, which);
   const Singles singles;
   for (int at = 0; at < packet.vectors * lanes; at += double_lanes) {
     const std::uint8_t bytes[8] = {static_cast<std::uint8_t>(which >> at & ((1u << double_lanes) - 1))};

@@ -26,9 +26,9 @@
 HWY_BEFORE_NAMESPACE();
 namespace tensorray::packets::HWY_NAMESPACE {
 
-/// The kernel, for voxels that are cubes along the axes (`uniform`) or have any other shape, and for rays with or
-/// without differentials.
-template <bool uniform, bool differentials>
+/// The kernel, for voxels that are cubes along the axes (`uniform`) or have any other shape, for rays with or
+/// without differentials, whose changes of radiance are wanted or not.
+template <bool uniform, bool differentials, bool changes>
 class Kernel {
  public:
   Kernel(const PacketMedium& medium, KernelRays& batch) : medium_(medium), rays_(batch.rays), batch_(batch) {}
@@ -52,6 +52,7 @@ class Kernel {
   std::uint32_t stopped(const Packet& packet) const;
   std::uint32_t spent(const Packet& packet) const;
   void locate_on_extent(Packet& packet);
+  void add_step(Packet& packet);
   void take_out(Packet& packet, std::uint32_t stop, std::uint32_t leave);
   void keep_points(const Packet& packet, std::uint32_t which);
   unsigned samples_per_step() const { return medium_.stages ? medium_.stages->stages : 1; }
@@ -69,8 +70,8 @@ class Kernel {
 };
 
 /// Copies a ray into a lane.
-template <bool uniform, bool differentials>
-void Kernel<uniform, differentials>::enter(Packet& packet, int lane) {
+template <bool uniform, bool differentials, bool changes>
+void Kernel<uniform, differentials, changes>::enter(Packet& packet, int lane) {
   const KernelRay& ray = rays_[packet.ray[lane]];
   for (int axis = 0; axis < 3; ++axis) {
     packet.p[axis][lane] = ray.position[axis];
@@ -86,11 +87,12 @@ void Kernel<uniform, differentials>::enter(Packet& packet, int lane) {
   packet.bending_rate[lane] = std::fabs(packet.kick[lane]) * ray.norm;
   packet.wanted[lane] = medium_.settings.step;
   packet.length[lane] = 0;
+  if constexpr (changes) packet.radiance_change[lane] = 0;
 }
 
 /// Copies a ray, without the values that depend on its brick (see `begin`).
-template <bool uniform, bool differentials>
-void Kernel<uniform, differentials>::copy_lane(const Packet& from, int of, Packet& to, int lane) {
+template <bool uniform, bool differentials, bool changes>
+void Kernel<uniform, differentials, changes>::copy_lane(const Packet& from, int of, Packet& to, int lane) {
   for (int axis = 0; axis < 3; ++axis) {
     to.p[axis][lane] = from.p[axis][of];
     to.v[axis][lane] = from.v[axis][of];
@@ -104,6 +106,7 @@ void Kernel<uniform, differentials>::copy_lane(const Packet& from, int of, Packe
   }
   to.kick[lane] = from.kick[of];
   to.length[lane] = from.length[of];
+  if constexpr (changes) to.radiance_change[lane] = from.radiance_change[of];
   to.bending_rate[lane] = from.bending_rate[of];
   to.time[lane] = from.time[of];
   to.wanted[lane] = from.wanted[of];
@@ -111,8 +114,8 @@ void Kernel<uniform, differentials>::copy_lane(const Packet& from, int of, Packe
 }
 
 /// Moves the remaining rays to the front if that frees a vector. The other lanes repeat one of these rays.
-template <bool uniform, bool differentials>
-void Kernel<uniform, differentials>::close_ranks(Packet& packet) {
+template <bool uniform, bool differentials, bool changes>
+void Kernel<uniform, differentials, changes>::close_ranks(Packet& packet) {
   const int count = static_cast<int>(hwy::PopCount(packet.alive));
   if (count <= (packet.vectors - 1) * lanes) {
     int to = 0;
@@ -129,8 +132,8 @@ void Kernel<uniform, differentials>::close_ranks(Packet& packet) {
   begin<uniform>(medium_, packet);
 }
 
-template <bool uniform, bool differentials>
-void Kernel<uniform, differentials>::fill(Packet& packet) {
+template <bool uniform, bool differentials, bool changes>
+void Kernel<uniform, differentials, changes>::fill(Packet& packet) {
   if (next_ == rays_.size()) return;
   const int count = static_cast<int>(std::min<std::size_t>(packet_rays, rays_.size() - next_));
   packet.alive = ~0u >> (packet_rays - count);
@@ -154,9 +157,9 @@ void Kernel<uniform, differentials>::fill(Packet& packet) {
 }
 
 /// The lanes whose points are outside the extent, as bits.
-template <bool uniform, bool differentials>
-HWY_INLINE std::uint32_t Kernel<uniform, differentials>::outside(const Packet& packet,
-                                                                 const PerRay (&points)[3]) const {
+template <bool uniform, bool differentials, bool changes>
+HWY_INLINE std::uint32_t Kernel<uniform, differentials, changes>::outside(const Packet& packet,
+                                                                          const PerRay (&points)[3]) const {
   std::uint32_t result = 0;
   for (int i = 0; i < packet.vectors * lanes; i += lanes)
     for (int axis = 0; axis < 3; ++axis) {
@@ -169,8 +172,8 @@ HWY_INLINE std::uint32_t Kernel<uniform, differentials>::outside(const Packet& p
 }
 
 /// The lanes that cannot take this step, as bits.
-template <bool uniform, bool differentials>
-HWY_NOINLINE std::uint32_t Kernel<uniform, differentials>::stopped(const Packet& packet) const {
+template <bool uniform, bool differentials, bool changes>
+HWY_NOINLINE std::uint32_t Kernel<uniform, differentials, changes>::stopped(const Packet& packet) const {
   std::uint32_t stop = 0;
   for (int i = 0; i < packet.vectors * lanes; i += lanes) {
     const F3 v = load(packet.v_next, i);
@@ -198,8 +201,8 @@ HWY_NOINLINE std::uint32_t Kernel<uniform, differentials>::stopped(const Packet&
 
 /// The lanes that may take no further step, as bits. Rays that have crossed a cut have taken more steps than the
 /// packet counts.
-template <bool uniform, bool differentials>
-HWY_NOINLINE std::uint32_t Kernel<uniform, differentials>::spent(const Packet& packet) const {
+template <bool uniform, bool differentials, bool changes>
+HWY_NOINLINE std::uint32_t Kernel<uniform, differentials, changes>::spent(const Packet& packet) const {
   std::uint32_t result = 0;
   for (std::uint32_t rest = packet.alive; rest != 0; rest &= rest - 1) {
     const auto lane = hwy::Num0BitsBelowLS1Bit_Nonzero32(rest);
@@ -210,8 +213,8 @@ HWY_NOINLINE std::uint32_t Kernel<uniform, differentials>::spent(const Packet& p
 
 /// Moves the middles of steps that lie outside the extent to the nearest points on it, where the tensor is that of the
 /// outermost voxels. Light may turn back into the extent from there.
-template <bool uniform, bool differentials>
-HWY_NOINLINE void Kernel<uniform, differentials>::locate_on_extent(Packet& packet) {
+template <bool uniform, bool differentials, bool changes>
+HWY_NOINLINE void Kernel<uniform, differentials, changes>::locate_on_extent(Packet& packet) {
   packet.clamps = true;
   locate_middles<uniform, differentials>(medium_, packet);
   interpolate<uniform, differentials>(packet);
@@ -219,8 +222,9 @@ HWY_NOINLINE void Kernel<uniform, differentials>::locate_on_extent(Packet& packe
 }
 
 /// Writes back the rays of some lanes, as they were before the step, and removes them from the packet.
-template <bool uniform, bool differentials>
-HWY_NOINLINE void Kernel<uniform, differentials>::take_out(Packet& packet, std::uint32_t stop, std::uint32_t leave) {
+template <bool uniform, bool differentials, bool changes>
+HWY_NOINLINE void Kernel<uniform, differentials, changes>::take_out(Packet& packet, std::uint32_t stop,
+                                                                    std::uint32_t leave) {
   Packet& leaving = leaving_[&packet - packets_];
   for (std::uint32_t rest = stop | leave; rest != 0; rest &= rest - 1) {
     const int lane = static_cast<int>(hwy::Num0BitsBelowLS1Bit_Nonzero32(rest));
@@ -236,6 +240,7 @@ HWY_NOINLINE void Kernel<uniform, differentials>::take_out(Packet& packet, std::
         }
     }
     ray.length += double{packet.length[lane]} * to_world();
+    if constexpr (changes) ray.radiance_change += packet.radiance_change[lane];
     ray.step = packet.time[lane] * to_world();
     ray.steps += packet.steps;
     packet.alive &= ~(1u << lane);
@@ -245,8 +250,8 @@ HWY_NOINLINE void Kernel<uniform, differentials>::take_out(Packet& packet, std::
   }
 }
 
-template <bool uniform, bool differentials>
-HWY_NOINLINE void Kernel<uniform, differentials>::keep_points(const Packet& packet, std::uint32_t which) {
+template <bool uniform, bool differentials, bool changes>
+HWY_NOINLINE void Kernel<uniform, differentials, changes>::keep_points(const Packet& packet, std::uint32_t which) {
   for (std::uint32_t rest = which; rest != 0; rest &= rest - 1) {
     const auto lane = hwy::Num0BitsBelowLS1Bit_Nonzero32(rest);
     const KernelRay& ray = rays_[packet.ray[lane]];
@@ -261,10 +266,21 @@ HWY_NOINLINE void Kernel<uniform, differentials>::keep_points(const Packet& pack
   }
 }
 
+/// Adds a step to what the lanes have travelled.
+template <bool uniform, bool differentials, bool changes>
+HWY_INLINE void Kernel<uniform, differentials, changes>::add_step(Packet& packet) {
+  for (int i = 0; i < packet.vectors * lanes; i += lanes) {
+    store(hn::Add(load(packet.length, i), load(packet.time, i)), packet.length, i);
+    if constexpr (changes)
+      store(hn::Add(load(packet.radiance_change, i), load(packet.change_of_step, i)), packet.radiance_change, i);
+  }
+  ++packet.steps;
+}
+
 /// Ends a step. Takes out the rays that it ends, as they were before it: those of `stop` and those found here, except
 /// for lanes that are `staying`.
-template <bool uniform, bool differentials>
-void Kernel<uniform, differentials>::end_step(Packet& packet, std::uint32_t staying, std::uint32_t stop) {
+template <bool uniform, bool differentials, bool changes>
+void Kernel<uniform, differentials, changes>::end_step(Packet& packet, std::uint32_t staying, std::uint32_t stop) {
   std::uint32_t leave = 0;
   if (packet.near_border) leave = outside(packet, packet.p_next) & ~staying;
   const bool may_fail = medium_.settings.method != BendingMethod::splitting;
@@ -282,52 +298,50 @@ void Kernel<uniform, differentials>::end_step(Packet& packet, std::uint32_t stay
     store(load(packet.p_next, i), packet.p, i);
     store(load(packet.v_next, i), packet.v, i);
     if constexpr (!uniform) store(load(packet.u_next, i), packet.u, i);
-    store(hn::Add(load(packet.length, i), load(packet.time, i)), packet.length, i);
     if constexpr (differentials)
       for (int k = 0; k < 2; ++k) {
         store(load(packet.dp_next[k], i), packet.dp[k], i);
         store(load(packet.dv_next[k], i), packet.dv[k], i);
       }
   }
-  ++packet.steps;
+  add_step(packet);
   if (!batch_.points.empty()) keep_points(packet, packet.alive & ~staying);
   if ((stop | leave) != 0 && packet.alive != 0) close_ranks(packet);
 }
 
 /// The second part of a step that may end rays.
-template <bool uniform, bool differentials>
-HWY_NOINLINE void Kernel<uniform, differentials>::step_watched(Packet& packet) {
+template <bool uniform, bool differentials, bool changes>
+HWY_NOINLINE void Kernel<uniform, differentials, changes>::step_watched(Packet& packet) {
   if (packet.near_border && (outside(packet, packet.middle) & packet.alive) != 0) locate_on_extent(packet);
-  take_step<uniform, differentials>(medium_, packet, packet.p_next, packet.v_next, packet.u_next);
+  take_step<uniform, differentials, changes>(medium_, packet, packet.p_next, packet.v_next, packet.u_next);
   end_step(packet, 0, 0);
 }
 
-template <bool uniform, bool differentials>
-HWY_INLINE void Kernel<uniform, differentials>::step_split(Packet& packet) {
+template <bool uniform, bool differentials, bool changes>
+HWY_INLINE void Kernel<uniform, differentials, changes>::step_split(Packet& packet) {
   locate_middles<uniform, differentials>(medium_, packet);
   interpolate<uniform, differentials>(packet);
   samples_ += hwy::PopCount(packet.alive);
   if (differentials || HWY_UNLIKELY(packet.watched || packet.steps >= packet.most_steps)) return step_watched(packet);
-  take_step<uniform, differentials>(medium_, packet, packet.p, packet.v, packet.u);
-  for (int i = 0; i < packet.vectors * lanes; i += lanes)
-    store(hn::Add(load(packet.length, i), load(packet.time, i)), packet.length, i);
-  ++packet.steps;
+  take_step<uniform, differentials, changes>(medium_, packet, packet.p, packet.v, packet.u);
+  add_step(packet);
   if (HWY_UNLIKELY(!batch_.points.empty())) keep_points(packet, packet.alive);
 }
 
 /// Computes the positions after a step of length `time`. May move lanes to other bricks.
-template <bool uniform, bool differentials>
-void Kernel<uniform, differentials>::attempt(Packet& packet) {
-  if (medium_.stages) return step_by_stages<uniform, differentials>(medium_, packet);
-  if (medium_.settings.method == BendingMethod::euler) return step_by_euler<uniform, differentials>(medium_, packet);
+template <bool uniform, bool differentials, bool changes>
+void Kernel<uniform, differentials, changes>::attempt(Packet& packet) {
+  if (medium_.stages) return step_by_stages<uniform, differentials, changes>(medium_, packet);
+  if (medium_.settings.method == BendingMethod::euler)
+    return step_by_euler<uniform, differentials, changes>(medium_, packet);
   locate_middles<uniform, differentials>(medium_, packet);
   interpolate<uniform, differentials>(packet);
-  take_step<uniform, differentials>(medium_, packet, packet.p_next, packet.v_next, packet.u_next);
+  take_step<uniform, differentials, changes>(medium_, packet, packet.p_next, packet.v_next, packet.u_next);
 }
 
 /// A step of a method other than splitting.
-template <bool uniform, bool differentials>
-HWY_NOINLINE void Kernel<uniform, differentials>::step_otherwise(Packet& packet) {
+template <bool uniform, bool differentials, bool changes>
+HWY_NOINLINE void Kernel<uniform, differentials, changes>::step_otherwise(Packet& packet) {
   const std::uint32_t stop = too_short<uniform>(packet);
   attempt(packet);
   samples_ += hwy::PopCount(packet.alive) * samples_per_step();
@@ -336,8 +350,8 @@ HWY_NOINLINE void Kernel<uniform, differentials>::step_otherwise(Packet& packet)
 }
 
 /// Repeats the step that leaves the extent, with the length that ends on its face (Newton's method).
-template <bool uniform, bool differentials>
-HWY_NOINLINE void Kernel<uniform, differentials>::land(Packet& packet) {
+template <bool uniform, bool differentials, bool changes>
+HWY_NOINLINE void Kernel<uniform, differentials, changes>::land(Packet& packet) {
   packet.vectors = packet_rays / lanes;
   close_ranks(packet);
   packet.clamps = true;
@@ -355,8 +369,8 @@ HWY_NOINLINE void Kernel<uniform, differentials>::land(Packet& packet) {
 }
 
 /// Writes back the rays, which are on the extent's faces.
-template <bool uniform, bool differentials>
-void Kernel<uniform, differentials>::arrive(Packet& packet, const FaceLanding& landing) {
+template <bool uniform, bool differentials, bool changes>
+void Kernel<uniform, differentials, changes>::arrive(Packet& packet, const FaceLanding& landing) {
   for (std::uint32_t rest = packet.alive; rest != 0; rest &= rest - 1) {
     const auto lane = hwy::Num0BitsBelowLS1Bit_Nonzero32(rest);
     KernelRay& ray = rays_[packet.ray[lane]];
@@ -367,14 +381,15 @@ void Kernel<uniform, differentials>::arrive(Packet& packet, const FaceLanding& l
     }
     ray.axis = static_cast<std::int8_t>(landing.axis[lane]);
     ray.length += double{packet.time[lane]} * to_world();
+    if constexpr (changes) ray.radiance_change += packet.change_of_step[lane];
     ++ray.steps;
     samples_ += (1 + landing_steps) * samples_per_step();
   }
   packet.alive = 0;
 }
 
-template <bool uniform, bool differentials>
-std::uint64_t Kernel<uniform, differentials>::run() {
+template <bool uniform, bool differentials, bool changes>
+std::uint64_t Kernel<uniform, differentials, changes>::run() {
   const bool otherwise = medium_.settings.method != BendingMethod::splitting;
   for (Packet& packet : packets_) fill(packet);
   for (bool busy = true; busy;) {
@@ -396,10 +411,15 @@ std::uint64_t Kernel<uniform, differentials>::run() {
   return samples_;
 }
 
+template <bool differentials, bool changes>
+std::uint64_t trace_as(const PacketMedium& medium, KernelRays& batch) {
+  return medium.uniform ? Kernel<true, differentials, changes>(medium, batch).run()
+                        : Kernel<false, differentials, changes>(medium, batch).run();
+}
+
 std::uint64_t trace(const PacketMedium& medium, KernelRays& batch) {
-  if (!batch.differentials.empty())
-    return medium.uniform ? Kernel<true, true>(medium, batch).run() : Kernel<false, true>(medium, batch).run();
-  return medium.uniform ? Kernel<true, false>(medium, batch).run() : Kernel<false, false>(medium, batch).run();
+  if (!batch.differentials.empty()) return trace_as<true, false>(medium, batch);
+  return batch.wants_radiance_change ? trace_as<false, true>(medium, batch) : trace_as<false, false>(medium, batch);
 }
 
 int vector_lanes() { return lanes; }

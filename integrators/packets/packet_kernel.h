@@ -21,11 +21,12 @@ struct KernelRay {
   std::array<float, 3> position;      ///< From the brick's first voxel, in voxels.
   std::array<float, 3> direction;     ///< V; unit, world axes.
   float strength = 0;                 ///< σ = s · scale.
-  float norm = 0;           ///< Norm of the deviator of T as last sampled; 0 if it does not make steps shorter.
-  double length = 0;        ///< Length of the path, world units; the kernel adds to it.
-  std::uint32_t steps = 0;  ///< Number of steps; the kernel adds to it.
-  std::int8_t axis = -1;    ///< Axis of the face of the extent where the ray left; -1: it has not left.
-  float step = 0;           ///< If the ray has not left: length of its next step, world units; 0: not known.
+  float norm = 0;             ///< Norm of the deviator of T as last sampled; 0 if it does not make steps shorter.
+  double length = 0;          ///< Length of the path, world units; the kernel adds to it.
+  std::uint32_t steps = 0;    ///< Number of steps; the kernel adds to it.
+  float radiance_change = 0;  ///< Λ in the kernel, if it is wanted.
+  std::int8_t axis = -1;      ///< Axis of the face of the extent where the ray left; -1: it has not left.
+  float step = 0;             ///< If the ray has not left: length of its next step, world units; 0: not known.
 };
 
 /// Derivatives of a ray along two parameters: voxels, in index space, and radians.
@@ -44,6 +45,7 @@ struct KernelRays {
   std::vector<KernelRay> rays;
   std::vector<KernelDifferential> differentials;  ///< One for every ray, or empty.
   std::vector<std::vector<KernelPoint>> points;   ///< One list for every ray, to which the kernel adds; or empty.
+  bool wants_radiance_change = false;             ///< Only without differentials: see RayBatch.
 };
 
 /// Whether the step from one point to another meets a surface, so that packets cannot take it. Called where surfaces

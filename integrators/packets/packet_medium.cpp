@@ -4,6 +4,8 @@
 
 #include <Eigen/Geometry>
 
+#include "integrators/bending/exponential.h"
+
 namespace tensorray::packets {
 
 PacketMedium::PacketMedium(const TensorField& field_, const KernelSettings& settings_)
@@ -43,6 +45,12 @@ bool PacketMedium::near_surface(const std::int32_t at[3]) const {
 bool PacketMedium::meets_surface(const double from[3], const double to[3]) const {
   return settings.meets_surface(field.to_world() * Eigen::Vector3d(from[0], from[1], from[2]),
                                 field.to_world() * Eigen::Vector3d(to[0], to[1], to[2]));
+}
+
+float strong_radiance_change(const float T[9], float factor, const float v[3]) {
+  const Eigen::Matrix3d A = double{factor} * Eigen::Map<const Eigen::Matrix3f>(T).cast<double>();
+  const Eigen::Vector3d direction = Eigen::Map<const Eigen::Vector3f>(v).cast<double>();
+  return static_cast<float>(-3 * exponential_direction(A, direction).log_length);
 }
 
 }  // namespace tensorray::packets

@@ -39,6 +39,10 @@ struct PacketMedium {
   bool meets_surface(const double from[3], const double to[3]) const;
 };
 
+/// Λ of a kick that is too strong for a series in single precision.
+/// @param T  T up to a multiple of I, column by column.
+float strong_radiance_change(const float T[9], float factor, const float v[3]);
+
 constexpr float strongest_kick = static_cast<float>(step_lengths::strongest_kick);
 /// Voxels. Shorter steps are taken in double precision; splitting never takes them.
 constexpr float shortest_step = 1.0f / 1024;
@@ -74,6 +78,8 @@ struct alignas(64) Packet {
   PerRay fraction[3];  // Position within the cell.
   PerRay tensor[8];    // Tensors of all lanes, component after component.
   PerRay p_next[3], v_next[3], u_next[3];
+  // Only if the change of radiance is wanted: Λ since the ray entered the packet, and that of this step.
+  PerRay radiance_change, change_of_step;
   // Adaptive methods: the next step, voxels, and the error of this one divided by the tolerance.
   PerRay wanted, excess;
 

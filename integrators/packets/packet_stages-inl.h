@@ -21,8 +21,9 @@ namespace tensorray::packets::HWY_NAMESPACE {
 /// their derivatives along two parameters.
 struct alignas(64) Stages {
   PerRay v[3][RungeKutta::most_stages][3], change[3][RungeKutta::most_stages][3];
-  PerRay ahead[3];  // Offset of the next stage's point from p, voxels.
-  PerRay dp[2][3];  // Derivatives of the position of that point.
+  PerRay ahead[3];                             // Offset of the next stage's point from p, voxels.
+  PerRay dp[2][3];                             // Derivatives of the position of that point.
+  PerRay divergence[RungeKutta::most_stages];  // σ (tr T − 3 VᵀTV / |V|²) in each stage.
 };
 
 /// Σ_j factors[j] · rates[j].
@@ -59,8 +60,13 @@ HWY_INLINE void begin_stage(const PacketMedium& medium, const Packet& packet, in
   }
 }
 
+/// σ (tr T − 3 VᵀTV), which adding c I to T does not change.
+HWY_INLINE F divergence(const Tensor& T, F strength, F along) {
+  return hn::Mul(strength, hn::NegMulAdd(set(3), along, hn::Add(T.c[0], T.c[4])));
+}
+
 /// Eq. 5 and its derivatives, with the tensors as last sampled.
-template <bool differentials>
+template <bool differentials, bool changes>
 HWY_INLINE void end_stage(const PacketMedium& medium, Packet& packet, int stage, Stages& stages) {
   for (int i = 0; i < packet.vectors * lanes; i += lanes) {
     const F kick = load(packet.kick, i);
@@ -70,6 +76,7 @@ HWY_INLINE void end_stage(const PacketMedium& medium, Packet& packet, int stage,
     const F inverse = hn::Div(set(1), dot(v, v)), along = hn::Mul(dot(v, Tv), inverse);
     const F3 change = mul_add(hn::Neg(along), v, Tv);
     store(mul(kick, change), stages.change[0][stage], i);
+    if constexpr (changes) store(divergence(T, kick, along), stages.divergence[stage], i);
     if constexpr (differentials)
       for (int k = 0; k < 2; ++k) {
         const F3 dv = load(stages.v[k + 1][stage], i);
@@ -114,7 +121,7 @@ HWY_INLINE F find_excess(const PacketMedium& medium, const Packet& packet, const
   return hn::Mul(hn::Mul(load(packet.time, at), greater), set(1 / medium.settings.tolerance));
 }
 
-template <bool uniform, bool differentials>
+template <bool uniform, bool differentials, bool changes>
 HWY_INLINE void combine_stages(const PacketMedium& medium, Packet& packet, const Stages& stages) {
   const double* const factors = medium.stages->b;
   const int count = medium.stages->stages;
@@ -133,12 +140,18 @@ HWY_INLINE void combine_stages(const PacketMedium& medium, Packet& packet, const
         dv[k] = after(packet.dv[k], k + 1);
       }
     keep_unit<uniform, differentials>(medium, packet, after(packet.v, 0), dv, i);
+    if constexpr (changes) {
+      F change = hn::Zero(floats);
+      for (int j = 0; j < count; ++j)
+        change = hn::MulAdd(set(static_cast<float>(factors[j])), load(stages.divergence[j], i), change);
+      store(hn::Mul(time, change), packet.change_of_step, i);
+    }
     if (medium.adaptive) store(find_excess<uniform>(medium, packet, stages, i), packet.excess, i);
   }
 }
 
 /// A step of a Runge–Kutta method.
-template <bool uniform, bool differentials>
+template <bool uniform, bool differentials, bool changes>
 HWY_NOINLINE void step_by_stages(const PacketMedium& medium, Packet& packet) {
   Stages stages;
   bool near_border = false, near_surface = false;  // In any brick that is sampled.
@@ -149,11 +162,11 @@ HWY_NOINLINE void step_by_stages(const PacketMedium& medium, Packet& packet) {
     near_border |= packet.near_border;
     near_surface |= packet.near_surface;
     interpolate<uniform, differentials>(packet);
-    end_stage<differentials>(medium, packet, stage, stages);
+    end_stage<differentials, changes>(medium, packet, stage, stages);
   }
   packet.near_border |= near_border;
   packet.near_surface |= near_surface;
-  combine_stages<uniform, differentials>(medium, packet, stages);
+  combine_stages<uniform, differentials, changes>(medium, packet, stages);
 }
 
 /// T₂₂ and its slopes at the points where the lanes' tensors were sampled.
@@ -171,7 +184,7 @@ HWY_INLINE Slopes<F> sample_trailing(const Packet& packet, int at) {
 }
 
 /// A step of Euler's method (Eq. 3–4), which the trace of T affects.
-template <bool uniform, bool differentials>
+template <bool uniform, bool differentials, bool changes>
 HWY_NOINLINE void step_by_euler(const PacketMedium& medium, Packet& packet) {
   locate<uniform, differentials>(medium, packet, [&](int i) HWY_ATTR { return load(packet.p, i); });
   interpolate<uniform, differentials>(packet);
@@ -189,7 +202,8 @@ HWY_NOINLINE void step_by_euler(const PacketMedium& medium, Packet& packet) {
         const F3 bent = add(apply(T, before), apply(tensor_along(packet, along, i), v));
         dv[k] = mul_add(factor, mul_add(trailing.value, before, mul_add(dtrailing, v, bent)), before);
       }
-    const F3 after = mul_add(factor, mul_add(trailing.value, v, apply(T, v)), v);
+    const F3 Tv = apply(T, v), after = mul_add(factor, mul_add(trailing.value, v, Tv), v);
+    if constexpr (changes) store(divergence(T, factor, dot(v, Tv)), packet.change_of_step, i);
     keep_unit<uniform, differentials>(medium, packet, after, dv, i);
     keep_bending_rate(packet, T, i);
     const auto on = [&](const PerRay(&p)[3], const PerRay(&along)[3])
@@ -229,6 +243,7 @@ HWY_INLINE std::uint32_t too_short(const Packet& packet) {
 template <bool uniform, bool differentials>
 HWY_INLINE void stay(Packet& packet, int lane) {
   packet.time[lane] = 0;
+  packet.change_of_step[lane] = 0;
   for (int axis = 0; axis < 3; ++axis) {
     packet.p_next[axis][lane] = packet.p[axis][lane];
     packet.v_next[axis][lane] = packet.v[axis][lane];

@@ -22,7 +22,8 @@
 HWY_BEFORE_NAMESPACE();
 namespace tensorray::packets::HWY_NAMESPACE {
 
-// Template arguments: `uniform`: voxels are cubes along the axes. `differentials`: rays have differentials.
+// Template arguments: `uniform`: voxels are cubes along the axes. `differentials`: rays have differentials. `changes`:
+// the change of radiance is wanted.
 
 /// The change of position per unit of `time`, in index space: V if voxels are uniform (time in voxels), else u (time in
 /// world units).
@@ -254,7 +255,7 @@ HWY_INLINE void bend_differentials(const PacketMedium& medium, Packet& packet, c
 
 /// The third part of a step: bends the rays, and moves from the middle to the positions and directions at the end. The
 /// results may overwrite those of the packet. `weakly`: no lane needs more than two terms.
-template <bool uniform, bool differentials, bool weakly>
+template <bool uniform, bool differentials, bool changes, bool weakly>
 HWY_INLINE void take_step_as(const PacketMedium& medium, Packet& packet, PerRay (&p)[3], PerRay (&v)[3],
                              PerRay (&u)[3]) {
   for (int i = 0; i < packet.vectors * lanes; i += lanes) {
@@ -263,9 +264,9 @@ HWY_INLINE void take_step_as(const PacketMedium& medium, Packet& packet, PerRay 
     for (int c = 0; c < 8; ++c) T.c[c] = load(packet.tensor[c], i);
     const F3 before = load(packet.v, i);
     if constexpr (weakly)
-      store(bend_weakly(T, before, factor), v, i);
+      store(bend_weakly<changes>(packet, T, before, factor, i), v, i);
     else
-      bend_strongly<differentials>(packet, T, before, factor, i, v);
+      bend_strongly<differentials, changes>(packet, T, before, factor, i, v);
     if constexpr (differentials) bend_differentials<uniform>(medium, packet, T, before, factor, i);
     const F3 after = load(v, i);
     if constexpr (uniform) {
@@ -278,11 +279,11 @@ HWY_INLINE void take_step_as(const PacketMedium& medium, Packet& packet, PerRay 
   }
 }
 
-template <bool uniform, bool differentials>
+template <bool uniform, bool differentials, bool changes>
 HWY_INLINE void take_step(const PacketMedium& medium, Packet& packet, PerRay (&p)[3], PerRay (&v)[3], PerRay (&u)[3]) {
   if (!differentials && HWY_LIKELY(packet.greatest_reach <= series_reach[0]))
-    return take_step_as<uniform, differentials, true>(medium, packet, p, v, u);
-  take_step_as<uniform, differentials, false>(medium, packet, p, v, u);
+    return take_step_as<uniform, differentials, changes, true>(medium, packet, p, v, u);
+  take_step_as<uniform, differentials, changes, false>(medium, packet, p, v, u);
 }
 
 }  // namespace tensorray::packets::HWY_NAMESPACE

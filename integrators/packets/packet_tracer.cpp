@@ -117,6 +117,7 @@ State<N> state_of(const TensorField& field, const packets::KernelRays& kernel, s
     if (std::abs(index[axis] - face) < face_margin) index[axis] = face;
   }
   State<N> state;
+  state.radiance_change = ray.radiance_change;
   state.P.col(0) = field.to_world() * index;
   state.V.col(0) = to_vector(ray.direction);
   if constexpr (N == 3) {
@@ -231,6 +232,7 @@ void trace_rays(const TensorField& field, const Geometry& geometry, const Bendin
   Tracer<N> tracer(field, geometry, settings);
   approach(field, settings, batch, recordings, tracer, flight);
   if (recordings) flight.kernel.points.resize(flight.kernel.rays.size());
+  flight.kernel.wants_radiance_change = batch.wants_radiance_change;
   batch.tensor_samples += packets::run(field, kernel_settings(field, geometry, settings), flight.kernel);
   for (std::size_t i = 0; i < flight.numbers.size(); ++i) {
     const std::size_t number = flight.numbers[i];

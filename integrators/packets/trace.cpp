@@ -38,9 +38,12 @@ void prepare(const BendingSettings& settings, RayBatch& batch) {
   make_room();  // Rays bring pages of a field that has a bound into memory.
   if (has_differentials(batch) && batch.differentials.size() != batch.size())
     throw std::invalid_argument("a batch must have differentials for every ray or for none");
+  if (has_differentials(batch) && batch.wants_radiance_change)
+    throw std::invalid_argument("rays with differentials have no radiance change; leave out one of them");
   batch.end.resize(batch.size());
   batch.length.resize(batch.size());
   batch.steps.resize(batch.size());
+  if (batch.wants_radiance_change) batch.radiance_change.resize(batch.size());
 }
 
 void trace_one_by_one(const TensorField& field, const Geometry& geometry, const BendingSettings& settings,

@@ -5,8 +5,6 @@
 #include <limits>
 #include <utility>
 
-#include "integrators/bending/radiance_change.h"
-
 namespace tensorray {
 
 using Eigen::Vector3d;
@@ -37,15 +35,13 @@ double FieldRegion::entry(const Vector3d& origin, const Vector3d& direction) con
 
 /// @param sign   Of the flexibility: 1 for light, −1 for light that is followed back.
 /// @param gains  Whether the gain of a way is that along its ray; otherwise it is 1.
-void FieldRegion::follow(const Vector3d& origin, const Vector3d& direction, double sign, bool gains, Memory& memory,
+/// @param rays   Set to the rays of the ways.
+void FieldRegion::follow(const Vector3d& origin, const Vector3d& direction, double sign, bool gains, RayBatch& rays,
                          std::vector<BentWay>& ways) const {
-  RayBatch& rays = memory.rays;
   rays.clear();
   for (const BentWay& way : ways) rays.add(origin, direction, sign * settings_.flexibility(way.band, way.place));
-  if (gains)
-    trace(field_, geometry_, settings_.bending, rays, memory.tracks);
-  else
-    trace(field_, geometry_, settings_.bending, rays);
+  rays.wants_radiance_change = gains;
+  trace(field_, geometry_, settings_.bending, rays);
   for (std::size_t i = 0; i < ways.size(); ++i) {
     BentWay& way = ways[i];
     const RayEnd end = rays.end[i];
@@ -55,17 +51,16 @@ void FieldRegion::follow(const Vector3d& origin, const Vector3d& direction, doub
     way.on_surface = end == RayEnd::obstacle;
     way.gain = 1;
     if (!gains || !way.arrives) continue;
-    const double strength = rays.flexibility[i] * settings_.bending.scale;
-    way.gain = std::exp(log_radiance_change(field_, geometry_, memory.tracks[i], strength));
+    way.gain = std::exp(rays.radiance_change[i]);
   }
 }
 
 void FieldRegion::follow_back(const Vector3d& origin, const Vector3d& direction, std::vector<BentWay>& ways) const {
-  Memory& memory = memory_.local();
-  follow(origin, direction, -1, settings_.conserve == Conserve::power, memory, ways);
+  RayBatch& rays = memory_.local();
+  follow(origin, direction, -1, settings_.conserve == Conserve::power, rays, ways);
   for (std::size_t i = 0; i < ways.size(); ++i) {
     BentWay& way = ways[i];
-    ++ends_[static_cast<std::size_t>(memory.rays.end[i])];
+    ++ends_[static_cast<std::size_t>(rays.end[i])];
     if (way.arrives && settings_.most_gain > 0 && !(way.gain <= settings_.most_gain)) {
       way.gain = settings_.most_gain;
       ++limited_;

@@ -16,7 +16,7 @@ namespace tensorray {
 
 /// What light keeps on its way through the field. Both are consistent, and differ in what they call physical.
 enum class Conserve {
-  power,     ///< A photon's power, as on the plates of this project: radiance changes by radiance_change.h.
+  power,     ///< A photon's power, as on the plates of this project: radiance changes (RayBatch).
   radiance,  ///< Radiance, as in the lens of this project: a photon's power changes instead.
 };
 
@@ -46,20 +46,14 @@ class FieldRegion final : public BendingRegion {
   std::uint64_t limited() const { return limited_; }
 
  private:
-  /// The memory of one thread's calls.
-  struct Memory {
-    RayBatch rays;
-    std::vector<Track> tracks;
-  };
-
-  void follow(const Eigen::Vector3d& origin, const Eigen::Vector3d& direction, double sign, bool gains, Memory& memory,
+  void follow(const Eigen::Vector3d& origin, const Eigen::Vector3d& direction, double sign, bool gains, RayBatch& rays,
               std::vector<BentWay>& ways) const;
 
   const TensorField& field_;
   const Geometry& geometry_;
   FieldViewSettings settings_;
   double rounding_;  ///< World units.
-  mutable tbb::enumerable_thread_specific<Memory> memory_;
+  mutable tbb::enumerable_thread_specific<RayBatch> memory_;
   mutable std::array<std::atomic<std::uint64_t>, ray_end_count> ends_{};
   mutable std::atomic<std::uint64_t> limited_{0};
 };

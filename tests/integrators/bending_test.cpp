@@ -88,6 +88,31 @@ TEST(Bending, AllMethodsFollowTheExactPathOfConstantTensors) {
   }
 }
 
+/// Λ of light of constant T: L_end / L_start = |M V₀|³ / det M with M = exp(s ℓ T), and −Λ is its logarithm.
+TEST(Bending, RadianceOfConstantTensorsChangesAsInTheClosedForm) {
+  const Vector3d P(-0.2, 0.1, -0.5), V = Vector3d(0.3, -0.4, 1).normalized();
+  const double s = 0.5;
+  for (const Matrix3d& T : constant_tensors()) {
+    const TensorField field = constant_field(T);
+    const Geometry geometry(surfaces_of(field));
+    const auto error = [&](BendingMethod method, double step) {
+      BendingSettings settings = settings_of(method, step);
+      settings.max_steps = static_cast<int>(4 / step);
+      RayBatch rays;
+      rays.wants_radiance_change = true;
+      rays.add(P, V, s);
+      trace_reference(field, geometry, settings, rays);
+      EXPECT_EQ(rays.end[0], RayEnd::step_limit);
+      const Matrix3d M = Matrix3d(s * rays.length[0] * T).exp();
+      return std::abs(rays.radiance_change[0] + std::log(std::pow((M * V).norm(), 3) / M.determinant()));
+    };
+    EXPECT_LT(error(BendingMethod::splitting, 1), 1e-11) << "every step is exact";
+    // ‖s T h‖ is about 0.02, and Λ at most 1: as in the test above.
+    EXPECT_LT(error(BendingMethod::euler, 1.0 / 16), 0.04);
+    EXPECT_LT(error(BendingMethod::rk4, 1.0 / 16), 1e-7);
+  }
+}
+
 TEST(Bending, DiagonalTensorsMatchTheClosedForm) {
   const Vector3d diagonal(1.5, -0.75, 0.25), V = Vector3d(1, 2, -3).normalized();
   const TensorField field = constant_field(diagonal.asDiagonal().toDenseMatrix());

@@ -275,6 +275,52 @@ TEST_P(PacketMethods, RecordTheSameTracks) {
   }
 }
 
+/// Λ is the same to single precision, and does not depend on neighbours; that it is wanted changes no ray.
+TEST_P(PacketMethods, KnowTheChangeOfRadiance) {
+  for (const BendingMethod method :
+       {BendingMethod::splitting, BendingMethod::euler, BendingMethod::rk4, BendingMethod::bs23, BendingMethod::dopri5})
+    for (const double kick : {1e-3, 0.05, 0.5}) {
+      Scene scene = random_scene(method, lattices()[method == BendingMethod::rk4 ? 2 : 0], 0, kick, 40);
+      SCOPED_TRACE(scene.name);
+      const RayBatch plain = traced(scene, scene.rays);
+      scene.rays.wants_radiance_change = true;
+      const RayBatch all = traced(scene, scene.rays), reference = traced_by_reference(scene, scene.rays);
+      double greatest = 0;
+      int compared = 0;
+      for (std::size_t i = 0; i < all.size(); ++i) {
+        EXPECT_TRUE(identical(all, i, plain, i)) << "ray " << i;
+        RayBatch alone;
+        alone.wants_radiance_change = true;
+        alone.add(scene.rays.position[i], scene.rays.direction[i], scene.rays.flexibility[i]);
+        EXPECT_EQ(traced(scene, alone).radiance_change[0], all.radiance_change[i]);
+        if (!agree(all, reference, i)) continue;  // Other steps.
+        ++compared;
+        const double change = reference.radiance_change[i];
+        EXPECT_NEAR(all.radiance_change[i], change, 1e-3 * (1 + std::abs(change))) << "ray " << i;
+        greatest = std::max(greatest, std::abs(change));
+      }
+      EXPECT_GT(greatest, kick);
+      EXPECT_GT(compared, static_cast<int>(all.size()) / 2);
+    }
+}
+
+/// Adding c(P) I to T changes no ray and no Λ.
+TEST_P(PacketMethods, IsotropicTensorsChangeNoRadiance) {
+  const TensorFunction smooth = smooth_tensor(41);
+  const auto changes = [&](double c) {
+    TensorField field(lattice_grid(index_box({0, 0, 0}, {24, 24, 24}), lattices()[0], [&](const Vector3d& p) {
+      return Matrix3d(0.1 * (smooth(p) + c * p.x() * Matrix3d::Identity()));
+    }));
+    RayBatch rays = random_rays(field, 16, {0.3, -1}, 42);
+    rays.wants_radiance_change = true;
+    const Scene scene = make_scene("isotropic", std::move(field), {}, 0, std::move(rays));
+    return traced(scene, scene.rays).radiance_change;
+  };
+  const std::vector<double> without = changes(0), with = changes(1);
+  for (std::size_t i = 0; i < with.size(); ++i) EXPECT_NEAR(with[i], without[i], 1e-3) << "ray " << i;
+  EXPECT_GT(*std::max_element(without.begin(), without.end()), 0.1);
+}
+
 /// Rays with derivatives, along a parallel shift and along a shift with a turn.
 RayBatch with_differentials(RayBatch rays) {
   for (const Vector3d& direction : rays.direction) {
