@@ -50,8 +50,7 @@ void FieldRegion::follow(const Vector3d& origin, const Vector3d& direction, doub
     way.arrives = end == RayEnd::missed || end == RayEnd::obstacle;
     way.on_surface = end == RayEnd::obstacle;
     way.gain = 1;
-    if (!gains || !way.arrives) continue;
-    way.gain = std::exp(rays.radiance_change[i]);
+    if (gains && way.arrives) way.gain = std::exp(rays.radiance_change[i]);
   }
 }
 
