@@ -4,7 +4,6 @@
 
 #include <gtest/gtest.h>
 
-#include "integrators/bending/radiance_change.h"
 #include "integrators/view/field_region.h"
 #include "renderer/sampling/random.h"
 #include "renderer/shading/photon_tracer.h"
@@ -76,17 +75,14 @@ std::vector<double> rays_on_floor(const TensorField& field, Conserve conserve) {
     const Vector3d at(side * (random_uniform(1, i, 0) - 0.5), side * (random_uniform(1, i, 1) - 0.5), 1);
     rays.add(at - 0.5 * along, along, flexibility);
   }
-  std::vector<Track> tracks;
-  RayBatch tracked = rays;
-  trace(field, geometry, {}, tracked, tracks);
+  rays.wants_radiance_change = true;
   trace_reference(field, geometry, {}, rays);
   std::vector<double> power(64);
   for (std::size_t i = 0; i < rays.size(); ++i) {
     // Only light that meets the cube: it has gone through it, or past its upper edge.
     if (rays.end[i] != RayEnd::obstacle || rays.steps[i] == 0) continue;
     const Eigen::Array2i square = ((rays.position[i].head<2>().array() + 1) / 0.25).floor().cast<int>();
-    const double gain =
-        conserve == Conserve::power ? 1 : std::exp(log_radiance_change(field, geometry, tracks[i], flexibility));
+    const double gain = conserve == Conserve::power ? 1 : std::exp(rays.radiance_change[i]);
     if ((square >= 0).all() && (square < 8).all())
       power[static_cast<std::size_t>(8 * square.y() + square.x())] += gain * side * side * std::abs(along.z()) / count;
   }
