@@ -123,8 +123,8 @@ inline bool jumps(const FlowTriangle& triangle, const Eigen::Vector2d& a, const 
 ///
 /// In a range, each position first sends light at 5 of the 33 nodes, or at 3 where the positions beside it agree in
 /// what lies between. Where these are smooth, so that an error of more than a hundredth of the tolerance is unlikely,
-/// the others are predicted (node_prediction.h); where not, more nodes are traced, up to all. (At a caustic a small
-/// error of the landing is a great one of the colour.)
+/// the others are predicted (node_prediction.h); where not, more nodes are traced, up to all, in each quarter of the
+/// range on its own. (At a caustic a small error of the landing is a great one of the colour.)
 ///
 /// If `geometry` has a body instead of a plate, the landings of light from the volume are the projections of
 /// the points of the body on `plate`: along its normal, or from the beam's source if it has one. Light counts as landed

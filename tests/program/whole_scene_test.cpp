@@ -1,6 +1,8 @@
 // The method "scene": surfaces in light that a field bends, seen through the field.
 
 #include <cmath>
+#include <string>
+#include <utility>
 
 #include <fmt/core.h>
 
@@ -154,25 +156,34 @@ TEST_F(WholeScene, AnEvenSkyThroughTheFieldIsEvenIfRadianceIsConserved) {
   EXPECT_GT(differs(picture(sky)), 0.1);
 }
 
-/// The light of points, traced forwards to the floor, is that of a lamp that the path tracer finds backwards.
-TEST_F(WholeScene, TheLightOfPointsThroughTheFieldIsThatOfALamp) {
+/// A plate below a bending field, in the light of nine points (`first`) or of a lamp (`second`): a square of 3 × 3 with
+/// the intensity π 100. The lamp is darker by 1% towards the edges.
+/// @param integrator  More keys of the integrator.
+std::pair<std::string, std::string> points_and_lamp(const std::string& integrator) {
   const std::string common = R"({
     "field": {"generate": {"kind": "point_load", "resolution": 17}, "eigenvalues": "raw", "scale": 1},
-    "integrator": {"type": "scene", "max_samples": 512, "min_samples": 512, "noise": 0, "max_gain": 0, "bands": 8,
-                   "max_depth": 1, "caustic": {"resolution": 256, "rays": 20000}},
     "objects": [{"plate": {"center": [0, 0, -1.5], "size": [1.6, 1.6]}, "material": {"kind": "diffuse"}}],
     "camera": {"projection": "orthographic", "position": [0, 0.001, -1.2], "target": [0, 0, -1.5], "height": 1.4,
                "resolution": [20, 20]},
+    "integrator": {"type": "scene", "noise": 0, "max_gain": 0, "bands": 8, "max_depth": 1, )" +
+                             integrator + R"(},
     "lights": [)";
-  // A square of 3 × 3 with the intensity π 100, as nine points and as a lamp, which is darker by 1% towards the edges.
   std::string points;
   for (const int x : {-1, 0, 1})
     for (const int y : {-1, 0, 1})
       points += fmt::format(R"({}{{"kind": "point", "position": [{}, {}, 12], "strength": 11.111}})",
                             points.empty() ? "" : ", ", x, y);
-  write("scene.json", common + points + "]}");
+  return {common + points + "]}",
+          common + R"({"kind": "area", "center": [0, 0, 12], "size": [3, 3], "strength": 34.907}]})"};
+}
+
+/// The light of points, traced forwards to the floor, is that of a lamp that the path tracer finds backwards.
+TEST_F(WholeScene, TheLightOfPointsThroughTheFieldIsThatOfALamp) {
+  const auto [points, lamp] =
+      points_and_lamp(R"("max_samples": 512, "min_samples": 512, "caustic": {"resolution": 256, "rays": 20000})");
+  write("scene.json", points);
   const Image forwards = picture({});
-  write("scene.json", common + R"({"kind": "area", "center": [0, 0, 12], "size": [3, 3], "strength": 34.907}]})");
+  write("scene.json", lamp);
   const Image backwards = picture({}), other_law = picture({"integrator.conserve=radiance"});
   EXPECT_GT(mean(forwards, "G"), 0.2);
   EXPECT_NEAR(mean(forwards, "G"), mean(backwards, "G"), 0.03 * mean(backwards, "G"));
@@ -210,22 +221,10 @@ TEST_F(WholeScene, PhotonsGiveTheLightOfTheFlowMap) {
 
 /// Where radiance is conserved, light of points gains as the lamp's does.
 TEST_F(WholeScene, PhotonsConserveRadianceOnRequest) {
-  const std::string common = R"({
-    "field": {"generate": {"kind": "point_load", "resolution": 17}, "eigenvalues": "raw", "scale": 1},
-    "integrator": {"type": "scene", "max_samples": 64, "min_samples": 64, "noise": 0, "max_gain": 0, "bands": 8,
-                   "max_depth": 1, "conserve": "radiance"},
-    "objects": [{"plate": {"center": [0, 0, -1.5], "size": [1.6, 1.6]}, "material": {"kind": "diffuse"}}],
-    "camera": {"projection": "orthographic", "position": [0, 0.001, -1.2], "target": [0, 0, -1.5], "height": 1.4,
-               "resolution": [20, 20]},
-    "lights": [)";
-  std::string points;
-  for (const int x : {-1, 0, 1})
-    for (const int y : {-1, 0, 1})
-      points += fmt::format(R"({}{{"kind": "point", "position": [{}, {}, 12], "strength": 11.111}})",
-                            points.empty() ? "" : ", ", x, y);
-  write("scene.json", common + points + "]}");
+  const auto [points, lamp] = points_and_lamp(R"("max_samples": 64, "min_samples": 64, "conserve": "radiance")");
+  write("scene.json", points);
   const Image forwards = picture({}), map = picture({"integrator.photons.per_pass=0"});
-  write("scene.json", common + R"({"kind": "area", "center": [0, 0, 12], "size": [3, 3], "strength": 34.907}]})");
+  write("scene.json", lamp);
   const Image backwards = picture({});
   EXPECT_NEAR(mean(forwards, "G"), mean(backwards, "G"), 0.03 * mean(backwards, "G"));
   EXPECT_GT(std::abs(mean(map, "G") / mean(backwards, "G") - 1), 0.1);  // A flow map keeps power.
