@@ -16,8 +16,9 @@
 namespace tensorray {
 namespace {
 
-constexpr double even_part = 0.1;  // Densities of a square's halves that differ by less than this part of their sum ...
-                                   // become one.
+constexpr double even_part = 0.1;     // Densities of a square's halves that differ by less than this part of their sum
+                                      // become one, ...
+constexpr double uneven_part = 0.15;  // ... from this part on they stay as they are.
 constexpr std::size_t most_memory = 1u << 28;  // Bytes for the deposits of all threads, if a row of each takes less.
 constexpr std::size_t planes = DepositPlanes::count;
 
@@ -129,10 +130,16 @@ double start_triangle(const Job& job, const FlowPiece& piece, const FlowPiece::T
 }
 
 /// Gives the two triangles of a square one density if theirs are nearly the same: the edge between them need not be
-/// drawn then. Their power stays the same.
+/// drawn then. Beyond `even_part` their difference grows to its own, so that it does not jump. Their power stays the
+/// same.
 void even_out(double& a, double& b, double area_a, double area_b) {
-  if (!(a * b > 0 && std::abs(a - b) < even_part * std::abs(a + b))) return;
-  a = b = (area_a + area_b) / (area_a / a + area_b / b);
+  if (!(a * b > 0)) return;
+  const double part = std::abs(a - b) / std::abs(a + b);
+  if (part >= uneven_part) return;
+  const double even = (area_a + area_b) / (area_a / a + area_b / b);
+  const double left = std::max(part - even_part, 0.0) / (uneven_part - even_part);
+  a = even + left * (a - even);
+  b = even + left * (b - even);
 }
 
 /// Draws a piece at one place among the nodes.

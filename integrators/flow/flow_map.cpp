@@ -444,6 +444,9 @@ class FlowMapBuilder {
   }
 
   void make_triangles() {
+    map_.triangles.reserve(3 * squares_.size());
+    map_.edges.reserve(5 * squares_.size());
+    open_edges_.reserve(3 * squares_.size());
     std::vector<std::uint32_t> outline;
     for (const Square& square : squares_) {
       const std::uint32_t x = square.x, y = square.y, side = side_of(square);

@@ -17,16 +17,17 @@ constexpr Detail most_detail = 15;
 constexpr double many_places = 128;
 
 /// Distance that the light of a position moves from node to node, at most, pixels; infinite if it does not always end
-/// on the same thing.
-float movement(const FlowMap& map, std::size_t position) {
-  const std::size_t first = position * map.nodes;
-  float greatest = 0;
-  for (std::size_t i = first + 1; i < first + map.nodes; ++i) {
-    if (map.ends[i] != map.ends[first]) return std::numeric_limits<float>::infinity();
-    if (map.ends[i] == RayEnd::plate)
-      greatest = std::max(greatest, (map.landings[i] - map.landings[i - 1]).squaredNorm());
-  }
-  return std::sqrt(greatest);
+/// on the same thing. It is that of the parabola through three nodes, which are traced even where others are predicted:
+/// what a prediction misses must not change how often a triangle is drawn.
+double movement(const FlowMap& map, std::size_t position) {
+  const std::size_t first = position * map.nodes, last = first + map.nodes - 1;
+  for (std::size_t i = first + 1; i <= last; ++i)
+    if (map.ends[i] != map.ends[first]) return std::numeric_limits<double>::infinity();
+  if (map.nodes == 1 || map.ends[first] != RayEnd::plate) return 0;
+  const Eigen::Vector2f a = map.landings[first], c = map.landings[last];
+  const Eigen::Vector2f b = (map.landings[(first + last) / 2] + map.landings[(first + last + 1) / 2]) / 2;
+  const float fastest = std::max((4 * b - 3 * a - c).norm(), (3 * c - 4 * b + a).norm());  // At the ends.
+  return fastest / static_cast<float>(map.nodes - 1);
 }
 
 /// @param steps  The steps that light moves within each of `bands` bands.

@@ -6,9 +6,11 @@ namespace tensorray {
 namespace {
 
 constexpr std::size_t quarters = 4, quarter_nodes = (range_nodes - 1) / quarters;
-constexpr float gain = 4;         // Halving the distance of nodes: 16 for smooth landings; less, to be safe.
-constexpr float parent_part = 1;  // The parents' distance from their mean, over the error of the mean in their middle,
-                                  // which is of second order: 4 and more; less, to be safe.
+// What a traced node may miss, in tolerances. Half of the distance makes it a sixteenth where landings are smooth.
+constexpr float most = 4;
+constexpr float most_beside_parents = 2;
+constexpr float most_of_five = 1;    // Five nodes may be where they are predicted by chance in wild light, ...
+constexpr float beside_quarter = 4;  // ... but not those beside the quarter: these may miss so many times as much.
 
 /// The first node of a quarter, and its last one, which is also the first one of the next quarter.
 std::size_t first_of(std::size_t quarter) { return quarter * quarter_nodes; }
@@ -121,7 +123,7 @@ bool NodePrediction::parents_agree(std::size_t quarter, std::size_t step, float 
   for (std::size_t i = parent_count_ == 2 ? 1 : 0; i < parent_count_; ++i) {
     for (std::size_t node = first_of(quarter); node <= last_of(quarter); ++node) {
       const Eigen::Vector2f difference = missed(parents_[i], step, node) - missed(mean_.data(), step, node);
-      if (!(difference.norm() <= parent_part * tolerance)) return false;
+      if (!(difference.norm() <= tolerance)) return false;
     }
   }
   return true;
@@ -129,13 +131,16 @@ bool NodePrediction::parents_agree(std::size_t quarter, std::size_t step, float 
 
 bool NodePrediction::is_smooth(std::size_t quarter, std::size_t step, float tolerance) const {
   const std::size_t coarse = 2 * step;
+  const float within = (step == quarter_nodes ? most_of_five : most) * tolerance;
   for (std::size_t node = step; node < range_nodes; node += coarse) {
-    if (!overlaps(node - step, node + step, quarter)) continue;
+    const bool is_within = overlaps(node - step, node + step, quarter);
+    if (!is_within && !overlaps(node - std::min(node, 3 * step), node + 3 * step, quarter)) continue;
     if (!matters(node - step, step) && !matters(node, step)) continue;
     const Stencil& stencil = polynomials(coarse).stencils[node];
     for (std::size_t i = 0; i < polynomials(coarse).count; ++i)
       if (!landed(stencil.first + i * coarse)) return false;
-    if (!landed(node) || !(missed(landings_, coarse, node).norm() / gain <= tolerance)) return false;
+    const float allowed = is_within ? within : beside_quarter * within;
+    if (!landed(node) || !(missed(landings_, coarse, node).norm() <= allowed)) return false;
   }
   return true;
 }
@@ -147,7 +152,7 @@ bool NodePrediction::is_smooth_beside_parents(std::size_t quarter, std::size_t s
   for (std::size_t node = step; node < range_nodes; node += 2 * step) {
     if (!overlaps(node - step, node + step, quarter)) continue;
     const Eigen::Vector2f differs = missed(landings_, 2 * step, node) - missed(mean_.data(), 2 * step, node);
-    if (!(differs.norm() / gain <= tolerance)) return false;
+    if (!(differs.norm() <= most_beside_parents * tolerance)) return false;
   }
   return true;
 }

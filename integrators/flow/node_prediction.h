@@ -40,9 +40,9 @@ class NodePrediction {
   bool parents_agree(std::size_t step, float tolerance) const;
 
   /// Sets the nodes that are not traced in each quarter where they can be predicted to within `tolerance`, pixels,
-  /// wherever light may fall on the plate. The greatest of the traced nodes' distances from what every second one of
-  /// them predicts tells: where landings are smooth, the next one is a quarter of it, at most. They are not smooth
-  /// where light of the nodes leaves the volume through different faces.
+  /// wherever light may fall on the plate. No traced node of the quarter may be farther from what every second one
+  /// predicts, and none beside it by a few times that. Where landings are smooth, untraced nodes are then nearer by
+  /// far. They are not smooth where light of the nodes leaves the volume through different faces.
   /// @param faces  Of the nodes that are known; sets those of the others.
   /// @return Whether all nodes are known.
   bool predict(std::size_t step, float tolerance, ExitFaces& faces);

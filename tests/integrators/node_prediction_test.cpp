@@ -54,9 +54,9 @@ TEST(NodePrediction, CubicsAreExact) {
   const FlowMap map = map_of({0, 1, 0.5}, [](double x, double t) {
     return Vector2f(static_cast<float>(40 + x + 10 * t * t * t), static_cast<float>(50 - 20 * t * t));
   });
-  // Five nodes: the second one deviates from a parabola by 10 · 3/64 pixels, a quarter of which is allowed.
-  EXPECT_EQ(error_of(map, {}, 8, 0.116f), -1);
-  EXPECT_NEAR(error_of(map, {}, 8, 0.12f), 0, 1e-5);
+  // Five nodes: the second one deviates from a parabola by 10 · 3/64 pixels.
+  EXPECT_EQ(error_of(map, {}, 8, 0.468f), -1);
+  EXPECT_NEAR(error_of(map, {}, 8, 0.47f), 0, 1e-5);
 }
 
 /// The error of a cubic through nodes at a distance h is at most 1/24 h⁴ times the fourth derivative, here 160: it
