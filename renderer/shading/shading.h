@@ -42,8 +42,9 @@ struct ShadingSettings {
   /// light that the bands are made from. 0: no limit. The limit removes rare bright paths (fireflies). With the
   /// default, one such path adds at most 10 / samples to a pixel: at 64 samples 0.16, which is 20 times the
   /// neighbouring pixels only if these are below 0.008. Light that is scattered once, which lights most of a picture,
-  /// is never changed. Light that many surfaces exchange is rarely changed. Light of one band, which was bent, is limited
-  /// as if that of all bands were like it: the eye hardly sees some bands, and bright pixels of their colours would stay.
+  /// is never changed. Light that many surfaces exchange is rarely changed. Light of one band, which was bent, is
+  /// limited as if that of all bands were like it: the eye hardly sees some bands, and bright pixels of their colours
+  /// would stay.
   double indirect_clamp = 10;
   /// World units; beyond it nothing hides the sky.
   double occlusion_distance = std::numeric_limits<double>::infinity();

@@ -126,8 +126,11 @@ TEST_F(WholeScene, AWeakFieldLightsBodiesAsIfItWereNotThere) {
 
 /// As good as nothing is left of light that is scattered twice, and that scattered once stays.
 TEST_F(WholeScene, ASmallIndirectClampLeavesDirectLight) {
-  const Image direct = picture({"integrator.max_depth=1"}), clamped = picture({"integrator.indirect_clamp=1e-7"});
-  const Image unlimited = picture({"integrator.indirect_clamp=0"});
+  write_roof("roof.ply", 0, 0, -2.2);
+  const std::string objects = "objects=[{\"plate\":{\"center\":[0,0,-2.6],\"size\":[8,8]}},{\"file\":\"roof.ply\"}]";
+  const Image direct = picture({objects, "integrator.max_depth=1"});
+  const Image clamped = picture({objects, "integrator.indirect_clamp=1e-7"});
+  const Image unlimited = picture({objects, "integrator.indirect_clamp=0"});
   for (const char* channel : {"R", "G", "B"}) {
     EXPECT_NEAR(mean(clamped, channel), mean(direct, channel), 1e-5) << channel;
     EXPECT_GT(mean(unlimited, channel), mean(direct, channel) + 1e-4) << channel;
