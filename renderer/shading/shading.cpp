@@ -107,6 +107,7 @@ std::optional<FirstSurface> RayShader::shade(const Vector3d& origin, const Vecto
   throughput_.setOnes();
   bent_view_.reset();
   band_ = -1;
+  share_ = 1;
   sampler.dimension = first_dimension;
   const std::optional<SurfaceHit> hit = scene_.surfaces.intersect(origin, direction);
   if (bends(origin, direction, hit ? hit->distance : std::numeric_limits<double>::infinity()))
@@ -250,7 +251,8 @@ std::optional<FirstSurface> RayShader::shade_bent(const Vector3d& origin, const 
   const std::vector<BentWay> ways = follow_ways(origin, direction, depth, sampler);
   const BandValues before = throughput_;
   const int band_before = band_;
-  const double share = bands_per_followed(depth);
+  const double share_before = share_, share = bands_per_followed(depth);
+  share_ *= share;
   const bool is_view = depth == 0;
   std::optional<FirstSurface> seen;
   BentView view{0, 0, 0};
@@ -279,6 +281,7 @@ std::optional<FirstSurface> RayShader::shade_bent(const Vector3d& origin, const 
   }
   throughput_ = before;
   band_ = band_before;
+  share_ = share_before;
   if (is_view) bent_view_ = view;
   return seen;
 }
@@ -298,6 +301,9 @@ void RayShader::add_bent_light(const Vertex& vertex, const Vector3d& wi, const V
     factor /= 1 + ratio * ratio;
   }
   const BandValues scattered = factor * contribution_ * throughput_;
+  const int band_before = band_;
+  const double share_before = share_;
+  share_ *= bands_per_followed(depth);
   for (const BentWay& way : follow_ways(start, direction, depth, sampler)) {
     if (!way.arrives) continue;
     const auto hit = surface_at_end(scene_.surfaces, way);
@@ -307,10 +313,13 @@ void RayShader::add_bent_light(const Vertex& vertex, const Vector3d& wi, const V
     const std::vector<float>* const found =
         hit ? scene_.lights.emitted(light, hit->normal, way.direction) : &background_;
     if (!found) continue;
+    band_ = way.band;
     contribution_.setZero();
     contribution_[way.band] = scattered[way.band] * way.gain * (*found)[static_cast<std::size_t>(way.band)];
     add(depth, {light, way.direction, false, found});
   }
+  band_ = band_before;
+  share_ = share_before;
 }
 
 void RayShader::add_landed_light(const Vertex& vertex, int depth) {
@@ -422,10 +431,10 @@ void RayShader::add_emission(const SurfaceHit& hit, const Vector3d& direction, d
 /// Adds light that was scattered `depth` times. Leaves out values that overflow, since one would make the mean
 /// infinite.
 void RayShader::add(int depth, const LightSource& source) {
-  const double luminance = scene_.colors.luminance(contribution_);
-  if (!std::isfinite(luminance)) return;
-  if (depth >= 2 && settings_.indirect_clamp > 0 && luminance > settings_.indirect_clamp)
-    contribution_ *= settings_.indirect_clamp / luminance;
+  const double brightness = band_ < 0 ? scene_.colors.luminance(contribution_) : contribution_[band_] / share_;
+  if (!std::isfinite(brightness)) return;
+  if (depth >= 2 && settings_.indirect_clamp > 0 && brightness > settings_.indirect_clamp)
+    contribution_ *= settings_.indirect_clamp / brightness;
   radiance_ += contribution_;
   if (scene_.groups > 0) add_to_groups(source);
 }

@@ -42,7 +42,9 @@ struct ShadingSettings {
   /// light that the bands are made from. 0: no limit. The limit removes rare bright paths (fireflies). With the
   /// default, one such path adds at most 10 / samples to a pixel: at 64 samples 0.16, which is 20 times the
   /// neighbouring pixels only if these are below 0.008. Light that is scattered once, which lights most of a picture,
-  /// is never changed. Light that many surfaces exchange is rarely changed.
+  /// is never changed. Light that many surfaces exchange is rarely changed. Light of one band, which was bent, is
+  /// limited as if that of all bands were like it: the eye hardly sees some bands, and bright pixels of their colours
+  /// would stay.
   double indirect_clamp = 10;
   /// World units; beyond it nothing hides the sky.
   double occlusion_distance = std::numeric_limits<double>::infinity();
@@ -162,6 +164,7 @@ class RayShader {
   std::vector<float> background_, of_one_light_;
   std::optional<BentView> bent_view_;
   int band_ = -1;          ///< The only band of the path, after it was bent; −1: all bands.
+  double share_ = 1;       ///< The number of bands for which `band_` stands.
   bool aims_bent_ = true;  ///< Whether sampled lights are looked for through the region.
 };
 

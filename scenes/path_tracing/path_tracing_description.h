@@ -90,6 +90,7 @@ struct PathTracingDescription {
   Shading shading = Shading::path;
   int bands = 16;  ///< Number of bands of the light that shows the paths.
   int max_depth = 6;
+  double indirect_clamp = 10;  ///< ShadingSettings::indirect_clamp where the strongest light has the strength 1.
   int samples = 64;
   int min_samples = 16;
   double noise = 0.02;                ///< Relative error at which a pixel is done; 0: every pixel gets all samples.

@@ -139,6 +139,10 @@ void describe(PathTracingDescription& paths, Visitor& visit) {
         between(3, 1000));
   visit("max_depth", paths.max_depth,
         "path_tracing: greatest number of surfaces that light meets; 1: direct light only", between(1, 1000));
+  visit("indirect_clamp", paths.indirect_clamp,
+        "path_tracing: most that light scattered twice or more adds to a sample, where the strongest light has the "
+        "strength 1; 0: no limit",
+        at_least(0));
   visit("max_samples", paths.samples, "path_tracing: greatest number of samples per pixel", between(1, 1e6));
   visit("min_samples", paths.min_samples, "path_tracing: least number of samples per pixel", between(1, 1e6));
   visit("noise", paths.noise,

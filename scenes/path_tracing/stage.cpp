@@ -18,7 +18,7 @@ PathTracerSettings tracer_settings(const SceneDescription& scene, const PathTrac
   settings.shading.max_depth = description.max_depth;
   double strength = scene.lights.empty() ? 1 : 0;
   for (const LightSourceDescription& light : scene.lights) strength = std::max(strength, light.strength);
-  settings.shading.indirect_clamp *= strength;  // The clamp removes fireflies, and must not darken bright lights.
+  settings.shading.indirect_clamp = description.indirect_clamp * strength;  // Bright lights must not become darker.
   settings.filter = PixelFilter(description.filter);
   settings.transparent = description.background != Background::lights;
   settings.min_samples = std::min(description.min_samples, description.samples);

@@ -1,7 +1,7 @@
 #pragma once
 /// @file scenes/whole/whole_description.h
 /// The keys of `integrator` that only the method "scene" has. It shares those of path tracing: bands, samples, noise,
-/// max_depth, filter, shading, background.
+/// max_depth, indirect_clamp, filter, shading, background.
 
 #include <array>
 #include <cstdint>

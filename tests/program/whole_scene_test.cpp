@@ -124,6 +124,20 @@ TEST_F(WholeScene, AWeakFieldLightsBodiesAsIfItWereNotThere) {
     EXPECT_NEAR(mean(with, channel) / mean(without, channel), 1, 0.02) << channel;
 }
 
+/// As good as nothing is left of light that is scattered twice, and that scattered once stays.
+TEST_F(WholeScene, ASmallIndirectClampLeavesDirectLight) {
+  write_roof("roof.ply", 0, 0, -2.2);
+  const std::string objects = "objects=[{\"plate\":{\"center\":[0,0,-2.6],\"size\":[8,8]}},{\"file\":\"roof.ply\"}]";
+  const Image direct = picture({objects, "integrator.max_depth=1"});
+  const Image clamped = picture({objects, "integrator.indirect_clamp=1e-7"});
+  const Image unlimited = picture({objects, "integrator.indirect_clamp=0"});
+  for (const char* channel : {"R", "G", "B"}) {
+    EXPECT_NEAR(mean(clamped, channel), mean(direct, channel), 1e-5) << channel;
+    EXPECT_GT(mean(unlimited, channel), mean(direct, channel) + 1e-4) << channel;
+  }
+  expect_error("integrator.indirect_clamp=-1", "/integrator/indirect_clamp");
+}
+
 TEST_F(WholeScene, PathsAreObjects) {
   const std::string floor = "{\"plate\":{\"center\":[0,0,-2.6],\"size\":[8,8]}}";
   const Image with = picture({"objects=[" + floor + ",{\"paths\":{\"count\":9}}]"});

@@ -6,6 +6,7 @@
 #include <gtest/gtest.h>
 
 #include "renderer/shading/path_tracer.h"
+#include "renderer/surfaces/mesh.h"
 #include "tests/renderer/statistics.h"
 
 namespace tensorray {
@@ -176,6 +177,31 @@ TEST(BendingRegionTest, LandedLightReplacesTheSunBehindTheRegion) {
   EXPECT_NEAR(radiance(below), 3 * 0.6 / 3.14159265, 1e-6);
   stage.scene.landed[0].side = -1;
   EXPECT_EQ(radiance(below), 0);
+}
+
+/// A room that emits, about the ball. Every surface sends on half of the light, in all bands alike.
+TEST(BendingRegionTest, BentLightIsLimitedInAllBandsAlike) {
+  TriangleMesh room = box_mesh({Vector3d(-1, -1, -1), Vector3d(1, 1, 1)}, Eigen::Affine3d::Identity());
+  for (auto& triangle : room.triangles) std::swap(triangle[1], triangle[2]);  // They face inwards.
+  const AreaLight walls{room, even(8)};
+  ShadedSurface surface;
+  surface.shape = room;
+  surface.light = 0;
+  const std::vector<Material> materials{make_material(Diffuse{}, BandValues::Constant(bands, 0.5))};
+  const SurfaceScene surfaces({surface});
+  const LightSampler lights({walls}, {0.3f, 0.5f, 0.15f, 0.05f}, surfaces.bounds());
+  ShadedScene scene{surfaces, materials, lights, colors()};
+  const TurningBall ball(0.7);
+  scene.region = &ball;
+  ShadingSettings settings;
+  settings.direct = DirectLight::material;  // Each contribution is 8 / 2^depth.
+  settings.roulette_depth = 100;
+  settings.max_depth = 3;
+  settings.indirect_clamp = 0.5;
+  for (const int count : {1, 2, 4}) {
+    scene.bands_per_view = scene.bands_per_bounce = count;
+    EXPECT_NEAR(seen(scene, settings, {0.9, 0.1, 0.3}, {0, 0, 0.1}, 200).mean(), 8 + 4 + 0.5 + 0.5, 1e-6) << count;
+  }
 }
 
 }  // namespace
