@@ -80,7 +80,7 @@ TEST(Paths, RecordsWhatTheRayDoesWithoutChangingIt) {
   for (const BendingMethod method : {BendingMethod::splitting, BendingMethod::dopri5}) {
     const Geometry geometry(surfaces_of(field));
     RayBatch plain, recorded;
-    std::vector<PathPoints> paths;
+    std::vector<RayPoints> paths;
     for (RayBatch* batch : {&plain, &recorded}) batch->add({0.2, -0.1, 2}, {0, 0, -1}, 0.5);
     const BendingSettings bending = settings_of(method, 0);
     trace(field, geometry, bending, plain);
