@@ -95,6 +95,7 @@ std::vector<PathSeed> seeds_of(const SeedList& list, const std::vector<LightChan
     throw std::invalid_argument(fmt::format("{} seeds with {} wavelengths are more than {} paths; ask for fewer",
                                             list.positions.size(), channels.size(), most_paths));
   std::vector<PathSeed> seeds;
+  seeds.reserve(count);
   for (std::size_t i = 0; i < list.positions.size(); ++i)
     for (const LightChannel& channel : channels)
       seeds.push_back({list.positions[i], list.directions.empty() ? beam.direction : list.directions[i],
