@@ -4,6 +4,7 @@
 /// not needed, and converting them would take longer than tracing the ray.
 
 #include <cstddef>
+#include <cstdint>
 #include <vector>
 
 #include <Eigen/Core>
@@ -22,14 +23,14 @@ struct RayPoint {
 };
 using RayPoints = std::vector<RayPoint>;
 
-/// A ray after a step in the field. Each four numbers fill a vector register.
+/// A ray after a step in the field. The kernel writes each four numbers as one vector.
 struct alignas(16) StepPoint {
   float position[3];   ///< From the first voxel of a brick, in voxels.
   float length;        ///< Length of the path since the ray entered the field, world units.
   float direction[3];  ///< V; unit within rounding, world axes.
-  float unused;
+  float padding;
   std::int32_t brick[3];  ///< Coordinates of the brick, in bricks.
-  std::int32_t unused_too;
+  std::int32_t more_padding;
 
   BrickPoint place() const { return {{brick[0], brick[1], brick[2]}, {position[0], position[1], position[2]}}; }
 };

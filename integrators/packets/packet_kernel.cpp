@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstddef>
 #include <cstring>
 #include <stdexcept>
 
@@ -265,10 +266,10 @@ HWY_NOINLINE void Kernel<uniform, differentials, changes>::keep_points(const Pac
   }
   for (std::uint32_t rest = which; rest != 0; rest &= rest - 1) {
     const auto lane = hwy::Num0BitsBelowLS1Bit_Nonzero32(rest);
-    StepPoint& point = batch_.points[packet.ray[lane]]->emplace_back();
-    std::memcpy(point.position, positions[lane], sizeof positions[lane]);
-    std::memcpy(point.direction, directions[lane], sizeof directions[lane]);
-    std::memcpy(point.brick, bricks[lane], sizeof bricks[lane]);
+    auto* const point = reinterpret_cast<unsigned char*>(&batch_.points[packet.ray[lane]]->emplace_back());
+    std::memcpy(point + offsetof(StepPoint, position), positions[lane], sizeof positions[lane]);
+    std::memcpy(point + offsetof(StepPoint, direction), directions[lane], sizeof directions[lane]);
+    std::memcpy(point + offsetof(StepPoint, brick), bricks[lane], sizeof bricks[lane]);
   }
 }
 

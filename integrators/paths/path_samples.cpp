@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include <Eigen/LU>
 
@@ -96,7 +97,7 @@ void set_tensors(const TensorField& field, const Eigen::Vector3i& brick, PathSam
   const float* const places = samples.places.data();
   const IndexPoints points{brick, {places, places + samples.room, places + 2 * samples.room}, samples.count};
   const double greatest = field.greatest_norm();
-  const double factor = greatest > 0 ? 1 / greatest : 1;
+  const double factor = 1 / std::max<double>(greatest, std::numeric_limits<float>::min());  // Squares stay in range.
   sample_tensors(field, points, static_cast<float>(factor), samples.tensors.data(), samples.room);
 }
 
