@@ -13,6 +13,7 @@
 
 #include <Eigen/Core>
 
+#include "integrators/bending/ray_record.h"
 #include "renderer/surfaces/geometry.h"
 #include "volumes/bricks/tensor_field.h"
 
@@ -93,23 +94,6 @@ struct RayBatch {
   void add(const Eigen::Vector3d& position, const Eigen::Vector3d& direction, double flexibility);
 };
 
-/// A recorded point of a ray's path.
-struct PathPoint {
-  Eigen::Vector3d position = Eigen::Vector3d::Zero();
-  Eigen::Vector3d direction = Eigen::Vector3d::Zero();  ///< V; unit.
-  double length = 0;                                    ///< Length of the path up to here, world units.
-  Eigen::Matrix3d tensor = Eigen::Matrix3d::Zero();     ///< T of the field here; zero where light is straight.
-  Eigen::Vector3d change = Eigen::Vector3d::Zero();     ///< V' here, with σ·T. Its norm is the curvature of the path.
-  bool in_field = false;  ///< Whether the path bends here (inside the volume and the cut).
-
-  Eigen::Vector3d force() const { return tensor * direction; }  ///< T V; its norm is Eq. 11.
-};
-
-/// Points of a path, from the start to the end. In the field there is one point for each step, from the entry to the
-/// exit. A straight piece that ends on a surface has a point at each end. Where the ray enters or leaves the field
-/// there are two points, one of them in the field. Empty if the ray meets nothing.
-using PathPoints = std::vector<PathPoint>;
-
 /// A vertex of the polyline that a ray's steps form.
 struct TrackPoint {
   Eigen::Vector3d position = Eigen::Vector3d::Zero();
@@ -136,10 +120,11 @@ void trace(const TensorField& field, const Geometry& geometry, const BendingSett
 void trace_reference(const TensorField& field, const Geometry& geometry, const BendingSettings& settings,
                      RayBatch& batch);
 
-/// The same as `trace`; it also records a path for each ray. The rays are the same. Each step takes one more tensor
-/// sample.
+/// The same as `trace`; it also records the points of each ray, at little cost. The rays are the same.
 void trace(const TensorField& field, const Geometry& geometry, const BendingSettings& settings, RayBatch& batch,
-           std::vector<PathPoints>& paths);
+           std::vector<RayRecord>& records);
+void trace(const TensorField& field, const Geometry& geometry, const BendingSettings& settings, RayBatch& batch,
+           std::vector<RayPoints>& points);
 
 /// The same as `trace`; it also records a track for each ray, at almost no cost.
 void trace(const TensorField& field, const Geometry& geometry, const BendingSettings& settings, RayBatch& batch,

@@ -36,22 +36,10 @@ void Tracer<N>::meet_surface(const Eigen::Vector3d& normal, bool bends) {
   }
 }
 
-/// Does not change `medium_`, so that recorded rays take the same steps as others.
 template <int N>
 void Tracer<N>::record(bool in_field) {
   if (recording_.track) recording_.track->push_back({position(), length_});
-  if (!recording_.path) return;
-  PathPoint here;
-  here.position = position();
-  here.direction = direction();
-  here.length = length_;
-  here.in_field = in_field;
-  if (in_field) {
-    RayMedium<1> medium{sampler_, medium_.strength};
-    here.change = medium.derivative({here.position, here.direction, 0}).V;
-    here.tensor = medium.T;
-  }
-  recording_.path->push_back(here);
+  if (recording_.points) recording_.points->push_back({position(), direction(), length_, in_field});
 }
 
 /// Moves the ray straight to a surface, in free space.

@@ -9,6 +9,7 @@
 
 #include "integrators/bending/bending.h"
 #include "integrators/bending/bending_steps.h"
+#include "integrators/bending/ray_record.h"
 #include "renderer/surfaces/geometry.h"
 #include "volumes/bricks/tensor_sampler.h"
 
@@ -19,17 +20,20 @@ using bending_steps::State;
 
 /// Where to record a ray; null: do not record.
 struct Recording {
-  PathPoints* path = nullptr;
+  RayPoints* points = nullptr;
   Track* track = nullptr;
 };
 
 /// Where to record a batch; null: do not record.
 struct Recordings {
-  std::vector<PathPoints>* paths = nullptr;
+  std::vector<RayRecord>* rays = nullptr;
   std::vector<Track>* tracks = nullptr;
 
-  Recording of(std::size_t ray) const { return {paths ? &(*paths)[ray] : nullptr, tracks ? &(*tracks)[ray] : nullptr}; }
-  explicit operator bool() const { return paths || tracks; }
+  /// Of a ray before and behind its steps in packets.
+  Recording before(std::size_t ray) const { return {rays ? &(*rays)[ray].before : nullptr, track(ray)}; }
+  Recording behind(std::size_t ray) const { return {rays ? &(*rays)[ray].behind : nullptr, track(ray)}; }
+  Track* track(std::size_t ray) const { return tracks ? &(*tracks)[ray] : nullptr; }
+  explicit operator bool() const { return rays || tracks; }
 };
 
 /// How far a ray has been traced.

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstddef>
 #include <cstring>
 #include <stdexcept>
 
@@ -74,9 +75,9 @@ template <bool uniform, bool differentials, bool changes>
 void Kernel<uniform, differentials, changes>::enter(Packet& packet, int lane) {
   const KernelRay& ray = rays_[packet.ray[lane]];
   for (int axis = 0; axis < 3; ++axis) {
-    packet.p[axis][lane] = ray.position[axis];
+    packet.p[axis][lane] = ray.place.position[axis];
     packet.v[axis][lane] = ray.direction[axis];
-    packet.brick[axis][lane] = ray.brick[axis];
+    packet.brick[axis][lane] = ray.place.brick[axis];
     if constexpr (differentials)
       for (int i = 0; i < 2; ++i) {
         packet.dp[i][axis][lane] = batch_.differentials[packet.ray[lane]].position[i][axis];
@@ -230,8 +231,8 @@ HWY_NOINLINE void Kernel<uniform, differentials, changes>::take_out(Packet& pack
     const int lane = static_cast<int>(hwy::Num0BitsBelowLS1Bit_Nonzero32(rest));
     KernelRay& ray = rays_[packet.ray[lane]];
     for (int axis = 0; axis < 3; ++axis) {
-      ray.brick[axis] = packet.brick[axis][lane];
-      ray.position[axis] = packet.p[axis][lane];
+      ray.place.brick[axis] = packet.brick[axis][lane];
+      ray.place.position[axis] = packet.p[axis][lane];
       ray.direction[axis] = packet.v[axis][lane];
       if constexpr (differentials)
         for (int i = 0; i < 2; ++i) {
@@ -250,19 +251,25 @@ HWY_NOINLINE void Kernel<uniform, differentials, changes>::take_out(Packet& pack
   }
 }
 
+/// Records the points of some lanes.
 template <bool uniform, bool differentials, bool changes>
 HWY_NOINLINE void Kernel<uniform, differentials, changes>::keep_points(const Packet& packet, std::uint32_t which) {
+  alignas(64) float positions[packet_rays][4], directions[packet_rays][4];
+  alignas(64) std::int32_t bricks[packet_rays][4];
+  for (int i = 0; i < packet.vectors * lanes; i += lanes) {
+    const F3 p = load(packet.p, i), v = load(packet.v, i);
+    const F length = hn::Mul(load(packet.length, i), set(to_world()));
+    hn::StoreInterleaved4(p.x, p.y, p.z, length, floats, positions[i]);
+    hn::StoreInterleaved4(v.x, v.y, v.z, v.z, floats, directions[i]);
+    const auto brick = [&](int axis) HWY_ATTR { return hn::Load(ints, packet.brick[axis] + i); };
+    hn::StoreInterleaved4(brick(0), brick(1), brick(2), brick(2), ints, bricks[i]);
+  }
   for (std::uint32_t rest = which; rest != 0; rest &= rest - 1) {
     const auto lane = hwy::Num0BitsBelowLS1Bit_Nonzero32(rest);
-    const KernelRay& ray = rays_[packet.ray[lane]];
-    KernelPoint point;
-    for (int axis = 0; axis < 3; ++axis) {
-      point.brick[axis] = packet.brick[axis][lane];
-      point.position[axis] = packet.p[axis][lane];
-      point.direction[axis] = packet.v[axis][lane];
-    }
-    point.length = ray.length + double{packet.length[lane]} * to_world();
-    batch_.points[packet.ray[lane]].push_back(point);
+    auto* const point = reinterpret_cast<unsigned char*>(&batch_.points[packet.ray[lane]]->emplace_back());
+    std::memcpy(point + offsetof(StepPoint, position), positions[lane], sizeof positions[lane]);
+    std::memcpy(point + offsetof(StepPoint, direction), directions[lane], sizeof directions[lane]);
+    std::memcpy(point + offsetof(StepPoint, brick), bricks[lane], sizeof bricks[lane]);
   }
 }
 
@@ -375,8 +382,8 @@ void Kernel<uniform, differentials, changes>::arrive(Packet& packet, const FaceL
     const auto lane = hwy::Num0BitsBelowLS1Bit_Nonzero32(rest);
     KernelRay& ray = rays_[packet.ray[lane]];
     for (int axis = 0; axis < 3; ++axis) {
-      ray.brick[axis] = packet.brick[axis][lane];
-      ray.position[axis] = packet.p_next[axis][lane];
+      ray.place.brick[axis] = packet.brick[axis][lane];
+      ray.place.position[axis] = packet.p_next[axis][lane];
       ray.direction[axis] = packet.v_next[axis][lane];
     }
     ray.axis = static_cast<std::int8_t>(landing.axis[lane]);

@@ -10,23 +10,22 @@
 #include <vector>
 
 #include "integrators/bending/bending.h"
+#include "integrators/bending/ray_record.h"
 #include "volumes/bricks/tensor_field.h"
 
 namespace tensorray::packets {
 
-/// A ray in the field. Positions are relative to a brick, so that single precision resolves 1e-6 of a voxel in a field
-/// of any size.
+/// A ray in the field.
 struct KernelRay {
-  std::array<std::int32_t, 3> brick;  ///< Position of the brick, in bricks.
-  std::array<float, 3> position;      ///< From the brick's first voxel, in voxels.
-  std::array<float, 3> direction;     ///< V; unit, world axes.
-  float strength = 0;                 ///< σ = s · scale.
-  float norm = 0;             ///< Norm of the deviator of T as last sampled; 0 if it does not make steps shorter.
-  double length = 0;          ///< Length of the path, world units; the kernel adds to it.
-  std::uint32_t steps = 0;    ///< Number of steps; the kernel adds to it.
-  float radiance_change = 0;  ///< Λ in the kernel, if it is wanted.
-  std::int8_t axis = -1;      ///< Axis of the face of the extent where the ray left; -1: it has not left.
-  float step = 0;             ///< If the ray has not left: length of its next step, world units; 0: not known.
+  BrickPoint place;
+  std::array<float, 3> direction;  ///< V; unit, world axes.
+  float strength = 0;              ///< σ = s · scale.
+  float norm = 0;                  ///< Norm of the deviator of T as last sampled; 0 if it does not make steps shorter.
+  double length = 0;               ///< Length of the path, world units; the kernel adds to it.
+  std::uint32_t steps = 0;         ///< Number of steps; the kernel adds to it.
+  float radiance_change = 0;       ///< Λ in the kernel, if it is wanted.
+  std::int8_t axis = -1;           ///< Axis of the face of the extent where the ray left; -1: it has not left.
+  float step = 0;                  ///< If the ray has not left: length of its next step, world units; 0: not known.
 };
 
 /// Derivatives of a ray along two parameters: voxels, in index space, and radians.
@@ -34,17 +33,10 @@ struct KernelDifferential {
   float position[2][3], direction[2][3];
 };
 
-/// A ray after a step.
-struct KernelPoint {
-  std::array<std::int32_t, 3> brick;
-  std::array<float, 3> position, direction;
-  double length;  ///< Length of the path, world units.
-};
-
 struct KernelRays {
   std::vector<KernelRay> rays;
   std::vector<KernelDifferential> differentials;  ///< One for every ray, or empty.
-  std::vector<std::vector<KernelPoint>> points;   ///< One list for every ray, to which the kernel adds; or empty.
+  std::vector<std::vector<StepPoint>*> points;    ///< One list for every ray, to which the kernel adds; or empty.
   bool wants_radiance_change = false;             ///< Only without differentials: see RayBatch.
 };
 

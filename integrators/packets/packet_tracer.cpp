@@ -59,15 +59,10 @@ KernelSettings kernel_settings(const TensorField& field, const Geometry& geometr
 /// A batch while it is traced.
 struct Flight {
   packets::KernelRays kernel;
-  std::vector<std::size_t> numbers;  // Number, in the batch, of each ray of the kernel.
-  std::vector<Travelled> travelled;  // State of each ray before the kernel.
+  std::vector<std::size_t> numbers;           // Number, in the batch, of each ray of the kernel.
+  std::vector<Travelled> travelled;           // State of each ray before the kernel.
+  std::vector<std::vector<StepPoint>> steps;  // Of each ray of the kernel, for its track.
 };
-
-Eigen::Vector3d index_position(const std::array<std::int32_t, 3>& brick, const std::array<float, 3>& position) {
-  Eigen::Vector3d index;
-  for (int axis = 0; axis < 3; ++axis) index[axis] = double{TensorBrick::cells} * brick[axis] + position[axis];
-  return index;
-}
 
 Eigen::Vector3d to_vector(const std::array<float, 3>& v) { return {v[0], v[1], v[2]}; }
 
@@ -75,21 +70,15 @@ Eigen::Vector3d to_vector(const std::array<float, 3>& v) { return {v[0], v[1], v
 template <int N>
 KernelRay kernel_ray(const TensorField& field, Tracer<N>& tracer) {
   KernelRay ray;
-  const Eigen::Vector3d index = field.to_index() * Eigen::Vector3d(tracer.state().position());
-  for (int axis = 0; axis < 3; ++axis) {
-    const double first = field.voxels().min()[axis], last = std::max(first, field.voxels().max()[axis] - 1);
-    const double cell = std::clamp(std::floor(index[axis]), first, last);
-    ray.brick[axis] = static_cast<std::int32_t>(std::floor(cell / TensorBrick::cells));
-    ray.position[axis] = static_cast<float>(index[axis] - double{TensorBrick::cells} * ray.brick[axis]);
-    ray.direction[axis] = static_cast<float>(tracer.state().V(axis, 0));
-  }
+  ray.place = brick_point(field, field.to_index() * Eigen::Vector3d(tracer.state().position()));
+  for (int axis = 0; axis < 3; ++axis) ray.direction[axis] = static_cast<float>(tracer.state().V(axis, 0));
   return ray;
 }
 
 /// Whether the field may be so strong, where a ray begins to bend, that steps must be shorter.
 bool may_be_strong(const TensorField& field, const KernelRay& ray, double strength) {
   const double longest_voxel = field.to_world().linear().norm();
-  const TensorBrick brick = field.brick({ray.brick[0], ray.brick[1], ray.brick[2]});
+  const TensorBrick brick = field.brick({ray.place.brick[0], ray.place.brick[1], ray.place.brick[2]});
   return std::abs(strength) * longest_voxel * brick.strongest > 0.1;
 }
 
@@ -108,7 +97,7 @@ packets::KernelDifferential kernel_differential(const TensorField& field, const 
 template <int N>
 State<N> state_of(const TensorField& field, const packets::KernelRays& kernel, std::size_t i) {
   const KernelRay& ray = kernel.rays[i];
-  Eigen::Vector3d index = index_position(ray.brick, ray.position);
+  Eigen::Vector3d index = index_position(ray.place);
   if (ray.axis >= 0) {
     const Eigen::AlignedBox3d& box = field.index_bounds();
     const int axis = ray.axis;
@@ -138,9 +127,9 @@ bool same_start(const RayBatch& batch, std::size_t i, std::size_t j) {
                                           batch.differentials[i].direction == batch.differentials[j].direction));
 }
 
-/// Copies the record of one ray to another.
+/// Copies what one ray has recorded before the kernel to another.
 void copy_record(const Recordings& recordings, std::size_t from, std::size_t to) {
-  if (recordings.paths) (*recordings.paths)[to] = (*recordings.paths)[from];
+  if (recordings.rays) (*recordings.rays)[to].before = (*recordings.rays)[from].before;
   if (recordings.tracks) (*recordings.tracks)[to] = (*recordings.tracks)[from];
 }
 
@@ -151,7 +140,7 @@ void approach(const TensorField& field, const BendingSettings& settings, RayBatc
               Tracer<N>& tracer, Flight& flight) {
   for (std::size_t i = 0; i < batch.size();) {
     const std::size_t first = i;
-    const auto end = tracer.approach(start_of<N>(batch, first), recordings.of(first));
+    const auto end = tracer.approach(start_of<N>(batch, first), recordings.before(first));
     KernelRay ray = end ? KernelRay() : kernel_ray(field, tracer);
     bool sampled = false;
     std::size_t last = first + 1;
@@ -176,52 +165,51 @@ void approach(const TensorField& field, const BendingSettings& settings, RayBatc
       flight.numbers.push_back(i);
       flight.travelled.push_back(travelled);
       if (!recordings) continue;
-      tracer.take_over(state, strength, travelled, recordings.of(i));
+      tracer.take_over(state, strength, travelled, recordings.before(i));
       tracer.record(true);
     }
   }
 }
 
-/// Adds the points of the kernel to a ray's record. The ray's state after the kernel is recorded when the ray
-/// continues.
-template <int N>
-void record_points(const TensorField& field, const std::vector<packets::KernelPoint>& points, double strength,
-                   Travelled travelled, const Recording& recording, Tracer<N>& tracer) {
-  for (const packets::KernelPoint& point : points) {
-    State<N> state;
-    state.P.setZero();
-    state.V.setZero();
-    state.P.col(0) = field.to_world() * index_position(point.brick, point.position);
-    state.V.col(0) = to_vector(point.direction);
-    travelled.length = point.length;
-    tracer.take_over(bending_steps::normalized(state), strength, travelled, recording);
-    tracer.record(true);
-  }
+/// Says where the kernel records the steps of its rays.
+void record_steps(const Recordings& recordings, Flight& flight) {
+  if (!recordings) return;
+  flight.steps.resize(recordings.tracks ? flight.numbers.size() : 0);
+  for (std::size_t i = 0; i < flight.numbers.size(); ++i)
+    flight.kernel.points.push_back(recordings.rays ? &(*recordings.rays)[flight.numbers[i]].steps : &flight.steps[i]);
 }
 
-template <class Points>
-void drop_last(Points* points) {
-  if (points) points->pop_back();
+void add_steps(const TensorField& field, const std::vector<StepPoint>& steps, Track& track) {
+  const double entry_length = track.back().length;
+  for (const StepPoint& step : steps)
+    track.push_back({field.to_world() * index_position(step.place()), entry_length + double{step.length}});
 }
 
-/// Follows a ray from the point where the kernel stopped to its end.
+/// Removes the last point of a ray, which is recorded again when the ray continues.
+void drop_last(const Recordings& recordings, std::size_t number) {
+  if (recordings.tracks) (*recordings.tracks)[number].pop_back();
+  if (!recordings.rays) return;
+  RayRecord& ray = (*recordings.rays)[number];
+  ray.steps.empty() ? ray.before.pop_back() : ray.steps.pop_back();
+}
+
+/// Follows ray i of the kernel from the point where the kernel stopped to its end.
 template <int N>
 RayEnd finish(const TensorField& field, const Flight& flight, std::size_t i, double strength,
-              const Recording& recording, Tracer<N>& tracer) {
+              const Recordings& recordings, Tracer<N>& tracer) {
   const KernelRay& ray = flight.kernel.rays[i];
+  const std::size_t number = flight.numbers[i];
   Travelled travelled = flight.travelled[i];
-  if (!flight.kernel.points.empty())
-    record_points(field, flight.kernel.points[i], strength, travelled, recording, tracer);
   travelled.length = ray.length;
   travelled.steps = ray.steps;
-  tracer.take_over(state_of<N>(field, flight.kernel, i), strength, travelled, recording);
+  if (recordings.tracks) add_steps(field, flight.steps[i], (*recordings.tracks)[number]);
+  tracer.take_over(state_of<N>(field, flight.kernel, i), strength, travelled, recordings.behind(number));
   if (ray.axis >= 0) {
     if (tracer.state().direction().isZero()) return RayEnd::degenerate;
     tracer.record(true);
     return tracer.leave();
   }
-  drop_last(recording.path);  // `follow` records this point again.
-  drop_last(recording.track);
+  drop_last(recordings, number);
   return tracer.follow(double{ray.step});
 }
 
@@ -231,12 +219,12 @@ void trace_rays(const TensorField& field, const Geometry& geometry, const Bendin
   Flight flight;
   Tracer<N> tracer(field, geometry, settings);
   approach(field, settings, batch, recordings, tracer, flight);
-  if (recordings) flight.kernel.points.resize(flight.kernel.rays.size());
+  record_steps(recordings, flight);
   flight.kernel.wants_radiance_change = batch.wants_radiance_change;
   batch.tensor_samples += packets::run(field, kernel_settings(field, geometry, settings), flight.kernel);
   for (std::size_t i = 0; i < flight.numbers.size(); ++i) {
     const std::size_t number = flight.numbers[i];
-    const RayEnd end = finish(field, flight, i, strength_of(batch, number, settings), recordings.of(number), tracer);
+    const RayEnd end = finish(field, flight, i, strength_of(batch, number, settings), recordings, tracer);
     set_end(batch, number, end, tracer);
   }
   batch.tensor_samples += tracer.samples();

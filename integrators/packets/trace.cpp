@@ -16,7 +16,7 @@ void trace_ray_by_ray(const TensorField& field, const Geometry& geometry, const 
                       RayBatch& batch, const Recordings& recordings) {
   Tracer<N> tracer(field, geometry, settings);
   for (std::size_t i = 0; i < batch.size(); ++i) {
-    const RayEnd end = tracer.trace(start_of<N>(batch, i), strength_of(batch, i, settings), recordings.of(i));
+    const RayEnd end = tracer.trace(start_of<N>(batch, i), strength_of(batch, i, settings), recordings.before(i));
     set_end(batch, i, end, tracer);
   }
   batch.tensor_samples += tracer.samples();
@@ -68,10 +68,19 @@ void trace(const TensorField& field, const Geometry& geometry, const BendingSett
 }
 
 void trace(const TensorField& field, const Geometry& geometry, const BendingSettings& settings, RayBatch& batch,
-           std::vector<PathPoints>& paths) {
-  paths.resize(batch.size());
-  for (PathPoints& path : paths) path.clear();  // Keeps the memory that they have allocated.
-  trace_batch(field, geometry, settings, batch, {&paths, nullptr});
+           std::vector<RayRecord>& records) {
+  records.resize(batch.size());
+  for (RayRecord& record : records) record.clear();
+  trace_batch(field, geometry, settings, batch, {&records, nullptr});
+}
+
+void trace(const TensorField& field, const Geometry& geometry, const BendingSettings& settings, RayBatch& batch,
+           std::vector<RayPoints>& points) {
+  std::vector<RayRecord> records;
+  trace(field, geometry, settings, batch, records);
+  points.assign(batch.size(), {});
+  for (std::size_t i = 0; i < batch.size(); ++i)
+    for (std::size_t k = 0; k < records[i].size(); ++k) points[i].push_back(ray_point(field, records[i], k));
 }
 
 void trace(const TensorField& field, const Geometry& geometry, const BendingSettings& settings, RayBatch& batch,

@@ -4,7 +4,7 @@
 
 #include <vector>
 
-#include "integrators/bending/bending.h"
+#include "integrators/bending/path_points.h"
 
 namespace tensorray {
 

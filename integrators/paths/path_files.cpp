@@ -70,6 +70,8 @@ void write_paths(const std::filesystem::path& path, const std::vector<Path>& pat
   throw_unknown_ending(path);
 }
 
+bool stores_tensors(const std::filesystem::path& path) { return lower_case_ending(path) != ".tck"; }
+
 std::vector<Path> read_paths(const std::filesystem::path& path) {
   const std::string ending = lower_case_ending(path);
   if (ending != ".vtp" && ending != ".tck") throw_unknown_ending(path);

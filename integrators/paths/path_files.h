@@ -28,6 +28,9 @@ namespace tensorray {
 /// disk is full).
 void write_paths(const std::filesystem::path& path, const std::vector<Path>& paths);
 
+/// Whether a file with this ending holds the tensors of the points.
+bool stores_tensors(const std::filesystem::path& path);
+
 /// Reads the files of write_paths and of other programs. A `.vtp` that lacks one of `direction`, `length`, `tensor`,
 /// `change`, `in_field` (streamlines, for example) gives bare paths, as every `.tck` does: see bare_way. Polylines of
 /// fewer than two different points are left out. A `.vtp` may have any of VTK's encodings. Missing data of a path have

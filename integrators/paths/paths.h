@@ -8,6 +8,7 @@
 
 #include "base/progress.h"
 #include "integrators/bending/bending.h"
+#include "integrators/bending/path_points.h"
 
 namespace tensorray {
 
@@ -25,9 +26,13 @@ struct PathSettings {
   bool backwards = true;
   bool outside = false;  ///< Whether to keep the straight parts in front of and behind the volume.
 
+  /// Whether points have `tensor` and `change`. Without these, more points are left out.
+  bool tensors = true;
+
   /// Points are left out where linear interpolation between the remaining points errs by no more than both tolerances.
-  double tolerance = 0.05;         ///< In position, in voxels; >= 0.
-  double tensor_tolerance = 0.02;  ///< In T, as a fraction of the greatest norm of T there; >= 0.
+  double tolerance = 0.05;  ///< In position, in voxels; >= 0.
+  double tensor_tolerance =
+      0.02;  ///< In T, as a fraction of the greatest norm of T there; >= 0. Unused without tensors.
 };
 
 /// The path of one ray, in the light's direction. Points are those that `trace` records, thinned; lengths increase from

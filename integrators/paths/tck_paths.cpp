@@ -12,6 +12,9 @@
 #include <optional>
 #include <stdexcept>
 #include <string>
+#include <vector>
+
+#include <tbb/parallel_for.h>
 
 #include "base/byte_order.h"
 #include "base/errors.h"
@@ -23,9 +26,16 @@ namespace tensorray {
 namespace {
 
 const std::string magic = "mrtrix tracks";
+constexpr std::size_t tracks_together = 4096;  // Tracks that one thread converts.
 
 void put(const Eigen::Vector3d& triplet, std::string& text) {
   for (const double x : triplet) append_number(static_cast<float>(x), ByteOrder::little, text);
+}
+
+void put(const Path& path, std::string& text) {
+  text.reserve(text.size() + 3 * sizeof(float) * (path.points.size() + 1));
+  for (const PathPoint& point : path.points) put(point.position, text);
+  put(Eigen::Vector3d::Constant(std::numeric_limits<double>::quiet_NaN()), text);
 }
 
 std::string header_text(std::size_t count) {
@@ -123,17 +133,18 @@ void write_tck_paths(const std::filesystem::path& path, const std::vector<Path>&
   const auto has_points = [](const Path& line) { return !line.points.empty(); };
   std::ofstream file(path, std::ios::binary);
   file << header_text(static_cast<std::size_t>(std::count_if(paths.begin(), paths.end(), has_points)));
-  std::string track;
-  for (const Path& line : paths) {
-    if (!has_points(line)) continue;
-    track.clear();
-    for (const PathPoint& point : line.points) put(point.position, track);
-    put(Eigen::Vector3d::Constant(std::numeric_limits<double>::quiet_NaN()), track);
-    file.write(track.data(), static_cast<std::streamsize>(track.size()));
-  }
-  track.clear();
-  put(Eigen::Vector3d::Constant(std::numeric_limits<double>::infinity()), track);
-  file.write(track.data(), static_cast<std::streamsize>(track.size()));
+  const auto write = [&](const std::string& bytes) {
+    file.write(bytes.data(), static_cast<std::streamsize>(bytes.size()));
+  };
+  std::vector<std::string> tracks((paths.size() + tracks_together - 1) / tracks_together);
+  tbb::parallel_for(std::size_t{0}, tracks.size(), [&](std::size_t i) {
+    for (std::size_t k = i * tracks_together; k < std::min((i + 1) * tracks_together, paths.size()); ++k)
+      if (has_points(paths[k])) put(paths[k], tracks[i]);
+  });
+  for (const std::string& bytes : tracks) write(bytes);
+  std::string end;
+  put(Eigen::Vector3d::Constant(std::numeric_limits<double>::infinity()), end);
+  write(end);
   file.close();
   if (!file) fail(path, "cannot be written; check the path and the space on the disk");
 }

@@ -2,14 +2,15 @@
 
 #include <algorithm>
 #include <cmath>
+#include <memory>
 #include <sstream>
 #include <stdexcept>
 
-#include <tbb/blocked_range.h>
 #include <tbb/parallel_for.h>
 
 #include "renderer/sampling/random.h"
-#include "volumes/bricks/tensor_sampler.h"
+#include "volumes/bricks/brick_point.h"
+#include "volumes/bricks/sample_tensors.h"
 
 namespace tensorray {
 namespace {
@@ -23,15 +24,45 @@ Eigen::Vector3d candidate(const Eigen::AlignedBox3d& box, std::uint64_t seed, st
   return box.min() + u.cwiseProduct(box.sizes());
 }
 
+/// Candidates that are sampled together.
+struct Candidates {
+  static constexpr std::uint32_t count = 1024;
+  float places[3][sampled_room(count)];
+  float tensors[9][sampled_room(count)];
+  bool inside[count];
+};
+
+/// Sets the values of the candidates from `first` on; NaN outside the extent.
+void judge_some(const TensorField& field, const Eigen::AlignedBox3d& box, const Threshold& threshold,
+                std::uint64_t seed, std::uint32_t first, Candidates& candidates, double* values) {
+  const BrickPoint corner = brick_point(field, field.voxels().min());
+  const Eigen::Vector3i first_brick(corner.brick[0], corner.brick[1], corner.brick[2]);
+  const Eigen::Vector3d origin = index_position({corner.brick, {}});
+  for (std::uint32_t i = 0; i < Candidates::count; ++i) {
+    const Eigen::Vector3d index = field.to_index() * candidate(box, seed, first + i);
+    candidates.inside[i] = field.index_bounds().contains(index);
+    for (int axis = 0; axis < 3; ++axis) candidates.places[axis][i] = static_cast<float>(index[axis] - origin[axis]);
+  }
+  const IndexPoints points{
+      first_brick, {candidates.places[0], candidates.places[1], candidates.places[2]}, Candidates::count};
+  sample_tensors(field, points, 1, candidates.tensors[0], sampled_room(Candidates::count));
+  for (std::uint32_t i = 0; i < Candidates::count; ++i) {
+    if (!candidates.inside[i]) continue;
+    Eigen::Matrix3d tensor;
+    for (int component = 0; component < 9; ++component)
+      tensor.data()[component] = double{candidates.tensors[component][i]};
+    values[i] = threshold.value(tensor);
+  }
+}
+
 /// Values of the candidates from `first` on; NaN outside the extent.
 std::vector<double> judge(const TensorField& field, const Eigen::AlignedBox3d& box, const Threshold& threshold,
                           std::uint64_t seed, std::uint32_t first) {
   std::vector<double> values(block, std::nan(""));
-  tbb::parallel_for(tbb::blocked_range<std::uint32_t>(0, block, 1024), [&](const auto& range) {
-    TensorSampler sampler(field);
-    for (std::uint32_t i = range.begin(); i < range.end(); ++i)
-      if (const Eigen::Vector3d point = candidate(box, seed, first + i); field.contains(point))
-        values[i] = threshold.value(sampler.at(point));
+  tbb::parallel_for(0u, block / Candidates::count, [&](std::uint32_t i) {
+    const auto candidates = std::make_unique<Candidates>();
+    const std::uint32_t begin = i * Candidates::count;
+    judge_some(field, box, threshold, seed, first + begin, *candidates, &values[begin]);
   });
   return values;
 }

@@ -21,8 +21,8 @@ struct Threshold {
 };
 
 /// Points of equal density in the part of the field's extent and of the world box `bounds` where the threshold selects
-/// the tensor (inactive voxels count as zero): the first `count` points of a Sobol sequence there. Runs on all threads;
-/// the result does not depend on their number.
+/// the tensor (inactive voxels count as zero; sampled in single precision): the first `count` points of a Sobol
+/// sequence there. Runs on all threads; the result does not depend on their number.
 /// @throw std::invalid_argument if `count` is 0, the threshold is empty, or `bounds` does not meet the extent;
 /// std::runtime_error, with the range of the values found, if none of 2²⁰ points is selected, or fewer than `count` of
 /// 2²⁶.

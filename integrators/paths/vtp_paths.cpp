@@ -3,6 +3,9 @@
 #include <stdexcept>
 #include <string>
 #include <utility>
+#include <vector>
+
+#include <tbb/parallel_for.h>
 
 #include "integrators/paths/cross_section.h"
 #include "integrators/paths/path_files.h"
@@ -14,71 +17,83 @@ namespace {
 
 using RowMajorMatrix = Eigen::Matrix<double, 3, 3, Eigen::RowMajor>;
 
-/// Makes a DataArray from numbers, vectors or matrices.
+/// Where the points of each path begin among all points; behind the last path, the number of all points.
+std::vector<std::size_t> first_points(const std::vector<Path>& paths) {
+  std::vector<std::size_t> firsts{0};
+  for (const Path& path : paths) firsts.push_back(firsts.back() + path.points.size());
+  return firsts;
+}
+
 template <class Number>
-class Column {
- public:
-  explicit Column(int components) { array_.components = components; }
+void put(double value, Number*& to) {
+  *to++ = static_cast<Number>(value);
+}
+template <class Derived, class Number>
+void put(const Eigen::PlainObjectBase<Derived>& value, Number*& to) {
+  for (Eigen::Index i = 0; i < value.size(); ++i) put(value.data()[i], to);
+}
 
-  void add(double value) { values_.push_back(static_cast<Number>(value)); }
-  template <class Derived>
-  void add(const Eigen::PlainObjectBase<Derived>& value) {
-    for (Eigen::Index i = 0; i < value.size(); ++i) add(value.data()[i]);
-  }
-  DataArray take() {
-    array_.values = std::move(values_);
-    return std::move(array_);
-  }
-
- private:
-  DataArray array_;
-  std::vector<Number> values_;
-};
+template <class Number>
+DataArray data_array(int components, std::vector<Number> values) {
+  DataArray array;
+  array.components = components;
+  array.values = std::move(values);
+  return array;
+}
 
 template <class Number, class Get>
-DataArray per_point(const std::vector<Path>& paths, int components, const Get& get) {
-  Column<Number> column(components);
-  for (const Path& path : paths)
-    for (const PathPoint& point : path.points) column.add(get(point));
-  return column.take();
+DataArray per_point(const std::vector<Path>& paths, const std::vector<std::size_t>& firsts, int components,
+                    const Get& get) {
+  const auto width = static_cast<std::size_t>(components);
+  std::vector<Number> values(width * firsts.back());
+  tbb::parallel_for(std::size_t{0}, paths.size(), [&](std::size_t i) {
+    Number* to = values.data() + width * firsts[i];
+    for (const PathPoint& point : paths[i].points) put(get(point), to);
+  });
+  return data_array(components, std::move(values));
 }
 
 template <class Number, class Get>
 DataArray per_path(const std::vector<Path>& paths, const Get& get) {
-  Column<Number> column(1);
+  std::vector<Number> values;
   for (const Path& path : paths)
-    if (!path.points.empty()) column.add(get(path));
-  return column.take();
+    if (!path.points.empty()) values.push_back(static_cast<Number>(get(path)));
+  return data_array(1, std::move(values));
 }
 
-void add_axes(const std::vector<Path>& paths, PolylineData& data) {
+void add_axes(const std::vector<Path>& paths, const std::vector<std::size_t>& firsts, PolylineData& data) {
   CrossSectionSettings bare;
   bare.least_radius = 1e-300;  // Becomes zero in single precision.
-  Column<float> major(3), minor(3);
-  for (const Path& path : paths)
-    for (const CrossSection& section : cross_sections(path.points, bare)) {
-      major.add(section.major);
-      minor.add(section.minor);
+  std::vector<float> majors(3 * firsts.back()), minors(3 * firsts.back());
+  tbb::parallel_for(std::size_t{0}, paths.size(), [&](std::size_t i) {
+    float *major = majors.data() + 3 * firsts[i], *minor = minors.data() + 3 * firsts[i];
+    for (const CrossSection& section : cross_sections(paths[i].points, bare)) {
+      put(section.major, major);
+      put(section.minor, minor);
     }
-  data.point_data["axis_major"] = major.take();
-  data.point_data["axis_minor"] = minor.take();
+  });
+  data.point_data["axis_major"] = data_array(3, std::move(majors));
+  data.point_data["axis_minor"] = data_array(3, std::move(minors));
 }
 
 PolylineData data_of(const std::vector<Path>& paths) {
   PolylineData data;
+  const std::vector<std::size_t> firsts = first_points(paths);
   for (const Path& path : paths) {
     for (const PathPoint& point : path.points) data.points.push_back(point.position);
     if (!path.points.empty()) data.line_ends.push_back(data.points.size());
   }
   auto& points = data.point_data;
-  points["direction"] = per_point<double>(paths, 3, [](const PathPoint& point) { return point.direction; });
-  points["length"] = per_point<double>(paths, 1, [](const PathPoint& point) { return point.length; });
-  points["tensor"] = per_point<double>(paths, 9, [](const PathPoint& point) { return RowMajorMatrix(point.tensor); });
-  points["change"] = per_point<double>(paths, 3, [](const PathPoint& point) { return point.change; });
-  points["in_field"] = per_point<std::uint8_t>(paths, 1, [](const PathPoint& point) { return point.in_field ? 1 : 0; });
-  points["force"] = per_point<float>(paths, 3, [](const PathPoint& point) { return point.force(); });
-  points["curvature"] = per_point<float>(paths, 1, [](const PathPoint& point) { return point.change.norm(); });
-  add_axes(paths, data);
+  points["direction"] = per_point<double>(paths, firsts, 3, [](const PathPoint& point) { return point.direction; });
+  points["length"] = per_point<double>(paths, firsts, 1, [](const PathPoint& point) { return point.length; });
+  points["tensor"] =
+      per_point<double>(paths, firsts, 9, [](const PathPoint& point) { return RowMajorMatrix(point.tensor); });
+  points["change"] = per_point<double>(paths, firsts, 3, [](const PathPoint& point) { return point.change; });
+  points["in_field"] =
+      per_point<std::uint8_t>(paths, firsts, 1, [](const PathPoint& point) { return point.in_field ? 1 : 0; });
+  points["force"] = per_point<float>(paths, firsts, 3, [](const PathPoint& point) { return point.force(); });
+  points["curvature"] = per_point<float>(paths, firsts, 1, [](const PathPoint& point) { return point.change.norm(); });
+  add_axes(paths, firsts, data);
 
   auto& lines = data.line_data;
   lines["wavelength"] = per_path<double>(paths, [](const Path& path) { return path.wavelength; });

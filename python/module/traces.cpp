@@ -39,7 +39,7 @@ struct TraceRequest {
 
 struct Traced {
   RayBatch rays;
-  std::vector<PathPoints> paths;
+  std::vector<RayPoints> paths;
 };
 
 Eigen::Matrix<double, 3, 2> columns(const double* numbers) {
@@ -101,7 +101,7 @@ void trace_all(const TensorField& field, const Geometry& geometry, const Bending
     batch.direction = slice(rays.direction, range.begin(), range.end());
     batch.flexibility = slice(rays.flexibility, range.begin(), range.end());
     batch.differentials = slice(rays.differentials, range.begin(), range.end());
-    std::vector<PathPoints> paths;
+    std::vector<RayPoints> paths;
     with_paths ? trace(field, geometry, bending, batch, paths) : trace(field, geometry, bending, batch);
     put(rays.position, range.begin(), batch.position);
     put(rays.direction, range.begin(), batch.direction);
@@ -120,9 +120,9 @@ py::array ends_array(std::vector<RayEnd> ends, const Shape& shape) {
 }
 
 /// The positions of a path's points.
-py::array way(const PathPoints& points) {
+py::array way(const RayPoints& points) {
   std::vector<Eigen::Vector3d> positions;
-  for (const PathPoint& point : points) positions.push_back(point.position);
+  for (const RayPoint& point : points) positions.push_back(point.position);
   const auto count = static_cast<py::ssize_t>(positions.size());
   return taken_matrices(std::move(positions), {count, 3});
 }
@@ -142,7 +142,7 @@ py::dict arrays_of(Traced traced) {
   }
   if (!traced.paths.empty()) {
     py::list ways;
-    for (const PathPoints& points : traced.paths) ways.append(way(points));
+    for (const RayPoints& points : traced.paths) ways.append(way(points));
     arrays["ways"] = ways;
   }
   arrays["positions"] = taken_matrices(std::move(rays.position), {count, 3});

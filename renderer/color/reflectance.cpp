@@ -7,6 +7,7 @@
 #include <stdexcept>
 
 #include <Eigen/LU>
+#include <tbb/parallel_for.h>
 
 namespace tensorray {
 namespace {
@@ -120,16 +121,17 @@ std::size_t table_index(int largest, int brightness, int second, int third) {
 std::vector<Vector3d> make_table(const std::vector<BandColor>& bands) {
   constexpr int last = table_nodes - 1;
   std::vector<Vector3d> table(table_index(3, 0, 0, 0));
-  for (int largest = 0; largest < 3; ++largest)
-    for (int i = 0; i <= last; ++i)
-      for (int j = 0; j <= last; ++j)
-        for (int k = 0; k <= last; ++k) {
-          Vector3d rgb;
-          rgb[largest] = darkest + (1 - darkest) * i / last;
-          rgb[(largest + 1) % 3] = rgb[largest] * j / last;
-          rgb[(largest + 2) % 3] = rgb[largest] * k / last;
-          table[table_index(largest, i, j, k)] = to_ball(solve(bands, rgb, Vector3d::Zero()));
-        }
+  tbb::parallel_for(0, 3 * table_nodes, [&](int layer) {
+    const int largest = layer / table_nodes, i = layer % table_nodes;
+    for (int j = 0; j <= last; ++j)
+      for (int k = 0; k <= last; ++k) {
+        Vector3d rgb;
+        rgb[largest] = darkest + (1 - darkest) * i / last;
+        rgb[(largest + 1) % 3] = rgb[largest] * j / last;
+        rgb[(largest + 2) % 3] = rgb[largest] * k / last;
+        table[table_index(largest, i, j, k)] = to_ball(solve(bands, rgb, Vector3d::Zero()));
+      }
+  });
   return table;
 }
 

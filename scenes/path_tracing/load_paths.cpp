@@ -95,6 +95,7 @@ std::vector<PathSeed> seeds_of(const SeedList& list, const std::vector<LightChan
     throw std::invalid_argument(fmt::format("{} seeds with {} wavelengths are more than {} paths; ask for fewer",
                                             list.positions.size(), channels.size(), most_paths));
   std::vector<PathSeed> seeds;
+  seeds.reserve(count);
   for (std::size_t i = 0; i < list.positions.size(); ++i)
     for (const LightChannel& channel : channels)
       seeds.push_back({list.positions[i], list.directions.empty() ? beam.direction : list.directions[i],
@@ -184,12 +185,13 @@ PathScene load_paths(const Scene& scene, const PathTracingDescription& settings)
   return paths;
 }
 
-std::vector<Path> follow_paths(const Scene& scene, const PathScene& path_scene, const Progress& progress,
+std::vector<Path> follow_paths(const Scene& scene, const PathScene& path_scene, bool tensors, const Progress& progress,
                                Statistics& statistics) {
   const PathTracingDescription& description = path_scene.settings;
   PathSettings settings;
   settings.backwards = description.backwards;
   settings.outside = description.outside;
+  settings.tensors = tensors;
   std::vector<Path> paths = path_scene.seeds.empty() ? path_scene.paths
                                                      : trace_paths(scene.field, scene.geometry, scene.bending,
                                                                    path_scene.seeds, settings, progress);

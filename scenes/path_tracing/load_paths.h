@@ -50,8 +50,9 @@ struct PathScene {
 PathScene load_paths(const Scene& scene, const PathTracingDescription& settings);
 
 /// Follows the rays, counts them by channel and end, and leaves out those that do not meet the volume.
+/// @param tensors  Whether the points of paths need the tensor (PathSettings).
 /// @throw std::runtime_error if no path is left; Cancelled.
-std::vector<Path> follow_paths(const Scene& scene, const PathScene& paths, const Progress& progress,
+std::vector<Path> follow_paths(const Scene& scene, const PathScene& paths, bool tensors, const Progress& progress,
                                Statistics& statistics);
 
 }  // namespace tensorray

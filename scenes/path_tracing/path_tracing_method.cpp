@@ -130,16 +130,22 @@ SurfacePicture render_stage(const Scene& scene, const PathScene& path_scene, con
   return render_surfaces(shaded, camera, tracer_settings(scene.description, path_scene.settings), callbacks);
 }
 
+/// Whether the file of paths has the tensors at their points.
+bool stores_tensors(const OutputDescription& output) {
+  return output.wants("paths") && tensorray::stores_tensors(output.files.at("paths"));
+}
+
 Render LoadedPaths::render(const Scene& scene, const Progress& progress, RenderJob* job) const {
   const PathTracingDescription& description = paths_.settings;
   const OutputDescription& output = scene.description.output;
   const bool has_picture = output.wants("image") || output.wants("exr") || output.wants("spectral");
+  const bool is_drawn = has_picture || output.wants("tubes");
   const ShownLight& light = paths_.lights.light;
   const auto start = Clock::now();
   Render result;
-  result.paths = follow_paths(scene, paths_, progress, result.statistics);
+  result.paths = follow_paths(scene, paths_, is_drawn || stores_tensors(output), progress, result.statistics);
   result.statistics.seconds_tracing = seconds_since(start);
-  if (!has_picture && !output.wants("tubes")) return result;
+  if (!is_drawn) return result;
 
   const auto drawing = Clock::now();
   const PathColors colors = path_colors(description.color, result.paths);

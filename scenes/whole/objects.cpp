@@ -120,7 +120,7 @@ void make_tubes(const Scene& scene, double tolerance, const Progress& progress, 
     if (!object.paths) continue;
     Statistics ends;
     const PathTracingDescription& tracing = object.paths->settings;
-    const std::vector<Path> paths = follow_paths(scene, *object.paths, progress, ends);
+    const std::vector<Path> paths = follow_paths(scene, *object.paths, true, progress, ends);
     const PathColors colors = path_colors(tracing.color, paths);
     const double radius = typical_radius(tracing.radius, paths.size(), world_box(scene.field));
     object.surface = path_surface(path_mesh(paths, tracing, colors, radius, tolerance), paths, colors,

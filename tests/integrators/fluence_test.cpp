@@ -113,7 +113,7 @@ std::vector<double> lengths_by_channel(const Bench& bench, std::uint64_t photons
     if (!positions.sample(i, emission)) continue;
     for (std::size_t channel = 0; channel < lengths.size(); ++channel) {
       RayBatch batch;
-      std::vector<PathPoints> paths;
+      std::vector<RayPoints> paths;
       batch.add(emission.origin, bench.beam.direction, channels()[channel].flexibility);
       trace(bench.field, bench.geometry, {}, batch, paths);
       for (std::size_t k = 1; k < paths[0].size(); ++k)

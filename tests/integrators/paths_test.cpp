@@ -5,7 +5,9 @@
 #include <limits>
 
 #include <gtest/gtest.h>
+#include <tbb/task_arena.h>
 
+#include "integrators/bending/scalar_tracer.h"
 #include "integrators/paths/cross_section.h"
 #include "renderer/surfaces/tube_mesh.h"
 #include "tests/integrators/support.h"
@@ -80,7 +82,7 @@ TEST(Paths, RecordsWhatTheRayDoesWithoutChangingIt) {
   for (const BendingMethod method : {BendingMethod::splitting, BendingMethod::dopri5}) {
     const Geometry geometry(surfaces_of(field));
     RayBatch plain, recorded;
-    std::vector<PathPoints> paths;
+    std::vector<RayPoints> paths;
     for (RayBatch* batch : {&plain, &recorded}) batch->add({0.2, -0.1, 2}, {0, 0, -1}, 0.5);
     const BendingSettings bending = settings_of(method, 0);
     trace(field, geometry, bending, plain);
@@ -96,6 +98,40 @@ TEST(Paths, RecordsWhatTheRayDoesWithoutChangingIt) {
       EXPECT_EQ(paths[0].size(), 3 + recorded.steps[0]);
     }
   }
+}
+
+/// Packets take the steps of the reference, in single precision.
+TEST(Paths, RecordsTheStepsOfTheReference) {
+  const TensorField field = cube_field(33, linear_tensor);
+  Surfaces surfaces = surfaces_of(field);
+  surfaces.plate = plate_across({0, 0, -1}, 1.5);
+  surfaces.obstacles.push_back(
+      box_mesh(Eigen::AlignedBox3d(Vector3d(0.3, -1, -0.6), Vector3d(1, 1, -0.2)), Eigen::Affine3d::Identity()));
+  const Geometry geometry(std::move(surfaces));
+  RayBatch batch;
+  for (int i = 0; i < 40; ++i) batch.add({0.05 * i - 1, 0.3, i % 4 == 0 ? 0.2 : 2.0}, {0, 0, -1}, 0.02 * i);
+  const RayBatch starts = batch;
+  std::vector<RayPoints> points;
+  trace(field, geometry, {}, batch, points);
+  int on_obstacle = 0;
+  for (std::size_t i = 0; i < starts.size(); ++i) {
+    const BendingSettings settings;
+    RayPoints expected;
+    Tracer<1> reference(field, geometry, settings);
+    const RayEnd end =
+        reference.trace({starts.position[i], starts.direction[i], 0}, starts.flexibility[i], {&expected, nullptr});
+    ASSERT_EQ(batch.end[i], end);
+    on_obstacle += end == RayEnd::obstacle ? 1 : 0;
+    ASSERT_EQ(points[i].size(), expected.size()) << i;
+    for (std::size_t k = 0; k < expected.size(); ++k) {
+      EXPECT_EQ(points[i][k].in_field, expected[k].in_field);
+      EXPECT_LT((points[i][k].position - expected[k].position).norm(), 10 * single_precision);
+      EXPECT_LT((points[i][k].direction - expected[k].direction).norm(), 10 * single_precision);
+      EXPECT_NEAR(points[i][k].direction.norm(), 1, 1e-12);
+      EXPECT_NEAR(points[i][k].length, expected[k].length, 10 * single_precision);
+    }
+  }
+  EXPECT_GT(on_obstacle, 5);
 }
 
 TEST(Paths, PointsCarryTheTensorAndTheCurvature) {
@@ -181,6 +217,49 @@ TEST(Paths, ThinningKeepsItsTolerances) {
     EXPECT_LE((a.tensor + t * (b.tensor - a.tensor) - point.tensor).norm(),
               1.0001 * settings.tensor_tolerance * greatest);
   }
+}
+
+TEST(Paths, WithoutTensorsFewerPointsHaveTheSamePositions) {
+  const TensorField field =
+      cube_field(65, [](const Vector3d& p) { return Matrix3d(std::exp(2 * p.z()) * linear_tensor(p)); });
+  const PathSeed seed = seed_at({0.2, -0.1, 0.3}, 0.1);
+  PathSettings settings;
+  const Path with = trace_one_path(field, seed, settings), all = trace_one_path(field, seed, everything());
+  settings.tensors = false;
+  const Path without = trace_one_path(field, seed, settings);
+  EXPECT_LT(without.points.size(), with.points.size());
+  EXPECT_GT(without.points.size(), 3u);
+  EXPECT_LE(distance(all.points, without.points), settings.tolerance * voxel_size(field));
+  EXPECT_EQ(without.points.front().position, all.points.front().position);
+  EXPECT_EQ(without.points.back().length, all.points.back().length);
+  std::size_t next = 0;
+  for (const PathPoint& point : without.points) {
+    EXPECT_TRUE(point.tensor.isZero(0) && point.change.isZero(0));
+    while (next < all.points.size() && all.points[next].position != point.position) ++next;
+    ASSERT_LT(next, all.points.size()) << "every point is one of the ray";
+    EXPECT_EQ(point.direction, all.points[next].direction);
+  }
+}
+
+TEST(Paths, AreTheSameOnAnyNumberOfThreads) {
+  const TensorField field = cube_field(33, linear_tensor);
+  const Geometry geometry(surfaces_of(field));
+  std::vector<PathSeed> seeds;
+  for (int i = 0; i < 300; ++i)
+    seeds.push_back(seed_at({std::sin(1.0 * i), std::cos(1.7 * i), 0.9 * std::sin(2.3 * i)}, 0.002 * i));
+  std::vector<std::vector<Path>> traced;
+  for (const int threads : {1, 2, 7})
+    tbb::task_arena(threads).execute(
+        [&] { traced.push_back(trace_paths(field, geometry, {}, seeds, {}, Progress())); });
+  for (std::size_t n = 1; n < traced.size(); ++n)
+    for (std::size_t i = 0; i < seeds.size(); ++i) {
+      ASSERT_EQ(traced[n][i].points.size(), traced[0][i].points.size());
+      for (std::size_t k = 0; k < traced[0][i].points.size(); ++k) {
+        ASSERT_EQ(traced[n][i].points[k].position, traced[0][i].points[k].position);
+        ASSERT_EQ(traced[n][i].points[k].tensor, traced[0][i].points[k].tensor);
+        ASSERT_EQ(traced[n][i].points[k].length, traced[0][i].points[k].length);
+      }
+    }
 }
 
 TEST(Paths, KeepsTheStraightPartsOnRequestAndSeparatesTheFaces) {

@@ -200,6 +200,20 @@ TEST_F(Paths, FilesOfPathsNeedNoPicture) {
   EXPECT_EQ(read_json("stats.json")["seconds"]["draw"], 0);
 }
 
+/// A file without tensors holds only the points that positions need.
+TEST_F(Paths, TracksAloneAreShortAndTheSameOnAnyNumberOfThreads) {
+  std::set<std::string> contents;
+  for (const std::string threads : {"1", "2", "7"}) {
+    std::vector<std::string> all = arguments({"alone.tck"}, {"integrator.seeds.count=500"});
+    all.insert(all.end(), {"--threads", threads});
+    run_well(all);
+    contents.insert(read_file(in_folder("alone.tck")));
+  }
+  EXPECT_EQ(contents.size(), 1u);
+  run_well(arguments({"with.ply", "with.tck"}, {"integrator.seeds.count=500"}));
+  EXPECT_LT(contents.begin()->size(), read_file(in_folder("with.tck")).size());
+}
+
 TEST_F(Paths, TubesAreObstaclesOfAnotherScene) {
   run_well(arguments({"tube.ply"}, {"integrator.seeds.count=1", "integrator.radius.typical=0.1"}));
   EXPECT_EQ(read_file(in_folder("tube.ply")).compare(0, 4, "ply\n"), 0);

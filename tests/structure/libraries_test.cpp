@@ -80,9 +80,7 @@ TEST(Structure, OnlyBendingKnowsTheRule) {
   std::set<std::string> readers;
   for (const Line& line : lines_of("integrators"))
     if (std::regex_search(line.text, tensor_at_a_point)) {
-      // Seeds only read the field.
-      EXPECT_TRUE(line.is_under("integrators/bending") || line.is_under("integrators/packets") ||
-                  line.file == "integrators/paths/threshold_seeds.cpp")
+      EXPECT_TRUE(line.is_under("integrators/bending") || line.is_under("integrators/packets"))
           << line.file << ": " << line.text;
       readers.insert(line.folder());
     }

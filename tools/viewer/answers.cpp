@@ -45,7 +45,7 @@ std::string color_of(const Scene& scene, std::size_t channel) {
 }
 
 /// Every few points of a path, and its last one.
-Json polyline(const PathPoints& path) {
+Json polyline(const RayPoints& path) {
   Json points = Json::array();
   const std::size_t step = std::max<std::size_t>(1, (path.size() + most_points - 1) / most_points);
   for (std::size_t i = 0; i < path.size(); i += step) points.push_back(to_json(path[i].position));
@@ -58,9 +58,9 @@ void add_rays(const Scene& scene, std::size_t channel, double flexibility, const
               Json& rays) {
   RayBatch batch;
   for (const Vector3d& start : starts) batch.add(start, scene.beam.direction, flexibility);
-  std::vector<PathPoints> paths;
+  std::vector<RayPoints> paths;
   trace(scene.field, scene.geometry, scene.bending, batch, paths);
-  for (const PathPoints& path : paths)
+  for (const RayPoints& path : paths)
     if (!path.empty()) rays.push_back({{"points", polyline(path)}, {"color", color_of(scene, channel)}});
 }
 
