@@ -36,18 +36,15 @@ class FieldRegion final : public BendingRegion {
   FieldRegion(const TensorField& field, const Geometry& geometry, FieldViewSettings settings);
 
   double entry(const Eigen::Vector3d& origin, const Eigen::Vector3d& direction) const override;
-  void follow_back(const Eigen::Vector3d& origin, const Eigen::Vector3d& direction,
-                   std::vector<BentWay>& ways) const override;
-  void follow_light(const Eigen::Vector3d& origin, const Eigen::Vector3d& direction,
-                    std::vector<BentWay>& ways) const override;
+  void follow_back(std::vector<BentWay>& ways) const override;
+  void follow_light(std::vector<BentWay>& ways) const override;
 
   /// Ways followed back so far, by their end; those that were limited.
   std::uint64_t ways(RayEnd end) const { return ends_[static_cast<std::size_t>(end)]; }
   std::uint64_t limited() const { return limited_; }
 
  private:
-  void follow(const Eigen::Vector3d& origin, const Eigen::Vector3d& direction, double sign, bool gains, RayBatch& rays,
-              std::vector<BentWay>& ways) const;
+  void follow(double sign, bool gains, RayBatch& rays, std::vector<BentWay>& ways) const;
 
   const TensorField& field_;
   const Geometry& geometry_;

@@ -124,19 +124,21 @@ ChunkPhotons PhotonTracer::trace(const Source& source, const Chunk& chunk) const
 void PhotonTracer::trace(const Source& source, PathSampler sampler, ChunkPhotons& result) const {
   BentWay way;
   way.place = sampler.next_1d();
+  const EmittedPhoton photon = source.emitter.sample(sampler);
+  way.position = photon.origin;
+  way.direction = photon.direction;
   std::vector<BentWay> ways;
   for (std::size_t band = 0; band < source.strength->size(); ++band) {
     way.band = static_cast<int>(band);
     if ((*source.strength)[band] > 0) ways.push_back(way);
   }
-  const EmittedPhoton photon = source.emitter.sample(sampler);
   const auto hit = surfaces_.intersect(photon.origin, photon.direction);
   const double entry = region_.entry(photon.origin, photon.direction);
   if (!(entry < (hit ? hit->distance : std::numeric_limits<double>::infinity()))) {
     result.counts[static_cast<std::size_t>(hit ? PhotonEnd::before : PhotonEnd::escaped)] += ways.size();
     return;
   }
-  region_.follow_light(photon.origin, photon.direction, ways);
+  region_.follow_light(ways);
   for (const BentWay& each : ways)
     ++result.counts[static_cast<std::size_t>(
         land(source, each, photon.power / static_cast<double>(source.count), result))];

@@ -33,14 +33,11 @@ class ClearCube : public BendingRegion {
     return leaves > enters ? enters : INFINITY;
   }
 
-  void follow_back(const Vector3d& origin, const Vector3d& direction, std::vector<BentWay>& ways) const override {
-    follow_light(origin, direction, ways);
-  }
+  void follow_back(std::vector<BentWay>& ways) const override { follow_light(ways); }
 
-  void follow_light(const Vector3d& origin, const Vector3d& direction, std::vector<BentWay>& ways) const override {
+  void follow_light(std::vector<BentWay>& ways) const override {
     for (BentWay& way : ways) {
-      way.position = origin + entry(origin, direction) * direction;
-      way.direction = direction;
+      way.position += entry(way.position, way.direction) * way.direction;
       way.arrives = !stops_ || way.position.x() > 0;
       way.gain = gain_;
     }
@@ -202,9 +199,9 @@ TEST(PhotonTracerTest, ShadingIsThatOfStraightLight) {
     RayShader shader(scene, {});
     Mean mean;
     for (std::uint32_t i = 0; i < 16 * 8; ++i) {
-      PathSampler numbers{3, 7, i, 0};
-      shader.shade({x, -3, 1}, (Vector3d(x, 0.05, -0.8) - Vector3d(x, -3, 1)).normalized(), true, numbers);
-      mean.add(shader.radiance()[1]);
+      const Vector3d from(x, -3, 1);
+      shader.shade({{from, (Vector3d(x, 0.05, -0.8) - from).normalized(), {3, 7, i, 0}}}, true);
+      mean.add(shader.radiance(0)[1]);
     }
     return mean;
   };
