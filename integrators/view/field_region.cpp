@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <numeric>
 #include <utility>
 
 namespace tensorray {
@@ -41,7 +42,10 @@ void FieldRegion::follow(double sign, bool gains, RayBatch& rays, std::vector<Be
   for (const BentWay& way : ways)
     rays.add(way.position, way.direction, sign * settings_.flexibility(way.band, way.place));
   rays.wants_radiance_change = gains;
+  rays.tensor_samples = 0;
   trace(field_, geometry_, settings_.bending, rays);
+  tensor_samples_ += rays.tensor_samples;
+  steps_ += std::accumulate(rays.steps.begin(), rays.steps.end(), std::uint64_t{0});
   for (std::size_t i = 0; i < ways.size(); ++i) {
     BentWay& way = ways[i];
     const RayEnd end = rays.end[i];

@@ -39,6 +39,10 @@ class FieldRegion final : public BendingRegion {
   void follow_back(std::vector<BentWay>& ways) const override;
   void follow_light(std::vector<BentWay>& ways) const override;
 
+  /// Tensor samples and steps of all ways so far.
+  std::uint64_t tensor_samples() const { return tensor_samples_; }
+  std::uint64_t steps() const { return steps_; }
+
   /// Ways followed back so far, by their end; those that were limited.
   std::uint64_t ways(RayEnd end) const { return ends_[static_cast<std::size_t>(end)]; }
   std::uint64_t limited() const { return limited_; }
@@ -52,7 +56,7 @@ class FieldRegion final : public BendingRegion {
   double rounding_;  ///< World units.
   mutable tbb::enumerable_thread_specific<RayBatch> memory_;
   mutable std::array<std::atomic<std::uint64_t>, ray_end_count> ends_{};
-  mutable std::atomic<std::uint64_t> limited_{0};
+  mutable std::atomic<std::uint64_t> limited_{0}, tensor_samples_{0}, steps_{0};
 };
 
 }  // namespace tensorray

@@ -10,6 +10,7 @@
 
 #include <Eigen/Core>
 
+#include "renderer/shading/photon_counts.h"
 #include "renderer/surfaces/surface_scene.h"
 
 namespace tensorray {
@@ -60,6 +61,12 @@ class PhotonPass {
   Eigen::Vector3d corner_ = Eigen::Vector3d::Zero();
   std::vector<LandedPhoton> photons_;
   std::vector<Cell> cells_;  ///< By key, with an end.
+};
+
+/// The photons of all passes.
+struct TracedPhotons {
+  std::vector<PhotonPass> passes;    ///< The photons that `serves` wants.
+  std::vector<PhotonCounts> counts;  ///< Of each pass.
 };
 
 template <class Use>

@@ -45,7 +45,7 @@ const std::vector<float>* strength_of(const Light& light) {
 
 /// The lights that light a surface, with shares of `per_pass` by their power.
 std::vector<Source> sources_of(const std::vector<Vector3d>& corners, const SurfaceScene& surfaces,
-                               const std::vector<Light>& lights, const PhotonSettings& settings) {
+                               const std::vector<Light>& lights, const PhotonTracerSettings& settings) {
   std::vector<Source> sources;
   std::vector<double> powers;
   for (int i = 0; i < static_cast<int>(lights.size()); ++i) {
@@ -91,7 +91,7 @@ void add_mirrored(const LandedPhoton& photon, const Plate& plate, double radius,
 /// Traces the photons of a pass.
 class PhotonTracer {
  public:
-  PhotonTracer(const BendingRegion& region, const SurfaceScene& surfaces, const PhotonSettings& settings, int pass)
+  PhotonTracer(const BendingRegion& region, const SurfaceScene& surfaces, const PhotonTracerSettings& settings, int pass)
       : region_(region),
         surfaces_(surfaces),
         settings_(settings),
@@ -107,7 +107,7 @@ class PhotonTracer {
 
   const BendingRegion& region_;
   const SurfaceScene& surfaces_;
-  const PhotonSettings& settings_;
+  const PhotonTracerSettings& settings_;
   int pass_;
   double radius_;
 };
@@ -169,7 +169,7 @@ PhotonEnd PhotonTracer::land(const Source& source, const BentWay& way, double po
 
 TracedPhotons trace_photons(const BendingRegion& region, const std::vector<Vector3d>& corners,
                             const SurfaceScene& surfaces, const std::vector<Light>& lights,
-                            const PhotonSettings& settings, const Progress& progress) {
+                            const PhotonTracerSettings& settings, const Progress& progress) {
   TracedPhotons result;
   if (settings.per_pass == 0) return result;
   const std::vector<Source> sources = sources_of(corners, surfaces, lights, settings);
@@ -182,9 +182,10 @@ TracedPhotons trace_photons(const BendingRegion& region, const std::vector<Vecto
     tbb::parallel_for(std::size_t{0}, chunks.size(),
                       [&](std::size_t i) { parts[i] = tracer.trace(sources[chunks[i].source], chunks[i]); });
     std::vector<LandedPhoton> landed;
+    result.counts.push_back({});
     for (const ChunkPhotons& part : parts) {
       landed.insert(landed.end(), part.landed.begin(), part.landed.end());
-      for (std::size_t end = 0; end < part.counts.size(); ++end) result.counts[end] += part.counts[end];
+      for (std::size_t end = 0; end < part.counts.size(); ++end) result.counts.back()[end] += part.counts[end];
     }
     result.passes.emplace_back(std::move(landed), tracer.radius());
   }

@@ -253,6 +253,52 @@ TEST_F(WholeScene, AWeakFieldLightsPlatesWithinTheVolume) {
   EXPECT_EQ(picture(weak, "7").pixels, with.pixels);
 }
 
+/// A plate along the light in the lower half of the volume, and one below the volume: the field turns light to both
+/// sides, which a flow map cannot show.
+TEST_F(WholeScene, PlatesAlongTheLightAreLitOnBothSides) {
+  for (const double z : {-1.5, -2.4})
+    for (const double side : {-1.0, 1.0}) {
+      const std::vector<std::string> sets{
+          fmt::format(R"(objects=[{{"plate":{{"center":[0,0,{}],"normal":[0,1,0],"size":[1.4,0.6]}}}}])", z),
+          R"(lights=[{"kind":"directional","direction":[0,0,-1]}])",
+          "integrator.max_samples=16",
+          "integrator.min_samples=16",
+          "integrator.max_depth=1",
+          fmt::format("camera.position=[0,{},{}]", 4 * side, z),
+          fmt::format("camera.target=[0,0,{}]", z)};
+      std::vector<std::string> map = sets;
+      map.push_back("lights.0.caustic=map");
+      const double automatic = mean(picture(sets), "caustic.G");
+      EXPECT_GT(automatic, 0.003) << side << " " << z;
+      // The field is the same on both sides, and so is its light; the map has all of it on one side.
+      const double of_map = mean(picture(map), "caustic.G");
+      EXPECT_GT(std::abs(of_map / automatic - 1), 0.3) << side << " " << z << " " << of_map;
+    }
+}
+
+TEST_F(WholeScene, StatisticsCountPhotonsAndBentRays) {
+  run_well({"render", "scene.json", "-q", "-o", "out.exr", "--stats", "stats.json", "--set",
+            R"(lights=[{"kind":"directional","direction":[0.1,0,-1],"caustic":"photons"}])", "--set",
+            "integrator.photons.per_pass=100", "--set", "integrator.max_samples=16"});
+  const auto stats = read_json("stats.json");
+  const auto& photons = stats["photons"];
+  const auto sum_of_ends = [](const auto& counts) {
+    std::uint64_t sum = 0;
+    for (const char* end : {"before", "landed", "escaped", "stopped"}) sum += counts[end].template get<std::uint64_t>();
+    return sum;
+  };
+  EXPECT_EQ(photons["emitted"], 2 * 100 * 32);
+  EXPECT_EQ(photons["emitted"], sum_of_ends(photons));
+  ASSERT_EQ(photons["passes"].size(), 2u);  // Of 8 samples each.
+  EXPECT_EQ(photons["passes"][1]["emitted"], 100 * 32);
+  EXPECT_GT(photons["passes"][1]["landed"], 0);
+  EXPECT_GE(stats["samples"], 4 * 40 * 32);
+  EXPECT_LE(stats["samples"], 16 * 40 * 32);
+  EXPECT_GT(stats["bent_rays"]["emitted"], 1000);
+  EXPECT_GT(stats["ray_steps"], stats["bent_rays"]["emitted"]);
+  EXPECT_GT(stats["tensor_samples"], 0);
+}
+
 TEST_F(WholeScene, SaysWhenPhotonsAreLost) {
   const auto errors = [&](const std::string& steps) {
     return run({"render", "scene.json", "-o", "out.exr", "--set",
