@@ -41,7 +41,7 @@ void FieldRegion::follow(double sign, bool gains, RayBatch& rays, std::vector<Be
   rays.clear();
   for (const BentWay& way : ways)
     rays.add(way.position, way.direction, sign * settings_.flexibility(way.band, way.place));
-  rays.wants_radiance_change = gains;
+  rays.wants_radiance_change = true;
   rays.tensor_samples = 0;
   trace(field_, geometry_, settings_.bending, rays);
   tensor_samples_ += rays.tensor_samples;
@@ -53,8 +53,8 @@ void FieldRegion::follow(double sign, bool gains, RayBatch& rays, std::vector<Be
     way.direction = rays.direction[i];
     way.arrives = end == RayEnd::missed || end == RayEnd::obstacle;
     way.on_surface = end == RayEnd::obstacle;
-    way.gain = 1;
-    if (gains && way.arrives) way.gain = std::exp(rays.radiance_change[i]);
+    way.gain = gains && way.arrives ? std::exp(rays.radiance_change[i]) : 1;
+    way.compression = std::exp(-sign * rays.radiance_change[i]);
   }
 }
 

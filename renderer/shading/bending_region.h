@@ -22,6 +22,9 @@ struct BentWay {
 
   // Set by `follow_back` and `follow_light`.
   double gain = 1;  ///< Followed back: factor on the radiance found at its end; followed by light: on a photon's power.
+  /// Followed back: factor on the radiance of photons that keep their power, whatever light keeps here: the phase space
+  /// that light from the end has there, over that which it has at the start. Followed by light: the same for its way.
+  double compression = 1;
   bool arrives = false;     ///< False: nothing is known of light along this way, which counts as none.
   bool on_surface = false;  ///< Whether the way ends on a surface; otherwise it goes on straight from `position`.
 };

@@ -27,9 +27,9 @@ double RayShader::bands_per_followed(int depth) const {
 /// Lets a ray wait at the region, for the band of the path; for a path of all bands, for some of them, evenly spaced.
 /// Successive samples of a pixel take different bands.
 /// @param depth   Number of surfaces that the path has met.
-/// @param weight  Of the light that a path meets next.
+/// @param weight  See WaitingRay.
 void RayShader::wait(const Vector3d& origin, const Vector3d& direction, const BandValues& throughput, int depth,
-                     double weight, bool seeks_light) {
+                     double weight, bool seeks_light, const PhotonRivalry& rivalry) {
   PathSampler places = sampler();
   places.dimension = first_bent_dimension + static_cast<std::uint32_t>(depth);
   BentWay way;
@@ -42,6 +42,7 @@ void RayShader::wait(const Vector3d& origin, const Vector3d& direction, const Ba
   waiting.seeks_light = seeks_light;
   waiting.share = bands_per_followed(depth);
   waiting.weight = weight;
+  waiting.rivalry = rivalry;
   waiting.direction = direction;
   waiting.first = waiting_.ways.size();
   const int bands = static_cast<int>(throughput_.size()), parts = static_cast<int>(waiting.share);
@@ -90,7 +91,8 @@ void RayShader::continue_band(const WaitingRay& waiting, std::size_t number) {
     if (!is_view || show_background_) add_background(way.direction, waiting.weight, waiting.depth, is_view);
     return;
   }
-  if (settings_.shading == Shading::path) add_emission(*hit, way.direction, waiting.weight, waiting.depth);
+  if (settings_.shading == Shading::path)
+    add_emission(*hit, way.direction, waiting.weight * share_beside_photons(waiting, way, *hit), waiting.depth);
   if (!is_view && waiting.depth == settings_.max_depth) return;
   const Vertex vertex = make_vertex(*hit, way.direction);
   const bool is_to_middle = number - waiting.first <= (waiting.last - waiting.first) / 2;
@@ -107,13 +109,14 @@ void RayShader::seek_bent_light(const Vertex& vertex, const Vector3d& wi, const 
   const double density = scene_.lights.direction_pdf(vertex.point, direction);
   if (!(density > 0)) return;
   if (scene_.surfaces.occluded(start, direction, scene_.region->entry(start, direction))) return;
-  double factor = std::abs(wi.z()) / density;
+  double factor = std::abs(wi.z()) / density, others = 1;
   if (settings_.direct == DirectLight::both) {
     const double ratio = pdf(*vertex.material, reflectance_, wi, vertex.wo) / density;
-    factor /= 1 + ratio * ratio;
+    others = 1 + ratio * ratio;
+    factor /= others;
   }
   contribution_ = factor * contribution_ * throughput_;
-  wait(start, direction, contribution_, depth, 1, true);
+  wait(start, direction, contribution_, depth, 1 / others, true, rivalry(vertex, direction, density, depth));
 }
 
 /// Adds the light that a ray has met which seeks it.
@@ -128,9 +131,10 @@ void RayShader::bring_light(const WaitingRay& waiting) {
     const std::vector<float>* const found =
         hit ? scene_.lights.emitted(light, hit->normal, way.direction) : &background_;
     if (!found) continue;
+    const double share = hit ? share_beside_photons(waiting, way, *hit) : 1;
     contribution_.setZero();
     contribution_[way.band] =
-        followed_.throughput[i] * (way.gain * waiting.share) * (*found)[static_cast<std::size_t>(way.band)];
+        followed_.throughput[i] * (way.gain * waiting.share) * (*found)[static_cast<std::size_t>(way.band)] * share;
     add(waiting.depth, {light, way.direction, false, found});
   }
 }

@@ -1,6 +1,7 @@
 #pragma once
 /// @file renderer/shading/photon_tracer.h
-/// Traces photons of directional lights and points through a bending region to the surfaces behind it and within it.
+/// Traces photons of directional lights, points and area lights through a bending region to the surfaces behind it and
+/// within it.
 
 #include <cstdint>
 #include <functional>
@@ -33,7 +34,7 @@ struct PhotonTracerSettings {
 
 /// @param corners  Of the region's hull.
 /// @return the same for any number of threads: random numbers are functions of (seed, pass, light, photon, dimension).
-/// @throw std::invalid_argument if a point light is within the region; Cancelled.
+/// @throw std::invalid_argument if a point light or an area light is within the region; Cancelled.
 TracedPhotons trace_photons(const BendingRegion& region, const std::vector<Eigen::Vector3d>& corners,
                             const SurfaceScene& surfaces, const std::vector<Light>& lights,
                             const PhotonTracerSettings& settings, const Progress& progress);

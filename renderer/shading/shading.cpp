@@ -76,7 +76,7 @@ RayShader::RayShader(const ShadedScene& scene, const ShadingSettings& settings)
       reflectance_(scene.colors.bands()),
       weight_(scene.colors.bands()),
       contribution_(scene.colors.bands()),
-      photon_sums_(static_cast<std::size_t>(scene.groups + 1), {BandValues(scene.colors.bands())}),
+      photon_sums_(static_cast<std::size_t>(2 * (scene.groups + 1)), {BandValues(scene.colors.bands())}),
       aims_bent_(scene.lights.is_concentrated()) {}
 
 void RayShader::shade(const std::vector<ViewRay>& rays, bool show_background) {
@@ -109,7 +109,7 @@ void RayShader::shade_view(const Vector3d& origin, const Vector3d& direction) {
   sampler().dimension = first_dimension;
   const std::optional<SurfaceHit> hit = scene_.surfaces.intersect(origin, direction);
   if (bends(origin, direction, hit ? hit->distance : std::numeric_limits<double>::infinity()))
-    return wait(origin, direction, throughput_, 0, 1, false);
+    return wait(origin, direction, throughput_, 0, 1, false, {});
   if (!hit) {
     if (show_background_) add_background(direction, 1, 0);
     return;
@@ -191,7 +191,8 @@ void RayShader::shade_path(Vertex vertex, int depth) {
     if (bends(start, direction, hit ? hit->distance : std::numeric_limits<double>::infinity())) {
       const auto light_pdf = [&] { return scene_.lights.direction_pdf(vertex.point, direction); };
       const double weight = aims_bent_ ? material_weight(scattered->pdf, light_pdf) : 1;
-      return wait(start, direction, throughput_, depth, weight, false);
+      return wait(start, direction, throughput_, depth, weight, false,
+                  rivalry(vertex, direction, scattered->pdf, depth));
     }
     if (!hit) {
       add_background(direction,

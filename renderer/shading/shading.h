@@ -60,13 +60,13 @@ struct ShadedScene {
   /// Bands that a ray of the camera, and one that surfaces have scattered, follows into the region. Both divide the
   /// number of bands.
   int bands_per_view = 1, bands_per_bounce = 1;
-  std::vector<LandedLight> landed = {};              ///< Light that bends on its way to surfaces.
-  const std::vector<PhotonPass>* photons = nullptr;  ///< Light that bends, too, on other surfaces. Samples choose
-                                                     ///< among the passes. Null or empty: none.
+  std::vector<LandedLight> landed = {};    ///< Light that bends on its way to surfaces.
+  const TracedPhotons* photons = nullptr;  ///< Light that bends, too, on other surfaces. Samples choose among the
+                                           ///< passes. Null or without passes: none.
   std::vector<int> group_of_light = {};  ///< Of each light: the number of its group; −1: it has none. Empty: none has.
   int groups = 0;                        ///< The number of groups, whose light is also added up apart.
 
-  bool has_photons() const { return photons && !photons->empty(); }
+  bool has_photons() const { return photons && !photons->passes.empty(); }
   bool has_landed_light() const { return !landed.empty() || has_photons(); }
   int layers() const { return (has_landed_light() ? 1 : 0) + groups; }
 };
@@ -143,14 +143,23 @@ class RayShader {
     }
   };
 
+  /// What photons need to be weighed against the technique that has chosen a direction at a surface.
+  struct PhotonRivalry {
+    double pdf = 0;    ///< Of the direction, per steradian.
+    double reach = 0;  ///< Area of the photons' disk, across the direction; 0: photons do not count.
+    std::uint32_t surface = 0;
+  };
+
   /// A ray that waits at the region, with its ways: for some of the bands of its path.
   struct WaitingRay {
-    std::size_t ray = 0;              ///< Number of the camera's ray.
-    int depth = 0;                    ///< Number of surfaces that the path has met.
-    bool seeks_light = false;         ///< It brings light to a surface, and ends; otherwise, it continues the path.
-    double share = 1;                 ///< Bands for which each way stands.
-    double weight = 1;                ///< Of the light that a path meets next.
-    std::size_t first = 0, last = 0;  ///< Its ways.
+    std::size_t ray = 0;       ///< Number of the camera's ray.
+    int depth = 0;             ///< Number of surfaces that the path has met.
+    bool seeks_light = false;  ///< It brings light to a surface, and ends; otherwise, it continues the path.
+    double share = 1;          ///< Bands for which each way stands.
+    double weight = 1;  ///< Of the light that is met next, by its technique's density; it is in the throughput of
+                        ///< a ray that seeks light.
+    PhotonRivalry rivalry;
+    std::size_t first = 0, last = 0;                       ///< Its ways.
     Eigen::Vector3d direction = Eigen::Vector3d::UnitZ();  ///< Before it bends.
   };
 
@@ -180,7 +189,7 @@ class RayShader {
   bool bends(const Eigen::Vector3d& origin, const Eigen::Vector3d& direction, double distance) const;
   double bands_per_followed(int depth) const;
   void wait(const Eigen::Vector3d& origin, const Eigen::Vector3d& direction, const BandValues& throughput, int depth,
-            double weight, bool seeks_light);
+            double weight, bool seeks_light, const PhotonRivalry& rivalry);
   void continue_path(const WaitingRay& waiting);
   void continue_band(const WaitingRay& waiting, std::size_t number);
   void see_bent(const WaitingRay& waiting);
@@ -191,6 +200,11 @@ class RayShader {
   bool is_shadowed(const Eigen::Vector3d& start, const Eigen::Vector3d& point) const;
   void add_landed_light(const Vertex& vertex, int depth);
   void add_photons(const Vertex& vertex, int depth);
+  const PhotonPass& photon_pass(int depth);
+  PhotonRivalry rivalry(const Vertex& vertex, const Eigen::Vector3d& direction, double pdf, int depth);
+  double share_beside_photons(const WaitingRay& waiting, const BentWay& way, const SurfaceHit& hit) const;
+  double share_of_photon(const Vertex& vertex, const LandedPhoton& photon, const Eigen::Vector3d& wi,
+                         double radius) const;
   void add_landed(int depth, int light);
   void add_background(const Eigen::Vector3d& direction, double weight, int depth, bool disks = true);
   void add_emission(const SurfaceHit& hit, const Eigen::Vector3d& direction, double weight, int depth);
@@ -220,7 +234,8 @@ class RayShader {
   int band_ = -1;        ///< Its only band, after it was bent; −1: all bands.
   BandValues throughput_, reflectance_, weight_, contribution_;
 
-  /// The light of photons, for each group and for all others; and one of the lights that it comes from, or −1.
+  /// The light of photons, for each group and for all others, of area lights apart; and one of the lights that it comes
+  /// from, or −1.
   struct PhotonSum {
     BandValues scattered;
     int light = -1;

@@ -13,6 +13,7 @@ namespace {
 using Eigen::Vector3d;
 
 constexpr double steepest_along = 0.5;   // Sine of the angle between a plate and light along it; fields turn light.
+constexpr double small_lamp = 0.4;       // Radians, seen from the volume: fields turn light by more.
 constexpr double photons_in_reach = 10;  // Of a band, within the automatic radius, where light is undisturbed.
 
 /// The direction in which light comes to a point; nothing if it is of a kind that does not land.
@@ -43,6 +44,14 @@ bool has_light_on_both_sides(const Plate& plate, const TensorField& field, const
   return std::abs(height) < reach && std::abs(normal.dot(direction)) < steepest_along;
 }
 
+/// Whether a lamp outside the volume is so small, as seen from there, that straight aim misses it.
+bool is_small(const AreaLight& lamp, const TensorField& field) {
+  Eigen::AlignedBox3d box;
+  for (const Vector3d& vertex : lamp.mesh.vertices) box.extend(vertex);
+  const double distance = (box.center() - field.world_box().center()).norm();
+  return !box.intersects(field.world_box()) && box.diagonal().norm() < small_lamp * distance;
+}
+
 /// The radius about which there are enough photons: by Cauchy, a convex body of area A has the mean silhouette A / 4.
 double automatic_radius(const TensorField& field, double per_pass) {
   const Vector3d size = field.world_box().sizes();
@@ -58,6 +67,11 @@ PhotonPairs photon_pairs(const Scene& scene, const std::vector<Light>& lights, c
   if (settings.photons.per_pass == 0) return pairs;
   for (std::size_t i = 0; i < lights.size(); ++i) {
     const LightCaustic caustic = caustic_of(scene, i);
+    if (const auto* area = std::get_if<AreaLight>(&lights[i])) {
+      const bool wanted = caustic == LightCaustic::photons || is_small(*area, scene.field);
+      pairs[i].assign(objects.size(), wanted);
+      continue;
+    }
     if (!direction_at(lights[i], {}) || caustic == LightCaustic::map) continue;
     const bool always = caustic == LightCaustic::photons || settings.conserve == Conserve::radiance;
     for (std::size_t k = 0; k < objects.size(); ++k)

@@ -194,7 +194,7 @@ Render LoadedWhole::render(const Scene& scene, const Progress& progress, RenderJ
     const PhotonPairs pairs = photon_pairs(scene, lights, objects, whole_.settings);
     photons = photons_of(scene, region, stage, lights, objects, pairs, whole_.settings.photons,
                          samples.max_samples / samples.first_samples, progress);
-    shaded.photons = &photons.passes;
+    shaded.photons = &photons;
     shaded.landed = land_light(scene, lights, light, objects, whole_.settings.caustic, pairs, progress);
   }
   report(photons.counts, result);
@@ -249,7 +249,7 @@ class WholeMethod : public MethodWith<WholeDescription> {
 void WholeMethod::check_photons(const SceneDescription& scene, const PathTracingDescription& tracing,
                                 const SceneSource& source) const {
   const bool wanted = std::any_of(scene.lights.begin(), scene.lights.end(), [&](const LightSourceDescription& light) {
-    return light.caustic == LightCaustic::photons;
+    return light.caustic == LightCaustic::photons || light.kind == LightKind::area;
   });
   if (!wanted && settings().conserve == Conserve::power) return;
   const double passes = std::max(1, tracing.samples * bands_per_bounce(settings()) / tracing.bands);
@@ -267,6 +267,9 @@ void WholeMethod::check(SceneDescription& scene, const Json& json, const SceneSo
           fmt::format("`/objects/{}/paths` cannot have the `/integrator/style` \"lines\"; use \"tube\", "
                       "\"wire\" or \"ellipses\"",
                       i));
+  for (std::size_t i = 0; i < scene.lights.size(); ++i)
+    if (scene.lights[i].kind == LightKind::area && scene.lights[i].caustic == LightCaustic::map)
+      source.fail(fmt::format("`/lights/{}/caustic` of an `area` cannot be \"map\"; use \"photons\" or \"auto\"", i));
   if (tracing.bands % settings().bands_per_sample != 0)
     source.fail(fmt::format("`/integrator/bands_per_sample` must divide `/integrator/bands` ({}), but is {}",
                             tracing.bands, settings().bands_per_sample));

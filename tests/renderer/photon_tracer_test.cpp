@@ -195,7 +195,7 @@ TEST(PhotonTracerTest, ShadingIsThatOfStraightLight) {
   const TracedPhotons photons = traced(cube, floor, lights, settings_of(4000, 16, 0.1));
   ShadedScene straight{floor, materials, sampler, colors}, bent = straight;
   bent.region = &cube;
-  bent.photons = &photons.passes;
+  bent.photons = &photons;
   const auto mean_of = [&](const ShadedScene& scene, double x) {
     RayShader shader(scene, {});
     Mean mean;
