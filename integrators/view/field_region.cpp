@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <numeric>
 #include <utility>
 
 namespace tensorray {
@@ -36,12 +37,15 @@ double FieldRegion::entry(const Vector3d& origin, const Vector3d& direction) con
 /// @param sign   Of the flexibility: 1 for light, −1 for light that is followed back.
 /// @param gains  Whether the gain of a way is that along its ray; otherwise it is 1.
 /// @param rays   Set to the rays of the ways.
-void FieldRegion::follow(const Vector3d& origin, const Vector3d& direction, double sign, bool gains, RayBatch& rays,
-                         std::vector<BentWay>& ways) const {
+void FieldRegion::follow(double sign, bool gains, RayBatch& rays, std::vector<BentWay>& ways) const {
   rays.clear();
-  for (const BentWay& way : ways) rays.add(origin, direction, sign * settings_.flexibility(way.band, way.place));
-  rays.wants_radiance_change = gains;
+  for (const BentWay& way : ways)
+    rays.add(way.position, way.direction, sign * settings_.flexibility(way.band, way.place));
+  rays.wants_radiance_change = true;
+  rays.tensor_samples = 0;
   trace(field_, geometry_, settings_.bending, rays);
+  tensor_samples_ += rays.tensor_samples;
+  steps_ += std::accumulate(rays.steps.begin(), rays.steps.end(), std::uint64_t{0});
   for (std::size_t i = 0; i < ways.size(); ++i) {
     BentWay& way = ways[i];
     const RayEnd end = rays.end[i];
@@ -49,14 +53,14 @@ void FieldRegion::follow(const Vector3d& origin, const Vector3d& direction, doub
     way.direction = rays.direction[i];
     way.arrives = end == RayEnd::missed || end == RayEnd::obstacle;
     way.on_surface = end == RayEnd::obstacle;
-    way.gain = 1;
-    if (gains && way.arrives) way.gain = std::exp(rays.radiance_change[i]);
+    way.gain = gains && way.arrives ? std::exp(rays.radiance_change[i]) : 1;
+    way.compression = std::exp(-sign * rays.radiance_change[i]);
   }
 }
 
-void FieldRegion::follow_back(const Vector3d& origin, const Vector3d& direction, std::vector<BentWay>& ways) const {
+void FieldRegion::follow_back(std::vector<BentWay>& ways) const {
   RayBatch& rays = memory_.local();
-  follow(origin, direction, -1, settings_.conserve == Conserve::power, rays, ways);
+  follow(-1, settings_.conserve == Conserve::power, rays, ways);
   for (std::size_t i = 0; i < ways.size(); ++i) {
     BentWay& way = ways[i];
     ++ends_[static_cast<std::size_t>(rays.end[i])];
@@ -69,8 +73,8 @@ void FieldRegion::follow_back(const Vector3d& origin, const Vector3d& direction,
 }
 
 /// Where radiance stays, the power of a photon changes as the radiance of a photon of constant power, the other way.
-void FieldRegion::follow_light(const Vector3d& origin, const Vector3d& direction, std::vector<BentWay>& ways) const {
-  follow(origin, direction, 1, settings_.conserve == Conserve::radiance, memory_.local(), ways);
+void FieldRegion::follow_light(std::vector<BentWay>& ways) const {
+  follow(1, settings_.conserve == Conserve::radiance, memory_.local(), ways);
   for (BentWay& way : ways) way.arrives = way.arrives && std::isfinite(way.gain);
 }
 

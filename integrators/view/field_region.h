@@ -36,18 +36,19 @@ class FieldRegion final : public BendingRegion {
   FieldRegion(const TensorField& field, const Geometry& geometry, FieldViewSettings settings);
 
   double entry(const Eigen::Vector3d& origin, const Eigen::Vector3d& direction) const override;
-  void follow_back(const Eigen::Vector3d& origin, const Eigen::Vector3d& direction,
-                   std::vector<BentWay>& ways) const override;
-  void follow_light(const Eigen::Vector3d& origin, const Eigen::Vector3d& direction,
-                    std::vector<BentWay>& ways) const override;
+  void follow_back(std::vector<BentWay>& ways) const override;
+  void follow_light(std::vector<BentWay>& ways) const override;
+
+  /// Tensor samples and steps of all ways so far.
+  std::uint64_t tensor_samples() const { return tensor_samples_; }
+  std::uint64_t steps() const { return steps_; }
 
   /// Ways followed back so far, by their end; those that were limited.
   std::uint64_t ways(RayEnd end) const { return ends_[static_cast<std::size_t>(end)]; }
   std::uint64_t limited() const { return limited_; }
 
  private:
-  void follow(const Eigen::Vector3d& origin, const Eigen::Vector3d& direction, double sign, bool gains, RayBatch& rays,
-              std::vector<BentWay>& ways) const;
+  void follow(double sign, bool gains, RayBatch& rays, std::vector<BentWay>& ways) const;
 
   const TensorField& field_;
   const Geometry& geometry_;
@@ -55,7 +56,7 @@ class FieldRegion final : public BendingRegion {
   double rounding_;  ///< World units.
   mutable tbb::enumerable_thread_specific<RayBatch> memory_;
   mutable std::array<std::atomic<std::uint64_t>, ray_end_count> ends_{};
-  mutable std::atomic<std::uint64_t> limited_{0};
+  mutable std::atomic<std::uint64_t> limited_{0}, tensor_samples_{0}, steps_{0};
 };
 
 }  // namespace tensorray

@@ -40,12 +40,6 @@ double dot(const std::vector<float>& a, const std::vector<float>& b) {
   return sum;
 }
 
-/// Normal of a triangle on the side that emits; its length is twice the area.
-Vector3d triangle_normal(const TriangleMesh& mesh, std::size_t triangle) {
-  const auto [a, b, c] = mesh.triangles[triangle];
-  return (mesh.vertices[b] - mesh.vertices[a]).cross(mesh.vertices[c] - mesh.vertices[a]);
-}
-
 /// Distance along a ray to a triangle, if the ray meets it (Möller and Trumbore 1997).
 std::optional<double> distance_to(const TriangleMesh& mesh, std::size_t triangle, const Vector3d& origin,
                                   const Vector3d& direction) {
@@ -82,6 +76,11 @@ void add(double factor, const std::vector<float>& values, std::vector<float>& su
 TriangleMesh rectangle_mesh(const Vector3d& center, const Vector3d& right, const Vector3d& up, const Vector2d& size) {
   const Vector3d x = size.x() / 2 * right, y = size.y() / 2 * up;
   return {{center - x - y, center + x - y, center + x + y, center - x + y}, {{0, 1, 2}, {0, 2, 3}}};
+}
+
+Vector3d triangle_normal(const TriangleMesh& mesh, std::size_t triangle) {
+  const auto [a, b, c] = mesh.triangles[triangle];
+  return (mesh.vertices[b] - mesh.vertices[a]).cross(mesh.vertices[c] - mesh.vertices[a]);
 }
 
 LightSampler::LightSampler(std::vector<Light> lights, const std::vector<float>& luminance,

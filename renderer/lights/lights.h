@@ -45,6 +45,9 @@ using Light = std::variant<AreaLight, DirectionalLight, ConstantLight, Environme
 TriangleMesh rectangle_mesh(const Eigen::Vector3d& center, const Eigen::Vector3d& right, const Eigen::Vector3d& up,
                             const Eigen::Vector2d& size);
 
+/// Normal of a triangle on the side that emits; its length is twice the area.
+Eigen::Vector3d triangle_normal(const TriangleMesh& mesh, std::size_t triangle);
+
 /// Light that reaches a point from one direction. Reuse one sample: it then allocates no more memory.
 struct LightSample {
   Eigen::Vector3d direction = Eigen::Vector3d::Zero();  ///< Unit, from the point to the light.

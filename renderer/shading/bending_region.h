@@ -16,10 +16,15 @@ struct BentWay {
   int band = 0;
   double place = 0.5;  ///< The wavelength: 0 and 1 are the ends of the band.
 
-  // Set by `follow_back` and `follow_light`.
-  Eigen::Vector3d position = Eigen::Vector3d::Zero();   ///< Where it leaves the region, or meets a surface.
+  /// Where it starts; `follow_back` and `follow_light` set it to where it leaves the region, or meets a surface.
+  Eigen::Vector3d position = Eigen::Vector3d::Zero();
   Eigen::Vector3d direction = Eigen::Vector3d::Zero();  ///< Unit; the direction in which it is followed.
+
+  // Set by `follow_back` and `follow_light`.
   double gain = 1;  ///< Followed back: factor on the radiance found at its end; followed by light: on a photon's power.
+  /// Followed back: factor on the radiance of photons that keep their power, whatever light keeps here: the phase space
+  /// that light from the end has there, over that which it has at the start. Followed by light: the same for its way.
+  double compression = 1;
   bool arrives = false;     ///< False: nothing is known of light along this way, which counts as none.
   bool on_surface = false;  ///< Whether the way ends on a surface; otherwise it goes on straight from `position`.
 };
@@ -32,13 +37,12 @@ class BendingRegion {
   /// Distance at which a straight ray enters: 0 if it starts inside, infinite if it misses the region.
   virtual double entry(const Eigen::Vector3d& origin, const Eigen::Vector3d& direction) const = 0;
 
-  /// Follows a ray that enters, once for each of `ways`.
-  virtual void follow_back(const Eigen::Vector3d& origin, const Eigen::Vector3d& direction,
-                           std::vector<BentWay>& ways) const = 0;
+  /// Follows light of a viewer back along ways that enter, in place. One call with many ways is faster than many calls,
+  /// if those of one start stand next to each other. The result of a way does not depend on the others.
+  virtual void follow_back(std::vector<BentWay>& ways) const = 0;
 
-  /// Follows light that travels in `direction` and enters, once for each of `ways`.
-  virtual void follow_light(const Eigen::Vector3d& origin, const Eigen::Vector3d& direction,
-                            std::vector<BentWay>& ways) const = 0;
+  /// The same for light that starts where the ways do.
+  virtual void follow_light(std::vector<BentWay>& ways) const = 0;
 };
 
 /// The surface at the end of a way, or the one that it meets behind the region, if there is one.

@@ -6,10 +6,13 @@
 
 #include <algorithm>
 #include <cstdint>
+#include <optional>
 #include <vector>
 
 #include <Eigen/Core>
 
+#include "renderer/lights/photon_emitter.h"
+#include "renderer/shading/photon_counts.h"
 #include "renderer/surfaces/surface_scene.h"
 
 namespace tensorray {
@@ -23,10 +26,19 @@ struct LandedPhoton {
   std::uint32_t surface = 0;  ///< Index of the surface.
   std::int32_t light = 0;     ///< Index of the light that it comes from.
   std::int32_t band = 0;
+  float density = 0;  ///< Of an area light: expected number of photons of the pass and band, per area across their
+                      ///< direction and per steradian, where this one has landed. Of other lights: 0.
 };
 
 /// The radius of a pass: r²(pass + 1) / r²(pass) = (pass + 1 + α) / (pass + 2), α = ⅔. @param pass  From 0.
 double photon_radius(double first, int pass);
+
+/// An area light whose light photons find through the region, as other techniques do (multiple importance sampling).
+struct AreaPhotons {
+  PhotonEmitter emitter;
+  double count = 0;            ///< Photons of a band in each pass.
+  std::vector<bool> surfaces;  ///< By index: whether photons light them.
+};
 
 /// The photons of one pass, sorted by cells of a lattice, then by band, then by their order before. Immutable: any
 /// thread may use it.
@@ -60,6 +72,13 @@ class PhotonPass {
   Eigen::Vector3d corner_ = Eigen::Vector3d::Zero();
   std::vector<LandedPhoton> photons_;
   std::vector<Cell> cells_;  ///< By key, with an end.
+};
+
+/// The photons of all passes.
+struct TracedPhotons {
+  std::vector<PhotonPass> passes;                 ///< The photons that `serves` wants.
+  std::vector<PhotonCounts> counts;               ///< Of each pass.
+  std::vector<std::optional<AreaPhotons>> areas;  ///< By light; those of area lights that have photons.
 };
 
 template <class Use>

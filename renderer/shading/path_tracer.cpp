@@ -24,9 +24,10 @@ using Eigen::Vector2d;
 using Eigen::Vector2f;
 using Eigen::Vector3f;
 
-constexpr int tile_size = 16;             ///< Pixels.
-constexpr int neighborhood = 2;           ///< Pixels in each direction that help decide whether a pixel is done.
-constexpr double least_luminance = 0.05;  ///< To which errors are compared; fraction of the picture's mean.
+constexpr int tile_size = 16;               ///< Pixels.
+constexpr int neighborhood = 2;             ///< Pixels in each direction that help decide whether a pixel is done.
+constexpr std::size_t batch_samples = 256;  ///< That are shaded together: their bent rays fill packets.
+constexpr double least_luminance = 0.05;    ///< To which errors are compared; fraction of the picture's mean.
 
 void require_valid(const Camera& camera, const PathTracerSettings& settings) {
   require(camera.resolution.minCoeff() >= 1, "the camera's resolution must be >= 1");
@@ -48,7 +49,7 @@ void extend_mean(Mean&& mean, int count, const Value& value) {
 }
 
 /// Sets the means of a pixel's bands after `samples` more of `count` samples.
-void extend_means(const BandValues& sum, int samples, double count, double* means) {
+void extend_means(const BandsIn& sum, int samples, double count, double* means) {
   for (Eigen::Index band = 0; band < sum.size(); ++band) means[band] += (sum[band] - samples * means[band]) / count;
 }
 
@@ -70,13 +71,14 @@ class Rendering {
   SurfacePicture run();
 
  private:
-  /// The memory of one thread.
-  struct Worker {
-    Worker(const ShadedScene& scene, const ShadingSettings& settings)
-        : shader(scene, settings), sum(scene.colors.bands()), layers(shader.layers()) {}
+  /// Samples of pixels, to be shaded together; and the memory of one thread.
+  struct Batch {
+    Batch(const ShadedScene& scene, const ShadingSettings& settings)
+        : shader(scene, settings), sum(Eigen::ArrayXXd::Zero(scene.colors.bands(), 1 + scene.layers())) {}
     RayShader shader;
-    BandValues sum;
-    std::vector<BandValues> layers;  // Sums.
+    std::vector<ViewRay> rays;
+    std::vector<Vector2d> offsets;  // Of each sample from its pixel's centre.
+    Eigen::ArrayXXd sum;            // Of one pixel's samples: radiance and layers.
   };
 
   Tile load(std::size_t number) const;
@@ -86,10 +88,12 @@ class Rendering {
   void count_tiles();
   double time_used() const;
   int next_samples(int before) const;
-  std::optional<FirstSurface> shade(int x, int y, PathSampler& sampler, RayShader& shader, Vector2d& offset) const;
+  void add_ray(int x, int y, int sample, Batch& batch) const;
   void pass(const std::vector<std::size_t>& tiles);
-  void extend(std::size_t number, Worker& worker);
-  void render_pixel(Tile& tile, int x, int y, int samples, Worker& worker);
+  void extend(std::size_t number, Batch& batch);
+  void shade(Tile& tile, int before, int after, Batch& batch);
+  void add_sample(PixelState& pixel, std::size_t number, Batch& batch) const;
+  void add_light(Tile& tile, int x, int y, int samples, Batch& batch) const;
   void add_surface(PixelState& pixel, const Vector2d& offset, const FirstSurface& surface) const;
   void add_place(PixelState& pixel, const FirstSurface& surface) const;
   bool finish_pixels(Tile& tile);
@@ -130,14 +134,12 @@ double Rendering::mean_luminance() const {
   const int columns = (width_ + step - 1) / step, rows = (height_ + step - 1) / step;
   std::vector<double> luminances(static_cast<std::size_t>(columns) * rows);
   tbb::parallel_for(0, rows, [&](int row) {
-    RayShader shader(scene_, settings_.shading);
-    for (int column = 0; column < columns; ++column) {
-      const std::size_t index = static_cast<std::size_t>(row * step) * width_ + column * step;
-      PathSampler sampler{settings_.seed, index, 0, 0};
-      Vector2d offset;
-      shade(column * step, row * step, sampler, shader, offset);
-      luminances[static_cast<std::size_t>(row) * columns + column] = scene_.colors.luminance(shader.radiance());
-    }
+    Batch batch(scene_, settings_.shading);
+    for (int column = 0; column < columns; ++column) add_ray(column * step, row * step, 0, batch);
+    batch.shader.shade(batch.rays, !settings_.transparent);
+    for (int column = 0; column < columns; ++column)
+      luminances[static_cast<std::size_t>(row) * columns + column] =
+          scene_.colors.luminance(batch.shader.radiance(static_cast<std::size_t>(column)));
   });
   return std::accumulate(luminances.begin(), luminances.end(), 0.0) / static_cast<double>(luminances.size());
 }
@@ -198,8 +200,8 @@ void Rendering::pass(const std::vector<std::size_t>& tiles) {
   const auto caller = std::this_thread::get_id();
   tbb::parallel_for(std::size_t{0}, tiles.size(), [&](std::size_t i) {
     if (work_.stopping) return;
-    Worker worker(scene_, settings_.shading);
-    extend(tiles[i], worker);
+    Batch batch(scene_, settings_.shading);
+    extend(tiles[i], batch);
     if (std::this_thread::get_id() != caller) return;
     if (callbacks_.progress) {
       const auto by_time = static_cast<std::uint64_t>(std::min(1.0, time_used()) * static_cast<double>(total_samples_));
@@ -209,57 +211,75 @@ void Rendering::pass(const std::vector<std::size_t>& tiles) {
   });
 }
 
-void Rendering::extend(std::size_t number, Worker& worker) {
+void Rendering::extend(std::size_t number, Batch& batch) {
   Tile tile = load(number);
   const int before = tile.samples(), more = next_samples(before), after = before + more;
   for (int y = 0; y < tile.height; ++y)
-    for (int x = 0; x < tile.width; ++x) render_pixel(tile, x, y, more, worker);
+    for (int x = 0; x < tile.width; ++x) {
+      if (tile.pixel(x, y).done != 0) continue;
+      for (int sample = before; sample < after; ++sample) {
+        add_ray(tile.left + x, tile.top + y, sample, batch);
+        if (batch.rays.size() == batch_samples) shade(tile, before, after, batch);
+      }
+    }
+  shade(tile, before, after, batch);
   const bool has_enough = after == settings_.max_samples || (after >= settings_.min_samples && finish_pixels(tile));
   const bool done = has_enough || more == 0;
   work_.keep(number, tile.bytes(), done);
 }
 
-/// Sets the radiance of `shader` to that of a sample of pixel x, y of the picture. @param offset  Becomes its place.
-std::optional<FirstSurface> Rendering::shade(int x, int y, PathSampler& sampler, RayShader& shader,
-                                             Vector2d& offset) const {
-  offset = settings_.filter.sample(sampler.next_2d());
+/// Adds the ray of a sample of pixel x, y of the picture.
+void Rendering::add_ray(int x, int y, int sample, Batch& batch) const {
+  PathSampler sampler{settings_.seed, static_cast<std::size_t>(y) * width_ + x, static_cast<std::uint32_t>(sample), 0};
+  const Vector2d offset = settings_.filter.sample(sampler.next_2d());
   const Vector2d lens = camera_.lens_radius > 0 ? square_to_disk(sampler.next_2d()) : Vector2d(0, 0);
   const CameraRay ray = camera_ray(camera_, Vector2d(x + 0.5, y + 0.5) + offset, lens);
-  return shader.shade(ray.origin, ray.direction, !settings_.transparent, sampler);
+  batch.rays.push_back({ray.origin, ray.direction, sampler});
+  batch.offsets.push_back(offset);
 }
 
-void Rendering::render_pixel(Tile& tile, int x, int y, int samples, Worker& worker) {
-  PixelState& pixel = tile.pixel(x, y);
-  if (pixel.done != 0) return;
-  const std::size_t index = static_cast<std::size_t>(tile.top + y) * width_ + tile.left + x;
-  RayShader& shader = worker.shader;
-  worker.sum.setZero();
-  for (BandValues& layer : worker.layers) layer.setZero();
-  for (int i = 0; i < samples; ++i) {
-    PathSampler sampler{settings_.seed, index, static_cast<std::uint32_t>(pixel.samples), 0};
-    Vector2d offset;
-    const auto surface = shade(tile.left + x, tile.top + y, sampler, shader, offset);
-    worker.sum += shader.radiance();
-    for (std::size_t k = 0; k < worker.layers.size(); ++k) worker.layers[k] += shader.layers()[k];
-    if (const auto& view = shader.bent_view()) {
-      extend_mean(pixel.gain, ++pixel.bent, static_cast<float>(view->gain));
-      extend_mean(pixel.deflection, pixel.bent, static_cast<float>(view->deflection));
-      extend_mean(pixel.arrives, pixel.bent, static_cast<float>(view->arrives));
-    }
-    ++pixel.samples;
-    const double luminance = scene_.colors.luminance(shader.radiance()), change = luminance - pixel.luminance;
-    pixel.luminance += change / pixel.samples;
-    pixel.squares += change * (luminance - pixel.luminance);
-    if (surface) add_surface(pixel, offset, *surface);
+/// Shades the batch and adds its samples to their pixels. These had `before` samples, and will have `after`.
+void Rendering::shade(Tile& tile, int before, int after, Batch& batch) {
+  batch.shader.shade(batch.rays, !settings_.transparent);
+  for (std::size_t i = 0; i < batch.rays.size(); ++i) {
+    const auto width = static_cast<std::uint64_t>(width_), index = batch.rays[i].sampler.pixel;
+    const int x = static_cast<int>(index % width) - tile.left, y = static_cast<int>(index / width) - tile.top;
+    PixelState& pixel = tile.pixel(x, y);
+    add_sample(pixel, i, batch);
+    if (pixel.samples == after) add_light(tile, x, y, after - before, batch);
   }
+  finished_samples_ += batch.rays.size();
+  batch.rays.clear();
+  batch.offsets.clear();
+}
+
+/// Adds sample `number` of the batch: all but its light to the pixel, and its light to the pixel's sum.
+void Rendering::add_sample(PixelState& pixel, std::size_t number, Batch& batch) const {
+  const RayShader& shader = batch.shader;
+  const RayView& view = shader.view(number);
+  batch.sum.col(0) += shader.radiance(number);
+  for (int layer = 0; layer < scene_.layers(); ++layer) batch.sum.col(1 + layer) += shader.layer(number, layer);
+  if (view.bent) {
+    extend_mean(pixel.gain, ++pixel.bent, static_cast<float>(view.bent->gain));
+    extend_mean(pixel.deflection, pixel.bent, static_cast<float>(view.bent->deflection));
+    extend_mean(pixel.arrives, pixel.bent, static_cast<float>(view.bent->arrives));
+  }
+  ++pixel.samples;
+  const double luminance = scene_.colors.luminance(shader.radiance(number)), change = luminance - pixel.luminance;
+  pixel.luminance += change / pixel.samples;
+  pixel.squares += change * (luminance - pixel.luminance);
+  if (view.surface) add_surface(pixel, batch.offsets[number], *view.surface);
+}
+
+/// Adds the light of a pixel's `samples` to the tile.
+void Rendering::add_light(Tile& tile, int x, int y, int samples, Batch& batch) const {
+  const int count = tile.pixel(x, y).samples;
   double* light = tile.light_of(x, y);
-  extend_means(worker.sum, samples, pixel.samples, light);
-  light += worker.sum.size();
-  for (const BandValues& layer : worker.layers) {
-    extend_means(scene_.colors.color(layer).cast<double>().array(), samples, pixel.samples, light);
-    light += 3;
-  }
-  finished_samples_ += static_cast<std::uint64_t>(samples);
+  extend_means(batch.sum.col(0), samples, count, light);
+  light += batch.sum.rows();
+  for (int layer = 0; layer < scene_.layers(); ++layer, light += 3)
+    extend_means(scene_.colors.color(batch.sum.col(1 + layer)).cast<double>().array(), samples, count, light);
+  batch.sum.setZero();
 }
 
 void Rendering::add_surface(PixelState& pixel, const Vector2d& offset, const FirstSurface& surface) const {

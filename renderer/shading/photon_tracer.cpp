@@ -40,12 +40,13 @@ struct ChunkPhotons {
 const std::vector<float>* strength_of(const Light& light) {
   if (const auto* point = std::get_if<PointLight>(&light)) return &point->intensity;
   if (const auto* sun = std::get_if<DirectionalLight>(&light)) return &sun->irradiance;
+  if (const auto* area = std::get_if<AreaLight>(&light)) return &area->radiance;
   return nullptr;
 }
 
 /// The lights that light a surface, with shares of `per_pass` by their power.
 std::vector<Source> sources_of(const std::vector<Vector3d>& corners, const SurfaceScene& surfaces,
-                               const std::vector<Light>& lights, const PhotonSettings& settings) {
+                               const std::vector<Light>& lights, const PhotonTracerSettings& settings) {
   std::vector<Source> sources;
   std::vector<double> powers;
   for (int i = 0; i < static_cast<int>(lights.size()); ++i) {
@@ -62,6 +63,19 @@ std::vector<Source> sources_of(const std::vector<Vector3d>& corners, const Surfa
     sources[i].count =
         static_cast<std::uint64_t>(std::max(1.0, std::round(static_cast<double>(settings.per_pass) * powers[i] / all)));
   return sources;
+}
+
+std::vector<std::optional<AreaPhotons>> areas_of(const std::vector<Source>& sources, const std::vector<Light>& lights,
+                                                 const SurfaceScene& surfaces, const PhotonTracerSettings& settings) {
+  std::vector<std::optional<AreaPhotons>> areas(lights.size());
+  for (const Source& source : sources) {
+    const auto light = static_cast<std::size_t>(source.light);
+    if (!std::holds_alternative<AreaLight>(lights[light])) continue;
+    areas[light] = AreaPhotons{source.emitter, static_cast<double>(source.count), {}};
+    for (std::uint32_t k = 0; k < surfaces.surfaces().size(); ++k)
+      areas[light]->surfaces.push_back(settings.serves(source.light, k));
+  }
+  return areas;
 }
 
 std::vector<Chunk> chunks_of(const std::vector<Source>& sources) {
@@ -91,7 +105,8 @@ void add_mirrored(const LandedPhoton& photon, const Plate& plate, double radius,
 /// Traces the photons of a pass.
 class PhotonTracer {
  public:
-  PhotonTracer(const BendingRegion& region, const SurfaceScene& surfaces, const PhotonSettings& settings, int pass)
+  PhotonTracer(const BendingRegion& region, const SurfaceScene& surfaces, const PhotonTracerSettings& settings,
+               int pass)
       : region_(region),
         surfaces_(surfaces),
         settings_(settings),
@@ -103,11 +118,11 @@ class PhotonTracer {
 
  private:
   void trace(const Source& source, PathSampler sampler, ChunkPhotons& result) const;
-  PhotonEnd land(const Source& source, const BentWay& way, double power, ChunkPhotons& result) const;
+  PhotonEnd land(const Source& source, const BentWay& way, const EmittedPhoton& emitted, ChunkPhotons& result) const;
 
   const BendingRegion& region_;
   const SurfaceScene& surfaces_;
-  const PhotonSettings& settings_;
+  const PhotonTracerSettings& settings_;
   int pass_;
   double radius_;
 };
@@ -124,26 +139,30 @@ ChunkPhotons PhotonTracer::trace(const Source& source, const Chunk& chunk) const
 void PhotonTracer::trace(const Source& source, PathSampler sampler, ChunkPhotons& result) const {
   BentWay way;
   way.place = sampler.next_1d();
+  const EmittedPhoton photon = source.emitter.sample(sampler);
+  way.position = photon.origin;
+  way.direction = photon.direction;
   std::vector<BentWay> ways;
   for (std::size_t band = 0; band < source.strength->size(); ++band) {
     way.band = static_cast<int>(band);
     if ((*source.strength)[band] > 0) ways.push_back(way);
   }
-  const EmittedPhoton photon = source.emitter.sample(sampler);
   const auto hit = surfaces_.intersect(photon.origin, photon.direction);
   const double entry = region_.entry(photon.origin, photon.direction);
   if (!(entry < (hit ? hit->distance : std::numeric_limits<double>::infinity()))) {
     result.counts[static_cast<std::size_t>(hit ? PhotonEnd::before : PhotonEnd::escaped)] += ways.size();
     return;
   }
-  region_.follow_light(photon.origin, photon.direction, ways);
-  for (const BentWay& each : ways)
-    ++result.counts[static_cast<std::size_t>(
-        land(source, each, photon.power / static_cast<double>(source.count), result))];
+  if (!(photon.power > 0)) {  // From the side of an area light that does not emit.
+    result.counts[static_cast<std::size_t>(PhotonEnd::escaped)] += ways.size();
+    return;
+  }
+  region_.follow_light(ways);
+  for (const BentWay& each : ways) ++result.counts[static_cast<std::size_t>(land(source, each, photon, result))];
 }
 
-/// @param power  For a strength of 1.
-PhotonEnd PhotonTracer::land(const Source& source, const BentWay& way, double power, ChunkPhotons& result) const {
+PhotonEnd PhotonTracer::land(const Source& source, const BentWay& way, const EmittedPhoton& emitted,
+                             ChunkPhotons& result) const {
   if (!way.arrives) return PhotonEnd::stopped;
   const auto hit = surface_at_end(surfaces_, way);
   if (!hit) return PhotonEnd::escaped;
@@ -152,7 +171,10 @@ PhotonEnd PhotonTracer::land(const Source& source, const BentWay& way, double po
   photon.position = hit->position.cast<float>();
   photon.direction = way.direction.cast<float>();
   photon.normal = hit->normal.cast<float>();
-  photon.power = static_cast<float>(power * way.gain) * (*source.strength)[static_cast<std::size_t>(way.band)];
+  const auto count = static_cast<double>(source.count);
+  photon.density = static_cast<float>(count * emitted.density * way.compression);
+  photon.power =
+      static_cast<float>(emitted.power / count * way.gain) * (*source.strength)[static_cast<std::size_t>(way.band)];
   photon.surface = hit->surface;
   photon.light = source.light;
   photon.band = way.band;
@@ -167,11 +189,12 @@ PhotonEnd PhotonTracer::land(const Source& source, const BentWay& way, double po
 
 TracedPhotons trace_photons(const BendingRegion& region, const std::vector<Vector3d>& corners,
                             const SurfaceScene& surfaces, const std::vector<Light>& lights,
-                            const PhotonSettings& settings, const Progress& progress) {
+                            const PhotonTracerSettings& settings, const Progress& progress) {
   TracedPhotons result;
   if (settings.per_pass == 0) return result;
   const std::vector<Source> sources = sources_of(corners, surfaces, lights, settings);
   if (sources.empty()) return result;
+  result.areas = areas_of(sources, lights, surfaces, settings);
   const std::vector<Chunk> chunks = chunks_of(sources);
   for (int pass = 0; pass < settings.passes; ++pass) {
     progress.update("tracing photons", static_cast<std::uint64_t>(pass), static_cast<std::uint64_t>(settings.passes));
@@ -180,9 +203,10 @@ TracedPhotons trace_photons(const BendingRegion& region, const std::vector<Vecto
     tbb::parallel_for(std::size_t{0}, chunks.size(),
                       [&](std::size_t i) { parts[i] = tracer.trace(sources[chunks[i].source], chunks[i]); });
     std::vector<LandedPhoton> landed;
+    result.counts.push_back({});
     for (const ChunkPhotons& part : parts) {
       landed.insert(landed.end(), part.landed.begin(), part.landed.end());
-      for (std::size_t end = 0; end < part.counts.size(); ++end) result.counts[end] += part.counts[end];
+      for (std::size_t end = 0; end < part.counts.size(); ++end) result.counts.back()[end] += part.counts[end];
     }
     result.passes.emplace_back(std::move(landed), tracer.radius());
   }

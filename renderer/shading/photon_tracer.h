@@ -1,8 +1,8 @@
 #pragma once
 /// @file renderer/shading/photon_tracer.h
-/// Traces photons of directional lights and points through a bending region to the surfaces behind it and within it.
+/// Traces photons of directional lights, points and area lights through a bending region to the surfaces behind it and
+/// within it.
 
-#include <array>
 #include <cstdint>
 #include <functional>
 #include <optional>
@@ -19,7 +19,7 @@
 
 namespace tensorray {
 
-struct PhotonSettings {
+struct PhotonTracerSettings {
   std::uint64_t per_pass = 16384;  ///< Positions from which light starts, of all lights; each is at least one. Every
                                    ///< position has a photon of each band. 0: none.
   int passes = 1;                  ///< >= 1
@@ -32,24 +32,11 @@ struct PhotonSettings {
   std::vector<std::optional<Plate>> plates;
 };
 
-/// Where photons went: they met a surface before the region (straight light, which photons do not count), landed on a
-/// surface after it, left everything, or could not be followed.
-enum class PhotonEnd { before, landed, escaped, stopped };
-constexpr int photon_end_count = 4;
-
-/// Photons of all passes by their end; their sum is the number of those that were emitted.
-using PhotonCounts = std::array<std::uint64_t, photon_end_count>;
-
-struct TracedPhotons {
-  std::vector<PhotonPass> passes;  ///< The photons that `serves` wants.
-  PhotonCounts counts{};
-};
-
 /// @param corners  Of the region's hull.
 /// @return the same for any number of threads: random numbers are functions of (seed, pass, light, photon, dimension).
-/// @throw std::invalid_argument if a point light is within the region; Cancelled.
+/// @throw std::invalid_argument if a point light or an area light is within the region; Cancelled.
 TracedPhotons trace_photons(const BendingRegion& region, const std::vector<Eigen::Vector3d>& corners,
                             const SurfaceScene& surfaces, const std::vector<Light>& lights,
-                            const PhotonSettings& settings, const Progress& progress);
+                            const PhotonTracerSettings& settings, const Progress& progress);
 
 }  // namespace tensorray

@@ -62,13 +62,13 @@ struct ShadedScene {
   /// Bands that a ray of the camera, and one that surfaces have scattered, follows into the region. Both divide the
   /// number of bands.
   int bands_per_view = 1, bands_per_bounce = 1;
-  std::vector<LandedLight> landed = {};              ///< Light that bends on its way to surfaces.
-  const std::vector<PhotonPass>* photons = nullptr;  ///< Light that bends, too, on other surfaces. Samples choose
-                                                     ///< among the passes. Null or empty: none.
+  std::vector<LandedLight> landed = {};    ///< Light that bends on its way to surfaces.
+  const TracedPhotons* photons = nullptr;  ///< Light that bends, too, on other surfaces. Samples choose among the
+                                           ///< passes. Null or without passes: none.
   std::vector<int> group_of_light = {};  ///< Of each light: the number of its group; −1: it has none. Empty: none has.
   int groups = 0;                        ///< The number of groups, whose light is also added up apart.
 
-  bool has_photons() const { return photons && !photons->empty(); }
+  bool has_photons() const { return photons && !photons->passes.empty(); }
   bool has_landed_light() const { return !landed.empty() || has_photons(); }
   int layers() const { return (has_landed_light() ? 1 : 0) + groups; }
 };
@@ -93,51 +93,126 @@ struct BentView {
   double arrives = 1;     ///< The part of the bands whose way could be followed to its end.
 };
 
-/// Follows rays. It reuses its memory: make one for each thread. The scene must outlive it.
+/// A ray of the camera: a sample of the picture.
+struct ViewRay {
+  Eigen::Vector3d origin = Eigen::Vector3d::Zero(), direction = Eigen::Vector3d::UnitZ();  ///< World; unit.
+  PathSampler sampler;  ///< Its dimensions from the third one are for shading.
+};
+
+/// What a ray of the camera meets.
+struct RayView {
+  std::optional<FirstSurface> surface;  ///< The first one. Of a ray that bends, that of the middle one of its bands.
+  std::optional<BentView> bent;         ///< If it enters the region.
+};
+
+/// Estimates the light that rays see. It reuses its memory: make one for each thread. The scene must outlive it.
+///
+/// Rays that enter the region wait there, and are then followed together: those of all samples that one call shades, as
+/// they leave the camera, then those that the surfaces have scattered that these have met, and so on.
 class RayShader {
  public:
   RayShader(const ShadedScene& scene, const ShadingSettings& settings);
 
-  /// Sets `radiance()` to an estimate of what the ray sees. The mean of the estimate is exact, apart from clamping.
+  /// Sets `radiance`, `layer` and `view` of each of `rays`: its result depends on that ray alone. The mean of the
+  /// estimate is exact, apart from clamping.
   /// @param show_background  False: a ray that meets nothing sees no light.
-  /// @return the first surface, if there is one.
-  std::optional<FirstSurface> shade(const Eigen::Vector3d& origin, const Eigen::Vector3d& direction,
-                                    bool show_background, PathSampler& sampler);
+  void shade(const std::vector<ViewRay>& rays, bool show_background);
 
-  const BandValues& radiance() const { return radiance_; }
+  /// In every band.
+  auto radiance(std::size_t ray) const { return light_.col(column(ray)); }
 
-  /// Parts of `radiance()`: if there are ShadedScene::landed or photons, what these have lit; then the light of each
+  /// Parts of `radiance`: if there are ShadedScene::landed or photons, what these have lit; then the light of each
   /// group.
-  const std::vector<BandValues>& layers() const { return layers_; }
+  auto layer(std::size_t ray, int layer) const { return light_.col(column(ray) + 1 + layer); }
 
-  const std::optional<BentView>& bent_view() const { return bent_view_; }
+  const RayView& view(std::size_t ray) const { return views_[ray]; }
 
  private:
-  struct Vertex;
+  /// A point where a path meets a surface. The frame is the material's: +z points outwards.
+  struct Vertex {
+    SurfaceHit hit;
+    const Material* material;
+    double side;            ///< 1: seen from outside, −1: from inside.
+    Eigen::Vector3d point;  ///< The point that is lit.
+    Eigen::Vector3d normal;
+    Eigen::Vector3d direction;  ///< Of the ray that found it.
+    Eigen::Matrix3d frame;
+    Eigen::Vector3d wo;
 
+    /// Start of a ray towards `wi`.
+    Eigen::Vector3d start(const SurfaceScene& surfaces, const Eigen::Vector3d& wi) const {
+      return surfaces.start(hit, point, wi.z() * wo.z() < 0 ? -side : side);
+    }
+  };
+
+  /// What photons need to be weighed against the technique that has chosen a direction at a surface.
+  struct PhotonRivalry {
+    double pdf = 0;    ///< Of the direction, per steradian.
+    double reach = 0;  ///< Area of the photons' disk, across the direction; 0: photons do not count.
+    std::uint32_t surface = 0;
+  };
+
+  /// A ray that waits at the region, with its ways: for some of the bands of its path.
+  struct WaitingRay {
+    std::size_t ray = 0;       ///< Number of the camera's ray.
+    int depth = 0;             ///< Number of surfaces that the path has met.
+    bool seeks_light = false;  ///< It brings light to a surface, and ends; otherwise, it continues the path.
+    double share = 1;          ///< Bands of the path for which each way stands.
+    double stands = 1;         ///< Bands of the camera's ray for which it stands.
+    double weight = 1;  ///< Of the light that is met next, by its technique's density; it is in the throughput of
+                        ///< a ray that seeks light.
+    PhotonRivalry rivalry;
+    std::size_t first = 0, last = 0;                       ///< Its ways.
+    Eigen::Vector3d direction = Eigen::Vector3d::UnitZ();  ///< Before it bends.
+  };
+
+  /// Rays that wait together.
+  struct Wave {
+    std::vector<WaitingRay> rays;
+    std::vector<BentWay> ways;
+    std::vector<double> throughput;  ///< Of each way, in its band.
+    void clear() {
+      rays.clear();
+      ways.clear();
+      throughput.clear();
+    }
+  };
+
+  Eigen::Index column(std::size_t ray) const { return static_cast<Eigen::Index>(ray) * (1 + scene_.layers()); }
+
+  void shade_view(const Eigen::Vector3d& origin, const Eigen::Vector3d& direction);
+  void shade_surface(const Vertex& vertex, int depth);
+  void shade_path(Vertex vertex, int depth);
+  void shade_occlusion(const Vertex& vertex);
   FirstSurface first_surface(const Vertex& vertex);
   Vertex make_vertex(const SurfaceHit& hit, const Eigen::Vector3d& direction);
   void set_reflectance(const SurfaceHit& hit, BandValues& reflectance) const;
-  void shade_surface(const Vertex& vertex, int depth, PathSampler& sampler);
-  void shade_path(Vertex vertex, int depth, PathSampler& sampler);
+  PathSampler& sampler() { return samplers_[ray_]; }
+
   bool bends(const Eigen::Vector3d& origin, const Eigen::Vector3d& direction, double distance) const;
   double bands_per_followed(int depth) const;
-  std::vector<BentWay> follow_ways(const Eigen::Vector3d& origin, const Eigen::Vector3d& direction, int depth,
-                                   const PathSampler& sampler) const;
-  std::optional<FirstSurface> shade_bent(const Eigen::Vector3d& origin, const Eigen::Vector3d& direction, int depth,
-                                         double weight, bool show_background, PathSampler& sampler);
-  void add_bent_light(const Vertex& vertex, const Eigen::Vector3d& wi, const Eigen::Vector3d& start, int depth,
-                      const PathSampler& sampler);
-  void add_landed_light(const Vertex& vertex, int depth);
-  void add_photons(const Vertex& vertex, int depth, PathSampler sampler);
-  void add_landed(int depth, int light);
-  void add_direct_light(const Vertex& vertex, int depth, PathSampler& sampler);
+  void wait(const Eigen::Vector3d& origin, const Eigen::Vector3d& direction, const BandValues& throughput, int depth,
+            double weight, bool seeks_light, const PhotonRivalry& rivalry);
+  void continue_path(const WaitingRay& waiting);
+  void continue_band(const WaitingRay& waiting, std::size_t number);
+  void see_bent(const WaitingRay& waiting);
+  void bring_light(const WaitingRay& waiting);
+
+  void add_direct_light(const Vertex& vertex, int depth);
+  void seek_bent_light(const Vertex& vertex, const Eigen::Vector3d& wi, const Eigen::Vector3d& start, int depth);
   bool is_shadowed(const Eigen::Vector3d& start, const Eigen::Vector3d& point) const;
+  void add_landed_light(const Vertex& vertex, int depth);
+  void add_photons(const Vertex& vertex, int depth);
+  const PhotonPass& photon_pass(int depth);
+  PhotonRivalry rivalry(const Vertex& vertex, const Eigen::Vector3d& direction, double pdf, int depth);
+  double share_beside_photons(const WaitingRay& waiting, const BentWay& way, const SurfaceHit& hit) const;
+  double share_of_photon(const Vertex& vertex, const LandedPhoton& photon, const Eigen::Vector3d& wi,
+                         double radius) const;
+  void add_landed(int depth, int light);
   void add_background(const Eigen::Vector3d& direction, double weight, int depth, bool disks = true);
   void add_emission(const SurfaceHit& hit, const Eigen::Vector3d& direction, double weight, int depth);
   template <class Density>
   double material_weight(double material_pdf, const Density& light_pdf) const;
-  void shade_occlusion(const Vertex& vertex, PathSampler& sampler);
 
   /// Where light comes from that is added: a light, or the background in a direction.
   struct LightSource {
@@ -151,20 +226,27 @@ class RayShader {
 
   const ShadedScene& scene_;
   const ShadingSettings settings_;
-  BandValues radiance_, throughput_, reflectance_, weight_, contribution_;
-  std::vector<BandValues> layers_;
+  std::vector<PathSampler> samplers_;
+  std::vector<RayView> views_;
+  Eigen::ArrayXXd light_;  ///< A column of bands for each ray's radiance and for each of its layers.
+  bool show_background_ = true;
+  Wave waiting_, followed_;
 
-  /// The light of photons, for each group and for all others; and one of the lights that it comes from, or −1.
+  // Of the path that is followed.
+  std::size_t ray_ = 0;  ///< Number of the camera's ray.
+  int band_ = -1;        ///< Its only band, after it was bent; −1: all bands.
+  double stands_ = 1;    ///< The number of bands for which `band_` stands.
+  BandValues throughput_, reflectance_, weight_, contribution_;
+
+  /// The light of photons, for each group and for all others, of area lights apart; and one of the lights that it comes
+  /// from, or −1.
   struct PhotonSum {
     BandValues scattered;
     int light = -1;
   };
   std::vector<PhotonSum> photon_sums_;
-  LightSample light_;
+  LightSample light_sample_;
   std::vector<float> background_, of_one_light_;
-  std::optional<BentView> bent_view_;
-  int band_ = -1;          ///< The only band of the path, after it was bent; −1: all bands.
-  double share_ = 1;       ///< The number of bands for which `band_` stands.
   bool aims_bent_ = true;  ///< Whether sampled lights are looked for through the region.
 };
 

@@ -133,11 +133,11 @@ void describe(LightSourceDescription& light, Visitor& visit) {
   visit("file", light.file, "environment: a latitude-longitude picture");
   visit("rotation", light.rotation, "environment: rotation about +z, degrees");
   visit("caustic", light.caustic,
-        "directional, point: how integrator `scene` finds light that comes through the field to objects");
+        "directional, point, area: how integrator `scene` finds light that comes through the field to objects");
   visit("group", light.group, "name of a layer of the .exr that has the light of all lights of this group");
   visit.only_for({"direction"}, "kind", light.kind, {LightKind::directional, LightKind::area});
   visit.only_for({"angle"}, "kind", light.kind, {LightKind::directional});
-  visit.only_for({"caustic"}, "kind", light.kind, {LightKind::directional, LightKind::point});
+  visit.only_for({"caustic"}, "kind", light.kind, {LightKind::directional, LightKind::point, LightKind::area});
   visit.only_for({"center", "size"}, "kind", light.kind, {LightKind::area});
   visit.only_for({"position"}, "kind", light.kind, {LightKind::point});
   visit.only_for({"file", "rotation"}, "kind", light.kind, {LightKind::environment});

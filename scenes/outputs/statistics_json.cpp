@@ -1,6 +1,7 @@
 #include "scenes/outputs/statistics_json.h"
 
 #include <cstdint>
+#include <numeric>
 
 #include <nlohmann/json.hpp>
 #include <sys/resource.h>
@@ -19,6 +20,31 @@ Json balance(const std::array<Number, ray_end_count>& ends) {
   Json stopped;
   for (const RayEnd end : {RayEnd::obstacle, RayEnd::step_limit, RayEnd::degenerate}) stopped[to_string(end)] = of(end);
   return {{"emitted", emitted}, {"deposited", of(RayEnd::plate)}, {"missed", of(RayEnd::missed)}, {"stopped", stopped}};
+}
+
+/// Photons of a whole scene.
+Json photon_counts(const PhotonCounts& counts) {
+  const auto of = [&](PhotonEnd end) { return counts[static_cast<std::size_t>(end)]; };
+  return {{"emitted", std::accumulate(counts.begin(), counts.end(), std::uint64_t{0})},
+          {"before", of(PhotonEnd::before)},
+          {"landed", of(PhotonEnd::landed)},
+          {"escaped", of(PhotonEnd::escaped)},
+          {"stopped", of(PhotonEnd::stopped)}};
+}
+
+void add_whole(const WholeStatistics& whole, Json& json) {
+  PhotonCounts all{};
+  Json passes = Json::array();
+  for (const PhotonCounts& counts : whole.photons) {
+    for (std::size_t end = 0; end < all.size(); ++end) all[end] += counts[end];
+    passes.push_back(photon_counts(counts));
+  }
+  json["bent_rays"] = json["photons"];
+  json["samples"] = whole.samples;
+  json["photons"] = photon_counts(all);
+  json["photons"]["passes"] = passes;
+  json.erase("positions");
+  json.erase("channels");
 }
 
 std::uint64_t peak_memory_bytes() {
@@ -74,6 +100,7 @@ std::string statistics_json(const Scene& scene, const Statistics& statistics, do
                {"channels", channels}};
   if (statistics.error) json["error"] = *statistics.error;
   if (has_power) json["power"] = balance(power);
+  if (statistics.whole) add_whole(*statistics.whole, json);
   return json.dump(2) + "\n";
 }
 

@@ -16,12 +16,19 @@
 #include "renderer/film/photon_map.h"
 #include "renderer/film/spectral_image.h"
 #include "renderer/images/image.h"
+#include "renderer/shading/photon_counts.h"
 #include "volumes/grids/scalar_grid.h"
 
 namespace tensorray {
 
 struct Progress;
 struct Scene;
+
+/// The work of a whole scene.
+struct WholeStatistics {
+  std::uint64_t samples = 0;          ///< Of all pixels.
+  std::vector<PhotonCounts> photons;  ///< Of each pass, by their end.
+};
 
 struct Statistics {
   std::uint64_t positions = 0;  ///< Positions from which light was emitted.
@@ -30,7 +37,8 @@ struct Statistics {
   std::vector<double> channel_power;
   /// Power by channel and end, for a beam of irradiance 1; if rays of a channel differ in power. Empty otherwise.
   std::vector<std::array<double, ray_end_count>> power;
-  std::optional<double> error;  ///< Estimated relative error of the picture, if the scene bounds it.
+  std::optional<WholeStatistics> whole;  ///< Of the method scene, whose `ends` are those of all rays that bend.
+  std::optional<double> error;           ///< Estimated relative error of the picture, if the scene bounds it.
   std::uint64_t ray_steps = 0, tensor_samples = 0;
   double seconds_tracing = 0, seconds_density = 0, seconds_drawing = 0, seconds_color = 0;
 };

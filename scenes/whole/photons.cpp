@@ -12,6 +12,8 @@ namespace {
 
 using Eigen::Vector3d;
 
+constexpr double steepest_along = 0.5;   // Sine of the angle between a plate and light along it; fields turn light.
+constexpr double small_lamp = 0.4;       // Radians, seen from the volume: fields turn light by more.
 constexpr double photons_in_reach = 10;  // Of a band, within the automatic radius, where light is undisturbed.
 
 /// The direction in which light comes to a point; nothing if it is of a kind that does not land.
@@ -26,14 +28,28 @@ LightCaustic caustic_of(const Scene& scene, std::size_t light) {
   return light < lights.size() ? lights[light].caustic : LightCaustic::automatic;
 }
 
-/// Whether a plate reaches into the volume, and light meets its plane before the middle of the volume.
-bool is_early_within(const SceneObject& object, const TensorField& field, const Vector3d& direction) {
-  if (!object.plate) return false;
+/// Whether bent light may meet both sides of a plate, or a side that does not face the middle of the volume.
+/// @param light  Not the kind that does not land.
+bool has_light_on_both_sides(const Plate& plate, const TensorField& field, const Light& light) {
+  const Eigen::AlignedBox3d volume = field.world_box();
+  const Vector3d normal = plate.normal();
+  const double height = normal.dot(volume.center() - plate.center);
   Eigen::AlignedBox3d box;
-  for (const Vector3d& vertex : object.mesh().vertices) box.extend(vertex);
-  const Vector3d normal = object.plate->normal();
-  const double height = normal.dot(field.world_box().center() - object.plate->center);
-  return box.intersects(field.world_box()) && height * normal.dot(direction) > 0;
+  for (const Vector3d& vertex : rectangle_mesh(plate.center, plate.right, plate.up, plate.size).vertices)
+    box.extend(vertex);
+  const bool is_early = height * normal.dot(*direction_at(light, volume.center())) > 0;
+  if (box.intersects(volume) && is_early) return true;
+  const Vector3d direction = direction_at(light, plate.center)->normalized();
+  const double reach = normal.cwiseAbs().dot(volume.sizes()) / 2;  // Of the volume, on each side of its middle.
+  return std::abs(height) < reach && std::abs(normal.dot(direction)) < steepest_along;
+}
+
+/// Whether a lamp outside the volume is so small, as seen from there, that straight aim misses it.
+bool is_small(const AreaLight& lamp, const TensorField& field) {
+  Eigen::AlignedBox3d box;
+  for (const Vector3d& vertex : lamp.mesh.vertices) box.extend(vertex);
+  const double distance = (box.center() - field.world_box().center()).norm();
+  return !box.intersects(field.world_box()) && box.diagonal().norm() < small_lamp * distance;
 }
 
 /// The radius about which there are enough photons: by Cauchy, a convex body of area A has the mean silhouette A / 4.
@@ -50,12 +66,16 @@ PhotonPairs photon_pairs(const Scene& scene, const std::vector<Light>& lights, c
   PhotonPairs pairs(lights.size(), std::vector<bool>(objects.size(), false));
   if (settings.photons.per_pass == 0) return pairs;
   for (std::size_t i = 0; i < lights.size(); ++i) {
-    const auto direction = direction_at(lights[i], scene.field.world_box().center());
     const LightCaustic caustic = caustic_of(scene, i);
-    if (!direction || caustic == LightCaustic::map) continue;
+    if (const auto* area = std::get_if<AreaLight>(&lights[i])) {
+      const bool wanted = caustic == LightCaustic::photons || is_small(*area, scene.field);
+      pairs[i].assign(objects.size(), wanted);
+      continue;
+    }
+    if (!direction_at(lights[i], {}) || caustic == LightCaustic::map) continue;
     const bool always = caustic == LightCaustic::photons || settings.conserve == Conserve::radiance;
     for (std::size_t k = 0; k < objects.size(); ++k)
-      pairs[i][k] = always || is_early_within(objects[k], scene.field, *direction);
+      pairs[i][k] = always || (objects[k].plate && has_light_on_both_sides(*objects[k].plate, scene.field, lights[i]));
   }
   return pairs;
 }
@@ -64,7 +84,7 @@ TracedPhotons photons_of(const Scene& scene, const BendingRegion& region, const 
                          const std::vector<Light>& lights, const std::vector<SceneObject>& objects,
                          const PhotonPairs& pairs, const PhotonsDescription& description, int passes,
                          const Progress& progress) {
-  PhotonSettings settings;
+  PhotonTracerSettings settings;
   settings.per_pass = description.per_pass;
   if (settings.per_pass == 0) return {};
   settings.passes = passes;

@@ -14,14 +14,16 @@
 namespace tensorray {
 
 /// For each light, for each object (the surface of object i has the index i): whether photons are its light through the
-/// field. A light whose `caustic` is "auto" has photons where no flow map can be right: on plates within the volume
-/// that it meets before the middle, and on all objects where radiance is conserved, since a flow map keeps power.
+/// field. A light whose `caustic` is "auto" has photons where no flow map can be right, since it has the light of one
+/// side of a plate: on plates within the volume that it meets before the middle, and on plates along the light whose
+/// plane divides the volume. Where radiance is conserved, all objects have photons, since a flow map keeps power. An
+/// area light has photons beside other techniques; with "auto" if it is small.
 using PhotonPairs = std::vector<std::vector<bool>>;
 PhotonPairs photon_pairs(const Scene& scene, const std::vector<Light>& lights, const std::vector<SceneObject>& objects,
                          const WholeDescription& settings);
 
 /// @param passes  Of photons.
-/// @throw SceneError if a point light is within the volume; Cancelled.
+/// @throw SceneError if a point light or an area light is within the volume; Cancelled.
 TracedPhotons photons_of(const Scene& scene, const BendingRegion& region, const SurfaceScene& stage,
                          const std::vector<Light>& lights, const std::vector<SceneObject>& objects,
                          const PhotonPairs& pairs, const PhotonsDescription& description, int passes,

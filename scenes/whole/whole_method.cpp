@@ -124,6 +124,8 @@ PathTracerSettings whole_tracer_settings(const Scene& scene, const WholeScene& w
 
 void report(const FieldRegion& region, const WholeScene& whole, Render& result) {
   Statistics& statistics = result.statistics;
+  statistics.ray_steps = region.steps();
+  statistics.tensor_samples = region.tensor_samples();
   statistics.ends.assign(1, EndCounts{});
   for (int end = 0; end < ray_end_count; ++end) {
     statistics.ends[0][static_cast<std::size_t>(end)] = region.ways(static_cast<RayEnd>(end));
@@ -137,9 +139,14 @@ void report(const FieldRegion& region, const WholeScene& whole, Render& result) 
                     100.0 * static_cast<double>(region.limited()) / static_cast<double>(statistics.positions)));
 }
 
-void report(const PhotonCounts& counts, Render& result) {
-  const std::uint64_t stopped = counts[static_cast<std::size_t>(PhotonEnd::stopped)];
-  const std::uint64_t emitted = std::accumulate(counts.begin(), counts.end(), std::uint64_t{0});
+void report(const std::vector<PhotonCounts>& passes, Render& result) {
+  result.statistics.whole = WholeStatistics();
+  result.statistics.whole->photons = passes;
+  std::uint64_t stopped = 0, emitted = 0;
+  for (const PhotonCounts& counts : passes) {
+    stopped += counts[static_cast<std::size_t>(PhotonEnd::stopped)];
+    emitted += std::accumulate(counts.begin(), counts.end(), std::uint64_t{0});
+  }
   if (stopped * 1000 > emitted)
     result.warnings.push_back(fmt::format("{:.1f}% of the photons could not be followed; the picture lacks their light",
                                           100.0 * static_cast<double>(stopped) / static_cast<double>(emitted)));
@@ -187,10 +194,10 @@ Render LoadedWhole::render(const Scene& scene, const Progress& progress, RenderJ
     const PhotonPairs pairs = photon_pairs(scene, lights, objects, whole_.settings);
     photons = photons_of(scene, region, stage, lights, objects, pairs, whole_.settings.photons,
                          samples.max_samples / samples.first_samples, progress);
-    shaded.photons = &photons.passes;
-    report(photons.counts, result);
+    shaded.photons = &photons;
     shaded.landed = land_light(scene, lights, light, objects, whole_.settings.caustic, pairs, progress);
   }
+  report(photons.counts, result);
   result.statistics.seconds_tracing = seconds_since(start);
 
   start = Clock::now();
@@ -206,7 +213,9 @@ Render LoadedWhole::render(const Scene& scene, const Progress& progress, RenderJ
     return shown;
   });
   const PathTracerSettings settings = whole_tracer_settings(scene, whole_, result.statistics.seconds_tracing);
-  add_picture(render_surfaces(shaded, camera, settings, callbacks), result);
+  const SurfacePicture picture = render_surfaces(shaded, camera, settings, callbacks);
+  add_picture(picture, result);
+  for (const float count : picture.samples) result.statistics.whole->samples += static_cast<std::uint64_t>(count);
   report(region, whole_, result);
   result.statistics.seconds_drawing = seconds_since(start);
   return result;
@@ -240,7 +249,7 @@ class WholeMethod : public MethodWith<WholeDescription> {
 void WholeMethod::check_photons(const SceneDescription& scene, const PathTracingDescription& tracing,
                                 const SceneSource& source) const {
   const bool wanted = std::any_of(scene.lights.begin(), scene.lights.end(), [&](const LightSourceDescription& light) {
-    return light.caustic == LightCaustic::photons;
+    return light.caustic == LightCaustic::photons || light.kind == LightKind::area;
   });
   if (!wanted && settings().conserve == Conserve::power) return;
   const double passes = std::max(1, tracing.samples * bands_per_bounce(settings()) / tracing.bands);
@@ -258,6 +267,9 @@ void WholeMethod::check(SceneDescription& scene, const Json& json, const SceneSo
           fmt::format("`/objects/{}/paths` cannot have the `/integrator/style` \"lines\"; use \"tube\", "
                       "\"wire\" or \"ellipses\"",
                       i));
+  for (std::size_t i = 0; i < scene.lights.size(); ++i)
+    if (scene.lights[i].kind == LightKind::area && scene.lights[i].caustic == LightCaustic::map)
+      source.fail(fmt::format("`/lights/{}/caustic` of an `area` cannot be \"map\"; use \"photons\" or \"auto\"", i));
   if (tracing.bands % settings().bands_per_sample != 0)
     source.fail(fmt::format("`/integrator/bands_per_sample` must divide `/integrator/bands` ({}), but is {}",
                             tracing.bands, settings().bands_per_sample));

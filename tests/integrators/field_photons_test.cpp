@@ -50,7 +50,7 @@ std::vector<double> photons_on_floor(const TensorField& field, double strength, 
   view.conserve = conserve;
   view.flexibility = [strength](int, double) { return strength; };
   const FieldRegion region(field, geometry, view);
-  PhotonSettings settings;
+  PhotonTracerSettings settings;
   settings.per_pass = 60000;
   settings.radius = 0.01;
   settings.serves = [](int, std::uint32_t) { return true; };

@@ -42,7 +42,9 @@ void sample_entry(std::uint64_t index, Vector3d& position, Vector3d& direction) 
 
 BentWay follow(const FieldRegion& region, const Vector3d& position, const Vector3d& direction) {
   std::vector<BentWay> ways(1);
-  region.follow_back(position, direction, ways);
+  ways[0].position = position;
+  ways[0].direction = direction;
+  region.follow_back(ways);
   return ways[0];
 }
 

@@ -1,5 +1,6 @@
 // The method "scene": surfaces in light that a field bends, seen through the field.
 
+#include <algorithm>
 #include <cmath>
 #include <string>
 #include <utility>
@@ -198,9 +199,19 @@ TEST_F(WholeScene, TheLightOfPointsThroughTheFieldIsThatOfALamp) {
   write("scene.json", points);
   const Image forwards = picture({});
   write("scene.json", lamp);
-  const Image backwards = picture({}), other_law = picture({"integrator.conserve=radiance"});
+  const std::string none = "integrator.photons.per_pass=0";
+  const Image backwards = picture({none}), other_law = picture({none, "integrator.conserve=radiance"});
   EXPECT_GT(mean(forwards, "G"), 0.2);
   EXPECT_NEAR(mean(forwards, "G"), mean(backwards, "G"), 0.03 * mean(backwards, "G"));
+  // Photons beside the other ways to find the lamp: whatever law light follows.
+  std::vector<std::string> few{"integrator.photons.per_pass=1024", "integrator.max_samples=128",
+                               "integrator.min_samples=128"};
+  const Image photons = picture(few);
+  few.push_back("integrator.conserve=radiance");
+  const Image other_photons = picture(few);
+  EXPECT_NE(photons.pixels, backwards.pixels);
+  EXPECT_NEAR(mean(photons, "G"), mean(backwards, "G"), 0.03 * mean(backwards, "G"));
+  EXPECT_NEAR(mean(other_photons, "G"), mean(other_law, "G"), 0.03 * mean(other_law, "G"));
   EXPECT_GT(std::abs(mean(other_law, "G") / mean(backwards, "G") - 1), 0.1);
 }
 
@@ -267,6 +278,52 @@ TEST_F(WholeScene, AWeakFieldLightsPlatesWithinTheVolume) {
   EXPECT_EQ(picture(weak, "7").pixels, with.pixels);
 }
 
+/// A plate along the light in the lower half of the volume, and one below the volume. Light that hardly bends meets
+/// their outer sides; light that bends more meets the inner ones. A flow map has one side.
+TEST_F(WholeScene, PlatesAlongTheLightAreLitOnBothSides) {
+  for (const double z : {-1.5, -2.4}) {
+    std::vector<double> automatic, map;
+    for (const double side : {-1.0, 1.0}) {
+      std::vector<std::string> sets{
+          fmt::format(R"(objects=[{{"plate":{{"center":[0,0.35,{}],"normal":[0,1,0],"size":[1.4,0.6]}}}}])", z),
+          R"(lights=[{"kind":"directional","direction":[0,-0.1,-1]}])",
+          "integrator.max_samples=16",
+          "integrator.min_samples=16",
+          "integrator.max_depth=1",
+          fmt::format("camera.position=[0,{},{}]", 4 * side, z),
+          fmt::format("camera.target=[0,0.35,{}]", z)};
+      automatic.push_back(mean(picture(sets), "R"));
+      sets.push_back("lights.0.caustic=map");
+      map.push_back(mean(picture(sets), "R"));
+    }
+    for (const double each : automatic) EXPECT_GT(each, 4e-4) << z;
+    EXPECT_LT(std::min(map[0] / automatic[0], map[1] / automatic[1]), 0.1) << z;
+  }
+}
+
+TEST_F(WholeScene, StatisticsCountPhotonsAndBentRays) {
+  run_well({"render", "scene.json", "-q", "-o", "out.exr", "--stats", "stats.json", "--set",
+            R"(lights=[{"kind":"directional","direction":[0.1,0,-1],"caustic":"photons"}])", "--set",
+            "integrator.photons.per_pass=100", "--set", "integrator.max_samples=16"});
+  const auto stats = read_json("stats.json");
+  const auto& photons = stats["photons"];
+  const auto sum_of_ends = [](const auto& counts) {
+    std::uint64_t sum = 0;
+    for (const char* end : {"before", "landed", "escaped", "stopped"}) sum += counts[end].template get<std::uint64_t>();
+    return sum;
+  };
+  EXPECT_EQ(photons["emitted"], 4 * 100 * 16);
+  EXPECT_EQ(photons["emitted"], sum_of_ends(photons));
+  ASSERT_EQ(photons["passes"].size(), 4u);  // Of 4 samples each.
+  EXPECT_EQ(photons["passes"][1]["emitted"], 100 * 16);
+  EXPECT_GT(photons["passes"][1]["landed"], 0);
+  EXPECT_GE(stats["samples"], 4 * 40 * 32);
+  EXPECT_LE(stats["samples"], 16 * 40 * 32);
+  EXPECT_GT(stats["bent_rays"]["emitted"], 1000);
+  EXPECT_GT(stats["ray_steps"], stats["bent_rays"]["emitted"]);
+  EXPECT_GT(stats["tensor_samples"], 0);
+}
+
 TEST_F(WholeScene, SaysWhenPhotonsAreLost) {
   const auto errors = [&](const std::string& steps) {
     return run({"render", "scene.json", "-o", "out.exr", "--set",
@@ -318,7 +375,9 @@ TEST_F(WholeScene, RefusesWhatDoesNotFit) {
   expect_error("lights=[{\"kind\":\"point\",\"position\":[0,0,-0.9],\"caustic\":\"photons\"}]",
                "/lights`: the light is within the volume");
   expect_error("lights=[{\"kind\":\"point\",\"position\":[0,0,3],\"caustic\":\"none\"}]", "/lights/0/caustic");
-  expect_error("lights=[{\"kind\":\"area\",\"center\":[0,0,3],\"caustic\":\"map\"}]", "caustic");
+  expect_error("lights=[{\"kind\":\"area\",\"center\":[0,0,3],\"caustic\":\"map\"}]", "/lights/0/caustic");
+  expect_error("lights=[{\"kind\":\"area\",\"center\":[0,0,-0.9],\"caustic\":\"photons\"}]",
+               "/lights`: an area light with photons must be outside the volume");
   expect_error("integrator.photons.max_radius=0", "/integrator/photons/max_radius");
   expect_error("lights=[{\"kind\":\"constant\",\"group\":\"albedo\"}]", "/lights/0/group");
 }

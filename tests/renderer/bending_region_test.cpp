@@ -28,21 +28,20 @@ class TurningBall : public BendingRegion {
     return half > 0 && along + std::sqrt(half) > 1e-9 ? std::max(0.0, along - std::sqrt(half)) : INFINITY;
   }
 
-  void follow_back(const Vector3d& origin, const Vector3d& direction, std::vector<BentWay>& ways) const override {
+  void follow_back(std::vector<BentWay>& ways) const override {
     for (BentWay& way : ways) {
-      way.direction = Eigen::AngleAxisd(angle_ * (1 + way.band), Vector3d::UnitZ()) * direction;
-      const double along = entry(origin, direction);
-      way.position = origin + along * direction;
+      way.position += entry(way.position, way.direction) * way.direction;
+      way.direction = Eigen::AngleAxisd(angle_ * (1 + way.band), Vector3d::UnitZ()) * way.direction;
       way.arrives = true;
       way.gain = gain_;
     }
   }
 
   /// Light that passes the ball at its centre height turns back.
-  void follow_light(const Vector3d& origin, const Vector3d& direction, std::vector<BentWay>& ways) const override {
+  void follow_light(std::vector<BentWay>& ways) const override {
     for (BentWay& way : ways) {
-      way.direction = Eigen::AngleAxisd(-angle_ * (1 + way.band), Vector3d::UnitZ()) * direction;
-      way.position = origin + entry(origin, direction) * direction;
+      way.position += entry(way.position, way.direction) * way.direction;
+      way.direction = Eigen::AngleAxisd(-angle_ * (1 + way.band), Vector3d::UnitZ()) * way.direction;
       way.arrives = true;
     }
   }
@@ -100,9 +99,8 @@ Mean seen(const ShadedScene& scene, const ShadingSettings& settings, const Vecto
   RayShader shader(scene, settings);
   Mean mean;
   for (std::uint64_t i = 0; i < samples; ++i) {
-    PathSampler sampler{3, i, 0, 0};
-    shader.shade(from, (to - from).normalized(), true, sampler);
-    mean.add(shader.radiance().mean());
+    shader.shade({{from, (to - from).normalized(), {3, i, 0, 0}}}, true);
+    mean.add(shader.radiance(0).mean());
   }
   return mean;
 }
@@ -115,7 +113,6 @@ TEST(BendingRegionTest, AWhiteFloorInAWhiteSkyCannotBeSeen) {
   stage.scene.region = &ball;
   stage.scene.bands_per_view = 4;
   stage.scene.bands_per_bounce = 4;
-  RayShader shader(stage.scene, {});
   for (const Vector3d& to : {Vector3d(0, 0, 0), Vector3d(0.1, 0, -0.8), Vector3d(0.9, 0.4, -0.8)}) {
     const Mean mean = seen(stage.scene, {}, {0, -3, 1.5}, to, 4000);
     EXPECT_NEAR(mean.mean(), 1, 5 * mean.error() + 1e-9);
@@ -154,6 +151,41 @@ TEST(BendingRegionTest, BandsThatAreFollowedStandForAll) {
   }
   for (std::size_t i = 1; i < means.size(); ++i)
     EXPECT_NEAR(means[i].mean(), means[0].mean(), 4.5 * std::hypot(means[i].error(), means[0].error())) << i;
+}
+
+/// Rays that are shaded together are followed together, and see what each of them sees alone, bit for bit.
+TEST(BendingRegionTest, WhatARaySeesDoesNotDependOnTheOthers) {
+  Stage stage({lamp(), ConstantLight{even(0.2f)}});
+  const TurningBall ball(0.4, 1.5);
+  stage.scene.region = &ball;
+  stage.scene.bands_per_view = 2;
+  stage.scene.group_of_light = {0, 1};
+  stage.scene.groups = 2;
+  std::vector<ViewRay> rays;
+  for (std::uint64_t i = 0; i < 300; ++i) {
+    const Vector3d from(0.2, -3, 0.7),
+        to(0.006 * static_cast<double>(i) - 0.9, 0, 0.3 - 0.003 * static_cast<double>(i));
+    rays.push_back({from, (to - from).normalized(), {3, i / 4, static_cast<std::uint32_t>(i % 4), 0}});
+  }
+  RayShader together(stage.scene, {}), alone(stage.scene, {});
+  together.shade(rays, true);
+  int bent = 0;
+  for (std::size_t i = 0; i < rays.size(); ++i) {
+    alone.shade({rays[i]}, true);
+    EXPECT_TRUE((together.radiance(i) == alone.radiance(0)).all()) << i;
+    for (int group = 0; group < 2; ++group) EXPECT_TRUE((together.layer(i, group) == alone.layer(0, group)).all()) << i;
+    const RayView &view = together.view(i), &other = alone.view(0);
+    ASSERT_EQ(view.bent.has_value(), other.bent.has_value());
+    ASSERT_EQ(view.surface.has_value(), other.surface.has_value());
+    if (view.surface) {
+      EXPECT_EQ(view.surface->hit.position, other.surface->hit.position);
+    }
+    if (!view.bent) continue;
+    EXPECT_EQ(view.bent->deflection, other.bent->deflection);
+    ++bent;
+  }
+  EXPECT_GT(bent, 50);
+  EXPECT_LT(bent, 290);
 }
 
 /// A directional light reaches no surface through the region, because landed light has it; the camera still sees it.

@@ -99,9 +99,8 @@ Mean seen(const World& world, const ShadingSettings& settings, const Vector3d& f
   Mean mean;
   for (int i = 0; i < samples; ++i) {
     // Each ray has its own pixel, so that samples are independent and the error estimate is valid.
-    PathSampler sampler{11, static_cast<std::uint64_t>(i), 0, 0};
-    shader.shade(from, (to - from).normalized(), true, sampler);
-    mean.add(shader.radiance()[0]);
+    shader.shade({{from, (to - from).normalized(), {11, static_cast<std::uint64_t>(i), 0, 0}}}, true);
+    mean.add(shader.radiance(0)[0]);
   }
   return mean;
 }
@@ -263,12 +262,12 @@ TEST(ShadingNormalTest, SmoothSpheresHaveNoFringesAndDoNotLeak) {
     RayShader shader(world.scene, settings);
     for (int i = 0; i < 2000; ++i) {
       const double x = -1 + 2 * random_uniform(2, i, 0), z = -1 + 2 * random_uniform(2, i, 1);
-      PathSampler sampler;
-      const auto surface = shader.shade({x, -5, z}, {0, 1, 0}, false, sampler);
+      shader.shade({{{x, -5, z}, {0, 1, 0}, {}}}, false);
+      const auto& surface = shader.view(0).surface;
       if (!surface) continue;
       const double cosine = -surface->normal.dot(travels.normalized());
       EXPECT_LT(surface->normal.y(), 0);  // The viewer is above the surface.
-      EXPECT_NEAR(shader.radiance()[0] * pi, std::max(0.0, cosine), 1e-6) << x << " " << z;
+      EXPECT_NEAR(shader.radiance(0)[0] * pi, std::max(0.0, cosine), 1e-6) << x << " " << z;
     }
   }
 }

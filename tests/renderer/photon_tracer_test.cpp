@@ -2,6 +2,7 @@
 
 #include <cmath>
 #include <cstring>
+#include <numeric>
 
 #include <gtest/gtest.h>
 #include <tbb/global_control.h>
@@ -33,14 +34,11 @@ class ClearCube : public BendingRegion {
     return leaves > enters ? enters : INFINITY;
   }
 
-  void follow_back(const Vector3d& origin, const Vector3d& direction, std::vector<BentWay>& ways) const override {
-    follow_light(origin, direction, ways);
-  }
+  void follow_back(std::vector<BentWay>& ways) const override { follow_light(ways); }
 
-  void follow_light(const Vector3d& origin, const Vector3d& direction, std::vector<BentWay>& ways) const override {
+  void follow_light(std::vector<BentWay>& ways) const override {
     for (BentWay& way : ways) {
-      way.position = origin + entry(origin, direction) * direction;
-      way.direction = direction;
+      way.position += entry(way.position, way.direction) * way.direction;
       way.arrives = !stops_ || way.position.x() > 0;
       way.gain = gain_;
     }
@@ -67,8 +65,8 @@ SurfaceScene floor_at(double height, double size, bool roof = false) {
 
 DirectionalLight sun(const Vector3d& direction, double angle = 0) { return {direction, {2, 3}, angle}; }
 
-PhotonSettings settings_of(std::uint64_t per_pass, int passes = 1, double radius = 0.05) {
-  PhotonSettings settings;
+PhotonTracerSettings settings_of(std::uint64_t per_pass, int passes = 1, double radius = 0.05) {
+  PhotonTracerSettings settings;
   settings.per_pass = per_pass;
   settings.passes = passes;
   settings.radius = radius;
@@ -78,7 +76,7 @@ PhotonSettings settings_of(std::uint64_t per_pass, int passes = 1, double radius
 }
 
 TracedPhotons traced(const BendingRegion& region, const SurfaceScene& surfaces, const std::vector<Light>& lights,
-                     const PhotonSettings& settings) {
+                     const PhotonTracerSettings& settings) {
   return trace_photons(region, corners(), surfaces, lights, settings, {});
 }
 
@@ -111,7 +109,7 @@ TEST(PhotonTracerTest, TheSunsPowerIsThatOfTheSilhouette) {
   const Vector3d direction = Vector3d(0.4, 0.3, -1).normalized();
   const double silhouette = direction.cwiseAbs().sum();
   const TracedPhotons photons = traced(ClearCube(0.5), floor, {sun(3 * direction)}, settings_of(1000, 2));
-  EXPECT_EQ(photons.counts, (PhotonCounts{0, 2 * 1000 * bands, 0, 0}));
+  EXPECT_EQ(photons.counts, std::vector<PhotonCounts>(2, {0, 1000 * bands, 0, 0}));
   EXPECT_NEAR(power_in(photons, 0), 0.5 * 2 * silhouette, 1e-6);
   EXPECT_NEAR(power_in(photons, 1), 0.5 * 3 * silhouette, 1e-6);
 }
@@ -129,17 +127,17 @@ TEST(PhotonTracerTest, APointsPowerIsThatOfItsSolidAngle) {
 TEST(PhotonTracerTest, EveryPhotonEnds) {
   const TracedPhotons photons =
       traced(ClearCube(1, true), floor_at(-0.8, 0.5, true), {sun({0, 0, -1})}, settings_of(4000, 3));
-  std::uint64_t sum = 0;
-  for (const std::uint64_t count : photons.counts) sum += count;
-  EXPECT_EQ(sum, 3u * 4000 * bands);
+  ASSERT_EQ(photons.counts.size(), 3u);
+  for (const PhotonCounts& counts : photons.counts)
+    EXPECT_EQ(std::accumulate(counts.begin(), counts.end(), std::uint64_t{0}), 4000u * bands);
   const auto part = [&](PhotonEnd end) {
-    return static_cast<double>(photons.counts[static_cast<std::size_t>(end)]) / static_cast<double>(sum);
+    return static_cast<double>(photons.counts[0][static_cast<std::size_t>(end)]) / (4000.0 * bands);
   };
   EXPECT_NEAR(part(PhotonEnd::before), 0.5, 0.02);  // The roof, at x > 0; the rest is stopped.
   EXPECT_NEAR(part(PhotonEnd::stopped), 0.5, 0.02);
   const TracedPhotons open = traced(ClearCube(), floor_at(-0.8, 0.5), {sun({0, 0, -1})}, settings_of(4000));
-  EXPECT_NEAR(static_cast<double>(open.counts[1]) / (4000.0 * bands), 0.25, 0.01);
-  EXPECT_NEAR(static_cast<double>(open.counts[2]) / (4000.0 * bands), 0.75, 0.01);
+  EXPECT_NEAR(static_cast<double>(open.counts[0][1]) / (4000.0 * bands), 0.25, 0.01);
+  EXPECT_NEAR(static_cast<double>(open.counts[0][2]) / (4000.0 * bands), 0.75, 0.01);
 }
 
 /// A region that bends nothing: photons give the irradiance of straight light, within the region and behind it.
@@ -166,7 +164,7 @@ TEST(PhotonTracerTest, StraightLightHasItsClosedForm) {
 /// The light of a small plate is that of the photons that land on it, in spite of the radius.
 TEST(PhotonTracerTest, PlatesKeepTheirLightAtTheirEdges) {
   const SurfaceScene floor = floor_at(-0.8, 0.5);
-  PhotonSettings settings = settings_of(3000, 4, 0.12);
+  PhotonTracerSettings settings = settings_of(3000, 4, 0.12);
   const auto mean_on_plate = [&] {
     const TracedPhotons photons = traced(ClearCube(), floor, {sun({0, 0, -1})}, settings);
     Mean mean;
@@ -197,14 +195,14 @@ TEST(PhotonTracerTest, ShadingIsThatOfStraightLight) {
   const TracedPhotons photons = traced(cube, floor, lights, settings_of(4000, 16, 0.1));
   ShadedScene straight{floor, materials, sampler, colors}, bent = straight;
   bent.region = &cube;
-  bent.photons = &photons.passes;
+  bent.photons = &photons;
   const auto mean_of = [&](const ShadedScene& scene, double x) {
     RayShader shader(scene, {});
     Mean mean;
     for (std::uint32_t i = 0; i < 16 * 8; ++i) {
-      PathSampler numbers{3, 7, i, 0};
-      shader.shade({x, -3, 1}, (Vector3d(x, 0.05, -0.8) - Vector3d(x, -3, 1)).normalized(), true, numbers);
-      mean.add(shader.radiance()[1]);
+      const Vector3d from(x, -3, 1);
+      shader.shade({{from, (Vector3d(x, 0.05, -0.8) - from).normalized(), {3, 7, i, 0}}}, true);
+      mean.add(shader.radiance(0)[1]);
     }
     return mean;
   };
