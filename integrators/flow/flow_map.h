@@ -122,7 +122,7 @@ inline bool jumps(const FlowTriangle& triangle, const Eigen::Vector2d& a, const 
 /// √n times as large. Squares whose light falls beside the plate stay as they are.
 ///
 /// In a range, each position first sends light at 5 of the 33 nodes, or at 3 where the positions beside it agree in
-/// what lies between. Where these are smooth, so that an error of more than 1/200 of the tolerance is unlikely,
+/// what lies between. Where these are smooth, so that an error of more than 1/300 of the tolerance is unlikely,
 /// the others are predicted (node_prediction.h); where not, more nodes are traced, up to all, in each quarter of the
 /// range on its own. (At a caustic a small error of the landing is a great one of the colour.)
 ///

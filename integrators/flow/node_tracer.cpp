@@ -12,7 +12,7 @@
 namespace tensorray {
 namespace {
 
-constexpr double node_part = 200;          // Landings are predicted to within this part of the tolerance.
+constexpr double node_part = 300;          // Landings are predicted to within this part of the tolerance.
 constexpr std::size_t first_step = 8;      // 5 nodes come first, ...
 constexpr std::size_t coarsest_step = 16;  // ... or 3, where the parents agree in what is between them.
 constexpr double off_surface = 1e-4;  // Distance, in sizes of a body, at which it is looked for about its own points.
