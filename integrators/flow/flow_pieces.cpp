@@ -25,6 +25,7 @@ double movement(const FlowMap& map, std::size_t position) {
     if (map.ends[i] != map.ends[first]) return std::numeric_limits<double>::infinity();
   if (map.nodes == 1 || map.ends[first] != RayEnd::plate) return 0;
   const Eigen::Vector2f a = map.landings[first], c = map.landings[last];
+  // In the middle, where there may be no node.
   const Eigen::Vector2f b = (map.landings[(first + last) / 2] + map.landings[(first + last + 1) / 2]) / 2;
   const float fastest = std::max((4 * b - 3 * a - c).norm(), (3 * c - 4 * b + a).norm());  // At the ends.
   return fastest / static_cast<float>(map.nodes - 1);

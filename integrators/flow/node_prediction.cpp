@@ -68,13 +68,18 @@ Eigen::Vector2f missed(const Eigen::Vector2f* landings, std::size_t step, std::s
   return landings[node] - polynomials(step).at(landings, node);
 }
 
+/// Whether every `step`-th node from `first` to `last` has one face.
+bool is_one_face(std::size_t first, std::size_t last, std::size_t step, const ExitFaces& faces) {
+  for (std::size_t node = first + step; node <= last; node += step)
+    if (faces[node] != faces[first]) return false;
+  return true;
+}
+
 /// Whether the nodes from which a quarter's are predicted have one face.
 bool is_one_face(std::size_t quarter, std::size_t step, const ExitFaces& faces) {
   const Polynomials& all = polynomials(step);
   const std::size_t first = all.stencils[first_of(quarter) + 1].first, last = all.stencils[last_of(quarter) - 1].first;
-  for (std::size_t node = first + step; node < last + all.count * step; node += step)
-    if (faces[node] != faces[first]) return false;
-  return true;
+  return is_one_face(first, last + (all.count - 1) * step, step, faces);
 }
 
 }  // namespace
@@ -129,14 +134,15 @@ bool NodePrediction::parents_agree(std::size_t quarter, std::size_t step, float 
   return true;
 }
 
-bool NodePrediction::is_smooth(std::size_t quarter, std::size_t step, float tolerance) const {
-  const std::size_t coarse = 2 * step;
+bool NodePrediction::is_smooth(std::size_t quarter, std::size_t step, float tolerance, const ExitFaces& faces) const {
+  const std::size_t coarse = 2 * step, reach = (polynomials(coarse).count - 1) * coarse;
   const float within = (step == quarter_nodes ? most_of_five : most) * tolerance;
   for (std::size_t node = step; node < range_nodes; node += coarse) {
     const bool is_within = overlaps(node - step, node + step, quarter);
     if (!is_within && !overlaps(node - std::min(node, 3 * step), node + 3 * step, quarter)) continue;
     if (!matters(node - step, step) && !matters(node, step)) continue;
     const Stencil& stencil = polynomials(coarse).stencils[node];
+    if (!is_within && !is_one_face(stencil.first, stencil.first + reach, coarse, faces)) continue;
     for (std::size_t i = 0; i < polynomials(coarse).count; ++i)
       if (!landed(stencil.first + i * coarse)) return false;
     const float allowed = is_within ? within : beside_quarter * within;
@@ -189,7 +195,8 @@ bool NodePrediction::predict(std::size_t step, float tolerance, ExitFaces& faces
     if (is_predicted_[quarter] || !is_one_face(quarter, step, faces)) continue;
     beside_parents[quarter] = is_smooth_beside_parents(quarter, step, tolerance);
     // Three nodes do not tell by themselves how smooth landings are.
-    is_ready[quarter] = beside_parents[quarter] || (step <= quarter_nodes && is_smooth(quarter, step, tolerance));
+    is_ready[quarter] =
+        beside_parents[quarter] || (step <= quarter_nodes && is_smooth(quarter, step, tolerance, faces));
   }
   const auto is_true = [](bool each) { return each; };
   if (step > quarter_nodes && !std::all_of(is_ready.begin(), is_ready.end(), is_true)) return false;

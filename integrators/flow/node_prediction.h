@@ -41,8 +41,8 @@ class NodePrediction {
 
   /// Sets the nodes that are not traced in each quarter where they can be predicted to within `tolerance`, pixels,
   /// wherever light may fall on the plate. No traced node of the quarter may be farther from what every second one
-  /// predicts, and none beside it by a few times that. Where landings are smooth, untraced nodes are then nearer by
-  /// far. They are not smooth where light of the nodes leaves the volume through different faces.
+  /// predicts, and none beside it, of the same face, by a few times that. Where landings are smooth, untraced nodes are
+  /// then nearer by far. They are not smooth where light of the nodes leaves the volume through different faces.
   /// @param faces  Of the nodes that are known; sets those of the others.
   /// @return Whether all nodes are known.
   bool predict(std::size_t step, float tolerance, ExitFaces& faces);
@@ -54,7 +54,7 @@ class NodePrediction {
   bool landed(std::size_t node) const { return ends_[node] == RayEnd::plate; }
   bool is_on_plate(std::size_t node) const;
   bool matters(std::size_t node, std::size_t step) const;
-  bool is_smooth(std::size_t quarter, std::size_t step, float tolerance) const;
+  bool is_smooth(std::size_t quarter, std::size_t step, float tolerance, const ExitFaces& faces) const;
   bool parents_agree(std::size_t quarter, std::size_t step, float tolerance) const;
   bool is_smooth_beside_parents(std::size_t quarter, std::size_t step, float tolerance) const;
   Eigen::Vector2f between(std::size_t node, std::size_t step) const;

@@ -33,12 +33,6 @@ struct Interpolation {
   bool strict;  // Whether no error is allowed, so that the search ends soon after the first one.
 };
 
-/// The point that interpolation misses most, and the square of its error.
-struct Missed {
-  float error;
-  std::size_t point;
-};
-
 }  // namespace
 }  // namespace tensorray
 #endif
@@ -92,8 +86,9 @@ struct Piece {
   }
 };
 
-/// Of the points between i and j, the one that interpolation between these misses most; of several, the first.
-Missed most_missed(const Interpolation& path, std::size_t i, std::size_t j) {
+/// Of the points between i and j, the one that interpolation between these misses most; of several, the first. The
+/// error is its square.
+Worst most_missed(const Interpolation& path, std::size_t i, std::size_t j) {
   const Floats d;
   const Ints ints;
   const Piece piece{path, i, j, 1 / ((path.lengths[j] - path.lengths[i]) + (path.more[j] - path.more[i]))};
@@ -167,8 +162,7 @@ std::vector<std::size_t> thinned(const PathSamples& samples, double tolerance, d
   }
   return thinned(samples.count, [&](std::size_t first, std::size_t last) -> Worst {
     if (last - first < 2) return {};
-    const Missed missed = HWY_DYNAMIC_DISPATCH(most_missed)(path, first, last);
-    return {missed.error, missed.point};
+    return HWY_DYNAMIC_DISPATCH(most_missed)(path, first, last);
   });
 }
 
