@@ -61,7 +61,7 @@ struct Flight {
   packets::KernelRays kernel;
   std::vector<std::size_t> numbers;           // Number, in the batch, of each ray of the kernel.
   std::vector<Travelled> travelled;           // State of each ray before the kernel.
-  std::vector<std::vector<StepPoint>> steps;  // Of each ray of the kernel, for its track.
+  std::vector<std::vector<StepPoint>> steps;  // Of each ray of the kernel, if only tracks are recorded.
 };
 
 Eigen::Vector3d to_vector(const std::array<float, 3>& v) { return {v[0], v[1], v[2]}; }
@@ -174,7 +174,7 @@ void approach(const TensorField& field, const BendingSettings& settings, RayBatc
 /// Says where the kernel records the steps of its rays.
 void record_steps(const Recordings& recordings, Flight& flight) {
   if (!recordings) return;
-  flight.steps.resize(recordings.tracks ? flight.numbers.size() : 0);
+  if (!recordings.rays) flight.steps.resize(flight.numbers.size());
   for (std::size_t i = 0; i < flight.numbers.size(); ++i)
     flight.kernel.points.push_back(recordings.rays ? &(*recordings.rays)[flight.numbers[i]].steps : &flight.steps[i]);
 }
@@ -202,7 +202,7 @@ RayEnd finish(const TensorField& field, const Flight& flight, std::size_t i, dou
   Travelled travelled = flight.travelled[i];
   travelled.length = ray.length;
   travelled.steps = ray.steps;
-  if (recordings.tracks) add_steps(field, flight.steps[i], (*recordings.tracks)[number]);
+  if (recordings.tracks) add_steps(field, *flight.kernel.points[i], (*recordings.tracks)[number]);
   tracer.take_over(state_of<N>(field, flight.kernel, i), strength, travelled, recordings.behind(number));
   if (ray.axis >= 0) {
     if (tracer.state().direction().isZero()) return RayEnd::degenerate;
