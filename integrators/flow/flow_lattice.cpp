@@ -1,0 +1,51 @@
+#include "integrators/flow/flow_lattice.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace tensorray {
+namespace {
+
+constexpr int most_columns = 1 << 12;  // Number of first squares along a side.
+
+bool is_parallelogram(const std::vector<Eigen::Vector2d>& polygon) {
+  if (polygon.size() != 4) return false;
+  const Eigen::Vector2d skew = polygon[0] - polygon[1] + polygon[2] - polygon[3];
+  return skew.norm() < 1e-9 * (polygon[2] - polygon[0]).norm();
+}
+
+}  // namespace
+
+std::vector<Patch> patches_of(const std::vector<Eigen::Vector2d>& polygon, double square_size) {
+  std::vector<Patch> patches;
+  const std::size_t n = polygon.size();
+  if (is_parallelogram(polygon)) {
+    patches.push_back({{polygon[0], polygon[1], polygon[2], polygon[3]}});
+  } else {
+    Eigen::Vector2d center(0, 0);
+    for (const Eigen::Vector2d& corner : polygon) center += corner / static_cast<double>(n);
+    for (std::size_t i = 0; i < n; ++i) {
+      const Eigen::Vector2d &corner = polygon[i], &next = polygon[(i + 1) % n], &last = polygon[(i + n - 1) % n];
+      patches.push_back({{(last + corner) / 2, corner, (corner + next) / 2, center}});
+    }
+  }
+  for (Patch& patch : patches) {
+    const auto count = [&](int a, int b, int c, int d) {
+      const double length =
+          std::max((patch.corners[b] - patch.corners[a]).norm(), (patch.corners[d] - patch.corners[c]).norm());
+      return static_cast<int>(std::clamp(std::ceil(length / square_size), 1.0, double{most_columns}));
+    };
+    patch.columns = count(0, 1, 3, 2);
+    patch.rows = count(1, 2, 0, 3);
+  }
+  return patches;
+}
+
+bool FlowLattice::is_on_border(const Square& square) const {
+  const Patch& patch = patches[square.patch];
+  const std::uint32_t side = side_of(square), right = static_cast<std::uint32_t>(patch.columns) << levels,
+                      top = static_cast<std::uint32_t>(patch.rows) << levels;
+  return square.x == 0 || square.y == 0 || square.x + side == right || square.y + side == top;
+}
+
+}  // namespace tensorray
