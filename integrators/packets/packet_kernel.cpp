@@ -442,6 +442,26 @@ HWY_EXPORT(vector_lanes);
 
 namespace {
 
+bool is_zen4() {
+#if defined(__x86_64__) && defined(__GNUC__)
+  __builtin_cpu_init();
+  return __builtin_cpu_is("amd") && __builtin_cpu_supports("avx512f") &&
+         !__builtin_cpu_supports("avx512vp2intersect");  // Zen 5 has it.
+#else
+  return false;
+#endif
+}
+
+/// Zen 4 does the operations of AVX-512 in two halves, and waits longer for loads into one lane after the other: the
+/// kernel, of all code with vectors, is faster with AVX2 there.
+bool prefers_avx2 = is_zen4();
+
+#if HWY_TARGETS & HWY_AVX2
+#define KERNEL_DISPATCH(function) (prefers_avx2 ? &N_AVX2::function : &HWY_DYNAMIC_DISPATCH(function))
+#else
+#define KERNEL_DISPATCH(function) HWY_DYNAMIC_DISPATCH(function)
+#endif
+
 #if defined(__SSE__)
 /// Denormal numbers count as zero during the lifetime of this object, because arithmetic with them is many times
 /// slower.
@@ -464,32 +484,16 @@ struct WithoutDenormals {};
 std::uint64_t run(const TensorField& field, const KernelSettings& settings, KernelRays& batch) {
   const PacketMedium medium(field, settings);
   [[maybe_unused]] const WithoutDenormals guard;
-  return HWY_DYNAMIC_DISPATCH(trace)(medium, batch);
+  return KERNEL_DISPATCH(trace)(medium, batch);
 }
 
 namespace {
 
-/// Instruction sets with which the kernel is slower than with narrower vectors. Zen 4 does the operations of AVX-512 in
-/// two halves, and waits longer for loads into one lane after the other.
-std::int64_t slow_targets() {
-#if defined(__x86_64__) && defined(__GNUC__)
-  __builtin_cpu_init();
-  const bool is_zen4 = __builtin_cpu_is("amd") && __builtin_cpu_supports("avx512f") &&
-                       !__builtin_cpu_supports("avx512vp2intersect");  // Zen 5 has it.
-  return is_zen4 ? HWY_AVX3 : 0;
-#else
-  return 0;
-#endif
-}
-
-/// The processor's instruction sets, before any is disabled.
+/// The processor's instruction sets.
 const std::vector<std::int64_t>& targets() {
   static const std::vector<std::int64_t> all = hwy::SupportedAndGeneratedTargets();
   return all;
 }
-
-/// Selects an instruction set before any ray is traced.
-[[maybe_unused]] const bool is_selected = (use_instruction_set(""), true);
 
 }  // namespace
 
@@ -504,11 +508,11 @@ void use_instruction_set(const std::string& name) {
                                   [&](std::int64_t target) { return name == hwy::TargetName(target); });
   if (found == targets().end() && !name.empty())
     throw std::invalid_argument("this processor has no instruction set \"" + name + "\"");
-  hwy::DisableTargets(name.empty() ? slow_targets() : 0);
+  prefers_avx2 = name.empty() && is_zen4();
   hwy::SetSupportedTargetsForTest(name.empty() ? 0 : *found);
 }
 
-int lane_count() { return HWY_DYNAMIC_DISPATCH(vector_lanes)(); }
+int lane_count() { return KERNEL_DISPATCH(vector_lanes)(); }
 
 }  // namespace tensorray::packets
 #endif

@@ -84,7 +84,6 @@ double rate_of_chains(const Run& run, double seconds) {
 
 std::vector<VectorRate> vector_rates(double seconds) {
   std::vector<VectorRate> rates;
-  hwy::DisableTargets(0);  // Also those which the kernel uses only on request.
   for (const std::int64_t target : hwy::SupportedAndGeneratedTargets()) {
     hwy::SetSupportedTargetsForTest(target);
     hwy::GetChosenTarget().DeInit();
