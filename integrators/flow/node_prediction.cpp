@@ -6,11 +6,7 @@ namespace tensorray {
 namespace {
 
 constexpr std::size_t quarters = 4, quarter_nodes = (range_nodes - 1) / quarters;
-// What a traced node may miss, in tolerances. Half of the distance makes it a sixteenth where landings are smooth.
-constexpr float most = 4;
-constexpr float most_beside_parents = 2;
-constexpr float most_of_five = 1;    // Five nodes may be where they are predicted by chance in wild light, ...
-constexpr float beside_quarter = 4;  // ... but not those beside the quarter: these may miss so many times as much.
+constexpr float beside_quarter = 4;  // Nodes beside a quarter may miss so many times as much as its own.
 
 /// The first node of a quarter, and its last one, which is also the first one of the next quarter.
 std::size_t first_of(std::size_t quarter) { return quarter * quarter_nodes; }
@@ -136,7 +132,6 @@ bool NodePrediction::parents_agree(std::size_t quarter, std::size_t step, float 
 
 bool NodePrediction::is_smooth(std::size_t quarter, std::size_t step, float tolerance, const ExitFaces& faces) const {
   const std::size_t coarse = 2 * step, reach = (polynomials(coarse).count - 1) * coarse;
-  const float within = (step == quarter_nodes ? most_of_five : most) * tolerance;
   for (std::size_t node = step; node < range_nodes; node += coarse) {
     const bool is_within = overlaps(node - step, node + step, quarter);
     if (!is_within && !overlaps(node - std::min(node, 3 * step), node + 3 * step, quarter)) continue;
@@ -145,7 +140,7 @@ bool NodePrediction::is_smooth(std::size_t quarter, std::size_t step, float tole
     if (!is_within && !is_one_face(stencil.first, stencil.first + reach, coarse, faces)) continue;
     for (std::size_t i = 0; i < polynomials(coarse).count; ++i)
       if (!landed(stencil.first + i * coarse)) return false;
-    const float allowed = is_within ? within : beside_quarter * within;
+    const float allowed = is_within ? tolerance : beside_quarter * tolerance;
     if (!landed(node) || !(missed(landings_, coarse, node).norm() <= allowed)) return false;
   }
   return true;
@@ -158,7 +153,7 @@ bool NodePrediction::is_smooth_beside_parents(std::size_t quarter, std::size_t s
   for (std::size_t node = step; node < range_nodes; node += 2 * step) {
     if (!overlaps(node - step, node + step, quarter)) continue;
     const Eigen::Vector2f differs = missed(landings_, 2 * step, node) - missed(mean_.data(), 2 * step, node);
-    if (!(differs.norm() <= most_beside_parents * tolerance)) return false;
+    if (!(differs.norm() <= tolerance)) return false;
   }
   return true;
 }

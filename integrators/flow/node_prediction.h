@@ -40,8 +40,8 @@ class NodePrediction {
   bool parents_agree(std::size_t step, float tolerance) const;
 
   /// Sets the nodes that are not traced in each quarter where they can be predicted to within `tolerance`, pixels,
-  /// wherever light may fall on the plate. No traced node of the quarter may be farther from what every second one
-  /// predicts, and none beside it, of the same face, by a few times that. Where landings are smooth, untraced nodes are
+  /// wherever light may fall on the plate: no traced node of the quarter may be farther from what every second one
+  /// predicts, and none beside it, of the same face, four times as far. Where landings are smooth, untraced nodes are
   /// then nearer by far. They are not smooth where light of the nodes leaves the volume through different faces.
   /// @param faces  Of the nodes that are known; sets those of the others.
   /// @return Whether all nodes are known.
