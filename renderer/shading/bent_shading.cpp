@@ -10,6 +10,7 @@ namespace {
 using Eigen::Vector3d;
 
 constexpr std::uint32_t first_bent_dimension = 1u << 20;  ///< For wavelengths within their bands; one for each depth.
+constexpr double part_of_pixel = 0.2;                     ///< That the bent light of the camera may miss.
 
 }  // namespace
 
@@ -34,6 +35,7 @@ void RayShader::wait(const Vector3d& origin, const Vector3d& direction, const Ba
   places.dimension = first_bent_dimension + static_cast<std::uint32_t>(depth);
   BentWay way;
   way.place = places.next_1d();
+  if (depth == 0) way.tolerance = part_of_pixel * settings_.pixel_angle;
   way.position = origin;
   way.direction = direction;
   WaitingRay waiting;

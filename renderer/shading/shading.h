@@ -47,6 +47,9 @@ struct ShadingSettings {
   /// limited as if that of all bands were like it: the eye hardly sees some bands, and bright pixels of their colours
   /// would stay.
   double indirect_clamp = 10;
+  /// Radians; the size of a pixel as the camera sees it. Light of the camera may be bent with an error of a fifth of it
+  /// at most, so that not each band need be followed. 0: each is.
+  double pixel_angle = 0;
   /// World units; beyond it nothing hides the sky.
   double occlusion_distance = std::numeric_limits<double>::infinity();
 };
