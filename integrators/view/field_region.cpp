@@ -10,6 +10,10 @@ namespace tensorray {
 
 using Eigen::Vector3d;
 
+namespace {
+constexpr double face_thickness = 1e-3;  // Voxels: positions at the end of a ray have single precision.
+}  // namespace
+
 FieldRegion::FieldRegion(const TensorField& field, const Geometry& geometry, FieldViewSettings settings)
     : field_(field),
       geometry_(geometry),
@@ -36,8 +40,8 @@ double FieldRegion::entry(const Vector3d& origin, const Vector3d& direction) con
 
 /// @param sign   Of the flexibility: 1 for light, −1 for light that is followed back.
 /// @param gains  Whether the gain of a way is that along its ray; otherwise it is 1.
-/// @param rays   Set to the rays of the ways.
-void FieldRegion::follow(double sign, bool gains, RayBatch& rays, std::vector<BentWay>& ways) const {
+void FieldRegion::follow(double sign, bool gains, std::vector<BentWay>& ways) const {
+  RayBatch& rays = memory_.local();
   rays.clear();
   for (const BentWay& way : ways)
     rays.add(way.position, way.direction, sign * settings_.flexibility(way.band, way.place));
@@ -55,15 +59,18 @@ void FieldRegion::follow(double sign, bool gains, RayBatch& rays, std::vector<Be
     way.on_surface = end == RayEnd::obstacle;
     way.gain = gains && way.arrives ? std::exp(rays.radiance_change[i]) : 1;
     way.compression = std::exp(-sign * rays.radiance_change[i]);
+    if (sign < 0) ++ends_[static_cast<std::size_t>(end)];
   }
 }
 
 void FieldRegion::follow_back(std::vector<BentWay>& ways) const {
-  RayBatch& rays = memory_.local();
-  follow(-1, settings_.conserve == Conserve::power, rays, ways);
-  for (std::size_t i = 0; i < ways.size(); ++i) {
-    BentWay& way = ways[i];
-    ++ends_[static_cast<std::size_t>(rays.end[i])];
+  std::vector<BandGroup> groups;
+  if (geometry_.surfaces().obstacles.empty()) groups = interpolation_groups(ways);
+  if (groups.empty())
+    follow(-1, settings_.conserve == Conserve::power, ways);
+  else
+    follow_groups(std::move(groups), ways);
+  for (BentWay& way : ways) {
     if (way.arrives && settings_.most_gain > 0 && !(way.gain <= settings_.most_gain)) {
       way.gain = settings_.most_gain;
       ++limited_;
@@ -72,9 +79,65 @@ void FieldRegion::follow_back(std::vector<BentWay>& ways) const {
   }
 }
 
+/// Follows back the ways with these indices.
+void FieldRegion::follow_some(const std::vector<std::size_t>& which, std::vector<BentWay>& ways) const {
+  std::vector<BentWay> some;
+  for (const std::size_t i : which) some.push_back(ways[i]);
+  follow(-1, settings_.conserve == Conserve::power, some);
+  for (std::size_t k = 0; k < which.size(); ++k) ways[which[k]] = some[k];
+}
+
+/// Follows what must be followed in two calls: before and after the interpolation of groups is known to be good.
+void FieldRegion::follow_groups(std::vector<BandGroup> groups, std::vector<BentWay>& ways) const {
+  std::vector<std::size_t> wanted;
+  std::vector<Vector3d> starts;
+  std::size_t next = 0;
+  for (const BandGroup& group : groups) {
+    for (; next < group.first; ++next) wanted.push_back(next);
+    for (; next < group.first + group.count; ++next)
+      if (group.is_traced(next)) wanted.push_back(next);
+    starts.push_back(ways[group.first].position);
+  }
+  for (; next < ways.size(); ++next) wanted.push_back(next);
+  follow_some(wanted, ways);
+
+  wanted.clear();
+  for (std::size_t k = 0; k < groups.size(); ++k) {
+    const BandGroup& group = groups[k];
+    if (end_alike(group, ways) && is_predictable(group, ways, starts[k])) {
+      interpolate(group, ways);
+      for (std::size_t i = group.first; i < group.first + group.count; ++i)
+        ways[i].gain = settings_.conserve == Conserve::power ? ways[i].compression : 1;
+    } else {
+      for (std::size_t i = group.first; i < group.first + group.count; ++i)
+        if (!group.is_traced(i)) wanted.push_back(i);
+    }
+  }
+  follow_some(wanted, ways);
+}
+
+/// Whether the traced ways of a group leave the volume by one face of its box.
+bool FieldRegion::end_alike(const BandGroup& group, const std::vector<BentWay>& ways) const {
+  const int face = face_at(ways[group.check].position);
+  const auto leaves = [&](std::size_t i) {
+    return ways[i].arrives && !ways[i].on_surface && face_at(ways[i].position) == face;
+  };
+  return face >= 0 && leaves(group.check) && std::all_of(group.nodes.begin(), group.nodes.end(), leaves);
+}
+
+/// The number of the box's face on which a position lies; −1: none.
+int FieldRegion::face_at(const Vector3d& position) const {
+  const Vector3d at = field_.to_index() * position;
+  for (int axis = 0; axis < 3; ++axis) {
+    if (std::abs(at[axis] - field_.index_bounds().min()[axis]) < face_thickness) return 2 * axis;
+    if (std::abs(at[axis] - field_.index_bounds().max()[axis]) < face_thickness) return 2 * axis + 1;
+  }
+  return -1;
+}
+
 /// Where radiance stays, the power of a photon changes as the radiance of a photon of constant power, the other way.
 void FieldRegion::follow_light(std::vector<BentWay>& ways) const {
-  follow(1, settings_.conserve == Conserve::radiance, memory_.local(), ways);
+  follow(1, settings_.conserve == Conserve::radiance, ways);
   for (BentWay& way : ways) way.arrives = way.arrives && std::isfinite(way.gain);
 }
 

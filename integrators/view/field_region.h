@@ -1,15 +1,19 @@
 #pragma once
 /// @file integrators/view/field_region.h
-/// A tensor field as the viewer of a scene sees through it: light is followed backwards, which is Eq. 5 with −s.
+/// A tensor field as the viewer of a scene sees through it: light is followed backwards, which is Eq. 5 with −s. Ways
+/// with a tolerance are interpolated (band_interpolation.h) where the traced ones leave the volume by one face of its
+/// box, and no obstacle is within it.
 
 #include <array>
 #include <atomic>
 #include <cstdint>
 #include <functional>
+#include <vector>
 
 #include <tbb/enumerable_thread_specific.h>
 
 #include "integrators/bending/bending.h"
+#include "integrators/view/band_interpolation.h"
 #include "renderer/shading/bending_region.h"
 
 namespace tensorray {
@@ -43,12 +47,16 @@ class FieldRegion final : public BendingRegion {
   std::uint64_t tensor_samples() const { return tensor_samples_; }
   std::uint64_t steps() const { return steps_; }
 
-  /// Ways followed back so far, by their end; those that were limited.
+  /// Ways followed back so far, by their end, without those that were interpolated; those that were limited.
   std::uint64_t ways(RayEnd end) const { return ends_[static_cast<std::size_t>(end)]; }
   std::uint64_t limited() const { return limited_; }
 
  private:
-  void follow(double sign, bool gains, RayBatch& rays, std::vector<BentWay>& ways) const;
+  void follow(double sign, bool gains, std::vector<BentWay>& ways) const;
+  void follow_some(const std::vector<std::size_t>& which, std::vector<BentWay>& ways) const;
+  void follow_groups(std::vector<BandGroup> groups, std::vector<BentWay>& ways) const;
+  bool end_alike(const BandGroup& group, const std::vector<BentWay>& ways) const;
+  int face_at(const Eigen::Vector3d& position) const;
 
   const TensorField& field_;
   const Geometry& geometry_;

@@ -67,8 +67,15 @@ bool is_background(const Light& light) {
   return !std::holds_alternative<AreaLight>(light) && !std::holds_alternative<PointLight>(light);
 }
 
-void add(double factor, const std::vector<float>& values, std::vector<float>& sum) {
-  for (std::size_t i = 0; i < sum.size(); ++i) sum[i] += static_cast<float>(factor) * values[i];
+/// @param values  Of all bands. @param sum  Of those from `first_band` on.
+void add(double factor, const std::vector<float>& values, std::vector<float>& sum, std::ptrdiff_t first_band) {
+  const float* const of_band = values.data() + first_band;
+  for (std::size_t i = 0; i < sum.size(); ++i) sum[i] += static_cast<float>(factor) * of_band[i];
+}
+
+void set(const std::vector<float>& values, std::vector<float>& part, std::ptrdiff_t first_band, std::size_t count) {
+  const auto first = values.begin() + first_band;
+  part.assign(first, first + static_cast<std::ptrdiff_t>(count));
 }
 
 }  // namespace
@@ -141,20 +148,22 @@ LightSampler::Prepared LightSampler::prepare(Light& light, const std::vector<flo
 
 double LightSampler::choice_probability(int light) const { return choice_ ? choice_->probability(light) : 0; }
 
-bool LightSampler::sample(const Vector3d& point, double choice, const Vector2d& u, LightSample& sample) const {
+bool LightSampler::sample(const Vector3d& point, double choice, const Vector2d& u, LightSample& sample,
+                          BandRange bands) const {
   if (!choice_) return false;
   const Distribution1D::Sample chosen = choice_->sample(choice);
   const Light& light = lights_[chosen.cell];
-  if (std::holds_alternative<AreaLight>(light)) return sample_area(chosen.cell, point, chosen.within, u, sample);
+  if (std::holds_alternative<AreaLight>(light)) return sample_area(chosen.cell, point, chosen.within, u, sample, bands);
 
   sample.is_delta = !is_background(light);
   sample.light = sample.is_delta ? chosen.cell : -1;
-  if (const auto* lamp = std::get_if<PointLight>(&light)) return sample_point(*lamp, point, chosen.probability, sample);
+  if (const auto* lamp = std::get_if<PointLight>(&light))
+    return sample_point(*lamp, point, chosen.probability, sample, bands);
   const auto* directional = std::get_if<DirectionalLight>(&light);
   sample.distance = std::numeric_limits<double>::infinity();
   if (sample.is_delta) {
     sample.direction = -directional->direction;
-    sample.radiance = directional->irradiance;
+    set(directional->irradiance, sample.radiance, bands.first, size(bands));
     sample.pdf = chosen.probability;
     return true;
   }
@@ -162,24 +171,24 @@ bool LightSampler::sample(const Vector3d& point, double choice, const Vector2d& 
                          ? Vector3d(frame_about(-directional->direction) * square_to_cone(u, directional->angle))
                          : prepared_[chosen.cell].environment->sample(u);
   sample.pdf = background_pdf(sample.direction);
-  background(sample.direction, sample.radiance);
+  background(sample.direction, sample.radiance, true, -1, bands);
   return sample.pdf > 0;
 }
 
-bool LightSampler::sample_point(const PointLight& light, const Vector3d& point, double probability,
-                                LightSample& sample) const {
+bool LightSampler::sample_point(const PointLight& light, const Vector3d& point, double probability, LightSample& sample,
+                                BandRange bands) const {
   const Vector3d way = light.position - point;
   sample.distance = way.norm();
   if (!(sample.distance > 0)) return false;
   sample.direction = way / sample.distance;
-  sample.radiance.assign(bands_, 0);
-  add(1 / way.squaredNorm(), light.intensity, sample.radiance);
+  sample.radiance.assign(size(bands), 0);
+  add(1 / way.squaredNorm(), light.intensity, sample.radiance, bands.first);
   sample.pdf = probability;
   return true;
 }
 
-bool LightSampler::sample_area(int light, const Vector3d& point, double choice, const Vector2d& u,
-                               LightSample& sample) const {
+bool LightSampler::sample_area(int light, const Vector3d& point, double choice, const Vector2d& u, LightSample& sample,
+                               BandRange bands) const {
   const auto& area = std::get<AreaLight>(lights_[light]);
   const int triangle = prepared_[light].triangles->sample(choice).cell;
   const auto [a, b, c] = area.mesh.triangles[triangle];
@@ -188,7 +197,7 @@ bool LightSampler::sample_area(int light, const Vector3d& point, double choice, 
       weights.x() * area.mesh.vertices[a] + weights.y() * area.mesh.vertices[b] + weights.z() * area.mesh.vertices[c];
   sample.distance = (position - point).norm();
   sample.direction = (position - point) / sample.distance;
-  sample.radiance = area.radiance;
+  set(area.radiance, sample.radiance, bands.first, size(bands));
   sample.is_delta = false;
   sample.light = light;
   sample.pdf = area_pdf(light, point, position, triangle_normal(area.mesh, triangle).normalized());
@@ -209,17 +218,18 @@ const std::vector<float>* LightSampler::emitted(int light, const Vector3d& norma
   return normal.dot(direction) < 0 ? &area.radiance : nullptr;
 }
 
-void LightSampler::background(const Vector3d& direction, std::vector<float>& radiance, bool disks, int only) const {
-  radiance.assign(bands_, 0);
+void LightSampler::background(const Vector3d& direction, std::vector<float>& radiance, bool disks, int only,
+                              BandRange bands) const {
+  radiance.assign(size(bands), 0);
   for (std::size_t i = 0; i < lights_.size(); ++i) {
     if (!is_background(lights_[i]) || (only >= 0 && static_cast<std::size_t>(only) != i)) continue;
     if (const auto* sun = std::get_if<DirectionalLight>(&lights_[i])) {
       const Disk& disk = *prepared_[i].disk;
-      if (disks && disk.contains(*sun, direction)) add(disk.radiance, sun->irradiance, radiance);
+      if (disks && disk.contains(*sun, direction)) add(disk.radiance, sun->irradiance, radiance, bands.first);
     } else if (const auto* constant = std::get_if<ConstantLight>(&lights_[i])) {
-      add(1, constant->radiance, radiance);
+      add(1, constant->radiance, radiance, bands.first);
     } else {
-      prepared_[i].environment->add_radiance(direction, radiance);
+      prepared_[i].environment->add_radiance(direction, radiance, bands.first);
     }
   }
 }

@@ -10,6 +10,7 @@
 #include <Eigen/Geometry>
 
 #include "base/triangle_mesh.h"
+#include "renderer/color/band_range.h"
 #include "renderer/textures/environment_map.h"
 
 namespace tensorray {
@@ -52,7 +53,8 @@ Eigen::Vector3d triangle_normal(const TriangleMesh& mesh, std::size_t triangle);
 struct LightSample {
   Eigen::Vector3d direction = Eigen::Vector3d::Zero();  ///< Unit, from the point to the light.
   double distance = 0;          ///< Distance to the light; anything nearer shadows it. Infinite for the background.
-  std::vector<float> radiance;  ///< In every band. For a delta light: irradiance on a surface normal to `direction`.
+  std::vector<float> radiance;  ///< In the bands asked for. For a delta light: irradiance on a surface normal to
+                                ///< `direction`.
   double pdf = 0;  ///< Per steradian, with the probability of the light. For a delta light: that probability alone.
   bool is_delta = false;  ///< True if no other way to choose directions can find this light.
   int light = -1;         ///< Its index; −1: the background.
@@ -81,8 +83,10 @@ class LightSampler {
   /// Samples light that reaches `point` if nothing is in between. The expectation of radiance · f(direction) / pdf is
   /// the integral of f over all light, but for constant light where no other light is chosen.
   /// @param choice, u  Uniform in [0, 1).
+  /// @param bands  Whose radiance is wanted. The direction does not depend on them.
   /// @return false if there is no light in the chosen direction, or none to choose: count it as 0.
-  bool sample(const Eigen::Vector3d& point, double choice, const Eigen::Vector2d& u, LightSample& sample) const;
+  bool sample(const Eigen::Vector3d& point, double choice, const Eigen::Vector2d& u, LightSample& sample,
+              BandRange bands = {}) const;
 
   /// The density, per steradian, with which `sample` finds `position` on an area light from `point`.
   /// @param normal  Unit normal of the mesh at `position`. The density is zero if this side does not emit.
@@ -94,11 +98,11 @@ class LightSampler {
   /// @param normal  Normal of the mesh at that position.
   const std::vector<float>* emitted(int light, const Eigen::Vector3d& normal, const Eigen::Vector3d& direction) const;
 
-  /// Sets `radiance` to the background's in every band, seen along the unit `direction`.
+  /// Sets `radiance` to the background's in each of `bands`, seen along the unit `direction`.
   /// @param disks  Whether the disks of directional lights count.
   /// @param only   The index of the light that counts; −1: all do.
-  void background(const Eigen::Vector3d& direction, std::vector<float>& radiance, bool disks = true,
-                  int only = -1) const;
+  void background(const Eigen::Vector3d& direction, std::vector<float>& radiance, bool disks = true, int only = -1,
+                  BandRange bands = {}) const;
 
   /// The density, per steradian, with which `sample` chooses the background in `direction`.
   double background_pdf(const Eigen::Vector3d& direction) const;
@@ -136,10 +140,13 @@ class LightSampler {
   };
 
   Prepared prepare(Light& light, const std::vector<float>& importance, double scene_radius) const;
-  bool sample_point(const PointLight& light, const Eigen::Vector3d& point, double probability,
-                    LightSample& sample) const;
+  bool sample_point(const PointLight& light, const Eigen::Vector3d& point, double probability, LightSample& sample,
+                    BandRange bands) const;
   bool sample_area(int light, const Eigen::Vector3d& point, double choice, const Eigen::Vector2d& u,
-                   LightSample& sample) const;
+                   LightSample& sample, BandRange bands) const;
+  std::size_t size(BandRange bands) const {
+    return static_cast<std::size_t>(bands.size(static_cast<std::ptrdiff_t>(bands_)));
+  }
   double directional_pdf(int light, const Eigen::Vector3d& direction) const;
 
   std::size_t bands_ = 0;

@@ -3,6 +3,7 @@
 #include <cmath>
 #include <stdexcept>
 #include <string>
+#include <type_traits>
 
 #include "base/constants.h"
 
@@ -35,6 +36,16 @@ bool scatters(const Material& material, const Eigen::Vector3d& wi, const Eigen::
   return sides > 0 || (sides < 0 && is_glass(material));
 }
 
+/// Metals alone have values of each band.
+template <class Model>
+void evaluate(const Model& model, const BandsIn& reflectance, const Eigen::Vector3d& wi, const Eigen::Vector3d& wo,
+              BandsOut f, Eigen::Index first_band) {
+  if constexpr (std::is_same_v<Model, ConductorScattering>)
+    tensorray::evaluate(model, reflectance, wi, wo, f, first_band);
+  else
+    evaluate(model, reflectance, wi, wo, f);
+}
+
 double refraction(const Material& material, const Eigen::Vector3d& wi, const Eigen::Vector3d& wo) {
   const auto* glass = std::get_if<DielectricScattering>(&material.scattering);
   if (glass == nullptr || wi.z() * wo.z() > 0) return 1;
@@ -59,13 +70,13 @@ Material make_material(const MaterialSettings& settings, const BandValues& refle
 }
 
 void evaluate(const Material& material, const BandsIn& reflectance, const Eigen::Vector3d& wi,
-              const Eigen::Vector3d& wo, BandsOut f) {
+              const Eigen::Vector3d& wo, BandsOut f, Eigen::Index first_band) {
   if (!scatters(material, wi, wo)) {
     f.setZero();
     return;
   }
   const Eigen::Vector3d i = seen(material, wi, wo), o = seen(material, wo, wo);
-  std::visit([&](const auto& model) { evaluate(model, reflectance, i, o, f); }, material.scattering);
+  std::visit([&](const auto& model) { evaluate(model, reflectance, i, o, f, first_band); }, material.scattering);
 }
 
 double pdf(const Material& material, const BandsIn& reflectance, const Eigen::Vector3d& wi, const Eigen::Vector3d& wo) {
@@ -75,7 +86,7 @@ double pdf(const Material& material, const BandsIn& reflectance, const Eigen::Ve
 }
 
 std::optional<ScatteringSample> sample(const Material& material, const BandsIn& reflectance, const Eigen::Vector3d& wo,
-                                       const Eigen::Vector3d& u, BandsOut weight) {
+                                       const Eigen::Vector3d& u, BandsOut weight, Eigen::Index first_band) {
   weight.setZero();
   if (wo.z() == 0) return std::nullopt;
   const Eigen::Vector3d o = seen(material, wo, wo);
@@ -85,7 +96,7 @@ std::optional<ScatteringSample> sample(const Material& material, const BandsIn& 
            std::visit([&](const auto& model) { return sample(model, reflectance, o, u); }, material.scattering), wo);
   result.pdf = pdf(material, reflectance, result.wi, wo);
   if (!(result.pdf > 0)) return std::nullopt;
-  evaluate(material, reflectance, result.wi, wo, weight);
+  evaluate(material, reflectance, result.wi, wo, weight, first_band);
   weight *= std::abs(result.wi.z()) / result.pdf;
   result.refraction = refraction(material, result.wi, wo);
   return result;

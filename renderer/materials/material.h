@@ -38,11 +38,12 @@ Material make_material(const MaterialSettings& settings, const BandValues& refle
 /// @param reflectance  Reflectance at the point, 0 to 1 in each band: `material.reflectance`, or that of the surface's
 ///                     colours (vertices, textures) at the point.
 /// @param f            One value for each band; overwritten.
+/// @param first_band   Of `reflectance` and `f`, which may have some of the bands only.
 void evaluate(const Material& material, const BandsIn& reflectance, const Eigen::Vector3d& wi,
-              const Eigen::Vector3d& wo, BandsOut f);
+              const Eigen::Vector3d& wo, BandsOut f, Eigen::Index first_band = 0);
 
-/// The density, per steradian, with which `sample` gives wi; the same for all bands. Its integral is 1 minus the
-/// probability that `sample` returns nothing.
+/// The density, per steradian, with which `sample` gives wi; the same for all bands of `reflectance`. Its integral is 1
+/// minus the probability that `sample` returns nothing.
 double pdf(const Material& material, const BandsIn& reflectance, const Eigen::Vector3d& wi, const Eigen::Vector3d& wo);
 
 struct ScatteringSample {
@@ -58,8 +59,9 @@ struct ScatteringSample {
 /// @param weight  f(wi, wo) |cos wi| / pdf for each band; overwritten. Without the factor `refraction` it is usually
 ///                close to the reflectance. Rarely, it reaches 10 (rough plastic, mirrored at a grazing facet), or 30
 ///                in rough glass with an index near 1.
+/// @param first_band  As in `evaluate`.
 /// @return nothing if the path ends here; the weight is then 0.
 std::optional<ScatteringSample> sample(const Material& material, const BandsIn& reflectance, const Eigen::Vector3d& wo,
-                                       const Eigen::Vector3d& u, BandsOut weight);
+                                       const Eigen::Vector3d& u, BandsOut weight, Eigen::Index first_band = 0);
 
 }  // namespace tensorray

@@ -26,7 +26,7 @@ ReflectanceTable::ReflectanceTable(const ReflectanceModel& model, const std::vec
   }
 }
 
-void ReflectanceTable::reflectance(const Eigen::Vector3f& color, BandsOut reflectance) const {
+void ReflectanceTable::reflectance(const Eigen::Vector3f& color, BandsOut reflectance, Eigen::Index first_band) const {
   const Eigen::Array3f place = color.array().max(0).min(1) * cells;
   const Eigen::Array3i node = place.cast<int>().min(cells - 1);
   const Eigen::Array3f above = place - node.cast<float>(), below = 1 - above;
@@ -35,7 +35,7 @@ void ReflectanceTable::reflectance(const Eigen::Vector3f& color, BandsOut reflec
   for (int corner = 0; corner < 8; ++corner) {
     const int x = corner & 1, y = corner >> 1 & 1, z = corner >> 2;
     weights[corner] = (x ? above : below)[0] * (y ? above : below)[1] * (z ? above : below)[2];
-    spectra[corner] = nodes_.col(node[0] + x + stride * (node[1] + y + stride * (node[2] + z))).data();
+    spectra[corner] = nodes_.col(node[0] + x + stride * (node[1] + y + stride * (node[2] + z))).data() + first_band;
   }
   for (Eigen::Index band = 0; band < reflectance.size(); ++band) {
     float sum = 0;

@@ -22,8 +22,8 @@ class ReflectanceTable {
 
   /// Sets the reflectance of a colour in the working space.
   /// @param color        Components are clamped to [0, 1].
-  /// @param reflectance  One value for each band.
-  void reflectance(const Eigen::Vector3f& color, BandsOut reflectance) const;
+  /// @param reflectance  One value for each band from `first_band` on.
+  void reflectance(const Eigen::Vector3f& color, BandsOut reflectance, Eigen::Index first_band = 0) const;
 
   /// The colour, in the working space, of the values of all bands.
   Eigen::Vector3f color(const BandsIn& values) const { return (colors_ * values.matrix()).cast<float>(); }

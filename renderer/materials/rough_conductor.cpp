@@ -116,15 +116,18 @@ ConductorScattering prepare(const RoughConductor& settings) {
 }
 
 void evaluate(const ConductorScattering& metal, const BandsIn& reflectance, const Eigen::Vector3d& wi,
-              const Eigen::Vector3d& wo, BandsOut f) {
+              const Eigen::Vector3d& wo, BandsOut f, Eigen::Index first_band) {
   const double single = ggx_reflection(metal.alpha, wi, wo);
   const double missing = metal.missing.mean();
   const double several = fill(metal.missing.at(wo.z()), metal.missing.at(wi.z()), missing);
   const double cosine = std::min(1.0, wo.dot((wi + wo).normalized()));
+  const auto index_n = metal.index.n.segment(first_band, f.size()),
+             index_k = metal.index.k.segment(first_band, f.size());
+  const auto mean_fresnel = metal.mean_fresnel.segment(first_band, f.size());
   for (Eigen::Index band = 0; band < f.size(); ++band) {
-    const double fresnel = fresnel_conductor(cosine, metal.index.n[band], metal.index.k[band]);
-    f[band] = reflectance[band] * fresnel * single +
-              fill_color(reflectance[band] * metal.mean_fresnel[band], missing) * several;
+    const double fresnel = fresnel_conductor(cosine, index_n[band], index_k[band]);
+    f[band] =
+        reflectance[band] * fresnel * single + fill_color(reflectance[band] * mean_fresnel[band], missing) * several;
   }
 }
 

@@ -43,7 +43,7 @@ ConductorScattering prepare(const RoughConductor& settings);
 /// Sets f for wi and wo with z > 0.
 /// @param reflectance  A factor of Fresnel's reflectance at every bounce.
 void evaluate(const ConductorScattering& metal, const BandsIn& reflectance, const Eigen::Vector3d& wi,
-              const Eigen::Vector3d& wo, BandsOut f);
+              const Eigen::Vector3d& wo, BandsOut f, Eigen::Index first_band = 0);
 
 /// Directions below the surface, which `sample` may give, have density 0, so the integral of the density is below 1.
 double pdf(const ConductorScattering& metal, const BandsIn& reflectance, const Eigen::Vector3d& wi,

@@ -15,6 +15,9 @@ namespace tensorray {
 struct BentWay {
   int band = 0;
   double place = 0.5;  ///< The wavelength: 0 and 1 are the ends of the band.
+  /// Radians; by how much the end may be off, as seen from the start, and its direction. It may then be interpolated
+  /// between ways of other bands that stand next to it and start alike. 0: each way is followed.
+  double tolerance = 0;
 
   /// Where it starts; `follow_back` and `follow_light` set it to where it leaves the region, or meets a surface.
   Eigen::Vector3d position = Eigen::Vector3d::Zero();
@@ -38,7 +41,8 @@ class BendingRegion {
   virtual double entry(const Eigen::Vector3d& origin, const Eigen::Vector3d& direction) const = 0;
 
   /// Follows light of a viewer back along ways that enter, in place. One call with many ways is faster than many calls,
-  /// if those of one start stand next to each other. The result of a way does not depend on the others.
+  /// if those of one start stand next to each other. The result of a way without a `tolerance` does not depend on the
+  /// others; that of a way with one depends on those that start alike.
   virtual void follow_back(std::vector<BentWay>& ways) const = 0;
 
   /// The same for light that starts where the ways do.

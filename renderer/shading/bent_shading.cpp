@@ -10,6 +10,7 @@ namespace {
 using Eigen::Vector3d;
 
 constexpr std::uint32_t first_bent_dimension = 1u << 20;  ///< For wavelengths within their bands; one for each depth.
+constexpr double part_of_pixel = 0.2;                     ///< That the bent light of the camera may miss.
 
 }  // namespace
 
@@ -21,7 +22,7 @@ bool RayShader::bends(const Vector3d& origin, const Vector3d& direction, double 
 /// The number of bands for which one that is followed into the region stands.
 double RayShader::bands_per_followed(int depth) const {
   if (band_ >= 0) return 1;
-  return static_cast<double>(throughput_.size()) / (depth == 0 ? scene_.bands_per_view : scene_.bands_per_bounce);
+  return static_cast<double>(scene_.colors.bands()) / (depth == 0 ? scene_.bands_per_view : scene_.bands_per_bounce);
 }
 
 /// Lets a ray wait at the region, for the band of the path; for a path of all bands, for some of them, evenly spaced.
@@ -34,6 +35,7 @@ void RayShader::wait(const Vector3d& origin, const Vector3d& direction, const Ba
   places.dimension = first_bent_dimension + static_cast<std::uint32_t>(depth);
   BentWay way;
   way.place = places.next_1d();
+  if (depth == 0) way.tolerance = part_of_pixel * settings_.pixel_angle;
   way.position = origin;
   way.direction = direction;
   WaitingRay waiting;
@@ -46,13 +48,13 @@ void RayShader::wait(const Vector3d& origin, const Vector3d& direction, const Ba
   waiting.rivalry = rivalry;
   waiting.direction = direction;
   waiting.first = waiting_.ways.size();
-  const int bands = static_cast<int>(throughput_.size()), parts = static_cast<int>(waiting.share);
+  const int bands = static_cast<int>(scene_.colors.bands()), parts = static_cast<int>(waiting.share);
   const int first = static_cast<int>((places.pixel + places.sample) % static_cast<std::uint64_t>(parts));
   for (int band = band_ < 0 ? first : band_; band < bands; band += band_ < 0 ? parts : bands) {
-    if (!(throughput_[band] > 0)) continue;
+    if (!(throughput_[band - first_band()] > 0)) continue;
     way.band = band;
     waiting_.ways.push_back(way);
-    waiting_.throughput.push_back(throughput[band]);
+    waiting_.throughput.push_back(throughput[band - first_band()]);
   }
   waiting.last = waiting_.ways.size();
   waiting_.rays.push_back(waiting);
@@ -63,6 +65,7 @@ void RayShader::continue_path(const WaitingRay& waiting) {
   if (waiting.depth == 0) see_bent(waiting);
   for (std::size_t i = waiting.first; i < waiting.last; ++i)
     if (followed_.ways[i].arrives) continue_band(waiting, i);
+  if (auto& seen = views_[ray_].surface; seen && waiting.depth == 0) set_albedo(*seen);
 }
 
 /// Sets what the region does to a ray of the camera.
@@ -84,10 +87,9 @@ void RayShader::see_bent(const WaitingRay& waiting) {
 void RayShader::continue_band(const WaitingRay& waiting, std::size_t number) {
   const BentWay& way = followed_.ways[number];
   const bool is_view = waiting.depth == 0;
-  band_ = way.band;
+  carry(way.band);
   stands_ = waiting.stands;
-  throughput_.setZero();
-  throughput_[band_] = followed_.throughput[number] * (way.gain * waiting.share);
+  throughput_[0] = followed_.throughput[number] * (way.gain * waiting.share);
   const auto hit = surface_at_end(scene_.surfaces, way);
   if (!hit) {
     if (!is_view || show_background_) add_background(way.direction, waiting.weight, waiting.depth, is_view);
@@ -98,7 +100,7 @@ void RayShader::continue_band(const WaitingRay& waiting, std::size_t number) {
   if (!is_view && waiting.depth == settings_.max_depth) return;
   const Vertex vertex = make_vertex(*hit, way.direction);
   const bool is_to_middle = number - waiting.first <= (waiting.last - waiting.first) / 2;
-  if (is_view && is_to_middle) views_[ray_].surface = first_surface(vertex);
+  if (is_view && is_to_middle) views_[ray_].surface = FirstSurface{*hit, vertex.normal, way.direction};
   shade_surface(vertex, waiting.depth + 1);
 }
 
@@ -129,17 +131,13 @@ void RayShader::bring_light(const WaitingRay& waiting) {
     const auto hit = surface_at_end(scene_.surfaces, way);
     const int light = hit ? scene_.surfaces.surfaces()[hit->surface].light : -1;
     if (hit && light < 0) continue;
-    if (!hit) scene_.lights.background(way.direction, background_, false);
-    const std::vector<float>* const found =
-        hit ? scene_.lights.emitted(light, hit->normal, way.direction) : &background_;
-    if (!found) continue;
-    const double share = hit ? share_beside_photons(waiting, way, *hit) : 1;
-    band_ = way.band;
+    carry(way.band);
     stands_ = waiting.stands;
-    contribution_.setZero();
-    contribution_[band_] =
-        followed_.throughput[i] * (way.gain * waiting.share) * (*found)[static_cast<std::size_t>(way.band)] * share;
-    add(waiting.depth, {light, way.direction, false, found});
+    throughput_[0] = followed_.throughput[i] * (way.gain * waiting.share);
+    if (hit)
+      add_emission(*hit, way.direction, share_beside_photons(waiting, way, *hit), waiting.depth);
+    else
+      add_background(way.direction, 1, waiting.depth, false);
   }
 }
 

@@ -28,7 +28,7 @@ bool is_lit(const LandedLight& light, const Vector3d& point, const Vector3d& ray
   return !light.body->occluded(point + off * towards, towards);
 }
 
-void add_irradiance(const LandedLight& light, const Vector3d& point, Eigen::ArrayXd& sum) {
+void add_irradiance(const LandedLight& light, const Vector3d& point, Eigen::ArrayXd& sum, Eigen::Index first_band) {
   const Vector3d place = place_of(light, point);
   const Eigen::Vector2d at = light.plate.to_pixel(place) - Eigen::Vector2d(0.5, 0.5);
   const Eigen::Vector2i& size = light.plate.resolution;
@@ -45,11 +45,9 @@ void add_irradiance(const LandedLight& light, const Vector3d& point, Eigen::Arra
       const int x = static_cast<int>(corner.x()) + i, y = static_cast<int>(corner.y()) + j;
       const double weight = (i == 1 ? part.x() : 1 - part.x()) * (j == 1 ? part.y() : 1 - part.y());
       if (!(weight > 0) || x < 0 || y < 0 || x >= size.x() || y >= size.y()) continue;
-      const std::size_t pixel = static_cast<std::size_t>(y) * static_cast<std::size_t>(size.x()) + x;
-      sum += gain * weight *
-             Eigen::Map<const Eigen::ArrayXf>(&light.irradiance[pixel * static_cast<std::size_t>(light.bands)],
-                                              light.bands)
-                 .cast<double>();
+      const Eigen::Index pixel = static_cast<Eigen::Index>(y) * size.x() + x;
+      const float* const irradiance = light.irradiance.data() + pixel * light.bands + first_band;
+      sum += gain * weight * Eigen::Map<const Eigen::ArrayXf>(irradiance, sum.size()).cast<double>();
     }
 }
 

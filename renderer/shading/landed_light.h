@@ -43,7 +43,8 @@ bool is_lit(const LandedLight& light, const Eigen::Vector3d& point, const Eigen:
 float folds_at(const LandedLight& light, const Eigen::Vector3d& point);
 
 /// Adds the irradiance of the plate at a point of the surface to `sum`, with linear interpolation between pixels. On a
-/// body it is that of a surface that faces the light.
-void add_irradiance(const LandedLight& light, const Eigen::Vector3d& point, Eigen::ArrayXd& sum);
+/// body it is that of a surface that faces the light. @param sum  Of the bands from `first_band` on.
+void add_irradiance(const LandedLight& light, const Eigen::Vector3d& point, Eigen::ArrayXd& sum,
+                    Eigen::Index first_band = 0);
 
 }  // namespace tensorray

@@ -18,10 +18,10 @@ void RayShader::add_landed_light(const Vertex& vertex, int depth) {
   for (const LandedLight& light : scene_.landed) {
     if (light.surface != vertex.hit.surface || !is_lit(light, vertex.hit.position, vertex.direction)) continue;
     const Vector3d wi = vertex.frame.transpose() * direction_towards(light, vertex.hit.position);
-    evaluate(*vertex.material, reflectance_, wi, vertex.wo, contribution_);
+    evaluate(*vertex.material, reflectance_, wi, vertex.wo, contribution_, first_band());
     if (light.body) contribution_ *= std::abs(wi.z());
     weight_.setZero();
-    add_irradiance(light, vertex.hit.position, weight_);
+    add_irradiance(light, vertex.hit.position, weight_, first_band());
     contribution_ *= throughput_ * weight_;
     if (!(contribution_.maxCoeff() > 0)) continue;
     add_landed(depth, light.light);
@@ -31,7 +31,8 @@ void RayShader::add_landed_light(const Vertex& vertex, int depth) {
 /// Adds `contribution_`, the light of a light that has landed.
 void RayShader::add_landed(int depth, int light) {
   add(depth, {light});
-  if (contribution_.allFinite()) light_.col(column(ray_) + 1) += contribution_;
+  if (contribution_.allFinite())
+    light_.col(column(ray_) + 1).segment(first_band(), contribution_.size()) += contribution_;
 }
 
 /// The pass from which a surface takes its photons: each sample takes one by chance, so that the noise of photons is
@@ -52,8 +53,8 @@ void RayShader::add_photons(const Vertex& vertex, int depth) {
     const Vector3d wi = vertex.frame.transpose() * -photon.direction.cast<double>();
     double scattered = density * photon.power;
     if (!is_diffuse) {
-      evaluate(*vertex.material, reflectance_, wi, vertex.wo, contribution_);
-      scattered *= contribution_[photon.band];
+      evaluate(*vertex.material, reflectance_, wi, vertex.wo, contribution_, first_band());
+      scattered *= contribution_[photon.band - first_band()];
     } else if (!(wi.z() * vertex.wo.z() > 0)) {
       return;
     }
@@ -63,7 +64,7 @@ void RayShader::add_photons(const Vertex& vertex, int depth) {
     PhotonSum& sum = photon_sums_[static_cast<std::size_t>(2 * (group + 1) + (is_of_area ? 1 : 0))];
     if (sum.light < 0) sum.scattered.setZero();
     sum.light = photon.light;
-    sum.scattered[photon.band] += scattered;
+    sum.scattered[photon.band - first_band()] += scattered;
   });
   for (std::size_t i = 0; i < photon_sums_.size(); ++i) {
     const PhotonSum& sum = photon_sums_[i];

@@ -42,6 +42,7 @@ void require_shadable(const ShadedScene& scene, const ShadingSettings& settings)
   require(settings.max_depth >= 0, "max_depth must be >= 0");
   require(settings.roulette_depth >= 1, "roulette_depth must be >= 1");
   require(settings.indirect_clamp >= 0, "indirect_clamp must be >= 0");
+  require(settings.pixel_angle >= 0, "pixel_angle must be >= 0");
   require(settings.occlusion_distance > 0, "occlusion_distance must be > 0");
   for (std::size_t i = 0; i < scene.materials.size(); ++i)
     require(scene.materials[i].reflectance.size() == scene.colors.bands(),
@@ -72,11 +73,8 @@ void require_shadable(const ShadedScene& scene, const ShadingSettings& settings)
 RayShader::RayShader(const ShadedScene& scene, const ShadingSettings& settings)
     : scene_(scene),
       settings_(settings),
-      throughput_(scene.colors.bands()),
-      reflectance_(scene.colors.bands()),
-      weight_(scene.colors.bands()),
-      contribution_(scene.colors.bands()),
-      photon_sums_(static_cast<std::size_t>(2 * (scene.groups + 1)), {BandValues(scene.colors.bands())}),
+      photon_sums_(static_cast<std::size_t>(2 * (scene.groups + 1))),
+      albedo_(scene.colors.bands()),
       aims_bent_(scene.lights.is_concentrated()) {}
 
 void RayShader::shade(const std::vector<ViewRay>& rays, bool show_background) {
@@ -103,9 +101,18 @@ void RayShader::shade(const std::vector<ViewRay>& rays, bool show_background) {
   }
 }
 
+/// Begins a path with light of `band` alone; −1: of all bands. All that is computed for it has these bands only.
+void RayShader::carry(int band) {
+  band_ = band;
+  const Eigen::Index bands = band < 0 ? scene_.colors.bands() : 1;
+  if (throughput_.size() == bands) return;
+  for (BandValues* values : {&throughput_, &reflectance_, &weight_, &contribution_}) values->resize(bands);
+  for (PhotonSum& sum : photon_sums_) sum.scattered.resize(bands);
+}
+
 void RayShader::shade_view(const Vector3d& origin, const Vector3d& direction) {
+  carry(-1);
   throughput_.setOnes();
-  band_ = -1;
   stands_ = 1;
   sampler().dimension = first_dimension;
   const std::optional<SurfaceHit> hit = scene_.surfaces.intersect(origin, direction);
@@ -117,7 +124,8 @@ void RayShader::shade_view(const Vector3d& origin, const Vector3d& direction) {
   }
   if (settings_.shading == Shading::path) add_emission(*hit, direction, 1, 0);
   const Vertex vertex = make_vertex(*hit, direction);
-  views_[ray_].surface = first_surface(vertex);
+  views_[ray_].surface = FirstSurface{*hit, vertex.normal, direction};
+  set_albedo(*views_[ray_].surface);
   shade_surface(vertex, 1);
 }
 
@@ -133,12 +141,12 @@ void RayShader::shade_surface(const Vertex& vertex, int depth) {
   }
 }
 
-/// Needs the vertex's `reflectance_`.
-FirstSurface RayShader::first_surface(const Vertex& vertex) {
-  contribution_ = reflectance_;
-  if (const auto* metal = std::get_if<ConductorScattering>(&vertex.material->scattering))
-    contribution_ *= metal->mean_fresnel;
-  return {vertex.hit, vertex.normal, vertex.direction, scene_.colors.color(contribution_)};
+/// Whatever bands the path has.
+void RayShader::set_albedo(FirstSurface& surface) {
+  set_reflectance(surface.hit, 0, albedo_);
+  const Material& material = scene_.materials[scene_.surfaces.surfaces()[surface.hit.surface].material];
+  if (const auto* metal = std::get_if<ConductorScattering>(&material.scattering)) albedo_ *= metal->mean_fresnel;
+  surface.albedo = scene_.colors.color(albedo_);
 }
 
 /// Also sets `reflectance_`.
@@ -152,16 +160,17 @@ RayShader::Vertex RayShader::make_vertex(const SurfaceHit& hit, const Vector3d& 
   vertex.normal = facing_normal(hit, direction, vertex.side);
   vertex.frame = frame_about(vertex.side * vertex.normal);
   vertex.wo = vertex.frame.transpose() * -direction;
-  set_reflectance(hit, reflectance_);
+  set_reflectance(hit, first_band(), reflectance_);
   return vertex;
 }
 
-void RayShader::set_reflectance(const SurfaceHit& hit, BandValues& reflectance) const {
+/// @param reflectance  Of the bands from `first_band` on.
+void RayShader::set_reflectance(const SurfaceHit& hit, Eigen::Index first_band, BandValues& reflectance) const {
   const ShadedSurface& surface = scene_.surfaces.surfaces()[hit.surface];
   if (surface.colors.empty() && !surface.texture)
-    reflectance = scene_.materials[surface.material].reflectance;
+    reflectance = scene_.materials[surface.material].reflectance.segment(first_band, reflectance.size());
   else
-    scene_.colors.reflectance(hit.color, reflectance);
+    scene_.colors.reflectance(hit.color, reflectance, first_band);
 }
 
 /// Directions below the geometric surface but above the shaded one are followed like all others, from the lifted point.
@@ -176,7 +185,8 @@ void RayShader::shade_path(Vertex vertex, int depth) {
     add_direct_light(vertex, depth);
     const double lobe = sampler.next_1d();
     const Eigen::Vector2d place = sampler.next_2d();
-    const auto scattered = sample(*vertex.material, reflectance_, vertex.wo, {lobe, place.x(), place.y()}, weight_);
+    const Vector3d u(lobe, place.x(), place.y());
+    const auto scattered = sample(*vertex.material, reflectance_, vertex.wo, u, weight_, first_band());
     if (!scattered) return;
     throughput_ *= weight_;
     refraction *= scattered->refraction;
@@ -221,10 +231,10 @@ void RayShader::add_direct_light(const Vertex& vertex, int depth) {
   PathSampler& sampler = this->sampler();
   const double choice = sampler.next_1d();
   const Eigen::Vector2d place = sampler.next_2d();
-  if (!scene_.lights.sample(vertex.point, choice, place, light_sample_)) return;
+  if (!scene_.lights.sample(vertex.point, choice, place, light_sample_, bands())) return;
   if (settings_.direct == DirectLight::material && !light_sample_.is_delta) return;
   const Vector3d wi = vertex.frame.transpose() * light_sample_.direction;
-  evaluate(*vertex.material, reflectance_, wi, vertex.wo, contribution_);
+  evaluate(*vertex.material, reflectance_, wi, vertex.wo, contribution_, first_band());
   if (!(contribution_.maxCoeff() > 0)) return;
   const Vector3d start = vertex.start(scene_.surfaces, wi);
   if (bends(start, light_sample_.direction, light_sample_.distance)) return seek_bent_light(vertex, wi, start, depth);
@@ -250,7 +260,7 @@ bool RayShader::is_shadowed(const Vector3d& start, const Vector3d& point) const 
 
 void RayShader::add_background(const Vector3d& direction, double weight, int depth, bool disks) {
   if (!(weight > 0)) return;
-  scene_.lights.background(direction, background_, disks);
+  scene_.lights.background(direction, background_, disks, -1, bands());
   contribution_ = throughput_ * as_array(background_).cast<double>() * weight;
   add(depth, {-1, direction, disks, &background_});
 }
@@ -260,18 +270,18 @@ void RayShader::add_emission(const SurfaceHit& hit, const Vector3d& direction, d
   if (light < 0 || !(weight > 0)) return;
   const std::vector<float>* emitted = scene_.lights.emitted(light, hit.normal, direction);
   if (emitted == nullptr) return;
-  contribution_ = throughput_ * as_array(*emitted).cast<double>() * weight;
+  contribution_ = throughput_ * as_array(*emitted).segment(first_band(), throughput_.size()).cast<double>() * weight;
   add(depth, {light});
 }
 
 /// Adds light that was scattered `depth` times. Leaves out values that overflow, since one would make the mean
 /// infinite.
 void RayShader::add(int depth, const LightSource& source) {
-  const double brightness = band_ < 0 ? scene_.colors.luminance(contribution_) : contribution_[band_] / stands_;
+  const double brightness = band_ < 0 ? scene_.colors.luminance(contribution_) : contribution_[0] / stands_;
   if (!std::isfinite(brightness)) return;
   if (depth >= 2 && settings_.indirect_clamp > 0 && brightness > settings_.indirect_clamp)
     contribution_ *= settings_.indirect_clamp / brightness;
-  light_.col(column(ray_)) += contribution_;
+  light_.col(column(ray_)).segment(first_band(), contribution_.size()) += contribution_;
   if (scene_.groups > 0) add_to_groups(source);
 }
 
@@ -279,14 +289,17 @@ void RayShader::add(int depth, const LightSource& source) {
 void RayShader::add_to_groups(const LightSource& source) {
   const Eigen::Index first = column(ray_ + 1) - scene_.groups;
   const auto group_of = [&](int light) { return scene_.group_of_light[static_cast<std::size_t>(light)]; };
+  const auto layer_of = [&](int light) {
+    return light_.col(first + group_of(light)).segment(first_band(), contribution_.size());
+  };
   if (source.light >= 0) {
-    if (group_of(source.light) >= 0) light_.col(first + group_of(source.light)) += contribution_;
+    if (group_of(source.light) >= 0) layer_of(source.light) += contribution_;
     return;
   }
   for (int light = 0; light < static_cast<int>(scene_.group_of_light.size()); ++light) {
     if (group_of(light) < 0) continue;
-    scene_.lights.background(source.direction, of_one_light_, source.disks, light);
-    auto layer = light_.col(first + group_of(light));
+    scene_.lights.background(source.direction, of_one_light_, source.disks, light, bands());
+    auto layer = layer_of(light);
     for (std::size_t band = 0; band < of_one_light_.size(); ++band)
       if (of_one_light_[band] > 0)
         layer[static_cast<Eigen::Index>(band)] +=

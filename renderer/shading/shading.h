@@ -2,6 +2,7 @@
 /// @file renderer/shading/shading.h
 /// The light that a ray sees: path tracing (Kajiya 1986; Veach 1997) and two fast previews.
 
+#include <algorithm>
 #include <cstdint>
 #include <limits>
 #include <optional>
@@ -46,6 +47,9 @@ struct ShadingSettings {
   /// limited as if that of all bands were like it: the eye hardly sees some bands, and bright pixels of their colours
   /// would stay.
   double indirect_clamp = 10;
+  /// Radians; the size of a pixel as the camera sees it. Light of the camera may be bent with an error of a fifth of it
+  /// at most, so that not each band need be followed. 0: each is.
+  double pixel_angle = 0;
   /// World units; beyond it nothing hides the sky.
   double occlusion_distance = std::numeric_limits<double>::infinity();
 };
@@ -184,9 +188,12 @@ class RayShader {
   void shade_surface(const Vertex& vertex, int depth);
   void shade_path(Vertex vertex, int depth);
   void shade_occlusion(const Vertex& vertex);
-  FirstSurface first_surface(const Vertex& vertex);
+  void carry(int band);
+  Eigen::Index first_band() const { return std::max(band_, 0); }
+  BandRange bands() const { return {first_band(), throughput_.size()}; }
+  void set_albedo(FirstSurface& surface);
   Vertex make_vertex(const SurfaceHit& hit, const Eigen::Vector3d& direction);
-  void set_reflectance(const SurfaceHit& hit, BandValues& reflectance) const;
+  void set_reflectance(const SurfaceHit& hit, Eigen::Index first_band, BandValues& reflectance) const;
   PathSampler& sampler() { return samplers_[ray_]; }
 
   bool bends(const Eigen::Vector3d& origin, const Eigen::Vector3d& direction, double distance) const;
@@ -233,10 +240,10 @@ class RayShader {
   Wave waiting_, followed_;
 
   // Of the path that is followed.
-  std::size_t ray_ = 0;  ///< Number of the camera's ray.
-  int band_ = -1;        ///< Its only band, after it was bent; −1: all bands.
-  double stands_ = 1;    ///< The number of bands for which `band_` stands.
-  BandValues throughput_, reflectance_, weight_, contribution_;
+  std::size_t ray_ = 0;                                          ///< Number of the camera's ray.
+  int band_ = -1;                                                ///< Its only band, after it was bent; −1: all bands.
+  double stands_ = 1;                                            ///< The number of bands for which `band_` stands.
+  BandValues throughput_, reflectance_, weight_, contribution_;  ///< Of its bands.
 
   /// The light of photons, for each group and for all others, of area lights apart; and one of the lights that it comes
   /// from, or −1.
@@ -246,8 +253,9 @@ class RayShader {
   };
   std::vector<PhotonSum> photon_sums_;
   LightSample light_sample_;
-  std::vector<float> background_, of_one_light_;
-  bool aims_bent_ = true;  ///< Whether sampled lights are looked for through the region.
+  std::vector<float> background_, of_one_light_;  ///< Of the path's bands.
+  BandValues albedo_;                             ///< Of all bands.
+  bool aims_bent_ = true;                         ///< Whether sampled lights are looked for through the region.
 };
 
 }  // namespace tensorray

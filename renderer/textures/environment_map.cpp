@@ -104,13 +104,14 @@ EnvironmentMap::EnvironmentMap(EnvironmentLight light, const std::vector<float>&
     : light_(checked(std::move(light))),
       cells_(cell_importance(light_, importance), light_.picture.width, light_.picture.height) {}
 
-void EnvironmentMap::add_radiance(const Vector3d& direction, std::vector<float>& radiance) const {
+void EnvironmentMap::add_radiance(const Vector3d& direction, std::vector<float>& radiance,
+                                  std::ptrdiff_t first_band) const {
   const auto about = neighbours(light_.picture, to_pixel(light_.picture, light_.to_world.transpose() * direction));
   Eigen::Map<Eigen::VectorXf> sum(radiance.data(), static_cast<Eigen::Index>(radiance.size()));
   for (Eigen::Index channel = 0; channel < light_.channel_spectra.cols(); ++channel) {
     float value = 0;
     for (const Neighbour& neighbour : about) value += neighbour.weight * neighbour.texel[channel];
-    sum += value * light_.channel_spectra.col(channel);
+    sum += value * light_.channel_spectra.col(channel).segment(first_band, sum.size());
   }
 }
 

@@ -31,8 +31,10 @@ class EnvironmentMap {
   /// finite, or `to_world` is not a rotation.
   EnvironmentMap(EnvironmentLight light, const std::vector<float>& importance);
 
-  /// Adds the radiance from `direction` to that of each band. @param direction  Unit, world; from the viewer outwards.
-  void add_radiance(const Eigen::Vector3d& direction, std::vector<float>& radiance) const;
+  /// Adds the radiance from `direction`. @param direction  Unit, world; from the viewer outwards.
+  /// @param radiance  Of each band from `first_band` on.
+  void add_radiance(const Eigen::Vector3d& direction, std::vector<float>& radiance,
+                    std::ptrdiff_t first_band = 0) const;
 
   /// A unit direction in the world. @param u  Uniform in [0, 1)².
   Eigen::Vector3d sample(const Eigen::Vector2d& u) const;

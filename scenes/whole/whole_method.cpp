@@ -110,14 +110,21 @@ int bands_per_bounce(const WholeDescription& settings) {
   return settings.bands_per_sample % 2 == 0 ? settings.bands_per_sample / 2 : settings.bands_per_sample;
 }
 
+/// The angle of a pixel, radians; of parallel rays, as seen over the distance at which they are sharp.
+double pixel_angle(const Camera& camera) {
+  return pixel_size(camera, camera.position + camera.focus_distance * camera.forward) / camera.focus_distance;
+}
+
 /// All bands must have as many samples. @param seconds  That have passed.
-PathTracerSettings whole_tracer_settings(const Scene& scene, const WholeScene& whole, double seconds) {
+PathTracerSettings whole_tracer_settings(const Scene& scene, const WholeScene& whole, const Camera& camera,
+                                         double seconds) {
   PathTracerSettings settings = tracer_settings(scene.description, whole.tracing);
   settings.transparent = whole.tracing.background == Background::transparent;
   const int parts = whole.tracing.bands / bands_per_bounce(whole.settings);
   for (int* samples : {&settings.min_samples, &settings.max_samples, &settings.pass_samples})
     *samples = (*samples + parts - 1) / parts * parts;
   settings.first_samples = parts;
+  settings.shading.pixel_angle = pixel_angle(camera);
   settings.max_seconds = std::max(0.0, settings.max_seconds - seconds);
   return settings;
 }
@@ -188,7 +195,7 @@ Render LoadedWhole::render(const Scene& scene, const Progress& progress, RenderJ
   set_groups(groups, shaded);
   shaded.bands_per_view = whole_.settings.bands_per_sample;
   shaded.bands_per_bounce = bands_per_bounce(whole_.settings);
-  const PathTracerSettings samples = whole_tracer_settings(scene, whole_, 0);
+  const PathTracerSettings samples = whole_tracer_settings(scene, whole_, camera, 0);
   TracedPhotons photons;
   if (bends) {
     const PhotonPairs pairs = photon_pairs(scene, lights, objects, whole_.settings);
@@ -212,7 +219,7 @@ Render LoadedWhole::render(const Scene& scene, const Progress& progress, RenderJ
     add_picture(picture, shown);
     return shown;
   });
-  const PathTracerSettings settings = whole_tracer_settings(scene, whole_, result.statistics.seconds_tracing);
+  const PathTracerSettings settings = whole_tracer_settings(scene, whole_, camera, result.statistics.seconds_tracing);
   const SurfacePicture picture = render_surfaces(shaded, camera, settings, callbacks);
   add_picture(picture, result);
   for (const float count : picture.samples) result.statistics.whole->samples += static_cast<std::uint64_t>(count);

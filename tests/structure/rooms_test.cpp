@@ -35,7 +35,7 @@ const std::vector<Room> rooms{
     {"renderer/materials", {"renderer/color"}},
     {"renderer/textures", {"renderer/color", "renderer/images", "renderer/sampling"}},
     {"renderer/openimageio", {"renderer/images", "renderer/textures"}},
-    {"renderer/lights", {"renderer/sampling", "renderer/surfaces", "renderer/textures"}},
+    {"renderer/lights", {"renderer/color", "renderer/sampling", "renderer/surfaces", "renderer/textures"}},
     {"renderer/shading",
      {"renderer/film", "renderer/lights", "renderer/materials", "renderer/sampling", "renderer/surfaces"}},
 
