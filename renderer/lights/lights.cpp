@@ -107,9 +107,12 @@ LightSampler::LightSampler(std::vector<Light> lights, const std::vector<float>& 
   if (std::any_of(powers.begin(), powers.end(), [](double power) { return power > 0; })) choice_.emplace(powers);
 }
 
-LightSampler::Disk LightSampler::make_disk(double angle) {
+LightSampler::Disk LightSampler::make_disk(const DirectionalLight& light) {
+  const double angle = light.angle;
   Disk disk;
-  disk.chord2 = std::pow(2 * std::sin(angle / 2), 2);
+  disk.frame = frame_about(-light.direction);
+  disk.height = one_minus_cosine(angle);
+  disk.chord2 = 2 * disk.height;
   disk.pdf = 1 / cone_solid_angle(angle);
   disk.radiance = 1 / (pi * std::pow(std::sin(angle), 2));  // ∫ cos θ dω = π sin² angle.
   return disk;
@@ -132,7 +135,7 @@ LightSampler::Prepared LightSampler::prepare(Light& light, const std::vector<flo
     require(directional->angle >= 0 && directional->angle <= pi / 2, "angle must be 0 to pi / 2");
     directional->direction.stableNormalize();
     result.power = ball * dot(directional->irradiance, importance);
-    if (directional->angle > 0) result.disk = make_disk(directional->angle);
+    if (directional->angle > 0) result.disk = make_disk(*directional);
   } else if (auto* point = std::get_if<PointLight>(&light)) {
     require_bands(point->intensity, bands_, "intensity");
     require(point->position.allFinite(), "position must be finite");
@@ -148,12 +151,13 @@ LightSampler::Prepared LightSampler::prepare(Light& light, const std::vector<flo
 
 double LightSampler::choice_probability(int light) const { return choice_ ? choice_->probability(light) : 0; }
 
-bool LightSampler::sample(const Vector3d& point, double choice, const Vector2d& u, LightSample& sample,
-                          BandRange bands) const {
+/// The number that chooses a light, or a triangle, also gives the place on it: places stay stratified.
+bool LightSampler::sample(const Vector3d& point, const Vector2d& u, LightSample& sample, BandRange bands) const {
   if (!choice_) return false;
-  const Distribution1D::Sample chosen = choice_->sample(choice);
+  const Distribution1D::Sample chosen = choice_->sample(u.x());
+  const Vector2d place(chosen.within, u.y());
   const Light& light = lights_[chosen.cell];
-  if (std::holds_alternative<AreaLight>(light)) return sample_area(chosen.cell, point, chosen.within, u, sample, bands);
+  if (std::holds_alternative<AreaLight>(light)) return sample_area(chosen.cell, point, place, sample, bands);
 
   sample.is_delta = !is_background(light);
   sample.light = sample.is_delta ? chosen.cell : -1;
@@ -167,9 +171,9 @@ bool LightSampler::sample(const Vector3d& point, double choice, const Vector2d& 
     sample.pdf = chosen.probability;
     return true;
   }
-  sample.direction = directional
-                         ? Vector3d(frame_about(-directional->direction) * square_to_cone(u, directional->angle))
-                         : prepared_[chosen.cell].environment->sample(u);
+  const Prepared& prepared = prepared_[chosen.cell];
+  sample.direction = directional ? Vector3d(prepared.disk->frame * square_to_cap(place, prepared.disk->height))
+                                 : prepared.environment->sample(place);
   sample.pdf = background_pdf(sample.direction);
   background(sample.direction, sample.radiance, true, -1, bands);
   return sample.pdf > 0;
@@ -187,12 +191,12 @@ bool LightSampler::sample_point(const PointLight& light, const Vector3d& point, 
   return true;
 }
 
-bool LightSampler::sample_area(int light, const Vector3d& point, double choice, const Vector2d& u, LightSample& sample,
+bool LightSampler::sample_area(int light, const Vector3d& point, const Vector2d& u, LightSample& sample,
                                BandRange bands) const {
   const auto& area = std::get<AreaLight>(lights_[light]);
-  const int triangle = prepared_[light].triangles->sample(choice).cell;
-  const auto [a, b, c] = area.mesh.triangles[triangle];
-  const Vector3d weights = square_to_triangle(u);
+  const Distribution1D::Sample triangle = prepared_[light].triangles->sample(u.x());
+  const auto [a, b, c] = area.mesh.triangles[triangle.cell];
+  const Vector3d weights = square_to_triangle({triangle.within, u.y()});
   const Vector3d position =
       weights.x() * area.mesh.vertices[a] + weights.y() * area.mesh.vertices[b] + weights.z() * area.mesh.vertices[c];
   sample.distance = (position - point).norm();
@@ -200,7 +204,7 @@ bool LightSampler::sample_area(int light, const Vector3d& point, double choice, 
   set(area.radiance, sample.radiance, bands.first, size(bands));
   sample.is_delta = false;
   sample.light = light;
-  sample.pdf = area_pdf(light, point, position, triangle_normal(area.mesh, triangle).normalized());
+  sample.pdf = area_pdf(light, point, position, triangle_normal(area.mesh, triangle.cell).normalized());
   return sample.pdf > 0;
 }
 

@@ -82,11 +82,10 @@ class LightSampler {
 
   /// Samples light that reaches `point` if nothing is in between. The expectation of radiance · f(direction) / pdf is
   /// the integral of f over all light, but for constant light where no other light is chosen.
-  /// @param choice, u  Uniform in [0, 1).
+  /// @param u  Uniform in [0, 1)².
   /// @param bands  Whose radiance is wanted. The direction does not depend on them.
   /// @return false if there is no light in the chosen direction, or none to choose: count it as 0.
-  bool sample(const Eigen::Vector3d& point, double choice, const Eigen::Vector2d& u, LightSample& sample,
-              BandRange bands = {}) const;
+  bool sample(const Eigen::Vector3d& point, const Eigen::Vector2d& u, LightSample& sample, BandRange bands = {}) const;
 
   /// The density, per steradian, with which `sample` finds `position` on an area light from `point`.
   /// @param normal  Unit normal of the mesh at `position`. The density is zero if this side does not emit.
@@ -121,6 +120,8 @@ class LightSampler {
  private:
   /// The disk of a directional light.
   struct Disk {
+    Eigen::Matrix3d frame = Eigen::Matrix3d::Identity();  ///< Its axis points to the disk's centre.
+    double height = 0;                                    ///< 1 − cos of the angle to its rim.
     double chord2 = 0;    ///< Squared chord from its centre to its rim: chords are accurate at small angles.
     double pdf = 0;       ///< Per steradian, within the disk.
     double radiance = 0;  ///< For each unit of irradiance that it gives to a surface that faces it.
@@ -129,7 +130,7 @@ class LightSampler {
       return (towards + light.direction).squaredNorm() <= chord2;
     }
   };
-  static Disk make_disk(double angle);
+  static Disk make_disk(const DirectionalLight& light);
 
   /// What `sample` needs for each light, in addition to the light.
   struct Prepared {
@@ -142,8 +143,8 @@ class LightSampler {
   Prepared prepare(Light& light, const std::vector<float>& importance, double scene_radius) const;
   bool sample_point(const PointLight& light, const Eigen::Vector3d& point, double probability, LightSample& sample,
                     BandRange bands) const;
-  bool sample_area(int light, const Eigen::Vector3d& point, double choice, const Eigen::Vector2d& u,
-                   LightSample& sample, BandRange bands) const;
+  bool sample_area(int light, const Eigen::Vector3d& point, const Eigen::Vector2d& u, LightSample& sample,
+                   BandRange bands) const;
   std::size_t size(BandRange bands) const {
     return static_cast<std::size_t>(bands.size(static_cast<std::ptrdiff_t>(bands_)));
   }

@@ -6,21 +6,28 @@
 #include <type_traits>
 
 #include "base/constants.h"
+#include "renderer/sampling/sampling.h"
 
 namespace tensorray {
 namespace {
 
 Diffuse prepare(const Diffuse& settings) { return settings; }
 
-void evaluate(const Diffuse&, const BandsIn& reflectance, const Eigen::Vector3d&, const Eigen::Vector3d&, BandsOut f) {
-  f = reflectance / pi;
+double evaluate(const Diffuse&, const BandsIn& reflectance, const Eigen::Vector3d& wi, const Eigen::Vector3d&,
+                BandsOut f) {
+  f = reflectance.head(f.size()) / pi;
+  return wi.z() / pi;
 }
 
-double pdf(const Diffuse&, const BandsIn&, const Eigen::Vector3d& wi, const Eigen::Vector3d&) { return wi.z() / pi; }
+Eigen::Vector3d sample(const Diffuse&, const BandsIn&, const Eigen::Vector3d&, const Eigen::Vector2d& u) {
+  return square_to_cosine_hemisphere(u);
+}
 
-Eigen::Vector3d sample(const Diffuse&, const BandsIn&, const Eigen::Vector3d&, const Eigen::Vector3d& u) {
-  const double sine = std::sqrt(u.y()), turn = 2 * pi * u.z();
-  return {sine * std::cos(turn), sine * std::sin(turn), std::sqrt(1 - u.y())};
+/// Opaque models need only two numbers.
+template <class Model>
+Eigen::Vector3d sample(const Model& model, const BandsIn& reflectance, const Eigen::Vector3d& wo,
+                       const Eigen::Vector3d& u) {
+  return sample(model, reflectance, wo, Eigen::Vector2d(u.head<2>()));
 }
 
 bool is_glass(const Material& material) { return std::holds_alternative<DielectricScattering>(material.scattering); }
@@ -38,12 +45,12 @@ bool scatters(const Material& material, const Eigen::Vector3d& wi, const Eigen::
 
 /// Metals alone have values of each band.
 template <class Model>
-void evaluate(const Model& model, const BandsIn& reflectance, const Eigen::Vector3d& wi, const Eigen::Vector3d& wo,
-              BandsOut f, Eigen::Index first_band) {
+double evaluate(const Model& model, const BandsIn& reflectance, const Eigen::Vector3d& wi, const Eigen::Vector3d& wo,
+                BandsOut f, Eigen::Index first_band) {
   if constexpr (std::is_same_v<Model, ConductorScattering>)
-    tensorray::evaluate(model, reflectance, wi, wo, f, first_band);
+    return tensorray::evaluate(model, reflectance, wi, wo, f, first_band);
   else
-    evaluate(model, reflectance, wi, wo, f);
+    return evaluate(model, reflectance, wi, wo, f);
 }
 
 double refraction(const Material& material, const Eigen::Vector3d& wi, const Eigen::Vector3d& wo) {
@@ -69,20 +76,20 @@ Material make_material(const MaterialSettings& settings, const BandValues& refle
   return material;
 }
 
-void evaluate(const Material& material, const BandsIn& reflectance, const Eigen::Vector3d& wi,
-              const Eigen::Vector3d& wo, BandsOut f, Eigen::Index first_band) {
+double evaluate(const Material& material, const BandsIn& reflectance, const Eigen::Vector3d& wi,
+                const Eigen::Vector3d& wo, BandsOut f, Eigen::Index first_band) {
   if (!scatters(material, wi, wo)) {
     f.setZero();
-    return;
+    return 0;
   }
   const Eigen::Vector3d i = seen(material, wi, wo), o = seen(material, wo, wo);
-  std::visit([&](const auto& model) { evaluate(model, reflectance, i, o, f, first_band); }, material.scattering);
+  const auto of = [&](const auto& model) { return evaluate(model, reflectance, i, o, f, first_band); };
+  return std::visit(of, material.scattering);
 }
 
 double pdf(const Material& material, const BandsIn& reflectance, const Eigen::Vector3d& wi, const Eigen::Vector3d& wo) {
-  if (!scatters(material, wi, wo)) return 0;
-  const Eigen::Vector3d i = seen(material, wi, wo), o = seen(material, wo, wo);
-  return std::visit([&](const auto& model) { return pdf(model, reflectance, i, o); }, material.scattering);
+  BandValues none;
+  return evaluate(material, reflectance, wi, wo, none);
 }
 
 std::optional<ScatteringSample> sample(const Material& material, const BandsIn& reflectance, const Eigen::Vector3d& wo,
@@ -90,13 +97,14 @@ std::optional<ScatteringSample> sample(const Material& material, const BandsIn& 
   weight.setZero();
   if (wo.z() == 0) return std::nullopt;
   const Eigen::Vector3d o = seen(material, wo, wo);
+  const auto direction = [&](const auto& model) { return sample(model, reflectance, o, u); };
   ScatteringSample result;
-  result.wi =
-      seen(material,
-           std::visit([&](const auto& model) { return sample(model, reflectance, o, u); }, material.scattering), wo);
-  result.pdf = pdf(material, reflectance, result.wi, wo);
-  if (!(result.pdf > 0)) return std::nullopt;
-  evaluate(material, reflectance, result.wi, wo, weight, first_band);
+  result.wi = seen(material, std::visit(direction, material.scattering), wo);
+  result.pdf = evaluate(material, reflectance, result.wi, wo, weight, first_band);
+  if (!(result.pdf > 0)) {
+    weight.setZero();
+    return std::nullopt;
+  }
   weight *= std::abs(result.wi.z()) / result.pdf;
   result.refraction = refraction(material, result.wi, wo);
   return result;

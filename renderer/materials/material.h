@@ -39,8 +39,9 @@ Material make_material(const MaterialSettings& settings, const BandValues& refle
 ///                     colours (vertices, textures) at the point.
 /// @param f            One value for each band; overwritten.
 /// @param first_band   Of `reflectance` and `f`, which may have some of the bands only.
-void evaluate(const Material& material, const BandsIn& reflectance, const Eigen::Vector3d& wi,
-              const Eigen::Vector3d& wo, BandsOut f, Eigen::Index first_band = 0);
+/// @return `pdf`, which shares most of the work.
+double evaluate(const Material& material, const BandsIn& reflectance, const Eigen::Vector3d& wi,
+                const Eigen::Vector3d& wo, BandsOut f, Eigen::Index first_band = 0);
 
 /// The density, per steradian, with which `sample` gives wi; the same for all bands of `reflectance`. Its integral is 1
 /// minus the probability that `sample` returns nothing.
@@ -55,7 +56,7 @@ struct ScatteringSample {
 };
 
 /// Chooses the direction that light comes from.
-/// @param u       In [0, 1)³.
+/// @param u       In [0, 1)³; z matters to glass alone.
 /// @param weight  f(wi, wo) |cos wi| / pdf for each band; overwritten. Without the factor `refraction` it is usually
 ///                close to the reflectance. Rarely, it reaches 10 (rough plastic, mirrored at a grazing facet), or 30
 ///                in rough glass with an index near 1.

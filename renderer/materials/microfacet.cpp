@@ -8,6 +8,7 @@
 #include <Eigen/Geometry>
 
 #include "base/constants.h"
+#include "renderer/sampling/sampling.h"
 
 namespace tensorray {
 namespace {
@@ -54,15 +55,15 @@ double ggx_facets(double alpha, const Eigen::Vector3d& m) {
 Eigen::Vector3d ggx_sample_visible(double alpha, const Eigen::Vector3d& wo, const Eigen::Vector2d& u) {
   // Stretched by 1 / alpha, the facets form a hemisphere. From wo it is a disk whose lower part is squeezed.
   const Eigen::Vector3d view = Eigen::Vector3d(alpha * wo.x(), alpha * wo.y(), wo.z()).normalized();
-  const double across = std::hypot(view.x(), view.y());
+  const double across = view.head<2>().norm();
   const Eigen::Vector3d right =
       across > 0 ? Eigen::Vector3d(-view.y() / across, view.x() / across, 0) : Eigen::Vector3d(1, 0, 0);
   const Eigen::Vector3d up = view.cross(right);
 
-  const double radius = std::sqrt(u.x()), angle = 2 * pi * u.y();
-  const double x = radius * std::cos(angle);
+  const Eigen::Vector2d place = std::sqrt(u.x()) * circle_at(u.y());
+  const double x = place.x();
   const double visible = (1 + view.z()) / 2;
-  const double y = (1 - visible) * std::sqrt(std::max(0.0, 1 - square(x))) + visible * radius * std::sin(angle);
+  const double y = (1 - visible) * std::sqrt(std::max(0.0, 1 - square(x))) + visible * place.y();
   const double z = std::sqrt(std::max(0.0, 1 - square(x) - square(y)));
 
   const Eigen::Vector3d normal = x * right + y * up + z * view;
@@ -78,14 +79,9 @@ double ggx_shadowing(double alpha, double cosine_o, double cosine_i) {
   return cosine_i * (cosine_o + o) / (cosine_o * i + cosine_i * o);
 }
 
-double ggx_reflection(double alpha, const Eigen::Vector3d& wi, const Eigen::Vector3d& wo) {
-  const Eigen::Vector3d m = (wi + wo).normalized();
-  return ggx_facets(alpha, m) / (2 * (wo.z() * spread(alpha, wi.z()) + wi.z() * spread(alpha, wo.z())));
-}
-
-double ggx_reflection_pdf(double alpha, const Eigen::Vector3d& wi, const Eigen::Vector3d& wo) {
-  const Eigen::Vector3d m = (wi + wo).normalized();
-  return ggx_facets(alpha, m) / (2 * (wo.z() + spread(alpha, wo.z())));
+GgxReflection ggx_reflection(double alpha, const Eigen::Vector3d& wi, const Eigen::Vector3d& wo) {
+  const double facets = ggx_facets(alpha, (wi + wo).normalized()) / 2, o = spread(alpha, wo.z());
+  return {facets / (wo.z() * spread(alpha, wi.z()) + wi.z() * o), facets / (wo.z() + o)};
 }
 
 double fresnel_dielectric(double cosine, double index) {
@@ -164,8 +160,8 @@ Eigen::Vector3d CosineTable::sample(const Eigen::Vector2d& u) const {
   const double low = square(knot_cosine(horizon, segment)), high = square(knot_cosine(horizon, segment + 1));
   const double share = means[segment] > 0 ? (wanted - cumulative[segment]) / means[segment] : u.x() * (high - low);
   const double cosine2 = std::clamp(low + share, low, high);
-  const double sine = std::sqrt(1 - cosine2), turn = 2 * pi * u.y();
-  return {sine * std::cos(turn), sine * std::sin(turn), std::sqrt(cosine2)};
+  const Eigen::Vector2d place = std::sqrt(1 - cosine2) * circle_at(u.y());
+  return {place.x(), place.y(), std::sqrt(cosine2)};
 }
 
 CosineTable make_cosine_table(double alpha, const std::function<double(double cosine)>& function) {

@@ -7,6 +7,7 @@
 /// The frame is as in renderer/materials/scattering.h; wi and wo have z >= 0, not both 0. `alpha` is the width of GGX.
 /// There is no state: any thread may call every function.
 
+#include <algorithm>
 #include <array>
 #include <functional>
 
@@ -34,10 +35,18 @@ double ggx_visible_pdf(double alpha, const Eigen::Vector3d& wo, const Eigen::Vec
 /// The fraction of a facet, visible from one direction, that is also visible from another one: G2 / G1(wo), <= 1.
 double ggx_shadowing(double alpha, double cosine_o, double cosine_i);
 
-/// f of a surface of perfect mirrors, single bounces only, and the density of directions wi that result from reflecting
-/// wo at ggx_sample_visible. Both are finite for cosines > 0, and f · cosine_i / pdf is ggx_shadowing.
-double ggx_reflection(double alpha, const Eigen::Vector3d& wi, const Eigen::Vector3d& wo);
-double ggx_reflection_pdf(double alpha, const Eigen::Vector3d& wi, const Eigen::Vector3d& wo);
+/// Single bounces between the directions of a HalfVector. Both are finite for cosines > 0, and f · cosine_i / pdf is
+/// ggx_shadowing.
+struct GgxReflection {
+  double f = 0;    ///< Of a surface of perfect mirrors.
+  double pdf = 0;  ///< Of directions wi that result from reflecting wo at ggx_sample_visible.
+};
+GgxReflection ggx_reflection(double alpha, const Eigen::Vector3d& wi, const Eigen::Vector3d& wo);
+
+/// The cosine between wo, or wi, and the normal of the facets that mirror one to the other.
+inline double facet_cosine(const Eigen::Vector3d& wi, const Eigen::Vector3d& wo) {
+  return std::min(1.0, (wi + wo).norm() / 2);
+}
 
 /// `w` mirrored at a facet; `w` and the result point away from the facet.
 inline Eigen::Vector3d mirrored(const Eigen::Vector3d& w, const Eigen::Vector3d& m) { return 2 * w.dot(m) * m - w; }

@@ -5,6 +5,9 @@
 #include <stdexcept>
 #include <string>
 
+#include "base/constants.h"
+#include "renderer/sampling/sampling.h"
+
 namespace tensorray {
 namespace {
 
@@ -39,25 +42,26 @@ CosineTable missing_table(const PrincipledScattering& layers, const Fresnel& fre
   });
 }
 
-/// Sampling probability of each lobe, in proportion to what it scatters in the brightest band, so that no weight is
-/// large.
+/// Sampling probability of each lobe, in proportion to what it scatters in the mean of the bands.
 struct LobeShares {
-  double coat;
-  double base;
-  double dielectric_fill;
-  double metal_fill;
+  double coat = 0, base = 0, dielectric_fill = 0, metal_fill = 0;
 };
 
 LobeShares lobe_shares(const PrincipledScattering& layers, const BandsIn& reflectance, double cosine_o) {
-  const double metallic = layers.metallic, brightest = reflectance.size() > 0 ? reflectance.maxCoeff() : 0;
-  const double coat = layers.coat.at(cosine_o);
-  const double dielectric = layers.missing_dielectric.at(cosine_o), metal = layers.missing_metal.at(cosine_o);
-  LobeShares shares{};
-  shares.coat = coat;
-  shares.base = std::max(1e-3, (1 - metallic) * (1 - coat - dielectric) +
-                                   metallic * (1 - coat - metal) * fresnel_schlick(cosine_o, brightest));
-  shares.dielectric_fill = (1 - metallic) * brightest * dielectric;
-  shares.metal_fill = metallic * metal * fill_color(mean_schlick(brightest), layers.missing_metal.mean());
+  const double metallic = layers.metallic, typical = reflectance.mean();
+  LobeShares shares;
+  if (layers.clearcoat > 0) shares.coat = layers.coat.at(cosine_o);
+  if (metallic < 1) {
+    const double missing = layers.missing_dielectric.at(cosine_o);
+    shares.base = (1 - metallic) * (1 - shares.coat - missing);
+    shares.dielectric_fill = (1 - metallic) * typical * missing;
+  }
+  if (metallic > 0) {
+    const double missing = layers.missing_metal.at(cosine_o);
+    shares.base += metallic * (1 - shares.coat - missing) * fresnel_schlick(cosine_o, typical);
+    shares.metal_fill = metallic * missing * fill_color(mean_schlick(typical), layers.missing_metal.mean());
+  }
+  shares.base = std::max(1e-3, shares.base);
   const double sum = shares.coat + shares.base + shares.dielectric_fill + shares.metal_fill;
   return {shares.coat / sum, shares.base / sum, shares.dielectric_fill / sum, shares.metal_fill / sum};
 }
@@ -90,48 +94,49 @@ PrincipledScattering prepare(const Principled& settings) {
   return layers;
 }
 
-void evaluate(const PrincipledScattering& layers, const BandsIn& reflectance, const Eigen::Vector3d& wi,
-              const Eigen::Vector3d& wo, BandsOut f) {
-  const double cosine = std::min(1.0, wo.dot((wi + wo).normalized()));
-  const double base = ggx_reflection(layers.alpha, wi, wo) * through_coat(layers, wo.z(), wi.z());
+double evaluate(const PrincipledScattering& layers, const BandsIn& reflectance, const Eigen::Vector3d& wi,
+                const Eigen::Vector3d& wo, BandsOut f) {
+  const double cosine = facet_cosine(wi, wo), metallic = layers.metallic;
+  const LobeShares shares = lobe_shares(layers, reflectance, wo.z());
+  GgxReflection base = ggx_reflection(layers.alpha, wi, wo);
+  double density = shares.base * base.pdf, uncolored = 0;
+  if (layers.clearcoat > 0) {
+    const GgxReflection coat = ggx_reflection(layers.coat_alpha, wi, wo);
+    density += shares.coat * coat.pdf;
+    uncolored = layers.clearcoat * fresnel_dielectric(cosine, coat_index) * coat.f;
+    base.f *= through_coat(layers, wo.z(), wi.z());
+  }
   const auto fill_of = [&](const CosineTable& missing) {
     return fill(missing.at(wo.z()), missing.at(wi.z()), missing.mean());
   };
-  const double diffuse = (1 - layers.metallic) * fill_of(layers.missing_dielectric);
-  const double several = layers.metallic * fill_of(layers.missing_metal);
-  double uncolored = (1 - layers.metallic) * fresnel_dielectric(cosine, layers.index) * base;
-  if (layers.clearcoat > 0)
-    uncolored += layers.clearcoat * fresnel_dielectric(cosine, coat_index) * ggx_reflection(layers.coat_alpha, wi, wo);
-  if (layers.metallic == 0) {
-    f = uncolored + diffuse * reflectance;
-    return;
+  double diffuse = 0;
+  if (metallic < 1) {
+    density += shares.dielectric_fill * wi.z() / pi;
+    uncolored += (1 - metallic) * fresnel_dielectric(cosine, layers.index) * base.f;
+    diffuse = (1 - metallic) * fill_of(layers.missing_dielectric);
   }
+  f = uncolored + diffuse * reflectance.head(f.size());
+  if (metallic == 0) return density;
+  const double several = metallic * fill_of(layers.missing_metal), missing = layers.missing_metal.mean();
   for (Eigen::Index band = 0; band < f.size(); ++band)
-    f[band] = uncolored + diffuse * reflectance[band] +
-              layers.metallic * base * fresnel_schlick(cosine, reflectance[band]) +
-              several * fill_color(mean_schlick(reflectance[band]), layers.missing_metal.mean());
-}
-
-double pdf(const PrincipledScattering& layers, const BandsIn& reflectance, const Eigen::Vector3d& wi,
-           const Eigen::Vector3d& wo) {
-  const LobeShares shares = lobe_shares(layers, reflectance, wo.z());
-  double sum = shares.base * ggx_reflection_pdf(layers.alpha, wi, wo) +
-               shares.dielectric_fill * layers.missing_dielectric.pdf(wi.z()) +
-               shares.metal_fill * layers.missing_metal.pdf(wi.z());
-  if (shares.coat > 0) sum += shares.coat * ggx_reflection_pdf(layers.coat_alpha, wi, wo);
-  return sum;
+    f[band] += metallic * base.f * fresnel_schlick(cosine, reflectance[band]) +
+               several * fill_color(mean_schlick(reflectance[band]), missing);
+  return density + shares.metal_fill * wi.z() / pi;
 }
 
 Eigen::Vector3d sample(const PrincipledScattering& layers, const BandsIn& reflectance, const Eigen::Vector3d& wo,
-                       const Eigen::Vector3d& u) {
+                       const Eigen::Vector2d& u) {
   const LobeShares shares = lobe_shares(layers, reflectance, wo.z());
-  const Eigen::Vector2d place = u.tail<2>();
-  double lobe = u.x();
-  if (lobe < shares.coat) return mirrored(wo, ggx_sample_visible(layers.coat_alpha, wo, place));
-  lobe -= shares.coat;
-  if (lobe < shares.dielectric_fill) return layers.missing_dielectric.sample(place);
-  lobe -= shares.dielectric_fill;
-  if (lobe < shares.metal_fill) return layers.missing_metal.sample(place);
+  Eigen::Vector2d place = u;
+  double rest = 1;
+  const auto choose_lobe = [&](double share) {
+    const bool chosen = choose(share / rest, place.x());
+    rest -= share;
+    return chosen;
+  };
+  if (choose_lobe(shares.dielectric_fill)) return square_to_cosine_hemisphere(place);
+  if (choose_lobe(shares.coat)) return mirrored(wo, ggx_sample_visible(layers.coat_alpha, wo, place));
+  if (choose_lobe(shares.metal_fill)) return square_to_cosine_hemisphere(place);
   return mirrored(wo, ggx_sample_visible(layers.alpha, wo, place));
 }
 

@@ -35,12 +35,10 @@ struct PrincipledScattering {
 /// @throw std::invalid_argument naming the setting that is out of range.
 PrincipledScattering prepare(const Principled& settings);
 
-/// As for conductors: wi and wo with z > 0, u in [0, 1)³. `sample` may give a direction below the surface.
-void evaluate(const PrincipledScattering& layers, const BandsIn& reflectance, const Eigen::Vector3d& wi,
-              const Eigen::Vector3d& wo, BandsOut f);
-double pdf(const PrincipledScattering& layers, const BandsIn& reflectance, const Eigen::Vector3d& wi,
-           const Eigen::Vector3d& wo);
+/// As for conductors: wi and wo with z > 0, u in [0, 1)². `sample` may give a direction below the surface.
+double evaluate(const PrincipledScattering& layers, const BandsIn& reflectance, const Eigen::Vector3d& wi,
+                const Eigen::Vector3d& wo, BandsOut f);
 Eigen::Vector3d sample(const PrincipledScattering& layers, const BandsIn& reflectance, const Eigen::Vector3d& wo,
-                       const Eigen::Vector3d& u);
+                       const Eigen::Vector2d& u);
 
 }  // namespace tensorray

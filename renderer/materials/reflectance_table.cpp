@@ -1,7 +1,6 @@
 #include "renderer/materials/reflectance_table.h"
 
 #include <algorithm>
-#include <array>
 
 namespace tensorray {
 namespace {
@@ -30,18 +29,13 @@ void ReflectanceTable::reflectance(const Eigen::Vector3f& color, BandsOut reflec
   const Eigen::Array3f place = color.array().max(0).min(1) * cells;
   const Eigen::Array3i node = place.cast<int>().min(cells - 1);
   const Eigen::Array3f above = place - node.cast<float>(), below = 1 - above;
-  std::array<const float*, 8> spectra;
-  std::array<float, 8> weights;
-  for (int corner = 0; corner < 8; ++corner) {
-    const int x = corner & 1, y = corner >> 1 & 1, z = corner >> 2;
-    weights[corner] = (x ? above : below)[0] * (y ? above : below)[1] * (z ? above : below)[2];
-    spectra[corner] = nodes_.col(node[0] + x + stride * (node[1] + y + stride * (node[2] + z))).data() + first_band;
-  }
-  for (Eigen::Index band = 0; band < reflectance.size(); ++band) {
-    float sum = 0;
-    for (int corner = 0; corner < 8; ++corner) sum += weights[corner] * spectra[corner][band];
-    reflectance[band] = sum;
-  }
+  const auto node_at = [&](int x, int y, int z) {
+    return nodes_.col(node[0] + x + stride * (node[1] + y + stride * (node[2] + z)))
+        .segment(first_band, reflectance.size());
+  };
+  const auto line = [&](int y, int z) { return below[0] * node_at(0, y, z) + above[0] * node_at(1, y, z); };
+  const auto near = below[1] * line(0, 0) + above[1] * line(1, 0), far = below[1] * line(0, 1) + above[1] * line(1, 1);
+  reflectance = (below[2] * near + above[2] * far).cast<double>();
 }
 
 }  // namespace tensorray

@@ -26,7 +26,7 @@ class ReflectanceTable {
   void reflectance(const Eigen::Vector3f& color, BandsOut reflectance, Eigen::Index first_band = 0) const;
 
   /// The colour, in the working space, of the values of all bands.
-  Eigen::Vector3f color(const BandsIn& values) const { return (colors_ * values.matrix()).cast<float>(); }
+  Eigen::Vector3f color(const BandsIn& values) const { return colors_.lazyProduct(values.matrix()).cast<float>(); }
 
   /// The luminance (Y) of the values of all bands.
   double luminance(const BandsIn& values) const { return luminance_.dot(values.matrix()); }

@@ -5,6 +5,7 @@
 #include <stdexcept>
 
 #include "base/text.h"
+#include "renderer/sampling/sampling.h"
 
 namespace tensorray {
 namespace {
@@ -115,31 +116,29 @@ ConductorScattering prepare(const RoughConductor& settings) {
   return metal;
 }
 
-void evaluate(const ConductorScattering& metal, const BandsIn& reflectance, const Eigen::Vector3d& wi,
-              const Eigen::Vector3d& wo, BandsOut f, Eigen::Index first_band) {
-  const double single = ggx_reflection(metal.alpha, wi, wo);
-  const double missing = metal.missing.mean();
+double evaluate(const ConductorScattering& metal, const BandsIn& reflectance, const Eigen::Vector3d& wi,
+                const Eigen::Vector3d& wo, BandsOut f, Eigen::Index first_band) {
+  const GgxReflection single = ggx_reflection(metal.alpha, wi, wo);
+  const double share = single_bounce_share(metal, wo), missing = metal.missing.mean();
   const double several = fill(metal.missing.at(wo.z()), metal.missing.at(wi.z()), missing);
-  const double cosine = std::min(1.0, wo.dot((wi + wo).normalized()));
+  const double cosine = facet_cosine(wi, wo);
   const auto index_n = metal.index.n.segment(first_band, f.size()),
              index_k = metal.index.k.segment(first_band, f.size());
   const auto mean_fresnel = metal.mean_fresnel.segment(first_band, f.size());
   for (Eigen::Index band = 0; band < f.size(); ++band) {
     const double fresnel = fresnel_conductor(cosine, index_n[band], index_k[band]);
     f[band] =
-        reflectance[band] * fresnel * single + fill_color(reflectance[band] * mean_fresnel[band], missing) * several;
+        reflectance[band] * fresnel * single.f + fill_color(reflectance[band] * mean_fresnel[band], missing) * several;
   }
-}
-
-double pdf(const ConductorScattering& metal, const BandsIn&, const Eigen::Vector3d& wi, const Eigen::Vector3d& wo) {
-  const double share = single_bounce_share(metal, wo);
-  return share * ggx_reflection_pdf(metal.alpha, wi, wo) + (1 - share) * metal.missing.pdf(wi.z());
+  return share * single.pdf + (1 - share) * metal.missing.pdf(wi.z());
 }
 
 Eigen::Vector3d sample(const ConductorScattering& metal, const BandsIn&, const Eigen::Vector3d& wo,
-                       const Eigen::Vector3d& u) {
-  if (u.x() < single_bounce_share(metal, wo)) return mirrored(wo, ggx_sample_visible(metal.alpha, wo, u.tail<2>()));
-  return metal.missing.sample(u.tail<2>());
+                       const Eigen::Vector2d& u) {
+  Eigen::Vector2d place = u;
+  if (choose(single_bounce_share(metal, wo), place.x()))
+    return mirrored(wo, ggx_sample_visible(metal.alpha, wo, place));
+  return metal.missing.sample(place);
 }
 
 }  // namespace tensorray

@@ -40,18 +40,16 @@ struct ConductorScattering {
 /// @throw std::invalid_argument if the roughness is out of range, or n and k differ in size or are not finite and >= 0.
 ConductorScattering prepare(const RoughConductor& settings);
 
-/// Sets f for wi and wo with z > 0.
+/// Sets f for wi and wo with z > 0, in as many bands as it has.
 /// @param reflectance  A factor of Fresnel's reflectance at every bounce.
-void evaluate(const ConductorScattering& metal, const BandsIn& reflectance, const Eigen::Vector3d& wi,
-              const Eigen::Vector3d& wo, BandsOut f, Eigen::Index first_band = 0);
-
-/// Directions below the surface, which `sample` may give, have density 0, so the integral of the density is below 1.
-double pdf(const ConductorScattering& metal, const BandsIn& reflectance, const Eigen::Vector3d& wi,
-           const Eigen::Vector3d& wo);
+/// @return the density of `sample`. Directions below the surface, which it may give, have density 0, so the integral of
+/// the density is below 1.
+double evaluate(const ConductorScattering& metal, const BandsIn& reflectance, const Eigen::Vector3d& wi,
+                const Eigen::Vector3d& wo, BandsOut f, Eigen::Index first_band = 0);
 
 /// Samples a direction wi. It may be below the surface, where nothing is reflected.
-/// @param u  In [0, 1)³.
+/// @param u  In [0, 1)².
 Eigen::Vector3d sample(const ConductorScattering& metal, const BandsIn& reflectance, const Eigen::Vector3d& wo,
-                       const Eigen::Vector3d& u);
+                       const Eigen::Vector2d& u);
 
 }  // namespace tensorray

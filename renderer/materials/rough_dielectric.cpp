@@ -7,6 +7,8 @@
 
 #include <Eigen/Geometry>
 
+#include "renderer/sampling/sampling.h"
+
 namespace tensorray {
 namespace {
 
@@ -108,38 +110,30 @@ DielectricScattering prepare(const RoughDielectric& settings) {
   return glass;
 }
 
-void evaluate(const DielectricScattering& glass, const BandsIn& reflectance, const Eigen::Vector3d& wi,
-              const Eigen::Vector3d& wo, BandsOut f) {
+double evaluate(const DielectricScattering& glass, const BandsIn& reflectance, const Eigen::Vector3d& wi,
+                const Eigen::Vector3d& wo, BandsOut f) {
   const bool outside = wo.z() > 0;
   const View view = view_of(glass, outside);
   const Eigen::Vector3d o = turned(wo, outside), i = turned(wi, outside);
-  const double missing = view.near.at(o.z());
-  double value = 0;
+  const double missing = view.near.at(o.z()), share = single_bounce_share(view, o);
+  double value = 0, density = 0;
   if (i.z() > 0) {
-    value = fresnel(o, (i + o).normalized(), view.index) * ggx_reflection(glass.alpha, i, o) +
-            (1 - view.refracted) * fill(missing, view.near.at(i.z()), view.near.mean());
+    const double reflected = fresnel_dielectric(facet_cosine(i, o), view.index), rest = 1 - view.refracted;
+    const GgxReflection single = ggx_reflection(glass.alpha, i, o);
+    value = reflected * single.f + rest * fill(missing, view.near.at(i.z()), view.near.mean());
+    density = share * reflected * single.pdf + (1 - share) * rest * view.near.pdf(i.z());
   } else {
+    value = view.refracted_radiance * fill(missing, view.far.at(-i.z()), 1);
+    density = (1 - share) * view.refracted * view.far.pdf(-i.z());
     const auto [m, jacobian] = refraction_between(i, o, view.index);
-    if (jacobian > 0)
-      value = (1 - fresnel(o, m, view.index)) * ggx_visible_pdf(glass.alpha, o, m) *
-              ggx_shadowing(glass.alpha, o.z(), -i.z()) * jacobian / (-i.z() * square(view.index));
-    value += view.refracted_radiance * fill(missing, view.far.at(-i.z()), 1);
+    if (jacobian > 0) {
+      const double single = (1 - fresnel(o, m, view.index)) * ggx_visible_pdf(glass.alpha, o, m) * jacobian;
+      value += single * ggx_shadowing(glass.alpha, o.z(), -i.z()) / (-i.z() * square(view.index));
+      density += share * single;
+    }
   }
-  f = reflectance * value;
-}
-
-double pdf(const DielectricScattering& glass, const BandsIn&, const Eigen::Vector3d& wi, const Eigen::Vector3d& wo) {
-  const bool outside = wo.z() > 0;
-  const View view = view_of(glass, outside);
-  const Eigen::Vector3d o = turned(wo, outside), i = turned(wi, outside);
-  const double share = single_bounce_share(view, o);
-  if (i.z() > 0)
-    return share * fresnel(o, (i + o).normalized(), view.index) * ggx_reflection_pdf(glass.alpha, i, o) +
-           (1 - share) * (1 - view.refracted) * view.near.pdf(i.z());
-  const auto [m, jacobian] = refraction_between(i, o, view.index);
-  const double several = (1 - share) * view.refracted * view.far.pdf(-i.z());
-  if (jacobian <= 0) return several;
-  return share * (1 - fresnel(o, m, view.index)) * ggx_visible_pdf(glass.alpha, o, m) * jacobian + several;
+  f = reflectance.head(f.size()) * value;
+  return density;
 }
 
 Eigen::Vector3d sample(const DielectricScattering& glass, const BandsIn&, const Eigen::Vector3d& wo,
@@ -147,16 +141,16 @@ Eigen::Vector3d sample(const DielectricScattering& glass, const BandsIn&, const 
   const bool outside = wo.z() > 0;
   const View view = view_of(glass, outside);
   const Eigen::Vector3d o = turned(wo, outside);
-  const double share = single_bounce_share(view, o);
-  if (u.x() < share) {
-    const Eigen::Vector3d m = ggx_sample_visible(glass.alpha, o, u.tail<2>());
-    const bool reflects = u.x() < share * fresnel(o, m, view.index);
+  Eigen::Vector2d place = u.head<2>();
+  if (choose(single_bounce_share(view, o), place.x())) {
+    const Eigen::Vector3d m = ggx_sample_visible(glass.alpha, o, place);
+    const bool reflects = u.z() < fresnel(o, m, view.index);
     // Light that leaves a facet to the wrong side has no density.
     const Eigen::Vector3d wi = reflects ? mirrored(o, m) : refracted(o, m, view.index);
     return (reflects ? wi.z() > 0 : wi.z() < 0) ? turned(wi, outside) : Eigen::Vector3d::Zero();
   }
-  if (u.x() >= share + (1 - share) * view.refracted) return turned(view.near.sample(u.tail<2>()), outside);
-  return turned(view.far.sample(u.tail<2>()), !outside);
+  if (u.z() >= view.refracted) return turned(view.near.sample(place), outside);
+  return turned(view.far.sample(place), !outside);
 }
 
 }  // namespace tensorray

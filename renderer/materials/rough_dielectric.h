@@ -28,10 +28,9 @@ DielectricScattering prepare(const RoughDielectric& settings);
 
 /// Arguments are as for conductors, but wi and wo may have any z except 0.
 /// @param reflectance  A factor of all scattered light.
-void evaluate(const DielectricScattering& glass, const BandsIn& reflectance, const Eigen::Vector3d& wi,
-              const Eigen::Vector3d& wo, BandsOut f);
-double pdf(const DielectricScattering& glass, const BandsIn& reflectance, const Eigen::Vector3d& wi,
-           const Eigen::Vector3d& wo);
+double evaluate(const DielectricScattering& glass, const BandsIn& reflectance, const Eigen::Vector3d& wi,
+                const Eigen::Vector3d& wo, BandsOut f);
+/// @param u  In [0, 1)³; z chooses between reflection and refraction.
 /// May give a zero vector, or a direction for which `evaluate` gives 0: this light is lost between the facets.
 Eigen::Vector3d sample(const DielectricScattering& glass, const BandsIn& reflectance, const Eigen::Vector3d& wo,
                        const Eigen::Vector3d& u);

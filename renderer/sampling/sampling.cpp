@@ -18,10 +18,9 @@ std::uint64_t sequence_seed(const PathSampler& path) {
 /// angles.
 Eigen::Vector3d direction_at(double height, double turn) {
   const double across = std::sqrt(std::max(0.0, height * (2 - height)));
-  return {across * std::cos(2 * pi * turn), across * std::sin(2 * pi * turn), 1 - height};
+  const Eigen::Vector2d place = across * circle_at(turn);
+  return {place.x(), place.y(), 1 - height};
 }
-
-double one_minus_cosine(double angle) { return 2 * std::pow(std::sin(angle / 2), 2); }
 
 }  // namespace
 
@@ -48,13 +47,25 @@ Eigen::Matrix3d frame_about(const Eigen::Vector3d& axis) {
   return frame;
 }
 
+Eigen::Vector2d circle_at(double turn) {
+  // Taylor's series for the angle from the nearest quarter turn: the next terms are below 1e-15.
+  const int quarter = static_cast<int>(4 * turn + 8.5) - 8;
+  const double angle = (turn - 0.25 * quarter) * (2 * pi), x = angle * angle;
+  const double x2 = x * x, x4 = x2 * x2;
+  const double sine = angle * ((1 - x / 6) + x2 * (1.0 / 120 - x / 5040) +
+                               x4 * ((1.0 / 362880 - x / 39916800) + x2 * (1.0 / 6227020800 - x / 1307674368000)));
+  const double cosine = (1 - x / 2) + x2 * (1.0 / 24 - x / 720) +
+                        x4 * ((1.0 / 40320 - x / 3628800) + x2 * (1.0 / 479001600 - x / 87178291200));
+  const double along = quarter & 1 ? -sine : cosine, across = quarter & 1 ? cosine : sine;
+  return quarter & 2 ? Eigen::Vector2d(-along, -across) : Eigen::Vector2d(along, across);
+}
+
 Eigen::Vector2d square_to_disk(const Eigen::Vector2d& u) {
   const Eigen::Vector2d p = 2 * u - Eigen::Vector2d::Ones();
   if (p.isZero(0)) return Eigen::Vector2d::Zero();
   const bool along_x = std::abs(p.x()) > std::abs(p.y());
   const double radius = along_x ? p.x() : p.y();
-  const double angle = along_x ? pi / 4 * p.y() / p.x() : pi / 2 - pi / 4 * p.x() / p.y();
-  return {radius * std::cos(angle), radius * std::sin(angle)};
+  return radius * circle_at(along_x ? p.y() / p.x() / 8 : 0.25 - p.x() / p.y() / 8);
 }
 
 Eigen::Vector3d square_to_cosine_hemisphere(const Eigen::Vector2d& u) {
@@ -64,8 +75,12 @@ Eigen::Vector3d square_to_cosine_hemisphere(const Eigen::Vector2d& u) {
 
 Eigen::Vector3d square_to_sphere(const Eigen::Vector2d& u) { return direction_at(2 * u.x(), u.y()); }
 
+double one_minus_cosine(double angle) { return 2 * std::pow(std::sin(angle / 2), 2); }
+
+Eigen::Vector3d square_to_cap(const Eigen::Vector2d& u, double height) { return direction_at(height * u.x(), u.y()); }
+
 Eigen::Vector3d square_to_cone(const Eigen::Vector2d& u, double angle) {
-  return direction_at(one_minus_cosine(angle) * u.x(), u.y());
+  return square_to_cap(u, one_minus_cosine(angle));
 }
 
 double cone_solid_angle(double angle) { return 2 * pi * one_minus_cosine(angle); }

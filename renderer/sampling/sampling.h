@@ -3,6 +3,7 @@
 /// Low-discrepancy numbers for the dimensions of a light path, and warps from the unit square to other domains.
 /// Everything here is a pure function, or belongs to one thread.
 
+#include <algorithm>
 #include <cstdint>
 
 #include <Eigen/Core>
@@ -10,11 +11,11 @@
 namespace tensorray {
 
 /// The random numbers of one light path: each call takes the next dimension. Each dimension is a separate Sobol
-/// sequence, shuffled and Owen-scrambled by a hash of (seed, pixel, dimension); `sample` is the index into it (padding:
-/// Burley 2020, "Practical Hash-based Owen Scrambling"). So the samples of a pixel are stratified in each dimension,
-/// and the two numbers of `next_2d` are stratified jointly: of the first 2^k samples, one is in each elementary
-/// interval. Different dimensions and different pixels are uncorrelated.
-/// Where light paths of a pixel branch, set `dimension` so that the same choice always has the same dimension.
+/// sequence, shuffled and Owen-scrambled by a hash of (seed, pixel, dimension); `sample` is the index
+/// into it (padding: Burley 2020, "Practical Hash-based Owen Scrambling"). So the samples of a pixel are stratified in
+/// each dimension, and the two numbers of `next_2d` are stratified jointly: of the first 2^k samples, one is in each
+/// elementary interval. Different dimensions and different pixels are uncorrelated. Where light paths of a pixel
+/// branch, set `dimension` so that the same choice always has the same dimension.
 struct PathSampler {
   std::uint64_t seed = 0;
   std::uint64_t pixel = 0;   ///< y * width + x.
@@ -25,9 +26,21 @@ struct PathSampler {
   Eigen::Vector2d next_2d();  ///< In [0, 1)²; uses up one dimension, as next_1d does.
 };
 
+/// Chooses with the probability `share`, and keeps `u` (uniform in [0, 1)) uniform for the next choice: one number can
+/// choose a lobe and then a direction of the lobe, which keeps the directions of each lobe stratified.
+inline bool choose(double share, double& u) {
+  const bool chosen = u < share;
+  constexpr double below_one = 1 - 0x1p-53;
+  u = std::min(chosen ? u / share : (u - share) / (1 - share), below_one);
+  return chosen;
+}
+
 /// An orthonormal, right-handed frame about a unit vector: columns tangent, bitangent, axis (Duff et al. 2017,
 /// "Building an Orthonormal Basis, Revisited"). It is discontinuous where axis.z changes sign.
 Eigen::Matrix3d frame_about(const Eigen::Vector3d& axis);
+
+/// The point of the unit circle at `turn` turns from +x towards +y, to 2e-15. @param turn  In [−2, 2].
+Eigen::Vector2d circle_at(double turn);
 
 // The warps map `u`, uniform in the unit square, to the stated density. Nearby points stay nearby, so that
 // stratification is preserved.
@@ -40,6 +53,12 @@ Eigen::Vector3d square_to_cosine_hemisphere(const Eigen::Vector2d& u);
 
 /// Unit directions, uniform: density 1/(4π).
 Eigen::Vector3d square_to_sphere(const Eigen::Vector2d& u);
+
+/// 1 − cos angle; accurate also for small angles.
+double one_minus_cosine(double angle);
+
+/// Unit directions with 1 − z below `height` (0 to 2), uniform: density 1 / (2π height).
+Eigen::Vector3d square_to_cap(const Eigen::Vector2d& u, double height);
 
 /// Unit directions within `angle` (radians, 0 to π) of +z, uniform: density 1 / cone_solid_angle(angle).
 Eigen::Vector3d square_to_cone(const Eigen::Vector2d& u, double angle);

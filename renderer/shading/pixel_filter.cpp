@@ -10,10 +10,10 @@
 namespace tensorray {
 namespace {
 
-/// The quantiles are tabulated at this many equal steps.
-constexpr int steps = 1024;
-/// Steps at each end in which the quantile is searched for: it has no finite derivative at an end where the density is
-/// 0.
+/// The quantiles of one half of a filter are tabulated at this many equal steps; the other half mirrors it.
+constexpr int steps = 512;
+/// The first steps have a finer table of their own, and in its first steps the quantile is searched for: it has no
+/// finite derivative at an end where the density is 0.
 constexpr int searched_steps = 12;
 
 /// All shapes are defined on [−1, 1] and have integral 1.
@@ -52,11 +52,18 @@ double default_radius(PixelFilterShape shape) { return shape == PixelFilterShape
 PixelFilter::PixelFilter(PixelFilterShape shape, double radius) : shape_(shape), radius_(radius) {
   if (!(radius > 0 && std::isfinite(radius)))
     throw std::invalid_argument("the pixel filter's radius must be above 0, not " + std::to_string(radius));
-  quantiles_.push_back({-radius, 0});
+  middle_ = quantiles(0.5);
+  end_ = quantiles(0.5 * searched_steps / steps);
+}
+
+/// The quantiles from 0 to `last`, at equal steps.
+std::vector<PixelFilter::Quantile> PixelFilter::quantiles(double last) const {
+  std::vector<Quantile> result{{-radius_, 0}};
   for (int i = 1; i <= steps; ++i) {
-    const double x = i < steps ? invert(static_cast<double>(i) / steps, quantiles_.back().position, radius) : radius;
-    quantiles_.push_back({x, 1 / (steps * density(x))});
+    const double x = invert(last * i / steps, result.back().position, 0);
+    result.push_back({x, last / (steps * density(x))});
   }
+  return result;
 }
 
 double PixelFilter::density(double x) const {
@@ -86,13 +93,21 @@ double PixelFilter::cumulative(double x) const {
   return 0.5 + t / 2;
 }
 
-/// Interpolates the quantiles by the cubic polynomials that also have their derivatives (Hermite).
 double PixelFilter::sample(double u) const {
-  const int i = std::clamp(static_cast<int>(u * steps), 0, steps - 1);
-  const Quantile& low = quantiles_[i];
-  const Quantile& high = quantiles_[i + 1];
-  if (i < searched_steps || i >= steps - searched_steps) return invert(u, low.position, high.position);
-  const double t = u * steps - i, rest = 1 - t;
+  if (shape_ == PixelFilterShape::box) return (2 * u - 1) * radius_;
+  return u < 0.5 ? lower_sample(u) : -lower_sample(1 - u);
+}
+
+/// Interpolates the quantiles by the cubic polynomials that also have their derivatives (Hermite).
+/// @param u  0 to ½.
+double PixelFilter::lower_sample(double u) const {
+  const bool is_end = u < 0.5 * searched_steps / steps;
+  const std::vector<Quantile>& quantiles = is_end ? end_ : middle_;
+  const double place = u * (is_end ? 2.0 * steps * steps / searched_steps : 2.0 * steps);
+  const int i = std::min(static_cast<int>(place), steps - 1);
+  const Quantile &low = quantiles[i], &high = quantiles[i + 1];
+  if (is_end && i < searched_steps) return invert(u, low.position, high.position);
+  const double t = place - i, rest = 1 - t;
   return low.position + t * t * (3 - 2 * t) * (high.position - low.position) +
          t * rest * (rest * low.slope - t * high.slope);
 }

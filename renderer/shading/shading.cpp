@@ -16,7 +16,7 @@ using Eigen::Vector3d;
 
 /// First dimension of the sampler for shading; the camera uses those before.
 constexpr std::uint32_t first_dimension = 2;
-constexpr std::uint32_t dimensions_per_vertex = 5;
+constexpr std::uint32_t dimensions_per_vertex = 4;
 
 /// Least cosine between the shading normal and the direction to the viewer. Interpolated normals can place the viewer
 /// below a surface that is seen from above.
@@ -183,9 +183,9 @@ void RayShader::shade_path(Vertex vertex, int depth) {
     if (!scene_.landed.empty()) add_landed_light(vertex, depth);
     if (scene_.has_photons()) add_photons(vertex, depth);
     add_direct_light(vertex, depth);
-    const double lobe = sampler.next_1d();
+    const double side = is_glass(*vertex.material) ? sampler.next_1d() : 0;
     const Eigen::Vector2d place = sampler.next_2d();
-    const Vector3d u(lobe, place.x(), place.y());
+    const Vector3d u(place.x(), place.y(), side);
     const auto scattered = sample(*vertex.material, reflectance_, vertex.wo, u, weight_, first_band());
     if (!scattered) return;
     throughput_ *= weight_;
@@ -228,20 +228,17 @@ double RayShader::material_weight(double material_pdf, const Density& light_pdf)
 }
 
 void RayShader::add_direct_light(const Vertex& vertex, int depth) {
-  PathSampler& sampler = this->sampler();
-  const double choice = sampler.next_1d();
-  const Eigen::Vector2d place = sampler.next_2d();
-  if (!scene_.lights.sample(vertex.point, choice, place, light_sample_, bands())) return;
+  if (!scene_.lights.sample(vertex.point, sampler().next_2d(), light_sample_, bands())) return;
   if (settings_.direct == DirectLight::material && !light_sample_.is_delta) return;
   const Vector3d wi = vertex.frame.transpose() * light_sample_.direction;
-  evaluate(*vertex.material, reflectance_, wi, vertex.wo, contribution_, first_band());
+  const double material_pdf = evaluate(*vertex.material, reflectance_, wi, vertex.wo, contribution_, first_band());
   if (!(contribution_.maxCoeff() > 0)) return;
   const Vector3d start = vertex.start(scene_.surfaces, wi);
   if (bends(start, light_sample_.direction, light_sample_.distance)) return seek_bent_light(vertex, wi, start, depth);
   if (is_shadowed(start, vertex.point)) return;
   double factor = std::abs(wi.z()) / light_sample_.pdf;
   if (settings_.direct == DirectLight::both && !light_sample_.is_delta) {
-    const double ratio = pdf(*vertex.material, reflectance_, wi, vertex.wo) / light_sample_.pdf;
+    const double ratio = material_pdf / light_sample_.pdf;
     factor /= 1 + ratio * ratio;
   }
   contribution_ *= throughput_ * as_array(light_sample_.radiance).cast<double>() * factor;

@@ -243,7 +243,8 @@ void SurfaceScene::State::attach(unsigned id, const RoundCurves& curves) {
 }
 
 RTCRay SurfaceScene::State::ray(const Vector3d& start, const Vector3d& direction, double distance) const {
-  const Vector3f local = ((start - origin) / unit).cast<float>();
+  const double scale = 1 / unit;
+  const Vector3f local = (scale * (start - origin)).cast<float>();
   RTCRay result{};
   result.org_x = local.x();
   result.org_y = local.y();
@@ -251,7 +252,7 @@ RTCRay SurfaceScene::State::ray(const Vector3d& start, const Vector3d& direction
   result.dir_x = static_cast<float>(direction.x());
   result.dir_y = static_cast<float>(direction.y());
   result.dir_z = static_cast<float>(direction.z());
-  result.tfar = static_cast<float>(distance / unit);
+  result.tfar = static_cast<float>(scale * distance);
   result.mask = 0xffffffffu;
   return result;
 }
@@ -259,7 +260,7 @@ RTCRay SurfaceScene::State::ray(const Vector3d& start, const Vector3d& direction
 /// Distance that a ray travels before it comes near the scene. Far from the scene, single precision is not enough.
 double SurfaceScene::State::approach(const Vector3d& from, const Vector3d& direction) const {
   const Vector3d way = origin - from;
-  return way.norm() > 2 * unit ? std::max(0.0, way.dot(direction) - 1.5 * unit) : 0.0;
+  return way.squaredNorm() > 4 * unit * unit ? std::max(0.0, way.dot(direction) - 1.5 * unit) : 0.0;
 }
 
 Corners SurfaceScene::State::corners(const SurfaceHit& hit) const {
@@ -274,7 +275,7 @@ void SurfaceScene::State::complete(const TriangleMesh& mesh, const Vector3d& dir
   const auto& [a, b, c] = corner.point;
   const Vector3d cross = (mesh.vertices[b] - mesh.vertices[a]).cross(mesh.vertices[c] - mesh.vertices[a]);
   hit.position = hit.lifted_position = corner.mean(mesh.vertices);
-  hit.normal = hit.shading_normal = cross.stableNormalized();
+  hit.normal = hit.shading_normal = cross.normalized();
   const std::vector<Vector3f>& normals = surfaces[hit.surface].normals;
   if (normals.empty()) return;
   const Vector3d smooth = corner.mean(normals).cast<double>();
@@ -346,8 +347,11 @@ std::optional<SurfaceHit> SurfaceScene::intersect(const Vector3d& origin, const 
   hit.primitive = result.hit.primID;
   hit.u = result.hit.u;
   const ShadedSurface& surface = state.surfaces[hit.surface];
-  if (const auto* mesh = std::get_if<TriangleMesh>(&surface.shape)) {
-    hit.v = result.hit.v;
+  const auto* mesh = std::get_if<TriangleMesh>(&surface.shape);
+  if (mesh) hit.v = result.hit.v;
+  // Colours come first, so that they are loaded while the rest is computed.
+  if (!surface.texture && !surface.colors.empty()) hit.color = state.corners(hit).mean(surface.colors);
+  if (mesh) {
     state.complete(*mesh, direction, hit);
   } else {
     hit.position = start + (result.ray.tfar * state.unit) * direction;
@@ -355,10 +359,7 @@ std::optional<SurfaceHit> SurfaceScene::intersect(const Vector3d& origin, const 
     state.complete(std::get<RoundCurves>(surface.shape), hit);
   }
   hit.distance = (hit.position - origin).dot(direction);
-  if (surface.texture)
-    hit.color = color_at(*surface.texture, hit.position);
-  else if (!surface.colors.empty())
-    hit.color = state.corners(hit).mean(surface.colors);
+  if (surface.texture) hit.color = color_at(*surface.texture, hit.position);
   return hit;
 }
 

@@ -46,7 +46,7 @@ Mean irradiance(const LightSampler& lights, const Vector3d& point, const Vector3
   LightSample sample;
   for (int i = 0; i < samples; ++i) {
     const Vector2d u(random_uniform(1, i, 1), random_uniform(1, i, 2));
-    const bool found = lights.sample(point, random_uniform(1, i, 0), u, sample);
+    const bool found = lights.sample(point, u, sample);
     mean.add(found ? sample.radiance[band] * std::max(0.0, sample.direction.dot(normal)) / sample.pdf : 0);
   }
   return mean;
@@ -97,7 +97,7 @@ TEST(AreaLight, SamplesLieOnTheMeshEvenly) {
   const Vector3d point(0.2, 0.4, -1);
   for (int i = 0; i < 50000; ++i) {
     const Vector2d u(random_uniform(2, i, 1), random_uniform(2, i, 2));
-    ASSERT_TRUE(lights.sample(point, random_uniform(2, i, 0), u, sample));
+    ASSERT_TRUE(lights.sample(point, u, sample));
     EXPECT_FALSE(sample.is_delta);
     const Vector3d p = point + sample.distance * sample.direction;
     EXPECT_NEAR(p.z(), 2, 1e-14);
@@ -127,7 +127,7 @@ TEST(AreaLight, DensityIntegratesToOne) {
 TEST(DirectionalLight, ParallelLightIsADelta) {
   const LightSampler lights({DirectionalLight{{0, 3, -4}, {5, 7}, 0}}, {1, 1}, unit_scene);
   LightSample sample;
-  ASSERT_TRUE(lights.sample({1, 2, 3}, 0.4, {0.1, 0.2}, sample));
+  ASSERT_TRUE(lights.sample({1, 2, 3}, {0.1, 0.2}, sample));
   EXPECT_TRUE(sample.is_delta);
   EXPECT_EQ(sample.pdf, 1);
   EXPECT_LT((sample.direction - Vector3d(0, -0.6, 0.8)).norm(), 1e-15);
@@ -150,7 +150,7 @@ TEST(DirectionalLight, ADiskGivesItsIrradiance) {
     const Mean tilted = irradiance(lights, Vector3d::Zero(), {0, 0, 1});
     EXPECT_NEAR(tilted.mean(), 5 * 0.8, 4 * tilted.error() + 1e-5) << angle;
     LightSample sample;
-    ASSERT_TRUE(lights.sample(Vector3d::Zero(), 0.5, {0.99, 0.3}, sample));
+    ASSERT_TRUE(lights.sample(Vector3d::Zero(), {0.99, 0.3}, sample));
     EXPECT_FALSE(sample.is_delta);
     EXPECT_NEAR(sample.pdf * cone_solid_angle(angle), 1, 1e-12);
     EXPECT_EQ(lights.background_pdf(to_light), 1 / cone_solid_angle(angle));
@@ -163,7 +163,7 @@ TEST(ConstantLight, IsLeftToTheMaterial) {
     if (has_other) list.emplace_back(DirectionalLight{{0, 0, -1}, {1, 1}, 0.1});
     const LightSampler lights(list, {1, 1}, unit_scene);
     LightSample sample;
-    EXPECT_EQ(lights.sample(Vector3d::Zero(), 0.3, {0.5, 0.5}, sample), has_other);
+    EXPECT_EQ(lights.sample(Vector3d::Zero(), {0.5, 0.5}, sample), has_other);
     EXPECT_EQ(lights.choice_probability(0), 0);
     EXPECT_EQ(lights.background_pdf({0.6, 0, 0.8}), 0);
     std::vector<float> radiance;
@@ -208,7 +208,7 @@ TEST(LightSampler, SampledBackgroundIsWhatARayWouldSee) {
   std::vector<float> radiance;
   for (int i = 0; i < 1000; ++i) {
     const Vector2d u(random_uniform(3, i, 1), random_uniform(3, i, 2));
-    ASSERT_TRUE(lights.sample(Vector3d::Zero(), random_uniform(3, i, 0), u, sample));
+    ASSERT_TRUE(lights.sample(Vector3d::Zero(), u, sample));
     lights.background(sample.direction, radiance);
     EXPECT_EQ(radiance, sample.radiance);
     EXPECT_EQ(lights.background_pdf(sample.direction), sample.pdf);
@@ -238,7 +238,7 @@ TEST(LightSampler, PowerIsLuminanceAboveAll) {
 TEST(LightSampler, NoLightIsDark) {
   const LightSampler lights({}, {1, 1}, {});
   LightSample sample;
-  EXPECT_FALSE(lights.sample(Vector3d::Zero(), 0.5, {0.5, 0.5}, sample));
+  EXPECT_FALSE(lights.sample(Vector3d::Zero(), {0.5, 0.5}, sample));
   EXPECT_EQ(lights.background_pdf({0, 0, 1}), 0);
   std::vector<float> radiance;
   lights.background({0, 0, 1}, radiance);

@@ -51,10 +51,9 @@ TEST(MicrofacetTest, ReflectionIsItsDensityTimesShadowing) {
   for (const double alpha : {0.0004, 0.3, 1.0})
     for (const double cosine : {1.0, 0.5, 1e-4}) {
       const Eigen::Vector3d wo = direction(cosine, 0), wi = direction(0.4, 2);
-      EXPECT_NEAR(ggx_reflection(alpha, wi, wo) * wi.z() /
-                      (ggx_reflection_pdf(alpha, wi, wo) * ggx_shadowing(alpha, wo.z(), wi.z())),
-                  1, 1e-12);
-      EXPECT_NEAR(ggx_reflection(alpha, wi, wo) / ggx_reflection(alpha, wo, wi), 1, 1e-12);
+      const GgxReflection there = ggx_reflection(alpha, wi, wo);
+      EXPECT_NEAR(there.f * wi.z() / (there.pdf * ggx_shadowing(alpha, wo.z(), wi.z())), 1, 1e-12);
+      EXPECT_NEAR(there.f / ggx_reflection(alpha, wo, wi).f, 1, 1e-12);
     }
 }
 

@@ -32,7 +32,7 @@ const std::vector<Room> rooms{
     {"renderer/surfaces", {}},
     {"renderer/color", {"renderer/images"}},
     {"renderer/film", {"renderer/color", "renderer/images"}},
-    {"renderer/materials", {"renderer/color"}},
+    {"renderer/materials", {"renderer/color", "renderer/sampling"}},
     {"renderer/textures", {"renderer/color", "renderer/images", "renderer/sampling"}},
     {"renderer/openimageio", {"renderer/images", "renderer/textures"}},
     {"renderer/lights", {"renderer/color", "renderer/sampling", "renderer/surfaces", "renderer/textures"}},

@@ -235,7 +235,7 @@ def measure_bending(options):
     fields = [tr.render(SCENE, changes={**keys, **more}, threads=options.threads, progress=False).statistics
               for more in ({}, {"bending.a": 0, "bending.b": 0})]
     seconds = [field["seconds"]["draw"] for field in fields]
-    return {"ways_a_second": fields[0]["positions"] / max(seconds[0] - seconds[1], 1e-3), "seconds_bent": seconds[0],
+    return {"ways_a_second": fields[0]["bent_rays"]["emitted"] / max(seconds[0] - seconds[1], 1e-3), "seconds_bent": seconds[0],
             "seconds_straight": seconds[1]}
 
 
