@@ -15,7 +15,7 @@ namespace {
 
 /// Bytes that a packet reads for a cell that is not in the cache: the four voxels that it does not share with its
 /// neighbour.
-constexpr double bytes_per_cold_cell = 4 * TensorBrick::bending_floats * sizeof(float);
+constexpr double bytes_per_cold_cell = 4 * TensorBrick::general * sizeof(float);
 
 struct Measurement {
   std::string name;
