@@ -95,27 +95,51 @@ HWY_INLINE F3 apply(const Tensor& T, const F3& v) {
           hn::MulAdd(T.c[5], v.y, hn::Mul(T.c[2], v.x))};
 }
 
-/// Offsets of a cell's corners from its first voxel, in voxels: z changes first, then y, then x.
+/// The corners of a cell: offsets from its first voxel, in voxels. z changes first, then y, then x.
 constexpr int corners[8] = {TensorBrick::voxel(0, 0, 0), TensorBrick::voxel(0, 0, 1), TensorBrick::voxel(0, 1, 0),
                             TensorBrick::voxel(0, 1, 1), TensorBrick::voxel(1, 0, 0), TensorBrick::voxel(1, 0, 1),
                             TensorBrick::voxel(1, 1, 0), TensorBrick::voxel(1, 1, 1)};
-/// The edges of a cell along y: offsets, in voxels, of their near ends from the cell's first voxel.
-constexpr int edges[4] = {corners[0], corners[1], corners[4], corners[5]};
-constexpr int along_y = TensorBrick::voxel(0, 1, 0);
+
+/// Distances of neighbouring voxels, in floats.
+template <int components>
+constexpr int y_stride = TensorBrick::bending_offset(components, TensorBrick::voxel(0, 1, 0));
+template <int components>
+constexpr int x_stride = TensorBrick::bending_offset(components, TensorBrick::voxel(1, 0, 0));
 
 using Eight = hn::CappedTag<float, 8>;  // For the components of one voxel.
 constexpr Eight eight;
 constexpr int eight_lanes = static_cast<int>(hn::MaxLanes(Eight()));
 
-/// The components of a voxel from `c` on; if it has fewer than the vector, the others are those of the next voxel.
-template <int components>
-HWY_INLINE hn::Vec<Eight> load_voxel(const float* c) {
-  return components == TensorBrick::general ? hn::Load(eight, c) : hn::LoadU(eight, c);
-}
+/// The memory of a cell: its first voxel, and the next one along z.
+struct Cell {
+  const float *near, *far;
+};
 
 template <int components>
-HWY_INLINE const float* cell_of(const Packet& packet, int lane) {
-  return packet.bending[lane] + static_cast<int>(packet.voxel[lane]) * components;
+HWY_INLINE Cell cell_of(const Packet& packet, int lane) {
+  const int voxel = static_cast<int>(packet.voxel[lane]);
+  const float* const brick = packet.bending[lane];
+  return {brick + TensorBrick::bending_offset(components, voxel),
+          brick + TensorBrick::bending_offset(components, voxel + 1)};
+}
+
+/// The near end of edge i of a cell along y. Odd edges are at the far voxel along z, edges 2 and 3 at the far one
+/// along x.
+template <int components>
+HWY_INLINE const float* edge_of(const Cell& cell, int i) {
+  return (i % 2 ? cell.far : cell.near) + i / 2 * x_stride<components>;
+}
+
+/// The lane of a far voxel's first component, where vectors hold more than the components of a voxel: these vectors end
+/// with its last component, so that no cache line beyond the cell is read.
+template <int components>
+constexpr int far_lane = components < eight_lanes ? eight_lanes - components : 0;
+
+/// Components c and following of the voxel at an end of edge i.
+template <int components>
+HWY_INLINE hn::Vec<Eight> load_voxel(const float* voxel, int i, int c) {
+  if (components == TensorBrick::general) return hn::Load(eight, voxel + c);
+  return hn::LoadU(eight, voxel + c - (i % 2 ? far_lane<components> : 0));
 }
 
 template <class V>
@@ -124,19 +148,19 @@ HWY_INLINE V between(V near, V far, V fraction) {
 }
 
 /// Trilinear interpolation along y, then x, then z. `near(i)` is the value at the near end of edge i, and `rise(i)`
-/// that at its far end minus that. The operations and their order are the same wherever they are done, and so are the
-/// results, bit for bit.
-template <class V, class Near, class Rise>
-HWY_INLINE V trilinear(const Near& near, const Rise& rise, V x, V y, V z) {
+/// that at its far end minus that. `aligned` moves values of far voxels to the lanes of near ones. The operations and
+/// their order are the same wherever they are done, and so are the results, bit for bit.
+template <class V, class Near, class Rise, class Aligned>
+HWY_INLINE V trilinear(const Near& near, const Rise& rise, const Aligned& aligned, V x, V y, V z) {
   const auto edge = [&](int i) HWY_ATTR { return hn::MulAdd(rise(i), y, near(i)); };
   const V first = between(edge(0), edge(2), x);
-  return between(first, between(edge(1), edge(3), x), z);
+  return between(first, aligned(between(edge(1), edge(3), x)), z);
 }
 
 /// Samples the tensors of `count` vectors, one or two, whose lanes are all in one cell. `rises` are those of the cell's
 /// edges. Each value is loaded once for all vectors, and copied to all lanes.
 template <int components, int count>
-HWY_INLINE void sample_cell(const float* HWY_RESTRICT cell, const float (&rises)[4][8], Packet& packet, int first) {
+HWY_INLINE void sample_cell(const Cell& cell, const float (&rises)[4][8], Packet& packet, int first) {
   F3 at[count];
   for (int n = 0; n < count; ++n) at[n] = load(packet.fraction, first + n * lanes);
 #pragma GCC unroll 8
@@ -144,8 +168,9 @@ HWY_INLINE void sample_cell(const float* HWY_RESTRICT cell, const float (&rises)
     F values[count];
 #pragma GCC unroll 2
     for (int n = 0; n < count; ++n)
-      values[n] = trilinear([&](int i) HWY_ATTR { return set(cell[edges[i] * components + c]); },
-                            [&](int i) HWY_ATTR { return set(rises[i][c]); }, at[n].x, at[n].y, at[n].z);
+      values[n] = trilinear([&](int i) HWY_ATTR { return set(edge_of<components>(cell, i)[c]); },
+                            [&](int i) HWY_ATTR { return set(rises[i][(i % 2 ? far_lane<components> : 0) + c]); },
+                            [](F far) HWY_ATTR { return far; }, at[n].x, at[n].y, at[n].z);
 #pragma GCC unroll 2
     for (int n = 0; n < count; ++n) store(values[n], packet.tensor[c], first + n * lanes);
   }
@@ -153,34 +178,60 @@ HWY_INLINE void sample_cell(const float* HWY_RESTRICT cell, const float (&rises)
 
 /// The same for any number of vectors.
 template <int components>
-HWY_INLINE void sample_cell(const float* cell, Packet& packet, int first, int count) {
+HWY_INLINE void sample_cell(const Cell& cell, Packet& packet, int first, int count) {
   alignas(64) float rises[4][8];
   for (int i = 0; i < 4; ++i)
     for (int c = 0; c < components; c += eight_lanes) {
-      const float* const edge = cell + edges[i] * components + c;
-      const auto rise = hn::Sub(load_voxel<components>(edge + along_y * components), load_voxel<components>(edge));
+      const float* const edge = edge_of<components>(cell, i);
+      const auto rise = hn::Sub(load_voxel<components>(edge + y_stride<components>, i, c),
+                                load_voxel<components>(edge, i, c));
       hn::Store(rise, eight, rises[i] + c);
     }
   for (; count > 1; count -= 2, first += 2 * lanes) sample_cell<components, 2>(cell, rises, packet, first);
   if (count > 0) sample_cell<components, 1>(cell, rises, packet, first);
 }
 
-/// Prefetches the memory of a cell.
+/// Prefetches the memory of a cell, given its first voxel.
 template <int components>
 HWY_INLINE void prefetch_cell(const float* cell) {
-  for (const int corner : corners) hwy::Prefetch(cell + corner * components);
+  constexpr int last = components == TensorBrick::general ? components : 2 * components - 1;
+  for (const int edge : {0, y_stride<components>, x_stride<components>, x_stride<components> + y_stride<components>}) {
+    hwy::Prefetch(cell + edge);
+    hwy::Prefetch(cell + edge + last);
+  }
+}
+
+/// Offsets, in floats, of voxels in their bricks, given their numbers.
+template <int components>
+HWY_INLINE void store_offsets(F voxel, std::int32_t (&offsets)[lanes]) {
+  // Of five components, floor(16/3 voxel); the sum keeps rounding away from whole numbers.
+  const F offset = components == TensorBrick::symmetric
+                       ? hn::Floor(hn::MulAdd(voxel, set(16.0f / 3), set(0.25f)))
+                       : hn::Mul(voxel, set(components));
+  hn::Store(hn::ConvertTo(ints, offset), ints, offsets);
+}
+
+/// Moves the components of a far voxel to the lanes of those of a near one.
+template <int components>
+HWY_INLINE hn::Vec<Eight> aligned(hn::Vec<Eight> far) {
+  if constexpr (far_lane<components> == 0) {
+    return far;
+  } else {
+    alignas(32) constexpr std::int32_t from[8] = {3, 4, 5, 6, 7, 0, 1, 2};
+    static_assert(far_lane<components> == 3, "the table moves components by three lanes");
+    return hn::TableLookupLanes(far, hn::SetTableIndices(eight, from));
+  }
 }
 
 /// Components `c` and following of a lane's tensor.
 template <int components>
-HWY_INLINE hn::Vec<Eight> sample_lane(const Packet& packet, int lane, int c) {
-  const float* const cell = cell_of<components>(packet, lane) + c;
+HWY_INLINE hn::Vec<Eight> sample_lane(const Packet& packet, const Cell& cell, int lane, int c) {
   const auto fraction = [&](int axis) HWY_ATTR { return hn::Set(eight, packet.fraction[axis][lane]); };
-  const auto near = [&](int i) HWY_ATTR { return load_voxel<components>(cell + edges[i] * components); };
+  const auto near = [&](int i) HWY_ATTR { return load_voxel<components>(edge_of<components>(cell, i), i, c); };
   const auto rise = [&](int i) HWY_ATTR {
-    return hn::Sub(load_voxel<components>(cell + (edges[i] + along_y) * components), near(i));
+    return hn::Sub(load_voxel<components>(edge_of<components>(cell, i) + y_stride<components>, i, c), near(i));
   };
-  return trilinear(near, rise, fraction(0), fraction(1), fraction(2));
+  return trilinear(near, rise, aligned<components>, fraction(0), fraction(1), fraction(2));
 }
 
 /// Four rows to four columns in each block of four.
@@ -228,11 +279,19 @@ HWY_INLINE F row_of(const Sample& sample, int lane) {
 /// time. Prefetches the cells `ahead` (offsets, in floats, within the lanes' bricks).
 template <int components>
 HWY_INLINE void sample_own_cells(Packet& packet, int at, const std::int32_t (&ahead)[lanes]) {
+  alignas(64) std::int32_t near[lanes], far[lanes];
+  const F voxel = load(packet.voxel, at);
+  store_offsets<components>(voxel, near);
+  store_offsets<components>(hn::Add(voxel, set(1)), far);
+  const auto cell = [&](int lane) HWY_ATTR {
+    const float* const brick = packet.bending[at + lane];
+    return Cell{brick + near[lane], brick + far[lane]};
+  };
   for (int c = 0; c < components; c += eight_lanes) {
     F rows[eight_lanes];
 #pragma GCC unroll 8
     for (int row = 0; row < eight_lanes; ++row)
-      rows[row] = row_of([&](int lane) HWY_ATTR { return sample_lane<components>(packet, at + lane, c); }, row);
+      rows[row] = row_of([&](int lane) HWY_ATTR { return sample_lane<components>(packet, cell(lane), at + lane, c); }, row);
     if (c == 0)
       for (int lane = 0; lane < lanes; ++lane) prefetch_cell<components>(packet.bending[at + lane] + ahead[lane]);
     transpose_rows(rows);
@@ -257,11 +316,12 @@ HWY_INLINE Polynomial<V> polynomial(const Corner& c) {
   return {{c(0), z, y, yz, x, hn::Sub(far, z), hn::Sub(far_y, y), xyz}};
 }
 
-/// The polynomials of the components from `cell` on.
+/// The polynomials of components `c` and following.
 template <int components>
-HWY_INLINE Polynomial<hn::Vec<Eight>> cell_polynomial(const float* cell) {
-  return polynomial<hn::Vec<Eight>>(
-      [&](int k) HWY_ATTR { return load_voxel<components>(cell + corners[k] * components); });
+HWY_INLINE Polynomial<hn::Vec<Eight>> cell_polynomial(const Cell& cell, int c) {
+  return polynomial<hn::Vec<Eight>>([&](int k) HWY_ATTR {
+    return hn::LoadU(eight, edge_of<components>(cell, k / 4 * 2 + k % 2) + k / 2 % 2 * y_stride<components> + c);
+  });
 }
 
 /// A value and its slopes.
@@ -309,10 +369,10 @@ HWY_INLINE void transpose(const float* values, PerRay (&tensor)[8], int at) {
 
 /// Samples the tensors and their slopes for a vector whose lanes are in one cell.
 template <int components>
-HWY_INLINE void sample_slopes(const float* cell, Packet& packet, int at) {
+HWY_INLINE void sample_slopes(const Cell& cell, Packet& packet, int at) {
   alignas(64) float coefficients[8][8];
   for (int i = 0; i < components; i += eight_lanes) {
-    const auto polynomial = cell_polynomial<components>(cell + i);
+    const auto polynomial = cell_polynomial<components>(cell, i);
     for (int k = 0; k < 8; ++k) hn::Store(polynomial.k[k], eight, coefficients[k] + i);
   }
   const F3 fraction = load(packet.fraction, at);
@@ -334,9 +394,9 @@ HWY_INLINE void sample_own_slopes(Packet& packet, int at, const std::int32_t (&a
   for (int i = 0; i < components; i += eight_lanes) {
     for (int lane = 0; lane < lanes; ++lane) {
       if (i == 0) prefetch_cell<components>(packet.bending[at + lane] + ahead[lane]);
-      const float* const cell = cell_of<components>(packet, at + lane) + i;
+      const Cell cell = cell_of<components>(packet, at + lane);
       const auto fraction = [&](int axis) HWY_ATTR { return hn::Set(eight, packet.fraction[axis][at + lane]); };
-      const auto sampled = evaluate(cell_polynomial<components>(cell), fraction(0), fraction(1), fraction(2));
+      const auto sampled = evaluate(cell_polynomial<components>(cell, i), fraction(0), fraction(1), fraction(2));
       store_components(sampled.value, i, lane, values[0]);
       store_components(sampled.x, i, lane, values[1]);
       store_components(sampled.y, i, lane, values[2]);

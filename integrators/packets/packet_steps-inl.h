@@ -173,7 +173,7 @@ HWY_INLINE void find_cells_ahead(const Packet& packet, int at, std::int32_t (&ah
   const F last = set(TensorBrick::cells - 1), width = set(TensorBrick::width);
   const F3 cell = clamp(floor(there), zeros(), {last, last, last});
   const F voxel = hn::MulAdd(hn::MulAdd(cell.x, width, cell.y), width, cell.z);
-  hn::Store(hn::ConvertTo(ints, hn::Mul(voxel, set(components))), ints, ahead);
+  store_offsets<components>(voxel, ahead);
 }
 
 /// Whether all lanes of a vector are in one cell.

@@ -30,13 +30,21 @@ std::bitset<8> shared_faces(const BlockShape& block) {
   return touched;
 }
 
-/// The voxels of a block as bricks hold them.
+/// The voxels of a block as bricks hold them. Voxels of `bending` are at `block_offset`.
 struct BlockVoxels {
   alignas(64) float bending[TensorBlock::voxels * TensorBrick::general];
   alignas(64) float trailing[TensorBlock::voxels];
   alignas(64) float deviator[TensorBlock::voxels];  // Squared norm.
   alignas(64) float squares[TensorBlock::voxels];   // Sum of the squares of `bending`.
 };
+
+/// Offset of a voxel in BlockVoxels::bending, in floats. Rows along z are as in bricks.
+template <int components>
+int block_offset(int voxel) {
+  constexpr int size = TensorBlock::size;
+  return voxel / size * TensorBrick::bending_offset(components, size) +
+         TensorBrick::bending_offset(components, voxel % size);
+}
 
 /// The stored components of T − T₂₂ I, and T₂₂, of each voxel. @return the greatest squared norm of T.
 template <int components>
@@ -45,7 +53,7 @@ float convert(const TensorBlock& block, BlockVoxels& voxels) {
   float greatest = 0;
   for (int i = 0; i < TensorBlock::voxels; ++i) {
     const float* const T = block.values[i].data();
-    float* const bending = voxels.bending + i * components;
+    float* const bending = voxels.bending + block_offset<components>(i);
     Four near = Eigen::Map<const Four>(T), far = Eigen::Map<const Four>(T + 4);
     const float last = T[8];
     greatest = std::max(greatest, (near * near + far * far).sum() + last * last);
@@ -89,7 +97,9 @@ void for_shared_rows(const Eigen::Vector3i& ahead, const Visit& visit) {
 /// Copies `length` voxels.
 template <int components, int length>
 void copy_row(const BlockVoxels& voxels, int from, float* brick, int to) {
-  std::memcpy(brick + to * components, voxels.bending + from * components, length * components * sizeof(float));
+  constexpr std::size_t floats = TensorBrick::bending_offset(components, length - 1) + components;
+  std::memcpy(brick + TensorBrick::bending_offset(components, to), voxels.bending + block_offset<components>(from),
+              floats * sizeof(float));
   std::memcpy(brick + TensorBrick::trailing_offset(components) + to, voxels.trailing + from, length * sizeof(float));
 }
 
@@ -109,7 +119,8 @@ void set_share(const BlockVoxels& voxels, int bits, BlockShare& share) {
 /// The squared Frobenius norm of the deviator of T, from T − T₂₂ I.
 double squared_deviator(const TensorBrick& brick, int voxel) {
   const auto component = [&](int i) {
-    return double{brick.bending[voxel * brick.components + TensorBrick::stored_component(brick.components, i)]};
+    const int offset = TensorBrick::bending_offset(brick.components, voxel);
+    return double{brick.bending[offset + TensorBrick::stored_component(brick.components, i)]};
   };
   double squares = 0;
   for (int i = 0; i < TensorBrick::general; ++i) squares += component(i) * component(i);
@@ -193,7 +204,7 @@ void widen_brick(const float* symmetric, float* general) {
   constexpr int few = TensorBrick::symmetric, all = TensorBrick::general;
   for (int voxel = 0; voxel < TensorBrick::voxels; ++voxel)
     for (int i = 0; i < all; ++i)
-      general[voxel * all + i] = symmetric[voxel * few + TensorBrick::stored_component(few, i)];
+      general[voxel * all + i] = symmetric[TensorBrick::bending_offset(few, voxel) + TensorBrick::stored_component(few, i)];
   std::copy_n(symmetric + TensorBrick::trailing_offset(few), TensorBrick::voxels,
               general + TensorBrick::trailing_offset(all));
 }

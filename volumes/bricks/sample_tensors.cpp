@@ -22,7 +22,7 @@ struct Cells {
   alignas(64) float fraction[3][cell_block] = {};           // Position within the cell.
   alignas(64) std::int32_t brick[3][cell_block] = {};       // Coordinates of the brick.
   alignas(64) std::int32_t voxel[cell_block] = {};          // Number, in the brick, of the cell's first voxel.
-  const float *bending[cell_block], *trailing[cell_block];  // Of the cell's first voxel.
+  const float *bending[cell_block], *trailing[cell_block];  // Of the brick.
 };
 
 /// The extent, from the points' origin: its first and last voxels, and the first voxel of its last cell.
@@ -97,10 +97,12 @@ void sample_bending(const Cells& cells, std::size_t count, float (*components)[4
   const Eight d;
   for (std::size_t p = 0; p < count; ++p)
     for (std::size_t c = 0; c < stored; c += hn::Lanes(d)) {
-      const float* const cell = cells.bending[p] + c;
       // Where vectors hold more than a voxel's components, the others are those of the next voxel, and are not used.
       const auto corner = [&](int x, int y, int z)
-                              HWY_ATTR { return hn::LoadU(d, cell + TensorBrick::voxel(x, y, z) * stored); };
+                              HWY_ATTR {
+        const int voxel = cells.voxel[p] + TensorBrick::voxel(x, y, z);
+        return hn::LoadU(d, cells.bending[p] + TensorBrick::bending_offset(stored, voxel) + c);
+      };
       const auto fraction = [&](int axis) HWY_ATTR { return hn::Set(d, cells.fraction[axis][p]); };
       const auto sampled = trilinear(corner, fraction(0), fraction(1), fraction(2));
       store_components(sampled, c, p, components);
@@ -111,7 +113,7 @@ void sample_bending(const Cells& cells, std::size_t count, float (*components)[4
 void sample_trailing(const Cells& cells, std::size_t count, float* trailing) {
   const auto at = [](float near, float far, float fraction) { return near + fraction * (far - near); };
   for (std::size_t p = 0; p < count; ++p) {
-    const float* const cell = cells.trailing[p];
+    const float* const cell = cells.trailing[p] + cells.voxel[p];
     const float x = cells.fraction[0][p], y = cells.fraction[1][p], z = cells.fraction[2][p];
     const auto face = [&](const float* first) {
       return at(at(first[0], first[1], z), at(first[TensorBrick::width], first[TensorBrick::width + 1], z), y);
@@ -180,8 +182,8 @@ void find_voxels(const TensorField& field, std::size_t count, Eigen::Vector3i& a
       at = wanted;
       brick = field.brick(at);
     }
-    cells.bending[p] = brick.bending + cells.voxel[p] * brick.components;
-    cells.trailing[p] = brick.trailing + cells.voxel[p];
+    cells.bending[p] = brick.bending;
+    cells.trailing[p] = brick.trailing;
   }
 }
 

@@ -52,7 +52,7 @@ const float* const TensorField::zeros = zero_brick.floats;
 Eigen::Matrix3d TensorBrick::tensor(int voxel) const {
   Eigen::Matrix3d T;
   for (int i = 0; i < general; ++i)
-    T.data()[i] = double{bending[voxel * components + stored_component(components, i)]};
+    T.data()[i] = double{bending[bending_offset(components, voxel) + stored_component(components, i)]};
   T(2, 2) = trailing[voxel];
   T(0, 0) += T(2, 2);
   T(1, 1) += T(2, 2);

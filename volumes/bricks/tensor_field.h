@@ -40,12 +40,17 @@ struct TensorBrick {
     constexpr int of_symmetric[] = {0, 1, 2, 1, 3, 4, 2, 4};
     return components == symmetric ? of_symmetric[i] : i;
   }
+  /// Offset of a voxel's components from `bending`, in floats. Three voxels of five fill a cache line but for its last
+  /// float, so that fewer lines are read. A row along z begins a line.
+  static constexpr int bending_offset(int components, int voxel) {
+    return components == symmetric ? voxel / 3 * 16 + voxel % 3 * symmetric : voxel * components;
+  }
   /// Offset of `trailing` from `bending`, in floats.
-  static constexpr int trailing_offset(int components) { return voxels * components; }
+  static constexpr int trailing_offset(int components) { return bending_offset(components, voxels); }
   /// Number of floats of a brick, rounded up to whole cache lines.
   static constexpr int stored_floats(int components) { return (trailing_offset(components) + voxels + 15) / 16 * 16; }
 
-  const float* bending;   ///< T − T₂₂ I column by column: `components` floats per voxel.
+  const float* bending;   ///< T − T₂₂ I column by column, `components` per voxel at its `bending_offset`.
   const float* trailing;  ///< One float per voxel: T₂₂.
   float strongest;        ///< Upper bound in the brick of the Frobenius norm of the deviator, T − ⅓ tr(T) I.
   int components;         ///< `general` or `symmetric`; the same in all bricks of a field.

@@ -67,7 +67,7 @@ Slopes<Value> interpolate(int voxel, const Eigen::Vector3d& f, Load load) {
 }
 
 Eight bending(const TensorBrick& brick, int voxel) {
-  const float* const stored = brick.bending + voxel * brick.components;
+  const float* const stored = brick.bending + TensorBrick::bending_offset(brick.components, voxel);
   if (brick.components == TensorBrick::general)
     return Eigen::Map<const Eigen::Array<float, 8, 1>>(stored).cast<double>();
   Eight eight;
