@@ -183,8 +183,8 @@ HWY_INLINE void sample_cell(const Cell& cell, Packet& packet, int first, int cou
   for (int i = 0; i < 4; ++i)
     for (int c = 0; c < components; c += eight_lanes) {
       const float* const edge = edge_of<components>(cell, i);
-      const auto rise = hn::Sub(load_voxel<components>(edge + y_stride<components>, i, c),
-                                load_voxel<components>(edge, i, c));
+      const auto rise =
+          hn::Sub(load_voxel<components>(edge + y_stride<components>, i, c), load_voxel<components>(edge, i, c));
       hn::Store(rise, eight, rises[i] + c);
     }
   for (; count > 1; count -= 2, first += 2 * lanes) sample_cell<components, 2>(cell, rises, packet, first);
@@ -205,9 +205,8 @@ HWY_INLINE void prefetch_cell(const float* cell) {
 template <int components>
 HWY_INLINE void store_offsets(F voxel, std::int32_t (&offsets)[lanes]) {
   // Of five components, floor(16/3 voxel); the sum keeps rounding away from whole numbers.
-  const F offset = components == TensorBrick::symmetric
-                       ? hn::Floor(hn::MulAdd(voxel, set(16.0f / 3), set(0.25f)))
-                       : hn::Mul(voxel, set(components));
+  const F offset = components == TensorBrick::symmetric ? hn::Floor(hn::MulAdd(voxel, set(16.0f / 3), set(0.25f)))
+                                                        : hn::Mul(voxel, set(components));
   hn::Store(hn::ConvertTo(ints, offset), ints, offsets);
 }
 
@@ -291,7 +290,8 @@ HWY_INLINE void sample_own_cells(Packet& packet, int at, const std::int32_t (&ah
     F rows[eight_lanes];
 #pragma GCC unroll 8
     for (int row = 0; row < eight_lanes; ++row)
-      rows[row] = row_of([&](int lane) HWY_ATTR { return sample_lane<components>(packet, cell(lane), at + lane, c); }, row);
+      rows[row] =
+          row_of([&](int lane) HWY_ATTR { return sample_lane<components>(packet, cell(lane), at + lane, c); }, row);
     if (c == 0)
       for (int lane = 0; lane < lanes; ++lane) prefetch_cell<components>(packet.bending[at + lane] + ahead[lane]);
     transpose_rows(rows);

@@ -78,7 +78,9 @@ HWY_INLINE void strong_deviator(const Packet& packet, int at, Matrix& A) {
   const Singles singles;
   const D factor =
       hn::PromoteTo(doubles, hn::Mul(hn::Load(singles, packet.time + at), hn::Load(singles, packet.kick + at)));
-  for (int i = 0; i < 8; ++i) A.m[i % 3 * 3 + i / 3] = hn::Mul(factor, promoted(packet.tensor[TensorBrick::stored_component(components, i)] + at));
+  for (int i = 0; i < 8; ++i)
+    A.m[i % 3 * 3 + i / 3] =
+        hn::Mul(factor, promoted(packet.tensor[TensorBrick::stored_component(components, i)] + at));
   const D third = hn::Mul(set_double(1.0 / 3), hn::Add(A.m[0], A.m[4]));
   A.m[0] = hn::Sub(A.m[0], third);
   A.m[4] = hn::Sub(A.m[4], third);

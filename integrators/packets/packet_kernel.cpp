@@ -160,7 +160,7 @@ void Kernel<components, uniform, differentials, changes>::fill(Packet& packet) {
 /// The lanes whose points are outside the extent, as bits.
 template <int components, bool uniform, bool differentials, bool changes>
 HWY_INLINE std::uint32_t Kernel<components, uniform, differentials, changes>::outside(const Packet& packet,
-                                                                          const PerRay (&points)[3]) const {
+                                                                                      const PerRay (&points)[3]) const {
   std::uint32_t result = 0;
   for (int i = 0; i < packet.vectors * lanes; i += lanes)
     for (int axis = 0; axis < 3; ++axis) {
@@ -225,7 +225,7 @@ HWY_NOINLINE void Kernel<components, uniform, differentials, changes>::locate_on
 /// Writes back the rays of some lanes, as they were before the step, and removes them from the packet.
 template <int components, bool uniform, bool differentials, bool changes>
 HWY_NOINLINE void Kernel<components, uniform, differentials, changes>::take_out(Packet& packet, std::uint32_t stop,
-                                                                    std::uint32_t leave) {
+                                                                                std::uint32_t leave) {
   Packet& leaving = leaving_[&packet - packets_];
   for (std::uint32_t rest = stop | leave; rest != 0; rest &= rest - 1) {
     const int lane = static_cast<int>(hwy::Num0BitsBelowLS1Bit_Nonzero32(rest));
@@ -253,7 +253,8 @@ HWY_NOINLINE void Kernel<components, uniform, differentials, changes>::take_out(
 
 /// Records the points of some lanes.
 template <int components, bool uniform, bool differentials, bool changes>
-HWY_NOINLINE void Kernel<components, uniform, differentials, changes>::keep_points(const Packet& packet, std::uint32_t which) {
+HWY_NOINLINE void Kernel<components, uniform, differentials, changes>::keep_points(const Packet& packet,
+                                                                                   std::uint32_t which) {
   alignas(64) float positions[packet_rays][4], directions[packet_rays][4];
   alignas(64) std::int32_t bricks[packet_rays][4];
   for (int i = 0; i < packet.vectors * lanes; i += lanes) {
@@ -287,7 +288,8 @@ HWY_INLINE void Kernel<components, uniform, differentials, changes>::add_step(Pa
 /// Ends a step. Takes out the rays that it ends, as they were before it: those of `stop` and those found here, except
 /// for lanes that are `staying`.
 template <int components, bool uniform, bool differentials, bool changes>
-void Kernel<components, uniform, differentials, changes>::end_step(Packet& packet, std::uint32_t staying, std::uint32_t stop) {
+void Kernel<components, uniform, differentials, changes>::end_step(Packet& packet, std::uint32_t staying,
+                                                                   std::uint32_t stop) {
   std::uint32_t leave = 0;
   if (packet.near_border) leave = outside(packet, packet.p_next) & ~staying;
   const bool may_fail = medium_.settings.method != BendingMethod::splitting;
@@ -432,7 +434,8 @@ std::uint64_t trace_components(const PacketMedium& medium, KernelRays& batch) {
 }
 
 std::uint64_t trace(const PacketMedium& medium, KernelRays& batch) {
-  return medium.field.is_symmetric() ? trace_components<TensorBrick::symmetric>(medium, batch) : trace_components<TensorBrick::general>(medium, batch);
+  return medium.field.is_symmetric() ? trace_components<TensorBrick::symmetric>(medium, batch)
+                                     : trace_components<TensorBrick::general>(medium, batch);
 }
 
 int vector_lanes() { return lanes; }

@@ -204,7 +204,8 @@ void widen_brick(const float* symmetric, float* general) {
   constexpr int few = TensorBrick::symmetric, all = TensorBrick::general;
   for (int voxel = 0; voxel < TensorBrick::voxels; ++voxel)
     for (int i = 0; i < all; ++i)
-      general[voxel * all + i] = symmetric[TensorBrick::bending_offset(few, voxel) + TensorBrick::stored_component(few, i)];
+      general[voxel * all + i] =
+          symmetric[TensorBrick::bending_offset(few, voxel) + TensorBrick::stored_component(few, i)];
   std::copy_n(symmetric + TensorBrick::trailing_offset(few), TensorBrick::voxels,
               general + TensorBrick::trailing_offset(all));
 }

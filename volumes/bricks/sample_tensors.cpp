@@ -98,8 +98,7 @@ void sample_bending(const Cells& cells, std::size_t count, float (*components)[4
   for (std::size_t p = 0; p < count; ++p)
     for (std::size_t c = 0; c < stored; c += hn::Lanes(d)) {
       // Where vectors hold more than a voxel's components, the others are those of the next voxel, and are not used.
-      const auto corner = [&](int x, int y, int z)
-                              HWY_ATTR {
+      const auto corner = [&](int x, int y, int z) HWY_ATTR {
         const int voxel = cells.voxel[p] + TensorBrick::voxel(x, y, z);
         return hn::LoadU(d, cells.bending[p] + TensorBrick::bending_offset(stored, voxel) + c);
       };

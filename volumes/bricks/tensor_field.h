@@ -140,7 +140,7 @@ class TensorField {
   Eigen::Affine3d to_world_, to_index_;
   Eigen::AlignedBox3d index_bounds_, voxels_;
   std::vector<Eigen::Vector3i> bricks_;
-  Floats floats_;                 ///< The bricks, in the order of `bricks_`.
+  Floats floats_;  ///< The bricks, in the order of `bricks_`.
   int components_ = TensorBrick::symmetric;
   std::vector<float> strongest_;  ///< TensorBrick::strongest of each brick.
   double greatest_norm_ = 0;
