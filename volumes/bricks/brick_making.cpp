@@ -61,8 +61,10 @@ float convert(const TensorBlock& block, BlockVoxels& voxels) {
     near -= diagonal;
     far -= diagonal;
     Eigen::Map<Four>{bending} = near;
+    // From the second component on the diagonal, which `near` holds twice; then the float that fills a cache line, or
+    // the first one of the next voxel, which follows.
     if constexpr (components == TensorBrick::symmetric)
-      Eigen::Map<Eigen::Array2f>{bending + 3} = far.head<2>();  // Over the component that `near` has twice.
+      Eigen::Map<Eigen::Array3f>{bending + 3} = Eigen::Array3f(far[0], far[1], 0);
     else
       Eigen::Map<Four>{bending + 4} = far;
     const float squares = (near * near + far * far).sum(), trace = near[0] + far[0];
