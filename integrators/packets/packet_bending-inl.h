@@ -76,7 +76,7 @@ HWY_INLINE void keep_bending_rate(Packet& packet, const Tensor& T, int at) {
 /// halves of vectors, which stalls the processor. How a lane is computed depends on that lane alone.
 /// @param to  The packet's next directions; its present ones only if the field is weak in all lanes' bricks.
 /// `changes`: stores Λ of the kick.
-template <bool differentials, bool changes>
+template <int components, bool differentials, bool changes>
 HWY_INLINE void bend_strongly(Packet& packet, const Tensor& T, const F3& v, F factor, int at, PerRay (&to)[3]) {
   const F reach = load(packet.reach, at);
   F size = reach;
@@ -106,7 +106,7 @@ HWY_INLINE void bend_strongly(Packet& packet, const Tensor& T, const F3& v, F fa
   // Rays with differentials stop where no series is exact enough.
   store(mul(differentials ? hn::IfThenElseZero(fits, scale) : scale, sum), to, at);
   if (!differentials && HWY_UNLIKELY(!hn::AllTrue(floats, fits)))
-    bend_in_double<changes>(packet, to_bits(hn::Not(fits), at), to);
+    bend_in_double<components, changes>(packet, to_bits(hn::Not(fits), at), to);
 }
 
 }  // namespace tensorray::packets::HWY_NAMESPACE

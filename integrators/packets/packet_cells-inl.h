@@ -9,6 +9,8 @@
 #define TENSORRAY_INTEGRATORS_PACKET_CELLS_TOGGLE
 #endif
 
+#include <algorithm>
+
 #include <hwy/cache_control.h>
 #include <hwy/highway.h>
 
@@ -73,6 +75,19 @@ HWY_INLINE std::uint32_t to_bits(Mask mask, int at) {
   return (result & ((1u << lanes) - 1)) << at;
 }
 
+/// The tensor whose stored component i is `stored(i)`.
+template <int components, class Stored>
+HWY_INLINE Tensor tensor_of(const Stored& stored) {
+  Tensor T;
+  for (int i = 0; i < 8; ++i) T.c[i] = stored(TensorBrick::stored_component(components, i));
+  return T;
+}
+
+template <int components>
+HWY_INLINE Tensor load_tensor(const Packet& packet, int at) {
+  return tensor_of<components>([&](int i) HWY_ATTR { return load(packet.tensor[i], at); });
+}
+
 /// T V.
 HWY_INLINE F3 apply(const Tensor& T, const F3& v) {
   return {hn::MulAdd(T.c[6], v.z, hn::MulAdd(T.c[3], v.y, hn::Mul(T.c[0], v.x))),
@@ -80,28 +95,52 @@ HWY_INLINE F3 apply(const Tensor& T, const F3& v) {
           hn::MulAdd(T.c[5], v.y, hn::Mul(T.c[2], v.x))};
 }
 
-/// Offsets of a cell's corners from its first voxel, in floats: z changes first, then y, then x.
-constexpr int z_stride = TensorBrick::bending_floats, y_stride = TensorBrick::width * z_stride,
-              x_stride = TensorBrick::width * y_stride;
-constexpr int corners[8] = {0,
-                            z_stride,
-                            y_stride,
-                            y_stride + z_stride,
-                            x_stride,
-                            x_stride + z_stride,
-                            x_stride + y_stride,
-                            x_stride + y_stride + z_stride};
+/// The corners of a cell: offsets from its first voxel, in voxels. z changes first, then y, then x.
+constexpr int corners[8] = {TensorBrick::voxel(0, 0, 0), TensorBrick::voxel(0, 0, 1), TensorBrick::voxel(0, 1, 0),
+                            TensorBrick::voxel(0, 1, 1), TensorBrick::voxel(1, 0, 0), TensorBrick::voxel(1, 0, 1),
+                            TensorBrick::voxel(1, 1, 0), TensorBrick::voxel(1, 1, 1)};
+
+/// Distances of neighbouring voxels, in floats.
+template <int components>
+constexpr int y_stride = TensorBrick::bending_offset(components, TensorBrick::voxel(0, 1, 0));
+template <int components>
+constexpr int x_stride = TensorBrick::bending_offset(components, TensorBrick::voxel(1, 0, 0));
 
 using Eight = hn::CappedTag<float, 8>;  // For the components of one voxel.
 constexpr Eight eight;
 constexpr int eight_lanes = static_cast<int>(hn::MaxLanes(Eight()));
 
-HWY_INLINE const float* cell_of(const Packet& packet, int lane) {
-  return packet.bending[lane] + static_cast<int>(packet.voxel[lane]) * TensorBrick::bending_floats;
+/// The memory of a cell: its first voxel, and the next one along z.
+struct Cell {
+  const float *near, *far;
+};
+
+template <int components>
+HWY_INLINE Cell cell_of(const Packet& packet, int lane) {
+  const int voxel = static_cast<int>(packet.voxel[lane]);
+  const float* const brick = packet.bending[lane];
+  return {brick + TensorBrick::bending_offset(components, voxel),
+          brick + TensorBrick::bending_offset(components, voxel + 1)};
 }
 
-/// The edges of a cell along y: offsets, in floats, of their near ends from the cell's first voxel.
-constexpr int edges[4] = {0, z_stride, x_stride, x_stride + z_stride};
+/// The near end of edge i of a cell along y. Odd edges are at the far voxel along z, edges 2 and 3 at the far one
+/// along x.
+template <int components>
+HWY_INLINE const float* edge_of(const Cell& cell, int i) {
+  return (i % 2 ? cell.far : cell.near) + i / 2 * x_stride<components>;
+}
+
+/// The lane of a far voxel's first component, where vectors hold more than the components of a voxel: these vectors end
+/// with its last component, so that no cache line beyond the cell is read.
+template <int components>
+constexpr int far_lane = components < eight_lanes ? eight_lanes - components : 0;
+
+/// Components c and following of the voxel at an end of edge i.
+template <int components>
+HWY_INLINE hn::Vec<Eight> load_voxel(const float* voxel, int i, int c) {
+  if (components == TensorBrick::general) return hn::Load(eight, voxel + c);
+  return hn::LoadU(eight, voxel + c - (i % 2 ? far_lane<components> : 0));
+}
 
 template <class V>
 HWY_INLINE V between(V near, V far, V fraction) {
@@ -109,62 +148,89 @@ HWY_INLINE V between(V near, V far, V fraction) {
 }
 
 /// Trilinear interpolation along y, then x, then z. `near(i)` is the value at the near end of edge i, and `rise(i)`
-/// that at its far end minus that. The operations and their order are the same wherever they are done, and so are the
-/// results, bit for bit.
-template <class V, class Near, class Rise>
-HWY_INLINE V trilinear(const Near& near, const Rise& rise, V x, V y, V z) {
+/// that at its far end minus that. `aligned` moves values of far voxels to the lanes of near ones. The operations and
+/// their order are the same wherever they are done, and so are the results, bit for bit.
+template <class V, class Near, class Rise, class Aligned>
+HWY_INLINE V trilinear(const Near& near, const Rise& rise, const Aligned& aligned, V x, V y, V z) {
   const auto edge = [&](int i) HWY_ATTR { return hn::MulAdd(rise(i), y, near(i)); };
   const V first = between(edge(0), edge(2), x);
-  return between(first, between(edge(1), edge(3), x), z);
+  return between(first, aligned(between(edge(1), edge(3), x)), z);
 }
 
 /// Samples the tensors of `count` vectors, one or two, whose lanes are all in one cell. `rises` are those of the cell's
 /// edges. Each value is loaded once for all vectors, and copied to all lanes.
-template <int count>
-HWY_INLINE void sample_cell(const float* HWY_RESTRICT cell, const float (&rises)[4][8], Packet& packet, int first) {
+template <int components, int count>
+HWY_INLINE void sample_cell(const Cell& cell, const float (&rises)[4][8], Packet& packet, int first) {
   F3 at[count];
   for (int n = 0; n < count; ++n) at[n] = load(packet.fraction, first + n * lanes);
 #pragma GCC unroll 8
-  for (int c = 0; c < 8; ++c) {
+  for (int c = 0; c < components; ++c) {
     F values[count];
 #pragma GCC unroll 2
     for (int n = 0; n < count; ++n)
-      values[n] = trilinear([&](int i) HWY_ATTR { return set(cell[edges[i] + c]); },
-                            [&](int i) HWY_ATTR { return set(rises[i][c]); }, at[n].x, at[n].y, at[n].z);
+      values[n] = trilinear([&](int i) HWY_ATTR { return set(edge_of<components>(cell, i)[c]); },
+                            [&](int i) HWY_ATTR { return set(rises[i][(i % 2 ? far_lane<components> : 0) + c]); },
+                            [](F far) HWY_ATTR { return far; }, at[n].x, at[n].y, at[n].z);
 #pragma GCC unroll 2
     for (int n = 0; n < count; ++n) store(values[n], packet.tensor[c], first + n * lanes);
   }
 }
 
 /// The same for any number of vectors.
-HWY_INLINE void sample_cell(const float* cell, Packet& packet, int first, int count) {
+template <int components>
+HWY_INLINE void sample_cell(const Cell& cell, Packet& packet, int first, int count) {
   alignas(64) float rises[4][8];
   for (int i = 0; i < 4; ++i)
-    for (int c = 0; c < 8; c += eight_lanes) {
-      const float* const edge = cell + edges[i] + c;
-      hn::Store(hn::Sub(hn::Load(eight, edge + y_stride), hn::Load(eight, edge)), eight, rises[i] + c);
+    for (int c = 0; c < components; c += eight_lanes) {
+      const float* const edge = edge_of<components>(cell, i);
+      const auto rise =
+          hn::Sub(load_voxel<components>(edge + y_stride<components>, i, c), load_voxel<components>(edge, i, c));
+      hn::Store(rise, eight, rises[i] + c);
     }
-  for (; count > 1; count -= 2, first += 2 * lanes) sample_cell<2>(cell, rises, packet, first);
-  if (count > 0) sample_cell<1>(cell, rises, packet, first);
+  for (; count > 1; count -= 2, first += 2 * lanes) sample_cell<components, 2>(cell, rises, packet, first);
+  if (count > 0) sample_cell<components, 1>(cell, rises, packet, first);
 }
 
-/// Prefetches the memory of a cell.
+/// Prefetches the memory of a cell, given its first voxel. A symmetric tensor's neighbour along z is in the same cache
+/// line in three of four cells; to ask for it costs more than it gains.
+template <int components>
 HWY_INLINE void prefetch_cell(const float* cell) {
-  for (const int edge : {0, y_stride, x_stride, x_stride + y_stride}) {
+  for (const int edge : {0, y_stride<components>, x_stride<components>, x_stride<components> + y_stride<components>}) {
     hwy::Prefetch(cell + edge);
-    hwy::Prefetch(cell + edge + z_stride);
+    if (components == TensorBrick::general) hwy::Prefetch(cell + edge + components);
+  }
+}
+
+/// Offsets, in floats, of voxels in their bricks, given their numbers.
+template <int components>
+HWY_INLINE void store_offsets(F voxel, std::int32_t (&offsets)[lanes]) {
+  // Of five components, floor(16/3 voxel); the sum keeps rounding away from whole numbers.
+  const F offset = components == TensorBrick::symmetric ? hn::Floor(hn::MulAdd(voxel, set(16.0f / 3), set(0.25f)))
+                                                        : hn::Mul(voxel, set(components));
+  hn::Store(hn::ConvertTo(ints, offset), ints, offsets);
+}
+
+/// Moves the components of a far voxel to the lanes of those of a near one.
+template <int components>
+HWY_INLINE hn::Vec<Eight> aligned(hn::Vec<Eight> far) {
+  if constexpr (far_lane<components> == 0) {
+    return far;
+  } else {
+    alignas(32) constexpr std::int32_t from[8] = {3, 4, 5, 6, 7, 0, 1, 2};
+    static_assert(far_lane<components> == 3, "the table moves components by three lanes");
+    return hn::TableLookupLanes(far, hn::SetTableIndices(eight, from));
   }
 }
 
 /// Components `c` and following of a lane's tensor.
-HWY_INLINE hn::Vec<Eight> sample_lane(const Packet& packet, int lane, int c) {
-  const float* const cell = cell_of(packet, lane) + c;
+template <int components>
+HWY_INLINE hn::Vec<Eight> sample_lane(const Packet& packet, const Cell& cell, int lane, int c) {
   const auto fraction = [&](int axis) HWY_ATTR { return hn::Set(eight, packet.fraction[axis][lane]); };
-  const auto near = [&](int i) HWY_ATTR { return hn::Load(eight, cell + edges[i]); };
+  const auto near = [&](int i) HWY_ATTR { return load_voxel<components>(edge_of<components>(cell, i), i, c); };
   const auto rise = [&](int i) HWY_ATTR {
-    return hn::Sub(hn::Load(eight, cell + edges[i] + y_stride), hn::Load(eight, cell + edges[i]));
+    return hn::Sub(load_voxel<components>(edge_of<components>(cell, i) + y_stride<components>, i, c), near(i));
   };
-  return trilinear(near, rise, fraction(0), fraction(1), fraction(2));
+  return trilinear(near, rise, aligned<components>, fraction(0), fraction(1), fraction(2));
 }
 
 /// Four rows to four columns in each block of four.
@@ -210,17 +276,26 @@ HWY_INLINE F row_of(const Sample& sample, int lane) {
 
 /// Samples the tensors of a vector whose lanes are in several cells: a register holds the components of one lane at a
 /// time. Prefetches the cells `ahead` (offsets, in floats, within the lanes' bricks).
+template <int components>
 HWY_INLINE void sample_own_cells(Packet& packet, int at, const std::int32_t (&ahead)[lanes]) {
-  for (int c = 0; c < 8; c += eight_lanes) {
+  alignas(64) std::int32_t near[lanes], far[lanes];
+  const F voxel = load(packet.voxel, at);
+  store_offsets<components>(voxel, near);
+  store_offsets<components>(hn::Add(voxel, set(1)), far);
+  const auto cell = [&](int lane) HWY_ATTR {
+    const float* const brick = packet.bending[at + lane];
+    return Cell{brick + near[lane], brick + far[lane]};
+  };
+  for (int c = 0; c < components; c += eight_lanes) {
     F rows[eight_lanes];
 #pragma GCC unroll 8
     for (int row = 0; row < eight_lanes; ++row)
-      rows[row] = row_of([&](int lane) HWY_ATTR { return sample_lane(packet, at + lane, c); }, row);
+      rows[row] =
+          row_of([&](int lane) HWY_ATTR { return sample_lane<components>(packet, cell(lane), at + lane, c); }, row);
     if (c == 0)
-      for (int lane = 0; lane < lanes; ++lane) prefetch_cell(packet.bending[at + lane] + ahead[lane]);
+      for (int lane = 0; lane < lanes; ++lane) prefetch_cell<components>(packet.bending[at + lane] + ahead[lane]);
     transpose_rows(rows);
-#pragma GCC unroll 8
-    for (int row = 0; row < eight_lanes; ++row) store(rows[row], packet.tensor[c + row], at);
+    for (int row = 0; row < std::min(eight_lanes, components - c); ++row) store(rows[row], packet.tensor[c + row], at);
   }
 }
 
@@ -241,9 +316,12 @@ HWY_INLINE Polynomial<V> polynomial(const Corner& c) {
   return {{c(0), z, y, yz, x, hn::Sub(far, z), hn::Sub(far_y, y), xyz}};
 }
 
-/// The polynomials of the components from `cell` on.
-HWY_INLINE Polynomial<hn::Vec<Eight>> cell_polynomial(const float* cell) {
-  return polynomial<hn::Vec<Eight>>([&](int k) HWY_ATTR { return hn::Load(eight, cell + corners[k]); });
+/// The polynomials of components `c` and following.
+template <int components>
+HWY_INLINE Polynomial<hn::Vec<Eight>> cell_polynomial(const Cell& cell, int c) {
+  return polynomial<hn::Vec<Eight>>([&](int k) HWY_ATTR {
+    return hn::LoadU(eight, edge_of<components>(cell, k / 4 * 2 + k % 2) + k / 2 % 2 * y_stride<components> + c);
+  });
 }
 
 /// A value and its slopes.
@@ -276,11 +354,13 @@ HWY_INLINE void store_components(V values, int i, int lane, float* components) {
 }
 
 /// Reorders components from lane after lane to component after component.
-HWY_INLINE void transpose(const float* components, PerRay (&tensor)[8], int at) {
+template <int components>
+HWY_INLINE void transpose(const float* values, PerRay (&tensor)[8], int at) {
   for (int half = 0; half < 2; ++half) {
     F a, b, c, d;
-    hn::LoadInterleaved4(floats, components + half * lanes * 4, a, b, c, d);
+    hn::LoadInterleaved4(floats, values + half * lanes * 4, a, b, c, d);
     store(a, tensor[4 * half], at);
+    if (4 * half + 1 >= components) break;
     store(b, tensor[4 * half + 1], at);
     store(c, tensor[4 * half + 2], at);
     store(d, tensor[4 * half + 3], at);
@@ -288,14 +368,15 @@ HWY_INLINE void transpose(const float* components, PerRay (&tensor)[8], int at) 
 }
 
 /// Samples the tensors and their slopes for a vector whose lanes are in one cell.
-HWY_INLINE void sample_slopes(const float* cell, Packet& packet, int at) {
+template <int components>
+HWY_INLINE void sample_slopes(const Cell& cell, Packet& packet, int at) {
   alignas(64) float coefficients[8][8];
-  for (int i = 0; i < 8; i += eight_lanes) {
-    const auto polynomial = cell_polynomial(cell + i);
+  for (int i = 0; i < components; i += eight_lanes) {
+    const auto polynomial = cell_polynomial<components>(cell, i);
     for (int k = 0; k < 8; ++k) hn::Store(polynomial.k[k], eight, coefficients[k] + i);
   }
   const F3 fraction = load(packet.fraction, at);
-  for (int c = 0; c < 8; ++c) {
+  for (int c = 0; c < components; ++c) {
     Polynomial<F> polynomial;
     for (int k = 0; k < 8; ++k) polynomial.k[k] = set(coefficients[k][c]);
     const Slopes<F> sampled = evaluate(polynomial, fraction.x, fraction.y, fraction.z);
@@ -307,22 +388,23 @@ HWY_INLINE void sample_slopes(const float* cell, Packet& packet, int at) {
 }
 
 /// The same for a vector whose lanes are in several cells.
+template <int components>
 HWY_INLINE void sample_own_slopes(Packet& packet, int at, const std::int32_t (&ahead)[lanes]) {
-  alignas(64) float components[4][lanes * 8];
-  for (int i = 0; i < 8; i += eight_lanes) {
+  alignas(64) float values[4][lanes * 8];
+  for (int i = 0; i < components; i += eight_lanes) {
     for (int lane = 0; lane < lanes; ++lane) {
-      if (i == 0) prefetch_cell(packet.bending[at + lane] + ahead[lane]);
-      const float* const cell = cell_of(packet, at + lane) + i;
+      if (i == 0) prefetch_cell<components>(packet.bending[at + lane] + ahead[lane]);
+      const Cell cell = cell_of<components>(packet, at + lane);
       const auto fraction = [&](int axis) HWY_ATTR { return hn::Set(eight, packet.fraction[axis][at + lane]); };
-      const auto sampled = evaluate(cell_polynomial(cell), fraction(0), fraction(1), fraction(2));
-      store_components(sampled.value, i, lane, components[0]);
-      store_components(sampled.x, i, lane, components[1]);
-      store_components(sampled.y, i, lane, components[2]);
-      store_components(sampled.z, i, lane, components[3]);
+      const auto sampled = evaluate(cell_polynomial<components>(cell, i), fraction(0), fraction(1), fraction(2));
+      store_components(sampled.value, i, lane, values[0]);
+      store_components(sampled.x, i, lane, values[1]);
+      store_components(sampled.y, i, lane, values[2]);
+      store_components(sampled.z, i, lane, values[3]);
     }
   }
-  transpose(components[0], packet.tensor, at);
-  for (int axis = 0; axis < 3; ++axis) transpose(components[1 + axis], packet.slopes[axis], at);
+  transpose<components>(values[0], packet.tensor, at);
+  for (int axis = 0; axis < 3; ++axis) transpose<components>(values[1 + axis], packet.slopes[axis], at);
 }
 
 }  // namespace tensorray::packets::HWY_NAMESPACE

@@ -73,11 +73,14 @@ HWY_INLINE D inverse_power_of_two(D value) {
 }
 
 /// σ h times the deviator of T. (The trace changes only the length.)
+template <int components>
 HWY_INLINE void strong_deviator(const Packet& packet, int at, Matrix& A) {
   const Singles singles;
   const D factor =
       hn::PromoteTo(doubles, hn::Mul(hn::Load(singles, packet.time + at), hn::Load(singles, packet.kick + at)));
-  for (int i = 0; i < 8; ++i) A.m[i % 3 * 3 + i / 3] = hn::Mul(factor, promoted(packet.tensor[i] + at));
+  for (int i = 0; i < 8; ++i)
+    A.m[i % 3 * 3 + i / 3] =
+        hn::Mul(factor, promoted(packet.tensor[TensorBrick::stored_component(components, i)] + at));
   const D third = hn::Mul(set_double(1.0 / 3), hn::Add(A.m[0], A.m[4]));
   A.m[0] = hn::Sub(A.m[0], third);
   A.m[4] = hn::Sub(A.m[4], third);
@@ -182,12 +185,13 @@ HWY_NOINLINE D3 bend_by_matrix(const Matrix& A, const MatrixPolynomial& of, hn::
 
 /// Stores Λ of the strong kicks of some lanes, given as bits: −3 ln |exp(A) V|, where A is σ h times the deviator of T.
 /// Only few lanes have such kicks.
+template <int components>
 HWY_NOINLINE void change_in_double(Packet& packet, std::uint32_t which) {
   for (; which != 0; which &= which - 1) {
     const auto lane = hwy::Num0BitsBelowLS1Bit_Nonzero32(which);
     const float v[3] = {packet.v[0][lane], packet.v[1][lane], packet.v[2][lane]};
     float T[9];
-    for (int i = 0; i < 8; ++i) T[i] = packet.tensor[i][lane];
+    for (int i = 0; i < 8; ++i) T[i] = packet.tensor[TensorBrick::stored_component(components, i)][lane];
     T[8] = 0;
     packet.change_of_step[lane] = strong_radiance_change(T, packet.time[lane] * packet.kick[lane], v);
   }
@@ -195,16 +199,16 @@ HWY_NOINLINE void change_in_double(Packet& packet, std::uint32_t which) {
 
 /// exp(σ h T) V, normalised, of some lanes, given as bits; zero if it has no direction. `changes`: stores Λ of the
 /// kick.
-template <bool changes>
+template <int components, bool changes>
 HWY_NOINLINE void bend_in_double(Packet& packet, std::uint32_t which, PerRay (&to)[3]) {
-  if constexpr (changes) change_in_double(packet, which);
+  if constexpr (changes) change_in_double<components>(packet, which);
   const Singles singles;
   for (int at = 0; at < packet.vectors * lanes; at += double_lanes) {
     const std::uint8_t bytes[8] = {static_cast<std::uint8_t>(which >> at & ((1u << double_lanes) - 1))};
     if (bytes[0] == 0) continue;
     const auto wanted = hn::LoadMaskBits(singles, bytes);
     Matrix A;
-    strong_deviator(packet, at, A);
+    strong_deviator<components>(packet, at, A);
     const D size = norm(A);
     const auto squarings = halve(A, size);
     const MatrixPolynomial exponential = small_exponential(A);

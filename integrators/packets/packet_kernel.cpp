@@ -29,7 +29,7 @@ namespace tensorray::packets::HWY_NAMESPACE {
 
 /// The kernel, for voxels that are cubes along the axes (`uniform`) or have any other shape, for rays with or
 /// without differentials, whose changes of radiance are wanted or not.
-template <bool uniform, bool differentials, bool changes>
+template <int components, bool uniform, bool differentials, bool changes>
 class Kernel {
  public:
   Kernel(const PacketMedium& medium, KernelRays& batch) : medium_(medium), rays_(batch.rays), batch_(batch) {}
@@ -71,8 +71,8 @@ class Kernel {
 };
 
 /// Copies a ray into a lane.
-template <bool uniform, bool differentials, bool changes>
-void Kernel<uniform, differentials, changes>::enter(Packet& packet, int lane) {
+template <int components, bool uniform, bool differentials, bool changes>
+void Kernel<components, uniform, differentials, changes>::enter(Packet& packet, int lane) {
   const KernelRay& ray = rays_[packet.ray[lane]];
   for (int axis = 0; axis < 3; ++axis) {
     packet.p[axis][lane] = ray.place.position[axis];
@@ -92,8 +92,8 @@ void Kernel<uniform, differentials, changes>::enter(Packet& packet, int lane) {
 }
 
 /// Copies a ray, without the values that depend on its brick (see `begin`).
-template <bool uniform, bool differentials, bool changes>
-void Kernel<uniform, differentials, changes>::copy_lane(const Packet& from, int of, Packet& to, int lane) {
+template <int components, bool uniform, bool differentials, bool changes>
+void Kernel<components, uniform, differentials, changes>::copy_lane(const Packet& from, int of, Packet& to, int lane) {
   for (int axis = 0; axis < 3; ++axis) {
     to.p[axis][lane] = from.p[axis][of];
     to.v[axis][lane] = from.v[axis][of];
@@ -115,8 +115,8 @@ void Kernel<uniform, differentials, changes>::copy_lane(const Packet& from, int 
 }
 
 /// Moves the remaining rays to the front if that frees a vector. The other lanes repeat one of these rays.
-template <bool uniform, bool differentials, bool changes>
-void Kernel<uniform, differentials, changes>::close_ranks(Packet& packet) {
+template <int components, bool uniform, bool differentials, bool changes>
+void Kernel<components, uniform, differentials, changes>::close_ranks(Packet& packet) {
   const int count = static_cast<int>(hwy::PopCount(packet.alive));
   if (count <= (packet.vectors - 1) * lanes) {
     int to = 0;
@@ -133,8 +133,8 @@ void Kernel<uniform, differentials, changes>::close_ranks(Packet& packet) {
   begin<uniform>(medium_, packet);
 }
 
-template <bool uniform, bool differentials, bool changes>
-void Kernel<uniform, differentials, changes>::fill(Packet& packet) {
+template <int components, bool uniform, bool differentials, bool changes>
+void Kernel<components, uniform, differentials, changes>::fill(Packet& packet) {
   if (next_ == rays_.size()) return;
   const int count = static_cast<int>(std::min<std::size_t>(packet_rays, rays_.size() - next_));
   packet.alive = ~0u >> (packet_rays - count);
@@ -158,9 +158,9 @@ void Kernel<uniform, differentials, changes>::fill(Packet& packet) {
 }
 
 /// The lanes whose points are outside the extent, as bits.
-template <bool uniform, bool differentials, bool changes>
-HWY_INLINE std::uint32_t Kernel<uniform, differentials, changes>::outside(const Packet& packet,
-                                                                          const PerRay (&points)[3]) const {
+template <int components, bool uniform, bool differentials, bool changes>
+HWY_INLINE std::uint32_t Kernel<components, uniform, differentials, changes>::outside(const Packet& packet,
+                                                                                      const PerRay (&points)[3]) const {
   std::uint32_t result = 0;
   for (int i = 0; i < packet.vectors * lanes; i += lanes)
     for (int axis = 0; axis < 3; ++axis) {
@@ -173,8 +173,8 @@ HWY_INLINE std::uint32_t Kernel<uniform, differentials, changes>::outside(const 
 }
 
 /// The lanes that cannot take this step, as bits.
-template <bool uniform, bool differentials, bool changes>
-HWY_NOINLINE std::uint32_t Kernel<uniform, differentials, changes>::stopped(const Packet& packet) const {
+template <int components, bool uniform, bool differentials, bool changes>
+HWY_NOINLINE std::uint32_t Kernel<components, uniform, differentials, changes>::stopped(const Packet& packet) const {
   std::uint32_t stop = 0;
   for (int i = 0; i < packet.vectors * lanes; i += lanes) {
     const F3 v = load(packet.v_next, i);
@@ -202,8 +202,8 @@ HWY_NOINLINE std::uint32_t Kernel<uniform, differentials, changes>::stopped(cons
 
 /// The lanes that may take no further step, as bits. Rays that have crossed a cut have taken more steps than the
 /// packet counts.
-template <bool uniform, bool differentials, bool changes>
-HWY_NOINLINE std::uint32_t Kernel<uniform, differentials, changes>::spent(const Packet& packet) const {
+template <int components, bool uniform, bool differentials, bool changes>
+HWY_NOINLINE std::uint32_t Kernel<components, uniform, differentials, changes>::spent(const Packet& packet) const {
   std::uint32_t result = 0;
   for (std::uint32_t rest = packet.alive; rest != 0; rest &= rest - 1) {
     const auto lane = hwy::Num0BitsBelowLS1Bit_Nonzero32(rest);
@@ -214,18 +214,18 @@ HWY_NOINLINE std::uint32_t Kernel<uniform, differentials, changes>::spent(const 
 
 /// Moves the middles of steps that lie outside the extent to the nearest points on it, where the tensor is that of the
 /// outermost voxels. Light may turn back into the extent from there.
-template <bool uniform, bool differentials, bool changes>
-HWY_NOINLINE void Kernel<uniform, differentials, changes>::locate_on_extent(Packet& packet) {
+template <int components, bool uniform, bool differentials, bool changes>
+HWY_NOINLINE void Kernel<components, uniform, differentials, changes>::locate_on_extent(Packet& packet) {
   packet.clamps = true;
   locate_middles<uniform, differentials>(medium_, packet);
-  interpolate<uniform, differentials>(packet);
+  interpolate<components, uniform, differentials>(packet);
   packet.clamps = medium_.clamps;
 }
 
 /// Writes back the rays of some lanes, as they were before the step, and removes them from the packet.
-template <bool uniform, bool differentials, bool changes>
-HWY_NOINLINE void Kernel<uniform, differentials, changes>::take_out(Packet& packet, std::uint32_t stop,
-                                                                    std::uint32_t leave) {
+template <int components, bool uniform, bool differentials, bool changes>
+HWY_NOINLINE void Kernel<components, uniform, differentials, changes>::take_out(Packet& packet, std::uint32_t stop,
+                                                                                std::uint32_t leave) {
   Packet& leaving = leaving_[&packet - packets_];
   for (std::uint32_t rest = stop | leave; rest != 0; rest &= rest - 1) {
     const int lane = static_cast<int>(hwy::Num0BitsBelowLS1Bit_Nonzero32(rest));
@@ -252,8 +252,9 @@ HWY_NOINLINE void Kernel<uniform, differentials, changes>::take_out(Packet& pack
 }
 
 /// Records the points of some lanes.
-template <bool uniform, bool differentials, bool changes>
-HWY_NOINLINE void Kernel<uniform, differentials, changes>::keep_points(const Packet& packet, std::uint32_t which) {
+template <int components, bool uniform, bool differentials, bool changes>
+HWY_NOINLINE void Kernel<components, uniform, differentials, changes>::keep_points(const Packet& packet,
+                                                                                   std::uint32_t which) {
   alignas(64) float positions[packet_rays][4], directions[packet_rays][4];
   alignas(64) std::int32_t bricks[packet_rays][4];
   for (int i = 0; i < packet.vectors * lanes; i += lanes) {
@@ -274,8 +275,8 @@ HWY_NOINLINE void Kernel<uniform, differentials, changes>::keep_points(const Pac
 }
 
 /// Adds a step to what the lanes have travelled.
-template <bool uniform, bool differentials, bool changes>
-HWY_INLINE void Kernel<uniform, differentials, changes>::add_step(Packet& packet) {
+template <int components, bool uniform, bool differentials, bool changes>
+HWY_INLINE void Kernel<components, uniform, differentials, changes>::add_step(Packet& packet) {
   for (int i = 0; i < packet.vectors * lanes; i += lanes) {
     store(hn::Add(load(packet.length, i), load(packet.time, i)), packet.length, i);
     if constexpr (changes)
@@ -286,8 +287,9 @@ HWY_INLINE void Kernel<uniform, differentials, changes>::add_step(Packet& packet
 
 /// Ends a step. Takes out the rays that it ends, as they were before it: those of `stop` and those found here, except
 /// for lanes that are `staying`.
-template <bool uniform, bool differentials, bool changes>
-void Kernel<uniform, differentials, changes>::end_step(Packet& packet, std::uint32_t staying, std::uint32_t stop) {
+template <int components, bool uniform, bool differentials, bool changes>
+void Kernel<components, uniform, differentials, changes>::end_step(Packet& packet, std::uint32_t staying,
+                                                                   std::uint32_t stop) {
   std::uint32_t leave = 0;
   if (packet.near_border) leave = outside(packet, packet.p_next) & ~staying;
   const bool may_fail = medium_.settings.method != BendingMethod::splitting;
@@ -317,38 +319,38 @@ void Kernel<uniform, differentials, changes>::end_step(Packet& packet, std::uint
 }
 
 /// The second part of a step that may end rays.
-template <bool uniform, bool differentials, bool changes>
-HWY_NOINLINE void Kernel<uniform, differentials, changes>::step_watched(Packet& packet) {
+template <int components, bool uniform, bool differentials, bool changes>
+HWY_NOINLINE void Kernel<components, uniform, differentials, changes>::step_watched(Packet& packet) {
   if (packet.near_border && (outside(packet, packet.middle) & packet.alive) != 0) locate_on_extent(packet);
-  take_step<uniform, differentials, changes>(medium_, packet, packet.p_next, packet.v_next, packet.u_next);
+  take_step<components, uniform, differentials, changes>(medium_, packet, packet.p_next, packet.v_next, packet.u_next);
   end_step(packet, 0, 0);
 }
 
-template <bool uniform, bool differentials, bool changes>
-HWY_INLINE void Kernel<uniform, differentials, changes>::step_split(Packet& packet) {
+template <int components, bool uniform, bool differentials, bool changes>
+HWY_INLINE void Kernel<components, uniform, differentials, changes>::step_split(Packet& packet) {
   locate_middles<uniform, differentials>(medium_, packet);
-  interpolate<uniform, differentials>(packet);
+  interpolate<components, uniform, differentials>(packet);
   samples_ += hwy::PopCount(packet.alive);
   if (differentials || HWY_UNLIKELY(packet.watched || packet.steps >= packet.most_steps)) return step_watched(packet);
-  take_step<uniform, differentials, changes>(medium_, packet, packet.p, packet.v, packet.u);
+  take_step<components, uniform, differentials, changes>(medium_, packet, packet.p, packet.v, packet.u);
   add_step(packet);
   if (HWY_UNLIKELY(!batch_.points.empty())) keep_points(packet, packet.alive);
 }
 
 /// Computes the positions after a step of length `time`. May move lanes to other bricks.
-template <bool uniform, bool differentials, bool changes>
-void Kernel<uniform, differentials, changes>::attempt(Packet& packet) {
-  if (medium_.stages) return step_by_stages<uniform, differentials, changes>(medium_, packet);
+template <int components, bool uniform, bool differentials, bool changes>
+void Kernel<components, uniform, differentials, changes>::attempt(Packet& packet) {
+  if (medium_.stages) return step_by_stages<components, uniform, differentials, changes>(medium_, packet);
   if (medium_.settings.method == BendingMethod::euler)
-    return step_by_euler<uniform, differentials, changes>(medium_, packet);
+    return step_by_euler<components, uniform, differentials, changes>(medium_, packet);
   locate_middles<uniform, differentials>(medium_, packet);
-  interpolate<uniform, differentials>(packet);
-  take_step<uniform, differentials, changes>(medium_, packet, packet.p_next, packet.v_next, packet.u_next);
+  interpolate<components, uniform, differentials>(packet);
+  take_step<components, uniform, differentials, changes>(medium_, packet, packet.p_next, packet.v_next, packet.u_next);
 }
 
 /// A step of a method other than splitting.
-template <bool uniform, bool differentials, bool changes>
-HWY_NOINLINE void Kernel<uniform, differentials, changes>::step_otherwise(Packet& packet) {
+template <int components, bool uniform, bool differentials, bool changes>
+HWY_NOINLINE void Kernel<components, uniform, differentials, changes>::step_otherwise(Packet& packet) {
   const std::uint32_t stop = too_short<uniform>(packet);
   attempt(packet);
   samples_ += hwy::PopCount(packet.alive) * samples_per_step();
@@ -357,8 +359,8 @@ HWY_NOINLINE void Kernel<uniform, differentials, changes>::step_otherwise(Packet
 }
 
 /// Repeats the step that leaves the extent, with the length that ends on its face (Newton's method).
-template <bool uniform, bool differentials, bool changes>
-HWY_NOINLINE void Kernel<uniform, differentials, changes>::land(Packet& packet) {
+template <int components, bool uniform, bool differentials, bool changes>
+HWY_NOINLINE void Kernel<components, uniform, differentials, changes>::land(Packet& packet) {
   packet.vectors = packet_rays / lanes;
   close_ranks(packet);
   packet.clamps = true;
@@ -376,8 +378,8 @@ HWY_NOINLINE void Kernel<uniform, differentials, changes>::land(Packet& packet) 
 }
 
 /// Writes back the rays, which are on the extent's faces.
-template <bool uniform, bool differentials, bool changes>
-void Kernel<uniform, differentials, changes>::arrive(Packet& packet, const FaceLanding& landing) {
+template <int components, bool uniform, bool differentials, bool changes>
+void Kernel<components, uniform, differentials, changes>::arrive(Packet& packet, const FaceLanding& landing) {
   for (std::uint32_t rest = packet.alive; rest != 0; rest &= rest - 1) {
     const auto lane = hwy::Num0BitsBelowLS1Bit_Nonzero32(rest);
     KernelRay& ray = rays_[packet.ray[lane]];
@@ -395,8 +397,8 @@ void Kernel<uniform, differentials, changes>::arrive(Packet& packet, const FaceL
   packet.alive = 0;
 }
 
-template <bool uniform, bool differentials, bool changes>
-std::uint64_t Kernel<uniform, differentials, changes>::run() {
+template <int components, bool uniform, bool differentials, bool changes>
+std::uint64_t Kernel<components, uniform, differentials, changes>::run() {
   const bool otherwise = medium_.settings.method != BendingMethod::splitting;
   for (Packet& packet : packets_) fill(packet);
   for (bool busy = true; busy;) {
@@ -418,15 +420,22 @@ std::uint64_t Kernel<uniform, differentials, changes>::run() {
   return samples_;
 }
 
-template <bool differentials, bool changes>
+template <int components, bool differentials, bool changes>
 std::uint64_t trace_as(const PacketMedium& medium, KernelRays& batch) {
-  return medium.uniform ? Kernel<true, differentials, changes>(medium, batch).run()
-                        : Kernel<false, differentials, changes>(medium, batch).run();
+  return medium.uniform ? Kernel<components, true, differentials, changes>(medium, batch).run()
+                        : Kernel<components, false, differentials, changes>(medium, batch).run();
+}
+
+template <int components>
+std::uint64_t trace_components(const PacketMedium& medium, KernelRays& batch) {
+  if (!batch.differentials.empty()) return trace_as<components, true, false>(medium, batch);
+  return batch.wants_radiance_change ? trace_as<components, false, true>(medium, batch)
+                                     : trace_as<components, false, false>(medium, batch);
 }
 
 std::uint64_t trace(const PacketMedium& medium, KernelRays& batch) {
-  if (!batch.differentials.empty()) return trace_as<true, false>(medium, batch);
-  return batch.wants_radiance_change ? trace_as<false, true>(medium, batch) : trace_as<false, false>(medium, batch);
+  return medium.field.is_symmetric() ? trace_components<TensorBrick::symmetric>(medium, batch)
+                                     : trace_components<TensorBrick::general>(medium, batch);
 }
 
 int vector_lanes() { return lanes; }

@@ -74,9 +74,10 @@ void use_instruction_set(const std::string& name);
 int lane_count();
 
 /// Vector operations in one step of a vector of rays in one cell, where the field is weak. They limit the speed.
-/// Multiplications and multiply-adds: middle and cell 6, tensor 56, kick and second half of the step 36.
-constexpr int multiply_adds_per_step = 98;
-/// Additions, roundings, comparisons: middle and cell 10, tensor 24, length 1.
-constexpr int adds_per_step = 35;
+/// Multiplications and multiply-adds: middle and cell 6, kick and second half of the step 36, and 7 for each component
+/// that voxels store.
+constexpr int multiply_adds_per_step(int components) { return 6 + 36 + 7 * components; }
+/// Additions, roundings, comparisons: middle and cell 10, length 1, and 3 for each component.
+constexpr int adds_per_step(int components) { return 10 + 1 + 3 * components; }
 
 }  // namespace tensorray::packets

@@ -66,12 +66,11 @@ HWY_INLINE F divergence(const Tensor& T, F strength, F along) {
 }
 
 /// Eq. 5 and its derivatives, with the tensors as last sampled.
-template <bool differentials, bool changes>
+template <int components, bool differentials, bool changes>
 HWY_INLINE void end_stage(const PacketMedium& medium, Packet& packet, int stage, Stages& stages) {
   for (int i = 0; i < packet.vectors * lanes; i += lanes) {
     const F kick = load(packet.kick, i);
-    Tensor T;
-    for (int c = 0; c < 8; ++c) T.c[c] = load(packet.tensor[c], i);
+    const Tensor T = load_tensor<components>(packet, i);
     const F3 v = load(stages.v[0][stage], i), Tv = apply(T, v);
     const F inverse = hn::Div(set(1), dot(v, v)), along = hn::Mul(dot(v, Tv), inverse);
     const F3 change = mul_add(hn::Neg(along), v, Tv);
@@ -80,7 +79,7 @@ HWY_INLINE void end_stage(const PacketMedium& medium, Packet& packet, int stage,
     if constexpr (differentials)
       for (int k = 0; k < 2; ++k) {
         const F3 dv = load(stages.v[k + 1][stage], i);
-        const Tensor dT = tensor_along(packet, along_slopes(medium, load(stages.dp[k], i)), i);
+        const Tensor dT = tensor_along<components>(packet, along_slopes(medium, load(stages.dp[k], i)), i);
         const F3 dTv = add(apply(T, dv), apply(dT, v));
         // v·change is 0, because Tv = along · v + change.
         const F dalong = hn::Mul(inverse, hn::Sub(hn::Add(dot(dv, change), dot(v, dTv)), hn::Mul(along, dot(v, dv))));
@@ -151,7 +150,7 @@ HWY_INLINE void combine_stages(const PacketMedium& medium, Packet& packet, const
 }
 
 /// A step of a Runge–Kutta method.
-template <bool uniform, bool differentials, bool changes>
+template <int components, bool uniform, bool differentials, bool changes>
 HWY_NOINLINE void step_by_stages(const PacketMedium& medium, Packet& packet) {
   Stages stages;
   bool near_border = false, near_surface = false;  // In any brick that is sampled.
@@ -161,8 +160,8 @@ HWY_NOINLINE void step_by_stages(const PacketMedium& medium, Packet& packet) {
                                    [&](int i) HWY_ATTR { return add(load(packet.p, i), load(stages.ahead, i)); });
     near_border |= packet.near_border;
     near_surface |= packet.near_surface;
-    interpolate<uniform, differentials>(packet);
-    end_stage<differentials, changes>(medium, packet, stage, stages);
+    interpolate<components, uniform, differentials>(packet);
+    end_stage<components, differentials, changes>(medium, packet, stage, stages);
   }
   packet.near_border |= near_border;
   packet.near_surface |= near_surface;
@@ -170,11 +169,12 @@ HWY_NOINLINE void step_by_stages(const PacketMedium& medium, Packet& packet) {
 }
 
 /// T₂₂ and its slopes at the points where the lanes' tensors were sampled.
+template <int components>
 HWY_INLINE Slopes<F> sample_trailing(const Packet& packet, int at) {
   alignas(64) float values[8][lanes];
   const auto corner = [&](int lane, int k) HWY_ATTR {
-    const int voxel = static_cast<int>(packet.voxel[at + lane]) + corners[k] / TensorBrick::bending_floats;
-    return packet.bending[at + lane][TensorBrick::trailing_offset + voxel];
+    const int voxel = static_cast<int>(packet.voxel[at + lane]) + corners[k];
+    return packet.bending[at + lane][TensorBrick::trailing_offset(components) + voxel];
   };
   for (int lane = 0; lane < (packet.one_cell ? 0 : lanes); ++lane)
     for (int k = 0; k < 8; ++k) values[k][lane] = corner(lane, k);
@@ -184,22 +184,21 @@ HWY_INLINE Slopes<F> sample_trailing(const Packet& packet, int at) {
 }
 
 /// A step of Euler's method (Eq. 3–4), which the trace of T affects.
-template <bool uniform, bool differentials, bool changes>
+template <int components, bool uniform, bool differentials, bool changes>
 HWY_NOINLINE void step_by_euler(const PacketMedium& medium, Packet& packet) {
   locate<uniform, differentials>(medium, packet, [&](int i) HWY_ATTR { return load(packet.p, i); });
-  interpolate<uniform, differentials>(packet);
+  interpolate<components, uniform, differentials>(packet);
   for (int i = 0; i < packet.vectors * lanes; i += lanes) {
     const F time = load(packet.time, i), factor = hn::Mul(time, load(packet.kick, i));
-    Tensor T;
-    for (int c = 0; c < 8; ++c) T.c[c] = load(packet.tensor[c], i);
-    const Slopes<F> trailing = sample_trailing(packet, i);
+    const Tensor T = load_tensor<components>(packet, i);
+    const Slopes<F> trailing = sample_trailing<components>(packet, i);
     const F3 v = load(packet.v, i);
     F3 dv[2];
     if constexpr (differentials)
       for (int k = 0; k < 2; ++k) {
         const F3 along = along_slopes(medium, load(packet.dp[k], i)), before = load(packet.dv[k], i);
         const F dtrailing = dot(along, {trailing.x, trailing.y, trailing.z});
-        const F3 bent = add(apply(T, before), apply(tensor_along(packet, along, i), v));
+        const F3 bent = add(apply(T, before), apply(tensor_along<components>(packet, along, i), v));
         dv[k] = mul_add(factor, mul_add(trailing.value, before, mul_add(dtrailing, v, bent)), before);
       }
     const F3 Tv = apply(T, v), after = mul_add(factor, mul_add(trailing.value, v, Tv), v);

@@ -167,13 +167,13 @@ HWY_INLINE void locate_middles(const PacketMedium& medium, Packet& packet) {
 
 /// Offsets, in floats within the lanes' bricks, of the cells where the lanes of a vector will be after two long steps;
 /// beyond a brick, of the last cell on the way.
-template <bool uniform>
+template <int components, bool uniform>
 HWY_INLINE void find_cells_ahead(const Packet& packet, int at, std::int32_t (&ahead)[lanes]) {
   const F3 there = add(load(packet.middle, at), load(direction<uniform>(packet), at));
   const F last = set(TensorBrick::cells - 1), width = set(TensorBrick::width);
   const F3 cell = clamp(floor(there), zeros(), {last, last, last});
   const F voxel = hn::MulAdd(hn::MulAdd(cell.x, width, cell.y), width, cell.z);
-  hn::Store(hn::ConvertTo(ints, hn::Mul(voxel, set(TensorBrick::bending_floats))), ints, ahead);
+  store_offsets<components>(voxel, ahead);
 }
 
 /// Whether all lanes of a vector are in one cell.
@@ -186,27 +186,27 @@ HWY_INLINE bool in_one_cell(const Packet& packet, int first) {
 }
 
 /// The second part of a step: samples the tensors there.
-template <bool uniform, bool differentials>
+template <int components, bool uniform, bool differentials>
 HWY_INLINE void interpolate(Packet& packet) {
   alignas(64) std::int32_t ahead[lanes];
   if (!differentials && HWY_LIKELY(packet.one_cell)) {
-    find_cells_ahead<uniform>(packet, 0, ahead);
-    prefetch_cell(packet.bending[0] + ahead[0]);
-    return sample_cell(cell_of(packet, 0), packet, 0, packet.vectors);
+    find_cells_ahead<components, uniform>(packet, 0, ahead);
+    prefetch_cell<components>(packet.bending[0] + ahead[0]);
+    return sample_cell<components>(cell_of<components>(packet, 0), packet, 0, packet.vectors);
   }
   for (int i = 0; i < packet.vectors * lanes; i += lanes) {
     const bool together = in_one_cell(packet, i);
-    if (!together) find_cells_ahead<uniform>(packet, i, ahead);
+    if (!together) find_cells_ahead<components, uniform>(packet, i, ahead);
     if constexpr (differentials) {
       if (together)
-        sample_slopes(cell_of(packet, i), packet, i);
+        sample_slopes<components>(cell_of<components>(packet, i), packet, i);
       else
-        sample_own_slopes(packet, i, ahead);
+        sample_own_slopes<components>(packet, i, ahead);
     } else {
       if (together)
-        sample_cell(cell_of(packet, i), packet, i, 1);
+        sample_cell<components>(cell_of<components>(packet, i), packet, i, 1);
       else
-        sample_own_cells(packet, i, ahead);
+        sample_own_cells<components>(packet, i, ahead);
     }
   }
 }
@@ -218,23 +218,23 @@ HWY_INLINE F3 along_slopes(const PacketMedium& medium, const F3& dp) {
 }
 
 /// Change of the tensor if the position changes by `along`.
+template <int components>
 HWY_INLINE Tensor tensor_along(const Packet& packet, const F3& along, int at) {
-  Tensor dT;
-  for (int c = 0; c < 8; ++c)
-    dT.c[c] = dot(along, {load(packet.slopes[0][c], at), load(packet.slopes[1][c], at), load(packet.slopes[2][c], at)});
-  return dT;
+  return tensor_of<components>([&](int i) HWY_ATTR {
+    return dot(along, {load(packet.slopes[0][i], at), load(packet.slopes[1][i], at), load(packet.slopes[2][i], at)});
+  });
 }
 
 /// The derivatives along two parameters of exp(factor · T) V, normalised, and of the positions at the end of the step.
 /// They are the derivatives of the method's own steps. The series has one more term than without derivatives, because
 /// differentiation removes one.
-template <bool uniform>
+template <int components, bool uniform>
 HWY_INLINE void bend_differentials(const PacketMedium& medium, Packet& packet, const Tensor& T, const F3& v, F factor,
                                    int at) {
   const F size = load(packet.size, at), half = hn::Mul(set(0.5f), load(packet.time, at));
   for (int i = 0; i < 2; ++i) {
     const F3 dmiddle = mul_add(half, index_direction<uniform>(medium, load(packet.dv[i], at)), load(packet.dp[i], at));
-    const Tensor dT = tensor_along(packet, along_slopes(medium, dmiddle), at);
+    const Tensor dT = tensor_along<components>(packet, along_slopes(medium, dmiddle), at);
     F3 term = v, sum = v, dterm = load(packet.dv[i], at), dsum = dterm;
     for (int n = 1; n <= most_terms; ++n) {
       const Mask needed = hn::Gt(size, set(n < 4 ? -1.0f : series_reach[n - 4]));
@@ -255,19 +255,18 @@ HWY_INLINE void bend_differentials(const PacketMedium& medium, Packet& packet, c
 
 /// The third part of a step: bends the rays, and moves from the middle to the positions and directions at the end. The
 /// results may overwrite those of the packet. `weakly`: no lane needs more than two terms.
-template <bool uniform, bool differentials, bool changes, bool weakly>
+template <int components, bool uniform, bool differentials, bool changes, bool weakly>
 HWY_INLINE void take_step_as(const PacketMedium& medium, Packet& packet, PerRay (&p)[3], PerRay (&v)[3],
                              PerRay (&u)[3]) {
   for (int i = 0; i < packet.vectors * lanes; i += lanes) {
     const F time = load(packet.time, i), factor = hn::Mul(time, load(packet.kick, i)), half = hn::Mul(set(0.5f), time);
-    Tensor T;
-    for (int c = 0; c < 8; ++c) T.c[c] = load(packet.tensor[c], i);
+    const Tensor T = load_tensor<components>(packet, i);
     const F3 before = load(packet.v, i);
     if constexpr (weakly)
       store(bend_weakly<changes>(packet, T, before, factor, i), v, i);
     else
-      bend_strongly<differentials, changes>(packet, T, before, factor, i, v);
-    if constexpr (differentials) bend_differentials<uniform>(medium, packet, T, before, factor, i);
+      bend_strongly<components, differentials, changes>(packet, T, before, factor, i, v);
+    if constexpr (differentials) bend_differentials<components, uniform>(medium, packet, T, before, factor, i);
     const F3 after = load(v, i);
     if constexpr (uniform) {
       store(mul_add(half, after, load(packet.middle, i)), p, i);
@@ -279,11 +278,11 @@ HWY_INLINE void take_step_as(const PacketMedium& medium, Packet& packet, PerRay 
   }
 }
 
-template <bool uniform, bool differentials, bool changes>
+template <int components, bool uniform, bool differentials, bool changes>
 HWY_INLINE void take_step(const PacketMedium& medium, Packet& packet, PerRay (&p)[3], PerRay (&v)[3], PerRay (&u)[3]) {
   if (!differentials && HWY_LIKELY(packet.greatest_reach <= series_reach[0]))
-    return take_step_as<uniform, differentials, changes, true>(medium, packet, p, v, u);
-  take_step_as<uniform, differentials, changes, false>(medium, packet, p, v, u);
+    return take_step_as<components, uniform, differentials, changes, true>(medium, packet, p, v, u);
+  take_step_as<components, uniform, differentials, changes, false>(medium, packet, p, v, u);
 }
 
 }  // namespace tensorray::packets::HWY_NAMESPACE

@@ -160,7 +160,7 @@ void expect_same(const TensorField& a, const TensorField& b, const Eigen::Aligne
         const TensorBrick one = a.brick({x, y, z}), other = b.brick({x, y, z});
         ASSERT_EQ(a.is_stored({x, y, z}), b.is_stored({x, y, z}));
         ASSERT_EQ(one.strongest, other.strongest);
-        ASSERT_TRUE(std::equal(one.bending, one.bending + TensorBrick::trailing_offset, other.bending));
+        ASSERT_TRUE(std::equal(one.bending, one.bending + TensorBrick::trailing_offset(one.components), other.bending));
         ASSERT_TRUE(std::equal(one.trailing, one.trailing + TensorBrick::voxels, other.trailing));
       }
 }

@@ -15,7 +15,13 @@ namespace {
 
 /// Bytes that a packet reads for a cell that is not in the cache: the four voxels that it does not share with its
 /// neighbour.
-constexpr double bytes_per_cold_cell = 4 * TensorBrick::bending_floats * sizeof(float);
+double bytes_per_cold_cell(int components) {
+  return 4.0 * sizeof(float) * TensorBrick::trailing_offset(components) / TensorBrick::voxels;
+}
+
+int components_of(const TestField& test) {
+  return test.field.is_symmetric() ? TensorBrick::symmetric : TensorBrick::general;
+}
 
 struct Measurement {
   std::string name;
@@ -118,22 +124,23 @@ KernelRate measure_kernel(const TestField& test, Order order, const TraceFunctio
 
 /// The rate as a fraction of the highest one at which vectors of these instructions can be issued: the pipes that
 /// multiply limit it, those that add, or all of them together.
-double issue_fraction(double samples_per_second, const std::string& instructions, const Json& machine) {
+double issue_fraction(double samples_per_second, const std::string& instructions, int components, const Json& machine) {
+  const int multiply_adds = packets::multiply_adds_per_step(components), adds = packets::adds_per_step(components);
   for (const Json& rate : machine.at("vectors"))
     if (rate.at("instructions") == instructions) {
       const auto seconds = [&](int operations, const char* kind) { return operations / rate.at(kind).get<double>(); };
       const double least =
-          std::max({seconds(packets::multiply_adds_per_step, "multiply_adds_per_second"),
-                    seconds(packets::adds_per_step, "adds_per_second"),
-                    seconds(packets::multiply_adds_per_step + packets::adds_per_step, "both_per_second")});
+          std::max({seconds(multiply_adds, "multiply_adds_per_second"), seconds(adds, "adds_per_second"),
+                    seconds(multiply_adds + adds, "both_per_second")});
       return samples_per_second * least / rate.at("lanes").get<double>();
     }
   throw std::logic_error("no rate was measured for " + instructions);
 }
 
-double bandwidth_fraction(double samples_per_second, const Json& machine) {
+double bandwidth_fraction(double samples_per_second, int components, const Json& machine) {
   const double cells_per_second = samples_per_second / packet_rays * step;
-  return cells_per_second * bytes_per_cold_cell / machine.at("memory")[0].at("read_bytes_per_second").get<double>();
+  return cells_per_second * bytes_per_cold_cell(components) /
+         machine.at("memory")[0].at("read_bytes_per_second").get<double>();
 }
 
 Json describe_kernel(const TestField& test, Order order, const Kernel& kernel, const TraceFunction& function,
@@ -149,8 +156,9 @@ Json describe_kernel(const TestField& test, Order order, const Kernel& kernel, c
   row["ends"] = ends(test, order, function);
   row["greatest_difference_in_voxels"] = greatest_difference(test, order, function, kernel.settings);
   if (!kernel.instructions.empty())
-    row["issue_fraction"] = issue_fraction(rate.samples.median, kernel.instructions, machine);
-  if (order == Order::fresh) row["bandwidth_fraction"] = bandwidth_fraction(rate.samples.median, machine);
+    row["issue_fraction"] = issue_fraction(rate.samples.median, kernel.instructions, components_of(test), machine);
+  if (order == Order::fresh)
+    row["bandwidth_fraction"] = bandwidth_fraction(rate.samples.median, components_of(test), machine);
   return row;
 }
 

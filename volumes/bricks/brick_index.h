@@ -13,8 +13,8 @@ namespace tensorray {
 
 /// Maps the coordinates of bricks (voxel index / 8) to their numbers in a list. Memory follows the number of bricks,
 /// not their extent. The index is a dense table over the box of all bricks where that takes at most 256 bytes per brick
-/// (a brick itself takes 26,000); finding a brick is then one load from a table that fits in caches. Otherwise it is a
-/// hash table. Immutable; any number of threads may read it at once.
+/// (a brick itself takes 18,000 or 26,000); finding a brick is then one load from a table that fits in caches.
+/// Otherwise it is a hash table. Immutable; any number of threads may read it at once.
 class BrickIndex {
  public:
   static constexpr std::uint32_t missing = 0xffffffffu;

@@ -8,8 +8,6 @@
 
 #include <tbb/parallel_sort.h>
 
-#include "volumes/bricks/tensor_field.h"
-
 namespace tensorray {
 namespace {
 
@@ -32,21 +30,30 @@ std::bitset<8> shared_faces(const BlockShape& block) {
   return touched;
 }
 
-/// The voxels of a block as bricks hold them.
+/// The voxels of a block as bricks hold them. Voxels of `bending` are at `block_offset`.
 struct BlockVoxels {
-  alignas(64) float bending[TensorBlock::voxels * TensorBrick::bending_floats];
+  alignas(64) float bending[TensorBlock::voxels * TensorBrick::general];
   alignas(64) float trailing[TensorBlock::voxels];
   alignas(64) float deviator[TensorBlock::voxels];  // Squared norm.
   alignas(64) float squares[TensorBlock::voxels];   // Sum of the squares of `bending`.
 };
 
-/// T − T₂₂ I (eight floats) and T₂₂ of each voxel. @return the greatest squared norm of T.
+/// Offset of a voxel in BlockVoxels::bending, in floats. Rows along z are as in bricks.
+template <int components>
+int block_offset(int voxel) {
+  constexpr int size = TensorBlock::size;
+  return voxel / size * TensorBrick::bending_offset(components, size) +
+         TensorBrick::bending_offset(components, voxel % size);
+}
+
+/// The stored components of T − T₂₂ I, and T₂₂, of each voxel. @return the greatest squared norm of T.
+template <int components>
 float convert(const TensorBlock& block, BlockVoxels& voxels) {
   using Four = Eigen::Array4f;  // A vector register.
   float greatest = 0;
   for (int i = 0; i < TensorBlock::voxels; ++i) {
     const float* const T = block.values[i].data();
-    float* const bending = voxels.bending + i * TensorBrick::bending_floats;
+    float* const bending = voxels.bending + block_offset<components>(i);
     Four near = Eigen::Map<const Four>(T), far = Eigen::Map<const Four>(T + 4);
     const float last = T[8];
     greatest = std::max(greatest, (near * near + far * far).sum() + last * last);
@@ -54,7 +61,12 @@ float convert(const TensorBlock& block, BlockVoxels& voxels) {
     near -= diagonal;
     far -= diagonal;
     Eigen::Map<Four>{bending} = near;
-    Eigen::Map<Four>{bending + 4} = far;
+    // From the second component on the diagonal, which `near` holds twice; then the float that fills a cache line, or
+    // the first one of the next voxel, which follows.
+    if constexpr (components == TensorBrick::symmetric)
+      Eigen::Map<Eigen::Array3f>{bending + 3} = Eigen::Array3f(far[0], far[1], 0);
+    else
+      Eigen::Map<Four>{bending + 4} = far;
     const float squares = (near * near + far * far).sum(), trace = near[0] + far[0];
     // The relative error of single precision is below 2e-6 here, because the trace takes at most two thirds of the
     // squares away.
@@ -85,11 +97,12 @@ void for_shared_rows(const Eigen::Vector3i& ahead, const Visit& visit) {
 }
 
 /// Copies `length` voxels.
-template <int length>
+template <int components, int length>
 void copy_row(const BlockVoxels& voxels, int from, float* brick, int to) {
-  constexpr int floats = TensorBrick::bending_floats;
-  std::memcpy(brick + to * floats, voxels.bending + from * floats, length * floats * sizeof(float));
-  std::memcpy(brick + TensorBrick::trailing_offset + to, voxels.trailing + from, length * sizeof(float));
+  constexpr std::size_t floats = TensorBrick::bending_offset(components, length - 1) + components;
+  std::memcpy(brick + TensorBrick::bending_offset(components, to), voxels.bending + block_offset<components>(from),
+              floats * sizeof(float));
+  std::memcpy(brick + TensorBrick::trailing_offset(components) + to, voxels.trailing + from, length * sizeof(float));
 }
 
 /// Sets what the brick that is corner(bits) before the block needs to know.
@@ -105,20 +118,42 @@ void set_share(const BlockVoxels& voxels, int bits, BlockShare& share) {
   share.squares[static_cast<std::size_t>(bits)] = squares;
 }
 
-/// The squared Frobenius norm of the deviator of T, from the eight floats of T − T₂₂ I.
-double squared_deviator(const float* bending) {
+/// The squared Frobenius norm of the deviator of T, from T − T₂₂ I.
+double squared_deviator(const TensorBrick& brick, int voxel) {
+  const auto component = [&](int i) {
+    const int offset = TensorBrick::bending_offset(brick.components, voxel);
+    return double{brick.bending[offset + TensorBrick::stored_component(brick.components, i)]};
+  };
   double squares = 0;
-  for (int i = 0; i < TensorBrick::bending_floats; ++i) squares += double{bending[i]} * bending[i];
-  const double trace = double{bending[0]} + bending[4];
+  for (int i = 0; i < TensorBrick::general; ++i) squares += component(i) * component(i);
+  const double trace = component(0) + component(4);
   return std::max(0.0, squares - trace * trace / 3);
 }
 
 /// In double precision, for values of any size; NaN counts as zero.
-double greatest_squared_deviator(const float* brick) {
+double greatest_squared_deviator(const TensorBrick& brick) {
   double greatest = 0;
   for (int voxel = 0; voxel < TensorBrick::voxels; ++voxel)
-    greatest = std::max(greatest, squared_deviator(brick + voxel * TensorBrick::bending_floats));
+    greatest = std::max(greatest, squared_deviator(brick, voxel));
   return greatest;
+}
+
+template <int components>
+BlockShare place(const TensorBlock& block, const std::array<float*, bricks_of_block>& bricks) {
+  BlockVoxels voxels;
+  BlockShare share;
+  const float norm = convert<components>(block, voxels);
+  share.norm = norm > least && norm < most ? double{norm} : greatest_squared_norm(block);
+  for (int bits = 0; bits < bricks_of_block; ++bits) {
+    const bool is_row = corner(bits).z() == 0;
+    is_row ? set_share<cells>(voxels, bits, share) : set_share<1>(voxels, bits, share);
+    float* const brick = bricks[static_cast<std::size_t>(bits)];
+    if (!brick) continue;
+    for_shared_rows(corner(bits), [&](int from, int to) {
+      is_row ? copy_row<components, cells>(voxels, from, brick, to) : copy_row<components, 1>(voxels, from, brick, to);
+    });
+  }
+  return share;
 }
 
 }  // namespace
@@ -148,33 +183,45 @@ std::vector<Eigen::Vector3i> active_bricks(const BlockTable& table, const Eigen:
   return bricks;
 }
 
-BlockShare place_block(const TensorBlock& block, const std::array<float*, bricks_of_block>& bricks) {
-  BlockVoxels voxels;
-  BlockShare share;
-  const float norm = convert(block, voxels);
-  share.norm = norm > least && norm < most ? double{norm} : greatest_squared_norm(block);
-  for (int bits = 0; bits < bricks_of_block; ++bits) {
-    const bool is_row = corner(bits).z() == 0;
-    is_row ? set_share<cells>(voxels, bits, share) : set_share<1>(voxels, bits, share);
-    float* const brick = bricks[static_cast<std::size_t>(bits)];
-    if (!brick) continue;
-    for_shared_rows(corner(bits), [&](int from, int to) {
-      is_row ? copy_row<cells>(voxels, from, brick, to) : copy_row<1>(voxels, from, brick, to);
-    });
+bool has_symmetric_tensors(const TensorBlock& block) {
+  const auto bits = [](const float& value) {
+    std::uint32_t result;
+    std::memcpy(&result, &value, sizeof result);
+    return result;
+  };
+  std::uint32_t difference = 0;
+  for (const Eigen::Matrix3f& value : block.values) {
+    const float* const T = value.data();
+    difference |= (bits(T[1]) ^ bits(T[3])) | (bits(T[2]) ^ bits(T[6])) | (bits(T[5]) ^ bits(T[7]));
   }
-  return share;
+  return difference == 0;
 }
 
-float strongest_deviator(const BlockTable& table, const std::vector<BlockShare>& shares, const Eigen::Vector3i& brick,
-                         const float* floats) {
+BlockShare place_block(const TensorBlock& block, int components, const std::array<float*, bricks_of_block>& bricks) {
+  return components == TensorBrick::symmetric ? place<TensorBrick::symmetric>(block, bricks)
+                                              : place<TensorBrick::general>(block, bricks);
+}
+
+void widen_brick(const float* symmetric, float* general) {
+  constexpr int few = TensorBrick::symmetric, all = TensorBrick::general;
+  for (int voxel = 0; voxel < TensorBrick::voxels; ++voxel)
+    for (int i = 0; i < all; ++i)
+      general[voxel * all + i] =
+          symmetric[TensorBrick::bending_offset(few, voxel) + TensorBrick::stored_component(few, i)];
+  std::copy_n(symmetric + TensorBrick::trailing_offset(few), TensorBrick::voxels,
+              general + TensorBrick::trailing_offset(all));
+}
+
+float strongest_deviator(const BlockTable& table, const std::vector<BlockShare>& shares, const Eigen::Vector3i& place,
+                         const TensorBrick& brick) {
   float greatest = 0, sum = 0;
   for (int bits = 0; bits < bricks_of_block; ++bits) {
-    const std::uint32_t block = table.index.find(brick + corner(bits));
+    const std::uint32_t block = table.index.find(place + corner(bits));
     if (block == BrickIndex::missing) continue;
     greatest = std::max(greatest, shares[block].strongest[static_cast<std::size_t>(bits)]);
     sum += shares[block].squares[static_cast<std::size_t>(bits)];
   }
-  const double squared = greatest > least && sum < most ? double{greatest} : greatest_squared_deviator(floats);
+  const double squared = greatest > least && sum < most ? double{greatest} : greatest_squared_deviator(brick);
   // Rounded up, because interpolation may round to slightly more than the tensor of any voxel.
   return static_cast<float>(std::sqrt(squared) * (1 + 1.2e-5));
 }

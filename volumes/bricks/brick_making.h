@@ -8,6 +8,7 @@
 #include <Eigen/Geometry>
 
 #include "volumes/bricks/brick_index.h"
+#include "volumes/bricks/tensor_field.h"
 #include "volumes/grids/tensor_grid.h"
 
 namespace tensorray {
@@ -41,13 +42,20 @@ struct BlockShare {
   double norm;                                   ///< Greatest squared norm of a tensor.
 };
 
+/// Whether T = Tᵀ in all voxels, bit for bit.
+bool has_symmetric_tensors(const TensorBlock& block);
+
 /// Copies the voxels of a block to its bricks, in the layout of TensorBrick.
-/// @param bricks  Entry i is the brick that is corner(i) before the block; null: there is no such brick.
-BlockShare place_block(const TensorBlock& block, const std::array<float*, bricks_of_block>& bricks);
+/// @param components  Of the bricks. If TensorBrick::symmetric, the block must be symmetric.
+/// @param bricks      Entry i is the brick that is corner(i) before the block; null: there is no such brick.
+BlockShare place_block(const TensorBlock& block, int components, const std::array<float*, bricks_of_block>& bricks);
+
+/// Copies a brick of symmetric tensors to one of tensors of any kind.
+void widen_brick(const float* symmetric, float* general);
 
 /// TensorBrick::strongest of a brick. @param shares  Of the blocks, in the order of the table.
-/// @param floats  The brick, which is complete.
-float strongest_deviator(const BlockTable& table, const std::vector<BlockShare>& shares, const Eigen::Vector3i& brick,
-                         const float* floats);
+/// @param brick  The brick at `place`; it is complete but for `strongest`.
+float strongest_deviator(const BlockTable& table, const std::vector<BlockShare>& shares, const Eigen::Vector3i& place,
+                         const TensorBrick& brick);
 
 }  // namespace tensorray

@@ -22,7 +22,7 @@ struct Cells {
   alignas(64) float fraction[3][cell_block] = {};           // Position within the cell.
   alignas(64) std::int32_t brick[3][cell_block] = {};       // Coordinates of the brick.
   alignas(64) std::int32_t voxel[cell_block] = {};          // Number, in the brick, of the cell's first voxel.
-  const float *bending[cell_block], *trailing[cell_block];  // Of the cell's first voxel.
+  const float *bending[cell_block], *trailing[cell_block];  // Of the brick.
 };
 
 /// The extent, from the points' origin: its first and last voxels, and the first voxel of its last cell.
@@ -43,9 +43,6 @@ namespace {
 namespace hn = hwy::HWY_NAMESPACE;
 using Floats = hn::CappedTag<float, 16>;
 using Eight = hn::CappedTag<float, 8>;  // For the components of one voxel.
-
-constexpr std::size_t z_stride = TensorBrick::bending_floats, y_stride = TensorBrick::width * z_stride,
-                      x_stride = TensorBrick::width * y_stride;
 
 /// Finds the cells of the points from `first` on.
 void find_cells(const CellRange& range, const IndexPoints& points, std::size_t first, std::size_t count, Cells& cells) {
@@ -94,14 +91,17 @@ HWY_INLINE void store_components(V values, std::size_t c, std::size_t p, float (
   hn::Store(values, hn::DFromV<V>(), components[c / 4] + 4 * p + c % 4);
 }
 
-/// T − T₂₂ I.
+/// The stored components of T − T₂₂ I.
+template <int stored>
 void sample_bending(const Cells& cells, std::size_t count, float (*components)[4 * cell_block]) {
   const Eight d;
   for (std::size_t p = 0; p < count; ++p)
-    for (std::size_t c = 0; c < 8; c += hn::Lanes(d)) {
-      const float* const cell = cells.bending[p] + c;
-      const auto corner = [&](int x, int y, int z)
-                              HWY_ATTR { return hn::Load(d, cell + x * x_stride + y * y_stride + z * z_stride); };
+    for (std::size_t c = 0; c < stored; c += hn::Lanes(d)) {
+      // Where vectors hold more than a voxel's components, the others are those of the next voxel, and are not used.
+      const auto corner = [&](int x, int y, int z) HWY_ATTR {
+        const int voxel = cells.voxel[p] + TensorBrick::voxel(x, y, z);
+        return hn::LoadU(d, cells.bending[p] + TensorBrick::bending_offset(stored, voxel) + c);
+      };
       const auto fraction = [&](int axis) HWY_ATTR { return hn::Set(d, cells.fraction[axis][p]); };
       const auto sampled = trilinear(corner, fraction(0), fraction(1), fraction(2));
       store_components(sampled, c, p, components);
@@ -112,7 +112,7 @@ void sample_bending(const Cells& cells, std::size_t count, float (*components)[4
 void sample_trailing(const Cells& cells, std::size_t count, float* trailing) {
   const auto at = [](float near, float far, float fraction) { return near + fraction * (far - near); };
   for (std::size_t p = 0; p < count; ++p) {
-    const float* const cell = cells.trailing[p];
+    const float* const cell = cells.trailing[p] + cells.voxel[p];
     const float x = cells.fraction[0][p], y = cells.fraction[1][p], z = cells.fraction[2][p];
     const auto face = [&](const float* first) {
       return at(at(first[0], first[1], z), at(first[TensorBrick::width], first[TensorBrick::width + 1], z), y);
@@ -122,20 +122,30 @@ void sample_trailing(const Cells& cells, std::size_t count, float* trailing) {
 }
 
 /// Samples the cells. @param components, stride  As in sample_tensors.
-void sample_cells(const Cells& cells, std::size_t count, float factor, float* components, std::size_t stride) {
+template <int stored>
+void sample_cells_of(const Cells& cells, std::size_t count, float factor, float* components, std::size_t stride) {
   const Floats d;
   alignas(64) float bending[2][4 * cell_block], trailing[cell_block];
-  sample_bending(cells, count, bending);
+  sample_bending<stored>(cells, count, bending);
   sample_trailing(cells, count, trailing);
   for (std::size_t p = 0; p < count; p += hn::Lanes(d)) {
-    hn::Vec<Floats> T[9];
-    hn::LoadInterleaved4(d, bending[0] + 4 * p, T[0], T[1], T[2], T[3]);
-    hn::LoadInterleaved4(d, bending[1] + 4 * p, T[4], T[5], T[6], T[7]);
+    hn::Vec<Floats> s[8], T[9];
+    hn::LoadInterleaved4(d, bending[0] + 4 * p, s[0], s[1], s[2], s[3]);
+    hn::LoadInterleaved4(d, bending[1] + 4 * p, s[4], s[5], s[6], s[7]);
+    for (int i = 0; i < 8; ++i) T[i] = s[TensorBrick::stored_component(stored, i)];
     T[8] = hn::Load(d, trailing + p);
     T[0] = hn::Add(T[0], T[8]);
     T[4] = hn::Add(T[4], T[8]);
     for (std::size_t c = 0; c < 9; ++c) hn::StoreU(hn::Mul(T[c], hn::Set(d, factor)), d, components + c * stride + p);
   }
+}
+
+void sample_cells(const Cells& cells, int stored, std::size_t count, float factor, float* components,
+                  std::size_t stride) {
+  if (stored == TensorBrick::symmetric)
+    sample_cells_of<TensorBrick::symmetric>(cells, count, factor, components, stride);
+  else
+    sample_cells_of<TensorBrick::general>(cells, count, factor, components, stride);
 }
 
 }  // namespace
@@ -171,8 +181,8 @@ void find_voxels(const TensorField& field, std::size_t count, Eigen::Vector3i& a
       at = wanted;
       brick = field.brick(at);
     }
-    cells.bending[p] = brick.bending + cells.voxel[p] * TensorBrick::bending_floats;
-    cells.trailing[p] = brick.trailing + cells.voxel[p];
+    cells.bending[p] = brick.bending;
+    cells.trailing[p] = brick.trailing;
   }
 }
 
@@ -188,7 +198,7 @@ void sample_tensors(const TensorField& field, const IndexPoints& points, float f
     const std::size_t count = std::min(cell_block, points.count - first);
     HWY_DYNAMIC_DISPATCH(find_cells)(range, points, first, count, cells);
     find_voxels(field, count, at, brick, cells);
-    HWY_DYNAMIC_DISPATCH(sample_cells)(cells, count, factor, components + first, stride);
+    HWY_DYNAMIC_DISPATCH(sample_cells)(cells, brick.components, count, factor, components + first, stride);
   }
 }
 

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <atomic>
 #include <cmath>
 #include <functional>
 #include <stdexcept>
@@ -17,7 +18,7 @@ namespace tensorray {
 namespace {
 
 struct alignas(64) ZeroBrick {
-  float floats[TensorBrick::stored_floats] = {};
+  float floats[TensorBrick::stored_floats(TensorBrick::general)] = {};
 };
 constexpr ZeroBrick zero_brick;
 
@@ -46,12 +47,12 @@ Eigen::AlignedBox3d extent_of(const Eigen::AlignedBox3i& active) {
 
 }  // namespace
 
-const TensorBrick TensorField::zeros{zero_brick.floats, zero_brick.floats + TensorBrick::trailing_offset, 0};
+const float* const TensorField::zeros = zero_brick.floats;
 
 Eigen::Matrix3d TensorBrick::tensor(int voxel) const {
   Eigen::Matrix3d T;
-  Eigen::Map<Eigen::Matrix<double, 8, 1>>(T.data()) =
-      Eigen::Map<const Eigen::Matrix<float, 8, 1>>(bending + voxel * bending_floats).cast<double>();
+  for (int i = 0; i < general; ++i)
+    T.data()[i] = double{bending[bending_offset(components, voxel) + stored_component(components, i)]};
   T(2, 2) = trailing[voxel];
   T(0, 0) += T(2, 2);
   T(1, 1) += T(2, 2);
@@ -103,40 +104,71 @@ void TensorField::make_bricks(const std::vector<BlockShape>& shapes, const Block
   bricks_ = active_bricks(table, bricks_of(active));
   bricks_.shrink_to_fit();
   index_ = BrickIndex(bricks_);
-  floats_ = allocate(bricks_.size());
-  const auto floats_of = [&](std::size_t brick) { return floats_.get() + brick * TensorBrick::stored_floats; };
   std::vector<BlockShare> shares(shapes.size());
-  const auto place = [&](const tbb::blocked_range<std::size_t>& range) {
-    TensorBlock own;
-    for (std::size_t i = range.begin(); i < range.end(); ++i) {
-      make_room();
-      std::array<float*, bricks_of_block> bricks{};
-      for (int bits = 0; bits < bricks_of_block; ++bits)
-        if (const std::uint32_t brick = index_.find(table.places[i] - corner(bits)); brick != BrickIndex::missing)
-          bricks[static_cast<std::size_t>(bits)] = floats_of(brick);
-      shares[i] = place_block(blocks.get(i, own), bricks);
-    }
-  };
-  for (std::size_t first = 0; first < shapes.size(); first += part_size) {
-    const std::size_t end = std::min(first + part_size, shapes.size());
-    tbb::parallel_for(tbb::blocked_range<std::size_t>(first, end, grain), place);
-    blocks.give_back(end);
-  }
+  place_blocks(table, blocks, shares);
   strongest_.resize(bricks_.size());
   tbb::parallel_for(std::size_t{0}, bricks_.size(), [&](std::size_t i) {
-    strongest_[i] = strongest_deviator(table, shares, bricks_[i], floats_of(i));
+    strongest_[i] = strongest_deviator(table, shares, bricks_[i], brick_at(floats_of(i), 0));
   });
   double norm = 0;
   for (const BlockShare& share : shares) norm = std::max(norm, share.norm);
   greatest_norm_ = std::sqrt(norm);
 }
 
-/// Memory for `bricks` bricks, filled with zeros. It uses large pages where the system has them, because rays visit
-/// bricks that are far apart in memory.
-TensorField::Floats TensorField::allocate(std::size_t bricks) {
-  const std::size_t bytes = bricks * TensorBrick::stored_floats * sizeof(float);
+/// Fills the bricks. They store symmetric tensors until the first block comes that has others. Its part is then placed
+/// again.
+void TensorField::place_blocks(const BlockTable& table, const Blocks& blocks, std::vector<BlockShare>& shares) {
+  allocate(TensorBrick::symmetric);
+  std::atomic<bool> fits{true};
+  const auto place = [&](const tbb::blocked_range<std::size_t>& range) {
+    TensorBlock own;
+    for (std::size_t i = range.begin(); i < range.end() && fits; ++i) {
+      make_room();
+      const TensorBlock& block = blocks.get(i, own);
+      if (components_ == TensorBrick::symmetric && !has_symmetric_tensors(block)) {
+        fits = false;
+        return;
+      }
+      std::array<float*, bricks_of_block> bricks{};
+      for (int bits = 0; bits < bricks_of_block; ++bits)
+        if (const std::uint32_t brick = index_.find(table.places[i] - corner(bits)); brick != BrickIndex::missing)
+          bricks[static_cast<std::size_t>(bits)] = floats_of(brick);
+      shares[i] = place_block(block, components_, bricks);
+    }
+  };
+  for (std::size_t first = 0; first < shares.size(); first += part_size) {
+    const std::size_t end = std::min(first + part_size, shares.size());
+    const tbb::blocked_range<std::size_t> part(first, end, grain);
+    tbb::parallel_for(part, place);
+    if (!fits) {
+      widen(first > 0);
+      fits = true;
+      tbb::parallel_for(part, place);
+    }
+    blocks.give_back(end);
+  }
+}
+
+/// Replaces the bricks by those of tensors of any kind. `keep`: with the tensors that they hold.
+void TensorField::widen(bool keep) {
+  const Floats narrow = std::move(floats_);
+  const auto stored_floats = static_cast<std::size_t>(TensorBrick::stored_floats(components_));
+  allocate(TensorBrick::general);
+  if (!keep) return;
+  tbb::parallel_for(std::size_t{0}, bricks_.size(), [&](std::size_t i) {
+    make_room();
+    widen_brick(narrow.get() + i * stored_floats, floats_of(i));
+  });
+}
+
+/// Memory for all bricks, filled with zeros. It uses large pages where the system has them, because rays visit bricks
+/// that are far apart in memory.
+void TensorField::allocate(int components) {
+  components_ = components;
+  const auto stored_floats = static_cast<std::size_t>(TensorBrick::stored_floats(components));
+  const std::size_t bytes = bricks_.size() * stored_floats * sizeof(float);
   constexpr std::size_t alignment = 4096;
-  return {static_cast<float*>(map_pages(bytes, alignment)), Release{bytes}};
+  floats_ = {static_cast<float*>(map_pages(bytes, alignment)), Release{bytes}};
 }
 
 void TensorField::Release::operator()(float* floats) const { unmap_pages(floats, bytes); }
@@ -146,8 +178,8 @@ std::vector<Eigen::Vector3d> TensorField::corners() const { return corners_of(in
 Eigen::AlignedBox3d TensorField::world_box() const { return box_of(corners()); }
 
 std::size_t TensorField::memory_bytes() const {
-  return brick_count() * ((TensorBrick::stored_floats + 1) * sizeof(float) + sizeof(Eigen::Vector3i)) +
-         index_.memory_bytes();
+  const auto floats = static_cast<std::size_t>(TensorBrick::stored_floats(components_)) + 1;
+  return brick_count() * (floats * sizeof(float) + sizeof(Eigen::Vector3i)) + index_.memory_bytes();
 }
 
 }  // namespace tensorray

@@ -15,25 +15,45 @@
 
 namespace tensorray {
 
+struct BlockShare;
+struct BlockTable;
+
 /// 8³ cells, with the far apron that interpolation needs: 9³ voxels. All bricks without an active voxel share one brick
 /// of zeros.
 ///
 /// A tensor T is stored in two parts. T − T₂₂ I bends light as T does, because a multiple of the identity bends nothing
 /// (Zheng and Pang 2003, Eq. 5). Its last component is zero, so that a tracer reads only eight floats, which fill one
-/// or two vector registers. T₂₂ is stored separately.
+/// or two vector registers. If T = Tᵀ in all voxels of the field, bit for bit, five of them are stored: those on and
+/// below the diagonal. T₂₂ is stored separately.
 struct TensorBrick {
   static constexpr int cells = 8;
   static constexpr int width = cells + 1;  ///< Voxels along an edge, with the apron.
   static constexpr int voxels = width * width * width;
-  static constexpr int bending_floats = 8;
-  static constexpr int trailing_offset = voxels * bending_floats;  ///< Offset of `trailing` from `bending`, in floats.
-  static constexpr int stored_floats = (trailing_offset + voxels + 15) / 16 * 16;  ///< Rounded up to whole cache lines.
+
+  /// Numbers of components of T − T₂₂ I that voxels store: of any tensor, and of a symmetric one.
+  static constexpr int general = 8, symmetric = 5;
 
   static constexpr int voxel(int x, int y, int z) { return (x * width + y) * width + z; }
 
-  const float* bending;   ///< Eight floats per voxel: T − T₂₂ I column by column, aligned to 32 bytes.
+  /// The number of the stored component that is component i, column by column, of T − T₂₂ I.
+  static constexpr int stored_component(int components, int i) {
+    constexpr int of_symmetric[] = {0, 1, 2, 1, 3, 4, 2, 4};
+    return components == symmetric ? of_symmetric[i] : i;
+  }
+  /// Offset of a voxel's components from `bending`, in floats. Three voxels of five fill a cache line but for its last
+  /// float, so that fewer lines are read. A row along z begins a line.
+  static constexpr int bending_offset(int components, int voxel) {
+    return components == symmetric ? voxel / 3 * 16 + voxel % 3 * symmetric : voxel * components;
+  }
+  /// Offset of `trailing` from `bending`, in floats.
+  static constexpr int trailing_offset(int components) { return bending_offset(components, voxels); }
+  /// Number of floats of a brick, rounded up to whole cache lines.
+  static constexpr int stored_floats(int components) { return (trailing_offset(components) + voxels + 15) / 16 * 16; }
+
+  const float* bending;   ///< T − T₂₂ I column by column, `components` per voxel at its `bending_offset`.
   const float* trailing;  ///< One float per voxel: T₂₂.
   float strongest;        ///< Upper bound in the brick of the Frobenius norm of the deviator, T − ⅓ tr(T) I.
+  int components;         ///< `general` or `symmetric`; the same in all bricks of a field.
 
   Eigen::Matrix3d tensor(int voxel) const;  ///< The tensor T at a voxel.
 };
@@ -75,6 +95,9 @@ class TensorField {
   /// The greatest Frobenius norm of all voxels.
   double greatest_norm() const { return greatest_norm_; }
 
+  /// Whether T = Tᵀ in all voxels, bit for bit. Bricks then store five components, and tracing is faster.
+  bool is_symmetric() const { return components_ == TensorBrick::symmetric; }
+
   std::size_t brick_count() const { return bricks_.size(); }
 
   /// Coordinates (voxel index / 8) of the bricks in memory, ordered by x, then y, then z. A brick is in memory if an
@@ -86,7 +109,7 @@ class TensorField {
   /// outside the extent.
   TensorBrick brick(const Eigen::Vector3i& brick) const {
     const std::uint32_t index = index_.find(brick);
-    return index == BrickIndex::missing ? zeros : stored(index);
+    return index == BrickIndex::missing ? brick_at(zeros, 0) : stored(index);
   }
 
   /// Whether the brick is in memory. If not, `brick` returns the brick of zeros.
@@ -95,7 +118,7 @@ class TensorField {
  private:
   struct Blocks;
 
-  static const TensorBrick zeros;
+  static const float* const zeros;  // A brick of either kind.
 
   struct Release {
     std::size_t bytes;
@@ -105,16 +128,20 @@ class TensorField {
   using Floats = std::shared_ptr<float[]>;
 
   void make_bricks(const std::vector<BlockShape>& shapes, const Blocks& blocks);
-  static Floats allocate(std::size_t bricks);
-  TensorBrick stored(std::size_t index) const {
-    const float* const floats = floats_.get() + index * TensorBrick::stored_floats;
-    return {floats, floats + TensorBrick::trailing_offset, strongest_[index]};
+  void place_blocks(const BlockTable& table, const Blocks& blocks, std::vector<BlockShare>& shares);
+  void widen(bool keep);
+  void allocate(int components);
+  float* floats_of(std::size_t index) const { return floats_.get() + index * TensorBrick::stored_floats(components_); }
+  TensorBrick brick_at(const float* floats, float strongest) const {
+    return {floats, floats + TensorBrick::trailing_offset(components_), strongest, components_};
   }
+  TensorBrick stored(std::size_t index) const { return brick_at(floats_of(index), strongest_[index]); }
 
   Eigen::Affine3d to_world_, to_index_;
   Eigen::AlignedBox3d index_bounds_, voxels_;
   std::vector<Eigen::Vector3i> bricks_;
-  Floats floats_;                 ///< The bricks, in the order of `bricks_`.
+  Floats floats_;  ///< The bricks, in the order of `bricks_`.
+  int components_ = TensorBrick::symmetric;
   std::vector<float> strongest_;  ///< TensorBrick::strongest of each brick.
   double greatest_norm_ = 0;
   BrickIndex index_;  ///< Finds a brick by its coordinates.

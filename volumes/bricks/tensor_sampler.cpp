@@ -67,8 +67,12 @@ Slopes<Value> interpolate(int voxel, const Eigen::Vector3d& f, Load load) {
 }
 
 Eight bending(const TensorBrick& brick, int voxel) {
-  return Eigen::Map<const Eigen::Array<float, 8, 1>>(brick.bending + voxel * TensorBrick::bending_floats)
-      .cast<double>();
+  const float* const stored = brick.bending + TensorBrick::bending_offset(brick.components, voxel);
+  if (brick.components == TensorBrick::general)
+    return Eigen::Map<const Eigen::Array<float, 8, 1>>(stored).cast<double>();
+  Eight eight;
+  for (int i = 0; i < 8; ++i) eight[i] = double{stored[TensorBrick::stored_component(TensorBrick::symmetric, i)]};
+  return eight;
 }
 
 }  // namespace

@@ -40,6 +40,12 @@ bool all_finite(const Eigen::MatrixBase<Derived>& values) {
   return values.allFinite();
 }
 
+/// v vᵀ. It is symmetric, bit for bit; a scalar times v vᵀ, in one expression, need not be.
+template <int size>
+Eigen::Matrix<double, size, size> outer_square(const Eigen::Matrix<double, size, 1>& v) {
+  return v * v.transpose();
+}
+
 void check_poisson_ratio(double ratio) {
   require(ratio >= -1 && ratio <= 0.5, "poisson_ratio must be between -1 and 0.5");
 }
@@ -169,7 +175,7 @@ Matrix3d sample(const Helix& g, const Vector3d& position) {
   const Vector3d tangent = Vector3d(-position.y(), position.x(), g.pitch / (2 * pi)).normalized();
   const double profile = helix_profile(g, position);
   return (g.background + profile * (g.across - g.background)) * Matrix3d::Identity() +
-         profile * (g.along - g.across) * tangent * tangent.transpose();
+         profile * (g.along - g.across) * outer_square(tangent);
 }
 
 std::string source_of(Generator generator, const GridSettings& grid) {
@@ -258,12 +264,12 @@ Matrix3d point_load_stress(const Vector3d& position, double load, double poisson
   // axis. The radial part is −3 depth p pᵀ/R⁵; the rest lies in the plane of the surface.
   const double depth = -position.z(), distance = position.norm();
   const double cube = distance * distance * distance, reach = distance + depth;
-  Matrix3d tensor = -3 * depth / (cube * distance * distance) * position * position.transpose();
+  Matrix3d tensor = -3 * depth / (cube * distance * distance) * outer_square(position);
   const double compressibility = 1 - 2 * poisson_ratio;
   const Eigen::Vector2d across = position.head<2>();
   tensor.topLeftCorner<2, 2>() +=
       compressibility * ((depth / cube - 1 / (distance * reach)) * Eigen::Matrix2d::Identity() +
-                         (distance + reach) / (cube * reach * reach) * across * across.transpose());
+                         (distance + reach) / (cube * reach * reach) * outer_square(across));
   return load / (2 * pi) * tensor;
 }
 
