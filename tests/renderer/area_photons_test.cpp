@@ -158,8 +158,8 @@ MaterialSettings glossy() {
 }
 
 /// Aim and material find the light with each other's weights or alone; each with photons and without. There are so few
-/// photons in each pass that no technique has all the weight. Their noise is common to all samples: without weights 7% of
-/// the light (by seeds), with them less.
+/// photons in each pass that no technique has all the weight. Their noise is common to all samples: without weights 7%
+/// of the light (by seeds), with them less.
 TEST(AreaPhotonsTest, EverySubsetOfTechniquesHasTheSameMean) {
   for (const MaterialSettings& floor : {MaterialSettings(Diffuse{}), glossy()})
     for (const double steeper : {1.0, 1.6}) {
