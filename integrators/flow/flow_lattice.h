@@ -36,11 +36,11 @@ struct Square {
   std::array<std::uint32_t, 4> corners{};                    // Positions, counter-clockwise from the lower left.
 };
 
-/// Coordinates of the finest lattice have positions' indices.
+/// The patches, and the positions that are at points of their finest lattices.
 struct FlowLattice {
   std::vector<Patch> patches;
   int levels = 1;  ///< Number of divisions from the first squares to the smallest ones, up to 14.
-  std::unordered_map<std::uint64_t, std::uint32_t> positions;  ///< By `key`.
+  std::unordered_map<std::uint64_t, std::uint32_t> positions;  ///< Their indices in the map, by `key`.
 
   static std::uint64_t key(std::uint32_t patch, std::uint32_t x, std::uint32_t y) {
     return std::uint64_t{patch} << 58 | std::uint64_t{x} << 29 | y;
@@ -48,6 +48,7 @@ struct FlowLattice {
 
   std::uint32_t side_of(const Square& square) const { return 1u << (levels - square.level); }
 
+  /// Whether a side of the square is one of its patch.
   bool is_on_border(const Square& square) const;
 };
 

@@ -11,11 +11,11 @@
 namespace tensorray {
 
 /// The random numbers of one light path: each call takes the next dimension. Each dimension is a separate Sobol
-/// sequence, shuffled and Owen-scrambled by a hash of (seed, pixel, dimension); `sample` is the index
-/// into it (padding: Burley 2020, "Practical Hash-based Owen Scrambling"). So the samples of a pixel are stratified in
-/// each dimension, and the two numbers of `next_2d` are stratified jointly: of the first 2^k samples, one is in each
-/// elementary interval. Different dimensions and different pixels are uncorrelated. Where light paths of a pixel
-/// branch, set `dimension` so that the same choice always has the same dimension.
+/// sequence, shuffled and Owen-scrambled by a hash of (seed, pixel, dimension); `sample` is the index into it (padding:
+/// Burley 2020, "Practical Hash-based Owen Scrambling"). So the samples of a pixel are stratified in each dimension,
+/// and the two numbers of `next_2d` are stratified jointly: of the first 2^k samples, one is in each elementary
+/// interval. Different dimensions and different pixels are uncorrelated.
+/// Where light paths of a pixel branch, set `dimension` so that the same choice always has the same dimension.
 struct PathSampler {
   std::uint64_t seed = 0;
   std::uint64_t pixel = 0;   ///< y * width + x.

@@ -1,6 +1,7 @@
 #include "renderer/sampling/sampling.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <set>
 
@@ -105,6 +106,32 @@ TEST(FrameAbout, IsRightHandedAndOrthonormal) {
 }
 
 // Applies the textbook inverse to the result of each warp; the inverse must return a uniform square.
+
+TEST(CircleAt, IsCosineAndSine) {
+  for (int i = -20000; i <= 20000; ++i) {
+    const double turn = i / 10000.0;
+    const Vector2d at = circle_at(turn);
+    EXPECT_NEAR(at.x(), std::cos(2 * pi * turn), 2e-15) << turn;
+    EXPECT_NEAR(at.y(), std::sin(2 * pi * turn), 2e-15) << turn;
+  }
+}
+
+/// One number chooses with the given probability, and what is left of it is uniform after either choice.
+TEST(Choose, LeavesAnEvenNumber) {
+  constexpr int count = 60000;
+  for (const double share : {0.0, 1e-3, 0.3, 1.0}) {
+    std::array<std::array<int, 10>, 2> bins{};
+    for (int i = 0; i < count; ++i) {
+      double u = (i + 0.5) / count;
+      const bool chosen = choose(share, u);
+      ASSERT_GE(u, 0);
+      ASSERT_LT(u, 1);
+      ++bins[chosen][static_cast<std::size_t>(10 * u)];
+    }
+    for (const bool chosen : {false, true})
+      for (const int bin : bins[chosen]) EXPECT_NEAR(bin, count * (chosen ? share : 1 - share) / 10, 1.5) << share;
+  }
+}
 
 TEST(Warps, DiskIsEven) {
   EXPECT_LT(std::abs(square_score([](int i) {
