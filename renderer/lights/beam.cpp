@@ -42,6 +42,13 @@ bool contains(const std::vector<Eigen::Vector2d>& polygon, const Eigen::Vector2d
   return true;
 }
 
+/// Unit; the mean direction from a source to points.
+Eigen::Vector3d axis_from(const Eigen::Vector3d& source, const std::vector<Eigen::Vector3d>& points) {
+  Eigen::Vector3d axis(0, 0, 0);
+  for (const Eigen::Vector3d& point : points) axis += (point - source).normalized();
+  return axis.normalized();
+}
+
 }  // namespace
 
 double area(const std::vector<Eigen::Vector2d>& polygon) {
@@ -75,22 +82,24 @@ Beam silhouette_beam(const std::vector<Eigen::Vector3d>& points, const Eigen::Ve
   return beam;
 }
 
+bool is_surrounded(const Eigen::Vector3d& source, const std::vector<Eigen::Vector3d>& points) {
+  constexpr double least_cosine = 0.02;
+  const Eigen::Vector3d axis = axis_from(source, points);
+  return std::any_of(points.begin(), points.end(), [&](const Eigen::Vector3d& point) {
+    return !((point - source).dot(axis) > least_cosine * (point - source).norm());
+  });
+}
+
 Beam point_beam(const std::vector<Eigen::Vector3d>& points, const Eigen::Vector3d& source) {
-  constexpr double least_cosine = 0.02, start_part = 1e-4;
-  Eigen::Vector3d axis(0, 0, 0);
-  for (const Eigen::Vector3d& point : points) axis += (point - source).normalized();
+  constexpr double start_part = 1e-4;
+  if (is_surrounded(source, points)) throw std::invalid_argument("the light is within the volume, or too near");
   Beam beam;
   beam.source = source;
-  beam.direction = axis.normalized();
+  beam.direction = axis_from(source, points);
   beam.up = upright(beam.direction, Eigen::Vector3d::UnitZ());
   beam.right = beam.direction.cross(beam.up);
   double nearest = std::numeric_limits<double>::infinity();
-  for (const Eigen::Vector3d& point : points) {
-    const double along = (point - source).dot(beam.direction);
-    if (!(along > least_cosine * (point - source).norm()))
-      throw std::invalid_argument("the light is within the volume, or too near; move it away");
-    nearest = std::min(nearest, along);
-  }
+  for (const Eigen::Vector3d& point : points) nearest = std::min(nearest, (point - source).dot(beam.direction));
   const double start = start_part * nearest;
   beam.center = source + start * beam.direction;
   std::vector<Eigen::Vector2d> seen;

@@ -37,8 +37,11 @@ struct Beam {
 Beam silhouette_beam(const std::vector<Eigen::Vector3d>& points, const Eigen::Vector3d& direction,
                      const Eigen::Vector3d& up);
 
+/// Whether a source is among `points`, or so near that they are all around it: no beam from it covers them.
+bool is_surrounded(const Eigen::Vector3d& source, const std::vector<Eigen::Vector3d>& points);
+
 /// The beam from `source` whose aperture is the silhouette of `points`. It starts near the source.
-/// @throw std::invalid_argument if the source is among the points, or so near that they are all around it.
+/// @throw std::invalid_argument if the points surround the source.
 Beam point_beam(const std::vector<Eigen::Vector3d>& points, const Eigen::Vector3d& source);
 
 /// How much smaller lengths are where light starts than at a point, as straight light projects them; 1 if it is

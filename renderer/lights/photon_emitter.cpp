@@ -33,7 +33,10 @@ Vector2d sample_polygon(const std::vector<Vector2d>& polygon, Vector2d u) {
 PhotonEmitter::PhotonEmitter(const Light& light, std::vector<Vector3d> corners, const Eigen::AlignedBox3d& scene)
     : corners_(std::move(corners)), scene_(scene) {
   if (const auto* point = std::get_if<PointLight>(&light)) {
-    beam_ = point_beam(corners_, point->position);
+    if (is_surrounded(point->position, corners_))
+      surrounded_ = point->position;
+    else
+      beam_ = point_beam(corners_, point->position);
   } else if (const auto* sun = std::get_if<DirectionalLight>(&light)) {
     beam_ = beam_towards(sun->direction.normalized());
     angle_ = sun->angle;
@@ -45,10 +48,8 @@ PhotonEmitter::PhotonEmitter(const Light& light, std::vector<Vector3d> corners, 
 }
 
 PhotonEmitter::Lamp PhotonEmitter::make_lamp(const AreaLight& light, const std::vector<Vector3d>& corners) {
-  Eigen::AlignedBox3d volume, box;
+  Eigen::AlignedBox3d volume;
   for (const Vector3d& corner : corners) volume.extend(corner);
-  for (const Vector3d& vertex : light.mesh.vertices) box.extend(vertex);
-  if (volume.intersects(box)) throw std::invalid_argument("an area light with photons must be outside the volume");
   std::vector<double> areas;
   for (std::size_t i = 0; i < light.mesh.triangles.size(); ++i)
     areas.push_back(triangle_normal(light.mesh, i).norm() / 2);
@@ -56,8 +57,7 @@ PhotonEmitter::Lamp PhotonEmitter::make_lamp(const AreaLight& light, const std::
 }
 
 double PhotonEmitter::Lamp::angle(const Vector3d& position) const {
-  const double distance = (center - position).norm();
-  return distance > radius ? std::asin(radius / distance) : pi;
+  return std::asin(radius / (center - position).norm());
 }
 
 /// Starts before the whole scene.
@@ -73,23 +73,31 @@ Beam PhotonEmitter::beam_towards(const Vector3d& direction) const {
   return beam;
 }
 
-/// Of a disk of even radiance each direction has its own beam, so that no light is lost at the volume's silhouette.
 EmittedPhoton PhotonEmitter::sample(PathSampler& sampler) const {
   if (lamp_) return sample_lamp(sampler);
+  if (surrounded_) return {*surrounded_, square_to_sphere(sampler.next_2d()), 4 * pi};
+  return angle_ > 0 ? sample_sun(sampler) : sample_beam(sampler);
+}
+
+/// Of a disk of even radiance each direction has its own beam, so that no light is lost at the volume's silhouette.
+EmittedPhoton PhotonEmitter::sample_sun(PathSampler& sampler) const {
   const Vector2d place = sampler.next_2d();
-  if (angle_ > 0) {
-    const Vector3d direction = frame_about(beam_.direction) * square_to_cone(sampler.next_2d(), angle_);
-    const Beam beam = beam_towards(direction);
-    const double radiance = 1 / (pi * std::pow(std::sin(angle_), 2));
-    return {beam.start(sample_polygon(beam.aperture, place)), beam.direction,
-            radiance * cone_solid_angle(angle_) * area(beam.aperture)};
-  }
-  const Vector3d start = beam_.start(sample_polygon(beam_.aperture, place)), direction = beam_.direction_at(start);
+  const Vector3d direction = frame_about(beam_.direction) * square_to_cone(sampler.next_2d(), angle_);
+  const Beam beam = beam_towards(direction);
+  const double radiance = 1 / (pi * std::pow(std::sin(angle_), 2));
+  return {beam.start(sample_polygon(beam.aperture, place)), beam.direction,
+          radiance * cone_solid_angle(angle_) * area(beam.aperture)};
+}
+
+EmittedPhoton PhotonEmitter::sample_beam(PathSampler& sampler) const {
+  const Vector3d start = beam_.start(sample_polygon(beam_.aperture, sampler.next_2d()));
+  const Vector3d direction = beam_.direction_at(start);
   const double spread = beam_.source ? direction.dot(beam_.direction) / (start - *beam_.source).squaredNorm() : 1;
   return {start, direction, spread * area(beam_.aperture)};
 }
 
-/// Even over the area, and over the cone about the ball. Starts a little off the light, which would stop it.
+/// Even over the area, and over the cone about the ball; within the ball, as a diffuse surface shines. Starts a little
+/// off the light, which would stop it.
 EmittedPhoton PhotonEmitter::sample_lamp(PathSampler& sampler) const {
   const auto triangle = static_cast<std::size_t>(lamp_->triangles.sample(sampler.next_1d()).cell);
   const Vector3d weights = square_to_triangle(sampler.next_2d());
@@ -97,9 +105,11 @@ EmittedPhoton PhotonEmitter::sample_lamp(PathSampler& sampler) const {
   const Vector3d normal = triangle_normal(lamp_->mesh, triangle).normalized();
   Vector3d position = Vector3d::Zero();
   for (int i = 0; i < 3; ++i) position += weights[i] * lamp_->mesh.vertices[corner[static_cast<std::size_t>(i)]];
-  const double angle = lamp_->angle(position);
-  const Vector3d direction =
-      frame_about((lamp_->center - position).normalized()) * square_to_cone(sampler.next_2d(), angle);
+  const Vector2d turn = sampler.next_2d();
+  const Vector3d direction = lamp_->is_within(position)
+                                 ? Vector3d(frame_about(normal) * square_to_cosine_hemisphere(turn))
+                                 : Vector3d(frame_about((lamp_->center - position).normalized()) *
+                                            square_to_cone(turn, lamp_->angle(position)));
   EmittedPhoton photon{position + 1e-6 * lamp_->radius * normal, direction};
   photon.density = density(position, normal, direction);
   if (photon.density > 0) photon.power = 1 / photon.density;
@@ -107,9 +117,9 @@ EmittedPhoton PhotonEmitter::sample_lamp(PathSampler& sampler) const {
 }
 
 double PhotonEmitter::density(const Vector3d& position, const Vector3d& normal, const Vector3d& direction) const {
-  const double angle = lamp_->angle(position), cosine = normal.dot(direction);
-  const double area = lamp_->triangles.sum();
-  return cosine > 0 ? 1 / (area * cone_solid_angle(angle) * cosine) : 0;
+  const double cosine = normal.dot(direction), area = lamp_->triangles.sum();
+  if (!(cosine > 0)) return 0;
+  return 1 / (area * (lamp_->is_within(position) ? pi : cone_solid_angle(lamp_->angle(position)) * cosine));
 }
 
 double PhotonEmitter::power() const {
@@ -119,10 +129,13 @@ double PhotonEmitter::power() const {
       const Vector3d across = triangle_normal(lamp_->mesh, i) / 2;
       const Vector3d position = lamp_->mesh.vertices[static_cast<std::size_t>(lamp_->mesh.triangles[i][0])];
       const Vector3d way = lamp_->center - position;
-      sum += std::max(0.0, across.dot(way.normalized())) * cone_solid_angle(lamp_->angle(position));
+      sum += lamp_->is_within(position)
+                 ? across.norm() * pi
+                 : std::max(0.0, across.dot(way.normalized())) * cone_solid_angle(lamp_->angle(position));
     }
     return sum;
   }
+  if (surrounded_) return 4 * pi;
   double sum = 0;
   for (std::size_t i = 1; i + 1 < beam_.aperture.size(); ++i)
     sum += start_area(beam_, beam_.aperture[0], beam_.aperture[i], beam_.aperture[i + 1]);

@@ -34,7 +34,7 @@ struct PhotonTracerSettings {
 
 /// @param corners  Of the region's hull.
 /// @return the same for any number of threads: random numbers are functions of (seed, pass, light, photon, dimension).
-/// @throw std::invalid_argument if a point light or an area light is within the region; Cancelled.
+/// @throw Cancelled.
 TracedPhotons trace_photons(const BendingRegion& region, const std::vector<Eigen::Vector3d>& corners,
                             const SurfaceScene& surfaces, const std::vector<Light>& lights,
                             const PhotonTracerSettings& settings, const Progress& progress);

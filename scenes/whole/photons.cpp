@@ -44,12 +44,12 @@ bool has_light_on_both_sides(const Plate& plate, const TensorField& field, const
   return std::abs(height) < reach && std::abs(normal.dot(direction)) < steepest_along;
 }
 
-/// Whether a lamp outside the volume is so small, as seen from there, that straight aim misses it.
+/// Whether a lamp is so small, as seen from afar in the volume, that straight aim misses it.
 bool is_small(const AreaLight& lamp, const TensorField& field) {
   Eigen::AlignedBox3d box;
   for (const Vector3d& vertex : lamp.mesh.vertices) box.extend(vertex);
   const double distance = (box.center() - field.world_box().center()).norm();
-  return !box.intersects(field.world_box()) && box.diagonal().norm() < small_lamp * distance;
+  return box.diagonal().norm() < small_lamp * std::max(distance, field.world_box().diagonal().norm() / 2);
 }
 
 /// The radius about which there are enough photons: by Cauchy, a convex body of area A has the mean silhouette A / 4.
@@ -73,7 +73,9 @@ PhotonPairs photon_pairs(const Scene& scene, const std::vector<Light>& lights, c
       continue;
     }
     if (!direction_at(lights[i], {}) || caustic == LightCaustic::map) continue;
-    const bool always = caustic == LightCaustic::photons || settings.conserve == Conserve::radiance;
+    const auto* point = std::get_if<PointLight>(&lights[i]);
+    const bool always = caustic == LightCaustic::photons || settings.conserve == Conserve::radiance ||
+                        (point && is_surrounded(point->position, scene.field.corners()));
     for (std::size_t k = 0; k < objects.size(); ++k)
       pairs[i][k] = always || (objects[k].plate && has_light_on_both_sides(*objects[k].plate, scene.field, lights[i]));
   }
@@ -96,11 +98,7 @@ TracedPhotons photons_of(const Scene& scene, const BendingRegion& region, const 
     const std::vector<bool>& of_light = pairs[static_cast<std::size_t>(light)];
     return surface < of_light.size() && of_light[surface];
   };
-  try {
-    return trace_photons(region, scene.field.corners(), stage, lights, settings, progress);
-  } catch (const std::invalid_argument& error) {
-    throw SceneError(fmt::format("{}: `/lights`: {}", scene.description.path.string(), error.what()));
-  }
+  return trace_photons(region, scene.field.corners(), stage, lights, settings, progress);
 }
 
 }  // namespace tensorray

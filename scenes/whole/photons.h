@@ -23,7 +23,7 @@ PhotonPairs photon_pairs(const Scene& scene, const std::vector<Light>& lights, c
                          const WholeDescription& settings);
 
 /// @param passes  Of photons.
-/// @throw SceneError if a point light or an area light is within the volume; Cancelled.
+/// @throw Cancelled.
 TracedPhotons photons_of(const Scene& scene, const BendingRegion& region, const SurfaceScene& stage,
                          const std::vector<Light>& lights, const std::vector<SceneObject>& objects,
                          const PhotonPairs& pairs, const PhotonsDescription& description, int passes,

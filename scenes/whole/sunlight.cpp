@@ -127,7 +127,8 @@ std::optional<LandedIrradiance> land(const Scene& scene, const Surfaces& surface
     return landed_irradiance(scene.field, surfaces, plate, light, scene.bending, caustic.resolution, caustic.rays,
                              progress);
   } catch (const std::invalid_argument& error) {
-    throw SceneError(fmt::format("{}: `/lights/{}`: {}", scene.description.path.string(), number, error.what()));
+    throw SceneError(fmt::format("{}: `/lights/{}` has no map of its light: {}; move it away, or use photons",
+                                 scene.description.path.string(), number, error.what()));
   }
 }
 

@@ -4,6 +4,7 @@
 
 #include <gtest/gtest.h>
 
+#include "base/constants.h"
 #include "integrators/view/field_region.h"
 #include "renderer/sampling/random.h"
 #include "renderer/shading/photon_tracer.h"
@@ -43,8 +44,11 @@ SurfaceScene floor_scene() {
   return SurfaceScene(std::move(surfaces));
 }
 
+const PointLight point_within{{0.1, -0.2, 0.4}, {1}};
+
 /// The power on the floor's squares of 0.25 × 0.25 about the origin, by photons.
-std::vector<double> photons_on_floor(const TensorField& field, double strength, Conserve conserve) {
+std::vector<double> photons_on_floor(const TensorField& field, double strength, Conserve conserve,
+                                     const Light& light = DirectionalLight{along, {1}}) {
   const Geometry geometry = geometry_with_floor(field);
   FieldViewSettings view;
   view.conserve = conserve;
@@ -54,8 +58,7 @@ std::vector<double> photons_on_floor(const TensorField& field, double strength, 
   settings.per_pass = 60000;
   settings.radius = 0.01;
   settings.serves = [](int, std::uint32_t) { return true; };
-  const TracedPhotons photons =
-      trace_photons(region, field.corners(), floor_scene(), {DirectionalLight{along, {1}}}, settings, {});
+  const TracedPhotons photons = trace_photons(region, field.corners(), floor_scene(), {light}, settings, {});
   std::vector<double> power(64);
   for (const LandedPhoton& photon : photons.passes[0].photons()) {
     const Eigen::Array2i square = ((photon.position.head<2>().array() + 1) / 0.25f).floor().cast<int>();
@@ -65,9 +68,9 @@ std::vector<double> photons_on_floor(const TensorField& field, double strength, 
   return power;
 }
 
-/// The same by rays from random positions of a square above the volume, one by one in double precision.
-std::vector<double> rays_on_floor(const TensorField& field, Conserve conserve) {
-  const Geometry geometry = geometry_with_floor(field);
+/// Rays of the sun, from random positions of a square above the volume.
+/// @param power  Of each of them.
+RayBatch sun_rays(double& power) {
   constexpr int count = 120000;
   constexpr double side = 2.6;
   RayBatch rays;
@@ -75,6 +78,27 @@ std::vector<double> rays_on_floor(const TensorField& field, Conserve conserve) {
     const Vector3d at(side * (random_uniform(1, i, 0) - 0.5), side * (random_uniform(1, i, 1) - 0.5), 1);
     rays.add(at - 0.5 * along, along, flexibility);
   }
+  power = side * side * std::abs(along.z()) / count;
+  return rays;
+}
+
+/// Rays of the point, the lower half of them.
+RayBatch point_rays(double& power) {
+  constexpr int count = 120000;
+  RayBatch rays;
+  for (int i = 0; i < count; ++i) {
+    const double z = -random_uniform(2, i, 0), turn = 2 * pi * random_uniform(2, i, 1), across = std::sqrt(1 - z * z);
+    rays.add(point_within.position, {across * std::cos(turn), across * std::sin(turn), z}, flexibility);
+  }
+  power = 2 * pi / count;
+  return rays;
+}
+
+/// The same by rays one by one in double precision.
+std::vector<double> rays_on_floor(const TensorField& field, Conserve conserve, RayBatch (*rays_of)(double&)) {
+  const Geometry geometry = geometry_with_floor(field);
+  double power_of_ray = 0;
+  RayBatch rays = rays_of(power_of_ray);
   rays.wants_radiance_change = true;
   trace_reference(field, geometry, {}, rays);
   std::vector<double> power(64);
@@ -84,7 +108,7 @@ std::vector<double> rays_on_floor(const TensorField& field, Conserve conserve) {
     const Eigen::Array2i square = ((rays.position[i].head<2>().array() + 1) / 0.25).floor().cast<int>();
     const double gain = conserve == Conserve::power ? 1 : std::exp(rays.radiance_change[i]);
     if ((square >= 0).all() && (square < 8).all())
-      power[static_cast<std::size_t>(8 * square.y() + square.x())] += gain * side * side * std::abs(along.z()) / count;
+      power[static_cast<std::size_t>(8 * square.y() + square.x())] += gain * power_of_ray;
   }
   return power;
 }
@@ -103,12 +127,22 @@ double difference(const std::vector<double>& a, const std::vector<double>& b) {
 TEST(FieldPhotonsTest, AFloorWithinTheVolumeHasTheLightOfForwardRays) {
   const TensorField field = lens_field();
   for (const Conserve conserve : {Conserve::power, Conserve::radiance}) {
-    const std::vector<double> truth = rays_on_floor(field, conserve);
+    const std::vector<double> truth = rays_on_floor(field, conserve, sun_rays);
     EXPECT_LT(difference(photons_on_floor(field, flexibility, conserve), truth), 0.2);
     EXPECT_GT(difference(photons_on_floor(field, -flexibility, conserve), truth), 0.5);  // The wrong sign.
   }
-  const std::vector<double> truth = rays_on_floor(field, Conserve::power);
+  const std::vector<double> truth = rays_on_floor(field, Conserve::power, sun_rays);
   EXPECT_GT(difference(photons_on_floor(field, flexibility, Conserve::radiance), truth), 0.3);
+}
+
+/// Of a point in the volume.
+TEST(FieldPhotonsTest, APointWithinTheVolumeLightsItsFloorAsForwardRaysDo) {
+  const TensorField field = lens_field();
+  for (const Conserve conserve : {Conserve::power, Conserve::radiance}) {
+    const std::vector<double> truth = rays_on_floor(field, conserve, point_rays);
+    EXPECT_LT(difference(photons_on_floor(field, flexibility, conserve, point_within), truth), 0.2);
+    EXPECT_GT(difference(photons_on_floor(field, -flexibility, conserve, point_within), truth), 0.5);
+  }
 }
 
 }  // namespace

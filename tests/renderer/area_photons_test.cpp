@@ -78,6 +78,8 @@ std::vector<Vector3d> corners() {
 
 AreaLight lamp() { return {rectangle_mesh({1.8, 0.2, 3}, {1, 0, 0}, {0, -1, 0}, {1.2, 0.9}), {5, 7}}; }
 
+AreaLight lamp_within() { return {rectangle_mesh({0.2, 0.2, 0.2}, {1, 0, 0}, {0, -1, 0}, {0.3, 0.2}), {5, 7}}; }
+
 const std::vector<Band>& both_bands() {
   static const std::vector<Band> result{{600, 100, 0.5, Vector3d(1, 1, 0)}, {500, 100, 0.5, Vector3d(0, 1, 1)}};
   return result;
@@ -89,13 +91,15 @@ const ReflectanceTable& colors() {
   return table;
 }
 
-/// A floor below the plane, the lamp above it, and the lamp's photons on the floor.
+/// A floor below the plane, a lamp above it, and the lamp's photons on the floor.
 struct Stage {
-  Stage(const BendingRegion& region_, const MaterialSettings& floor, std::uint64_t per_pass, int passes)
+  Stage(const BendingRegion& region_, const MaterialSettings& floor, std::uint64_t per_pass, int passes,
+        const AreaLight& light = lamp())
       : region(region_),
+        light_list{light},
         materials{make_material(floor, BandValues::Constant(bands, 0.6)),
                   make_material(Diffuse{}, BandValues::Zero(bands))},
-        surfaces(parts()),
+        surfaces(parts(light)),
         lights(light_list, {0.5f, 0.5f}, surfaces.bounds()),
         scene{surfaces, materials, lights, colors()} {
     scene.region = &region;
@@ -108,10 +112,10 @@ struct Stage {
     photons = trace_photons(region, corners(), surfaces, light_list, settings, {});
   }
 
-  static std::vector<ShadedSurface> parts() {
+  static std::vector<ShadedSurface> parts(const AreaLight& light) {
     std::vector<ShadedSurface> result(2);
     result[0].shape = rectangle_mesh({0, 0, -0.8}, {1, 0, 0}, {0, 1, 0}, {8, 8});
-    result[1].shape = lamp().mesh;
+    result[1].shape = light.mesh;
     result[1].material = 1;
     result[1].light = 0;
     return result;
@@ -134,7 +138,7 @@ struct Stage {
   }
 
   const BendingRegion& region;
-  std::vector<Light> light_list{lamp()};
+  std::vector<Light> light_list;
   std::vector<Material> materials;
   SurfaceScene surfaces;
   LightSampler lights;
@@ -232,9 +236,16 @@ TEST(AreaPhotonsTest, TheSameBytesOnAnyNumberOfThreads) {
   }
 }
 
-TEST(AreaPhotonsTest, RefusesALampWithinTheRegion) {
-  const AreaLight within{rectangle_mesh({0, 0, 0.1}, {1, 0, 0}, {0, -1, 0}, {0.5, 0.4}), {5, 7}};
-  EXPECT_THROW(PhotonEmitter(within, corners(), {}), std::invalid_argument);
+/// Photons of a lamp within the region start in all directions, as it shines.
+TEST(AreaPhotonsTest, ALampWithinTheRegionHasTheSameMeanByPhotons) {
+  const BendingPlane plane(0.15, 1.3);
+  Stage stage(plane, Diffuse{}, 300, 1024, lamp_within());
+  const Mean truth = stage.seen(DirectLight::both, false, 1), with = stage.seen(DirectLight::both, true, 1);
+  EXPECT_LT(truth.error(), 0.03 * truth.mean());
+  EXPECT_NEAR(with.mean(), truth.mean(), 4.5 * std::hypot(with.error(), truth.error()) + 0.05 * truth.mean());
+  const Stage many(plane, Diffuse{}, 30000, 32, lamp_within());
+  EXPECT_NEAR(by_photons_alone(many, 1), truth.mean(), 4.5 * truth.error() + 0.06 * truth.mean());
+  EXPECT_DOUBLE_EQ(PhotonEmitter(lamp_within(), corners(), {}).power(), pi * 0.3 * 0.2);
 }
 
 }  // namespace
