@@ -1,9 +1,8 @@
 #include "scenes/whole/photons.h"
 
+#include <algorithm>
 #include <cmath>
 #include <optional>
-
-#include <fmt/format.h>
 
 #include "base/constants.h"
 
@@ -52,11 +51,26 @@ bool is_small(const AreaLight& lamp, const TensorField& field) {
   return box.diagonal().norm() < small_lamp * std::max(distance, field.world_box().diagonal().norm() / 2);
 }
 
-/// The radius about which there are enough photons: by Cauchy, a convex body of area A has the mean silhouette A / 4.
-double automatic_radius(const TensorField& field, double per_pass) {
-  const Vector3d size = field.world_box().sizes();
-  const double silhouette = (size.x() * size.y() + size.y() * size.z() + size.z() * size.x()) / 2;
-  return std::sqrt(photons_in_reach * silhouette / (pi * per_pass));
+/// The area over which undisturbed light is spread where it leaves the volume. From outside, it is the silhouette: by
+/// Cauchy, a convex body of area A has the mean silhouette A / 4. From within, it is about the ball around the volume.
+double spread_of(const Light& light, const TensorField& field) {
+  const Vector3d size = field.world_box().sizes(), middle = field.world_box().center();
+  const double ball = size.squaredNorm() * pi;
+  if (const auto* point = std::get_if<PointLight>(&light); point && is_surrounded(point->position, field.corners()))
+    return ball;
+  if (const auto* lamp = std::get_if<AreaLight>(&light))
+    if ((lamp->mesh.vertices.front() - middle).norm() < size.norm() / 2) return ball / 4;
+  return (size.x() * size.y() + size.y() * size.z() + size.z() * size.x()) / 2;
+}
+
+/// The radius within which there are enough photons of any light that has some.
+double automatic_radius(const TensorField& field, const std::vector<Light>& lights, const PhotonPairs& pairs,
+                        std::uint64_t per_pass) {
+  double spread = 0;
+  for (std::size_t i = 0; i < lights.size(); ++i)
+    if (std::find(pairs[i].begin(), pairs[i].end(), true) != pairs[i].end())
+      spread = std::max(spread, spread_of(lights[i], field));
+  return std::sqrt(photons_in_reach * spread / (pi * static_cast<double>(per_pass)));
 }
 
 }  // namespace
@@ -90,8 +104,7 @@ TracedPhotons photons_of(const Scene& scene, const BendingRegion& region, const 
   settings.per_pass = description.per_pass;
   if (settings.per_pass == 0) return {};
   settings.passes = passes;
-  settings.radius =
-      description.max_radius.value_or(automatic_radius(scene.field, static_cast<double>(settings.per_pass)));
+  settings.radius = description.max_radius.value_or(automatic_radius(scene.field, lights, pairs, settings.per_pass));
   settings.seed = scene.description.seed;
   for (const SceneObject& object : objects) settings.plates.push_back(object.plate);
   settings.serves = [&pairs](int light, std::uint32_t surface) {
