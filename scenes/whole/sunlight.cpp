@@ -16,10 +16,10 @@ namespace {
 
 using Eigen::Vector3d;
 
-constexpr double sky_strength = 0.35;
+constexpr double sky_strength = 0.26;
 const Vector3d sky_color(0.62, 0.78, 1);
-constexpr double sun_strength = 1;
-constexpr double sun_degrees = 0.53;  // Angular diameter.
+constexpr double sun_strength = 0.75;  // White squares are just below white.
+constexpr double sun_degrees = 0.53;   // Angular diameter.
 const Vector3d high_sun(0.35, 0.25, -1);
 
 std::vector<Light> default_lights(const Scene& scene, const ShownLight& shown) {
