@@ -38,13 +38,20 @@ double FieldRegion::entry(const Vector3d& origin, const Vector3d& direction) con
   return leaves - enters > rounding_ ? enters : infinite;
 }
 
+/// Where a way is followed from. Nothing is before the volume, and it does not meet the surface on which it starts.
+Vector3d FieldRegion::start_of(const BentWay& way) const {
+  if (geometry_.surfaces().obstacles.empty()) return way.position;
+  const double before = entry(way.position, way.direction);
+  return way.position + ((std::isinf(before) ? 0 : before) + 2 * geometry_.margin()) * way.direction;
+}
+
 /// @param sign   Of the flexibility: 1 for light, −1 for light that is followed back.
 /// @param gains  Whether the gain of a way is that along its ray; otherwise it is 1.
 void FieldRegion::follow(double sign, bool gains, std::vector<BentWay>& ways) const {
   RayBatch& rays = memory_.local();
   rays.clear();
   for (const BentWay& way : ways)
-    rays.add(way.position, way.direction, sign * settings_.flexibility(way.band, way.place));
+    rays.add(start_of(way), way.direction, sign * settings_.flexibility(way.band, way.place));
   rays.wants_radiance_change = true;
   rays.tensor_samples = 0;
   trace(field_, geometry_, settings_.bending, rays);

@@ -36,7 +36,8 @@ struct FieldViewSettings {
 class FieldRegion final : public BendingRegion {
  public:
   /// @param geometry  Bounds, cut, and all obstacles that lie in the volume. Ways end on them; those that leave the
-  ///                  volume may end on obstacles outside it, too.
+  ///                  volume may end on obstacles outside it, too. Ways may start on obstacles; nothing is looked for
+  ///                  before the volume.
   FieldRegion(const TensorField& field, const Geometry& geometry, FieldViewSettings settings);
 
   double entry(const Eigen::Vector3d& origin, const Eigen::Vector3d& direction) const override;
@@ -52,6 +53,7 @@ class FieldRegion final : public BendingRegion {
   std::uint64_t limited() const { return limited_; }
 
  private:
+  Eigen::Vector3d start_of(const BentWay& way) const;
   void follow(double sign, bool gains, std::vector<BentWay>& ways) const;
   void follow_some(const std::vector<std::size_t>& which, std::vector<BentWay>& ways) const;
   void follow_groups(std::vector<BandGroup> groups, std::vector<BentWay>& ways) const;

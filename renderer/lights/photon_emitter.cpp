@@ -110,7 +110,7 @@ EmittedPhoton PhotonEmitter::sample_lamp(PathSampler& sampler) const {
                                  ? Vector3d(frame_about(normal) * square_to_cosine_hemisphere(turn))
                                  : Vector3d(frame_about((lamp_->center - position).normalized()) *
                                             square_to_cone(turn, lamp_->angle(position)));
-  EmittedPhoton photon{position + 1e-6 * lamp_->radius * normal, direction};
+  EmittedPhoton photon{position + 1e-5 * lamp_->radius * normal, direction};
   photon.density = density(position, normal, direction);
   if (photon.density > 0) photon.power = 1 / photon.density;
   return photon;

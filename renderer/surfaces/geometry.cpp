@@ -106,6 +106,8 @@ Geometry::~Geometry() = default;
 Geometry::Geometry(Geometry&&) noexcept = default;
 Geometry& Geometry::operator=(Geometry&&) noexcept = default;
 
+double Geometry::margin() const { return state_->margin; }
+
 const Surfaces& Geometry::surfaces() const { return state_->surfaces; }
 
 std::optional<Hit> Geometry::State::nearest(const Group& group, const Eigen::Vector3d& from,

@@ -41,8 +41,8 @@ struct Surfaces {
 ///
 /// Embree finds the triangle in single precision; the distance to the triangle's plane is then computed in double
 /// precision. Light may start anywhere. A ray from so far away that double precision does not resolve a surface does
-/// not meet it. A surface that lies behind the origin by less than about 1e-6 of the volume's size counts as a hit at
-/// distance 0: light that starts on a plate, or leaves the volume through one, meets it.
+/// not meet it. A surface that lies behind the origin by less than `margin` counts as a hit at distance 0: light that
+/// starts on a plate, or leaves the volume through one, meets it.
 class Geometry {
  public:
   /// @throw std::invalid_argument naming the surface if it is not finite, or too far from the volume for single
@@ -67,6 +67,8 @@ class Geometry {
   /// sense are skipped.
   std::optional<Hit> crossing(Surface surface, bool inwards, const Eigen::Vector3d& origin,
                               const Eigen::Vector3d& direction, double max_distance = infinite) const;
+
+  double margin() const;  ///< World units; about 1e-6 of the volume's size.
 
   const Surfaces& surfaces() const;
   bool has_cut() const { return surfaces().cut.has_value(); }

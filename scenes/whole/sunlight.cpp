@@ -33,12 +33,14 @@ std::vector<Light> default_lights(const Scene& scene, const ShownLight& shown) {
 
 /// All surfaces that stop light on its way to object `receiver`, and the object itself, if it is no plate. Paths show
 /// light, and do not stop it.
-Surfaces surfaces_before(const Scene& scene, const std::vector<SceneObject>& objects, std::size_t receiver) {
+Surfaces surfaces_before(const Scene& scene, const std::vector<SceneObject>& objects, const SurfaceScene& stage,
+                         std::size_t receiver) {
   Surfaces surfaces;
   surfaces.bounds = scene.geometry.surfaces().bounds;
   surfaces.cut = scene.geometry.surfaces().cut;
-  for (std::size_t i = 0; i < objects.size(); ++i)
-    if (i != receiver && !objects[i].paths) surfaces.obstacles.push_back(objects[i].mesh());
+  for (std::size_t i = 0; i < stage.surfaces().size(); ++i)
+    if (i != receiver && !(i < objects.size() && objects[i].paths))
+      surfaces.obstacles.push_back(std::get<TriangleMesh>(stage.surfaces()[i].shape));
   if (!objects[receiver].plate) surfaces.body = objects[receiver].mesh();
   return surfaces;
 }
@@ -157,8 +159,9 @@ std::function<double(double)> flexibility_of(const BendingDescription& bending) 
 }
 
 std::vector<LandedLight> land_light(const Scene& scene, const std::vector<Light>& lights, const ShownLight& shown,
-                                    const std::vector<SceneObject>& objects, const CausticDescription& caustic,
-                                    const PhotonPairs& photons, const Progress& progress) {
+                                    const std::vector<SceneObject>& objects, const SurfaceScene& stage,
+                                    const CausticDescription& caustic, const PhotonPairs& photons,
+                                    const Progress& progress) {
   std::vector<LandedLight> result;
   for (std::size_t number = 0; number < lights.size(); ++number) {
     const auto light = landing_light(lights[number], shown, scene.description.bending, caustic.passes);
@@ -167,7 +170,8 @@ std::vector<LandedLight> land_light(const Scene& scene, const std::vector<Light>
       if (photons[number][i] || objects[i].mesh().triangles.empty()) continue;
       Plate plate = objects[i].plate ? *objects[i].plate : plane_behind(objects[i].mesh(), *light);
       plate.resolution.setConstant(caustic.resolution);
-      const auto landed = land(scene, surfaces_before(scene, objects, i), plate, *light, number, caustic, progress);
+      const auto landed =
+          land(scene, surfaces_before(scene, objects, stage, i), plate, *light, number, caustic, progress);
       if (!landed) continue;
       result.push_back(landed_light(*landed, *light, strength_of(lights[number])));
       result.back().surface = static_cast<std::uint32_t>(i);

@@ -22,9 +22,10 @@ std::vector<Light> whole_lights(const Scene& scene, const ShownLights& shown, co
 std::function<double(double)> flexibility_of(const BendingDescription& bending);
 
 /// The light of directional lights and points that lands on `objects` through the field, by flow maps: of all pairs but
-/// those that have photons. The surface of object i must have the index i. @throw Cancelled.
+/// those that have photons. @param stage  All surfaces; that of object i has the index i. @throw Cancelled.
 std::vector<LandedLight> land_light(const Scene& scene, const std::vector<Light>& lights, const ShownLight& shown,
-                                    const std::vector<SceneObject>& objects, const CausticDescription& caustic,
-                                    const PhotonPairs& photons, const Progress& progress);
+                                    const std::vector<SceneObject>& objects, const SurfaceScene& stage,
+                                    const CausticDescription& caustic, const PhotonPairs& photons,
+                                    const Progress& progress);
 
 }  // namespace tensorray

@@ -1,6 +1,7 @@
 #include "scenes/whole/whole_method.h"
 
 #include <algorithm>
+#include <iterator>
 #include <numeric>
 
 #include <fmt/format.h>
@@ -76,19 +77,21 @@ Camera whole_camera(const Scene& scene, const std::vector<Vector3d>& points) {
   }
 }
 
-/// The volume for rays that are seen. Objects that reach into it stop light there; if there are any, all objects must.
-Geometry seen_geometry(const Scene& scene, const std::vector<SceneObject>& objects) {
+/// The volume for rays that are seen. Surfaces that reach into it stop light there; if there are any, all surfaces
+/// must.
+Geometry seen_geometry(const Scene& scene, const SurfaceScene& stage) {
   Surfaces surfaces;
   surfaces.bounds = scene.geometry.surfaces().bounds;
   surfaces.cut = scene.geometry.surfaces().cut;
   const Eigen::AlignedBox3d volume = scene.field.world_box();
-  const bool reach_in = std::any_of(objects.begin(), objects.end(), [&](const SceneObject& object) {
+  const auto mesh_of = [](const ShadedSurface& surface) { return std::get<TriangleMesh>(surface.shape); };
+  const std::vector<ShadedSurface>& all = stage.surfaces();
+  const bool reach_in = std::any_of(all.begin(), all.end(), [&](const ShadedSurface& surface) {
     Eigen::AlignedBox3d box;
-    for (const Vector3d& vertex : object.mesh().vertices) box.extend(vertex);
+    for (const Vector3d& vertex : mesh_of(surface).vertices) box.extend(vertex);
     return box.intersects(volume);
   });
-  if (reach_in)
-    for (const SceneObject& object : objects) surfaces.obstacles.push_back(object.mesh());
+  if (reach_in) std::transform(all.begin(), all.end(), std::back_inserter(surfaces.obstacles), mesh_of);
   return Geometry(std::move(surfaces));
 }
 
@@ -186,7 +189,7 @@ Render LoadedWhole::render(const Scene& scene, const Progress& progress, RenderJ
   for (const Band& band : light.bands) luminance.push_back(static_cast<float>(band.xyz.y()));
   const LightSampler sampler(lights, luminance, stage.bounds());
   const ReflectanceTable table(light.model, light.bands, light.xyz_to_working);
-  const Geometry geometry = seen_geometry(scene, objects);
+  const Geometry geometry = seen_geometry(scene, stage);
   const FieldRegion region(scene.field, geometry, view_settings(scene, whole_));
   const bool bends = bends_light(scene, light.bands);
   ShadedScene shaded{stage, materials, sampler, table};
@@ -202,7 +205,7 @@ Render LoadedWhole::render(const Scene& scene, const Progress& progress, RenderJ
     photons = photons_of(scene, region, stage, lights, objects, pairs, whole_.settings.photons,
                          samples.max_samples / samples.first_samples, progress);
     shaded.photons = &photons;
-    shaded.landed = land_light(scene, lights, light, objects, whole_.settings.caustic, pairs, progress);
+    shaded.landed = land_light(scene, lights, light, objects, stage, whole_.settings.caustic, pairs, progress);
   }
   report(photons.counts, result);
   result.statistics.seconds_tracing = seconds_since(start);

@@ -7,8 +7,10 @@
 #include <Eigen/LU>
 #include <gtest/gtest.h>
 
+#include "renderer/lights/lights.h"
 #include "renderer/sampling/random.h"
 #include "renderer/sampling/sampling.h"
+#include "renderer/surfaces/surface_scene.h"
 #include "tests/integrators/support.h"
 
 namespace tensorray {
@@ -69,6 +71,34 @@ TEST(FieldRegionTest, EntersWhereStraightLightMeetsTheBox) {
   EXPECT_EQ(region.entry({0, 0, 3}, {0, 0, 1}), INFINITY);
   EXPECT_EQ(region.entry({0, 0, 1}, {0, 0, 1}), INFINITY);  // Leaves.
   EXPECT_EQ(region.entry({2, 0, 3}, {0, 0, -1}), INFINITY);
+}
+
+/// Ways that start on a surface, within the volume and before it, leave it: they do not end where they start.
+TEST(FieldRegionTest, WaysStartOnSurfaces) {
+  const TensorField field = constant_field(general_tensor());
+  for (const double height : {-0.4, -1.0, -1.7}) {
+    const TriangleMesh floor = rectangle_mesh({0, 0, height}, {1, 0, 0}, {0, 1, 0}, {4, 4});
+    const TriangleMesh roof = rectangle_mesh({0, 0, 0.4}, {1, 0, 0}, {0, 1, 0}, {4, 4});
+    Surfaces surfaces = surfaces_of(field);
+    surfaces.obstacles = {floor, roof};
+    const Geometry geometry(std::move(surfaces));
+    const FieldRegion region(field, geometry, view(Conserve::power, 1e-9));
+    std::vector<ShadedSurface> shaded(1);
+    shaded[0].shape = floor;
+    const SurfaceScene stage(std::move(shaded));
+    for (std::uint64_t i = 0; i < 200; ++i) {
+      PathSampler sampler{7, i, 0, 0};
+      const Eigen::Vector2d at = 1.6 * sampler.next_2d() - Eigen::Vector2d(0.8, 0.8);
+      const Vector3d direction = square_to_cosine_hemisphere(sampler.next_2d());
+      const auto hit = stage.intersect({at.x(), at.y(), 0}, {0, 0, -1});
+      const Vector3d start = stage.start(*hit, hit->lifted_position, 1);
+      if (std::isinf(region.entry(start, direction))) continue;
+      const BentWay way = follow(region, start, direction);
+      ASSERT_TRUE(way.arrives);
+      EXPECT_GT(way.position.z(), height + 1e-3) << i;
+      EXPECT_TRUE(!way.on_surface || std::abs(way.position.z() - 0.4) < 1e-5) << i;
+    }
+  }
 }
 
 /// Photons keep their power; radiance is still constant if the symmetric part of T is a multiple of the identity,

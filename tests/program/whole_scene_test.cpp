@@ -278,6 +278,53 @@ TEST_F(WholeScene, AWeakFieldLightsPlatesWithinTheVolume) {
   EXPECT_EQ(picture(weak, "7").pixels, with.pixels);
 }
 
+/// A point within the volume, and lamps there, of which the large one has no photons, light a plate below and one
+/// within, beside a sky.
+TEST_F(WholeScene, AWeakFieldIsLitFromWithinAsIfItWereNotThere) {
+  for (const char* light : {R"({"kind":"point","position":[0.1,0.2,-0.5],"strength":1})",
+                            R"({"kind":"area","center":[0.1,0.2,-0.5],"size":[0.2,0.2],"strength":20})",
+                            R"({"kind":"area","center":[0.1,0.2,-0.5],"size":[0.6,0.6],"strength":3})"}) {
+    const std::vector<std::string> sets{
+        "objects=[{\"plate\":{\"center\":[0,0,-2.6],\"size\":[4,4]},\"material\":{\"kind\":\"diffuse\"}},"
+        "{\"plate\":{\"center\":[0.4,0,-1.2],\"size\":[0.8,0.8]},\"material\":{\"kind\":\"diffuse\"}}]",
+        std::string("lights=[{\"kind\":\"constant\",\"strength\":0.2},") + light + "]",
+        "integrator.max_samples=32",
+        "integrator.min_samples=32",
+        "camera.position=[1,-4,3]",
+        "camera.target=[0,0,-1.6]"};
+    std::vector<std::string> weak = sets, none = sets;
+    weak.push_back("field.scale=1e-7");
+    none.insert(none.end(), {"bending.a=0", "bending.b=0"});
+    const Image with = picture(weak), without = picture(none);
+    EXPECT_GT(mean(without, "G"), 0.01);
+    for (const char* channel : {"R", "G", "B"})
+      EXPECT_NEAR(mean(with, channel) / mean(without, channel), 1, 0.02) << channel << light;
+    EXPECT_EQ(picture(weak, "1").pixels, with.pixels);
+  }
+}
+
+/// Where aim finds some of a lamp's light within a bending field, photons beside it do not change the mean. Without its
+/// photons the lamp is found because it stops the rays that are followed back.
+TEST_F(WholeScene, ALampWithinTheFieldHasTheSameLightWithPhotons) {
+  const std::vector<std::string> sets{
+      "field.scale=0.5",
+      "objects=[{\"plate\":{\"center\":[0,0,-2.6],\"size\":[3,3]},\"material\":{\"kind\":\"diffuse\"}}]",
+      R"(lights=[{"kind":"area","center":[0.1,0.2,-0.5],"size":[0.5,0.5],"strength":10}])",
+      "integrator.bands=8",
+      "integrator.max_samples=512",
+      "integrator.min_samples=512",
+      "integrator.max_depth=1",
+      R"(camera={"projection":"orthographic","position":[0,0.001,-2.2],"target":[0,0,-2.6],"height":2.4,)"
+      R"("resolution":[12,12]})"};
+  std::vector<std::string> none = sets;
+  none.push_back("integrator.photons.per_pass=0");
+  const Image with = picture(sets), without = picture(none);
+  EXPECT_NE(with.pixels, without.pixels);
+  EXPECT_GT(mean(without, "G"), 0.05);
+  for (const char* channel : {"R", "G", "B"})
+    EXPECT_NEAR(mean(with, channel) / mean(without, channel), 1, 0.03) << channel;
+}
+
 /// A plate along the light in the lower half of the volume, and one below the volume. Light that hardly bends meets
 /// their outer sides; light that bends more meets the inner ones. A flow map has one side.
 TEST_F(WholeScene, PlatesAlongTheLightAreLitOnBothSides) {
@@ -371,13 +418,10 @@ TEST_F(WholeScene, RefusesWhatDoesNotFit) {
   expect_error("objects=[{\"plate\":{\"center\":[0,0,0]},\"texture\":\"none.png\"}]", "none.png");
   expect_error("objects=[{\"plate\":{\"center\":[0,0,0],\"colour\":1}}]", "/objects/0/plate/colour");
   expect_error("lights=[{\"kind\":\"point\"}]", "/lights/0` is a point and needs its `position`");
-  expect_error("lights=[{\"kind\":\"point\",\"position\":[0,0,-0.9]}]", "/lights/0`: the light is within the volume");
-  expect_error("lights=[{\"kind\":\"point\",\"position\":[0,0,-0.9],\"caustic\":\"photons\"}]",
-               "/lights`: the light is within the volume");
+  expect_error("lights=[{\"kind\":\"point\",\"position\":[0,0,-0.9],\"caustic\":\"map\"}]",
+               "/lights/0` has no map of its light: the light is within the volume, or too near; move it away, or use");
   expect_error("lights=[{\"kind\":\"point\",\"position\":[0,0,3],\"caustic\":\"none\"}]", "/lights/0/caustic");
   expect_error("lights=[{\"kind\":\"area\",\"center\":[0,0,3],\"caustic\":\"map\"}]", "/lights/0/caustic");
-  expect_error("lights=[{\"kind\":\"area\",\"center\":[0,0,-0.9],\"caustic\":\"photons\"}]",
-               "/lights`: an area light with photons must be outside the volume");
   expect_error("integrator.photons.max_radius=0", "/integrator/photons/max_radius");
   expect_error("lights=[{\"kind\":\"constant\",\"group\":\"albedo\"}]", "/lights/0/group");
 }
