@@ -309,10 +309,11 @@ TEST_F(WholeScene, ALampWithinTheFieldHasTheSameLightWithPhotons) {
   const std::vector<std::string> sets{
       "field.scale=0.5",
       "objects=[{\"plate\":{\"center\":[0,0,-2.6],\"size\":[3,3]},\"material\":{\"kind\":\"diffuse\"}}]",
-      R"(lights=[{"kind":"area","center":[0.1,0.2,-0.5],"size":[0.5,0.5],"strength":10}])",
+      R"(lights=[{"kind":"area","center":[0.1,0.2,-0.5],"size":[0.5,0.5],"strength":10,"caustic":"photons"}])",
       "integrator.bands=8",
-      "integrator.max_samples=512",
-      "integrator.min_samples=512",
+      "integrator.photons.per_pass=1024",
+      "integrator.max_samples=128",
+      "integrator.min_samples=128",
       "integrator.max_depth=1",
       R"(camera={"projection":"orthographic","position":[0,0.001,-2.2],"target":[0,0,-2.6],"height":2.4,)"
       R"("resolution":[12,12]})"};
