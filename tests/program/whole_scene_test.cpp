@@ -303,12 +303,14 @@ TEST_F(WholeScene, AWeakFieldIsLitFromWithinAsIfItWereNotThere) {
   }
 }
 
-/// Where aim finds some of a lamp's light within a bending field, photons beside it do not change the mean. Without its
-/// photons the lamp is found because it stops the rays that are followed back.
+/// Where aim finds some of a lamp's light within a bending field, photons beside it do not change the mean, beside a
+/// plate there that stops light. Without its photons the lamp is found because it stops the rays that are followed
+/// back.
 TEST_F(WholeScene, ALampWithinTheFieldHasTheSameLightWithPhotons) {
   const std::vector<std::string> sets{
       "field.scale=0.5",
-      "objects=[{\"plate\":{\"center\":[0,0,-2.6],\"size\":[3,3]},\"material\":{\"kind\":\"diffuse\"}}]",
+      "objects=[{\"plate\":{\"center\":[0,0,-2.6],\"size\":[3,3]},\"material\":{\"kind\":\"diffuse\"}},"
+      "{\"plate\":{\"center\":[-0.5,0,-1.4],\"size\":[0.8,1.2]},\"material\":{\"kind\":\"diffuse\"}}]",
       R"(lights=[{"kind":"area","center":[0.1,0.2,-0.5],"size":[0.5,0.5],"strength":10,"caustic":"photons"}])",
       "integrator.bands=8",
       "integrator.photons.per_pass=1024",
