@@ -109,7 +109,8 @@ double RayShader::share_of_photon(const Vertex& vertex, const LandedPhoton& phot
   const Vector3d direction = -photon.direction.cast<double>();
   const double own = photon.density * pi * radius * radius * std::abs(direction.dot(vertex.hit.normal));
   if (!(own > 0)) return 0;
-  const double aimed = scene_.lights.direction_pdf(vertex.point, direction);
+  // Where the photon is: seen from the vertex beside it, aim in its direction might miss the light.
+  const double aimed = scene_.lights.direction_pdf(photon.position.cast<double>(), direction);
   const double scattered =
       settings_.direct == DirectLight::lights && aimed > 0 ? 0 : pdf(*vertex.material, reflectance_, wi, vertex.wo);
   const double by_light = (settings_.direct == DirectLight::material ? 0 : aimed) / own, by_material = scattered / own;
