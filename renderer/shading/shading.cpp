@@ -86,11 +86,14 @@ void RayShader::shade(const std::vector<ViewRay>& rays, bool show_background) {
   light_.setZero(static_cast<Eigen::Index>(scene_.colors.bands()), column(rays.size()));
   views_.assign(rays.size(), {});
   samplers_.clear();
+  straight_.clear();
   waiting_.clear();
-  for (ray_ = 0; ray_ < rays.size(); ++ray_) {
-    samplers_.push_back(rays[ray_].sampler);
-    shade_view(rays[ray_].origin, rays[ray_].direction);
+  for (const ViewRay& ray : rays) {
+    samplers_.push_back(ray.sampler);
+    straight_.push_back({ray.origin, ray.direction});
   }
+  scene_.surfaces.intersect(straight_, hits_);
+  for (ray_ = 0; ray_ < rays.size(); ++ray_) shade_view(straight_[ray_], hits_[ray_]);
   while (!waiting_.rays.empty()) {
     std::swap(waiting_, followed_);
     waiting_.clear();
@@ -114,12 +117,12 @@ void RayShader::carry(int band) {
   for (PhotonSum& sum : photon_sums_) sum.scattered.resize(bands);
 }
 
-void RayShader::shade_view(const Vector3d& origin, const Vector3d& direction) {
+void RayShader::shade_view(const StraightRay& ray, const std::optional<SurfaceHit>& hit) {
+  const auto& [origin, direction] = ray;
   carry(-1);
   throughput_.setOnes();
   stands_ = 1;
   sampler().dimension = first_dimension;
-  const std::optional<SurfaceHit> hit = scene_.surfaces.intersect(origin, direction);
   if (bends(origin, direction, hit ? hit->distance : std::numeric_limits<double>::infinity()))
     return wait(origin, direction, throughput_, 0, 1, false, {});
   if (!hit) {

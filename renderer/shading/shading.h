@@ -187,7 +187,7 @@ class RayShader {
 
   Eigen::Index column(std::size_t ray) const { return static_cast<Eigen::Index>(ray) * (1 + scene_.layers()); }
 
-  void shade_view(const Eigen::Vector3d& origin, const Eigen::Vector3d& direction);
+  void shade_view(const StraightRay& ray, const std::optional<SurfaceHit>& hit);
   void shade_surface(const Vertex& vertex, int depth);
   void shade_path(Vertex vertex, int depth);
   void shade_occlusion(const Vertex& vertex);
@@ -238,6 +238,8 @@ class RayShader {
   const ShadedScene& scene_;
   const ShadingSettings settings_;
   std::vector<PathSampler> samplers_;
+  std::vector<StraightRay> straight_;  ///< The camera's rays, and what they meet if they are not bent.
+  std::vector<std::optional<SurfaceHit>> hits_;
   std::vector<RayView> views_;
   Eigen::ArrayXXd light_;  ///< A column of bands for each ray's radiance and for each of its layers.
   bool show_background_ = true;
