@@ -85,8 +85,8 @@ PrincipledView viewed(const PrincipledScattering& layers, const BandsIn& reflect
     view.metal_fill = metallic * view.missing_metal * fill_color(mean_schlick(typical), layers.missing_metal.mean());
   }
   view.base = std::max(1e-3, view.base);
-  const double sum = view.coat + view.base + view.dielectric_fill + view.metal_fill;
-  for (double* share : {&view.coat, &view.base, &view.dielectric_fill, &view.metal_fill}) *share /= sum;
+  const double scale = 1 / (view.coat + view.base + view.dielectric_fill + view.metal_fill);
+  for (double* share : {&view.coat, &view.base, &view.dielectric_fill, &view.metal_fill}) *share *= scale;
   return view;
 }
 

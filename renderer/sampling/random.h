@@ -37,7 +37,7 @@ struct SobolTwins {
 /// stratified together: the first 2^k points of `joint_sobol_start`, with either of the twins, have four points in each
 /// elementary interval of volume 2^(2-k) up to k = 7, and eight in each of volume 2^(3-k) up to k = 10.
 /// `joint_sobol_start` has dimensions 0 and 1, with one point in each of their elementary intervals;
-/// `joint_sobol_twins` has dimensions 2 and 3, twice.
+/// `joint_sobol_twins` has dimensions 2 and 3, twice. Keys of the two, and of `sobol_twins`, must be three apart.
 std::array<double, 2> joint_sobol_start(std::uint64_t key, std::uint32_t index);
 SobolTwins joint_sobol_twins(std::uint64_t key, std::uint32_t index);
 

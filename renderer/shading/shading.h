@@ -39,8 +39,8 @@ struct ShadingSettings {
   DirectLight direct = DirectLight::both;
   int max_depth = 8;  ///< Most surfaces at which a path scatters; >= 0. 1: direct light only.
   /// After this many surfaces, a path that carries less than a tenth of its luminance may end at random (Russian
-  /// roulette); >= 1.
-  int roulette_depth = 1;
+  /// roulette); >= 1. 1 would make dark surfaces noisy in light that only their material finds, such as a sky's.
+  int roulette_depth = 2;
   /// Greatest luminance that light scattered twice or more adds, for each sample and surface; 1 is the luminance of the
   /// light that the bands are made from. 0: no limit. The limit removes rare bright paths (fireflies). With the
   /// default, one such path adds at most 10 / samples to a pixel: at 64 samples 0.16, which is 20 times the

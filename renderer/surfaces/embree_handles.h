@@ -89,8 +89,9 @@ inline void check(RTCDevice device) {
 }
 
 /// A device costs a tenth of a millisecond, so every scene has its own and scenes share no state.
-inline Owned<RTCDevice> make_device() {
-  Owned<RTCDevice> device(rtcNewDevice(nullptr));
+/// @param settings  Embree's, as text; null: none.
+inline Owned<RTCDevice> make_device(const char* settings = nullptr) {
+  Owned<RTCDevice> device(rtcNewDevice(settings));
   if (!device) throw std::runtime_error("Embree cannot start on this processor");
   return device;
 }

@@ -22,6 +22,8 @@ using embree::Owned;
 constexpr double offset_fraction = 1e-6;
 /// Fraction of the distance to a target that is left out at its end.
 constexpr double end_fraction = 5e-5;
+/// Embree's setting that lets it use AVX-512: then it takes a fifteenth less time here.
+constexpr const char* widest_vectors = "frequency_level=simd512";
 /// With fewer triangles, a slower build is worth its time, as it splits long thin triangles. With more, memory limits
 /// the picture, so the search tree keeps no copies of the triangles.
 constexpr std::size_t large_scene = 2'000'000;
@@ -183,7 +185,7 @@ struct SurfaceScene::State {
 };
 
 void SurfaceScene::State::build() {
-  device = embree::make_device();
+  device = embree::make_device(widest_vectors);
   scene.reset(rtcNewScene(device.get()));
   check(device.get());
   std::size_t triangles = 0;
