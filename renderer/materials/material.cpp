@@ -23,11 +23,17 @@ Eigen::Vector3d sample(const Diffuse&, const BandsIn&, const Eigen::Vector3d&, c
   return square_to_cosine_hemisphere(u);
 }
 
-/// Opaque models need only two numbers.
+/// Opaque models need only two numbers, and one of them needs the view.
 template <class Model>
-Eigen::Vector3d sample(const Model& model, const BandsIn& reflectance, const Eigen::Vector3d& wo,
-                       const Eigen::Vector3d& u) {
-  return sample(model, reflectance, wo, Eigen::Vector2d(u.head<2>()));
+Eigen::Vector3d sample(const Model& model, const ViewedMaterial& view, const BandsIn& reflectance,
+                       const Eigen::Vector3d& wo, const Eigen::Vector3d& u) {
+  const Eigen::Vector2d place = u.head<2>();
+  if constexpr (std::is_same_v<Model, PrincipledScattering>)
+    return tensorray::sample(model, view.principled, wo, place);
+  else if constexpr (std::is_same_v<Model, DielectricScattering>)
+    return tensorray::sample(model, reflectance, wo, u);
+  else
+    return sample(model, reflectance, wo, place);
 }
 
 bool is_glass(const Material& material) { return std::holds_alternative<DielectricScattering>(material.scattering); }
@@ -45,10 +51,12 @@ bool scatters(const Material& material, const Eigen::Vector3d& wi, const Eigen::
 
 /// Metals alone have values of each band.
 template <class Model>
-double evaluate(const Model& model, const BandsIn& reflectance, const Eigen::Vector3d& wi, const Eigen::Vector3d& wo,
-                BandsOut f, Eigen::Index first_band) {
+double evaluate(const Model& model, const ViewedMaterial& view, const BandsIn& reflectance, const Eigen::Vector3d& wi,
+                const Eigen::Vector3d& wo, BandsOut f, Eigen::Index first_band) {
   if constexpr (std::is_same_v<Model, ConductorScattering>)
     return tensorray::evaluate(model, reflectance, wi, wo, f, first_band);
+  else if constexpr (std::is_same_v<Model, PrincipledScattering>)
+    return tensorray::evaluate(model, view.principled, reflectance, wi, wo, f);
   else
     return evaluate(model, reflectance, wi, wo, f);
 }
@@ -76,15 +84,25 @@ Material make_material(const MaterialSettings& settings, const BandValues& refle
   return material;
 }
 
-double evaluate(const Material& material, const BandsIn& reflectance, const Eigen::Vector3d& wi,
-                const Eigen::Vector3d& wo, BandsOut f, Eigen::Index first_band) {
+ViewedMaterial viewed(const Material& material, const BandsIn& reflectance, const Eigen::Vector3d& wo) {
+  const auto* principled = std::get_if<PrincipledScattering>(&material.scattering);
+  return principled ? ViewedMaterial{viewed(*principled, reflectance, std::abs(wo.z()))} : ViewedMaterial{};
+}
+
+double evaluate(const Material& material, const ViewedMaterial& view, const BandsIn& reflectance,
+                const Eigen::Vector3d& wi, const Eigen::Vector3d& wo, BandsOut f, Eigen::Index first_band) {
   if (!scatters(material, wi, wo)) {
     f.setZero();
     return 0;
   }
   const Eigen::Vector3d i = seen(material, wi, wo), o = seen(material, wo, wo);
-  const auto of = [&](const auto& model) { return evaluate(model, reflectance, i, o, f, first_band); };
+  const auto of = [&](const auto& model) { return evaluate(model, view, reflectance, i, o, f, first_band); };
   return std::visit(of, material.scattering);
+}
+
+double evaluate(const Material& material, const BandsIn& reflectance, const Eigen::Vector3d& wi,
+                const Eigen::Vector3d& wo, BandsOut f, Eigen::Index first_band) {
+  return evaluate(material, viewed(material, reflectance, wo), reflectance, wi, wo, f, first_band);
 }
 
 double pdf(const Material& material, const BandsIn& reflectance, const Eigen::Vector3d& wi, const Eigen::Vector3d& wo) {
@@ -92,15 +110,16 @@ double pdf(const Material& material, const BandsIn& reflectance, const Eigen::Ve
   return evaluate(material, reflectance, wi, wo, none);
 }
 
-std::optional<ScatteringSample> sample(const Material& material, const BandsIn& reflectance, const Eigen::Vector3d& wo,
-                                       const Eigen::Vector3d& u, BandsOut weight, Eigen::Index first_band) {
+std::optional<ScatteringSample> sample(const Material& material, const ViewedMaterial& view, const BandsIn& reflectance,
+                                       const Eigen::Vector3d& wo, const Eigen::Vector3d& u, BandsOut weight,
+                                       Eigen::Index first_band) {
   weight.setZero();
   if (wo.z() == 0) return std::nullopt;
   const Eigen::Vector3d o = seen(material, wo, wo);
-  const auto direction = [&](const auto& model) { return sample(model, reflectance, o, u); };
+  const auto direction = [&](const auto& model) { return sample(model, view, reflectance, o, u); };
   ScatteringSample result;
   result.wi = seen(material, std::visit(direction, material.scattering), wo);
-  result.pdf = evaluate(material, reflectance, result.wi, wo, weight, first_band);
+  result.pdf = evaluate(material, view, reflectance, result.wi, wo, weight, first_band);
   if (!(result.pdf > 0)) {
     weight.setZero();
     return std::nullopt;
@@ -108,6 +127,11 @@ std::optional<ScatteringSample> sample(const Material& material, const BandsIn& 
   weight *= std::abs(result.wi.z()) / result.pdf;
   result.refraction = refraction(material, result.wi, wo);
   return result;
+}
+
+std::optional<ScatteringSample> sample(const Material& material, const BandsIn& reflectance, const Eigen::Vector3d& wo,
+                                       const Eigen::Vector3d& u, BandsOut weight, Eigen::Index first_band) {
+  return sample(material, viewed(material, reflectance, wo), reflectance, wo, u, weight, first_band);
 }
 
 }  // namespace tensorray

@@ -33,6 +33,14 @@ struct Material {
 /// @throw std::invalid_argument if a setting or a reflectance is out of range, or a metal has other bands.
 Material make_material(const MaterialSettings& settings, const BandValues& reflectance);
 
+/// What all directions of light share at a point that a viewer sees.
+struct ViewedMaterial {
+  PrincipledView principled;  ///< Of that material only.
+};
+
+/// @param reflectance, wo  As in `evaluate`.
+ViewedMaterial viewed(const Material& material, const BandsIn& reflectance, const Eigen::Vector3d& wo);
+
 /// Sets f(wi, wo) in every band, without a cosine. It is 0 if a direction lies in the surface (z = 0), and on the far
 /// side of opaque materials.
 /// @param reflectance  Reflectance at the point, 0 to 1 in each band: `material.reflectance`, or that of the surface's
@@ -42,6 +50,10 @@ Material make_material(const MaterialSettings& settings, const BandValues& refle
 /// @return `pdf`, which shares most of the work.
 double evaluate(const Material& material, const BandsIn& reflectance, const Eigen::Vector3d& wi,
                 const Eigen::Vector3d& wo, BandsOut f, Eigen::Index first_band = 0);
+
+/// The same, where several directions light one point. @param view  That of `reflectance` and wo.
+double evaluate(const Material& material, const ViewedMaterial& view, const BandsIn& reflectance,
+                const Eigen::Vector3d& wi, const Eigen::Vector3d& wo, BandsOut f, Eigen::Index first_band = 0);
 
 /// The density, per steradian, with which `sample` gives wi; the same for all bands of `reflectance`. Its integral is 1
 /// minus the probability that `sample` returns nothing.
@@ -64,5 +76,10 @@ struct ScatteringSample {
 /// @return nothing if the path ends here; the weight is then 0.
 std::optional<ScatteringSample> sample(const Material& material, const BandsIn& reflectance, const Eigen::Vector3d& wo,
                                        const Eigen::Vector3d& u, BandsOut weight, Eigen::Index first_band = 0);
+
+/// The same. @param view  As in `evaluate`.
+std::optional<ScatteringSample> sample(const Material& material, const ViewedMaterial& view, const BandsIn& reflectance,
+                                       const Eigen::Vector3d& wo, const Eigen::Vector3d& u, BandsOut weight,
+                                       Eigen::Index first_band = 0);
 
 }  // namespace tensorray

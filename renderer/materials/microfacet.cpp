@@ -80,7 +80,10 @@ double ggx_shadowing(double alpha, double cosine_o, double cosine_i) {
 }
 
 GgxReflection ggx_reflection(double alpha, const Eigen::Vector3d& wi, const Eigen::Vector3d& wo) {
-  const double facets = ggx_facets(alpha, (wi + wo).normalized()) / 2, o = spread(alpha, wo.z());
+  // As ggx_facets of the normal that wi + wo has when its length is 1, without a square root for it.
+  const Eigen::Vector3d sum = wi + wo;
+  const double alpha2 = square(alpha), stretched = sum.head<2>().squaredNorm() + alpha2 * square(sum.z());
+  const double facets = alpha2 * square(sum.squaredNorm() / stretched) / (2 * pi), o = spread(alpha, wo.z());
   return {facets / (wo.z() * spread(alpha, wi.z()) + wi.z() * o), facets / (wo.z() + o)};
 }
 

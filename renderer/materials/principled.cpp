@@ -42,30 +42,6 @@ CosineTable missing_table(const PrincipledScattering& layers, const Fresnel& fre
   });
 }
 
-/// Sampling probability of each lobe, in proportion to what it scatters in the mean of the bands.
-struct LobeShares {
-  double coat = 0, base = 0, dielectric_fill = 0, metal_fill = 0;
-};
-
-LobeShares lobe_shares(const PrincipledScattering& layers, const BandsIn& reflectance, double cosine_o) {
-  const double metallic = layers.metallic, typical = reflectance.mean();
-  LobeShares shares;
-  if (layers.clearcoat > 0) shares.coat = layers.coat.at(cosine_o);
-  if (metallic < 1) {
-    const double missing = layers.missing_dielectric.at(cosine_o);
-    shares.base = (1 - metallic) * (1 - shares.coat - missing);
-    shares.dielectric_fill = (1 - metallic) * typical * missing;
-  }
-  if (metallic > 0) {
-    const double missing = layers.missing_metal.at(cosine_o);
-    shares.base += metallic * (1 - shares.coat - missing) * fresnel_schlick(cosine_o, typical);
-    shares.metal_fill = metallic * missing * fill_color(mean_schlick(typical), layers.missing_metal.mean());
-  }
-  shares.base = std::max(1e-3, shares.base);
-  const double sum = shares.coat + shares.base + shares.dielectric_fill + shares.metal_fill;
-  return {shares.coat / sum, shares.base / sum, shares.dielectric_fill / sum, shares.metal_fill / sum};
-}
-
 }  // namespace
 
 PrincipledScattering prepare(const Principled& settings) {
@@ -94,39 +70,58 @@ PrincipledScattering prepare(const Principled& settings) {
   return layers;
 }
 
-double evaluate(const PrincipledScattering& layers, const BandsIn& reflectance, const Eigen::Vector3d& wi,
-                const Eigen::Vector3d& wo, BandsOut f) {
+PrincipledView viewed(const PrincipledScattering& layers, const BandsIn& reflectance, double cosine_o) {
+  const double metallic = layers.metallic, typical = reflectance.mean();
+  PrincipledView view;
+  if (layers.clearcoat > 0) view.coat = view.coat_reflects = layers.coat.at(cosine_o);
+  if (metallic < 1) {
+    view.missing_dielectric = layers.missing_dielectric.at(cosine_o);
+    view.base = (1 - metallic) * (1 - view.coat - view.missing_dielectric);
+    view.dielectric_fill = (1 - metallic) * typical * view.missing_dielectric;
+  }
+  if (metallic > 0) {
+    view.missing_metal = layers.missing_metal.at(cosine_o);
+    view.base += metallic * (1 - view.coat - view.missing_metal) * fresnel_schlick(cosine_o, typical);
+    view.metal_fill = metallic * view.missing_metal * fill_color(mean_schlick(typical), layers.missing_metal.mean());
+  }
+  view.base = std::max(1e-3, view.base);
+  const double scale = 1 / (view.coat + view.base + view.dielectric_fill + view.metal_fill);
+  for (double* share : {&view.coat, &view.base, &view.dielectric_fill, &view.metal_fill}) *share *= scale;
+  return view;
+}
+
+double evaluate(const PrincipledScattering& layers, const PrincipledView& view, const BandsIn& reflectance,
+                const Eigen::Vector3d& wi, const Eigen::Vector3d& wo, BandsOut f) {
   const double cosine = facet_cosine(wi, wo), metallic = layers.metallic;
-  const LobeShares shares = lobe_shares(layers, reflectance, wo.z());
   GgxReflection base = ggx_reflection(layers.alpha, wi, wo);
-  double density = shares.base * base.pdf, uncolored = 0;
+  double density = view.base * base.pdf, uncolored = 0;
   if (layers.clearcoat > 0) {
     const GgxReflection coat = ggx_reflection(layers.coat_alpha, wi, wo);
-    density += shares.coat * coat.pdf;
+    density += view.coat * coat.pdf;
     uncolored = layers.clearcoat * fresnel_dielectric(cosine, coat_index) * coat.f;
-    base.f *= through_coat(layers, wo.z(), wi.z());
+    base.f *= 1 - std::max(view.coat_reflects, layers.coat.at(wi.z()));
   }
-  const auto fill_of = [&](const CosineTable& missing) {
-    return fill(missing.at(wo.z()), missing.at(wi.z()), missing.mean());
+  const auto fill_of = [&](double missing_o, const CosineTable& missing) {
+    return fill(missing_o, missing.at(wi.z()), missing.mean());
   };
   double diffuse = 0;
   if (metallic < 1) {
-    density += shares.dielectric_fill * wi.z() / pi;
+    density += view.dielectric_fill * wi.z() / pi;
     uncolored += (1 - metallic) * fresnel_dielectric(cosine, layers.index) * base.f;
-    diffuse = (1 - metallic) * fill_of(layers.missing_dielectric);
+    diffuse = (1 - metallic) * fill_of(view.missing_dielectric, layers.missing_dielectric);
   }
   f = uncolored + diffuse * reflectance.head(f.size());
   if (metallic == 0) return density;
-  const double several = metallic * fill_of(layers.missing_metal), missing = layers.missing_metal.mean();
+  const double several = metallic * fill_of(view.missing_metal, layers.missing_metal),
+               missing = layers.missing_metal.mean();
   for (Eigen::Index band = 0; band < f.size(); ++band)
     f[band] += metallic * base.f * fresnel_schlick(cosine, reflectance[band]) +
                several * fill_color(mean_schlick(reflectance[band]), missing);
-  return density + shares.metal_fill * wi.z() / pi;
+  return density + view.metal_fill * wi.z() / pi;
 }
 
-Eigen::Vector3d sample(const PrincipledScattering& layers, const BandsIn& reflectance, const Eigen::Vector3d& wo,
+Eigen::Vector3d sample(const PrincipledScattering& layers, const PrincipledView& view, const Eigen::Vector3d& wo,
                        const Eigen::Vector2d& u) {
-  const LobeShares shares = lobe_shares(layers, reflectance, wo.z());
   Eigen::Vector2d place = u;
   double rest = 1;
   const auto choose_lobe = [&](double share) {
@@ -134,9 +129,9 @@ Eigen::Vector3d sample(const PrincipledScattering& layers, const BandsIn& reflec
     rest -= share;
     return chosen;
   };
-  if (choose_lobe(shares.dielectric_fill)) return square_to_cosine_hemisphere(place);
-  if (choose_lobe(shares.coat)) return mirrored(wo, ggx_sample_visible(layers.coat_alpha, wo, place));
-  if (choose_lobe(shares.metal_fill)) return square_to_cosine_hemisphere(place);
+  if (choose_lobe(view.dielectric_fill)) return square_to_cosine_hemisphere(place);
+  if (choose_lobe(view.coat)) return mirrored(wo, ggx_sample_visible(layers.coat_alpha, wo, place));
+  if (choose_lobe(view.metal_fill)) return square_to_cosine_hemisphere(place);
   return mirrored(wo, ggx_sample_visible(layers.alpha, wo, place));
 }
 

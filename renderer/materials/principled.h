@@ -35,10 +35,21 @@ struct PrincipledScattering {
 /// @throw std::invalid_argument naming the setting that is out of range.
 PrincipledScattering prepare(const Principled& settings);
 
+/// What all directions of light share at a point: it depends on the viewer and on the reflectance.
+struct PrincipledView {
+  /// Sampling probability of each lobe, in proportion to what it scatters in the mean of the bands.
+  double coat = 0, base = 0, dielectric_fill = 0, metal_fill = 0;
+  double coat_reflects = 0, missing_dielectric = 0, missing_metal = 0;  ///< The tables at the viewer's cosine.
+};
+
+/// @param cosine_o  Of wo; > 0.
+PrincipledView viewed(const PrincipledScattering& layers, const BandsIn& reflectance, double cosine_o);
+
 /// As for conductors: wi and wo with z > 0, u in [0, 1)². `sample` may give a direction below the surface.
-double evaluate(const PrincipledScattering& layers, const BandsIn& reflectance, const Eigen::Vector3d& wi,
-                const Eigen::Vector3d& wo, BandsOut f);
-Eigen::Vector3d sample(const PrincipledScattering& layers, const BandsIn& reflectance, const Eigen::Vector3d& wo,
+/// @param view  That of `reflectance` and wo.
+double evaluate(const PrincipledScattering& layers, const PrincipledView& view, const BandsIn& reflectance,
+                const Eigen::Vector3d& wi, const Eigen::Vector3d& wo, BandsOut f);
+Eigen::Vector3d sample(const PrincipledScattering& layers, const PrincipledView& view, const Eigen::Vector3d& wo,
                        const Eigen::Vector2d& u);
 
 }  // namespace tensorray

@@ -12,9 +12,9 @@ constexpr int stride = cells + 1;
 
 ReflectanceTable::ReflectanceTable(const ReflectanceModel& model, const std::vector<Band>& bands,
                                    const Eigen::Matrix3d& xyz_to_rgb)
-    : nodes_(bands.size(), stride * stride * stride), colors_(3, bands.size()), luminance_(bands.size()) {
+    : nodes_(bands.size(), stride * stride * stride), colors_(4, bands.size()), luminance_(bands.size()) {
   for (Eigen::Index band = 0; band < luminance_.size(); ++band) {
-    colors_.col(band) = xyz_to_rgb * bands[band].xyz;
+    colors_.col(band) << xyz_to_rgb * bands[band].xyz, 0;
     luminance_[band] = bands[band].xyz.y();
   }
   for (int node = 0; node < nodes_.cols(); ++node) {

@@ -26,7 +26,9 @@ class ReflectanceTable {
   void reflectance(const Eigen::Vector3f& color, BandsOut reflectance, Eigen::Index first_band = 0) const;
 
   /// The colour, in the working space, of the values of all bands.
-  Eigen::Vector3f color(const BandsIn& values) const { return colors_.lazyProduct(values.matrix()).cast<float>(); }
+  Eigen::Vector3f color(const BandsIn& values) const {
+    return Eigen::Vector4d(colors_.lazyProduct(values.matrix())).head<3>().cast<float>();
+  }
 
   /// The luminance (Y) of the values of all bands.
   double luminance(const BandsIn& values) const { return luminance_.dot(values.matrix()); }
@@ -34,8 +36,8 @@ class ReflectanceTable {
   Eigen::Index bands() const { return luminance_.size(); }
 
  private:
-  Eigen::ArrayXXf nodes_;  ///< Bands × nodes; red varies fastest.
-  Eigen::Matrix3Xd colors_;
+  Eigen::ArrayXXf nodes_;    ///< Bands × nodes; red varies fastest.
+  Eigen::Matrix4Xd colors_;  ///< The last row is 0: vectors of two or four are full.
   Eigen::VectorXd luminance_;
 };
 

@@ -17,11 +17,6 @@ constexpr std::uint64_t mix(std::uint64_t x) {
   return x ^ (x >> 31);
 }
 
-/// Mixes after each key, so that different keys with equal sums give different results.
-constexpr std::uint64_t hash(std::uint64_t seed, std::uint64_t index, std::uint32_t dimension) {
-  return mix(mix(mix(seed) + index) + dimension);
-}
-
 constexpr std::uint32_t reverse_bits(std::uint32_t x) {
   x = __builtin_bswap32(x);
   x = ((x & 0x0f0f0f0fu) << 4) | ((x & 0xf0f0f0f0u) >> 4);
@@ -48,7 +43,7 @@ class SequenceKeys {
 
   constexpr std::uint32_t shuffle() const { return of_dimension(sobol_dimensions); }
   constexpr std::uint32_t of_dimension(std::uint32_t dimension) const {
-    return static_cast<std::uint32_t>(mix(mixed_ + dimension) >> 32);  // That of hash(seed, 0, dimension).
+    return static_cast<std::uint32_t>(mix(mixed_ + dimension) >> 32);  // As random_uniform(seed, 0, dimension).
   }
 
  private:
@@ -85,14 +80,45 @@ constexpr std::uint32_t sobol_2(std::uint32_t reversed) {
   return x;
 }
 
+/// Dimension 3 has the primitive polynomial x³ + x + 1, first numbers 1, 3 and 1. From the index itself, as `sobol_2`
+/// is from its reverse: of small indices, few bits are left to go through.
+constexpr std::uint32_t sobol_3(std::uint32_t index) {
+  std::uint32_t x = 0, number = 1u << 31, next = 3u << 30, second = 1u << 29;
+  for (; index != 0; index >>= 1) {
+    x ^= number & (0u - (index & 1));
+    const std::uint32_t after = second;
+    second = next ^ number ^ (number >> 3);
+    number = next;
+    next = after;
+  }
+  return x;
+}
+
 double scrambled(std::uint32_t x, std::uint32_t key) {
   return reverse_bits(scramble_reversed(reverse_bits(x), key)) * 0x1p-32;
 }
 
+constexpr std::uint32_t low_half(std::uint64_t key) { return static_cast<std::uint32_t>(key); }
+constexpr std::uint32_t high_half(std::uint64_t key) { return static_cast<std::uint32_t>(key >> 32); }
+
+/// Scrambles a pair of coordinates twice.
+SobolTwins twins(std::uint32_t x, std::uint32_t y, std::uint64_t key) {
+  const std::uint64_t first = mix(key + 1), second = mix(key + 2);
+  return {{scrambled(x, low_half(first)), scrambled(y, high_half(first))},
+          {scrambled(x, low_half(second)), scrambled(y, high_half(second))}};
+}
+
 }  // namespace
 
+/// Mixes after each key, so that different keys with equal sums give different results.
+std::uint64_t random_key(std::uint64_t seed, std::uint64_t index) { return mix(mix(seed) + index); }
+
+double random_uniform(std::uint64_t key, std::uint32_t dimension) {
+  return static_cast<double>(mix(key + dimension) >> 11) * 0x1p-53;
+}
+
 double random_uniform(std::uint64_t seed, std::uint64_t index, std::uint32_t dimension) {
-  return static_cast<double>(hash(seed, index, dimension) >> 11) * 0x1p-53;
+  return random_uniform(random_key(seed, index), dimension);
 }
 
 double sobol(std::uint64_t seed, std::uint32_t index, std::uint32_t dimension) {
@@ -108,6 +134,21 @@ std::array<double, 2> sobol_pair(std::uint64_t seed, std::uint32_t index) {
   const SequenceKeys keys(seed);
   const std::uint32_t reversed = scramble_reversed(reverse_bits(index), keys.shuffle());
   return {scrambled(sobol_0(reversed), keys.of_dimension(0)), scrambled(sobol_1(reversed), keys.of_dimension(1))};
+}
+
+std::array<double, 2> joint_sobol_start(std::uint64_t key, std::uint32_t index) {
+  const std::uint64_t scramble = mix(key);
+  const std::uint32_t reversed = reverse_bits(index);
+  return {scrambled(sobol_0(reversed), low_half(scramble)), scrambled(sobol_1(reversed), high_half(scramble))};
+}
+
+SobolTwins joint_sobol_twins(std::uint64_t key, std::uint32_t index) {
+  return twins(sobol_2(reverse_bits(index)), sobol_3(index), key);
+}
+
+SobolTwins sobol_twins(std::uint64_t key, std::uint32_t index) {
+  const std::uint32_t reversed = scramble_reversed(reverse_bits(index), low_half(mix(key)));
+  return twins(sobol_0(reversed), sobol_1(reversed), key);
 }
 
 }  // namespace tensorray

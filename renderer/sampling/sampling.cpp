@@ -1,6 +1,7 @@
 #include "renderer/sampling/sampling.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 
 #include "base/constants.h"
@@ -11,8 +12,15 @@ namespace {
 
 /// The seed of the sequence of the current dimension: the 53 random bits of the hash.
 std::uint64_t sequence_seed(const PathSampler& path) {
-  return static_cast<std::uint64_t>(random_uniform(path.seed, path.pixel, path.dimension) * 0x1p53);
+  return static_cast<std::uint64_t>(random_uniform(path.key, path.dimension) * 0x1p53);
 }
+
+/// Keys of a path's other sequences, unlike those of its dimensions, which are below 2^32. A sequence may use four.
+std::uint64_t sequence_key(const PathSampler& path, int number) {
+  return path.key + (std::uint64_t{1} << 32) + 4 * static_cast<std::uint64_t>(number);
+}
+
+Eigen::Vector2d vector(const std::array<double, 2>& pair) { return {pair[0], pair[1]}; }
 
 /// The direction about +z with 1 − cos θ = `height`. Uses 1 − cos θ, because cos θ is not accurate enough for small
 /// angles.
@@ -24,6 +32,9 @@ Eigen::Vector3d direction_at(double height, double turn) {
 
 }  // namespace
 
+PathSampler::PathSampler(std::uint64_t seed, std::uint64_t pixel_, std::uint32_t sample_, std::uint32_t dimension_)
+    : pixel(pixel_), sample(sample_), dimension(dimension_), key(random_key(seed, pixel_)) {}
+
 double PathSampler::next_1d() {
   const std::uint64_t sequence = sequence_seed(*this);
   ++dimension;
@@ -33,8 +44,15 @@ double PathSampler::next_1d() {
 Eigen::Vector2d PathSampler::next_2d() {
   const std::uint64_t sequence = sequence_seed(*this);
   ++dimension;
-  const auto [x, y] = sobol_pair(sequence, sample);
-  return {x, y};
+  return vector(sobol_pair(sequence, sample));
+}
+
+Eigen::Vector2d PathSampler::in_pixel() const { return vector(joint_sobol_start(sequence_key(*this, 0), sample)); }
+
+SurfaceNumbers PathSampler::at_surface(int depth) const {
+  const std::uint64_t sequence = sequence_key(*this, depth);
+  const SobolTwins twins = depth == 1 ? joint_sobol_twins(sequence, sample) : sobol_twins(sequence, sample);
+  return {vector(twins.first), vector(twins.second)};
 }
 
 Eigen::Matrix3d frame_about(const Eigen::Vector3d& axis) {

@@ -10,20 +10,34 @@
 
 namespace tensorray {
 
-/// The random numbers of one light path: each call takes the next dimension. Each dimension is a separate Sobol
-/// sequence, shuffled and Owen-scrambled by a hash of (seed, pixel, dimension); `sample` is the index into it (padding:
-/// Burley 2020, "Practical Hash-based Owen Scrambling"). So the samples of a pixel are stratified in each dimension,
-/// and the two numbers of `next_2d` are stratified jointly: of the first 2^k samples, one is in each elementary
-/// interval. Different dimensions and different pixels are uncorrelated.
+/// The random numbers that a surface needs.
+struct SurfaceNumbers {
+  Eigen::Vector2d direction, light;  ///< In [0, 1)²: to choose where light comes from, and to choose a light.
+};
+
+/// The random numbers of one light path, as functions of (seed, pixel, sample). Each call of `next_…` takes the next
+/// dimension. Each dimension is a separate Sobol sequence, shuffled and Owen-scrambled by a hash of (seed, pixel,
+/// dimension); `sample` is the index into it (padding: Burley 2020, "Practical Hash-based Owen Scrambling"). So the
+/// samples of a pixel are stratified in each dimension, and the two numbers of `next_2d` are stratified jointly: of the
+/// first 2^k samples, one is in each elementary interval. Different dimensions and different pixels are uncorrelated.
 /// Where light paths of a pixel branch, set `dimension` so that the same choice always has the same dimension.
+///
+/// `in_pixel` and `at_surface` have dimensions of their own. The place in the pixel and the numbers of the first
+/// surface decide most of what a sample sees: they are one sequence, stratified jointly in four dimensions.
 struct PathSampler {
-  std::uint64_t seed = 0;
-  std::uint64_t pixel = 0;   ///< y * width + x.
-  std::uint32_t sample = 0;  ///< Index of the sample within the pixel, from 0; further passes continue the count.
-  std::uint32_t dimension = 0;
+  PathSampler(std::uint64_t seed = 0, std::uint64_t pixel = 0, std::uint32_t sample = 0, std::uint32_t dimension = 0);
+
+  std::uint64_t pixel;   ///< y * width + x.
+  std::uint32_t sample;  ///< Index of the sample within the pixel, from 0; further passes continue the count.
+  std::uint32_t dimension;
+  std::uint64_t key;  ///< Of seed and pixel.
 
   double next_1d();           ///< In [0, 1).
   Eigen::Vector2d next_2d();  ///< In [0, 1)²; uses up one dimension, as next_1d does.
+
+  Eigen::Vector2d in_pixel() const;  ///< In [0, 1)².
+  /// @param depth  Number of the surface along the path, from 1.
+  SurfaceNumbers at_surface(int depth) const;
 };
 
 /// Chooses with the probability `share`, and keeps `u` (uniform in [0, 1)) uniform for the next choice: one number can

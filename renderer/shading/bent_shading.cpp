@@ -65,7 +65,10 @@ void RayShader::continue_path(const WaitingRay& waiting) {
   if (waiting.depth == 0) see_bent(waiting);
   for (std::size_t i = waiting.first; i < waiting.last; ++i)
     if (followed_.ways[i].arrives) continue_band(waiting, i);
-  if (auto& seen = views_[ray_].surface; seen && waiting.depth == 0) set_albedo(*seen);
+  if (auto& seen = views_[ray_].surface; seen && waiting.depth == 0) {
+    set_reflectance(seen->hit, 0, albedo_);
+    set_albedo(*seen, albedo_);
+  }
 }
 
 /// Sets what the region does to a ray of the camera.

@@ -152,14 +152,17 @@ Camera frame_points(const std::vector<Vector3d>& points, const Framing& framing)
 CameraRay camera_ray(const Camera& camera, const Vector2d& pixel, const Vector2d& lens) {
   const double pixel_height = camera.height / camera.resolution.y();
   const Vector2d window = pixel - camera.resolution.cast<double>() / 2;
-  Eigen::Matrix<double, 3, 2> across;  // Size of a pixel in the window, as world vectors.
-  across << pixel_height * camera.right, -pixel_height * camera.up;
+  const Vector3d place = (pixel_height * window.x()) * camera.right - (pixel_height * window.y()) * camera.up;
 
   CameraRay ray;
-  ray.origin = camera.position + camera.lens_radius * (lens.x() * camera.right + lens.y() * camera.up);
+  ray.origin = camera.position;
   Vector3d towards = camera.forward;  // From the lens to the point in focus, divided by the focus distance.
-  (camera.projection == Projection::perspective ? towards : ray.origin) += across * window;
-  towards -= camera.lens_radius / camera.focus_distance * (lens.x() * camera.right + lens.y() * camera.up);
+  (camera.projection == Projection::perspective ? towards : ray.origin) += place;
+  if (camera.lens_radius > 0) {
+    const Vector3d on_lens = camera.lens_radius * (lens.x() * camera.right + lens.y() * camera.up);
+    ray.origin += on_lens;
+    towards -= on_lens / camera.focus_distance;
+  }
   ray.direction = towards / towards.norm();
   return ray;
 }

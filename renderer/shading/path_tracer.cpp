@@ -24,10 +24,12 @@ using Eigen::Vector2d;
 using Eigen::Vector2f;
 using Eigen::Vector3f;
 
-constexpr int tile_size = 16;               ///< Pixels.
-constexpr int neighborhood = 2;             ///< Pixels in each direction that help decide whether a pixel is done.
-constexpr std::size_t batch_samples = 256;  ///< That are shaded together: their bent rays fill packets.
-constexpr double least_luminance = 0.05;    ///< To which errors are compared; fraction of the picture's mean.
+constexpr int tile_size = 16;    ///< Pixels.
+constexpr int neighborhood = 2;  ///< Pixels in each direction that help decide whether a pixel is done.
+/// Samples that are shaded together. Where light bends, their rays fill packets; otherwise, all that is known of them
+/// should stay in the cache of the first level.
+constexpr std::size_t bent_batch = 256, straight_batch = 32;
+constexpr double least_luminance = 0.05;  ///< To which errors are compared; fraction of the picture's mean.
 
 void require_valid(const Camera& camera, const PathTracerSettings& settings) {
   require(camera.resolution.minCoeff() >= 1, "the camera's resolution must be >= 1");
@@ -66,7 +68,8 @@ class Rendering {
         height_(camera.resolution.y()),
         columns_((width_ + tile_size - 1) / tile_size),
         tiles_(static_cast<std::size_t>(columns_) * ((height_ + tile_size - 1) / tile_size)),
-        light_values_(scene.colors.bands() + 3 * static_cast<std::size_t>(scene.layers())) {}
+        light_values_(scene.colors.bands() + 3 * static_cast<std::size_t>(scene.layers())),
+        batch_samples_(scene.region ? bent_batch : straight_batch) {}
 
   SurfacePicture run();
 
@@ -108,7 +111,8 @@ class Rendering {
   const int width_, height_, columns_;  ///< Columns of tiles.
   const std::size_t tiles_;
   const std::size_t light_values_;  ///< For each pixel.
-  double floor_ = 0;                ///< Least luminance to which errors are compared.
+  const std::size_t batch_samples_;
+  double floor_ = 0;  ///< Least luminance to which errors are compared.
   Clock::time_point start_ = Clock::now();
   std::uint64_t total_samples_ = 0;
   std::atomic<std::uint64_t> finished_samples_{0};
@@ -219,7 +223,7 @@ void Rendering::extend(std::size_t number, Batch& batch) {
       if (tile.pixel(x, y).done != 0) continue;
       for (int sample = before; sample < after; ++sample) {
         add_ray(tile.left + x, tile.top + y, sample, batch);
-        if (batch.rays.size() == batch_samples) shade(tile, before, after, batch);
+        if (batch.rays.size() == batch_samples_) shade(tile, before, after, batch);
       }
     }
   shade(tile, before, after, batch);
@@ -230,8 +234,8 @@ void Rendering::extend(std::size_t number, Batch& batch) {
 
 /// Adds the ray of a sample of pixel x, y of the picture.
 void Rendering::add_ray(int x, int y, int sample, Batch& batch) const {
-  PathSampler sampler{settings_.seed, static_cast<std::size_t>(y) * width_ + x, static_cast<std::uint32_t>(sample), 0};
-  const Vector2d offset = settings_.filter.sample(sampler.next_2d());
+  PathSampler sampler(settings_.seed, static_cast<std::size_t>(y) * width_ + x, static_cast<std::uint32_t>(sample));
+  const Vector2d offset = settings_.filter.sample(sampler.in_pixel());
   const Vector2d lens = camera_.lens_radius > 0 ? square_to_disk(sampler.next_2d()) : Vector2d(0, 0);
   const CameraRay ray = camera_ray(camera_, Vector2d(x + 0.5, y + 0.5) + offset, lens);
   batch.rays.push_back({ray.origin, ray.direction, sampler});

@@ -22,6 +22,10 @@ constexpr std::uint32_t dimensions_per_vertex = 4;
 /// below a surface that is seen from above.
 constexpr double least_cosine = 0.01;
 
+/// The part of its light's luminance that a path must carry to go on in any case. Measured on tubes in a studio's light
+/// (docs/performance.md, "Beside Cycles"): with 1/2 and 1/4 there is more noise for the time; with 1/16 it is the same.
+constexpr double least_carried = 0.1;
+
 bool is_glass(const Material& material) { return std::holds_alternative<DielectricScattering>(material.scattering); }
 
 Eigen::Map<const Eigen::ArrayXf> as_array(const std::vector<float>& values) {
@@ -82,11 +86,14 @@ void RayShader::shade(const std::vector<ViewRay>& rays, bool show_background) {
   light_.setZero(static_cast<Eigen::Index>(scene_.colors.bands()), column(rays.size()));
   views_.assign(rays.size(), {});
   samplers_.clear();
+  straight_.clear();
   waiting_.clear();
-  for (ray_ = 0; ray_ < rays.size(); ++ray_) {
-    samplers_.push_back(rays[ray_].sampler);
-    shade_view(rays[ray_].origin, rays[ray_].direction);
+  for (const ViewRay& ray : rays) {
+    samplers_.push_back(ray.sampler);
+    straight_.push_back({ray.origin, ray.direction});
   }
+  scene_.surfaces.intersect(straight_, hits_);
+  for (ray_ = 0; ray_ < rays.size(); ++ray_) shade_view(straight_[ray_], hits_[ray_]);
   while (!waiting_.rays.empty()) {
     std::swap(waiting_, followed_);
     waiting_.clear();
@@ -110,12 +117,12 @@ void RayShader::carry(int band) {
   for (PhotonSum& sum : photon_sums_) sum.scattered.resize(bands);
 }
 
-void RayShader::shade_view(const Vector3d& origin, const Vector3d& direction) {
+void RayShader::shade_view(const StraightRay& ray, const std::optional<SurfaceHit>& hit) {
+  const auto& [origin, direction] = ray;
   carry(-1);
   throughput_.setOnes();
   stands_ = 1;
   sampler().dimension = first_dimension;
-  const std::optional<SurfaceHit> hit = scene_.surfaces.intersect(origin, direction);
   if (bends(origin, direction, hit ? hit->distance : std::numeric_limits<double>::infinity()))
     return wait(origin, direction, throughput_, 0, 1, false, {});
   if (!hit) {
@@ -125,7 +132,7 @@ void RayShader::shade_view(const Vector3d& origin, const Vector3d& direction) {
   if (settings_.shading == Shading::path) add_emission(*hit, direction, 1, 0);
   const Vertex vertex = make_vertex(*hit, direction);
   views_[ray_].surface = FirstSurface{*hit, vertex.normal, direction};
-  set_albedo(*views_[ray_].surface);
+  set_albedo(*views_[ray_].surface, reflectance_);
   shade_surface(vertex, 1);
 }
 
@@ -141,9 +148,9 @@ void RayShader::shade_surface(const Vertex& vertex, int depth) {
   }
 }
 
-/// Whatever bands the path has.
-void RayShader::set_albedo(FirstSurface& surface) {
-  set_reflectance(surface.hit, 0, albedo_);
+/// @param reflectance  Of all bands.
+void RayShader::set_albedo(FirstSurface& surface, const BandValues& reflectance) {
+  albedo_ = reflectance;
   const Material& material = scene_.materials[scene_.surfaces.surfaces()[surface.hit.surface].material];
   if (const auto* metal = std::get_if<ConductorScattering>(&material.scattering)) albedo_ *= metal->mean_fresnel;
   surface.albedo = scene_.colors.color(albedo_);
@@ -161,6 +168,7 @@ RayShader::Vertex RayShader::make_vertex(const SurfaceHit& hit, const Vector3d& 
   vertex.frame = frame_about(vertex.side * vertex.normal);
   vertex.wo = vertex.frame.transpose() * -direction;
   set_reflectance(hit, first_band(), reflectance_);
+  vertex.view = viewed(*vertex.material, reflectance_, vertex.wo);
   return vertex;
 }
 
@@ -182,15 +190,15 @@ void RayShader::shade_path(Vertex vertex, int depth) {
     sampler.dimension = first_dimension + dimensions_per_vertex * static_cast<std::uint32_t>(depth - 1);
     if (!scene_.landed.empty()) add_landed_light(vertex, depth);
     if (scene_.has_photons()) add_photons(vertex, depth);
-    add_direct_light(vertex, depth);
+    const SurfaceNumbers numbers = sampler.at_surface(depth);
+    add_direct_light(vertex, numbers.light, depth);
     const double side = is_glass(*vertex.material) ? sampler.next_1d() : 0;
-    const Eigen::Vector2d place = sampler.next_2d();
-    const Vector3d u(place.x(), place.y(), side);
-    const auto scattered = sample(*vertex.material, reflectance_, vertex.wo, u, weight_, first_band());
+    const Vector3d u(numbers.direction.x(), numbers.direction.y(), side);
+    const auto scattered = sample(*vertex.material, vertex.view, reflectance_, vertex.wo, u, weight_, first_band());
     if (!scattered) return;
     throughput_ *= weight_;
     refraction *= scattered->refraction;
-    const double survival = depth < settings_.roulette_depth ? 1 : std::min(0.95, throughput_.maxCoeff() / refraction);
+    const double survival = depth < settings_.roulette_depth ? 1 : survives(refraction);
     if (survival < 1) {
       if (!(sampler.next_1d() < survival)) return;
       throughput_ /= survival;
@@ -218,6 +226,13 @@ void RayShader::shade_path(Vertex vertex, int depth) {
   }
 }
 
+/// The probability with which the path goes on. Light that would hardly be seen is followed rarely: the brightness of
+/// what the path still carries decides.
+double RayShader::survives(double refraction) const {
+  const double carried = band_ < 0 ? scene_.colors.luminance(throughput_) : throughput_[0] / stands_;
+  return std::min(1.0, carried / (least_carried * refraction));
+}
+
 /// Weight of light that a sampled direction has found.
 template <class Density>
 double RayShader::material_weight(double material_pdf, const Density& light_pdf) const {
@@ -227,11 +242,13 @@ double RayShader::material_weight(double material_pdf, const Density& light_pdf)
   return 1 / (1 + ratio * ratio);
 }
 
-void RayShader::add_direct_light(const Vertex& vertex, int depth) {
-  if (!scene_.lights.sample(vertex.point, sampler().next_2d(), light_sample_, bands())) return;
+/// @param u  In [0, 1)².
+void RayShader::add_direct_light(const Vertex& vertex, const Eigen::Vector2d& u, int depth) {
+  if (!scene_.lights.sample(vertex.point, u, light_sample_, bands())) return;
   if (settings_.direct == DirectLight::material && !light_sample_.is_delta) return;
   const Vector3d wi = vertex.frame.transpose() * light_sample_.direction;
-  const double material_pdf = evaluate(*vertex.material, reflectance_, wi, vertex.wo, contribution_, first_band());
+  const double material_pdf =
+      evaluate(*vertex.material, vertex.view, reflectance_, wi, vertex.wo, contribution_, first_band());
   if (!(contribution_.maxCoeff() > 0)) return;
   const Vector3d start = vertex.start(scene_.surfaces, wi);
   if (bends(start, light_sample_.direction, light_sample_.distance)) return seek_bent_light(vertex, wi, start, depth);
@@ -305,7 +322,8 @@ void RayShader::add_to_groups(const LightSource& source) {
 }
 
 void RayShader::shade_occlusion(const Vertex& vertex) {
-  const Vector3d direction = frame_about(vertex.normal) * square_to_cosine_hemisphere(sampler().next_2d());
+  const Vector3d direction =
+      frame_about(vertex.normal) * square_to_cosine_hemisphere(sampler().at_surface(1).direction);
   const Vector3d start = scene_.surfaces.start(vertex.hit, vertex.hit.lifted_position, vertex.side);
   if (!scene_.surfaces.occluded(start, direction, settings_.occlusion_distance))
     light_.col(column(ray_)) += throughput_ * reflectance_;

@@ -37,8 +37,10 @@ enum class DirectLight {
 struct ShadingSettings {
   Shading shading = Shading::path;
   DirectLight direct = DirectLight::both;
-  int max_depth = 8;       ///< Most surfaces at which a path scatters; >= 0. 1: direct light only.
-  int roulette_depth = 4;  ///< After this many surfaces, a path may end at random (Russian roulette); >= 1.
+  int max_depth = 8;  ///< Most surfaces at which a path scatters; >= 0. 1: direct light only.
+  /// After this many surfaces, a path that carries less than a tenth of its luminance may end at random (Russian
+  /// roulette); >= 1. 1 would make dark surfaces noisy in light that only their material finds, such as a sky's.
+  int roulette_depth = 2;
   /// Greatest luminance that light scattered twice or more adds, for each sample and surface; 1 is the luminance of the
   /// light that the bands are made from. 0: no limit. The limit removes rare bright paths (fireflies). With the
   /// default, one such path adds at most 10 / samples to a pixel: at 64 samples 0.16, which is 20 times the
@@ -142,6 +144,7 @@ class RayShader {
     Eigen::Vector3d direction;  ///< Of the ray that found it.
     Eigen::Matrix3d frame;
     Eigen::Vector3d wo;
+    ViewedMaterial view;
 
     /// Start of a ray towards `wi`.
     Eigen::Vector3d start(const SurfaceScene& surfaces, const Eigen::Vector3d& wi) const {
@@ -184,14 +187,14 @@ class RayShader {
 
   Eigen::Index column(std::size_t ray) const { return static_cast<Eigen::Index>(ray) * (1 + scene_.layers()); }
 
-  void shade_view(const Eigen::Vector3d& origin, const Eigen::Vector3d& direction);
+  void shade_view(const StraightRay& ray, const std::optional<SurfaceHit>& hit);
   void shade_surface(const Vertex& vertex, int depth);
   void shade_path(Vertex vertex, int depth);
   void shade_occlusion(const Vertex& vertex);
   void carry(int band);
   Eigen::Index first_band() const { return std::max(band_, 0); }
   BandRange bands() const { return {first_band(), throughput_.size()}; }
-  void set_albedo(FirstSurface& surface);
+  void set_albedo(FirstSurface& surface, const BandValues& reflectance);
   Vertex make_vertex(const SurfaceHit& hit, const Eigen::Vector3d& direction);
   void set_reflectance(const SurfaceHit& hit, Eigen::Index first_band, BandValues& reflectance) const;
   PathSampler& sampler() { return samplers_[ray_]; }
@@ -205,7 +208,7 @@ class RayShader {
   void see_bent(const WaitingRay& waiting);
   void bring_light(const WaitingRay& waiting);
 
-  void add_direct_light(const Vertex& vertex, int depth);
+  void add_direct_light(const Vertex& vertex, const Eigen::Vector2d& u, int depth);
   void seek_bent_light(const Vertex& vertex, const Eigen::Vector3d& wi, const Eigen::Vector3d& start, int depth);
   bool is_shadowed(const Eigen::Vector3d& start, const Eigen::Vector3d& point) const;
   void add_landed_light(const Vertex& vertex, int depth);
@@ -218,6 +221,7 @@ class RayShader {
   void add_landed(int depth, int light);
   void add_background(const Eigen::Vector3d& direction, double weight, int depth, bool disks = true);
   void add_emission(const SurfaceHit& hit, const Eigen::Vector3d& direction, double weight, int depth);
+  double survives(double refraction) const;
   template <class Density>
   double material_weight(double material_pdf, const Density& light_pdf) const;
 
@@ -234,6 +238,8 @@ class RayShader {
   const ShadedScene& scene_;
   const ShadingSettings settings_;
   std::vector<PathSampler> samplers_;
+  std::vector<StraightRay> straight_;  ///< The camera's rays, and what they meet if they are not bent.
+  std::vector<std::optional<SurfaceHit>> hits_;
   std::vector<RayView> views_;
   Eigen::ArrayXXd light_;  ///< A column of bands for each ray's radiance and for each of its layers.
   bool show_background_ = true;

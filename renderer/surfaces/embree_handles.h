@@ -14,6 +14,7 @@
 #include <stdexcept>
 #include <string>
 #include <type_traits>
+#include <vector>
 
 namespace tensorray::embree {
 
@@ -26,6 +27,14 @@ inline bool is_valid(const RTCRay& ray) {
          fits(ray.dir_z) && !std::isnan(ray.tfar);
 }
 
+/// A ray that meets nothing.
+inline RTCRay nowhere() {
+  RTCRay ray{};
+  ray.dir_x = 1;
+  ray.tfar = -1;
+  return ray;
+}
+
 /// Does not change a ray that is not valid: it meets nothing.
 inline void intersect(RTCScene scene, RTCRayHit& ray) {
   if (!is_valid(ray.ray)) return;
@@ -35,6 +44,20 @@ inline void intersect(RTCScene scene, RTCRayHit& ray) {
   RTCIntersectContext context;
   rtcInitIntersectContext(&context);
   rtcIntersect1(scene, &context, &ray);
+#endif
+}
+
+/// The same for rays that go nearly alike, in one call where Embree has one.
+inline void intersect(RTCScene scene, std::vector<RTCRayHit>& rays) {
+#if RTC_VERSION_MAJOR >= 4
+  for (RTCRayHit& ray : rays) intersect(scene, ray);
+#else
+  for (RTCRayHit& ray : rays)
+    if (!is_valid(ray.ray)) ray.ray = nowhere();
+  RTCIntersectContext context;
+  rtcInitIntersectContext(&context);
+  context.flags = RTC_INTERSECT_CONTEXT_FLAG_COHERENT;
+  rtcIntersect1M(scene, &context, rays.data(), static_cast<unsigned>(rays.size()), sizeof(RTCRayHit));
 #endif
 }
 
@@ -66,8 +89,9 @@ inline void check(RTCDevice device) {
 }
 
 /// A device costs a tenth of a millisecond, so every scene has its own and scenes share no state.
-inline Owned<RTCDevice> make_device() {
-  Owned<RTCDevice> device(rtcNewDevice(nullptr));
+/// @param settings  Embree's, as text; null: none.
+inline Owned<RTCDevice> make_device(const char* settings = nullptr) {
+  Owned<RTCDevice> device(rtcNewDevice(settings));
   if (!device) throw std::runtime_error("Embree cannot start on this processor");
   return device;
 }

@@ -22,6 +22,8 @@ using embree::Owned;
 constexpr double offset_fraction = 1e-6;
 /// Fraction of the distance to a target that is left out at its end.
 constexpr double end_fraction = 5e-5;
+/// Embree's setting that lets it use AVX-512: a picture of tubes then takes 3 % less time (Zen 4).
+constexpr const char* widest_vectors = "frequency_level=simd512";
 /// With fewer triangles, a slower build is worth its time, as it splits long thin triangles. With more, memory limits
 /// the picture, so the search tree keeps no copies of the triangles.
 constexpr std::size_t large_scene = 2'000'000;
@@ -175,13 +177,15 @@ struct SurfaceScene::State {
 
   RTCRay ray(const Vector3d& start, const Vector3d& direction, double distance) const;
   double approach(const Vector3d& from, const Vector3d& direction) const;
+  RTCRayHit search(const StraightRay& ray) const;
+  std::optional<SurfaceHit> found(const StraightRay& ray, const RTCRayHit& result) const;
   Corners corners(const SurfaceHit& hit) const;
   void complete(const TriangleMesh& mesh, const Vector3d& direction, SurfaceHit& hit) const;
   void complete(const RoundCurves& curves, SurfaceHit& hit) const;
 };
 
 void SurfaceScene::State::build() {
-  device = embree::make_device();
+  device = embree::make_device(widest_vectors);
   scene.reset(rtcNewScene(device.get()));
   check(device.get());
   std::size_t triangles = 0;
@@ -332,35 +336,54 @@ SurfaceScene& SurfaceScene::operator=(SurfaceScene&&) noexcept = default;
 const std::vector<ShadedSurface>& SurfaceScene::surfaces() const { return state_->surfaces; }
 const Eigen::AlignedBox3d& SurfaceScene::bounds() const { return state_->bounds; }
 
-std::optional<SurfaceHit> SurfaceScene::intersect(const Vector3d& origin, const Vector3d& direction) const {
-  const State& state = *state_;
-  const double approach = state.approach(origin, direction);
-  const Vector3d start = origin + approach * direction;
+RTCRayHit SurfaceScene::State::search(const StraightRay& ray) const {
   RTCRayHit result{};
-  result.ray = state.ray(start, direction, std::numeric_limits<double>::infinity());
+  const Vector3d start = ray.origin + approach(ray.origin, ray.direction) * ray.direction;
+  result.ray = this->ray(start, ray.direction, std::numeric_limits<double>::infinity());
   result.hit.geomID = RTC_INVALID_GEOMETRY_ID;
-  embree::intersect(state.scene.get(), result);
-  if (result.hit.geomID == RTC_INVALID_GEOMETRY_ID) return std::nullopt;
+  return result;
+}
 
-  SurfaceHit hit;
+/// What Embree's `result` of `search` is.
+std::optional<SurfaceHit> SurfaceScene::State::found(const StraightRay& ray, const RTCRayHit& result) const {
+  if (result.hit.geomID == RTC_INVALID_GEOMETRY_ID) return std::nullopt;
+  std::optional<SurfaceHit> found(std::in_place);
+  SurfaceHit& hit = *found;
   hit.surface = result.hit.geomID;
   hit.primitive = result.hit.primID;
   hit.u = result.hit.u;
-  const ShadedSurface& surface = state.surfaces[hit.surface];
+  const ShadedSurface& surface = surfaces[hit.surface];
   const auto* mesh = std::get_if<TriangleMesh>(&surface.shape);
   if (mesh) hit.v = result.hit.v;
   // Colours come first, so that they are loaded while the rest is computed.
-  if (!surface.texture && !surface.colors.empty()) hit.color = state.corners(hit).mean(surface.colors);
+  if (!surface.texture && !surface.colors.empty()) hit.color = corners(hit).mean(surface.colors);
   if (mesh) {
-    state.complete(*mesh, direction, hit);
+    complete(*mesh, ray.direction, hit);
   } else {
-    hit.position = start + (result.ray.tfar * state.unit) * direction;
+    const double distance = approach(ray.origin, ray.direction) + result.ray.tfar * unit;
+    hit.position = ray.origin + distance * ray.direction;
     hit.normal = Vector3d(result.hit.Ng_x, result.hit.Ng_y, result.hit.Ng_z).stableNormalized();
-    state.complete(std::get<RoundCurves>(surface.shape), hit);
+    complete(std::get<RoundCurves>(surface.shape), hit);
   }
-  hit.distance = (hit.position - origin).dot(direction);
+  hit.distance = (hit.position - ray.origin).dot(ray.direction);
   if (surface.texture) hit.color = color_at(*surface.texture, hit.position);
-  return hit;
+  return found;
+}
+
+std::optional<SurfaceHit> SurfaceScene::intersect(const Vector3d& origin, const Vector3d& direction) const {
+  const StraightRay ray{origin, direction};
+  RTCRayHit result = state_->search(ray);
+  embree::intersect(state_->scene.get(), result);
+  return state_->found(ray, result);
+}
+
+void SurfaceScene::intersect(const std::vector<StraightRay>& rays, std::vector<std::optional<SurfaceHit>>& hits) const {
+  std::vector<RTCRayHit> results;
+  results.reserve(rays.size());
+  for (const StraightRay& ray : rays) results.push_back(state_->search(ray));
+  embree::intersect(state_->scene.get(), results);
+  hits.clear();
+  for (std::size_t i = 0; i < rays.size(); ++i) hits.push_back(state_->found(rays[i], results[i]));
 }
 
 bool SurfaceScene::occluded(const Vector3d& origin, const Vector3d& direction, double distance) const {

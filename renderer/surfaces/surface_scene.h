@@ -30,6 +30,10 @@ struct SurfaceHit {
   float u = 0, v = 0;  ///< Barycentric weights of vertices 1 and 2. On a segment: position along it, and 0.
 };
 
+struct StraightRay {
+  Eigen::Vector3d origin = Eigen::Vector3d::Zero(), direction = Eigen::Vector3d::UnitZ();  ///< World; unit.
+};
+
 /// Values of a hit for the auxiliary planes. Those that the surface does not have are missing.
 struct SurfaceData {
   std::optional<float> force, arc_length;
@@ -54,6 +58,9 @@ class SurfaceScene {
   /// The nearest surface along the unit `direction`, from either side. Rays may start anywhere. There is no hit if the
   /// origin is so far away that double precision does not resolve the scene, or if a value is not finite.
   std::optional<SurfaceHit> intersect(const Eigen::Vector3d& origin, const Eigen::Vector3d& direction) const;
+
+  /// The same for each of `rays`. It is faster where these go nearly alike, as those of a pixel.
+  void intersect(const std::vector<StraightRay>& rays, std::vector<std::optional<SurfaceHit>>& hits) const;
 
   /// Whether a surface is nearer than `distance` along the unit `direction`. The last 5e-5 of the distance does not
   /// count: rounding may place the target itself there.

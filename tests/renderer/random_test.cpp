@@ -1,5 +1,7 @@
 #include "renderer/sampling/random.h"
 
+#include <algorithm>
+#include <array>
 #include <cmath>
 #include <set>
 #include <stdexcept>
@@ -101,6 +103,57 @@ TEST(SobolTest, ThreeDimensionsAreStratifiedTogether) {
       }
       for (const int count : counts) ASSERT_EQ(count, 2) << i << " " << j << " " << l;
     }
+}
+
+/// The coordinates of a joint point, with one of its twins.
+std::array<double, 4> joint_point(std::uint64_t key, int index, bool second) {
+  const auto i = static_cast<std::uint32_t>(index);
+  const auto [x, y] = joint_sobol_start(key, i);
+  const SobolTwins twins = joint_sobol_twins(key + 1, i);
+  const auto [z, w] = second ? twins.second : twins.first;
+  return {x, y, z, w};
+}
+
+/// Whether each box of 2^-bits[0] × … has as many of the first 2^k joint points.
+bool is_even(int k, const std::array<int, 4>& bits, bool second) {
+  std::vector<int> counts(std::size_t{1} << (bits[0] + bits[1] + bits[2] + bits[3]));
+  for (int index = 0; index < (1 << k); ++index) {
+    const std::array<double, 4> point = joint_point(77, index, second);
+    std::size_t box = 0;
+    for (std::size_t axis = 0; axis < 4; ++axis)
+      box = (box << bits[axis]) + static_cast<std::size_t>(std::ldexp(point[axis], bits[axis]));
+    ++counts[box];
+  }
+  return std::all_of(counts.begin(), counts.end(), [&](int count) { return count == counts[0]; });
+}
+
+TEST(SobolTest, FourDimensionsAreStratifiedTogether) {
+  for (const bool second : {false, true})
+    for (int k = 2; k <= 10; ++k) {
+      const int bits = k - (k <= 7 ? 2 : 3);
+      for (int a = 0; a <= bits; ++a)
+        for (int b = 0; a + b <= bits; ++b)
+          for (int c = 0; a + b + c <= bits; ++c)
+            EXPECT_TRUE(is_even(k, {a, b, c, bits - a - b - c}, second)) << k << ": " << a << " " << b << " " << c;
+      for (int a = 0; a <= k; ++a) EXPECT_TRUE(is_even(k, {a, k - a, 0, 0}, second)) << k << ": " << a;
+    }
+}
+
+TEST(SobolTest, TwinsAreUncorrelated) {
+  // One function of each; over keys, the errors of their means must not go together.
+  double product = 0, first2 = 0, second2 = 0;
+  for (std::uint64_t key = 0; key < 4000; ++key) {
+    double first = -0.25, second = -0.25;
+    for (std::uint32_t i = 0; i < 16; ++i) {
+      const SobolTwins twins = key % 2 ? joint_sobol_twins(10 * key, i) : sobol_twins(10 * key, i);
+      first += twins.first[0] * twins.first[1] / 16;
+      second += twins.second[0] * twins.second[1] / 16;
+    }
+    product += first * second;
+    first2 += first * first;
+    second2 += second * second;
+  }
+  EXPECT_LT(std::abs(product) / std::sqrt(first2 * second2), 4 / std::sqrt(4000.0));
 }
 
 TEST(SobolTest, EachDimensionAloneIsStratified) {

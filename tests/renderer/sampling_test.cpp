@@ -77,6 +77,32 @@ TEST(PathSampler, SingleNumbersAreStratified) {
   for (const int count : counts) EXPECT_EQ(count, 1);
 }
 
+/// Some of the pairs that a sample has without dimensions.
+Vector2d pair_of(std::uint64_t pixel, int sample, int number) {
+  const PathSampler path(5, pixel, static_cast<std::uint32_t>(sample));
+  if (number == 0) return path.in_pixel();
+  const SurfaceNumbers numbers = path.at_surface((number + 1) / 2);
+  return number % 2 ? numbers.direction : numbers.light;
+}
+
+TEST(PathSampler, NumbersOfSurfacesAreEvenAndUnrelated) {
+  constexpr int pairs = 7;  // Those of three surfaces, too.
+  for (int number = 0; number < pairs; ++number) {
+    EXPECT_LT(square_score([&](int i) { return pair_of(1, i, number); }), 4) << number;
+    EXPECT_LT(std::abs(square_score([&](int i) { return pair_of(static_cast<std::uint64_t>(i), 0, number); })), 4);
+    for (int other = 0; other < number; ++other) {
+      const auto both = [&](std::uint64_t pixel, int sample) {
+        return Vector2d(pair_of(pixel, sample, number).x(), pair_of(pixel, sample, other).x());
+      };
+      const bool are_twins = number % 2 == 0 && other == number - 1;  // Of one point, so related within a pixel.
+      if (!are_twins) {
+        EXPECT_LT(square_score([&](int i) { return both(3, i); }), 5.5) << number << " " << other;
+      }
+      EXPECT_LT(std::abs(square_score([&](int i) { return both(static_cast<std::uint64_t>(i), 0); })), 4.5);
+    }
+  }
+}
+
 TEST(PathSampler, DimensionsAndPixelsAreUnrelated) {
   const auto number = [](std::uint64_t pixel, int sample, std::uint32_t dimension) {
     return PathSampler{5, pixel, static_cast<std::uint32_t>(sample), dimension}.next_1d();
