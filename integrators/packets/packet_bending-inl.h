@@ -95,9 +95,9 @@ HWY_INLINE void bend_strongly(Packet& packet, const Tensor& T, const F3& v, F fa
   }
   const F3 sum = two_terms(T, v, inner, factor);
   const F e = excess(sum);
-  const F exact = hn::Div(set(1), hn::Sqrt(hn::Add(e, set(1))));
   const Mask weak = hn::Le(size, set(series_reach[0])), fits = hn::Le(size, set(1));
-  const F scale = hn::IfThenElse(weak, inverse_root_near_one(e), exact);
+  F scale = inverse_root_near_one(e);
+  if (!hn::AllTrue(floats, weak)) scale = hn::IfThenElse(weak, scale, hn::Div(set(1), hn::Sqrt(hn::Add(e, set(1)))));
   if constexpr (changes) {
     F log_squared = log_near_one(e);
     if (!hn::AllTrue(floats, weak)) log_squared = hn::IfThenElse(weak, log_squared, hn::Log1p(floats, e));

@@ -9,6 +9,8 @@
 #define TENSORRAY_INTEGRATORS_PACKET_BRICKS_TOGGLE
 #endif
 
+#include <algorithm>
+
 #include <hwy/highway.h>
 
 #include "integrators/packets/packet_cells-inl.h"
@@ -16,23 +18,43 @@
 HWY_BEFORE_NAMESPACE();
 namespace tensorray::packets::HWY_NAMESPACE {
 
-/// Finds the bricks of some lanes. `wanted` has one bit for each lane.
-HWY_INLINE void find_bricks(const PacketMedium& medium, Packet& packet, std::uint32_t wanted) {
-  while (wanted != 0) {
-    const auto first = hwy::Num0BitsBelowLS1Bit_Nonzero32(wanted);
-    const std::int32_t at[3] = {packet.brick[0][first], packet.brick[1][first], packet.brick[2][first]};
-    const TensorBrick brick = medium.brick(at);
-    std::uint32_t found = 0;
-    for (int i = 0; i < packet.vectors * lanes; i += lanes) {
-      const auto same = [&](int axis) HWY_ATTR {
-        return hn::Eq(hn::Load(ints, packet.brick[axis] + i), hn::Set(ints, at[axis]));
-      };
-      found |= to_bits(hn::RebindMask(floats, hn::And(same(0), hn::And(same(1), same(2)))), i);
+/// The bits of a vector's lanes, given those of the packet.
+HWY_INLINE std::uint32_t bits_of_vector(std::uint32_t packet, int at) { return packet >> at & ((1u << lanes) - 1); }
+
+/// Looks up bricks. The lanes of a packet are often in the brick of the lane before.
+struct BrickLookup {
+  const PacketMedium& medium;
+  std::int32_t at[3] = {};
+  TensorBrick brick{};
+
+  HWY_INLINE const TensorBrick& of_lane(const Packet& packet, int lane) {
+    const std::int32_t to[3] = {packet.brick[0][lane], packet.brick[1][lane], packet.brick[2][lane]};
+    if (!brick.bending || ((to[0] ^ at[0]) | (to[1] ^ at[1]) | (to[2] ^ at[2])) != 0) {
+      for (int axis = 0; axis < 3; ++axis) at[axis] = to[axis];
+      brick = medium.brick(at);
     }
-    found &= wanted;
-    wanted &= ~found;
-    for (; found != 0; found &= found - 1) {
-      const auto lane = hwy::Num0BitsBelowLS1Bit_Nonzero32(found);
+    return brick;
+  }
+};
+
+/// Finds the bricks of some lanes. `wanted` has one bit for each lane; other lanes of their vectors keep their bricks.
+HWY_INLINE void find_bricks(const PacketMedium& medium, Packet& packet, std::uint32_t wanted) {
+  BrickLookup lookup{medium};
+  for (int i = 0; i < packet.vectors * lanes; i += lanes) {
+    std::uint32_t rest = bits_of_vector(wanted, i);
+    if (rest == 0) continue;
+    const auto same = [&](int axis) HWY_ATTR {
+      return hn::Eq(hn::Load(ints, packet.brick[axis] + i), hn::Set(ints, packet.brick[axis][i]));
+    };
+    if (hn::AllTrue(ints, hn::And(same(0), hn::And(same(1), same(2))))) {
+      const TensorBrick& brick = lookup.of_lane(packet, i);
+      std::fill_n(packet.bending + i, lanes, brick.bending);
+      store(set(brick.strongest), packet.strongest, i);
+      continue;
+    }
+    for (; rest != 0; rest &= rest - 1) {
+      const int lane = i + static_cast<int>(hwy::Num0BitsBelowLS1Bit_Nonzero32(rest));
+      const TensorBrick& brick = lookup.of_lane(packet, lane);
       packet.bending[lane] = brick.bending;
       packet.strongest[lane] = brick.strongest;
     }
@@ -106,25 +128,25 @@ void begin(const PacketMedium& medium, Packet& packet) {
 }
 
 /// Moves the lanes whose point is outside their brick to the brick of the point. `point(i)` gives the points of the
-/// vector at lane i, relative to the lanes' bricks.
+/// vector at lane i, relative to the lanes' bricks. `which` has the bits of lanes that may move.
 template <bool uniform, class Point>
-HWY_INLINE void move_to_bricks(const PacketMedium& medium, Packet& packet, const Point& point) {
+HWY_INLINE void move_to_bricks(const PacketMedium& medium, Packet& packet, std::uint32_t which, const Point& point) {
   const F zero = hn::Zero(floats), cells = set(TensorBrick::cells);
   std::uint32_t moved = 0;
   for (int i = 0; i < packet.vectors * lanes; i += lanes) {
-    const F3 to = point(i);
-    const F axes[3] = {to.x, to.y, to.z};
+    if (bits_of_vector(which, i) == 0) continue;
+    // The cell between the last two voxels is the last one, also for points on its far face.
+    const F3 cell = floor(point(i)), last = load(packet.last, i);
+    const auto away = [&](F to, F most)
+                          HWY_ATTR { return hn::Floor(hn::Mul(hn::Min(to, most), set(1.0f / TensorBrick::cells))); };
+    const F bricks[3] = {away(cell.x, last.x), away(cell.y, last.y), away(cell.z, last.z)};
+    const Mask moves = hn::Or(hn::Ne(bricks[0], zero), hn::Or(hn::Ne(bricks[1], zero), hn::Ne(bricks[2], zero)));
+    moved |= to_bits(moves, i);
     for (int axis = 0; axis < 3; ++axis) {
-      // The cell between the last two voxels is the last one, also for points on its far face.
-      const F cell = hn::Min(hn::Floor(axes[axis]), load(packet.last[axis], i));
-      const F bricks = hn::Floor(hn::Mul(cell, set(1.0f / TensorBrick::cells)));
-      const Mask moves = hn::Ne(bricks, zero);
-      if (hn::AllFalse(floats, moves)) continue;
-      moved |= to_bits(moves, i);
       for (PerRay* values : {&packet.p[axis], &packet.low[axis], &packet.high[axis], &packet.last[axis]})
-        store(hn::NegMulAdd(bricks, cells, load(*values, i)), *values, i);
+        store(hn::NegMulAdd(bricks[axis], cells, load(*values, i)), *values, i);
       std::int32_t* const brick = packet.brick[axis] + i;
-      hn::Store(hn::Add(hn::Load(ints, brick), hn::ConvertTo(ints, bricks)), ints, brick);
+      hn::Store(hn::Add(hn::Load(ints, brick), hn::ConvertTo(ints, bricks[axis])), ints, brick);
     }
   }
   find_bricks(medium, packet, moved);

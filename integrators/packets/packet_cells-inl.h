@@ -147,12 +147,11 @@ HWY_INLINE V between(V near, V far, V fraction) {
   return hn::MulAdd(hn::Sub(far, near), fraction, near);
 }
 
-/// Trilinear interpolation along y, then x, then z. `near(i)` is the value at the near end of edge i, and `rise(i)`
-/// that at its far end minus that. `aligned` moves values of far voxels to the lanes of near ones. The operations and
-/// their order are the same wherever they are done, and so are the results, bit for bit.
-template <class V, class Near, class Rise, class Aligned>
-HWY_INLINE V trilinear(const Near& near, const Rise& rise, const Aligned& aligned, V x, V y, V z) {
-  const auto edge = [&](int i) HWY_ATTR { return hn::MulAdd(rise(i), y, near(i)); };
+/// Trilinear interpolation along y, then x, then z. `edge(i)` is the value on edge i, interpolated along y. `aligned`
+/// moves values of far voxels to the lanes of near ones. The operations and their order are the same wherever they are
+/// done, and so are the results, bit for bit.
+template <class V, class Edge, class Aligned>
+HWY_INLINE V trilinear(const Edge& edge, const Aligned& aligned, V x, V z) {
   const V first = between(edge(0), edge(2), x);
   return between(first, aligned(between(edge(1), edge(3), x)), z);
 }
@@ -168,9 +167,12 @@ HWY_INLINE void sample_cell(const Cell& cell, const float (&rises)[4][8], Packet
     F values[count];
 #pragma GCC unroll 2
     for (int n = 0; n < count; ++n)
-      values[n] = trilinear([&](int i) HWY_ATTR { return set(edge_of<components>(cell, i)[c]); },
-                            [&](int i) HWY_ATTR { return set(rises[i][(i % 2 ? far_lane<components> : 0) + c]); },
-                            [](F far) HWY_ATTR { return far; }, at[n].x, at[n].y, at[n].z);
+      values[n] = trilinear(
+          [&](int i) HWY_ATTR {
+            const float rise = rises[i][(i % 2 ? far_lane<components> : 0) + c];
+            return hn::MulAdd(set(rise), at[n].y, set(edge_of<components>(cell, i)[c]));
+          },
+          [](F far) HWY_ATTR { return far; }, at[n].x, at[n].z);
 #pragma GCC unroll 2
     for (int n = 0; n < count; ++n) store(values[n], packet.tensor[c], first + n * lanes);
   }
@@ -201,14 +203,21 @@ HWY_INLINE void prefetch_cell(const float* cell) {
   }
 }
 
-/// Offsets, in floats, of voxels in their bricks, given their numbers.
+/// Offsets, in floats, of voxels in their bricks, given their numbers. They are the last bits of sums so great that
+/// their last bit is 1, or ½ for five components, whose offset is floor(16/3 voxel).
 template <int components>
-HWY_INLINE void store_offsets(F voxel, std::int32_t (&offsets)[lanes]) {
-  // Of five components, floor(16/3 voxel); the sum keeps rounding away from whole numbers.
-  const F offset = components == TensorBrick::symmetric ? hn::Floor(hn::MulAdd(voxel, set(16.0f / 3), set(0.25f)))
-                                                        : hn::Mul(voxel, set(components));
-  hn::Store(hn::ConvertTo(ints, offset), ints, offsets);
+HWY_INLINE hn::Vec<Bits> offsets_of(F voxel) {
+  constexpr bool halves = components == TensorBrick::symmetric;
+  const F sum = hn::MulAdd(voxel, set(halves ? 16.0f / 3 : components), set(halves ? 4194304.0f : 8388608.0f));
+  const auto offset = hn::And(hn::BitCast(bits, sum), hn::Set(bits, 0x7FFFFF));
+  return halves ? hn::ShiftRight<1>(offset) : offset;
 }
+
+/// Offsets of the cells of lanes, in floats from the first voxels of their bricks: near and far voxels along z, and the
+/// cells that are prefetched.
+struct Offsets {
+  alignas(64) std::uint32_t near[packet_rays], far[packet_rays], ahead[packet_rays];
+};
 
 /// Moves the components of a far voxel to the lanes of those of a near one.
 template <int components>
@@ -222,15 +231,25 @@ HWY_INLINE hn::Vec<Eight> aligned(hn::Vec<Eight> far) {
   }
 }
 
+/// Keeps a value in a register: GCC would read it from memory again for each use.
+template <class V>
+HWY_INLINE V in_register(V value) {
+#if HWY_COMPILER_GCC_ACTUAL && HWY_ARCH_X86 && HWY_TARGET <= HWY_SSE2
+  asm("" : "+x"(value.raw));
+#endif
+  return value;
+}
+
 /// Components `c` and following of a lane's tensor.
 template <int components>
 HWY_INLINE hn::Vec<Eight> sample_lane(const Packet& packet, const Cell& cell, int lane, int c) {
   const auto fraction = [&](int axis) HWY_ATTR { return hn::Set(eight, packet.fraction[axis][lane]); };
-  const auto near = [&](int i) HWY_ATTR { return load_voxel<components>(edge_of<components>(cell, i), i, c); };
-  const auto rise = [&](int i) HWY_ATTR {
-    return hn::Sub(load_voxel<components>(edge_of<components>(cell, i) + y_stride<components>, i, c), near(i));
+  const auto edge = [&](int i) HWY_ATTR {
+    const float* const voxel = edge_of<components>(cell, i);
+    return between(in_register(load_voxel<components>(voxel, i, c)),
+                   load_voxel<components>(voxel + y_stride<components>, i, c), fraction(1));
   };
-  return trilinear(near, rise, aligned<components>, fraction(0), fraction(1), fraction(2));
+  return trilinear(edge, aligned<components>, fraction(0), fraction(2));
 }
 
 /// Four rows to four columns in each block of four.
@@ -275,16 +294,12 @@ HWY_INLINE F row_of(const Sample& sample, int lane) {
 }
 
 /// Samples the tensors of a vector whose lanes are in several cells: a register holds the components of one lane at a
-/// time. Prefetches the cells `ahead` (offsets, in floats, within the lanes' bricks).
+/// time. Prefetches the cells ahead.
 template <int components>
-HWY_INLINE void sample_own_cells(Packet& packet, int at, const std::int32_t (&ahead)[lanes]) {
-  alignas(64) std::int32_t near[lanes], far[lanes];
-  const F voxel = load(packet.voxel, at);
-  store_offsets<components>(voxel, near);
-  store_offsets<components>(hn::Add(voxel, set(1)), far);
+HWY_INLINE void sample_own_cells(Packet& packet, int at, const Offsets& offsets) {
   const auto cell = [&](int lane) HWY_ATTR {
     const float* const brick = packet.bending[at + lane];
-    return Cell{brick + near[lane], brick + far[lane]};
+    return Cell{brick + offsets.near[at + lane], brick + offsets.far[at + lane]};
   };
   for (int c = 0; c < components; c += eight_lanes) {
     F rows[eight_lanes];
@@ -293,7 +308,8 @@ HWY_INLINE void sample_own_cells(Packet& packet, int at, const std::int32_t (&ah
       rows[row] =
           row_of([&](int lane) HWY_ATTR { return sample_lane<components>(packet, cell(lane), at + lane, c); }, row);
     if (c == 0)
-      for (int lane = 0; lane < lanes; ++lane) prefetch_cell<components>(packet.bending[at + lane] + ahead[lane]);
+      for (int lane = 0; lane < lanes; ++lane)
+        prefetch_cell<components>(packet.bending[at + lane] + offsets.ahead[at + lane]);
     transpose_rows(rows);
     for (int row = 0; row < std::min(eight_lanes, components - c); ++row) store(rows[row], packet.tensor[c + row], at);
   }
@@ -389,11 +405,11 @@ HWY_INLINE void sample_slopes(const Cell& cell, Packet& packet, int at) {
 
 /// The same for a vector whose lanes are in several cells.
 template <int components>
-HWY_INLINE void sample_own_slopes(Packet& packet, int at, const std::int32_t (&ahead)[lanes]) {
+HWY_INLINE void sample_own_slopes(Packet& packet, int at, const Offsets& offsets) {
   alignas(64) float values[4][lanes * 8];
   for (int i = 0; i < components; i += eight_lanes) {
     for (int lane = 0; lane < lanes; ++lane) {
-      if (i == 0) prefetch_cell<components>(packet.bending[at + lane] + ahead[lane]);
+      if (i == 0) prefetch_cell<components>(packet.bending[at + lane] + offsets.ahead[at + lane]);
       const Cell cell = cell_of<components>(packet, at + lane);
       const auto fraction = [&](int axis) HWY_ATTR { return hn::Set(eight, packet.fraction[axis][at + lane]); };
       const auto sampled = evaluate(cell_polynomial<components>(cell, i), fraction(0), fraction(1), fraction(2));

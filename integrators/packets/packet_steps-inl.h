@@ -56,7 +56,7 @@ HWY_NOINLINE void leave_straight_bricks(const PacketMedium& medium, Packet& pack
   std::uint32_t any = 0;
   for (int i = 0; i < packet.vectors * lanes; i += lanes) any |= to_bits(moves(i), i);
   if (any == 0) return;
-  move_to_bricks<uniform>(medium, packet, [&](int i) HWY_ATTR {
+  move_to_bricks<uniform>(medium, packet, any, [&](int i) HWY_ATTR {
     return select(moves(i), clamp(load(packet.p, i), load(packet.low, i), load(packet.high, i)), zeros());
   });
 }
@@ -112,48 +112,51 @@ HWY_NOINLINE void find_times(const PacketMedium& medium, Packet& packet) {
 }
 
 /// Finds the sample points (`point_of(i)` gives those of the vector at lane i), their cells, and the values that
-/// interpolation needs. `careful`: the packet clamps, or, with `forced`, points outside their bricks count as on the
+/// interpolation needs. `careful`: the packet clamps, or, with `moved`, points outside their bricks count as on the
 /// faces of the bricks.
-/// @return whether all points are within their lanes' bricks.
+/// @param moved  Bits of lanes; only their vectors are found again. 0: all vectors.
+/// @return bits of the lanes whose points are not within their bricks.
 template <bool differentials, bool careful, class Point>
-HWY_INLINE bool find_cells(Packet& packet, bool forced, const Point& point_of) {
+HWY_INLINE std::uint32_t find_cells(Packet& packet, std::uint32_t moved, const Point& point_of) {
   const F last = set(TensorBrick::cells - 1), width = set(TensorBrick::width);
-  auto greatest = hn::Zero(bits);
+  std::uint32_t beyond = 0;
   F first = hn::Zero(floats);
   Mask same = hn::Eq(first, first);
   for (int i = 0; i < packet.vectors * lanes; i += lanes) {
-    F3 point = point_of(i);
-    store(point, packet.middle, i);
-    if (careful && packet.clamps) point = clamp(point, load(packet.low, i), load(packet.high, i));
-    F3 near = floor(point);
-    if (careful && packet.clamps) near = clamp(near, load(packet.low, i), load(packet.last, i));
-    // As unsigned integers, negative floats are the greatest.
-    greatest = hn::Max(hn::Max(greatest, hn::BitCast(bits, near.x)),
-                       hn::Max(hn::BitCast(bits, near.y), hn::BitCast(bits, near.z)));
-    if (careful && forced) near = clamp(near, zeros(), {last, last, last});
-    const F3 fraction = sub(point, near);
-    store(fraction, packet.fraction, i);
-    const F voxel = hn::MulAdd(hn::MulAdd(near.x, width, near.y), width, near.z);
-    store(voxel, packet.voxel, i);
+    if (!careful || moved == 0 || bits_of_vector(moved, i) != 0) {
+      F3 point = point_of(i);
+      store(point, packet.middle, i);
+      if (careful && packet.clamps) point = clamp(point, load(packet.low, i), load(packet.high, i));
+      F3 near = floor(point);
+      if (careful && packet.clamps) near = clamp(near, load(packet.low, i), load(packet.last, i));
+      // As unsigned integers, negative floats are the greatest.
+      const auto greatest =
+          hn::Max(hn::BitCast(bits, near.x), hn::Max(hn::BitCast(bits, near.y), hn::BitCast(bits, near.z)));
+      beyond |= to_bits(hn::RebindMask(floats, hn::Gt(greatest, hn::BitCast(bits, last))), i);
+      if (careful && moved != 0) near = clamp(near, zeros(), {last, last, last});
+      store(sub(point, near), packet.fraction, i);
+      store(hn::MulAdd(hn::MulAdd(near.x, width, near.y), width, near.z), packet.voxel, i);
+    }
+    const F voxel = load(packet.voxel, i);
     if (i == 0) first = set(hn::GetLane(voxel));
     same = hn::And(same, hn::Eq(voxel, first));
   }
   packet.one_cell = packet.one_brick && hn::AllTrue(floats, same);
-  return hn::AllFalse(bits, hn::Gt(greatest, hn::BitCast(bits, last)));
+  return beyond;
 }
 
 /// Finds the sample points, and moves lanes to the bricks of these points.
 template <bool uniform, bool differentials, class Point>
 HWY_INLINE void locate(const PacketMedium& medium, Packet& packet, const Point& point_of) {
-  const bool found = packet.clamps ? find_cells<differentials, true>(packet, false, point_of)
-                                   : find_cells<differentials, false>(packet, false, point_of);
-  if (HWY_LIKELY(found)) return;
-  move_to_bricks<uniform>(medium, packet, [&](int i) HWY_ATTR {
+  const std::uint32_t beyond = packet.clamps ? find_cells<differentials, true>(packet, 0, point_of)
+                                             : find_cells<differentials, false>(packet, 0, point_of);
+  if (HWY_LIKELY(beyond == 0)) return;
+  move_to_bricks<uniform>(medium, packet, beyond, [&](int i) HWY_ATTR {
     const F3 point = load(packet.middle, i);
     return packet.clamps ? clamp(point, load(packet.low, i), load(packet.high, i)) : point;
   });
   // The remaining points are outside the extent, or rounding put them on a face.
-  find_cells<differentials, true>(packet, true, point_of);
+  find_cells<differentials, true>(packet, beyond, point_of);
 }
 
 /// The first part of a step: locates its middle.
@@ -168,12 +171,12 @@ HWY_INLINE void locate_middles(const PacketMedium& medium, Packet& packet) {
 /// Offsets, in floats within the lanes' bricks, of the cells where the lanes of a vector will be after two long steps;
 /// beyond a brick, of the last cell on the way.
 template <int components, bool uniform>
-HWY_INLINE void find_cells_ahead(const Packet& packet, int at, std::int32_t (&ahead)[lanes]) {
+HWY_INLINE hn::Vec<Bits> find_cells_ahead(const Packet& packet, int at) {
   const F3 there = add(load(packet.middle, at), load(direction<uniform>(packet), at));
   const F last = set(TensorBrick::cells - 1), width = set(TensorBrick::width);
   const F3 cell = clamp(floor(there), zeros(), {last, last, last});
   const F voxel = hn::MulAdd(hn::MulAdd(cell.x, width, cell.y), width, cell.z);
-  store_offsets<components>(voxel, ahead);
+  return offsets_of<components>(voxel);
 }
 
 /// Whether all lanes of a vector are in one cell.
@@ -188,25 +191,30 @@ HWY_INLINE bool in_one_cell(const Packet& packet, int first) {
 /// The second part of a step: samples the tensors there.
 template <int components, bool uniform, bool differentials>
 HWY_INLINE void interpolate(Packet& packet) {
-  alignas(64) std::int32_t ahead[lanes];
   if (!differentials && HWY_LIKELY(packet.one_cell)) {
-    find_cells_ahead<components, uniform>(packet, 0, ahead);
-    prefetch_cell<components>(packet.bending[0] + ahead[0]);
+    const auto ahead = hn::GetLane(find_cells_ahead<components, uniform>(packet, 0));
+    prefetch_cell<components>(packet.bending[0] + ahead);
     return sample_cell<components>(cell_of<components>(packet, 0), packet, 0, packet.vectors);
+  }
+  Offsets offsets;
+  for (int i = 0; i < packet.vectors * lanes; i += lanes) {
+    const F voxel = load(packet.voxel, i);
+    hn::Store(offsets_of<components>(voxel), bits, offsets.near + i);
+    hn::Store(offsets_of<components>(hn::Add(voxel, set(1))), bits, offsets.far + i);
+    hn::Store(find_cells_ahead<components, uniform>(packet, i), bits, offsets.ahead + i);
   }
   for (int i = 0; i < packet.vectors * lanes; i += lanes) {
     const bool together = in_one_cell(packet, i);
-    if (!together) find_cells_ahead<components, uniform>(packet, i, ahead);
     if constexpr (differentials) {
       if (together)
         sample_slopes<components>(cell_of<components>(packet, i), packet, i);
       else
-        sample_own_slopes<components>(packet, i, ahead);
+        sample_own_slopes<components>(packet, i, offsets);
     } else {
       if (together)
         sample_cell<components>(cell_of<components>(packet, i), packet, i, 1);
       else
-        sample_own_cells<components>(packet, i, ahead);
+        sample_own_cells<components>(packet, i, offsets);
     }
   }
 }
