@@ -47,30 +47,35 @@ int block_offset(int voxel) {
 }
 
 /// The stored components of T − T₂₂ I, and T₂₂, of each voxel. @return the greatest squared norm of T.
+/// Numbers are single ones: a vector that is made of them in memory is there many cycles later.
 template <int components>
 float convert(const TensorBlock& block, BlockVoxels& voxels) {
-  using Four = Eigen::Array4f;  // A vector register.
+  const auto square = [](float x) { return x * x; };
   float greatest = 0;
   for (int i = 0; i < TensorBlock::voxels; ++i) {
     const float* const T = block.values[i].data();
     float* const bending = voxels.bending + block_offset<components>(i);
-    Four near = Eigen::Map<const Four>(T), far = Eigen::Map<const Four>(T + 4);
-    const float last = T[8];
-    greatest = std::max(greatest, (near * near + far * far).sum() + last * last);
-    const Four diagonal(last, 0, 0, 0);
-    near -= diagonal;
-    far -= diagonal;
-    Eigen::Map<Four>{bending} = near;
-    // From the second component on the diagonal, which `near` holds twice; then the float that fills a cache line, or
-    // the first one of the next voxel, which follows.
-    if constexpr (components == TensorBrick::symmetric)
-      Eigen::Map<Eigen::Array3f>{bending + 3} = Eigen::Array3f(far[0], far[1], 0);
-    else
-      Eigen::Map<Four>{bending + 4} = far;
-    const float squares = (near * near + far * far).sum(), trace = near[0] + far[0];
+    const float last = T[8], first = T[0] - last, second = T[4] - last;  // On the diagonal.
+    const float even = square(T[2]) + square(T[6]), odd = (square(T[1]) + square(T[5])) + (square(T[3]) + square(T[7]));
+    greatest = std::max(greatest, (((square(T[0]) + square(T[4])) + even) + odd) + square(last));
+    bending[0] = first;
+    bending[1] = T[1];
+    bending[2] = T[2];
+    if constexpr (components == TensorBrick::symmetric) {
+      bending[3] = second;
+      bending[4] = T[5];
+      bending[5] = 0;  // The float that fills a cache line, or the first one of the next voxel, which follows.
+    } else {
+      bending[3] = T[3];
+      bending[4] = second;
+      bending[5] = T[5];
+      bending[6] = T[6];
+      bending[7] = T[7];
+    }
+    const float squares = ((square(first) + square(second)) + even) + odd, trace = first + second;
     // The relative error of single precision is below 2e-6 here, because the trace takes at most two thirds of the
     // squares away.
-    voxels.deviator[i] = squares - trace * trace * (1.0f / 3);
+    voxels.deviator[i] = squares - square(trace) * (1.0f / 3);
     voxels.squares[i] = squares;
     voxels.trailing[i] = last;
   }

@@ -2,6 +2,7 @@
 /// @file volumes/files/file_bytes.h
 /// The bytes of a file, at any position. Streams read in order, and copy what they skip.
 
+#include <cstddef>
 #include <cstdint>
 #include <filesystem>
 #include <vector>
@@ -10,7 +11,9 @@
 
 namespace tensorray {
 
-/// An open file. Any number of threads may read it at once.
+/// An open file. Any number of threads may read it at once. It is mapped to memory, so that nothing is copied, unless
+/// memory has a bound (grids/page_memory.h) or the file's system cannot map it. As with any mapped file, the system
+/// ends the process if somebody cuts the file short while it is open.
 class FileBytes {
  public:
   /// @throw std::runtime_error naming the file and the reason.
@@ -21,18 +24,22 @@ class FileBytes {
 
   std::int64_t size() const { return size_; }
 
-  /// Copies `count` bytes from position `at` on. @return false if the file does not have them, or cannot be read.
-  bool read(std::int64_t at, void* bytes, std::size_t count) const;
+  bool is_mapped() const { return mapped_ != nullptr; }
+
+  /// The `count` bytes from position `at` on; of a file that is not mapped, as a copy in `copy`.
+  /// @return null if the file does not have them, or cannot be read.
+  const char* bytes(std::int64_t at, std::size_t count, std::vector<char>& copy) const;
 
  private:
   int file_ = -1;
   std::int64_t size_ = 0;
+  const char* mapped_ = nullptr;
 };
 
 /// Thrown where a file has less bytes than are needed, or lengths in it do not fit.
 struct Misfit {};
 
-/// Reads a file from front to back. It reads ahead by a window.
+/// Reads a file from front to back. It reads ahead by a window, unless the file is mapped.
 class ByteCursor {
  public:
   ByteCursor(const FileBytes& file, std::int64_t at, std::size_t window) : file_(file), at_(at), window_(window) {}
@@ -53,9 +60,10 @@ class ByteCursor {
 
  private:
   const FileBytes& file_;
-  std::int64_t at_, first_ = 0;  ///< The next byte, and that of `bytes_`.
+  std::int64_t at_, first_ = 0, end_ = 0;  ///< The next byte; those that were read.
   std::size_t window_;
-  std::vector<char> bytes_;
+  const char* ahead_ = nullptr;  ///< The bytes from `first_` to `end_`.
+  std::vector<char> copy_;
 };
 
 }  // namespace tensorray

@@ -1,5 +1,6 @@
 #include "volumes/files/vdb_leaves.h"
 
+#include <array>
 #include <istream>
 #include <streambuf>
 
@@ -13,7 +14,19 @@ constexpr int voxels = TensorBlock::voxels;
 /// Bytes in memory as a stream, which OpenVDB's functions need.
 class MemoryBuffer : public std::streambuf {
  public:
-  MemoryBuffer(char* begin, char* end) { setg(begin, begin, end); }
+  void set(const char* begin, const char* end) {
+    char* const first = const_cast<char*>(begin);  // Nobody writes to it.
+    setg(first, first, first + (end - begin));
+  }
+};
+
+constexpr std::size_t greatest_value = 24;  // Bytes.
+
+/// What a thread needs to unpack leaves. Making a stream takes as long as half of a leaf.
+struct Unpacking {
+  MemoryBuffer buffer;
+  std::istream stream{&buffer};
+  alignas(8) std::array<char, voxels * greatest_value> values;
 };
 
 }  // namespace
@@ -22,37 +35,40 @@ LeafReader::LeafReader(const FileBytes& file, const StoredTree& tree)
     : file_(file), tree_(tree), size_(value_size(tree.type).value()) {}
 
 void LeafReader::read(const StoredLeaf& leaf, const std::vector<TensorEntry>& entries, TensorBlock& block) {
-  stored_.resize(static_cast<std::size_t>(leaf.bytes));
-  if (stored_.empty() || !file_.read(leaf.at, stored_.data(), stored_.size())) throw Misfit();
-  const int flag = static_cast<signed char>(stored_[0]);
+  thread_local Unpacking unpacking;
+  const auto bytes = static_cast<std::size_t>(leaf.bytes);
+  const char* const stored = bytes > 0 ? file_.bytes(leaf.at, bytes, copy_) : nullptr;
+  if (!stored) throw Misfit();
+  const int flag = static_cast<signed char>(stored[0]);
   const auto before = static_cast<std::size_t>(1 + bytes_behind_flag(flag, size_, voxels));
   const bool has_all = flag == all_values || !tree_.active_only;
   const std::size_t count = has_all ? voxels : leaf.active.count();
-  values_.resize(count * static_cast<std::size_t>(tree_.half ? size_.half : size_.full));
-  if (before > stored_.size()) throw Misfit();
+  const std::size_t unpacked = count * static_cast<std::size_t>(tree_.half ? size_.half : size_.full);
+  if (before > bytes) throw Misfit();
   if (count == 0) return;
-  MemoryBuffer buffer(stored_.data() + before, stored_.data() + stored_.size());
-  std::istream stream(&buffer);
+  auto& [buffer, stream, values] = unpacking;
+  buffer.set(stored + before, stored + bytes);
+  stream.clear();
   if (tree_.blosc)
-    openvdb::io::bloscFromStream(stream, values_.data(), values_.size());
+    openvdb::io::bloscFromStream(stream, values.data(), unpacked);
   else if (tree_.zip)
-    openvdb::io::unzipFromStream(stream, values_.data(), values_.size());
+    openvdb::io::unzipFromStream(stream, values.data(), unpacked);
   else
-    stream.read(values_.data(), static_cast<std::streamsize>(values_.size()));
+    stream.read(values.data(), static_cast<std::streamsize>(unpacked));
   if (!stream) throw Misfit();
   const bool is_double = size_.full % 8 == 0;
   if (tree_.half)
-    put<openvdb::math::half>(leaf, has_all, entries, block);
+    put<openvdb::math::half>(values.data(), leaf, has_all, entries, block);
   else if (is_double)
-    put<double>(leaf, has_all, entries, block);
+    put<double>(values.data(), leaf, has_all, entries, block);
   else
-    put<float>(leaf, has_all, entries, block);
+    put<float>(values.data(), leaf, has_all, entries, block);
 }
 
 template <class Number>
-void LeafReader::put(const StoredLeaf& leaf, bool has_all, const std::vector<TensorEntry>& entries,
+void LeafReader::put(const char* values, const StoredLeaf& leaf, bool has_all, const std::vector<TensorEntry>& entries,
                      TensorBlock& block) const {
-  const auto* const numbers = reinterpret_cast<const Number*>(values_.data());
+  const auto* const numbers = reinterpret_cast<const Number*>(values);
   const int components = static_cast<int>((tree_.half ? size_.half : size_.full) / std::int64_t{sizeof(Number)});
   for (const TensorEntry& entry : entries) {
     const Number* from = numbers + entry.component;

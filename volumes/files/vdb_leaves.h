@@ -27,12 +27,13 @@ class LeafReader {
 
  private:
   template <class Number>
-  void put(const StoredLeaf& leaf, bool has_all, const std::vector<TensorEntry>& entries, TensorBlock& block) const;
+  void put(const char* values, const StoredLeaf& leaf, bool has_all, const std::vector<TensorEntry>& entries,
+           TensorBlock& block) const;
 
   const FileBytes& file_;
   const StoredTree& tree_;
   const ValueSize size_;
-  std::vector<char> stored_, values_;
+  std::vector<char> copy_;
 };
 
 }  // namespace tensorray
