@@ -30,12 +30,13 @@ namespace {
 
 constexpr int step_x = TensorBrick::voxel(1, 0, 0), step_y = TensorBrick::voxel(0, 1, 0);
 
-/// The eight floats that bend light fill vector registers; T₂₂ is interpolated separately.
+/// The eight floats that bend light fill vector registers; T₂₂ is interpolated separately. Of symmetric tensors there
+/// are five; what follows them is interpolated, too, and not used.
 using Eight = Eigen::Array<double, 8, 1>;
 
-Eigen::Matrix3d to_matrix(const Eight& bending, double trailing) {
+Eigen::Matrix3d to_matrix(const TensorBrick& brick, const Eight& bending, double trailing) {
   Eigen::Matrix3d T;
-  Eigen::Map<Eight>(T.data()) = bending;
+  for (int i = 0; i < 8; ++i) T.data()[i] = bending[TensorBrick::stored_component(brick.components, i)];
   T(0, 0) += trailing;
   T(1, 1) += trailing;
   T(2, 2) = trailing;
@@ -68,11 +69,7 @@ Slopes<Value> interpolate(int voxel, const Eigen::Vector3d& f, Load load) {
 
 Eight bending(const TensorBrick& brick, int voxel) {
   const float* const stored = brick.bending + TensorBrick::bending_offset(brick.components, voxel);
-  if (brick.components == TensorBrick::general)
-    return Eigen::Map<const Eigen::Array<float, 8, 1>>(stored).cast<double>();
-  Eight eight;
-  for (int i = 0; i < 8; ++i) eight[i] = double{stored[TensorBrick::stored_component(TensorBrick::symmetric, i)]};
-  return eight;
+  return Eigen::Map<const Eigen::Array<float, 8, 1>>(stored).cast<double>();
 }
 
 }  // namespace
@@ -91,7 +88,7 @@ Eigen::Matrix3d TensorSampler::at(const Eigen::Vector3d& world) {
     eight += weight * bending(brick_, at);
     last += weight * brick_.trailing[at];
   }
-  return to_matrix(eight, last);
+  return to_matrix(brick_, eight, last);
 }
 
 Eigen::Matrix3d TensorSampler::at(const Eigen::Vector3d& world, const Eigen::Matrix<double, 3, 2>& along,
@@ -107,9 +104,9 @@ Eigen::Matrix3d TensorSampler::at(const Eigen::Vector3d& world, const Eigen::Mat
     if (field_->voxels().sizes()[axis] == 0) by_index.row(axis).setZero();
   for (int i = 0; i < 2; ++i) {
     const double x = by_index(0, i), y = by_index(1, i), z = by_index(2, i);
-    derivatives[i] = to_matrix(x * eight.x + y * eight.y + z * eight.z, x * last.x + y * last.y + z * last.z);
+    derivatives[i] = to_matrix(brick_, x * eight.x + y * eight.y + z * eight.z, x * last.x + y * last.y + z * last.z);
   }
-  return to_matrix(eight.value, last.value);
+  return to_matrix(brick_, eight.value, last.value);
 }
 
 double TensorSampler::way_through_straight_brick(const Eigen::Vector3d& world, const Eigen::Vector3d& direction) {

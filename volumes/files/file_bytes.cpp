@@ -5,37 +5,27 @@
 #include <system_error>
 
 #include <fcntl.h>
-#include <sys/mman.h>
 #include <unistd.h>
 
 #include "base/errors.h"
-#include "volumes/grids/page_memory.h"
 
 namespace tensorray {
 
 FileBytes::FileBytes(const std::filesystem::path& path) : file_(open(path.c_str(), O_RDONLY | O_CLOEXEC)) {
   if (file_ < 0) fail(path, "cannot be opened: " + std::generic_category().message(errno) + "; check the path");
   size_ = static_cast<std::int64_t>(std::filesystem::file_size(path));
-  if (memory_bound()) return;
-  void* const memory = mmap(nullptr, static_cast<std::size_t>(size_), PROT_READ, MAP_SHARED, file_, 0);
-  if (memory != MAP_FAILED) mapped_ = static_cast<const char*>(memory);
 }
 
-FileBytes::~FileBytes() {
-  if (mapped_) munmap(const_cast<char*>(mapped_), static_cast<std::size_t>(size_));
-  close(file_);
-}
+FileBytes::~FileBytes() { close(file_); }
 
-const char* FileBytes::bytes(std::int64_t at, std::size_t count, std::vector<char>& copy) const {
-  if (at < 0 || at > size_ || static_cast<std::int64_t>(count) > size_ - at) return nullptr;
-  if (mapped_) return mapped_ + at;
-  copy.resize(count);
+bool FileBytes::read(std::int64_t at, void* bytes, std::size_t count) const {
   for (std::size_t done = 0; done < count;) {
-    const ssize_t got = pread(file_, copy.data() + done, count - done, static_cast<off_t>(at + std::int64_t(done)));
-    if (got <= 0) return nullptr;
+    const ssize_t got =
+        pread(file_, static_cast<char*>(bytes) + done, count - done, static_cast<off_t>(at + std::int64_t(done)));
+    if (got <= 0) return false;
     done += static_cast<std::size_t>(got);
   }
-  return copy.data();
+  return true;
 }
 
 void ByteCursor::skip(std::int64_t bytes) {
@@ -46,16 +36,13 @@ void ByteCursor::skip(std::int64_t bytes) {
 const char* ByteCursor::next(std::size_t count) {
   const auto wanted = static_cast<std::int64_t>(count);
   if (wanted > file_.size() - at_) throw Misfit();
-  if (at_ < first_ || at_ + wanted > end_) {
-    const auto rest = static_cast<std::size_t>(file_.size() - at_);
-    const std::size_t bytes = file_.is_mapped() ? rest : std::min(std::max(count, window_), rest);
-    ahead_ = file_.bytes(at_, bytes, copy_);
-    if (!ahead_) throw Misfit();
+  if (at_ < first_ || at_ + wanted > first_ + static_cast<std::int64_t>(bytes_.size())) {
     first_ = at_;
-    end_ = at_ + static_cast<std::int64_t>(bytes);
+    bytes_.resize(std::min(std::max(count, window_), static_cast<std::size_t>(file_.size() - at_)));
+    if (!file_.read(first_, bytes_.data(), bytes_.size())) throw Misfit();
   }
   at_ += wanted;
-  return ahead_ + (at_ - wanted - first_);
+  return bytes_.data() + (at_ - wanted - first_);
 }
 
 }  // namespace tensorray

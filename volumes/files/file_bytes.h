@@ -2,7 +2,6 @@
 /// @file volumes/files/file_bytes.h
 /// The bytes of a file, at any position. Streams read in order, and copy what they skip.
 
-#include <cstddef>
 #include <cstdint>
 #include <filesystem>
 #include <vector>
@@ -11,9 +10,7 @@
 
 namespace tensorray {
 
-/// An open file. Any number of threads may read it at once. It is mapped to memory, so that nothing is copied, unless
-/// memory has a bound (grids/page_memory.h) or the file's system cannot map it. As with any mapped file, the system
-/// ends the process if somebody cuts the file short while it is open.
+/// An open file. Any number of threads may read it at once.
 class FileBytes {
  public:
   /// @throw std::runtime_error naming the file and the reason.
@@ -24,22 +21,18 @@ class FileBytes {
 
   std::int64_t size() const { return size_; }
 
-  bool is_mapped() const { return mapped_ != nullptr; }
-
-  /// The `count` bytes from position `at` on; of a file that is not mapped, as a copy in `copy`.
-  /// @return null if the file does not have them, or cannot be read.
-  const char* bytes(std::int64_t at, std::size_t count, std::vector<char>& copy) const;
+  /// Copies `count` bytes from position `at` on. @return false if the file does not have them, or cannot be read.
+  bool read(std::int64_t at, void* bytes, std::size_t count) const;
 
  private:
   int file_ = -1;
   std::int64_t size_ = 0;
-  const char* mapped_ = nullptr;
 };
 
 /// Thrown where a file has less bytes than are needed, or lengths in it do not fit.
 struct Misfit {};
 
-/// Reads a file from front to back. It reads ahead by a window, unless the file is mapped.
+/// Reads a file from front to back. It reads ahead by a window.
 class ByteCursor {
  public:
   ByteCursor(const FileBytes& file, std::int64_t at, std::size_t window) : file_(file), at_(at), window_(window) {}
@@ -60,10 +53,9 @@ class ByteCursor {
 
  private:
   const FileBytes& file_;
-  std::int64_t at_, first_ = 0, end_ = 0;  ///< The next byte; those that were read.
+  std::int64_t at_, first_ = 0;  ///< The next byte, and that of `bytes_`.
   std::size_t window_;
-  const char* ahead_ = nullptr;  ///< The bytes from `first_` to `end_`.
-  std::vector<char> copy_;
+  std::vector<char> bytes_;
 };
 
 }  // namespace tensorray

@@ -37,8 +37,9 @@ LeafReader::LeafReader(const FileBytes& file, const StoredTree& tree)
 void LeafReader::read(const StoredLeaf& leaf, const std::vector<TensorEntry>& entries, TensorBlock& block) {
   thread_local Unpacking unpacking;
   const auto bytes = static_cast<std::size_t>(leaf.bytes);
-  const char* const stored = bytes > 0 ? file_.bytes(leaf.at, bytes, copy_) : nullptr;
-  if (!stored) throw Misfit();
+  stored_.resize(bytes);
+  if (bytes == 0 || !file_.read(leaf.at, stored_.data(), bytes)) throw Misfit();
+  const char* const stored = stored_.data();
   const int flag = static_cast<signed char>(stored[0]);
   const auto before = static_cast<std::size_t>(1 + bytes_behind_flag(flag, size_, voxels));
   const bool has_all = flag == all_values || !tree_.active_only;

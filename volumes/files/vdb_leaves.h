@@ -33,7 +33,7 @@ class LeafReader {
   const FileBytes& file_;
   const StoredTree& tree_;
   const ValueSize size_;
-  std::vector<char> copy_;
+  std::vector<char> stored_;
 };
 
 }  // namespace tensorray
