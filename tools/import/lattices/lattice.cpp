@@ -98,10 +98,10 @@ void sort(Blocks& blocks) {
   for (const auto& place : order) source.push_back(std::get<3>(place));
   for (std::size_t i = 0; i < source.size(); ++i) {
     if (source[i] == i) continue;
-    make_room();
     const auto first = std::make_unique<typename Blocks::value_type>(std::move(blocks[i]));
     std::size_t to = i;
     while (source[to] != i) {
+      make_room();
       blocks[to] = std::move(blocks[source[to]]);
       to = std::exchange(source[to], to);
     }
