@@ -22,6 +22,13 @@ HWY_INLINE F inverse_root_near_one(F excess) {
   return hn::MulAdd(hn::MulAdd(set(3.0f / 8), excess, set(-0.5f)), excess, set(1));
 }
 
+/// The same for an excess below 0.0475, to 6e-8. That of exp(A) V is, if no two eigenvalues of A differ by more than
+/// √2 · series_reach[1].
+HWY_INLINE F inverse_root_nearby(F excess) {
+  const F inner = hn::MulAdd(hn::MulAdd(set(35.0f / 128), excess, set(-5.0f / 16)), excess, set(3.0f / 8));
+  return hn::MulAdd(hn::MulAdd(inner, excess, set(-0.5f)), excess, set(1));
+}
+
 /// |v|² − 1.
 HWY_INLINE F excess(const F3& v) { return hn::MulAdd(v.x, v.x, hn::MulAdd(v.y, v.y, hn::MulAdd(v.z, v.z, set(-1)))); }
 
@@ -97,7 +104,11 @@ HWY_INLINE void bend_strongly(Packet& packet, const Tensor& T, const F3& v, F fa
   const F e = excess(sum);
   const Mask weak = hn::Le(size, set(series_reach[0])), fits = hn::Le(size, set(1));
   F scale = inverse_root_near_one(e);
-  if (!hn::AllTrue(floats, weak)) scale = hn::IfThenElse(weak, scale, hn::Div(set(1), hn::Sqrt(hn::Add(e, set(1)))));
+  if (terms > 2) scale = hn::IfThenElse(weak, scale, inverse_root_nearby(e));
+  if (terms > 3) {
+    const F root = hn::Div(set(1), hn::Sqrt(hn::Add(e, set(1))));
+    scale = hn::IfThenElse(hn::Le(size, set(series_reach[1])), scale, root);
+  }
   if constexpr (changes) {
     F log_squared = log_near_one(e);
     if (!hn::AllTrue(floats, weak)) log_squared = hn::IfThenElse(weak, log_squared, hn::Log1p(floats, e));

@@ -62,6 +62,7 @@ HWY_INLINE F3 floor(const F3& a) { return {hn::Floor(a.x), hn::Floor(a.y), hn::F
 HWY_INLINE F3 select(Mask mask, const F3& yes, const F3& no) {
   return {hn::IfThenElse(mask, yes.x, no.x), hn::IfThenElse(mask, yes.y, no.y), hn::IfThenElse(mask, yes.z, no.z)};
 }
+HWY_INLINE F3 minimum(const F3& a, const F3& b) { return {hn::Min(a.x, b.x), hn::Min(a.y, b.y), hn::Min(a.z, b.z)}; }
 HWY_INLINE F3 clamp(const F3& p, const F3& low, const F3& high) {
   return {hn::Min(hn::Max(p.x, low.x), high.x), hn::Min(hn::Max(p.y, low.y), high.y),
           hn::Min(hn::Max(p.z, low.z), high.z)};

@@ -1,5 +1,6 @@
 #include "integrators/packets/packet_medium.h"
 
+#include <algorithm>
 #include <cmath>
 
 #include <Eigen/Geometry>
@@ -31,6 +32,13 @@ PacketMedium::PacketMedium(const TensorField& field_, const KernelSettings& sett
   longest_step = settings.step > 0 ? settings.step : static_cast<float>(automatic);
   past_straight_brick =
       static_cast<float>(stages ? step_lengths::past_straight_brick_by_stages : step_lengths::past_straight_brick);
+  // A step may begin a little outside its brick.
+  const double margin_of_steps = std::min(longest_step + 1.0, 1e9);
+  for (int axis = 0; axis < 3; ++axis) {
+    first_inner[axis] = static_cast<std::int32_t>(std::ceil((first[axis] + margin_of_steps) / TensorBrick::cells));
+    last_inner[axis] = static_cast<std::int32_t>(std::floor((last[axis] - margin_of_steps) / TensorBrick::cells)) - 1;
+    if (clamps) first_inner[axis] = last_inner[axis] + 1;
+  }
   bounded = std::isfinite(settings.max_length);
 }
 

@@ -26,6 +26,7 @@ struct PacketMedium {
   float longest_voxel;  // No voxel is longer along any direction, world units.
   float to_index[3][3];
   std::int32_t first[3], last[3];  // First and last voxels of the extent.
+  std::int32_t first_inner[3], last_inner[3];  // No step from these bricks may leave the extent. May be none.
   float margin[3];     // Distance of the extent's faces from these voxels: ½ on an axis of a single voxel, else 0.
   bool flat;           // Whether an axis has a single voxel.
   float slope[3];      // 0 along axes with a single voxel, 1 along the others.
@@ -68,6 +69,7 @@ struct alignas(64) Packet {
   PerRay bending_rate;  // |kick| times the norm of T's deviator as last sampled, or 0.
   PerRay reach;         // Upper bound of ‖σ h T‖ in the brick.
   PerRay strongest;
+  // Only if near_border:
   PerRay low[3], high[3];  // Box of the voxels, relative to the brick.
   PerRay last[3];          // Last cell, relative to the brick.
 
@@ -97,7 +99,8 @@ struct alignas(64) Packet {
   std::uint32_t steps = 0, most_steps = 0;
   float greatest_reach = 0;
   bool one_brick = false, one_cell = false;
-  bool near_border = false, near_surface = false, straight = false;
+  bool near_border = false;  // Whether a step may leave the extent, or sample points are moved to it.
+  bool near_surface = false, straight = false;
   bool varied = false;   // Whether some steps are not of the longest length.
   bool timed = false;    // Whether `time` is already that of the next step.
   bool watched = false;  // Whether a step may end a ray for another reason than the number of steps.

@@ -57,7 +57,8 @@ HWY_NOINLINE void leave_straight_bricks(const PacketMedium& medium, Packet& pack
   for (int i = 0; i < packet.vectors * lanes; i += lanes) any |= to_bits(moves(i), i);
   if (any == 0) return;
   move_to_bricks<uniform>(medium, packet, any, [&](int i) HWY_ATTR {
-    return select(moves(i), clamp(load(packet.p, i), load(packet.low, i), load(packet.high, i)), zeros());
+    const F3 p = load(packet.p, i);
+    return select(moves(i), packet.near_border ? clamp(p, load(packet.low, i), load(packet.high, i)) : p, zeros());
   });
 }
 
@@ -169,20 +170,21 @@ HWY_INLINE void locate_middles(const PacketMedium& medium, Packet& packet) {
 }
 
 /// Offsets, in floats within the lanes' bricks, of the cells where the lanes of a vector will be after two long steps;
-/// beyond a brick, of the last cell on the way.
+/// beyond a brick, of any of its cells.
 template <int components, bool uniform>
 HWY_INLINE hn::Vec<Bits> find_cells_ahead(const Packet& packet, int at) {
-  const F3 there = add(load(packet.middle, at), load(direction<uniform>(packet), at));
-  const F last = set(TensorBrick::cells - 1), width = set(TensorBrick::width);
-  const F3 cell = clamp(floor(there), zeros(), {last, last, last});
-  const F voxel = hn::MulAdd(hn::MulAdd(cell.x, width, cell.y), width, cell.z);
-  return offsets_of<components>(voxel);
+  const F3 cells = floor(add(load(packet.fraction, at), load(direction<uniform>(packet), at)));
+  constexpr int last_cell = TensorBrick::cells - 1;
+  const F width = set(TensorBrick::width), last = set(TensorBrick::voxel(last_cell, last_cell, last_cell));
+  const F voxels = hn::MulAdd(hn::MulAdd(cells.x, width, cells.y), width, cells.z);
+  const F voxel = hn::Add(load(packet.voxel, at), voxels);
+  return offsets_of<components>(hn::Min(hn::Max(voxel, hn::Zero(floats)), last));
 }
 
 /// Whether all lanes of a vector are in one cell.
 HWY_INLINE bool in_one_cell(const Packet& packet, int first) {
   Mask same = hn::Eq(load(packet.voxel, first), set(packet.voxel[first]));
-  if (!packet.one_brick)
+  if (!packet.one_brick && hn::AllTrue(floats, same))
     for (const auto& brick : packet.brick)
       same = hn::And(same, hn::RebindMask(floats, hn::Eq(hn::Load(ints, brick + first), hn::Set(ints, brick[first]))));
   return hn::AllTrue(floats, same);

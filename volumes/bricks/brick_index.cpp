@@ -3,7 +3,7 @@
 namespace tensorray {
 namespace {
 
-constexpr double greatest_table = 64;  // Table entries per brick, at most; an entry takes four bytes.
+constexpr double greatest_table = 32;  // Table entries per brick, at most; an entry takes eight bytes.
 
 }  // namespace
 
@@ -26,22 +26,22 @@ void BrickIndex::make_table(const std::vector<Eigen::Vector3i>& bricks, const Ei
     size_[axis] = static_cast<std::uint32_t>(box.max()[i]) - first_[axis] + 1;
     entries *= size_[axis];
   }
-  table_.assign(entries, missing);
+  table_.assign(entries, Entry());
   for (std::size_t i = 0; i < bricks.size(); ++i) {
     const Eigen::Vector3i at = bricks[i] - box.min();
     table_[(static_cast<std::size_t>(at.x()) * size_[1] + static_cast<std::size_t>(at.y())) * size_[2] +
-           static_cast<std::size_t>(at.z())] = static_cast<std::uint32_t>(i);
+           static_cast<std::size_t>(at.z())].number = static_cast<std::uint32_t>(i);
   }
 }
 
 void BrickIndex::make_slots(const std::vector<Eigen::Vector3i>& bricks) {
   std::size_t size = 16;
   while (size < 2 * bricks.size()) size *= 2;
-  slots_.assign(size, Slot{Eigen::Vector3i::Zero(), missing});
+  slots_.assign(size, Slot{Eigen::Vector3i::Zero(), Entry()});
   for (std::size_t i = 0; i < bricks.size(); ++i) {
     std::size_t slot = home_slot(bricks[i]);
-    while (slots_[slot].index != missing) slot = (slot + 1) & (size - 1);
-    slots_[slot] = {bricks[i], static_cast<std::uint32_t>(i)};
+    while (slots_[slot].entry.number != missing) slot = (slot + 1) & (size - 1);
+    slots_[slot] = {bricks[i], {static_cast<std::uint32_t>(i), 0}};
   }
 }
 
@@ -53,9 +53,17 @@ std::size_t BrickIndex::home_slot(const Eigen::Vector3i& brick) const {
   return static_cast<std::size_t>(hash) & (slots_.size() - 1);
 }
 
-std::uint32_t BrickIndex::find_slot(const Eigen::Vector3i& brick) const {
+BrickIndex::Entry BrickIndex::find_slot(const Eigen::Vector3i& brick) const {
   for (std::size_t slot = home_slot(brick);; slot = (slot + 1) & (slots_.size() - 1))
-    if (slots_[slot].index == missing || slots_[slot].brick == brick) return slots_[slot].index;
+    if (slots_[slot].entry.number == missing || slots_[slot].brick == brick) return slots_[slot].entry;
+}
+
+void BrickIndex::set_values(const std::vector<float>& values) {
+  const auto set = [&](Entry& entry) {
+    if (entry.number != missing) entry.value = values[entry.number];
+  };
+  for (Entry& entry : table_) set(entry);
+  for (Slot& slot : slots_) set(slot.entry);
 }
 
 std::size_t BrickIndex::memory_bytes() const {

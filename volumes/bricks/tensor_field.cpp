@@ -106,10 +106,11 @@ void TensorField::make_bricks(const std::vector<BlockShape>& shapes, const Block
   index_ = BrickIndex(bricks_);
   std::vector<BlockShare> shares(shapes.size());
   place_blocks(table, blocks, shares);
-  strongest_.resize(bricks_.size());
+  std::vector<float> strongest(bricks_.size());
   tbb::parallel_for(std::size_t{0}, bricks_.size(), [&](std::size_t i) {
-    strongest_[i] = strongest_deviator(table, shares, bricks_[i], brick_at(floats_of(i), 0));
+    strongest[i] = strongest_deviator(table, shares, bricks_[i], brick_at(floats_of(i), 0));
   });
+  index_.set_values(strongest);
   double norm = 0;
   for (const BlockShare& share : shares) norm = std::max(norm, share.norm);
   greatest_norm_ = std::sqrt(norm);
@@ -178,7 +179,7 @@ std::vector<Eigen::Vector3d> TensorField::corners() const { return corners_of(in
 Eigen::AlignedBox3d TensorField::world_box() const { return box_of(corners()); }
 
 std::size_t TensorField::memory_bytes() const {
-  const auto floats = static_cast<std::size_t>(TensorBrick::stored_floats(components_)) + 1;
+  const auto floats = static_cast<std::size_t>(TensorBrick::stored_floats(components_));
   return brick_count() * (floats * sizeof(float) + sizeof(Eigen::Vector3i)) + index_.memory_bytes();
 }
 

@@ -108,8 +108,8 @@ class TensorField {
   /// The brick whose first cell is at `brick` * 8. It is the brick of zeros wherever no brick is in memory, also
   /// outside the extent.
   TensorBrick brick(const Eigen::Vector3i& brick) const {
-    const std::uint32_t index = index_.find(brick);
-    return index == BrickIndex::missing ? brick_at(zeros, 0) : stored(index);
+    const BrickIndex::Entry entry = index_.entry(brick);
+    return brick_at(entry.number == BrickIndex::missing ? zeros : floats_of(entry.number), entry.value);
   }
 
   /// Whether the brick is in memory. If not, `brick` returns the brick of zeros.
@@ -135,16 +135,14 @@ class TensorField {
   TensorBrick brick_at(const float* floats, float strongest) const {
     return {floats, floats + TensorBrick::trailing_offset(components_), strongest, components_};
   }
-  TensorBrick stored(std::size_t index) const { return brick_at(floats_of(index), strongest_[index]); }
 
   Eigen::Affine3d to_world_, to_index_;
   Eigen::AlignedBox3d index_bounds_, voxels_;
   std::vector<Eigen::Vector3i> bricks_;
   Floats floats_;  ///< The bricks, in the order of `bricks_`.
   int components_ = TensorBrick::symmetric;
-  std::vector<float> strongest_;  ///< TensorBrick::strongest of each brick.
   double greatest_norm_ = 0;
-  BrickIndex index_;  ///< Finds a brick by its coordinates.
+  BrickIndex index_;  ///< Finds a brick, and its TensorBrick::strongest, by its coordinates.
 };
 
 }  // namespace tensorray
