@@ -25,7 +25,7 @@ struct PacketMedium {
   float voxel;          // If uniform: edge of a voxel, world units.
   float longest_voxel;  // No voxel is longer along any direction, world units.
   float to_index[3][3];
-  std::int32_t first[3], last[3];  // First and last voxels of the extent.
+  std::int32_t first[3], last[3];              // First and last voxels of the extent.
   std::int32_t first_inner[3], last_inner[3];  // No step from these bricks may leave the extent. May be none.
   float margin[3];     // Distance of the extent's faces from these voxels: ½ on an axis of a single voxel, else 0.
   bool flat;           // Whether an axis has a single voxel.
@@ -95,6 +95,7 @@ struct alignas(64) Packet {
   alignas(64) std::int32_t brick[3][packet_rays];
   std::int32_t ray[packet_rays];
   std::uint32_t alive = 0;  // One bit for each lane.
+  std::uint32_t moved = 0;  // The lanes that have entered other bricks for these samples; may be more.
   int vectors = 0;          // Number of vectors in use.
   std::uint32_t steps = 0, most_steps = 0;
   float greatest_reach = 0;

@@ -151,6 +151,7 @@ template <bool uniform, bool differentials, class Point>
 HWY_INLINE void locate(const PacketMedium& medium, Packet& packet, const Point& point_of) {
   const std::uint32_t beyond = packet.clamps ? find_cells<differentials, true>(packet, 0, point_of)
                                              : find_cells<differentials, false>(packet, 0, point_of);
+  packet.moved = beyond;
   if (HWY_LIKELY(beyond == 0)) return;
   move_to_bricks<uniform>(medium, packet, beyond, [&](int i) HWY_ATTR {
     const F3 point = load(packet.middle, i);
@@ -204,6 +205,11 @@ HWY_INLINE void interpolate(Packet& packet) {
     hn::Store(offsets_of<components>(voxel), bits, offsets.near + i);
     hn::Store(offsets_of<components>(hn::Add(voxel, set(1))), bits, offsets.far + i);
     hn::Store(find_cells_ahead<components, uniform>(packet, i), bits, offsets.ahead + i);
+  }
+  // Nothing has asked for these cells before.
+  for (std::uint32_t rest = packet.moved; rest != 0; rest &= rest - 1) {
+    const auto lane = hwy::Num0BitsBelowLS1Bit_Nonzero32(rest);
+    prefetch_cell<components>(packet.bending[lane] + offsets.near[lane]);
   }
   for (int i = 0; i < packet.vectors * lanes; i += lanes) {
     const bool together = in_one_cell(packet, i);

@@ -30,7 +30,8 @@ void BrickIndex::make_table(const std::vector<Eigen::Vector3i>& bricks, const Ei
   for (std::size_t i = 0; i < bricks.size(); ++i) {
     const Eigen::Vector3i at = bricks[i] - box.min();
     table_[(static_cast<std::size_t>(at.x()) * size_[1] + static_cast<std::size_t>(at.y())) * size_[2] +
-           static_cast<std::size_t>(at.z())].number = static_cast<std::uint32_t>(i);
+           static_cast<std::size_t>(at.z())]
+        .number = static_cast<std::uint32_t>(i);
   }
 }
 
