@@ -8,6 +8,7 @@ find_package(fmt REQUIRED)
 find_package(CLI11 REQUIRED)
 find_package(assimp REQUIRED)
 find_package(PNG REQUIRED)
+find_package(OpenEXR 3 REQUIRED)
 
 # On Debian, OpenVDB's find module is outside CMake's search path.
 file(GLOB OPENVDB_MODULE_PATHS /usr/lib/*/cmake/OpenVDB /usr/lib/cmake/OpenVDB /usr/local/lib*/cmake/OpenVDB)

@@ -16,6 +16,7 @@
 
 #include "base/errors.h"
 #include "base/text.h"
+#include "renderer/images/exr_encoder.h"
 #include "renderer/images/picture_library.h"
 #include "renderer/images/png_encoder.h"
 
@@ -24,13 +25,14 @@ namespace {
 
 PictureFormat find_format(const std::filesystem::path& path) {
   const std::string ending = lower_case_ending(path);
-  if (ending == ".exr") return {"openexr", SampleType::float32, false, true, true};
-  if (ending == ".png") return {"png", SampleType::uint16, true, true, true};
-  if (ending == ".jpg" || ending == ".jpeg") return {"jpeg", SampleType::uint8, true, false, false};
-  if (ending == ".tif" || ending == ".tiff") return {"tiff", SampleType::uint16, true, true, false};
+  if (ending == ".exr") return {"openexr", SampleType::float32, true};
+  if (ending == ".png") return {"png", SampleType::uint16, true};
+  if (ending == ".jpg" || ending == ".jpeg") return {"jpeg", SampleType::uint8, false};
+  if (ending == ".tif" || ending == ".tiff") return {"tiff", SampleType::uint16, true};
   throw std::runtime_error("unknown picture ending \"" + ending + "\"; known: " + joined(image_endings()));
 }
 
+bool is_exr(const PictureFormat& format) { return format.name == "openexr"; }
 bool is_png(const PictureFormat& format) { return format.name == "png"; }
 
 void check_size(const Image& image) {
@@ -102,6 +104,12 @@ const PictureLibrary& ready_library() {
   return library;
 }
 
+std::vector<unsigned char> encode(const Image& image, const PictureFormat& format, const ImageMetadata& metadata) {
+  if (is_exr(format)) return encode_exr(image, metadata, image_threads);
+  const Image shown = clipped(image, format.alpha);
+  return is_png(format) ? encode_png(shown, metadata) : ready_library().encode(shown, format, metadata);
+}
+
 /// Reads a file with one of the library's functions; errors name the file.
 template <class Decode>
 auto read(const std::filesystem::path& path, Decode PictureLibrary::*decode) {
@@ -142,18 +150,16 @@ void prepare_images(const std::vector<std::filesystem::path>& files) {
   for (const std::filesystem::path& file : files) {
     const std::vector<std::string> known = image_endings();
     const bool is_picture = std::find(known.begin(), known.end(), lower_case_ending(file)) != known.end();
-    if (is_picture && !is_png(find_format(file))) picture_library();
+    if (!is_picture) continue;
+    const PictureFormat format = find_format(file);
+    if (!is_exr(format) && !is_png(format)) picture_library();
   }
 }
 
 void write_image(const std::filesystem::path& path, const Image& image, const ImageMetadata& metadata) {
   check_size(image);
   try {
-    const PictureFormat format = find_format(path);
-    const bool clip = format.display_referred;
-    const Image clipped_image = clip ? clipped(image, format.alpha) : Image();
-    const Image& stored = clip ? clipped_image : image;
-    write_bytes(path, is_png(format) ? encode_png(stored, metadata) : ready_library().encode(stored, format, metadata));
+    write_bytes(path, encode(image, find_format(path), metadata));
   } catch (const std::exception& error) {
     throw std::runtime_error("cannot write " + path.string() + ": " + error.what());
   }

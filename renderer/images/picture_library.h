@@ -1,9 +1,8 @@
 #pragma once
 /// @file renderer/images/picture_library.h
 /// Everything that the program does with OpenImageIO. It is a library of its own, which is loaded when the first
-/// picture is read, looked up or written (but PNG is written without it): Debian's OpenImageIO brings 260 libraries,
-/// which take a quarter of a second to load, and several seconds from a cold disk. Commands and errors without a
-/// picture do not wait for them.
+/// picture is read or looked up, or written as JPEG or TIFF: Debian's OpenImageIO brings 260 libraries, which take a
+/// quarter of a second to load, and several seconds from a cold disk. Most renders do not wait for them.
 
 #include <cstddef>
 #include <filesystem>
@@ -21,9 +20,7 @@ enum class Wrap;
 struct PictureFormat {
   std::string name;                       ///< OpenImageIO's name of the format chooses the writer.
   SampleType type = SampleType::float32;  ///< Of the stored values.
-  bool display_referred = true;
   bool alpha = false;
-  bool all_metadata = false;
 };
 
 /// Pictures of several sizes (the levels of a MIP map) that give their pixels by rectangles.
@@ -54,6 +51,7 @@ struct TileLookup {
 /// The functions of the library. Errors are std::runtime_error with one line; the caller adds the file's name.
 struct PictureLibrary {
   void (*set_threads)(int threads);
+  /// JPEG and TIFF.
   std::vector<unsigned char> (*encode)(const Image& image, const PictureFormat& format, const ImageMetadata& metadata);
   Image (*decode)(const std::filesystem::path& path);
   NativeImage (*decode_native)(const std::filesystem::path& path);

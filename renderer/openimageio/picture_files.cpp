@@ -31,16 +31,14 @@ OIIO::ImageSpec make_spec(const Image& image, const PictureFormat& format, const
   OIIO::ImageSpec spec(image.width, image.height, static_cast<int>(image.channels.size()), type_desc(format.type));
   spec.channelnames = image.channels;
   if (image.channels.size() > 3 && image.channels[3] == "A") spec.alpha_channel = 3;
-  if (format.display_referred) spec.attribute("oiio:UnassociatedAlpha", 1);
-  if (format.name == "openexr") spec.attribute("compression", "zip");
+  spec.attribute("oiio:UnassociatedAlpha", 1);
   if (format.name == "jpeg") {
     spec.attribute("Compression", "jpeg:95");
     spec.attribute("jpeg:subsampling", "4:4:4");
+    spec.attribute("oiio:ColorSpace", "sRGB");
   }
-  if (format.name == "jpeg") spec.attribute("oiio:ColorSpace", "sRGB");
   for (const auto& [name, value] : metadata)
-    if (format.all_metadata || is_plain(name) || (format.name == "jpeg" && name == "oiio:ColorSpace"))
-      spec.attribute(name, value);
+    if (is_plain(name) || (format.name == "jpeg" && name == "oiio:ColorSpace")) spec.attribute(name, value);
   spec.attribute("DateTime", "");  // Prevents OpenImageIO from writing the time, which would differ between runs.
   return spec;
 }

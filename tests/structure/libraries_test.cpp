@@ -18,10 +18,10 @@ using test::Line, test::lines_of, test::top_folders;
 bool is_benchmark(const Line& line) { return line.is_under("tools/benchmark"); }
 
 TEST(Structure, HeavyLibrariesStayOutOfHeadersAndInTheirFolder) {
-  const std::map<std::string, std::string> homes{{"openvdb", "volumes"},      {"embree", "renderer"},
-                                                 {"OpenImageIO", "renderer"}, {"OpenColorIO", "renderer"},
-                                                 {"assimp", "renderer"},      {"boost", "tools"}};
-  const std::regex include("#include <(openvdb|embree|OpenImageIO|OpenColorIO|assimp|boost)");
+  const std::map<std::string, std::string> homes{
+      {"openvdb", "volumes"},  {"embree", "renderer"}, {"OpenImageIO", "renderer"}, {"OpenColorIO", "renderer"},
+      {"OpenEXR", "renderer"}, {"png", "renderer"},    {"assimp", "renderer"},      {"boost", "tools"}};
+  const std::regex include("#include <(openvdb|embree|OpenImageIO|OpenColorIO|OpenEXR|png|assimp|boost)");
   std::map<std::string, std::set<std::string>> users;
   for (const std::string& folder : top_folders())
     for (const Line& line : lines_of(folder)) {
@@ -39,6 +39,8 @@ TEST(Structure, HeavyLibrariesStayOutOfHeadersAndInTheirFolder) {
       {"embree", {"renderer/surfaces/embree_handles.h"}},
       {"OpenImageIO", {"renderer/openimageio/picture_files.cpp", "renderer/openimageio/tile_lookup.cpp"}},
       {"OpenColorIO", {"renderer/color/color.cpp"}},
+      {"OpenEXR", {"renderer/images/exr_encoder.cpp"}},
+      {"png", {"renderer/images/png_encoder.cpp"}},
       {"assimp", {"renderer/surfaces/mesh.cpp"}},
       {"boost", {"tools/viewer/http_connection.cpp", "tools/viewer/page_socket.cpp", "tools/viewer/server_state.h"}}};
   for (const auto& [library, files] : only) EXPECT_EQ(users[library], files) << library;

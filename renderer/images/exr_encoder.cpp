@@ -1,0 +1,114 @@
+#include "renderer/images/exr_encoder.h"
+
+#include <algorithm>
+#include <cstdint>
+#include <exception>
+#include <mutex>
+#include <new>
+#include <set>
+#include <stdexcept>
+#include <string>
+#include <thread>
+
+#include <OpenEXR/ImfChannelList.h>
+#include <OpenEXR/ImfFrameBuffer.h>
+#include <OpenEXR/ImfHeader.h>
+#include <OpenEXR/ImfIO.h>
+#include <OpenEXR/ImfOutputFile.h>
+#include <OpenEXR/ImfStringAttribute.h>
+#include <OpenEXR/ImfThreading.h>
+
+#include "base/text.h"
+
+namespace tensorray {
+namespace {
+
+/// A file in memory. OpenEXR goes back in it to write where the rows are.
+class MemoryFile : public Imf::OStream {
+ public:
+  MemoryFile() : OStream("in memory") {}
+
+  void write(const char data[], int size) override {
+    const std::size_t end = position_ + static_cast<std::size_t>(size);
+    if (end > bytes.size()) bytes.resize(end);
+    std::copy_n(data, size, bytes.begin() + static_cast<std::ptrdiff_t>(position_));
+    position_ = end;
+  }
+  std::uint64_t tellp() override { return position_; }
+  void seekp(std::uint64_t position) override { position_ = static_cast<std::size_t>(position); }
+
+  std::vector<unsigned char> bytes;
+
+ private:
+  std::size_t position_ = 0;
+};
+
+/// The name of the format for an attribute.
+std::string attribute_name(const std::string& attribute) {
+  if (attribute == "ImageDescription") return "comments";
+  return attribute == "Copyright" ? "owner" : attribute;
+}
+
+/// The names of the channels in the file, all different.
+std::vector<std::string> distinct_names(const std::vector<std::string>& channels) {
+  constexpr std::size_t longest = 255;
+  std::set<std::string> taken;
+  std::vector<std::string> names;
+  for (std::size_t c = 0; c < channels.size(); ++c) {
+    std::string name = channels[c].substr(0, longest);
+    if (name.empty() || !taken.insert(name).second) name = "channel" + std::to_string(c);
+    names.push_back(name);
+  }
+  return names;
+}
+
+Imf::Header header_of(const Image& image, const ImageMetadata& metadata) {
+  Imf::Header header(image.width, image.height);
+  header.compression() = Imf::ZIP_COMPRESSION;
+  header.insert("capDate", Imf::StringAttribute());  // Unknown: the same picture gives the same bytes at any time.
+  const std::set<std::string> left_out{"", "type", "oiio:ColorSpace"};
+  for (const auto& [attribute, text] : metadata) {
+    const std::string name = attribute_name(attribute);
+    const bool is_free = left_out.count(name) == 0 && header.find(name) == header.end();
+    if (is_free) header.insert(name, Imf::StringAttribute(text));
+  }
+  return header;
+}
+
+/// OpenImageIO, which reads with the same pool, sets the same number (renderer/openimageio/picture_files.cpp).
+void set_pool(int threads) {
+  const int all = static_cast<int>(std::thread::hardware_concurrency());
+  const int wanted = threads == 0 ? all : threads == 1 ? 0 : threads;  // 0: the calling thread alone.
+  static std::mutex mutex;
+  const std::lock_guard<std::mutex> lock(mutex);
+  if (Imf::globalThreadCount() != wanted) Imf::setGlobalThreadCount(wanted);
+}
+
+}  // namespace
+
+std::vector<unsigned char> encode_exr(const Image& image, const ImageMetadata& metadata, int threads) {
+  const std::string failure = "the picture cannot be encoded as EXR: ";
+  set_pool(threads);
+  MemoryFile memory;
+  try {
+    Imf::Header header = header_of(image, metadata);
+    Imf::FrameBuffer channels;
+    const std::vector<std::string> names = distinct_names(image.channels);
+    const std::size_t pixel_bytes = names.size() * sizeof(float);
+    for (std::size_t c = 0; c < names.size(); ++c) {
+      header.channels().insert(names[c], Imf::Channel(Imf::FLOAT));
+      char* const first = reinterpret_cast<char*>(const_cast<float*>(&image.pixels[c]));  // It is only read.
+      channels.insert(names[c], Imf::Slice(Imf::FLOAT, first, pixel_bytes, pixel_bytes * image.width));
+    }
+    Imf::OutputFile file(memory, header);
+    file.setFrameBuffer(channels);
+    file.writePixels(image.height);
+  } catch (const std::bad_alloc&) {
+    throw std::runtime_error(failure + "there is not enough memory");
+  } catch (const std::exception& error) {
+    throw std::runtime_error(failure + one_line(error.what()));
+  }
+  return std::move(memory.bytes);
+}
+
+}  // namespace tensorray

@@ -1,0 +1,126 @@
+#include "renderer/images/exr_encoder.h"
+
+#include <cmath>
+#include <cstdlib>
+#include <cstring>
+#include <stdexcept>
+
+#include <dlfcn.h>
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "tests/images/picture_files.h"
+#include "tests/renderer/support.h"
+
+namespace tensorray {
+namespace {
+
+using ::testing::HasSubstr;
+using ::testing::Not;
+
+/// A picture whose values are all different, and beside them those that are not numbers.
+Image picture(int width, int height, std::vector<std::string> channels) {
+  Image image(width, height, std::move(channels));
+  for (std::size_t i = 0; i < image.pixels.size(); ++i) image.pixels[i] = 0.37f * static_cast<float>(i) - 100;
+  const std::vector<float> odd{NAN, INFINITY, -INFINITY, -0.0f, 1e-42f};
+  for (std::size_t i = 0; i < std::min(odd.size(), image.pixels.size()); ++i) image.pixels[i] = odd[i];
+  return image;
+}
+
+std::string file_of(const Image& image, const ImageMetadata& metadata = {}, int threads = 1) {
+  const std::vector<unsigned char> bytes = encode_exr(image, metadata, threads);
+  return {bytes.begin(), bytes.end()};
+}
+
+/// An attribute of text, as the format stores it.
+std::string attribute(const std::string& name, const std::string& text) {
+  const std::string zero(1, '\0');
+  return name + zero + "string" + zero + little_endian(static_cast<std::int32_t>(text.size())) + text;
+}
+
+TEST(ExrEncoderTest, PicturesAreReadBackBitForBit) {
+  // OpenImageIO gives R, G, B, A first, and the others in alphabetical order.
+  for (const std::vector<std::string>& channels :
+       {std::vector<std::string>{"Y"}, std::vector<std::string>{"R", "G", "B"},
+        std::vector<std::string>{"R", "G", "B", "A"},
+        std::vector<std::string>{"R", "G", "B", "A", "Z", "albedo.R", "normal.X", "sun.R"},
+        std::vector<std::string>{"R", "G", "B", "S0.423,750000nm", "S0.511,250000nm"}})
+    for (const auto& [width, height] : {std::pair(1, 1), std::pair(5, 16), std::pair(70, 37)}) {
+      const Image image = picture(width, height, channels);
+      const Temporary file("picture.exr", file_of(image));
+      const Image read = read_image(file.path());
+      ASSERT_EQ(read.channels, channels);
+      ASSERT_EQ(read.width, width);
+      ASSERT_EQ(read.height, height);
+      EXPECT_EQ(std::memcmp(read.pixels.data(), image.pixels.data(), sizeof(float) * image.pixels.size()), 0);
+    }
+}
+
+TEST(ExrEncoderTest, ChannelsMayHaveAnyOrder) {
+  const Image image = picture(4, 3, {"Z", "B", "A", "G", "albedo.B", "R"});
+  const Temporary file("order.exr", file_of(image));
+  const Image read = read_image(file.path());
+  EXPECT_EQ(read.channels, (std::vector<std::string>{"R", "G", "B", "A", "Z", "albedo.B"}));
+  const std::vector<std::size_t> from{5, 3, 1, 2, 0, 4};
+  for (std::size_t c = 0; c < from.size(); ++c) EXPECT_EQ(read.pixel(2, 1)[c], image.pixel(2, 1)[from[c]]);
+}
+
+TEST(ExrEncoderTest, MetadataIsText) {
+  const std::string file = file_of(picture(2, 2, {"R", "G", "B"}), {{"ImageDescription", "a\nb"},
+                                                                    {"Copyright", "all"},
+                                                                    {"Software", "tensorray 9.9"},
+                                                                    {"spectralLayoutVersion", "1.0"},
+                                                                    {"tensorray:done", "0.5000"},
+                                                                    {"empty", ""},
+                                                                    {std::string(40, 'x'), "long"}});
+  for (const auto& [name, text] : {std::pair<std::string, std::string>("comments", "a\nb"),
+                                   {"owner", "all"},
+                                   {"Software", "tensorray 9.9"},
+                                   {"spectralLayoutVersion", "1.0"},
+                                   {"tensorray:done", "0.5000"},
+                                   {"empty", ""},
+                                   {std::string(40, 'x'), "long"}})
+    EXPECT_THAT(file, HasSubstr(attribute(name, text)));
+}
+
+TEST(ExrEncoderTest, MetadataThatTheFormatHasNoPlaceForIsLeftOut) {
+  const Image image = picture(2, 2, {"R", "G", "B"});
+  const std::string plain = file_of(image);
+  for (const std::string name : {"", "channels", "dataWindow", "capDate", "type", "oiio:ColorSpace"})
+    EXPECT_TRUE(file_of(image, {{name, "text"}}) == plain) << name;
+}
+
+TEST(ExrEncoderTest, ChannelsOfTheSameNameAreAllWritten) {
+  const std::string name(300, 'n');
+  const Temporary file("names.exr", file_of(picture(3, 2, {"R", "G", "B", "R", "", name + "1", name + "2"})));
+  EXPECT_EQ(read_image(file.path()).channels,
+            (std::vector<std::string>{"R", "G", "B", "channel3", "channel4", "channel6", name.substr(0, 255)}));
+}
+
+TEST(ExrEncoderTest, AnyNumberOfThreadsGivesTheSameBytes) {
+  const Image image = picture(300, 200, {"R", "G", "B", "A"});
+  const std::string one = file_of(image, {}, 1);
+  for (const int threads : {2, 5, 0}) EXPECT_TRUE(file_of(image, {}, threads) == one) << threads;
+}
+
+TEST(ExrEncoderTest, PicturesThatAreTooLargeAreErrors) {
+  Image image = picture(1, 1, {"R"});
+  image.width = 1 << 30;
+  EXPECT_THAT(message([&] { encode_exr(image, {}, 1); }), HasSubstr("cannot be encoded as EXR: "));
+}
+
+/// In a process of its own, as other tests load it.
+TEST(ExrEncoderDeathTest, WritingDoesNotLoadOpenImageIO) {
+  GTEST_FLAG_SET(death_test_style, "threadsafe");
+  const auto is_loaded = [] { return dlopen("libtensorray_pictures.so", RTLD_LAZY | RTLD_NOLOAD) != nullptr; };
+  const auto write = [&](const std::string& ending) {
+    const Temporary file("alone" + ending);
+    prepare_images({file.path()});
+    write_image(file.path(), Image(3, 3, {"R", "G", "B"}));
+    return is_loaded();
+  };
+  EXPECT_EXIT(std::exit(write(".exr") || write(".png") || !write(".tif")), ::testing::ExitedWithCode(0), "");
+}
+
+}  // namespace
+}  // namespace tensorray
