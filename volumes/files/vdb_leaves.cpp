@@ -1,69 +1,77 @@
 #include "volumes/files/vdb_leaves.h"
 
-#include <array>
-#include <istream>
-#include <streambuf>
+#include <cstring>
+#include <sstream>
+#include <string>
 
 #include <openvdb/io/Compression.h>
+#include <openvdb/points/StreamCompression.h>
+
+#include "base/byte_order.h"
 
 namespace tensorray {
 namespace {
 
 constexpr int voxels = TensorBlock::voxels;
 
-/// Bytes in memory as a stream, which OpenVDB's functions need.
-class MemoryBuffer : public std::streambuf {
- public:
-  void set(const char* begin, const char* end) {
-    char* const first = const_cast<char*>(begin);  // Nobody writes to it.
-    setg(first, first, first + (end - begin));
-  }
-};
-
-constexpr std::size_t greatest_value = 24;  // Bytes.
-
-/// What a thread needs to unpack leaves. Making a stream takes as long as half of a leaf.
-struct Unpacking {
-  MemoryBuffer buffer;
-  std::istream stream{&buffer};
-  alignas(8) std::array<char, voxels * greatest_value> values;
-};
-
 }  // namespace
 
 LeafReader::LeafReader(const FileBytes& file, const StoredTree& tree)
     : file_(file), tree_(tree), size_(value_size(tree.type).value()) {}
 
+void LeafReader::fetch(const StoredLeaf& leaf, const StoredLeaf& last) {
+  first_ = leaf.at;
+  stored_.resize(static_cast<std::size_t>(last.at + last.bytes - first_));
+  if (!file_.read(first_, stored_.data(), stored_.size())) throw Misfit();
+}
+
 void LeafReader::read(const StoredLeaf& leaf, const std::vector<TensorEntry>& entries, TensorBlock& block) {
-  thread_local Unpacking unpacking;
   const auto bytes = static_cast<std::size_t>(leaf.bytes);
-  stored_.resize(bytes);
-  if (bytes == 0 || !file_.read(leaf.at, stored_.data(), bytes)) throw Misfit();
-  const char* const stored = stored_.data();
+  if (bytes == 0) throw Misfit();
+  const char* const stored = stored_.data() + (leaf.at - first_);
   const int flag = static_cast<signed char>(stored[0]);
   const auto before = static_cast<std::size_t>(1 + bytes_behind_flag(flag, size_, voxels));
   const bool has_all = flag == all_values || !tree_.active_only;
   const std::size_t count = has_all ? voxels : leaf.active.count();
-  const std::size_t unpacked = count * static_cast<std::size_t>(tree_.half ? size_.half : size_.full);
+  const std::size_t expected = count * static_cast<std::size_t>(tree_.half ? size_.half : size_.full);
   if (before > bytes) throw Misfit();
   if (count == 0) return;
-  auto& [buffer, stream, values] = unpacking;
-  buffer.set(stored + before, stored + bytes);
-  stream.clear();
-  if (tree_.blosc)
-    openvdb::io::bloscFromStream(stream, values.data(), unpacked);
-  else if (tree_.zip)
-    openvdb::io::unzipFromStream(stream, values.data(), unpacked);
-  else
-    stream.read(values.data(), static_cast<std::streamsize>(unpacked));
-  if (!stream) throw Misfit();
+  const char* const values = unpacked(stored + before, bytes - before, expected);
   const bool is_double = size_.full % 8 == 0;
   if (tree_.half)
-    put<openvdb::math::half>(values.data(), leaf, has_all, entries, block);
+    put<openvdb::math::half>(values, leaf, has_all, entries, block);
   else if (is_double)
-    put<double>(values.data(), leaf, has_all, entries, block);
+    put<double>(values, leaf, has_all, entries, block);
   else
-    put<float>(values.data(), leaf, has_all, entries, block);
+    put<float>(values, leaf, has_all, entries, block);
+}
+
+/// The values of a chunk of `bytes`.
+const char* LeafReader::unpacked(const char* chunk, std::size_t bytes, std::size_t expected) {
+  constexpr std::size_t length_bytes = 8;
+  if (tree_.blosc || tree_.zip) {
+    if (bytes < length_bytes) throw Misfit();
+    const auto stored = read_number<std::int64_t>(chunk, ByteOrder::little);
+    if (stored > 0 && tree_.blosc) {
+      chunk += length_bytes;
+      if (static_cast<std::size_t>(stored) > bytes - length_bytes || stored < 16 ||
+          !blosc_fits(chunk, stored, static_cast<std::int64_t>(expected)))
+        throw Misfit();
+      openvdb::compression::bloscDecompress(values_.data(), expected, values_.size(), chunk);
+      return values_.data();
+    }
+    if (stored > 0) {
+      std::istringstream stream(std::string(chunk, bytes));
+      openvdb::io::unzipFromStream(stream, values_.data(), expected);
+      if (!stream) throw Misfit();
+      return values_.data();
+    }
+    chunk += length_bytes;  // The chunk is not compressed.
+    bytes -= length_bytes;
+  }
+  if (bytes < expected) throw Misfit();
+  std::memcpy(values_.data(), chunk, expected);
+  return values_.data();
 }
 
 template <class Number>
