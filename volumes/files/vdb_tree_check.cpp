@@ -13,7 +13,7 @@ constexpr int blosc_header = 16;
 constexpr int leaf_width = TensorBlock::size, lower_width = 16 * leaf_width, upper_width = 32 * lower_width;
 
 // Topology is read as it stands; of values only the beginnings are.
-constexpr std::size_t topology_window = 1 << 16, values_window = 256;
+constexpr std::size_t topology_window = 1 << 16, values_window = 96;
 
 class Walker {
  public:
