@@ -20,7 +20,7 @@ LeafReader::LeafReader(const FileBytes& file, const StoredTree& tree)
     : file_(file), tree_(tree), size_(value_size(tree.type).value()) {}
 
 void LeafReader::fetch(const StoredLeaf& leaf, const StoredLeaf& last) {
-  first_ = leaf.at;
+  first_ = leaf.at - StoredLeaf::mask_bytes;
   stored_.resize(static_cast<std::size_t>(last.at + last.bytes - first_));
   if (!file_.read(first_, stored_.data(), stored_.size())) throw Misfit();
 }
@@ -30,6 +30,7 @@ void LeafReader::read(const StoredLeaf& leaf, const std::vector<TensorEntry>& en
   if (bytes == 0) throw Misfit();
   const char* const stored = stored_.data() + (leaf.at - first_);
   const int flag = static_cast<signed char>(stored[0]);
+  if (flag != leaf.flag || voxel_mask(stored - StoredLeaf::mask_bytes) != leaf.active) throw Misfit();
   const auto before = static_cast<std::size_t>(1 + bytes_behind_flag(flag, size_, voxels));
   const bool has_all = flag == all_values || !tree_.active_only;
   const std::size_t count = has_all ? voxels : leaf.active.count();
@@ -48,13 +49,13 @@ void LeafReader::read(const StoredLeaf& leaf, const std::vector<TensorEntry>& en
 
 /// The values of a chunk of `bytes`.
 const char* LeafReader::unpacked(const char* chunk, std::size_t bytes, std::size_t expected) {
-  constexpr std::size_t length_bytes = 8;
+  constexpr std::size_t length_bytes = 8, blosc_header = 16;
   if (tree_.blosc || tree_.zip) {
     if (bytes < length_bytes) throw Misfit();
     const auto stored = read_number<std::int64_t>(chunk, ByteOrder::little);
     if (stored > 0 && tree_.blosc) {
       chunk += length_bytes;
-      if (static_cast<std::size_t>(stored) > bytes - length_bytes || stored < 16 ||
+      if (static_cast<std::size_t>(stored) != bytes - length_bytes || bytes - length_bytes < blosc_header ||
           !blosc_fits(chunk, stored, static_cast<std::int64_t>(expected)))
         throw Misfit();
       openvdb::compression::bloscDecompress(values_.data(), expected, values_.size(), chunk);
@@ -69,7 +70,7 @@ const char* LeafReader::unpacked(const char* chunk, std::size_t bytes, std::size
     chunk += length_bytes;  // The chunk is not compressed.
     bytes -= length_bytes;
   }
-  if (bytes < expected) throw Misfit();
+  if (bytes != expected) throw Misfit();
   std::memcpy(values_.data(), chunk, expected);
   return values_.data();
 }

@@ -25,7 +25,7 @@ class LeafReader {
 
   /// Whether the bytes of the leaf are in memory.
   bool has(const StoredLeaf& leaf) const {
-    return leaf.at >= first_ && leaf.at + leaf.bytes <= first_ + static_cast<std::int64_t>(stored_.size());
+    return leaf.at > first_ && leaf.at + leaf.bytes <= first_ + static_cast<std::int64_t>(stored_.size());
   }
 
   /// Brings the bytes of a leaf, and what follows them up to the end of another one, into memory.
