@@ -4,9 +4,12 @@
 #include <bitset>
 #include <cmath>
 #include <cstring>
+#include <optional>
 #include <tuple>
 
 #include <tbb/parallel_sort.h>
+
+#include "volumes/grids/four_floats.h"
 
 namespace tensorray {
 namespace {
@@ -46,30 +49,7 @@ int block_offset(int voxel) {
          TensorBrick::bending_offset(components, voxel % size);
 }
 
-/// Vectors of four numbers, which all processors have.
-using Four = float __attribute__((vector_size(16)));
-using FourBits = std::uint32_t __attribute__((vector_size(16)));
-
-Four read(const float* from) {
-  Four vector;
-  std::memcpy(&vector, from, sizeof vector);
-  return vector;
-}
-
-void write(const Four& vector, float* to) { std::memcpy(to, &vector, sizeof vector); }
-
 Four square(const Four& x) { return x * x; }
-
-Four kept(const Four& x, const FourBits& mask) { return reinterpret_cast<Four>(reinterpret_cast<FourBits>(x) & mask); }
-
-FourBits difference(const Four& a, const Four& b) {
-  return reinterpret_cast<FourBits>(a) ^ reinterpret_cast<FourBits>(b);
-}
-
-Four low_pairs(const Four& a, const Four& b) { return __builtin_shufflevector(a, b, 0, 4, 1, 5); }
-Four high_pairs(const Four& a, const Four& b) { return __builtin_shufflevector(a, b, 2, 6, 3, 7); }
-Four low_halves(const Four& a, const Four& b) { return __builtin_shufflevector(a, b, 0, 1, 4, 5); }
-Four high_halves(const Four& a, const Four& b) { return __builtin_shufflevector(a, b, 2, 3, 6, 7); }
 
 /// Some components of four voxels: each first a vector of a voxel, then a vector of a component.
 struct FourVoxels {
@@ -102,16 +82,16 @@ Conversion convert(const TensorBlock& block, BlockVoxels& voxels) {
     for (int k = 0; k < 4; ++k) {
       const float* const T = block.values[i + k].data();
       float* const bending = voxels.bending + block_offset<components>(i + k);
-      const Four begin = read(T), end = read(T + 4), last{T[8], T[8], T[8], T[8]};
+      const Four begin = read_four(T), end = read_four(T + 4), last{T[8], T[8], T[8], T[8]};
       const Four low = low_pairs(begin, end), high = high_pairs(begin, end);
       asymmetry |= difference(low, high);           // In the upper half.
       corner_asymmetry |= difference(begin, end);  // In the third number.
       const Four second = end - kept(last, first_one);
-      write(begin - kept(last, first_one), bending);
+      write_four(begin - kept(last, first_one), bending);
       if constexpr (components == TensorBrick::symmetric)
-        write(kept(second, first_two), bending + 3);  // The next voxel, or a zero that fills a cache line, follows.
+        write_four(kept(second, first_two), bending + 3);  // The next voxel, or a zero that fills a cache line, follows.
       else
-        write(second, bending + 4);
+        write_four(second, bending + 4);
       squares.v[k] = square(begin) + square(end);
       diagonal.v[k] = low - kept(last, first_two);
     }
@@ -125,9 +105,9 @@ Conversion convert(const TensorBlock& block, BlockVoxels& voxels) {
     greatest = greatest < norm ? norm : greatest;
     // The relative error of single precision is below 2e-6 here, because the trace takes at most two thirds of the
     // squares away.
-    write(sum - square(diagonal.v[0] + diagonal.v[1]) * (1.0f / 3), voxels.deviator + i);
-    write(sum, voxels.squares + i);
-    write(last, voxels.trailing + i);
+    write_four(sum - square(diagonal.v[0] + diagonal.v[1]) * (1.0f / 3), voxels.deviator + i);
+    write_four(sum, voxels.squares + i);
+    write_four(last, voxels.trailing + i);
   }
   return {std::max(std::max(greatest[0], greatest[1]), std::max(greatest[2], greatest[3])),
           (asymmetry[2] | asymmetry[3] | corner_asymmetry[2]) == 0};
@@ -195,10 +175,11 @@ double greatest_squared_deviator(const TensorBrick& brick) {
 }
 
 template <int components>
-BlockShare place(const TensorBlock& block, const std::array<float*, bricks_of_block>& bricks) {
+std::optional<BlockShare> place(const TensorBlock& block, const std::array<float*, bricks_of_block>& bricks) {
   BlockVoxels voxels;
   BlockShare share;
-  const float norm = convert<components>(block, voxels).norm;
+  const auto [norm, is_symmetric] = convert<components>(block, voxels);
+  if (components == TensorBrick::symmetric && !is_symmetric) return std::nullopt;
   share.norm = norm > least && norm < most ? double{norm} : greatest_squared_norm(block);
   for (int bits = 0; bits < bricks_of_block; ++bits) {
     const bool is_row = corner(bits).z() == 0;
@@ -239,21 +220,8 @@ std::vector<Eigen::Vector3i> active_bricks(const BlockTable& table, const Eigen:
   return bricks;
 }
 
-bool has_symmetric_tensors(const TensorBlock& block) {
-  const auto bits = [](const float& value) {
-    std::uint32_t result;
-    std::memcpy(&result, &value, sizeof result);
-    return result;
-  };
-  std::uint32_t difference = 0;
-  for (const Eigen::Matrix3f& value : block.values) {
-    const float* const T = value.data();
-    difference |= (bits(T[1]) ^ bits(T[3])) | (bits(T[2]) ^ bits(T[6])) | (bits(T[5]) ^ bits(T[7]));
-  }
-  return difference == 0;
-}
-
-BlockShare place_block(const TensorBlock& block, int components, const std::array<float*, bricks_of_block>& bricks) {
+std::optional<BlockShare> place_block(const TensorBlock& block, int components,
+                                      const std::array<float*, bricks_of_block>& bricks) {
   return components == TensorBrick::symmetric ? place<TensorBrick::symmetric>(block, bricks)
                                               : place<TensorBrick::general>(block, bricks);
 }

@@ -350,6 +350,9 @@ struct StoredField {
   static constexpr std::uint32_t missing = 0xffffffffu;
 
   std::uint32_t leaf(std::size_t block, std::size_t grid) const { return leaves[block * grids.size() + grid]; }
+  const StoredLeaf& leaf_of(std::size_t block, std::size_t grid) const {
+    return grids[grid].leaves[leaf(block, grid)];
+  }
   std::size_t block_count() const { return leaves.size() / grids.size(); }
 
   explicit StoredField(const std::filesystem::path& p) : path(p), file(p) {}
@@ -393,17 +396,30 @@ const StoredLeaf& last_of_run(const StoredField& field, std::size_t block, std::
   return field.grids[grid].leaves[leaf];
 }
 
+void read_leaves(const StoredField& field, std::size_t i, std::vector<LeafReader>& readers, TensorBlock& block) {
+  std::array<const float*, 3> rows{};
+  std::size_t whole_rows = 0;
+  const std::size_t count = field.grids.size();
+  for (std::size_t grid = 0; grid < count; ++grid) {
+    if (field.leaf(i, grid) == StoredField::missing) continue;
+    const StoredLeaf& leaf = field.leaf_of(i, grid);
+    LeafReader& reader = readers[grid];
+    if (!reader.has(leaf)) reader.fetch(leaf, last_of_run(field, i, grid));
+    reader.unpack(leaf);
+    if (count == rows.size() && (rows[grid] = reader.vectors(leaf))) ++whole_rows;
+  }
+  if (whole_rows == rows.size()) return put_rows(rows, block);
+  for (std::size_t grid = 0; grid < count; ++grid)
+    if (field.leaf(i, grid) != StoredField::missing)
+      readers[grid].put(field.leaf_of(i, grid), field.grids[grid].entries, block);
+}
+
 void fill_block(const StoredField& field, std::size_t i, TensorBlock& block) {
   std::vector<LeafReader>& readers = field.readers.local();
   if (readers.empty())
     for (const StoredField::Grid& grid : field.grids) readers.emplace_back(field.file, grid.tree);
   try {
-    for (std::size_t grid = 0; grid < field.grids.size(); ++grid) {
-      if (field.leaf(i, grid) == StoredField::missing) continue;
-      const StoredLeaf& leaf = field.grids[grid].leaves[field.leaf(i, grid)];
-      if (!readers[grid].has(leaf)) readers[grid].fetch(leaf, last_of_run(field, i, grid));
-      readers[grid].read(leaf, field.grids[grid].entries, block);
-    }
+    read_leaves(field, i, readers, block);
   } catch (const Misfit&) {
     fail_damaged_voxels(field.path);
   } catch (const openvdb::Exception&) {

@@ -32,16 +32,22 @@ class LeafReader {
   /// @throw Misfit if the file is damaged.
   void fetch(const StoredLeaf& leaf, const StoredLeaf& last);
 
-  /// Writes the values of the leaf's active voxels to `block`. @param leaf  Its bytes are in memory.
+  /// Unpacks the values of a leaf whose bytes are in memory. They stay until the next call.
   /// @throw Misfit, or what OpenVDB throws, if the file is damaged.
-  void read(const StoredLeaf& leaf, const std::vector<TensorEntry>& entries, TensorBlock& block);
+  void unpack(const StoredLeaf& leaf);
+
+  /// Writes the values of the active voxels of `leaf`, the one unpacked last, to `block`.
+  void put(const StoredLeaf& leaf, const std::vector<TensorEntry>& entries, TensorBlock& block) const;
+
+  /// The values of `leaf`, the one unpacked last, if they are vectors of three floats and all its voxels are active. Four
+  /// floats may be read at each. Otherwise null.
+  const float* vectors(const StoredLeaf& leaf) const;
 
  private:
-  const char* unpacked(const char* chunk, std::size_t bytes, std::size_t expected);
+  void unpack(const char* chunk, std::size_t bytes, std::size_t expected);
 
   template <class Number>
-  void put(const char* values, const StoredLeaf& leaf, bool has_all, const std::vector<TensorEntry>& entries,
-           TensorBlock& block) const;
+  void put_numbers(const StoredLeaf& leaf, const std::vector<TensorEntry>& entries, TensorBlock& block) const;
 
   static constexpr std::size_t greatest_value = 24, blosc_overhead = 16;  // Bytes.
 
@@ -50,7 +56,11 @@ class LeafReader {
   const ValueSize size_;
   std::vector<char> stored_;  ///< Bytes of the file from position `first_` on.
   std::int64_t first_ = 0;
+  bool has_all_ = false;  ///< Values are those of all voxels, not of the active ones.
   alignas(8) std::array<char, TensorBlock::voxels * greatest_value + blosc_overhead> values_;
 };
+
+/// Writes the three rows of the tensors of all voxels, as `LeafReader::vectors` has them, to `block`.
+void put_rows(const std::array<const float*, 3>& rows, TensorBlock& block);
 
 }  // namespace tensorray
