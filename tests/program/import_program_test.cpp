@@ -25,7 +25,7 @@ class WithoutImport : public Program {
 TEST_F(WithoutImport, TheErrorSaysHowToBuildIt) {
   write("scene.json", small_scene());
   write("a.vtu", "");
-  write("lines.vtp", "");
+  write("lines.vtp", "<VTKFile/>");
   for (const std::string arguments :
        {"import a.vtu -o a.vdb",
         "render scene.json -q --set integrator.type=path_tracing --set integrator.paths=lines.vtp -o a.png"}) {

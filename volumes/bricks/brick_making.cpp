@@ -84,12 +84,13 @@ Conversion convert(const TensorBlock& block, BlockVoxels& voxels) {
       float* const bending = voxels.bending + block_offset<components>(i + k);
       const Four begin = read_four(T), end = read_four(T + 4), last{T[8], T[8], T[8], T[8]};
       const Four low = low_pairs(begin, end), high = high_pairs(begin, end);
-      asymmetry |= difference(low, high);           // In the upper half.
+      asymmetry |= difference(low, high);          // In the upper half.
       corner_asymmetry |= difference(begin, end);  // In the third number.
       const Four second = end - kept(last, first_one);
       write_four(begin - kept(last, first_one), bending);
       if constexpr (components == TensorBrick::symmetric)
-        write_four(kept(second, first_two), bending + 3);  // The next voxel, or a zero that fills a cache line, follows.
+        write_four(kept(second, first_two),
+                   bending + 3);  // The next voxel, or a zero that fills a cache line, follows.
       else
         write_four(second, bending + 4);
       squares.v[k] = square(begin) + square(end);

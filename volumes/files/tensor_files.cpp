@@ -350,9 +350,7 @@ struct StoredField {
   static constexpr std::uint32_t missing = 0xffffffffu;
 
   std::uint32_t leaf(std::size_t block, std::size_t grid) const { return leaves[block * grids.size() + grid]; }
-  const StoredLeaf& leaf_of(std::size_t block, std::size_t grid) const {
-    return grids[grid].leaves[leaf(block, grid)];
-  }
+  const StoredLeaf& leaf_of(std::size_t block, std::size_t grid) const { return grids[grid].leaves[leaf(block, grid)]; }
   std::size_t block_count() const { return leaves.size() / grids.size(); }
 
   explicit StoredField(const std::filesystem::path& p) : path(p), file(p) {}

@@ -225,8 +225,9 @@ class Reader : private openvdb::io::Archive {
     result.grid->readTransform(in_);
     result.tree = stored_tree(descriptor, compression);
     const FileBytes file(path_);
-    const bool fits = by_table && table_ ? tree_fits(file, in_.tellg(), descriptor.getEndPos(), *table_, result.tree, leaves)
-                                         : tree_fits(file, in_.tellg(), result.tree, leaves);
+    const bool fits = by_table && table_
+                          ? tree_fits(file, in_.tellg(), descriptor.getEndPos(), *table_, result.tree, leaves)
+                          : tree_fits(file, in_.tellg(), result.tree, leaves);
     if (!fits) fail_damaged(path_, "");
     return result;
   }

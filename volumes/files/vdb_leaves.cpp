@@ -23,7 +23,9 @@ LeafReader::LeafReader(const FileBytes& file, const StoredTree& tree)
 void LeafReader::fetch(const StoredLeaf& leaf, const StoredLeaf& last) {
   first_ = leaf.at - StoredLeaf::mask_bytes;
   stored_.resize(static_cast<std::size_t>(last.at + last.bytes - first_));
-  if (!file_.read(first_, stored_.data(), stored_.size())) throw Misfit();
+  if (file_.read(first_, stored_.data(), stored_.size())) return;
+  stored_.clear();
+  throw Misfit();
 }
 
 void LeafReader::unpack(const StoredLeaf& leaf) {

@@ -39,8 +39,8 @@ class LeafReader {
   /// Writes the values of the active voxels of `leaf`, the one unpacked last, to `block`.
   void put(const StoredLeaf& leaf, const std::vector<TensorEntry>& entries, TensorBlock& block) const;
 
-  /// The values of `leaf`, the one unpacked last, if they are vectors of three floats and all its voxels are active. Four
-  /// floats may be read at each. Otherwise null.
+  /// The values of `leaf`, the one unpacked last, if they are vectors of three floats and all its voxels are active.
+  /// Four floats may be read at each. Otherwise null.
   const float* vectors(const StoredLeaf& leaf) const;
 
  private:

@@ -1,5 +1,6 @@
 #include "volumes/files/vdb_tree_check.h"
 
+#include <algorithm>
 #include <cstring>
 #include <map>
 
@@ -25,6 +26,7 @@ constexpr std::int64_t greatest_chunk = 1 << 20;  // More than leaves have.
 template <std::size_t Count>
 std::bitset<Count> read_mask(const char* bytes) {
   std::bitset<Count> bits;
+  if (std::all_of(bytes, bytes + Count / 8, [](char byte) { return byte == '\xff'; })) return bits.set();
   for (std::size_t i = Count / 64; i-- > 0;)
     bits = bits << 64 | std::bitset<Count>(read_number<std::uint64_t>(bytes + 8 * i, ByteOrder::little));
   return bits;
@@ -262,6 +264,7 @@ bool walk(const FileBytes& file, std::int64_t at, const StoredTree& tree, Stored
   const std::optional<ValueSize> size = value_size(tree.type);
   if (!size) return true;
   try {
+    if (table) leaves.leaves.reserve(table->flags.size());
     Walker walker(file, at, tree, *size, leaves);
     walker.walk_topology();
     if (!table || !walker.follow(*table, end)) walker.walk_values();

@@ -46,9 +46,7 @@ struct LeafTable {
   std::vector<std::int8_t> flags;
   std::vector<std::int64_t> chunks;  ///< Bytes of the values, with the length before them.
 
-  friend bool operator==(const LeafTable& a, const LeafTable& b) {
-    return a.flags == b.flags && a.chunks == b.chunks;
-  }
+  friend bool operator==(const LeafTable& a, const LeafTable& b) { return a.flags == b.flags && a.chunks == b.chunks; }
 };
 
 /// Reads through a tree whose topology begins at position `at`, and through the values that follow it. Only for files

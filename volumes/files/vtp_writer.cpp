@@ -142,7 +142,8 @@ void write_texts(VtpWriter& file, const std::string& name, const Texts& texts) {
 }
 
 /// Cells of consecutive points. @param ends  The number of points up to the end of each.
-void write_cells(VtpWriter& file, const std::string& element, std::size_t points, const std::vector<std::int64_t>& ends) {
+void write_cells(VtpWriter& file, const std::string& element, std::size_t points,
+                 const std::vector<std::int64_t>& ends) {
   std::vector<std::int64_t> corners(points);
   std::iota(corners.begin(), corners.end(), std::int64_t{0});
   file.text("<" + element + ">\n");
