@@ -1,6 +1,6 @@
 #pragma once
 /// @file volumes/files/vtp_writer.h
-/// Writes VTK polydata (.vtp) without VTK, which takes ten times as long.
+/// Writes VTK polydata (.vtp) without VTK, which takes four times as long.
 
 #include <filesystem>
 
