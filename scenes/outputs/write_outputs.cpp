@@ -4,17 +4,11 @@
 
 #include <tbb/parallel_for_each.h>
 
-#include "base/text.h"
-#include "volumes/files/vtk_files.h"
-
 namespace tensorray {
 
 OutputFiles open_outputs(const OutputDescription& output) {
   OutputFiles files;
-  for (const auto& [key, path] : output.files) {
-    if (lower_case_ending(path) == ".vtp") require_vtk_program();
-    files.emplace(key, OutputFile(path));
-  }
+  for (const auto& [key, path] : output.files) files.emplace(key, OutputFile(path));
   return files;
 }
 

@@ -1,4 +1,4 @@
-// Points as VTK polydata, through `tensorray-import`.
+// Points as VTK polydata, as VTK reads them.
 
 #include <string>
 #include <vector>
@@ -14,11 +14,9 @@
 #include <vtkStringArray.h>
 #include <vtkXMLPolyDataReader.h>
 
-#include "base/child_program.h"
 #include "tests/import/mesh_files.h"
 #include "tests/volumes/file_size_limit.h"
 #include "tests/volumes/point_support.h"
-#include "tools/import/vtk/vtp_files.h"
 
 namespace tensorray {
 namespace {
@@ -81,24 +79,6 @@ TEST(VtpPoints, FullDiskIsNoticed) {
     const std::string error = error_of([&] { write_points(path, cloud); });
     EXPECT_EQ(testing::internal::GetCapturedStderr(), "");
     EXPECT_THAT(error, HasSubstr(path.string() + ": cannot be written: ")) << limit << " of " << size;
-  }
-}
-
-/// The full disk for VTK's file. The exchanged file in the test above is larger than the file that VTK writes.
-TEST(VtpPoints, FullDiskIsNoticedByVtk) {
-  PolyData data;
-  data.points.values = std::vector<float>(3 * 5000, 1.5f);
-  data.point_data.emplace_back("power", DataArray{1, std::vector<float>(5000, 2.5f)});
-  const TemporaryFolder folder;
-  const fs::path path = folder / "a.vtp";
-  write_vtp_file(path, view_of(data));
-  const auto size = fs::file_size(path);
-  for (const auto limit : {std::uintmax_t{0}, size / 50, size / 3, size / 2, size * 9 / 10, size - 1}) {
-    fs::remove(path);
-    const FileSizeLimit limited(limit);
-    testing::internal::CaptureStderr();
-    EXPECT_NE(error_of([&] { write_vtp_file(path, view_of(data)); }), "") << limit << " of " << size;
-    EXPECT_EQ(testing::internal::GetCapturedStderr(), "");
   }
 }
 

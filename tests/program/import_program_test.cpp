@@ -25,14 +25,22 @@ class WithoutImport : public Program {
 TEST_F(WithoutImport, TheErrorSaysHowToBuildIt) {
   write("scene.json", small_scene());
   write("a.vtu", "");
-  for (const std::string arguments : {"import a.vtu -o a.vdb", "render scene.json -q -o photons.vtp",
-                                      "render scene.json -q --set integrator.type=path_tracing -o paths.vtp"}) {
+  write("lines.vtp", "<VTKFile/>");
+  for (const std::string arguments :
+       {"import a.vtu -o a.vdb",
+        "render scene.json -q --set integrator.type=path_tracing --set integrator.paths=lines.vtp -o a.png"}) {
     const Outcome outcome = run_alone(arguments);
     EXPECT_EQ(outcome.status, 1) << arguments;
     EXPECT_NE(outcome.error.find("`tools/setup release import`"), std::string::npos) << outcome.error;
     EXPECT_EQ(std::count(outcome.error.begin(), outcome.error.end(), '\n'), 1) << outcome.error;
   }
-  EXPECT_FALSE(std::filesystem::exists(in_folder("photons.vtp")));
+}
+
+TEST_F(WithoutImport, VtkFilesAreWritten) {
+  write("scene.json", small_scene());
+  const Outcome outcome = run_alone("render scene.json -q -o photons.vtp");
+  EXPECT_EQ(outcome.status, 0) << outcome.error;
+  EXPECT_TRUE(std::filesystem::exists(in_folder("photons.vtp")));
 }
 
 TEST_F(WithoutImport, PicturesAreRendered) {

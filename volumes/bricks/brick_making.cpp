@@ -4,9 +4,12 @@
 #include <bitset>
 #include <cmath>
 #include <cstring>
+#include <optional>
 #include <tuple>
 
 #include <tbb/parallel_sort.h>
+
+#include "volumes/grids/four_floats.h"
 
 namespace tensorray {
 namespace {
@@ -46,40 +49,69 @@ int block_offset(int voxel) {
          TensorBrick::bending_offset(components, voxel % size);
 }
 
-/// The stored components of T − T₂₂ I, and T₂₂, of each voxel. @return the greatest squared norm of T.
-/// Numbers are single ones: a vector that is made of them in memory is there many cycles later.
+Four square(const Four& x) { return x * x; }
+
+/// Some components of four voxels: each first a vector of a voxel, then a vector of a component.
+struct FourVoxels {
+  Four v[4];
+
+  void transpose() {
+    const Four a = low_pairs(v[0], v[1]), b = low_pairs(v[2], v[3]);
+    const Four c = high_pairs(v[0], v[1]), d = high_pairs(v[2], v[3]);
+    v[0] = low_halves(a, b);
+    v[1] = high_halves(a, b);
+    v[2] = low_halves(c, d);
+    v[3] = high_halves(c, d);
+  }
+};
+
+/// What `convert` finds.
+struct Conversion {
+  float norm;         // Greatest squared norm of T.
+  bool is_symmetric;  // Whether T = Tᵀ in all voxels, bit for bit.
+};
+
+/// The stored components of T − T₂₂ I, and T₂₂, of each voxel.
 template <int components>
-float convert(const TensorBlock& block, BlockVoxels& voxels) {
-  const auto square = [](float x) { return x * x; };
-  float greatest = 0;
-  for (int i = 0; i < TensorBlock::voxels; ++i) {
-    const float* const T = block.values[i].data();
-    float* const bending = voxels.bending + block_offset<components>(i);
-    const float last = T[8], first = T[0] - last, second = T[4] - last;  // On the diagonal.
-    const float even = square(T[2]) + square(T[6]), odd = (square(T[1]) + square(T[5])) + (square(T[3]) + square(T[7]));
-    greatest = std::max(greatest, (((square(T[0]) + square(T[4])) + even) + odd) + square(last));
-    bending[0] = first;
-    bending[1] = T[1];
-    bending[2] = T[2];
-    if constexpr (components == TensorBrick::symmetric) {
-      bending[3] = second;
-      bending[4] = T[5];
-      bending[5] = 0;  // The float that fills a cache line, or the first one of the next voxel, which follows.
-    } else {
-      bending[3] = T[3];
-      bending[4] = second;
-      bending[5] = T[5];
-      bending[6] = T[6];
-      bending[7] = T[7];
+Conversion convert(const TensorBlock& block, BlockVoxels& voxels) {
+  constexpr FourBits first_one{~0u}, first_two{~0u, ~0u};
+  Four greatest{};
+  FourBits asymmetry{}, corner_asymmetry{};
+  for (int i = 0; i < TensorBlock::voxels; i += 4) {
+    FourVoxels squares, diagonal;
+    for (int k = 0; k < 4; ++k) {
+      const float* const T = block.values[i + k].data();
+      float* const bending = voxels.bending + block_offset<components>(i + k);
+      const Four begin = read_four(T), end = read_four(T + 4), last{T[8], T[8], T[8], T[8]};
+      const Four low = low_pairs(begin, end), high = high_pairs(begin, end);
+      asymmetry |= difference(low, high);          // In the upper half.
+      corner_asymmetry |= difference(begin, end);  // In the third number.
+      const Four second = end - kept(last, first_one);
+      write_four(begin - kept(last, first_one), bending);
+      if constexpr (components == TensorBrick::symmetric)
+        write_four(kept(second, first_two),
+                   bending + 3);  // The next voxel, or a zero that fills a cache line, follows.
+      else
+        write_four(second, bending + 4);
+      squares.v[k] = square(begin) + square(end);
+      diagonal.v[k] = low - kept(last, first_two);
     }
-    const float squares = ((square(first) + square(second)) + even) + odd, trace = first + second;
+    squares.transpose();
+    diagonal.transpose();
+    const Four last{block.values[i].data()[8], block.values[i + 1].data()[8], block.values[i + 2].data()[8],
+                    block.values[i + 3].data()[8]};
+    const Four even = squares.v[2], odd = squares.v[1] + squares.v[3];
+    const Four norm = ((squares.v[0] + even) + odd) + square(last);
+    const Four sum = ((square(diagonal.v[0]) + square(diagonal.v[1])) + even) + odd;
+    greatest = greatest < norm ? norm : greatest;
     // The relative error of single precision is below 2e-6 here, because the trace takes at most two thirds of the
     // squares away.
-    voxels.deviator[i] = squares - square(trace) * (1.0f / 3);
-    voxels.squares[i] = squares;
-    voxels.trailing[i] = last;
+    write_four(sum - square(diagonal.v[0] + diagonal.v[1]) * (1.0f / 3), voxels.deviator + i);
+    write_four(sum, voxels.squares + i);
+    write_four(last, voxels.trailing + i);
   }
-  return greatest;
+  return {std::max(std::max(greatest[0], greatest[1]), std::max(greatest[2], greatest[3])),
+          (asymmetry[2] | asymmetry[3] | corner_asymmetry[2]) == 0};
 }
 
 /// In double precision, for values of any size; NaN counts as zero.
@@ -144,10 +176,11 @@ double greatest_squared_deviator(const TensorBrick& brick) {
 }
 
 template <int components>
-BlockShare place(const TensorBlock& block, const std::array<float*, bricks_of_block>& bricks) {
+std::optional<BlockShare> place(const TensorBlock& block, const std::array<float*, bricks_of_block>& bricks) {
   BlockVoxels voxels;
   BlockShare share;
-  const float norm = convert<components>(block, voxels);
+  const auto [norm, is_symmetric] = convert<components>(block, voxels);
+  if (components == TensorBrick::symmetric && !is_symmetric) return std::nullopt;
   share.norm = norm > least && norm < most ? double{norm} : greatest_squared_norm(block);
   for (int bits = 0; bits < bricks_of_block; ++bits) {
     const bool is_row = corner(bits).z() == 0;
@@ -188,21 +221,8 @@ std::vector<Eigen::Vector3i> active_bricks(const BlockTable& table, const Eigen:
   return bricks;
 }
 
-bool has_symmetric_tensors(const TensorBlock& block) {
-  const auto bits = [](const float& value) {
-    std::uint32_t result;
-    std::memcpy(&result, &value, sizeof result);
-    return result;
-  };
-  std::uint32_t difference = 0;
-  for (const Eigen::Matrix3f& value : block.values) {
-    const float* const T = value.data();
-    difference |= (bits(T[1]) ^ bits(T[3])) | (bits(T[2]) ^ bits(T[6])) | (bits(T[5]) ^ bits(T[7]));
-  }
-  return difference == 0;
-}
-
-BlockShare place_block(const TensorBlock& block, int components, const std::array<float*, bricks_of_block>& bricks) {
+std::optional<BlockShare> place_block(const TensorBlock& block, int components,
+                                      const std::array<float*, bricks_of_block>& bricks) {
   return components == TensorBrick::symmetric ? place<TensorBrick::symmetric>(block, bricks)
                                               : place<TensorBrick::general>(block, bricks);
 }

@@ -3,6 +3,7 @@
 /// Makes the bricks of a TensorField from blocks, one block at a time and in any order.
 
 #include <array>
+#include <optional>
 #include <vector>
 
 #include <Eigen/Geometry>
@@ -42,13 +43,13 @@ struct BlockShare {
   double norm;                                   ///< Greatest squared norm of a tensor.
 };
 
-/// Whether T = Tᵀ in all voxels, bit for bit.
-bool has_symmetric_tensors(const TensorBlock& block);
-
 /// Copies the voxels of a block to its bricks, in the layout of TensorBrick.
-/// @param components  Of the bricks. If TensorBrick::symmetric, the block must be symmetric.
+/// @param components  Of the bricks.
 /// @param bricks      Entry i is the brick that is corner(i) before the block; null: there is no such brick.
-BlockShare place_block(const TensorBlock& block, int components, const std::array<float*, bricks_of_block>& bricks);
+/// @return nothing, and leaves the bricks as they are, if they are symmetric and the block is not: T = Tᵀ in all
+/// voxels, bit for bit.
+std::optional<BlockShare> place_block(const TensorBlock& block, int components,
+                                      const std::array<float*, bricks_of_block>& bricks);
 
 /// Copies a brick of symmetric tensors to one of tensors of any kind.
 void widen_brick(const float* symmetric, float* general);

@@ -5,6 +5,7 @@
 #include <atomic>
 #include <cmath>
 #include <functional>
+#include <optional>
 #include <stdexcept>
 
 #include <tbb/blocked_range.h>
@@ -126,15 +127,16 @@ void TensorField::place_blocks(const BlockTable& table, const Blocks& blocks, st
     for (std::size_t i = range.begin(); i < range.end() && fits; ++i) {
       make_room();
       const TensorBlock& block = blocks.get(i, own);
-      if (components_ == TensorBrick::symmetric && !has_symmetric_tensors(block)) {
-        fits = false;
-        return;
-      }
       std::array<float*, bricks_of_block> bricks{};
       for (int bits = 0; bits < bricks_of_block; ++bits)
         if (const std::uint32_t brick = index_.find(table.places[i] - corner(bits)); brick != BrickIndex::missing)
           bricks[static_cast<std::size_t>(bits)] = floats_of(brick);
-      shares[i] = place_block(block, components_, bricks);
+      const std::optional<BlockShare> share = place_block(block, components_, bricks);
+      if (!share) {
+        fits = false;
+        return;
+      }
+      shares[i] = *share;
     }
   };
   for (std::size_t first = 0; first < shares.size(); first += part_size) {

@@ -11,6 +11,7 @@
 #include <unordered_map>
 
 #include <malloc.h>
+#include <tbb/enumerable_thread_specific.h>
 #include <tbb/parallel_for.h>
 #include <tbb/parallel_sort.h>
 
@@ -343,7 +344,14 @@ struct StoredField {
   /// For each block of the field, and in it for each grid, the number of the leaf with its voxels; `missing`: none.
   std::vector<std::uint32_t> leaves;
 
+  /// For each thread, a reader of each grid.
+  mutable tbb::enumerable_thread_specific<std::vector<LeafReader>> readers;
+
   static constexpr std::uint32_t missing = 0xffffffffu;
+
+  std::uint32_t leaf(std::size_t block, std::size_t grid) const { return leaves[block * grids.size() + grid]; }
+  const StoredLeaf& leaf_of(std::size_t block, std::size_t grid) const { return grids[grid].leaves[leaf(block, grid)]; }
+  std::size_t block_count() const { return leaves.size() / grids.size(); }
 
   explicit StoredField(const std::filesystem::path& p) : path(p), file(p) {}
 };
@@ -377,14 +385,39 @@ std::vector<BlockShape> find_blocks(StoredField& field) {
   return shapes;
 }
 
+/// The last of the leaves that follow that of a block in the file and belong to the blocks that follow it: these are
+/// read at once. Neighbours along z are also neighbours in the file.
+const StoredLeaf& last_of_run(const StoredField& field, std::size_t block, std::size_t grid) {
+  constexpr std::size_t longest = 16;
+  std::uint32_t leaf = field.leaf(block, grid);
+  while (++block % longest != 0 && block < field.block_count() && field.leaf(block, grid) == leaf + 1) ++leaf;
+  return field.grids[grid].leaves[leaf];
+}
+
+void read_leaves(const StoredField& field, std::size_t i, std::vector<LeafReader>& readers, TensorBlock& block) {
+  std::array<const float*, 3> rows{};
+  std::size_t whole_rows = 0;
+  const std::size_t count = field.grids.size();
+  for (std::size_t grid = 0; grid < count; ++grid) {
+    if (field.leaf(i, grid) == StoredField::missing) continue;
+    const StoredLeaf& leaf = field.leaf_of(i, grid);
+    LeafReader& reader = readers[grid];
+    if (!reader.has(leaf)) reader.fetch(leaf, last_of_run(field, i, grid));
+    reader.unpack(leaf);
+    if (count == rows.size() && (rows[grid] = reader.vectors(leaf))) ++whole_rows;
+  }
+  if (whole_rows == rows.size()) return put_rows(rows, block);
+  for (std::size_t grid = 0; grid < count; ++grid)
+    if (field.leaf(i, grid) != StoredField::missing)
+      readers[grid].put(field.leaf_of(i, grid), field.grids[grid].entries, block);
+}
+
 void fill_block(const StoredField& field, std::size_t i, TensorBlock& block) {
+  std::vector<LeafReader>& readers = field.readers.local();
+  if (readers.empty())
+    for (const StoredField::Grid& grid : field.grids) readers.emplace_back(field.file, grid.tree);
   try {
-    for (std::size_t grid = 0; grid < field.grids.size(); ++grid) {
-      const std::uint32_t leaf = field.leaves[i * field.grids.size() + grid];
-      if (leaf == StoredField::missing) continue;
-      const StoredField::Grid& stored = field.grids[grid];
-      LeafReader(field.file, stored.tree).read(stored.leaves[leaf], stored.entries, block);
-    }
+    read_leaves(field, i, readers, block);
   } catch (const Misfit&) {
     fail_damaged_voxels(field.path);
   } catch (const openvdb::Exception&) {

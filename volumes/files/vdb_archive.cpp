@@ -34,6 +34,16 @@ constexpr std::streamoff version_offset = 8, tag_offset = 21;
   fail(path, "the file is truncated or damaged" + how + "; copy or write it again");
 }
 
+StoredTree stored_tree(const openvdb::io::GridDescriptor& descriptor, std::uint32_t compression) {
+  StoredTree tree;
+  tree.type = descriptor.gridType();
+  tree.half = descriptor.saveFloatAsHalf();
+  tree.blosc = compression & openvdb::io::COMPRESS_BLOSC;
+  tree.zip = compression & openvdb::io::COMPRESS_ZIP;
+  tree.active_only = compression & openvdb::io::COMPRESS_ACTIVE_MASK;
+  return tree;
+}
+
 /// Reads the table of grids itself. GridDescriptor::read refuses the whole file if one grid has an unknown type.
 class Reader : private openvdb::io::Archive {
  public:
@@ -98,7 +108,7 @@ class Reader : private openvdb::io::Archive {
       found[i].seekToGrid(reader.in_);
       StoredLeaves leaves;
       VdbLeafGrid& grid = result.grids.at(openvdb::io::GridDescriptor::nameAsString(found[i].uniqueName()));
-      grid = reader.read_without_voxels(found[i], leaves);
+      grid = reader.read_without_voxels(found[i], leaves, /*by_table=*/true);
       if (!leaves.complete) complete = false;
       grid.leaves = std::move(leaves.leaves);
     });
@@ -147,7 +157,9 @@ class Reader : private openvdb::io::Archive {
     for (std::uint32_t left = read_stored<std::uint32_t>(); left > 0; --left) {
       skip_string();  // Skips the name.
       if (read_string() == openvdb::io::DelayedLoadMetadata::staticTypeName()) {
-        if (!delayed_load_fits(read_string(), size_)) fail_damaged(path_, "");
+        const std::string value = read_string();
+        if (!delayed_load_fits(value, size_)) fail_damaged(path_, "");
+        table_ = read_leaf_table(value);
       } else {
         skip_string();
       }
@@ -183,8 +195,11 @@ class Reader : private openvdb::io::Archive {
     grid->setSaveFloatAsHalf(descriptor.saveFloatAsHalf());
     if (has_node_compression() && !descriptor.isInstance()) {
       const std::streamoff begin = in_.tellg();
-      StoredLeaves unused;
-      read_without_voxels(descriptor, unused);
+      StoredLeaves leaves;
+      const VdbLeafGrid checked = read_without_voxels(descriptor, leaves, /*by_table=*/false);
+      // OpenVDB finds the voxels of a box by the table.
+      if (box_ && table_ && value_size(checked.tree.type) && !(*table_ == table_of(checked.tree, leaves.leaves)))
+        fail_damaged(path_, "");
       in_.seekg(begin);
     } else {
       check_lengths(in_.tellg() + std::streamoff(has_node_compression() ? 4 : 0), 1);
@@ -199,20 +214,21 @@ class Reader : private openvdb::io::Archive {
   bool has_node_compression() const { return fileVersion() >= openvdb::OPENVDB_FILE_VERSION_NODE_MASK_COMPRESSION; }
 
   /// Reads metadata and transform of the grid that begins at the stream's position, and checks its tree.
-  VdbLeafGrid read_without_voxels(const openvdb::io::GridDescriptor& descriptor, StoredLeaves& leaves) {
+  /// @param by_table  The table of leaves, if there is one, says where they are.
+  VdbLeafGrid read_without_voxels(const openvdb::io::GridDescriptor& descriptor, StoredLeaves& leaves, bool by_table) {
+    table_.reset();
     check_lengths(in_.tellg() + std::streamoff(4), 1);  // Behind the compression. The string is the transform's type.
     const auto compression = read_stored<std::uint32_t>();
     VdbLeafGrid result;
     result.grid = openvdb::GridBase::createGrid(descriptor.gridType());
     result.grid->readMeta(in_);
     result.grid->readTransform(in_);
-    StoredTree& tree = result.tree;
-    tree.type = descriptor.gridType();
-    tree.half = descriptor.saveFloatAsHalf();
-    tree.blosc = compression & openvdb::io::COMPRESS_BLOSC;
-    tree.zip = compression & openvdb::io::COMPRESS_ZIP;
-    tree.active_only = compression & openvdb::io::COMPRESS_ACTIVE_MASK;
-    if (!tree_fits(FileBytes(path_), in_.tellg(), tree, leaves)) fail_damaged(path_, "");
+    result.tree = stored_tree(descriptor, compression);
+    const FileBytes file(path_);
+    const bool fits = by_table && table_
+                          ? tree_fits(file, in_.tellg(), descriptor.getEndPos(), *table_, result.tree, leaves)
+                          : tree_fits(file, in_.tellg(), result.tree, leaves);
+    if (!fits) fail_damaged(path_, "");
     return result;
   }
 
@@ -242,10 +258,36 @@ class Reader : private openvdb::io::Archive {
   std::vector<char> buffer_;
   std::ifstream in_;
   std::int64_t size_ = 0;
+  std::optional<LeafTable> table_;  // Of the leaves of the grid whose metadata were checked last.
+};
+
+/// The table of a grid's leaves. Their lengths are known when they are written; this only makes room for them, and says
+/// where it is.
+class LeafTableRoom : public openvdb::io::DelayedLoadMetadata {
+ public:
+  LeafTableRoom(std::size_t leaves, std::streamoff& at) : at_(&at) {
+    table_.flags.resize(leaves);
+    table_.chunks.resize(leaves);
+  }
+
+  openvdb::Metadata::Ptr copy() const override { return std::make_shared<LeafTableRoom>(*this); }
+  openvdb::Index32 size() const override { return static_cast<openvdb::Index32>(leaf_table_text(table_).size()); }
+
+ protected:
+  void writeValue(std::ostream& file) const override {
+    *at_ = file.tellp();
+    file << leaf_table_text(table_);
+  }
+
+ private:
+  std::streamoff* at_;
+  LeafTable table_;
 };
 
 class Writer : private openvdb::io::Archive {
  public:
+  explicit Writer(const std::filesystem::path& path) : path_(path) {}
+
   void write_file(std::fstream& file, const openvdb::GridPtrVec& grids, const openvdb::MetaMap& metadata) {
     auto stream_metadata = std::make_shared<openvdb::io::StreamMetadata>();
     openvdb::io::setStreamMetadataPtr(file, stream_metadata, /*transfer=*/false);
@@ -259,8 +301,8 @@ class Writer : private openvdb::io::Archive {
   }
 
  private:
-  /// As Archive::writeGrid, which also writes a table for delayed loading: for that, all values must be in memory, and
-  /// are compressed twice.
+  /// As Archive::writeGrid, which compresses values twice, because it writes the table of leaves first; for that, all
+  /// values must be in memory.
   void write_grid(std::ostream& file, openvdb::GridBase& grid) const {
     openvdb::io::GridDescriptor descriptor(grid.getName(), grid.type(), grid.saveFloatAsHalf());
     descriptor.writeHeader(file);
@@ -271,12 +313,27 @@ class Writer : private openvdb::io::Archive {
     grid.addStatsMetadata();
     const std::string compressed = openvdb::io::compressionToString(openvdb::io::getDataCompression(file));
     grid.insertMeta(openvdb::GridBase::META_FILE_COMPRESSION, openvdb::StringMetadata(compressed));
+    std::streamoff table = 0;
+    const bool has_table = value_size(grid.type()).has_value();
+    if (has_table)
+      grid.insertMeta(openvdb::GridBase::META_FILE_DELAYED_LOAD,
+                      LeafTableRoom(grid.constBaseTree().leafCount(), table));
     grid.writeMeta(file);
+    grid.removeMeta(openvdb::GridBase::META_FILE_DELAYED_LOAD);
     grid.writeTransform(file);
+    const std::streamoff topology = file.tellp();
     grid.writeTopology(file);
     descriptor.setBlockPos(file.tellp());
     grid.writeBuffers(file);
     descriptor.setEndPos(file.tellp());
+    if (has_table) {
+      file.flush();
+      const StoredTree tree = stored_tree(descriptor, openvdb::io::getDataCompression(file));
+      StoredLeaves written;
+      if (!tree_fits(FileBytes(path_), topology, tree, written)) throw std::ios_base::failure("leaves");
+      file.seekp(table);
+      file << leaf_table_text(table_of(tree, written.leaves));
+    }
     file.seekp(positions);
     descriptor.writeStreamPos(file);
     descriptor.seekToEnd(file);
@@ -308,6 +365,8 @@ class Writer : private openvdb::io::Archive {
     file.seekp(tag_offset);
     file.write(tag.data(), static_cast<std::streamsize>(tag.size()));
   }
+
+  const std::filesystem::path& path_;
 };
 
 }  // namespace
@@ -354,7 +413,7 @@ void write_vdb(const std::filesystem::path& path, const openvdb::GridPtrVec& gri
   try {
     file.exceptions(any_failure);
     file.open(path, std::ios::in | std::ios::out | std::ios::binary | std::ios::trunc);
-    Writer().write_file(file, grids, metadata);
+    Writer(path).write_file(file, grids, metadata);
     file.close();
   } catch (const std::ios_base::failure&) {
     fail(path, "cannot be written: " + (errno ? std::generic_category().message(errno) : "the write failed"));

@@ -28,8 +28,11 @@ struct StoredTree {
 struct StoredLeaf {
   Eigen::Vector3i origin;
   std::bitset<TensorBlock::voxels> active;
-  std::int64_t at = 0;     ///< Position of the flag before its values.
-  std::int32_t bytes = 0;  ///< From there on.
+  std::int64_t at = 0;     ///< Position of the flag before its values. The mask of its voxels is before the flag.
+  std::int32_t bytes = 0;  ///< From the flag on.
+  std::int8_t flag = 0;
+
+  static constexpr std::int64_t mask_bytes = TensorBlock::voxels / 8;
 };
 
 struct StoredLeaves {
@@ -37,11 +40,31 @@ struct StoredLeaves {
   bool complete = false;           ///< Whether all active voxels are in leaves, and none in tiles.
 };
 
+/// What a file says of a grid's leaves in their order, so that they are found without reading through all of them
+/// (metadata "file_delayed_load").
+struct LeafTable {
+  std::vector<std::int8_t> flags;
+  std::vector<std::int64_t> chunks;  ///< Bytes of the values, with the length before them.
+
+  friend bool operator==(const LeafTable& a, const LeafTable& b) { return a.flags == b.flags && a.chunks == b.chunks; }
+};
+
 /// Reads through a tree whose topology begins at position `at`, and through the values that follow it. Only for files
 /// of OpenVDB 3 (format 222) and later. It accepts without a check trees of other types than float, double, vec3s and
 /// vec3d with nodes of 5, 4 and 3, and finds no leaves in them.
 /// @return whether all lengths fit.
 bool tree_fits(const FileBytes& file, std::int64_t at, const StoredTree& tree, StoredLeaves& leaves);
+
+/// The same, but does not read the values where `table` fits a tree that ends at position `end`. Then lengths are to be
+/// checked when leaves are read.
+bool tree_fits(const FileBytes& file, std::int64_t at, std::int64_t end, const LeafTable& table, const StoredTree& tree,
+               StoredLeaves& leaves);
+
+/// The table of leaves that were read through.
+LeafTable table_of(const StoredTree& tree, const std::vector<StoredLeaf>& leaves);
+
+/// Active voxels, from a mask of a file.
+std::bitset<TensorBlock::voxels> voxel_mask(const char* bytes);
 
 /// What a leaf leaves out, and what follows the flag before its values.
 enum NodeFlag : int {
@@ -68,6 +91,12 @@ std::int64_t bytes_behind_flag(int flag, const ValueSize& size, std::size_t coun
 /// Whether the lengths in the value of a grid's metadata "file_delayed_load" fit. OpenVDB unpacks this value when it
 /// reads the metadata.
 bool delayed_load_fits(const std::string& value, std::int64_t file_size);
+
+/// The value of these metadata, not packed, so that its length depends on the number of leaves alone.
+std::string leaf_table_text(const LeafTable& table);
+
+/// The table in a value that fits. Nothing if it does not say lengths.
+std::optional<LeafTable> read_leaf_table(const std::string& value);
 
 /// Whether a Blosc chunk that begins with `header` (16 bytes) has a length of `stored` bytes, and unpacks to
 /// `expected` bytes.

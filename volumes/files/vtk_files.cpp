@@ -6,8 +6,8 @@
 
 #include "base/child_program.h"
 #include "base/errors.h"
-#include "base/progress.h"
 #include "base/text.h"
+#include "volumes/files/vtp_writer.h"
 
 namespace tensorray {
 namespace {
@@ -38,13 +38,15 @@ PolyDataView view_of_lines(const PolylineData& lines) {
   return view;
 }
 
-std::filesystem::path vtk_program() { return sibling_program("tensorray-import"); }
-
 /// @throw std::runtime_error with the error that the program printed, or with `on_crash` if it printed none.
 void run_vtk_program(const std::vector<std::string>& arguments, const UnnamedFile& shared,
                      const std::string& on_crash) {
-  require_vtk_program();
-  const ProgramEnd end = run_program(vtk_program(), arguments, shared);
+  const std::filesystem::path program = sibling_program("tensorray-import");
+  std::error_code none;
+  if (!std::filesystem::exists(program, none))
+    throw std::runtime_error("files of VTK need " + program.string() +
+                             ", which is not built; run `tools/setup release import`");
+  const ProgramEnd end = run_program(program, arguments, shared);
   if (end.signal != 0) throw std::runtime_error(on_crash);
   if (end.status == 0) return;
   const std::string reason = one_line(end.error);
@@ -53,12 +55,7 @@ void run_vtk_program(const std::vector<std::string>& arguments, const UnnamedFil
 
 void write(const std::filesystem::path& path, const PolyDataView& data) {
   try {
-    const UnnamedFile shared;
-    write_poly_data(shared.path(), data);
-    run_vtk_program({"--write-vtp", shared_file, path.string()}, shared,
-                    "the program that writes it ended; the memory may be short");
-  } catch (const Cancelled&) {
-    throw;
+    write_vtp_file(path, data);
   } catch (const std::runtime_error& error) {
     fail(path, std::string("cannot be written: ") + error.what());
   }
@@ -71,13 +68,6 @@ std::vector<double>& doubles(DataArray& array) {
 }
 
 }  // namespace
-
-void require_vtk_program() {
-  std::error_code none;
-  if (!std::filesystem::exists(vtk_program(), none))
-    throw std::runtime_error("files of VTK need " + vtk_program().string() +
-                             ", which is not built; run `tools/setup release import`");
-}
 
 void write_vtp(const std::filesystem::path& path, const PointCloud& points) { write(path, view_of_cloud(points)); }
 

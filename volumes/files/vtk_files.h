@@ -1,8 +1,8 @@
 #pragma once
 /// @file volumes/files/vtk_files.h
-/// Points and polylines as VTK polydata (.vtp). These functions start another program, `tensorray-import`, which
-/// contains VTK. Rendering therefore needs no VTK, and where VTK prints or ends the process because a file is
-/// damaged, the caller gets an exception. The programs exchange the data in a file without a name (poly_data.h).
+/// Points and polylines as VTK polydata (.vtp). Reading starts another program, `tensorray-import`, which contains VTK.
+/// Rendering therefore needs no VTK, and where VTK prints or ends the process because a file is damaged, the caller
+/// gets an exception. The programs exchange the data in a file without a name (poly_data.h).
 
 #include <cstddef>
 #include <filesystem>
@@ -28,18 +28,12 @@ struct PolylineData {
       texts;  ///< Field data: notes about the whole file. Written, but not read.
 };
 
-/// Call this before long work that reads or writes .vtp files, so that the work does not fail at its end.
-/// @throw std::runtime_error with the fix if `tensorray-import` is not built.
-void require_vtk_program();
-
 /// Writes one vertex per point, the scalars and vectors as point data, and the metadata as string field data;
-/// encoding: binary (base64), LZ4.
-/// @throw std::runtime_error naming the file and the reason, also when the disk is full; Cancelled.
+/// encoding: binary (base64), not compressed.
+/// @throw std::runtime_error naming the file and the reason, also when the disk is full.
 void write_vtp(const std::filesystem::path& path, const PointCloud& points);
 
-/// Writes polylines with points in double precision; encoding: binary (base64), not compressed, which most programs
-/// can read.
-/// @throw as above.
+/// Writes polylines with points in double precision, in the same encoding. @throw as above.
 void write_vtp(const std::filesystem::path& path, const PolylineData& lines);
 
 /// Reads the polylines of a .vtp file in any of VTK's encodings (ASCII, binary or appended; compressed or not; either

@@ -1,9 +1,8 @@
 /// @file tools/import/program/tensorray_import.cpp
 /// The program `tensorray-import`: everything that needs VTK, Teem or the NIfTI library.
 ///   tensorray-import ARGUMENTS...                    runs `tensorray import ARGUMENTS...`
-///   tensorray-import --write-vtp EXCHANGE FILE       a file of poly_data.h → VTK polydata
 ///   tensorray-import --read-vtp EXCHANGE FILE NAME...    VTK polydata, with the named arrays → a file of poly_data.h
-/// Only volumes/files/vtk_files.h uses the last two. Their errors are one line, without the program's name.
+/// Only volumes/files/vtk_files.h uses the last one. Its errors are one line, without the program's name.
 
 #include <csignal>
 #include <cstdio>
@@ -22,19 +21,14 @@
 
 namespace {
 
-int convert(bool writes, int argc, char** argv) {
+int convert(int argc, char** argv) {
   tensorray::end_with_parent();
   std::signal(SIGXFSZ, SIG_IGN);
   try {
-    if (argc < 4) throw std::runtime_error("--read-vtp and --write-vtp are for tensorray alone");
-    if (writes) {
-      const tensorray::PolyData data = tensorray::read_poly_data(argv[2]);
-      tensorray::write_vtp_file(argv[3], view_of(data));
-    } else {
-      const std::set<std::string> wanted(argv + 4, argv + argc);
-      const tensorray::PolyData data = tensorray::read_vtp_file(argv[3], wanted);
-      tensorray::write_poly_data(argv[2], view_of(data));
-    }
+    if (argc < 4) throw std::runtime_error("--read-vtp is for tensorray alone");
+    const std::set<std::string> wanted(argv + 4, argv + argc);
+    const tensorray::PolyData data = tensorray::read_vtp_file(argv[3], wanted);
+    tensorray::write_poly_data(argv[2], view_of(data));
     return 0;
   } catch (const std::bad_alloc&) {
     fmt::print(stderr, "it does not fit in memory\n");
@@ -48,7 +42,7 @@ int convert(bool writes, int argc, char** argv) {
 
 int main(int argc, char** argv) {
   const std::string first = argc > 1 ? argv[1] : "";
-  if (first == "--write-vtp" || first == "--read-vtp") return convert(first == "--write-vtp", argc, argv);
+  if (first == "--read-vtp") return convert(argc, argv);
   tensorray::Progress& progress = tensorray::progress_until_interrupted();
   CLI::App app("Make a tensor field of another program's file", "tensorray import");
   tensorray::add_import_options(app, progress);

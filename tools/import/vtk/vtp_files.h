@@ -1,6 +1,6 @@
 #pragma once
 /// @file tools/import/vtk/vtp_files.h
-/// Reads and writes VTK polydata (.vtp) with VTK, for programs without VTK (volumes/files/vtk_files.h).
+/// Reads VTK polydata (.vtp) with VTK, for programs without VTK (volumes/files/vtk_files.h).
 
 #include <filesystem>
 #include <set>
@@ -9,10 +9,6 @@
 #include "volumes/files/poly_data.h"
 
 namespace tensorray {
-
-/// Writes vertices (binary, LZ4) or polylines (binary, not compressed). Writes in place.
-/// @throw std::runtime_error with the reason (without the file), also when the disk is full.
-void write_vtp_file(const std::filesystem::path& path, const PolyDataView& data);
 
 /// Reads the polylines and the `wanted` numeric arrays, as doubles: see read_vtp_lines. VTK may end the process on
 /// damaged files: call this in a child process.
