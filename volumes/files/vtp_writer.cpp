@@ -96,6 +96,7 @@ class VtpWriter {
   void write(std::size_t at, const std::string& text) const {
     for (std::size_t done = 0; done < text.size();) {
       const ssize_t written = pwrite(file_, text.data() + done, text.size() - done, static_cast<off_t>(at + done));
+      if (written < 0 && errno == EINTR) continue;
       if (written < 0) fail();
       done += static_cast<std::size_t>(written);
     }
