@@ -461,8 +461,7 @@ bool is_zen4() {
 #endif
 }
 
-/// Zen 4 does the operations of AVX-512 in two halves, and waits longer for loads into one lane after the other: the
-/// kernel, of all code with vectors, is faster with AVX2 there.
+/// Zen 4 does the operations of AVX-512 in two halves: the kernel, of all code with vectors, is faster with AVX2 there.
 bool prefers_avx2 = is_zen4();
 
 #if HWY_TARGETS & HWY_AVX2
