@@ -18,6 +18,10 @@ constexpr double tangled_part = 0.75;  // A scale that shows less than this part
 constexpr double most_turn = 0.4;      // AutoScale::median_turn; light that turns more leaves the plate.
 constexpr double visible_turn = 0.15;
 constexpr double first_turn = 0.015;  // No ray turns by more at the first scale, radians.
+// A scale that shows less than this, with less turn, is too small. A few rays tell: one of so many.
+constexpr double weak_shown = 0.1, weak_turn = 0.05;
+constexpr std::size_t few = 4;
+constexpr double least_shown = 1e-6, least_growth = 1.5;  // Less may be rounding, or not be what grows with the scale.
 constexpr int doublings = 30, halvings = 8;
 constexpr int patience = 12;             // Doublings after which light that has not turned at all will not.
 constexpr double smallest_turn = 1e-7;   // Radians; a ray that turns less counts as straight.
@@ -85,22 +89,24 @@ AutoScale summary(double scale, std::vector<double> turns, const std::vector<dou
   return result;
 }
 
+/// @param each  Only every so many rays are traced.
 AutoScale probe(const TensorField& field, const Geometry& geometry, const ProbeBeam& probes, double scale,
-                const Progress& progress) {
+                const Progress& progress, std::size_t each = 1) {
   BendingSettings settings;
   settings.scale = scale;
   settings.step = 0.5;  // A fixed step, because the splitting method is stable at any scale.
   const Beam& beam = probes.beam;
-  const std::vector<Vector3d>& origins = probes.origins;
+  const std::size_t rays = (probes.origins.size() + each - 1) / each;
   RayDifferential start;
   start.position << beam.right, beam.up;
-  std::vector<double> turns(origins.size()), changes(origins.size());
-  const std::size_t batches = (origins.size() + batch_size - 1) / batch_size;
+  std::vector<double> turns(rays), changes(rays);
+  const std::size_t batches = (rays + batch_size - 1) / batch_size;
   tbb::parallel_for(std::size_t{0}, batches, [&](std::size_t task) {
     if (progress.cancelled) throw Cancelled();
-    const std::size_t first = task * batch_size, count = std::min(batch_size, origins.size() - first);
+    const std::size_t first = task * batch_size, count = std::min(batch_size, rays - first);
     RayBatch batch;
-    for (std::size_t i = 0; i < count; ++i) batch.add(origins[first + i], beam.direction, probe_flexibility);
+    for (std::size_t i = 0; i < count; ++i)
+      batch.add(probes.origins[(first + i) * each], beam.direction, probe_flexibility);
     batch.differentials.assign(count, start);
     trace(field, geometry, settings, batch);
     for (std::size_t i = 0; i < count; ++i) {
@@ -111,6 +117,19 @@ AutoScale probe(const TensorField& field, const Geometry& geometry, const ProbeB
     }
   });
   return summary(scale, std::move(turns), changes);
+}
+
+/// Doubles a scale while a few rays show that it is far too small: that they show little, but more each time.
+double last_weak_scale(const TensorField& field, const Geometry& geometry, const ProbeBeam& probes, double scale,
+                       const Progress& progress) {
+  double shown = least_shown;
+  for (int i = 0; i < doublings; ++i, scale *= 2) {
+    const AutoScale by_few = probe(field, geometry, probes, scale, progress, few);
+    const bool is_weak = by_few.shown < weak_shown && by_few.median_turn < weak_turn;
+    if (!is_weak || by_few.shown < least_growth * shown) return i > 0 ? scale / 2 : scale;
+    shown = by_few.shown;
+  }
+  return scale;
 }
 
 /// For light that only turns: the first scale that turns it visibly, or the one that turns it most.
@@ -131,7 +150,8 @@ AutoScale choose_scale(const TensorField& field, const Geometry& geometry, const
   const ProbeBeam probes = probe_beam(field, beam);
   const double depth = (field.to_world().linear() * field.index_bounds().sizes()).norm();
   // No ray turns by more than s‖T‖ times its length.
-  double scale = first_turn / (probe_flexibility * norm * depth);
+  const double first = first_turn / (probe_flexibility * norm * depth);
+  double scale = last_weak_scale(field, geometry, probes, first, progress);
   std::vector<AutoScale> tried;
   AutoScale best;
   for (int i = 0; i < doublings; ++i, scale *= 2) {
