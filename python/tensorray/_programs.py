@@ -1,4 +1,4 @@
-"""Where the programs of tensorray are: imports and .vtp files are the work of `tensorray-import`."""
+"""Where the programs of tensorray are: imports and reading .vtp files are the work of `tensorray-import`."""
 
 import os
 import shutil

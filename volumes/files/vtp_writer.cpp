@@ -4,8 +4,10 @@
 #include <array>
 #include <cerrno>
 #include <cstdint>
+#include <cstring>
 #include <numeric>
 #include <stdexcept>
+#include <string>
 #include <system_error>
 
 #include <fcntl.h>
