@@ -45,21 +45,23 @@ bool wants_sampling(const ImportSettings& settings) {
 void crop(TensorGrid& grid, Eigen::AlignedBox3d bounds) {
   const Eigen::Vector3d rounding = Eigen::Vector3d::Constant(1e-6 * grid.to_world.linear().colwise().norm().minCoeff());
   bounds = {bounds.min() - rounding, bounds.max() + rounding};
-  for (TensorBlock& block : grid.blocks)
+  for (TensorBlock& block : grid.blocks) {
+    make_room();
     for (int offset = 0; offset < TensorBlock::voxels; ++offset) {
       const Eigen::Vector3i index = block.origin + TensorBlock::position(offset);
       if (!block.active[offset] || bounds.contains(grid.to_world * index.cast<double>())) continue;
       block.active.reset(offset);
       block.values[offset].setZero();
     }
-  grid.blocks.erase(std::remove_if(grid.blocks.begin(), grid.blocks.end(),
-                                   [](const TensorBlock& block) { return block.active.none(); }),
-                    grid.blocks.end());
+  }
+  remove_empty_blocks(grid);
 }
 
 void make_symmetric(TensorGrid& grid) {
-  for (TensorBlock& block : grid.blocks)
+  for (TensorBlock& block : grid.blocks) {
+    make_room();
     for (Eigen::Matrix3f& value : block.values) value = (0.5f * (value + value.transpose())).eval();
+  }
 }
 
 TensorGrid import_lattice(const Lattice& lattice, const ImportSettings& settings, ImportReport& report) {

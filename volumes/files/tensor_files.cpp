@@ -383,10 +383,12 @@ class RowGrid : public openvdb::Vec3SGrid {
 };
 
 void check_half_range(const std::filesystem::path& path, const TensorGrid& grid) {
-  for (const TensorBlock& block : grid.blocks)
+  for (const TensorBlock& block : grid.blocks) {
+    make_room();
     for (const Eigen::Matrix3f& value : block.values)
       if ((value.array().abs() > greatest_half).any())
         fail(path, "a component exceeds 65504, the greatest 16-bit float; write single precision or scale the field");
+  }
 }
 
 }  // namespace

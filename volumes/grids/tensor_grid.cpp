@@ -83,18 +83,21 @@ std::size_t remove_non_finite(TensorBlock& block) {
   return before - block.active.count();
 }
 
+void remove_empty_blocks(TensorGrid& grid) {
+  const auto is_empty = [](const TensorBlock& block) {
+    make_room();
+    return block.active.none();
+  };
+  grid.blocks.erase(std::remove_if(grid.blocks.begin(), grid.blocks.end(), is_empty), grid.blocks.end());
+}
+
 std::size_t remove_non_finite(TensorGrid& grid) {
   std::atomic<std::size_t> removed{0};
   tbb::parallel_for(std::size_t{0}, grid.blocks.size(), [&](std::size_t i) {
     make_room();
     removed += remove_non_finite(grid.blocks[i]);
   });
-  grid.blocks.erase(std::remove_if(grid.blocks.begin(), grid.blocks.end(),
-                                   [](const TensorBlock& block) {
-                                     make_room();
-                                     return block.active.none();
-                                   }),
-                    grid.blocks.end());
+  remove_empty_blocks(grid);
   return removed;
 }
 

@@ -73,6 +73,9 @@ struct TensorGrid {
 TensorGrid dense_grid(const Eigen::AlignedBox3i& box, const Eigen::Affine3d& to_world,
                       const std::function<Eigen::Matrix3d(const Eigen::Vector3i&)>& value);
 
+/// Removes blocks that have no active voxel.
+void remove_empty_blocks(TensorGrid& grid);
+
 /// Sets voxels that are not finite to zero and inactive, so that light goes straight there, and removes blocks that
 /// have no active voxel left. Runs on all threads.
 /// @return the number of voxels that were not finite.

@@ -91,8 +91,10 @@ void add_slab(const Lattice& lattice, const ValueOf& value_of, int first_z, std:
 template <class Blocks>
 void sort(Blocks& blocks) {
   std::vector<std::tuple<int, int, int, std::size_t>> order;
-  for (const auto& block : blocks)
+  for (const auto& block : blocks) {
+    make_room();
     order.emplace_back(block.origin.x(), block.origin.y(), block.origin.z(), order.size());
+  }
   std::sort(order.begin(), order.end());
   std::vector<std::size_t> source;
   for (const auto& place : order) source.push_back(std::get<3>(place));
