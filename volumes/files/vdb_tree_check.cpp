@@ -145,6 +145,7 @@ class Walker {
       if (stored != -expected) throw Misfit();
       return in_.skip(expected);
     }
+    if (stored > greatest_chunk) throw Misfit();
     if (!tree_.blosc) return in_.skip(stored);
     if (stored < blosc_header || !blosc_fits(in_.next(blosc_header), stored, expected)) throw Misfit();
     in_.skip(stored - blosc_header);
@@ -267,7 +268,8 @@ bool walk(const FileBytes& file, std::int64_t at, const StoredTree& tree, Stored
     if (table) leaves.leaves.reserve(table->flags.size());
     Walker walker(file, at, tree, *size, leaves);
     walker.walk_topology();
-    if (!table || !walker.follow(*table, end)) walker.walk_values();
+    // Of trees with all values, tables have other flags than leaves; OpenVDB reads neither.
+    if (!table || !tree.active_only || !walker.follow(*table, end)) walker.walk_values();
     return true;
   } catch (const Misfit&) {
     return false;
