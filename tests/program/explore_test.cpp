@@ -74,6 +74,25 @@ TEST_F(Explore, OtherMethodsHaveSheets) {
   }
 }
 
+/// Several depths of a lens are side by side, and the stretch is 512 pixels wide.
+TEST_F(Explore, LargePicturesStayInTheirCells) {
+  for (const std::vector<std::string>& method : std::vector<std::vector<std::string>>{
+           {"stretch"}, {"lens", "--set", "integrator.image_plane.depth=[0,0.3,0.6,1]"}}) {
+    std::vector<std::string> arguments{"-o", "sheet.png", "--size", "32", "--method"};
+    arguments.insert(arguments.end(), method.begin(), method.end());
+    const Outcome outcome = explore(arguments);
+    ASSERT_EQ(outcome.status, 0) << outcome.error;
+    const Image sheet = read_image(in_folder("sheet.png"));
+    for (int y = 0; y < sheet.height; ++y)
+      for (int column = 0; column <= columns; ++column)
+        ASSERT_EQ(sheet.pixel(column * (size + gap) + gap / 2, y)[0], sheet.pixel(0, 0)[0]) << method[0] << " " << y;
+    double brightest = 0;
+    for (int x = 0; x < size; ++x)
+      for (int y = 0; y < size; ++y) brightest = std::max(brightest, double{sheet.pixel(gap + x, gap + y)[0]});
+    EXPECT_GT(brightest, 0.2) << method[0];
+  }
+}
+
 TEST_F(Explore, WrongOptionsAreRefused) {
   const auto expect_error = [&](const std::vector<std::string>& arguments, const std::string& text) {
     const Outcome outcome = explore(arguments);

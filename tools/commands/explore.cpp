@@ -55,6 +55,22 @@ struct ExploreOptions {
   bool quiet = false;
 };
 
+/// The picture with sides of at most `size` pixels: each is the mean of some of the picture's, if it is larger.
+Image fitted(const Image& picture, int size) {
+  const int step = (std::max(picture.width, picture.height) + size - 1) / size;
+  if (step <= 1) return picture;
+  Image result(std::max(1, picture.width / step), std::max(1, picture.height / step), {"R", "G", "B"});
+  for (int y = 0; y < result.height; ++y)
+    for (int x = 0; x < result.width; ++x) {
+      Eigen::Vector3f sum = Eigen::Vector3f::Zero();
+      for (int i = 0; i < step * step; ++i)
+        sum += Eigen::Map<const Eigen::Vector3f>(picture.pixel(std::min(x * step + i % step, picture.width - 1),
+                                                               std::min(y * step + i / step, picture.height - 1)));
+      Eigen::Map<Eigen::Vector3f>(result.pixel(x, y)) = sum / static_cast<float>(step * step);
+    }
+  return result;
+}
+
 /// The pictures of the sheet, and its labels.
 class Sheet {
  public:
@@ -67,14 +83,14 @@ class Sheet {
     std::fill(image_.pixels.begin(), image_.pixels.end(), 0.15f);
   }
 
-  void draw(std::size_t column, std::size_t row, const Image& picture, const std::string& label) {
+  void draw(std::size_t column, std::size_t row, const Image& rendered, const std::string& label) {
+    const Image picture = fitted(rendered, size_);
     const int left = gap + static_cast<int>(column) * (size_ + gap), top = gap + static_cast<int>(row) * row_;
     const int x0 = left + (size_ - picture.width) / 2, y0 = top + (size_ - picture.height) / 2;
     for (int y = 0; y < size_; ++y)
       for (int x = 0; x < size_; ++x) std::fill_n(image_.pixel(left + x, top + y), 3, 0.0f);
-    for (int y = 0; y < std::min(picture.height, size_); ++y)
-      for (int x = 0; x < std::min(picture.width, size_); ++x)
-        std::copy_n(picture.pixel(x, y), 3, image_.pixel(x0 + x, y0 + y));
+    for (int y = 0; y < picture.height; ++y)
+      for (int x = 0; x < picture.width; ++x) std::copy_n(picture.pixel(x, y), 3, image_.pixel(x0 + x, y0 + y));
     const double height = letters_ * std::min(1.0, size_ / text_width(label, letters_));
     draw_text(image_, Eigen::Vector2d(left, top + size_ + 1.5 * letters_), height, label, {0.9, 0.9, 0.9});
   }
