@@ -71,6 +71,29 @@ TEST(DamagedFiles, DamageBeforeTheTreesNeverCrashes) {
   }
 }
 
+TEST(DamagedFiles, LengthsOfZipThatAreTooLarge) {
+  using namespace openvdb::io;
+  const Temporary path("a.vdb"), stock("b.vdb"), damaged("c.vdb");
+  write_tensor_vdb(path, sparse_grid());
+  openvdb::io::File file(path.string());
+  file.open(/*delayLoad=*/false);
+  for (const std::uint32_t mask : {0u, std::uint32_t{COMPRESS_ACTIVE_MASK}}) {
+    write_stock(stock, *file.getGrids(), COMPRESS_ZIP | mask);
+    const std::string bytes = bytes_of(stock);
+    // A chunk of a leaf begins with its length, which is below that of the leaf's values; its stream of zlib follows.
+    std::size_t chunk = bytes.rfind("\x78\x9c");
+    while (read_number<std::uint64_t>(&bytes.at(chunk - 8), ByteOrder::little) > 12 * TensorBlock::voxels)
+      chunk = bytes.rfind("\x78\x9c", chunk - 1);
+    for (const std::int64_t length : {std::int64_t{1} << 21, std::int64_t{1} << 31, std::int64_t{1} << 40}) {
+      std::string number;
+      append_number(length, ByteOrder::little, number);
+      write_bytes(damaged, std::string(bytes).replace(chunk - 8, 8, number));
+      std::filesystem::resize_file(damaged, bytes.size() + 100);
+      EXPECT_THROW(read_tensor_vdb(damaged), std::runtime_error) << length << " " << mask;
+    }
+  }
+}
+
 /// Compression of a file's trees: half floats or not, and OpenVDB's flags.
 class FlippedBytes : public testing::TestWithParam<std::tuple<bool, std::uint32_t>> {};
 

@@ -9,6 +9,7 @@
 
 #include "base/byte_order.h"
 #include "tests/volumes/file_support.h"
+#include "volumes/files/vdb_archive.h"
 
 namespace tensorray {
 namespace {
@@ -168,6 +169,74 @@ TEST(TensorFiles, ActiveWhereAnyComponentIsAndZeroElsewhere) {
   expected.row(1) << 1, 2, 3;
   EXPECT_EQ(*find(read, {1, 0, 0}), expected);
   EXPECT_EQ(read.blocks[0].values[TensorBlock::offset(5, 5, 5)], Matrix3f(Matrix3f::Zero()));
+}
+
+/// Also where all voxels of a block are active, and a block was read before it.
+TEST(TensorFiles, ComponentsOfGridsWithoutAVoxelAreZero) {
+  openvdb::GridPtrVec rows;
+  for (int row = 0; row < 3; ++row) {
+    const auto grid = stock_grid<openvdb::Vec3SGrid>("T_row" + std::to_string(row), openvdb::Vec3s(0));
+    grid->denseFill({{0, 0, 0}, {7, 7, row == 0 ? 15 : 7}}, openvdb::Vec3s(1, 2, 3));
+    rows.push_back(grid);
+  }
+  openvdb::gridPtrCast<openvdb::Vec3SGrid>(rows[1])->tree().setValueOn({0, 0, 8}, openvdb::Vec3s(4, 5, 6));
+  const Temporary path("a.vdb");
+  write_stock(path, rows);
+  const std::optional<BlockSource> source = open_tensor_vdb(path);
+  ASSERT_TRUE(source);
+  TensorBlock block;
+  read_block(*source, 0, block);
+  read_block(*source, 1, block);
+  EXPECT_TRUE(block.active.all());
+  Matrix3f expected = Matrix3f::Zero();
+  expected.row(0) << 1, 2, 3;
+  EXPECT_EQ(block.values[1], expected);
+  expected.row(1) << 4, 5, 6;
+  EXPECT_EQ(block.values[0], expected);
+}
+
+TEST(TensorFiles, OfGridsWithOneNameTheSameIsReadEachTime) {
+  openvdb::GridPtrVec rows;
+  for (int i = 0; i < 6; ++i) {
+    rows.push_back(
+        stock_grid<openvdb::Vec3SGrid>((i < 3 ? "T_row" : "U_row") + std::to_string(i % 3), openvdb::Vec3s(0)));
+    openvdb::gridPtrCast<openvdb::Vec3SGrid>(rows.back())
+        ->denseFill({{0, 0, 0}, {7, 7, 7}}, openvdb::Vec3s(static_cast<float>(i / 3 + 1)));
+  }
+  const Temporary path("a.vdb");
+  write_stock(path, rows);
+  std::string bytes = bytes_of(path);
+  for (std::size_t at = bytes.find("U_row"); at != std::string::npos; at = bytes.find("U_row", at)) bytes[at] = 'T';
+  write_bytes(path, bytes);
+  for (int i = 0; i < 10; ++i) {
+    const Matrix3f tensor = read_tensor_vdb(path).blocks[0].values[0];
+    EXPECT_EQ(tensor, Matrix3f(Matrix3f::Constant(tensor(0, 0))));
+  }
+}
+
+/// OpenVDB's own files, whose tables of leaves say other flags than the leaves, or lengths that nothing has.
+TEST(TensorFiles, StockFilesOfAllCompressions) {
+  using namespace openvdb::io;
+  TensorGrid grid = sparse_grid();
+  const Temporary path("a.vdb"), stock("b.vdb");
+  for (const bool half : {false, true})
+    for (const bool dense : {false, true}) {
+      if (dense)
+        for (TensorBlock& block : grid.blocks) block.active.set();
+      write_tensor_vdb(path, grid, half);
+      openvdb::io::File file(path.string());
+      file.open(/*delayLoad=*/false);
+      const auto grids = file.getGrids();
+      for (const openvdb::GridBase::Ptr& row : *grids)  // A leaf without active voxels.
+        openvdb::gridPtrCast<openvdb::Vec3SGrid>(row)->tree().setValueOff({100, 0, 0}, openvdb::Vec3s(1));
+      for (const std::uint32_t values : {COMPRESS_NONE, COMPRESS_ZIP, COMPRESS_BLOSC})
+        for (const std::uint32_t mask : {0u, std::uint32_t{COMPRESS_ACTIVE_MASK}}) {
+          write_stock(stock, *grids, values | mask);
+          expect_same_blocks(read_tensor_vdb(stock), read_tensor_vdb(path));
+          const openvdb::CoordBBox box({0, 0, 0}, {7, 7, 7});
+          EXPECT_NO_THROW(read_vdb(stock, {"stress_row0"}, &box)) << half << dense << " " << values << " " << mask;
+        }
+    }
 }
 
 TEST(TensorFiles, BlocksAreReadInAnyOrder) {

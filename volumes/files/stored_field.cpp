@@ -33,6 +33,7 @@ void read_leaves(const StoredField& field, std::size_t i, std::vector<LeafReader
     if (count == rows.size() && (rows[grid] = reader.vectors(leaf))) ++whole_rows;
   }
   if (whole_rows == rows.size()) return put_rows(rows, block);
+  block.values.fill(Eigen::Matrix3f::Zero());  // A voxel of the block may be active in some of the grids alone.
   for (std::size_t grid = 0; grid < count; ++grid)
     if (field.leaf(i, grid) != StoredField::missing)
       readers[grid].put(field.leaf_of(i, grid), field.grids[grid].entries, block);

@@ -99,7 +99,7 @@ class Reader : private openvdb::io::Archive {
       if (!wanted.count(name)) continue;
       if (descriptor.isInstance()) return std::nullopt;
       found.push_back(descriptor);
-      result.grids[name];
+      if (!result.grids.try_emplace(name).second) return std::nullopt;  // A second grid of this name.
     }
     std::atomic<bool> complete{true};
     tbb::parallel_for(std::size_t{0}, found.size(), [&](std::size_t i) {
@@ -198,7 +198,7 @@ class Reader : private openvdb::io::Archive {
       StoredLeaves leaves;
       const VdbLeafGrid checked = read_without_voxels(descriptor, leaves, /*by_table=*/false);
       // OpenVDB finds the voxels of a box by the table.
-      if (box_ && table_ && value_size(checked.tree.type) && !(*table_ == table_of(checked.tree, leaves.leaves)))
+      if (box_ && table_ && value_size(checked.tree.type) && !agrees(*table_, checked.tree, leaves.leaves))
         fail_damaged(path_, "");
       in_.seekg(begin);
     } else {

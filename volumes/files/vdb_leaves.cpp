@@ -48,6 +48,7 @@ void LeafReader::unpack(const char* chunk, std::size_t bytes, std::size_t expect
   if (tree_.blosc || tree_.zip) {
     if (bytes < length_bytes) throw Misfit();
     const auto stored = read_number<std::int64_t>(chunk, ByteOrder::little);
+    if (stored > 0 && static_cast<std::size_t>(stored) != bytes - length_bytes) throw Misfit();
     if (stored > 0 && !tree_.blosc) {
       std::istringstream stream(std::string(chunk, bytes));
       openvdb::io::unzipFromStream(stream, values_.data(), expected);
@@ -57,9 +58,7 @@ void LeafReader::unpack(const char* chunk, std::size_t bytes, std::size_t expect
     chunk += length_bytes;
     bytes -= length_bytes;
     if (stored > 0) {
-      if (static_cast<std::size_t>(stored) != bytes || bytes < blosc_header ||
-          !blosc_fits(chunk, stored, static_cast<std::int64_t>(expected)))
-        throw Misfit();
+      if (bytes < blosc_header || !blosc_fits(chunk, stored, static_cast<std::int64_t>(expected))) throw Misfit();
       openvdb::compression::bloscDecompress(values_.data(), expected, values_.size(), chunk);
       return;
     }

@@ -268,7 +268,7 @@ bool walk(const FileBytes& file, std::int64_t at, const StoredTree& tree, Stored
     if (table) leaves.leaves.reserve(table->flags.size());
     Walker walker(file, at, tree, *size, leaves);
     walker.walk_topology();
-    // Of trees with all values, tables have other flags than leaves; OpenVDB reads neither.
+    // OpenVDB gives the leaves of trees with all values other flags in the table.
     if (!table || !tree.active_only || !walker.follow(*table, end)) walker.walk_values();
     return true;
   } catch (const Misfit&) {
@@ -285,6 +285,17 @@ bool tree_fits(const FileBytes& file, std::int64_t at, const StoredTree& tree, S
 bool tree_fits(const FileBytes& file, std::int64_t at, std::int64_t end, const LeafTable& table, const StoredTree& tree,
                StoredLeaves& leaves) {
   return walk(file, at, tree, leaves, &table, end);
+}
+
+bool agrees(const LeafTable& table, const StoredTree& tree, const std::vector<StoredLeaf>& leaves) {
+  const LeafTable found = table_of(tree, leaves);
+  if (table.flags.size() != leaves.size() || table.chunks.size() != leaves.size()) return false;
+  for (std::size_t i = 0; i < leaves.size(); ++i) {
+    if (tree.half && leaves[i].active.none()) continue;
+    if (tree.active_only && table.flags[i] != found.flags[i]) return false;
+    if (table.chunks[i] != found.chunks[i]) return false;
+  }
+  return true;
 }
 
 LeafTable table_of(const StoredTree& tree, const std::vector<StoredLeaf>& leaves) {

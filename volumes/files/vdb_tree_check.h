@@ -45,8 +45,6 @@ struct StoredLeaves {
 struct LeafTable {
   std::vector<std::int8_t> flags;
   std::vector<std::int64_t> chunks;  ///< Bytes of the values, with the length before them.
-
-  friend bool operator==(const LeafTable& a, const LeafTable& b) { return a.flags == b.flags && a.chunks == b.chunks; }
 };
 
 /// Reads through a tree whose topology begins at position `at`, and through the values that follow it. Only for files
@@ -59,6 +57,10 @@ bool tree_fits(const FileBytes& file, std::int64_t at, const StoredTree& tree, S
 /// checked when leaves are read.
 bool tree_fits(const FileBytes& file, std::int64_t at, std::int64_t end, const LeafTable& table, const StoredTree& tree,
                StoredLeaves& leaves);
+
+/// Whether a file's table says the same as its leaves, which were read through, in what OpenVDB takes from the table:
+/// not the flags in trees with all values, and nothing of a leaf of 16-bit floats without active voxels.
+bool agrees(const LeafTable& table, const StoredTree& tree, const std::vector<StoredLeaf>& leaves);
 
 /// The table of leaves that were read through.
 LeafTable table_of(const StoredTree& tree, const std::vector<StoredLeaf>& leaves);

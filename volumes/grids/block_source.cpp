@@ -39,7 +39,7 @@ void fill_block(TensorBlock& block, const std::function<Eigen::Matrix3d(const Ei
 void read_block(const BlockSource& source, std::size_t i, TensorBlock& block) {
   block.origin = source.shapes[i].origin;
   block.active = source.shapes[i].active;
-  block.values.fill(Eigen::Matrix3f::Zero());  // The grids of a field may have different active voxels.
+  if (!block.active.all()) block.values.fill(Eigen::Matrix3f::Zero());
   source.fill(i, block);
 }
 
