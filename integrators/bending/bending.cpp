@@ -2,6 +2,12 @@
 
 namespace tensorray {
 
+BendingSettings resolved(BendingSettings settings, const TensorField& field) {
+  if (settings.method == BendingMethod::automatic)
+    settings.method = field.is_cubic() ? BendingMethod::splitting4 : BendingMethod::splitting;
+  return settings;
+}
+
 const char* to_string(RayEnd end) {
   constexpr const char* names[ray_end_count] = {"plate", "missed", "obstacle", "step_limit", "degenerate"};
   return names[static_cast<int>(end)];

@@ -20,33 +20,40 @@
 namespace tensorray {
 
 enum class BendingMethod {
+  automatic,  ///< `splitting4` in a cubic field; `splitting` in a linear one, whose kinks leave no more than order 2.
   euler,      ///< The paper's Eq. 3–4: D ← normalize(D + σ h T(P) D), P ← P + h D. Order 1.
   splitting,  ///< Drift h/2, kick D ← normalize(exp(h σ T(P)) D), drift h/2. Order 2; exact in V for constant T; stable
               ///< at any step length.
-  rk4,     ///< Classical Runge–Kutta. Order 4.
-  bs23,    ///< Bogacki–Shampine, adaptive. Order 3.
-  dopri5,  ///< Dormand–Prince, adaptive. Order 5. The reference on smooth fields.
+  splitting4,  ///< Six such kicks between drifts (composition.h). Order 4; exact in V for constant T; stable at any
+               ///< step length; adaptive, unless the step is given.
+  rk4,         ///< Classical Runge–Kutta. Order 4.
+  bs23,        ///< Bogacki–Shampine, adaptive. Order 3.
+  dopri5,      ///< Dormand–Prince, adaptive. Order 5. The reference on smooth fields.
 };
 
 struct BendingSettings {
-  BendingMethod method = BendingMethod::splitting;
+  BendingMethod method = BendingMethod::automatic;
 
   double scale = 1;  ///< Factor on every ray's flexibility: light bends by s · scale · T. Finite.
 
   /// Arc length of a step, in voxels along the ray (a step of 1 has length 1 in index space). 0 means automatic: ½
   /// voxel, or shorter where the field is strong, so that |σ| h ‖T − ⅓ tr(T) I‖ (Frobenius) ≤ 0.2 with the last sampled
   /// T (Eq. 9, read dimensionally). An automatic step of `splitting`, which is stable, is never shorter than 1/64
-  /// voxel. For adaptive methods, `step` is the length of the first step and the limit of all steps; if it is 0, the
-  /// limit is 2 voxels.
+  /// voxel. Steps of `splitting4` follow its error if they are automatic, and are of at most 4 voxels. For the other
+  /// adaptive methods, `step` is the length of the first step and the limit of all steps; if it is 0, the limit is 2
+  /// voxels.
   double step = 0;
-  double tolerance = 1e-3;  ///< Adaptive methods: greatest error of the ray per step, in voxels and in radians; > 0.
-                            ///< Differentials do not count.
+  double tolerance = 1e-3;  ///< Adaptive methods: greatest error estimate of a step, in voxels, and, but for
+                            ///< `splitting4`, in radians; > 0. Differentials do not count.
   int max_steps = 20000;    ///< Greatest number of steps of a ray; > 0.
 
   /// Longest path that is followed, world units; > 0. A ray that reaches this length ends there as `missed`, inside or
   /// outside the volume.
   double max_length = std::numeric_limits<double>::infinity();
 };
+
+/// The settings with the method that `automatic` is for a field.
+BendingSettings resolved(BendingSettings settings, const TensorField& field);
 
 /// Why a ray ended. The counts are part of every render's statistics.
 enum class RayEnd : std::uint8_t {
@@ -110,9 +117,10 @@ using Track = std::vector<TrackPoint>;
 /// of the point where rays meet it, so that those of the position lie in the surface.
 /// @param field     World frame; s · scale · T in 1/length. Light goes straight outside its extent and outside the cut.
 /// @param geometry  Bounds (those of the field), cut, plate and obstacles.
-/// Accuracy: the method's order on smooth fields, 2 on trilinear data. Entry, exit and hits are located by repeating
-/// the step with the length that ends on the surface, which keeps the order.
-/// Threads: `field` and `geometry` are shared and immutable; one batch belongs to one thread.
+/// Accuracy: the method's order on smooth fields, 2 on trilinear data. A cubic field has kinks in its third
+/// derivatives: at steps much shorter than its voxels the order is 4 at most. Entry, exit and hits are located by
+/// repeating the step with the length that ends on the surface, which keeps the order. Threads: `field` and `geometry`
+/// are shared and immutable; one batch belongs to one thread.
 /// @throw std::invalid_argument if a setting is out of range.
 void trace(const TensorField& field, const Geometry& geometry, const BendingSettings& settings, RayBatch& batch);
 

@@ -9,6 +9,7 @@
 #include <Eigen/LU>
 
 #include "integrators/bending/bending.h"
+#include "integrators/bending/composition.h"
 #include "integrators/bending/exponential.h"
 #include "integrators/bending/runge_kutta.h"
 #include "volumes/bricks/tensor_sampler.h"
@@ -96,20 +97,44 @@ State<N> euler(RayMedium<N>& medium, const State<N>& from, double h) {
   return {from.P + h * to.V, to.V, to.radiance_change};
 }
 
+/// V ← exp(factor T) V, normalised, with T as last sampled.
+template <int N>
+void kick(const RayMedium<N>& medium, double factor, State<N>& ray) {
+  if constexpr (N == 1) {
+    const auto [V, log_length] = exponential_direction(factor * medium.T, ray.V);
+    ray.V = V;
+    ray.radiance_change -= 3 * log_length;
+  } else {
+    const std::array<Eigen::Matrix3d, 2> dT{factor * medium.dT[0], factor * medium.dT[1]};
+    ray.V = normalized<N>({ray.P, exponential_derivatives(factor * medium.T, dT, ray.V), 0}).V;
+  }
+}
+
 template <int N>
 State<N> splitting(RayMedium<N>& medium, const State<N>& from, double h) {
-  const Eigen::Matrix<double, 3, N> middle = from.P + h / 2 * from.V;
-  medium.sample(middle);
-  const double factor = h * medium.strength;
-  if constexpr (N == 1) {
-    const auto [V, log_length] = exponential_direction(factor * medium.T, from.V);
-    return {middle + h / 2 * V, V, from.radiance_change - 3 * log_length};
-  } else {
-    const State<N> to = normalized<N>(
-        {middle, exponential_derivatives(factor * medium.T, {factor * medium.dT[0], factor * medium.dT[1]}, from.V),
-         0});
-    return {middle + h / 2 * to.V, to.V, 0};
+  State<N> ray = from;
+  ray.P += h / 2 * ray.V;
+  medium.sample(ray.P);
+  kick(medium, h * medium.strength, ray);
+  ray.P += h / 2 * ray.V;
+  return ray;
+}
+
+/// A step of `splitting4`. Sets the position of `error`.
+template <int N>
+State<N> splitting4(RayMedium<N>& medium, const State<N>& from, double h, State<N>& error) {
+  const Composition& method = splitting4_method;
+  State<N> ray = from;
+  error.P = h * method.error[0] * ray.V;
+  error.V.setZero();
+  for (int i = 0; i < Composition::kicks; ++i) {
+    ray.P += h * method.drift[i] * ray.V;
+    medium.sample(ray.P);
+    kick(medium, h * method.kick[i] * medium.strength, ray);
+    error.P += h * method.error[i + 1] * ray.V;
   }
+  ray.P += h * method.drift[Composition::kicks] * ray.V;
+  return ray;
 }
 
 /// A step of a Runge–Kutta method. Adaptive methods set `error`.
@@ -133,6 +158,7 @@ State<N> by_stages(const RungeKutta& method, RayMedium<N>& medium, const State<N
 template <int N>
 State<N> advance(BendingMethod method, RayMedium<N>& medium, const State<N>& from, double h, State<N>& error) {
   if (const RungeKutta* const stages = runge_kutta(method)) return by_stages(*stages, medium, from, h, error);
+  if (method == BendingMethod::splitting4) return splitting4(medium, from, h, error);
   return method == BendingMethod::euler ? euler(medium, from, h) : splitting(medium, from, h);
 }
 

@@ -58,7 +58,9 @@ inline const RungeKutta* runge_kutta(BendingMethod method) {
     case BendingMethod::dopri5:
       return &dopri5_method;
     case BendingMethod::euler:
+    case BendingMethod::automatic:
     case BendingMethod::splitting:
+    case BendingMethod::splitting4:
       break;
   }
   return nullptr;

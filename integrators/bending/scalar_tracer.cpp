@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "integrators/bending/composition.h"
 #include "integrators/bending/step_lengths.h"
 
 namespace tensorray {
@@ -113,19 +114,58 @@ std::optional<RayEnd> Tracer<N>::cross_box() {
   return entry ? reach(entry) : leave();
 }
 
+/// Whether an error estimate sets the lengths of steps.
+template <int N>
+bool Tracer<N>::is_controlled() const {
+  const RungeKutta* const stages = runge_kutta(settings_.method);
+  return (stages && stages->adaptive) || (is_composed() && settings_.step == 0);
+}
+
 /// The length of an automatic step, in voxels.
 template <int N>
 double Tracer<N>::automatic_step() const {
+  using namespace step_lengths;
+  const double longest = is_composed() ? longest_composed : longest_automatic;
+  const double strongest = is_composed() ? strongest_composed : strongest_kick;
   const double kick = std::abs(medium_.strength) * deviator_norm(medium_.T) * voxel_;
-  if (kick * step_lengths::longest_automatic <= step_lengths::strongest_kick) return step_lengths::longest_automatic;
-  const double shortest = settings_.method == BendingMethod::splitting ? step_lengths::shortest_splitting : 0.0;
-  return std::max(step_lengths::strongest_kick / kick, shortest);
+  if (kick * longest <= strongest) return longest;
+  const double shortest = settings_.method == BendingMethod::splitting ? shortest_splitting : 0.0;
+  return std::max(strongest / kick, shortest);
 }
 
-/// What the chord from the ray to `next` meets first. `hit.distance` is along the chord.
+/// The path at the part t of a step to `next`.
 template <int N>
-typename Tracer<N>::Event Tracer<N>::meet(const State<N>& next, Hit& hit) const {
-  const Eigen::Vector3d from = position(), to = next.position();
+Eigen::Vector3d Tracer<N>::between(const State<N>& next, double h, double t) const {
+  const PathWeights w = path_weights(t);
+  return w.from * position() + h * w.from_direction * direction() + w.to * next.position() +
+         h * w.to_direction * next.direction();
+}
+
+/// Number of chords that a step is divided into: steps of `splitting4` may be long.
+template <int N>
+int Tracer<N>::chord_count(double h) const {
+  return is_composed() ? std::max(1, static_cast<int>(std::ceil(h / voxel_ / chord_length - 1e-3))) : 1;
+}
+
+/// Records the path between the ray and `next`.
+template <int N>
+void Tracer<N>::record_inner(const State<N>& next, double h) {
+  if (!recording_.track && !recording_.points) return;
+  const int count = chord_count(h);
+  for (int i = 1; i < count; ++i) {
+    const double t = double(i) / count;
+    const PathWeights w = path_slopes(t);
+    const Eigen::Vector3d point = between(next, h, t);
+    const Eigen::Vector3d along = w.from / h * position() + w.from_direction * direction() +
+                                  w.to / h * next.position() + w.to_direction * next.direction();
+    if (recording_.track) recording_.track->push_back({point, length_ + t * h});
+    if (recording_.points) recording_.points->push_back({point, along.normalized(), length_ + t * h, true});
+  }
+}
+
+/// What a chord of the path meets first. `hit.distance` is along the chord.
+template <int N>
+typename Tracer<N>::Event Tracer<N>::meet(const Eigen::Vector3d& from, const Eigen::Vector3d& to, Hit& hit) const {
   const bool leaves_box = !field_.contains(to);
   const bool may_absorb = geometry_.may_absorb(from, to);
   if (!leaves_box && !may_absorb && !geometry_.has_cut()) return Event::none;
@@ -154,19 +194,41 @@ typename Tracer<N>::Event Tracer<N>::meet(const State<N>& next, Hit& hit) const 
   return event;
 }
 
+/// What the step from the ray to `next` meets first, on the chords that it is divided into.
+template <int N>
+typename Tracer<N>::Event Tracer<N>::meet(const State<N>& next, double h, Landing& landing) const {
+  const int count = chord_count(h);
+  const double part = h / count;
+  const Eigen::Vector3d start = position();
+  Eigen::Vector3d from = start;
+  for (int i = 0; i < count; ++i) {
+    const Eigen::Vector3d to = i + 1 == count ? Eigen::Vector3d(next.position()) : between(next, h, (i + 1.0) / count);
+    Hit& hit = landing.hit;
+    const Event event = meet(from, to, hit);
+    if (event != Event::none) {
+      const Eigen::Vector3d chord = to - from;
+      landing.to_plane = hit.normal.dot(from - start) + hit.normal.dot(chord) / chord.norm() * hit.distance;
+      landing.length = part * i + part * hit.distance / chord.norm();
+      return event;
+    }
+    from = to;
+  }
+  return Event::none;
+}
+
 /// Repeats the step with the length that ends on the plane of `hit` (Newton's method), which keeps the order.
 /// @return that length.
 template <int N>
-double Tracer<N>::land(const State<N>& next, double h, const Hit& hit) {
+double Tracer<N>::land(double h, const Landing& landing) {
+  const Hit& hit = landing.hit;
   if (hit.normal.isZero()) return 0;
-  const State<N> from = ray_;
-  const Eigen::Vector3d start = position(), chord = next.position() - start;
-  const double to_plane = hit.normal.dot(chord) / chord.norm() * hit.distance;
-  double length = h * hit.distance / chord.norm();
-  State<N> unused, landed = from;
+  const Eigen::Vector3d start = position();
+  double length = landing.length;
+  State<N> unused, landed = ray_;
   for (int i = 0; i < 4; ++i) {
     landed = step(length, unused);
-    const double gap = (to_plane - hit.normal.dot(landed.position() - start)) / hit.normal.dot(landed.direction());
+    const double gap =
+        (landing.to_plane - hit.normal.dot(landed.position() - start)) / hit.normal.dot(landed.direction());
     if (!(std::abs(gap) <= h)) break;  // The light is nearly parallel to the plane.
     if (std::abs(gap) <= 1e-10 * h || i == 3) {
       landed.P += gap * landed.V;
@@ -175,6 +237,7 @@ double Tracer<N>::land(const State<N>& next, double h, const Hit& hit) {
     }
     length = std::clamp(length + gap, 0.0, h);
   }
+  record_inner(landed, length);
   ray_ = landed;
   meet_surface(hit.normal, true);
   return length;
@@ -185,10 +248,11 @@ template <int N>
 double Tracer<N>::control_step(const State<N>& error) {
   using namespace step_lengths;
   const double excess = std::max(error.position().norm() / voxel_, error.direction().norm()) / settings_.tolerance;
-  const double order = runge_kutta(settings_.method)->order;
-  const double factor = safety * std::pow(std::max(excess, least_excess), -1 / order);
+  const double order = is_composed() ? composed_order : runge_kutta(settings_.method)->order;
+  const double factor =
+      (is_composed() ? composed_safety : safety) * std::pow(std::max(excess, least_excess), -1 / order);
   const double growth = factor > least_growth ? std::min(factor, most_growth) : least_growth;
-  const double longest = settings_.step > 0 ? settings_.step : longest_adaptive;
+  const double longest = is_composed() ? longest_composed : settings_.step > 0 ? settings_.step : longest_adaptive;
   adaptive_step_ = std::clamp(adaptive_step_ * growth, shortest_adaptive, longest);
   return excess;
 }
@@ -199,18 +263,16 @@ template <int N>
 double Tracer<N>::next_step() {
   const double way =
       settings_.method == BendingMethod::euler ? 0 : sampler_.way_through_straight_brick(position(), direction());
-  const RungeKutta* const stages = runge_kutta(settings_.method);
+  const bool stages = runge_kutta(settings_.method) != nullptr;
   if (way > 0)
     return way + (stages ? step_lengths::past_straight_brick_by_stages : step_lengths::past_straight_brick) * voxel_;
-  if (stages && stages->adaptive) return voxel_ * adaptive_step_;
+  if (is_controlled()) return voxel_ * adaptive_step_;
   return voxel_ * (settings_.step == 0 ? automatic_step() : settings_.step);
 }
 
 /// Steps through the field to an absorber, out of the box or out of the cut. Returns nothing if the ray leaves the cut.
 template <int N>
 std::optional<RayEnd> Tracer<N>::bend(double first_step) {
-  const RungeKutta* const stages = runge_kutta(settings_.method);
-  const bool controlled = stages && stages->adaptive;
   voxel_ = length_of_voxel();
   medium_.sample(ray_.P);
   adaptive_step_ = first_step > 0 ? first_step / voxel_ : settings_.step == 0 ? automatic_step() : settings_.step;
@@ -225,21 +287,22 @@ std::optional<RayEnd> Tracer<N>::bend(double first_step) {
     State<N> error;
     const State<N> next = step(h, error);
     if (next.direction().isZero() || !next.position().allFinite()) return RayEnd::degenerate;
-    if (controlled && control_step(error) > 1 && wanted > step_lengths::shortest_adaptive * voxel_) continue;
+    if (is_controlled() && control_step(error) > 1 && wanted > step_lengths::shortest_adaptive * voxel_) continue;
 
-    Hit hit;
-    const Event event = meet(next, hit);
+    Landing landing;
+    const Event event = meet(next, h, landing);
     if (event == Event::none) {
+      record_inner(next, h);
       ray_ = next;
       length_ += h;
       record(true);
       if (h == rest) return RayEnd::missed;
       continue;
     }
-    length_ += land(next, h, hit);
+    length_ += land(h, landing);
     if (direction().isZero() || !position().allFinite()) return RayEnd::degenerate;
     record(true);
-    if (event == Event::absorber) return end_on(hit.surface);
+    if (event == Event::absorber) return end_on(landing.hit.surface);
     if (event == Event::leaves_box) return leave();
     return std::nullopt;
   }

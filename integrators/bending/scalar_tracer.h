@@ -82,6 +82,13 @@ class Tracer {
   /// What a step meets; `none`: nothing.
   enum class Event { none, absorber, leaves_box, leaves_cut };
 
+  /// Where a step meets something: the distance of its plane from the beginning of the step, along its normal, and the
+  /// length of the step up to there, approximately.
+  struct Landing {
+    Hit hit;
+    double to_plane = 0, length = 0;
+  };
+
   std::optional<RayEnd> reach(const std::optional<Hit>& entry);
   std::optional<RayEnd> reach_box();
   std::optional<RayEnd> cross_box();
@@ -99,8 +106,14 @@ class Tracer {
   void go_straight(const Hit& hit);
   bool ends_before(double distance) const { return length_ + distance >= settings_.max_length; }
   void meet_surface(const Eigen::Vector3d& normal, bool bends);
-  Event meet(const State<N>& next, Hit& hit) const;
-  double land(const State<N>& next, double h, const Hit& hit);
+  bool is_composed() const { return settings_.method == BendingMethod::splitting4; }
+  bool is_controlled() const;
+  Eigen::Vector3d between(const State<N>& next, double h, double t) const;
+  int chord_count(double h) const;
+  void record_inner(const State<N>& next, double h);
+  Event meet(const Eigen::Vector3d& from, const Eigen::Vector3d& to, Hit& hit) const;
+  Event meet(const State<N>& next, double h, Landing& landing) const;
+  double land(double h, const Landing& landing);
 
   const TensorField& field_;
   const Geometry& geometry_;

@@ -1,5 +1,5 @@
 /// @file integrators/packets/packet_bending-inl.h
-/// The kick of a step: exp(σ h T) V, normalised. A part of packet_kernel.cpp.
+/// The kick of a step: exp(σ h T) V, normalised. A part of packet_kernel-inl.h.
 
 // Included once for each instruction set: see Highway's foreach_target.h.
 #if defined(TENSORRAY_INTEGRATORS_PACKET_BENDING_TOGGLE) == defined(HWY_TARGET_TOGGLE)
@@ -81,10 +81,13 @@ HWY_INLINE void keep_bending_rate(Packet& packet, const Tensor& T, int at) {
 
 /// exp(factor · T) V, normalised, for any strength. The result is stored: a returned value would pass through memory in
 /// halves of vectors, which stalls the processor. How a lane is computed depends on that lane alone.
+/// @param from  The directions, of which `v` are those at `at`.
+/// @param part  The part of the step that this kick takes.
 /// @param to  The packet's next directions; its present ones only if the field is weak in all lanes' bricks.
 /// `changes`: stores Λ of the kick.
 template <int components, bool differentials, bool changes>
-HWY_INLINE void bend_strongly(Packet& packet, const Tensor& T, const F3& v, F factor, int at, PerRay (&to)[3]) {
+HWY_INLINE void bend_strongly(Packet& packet, const Tensor& T, const PerRay (&from)[3], const F3& v, float part,
+                              F factor, int at, PerRay (&to)[3]) {
   const F reach = load(packet.reach, at);
   F size = reach;
   if (HWY_UNLIKELY(!(packet.greatest_reach <= strongest_kick))) {
@@ -97,8 +100,8 @@ HWY_INLINE void bend_strongly(Packet& packet, const Tensor& T, const F3& v, F fa
   while (terms < most_terms && !hn::AllTrue(floats, hn::Le(size, set(series_reach[terms - 2])))) ++terms;
   F3 inner = v;  // Horner's rule, from the last term that any lane needs.
   for (int n = terms; n > 2; --n) {
-    const F part = hn::Mul(set(1.0f / static_cast<float>(n)), factor);
-    inner = select(hn::Gt(size, set(series_reach[n - 3])), mul_add(part, apply(T, inner), v), v);
+    const F nth = hn::Mul(set(1.0f / static_cast<float>(n)), factor);
+    inner = select(hn::Gt(size, set(series_reach[n - 3])), mul_add(nth, apply(T, inner), v), v);
   }
   const F3 sum = two_terms(T, v, inner, factor);
   const F e = excess(sum);
@@ -117,7 +120,7 @@ HWY_INLINE void bend_strongly(Packet& packet, const Tensor& T, const F3& v, F fa
   // Rays with differentials stop where no series is exact enough.
   store(mul(differentials ? hn::IfThenElseZero(fits, scale) : scale, sum), to, at);
   if (!differentials && HWY_UNLIKELY(!hn::AllTrue(floats, fits)))
-    bend_in_double<components, changes>(packet, to_bits(hn::Not(fits), at), to);
+    bend_in_double<components, changes>(packet, from, part, to_bits(hn::Not(fits), at), to);
 }
 
 }  // namespace tensorray::packets::HWY_NAMESPACE

@@ -1,5 +1,5 @@
 /// @file integrators/packets/packet_bricks-inl.h
-/// The bricks of a packet's lanes. A part of packet_kernel.cpp.
+/// The bricks of a packet's lanes. A part of packet_kernel-inl.h.
 
 // Included once for each instruction set: see Highway's foreach_target.h.
 #if defined(TENSORRAY_INTEGRATORS_PACKET_BRICKS_TOGGLE) == defined(HWY_TARGET_TOGGLE)
@@ -54,7 +54,7 @@ HWY_INLINE void find_bricks(const PacketMedium& medium, Packet& packet, std::uin
 template <bool uniform>
 HWY_INLINE void find_reach(const PacketMedium& medium, Packet& packet) {
   const F most = set(1e30f);
-  const F longest = set(medium.longest_step * (uniform ? 1.0f : medium.longest_voxel));
+  const F longest = set(medium.longest_kick * (uniform ? 1.0f : medium.longest_voxel));
   const bool euler = medium.settings.method == BendingMethod::euler;  // The trace of T, which has no bound, affects it.
   F greatest = hn::Zero(floats);
   packet.straight = false;

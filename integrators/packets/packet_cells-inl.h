@@ -1,5 +1,5 @@
 /// @file integrators/packets/packet_cells-inl.h
-/// Vectors with a ray in each lane, and the tensor at these rays. A part of packet_kernel.cpp.
+/// Vectors with a ray in each lane, and the tensor at these rays. A part of packet_kernel-inl.h.
 
 // Included once for each instruction set: see Highway's foreach_target.h.
 #if defined(TENSORRAY_INTEGRATORS_PACKET_CELLS_TOGGLE) == defined(HWY_TARGET_TOGGLE)

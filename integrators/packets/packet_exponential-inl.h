@@ -1,6 +1,6 @@
 /// @file integrators/packets/packet_exponential-inl.h
 /// Kicks that are too strong for a series in single precision, by scaling and squaring in double precision. A part of
-/// packet_kernel.cpp.
+/// packet_kernel-inl.h.
 
 // Included once for each instruction set: see Highway's foreach_target.h.
 #if defined(TENSORRAY_INTEGRATORS_PACKET_EXPONENTIAL_TOGGLE) == defined(HWY_TARGET_TOGGLE)
@@ -74,10 +74,10 @@ HWY_INLINE D inverse_power_of_two(D value) {
 
 /// σ h times the deviator of T. (The trace changes only the length.)
 template <int components>
-HWY_INLINE void strong_deviator(const Packet& packet, int at, Matrix& A) {
+HWY_INLINE void strong_deviator(const Packet& packet, float part, int at, Matrix& A) {
   const Singles singles;
-  const D factor =
-      hn::PromoteTo(doubles, hn::Mul(hn::Load(singles, packet.time + at), hn::Load(singles, packet.kick + at)));
+  const auto time = hn::Mul(hn::Set(singles, part), hn::Load(singles, packet.time + at));
+  const D factor = hn::PromoteTo(doubles, hn::Mul(time, hn::Load(singles, packet.kick + at)));
   for (int i = 0; i < 8; ++i)
     A.m[i % 3 * 3 + i / 3] =
         hn::Mul(factor, promoted(packet.tensor[TensorBrick::stored_component(components, i)] + at));
@@ -173,8 +173,8 @@ HWY_INLINE hn::Mask<Doubles> bend_by_polynomial(const Matrix& A, MatrixPolynomia
 
 /// The same by squaring the exponential itself. Where two coordinate axes span the plane that shrinks, this keeps the
 /// light in it.
-HWY_NOINLINE D3 bend_by_matrix(const Matrix& A, const MatrixPolynomial& of, hn::Vec<Counts> squarings,
-                               const D3& before) {
+static HWY_NOINLINE D3 bend_by_matrix(const Matrix& A, const MatrixPolynomial& of, hn::Vec<Counts> squarings,
+                                      const D3& before) {
   Matrix power;
   square(A, power.m);
   for (int i = 0; i < 9; ++i) power.m[i] = hn::MulAdd(of.c[2], power.m[i], hn::Mul(of.c[1], A.m[i]));
@@ -186,33 +186,34 @@ HWY_NOINLINE D3 bend_by_matrix(const Matrix& A, const MatrixPolynomial& of, hn::
 /// Stores Λ of the strong kicks of some lanes, given as bits: −3 ln |exp(A) V|, where A is σ h times the deviator of T.
 /// Only few lanes have such kicks.
 template <int components>
-HWY_NOINLINE void change_in_double(Packet& packet, std::uint32_t which) {
+HWY_NOINLINE void change_in_double(Packet& packet, const PerRay (&from)[3], float part, std::uint32_t which) {
   for (; which != 0; which &= which - 1) {
     const auto lane = hwy::Num0BitsBelowLS1Bit_Nonzero32(which);
-    const float v[3] = {packet.v[0][lane], packet.v[1][lane], packet.v[2][lane]};
+    const float v[3] = {from[0][lane], from[1][lane], from[2][lane]};
     float T[9];
     for (int i = 0; i < 8; ++i) T[i] = packet.tensor[TensorBrick::stored_component(components, i)][lane];
     T[8] = 0;
-    packet.change_of_step[lane] = strong_radiance_change(T, packet.time[lane] * packet.kick[lane], v);
+    packet.change_of_step[lane] = strong_radiance_change(T, part * packet.time[lane] * packet.kick[lane], v);
   }
 }
 
-/// exp(σ h T) V, normalised, of some lanes, given as bits; zero if it has no direction. `changes`: stores Λ of the
-/// kick.
+/// exp(σ h T) V, normalised, of some lanes, given as bits; zero if it has no direction. h is the part `part` of the
+/// step. `changes`: stores Λ of the kick.
 template <int components, bool changes>
-HWY_NOINLINE void bend_in_double(Packet& packet, std::uint32_t which, PerRay (&to)[3]) {
-  if constexpr (changes) change_in_double<components>(packet, which);
+HWY_NOINLINE void bend_in_double(Packet& packet, const PerRay (&from)[3], float part, std::uint32_t which,
+                                 PerRay (&to)[3]) {
+  if constexpr (changes) change_in_double<components>(packet, from, part, which);
   const Singles singles;
   for (int at = 0; at < packet.vectors * lanes; at += double_lanes) {
     const std::uint8_t bytes[8] = {static_cast<std::uint8_t>(which >> at & ((1u << double_lanes) - 1))};
     if (bytes[0] == 0) continue;
     const auto wanted = hn::LoadMaskBits(singles, bytes);
     Matrix A;
-    strong_deviator<components>(packet, at, A);
+    strong_deviator<components>(packet, part, at, A);
     const D size = norm(A);
     const auto squarings = halve(A, size);
     const MatrixPolynomial exponential = small_exponential(A);
-    const D3 before{{promoted(packet.v[0] + at), promoted(packet.v[1] + at), promoted(packet.v[2] + at)}};
+    const D3 before{{promoted(from[0] + at), promoted(from[1] + at), promoted(from[2] + at)}};
     D3 v;
     const auto precise = bend_by_polynomial(A, exponential, squarings, before, v);
     if (HWY_UNLIKELY(!hn::AllTrue(doubles, precise))) {

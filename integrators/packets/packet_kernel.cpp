@@ -1,9 +1,6 @@
 #include "integrators/packets/packet_kernel.h"
 
 #include <algorithm>
-#include <cmath>
-#include <cstddef>
-#include <cstring>
 #include <stdexcept>
 
 #include "integrators/packets/packet_medium.h"
@@ -11,14 +8,11 @@
 // The code below is compiled once for each instruction set. The best one of the processor is selected at run time.
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "integrators/packets/packet_kernel.cpp"  // NOLINT
-// Structs below have vectors as members. That is not possible with vectors whose size is unknown at compile time.
-#define HWY_DISABLED_TARGETS (HWY_SSSE3 | HWY_SVE | HWY_SVE2 | HWY_SVE_256 | HWY_SVE2_128 | HWY_RVV)
-#include <hwy/foreach_target.h>  // IWYU pragma: keep
-// Must come after foreach_target.h:
+#include "integrators/packets/packet_targets.h"
+// Must come after packet_targets.h:
 #include <hwy/highway.h>
 
-#include "integrators/packets/packet_landing-inl.h"
-#include "integrators/packets/packet_stages-inl.h"
+#include "integrators/packets/packet_kernel-inl.h"
 
 #if defined(__SSE__)
 #include <xmmintrin.h>
@@ -27,415 +21,22 @@
 HWY_BEFORE_NAMESPACE();
 namespace tensorray::packets::HWY_NAMESPACE {
 
-/// The kernel, for voxels that are cubes along the axes (`uniform`) or have any other shape, for rays with or
-/// without differentials, whose changes of radiance are wanted or not.
-template <int components, bool uniform, bool differentials, bool changes>
-class Kernel {
- public:
-  Kernel(const PacketMedium& medium, KernelRays& batch) : medium_(medium), rays_(batch.rays), batch_(batch) {}
-
-  std::uint64_t run();
-
- private:
-  // Number of packets that are stepped in turn. With enough vectors, the processor has work while one of them waits.
-  static constexpr int in_flight = lanes > 8 ? 2 : 1;
-
-  void fill(Packet& packet);
-  void enter(Packet& packet, int lane);
-  static void copy_lane(const Packet& from, int of, Packet& to, int lane);
-  void close_ranks(Packet& packet);
-  void step_split(Packet& packet);
-  void step_watched(Packet& packet);
-  void step_otherwise(Packet& packet);
-  void attempt(Packet& packet);
-  void end_step(Packet& packet, std::uint32_t staying, std::uint32_t stop);
-  std::uint32_t outside(const Packet& packet, const PerRay (&points)[3]) const;
-  std::uint32_t stopped(const Packet& packet) const;
-  std::uint32_t spent(const Packet& packet) const;
-  void locate_on_extent(Packet& packet);
-  void add_step(Packet& packet);
-  void take_out(Packet& packet, std::uint32_t stop, std::uint32_t leave);
-  void keep_points(const Packet& packet, std::uint32_t which);
-  unsigned samples_per_step() const { return medium_.stages ? medium_.stages->stages : 1; }
-  float to_world() const { return uniform ? medium_.voxel : 1.0f; }  // World units per unit of `time`.
-  void land(Packet& packet);
-  void arrive(Packet& packet, const FaceLanding& landing);
-
-  const PacketMedium& medium_;
-  std::vector<KernelRay>& rays_;
-  KernelRays& batch_;
-  std::size_t next_ = 0;  // The first ray that no packet has held yet.
-  std::uint64_t samples_ = 0;
-  Packet packets_[in_flight];
-  Packet leaving_[in_flight];  // Rays of these packets that leave the extent, as they were before their last step.
-};
-
-/// Copies a ray into a lane.
-template <int components, bool uniform, bool differentials, bool changes>
-void Kernel<components, uniform, differentials, changes>::enter(Packet& packet, int lane) {
-  const KernelRay& ray = rays_[packet.ray[lane]];
-  for (int axis = 0; axis < 3; ++axis) {
-    packet.p[axis][lane] = ray.place.position[axis];
-    packet.v[axis][lane] = ray.direction[axis];
-    packet.brick[axis][lane] = ray.place.brick[axis];
-    if constexpr (differentials)
-      for (int i = 0; i < 2; ++i) {
-        packet.dp[i][axis][lane] = batch_.differentials[packet.ray[lane]].position[i][axis];
-        packet.dv[i][axis][lane] = batch_.differentials[packet.ray[lane]].direction[i][axis];
-      }
-  }
-  packet.kick[lane] = uniform ? ray.strength * medium_.voxel : ray.strength;
-  packet.bending_rate[lane] = std::fabs(packet.kick[lane]) * ray.norm;
-  packet.wanted[lane] = medium_.settings.step;
-  packet.length[lane] = 0;
-  if constexpr (changes) packet.radiance_change[lane] = 0;
-}
-
-/// Copies a ray, without the values that depend on its brick (see `begin`).
-template <int components, bool uniform, bool differentials, bool changes>
-void Kernel<components, uniform, differentials, changes>::copy_lane(const Packet& from, int of, Packet& to, int lane) {
-  for (int axis = 0; axis < 3; ++axis) {
-    to.p[axis][lane] = from.p[axis][of];
-    to.v[axis][lane] = from.v[axis][of];
-    if constexpr (!uniform) to.u[axis][lane] = from.u[axis][of];
-    to.brick[axis][lane] = from.brick[axis][of];
-    if constexpr (differentials)
-      for (int i = 0; i < 2; ++i) {
-        to.dp[i][axis][lane] = from.dp[i][axis][of];
-        to.dv[i][axis][lane] = from.dv[i][axis][of];
-      }
-  }
-  to.kick[lane] = from.kick[of];
-  to.length[lane] = from.length[of];
-  if constexpr (changes) to.radiance_change[lane] = from.radiance_change[of];
-  to.bending_rate[lane] = from.bending_rate[of];
-  to.time[lane] = from.time[of];
-  to.wanted[lane] = from.wanted[of];
-  to.ray[lane] = from.ray[of];
-}
-
-/// Moves the remaining rays to the front if that frees a vector. The other lanes repeat one of these rays.
-template <int components, bool uniform, bool differentials, bool changes>
-void Kernel<components, uniform, differentials, changes>::close_ranks(Packet& packet) {
-  const int count = static_cast<int>(hwy::PopCount(packet.alive));
-  if (count <= (packet.vectors - 1) * lanes) {
-    int to = 0;
-    for (std::uint32_t rest = packet.alive; rest != 0; rest &= rest - 1, ++to) {
-      const int lane = static_cast<int>(hwy::Num0BitsBelowLS1Bit_Nonzero32(rest));
-      if (to != lane) copy_lane(packet, lane, packet, to);
-    }
-    packet.vectors = (count + lanes - 1) / lanes;
-    packet.alive = ~0u >> (packet_rays - count);
-  }
-  const int of = static_cast<int>(hwy::Num0BitsBelowLS1Bit_Nonzero32(packet.alive));
-  for (int lane = 0; lane < packet.vectors * lanes; ++lane)
-    if (!(packet.alive >> lane & 1)) copy_lane(packet, of, packet, lane);
-  begin<uniform>(medium_, packet);
-}
-
-template <int components, bool uniform, bool differentials, bool changes>
-void Kernel<components, uniform, differentials, changes>::fill(Packet& packet) {
-  if (next_ == rays_.size()) return;
-  const int count = static_cast<int>(std::min<std::size_t>(packet_rays, rays_.size() - next_));
-  packet.alive = ~0u >> (packet_rays - count);
-  packet.vectors = packet_rays / lanes;
-  packet.clamps = medium_.clamps;
-  packet.steps = 0;
-  packet.most_steps = medium_.settings.max_steps;
-  for (int lane = 0; lane < count; ++lane) {
-    packet.ray[lane] = static_cast<std::int32_t>(next_++);
-    enter(packet, lane);
-    packet.most_steps = std::min(packet.most_steps, medium_.settings.max_steps - rays_[packet.ray[lane]].steps);
-  }
-  if constexpr (!uniform)
-    for (int i = 0; i < packet_rays; i += lanes)
-      store(index_direction<uniform>(medium_, load(packet.v, i)), packet.u, i);
-  if (medium_.adaptive && medium_.settings.step == 0) begin_steps<uniform>(medium_, packet);
-  if (count < packet_rays)
-    close_ranks(packet);
-  else
-    begin<uniform>(medium_, packet);
-}
-
-/// The lanes whose points are outside the extent, as bits.
-template <int components, bool uniform, bool differentials, bool changes>
-HWY_INLINE std::uint32_t Kernel<components, uniform, differentials, changes>::outside(const Packet& packet,
-                                                                                      const PerRay (&points)[3]) const {
-  std::uint32_t result = 0;
-  for (int i = 0; i < packet.vectors * lanes; i += lanes)
-    for (int axis = 0; axis < 3; ++axis) {
-      const F x = load(points[axis], i), margin = set(medium_.margin[axis]);
-      result |= to_bits(hn::Or(hn::Lt(hn::Add(x, margin), load(packet.low[axis], i)),
-                               hn::Gt(hn::Sub(x, margin), load(packet.high[axis], i))),
-                        i);
-    }
-  return result;
-}
-
-/// The lanes that cannot take this step, as bits.
-template <int components, bool uniform, bool differentials, bool changes>
-HWY_NOINLINE std::uint32_t Kernel<components, uniform, differentials, changes>::stopped(const Packet& packet) const {
-  std::uint32_t stop = 0;
-  for (int i = 0; i < packet.vectors * lanes; i += lanes) {
-    const F3 v = load(packet.v_next, i);
-    stop |= to_bits(hn::Not(hn::Gt(dot(v, v), set(0.5f))), i);  // The ray has no direction.
-  }
-  if (!packet.near_surface && !medium_.bounded) return stop;
-  for (std::uint32_t rest = packet.alive; rest != 0; rest &= rest - 1) {
-    const auto lane = hwy::Num0BitsBelowLS1Bit_Nonzero32(rest);
-    const float before = static_cast<float>(rays_[packet.ray[lane]].length);  // Length of the path up to the field.
-    const float length = (packet.length[lane] + packet.time[lane]) * to_world() + before;
-    bool stops = length >= medium_.settings.max_length;
-    if (packet.near_surface) {
-      double from[3], until[3];
-      for (int axis = 0; axis < 3; ++axis) {
-        const double base = double{TensorBrick::cells} * packet.brick[axis][lane];
-        from[axis] = base + packet.p[axis][lane];
-        until[axis] = base + packet.p_next[axis][lane];
-      }
-      stops |= medium_.meets_surface(from, until);
-    }
-    if (stops) stop |= 1u << lane;
-  }
-  return stop;
-}
-
-/// The lanes that may take no further step, as bits. Rays that have crossed a cut have taken more steps than the
-/// packet counts.
-template <int components, bool uniform, bool differentials, bool changes>
-HWY_NOINLINE std::uint32_t Kernel<components, uniform, differentials, changes>::spent(const Packet& packet) const {
-  std::uint32_t result = 0;
-  for (std::uint32_t rest = packet.alive; rest != 0; rest &= rest - 1) {
-    const auto lane = hwy::Num0BitsBelowLS1Bit_Nonzero32(rest);
-    if (rays_[packet.ray[lane]].steps + packet.steps >= medium_.settings.max_steps) result |= 1u << lane;
-  }
-  return result;
-}
-
-/// Moves the middles of steps that lie outside the extent to the nearest points on it, where the tensor is that of the
-/// outermost voxels. Light may turn back into the extent from there.
-template <int components, bool uniform, bool differentials, bool changes>
-HWY_NOINLINE void Kernel<components, uniform, differentials, changes>::locate_on_extent(Packet& packet) {
-  packet.clamps = true;
-  locate_middles<uniform, differentials>(medium_, packet);
-  interpolate<components, uniform, differentials>(packet);
-  packet.clamps = medium_.clamps;
-}
-
-/// Writes back the rays of some lanes, as they were before the step, and removes them from the packet.
-template <int components, bool uniform, bool differentials, bool changes>
-HWY_NOINLINE void Kernel<components, uniform, differentials, changes>::take_out(Packet& packet, std::uint32_t stop,
-                                                                                std::uint32_t leave) {
-  Packet& leaving = leaving_[&packet - packets_];
-  for (std::uint32_t rest = stop | leave; rest != 0; rest &= rest - 1) {
-    const int lane = static_cast<int>(hwy::Num0BitsBelowLS1Bit_Nonzero32(rest));
-    KernelRay& ray = rays_[packet.ray[lane]];
-    for (int axis = 0; axis < 3; ++axis) {
-      ray.place.brick[axis] = packet.brick[axis][lane];
-      ray.place.position[axis] = packet.p[axis][lane];
-      ray.direction[axis] = packet.v[axis][lane];
-      if constexpr (differentials)
-        for (int i = 0; i < 2; ++i) {
-          batch_.differentials[packet.ray[lane]].position[i][axis] = packet.dp[i][axis][lane];
-          batch_.differentials[packet.ray[lane]].direction[i][axis] = packet.dv[i][axis][lane];
-        }
-    }
-    ray.length += double{packet.length[lane]} * to_world();
-    if constexpr (changes) ray.radiance_change += packet.radiance_change[lane];
-    ray.step = packet.time[lane] * to_world();
-    ray.steps += packet.steps;
-    packet.alive &= ~(1u << lane);
-    if (!(leave >> lane & 1)) continue;
-    copy_lane(packet, lane, leaving, static_cast<int>(hwy::PopCount(leaving.alive)));
-    leaving.alive = leaving.alive << 1 | 1;
-  }
-}
-
-/// Records the points of some lanes.
-template <int components, bool uniform, bool differentials, bool changes>
-HWY_NOINLINE void Kernel<components, uniform, differentials, changes>::keep_points(const Packet& packet,
-                                                                                   std::uint32_t which) {
-  alignas(64) float positions[packet_rays][4], directions[packet_rays][4];
-  alignas(64) std::int32_t bricks[packet_rays][4];
-  for (int i = 0; i < packet.vectors * lanes; i += lanes) {
-    const F3 p = load(packet.p, i), v = load(packet.v, i);
-    const F length = hn::Mul(load(packet.length, i), set(to_world()));
-    hn::StoreInterleaved4(p.x, p.y, p.z, length, floats, positions[i]);
-    hn::StoreInterleaved4(v.x, v.y, v.z, v.z, floats, directions[i]);
-    const auto brick = [&](int axis) HWY_ATTR { return hn::Load(ints, packet.brick[axis] + i); };
-    hn::StoreInterleaved4(brick(0), brick(1), brick(2), brick(2), ints, bricks[i]);
-  }
-  for (std::uint32_t rest = which; rest != 0; rest &= rest - 1) {
-    const auto lane = hwy::Num0BitsBelowLS1Bit_Nonzero32(rest);
-    auto* const point = reinterpret_cast<unsigned char*>(&batch_.points[packet.ray[lane]]->emplace_back());
-    std::memcpy(point + offsetof(StepPoint, position), positions[lane], sizeof positions[lane]);
-    std::memcpy(point + offsetof(StepPoint, direction), directions[lane], sizeof directions[lane]);
-    std::memcpy(point + offsetof(StepPoint, brick), bricks[lane], sizeof bricks[lane]);
-  }
-}
-
-/// Adds a step to what the lanes have travelled.
-template <int components, bool uniform, bool differentials, bool changes>
-HWY_INLINE void Kernel<components, uniform, differentials, changes>::add_step(Packet& packet) {
-  for (int i = 0; i < packet.vectors * lanes; i += lanes) {
-    store(hn::Add(load(packet.length, i), load(packet.time, i)), packet.length, i);
-    if constexpr (changes)
-      store(hn::Add(load(packet.radiance_change, i), load(packet.change_of_step, i)), packet.radiance_change, i);
-  }
-  ++packet.steps;
-}
-
-/// Ends a step. Takes out the rays that it ends, as they were before it: those of `stop` and those found here, except
-/// for lanes that are `staying`.
-template <int components, bool uniform, bool differentials, bool changes>
-void Kernel<components, uniform, differentials, changes>::end_step(Packet& packet, std::uint32_t staying,
-                                                                   std::uint32_t stop) {
-  std::uint32_t leave = 0;
-  if (packet.near_border) leave = outside(packet, packet.p_next) & ~staying;
-  const bool may_fail = medium_.settings.method != BendingMethod::splitting;
-  if (may_fail || packet.near_surface || medium_.bounded || !(packet.greatest_reach <= strongest_kick))
-    stop |= stopped(packet) & ~staying;
-  if (packet.steps >= packet.most_steps) stop |= spent(packet);
-  if constexpr (differentials) {  // The reference computes the differentials at a crossing.
-    stop |= leave;
-    leave = 0;
-  }
-  stop &= packet.alive;
-  leave &= packet.alive & ~stop;
-  if ((stop | leave) != 0) take_out(packet, stop, leave);
-  for (int i = 0; i < packet.vectors * lanes; i += lanes) {
-    store(load(packet.p_next, i), packet.p, i);
-    store(load(packet.v_next, i), packet.v, i);
-    if constexpr (!uniform) store(load(packet.u_next, i), packet.u, i);
-    if constexpr (differentials)
-      for (int k = 0; k < 2; ++k) {
-        store(load(packet.dp_next[k], i), packet.dp[k], i);
-        store(load(packet.dv_next[k], i), packet.dv[k], i);
-      }
-  }
-  add_step(packet);
-  if (!batch_.points.empty()) keep_points(packet, packet.alive & ~staying);
-  if ((stop | leave) != 0 && packet.alive != 0) close_ranks(packet);
-}
-
-/// The second part of a step that may end rays.
-template <int components, bool uniform, bool differentials, bool changes>
-HWY_NOINLINE void Kernel<components, uniform, differentials, changes>::step_watched(Packet& packet) {
-  if (packet.near_border && (outside(packet, packet.middle) & packet.alive) != 0) locate_on_extent(packet);
-  take_step<components, uniform, differentials, changes>(medium_, packet, packet.p_next, packet.v_next, packet.u_next);
-  end_step(packet, 0, 0);
-}
-
-template <int components, bool uniform, bool differentials, bool changes>
-HWY_INLINE void Kernel<components, uniform, differentials, changes>::step_split(Packet& packet) {
-  locate_middles<uniform, differentials>(medium_, packet);
-  interpolate<components, uniform, differentials>(packet);
-  samples_ += hwy::PopCount(packet.alive);
-  if (differentials || HWY_UNLIKELY(packet.watched || packet.steps >= packet.most_steps)) return step_watched(packet);
-  take_step<components, uniform, differentials, changes>(medium_, packet, packet.p, packet.v, packet.u);
-  add_step(packet);
-  if (HWY_UNLIKELY(!batch_.points.empty())) keep_points(packet, packet.alive);
-}
-
-/// Computes the positions after a step of length `time`. May move lanes to other bricks.
-template <int components, bool uniform, bool differentials, bool changes>
-void Kernel<components, uniform, differentials, changes>::attempt(Packet& packet) {
-  if (medium_.stages) return step_by_stages<components, uniform, differentials, changes>(medium_, packet);
-  if (medium_.settings.method == BendingMethod::euler)
-    return step_by_euler<components, uniform, differentials, changes>(medium_, packet);
-  locate_middles<uniform, differentials>(medium_, packet);
-  interpolate<components, uniform, differentials>(packet);
-  take_step<components, uniform, differentials, changes>(medium_, packet, packet.p_next, packet.v_next, packet.u_next);
-}
-
-/// A step of a method other than splitting.
-template <int components, bool uniform, bool differentials, bool changes>
-HWY_NOINLINE void Kernel<components, uniform, differentials, changes>::step_otherwise(Packet& packet) {
-  const std::uint32_t stop = too_short<uniform>(packet);
-  attempt(packet);
-  samples_ += hwy::PopCount(packet.alive) * samples_per_step();
-  const std::uint32_t staying = medium_.adaptive ? control_steps<uniform, differentials>(medium_, packet) : 0;
-  end_step(packet, staying, stop);
-}
-
-/// Repeats the step that leaves the extent, with the length that ends on its face (Newton's method).
-template <int components, bool uniform, bool differentials, bool changes>
-HWY_NOINLINE void Kernel<components, uniform, differentials, changes>::land(Packet& packet) {
-  packet.vectors = packet_rays / lanes;
-  close_ranks(packet);
-  packet.clamps = true;
-  FaceLanding landing;
-  attempt(packet);
-  aim(medium_, packet, landing);
-  for (int n = 0; n < landing_steps; ++n) {
-    attempt(packet);
-    if (n < landing_steps - 1)
-      improve<uniform>(medium_, packet, landing);
-    else
-      touch_down<uniform>(medium_, packet, landing);
-  }
-  arrive(packet, landing);
-}
-
-/// Writes back the rays, which are on the extent's faces.
-template <int components, bool uniform, bool differentials, bool changes>
-void Kernel<components, uniform, differentials, changes>::arrive(Packet& packet, const FaceLanding& landing) {
-  for (std::uint32_t rest = packet.alive; rest != 0; rest &= rest - 1) {
-    const auto lane = hwy::Num0BitsBelowLS1Bit_Nonzero32(rest);
-    KernelRay& ray = rays_[packet.ray[lane]];
-    for (int axis = 0; axis < 3; ++axis) {
-      ray.place.brick[axis] = packet.brick[axis][lane];
-      ray.place.position[axis] = packet.p_next[axis][lane];
-      ray.direction[axis] = packet.v_next[axis][lane];
-    }
-    ray.axis = static_cast<std::int8_t>(landing.axis[lane]);
-    ray.length += double{packet.time[lane]} * to_world();
-    if constexpr (changes) ray.radiance_change += packet.change_of_step[lane];
-    ++ray.steps;
-    samples_ += (1 + landing_steps) * samples_per_step();
-  }
-  packet.alive = 0;
-}
-
-template <int components, bool uniform, bool differentials, bool changes>
-std::uint64_t Kernel<components, uniform, differentials, changes>::run() {
-  const bool otherwise = medium_.settings.method != BendingMethod::splitting;
-  for (Packet& packet : packets_) fill(packet);
-  for (bool busy = true; busy;) {
-    busy = false;
-    for (Packet& packet : packets_) {
-      if (packet.alive == 0) continue;
-      busy = true;
-      if (HWY_UNLIKELY(!packet.timed)) find_times<uniform>(medium_, packet);
-      if (HWY_UNLIKELY(otherwise))
-        step_otherwise(packet);
-      else
-        step_split(packet);
-      if (HWY_LIKELY(packet.alive != 0)) continue;
-      Packet& leaving = leaving_[&packet - packets_];
-      if (leaving.alive != 0) land(leaving);
-      fill(packet);
-    }
-  }
-  return samples_;
-}
-
-template <int components, bool differentials, bool changes>
+template <class Bricks, bool differentials, bool changes>
 std::uint64_t trace_as(const PacketMedium& medium, KernelRays& batch) {
-  return medium.uniform ? Kernel<components, true, differentials, changes>(medium, batch).run()
-                        : Kernel<components, false, differentials, changes>(medium, batch).run();
+  return medium.uniform ? Kernel<Bricks, true, differentials, changes>(medium, batch).run()
+                        : Kernel<Bricks, false, differentials, changes>(medium, batch).run();
 }
 
-template <int components>
+template <class Bricks>
 std::uint64_t trace_components(const PacketMedium& medium, KernelRays& batch) {
-  if (!batch.differentials.empty()) return trace_as<components, true, false>(medium, batch);
-  return batch.wants_radiance_change ? trace_as<components, false, true>(medium, batch)
-                                     : trace_as<components, false, false>(medium, batch);
+  if (!batch.differentials.empty()) return trace_as<Bricks, true, false>(medium, batch);
+  return batch.wants_radiance_change ? trace_as<Bricks, false, true>(medium, batch)
+                                     : trace_as<Bricks, false, false>(medium, batch);
 }
 
 std::uint64_t trace(const PacketMedium& medium, KernelRays& batch) {
-  return medium.field.is_symmetric() ? trace_components<TensorBrick::symmetric>(medium, batch)
-                                     : trace_components<TensorBrick::general>(medium, batch);
+  return medium.field.is_symmetric() ? trace_components<LinearBricks<TensorBrick::symmetric>>(medium, batch)
+                                     : trace_components<LinearBricks<TensorBrick::general>>(medium, batch);
 }
 
 int vector_lanes() { return lanes; }
@@ -492,7 +93,7 @@ struct WithoutDenormals {};
 std::uint64_t run(const TensorField& field, const KernelSettings& settings, KernelRays& batch) {
   const PacketMedium medium(field, settings);
   [[maybe_unused]] const WithoutDenormals guard;
-  return KERNEL_DISPATCH(trace)(medium, batch);
+  return field.is_cubic() ? trace_cubic(medium, batch, prefers_avx2) : KERNEL_DISPATCH(trace)(medium, batch);
 }
 
 namespace {

@@ -1,5 +1,5 @@
 /// @file integrators/packets/packet_landing-inl.h
-/// The last step of rays in the extent, which ends on a face of the extent. A part of packet_kernel.cpp.
+/// The last step of rays in the extent, which ends on a face of the extent. A part of packet_kernel-inl.h.
 
 // Included once for each instruction set: see Highway's foreach_target.h.
 #if defined(TENSORRAY_INTEGRATORS_PACKET_LANDING_TOGGLE) == defined(HWY_TARGET_TOGGLE)
@@ -30,7 +30,7 @@ HWY_INLINE F face(const PacketMedium& medium, const Packet& packet, const FaceLa
 }
 
 /// Finds the face that the chord of the whole step meets, and the approximate length of a step that ends there.
-HWY_NOINLINE void aim(const PacketMedium& medium, Packet& packet, FaceLanding& landing) {
+static HWY_NOINLINE void aim(const PacketMedium& medium, Packet& packet, FaceLanding& landing) {
   const F zero = hn::Zero(floats), one = set(1);
   for (int i = 0; i < packet.vectors * lanes; i += lanes) {
     const F longest = load(packet.time, i);
@@ -44,6 +44,35 @@ HWY_NOINLINE void aim(const PacketMedium& medium, Packet& packet, FaceLanding& l
     const F x = part(0), y = part(1), z = part(2), nearest = hn::Min(hn::Min(x, y), z);
     store(hn::IfThenElse(hn::Eq(x, nearest), zero, hn::IfThenElse(hn::Eq(y, nearest), one, set(2))), landing.axis, i);
     store(hn::Mul(longest, hn::Min(hn::Max(nearest, zero), one)), packet.time, i);
+  }
+}
+
+/// Improves the lengths by the path between the ends of the whole step.
+template <bool uniform>
+HWY_NOINLINE void aim_along_path(const PacketMedium& medium, Packet& packet, const FaceLanding& landing) {
+  const F one = set(1), two = set(2), three = set(3);
+  for (int i = 0; i < packet.vectors * lanes; i += lanes) {
+    const F longest = load(landing.longest, i), axis = load(landing.axis, i);
+    const auto of_axis = [&](const F3& v) HWY_ATTR {
+      return hn::IfThenElse(hn::Eq(axis, hn::Zero(floats)), v.x, hn::IfThenElse(hn::Eq(axis, one), v.y, v.z));
+    };
+    const auto on_face = [&](int k) HWY_ATTR { return face(medium, packet, landing, k, i); };
+    const F3 v = uniform ? load(packet.v, i) : load(packet.u, i);
+    const F3 v_next = uniform ? load(packet.v_next, i) : load(packet.u_next, i);
+    const F from = of_axis(load(packet.p, i)), way = hn::Sub(of_axis(load(packet.p_next, i)), from);
+    const F gap = hn::Sub(of_axis({on_face(0), on_face(1), on_face(2)}), from);
+    const F a = hn::Mul(longest, of_axis(v)), b = hn::Mul(longest, of_axis(v_next));
+    // The path is a t + (3 way − 2 a − b) t² + (a + b − 2 way) t³.
+    const F square = hn::Sub(hn::MulSub(three, way, hn::Mul(two, a)), b), cube = hn::NegMulAdd(two, way, hn::Add(a, b));
+    F t = hn::Div(load(packet.time, i), longest);
+    for (int n = 0; n < 3; ++n) {
+      const F at = hn::Mul(t, hn::MulAdd(t, hn::MulAdd(t, cube, square), a));
+      const F slope = hn::MulAdd(t, hn::MulAdd(hn::Mul(three, cube), t, hn::Mul(two, square)), a);
+      const F change = hn::Div(hn::Sub(gap, at), slope);
+      // Light nearly parallel to the face keeps the length by the chord.
+      t = hn::IfThenElse(hn::Le(hn::Abs(change), one), hn::Min(hn::Max(hn::Add(t, change), hn::Zero(floats)), one), t);
+    }
+    store(hn::Mul(t, longest), packet.time, i);
   }
 }
 

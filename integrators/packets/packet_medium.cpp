@@ -12,12 +12,16 @@ namespace tensorray::packets {
 PacketMedium::PacketMedium(const TensorField& field_, const KernelSettings& settings_)
     : field(field_), settings(settings_) {
   const Eigen::Matrix3d M = field.to_index().linear();
-  uniform = M == Eigen::Matrix3d(M(0, 0) * Eigen::Matrix3d::Identity()) && M(0, 0) > 0;
+  const bool cubes = M == Eigen::Matrix3d(M(0, 0) * Eigen::Matrix3d::Identity()) && M(0, 0) > 0;
+  uniform = cubes && settings.method == BendingMethod::splitting && !field.is_cubic();
   voxel = static_cast<float>(1 / M(0, 0));
-  const Eigen::Matrix3d to_world = field.to_world().linear();
-  longest_voxel = static_cast<float>(to_world.norm());  // The norm is not less than the greatest singular value.
+  const Eigen::Matrix3d world = field.to_world().linear();
+  longest_voxel = static_cast<float>(world.norm());  // The norm is not less than the greatest singular value.
   for (int row = 0; row < 3; ++row)
-    for (int column = 0; column < 3; ++column) to_index[row][column] = static_cast<float>(M(row, column));
+    for (int column = 0; column < 3; ++column) {
+      to_index[row][column] = static_cast<float>(M(row, column));
+      to_world[row][column] = world(row, column);
+    }
   for (int axis = 0; axis < 3; ++axis) {
     first[axis] = static_cast<std::int32_t>(field.voxels().min()[axis]);
     last[axis] = static_cast<std::int32_t>(field.voxels().max()[axis]);
@@ -26,10 +30,15 @@ PacketMedium::PacketMedium(const TensorField& field_, const KernelSettings& sett
   }
   flat = (field.voxels().sizes().array() == 0).any();
   stages = runge_kutta(settings.method);
-  adaptive = stages && stages->adaptive;
-  clamps = flat || settings.method != BendingMethod::splitting;
-  const double automatic = adaptive ? step_lengths::longest_adaptive : step_lengths::longest_automatic;
+  composed = settings.method == BendingMethod::splitting4;
+  adaptive = (stages && stages->adaptive) || (composed && settings.step == 0);
+  clamps = flat || settings.method != BendingMethod::splitting || field.is_cubic();
+  const double automatic = composed   ? step_lengths::longest_composed
+                           : adaptive ? step_lengths::longest_adaptive
+                                      : step_lengths::longest_automatic;
   longest_step = settings.step > 0 ? settings.step : static_cast<float>(automatic);
+  longest_kick = longest_step;
+  if (composed) longest_kick *= static_cast<float>(splitting4_method.kick[Composition::kicks / 2]);
   past_straight_brick =
       static_cast<float>(stages ? step_lengths::past_straight_brick_by_stages : step_lengths::past_straight_brick);
   // A step may begin a little outside its brick.

@@ -1,15 +1,30 @@
 #pragma once
 /// @file integrators/packets/packet_medium.h
 /// Data that the kernel's code for all instruction sets shares: the field, and a packet of rays. A part of
-/// packet_kernel.cpp.
+/// packet_kernel-inl.h.
 
 #include <cstdint>
 
+#include "integrators/bending/composition.h"
 #include "integrators/bending/runge_kutta.h"
 #include "integrators/bending/step_lengths.h"
 #include "integrators/packets/packet_kernel.h"
+#include "volumes/bricks/cubic_brick.h"
 
 namespace tensorray::packets {
+
+/// How bricks hold a field: of voxels, between which it is trilinear, or of coefficients of cubic B-splines. @p stored
+/// is the number of components.
+template <int stored>
+struct LinearBricks : TensorBrick {
+  static constexpr int components = stored;
+  static constexpr bool cubic = false;
+};
+template <int stored>
+struct CubicBricks : CubicBrick {
+  static constexpr int components = stored;
+  static constexpr bool cubic = true;
+};
 
 /// The field and the settings as the kernel uses them. No member function is inlined into code for an instruction set
 /// that the processor may lack.
@@ -20,17 +35,22 @@ struct PacketMedium {
   const KernelSettings& settings;
   /// Stages of the method; null if it has one sample, at the middle of a step or (Euler) at its beginning.
   const RungeKutta* stages;
+  bool composed;  // Whether the method is `splitting4`.
   bool adaptive;
-  bool uniform;         // Whether voxels are cubes along the world's axes, so that index space is scaled world space.
+  /// Whether the method is `splitting`, and the field is linear, of voxels that are cubes along the world's axes: index
+  /// space is scaled world space. This usual case is faster; other methods and fields have one code for all voxels.
+  bool uniform;
   float voxel;          // If uniform: edge of a voxel, world units.
   float longest_voxel;  // No voxel is longer along any direction, world units.
   float to_index[3][3];
+  double to_world[3][3];
   std::int32_t first[3], last[3];              // First and last voxels of the extent.
   std::int32_t first_inner[3], last_inner[3];  // No step from these bricks may leave the extent. May be none.
   float margin[3];     // Distance of the extent's faces from these voxels: ½ on an axis of a single voxel, else 0.
   bool flat;           // Whether an axis has a single voxel.
   float slope[3];      // 0 along axes with a single voxel, 1 along the others.
   bool clamps;         // Whether sample points of any step may be outside the box of the voxels.
+  float longest_kick;  // Longest part of a step that a kick takes, voxels.
   float longest_step;  // Longest step, voxels; steps through straight bricks may be longer.
   float past_straight_brick;  // How far a step through a straight brick goes beyond it, voxels.
   bool bounded;               // Whether the limit of length may end rays within the field.
@@ -40,6 +60,9 @@ struct PacketMedium {
   bool meets_surface(const double from[3], const double to[3]) const;
 };
 
+/// `run` in a cubic field. @param prefers_avx2  Not to use wider vectors.
+std::uint64_t trace_cubic(const PacketMedium& medium, KernelRays& batch, bool prefers_avx2);
+
 /// Λ of a kick that is too strong for a series in single precision.
 /// @param T  T up to a multiple of I, column by column.
 float strong_radiance_change(const float T[9], float factor, const float v[3]);
@@ -47,7 +70,8 @@ float strong_radiance_change(const float T[9], float factor, const float v[3]);
 constexpr float strongest_kick = static_cast<float>(step_lengths::strongest_kick);
 /// Voxels. Shorter steps are taken in double precision; splitting never takes them.
 constexpr float shortest_step = 1.0f / 1024;
-constexpr int landing_steps = 4;  // Steps of Newton's method to a face of the extent.
+constexpr int landing_steps = 4;           // Steps of Newton's method to a face of the extent.
+constexpr int composed_landing_steps = 1;  // The same of `splitting4`, whose path between the ends is known.
 
 /// With n terms the power series of exp(A) V is exact to 3e-9 for ‖A‖ up to entry n − 2: (3e-9 (n + 1)!)^(1/(n + 1)).
 /// This error must be smaller than rounding errors: it is the same in every step, and they are not.

@@ -1,5 +1,5 @@
 /// @file integrators/packets/packet_stages-inl.h
-/// Steps of the methods other than splitting, from p and v to p_next and v_next. A part of packet_kernel.cpp.
+/// Steps of the methods other than splitting, from p and v to p_next and v_next. A part of packet_kernel-inl.h.
 
 // Included once for each instruction set: see Highway's foreach_target.h.
 #if defined(TENSORRAY_INTEGRATORS_PACKET_STAGES_TOGGLE) == defined(HWY_TARGET_TOGGLE)
@@ -150,18 +150,18 @@ HWY_INLINE void combine_stages(const PacketMedium& medium, Packet& packet, const
 }
 
 /// A step of a Runge–Kutta method.
-template <int components, bool uniform, bool differentials, bool changes>
+template <class Bricks, bool uniform, bool differentials, bool changes>
 HWY_NOINLINE void step_by_stages(const PacketMedium& medium, Packet& packet) {
   Stages stages;
   bool near_border = false, near_surface = false;  // In any brick that is sampled.
   for (int stage = 0; stage < medium.stages->stages; ++stage) {
     begin_stage<uniform, differentials>(medium, packet, stage, stages);
-    locate<uniform, differentials>(medium, packet,
-                                   [&](int i) HWY_ATTR { return add(load(packet.p, i), load(stages.ahead, i)); });
+    locate<Bricks, uniform, differentials>(
+        medium, packet, [&](int i) HWY_ATTR { return add(load(packet.p, i), load(stages.ahead, i)); });
     near_border |= packet.near_border;
     near_surface |= packet.near_surface;
-    interpolate<components, uniform, differentials>(packet);
-    end_stage<components, differentials, changes>(medium, packet, stage, stages);
+    interpolate<Bricks, uniform, differentials>(packet);
+    end_stage<Bricks::components, differentials, changes>(medium, packet, stage, stages);
   }
   packet.near_border |= near_border;
   packet.near_surface |= near_surface;
@@ -169,8 +169,10 @@ HWY_NOINLINE void step_by_stages(const PacketMedium& medium, Packet& packet) {
 }
 
 /// T₂₂ and its slopes at the points where the lanes' tensors were sampled.
-template <int components>
+template <class Bricks>
 HWY_INLINE Slopes<F> sample_trailing(const Packet& packet, int at) {
+  constexpr int components = Bricks::components;
+  if constexpr (Bricks::cubic) return sample_trailing_spline<components>(packet, at);
   alignas(64) float values[8][lanes];
   const auto corner = [&](int lane, int k) HWY_ATTR {
     const int voxel = static_cast<int>(packet.voxel[at + lane]) + corners[k];
@@ -184,14 +186,15 @@ HWY_INLINE Slopes<F> sample_trailing(const Packet& packet, int at) {
 }
 
 /// A step of Euler's method (Eq. 3–4), which the trace of T affects.
-template <int components, bool uniform, bool differentials, bool changes>
+template <class Bricks, bool uniform, bool differentials, bool changes>
 HWY_NOINLINE void step_by_euler(const PacketMedium& medium, Packet& packet) {
-  locate<uniform, differentials>(medium, packet, [&](int i) HWY_ATTR { return load(packet.p, i); });
-  interpolate<components, uniform, differentials>(packet);
+  constexpr int components = Bricks::components;
+  locate<Bricks, uniform, differentials>(medium, packet, [&](int i) HWY_ATTR { return load(packet.p, i); });
+  interpolate<Bricks, uniform, differentials>(packet);
   for (int i = 0; i < packet.vectors * lanes; i += lanes) {
     const F time = load(packet.time, i), factor = hn::Mul(time, load(packet.kick, i));
     const Tensor T = load_tensor<components>(packet, i);
-    const Slopes<F> trailing = sample_trailing<components>(packet, i);
+    const Slopes<F> trailing = sample_trailing<Bricks>(packet, i);
     const F3 v = load(packet.v, i);
     F3 dv[2];
     if constexpr (differentials)
@@ -256,12 +259,14 @@ HWY_INLINE void stay(Packet& packet, int lane) {
 }
 
 /// The next adaptive step divided by the last one: see step_lengths.h.
-HWY_INLINE F growth(F excess, int order) {
+HWY_INLINE F growth(const PacketMedium& medium, F excess) {
   using namespace step_lengths;
+  const int order = medium.composed ? composed_order : medium.stages->order;
   const auto single = [](double value) HWY_ATTR { return set(static_cast<float>(value)); };
   const F within = hn::Min(hn::Max(excess, single(least_excess)), set(1e30f));
   const F root = hn::Exp(floats, hn::Mul(single(-1.0 / order), hn::Log(floats, within)));
-  const F factor = hn::Mul(single(safety), root), least = single(least_growth), most = single(most_growth);
+  const F factor = hn::Mul(single(medium.composed ? composed_safety : safety), root), least = single(least_growth),
+          most = single(most_growth);
   return hn::IfThenElse(hn::Eq(excess, excess), hn::Min(hn::Max(factor, least), most), least);
 }
 
@@ -272,7 +277,7 @@ HWY_NOINLINE std::uint32_t control_steps(const PacketMedium& medium, Packet& pac
   std::uint32_t staying = 0;
   for (int i = 0; i < packet.vectors * lanes; i += lanes) {
     const F excess = load(packet.excess, i), wanted = load(packet.wanted, i);
-    store(hn::Min(hn::Mul(wanted, growth(excess, medium.stages->order)), set(medium.longest_step)), packet.wanted, i);
+    store(hn::Min(hn::Mul(wanted, growth(medium, excess)), set(medium.longest_step)), packet.wanted, i);
     const F3 v = load(packet.v_next, i);  // A lane without a direction does not stay: it stops, whatever its error.
     staying |= to_bits(hn::And(hn::Gt(excess, set(1)), hn::Gt(dot(v, v), hn::Zero(floats))), i);
   }

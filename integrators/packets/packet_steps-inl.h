@@ -1,6 +1,6 @@
 /// @file integrators/packets/packet_steps-inl.h
 /// A step of a packet, in three parts: to its middle, the tensors there, the kick and the second half. A part of
-/// packet_kernel.cpp.
+/// packet_kernel-inl.h.
 
 // Included once for each instruction set: see Highway's foreach_target.h.
 #if defined(TENSORRAY_INTEGRATORS_PACKET_STEPS_TOGGLE) == defined(HWY_TARGET_TOGGLE)
@@ -18,12 +18,13 @@
 #include "integrators/packets/packet_bending-inl.h"
 #include "integrators/packets/packet_bricks-inl.h"
 #include "integrators/packets/packet_cells-inl.h"
+#include "integrators/packets/packet_splines-inl.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace tensorray::packets::HWY_NAMESPACE {
 
-// Template arguments: `uniform`: voxels are cubes along the axes. `differentials`: rays have differentials. `changes`:
-// the change of radiance is wanted.
+// Template arguments: `Bricks`: LinearBricks or CubicBricks. `uniform`: voxels are cubes along the axes.
+// `differentials`: rays have differentials. `changes`: the change of radiance is wanted.
 
 /// The change of position per unit of `time`, in index space: V if voxels are uniform (time in voxels), else u (time in
 /// world units).
@@ -67,8 +68,11 @@ HWY_NOINLINE void leave_straight_bricks(const PacketMedium& medium, Packet& pack
 HWY_INLINE F automatic_step(const PacketMedium& medium, F bending_rate, F voxel) {
   const bool splitting = medium.settings.method == BendingMethod::splitting;
   const F shortest = set(splitting ? static_cast<float>(step_lengths::shortest_splitting) : 0.0f);
-  const F longest = set(static_cast<float>(step_lengths::longest_automatic));
-  const F kick = hn::Mul(bending_rate, voxel), strongest = set(strongest_kick);
+  const bool composed = medium.composed;
+  const F longest =
+      set(static_cast<float>(composed ? step_lengths::longest_composed : step_lengths::longest_automatic));
+  const F strongest = set(composed ? static_cast<float>(step_lengths::strongest_composed) : strongest_kick);
+  const F kick = hn::Mul(bending_rate, voxel);
   return hn::IfThenElse(hn::Gt(hn::Mul(kick, longest), strongest), hn::Max(hn::Div(strongest, kick), shortest),
                         longest);
 }
@@ -117,9 +121,9 @@ HWY_NOINLINE void find_times(const PacketMedium& medium, Packet& packet) {
 /// faces of the bricks.
 /// @param moved  Bits of lanes; only their vectors are found again. 0: all vectors.
 /// @return bits of the lanes whose points are not within their bricks.
-template <bool differentials, bool careful, class Point>
+template <class Bricks, bool differentials, bool careful, class Point>
 HWY_INLINE std::uint32_t find_cells(Packet& packet, std::uint32_t moved, const Point& point_of) {
-  const F last = set(TensorBrick::cells - 1), width = set(TensorBrick::width);
+  const F last = set(Bricks::cells - 1), width = set(Bricks::width);
   std::uint32_t beyond = 0;
   F first = hn::Zero(floats);
   Mask same = hn::Eq(first, first);
@@ -147,10 +151,10 @@ HWY_INLINE std::uint32_t find_cells(Packet& packet, std::uint32_t moved, const P
 }
 
 /// Finds the sample points, and moves lanes to the bricks of these points.
-template <bool uniform, bool differentials, class Point>
+template <class Bricks, bool uniform, bool differentials, class Point>
 HWY_INLINE void locate(const PacketMedium& medium, Packet& packet, const Point& point_of) {
-  const std::uint32_t beyond = packet.clamps ? find_cells<differentials, true>(packet, 0, point_of)
-                                             : find_cells<differentials, false>(packet, 0, point_of);
+  const std::uint32_t beyond = packet.clamps ? find_cells<Bricks, differentials, true>(packet, 0, point_of)
+                                             : find_cells<Bricks, differentials, false>(packet, 0, point_of);
   packet.moved = beyond;
   if (HWY_LIKELY(beyond == 0)) return;
   move_to_bricks<uniform>(medium, packet, beyond, [&](int i) HWY_ATTR {
@@ -158,13 +162,13 @@ HWY_INLINE void locate(const PacketMedium& medium, Packet& packet, const Point& 
     return packet.clamps ? clamp(point, load(packet.low, i), load(packet.high, i)) : point;
   });
   // The remaining points are outside the extent, or rounding put them on a face.
-  find_cells<differentials, true>(packet, beyond, point_of);
+  find_cells<Bricks, differentials, true>(packet, beyond, point_of);
 }
 
 /// The first part of a step: locates its middle.
-template <bool uniform, bool differentials>
+template <class Bricks, bool uniform, bool differentials>
 HWY_INLINE void locate_middles(const PacketMedium& medium, Packet& packet) {
-  locate<uniform, differentials>(medium, packet, [&](int i) HWY_ATTR {
+  locate<Bricks, uniform, differentials>(medium, packet, [&](int i) HWY_ATTR {
     const F half = hn::Mul(set(0.5f), load(packet.time, i));
     return mul_add(half, load(direction<uniform>(packet), i), load(packet.p, i));
   });
@@ -192,8 +196,10 @@ HWY_INLINE bool in_one_cell(const Packet& packet, int first) {
 }
 
 /// The second part of a step: samples the tensors there.
-template <int components, bool uniform, bool differentials>
+template <class Bricks, bool uniform, bool differentials>
 HWY_INLINE void interpolate(Packet& packet) {
+  constexpr int components = Bricks::components;
+  if constexpr (Bricks::cubic) return sample_splines<components, differentials>(packet);
   if (!differentials && HWY_LIKELY(packet.one_cell)) {
     const auto ahead = hn::GetLane(find_cells_ahead<components, uniform>(packet, 0));
     prefetch_cell<components>(packet.bending[0] + ahead);
@@ -241,29 +247,35 @@ HWY_INLINE Tensor tensor_along(const Packet& packet, const F3& along, int at) {
   });
 }
 
-/// The derivatives along two parameters of exp(factor · T) V, normalised, and of the positions at the end of the step.
-/// They are the derivatives of the method's own steps. The series has one more term than without derivatives, because
+/// The derivatives of exp(factor · T) V, normalised, along a parameter along which T and V change by dT and dv. They
+/// are the derivatives of the method's own steps. The series has one more term than without derivatives, because
 /// differentiation removes one.
+HWY_INLINE F3 bend_differential(const Tensor& T, const Tensor& dT, const F3& v, const F3& dv, F factor, F size) {
+  F3 term = v, sum = v, dterm = dv, dsum = dterm;
+  for (int n = 1; n <= most_terms; ++n) {
+    const Mask needed = hn::Gt(size, set(n < 4 ? -1.0f : series_reach[n - 4]));
+    if (hn::AllFalse(floats, needed)) break;
+    const F part = hn::Mul(set(1.0f / static_cast<float>(n)), factor);
+    dterm = mul(part, add(apply(T, dterm), apply(dT, term)));
+    term = mul(part, apply(T, term));
+    sum = add(sum, select(needed, term, zeros()));
+    dsum = add(dsum, select(needed, dterm, zeros()));
+  }
+  const F inverse = hn::Div(set(1), hn::Sqrt(dot(sum, sum)));
+  const F3 unit = mul(inverse, sum), change = mul(inverse, dsum);
+  return mul_add(hn::Neg(dot(unit, change)), unit, change);
+}
+
+/// The derivatives, along two parameters, of the directions and positions at the end of the step.
 template <int components, bool uniform>
 HWY_INLINE void bend_differentials(const PacketMedium& medium, Packet& packet, const Tensor& T, const F3& v, F factor,
                                    int at) {
   const F size = load(packet.size, at), half = hn::Mul(set(0.5f), load(packet.time, at));
   for (int i = 0; i < 2; ++i) {
-    const F3 dmiddle = mul_add(half, index_direction<uniform>(medium, load(packet.dv[i], at)), load(packet.dp[i], at));
+    const F3 before = load(packet.dv[i], at);
+    const F3 dmiddle = mul_add(half, index_direction<uniform>(medium, before), load(packet.dp[i], at));
     const Tensor dT = tensor_along<components>(packet, along_slopes(medium, dmiddle), at);
-    F3 term = v, sum = v, dterm = load(packet.dv[i], at), dsum = dterm;
-    for (int n = 1; n <= most_terms; ++n) {
-      const Mask needed = hn::Gt(size, set(n < 4 ? -1.0f : series_reach[n - 4]));
-      if (hn::AllFalse(floats, needed)) break;
-      const F part = hn::Mul(set(1.0f / static_cast<float>(n)), factor);
-      dterm = mul(part, add(apply(T, dterm), apply(dT, term)));
-      term = mul(part, apply(T, term));
-      sum = add(sum, select(needed, term, zeros()));
-      dsum = add(dsum, select(needed, dterm, zeros()));
-    }
-    const F inverse = hn::Div(set(1), hn::Sqrt(dot(sum, sum)));
-    const F3 unit = mul(inverse, sum), change = mul(inverse, dsum);
-    const F3 dv = mul_add(hn::Neg(dot(unit, change)), unit, change);
+    const F3 dv = bend_differential(T, dT, v, before, factor, size);
     store(dv, packet.dv_next[i], at);
     store(mul_add(half, index_direction<uniform>(medium, dv), dmiddle), packet.dp_next[i], at);
   }
@@ -271,9 +283,10 @@ HWY_INLINE void bend_differentials(const PacketMedium& medium, Packet& packet, c
 
 /// The third part of a step: bends the rays, and moves from the middle to the positions and directions at the end. The
 /// results may overwrite those of the packet. `weakly`: no lane needs more than two terms.
-template <int components, bool uniform, bool differentials, bool changes, bool weakly>
+template <class Bricks, bool uniform, bool differentials, bool changes, bool weakly>
 HWY_INLINE void take_step_as(const PacketMedium& medium, Packet& packet, PerRay (&p)[3], PerRay (&v)[3],
                              PerRay (&u)[3]) {
+  constexpr int components = Bricks::components;
   for (int i = 0; i < packet.vectors * lanes; i += lanes) {
     const F time = load(packet.time, i), factor = hn::Mul(time, load(packet.kick, i)), half = hn::Mul(set(0.5f), time);
     const Tensor T = load_tensor<components>(packet, i);
@@ -281,7 +294,7 @@ HWY_INLINE void take_step_as(const PacketMedium& medium, Packet& packet, PerRay 
     if constexpr (weakly)
       store(bend_weakly<changes>(packet, T, before, factor, i), v, i);
     else
-      bend_strongly<components, differentials, changes>(packet, T, before, factor, i, v);
+      bend_strongly<components, differentials, changes>(packet, T, packet.v, before, 1, factor, i, v);
     if constexpr (differentials) bend_differentials<components, uniform>(medium, packet, T, before, factor, i);
     const F3 after = load(v, i);
     if constexpr (uniform) {
@@ -294,11 +307,11 @@ HWY_INLINE void take_step_as(const PacketMedium& medium, Packet& packet, PerRay 
   }
 }
 
-template <int components, bool uniform, bool differentials, bool changes>
+template <class Bricks, bool uniform, bool differentials, bool changes>
 HWY_INLINE void take_step(const PacketMedium& medium, Packet& packet, PerRay (&p)[3], PerRay (&v)[3], PerRay (&u)[3]) {
   if (!differentials && HWY_LIKELY(packet.greatest_reach <= series_reach[0]))
-    return take_step_as<components, uniform, differentials, changes, true>(medium, packet, p, v, u);
-  take_step_as<components, uniform, differentials, changes, false>(medium, packet, p, v, u);
+    return take_step_as<Bricks, uniform, differentials, changes, true>(medium, packet, p, v, u);
+  take_step_as<Bricks, uniform, differentials, changes, false>(medium, packet, p, v, u);
 }
 
 }  // namespace tensorray::packets::HWY_NAMESPACE

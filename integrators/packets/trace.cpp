@@ -54,8 +54,9 @@ void trace_one_by_one(const TensorField& field, const Geometry& geometry, const 
     trace_ray_by_ray<1>(field, geometry, settings, batch, recordings);
 }
 
-void trace_batch(const TensorField& field, const Geometry& geometry, const BendingSettings& settings, RayBatch& batch,
+void trace_batch(const TensorField& field, const Geometry& geometry, const BendingSettings& wanted, RayBatch& batch,
                  const Recordings& recordings) {
+  const BendingSettings settings = resolved(wanted, field);
   prepare(settings, batch);
   if (!trace_in_packets(field, geometry, settings, batch, recordings))
     trace_one_by_one(field, geometry, settings, batch, recordings);
@@ -90,8 +91,9 @@ void trace(const TensorField& field, const Geometry& geometry, const BendingSett
   trace_batch(field, geometry, settings, batch, {nullptr, &tracks});
 }
 
-void trace_reference(const TensorField& field, const Geometry& geometry, const BendingSettings& settings,
+void trace_reference(const TensorField& field, const Geometry& geometry, const BendingSettings& wanted,
                      RayBatch& batch) {
+  const BendingSettings settings = resolved(wanted, field);
   prepare(settings, batch);
   trace_one_by_one(field, geometry, settings, batch, {});
 }

@@ -22,7 +22,7 @@ namespace {
 constexpr float least_square = std::numeric_limits<float>::min();  // No division by zero.
 
 /// Points of a path, and factors that make squares of errors 1 where they are just allowed.
-struct Interpolation {
+struct PathInterpolation {
   const float* positions;
   const float* lengths;
   const float* more;
@@ -49,7 +49,7 @@ using F = hn::Vec<Floats>;
 
 /// A piece of a path: interpolates between points i and j.
 struct Piece {
-  const Interpolation& path;
+  const PathInterpolation& path;
   std::size_t i, j;
   float inverse_length;
 
@@ -88,7 +88,7 @@ struct Piece {
 
 /// Of the points between i and j, the one that interpolation between these misses most; of several, the first. The
 /// error is its square.
-Worst most_missed(const Interpolation& path, std::size_t i, std::size_t j) {
+Worst most_missed(const PathInterpolation& path, std::size_t i, std::size_t j) {
   const Floats d;
   const Ints ints;
   const Piece piece{path, i, j, 1 / ((path.lengths[j] - path.lengths[i]) + (path.more[j] - path.more[i]))};
@@ -144,7 +144,7 @@ float factor(double allowed) { return std::min(static_cast<float>(1 / (allowed *
 }  // namespace
 
 std::vector<std::size_t> thinned(const PathSamples& samples, double tolerance, double tensor_tolerance) {
-  Interpolation path{};
+  PathInterpolation path{};
   std::vector<float> squares;
   path.positions = samples.positions.data();
   path.lengths = samples.lengths.data();

@@ -94,7 +94,8 @@ AutoScale probe(const TensorField& field, const Geometry& geometry, const ProbeB
                 const Progress& progress, std::size_t each = 1) {
   BendingSettings settings;
   settings.scale = scale;
-  settings.step = 0.5;  // A fixed step, because the splitting method is stable at any scale.
+  settings.method = BendingMethod::splitting;
+  settings.step = field.is_cubic() ? 1 : 0.5;  // A fixed step, because the splitting method is stable at any scale.
   const Beam& beam = probes.beam;
   const std::size_t rays = (probes.origins.size() + each - 1) / each;
   RayDifferential start;

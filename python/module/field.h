@@ -27,8 +27,8 @@ class Field {
   const Json& keys() const { return keys_; }
   TensorGrid grid() const { return make_(); }
 
-  /// The field without voxels that are not finite, and preprocessed. Made anew if the choice differs from the last one.
-  LoadedField loaded(Eigenvalues mode) const;
+  /// The field without voxels that are not finite, and preprocessed. Made anew if a choice differs from the last one.
+  LoadedField loaded(Eigenvalues mode, const Interpolant& interpolant) const;
 
  private:
   Json keys_;
@@ -36,6 +36,7 @@ class Field {
   pybind11::object memory_;
   mutable std::mutex mutex_;
   mutable Eigenvalues mode_ = Eigenvalues::automatic;
+  mutable Interpolant interpolant_;
   mutable std::optional<LoadedField> loaded_;
 };
 

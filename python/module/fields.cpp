@@ -20,13 +20,14 @@
 
 namespace tensorray {
 
-LoadedField Field::loaded(Eigenvalues mode) const {
+LoadedField Field::loaded(Eigenvalues mode, const Interpolant& interpolant) const {
   const std::lock_guard<std::mutex> lock(mutex_);
-  if (!loaded_ || mode_ != mode) {
+  if (!loaded_ || mode_ != mode || interpolant_ != interpolant) {
     loaded_.reset();  // Its memory is needed.
     const std::string source = keys_.contains("file") ? keys_["file"] : keys_["generate"]["kind"];
-    loaded_ = prepare_field(make_(), mode, source);
+    loaded_ = prepare_field(make_(), mode, interpolant, source);
     mode_ = mode;
+    interpolant_ = interpolant;
   }
   return *loaded_;
 }

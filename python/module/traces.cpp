@@ -32,7 +32,7 @@ struct TraceRequest {
   Doubles positions, directions, flexibilities;  ///< (n, 3), (n, 3) unit, (n).
   std::optional<Doubles> along, turning;         ///< (n, 3, 2): derivatives of the starts.
   std::optional<Plate> plate;
-  std::string eigenvalues = "auto", method = "splitting";
+  std::string eigenvalues = "auto", method = "auto", interpolation = "cubic", border = "fade";
   BendingSettings bending;
   bool paths = false;
 };
@@ -160,10 +160,13 @@ py::dict trace_for_python(const Field& field, const TraceRequest& request, int t
   BendingSettings bending = request.bending;
   bending.method = value_of<BendingMethod>("method", request.method);
   const Eigenvalues mode = value_of<Eigenvalues>("eigenvalues", request.eigenvalues);
+  const bool extends = value_of<BorderChoice>("border", request.border) == BorderChoice::extend;
+  const Interpolant interpolant{value_of<Interpolation>("interpolation", request.interpolation),
+                                extends ? Border::extend : Border::fade};
   run(
       [&](const Progress& progress) {
         progress.update("loading", 0, 1);
-        const TensorField bricks = field.loaded(mode).field;
+        const TensorField bricks = field.loaded(mode, interpolant).field;
         Surfaces surfaces;
         surfaces.bounds = box_mesh(bricks.index_bounds(), bricks.to_world());
         surfaces.plate = request.plate;
@@ -263,6 +266,8 @@ void add_traces(py::module_& module) {
       .def_readwrite("turning", &TraceRequest::turning)
       .def_readwrite("plate", &TraceRequest::plate)
       .def_readwrite("eigenvalues", &TraceRequest::eigenvalues)
+      .def_readwrite("interpolation", &TraceRequest::interpolation)
+      .def_readwrite("border", &TraceRequest::border)
       .def_readwrite("method", &TraceRequest::method)
       .def_readwrite("paths", &TraceRequest::paths)
       .def_property("scale", nullptr, [](TraceRequest& self, double value) { self.bending.scale = value; })

@@ -8,7 +8,9 @@ _Path = Union[str, PathLike[str]]
 _Progress = Union[None, bool, Callable[[str, int, int], object]]
 _Scene = Union[None, _Path, Mapping[str, Any]]
 _Eigenvalues = Literal["auto", "raw", "absolute", "positive"]
-_Method = Literal["splitting", "euler", "rk4", "bs23", "dopri5"]
+_Method = Literal["auto", "splitting", "splitting4", "euler", "rk4", "bs23", "dopri5"]
+_Interpolation = Literal["cubic", "linear"]
+_Border = Literal["fade", "extend"]
 
 __version__: str
 RAY_ENDS: Tuple[str, ...]
@@ -105,7 +107,8 @@ class Trace:
 def trace(field: Field, positions: ArrayLike, directions: ArrayLike, s: ArrayLike, *, scale: float = ...,
           plate: Optional[Plate] = ..., jacobians: bool = ..., along: Optional[ArrayLike] = ...,
           turning: Optional[ArrayLike] = ..., ways: bool = ..., method: _Method = ..., step: Optional[float] = ...,
-          max_steps: int = ..., max_length: Optional[float] = ..., eigenvalues: _Eigenvalues = ..., threads: int = ...,
+          max_steps: int = ..., max_length: Optional[float] = ..., eigenvalues: _Eigenvalues = ...,
+          interpolation: _Interpolation = ..., border: _Border = ..., threads: int = ...,
           progress: _Progress = ...) -> Trace: ...
 
 class Landings:

@@ -45,8 +45,8 @@ class Trace:
 
 
 def trace(field, positions, directions, s, *, scale=1.0, plate=None, jacobians=False, along=None, turning=None,
-          ways=False, method="splitting", step=None, max_steps=20000, max_length=None, eigenvalues="auto", threads=0,
-          progress=None):
+          ways=False, method="auto", step=None, max_steps=20000, max_length=None, eigenvalues="auto",
+          interpolation="cubic", border="fade", threads=0, progress=None):
     """Follows single rays through a field.
 
     positions    Starts, world: (n, 3), or (3,) for one ray or for all.
@@ -58,11 +58,14 @@ def trace(field, positions, directions, s, *, scale=1.0, plate=None, jacobians=F
     along        These vectors, world: (n, 3, 2), or (3, 2) for all. Default: two unit vectors across the ray.
     turning      How the directions change along them: the same shapes; default: not at all (parallel light).
     ways         Whether to record the way of each ray.
-    method       splitting, euler, rk4, bs23 or dopri5.
+    method       auto (splitting4 if cubic, splitting if linear), splitting, splitting4, euler, rk4, bs23 or dopri5.
     step         Voxels a step; None: chosen along the ray.
     max_steps    Steps after which a ray is given up.
     max_length   Length after which a ray ends, world units; None: no limit.
     eigenvalues  Preprocessing: auto (absolute where the field is symmetric, else raw), raw, absolute or positive.
+    interpolation
+                 What the field is between its voxels: cubic (smooth) or linear.
+    border       cubic: whether inactive voxels fade to zero or extend the values of active ones.
     threads      Greatest number of threads; 0: all. The result does not depend on it.
 
     Returns a Trace. The light of a small area about a start fills |J0 x J1| times that area on the plate, where J0, J1
@@ -79,6 +82,7 @@ def trace(field, positions, directions, s, *, scale=1.0, plate=None, jacobians=F
         request.plate = _tensorray.Plate(*(np.asarray(part, float).ravel() for part in
                                            (plate.center, plate.normal, plate.up, plate.size)))
     request.eigenvalues, request.method, request.paths = eigenvalues, method, ways
+    request.interpolation, request.border = interpolation, border
     request.scale, request.step, request.max_steps = float(scale), float(step or 0), int(max_steps)
     request.max_length = math.inf if max_length is None else float(max_length)
     with shown(progress) as report:

@@ -27,10 +27,26 @@ inline auto choices(Eigenvalues) {
                     C{"positive", Eigenvalues::positive}};
 }
 
+inline auto choices(Interpolation) {
+  using C = Choice<Interpolation>;
+  return std::array{C{"cubic", Interpolation::cubic}, C{"linear", Interpolation::linear}};
+}
+
+inline auto choices(BorderChoice) {
+  using C = Choice<BorderChoice>;
+  return std::array{C{"auto", BorderChoice::automatic}, C{"fade", BorderChoice::fade},
+                    C{"extend", BorderChoice::extend}};
+}
+
 inline auto choices(BendingMethod) {
   using C = Choice<BendingMethod>;
-  return std::array{C{"euler", BendingMethod::euler}, C{"splitting", BendingMethod::splitting},
-                    C{"rk4", BendingMethod::rk4}, C{"bs23", BendingMethod::bs23}, C{"dopri5", BendingMethod::dopri5}};
+  return std::array{C{"auto", BendingMethod::automatic},
+                    C{"euler", BendingMethod::euler},
+                    C{"splitting", BendingMethod::splitting},
+                    C{"splitting4", BendingMethod::splitting4},
+                    C{"rk4", BendingMethod::rk4},
+                    C{"bs23", BendingMethod::bs23},
+                    C{"dopri5", BendingMethod::dopri5}};
 }
 
 inline auto choices(BeamPattern) {

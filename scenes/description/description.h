@@ -29,12 +29,18 @@
 
 namespace tensorray {
 
+/// What cubic interpolation takes inactive voxels for (Border); `automatic`: `extend` where obstacles or bounds are
+/// given, which stop light at the body that the active voxels are, else `fade`.
+enum class BorderChoice { automatic, fade, extend };
+
 struct FieldDescription {
   std::filesystem::path file;                   ///< OpenVDB file with the field; empty if `generate` is given.
   std::string name;                             ///< Name of the field in the file; empty: the only field.
   std::optional<GenerateDescription> generate;  ///< Generated field, instead of a file.
   Derive derive = Derive::none;
   Eigenvalues eigenvalues = Eigenvalues::automatic;
+  Interpolation interpolation = Interpolation::cubic;
+  BorderChoice border = BorderChoice::automatic;
   std::optional<double> scale;   ///< Factor on the flexibility; none: "auto".
   std::filesystem::path bounds;  ///< A closed mesh that cuts the volume; empty: none.
 };

@@ -35,6 +35,10 @@ void describe(FieldDescription& field, Visitor& visit) {
         "derivative that makes the tensor: gradient of a vector grid, hessian of a scalar grid");
   visit("eigenvalues", field.eigenvalues,
         "preprocessing: as they are, |T| or (T^2)^(1/2); auto is absolute where the field is symmetric, else raw");
+  visit("interpolation", field.interpolation, "what the field is between its voxels: smooth (cubic), or linear");
+  visit("border", field.border,
+        "cubic: inactive voxels fade to zero, or extend the values of active ones; auto extends where obstacles or "
+        "bounds are given");
   visit("scale", field.scale,
         "factor on the flexibility; auto is where light shows the field's structure without tangling",
         not_zero().or_word("auto"));
@@ -46,8 +50,10 @@ void describe(BendingDescription& bending, Visitor& visit) {
   visit("a", bending.flexibility.a, "constant part of the flexibility of light, s = a + b * wavelength");
   visit("b", bending.flexibility.b, "slope of the flexibility of light, s = a + b * wavelength, per nm");
   visit("rgb", bending.rgb, "three flexibilities, one for each colour channel, instead of wavelengths");
-  visit("method", bending.settings.method, "how rays are integrated");
-  visit("step", bending.settings.step, "arc length per step, in voxels; auto follows the strength of the field",
+  visit("method", bending.settings.method,
+        "how rays are integrated; auto is splitting4 between cubic voxels, splitting between linear ones");
+  visit("step", bending.settings.step,
+        "arc length per step, in voxels; auto follows the error, or the strength of the field",
         above(0).or_word("auto"));
   visit("tolerance", bending.settings.tolerance, "adaptive methods: error per step, in voxels", above(0));
   visit("max_steps", bending.settings.max_steps, "number of steps after which a ray is given up", between(1, 1e9));

@@ -53,8 +53,8 @@ std::string source_of(const FieldDescription& field) {
 LoadedField load_field(const SceneDescription& scene) {
   const FieldDescription& field = scene.field;
   if (const std::optional<BlockSource> blocks = load_blocks(scene))
-    return prepare_field(*blocks, field.eigenvalues, source_of(field));
-  return prepare_field(load_grid(scene), field.eigenvalues, source_of(field));
+    return prepare_field(*blocks, field.eigenvalues, interpolant_of(scene), source_of(field));
+  return prepare_field(load_grid(scene), field.eigenvalues, interpolant_of(scene), source_of(field));
 }
 
 TriangleMesh load_closed_mesh(const std::filesystem::path& path) {
@@ -237,6 +237,16 @@ LoadedLight load_light(const SceneDescription& description) {
   return light;
 }
 
+/// What the field is between its voxels, in words.
+std::string between_voxels(const MadeField& made) {
+  const Interpolant& interpolant = made.field->interpolant();
+  if (interpolant.between == Interpolation::linear) return "linear between them";
+  const bool is_dense = static_cast<double>(made.voxels) == (made.field->voxels().sizes().array() + 1).prod();
+  if (is_dense) return "cubic between them";
+  return interpolant.border == Border::fade ? "cubic between them, fading beside inactive ones"
+                                            : "cubic between them, continued into inactive ones";
+}
+
 LoadedField with_notes(MadeField made, const std::string& source) {
   std::vector<std::string> notes;
   if (made.non_finite > 0)
@@ -244,8 +254,13 @@ LoadedField with_notes(MadeField made, const std::string& source) {
                                 made.non_finite, made.voxels + made.non_finite));
   if (!made.field) throw std::runtime_error(source + ": no voxel of the field is finite; nothing can be traced");
   const EigenvalueReport& eigenvalues = made.eigenvalues;
-  notes.push_back(
-      fmt::format("field: {}, {} voxels, eigenvalues {}", source, made.voxels, choice_name(eigenvalues.chosen)));
+  notes.push_back(fmt::format("field: {}, {} voxels, eigenvalues {}, {}", source, made.voxels,
+                              choice_name(eigenvalues.chosen), between_voxels(made)));
+  if (is_coarse(made.resolution))
+    notes.push_back(fmt::format(
+        "warning: {}: voxels are too coarse: linear and cubic interpolation differ by {:.0f}% of the field's "
+        "norm in one of 100 cells; sample the field more finely, or smooth it",
+        source, 100 * made.resolution.percentile_99));
   if (eigenvalues.defective > 0)
     notes.push_back(fmt::format("{} voxels hold a defective tensor, preprocessed by its limit", eigenvalues.defective));
   if (eigenvalues.norm_lost > 0.01)
@@ -308,17 +323,21 @@ void require_near(const Plate& plate, const char* pointer, const SceneDescriptio
     fail_size(description, pointer);
 }
 
-LoadedField prepare_field(TensorGrid grid, Eigenvalues mode, const std::string& source) {
-  MadeField made;
-  made.non_finite = remove_non_finite(grid);
-  made.voxels = grid.active_voxels();
-  made.eigenvalues = apply_eigenvalues(grid, mode);
-  if (made.voxels > 0) made.field.emplace(std::move(grid));
-  return with_notes(std::move(made), source);
+Interpolant interpolant_of(const SceneDescription& description) {
+  const FieldDescription& field = description.field;
+  const bool stops = !description.obstacles.empty() || !field.bounds.empty();
+  const bool extends = field.border == BorderChoice::automatic ? stops : field.border == BorderChoice::extend;
+  return {field.interpolation, extends ? Border::extend : Border::fade};
 }
 
-LoadedField prepare_field(const BlockSource& blocks, Eigenvalues mode, const std::string& source) {
-  return with_notes(make_field(blocks, mode), source);
+LoadedField prepare_field(TensorGrid grid, Eigenvalues mode, const Interpolant& interpolant,
+                          const std::string& source) {
+  return with_notes(make_field(std::move(grid), mode, interpolant), source);
+}
+
+LoadedField prepare_field(const BlockSource& blocks, Eigenvalues mode, const Interpolant& interpolant,
+                          const std::string& source) {
+  return with_notes(make_field(blocks, mode, interpolant), source);
 }
 
 Scene load_scene(const SceneDescription& description, const Progress& progress) {

@@ -61,8 +61,12 @@ struct LoadedField {
 
 /// Removes voxels that are not finite, and preprocesses the others.
 /// @param source  Names the field in notes and errors. @throw std::runtime_error if no voxel is left.
-LoadedField prepare_field(TensorGrid grid, Eigenvalues mode, const std::string& source);
-LoadedField prepare_field(const BlockSource& blocks, Eigenvalues mode, const std::string& source);
+LoadedField prepare_field(TensorGrid grid, Eigenvalues mode, const Interpolant& interpolant, const std::string& source);
+LoadedField prepare_field(const BlockSource& blocks, Eigenvalues mode, const Interpolant& interpolant,
+                          const std::string& source);
+
+/// What the field of a scene is between its voxels.
+Interpolant interpolant_of(const SceneDescription& description);
 
 /// SceneDescription → Scene: loads fields, meshes and spectra, and chooses all values that the scene leaves open.
 /// @throw std::runtime_error, one line that names the file and the fix; SceneError if a value of the scene does not fit
@@ -72,8 +76,8 @@ Scene load_scene(const SceneDescription& description, const Progress& progress);
 /// The same with a field that is already in memory. Of `description.field` only `scale` and `bounds` are used.
 Scene load_scene(const SceneDescription& description, LoadedField field, const Progress& progress);
 
-/// The same for another description of a scene whose field is loaded: its `field` may differ in `scale` and `bounds`.
-/// Both scenes share the voxels. Notes about the field are left out.
+/// The same for another description of a scene whose field is loaded: its `field` may differ in `scale` and `bounds`,
+/// if it has the same interpolant. Both scenes share the voxels. Notes about the field are left out.
 Scene reload_scene(const Scene& loaded, const SceneDescription& description, const Progress& progress);
 
 /// Where the volume begins and ends along a direction, as signed distances from an origin, world units.

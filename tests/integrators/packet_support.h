@@ -224,8 +224,9 @@ constexpr double position_tolerance = 1e-3;  // Voxels.
 constexpr double length_tolerance = 1e-5;    // Relative to the length plus one voxel.
 
 /// Whether a method may repeat steps. Rounding can decide whether it repeats one.
-inline bool is_adaptive(BendingMethod method) {
-  return method == BendingMethod::bs23 || method == BendingMethod::dopri5;
+inline bool is_adaptive(const BendingSettings& settings) {
+  return settings.method == BendingMethod::bs23 || settings.method == BendingMethod::dopri5 ||
+         (settings.method == BendingMethod::splitting4 && settings.step == 0);
 }
 
 /// Whether ray i has the same path in both, to single precision.
@@ -260,7 +261,7 @@ inline void expect_reference(const Scene& scene, double sensitive = 0) {
   SCOPED_TRACE(scene.name);
   const RayBatch fast = traced(scene, scene.rays), exact = traced_by_reference(scene, scene.rays);
   const RayBatch moved = traced_by_reference(scene, turned_a_little(scene));
-  const bool adaptive = is_adaptive(scene.settings.method);
+  const bool adaptive = is_adaptive(scene.settings);
   std::size_t unstable = 0, steps_apart = 0, wrong = 0;
   for (std::size_t i = 0; i < exact.size(); ++i) {
     const double steps_allowed = adaptive ? 10 + 0.25 * exact.steps[i] : 1;

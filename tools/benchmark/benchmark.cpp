@@ -51,6 +51,7 @@ Json measure(const CommandLine& line) {
   if (wanted("jobs")) results["jobs"] = measure_jobs(line.options);
   if (wanted("keeping")) results["keeping"] = measure_keeping(line.options);
   if (wanted("caustics")) results["caustics"] = measure_caustics(line.options);
+  if (wanted("interpolation")) results["interpolation"] = measure_interpolation(line.options);
   if (wanted("view")) results["view"] = measure_view(line.options);
   return results;
 }
@@ -61,7 +62,7 @@ void run(int argc, char** argv) {
   CLI::App app(description, "tensorray_bench");
   app.add_flag("--json", line.json, "Print everything as JSON instead of tables");
   app.add_option("--only", line.only, "Measure only this part")
-      ->check(CLI::IsMember({"machine", "kernels", "loading", "jobs", "keeping", "caustics", "view"}))
+      ->check(CLI::IsMember({"machine", "kernels", "loading", "jobs", "keeping", "caustics", "interpolation", "view"}))
       ->type_name("PART");
   app.add_flag("--quick", line.options.quick,
                "Tiny sizes, takes seconds: checks that everything works; the numbers mean nothing");
@@ -70,7 +71,7 @@ void run(int argc, char** argv) {
   app.add_option("--kernels", line.options.kernels, "Measure only kernels whose names contain this text, such as AVX2")
       ->type_name("TEXT");
   app.add_option("--field", line.options.field,
-                 "Measure caustics only of fields whose names contain this text, such as vortex")
+                 "Measure caustics and interpolation only of fields whose names contain this text, such as vortex")
       ->type_name("TEXT");
   try {
     app.parse(argc, argv);

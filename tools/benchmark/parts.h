@@ -15,7 +15,7 @@ struct Options {
   bool quick = false;    ///< Tiny sizes: shows that everything works; the numbers have no meaning.
   bool million = false;  ///< Also run the job of a million positions.
   std::string kernels;   ///< Measure only kernels whose names contain this.
-  std::string field;     ///< Measure caustics only of fields whose names contain this.
+  std::string field;     ///< Measure caustics and interpolation only of fields whose names contain this.
   /// Called with a description of what is measured next.
   std::function<void(const std::string&)> announce;
 };
@@ -42,6 +42,11 @@ Json measure_keeping(const Options& options);
 /// Measures the error of the light on a plate, and the time for it, with the flow map and with photons.
 /// @throw as measure_jobs.
 Json measure_caustics(const Options& options);
+
+/// Measures how far pictures of fields of few voxels are from those of the formula, sampled at 257³, with each
+/// interpolation and some methods.
+/// @throw as measure_jobs.
+Json measure_interpolation(const Options& options);
 
 /// Measures how soon a live view shows a change: from a page's message to the picture's bytes, without the network.
 Json measure_view(const Options& options);

@@ -189,6 +189,22 @@ std::string caustics_text(const Json& caustics) {
   return text;
 }
 
+std::string interpolation_text(const Json& interpolation) {
+  std::string text;
+  for (const Json& field : interpolation) {
+    std::vector<Row> rows{
+        {fmt::format("{}, {}², against 257³", field.at("field").get<std::string>(), field.at("side").get<int>()),
+         "error", "with the default tolerance", "samples", "trace"}};
+    for (const Json& row : field.at("rows"))
+      rows.push_back({row.at("name"), fmt::format("{:.4f}", number(row, "error")),
+                      fmt::format("{:.4f}", number(row, "usual_error")),
+                      fmt::format("{:.2f} million", 1e-6 * number(row, "samples")),
+                      fmt::format("{:.2f} s", number(row, "seconds"))});
+    text += table(rows) + "\n";
+  }
+  return text;
+}
+
 }  // namespace
 
 std::string tables(const Json& results) {
@@ -203,6 +219,7 @@ std::string tables(const Json& results) {
   if (results.contains("jobs")) text += "\n" + jobs_text(results.at("jobs"));
   if (results.contains("keeping")) text += "\n" + keeping_text(results.at("keeping"));
   if (results.contains("caustics")) text += "\n" + caustics_text(results.at("caustics"));
+  if (results.contains("interpolation")) text += "\n" + interpolation_text(results.at("interpolation"));
   if (results.contains("view")) text += "\n" + view_text(results.at("view"));
   return text;
 }

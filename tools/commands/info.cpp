@@ -15,6 +15,7 @@
 #include "base/text.h"
 #include "tools/commands/commands.h"
 #include "volumes/files/tensor_files.h"
+#include "volumes/tensors/field_making.h"
 #include "volumes/tensors/statistics.h"
 
 namespace tensorray {
@@ -36,6 +37,7 @@ struct FieldInfo {
   Eigen::Matrix4d transform;  ///< From voxel indices to world.
   std::map<std::string, std::string> metadata;
   FieldStatistics statistics;
+  Resolution resolution;
 
   double stable_step_in_voxels() const {
     return statistics.stable_step(voxel_step_flexibility) / statistics.voxel_size.minCoeff();
@@ -43,8 +45,14 @@ struct FieldInfo {
 };
 
 FieldInfo field_info(const std::filesystem::path& file, const std::string& name) {
-  const TensorGrid grid = read_tensor_vdb(file, name);
-  return {grid.name, grid.to_world.matrix(), grid.metadata, field_statistics(grid)};
+  TensorGrid grid = read_tensor_vdb(file, name);
+  FieldInfo info{grid.name, grid.to_world.matrix(), grid.metadata, field_statistics(grid), {}};
+  if (info.statistics.active_voxels > info.statistics.non_finite) {
+    const MadeField made = make_field(std::move(grid), Eigenvalues::raw, {Interpolation::cubic, Border::fade});
+    info.resolution = made.resolution;
+    info.statistics.memory_bytes = made.field->memory_bytes();
+  }
+  return info;
 }
 
 std::vector<FieldInfo> field_infos(const InfoOptions& options, const std::vector<GridInfo>& grids) {
@@ -96,6 +104,10 @@ Json to_json(const FieldInfo& field) {
   json["asymmetry"] = s.asymmetry;
   json["absolute_loss"] = s.absolute_loss;
   json["deviator_max"] = s.deviator_max;
+  json["linear_to_cubic"] = {{"cells", field.resolution.cells},
+                             {"median", field.resolution.median},
+                             {"percentile_99", field.resolution.percentile_99},
+                             {"too_coarse", is_coarse(field.resolution)}};
   // Infinite for a field that does not bend light. JSON has no number for that and gets null.
   json["stable_step"] = {{"world_at_flexibility_1", s.stable_step(1)},
                          {"voxels_at_flexibility_0.3", field.stable_step_in_voxels()}};
@@ -163,11 +175,20 @@ void print_tensors(const FieldStatistics& s) {
   print_row("absolute would erase", percent(s.absolute_loss) + " of the squared norm (rotation and shear)");
 }
 
+void print_resolution(const Resolution& resolution) {
+  if (resolution.cells == 0) return;
+  print_row("between voxels", fmt::format("linear and cubic differ by {} of the norm (median), {} (99 % of the cells)",
+                                          percent(resolution.median), percent(resolution.percentile_99)));
+  if (is_coarse(resolution))
+    print_row("", "too coarse to trust: structures are about two voxels wide; sample it more finely, or smooth it");
+}
+
 void print_field(const FieldInfo& field) {
   const FieldStatistics& s = field.statistics;
   fmt::print("\nfield \"{}\"\n", field.name);
   print_grid(field);
   if (s.active_voxels > s.non_finite) print_tensors(s);
+  print_resolution(field.resolution);
   const bool bends = std::isfinite(s.stable_step(1));
   print_row("stable step, world", bends ? fmt::format("{:.4g} at s = 1", s.stable_step(1)) : "any");
   print_row("stable step, voxels",

@@ -50,7 +50,8 @@ Json field_of(const SceneDescription& description) {
 
 /// Loads a scene; from `loaded`, if that has the same field.
 Scene load(const SceneDescription& description, std::optional<Scene>& loaded, const Progress& progress) {
-  if (!loaded || field_of(loaded->description) != field_of(description)) {
+  if (!loaded || field_of(loaded->description) != field_of(description) ||
+      loaded->field.interpolant() != interpolant_of(description)) {
     loaded.reset();  // Its memory is needed.
     return load_scene(description, progress);
   }

@@ -63,7 +63,8 @@ const Scene& LiveScene::load(const Json& json, const std::vector<std::filesystem
 
   if (!has_picture(json, outputs)) render_.reset();
   Json field = field_keys(json);
-  if (scene_ && field != field_) scene_.reset();  // Its memory is needed.
+  if (scene_ && (field != field_ || scene_->field.interpolant() != interpolant_of(description)))
+    scene_.reset();  // Its memory is needed.
   Scene scene = scene_ ? reload_scene(*scene_, description, progress) : load_scene(description, progress);
   if (chooses_scale) scale_ = scene.scale.scale;
   if (chooses_direction) direction_ = scene.description.light.direction;

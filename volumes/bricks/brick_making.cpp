@@ -9,6 +9,8 @@
 
 #include <tbb/parallel_sort.h>
 
+#include "volumes/bricks/coefficients.h"
+#include "volumes/bricks/cubic_brick.h"
 #include "volumes/grids/four_floats.h"
 
 namespace tensorray {
@@ -121,6 +123,11 @@ double greatest_squared_norm(const TensorBlock& block) {
   return greatest;
 }
 
+/// @param norm  The greatest squared norm of a block's tensors in single precision.
+double squared_norm(float norm, const TensorBlock& block) {
+  return norm > least && norm < most ? double{norm} : greatest_squared_norm(block);
+}
+
 /// Calls visit(offset, voxel) for the voxels that a block and a brick share: the offset of a row's first voxel in the
 /// block, and its number in the brick. Rows along z are of eight voxels, or of one.
 /// @param ahead  Offset of the block from the brick, 0 or 1 along each axis.
@@ -181,7 +188,7 @@ std::optional<BlockShare> place(const TensorBlock& block, const std::array<float
   BlockShare share;
   const auto [norm, is_symmetric] = convert<components>(block, voxels);
   if (components == TensorBrick::symmetric && !is_symmetric) return std::nullopt;
-  share.norm = norm > least && norm < most ? double{norm} : greatest_squared_norm(block);
+  share.norm = squared_norm(norm, block);
   for (int bits = 0; bits < bricks_of_block; ++bits) {
     const bool is_row = corner(bits).z() == 0;
     is_row ? set_share<cells>(voxels, bits, share) : set_share<1>(voxels, bits, share);
@@ -194,12 +201,38 @@ std::optional<BlockShare> place(const TensorBlock& block, const std::array<float
   return share;
 }
 
+template <int components>
+std::optional<double> place_own(const TensorBlock& block, float* brick) {
+  BlockVoxels voxels;
+  const auto [norm, is_symmetric] = convert<components>(block, voxels);
+  if (components == TensorBrick::symmetric && !is_symmetric) return std::nullopt;
+  for (int i = 0; i < TensorBlock::voxels; i += cells) {
+    const int to = CubicBrick::coefficient(i / cells / cells, i / cells % cells, 0);
+    for (int z = 0; z < cells; ++z)
+      std::memcpy(brick + CubicBrick::bending_offset(components, to + z),
+                  voxels.bending + block_offset<components>(i + z), components * sizeof(float));
+    std::memcpy(brick + CubicBrick::trailing_offset(components) + to, voxels.trailing + i, cells * sizeof(float));
+  }
+  return squared_norm(norm, block);
+}
+
 }  // namespace
+
+std::optional<double> place_values(const TensorBlock& block, int components, float* brick) {
+  return components == TensorBrick::symmetric ? place_own<TensorBrick::symmetric>(block, brick)
+                                              : place_own<TensorBrick::general>(block, brick);
+}
 
 BlockTable::BlockTable(const std::vector<BlockShape>& all) : shapes(all) {
   places.reserve(shapes.size());
   for (const BlockShape& shape : shapes) places.emplace_back(shape.origin / cells);
   index = BrickIndex(places);
+}
+
+Eigen::AlignedBox3i bricks_of(const Eigen::AlignedBox3i& voxels) {
+  const auto brick_of = [](int cell) { return cell >> 3; };
+  const Eigen::Vector3i last = (voxels.max().array() - 1).matrix().cwiseMax(voxels.min());
+  return {voxels.min().unaryExpr(brick_of), last.unaryExpr(brick_of)};
 }
 
 std::vector<Eigen::Vector3i> active_bricks(const BlockTable& table, const Eigen::AlignedBox3i& extent) {

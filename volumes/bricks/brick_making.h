@@ -31,6 +31,9 @@ struct BlockTable {
   BrickIndex index;
 };
 
+/// The range of bricks that hold the cells between the voxels of a box. An axis with a single voxel has one cell.
+Eigen::AlignedBox3i bricks_of(const Eigen::AlignedBox3i& voxels);
+
 /// The bricks within `extent` that have an active voxel at a corner of one of their cells, ordered by x, then y, then
 /// z. Each block gives the brick at its place. An active voxel on a near face of a block also gives the preceding
 /// brick, whose apron contains that voxel.

@@ -2,6 +2,8 @@
 
 #include <algorithm>
 
+#include "volumes/bricks/cubic_brick.h"
+
 // The code before HWY_AFTER_NAMESPACE is compiled once for each kind of processor. It calls no inline functions of
 // other headers: the linker would keep only one of their copies, which may be compiled for the wrong processor.
 #undef HWY_TARGET_INCLUDE
@@ -29,6 +31,7 @@ struct Cells {
 struct CellRange {
   float first[3], last[3], last_cell[3];
   std::int32_t origin[3];
+  std::int32_t width;  // Numbers of a brick along an edge.
 };
 
 }  // namespace
@@ -59,7 +62,7 @@ void find_cells(const CellRange& range, const IndexPoints& points, std::size_t f
       const auto index = hn::Add(hn::ConvertTo(ints, cell), hn::Set(ints, range.origin[axis]));
       hn::Store(hn::ShiftRight<3>(index), ints, cells.brick[axis] + p);
       const auto within = hn::And(index, hn::Set(ints, TensorBrick::cells - 1));
-      voxel = hn::Add(hn::Mul(voxel, hn::Set(ints, TensorBrick::width)), within);
+      voxel = hn::Add(hn::Mul(voxel, hn::Set(ints, range.width)), within);
     }
     hn::Store(voxel, ints, cells.voxel + p);
   }
@@ -121,13 +124,58 @@ void sample_trailing(const Cells& cells, std::size_t count, float* trailing) {
   }
 }
 
+/// The weights of the cubic B-spline along an axis (see cubic_brick.h).
+HWY_INLINE void spline_weights(float t, float (&weights)[4]) {
+  const float u = 1 - t;
+  weights[0] = u * u * u / 6;
+  weights[1] = 2.0f / 3 - t * t * (2 - t) / 2;
+  weights[2] = 2.0f / 3 - u * u * (2 - u) / 2;
+  weights[3] = t * t * t / 6;
+}
+
+/// The same from the coefficients of a cubic field: the stored components of T − T₂₂ I, and T₂₂.
+template <int stored>
+void sample_spline(const Cells& cells, std::size_t count, float (*components)[4 * cell_block], float* trailing) {
+  const Eight d;
+  constexpr int width = CubicBrick::width;
+  for (std::size_t p = 0; p < count; ++p) {
+    float x[4], y[4], z[4];
+    spline_weights(cells.fraction[0][p], x);
+    spline_weights(cells.fraction[1][p], y);
+    spline_weights(cells.fraction[2][p], z);
+    const float* const first = cells.bending[p] + static_cast<std::size_t>(cells.voxel[p]) * stored;
+    for (std::size_t c = 0; c < stored; c += hn::Lanes(d)) {
+      auto sum = hn::Zero(d);
+      for (std::size_t row = 0; row < 16; ++row) {
+        const float* const along = first + (row / 4 * width + row % 4) * width * stored + c;
+        auto line = hn::Mul(hn::Set(d, z[0]), hn::LoadU(d, along));
+        for (std::size_t k = 1; k < 4; ++k) line = hn::MulAdd(hn::Set(d, z[k]), hn::LoadU(d, along + k * stored), line);
+        sum = hn::MulAdd(hn::Set(d, x[row / 4] * y[row % 4]), line, sum);
+      }
+      store_components(sum, c, p, components);
+    }
+    const float* const last = cells.trailing[p] + cells.voxel[p];
+    float sum = 0;
+    for (std::size_t row = 0; row < 16; ++row) {
+      const float* const along = last + (row / 4 * width + row % 4) * width;
+      sum += x[row / 4] * y[row % 4] * (z[0] * along[0] + z[1] * along[1] + z[2] * along[2] + z[3] * along[3]);
+    }
+    trailing[p] = sum;
+  }
+}
+
 /// Samples the cells. @param components, stride  As in sample_tensors.
 template <int stored>
-void sample_cells_of(const Cells& cells, std::size_t count, float factor, float* components, std::size_t stride) {
+void sample_cells_of(const Cells& cells, bool cubic, std::size_t count, float factor, float* components,
+                     std::size_t stride) {
   const Floats d;
   alignas(64) float bending[2][4 * cell_block], trailing[cell_block];
-  sample_bending<stored>(cells, count, bending);
-  sample_trailing(cells, count, trailing);
+  if (cubic) {
+    sample_spline<stored>(cells, count, bending, trailing);
+  } else {
+    sample_bending<stored>(cells, count, bending);
+    sample_trailing(cells, count, trailing);
+  }
   for (std::size_t p = 0; p < count; p += hn::Lanes(d)) {
     hn::Vec<Floats> s[8], T[9];
     hn::LoadInterleaved4(d, bending[0] + 4 * p, s[0], s[1], s[2], s[3]);
@@ -140,12 +188,12 @@ void sample_cells_of(const Cells& cells, std::size_t count, float factor, float*
   }
 }
 
-void sample_cells(const Cells& cells, int stored, std::size_t count, float factor, float* components,
+void sample_cells(const Cells& cells, int stored, bool cubic, std::size_t count, float factor, float* components,
                   std::size_t stride) {
   if (stored == TensorBrick::symmetric)
-    sample_cells_of<TensorBrick::symmetric>(cells, count, factor, components, stride);
+    sample_cells_of<TensorBrick::symmetric>(cells, cubic, count, factor, components, stride);
   else
-    sample_cells_of<TensorBrick::general>(cells, count, factor, components, stride);
+    sample_cells_of<TensorBrick::general>(cells, cubic, count, factor, components, stride);
 }
 
 }  // namespace
@@ -170,6 +218,9 @@ CellRange cell_range(const TensorField& field, const Eigen::Vector3i& origin) {
     range.last_cell[axis] = static_cast<float>(std::max(first, last - 1) - origin[axis]);
     range.origin[axis] = origin[axis];
   }
+  // In a cubic brick the number of a cell's voxel, as if it began with its own voxels, is that of the first coefficient
+  // that the cell needs.
+  range.width = field.is_cubic() ? CubicBrick::width : TensorBrick::width;
   return range;
 }
 
@@ -198,7 +249,8 @@ void sample_tensors(const TensorField& field, const IndexPoints& points, float f
     const std::size_t count = std::min(cell_block, points.count - first);
     HWY_DYNAMIC_DISPATCH(find_cells)(range, points, first, count, cells);
     find_voxels(field, count, at, brick, cells);
-    HWY_DYNAMIC_DISPATCH(sample_cells)(cells, brick.components, count, factor, components + first, stride);
+    HWY_DYNAMIC_DISPATCH(sample_cells)
+    (cells, brick.components, field.is_cubic(), count, factor, components + first, stride);
   }
 }
 

@@ -13,22 +13,17 @@
 
 #include "base/box.h"
 #include "volumes/bricks/brick_making.h"
+#include "volumes/bricks/coefficients.h"
+#include "volumes/bricks/cubic_brick.h"
 #include "volumes/grids/page_memory.h"
 
 namespace tensorray {
 namespace {
 
 struct alignas(64) ZeroBrick {
-  float floats[TensorBrick::stored_floats(TensorBrick::general)] = {};
+  float floats[CubicBrick::stored_floats(TensorBrick::general)] = {};
 };
 constexpr ZeroBrick zero_brick;
-
-/// The range of bricks that hold the cells between the voxels of a box. An axis with a single voxel has one cell.
-Eigen::AlignedBox3i bricks_of(const Eigen::AlignedBox3i& voxels) {
-  const auto brick_of = [](int cell) { return cell >> 3; };
-  const Eigen::Vector3i last = (voxels.max().array() - 1).matrix().cwiseMax(voxels.min());
-  return {voxels.min().unaryExpr(brick_of), last.unaryExpr(brick_of)};
-}
 
 /// Number of blocks that are placed before they are freed; enough to keep all threads busy.
 constexpr std::size_t part_size = 4096;
@@ -68,13 +63,15 @@ struct TensorField::Blocks {
   std::function<void(std::size_t end)> give_back = [](std::size_t) {};
 };
 
-TensorField::TensorField(const TensorGrid& grid) : to_world_(grid.to_world), to_index_(grid.to_world.inverse()) {
+TensorField::TensorField(const TensorGrid& grid, const Interpolant& interpolant)
+    : interpolant_(interpolant), to_world_(grid.to_world), to_index_(grid.to_world.inverse()) {
   Blocks blocks;
   blocks.get = [&](std::size_t i, TensorBlock&) -> const TensorBlock& { return grid.blocks[i]; };
   make_bricks(grid.shapes(), blocks);
 }
 
-TensorField::TensorField(TensorGrid&& grid) : to_world_(grid.to_world), to_index_(grid.to_world.inverse()) {
+TensorField::TensorField(TensorGrid&& grid, const Interpolant& interpolant)
+    : interpolant_(interpolant), to_world_(grid.to_world), to_index_(grid.to_world.inverse()) {
   std::size_t freed = 0;
   Blocks blocks;
   blocks.get = [&](std::size_t i, TensorBlock&) -> const TensorBlock& { return grid.blocks[i - freed]; };
@@ -84,7 +81,8 @@ TensorField::TensorField(TensorGrid&& grid) : to_world_(grid.to_world), to_index
   make_bricks(grid.shapes(), blocks);
 }
 
-TensorField::TensorField(const BlockSource& source) : to_world_(source.to_world), to_index_(source.to_world.inverse()) {
+TensorField::TensorField(const BlockSource& source, const Interpolant& interpolant)
+    : interpolant_(interpolant), to_world_(source.to_world), to_index_(source.to_world.inverse()) {
   Blocks blocks;
   blocks.get = [&](std::size_t i, TensorBlock& own) -> const TensorBlock& {
     read_block(source, i, own);
@@ -102,51 +100,82 @@ void TensorField::make_bricks(const std::vector<BlockShape>& shapes, const Block
   voxels_ = Eigen::AlignedBox3d(active.min().cast<double>(), active.max().cast<double>());
 
   const BlockTable table(shapes);
+  const double norm = is_cubic() ? make_cubic_bricks(table, active, blocks) : make_linear_bricks(table, active, blocks);
+  greatest_norm_ = std::sqrt(norm);
+}
+
+/// @return the greatest squared norm of a voxel.
+double TensorField::make_linear_bricks(const BlockTable& table, const Eigen::AlignedBox3i& active,
+                                       const Blocks& blocks) {
   bricks_ = active_bricks(table, bricks_of(active));
   bricks_.shrink_to_fit();
   index_ = BrickIndex(bricks_);
-  std::vector<BlockShare> shares(shapes.size());
-  place_blocks(table, blocks, shares);
-  std::vector<float> strongest(bricks_.size());
-  tbb::parallel_for(std::size_t{0}, bricks_.size(), [&](std::size_t i) {
-    strongest[i] = strongest_deviator(table, shares, bricks_[i], brick_at(floats_of(i), 0));
+  std::vector<BlockShare> shares(table.shapes.size());
+  place_blocks(shares.size(), blocks, [&](std::size_t i, const TensorBlock& block) {
+    std::array<float*, bricks_of_block> bricks{};
+    for (int bits = 0; bits < bricks_of_block; ++bits)
+      if (const std::uint32_t brick = index_.find(table.places[i] - corner(bits)); brick != BrickIndex::missing)
+        bricks[static_cast<std::size_t>(bits)] = floats_of(brick);
+    const std::optional<BlockShare> share = place_block(block, components_, bricks);
+    if (share) shares[i] = *share;
+    return share.has_value();
   });
-  index_.set_values(strongest);
+  set_strongest(
+      [&](std::size_t i) { return strongest_deviator(table, shares, bricks_[i], brick_at(floats_of(i), 0)); });
   double norm = 0;
   for (const BlockShare& share : shares) norm = std::max(norm, share.norm);
-  greatest_norm_ = std::sqrt(norm);
+  return norm;
+}
+
+/// The same. Voxels become coefficients in place.
+double TensorField::make_cubic_bricks(const BlockTable& table, const Eigen::AlignedBox3i& active,
+                                      const Blocks& blocks) {
+  CoefficientBricks coefficients = coefficient_bricks(table, active, interpolant_.border);
+  bricks_ = coefficients.places;
+  std::vector<double> norms(table.shapes.size());
+  place_blocks(norms.size(), blocks, [&](std::size_t i, const TensorBlock& block) {
+    const auto norm = place_values(block, components_, floats_of(coefficients.index.find(table.places[i])));
+    if (norm) norms[i] = *norm;
+    return norm.has_value();
+  });
+  const CoefficientMemory memory{floats_.get(), brick_floats_, components_};
+  continue_values(coefficients, interpolant_.border, memory);
+  make_coefficients(coefficients, active, interpolant_.border, memory);
+  fill_aprons(coefficients, active, memory);
+  keep_bricks(coefficients.count);
+  set_strongest([&](std::size_t i) { return strongest_coefficient(floats_of(i), components_); });
+  return norms.empty() ? 0 : *std::max_element(norms.begin(), norms.end());
+}
+
+void TensorField::set_strongest(const std::function<float(std::size_t)>& strongest_of) {
+  std::vector<float> strongest(bricks_.size());
+  tbb::parallel_for(std::size_t{0}, bricks_.size(), [&](std::size_t i) {
+    make_room();
+    strongest[i] = strongest_of(i);
+  });
+  index_.set_values(strongest);
 }
 
 /// Fills the bricks. They store symmetric tensors until the first block comes that has others. Its part is then placed
 /// again.
-void TensorField::place_blocks(const BlockTable& table, const Blocks& blocks, std::vector<BlockShare>& shares) {
+void TensorField::place_blocks(std::size_t count, const Blocks& blocks, const Place& place) {
   allocate(TensorBrick::symmetric);
   std::atomic<bool> fits{true};
-  const auto place = [&](const tbb::blocked_range<std::size_t>& range) {
+  const auto place_part = [&](const tbb::blocked_range<std::size_t>& range) {
     TensorBlock own;
     for (std::size_t i = range.begin(); i < range.end() && fits; ++i) {
       make_room();
-      const TensorBlock& block = blocks.get(i, own);
-      std::array<float*, bricks_of_block> bricks{};
-      for (int bits = 0; bits < bricks_of_block; ++bits)
-        if (const std::uint32_t brick = index_.find(table.places[i] - corner(bits)); brick != BrickIndex::missing)
-          bricks[static_cast<std::size_t>(bits)] = floats_of(brick);
-      const std::optional<BlockShare> share = place_block(block, components_, bricks);
-      if (!share) {
-        fits = false;
-        return;
-      }
-      shares[i] = *share;
+      if (!place(i, blocks.get(i, own))) fits = false;
     }
   };
-  for (std::size_t first = 0; first < shares.size(); first += part_size) {
-    const std::size_t end = std::min(first + part_size, shares.size());
+  for (std::size_t first = 0; first < count; first += part_size) {
+    const std::size_t end = std::min(first + part_size, count);
     const tbb::blocked_range<std::size_t> part(first, end, grain);
-    tbb::parallel_for(part, place);
+    tbb::parallel_for(part, place_part);
     if (!fits) {
       widen(first > 0);
       fits = true;
-      tbb::parallel_for(part, place);
+      tbb::parallel_for(part, place_part);
     }
     blocks.give_back(end);
   }
@@ -155,12 +184,12 @@ void TensorField::place_blocks(const BlockTable& table, const Blocks& blocks, st
 /// Replaces the bricks by those of tensors of any kind. `keep`: with the tensors that they hold.
 void TensorField::widen(bool keep) {
   const Floats narrow = std::move(floats_);
-  const auto stored_floats = static_cast<std::size_t>(TensorBrick::stored_floats(components_));
+  const std::size_t stored_floats = brick_floats_;
   allocate(TensorBrick::general);
   if (!keep) return;
   tbb::parallel_for(std::size_t{0}, bricks_.size(), [&](std::size_t i) {
     make_room();
-    widen_brick(narrow.get() + i * stored_floats, floats_of(i));
+    (is_cubic() ? widen_coefficients : widen_brick)(narrow.get() + i * stored_floats, floats_of(i));
   });
 }
 
@@ -168,10 +197,22 @@ void TensorField::widen(bool keep) {
 /// that are far apart in memory.
 void TensorField::allocate(int components) {
   components_ = components;
-  const auto stored_floats = static_cast<std::size_t>(TensorBrick::stored_floats(components));
-  const std::size_t bytes = bricks_.size() * stored_floats * sizeof(float);
+  brick_floats_ = static_cast<std::size_t>(is_cubic() ? CubicBrick::stored_floats(components)
+                                                      : TensorBrick::stored_floats(components));
+  trailing_offset_ = static_cast<std::size_t>(is_cubic() ? CubicBrick::trailing_offset(components)
+                                                         : TensorBrick::trailing_offset(components));
+  const std::size_t bytes = bricks_.size() * brick_floats_ * sizeof(float);
   constexpr std::size_t alignment = 4096;
   floats_ = {static_cast<float*>(map_pages(bytes, alignment)), Release{bytes}};
+}
+
+/// Frees all bricks but the first ones.
+void TensorField::keep_bricks(std::size_t count) {
+  bricks_.resize(count);
+  bricks_.shrink_to_fit();
+  index_ = BrickIndex(bricks_);
+  Release& release = *std::get_deleter<Release>(floats_);
+  release.bytes = shrink_pages(floats_.get(), release.bytes, count * brick_floats_ * sizeof(float));
 }
 
 void TensorField::Release::operator()(float* floats) const { unmap_pages(floats, bytes); }
@@ -181,8 +222,7 @@ std::vector<Eigen::Vector3d> TensorField::corners() const { return corners_of(in
 Eigen::AlignedBox3d TensorField::world_box() const { return box_of(corners()); }
 
 std::size_t TensorField::memory_bytes() const {
-  const auto floats = static_cast<std::size_t>(TensorBrick::stored_floats(components_));
-  return brick_count() * (floats * sizeof(float) + sizeof(Eigen::Vector3i)) + index_.memory_bytes();
+  return brick_count() * (brick_floats_ * sizeof(float) + sizeof(Eigen::Vector3i)) + index_.memory_bytes();
 }
 
 }  // namespace tensorray

@@ -1,15 +1,17 @@
 #pragma once
 /// @file volumes/bricks/tensor_field.h
-/// A tensor field that light can be traced through: immutable bricks in memory, sampled trilinearly.
+/// A tensor field that light can be traced through: immutable bricks in memory, and what is between their voxels.
 
 #include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <memory>
 #include <vector>
 
 #include <Eigen/Geometry>
 
 #include "volumes/bricks/brick_index.h"
+#include "volumes/bricks/interpolation.h"
 #include "volumes/grids/block_source.h"
 #include "volumes/grids/tensor_grid.h"
 
@@ -18,8 +20,8 @@ namespace tensorray {
 struct BlockShare;
 struct BlockTable;
 
-/// 8³ cells, with the far apron that interpolation needs: 9³ voxels. All bricks without an active voxel share one brick
-/// of zeros.
+/// 8³ cells, with the far apron that trilinear interpolation needs: 9³ voxels. All bricks without an active voxel share
+/// one brick of zeros. (A cubic field's bricks hold coefficients instead: see cubic_brick.h.)
 ///
 /// A tensor T is stored in two parts. T − T₂₂ I bends light as T does, because a multiple of the identity bends nothing
 /// (Zheng and Pang 2003, Eq. 5). Its last component is zero, so that a tracer reads only eight floats, which fill one
@@ -55,22 +57,23 @@ struct TensorBrick {
   float strongest;        ///< Upper bound in the brick of the Frobenius norm of the deviator, T − ⅓ tr(T) I.
   int components;         ///< `general` or `symmetric`; the same in all bricks of a field.
 
-  Eigen::Matrix3d tensor(int voxel) const;  ///< The tensor T at a voxel.
+  Eigen::Matrix3d tensor(int voxel) const;  ///< The tensor T at a voxel of a linear field.
 };
 
 /// A field as bricks in memory. Its size grows with the number of active voxels, not with the extent. Immutable; any
 /// number of threads may read it at once. Copies share the voxels.
 class TensorField {
  public:
+  /// The voxels of a cubic field must be finite: one that is not spoils all about it.
   /// @throw std::invalid_argument if the grid has no active voxel or its transform cannot be inverted.
-  explicit TensorField(const TensorGrid& grid);
+  explicit TensorField(const TensorGrid& grid, const Interpolant& interpolant = {});
 
   /// The same, but frees the blocks of the grid while it makes bricks, so that memory never holds the whole field
   /// twice.
-  explicit TensorField(TensorGrid&& grid);
+  explicit TensorField(TensorGrid&& grid, const Interpolant& interpolant = {});
 
   /// The same from blocks that are read once each, on all threads. @throw also what `source` throws.
-  explicit TensorField(const BlockSource& source);
+  explicit TensorField(const BlockSource& source, const Interpolant& interpolant = {});
 
   const Eigen::Affine3d& to_world() const { return to_world_; }
   const Eigen::Affine3d& to_index() const { return to_index_; }
@@ -98,10 +101,14 @@ class TensorField {
   /// Whether T = Tᵀ in all voxels, bit for bit. Bricks then store five components, and tracing is faster.
   bool is_symmetric() const { return components_ == TensorBrick::symmetric; }
 
+  const Interpolant& interpolant() const { return interpolant_; }
+  bool is_cubic() const { return interpolant_.between == Interpolation::cubic; }
+
   std::size_t brick_count() const { return bricks_.size(); }
 
   /// Coordinates (voxel index / 8) of the bricks in memory, ordered by x, then y, then z. A brick is in memory if an
-  /// active voxel is at a corner of one of its cells.
+  /// active voxel is at a corner of one of its cells or, of a cubic field, if a coefficient that one of its cells needs
+  /// is not zero.
   const std::vector<Eigen::Vector3i>& bricks() const { return bricks_; }
   std::size_t memory_bytes() const;
 
@@ -127,20 +134,29 @@ class TensorField {
   };
   using Floats = std::shared_ptr<float[]>;
 
+  /// Places block i in its bricks. @return false, and leaves them as they are, if they do not have enough components.
+  using Place = std::function<bool(std::size_t i, const TensorBlock& block)>;
+
   void make_bricks(const std::vector<BlockShape>& shapes, const Blocks& blocks);
-  void place_blocks(const BlockTable& table, const Blocks& blocks, std::vector<BlockShare>& shares);
+  double make_linear_bricks(const BlockTable& table, const Eigen::AlignedBox3i& active, const Blocks& blocks);
+  double make_cubic_bricks(const BlockTable& table, const Eigen::AlignedBox3i& active, const Blocks& blocks);
+  void place_blocks(std::size_t count, const Blocks& blocks, const Place& place);
   void widen(bool keep);
   void allocate(int components);
-  float* floats_of(std::size_t index) const { return floats_.get() + index * TensorBrick::stored_floats(components_); }
+  void keep_bricks(std::size_t count);
+  void set_strongest(const std::function<float(std::size_t)>& strongest_of);
+  float* floats_of(std::size_t index) const { return floats_.get() + index * brick_floats_; }
   TensorBrick brick_at(const float* floats, float strongest) const {
-    return {floats, floats + TensorBrick::trailing_offset(components_), strongest, components_};
+    return {floats, floats + trailing_offset_, strongest, components_};
   }
 
+  Interpolant interpolant_;
   Eigen::Affine3d to_world_, to_index_;
   Eigen::AlignedBox3d index_bounds_, voxels_;
   std::vector<Eigen::Vector3i> bricks_;
   Floats floats_;  ///< The bricks, in the order of `bricks_`.
   int components_ = TensorBrick::symmetric;
+  std::size_t brick_floats_ = 0, trailing_offset_ = 0;
   double greatest_norm_ = 0;
   BrickIndex index_;  ///< Finds a brick, and its TensorBrick::strongest, by its coordinates.
 };

@@ -4,6 +4,8 @@
 #include <cmath>
 #include <limits>
 
+#include "volumes/bricks/cubic_brick.h"
+
 namespace tensorray {
 
 int TensorSampler::locate(const Eigen::Vector3d& world, Eigen::Vector3d& fraction) {
@@ -23,6 +25,7 @@ int TensorSampler::locate(const Eigen::Vector3d& world, Eigen::Vector3d& fractio
     brick_ = field_->brick(at);
   }
   cell -= TensorBrick::cells * at;
+  if (field_->is_cubic()) return CubicBrick::coefficient(cell.x() - 1, cell.y() - 1, cell.z() - 1);
   return TensorBrick::voxel(cell.x(), cell.y(), cell.z());
 }
 
@@ -72,12 +75,39 @@ Eight bending(const TensorBrick& brick, int voxel) {
   return Eigen::Map<const Eigen::Array<float, 8, 1>>(stored).cast<double>();
 }
 
+/// The cubic B-spline at a point, and its slopes if they are wanted. @param first  The number of the first of the 4³
+/// coefficients.
+struct CubicCell {
+  const TensorBrick& brick;
+  int first;
+  const Eigen::Vector3d& fraction;
+
+  /// A component of index space's gradient, 0 to 2, or the value, −1.
+  Eigen::Matrix3d at(int slope) const {
+    double weights[3][4];
+    for (int axis = 0; axis < 3; ++axis)
+      axis == slope ? cubic_slopes(fraction[axis], weights[axis]) : cubic_weights(fraction[axis], weights[axis]);
+    Eight eight = Eight::Zero();
+    double last = 0;
+    for (int i = 0; i < 64; ++i) {
+      const int x = i >> 4, y = i >> 2 & 3, z = i & 3;
+      const int number = first + (x * CubicBrick::width + y) * CubicBrick::width + z;
+      const double weight = weights[0][x] * weights[1][y] * weights[2][z];
+      const float* const stored = brick.bending + CubicBrick::bending_offset(brick.components, number);
+      eight += weight * Eigen::Map<const Eigen::Array<float, 8, 1>>(stored).cast<double>();
+      last += weight * double{brick.trailing[number]};
+    }
+    return to_matrix(brick, eight, last);
+  }
+};
+
 }  // namespace
 
 Eigen::Matrix3d TensorSampler::at(const Eigen::Vector3d& world) {
   ++samples_;
   Eigen::Vector3d f;
   const int voxel = locate(world, f);
+  if (field_->is_cubic()) return CubicCell{brick_, voxel, f}.at(-1);
   const double wx[2] = {1 - f.x(), f.x()}, wy[2] = {1 - f.y(), f.y()}, wz[2] = {1 - f.z(), f.z()};
   Eight eight = Eight::Zero();
   double last = 0;
@@ -96,12 +126,18 @@ Eigen::Matrix3d TensorSampler::at(const Eigen::Vector3d& world, const Eigen::Mat
   ++samples_;
   Eigen::Vector3d f;
   const int voxel = locate(world, f);
-  const auto eight = interpolate<Eight>(voxel, f, [&](int at) { return bending(brick_, at); });
-  const auto last = interpolate<double>(voxel, f, [&](int at) { return double{brick_.trailing[at]}; });
   Eigen::Matrix<double, 3, 2> by_index = field_->to_index().linear() * along;
   // The tensor is constant along an axis with a single voxel.
   for (int axis = 0; axis < 3; ++axis)
     if (field_->voxels().sizes()[axis] == 0) by_index.row(axis).setZero();
+  if (field_->is_cubic()) {
+    const CubicCell cell{brick_, voxel, f};
+    const Eigen::Matrix3d x = cell.at(0), y = cell.at(1), z = cell.at(2);
+    for (int i = 0; i < 2; ++i) derivatives[i] = by_index(0, i) * x + by_index(1, i) * y + by_index(2, i) * z;
+    return cell.at(-1);
+  }
+  const auto eight = interpolate<Eight>(voxel, f, [&](int at) { return bending(brick_, at); });
+  const auto last = interpolate<double>(voxel, f, [&](int at) { return double{brick_.trailing[at]}; });
   for (int i = 0; i < 2; ++i) {
     const double x = by_index(0, i), y = by_index(1, i), z = by_index(2, i);
     derivatives[i] = to_matrix(brick_, x * eight.x + y * eight.y + z * eight.z, x * last.x + y * last.y + z * last.z);

@@ -18,11 +18,11 @@ class TensorSampler {
  public:
   explicit TensorSampler(const TensorField& field) : field_(&field) {}
 
-  /// Trilinear interpolation at a world position, in world axes; inactive voxels count as zero.
+  /// The field's interpolant at a world position, in world axes.
   Eigen::Matrix3d at(const Eigen::Vector3d& world);
 
-  /// The same, with the derivatives of the interpolation along two world vectors, the columns of `along`. On the face
-  /// of a cell they are the derivatives on one side.
+  /// The same, with the derivatives of the interpolant along two world vectors, the columns of `along`. On the face of
+  /// a cell of a linear field they are the derivatives on one side.
   Eigen::Matrix3d at(const Eigen::Vector3d& world, const Eigen::Matrix<double, 3, 2>& along,
                      std::array<Eigen::Matrix3d, 2>& derivatives);
 

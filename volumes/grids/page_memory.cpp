@@ -201,4 +201,12 @@ void unmap_pages(void* memory, std::size_t bytes) noexcept {
   munmap(memory, bytes);
 }
 
+std::size_t shrink_pages(void* memory, std::size_t bytes, std::size_t kept) noexcept {
+  const std::size_t page = static_cast<std::size_t>(sysconf(_SC_PAGESIZE));
+  const std::size_t end = (kept + page - 1) / page * page;
+  if (store || end >= bytes) return bytes;
+  munmap(static_cast<char*>(memory) + end, bytes - end);
+  return end;
+}
+
 }  // namespace tensorray

@@ -36,6 +36,10 @@ void* map_pages(std::size_t bytes, std::size_t alignment);
 
 void unmap_pages(void* memory, std::size_t bytes) noexcept;
 
+/// Frees the pages behind the first `kept` bytes; pages of a file are kept whole.
+/// @return the number of bytes that `unmap_pages` then needs.
+std::size_t shrink_pages(void* memory, std::size_t bytes, std::size_t kept) noexcept;
+
 /// An allocator of large arrays, which are pages where there is a bound. The bound must not come between an array and
 /// its end.
 template <class T>

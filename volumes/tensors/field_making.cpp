@@ -80,15 +80,21 @@ BlockSource with_shapes(const BlockSource& source, const std::vector<BlockShape>
   return result;
 }
 
+constexpr std::size_t compared_cells = 4096;  // Enough for a 99th percentile.
+
+void find_resolution(const std::vector<BlockShape>& shapes, MadeField& made) {
+  if (made.field && made.field->is_cubic()) made.resolution = measure_resolution(*made.field, shapes, compared_cells);
+}
+
 }  // namespace
 
-MadeField make_field(const BlockSource& source, Eigenvalues mode) {
+MadeField make_field(const BlockSource& source, Eigenvalues mode, const Interpolant& interpolant) {
   Eigenvalues chosen = mode == Eigenvalues::automatic ? guess(source) : mode;
   MadeField result;
   BlockSource current = source;
   while (true) {
     Pass pass(current, mode, chosen);
-    result.field.emplace(pass.source);
+    result.field.emplace(pass.source, interpolant);
     const BlockFindings found = pass.sum();
     const Eigenvalues right = mode == Eigenvalues::automatic ? automatic_choice(found.asymmetry.asymmetry()) : chosen;
     result.eigenvalues = report_of(found.eigenvalues, chosen);
@@ -100,6 +106,18 @@ MadeField make_field(const BlockSource& source, Eigenvalues mode) {
     if (current.shapes.empty()) break;
   }
   result.voxels = active_voxels(current.shapes);
+  find_resolution(current.shapes, result);
+  return result;
+}
+
+MadeField make_field(TensorGrid grid, Eigenvalues mode, const Interpolant& interpolant) {
+  MadeField result;
+  result.non_finite = remove_non_finite(grid);
+  const std::vector<BlockShape> shapes = grid.shapes();
+  result.voxels = active_voxels(shapes);
+  result.eigenvalues = apply_eigenvalues(grid, mode);
+  if (result.voxels > 0) result.field.emplace(std::move(grid), interpolant);
+  find_resolution(shapes, result);
   return result;
 }
 

@@ -42,15 +42,19 @@ void set_with_margin(openvdb::FloatGrid::Accessor& grid, const Voxels& box, cons
       for (int z = first.z(); z <= last.z(); ++z) grid.setValue({x, y, z}, value);
 }
 
-void add_brick(const TensorBrick& brick, const Vector3i& origin, const Voxels& box, Invariant which,
+void add_brick(const TensorField& field, const Vector3i& place, const Voxels& box, Invariant which,
                openvdb::FloatGrid::Accessor& grid) {
+  const Vector3i origin = TensorBrick::cells * place;
+  const TensorBrick brick = field.brick(place);
+  TensorSampler sampler(field);
   const Voxels own(origin, origin + Vector3i::Constant(TensorBrick::cells));
   const Voxels shared = own.intersection(box);
   for (int x = shared.min().x(); x <= shared.max().x(); ++x)
     for (int y = shared.min().y(); y <= shared.max().y(); ++y)
       for (int z = shared.min().z(); z <= shared.max().z(); ++z) {
         const Vector3i voxel(x, y, z), p = voxel - origin;
-        const Eigen::Matrix3d tensor = brick.tensor(TensorBrick::voxel(p.x(), p.y(), p.z()));
+        const Eigen::Matrix3d tensor = field.is_cubic() ? sampler.at(field.to_world() * voxel.cast<double>())
+                                                        : brick.tensor(TensorBrick::voxel(p.x(), p.y(), p.z()));
         set_with_margin(grid, box, voxel, as_float(invariant(which, tensor)));
       }
 }
@@ -65,8 +69,7 @@ openvdb::FloatGrid::Ptr invariant_grid(const TensorField& field, const Voxels& b
   for (int x = first.x(); x <= last.x(); ++x)
     for (int y = first.y(); y <= last.y(); ++y)
       for (int z = first.z(); z <= last.z(); ++z)
-        if (field.is_stored({x, y, z}))
-          add_brick(field.brick({x, y, z}), TensorBrick::cells * Vector3i(x, y, z), box, which, accessor);
+        if (field.is_stored({x, y, z})) add_brick(field, {x, y, z}, box, which, accessor);
   return grid;
 }
 

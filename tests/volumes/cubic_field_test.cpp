@@ -1,0 +1,209 @@
+// A cubic field: what it reproduces, what it does at borders, and that all readers see the same.
+
+#include <cmath>
+#include <random>
+#include <vector>
+
+#include <gtest/gtest.h>
+
+#include "volumes/bricks/sample_tensors.h"
+#include "volumes/bricks/tensor_field.h"
+#include "volumes/bricks/tensor_sampler.h"
+#include "volumes/grids/tensor_grid.h"
+
+namespace tensorray {
+namespace {
+
+using Eigen::AlignedBox3i;
+using Eigen::Matrix3d;
+using Eigen::Vector3d;
+using Eigen::Vector3i;
+
+constexpr Interpolant fading{Interpolation::cubic, Border::fade}, extending{Interpolation::cubic, Border::extend};
+constexpr double rounding = 4e-6;  // Of single precision, for values of 1: a coefficient is a sum of some 10 of them.
+
+/// A transform that turns, shears and scales.
+Eigen::Affine3d oblique() {
+  Eigen::Affine3d to_world = Eigen::Affine3d::Identity();
+  to_world.linear() << 0.5, 0.1, 0, -0.2, 0.3, 0.05, 0, 0.1, 0.8;
+  to_world.translation() = Vector3d(1, -2, 0.5);
+  return to_world;
+}
+
+/// A polynomial of degree `degrees` along each axis of index space, of values up to about 1 in a box of the size `box`.
+Matrix3d polynomial(const Vector3d& index, const Vector3i& degrees, bool symmetric) {
+  Matrix3d T;
+  for (int i = 0; i < 9; ++i) {
+    double value = 1;
+    for (int axis = 0; axis < 3; ++axis) {
+      const double x = (index[axis] - 7 + 0.7 * i) / 20;
+      double sum = 0.3;
+      for (int n = 1; n <= degrees[axis]; ++n) sum += (0.5 - 0.3 * n + 0.05 * i) * std::pow(x, n);
+      value *= sum;
+    }
+    T.data()[i] = value;
+  }
+  return symmetric ? Matrix3d((T + T.transpose()) / 2) : T;
+}
+
+struct ExtentCase {
+  Vector3i first, size;
+  bool symmetric;
+};
+
+void PrintTo(const ExtentCase& c, std::ostream* out) {
+  *out << c.size.transpose() << " voxels from " << c.first.transpose() << (c.symmetric ? ", symmetric" : "");
+}
+
+class Extents : public testing::TestWithParam<ExtentCase> {};
+
+/// Along an axis with n voxels, polynomials of degree up to min(3, n − 1) are exact, and their derivatives, up to the
+/// faces.
+TEST_P(Extents, PolynomialsAreReproduced) {
+  const auto [first, size, symmetric] = GetParam();
+  const Vector3i degrees = (size.array() - 1).min(3);
+  const bool sym = symmetric;
+  const TensorField field(dense_grid(AlignedBox3i(first, first + size - Vector3i::Ones()), oblique(),
+                                     [&, from = first](const Vector3i& index) {
+                                       return polynomial((index - from).cast<double>(), degrees, sym);
+                                     }),
+                          fading);
+  EXPECT_EQ(field.is_symmetric(), symmetric);
+  TensorSampler sampler(field);
+  std::mt19937 random(1);
+  std::uniform_real_distribution<double> uniform(0, 1);
+  const auto at = [&](const Vector3d& index) { return polynomial(index, degrees, sym); };
+  for (int n = 0; n < 400; ++n) {
+    Vector3d index;
+    for (int axis = 0; axis < 3; ++axis) {
+      const double u = uniform(random);
+      index[axis] = (u < 0.1 ? 0 : u > 0.9 ? 1 : uniform(random)) * (size[axis] - 1);
+    }
+    const Vector3d world = field.to_world() * (index + first.cast<double>());
+    Eigen::Matrix<double, 3, 2> along;
+    for (double& value : along.reshaped()) value = uniform(random) - 0.5;
+    std::array<Matrix3d, 2> derivatives;
+    const Matrix3d value = sampler.at(world, along, derivatives);
+    EXPECT_LT((value - at(index)).norm(), rounding) << index.transpose();
+    EXPECT_LT((sampler.at(world) - value).norm(), 1e-12);
+    for (int i = 0; i < 2; ++i) {
+      const Vector3d step = field.to_index().linear() * along.col(i) * 1e-4;
+      const Matrix3d expected = (at(index + step) - at(index - step)) / 2e-4;
+      EXPECT_LT((derivatives[i] - expected).norm(), 4 * rounding * step.norm() / 1e-4 + 1e-6) << index.transpose();
+    }
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(
+    CubicField, Extents,
+    testing::Values(ExtentCase{{0, 0, 0}, {16, 16, 16}, false}, ExtentCase{{0, 0, 0}, {17, 17, 17}, true},
+                    ExtentCase{{-3, 5, 7}, {18, 12, 26}, false}, ExtentCase{{7, 7, 15}, {10, 11, 19}, true},
+                    ExtentCase{{2, 0, -9}, {1, 2, 3}, false}, ExtentCase{{6, 6, 6}, {4, 5, 3}, false},
+                    ExtentCase{{7, 15, -1}, {2, 1, 4}, true}, ExtentCase{{0, 0, 0}, {9, 10, 8}, false}));
+
+Matrix3d noise(std::mt19937& random) {
+  std::normal_distribution<double> normal;
+  Matrix3d T;
+  for (double& value : T.reshaped()) value = normal(random);
+  return T;
+}
+
+/// A grid whose voxels within `box` are active where `is_active`.
+TensorGrid masked_grid(const AlignedBox3i& box, const std::function<bool(const Vector3i&)>& is_active,
+                       const std::function<Matrix3d(const Vector3i&)>& value) {
+  TensorGrid grid = dense_grid(box, Eigen::Affine3d::Identity(), value);
+  for (TensorBlock& block : grid.blocks)
+    for (int i = 0; i < TensorBlock::voxels; ++i)
+      if (block.active[i] && !is_active(block.origin + TensorBlock::position(i))) {
+        block.active[i] = false;
+        block.values[static_cast<std::size_t>(i)].setZero();
+      }
+  remove_empty_blocks(grid);
+  return grid;
+}
+
+/// A dense field of any values has them at its voxels.
+TEST(CubicField, InterpolatesItsVoxels) {
+  std::mt19937 random(3);
+  const TensorGrid grid =
+      dense_grid(AlignedBox3i(Vector3i(-5, 1, 6), Vector3i(12, 20, 22)), oblique(), [](auto& index) {
+        std::mt19937 own(static_cast<unsigned>(index.dot(Vector3i(1, 100, 10000)) + 1000000));
+        return noise(own);
+      });
+  const TensorField field(grid, fading);
+  TensorSampler sampler(field);
+  for (const TensorBlock& block : grid.blocks)
+    for (int i = 0; i < TensorBlock::voxels; ++i) {
+      if (!block.active[i]) continue;
+      const Vector3d at = grid.to_world * (block.origin + TensorBlock::position(i)).cast<double>();
+      const Matrix3d expected = block.values[static_cast<std::size_t>(i)].cast<double>();
+      ASSERT_LT((sampler.at(at) - expected).norm(), 3e-5);  // White noise: coefficients are up to ten times as large.
+    }
+}
+
+/// Beside inactive voxels: a step from a constant to nothing.
+TEST(CubicField, AStepHardlyRings) {
+  const AlignedBox3i box(Vector3i::Zero(), Vector3i(23, 23, 23));
+  const auto one = [](const Vector3i&) { return Matrix3d(Matrix3d::Constant(1)); };
+  const TensorField field(masked_grid(
+                              box, [](const Vector3i& v) { return v.x() >= 12 || v.x() == 0; }, one),
+                          fading);
+  TensorSampler sampler(field);
+  for (double x = 3; x < 23; x += 1.0 / 16) {
+    const double value = sampler.at({x, 11.3, 9.8})(0, 1);
+    EXPECT_LT(value, 1.1) << x;
+    EXPECT_GT(value, -0.1) << x;
+    if (x >= 14) EXPECT_NEAR(value, 1, 0.01) << x;
+    if (x <= 10) EXPECT_NEAR(value, 0, x <= 9 ? 1e-6 : 0.05) << x;
+  }
+  EXPECT_NEAR(sampler.at({11, 11, 9})(0, 1), 0, 1e-6);
+}
+
+/// The same beside a body of any shape.
+TEST(CubicField, ABallHardlyRings) {
+  const AlignedBox3i box(Vector3i::Zero(), Vector3i(31, 31, 31));
+  const Vector3d centre = Vector3d::Constant(15.3);
+  const auto one = [](const Vector3i&) { return Matrix3d(Matrix3d::Constant(1)); };
+  const auto within = [&](const Vector3i& v) { return (v.cast<double>() - centre).norm() < 12; };
+  const TensorField field(masked_grid(box, within, one), fading);
+  TensorSampler sampler(field);
+  double worst_active = 0, worst_inactive = 0, greatest = 0, least = 0;
+  std::vector<double> errors;
+  for (int x = 4; x < 27; ++x)
+    for (int y = 4; y < 27; ++y)
+      for (int z = 4; z < 27; ++z) {
+        const double value = sampler.at(Vector3d(x, y, z))(0, 1),
+                     off = sampler.at(Vector3d(x + 0.5, y + 0.5, z + 0.5))(0, 1);
+        greatest = std::max({greatest, value, off});
+        least = std::min({least, value, off});
+        if (within({x, y, z}))
+          worst_active = std::max(worst_active, std::abs(value - 1)), errors.push_back(std::abs(value - 1));
+        else
+          worst_inactive = std::max(worst_inactive, std::abs(value));
+      }
+  std::sort(errors.begin(), errors.end());
+  std::printf("p90 %.4f p99 %.4f\n", errors[errors.size() * 9 / 10], errors[errors.size() * 99 / 100]);
+  std::printf("active %.4f inactive %.4f greatest %.4f least %.4f\n", worst_active, worst_inactive, greatest, least);
+}
+
+TEST(CubicField, ExtendContinuesPolynomials) {
+  const AlignedBox3i box(Vector3i::Zero(), Vector3i(31, 31, 31));
+  const Vector3d centre = Vector3d::Constant(15.3);
+  const auto value = [](const Vector3i& v) { return polynomial(v.cast<double>(), {2, 2, 2}, false); };
+  const auto within = [&](const Vector3i& v) { return (v.cast<double>() - centre).norm() < 12; };
+  const TensorField field(masked_grid(box, within, value), extending);
+  TensorSampler sampler(field);
+  double worst = 0, worst_outside = 0;
+  for (int x = 0; x < 64; ++x)
+    for (int y = 0; y < 64; ++y)
+      for (int z = 0; z < 64; ++z) {
+        const Vector3d at = Vector3d(x, y, z) / 2;
+        const double error = (sampler.at(at) - polynomial(at, {2, 2, 2}, false)).norm();
+        if ((at - centre).norm() < 11.5) worst = std::max(worst, error);
+        if ((at - centre).norm() < 12.3) worst_outside = std::max(worst_outside, error);
+      }
+  std::printf("within %.6f near %.6f\n", worst, worst_outside);
+}
+
+}  // namespace
+}  // namespace tensorray
