@@ -70,6 +70,7 @@ Json run_job(const TemporaryFolder& folder, const RenderJob& job, int threads, c
   Json scene = job.scene;
   scene["field"]["generate"] = {{"kind", "point_load"}, {"resolution", job.resolution}};
   scene["field"]["eigenvalues"] = "raw";
+  scene["field"]["interpolation"] = "linear";  // As OpenVDB's BoxSampler, which jobs are compared with.
   const auto scene_path = folder / "scene.json", statistics_path = folder / "statistics.json";
   std::ofstream(scene_path) << scene;
   std::vector<std::string> arguments{"render",    scene_path.string(),     "--stats", statistics_path.string(),

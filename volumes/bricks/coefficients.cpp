@@ -5,6 +5,7 @@
 #include <cmath>
 #include <cstring>
 #include <tuple>
+#include <type_traits>
 
 #include <tbb/parallel_for.h>
 #include <tbb/parallel_sort.h>
@@ -218,8 +219,9 @@ struct Continued {
   Stored value;
 };
 
-/// (3 − √3) / 6: where all voxels of a half space have the value 1, this is that of the spline, whose coefficients beyond
-/// are zero, at the first voxel beyond. It falls to zero from there without a change of sign, and hardly rings within.
+/// (3 − √3) / 6: where all voxels of a half space have the value 1, this is that of the spline, whose coefficients
+/// beyond are zero, at the first voxel beyond. It falls to zero from there without a change of sign, and hardly rings
+/// within.
 constexpr float faded = 0.21132487f;
 
 /// The continuation to the voxel at `index`, if one leads there.
@@ -413,18 +415,55 @@ void solve_across(const CoefficientBricks& bricks, const Column& column, const R
   }
 }
 
+/// Copies the lines of a sheet of voxels, at x, to a buffer in which those of one z follow each other, or back.
+template <int components, bool back>
+void copy_sheet(const Column& column, int x, const CoefficientMemory& memory, float* buffer) {
+  constexpr int floats = components + 1;
+  const auto copy = [](float* voxel, float* place, std::size_t count) {
+    back ? std::memcpy(voxel, place, count * sizeof(float)) : std::memcpy(place, voxel, count * sizeof(float));
+  };
+  for (const std::uint32_t number : column.bricks) {
+    float* const brick = memory.brick(number);
+    for (int y = 0; y < edge; ++y) {
+      const int first = CubicBrick::coefficient(x, y, 0);
+      for (int z = 0; z < edge; ++z) {
+        float* const place = buffer + (z * edge + y) * floats;
+        copy(brick + CubicBrick::bending_offset(components, first + z), place, components);
+        copy(brick + CubicBrick::trailing_offset(components) + first + z, place + components, 1);
+      }
+    }
+    buffer += edge * edge * floats;
+  }
+}
+
+/// Solves the lines of a column along z: eight neighbours along y together where they have the same runs.
 template <int components>
 void solve_along_z(const CoefficientBricks& bricks, const Column& column, const Runs& runs,
                    const CoefficientMemory& memory) {
-  std::vector<float*> pointers;
-  for (int x = 0; x < edge; ++x)
-    for (int y = 0; y < edge; ++y)
-      solve_line<components, 1>(
-          column, runs, memory,
-          [&](int i) {
-            return is_set(bricks.filled[column.bricks[static_cast<std::size_t>(i / edge)]], x, y, i % edge);
-          },
-          [&](int i) { return CubicBrick::coefficient(x, y, i); }, pointers);
+  constexpr int floats = components + 1, all = edge * floats;
+  std::vector<float> buffer(static_cast<std::size_t>(runs.count * all));
+  std::vector<float*> pointers(static_cast<std::size_t>(runs.count));
+  const auto row = [&](int i, int x, int y) {
+    return bricks.filled[column.bricks[static_cast<std::size_t>(i)]][static_cast<std::size_t>(x * edge + y)];
+  };
+  for (int x = 0; x < edge; ++x) {
+    copy_sheet<components, false>(column, x, memory, buffer.data());
+    const auto solve = [&](auto width, int y, const auto& set) {
+      for (int i = 0; i < runs.count; ++i) pointers[static_cast<std::size_t>(i)] = buffer.data() + i * all + y * floats;
+      runs.visit(set, [&](int from, int length, bool continues_before, bool continues_after) {
+        solve_run<width.value>(pointers.data() + from, length, continues_before, continues_after);
+      });
+    };
+    bool same = true;
+    for (int i = 0; i < runs.count / edge && same; ++i)
+      for (int y = 1; y < edge && same; ++y) same = row(i, x, y) == row(i, x, 0);
+    const auto set_at = [&](int y) { return [&, y](int i) { return (row(i / edge, x, y) >> i % edge & 1) != 0; }; };
+    if (same)
+      solve(std::integral_constant<int, all>(), 0, set_at(0));
+    else
+      for (int y = 0; y < edge; ++y) solve(std::integral_constant<int, floats>(), y, set_at(y));
+    copy_sheet<components, true>(column, x, memory, buffer.data());
+  }
 }
 
 /// The bricks of the column that begins with a brick; none if another brick is before it.
@@ -517,23 +556,30 @@ void for_apron(const Visit& visit) {
   }
 }
 
-/// Copies the part of an apron from the block that it belongs to.
-void copy_part(const float* block, const Vector3i& offset, const Vector3i& first, const Vector3i& end, int components,
-               float* brick) {
-  const auto length = static_cast<std::size_t>(end.z() - first.z());
-  const Vector3i shift = edge * offset;
+/// Copies the part of an apron, `length` voxels along z, from the block that it belongs to.
+template <int components, int length>
+void copy_part_of(const float* block, const Vector3i& offset, const Vector3i& first, const Vector3i& end,
+                  float* brick) {
+  constexpr int trailing = CubicBrick::trailing_offset(components);
+  const int shift = CubicBrick::coefficient(edge * offset.x(), edge * offset.y(), edge * offset.z()) -
+                    CubicBrick::coefficient(0, 0, 0);
   for (int x = first.x(); x < end.x(); ++x)
     for (int y = first.y(); y < end.y(); ++y) {
-      const int to = CubicBrick::coefficient(x, y, first.z());
-      const int from = CubicBrick::coefficient(x - shift.x(), y - shift.y(), first.z() - shift.z());
-      const auto copy = [&](int target, int source, std::size_t count) {
-        std::memcpy(brick + target, block + source, count * sizeof(float));
-      };
-      const int trailing = CubicBrick::trailing_offset(components);
-      copy(CubicBrick::bending_offset(components, to), CubicBrick::bending_offset(components, from),
-           length * static_cast<std::size_t>(components));
-      copy(trailing + to, trailing + from, length);
+      const int to = CubicBrick::coefficient(x, y, first.z()), from = to - shift;
+      std::memcpy(brick + CubicBrick::bending_offset(components, to),
+                  block + CubicBrick::bending_offset(components, from), length * components * sizeof(float));
+      std::memcpy(brick + trailing + to, block + trailing + from, length * sizeof(float));
     }
+}
+
+template <int components>
+void copy_part(const float* block, const Vector3i& offset, const Vector3i& first, const Vector3i& end, float* brick) {
+  if (offset.z() < 0)
+    copy_part_of<components, CubicBrick::before>(block, offset, first, end, brick);
+  else if (offset.z() > 0)
+    copy_part_of<components, CubicBrick::width - edge - 1>(block, offset, first, end, brick);
+  else
+    copy_part_of<components, edge>(block, offset, first, end, brick);
 }
 
 /// Extrapolates the coefficients of a brick that are outside the extent.
@@ -556,43 +602,58 @@ void extrapolate(const Extrapolation& field, const Vector3i& place, std::size_t 
 
 }  // namespace
 
-void fill_aprons(const CoefficientBricks& bricks, const AlignedBox3i& extent, const CoefficientMemory& memory) {
+namespace {
+
+/// TensorBrick::strongest: a B-spline is a mean of its coefficients, so that none of its deviators is greater than
+/// theirs.
+template <int components>
+float strongest_of(const float* brick) {
+  const auto greatest = [&](auto number) {
+    using Number = decltype(number);
+    for (int i = 0; i < CubicBrick::coefficients; ++i) {
+      const float* const T = brick + CubicBrick::bending_offset(components, i);
+      const auto component = [&](int k) { return Number(T[TensorBrick::stored_component(components, k)]); };
+      Number squares = 0;
+      for (int k = 0; k < 8; ++k) squares += component(k) * component(k);
+      const Number trace = component(0) + component(4);
+      number = std::max(number, squares - trace * trace / 3);
+    }
+    return number;
+  };
+  constexpr float least = 1e-25f, most = 1e30f;  // Outside this range squares may underflow or overflow.
+  const float single = greatest(0.0f);
+  // Single precision errs by less than 2e-6 here, because the trace takes at most two thirds of the squares away.
+  const double squared = single > least && single < most ? double{single} : greatest(0.0);
+  return static_cast<float>(std::sqrt(squared) * (1 + 1.2e-5));  // Interpolation may round to slightly more.
+}
+
+template <int components>
+void finish_bricks_of(const CoefficientBricks& bricks, const AlignedBox3i& extent, const CoefficientMemory& memory,
+                      std::vector<float>& strongest) {
   const Extrapolation field{{bricks, bricks.filled}, extent, memory};
   tbb::parallel_for(std::size_t{0}, bricks.count, [&](std::size_t i) {
     make_room();
     const Vector3i& place = bricks.places[i];
     for_apron([&](const Vector3i& offset, const Vector3i& first, const Vector3i& end) {
       const std::uint32_t block = bricks.index.find(place + offset);
-      if (block != BrickIndex::missing)
-        copy_part(memory.brick(block), offset, first, end, memory.components, memory.brick(i));
+      if (block != BrickIndex::missing) copy_part<components>(memory.brick(block), offset, first, end, memory.brick(i));
     });
     const AlignedBox3i covered(edge * place - Vector3i::Ones(), edge * place + Vector3i::Constant(edge + 1));
     if (!extent.contains(covered)) extrapolate(field, place, i);
+    strongest[i] = strongest_of<components>(memory.brick(i));
   });
-}
-
-namespace {
-
-template <int components>
-float strongest_of(const float* brick) {
-  double greatest = 0;
-  for (int i = 0; i < CubicBrick::coefficients; ++i) {
-    const float* const T = brick + CubicBrick::bending_offset(components, i);
-    const auto component = [&](int k) { return double{T[TensorBrick::stored_component(components, k)]}; };
-    double squares = 0;
-    for (int k = 0; k < 8; ++k) squares += component(k) * component(k);
-    const double trace = component(0) + component(4);
-    greatest = std::max(greatest, squares - trace * trace / 3);
-  }
-  // Rounded up, because interpolation may round to slightly more than any coefficient.
-  return static_cast<float>(std::sqrt(greatest) * (1 + 1.2e-5));
 }
 
 }  // namespace
 
-float strongest_coefficient(const float* brick, int components) {
-  return components == TensorBrick::symmetric ? strongest_of<TensorBrick::symmetric>(brick)
-                                              : strongest_of<TensorBrick::general>(brick);
+std::vector<float> finish_bricks(const CoefficientBricks& bricks, const AlignedBox3i& extent,
+                                 const CoefficientMemory& memory) {
+  std::vector<float> strongest(bricks.count);
+  if (memory.components == TensorBrick::symmetric)
+    finish_bricks_of<TensorBrick::symmetric>(bricks, extent, memory, strongest);
+  else
+    finish_bricks_of<TensorBrick::general>(bricks, extent, memory, strongest);
+  return strongest;
 }
 
 void widen_coefficients(const float* symmetric, float* general) {

@@ -65,11 +65,8 @@ void make_coefficients(const CoefficientBricks& bricks, const Eigen::AlignedBox3
                        const CoefficientMemory& memory);
 
 /// Copies to each of the first bricks the coefficients of others that its cells need, and extrapolates those that are
-/// outside the extent.
-void fill_aprons(const CoefficientBricks& bricks, const Eigen::AlignedBox3i& extent, const CoefficientMemory& memory);
-
-/// TensorBrick::strongest: a B-spline is a mean of its coefficients, so that none of its deviators is greater than
-/// theirs.
-float strongest_coefficient(const float* brick, int components);
+/// outside the extent. @return TensorBrick::strongest of these bricks.
+std::vector<float> finish_bricks(const CoefficientBricks& bricks, const Eigen::AlignedBox3i& extent,
+                                 const CoefficientMemory& memory);
 
 }  // namespace tensorray

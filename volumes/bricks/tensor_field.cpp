@@ -120,8 +120,11 @@ double TensorField::make_linear_bricks(const BlockTable& table, const Eigen::Ali
     if (share) shares[i] = *share;
     return share.has_value();
   });
-  set_strongest(
-      [&](std::size_t i) { return strongest_deviator(table, shares, bricks_[i], brick_at(floats_of(i), 0)); });
+  std::vector<float> strongest(bricks_.size());
+  tbb::parallel_for(std::size_t{0}, bricks_.size(), [&](std::size_t i) {
+    strongest[i] = strongest_deviator(table, shares, bricks_[i], brick_at(floats_of(i), 0));
+  });
+  index_.set_values(strongest);
   double norm = 0;
   for (const BlockShare& share : shares) norm = std::max(norm, share.norm);
   return norm;
@@ -141,19 +144,10 @@ double TensorField::make_cubic_bricks(const BlockTable& table, const Eigen::Alig
   const CoefficientMemory memory{floats_.get(), brick_floats_, components_};
   continue_values(coefficients, interpolant_.border, memory);
   make_coefficients(coefficients, active, interpolant_.border, memory);
-  fill_aprons(coefficients, active, memory);
+  const std::vector<float> strongest = finish_bricks(coefficients, active, memory);
   keep_bricks(coefficients.count);
-  set_strongest([&](std::size_t i) { return strongest_coefficient(floats_of(i), components_); });
-  return norms.empty() ? 0 : *std::max_element(norms.begin(), norms.end());
-}
-
-void TensorField::set_strongest(const std::function<float(std::size_t)>& strongest_of) {
-  std::vector<float> strongest(bricks_.size());
-  tbb::parallel_for(std::size_t{0}, bricks_.size(), [&](std::size_t i) {
-    make_room();
-    strongest[i] = strongest_of(i);
-  });
   index_.set_values(strongest);
+  return norms.empty() ? 0 : *std::max_element(norms.begin(), norms.end());
 }
 
 /// Fills the bricks. They store symmetric tensors until the first block comes that has others. Its part is then placed

@@ -144,7 +144,6 @@ class TensorField {
   void widen(bool keep);
   void allocate(int components);
   void keep_bricks(std::size_t count);
-  void set_strongest(const std::function<float(std::size_t)>& strongest_of);
   float* floats_of(std::size_t index) const { return floats_.get() + index * brick_floats_; }
   TensorBrick brick_at(const float* floats, float strongest) const {
     return {floats, floats + trailing_offset_, strongest, components_};
