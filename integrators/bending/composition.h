@@ -2,6 +2,8 @@
 /// @file integrators/bending/composition.h
 /// Coefficients of `splitting4`, and the path between its steps, for both tracers.
 
+#include <cmath>
+
 namespace tensorray {
 
 /// The symmetric composition of order 4 with six kicks, S6, of S. Blanes and P. C. Moan (Practical symplectic
@@ -34,9 +36,15 @@ inline constexpr Composition splitting4_method = [] {
   return m;
 }();
 
-/// Long steps are divided into chords of this length, voxels, where the path between their ends matters: for surfaces
-/// that light may meet, and where paths are recorded.
-constexpr double chord_length = 0.5;
+/// Where paths are recorded, steps are divided into pieces of this length, voxels.
+constexpr double piece_length = 1;
+
+/// Number of chords that stay within 0.02 voxels of the path, for surfaces that light may meet.
+/// @param length, turn  Of the step: voxels, and the distance of the directions at its ends.
+inline int chords_of(double length, double turn) {
+  const double squares = length * turn / 8 / 0.02;
+  return squares < 1 ? 1 : squares < 1024 ? static_cast<int>(std::ceil(std::sqrt(squares))) : 32;
+}
 
 /// Weights, at the part t of a step of length h, of its two ends' positions and, times h, directions: a cubic, whose
 /// error is a hundredth of that of a chord in steps of two voxels, and falls with h⁴.

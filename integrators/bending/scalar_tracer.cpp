@@ -141,17 +141,17 @@ Eigen::Vector3d Tracer<N>::between(const State<N>& next, double h, double t) con
          h * w.to_direction * next.direction();
 }
 
-/// Number of chords that a step is divided into: steps of `splitting4` may be long.
+/// Number of pieces of a step that are recorded: steps of `splitting4` may be long.
 template <int N>
-int Tracer<N>::chord_count(double h) const {
-  return is_composed() ? std::max(1, static_cast<int>(std::ceil(h / voxel_ / chord_length - 1e-3))) : 1;
+int Tracer<N>::piece_count(double h) const {
+  return is_composed() ? std::max(1, static_cast<int>(std::ceil(h / voxel_ / piece_length - 1e-3))) : 1;
 }
 
 /// Records the path between the ray and `next`.
 template <int N>
 void Tracer<N>::record_inner(const State<N>& next, double h) {
   if (!recording_.track && !recording_.points) return;
-  const int count = chord_count(h);
+  const int count = piece_count(h);
   for (int i = 1; i < count; ++i) {
     const double t = double(i) / count;
     const PathWeights w = path_slopes(t);
@@ -197,7 +197,7 @@ typename Tracer<N>::Event Tracer<N>::meet(const Eigen::Vector3d& from, const Eig
 /// What the step from the ray to `next` meets first, on the chords that it is divided into.
 template <int N>
 typename Tracer<N>::Event Tracer<N>::meet(const State<N>& next, double h, Landing& landing) const {
-  const int count = chord_count(h);
+  const int count = is_composed() ? chords_of(h / voxel_, (next.direction() - direction()).norm()) : 1;
   const double part = h / count;
   const Eigen::Vector3d start = position();
   Eigen::Vector3d from = start;
@@ -230,7 +230,7 @@ double Tracer<N>::land(double h, const Landing& landing) {
     const double gap =
         (landing.to_plane - hit.normal.dot(landed.position() - start)) / hit.normal.dot(landed.direction());
     if (!(std::abs(gap) <= h)) break;  // The light is nearly parallel to the plane.
-    if (std::abs(gap) <= 1e-10 * h || i == 3) {
+    if (std::abs(gap) <= (is_composed() ? 1e-5 : 1e-10) * h || i == 3) {
       landed.P += gap * landed.V;
       length += gap;
       break;

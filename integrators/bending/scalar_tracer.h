@@ -109,7 +109,7 @@ class Tracer {
   bool is_composed() const { return settings_.method == BendingMethod::splitting4; }
   bool is_controlled() const;
   Eigen::Vector3d between(const State<N>& next, double h, double t) const;
-  int chord_count(double h) const;
+  int piece_count(double h) const;
   void record_inner(const State<N>& next, double h);
   Event meet(const Eigen::Vector3d& from, const Eigen::Vector3d& to, Hit& hit) const;
   Event meet(const State<N>& next, double h, Landing& landing) const;

@@ -96,6 +96,15 @@ HWY_INLINE F3 apply(const Tensor& T, const F3& v) {
           hn::MulAdd(T.c[5], v.y, hn::Mul(T.c[2], v.x))};
 }
 
+/// Whether all lanes of a vector are in one cell.
+HWY_INLINE bool in_one_cell(const Packet& packet, int first) {
+  Mask same = hn::Eq(load(packet.voxel, first), set(packet.voxel[first]));
+  if (!packet.one_brick && hn::AllTrue(floats, same))
+    for (const auto& brick : packet.brick)
+      same = hn::And(same, hn::RebindMask(floats, hn::Eq(hn::Load(ints, brick + first), hn::Set(ints, brick[first]))));
+  return hn::AllTrue(floats, same);
+}
+
 /// The corners of a cell: offsets from its first voxel, in voxels. z changes first, then y, then x.
 constexpr int corners[8] = {TensorBrick::voxel(0, 0, 0), TensorBrick::voxel(0, 0, 1), TensorBrick::voxel(0, 1, 0),
                             TensorBrick::voxel(0, 1, 1), TensorBrick::voxel(1, 0, 0), TensorBrick::voxel(1, 0, 1),

@@ -90,9 +90,9 @@ HWY_INLINE void end_composed(const PacketMedium& medium, Packet& packet, const C
         store(load(step.dv[k], i), packet.dv_next[k], i);
       }
     if (!medium.adaptive) continue;
-    const F3 error = index_direction<uniform>(medium, load(step.error, i));
-    const F voxels = hn::Mul(load(packet.time, i), hn::Sqrt(dot(error, error)));
-    store(hn::Mul(voxels, set(1 / medium.settings.tolerance)), packet.excess, i);
+    const F3 error = load(step.error, i), u = load(packet.u, i);
+    const F voxels = hn::Sqrt(uniform ? dot(error, error) : hn::Mul(dot(error, error), dot(u, u)));
+    store(hn::Mul(hn::Mul(load(packet.time, i), voxels), set(1 / medium.settings.tolerance)), packet.excess, i);
   }
 }
 

@@ -57,6 +57,7 @@ class Kernel {
   void keep_inner_points(const Packet& packet, std::uint32_t which);
   std::array<float, 3> direction_between(const Packet& packet, int lane, double t) const;
   std::uint32_t outside_between(const Packet& packet) const;
+  double length_of_step(const Packet& packet, int lane) const;
   int chord_count(const Packet& packet, int lane) const;
   void chord_ends(const Packet& packet, int lane, int i, int count, double (&from)[3], double (&to)[3]) const;
   bool meets_surface(const Packet& packet, int lane) const;
@@ -194,17 +195,25 @@ HWY_NOINLINE std::uint32_t Kernel<Bricks, uniform, differentials, changes>::outs
   return result;
 }
 
-/// Number of chords that the step of a lane is divided into.
+/// Length of a lane's step, voxels.
+template <class Bricks, bool uniform, bool differentials, bool changes>
+double Kernel<Bricks, uniform, differentials, changes>::length_of_step(const Packet& packet, int lane) const {
+  if (uniform) return packet.time[lane];
+  double squares = 0;
+  for (const auto& u : packet.u) squares += double{u[lane]} * u[lane];
+  return packet.time[lane] * std::sqrt(squares);
+}
+
+/// Number of chords that stand for the step of a lane where it may meet surfaces.
 template <class Bricks, bool uniform, bool differentials, bool changes>
 int Kernel<Bricks, uniform, differentials, changes>::chord_count(const Packet& packet, int lane) const {
   if (!is_composed()) return 1;
-  float squares = 1;
-  if constexpr (!uniform) {
-    squares = 0;
-    for (const auto& u : packet.u) squares += u[lane] * u[lane];
+  double squares = 0;
+  for (int axis = 0; axis < 3; ++axis) {
+    const double turn = packet.v_next[axis][lane] - packet.v[axis][lane];
+    squares += turn * turn;
   }
-  const float voxels = packet.time[lane] * std::sqrt(squares);
-  return std::max(1, static_cast<int>(std::ceil(voxels / static_cast<float>(chord_length) - 1e-3f)));
+  return chords_of(length_of_step(packet, lane), std::sqrt(squares));
 }
 
 /// The ends of chord i of a lane's step, in index space.
@@ -358,7 +367,7 @@ HWY_NOINLINE void Kernel<Bricks, uniform, differentials, changes>::keep_inner_po
                                                                                      std::uint32_t which) {
   for (std::uint32_t rest = which; rest != 0; rest &= rest - 1) {
     const int lane = static_cast<int>(hwy::Num0BitsBelowLS1Bit_Nonzero32(rest));
-    const int count = chord_count(packet, lane);
+    const int count = static_cast<int>(std::ceil(length_of_step(packet, lane) / piece_length - 1e-3));
     for (int n = 1; n < count; ++n) {
       const double t = double(n) / count;
       double from[3], to[3];

@@ -55,19 +55,6 @@ constexpr int row_stride = CubicBrick::bending_offset(components, CubicBrick::wi
 template <int components>
 constexpr int sheet_stride = row_stride<components>* CubicBrick::width;
 
-/// Asks for the coefficients about a lane.
-template <int components>
-HWY_INLINE void prefetch_spline(const float* first) {
-  constexpr int row = 4 * components;  // Floats.
-  for (int x = 0; x < 4; ++x)
-    for (int y = 0; y < 4; ++y) {
-      const float* const along = first + x * sheet_stride<components> + y * row_stride<components>;
-      hwy::Prefetch(along);
-      hwy::Prefetch(along + 16);
-      if (row > 32) hwy::Prefetch(along + row - 1);
-    }
-}
-
 using V8 = hn::Vec<Eight>;
 
 /// Four coefficients along z, or four sums of such, each in a vector of `eight_lanes` components.
@@ -86,13 +73,16 @@ HWY_INLINE V8 along_z(const Four& sums, const float (&weights)[4][lanes], int la
                     hn::MulAdd(weight(1), sums.z[1], hn::MulAdd(weight(2), sums.z[2], hn::Mul(weight(3), sums.z[3]))));
 }
 
-/// Components `c` and following of a lane's tensor: the sums along y, then x, then z.
+// The sums along y, then x, then z. The operations of a lane and their order are the same in all functions below, and
+// so are the results, bit for bit.
+
+/// Sums of coefficients along y and x: a vector for each z. @param first  Of components `c` and following.
 template <int components>
-HWY_INLINE V8 spline_value(const float* first, const SplineWeights& weights, int lane, int c) {
+HWY_INLINE Four sum_sheets(const float* first, const SplineWeights& weights, int lane) {
   Four sums = four_zeros();
 #pragma GCC unroll 4
   for (int x = 0; x < 4; ++x) {
-    const float* const sheet = first + x * sheet_stride<components> + c;
+    const float* const sheet = first + x * sheet_stride<components>;
     Four lines = four_zeros();
 #pragma GCC unroll 4
     for (int y = 0; y < 4; ++y) {
@@ -106,7 +96,105 @@ HWY_INLINE V8 spline_value(const float* first, const SplineWeights& weights, int
 #pragma GCC unroll 4
     for (int z = 0; z < 4; ++z) sums.z[z] = hn::MulAdd(weight, lines.z[z], sums.z[z]);
   }
-  return along_z(sums, weights.value[2], lane);
+  return sums;
+}
+
+#if HWY_ARCH_X86 && HWY_TARGET <= HWY_AVX3
+/// The same with vectors of 16 numbers, of two coefficients with eight components.
+HWY_INLINE Four sum_wide_sheets(const float* first, const SplineWeights& weights, int lane) {
+  constexpr int components = TensorBrick::general;
+  F near = hn::Zero(floats), far = near;
+#pragma GCC unroll 4
+  for (int x = 0; x < 4; ++x) {
+    const float* const sheet = first + x * sheet_stride<components>;
+    F near_line = hn::Zero(floats), far_line = near_line;
+#pragma GCC unroll 4
+    for (int y = 0; y < 4; ++y) {
+      const F weight = set(weights.value[1][y][lane]);
+      const float* const row = sheet + y * row_stride<components>;
+      near_line = hn::MulAdd(weight, hn::LoadU(floats, row), near_line);
+      far_line = hn::MulAdd(weight, hn::LoadU(floats, row + 16), far_line);
+    }
+    const F weight = set(weights.value[0][x][lane]);
+    near = hn::MulAdd(weight, near_line, near);
+    far = hn::MulAdd(weight, far_line, far);
+  }
+  return {
+      {hn::LowerHalf(eight, near), hn::UpperHalf(eight, near), hn::LowerHalf(eight, far), hn::UpperHalf(eight, far)}};
+}
+
+/// The same of three coefficients with five components, and one more.
+HWY_INLINE Four sum_wide_symmetric_sheets(const float* first, const SplineWeights& weights, int lane) {
+  constexpr int components = TensorBrick::symmetric;
+  F three = hn::Zero(floats);
+  V8 last = hn::Zero(eight);
+#pragma GCC unroll 4
+  for (int x = 0; x < 4; ++x) {
+    const float* const sheet = first + x * sheet_stride<components>;
+    F three_lines = hn::Zero(floats);
+    V8 last_line = hn::Zero(eight);
+#pragma GCC unroll 4
+    for (int y = 0; y < 4; ++y) {
+      const F weight = set(weights.value[1][y][lane]);
+      const float* const row = sheet + y * row_stride<components>;
+      three_lines = hn::MulAdd(weight, hn::LoadU(floats, row), three_lines);
+      last_line = hn::MulAdd(hn::LowerHalf(eight, weight), hn::LoadU(eight, row + 3 * components), last_line);
+    }
+    const F weight = set(weights.value[0][x][lane]);
+    three = hn::MulAdd(weight, three_lines, three);
+    last = hn::MulAdd(hn::LowerHalf(eight, weight), last_line, last);
+  }
+  alignas(64) constexpr std::int32_t from[2][16] = {{5, 6, 7, 8, 9, 5, 5, 5, 5, 5, 5, 5, 5, 5, 5, 5},
+                                                    {10, 11, 12, 13, 14, 5, 5, 5, 5, 5, 5, 5, 5, 5, 5, 5}};
+  const auto moved = [&](int i) HWY_ATTR {
+    return hn::LowerHalf(eight, hn::TableLookupLanes(three, hn::SetTableIndices(floats, from[i])));
+  };
+  return {{hn::LowerHalf(eight, three), moved(0), moved(1), last}};
+}
+#endif
+
+/// Components `c` and following of a lane's tensor.
+template <int components>
+HWY_INLINE V8 spline_value(const float* first, const SplineWeights& weights, int lane, int c) {
+  const auto sums = [&]() HWY_ATTR {
+#if HWY_ARCH_X86 && HWY_TARGET <= HWY_AVX3
+    return components == TensorBrick::general ? sum_wide_sheets(first + c, weights, lane)
+                                              : sum_wide_symmetric_sheets(first + c, weights, lane);
+#else
+    return sum_sheets<components>(first + c, weights, lane);
+#endif
+  };
+  return along_z(sums(), weights.value[2], lane);
+}
+
+/// Samples the tensors of a vector whose lanes are all in one cell. Each coefficient is loaded once, and copied to all
+/// lanes.
+template <int components>
+HWY_INLINE void sample_spline_cell(Packet& packet, int at) {
+  SplineWeights weights;
+  find_weights<false>(packet, at, weights);
+  const float* const first = first_coefficient<components>(packet, at);
+  const auto weight = [&](int axis, int k) HWY_ATTR { return hn::Load(floats, weights.value[axis][k]); };
+  for (int c = 0; c < components; ++c) {
+    F sums[4];
+#pragma GCC unroll 4
+    for (int z = 0; z < 4; ++z) {
+      F sum = hn::Zero(floats);
+#pragma GCC unroll 4
+      for (int x = 0; x < 4; ++x) {
+        const float* const line = first + x * sheet_stride<components> + z * components + c;
+        F along_y = hn::Zero(floats);
+#pragma GCC unroll 4
+        for (int y = 0; y < 4; ++y) along_y = hn::MulAdd(weight(1, y), set(line[y * row_stride<components>]), along_y);
+        sum = hn::MulAdd(weight(0, x), along_y, sum);
+      }
+      sums[z] = sum;
+    }
+    const F value = hn::MulAdd(
+        weight(2, 0), sums[0],
+        hn::MulAdd(weight(2, 1), sums[1], hn::MulAdd(weight(2, 2), sums[2], hn::Mul(weight(2, 3), sums[3]))));
+    store(value, packet.tensor[c], at);
+  }
 }
 
 /// The same with the slopes.
@@ -179,6 +267,8 @@ HWY_INLINE void sample_splines(Packet& packet) {
   for (int i = 0; i < packet.vectors * lanes; i += lanes) {
     if constexpr (differentials)
       sample_spline_slopes<components>(packet, i);
+    else if (in_one_cell(packet, i))
+      sample_spline_cell<components>(packet, i);
     else
       sample_spline<components>(packet, i);
   }

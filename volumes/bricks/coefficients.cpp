@@ -227,13 +227,13 @@ constexpr float faded = 0.21132487f;
 /// The continuation to the voxel at `index`, if one leads there.
 void continue_to(const Vector3i& index, const VoxelReader& known, Border border, const CoefficientMemory& memory,
                  Continued& to) {
-  const int longest = border == Border::extend ? 3 : 1;
+  const int longest = border == Border::extend ? 2 : 1;
   int most = 0, count = 0;
   Stored sum = Stored::Zero();
   for (int direction = 0; direction < 6; ++direction) {
     Vector3i along = Vector3i::Zero();
     along[direction / 2] = direction % 2 ? 1 : -1;
-    Stored values[3];
+    Stored values[2];
     int length = 0;
     for (; length < longest; ++length) {
       const auto voxel = known.find(index + (length + 1) * along);
@@ -246,9 +246,7 @@ void continue_to(const Vector3i& index, const VoxelReader& known, Border border,
       count = 0;
       sum.setZero();
     }
-    sum += length == 3   ? Stored(3 * (values[0] - values[1]) + values[2])
-           : length == 2 ? Stored(2 * values[0] - values[1])
-                         : values[0];
+    sum += length == 2 ? Stored(2 * values[0] - values[1]) : values[0];
     ++count;
   }
   to.is_known = count > 0;

@@ -54,7 +54,7 @@ std::optional<double> place_values(const TensorBlock& block, int components, flo
 void widen_coefficients(const float* symmetric, float* general);
 
 /// Continues the values of the active voxels to the others that have coefficients, as the mean of all axes that lead to
-/// a voxel: with `extend` by a parabola through three voxels, or by what fewer voxels allow; with `fade` a fifth of the
+/// a voxel: with `extend` by a line through two voxels, or the value of a single one; with `fade` a fifth of the
 /// neighbour's value.
 void continue_values(const CoefficientBricks& bricks, Border border, const CoefficientMemory& memory);
 
