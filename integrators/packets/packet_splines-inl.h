@@ -57,15 +57,72 @@ constexpr int sheet_stride = row_stride<components>* CubicBrick::width;
 
 using V8 = hn::Vec<Eight>;
 
-/// Four coefficients along z, or four sums of such, each in a vector of `eight_lanes` components.
+/// Components of four coefficients along z, or of sums of such.
 struct Four {
   V8 z[4];
 };
 
-HWY_INLINE Four four_zeros() {
+// A row is four coefficients along z as they are loaded: in four vectors, or with AVX-512 in two, of two coefficients
+// with eight components, or of three with five and the last one.
+
+#if HWY_ARCH_X86 && HWY_TARGET <= HWY_AVX3
+struct Row {
+  F near, far;
+};
+
+HWY_INLINE Row empty_row() { return {hn::Zero(floats), hn::Zero(floats)}; }
+
+template <int components>
+HWY_INLINE Row load_row(const float* from) {
+  return {hn::LoadU(floats, from),
+          hn::LoadU(floats, from + (components == TensorBrick::general ? 16 : 3 * components))};
+}
+
+HWY_INLINE Row add_row(float weight, const Row& row, const Row& to) {
+  const F w = set(weight);
+  return {hn::MulAdd(w, row.near, to.near), hn::MulAdd(w, row.far, to.far)};
+}
+
+template <int components>
+HWY_INLINE Four four_of(const Row& row) {
+  const auto lower = [](F v) HWY_ATTR { return hn::LowerHalf(eight, v); };
+  if constexpr (components == TensorBrick::general)
+    return {{lower(row.near), hn::UpperHalf(eight, row.near), lower(row.far), hn::UpperHalf(eight, row.far)}};
+  alignas(64) constexpr std::int32_t from[2][16] = {{5, 6, 7, 8, 9, 5, 5, 5, 5, 5, 5, 5, 5, 5, 5, 5},
+                                                    {10, 11, 12, 13, 14, 5, 5, 5, 5, 5, 5, 5, 5, 5, 5, 5}};
+  const auto moved = [&](int i) HWY_ATTR {
+    return lower(hn::TableLookupLanes(row.near, hn::SetTableIndices(floats, from[i])));
+  };
+  return {{lower(row.near), moved(0), moved(1), lower(row.far)}};
+}
+#else
+using Row = Four;
+
+HWY_INLINE Row empty_row() {
   const V8 zero = hn::Zero(eight);
   return {{zero, zero, zero, zero}};
 }
+
+template <int components>
+HWY_INLINE Row load_row(const float* from) {
+  const auto at = [&](int z) HWY_ATTR { return hn::LoadU(eight, from + z * components); };
+  return {{at(0), at(1), at(2), at(3)}};
+}
+
+HWY_INLINE Row add_row(float weight, const Row& row, const Row& to) {
+  const V8 w = hn::Set(eight, weight);
+  const auto sum = [&](int z) HWY_ATTR { return hn::MulAdd(w, row.z[z], to.z[z]); };
+  return {{sum(0), sum(1), sum(2), sum(3)}};
+}
+
+template <int components>
+HWY_INLINE Four four_of(const Row& row) {
+  return row;
+}
+#endif
+
+// The sums along y, then x, then z. The operations of a lane and their order are the same in all functions below, and
+// so are the results, bit for bit.
 
 HWY_INLINE V8 along_z(const Four& sums, const float (&weights)[4][lanes], int lane) {
   const auto weight = [&](int k) HWY_ATTR { return hn::Set(eight, weights[k][lane]); };
@@ -73,98 +130,43 @@ HWY_INLINE V8 along_z(const Four& sums, const float (&weights)[4][lanes], int la
                     hn::MulAdd(weight(1), sums.z[1], hn::MulAdd(weight(2), sums.z[2], hn::Mul(weight(3), sums.z[3]))));
 }
 
-// The sums along y, then x, then z. The operations of a lane and their order are the same in all functions below, and
-// so are the results, bit for bit.
-
-/// Sums of coefficients along y and x: a vector for each z. @param first  Of components `c` and following.
+/// Components of a lane's tensor. @param first  Its first coefficient, from the first of these components on.
 template <int components>
-HWY_INLINE Four sum_sheets(const float* first, const SplineWeights& weights, int lane) {
-  Four sums = four_zeros();
+HWY_INLINE V8 spline_value(const float* first, const SplineWeights& weights, int lane) {
+  Row sums = empty_row();
 #pragma GCC unroll 4
   for (int x = 0; x < 4; ++x) {
-    const float* const sheet = first + x * sheet_stride<components>;
-    Four lines = four_zeros();
+    Row lines = empty_row();
 #pragma GCC unroll 4
-    for (int y = 0; y < 4; ++y) {
-      const V8 weight = hn::Set(eight, weights.value[1][y][lane]);
-#pragma GCC unroll 4
-      for (int z = 0; z < 4; ++z)
-        lines.z[z] =
-            hn::MulAdd(weight, hn::LoadU(eight, sheet + y * row_stride<components> + z * components), lines.z[z]);
-    }
-    const V8 weight = hn::Set(eight, weights.value[0][x][lane]);
-#pragma GCC unroll 4
-    for (int z = 0; z < 4; ++z) sums.z[z] = hn::MulAdd(weight, lines.z[z], sums.z[z]);
+    for (int y = 0; y < 4; ++y)
+      lines = add_row(weights.value[1][y][lane],
+                      load_row<components>(first + x * sheet_stride<components> + y * row_stride<components>), lines);
+    sums = add_row(weights.value[0][x][lane], lines, sums);
   }
-  return sums;
+  return along_z(four_of<components>(sums), weights.value[2], lane);
 }
 
-#if HWY_ARCH_X86 && HWY_TARGET <= HWY_AVX3
-/// The same with vectors of 16 numbers, of two coefficients with eight components.
-HWY_INLINE Four sum_wide_sheets(const float* first, const SplineWeights& weights, int lane) {
-  constexpr int components = TensorBrick::general;
-  F near = hn::Zero(floats), far = near;
-#pragma GCC unroll 4
-  for (int x = 0; x < 4; ++x) {
-    const float* const sheet = first + x * sheet_stride<components>;
-    F near_line = hn::Zero(floats), far_line = near_line;
-#pragma GCC unroll 4
-    for (int y = 0; y < 4; ++y) {
-      const F weight = set(weights.value[1][y][lane]);
-      const float* const row = sheet + y * row_stride<components>;
-      near_line = hn::MulAdd(weight, hn::LoadU(floats, row), near_line);
-      far_line = hn::MulAdd(weight, hn::LoadU(floats, row + 16), far_line);
-    }
-    const F weight = set(weights.value[0][x][lane]);
-    near = hn::MulAdd(weight, near_line, near);
-    far = hn::MulAdd(weight, far_line, far);
-  }
-  return {
-      {hn::LowerHalf(eight, near), hn::UpperHalf(eight, near), hn::LowerHalf(eight, far), hn::UpperHalf(eight, far)}};
-}
-
-/// The same of three coefficients with five components, and one more.
-HWY_INLINE Four sum_wide_symmetric_sheets(const float* first, const SplineWeights& weights, int lane) {
-  constexpr int components = TensorBrick::symmetric;
-  F three = hn::Zero(floats);
-  V8 last = hn::Zero(eight);
-#pragma GCC unroll 4
-  for (int x = 0; x < 4; ++x) {
-    const float* const sheet = first + x * sheet_stride<components>;
-    F three_lines = hn::Zero(floats);
-    V8 last_line = hn::Zero(eight);
-#pragma GCC unroll 4
-    for (int y = 0; y < 4; ++y) {
-      const F weight = set(weights.value[1][y][lane]);
-      const float* const row = sheet + y * row_stride<components>;
-      three_lines = hn::MulAdd(weight, hn::LoadU(floats, row), three_lines);
-      last_line = hn::MulAdd(hn::LowerHalf(eight, weight), hn::LoadU(eight, row + 3 * components), last_line);
-    }
-    const F weight = set(weights.value[0][x][lane]);
-    three = hn::MulAdd(weight, three_lines, three);
-    last = hn::MulAdd(hn::LowerHalf(eight, weight), last_line, last);
-  }
-  alignas(64) constexpr std::int32_t from[2][16] = {{5, 6, 7, 8, 9, 5, 5, 5, 5, 5, 5, 5, 5, 5, 5, 5},
-                                                    {10, 11, 12, 13, 14, 5, 5, 5, 5, 5, 5, 5, 5, 5, 5, 5}};
-  const auto moved = [&](int i) HWY_ATTR {
-    return hn::LowerHalf(eight, hn::TableLookupLanes(three, hn::SetTableIndices(floats, from[i])));
-  };
-  return {{hn::LowerHalf(eight, three), moved(0), moved(1), last}};
-}
-#endif
-
-/// Components `c` and following of a lane's tensor.
+/// The same with the slopes.
 template <int components>
-HWY_INLINE V8 spline_value(const float* first, const SplineWeights& weights, int lane, int c) {
-  const auto sums = [&]() HWY_ATTR {
-#if HWY_ARCH_X86 && HWY_TARGET <= HWY_AVX3
-    return components == TensorBrick::general ? sum_wide_sheets(first + c, weights, lane)
-                                              : sum_wide_symmetric_sheets(first + c, weights, lane);
-#else
-    return sum_sheets<components>(first + c, weights, lane);
-#endif
-  };
-  return along_z(sums(), weights.value[2], lane);
+HWY_INLINE Slopes<V8> spline_slopes(const float* first, const SplineWeights& weights, int lane) {
+  Row sums = empty_row(), by_x = sums, by_y = sums;
+#pragma GCC unroll 4
+  for (int x = 0; x < 4; ++x) {
+    Row lines = empty_row(), slopes = lines;
+#pragma GCC unroll 4
+    for (int y = 0; y < 4; ++y) {
+      const Row row = load_row<components>(first + x * sheet_stride<components> + y * row_stride<components>);
+      lines = add_row(weights.value[1][y][lane], row, lines);
+      slopes = add_row(weights.slope[1][y][lane], row, slopes);
+    }
+    sums = add_row(weights.value[0][x][lane], lines, sums);
+    by_x = add_row(weights.slope[0][x][lane], lines, by_x);
+    by_y = add_row(weights.value[0][x][lane], slopes, by_y);
+  }
+  const auto& along = weights.value[2];
+  const Four values = four_of<components>(sums);
+  return {along_z(values, along, lane), along_z(four_of<components>(by_x), along, lane),
+          along_z(four_of<components>(by_y), along, lane), along_z(values, weights.slope[2], lane)};
 }
 
 /// Samples the tensors of a vector whose lanes are all in one cell. Each coefficient is loaded once, and copied to all
@@ -197,33 +199,6 @@ HWY_INLINE void sample_spline_cell(Packet& packet, int at) {
   }
 }
 
-/// The same with the slopes.
-template <int components>
-HWY_INLINE Slopes<V8> spline_slopes(const float* first, const SplineWeights& weights, int lane, int c) {
-  Four sums = four_zeros(), by_x = sums, by_y = sums;
-  for (int x = 0; x < 4; ++x) {
-    const float* const sheet = first + x * sheet_stride<components> + c;
-    Four lines = four_zeros(), slopes = lines;
-    for (int y = 0; y < 4; ++y) {
-      const V8 weight = hn::Set(eight, weights.value[1][y][lane]), slope = hn::Set(eight, weights.slope[1][y][lane]);
-      for (int z = 0; z < 4; ++z) {
-        const V8 coefficient = hn::LoadU(eight, sheet + y * row_stride<components> + z * components);
-        lines.z[z] = hn::MulAdd(weight, coefficient, lines.z[z]);
-        slopes.z[z] = hn::MulAdd(slope, coefficient, slopes.z[z]);
-      }
-    }
-    const V8 weight = hn::Set(eight, weights.value[0][x][lane]), slope = hn::Set(eight, weights.slope[0][x][lane]);
-    for (int z = 0; z < 4; ++z) {
-      sums.z[z] = hn::MulAdd(weight, lines.z[z], sums.z[z]);
-      by_x.z[z] = hn::MulAdd(slope, lines.z[z], by_x.z[z]);
-      by_y.z[z] = hn::MulAdd(weight, slopes.z[z], by_y.z[z]);
-    }
-  }
-  const auto& along = weights.value[2];
-  return {along_z(sums, along, lane), along_z(by_x, along, lane), along_z(by_y, along, lane),
-          along_z(sums, weights.slope[2], lane)};
-}
-
 /// Samples the tensors of a vector.
 template <int components>
 HWY_INLINE void sample_spline(Packet& packet, int at) {
@@ -234,7 +209,7 @@ HWY_INLINE void sample_spline(Packet& packet, int at) {
     for (int row = 0; row < eight_lanes; ++row)
       rows[row] = row_of(
           [&](int lane) HWY_ATTR {
-            return spline_value<components>(first_coefficient<components>(packet, at + lane), weights, lane, c);
+            return spline_value<components>(first_coefficient<components>(packet, at + lane) + c, weights, lane);
           },
           row);
     transpose_rows(rows);
@@ -251,7 +226,7 @@ HWY_INLINE void sample_spline_slopes(Packet& packet, int at) {
   for (int c = 0; c < components; c += eight_lanes)
     for (int lane = 0; lane < lanes; ++lane) {
       const auto sampled =
-          spline_slopes<components>(first_coefficient<components>(packet, at + lane), weights, lane, c);
+          spline_slopes<components>(first_coefficient<components>(packet, at + lane) + c, weights, lane);
       store_components(sampled.value, c, lane, values[0]);
       store_components(sampled.x, c, lane, values[1]);
       store_components(sampled.y, c, lane, values[2]);
