@@ -27,14 +27,16 @@ class Field {
   const Json& keys() const { return keys_; }
   TensorGrid grid() const { return make_(); }
 
-  /// The field without voxels that are not finite, and preprocessed. Made anew if the choice differs from the last one.
-  LoadedField loaded(Eigenvalues mode) const;
+  /// The field without voxels that are not finite, smoothed and preprocessed. Made anew if the choice differs from the
+  /// last one. @param smoothing  Deviation, voxels; 0: none.
+  LoadedField loaded(double smoothing, Eigenvalues mode) const;
 
  private:
   Json keys_;
   std::function<TensorGrid()> make_;
   pybind11::object memory_;
   mutable std::mutex mutex_;
+  mutable double smoothing_ = 0;
   mutable Eigenvalues mode_ = Eigenvalues::automatic;
   mutable std::optional<LoadedField> loaded_;
 };

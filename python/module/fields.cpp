@@ -20,12 +20,13 @@
 
 namespace tensorray {
 
-LoadedField Field::loaded(Eigenvalues mode) const {
+LoadedField Field::loaded(double smoothing, Eigenvalues mode) const {
   const std::lock_guard<std::mutex> lock(mutex_);
-  if (!loaded_ || mode_ != mode) {
+  if (!loaded_ || smoothing_ != smoothing || mode_ != mode) {
     loaded_.reset();  // Its memory is needed.
     const std::string source = keys_.contains("file") ? keys_["file"] : keys_["generate"]["kind"];
-    loaded_ = prepare_field(make_(), mode, source);
+    loaded_ = prepare_field(make_(), smoothing, mode, source);
+    smoothing_ = smoothing;
     mode_ = mode;
   }
   return *loaded_;

@@ -105,8 +105,8 @@ class Trace:
 def trace(field: Field, positions: ArrayLike, directions: ArrayLike, s: ArrayLike, *, scale: float = ...,
           plate: Optional[Plate] = ..., jacobians: bool = ..., along: Optional[ArrayLike] = ...,
           turning: Optional[ArrayLike] = ..., ways: bool = ..., method: _Method = ..., step: Optional[float] = ...,
-          max_steps: int = ..., max_length: Optional[float] = ..., eigenvalues: _Eigenvalues = ..., threads: int = ...,
-          progress: _Progress = ...) -> Trace: ...
+          max_steps: int = ..., max_length: Optional[float] = ..., eigenvalues: _Eigenvalues = ..., smooth: float = ...,
+          threads: int = ..., progress: _Progress = ...) -> Trace: ...
 
 class Landings:
     starts: NDArray[np.float64]

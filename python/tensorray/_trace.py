@@ -45,8 +45,8 @@ class Trace:
 
 
 def trace(field, positions, directions, s, *, scale=1.0, plate=None, jacobians=False, along=None, turning=None,
-          ways=False, method="splitting", step=None, max_steps=20000, max_length=None, eigenvalues="auto", threads=0,
-          progress=None):
+          ways=False, method="splitting", step=None, max_steps=20000, max_length=None, eigenvalues="auto", smooth=0.0,
+          threads=0, progress=None):
     """Follows single rays through a field.
 
     positions    Starts, world: (n, 3), or (3,) for one ray or for all.
@@ -63,6 +63,7 @@ def trace(field, positions, directions, s, *, scale=1.0, plate=None, jacobians=F
     max_steps    Steps after which a ray is given up.
     max_length   Length after which a ray ends, world units; None: no limit.
     eigenvalues  Preprocessing: auto (absolute where the field is symmetric, else raw), raw, absolute or positive.
+    smooth       Standard deviation of a Gaussian that smooths the field first, voxels; 0: none.
     threads      Greatest number of threads; 0: all. The result does not depend on it.
 
     Returns a Trace. The light of a small area about a start fills |J0 x J1| times that area on the plate, where J0, J1
@@ -78,7 +79,8 @@ def trace(field, positions, directions, s, *, scale=1.0, plate=None, jacobians=F
     if plate is not None:
         request.plate = _tensorray.Plate(*(np.asarray(part, float).ravel() for part in
                                            (plate.center, plate.normal, plate.up, plate.size)))
-    request.eigenvalues, request.method, request.paths = eigenvalues, method, ways
+    request.eigenvalues, request.smooth = eigenvalues, float(smooth)
+    request.method, request.paths = method, ways
     request.scale, request.step, request.max_steps = float(scale), float(step or 0), int(max_steps)
     request.max_length = math.inf if max_length is None else float(max_length)
     with shown(progress) as report:

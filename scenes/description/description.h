@@ -34,6 +34,7 @@ struct FieldDescription {
   std::string name;                             ///< Name of the field in the file; empty: the only field.
   std::optional<GenerateDescription> generate;  ///< Generated field, instead of a file.
   Derive derive = Derive::none;
+  double smooth = 0;  ///< Deviation of the Gaussian that smooths the field, voxels; 0: none.
   Eigenvalues eigenvalues = Eigenvalues::automatic;
   std::optional<double> scale;   ///< Factor on the flexibility; none: "auto".
   std::filesystem::path bounds;  ///< A closed mesh that cuts the volume; empty: none.

@@ -19,6 +19,7 @@
 #include "scenes/description/choices.h"
 #include "scenes/description/description.h"
 #include "scenes/keys/limits.h"
+#include "volumes/tensors/smoothing.h"
 
 namespace tensorray {
 
@@ -33,6 +34,8 @@ void describe(FieldDescription& field, Visitor& visit) {
   visit.generator("generate", field.generate, "an analytic field instead of a file");
   visit("derive", field.derive,
         "derivative that makes the tensor: gradient of a vector grid, hessian of a scalar grid");
+  visit("smooth", field.smooth, "standard deviation of a Gaussian that smooths the field first, voxels; 0 is none",
+        between(0, greatest_smoothing));
   visit("eigenvalues", field.eigenvalues,
         "preprocessing: as they are, |T| or (T^2)^(1/2); auto is absolute where the field is symmetric, else raw");
   visit("scale", field.scale,

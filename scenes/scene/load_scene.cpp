@@ -12,6 +12,7 @@
 #include "volumes/files/tensor_files.h"
 #include "volumes/grids/page_memory.h"
 #include "volumes/tensors/field_making.h"
+#include "volumes/tensors/smoothing.h"
 
 namespace tensorray {
 namespace {
@@ -41,7 +42,7 @@ TensorGrid load_grid(const SceneDescription& scene) {
 /// The blocks of the field; nothing if it must be read as a whole.
 std::optional<BlockSource> load_blocks(const SceneDescription& scene) {
   const FieldDescription& field = scene.field;
-  if (memory_bound()) return std::nullopt;
+  if (memory_bound() || field.smooth > 0) return std::nullopt;
   if (field.generate) return generated(scene, generator_source);
   return field.derive == Derive::none ? open_tensor_vdb(field.file, field.name) : std::nullopt;
 }
@@ -54,7 +55,7 @@ LoadedField load_field(const SceneDescription& scene) {
   const FieldDescription& field = scene.field;
   if (const std::optional<BlockSource> blocks = load_blocks(scene))
     return prepare_field(*blocks, field.eigenvalues, source_of(field));
-  return prepare_field(load_grid(scene), field.eigenvalues, source_of(field));
+  return prepare_field(load_grid(scene), field.smooth, field.eigenvalues, source_of(field));
 }
 
 TriangleMesh load_closed_mesh(const std::filesystem::path& path) {
@@ -308,13 +309,16 @@ void require_near(const Plate& plate, const char* pointer, const SceneDescriptio
     fail_size(description, pointer);
 }
 
-LoadedField prepare_field(TensorGrid grid, Eigenvalues mode, const std::string& source) {
+LoadedField prepare_field(TensorGrid grid, double smoothing, Eigenvalues mode, const std::string& source) {
   MadeField made;
   made.non_finite = remove_non_finite(grid);
   made.voxels = grid.active_voxels();
+  smooth(grid, smoothing);
   made.eigenvalues = apply_eigenvalues(grid, mode);
   if (made.voxels > 0) made.field.emplace(std::move(grid));
-  return with_notes(std::move(made), source);
+  LoadedField loaded = with_notes(std::move(made), source);
+  if (smoothing > 0) loaded.notes.push_back(fmt::format("field smoothed: a Gaussian of {:g} voxels", smoothing));
+  return loaded;
 }
 
 LoadedField prepare_field(const BlockSource& blocks, Eigenvalues mode, const std::string& source) {

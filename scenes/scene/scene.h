@@ -59,9 +59,12 @@ struct LoadedField {
   std::vector<std::string> notes;
 };
 
-/// Removes voxels that are not finite, and preprocesses the others.
-/// @param source  Names the field in notes and errors. @throw std::runtime_error if no voxel is left.
-LoadedField prepare_field(TensorGrid grid, Eigenvalues mode, const std::string& source);
+/// Removes voxels that are not finite, smooths the others, and then changes their eigenvalues.
+/// @param smoothing  Deviation, voxels; 0: none.
+/// @param source     Names the field in notes and errors. @throw std::runtime_error if no voxel is left.
+LoadedField prepare_field(TensorGrid grid, double smoothing, Eigenvalues mode, const std::string& source);
+
+/// The same without smoothing.
 LoadedField prepare_field(const BlockSource& blocks, Eigenvalues mode, const std::string& source);
 
 /// SceneDescription → Scene: loads fields, meshes and spectra, and chooses all values that the scene leaves open.
