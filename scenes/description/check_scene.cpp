@@ -74,6 +74,8 @@ void check_objects(const SceneDescription& scene, const SceneSource& source) {
     const auto* pattern = std::get_if<Pattern>(&object.texture);
     if (!object.plate && !(pattern && *pattern == Pattern::none))
       source.fail(fmt::format("`/objects/{}/texture`: only plates have textures; remove it", i));
+    if (object.smooth_angle && object.file.empty())
+      source.fail(fmt::format("`/objects/{}/smooth_angle`: only meshes (`file`) have smooth edges; remove it", i));
   }
 }
 

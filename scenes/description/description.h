@@ -129,6 +129,8 @@ enum class Pattern { none, checkerboard };
 struct ObjectDescription {
   std::optional<PlateDescription> plate;
   std::filesystem::path file;  ///< A mesh.
+  /// Of a mesh: edges look smooth where triangles are turned by at most this, degrees; none: as its normals say.
+  std::optional<double> smooth_angle;
   std::optional<PathsDescription> paths;
   std::variant<Pattern, std::filesystem::path> texture = Pattern::none;  ///< Of a plate; a pattern or a picture.
   int squares = 16;                                                      ///< checkerboard: along the shorter side.

@@ -165,6 +165,9 @@ void describe(ObjectDescription& object, Visitor& visit) {
   visit.exactly_one({"plate", "file", "paths"});
   visit.section("plate", object.plate, "a flat rectangle");
   visit("file", object.file, "a mesh");
+  visit("smooth_angle", object.smooth_angle,
+        "of a mesh: edges look smooth up to this angle between triangles, degrees; auto takes the file's normals",
+        between(0, 180).or_word("auto"));
   visit.section("paths", object.paths,
                 "bent rays as tubes, with the seeds, style, radius and colours of `integrator` (path_tracing)");
   visit("texture", object.texture, "of a plate: a pattern, or a picture whose colours are its reflectance");

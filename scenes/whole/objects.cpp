@@ -4,7 +4,6 @@
 #include <cmath>
 
 #include "renderer/lights/lights.h"
-#include "renderer/surfaces/mesh.h"
 #include "scenes/path_tracing/context_surfaces.h"
 #include "scenes/path_tracing/path_colors.h"
 #include "scenes/path_tracing/path_surfaces.h"
@@ -83,7 +82,7 @@ SceneObject load_object(const ObjectDescription& description, const Scene& scene
     return object;
   }
   if (!description.plate) {
-    object.surface.shape = read_mesh(description.file);
+    object.surface = read_mesh_surface(description.file, description.smooth_angle);
     return object;
   }
   const Plate plate = make_plate(*description.plate);
@@ -107,9 +106,9 @@ std::vector<SceneObject> load_objects(const Scene& scene, const PathTracingDescr
   if (descriptions.empty()) descriptions.push_back(default_floor(scene.field));
   std::vector<SceneObject> objects;
   for (const ObjectDescription& each : descriptions) objects.push_back(load_object(each, scene, tracing, lights.light));
-  for (const TriangleMesh& mesh : scene.geometry.surfaces().obstacles) {
+  for (const std::filesystem::path& file : scene.description.obstacles) {
     SceneObject obstacle;
-    obstacle.surface.shape = mesh;
+    obstacle.surface = read_mesh_surface(file);
     objects.push_back(std::move(obstacle));
   }
   return objects;

@@ -82,7 +82,7 @@ class RaysTest(unittest.TestCase):
         # A rotation stays the same, constant as it is; the value of one voxel is spread over its neighbours.
         tensors = np.zeros((9, 9, 9, 3, 3))
         tensors[4, 4, 4] = [[0, 1, 0], [-1, 0, 0], [0, 0, 0]]
-        field = tr.field(tensors)
+        field = tr.Field(tensors)
         start, heading = [2, 2, 2.5], [0, 1, 0]
         turned = [tr.trace(field, start, heading, 1, smooth=smooth).directions[0, 0] for smooth in (0, 1.5, 0)]
         self.assertEqual(turned[0], 0)
