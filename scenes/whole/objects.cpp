@@ -44,9 +44,9 @@ SurfaceTexture checkerboard(Plate plate, int squares, const Eigen::Vector3f& bri
   return texture;
 }
 
-SurfaceTexture picture(Plate plate, const std::filesystem::path& file, const ColorManagement& color,
-                       const Eigen::Matrix3d& rec709_to_working) {
-  const Image image = load_rec709(file, color, rec709_to_working.inverse());
+SurfaceTexture picture(Plate plate, const PictureFile& file, const ColorManagement& color,
+                       const Eigen::Matrix3d& rec709_to_working, std::vector<std::string>& notes) {
+  const Image image = load_rec709(file, color, rec709_to_working.inverse(), notes);
   SurfaceTexture texture;
   plate.resolution = {image.width, image.height};
   texture.plate = plate;
@@ -68,17 +68,18 @@ Plate make_plate(const PlateDescription& description) {
 }
 
 /// Paths with all that `integrator` says of them, but for their number.
-PathScene load_path_object(const PathsDescription& description, const Scene& scene, PathTracingDescription tracing) {
+PathScene load_path_object(const PathsDescription& description, const Scene& scene, PathTracingDescription tracing,
+                           std::vector<std::string>& notes) {
   if (description.count) tracing.seeds.count = *description.count;
-  return load_paths(scene, tracing);
+  return load_paths(scene, tracing, notes);
 }
 
 SceneObject load_object(const ObjectDescription& description, const Scene& scene, const PathTracingDescription& tracing,
-                        const ShownLight& light) {
+                        const ShownLight& light, std::vector<std::string>& notes) {
   SceneObject object;
   object.material = description.material;
   if (description.paths) {
-    object.paths = load_path_object(*description.paths, scene, tracing);
+    object.paths = load_path_object(*description.paths, scene, tracing, notes);
     return object;
   }
   if (!description.plate) {
@@ -91,8 +92,8 @@ SceneObject load_object(const ObjectDescription& description, const Scene& scene
   const Eigen::Vector3f bright =
       (light.rec709_to_working * description.material.color).cwiseMax(0).cwiseMin(1).cast<float>();
   if (const auto* file = std::get_if<std::filesystem::path>(&description.texture))
-    object.surface.texture =
-        std::make_shared<SurfaceTexture>(picture(plate, *file, scene.color, light.rec709_to_working));
+    object.surface.texture = std::make_shared<SurfaceTexture>(
+        picture(plate, {*file, description.texture_layer}, scene.color, light.rec709_to_working, notes));
   else if (std::get<Pattern>(description.texture) == Pattern::checkerboard)
     object.surface.texture = std::make_shared<SurfaceTexture>(checkerboard(plate, description.squares, bright));
   return object;
@@ -101,11 +102,12 @@ SceneObject load_object(const ObjectDescription& description, const Scene& scene
 }  // namespace
 
 std::vector<SceneObject> load_objects(const Scene& scene, const PathTracingDescription& tracing,
-                                      const ShownLights& lights) {
+                                      const ShownLights& lights, std::vector<std::string>& notes) {
   std::vector<ObjectDescription> descriptions = scene.description.objects;
-  if (descriptions.empty()) descriptions.push_back(default_floor(scene.field));
+  if (scene.description.default_objects) descriptions.push_back(default_floor(scene.field));
   std::vector<SceneObject> objects;
-  for (const ObjectDescription& each : descriptions) objects.push_back(load_object(each, scene, tracing, lights.light));
+  for (const ObjectDescription& each : descriptions)
+    objects.push_back(load_object(each, scene, tracing, lights.light, notes));
   for (const std::filesystem::path& file : scene.description.obstacles) {
     SceneObject obstacle;
     obstacle.surface = read_mesh_surface(file);
