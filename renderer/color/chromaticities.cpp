@@ -17,9 +17,6 @@ Matrix3d bradford_cones() {
 
 }  // namespace
 
-const Vector2d d65_white(0.3127, 0.3290), aces_white(0.32168, 0.33767);
-const Chromaticities rec709_chromaticities{{0.64, 0.33}, {0.30, 0.60}, {0.15, 0.06}, {0.3127, 0.3290}};
-
 Chromaticities chromaticities_of(const std::array<double, 8>& n) {
   return {{n[0], n[1]}, {n[2], n[3]}, {n[4], n[5]}, {n[6], n[7]}};
 }

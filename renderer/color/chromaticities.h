@@ -17,8 +17,8 @@ struct Chromaticities {
 Chromaticities chromaticities_of(const std::array<double, 8>& numbers);  ///< In the order of the members.
 std::array<double, 8> numbers_of(const Chromaticities& colors);
 
-extern const Chromaticities rec709_chromaticities;
-extern const Eigen::Vector2d aces_white, d65_white;
+inline const Eigen::Vector2d d65_white(0.3127, 0.3290), aces_white(0.32168, 0.33767);
+inline const Chromaticities rec709_chromaticities{{0.64, 0.33}, {0.30, 0.60}, {0.15, 0.06}, d65_white};
 
 /// XYZ with Y = 1.
 Eigen::Vector3d xyz_of(const Eigen::Vector2d& chromaticity);

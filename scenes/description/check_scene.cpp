@@ -8,6 +8,7 @@
 
 #include <fmt/core.h>
 
+#include "renderer/color/color.h"
 #include "scenes/description/run_files.h"
 
 namespace tensorray {
