@@ -205,16 +205,18 @@ class SampleView {
     const Matrix2d box = footprint(from.node);
     const Eigen::Vector4d texel =
         view_.light.image.texture->lookup(middle, is_long ? swept(box, end - from.st) : box).cast<double>();
-    if (!(texel.w() > 0)) return;
+    const bool glows = !(texel.w() > 0);  // Light of a flame, say, that covers nothing.
+    if (glows && texel.head<3>().isZero(0)) return;
+    const double covered = glows ? 0 : texel.w(), amount = glows ? 1 : texel.w();
     thread_local std::vector<double> radiances;
     radiances.resize(span.last - span.first);
-    view_.radiance(texel.head<3>() / texel.w(), span.first, span.last, radiances.data());
-    const double part = share * texel.w() / (n_ * n_);
+    view_.radiance(texel.head<3>() / amount, span.first, span.last, radiances.data());
+    const double part = share * amount / (n_ * n_);
     for (std::size_t i = span.first; i < span.last; ++i) {
       const LensBand& band = view_.bands[i];
       pixel.color += part * radiances[i - span.first] * band.color;
       pixel.channels[band.channel] += part * radiances[i - span.first] * band.weight;
-      pixel.alpha[i] += part;
+      pixel.alpha[i] += share * covered / (n_ * n_);
     }
   }
 

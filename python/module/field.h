@@ -27,16 +27,16 @@ class Field {
   const Json& keys() const { return keys_; }
   TensorGrid grid() const { return make_(); }
 
-  /// The field without voxels that are not finite, and preprocessed. Made anew if a choice differs from the last one.
-  LoadedField loaded(Eigenvalues mode, const Interpolant& interpolant) const;
+  /// The field without voxels that are not finite, smoothed and preprocessed. Made anew if a choice differs from the
+  /// last one.
+  LoadedField loaded(const FieldChoices& choices) const;
 
  private:
   Json keys_;
   std::function<TensorGrid()> make_;
   pybind11::object memory_;
   mutable std::mutex mutex_;
-  mutable Eigenvalues mode_ = Eigenvalues::automatic;
-  mutable Interpolant interpolant_;
+  mutable FieldChoices choices_;
   mutable std::optional<LoadedField> loaded_;
 };
 

@@ -20,14 +20,13 @@
 
 namespace tensorray {
 
-LoadedField Field::loaded(Eigenvalues mode, const Interpolant& interpolant) const {
+LoadedField Field::loaded(const FieldChoices& choices) const {
   const std::lock_guard<std::mutex> lock(mutex_);
-  if (!loaded_ || mode_ != mode || interpolant_ != interpolant) {
+  if (!loaded_ || choices_ != choices) {
     loaded_.reset();  // Its memory is needed.
     const std::string source = keys_.contains("file") ? keys_["file"] : keys_["generate"]["kind"];
-    loaded_ = prepare_field(make_(), mode, interpolant, source);
-    mode_ = mode;
-    interpolant_ = interpolant;
+    loaded_ = prepare_field(make_(), choices, source);
+    choices_ = choices;
   }
   return *loaded_;
 }

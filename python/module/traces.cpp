@@ -23,6 +23,7 @@
 #include "python/module/work.h"
 #include "renderer/surfaces/mesh.h"
 #include "scenes/scene/fine_bands.h"
+#include "volumes/tensors/smoothing.h"
 
 namespace tensorray {
 namespace {
@@ -33,6 +34,7 @@ struct TraceRequest {
   std::optional<Doubles> along, turning;         ///< (n, 3, 2): derivatives of the starts.
   std::optional<Plate> plate;
   std::string eigenvalues = "auto", method = "auto", interpolation = "cubic", border = "fade";
+  double smooth = 0;  ///< Voxels.
   BendingSettings bending;
   bool paths = false;
 };
@@ -58,6 +60,7 @@ void check(const TraceRequest& request) {
             "trace: positions, directions and s must be finite");
     require(std::abs(V.norm() - 1) < 1e-6, "trace: directions must not be zero");
   }
+  require(request.smooth >= 0 && request.smooth <= greatest_smoothing, "trace: smooth must be 0 to 20 voxels");
 }
 
 RayBatch batch_of(const TraceRequest& request) {
@@ -159,14 +162,15 @@ py::dict trace_for_python(const Field& field, const TraceRequest& request, int t
   traced.rays = batch_of(request);
   BendingSettings bending = request.bending;
   bending.method = value_of<BendingMethod>("method", request.method);
-  const Eigenvalues mode = value_of<Eigenvalues>("eigenvalues", request.eigenvalues);
   const bool extends = value_of<BorderChoice>("border", request.border) == BorderChoice::extend;
-  const Interpolant interpolant{value_of<Interpolation>("interpolation", request.interpolation),
-                                extends ? Border::extend : Border::fade};
+  const FieldChoices choices{
+      request.smooth,
+      value_of<Eigenvalues>("eigenvalues", request.eigenvalues),
+      {value_of<Interpolation>("interpolation", request.interpolation), extends ? Border::extend : Border::fade}};
   run(
       [&](const Progress& progress) {
         progress.update("loading", 0, 1);
-        const TensorField bricks = field.loaded(mode, interpolant).field;
+        const TensorField bricks = field.loaded(choices).field;
         Surfaces surfaces;
         surfaces.bounds = box_mesh(bricks.index_bounds(), bricks.to_world());
         surfaces.plate = request.plate;
@@ -268,6 +272,7 @@ void add_traces(py::module_& module) {
       .def_readwrite("eigenvalues", &TraceRequest::eigenvalues)
       .def_readwrite("interpolation", &TraceRequest::interpolation)
       .def_readwrite("border", &TraceRequest::border)
+      .def_readwrite("smooth", &TraceRequest::smooth)
       .def_readwrite("method", &TraceRequest::method)
       .def_readwrite("paths", &TraceRequest::paths)
       .def_property("scale", nullptr, [](TraceRequest& self, double value) { self.bending.scale = value; })

@@ -107,7 +107,7 @@ class Trace:
 def trace(field: Field, positions: ArrayLike, directions: ArrayLike, s: ArrayLike, *, scale: float = ...,
           plate: Optional[Plate] = ..., jacobians: bool = ..., along: Optional[ArrayLike] = ...,
           turning: Optional[ArrayLike] = ..., ways: bool = ..., method: _Method = ..., step: Optional[float] = ...,
-          max_steps: int = ..., max_length: Optional[float] = ..., eigenvalues: _Eigenvalues = ...,
+          max_steps: int = ..., max_length: Optional[float] = ..., eigenvalues: _Eigenvalues = ..., smooth: float = ...,
           interpolation: _Interpolation = ..., border: _Border = ..., threads: int = ...,
           progress: _Progress = ...) -> Trace: ...
 

@@ -22,7 +22,7 @@ def render(scene=None, field=None, *, outputs=(), keep=(), changes=None, frame=N
     scene     A dictionary with the keys of a scene file (docs/scenes.md, tr.schema()), or the name of a scene file or
               of a field's file (.vdb). None: the light that `field` bends, on a plate.
     field     A Field, instead of the scene's own `field.file` or `field.generate`. Other keys of the scene's `field`
-              (scale, eigenvalues, bounds) stay.
+              (scale, smooth, eigenvalues, bounds) stay.
     outputs   Names of files to write: their endings say what they hold, as with -o. The bytes are those that the
               command line writes. Without them nothing is written, whatever the scene's `output` says.
     keep      What else the result holds, beside the picture: "spectral", "photons", and other keys of `output`.

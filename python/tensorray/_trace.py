@@ -45,7 +45,7 @@ class Trace:
 
 
 def trace(field, positions, directions, s, *, scale=1.0, plate=None, jacobians=False, along=None, turning=None,
-          ways=False, method="auto", step=None, max_steps=20000, max_length=None, eigenvalues="auto",
+          ways=False, method="auto", step=None, max_steps=20000, max_length=None, eigenvalues="auto", smooth=0.0,
           interpolation="cubic", border="fade", threads=0, progress=None):
     """Follows single rays through a field.
 
@@ -63,6 +63,7 @@ def trace(field, positions, directions, s, *, scale=1.0, plate=None, jacobians=F
     max_steps    Steps after which a ray is given up.
     max_length   Length after which a ray ends, world units; None: no limit.
     eigenvalues  Preprocessing: auto (absolute where the field is symmetric, else raw), raw, absolute or positive.
+    smooth       Standard deviation of a Gaussian that smooths the field first, voxels; 0: none.
     interpolation
                  What the field is between its voxels: cubic (smooth) or linear.
     border       cubic: whether inactive voxels fade to zero or extend the values of active ones.
@@ -81,7 +82,8 @@ def trace(field, positions, directions, s, *, scale=1.0, plate=None, jacobians=F
     if plate is not None:
         request.plate = _tensorray.Plate(*(np.asarray(part, float).ravel() for part in
                                            (plate.center, plate.normal, plate.up, plate.size)))
-    request.eigenvalues, request.method, request.paths = eigenvalues, method, ways
+    request.eigenvalues, request.smooth = eigenvalues, float(smooth)
+    request.method, request.paths = method, ways
     request.interpolation, request.border = interpolation, border
     request.scale, request.step, request.max_steps = float(scale), float(step or 0), int(max_steps)
     request.max_length = math.inf if max_length is None else float(max_length)

@@ -1,5 +1,7 @@
 #include "renderer/color/color.h"
 
+#include <algorithm>
+#include <cmath>
 #include <cstdlib>
 #include <optional>
 #include <sstream>
@@ -13,6 +15,9 @@
 #include "base/errors.h"
 #include "base/text.h"
 #include "renderer/color/builtin_config.h"
+#include "renderer/color/chromaticities.h"
+#include "renderer/color/file_colors.h"
+#include "renderer/color/icc_profile.h"
 
 namespace OCIO = OCIO_NAMESPACE;
 
@@ -22,38 +27,10 @@ namespace {
 using Eigen::Matrix3d;
 using Eigen::Vector3d;
 
-/// Converts a chromaticity to XYZ with Y = 1.
-Vector3d from_chromaticity(double x, double y) { return {x / y, 1, (1 - x - y) / y}; }
-
-const Vector3d white_d65 = from_chromaticity(0.3127, 0.3290);
-const Vector3d white_aces = from_chromaticity(0.32168, 0.33767);
-
-/// The matrix from linear RGB to XYZ. Columns of `primaries`: XYZ of the primaries; `white`: XYZ of RGB (1, 1, 1).
-Matrix3d rgb_to_xyz(const Matrix3d& primaries, const Vector3d& white) {
-  return primaries * (primaries.inverse() * white).asDiagonal();
-}
+const Vector3d white_d65 = xyz_of(d65_white);
 
 /// From ACES2065-1 (SMPTE ST 2065-1) to XYZ. The blue primary has a negative y.
-Matrix3d aces_to_xyz() {
-  Matrix3d primaries;
-  primaries << from_chromaticity(0.7347, 0.2653), from_chromaticity(0, 1), from_chromaticity(0.0001, -0.0770);
-  return rgb_to_xyz(primaries, white_aces);
-}
-
-Matrix3d bradford_cones() {
-  Matrix3d cones;
-  cones << 0.8951, 0.2664, -0.1614, -0.7502, 1.7135, 0.0367, 0.0389, -0.0685, 1.0296;
-  return cones;
-}
-
-/// Bradford's chromatic adaptation from one white to another (XYZ, Y = 1). Empty if `from` is too saturated for it.
-std::optional<Matrix3d> adaptation(const Vector3d& from, const Vector3d& to) {
-  constexpr double least_response = 0.01;
-  const Matrix3d cones = bradford_cones();
-  const Vector3d response = (cones * from).cwiseQuotient(cones * to);
-  if (!(response.minCoeff() > least_response)) return std::nullopt;
-  return cones.inverse() * response.cwiseInverse().asDiagonal() * cones;
-}
+Matrix3d aces_to_xyz() { return rgb_to_xyz({{0.7347, 0.2653}, {0, 1}, {0.0001, -0.0770}, aces_white}); }
 
 /// A config and its name for messages and provenance.
 struct NamedConfig {
@@ -61,24 +38,43 @@ struct NamedConfig {
   std::string name;
 };
 
-NamedConfig open_config(const std::filesystem::path& path, const std::string& fix) {
-  // Newer versions of OpenColorIO contain configs, which have addresses of this form.
-  const bool is_file = path.string().rfind("ocio://", 0) != 0;
+void require_config_readable(const std::string& name, const std::string& fix) {
   try {
-    if (is_file) require_readable(path);
-    return {OCIO::Config::CreateFromFile(path.string().c_str()), path.string()};
+    require_readable(name);
   } catch (const std::exception& error) {
-    throw std::runtime_error("OCIO config " + path.string() + ": " + one_line(error.what()) + fix);
+    throw std::runtime_error("OCIO config " + name + ": " + error.what() + fix);
   }
 }
 
-NamedConfig find_config(const std::filesystem::path& path) {
-  if (!path.empty()) return open_config(path, "");
+/// What to do about a config that this version of the library cannot read.
+std::string way_out(bool is_file) {
+  const std::string version = std::string("OpenColorIO ") + OCIO::GetVersion();
+  if (!is_file)
+    return OCIO::GetVersionHex() >= 0x02020000
+               ? ""
+               : "; " + version + " has no configs of its own (2.2 has); name a file, or \"built-in\"";
+  return "; if it is for a newer library than " + version +
+         ", take a version of the config for an older one, or \"built-in\"";
+}
+
+/// @param fix  More for the message.
+NamedConfig open_config(const std::string& name, const std::string& fix) {
+  const bool is_file = !is_library_config(name);
+  if (is_file) require_config_readable(name, fix);
+  try {
+    return {OCIO::Config::CreateFromFile(name.c_str()), name};
+  } catch (const std::exception& error) {
+    throw std::runtime_error("OCIO config " + name + ": " + one_line(error.what()) + way_out(is_file) + fix);
+  }
+}
+
+NamedConfig find_config(const std::string& name) {
   const char* const environment = std::getenv("OCIO");
-  if (environment && *environment)
+  if (!name.empty() && name != builtin_config_word) return open_config(name, "");
+  if (name.empty() && environment && *environment)
     return open_config(environment, "; correct or unset $OCIO (without it the built-in config is used)");
   std::istringstream text(builtin_color_config);
-  return {OCIO::Config::CreateFromStream(text), "built-in"};
+  return {OCIO::Config::CreateFromStream(text), builtin_config_word};
 }
 
 std::string in_quotes(const std::string& text) { return "\"" + text + "\""; }
@@ -163,23 +159,97 @@ Matrix3d matrix_to_working(const OCIO::Config& config, const char* space) {
 Matrix3d find_xyz_to_working(const OCIO::Config& config) {
   if (config.hasRole("aces_interchange"))
     return matrix_to_working(config, "aces_interchange") * aces_to_xyz().inverse() *
-           adaptation(white_d65, white_aces).value();
+           adaptation(white_d65, xyz_of(aces_white)).value();
   if (config.hasRole("cie_xyz_d65_interchange")) return matrix_to_working(config, "cie_xyz_d65_interchange");
   return rec709_to_xyz().inverse();
 }
 
+/// A matrix that is this near to identity is that of the same space: published numbers have four digits.
+constexpr double same_space = 2e-4;
+
+ColorConversion conversion_of(const FileColors& colors, const Matrix3d& xyz_to_working) {
+  const Eigen::Matrix3f matrix = (xyz_to_working * colors.rgb_to_xyz).cast<float>();
+  return [curves = colors.curves, matrix](float* rgba, std::size_t count) {
+    for (std::size_t i = 0; i < count; ++i, rgba += 4) {
+      const Eigen::Vector3f light(curves[0].at(rgba[0]), curves[1].at(rgba[1]), curves[2].at(rgba[2]));
+      Eigen::Map<Eigen::Vector3f>(rgba, 3) = matrix * light;
+    }
+  };
+}
+
+bool is_identity(const TransferCurve& curve) {
+  return curve.table.empty() && curve.g == 1 && curve.a == 1 && curve.b == 0 && curve.d <= 0 && curve.e == 0;
+}
+
+bool is_working_space(const FileColors& colors, const Matrix3d& xyz_to_working) {
+  const Matrix3d matrix = xyz_to_working * colors.rgb_to_xyz;
+  return (matrix - Matrix3d::Identity()).cwiseAbs().maxCoeff() < same_space && is_identity(colors.curves[0]) &&
+         is_identity(colors.curves[1]) && is_identity(colors.curves[2]);
+}
+
+/// A display as a curve and a matrix, if its colours are such.
+std::optional<IccProfile> measured(const OCIO::CPUProcessor& to_xyz) {
+  constexpr double rounding = 2e-3;
+  const Vector3d white = apply(to_xyz, Vector3d::Ones());
+  if (!(std::abs(white.y() - 1) < 0.01)) return std::nullopt;  // Displays of high dynamic range.
+  IccProfile profile;
+  constexpr int count = 4096;
+  TransferCurve curve;
+  for (int i = 0; i < count; ++i)
+    curve.table.push_back(static_cast<float>(apply(to_xyz, Vector3d::Constant(i / (count - 1.0))).y() / white.y()));
+  for (int c = 0; c < 3; ++c) profile.rgb_to_xyz.col(c) = apply(to_xyz, Vector3d::Unit(c)) / white.y();
+  profile.curves = {curve, curve, curve};
+  for (const Vector3d& color : {Vector3d(0.2, 0.5, 0.9), Vector3d(0.9, 0.1, 0.4), Vector3d(0.5, 0.5, 0.5)}) {
+    const Vector3d light = color.unaryExpr([&](double x) { return double(curve.at(static_cast<float>(x))); });
+    if (!((apply(to_xyz, color) / white.y() - profile.rgb_to_xyz * light).cwiseAbs().maxCoeff() < rounding))
+      return std::nullopt;
+  }
+  const double gamma = std::log(static_cast<double>(curve.at(0.5f))) / std::log(0.5);
+  const TransferCurve power = power_curve(gamma);
+  double difference = 0;
+  for (float x = 0; x <= 1; x += 1.0f / 64)
+    difference = std::max(difference, static_cast<double>(std::abs(power.at(x) - curve.at(x))));
+  if (difference < 1e-4) profile.curves = {power, power, power};
+  return profile;
+}
+
+/// Characters that ICC profiles of version 2 can hold.
+std::string printable_ascii(std::string text) {
+  std::replace_if(
+      text.begin(), text.end(), [](unsigned char c) { return c < 0x20 || c > 0x7e; }, '?');
+  return text;
+}
+
+/// What a view of a display shows its pictures in, if that can be known. Configs of version 1 do not say what their
+/// displays are; only names tell.
+DisplayEncoding encoding_of(const OCIO::Config& config, const std::string& display, const std::string& view) {
+  const std::string name = config.getDisplayViewColorSpaceName(display.c_str(), view.c_str());
+  const std::string space_name = name == "<USE_DISPLAY_NAME>" ? display : name;
+  const OCIO::ConstColorSpaceRcPtr space = config.getColorSpace(space_name.c_str());
+  if (!space || space->isData()) return {};
+  if (space->getReferenceSpaceType() != OCIO::REFERENCE_SPACE_DISPLAY)
+    return {lower_case(space_name).find("srgb") != std::string::npos, ""};
+  if (!config.hasRole("cie_xyz_d65_interchange")) return {};
+  const auto to_xyz = config.getProcessor(space_name.c_str(), "cie_xyz_d65_interchange")->getDefaultCPUProcessor();
+  const std::optional<IccProfile> profile = measured(*to_xyz);
+  if (!profile) return {};
+  if (is_srgb({profile->curves, profile->rgb_to_xyz})) return {true, ""};
+  return {false, make_icc_profile(printable_ascii(space_name), *profile)};
+}
+
 }  // namespace
 
-Matrix3d rec709_to_xyz() {
-  Matrix3d primaries;
-  primaries << from_chromaticity(0.64, 0.33), from_chromaticity(0.30, 0.60), from_chromaticity(0.15, 0.06);
-  return rgb_to_xyz(primaries, white_d65);
-}
+const char* const builtin_config_word = "built-in";
+
+bool is_library_config(const std::string& name) { return name == builtin_config_word || starts_with(name, "ocio://"); }
+
+Matrix3d rec709_to_xyz() { return rgb_to_xyz(rec709_chromaticities); }
 
 struct ColorManagement::State {
   OCIO::ConstConfigRcPtr config;
   std::string config_name, working_space, display, view;
   OCIO::ConstCPUProcessorRcPtr to_display;
+  DisplayEncoding encoding;
   Matrix3d xyz_to_working;
 };
 
@@ -196,6 +266,7 @@ ColorManagement::ColorManagement(const ColorSettings& settings) : state_(std::ma
     state_->view = choose(settings.view, config->getDefaultView(state_->display.c_str()),
                           views(*config, state_->display), "display " + in_quotes(state_->display));
     state_->to_display = display_processor(*config, state_->display, state_->view);
+    state_->encoding = encoding_of(*config, state_->display, state_->view);
     state_->xyz_to_working = find_xyz_to_working(*config);
   } catch (const std::exception& error) {
     throw std::runtime_error(subject + ": " + one_line(error.what()));
@@ -266,6 +337,28 @@ ColorConversion ColorManagement::to_working(const std::string& space) const {
     throw std::runtime_error("OCIO config " + state_->config_name + " cannot convert " + in_quotes(space) +
                              " to scene_linear: " + one_line(error.what()));
   }
+}
+
+ColorConversion ColorManagement::picture_conversion(const std::filesystem::path& file, const NativeImage& image,
+                                                    const std::string& wanted, std::vector<std::string>& notes) const {
+  const auto by_name = [&] { return to_working(texture_space(file, image.is_integer, wanted)); };
+  if (!wanted.empty() || !space_by_rule(*state_->config, file).empty()) return by_name();
+  try {
+    const bool grey = image.rgb[0] == image.rgb[1];
+    const std::optional<FileColors> colors = file_colors(image.tags, image.is_integer, grey);
+    if (!colors) return by_name();
+    if (is_working_space(*colors, state_->xyz_to_working)) return {};
+    return conversion_of(*colors, state_->xyz_to_working);
+  } catch (const std::runtime_error& error) {
+    notes.push_back("warning: " + file.string() + ": its description of its colours is not used: " + error.what());
+    return by_name();
+  }
+}
+
+const DisplayEncoding& ColorManagement::display_encoding() const { return state_->encoding; }
+
+std::array<double, 8> ColorManagement::working_chromaticities() const {
+  return numbers_of(named_chromaticities(state_->xyz_to_working.inverse()));
 }
 
 std::string ColorManagement::config_name() const { return state_->config_name; }

@@ -2,11 +2,13 @@
 /// @file renderer/color/color.h
 /// Conversion from CIE XYZ to the scene-linear working space, and from there to a display, by OpenColorIO.
 
+#include <array>
 #include <cstddef>
 #include <filesystem>
 #include <functional>
 #include <memory>
 #include <string>
+#include <vector>
 
 #include <Eigen/Core>
 
@@ -17,15 +19,28 @@ namespace tensorray {
 /// The matrix from linear Rec.709 (ITU-R BT.709, white D65) to XYZ. White has Y = 1.
 Eigen::Matrix3d rec709_to_xyz();
 
+/// The name of the config that is part of the program.
+extern const char* const builtin_config_word;
+
+/// Whether this names no file, but the built-in config, or one that OpenColorIO 2.2 or newer contains (ocio://NAME).
+bool is_library_config(const std::string& name);
+
 struct ColorSettings {
-  std::filesystem::path config;  ///< An OCIO config. Empty: $OCIO, or the built-in config if that is not set.
-  std::string display;           ///< A display of the config. Empty: the config's default display.
-  std::string view;              ///< A view of the display. Empty: the display's default view.
+  /// An OCIO config: a file, or what is_library_config tells. Empty: $OCIO, or the built-in config if that is not set.
+  std::string config;
+  std::string display;  ///< A display of the config. Empty: the config's default display.
+  std::string view;     ///< A view of the display. Empty: the display's default view.
 };
 
 /// Converts colours to the working space in place: `count` pixels of R, G, B, A. The colours are not multiplied by
 /// alpha; alpha does not change. Any thread may call it. Empty if the colours are already in the working space.
 using ColorConversion = std::function<void(float* rgba, std::size_t count)>;
+
+/// The colours of a display, which files for it are marked with.
+struct DisplayEncoding {
+  bool is_srgb = false;
+  std::string icc_profile;  ///< Of other displays; empty: unknown.
+};
 
 /// An OpenColorIO config with a chosen display and view. Immutable; any number of threads may use it.
 class ColorManagement {
@@ -66,6 +81,17 @@ class ColorManagement {
   /// transforms are formulas. It may outlive this object.
   /// @throw std::runtime_error naming the space if the config cannot convert it.
   ColorConversion to_working(const std::string& space) const;
+
+  /// The conversion of a picture file: that of texture_space if a space is wanted or a file rule matches; otherwise
+  /// what the file says of its colours (file_colors.h); otherwise that of texture_space. Tags that cannot be followed
+  /// become a warning in `notes`.
+  ColorConversion picture_conversion(const std::filesystem::path& file, const NativeImage& image,
+                                     const std::string& wanted, std::vector<std::string>& notes) const;
+
+  const DisplayEncoding& display_encoding() const;
+
+  /// x and y of red, green, blue and white of the working space.
+  std::array<double, 8> working_chromaticities() const;
 
   std::string config_name() const;    ///< For provenance: the path of the config, or "built-in".
   std::string working_space() const;  ///< The name of the scene_linear space.

@@ -51,17 +51,18 @@ Image color_image(const Film& color) {
   return linear_image(color, primaries, Eigen::Matrix3d::Identity());
 }
 
-SpectralImage spectral_image(const Film& film, const std::vector<Band>& bands, double beam_irradiance,
+SpectralImage spectral_image(const Film& film, const std::vector<Band>& bands, SpectralQuantity quantity, double beam,
                              const Eigen::Matrix3d& xyz_to_rgb) {
   check_channels(film, bands);
   std::vector<std::string> channels{"R", "G", "B"};
   for (const Band& band : bands) channels.push_back(channel_name(band.wavelength));
+  const char* const unit = quantity == SpectralQuantity::radiance ? "W.m^-2.sr^-1.nm^-1" : "W.m^-2.nm^-1";
   SpectralImage result{Image(film.width, film.height, channels),
-                       {{"spectralLayoutVersion", "1.0"}, {"emissiveUnits", "W.m^-2.nm^-1"}}};
+                       {{"spectralLayoutVersion", "1.0"}, {"emissiveUnits", unit}}};
   fill_colors(film, bands, xyz_to_rgb, result.image);
   tbb::parallel_for(0, film.height, [&](int y) {
     for (std::size_t k = 0; k < bands.size(); ++k) {
-      const double scale = beam_irradiance * bands[k].power / bands[k].width;
+      const double scale = beam * bands[k].power / bands[k].width;
       const double* const row = film.plane(static_cast<int>(k)) + static_cast<std::size_t>(y) * film.width;
       for (int x = 0; x < film.width; ++x) result.image.pixel(x, y)[3 + k] = static_cast<float>(scale * row[x]);
     }

@@ -26,15 +26,19 @@ struct SpectralImage {
   ImageMetadata metadata;  ///< The metadata that the layout requires; callers may add more.
 };
 
-/// The film as spectral irradiance, in the layout of Fichet et al. 2021 ("An OpenEXR Layout for Spectral Images", JCGT
-/// 10(3)). The first channels are R, G, B as in `linear_image`, which let other programs show the picture. Then follows
-/// one channel per band, such as "S0.550,000000nm", with the values film_k · beam_irradiance · power_k / width_k. Write
-/// it as EXR.
+enum class SpectralQuantity { irradiance, radiance };
+
+/// The film as spectral irradiance or radiance, in the layout of Fichet et al. 2021 ("An OpenEXR Layout for Spectral
+/// Images", JCGT 10(3)). The first channels are R, G, B as in `linear_image`, which let other programs show the
+/// picture. Then follows one channel per band, such as "S0.550,000000nm", with the values film_k · beam · power_k /
+/// width_k. Write it as EXR.
 /// @param film             Relative to the undisturbed beam (1: undisturbed), one channel per band.
-/// @param beam_irradiance  Irradiance of the undisturbed beam over all bands, in any unit. The result is in that unit
-///                         per nm.
+/// @param quantity         Decides the unit in the header.
+/// @param beam             The quantity that a film of 1 means, over all bands, in W.m^-2 or W.m^-2.sr^-1. The result
+/// is
+///                         in that unit per nm.
 /// @throw std::invalid_argument unless the film has one channel per band.
-SpectralImage spectral_image(const Film& film, const std::vector<Band>& bands, double beam_irradiance,
+SpectralImage spectral_image(const Film& film, const std::vector<Band>& bands, SpectralQuantity quantity, double beam,
                              const Eigen::Matrix3d& xyz_to_rgb);
 
 }  // namespace tensorray

@@ -6,11 +6,13 @@
 #include <mutex>
 #include <new>
 #include <set>
+#include <sstream>
 #include <stdexcept>
 #include <string>
 #include <thread>
 
 #include <OpenEXR/ImfChannelList.h>
+#include <OpenEXR/ImfChromaticitiesAttribute.h>
 #include <OpenEXR/ImfFrameBuffer.h>
 #include <OpenEXR/ImfHeader.h>
 #include <OpenEXR/ImfIO.h>
@@ -62,11 +64,22 @@ std::vector<std::string> distinct_names(const std::vector<std::string>& channels
   return names;
 }
 
+/// @param numbers  x and y of red, green, blue and white.
+Imf::Chromaticities chromaticities_of(const std::string& numbers) {
+  std::istringstream words(numbers);
+  Imath::V2f points[4];
+  for (Imath::V2f& point : points) words >> point.x >> point.y;
+  if (!words) throw std::runtime_error("chromaticities must be eight numbers");
+  return {points[0], points[1], points[2], points[3]};
+}
+
 Imf::Header header_of(const Image& image, const ImageMetadata& metadata) {
   Imf::Header header(image.width, image.height);
   header.compression() = Imf::ZIP_COMPRESSION;
   header.insert("capDate", Imf::StringAttribute());  // Unknown: the same picture gives the same bytes at any time.
-  const std::set<std::string> left_out{"", "type", "oiio:ColorSpace"};
+  const std::set<std::string> left_out{"", "type", "oiio:ColorSpace", "ICCProfile"};
+  if (metadata.count("chromaticities") > 0)
+    header.insert("chromaticities", Imf::ChromaticitiesAttribute(chromaticities_of(metadata.at("chromaticities"))));
   for (const auto& [attribute, text] : metadata) {
     const std::string name = attribute_name(attribute);
     const bool is_free = left_out.count(name) == 0 && header.find(name) == header.end();

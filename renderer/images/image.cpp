@@ -10,6 +10,7 @@
 #include <memory>
 #include <mutex>
 #include <new>
+#include <optional>
 #include <set>
 #include <stdexcept>
 #include <system_error>
@@ -17,8 +18,10 @@
 #include "base/errors.h"
 #include "base/text.h"
 #include "renderer/images/exr_encoder.h"
+#include "renderer/images/luminance_chroma.h"
 #include "renderer/images/picture_library.h"
 #include "renderer/images/png_encoder.h"
+#include "renderer/images/png_tags.h"
 
 namespace tensorray {
 namespace {
@@ -110,13 +113,13 @@ std::vector<unsigned char> encode(const Image& image, const PictureFormat& forma
   return is_png(format) ? encode_png(shown, metadata) : ready_library().encode(shown, format, metadata);
 }
 
-/// Reads a file with one of the library's functions; errors name the file.
+/// Reads a file with `decode`; errors name the file.
 template <class Decode>
-auto read(const std::filesystem::path& path, Decode PictureLibrary::*decode) {
+auto read(const std::filesystem::path& path, const Decode& decode) {
   require_readable(path);
   try {
     if (is_cut_off(path)) throw std::runtime_error("the file is cut off");
-    return (ready_library().*decode)(path);
+    return decode();
   } catch (const std::bad_alloc&) {
     throw std::runtime_error("cannot read " + path.string() + ": not enough memory for a picture of its size");
   } catch (const std::exception& error) {
@@ -136,6 +139,18 @@ void unpack(const NativeImage& image, std::size_t first_pixel, int count, float 
     for (int c = 0; c < 3; ++c) rgba[c] = value(image.rgb[c]);
     rgba[3] = image.alpha < 0 ? 1.0f : value(image.alpha);
   }
+}
+
+std::size_t non_finite_pixels(const NativeImage& image) {
+  if (image.type != SampleType::float32) return 0;
+  const auto* pixel = static_cast<const float*>(image.samples.get());
+  const std::size_t count = static_cast<std::size_t>(image.data_width) * image.data_height;
+  std::size_t found = 0;
+  for (std::size_t i = 0; i < count; ++i, pixel += image.channels) {
+    const auto is_finite = [&](int channel) { return channel < 0 || std::isfinite(pixel[channel]); };
+    found += !(is_finite(image.rgb[0]) && is_finite(image.rgb[1]) && is_finite(image.rgb[2]) && is_finite(image.alpha));
+  }
+  return found;
 }
 
 }  // namespace
@@ -165,9 +180,25 @@ void write_image(const std::filesystem::path& path, const Image& image, const Im
   }
 }
 
-Image read_image(const std::filesystem::path& path) { return read(path, &PictureLibrary::decode); }
+Image read_image(const std::filesystem::path& path) {
+  return read(path, [&] { return ready_library().decode(path); });
+}
 
-NativeImage read_native_image(const std::filesystem::path& path) { return read(path, &PictureLibrary::decode_native); }
+NativeImage read_native_image(const std::filesystem::path& path, const std::string& layer) {
+  return read(path, [&] {
+    std::optional<NativeImage> image = read_luminance_chroma(path);
+    if (!image) image = ready_library().decode_native(path, layer);
+    add_png_tags(path, image->tags);
+    image->non_finite = non_finite_pixels(*image);
+    return *image;
+  });
+}
+
+void add_notes(const std::filesystem::path& path, const NativeImage& image, std::vector<std::string>& notes) {
+  if (image.non_finite > 0)
+    notes.push_back("warning: " + path.string() + ": " + std::to_string(image.non_finite) +
+                    " pixels have values that are not finite; these count as 0");
+}
 
 NativeImage native_image(Image image) {
   const std::vector<std::string> rgb{"R", "G", "B"}, rgba{"R", "G", "B", "A"};

@@ -12,6 +12,8 @@
 #include <utility>
 #include <vector>
 
+#include "renderer/images/color_tags.h"
+
 namespace tensorray {
 
 /// Pixels as 32-bit floats, row by row from the top, channels interleaved.
@@ -57,10 +59,11 @@ void prepare_images(const std::vector<std::filesystem::path>& files);
 /// - PNG: 16 bits, all metadata. TIFF: 16 bits. JPEG: 8 bits, quality 95. TIFF and JPEG store only the metadata
 ///   ImageDescription, Software, Artist and Copyright.
 /// All formats except EXR take the values as display-referred and clip them to [0, 1] (NaN: 0). PNG and JPEG are marked
-/// as sRGB, unless the metadata `oiio:ColorSpace` says otherwise. They store the first three channels, or only the
-/// first if there are fewer than three. PNG and TIFF also store the fourth channel if it is "A"; its values do not
-/// change, and the colours are neither multiplied nor divided by it. The file is encoded in memory and then written in
-/// place: use an OutputFile (base/output_file.h) to never leave an incomplete file.
+/// as sRGB, unless there is metadata `oiio:ColorSpace` with another value. All three hold the profile that the metadata
+/// `ICCProfile` give. In EXR, the metadata `chromaticities` (eight numbers) become the attribute. They store the first
+/// three channels, or only the first if there are fewer than three. PNG and TIFF also store the fourth channel if it is
+/// "A"; its values do not change, and the colours are neither multiplied nor divided by it. The file is encoded in
+/// memory and then written in place: use an OutputFile (base/output_file.h) to never leave an incomplete file.
 /// @throw std::invalid_argument if the picture has no pixels, or not as many as its size and channels require.
 /// @throw std::runtime_error naming the file and the reason (also if the disk is full).
 void write_image(const std::filesystem::path& path, const Image& image, const ImageMetadata& metadata = {});
@@ -82,19 +85,28 @@ struct NativeImage {
   int data_width = 0;
   int data_height = 0;
   SampleType type = SampleType::float32;
-  int channels = 0;                     ///< Number of channels per pixel, interleaved.
-  std::array<int, 3> rgb{};             ///< Indices of red, green and blue; all equal for a grey picture.
-  int alpha = -1;                       ///< Index of alpha; -1: none.
-  bool is_premultiplied = false;        ///< Whether the colours are multiplied by alpha.
+  bool is_integer = false;        ///< Whether the file stores integers, also where `type` is float32.
+  int channels = 0;               ///< Number of channels per pixel, interleaved.
+  std::array<int, 3> rgb{};       ///< Indices of red, green and blue; all equal for a grey picture.
+  int alpha = -1;                 ///< Index of alpha; -1: none.
+  bool is_premultiplied = false;  ///< Whether the colours are multiplied by alpha.
+  ColorTags tags;
+  std::size_t non_finite = 0;           ///< Pixels with a value that is not finite, which counts as 0.
   std::shared_ptr<const void> samples;  ///< data_width * data_height * channels values, rows from the top.
 };
 
 /// Reads a picture as its file stores it: integers of up to 8 bits as uint8, of up to 16 bits as uint16, everything
-/// else as floats. Channels are found by name: R, G, B (without a layer's name, or else of the first layer that has
-/// them); Y, or a single channel of any name, for grey; and A.
+/// else as floats. It is turned as the file's orientation says (Exif, TIFF). Channels are found by name: R, G, B
+/// (without a layer's name, or else of the first layer that has them); Y, or a single channel of any name, for grey;
+/// and A. Of EXR as luminance and chroma, R, G and B are computed.
+/// @param layer  Only the channels LAYER.R, ... count, the channel LAYER for grey, or the part of the file with this
+///               name. Empty: any.
 /// @throw std::runtime_error naming the file and the reason; also if the file is cut off, has no such channels, or its
 /// values take more than 8 GiB.
-NativeImage read_native_image(const std::filesystem::path& path);
+NativeImage read_native_image(const std::filesystem::path& path, const std::string& layer = "");
+
+/// Adds a warning to `notes` if the picture has pixels that are not finite.
+void add_notes(const std::filesystem::path& path, const NativeImage& image, std::vector<std::string>& notes);
 
 /// Converts a picture in memory without a copy. @throw std::invalid_argument unless the channels are R, G, B or R, G,
 /// B, A (with colours multiplied by alpha) and all pixels are there.

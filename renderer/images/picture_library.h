@@ -54,7 +54,7 @@ struct PictureLibrary {
   /// JPEG and TIFF.
   std::vector<unsigned char> (*encode)(const Image& image, const PictureFormat& format, const ImageMetadata& metadata);
   Image (*decode)(const std::filesystem::path& path);
-  NativeImage (*decode_native)(const std::filesystem::path& path);
+  NativeImage (*decode_native)(const std::filesystem::path& path, const std::string& layer);
   /// `source` must outlive the result.
   std::unique_ptr<TileLookup> (*make_lookup)(const TileSource& source, Wrap wrap);
 };

@@ -1,5 +1,6 @@
 #include "renderer/images/png_encoder.h"
 
+#include <algorithm>
 #include <csetjmp>
 #include <cstdint>
 #include <stdexcept>
@@ -14,6 +15,7 @@ namespace {
 using Bytes = std::vector<unsigned char>;
 
 constexpr const char* color_space = "oiio:ColorSpace";
+constexpr const char* profile = "ICCProfile";
 constexpr std::size_t longest_name = 79;  // Of a text; the format's limit.
 
 /// The names of the format for these attributes; others keep theirs.
@@ -26,6 +28,7 @@ std::string text_name(const std::string& attribute) {
 struct Contents {
   int width = 0, height = 0, color_type = 0;
   bool is_srgb = true;
+  std::string icc_profile;  // Empty: none.
   std::vector<std::pair<std::string, std::string>> texts;
   Bytes values;  // Of 16 bits, high byte first, row after row.
   std::size_t row_bytes = 0;
@@ -41,9 +44,11 @@ Contents contents_of(const Image& image, const ImageMetadata& metadata) {
                                         : PNG_COLOR_TYPE_RGB_ALPHA;
   const auto space = metadata.find(color_space);
   contents.is_srgb = space == metadata.end() || space->second == "sRGB";
+  if (metadata.count(profile) > 0) contents.icc_profile = metadata.at(profile);
   for (const auto& [name, text] : metadata) {
     const std::string key = text_name(name);
-    if (name != color_space && !key.empty() && key.size() <= longest_name) contents.texts.emplace_back(key, text);
+    if (name != color_space && name != profile && !key.empty() && key.size() <= longest_name)
+      contents.texts.emplace_back(key, text);
   }
   contents.values.reserve(2 * image.pixels.size());
   for (const float value : image.pixels) {
@@ -53,6 +58,10 @@ Contents contents_of(const Image& image, const ImageMetadata& metadata) {
   }
   contents.row_bytes = 2 * channels * static_cast<std::size_t>(image.width);
   return contents;
+}
+
+bool is_ascii(const std::string& text) {
+  return std::all_of(text.begin(), text.end(), [](unsigned char c) { return c < 0x80; });
 }
 
 /// @return whether it succeeded.
@@ -65,6 +74,10 @@ bool write(png_structp png, png_infop info, const Contents& contents, std::vecto
   png_set_IHDR(png, info, static_cast<png_uint_32>(contents.width), static_cast<png_uint_32>(contents.height), 16,
                contents.color_type, PNG_INTERLACE_NONE, PNG_COMPRESSION_TYPE_DEFAULT, PNG_FILTER_TYPE_DEFAULT);
   if (contents.is_srgb) png_set_sRGB_gAMA_and_cHRM(png, info, PNG_sRGB_INTENT_PERCEPTUAL);
+  if (!contents.icc_profile.empty())
+    png_set_iCCP(png, info, "display", PNG_COMPRESSION_TYPE_BASE,
+                 reinterpret_cast<png_const_bytep>(contents.icc_profile.data()),
+                 static_cast<png_uint_32>(contents.icc_profile.size()));
   png_set_text(png, info, texts.data(), static_cast<int>(texts.size()));
   png_write_info(png, info);
   for (int y = 0; y < contents.height; ++y)
@@ -92,12 +105,19 @@ void append(png_structp png, png_bytep data, std::size_t size) {
 std::vector<unsigned char> encode_png(const Image& image, const ImageMetadata& metadata) {
   Contents contents = contents_of(image, metadata);
   std::vector<png_text> texts;
+  std::string no_language;
   for (auto& [name, text] : contents.texts) {
     png_text each{};
-    each.compression = PNG_TEXT_COMPRESSION_NONE;
     each.key = name.data();
     each.text = text.data();
-    each.text_length = text.size();
+    if (is_ascii(text)) {
+      each.compression = PNG_TEXT_COMPRESSION_NONE;
+      each.text_length = text.size();
+    } else {  // Plain text of the format is Latin-1; this is UTF-8.
+      each.compression = PNG_ITXT_COMPRESSION_NONE;
+      each.itxt_length = text.size();
+      each.lang = each.lang_key = no_language.data();
+    }
     texts.push_back(each);
   }
   Bytes file;

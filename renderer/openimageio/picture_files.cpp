@@ -2,10 +2,13 @@
 
 #include <algorithm>
 #include <array>
+#include <cstdint>
+#include <cstring>
 #include <memory>
 #include <set>
 #include <stdexcept>
 #include <string>
+#include <utility>
 
 #include <OpenImageIO/filesystem.h>
 #include <OpenImageIO/imageio.h>
@@ -39,6 +42,10 @@ OIIO::ImageSpec make_spec(const Image& image, const PictureFormat& format, const
   }
   for (const auto& [name, value] : metadata)
     if (is_plain(name) || (format.name == "jpeg" && name == "oiio:ColorSpace")) spec.attribute(name, value);
+  const auto profile = metadata.find("ICCProfile");
+  if (profile != metadata.end())
+    spec.attribute("ICCProfile", OIIO::TypeDesc(OIIO::TypeDesc::UINT8, static_cast<int>(profile->second.size())),
+                   profile->second.data());
   spec.attribute("DateTime", "");  // Prevents OpenImageIO from writing the time, which would differ between runs.
   return spec;
 }
@@ -64,19 +71,30 @@ int find_channel(const OIIO::ImageSpec& spec, const std::string& name) {
   return -1;
 }
 
+bool find_rgb_of(const OIIO::ImageSpec& spec, const std::string& prefix, NativeImage& image) {
+  const std::array<int, 3> rgb{find_channel(spec, prefix + "R"), find_channel(spec, prefix + "G"),
+                               find_channel(spec, prefix + "B")};
+  if (rgb[0] < 0 || rgb[1] < 0 || rgb[2] < 0) return false;
+  image.rgb = rgb;
+  image.alpha = find_channel(spec, prefix + "A");
+  return true;
+}
+
+/// The names before the last point of the channels' names, with the point; also of channels without a point.
+std::vector<std::string> prefixes(const OIIO::ImageSpec& spec) {
+  std::vector<std::string> found;
+  for (const std::string& name : spec.channelnames) {
+    const std::string prefix = name.substr(0, name.rfind('.') + 1);
+    if (std::find(found.begin(), found.end(), prefix) == found.end()) found.push_back(prefix);
+  }
+  return found;
+}
+
 /// Finds the colour channels without a layer's name, or those of the first layer that has colours.
 bool find_rgb(const OIIO::ImageSpec& spec, NativeImage& image) {
-  std::vector<std::string> layers{""};
-  for (const std::string& name : spec.channelnames) layers.push_back(name.substr(0, name.rfind('.') + 1));
-  for (const std::string& layer : layers) {
-    const std::array<int, 3> rgb{find_channel(spec, layer + "R"), find_channel(spec, layer + "G"),
-                                 find_channel(spec, layer + "B")};
-    if (rgb[0] < 0 || rgb[1] < 0 || rgb[2] < 0) continue;
-    image.rgb = rgb;
-    image.alpha = find_channel(spec, layer + "A");
-    return true;
-  }
-  return false;
+  if (find_rgb_of(spec, "", image)) return true;
+  const std::vector<std::string> all = prefixes(spec);
+  return std::any_of(all.begin(), all.end(), [&](const std::string& each) { return find_rgb_of(spec, each, image); });
 }
 
 bool find_grey(const OIIO::ImageSpec& spec, NativeImage& image) {
@@ -92,14 +110,45 @@ bool find_grey(const OIIO::ImageSpec& spec, NativeImage& image) {
   return grey >= 0;
 }
 
-/// Finds the channels; their indices count from the first channel that is needed.
-/// @return the index of that first channel in the file; `image.channels` counts from it to the last one needed.
-int choose_channels(const OIIO::ImageSpec& spec, NativeImage& image) {
-  if (!find_rgb(spec, image) && !find_grey(spec, image)) {
-    std::string names;
-    for (const std::string& name : spec.channelnames) names += (names.empty() ? "" : ", ") + name;
-    throw std::runtime_error("it has no channels R, G, B, nor grey (Y); its channels: " + names);
+std::string part_name(const OIIO::ImageSpec& spec) { return spec.get_string_attribute("oiio:subimagename"); }
+
+/// Finds the channels of a layer: LAYER.R, ..., the channel LAYER, or all channels of the part of this name.
+bool find_layer(const OIIO::ImageSpec& spec, const std::string& layer, NativeImage& image) {
+  if (find_rgb_of(spec, layer + ".", image)) return true;
+  if (OIIO::Strutil::iequals(part_name(spec), layer)) return find_rgb(spec, image) || find_grey(spec, image);
+  int grey = find_channel(spec, layer + ".Y");
+  if (grey < 0) grey = find_channel(spec, layer);
+  image.rgb = {grey, grey, grey};
+  image.alpha = -1;
+  return grey >= 0;
+}
+
+[[noreturn]] void throw_no_layer(OIIO::ImageInput& input, const std::string& layer) {
+  std::vector<std::string> known;
+  for (int part = 0; input.seek_subimage(part, 0); ++part) {
+    if (!part_name(input.spec()).empty()) known.push_back(part_name(input.spec()));
+    for (const std::string& prefix : prefixes(input.spec()))
+      if (!prefix.empty()) known.push_back(prefix.substr(0, prefix.size() - 1));
   }
+  throw std::runtime_error("it has no layer \"" + layer +
+                           "\"; its layers: " + (known.empty() ? "none" : joined(known)));
+}
+
+/// Finds the channels in the first part of the file, or those of a layer in any part. @return the part.
+int find_channels(OIIO::ImageInput& input, const std::string& layer, NativeImage& image) {
+  if (layer.empty()) {
+    const OIIO::ImageSpec& spec = input.spec();
+    if (find_rgb(spec, image) || find_grey(spec, image)) return 0;
+    throw std::runtime_error("it has no channels R, G, B, nor grey (Y); its channels: " + joined(spec.channelnames));
+  }
+  for (int part = 0; input.seek_subimage(part, 0); ++part)
+    if (find_layer(input.spec(), layer, image)) return part;
+  throw_no_layer(input, layer);
+}
+
+/// Makes the channels' indices count from the first one that is needed.
+/// @return the index of that first channel in the file; `image.channels` counts from it to the last one needed.
+int first_channel(NativeImage& image) {
   const auto [least, most] = std::minmax_element(image.rgb.begin(), image.rgb.end());
   const int first = image.alpha < 0 ? *least : std::min(*least, image.alpha);
   image.channels = std::max(*most, image.alpha) + 1 - first;
@@ -126,6 +175,65 @@ std::size_t checked_bytes(const NativeImage& image) {
     throw std::runtime_error("its " + std::to_string(image.width) + " x " + std::to_string(image.height) +
                              " pixels take more than 8 GiB; make it smaller");
   return static_cast<std::size_t>(stored);
+}
+
+ColorTags tags_of(const OIIO::ImageSpec& spec) {
+  ColorTags tags;
+  if (const OIIO::ParamValue* const profile = spec.find_attribute("ICCProfile"))
+    tags.icc_profile.assign(static_cast<const char*>(profile->data()), static_cast<std::size_t>(profile->datasize()));
+  const auto floats = [&](const char* name, auto& target) {
+    const OIIO::ParamValue* const found = spec.find_attribute(name);
+    if (!found || found->type().basetype != OIIO::TypeDesc::FLOAT) return;
+    const auto* const values = static_cast<const float*>(found->data());
+    if (static_cast<std::size_t>(found->datasize()) == target.emplace().size() * sizeof(float))
+      std::copy_n(values, target->size(), target->begin());
+    else
+      target.reset();
+  };
+  floats("chromaticities", tags.chromaticities);
+  floats("adoptedNeutral", tags.adopted_neutral);
+  return tags;
+}
+
+/// Makes floats of a TIFF's integers of 24 bits, which were read as uint32, in place. OpenImageIO 2.4 scales them to 32
+/// bits, and takes their bytes in the wrong order: libtiff gives them in the processor's.
+void convert_24_bits(unsigned char* values, std::size_t count) {
+  for (std::size_t i = 0; i < count; ++i, values += sizeof(float)) {
+    std::uint32_t wrong = 0;
+    std::memcpy(&wrong, values, sizeof wrong);
+    wrong >>= 8;
+    const std::uint32_t right = (wrong & 0xff) << 16 | (wrong & 0xff00) | wrong >> 16;
+    const float value = static_cast<float>(right / 16777215.0);
+    std::memcpy(values, &value, sizeof value);
+  }
+}
+
+/// Turns a picture as Exif's orientation (1 to 8) says.
+void turn(int orientation, NativeImage& image) {
+  if (orientation < 2 || orientation > 8) return;
+  const bool swaps = orientation >= 5;
+  const bool mirrors_x = orientation == 2 || orientation == 3 || orientation == 7 || orientation == 8;
+  const bool mirrors_y = orientation == 3 || orientation == 4 || orientation == 6 || orientation == 7;
+  const NativeImage from = image;
+  if (mirrors_x) image.data_x = from.width - from.data_x - from.data_width;
+  if (mirrors_y) image.data_y = from.height - from.data_y - from.data_height;
+  if (swaps) {
+    std::swap(image.width, image.height);
+    std::swap(image.data_x, image.data_y);
+    std::swap(image.data_width, image.data_height);
+  }
+  const std::size_t pixel = bytes_of(image.type) * static_cast<std::size_t>(image.channels);
+  const auto* const source = static_cast<const unsigned char*>(from.samples.get());
+  const std::shared_ptr<unsigned char[]> target(new unsigned char[checked_bytes(image)]);
+  std::size_t at = 0;
+  for (int y = 0; y < image.data_height; ++y)
+    for (int x = 0; x < image.data_width; ++x, at += pixel) {
+      const int column = swaps ? y : x, row = swaps ? x : y;
+      const int from_x = mirrors_x ? from.data_width - 1 - column : column;
+      const int from_y = mirrors_y ? from.data_height - 1 - row : row;
+      std::copy_n(source + (static_cast<std::size_t>(from_y) * from.data_width + from_x) * pixel, pixel, &target[at]);
+    }
+  image.samples = target;
 }
 
 }  // namespace
@@ -158,11 +266,12 @@ Image decode(const std::filesystem::path& path) {
   return image;
 }
 
-NativeImage decode_native(const std::filesystem::path& path) {
+NativeImage decode_native(const std::filesystem::path& path, const std::string& layer) {
   const std::unique_ptr<OIIO::ImageInput> input = open_as_it_is(path);
-  const OIIO::ImageSpec& spec = input->spec();
-  if (spec.deep || spec.depth > 1) throw std::runtime_error("it is not a flat picture, but deep or a volume");
   NativeImage image;
+  const int part = find_channels(*input, layer, image);
+  const OIIO::ImageSpec spec = input->spec(part, 0);
+  if (spec.deep || spec.depth > 1) throw std::runtime_error("it is not a flat picture, but deep or a volume");
   image.width = spec.full_width;
   image.height = spec.full_height;
   image.data_x = spec.x - spec.full_x;
@@ -170,14 +279,22 @@ NativeImage decode_native(const std::filesystem::path& path) {
   image.data_width = spec.width;
   image.data_height = spec.height;
   image.type = sample_type(spec);
-  const int first = choose_channels(spec, image);
+  image.is_integer = !spec.format.is_floating_point();
+  image.tags = tags_of(spec);
+  const int bits = spec.get_int_attribute("oiio:BitsPerSample");
+  if (bits == 24 && !image.is_integer)
+    throw std::runtime_error("floats of 24 bits are not read; save it with 16 or 32 bits");
+  const int first = first_channel(image);
   image.is_premultiplied = image.alpha >= 0 && !spec.get_int_attribute("oiio:UnassociatedAlpha");
   const std::size_t bytes = checked_bytes(image);
   const std::shared_ptr<unsigned char[]> samples(new unsigned char[bytes]);
-  if (!input->read_image(0, 0, first, first + image.channels, type_desc(image.type), samples.get()))
+  if (!input->read_image(part, 0, first, first + image.channels,
+                         bits == 24 ? OIIO::TypeDesc(OIIO::TypeDesc::UINT32) : type_desc(image.type), samples.get()))
     throw_read_error(*input);
   input->close();
+  if (bits == 24) convert_24_bits(samples.get(), bytes / sizeof(float));
   image.samples = samples;
+  turn(spec.get_int_attribute("Orientation", 1), image);
   return image;
 }
 

@@ -3,6 +3,7 @@
 /// Pictures in the formats of files; see PictureLibrary.
 
 #include <filesystem>
+#include <string>
 #include <vector>
 
 #include "renderer/images/picture_library.h"
@@ -12,6 +13,6 @@ namespace tensorray::openimageio {
 void set_threads(int threads);
 std::vector<unsigned char> encode(const Image& image, const PictureFormat& format, const ImageMetadata& metadata);
 Image decode(const std::filesystem::path& path);
-NativeImage decode_native(const std::filesystem::path& path);
+NativeImage decode_native(const std::filesystem::path& path, const std::string& layer);
 
 }  // namespace tensorray::openimageio

@@ -10,94 +10,187 @@
 #include <utility>
 
 #include <assimp/Importer.hpp>
-#include <assimp/postprocess.h>
 #include <assimp/scene.h>
 
 #include "base/errors.h"
 #include "base/text.h"
+#include "renderer/surfaces/obj.h"
 #include "renderer/surfaces/ply.h"
+#include "renderer/surfaces/polygon.h"
+#include "renderer/surfaces/smooth_normals.h"
 
 namespace tensorray {
 namespace {
 
 using Triangle = std::array<std::uint32_t, 3>;
-using Position = std::array<double, 3>;
+/// What tells vertices apart: a position, and a normal, or zero.
+using VertexKey = std::array<double, 6>;
 
-struct PositionHash {
-  std::size_t operator()(const Position& position) const {
+struct VertexHash {
+  std::size_t operator()(const VertexKey& key) const {
     std::size_t hash = 0;
-    for (const double coordinate : position) hash = hash * 0x9e3779b97f4a7c15u + std::hash<double>()(coordinate);
+    for (const double coordinate : key) hash = hash * 0x9e3779b97f4a7c15u + std::hash<double>()(coordinate);
     return hash;
   }
 };
 
-/// Joins vertices at equal positions, which files often repeat (for normals, or for each mesh). Drops triangles of zero
-/// area and vertices that no triangle uses.
-TriangleMesh joined(const TriangleMesh& mesh) {
-  TriangleMesh result;
-  std::unordered_map<Position, std::uint32_t, PositionHash> indices;
-  const auto vertex = [&](const Eigen::Vector3d& position) {
-    const auto [entry, is_new] = indices.try_emplace({position.x(), position.y(), position.z()},
-                                                     static_cast<std::uint32_t>(result.vertices.size()));
-    if (is_new) result.vertices.push_back(position);
+VertexKey key_of(const MeshWithNormals& mesh, std::uint32_t vertex) {
+  const Eigen::Vector3d& P = mesh.mesh.vertices[vertex];
+  if (mesh.normals.empty()) return {P.x(), P.y(), P.z(), 0, 0, 0};
+  const Eigen::Vector3f& N = mesh.normals[vertex];
+  return {P.x(), P.y(), P.z(), N.x(), N.y(), N.z()};
+}
+
+/// Joins equal vertices, which files often repeat (for normals, or for each mesh). Drops triangles of zero area and
+/// vertices that no triangle uses.
+MeshWithNormals without_repeats(const MeshWithNormals& given) {
+  MeshWithNormals result;
+  std::unordered_map<VertexKey, std::uint32_t, VertexHash> indices;
+  const auto vertex = [&](std::uint32_t index) {
+    const auto [entry, is_new] =
+        indices.try_emplace(key_of(given, index), static_cast<std::uint32_t>(result.mesh.vertices.size()));
+    if (!is_new) return entry->second;
+    result.mesh.vertices.push_back(given.mesh.vertices[index]);
+    if (!given.normals.empty()) result.normals.push_back(given.normals[index]);
     return entry->second;
   };
-  for (const Triangle& t : mesh.triangles) {
-    const Eigen::Vector3d &a = mesh.vertices[t[0]], &b = mesh.vertices[t[1]], &c = mesh.vertices[t[2]];
-    if ((b - a).cross(c - a).isZero(0)) continue;
-    const std::uint32_t first = vertex(a), second = vertex(b), third = vertex(c);
-    result.triangles.push_back({first, second, third});
+  for (const Triangle& t : given.mesh.triangles) {
+    const auto& P = given.mesh.vertices;
+    if ((P[t[1]] - P[t[0]]).cross(P[t[2]] - P[t[0]]).isZero(0)) continue;
+    const std::uint32_t first = vertex(t[0]), second = vertex(t[1]), third = vertex(t[2]);
+    result.mesh.triangles.push_back({first, second, third});
   }
   return result;
 }
 
-/// Checks what assimp's own processing assumes.
-/// @return whether a face has more than three corners.
-bool check_faces(const aiScene& scene) {
-  bool polygons = false;
-  for (unsigned m = 0; m < scene.mNumMeshes; ++m) {
-    const aiMesh& mesh = *scene.mMeshes[m];
-    for (unsigned f = 0; f < mesh.mNumFaces; ++f) {
-      const aiFace& face = mesh.mFaces[f];
-      if (face.mNumIndices == 0) throw std::runtime_error("a face has no vertices");
-      if (*std::max_element(face.mIndices, face.mIndices + face.mNumIndices) >= mesh.mNumVertices)
-        throw std::runtime_error("a face names a vertex that is not there");
-      polygons = polygons || face.mNumIndices > 3;
-    }
-  }
-  return polygons;
+void check_face(const aiMesh& part, const aiFace& face) {
+  if (face.mNumIndices == 0) throw std::runtime_error("a face has no vertices");
+  if (*std::max_element(face.mIndices, face.mIndices + face.mNumIndices) >= part.mNumVertices)
+    throw std::runtime_error("a face names a vertex that is not there");
 }
 
-void add_mesh(const aiMesh& part, const aiMatrix4x4& to_world, TriangleMesh& mesh) {
-  const auto offset = static_cast<std::uint32_t>(mesh.vertices.size());
-  for (unsigned i = 0; i < part.mNumVertices; ++i) {
-    const aiVector3D v = to_world * part.mVertices[i];
-    mesh.vertices.emplace_back(v.x, v.y, v.z);
-  }
-  const bool mirrored = to_world.Determinant() < 0;
-  for (unsigned i = 0; i < part.mNumFaces; ++i) {
-    const aiFace& face = part.mFaces[i];
-    if (face.mNumIndices != 3) continue;  // Points and lines have no surface.
-    Triangle t{offset + face.mIndices[0], offset + face.mIndices[1], offset + face.mIndices[2]};
+void add_face(const TriangleMesh& mesh, const aiFace& face, std::uint32_t offset, bool mirrored,
+              std::vector<Triangle>& triangles) {
+  std::vector<Eigen::Vector3d> corners;
+  for (unsigned i = 0; i < face.mNumIndices; ++i) corners.push_back(mesh.vertices[offset + face.mIndices[i]]);
+  for (Triangle t : triangulate(corners)) {
     if (mirrored) std::swap(t[1], t[2]);
-    mesh.triangles.push_back(t);
+    triangles.push_back({offset + face.mIndices[t[0]], offset + face.mIndices[t[1]], offset + face.mIndices[t[2]]});
   }
 }
 
-void add_node(const aiScene& scene, const aiNode& node, const aiMatrix4x4& to_world, TriangleMesh& mesh) {
-  const aiMatrix4x4 here = to_world * node.mTransformation;
+Eigen::Affine3d affine_of(const aiMatrix4x4& matrix) {
+  Eigen::Affine3d result;
+  for (int row = 0; row < 4; ++row)
+    for (int column = 0; column < 4; ++column) result.matrix()(row, column) = double(matrix[row][column]);
+  return result;
+}
+
+void add_mesh(const aiMesh& part, const Eigen::Affine3d& to_world, MeshWithNormals& result) {
+  TriangleMesh& mesh = result.mesh;
+  const auto offset = static_cast<std::uint32_t>(mesh.vertices.size());
+  const Eigen::Matrix3d turn = to_world.linear().inverse().transpose();
+  for (unsigned i = 0; i < part.mNumVertices; ++i) {
+    const aiVector3D& v = part.mVertices[i];
+    mesh.vertices.push_back(to_world * Eigen::Vector3d(v.x, v.y, v.z));
+    Eigen::Vector3d normal = Eigen::Vector3d::Zero();
+    if (part.HasNormals()) normal = Eigen::Vector3d(part.mNormals[i].x, part.mNormals[i].y, part.mNormals[i].z);
+    result.normals.push_back((turn * normal).stableNormalized().cast<float>());
+  }
+  const bool mirrored = to_world.linear().determinant() < 0;
+  for (unsigned i = 0; i < part.mNumFaces; ++i) {
+    check_face(part, part.mFaces[i]);
+    if (part.mFaces[i].mNumIndices < 3) continue;  // Points and lines have no surface.
+    add_face(mesh, part.mFaces[i], offset, mirrored, mesh.triangles);
+  }
+}
+
+void add_node(const aiScene& scene, const aiNode& node, const Eigen::Affine3d& to_world, MeshWithNormals& mesh) {
+  const Eigen::Affine3d here = to_world * affine_of(node.mTransformation);
   for (unsigned i = 0; i < node.mNumMeshes; ++i) add_mesh(*scene.mMeshes[node.mMeshes[i]], here, mesh);
   for (unsigned i = 0; i < node.mNumChildren; ++i) add_node(scene, *node.mChildren[i], here, mesh);
 }
 
-/// Uses as few of assimp's processing steps as possible, since they abort the program on unexpected input.
-TriangleMesh import(const std::filesystem::path& path) {
+int metadata(const aiScene& scene, const char* key, int otherwise) {
+  std::int32_t value = otherwise;
+  if (scene.mMetaData) scene.mMetaData->Get(key, value);
+  return value;
+}
+
+/// FBX says which of its axes are right, up and front, and its unit in centimetres. assimp 5.2 passes on both.
+Eigen::Affine3d fbx_to_world(const aiScene& scene) {
+  const auto axis = [&](const char* key, int otherwise) {
+    const int number = metadata(scene, key, otherwise);
+    if (number < 0 || number > 2) throw std::runtime_error("its axes are not right, up and front");
+    return Eigen::Vector3d(metadata(scene, (std::string(key) + "Sign").c_str(), 1) * Eigen::Vector3d::Unit(number));
+  };
+  Eigen::Matrix3d turn;  // Rows: where x, y and z come from.
+  turn << axis("CoordAxis", 0).transpose(), -axis("FrontAxis", 2).transpose(), axis("UpAxis", 1).transpose();
+  if (std::abs(turn.determinant()) != 1) throw std::runtime_error("its axes are not right, up and front");
+  float unit = 1;
+  if (scene.mMetaData) scene.mMetaData->Get("UnitScaleFactor", unit);
+  return Eigen::Affine3d(0.01 * double(unit) * turn);
+}
+
+/// From assimp's coordinates to metres with +z up, for the formats that say what theirs are. assimp has already brought
+/// COLLADA's to metres with +y up, which are those of glTF.
+Eigen::Affine3d to_world(const aiScene& scene, const std::string& ending) {
+  if (ending == ".fbx") return fbx_to_world(scene);
+  if (ending != ".dae" && ending != ".gltf" && ending != ".glb") return Eigen::Affine3d::Identity();
+  Eigen::Matrix3d turn;
+  turn << 1, 0, 0, 0, 0, -1, 0, 1, 0;
+  return Eigen::Affine3d(turn);
+}
+
+/// Uses none of assimp's processing steps, since they abort the program on unexpected input.
+MeshWithNormals import(const std::filesystem::path& path, const std::string& ending) {
   Assimp::Importer importer;
   const aiScene* scene = importer.ReadFile(path.string(), 0);
-  if (scene && check_faces(*scene)) scene = importer.ApplyPostProcessing(aiProcess_Triangulate);
   if (!scene) throw std::runtime_error(one_line(importer.GetErrorString()));
-  TriangleMesh mesh;
-  if (scene->mRootNode) add_node(*scene, *scene->mRootNode, aiMatrix4x4(), mesh);
+  MeshWithNormals mesh;
+  if (scene->mRootNode) add_node(*scene, *scene->mRootNode, to_world(*scene, ending), mesh);
+  return mesh;
+}
+
+MeshWithNormals read_any(const std::filesystem::path& path) {
+  const std::string ending = lower_case_ending(path);
+  if (ending == ".ply") return read_ply(path);
+  if (ending == ".obj") return read_obj(path);
+  const std::vector<std::string> others{".stl", ".off", ".gltf", ".glb", ".dae", ".fbx"};
+  if (std::find(others.begin(), others.end(), ending) == others.end())
+    throw std::runtime_error("a mesh is a .ply, .obj, " + joined(others) +
+                             " file; convert other formats to one of these, for example with Blender");
+  MeshWithNormals mesh = import(path, ending);
+  if (ending == ".stl") mesh.normals.clear();  // They are those of the triangles.
+  return mesh;
+}
+
+void check_finite(const MeshWithNormals& mesh) {
+  for (std::size_t i = 0; i < mesh.mesh.vertices.size(); ++i)
+    if (!mesh.mesh.vertices[i].cast<float>().allFinite())
+      throw std::runtime_error("vertex " + std::to_string(i) + " is not finite in single precision");
+  for (std::size_t i = 0; i < mesh.normals.size(); ++i)
+    if (!mesh.normals[i].allFinite())
+      throw std::runtime_error("the normal of vertex " + std::to_string(i) + " is not finite");
+}
+
+/// Calls make() with an error that names the file.
+template <class Make>
+auto naming(const std::filesystem::path& path, const Make& make) {
+  require_readable(path);
+  try {
+    return make();
+  } catch (const std::exception& error) {
+    throw std::runtime_error("cannot read the mesh " + path.string() + ": " + error.what());
+  }
+}
+
+MeshWithNormals read_joined(const std::filesystem::path& path, bool normals) {
+  MeshWithNormals raw = read_any(path);
+  check_finite(raw);
+  if (!normals) raw.normals.clear();
+  MeshWithNormals mesh = without_repeats(raw);
+  if (mesh.mesh.triangles.empty()) throw std::runtime_error("it holds no triangles");
   return mesh;
 }
 
@@ -136,18 +229,14 @@ void turn_round(TriangleMesh& mesh) {
 }  // namespace
 
 TriangleMesh read_mesh(const std::filesystem::path& path) {
-  require_readable(path);
-  try {
-    const TriangleMesh raw = lower_case_ending(path) == ".ply" ? read_ply(path) : import(path);
-    for (std::size_t i = 0; i < raw.vertices.size(); ++i)
-      if (!raw.vertices[i].cast<float>().allFinite())
-        throw std::runtime_error("vertex " + std::to_string(i) + " is not finite in single precision");
-    TriangleMesh mesh = joined(raw);
-    if (mesh.triangles.empty()) throw std::runtime_error("it holds no triangles");
-    return mesh;
-  } catch (const std::exception& error) {
-    throw std::runtime_error("cannot read the mesh " + path.string() + ": " + error.what());
-  }
+  return naming(path, [&] { return read_joined(path, false).mesh; });
+}
+
+MeshWithNormals read_mesh_with_normals(const std::filesystem::path& path, std::optional<double> smooth_angle) {
+  return naming(path, [&] {
+    if (smooth_angle) return with_smooth_normals(read_joined(path, false).mesh, *smooth_angle);
+    return read_joined(path, true);
+  });
 }
 
 TriangleMesh box_mesh(const Eigen::AlignedBox3d& box, const Eigen::Affine3d& transform) {

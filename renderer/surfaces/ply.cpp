@@ -10,8 +10,11 @@
 #include <sstream>
 #include <stdexcept>
 #include <string>
+#include <utility>
+#include <vector>
 
 #include "base/byte_order.h"
+#include "renderer/surfaces/polygon.h"
 
 namespace tensorray {
 namespace {
@@ -161,18 +164,35 @@ std::size_t to_count(double value) {
   return static_cast<std::size_t>(value);
 }
 
-void read_vertex(const Element& element, Numbers& numbers, TriangleMesh& mesh) {
-  Eigen::Vector3d position = Eigen::Vector3d::Zero();
+/// What the file holds, before polygons are divided.
+struct PlyContents {
+  std::vector<Eigen::Vector3d> vertices;
+  std::vector<Eigen::Vector3f> normals;  ///< For each vertex; empty: the file has none.
+  std::vector<std::uint32_t> corners;    ///< Of all faces.
+  std::vector<std::size_t> face_ends;    ///< Corners up to the end of each face.
+};
+
+/// The place of a property among x, y, z, nx, ny, nz; −1: none of them.
+int coordinate_of(const std::string& property) {
+  static const std::vector<std::string> names{"x", "y", "z", "nx", "ny", "nz"};
+  const auto found = std::find(names.begin(), names.end(), property);
+  return found == names.end() ? -1 : static_cast<int>(found - names.begin());
+}
+
+void read_ply_vertex(const Element& element, Numbers& numbers, PlyContents& contents) {
+  Eigen::Matrix<double, 6, 1> coordinates = Eigen::Matrix<double, 6, 1>::Zero();
+  bool has_normal = false;
   for (const Property& property : element.properties) {
     const std::size_t count = property.is_list ? to_count(numbers.next(property.count_type)) : 1;
+    const int coordinate = coordinate_of(property.name);
+    has_normal = has_normal || coordinate >= 3;
     for (std::size_t i = 0; i < count; ++i) {
       const double value = numbers.next(property.type);
-      if (property.name == "x") position.x() = value;
-      if (property.name == "y") position.y() = value;
-      if (property.name == "z") position.z() = value;
+      if (coordinate >= 0) coordinates[coordinate] = value;
     }
   }
-  mesh.vertices.push_back(position);
+  contents.vertices.emplace_back(coordinates.head<3>());
+  if (has_normal) contents.normals.emplace_back(coordinates.tail<3>().cast<float>());
 }
 
 std::uint32_t to_index(double value) {
@@ -181,19 +201,47 @@ std::uint32_t to_index(double value) {
   return static_cast<std::uint32_t>(value);
 }
 
-void read_face(const Element& element, Numbers& numbers, TriangleMesh& mesh) {
+bool is_corners(const Property& property) {
+  return property.is_list && (property.name == "vertex_indices" || property.name == "vertex_index");
+}
+
+void read_ply_face(const Element& element, Numbers& numbers, PlyContents& contents) {
   for (const Property& property : element.properties) {
-    const bool corners = property.is_list && (property.name == "vertex_indices" || property.name == "vertex_index");
     const std::size_t count = property.is_list ? to_count(numbers.next(property.count_type)) : 1;
-    std::uint32_t first = 0, last = 0;
+    if (is_corners(property) && count < 3)
+      throw std::runtime_error("face " + std::to_string(contents.face_ends.size()) + " has " + std::to_string(count) +
+                               " corners; it needs three");
     for (std::size_t i = 0; i < count; ++i) {
       const double value = numbers.next(property.type);
-      if (!corners) continue;
-      const std::uint32_t index = to_index(value);
-      if (i == 0) first = index;
-      if (i >= 2) mesh.triangles.push_back({first, last, index});
-      last = index;
+      if (is_corners(property)) contents.corners.push_back(to_index(value));
     }
+    if (is_corners(property)) contents.face_ends.push_back(contents.corners.size());
+  }
+}
+
+/// Adds the triangles of strips: each corner makes one with the two before it, and every second is turned round.
+void add_strips(const std::vector<double>& indices, PlyContents& contents) {
+  std::vector<std::uint32_t> strip;
+  for (const double index : indices) {
+    if (index == -1) {
+      strip.clear();
+      continue;
+    }
+    strip.push_back(to_index(index));
+    const std::size_t count = strip.size();
+    if (count < 3) continue;
+    const bool turned = count % 2 == 0;
+    contents.corners.insert(contents.corners.end(),
+                            {strip[count - (turned ? 2 : 3)], strip[count - (turned ? 3 : 2)], strip[count - 1]});
+    contents.face_ends.push_back(contents.corners.size());
+  }
+}
+
+void read_strips(const Element& element, Numbers& numbers, PlyContents& contents) {
+  for (const Property& property : element.properties) {
+    std::vector<double> indices(property.is_list ? to_count(numbers.next(property.count_type)) : 1);
+    for (double& index : indices) index = numbers.next(property.type);
+    if (is_corners(property)) add_strips(indices, contents);
   }
 }
 
@@ -204,31 +252,52 @@ void pass_over(const Element& element, Numbers& numbers) {
   }
 }
 
-void read_element(const Element& element, Numbers& numbers, TriangleMesh& mesh) {
+void read_element(const Element& element, Numbers& numbers, PlyContents& contents) {
   if (element.properties.empty()) return;  // Such elements have no bytes, whatever count the header gives.
   for (std::size_t row = 0; row < element.count; ++row) {
     if (element.name == "vertex")
-      read_vertex(element, numbers, mesh);
+      read_ply_vertex(element, numbers, contents);
     else if (element.name == "face")
-      read_face(element, numbers, mesh);
+      read_ply_face(element, numbers, contents);
+    else if (element.name == "tristrips")
+      read_strips(element, numbers, contents);
     else
       pass_over(element, numbers);
   }
 }
 
+/// Divides the faces into triangles.
+MeshWithNormals mesh_of_ply(PlyContents contents) {
+  MeshWithNormals result;
+  std::vector<Eigen::Vector3d> positions;
+  const std::uint32_t* corners = contents.corners.data();
+  std::size_t first = 0;
+  for (const std::size_t end : contents.face_ends) {
+    positions.clear();
+    for (std::size_t i = first; i < end; ++i) {
+      if (corners[i] >= contents.vertices.size()) throw std::runtime_error("a face names a vertex that is not there");
+      positions.push_back(contents.vertices[corners[i]]);
+    }
+    for (const auto& triangle : triangulate(positions))
+      result.mesh.triangles.push_back(
+          {corners[first + triangle[0]], corners[first + triangle[1]], corners[first + triangle[2]]});
+    first = end;
+  }
+  result.mesh.vertices = std::move(contents.vertices);
+  result.normals = std::move(contents.normals);
+  return result;
+}
+
 }  // namespace
 
-TriangleMesh read_ply(const std::filesystem::path& path) {
+MeshWithNormals read_ply(const std::filesystem::path& path) {
   std::ifstream file(path, std::ios::binary);
   const std::string bytes((std::istreambuf_iterator<char>(file)), std::istreambuf_iterator<char>());
   const Header header = parse_header(bytes);
   Numbers numbers(bytes, header.size, header.encoding);
-  TriangleMesh mesh;
-  for (const Element& element : header.elements) read_element(element, numbers, mesh);
-  for (const auto& triangle : mesh.triangles)
-    if (*std::max_element(triangle.begin(), triangle.end()) >= mesh.vertices.size())
-      throw std::runtime_error("a face names a vertex that is not there");
-  return mesh;
+  PlyContents contents;
+  for (const Element& element : header.elements) read_element(element, numbers, contents);
+  return mesh_of_ply(std::move(contents));
 }
 
 }  // namespace tensorray

@@ -142,10 +142,11 @@ Texture::Texture(Image image, Wrap wrap)
     : state_(std::make_unique<State>(native_image(std::move(image)), ColorConversion(), wrap, "a picture in memory")) {}
 
 Texture::Texture(const std::filesystem::path& file, const ColorManagement& color, const std::string& color_space,
-                 Wrap wrap) {
-  NativeImage image = read_native_image(file);
-  const bool integer = image.type != SampleType::float32;
-  ColorConversion conversion = color.to_working(color.texture_space(file, integer, color_space));
+                 Wrap wrap, const std::string& layer, std::vector<std::string>* notes) {
+  std::vector<std::string> unread;
+  NativeImage image = read_native_image(file, layer);
+  add_notes(file, image, notes ? *notes : unread);
+  ColorConversion conversion = color.picture_conversion(file, image, color_space, notes ? *notes : unread);
   state_ = std::make_unique<State>(std::move(image), std::move(conversion), wrap, file.string());
 }
 

@@ -5,6 +5,7 @@
 #include <filesystem>
 #include <memory>
 #include <string>
+#include <vector>
 
 #include <Eigen/Core>
 
@@ -38,10 +39,13 @@ class Texture {
   /// RGB, RGBA, CMYK (converted by OpenImageIO's reader). The picture is the display window of the file; it is
   /// transparent black outside the data window.
   /// @param color_space  Colour space of the file: a name, alias or role of the OCIO config; empty: see
-  ///                     `ColorManagement::texture_space`. Alpha is not converted.
+  ///                     `ColorManagement::picture_conversion`. Alpha is not converted.
+  /// @param layer        Layer of the file, as of read_native_image.
+  /// @param notes        Gets warnings about the file; null: nobody reads them.
   /// @throw std::runtime_error naming the file and the fix if the file is missing, empty, cut off, not a picture, has
   /// no colour channels, or is too large for the memory.
-  Texture(const std::filesystem::path& file, const ColorManagement& color, const std::string& color_space, Wrap wrap);
+  Texture(const std::filesystem::path& file, const ColorManagement& color, const std::string& color_space, Wrap wrap,
+          const std::string& layer = "", std::vector<std::string>* notes = nullptr);
 
   ~Texture();
   Texture(Texture&&) noexcept;

@@ -8,6 +8,7 @@
 
 #include <fmt/core.h>
 
+#include "renderer/color/color.h"
 #include "scenes/description/run_files.h"
 
 namespace tensorray {
@@ -74,6 +75,10 @@ void check_objects(const SceneDescription& scene, const SceneSource& source) {
     const auto* pattern = std::get_if<Pattern>(&object.texture);
     if (!object.plate && !(pattern && *pattern == Pattern::none))
       source.fail(fmt::format("`/objects/{}/texture`: only plates have textures; remove it", i));
+    if (!object.texture_layer.empty() && pattern)
+      source.fail(fmt::format("`/objects/{}/texture_layer`: only pictures have layers; remove it", i));
+    if (object.smooth_angle && object.file.empty())
+      source.fail(fmt::format("`/objects/{}/smooth_angle`: only meshes (`file`) have smooth edges; remove it", i));
   }
 }
 
@@ -140,6 +145,9 @@ void check_spectral_output(const SceneDescription& scene, const SceneSource& sou
 }
 
 void check_scene(SceneDescription& scene, const Json& json, const SceneSource& source) {
+  scene.default_lights = !given(json, "/lights");
+  scene.default_objects = !given(json, "/objects");
+  if (!is_library_config(scene.output.ocio)) scene.output.ocio = source.resolve(scene.output.ocio).string();
   if (!scene.bending.rgb) check_wavelengths(scene.light, source);
   check_normal(scene.receiver.normal, "/receiver", scene.light, source);
   check_lights(scene, source);

@@ -38,6 +38,7 @@ struct FieldDescription {
   std::string name;                             ///< Name of the field in the file; empty: the only field.
   std::optional<GenerateDescription> generate;  ///< Generated field, instead of a file.
   Derive derive = Derive::none;
+  double smooth = 0;  ///< Deviation of the Gaussian that smooths the field, voxels; 0: none.
   Eigenvalues eigenvalues = Eigenvalues::automatic;
   Interpolation interpolation = Interpolation::cubic;
   BorderChoice border = BorderChoice::automatic;
@@ -110,6 +111,7 @@ struct LightSourceDescription {
   Eigen::Vector2d size{1, 1};                ///< area: width and height.
   std::optional<Eigen::Vector3d> position;   ///< point: world.
   std::filesystem::path file;                ///< environment: a latitude-longitude picture.
+  std::string layer;                         ///< environment: layer of the file; empty: any.
   double rotation = 0;                       ///< environment: rotation about +z, degrees.
   LightCaustic caustic = LightCaustic::automatic;
   std::string group;  ///< Its light is also a layer of the EXR with this name; empty: it is not.
@@ -134,8 +136,11 @@ enum class Pattern { none, checkerboard };
 struct ObjectDescription {
   std::optional<PlateDescription> plate;
   std::filesystem::path file;  ///< A mesh.
+  /// Of a mesh: edges look smooth where triangles are turned by at most this, degrees; none: as its normals say.
+  std::optional<double> smooth_angle;
   std::optional<PathsDescription> paths;
   std::variant<Pattern, std::filesystem::path> texture = Pattern::none;  ///< Of a plate; a pattern or a picture.
+  std::string texture_layer;                                             ///< Layer of the picture; empty: any.
   int squares = 16;                                                      ///< checkerboard: along the shorter side.
   MaterialDescription material;
 };
@@ -161,9 +166,9 @@ struct OutputDescription {
   std::map<std::string, std::filesystem::path> files;  ///< Files to write, by Output::key.
   bool fluence_bands = false;                          ///< Whether `fluence` also has a grid for each band.
   std::optional<double> exposure;                      ///< Exposure of `image` in stops; none: "auto".
-  bool white_balance = true;   ///< Whether the white of the light is adapted to that of the working space.
-  std::filesystem::path ocio;  ///< OCIO config; empty: $OCIO, or the built-in one.
-  std::string display, view;   ///< Empty: the default of the config.
+  bool white_balance = true;  ///< Whether the white of the light is adapted to that of the working space.
+  std::string ocio;           ///< OCIO config, as of ColorSettings; empty: $OCIO, or the built-in one.
+  std::string display, view;  ///< Empty: the default of the config.
 
   bool wants(const std::string& key) const { return files.count(key) > 0; }
 };
@@ -179,8 +184,10 @@ struct SceneDescription {
   ReceiverDescription receiver;
   IntegratorDescription integrator;
   CameraDescription camera;
-  std::vector<LightSourceDescription> lights;  ///< Empty: a white sky and a lamp.
-  std::vector<ObjectDescription> objects;      ///< Empty: a floor.
+  std::vector<LightSourceDescription> lights;
+  std::vector<ObjectDescription> objects;
+  bool default_lights = true;   ///< No `lights` are given: there are a white sky and a lamp, or a sky and the sun.
+  bool default_objects = true;  ///< No `objects` are given: there is a floor.
   OutputDescription output;
   std::vector<std::string> warnings;  ///< Likely mistakes that are allowed; one line each.
 };

@@ -4,14 +4,16 @@
 
 #include <fmt/core.h>
 
+#include "renderer/color/color.h"
+
 namespace tensorray {
 
 std::vector<NamedFile> input_files(const SceneDescription& scene) {
-  std::vector<NamedFile> files{{scene.path, "the scene file"},
-                               {scene.field.file, "`/field/file`"},
-                               {scene.field.bounds, "`/field/bounds`"},
-                               {scene.output.ocio, "`/output/ocio`"}};
-  if (const char* config = std::getenv("OCIO")) files.push_back({config, "$OCIO"});
+  std::vector<NamedFile> files{
+      {scene.path, "the scene file"}, {scene.field.file, "`/field/file`"}, {scene.field.bounds, "`/field/bounds`"}};
+  if (!is_library_config(scene.output.ocio)) files.push_back({scene.output.ocio, "`/output/ocio`"});
+  const char* const config = std::getenv("OCIO");
+  if (config && !is_library_config(config)) files.push_back({config, "$OCIO"});
   if (const auto* spectrum = std::get_if<std::filesystem::path>(&scene.light.spectrum))
     files.push_back({*spectrum, "`/light/spectrum`"});
   for (std::size_t i = 0; i < scene.obstacles.size(); ++i)

@@ -19,6 +19,7 @@
 #include "scenes/description/choices.h"
 #include "scenes/description/description.h"
 #include "scenes/keys/limits.h"
+#include "volumes/tensors/smoothing.h"
 
 namespace tensorray {
 
@@ -33,6 +34,8 @@ void describe(FieldDescription& field, Visitor& visit) {
   visit.generator("generate", field.generate, "an analytic field instead of a file");
   visit("derive", field.derive,
         "derivative that makes the tensor: gradient of a vector grid, hessian of a scalar grid");
+  visit("smooth", field.smooth, "standard deviation of a Gaussian that smooths the field first, voxels; 0 is none",
+        between(0, greatest_smoothing));
   visit("eigenvalues", field.eigenvalues,
         "preprocessing: as they are, |T| or (T^2)^(1/2); auto is absolute where the field is symmetric, else raw");
   visit("interpolation", field.interpolation, "what the field is between its voxels: smooth (cubic), or linear");
@@ -137,6 +140,7 @@ void describe(LightSourceDescription& light, Visitor& visit) {
   visit("size", light.size, "area: width and height, world units", above(0));
   visit("position", light.position, "point: where it is, world");
   visit("file", light.file, "environment: a latitude-longitude picture");
+  visit("layer", light.layer, "environment: layer of the file (.exr); default: R, G, B, or the first layer");
   visit("rotation", light.rotation, "environment: rotation about +z, degrees");
   visit("caustic", light.caustic,
         "directional, point, area: how integrator `scene` finds light that comes through the field to objects");
@@ -146,7 +150,7 @@ void describe(LightSourceDescription& light, Visitor& visit) {
   visit.only_for({"caustic"}, "kind", light.kind, {LightKind::directional, LightKind::point, LightKind::area});
   visit.only_for({"center", "size"}, "kind", light.kind, {LightKind::area});
   visit.only_for({"position"}, "kind", light.kind, {LightKind::point});
-  visit.only_for({"file", "rotation"}, "kind", light.kind, {LightKind::environment});
+  visit.only_for({"file", "layer", "rotation"}, "kind", light.kind, {LightKind::environment});
 }
 
 template <class Visitor>
@@ -168,9 +172,13 @@ void describe(ObjectDescription& object, Visitor& visit) {
   visit.exactly_one({"plate", "file", "paths"});
   visit.section("plate", object.plate, "a flat rectangle");
   visit("file", object.file, "a mesh");
+  visit("smooth_angle", object.smooth_angle,
+        "of a mesh: edges look smooth up to this angle between triangles, degrees; auto takes the file's normals",
+        between(0, 180).or_word("auto"));
   visit.section("paths", object.paths,
                 "bent rays as tubes, with the seeds, style, radius and colours of `integrator` (path_tracing)");
   visit("texture", object.texture, "of a plate: a pattern, or a picture whose colours are its reflectance");
+  visit("texture_layer", object.texture_layer, "of a picture: layer of the file (.exr)");
   visit("squares", object.squares, "checkerboard: squares along the shorter side", between(1, 4096));
   visit.section("material", object.material, "material; the brighter squares of a checkerboard have its colour");
 }
@@ -192,7 +200,8 @@ void describe(OutputDescription& output, Visitor& visit) {
   visit("fluence_bands", output.fluence_bands, "write a further grid to `fluence` for each band of wavelengths");
   visit("exposure", output.exposure, "exposure of `image`, stops", between(-100, 100).or_word("auto"));
   visit("white_balance", output.white_balance, "adapt the light's white to the working space's");
-  visit("ocio", output.ocio, "OpenColorIO config; default: $OCIO, or the built-in one");
+  visit("ocio", output.ocio,
+        "OpenColorIO config: a file, ocio://NAME, or built-in; default: $OCIO, or the built-in one");
   visit("display", output.display, "OpenColorIO display; default: that of the config");
   visit("view", output.view, "OpenColorIO view; default: that of the display");
 }

@@ -36,6 +36,7 @@ enum class Overlay { none, grid };
 struct LensDescription {
   LensMode mode = LensMode::scatter;
   std::variant<TestImage, std::filesystem::path> image = TestImage::checkerboard;
+  std::string image_layer;        ///< Layer of the file; empty: any.
   std::string image_color_space;  ///< OpenColorIO colour space of the file; empty: "auto".
   ImagePlaneDescription plane;
   Wrap wrap = Wrap::none;
@@ -90,6 +91,7 @@ void describe(LensDescription& lens, Visitor& visit) {
   visit("image", lens.image, "lens: the picture that is seen: a file, or checkerboard, grid, color_wheel, line");
   visit("image_color_space", lens.image_color_space, "lens: OpenColorIO space of the file; auto: by its format",
         Limits().or_word("auto"));
+  visit("image_layer", lens.image_layer, "lens: layer of the file (.exr); default: R, G, B, or the first layer");
   visit.section("image_plane", lens.plane, "lens: position and size of the image");
   visit("wrap", lens.wrap, "lens: how the image continues beyond its edges (gather)");
   visit("samples", lens.samples, "lens: samples of a pixel along x and along y", between(1, 16));

@@ -158,13 +158,11 @@ class LoadedLens : public LoadedMethod {
   LensScene lens_;
 };
 
-/// Puts spectral pictures side by side. A white image has the radiance of a white diffuse surface in the scene's light.
+/// Puts spectral pictures side by side.
 SpectralImage spectra_side_by_side(std::vector<SpectralImage> spectra) {
   std::vector<Image> images;
   for (SpectralImage& spectrum : spectra) images.push_back(std::move(spectrum.image));
-  SpectralImage all{side_by_side(images), spectra.front().metadata};
-  all.metadata["emissiveUnits"] = "W.m^-2.sr^-1.nm^-1";
-  return all;
+  return {side_by_side(images), spectra.front().metadata};
 }
 
 Render LoadedLens::render(const Scene& scene, const Progress& progress, RenderJob*) const {
@@ -197,7 +195,9 @@ Render LoadedLens::render(const Scene& scene, const Progress& progress, RenderJo
     add_statistics(picture, result.statistics);
     result.statistics.seconds_tracing += light.seconds_tracing;
     if (by_channel)
-      spectra.push_back(spectral_image(picture.radiance, scene.bands, scene.description.light.irradiance / pi, matrix));
+      // A white image has the radiance of a white diffuse surface in the scene's light.
+      spectra.push_back(spectral_image(picture.radiance, scene.bands, SpectralQuantity::radiance,
+                                       scene.description.light.irradiance / pi, matrix));
   }
   result.linear = side_by_side(pictures);
   if (!spectra.empty()) result.spectral = spectra_side_by_side(std::move(spectra));
@@ -238,8 +238,8 @@ class LensMethod : public MethodWith<LensDescription> {
     check_receiver_memory(scene, 1200 + 2.0 * sizeof(float) * (15 + channels) * pictures, source);
   }
 
-  std::unique_ptr<const LoadedMethod> load(const Scene& scene, std::vector<std::string>&) const override {
-    return std::make_unique<LoadedLens>(settings(), load_lens(scene, settings()));
+  std::unique_ptr<const LoadedMethod> load(const Scene& scene, std::vector<std::string>& notes) const override {
+    return std::make_unique<LoadedLens>(settings(), load_lens(scene, settings(), notes));
   }
 };
 

@@ -32,11 +32,12 @@ Image load_test_image(TestImage which, const Plate& receiver, const ColorManagem
 /// Whether the image continues beyond its edges. In the mode `scatter` light starts from the image only.
 bool goes_on(const LensDescription& lens) { return lens.wrap != Wrap::none && lens.mode == LensMode::gather; }
 
-Texture load_image(const LensDescription& lens, const Plate& receiver, const ColorManagement& color) {
+Texture load_image(const LensDescription& lens, const Plate& receiver, const ColorManagement& color,
+                   std::vector<std::string>& notes) {
   const Wrap wrap = goes_on(lens) ? lens.wrap : Wrap::clamp;  // The lens cuts clamped images sharply at their edges.
   if (const TestImage* which = std::get_if<TestImage>(&lens.image))
     return {load_test_image(*which, receiver, color), wrap};
-  return {std::get<std::filesystem::path>(lens.image), color, lens.image_color_space, wrap};
+  return {std::get<std::filesystem::path>(lens.image), color, lens.image_color_space, wrap, lens.image_layer, &notes};
 }
 
 /// The plate as it is seen from its other side.
@@ -56,10 +57,10 @@ Eigen::Vector2d covering_size(const Plate& receiver, const Texture& image) {
 
 }  // namespace
 
-LensScene load_lens(const Scene& scene, const LensDescription& lens) {
+LensScene load_lens(const Scene& scene, const LensDescription& lens, std::vector<std::string>& notes) {
   const Eigen::Vector3d& direction = scene.beam.direction;
   const Plate receiver = from_behind(*scene.geometry.surfaces().plate);
-  LensScene result{load_image(lens, receiver, scene.color), receiver, {}, goes_on(lens)};
+  LensScene result{load_image(lens, receiver, scene.color, notes), receiver, {}, goes_on(lens)};
 
   Plate plane = receiver;
   if (lens.plane.normal || lens.plane.up) {

@@ -20,6 +20,6 @@ struct LensScene {
 };
 
 /// @throw std::runtime_error if the image cannot be read; SceneError if the image would be behind the receiver.
-LensScene load_lens(const Scene& scene, const LensDescription& lens);
+LensScene load_lens(const Scene& scene, const LensDescription& lens, std::vector<std::string>& notes);
 
 }  // namespace tensorray

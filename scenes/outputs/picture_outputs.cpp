@@ -4,22 +4,36 @@
 #include <cmath>
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include "volumes/files/scalar_files.h"
 
 namespace tensorray {
 namespace {
 
+/// Marks a file with the display that its colours are for; with nothing if that is not known.
+void add_display(const Scene& scene, const Render& render, ImageMetadata& metadata) {
+  const DisplayEncoding& encoding = scene.color.display_encoding();
+  if (render.display || encoding.is_srgb) return;  // Files are sRGB unless they say otherwise.
+  metadata["oiio:ColorSpace"] = "";
+  if (!encoding.icc_profile.empty()) metadata["ICCProfile"] = encoding.icc_profile;
+}
+
 void write_display(const std::filesystem::path& file, const Scene& scene, const Render& render) {
-  write_image(file, display_image(scene, render, holds_alpha(file)), provenance(scene, render));
+  ImageMetadata metadata = provenance(scene, render);
+  add_display(scene, render, metadata);
+  write_image(file, display_image(scene, render, holds_alpha(file)), metadata);
 }
 
 void write_linear(const std::filesystem::path& file, const Scene& scene, const Render& render) {
-  write_image(file, render.linear, provenance(scene, render));
+  ImageMetadata metadata = provenance(scene, render);
+  metadata["chromaticities"] = fmt::format("{}", fmt::join(scene.color.working_chromaticities(), " "));
+  write_image(file, render.linear, metadata);
 }
 
 void write_spectral(const std::filesystem::path& file, const Scene& scene, const Render& render) {
   ImageMetadata metadata = provenance(scene, render);
+  metadata["chromaticities"] = fmt::format("{}", fmt::join(scene.color.working_chromaticities(), " "));  // Of R, G, B.
   metadata.insert(render.spectral->metadata.begin(), render.spectral->metadata.end());
   write_image(file, render.spectral->image, metadata);
 }

@@ -5,9 +5,11 @@
 
 #include <fmt/format.h>
 
+#include "base/constants.h"
 #include "renderer/color/color.h"
 #include "renderer/color/colormap.h"
 #include "renderer/film/spectral_image.h"
+#include "renderer/surfaces/mesh.h"
 #include "scenes/path_tracing/path_tracing_keys.h"
 #include "scenes/photons/plate_light.h"
 #include "volumes/bricks/tensor_sampler.h"
@@ -143,6 +145,19 @@ ShadedSurface make_slice(const Scene& scene, const ShownLight& light, const Slic
   return surface;
 }
 
+}  // namespace
+
+ShadedSurface read_mesh_surface(const std::filesystem::path& file, std::optional<double> smooth_angle) {
+  if (smooth_angle) *smooth_angle *= pi / 180;
+  MeshWithNormals read = read_mesh_with_normals(file, smooth_angle);
+  ShadedSurface surface;
+  surface.shape = std::move(read.mesh);
+  surface.normals = std::move(read.normals);
+  return surface;
+}
+
+namespace {
+
 ShadedSurface make_isosurface(const Scene& scene, const IsosurfaceDescription& description) {
   Isosurface found = isosurface(scene.field, description.invariant, description.value);
   if (found.mesh.triangles.empty())
@@ -201,11 +216,8 @@ void add_context(const Scene& scene, const PathScene& paths, const Progress& pro
   };
   if (context.box) add_surface(box_edges(scene.field), plain(0.12, 1));
   if (context.obstacles)
-    for (const TriangleMesh& mesh : scene.geometry.surfaces().obstacles) {
-      ShadedSurface surface;
-      surface.shape = mesh;
-      add_surface(std::move(surface), plain(0.6, 0.5));
-    }
+    for (const std::filesystem::path& file : scene.description.obstacles)
+      add_surface(read_mesh_surface(file), plain(0.6, 0.5));
   if (context.plate) add_surface(lit_plate(scene, progress), plain(0.8, 1));
   if (context.slice) add_surface(make_slice(scene, paths.lights.light, *context.slice), plain(0.8, 1));
   for (const IsosurfaceDescription& each : context.isosurfaces)

@@ -2,6 +2,8 @@
 /// @file scenes/path_tracing/context_surfaces.h
 /// The other surfaces in a picture of paths: the volume's edges, obstacles, the plate, a slice, isosurfaces.
 
+#include <filesystem>
+#include <optional>
 #include <vector>
 
 #include "base/progress.h"
@@ -14,6 +16,10 @@ namespace tensorray {
 /// Makes a material from its description, for the bands of the light that shows the paths.
 /// @throw std::invalid_argument if a metal is unknown.
 Material load_material(const MaterialDescription& description, const ShownLight& light);
+
+/// A mesh as a surface that is shaded with its normals.
+/// @param smooth_angle  As of ObjectDescription. @throw as read_mesh.
+ShadedSurface read_mesh_surface(const std::filesystem::path& file, std::optional<double> smooth_angle = {});
 
 /// Adds the scene's context to `surfaces`, and the materials that it needs to `materials`.
 /// @throw SceneError if a slice or an isosurface is empty; Cancelled (photons are traced for the plate).

@@ -106,9 +106,10 @@ std::vector<PathSeed> seeds_of(const SeedList& list, const std::vector<LightChan
 /// Gives each channel of the picture the spectrum of its primary of Rec. 709, which reflectances can have. Spectra add
 /// as colours do, so that every colour of the picture is then right.
 EnvironmentLight load_environment(const LightSourceDescription& description, const ColorManagement& color,
-                                  const ShownLight& light) {
+                                  const ShownLight& light, std::vector<std::string>& notes) {
   EnvironmentLight environment;
-  environment.picture = load_rec709(description.file, color, light.rec709_to_working.inverse());
+  environment.picture =
+      load_rec709({description.file, description.layer}, color, light.rec709_to_working.inverse(), notes);
   environment.channel_spectra.resize(static_cast<Eigen::Index>(light.bands.size()), 3);
   for (int c = 0; c < 3; ++c) {
     const std::vector<float> spectrum =
@@ -136,10 +137,11 @@ void count_ends(const Scene& scene, const std::vector<Path>& paths, Statistics& 
 
 }  // namespace
 
-Image load_rec709(const std::filesystem::path& file, const ColorManagement& color, const Eigen::Matrix3d& to_rec709) {
-  const NativeImage native = read_native_image(file);
-  const ColorConversion to_working =
-      color.to_working(color.texture_space(file, native.type != SampleType::float32, ""));
+Image load_rec709(const PictureFile& file, const ColorManagement& color, const Eigen::Matrix3d& to_rec709,
+                  std::vector<std::string>& notes) {
+  const NativeImage native = read_native_image(file.path, file.layer);
+  add_notes(file.path, native, notes);
+  const ColorConversion to_working = color.picture_conversion(file.path, native, "", notes);
   Image image(native.width, native.height, {"R", "G", "B"});
   std::vector<float> row(4 * static_cast<std::size_t>(native.width));
   for (int y = 0; y < native.height; ++y) {
@@ -152,12 +154,12 @@ Image load_rec709(const std::filesystem::path& file, const ColorManagement& colo
   return image;
 }
 
-ShownLights load_lights(const Scene& scene, int bands) {
+ShownLights load_lights(const Scene& scene, int bands, std::vector<std::string>& notes) {
   const SceneDescription& description = scene.description;
   ShownLights lights{shown_light(scene.color, load_spectrum(description.light.spectrum), bands), {}};
   for (const LightSourceDescription& each : description.lights)
     if (each.kind == LightKind::environment)
-      lights.environments.push_back(load_environment(each, scene.color, lights.light));
+      lights.environments.push_back(load_environment(each, scene.color, lights.light, notes));
   return lights;
 }
 
@@ -168,9 +170,9 @@ std::vector<float> ShownLight::radiance(const Eigen::Vector3d& rec709, double fa
   return values;
 }
 
-PathScene load_paths(const Scene& scene, const PathTracingDescription& settings) {
+PathScene load_paths(const Scene& scene, const PathTracingDescription& settings, std::vector<std::string>& notes) {
   const SceneDescription& description = scene.description;
-  PathScene paths{settings, {}, {}, load_lights(scene, settings.bands)};
+  PathScene paths{settings, {}, {}, load_lights(scene, settings.bands, notes)};
   if (!settings.paths.empty()) {
     paths.paths = read_paths(settings.paths);
   } else {

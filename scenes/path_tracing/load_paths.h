@@ -31,12 +31,20 @@ struct ShownLights {
   std::vector<EnvironmentLight> environments;  ///< The environments among the scene's lights, in their order.
 };
 
-/// @param bands  Number of bands.
+/// @param bands  Number of bands. @param notes  Gets warnings.
 /// @throw std::runtime_error naming the file that cannot be read.
-ShownLights load_lights(const Scene& scene, int bands);
+ShownLights load_lights(const Scene& scene, int bands, std::vector<std::string>& notes);
 
-/// Reads a picture and converts it to linear Rec. 709. @throw std::runtime_error naming the file.
-Image load_rec709(const std::filesystem::path& file, const ColorManagement& color, const Eigen::Matrix3d& to_rec709);
+/// A picture file, and which of its layers counts; empty: any.
+struct PictureFile {
+  std::filesystem::path path;
+  std::string layer;
+};
+
+/// Reads a picture and converts it to linear Rec. 709. @param notes  Gets warnings. @throw std::runtime_error naming
+/// the file.
+Image load_rec709(const PictureFile& file, const ColorManagement& color, const Eigen::Matrix3d& to_rec709,
+                  std::vector<std::string>& notes);
 
 struct PathScene {
   PathTracingDescription settings;
@@ -47,7 +55,7 @@ struct PathScene {
 
 /// @throw std::runtime_error naming the file that cannot be read; SceneError if a value of the scene does not fit the
 /// loaded data.
-PathScene load_paths(const Scene& scene, const PathTracingDescription& settings);
+PathScene load_paths(const Scene& scene, const PathTracingDescription& settings, std::vector<std::string>& notes);
 
 /// Follows the rays, counts them by channel and end, and leaves out those that do not meet the volume.
 /// @param tensors  Whether the points of paths need the tensor (PathSettings).

@@ -168,7 +168,8 @@ Render LoadedPaths::render(const Scene& scene, const Progress& progress, RenderJ
   const auto add_picture = [&](const SurfacePicture& picture, Render& render) {
     render.linear = make_image(picture, light, description, groups);
     if (output.wants("spectral"))
-      render.spectral = spectral_image(picture.radiance, light.bands, 1, light.xyz_to_working);
+      render.spectral =
+          spectral_image(picture.radiance, light.bands, SpectralQuantity::radiance, 1, light.xyz_to_working);
   };
   const RenderCallbacks callbacks = callbacks_of(progress, job, [&](const SurfacePicture& picture) {
     Render shown = result;
@@ -225,8 +226,8 @@ class PathTracingMethod : public MethodWith<PathTracingDescription> {
 
   void check(SceneDescription& scene, const Json& json, const SceneSource& source, bool chosen) const override;
 
-  std::unique_ptr<const LoadedMethod> load(const Scene& scene, std::vector<std::string>&) const override {
-    return std::make_unique<LoadedPaths>(load_paths(scene, settings()));
+  std::unique_ptr<const LoadedMethod> load(const Scene& scene, std::vector<std::string>& notes) const override {
+    return std::make_unique<LoadedPaths>(load_paths(scene, settings(), notes));
   }
 };
 

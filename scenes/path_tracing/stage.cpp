@@ -16,7 +16,7 @@ PathTracerSettings tracer_settings(const SceneDescription& scene, const PathTrac
   PathTracerSettings settings;
   settings.shading.shading = description.shading;
   settings.shading.max_depth = description.max_depth;
-  double strength = scene.lights.empty() ? 1 : 0;
+  double strength = scene.default_lights ? 1 : 0;
   for (const LightSourceDescription& light : scene.lights) strength = std::max(strength, light.strength);
   settings.shading.indirect_clamp = description.indirect_clamp * strength;  // Bright lights must not become darker.
   settings.filter = PixelFilter(description.filter);

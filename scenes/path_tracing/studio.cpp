@@ -78,7 +78,7 @@ Camera make_camera(const CameraDescription& description, const std::vector<Eigen
 }
 
 std::vector<Light> make_lights(const SceneDescription& description, const ShownLights& shown, const Camera& camera) {
-  if (description.lights.empty()) {
+  if (description.default_lights) {
     const Eigen::Vector3d white = Eigen::Vector3d::Ones();
     DirectionalLight key;
     key.direction = camera.forward + 0.6 * camera.right - 0.9 * camera.up;

@@ -73,7 +73,8 @@ Render LoadedPhotons::render(const Scene& scene, const Progress& progress, Rende
   const bool has_map = !light.map.triangles.empty() && description.output.wants("exr");
   result.linear = has_map ? with_channels(light.linear, plate_map(light.map, scene)) : std::move(light.linear);
   if (description.output.wants("spectral"))
-    result.spectral = spectral_image(light.irradiance, scene.bands, description.light.irradiance, to_working(scene));
+    result.spectral = spectral_image(light.irradiance, scene.bands, SpectralQuantity::irradiance,
+                                     description.light.irradiance, to_working(scene));
   result.photons = std::move(light.photons);
   result.grids = std::move(light.fluence);
   name_fluence(scene, result.grids);

@@ -12,6 +12,7 @@
 #include "volumes/files/tensor_files.h"
 #include "volumes/grids/page_memory.h"
 #include "volumes/tensors/field_making.h"
+#include "volumes/tensors/smoothing.h"
 
 namespace tensorray {
 namespace {
@@ -41,7 +42,7 @@ TensorGrid load_grid(const SceneDescription& scene) {
 /// The blocks of the field; nothing if it must be read as a whole.
 std::optional<BlockSource> load_blocks(const SceneDescription& scene) {
   const FieldDescription& field = scene.field;
-  if (memory_bound()) return std::nullopt;
+  if (memory_bound() || field.smooth > 0) return std::nullopt;
   if (field.generate) return generated(scene, generator_source);
   return field.derive == Derive::none ? open_tensor_vdb(field.file, field.name) : std::nullopt;
 }
@@ -53,8 +54,8 @@ std::string source_of(const FieldDescription& field) {
 LoadedField load_field(const SceneDescription& scene) {
   const FieldDescription& field = scene.field;
   if (const std::optional<BlockSource> blocks = load_blocks(scene))
-    return prepare_field(*blocks, field.eigenvalues, interpolant_of(scene), source_of(field));
-  return prepare_field(load_grid(scene), field.eigenvalues, interpolant_of(scene), source_of(field));
+    return prepare_field(*blocks, choices_of(scene), source_of(field));
+  return prepare_field(load_grid(scene), choices_of(scene), source_of(field));
 }
 
 TriangleMesh load_closed_mesh(const std::filesystem::path& path) {
@@ -330,14 +331,23 @@ Interpolant interpolant_of(const SceneDescription& description) {
   return {field.interpolation, extends ? Border::extend : Border::fade};
 }
 
-LoadedField prepare_field(TensorGrid grid, Eigenvalues mode, const Interpolant& interpolant,
-                          const std::string& source) {
-  return with_notes(make_field(std::move(grid), mode, interpolant), source);
+FieldChoices choices_of(const SceneDescription& description) {
+  return {description.field.smooth, description.field.eigenvalues, interpolant_of(description)};
 }
 
-LoadedField prepare_field(const BlockSource& blocks, Eigenvalues mode, const Interpolant& interpolant,
-                          const std::string& source) {
-  return with_notes(make_field(blocks, mode, interpolant), source);
+LoadedField prepare_field(TensorGrid grid, const FieldChoices& choices, const std::string& source) {
+  const std::size_t non_finite = remove_non_finite(grid);
+  smooth(grid, choices.smoothing);
+  MadeField made = make_field(std::move(grid), choices.eigenvalues, choices.interpolant);
+  made.non_finite = non_finite;
+  LoadedField loaded = with_notes(std::move(made), source);
+  if (choices.smoothing > 0)
+    loaded.notes.push_back(fmt::format("field smoothed: a Gaussian of {:g} voxels", choices.smoothing));
+  return loaded;
+}
+
+LoadedField prepare_field(const BlockSource& blocks, const FieldChoices& choices, const std::string& source) {
+  return with_notes(make_field(blocks, choices.eigenvalues, choices.interpolant), source);
 }
 
 Scene load_scene(const SceneDescription& description, const Progress& progress) {

@@ -59,14 +59,27 @@ struct LoadedField {
   std::vector<std::string> notes;
 };
 
-/// Removes voxels that are not finite, and preprocesses the others.
-/// @param source  Names the field in notes and errors. @throw std::runtime_error if no voxel is left.
-LoadedField prepare_field(TensorGrid grid, Eigenvalues mode, const Interpolant& interpolant, const std::string& source);
-LoadedField prepare_field(const BlockSource& blocks, Eigenvalues mode, const Interpolant& interpolant,
-                          const std::string& source);
+/// What is made of a field's voxels.
+struct FieldChoices {
+  double smoothing = 0;  ///< Deviation of a Gaussian, voxels; 0: none.
+  Eigenvalues eigenvalues = Eigenvalues::automatic;
+  Interpolant interpolant;
+};
 
-/// What the field of a scene is between its voxels.
+inline bool operator!=(const FieldChoices& a, const FieldChoices& b) {
+  return a.smoothing != b.smoothing || a.eigenvalues != b.eigenvalues || a.interpolant != b.interpolant;
+}
+
+/// What the field of a scene is between its voxels, and all choices.
 Interpolant interpolant_of(const SceneDescription& description);
+FieldChoices choices_of(const SceneDescription& description);
+
+/// Removes voxels that are not finite, smooths the others, and then changes their eigenvalues.
+/// @param source  Names the field in notes and errors. @throw std::runtime_error if no voxel is left.
+LoadedField prepare_field(TensorGrid grid, const FieldChoices& choices, const std::string& source);
+
+/// The same; the choices have no smoothing, which needs a grid.
+LoadedField prepare_field(const BlockSource& blocks, const FieldChoices& choices, const std::string& source);
 
 /// SceneDescription → Scene: loads fields, meshes and spectra, and chooses all values that the scene leaves open.
 /// @throw std::runtime_error, one line that names the file and the fix; SceneError if a value of the scene does not fit

@@ -4,7 +4,6 @@
 #include <cmath>
 
 #include "renderer/lights/lights.h"
-#include "renderer/surfaces/mesh.h"
 #include "scenes/path_tracing/context_surfaces.h"
 #include "scenes/path_tracing/path_colors.h"
 #include "scenes/path_tracing/path_surfaces.h"
@@ -45,9 +44,9 @@ SurfaceTexture checkerboard(Plate plate, int squares, const Eigen::Vector3f& bri
   return texture;
 }
 
-SurfaceTexture picture(Plate plate, const std::filesystem::path& file, const ColorManagement& color,
-                       const Eigen::Matrix3d& rec709_to_working) {
-  const Image image = load_rec709(file, color, rec709_to_working.inverse());
+SurfaceTexture picture(Plate plate, const PictureFile& file, const ColorManagement& color,
+                       const Eigen::Matrix3d& rec709_to_working, std::vector<std::string>& notes) {
+  const Image image = load_rec709(file, color, rec709_to_working.inverse(), notes);
   SurfaceTexture texture;
   plate.resolution = {image.width, image.height};
   texture.plate = plate;
@@ -69,21 +68,22 @@ Plate make_plate(const PlateDescription& description) {
 }
 
 /// Paths with all that `integrator` says of them, but for their number.
-PathScene load_path_object(const PathsDescription& description, const Scene& scene, PathTracingDescription tracing) {
+PathScene load_path_object(const PathsDescription& description, const Scene& scene, PathTracingDescription tracing,
+                           std::vector<std::string>& notes) {
   if (description.count) tracing.seeds.count = *description.count;
-  return load_paths(scene, tracing);
+  return load_paths(scene, tracing, notes);
 }
 
 SceneObject load_object(const ObjectDescription& description, const Scene& scene, const PathTracingDescription& tracing,
-                        const ShownLight& light) {
+                        const ShownLight& light, std::vector<std::string>& notes) {
   SceneObject object;
   object.material = description.material;
   if (description.paths) {
-    object.paths = load_path_object(*description.paths, scene, tracing);
+    object.paths = load_path_object(*description.paths, scene, tracing, notes);
     return object;
   }
   if (!description.plate) {
-    object.surface.shape = read_mesh(description.file);
+    object.surface = read_mesh_surface(description.file, description.smooth_angle);
     return object;
   }
   const Plate plate = make_plate(*description.plate);
@@ -92,8 +92,8 @@ SceneObject load_object(const ObjectDescription& description, const Scene& scene
   const Eigen::Vector3f bright =
       (light.rec709_to_working * description.material.color).cwiseMax(0).cwiseMin(1).cast<float>();
   if (const auto* file = std::get_if<std::filesystem::path>(&description.texture))
-    object.surface.texture =
-        std::make_shared<SurfaceTexture>(picture(plate, *file, scene.color, light.rec709_to_working));
+    object.surface.texture = std::make_shared<SurfaceTexture>(
+        picture(plate, {*file, description.texture_layer}, scene.color, light.rec709_to_working, notes));
   else if (std::get<Pattern>(description.texture) == Pattern::checkerboard)
     object.surface.texture = std::make_shared<SurfaceTexture>(checkerboard(plate, description.squares, bright));
   return object;
@@ -102,14 +102,15 @@ SceneObject load_object(const ObjectDescription& description, const Scene& scene
 }  // namespace
 
 std::vector<SceneObject> load_objects(const Scene& scene, const PathTracingDescription& tracing,
-                                      const ShownLights& lights) {
+                                      const ShownLights& lights, std::vector<std::string>& notes) {
   std::vector<ObjectDescription> descriptions = scene.description.objects;
-  if (descriptions.empty()) descriptions.push_back(default_floor(scene.field));
+  if (scene.description.default_objects) descriptions.push_back(default_floor(scene.field));
   std::vector<SceneObject> objects;
-  for (const ObjectDescription& each : descriptions) objects.push_back(load_object(each, scene, tracing, lights.light));
-  for (const TriangleMesh& mesh : scene.geometry.surfaces().obstacles) {
+  for (const ObjectDescription& each : descriptions)
+    objects.push_back(load_object(each, scene, tracing, lights.light, notes));
+  for (const std::filesystem::path& file : scene.description.obstacles) {
     SceneObject obstacle;
-    obstacle.surface.shape = mesh;
+    obstacle.surface = read_mesh_surface(file);
     objects.push_back(std::move(obstacle));
   }
   return objects;

@@ -27,7 +27,7 @@ struct SceneObject {
 /// The objects of the scene (without any, a checkerboard as floor below the volume), then its obstacles.
 /// @throw std::runtime_error naming the file that cannot be read; SceneError if seeds of paths are wrong.
 std::vector<SceneObject> load_objects(const Scene& scene, const PathTracingDescription& tracing,
-                                      const ShownLights& lights);
+                                      const ShownLights& lights, std::vector<std::string>& notes);
 
 /// Follows the paths of objects that consist of paths, and makes their tubes.
 /// @param tolerance  Greatest distance of triangles from the tubes, world units.

@@ -144,7 +144,7 @@ void face(double side, LandedLight& light) {
 }  // namespace
 
 std::vector<Light> whole_lights(const Scene& scene, const ShownLights& shown, const Camera& camera) {
-  if (scene.description.lights.empty()) return default_lights(scene, shown.light);
+  if (scene.description.default_lights) return default_lights(scene, shown.light);
   return make_lights(scene.description, shown, camera);
 }
 

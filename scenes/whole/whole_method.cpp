@@ -214,7 +214,8 @@ Render LoadedWhole::render(const Scene& scene, const Progress& progress, RenderJ
   const auto add_picture = [&](const SurfacePicture& picture, Render& render) {
     render.linear = make_image(picture, light, whole_.tracing, groups);
     if (scene.description.output.wants("spectral"))
-      render.spectral = spectral_image(picture.radiance, light.bands, 1, light.xyz_to_working);
+      render.spectral =
+          spectral_image(picture.radiance, light.bands, SpectralQuantity::radiance, 1, light.xyz_to_working);
   };
   result.exposure = 0;
   const RenderCallbacks callbacks = callbacks_of(progress, job, [&](const SurfacePicture& picture) {
@@ -247,10 +248,10 @@ class WholeMethod : public MethodWith<WholeDescription> {
   void check_photons(const SceneDescription& scene, const PathTracingDescription& tracing,
                      const SceneSource& source) const;
 
-  std::unique_ptr<const LoadedMethod> load(const Scene& scene, std::vector<std::string>&) const override {
+  std::unique_ptr<const LoadedMethod> load(const Scene& scene, std::vector<std::string>& notes) const override {
     const auto& tracing = scene.description.integrator.settings<PathTracingDescription>();
-    WholeScene whole{settings(), tracing, load_lights(scene, tracing.bands), {}};
-    whole.objects = load_objects(scene, tracing, whole.lights);
+    WholeScene whole{settings(), tracing, load_lights(scene, tracing.bands, notes), {}};
+    whole.objects = load_objects(scene, tracing, whole.lights, notes);
     return std::make_unique<LoadedWhole>(std::move(whole));
   }
 };

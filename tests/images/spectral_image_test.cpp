@@ -64,11 +64,16 @@ TEST(LinearImageTest, UnitBandsPassColorsOn) {
 TEST(SpectralImageTest, FollowsTheLayout) {
   const std::vector<Band> bands = make_bands(illuminant("D65"), 380, 730, 4);
   const Film film = counting_film(4, 3, 4);
-  const SpectralImage spectral = spectral_image(film, bands, 10, Eigen::Matrix3d::Identity());
+  const SpectralImage spectral =
+      spectral_image(film, bands, SpectralQuantity::irradiance, 10, Eigen::Matrix3d::Identity());
   EXPECT_EQ(spectral.image.channels, (std::vector<std::string>{"R", "G", "B", "S0.423,750000nm", "S0.511,250000nm",
                                                                "S0.598,750000nm", "S0.686,250000nm"}));
   EXPECT_EQ(spectral.metadata.at("spectralLayoutVersion"), "1.0");
   EXPECT_EQ(spectral.metadata.at("emissiveUnits"), "W.m^-2.nm^-1");
+  const SpectralImage radiance =
+      spectral_image(film, bands, SpectralQuantity::radiance, 10, Eigen::Matrix3d::Identity());
+  EXPECT_EQ(radiance.metadata.at("emissiveUnits"), "W.m^-2.sr^-1.nm^-1");
+  EXPECT_EQ(radiance.image.pixels, spectral.image.pixels);
   const Image rgb = linear_image(film, bands, Eigen::Matrix3d::Identity());
   for (int k = 0; k < 4; ++k)
     EXPECT_FLOAT_EQ(spectral.image.pixel(2, 1)[3 + k], film.plane(k)[6] * 10 * bands[k].power / bands[k].width);
@@ -79,7 +84,7 @@ TEST(SpectralImageTest, IntegratesToTheBeamsIrradiance) {
   const std::vector<Band> bands = make_bands(illuminant("A"), 400, 700, 7);
   Film film(1, 1, 7);
   film.values.assign(7, 1);
-  const Image image = spectral_image(film, bands, 2.5, Eigen::Matrix3d::Identity()).image;
+  const Image image = spectral_image(film, bands, SpectralQuantity::irradiance, 2.5, Eigen::Matrix3d::Identity()).image;
   double irradiance = 0;
   for (int k = 0; k < 7; ++k) irradiance += image.pixels[3 + k] * bands[k].width;
   EXPECT_NEAR(irradiance, 2.5, 1e-6);
@@ -92,7 +97,8 @@ TEST(SpectralImageTest, NamesHaveSixDecimalsInEveryLocale) {
   bands[2].wavelength = 1250.0000004;
   const char* const changed = std::setlocale(LC_NUMERIC, "de_DE.UTF-8");  // Null if the locale is not installed.
   for (Band& band : bands) band.width = 1;
-  const Image image = spectral_image(Film(1, 1, 3), bands, 1, Eigen::Matrix3d::Identity()).image;
+  const Image image =
+      spectral_image(Film(1, 1, 3), bands, SpectralQuantity::irradiance, 1, Eigen::Matrix3d::Identity()).image;
   std::setlocale(LC_NUMERIC, "C");
   EXPECT_EQ(image.channels[3], "S0.380,000000nm") << (changed ? changed : "C");
   EXPECT_EQ(image.channels[4], "S0.333,333333nm");
@@ -102,7 +108,8 @@ TEST(SpectralImageTest, NamesHaveSixDecimalsInEveryLocale) {
 TEST(SpectralImageTest, SurvivesTheFile) {
   const Temporary file("layout.exr");
   const std::vector<Band> bands = make_bands(illuminant("D65"), 380, 730, 32);
-  const SpectralImage spectral = spectral_image(counting_film(5, 4, 32), bands, 1, Eigen::Matrix3d::Identity());
+  const SpectralImage spectral =
+      spectral_image(counting_film(5, 4, 32), bands, SpectralQuantity::irradiance, 1, Eigen::Matrix3d::Identity());
   write_image(file.path(), spectral.image, spectral.metadata);
   const Image read = read_image(file.path());
   ASSERT_THAT(read.channels, ::testing::UnorderedElementsAreArray(spectral.image.channels));
@@ -120,8 +127,9 @@ TEST(SpectralImageTest, SurvivesTheFile) {
 
 TEST(SpectralImageTest, FilmAndBandsMustAgree) {
   EXPECT_THROW(linear_image(Film(1, 1, 2), std::vector<Band>(3), Eigen::Matrix3d::Identity()), std::invalid_argument);
-  EXPECT_THROW(spectral_image(Film(1, 1, 2), std::vector<Band>(3), 1, Eigen::Matrix3d::Identity()),
-               std::invalid_argument);
+  EXPECT_THROW(
+      spectral_image(Film(1, 1, 2), std::vector<Band>(3), SpectralQuantity::irradiance, 1, Eigen::Matrix3d::Identity()),
+      std::invalid_argument);
 }
 
 }  // namespace

@@ -430,6 +430,62 @@ TEST_F(WholeScene, RefusesWhatDoesNotFit) {
 }
 
 /// Too little time for more than the first samples, in which all bands have as many.
+TEST_F(WholeScene, EmptyListsMeanNone) {
+  // Without objects there is only the sky; without lights, nothing shines.
+  const Image sky = picture({"objects=[]", R"(lights=[{"kind":"constant","strength":0.5}])", "field.scale=1e-9"});
+  EXPECT_NEAR(mean(sky, "G"), 0.5, 1e-3);
+  EXPECT_GT(mean(picture({"objects=[]"}), "B"), 0);  // The default lights.
+  EXPECT_EQ(mean(picture({"lights=[]"}), "G"), 0);
+  EXPECT_EQ(mean(picture({"lights=[]", "objects=[]"}), "G"), 0);
+  EXPECT_GT(mean(picture({}), "G"), 0);
+  const std::vector<std::string> paths{"integrator.type=path_tracing", "integrator.background_color=[0,0,0]"};
+  EXPECT_EQ(mean(picture({paths[0], paths[1], "lights=[]"}), "G"), 0);
+  EXPECT_GT(mean(picture(paths), "G"), 0);
+}
+
+/// A sphere of few triangles about (0, 0, 4), with or without normals.
+std::string coarse_sphere(int rows, bool normals) {
+  std::string text, faces;
+  const int columns = 2 * rows;
+  for (int i = 0; i <= rows; ++i)
+    for (int j = 0; j < columns; ++j) {
+      const double theta = M_PI * i / rows, phi = 2 * M_PI * j / columns;
+      const double x = std::sin(theta) * std::cos(phi), y = std::sin(theta) * std::sin(phi), z = std::cos(theta);
+      text += fmt::format("v {} {} {}\n", x, y, z + 4);
+      if (normals) text += fmt::format("vn {} {} {}\n", x, y, z);
+      if (i == rows) continue;
+      faces += "f";
+      for (const int corner : {i * columns + j, (i + 1) * columns + j, (i + 1) * columns + (j + 1) % columns,
+                               i * columns + (j + 1) % columns})
+        faces += normals ? fmt::format(" {0}//{0}", corner + 1) : fmt::format(" {}", corner + 1);
+      faces += "\n";
+    }
+  return text + faces;
+}
+
+TEST_F(WholeScene, MeshesAreShadedWithTheirNormals) {
+  write("flat.obj", coarse_sphere(8, false));
+  write("smooth.obj", coarse_sphere(8, true));
+  write("fine.obj", coarse_sphere(60, false));
+  const auto sphere = [&](const std::string& file, const std::string& angle) {
+    return picture({"field.scale=1e-9", R"(lights=[{"kind":"directional","direction":[-1,1,-1]}])",
+                    R"(camera={"position":[0,-6,4],"target":[0,0,4],"angle":14,"resolution":[32,32]})",
+                    "objects=[{\"file\":\"" + file + "\",\"smooth_angle\":" + angle +
+                        ",\"material\":{\"kind\":\"diffuse\",\"color\":[0.5,0.5,0.5]}}]"});
+  };
+  const Image fine = sphere("fine.obj", "\"auto\"");
+  const auto difference = [&](const Image& image) {
+    double sum = 0;
+    for (int y = 0; y < 32; ++y)
+      for (int x = 0; x < 32; ++x) sum += std::abs(image.pixel(x, y)[1] - fine.pixel(x, y)[1]);
+    return sum / (32 * 32);
+  };
+  const double flat = difference(sphere("flat.obj", "\"auto\""));
+  EXPECT_LT(difference(sphere("smooth.obj", "\"auto\"")), 0.25 * flat);
+  EXPECT_LT(difference(sphere("flat.obj", "60")), 0.25 * flat);
+  EXPECT_NEAR(difference(sphere("smooth.obj", "0")), flat, 0.02 * flat);
+}
+
 TEST_F(WholeScene, StopsByTime) {
   const Image image = picture({"integrator.max_seconds=1e-6", "integrator.max_samples=16"});
   EXPECT_EQ(mean(image, "samples"), 4);

@@ -78,6 +78,19 @@ class RaysTest(unittest.TestCase):
         self.assertEqual(whole.landings.shape[1], len(whole.flexibilities))
         np.testing.assert_allclose(whole.flexibilities[[0, -1]], [0.37, 0.02])
 
+    def test_smoothing(self):
+        # A rotation stays the same, constant as it is; the value of one voxel is spread over its neighbours.
+        tensors = np.zeros((9, 9, 9, 3, 3))
+        tensors[4, 4, 4] = [[0, 1, 0], [-1, 0, 0], [0, 0, 0]]
+        field = tr.Field(tensors)
+        start, heading = [2, 2, 2.5], [0, 1, 0]
+        turned = [tr.trace(field, start, heading, 1, smooth=smooth).directions[0, 0] for smooth in (0, 1.5, 0)]
+        self.assertEqual(turned[0], 0)
+        self.assertGreater(turned[1], 0)
+        self.assertEqual(turned[2], 0)
+        ends = [tr.trace(rotation(), [-1, 0, 0], [1, 0, 0], 0.8, smooth=smooth).positions for smooth in (0, 2)]
+        np.testing.assert_array_equal(ends[0], ends[1])
+
     def test_errors(self):
         field = rotation()
         for text, arguments in [("shape", ([0, 0], [0, 0, 1], 1)), ("not be zero", ([0, 0, 0], [0, 0, 0], 1)),
@@ -86,7 +99,8 @@ class RaysTest(unittest.TestCase):
             with self.assertRaisesRegex(ValueError, text):
                 tr.trace(field, *arguments)
         for text, options in [("method", {"method": "guess"}), ("eigenvalues", {"eigenvalues": "some"}),
-                              ("plate", {"plate": tr.Plate((0, 0, 0), size=(0, 1))}), ("step", {"max_steps": 0})]:
+                              ("plate", {"plate": tr.Plate((0, 0, 0), size=(0, 1))}), ("step", {"max_steps": 0}),
+                              ("smooth", {"smooth": -1})]:
             with self.assertRaisesRegex(ValueError, text):
                 tr.trace(field, [0, 0, 0], [0, 0, 1], 1, **options)
 

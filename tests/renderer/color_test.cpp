@@ -202,6 +202,7 @@ TEST_F(ColorTest, ConfigsAreFoundByPathAndByEnvironment) {
   EXPECT_EQ(ColorManagement({}).config_name(), "built-in");
   setenv("OCIO", "/no/such.ocio", 1);
   EXPECT_EQ(ColorManagement({file.path(), "", ""}).config_name(), file.path().string());
+  EXPECT_EQ(ColorManagement({"built-in", "", ""}).config_name(), "built-in");
 }
 
 TEST_F(ColorTest, EitherInterchangeRoleLeadsToTheWorkingSpace) {
@@ -240,6 +241,11 @@ TEST_F(ColorTest, BadConfigsAreOneClearLine) {
   EXPECT_THAT(error_of({curved.path(), "", ""}), HasSubstr("not linear"));
   const Temporary missing("missing.ocio", config_text("  scene_linear: nowhere\n"));
   EXPECT_THAT(error_of({missing.path(), "", ""}), HasSubstr("nowhere"));
+  const Temporary newer("newer.ocio", "ocio_profile_version: 2.9\nroles:\n  default: raw\n");
+  EXPECT_THAT(error_of({newer.path(), "", ""}),
+              AllOf(HasSubstr(newer.path().string()), HasSubstr("for a newer library than OpenColorIO"),
+                    HasSubstr("\"built-in\"")));
+  EXPECT_THAT(error_of({"ocio://no-such-config", "", ""}), HasSubstr("OCIO config ocio://no-such-config"));
   setenv("OCIO", "/no/such.ocio", 1);
   EXPECT_THAT(error_of({}), AllOf(HasSubstr("/no/such.ocio: no such file"), HasSubstr("$OCIO")));
 }

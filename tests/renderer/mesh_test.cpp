@@ -1,8 +1,11 @@
 #include "renderer/surfaces/mesh.h"
 
 #include <algorithm>
+#include <cmath>
 #include <cstdint>
+#include <optional>
 #include <stdexcept>
+#include <utility>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -165,7 +168,7 @@ TEST(ReadMeshTest, BinaryPly) {
     }
 }
 
-TEST(ReadMeshTest, PlyKeepsDoublePrecisionAndFansPolygons) {
+TEST(ReadMeshTest, PlyKeepsDoublePrecisionAndDividesPolygons) {
   const Temporary file("quadrilateral.PLY",
                        "ply\nformat ascii 1.0\ncomment a square\nelement vertex 4\nproperty double z\n"
                        "property double x\nproperty double y\nelement face 1\nproperty list uchar uint vertex_index\n"
@@ -210,6 +213,258 @@ TEST(ReadMeshTest, JoinsEqualPositionsAndDropsDegenerateTriangles) {
   EXPECT_NO_THROW(require_closed(mesh));
 }
 
+/// The concave arrowhead of area 1/2 that a fan would draw with twice its area, and other polygons, with their areas.
+struct Polygon {
+  std::vector<Vector3d> corners;
+  double area = 0;
+};
+
+const std::vector<Polygon> polygons{
+    {{{0, -1, 0}, {-0.5, 0, 0}, {0, 1, 0}, {-1, 0, 0}}, 0.5},
+    {{{-0.5, 0, 0}, {0, 1, 0}, {-1, 0, 0}, {0, -1, 0}}, 0.5},
+    {{{0, 0, 7}, {3, 0, 7}, {3, 3, 7}, {2, 3, 7}, {2, 1, 7}, {1, 1, 7}, {1, 3, 7}, {0, 3, 7}}, 7},  // A U.
+    {{{0, 0, 0}, {0, 1, 0}, {0, 2, 0}, {0, 2, 2}, {0, 0, 2}}, 4},                                   // In a line.
+    // A square with a square hole, whose outline is joined to the other by an edge that is there twice.
+    {{{0, 0, 0}, {4, 0, 0}, {4, 4, 0}, {0, 4, 0}, {0, 0, 0}, {1, 1, 0}, {1, 3, 0}, {3, 3, 0}, {3, 1, 0}, {1, 1, 0}},
+     12},
+};
+
+std::string ply_of(const Polygon& polygon) {
+  const std::size_t count = polygon.corners.size();
+  std::string content = ply_header("ascii", static_cast<int>(count), 1);
+  for (const Vector3d& P : polygon.corners)
+    content += std::to_string(P.x()) + " " + std::to_string(P.y()) + " " + std::to_string(P.z()) + "\n";
+  content += std::to_string(count);
+  for (std::size_t i = 0; i < count; ++i) content += " " + std::to_string(i);
+  return content + "\n";
+}
+
+std::string obj_of(const Polygon& polygon) {
+  std::string content, face = "f";
+  for (const Vector3d& P : polygon.corners) {
+    content += "v " + std::to_string(P.x()) + " " + std::to_string(P.y()) + " " + std::to_string(P.z()) + "\n";
+    face += " " + std::to_string(std::count(content.begin(), content.end(), '\n'));
+  }
+  return content + face + "\n";
+}
+
+TEST(ReadMeshTest, PolygonsHaveTheirArea) {
+  for (std::size_t i = 0; i < polygons.size(); ++i)
+    for (const auto& [name, content] :
+         {std::pair("a.ply", ply_of(polygons[i])), std::pair("a.obj", obj_of(polygons[i]))}) {
+      const Temporary file(name, content);
+      const TriangleMesh mesh = read_mesh(file.path());
+      EXPECT_EQ(mesh.triangles.size(), polygons[i].corners.size() - 2) << name << " " << i;
+      EXPECT_NEAR(surface_area(mesh), polygons[i].area, 1e-6) << name << " " << i;
+    }
+}
+
+TEST(ReadMeshTest, CornersInALineKeepNeighboursJoined) {
+  // A tetrahedron of which one face is a quadrilateral: it has a corner in the middle of an edge, where the triangles
+  // of the other face at this edge meet.
+  const Temporary file("line.ply", ply_header("ascii", 5, 5) +
+                                       "0 0 0\n1 0 0\n0 1 0\n0 0 1\n0.5 0 0\n"
+                                       "4 0 2 1 4\n3 0 4 3\n3 4 1 3\n3 0 3 2\n3 1 2 3\n");
+  TriangleMesh mesh = read_mesh(file.path());
+  EXPECT_EQ(mesh.triangles.size(), 6u);
+  EXPECT_NO_THROW(require_closed(mesh));
+  EXPECT_NEAR(volume(mesh), 1 / 6.0, 1e-7);
+}
+
+TEST(ReadMeshTest, TriangleStripsOfPly) {
+  // A cube as one strip of 12 triangles, and the same as two strips with the mark of a new one between them.
+  const std::string header =
+      "ply\nformat ascii 1.0\nelement vertex 8\nproperty float x\nproperty float y\nproperty float z\n"
+      "element tristrips 1\nproperty list int int vertex_indices\nend_header\n"
+      "1 0 0\n0 0 0\n1 1 0\n0 1 0\n1 0 1\n0 0 1\n1 1 1\n0 1 1\n";
+  for (const std::string strips : {"14 6 7 4 5 1 7 3 6 2 4 0 1 2 3\n", "18 6 7 4 5 1 7 3 6 -1 3 6 2 4 0 1 2 3 -1\n"}) {
+    const Temporary file("strips.ply", header + strips);
+    TriangleMesh mesh = read_mesh(file.path());
+    EXPECT_EQ(mesh.triangles.size(), 12u);
+    EXPECT_NEAR(volume(mesh), 1, 1e-12);
+    EXPECT_NO_THROW(require_closed(mesh));
+  }
+}
+
+TEST(ReadMeshTest, EveryWayToWriteAnObjFace) {
+  const std::string vertices = "v 0 0 0\nv 2 0 0\nv 0 2 0\n", normals = "vn 0 0 1\n", texture = "vt 0 0\nvt 1 0\n";
+  for (const std::string& content :
+       {vertices + "f 1 2 3\n", vertices + "f -3 -2 -1", vertices + normals + "f 1//1 2//1 3//1 # its only face\n",
+        vertices + normals + "f 1/1/1 2/2/1 3/3/1\n", vertices + texture + "f 1/1 2/2 3/2# a comment\n",
+        vertices + texture + normals + "f -3/-2/-1 -2/-1/-1 -1/-1/-1\r\n", "f 1 2 3\n" + vertices,
+        "\xef\xbb\xbf# begins with a mark\no a\ng b c\ns 1\nusemtl d\n" + vertices + "l 1 2\np 1\n  f 1 \\\n 2 3\n",
+        std::string("v 0 0 0 1 0 0\nv 2 0 0 0 1 0\nv 0 4 0 2\nf 1/ 2/ 3/\n")}) {
+    const Temporary file("face.obj", content);
+    EXPECT_DOUBLE_EQ(surface_area(read_mesh(file.path())), 2) << content;
+  }
+}
+
+TEST(ReadMeshTest, ObjErrorsNameTheLine) {
+  const std::string vertices = "v 0 0 0\nv 2 0 0\nv 0 2 0\n";
+  for (const auto& [rest, text] :
+       std::vector<std::pair<std::string, std::string>>{{"f 1 2 0\n", "line 4: the face names vertex 0"},
+                                                        {"f 1 2 3\nf 1 2 -4\n", "line 5: the face names vertex -4"},
+                                                        {"f 1//1 2//1 3//1\n", "line 4: the face names normal 1 of 0"},
+                                                        {"f 1 2 x\n", "line 4: the face has \"x\""},
+                                                        {"f 1 2 3x\n", "line 4: the face has \"3x\""},
+                                                        {"f 1 2\n", "line 4: a face needs at least three"},
+                                                        {"v 1 2\n", "line 4: \"v\" needs three numbers"},
+                                                        {"v 1 2 three\n", "line 4: \"three\" is not a number"},
+                                                        {"surf 0 1 0 1 1 2\n", "line 4: \"surf\" is not read"},
+                                                        {"F 1 2 3\n", "line 4: \"F\" is not read"},
+                                                        {"v 0 0 0 0\n", "line 4: the vertex has the weight 0"}}) {
+    const Temporary file("bad.obj", vertices + rest);
+    EXPECT_THAT(message([&] { read_mesh(file.path()); }), HasSubstr(text)) << rest;
+  }
+  const Temporary file("two.ply", ply_header("ascii", 3, 1) + "0 0 0\n1 0 0\n0 1 0\n2 0 1\n");
+  EXPECT_THAT(message([&] { read_mesh(file.path()); }), HasSubstr("face 0 has 2 corners"));
+}
+
+/// A tetrahedron with corners at 1, 2 and 3 along the axes of its file.
+std::string collada(const std::string& asset) {
+  return R"(<?xml version="1.0"?><COLLADA xmlns="http://www.collada.org/2005/11/COLLADASchema" version="1.4.1"><asset>)" +
+         asset + R"(</asset><library_geometries><geometry id="g"><mesh><source id="p">
+<float_array id="pa" count="12">0 0 0 1 0 0 0 2 0 0 0 3</float_array><technique_common>
+<accessor source="#pa" count="4" stride="3"><param name="X" type="float"/><param name="Y" type="float"/>
+<param name="Z" type="float"/></accessor></technique_common></source>
+<vertices id="v"><input semantic="POSITION" source="#p"/></vertices>
+<triangles count="4"><input semantic="VERTEX" source="#v" offset="0"/><p>0 2 1 0 1 3 0 3 2 1 2 3</p></triangles>
+</mesh></geometry></library_geometries><library_visual_scenes><visual_scene id="s"><node id="n">
+<instance_geometry url="#g"/></node></visual_scene></library_visual_scenes>
+<scene><instance_visual_scene url="#s"/></scene></COLLADA>)";
+}
+
+std::string fbx(int up, int front, int front_sign, double unit) {
+  const auto number = [](const std::string& name, int value) {
+    return "P: \"" + name + "\", \"int\", \"Integer\", \"\"," + std::to_string(value) + "\n";
+  };
+  return "; FBX 7.4.0 project file\nFBXHeaderExtension:  {\nFBXHeaderVersion: 1003\nFBXVersion: 7400\n}\n"
+         "GlobalSettings:  {\nVersion: 1000\nProperties70:  {\n" +
+         number("UpAxis", up) + number("UpAxisSign", 1) + number("FrontAxis", front) +
+         number("FrontAxisSign", front_sign) + number("CoordAxis", 0) + number("CoordAxisSign", 1) +
+         "P: \"UnitScaleFactor\", \"double\", \"Number\", \"\"," + std::to_string(unit) +
+         "\n}\n}\nObjects:  {\nGeometry: 1000, \"Geometry::g\", \"Mesh\" {\nVertices: *12 {\n"
+         "a: 0,0,0,1,0,0,0,2,0,0,0,3\n}\nPolygonVertexIndex: *12 {\na: 0,2,-2,0,1,-4,0,3,-3,1,2,-4\n}\n"
+         "GeometryVersion: 124\n}\nModel: 2000, \"Model::m\", \"Mesh\" {\nVersion: 232\n}\n}\n"
+         "Connections:  {\nC: \"OO\",2000,0\nC: \"OO\",1000,2000\n}\n";
+}
+
+const std::string gltf =
+    R"({"asset": {"version": "2.0"}, "scene": 0, "scenes": [{"nodes": [0]}], "nodes": [{"mesh": 0}],
+        "meshes": [{"primitives": [{"attributes": {"POSITION": 0}}]}],
+        "buffers": [{"byteLength": 36, "uri":
+          "data:application/octet-stream;base64,AACAPwAAAAAAAAAAAAAAAAAAAEAAAAAAAAAAAAAAAAAAAEBA"}],
+        "bufferViews": [{"buffer": 0, "byteLength": 36}],
+        "accessors": [{"bufferView": 0, "componentType": 5126, "count": 3, "type": "VEC3",
+                       "min": [0, 0, 0], "max": [1, 2, 3]}]})";
+
+TEST(ReadMeshTest, FormatsWithUnitAndAxesAreInMetresWithZUp) {
+  struct Case {
+    std::string name, content;
+    Vector3d x, y, z;  ///< Where the corners on the file's axes are.
+  };
+  const Vector3d X(1, 0, 0), Y(0, 1, 0), Z(0, 0, 1);
+  for (const Case& each :
+       std::vector<Case>{{"a.dae", collada("<up_axis>Z_UP</up_axis>"), X, 2 * Y, 3 * Z},
+                         {"b.dae", collada("<unit name=\"cm\" meter=\"0.01\"/><up_axis>Z_UP</up_axis>"), 0.01 * X,
+                          0.02 * Y, 0.03 * Z},
+                         {"c.dae", collada("<up_axis>Y_UP</up_axis>"), X, 2 * Z, -3 * Y},
+                         {"d.dae", collada(""), X, 2 * Z, -3 * Y},
+                         {"e.dae", collada("<up_axis>X_UP</up_axis>"), Z, -2 * X, -3 * Y},
+                         {"a.gltf", gltf, X, 2 * Z, -3 * Y},
+                         {"a.fbx", fbx(1, 2, 1, 1), 0.01 * X, 0.02 * Z, -0.03 * Y},
+                         {"b.fbx", fbx(2, 1, -1, 1), 0.01 * X, 0.02 * Y, 0.03 * Z},
+                         {"c.fbx", fbx(2, 1, -1, 100), X, 2 * Y, 3 * Z}}) {
+    const Temporary file(each.name, each.content);
+    const TriangleMesh mesh = read_mesh(file.path());
+    for (const Vector3d& expected : {each.x, each.y, each.z}) {
+      const auto distance = [&](const Vector3d& vertex) { return (vertex - expected).norm(); };
+      double nearest = 1e9;
+      for (const Vector3d& vertex : mesh.vertices) nearest = std::min(nearest, distance(vertex));
+      EXPECT_LT(nearest, 1e-6) << each.name << " " << expected.transpose();
+    }
+    EXPECT_GE(volume(mesh), 0) << each.name;  // Not mirrored.
+  }
+}
+
+TEST(ReadMeshTest, OtherFormatsAreRefusedWithTheList) {
+  for (const std::string name : {"a.3ds", "a.3mf", "a.x3d", "a.blend", "a"}) {
+    const Temporary file(name, "solid\n");
+    EXPECT_THAT(message([&] { read_mesh(file.path()); }),
+                HasSubstr("a mesh is a .ply, .obj, .stl, .off, .gltf, .glb, .dae, .fbx file; convert"))
+        << name;
+  }
+}
+
+/// A sphere of radius 2 about the origin, open at its ends.
+std::string sphere_ply(bool normals) {
+  constexpr int rows = 24, columns = 48;
+  std::string header = ply_header("ascii", rows * columns, (rows - 1) * columns), content, faces;
+  if (normals) header.insert(header.find("element face"), "property float nx\nproperty float ny\nproperty float nz\n");
+  for (int i = 0; i < rows; ++i)
+    for (int j = 0; j < columns; ++j) {
+      const double theta = M_PI * (i + 0.5) / rows, phi = 2 * M_PI * j / columns;
+      for (int repeat = 0; repeat < (normals ? 2 : 1); ++repeat)
+        for (const double x : {std::sin(theta) * std::cos(phi), std::sin(theta) * std::sin(phi), std::cos(theta)})
+          content += std::to_string((repeat == 0 ? 2 : 1) * x) + " ";
+      content += "\n";
+      const int next = (j + 1) % columns;
+      if (i + 1 < rows)
+        faces += "4 " + std::to_string(i * columns + j) + " " + std::to_string((i + 1) * columns + j) + " " +
+                 std::to_string((i + 1) * columns + next) + " " + std::to_string(i * columns + next) + "\n";
+    }
+  return header + content + faces;
+}
+
+TEST(MeshNormalsTest, AreThoseOfTheFileOrMadeByAngle) {
+  for (const bool in_file : {true, false}) {
+    const Temporary file("sphere.ply", sphere_ply(in_file));
+    const std::optional<double> angle = in_file ? std::nullopt : std::optional(0.5);
+    const MeshWithNormals sphere = read_mesh_with_normals(file.path(), angle);
+    ASSERT_EQ(sphere.normals.size(), 24u * 48u);
+    for (std::size_t i = 0; i < sphere.normals.size(); ++i) {
+      const Vector3d P = sphere.mesh.vertices[i];
+      if (std::abs(P.z()) > 1.98) continue;  // The rims of the open ends.
+      EXPECT_LT((sphere.normals[i].cast<double>() - P / 2).norm(), in_file ? 1e-5 : 0.01) << P.transpose();
+    }
+  }
+  const Temporary flat("flat.ply", sphere_ply(false));
+  EXPECT_TRUE(read_mesh_with_normals(flat.path(), std::nullopt).normals.empty());
+}
+
+TEST(MeshNormalsTest, OfACubeDependOnTheAngle) {
+  const Temporary file("cube.obj",
+                       "v -1 -1 -1\nv 1 -1 -1\nv 1 1 -1\nv -1 1 -1\nv -1 -1 1\nv 1 -1 1\nv 1 1 1\nv -1 1 1\n"
+                       "f 1 4 3 2\nf 5 6 7 8\nf 1 2 6 5\nf 4 8 7 3\nf 1 5 8 4\nf 2 3 7 6\n");
+  const MeshWithNormals sharp = read_mesh_with_normals(file.path(), 89 * M_PI / 180);
+  EXPECT_EQ(sharp.mesh.vertices.size(), 24u);
+  for (const auto& triangle : sharp.mesh.triangles) {
+    const Vector3d& a = sharp.mesh.vertices[triangle[0]];
+    const Vector3d flat =
+        (sharp.mesh.vertices[triangle[1]] - a).cross(sharp.mesh.vertices[triangle[2]] - a).normalized();
+    for (const std::uint32_t corner : triangle) EXPECT_LT((sharp.normals[corner].cast<double>() - flat).norm(), 1e-6);
+  }
+  // Weights by angle: three faces meet alike at each corner, however they are divided.
+  const MeshWithNormals round = read_mesh_with_normals(file.path(), M_PI / 2);
+  EXPECT_EQ(round.mesh.vertices.size(), 8u);
+  for (std::size_t i = 0; i < 8; ++i)
+    EXPECT_LT((round.normals[i].cast<double>() - round.mesh.vertices[i].normalized()).norm(), 1e-6);
+}
+
+TEST(MeshNormalsTest, OfObjBelongToCorners) {
+  // Two triangles share an edge with different normals; the second has a corner without one.
+  const Temporary file("corners.obj",
+                       "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 1 1 0\nvn 0 0 1\nvn 0 1 0\n"
+                       "f 1//1 2//1 3//1\nf 2//2 4 3//2\n");
+  const MeshWithNormals mesh = read_mesh_with_normals(file.path(), std::nullopt);
+  ASSERT_EQ(mesh.mesh.vertices.size(), 6u);
+  const auto normal = [&](int triangle, int corner) { return mesh.normals[mesh.mesh.triangles[triangle][corner]]; };
+  for (int corner = 0; corner < 3; ++corner) EXPECT_EQ(normal(0, corner), Eigen::Vector3f(0, 0, 1));
+  EXPECT_EQ(normal(1, 0), Eigen::Vector3f(0, 1, 0));
+  EXPECT_EQ(normal(1, 1), Eigen::Vector3f(0, 0, 0));
+  EXPECT_EQ(read_mesh(file.path()).vertices.size(), 4u);
+}
+
 TEST(ReadMeshTest, PlyFilesThatWereCutOffAreRefused) {
   for (const std::string& whole : {tetrahedron_ply.substr(0, tetrahedron_ply.size() - 2),  // Without "3\n".
                                    binary_tetrahedron(false, "\n")})
@@ -238,7 +493,8 @@ TEST(ReadMeshTest, BadFilesAreOneClearLine) {
   EXPECT_THAT(error("lines.obj", "v 0 0 0\nv 1 0 0\nl 1 2\n"), HasSubstr("no triangles"));
   EXPECT_THAT(error("flat.ply", ply_header("ascii", 3, 1) + "0 0 0\n1 0 0\n2 0 0\n3 0 1 2\n"),
               HasSubstr("no triangles"));
-  EXPECT_THAT(error("index.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 9\n"), HasSubstr("index"));
+  EXPECT_THAT(error("index.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 9\n"),
+              HasSubstr("line 4: the face names vertex 9 of 3"));
   EXPECT_THAT(error("nan.obj", "v 0 0 nan\nv 1 0 0\nv 0 1 0\nf 1 2 3\n"), HasSubstr("not finite"));
   std::string beyond = tetrahedron_ply;
   beyond.replace(beyond.find("3 1 2 3"), 7, "3 1 2 4");

@@ -1,0 +1,384 @@
+// What picture files say about their colours and their position, and what is made of it.
+
+#include <cmath>
+#include <cstdlib>
+#include <limits>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "renderer/color/chromaticities.h"
+#include "renderer/color/color.h"
+#include "renderer/color/icc_profile.h"
+#include "renderer/textures/texture.h"
+#include "tests/images/picture_files.h"
+#include "tests/renderer/support.h"
+
+namespace tensorray {
+namespace {
+
+using Eigen::Matrix3d;
+using Eigen::Vector3d;
+using ::testing::HasSubstr;
+using ::testing::IsEmpty;
+
+/// The built-in config, whose working space is linear Rec. 709, whatever $OCIO is.
+const ColorManagement& color() {
+  static const ColorManagement management({builtin_config_word, "", ""});
+  return management;
+}
+
+double decoded(double value) { return value <= 0.04045 ? value / 12.92 : std::pow((value + 0.055) / 1.055, 2.4); }
+
+/// The mean of a picture in the working space.
+Vector3d light_of(const std::string& name, const std::string& content, const std::string& layer = "",
+                  std::vector<std::string>* notes = nullptr) {
+  const Temporary file(name, content);
+  const Texture texture(file.path(), color(), "", Wrap::clamp, layer, notes);
+  return texture.lookup({0.5, 0.5}, Eigen::Matrix2d::Identity()).head<3>().cast<double>();
+}
+
+/// A PNG of one pixel with chunks before its pixels.
+std::string png_with(const std::string& chunks, const std::vector<int>& rgb) {
+  std::string file = png_file(1, 1, 3, 8, rgb);
+  return file.insert(file.find("IDAT") - 4, chunks);
+}
+
+std::string gamma_chunk(double gamma) { return png_chunk("gAMA", big_endian(static_cast<std::uint32_t>(gamma * 1e5))); }
+
+std::string chromaticities_chunk(const std::vector<double>& white_red_green_blue) {
+  std::string data;
+  for (const double number : white_red_green_blue)
+    data += big_endian(static_cast<std::uint32_t>(std::lround(number * 1e5)));
+  return png_chunk("cHRM", data);
+}
+
+std::string profile_chunk(const std::string& profile) {
+  return png_chunk("iCCP", std::string("a profile\0\0", 11) + zlib_stored(profile));
+}
+
+const std::vector<double> p3_numbers{0.3127, 0.3290, 0.680, 0.320, 0.265, 0.690, 0.150, 0.060};
+const Vector3d p3_red(1.22494, -0.04206, -0.01964);  // In Rec. 709, as published with the space.
+
+const Chromaticities p3{{0.680, 0.320}, {0.265, 0.690}, {0.150, 0.060}, {0.3127, 0.3290}};
+
+std::string p3_profile() {
+  const TransferCurve curve = srgb_curve();
+  return make_icc_profile("P3", {{curve, curve, curve}, rgb_to_xyz(p3)});
+}
+
+TEST(PictureColors, PngChunksInTheirOrder) {
+  const double half = 128 / 255.0;
+  const Vector3d linear = Vector3d::Constant(half), srgb = Vector3d::Constant(decoded(half));
+  const std::string p3_chunk = chromaticities_chunk(p3_numbers), srgb_chunk = png_chunk("sRGB", std::string(1, '\0'));
+  const std::string code_points = png_chunk("cICP", std::string("\x0c\x0d\0\1", 4));
+  struct Case {
+    std::string chunks;
+    std::vector<int> rgb;
+    Vector3d expected;
+  };
+  for (const Case& each : std::vector<Case>{{"", {128, 128, 128}, srgb},
+                                            {gamma_chunk(1), {128, 128, 128}, linear},
+                                            {gamma_chunk(0.5), {128, 128, 128}, Vector3d::Constant(half * half)},
+                                            {gamma_chunk(0.45455), {128, 128, 128}, srgb},
+                                            {srgb_chunk + gamma_chunk(1), {128, 128, 128}, srgb},
+                                            {p3_chunk, {255, 0, 0}, p3_red},
+                                            {p3_chunk, {128, 128, 128}, srgb},
+                                            {p3_chunk + gamma_chunk(1), {128, 0, 0}, half * p3_red},
+                                            {srgb_chunk + p3_chunk, {255, 0, 0}, Vector3d(1, 0, 0)},
+                                            {profile_chunk(p3_profile()), {255, 0, 0}, p3_red},
+                                            {profile_chunk(p3_profile()) + p3_chunk, {128, 128, 128}, srgb},
+                                            {code_points + srgb_chunk, {255, 0, 0}, p3_red}}) {
+    std::vector<std::string> notes;
+    const Vector3d light = light_of("a.png", png_with(each.chunks, each.rgb), "", &notes);
+    EXPECT_LT((light - each.expected).cwiseAbs().maxCoeff(), 4e-4) << each.chunks << "\n" << light.transpose();
+    EXPECT_THAT(notes, IsEmpty());
+  }
+}
+
+TEST(PictureColors, ProfilesThatCannotBeUsedAreSaidAndNotUsed) {
+  std::string printer = p3_profile();
+  printer.replace(20, 4, "Lab ");
+  const std::string code_points = png_chunk("cICP", std::string("\x09\x10\0\1", 4));  // Rec. 2020, PQ.
+  for (const auto& [chunk, text] : std::vector<std::pair<std::string, std::string>>{
+           {profile_chunk(printer), "it consists of tables"}, {code_points, "code points (primaries 9, curve 16)"}}) {
+    std::vector<std::string> notes;
+    const Vector3d light = light_of("a.png", png_with(chunk, {255, 0, 0}), "", &notes);
+    EXPECT_LT((light - Vector3d(1, 0, 0)).norm(), 1e-5);
+    ASSERT_EQ(notes.size(), 1u) << text;
+    EXPECT_THAT(notes[0], HasSubstr(text));
+  }
+}
+
+TEST(IccProfileTest, ReadsWhatItWrites) {
+  TransferCurve table;
+  table.table = {0, 0.1f, 0.5f, 1};
+  for (const TransferCurve& curve : {power_curve(2.4), power_curve(1), srgb_curve(), table}) {
+    const IccProfile profile = parse_icc_profile(make_icc_profile("x", {{curve, curve, curve}, rgb_to_xyz(p3)}), false);
+    EXPECT_LT((profile.rgb_to_xyz - rgb_to_xyz(p3)).cwiseAbs().maxCoeff(), 5e-5);
+    for (float x = 0; x <= 1; x += 1.0f / 32)
+      EXPECT_NEAR(profile.curves[1].at(x), curve.at(x), 2e-3) << x;  // 2.4 is 614/256.
+  }
+  std::string profile = p3_profile();
+  for (std::size_t size = 0; size < 500; size += 7)
+    EXPECT_THROW(parse_icc_profile(profile.substr(0, size), false), std::runtime_error) << size;
+  EXPECT_THROW(parse_icc_profile(profile, true), std::runtime_error);
+}
+
+/// A profile whose curves are parametric, all five kinds (ICC.1:2010, 10.16).
+TEST(IccProfileTest, ParametricCurves) {
+  const auto fixed = [](double x) { return big_endian(static_cast<std::uint32_t>(std::lround(x * 65536))); };
+  const auto expected = [](int kind, double x) {
+    const double g = 2, a = 0.8, b = 0.1, c = 0.25, d = 0.4, e = 0.05, f = 0.02;
+    if (kind == 0) return x * x;
+    if (kind == 1) return std::pow(a * x + b, g);
+    if (kind == 2) return std::pow(a * x + b, g) + c;
+    if (kind == 3) return x >= d ? std::pow(a * x + b, g) : c * x;
+    return x >= d ? std::pow(a * x + b, g) + e : c * x + f;
+  };
+  for (int kind = 0; kind < 5; ++kind) {
+    const std::vector<double> all{2, 0.8, 0.1, 0.25, 0.4, 0.05, 0.02};
+    const int counts[] = {1, 3, 4, 5, 7};
+    std::string curve = std::string("para\0\0\0\0\0", 9) + static_cast<char>(kind) + std::string(2, '\0');
+    for (int i = 0; i < counts[kind]; ++i) curve += fixed(all[static_cast<std::size_t>(i)]);
+    // Appended to a valid profile, of which the entry rTRC, the seventh, is directed to it.
+    std::string profile = p3_profile();
+    const std::size_t entry = 132 + 12 * 6;
+    profile.replace(
+        entry + 4, 8,
+        big_endian(static_cast<std::uint32_t>(profile.size())) + big_endian(static_cast<std::uint32_t>(curve.size())));
+    const IccProfile parsed = parse_icc_profile(profile + curve, false);
+    for (const float x : {0.0f, 0.2f, 0.39f, 0.41f, 0.7f, 1.0f})
+      EXPECT_NEAR(parsed.curves[0].at(x), expected(kind, x), 1e-4) << kind << " " << x;
+  }
+}
+
+Vector3d light_of_exr(const Vector3d& rgb, const std::string& chromaticities) {
+  const Temporary file("a.exr");
+  Image image(1, 1, {"R", "G", "B"});
+  for (int c = 0; c < 3; ++c) image.pixels[static_cast<std::size_t>(c)] = static_cast<float>(rgb[c]);
+  ImageMetadata metadata;
+  if (!chromaticities.empty()) metadata["chromaticities"] = chromaticities;
+  write_image(file.path(), image, metadata);
+  return light_of("b.exr", read_bytes(file.path()));
+}
+
+TEST(PictureColors, ChromaticitiesOfExr) {
+  const Vector3d white_d65(0.95046, 1, 1.08906);
+  struct Case {
+    Vector3d rgb;
+    std::string chromaticities;
+    Vector3d expected;
+  };
+  for (const Case& each : std::vector<Case>{
+           {{0.2, 0.5, 4}, "", {0.2, 0.5, 4}},
+           {{0.2, 0.5, 4}, "0.64 0.33 0.3 0.6 0.15 0.06 0.3127 0.329", {0.2, 0.5, 4}},
+           {white_d65, "1 0 0 1 0 0 0.333333 0.333333", {1, 1, 1}},
+           {Vector3d::Ones(), "0.713 0.293 0.165 0.83 0.128 0.044 0.32168 0.33767", {1, 1, 1}},
+           {Vector3d::UnitX(), "0.713 0.293 0.165 0.83 0.128 0.044 0.32168 0.33767", {1.70505, -0.13026, -0.02400}},
+           {Vector3d::UnitX(), "0.68 0.32 0.265 0.69 0.15 0.06 0.3127 0.329", p3_red}})
+    EXPECT_LT((light_of_exr(each.rgb, each.chromaticities) - each.expected).cwiseAbs().maxCoeff(), 3e-4)
+        << each.chromaticities << ": " << light_of_exr(each.rgb, each.chromaticities).transpose();
+}
+
+TEST(PictureColors, WorkingSpacesHaveTheirPublishedNumbers) {
+  const std::array<double, 8> rec709{0.64, 0.33, 0.30, 0.60, 0.15, 0.06, 0.3127, 0.3290};
+  EXPECT_EQ(color().working_chromaticities(), rec709);
+  const Chromaticities acescg{{0.713, 0.293}, {0.165, 0.830}, {0.128, 0.044}, {0.32168, 0.33767}};
+  const Matrix3d adapted = *adaptation(xyz_of(acescg.white), xyz_of(d65_white)) * rgb_to_xyz(acescg);
+  EXPECT_EQ(numbers_of(named_chromaticities(adapted)), numbers_of(acescg));
+  const Chromaticities odd{{0.7, 0.31}, {0.2, 0.7}, {0.14, 0.05}, d65_white};
+  const std::array<double, 8> found = numbers_of(named_chromaticities(rgb_to_xyz(odd)));
+  for (std::size_t i = 0; i < 8; ++i) EXPECT_NEAR(found[i], numbers_of(odd)[i], 1e-12);
+}
+
+/// A TIFF of RGB integers. @param values  One for each sample.
+std::string tiff_of(int width, int height, int bits, int orientation, const std::vector<std::uint32_t>& values) {
+  std::string pixels;
+  for (const std::uint32_t value : values) pixels += little_endian(value).substr(0, static_cast<std::size_t>(bits / 8));
+  const auto entry = [](int tag, int type, std::uint32_t count, std::uint32_t value) {
+    return little_endian(static_cast<std::uint16_t>(tag)) + little_endian(static_cast<std::uint16_t>(type)) +
+           little_endian(count) + little_endian(value);
+  };
+  const auto size = static_cast<std::uint32_t>(pixels.size()), directory = 16 + size + size % 2;
+  std::string file = std::string("II*\0", 4) + little_endian(directory);
+  for (int i = 0; i < 4; ++i) file += little_endian(static_cast<std::uint16_t>(bits));
+  file += pixels + std::string(size % 2, '\0') + little_endian(std::uint16_t{10});
+  file += entry(256, 4, 1, static_cast<std::uint32_t>(width)) + entry(257, 4, 1, static_cast<std::uint32_t>(height)) +
+          entry(258, 3, 3, 8) + entry(259, 3, 1, 1) + entry(262, 3, 1, 2) + entry(273, 4, 1, 16) +
+          entry(274, 3, 1, static_cast<std::uint32_t>(orientation)) + entry(277, 3, 1, 3) +
+          entry(278, 4, 1, static_cast<std::uint32_t>(height)) + entry(279, 4, 1, size);
+  return file + little_endian(std::uint32_t{0});
+}
+
+TEST(PictureColors, IntegersOfAllSizesAreSrgb) {
+  for (const int bits : {8, 16, 24, 32})
+    for (const double value : {0.5, 0.123, 1.0}) {
+      const double greatest = std::pow(2, bits) - 1;
+      const auto stored = static_cast<std::uint32_t>(std::floor(value * greatest));
+      const Vector3d light = light_of("a.tif", tiff_of(1, 1, bits, 1, {stored, 0, stored}));
+      const double expected = decoded(stored / greatest);
+      EXPECT_LT((light - Vector3d(expected, 0, expected)).norm(), 1e-5) << bits << " " << value;
+    }
+}
+
+TEST(PictureOrientation, PicturesStandUpright) {
+  // The stored picture, 3 x 2, whose rows are 0 1 2 and 3 4 5; and its rows when it is turned as each orientation says.
+  const std::vector<std::vector<std::vector<int>>> turned{
+      {{0, 1, 2}, {3, 4, 5}},   {{2, 1, 0}, {5, 4, 3}},   {{5, 4, 3}, {2, 1, 0}},   {{3, 4, 5}, {0, 1, 2}},
+      {{0, 3}, {1, 4}, {2, 5}}, {{3, 0}, {4, 1}, {5, 2}}, {{5, 2}, {4, 1}, {3, 0}}, {{2, 5}, {1, 4}, {0, 3}}};
+  for (int orientation = 1; orientation <= 8; ++orientation) {
+    std::vector<std::uint32_t> values;
+    for (std::uint32_t i = 0; i < 6; ++i) values.insert(values.end(), {10 * i, 10 * i, 10 * i});
+    const Temporary file("turned.tif", tiff_of(3, 2, 8, orientation, values));
+    const NativeImage image = read_native_image(file.path());
+    const auto& rows = turned[static_cast<std::size_t>(orientation - 1)];
+    ASSERT_EQ(image.height, static_cast<int>(rows.size())) << orientation;
+    ASSERT_EQ(image.width, static_cast<int>(rows[0].size())) << orientation;
+    for (int y = 0; y < image.height; ++y)
+      for (int x = 0; x < image.width; ++x) {
+        float rgba[4];
+        read_pixels(image, x, y, 1, rgba);
+        EXPECT_NEAR(255 * rgba[1], 10 * rows[static_cast<std::size_t>(y)][static_cast<std::size_t>(x)], 1e-3)
+            << orientation << " " << x << " " << y;
+      }
+  }
+}
+
+TEST(PictureOrientation, ExifOfPng) {
+  const std::string exif("MM\0*\0\0\0\x08\0\1\x01\x12\0\3\0\0\0\1\0\6\0\0\0\0\0\0", 26);
+  std::string content = png_file(2, 1, 3, 8, {10, 10, 10, 20, 20, 20});
+  content.insert(content.find("IDAT") - 4, png_chunk("eXIf", exif));
+  const Temporary file("phone.png", content);
+  const NativeImage image = read_native_image(file.path());
+  EXPECT_EQ(image.width, 1);
+  EXPECT_EQ(image.height, 2);
+}
+
+TEST(PictureLayers, AreChosenByName) {
+  const Temporary file("layers.exr");
+  Image image(1, 1, {"R", "G", "B", "Z", "key.B", "key.G", "key.R", "fill.R", "fill.G", "fill.B", "fill.A"});
+  for (std::size_t i = 0; i < image.pixels.size(); ++i) image.pixels[i] = static_cast<float>(i + 1);
+  image.pixels.back() = 1;
+  write_image(file.path(), image);
+  const std::string content = read_bytes(file.path());
+  EXPECT_EQ(light_of("a.exr", content), Vector3d(1, 2, 3));
+  EXPECT_EQ(light_of("a.exr", content, "key"), Vector3d(7, 6, 5));
+  EXPECT_EQ(light_of("a.exr", content, "fill"), Vector3d(8, 9, 10));
+  EXPECT_EQ(light_of("a.exr", content, "Z"), Vector3d(4, 4, 4));
+  EXPECT_THAT(message([&] { light_of("a.exr", content, "rim"); }),
+              HasSubstr("it has no layer \"rim\"; its layers: fill, key"));
+}
+
+TEST(PictureColors, NonFiniteTexelsAreCountedAndSaid) {
+  const Temporary file("nan.exr");
+  Image image(2, 2, {"R", "G", "B", "Z"});
+  image.pixels[1] = std::numeric_limits<float>::quiet_NaN();
+  image.pixels[2] = std::numeric_limits<float>::infinity();
+  image.pixels[8] = -std::numeric_limits<float>::infinity();
+  image.pixels[15] = std::numeric_limits<float>::quiet_NaN();  // Z, which is not read.
+  write_image(file.path(), image);
+  std::vector<std::string> notes;
+  light_of("a.exr", read_bytes(file.path()), "", &notes);
+  ASSERT_EQ(notes.size(), 1u);
+  EXPECT_THAT(notes[0], HasSubstr("a.exr: 2 pixels have values that are not finite"));
+}
+
+TEST(PictureColors, LightWithoutAlphaIsKept) {
+  const Temporary file("glow.exr");
+  Image image(1, 1, {"R", "G", "B", "A"});
+  image.pixels = {1, 2, 3, 0};
+  write_image(file.path(), image, {{"chromaticities", "0.713 0.293 0.165 0.83 0.128 0.044 0.32168 0.33767"}});
+  const Texture texture(file.path(), color(), "", Wrap::clamp);
+  const Eigen::Vector4f light = texture.lookup({0.5, 0.5}, Eigen::Matrix2d::Identity());
+  EXPECT_EQ(light[3], 0);
+  // The published matrix from ACEScg.
+  EXPECT_LT((light.head<3>() - Eigen::Vector3f(0.21169f, 2.11969f, 3.17697f)).norm(), 2e-3);
+}
+
+/// An EXR of 2 x 2 pixels as luminance and chroma, which has one sample for all four.
+std::string luminance_chroma(const Vector3d& rgb) {
+  const Vector3d weights(0.2126, 0.7152, 0.0722);
+  const double luminance = weights.dot(rgb);
+  const std::string zero(1, '\0');
+  const auto attribute = [&](const std::string& name, const std::string& type, const std::string& value) {
+    return name + zero + type + zero + little_endian(static_cast<std::int32_t>(value.size())) + value;
+  };
+  const auto channel = [&](const std::string& name, int sampling) {
+    return name + zero + little_endian(2) + little_endian(0) + little_endian(sampling) + little_endian(sampling);
+  };
+  const std::string box = little_endian(0) + little_endian(0) + little_endian(1) + little_endian(1);
+  std::string file = "\x76\x2f\x31\x01" + little_endian(2) +
+                     attribute("channels", "chlist", channel("BY", 2) + channel("RY", 2) + channel("Y", 1) + zero) +
+                     attribute("compression", "compression", zero) + attribute("dataWindow", "box2i", box) +
+                     attribute("displayWindow", "box2i", box) + attribute("lineOrder", "lineOrder", zero) +
+                     attribute("pixelAspectRatio", "float", little_endian(1.0f)) +
+                     attribute("screenWindowCenter", "v2f", little_endian(0.0f) + little_endian(0.0f)) +
+                     attribute("screenWindowWidth", "float", little_endian(1.0f)) + zero;
+  const auto number = [](double value) { return little_endian(static_cast<float>(value)); };
+  const std::string pair = number(luminance) + number(luminance);
+  const std::string rows[2] = {
+      number((rgb[2] - luminance) / luminance) + number((rgb[0] - luminance) / luminance) + pair, pair};
+  std::size_t at = file.size() + 16;
+  for (const std::string& row : rows) {
+    file += little_endian(static_cast<std::uint64_t>(at));
+    at += 8 + row.size();
+  }
+  for (int y = 0; y < 2; ++y)
+    file += little_endian(y) + little_endian(static_cast<std::int32_t>(rows[y].size())) + rows[y];
+  return file;
+}
+
+TEST(PictureColors, LuminanceAndChroma) {
+  const Vector3d rgb(0.2, 0.5, 0.8);
+  EXPECT_LT((light_of("a.exr", luminance_chroma(rgb)) - rgb).cwiseAbs().maxCoeff(), 1e-3);
+  std::string cut = luminance_chroma(rgb);
+  cut.resize(cut.size() - 4);
+  EXPECT_THAT(message([&] { light_of("a.exr", cut); }), HasSubstr("cannot read"));
+}
+
+/// The displays of the built-in config, and how files for them are marked.
+TEST(DisplayEncodingTest, OfEachDisplay) {
+  EXPECT_TRUE(color().display_encoding().is_srgb);
+  EXPECT_THAT(color().display_encoding().icc_profile, IsEmpty());
+  const ColorManagement video({builtin_config_word, "Rec.1886", ""});
+  EXPECT_FALSE(video.display_encoding().is_srgb);
+  const IccProfile profile = parse_icc_profile(video.display_encoding().icc_profile, false);
+  EXPECT_LT((profile.rgb_to_xyz - rec709_to_xyz()).cwiseAbs().maxCoeff(), 5e-4);
+  for (const float x : {0.1f, 0.5f, 0.9f}) EXPECT_NEAR(profile.curves[0].at(x), std::pow(x, 2.4f), 1e-3);
+  const ColorManagement raw({builtin_config_word, "sRGB", "Raw"});
+  EXPECT_FALSE(raw.display_encoding().is_srgb);
+  EXPECT_THAT(raw.display_encoding().icc_profile, IsEmpty());
+}
+
+TEST(DisplayEncodingTest, FilesHoldTheProfile) {
+  Image image(2, 2, {"R", "G", "B"});
+  image.pixels = {1, 0, 0, 1, 0, 0, 1, 0, 0, 1, 0, 0};
+  const ImageMetadata metadata{{"oiio:ColorSpace", ""}, {"ICCProfile", p3_profile()}};
+  for (const std::string name : {"a.png", "a.jpg", "a.tif"}) {
+    const Temporary file(name);
+    write_image(file.path(), image, metadata);
+    EXPECT_LT((light_of(name == "a.jpg" ? "b.jpg" : "b" + name, read_bytes(file.path())) - p3_red).norm(),
+              name == "a.jpg" ? 0.02 : 1e-3)
+        << name;
+    const std::string before = read_bytes(file.path());
+    EXPECT_EQ(before.find("sRGB"), std::string::npos) << name;
+  }
+}
+
+TEST(PngTextTest, OtherScriptsAreUnicode) {
+  const Image image(1, 1, {"R", "G", "B"});
+  const Temporary plain("plain.png"), foreign("foreign.png");
+  write_image(plain.path(), image, {{"Artist", "Mueller"}});
+  write_image(foreign.path(), image, {{"Artist", "M\xc3\xbcller \xe5\xbc\xb5"}});
+  EXPECT_THAT(read_bytes(plain.path()), HasSubstr(std::string("tEXtAuthor\0Mueller", 18)));
+  // Name, no compression, no language, no translated name, text.
+  EXPECT_THAT(read_bytes(foreign.path()),
+              HasSubstr(std::string("iTXtAuthor\0\0\0\0\0", 15) + "M\xc3\xbcller \xe5\xbc\xb5"));
+}
+
+}  // namespace
+}  // namespace tensorray
