@@ -20,8 +20,10 @@ bool is_parallelogram(const std::vector<Eigen::Vector2d>& polygon) {
 double graded(double at, int count, bool begins, bool ends) {
   const double first = ends && count == 1 ? 0.5 : 1, last = begins && count == 1 ? 0.5 : 1;  // Sizes of what is graded.
   const double left = count - at;
-  if (begins && at < first) at = at * at / first;
-  else if (ends && left < last) at = count - left * left / last;
+  if (begins && at < first)
+    at = at * at / first;
+  else if (ends && left < last)
+    at = count - left * left / last;
   return at / count;
 }
 

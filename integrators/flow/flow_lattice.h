@@ -52,8 +52,8 @@ struct FlowLattice {
 
   /// Where a column or a row of the finest lattice lies, as a part of the patch's width or height. They are evenly
   /// spaced, but in the first squares at the aperture's edge the distance from it grows as the square of their number,
-  /// if `is_graded`: light that leaves the volume at once, through the face along which it goes, lands where the root of
-  /// this distance says.
+  /// if `is_graded`: light that leaves the volume at once, through the face along which it goes, lands where the root
+  /// of this distance says.
   double u_of(std::uint32_t patch, std::uint32_t x) const;
   double v_of(std::uint32_t patch, std::uint32_t y) const;
 

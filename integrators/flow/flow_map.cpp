@@ -27,8 +27,10 @@ constexpr double usual_tolerance = 0.5;  // Pixels.
 
 constexpr double inset = 3e-6;  // On the aperture's edge, it is a matter of rounding whether rays enter the volume.
                                 // There they start this part of a patch further inside.
-constexpr int edge_levels = 2;   // Light from the edge may go its own way within a part of a first square: there squares
-                                 // are divided so often before their error is estimated.
+constexpr int edge_levels = 2;  // Light from the edge may go its own way within a part of a first square: there squares
+                                // are divided so often before their error is estimated.
+constexpr float least_extent = 0.5f;  // Pixels. Squares, and light on a fold, count as no smaller.
+constexpr double unswept_part = 0.5;  // The smallest squares are so much smaller for light of single flexibilities.
 constexpr double swept_share = 0.99;  // The part of the positions whose light moves slowly enough from band to band.
 constexpr int most_levels = 14;
 constexpr std::size_t task_size = 64;  // Positions that one thread traces as one task.
@@ -77,8 +79,12 @@ class FlowMapBuilder {
     const double size = first_size(field, beam, pixel, settings);
     lattice_.patches = patches_of(beam.aperture, size);
     lattice_.is_graded = settings.silhouette;
-    const double finest = std::min(settings.finest, settings.tolerance) * pixel;
-    while (lattice_.levels < most_levels && std::ldexp(size, -lattice_.levels) > finest) ++lattice_.levels;
+    first_size_ = static_cast<float>(size / pixel);
+    // Light on the two sides of a tear cannot be told apart within a smallest square. Where light of a range tears at
+    // other places at each flexibility, this is spread.
+    const double finest =
+        std::min(settings.finest, settings.tolerance) * (is_light() && !is_swept() ? unswept_part : 1);
+    while (lattice_.levels < most_levels && std::ldexp(size, -lattice_.levels) > finest * pixel) ++lattice_.levels;
   }
 
   FlowMap build() && {
@@ -171,20 +177,56 @@ class FlowMapBuilder {
     return reach.landed > 0 && (settings_.beside || ((reach.low < size).all() && (reach.high > 0).all()));
   }
 
+  /// Whether the map is to be drawn as light. Otherwise it says what is seen at each place.
+  bool is_light() const { return settings_.silhouette; }
+
+  /// Whether light of all nodes is drawn from place to place.
+  bool is_swept() const { return settings_.range && map_.nodes > 1; }
+
+  /// The lesser extent of a square's light on the plate, pixels; 0 on a fold.
+  float width_of(const Square& square, const Reach& reach, std::size_t node) const {
+    const auto& [a, b, c, d] = square.corners;
+    const Eigen::Vector2f up = landing(c, node) - landing(a, node), down = landing(d, node) - landing(b, node);
+    const float area = std::abs(up.x() * down.y() - up.y() * down.x()) / 2;
+    return area > 0 ? area / (reach.high - reach.low).maxCoeff() : 0;
+  }
+
+  /// The error of landings that a square may have of a map that is drawn as light, pixels. It moves light, of which a
+  /// larger square has more, and is seen less where this light is spread over the plate.
+  /// @param width  Of the square's light, the least of all nodes, pixels.
+  /// @param sweep  The distance of its light from the first node to the last, pixels.
+  float light_bound(const Square& square, float width, float sweep) const {
+    const float size = std::max(std::ldexp(first_size_, -square.level), least_extent);
+    width = std::max(width, least_extent);
+    return static_cast<float>(settings_.tolerance) * width / size * std::cbrt(std::max(sweep / width, 1.0f));
+  }
+
+  /// Likewise of any other map.
+  /// @param size  The greatest extent of the square's landings, pixels.
+  float place_bound(float size) const {
+    return static_cast<float>(settings_.tolerance) * std::sqrt(std::max(size, 1.0f));
+  }
+
   bool needs_division(const Square& square) const {
     if (square.level >= lattice_.levels) return false;
-    if (square.level == 0) return true;  // There is no estimate of its error yet.
-    if (square.level < edge_levels && settings_.silhouette && lattice_.is_at_edge(square)) return true;
+    const bool is_at_edge = settings_.silhouette && lattice_.is_at_edge(square);
+    if (square.level < (is_at_edge ? edge_levels : 1)) return true;  // There is no estimate of its error yet.
     bool is_seen = false;
-    float size = 0;
+    float width = std::numeric_limits<float>::infinity(), size = 0;
+    Eigen::Vector2f first(0, 0), last(0, 0);
     for (const std::size_t node : tracer_.check_nodes()) {
       const Reach reach = reach_of(square.corners, node);
       if (!is_on_plate(reach)) continue;
       if (reach.landed < 4) return true;
-      is_seen = true;
+      width = std::min(width, width_of(square, reach, node));
       size = std::max(size, (reach.high - reach.low).maxCoeff());
+      last = landing(square.corners[0], node);
+      if (!is_seen) first = last;
+      is_seen = true;
     }
-    return is_seen && square.error > settings_.tolerance * std::sqrt(std::max(size, 1.0f));
+    if (!is_seen) return false;
+    return square.error >
+           (is_light() ? light_bound(square, width, is_swept() ? (last - first).norm() : 0) : place_bound(size));
   }
 
   /// The squares that need division, or those with the greatest errors if they are too many.
@@ -311,6 +353,7 @@ class FlowMapBuilder {
   std::vector<Square> squares_;
   std::vector<Eigen::Vector2d> origins_;  // Where the rays of the positions start, in the beam's frame.
   std::vector<Parents> parents_;          // Of the positions.
+  float first_size_ = 1;                  // Of the first squares, pixels of straight light.
   std::size_t traced_ = 0;                // Number of positions that have landings.
   FlowMap map_;
 };
