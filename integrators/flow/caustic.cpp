@@ -112,7 +112,7 @@ double start_triangle(const Job& job, const FlowPiece& piece, const FlowPiece::T
   const std::vector<Eigen::Vector2d>& at = worker.at;
   const auto landed = [&](std::uint16_t corner) { return piece.always_lands || worker.ends[corner] == RayEnd::plate; };
   const auto count = [&](RayEnd end, double part) { power[static_cast<int>(end)] += part * carried; };
-  if (landed(a) && landed(b) && landed(c)) {
+  if (landed(a) && landed(b) && landed(c) && !jumps(triangle.is_torn, at[a], at[b], at[c])) {
     const double on_plate = is_all_on_plate ? 1 : part_on_plate(at[a], at[b], at[c], job.plate);
     count(RayEnd::plate, on_plate);
     count(RayEnd::missed, 1 - on_plate);

@@ -38,7 +38,7 @@ constexpr double usual_step = 0.65;
 /// Draws each triangle as often as its light moves by `step` from the first band to the last: once for several bands
 /// in a row where light moves less, at most 16 times for each band where it moves more (every two steps where these are
 /// more than 128). Triangles of which not all corners land leave their light at the corners: each corner takes a third.
-/// The little light of triangles at a tear is spread across it. What lands beside the plate counts as missed.
+/// So do the small triangles at a tear. What lands beside the plate counts as missed.
 /// @param plate       The plate of the map.
 /// @param bands       In the order of their nodes, without gaps between those that have a width.
 /// @param by_channel  Whether the result has the irradiance of each channel.

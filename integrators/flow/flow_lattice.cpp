@@ -14,19 +14,32 @@ bool is_parallelogram(const std::vector<Eigen::Vector2d>& polygon) {
   return skew.norm() < 1e-9 * (polygon[2] - polygon[0]).norm();
 }
 
+/// The place of a line of a lattice of `count` squares, in [0, 1].
+/// @param at      In squares.
+/// @param begins  Whether the lines of the first square gather at its begin; likewise `ends` for the last one.
+double graded(double at, int count, bool begins, bool ends) {
+  const double first = ends && count == 1 ? 0.5 : 1, last = begins && count == 1 ? 0.5 : 1;  // Sizes of what is graded.
+  const double left = count - at;
+  if (begins && at < first)
+    at = at * at / first;
+  else if (ends && left < last)
+    at = count - left * left / last;
+  return at / count;
+}
+
 }  // namespace
 
 std::vector<Patch> patches_of(const std::vector<Eigen::Vector2d>& polygon, double square_size) {
   std::vector<Patch> patches;
   const std::size_t n = polygon.size();
   if (is_parallelogram(polygon)) {
-    patches.push_back({{polygon[0], polygon[1], polygon[2], polygon[3]}});
+    patches.push_back({{polygon[0], polygon[1], polygon[2], polygon[3]}, {true, true, true, true}});
   } else {
     Eigen::Vector2d center(0, 0);
     for (const Eigen::Vector2d& corner : polygon) center += corner / static_cast<double>(n);
     for (std::size_t i = 0; i < n; ++i) {
       const Eigen::Vector2d &corner = polygon[i], &next = polygon[(i + 1) % n], &last = polygon[(i + n - 1) % n];
-      patches.push_back({{(last + corner) / 2, corner, (corner + next) / 2, center}});
+      patches.push_back({{(last + corner) / 2, corner, (corner + next) / 2, center}, {true, true, false, false}});
     }
   }
   for (Patch& patch : patches) {
@@ -39,6 +52,24 @@ std::vector<Patch> patches_of(const std::vector<Eigen::Vector2d>& polygon, doubl
     patch.rows = count(1, 2, 0, 3);
   }
   return patches;
+}
+
+double FlowLattice::u_of(std::uint32_t patch, std::uint32_t x) const {
+  const Patch& p = patches[patch];
+  return graded(std::ldexp(x, -levels), p.columns, is_graded && p.is_edge[3], is_graded && p.is_edge[1]);
+}
+
+double FlowLattice::v_of(std::uint32_t patch, std::uint32_t y) const {
+  const Patch& p = patches[patch];
+  return graded(std::ldexp(y, -levels), p.rows, is_graded && p.is_edge[0], is_graded && p.is_edge[2]);
+}
+
+bool FlowLattice::is_at_edge(const Square& square) const {
+  const Patch& patch = patches[square.patch];
+  const std::uint32_t side = side_of(square), right = static_cast<std::uint32_t>(patch.columns) << levels,
+                      top = static_cast<std::uint32_t>(patch.rows) << levels;
+  return (patch.is_edge[0] && square.y == 0) || (patch.is_edge[1] && square.x + side == right) ||
+         (patch.is_edge[2] && square.y + side == top) || (patch.is_edge[3] && square.x == 0);
 }
 
 bool FlowLattice::is_on_border(const Square& square) const {

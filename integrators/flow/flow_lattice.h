@@ -15,6 +15,7 @@ namespace tensorray {
 /// A quadrilateral part of the aperture with a lattice of squares; corners counter-clockwise.
 struct Patch {
   std::array<Eigen::Vector2d, 4> corners;
+  std::array<bool, 4> is_edge{};  ///< Whether the side from each corner to the next is a part of the aperture's edge.
   int columns = 1, rows = 1;
 
   /// The point at (u, v) in [0, 1]²; bilinear.
@@ -39,7 +40,8 @@ struct Square {
 /// The patches, and the positions that are at points of their finest lattices.
 struct FlowLattice {
   std::vector<Patch> patches;
-  int levels = 1;  ///< Number of divisions from the first squares to the smallest ones, up to 14.
+  int levels = 1;          ///< Number of divisions from the first squares to the smallest ones, up to 14.
+  bool is_graded = false;  ///< Whether positions are closer to each other at the aperture's edge.
   std::unordered_map<std::uint64_t, std::uint32_t> positions;  ///< Their indices in the map, by `key`.
 
   static std::uint64_t key(std::uint32_t patch, std::uint32_t x, std::uint32_t y) {
@@ -47,6 +49,16 @@ struct FlowLattice {
   }
 
   std::uint32_t side_of(const Square& square) const { return 1u << (levels - square.level); }
+
+  /// Where a column or a row of the finest lattice lies, as a part of the patch's width or height. They are evenly
+  /// spaced, but in the first squares at the aperture's edge the distance from it grows as the square of their number,
+  /// if `is_graded`: light that leaves the volume at once, through the face along which it goes, lands where the root
+  /// of this distance says.
+  double u_of(std::uint32_t patch, std::uint32_t x) const;
+  double v_of(std::uint32_t patch, std::uint32_t y) const;
+
+  /// Whether a side of the square is a part of the aperture's edge.
+  bool is_at_edge(const Square& square) const;
 
   /// Whether a side of the square is one of its patch.
   bool is_on_border(const Square& square) const;

@@ -27,6 +27,10 @@ constexpr double usual_tolerance = 0.5;  // Pixels.
 
 constexpr double inset = 3e-6;  // On the aperture's edge, it is a matter of rounding whether rays enter the volume.
                                 // There they start this part of a patch further inside.
+constexpr int edge_levels = 2;  // Light from the edge may go its own way within a part of a first square: there squares
+                                // are divided so often before their error is estimated.
+constexpr float least_extent = 0.5f;  // Pixels. Squares, and light on a fold, count as no smaller.
+constexpr double unswept_part = 0.5;  // The smallest squares are so much smaller for light of single flexibilities.
 constexpr double swept_share = 0.99;  // The part of the positions whose light moves slowly enough from band to band.
 constexpr int most_levels = 14;
 constexpr std::size_t task_size = 64;  // Positions that one thread traces as one task.
@@ -74,8 +78,13 @@ class FlowMapBuilder {
     const double pixel = pixel_of_starts(plate_, beam);
     const double size = first_size(field, beam, pixel, settings);
     lattice_.patches = patches_of(beam.aperture, size);
-    const double finest = std::min(settings.finest, settings.tolerance) * pixel;
-    while (lattice_.levels < most_levels && std::ldexp(size, -lattice_.levels) > finest) ++lattice_.levels;
+    lattice_.is_graded = settings.silhouette;
+    first_size_ = static_cast<float>(size / pixel);
+    // Light on the two sides of a tear cannot be told apart within a smallest square. Where light of a range tears at
+    // other places at each flexibility, this is spread.
+    const double finest =
+        std::min(settings.finest, settings.tolerance) * (is_light() && !is_swept() ? unswept_part : 1);
+    while (lattice_.levels < most_levels && std::ldexp(size, -lattice_.levels) > finest * pixel) ++lattice_.levels;
   }
 
   FlowMap build() && {
@@ -95,7 +104,7 @@ class FlowMapBuilder {
         lattice_.positions.emplace(FlowLattice::key(patch, x, y), static_cast<std::uint32_t>(map_.starts.size()));
     if (is_new) {
       const Patch& p = lattice_.patches[patch];
-      const double u = std::ldexp(x, -lattice_.levels) / p.columns, v = std::ldexp(y, -lattice_.levels) / p.rows;
+      const double u = lattice_.u_of(patch, x), v = lattice_.v_of(patch, y);
       map_.starts.push_back(p.at(u, v));
       const double least = settings_.silhouette ? inset : 0;
       origins_.push_back(p.at(std::clamp(u, least, 1 - least), std::clamp(v, least, 1 - least)));
@@ -168,19 +177,56 @@ class FlowMapBuilder {
     return reach.landed > 0 && (settings_.beside || ((reach.low < size).all() && (reach.high > 0).all()));
   }
 
+  /// Whether the map is to be drawn as light. Otherwise it says what is seen at each place.
+  bool is_light() const { return settings_.silhouette; }
+
+  /// Whether light of all nodes is drawn from place to place.
+  bool is_swept() const { return settings_.range && map_.nodes > 1; }
+
+  /// The lesser extent of a square's light on the plate, pixels; 0 on a fold.
+  float width_of(const Square& square, const Reach& reach, std::size_t node) const {
+    const auto& [a, b, c, d] = square.corners;
+    const Eigen::Vector2f up = landing(c, node) - landing(a, node), down = landing(d, node) - landing(b, node);
+    const float area = std::abs(up.x() * down.y() - up.y() * down.x()) / 2;
+    return area > 0 ? area / (reach.high - reach.low).maxCoeff() : 0;
+  }
+
+  /// The error of landings that a square may have of a map that is drawn as light, pixels. It moves light, of which a
+  /// larger square has more, and is seen less where this light is spread over the plate.
+  /// @param width  Of the square's light, the least of all nodes, pixels.
+  /// @param sweep  The distance of its light from the first node to the last, pixels.
+  float light_bound(const Square& square, float width, float sweep) const {
+    const float size = std::max(std::ldexp(first_size_, -square.level), least_extent);
+    width = std::max(width, least_extent);
+    return static_cast<float>(settings_.tolerance) * width / size * std::cbrt(std::max(sweep / width, 1.0f));
+  }
+
+  /// Likewise of any other map.
+  /// @param size  The greatest extent of the square's landings, pixels.
+  float place_bound(float size) const {
+    return static_cast<float>(settings_.tolerance) * std::sqrt(std::max(size, 1.0f));
+  }
+
   bool needs_division(const Square& square) const {
     if (square.level >= lattice_.levels) return false;
-    if (square.level == 0) return true;  // There is no estimate of its error yet.
+    const bool is_at_edge = settings_.silhouette && lattice_.is_at_edge(square);
+    if (square.level < (is_at_edge ? edge_levels : 1)) return true;  // There is no estimate of its error yet.
     bool is_seen = false;
-    float size = 0;
+    float width = std::numeric_limits<float>::infinity(), size = 0;
+    Eigen::Vector2f first(0, 0), last(0, 0);
     for (const std::size_t node : tracer_.check_nodes()) {
       const Reach reach = reach_of(square.corners, node);
       if (!is_on_plate(reach)) continue;
       if (reach.landed < 4) return true;
-      is_seen = true;
+      width = std::min(width, width_of(square, reach, node));
       size = std::max(size, (reach.high - reach.low).maxCoeff());
+      last = landing(square.corners[0], node);
+      if (!is_seen) first = last;
+      is_seen = true;
     }
-    return is_seen && square.error > settings_.tolerance * std::sqrt(std::max(size, 1.0f));
+    if (!is_seen) return false;
+    return square.error >
+           (is_light() ? light_bound(square, width, is_swept() ? (last - first).norm() : 0) : place_bound(size));
   }
 
   /// The squares that need division, or those with the greatest errors if they are too many.
@@ -254,22 +300,38 @@ class FlowMapBuilder {
     return part;
   }
 
-  /// The greatest distance, at a node, of a middle's landing from the mean of the corners beside it; infinite if some
+  /// The greatest distance, at a node, of a middle's landing from what the corners beside it predict; infinite if some
   /// of the light does not land.
-  float deviation_at(const std::array<std::uint32_t, 4>& corners, const Middles& middles, std::size_t node) const {
+  float deviation_at(const Square& square, const Middles& middles, std::size_t node) const {
     std::array<Eigen::Vector2f, 4> at;
     for (int i = 0; i < 4; ++i) {
-      if (!landed(corners[i], node)) return std::numeric_limits<float>::infinity();
-      at[i] = landing(corners[i], node);
+      if (!landed(square.corners[i], node)) return std::numeric_limits<float>::infinity();
+      at[i] = landing(square.corners[i], node);
     }
+    const auto [u, v] = middle_of(square);
+    const auto between = [](const Eigen::Vector2f& from, const Eigen::Vector2f& to, float part) {
+      return Eigen::Vector2f((1 - part) * from + part * to);
+    };
+    const Eigen::Vector2f bottom = between(at[0], at[1], u), top = between(at[3], at[2], u);
+    const std::array<Eigen::Vector2f, 5> expected{bottom, between(at[1], at[2], v), top, between(at[0], at[3], v),
+                                                  between(bottom, top, v)};
     float greatest = 0;
     for (int i = 0; i < 5; ++i) {
       if (!landed(middles[i], node)) return std::numeric_limits<float>::infinity();
-      const Eigen::Vector2f mean =
-          i < 4 ? Eigen::Vector2f((at[i] + at[(i + 1) % 4]) / 2) : Eigen::Vector2f((at[0] + at[1] + at[2] + at[3]) / 4);
-      greatest = std::max(greatest, (landing(middles[i], node) - mean).norm());
+      greatest = std::max(greatest, (landing(middles[i], node) - expected[i]).norm());
     }
     return greatest;
+  }
+
+  /// Where the middle of a square lies in it; (½, ½) but at the aperture's edge.
+  std::pair<float, float> middle_of(const Square& square) const {
+    const std::uint32_t side = lattice_.side_of(square), half = side / 2;
+    const auto part = [](double first, double middle, double last) {
+      return static_cast<float>((middle - first) / (last - first));
+    };
+    const auto u = [&](std::uint32_t x) { return lattice_.u_of(square.patch, square.x + x); };
+    const auto v = [&](std::uint32_t y) { return lattice_.v_of(square.patch, square.y + y); };
+    return {part(u(0), u(half), u(side)), part(v(0), v(half), v(side))};
   }
 
   /// The greatest deviation among the nodes whose light falls on the plate.
@@ -278,7 +340,7 @@ class FlowMapBuilder {
     const std::array<std::uint32_t, 9> all{a, b, c, d, middles[0], middles[1], middles[2], middles[3], middles[4]};
     float greatest = 0;
     for (const std::size_t node : tracer_.check_nodes())
-      if (is_on_plate(reach_of(all, node))) greatest = std::max(greatest, deviation_at(square.corners, middles, node));
+      if (is_on_plate(reach_of(all, node))) greatest = std::max(greatest, deviation_at(square, middles, node));
     return greatest;
   }
 
@@ -291,6 +353,7 @@ class FlowMapBuilder {
   std::vector<Square> squares_;
   std::vector<Eigen::Vector2d> origins_;  // Where the rays of the positions start, in the beam's frame.
   std::vector<Parents> parents_;          // Of the positions.
+  float first_size_ = 1;                  // Of the first squares, pixels of straight light.
   std::size_t traced_ = 0;                // Number of positions that have landings.
   FlowMap map_;
 };

@@ -29,8 +29,8 @@ struct FlowSettings {
   double tolerance = 0.5;  ///< Wanted error of landings between positions, pixels; > 0.
   double finest = 0.5;  ///< Size of the smallest squares, pixels of straight light, unless the tolerance is less; > 0.
 
-  bool silhouette = true;  ///< Whether the edge of the aperture is that of the volume. Rays from there start a little
-                           ///< further inside, as they must enter the volume.
+  bool silhouette = true;  ///< Whether the edge of the aperture is that of the volume, and the map is drawn as light.
+                           ///< Rays from the edge start a little further inside, as they must enter the volume.
   bool beside = false;     ///< Whether light that lands beside the plate is as important as light on it.
 
   std::size_t most_starts = std::size_t{1} << 20;  ///< Refinement stops at so many positions; > 0.
@@ -104,9 +104,8 @@ inline FlowLanding landing_at(const FlowMap& map, std::size_t position, double n
 constexpr double torn_pixels = 1;
 
 /// Whether the landings of a triangle's corners, at one place among the nodes, lie on two sides of a tear.
-inline bool jumps(const FlowTriangle& triangle, const Eigen::Vector2d& a, const Eigen::Vector2d& b,
-                  const Eigen::Vector2d& c) {
-  return triangle.is_torn &&
+inline bool jumps(bool is_torn, const Eigen::Vector2d& a, const Eigen::Vector2d& b, const Eigen::Vector2d& c) {
+  return is_torn &&
          std::max({(b - a).squaredNorm(), (c - b).squaredNorm(), (a - c).squaredNorm()}) > torn_pixels * torn_pixels;
 }
 
@@ -118,8 +117,14 @@ inline bool jumps(const FlowTriangle& triangle, const Eigen::Vector2d& a, const 
 /// for that (for an aperture that is no parallelogram, one lattice for each corner). Each is divided into four, and
 /// then again, down to the finest size, if the landings within its parent were so far from where the
 /// parent's corners predict that an error greater than `tolerance` is likely, or if some of its corners' light lands
-/// and some does not. Where light is spread, so that the square's light covers n pixels along a side, the tolerance is
-/// √n times as large. Squares whose light falls beside the plate stay as they are.
+/// and some does not. In a map that is drawn as light, the tolerance is times w / n for a square of n pixels whose
+/// light is w pixels wide, both 0.5 at least: less on folds, more where light is spread; and times the cube root of the
+/// distance by which the range spreads it, in w. In other maps it is times √n where a square's landings cover n pixels.
+/// Squares whose light falls beside the plate stay as they are.
+///
+/// At the silhouette light leaves at once, through the face along which it goes, or is torn from light that stays: a
+/// map with √d, of the distance d from the edge, and with jumps. In the first squares there, positions have distances
+/// as the squares of whole numbers, and squares are divided twice before any error is estimated.
 ///
 /// In a range, each position first sends light at 5 of the 33 nodes, or at 3 where the positions beside it agree in
 /// what lies between. Where these are smooth, so that an error of more than 1/300 of the tolerance is unlikely,

@@ -107,6 +107,7 @@ class PieceBuilder {
     FlowPiece::Triangle added;
     for (std::size_t i = 0; i < 3; ++i) added.corners[i] = position(piece, triangle.corners[i]);
     added.area = triangle.area;
+    added.is_torn = triangle.is_torn;
     result_[piece].area += triangle.area;
     result_[piece].triangles.push_back(added);
   }

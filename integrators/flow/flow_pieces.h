@@ -22,6 +22,7 @@ struct FlowPiece {
   struct Triangle {
     std::array<std::uint16_t, 3> corners{};
     double area = 0;
+    bool is_torn = false;
   };
   struct Edge {
     static constexpr std::uint16_t none = 0xffff;

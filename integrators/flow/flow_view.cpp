@@ -169,7 +169,7 @@ struct Corners {
       corners[i] = {position, landing.end, start, landing.at, pixel};
       is_mapped = is_mapped && landing.end == RayEnd::plate;
     }
-    is_mapped = is_mapped && !jumps(triangle, corners[0].landing, corners[1].landing, corners[2].landing);
+    is_mapped = is_mapped && !jumps(triangle.is_torn, corners[0].landing, corners[1].landing, corners[2].landing);
   }
 
   Eigen::AlignedBox2d box() const {

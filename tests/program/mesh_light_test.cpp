@@ -3,7 +3,10 @@
 #include <algorithm>
 #include <cmath>
 
+#include <fmt/format.h>
+
 #include "renderer/images/image_distance.h"
+#include "tests/data_folder.h"
 #include "tests/program/support.h"
 
 namespace tensorray {
@@ -50,6 +53,71 @@ TEST_F(MeshLight, TheErrorIsBelowTheOneAskedFor) {
     EXPECT_LE(estimate, bound);
     EXPECT_LT(error, estimate);
     EXPECT_GT(error, estimate / 20);
+  }
+}
+
+/// The mean light of blocks of 4 × 4 pixels.
+std::vector<double> block_means(const Image& image) {
+  const auto channel = std::find(image.channels.begin(), image.channels.end(), "G") - image.channels.begin();
+  const int columns = image.width / 4, rows = image.height / 4;
+  std::vector<double> means(static_cast<std::size_t>(columns) * static_cast<std::size_t>(rows));
+  for (int y = 0; y < 4 * rows; ++y)
+    for (int x = 0; x < 4 * columns; ++x)
+      means[static_cast<std::size_t>(y / 4) * columns + x / 4] += image.pixel(x, y)[channel] / 16;
+  return means;
+}
+
+/// At the default tolerance the mesh shows what a histogram of many photons shows: blocks of pixels differ by 3% of the
+/// picture's own light and by the noise of the photons' number, root mean square.
+TEST_F(MeshLight, IsThatOfAHistogramInExampleScenes) {
+  constexpr double photons = 1e6, bound = 0.03;
+  struct Case {
+    const char* scene;
+    int resolution;
+    const char* change;
+  };
+  for (const Case& each : {Case{"helix", 128, ""}, Case{"vortex", 128, ""}, Case{"point_load_photons", 128, ""},
+                           Case{"two_point_load", 128, ""}, Case{"hemisphere_photons_front", 128, ""},
+                           Case{"hemisphere_photons_side", 128, ""}, Case{"hemisphere_photons_top", 128, ""},
+                           Case{"hemisphere_photons_front", 256, "field.scale=0.675"}}) {
+    const auto blocks_of = [&](const char* kind) {
+      std::vector<std::string> arguments{"render",
+                                         (source_folder() / "scenes" / each.scene).string() + ".json",
+                                         "-o",
+                                         "out.exr",
+                                         "--stats",
+                                         "stats.json",
+                                         "-q",
+                                         "--set",
+                                         fmt::format("receiver.resolution=[{0},{0}]", each.resolution),
+                                         "--set",
+                                         "light.wavelengths.min=549",
+                                         "--set",
+                                         "light.wavelengths.max=551",
+                                         "--set",
+                                         "light.wavelengths.count=1",
+                                         "--set",
+                                         fmt::format("light.photons={}", photons),
+                                         "--set",
+                                         fmt::format("integrator.density.kind={}", kind)};
+      if (*each.change) arguments.insert(arguments.end(), {"--set", each.change});
+      run_well(arguments);
+      return block_means(read_image(in_folder("out.exr")));
+    };
+    const std::vector<double> expected = blocks_of("histogram");
+    const json power = read_json("stats.json")["power"];
+    const double on_plate = power["deposited"].get<double>() / power["emitted"].get<double>() * photons;
+    const std::vector<double> light = blocks_of("mesh");
+    double all = 0, squares = 0, differences = 0;
+    for (std::size_t i = 0; i < light.size(); ++i) {
+      all += expected[i];
+      squares += expected[i] * expected[i];
+      differences += std::pow(light[i] - expected[i], 2);
+    }
+    // The variance of a number of photons is the number.
+    const double noise = all * all / on_plate;
+    EXPECT_LT(differences, 1.1 * noise + bound * bound * squares) << each.scene << " " << each.resolution;
+    EXPECT_LT(noise, 0.01 * squares) << each.scene << ": too few photons";
   }
 }
 
