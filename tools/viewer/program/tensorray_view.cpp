@@ -5,18 +5,18 @@
 #include <filesystem>
 #include <optional>
 #include <string>
-#include <thread>
 #include <vector>
 
 #include <CLI/CLI.hpp>
 #include <fmt/format.h>
-#include <tbb/global_control.h>
 
 #include "base/child_program.h"
 #include "renderer/images/image.h"
 #include "tools/command_line/interrupts.h"
 #include "tools/command_line/progress_bar.h"
 #include "tools/command_line/run_and_report.h"
+#include "tools/command_line/tell.h"
+#include "tools/command_line/threads.h"
 #include "tools/viewer/pages.h"
 #include "tools/viewer/server.h"
 #include "tools/viewer/token.h"
@@ -70,9 +70,8 @@ Server listen(const ViewOptions& options, Pages& pages) {
 }
 
 void view(ViewOptions options, Progress& progress) {
-  const unsigned threads = options.threads > 0 ? options.threads : std::max(1u, std::thread::hardware_concurrency());
-  const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, threads);
-  set_image_threads(static_cast<int>(threads));
+  const Threads threads(options.threads);
+  set_image_threads(static_cast<int>(running_threads()));
   if (options.viewed.copy.empty()) options.viewed.copy = default_copy(options.viewed.file);
   require_same_folder(options.viewed);
   options.server.token = token_of_user();
@@ -91,6 +90,7 @@ void view(ViewOptions options, Progress& progress) {
 }  // namespace
 
 int main(int argc, char** argv) {
+  open_standard_streams();
   Progress& progress = progress_until_interrupted();
   ViewOptions options;
   CLI::App app("Look at a scene in a browser and change it there: the picture follows", "tensorray view");
