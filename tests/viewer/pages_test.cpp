@@ -149,6 +149,22 @@ TEST_F(PagesTest, RefusesInOneLineAndGoesOn) {
   EXPECT_GE(errors, 4 + wrong.size());
 }
 
+/// A page that comes after a scene could not be loaded sees the one before.
+TEST_F(PagesTest, ANewPageAfterAFailureSeesTheSceneBefore) {
+  std::filesystem::path field = in_folder("field.vdb");
+  Json scene = test::small_scene();
+  send_scene(1, scene);
+  mailbox_.final_picture(1);
+  scene["field"]["scale"] = 1e300;  // It can be read, but nothing can be traced in it.
+  scene["field"]["generate"] = {{"kind", "constant"}, {"resolution", 12}, {"tensor", {{0, 0, 0}, {0, 0, 0}, {0, 0, 0}}}};
+  scene["field"]["scale"] = "auto";  // There is none for a field of zeros.
+  send_scene(2, scene);
+  mailbox_.wait([](const Json& json) { return json.value("id", Json()) == 2; });
+  pages_.open(other_mailbox_.sender());
+  const Json hello = other_mailbox_.wait([](const Json& json) { return json.value("type", "") == "hello"; }).json;
+  EXPECT_EQ(hello.at("field").at("voxels")[0], 12);
+}
+
 TEST_F(PagesTest, PagesDoNotDisturbEachOther) {
   const Pages::Id other = pages_.open(other_mailbox_.sender());
   Json scene = test::small_scene();

@@ -206,6 +206,52 @@ TEST(DamagedFiles, ReadsFormatsThatHoldUnknownGrids) {
   EXPECT_EQ(read_tensor_vdb(path).active_voxels(), 1u);
 }
 
+/// A tile at the greatest index has no index behind it, where a loop over its blocks could end.
+TEST(DamagedFiles, VoxelsFarAwayAreRefused) {
+  constexpr std::int32_t end = std::numeric_limits<std::int32_t>::max();
+  struct Case {
+    const char* what;
+    openvdb::Coord min, max;  ///< Of active voxels.
+  };
+  const auto at = [](std::int32_t x) { return openvdb::Coord(x, 0, 0); };
+  const std::vector<Case> cases{{"tile at the end", openvdb::Coord(end - 127), openvdb::Coord(end)},
+                                {"tile at the beginning", openvdb::Coord(-end - 1), openvdb::Coord(-end - 1 + 127)},
+                                {"voxel at the end", at(end), at(end)},
+                                {"voxel at the beginning", at(-end - 1), at(-end - 1)},
+                                {"voxel just out of range", at((1 << 29) + 8), at((1 << 29) + 8)}};
+  const Temporary path("far.vdb");
+  for (const Case& each : cases)
+    for (const Derive derive : {Derive::none, Derive::hessian}) {
+      const auto scalar = stock_grid<openvdb::FloatGrid>("phi", 0);
+      openvdb::GridPtrVec grids{scalar};
+      scalar->sparseFill({each.min, each.max}, 1.0f);
+      if (derive == Derive::none) {
+        grids.clear();
+        for (int row = 0; row < 3; ++row) {
+          const auto grid = stock_grid<openvdb::Vec3SGrid>("phi_row" + std::to_string(row), openvdb::Vec3s(0));
+          grid->sparseFill({each.min, each.max}, openvdb::Vec3s(1));
+          grids.push_back(grid);
+        }
+      }
+      write_stock(path, grids);
+      EXPECT_THAT([&] { read_tensor_vdb(path, "", derive); },
+                  ThrowsMessage<std::runtime_error>(AllOf(HasSubstr(path.string()), HasSubstr("indices are beyond"))))
+          << each.what;
+    }
+}
+
+/// Tiles take a few bytes in the file, and 2 GB each in memory.
+TEST(DamagedFiles, TilesThatFitInNoMemoryAreRefused) {
+  const auto grid = stock_grid<openvdb::FloatGrid>("phi", 0);
+  for (int i = 0; i < 4000; ++i)
+    grid->tree().addTile(2, openvdb::Coord(128 * (i % 20), 128 * (i / 20 % 20), 128 * (i / 400)), 1.0f, true);
+  const Temporary path("tiles.vdb");
+  write_stock(path, {grid});
+  EXPECT_LT(fs::file_size(path), 1000000u);
+  EXPECT_THAT([&] { read_tensor_vdb(path, "", Derive::hessian); },
+              ThrowsMessage<std::runtime_error>(AllOf(HasSubstr(path.string()), HasSubstr("active voxels need"))));
+}
+
 TEST(TensorFileWriting, FullDiskIsNoticed) {
   const TensorGrid grid = sparse_grid();
   const Temporary path("a.vdb");
