@@ -1,6 +1,7 @@
 #include "base/process_limits.h"
 
 #include <algorithm>
+#include <cstddef>
 #include <cmath>
 #include <cstdlib>
 #include <fstream>
@@ -13,6 +14,7 @@
 #include <vector>
 
 #include <sys/resource.h>
+#include <unistd.h>
 
 #include "base/text.h"
 
@@ -89,10 +91,14 @@ double container_memory(const fs::path& root) {
   return bytes;
 }
 
-double own_limit(decltype(RLIMIT_AS) resource) {
+/// What is left of a limit of this process, of which libraries and stacks have a part, too.
+/// @param column  What counts, in /proc/self/statm.
+double own_limit(decltype(RLIMIT_AS) resource, std::size_t column) {
   rlimit limit{};
-  const bool is_known = getrlimit(resource, &limit) == 0 && limit.rlim_cur != RLIM_INFINITY;
-  return is_known ? static_cast<double>(limit.rlim_cur) : unlimited;
+  if (getrlimit(resource, &limit) != 0 || limit.rlim_cur == RLIM_INFINITY) return unlimited;
+  const std::vector<double> pages = numbers_in("/proc/self/statm");
+  const double used = column < pages.size() ? pages[column] * static_cast<double>(sysconf(_SC_PAGESIZE)) : 0;
+  return std::max(0.0, static_cast<double>(limit.rlim_cur) - used);
 }
 
 }  // namespace
@@ -105,8 +111,8 @@ unsigned usable_processors(const fs::path& root) {
 MemoryLimit memory_limit(const fs::path& root) {
   const std::vector<MemoryLimit> limits{{machine_memory(root), "this machine's memory"},
                                         {container_memory(root), "the container's limit"},
-                                        {own_limit(RLIMIT_AS), "the limit of `ulimit -v`"},
-                                        {own_limit(RLIMIT_DATA), "the limit of `ulimit -d`"}};
+                                        {own_limit(RLIMIT_AS, 0), "what `ulimit -v` leaves"},
+                                        {own_limit(RLIMIT_DATA, 5), "what `ulimit -d` leaves"}};
   return *std::min_element(limits.begin(), limits.end(),
                            [](const MemoryLimit& a, const MemoryLimit& b) { return a.bytes < b.bytes; });
 }

@@ -15,10 +15,11 @@ unsigned usable_processors(const std::filesystem::path& root = "/");
 struct MemoryLimit {
   double bytes = 0;  ///< Infinite if nothing is known.
   std::string
-      cause;  ///< What sets it, for a message: "this machine's memory", "`ulimit -v`", "the limit of the container".
+      cause;  ///< What sets it, for a message: "this machine's memory".
 };
 
-/// The least of: the machine's memory and swap, the memory of containers (cgroups), and the limits of this process.
+/// The least of: the machine's memory and swap, the memory of containers (cgroups), and what the limits of this process
+/// (`ulimit -v`, `ulimit -d`) leave.
 MemoryLimit memory_limit(const std::filesystem::path& root = "/");
 
 /// Checks that `count` threads can be started at once, besides those that run. Libraries that meet this only later end

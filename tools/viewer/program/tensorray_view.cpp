@@ -2,9 +2,13 @@
 /// The program `tensorray-view`: a web server for the live view. `tensorray view` starts it.
 
 #include <algorithm>
+#include <cerrno>
+#include <cstdio>
 #include <filesystem>
 #include <optional>
+#include <stdexcept>
 #include <string>
+#include <system_error>
 #include <vector>
 
 #include <CLI/CLI.hpp>
@@ -83,7 +87,9 @@ void view(ViewOptions options, Progress& progress) {
   Server server = listen(options, pages);
   fmt::print("{}\n", server.url());
   if (!options.quiet) fmt::print("Open this address in a browser. Ctrl-C ends the view.\n");
-  std::fflush(stdout);
+  if (std::fflush(stdout) != 0)
+    throw std::runtime_error("the address cannot be written to standard output: " +
+                             std::generic_category().message(errno));
   server.run(progress);
 }
 
