@@ -2,6 +2,8 @@
 /// @file base/descriptor.h
 /// File descriptors of the system. Where this project needs one, and not a stream, it is a Descriptor.
 
+#include <cstddef>
+#include <cstdint>
 #include <filesystem>
 #include <string_view>
 
@@ -32,5 +34,11 @@ Descriptor open_file(const std::filesystem::path& path, int flags, unsigned mode
 
 /// Writes all bytes, however many calls it takes. @return false if it fails; `errno` says why.
 bool write_whole(int descriptor, std::string_view bytes);
+
+/// The same at a position of a file, for several threads at once.
+bool write_whole_at(int descriptor, std::string_view bytes, std::uint64_t at);
+
+/// Reads `count` bytes at a position of a file. @return false if it fails, or the file does not have them.
+bool read_whole_at(int descriptor, void* bytes, std::size_t count, std::uint64_t at);
 
 }  // namespace tensorray

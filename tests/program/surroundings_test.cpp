@@ -44,9 +44,6 @@ const std::vector<Command> commands{
     {"import", {"import", "INPUTS/tensors.npy", "-o", "RESULTS/i.vdb"}, {"i.vdb"}},
     {"view", {"view", "INPUTS/scene.json", "--port", "0"}, {}}};
 
-const char* const as_other_user =
-    "if [ $(id -u) = 0 ]; then set -- \"$0\" \"$@\"; exec setpriv --reuid=65534 --clear-groups";
-
 // Names of 255 bytes, which are the longest.
 #define TEN "0123456789"
 #define FIFTY TEN TEN TEN TEN TEN
