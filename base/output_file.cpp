@@ -61,7 +61,9 @@ fs::path folder_of(const fs::path& file) { return file.has_parent_path() ? file.
 OutputFile::OutputFile(fs::path target) : target_(std::move(target)) {
   std::error_code error;
   const fs::file_status status = fs::status(target_, error);
-  if (status.type() == fs::file_type::none) fail(target_, fmt::format("cannot be written: {}", error.message()));
+  const bool is_loop = error == std::errc::too_many_symbolic_link_levels;  // behind_links reports it.
+  if (status.type() == fs::file_type::none && !is_loop)
+    fail(target_, fmt::format("cannot be written: {}", error.message()));
   if (fs::is_directory(status) || !target_.has_filename()) fail(target_, "is a folder; give the name of a file");
   if (fs::exists(status) && ::access(target_.c_str(), W_OK) != 0) {
     fail(target_, fmt::format("cannot be written: {}", std::strerror(errno)));

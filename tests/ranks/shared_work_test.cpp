@@ -215,13 +215,13 @@ TEST(SharedWork, ContinuesWithUnitsOfAnEarlierRun) {
 
 /// Rank 0 gets units that are not done, so that a checkpoint has them.
 TEST(SharedWork, UnitsThatAreNotDoneAreSentAfterTheInterval) {
-  Event other_has_some;
-  Watch watch;
-  watch.on_units = [&](int rank, const std::vector<std::size_t>&) {
-    rank == 0 ? other_has_some.wait() : other_has_some.happen();
-  };
   constexpr double at_once = 1e-12;
   for (const double interval : {at_once, 0.0}) {
+    Event other_has_some;
+    Watch watch;
+    watch.on_units = [&](int rank, const std::vector<std::size_t>&) {
+      rank == 0 ? other_has_some.wait() : other_has_some.happen();
+    };
     const Result result = share_work(2, 40, {}, watch, interval);
     expect_complete(result.units, 40);
     const std::uint64_t away = result.traffic.units[1];
