@@ -1,8 +1,8 @@
 #include "base/process_limits.h"
 
 #include <algorithm>
-#include <cstddef>
 #include <cmath>
+#include <cstddef>
 #include <cstdlib>
 #include <fstream>
 #include <future>
@@ -115,6 +115,14 @@ MemoryLimit memory_limit(const fs::path& root) {
                                         {own_limit(RLIMIT_DATA, 5), "what `ulimit -d` leaves"}};
   return *std::min_element(limits.begin(), limits.end(),
                            [](const MemoryLimit& a, const MemoryLimit& b) { return a.bytes < b.bytes; });
+}
+
+void require_stack() {
+  constexpr rlim_t least = 256 << 10;  // Twice what renders and imports were seen to need.
+  rlimit limit{};
+  if (getrlimit(RLIMIT_STACK, &limit) == 0 && limit.rlim_cur < least)
+    throw std::runtime_error("the stack may have " + bytes_text(static_cast<double>(limit.rlim_cur)) + ", but needs " +
+                             bytes_text(static_cast<double>(least)) + "; raise `ulimit -s`");
 }
 
 void require_threads(unsigned count) {

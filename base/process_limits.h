@@ -22,6 +22,10 @@ struct MemoryLimit {
 /// (`ulimit -v`, `ulimit -d`) leave.
 MemoryLimit memory_limit(const std::filesystem::path& root = "/");
 
+/// Checks that stacks are large enough: one that ends cannot be reported.
+/// @throw std::runtime_error with the fix.
+void require_stack();
+
 /// Checks that `count` threads can be started at once, besides those that run. Libraries that meet this only later end
 /// the process. @throw std::runtime_error with the cause and the fix.
 void require_threads(unsigned count);

@@ -90,17 +90,18 @@ TEST_F(Limits, EstimatesOfMemoryAreNearWhatIsMeasured) {
     const char* key;
     int small, large;
   };
-  const std::vector<std::string> lens{"--set", "integrator.type=lens"},
+  const std::vector<std::string> paths{"--set", "integrator.type=path_tracing", "--set", "integrator.max_samples=1",
+                                       "--set", "integrator.min_samples=1",     "--set", "integrator.seeds.count=10"},
       histogram{"--set", R"(integrator.density={"kind":"histogram"})"};
   for (const Case& each :
-       {Case{histogram, "receiver.resolution", 2500, 5000}, Case{lens, "receiver.resolution", 500, 1500}}) {
+       {Case{histogram, "receiver.resolution", 2500, 5000}, Case{paths, "camera.resolution", 300, 1000}}) {
     double estimate[2], measured[2];
     for (const int i : {0, 1}) {
       const int size = i == 0 ? each.small : each.large;
       std::vector<std::string> arguments = each.more;
       arguments.insert(arguments.end(), {"--set", std::string(each.key) + "=[" + std::to_string(size) + "," +
                                                       std::to_string(size) + "]"});
-      estimate[i] = needed_bytes(run_in("ulimit -v 700000; exec", arguments).error);
+      estimate[i] = needed_bytes(run_in("ulimit -d 200000; exec", arguments).error);
       arguments.insert(arguments.end(), {"--stats", "stats.json"});
       const Outcome outcome = run_in("exec", arguments);
       ASSERT_EQ(outcome.status, 0) << outcome.error;

@@ -70,8 +70,9 @@ std::vector<Place> places() {
           {"a working folder that is gone", "mkdir gone; cd gone; rmdir ../gone; exec", {}},
           {"another locale", "LC_ALL=de_DE.UTF-8 LANG=de_DE.UTF-8 exec", {}},
           {"one processor", "exec taskset 1", {}},
-          {"few descriptors", "ulimit -n 24; exec", {}},
-          {"little stack", "ulimit -s 512; exec", {}},
+          {"few descriptors", "ulimit -n 16; exec", {}},
+          {"little stack", "ulimit -s 256; exec", {}},
+          {"too little stack", "ulimit -s 64; exec", {{"", {1, "ulimit -s"}}}},
           {"a folder whose name is no UTF-8", "exec", {}, "\xff\xc3(\xed\xa0\x80"},
           {"a folder with the longest name", "exec", {}, FIFTY FIFTY FIFTY FIFTY FIFTY "01234"},
           {"a folder that is missing", "exec", {{"", {1, "there is no folder"}}, {"view", {}}}, "missing"}};

@@ -8,6 +8,7 @@
 
 #include <CLI/Error.hpp>
 
+#include "base/process_limits.h"
 #include "base/progress.h"
 #include "base/text.h"
 #include "tools/command_line/tell.h"
@@ -40,6 +41,7 @@ std::string reason_of(const std::exception& error) {
 
 int run_and_report(const std::function<void()>& work) {
   try {
+    require_stack();
     work();
     if (std::fflush(stdout) != 0) throw std::runtime_error("standard output cannot be written: the disk may be full");
     return 0;
