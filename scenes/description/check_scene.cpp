@@ -122,7 +122,7 @@ void check_normal(const std::optional<Eigen::Vector3d>& normal, const char* poin
 }
 
 void check_memory(double bytes, const std::string& what, const SceneSource& source) {
-  constexpr double program = 250e6;  // What any render takes.
+  constexpr double program = 60e6;  // What the smallest render takes.
   const MemoryLimit limit = memory_limit();
   if (bytes + program > limit.bytes)
     source.fail(fmt::format("{} needs about {}, more than {}, {}; ask for less of it", what, bytes_text(bytes + program),

@@ -5,6 +5,8 @@
 #include <cstddef>
 #include <limits>
 
+#include "base/path_text.h"
+
 namespace tensorray {
 namespace {
 

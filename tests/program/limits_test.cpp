@@ -101,7 +101,7 @@ TEST_F(Limits, EstimatesOfMemoryAreNearWhatIsMeasured) {
       std::vector<std::string> arguments = each.more;
       arguments.insert(arguments.end(), {"--set", std::string(each.key) + "=[" + std::to_string(size) + "," +
                                                       std::to_string(size) + "]"});
-      estimate[i] = needed_bytes(run_in("ulimit -d 200000; exec", arguments).error);
+      estimate[i] = needed_bytes(run_in("ulimit -d 120000; exec", arguments).error);
       arguments.insert(arguments.end(), {"--stats", "stats.json"});
       const Outcome outcome = run_in("exec", arguments);
       ASSERT_EQ(outcome.status, 0) << outcome.error;
