@@ -20,10 +20,10 @@ class Limits : public Program {
     std::filesystem::permissions(in_folder(""), std::filesystem::perms::all);
   }
 
-  /// For a user whom `ulimit -u` binds: it does not bind root.
-  static std::string as_user(const std::string& shell) {
-    if (geteuid() != 0) return shell + "; exec";
-    return "exec setpriv --reuid=65534 --regid=65534 --clear-groups sh -c '" + shell + R"(; exec "$0" "$@"')";
+  /// Without further threads, as a user whom this limit binds: it does not bind root.
+  static std::string without_threads() {
+    const std::string user = geteuid() == 0 ? "setpriv --reuid=65534 --regid=65534 --clear-groups " : "";
+    return "exec " + user + "prlimit --nproc=1";
   }
 
   Outcome run_in(const std::string& shell, const std::vector<std::string>& more) const {
@@ -42,7 +42,7 @@ TEST_F(Limits, AreSaidInOneLine) {
   };
   const std::string little = "ulimit -v 3000000; exec";
   const std::vector<Case> cases{
-      {as_user("ulimit -u 1"), {}, 1, "threads can be started: Resource temporarily unavailable; give fewer"},
+      {without_threads(), {}, 1, "threads can be started: Resource temporarily unavailable; give fewer"},
       {little, {"--set", "receiver.resolution=[16000,16000]"}, 2, "`/receiver/resolution` needs about"},
       {little, {"--set", "integrator.type=lens", "--set", "receiver.resolution=[8000,8000]"}, 2, "ulimit -v"},
       {little, {"--set", "integrator.type=path_tracing", "--set", "camera.resolution=[6000,6000]"}, 2, "needs about"},
