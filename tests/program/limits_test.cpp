@@ -42,7 +42,7 @@ TEST_F(Limits, AreSaidInOneLine) {
   };
   const std::string little = "ulimit -v 3000000; exec";
   const std::vector<Case> cases{
-      {without_threads(), {}, 1, "threads can be started: Resource temporarily unavailable; give fewer"},
+      {without_threads(), {}, 1, "Resource temporarily unavailable"},
       {little, {"--set", "receiver.resolution=[16000,16000]"}, 2, "`/receiver/resolution` needs about"},
       {little, {"--set", "integrator.type=lens", "--set", "receiver.resolution=[8000,8000]"}, 2, "ulimit -v"},
       {little, {"--set", "integrator.type=path_tracing", "--set", "camera.resolution=[6000,6000]"}, 2, "needs about"},

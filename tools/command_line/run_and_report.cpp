@@ -1,12 +1,15 @@
 #include "tools/command_line/run_and_report.h"
 
 #include <cstdio>
+#include <exception>
 #include <filesystem>
 #include <new>
 #include <stdexcept>
 #include <string>
+#include <system_error>
 
 #include <CLI/Error.hpp>
+#include <unistd.h>
 
 #include "base/process_limits.h"
 #include "base/progress.h"
@@ -29,6 +32,29 @@ std::string text_of(const std::filesystem::filesystem_error& error) {
   if (!path.empty()) return path + ": " + error.code().message();
   return "the working folder cannot be found: " + error.code().message();
 }
+
+/// The end of a program whose exception nobody catches: one line and a status, as of any other error.
+[[noreturn]] void end_by_exception() {
+  std::string reason = "an unknown error";
+  try {
+    if (const std::exception_ptr error = std::current_exception()) std::rethrow_exception(error);
+  } catch (const std::system_error& error) {
+    reason = error.code().message() + "; limits of threads or memory (`ulimit -u`, `ulimit -v`) may be too low";
+  } catch (const std::exception& error) {
+    reason = reason_of(error);
+  } catch (...) {
+  }
+  report("ended by " + reason, failed);
+  _exit(failed);
+}
+
+#ifndef __SANITIZE_ADDRESS__
+void expect_exceptions() { std::set_terminate(end_by_exception); }
+
+/// Called before the libraries are initialized: one of OpenVDB's (log4cplus) starts threads then, and where it cannot,
+/// its exception comes before `main`.
+__attribute__((section(".preinit_array"), used)) void (*const before_libraries)() = expect_exceptions;
+#endif
 
 }  // namespace
 
