@@ -8,7 +8,6 @@
 #include <stdexcept>
 #include <system_error>
 
-#include <fcntl.h>
 #include <spawn.h>
 #ifdef __linux__
 #include <sys/prctl.h>
@@ -20,15 +19,6 @@
 
 namespace tensorray {
 namespace {
-
-/// Greater than the descriptors of the child's standard streams and of the shared file.
-constexpr int least_descriptor = 10;
-
-std::filesystem::path temporary_folder() {
-  std::error_code none;
-  const std::filesystem::path folder = std::filesystem::temp_directory_path(none);
-  return none ? "/tmp" : folder;
-}
 
 struct SpawnActions {
   SpawnActions() { posix_spawn_file_actions_init(&actions); }
@@ -51,22 +41,6 @@ int wait_for(pid_t child) {
 }
 
 }  // namespace
-
-UnnamedFile::UnnamedFile() {
-  std::string name = (temporary_folder() / "tensorray_XXXXXX").string();
-  const int made = mkostemp(&name[0], O_CLOEXEC);
-  if (made < 0)
-    throw std::runtime_error("no temporary file can be made in " + temporary_folder().string() + ": " +
-                             std::generic_category().message(errno) + "; name another folder in TMPDIR");
-  unlink(name.c_str());
-  descriptor_ = fcntl(made, F_DUPFD_CLOEXEC, least_descriptor);
-  close(made);
-  if (descriptor_ < 0) throw std::runtime_error("too many files are open");
-}
-
-UnnamedFile::~UnnamedFile() { close(descriptor_); }
-
-std::filesystem::path UnnamedFile::path() const { return "/proc/self/fd/" + std::to_string(descriptor_); }
 
 void use_programs_in(const std::filesystem::path& folder) { program_folder() = folder; }
 

@@ -7,25 +7,9 @@
 #include <string>
 #include <vector>
 
+#include "base/temporary_folder.h"
+
 namespace tensorray {
-
-/// A file in the temporary folder that has no name. The system removes it when the last process that holds it ends, for
-/// whatever reason. The file is empty at first.
-class UnnamedFile {
- public:
-  /// @throw std::runtime_error naming the temporary folder.
-  UnnamedFile();
-  ~UnnamedFile();
-  UnnamedFile(const UnnamedFile&) = delete;
-  UnnamedFile& operator=(const UnnamedFile&) = delete;
-
-  /// The path by which only this process can open the file.
-  std::filesystem::path path() const;
-  int descriptor() const { return descriptor_; }
-
- private:
-  int descriptor_ = -1;
-};
 
 /// The path by which a program that run_program starts can open the shared file.
 constexpr const char* shared_file = "/proc/self/fd/3";

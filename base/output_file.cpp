@@ -13,56 +13,34 @@
 #include <fmt/core.h>
 #include <unistd.h>
 
+#include "base/descriptor.h"
 #include "base/errors.h"
+#include "base/temporary_folder.h"
 
 namespace tensorray {
 namespace {
 
 namespace fs = std::filesystem;
 
-/// Closes a file descriptor when it goes out of scope.
-class Descriptor {
- public:
-  explicit Descriptor(int value) : value_(value) {}
-  ~Descriptor() { close(); }
-  Descriptor(const Descriptor&) = delete;
-  Descriptor& operator=(const Descriptor&) = delete;
-
-  int get() const { return value_; }
-  bool is_open() const { return value_ >= 0; }
-  bool close() { return value_ < 0 || ::close(std::exchange(value_, -1)) == 0; }
-
- private:
-  int value_;
-};
-
 /// Makes an empty file with a new name in `folder`.
 fs::path make_temporary(const fs::path& folder, const fs::path& target) {
   static std::atomic<unsigned> counter{0};
-  const std::string ending = target.extension().string();
+  // Longer endings name no format, and a name has a greatest length.
+  constexpr std::size_t longest_ending = 32;
+  const std::string ending = target.extension().string().size() <= longest_ending ? target.extension().string() : "";
   while (true) {
     const fs::path path = folder / fmt::format(".tensorray-{}-{}{}", getpid(), counter++, ending);
-    const Descriptor file(::open(path.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0666));
+    const Descriptor file = open_file(path, O_WRONLY | O_CREAT | O_EXCL);
     if (file.is_open()) return path;
     if (errno == EEXIST) continue;  // A killed process with the same process number left this file.
     fail(target, fmt::format("cannot write to the folder {}: {}", folder.string(), std::strerror(errno)));
   }
 }
 
-void write_all(int descriptor, const char* data, std::size_t size, const fs::path& target) {
-  while (size > 0) {
-    const ssize_t written = ::write(descriptor, data, size);
-    if (written < 0 && errno == EINTR) continue;
-    if (written < 0) fail(target, fmt::format("cannot be written: {}", std::strerror(errno)));
-    data += written;
-    size -= static_cast<std::size_t>(written);
-  }
-}
-
 void copy_into(const fs::path& source, const fs::path& device) {
-  const Descriptor from(::open(source.c_str(), O_RDONLY | O_CLOEXEC));
+  const Descriptor from = open_file(source, O_RDONLY);
   if (!from.is_open()) fail(device, fmt::format("cannot read {}: {}", source.string(), std::strerror(errno)));
-  Descriptor to(::open(device.c_str(), O_WRONLY | O_CLOEXEC));
+  Descriptor to = open_file(device, O_WRONLY);
   if (!to.is_open()) fail(device, fmt::format("cannot be opened: {}", std::strerror(errno)));
   std::vector<char> buffer(1 << 20);
   while (true) {
@@ -70,7 +48,8 @@ void copy_into(const fs::path& source, const fs::path& device) {
     if (size < 0 && errno == EINTR) continue;
     if (size < 0) fail(device, fmt::format("cannot read {}: {}", source.string(), std::strerror(errno)));
     if (size == 0) break;
-    write_all(to.get(), buffer.data(), static_cast<std::size_t>(size), device);
+    if (!write_whole(to.get(), {buffer.data(), static_cast<std::size_t>(size)}))
+      fail(device, fmt::format("cannot be written: {}", std::strerror(errno)));
   }
   if (!to.close()) fail(device, fmt::format("cannot be written: {}", std::strerror(errno)));
 }
@@ -82,6 +61,9 @@ fs::path folder_of(const fs::path& file) { return file.has_parent_path() ? file.
 OutputFile::OutputFile(fs::path target) : target_(std::move(target)) {
   std::error_code error;
   const fs::file_status status = fs::status(target_, error);
+  const bool is_loop = error == std::errc::too_many_symbolic_link_levels;  // behind_links reports it.
+  if (status.type() == fs::file_type::none && !is_loop)
+    fail(target_, fmt::format("cannot be written: {}", error.message()));
   if (fs::is_directory(status) || !target_.has_filename()) fail(target_, "is a folder; give the name of a file");
   if (fs::exists(status) && ::access(target_.c_str(), W_OK) != 0) {
     fail(target_, fmt::format("cannot be written: {}", std::strerror(errno)));
@@ -89,7 +71,7 @@ OutputFile::OutputFile(fs::path target) : target_(std::move(target)) {
   is_device_ = fs::exists(status) && !fs::is_regular_file(status);
   if (is_device_) {
     resolved_ = target_;
-    temporary_ = make_temporary(fs::temp_directory_path(), target_);
+    temporary_ = make_temporary(temporary_files(), target_);
     return;
   }
   resolved_ = fs::exists(status) ? fs::canonical(target_) : behind_links(target_);

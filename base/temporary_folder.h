@@ -1,33 +1,23 @@
 #pragma once
 /// @file base/temporary_folder.h
-/// A folder for temporary files.
+/// Where temporary files are, and folders and files there that vanish by themselves.
 
-#include <cerrno>
-#include <cstdlib>
 #include <filesystem>
-#include <stdexcept>
 #include <string>
-#include <system_error>
+
+#include "base/descriptor.h"
 
 namespace tensorray {
+
+/// The folder for temporary files: $TMPDIR, or /tmp where that is none.
+std::filesystem::path temporary_files();
 
 /// A new folder in the temporary folder. The destructor removes it with all its files.
 class TemporaryFolder {
  public:
   /// @throw std::runtime_error naming the temporary folder.
-  TemporaryFolder() {
-    std::error_code none;
-    const std::filesystem::path parent = std::filesystem::temp_directory_path(none);
-    std::string name = ((none ? "/tmp" : parent) / "tensorray_XXXXXX").string();
-    if (!mkdtemp(name.data()))
-      throw std::runtime_error("no temporary folder can be made as " + name + ": " +
-                               std::generic_category().message(errno) + "; name another folder in TMPDIR");
-    path_ = name;
-  }
-  ~TemporaryFolder() {
-    std::error_code ignored;  // A destructor must not throw.
-    std::filesystem::remove_all(path_, ignored);
-  }
+  TemporaryFolder();
+  ~TemporaryFolder();
   TemporaryFolder(const TemporaryFolder&) = delete;
   TemporaryFolder& operator=(const TemporaryFolder&) = delete;
 
@@ -35,6 +25,24 @@ class TemporaryFolder {
 
  private:
   std::filesystem::path path_;
+};
+
+/// Makes an empty file in `folder` that has no name: the system removes it when the last process that holds it ends,
+/// for whatever reason. @return a descriptor that is not open if it cannot be made; `errno` says why.
+Descriptor open_unnamed(const std::filesystem::path& folder);
+
+/// A file without a name in the temporary folder, to share with a program that this one starts (child_program.h).
+class UnnamedFile {
+ public:
+  /// @throw std::runtime_error naming the temporary folder.
+  UnnamedFile();
+
+  /// The path by which only this process can open the file.
+  std::filesystem::path path() const;
+  int descriptor() const { return file_.get(); }
+
+ private:
+  Descriptor file_;
 };
 
 }  // namespace tensorray

@@ -22,6 +22,9 @@ if(TENSORRAY_SANITIZE)
                          -fno-sanitize-recover=undefined)
   target_link_options(tensorray_options INTERFACE -fsanitize=address,undefined)
 endif()
+if(TENSORRAY_FUZZ)
+  target_compile_options(tensorray_options INTERFACE -fsanitize=fuzzer-no-link)
+endif()
 
 # Objects of a library are linked into programs and into the Python module, which is a shared library. The second option
 # lets the compiler inline as it does for programs.

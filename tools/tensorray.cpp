@@ -9,6 +9,7 @@
 
 #include "tools/command_line/interrupts.h"
 #include "tools/command_line/run_and_report.h"
+#include "tools/command_line/tell.h"
 #include "tools/commands/commands.h"
 
 namespace {
@@ -27,6 +28,7 @@ void require_known_command(const CLI::App& app, int argc, char** argv) {
 }  // namespace
 
 int main(int argc, char** argv) {
+  tensorray::open_standard_streams();
   tensorray::Progress& progress = tensorray::progress_until_interrupted();
   if (argc > 1 && std::string(argv[1]) == "import")
     return tensorray::run_and_report([&] { tensorray::become_import_program(argv + 1); });

@@ -4,12 +4,12 @@
 #include <map>
 #include <memory>
 #include <optional>
-#include <thread>
 #include <utility>
 
 #include <pybind11/stl.h>
 #include <pybind11/stl/filesystem.h>
 
+#include "base/process_limits.h"
 #include "base/seconds.h"
 #include "base/text.h"
 #include "python/module/arrays.h"
@@ -33,9 +33,7 @@ struct Rendered {
   std::optional<int> frame;  ///< Of a scene with keyframes.
 };
 
-int threads_of(int threads) {
-  return threads > 0 ? threads : static_cast<int>(std::max(1u, std::thread::hardware_concurrency()));
-}
+int threads_of(int threads) { return threads > 0 ? threads : static_cast<int>(usable_processors()); }
 
 /// What `tensorray render` does, with the scene of a request.
 std::shared_ptr<Rendered> render_request(const SceneRequest& request, int threads, const Progress& progress) {

@@ -10,6 +10,8 @@
 
 #include <tbb/task_arena.h>
 
+#include "base/process_limits.h"
+
 namespace tensorray {
 namespace {
 
@@ -31,7 +33,7 @@ struct Call {
 void do_work(Call& shared, const std::function<void(const Progress&)>& work, int threads) {
   std::exception_ptr error;
   try {
-    tbb::task_arena arena(threads > 0 ? threads : tbb::task_arena::automatic);
+    tbb::task_arena arena(threads > 0 ? threads : static_cast<int>(usable_processors()));
     arena.execute([&] { work(shared.progress); });
   } catch (...) {
     error = std::current_exception();

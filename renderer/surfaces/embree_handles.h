@@ -11,6 +11,7 @@
 
 #include <cmath>
 #include <memory>
+#include <new>
 #include <stdexcept>
 #include <string>
 #include <type_traits>
@@ -88,12 +89,18 @@ inline void check(RTCDevice device) {
     throw std::runtime_error("Embree cannot build the scene (error " + std::to_string(error) + ")");
 }
 
+/// @throw std::bad_alloc; std::runtime_error with the cause.
 /// A device costs a tenth of a millisecond, so every scene has its own and scenes share no state.
 /// @param settings  Embree's, as text; null: none.
 inline Owned<RTCDevice> make_device(const char* settings = nullptr) {
   Owned<RTCDevice> device(rtcNewDevice(settings));
-  if (!device) throw std::runtime_error("Embree cannot start on this processor");
-  return device;
+  if (device) return device;
+  const RTCError error = rtcGetDeviceError(nullptr);
+  if (error == RTC_ERROR_UNSUPPORTED_CPU)
+    throw std::runtime_error("Embree cannot start on this processor: it needs SSE2 or NEON");
+  if (error == RTC_ERROR_OUT_OF_MEMORY) throw std::bad_alloc();
+  throw std::runtime_error("Embree cannot start (error " + std::to_string(error) +
+                           "): the limits of this process on memory or threads may be too low (`ulimit -v`, `ulimit -u`)");
 }
 
 }  // namespace tensorray::embree

@@ -8,6 +8,8 @@
 
 #include <fmt/core.h>
 
+#include "base/process_limits.h"
+#include "base/text.h"
 #include "renderer/color/color.h"
 #include "scenes/description/run_files.h"
 
@@ -125,19 +127,19 @@ void check_normal(const std::optional<Eigen::Vector3d>& normal, const char* poin
 }
 
 void check_memory(double bytes, const std::string& what, const SceneSource& source) {
-  constexpr double most_gibibytes = 64;
-  const double gibibytes = bytes / (1 << 30);
-  if (gibibytes > most_gibibytes) source.fail(fmt::format("{} needs {:.0f} GiB; ask for less of it", what, gibibytes));
+  constexpr double program = 60e6;  // What the smallest render takes.
+  const MemoryLimit limit = memory_limit();
+  if (bytes + program > limit.bytes)
+    source.fail(fmt::format("{} needs about {}, more than {}, {}; ask for less of it", what, bytes_text(bytes + program),
+                            limit.cause, bytes_text(limit.bytes)));
 }
 
 void check_receiver_memory(const SceneDescription& scene, double bytes_per_pixel, const SceneSource& source) {
   if (!scene.receiver.resolution) return;
-  const int channels = scene.bending.rgb ? 3 : scene.light.wavelength_count;
-  const double pixels = scene.receiver.resolution->cast<double>().prod();
-  check_memory(pixels * (channels * sizeof(double) + bytes_per_pixel),
-               fmt::format("`/receiver/resolution` with {} channels of light (`/light/wavelengths/count`)", channels),
-               source);
+  check_memory(scene.receiver.resolution->cast<double>().prod() * bytes_per_pixel, "`/receiver/resolution`", source);
 }
+
+int channel_count(const SceneDescription& scene) { return scene.bending.rgb ? 3 : scene.light.wavelength_count; }
 
 void check_spectral_output(const SceneDescription& scene, const SceneSource& source) {
   if (scene.bending.rgb && scene.output.wants("spectral"))
@@ -152,7 +154,6 @@ void check_scene(SceneDescription& scene, const Json& json, const SceneSource& s
   check_normal(scene.receiver.normal, "/receiver", scene.light, source);
   check_lights(scene, source);
   check_objects(scene, source);
-  check_receiver_memory(scene, 0, source);
   drop_unmade_outputs(scene, source);
   for (const auto& method : scene.integrator.methods)
     method->check(scene, json, source, method.get() == &scene.integrator.method());

@@ -23,13 +23,18 @@ void warn_unused(SceneDescription& scene, const Json& json, const char* key, con
 void check_normal(const std::optional<Eigen::Vector3d>& normal, const char* pointer, const LightDescription& light,
                   const SceneSource& source);
 
-/// @throw SceneError if `bytes` is more than 64 GiB, which no sensible picture needs.
+/// @throw SceneError if `bytes`, and what the program takes, are more than this process may have (memory_limit).
+/// Estimates are within a third of what large pictures were measured to take
+/// (Limits.EstimatesOfMemoryAreNearWhatIsMeasured).
 /// @param what  The keys that need the memory, for the message.
 void check_memory(double bytes, const std::string& what, const SceneSource& source);
 
-/// Checks the memory of the receiver's film (a plane for each channel).
-/// @param bytes_per_pixel  What the method needs in addition.
+/// Checks the memory of the picture of the receiver.
+/// @param bytes_per_pixel  What the method needs, with its outputs.
 void check_receiver_memory(const SceneDescription& scene, double bytes_per_pixel, const SceneSource& source);
+
+/// Channels of light: bands, or three colours.
+int channel_count(const SceneDescription& scene);
 
 /// Refuses a spectral picture in RGB mode, whose light has no wavelengths.
 /// @throw SceneError if the scene has both `output.spectral` and `bending.rgb`.

@@ -8,6 +8,7 @@
 
 #include "base/content_hash.h"
 #include "base/errors.h"
+#include "base/path_text.h"
 #include "base/replace_file.h"
 
 // The file: the mark; the length of the header; the header, as JSON; for each unit, twice the length of its state, plus
@@ -61,7 +62,7 @@ std::string read_bytes(const std::filesystem::path& path) {
 
 void write_work(const std::filesystem::path& path, const WorkFile& work) {
   const Json header = {{"origin", work.origin},
-                       {"scene_file", work.scene_file.string()},
+                       {"scene_file", text_of_path(work.scene_file)},
                        {"part", {work.part.index, work.part.count}},
                        {"units", work.units.size()}};
   const std::string text = header.dump();
@@ -89,7 +90,7 @@ WorkFile read_work(const std::filesystem::path& path) {
   std::vector<std::uint64_t> sizes;
   try {
     work.origin = header.at("origin");
-    work.scene_file = header.at("scene_file").get<std::string>();
+    work.scene_file = path_of_text(header.at("scene_file").get<std::string>());
     work.part = {header.at("part").at(0).get<std::size_t>(), header.at("part").at(1).get<std::size_t>()};
     const std::string_view table = reader.take(sizeof(std::uint64_t) * header.at("units").get<std::uint32_t>());
     sizes.resize(table.size() / sizeof(std::uint64_t));

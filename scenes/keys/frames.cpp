@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <stdexcept>
+#include <unordered_set>
 
 #include <fmt/core.h>
 
@@ -101,15 +102,21 @@ void for_each_value(Json& json, const std::string& pointer, const Change& change
 
 std::vector<int> parse_frames(const std::string& text) {
   std::string rest = text;
-  const long first = take_number(rest);
-  const long last = take(rest, '-') ? take_number(rest) : first;
-  const long step = take(rest, 'x') ? take_number(rest) : 1;
-  if (!rest.empty() || first < 0 || last < first || step < 1)
-    throw std::invalid_argument("--frames " + printable(text) + ": give frames such as 7, 1-240 or 1-240x2");
-  if ((last - first) / step >= most_frames)
-    throw std::invalid_argument("--frames " + printable(text) + ": more than a million frames");
   std::vector<int> frames;
-  for (long frame = first; frame <= last; frame += step) frames.push_back(static_cast<int>(frame));
+  std::unordered_set<int> seen;
+  do {
+    const long first = take_number(rest);
+    const long last = take(rest, '-') ? take_number(rest) : first;
+    const long step = take(rest, 'x') ? take_number(rest) : 1;
+    const bool is_range = first >= 0 && last >= first && step >= 1 && (rest.empty() || rest[0] == ',');
+    if (!is_range)
+      throw std::invalid_argument("--frames " + printable(text) +
+                                  ": give frames such as 7, 1-240, 1-240x2, or a list of these, 1,3,7-9");
+    if ((last - first) / step >= most_frames - static_cast<long>(frames.size()))
+      throw std::invalid_argument("--frames " + printable(text) + ": more than a million frames");
+    for (long frame = first; frame <= last; frame += step)
+      if (seen.insert(static_cast<int>(frame)).second) frames.push_back(static_cast<int>(frame));
+  } while (take(rest, ','));
   return frames;
 }
 

@@ -6,6 +6,7 @@
 
 #include <fmt/core.h>
 
+#include "base/path_text.h"
 #include "scenes/keys/scene_source.h"
 #include "scenes/keys/values.h"
 
@@ -42,17 +43,8 @@ Json value_of(const std::string& text) {
   }
 }
 
-bool is_text(const std::string& bytes) {
-  try {
-    return !Json(bytes).dump().empty();
-  } catch (const Json::type_error&) {  // `bytes` are not UTF-8.
-    return false;
-  }
-}
-
 Override take_apart(const std::string& text) {
   const std::size_t equals = text.find('=');
-  if (!is_text(text)) throw SceneError("--set: KEY=VALUE must be UTF-8");
   if (equals == std::string::npos || equals == 0) {
     throw SceneError(printable(fmt::format("--set {}: must be KEY=VALUE, as in light.photons=1000", text)));
   }
@@ -117,7 +109,7 @@ void remove(Json& scene, const Override& change) {
 }  // namespace
 
 void apply_override(Json& scene, const std::string& text) {
-  const Override change = take_apart(text);
+  const Override change = take_apart(utf8_of(text));  // It may have a path of any bytes.
   if (change.value.is_null()) {
     remove(scene, change);
     return;

@@ -5,6 +5,8 @@
 #include <cstddef>
 #include <limits>
 
+#include "base/path_text.h"
+
 namespace tensorray {
 namespace {
 
@@ -130,7 +132,7 @@ Json Value<std::string>::json(const std::string& value) { return value.empty() ?
 bool Value<std::filesystem::path>::read(const Json& json, const Limits& limits, std::filesystem::path& target) {
   std::string text;
   if (!Value<std::string>::read(json, limits, text) || text.empty()) return false;
-  target = text;
+  target = path_of_text(text);
   const std::string ending = target.extension().string();
   const auto& allowed = limits.endings;
   return allowed.empty() || std::find(allowed.begin(), allowed.end(), ending) != allowed.end();
@@ -151,7 +153,7 @@ Json Value<std::filesystem::path>::schema(const std::filesystem::path&, const Li
 }
 
 Json Value<std::filesystem::path>::json(const std::filesystem::path& value) {
-  return Value<std::string>::json(value.string());
+  return Value<std::string>::json(text_of_path(value));
 }
 
 // Words known at run time

@@ -231,11 +231,11 @@ class LensMethod : public MethodWith<LensDescription> {
     if (!chosen) return;
     check_spectral_output(scene, source);
     warn_unused(scene, json, "/light/spectrum", "/bending/rgb");
-    // 1200 bytes for the flow map; and for each depth, two copies of the picture with all of its channels.
-    const int channels = scene.bending.rgb ? 3 : scene.light.wavelength_count;
+    // The flow map, and the points of a picture with its colours; the channels of each depth, and of all side by side.
     const auto& depth = settings().plane.depth;
-    const double pictures = depth ? static_cast<double>(depth->size()) : 1;
-    check_receiver_memory(scene, 1200 + 2.0 * sizeof(float) * (15 + channels) * pictures, source);
+    const double more_pictures = depth && !depth->empty() ? static_cast<double>(depth->size() - 1) : 0;
+    const double spectral = scene.output.wants("spectral") ? 16.0 * channel_count(scene) : 0;
+    check_receiver_memory(scene, 280 + spectral + more_pictures * (120 + spectral / 2), source);
   }
 
   std::unique_ptr<const LoadedMethod> load(const Scene& scene, std::vector<std::string>& notes) const override {

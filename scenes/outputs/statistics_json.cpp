@@ -6,6 +6,8 @@
 #include <nlohmann/json.hpp>
 #include <sys/resource.h>
 
+#include "base/path_text.h"
+
 namespace tensorray {
 namespace {
 
@@ -76,7 +78,7 @@ std::string statistics_json(const Scene& scene, const Statistics& statistics, do
   const double seconds = scene.seconds + statistics.seconds_tracing + statistics.seconds_density +
                          statistics.seconds_drawing + statistics.seconds_color + seconds_writing;
   Json json = {{"version", TENSORRAY_VERSION},
-               {"scene", scene.description.path.string()},
+               {"scene", text_of_path(scene.description.path)},
                {"seed", scene.description.seed},
                {"threads", threads},
                {"positions", statistics.positions},

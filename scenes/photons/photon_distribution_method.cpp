@@ -107,6 +107,19 @@ void write_photons(const std::filesystem::path& file, const Scene& scene, const 
   write_points(file, point_cloud(render.photons, provenance(scene, render)));
 }
 
+/// What the picture and its files take, for each pixel of the plate. Drawing a mesh needs planes of colours; where
+/// bands are wanted, also planes of bands, and a spectral picture of them; the map of the mesh is a picture of its own.
+double bytes_per_pixel(const SceneDescription& scene, PhotonDensityKind kind) {
+  const bool is_spectral = scene.output.wants("spectral");
+  const double channels = channel_count(scene);
+  if (kind == PhotonDensityKind::mesh)
+    return 42 + (scene.output.wants("exr") ? 70 : 0) + (is_spectral ? 13 * channels : 0);
+  // Sums, the film and pictures; photon differentials keep their sums as text, too.
+  const bool has_text = kind == PhotonDensityKind::photon_differential;
+  if (is_spectral || channels <= 3) return (has_text ? 36 : 24) * channels;
+  return has_text ? 78 : 58;
+}
+
 class PhotonDistributionMethod : public MethodWith<PhotonDescription> {
  public:
   const char* name() const override { return "photon_distribution"; }
@@ -130,6 +143,7 @@ class PhotonDistributionMethod : public MethodWith<PhotonDescription> {
       scene.warnings.push_back("`/integrator/density/error` bounds only the error of the light on a plate");
     if (!chosen) return;
     check_spectral_output(scene, source);
+    check_receiver_memory(scene, bytes_per_pixel(scene, settings().density.kind), source);
     warn_unused(scene, json, "/light/spectrum", "/bending/rgb");
     if (settings().density.kind != PhotonDensityKind::photon_differential &&
         given(json, "/integrator/density/footprint"))

@@ -5,6 +5,7 @@
 
 #include <fmt/core.h>
 
+#include "base/path_text.h"
 #include "base/text.h"
 #include "scenes/description/check_scene.h"
 #include "scenes/description/scene_keys.h"
@@ -72,17 +73,9 @@ void choose_outputs(SceneDescription& scene, const std::optional<int>& frame) {
 
 /// The scene of a field alone: the light that it bends, on a plate, from the side that shows most.
 Json scene_of_field(const std::filesystem::path& field) {
-  return {{"field", {{"file", std::filesystem::absolute(field).string()}}},
+  return {{"field", {{"file", text_of_path(std::filesystem::absolute(field))}}},
           {"light", {{"direction", "auto"}}},
           {"integrator", {{"type", "photon_distribution"}}}};
-}
-
-std::string text_of(const Json& json, const SceneSource& source) {
-  try {
-    return json.dump();
-  } catch (const Json::type_error&) {
-    source.fail("its path is not UTF-8; name the file in a scene file, or rename it");
-  }
 }
 
 }  // namespace
@@ -110,7 +103,7 @@ SceneDescription read_scene_json(Json json, const std::filesystem::path& path, c
   }
   SceneDescription scene = default_scene();
   scene.path = path;
-  scene.text = text_of(json, source);
+  scene.text = json.dump();
   SectionReader reader(json, "", source);
   describe(scene, reader);
   reader.finish();

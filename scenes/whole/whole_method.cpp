@@ -284,7 +284,7 @@ void WholeMethod::check(SceneDescription& scene, const Json& json, const SceneSo
   if (tracing.bands % settings().bands_per_sample != 0)
     source.fail(fmt::format("`/integrator/bands_per_sample` must divide `/integrator/bands` ({}), but is {}",
                             tracing.bands, settings().bands_per_sample));
-  check_memory(scene.camera.resolution.cast<double>().prod() * (250.0 + 48.0 * tracing.bands), "`/camera/resolution`",
+  check_memory(scene.camera.resolution.cast<double>().prod() * (340.0 + 20.0 * tracing.bands), "`/camera/resolution`",
                source);
   check_photons(scene, tracing, source);
   const double picture = 1.0 * tracing.bands * settings().caustic.resolution * settings().caustic.resolution;

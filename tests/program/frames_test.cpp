@@ -70,12 +70,42 @@ TEST_F(Frames, ExistingFramesAreLeftOutOnRequest) {
   EXPECT_EQ(pixels("a.2.exr"), second);
 }
 
+/// Without --keep-going, the first frame that fails ends the run.
+TEST_F(Frames, ABadFrameStopsNoOthersOnRequest) {
+  write("scene.json", R"({"field": {"file": "load.####.vdb"})" + rest_);
+  run_well({"make", "helix", "-o", "load.0005.vdb", "--resolution", "9"});
+  const std::vector<std::string> arguments{"render", "scene.json", "--frames", "0,1,3-5,2", "-o", "a.%02d.exr", "-q"};
+  const Outcome stopped = run(arguments);
+  EXPECT_EQ(stopped.status, 1);
+  EXPECT_TRUE(std::none_of(files().begin(), files().end(), [](const std::string& name) { return name[0] == 'a'; }));
+
+  std::vector<std::string> going = arguments;
+  going.emplace_back("--keep-going");
+  const Outcome outcome = run(going);
+  EXPECT_EQ(outcome.status, 1);
+  for (const char* frame : {"01", "03", "05"}) EXPECT_TRUE(exists(in_folder("a." + std::string(frame) + ".exr")));
+  for (const char* line : {"tensorray: frame 0: ", "tensorray: frame 4: ", "tensorray: frame 2: ",
+                           "tensorray: 3 frames failed: 0, 4, 2; render again with --frames 0,4,2"})
+    EXPECT_NE(outcome.error.find(line), std::string::npos) << line << outcome.error;
+  EXPECT_EQ(std::count(outcome.error.begin(), outcome.error.end(), '\n'), 4) << outcome.error;
+
+  // A frame whose scene is wrong, and not its files.
+  const Outcome wrong =
+      run({"render", "scene.json", "--frames", "1-3", "--keep-going", "-q", "-o", "b.$F.exr", "--set",
+           R"(light.photons={"keys":[[1,500],[2,-1],[3,500]]})", "--set", "field.file=load.0001.vdb"});
+  EXPECT_EQ(wrong.status, 1);
+  EXPECT_NE(wrong.error.find("tensorray: 1 frame failed: 2;"), std::string::npos) << wrong.error;
+  EXPECT_TRUE(exists(in_folder("b.1.exr")) && exists(in_folder("b.3.exr")));
+}
+
 TEST_F(Frames, MistakesAreNamed) {
   write("scene.json", R"({"field": {"file": "load.0001.vdb"})" + rest_);
   expect_error({"render", "scene.json", "-q"}, "`/light/direction` has keyframes: give --frames");
   expect_error({"render", "scene.json", "--frames", "1-2", "-o", "one.exr"}, "each frame would replace it");
   expect_error({"render", "scene.json", "--frames", "1-2", "-o", "a.#.exr", "--stats", "s.json"}, "s.json");
   expect_error({"render", "scene.json", "--frames", "2-1"}, "--frames 2-1");
+  for (const char* name : {"a.%04d.exr", "a.$F4.exr"})
+    expect_error({"render", "scene.json", "-o", name}, "has the number of a frame; give --frames");
   expect_error({"render", "scene.json", "--frames", "1-2", "--save-scene", "copy.json"}, "--save-scene");
   EXPECT_FALSE(exists(in_folder("one.exr")));
 }

@@ -47,6 +47,12 @@ class Program : public ::testing::Test {
 
   /// Starts the program with the test's folder as working folder. @return its process.
   pid_t start(const std::vector<std::string>& arguments, long file_size_limit = 0) const {
+    return start_in(file_size_limit > 0 ? "ulimit -f " + std::to_string(file_size_limit) + "; exec" : "exec",
+                    arguments);
+  }
+
+  /// The same. @param shell  Commands of the shell before the program; the last word runs it: "cd /; exec".
+  pid_t start_in(const std::string& shell, const std::vector<std::string>& arguments) const {
     const pid_t child = fork();
     if (child != 0) return child;
     if (chdir(folder_.c_str()) != 0) _exit(126);
@@ -54,9 +60,7 @@ class Program : public ::testing::Test {
     const int error = open("stderr", O_WRONLY | O_CREAT | O_TRUNC, 0600);
     dup2(out, 1);
     dup2(error, 2);
-    std::string command;
-    if (file_size_limit > 0) command += "ulimit -f " + std::to_string(file_size_limit) + "; ";
-    command += "exec \"$0\" \"$@\"";
+    const std::string command = shell + " \"$0\" \"$@\"";
     std::vector<const char*> argv{"sh", "-c", command.c_str(), TENSORRAY_BINARY};
     for (const std::string& argument : arguments) argv.push_back(argument.c_str());
     argv.push_back(nullptr);

@@ -1,8 +1,9 @@
 // Ranks that are threads of this process: jobs and units are handed out, and come back.
 
 #include <atomic>
-#include <chrono>
+#include <condition_variable>
 #include <deque>
+#include <functional>
 #include <mutex>
 #include <set>
 #include <string>
@@ -52,17 +53,47 @@ class ThreadRanks : public Ranks {
 
 std::string state_of(std::size_t unit) { return std::string(10 + unit, static_cast<char>('a' + unit % 26)); }
 
-/// Does units as the path tracer does: each in two passes. @param slow  A pause after each unit, in milliseconds.
-void do_units(Work& work, std::size_t units, int slow) {
+/// Something that happens once, for which threads wait.
+class Event {
+ public:
+  void happen() {
+    const std::lock_guard lock(mutex_);
+    has_happened_ = true;
+    wake_.notify_all();
+  }
+  void wait() {
+    std::unique_lock lock(mutex_);
+    wake_.wait(lock, [this] { return has_happened_; });
+  }
+
+ private:
+  std::mutex mutex_;
+  std::condition_variable wake_;
+  bool has_happened_ = false;
+};
+
+/// Called by each rank when it has got units, before it does them.
+using OnUnits = std::function<void(int rank, const std::vector<std::size_t>& units)>;
+/// Called by each rank when a unit is done.
+using OnDone = std::function<void(int rank)>;
+
+struct Watch {
+  OnUnits on_units = [](int, const std::vector<std::size_t>&) {};
+  OnDone on_done = [](int) {};
+};
+
+/// Does units as the path tracer does: each in two passes.
+void do_units(Work& work, std::size_t units, int rank = 0, const Watch& watch = {}) {
   work.begin(units);
   while (!work.stopping) {
     const std::vector<std::size_t> next = work.next();
     if (next.empty()) break;
+    watch.on_units(rank, next);
     for (const std::size_t unit : next) {
       const auto state = work.state(unit);
       const bool is_second = state && *state == "half";
       work.keep(unit, is_second ? state_of(unit) : "half", is_second);
-      if (slow > 0) std::this_thread::sleep_for(std::chrono::milliseconds(slow));
+      if (is_second) watch.on_done(rank);
     }
   }
 }
@@ -72,8 +103,9 @@ struct Result {
   RankTraffic traffic;
 };
 
-/// All ranks do the units of a work. @param kept  Units of an earlier run. @param slow  Pause of the last rank.
-Result share_work(int ranks, std::size_t units, std::vector<WorkUnit> kept = {}, int slow = 0, double interval = 0) {
+/// All ranks do the units of a work. @param kept  Units of an earlier run.
+Result share_work(int ranks, std::size_t units, std::vector<WorkUnit> kept = {}, const Watch& watch = {},
+                  double interval = 0) {
   Post post;
   post.boxes.resize(static_cast<std::size_t>(ranks));
   Progress progress;
@@ -86,14 +118,14 @@ Result share_work(int ranks, std::size_t units, std::vector<WorkUnit> kept = {},
         EXPECT_EQ(job->text, "the job");
         Work work;
         follower.share(*job, work, 2);
-        do_units(work, units, rank == ranks - 1 ? slow : 0);
+        do_units(work, units, rank, watch);
       }
     });
   ThreadRanks first(post, 0);
   Leader leader(first, progress);
   Work work({}, std::move(kept));
   leader.share("the job", work, 2);
-  do_units(work, units, ranks > 1 ? 1 : 0);  // Leaves some to the others.
+  do_units(work, units, 0, watch);
   leader.end();
   leader.finish();
   for (std::thread& each : others) each.join();
@@ -122,7 +154,12 @@ TEST(SharedWork, AllUnitsAreDoneOnce) {
 /// A unit crosses once each way, with 24 bytes about it; requests are counted, too.
 TEST(SharedWork, BytesAreThoseOfTheUnits) {
   constexpr std::size_t units = 200, head = 24;
-  const Result result = share_work(3, units);
+  Event others_have_some;
+  Watch watch;
+  watch.on_units = [&](int rank, const std::vector<std::size_t>&) {
+    rank == 0 ? others_have_some.wait() : others_have_some.happen();
+  };
+  const Result result = share_work(3, units, {}, watch);
   const std::uint64_t away = result.traffic.units[1] + result.traffic.units[2];
   EXPECT_GT(away, 0u);
   std::size_t states = 0;
@@ -136,10 +173,33 @@ TEST(SharedWork, BytesAreThoseOfTheUnits) {
   EXPECT_LE(result.traffic.messages, 2 * away + away + 2 * 2 * 4);
 }
 
+/// The last rank does its first units when the others have done all the rest.
 TEST(SharedWork, ASlowRankDoesNotHoldTheOthers) {
-  const Result result = share_work(4, 400, {}, 20);
-  expect_complete(result.units, 400);
-  EXPECT_LT(result.traffic.units[3], result.traffic.units[2] / 2);
+  constexpr std::size_t units = 400;
+  constexpr int slow = 3;
+  Event slow_has_some, rest_is_done;
+  std::atomic<std::size_t> held{0}, done{0};
+  const auto look = [&] {
+    if (held > 0 && held + done == units) rest_is_done.happen();
+  };
+  Watch watch;
+  watch.on_units = [&](int rank, const std::vector<std::size_t>& mine) {
+    if (rank != slow) return slow_has_some.wait();
+    if (held > 0) return;  // Their second pass.
+    held = mine.size();
+    slow_has_some.happen();
+    look();
+    rest_is_done.wait();
+  };
+  watch.on_done = [&](int rank) {
+    if (rank == slow) return;
+    ++done;
+    look();
+  };
+  const Result result = share_work(4, units, {}, watch);
+  expect_complete(result.units, units);
+  EXPECT_EQ(result.traffic.units[slow], held);
+  EXPECT_LT(held, units / 4);
 }
 
 TEST(SharedWork, ContinuesWithUnitsOfAnEarlierRun) {
@@ -155,13 +215,23 @@ TEST(SharedWork, ContinuesWithUnitsOfAnEarlierRun) {
 
 /// Rank 0 gets units that are not done, so that a checkpoint has them.
 TEST(SharedWork, UnitsThatAreNotDoneAreSentAfterTheInterval) {
-  const Result often = share_work(2, 40, {}, 5, 1e-3);
-  expect_complete(often.units, 40);
-  const Result never = share_work(2, 40, {}, 5);
-  const auto per_unit = [](const Result& result) {
-    return static_cast<double>(result.traffic.messages) / static_cast<double>(result.traffic.units[1]);
-  };
-  EXPECT_GT(per_unit(often), per_unit(never));
+  constexpr double at_once = 1e-12;
+  for (const double interval : {at_once, 0.0}) {
+    Event other_has_some;
+    Watch watch;
+    watch.on_units = [&](int rank, const std::vector<std::size_t>&) {
+      rank == 0 ? other_has_some.wait() : other_has_some.happen();
+    };
+    const Result result = share_work(2, 40, {}, watch, interval);
+    expect_complete(result.units, 40);
+    const std::uint64_t away = result.traffic.units[1];
+    ASSERT_GT(away, 0u);
+    // Each unit comes, is sent back when it is done, and before that as half.
+    EXPECT_GE(result.traffic.messages, (interval > 0 ? 3 : 2) * away);
+    if (interval == 0) {
+      EXPECT_LT(result.traffic.messages, 3 * away + 8);  // And requests: one for two units, and for the end.
+    }
+  }
 }
 
 TEST(SharedWork, WholeJobsAreDoneOnceByAnyRank) {
@@ -171,19 +241,18 @@ TEST(SharedWork, WholeJobsAreDoneOnceByAnyRank) {
   std::mutex mutex;
   std::vector<std::string> done;
   const auto note = [&](const std::string& job) {
-    std::this_thread::sleep_for(std::chrono::milliseconds(2));
     const std::lock_guard lock(mutex);
     done.push_back(job);
   };
   std::vector<std::thread> others;
-  std::atomic<int> by_others{0};
+  Event others_have_some;
   for (int rank = 1; rank < 3; ++rank)
     others.emplace_back([&, rank] {
       ThreadRanks mine(post, rank);
       Follower follower(mine, progress, 0);
       while (const auto job = follower.next_job()) {
         note(job->text);
-        ++by_others;
+        others_have_some.happen();
       }
     });
   ThreadRanks first(post, 0);
@@ -192,12 +261,12 @@ TEST(SharedWork, WholeJobsAreDoneOnceByAnyRank) {
   for (int i = 0; i < 30; ++i) jobs.push_back(std::to_string(i));
   const std::set<std::string> all(jobs.begin(), jobs.end());
   leader.offer(jobs);
+  others_have_some.wait();
   while (const auto job = leader.take()) note(*job);
   leader.finish();
   for (std::thread& each : others) each.join();
   EXPECT_EQ(done.size(), 30u);
   EXPECT_EQ(std::set<std::string>(done.begin(), done.end()), all);
-  EXPECT_GT(by_others, 0);
 }
 
 TEST(SharedWork, CancelledRanksStop) {
@@ -211,7 +280,7 @@ TEST(SharedWork, CancelledRanksStop) {
   Leader leader(first, progress);
   Work work;
   leader.share("the job", work, 2);
-  do_units(work, 10, 0);
+  do_units(work, 10);
   EXPECT_TRUE(work.stopping);
   leader.end();
   EXPECT_THROW(leader.finish(), Cancelled);

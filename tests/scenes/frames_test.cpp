@@ -23,8 +23,11 @@ TEST(Frames, AreReadFromTheirRange) {
   EXPECT_THAT(parse_frames("7"), ElementsAre(7));
   EXPECT_THAT(parse_frames("1-4"), ElementsAre(1, 2, 3, 4));
   EXPECT_THAT(parse_frames("0-10x4"), ElementsAre(0, 4, 8));
+  EXPECT_THAT(parse_frames("1,3,7-9"), ElementsAre(1, 3, 7, 8, 9));
+  EXPECT_THAT(parse_frames("5-9x2,6,5-7"), ElementsAre(5, 7, 9, 6));  // Each once.
   for (const char* bad :
-       {"", "-", "1-", "-3", "4-1", "1-4x0", "1-4x", "1-4y2", "1 - 4", "1.5", "99999999999", "0-1000000000"})
+       {",",   "1,",    ",1",   "1,,2",  "1;2",   "1, 2", "1,2-",        "0-999999,1000000", "", "-", "1-", "-3",
+        "4-1", "1-4x0", "1-4x", "1-4y2", "1 - 4", "1.5",  "99999999999", "0-1000000000"})
     EXPECT_THROW(parse_frames(bad), std::invalid_argument) << bad;
 }
 
@@ -32,6 +35,23 @@ TEST(Frames, NumbersTakeThePlaceOfNumberSigns) {
   EXPECT_EQ(numbered("flow.####.vdb", 7), "flow.0007.vdb");
   EXPECT_EQ(numbered("#/a##", 123), "123/a123");
   EXPECT_EQ(numbered("none", 1), "none");
+  struct Case {
+    const char *name, *with_7, *with_12345;
+  };
+  for (const Case& each : {Case{"a.%04d.png", "a.0007.png", "a.12345.png"}, Case{"a.%d.png", "a.7.png", "a.12345.png"},
+                           Case{"a.$F4.png", "a.0007.png", "a.12345.png"}, Case{"a.$F.png", "a.7.png", "a.12345.png"},
+                           Case{"$F", "7", "12345"}, Case{"%03d#$F2", "007707", "123451234512345"}}) {
+    EXPECT_EQ(numbered(each.name, 7), each.with_7);
+    EXPECT_EQ(numbered(each.name, 12345), each.with_12345);
+    EXPECT_TRUE(has_number_sign(each.name));
+    EXPECT_TRUE(has_foreign_number_sign(each.name));
+  }
+  for (const char* name : {"100%.png", "%s", "%4d", "%0x4d", "$FOO", "$F_a", "$", "%", "%0", "$F123", "%0123d", ""}) {
+    EXPECT_EQ(numbered(name, 7), name);
+    EXPECT_FALSE(has_number_sign(name)) << name;
+  }
+  EXPECT_TRUE(has_number_sign("a.#.png"));
+  EXPECT_FALSE(has_foreign_number_sign("a.#.png"));
   EXPECT_EQ(at(R"({"field": {"file": "flow.##.vdb"}, "list": ["#"]})", 3)["field"]["file"], "flow.03.vdb");
 }
 

@@ -9,6 +9,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
+#include <sys/resource.h>
 #include <unistd.h>
 
 #include "scenes/description/run_files.h"
@@ -338,7 +339,35 @@ TEST_F(ReadScene, ChecksAcrossKeys) {
   EXPECT_THAT(error({"receiver.normal=[1,0,0]"}), HasSubstr("`/receiver/normal` is perpendicular to the light"));
   EXPECT_NO_THROW(read({"receiver.normal=[1,0,0.01]"}));
   EXPECT_NO_THROW(read({"light.up=[0,0,1]"})) << "up along the light has a fallback";
-  EXPECT_THAT(error({"receiver.resolution=[32768,32768]", "light.wavelengths.count=64"}), HasSubstr("GiB"));
+}
+
+/// A path is any bytes. The scene's text, which is kept in files and read again, has them as UTF-8.
+TEST_F(ReadScene, PathsOfAnyBytesComeBack) {
+  const std::string name = "u\xff\xc3(.vdb";
+  const SceneDescription scene = read({"field.file=" + name});
+  EXPECT_EQ(scene.field.file, folder_ / name);
+  const SceneDescription again = read_scene_json(parse_value(scene.text), scene.path);
+  EXPECT_EQ(again.field.file, folder_ / name);
+  const SceneDescription alone = read_scene("/tmp/" + name, {});
+  EXPECT_EQ(alone.field.file, "/tmp/" + name);
+}
+
+/// What outputs need: planes of all bands only where a spectral picture is wanted.
+TEST_F(ReadScene, PicturesMustFitInMemory) {
+  rlimit before{};
+  ASSERT_EQ(getrlimit(RLIMIT_DATA, &before), 0);
+  const rlimit lower{rlim_t{8} << 30, before.rlim_max};
+  ASSERT_EQ(setrlimit(RLIMIT_DATA, &lower), 0);
+  const std::string plate = "receiver.resolution=[8000,8000]", camera = "camera.resolution=[3000,3000]";
+  EXPECT_NO_THROW(read({plate, "output.image=a.png", "light.wavelengths.count=256"}));
+  EXPECT_THAT(error({plate, "output.spectral=a.exr", "light.wavelengths.count=64"}),
+              AllOf(HasSubstr("`/receiver/resolution` needs about"), HasSubstr("what `ulimit -d` leaves")));
+  EXPECT_THAT(error({plate, "integrator.type=lens"}), HasSubstr("`/receiver/resolution` needs about"));
+  EXPECT_NO_THROW(read({"receiver.resolution=[4000,4000]", "integrator.type=lens"}));
+  EXPECT_NO_THROW(read({camera, "integrator.type=path_tracing"}));
+  EXPECT_THAT(error({camera, "integrator.type=path_tracing", "integrator.bands=64"}),
+              HasSubstr("`/camera/resolution` needs about"));
+  setrlimit(RLIMIT_DATA, &before);
 }
 
 TEST_F(ReadScene, OutputsNeverOverwriteEachOtherOrAnInput) {

@@ -106,6 +106,16 @@ TEST_F(LiveSceneTest, StaysAsItWasWhereASceneIsWrong) {
   EXPECT_THROW(live.load(wrong, outputs_, progress_), SceneError);
   wrong["receiver"] = {{"unknown", 1}};
   EXPECT_THROW(live.load(wrong, outputs_, progress_), SceneError);
+  // With another field, loading begins anew.
+  wrong = scene;
+  wrong["field"] = {{"file", "missing.vdb"}};
+  EXPECT_THROW(live.load(wrong, outputs_, progress_), std::runtime_error);
+  EXPECT_EQ(live.scene().field.brick({0, 0, 0}).bending, voxels);
+  EXPECT_TRUE(live.has_picture(scene, outputs_));
+  wrong["field"] = {{"generate", {{"kind", "vortex"}, {"resolution", 12}}}, {"scale", "auto"}};
+  progress_.cancelled = true;
+  EXPECT_THROW(live.load(wrong, outputs_, progress_), Cancelled);
+  progress_.cancelled = false;
   EXPECT_EQ(shown(live, scene).pixels, before.pixels);
   EXPECT_EQ(live.scene().field.brick({0, 0, 0}).bending, voxels);
 }

@@ -61,9 +61,10 @@ class ServerTest : public test::ViewTest {
     request.set(http::field::host, host);
     http::write(socket, request);
     beast::flat_buffer buffer;
-    http::response<http::string_body> response;
-    http::read(socket, buffer, response);
-    return response;
+    http::response_parser<http::string_body> parser;
+    parser.skip(verb == http::verb::head);
+    http::read(socket, buffer, parser);
+    return parser.release();
   }
 
   /// Sends bytes and reads until the server closes. @return What came.
@@ -93,6 +94,7 @@ class ServerTest : public test::ViewTest {
   Json read_json(Socket& socket) {
     beast::flat_buffer buffer;
     socket.read(buffer);
+    read_bytes_ = buffer.size();
     PageMessage message{socket.got_binary(), false, beast::buffers_to_string(buffer.data())};
     return test::received(message).json;
   }
@@ -107,6 +109,7 @@ class ServerTest : public test::ViewTest {
 
   const std::string token_ = random_token();
   std::string port_;
+  std::size_t read_bytes_ = 0;  ///< Of the last message.
 
  private:
   Progress progress_;
@@ -127,6 +130,53 @@ TEST_F(ServerTest, ServesItsFilesAndNoOthers) {
   for (const char* name : {"scene.json", "../scene.json", "%2e%2e/scene.json", "view.js/", "/etc/passwd", "socket"})
     EXPECT_EQ(get(path(name), own_host()).result_int(), 404u) << name;
   EXPECT_EQ(get(path(""), own_host(), http::verb::post).result_int(), 405u);
+}
+
+/// What people and programs make of the address that was printed.
+TEST_F(ServerTest, AnswersWhatIsMeant) {
+  struct Case {
+    http::verb verb;
+    std::string target;
+    unsigned status;
+    std::string body;
+  };
+  const std::string index = "content of index.html";
+  const std::string bare = "/" + token_;
+  for (const Case& each : {Case{http::verb::get, path("?utm_source=chat"), 200, index},
+                           Case{http::verb::get, path("view.js?v=2"), 200, "content of view.js"},
+                           Case{http::verb::get, path("?a=/b/"), 200, index}, Case{http::verb::head, path(""), 200, ""},
+                           Case{http::verb::head, path("none"), 404, ""}, Case{http::verb::get, bare, 308, ""},
+                           Case{http::verb::get, bare + "?x", 308, ""}, Case{http::verb::head, bare, 308, ""},
+                           Case{http::verb::post, path("?x"), 405, "only GET and HEAD are answered\n"}}) {
+    const auto response = get(each.target, own_host(), each.verb);
+    EXPECT_EQ(response.result_int(), each.status) << each.target;
+    EXPECT_EQ(response.body(), each.body) << each.target;
+    if (each.status == 308) {
+      EXPECT_EQ(response[http::field::location], path(""));
+    }
+    if (each.status == 200) {
+      EXPECT_EQ(response[http::field::content_length], std::to_string(get(each.target, own_host()).body().size()));
+    }
+  }
+}
+
+/// A picture may be larger than what a page may have waiting.
+TEST_F(ServerTest, SendsAFileOfAnySize) {
+  Json scene = test::small_scene();
+  scene["integrator"]["density"] = {{"kind", "gaussian"}, {"tau", 2}};
+  scene["receiver"]["resolution"] = {3000, 3000};  // 108 MB of floats, which are noise and do not shrink much.
+  scene["light"]["photons"] = 100000;
+  Socket socket = open_socket();
+  socket.read_message_max(std::size_t{1} << 30);
+  EXPECT_EQ(read_json(socket).at("type"), "hello");
+  socket.write(asio::buffer(Json{{"type", "scene"}, {"id", 1}, {"scene", scene}}.dump()));
+  for (Json json = Json::object(); !json.value("final", false);) json = read_json(socket);
+  socket.write(asio::buffer(Json{{"type", "export"}, {"id", 2}, {"file", "exr"}}.dump()));
+  Json json;
+  do json = read_json(socket);
+  while (json.value("type", "") != "file");
+  EXPECT_EQ(json.at("name"), "scene.exr");
+  EXPECT_GT(read_bytes_, Server::most_waiting_bytes);
 }
 
 TEST_F(ServerTest, RefusesAWrongToken) {

@@ -1,3 +1,4 @@
+#include <cstring>
 #include <functional>
 #include <limits>
 #include <random>
@@ -94,6 +95,29 @@ TEST(DamagedFiles, LengthsOfZipThatAreTooLarge) {
   }
 }
 
+/// What a TensorGrid promises (tensor_grid.h), whatever the file says.
+void expect_sound(const TensorGrid& grid) {
+  const Eigen::Vector3i* before = nullptr;
+  for (const TensorBlock& block : grid.blocks) {
+    EXPECT_TRUE(block.active.any());
+    EXPECT_TRUE(block.origin.unaryExpr([](int i) { return i & (TensorBlock::size - 1); }).isZero());
+    const auto key = [](const Eigen::Vector3i& at) { return std::make_tuple(at.x(), at.y(), at.z()); };
+    EXPECT_TRUE(!before || key(*before) < key(block.origin));
+    before = &block.origin;
+    for (int offset = 0; offset < TensorBlock::voxels; ++offset)
+      EXPECT_TRUE(block.active[offset] || block.values[offset].isZero(0)) << offset;
+  }
+}
+
+/// Values that are made of what happens to be in memory differ from one reading to the next.
+void expect_same_bits(const TensorGrid& a, const TensorGrid& b) {
+  ASSERT_EQ(a.blocks.size(), b.blocks.size());
+  for (std::size_t i = 0; i < a.blocks.size(); ++i) {
+    EXPECT_EQ(a.blocks[i].active, b.blocks[i].active);
+    EXPECT_EQ(std::memcmp(&a.blocks[i].values, &b.blocks[i].values, sizeof a.blocks[i].values), 0);
+  }
+}
+
 /// Compression of a file's trees: half floats or not, and OpenVDB's flags.
 class FlippedBytes : public testing::TestWithParam<std::tuple<bool, std::uint32_t>> {};
 
@@ -115,13 +139,16 @@ TEST_P(FlippedBytes, NeverCrash) {
     flipped = static_cast<char>(flipped ^ (i % 4 == 3 ? 0xff : 1 << (i % 8)));
     write_bytes(damaged, changed);
     try {
-      read_tensor_vdb(damaged);
+      const TensorGrid grid = read_tensor_vdb(damaged);
+      expect_sound(grid);
+      expect_same_bits(grid, read_tensor_vdb(damaged));
     } catch (const std::runtime_error& error) {
       ++refused;
       EXPECT_THAT(error.what(), AllOf(HasSubstr(damaged.string()), testing::Not(HasSubstr("\n"))));
     }
   }
   EXPECT_GT(refused, 0);
+  EXPECT_LT(refused, static_cast<int>(flips));
 }
 
 INSTANTIATE_TEST_SUITE_P(
@@ -204,6 +231,52 @@ TEST(DamagedFiles, ReadsFormatsThatHoldUnknownGrids) {
   write_bytes(path, bytes);
   EXPECT_EQ(list_vdb(path)[0].type, "mat3x");
   EXPECT_EQ(read_tensor_vdb(path).active_voxels(), 1u);
+}
+
+/// A tile at the greatest index has no index behind it, where a loop over its blocks could end.
+TEST(DamagedFiles, VoxelsFarAwayAreRefused) {
+  constexpr std::int32_t end = std::numeric_limits<std::int32_t>::max();
+  struct Case {
+    const char* what;
+    openvdb::Coord min, max;  ///< Of active voxels.
+  };
+  const auto at = [](std::int32_t x) { return openvdb::Coord(x, 0, 0); };
+  const std::vector<Case> cases{{"tile at the end", openvdb::Coord(end - 127), openvdb::Coord(end)},
+                                {"tile at the beginning", openvdb::Coord(-end - 1), openvdb::Coord(-end - 1 + 127)},
+                                {"voxel at the end", at(end), at(end)},
+                                {"voxel at the beginning", at(-end - 1), at(-end - 1)},
+                                {"voxel just out of range", at((1 << 29) + 8), at((1 << 29) + 8)}};
+  const Temporary path("far.vdb");
+  for (const Case& each : cases)
+    for (const Derive derive : {Derive::none, Derive::hessian}) {
+      const auto scalar = stock_grid<openvdb::FloatGrid>("phi", 0);
+      openvdb::GridPtrVec grids{scalar};
+      scalar->sparseFill({each.min, each.max}, 1.0f);
+      if (derive == Derive::none) {
+        grids.clear();
+        for (int row = 0; row < 3; ++row) {
+          const auto grid = stock_grid<openvdb::Vec3SGrid>("phi_row" + std::to_string(row), openvdb::Vec3s(0));
+          grid->sparseFill({each.min, each.max}, openvdb::Vec3s(1));
+          grids.push_back(grid);
+        }
+      }
+      write_stock(path, grids);
+      EXPECT_THAT([&] { read_tensor_vdb(path, "", derive); },
+                  ThrowsMessage<std::runtime_error>(AllOf(HasSubstr(path.string()), HasSubstr("indices are beyond"))))
+          << each.what;
+    }
+}
+
+/// Tiles take a few bytes in the file, and 2 GB each in memory.
+TEST(DamagedFiles, TilesThatFitInNoMemoryAreRefused) {
+  const auto grid = stock_grid<openvdb::FloatGrid>("phi", 0);
+  for (int i = 0; i < 4000; ++i)
+    grid->tree().addTile(2, openvdb::Coord(128 * (i % 20), 128 * (i / 20 % 20), 128 * (i / 400)), 1.0f, true);
+  const Temporary path("tiles.vdb");
+  write_stock(path, {grid});
+  EXPECT_LT(fs::file_size(path), 1000000u);
+  EXPECT_THAT([&] { read_tensor_vdb(path, "", Derive::hessian); },
+              ThrowsMessage<std::runtime_error>(AllOf(HasSubstr(path.string()), HasSubstr("active voxels need"))));
 }
 
 TEST(TensorFileWriting, FullDiskIsNoticed) {

@@ -3,11 +3,12 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
-#include <cstdio>
 
 #include <fmt/core.h>
 #include <sys/ioctl.h>
 #include <unistd.h>
+
+#include "tools/command_line/tell.h"
 
 namespace tensorray {
 namespace {
@@ -60,8 +61,7 @@ ProgressBar::ProgressBar(Progress& progress, bool quiet) : progress_(progress) {
 ProgressBar::~ProgressBar() {
   progress_.report = nullptr;
   if (!drawn_) return;
-  std::fputs(clear_line, stderr);
-  std::fflush(stderr);
+  print_error(clear_line);
 }
 
 void ProgressBar::update(const std::string& phase, std::uint64_t done, std::uint64_t total) {
@@ -77,8 +77,7 @@ void ProgressBar::update(const std::string& phase, std::uint64_t done, std::uint
   const double seconds = std::chrono::duration<double>(now - phase_start_).count();
   const double rate = seconds > 0.2 ? static_cast<double>(done - done_at_start_) / seconds : 0;
   // Leave one column free, because some terminals wrap a full line.
-  fmt::print(stderr, "{}{}", clear_line, progress_line(phase, done, total, rate, terminal_width() - 1));
-  std::fflush(stderr);
+  print_error(clear_line + progress_line(phase, done, total, rate, terminal_width() - 1));
   drawn_ = true;
 }
 

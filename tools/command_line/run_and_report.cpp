@@ -1,49 +1,90 @@
 #include "tools/command_line/run_and_report.h"
 
 #include <cstdio>
+#include <exception>
+#include <filesystem>
 #include <new>
 #include <stdexcept>
+#include <string>
+#include <system_error>
 
 #include <CLI/Error.hpp>
-#include <fmt/format.h>
+#include <unistd.h>
 
+#include "base/process_limits.h"
 #include "base/progress.h"
 #include "base/text.h"
+#include "tools/command_line/tell.h"
 
 namespace tensorray {
 namespace {
 
 constexpr int failed = 1, wrong_input = 2, interrupted = 130;
 
-int report(const std::exception& error, int status) {
-  fmt::print(stderr, "tensorray: {}\n", escaped(error.what()));
+int report(const std::string& what, int status) {
+  print_error("tensorray: " + escaped(what) + "\n");
   return status;
 }
 
+/// The library's text has the call's name in front, and the path behind.
+std::string text_of(const std::filesystem::filesystem_error& error) {
+  const std::string path = error.path1().string();
+  if (!path.empty()) return path + ": " + error.code().message();
+  return "the working folder cannot be found: " + error.code().message();
+}
+
+/// The end of a program whose exception nobody catches: one line and a status, as of any other error.
+[[noreturn]] void end_by_exception() {
+  std::string reason = "an unknown error";
+  try {
+    if (const std::exception_ptr error = std::current_exception()) std::rethrow_exception(error);
+  } catch (const std::system_error& error) {
+    reason = error.code().message() + "; limits of threads or memory (`ulimit -u`, `ulimit -v`) may be too low";
+  } catch (const std::exception& error) {
+    reason = reason_of(error);
+  } catch (...) {
+  }
+  report("ended by " + reason, failed);
+  _exit(failed);
+}
+
+#ifndef __SANITIZE_ADDRESS__
+void expect_exceptions() { std::set_terminate(end_by_exception); }
+
+/// Called before the libraries are initialized: one of OpenVDB's (log4cplus) starts threads then, and where it cannot,
+/// its exception comes before `main`.
+__attribute__((section(".preinit_array"), used)) void (*const before_libraries)() = expect_exceptions;
+#endif
+
 }  // namespace
+
+std::string reason_of(const std::exception& error) {
+  if (dynamic_cast<const std::bad_alloc*>(&error))
+    return "out of memory; lower the resolution, or the number of wavelengths";
+  if (const auto* file = dynamic_cast<const std::filesystem::filesystem_error*>(&error)) return escaped(text_of(*file));
+  return escaped(error.what());
+}
 
 int run_and_report(const std::function<void()>& work) {
   try {
+    require_stack();
     work();
     if (std::fflush(stdout) != 0) throw std::runtime_error("standard output cannot be written: the disk may be full");
     return 0;
   } catch (const CLI::RuntimeError& child) {  // The child has printed the error.
     return child.get_exit_code();
   } catch (const CLI::ParseError& error) {
-    fmt::print(stderr, "tensorray: {} (--help says more)\n", escaped(error.what()));
-    return wrong_input;
+    return report(std::string(error.what()) + " (--help says more)", wrong_input);
   } catch (const Cancelled&) {
-    fmt::print(stderr, "tensorray: interrupted; nothing was written\n");
-    return interrupted;
+    return report("interrupted; nothing was written", interrupted);
   } catch (const Interrupted& error) {
-    return report(error, interrupted);
+    return report(error.what(), interrupted);
   } catch (const std::invalid_argument& error) {
-    return report(error, wrong_input);
-  } catch (const std::bad_alloc&) {
-    fmt::print(stderr, "tensorray: out of memory; lower the resolution, or the number of wavelengths\n");
-    return failed;
+    return report(error.what(), wrong_input);
   } catch (const std::exception& error) {
-    return report(error, failed);
+    return report(reason_of(error), failed);
+  } catch (...) {
+    return report("failed for an unknown reason", failed);
   }
 }
 

@@ -2,8 +2,10 @@
 /// @file tools/command_line/run_and_report.h
 /// Reports errors to the user: one line, and an exit status.
 
+#include <exception>
 #include <functional>
 #include <stdexcept>
+#include <string>
 
 namespace tensorray {
 
@@ -11,6 +13,9 @@ namespace tensorray {
 struct Interrupted : std::runtime_error {
   using std::runtime_error::runtime_error;
 };
+
+/// What an error says to the user, on one line: libraries' texts are put into words.
+std::string reason_of(const std::exception& error);
 
 /// Calls `work`, and prints an exception that it throws as one line on standard error.
 /// @return the exit status: 0 done, 1 failed, 2 the command line or the scene is wrong, 130 interrupted.

@@ -12,6 +12,8 @@
 #include "base/output_file.h"
 #include "base/progress.h"
 #include "base/text.h"
+#include "tools/command_line/tell.h"
+#include "tools/command_line/threads.h"
 #include "tools/command_line/vdb_output.h"
 #include "tools/commands/commands.h"
 #include "volumes/files/scalar_files.h"
@@ -45,6 +47,7 @@ std::map<std::string, std::string> file_metadata(const TensorGrid& field) {
 }
 
 void derive(const DeriveOptions& options, const Progress& progress) {
+  const Threads threads;
   const std::vector<Invariant> invariants = chosen_invariants(options);
   require_distinct_files({{options.input, "the field"}}, {{options.output, "-o"}});
   OutputFile file(options.output);
@@ -65,11 +68,12 @@ void derive(const DeriveOptions& options, const Progress& progress) {
   file.commit();
 
   if (removed > 0)
-    fmt::print(stderr, "warning: {}: {} voxels are not finite and are left out\n", options.input.string(), removed);
+    tell({fmt::format("warning: {}: {} voxels are not finite and are left out", options.input.string(), removed)},
+         false);
   std::vector<std::string> names;
   for (const ScalarGrid& grid : grids) names.push_back(grid.name);
-  fmt::print("{}: {} of field \"{}\", {} voxels, {}\n", options.output.string(), joined(names), field.name,
-             field.active_voxels(), bytes_text(bytes));
+  tell_made(fmt::format("{}: {} of field \"{}\", {} voxels, {}", options.output.string(), joined(names), field.name,
+                        field.active_voxels(), bytes_text(bytes)));
 }
 
 }  // namespace

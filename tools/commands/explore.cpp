@@ -4,12 +4,10 @@
 #include <memory>
 #include <optional>
 #include <string>
-#include <thread>
 #include <vector>
 
 #include <CLI/CLI.hpp>
 #include <fmt/format.h>
-#include <tbb/global_control.h>
 
 #include "base/output_file.h"
 #include "base/text.h"
@@ -22,6 +20,8 @@
 #include "scenes/scene/render.h"
 #include "scenes/scene/scene.h"
 #include "tools/command_line/progress_bar.h"
+#include "tools/command_line/tell.h"
+#include "tools/command_line/threads.h"
 #include "tools/commands/commands.h"
 
 namespace tensorray {
@@ -170,9 +170,8 @@ void check(const ExploreOptions& options, const SceneDescription& description) {
 }
 
 void explore(const ExploreOptions& options, Progress& progress) {
-  const unsigned threads = options.threads > 0 ? options.threads : std::max(1u, std::thread::hardware_concurrency());
-  const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, threads);
-  set_image_threads(static_cast<int>(threads));
+  const Threads threads(options.threads);
+  set_image_threads(static_cast<int>(running_threads()));
   check(options, with(options, {}));
   std::vector<OutputFile> files;
   for (const std::string& file : {options.sheet, options.scene_copy})
@@ -210,7 +209,7 @@ void explore(const ExploreOptions& options, Progress& progress) {
   commit_all(files);
   if (options.quiet) return;
   for (const std::string& file : {options.sheet, options.scene_copy})
-    if (!file.empty()) fmt::print("wrote {}\n", file);
+    if (!file.empty()) tell_made("wrote " + file);
 }
 
 }  // namespace

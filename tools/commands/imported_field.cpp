@@ -4,11 +4,10 @@
 #include <stdexcept>
 #include <vector>
 
-#include <fmt/format.h>
-
 #include "base/child_program.h"
 #include "base/text.h"
 #include "scenes/pipeline/read_scene.h"
+#include "tools/command_line/tell.h"
 
 namespace tensorray {
 namespace {
@@ -59,7 +58,7 @@ ImportedField::ImportedField(const std::filesystem::path& file, const ImportChoi
   const ProgramEnd end = run_program(import_program(), arguments, UnnamedFile());
   if (end.signal != 0) throw std::runtime_error(file.string() + ": the import crashed; the file may be damaged");
   if (end.status != 0) throw std::runtime_error(last_line(end.error));
-  if (!quiet) fmt::print(stderr, "{}", end.error);
+  if (!quiet) print_error(end.error);
 }
 
 }  // namespace tensorray

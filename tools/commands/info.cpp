@@ -13,6 +13,7 @@
 #include <nlohmann/json.hpp>
 
 #include "base/text.h"
+#include "tools/command_line/threads.h"
 #include "tools/commands/commands.h"
 #include "volumes/files/tensor_files.h"
 #include "volumes/tensors/field_making.h"
@@ -209,6 +210,7 @@ void print_text(const InfoOptions& options, const std::vector<GridInfo>& grids, 
 }
 
 void info(const InfoOptions& options) {
+  const Threads threads;
   const std::vector<GridInfo> grids = list_vdb(options.file);
   const std::vector<FieldInfo> fields = field_infos(options, grids);
   if (options.json) {

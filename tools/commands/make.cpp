@@ -14,6 +14,8 @@
 #include "base/progress.h"
 #include "base/text.h"
 #include "scenes/keys/generate_grid.h"
+#include "tools/command_line/tell.h"
+#include "tools/command_line/threads.h"
 #include "tools/command_line/vdb_output.h"
 #include "tools/commands/commands.h"
 #include "volumes/files/tensor_files.h"
@@ -122,6 +124,7 @@ void add_grid_flags(CLI::App& command, GridRequest& grid) {
 }
 
 void make(const MakeOptions& options, const Progress& progress) {
+  const Threads threads;
   const GridSettings settings = choose_grid(options.generator, options.grid);
   OutputFile file(options.output);
   TensorGrid grid = generate(options.generator, settings);
@@ -135,8 +138,8 @@ void make(const MakeOptions& options, const Progress& progress) {
   file.commit();
 
   const Eigen::Vector3i& n = settings.resolution;
-  fmt::print("{}: field \"{}\", {} x {} x {} voxels, {}\n", options.output.string(), grid.name, n.x(), n.y(), n.z(),
-             bytes_text(bytes));
+  tell_made(fmt::format("{}: field \"{}\", {} x {} x {} voxels, {}", options.output.string(), grid.name, n.x(), n.y(),
+                        n.z(), bytes_text(bytes)));
 }
 
 void add_kind(CLI::App& parent, const std::string& kind, Progress& progress) {

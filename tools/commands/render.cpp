@@ -8,6 +8,7 @@
 #include <fmt/format.h>
 
 #include "base/distinct_files.h"
+#include "base/numbered_name.h"
 #include "base/text.h"
 #include "scenes/keys/frames.h"
 #include "scenes/pipeline/methods.h"
@@ -83,6 +84,24 @@ SceneChanges changes_of(const RenderOptions& options) {
   return changes;
 }
 
+/// Other programs' numbers of frames mean that frames are wanted. (# may be part of a name.)
+void refuse_number_signs(const SceneChanges& changes, const RenderRun& run) {
+  std::vector<std::filesystem::path> files = changes.outputs;
+  files.insert(files.end(), {run.statistics, run.keeping.shard_file});
+  for (const std::filesystem::path& file : files)
+    if (has_foreign_number_sign(file.filename().string()))
+      throw std::invalid_argument(printable(file.string()) +
+                                  ": has the number of a frame; give --frames, as --frames 7");
+}
+
+/// The end of a run that keeps going. @throw std::runtime_error if frames failed.
+void report_failed(const std::vector<int>& failed) {
+  if (failed.empty()) return;
+  throw std::runtime_error(fmt::format("{} {} failed: {}; render again with --frames {}", failed.size(),
+                                       failed.size() == 1 ? "frame" : "frames", fmt::join(failed, ", "),
+                                       fmt::join(failed, ",")));
+}
+
 /// Renders another program's file. Its pictures are named after the file.
 void render_import(const std::string& file, SceneChanges changes, const RenderOptions& options, Progress& progress) {
   if (!options.frames.empty()) throw std::invalid_argument("--frames: import the files first, with `tensorray import`");
@@ -107,12 +126,13 @@ void render_import(const std::string& file, SceneChanges changes, const RenderOp
   render_scene(field.path(), changes, run, progress);
 }
 
-/// @param leader  Null: there are no other ranks.
-void render(const RenderOptions& options, Leader* leader, Progress& progress) {
+/// @param leader  Null: there are no other ranks. @return frames that failed, where the run keeps going.
+std::vector<int> render(const RenderOptions& options, Leader* leader, Progress& progress) {
   SceneChanges changes = changes_of(options);
   if (needs_import(options.scene)) {
     if (leader) throw std::invalid_argument("mpirun: import the file first, with `tensorray import`");
-    return render_import(options.scene, changes, options, progress);
+    render_import(options.scene, changes, options, progress);
+    return {};
   }
   const ImportChoices& import = options.import;
   if (!import.order.empty() || !import.array.empty() || !import.gradient_of.empty())
@@ -121,16 +141,20 @@ void render(const RenderOptions& options, Leader* leader, Progress& progress) {
   run.leader = leader;
   if (!run.keeping.display.empty()) check_display_address(run.keeping.display);
   if (!options.shard.empty()) take_shard(options.shard, changes, run.keeping);
-  if (options.frames.empty()) return render_scene(options.scene, changes, run, progress);
+  if (options.frames.empty()) {
+    refuse_number_signs(changes, run);
+    render_scene(options.scene, changes, run, progress);
+    return {};
+  }
   if (!run.scene_copy.empty()) throw std::invalid_argument("--save-scene: not for several frames");
-  render_frames(options.scene, changes, parse_frames(options.frames), run, progress);
+  return render_frames(options.scene, changes, parse_frames(options.frames), run, progress);
 }
 
-/// Rank 0 checks everything, and says it; the others do what it asks for.
-void follow(const RenderOptions& options, Ranks& ranks, Progress& progress) {
+/// Rank 0 checks everything, and says it; the others do what it asks for. @return whether all frames succeeded.
+bool follow(const RenderOptions& options, Ranks& ranks, Progress& progress) {
   Follower follower(ranks, progress, options.run.keeping.interval);
   try {
-    follow(options.scene, changes_of(options), options.run, follower, progress);
+    return follow(options.scene, changes_of(options), options.run, follower, progress).empty();
   } catch (const Cancelled&) {
     throw CLI::RuntimeError(130);  // Without a word.
   } catch (const std::exception& error) {
@@ -140,15 +164,18 @@ void follow(const RenderOptions& options, Ranks& ranks, Progress& progress) {
 
 void render_alone_or_with_others(const RenderOptions& options, Progress& progress) {
   const std::unique_ptr<Ranks> ranks = join_ranks();
-  if (!ranks) return render(options, nullptr, progress);
+  if (!ranks) return report_failed(render(options, nullptr, progress));
   if (ranks->rank() == 0) {
     Leader leader(*ranks, progress);
-    render(options, &leader, progress);
+    const std::vector<int> failed = render(options, &leader, progress);
     leader.finish();
+    ranks->finish();
+    report_failed(failed);
   } else {
-    follow(options, *ranks, progress);
+    const bool is_well = follow(options, *ranks, progress);
+    ranks->finish();
+    if (!is_well) throw CLI::RuntimeError(1);  // The frames were named when they failed.
   }
-  ranks->finish();
 }
 
 }  // namespace
@@ -173,10 +200,15 @@ void add_render_command(CLI::App& program, Progress& progress) {
                       "photon_distribution: refine until the picture's relative error is below this, as 1%");
   command->add_option("--stats", options->run.statistics, "Write statistics of the render to this JSON file");
   command->add_option("--save-scene", options->run.scene_copy, "Write the scene, with its changes, to this JSON file");
-  CLI::Option* frames = command->add_option("--frames", options->frames,
-                                            "Render these frames, as 1-240 or 1-240x2: # in names of files is the "
-                                            "frame's number (flow.####.vdb), and numbers "
-                                            "of the scene may have keyframes");
+  CLI::Option* frames =
+      command->add_option("--frames", options->frames,
+                          "Render these frames, as 1-240, 1-240x2 or 1,3,7-9: # in names of files is the "
+                          "frame's number (flow.####.vdb, or flow.%04d.vdb, flow.$F4.vdb), and "
+                          "numbers of the scene may have keyframes");
+  command
+      ->add_flag("--keep-going", options->run.keep_going,
+                 "Of frames: if one fails, render those that follow, and name those that failed at the end")
+      ->needs(frames);
   command->add_flag("--skip-existing", options->run.skip_existing, "Leave out frames whose files exist")->needs(frames);
   command
       ->add_option("--checkpoint", options->run.keeping.interval,

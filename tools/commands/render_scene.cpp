@@ -6,14 +6,14 @@
 #include <future>
 #include <optional>
 #include <string>
-#include <thread>
 #include <utility>
 #include <vector>
 
 #include <fmt/format.h>
-#include <tbb/global_control.h>
 
+#include "base/path_text.h"
 #include "base/seconds.h"
+#include "base/text.h"
 #include "renderer/images/image.h"
 #include "scenes/jobs/origin.h"
 #include "scenes/keys/frames.h"
@@ -25,6 +25,7 @@
 #include "tools/command_line/progress_bar.h"
 #include "tools/command_line/run_and_report.h"
 #include "tools/command_line/tell.h"
+#include "tools/command_line/threads.h"
 #include "tools/commands/run_outputs.h"
 #include "tools/commands/tev_display.h"
 #include "tools/commands/work_keeper.h"
@@ -37,8 +38,10 @@ namespace {
 
 constexpr double watch_interval = 5, display_interval = 1;  // Seconds.
 
-unsigned threads_of(const RenderRun& run) {
-  return run.threads > 0 ? run.threads : std::max(1u, std::thread::hardware_concurrency());
+/// A name that cannot be looked at does not exist; opening the file says why.
+bool is_there(const std::filesystem::path& file) {
+  std::error_code none;
+  return std::filesystem::exists(file, none);
 }
 
 /// What does not change while a field stays the same.
@@ -69,7 +72,7 @@ KeepSettings keep_settings(const SceneDescription& description, const RenderRun&
   if (run.keeping.shard && !method.is_divided())
     throw SceneError(
         fmt::format("--shard: the work of {} is one piece; divide a sequence by --frames instead", method.name()));
-  if (!run.keeping.resume && !settings.file.empty() && std::filesystem::exists(settings.file))
+  if (!run.keeping.resume && !settings.file.empty() && is_there(settings.file))
     throw SceneError(
         printable(fmt::format("{}: is the checkpoint of a render that did not end; continue it with --resume, "
                               "or remove the file",
@@ -79,7 +82,7 @@ KeepSettings keep_settings(const SceneDescription& description, const RenderRun&
 
 /// The units of the checkpoint, if the run continues one. @throw SceneError if it is that of another render.
 std::vector<WorkUnit> kept_units(const std::filesystem::path& file, const RenderRun& run, const Scene& scene) {
-  if (!run.keeping.resume || file.empty() || !std::filesystem::exists(file)) return {};
+  if (!run.keeping.resume || file.empty() || !is_there(file)) return {};
   WorkFile kept = read_work(file);
   const WorkPart part = run.keeping.shard.value_or(WorkPart{});
   std::string other = difference(kept.origin, origin_of(scene));
@@ -126,7 +129,7 @@ class SharedWork {
   SharedWork(Leader* leader, const Scene& scene, Work& work, unsigned threads) : leader_(leader) {
     if (!leader_) return;
     const Json job = {{"origin", origin_of(scene)},
-                      {"scene_file", std::filesystem::absolute(scene.description.path).string()},
+                      {"scene_file", text_of_path(std::filesystem::absolute(scene.description.path))},
                       {"part", {work.part().index, work.part().count}}};
     leader_->share(job.dump(), work, threads);
   }
@@ -141,7 +144,7 @@ class SharedWork {
 };
 
 std::string run_statistics(const Scene& scene, const Statistics& statistics, double seconds, const RenderRun& run) {
-  std::string text = statistics_json(scene, statistics, seconds, static_cast<int>(threads_of(run)));
+  std::string text = statistics_json(scene, statistics, seconds, static_cast<int>(running_threads()));
   if (!run.leader) return text;
   const RankTraffic traffic = run.leader->traffic();
   auto json = nlohmann::ordered_json::parse(text);
@@ -161,15 +164,15 @@ void complete(const Scene& scene, RenderJob& job, OutputFiles files, const KeepS
   if (!run.keeping.display.empty())
     display.emplace(run.keeping.display, written_by(scene.description, run).front().filename().string());
   const bool is_divided = scene.description.integrator.method().is_divided();
-  const SharedWork shared(is_divided ? run.leader : nullptr, scene, job.work, threads_of(run));
+  const SharedWork shared(is_divided ? run.leader : nullptr, scene, job.work, running_threads());
   WorkKeeper keeper(scene, job.work, keep);
   job.show = [&](Render picture) {
     if (display) display->show(picture.linear);
     if (!keeper.take_file_request() || run.keeping.shard) return;
     try {
       write_so_far(std::move(picture), scene, job.work);
-    } catch (const std::runtime_error& error) {
-      tell({fmt::format("warning: no picture: {}", error.what())}, false);
+    } catch (const std::exception& error) {
+      tell({fmt::format("warning: no picture: {}", escaped(error.what()))}, false);
     }
   };
   Render result = render_or_keep(scene, progress, job, keeper, keep.file);
@@ -186,7 +189,7 @@ void complete(const Scene& scene, RenderJob& job, OutputFiles files, const KeepS
       write_text(files.at(statistics_key), run_statistics(scene, result.statistics, seconds_since(start), run));
     if (!run.scene_copy.empty()) write_text(files.at(scene_key), parse_value(scene.description.text).dump(2) + "\n");
     commit_outputs(std::move(files));
-  } catch (const std::runtime_error&) {  // The disk may be full.
+  } catch (const std::exception&) {  // The disk may be full.
     if (keeper.write()) tell({"the work is kept: --resume continues from " + keep.file.string()}, run.quiet);
     throw;
   }
@@ -196,9 +199,9 @@ void complete(const Scene& scene, RenderJob& job, OutputFiles files, const KeepS
 /// Renders a scene to its files. @return the loaded scene.
 Scene render_to_files(const SceneDescription& description, const RenderRun& run, std::optional<Scene> loaded,
                       Progress& progress) {
+  OutputFiles files = open_files(description, run);  // First: a folder that cannot be written is named for the picture.
   KeepSettings keep = keep_settings(description, run);
   keep.cancelled = &progress.cancelled;
-  OutputFiles files = open_files(description, run);
   std::optional<ProgressBar> bar(std::in_place, progress, run.quiet);
   Scene scene = load(description, loaded, progress);
   bar.reset();
@@ -208,19 +211,23 @@ Scene render_to_files(const SceneDescription& description, const RenderRun& run,
   RenderJob job{Work(run.keeping.shard.value_or(WorkPart{}), kept_units(keep.file, run, scene)), {}};
   complete(scene, job, std::move(files), keep, run, progress);
   for (const std::filesystem::path& file : written_by(description, run))
-    if (!run.quiet) fmt::print("wrote {}\n", file.string());
+    if (!run.quiet) tell_made("wrote " + file.string());
   return scene;
 }
 
 /// @throw SceneError if two frames have a file in common.
 void check_names(const std::filesystem::path& scene_file, SceneChanges changes, const std::vector<int>& frames,
                  const RenderRun& run) {
-  if (frames.size() < 2) return;
   std::vector<std::vector<std::filesystem::path>> names;
-  for (const int frame : {frames[0], frames[1]}) {
-    changes.frame = frame;
-    names.push_back(files_of(read_scene(scene_file, changes), at_frame(run, frame)));
+  for (std::size_t i = 0; i < frames.size() && names.size() < 2; ++i) {
+    changes.frame = frames[i];
+    try {
+      names.push_back(files_of(read_scene(scene_file, changes), at_frame(run, frames[i])));
+    } catch (const std::invalid_argument&) {
+      if (!run.keep_going) throw;  // Else it is reported when its turn comes.
+    }
   }
+  if (names.size() < 2) return;
   for (const std::filesystem::path& name : names[0])
     if (std::find(names[1].begin(), names[1].end(), name) != names[1].end())
       throw SceneError(
@@ -245,20 +252,66 @@ void render_frame(const std::filesystem::path& scene_file, SceneChanges changes,
   bound_memory_of(run, description);
   const RenderRun with_number = at_frame(run, frame);
   const std::vector<std::filesystem::path> files = files_of(description, with_number);
-  const auto exists = [](const std::filesystem::path& file) { return std::filesystem::exists(file); };
   const std::filesystem::path checkpoint = checkpoint_of(description, with_number.keeping);
-  const bool is_done = std::all_of(files.begin(), files.end(), exists) && (checkpoint.empty() || !exists(checkpoint));
+  const bool is_done = std::all_of(files.begin(), files.end(), is_there) && (checkpoint.empty() || !is_there(checkpoint));
   if (run.skip_existing && is_done) return;
   tell({fmt::format("frame {}", frame)}, run.quiet);
   Scene rendered = render_to_files(description, with_number, std::move(loaded), progress);
   loaded.emplace(std::move(rendered));
 }
 
+/// The same. With --keep-going, a frame that fails is noted, and others follow.
+void try_frame(const std::filesystem::path& scene_file, const SceneChanges& changes, const Json& job,
+               const RenderRun& run, std::optional<Scene>& loaded, std::vector<int>& failed, Progress& progress) {
+  if (!run.keep_going) return render_frame(scene_file, changes, job, run, loaded, progress);
+  const int frame = job.at("frame").get<int>();
+  try {
+    render_frame(scene_file, changes, job, run, loaded, progress);
+  } catch (const Cancelled&) {
+    throw;
+  } catch (const Interrupted&) {
+    throw;
+  } catch (const std::exception& error) {
+    tell({fmt::format("tensorray: frame {}: {}", frame, reason_of(error))}, false);
+    failed.push_back(frame);
+    loaded.reset();
+  }
+}
+
+/// What the frames of a sequence have in common.
+struct Sequence {
+  Json job;  ///< The scale and the direction, where scenes leave them open.
+  bool is_divided = false;
+};
+
+/// That of its first frame; where the run keeps going, of the first one that can be loaded.
+Sequence sequence_of(const std::filesystem::path& scene_file, SceneChanges changes, const std::vector<int>& frames,
+                     const RenderRun& run, std::optional<Scene>& loaded, Progress& progress) {
+  for (const int frame : frames) {
+    try {
+      changes.frame = frame;
+      const SceneDescription first = read_scene(scene_file, changes);
+      bound_memory_of(run, first);
+      if (!first.field.scale || !first.light.direction) loaded = load_scene(first, progress);
+      const Eigen::Vector3d direction = loaded ? *loaded->description.light.direction : *first.light.direction;
+      return {{{"scale", loaded ? loaded->scale.scale : *first.field.scale},
+               {"direction", {direction.x(), direction.y(), direction.z()}}},
+              first.integrator.method().is_divided()};
+    } catch (const Cancelled&) {
+      throw;
+    } catch (const std::exception&) {
+      if (!run.keep_going || frame == frames.back()) throw;  // Else it is reported when its turn comes.
+    }
+  }
+  throw std::logic_error("a sequence has frames");
+}
+
 /// Does units of a render of rank 0, until there are none left. @throw SceneError if its files are not those of rank 0.
 void render_units(const RankJob& job, const Json& order, const RenderRun& run, std::optional<Scene>& loaded,
                   Follower& follower, const Progress& progress) {
   const Json& origin = order.at("origin");
-  SceneDescription description = read_scene_json(origin.at("scene"), order.at("scene_file").get<std::string>());
+  SceneDescription description =
+      read_scene_json(origin.at("scene"), path_of_text(order.at("scene_file").get<std::string>()));
   set_chosen(origin, description);
   bound_memory_of(run, description);
   Scene scene = load(description, loaded, progress);
@@ -266,7 +319,7 @@ void render_units(const RankJob& job, const Json& order, const RenderRun& run, s
   if (!other.empty())
     throw SceneError(printable(fmt::format("{}: is not that of rank 0: {}", description.path.string(), other)));
   RenderJob units{Work({order.at("part").at(0).get<std::size_t>(), order.at("part").at(1).get<std::size_t>()}), {}};
-  follower.share(job, units.work, threads_of(run));
+  follower.share(job, units.work, running_threads());
   render(scene, progress, &units);
   loaded.emplace(std::move(scene));
 }
@@ -275,8 +328,8 @@ void render_units(const RankJob& job, const Json& order, const RenderRun& run, s
 
 void render_scene(const std::filesystem::path& scene_file, const SceneChanges& changes, const RenderRun& run,
                   Progress& progress) {
-  const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, threads_of(run));
-  set_image_threads(static_cast<int>(threads_of(run)));
+  const Threads threads(run.threads);
+  set_image_threads(static_cast<int>(running_threads()));
   const SceneDescription description = read_scene(scene_file, changes);
   bound_memory_of(run, description);
   const Method& method = description.integrator.method();
@@ -288,25 +341,20 @@ void render_scene(const std::filesystem::path& scene_file, const SceneChanges& c
   render_to_files(description, run, {}, progress);
 }
 
-void render_frames(const std::filesystem::path& scene_file, SceneChanges changes, const std::vector<int>& frames,
-                   const RenderRun& run, Progress& progress) {
-  const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, threads_of(run));
-  set_image_threads(static_cast<int>(threads_of(run)));
+std::vector<int> render_frames(const std::filesystem::path& scene_file, SceneChanges changes,
+                               const std::vector<int>& frames, const RenderRun& run, Progress& progress) {
+  const Threads threads(run.threads);
+  set_image_threads(static_cast<int>(running_threads()));
   check_names(scene_file, changes, frames, run);
-  changes.frame = frames.front();
-  const SceneDescription first = read_scene(scene_file, changes);
-  bound_memory_of(run, first);
   std::optional<Scene> loaded;
-  if (!first.field.scale || !first.light.direction) loaded = load_scene(first, progress);
-  const Eigen::Vector3d direction = loaded ? *loaded->description.light.direction : *first.light.direction;
-  Json job = {{"scale", loaded ? loaded->scale.scale : *first.field.scale},
-              {"direction", {direction.x(), direction.y(), direction.z()}}};
+  auto [job, is_divided] = sequence_of(scene_file, changes, frames, run, loaded, progress);
   std::deque<std::string> jobs;
   for (const int frame : frames) {
     job["frame"] = frame;
     jobs.push_back(job.dump());
   }
-  const bool is_handed_out = run.leader && !first.integrator.method().is_divided();
+  std::vector<int> failed;
+  const bool is_handed_out = run.leader && !is_divided;
   if (is_handed_out) run.leader->offer(std::exchange(jobs, {}));
   for (;;) {
     std::optional<std::string> next = is_handed_out ? run.leader->take() : std::nullopt;
@@ -314,28 +362,30 @@ void render_frames(const std::filesystem::path& scene_file, SceneChanges changes
       next = jobs.front();
       jobs.pop_front();
     }
-    if (!next) return;
-    render_frame(scene_file, changes, parse_value(*next), run, loaded, progress);
+    if (!next) return failed;
+    try_frame(scene_file, changes, parse_value(*next), run, loaded, failed, progress);
   }
 }
 
-void follow(const std::filesystem::path& scene_file, const SceneChanges& changes, const RenderRun& run,
-            Follower& follower, Progress& progress) {
-  const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, threads_of(run));
-  set_image_threads(static_cast<int>(threads_of(run)));
+std::vector<int> follow(const std::filesystem::path& scene_file, const SceneChanges& changes, const RenderRun& run,
+                        Follower& follower, Progress& progress) {
+  const Threads threads(run.threads);
+  set_image_threads(static_cast<int>(running_threads()));
+  std::vector<int> failed;
   std::optional<Scene> loaded;
   while (const std::optional<RankJob> job = follower.next_job()) {
     const Json order = parse_value(job->text);
     if (order.contains("frame"))
-      render_frame(scene_file, changes, order, run, loaded, progress);
+      try_frame(scene_file, changes, order, run, loaded, failed, progress);
     else
       render_units(*job, order, run, loaded, follower, progress);
   }
+  return failed;
 }
 
 void write_merged(const SceneDescription& description, const WorkFile& work, const RenderRun& run, Progress& progress) {
-  const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, threads_of(run));
-  set_image_threads(static_cast<int>(threads_of(run)));
+  const Threads threads(run.threads);
+  set_image_threads(static_cast<int>(running_threads()));
   OutputFiles files = open_files(description, run);
   const Scene scene = load_scene(description, progress);
   const std::string other = difference(work.origin, origin_of(scene));
@@ -347,7 +397,7 @@ void write_merged(const SceneDescription& description, const WorkFile& work, con
   RenderJob job{Work({}, work.units), {}};
   complete(scene, job, std::move(files), {}, run, progress);
   for (const std::filesystem::path& file : written_by(description, run))
-    if (!run.quiet) fmt::print("wrote {}\n", file.string());
+    if (!run.quiet) tell_made("wrote " + file.string());
 }
 
 }  // namespace tensorray

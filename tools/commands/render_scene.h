@@ -34,6 +34,7 @@ struct RenderRun {
   std::size_t memory = 0;            ///< What may be resident, in bytes; 0: without a bound.
   unsigned threads = 0;              ///< Number of threads; 0: all.
   bool skip_existing = false;        ///< Leave out frames of which all files exist, but no checkpoint.
+  bool keep_going = false;           ///< Of a sequence: a frame that fails does not end it.
   bool quiet = false;                ///< Print only errors.
   std::filesystem::path statistics;  ///< JSON file for the statistics; empty: none.
   std::filesystem::path scene_copy;  ///< File for the scene with its changes; empty: none.
@@ -50,14 +51,16 @@ void render_scene(const std::filesystem::path& scene_file, const SceneChanges& c
 /// Renders frames of a scene (see set_frame), one after the other. The scale and the direction `auto` are those of the
 /// first frame. A field that does not change is loaded once. Where there are other ranks, and the method's work is not
 /// divided, each takes the next frame.
+/// @return the frames that failed, where the run keeps going; they were named on standard error.
 /// @throw as render_scene; SceneError if the names of files do not count frames, so that one would replace another.
-void render_frames(const std::filesystem::path& scene_file, SceneChanges changes, const std::vector<int>& frames,
-                   const RenderRun& run, Progress& progress);
+std::vector<int> render_frames(const std::filesystem::path& scene_file, SceneChanges changes,
+                               const std::vector<int>& frames, const RenderRun& run, Progress& progress);
 
 /// Renders what rank 0 asks for, which calls render_scene or render_frames with the same arguments, until it has no
-/// more: units of its scenes, or frames. @throw as render_scene.
-void follow(const std::filesystem::path& scene_file, const SceneChanges& changes, const RenderRun& run,
-            Follower& follower, Progress& progress);
+/// more: units of its scenes, or frames. @return frames that failed here, where the run keeps going.
+/// @throw as render_scene.
+std::vector<int> follow(const std::filesystem::path& scene_file, const SceneChanges& changes, const RenderRun& run,
+                        Follower& follower, Progress& progress);
 
 /// Makes the pictures of a scene of work that is done. The work must be all of it, and that of the scene.
 /// @throw as render_scene.

@@ -5,6 +5,7 @@
 
 #include <fmt/format.h>
 
+#include "base/path_text.h"
 #include "base/text.h"
 #include "scenes/description/run_files.h"
 #include "scenes/keys/frames.h"
@@ -72,9 +73,7 @@ std::vector<std::filesystem::path> files_of(const SceneDescription& description,
 }
 
 std::filesystem::path checkpoint_of(const SceneDescription& description, const RunKeeping& keeping) {
-  const auto beside = [](const std::filesystem::path& file) {
-    return std::filesystem::path(file.string() + ".checkpoint");
-  };
+  const auto beside = [](const std::filesystem::path& file) { return with_suffix(file, ".checkpoint"); };
   if (!keeping.is_on) return {};
   if (keeping.shard) return beside(keeping.shard_file);
   const auto& files = description.output.files;

@@ -10,9 +10,9 @@
 #include <fmt/format.h>
 #include <netdb.h>
 #include <sys/socket.h>
-#include <unistd.h>
 
 #include "base/byte_order.h"
+#include "base/descriptor.h"
 #include "scenes/keys/scene_source.h"
 #include "tools/command_line/tell.h"
 
@@ -77,21 +77,18 @@ bool is_equal(const Image& a, const Image& b, int left, int top, int width, int 
   return true;
 }
 
-/// A socket that is connected, or -1. It waits `patience` seconds at most, also later when it sends.
-int connect_to(const Address& address) {
+/// A socket that is connected, or none. It waits `patience` seconds at most, also later when it sends.
+Descriptor connect_to(const Address& address) {
   addrinfo wanted{}, *found = nullptr;
   wanted.ai_socktype = SOCK_STREAM;
-  if (getaddrinfo(address.host.c_str(), address.port.c_str(), &wanted, &found) != 0) return -1;
-  int connected = -1;
-  for (const addrinfo* each = found; each && connected < 0; each = each->ai_next) {
-    const int handle = socket(each->ai_family, each->ai_socktype | SOCK_CLOEXEC, each->ai_protocol);
-    if (handle < 0) continue;
+  if (getaddrinfo(address.host.c_str(), address.port.c_str(), &wanted, &found) != 0) return {};
+  Descriptor connected;
+  for (const addrinfo* each = found; each && !connected.is_open(); each = each->ai_next) {
+    Descriptor handle(socket(each->ai_family, each->ai_socktype | SOCK_CLOEXEC, each->ai_protocol));
+    if (!handle.is_open()) continue;
     const timeval limit{patience, 0};
-    setsockopt(handle, SOL_SOCKET, SO_SNDTIMEO, &limit, sizeof limit);  // Also limits connect().
-    if (connect(handle, each->ai_addr, each->ai_addrlen) == 0)
-      connected = handle;
-    else
-      close(handle);
+    setsockopt(handle.get(), SOL_SOCKET, SO_SNDTIMEO, &limit, sizeof limit);  // Also limits connect().
+    if (connect(handle.get(), each->ai_addr, each->ai_addrlen) == 0) connected = std::move(handle);
   }
   freeaddrinfo(found);
   return connected;
@@ -109,23 +106,18 @@ void check_display_address(const std::string& text) {
 
 TevDisplay::TevDisplay(const std::string& address, std::string name)
     : address_(address), name_(std::move(name)), socket_(connect_to(address_of(address))) {
-  if (socket_ < 0) lose("cannot be reached");
-}
-
-TevDisplay::~TevDisplay() {
-  if (socket_ >= 0) close(socket_);
+  if (!socket_.is_open()) lose("cannot be reached");
 }
 
 void TevDisplay::lose(const std::string& why) {
   tell({fmt::format("warning: --display {}: the viewer {}; the render goes on without it", printable(address_), why)},
        false);
-  if (socket_ >= 0) close(socket_);
-  socket_ = -1;
+  socket_.close();
 }
 
 void TevDisplay::send(const std::string& message) {
-  for (std::size_t sent = 0; socket_ >= 0 && sent < message.size();) {
-    const ssize_t size = ::send(socket_, message.data() + sent, message.size() - sent, MSG_NOSIGNAL);
+  for (std::size_t sent = 0; socket_.is_open() && sent < message.size();) {
+    const ssize_t size = ::send(socket_.get(), message.data() + sent, message.size() - sent, MSG_NOSIGNAL);
     if (size > 0)
       sent += static_cast<std::size_t>(size);
     else if (size == 0 || errno != EINTR)
@@ -150,7 +142,7 @@ void TevDisplay::send_tile(const Image& picture, int left, int top) {
 }
 
 void TevDisplay::show(const Image& linear) {
-  if (socket_ < 0 || linear.pixels.empty()) return;
+  if (!socket_.is_open() || linear.pixels.empty()) return;
   if (shown_.pixels.empty()) {
     shown_ = Image(linear.width, linear.height, linear.channels);
     const int channels = sent_channels(linear);

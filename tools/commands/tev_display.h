@@ -5,6 +5,7 @@
 
 #include <string>
 
+#include "base/descriptor.h"
 #include "renderer/images/image.h"
 
 namespace tensorray {
@@ -15,9 +16,6 @@ class TevDisplay {
   /// @param address  HOST or HOST:PORT (14158).
   /// @param name     Of the picture, in the viewer.
   TevDisplay(const std::string& address, std::string name);
-  ~TevDisplay();
-  TevDisplay(const TevDisplay&) = delete;
-  TevDisplay& operator=(const TevDisplay&) = delete;
 
   /// Sends the tiles whose pixels have changed since the last call, in linear light: red, green, blue, and alpha.
   void show(const Image& linear);
@@ -28,7 +26,7 @@ class TevDisplay {
   void lose(const std::string& why);
 
   const std::string address_, name_;
-  int socket_ = -1;
+  Descriptor socket_;
   Image shown_;  ///< What the viewer has.
 };
 

@@ -2,12 +2,13 @@
 
 #include <algorithm>
 #include <chrono>
-#include <stdexcept>
+#include <exception>
 #include <utility>
 
 #include <fmt/format.h>
 
 #include "base/seconds.h"
+#include "base/text.h"
 #include "scenes/jobs/origin.h"
 #include "tools/command_line/interrupts.h"
 #include "tools/command_line/tell.h"
@@ -44,11 +45,12 @@ bool WorkKeeper::write() {
     if (file.units.empty()) return false;
     write_work(settings_.file, file);
     is_written_ = true;
-  } catch (const std::runtime_error& error) {
-    if (!has_failed_) tell({fmt::format("warning: no checkpoint: {}", error.what())}, false);
+  } catch (const std::exception& error) {  // Whatever it is: the render goes on.
+    if (!has_failed_) tell({fmt::format("warning: no checkpoint: {}", escaped(error.what()))}, false);
     has_failed_ = true;
   }
-  return is_written_ || std::filesystem::exists(settings_.file);
+  std::error_code none;
+  return is_written_ || std::filesystem::exists(settings_.file, none);
 }
 
 void WorkKeeper::remove() {
@@ -64,7 +66,7 @@ void WorkKeeper::begin() {
   if (origin_ || settings_.file.empty() || work_.units().empty()) return;
   try {
     origin_ = origin_of(scene_);
-  } catch (const std::runtime_error&) {  // write() reports it.
+  } catch (const std::exception&) {  // write() reports it.
   }
 }
 

@@ -36,15 +36,33 @@ Response refusal(http::status status, const char* text) {
   return make_response(status, "text/plain; charset=utf-8", std::string(text) + "\n");
 }
 
-Response answer(const Server::State& state, const HttpRequest& request) {
-  if (!state.is_own_host(request))
-    return refusal(http::status::forbidden, "this server does not have that name; --host allows further ones");
+/// A file of the page; or, where the address lacks its last "/", without which the page would not find its files, the
+/// right address.
+Response answer_get(const Server::State& state, const HttpRequest& request) {
   const std::optional<std::string> path = state.path_of(request);
+  if (path == Server::State::no_slash) {
+    Response response = make_response(http::status::permanent_redirect, "text/plain; charset=utf-8", "");
+    response.set(http::field::location, "/" + state.settings.token + "/");
+    return response;
+  }
   const auto file = path ? state.files.find(*path) : state.files.end();
   if (file == state.files.end())
     return refusal(http::status::not_found, "nothing is here; use the address that the program printed");
-  if (request.method() != http::verb::get) return refusal(http::status::method_not_allowed, "only GET is answered");
   return make_response(http::status::ok, file->second.type, file->second.bytes);
+}
+
+Response answer(const Server::State& state, const HttpRequest& request) {
+  if (!state.is_own_host(request))
+    return refusal(http::status::forbidden, "this server does not have that name; --host allows further ones");
+  const bool is_head = request.method() == http::verb::head;
+  Response response = answer_get(state, request);
+  const bool is_found = response.result_int() < 400;
+  if (is_found && !is_head && request.method() != http::verb::get) {
+    response = refusal(http::status::method_not_allowed, "only GET and HEAD are answered");
+    response.set(http::field::allow, "GET, HEAD");
+  }
+  if (is_head) response.body().clear();  // The length stays that of GET.
+  return response;
 }
 
 class Connection : public std::enable_shared_from_this<Connection> {

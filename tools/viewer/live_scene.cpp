@@ -52,30 +52,31 @@ const Scene& LiveScene::load(const Json& json, const std::vector<std::filesystem
   const Json loaded = with_names(json, outputs);
   if (scene_ && loaded == loaded_) return *scene_;
   SceneDescription description = read_scene_json(json, file_, {{}, outputs});
-  if (Json keys = choice_keys(json); keys != chosen_for_) {
+  const bool chooses_anew = choice_keys(json) != chosen_for_;
+  const bool chooses_scale = !description.field.scale, chooses_direction = !description.light.direction;
+  if (chooses_scale && !chooses_anew) description.field.scale = scale_;
+  if (chooses_direction && !chooses_anew) description.light.direction = direction_;
+
+  const bool has_field =
+      scene_ && field_keys(json) == field_ && scene_->field.interpolant() == interpolant_of(description);
+  Scene scene = has_field ? reload_scene(*scene_, description, progress) : load_scene(description, progress);
+  // A change that moves all rays begins without a memory: it would cost time and give nothing.
+  const Json rays = ray_keys(json, scene);
+  if (rays == rays_of_) scene.rays = scene_ && scene_->rays ? scene_->rays : std::make_shared<RayMemory>();
+
+  // From here on nothing fails: the scene before is replaced as a whole.
+  if (!has_picture(json, outputs)) render_.reset();
+  if (chooses_anew) {
     scale_.reset();
     direction_.reset();
-    chosen_for_ = std::move(keys);
   }
-  const bool chooses_scale = !description.field.scale, chooses_direction = !description.light.direction;
-  if (chooses_scale) description.field.scale = scale_;
-  if (chooses_direction) description.light.direction = direction_;
-
-  if (!has_picture(json, outputs)) render_.reset();
-  Json field = field_keys(json);
-  if (scene_ && (field != field_ || scene_->field.interpolant() != interpolant_of(description)))
-    scene_.reset();  // Its memory is needed.
-  Scene scene = scene_ ? reload_scene(*scene_, description, progress) : load_scene(description, progress);
   if (chooses_scale) scale_ = scene.scale.scale;
   if (chooses_direction) direction_ = scene.description.light.direction;
-  // A change that moves all rays begins without a memory: it would cost time and give nothing.
-  if (Json keys = ray_keys(json, scene); keys != rays_of_)
-    rays_of_ = std::move(keys);
-  else
-    scene.rays = scene_ && scene_->rays ? scene_->rays : std::make_shared<RayMemory>();
   scene_.emplace(std::move(scene));
   loaded_ = loaded;
-  field_ = std::move(field);
+  field_ = field_keys(json);
+  chosen_for_ = choice_keys(json);
+  rays_of_ = rays;
   rendered_ = picture_keys(json, outputs);
   return *scene_;
 }

@@ -27,7 +27,8 @@ class LiveScene {
   /// @param file  The scene's file; its folder is that of relative paths.
   explicit LiveScene(std::filesystem::path file) : file_(std::move(file)) {}
 
-  /// The scene of `json`, loaded. It is valid until the next call. If the call throws, the scene stays the one before.
+  /// The scene of `json`, loaded. It is valid until the next call. If the call throws, the scene, and its picture, stay
+  /// those before: where the field changes, both fields are in memory for a moment.
   /// @param outputs  Names of files whose kinds the render makes (".png" and others). They are not written.
   /// @throw As read_scene and load_scene.
   const Scene& load(const Json& json, const std::vector<std::filesystem::path>& outputs, const Progress& progress);

@@ -63,9 +63,10 @@ class PageSocket : public std::enable_shared_from_this<PageSocket> {
       waiting_bytes_ -= waiting->data.size();
       queue_.erase(waiting);
     }
+    // What waited before counts: one message, such as a large picture, may have any size.
+    if (waiting_bytes_ > Server::most_waiting_bytes) return beast::get_lowest_layer(socket_).close();
     waiting_bytes_ += message.data.size();
     queue_.push_back(std::move(message));
-    if (waiting_bytes_ > Server::most_waiting_bytes) return beast::get_lowest_layer(socket_).close();
     if (!writes_) write();
   }
 

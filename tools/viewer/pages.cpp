@@ -171,7 +171,13 @@ Pages::PagePointer Pages::next_page() {
 }
 
 void Pages::work() {
-  while (const PagePointer page = next_page()) serve(page);
+  while (const PagePointer page = next_page()) {
+    try {
+      serve(page);
+    } catch (...) {  // There was no memory even for the message of an error: the page gets nothing, others go on.
+      page->stages.clear();
+    }
+  }
 }
 
 void Pages::serve(const PagePointer& page) {

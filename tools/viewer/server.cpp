@@ -52,11 +52,11 @@ Server::State::State(const ServerSettings& s, Pages& p) : settings(s), pages(p),
 }
 
 std::optional<std::string> Server::State::path_of(const HttpRequest& request) const {
-  const beast::string_view target = request.target();
-  const std::size_t end = target.find('/', 1);
-  if (target.empty() || target[0] != '/' || end == beast::string_view::npos) return std::nullopt;
+  const beast::string_view whole = request.target(), target = whole.substr(0, whole.find('?'));
+  const std::size_t end = std::min(target.find('/', 1), target.size());
+  if (target.empty() || target[0] != '/') return std::nullopt;
   if (!same_secret(target.substr(1, end - 1), settings.token)) return std::nullopt;
-  return std::string(target.substr(end + 1));
+  return end == target.size() ? no_slash : std::string(target.substr(end + 1));
 }
 
 bool Server::State::is_own_host(const HttpRequest& request) const {

@@ -30,7 +30,9 @@ class Server {
   struct State;
 
   static constexpr std::size_t most_connections = 64, most_pages = 8;
-  static constexpr std::size_t most_message_bytes = 1 << 20, most_waiting_bytes = 64 << 20;
+  static constexpr std::size_t most_message_bytes = 1 << 20;
+  /// A page that still has more than this to read when another message comes is closed.
+  static constexpr std::size_t most_waiting_bytes = 64 << 20;
 
   /// Listens. @throw std::runtime_error if the address or port cannot be had, or the page is not built;
   /// std::invalid_argument if the address is none.

@@ -34,7 +34,10 @@ struct Server::State {
   /// Reads the page's files. @throw std::runtime_error naming a file that is missing.
   State(const ServerSettings& settings, Pages& pages);
 
-  /// What follows the token in the path of a request; none if the token is wrong.
+  /// A path that ends with the token, which is no path of the page.
+  static constexpr const char* no_slash = "/";
+
+  /// What follows the token in the path of a request, without a query; none if the token is wrong.
   std::optional<std::string> path_of(const HttpRequest& request) const;
 
   bool is_own_host(const HttpRequest& request) const;

@@ -6,17 +6,26 @@
 
 #include <fcntl.h>
 #include <fmt/format.h>
-#include <unistd.h>
+
+#include "base/descriptor.h"
 
 namespace tensorray {
 namespace {
 
 constexpr std::size_t digits = 32;
 
+/// The folder that a variable of the environment names; empty if it names none. A relative path would be one of the
+/// working folder's, and counts as none (XDG Base Directory Specification).
+std::filesystem::path folder_of(const char* variable) {
+  const char* const text = std::getenv(variable);
+  const std::filesystem::path folder = text ? text : "";
+  return folder.is_absolute() ? folder : std::filesystem::path();
+}
+
 /// Empty if there is no such folder.
 std::filesystem::path state_folder() {
-  if (const char* state = std::getenv("XDG_STATE_HOME")) return std::filesystem::path(state) / "tensorray";
-  if (const char* home = std::getenv("HOME")) return std::filesystem::path(home) / ".local" / "state" / "tensorray";
+  if (const auto state = folder_of("XDG_STATE_HOME"); !state.empty()) return state / "tensorray";
+  if (const auto home = folder_of("HOME"); !home.empty()) return home / ".local" / "state" / "tensorray";
   return {};
 }
 
@@ -35,18 +44,17 @@ std::string random_token() {
 
 std::string token_of_user() {
   const std::filesystem::path folder = state_folder();
+  if (folder.empty()) return random_token();
+  const std::filesystem::path file = folder / "view-token";
   std::string token;
-  if (!folder.empty()) std::getline(std::ifstream(folder / "view-token") >> std::ws, token);
+  std::getline(std::ifstream(file) >> std::ws, token);
   if (is_token(token)) return token;
   token = random_token();
   std::error_code ignored;  // Without the file, the token is good for this run.
   std::filesystem::create_directories(folder, ignored);
-  const int file = open((folder / "view-token").c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0600);
-  if (file < 0) return token;
-  const std::string line = token + "\n";
-  if (write(file, line.data(), line.size()) != static_cast<ssize_t>(line.size()))
-    std::filesystem::remove(folder / "view-token", ignored);
-  close(file);
+  Descriptor written = open_file(file, O_WRONLY | O_CREAT | O_TRUNC, 0600);
+  const bool is_kept = written.is_open() && write_whole(written.get(), token + "\n") && written.close();
+  if (!is_kept) std::filesystem::remove(file, ignored);
   return token;
 }
 

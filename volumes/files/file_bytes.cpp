@@ -5,27 +5,18 @@
 #include <system_error>
 
 #include <fcntl.h>
-#include <unistd.h>
 
 #include "base/errors.h"
 
 namespace tensorray {
 
-FileBytes::FileBytes(const std::filesystem::path& path) : file_(open(path.c_str(), O_RDONLY | O_CLOEXEC)) {
-  if (file_ < 0) fail(path, "cannot be opened: " + std::generic_category().message(errno) + "; check the path");
+FileBytes::FileBytes(const std::filesystem::path& path) : file_(open_file(path, O_RDONLY)) {
+  if (!file_.is_open()) fail(path, "cannot be opened: " + std::generic_category().message(errno) + "; check the path");
   size_ = static_cast<std::int64_t>(std::filesystem::file_size(path));
 }
 
-FileBytes::~FileBytes() { close(file_); }
-
 bool FileBytes::read(std::int64_t at, void* bytes, std::size_t count) const {
-  for (std::size_t done = 0; done < count;) {
-    const ssize_t got =
-        pread(file_, static_cast<char*>(bytes) + done, count - done, static_cast<off_t>(at + std::int64_t(done)));
-    if (got <= 0) return false;
-    done += static_cast<std::size_t>(got);
-  }
-  return true;
+  return read_whole_at(file_.get(), bytes, count, static_cast<std::uint64_t>(at));
 }
 
 void ByteCursor::skip(std::int64_t bytes) {

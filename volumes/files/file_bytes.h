@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "base/byte_order.h"
+#include "base/descriptor.h"
 
 namespace tensorray {
 
@@ -15,9 +16,6 @@ class FileBytes {
  public:
   /// @throw std::runtime_error naming the file and the reason.
   explicit FileBytes(const std::filesystem::path& path);
-  ~FileBytes();
-  FileBytes(const FileBytes&) = delete;
-  FileBytes& operator=(const FileBytes&) = delete;
 
   std::int64_t size() const { return size_; }
 
@@ -25,7 +23,7 @@ class FileBytes {
   bool read(std::int64_t at, void* bytes, std::size_t count) const;
 
  private:
-  int file_ = -1;
+  Descriptor file_;
   std::int64_t size_ = 0;
 };
 

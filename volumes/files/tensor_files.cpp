@@ -15,6 +15,7 @@
 #include "base/text.h"
 #include "volumes/files/stored_field.h"
 #include "volumes/files/vdb_archive.h"
+#include "volumes/files/voxel_extent.h"
 #include "volumes/grids/page_memory.h"
 #include "volumes/tensors/finite_differences.h"
 
@@ -25,6 +26,9 @@ constexpr double greatest_half = 65504;
 
 /// More blocks than fit in any machine's memory. An active tile at the root of a tree would expand to as many.
 constexpr std::size_t greatest_block_count = std::size_t{1} << 25;
+
+/// What a field needs at least for a block, when its tensors are symmetric (TensorBrick).
+constexpr std::size_t least_brick_bytes = 14000;
 
 bool is_vector(const GridInfo& grid) { return grid.type == "vec3s" || grid.type == "vec3d"; }
 bool is_scalar(const GridInfo& grid) { return grid.type == "float" || grid.type == "double"; }
@@ -135,15 +139,20 @@ void with_tree(const openvdb::GridBase& grid, const Visit& visit) {
   if (grid.isType<DoubleGrid>()) visit(static_cast<const DoubleGrid&>(grid).tree());
 }
 
+Eigen::Vector3i index_of(const openvdb::Coord& at) { return {at.x(), at.y(), at.z()}; }
+
 template <class Tree>
-void add_tile_origins(const Tree& tree, std::vector<openvdb::Coord>& origins) {
+void add_tile_origins(const std::filesystem::path& path, const Tree& tree, std::vector<openvdb::Coord>& origins) {
   constexpr int size = TensorBlock::size;
   auto tile = tree.cbeginValueOn();
   tile.setMaxDepth(Tree::ValueOnCIter::LEAF_DEPTH - 1);
   for (; tile; ++tile) {
     openvdb::CoordBBox box;
     tile.getBoundingBox(box);
-    if (box.volume() / TensorBlock::voxels + origins.size() > greatest_block_count) throw std::bad_alloc();
+    require_extent(path, index_of(box.min()), index_of(box.max()));  // The loops below would overflow.
+    const std::size_t count = origins.size() + box.volume() / TensorBlock::voxels;
+    if (count > greatest_block_count) throw std::bad_alloc();
+    require_memory(path, count, sizeof(openvdb::Coord));
     for (int x = box.min().x(); x <= box.max().x(); x += size)
       for (int y = box.min().y(); y <= box.max().y(); y += size)
         for (int z = box.min().z(); z <= box.max().z(); z += size) origins.emplace_back(x, y, z);
@@ -151,14 +160,17 @@ void add_tile_origins(const Tree& tree, std::vector<openvdb::Coord>& origins) {
 }
 
 /// The origins of all blocks that have an active voxel, sorted.
-std::vector<openvdb::Coord> block_origins(const std::vector<Source>& sources) {
+std::vector<openvdb::Coord> block_origins(const std::filesystem::path& path, const std::vector<Source>& sources) {
   std::vector<openvdb::Coord> origins;
   for (const Source& source : sources)
     with_tree(*source.grid, [&](const auto& tree) {
       static_assert(std::decay_t<decltype(tree)>::LeafNodeType::DIM == TensorBlock::size, "leaves are blocks");
       for (auto leaf = tree.cbeginLeaf(); leaf; ++leaf)
-        if (!leaf->isEmpty()) origins.push_back(leaf->origin());
-      add_tile_origins(tree, origins);
+        if (!leaf->isEmpty()) {
+          require_extent(path, index_of(leaf->origin()), index_of(leaf->origin()));
+          origins.push_back(leaf->origin());
+        }
+      add_tile_origins(path, tree, origins);
     });
   std::sort(origins.begin(), origins.end());
   origins.erase(std::unique(origins.begin(), origins.end()), origins.end());
@@ -198,9 +210,10 @@ void put(SampleBlock& block, int offset, const Entry& entry, double value) {
 /// Appends the blocks (TensorBlock or SampleBlock) of all active voxels, including those of active tiles, and no
 /// others.
 template <class Blocks>
-void add_blocks(const std::vector<Source>& sources, Blocks& blocks) {
-  const std::vector<openvdb::Coord> origins = block_origins(sources);
+void add_blocks(const std::filesystem::path& path, const std::vector<Source>& sources, Blocks& blocks) {
+  const std::vector<openvdb::Coord> origins = block_origins(path, sources);
   const std::size_t first = blocks.size();
+  require_memory(path, first + origins.size(), sizeof(typename Blocks::value_type));
   Blocks::allocator_type::prepare(origins.size());
   blocks.resize(first + origins.size());
   tbb::parallel_for(std::size_t{0}, origins.size(), [&](std::size_t i) {
@@ -308,6 +321,7 @@ std::vector<openvdb::CoordBBox> slabs_of(const std::filesystem::path& path, cons
     const auto max = grid.getMetadata<openvdb::Vec3IMetadata>(GridBase::META_FILE_BBOX_MAX);
     if (!count || !min || !max)
       fail(path, "does not say how many voxels it has, which --memory needs; write it again with this program");
+    require_extent(path, {min->value().x(), 0, 0}, {max->value().x(), 0, 0});  // Slabs are counted by it.
     voxels = std::max(voxels, static_cast<double>(count->value()));
     first = std::min(first, min->value().x());
     last = std::max(last, max->value().x());
@@ -429,6 +443,8 @@ std::optional<BlockSource> open_tensor_vdb(const std::filesystem::path& path, co
   result.metadata = metadata_of(file->file.metadata, *sources.front().grid);
   result.shapes = find_blocks(*field);
   if (result.shapes.empty()) fail(path, "\"" + result.name + "\" has no active voxel");
+  for (const BlockShape& shape : result.shapes) require_extent(path, shape.origin, shape.origin);
+  require_memory(path, result.shapes.size(), least_brick_bytes);
   result.fill = [field](std::size_t i, TensorBlock& block) { fill_block(*field, i, block); };
   return result;
 }
@@ -459,14 +475,14 @@ TensorGrid read_tensor_vdb(const std::filesystem::path& path, const std::string&
   result.to_world = common_transform(path, sources);
   result.metadata = metadata_of(file.metadata, *sources.front().grid);
   const auto read = [&](auto& blocks) {
-    if (!is_bounded) return add_blocks(sources, blocks);
+    if (!is_bounded) return add_blocks(path, sources, blocks);
     for (const openvdb::CoordBBox& slab : slabs_of(path, sources, derives)) {
       sources.clear();
       file = {};  // Before the next one is read.
       malloc_trim(0);
       file = read_vdb(path, wanted, &slab);
       sources = sources_of(file, result.name, parts);
-      add_blocks(sources, blocks);
+      add_blocks(path, sources, blocks);
     }
   };
   try {

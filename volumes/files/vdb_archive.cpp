@@ -7,6 +7,7 @@
 #include <cstdint>
 #include <fstream>
 #include <stdexcept>
+#include <string_view>
 #include <system_error>
 #include <utility>
 
@@ -16,6 +17,7 @@
 #include <tbb/parallel_for.h>
 
 #include "base/byte_order.h"
+#include "base/content_hash.h"
 #include "base/errors.h"
 #include "base/text.h"
 #include "volumes/files/vdb_tree_check.h"
@@ -346,16 +348,15 @@ class Writer : private openvdb::io::Archive {
     std::string stored(tag.size(), ' ');
     file.seekg(tag_offset);
     file.read(&stored[0], static_cast<std::streamsize>(stored.size()));
-    if (stored != tag) return;  // The format is not the expected one.
-    std::uint64_t low = 14695981039346656037u, high = 1099511628211u;
+    if (stored != tag) return;        // The format is not the expected one.
+    std::uint64_t low = 0, high = 1;  // Two hashes of the same bytes, as a tag has 128 bits.
     std::vector<char> chunk(stream_buffer);
     for (std::streamoff at = file.tellg(); at < end; at += static_cast<std::streamoff>(chunk.size())) {
       chunk.resize(static_cast<std::size_t>(std::min<std::streamoff>(end - at, stream_buffer)));
       file.read(chunk.data(), static_cast<std::streamsize>(chunk.size()));
-      for (const char c : chunk) {  // Fowler–Noll–Vo; the other half of the hash adds a rotation.
-        low = (low ^ static_cast<unsigned char>(c)) * 1099511628211u;
-        high = (high << 5 | high >> 59) ^ low;
-      }
+      const std::string_view bytes(chunk.data(), chunk.size());
+      low = content_hash(bytes, low);
+      high = content_hash(bytes, high);
     }
     for (std::size_t i = 0, digit = 0; i < tag.size(); ++i)
       if (tag[i] != '-') {

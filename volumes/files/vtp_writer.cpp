@@ -12,9 +12,9 @@
 
 #include <fcntl.h>
 #include <tbb/parallel_for.h>
-#include <unistd.h>
 
 #include "base/byte_order.h"
+#include "base/descriptor.h"
 
 namespace tensorray {
 namespace {
@@ -54,15 +54,9 @@ void encode_base64(const char* bytes, std::size_t count, std::string& text) {
 
 class VtpWriter {
  public:
-  explicit VtpWriter(const std::filesystem::path& path)
-      : file_(open(path.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0666)) {
-    if (file_ < 0) fail();
+  explicit VtpWriter(const std::filesystem::path& path) : file_(open_file(path, O_WRONLY | O_CREAT | O_TRUNC)) {
+    if (!file_.is_open()) fail();
   }
-  ~VtpWriter() {
-    if (file_ >= 0) ::close(file_);
-  }
-  VtpWriter(const VtpWriter&) = delete;
-  VtpWriter& operator=(const VtpWriter&) = delete;
 
   void text(const std::string& text) {
     write(end_, text);
@@ -87,24 +81,17 @@ class VtpWriter {
   }
 
   void close() {
-    const int file = file_;
-    file_ = -1;
-    if (::close(file) != 0) fail();
+    if (!file_.close()) fail();
   }
 
  private:
   [[noreturn]] static void fail() { throw std::runtime_error(std::generic_category().message(errno)); }
 
   void write(std::size_t at, const std::string& text) const {
-    for (std::size_t done = 0; done < text.size();) {
-      const ssize_t written = pwrite(file_, text.data() + done, text.size() - done, static_cast<off_t>(at + done));
-      if (written < 0 && errno == EINTR) continue;
-      if (written < 0) fail();
-      done += static_cast<std::size_t>(written);
-    }
+    if (!write_whole_at(file_.get(), text, at)) fail();
   }
 
-  int file_;
+  Descriptor file_;
   std::size_t end_ = 0;
 };
 

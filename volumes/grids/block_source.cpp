@@ -20,12 +20,14 @@ std::bitset<TensorBlock::voxels> voxels_within(const Eigen::Vector3i& origin, co
 
 /// The shapes of the blocks of a dense grid.
 std::vector<BlockShape> dense_shapes(const Eigen::AlignedBox3i& box) {
-  const Eigen::Vector3i first = box.min().unaryExpr([](int index) { return index - (index & (size - 1)); });
+  // Blocks are counted, and not their voxels: the index after the last voxel may be none.
+  const auto block_of = [](int index) { return (index - (index & (size - 1))) / size; };
+  const Eigen::Vector3i first = box.min().unaryExpr(block_of), last = box.max().unaryExpr(block_of);
   std::vector<BlockShape> shapes;
-  for (int x = first.x(); x <= box.max().x(); x += size)
-    for (int y = first.y(); y <= box.max().y(); y += size)
-      for (int z = first.z(); z <= box.max().z(); z += size)
-        shapes.push_back({{x, y, z}, voxels_within({x, y, z}, box)});
+  for (int x = first.x(); x <= last.x(); ++x)
+    for (int y = first.y(); y <= last.y(); ++y)
+      for (int z = first.z(); z <= last.z(); ++z)
+        shapes.push_back({size * Eigen::Vector3i(x, y, z), voxels_within(size * Eigen::Vector3i(x, y, z), box)});
   return shapes;
 }
 

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cerrno>
 #include <chrono>
 #include <cstdint>
 #include <cstdlib>
@@ -10,6 +11,7 @@
 #include <new>
 #include <stdexcept>
 #include <string>
+#include <system_error>
 #include <thread>
 
 #include <fcntl.h>
@@ -17,6 +19,8 @@
 #include <sys/statvfs.h>
 #include <unistd.h>
 
+#include "base/descriptor.h"
+#include "base/temporary_folder.h"
 #include "base/text.h"
 
 namespace tensorray {
@@ -29,19 +33,19 @@ constexpr double high = 0.75, low = 0.55;  ///< Parts of the bound: pages are dr
 
 /// What is resident of this process.
 std::size_t resident() {
-  static const int file = open("/proc/self/statm", O_RDONLY | O_CLOEXEC);
+  static const Descriptor file = open_file("/proc/self/statm", O_RDONLY);
   std::array<char, 128> text{};
-  if (pread(file, text.data(), text.size() - 1, 0) <= 0) return 0;
+  if (pread(file.get(), text.data(), text.size() - 1, 0) <= 0) return 0;
   char* second = nullptr;
   std::strtoull(text.data(), &second, 10);
   return std::strtoull(second, nullptr, 10) * static_cast<std::size_t>(sysconf(_SC_PAGESIZE));
 }
 
-int open_nameless(const std::filesystem::path& folder) {
-  std::string name = (folder / ".tensorray-XXXXXX").string();
-  const int file = mkostemp(name.data(), O_CLOEXEC);
-  if (file < 0) throw std::runtime_error("--memory: no file for the field can be made in " + folder.string());
-  unlink(name.c_str());
+Descriptor open_nameless(const std::filesystem::path& folder) {
+  Descriptor file = open_unnamed(folder);
+  if (!file.is_open())
+    throw std::runtime_error("--memory: no file for the field can be made in " + folder.string() + ": " +
+                             std::generic_category().message(errno));
   return file;
 }
 
@@ -55,8 +59,9 @@ class PageStore {
 
   double free_bytes() const {
     struct statvfs status {};
-    return fstatvfs(file_, &status) == 0 ? static_cast<double>(status.f_bavail) * static_cast<double>(status.f_frsize)
-                                         : 0;
+    return fstatvfs(file_.get(), &status) == 0
+               ? static_cast<double>(status.f_bavail) * static_cast<double>(status.f_frsize)
+               : 0;
   }
 
   const std::filesystem::path& folder() const { return folder_; }
@@ -76,10 +81,10 @@ class PageStore {
                                ": what is beside the field takes " + bytes_text(static_cast<double>(resident())) +
                                "; give more");
     // The disk must have the space now: a page that cannot be stored would end the process.
-    if (posix_fallocate(file_, end_, static_cast<off_t>(bytes)) != 0)
+    if (posix_fallocate(file_.get(), end_, static_cast<off_t>(bytes)) != 0)
       throw std::runtime_error("--memory: the disk of " + folder_.string() + " has no space for " +
                                bytes_text(static_cast<double>(bytes)) + " more of the field");
-    if (mmap(memory, bytes, PROT_READ | PROT_WRITE, MAP_SHARED | MAP_FIXED, file_, end_) == MAP_FAILED)
+    if (mmap(memory, bytes, PROT_READ | PROT_WRITE, MAP_SHARED | MAP_FIXED, file_.get(), end_) == MAP_FAILED)
       throw std::bad_alloc();
     regions_[memory] = {bytes, end_};
     end_ += static_cast<off_t>(bytes);
@@ -92,7 +97,7 @@ class PageStore {
     if (region == regions_.end()) return;
     constexpr int hole = FALLOC_FL_PUNCH_HOLE | FALLOC_FL_KEEP_SIZE;
     const auto size = static_cast<off_t>(region->second.bytes);
-    static_cast<void>(fallocate(file_, hole, region->second.offset, size));
+    static_cast<void>(fallocate(file_.get(), hole, region->second.offset, size));
     regions_.erase(region);
   }
 
@@ -130,7 +135,7 @@ class PageStore {
 
   const std::size_t bound_;
   const std::filesystem::path folder_;
-  const int file_;
+  const Descriptor file_;
   std::mutex mutex_;
   std::map<char*, Region> regions_;
   off_t end_ = 0;

@@ -19,6 +19,8 @@
 #include "base/temporary_folder.h"
 #include "base/text.h"
 #include "tools/command_line/progress_bar.h"
+#include "tools/command_line/tell.h"
+#include "tools/command_line/threads.h"
 #include "tools/command_line/vdb_output.h"
 #include "tools/import/import_file.h"
 #include "tools/import/program/child_process.h"
@@ -77,35 +79,36 @@ void print_lattice(const LatticeReport& report) {
   const auto percent = [&](std::size_t count) {
     return 100.0 * static_cast<double>(count) / static_cast<double>(report.voxels);
   };
-  fmt::print("  voxels as they were: {} of {} active ({:.1f}%); {} background, {} not finite\n", report.active,
-             report.voxels, percent(report.active), report.background, report.non_finite);
+  tell_made(fmt::format("  voxels as they were: {} of {} active ({:.1f}%); {} background, {} not finite", report.active,
+                        report.voxels, percent(report.active), report.background, report.non_finite));
 }
 
 void print_sampling(const ImportReport& report) {
   const SamplingReport& mesh = *report.mesh;
-  fmt::print("  sampled from {} cells at {} x {} x {} voxels of {:.4g} x {:.4g} x {:.4g}; {} active\n",
-             report.mesh_cells, mesh.size.x(), mesh.size.y(), mesh.size.z(), mesh.voxel.x(), mesh.voxel.y(),
-             mesh.voxel.z(), mesh.active);
-  fmt::print("  norm of the tensor, mesh -> grid: peak {:.4g} -> {:.4g}, median {:.4g} -> {:.4g}\n", mesh.native_peak,
-             mesh.sampled_peak, mesh.native_median, mesh.sampled_median);
-  if (mesh.non_finite_points > 0) fmt::print("  {} points of the mesh are not finite\n", mesh.non_finite_points);
+  tell_made(fmt::format("  sampled from {} cells at {} x {} x {} voxels of {:.4g} x {:.4g} x {:.4g}; {} active",
+                        report.mesh_cells, mesh.size.x(), mesh.size.y(), mesh.size.z(), mesh.voxel.x(), mesh.voxel.y(),
+                        mesh.voxel.z(), mesh.active));
+  tell_made(fmt::format("  norm of the tensor, mesh -> grid: peak {:.4g} -> {:.4g}, median {:.4g} -> {:.4g}",
+                        mesh.native_peak, mesh.sampled_peak, mesh.native_median, mesh.sampled_median));
+  if (mesh.non_finite_points > 0)
+    tell_made(fmt::format("  {} points of the mesh are not finite", mesh.non_finite_points));
   if (mesh.sampled_peak < kept_peak * mesh.native_peak) {
-    std::fflush(stdout);
-    fmt::print(stderr,
-               "tensorray: warning: the grid holds {:.0f}% of the mesh's peak norm; a larger --resolution, or --bounds "
-               "around what matters, holds more\n",
-               100 * mesh.sampled_peak / mesh.native_peak);
+    tell({fmt::format(
+             "tensorray: warning: the grid holds {:.0f}% of the mesh's peak norm; a larger --resolution, or --bounds "
+             "around what matters, holds more",
+             100 * mesh.sampled_peak / mesh.native_peak)},
+         false);
   }
 }
 
 /// Progress as a line of phase, done and total, for a program that has started this one.
 void tell_progress(const std::string& phase, std::uint64_t done, std::uint64_t total) {
-  fmt::print("{}\t{}\t{}\n", phase, done, total);
-  std::fflush(stdout);
+  tell_made(fmt::format("{}\t{}\t{}", phase, done, total));
 }
 
 /// The work of the child: everything except giving the files their final names.
 void import_to(const ImportOptions& options, const ImportSettings& settings, OutputFile& output, Progress& progress) {
+  const Threads threads;
   if (options.memory > 0) bound_memory(options.memory, std::filesystem::absolute(options.output).parent_path());
   ImportReport report;
   std::optional<ProgressBar> bar(std::in_place, progress, options.quiet);
@@ -119,12 +122,14 @@ void import_to(const ImportOptions& options, const ImportSettings& settings, Out
   const Eigen::Vector3i size = grid.active_box().sizes() + Eigen::Vector3i::Ones();
   output.write([&](const std::filesystem::path& path) { write_tensor_vdb(path, grid, options.half); });
   bar.reset();
-  fmt::print("{}: field \"{}\", {} x {} x {} voxels, {}\n", options.output.string(), escaped(name), size.x(), size.y(),
-             size.z(), bytes_text(static_cast<double>(std::filesystem::file_size(output.path()))));
+  tell_made(fmt::format("{}: field \"{}\", {} x {} x {} voxels, {}", options.output.string(), escaped(name), size.x(),
+                        size.y(), size.z(),
+                        bytes_text(static_cast<double>(std::filesystem::file_size(output.path())))));
   if (report.lattice) print_lattice(*report.lattice);
   if (report.mesh) print_sampling(report);
   if (report.boundary_triangles > 0)
-    fmt::print("{}: the body's surface, {} triangles\n", options.boundary.string(), report.boundary_triangles);
+    tell_made(
+        fmt::format("{}: the body's surface, {} triangles", options.boundary.string(), report.boundary_triangles));
 }
 
 void check_files(const ImportOptions& options, const std::vector<std::filesystem::path>& read) {

@@ -11,11 +11,11 @@
 #include <string>
 
 #include <CLI/CLI.hpp>
-#include <fmt/format.h>
 
 #include "base/child_program.h"
 #include "tools/command_line/interrupts.h"
 #include "tools/command_line/run_and_report.h"
+#include "tools/command_line/tell.h"
 #include "tools/import/program/import_command.h"
 #include "tools/import/vtk/vtp_files.h"
 
@@ -31,9 +31,9 @@ int convert(int argc, char** argv) {
     tensorray::write_poly_data(argv[2], view_of(data));
     return 0;
   } catch (const std::bad_alloc&) {
-    fmt::print(stderr, "it does not fit in memory\n");
+    tensorray::print_error("it does not fit in memory\n");
   } catch (const std::exception& error) {
-    fmt::print(stderr, "{}\n", error.what());
+    tensorray::print_error(std::string(error.what()) + "\n");
   }
   return 1;
 }
@@ -41,6 +41,7 @@ int convert(int argc, char** argv) {
 }  // namespace
 
 int main(int argc, char** argv) {
+  tensorray::open_standard_streams();
   const std::string first = argc > 1 ? argv[1] : "";
   if (first == "--read-vtp") return convert(argc, argv);
   tensorray::Progress& progress = tensorray::progress_until_interrupted();

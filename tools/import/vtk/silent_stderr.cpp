@@ -10,19 +10,17 @@ namespace tensorray {
 SilentStderr::SilentStderr() {
 #ifndef __SANITIZE_ADDRESS__
   std::fflush(stderr);
-  const int nowhere = open("/dev/null", O_WRONLY | O_CLOEXEC);
-  if (nowhere < 0) return;
-  kept_ = fcntl(STDERR_FILENO, F_DUPFD_CLOEXEC, 3);
-  if (kept_ >= 0) dup2(nowhere, STDERR_FILENO);
-  close(nowhere);
+  const Descriptor nowhere = open_file("/dev/null", O_WRONLY);
+  if (!nowhere.is_open()) return;
+  kept_ = Descriptor(fcntl(STDERR_FILENO, F_DUPFD_CLOEXEC, 3));
+  if (kept_.is_open()) dup2(nowhere.get(), STDERR_FILENO);
 #endif
 }
 
 SilentStderr::~SilentStderr() {
-  if (kept_ < 0) return;
+  if (!kept_.is_open()) return;
   std::fflush(stderr);
-  dup2(kept_, STDERR_FILENO);
-  close(kept_);
+  dup2(kept_.get(), STDERR_FILENO);
 }
 
 }  // namespace tensorray

@@ -2,6 +2,8 @@
 /// @file tools/import/vtk/silent_stderr.h
 /// Silences standard error, because netCDF and the C++ runtime write to it directly. Private to the importer.
 
+#include "base/descriptor.h"
+
 namespace tensorray {
 
 /// Until it is destroyed, drops everything that the process writes to standard error. (It does nothing in a program
@@ -14,7 +16,7 @@ class SilentStderr {
   SilentStderr& operator=(const SilentStderr&) = delete;
 
  private:
-  int kept_ = -1;
+  Descriptor kept_;
 };
 
 }  // namespace tensorray

@@ -2,21 +2,25 @@
 /// The program `tensorray-view`: a web server for the live view. `tensorray view` starts it.
 
 #include <algorithm>
+#include <cerrno>
+#include <cstdio>
 #include <filesystem>
 #include <optional>
+#include <stdexcept>
 #include <string>
-#include <thread>
+#include <system_error>
 #include <vector>
 
 #include <CLI/CLI.hpp>
 #include <fmt/format.h>
-#include <tbb/global_control.h>
 
 #include "base/child_program.h"
 #include "renderer/images/image.h"
 #include "tools/command_line/interrupts.h"
 #include "tools/command_line/progress_bar.h"
 #include "tools/command_line/run_and_report.h"
+#include "tools/command_line/tell.h"
+#include "tools/command_line/threads.h"
 #include "tools/viewer/pages.h"
 #include "tools/viewer/server.h"
 #include "tools/viewer/token.h"
@@ -70,9 +74,8 @@ Server listen(const ViewOptions& options, Pages& pages) {
 }
 
 void view(ViewOptions options, Progress& progress) {
-  const unsigned threads = options.threads > 0 ? options.threads : std::max(1u, std::thread::hardware_concurrency());
-  const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, threads);
-  set_image_threads(static_cast<int>(threads));
+  const Threads threads(options.threads);
+  set_image_threads(static_cast<int>(running_threads()));
   if (options.viewed.copy.empty()) options.viewed.copy = default_copy(options.viewed.file);
   require_same_folder(options.viewed);
   options.server.token = token_of_user();
@@ -84,13 +87,16 @@ void view(ViewOptions options, Progress& progress) {
   Server server = listen(options, pages);
   fmt::print("{}\n", server.url());
   if (!options.quiet) fmt::print("Open this address in a browser. Ctrl-C ends the view.\n");
-  std::fflush(stdout);
+  if (std::fflush(stdout) != 0)
+    throw std::runtime_error("the address cannot be written to standard output: " +
+                             std::generic_category().message(errno));
   server.run(progress);
 }
 
 }  // namespace
 
 int main(int argc, char** argv) {
+  open_standard_streams();
   Progress& progress = progress_until_interrupted();
   ViewOptions options;
   CLI::App app("Look at a scene in a browser and change it there: the picture follows", "tensorray view");

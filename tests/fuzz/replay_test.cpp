@@ -1,0 +1,52 @@
+// Bytes that broke a parser once, and some that are right (corpus/): none may end the process, or throw what is no
+// error of a reader. Beside each, what its cut-off beginnings give.
+
+#include <filesystem>
+#include <fstream>
+#include <iterator>
+#include <set>
+
+#include <gtest/gtest.h>
+
+#include "tests/data_folder.h"
+#include "tests/fuzz/targets.h"
+
+namespace tensorray::test {
+namespace {
+
+std::filesystem::path corpus() { return source_folder() / "tests" / "fuzz" / "corpus"; }
+
+std::string bytes_of(const std::filesystem::path& file) {
+  std::ifstream stream(file, std::ios::binary);
+  return {std::istreambuf_iterator<char>(stream), {}};
+}
+
+class Replay : public ::testing::TestWithParam<std::size_t> {};
+
+TEST_P(Replay, NoBytesBreakAParser) {
+  const FuzzTarget& target = fuzz_targets()[GetParam()];
+  std::size_t files = 0;
+  for (const auto& entry : std::filesystem::directory_iterator(corpus() / target.name)) {
+    const std::string bytes = bytes_of(entry.path());
+    ++files;
+    EXPECT_NO_THROW(target.read(bytes)) << entry.path();
+    constexpr std::size_t cuts = 64;
+    for (std::size_t i = 0; i < cuts; ++i)
+      EXPECT_NO_THROW(target.read(bytes.substr(0, bytes.size() * i / cuts))) << entry.path() << " " << i;
+  }
+  EXPECT_GT(files, 0u) << target.name;
+}
+
+INSTANTIATE_TEST_SUITE_P(Targets, Replay, ::testing::Range(std::size_t{0}, fuzz_targets().size()),
+                         [](const auto& test) { return std::string(fuzz_targets()[test.param].name); });
+
+/// A folder that belongs to no target is replayed by none.
+TEST(FuzzCorpus, BelongsToTargets) {
+  std::set<std::string> names;
+  for (const FuzzTarget& target : fuzz_targets()) names.insert(target.name);
+  for (const auto& entry : std::filesystem::directory_iterator(corpus()))
+    EXPECT_EQ(names.count(entry.path().filename().string()), 1u) << entry.path();
+}
+
+}  // namespace
+}  // namespace tensorray::test

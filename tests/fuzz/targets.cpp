@@ -1,0 +1,156 @@
+#include "tests/fuzz/targets.h"
+
+#include <cstdint>
+#include <new>
+#include <sstream>
+#include <stdexcept>
+
+#include <fcntl.h>
+#include <sys/mman.h>
+
+#include "base/descriptor.h"
+#include "base/path_text.h"
+#include "integrators/paths/path_formats.h"
+#include "integrators/paths/seed_files.h"
+#include "renderer/color/spectrum.h"
+#include "renderer/surfaces/ply.h"
+#include "scenes/jobs/work_file.h"
+#include "scenes/keys/frames.h"
+#include "scenes/keys/json_reader.h"
+#include "scenes/keys/overrides.h"
+#include "scenes/pipeline/read_scene.h"
+#include "tools/import/lattices/lattice_files.h"
+#include "tools/import/vtk/netcdf_size.h"
+#include "tools/import/vtk/plot3d_layout.h"
+#include "volumes/files/file_bytes.h"
+#include "volumes/files/vdb_tree_check.h"
+
+namespace tensorray::test {
+namespace {
+
+/// A file in memory, with a path.
+class MemoryFile {
+ public:
+  explicit MemoryFile(const std::string& bytes) : file_(memfd_create("fuzz", MFD_CLOEXEC)) {
+    if (!write_whole(file_.get(), bytes)) throw std::bad_alloc();
+  }
+  std::filesystem::path path() const { return "/proc/self/fd/" + std::to_string(file_.get()); }
+
+ private:
+  Descriptor file_;
+};
+
+/// Calls `read`. Errors of the kinds that readers report are fine, if they are one line.
+template <class Read>
+void expect_one_line(const Read& read) {
+  try {
+    read();
+  } catch (const std::runtime_error& error) {
+    if (std::string(error.what()).find('\n') != std::string::npos) throw std::logic_error(error.what());
+  } catch (const std::invalid_argument& error) {
+    if (std::string(error.what()).find('\n') != std::string::npos) throw std::logic_error(error.what());
+  }
+}
+
+template <class Read>
+void read_file(const std::string& bytes, const Read& read) {
+  const MemoryFile file(bytes);
+  expect_one_line([&] { read(file.path()); });
+}
+
+void read_scene_file(const std::string& bytes) {
+  read_file(bytes, [](const std::filesystem::path& path) { read_scene_json(read_json_object(path), "scene.json"); });
+}
+
+/// Lines of KEY=VALUE.
+void read_overrides(const std::string& bytes) {
+  Json scene = Json::object();
+  std::istringstream lines(bytes);
+  for (std::string line; std::getline(lines, line);) expect_one_line([&] { apply_override(scene, line); });
+  expect_one_line([&] { set_frame(scene, 7, {"scene.json"}); });
+  expect_one_line([&] { read_scene_json(scene, "scene.json"); });
+}
+
+void read_frames(const std::string& bytes) {
+  expect_one_line([&] { parse_frames(bytes); });
+  numbered(bytes, 7);
+  if (bytes_of_utf8(utf8_of(bytes)) != bytes) throw std::logic_error("a path does not come back");
+}
+
+void read_seeds_and_spectrum(const std::string& bytes) {
+  read_file(bytes, [](const std::filesystem::path& path) { read_seeds(path); });
+  read_file(bytes, [](const std::filesystem::path& path) { read_spectrum(path); });
+}
+
+void read_kept_work(const std::string& bytes) {
+  read_file(bytes, [](const std::filesystem::path& path) { read_work(path); });
+}
+
+void read_ply_mesh(const std::string& bytes) {
+  read_file(bytes, [](const std::filesystem::path& path) { read_ply(path); });
+}
+
+void read_tck(const std::string& bytes) {
+  read_file(bytes, [](const std::filesystem::path& path) { read_tck_paths(path); });
+}
+
+/// The values of all slices, too.
+void read_npy(const std::string& bytes) {
+  read_file(bytes, [](const std::filesystem::path& path) {
+    const Lattice lattice = open_npy(path);
+    std::vector<double> values(static_cast<std::size_t>(lattice.size.x()) * static_cast<std::size_t>(lattice.size.y()) *
+                               static_cast<std::size_t>(lattice.components));
+    for (int z = lattice.size.z() - 1; z >= 0; --z) lattice.read_slice(z, values.data());
+  });
+}
+
+void read_nrrd(const std::string& bytes) {
+  read_file(bytes, [](const std::filesystem::path& path) { open_nrrd(path); });
+}
+
+void read_nifti(const std::string& bytes) {
+  read_file(bytes, [](const std::filesystem::path& path) { open_nifti(path); });
+}
+
+void read_plot3d(const std::string& bytes) {
+  read_file(bytes, [](const std::filesystem::path& path) {
+    const Plot3dLayout layout = plot3d_grid_layout(path);
+    plot3d_q_layout(path, layout.size);
+  });
+}
+
+void read_netcdf(const std::string& bytes) {
+  read_file(bytes, [](const std::filesystem::path& path) { netcdf_size(path); });
+}
+
+/// The first byte chooses how the file stores its tree.
+void read_vdb_tree(const std::string& bytes) {
+  if (bytes.empty()) return;
+  const char* const types[] = {"Tree_vec3s_5_4_3", "Tree_float_5_4_3", "Tree_double_5_4_3", "Tree_vec3d_5_4_3"};
+  const auto choice = static_cast<unsigned char>(bytes[0]);
+  const StoredTree tree{types[choice & 3], (choice & 4) != 0, (choice & 8) != 0, (choice & 16) != 0,
+                        (choice & 32) != 0};
+  const MemoryFile file(bytes.substr(1));
+  const FileBytes content(file.path());
+  StoredLeaves leaves;
+  tree_fits(content, 0, tree, leaves);
+}
+
+void read_vdb_table(const std::string& bytes) {
+  if (delayed_load_fits(bytes, std::int64_t{1} << 30)) read_leaf_table(bytes);
+}
+
+}  // namespace
+
+const std::vector<FuzzTarget>& fuzz_targets() {
+  static const std::vector<FuzzTarget> targets{{"scene", read_scene_file},  {"override", read_overrides},
+                                               {"frames", read_frames},     {"text", read_seeds_and_spectrum},
+                                               {"work", read_kept_work},    {"ply", read_ply_mesh},
+                                               {"tck", read_tck},           {"npy", read_npy},
+                                               {"nrrd", read_nrrd},         {"nifti", read_nifti},
+                                               {"plot3d", read_plot3d},     {"netcdf", read_netcdf},
+                                               {"vdb_tree", read_vdb_tree}, {"vdb_table", read_vdb_table}};
+  return targets;
+}
+
+}  // namespace tensorray::test

@@ -1,0 +1,20 @@
+#pragma once
+/// @file tests/fuzz/targets.h
+/// The parsers that are ours, each as a function of any bytes. A fuzzer looks for bytes that break them (fuzzer.cpp);
+/// the bytes that broke them once, and some that are right, are in `corpus/NAME/`, and are a test (replay_test.cpp).
+
+#include <string>
+#include <vector>
+
+namespace tensorray::test {
+
+struct FuzzTarget {
+  const char* name;
+  /// Reads the bytes. An error that the reader reports is fine. @throw std::logic_error if it is not one line, or is no
+  /// kind of error that run_and_report puts into words; whatever else the reader throws.
+  void (*read)(const std::string& bytes);
+};
+
+const std::vector<FuzzTarget>& fuzz_targets();
+
+}  // namespace tensorray::test
