@@ -32,6 +32,7 @@ TEST(TensorOrder, NamesAreThoseOfTheirOrders) {
   EXPECT_EQ(tensor_order_of("fsl"), TensorOrder::fsl);
   EXPECT_EQ(tensor_order_of("mrtrix"), TensorOrder::mrtrix);
   EXPECT_EQ(tensor_order_of("voigt"), TensorOrder::voigt);
+  EXPECT_EQ(tensor_order_of("lower"), TensorOrder::lower_triangle);
   for (const std::string& name : tensor_order_names()) EXPECT_NO_THROW(tensor_order_of(name));
 }
 
@@ -41,7 +42,7 @@ TEST(TensorOrder, UnknownNamesAreErrorsThatListTheKnown) {
       ADD_FAILURE() << name;
     } catch (const std::invalid_argument& error) {
       EXPECT_EQ(std::string(error.what()),
-                "--order: unknown order \"" + name + "\"; there are vtk, fsl, mrtrix, voigt");
+                "--order: unknown order \"" + name + "\"; there are vtk, fsl, mrtrix, voigt, lower");
     }
 }
 

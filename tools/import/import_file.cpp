@@ -155,7 +155,7 @@ TensorGrid import_any(const ImportSettings& settings, const Progress& progress, 
   if (wants_sampling(settings))
     throw std::invalid_argument("has voxels of its own, which are kept: leave --resolution and --voxel-size out");
   Lattice lattice = open(file);
-  if (settings.lps) lattice.frame = Eigen::Vector3d(-1, -1, 1).asDiagonal() * lattice.frame;
+  if (settings.frame) take_frame(lattice, *settings.frame);
   return import_lattice(lattice, settings, report);
 }
 
@@ -181,10 +181,8 @@ TensorGrid import_tensors(const ImportSettings& settings, const Progress& progre
     throw std::invalid_argument(file.string() + ": says itself where it is, only .npy does not: leave --origin out");
   if (settings.voxel && lattice_reader(file) != open_npy)
     throw std::invalid_argument(file.string() + ": --voxel-size: only the voxels of .npy have three edges; give one");
-  if (settings.lps && (lattice_reader(file) != open_nifti || settings.order == TensorOrder::fsl))
-    throw std::invalid_argument(file.string() + (settings.order == TensorOrder::fsl
-                                                     ? ": --order fsl has a frame of its own: leave --frame out"
-                                                     : ": is no NIfTI file: leave --frame out"));
+  if (settings.frame && (!lattice_reader(file) || lattice_reader(file) == open_npy))
+    throw std::invalid_argument(file.string() + ": is not in an anatomical space: leave --frame out");
   progress.update("reading", 0, 1);
   TensorGrid grid;
   try {

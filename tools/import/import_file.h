@@ -24,7 +24,7 @@ struct ImportSettings {
   SamplingSettings sampling;
   std::optional<Eigen::Vector3d> voxel;   ///< Distances of voxels along x, y and z; of .npy only.
   std::optional<Eigen::Vector3d> origin;  ///< World position of the first voxel's centre; of .npy only.
-  bool lps = false;                       ///< The components are in LPS instead of RAS; of NIfTI only.
+  std::optional<ComponentFrame> frame;    ///< Axes of the components, where the file does not state them; of RAS files.
   std::optional<int> step;                ///< Of the steps of time, from 0 on; none: the last one.
   std::filesystem::path boundary;         ///< File for the surface of the body; empty: none.
 };

@@ -126,6 +126,8 @@ void require_room_for(const Lattice& lattice) {
 template <class Blocks, class ValueOf>
 void read_blocks(const Lattice& lattice, const ValueOf& value_of, Blocks& blocks, LatticeReport& report) {
   report = {};
+  report.notes = lattice.notes;
+  if (!lattice.frame_note.empty()) report.notes.push_back(lattice.frame_note);
   const auto slice_voxels = static_cast<std::size_t>(lattice.size.x()) * lattice.size.y();
   report.voxels = slice_voxels * lattice.size.z();
   require_room_for<typename Blocks::value_type>(lattice);
@@ -144,7 +146,7 @@ int unmasked(const Lattice& lattice) { return lattice.components - (lattice.mask
 TensorOrder order_of(const Lattice& lattice, const std::optional<TensorOrder>& order) {
   const int count = unmasked(lattice);
   if (order && (count == 9 || (lattice.order && *lattice.order != *order)))
-    throw std::invalid_argument(called(lattice) + " says its order itself: leave --order out");
+    throw std::invalid_argument(called(lattice) + " says its order itself: leave --order out (--frame says the axes)");
   if (count == 9) return TensorOrder::full;
   if (count == 3)
     throw std::invalid_argument(
@@ -161,6 +163,12 @@ TensorOrder order_of(const Lattice& lattice, const std::optional<TensorOrder>& o
   return *chosen;
 }
 
+Matrix3d frame_of(const Lattice& lattice, TensorOrder order) {
+  if (order == TensorOrder::fsl) return lattice.fsl_frame.value_or(lattice.frame);
+  if (order == TensorOrder::lower_triangle) return lattice.lower_frame.value_or(lattice.frame);
+  return lattice.frame;
+}
+
 TensorGrid empty_grid(const Lattice& lattice) {
   TensorGrid grid;
   grid.to_world = lattice.to_world;
@@ -170,9 +178,20 @@ TensorGrid empty_grid(const Lattice& lattice) {
 
 }  // namespace
 
+void take_frame(Lattice& lattice, ComponentFrame frame) {
+  if (!lattice.takes_frame)
+    throw std::invalid_argument(called(lattice) +
+                                " says itself in which axes its components are, or is not in an anatomical space: "
+                                "leave --frame out");
+  lattice.frame = axes_of(frame, lattice.to_world.linear());
+  lattice.fsl_frame.reset();
+  lattice.lower_frame.reset();
+  lattice.frame_note.clear();
+}
+
 TensorGrid tensors_of(const Lattice& lattice, const std::optional<TensorOrder>& order, LatticeReport& report) {
   const TensorOrder chosen = order_of(lattice, order);
-  const Matrix3d frame = chosen == TensorOrder::fsl && lattice.fsl_frame ? *lattice.fsl_frame : lattice.frame;
+  const Matrix3d frame = frame_of(lattice, chosen);
   TensorGrid grid = empty_grid(lattice);
   const auto tensor = [&](const double* components) -> Eigen::Matrix3f {
     const Matrix3d turned = frame * tensor_of(components, chosen) * frame.transpose();

@@ -33,12 +33,13 @@ Positions positions(TensorOrder order) {
 }  // namespace
 
 const std::vector<std::string>& tensor_order_names() {
-  static const std::vector<std::string> names = {"vtk", "fsl", "mrtrix", "voigt"};
+  static const std::vector<std::string> names = {"vtk", "fsl", "mrtrix", "voigt", "lower"};
   return names;
 }
 
 TensorOrder tensor_order_of(const std::string& name) {
-  constexpr std::array orders = {TensorOrder::vtk, TensorOrder::fsl, TensorOrder::mrtrix, TensorOrder::voigt};
+  constexpr std::array orders = {TensorOrder::vtk, TensorOrder::fsl, TensorOrder::mrtrix, TensorOrder::voigt,
+                                 TensorOrder::lower_triangle};
   const auto& names = tensor_order_names();
   const auto found = std::find(names.begin(), names.end(), name);
   if (found == names.end())

@@ -15,10 +15,10 @@ enum class TensorOrder {
   fsl,             ///< Six: xx xy xz yy yz zz. FSL, NRRD. OpenFOAM's files also use it, but VTK converts them to `vtk`.
   mrtrix,          ///< Six: xx yy zz xy xz yz. MRtrix.
   voigt,           ///< Six: xx yy zz yz xz xy. Continuum mechanics.
-  lower_triangle,  ///< Six: xx xy yy xz yz zz. NIfTI with the intent "symmetric matrix"; users cannot choose it.
+  lower_triangle,  ///< Six: xx xy yy xz yz zz. NIfTI with the intent "symmetric matrix" (ITK, ANTs), dipy, AFNI.
 };
 
-/// The names that users can choose: "vtk", "fsl", "mrtrix", "voigt".
+/// The names that users can choose: "vtk", "fsl", "mrtrix", "voigt", "lower".
 const std::vector<std::string>& tensor_order_names();
 
 /// @throw std::invalid_argument listing the names if `name` is unknown.

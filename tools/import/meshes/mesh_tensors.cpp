@@ -78,6 +78,7 @@ std::optional<TensorOrder> order_of_names(vtkDataArray& array) {
   if (names == "xxxyxzyyyzzz") return TensorOrder::fsl;
   if (names == "xxyyzzxyxzyz") return TensorOrder::mrtrix;
   if (names == "xxyyzzyzxzxy") return TensorOrder::voigt;
+  if (names == "xxxyyyxzyzzz") return TensorOrder::lower_triangle;
   return {};
 }
 

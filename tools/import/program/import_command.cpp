@@ -33,7 +33,7 @@ constexpr double kept_peak = 0.95;
 
 struct ImportOptions {
   ImportSettings settings;
-  std::string array, gradient_of, strain_of, order, frame = "ras";
+  std::string array, gradient_of, strain_of, order, frame;
   std::vector<int> resolution;
   std::vector<double> voxel_size, bounds, origin;
   std::filesystem::path output, boundary;
@@ -54,7 +54,7 @@ ImportSettings settings_of(const ImportOptions& options) {
     settings.take = Take::strain;
   }
   if (!options.order.empty()) settings.order = tensor_order_of(options.order);
-  settings.lps = options.frame == "lps";
+  if (!options.frame.empty()) settings.frame = component_frame_of(options.frame);
   if (options.voxel_size.size() == 1) settings.sampling.resolution = options.voxel_size[0];
   if (options.voxel_size.size() == 2) throw std::invalid_argument("--voxel-size needs one number, or three: x y z");
   if (options.voxel_size.size() == 3) settings.voxel = Eigen::Vector3d(options.voxel_size.data());
@@ -79,6 +79,7 @@ void print_lattice(const LatticeReport& report) {
   };
   fmt::print("  voxels as they were: {} of {} active ({:.1f}%); {} background, {} not finite\n", report.active,
              report.voxels, percent(report.active), report.background, report.non_finite);
+  for (const std::string& note : report.notes) fmt::print("  {}\n", note);
 }
 
 void print_sampling(const ImportReport& report) {
@@ -213,14 +214,16 @@ void add_what(CLI::App& command, ImportOptions& options) {
   command
       .add_option("--order", options.order,
                   "Order of six components: vtk (xx yy zz xy yz xz), fsl (xx xy xz yy yz zz), mrtrix (xx yy zz xy xz "
-                  "yz), voigt (xx yy zz yz xz xy)")
+                  "yz), voigt (xx yy zz yz xz xy), lower (xx xy yy xz yz zz)")
       ->check(CLI::IsMember(tensor_order_names()))
       ->option_text("ORDER");
   command
-      .add_option("--frame", options.frame,
-                  "Frame of a NIfTI file's vectors and tensors: ras, or lps, in which ITK and ANTs write displacements "
-                  "(ras)")
-      ->check(CLI::IsMember({"ras", "lps"}))
+      .add_option(
+          "--frame", options.frame,
+          "Axes of the components in anatomical files (NIfTI, NRRD): ras (scanner; MRtrix), lps (displacements of "
+          "ITK and ANTs), voxels (tensors of ANTs and dipy), fsl (voxels, with FSL's flip); default: those of "
+          "--order fsl and lower, else ras")
+      ->check(CLI::IsMember(component_frame_names()))
       ->option_text("FRAME");
   for (CLI::Option* option : command.get_options({}))
     if (option != command.get_help_ptr()) option->group("What to take");
