@@ -34,6 +34,7 @@ struct FieldDescription {
   std::string name;                             ///< Name of the field in the file; empty: the only field.
   std::optional<GenerateDescription> generate;  ///< Generated field, instead of a file.
   Derive derive = Derive::none;
+  ComponentGrids components;  ///< The grids that are the field's components; empty: found by their names.
   Eigenvalues eigenvalues = Eigenvalues::automatic;
   std::optional<double> scale;   ///< Factor on the flexibility; none: "auto".
   std::filesystem::path bounds;  ///< A closed mesh that cuts the volume; empty: none.
