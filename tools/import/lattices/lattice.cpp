@@ -151,11 +151,15 @@ TensorOrder order_of(const Lattice& lattice, const std::optional<TensorOrder>& o
   if (count == 3)
     throw std::invalid_argument(
         called(lattice) + " has three components, a vector: derive a tensor (--gradient-of), or choose another array");
-  if (count != 6 && count < 9)
+  if (count != 4 && count != 6 && count < 9)
     throw std::invalid_argument(fmt::format("{} has {} component{} and a tensor six or nine: choose another array",
                                             called(lattice), count, count == 1 ? "" : "s"));
-  const std::optional<TensorOrder> chosen = lattice.order ? lattice.order : order;
-  if (!chosen || *chosen == TensorOrder::full)
+  const std::optional<TensorOrder> chosen = lattice.order ? lattice.order : order ? order : lattice.usual_order;
+  if (count == 4 && (!chosen || component_count(*chosen) != 4))
+    throw std::invalid_argument(called(lattice) +
+                                " has four components of a tensor of a plane and does not say in which "
+                                "order: give it with --order plane|2x2");
+  if (!chosen || component_count(*chosen) != (count == 4 ? 4 : 6))
     throw std::invalid_argument(
         fmt::format("{} has six components of a symmetric tensor and does not say in which "
                     "order: give it with --order {}",

@@ -34,7 +34,8 @@ struct Lattice {
   bool masked = false;               ///< The first component is a mask: the voxel is inactive where it is below 0.5.
   bool zero_is_background = false;   ///< Voxels whose components are all exactly zero are inactive.
   std::optional<TensorOrder> order;  ///< Set where the format defines the order.
-  std::vector<std::string> notes;    ///< What the file leaves open, and how it was taken: for the user.
+  std::optional<TensorOrder> usual_order;  ///< Used where neither the format nor the user says it.
+  std::vector<std::string> notes;          ///< What the file leaves open, and how it was taken: for the user.
 
   /// Writes the numbers of slice `z` to `values`: x fastest, the components of a voxel side by side, size.x() *
   /// size.y() * components numbers in all. Called once for each z, from size.z() − 1 down to 0.

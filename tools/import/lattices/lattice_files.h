@@ -28,6 +28,16 @@ Lattice open_nrrd(const std::filesystem::path& path);
 /// slice by slice.
 Lattice open_nifti(const std::filesystem::path& path);
 
+/// Reads MetaImage (.mha, .mhd with its data file; ITK) with three axes and 6, 9 or 3 (a vector) channels. World is
+/// RAS, of the file's LPS. Components are in LPS unless the user gives the frame; six are xx xy xz yy yz zz unless the
+/// user gives the order. Exactly zero is background. Holds all numbers in memory.
+Lattice open_metaimage(const std::filesystem::path& path);
+
+/// Reads MRtrix's images (.mif, .mif.gz, .mih with its data file) with 6, 9 or 3 (a vector) volumes along the fourth
+/// axis. World is RAS millimetres. Six components are in the order `mrtrix` unless the user gives another one, in world
+/// axes but for the orders `fsl` and `lower`, as in NIfTI. Exactly zero is background. Holds all numbers in memory.
+Lattice open_mrtrix(const std::filesystem::path& path);
+
 /// Reads NumPy's .npy of shape (nz, ny, nx, 3, 3), (nz, ny, nx, 9), (nz, ny, nx, 6) or (nz, ny, nx, 3), in C or
 /// Fortran order, as float16, 32 or 64, in either byte order. World coordinates are the voxel indices (i, j, k), which
 /// the caller may scale and move.
