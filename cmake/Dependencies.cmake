@@ -32,7 +32,9 @@ endif()
 
 if(TENSORRAY_IMPORT)
   find_package(VTK REQUIRED COMPONENTS CommonCore CommonDataModel CommonExecutionModel FiltersCore FiltersGeneral
-               IOCGNSReader IOCore IOExodus IOGeometry IOLegacy IOParallelXML IOXML cgns)
+               IOCGNSReader IOCore IOEnSight IOExodus IOGeometry IOLegacy IOParallelXML IOXML cgns hdf5)
+
+  find_package(ZLIB REQUIRED)
 
   # The CMake packages of these two libraries do not work with Debian's other packages.
   find_path(Teem_INCLUDE_DIR teem/nrrd.h REQUIRED)

@@ -142,7 +142,7 @@ class Facet {
     const Vector2d b = corners_[1].start - corners_[0].start, c = corners_[2].start - corners_[0].start;
     Vector2d start = corners_[0].start + double{w[1]} * b + double{w[2]} * c;
     if (!is_curved_) return start;
-    const Vector2d back = (jacobian(w).inverse() * curve(w)).cast<double>();
+    const Vector2d back = jacobian(w).cast<double>().inverse() * curve(w).cast<double>();  // Its determinant: any size.
     if (back.squaredNorm() <= double{most_curvature * most_curvature} * std::abs(cross(b, c))) start -= back;
     return start;
   }
@@ -270,7 +270,7 @@ struct FlowView::TileSamples {
   int n;                    // Samples of a pixel along x and along y.
   const std::vector<char>& wanted;
   std::vector<FlowPoint>& points;
-  std::vector<float> distances;  // Squares, from straight light, of what the points show.
+  std::vector<double> distances;  // Squares, from straight light, of what the points show: world units, of any size.
 
   bool is_wanted(int x, int y) const {
     if (wanted.empty()) return true;
@@ -285,7 +285,7 @@ void FlowView::draw(int tile, int n, std::size_t node, const std::vector<char>& 
   const Eigen::AlignedBox2i samples(n * box.min(), n * (box.max() + Eigen::Vector2i(1, 1)) - Eigen::Vector2i(1, 1));
   const auto count = static_cast<std::size_t>((samples.sizes() + Eigen::Vector2i(1, 1)).prod());
   points.assign(count, FlowPoint());
-  TileSamples drawn{samples, n, wanted, points, std::vector<float>(count, std::numeric_limits<float>::infinity())};
+  TileSamples drawn{samples, n, wanted, points, std::vector<double>(count, std::numeric_limits<double>::infinity())};
   const Sorted& sorted = sorted_[node];
   for (std::uint32_t i = sorted.first_of_tile[tile]; i < sorted.first_of_tile[tile + 1]; ++i)
     draw_triangle(map_.triangles[sorted.triangles[i]], nodes_[node], drawn);
@@ -328,7 +328,7 @@ void FlowView::draw_triangle(const FlowTriangle& triangle, double node, TileSamp
     }
     const Vector2d other = picture_.side == FlowSide::starts ? facet.landing(weights) : facet.start(weights);
     ++point.sheets;
-    const auto distance = static_cast<float>((other - picture_.straight * Vector2d(sample / tile.n)).squaredNorm());
+    const double distance = (other - picture_.straight * Vector2d(sample / tile.n)).squaredNorm();
     if (!(distance < tile.distances[index])) return;
     tile.distances[index] = distance;
     point.end = RayEnd::plate;

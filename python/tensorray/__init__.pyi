@@ -42,6 +42,7 @@ def import_file(*files: _Path, array: Optional[str] = ..., gradient_of: Optional
                 resolution: Union[None, int, Sequence[int]] = ...,
                 voxel_size: Union[None, float, Sequence[float]] = ...,
                 origin: Optional[Sequence[float]] = ..., bounds: Optional[Sequence[float]] = ...,
+                thickness: Optional[float] = ...,
                 step: Union[None, int, str] = ..., boundary: Optional[_Path] = ..., name: Optional[str] = ...,
                 units: Optional[str] = ..., progress: _Progress = ...) -> Field: ...
 def invariant(field: Field, name: str, *, progress: _Progress = ...) -> NDArray[np.float32]: ...

@@ -123,8 +123,8 @@ def make(kind, resolution=None, *, min=None, max=None, progress=None, **paramete
 
 
 def import_file(*files, array=None, gradient_of=None, strain_of=None, order=None, frame=None, resolution=None,
-                voxel_size=None, origin=None, bounds=None, step=None, boundary=None, name=None, units=None,
-                progress=None):
+                voxel_size=None, origin=None, bounds=None, thickness=None, step=None, boundary=None, name=None,
+                units=None, progress=None):
     """Makes a field of other programs' files: VTK, ExodusII, CGNS, OpenFOAM, PLOT3D, NRRD, NIfTI, NumPy.
 
     files        One file, or several that belong together (a PLOT3D grid and its solution).
@@ -132,12 +132,13 @@ def import_file(*files, array=None, gradient_of=None, strain_of=None, order=None
                  commas: "sxx,syy,szz,sxy,syz,sxz"; default: the only array.
     gradient_of  Name of the velocity whose gradient is the tensor.
     strain_of    Name of the displacement whose strain is the tensor.
-    order        Order of six components: vtk, fsl, mrtrix or voigt.
-    frame        Frame of a NIfTI file's components: ras (the default) or lps (displacements of ITK and ANTs).
+    order        Order of six components: vtk, fsl, mrtrix, voigt or lower; of four of a plane: plane or 2x2.
+    frame        Axes of the components in a medical image: ras, lps, voxels or fsl; default: those of the order.
     resolution   Voxels along the longest edge, or along x, y and z; default: the median cell is a voxel.
     voxel_size   Edge of a voxel, world units; of .npy also three, along x, y and z.
     origin       World (x, y, z) of the centre of the first voxel of a .npy file; default: (0, 0, 0).
     bounds       Crop: (xmin, xmax, ymin, ymax, zmin, zmax).
+    thickness    Thickness of the slab that a flat mesh becomes; default: a typical edge of its cells.
     step         Step of time: a number from 1 on, "first" or "last" (the default).
     boundary     File.ply to write: the surface of the body that the mesh lies around, for `obstacles` of a scene.
     name, units  Name of the field (default: the array's), and units of the tensor.
@@ -152,7 +153,7 @@ def import_file(*files, array=None, gradient_of=None, strain_of=None, order=None
         raise RuntimeError(f"imports need {program}, which is not built; run `tools/setup release import`")
     options = {"--array": array, "--gradient-of": gradient_of, "--strain-of": strain_of, "--order": order,
                "--frame": frame, "--resolution": resolution, "--voxel-size": voxel_size, "--origin": origin,
-               "--bounds": bounds, "--steps": step, "--boundary": boundary, "--name": name, "--units": units}
+               "--bounds": bounds, "--thickness": thickness, "--steps": step, "--boundary": boundary, "--name": name, "--units": units}
     with tempfile.TemporaryDirectory() as folder:
         vdb = os.path.join(folder, "field.vdb")
         command = [program, "--tell-progress", "-q", "-o", vdb]

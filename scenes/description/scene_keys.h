@@ -27,6 +27,16 @@ namespace tensorray {
 constexpr double largest_exact_integer = 9007199254740992.0;
 
 template <class Visitor>
+void describe(ComponentGrids& grids, Visitor& visit) {
+  constexpr const char* entries[] = {"xx", "xy", "xz", "yx", "yy", "yz", "zx", "zy", "zz"};
+  constexpr const char* axes[] = {"x", "y", "z"};
+  for (std::size_t i = 0; i < 9; ++i)
+    visit(entries[i], grids.tensor[i], "name of the scalar grid that is this component of the tensor");
+  for (std::size_t i = 0; i < 3; ++i)
+    visit(axes[i], grids.vector[i], "name of the scalar grid that is this component of the vector to derive");
+}
+
+template <class Visitor>
 void describe(FieldDescription& field, Visitor& visit) {
   visit.exactly_one({"file", "generate"});
   visit("file", field.file, "OpenVDB file with the tensor field");
@@ -34,6 +44,9 @@ void describe(FieldDescription& field, Visitor& visit) {
   visit.generator("generate", field.generate, "an analytic field instead of a file");
   visit("derive", field.derive,
         "derivative that makes the tensor: gradient of a vector grid, hessian of a scalar grid");
+  visit.section("components", field.components,
+                "scalar grids of the file that are the components, whatever their names");
+  visit.exclude("components", {"generate"});
   visit("smooth", field.smooth, "standard deviation of a Gaussian that smooths the field first, voxels; 0 is none",
         between(0, greatest_smoothing));
   visit("eigenvalues", field.eigenvalues,

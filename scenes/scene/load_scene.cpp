@@ -35,7 +35,7 @@ auto generated(const SceneDescription& scene, const Make& make) {
 
 TensorGrid load_grid(const SceneDescription& scene) {
   const FieldDescription& field = scene.field;
-  if (!field.generate) return read_tensor_vdb(field.file, field.name, field.derive);
+  if (!field.generate) return read_tensor_vdb(field.file, field.name, field.derive, field.components);
   return generated(scene, generate);
 }
 
@@ -44,7 +44,7 @@ std::optional<BlockSource> load_blocks(const SceneDescription& scene) {
   const FieldDescription& field = scene.field;
   if (memory_bound() || field.smooth > 0) return std::nullopt;
   if (field.generate) return generated(scene, generator_source);
-  return field.derive == Derive::none ? open_tensor_vdb(field.file, field.name) : std::nullopt;
+  return field.derive == Derive::none ? open_tensor_vdb(field.file, field.name, field.components) : std::nullopt;
 }
 
 std::string source_of(const FieldDescription& field) {

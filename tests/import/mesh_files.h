@@ -13,7 +13,7 @@
 
 #include "tests/data_folder.h"
 
-namespace tensorray {
+namespace tensorray::test {
 
 /// A folder in the tests' temporary folder that no other process uses. Removed at the end.
 class TemporaryFolder : public std::filesystem::path {
@@ -27,6 +27,12 @@ class TemporaryFolder : public std::filesystem::path {
   TemporaryFolder(const TemporaryFolder&) = delete;
   TemporaryFolder& operator=(const TemporaryFolder&) = delete;
 };
+
+}  // namespace tensorray::test
+
+namespace tensorray {
+
+using test::TemporaryFolder;  // Not tensorray::TemporaryFolder itself, which the programs have, too.
 
 inline std::filesystem::path data_file(const std::string& name) { return test::data_folder() / name; }
 

@@ -227,15 +227,89 @@ TEST(Nifti, DisplacementsOfItkAreInLps) {
   ImportSettings settings;
   settings.files = {file};
   settings.take = Take::gradient;
-  settings.lps = true;
+  settings.frame = ComponentFrame::lps;
   ImportReport report;
   Matrix3d expected = Matrix3d::Zero();
   expected(0, 1) = -2;
   expected(1, 0) = -3;
   expected(2, 0) = 5;
   test::expect_near(expected, test::voxel(import_tensors(settings, Progress(), report), {2, 2, 2}));
-  settings.order = TensorOrder::fsl;
-  test::expect_error([&] { import_tensors(settings, Progress(), report); }, {"warp.nii", "--frame"});
+}
+
+/// A transform stored from left to right or from right to left, the six components of one tensor in the order, and the
+/// flags. What must come out, in RAS.
+struct FrameCase {
+  std::string name;
+  bool by_intent = false;
+  double first_axis = -2;  ///< Of the affine diag(., 2, 3).
+  std::optional<TensorOrder> order;
+  std::optional<ComponentFrame> frame;
+  double sign = 1;  ///< Of xy and xz in RAS.
+};
+
+TEST(Nifti, TheFrameAndTheOrderAreTwoThings) {
+  using Order = TensorOrder;
+  using Frame = ComponentFrame;
+  const std::vector<float> lower = {1, 0.2f, 0.6f, 0.1f, 0.05f, 0.3f}, upper = {1, 0.2f, 0.1f, 0.6f, 0.05f, 0.3f};
+  const std::vector<FrameCase> cases = {
+      {"intent alone: voxels", true, -2, {}, {}, -1},
+      {"intent alone, other side", true, 2, {}, {}, 1},
+      {"intent, voxels", true, -2, {}, Frame::voxels, -1},
+      {"intent, fsl", true, -2, {}, Frame::fsl, -1},
+      {"intent, fsl, other side: its flip", true, 2, {}, Frame::fsl, -1},
+      {"intent, ras", true, -2, {}, Frame::ras, 1},
+      {"intent, lps", true, -2, {}, Frame::lps, 1},  // the signs of xy cancel; xz changes, see below
+      {"intent and its order", true, -2, Order::lower_triangle, {}, -1},
+      {"lower alone: voxels", false, -2, Order::lower_triangle, {}, -1},
+      {"lower, ras", false, -2, Order::lower_triangle, Frame::ras, 1},
+      {"lower, fsl, other side", false, 2, Order::lower_triangle, Frame::fsl, -1},
+      {"fsl alone", false, -2, Order::fsl, {}, -1},
+      {"fsl alone, other side", false, 2, Order::fsl, {}, -1},
+      {"order of fsl in voxels", false, 2, Order::fsl, Frame::voxels, 1},
+      {"order of fsl in ras", false, -2, Order::fsl, Frame::ras, 1},
+  };
+  for (const FrameCase& one : cases) {
+    const Affine3d to_world(Eigen::Scaling(one.first_axis, 2.0, 3.0));
+    nifti_1_header header = header_of({1, 1, 1}, one.by_intent ? 1 : 6, to_world);
+    if (one.by_intent) header.dim[0] = 5, header.dim[5] = 6, header.intent_code = NIFTI_INTENT_SYMMATRIX;
+    const bool is_lower = one.by_intent || one.order == Order::lower_triangle;
+    const test::TemporaryFile file("frame.nii", file_of(header, test::bytes_of(is_lower ? lower : upper)));
+    ImportSettings settings;
+    settings.files = {file};
+    settings.order = one.order;
+    settings.frame = one.frame;
+    ImportReport report;
+    const TensorGrid grid = import_tensors(settings, Progress(), report);
+    const double xz = one.frame == Frame::lps ? -one.sign : one.sign, yz = one.frame == Frame::lps ? -1 : 1;
+    Matrix3d expected;
+    expected << 1, 0.2 * one.sign, 0.1 * xz, 0.2 * one.sign, 0.6, 0.05 * yz, 0.1 * xz, 0.05 * yz, 0.3;
+    SCOPED_TRACE(one.name);
+    test::expect_near(expected, test::voxel(grid, {0, 0, 0}));
+    EXPECT_EQ(!report.lattice->notes.empty(), one.by_intent && !one.frame);
+  }
+}
+
+TEST(Nifti, AnotherOrderThanThatOfTheIntentIsAnErrorThatNamesTheFrame) {
+  nifti_1_header header = header_of({1, 1, 1}, 1, Affine3d::Identity());
+  header.dim[0] = 5, header.dim[5] = 6, header.intent_code = NIFTI_INTENT_SYMMATRIX;
+  const test::TemporaryFile file("intent.nii", file_of(header, test::bytes_of(std::vector<float>(6, 1))));
+  test::expect_error([&] { test::tensors_of(open_nifti(file), "fsl"); }, {"--order", "--frame"});
+}
+
+TEST(Nifti, FilesWithoutAnOrientationAreTakenAsFslTakesAnalyze) {
+  nifti_1_header header = header_of({2, 1, 1}, 6, Affine3d::Identity());
+  header.sform_code = 0;
+  header.pixdim[1] = 2, header.pixdim[2] = 3, header.pixdim[3] = 4;
+  const std::vector<float> two = {1, 1, 0.2f, 0.2f, 0.1f, 0.1f, 0.6f, 0.6f, 0.05f, 0.05f, 0.3f, 0.3f};
+  const test::TemporaryFile file("no_form.nii", file_of(header, test::bytes_of(two)));
+  LatticeReport report;
+  const TensorGrid grid = tensors_of(open_nifti(file), TensorOrder::fsl, report);
+  EXPECT_EQ(grid.to_world.matrix(), Affine3d(Eigen::Scaling(-2.0, 3.0, 4.0)).matrix());
+  ASSERT_EQ(report.notes.size(), 1u);
+  EXPECT_NE(report.notes[0].find("sform"), std::string::npos);
+  // FSL does not flip such an image: the components are in the axes of the voxels, of which the first one points left.
+  test::expect_near((Matrix3d() << 1, -0.2, -0.1, -0.2, 0.6, 0.05, -0.1, 0.05, 0.3).finished(),
+                    test::voxel(grid, {1, 0, 0}));
 }
 
 TEST(Nifti, SlopeAndInterceptAreApplied) {
@@ -264,9 +338,9 @@ TEST(Nifti, TransformIsSformThenQformThenVoxelSizesInMillimetres) {
   expected(0, 3) = 7;
   EXPECT_LT((transform() - expected).norm(), 1e-5);
   header.qform_code = 0;
-  EXPECT_LT((transform() - Eigen::Matrix4d(Eigen::Vector4d(2, 3, 4, 1).asDiagonal())).norm(), 1e-5);
+  EXPECT_LT((transform() - Eigen::Matrix4d(Eigen::Vector4d(-2, 3, 4, 1).asDiagonal())).norm(), 1e-5);
   header.xyzt_units = NIFTI_UNITS_METER;
-  EXPECT_LT((transform() - Eigen::Matrix4d(Eigen::Vector4d(2000, 3000, 4000, 1).asDiagonal())).norm(), 1e-2);
+  EXPECT_LT((transform() - Eigen::Matrix4d(Eigen::Vector4d(-2000, 3000, 4000, 1).asDiagonal())).norm(), 1e-2);
 }
 
 TEST(Nifti, NotANumberIsInactiveAndNotZero) {

@@ -261,6 +261,28 @@ TEST(Nrrd, WrongFilesAreErrorsOfOneLine) {
   expect("NRRD0005\ntype: float\ndimension: 3\nsizes: 2 2 2\nencoding: raw\nendian: little\n\n" + numbers, {"axes"});
 }
 
+TEST(Nrrd, TheFrameOfComponentsIsGivenWhereTheFileDoesNotStateIt) {
+  const Matrix3d t = test::symmetric_tensor(), flip = Vector3d(-1, 1, 1).asDiagonal();
+  const std::string lps = "left-posterior-superior",
+                    directions = "space directions: none (2,0,0) (0,-2,0) (0,0,3)\n";  // in RAS: (−2, 0, 0) (0, 2, 0)
+  const auto take = [&](const std::string& header) {
+    const test::TemporaryFile file("frame.nrrd", header + test::bytes_of(six(t)));
+    Lattice lattice = open_nrrd(file);
+    take_frame(lattice, ComponentFrame::voxels);
+    return test::tensors_of(lattice);
+  };
+  const std::string start = header_of("3D-symmetric-matrix", 6, {1, 1, 1}, directions, lps);
+  test::expect_near(flip * t * flip, test::voxel(take(start), {0, 0, 0}));
+  const std::string stated =
+      header_of("3D-symmetric-matrix", 6, {1, 1, 1}, directions + measurement_frame(Matrix3d::Identity()), lps);
+  test::expect_error([&] { take(stated); }, {"--frame"});
+  test::expect_error(
+      [&] {
+        take(header_of("3D-symmetric-matrix", 6, {1, 1, 1}, directions, "scanner-xyz"));
+      },
+      {"--frame"});
+}
+
 TEST(Nrrd, CompressedFilesThatAreCutOffAreErrors) {
   const auto path = test::data_file("dt_helix/dt-helix-ref-RotationAndAffine.nrrd");
   TENSORRAY_NEEDS(path);

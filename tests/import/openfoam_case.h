@@ -18,8 +18,10 @@ class OpenFoamCase {
   /// A component of a cell's value in OpenFOAM's order. `at_end` is the time, 0 or 1.
   static double value(int cell, int component, int at_end) { return 1000 * at_end + 10 * cell + component; }
 
-  static void write(const std::filesystem::path& folder) {
+  /// @param part  The case is moved by so many of its widths along x, and its cells have the numbers of the next ones.
+  static void write(const std::filesystem::path& folder, int part = 0) {
     OpenFoamCase mesh;
+    mesh.part_ = part;
     mesh.make();
     mesh.write_mesh(folder / "constant" / "polyMesh");
     write_bytes(
@@ -29,9 +31,9 @@ class OpenFoamCase {
             "writeControl timeStep;\nwriteInterval 1;\n");
     for (const int at_end : {0, 1}) {
       const std::filesystem::path time = folder / (at_end ? "0.5" : "0");
-      write_field(time / "U", "volVectorField", "vector", 3, at_end);
-      write_field(time / "sigma", "volSymmTensorField", "symmTensor", 6, at_end);
-      write_field(time / "gradU", "volTensorField", "tensor", 9, at_end);
+      mesh.write_field(time / "U", "volVectorField", "vector", 3, at_end);
+      mesh.write_field(time / "sigma", "volSymmTensorField", "symmTensor", 6, at_end);
+      mesh.write_field(time / "gradU", "volTensorField", "tensor", 9, at_end);
     }
   }
 
@@ -54,12 +56,12 @@ class OpenFoamCase {
     return text + ")\n";
   }
 
-  static void write_field(const std::filesystem::path& path, const std::string& kind, const std::string& type,
-                          int components, int at_end) {
+  void write_field(const std::filesystem::path& path, const std::string& kind, const std::string& type, int components,
+                   int at_end) const {
     std::vector<std::string> rows;
     for (int cell = 0; cell < cells; ++cell) {
       std::string row = "(";
-      for (int c = 0; c < components; ++c) row += std::to_string(value(cell, c, at_end)) + " ";
+      for (int c = 0; c < components; ++c) row += std::to_string(value(cells * part_ + cell, c, at_end)) + " ";
       rows.push_back(row + ")");
     }
     write_bytes(path, head(kind, path.filename().string()) +
@@ -88,7 +90,7 @@ class OpenFoamCase {
   void write_mesh(const std::filesystem::path& folder) const {
     std::vector<std::string> points, faces, owner, neighbour;
     for (int n = 0; n < 27; ++n) {
-      points.push_back("(" + std::to_string(n % 3) + " " + std::to_string(0.5 * (n / 3 % 3)) + " " +
+      points.push_back("(" + std::to_string(2 * part_ + n % 3) + " " + std::to_string(0.5 * (n / 3 % 3)) + " " +
                        std::to_string(2 * (n / 9)) + ")");
     }
     for (const auto* sides : {&inner_, &outer_}) {
@@ -109,6 +111,7 @@ class OpenFoamCase {
                                          ";\n    startFace " + std::to_string(inner_.size()) + ";\n}\n)\n");
   }
 
+  int part_ = 0;
   std::vector<Side> inner_, outer_;
 };
 

@@ -25,6 +25,12 @@ TEST(TensorOrder, EachOrderPutsComponentsInTheirPlaces) {
   EXPECT_EQ(tensor_of(voigt, TensorOrder::voigt), numbered(true));
   EXPECT_EQ(tensor_of(lower, TensorOrder::lower_triangle), numbered(true));
   EXPECT_EQ(tensor_of(full, TensorOrder::full), numbered(false));
+  const double plane[] = {11, 22, 33, 12}, two_by_two[] = {11, 12, 21, 22};
+  Eigen::Matrix3d expected;
+  expected << 11, 12, 0, 12, 22, 0, 0, 0, 33;
+  EXPECT_EQ(tensor_of(plane, TensorOrder::plane), expected);
+  expected << 11, 12, 0, 21, 22, 0, 0, 0, 0;
+  EXPECT_EQ(tensor_of(two_by_two, TensorOrder::two_by_two), expected);
 }
 
 TEST(TensorOrder, NamesAreThoseOfTheirOrders) {
@@ -32,6 +38,9 @@ TEST(TensorOrder, NamesAreThoseOfTheirOrders) {
   EXPECT_EQ(tensor_order_of("fsl"), TensorOrder::fsl);
   EXPECT_EQ(tensor_order_of("mrtrix"), TensorOrder::mrtrix);
   EXPECT_EQ(tensor_order_of("voigt"), TensorOrder::voigt);
+  EXPECT_EQ(tensor_order_of("plane"), TensorOrder::plane);
+  EXPECT_EQ(tensor_order_of("2x2"), TensorOrder::two_by_two);
+  EXPECT_EQ(tensor_order_of("lower"), TensorOrder::lower_triangle);
   for (const std::string& name : tensor_order_names()) EXPECT_NO_THROW(tensor_order_of(name));
 }
 
@@ -41,7 +50,7 @@ TEST(TensorOrder, UnknownNamesAreErrorsThatListTheKnown) {
       ADD_FAILURE() << name;
     } catch (const std::invalid_argument& error) {
       EXPECT_EQ(std::string(error.what()),
-                "--order: unknown order \"" + name + "\"; there are vtk, fsl, mrtrix, voigt");
+                "--order: unknown order \"" + name + "\"; there are vtk, fsl, mrtrix, voigt, lower, plane, 2x2");
     }
 }
 

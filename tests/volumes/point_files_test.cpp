@@ -48,6 +48,22 @@ std::vector<Record> records_of(const openvdb::points::PointDataGrid& grid) {
   return records;
 }
 
+TEST(VdbPoints, OfAnyUnitOfLength) {
+  for (const double unit : {1e-12, 1e-7, 1.0, 1e26}) {
+    PointCloud cloud = cloud_of(2000, 0.5f);
+    for (Eigen::Vector3f& position : cloud.positions) position = (unit * position.cast<double>()).cast<float>();
+    const Temporary path("a.vdb");
+    write_points(path, cloud);
+    const auto grid = read_points(path);
+    const auto stored = grid->getMetadata<openvdb::StringMetadata>("tensorray:length_unit");
+    EXPECT_EQ(stored != nullptr, unit < 1e-6);
+    const double length = stored ? std::stod(stored->value()) : 1;
+    PointCloud expected = cloud;
+    for (Eigen::Vector3f& position : expected.positions) position = (position.cast<double>() / length).cast<float>();
+    expect_records(records_of(*grid), expected, static_cast<float>(1e-5 * std::max(1.0, unit)));
+  }
+}
+
 TEST(VdbPoints, HoldEveryPointAndAttribute) {
   for (const float thickness : {0.0f, 0.5f}) {
     const PointCloud cloud = cloud_of(20000, thickness);

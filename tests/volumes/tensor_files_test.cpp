@@ -498,6 +498,40 @@ TEST(TensorFiles, HessianOfAQuadraticIsExactInWorldAxes) {
   EXPECT_GT(inside, 1000u);
 }
 
+TEST(TensorFiles, VoxelsOfAnySizeAreWrittenAndRead) {
+  for (const double unit : {1e-30, 1e-12, 1e-9, 3e-6, 1e-5, 1e-3, 1.0, 1e10, 1e26}) {
+    TensorGrid grid = sparse_grid();
+    grid.to_world = Eigen::Affine3d(Eigen::Scaling(unit)) * grid.to_world;
+    grid.metadata["tensorray:length_unit"] = "7";  // As of a file that was read and changed: it is not kept.
+    const Temporary path("a.vdb");
+    write_tensor_vdb(path, grid);
+    const TensorGrid read = read_tensor_vdb(path);
+    EXPECT_LE((read.to_world.matrix() - grid.to_world.matrix()).topRows<3>().norm(), 1e-14 * unit) << unit;
+    EXPECT_EQ(read.metadata.count("tensorray:length_unit"), 0u);
+    expect_same_blocks(read, grid);
+    openvdb::io::File stock(path.string());
+    stock.open();
+    const auto row = stock.readGridMetadata("stress_row0");
+    const bool has_unit = row->getMetadata<openvdb::StringMetadata>("tensorray:length_unit") != nullptr;
+    EXPECT_EQ(has_unit, unit < 1e-4) << unit;  // Others read the voxels where they are, if OpenVDB can say it.
+    const double stored = row->transform().voxelSize().length();
+    EXPECT_TRUE(!has_unit || (stored > 0.5 && stored < 50)) << unit << ' ' << stored;
+  }
+}
+
+TEST(TensorFiles, AUnitThatIsNoNumberIsAnErrorWithTheGrid) {
+  const Temporary path("a.vdb");
+  openvdb::GridPtrVec rows;
+  for (const char* name : {"t_row0", "t_row1", "t_row2"}) {
+    rows.push_back(stock_grid<openvdb::Vec3SGrid>(name, openvdb::Vec3s(0)));
+    openvdb::gridPtrCast<openvdb::Vec3SGrid>(rows.back())->tree().setValue({0, 0, 0}, openvdb::Vec3s(1));
+    rows.back()->insertMeta("tensorray:length_unit", openvdb::StringMetadata("-1e-6"));
+  }
+  write_stock(path, rows);
+  EXPECT_THAT([&] { read_tensor_vdb(path); },
+              ThrowsMessage<std::runtime_error>(AllOf(HasSubstr("a.vdb"), HasSubstr("length_unit"))));
+}
+
 TEST(TensorFiles, DeriveNeedsTheRightKindOfGrid) {
   const Temporary path("a.vdb");
   write_stock(path, {stock_grid<openvdb::FloatGrid>("f", 0)});

@@ -15,6 +15,7 @@
 #include "base/text.h"
 #include "tools/import/lattices/lattice_files.h"
 #include "tools/import/meshes/component_arrays.h"
+#include "tools/import/meshes/flat_mesh.h"
 #include "tools/import/meshes/mesh_boundary.h"
 #include "tools/import/vtk/image_lattice.h"
 #include "tools/import/vtk/plot3d.h"
@@ -34,6 +35,10 @@ OpenLattice lattice_reader(const std::filesystem::path& path) {
     if (ends_with(name, ending)) return open_nrrd;
   for (const char* ending : {".nii", ".nii.gz", ".hdr"})
     if (ends_with(name, ending)) return open_nifti;
+  for (const char* ending : {".mha", ".mhd"})
+    if (ends_with(name, ending)) return open_metaimage;
+  for (const char* ending : {".mif", ".mif.gz", ".mih"})
+    if (ends_with(name, ending)) return open_mrtrix;
   return ends_with(name, ".npy") ? open_npy : nullptr;
 }
 
@@ -96,9 +101,40 @@ TensorGrid import_mesh(vtkDataSet& data, const ArrayChoice& array, const ImportS
   return grid;
 }
 
+/// Makes a slab of a flat mesh: one voxel across its plane.
+vtkSmartPointer<vtkDataSet> slab_of_flat(vtkSmartPointer<vtkDataSet> data, ImportSettings& settings,
+                                         ImportReport& report) {
+  const std::optional<FlatMesh> flat = flat_mesh(*data);
+  if (!flat && settings.thickness) throw std::invalid_argument("is not flat: leave --thickness out");
+  if (!flat) return data;
+  if (!settings.boundary.empty()) throw std::invalid_argument("is flat, and has no body: leave --boundary out");
+  report.thickness = settings.thickness.value_or(flat->edge);
+  settings.sampling.flat_axis = flat->axis;
+  if (!wants_sampling(settings)) settings.sampling.resolution = flat->edge;
+  return slab_of(*data, *flat, report.thickness);
+}
+
+/// Sets the distance of the voxels of an image along axes with one voxel.
+void set_thickness(vtkImageData& image, double thickness) {
+  bool is_flat = false;
+  for (int axis = 0; axis < 3; ++axis) {
+    if (image.GetDimensions()[axis] != 1) continue;
+    double spacing[3];
+    image.GetSpacing(spacing);
+    spacing[axis] = thickness;
+    image.SetSpacing(spacing);
+    is_flat = true;
+  }
+  if (!is_flat) throw std::invalid_argument("is not flat: leave --thickness out");
+}
+
 /// Keeps the voxels of a VTK image, unless the user asks for other voxels.
-TensorGrid import_data_set(vtkSmartPointer<vtkDataSet> data, const ImportSettings& settings, const Progress& progress,
+TensorGrid import_data_set(vtkSmartPointer<vtkDataSet> data, ImportSettings settings, const Progress& progress,
                            ImportReport& report) {
+  if (!vtkImageData::SafeDownCast(data) || wants_sampling(settings))
+    data = slab_of_flat(std::move(data), settings, report);
+  else if (settings.thickness)
+    set_thickness(*vtkImageData::SafeDownCast(data), *settings.thickness);
   const bool is_list = settings.take == Take::tensor && is_array_list(*data, settings.array);
   const ArrayChoice array =
       is_list ? join_arrays(*data, settings.array) : choose_array(*data, settings.array, settings.take);
@@ -139,6 +175,7 @@ TensorGrid import_any(const ImportSettings& settings, const Progress& progress, 
   const std::filesystem::path& file = settings.files.front();
   const OpenLattice open = lattice_reader(file);
   const bool has_steps = settings.files.size() == 1 && !open;
+  if (open && settings.thickness) throw std::invalid_argument("has voxels of its own: leave --thickness out");
   if (!has_steps && settings.step.value_or(0) > 0)
     throw std::invalid_argument("has one step of time; leave --steps out");
   if (open != open_npy && open != open_nifti) require_room_for(settings.files);
@@ -155,7 +192,7 @@ TensorGrid import_any(const ImportSettings& settings, const Progress& progress, 
   if (wants_sampling(settings))
     throw std::invalid_argument("has voxels of its own, which are kept: leave --resolution and --voxel-size out");
   Lattice lattice = open(file);
-  if (settings.lps) lattice.frame = Eigen::Vector3d(-1, -1, 1).asDiagonal() * lattice.frame;
+  if (settings.frame) take_frame(lattice, *settings.frame);
   return import_lattice(lattice, settings, report);
 }
 
@@ -181,10 +218,8 @@ TensorGrid import_tensors(const ImportSettings& settings, const Progress& progre
     throw std::invalid_argument(file.string() + ": says itself where it is, only .npy does not: leave --origin out");
   if (settings.voxel && lattice_reader(file) != open_npy)
     throw std::invalid_argument(file.string() + ": --voxel-size: only the voxels of .npy have three edges; give one");
-  if (settings.lps && (lattice_reader(file) != open_nifti || settings.order == TensorOrder::fsl))
-    throw std::invalid_argument(file.string() + (settings.order == TensorOrder::fsl
-                                                     ? ": --order fsl has a frame of its own: leave --frame out"
-                                                     : ": is no NIfTI file: leave --frame out"));
+  if (settings.frame && (!lattice_reader(file) || lattice_reader(file) == open_npy))
+    throw std::invalid_argument(file.string() + ": is not in an anatomical space: leave --frame out");
   progress.update("reading", 0, 1);
   TensorGrid grid;
   try {

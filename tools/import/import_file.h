@@ -22,9 +22,10 @@ struct ImportSettings {
   std::optional<TensorOrder> order;  ///< Order of six components, where the file does not state it.
   /// For files of voxels only `bounds` is used, except for VTK files; for .npy also a voxel size, that of the file.
   SamplingSettings sampling;
+  std::optional<double> thickness;        ///< Of a flat mesh or image; none: a typical edge of its cells.
   std::optional<Eigen::Vector3d> voxel;   ///< Distances of voxels along x, y and z; of .npy only.
   std::optional<Eigen::Vector3d> origin;  ///< World position of the first voxel's centre; of .npy only.
-  bool lps = false;                       ///< The components are in LPS instead of RAS; of NIfTI only.
+  std::optional<ComponentFrame> frame;    ///< Axes of the components, where the file does not state them; of RAS files.
   std::optional<int> step;                ///< Of the steps of time, from 0 on; none: the last one.
   std::filesystem::path boundary;         ///< File for the surface of the body; empty: none.
 };
@@ -34,6 +35,7 @@ struct ImportReport {
   std::optional<LatticeReport> lattice;
   std::optional<SamplingReport> mesh;
   std::size_t mesh_cells = 0, boundary_triangles = 0;
+  double thickness = 0;  ///< Of the slab that a flat mesh has become; 0: it was none.
 };
 
 /// Reads voxels as they are, and samples meshes. The grid gets the array's name, and its source as metadata. VTK's

@@ -10,6 +10,7 @@
 
 #include "base/box.h"
 #include "volumes/files/vdb_archive.h"
+#include "volumes/files/vdb_transform.h"
 #include "volumes/files/vtk_files.h"
 
 namespace tensorray {
@@ -71,12 +72,19 @@ void add_attribute(Grid& grid, const Index& index, const std::string& name, cons
 
 void write_vdb_points(const std::filesystem::path& path, const PointCloud& cloud) {
   openvdb::initialize();
-  const auto transform = openvdb::math::Transform::createLinearTransform(voxel_edge(cloud.positions));
-  const VectorList positions(cloud.positions);
+  const double edge = voxel_edge(cloud.positions);
+  const LengthUnit unit = length_unit_for(edge * edge * edge);
+  const auto transform = openvdb::math::Transform::createLinearTransform(edge / unit.value);
+  std::vector<Eigen::Vector3f> in_unit;
+  if (unit.value != 1)
+    for (const Eigen::Vector3f& position : cloud.positions)
+      in_unit.push_back((position.cast<double>() / unit.value).cast<float>());
+  const VectorList positions(unit.value == 1 ? cloud.positions : in_unit);
   const auto index = openvdb::tools::createPointIndexGrid<openvdb::tools::PointIndexGrid>(positions, *transform);
   const auto grid = openvdb::points::createPointDataGrid<openvdb::points::NullCodec, openvdb::points::PointDataGrid>(
       *index, positions, *transform);
   grid->setName("points");
+  note_unit(*grid, unit);
   for (const auto& [name, values] : cloud.scalars) add_attribute<ScalarList>(*grid, *index, name, values);
   for (const auto& [name, values] : cloud.vectors) add_attribute<VectorList>(*grid, *index, name, values);
   openvdb::MetaMap metadata;

@@ -1,6 +1,7 @@
 #include "volumes/files/scalar_files.h"
 
 #include "volumes/files/vdb_archive.h"
+#include "volumes/files/vdb_transform.h"
 
 namespace tensorray {
 namespace {
@@ -17,7 +18,7 @@ openvdb::FloatGrid::Ptr float_grid(const ScalarGrid& grid) {
       if (block.active[offset]) leaf->setValueOn(static_cast<openvdb::Index>(offset), block.values[offset]);
   }
   result->setName(grid.name);
-  result->setTransform(linear_transform(grid.to_world));
+  place(*result, grid.to_world);
   result->setGridClass(grid.fog ? openvdb::GRID_FOG_VOLUME : openvdb::GRID_UNKNOWN);
   for (const auto& [key, value] : grid.metadata)
     if (!(*result)[key])

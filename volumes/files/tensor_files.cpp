@@ -4,6 +4,7 @@
 #include <cmath>
 #include <memory>
 #include <optional>
+#include <set>
 #include <stdexcept>
 #include <type_traits>
 #include <unordered_map>
@@ -15,6 +16,7 @@
 #include "base/text.h"
 #include "volumes/files/stored_field.h"
 #include "volumes/files/vdb_archive.h"
+#include "volumes/files/vdb_transform.h"
 #include "volumes/files/voxel_extent.h"
 #include "volumes/grids/page_memory.h"
 #include "volumes/tensors/finite_differences.h"
@@ -30,98 +32,7 @@ constexpr std::size_t greatest_block_count = std::size_t{1} << 25;
 /// What a field needs at least for a block, when its tensors are symmetric (TensorBrick).
 constexpr std::size_t least_brick_bytes = 14000;
 
-bool is_vector(const GridInfo& grid) { return grid.type == "vec3s" || grid.type == "vec3d"; }
-bool is_scalar(const GridInfo& grid) { return grid.type == "float" || grid.type == "double"; }
-
 using Entry = TensorEntry;
-
-/// A grid of a field: the ending of its name, and the entries that it holds.
-struct Part {
-  std::string suffix;
-  std::vector<Entry> entries;
-};
-
-/// One way to store a tensor in grids.
-struct Layout {
-  bool (*suits)(const GridInfo&);
-  std::vector<Part> parts;
-};
-
-Layout rows_layout() {
-  Layout layout{is_vector, {}};
-  for (int row = 0; row < 3; ++row)
-    layout.parts.push_back({"_row" + std::to_string(row), {{0, row, 0}, {1, row, 1}, {2, row, 2}}});
-  return layout;
-}
-
-Layout numbered_layout() {
-  Layout layout{is_scalar, {}};
-  for (int i = 0; i < 9; ++i) layout.parts.push_back({"_" + std::to_string(i), {{0, i / 3, i % 3}}});
-  return layout;
-}
-
-Layout lettered_layout(bool symmetric) {
-  Layout layout{is_scalar, {}};
-  for (int row = 0; row < 3; ++row)
-    for (int column = symmetric ? row : 0; column < 3; ++column) {
-      layout.parts.push_back({std::string(".") + "xyz"[row] + "xyz" [column], {
-                                { 0, row, column }
-                              }});
-      if (symmetric && column != row) layout.parts.back().entries.push_back({0, column, row});
-    }
-  return layout;
-}
-
-/// Sorted by preference, for names that fit several layouts.
-const std::vector<Layout>& layouts() {
-  static const std::vector<Layout> all{rows_layout(), numbered_layout(), lettered_layout(false), lettered_layout(true)};
-  return all;
-}
-
-bool has(const std::vector<GridInfo>& grids, const std::string& name, const Layout& layout) {
-  return std::all_of(layout.parts.begin(), layout.parts.end(), [&](const Part& part) {
-    return std::any_of(grids.begin(), grids.end(),
-                       [&](const GridInfo& grid) { return grid.name == name + part.suffix && layout.suits(grid); });
-  });
-}
-
-const Layout& layout_of(const std::vector<GridInfo>& grids, const std::string& name) {
-  return *std::find_if(layouts().begin(), layouts().end(),
-                       [&](const Layout& layout) { return has(grids, name, layout); });
-}
-
-std::string joined_or_none(const std::vector<std::string>& words) { return words.empty() ? "none" : joined(words); }
-
-std::string described(const std::vector<GridInfo>& grids) {
-  std::vector<std::string> words;
-  for (const GridInfo& grid : grids) words.push_back(grid.name + " (" + grid.type + ")");
-  return joined_or_none(words);
-}
-
-/// The names that can be read with `derive`.
-std::vector<std::string> names_for(const std::vector<GridInfo>& grids, Derive derive) {
-  if (derive == Derive::none) return tensor_names(grids);
-  std::vector<std::string> names;
-  for (const GridInfo& grid : grids)
-    if (derive == Derive::gradient ? is_vector(grid) : is_scalar(grid)) names.push_back(grid.name);
-  return names;
-}
-
-std::string chosen_name(const std::filesystem::path& path, const std::vector<GridInfo>& grids, const std::string& name,
-                        Derive derive) {
-  const std::string kind = derive == Derive::none       ? "tensor field"
-                           : derive == Derive::gradient ? "vector grid for a gradient"
-                                                        : "scalar grid for a hessian";
-  const std::vector<std::string> names = names_for(grids, derive);
-  if (!name.empty()) {
-    if (std::find(names.begin(), names.end(), name) != names.end()) return name;
-    fail(path, "has no " + kind + " \"" + name + "\"; there are: " + joined_or_none(names) +
-                   "; the grids are: " + described(grids));
-  }
-  if (names.size() == 1) return names.front();
-  if (names.empty()) fail(path, "has no " + kind + "; the grids are: " + described(grids));
-  fail(path, "has several of what could be the " + kind + "; name one of: " + joined(names));
-}
 
 /// A grid, and the tensor entries that its values are stored in.
 struct Source {
@@ -203,9 +114,7 @@ void put(TensorBlock& block, int offset, const Entry& entry, double value) {
   block.values[offset](entry.row, entry.column) = static_cast<float>(value);
 }
 
-void put(SampleBlock& block, int offset, const Entry& entry, double value) {
-  block.values[offset][entry.component] = value;
-}
+void put(SampleBlock& block, int offset, const Entry& entry, double value) { block.values[offset][entry.row] = value; }
 
 /// Appends the blocks (TensorBlock or SampleBlock) of all active voxels, including those of active tiles, and no
 /// others.
@@ -230,23 +139,6 @@ void add_blocks(const std::filesystem::path& path, const std::vector<Source>& so
   });
 }
 
-/// OpenVDB multiplies row vectors from the left, Eigen column vectors from the right.
-Eigen::Affine3d to_eigen(const openvdb::Mat4d& matrix) {
-  Eigen::Affine3d affine;
-  for (int row = 0; row < 4; ++row)
-    for (int column = 0; column < 4; ++column) affine.matrix()(row, column) = matrix(column, row);
-  return affine;
-}
-
-Eigen::Affine3d transform_of(const std::filesystem::path& path, const openvdb::GridBase& grid) {
-  if (!grid.transform().isLinear())
-    fail(path, "grid " + grid.getName() + " has a transform that is not affine (a frustum); resample it first");
-  const Eigen::Affine3d affine = to_eigen(grid.transform().baseMap()->getAffineMap()->getMat4());
-  if (!affine.matrix().allFinite() || !affine.inverse().matrix().allFinite())
-    fail(path, "grid " + grid.getName() + " has a transform that cannot be inverted; give it voxels of some size");
-  return affine;
-}
-
 /// Whether two transforms differ by less than a millionth of a voxel per voxel, and by less than a thousandth of a
 /// voxel anywhere.
 bool same_transform(const Eigen::Affine3d& a, const Eigen::Affine3d& b) {
@@ -255,9 +147,9 @@ bool same_transform(const Eigen::Affine3d& a, const Eigen::Affine3d& b) {
 }
 
 Eigen::Affine3d common_transform(const std::filesystem::path& path, const std::vector<Source>& sources) {
-  const Eigen::Affine3d first = transform_of(path, *sources.front().grid);
+  const Eigen::Affine3d first = placement(path, *sources.front().grid);
   for (const Source& source : sources)
-    if (!same_transform(first, transform_of(path, *source.grid)))
+    if (!same_transform(first, placement(path, *source.grid)))
       fail(path, "grids " + sources.front().grid->getName() + " and " + source.grid->getName() +
                      " have different transforms; resample them to one");
   return first;
@@ -271,10 +163,11 @@ std::string text_of(const openvdb::Metadata& value) {
 /// The file's metadata, and the entries that this program writes on grids, because some tools keep only the grids'
 /// metadata.
 std::map<std::string, std::string> metadata_of(const openvdb::MetaMap& file, const openvdb::GridBase& grid) {
-  std::map<std::string, std::string> metadata;
+  std::map<std::string, std::string> metadata;  // Without the unit: `placement` has applied it.
   for (auto i = file.beginMeta(); i != file.endMeta(); ++i) metadata[i->first] = text_of(*i->second);
   for (auto i = grid.beginMeta(); i != grid.endMeta(); ++i)
     if (i->first.rfind("tensorray:", 0) == 0) metadata.emplace(i->first, text_of(*i->second));
+  metadata.erase(length_unit_key);
   return metadata;
 }
 
@@ -289,19 +182,19 @@ std::vector<GridInfo> infos_of(const VdbFile& file) {
   return infos;
 }
 
-std::vector<Part> parts_of(const std::vector<GridInfo>& grids, const std::string& name, Derive derive) {
-  if (derive == Derive::none) return layout_of(grids, name).parts;
-  if (derive == Derive::hessian) return {{"", {{0, 0, 0}}}};
-  return {{"", {{0, 0, 0}, {1, 0, 0}, {2, 0, 0}}}};
+/// The grids of a field in a file, in the order of its parts.
+std::vector<Source> sources_of(const VdbFile& file, const FieldGrids& field) {
+  std::vector<Source> sources;
+  for (const FieldPart& part : field.parts)
+    for (const VdbGrid& grid : file.grids)
+      if (grid.name == part.grid) sources.push_back({grid.grid, part.entries});
+  return sources;
 }
 
-/// The grids of a field in a file.
-std::vector<Source> sources_of(const VdbFile& file, const std::string& name, const std::vector<Part>& parts) {
-  std::vector<Source> sources;
-  for (const Part& part : parts)
-    for (const VdbGrid& grid : file.grids)
-      if (grid.name == name + part.suffix) sources.push_back({grid.grid, part.entries});
-  return sources;
+std::set<std::string> grid_names(const FieldGrids& field) {
+  std::set<std::string> names;
+  for (const FieldPart& part : field.parts) names.insert(part.grid);
+  return names;
 }
 
 /// Where there is a bound of memory, slabs across x of which each has its part of it; else one with everything.
@@ -351,12 +244,12 @@ class RowGrid : public openvdb::Vec3SGrid {
 
   RowGrid(const TensorGrid& grid, int row, bool half) : row_(row) {
     setName(grid.name + "_row" + std::to_string(row));
-    setTransform(linear_transform(grid.to_world));
+    place(*this, grid.to_world);
     setGridClass(openvdb::GRID_UNKNOWN);
     setVectorType(openvdb::VEC_INVARIANT);
     setSaveFloatAsHalf(half);
     for (const auto& [key, value] : grid.metadata)
-      if (!(*this)[key])
+      if (!(*this)[key] && key != length_unit_key)
         insertMeta(key, openvdb::StringMetadata(value));  // Keep the grid's own entries: name, type, ...
     for (const TensorBlock& block : grid.blocks) {
       make_room();
@@ -407,35 +300,20 @@ void check_half_range(const std::filesystem::path& path, const TensorGrid& grid)
 
 }  // namespace
 
-std::vector<std::string> tensor_names(const std::vector<GridInfo>& grids) {
-  std::vector<std::string> names;
-  for (const GridInfo& grid : grids)
-    for (const Layout& layout : layouts()) {
-      const std::string& first = layout.parts.front().suffix;
-      if (grid.name.size() < first.size()) continue;
-      const std::string name = grid.name.substr(0, grid.name.size() - first.size());
-      if (grid.name != name + first || !has(grids, name, layout)) continue;
-      if (std::find(names.begin(), names.end(), name) == names.end()) names.push_back(name);
-    }
-  return names;
-}
-
 std::vector<GridInfo> list_vdb(const std::filesystem::path& path) { return infos_of(read_vdb(path)); }
 
-std::optional<BlockSource> open_tensor_vdb(const std::filesystem::path& path, const std::string& name) {
-  const std::vector<GridInfo> infos = list_vdb(path);
-  BlockSource result;
-  result.name = chosen_name(path, infos, name, Derive::none);
-  const std::vector<Part> parts = parts_of(infos, result.name, Derive::none);
-  std::set<std::string> wanted;
-  for (const Part& part : parts) wanted.insert(result.name + part.suffix);
-  std::optional<VdbLeafFile> file = read_vdb_leaves(path, wanted);
+std::optional<BlockSource> open_tensor_vdb(const std::filesystem::path& path, const std::string& name,
+                                           const ComponentGrids& components) {
+  const FieldGrids grids = field_grids(path, list_vdb(path), name, Derive::none, components);
+  std::optional<VdbLeafFile> file = read_vdb_leaves(path, grid_names(grids));
   if (!file) return std::nullopt;
+  BlockSource result;
+  result.name = grids.name;
 
   const auto field = std::make_shared<StoredField>(path);
   std::vector<Source> sources;
-  for (const Part& part : parts) {
-    VdbLeafGrid& grid = file->grids.at(result.name + part.suffix);
+  for (const FieldPart& part : grids.parts) {
+    VdbLeafGrid& grid = file->grids.at(part.grid);
     sources.push_back({grid.grid, part.entries});
     field->grids.push_back({grid.tree, std::move(grid.leaves), part.entries});
   }
@@ -449,31 +327,30 @@ std::optional<BlockSource> open_tensor_vdb(const std::filesystem::path& path, co
   return result;
 }
 
-TensorGrid read_tensor_vdb(const std::filesystem::path& path, const std::string& name, Derive derive) {
+TensorGrid read_tensor_vdb(const std::filesystem::path& path, const std::string& name, Derive derive,
+                           const ComponentGrids& components) {
   const bool is_bounded = memory_bound().has_value(), derives = derive != Derive::none;
   const auto fail_too_large = [&](const std::string& field) {
     fail(path, "the active voxels of \"" + field + "\" do not fit in memory; resample it more coarsely");
   };
   if (!is_bounded && !derives)
-    if (const std::optional<BlockSource> source = open_tensor_vdb(path, name)) {
+    if (const std::optional<BlockSource> source = open_tensor_vdb(path, name, components)) {
       try {
         return to_grid(*source);
       } catch (const std::bad_alloc&) {
         fail_too_large(source->name);
       }
     }
-  const std::vector<GridInfo> infos = list_vdb(path);
+  const FieldGrids field = field_grids(path, list_vdb(path), name, derive, components);
+  const std::set<std::string> wanted = grid_names(field);
   TensorGrid result;
-  result.name = chosen_name(path, infos, name, derive);
-  const std::vector<Part> parts = parts_of(infos, result.name, derive);
-  std::set<std::string> wanted;
-  for (const Part& part : parts) wanted.insert(result.name + part.suffix);
-
+  result.name = field.name;
   const openvdb::CoordBBox nothing(openvdb::Coord::max(), openvdb::Coord::max());
   VdbFile file = read_vdb(path, wanted, is_bounded ? &nothing : nullptr);
-  std::vector<Source> sources = sources_of(file, result.name, parts);
+  std::vector<Source> sources = sources_of(file, field);
   result.to_world = common_transform(path, sources);
   result.metadata = metadata_of(file.metadata, *sources.front().grid);
+  const bool is_staggered = sources.front().grid->getGridClass() == openvdb::GRID_STAGGERED;
   const auto read = [&](auto& blocks) {
     if (!is_bounded) return add_blocks(path, sources, blocks);
     for (const openvdb::CoordBBox& slab : slabs_of(path, sources, derives)) {
@@ -481,8 +358,9 @@ TensorGrid read_tensor_vdb(const std::filesystem::path& path, const std::string&
       file = {};  // Before the next one is read.
       malloc_trim(0);
       file = read_vdb(path, wanted, &slab);
-      sources = sources_of(file, result.name, parts);
-      add_blocks(path, sources, blocks);
+/// What a field needs at least for a block, when its tensors are symmetric (TensorBrick).
+constexpr std::size_t least_brick_bytes = 14000;
+
     }
   };
   try {
@@ -491,7 +369,9 @@ TensorGrid read_tensor_vdb(const std::filesystem::path& path, const std::string&
       SampleBlocks samples;
       read(samples);
       const Eigen::Matrix3d to_index = result.to_world.inverse().linear();
-      result.blocks = derive == Derive::gradient ? gradient(samples, to_index) : hessian(samples, to_index);
+      result.blocks = derive == Derive::hessian ? hessian(samples, to_index)
+                      : is_staggered            ? staggered_gradient(samples, to_index)
+                                                : gradient(samples, to_index);
     }
   } catch (const std::bad_alloc&) {
     fail_too_large(result.name);
@@ -505,7 +385,8 @@ void write_tensor_vdb(const std::filesystem::path& path, const TensorGrid& grid,
   openvdb::GridPtrVec rows;
   for (int row = 0; row < 3; ++row) rows.push_back(std::make_shared<RowGrid>(grid, row, half));
   openvdb::MetaMap metadata;
-  for (const auto& [key, value] : grid.metadata) metadata.insertMeta(key, openvdb::StringMetadata(value));
+  for (const auto& [key, value] : grid.metadata)
+    if (key != length_unit_key) metadata.insertMeta(key, openvdb::StringMetadata(value));
   write_vdb(path, rows, metadata);
 }
 

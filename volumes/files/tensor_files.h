@@ -7,41 +7,29 @@
 #include <string>
 #include <vector>
 
+#include "volumes/files/grid_layouts.h"
 #include "volumes/grids/block_source.h"
 
 namespace tensorray {
 
-/// How a tensor is computed from a grid that does not store tensors.
-enum class Derive {
-  none,      ///< The grids are the tensor's components.
-  gradient,  ///< A Vec3 grid v: T(i, j) = ∂v_i/∂x_j, finite differences, world axes.
-  hessian,   ///< A scalar grid f: T(i, j) = ∂²f/∂x_i∂x_j, finite differences, world axes.
-};
-
-/// What a VDB file contains, apart from voxel values.
-struct GridInfo {
-  std::string name;     ///< Unique in the file: the second of two grids "T" is "T[1]".
-  std::string type;     ///< "vec3s", "float", ...
-  std::string storage;  ///< "full", or "half" where the file stores 16-bit floats.
-};
-
-/// Reads a tensor field. It accepts three Vec3 grids NAME_row0, NAME_row1, NAME_row2 (the rows); nine scalar grids
-/// NAME_0 … NAME_8 (row by row); scalar grids NAME.xx … NAME.zz, all nine or the six of a symmetric tensor (.xx .xy
-/// .xz .yy .yz .zz); and with `derive` one Vec3 or scalar grid NAME. Precision is single, half or double. A voxel is
-/// active where any component is active; the inactive components are zero there.
+/// Reads a tensor field of the grids that field_grids (grid_layouts.h) finds. Precision is single, half or double. A
+/// voxel is active where any component is active; the inactive components are zero there. With Derive::gradient, a
+/// vector grid of the class "staggered" has component i on the voxels' faces towards −i, and is differentiated there.
 /// @param name  Empty: the only tensor (or, with `derive`, the only suitable grid) in the file.
+/// @param components  The grids that are the components; empty: they are found by their names.
 /// @return the grid, with the file's metadata as text. Entries `tensorray:...` that the file lacks are taken from the
 /// first grid. Values that are not finite are kept: see remove_non_finite.
 /// @throw std::runtime_error, one line that names the file and the fix: missing, not a VDB, truncated, no such field
 /// (the message lists the grids of the file), several fields and no name, rows with different transforms, a transform
 /// that is not affine, no active voxel.
 TensorGrid read_tensor_vdb(const std::filesystem::path& path, const std::string& name = "",
-                           Derive derive = Derive::none);
+                           Derive derive = Derive::none, const ComponentGrids& components = {});
 
 /// The same field block by block. Its blocks are read when they are needed; the file stays open.
 /// @return nothing if the file cannot be read so (tiles, trees that grids share, files of OpenVDB 2): use
 /// read_tensor_vdb. @throw as read_tensor_vdb. Damage within the values of voxels shows when blocks are read.
-std::optional<BlockSource> open_tensor_vdb(const std::filesystem::path& path, const std::string& name = "");
+std::optional<BlockSource> open_tensor_vdb(const std::filesystem::path& path, const std::string& name = "",
+                                           const ComponentGrids& components = {});
 
 /// Writes the rows of a field as three Vec3S grids NAME_row0 … NAME_row2 with vector type "invariant" and one
 /// transform. Writes the grid's metadata on the file and on each grid. Equal grids give equal bytes. Writes the file
@@ -53,8 +41,5 @@ void write_tensor_vdb(const std::filesystem::path& path, const TensorGrid& grid,
 
 /// The grids of a file, in the file's order. @throw std::runtime_error as read_tensor_vdb.
 std::vector<GridInfo> list_vdb(const std::filesystem::path& path);
-
-/// The names of the tensor fields that read_tensor_vdb finds without `derive`.
-std::vector<std::string> tensor_names(const std::vector<GridInfo>& grids);
 
 }  // namespace tensorray

@@ -423,12 +423,4 @@ void write_vdb(const std::filesystem::path& path, const openvdb::GridPtrVec& gri
   }
 }
 
-/// OpenVDB multiplies row vectors from the left, Eigen column vectors from the right.
-openvdb::math::Transform::Ptr linear_transform(const Eigen::Affine3d& to_world) {
-  openvdb::Mat4d matrix;
-  for (int row = 0; row < 4; ++row)
-    for (int column = 0; column < 4; ++column) matrix(column, row) = to_world.matrix()(row, column);
-  return openvdb::math::Transform::createLinearTransform(matrix);
-}
-
 }  // namespace tensorray

@@ -68,7 +68,4 @@ std::optional<VdbLeafFile> read_vdb_leaves(const std::filesystem::path& path, co
 /// @throw std::runtime_error naming the file and the reason, also when the disk is full.
 void write_vdb(const std::filesystem::path& path, const openvdb::GridPtrVec& grids, const openvdb::MetaMap& metadata);
 
-/// The transform of a grid. @param to_world  From voxel indices to world.
-openvdb::math::Transform::Ptr linear_transform(const Eigen::Affine3d& to_world);
-
 }  // namespace tensorray

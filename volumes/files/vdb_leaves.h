@@ -8,14 +8,10 @@
 #include <vector>
 
 #include "volumes/files/file_bytes.h"
+#include "volumes/files/tensor_entry.h"
 #include "volumes/files/vdb_tree_check.h"
 
 namespace tensorray {
-
-/// The tensor entry that a component of a grid's value is stored in.
-struct TensorEntry {
-  int component, row, column;
-};
 
 /// Reads leaves of one grid. Each thread needs its own.
 class LeafReader {

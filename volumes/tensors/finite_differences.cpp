@@ -1,6 +1,7 @@
 #include "volumes/tensors/finite_differences.h"
 
 #include <algorithm>
+#include <array>
 #include <tuple>
 
 #include <tbb/parallel_for.h>
@@ -94,6 +95,47 @@ Matrix3d gradient_at(const Neighbourhood& near, const Vector3i& position, const 
   return differences * to_index;
 }
 
+/// The first difference at the middle between the faces 0 and 1 of `sample(n)`; where there is no face 1, extrapolated.
+double face_difference(const std::array<Sample, 4>& faces) {  // −2, −1, 0 and 1
+  const auto at = [&](int n) { return faces[static_cast<std::size_t>(n + 2)].value.x(); };
+  const auto is_active = [&](int n) { return faces[static_cast<std::size_t>(n + 2)].active; };
+  if (is_active(1)) return at(1) - at(0);
+  if (!is_active(-1)) return 0;
+  return is_active(-2) ? 2 * at(0) - 3 * at(-1) + at(-2) : at(0) - at(-1);
+}
+
+/// Component `axis` of a staggered vector at the centre of a voxel: the mean of its two faces, or extrapolated.
+Sample centre_of(const Neighbourhood& near, const Vector3i& position, int axis) {
+  const Sample face = near.at(position);
+  if (!face.active) return {};
+  const auto component = [axis](const Sample& sample) { return sample.value[axis]; };
+  const Sample next = near.at(position + Vector3i::Unit(axis));
+  if (next.active) return {Vector3d(0.5 * (component(face) + component(next)), 0, 0), true};
+  const Sample before = near.at(position - Vector3i::Unit(axis));
+  const double slope = before.active ? component(face) - component(before) : 0;
+  return {Vector3d(component(face) + 0.5 * slope, 0, 0), true};
+}
+
+Matrix3d staggered_gradient_at(const Neighbourhood& near, const Vector3i& position, const Matrix3d& to_index) {
+  Matrix3d differences;
+  for (int i = 0; i < 3; ++i)
+    for (int axis = 0; axis < 3; ++axis) {
+      const auto along = [&](int n) -> Vector3i { return position + n * Vector3i::Unit(axis); };
+      if (axis != i) {
+        differences(i, axis) = first_difference([&](int n) { return centre_of(near, along(n), i); }).x();
+        continue;
+      }
+      std::array<Sample, 4> faces;
+      for (int n = -2; n <= 1; ++n) {
+        Sample& face = faces[static_cast<std::size_t>(n + 2)];
+        face = near.at(along(n));
+        face.value = Vector3d(face.value[i], 0, 0);
+      }
+      differences(i, axis) = face_difference(faces);
+    }
+  return differences * to_index;
+}
+
 Matrix3d hessian_at(const Neighbourhood& near, const Vector3i& position, const Matrix3d& to_index) {
   Matrix3d differences;
   for (int i = 0; i < 3; ++i) {
@@ -126,6 +168,10 @@ TensorBlocks derive(const SampleBlocks& blocks, const Matrix3d& to_index, const 
 
 TensorBlocks gradient(const SampleBlocks& blocks, const Matrix3d& to_index) {
   return derive(blocks, to_index, gradient_at);
+}
+
+TensorBlocks staggered_gradient(const SampleBlocks& blocks, const Matrix3d& to_index) {
+  return derive(blocks, to_index, staggered_gradient_at);
 }
 
 TensorBlocks hessian(const SampleBlocks& blocks, const Matrix3d& to_index) {

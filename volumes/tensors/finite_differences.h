@@ -33,6 +33,12 @@ using SampleBlocks = std::deque<SampleBlock, SlotAllocator<SampleBlock>>;
 /// T(i, j) = ∂v_i/∂x_j, world axes.
 TensorBlocks gradient(const SampleBlocks& blocks, const Eigen::Matrix3d& to_index);
 
+/// The same of a staggered grid (marker and cell): component i of a voxel is at the middle of its face towards −i, in
+/// index space. T is at the centres of the voxels: along i, the difference of the two faces of the voxel; along the
+/// other axes, differences of the mean of the two faces. The values are exact for quadratic components inside the
+/// active region, where the next voxel is active, too.
+TensorBlocks staggered_gradient(const SampleBlocks& blocks, const Eigen::Matrix3d& to_index);
+
 /// T(i, j) = ∂²f/∂x_i∂x_j, world axes; exactly symmetric.
 TensorBlocks hessian(const SampleBlocks& blocks, const Eigen::Matrix3d& to_index);
 

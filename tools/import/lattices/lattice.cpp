@@ -126,6 +126,8 @@ void require_room_for(const Lattice& lattice) {
 template <class Blocks, class ValueOf>
 void read_blocks(const Lattice& lattice, const ValueOf& value_of, Blocks& blocks, LatticeReport& report) {
   report = {};
+  report.notes = lattice.notes;
+  if (!lattice.frame_note.empty()) report.notes.push_back(lattice.frame_note);
   const auto slice_voxels = static_cast<std::size_t>(lattice.size.x()) * lattice.size.y();
   report.voxels = slice_voxels * lattice.size.z();
   require_room_for<typename Blocks::value_type>(lattice);
@@ -144,21 +146,31 @@ int unmasked(const Lattice& lattice) { return lattice.components - (lattice.mask
 TensorOrder order_of(const Lattice& lattice, const std::optional<TensorOrder>& order) {
   const int count = unmasked(lattice);
   if (order && (count == 9 || (lattice.order && *lattice.order != *order)))
-    throw std::invalid_argument(called(lattice) + " says its order itself: leave --order out");
+    throw std::invalid_argument(called(lattice) + " says its order itself: leave --order out (--frame says the axes)");
   if (count == 9) return TensorOrder::full;
   if (count == 3)
     throw std::invalid_argument(
         called(lattice) + " has three components, a vector: derive a tensor (--gradient-of), or choose another array");
-  if (count != 6 && count < 9)
+  if (count != 4 && count != 6 && count < 9)
     throw std::invalid_argument(fmt::format("{} has {} component{} and a tensor six or nine: choose another array",
                                             called(lattice), count, count == 1 ? "" : "s"));
-  const std::optional<TensorOrder> chosen = lattice.order ? lattice.order : order;
-  if (!chosen || *chosen == TensorOrder::full)
+  const std::optional<TensorOrder> chosen = lattice.order ? lattice.order : order ? order : lattice.usual_order;
+  if (count == 4 && (!chosen || component_count(*chosen) != 4))
+    throw std::invalid_argument(called(lattice) +
+                                " has four components of a tensor of a plane and does not say in which "
+                                "order: give it with --order plane|2x2");
+  if (!chosen || component_count(*chosen) != (count == 4 ? 4 : 6))
     throw std::invalid_argument(
         fmt::format("{} has six components of a symmetric tensor and does not say in which "
                     "order: give it with --order {}",
                     called(lattice), fmt::join(tensor_order_names(), "|")));
   return *chosen;
+}
+
+Matrix3d frame_of(const Lattice& lattice, TensorOrder order) {
+  if (order == TensorOrder::fsl) return lattice.fsl_frame.value_or(lattice.frame);
+  if (order == TensorOrder::lower_triangle) return lattice.lower_frame.value_or(lattice.frame);
+  return lattice.frame;
 }
 
 TensorGrid empty_grid(const Lattice& lattice) {
@@ -170,9 +182,20 @@ TensorGrid empty_grid(const Lattice& lattice) {
 
 }  // namespace
 
+void take_frame(Lattice& lattice, ComponentFrame frame) {
+  if (!lattice.takes_frame)
+    throw std::invalid_argument(called(lattice) +
+                                " says itself in which axes its components are, or is not in an anatomical space: "
+                                "leave --frame out");
+  lattice.frame = axes_of(frame, lattice.to_world.linear());
+  lattice.fsl_frame.reset();
+  lattice.lower_frame.reset();
+  lattice.frame_note.clear();
+}
+
 TensorGrid tensors_of(const Lattice& lattice, const std::optional<TensorOrder>& order, LatticeReport& report) {
   const TensorOrder chosen = order_of(lattice, order);
-  const Matrix3d frame = chosen == TensorOrder::fsl && lattice.fsl_frame ? *lattice.fsl_frame : lattice.frame;
+  const Matrix3d frame = frame_of(lattice, chosen);
   TensorGrid grid = empty_grid(lattice);
   const auto tensor = [&](const double* components) -> Eigen::Matrix3f {
     const Matrix3d turned = frame * tensor_of(components, chosen) * frame.transpose();

@@ -6,9 +6,11 @@
 #include <functional>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include <Eigen/Geometry>
 
+#include "tools/import/lattices/component_frame.h"
 #include "tools/import/lattices/tensor_order.h"
 #include "volumes/grids/tensor_grid.h"
 
@@ -21,15 +23,19 @@ struct Lattice {
   Eigen::Affine3d to_world = Eigen::Affine3d::Identity();  ///< From voxel indices (0 ...) to world; invertible.
   Eigen::Matrix3d frame = Eigen::Matrix3d::Identity();     ///< From the axes of the components to world axes.
 
-  /// Replaces `frame` if the user says that the order is `fsl`. FSL and MRtrix write the same kind of file, FSL with
-  /// components in the image's axes and MRtrix in world axes. Only the order tells the two apart.
-  std::optional<Eigen::Matrix3d> fsl_frame;
+  /// Replace `frame` if the order is `fsl`, or `lower_triangle`. FSL, dipy and MRtrix write the same kind of file, with
+  /// components in different axes. Only the order tells them apart, unless the user gives the frame.
+  std::optional<Eigen::Matrix3d> fsl_frame, lower_frame;
+  std::string frame_note;    ///< Where the file leaves `frame` open: how it was taken, for the user.
+  bool takes_frame = false;  ///< World is RAS and the file does not state `frame`: the user may (take_frame).
 
   std::string array;                 ///< Name of the quantity; may be empty.
   int components = 0;                ///< Numbers per voxel, including the mask.
   bool masked = false;               ///< The first component is a mask: the voxel is inactive where it is below 0.5.
   bool zero_is_background = false;   ///< Voxels whose components are all exactly zero are inactive.
   std::optional<TensorOrder> order;  ///< Set where the format defines the order.
+  std::optional<TensorOrder> usual_order;  ///< Used where neither the format nor the user says it.
+  std::vector<std::string> notes;          ///< What the file leaves open, and how it was taken: for the user.
 
   /// Writes the numbers of slice `z` to `values`: x fastest, the components of a voxel side by side, size.x() *
   /// size.y() * components numbers in all. Called once for each z, from size.z() − 1 down to 0.
@@ -40,9 +46,14 @@ struct Lattice {
 /// Counts of the voxels.
 struct LatticeReport {
   std::size_t voxels = 0, active = 0;
-  std::size_t non_finite = 0;  ///< Made inactive, because a component was NaN or infinite.
-  std::size_t background = 0;  ///< Inactive because of the mask, or because they are exactly zero.
+  std::size_t non_finite = 0;      ///< Made inactive, because a component was NaN or infinite.
+  std::size_t background = 0;      ///< Inactive because of the mask, or because they are exactly zero.
+  std::vector<std::string> notes;  ///< Those of the lattice.
 };
+
+/// Sets the axes of the components to those that the user gives.
+/// @throw std::invalid_argument naming the fix, if the file states them.
+void take_frame(Lattice& lattice, ComponentFrame frame);
 
 /// The tensors, in world axes, of a lattice with six or nine components (seven or ten if masked). If there are more
 /// than nine components, the first six are the tensor, and the others are derived from it. T = F C Fᵀ with the frame

@@ -21,11 +21,22 @@ namespace tensorray {
 Lattice open_nrrd(const std::filesystem::path& path);
 
 /// Reads NIfTI-1 and NIfTI-2 (.nii, .nii.gz, .hdr/.img) with 6, 9 or 3 (a vector) volumes along the fourth or the
-/// fifth axis. World is RAS millimetres, from sform, else qform, else the voxel sizes. Applies scl_slope and
-/// scl_inter. The order is known if the intent code is "symmetric matrix"; otherwise the user must give it. With the
-/// order `fsl` the components are in FSL's axes of the image (Lattice::fsl_frame), otherwise in world axes. Exactly
-/// zero is background. Holds all numbers in memory, and frees them slice by slice.
+/// fifth axis. World is RAS millimetres, from sform, else qform, else the voxel sizes with the first axis from right to
+/// left. Applies scl_slope and scl_inter. The order is known if the intent code is "symmetric matrix"; otherwise the
+/// user must give it. With the order `fsl` the components are in FSL's axes of the image, as lower triangles in those
+/// of the voxels, otherwise in world axes. Exactly zero is background. Holds all numbers in memory, and frees them
+/// slice by slice.
 Lattice open_nifti(const std::filesystem::path& path);
+
+/// Reads MetaImage (.mha, .mhd with its data file; ITK) with three axes and 6, 9 or 3 (a vector) channels. World is
+/// RAS, of the file's LPS. Components are in LPS unless the user gives the frame; six are xx xy xz yy yz zz unless the
+/// user gives the order. Exactly zero is background. Holds all numbers in memory.
+Lattice open_metaimage(const std::filesystem::path& path);
+
+/// Reads MRtrix's images (.mif, .mif.gz, .mih with its data file) with 6, 9 or 3 (a vector) volumes along the fourth
+/// axis. World is RAS millimetres. Six components are in the order `mrtrix` unless the user gives another one, in world
+/// axes but for the orders `fsl` and `lower`, as in NIfTI. Exactly zero is background. Holds all numbers in memory.
+Lattice open_mrtrix(const std::filesystem::path& path);
 
 /// Reads NumPy's .npy of shape (nz, ny, nx, 3, 3), (nz, ny, nx, 9), (nz, ny, nx, 6) or (nz, ny, nx, 3), in C or
 /// Fortran order, as float16, 32 or 64, in either byte order. World coordinates are the voxel indices (i, j, k), which

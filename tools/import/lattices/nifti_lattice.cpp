@@ -3,8 +3,10 @@
 // - FSL's dtifit takes gradient directions in the image's axes, and flips the first axis if the transform has a
 //   positive determinant ("neurological" storage): https://fsl.fmrib.ox.ac.uk, "bvecs". Its components have the
 //   same axes.
-// Hence FSL's frame is the rotation of the transform, with that flip. Vectors, nine components, and symmetric
-// matrices by intent code are read in world axes, because the format does not state their axes.
+// Hence FSL's frame is the rotation of the transform, with that flip. The format does not state the axes of symmetric
+// matrices by intent code (1005) either. ANTs and dipy write them in the axes of the voxels
+// (https://github.com/ANTsX/ANTs/wiki/Warp-and-reorient-a-diffusion-tensor-image), and so they are read. Vectors and
+// nine components are read in world axes. --frame says otherwise.
 
 #include <array>
 #include <cmath>
@@ -17,7 +19,6 @@
 #include <utility>
 #include <vector>
 
-#include <Eigen/SVD>
 #include <fmt/format.h>
 #include <nifti2_io.h>
 
@@ -178,10 +179,13 @@ std::vector<std::vector<Plane>> read_planes(const nifti_image& image, const std:
   return slices;
 }
 
-/// From voxel indices to RAS millimetres. Files that do not state their unit are in millimetres.
+bool has_orientation(const nifti_image& image) { return image.sform_code > 0 || image.qform_code > 0; }
+
+/// From voxel indices to RAS millimetres. Files that do not state their unit are in millimetres. Files without an
+/// orientation are taken as FSL, nibabel and SPM take ANALYZE: the first axis runs from right to left.
 Eigen::Affine3d to_world(const nifti_image& image, const std::filesystem::path& path) {
-  Eigen::Matrix4d matrix = Eigen::Vector4d(image.dx, image.dy, image.dz, 1).asDiagonal();
-  if (image.sform_code > 0 || image.qform_code > 0) {
+  Eigen::Matrix4d matrix = Eigen::Vector4d(-std::abs(image.dx), image.dy, image.dz, 1).asDiagonal();
+  if (has_orientation(image)) {
     const nifti_dmat44& form = image.sform_code > 0 ? image.sto_xyz : image.qto_xyz;
     matrix = Eigen::Map<const Eigen::Matrix<double, 4, 4, Eigen::RowMajor>>(&form.m[0][0]);
   }
@@ -198,15 +202,6 @@ Eigen::Affine3d to_world(const nifti_image& image, const std::filesystem::path& 
   return transform;
 }
 
-/// The rotation nearest to the directions of the voxel axes, with FSL's flip of the first axis.
-Matrix3d fsl_frame(const Matrix3d& linear) {
-  const Matrix3d directions = linear.colwise().normalized();
-  const Eigen::JacobiSVD<Matrix3d> svd(directions, Eigen::ComputeFullU | Eigen::ComputeFullV);
-  Matrix3d frame = svd.matrixU() * svd.matrixV().transpose();
-  if (linear.determinant() > 0) frame.col(0) *= -1;
-  return frame;
-}
-
 }  // namespace
 
 Lattice open_nifti(const std::filesystem::path& path) {
@@ -217,10 +212,20 @@ Lattice open_nifti(const std::filesystem::path& path) {
   check_sizes(*image, path, lattice.components);
   lattice.size = {static_cast<int>(image->nx), static_cast<int>(image->ny), static_cast<int>(image->nz)};
   lattice.to_world = to_world(*image, path);
-  lattice.fsl_frame = fsl_frame(lattice.to_world.linear());
+  lattice.fsl_frame = axes_of(ComponentFrame::fsl, lattice.to_world.linear());
+  lattice.lower_frame = axes_of(ComponentFrame::voxels, lattice.to_world.linear());
+  lattice.takes_frame = true;
+  if (!has_orientation(*image))
+    lattice.notes.push_back(
+        "states no orientation (the codes of sform and qform are 0): its first axis is taken to run from right to "
+        "left, as FSL does; set the sform if it does not");
   lattice.zero_is_background = true;
   if (image->intent_code == NIFTI_INTENT_SYMMATRIX && lattice.components == 6)
     lattice.order = TensorOrder::lower_triangle;
+  if (lattice.order)
+    lattice.frame_note =
+        "does not say the axes of its symmetric matrices: taken as those of the voxels, as ANTs and dipy write them; "
+        "--frame says otherwise";
   // A slope of zero means no scaling; some programs write NaN instead.
   const bool scaled = std::isfinite(image->scl_slope) && image->scl_slope != 0;
   const double slope = scaled ? image->scl_slope : 1;

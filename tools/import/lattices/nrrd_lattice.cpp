@@ -225,11 +225,18 @@ Eigen::Affine3d to_world(const Nrrd& nrrd, const Axes& axes, const std::filesyst
   return to_ras(nrrd).asDiagonal() * transform;
 }
 
+bool has_frame(const Nrrd& nrrd) { return nrrd.spaceDim == 3 && !std::isnan(nrrd.measurementFrame[0][0]); }
+
+bool is_anatomical(const Nrrd& nrrd) {
+  return nrrd.space == nrrdSpaceRightAnteriorSuperior || nrrd.space == nrrdSpaceLeftPosteriorSuperior ||
+         nrrd.space == nrrdSpaceLeftAnteriorSuperior;
+}
+
 /// From the measurement frame, which the components use, to RAS. The file lists the columns of the matrix:
 /// measurementFrame[i] is column i.
 Matrix3d frame_of(const Nrrd& nrrd, const std::filesystem::path& path) {
   Matrix3d frame = Matrix3d::Identity();
-  if (nrrd.spaceDim == 3 && !std::isnan(nrrd.measurementFrame[0][0]))
+  if (has_frame(nrrd))
     for (int i = 0; i < 3; ++i) frame.col(i) = Eigen::Map<const Vector3d>(nrrd.measurementFrame[i]);
   if (!frame.allFinite() || !(std::abs(frame.determinant()) > 1e-9 * frame.colwise().norm().prod()))
     fail(path, "its measurement frame cannot be inverted: correct or remove it");
@@ -280,6 +287,7 @@ Lattice open_nrrd(const std::filesystem::path& path) {
   lattice.order = components.order;
   lattice.to_world = to_world(*nrrd, axes, path);
   lattice.frame = frame_of(*nrrd, path);
+  lattice.takes_frame = is_anatomical(*nrrd) && !has_frame(*nrrd);
   lattice.zero_is_background = true;
   const auto slices = std::make_shared<Slices>(std::move(nrrd), axes);
   lattice.read_slice = [slices](int z, double* values) { slices->read(z, values); };

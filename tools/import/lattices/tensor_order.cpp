@@ -25,6 +25,8 @@ Positions positions(TensorOrder order) {
       return {0, 2, 5, 1, 4, 3};
     case TensorOrder::vtk:
     case TensorOrder::full:
+    case TensorOrder::plane:
+    case TensorOrder::two_by_two:
       break;
   }
   return {0, 1, 2, 3, 4, 5};
@@ -33,12 +35,14 @@ Positions positions(TensorOrder order) {
 }  // namespace
 
 const std::vector<std::string>& tensor_order_names() {
-  static const std::vector<std::string> names = {"vtk", "fsl", "mrtrix", "voigt"};
+  static const std::vector<std::string> names = {"vtk", "fsl", "mrtrix", "voigt", "lower", "plane", "2x2"};
   return names;
 }
 
 TensorOrder tensor_order_of(const std::string& name) {
-  constexpr std::array orders = {TensorOrder::vtk, TensorOrder::fsl, TensorOrder::mrtrix, TensorOrder::voigt};
+  constexpr std::array orders = {
+      TensorOrder::vtk,   TensorOrder::fsl,       TensorOrder::mrtrix, TensorOrder::voigt, TensorOrder::lower_triangle,
+      TensorOrder::plane, TensorOrder::two_by_two};
   const auto& names = tensor_order_names();
   const auto found = std::find(names.begin(), names.end(), name);
   if (found == names.end())
@@ -47,11 +51,24 @@ TensorOrder tensor_order_of(const std::string& name) {
   return orders[static_cast<std::size_t>(found - names.begin())];
 }
 
+int component_count(TensorOrder order) {
+  if (order == TensorOrder::full) return 9;
+  return order == TensorOrder::plane || order == TensorOrder::two_by_two ? 4 : 6;
+}
+
 Eigen::Matrix3d tensor_of(const double* components, TensorOrder order) {
   if (order == TensorOrder::full) return Eigen::Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>(components);
-  const auto [xx, yy, zz, xy, yz, xz] = positions(order);
   const double* c = components;
   Eigen::Matrix3d tensor;
+  if (order == TensorOrder::plane) {
+    tensor << c[0], c[3], 0, c[3], c[1], 0, 0, 0, c[2];
+    return tensor;
+  }
+  if (order == TensorOrder::two_by_two) {
+    tensor << c[0], c[1], 0, c[2], c[3], 0, 0, 0, 0;
+    return tensor;
+  }
+  const auto [xx, yy, zz, xy, yz, xz] = positions(order);
   tensor << c[xx], c[xy], c[xz], c[xy], c[yy], c[yz], c[xz], c[yz], c[zz];
   return tensor;
 }

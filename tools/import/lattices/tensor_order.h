@@ -10,21 +10,26 @@
 namespace tensorray {
 
 enum class TensorOrder {
+  plane,           ///< Four, of a plane: xx yy zz xy; the others are zero. Ansys, Abaqus, CalculiX.
+  two_by_two,      ///< Four, of a plane: xx xy yx yy; the others are zero.
   full,            ///< Nine: xx xy xz yx yy yz zx zy zz, row by row.
   vtk,             ///< Six: xx yy zz xy yz xz. VTK, ParaView, Ansys, CalculiX.
   fsl,             ///< Six: xx xy xz yy yz zz. FSL, NRRD. OpenFOAM's files also use it, but VTK converts them to `vtk`.
   mrtrix,          ///< Six: xx yy zz xy xz yz. MRtrix.
   voigt,           ///< Six: xx yy zz yz xz xy. Continuum mechanics.
-  lower_triangle,  ///< Six: xx xy yy xz yz zz. NIfTI with the intent "symmetric matrix"; users cannot choose it.
+  lower_triangle,  ///< Six: xx xy yy xz yz zz. NIfTI with the intent "symmetric matrix" (ITK, ANTs), dipy, AFNI.
 };
 
-/// The names that users can choose: "vtk", "fsl", "mrtrix", "voigt".
+/// The names that users can choose: "vtk", "fsl", "mrtrix", "voigt", "lower", "plane", "2x2".
 const std::vector<std::string>& tensor_order_names();
 
 /// @throw std::invalid_argument listing the names if `name` is unknown.
 TensorOrder tensor_order_of(const std::string& name);
 
-/// The tensor with nine (`full`) or six components. Six components make a symmetric tensor.
+/// The number of components: nine, six or four.
+int component_count(TensorOrder order);
+
+/// The tensor with component_count(order) components. Six components make a symmetric tensor.
 Eigen::Matrix3d tensor_of(const double* components, TensorOrder order);
 
 }  // namespace tensorray

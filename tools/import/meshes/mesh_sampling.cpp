@@ -128,8 +128,18 @@ void require_two(int count) {
   if (count < 2) throw std::invalid_argument(fmt::format("--resolution {}: at least 2 voxels are needed", count));
 }
 
+/// What is sampled: the whole thickness of a slab.
+AlignedBox3d wanted_box(const SamplingSettings& settings, const Solid& solid) {
+  AlignedBox3d box = settings.bounds.value_or(solid.bounds);
+  if (const int flat = settings.flat_axis; flat >= 0) {
+    box.min()[flat] = solid.bounds.min()[flat];
+    box.max()[flat] = solid.bounds.max()[flat];
+  }
+  return box;
+}
+
 LatticeShape shape_of(vtkDataSet& mesh, const Solid& solid, const SamplingSettings& settings) {
-  const AlignedBox3d box = settings.bounds.value_or(solid.bounds);
+  const AlignedBox3d box = wanted_box(settings, solid);
   if (!(box.sizes().minCoeff() > 0) || !box.sizes().allFinite())
     throw std::invalid_argument(fmt::format("--bounds: {} to {} is not a box", text_of(box.min()), text_of(box.max())));
   if (!box.intersects(solid.bounds))
@@ -159,6 +169,7 @@ LatticeShape shape_of(vtkDataSet& mesh, const Solid& solid, const SamplingSettin
     size = voxels_along(box.sizes(), voxel);
     shape.voxel.setConstant(voxel);
   }
+  if (const int flat = settings.flat_axis; flat >= 0) size[flat] = 1, shape.voxel[flat] = box.sizes()[flat];
   if (size.prod() > most_voxels)
     throw std::invalid_argument(
         fmt::format("a grid of {:.0f} x {:.0f} x {:.0f} voxels is beyond the limit of 2^30: give "
@@ -335,7 +346,7 @@ TensorGrid sample_mesh(vtkDataSet& mesh, const SamplingSettings& settings, const
   grid.blocks = filled_blocks(source, bins_of(solid, shape, tolerance), progress);
   report.size = shape.size;
   report.voxel = shape.voxel;
-  report_native(mesh, tensors, solid, settings.bounds.value_or(solid.bounds), report);
+  report_native(mesh, tensors, solid, wanted_box(settings, solid), report);
   report_sampled(grid, report);
   if (report.active == 0)
     throw std::invalid_argument(

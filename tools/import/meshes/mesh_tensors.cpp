@@ -31,8 +31,9 @@ using Array = vtkSmartPointer<vtkDoubleArray>;
 
 constexpr double not_a_number = std::numeric_limits<double>::quiet_NaN();
 
-bool suits(int components, Take take) {
-  if (take == Take::tensor) return components == 6 || components >= 9;
+/// @param is_named  The user names the array. Without, four components may be anything, such as colours.
+bool suits(int components, Take take, bool is_named) {
+  if (take == Take::tensor) return components == 6 || components >= 9 || (components == 4 && is_named);
   return components == 3;
 }
 
@@ -55,14 +56,16 @@ void for_each_array(vtkDataSet& mesh, const Visit& visit) {
 }
 
 const char* wanted(Take take) {
-  return take == Take::tensor ? "a tensor has 6, 9, or more than 9 components" : "a vector has 3 components";
+  return take == Take::tensor ? "a tensor has 6, 9, or more than 9 components, of a plane 4"
+                              : "a vector has 3 components";
 }
 
 /// The order that the names of the first six components tell, as ParaView, CalculiX's converters and others write
 /// them: XX, S_YY, xy, S13, ... The two indices may be swapped.
 std::optional<TensorOrder> order_of_names(vtkDataArray& array) {
   std::string names;
-  for (int i = 0; i < 6; ++i) {
+  const int count = array.GetNumberOfComponents() == 4 ? 4 : 6;
+  for (int i = 0; i < count; ++i) {
     const char* given = array.GetComponentName(i);
     const std::string name = given ? given : "";
     if (name.size() < 2) return {};
@@ -74,16 +77,20 @@ std::optional<TensorOrder> order_of_names(vtkDataArray& array) {
     if (axes[0] > axes[1]) std::swap(axes[0], axes[1]);
     names += axes;
   }
+  if (names == "xxyyzzxy") return TensorOrder::plane;
+  if (names == "xxxyxyyy") return TensorOrder::two_by_two;
   if (names == "xxyyzzxyyzxz") return TensorOrder::vtk;
   if (names == "xxxyxzyyyzzz") return TensorOrder::fsl;
   if (names == "xxyyzzxyxzyz") return TensorOrder::mrtrix;
   if (names == "xxyyzzyzxzxy") return TensorOrder::voigt;
+  if (names == "xxxyyyxzyzzz") return TensorOrder::lower_triangle;
   return {};
 }
 
 std::string component_names(vtkDataArray& array) {
   std::string names;
-  for (int i = 0; i < 6; ++i) names += (names.empty() ? "" : " ") + std::string(array.GetComponentName(i));
+  for (int i = 0; i < 6 && array.GetComponentName(i); ++i)
+    names += (names.empty() ? "" : " ") + std::string(array.GetComponentName(i));
   return names;
 }
 
@@ -219,9 +226,16 @@ TensorOrder order_in(vtkDataArray& array, const std::optional<TensorOrder>& give
                     "otherwise; leave --order out",
                     array.GetName(), component_names(array)));
   if (said) return *said;
-  if (given) return *given;
+  const int count = array.GetNumberOfComponents() == 4 ? 4 : 6;
+  if (given && component_count(*given) == count) return *given;
+  if (count == 4)
+    throw std::invalid_argument(
+        fmt::format("array \"{}\" has 4 components, a tensor of a plane in an order that it does not say: give --order "
+                    "plane (xx yy zz xy) or 2x2 (xx xy yx yy)",
+                    array.GetName()));
   std::string names;
-  for (const std::string& name : tensor_order_names()) names += (names.empty() ? "" : ", ") + name;
+  for (const std::string& name : tensor_order_names())
+    if (component_count(tensor_order_of(name)) == 6) names += (names.empty() ? "" : ", ") + name;
   throw std::invalid_argument(
       fmt::format("array \"{}\" has {} components, of which the first six are a symmetric tensor, in an order that it "
                   "does not say: give --order, one of {}",
@@ -234,7 +248,7 @@ ArrayChoice choose_array(vtkDataSet& mesh, const std::string& name, Take take) {
   for_each_array(mesh, [&](vtkDataArray& array, bool of_cells) {
     if (!name.empty() && array.GetName() != name) return;
     components_of_named = array.GetNumberOfComponents();
-    if (!suits(components_of_named, take)) return;
+    if (!suits(components_of_named, take, !name.empty())) return;
     for (const ArrayChoice& choice : choices)
       if (choice.name == array.GetName()) return;
     choices.push_back({array.GetName(), of_cells});
@@ -257,7 +271,7 @@ ArrayChoice choose_array(vtkDataSet& mesh, const std::string& name, Take take) {
 vtkSmartPointer<vtkDataSet> with_tensors(vtkDataSet& mesh, const ArrayChoice& array, Take take,
                                          const std::optional<TensorOrder>& order) {
   vtkDataArray* const given = attributes(mesh, array.of_cells).GetArray(array.name.c_str());
-  if (!given || !suits(given->GetNumberOfComponents(), take))
+  if (!given || !suits(given->GetNumberOfComponents(), take, true))
     throw std::invalid_argument(
         fmt::format("no array \"{}\" of which {}; {}", array.name, wanted(take), list_of_arrays(mesh)));
   const TensorOrder known_order = take == Take::tensor ? order_in(*given, order) : TensorOrder::full;

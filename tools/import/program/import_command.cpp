@@ -35,9 +35,10 @@ constexpr double kept_peak = 0.95;
 
 struct ImportOptions {
   ImportSettings settings;
-  std::string array, gradient_of, strain_of, order, frame = "ras";
+  std::string array, gradient_of, strain_of, order, frame;
   std::vector<int> resolution;
   std::vector<double> voxel_size, bounds, origin;
+  double thickness = 0;
   std::filesystem::path output, boundary;
   std::string name, units, steps = "last";
   std::size_t memory = 0;  ///< Bytes; 0: without a bound.
@@ -56,10 +57,11 @@ ImportSettings settings_of(const ImportOptions& options) {
     settings.take = Take::strain;
   }
   if (!options.order.empty()) settings.order = tensor_order_of(options.order);
-  settings.lps = options.frame == "lps";
+  if (!options.frame.empty()) settings.frame = component_frame_of(options.frame);
   if (options.voxel_size.size() == 1) settings.sampling.resolution = options.voxel_size[0];
   if (options.voxel_size.size() == 2) throw std::invalid_argument("--voxel-size needs one number, or three: x y z");
   if (options.voxel_size.size() == 3) settings.voxel = Eigen::Vector3d(options.voxel_size.data());
+  if (options.thickness > 0) settings.thickness = options.thickness;
   if (options.resolution.size() == 1) settings.sampling.resolution = options.resolution[0];
   if (options.resolution.size() == 3) settings.sampling.resolution = Eigen::Vector3i(options.resolution.data());
   if (options.resolution.size() == 2) throw std::invalid_argument("--resolution needs one number, or three: x y z");
@@ -81,6 +83,7 @@ void print_lattice(const LatticeReport& report) {
   };
   tell_made(fmt::format("  voxels as they were: {} of {} active ({:.1f}%); {} background, {} not finite", report.active,
                         report.voxels, percent(report.active), report.background, report.non_finite));
+  for (const std::string& note : report.notes) tell_made(fmt::format("  {}", note));
 }
 
 void print_sampling(const ImportReport& report) {
@@ -126,6 +129,9 @@ void import_to(const ImportOptions& options, const ImportSettings& settings, Out
                         size.y(), size.z(),
                         bytes_text(static_cast<double>(std::filesystem::file_size(output.path())))));
   if (report.lattice) print_lattice(*report.lattice);
+  if (report.thickness > 0)
+    tell_made(fmt::format("  a flat mesh: a slab of one voxel, {:.4g} thick{}", report.thickness,
+                          settings.thickness ? "" : " (--thickness)"));
   if (report.mesh) print_sampling(report);
   if (report.boundary_triangles > 0)
     tell_made(
@@ -216,16 +222,19 @@ void add_what(CLI::App& command, ImportOptions& options) {
   array->excludes(gradient, strain);
   gradient->excludes(strain);
   command
-      .add_option("--order", options.order,
-                  "Order of six components: vtk (xx yy zz xy yz xz), fsl (xx xy xz yy yz zz), mrtrix (xx yy zz xy xz "
-                  "yz), voigt (xx yy zz yz xz xy)")
+      .add_option(
+          "--order", options.order,
+          "Order of six components: vtk (xx yy zz xy yz xz), fsl (xx xy xz yy yz zz), mrtrix (xx yy zz xy xz "
+          "yz), voigt (xx yy zz yz xz xy), lower (xx xy yy xz yz zz); of four: plane (xx yy zz xy), 2x2 (xx xy yx yy)")
       ->check(CLI::IsMember(tensor_order_names()))
       ->option_text("ORDER");
   command
       .add_option("--frame", options.frame,
-                  "Frame of a NIfTI file's vectors and tensors: ras, or lps, in which ITK and ANTs write displacements "
-                  "(ras)")
-      ->check(CLI::IsMember({"ras", "lps"}))
+                  "Axes of the components in anatomical files (NIfTI, NRRD, MetaImage, MRtrix): ras (scanner; MRtrix), "
+                  "lps (displacements of "
+                  "ITK and ANTs), voxels (tensors of ANTs and dipy), fsl (voxels, with FSL's flip); default: those of "
+                  "--order fsl and lower, else ras (MetaImage: lps)")
+      ->check(CLI::IsMember(component_frame_names()))
       ->option_text("FRAME");
   for (CLI::Option* option : command.get_options({}))
     if (option != command.get_help_ptr()) option->group("What to take");
@@ -250,6 +259,11 @@ void add_where(CLI::App& command, ImportOptions& options) {
       .add_option("--origin", options.origin, "World x y z of the centre of the first voxel of .npy (default: 0 0 0)")
       ->expected(3)
       ->group("Grid");
+  command
+      .add_option("--thickness", options.thickness,
+                  "Thickness of the slab that a flat mesh becomes (default: a typical edge of its cells)")
+      ->check(positive)
+      ->group("Grid");
   command.add_option("--bounds", options.bounds, "Crop: xmin xmax ymin ymax zmin zmax")->expected(6)->group("Grid");
 }
 
@@ -261,9 +275,11 @@ void add_import_options(CLI::App& program, Progress& progress) {
   add_where(program, *options);
   program
       .add_option("FILE", options->settings.files,
-                  "VTK (.vti .vtr .vts .vtu .vtk .pvti .pvtr .pvts .pvtu .vtm .pvd), ExodusII (.ex2 .exo .e .g), CGNS "
+                  "VTK (.vti .vtr .vts .vtu .vtk .pvti .pvtr .pvts .pvtu .vtm .pvd .vtkhdf), XDMF (.xdmf .xmf), "
+                  "EnSight (.case), ExodusII (.ex2 .exo .e .g), CGNS "
                   "(.cgns), an OpenFOAM "
-                  "case (its folder, or a .foam in it), NRRD (.nrrd .nhdr), NIfTI (.nii .nii.gz .hdr), NumPy (.npy); "
+                  "case (its folder, or a .foam in it), NRRD (.nrrd .nhdr), NIfTI (.nii .nii.gz .hdr), MetaImage (.mha "
+                  ".mhd), MRtrix (.mif .mif.gz .mih), NumPy (.npy); "
                   "of PLOT3D two, the grid and its q")
       ->required()
       ->expected(1, 2)

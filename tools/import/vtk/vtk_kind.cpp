@@ -18,6 +18,7 @@
 #include "base/errors.h"
 #include "base/text.h"
 #include "tools/import/vtk/netcdf_size.h"
+#include "tools/import/vtk/openfoam_parts.h"
 
 namespace tensorray {
 namespace {
@@ -45,6 +46,9 @@ const std::vector<KindFacts>& kinds() {
       {VtkKind::exodus, "an ExodusII file", nullptr, {".ex2", ".exo", ".e", ".g"}},
       {VtkKind::cgns, "a CGNS file", nullptr, {".cgns"}},
       {VtkKind::openfoam, "an OpenFOAM case", nullptr, {".foam"}},
+      {VtkKind::ensight, "a case of EnSight", nullptr, {".case", ".encas"}},
+      {VtkKind::xdmf, "an XDMF file", nullptr, {".xdmf", ".xmf", ".xdmf2", ".xdmf3"}},
+      {VtkKind::vtkhdf, "a VTKHDF file", nullptr, {".vtkhdf", ".hdf"}},
       {VtkKind::blocks, "a VTK multi-block file", "vtkMultiBlockDataSet", {".vtm"}},
       {VtkKind::time_series, "a ParaView collection", "Collection", {".pvd"}},
   };
@@ -99,16 +103,33 @@ std::optional<VtkKind> xml_kind(const fs::path& path, const std::string& head) {
            "', which has no volume to import; save it as an image, a rectilinear, structured or unstructured grid");
 }
 
+/// Whether a text begins, after comments, with EnSight's section FORMAT.
+bool is_ensight(const std::string& head) {
+  std::istringstream stream(head);
+  for (std::string line; std::getline(stream, line);) {
+    if (line.compare(0, 6, "FORMAT") == 0) return true;
+    if (line.find_first_not_of(" \t\r") != std::string::npos && line[0] != '#') return false;
+  }
+  return false;
+}
+
 std::optional<VtkKind> kind_of_contents(const fs::path& path, const std::string& head) {
   const auto begins_with = [&](const std::string& magic) { return head.compare(0, magic.size(), magic) == 0; };
   if (begins_with("# vtk DataFile Version")) return VtkKind::legacy;
   for (const char version : {'\x01', '\x02', '\x05'}) {
     if (begins_with(std::string("CDF") + version)) return VtkKind::exodus;
   }
-  if (begins_with("\x89HDF\r\n\x1a\n"))  // Of both kinds; their readers tell what else is in the file.
-    return lower_case_ending(path) == ".cgns" ? VtkKind::cgns : VtkKind::exodus;
+  if (begins_with("\x89HDF\r\n\x1a\n")) {  // Of several kinds; their readers tell what else is in the file.
+    const std::optional<VtkKind> promised = promised_kind(path);
+    if (promised == VtkKind::cgns || promised == VtkKind::vtkhdf) return promised;
+    if (const std::string ending = lower_case_ending(path); ending == ".h5" || ending == ".hdf5")
+      return VtkKind::vtkhdf;
+    return VtkKind::exodus;
+  }
   if (head.find("ADF Database") == 4) return VtkKind::cgns;
   if (const std::optional<VtkKind> kind = xml_kind(path, head)) return kind;
+  if (head.find("<Xdmf") != std::string::npos) return VtkKind::xdmf;
+  if (is_ensight(head)) return VtkKind::ensight;
   if (path.filename() == "controlDict" || path.extension() == ".foam") return VtkKind::openfoam;
   return {};
 }
@@ -206,38 +227,31 @@ void check_legacy(const fs::path& path, const std::string& head) {
   }
 }
 
-/// VTK reads a case without results as a case with one time and no fields.
-bool has_times(const fs::path& folder) {
-  return std::any_of(fs::directory_iterator(folder), fs::directory_iterator(), [](const fs::directory_entry& entry) {
-    const std::string name = entry.path().filename().string();
-    char* end = nullptr;
-    std::strtod(name.c_str(), &end);
-    return entry.is_directory() && *end == '\0';
-  });
-}
-
-void check_foam(const fs::path& path) {
-  const fs::path folder = openfoam_case(path);
-  if (!fs::exists(folder / "system" / "controlDict")) {
-    fail(path, "is no OpenFOAM case: " + (folder / "system/controlDict").string() + " is missing");
-  }
-  const bool mesh = fs::exists(folder / "constant" / "polyMesh");
-  if (!mesh && fs::exists(folder / "processor0")) {
-    fail(path, "is a decomposed OpenFOAM case; run reconstructPar (and reconstructParMesh) first");
-  }
-  if (!mesh) fail(path, "has no mesh: " + (folder / "constant/polyMesh").string() + " is missing; run blockMesh first");
-  for (const char* name : {"points", "faces", "owner", "neighbour"}) {
-    const fs::path part = folder / "constant" / "polyMesh" / name;
-    if (!fs::exists(part) && !fs::exists(part.string() + ".gz")) fail(part, "is missing; run blockMesh again");
-  }
-  if (!has_times(folder)) fail(path, "has no time folder; run the case's solver first");
+/// For formats that others convert: how. Empty for all others.
+std::string way_out(const std::string& ending, const std::string& name) {
+  const auto one_of = [&](std::initializer_list<const char*> endings) {
+    return std::any_of(endings.begin(), endings.end(), [&](const char* e) { return ending == e; });
+  };
+  if (one_of({".msh"}))
+    return "is a mesh of Gmsh, which is not read; run `meshio convert " + name + " FILE.vtu` (Debian's meshio-tools)";
+  if (one_of({".med"}))
+    return "is a file of MED (Salome, Code_Aster), which is not read; run `meshio convert " + name +
+           " FILE.vtk` (Debian's meshio-tools and python3-h5py)";
+  if (one_of({".frd"})) return "is a result of CalculiX, which is not read; convert it to .vtu with ccx2paraview";
+  if (one_of({".npz"}))
+    return "holds several arrays of NumPy; save the one of the tensors: numpy.save(\"FILE.npy\", numpy.load(\"" + name +
+           "\")[NAME])";
+  if (one_of({".dat", ".plt", ".tec", ".szplt"}))
+    return "may be a file of Tecplot, which is not read; open it in ParaView (File > Open, Tecplot reader) and save it "
+           "as .vtu, or .vtm if it has several blocks";
+  return {};
 }
 
 /// Also checks pieces, which may have the extent of the whole.
 VtkKind checked_kind(const fs::path& path) {
   if (!fs::exists(path)) fail(path, "does not exist");
   if (fs::is_directory(path)) {
-    check_foam(path);
+    openfoam_parts(path, openfoam_case(path));
     return VtkKind::openfoam;
   }
   const std::string head = read_head(path);
@@ -245,14 +259,13 @@ VtkKind checked_kind(const fs::path& path) {
   if (head.empty() && promised != VtkKind::openfoam) fail(path, "is empty; write it again");
   if (!found && promised) fail(path, std::string("is not ") + facts_of(*promised).text + ", as its ending says");
   const std::string ending = lower_case_ending(path);
-  if (ending == ".xdmf" || ending == ".xmf")
-    fail(path, "is a file of XDMF, which is not read; run `meshio convert " + path.filename().string() +
-                   " FILE.vtu`, or open it in ParaView and save it as .vtu");
+  if (const std::string way = way_out(ending, path.filename().string());
+      !way.empty() && (!found || ending == ".med"))  // MED is HDF5, too.
+    fail(path, way);
   if (!found)
     fail(path,
-         "is no file of VTK, ExodusII, CGNS or OpenFOAM, nor named as NRRD (.nrrd), NIfTI (.nii) or NumPy (.npy); "
-         "PLOT3D "
-         "needs two files, the grid and its q");
+         "is no file of VTK, ExodusII, CGNS, OpenFOAM, EnSight or XDMF, nor named as NRRD (.nrrd), NIfTI (.nii), "
+         "MetaImage (.mha), MRtrix (.mif) or NumPy (.npy); PLOT3D needs two files, the grid and its q");
   if (promised && *promised != *found) {
     fail(path, std::string("its ending says ") + facts_of(*promised).text + ", its contents are " +
                    facts_of(*found).text + "; give it the ending " + facts_of(*found).endings.front());
@@ -260,7 +273,7 @@ VtkKind checked_kind(const fs::path& path) {
   if (facts_of(*found).xml_type) check_xml_end(path);
   if (*found >= VtkKind::image_pieces && *found <= VtkKind::unstructured_pieces) check_pieces(path, *found);
   if (*found == VtkKind::legacy) check_legacy(path, head);
-  if (*found == VtkKind::openfoam) check_foam(path);
+  if (*found == VtkKind::openfoam) openfoam_parts(path, openfoam_case(path));
   if (*found == VtkKind::exodus) check_netcdf_size(path);
   return *found;
 }

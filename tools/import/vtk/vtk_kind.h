@@ -21,6 +21,9 @@ enum class VtkKind {
   exodus,
   cgns,
   openfoam,
+  ensight,
+  xdmf,
+  vtkhdf,
   blocks,       ///< .vtm, which names files of the kinds above.
   time_series,  ///< .pvd, which names files of the kinds above, also .vtm.
 };
@@ -30,7 +33,7 @@ enum class VtkKind {
 /// another kind; an XML image whose origin or spacing is not finite numbers; cut off (an XML file without its end; a
 /// piece that is missing, cut off or of another kind; a legacy file without its line DATASET); an image, rectilinear
 /// or structured grid whose pieces do not cover its extent; only surfaces; an OpenFOAM case without mesh, times or
-/// controlDict, or a decomposed case.
+/// controlDict.
 VtkKind vtk_kind(const std::filesystem::path& path);
 
 /// The files that a file in pieces lists, in that order.

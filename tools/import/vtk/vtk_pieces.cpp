@@ -100,7 +100,7 @@ DataSets data_sets_in(vtkDataObject* data) {
   return pieces;
 }
 
-vtkSmartPointer<vtkDataSet> one_data_set(const DataSets& pieces) {
+vtkSmartPointer<vtkDataSet> one_data_set(const DataSets& pieces, bool merges_points) {
   for (vtkDataSet* const piece : pieces) remove_ghosts(*piece);
   if (pieces.empty()) return nullptr;
   if (pieces.size() == 1) return pieces.front();
@@ -108,7 +108,7 @@ vtkSmartPointer<vtkDataSet> one_data_set(const DataSets& pieces) {
   complete_arrays(pieces, vtkDataObject::POINT);
   complete_arrays(pieces, vtkDataObject::CELL);
   vtkNew<vtkAppendFilter> append;
-  append->MergePointsOn();
+  append->SetMergePoints(merges_points);
   append->SetTolerance(0);
   append->SetOutputPointsPrecision(vtkAlgorithm::DEFAULT_PRECISION);
   for (vtkDataSet* const piece : pieces) append->AddInputData(piece);

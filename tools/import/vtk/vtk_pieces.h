@@ -23,6 +23,7 @@ DataSets data_sets_in(vtkDataObject* data);
 ///
 /// Removes copies of neighbours' cells (duplicate ghosts), and hidden cells of unstructured grids. Points are marked
 /// as ghosts only if they are hidden, because a copy of a neighbour's point has the neighbour's value.
-vtkSmartPointer<vtkDataSet> one_data_set(const DataSets& pieces);
+/// @param merges_points  False: points at equal positions stay apart, where pieces have values of their own.
+vtkSmartPointer<vtkDataSet> one_data_set(const DataSets& pieces, bool merges_points = true);
 
 }  // namespace tensorray

@@ -1,12 +1,15 @@
 #include "tools/import/vtk/vtk_source.h"
 
 #include <algorithm>
+#include <array>
+#include <map>
 #include <new>
 #include <stdexcept>
 #include <string>
 #include <vector>
 
 #include <vtkCGNSReader.h>
+#include <vtkCompositeDataSet.h>
 #include <vtkDataArray.h>
 #include <vtkDataSet.h>
 #include <vtkDataSetAttributes.h>
@@ -28,13 +31,19 @@
 #include <vtkXMLUnstructuredGridReader.h>
 
 #include "base/errors.h"
+#include "base/temporary_folder.h"
 #include "base/text.h"
+#include "tools/import/vtk/ensight.h"
+#include "tools/import/vtk/openfoam_parts.h"
+#include "tools/import/vtk/point_seams.h"
 #include "tools/import/vtk/silent_stderr.h"
 #include "tools/import/vtk/vtk_collection.h"
 #include "tools/import/vtk/vtk_geometry.h"
 #include "tools/import/vtk/vtk_kind.h"
 #include "tools/import/vtk/vtk_messages.h"
 #include "tools/import/vtk/vtk_pieces.h"
+#include "tools/import/vtk/vtkhdf.h"
+#include "tools/import/vtk/xdmf.h"
 
 namespace tensorray {
 namespace {
@@ -128,9 +137,9 @@ vtkSmartPointer<vtkDataObject> read_cgns(const Path& path, std::optional<int> st
   return reader->GetOutputDataObject(0);
 }
 
-/// The times of an OpenFOAM case, in order.
-std::vector<double> open_case(const Path& path, vtkOpenFOAMReader& reader) {
-  const Path dictionary = openfoam_case(path) / "system" / "controlDict";
+/// The times of a whole OpenFOAM case, in order.
+std::vector<double> open_case(const Path& folder, vtkOpenFOAMReader& reader) {
+  const Path dictionary = folder / "system" / "controlDict";
   reader.SetFileName(dictionary.c_str());
   reader.SkipZeroTimeOff();
   reader.UpdateInformation();
@@ -141,11 +150,14 @@ std::vector<double> open_case(const Path& path, vtkOpenFOAMReader& reader) {
   return times;
 }
 
-vtkSmartPointer<vtkDataObject> read_openfoam(const Path& path, std::optional<int> step) {
+/// Reads a whole case: one block, or one for each region.
+vtkSmartPointer<vtkDataObject> read_case(const Path& folder, std::optional<int> step) {
   vtkNew<vtkOpenFOAMReader> reader;
-  const std::vector<double> times = open_case(path, *reader);
-  reader->DisableAllPatchArrays();
-  reader->SetPatchArrayStatus("internalMesh", 1);
+  const std::vector<double> times = open_case(folder, *reader);
+  for (int i = 0; i < reader->GetNumberOfPatchArrays(); ++i) {
+    const std::string name = reader->GetPatchArrayName(i);
+    reader->SetPatchArrayStatus(name.c_str(), name == "internalMesh" || ends_with(name, "/internalMesh"));
+  }
   reader->EnableAllCellArrays();
   reader->EnableAllPointArrays();
   const int count = static_cast<int>(times.size());
@@ -154,8 +166,43 @@ vtkSmartPointer<vtkDataObject> read_openfoam(const Path& path, std::optional<int
   return reader->GetOutputDataObject(0);
 }
 
+/// One grid for each region; of a decomposed case, of the parts of all processors.
+vtkSmartPointer<vtkDataObject> read_openfoam(const Path& path, std::optional<int> step) {
+  const OpenFoamParts parts = openfoam_parts(path, openfoam_case(path));
+  if (parts.processors.empty()) return read_case(parts.folder, step);
+  const auto chosen = static_cast<std::size_t>(chosen_step(step, static_cast<int>(parts.times.size())));
+  const TemporaryFolder folder;
+  std::map<std::string, DataSets> regions;  // Of each region, the parts. A processor may have no part of a region.
+  for (const Path& one : processor_cases(parts, parts.times[chosen], folder / "")) {
+    const vtkSmartPointer<vtkDataObject> data = read_case(one, std::nullopt);
+    auto* const blocks = vtkMultiBlockDataSet::SafeDownCast(data);
+    for (unsigned int i = 0; blocks && i < blocks->GetNumberOfBlocks(); ++i) {
+      const char* const name =
+          blocks->HasMetaData(i) ? blocks->GetMetaData(i)->Get(vtkCompositeDataSet::NAME()) : nullptr;
+      for (const auto& set : data_sets_in(blocks->GetBlock(i))) {
+        check_geometry(*set, path);
+        regions[name ? name : ""].push_back(set);
+      }
+    }
+  }
+  auto result = vtkSmartPointer<vtkMultiBlockDataSet>::New();
+  for (const auto& [name, sets] : regions) {
+    share_point_values(sets);
+    result->SetBlock(result->GetNumberOfBlocks(), one_data_set(sets));
+  }
+  return result;
+}
+
+vtkSmartPointer<vtkDataObject> read_ensight_step(const Path& path, std::optional<int> step) {
+  const std::vector<double> times = ensight_times(path);
+  const int chosen = chosen_step(step, std::max(static_cast<int>(times.size()), 1));
+  return read_ensight(path, times.empty() ? std::nullopt : std::optional(times[static_cast<std::size_t>(chosen)]));
+}
+
 vtkSmartPointer<vtkDataObject> read_kind(VtkKind kind, const Path& path, std::optional<int> step) {
-  if (kind != VtkKind::exodus && kind != VtkKind::cgns && kind != VtkKind::openfoam)
+  constexpr std::array with_steps{VtkKind::exodus,  VtkKind::cgns, VtkKind::openfoam,
+                                  VtkKind::ensight, VtkKind::xdmf, VtkKind::vtkhdf};
+  if (std::find(with_steps.begin(), with_steps.end(), kind) == with_steps.end())
     chosen_step(step, 1);  // The others have one.
   switch (kind) {
     case VtkKind::legacy:
@@ -182,6 +229,12 @@ vtkSmartPointer<vtkDataObject> read_kind(VtkKind kind, const Path& path, std::op
       return read_cgns(path, step);
     case VtkKind::openfoam:
       return read_openfoam(path, step);
+    case VtkKind::ensight:
+      return read_ensight_step(path, step);
+    case VtkKind::xdmf:
+      return read_xdmf(path, chosen_step(step, xdmf_steps(path)));
+    case VtkKind::vtkhdf:
+      return read_vtkhdf(path, chosen_step(step, vtkhdf_steps(path)));
     case VtkKind::blocks:
     case VtkKind::time_series:
       break;  // read_data_sets reads them file by file.
@@ -228,7 +281,7 @@ vtkSmartPointer<vtkDataSet> read_vtk_source(const Path& path, std::optional<int>
   const SilentStderr silent;
   vtkSmartPointer<vtkDataSet> result;
   try {
-    result = one_data_set(read_data_sets(kind, path, messages, step));
+    result = one_data_set(read_data_sets(kind, path, messages, step), kind != VtkKind::openfoam);
   } catch (const std::bad_alloc&) {
     throw std::runtime_error(path.string() + ": is damaged, or too large: it announces more than memory holds");
   }
@@ -246,8 +299,11 @@ int time_steps(const Path& path) {
   const VtkMessages messages;
   const SilentStderr silent;
   int steps = 1;
-  if (kind == VtkKind::openfoam) steps = static_cast<int>(open_case(path, *vtkNew<vtkOpenFOAMReader>()).size());
+  if (kind == VtkKind::openfoam) steps = static_cast<int>(openfoam_parts(path, openfoam_case(path)).times.size());
   if (kind == VtkKind::cgns) steps = static_cast<int>(open_cgns(path, *vtkNew<vtkCGNSReader>()).size());
+  if (kind == VtkKind::ensight) steps = static_cast<int>(ensight_times(path).size());
+  if (kind == VtkKind::xdmf) steps = xdmf_steps(path);
+  if (kind == VtkKind::vtkhdf) steps = vtkhdf_steps(path);
   if (kind == VtkKind::exodus) {
     vtkNew<vtkExodusIIReader> reader;
     reader->SetFileName(path.c_str());

@@ -14,8 +14,10 @@ namespace tensorray {
 /// Reads a data set. Several blocks or pieces become one unstructured grid, whose points are merged where they meet.
 ///   .vtk (legacy)  .vti .vtr .vts .vtu  .pvti .pvtr .pvts .pvtu  .ex2 .exo .e .g (ExodusII)
 ///   .cgns (CGNS: the volumes of all zones)
+///   .case (EnSight)  .xdmf .xmf (XDMF)  .vtkhdf .hdf (VTKHDF)
 ///   .vtm (blocks)  .pvd (ParaView's collection, with steps of time)  of the files above
-///   .foam, controlDict or a folder with system/controlDict (OpenFOAM: internal mesh)
+///   .foam, controlDict or a folder with system/controlDict (OpenFOAM: internal mesh, also of several regions, whose
+///   points are not merged, and of cases that are decomposed)
 /// OpenFOAM stores fields at cells; VTK adds point arrays of the same names with the mean of the cells. A symmTensor
 /// (xx xy xz yy yz zz in OpenFOAM's files) is read in VTK's order, with its components named XX YY ZZ XY YZ XZ. A
 /// volTensorField is read as it is: OpenFOAM's grad(U) is ∂_i u_j, the transpose of this program's gradients. Points

@@ -1,0 +1,105 @@
+// EnSight's cases, as its manual describes them: Gold, in ASCII.
+
+#include <gmock/gmock.h>
+#include <vtkCellData.h>
+#include <vtkPointData.h>
+
+#include "base/progress.h"
+#include "tests/import/mesh_files.h"
+#include "tests/import/mesh_fixtures.h"
+#include "tools/import/import_file.h"
+#include "tools/import/vtk/vtk_source.h"
+
+namespace tensorray {
+namespace {
+
+using Eigen::Matrix3d;
+
+std::string number(double value) {
+  char text[16];
+  std::snprintf(text, sizeof text, "%12.5e\n", value);
+  return text;
+}
+
+std::string integer(int value) {
+  char text[16];
+  std::snprintf(text, sizeof text, "%10d", value);
+  return text;
+}
+
+/// Values of a variable: for each component, as many equal values as there are points or cells.
+std::string variable(const std::string& of, int count, const std::vector<double>& components) {
+  std::string text = "a variable\npart\n" + integer(1) + "\n" + of + "\n";
+  for (const double component : components)
+    for (int i = 0; i < count; ++i) text += number(component);
+  return text;
+}
+
+/// One cube from 0 to 2 along each axis, with three tensors at two times.
+void write_case(const std::filesystem::path& folder) {
+  std::string geometry =
+      "one\ncube\nnode id assign\nelement id assign\npart\n" + integer(1) + "\nbody\ncoordinates\n" + integer(8) + "\n";
+  for (int axis = 0; axis < 3; ++axis)
+    for (int i = 0; i < 8; ++i) geometry += number(2 * (i >> axis & 1));
+  geometry += "hexa8\n" + integer(1) + "\n";
+  for (const int corner : {1, 2, 4, 3, 5, 6, 8, 7}) geometry += integer(corner);
+  write_bytes(folder / "a.geo", geometry + "\n");
+  for (const int time : {0, 1}) {
+    const std::string name = "a." + std::to_string(time);
+    const double t = 100 * time;
+    write_bytes(folder / (name + ".sym"), variable("coordinates", 8, {t + 11, 22, 33, 12, 13, 23}));
+    write_bytes(folder / (name + ".gen"), variable("coordinates", 8, {t + 11, 12, 13, 21, 22, 23, 31, 32, 33}));
+    write_bytes(folder / (name + ".ele"), variable("hexa8", 1, {t + 11, 22, 33, 12, 13, 23}));
+  }
+  write_bytes(folder / "a.case",
+              "# a comment\nFORMAT\ntype: ensight gold\n\nGEOMETRY\nmodel: a.geo\n\nVARIABLE\n"
+              "tensor symm per node: 1 symmetric a.*.sym\ntensor asym per node: 1 general a.*.gen\n"
+              "tensor symm per element: 1 of_cells a.*.ele\n\nTIME\ntime set: 1\nnumber of steps: 2\n"
+              "filename start number: 0\nfilename increment: 1\ntime values: 0.5 2.5\n");
+}
+
+Matrix3d tensor_of(const std::filesystem::path& path, const std::string& array, std::optional<int> step = {}) {
+  ImportSettings settings;
+  settings.files = {path};
+  settings.array = array;
+  settings.step = step;
+  settings.sampling.resolution = 2;
+  ImportReport report;
+  const TensorGrid grid = import_tensors(settings, Progress(), report);
+  Matrix3d tensor = Matrix3d::Constant(NAN);
+  mesh_fixtures::for_each_voxel(grid, [&](const auto&, const Matrix3d& value) { tensor = value; });
+  EXPECT_EQ(grid.active_voxels(), 8u);
+  return tensor;
+}
+
+TEST(EnSight, TensorsHaveTheirOrderWithoutBeingTold) {
+  const TemporaryFolder folder;
+  write_case(folder);
+  Matrix3d symmetric, general;
+  symmetric << 111, 12, 13, 12, 22, 23, 13, 23, 33;
+  general << 111, 12, 13, 21, 22, 23, 31, 32, 33;
+  EXPECT_LT((tensor_of(folder / "a.case", "symmetric") - symmetric).norm(), 1e-3);
+  EXPECT_LT((tensor_of(folder / "a.case", "of_cells") - symmetric).norm(), 1e-3);
+  EXPECT_LT((tensor_of(folder / "a.case", "general") - general).norm(), 1e-3);
+}
+
+TEST(EnSight, StepsOfTime) {
+  const TemporaryFolder folder;
+  write_case(folder);
+  EXPECT_EQ(time_steps(folder / "a.case"), 2);
+  EXPECT_NEAR(tensor_of(folder / "a.case", "general", 0)(0, 0), 11, 1e-4);
+  EXPECT_NEAR(tensor_of(folder / "a.case", "general", 1)(0, 0), 111, 1e-4);
+  EXPECT_THROW(tensor_of(folder / "a.case", "general", 2), std::invalid_argument);
+}
+
+TEST(EnSight, DamageIsAnErrorWithTheFile) {
+  const TemporaryFolder folder;
+  write_case(folder);
+  std::filesystem::remove(folder / "a.geo");
+  EXPECT_NE(error_of([&] { read_vtk_source(folder / "a.case"); }).find("a.case: "), std::string::npos);
+  write_bytes(folder / "b.case", "no case\n");
+  EXPECT_NE(error_of([&] { read_vtk_source(folder / "b.case"); }).find("is not a case of EnSight"), std::string::npos);
+}
+
+}  // namespace
+}  // namespace tensorray

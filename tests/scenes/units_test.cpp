@@ -1,0 +1,106 @@
+// A scene in another unit of length is the same picture: nothing in a render has a length of its own.
+
+#include <cmath>
+#include <map>
+#include <set>
+#include <string>
+#include <vector>
+
+#include <fmt/format.h>
+#include <gtest/gtest.h>
+
+#include "base/progress.h"
+#include "scenes/pipeline/read_scene.h"
+#include "scenes/scene/render.h"
+#include "scenes/scene/scene.h"
+#include "volumes/tensors/generators.h"
+
+namespace tensorray {
+namespace {
+
+/// Channels of pictures that are lengths.
+const std::set<std::string> lengths{"displacement.x", "displacement.y", "displacement.z", "length", "Z"};
+
+/// A scene without its field. `$5` is the length 5.
+struct SceneCase {
+  std::string name, text;
+  int greatest = 86;  ///< Exponent of the greatest unit, 2^86 = 8e25.
+};
+
+const std::vector<SceneCase> scenes{
+    {"light on a plate", R"({"integrator": {"type": "photon_distribution"}})"},
+    {"photons", R"({"integrator": {"type": "photon_distribution",
+                    "density": {"kind": "photon_differential"}}})"},
+    {"lens", R"({"receiver": {"distance": $1, "size": [$3, $3], "resolution": [24, 24]},
+                 "integrator": {"type": "lens"}})"},
+    {"lens by gathering", R"({"integrator": {"type": "lens", "mode": "gather", "image_plane": {"distance": $0.5}}})"},
+    {"paths", R"({"integrator": {"type": "path_tracing", "max_samples": 4, "seeds": {"count": 20}}})"},
+    // The power of a lamp's photons, in units of area, is in single precision.
+    {"whole", R"({"objects": [{"plate": {"center": [0, 0, $-2.6], "size": [$16, $16]}, "texture": "checkerboard"}],
+                  "lights": [{"kind": "directional", "direction": [0.1, 0.15, -1]},
+                             {"kind": "area", "center": [0, 0, $3], "direction": [0, 0, -1], "size": [$0.2, $0.2],
+                              "strength": 20}],
+                  "camera": {"position": [$2.8, $-6.8, $1.6], "target": [0, 0, $-1.4], "resolution": [24, 24]},
+                  "integrator": {"type": "scene", "max_samples": 4, "min_samples": 4}})",
+     66},
+};
+
+/// Writes lengths of a scene in a unit.
+std::string in_unit(const std::string& text, double unit) {
+  std::string result;
+  for (std::size_t i = 0; i < text.size(); ++i) {
+    if (text[i] != '$') {
+      result += text[i];
+      continue;
+    }
+    std::size_t digits = 0;
+    result += fmt::format("{}", unit * std::stod(text.substr(i + 1), &digits));
+    i += digits;
+  }
+  return result;
+}
+
+Image picture_of(const SceneCase& one, double unit) {
+  Json json = Json::parse(in_unit(one.text, unit));
+  json["field"] = {{"scale", 0.6 / unit}, {"generate", {{"kind", "helix"}}}};
+  json["light"]["direction"] = {0.1, 0, -1};
+  json["light"]["wavelengths"]["count"] = 4;
+  json["light"]["photons"] = 4000;
+  if (!json.contains("receiver")) json["receiver"]["resolution"] = {24, 24};
+  if (!json.contains("camera")) json["camera"]["resolution"] = {24, 24};
+  TensorGrid grid = generate(Helix(), GridSettings{{17, 17, 17}});
+  grid.to_world = Eigen::Affine3d(Eigen::Scaling(unit)) * grid.to_world;
+  const Scene scene = load_scene(read_scene_json(json, "scene.json"),
+                                 prepare_field(std::move(grid), Eigenvalues::automatic, "helix"), Progress());
+  return render(scene, Progress()).linear;
+}
+
+TEST(Units, OfLengthDoNotChangeThePicture) {
+  for (const SceneCase& one : scenes) {
+    const Image expected = picture_of(one, 1);
+    // Powers of two near 1e-12, 1e-6, 1e10, 1e20 and 1e26: rounding is the same, except where lengths are compared with
+    // decimal tolerances.
+    for (const int exponent : {-40, -20, 33, 66, 86}) {
+      if (exponent > one.greatest) continue;
+      const double unit = std::ldexp(1.0, exponent);
+      const Image found = picture_of(one, unit);
+      ASSERT_EQ(found.channels, expected.channels);
+      ASSERT_EQ(found.pixels.size(), expected.pixels.size());
+      std::map<std::string, int> different;  // By channel.
+      std::size_t lit = 0;
+      for (std::size_t i = 0; i < found.pixels.size(); ++i) {
+        const std::string& channel = expected.channels[i % expected.channels.size()];
+        const double length = lengths.count(channel) > 0 ? unit : 1, wanted = expected.pixels[i];
+        const bool is_same = std::abs(found.pixels[i] / length - wanted) <= 1e-3 * (1 + std::abs(wanted));
+        if (!is_same && found.pixels[i] != expected.pixels[i]) ++different[channel];  // Z of nothing is always 1e10.
+        if (wanted > 0) ++lit;
+      }
+      EXPECT_GT(lit, found.pixels.size() / 8) << one.name;
+      for (const auto& [channel, count] : different)
+        EXPECT_LE(count, 6) << channel << " of " << one.name << " in units of " << unit;
+    }
+  }
+}
+
+}  // namespace
+}  // namespace tensorray
