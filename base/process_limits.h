@@ -13,9 +13,8 @@ namespace tensorray {
 unsigned usable_processors(const std::filesystem::path& root = "/");
 
 struct MemoryLimit {
-  double bytes = 0;  ///< Infinite if nothing is known.
-  std::string
-      cause;  ///< What sets it, for a message: "this machine's memory".
+  double bytes = 0;   ///< Infinite if nothing is known.
+  std::string cause;  ///< What sets it, for a message: "this machine's memory".
 };
 
 /// The least of: the machine's memory and swap, the memory of containers (cgroups), and what the limits of this process

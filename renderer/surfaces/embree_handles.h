@@ -99,8 +99,9 @@ inline Owned<RTCDevice> make_device(const char* settings = nullptr) {
   if (error == RTC_ERROR_UNSUPPORTED_CPU)
     throw std::runtime_error("Embree cannot start on this processor: it needs SSE2 or NEON");
   if (error == RTC_ERROR_OUT_OF_MEMORY) throw std::bad_alloc();
-  throw std::runtime_error("Embree cannot start (error " + std::to_string(error) +
-                           "): the limits of this process on memory or threads may be too low (`ulimit -v`, `ulimit -u`)");
+  throw std::runtime_error(
+      "Embree cannot start (error " + std::to_string(error) +
+      "): the limits of this process on memory or threads may be too low (`ulimit -v`, `ulimit -u`)");
 }
 
 }  // namespace tensorray::embree

@@ -130,8 +130,8 @@ void check_memory(double bytes, const std::string& what, const SceneSource& sour
   constexpr double program = 60e6;  // What the smallest render takes.
   const MemoryLimit limit = memory_limit();
   if (bytes + program > limit.bytes)
-    source.fail(fmt::format("{} needs about {}, more than {}, {}; ask for less of it", what, bytes_text(bytes + program),
-                            limit.cause, bytes_text(limit.bytes)));
+    source.fail(fmt::format("{} needs about {}, more than {}, {}; ask for less of it", what,
+                            bytes_text(bytes + program), limit.cause, bytes_text(limit.bytes)));
 }
 
 void check_receiver_memory(const SceneDescription& scene, double bytes_per_pixel, const SceneSource& source) {

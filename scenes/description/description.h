@@ -39,7 +39,7 @@ struct FieldDescription {
   std::optional<GenerateDescription> generate;  ///< Generated field, instead of a file.
   Derive derive = Derive::none;
   ComponentGrids components;  ///< The grids that are the field's components; empty: found by their names.
-  double smooth = 0;  ///< Deviation of the Gaussian that smooths the field, voxels; 0: none.
+  double smooth = 0;          ///< Deviation of the Gaussian that smooths the field, voxels; 0: none.
   Eigenvalues eigenvalues = Eigenvalues::automatic;
   Interpolation interpolation = Interpolation::cubic;
   BorderChoice border = BorderChoice::automatic;

@@ -253,7 +253,8 @@ void render_frame(const std::filesystem::path& scene_file, SceneChanges changes,
   const RenderRun with_number = at_frame(run, frame);
   const std::vector<std::filesystem::path> files = files_of(description, with_number);
   const std::filesystem::path checkpoint = checkpoint_of(description, with_number.keeping);
-  const bool is_done = std::all_of(files.begin(), files.end(), is_there) && (checkpoint.empty() || !is_there(checkpoint));
+  const bool is_done =
+      std::all_of(files.begin(), files.end(), is_there) && (checkpoint.empty() || !is_there(checkpoint));
   if (run.skip_existing && is_done) return;
   tell({fmt::format("frame {}", frame)}, run.quiet);
   Scene rendered = render_to_files(description, with_number, std::move(loaded), progress);
