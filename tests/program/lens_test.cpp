@@ -89,6 +89,29 @@ TEST_F(Lens, WithoutAFieldThePictureIsTheImage) {
   }
 }
 
+/// Light with alpha 0, such as a flame's, in a layer of the file, with a texel that is not finite.
+TEST_F(Lens, LightWithoutAlphaIsKept) {
+  Image glow(48, 32, {"R", "G", "B", "fire.R", "fire.G", "fire.B", "fire.A"});
+  for (int y = 0; y < 32; ++y)
+    for (int x = 0; x < 48; ++x) {
+      const float values[] = {0.5f, 0.5f, 0.5f, 3, 2, 1, 0};
+      std::copy_n(values, 7, glow.pixel(x, y));
+    }
+  glow.pixel(0, 0)[3] = NAN;
+  write_image(in_folder("glow.exr"), glow);
+  for (const std::string mode : {"gather", "scatter"}) {
+    write("scene.json", small_lens(R"("image": "glow.exr", "image_layer": "fire", "mode": ")" + mode + "\"", zero));
+    const Image seen = render({});
+    const float* const pixel = seen.pixel(24, 16);
+    EXPECT_NEAR(pixel[0], 3, 1e-3) << mode;
+    EXPECT_NEAR(pixel[1], 2, 1e-3) << mode;
+    EXPECT_NEAR(pixel[2], 1, 1e-3) << mode;
+    EXPECT_EQ(pixel[3], 0) << mode;
+  }
+  const Outcome outcome = run({"render", "scene.json", "-o", "out.exr"});
+  EXPECT_THAT(outcome.error, ::testing::HasSubstr("glow.exr: 1 pixels have values that are not finite"));
+}
+
 TEST_F(Lens, EveryChannelIsInTheExr) {
   write("scene.json", small_lens(R"("image": "checkerboard")"));
   for (const std::string mode : {"gather", "scatter"}) {
