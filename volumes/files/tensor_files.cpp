@@ -358,8 +358,8 @@ TensorGrid read_tensor_vdb(const std::filesystem::path& path, const std::string&
       file = {};  // Before the next one is read.
       malloc_trim(0);
       file = read_vdb(path, wanted, &slab);
-      /// What a field needs at least for a block, when its tensors are symmetric (TensorBrick).
-      constexpr std::size_t least_brick_bytes = 14000;
+      sources = sources_of(file, field);
+      add_blocks(path, sources, blocks);
     }
   };
   try {
