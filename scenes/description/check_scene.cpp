@@ -149,7 +149,8 @@ void check_spectral_output(const SceneDescription& scene, const SceneSource& sou
 void check_scene(SceneDescription& scene, const Json& json, const SceneSource& source) {
   scene.default_lights = !given(json, "/lights");
   scene.default_objects = !given(json, "/objects");
-  if (!is_library_config(scene.output.ocio)) scene.output.ocio = source.resolve(scene.output.ocio).string();
+  std::string& ocio = scene.output.ocio;
+  if (!ocio.empty() && !is_library_config(ocio)) ocio = source.resolve(ocio).string();
   if (!scene.bending.rgb) check_wavelengths(scene.light, source);
   check_normal(scene.receiver.normal, "/receiver", scene.light, source);
   check_lights(scene, source);

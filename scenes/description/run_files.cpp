@@ -11,7 +11,8 @@ namespace tensorray {
 std::vector<NamedFile> input_files(const SceneDescription& scene) {
   std::vector<NamedFile> files{
       {scene.path, "the scene file"}, {scene.field.file, "`/field/file`"}, {scene.field.bounds, "`/field/bounds`"}};
-  if (!is_library_config(scene.output.ocio)) files.push_back({scene.output.ocio, "`/output/ocio`"});
+  if (!scene.output.ocio.empty() && !is_library_config(scene.output.ocio))
+    files.push_back({scene.output.ocio, "`/output/ocio`"});
   const char* const config = std::getenv("OCIO");
   if (config && !is_library_config(config)) files.push_back({config, "$OCIO"});
   if (const auto* spectrum = std::get_if<std::filesystem::path>(&scene.light.spectrum))
