@@ -38,7 +38,9 @@ const std::vector<Command> commands{
     {"render",
      {"render", "INPUTS/scene.json", "-o", "RESULTS/a.png", "--checkpoint", "0.001", "--stats", "RESULTS/a.stats"},
      {"a.png"}},
-    {"sequence", {"render", "INPUTS/scene.json", "--frames", "1-2", "-o", "RESULTS/f.#.png"}, {"f.1.png", "f.2.png"}},
+    {"sequence",
+     {"render", "INPUTS/scene.json", "-q", "--frames", "1-2", "-o", "RESULTS/f.#.png"},
+     {"f.1.png", "f.2.png"}},
     {"shard", {"render", "INPUTS/scene.json", "--shard", "1/1", "-o", "RESULTS/b.shard"}, {"b.shard"}, false},
     {"merge", {"merge", "INPUTS/1.shard", "INPUTS/2.shard", "-o", "RESULTS/m.png"}, {"m.png"}},
     {"import", {"import", "INPUTS/tensors.npy", "-o", "RESULTS/i.vdb"}, {"i.vdb"}},
@@ -116,6 +118,7 @@ class Surroundings : public Program, public ::testing::WithParamInterface<std::s
 
   /// Runs a command to its end; a view ends when it has printed its address.
   Outcome run_in(const Place& place, const Command& command, const std::filesystem::path& results) const {
+    std::filesystem::remove(in_folder("stdout"));  // That of another run has an address, too.
     const pid_t child = start_in(place.shell, arguments_of(command, results));
     if (std::string(command.name) == "view") {
       siginfo_t info{};
