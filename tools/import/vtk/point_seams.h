@@ -6,9 +6,9 @@
 
 namespace tensorray {
 
-/// Gives points at the same position, in different parts, the same values: the mean of theirs, weighted by the cells that
-/// each part has there. Where the values of points are means of their cells, as VTK makes them for OpenFOAM, they are
-/// then those of the whole mesh. Only arrays that all parts have, with as many components, change.
+/// Gives points at the same position, in different parts, the same values: the mean of theirs, weighted by the cells
+/// that each part has there. Where the values of points are means of their cells, as VTK makes them for OpenFOAM, they
+/// are then those of the whole mesh. Only arrays that all parts have, with as many components, change.
 void share_point_values(const DataSets& parts);
 
 }  // namespace tensorray
