@@ -66,10 +66,10 @@ double FlowLattice::v_of(std::uint32_t patch, std::uint32_t y) const {
 
 bool FlowLattice::is_at_edge(const Square& square) const {
   const Patch& patch = patches[square.patch];
-  const std::uint32_t side = side_of(square), right = static_cast<std::uint32_t>(patch.columns) << levels,
-                      top = static_cast<std::uint32_t>(patch.rows) << levels;
-  return (patch.is_edge[0] && square.y == 0) || (patch.is_edge[1] && square.x + side == right) ||
-         (patch.is_edge[2] && square.y + side == top) || (patch.is_edge[3] && square.x == 0);
+  const std::uint32_t column = square.x >> levels, row = square.y >> levels;
+  return (patch.is_edge[0] && row == 0) ||
+         (patch.is_edge[1] && column + 1 == static_cast<std::uint32_t>(patch.columns)) ||
+         (patch.is_edge[2] && row + 1 == static_cast<std::uint32_t>(patch.rows)) || (patch.is_edge[3] && column == 0);
 }
 
 bool FlowLattice::is_on_border(const Square& square) const {

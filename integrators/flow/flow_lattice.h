@@ -41,6 +41,7 @@ struct Square {
 struct FlowLattice {
   std::vector<Patch> patches;
   int levels = 1;          ///< Number of divisions from the first squares to the smallest ones, up to 14.
+  int still_levels = 0;    ///< Of these divisions, the last ones that only light needs which all lands in one place.
   bool is_graded = false;  ///< Whether positions are closer to each other at the aperture's edge.
   std::unordered_map<std::uint64_t, std::uint32_t> positions;  ///< Their indices in the map, by `key`.
 
@@ -57,7 +58,7 @@ struct FlowLattice {
   double u_of(std::uint32_t patch, std::uint32_t x) const;
   double v_of(std::uint32_t patch, std::uint32_t y) const;
 
-  /// Whether a side of the square is a part of the aperture's edge.
+  /// Whether the square is a part of a first square that has a side at the aperture's edge.
   bool is_at_edge(const Square& square) const;
 
   /// Whether a side of the square is one of its patch.

@@ -29,9 +29,9 @@ constexpr double inset = 3e-6;  // On the aperture's edge, it is a matter of rou
                                 // There they start this part of a patch further inside.
 constexpr int edge_levels = 2;  // Light from the edge may go its own way within a part of a first square: there squares
                                 // are divided so often before their error is estimated.
-constexpr float least_extent = 0.5f;  // Pixels. Squares, and light on a fold, count as no smaller.
-constexpr double unswept_part = 0.5;  // The smallest squares are so much smaller for light of single flexibilities.
-constexpr double swept_share = 0.99;  // The part of the positions whose light moves slowly enough from band to band.
+constexpr float gathered_part = 0.5f;  // Of the tolerance is left, at least, where light is gathered.
+constexpr float still_pixels = 1;      // Light that moves by no more from the first node to the last is in one place.
+constexpr double swept_share = 0.99;   // The part of the positions whose light moves slowly enough from band to band.
 constexpr int most_levels = 14;
 constexpr std::size_t task_size = 64;  // Positions that one thread traces as one task.
 
@@ -80,11 +80,10 @@ class FlowMapBuilder {
     lattice_.patches = patches_of(beam.aperture, size);
     lattice_.is_graded = settings.silhouette;
     first_size_ = static_cast<float>(size / pixel);
-    // Light on the two sides of a tear cannot be told apart within a smallest square. Where light of a range tears at
-    // other places at each flexibility, this is spread.
-    const double finest =
-        std::min(settings.finest, settings.tolerance) * (is_light() && !is_swept() ? unswept_part : 1);
-    while (lattice_.levels < most_levels && std::ldexp(size, -lattice_.levels) > finest * pixel) ++lattice_.levels;
+    const double finest = std::min(settings.finest, settings.tolerance) * pixel;
+    while (lattice_.levels < most_levels && std::ldexp(size, -lattice_.levels) > finest) ++lattice_.levels;
+    lattice_.still_levels = is_light() && lattice_.levels < most_levels ? 1 : 0;
+    lattice_.levels += lattice_.still_levels;
   }
 
   FlowMap build() && {
@@ -180,9 +179,6 @@ class FlowMapBuilder {
   /// Whether the map is to be drawn as light. Otherwise it says what is seen at each place.
   bool is_light() const { return settings_.silhouette; }
 
-  /// Whether light of all nodes is drawn from place to place.
-  bool is_swept() const { return settings_.range && map_.nodes > 1; }
-
   /// The lesser extent of a square's light on the plate, pixels; 0 on a fold.
   float width_of(const Square& square, const Reach& reach, std::size_t node) const {
     const auto& [a, b, c, d] = square.corners;
@@ -196,9 +192,9 @@ class FlowMapBuilder {
   /// @param width  Of the square's light, the least of all nodes, pixels.
   /// @param sweep  The distance of its light from the first node to the last, pixels.
   float light_bound(const Square& square, float width, float sweep) const {
-    const float size = std::max(std::ldexp(first_size_, -square.level), least_extent);
-    width = std::max(width, least_extent);
-    return static_cast<float>(settings_.tolerance) * width / size * std::cbrt(std::max(sweep / width, 1.0f));
+    const float size = std::ldexp(first_size_, -square.level), pixel = 1;
+    return static_cast<float>(settings_.tolerance) * std::max(width / size, gathered_part) *
+           std::cbrt(std::max(sweep / std::max(width, pixel), 1.0f));
   }
 
   /// Likewise of any other map.
@@ -209,6 +205,7 @@ class FlowMapBuilder {
 
   bool needs_division(const Square& square) const {
     if (square.level >= lattice_.levels) return false;
+    const bool is_for_still_light = square.level >= lattice_.levels - lattice_.still_levels;
     const bool is_at_edge = settings_.silhouette && lattice_.is_at_edge(square);
     if (square.level < (is_at_edge ? edge_levels : 1)) return true;  // There is no estimate of its error yet.
     bool is_seen = false;
@@ -217,16 +214,16 @@ class FlowMapBuilder {
     for (const std::size_t node : tracer_.check_nodes()) {
       const Reach reach = reach_of(square.corners, node);
       if (!is_on_plate(reach)) continue;
-      if (reach.landed < 4) return true;
+      if (reach.landed < 4) return !is_for_still_light;
       width = std::min(width, width_of(square, reach, node));
       size = std::max(size, (reach.high - reach.low).maxCoeff());
       last = landing(square.corners[0], node);
       if (!is_seen) first = last;
       is_seen = true;
     }
-    if (!is_seen) return false;
-    return square.error >
-           (is_light() ? light_bound(square, width, is_swept() ? (last - first).norm() : 0) : place_bound(size));
+    const float sweep = settings_.range ? (last - first).norm() : 0;
+    if (!is_seen || (is_for_still_light && sweep > still_pixels)) return false;
+    return square.error > (is_light() ? light_bound(square, width, sweep) : place_bound(size));
   }
 
   /// The squares that need division, or those with the greatest errors if they are too many.

@@ -40,7 +40,7 @@ class TriangleBuilder {
   /// Whether the map jumps across a side of a smallest square. The landings at its ends are then far apart, and those
   /// at the ends of the side's other half, in the parent, are not.
   bool is_torn(const Square& square) const {
-    if (square.level < lattice_.levels || !(square.deviation > torn_pixels / 2)) return false;
+    if (square.level < lattice_.levels - lattice_.still_levels || !(square.deviation > torn_pixels / 2)) return false;
     const std::uint32_t half = lattice_.side_of(square), left = square.x / (2 * half) * 2 * half,
                         top = square.y / (2 * half) * 2 * half;
     std::array<std::array<std::uint32_t, 3>, 3> grid;  // The positions of the parent, by row and column.

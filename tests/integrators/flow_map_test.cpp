@@ -175,9 +175,11 @@ TEST(FlowMap, LightThatLeavesBetweenCornersIsNotOverlooked) {
           if (std::abs((x + 0.5) / resolution - 0.5) * size > 1.05) sum += film.plane(0)[y * resolution + x];
       return sum * bench.plate().pixel_area() / area(bench.beam.aperture);
     };
-    const double part = beside(expected), noise = std::sqrt(part / 400000);
+    // Where light is torn, half of a smallest square may be on the wrong side; the beam is 2 wide.
+    const double part = beside(expected), noise = std::sqrt(part / 400000),
+                 torn = 2 * 0.5 * single(0.4).finest * size / resolution / 2;
     EXPECT_GT(part, 0.02);
-    EXPECT_NEAR(beside(light), part, 4 * noise + 0.05 * part) << resolution;
+    EXPECT_NEAR(beside(light), part, 4 * noise + torn) << resolution;
   }
 }
 
@@ -286,7 +288,8 @@ TEST(FlowMap, TheSameOnAnyNumberOfThreads) {
   }
 }
 
-/// The error falls at least as the tolerance does: with a sixteenth of the tolerance there is a sixteenth of the error.
+/// Where large squares are smooth, their light is even within a triangle, which is of first order in their size: the
+/// error falls by more than half with a quarter of the tolerance, and by more where squares are near a pixel.
 TEST(FlowMap, ConvergesWithItsTolerance) {
   const FlowBench bench = make_bench(lens, plate_at(2.2, 3, 128));
   const auto light = [&](double tolerance) {
@@ -305,8 +308,9 @@ TEST(FlowMap, ConvergesWithItsTolerance) {
     }
     errors.push_back(std::sqrt(squares / all));
   }
-  EXPECT_LT(errors[2], 0.02);
-  EXPECT_LT(errors[2], errors[0] / 16);
+  EXPECT_LT(errors[1], errors[0] / 2);
+  EXPECT_LT(errors[2], errors[1] / 3);
+  EXPECT_LT(errors[2], 0.005);
 }
 
 TEST(FlowMap, KeepsToItsNumberOfPositions) {

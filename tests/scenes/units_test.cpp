@@ -71,7 +71,7 @@ Image picture_of(const SceneCase& one, double unit) {
   TensorGrid grid = generate(Helix(), GridSettings{{17, 17, 17}});
   grid.to_world = Eigen::Affine3d(Eigen::Scaling(unit)) * grid.to_world;
   const Scene scene = load_scene(read_scene_json(json, "scene.json"),
-                                 prepare_field(std::move(grid), Eigenvalues::automatic, "helix"), Progress());
+                                 prepare_field(std::move(grid), {0, Eigenvalues::automatic, {}}, "helix"), Progress());
   return render(scene, Progress()).linear;
 }
 
