@@ -165,17 +165,18 @@ bool follow(const RenderOptions& options, Ranks& ranks, Progress& progress) {
 void render_alone_or_with_others(const RenderOptions& options, Progress& progress) {
   const std::unique_ptr<Ranks> ranks = join_ranks();
   if (!ranks) return report_failed(render(options, nullptr, progress));
+  std::vector<int> failed;
+  bool is_well = true;
   if (ranks->rank() == 0) {
     Leader leader(*ranks, progress);
-    const std::vector<int> failed = render(options, &leader, progress);
+    failed = render(options, &leader, progress);
     leader.finish();
-    ranks->finish();
-    report_failed(failed);
   } else {
-    const bool is_well = follow(options, *ranks, progress);
-    ranks->finish();
-    if (!is_well) throw CLI::RuntimeError(1);  // The frames were named when they failed.
+    is_well = follow(options, *ranks, progress);
   }
+  ranks->finish();  // The leader's thread, which talks to the others, has ended.
+  report_failed(failed);
+  if (!is_well) throw CLI::RuntimeError(1);  // The frames were named when they failed.
 }
 
 }  // namespace
