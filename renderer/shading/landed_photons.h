@@ -22,12 +22,12 @@ struct LandedPhoton {
   Eigen::Vector3f position;   ///< World.
   Eigen::Vector3f direction;  ///< Unit; in which it travelled.
   Eigen::Vector3f normal;     ///< Unit, geometric, of the surface.
-  float power = 0;            ///< In its band.
   std::uint32_t surface = 0;  ///< Index of the surface.
   std::int32_t light = 0;     ///< Index of the light that it comes from.
   std::int32_t band = 0;
-  float density = 0;  ///< Of an area light: expected number of photons of the pass and band, per area across their
-                      ///< direction and per steradian, where this one has landed. Of other lights: 0.
+  double power = 0;    ///< In its band. Like the density in double precision: areas are in any unit.
+  double density = 0;  ///< Of an area light: expected number of photons of the pass and band, per area across their
+                       ///< direction and per steradian, where this one has landed. Of other lights: 0.
 };
 
 /// The radius of a pass: r²(pass + 1) / r²(pass) = (pass + 1 + α) / (pass + 2), α = ⅔. @param pass  From 0.

@@ -172,9 +172,8 @@ PhotonEnd PhotonTracer::land(const Source& source, const BentWay& way, const Emi
   photon.direction = way.direction.cast<float>();
   photon.normal = hit->normal.cast<float>();
   const auto count = static_cast<double>(source.count);
-  photon.density = static_cast<float>(count * emitted.density * way.compression);
-  photon.power =
-      static_cast<float>(emitted.power / count * way.gain) * (*source.strength)[static_cast<std::size_t>(way.band)];
+  photon.density = count * emitted.density * way.compression;
+  photon.power = emitted.power / count * way.gain * (*source.strength)[static_cast<std::size_t>(way.band)];
   photon.surface = hit->surface;
   photon.light = source.light;
   photon.band = way.band;
