@@ -204,7 +204,7 @@ TEST(MeshSampling, VoxelsThatNeedAPointThatIsNotANumberAreInactive) {
   });
   SamplingReport report;
   const TensorGrid grid = sampled(*mesh, resolution(17), report);
-  EXPECT_EQ(report.non_finite_points, 1u);
+  EXPECT_EQ(report.non_finite, 1u);
   EXPECT_EQ(report.active,
             17u * 17u * 17u - 7u * 7u * 7u);  // all points strictly within the eight cells around the hidden point
   expect_linear(grid);

@@ -88,7 +88,8 @@ void print_sampling(const ImportReport& report) {
              mesh.voxel.z(), mesh.active);
   fmt::print("  norm of the tensor, mesh -> grid: peak {:.4g} -> {:.4g}, median {:.4g} -> {:.4g}\n", mesh.native_peak,
              mesh.sampled_peak, mesh.native_median, mesh.sampled_median);
-  if (mesh.non_finite_points > 0) fmt::print("  {} points of the mesh are not finite\n", mesh.non_finite_points);
+  if (mesh.non_finite > 0)
+    fmt::print("  {} {} of the mesh are not finite\n", mesh.non_finite, mesh.of_cells ? "cells" : "points");
   if (mesh.sampled_peak < kept_peak * mesh.native_peak) {
     std::fflush(stdout);
     fmt::print(stderr,
