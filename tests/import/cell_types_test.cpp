@@ -57,6 +57,9 @@ TEST_P(EveryCellType, PartsHaveItsVolumeAndCentroid) {
       for (int i = 0; i < cell.points(); ++i)
         position += part.weights[static_cast<std::size_t>(i)] * cell.positions().col(i);
       EXPECT_LT((position - part.position).norm(), 1e-5);
+      Eigen::Matrix3d edges = Eigen::Matrix3d::Zero();
+      for (int i = 0; i < cell.points(); ++i) edges += cell.positions().col(i) * part.changes.row(i);
+      EXPECT_LT((edges - part.edges).norm(), 1e-5);
       sum += part.volume;
     });
     EXPECT_NEAR(sum, volume, 1e-5 * volume) << longest;

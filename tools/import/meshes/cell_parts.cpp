@@ -71,7 +71,7 @@ class Divider {
         part_(part),
         shape_(cell.shape() == Shape::tetrahedra ? Shape::simplex : cell.shape()),
         powers_(powers(shape_)),
-        longest_(longest),
+        longest_(cell.shape() == Shape::box && cell.is_linear() ? 1.0 * longest : 0.5 * longest),
         where_(where),
         visit_(visit) {}
 
@@ -85,13 +85,14 @@ class Divider {
     }
     Matrix3d tangents;
     cell_.evaluate(parametric(shape_, centre, tangents), part_);
-    const Matrix3d edges = cell_.jacobian() * tangents * (piece.to - piece.from).matrix().asDiagonal();
+    tangents *= (piece.to - piece.from).matrix().asDiagonal();
+    const Matrix3d edges = cell_.jacobian() * tangents;
     // Twice as far as an affine piece reaches, because edges that are not parallel differ in length.
     const Vector3d reach = edges.cwiseAbs().rowwise().sum();
     if (!where_.intersects(Eigen::AlignedBox3d(cell_.position() - reach, cell_.position() + reach))) return;
     const Eigen::RowVector3d lengths = (longest_.cwiseInverse().asDiagonal() * edges).colwise().norm();
     Eigen::Index axis = 0;
-    if (!(lengths.maxCoeff(&axis) > rounded_one)) return visit_part(volume, centre);
+    if (!(lengths.maxCoeff(&axis) > rounded_one)) return visit_part(volume, centre, edges, tangents);
     Piece first = piece, second = piece;
     first.to[axis] = second.from[axis] = 0.5 * (piece.from[axis] + piece.to[axis]);
     divide(first);
@@ -101,12 +102,12 @@ class Divider {
  private:
   static constexpr double rounded_one = 1 + 1e-6;
 
-  void visit_part(double volume, const Array3d& centre) {
+  void visit_part(double volume, const Array3d& centre, const Matrix3d& edges, const Matrix3d& tangents) {
     if (shape_ == Shape::pyramid) volume *= 0.5;  // Its height.
     // The Jacobian of VTK's collapsed pyramids has the density in itself.
     if (shape_ == Shape::collapsed_pyramid) volume /= (1 - centre[2]) * (1 - centre[2]);
     volume *= std::abs(cell_.jacobian().determinant());
-    if (volume > 0) visit_({cell_.position(), volume, cell_.weights()});
+    if (volume > 0) visit_({cell_.position(), volume, edges, cell_.weights(), cell_.derivatives() * tangents});
   }
 
   MeshCell& cell_;

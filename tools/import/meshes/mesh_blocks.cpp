@@ -159,24 +159,50 @@ AlignedBox3d box_of(const SamplingLattice& lattice, const AlignedBox3i& voxels) 
   return {lattice.position(voxels.min()) - 0.5 * lattice.voxel, lattice.position(voxels.max()) + 0.5 * lattice.voxel};
 }
 
+/// The change of the tensor along the edges of a part of `cell`.
+Eigen::Matrix<double, 9, 3> changes_in(const MeshSource& source, const MeshCell& cell, const CellPart& part) {
+  Eigen::Matrix<double, 9, 3> sum = Eigen::Matrix<double, 9, 3>::Zero();
+  if (!source.point_tensors) return sum;
+  for (int i = 0; i < cell.points(); ++i)
+    sum.noalias() += Eigen::Map<const Tensor>(source.point_tensors + 9 * cell.point(i)) * part.changes.row(i);
+  return sum;
+}
+
+/// Adds samples of a part, evenly spaced along its edges, to the averages of the voxels of the block that they are in.
+void add_samples(const MeshSource& source, Workspace& work, vtkIdType id, double fineness, const TensorBlock& block,
+                 const Voxels& voxels, double samples_along_voxel, const CellPart& part) {
+  const SamplingLattice& lattice = source.lattice;
+  const Tensor tensor = tensor_in(source, work.cell, id, part.weights);
+  const Eigen::Matrix<double, 9, 3> changes = changes_in(source, work.cell, part);
+  if (!tensor.allFinite() || !changes.allFinite()) return;
+  const Vector3d centre = (part.position - lattice.position(block.origin)).cwiseQuotient(lattice.voxel);
+  const Eigen::Matrix3d edges = lattice.voxel.cwiseInverse().asDiagonal() * part.edges;
+  const Eigen::Array3d lengths = edges.colwise().norm().transpose();
+  const Eigen::Array3d counts = (samples_along_voxel * lengths - 1e-6).ceil().max(1);
+  const double weight = part.volume / lattice.voxel.prod() / counts.prod();
+  for (double x = 0.5; x < counts[0]; ++x)
+    for (double y = 0.5; y < counts[1]; ++y)
+      for (double z = 0.5; z < counts[2]; ++z) {
+        const Vector3d along = (Eigen::Array3d(x, y, z) / counts - 0.5).matrix();
+        const Eigen::Array3d position = (centre + edges * along).array();
+        const Eigen::Array3d index = (position + 0.5).floor();
+        if (!(index >= 0).all() || !(index < TensorBlock::size).all()) continue;
+        const auto offset = static_cast<std::size_t>(
+            TensorBlock::offset(static_cast<int>(index.x()), static_cast<int>(index.y()), static_cast<int>(index.z())));
+        if (!voxels[offset]) continue;
+        work.averages[offset].add((position - index).matrix(), weight, tensor + changes * along);
+        work.fineness[offset] = std::max(work.fineness[offset], fineness);
+      }
+}
+
 /// Adds the part of the cell that is in `voxels` of the block to their averages.
 void add_parts(const MeshSource& source, Workspace& work, vtkIdType id, double fineness, const TensorBlock& block,
                const Voxels& voxels, const AlignedBox3d& where) {
-  constexpr double parts_along_voxel = 4;
   const SamplingLattice& lattice = source.lattice;
-  const Vector3d first = lattice.position(block.origin);
-  visit_parts(work.cell, lattice.voxel / parts_along_voxel, where, [&](const CellPart& part) {
-    const Eigen::Array3d position = (part.position - first).array() / lattice.voxel.array();
-    const Eigen::Array3d index = (position + 0.5).floor();
-    if (!(index >= 0).all() || !(index < TensorBlock::size).all()) return;
-    const Vector3i voxel = index.cast<int>().matrix();
-    const auto offset = static_cast<std::size_t>(TensorBlock::offset(voxel.x(), voxel.y(), voxel.z()));
-    if (!voxels[offset]) return;
-    const Tensor tensor = tensor_in(source, work.cell, id, part.weights);
-    if (!tensor.allFinite()) return;
-    work.averages[offset].add((position - index).matrix(), part.volume / lattice.voxel.prod(), tensor);
-    work.fineness[offset] = std::max(work.fineness[offset], fineness);
-  });
+  // Layers that are many in a voxel need fewer samples each.
+  const double samples = work.cell.thickness(lattice.voxel.cwiseInverse()) < 0.125 ? 2 : 4;
+  visit_parts(work.cell, lattice.voxel, where,
+              [&](const CellPart& part) { add_samples(source, work, id, fineness, block, voxels, samples, part); });
 }
 
 /// Adds the cells that are thinner than voxels. @return the voxels that have some.

@@ -90,8 +90,8 @@ bool MeshCell::load(vtkDataSet& mesh, vtkIdType id) {
   positions_.resize(3, count);
   for (vtkIdType i = 0; i < count; ++i) cell_->Points->GetPoint(i, positions_.col(i).data());
   weights_.resize(static_cast<std::size_t>(count));
-  derivatives_.resize(static_cast<std::size_t>(3 * count));
-  scratch_.resize(derivatives_.size());
+  derivatives_.resize(count, 3);
+  scratch_.resize(static_cast<std::size_t>(3 * count));
   if (shape_ == Shape::tetrahedra) make_tetrahedra();
   set_frame();
   return true;
@@ -203,24 +203,22 @@ double MeshCell::thickness(const Eigen::Vector3d& scale) const {
 }
 
 void MeshCell::differentiate(const Eigen::Vector3d& p) {
-  const std::size_t count = weights_.size();
-  if (kind_ == Derivatives::by_point) return cell_->InterpolateDerivs(p.data(), derivatives_.data());
-  if (kind_ == Derivatives::by_axis) {
+  const Eigen::Index count = derivatives_.rows();
+  if (kind_ == Derivatives::by_axis) return cell_->InterpolateDerivs(p.data(), derivatives_.data());
+  if (kind_ == Derivatives::by_point) {
     cell_->InterpolateDerivs(p.data(), scratch_.data());
-    for (std::size_t i = 0; i < count; ++i)
-      for (std::size_t k = 0; k < 3; ++k) derivatives_[3 * i + k] = scratch_[k * count + i];
+    derivatives_ = Eigen::Map<const Eigen::Matrix<double, 3, Eigen::Dynamic>>(scratch_.data(), 3, count).transpose();
     return;
   }
   constexpr double step = 1e-5;  // Of a central difference: its error is about 1e-10.
-  for (std::size_t k = 0; k < 3; ++k) {
+  const Eigen::Map<const Eigen::VectorXd> weights(scratch_.data(), count);
+  for (Eigen::Index axis = 0; axis < 3; ++axis) {
+    derivatives_.col(axis).setZero();
     for (const double side : {-step, step}) {
       Eigen::Vector3d beside = p;
-      beside[static_cast<Eigen::Index>(k)] += side;
+      beside[axis] += side;
       cell_->InterpolateFunctions(beside.data(), scratch_.data());
-      for (std::size_t i = 0; i < count; ++i) {
-        double& derivative = derivatives_[3 * i + k];
-        derivative = side < 0 ? -scratch_[i] : (derivative + scratch_[i]) / (2 * step);
-      }
+      derivatives_.col(axis) += weights / (2 * side);
     }
   }
 }
@@ -231,19 +229,23 @@ void MeshCell::evaluate(const Eigen::Vector3d& p, std::size_t part) {
     const std::vector<std::size_t>& face = faces_[tetrahedron.face];
     position_ = tetrahedron.origin + tetrahedron.edges * p;
     jacobian_ = tetrahedron.edges;
-    std::fill(weights_.begin(), weights_.end(), (1 - p.sum()) / static_cast<double>(weights_.size()));
-    for (const std::size_t i : face) weights_[i] += p.x() / static_cast<double>(face.size());
-    weights_[tetrahedron.edge[0]] += p.y();
-    weights_[tetrahedron.edge[1]] += p.z();
+    const double mean = 1 / static_cast<double>(weights_.size()), of_face = 1 / static_cast<double>(face.size());
+    std::fill(weights_.begin(), weights_.end(), (1 - p.sum()) * mean);
+    derivatives_.setConstant(-mean);
+    for (const std::size_t i : face) {
+      weights_[i] += p.x() * of_face;
+      derivatives_(static_cast<Eigen::Index>(i), 0) += of_face;
+    }
+    for (std::size_t k = 0; k < 2; ++k) {
+      weights_[tetrahedron.edge[k]] += p[static_cast<Eigen::Index>(k + 1)];
+      derivatives_(static_cast<Eigen::Index>(tetrahedron.edge[k]), static_cast<Eigen::Index>(k + 1)) += 1;
+    }
     return;
   }
   cell_->InterpolateFunctions(p.data(), weights_.data());
   differentiate(p);
-  const auto count = static_cast<Eigen::Index>(weights_.size());
-  position_.noalias() = positions_ * Eigen::Map<const Eigen::VectorXd>(weights_.data(), count);
-  jacobian_.noalias() =
-      positions_ *
-      Eigen::Map<const Eigen::Matrix<double, 3, Eigen::Dynamic>>(derivatives_.data(), 3, count).transpose();
+  position_.noalias() = positions_ * Eigen::Map<const Eigen::VectorXd>(weights_.data(), positions_.cols());
+  jacobian_.noalias() = positions_ * derivatives_;
 }
 
 /// Newton's method from `p`. @return whether it converged; the solution may be outside the cell.

@@ -36,6 +36,7 @@ class MeshCell {
   const Eigen::Matrix3Xd& positions() const { return positions_; }
   vtkGenericCell& vtk() const { return *cell_; }
   Shape shape() const { return shape_; }
+  bool is_linear() const { return linear_; }
 
   /// Contains the cell. For a curved cell it is larger than the box of its points.
   Eigen::AlignedBox3d box() const;
@@ -57,8 +58,8 @@ class MeshCell {
   const Eigen::Vector3d& position() const { return position_; }
   const Eigen::Matrix3d& jacobian() const { return jacobian_; }  ///< ∂ position / ∂ parametric coordinates.
   std::size_t parts() const { return shape_ == Shape::tetrahedra ? tetrahedra_.size() : 1; }
-  /// The derivative of the weight of point `i` along parametric axis `axis`, where evaluate() was last.
-  double derivative(int i, int axis) const { return derivatives_[static_cast<std::size_t>(3 * i + axis)]; }
+  /// Derivatives of the weights where evaluate() was last: a row for each point, a column for each parametric axis.
+  const Eigen::MatrixX3d& derivatives() const { return derivatives_; }
 
  private:
   /// How derivatives of the shape functions are had. VTK's classes store them by axis or by point. Those of some are
@@ -96,7 +97,7 @@ class MeshCell {
   bool linear_ = true;
   Eigen::Matrix3Xd positions_;
   std::vector<double> weights_;
-  std::vector<double> derivatives_;  ///< Of the weights, three for each point.
+  Eigen::MatrixX3d derivatives_;
   std::vector<double> scratch_;
   std::vector<std::vector<std::size_t>> faces_;  ///< Of a polyhedron: the indices of their points.
   std::vector<Tetrahedron> tetrahedra_;
