@@ -32,7 +32,8 @@ endif()
 
 if(TENSORRAY_IMPORT)
   find_package(VTK REQUIRED COMPONENTS CommonCore CommonDataModel CommonExecutionModel FiltersCore FiltersGeneral
-               IOCGNSReader IOCore IOExodus IOGeometry IOLegacy IOParallelXML IOXML cgns)
+               IOCGNSReader IOCore IOExodus IOGeometry IOLegacy IOParallelXML IOXML cgns exodusII)
+  find_package(ZLIB REQUIRED)
 
   # The CMake packages of these two libraries do not work with Debian's other packages.
   find_path(Teem_INCLUDE_DIR teem/nrrd.h REQUIRED)

@@ -75,6 +75,8 @@ TEST_P(EveryCell, SamplesALinearFieldExactlyAtEveryVoxelOfACube) {
 INSTANTIATE_TEST_SUITE_P(Types, EveryCell,
                          ::testing::Values(CellCase{"Hexahedron", VTK_HEXAHEDRON, false},
                                            CellCase{"BentHexahedron", VTK_HEXAHEDRON, true},
+                                           CellCase{"LagrangeHexahedron", VTK_LAGRANGE_HEXAHEDRON, false},
+                                           CellCase{"BentLagrangeHexahedron", VTK_LAGRANGE_HEXAHEDRON, true},
                                            CellCase{"Wedge", VTK_WEDGE, false}, CellCase{"BentWedge", VTK_WEDGE, true},
                                            CellCase{"Pyramid", VTK_PYRAMID, false},
                                            CellCase{"Tetrahedron", VTK_TETRA, false},

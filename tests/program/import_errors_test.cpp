@@ -169,9 +169,9 @@ TEST_F(ImportErrors, AFullDiskLeavesWhatWasThere) {
 TEST_F(ImportErrors, HelpNamesEveryFlagAndFormat) {
   const std::string help = run_well({"import", "--help"}).out;
   for (const char* word :
-       {"--array", "--gradient-of", "--strain-of", "--order",  "--resolution", "--voxel-size", "--bounds", "--boundary",
-        "--half",  "--name",        "--units",     "--output", "--quiet",      ".pvtu",        ".vtk",     ".ex2",
-        ".foam",   ".nrrd",         ".nii.gz",     ".npy",     "PLOT3D",       "mrtrix",       "voigt"})
+       {"--array", "--gradient-of", "--strain-of", "--order", "--resolution", "--voxel-size", "--bounds", "--boundary",
+        "--half",  "--cells",       "--name",      "--units", "--output",     "--quiet",      ".pvtu",    ".vtk",
+        ".ex2",    ".foam",         ".nrrd",       ".nii.gz", ".npy",         "PLOT3D",       "mrtrix",   "voigt"})
     EXPECT_NE(help.find(word), std::string::npos) << word;
 }
 

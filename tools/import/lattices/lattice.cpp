@@ -8,7 +8,6 @@
 #include <vector>
 
 #include <fmt/format.h>
-#include <fmt/ranges.h>
 #include <tbb/parallel_for.h>
 
 #include "volumes/grids/page_memory.h"
@@ -143,22 +142,13 @@ int unmasked(const Lattice& lattice) { return lattice.components - (lattice.mask
 
 TensorOrder order_of(const Lattice& lattice, const std::optional<TensorOrder>& order) {
   const int count = unmasked(lattice);
-  if (order && (count == 9 || (lattice.order && *lattice.order != *order)))
-    throw std::invalid_argument(called(lattice) + " says its order itself: leave --order out");
-  if (count == 9) return TensorOrder::full;
   if (count == 3)
     throw std::invalid_argument(
         called(lattice) + " has three components, a vector: derive a tensor (--gradient-of), or choose another array");
   if (count != 6 && count < 9)
     throw std::invalid_argument(fmt::format("{} has {} component{} and a tensor six or nine: choose another array",
                                             called(lattice), count, count == 1 ? "" : "s"));
-  const std::optional<TensorOrder> chosen = lattice.order ? lattice.order : order;
-  if (!chosen || *chosen == TensorOrder::full)
-    throw std::invalid_argument(
-        fmt::format("{} has six components of a symmetric tensor and does not say in which "
-                    "order: give it with --order {}",
-                    called(lattice), fmt::join(tensor_order_names(), "|")));
-  return *chosen;
+  return chosen_order(count, lattice.order, order, called(lattice));
 }
 
 TensorGrid empty_grid(const Lattice& lattice) {

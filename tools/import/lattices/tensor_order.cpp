@@ -47,6 +47,19 @@ TensorOrder tensor_order_of(const std::string& name) {
   return orders[static_cast<std::size_t>(found - names.begin())];
 }
 
+TensorOrder chosen_order(int components, const std::optional<TensorOrder>& said,
+                         const std::optional<TensorOrder>& given, const std::string& what) {
+  if (given && (components == 9 || (said && *said != *given)))
+    throw std::invalid_argument(what + " says its order itself: leave --order out");
+  if (components == 9) return TensorOrder::full;
+  const std::optional<TensorOrder> chosen = said ? said : given;
+  if (!chosen || *chosen == TensorOrder::full)
+    throw std::invalid_argument(fmt::format(
+        "{} has {} of a symmetric tensor and does not say in which order: give it with --order {}", what,
+        components == 6 ? "six components" : "the six components first", fmt::join(tensor_order_names(), "|")));
+  return *chosen;
+}
+
 Eigen::Matrix3d tensor_of(const double* components, TensorOrder order) {
   if (order == TensorOrder::full) return Eigen::Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>(components);
   const auto [xx, yy, zz, xy, yz, xz] = positions(order);

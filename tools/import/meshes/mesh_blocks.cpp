@@ -168,6 +168,21 @@ Eigen::Matrix<double, 9, 3> changes_in(const MeshSource& source, const MeshCell&
   return sum;
 }
 
+/// The number of samples along each edge of a part: more where the part is in several voxels, among which samples
+/// divide it. All in voxels.
+Eigen::Array3d sample_counts(const Vector3d& centre, const Eigen::Matrix3d& edges, double samples_along_voxel) {
+  constexpr double rounding = 1e-6, least = 3;
+  Eigen::Array3d counts;
+  for (int axis = 0; axis < 3; ++axis) {
+    const double length = edges.col(axis).norm();
+    const Eigen::Array3d reach = 0.5 * edges.col(axis).array().abs() - rounding;
+    const Eigen::Array3d from = (centre.array() + 0.5 - reach).floor(), to = (centre.array() + 0.5 + reach).floor();
+    counts[axis] = (from < to).any() ? std::max(least, std::ceil(samples_along_voxel * length - rounding))
+                                     : std::max(1.0, std::ceil(2 * length - rounding));
+  }
+  return counts;
+}
+
 /// Adds samples of a part, evenly spaced along its edges, to the averages of the voxels of the block that they are in.
 void add_samples(const MeshSource& source, Workspace& work, vtkIdType id, double fineness, const TensorBlock& block,
                  const Voxels& voxels, double samples_along_voxel, const CellPart& part) {
@@ -177,8 +192,7 @@ void add_samples(const MeshSource& source, Workspace& work, vtkIdType id, double
   if (!tensor.allFinite() || !changes.allFinite()) return;
   const Vector3d centre = (part.position - lattice.position(block.origin)).cwiseQuotient(lattice.voxel);
   const Eigen::Matrix3d edges = lattice.voxel.cwiseInverse().asDiagonal() * part.edges;
-  const Eigen::Array3d lengths = edges.colwise().norm().transpose();
-  const Eigen::Array3d counts = (samples_along_voxel * lengths - 1e-6).ceil().max(1);
+  const Eigen::Array3d counts = sample_counts(centre, edges, samples_along_voxel);
   const double weight = part.volume / lattice.voxel.prod() / counts.prod();
   for (double x = 0.5; x < counts[0]; ++x)
     for (double y = 0.5; y < counts[1]; ++y)

@@ -84,6 +84,9 @@ bool MeshCell::load(vtkDataSet& mesh, vtkIdType id) {
   const Type type = type_of(cell_->GetCellType());
   const vtkIdType count = type.points > 0 ? type.points : cell_->GetNumberOfPoints();
   if (cell_->GetNumberOfPoints() < count) return false;
+  if (vtkUnsignedCharArray* const hidden = mesh.GetPointGhostArray())
+    for (vtkIdType i = 0; i < count; ++i)
+      if (is_hidden(hidden->GetValue(cell_->GetPointId(static_cast<int>(i))))) return false;
   shape_ = type.shape;
   kind_ = type.derivatives;
   linear_ = cell_->IsLinear() != 0;
@@ -246,6 +249,25 @@ void MeshCell::evaluate(const Eigen::Vector3d& p, std::size_t part) {
   differentiate(p);
   position_.noalias() = positions_ * Eigen::Map<const Eigen::VectorXd>(weights_.data(), positions_.cols());
   jacobian_.noalias() = positions_ * derivatives_;
+}
+
+Eigen::Matrix3d MeshCell::gradient(const Eigen::Matrix3Xd& values, int point) {
+  if (shape_ != Shape::tetrahedra) {
+    Eigen::Vector3d p(cell_->GetParametricCoords() + 3 * point);
+    if (shape_ == Shape::collapsed_pyramid || shape_ == Shape::pyramid) p.z() = std::min(p.z(), 1 - 1e-3);
+    evaluate(p);
+    return values * derivatives_ * jacobian_.inverse();
+  }
+  Eigen::Matrix3d sum = Eigen::Matrix3d::Zero();
+  int count = 0;
+  for (std::size_t part = 0; part < tetrahedra_.size(); ++part) {
+    const std::array<std::size_t, 2>& edge = tetrahedra_[part].edge;
+    if (edge[0] != static_cast<std::size_t>(point) && edge[1] != static_cast<std::size_t>(point)) continue;
+    evaluate(Eigen::Vector3d::Zero(), part);
+    sum += values * derivatives_ * jacobian_.inverse();
+    ++count;
+  }
+  return sum / count;
 }
 
 /// Newton's method from `p`. @return whether it converged; the solution may be outside the cell.

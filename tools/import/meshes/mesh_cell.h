@@ -27,8 +27,8 @@ class MeshCell {
   enum class Shape { box, simplex, prism, collapsed_pyramid, pyramid, tetrahedra };
 
   /// If a cell lists more points than its type has (for example linear hexahedra with the middle nodes of quadratic
-  /// ones), only the first ones count. @return false if the cell is not three-dimensional, is hidden, or lists too
-  /// few points; then call no other function.
+  /// ones), only the first ones count. @return false if the cell is not three-dimensional, is hidden, has a hidden
+  /// point, or lists too few points; then call no other function.
   bool load(vtkDataSet& mesh, vtkIdType id);
 
   int points() const { return static_cast<int>(positions_.cols()); }
@@ -57,6 +57,10 @@ class MeshCell {
   void evaluate(const Eigen::Vector3d& p, std::size_t part = 0);
   const Eigen::Vector3d& position() const { return position_; }
   const Eigen::Matrix3d& jacobian() const { return jacobian_; }  ///< ∂ position / ∂ parametric coordinates.
+  /// ∂v_i/∂x_j at point `point` of a vector that is `values` at the points; of a cell of `tetrahedra`, its mean in
+  /// those that have the point. Not finite where the cell is flat.
+  Eigen::Matrix3d gradient(const Eigen::Matrix3Xd& values, int point);
+
   std::size_t parts() const { return shape_ == Shape::tetrahedra ? tetrahedra_.size() : 1; }
   /// Derivatives of the weights where evaluate() was last: a row for each point, a column for each parametric axis.
   const Eigen::MatrixX3d& derivatives() const { return derivatives_; }

@@ -26,7 +26,7 @@ VoxelAverage::Tensor VoxelAverage::value() const {
   const Eigen::Matrix<double, 9, 3> gradient = variance.ldlt().solve(covariance.transpose()).transpose();
   const double all = squares_ / weight_ - average.squaredNorm();
   const double explained = gradient.cwiseProduct(covariance).sum();
-  const double fraction = all > 0 ? std::clamp(explained / all, 0.0, 1.0) : 0.0;
+  const double fraction = all > 0 ? std::clamp(4 * explained / all - 3, 0.0, 1.0) : 0.0;
   return average - fraction * gradient * centroid;
 }
 

@@ -17,10 +17,11 @@ class VoxelAverage {
   bool empty() const { return weight_ == 0; }
 
   /// The average, corrected for samples that are not centred in the voxel: because the body fills the voxel in part,
-  /// or because parts of cells belong to one voxel as wholes. A linear function g is fitted by least squares, and
-  /// ρ² g(centroid) is subtracted, where ρ² is the fraction of the variance that g explains. So a linear field gives
-  /// its value at the centre, whatever the samples' positions, and a layer that is much thinner than the voxel gives
-  /// its plain average, of which a line fitted through it says nothing.
+  /// or because samples belong to one voxel as wholes. A linear function is fitted by least squares, and what it
+  /// changes from the centre to the centroid of the samples is subtracted: wholly where it explains all variance of the
+  /// tensor, not at all where it explains less than 3/4. So a linear field gives its value at the centre, whatever the
+  /// samples' positions, and a layer that is thinner than the voxel gives its plain average, as a line fitted to it
+  /// says nothing.
   Tensor value() const;
 
  private:

@@ -33,7 +33,7 @@ constexpr double kept_peak = 0.95;
 
 struct ImportOptions {
   ImportSettings settings;
-  std::string array, gradient_of, strain_of, order, frame = "ras";
+  std::string array, gradient_of, strain_of, order, frame = "ras", cells = "linear";
   std::vector<int> resolution;
   std::vector<double> voxel_size, bounds, origin;
   std::filesystem::path output, boundary;
@@ -54,6 +54,7 @@ ImportSettings settings_of(const ImportOptions& options) {
     settings.take = Take::strain;
   }
   if (!options.order.empty()) settings.order = tensor_order_of(options.order);
+  if (options.cells == "constant") settings.cell_values = CellValues::constant;
   settings.lps = options.frame == "lps";
   if (options.voxel_size.size() == 1) settings.sampling.resolution = options.voxel_size[0];
   if (options.voxel_size.size() == 2) throw std::invalid_argument("--voxel-size needs one number, or three: x y z");
@@ -202,11 +203,13 @@ std::string positive(const std::string& text) {
 void add_what(CLI::App& command, ImportOptions& options) {
   auto* array =
       command.add_option("--array", options.array,
-                         "The array that is the tensor (default: the only one), or six or nine scalar arrays that "
-                         "are its components: sxx,syy,szz,sxy,syz,sxz");
+                         "The array that is the tensor (default: the only one), or its components: six or nine scalar "
+                         "arrays (sxx,syy,szz,sxy,syz,sxz), components of others (NAME:COMPONENT), or three vectors "
+                         "as rows");
   auto* gradient =
       command.add_option("--gradient-of", options.gradient_of,
-                         "Take the gradient of this vector array, T_ij = dv_i/dx_j, made on the mesh itself");
+                         "Take the gradient of this vector array, or of three scalar arrays (u,v,w): T_ij = dv_i/dx_j, "
+                         "made on the mesh itself");
   auto* strain = command.add_option("--strain-of", options.strain_of,
                                     "Take the symmetric part of the gradient of this displacement");
   array->excludes(gradient, strain);
@@ -223,6 +226,12 @@ void add_what(CLI::App& command, ImportOptions& options) {
                   "(ras)")
       ->check(CLI::IsMember({"ras", "lps"}))
       ->option_text("FRAME");
+  command
+      .add_option("--cells", options.cells,
+                  "What tensors at the cells of a mesh are in between: linear (averaged to the points, and "
+                  "interpolated), or constant in each cell (linear)")
+      ->check(CLI::IsMember({"linear", "constant"}))
+      ->option_text("VALUES");
   for (CLI::Option* option : command.get_options({}))
     if (option != command.get_help_ptr()) option->group("What to take");
 }

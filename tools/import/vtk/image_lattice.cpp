@@ -5,11 +5,14 @@
 #include <limits>
 #include <memory>
 #include <stdexcept>
+#include <vector>
 
 #include <vtkCellData.h>
 #include <vtkDataArray.h>
+#include <vtkIdList.h>
 #include <vtkImageData.h>
 #include <vtkMatrix3x3.h>
+#include <vtkNew.h>
 #include <vtkPointData.h>
 #include <vtkSmartPointer.h>
 #include <vtkUnsignedCharArray.h>
@@ -20,9 +23,8 @@ namespace {
 /// The arrays of the image, whose slices are freed as they are read.
 struct Source {
   vtkSmartPointer<vtkDataArray> values;
-  vtkSmartPointer<vtkUnsignedCharArray> ghosts;  ///< May be null.
-  unsigned char hidden = 0;                      ///< The bit of `ghosts` that marks hidden voxels.
-  vtkIdType slice = 0;                           ///< Voxels per slice.
+  std::vector<bool> hidden;  ///< Of each voxel; empty if none is.
+  vtkIdType slice = 0;       ///< Voxels per slice.
 };
 
 Eigen::Vector3i size_of(vtkImageData& image, bool of_cells) {
@@ -66,6 +68,27 @@ Eigen::Affine3d to_world_of(vtkImageData& image, bool of_cells) {
   return to_world;
 }
 
+/// As in a mesh (mesh_cell.h): a cell with a hidden point is hidden, and a point whose cells are all hidden.
+std::vector<bool> hidden_voxels(vtkImageData& image, bool of_cells) {
+  vtkUnsignedCharArray* const cells = image.GetCellGhostArray();
+  vtkUnsignedCharArray* const points = image.GetPointGhostArray();
+  if (!cells && !points) return {};
+  constexpr unsigned char hidden_cell = vtkDataSetAttributes::HIDDENCELL | vtkDataSetAttributes::REFINEDCELL;
+  std::vector<bool> hidden_cells(static_cast<std::size_t>(image.GetNumberOfCells()));
+  std::vector<bool> hidden_points(static_cast<std::size_t>(image.GetNumberOfPoints()), true);
+  vtkNew<vtkIdList> ids;
+  for (vtkIdType cell = 0; cell < image.GetNumberOfCells(); ++cell) {
+    image.GetCellPoints(cell, ids);
+    bool hidden = cells && (cells->GetValue(cell) & hidden_cell);
+    for (vtkIdType i = 0; points && i < ids->GetNumberOfIds(); ++i)
+      hidden = hidden || (points->GetValue(ids->GetId(i)) & vtkDataSetAttributes::HIDDENPOINT);
+    hidden_cells[static_cast<std::size_t>(cell)] = hidden;
+    for (vtkIdType i = 0; !hidden && i < ids->GetNumberOfIds(); ++i)
+      hidden_points[static_cast<std::size_t>(ids->GetId(i))] = false;
+  }
+  return of_cells ? hidden_cells : hidden_points;
+}
+
 void read_slice(Source& source, int z, double* out) {
   const vtkIdType begin = z * source.slice, end = begin + source.slice;
   vtkDataArray& values = *source.values;
@@ -74,8 +97,7 @@ void read_slice(Source& source, int z, double* out) {
   }
   const int components = values.GetNumberOfComponents();
   for (vtkIdType i = begin; i < end; ++i, out += components) {
-    const bool hidden = source.ghosts && (source.ghosts->GetValue(i) & source.hidden);
-    if (hidden) {
+    if (!source.hidden.empty() && source.hidden[static_cast<std::size_t>(i)]) {
       std::fill(out, out + components, std::numeric_limits<double>::quiet_NaN());
     } else {
       values.GetTuple(i, out);
@@ -96,9 +118,7 @@ Lattice lattice_of(vtkSmartPointer<vtkImageData> image, vtkSmartPointer<vtkDataA
 
   const auto source = std::make_shared<Source>();
   source->slice = static_cast<vtkIdType>(lattice.size.x()) * lattice.size.y();
-  source->ghosts = of_cells ? image->GetCellGhostArray() : image->GetPointGhostArray();
-  source->hidden = vtkDataSetAttributes::HIDDENPOINT;
-  if (of_cells) source->hidden = vtkDataSetAttributes::HIDDENCELL;
+  source->hidden = hidden_voxels(*image, of_cells);
   source->values = std::move(values);
   if (source->values->GetNumberOfTuples() != source->slice * lattice.size.z()) {
     throw std::runtime_error("the array '" + lattice.array + "' has " +
