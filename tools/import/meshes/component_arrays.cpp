@@ -49,6 +49,7 @@ int component_called(vtkDataArray& array, const std::string& name) {
 
 /// What `name` means: an array, NAME:COMPONENT, or a component whose name is its own.
 std::optional<Part> part_called(vtkDataSetAttributes& data, const std::string& name) {
+  if (name.empty()) return {};
   if (vtkDataArray* const array = data.GetArray(name.c_str()))
     return Part{array, array->GetNumberOfComponents() == 1 ? 0 : -1};
   const std::size_t colon = name.rfind(':');

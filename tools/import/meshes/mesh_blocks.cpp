@@ -171,14 +171,14 @@ Eigen::Matrix<double, 9, 3> changes_in(const MeshSource& source, const MeshCell&
 /// The number of samples along each edge of a part: more where the part is in several voxels, among which samples
 /// divide it. All in voxels.
 Eigen::Array3d sample_counts(const Vector3d& centre, const Eigen::Matrix3d& edges, double samples_along_voxel) {
-  constexpr double rounding = 1e-6, least = 3;
+  constexpr double rounding = 1e-6, least = 3, thin = 0.125;
   Eigen::Array3d counts;
   for (int axis = 0; axis < 3; ++axis) {
     const double length = edges.col(axis).norm();
     const Eigen::Array3d reach = 0.5 * edges.col(axis).array().abs() - rounding;
     const Eigen::Array3d from = (centre.array() + 0.5 - reach).floor(), to = (centre.array() + 0.5 + reach).floor();
     counts[axis] = (from < to).any() ? std::max(least, std::ceil(samples_along_voxel * length - rounding))
-                                     : std::max(1.0, std::ceil(2 * length - rounding));
+                                     : std::max(length > thin ? 2.0 : 1.0, std::ceil(2 * length - rounding));
   }
   return counts;
 }

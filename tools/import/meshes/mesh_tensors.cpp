@@ -214,6 +214,9 @@ vtkSmartPointer<vtkDataSet> with_arrays(vtkDataSet& mesh, const Array& of_points
       attributes(*result, cells).AddArray(tensors);
     }
   }
+  // VTK 9.1 keeps that a structured grid has no ghosts from when its structure was copied.
+  result->UpdatePointGhostArrayCache();
+  result->UpdateCellGhostArrayCache();
   return result;
 }
 

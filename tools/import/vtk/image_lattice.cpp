@@ -68,25 +68,28 @@ Eigen::Affine3d to_world_of(vtkImageData& image, bool of_cells) {
   return to_world;
 }
 
-/// As in a mesh (mesh_cell.h): a cell with a hidden point is hidden, and a point whose cells are all hidden.
+/// Cells that are hidden or have a hidden point; or points that are hidden or have hidden cells alone.
 std::vector<bool> hidden_voxels(vtkImageData& image, bool of_cells) {
   vtkUnsignedCharArray* const cells = image.GetCellGhostArray();
   vtkUnsignedCharArray* const points = image.GetPointGhostArray();
   if (!cells && !points) return {};
   constexpr unsigned char hidden_cell = vtkDataSetAttributes::HIDDENCELL | vtkDataSetAttributes::REFINEDCELL;
-  std::vector<bool> hidden_cells(static_cast<std::size_t>(image.GetNumberOfCells()));
-  std::vector<bool> hidden_points(static_cast<std::size_t>(image.GetNumberOfPoints()), true);
-  vtkNew<vtkIdList> ids;
+  const auto is_hidden_point = [&](vtkIdType i) {
+    return points && (points->GetValue(i) & vtkDataSetAttributes::HIDDENPOINT) != 0;
+  };
+  std::vector<bool> hidden(static_cast<std::size_t>(of_cells ? image.GetNumberOfCells() : image.GetNumberOfPoints()),
+                           !of_cells);
+  vtkNew<vtkIdList> corners;
   for (vtkIdType cell = 0; cell < image.GetNumberOfCells(); ++cell) {
-    image.GetCellPoints(cell, ids);
-    bool hidden = cells && (cells->GetValue(cell) & hidden_cell);
-    for (vtkIdType i = 0; points && i < ids->GetNumberOfIds(); ++i)
-      hidden = hidden || (points->GetValue(ids->GetId(i)) & vtkDataSetAttributes::HIDDENPOINT);
-    hidden_cells[static_cast<std::size_t>(cell)] = hidden;
-    for (vtkIdType i = 0; !hidden && i < ids->GetNumberOfIds(); ++i)
-      hidden_points[static_cast<std::size_t>(ids->GetId(i))] = false;
+    const bool is_hidden = cells && (cells->GetValue(cell) & hidden_cell) != 0;
+    image.GetCellPoints(cell, corners);
+    for (vtkIdType i = 0; i < corners->GetNumberOfIds(); ++i) {
+      const vtkIdType point = corners->GetId(i);
+      if (of_cells && (is_hidden || is_hidden_point(point))) hidden[static_cast<std::size_t>(cell)] = true;
+      if (!of_cells && !is_hidden && !is_hidden_point(point)) hidden[static_cast<std::size_t>(point)] = false;
+    }
   }
-  return of_cells ? hidden_cells : hidden_points;
+  return hidden;
 }
 
 void read_slice(Source& source, int z, double* out) {

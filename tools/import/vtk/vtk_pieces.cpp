@@ -65,12 +65,12 @@ const vtkUnsignedCharArray* ghosts_of(vtkDataSetAttributes& attributes) {
   return vtkUnsignedCharArray::SafeDownCast(attributes.GetArray(vtkDataSetAttributes::GhostArrayName()));
 }
 
-/// Marks the cells that are to be left out beside other pieces as duplicates, which VTK can remove: copies of
-/// neighbours' cells, hidden cells, and those with a hidden point. Removes other marks.
-void mark_unused_cells(vtkDataSet& piece) {
+/// The piece without the cells that are to be left out beside other pieces: copies of neighbours' cells, hidden cells,
+/// and those with a hidden point.
+vtkSmartPointer<vtkDataSet> used_part(vtkDataSet& piece) {
   const auto* const cells = ghosts_of(*piece.GetCellData());
   const auto* const points = ghosts_of(*piece.GetPointData());
-  if (!cells && !points) return;
+  if (!cells && !points) return &piece;
   constexpr unsigned char used = 0, copy = vtkDataSetAttributes::DUPLICATECELL;
   constexpr unsigned char unused =
       vtkDataSetAttributes::DUPLICATECELL | vtkDataSetAttributes::HIDDENCELL | vtkDataSetAttributes::REFINEDCELL;
@@ -78,15 +78,23 @@ void mark_unused_cells(vtkDataSet& piece) {
   marks->SetName(vtkDataSetAttributes::GhostArrayName());
   vtkNew<vtkIdList> ids;
   for (vtkIdType cell = 0; cell < piece.GetNumberOfCells(); ++cell) {
-    bool is_unused = cells && (cells->GetValue(cell) & unused);
+    bool is_unused = cells && (cells->GetValue(cell) & unused) != 0;
     piece.GetCellPoints(cell, ids);
     for (vtkIdType i = 0; points && i < ids->GetNumberOfIds(); ++i)
-      is_unused = is_unused || (points->GetValue(ids->GetId(i)) & vtkDataSetAttributes::HIDDENPOINT);
+      is_unused = is_unused || (points->GetValue(ids->GetId(i)) & vtkDataSetAttributes::HIDDENPOINT) != 0;
     marks->InsertNextValue(is_unused ? copy : used);
   }
-  piece.GetPointData()->RemoveArray(vtkDataSetAttributes::GhostArrayName());
-  piece.GetCellData()->RemoveArray(vtkDataSetAttributes::GhostArrayName());
-  piece.GetCellData()->AddArray(marks);
+  for (vtkDataSetAttributes* const data : {static_cast<vtkDataSetAttributes*>(piece.GetPointData()),
+                                           static_cast<vtkDataSetAttributes*>(piece.GetCellData())})
+    data->RemoveArray(vtkDataSetAttributes::GhostArrayName());
+  vtkNew<vtkAppendFilter> to_unstructured;
+  to_unstructured->AddInputData(&piece);
+  to_unstructured->Update();
+  const vtkSmartPointer<vtkUnstructuredGrid> grid = to_unstructured->GetOutput();
+  grid->GetCellData()->AddArray(marks);
+  grid->RemoveGhostCells();  // Those that are marked as copies.
+  grid->GetCellData()->RemoveArray(vtkDataSetAttributes::GhostArrayName());
+  return grid;
 }
 
 /// Adds missing arrays, because vtkAppendFilter drops arrays that some of its inputs lack.
@@ -113,19 +121,16 @@ void complete_arrays(const DataSets& pieces, vtkDataObject::AttributeTypes type)
   }
 }
 
-/// Gives each point of `all` the values of the first piece that has it in a cell that is used, and has the array: not
-/// those of a piece that lacks it, or in which the point is of unused cells alone. The cells of `all` are those of the
-/// pieces, in their order.
+/// Gives each point of `all` the values of the first piece that has it and the array. The cells of `all` are those of
+/// the pieces, in their order.
 void take_known_values(vtkUnstructuredGrid& all, const DataSets& pieces,
                        const std::vector<std::set<std::string>>& known) {
   vtkNew<vtkIdList> from, to;
   vtkIdType end = all.GetNumberOfCells();
   for (std::size_t k = pieces.size(); k-- > 0;) {
     vtkDataSet& piece = *pieces[k];
-    const auto* const marks = ghosts_of(*piece.GetCellData());
     end -= piece.GetNumberOfCells();
     for (vtkIdType cell = 0; cell < piece.GetNumberOfCells(); ++cell) {
-      if (marks && marks->GetValue(cell) != 0) continue;
       piece.GetCellPoints(cell, from);
       all.GetCellPoints(end + cell, to);
       for (const std::string& name : known[k]) {
@@ -166,16 +171,17 @@ bool is_same_mesh(vtkDataSet& a, vtkDataSet& b) {
   return true;
 }
 
-vtkSmartPointer<vtkDataSet> one_data_set(const DataSets& pieces) {
-  if (pieces.empty()) return nullptr;
-  if (pieces.size() == 1) {
-    keep_hidden(*pieces.front());
-    return pieces.front();
+vtkSmartPointer<vtkDataSet> one_data_set(const DataSets& given) {
+  if (given.empty()) return nullptr;
+  if (given.size() == 1) {
+    keep_hidden(*given.front());
+    return given.front();
   }
+  DataSets pieces;
   std::vector<std::set<std::string>> known;
-  for (vtkDataSet* const piece : pieces) {
-    mark_unused_cells(*piece);
-    known.push_back(point_arrays(*piece));
+  for (vtkDataSet* const piece : given) {
+    pieces.push_back(used_part(*piece));
+    known.push_back(point_arrays(*pieces.back()));
   }
   complete_arrays(pieces, vtkDataObject::POINT);
   complete_arrays(pieces, vtkDataObject::CELL);
@@ -187,8 +193,6 @@ vtkSmartPointer<vtkDataSet> one_data_set(const DataSets& pieces) {
   append->Update();
   const vtkSmartPointer<vtkUnstructuredGrid> all = append->GetOutput();
   take_known_values(*all, pieces, known);
-  all->RemoveGhostCells();
-  all->GetCellData()->RemoveArray(vtkDataSetAttributes::GhostArrayName());
   return all;
 }
 
