@@ -191,6 +191,29 @@ TEST(Ghosts, EachKindOfDataSetTreatsThemAlike) {
         }
 }
 
+TEST(Ghosts, DerivativesDoNotLookAtHiddenPointsOfAnyKindOfDataSet) {
+  const TemporaryFolder folder;
+  for (const auto& [ending, set] : kinds_of_cubes()) {
+    add_array<3>(*set, "v",
+                 [](const Vector3d& p) { return Vector3d(p.x() < 2.5 ? p.x() : 1e6, 2 * p.y(), 3 * p.z()); });
+    mark(*set->GetPointData(), set->GetNumberOfPoints(), vtkDataSetAttributes::HIDDENPOINT,
+         [](vtkIdType i) { return i % 5 >= 3; });
+    write_xml(*set, folder / ("a" + ending));
+    ImportSettings settings;
+    settings.files = {folder / ("a" + ending)};
+    settings.array = "v";
+    settings.take = Take::gradient;
+    settings.sampling.resolution = 0.5;
+    ImportReport report;
+    std::size_t voxels = 0;
+    for_each_voxel(import_tensors(settings, Progress(), report), [&](const Vector3d&, const Matrix3d& gradient) {
+      ++voxels;
+      EXPECT_LT((gradient - Matrix3d(Vector3d(1, 2, 3).asDiagonal())).norm(), 1e-5) << ending;
+    });
+    EXPECT_EQ(voxels, half) << ending;
+  }
+}
+
 /// Images whose voxels are kept do the same: of points, those that no used cell has are not there.
 TEST(Ghosts, VoxelsThatAreKeptAreHiddenAsInAMesh) {
   const TemporaryFolder folder;

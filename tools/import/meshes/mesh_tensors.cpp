@@ -129,7 +129,7 @@ Array averaged_to_points(vtkDataSet& mesh, vtkDataArray& of_cells) {
 
 /// Whether VTK may take differences along the grid: it ignores that points are hidden, and spreads what is not finite.
 bool is_whole_grid(vtkDataSet& mesh, vtkDoubleArray& vectors) {
-  if (mesh.IsA("vtkUnstructuredGrid") || mesh.HasAnyBlankPoints() || mesh.HasAnyBlankCells()) return false;
+  if (mesh.IsA("vtkUnstructuredGrid") || mesh.GetPointGhostArray() || mesh.GetCellGhostArray()) return false;
   const double* const begin = vectors.GetPointer(0);
   return std::all_of(begin, begin + vectors.GetNumberOfValues(), [](double v) { return std::isfinite(v); });
 }
