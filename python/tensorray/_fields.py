@@ -153,7 +153,8 @@ def import_file(*files, array=None, gradient_of=None, strain_of=None, cells=None
         raise RuntimeError(f"imports need {program}, which is not built; run `tools/setup release import`")
     options = {"--array": array, "--gradient-of": gradient_of, "--strain-of": strain_of, "--cells": cells,
                "--order": order, "--frame": frame, "--resolution": resolution, "--voxel-size": voxel_size,
-               "--origin": origin, "--bounds": bounds, "--steps": step, "--boundary": boundary, "--name": name, "--units": units}
+               "--origin": origin, "--bounds": bounds, "--steps": step, "--boundary": boundary, "--name": name,
+               "--units": units}
     with tempfile.TemporaryDirectory() as folder:
         vdb = os.path.join(folder, "field.vdb")
         command = [program, "--tell-progress", "-q", "-o", vdb]
