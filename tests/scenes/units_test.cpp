@@ -35,7 +35,7 @@ const std::vector<SceneCase> scenes{
                  "integrator": {"type": "lens"}})"},
     {"lens by gathering", R"({"integrator": {"type": "lens", "mode": "gather", "image_plane": {"distance": $0.5}}})"},
     {"paths", R"({"integrator": {"type": "path_tracing", "max_samples": 4, "seeds": {"count": 20}}})"},
-    // The power of a lamp's photons, in units of area, is in single precision.
+    // Of lamps' photons, powers in units of area are checked up to here.
     {"whole", R"({"objects": [{"plate": {"center": [0, 0, $-2.6], "size": [$16, $16]}, "texture": "checkerboard"}],
                   "lights": [{"kind": "directional", "direction": [0.1, 0.15, -1]},
                              {"kind": "area", "center": [0, 0, $3], "direction": [0, 0, -1], "size": [$0.2, $0.2],
@@ -71,7 +71,7 @@ Image picture_of(const SceneCase& one, double unit) {
   TensorGrid grid = generate(Helix(), GridSettings{{17, 17, 17}});
   grid.to_world = Eigen::Affine3d(Eigen::Scaling(unit)) * grid.to_world;
   const Scene scene = load_scene(read_scene_json(json, "scene.json"),
-                                 prepare_field(std::move(grid), Eigenvalues::automatic, "helix"), Progress());
+                                 prepare_field(std::move(grid), {0, Eigenvalues::automatic, {}}, "helix"), Progress());
   return render(scene, Progress()).linear;
 }
 
