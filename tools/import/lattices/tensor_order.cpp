@@ -64,14 +64,17 @@ TensorOrder chosen_order(int components, const std::optional<TensorOrder>& said,
   const int count = components == 4 ? 4 : 6;
   const std::optional<TensorOrder> chosen = said ? said : given;
   if (chosen && component_count(*chosen) == count) return *chosen;
+  if (components == 4)
+    throw std::invalid_argument(
+        what +
+        " has four components of a tensor of a plane and does not say in which order: give it with --order plane (xx "
+        "yy zz xy) or 2x2 (xx xy yx yy)");
   std::vector<std::string> orders;
   for (const std::string& name : tensor_order_names())
     if (component_count(tensor_order_of(name)) == count) orders.push_back(name);
-  throw std::invalid_argument(fmt::format("{} has {} and does not say in which order: give it with --order {}", what,
-                                          components == 4   ? "four components of a tensor of a plane"
-                                          : components == 6 ? "six components of a symmetric tensor"
-                                                            : "the six components first of a symmetric tensor",
-                                          fmt::join(orders, "|")));
+  throw std::invalid_argument(
+      fmt::format("{} has {} of a symmetric tensor and does not say in which order: give it with --order {}", what,
+                  components == 6 ? "six components" : "the six components first", fmt::join(orders, "|")));
 }
 
 Eigen::Matrix3d tensor_of(const double* components, TensorOrder order) {
