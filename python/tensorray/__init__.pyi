@@ -38,7 +38,8 @@ def read_vdb(file: _Path, name: str = ..., *, derive: Literal["none", "gradient"
 def make(kind: str, resolution: Union[None, int, Sequence[int]] = ..., *, min: Optional[ArrayLike] = ...,
          max: Optional[ArrayLike] = ..., progress: _Progress = ..., **parameters: Any) -> Field: ...
 def import_file(*files: _Path, array: Optional[str] = ..., gradient_of: Optional[str] = ...,
-                strain_of: Optional[str] = ..., order: Optional[str] = ..., frame: Optional[str] = ...,
+                strain_of: Optional[str] = ..., cells: Optional[str] = ..., order: Optional[str] = ...,
+                frame: Optional[str] = ...,
                 resolution: Union[None, int, Sequence[int]] = ...,
                 voxel_size: Union[None, float, Sequence[float]] = ...,
                 origin: Optional[Sequence[float]] = ..., bounds: Optional[Sequence[float]] = ...,

@@ -122,16 +122,17 @@ def make(kind, resolution=None, *, min=None, max=None, progress=None, **paramete
         return Field._of(_tensorray.make_field(json_of(keys), report))
 
 
-def import_file(*files, array=None, gradient_of=None, strain_of=None, order=None, frame=None, resolution=None,
-                voxel_size=None, origin=None, bounds=None, thickness=None, step=None, boundary=None, name=None,
-                units=None, progress=None):
+def import_file(*files, array=None, gradient_of=None, strain_of=None, cells=None, order=None, frame=None,
+                resolution=None, voxel_size=None, origin=None, bounds=None, thickness=None, step=None, boundary=None,
+                name=None, units=None, progress=None):
     """Makes a field of other programs' files: VTK, ExodusII, CGNS, OpenFOAM, PLOT3D, NRRD, NIfTI, NumPy.
 
     files        One file, or several that belong together (a PLOT3D grid and its solution).
-    array        Name of the array that is the tensor, or of six or nine scalar arrays that are its components, with
-                 commas: "sxx,syy,szz,sxy,syz,sxz"; default: the only array.
+    array        Name of the array that is the tensor, or of its components, with commas: "sxx,syy,szz,sxy,syz,sxz";
+                 default: the only array.
     gradient_of  Name of the velocity whose gradient is the tensor.
     strain_of    Name of the displacement whose strain is the tensor.
+    cells        What tensors at cells are between their centres: linear (the default) or constant in each cell.
     order        Order of six components: vtk, fsl, mrtrix, voigt or lower; of four of a plane: plane or 2x2.
     frame        Axes of the components in a medical image: ras, lps, voxels or fsl; default: those of the order.
     resolution   Voxels along the longest edge, or along x, y and z; default: the median cell is a voxel.
@@ -151,9 +152,10 @@ def import_file(*files, array=None, gradient_of=None, strain_of=None, order=None
     program = os.path.join(_programs.folder(), "tensorray-import")
     if not os.path.exists(program):
         raise RuntimeError(f"imports need {program}, which is not built; run `tools/setup release import`")
-    options = {"--array": array, "--gradient-of": gradient_of, "--strain-of": strain_of, "--order": order,
-               "--frame": frame, "--resolution": resolution, "--voxel-size": voxel_size, "--origin": origin,
-               "--bounds": bounds, "--thickness": thickness, "--steps": step, "--boundary": boundary, "--name": name, "--units": units}
+    options = {"--array": array, "--gradient-of": gradient_of, "--strain-of": strain_of, "--cells": cells,
+               "--order": order, "--frame": frame, "--resolution": resolution, "--voxel-size": voxel_size,
+               "--origin": origin, "--bounds": bounds, "--thickness": thickness, "--steps": step,
+               "--boundary": boundary, "--name": name, "--units": units}
     with tempfile.TemporaryDirectory() as folder:
         vdb = os.path.join(folder, "field.vdb")
         command = [program, "--tell-progress", "-q", "-o", vdb]

@@ -77,7 +77,7 @@ inline Grid unit_cube(int cell_type, int n, const Map& map) {
     for (const auto& corner : {Vector3d(0, 0, 0), Vector3d(1, 0, 0), Vector3d(1, 1, 0), Vector3d(0, 1, 0),
                                Vector3d(0, 0, 1), Vector3d(1, 0, 1), Vector3d(1, 1, 1), Vector3d(0, 1, 1)})
       c.push_back((corner + Vector3d(i % n, i / n % n, i / n / n)) / n);
-    if (cell_type == VTK_HEXAHEDRON) cell(cell_type, c);
+    if (cell_type == VTK_HEXAHEDRON || cell_type == VTK_LAGRANGE_HEXAHEDRON) cell(cell_type, c);
     if (cell_type == VTK_WEDGE) {
       cell(cell_type, {c[0], c[1], c[2], c[4], c[5], c[6]});
       cell(cell_type, {c[0], c[2], c[3], c[4], c[6], c[7]});

@@ -75,6 +75,8 @@ TEST_P(EveryCell, SamplesALinearFieldExactlyAtEveryVoxelOfACube) {
 INSTANTIATE_TEST_SUITE_P(Types, EveryCell,
                          ::testing::Values(CellCase{"Hexahedron", VTK_HEXAHEDRON, false},
                                            CellCase{"BentHexahedron", VTK_HEXAHEDRON, true},
+                                           CellCase{"LagrangeHexahedron", VTK_LAGRANGE_HEXAHEDRON, false},
+                                           CellCase{"BentLagrangeHexahedron", VTK_LAGRANGE_HEXAHEDRON, true},
                                            CellCase{"Wedge", VTK_WEDGE, false}, CellCase{"BentWedge", VTK_WEDGE, true},
                                            CellCase{"Pyramid", VTK_PYRAMID, false},
                                            CellCase{"Tetrahedron", VTK_TETRA, false},
@@ -204,7 +206,7 @@ TEST(MeshSampling, VoxelsThatNeedAPointThatIsNotANumberAreInactive) {
   });
   SamplingReport report;
   const TensorGrid grid = sampled(*mesh, resolution(17), report);
-  EXPECT_EQ(report.non_finite_points, 1u);
+  EXPECT_EQ(report.non_finite, 1u);
   EXPECT_EQ(report.active,
             17u * 17u * 17u - 7u * 7u * 7u);  // all points strictly within the eight cells around the hidden point
   expect_linear(grid);

@@ -9,6 +9,7 @@
 #include "tests/import/mesh_files.h"
 #include "tests/import/openfoam_case.h"
 #include "tests/import/vtk_files.h"
+#include "tools/import/meshes/mesh_tensors.h"
 #include "tools/import/vtk/vtk_source.h"
 
 namespace tensorray {
@@ -62,8 +63,9 @@ void expect_both_parts(const fs::path& folder, std::optional<int> step = {}) {
   }
   // The middle of the seam has the mean of all eight cells about it.
   const vtkIdType middle = read->FindPoint(2, 0.5, 2);
-  const double mean = (OpenFoamCase::value(4, 1, at_end) + OpenFoamCase::value(11, 1, at_end)) / 2;
-  EXPECT_NEAR(read->GetPointData()->GetArray("U")->GetComponent(middle, 1), mean, 1e-3);
+  const double mean = (OpenFoamCase::value(4, 0, at_end) + OpenFoamCase::value(11, 0, at_end)) / 2;
+  const auto tensors = with_tensors(*read, {"sigma", true}, Take::tensor, {});
+  EXPECT_NEAR(tensors->GetPointData()->GetArray(tensor_array)->GetComponent(middle, 0), mean, 1e-3);
 }
 
 TEST(OpenFoamParts, DecomposedCasesAreMerged) {
@@ -132,9 +134,10 @@ TEST(OpenFoamParts, RegionsKeepTheirOwnValuesWhereTheyMeet) {
   const auto read = read_vtk_source(folder);
   ASSERT_EQ(read->GetNumberOfCells(), 2 * OpenFoamCase::cells);
   EXPECT_EQ(read->GetNumberOfPoints(), 27 + 27);
+  const auto gradients = with_tensors(*read, {"U", true}, Take::gradient, {});
   int with_U = 0;
   for (vtkIdType i = 0; i < read->GetNumberOfPoints(); ++i)
-    if (std::isfinite(read->GetPointData()->GetArray("U")->GetComponent(i, 0))) ++with_U;
+    if (std::isfinite(gradients->GetPointData()->GetArray(tensor_array)->GetComponent(i, 0))) ++with_U;
   EXPECT_EQ(with_U, 27);  // Also those at the solid, which has no U.
 }
 

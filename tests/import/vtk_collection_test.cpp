@@ -61,6 +61,27 @@ TEST(VtkCollection, OfATimeSeriesTheLastTimeWithAllItsParts) {
   EXPECT_EQ(read_vtk_source(folder / "blocks.pvd")->GetNumberOfCells(), 5);
 }
 
+TEST(VtkCollection, APartThatIsNamedTwiceForOneTimeCountsOnceOrIsRefused) {
+  const TemporaryFolder folder;
+  write_xml(*bar(0, 3), folder / "a.vtu");
+  const auto other = bar(0, 3);
+  other->GetPointData()->GetArray("tensor")->Fill(7);
+  write_xml(*other, folder / "restarted.vtu");
+  const std::string a = "<DataSet timestep=\"1\" part=\"0\" file=\"a.vtu\"/>\n";
+  write_bytes(folder / "same.pvd", series(a + a));
+  expect_same(*read_vtk_source(folder / "same.pvd"), *bar(0, 3), 0x1p-1000);
+  for (const char* part : {"part=\"0\" ", ""}) {
+    write_bytes(folder / "both.pvd", series(a + "<DataSet timestep=\"1\" " + part + "file=\"restarted.vtu\"/>\n"));
+    const std::string error = error_of([&] { read_vtk_source(folder / "both.pvd"); });
+    EXPECT_NE(error.find("both.pvd: names the same mesh twice for one time, as a.vtu and as restarted.vtu"),
+              std::string::npos)
+        << error;
+  }
+  write_bytes(folder / "both.vtm", blocks("<DataSet file=\"a.vtu\"/><DataSet file=\"restarted.vtu\"/>"));
+  EXPECT_NE(error_of([&] { read_vtk_source(folder / "both.vtm"); }).find("names the same mesh twice"),
+            std::string::npos);
+}
+
 TEST(VtkCollection, ErrorsNameTheFile) {
   const TemporaryFolder folder;
   write_xml(*bar(0, 1), folder / "a.vtu");

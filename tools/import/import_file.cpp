@@ -94,7 +94,7 @@ TensorGrid import_mesh(vtkDataSet& data, const ArrayChoice& array, const ImportS
       throw std::invalid_argument("is a convex mesh, with no body in it: leave --boundary out");
   }
   progress.update("making tensors", 0, 1);
-  const auto mesh = with_tensors(data, array, settings.take, settings.order);
+  const auto mesh = with_tensors(data, array, settings.take, settings.order, settings.cell_values);
   report.mesh.emplace();
   TensorGrid grid = sample_mesh(*mesh, settings.sampling, progress, *report.mesh);
   grid.name = array.name;
@@ -135,9 +135,9 @@ TensorGrid import_data_set(vtkSmartPointer<vtkDataSet> data, ImportSettings sett
     data = slab_of_flat(std::move(data), settings, report);
   else if (settings.thickness)
     set_thickness(*vtkImageData::SafeDownCast(data), *settings.thickness);
-  const bool is_list = settings.take == Take::tensor && is_array_list(*data, settings.array);
-  const ArrayChoice array =
-      is_list ? join_arrays(*data, settings.array) : choose_array(*data, settings.array, settings.take);
+  const ArrayChoice array = is_array_list(*data, settings.array)
+                                ? join_arrays(*data, settings.array, settings.take)
+                                : choose_array(*data, settings.array, settings.take, settings.cell_values);
   auto image = vtkSmartPointer<vtkImageData>(vtkImageData::SafeDownCast(data));
   if (!image || wants_sampling(settings)) return import_mesh(*data, array, settings, progress, report);
   data = nullptr;  // Leave the lattice as the only owner of the numbers, so that it can free them.
@@ -145,9 +145,9 @@ TensorGrid import_data_set(vtkSmartPointer<vtkDataSet> data, ImportSettings sett
                                                     : static_cast<vtkDataSetAttributes*>(image->GetPointData());
   vtkSmartPointer<vtkDataArray> values = attributes->GetArray(array.name.c_str());
   std::optional<TensorOrder> order;
-  if (is_list) order = order_in(*values, settings.order);
+  if (settings.take == Take::tensor) order = order_in(*values, settings.order);
   Lattice lattice = lattice_of(std::move(image), std::move(values), array.of_cells);
-  if (is_list) lattice.order = order;
+  if (order != TensorOrder::full) lattice.order = order;
   return import_lattice(lattice, settings, report);
 }
 

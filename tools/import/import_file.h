@@ -17,9 +17,11 @@ namespace tensorray {
 struct ImportSettings {
   /// One file. For PLOT3D two: the grid file and the q file.
   std::vector<std::filesystem::path> files;
-  std::string array;  ///< Name of the array, or of six or nine scalar arrays; empty: the only suitable one.
+  std::string
+      array;  ///< Name of the array, or a list of its components (component_arrays.h); empty: the only suitable one.
   Take take = Take::tensor;
-  std::optional<TensorOrder> order;  ///< Order of six components, where the file does not state it.
+  CellValues cell_values = CellValues::linear;  ///< Of tensors at the cells of a mesh.
+  std::optional<TensorOrder> order;             ///< Order of six components, where the file does not state it.
   /// For files of voxels only `bounds` is used, except for VTK files; for .npy also a voxel size, that of the file.
   SamplingSettings sampling;
   std::optional<double> thickness;        ///< Of a flat mesh or image; none: a typical edge of its cells.

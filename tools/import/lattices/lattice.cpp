@@ -8,7 +8,6 @@
 #include <vector>
 
 #include <fmt/format.h>
-#include <fmt/ranges.h>
 #include <tbb/parallel_for.h>
 
 #include "volumes/grids/page_memory.h"
@@ -145,26 +144,14 @@ int unmasked(const Lattice& lattice) { return lattice.components - (lattice.mask
 
 TensorOrder order_of(const Lattice& lattice, const std::optional<TensorOrder>& order) {
   const int count = unmasked(lattice);
-  if (order && (count == 9 || (lattice.order && *lattice.order != *order)))
-    throw std::invalid_argument(called(lattice) + " says its order itself: leave --order out (--frame says the axes)");
-  if (count == 9) return TensorOrder::full;
   if (count == 3)
     throw std::invalid_argument(
         called(lattice) + " has three components, a vector: derive a tensor (--gradient-of), or choose another array");
   if (count != 4 && count != 6 && count < 9)
     throw std::invalid_argument(fmt::format("{} has {} component{} and a tensor six or nine: choose another array",
                                             called(lattice), count, count == 1 ? "" : "s"));
-  const std::optional<TensorOrder> chosen = lattice.order ? lattice.order : order ? order : lattice.usual_order;
-  if (count == 4 && (!chosen || component_count(*chosen) != 4))
-    throw std::invalid_argument(called(lattice) +
-                                " has four components of a tensor of a plane and does not say in which "
-                                "order: give it with --order plane|2x2");
-  if (!chosen || component_count(*chosen) != (count == 4 ? 4 : 6))
-    throw std::invalid_argument(
-        fmt::format("{} has six components of a symmetric tensor and does not say in which "
-                    "order: give it with --order {}",
-                    called(lattice), fmt::join(tensor_order_names(), "|")));
-  return *chosen;
+  const std::optional<TensorOrder> said = lattice.order || order ? lattice.order : lattice.usual_order;
+  return chosen_order(count, said, order, called(lattice));
 }
 
 Matrix3d frame_of(const Lattice& lattice, TensorOrder order) {

@@ -56,6 +56,27 @@ int component_count(TensorOrder order) {
   return order == TensorOrder::plane || order == TensorOrder::two_by_two ? 4 : 6;
 }
 
+TensorOrder chosen_order(int components, const std::optional<TensorOrder>& said,
+                         const std::optional<TensorOrder>& given, const std::string& what) {
+  if (given && (components == 9 || (said && *said != *given)))
+    throw std::invalid_argument(what + " says its order itself: leave --order out (--frame says the axes of an image)");
+  if (components == 9) return TensorOrder::full;
+  const int count = components == 4 ? 4 : 6;
+  const std::optional<TensorOrder> chosen = said ? said : given;
+  if (chosen && component_count(*chosen) == count) return *chosen;
+  if (components == 4)
+    throw std::invalid_argument(
+        what +
+        " has four components of a tensor of a plane and does not say in which order: give it with --order plane (xx "
+        "yy zz xy) or 2x2 (xx xy yx yy)");
+  std::vector<std::string> orders;
+  for (const std::string& name : tensor_order_names())
+    if (component_count(tensor_order_of(name)) == count) orders.push_back(name);
+  throw std::invalid_argument(
+      fmt::format("{} has {} of a symmetric tensor and does not say in which order: give it with --order {}", what,
+                  components == 6 ? "six components" : "the six components first", fmt::join(orders, "|")));
+}
+
 Eigen::Matrix3d tensor_of(const double* components, TensorOrder order) {
   if (order == TensorOrder::full) return Eigen::Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>(components);
   const double* c = components;

@@ -2,6 +2,7 @@
 /// @file tools/import/lattices/tensor_order.h
 /// The orders in which programs write the components of a tensor.
 
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -28,6 +29,12 @@ TensorOrder tensor_order_of(const std::string& name);
 
 /// The number of components: nine, six or four.
 int component_count(TensorOrder order);
+
+/// The order of an array of four, six, nine or more components.
+/// @param said  What the file says of it. @param given  What the user says. @param what  The array, for messages.
+/// @throw std::invalid_argument if neither says it, or if the user says it of an array whose order is known otherwise.
+TensorOrder chosen_order(int components, const std::optional<TensorOrder>& said,
+                         const std::optional<TensorOrder>& given, const std::string& what);
 
 /// The tensor with component_count(order) components. Six components make a symmetric tensor.
 Eigen::Matrix3d tensor_of(const double* components, TensorOrder order);

@@ -1,6 +1,7 @@
 #include "tools/import/meshes/component_arrays.h"
 
 #include <algorithm>
+#include <optional>
 #include <sstream>
 #include <stdexcept>
 #include <string>
@@ -15,7 +16,6 @@
 #include <vtkSmartPointer.h>
 
 #include "base/text.h"
-#include "tools/import/meshes/mesh_tensors.h"
 
 namespace tensorray {
 namespace {
@@ -33,52 +33,119 @@ Names names_in(const std::string& list) {
   return names;
 }
 
-/// The first of `names` that is no array of `data`; null if all are.
-const std::string* missing_name(vtkDataSetAttributes& data, const Names& names) {
-  const auto found = std::find_if(names.begin(), names.end(), [&](const auto& n) { return !data.GetArray(n.c_str()); });
-  return found == names.end() ? nullptr : &*found;
+/// A component of an array; `component` is -1 for a vector as a whole.
+struct Part {
+  vtkDataArray* array = nullptr;
+  int component = 0;
+};
+
+std::string component_name(vtkDataArray& array, int component) {
+  const char* const name = array.GetComponentName(component);
+  return name ? name : "";
 }
 
-void check_scalars(vtkDataSet& mesh, vtkDataSetAttributes& data, const Names& names) {
-  for (const std::string& name : names) {
-    const int components = data.GetArray(name.c_str())->GetNumberOfComponents();
-    if (components != 1)
-      throw std::invalid_argument(
-          fmt::format("array \"{}\" has {} components, and each array of a list is one "
-                      "component (--array); {}",
-                      name, components, list_of_arrays(mesh)));
+/// A component by its name or its number from 0 on; -2 if there is none.
+int component_called(vtkDataArray& array, const std::string& name) {
+  for (int i = 0; i < array.GetNumberOfComponents(); ++i)
+    if (name == component_name(array, i) || name == std::to_string(i)) return i;
+  return -2;
+}
+
+/// What `name` means: an array, NAME:COMPONENT, or a component whose name is its own.
+std::optional<Part> part_called(vtkDataSetAttributes& data, const std::string& name) {
+  if (name.empty()) return {};
+  if (vtkDataArray* const array = data.GetArray(name.c_str()))
+    return Part{array, array->GetNumberOfComponents() == 1 ? 0 : -1};
+  const std::size_t colon = name.rfind(':');
+  if (vtkDataArray* const array = colon == std::string::npos ? nullptr : data.GetArray(name.substr(0, colon).c_str())) {
+    const int component = component_called(*array, name.substr(colon + 1));
+    if (component >= 0) return Part{array, component};
   }
+  for (int i = 0; i < data.GetNumberOfArrays(); ++i)
+    if (vtkDataArray* const array = data.GetArray(i))
+      for (int k = 0; k < array->GetNumberOfComponents(); ++k)
+        if (array->GetNumberOfComponents() > 1 && component_name(*array, k) == name) return Part{array, k};
+  return {};
 }
 
-/// The attributes, of points or else of cells, that have all the arrays.
+/// The attributes, of points or else of cells, that have all that is listed.
 vtkDataSetAttributes& attributes_with(vtkDataSet& mesh, const Names& names) {
   vtkDataSetAttributes &points = *mesh.GetPointData(), &cells = *mesh.GetCellData();
-  if (!missing_name(points, names)) return points;
-  if (!missing_name(cells, names)) return cells;
+  for (vtkDataSetAttributes* const data : {&points, &cells})
+    if (std::all_of(names.begin(), names.end(), [&](const auto& name) { return part_called(*data, name).has_value(); }))
+      return *data;
   for (const std::string& name : names)
-    if (!points.GetArray(name.c_str()) && !cells.GetArray(name.c_str()))
-      throw std::invalid_argument(fmt::format("no array \"{}\" (--array); {}", name, list_of_arrays(mesh)));
-  throw std::invalid_argument("some arrays of the list are at points, others at cells (--array); " +
-                              list_of_arrays(mesh));
+    if (!part_called(points, name) && !part_called(cells, name))
+      throw std::invalid_argument(
+          fmt::format("no array \"{}\" in the list, nor such a component; {}", name, list_of_arrays(mesh)));
+  throw std::invalid_argument("some arrays of the list are at points, others at cells; " + list_of_arrays(mesh));
+}
+
+/// Whether the parts are the components of a tensor in the plane of x and y.
+bool is_plane(const std::vector<Part>& parts, Take take) {
+  return take == Take::tensor && (parts.size() == 3 || parts.size() == 4);
+}
+
+/// The components that make the new array, in its order: three vectors are the rows of a tensor.
+std::vector<Part> parts_of(vtkDataSet& mesh, vtkDataSetAttributes& data, const Names& names, Take take) {
+  std::vector<Part> parts;
+  for (const std::string& name : names) parts.push_back(*part_called(data, name));
+  const auto is_vector = [](const Part& part) {
+    return part.component < 0 && part.array->GetNumberOfComponents() == 3;
+  };
+  if (take == Take::tensor && names.size() == 3 && std::all_of(parts.begin(), parts.end(), is_vector)) {
+    std::vector<Part> rows;
+    for (const Part& part : parts)
+      for (int i = 0; i < 3; ++i) rows.push_back({part.array, i});
+    return rows;
+  }
+  for (std::size_t i = 0; i < parts.size(); ++i)
+    if (parts[i].component < 0)
+      throw std::invalid_argument(fmt::format(
+          "array \"{}\" has {} components, and each array of a list is one component: give {}:COMPONENT; {}", names[i],
+          parts[i].array->GetNumberOfComponents(), names[i], list_of_arrays(mesh)));
+  const std::size_t count = parts.size();
+  const bool fits = take == Take::tensor ? count == 6 || count == 9 || is_plane(parts, take) : count == 3;
+  if (fits) return parts;
+  throw std::invalid_argument(
+      fmt::format("{} lists {} arrays, and {}; {}",
+                  take == Take::tensor     ? "--array"
+                  : take == Take::gradient ? "--gradient-of"
+                                           : "--strain-of",
+                  names.size(),
+                  take == Take::tensor ? "a tensor has 6 or 9 components, of a plane 3 or 4, or 3 vectors as rows"
+                                       : "a vector has 3 components",
+                  list_of_arrays(mesh)));
 }
 
 /// An array for the components, of their type if they have the same.
-vtkSmartPointer<vtkDataArray> new_array(vtkDataSetAttributes& data, const Names& names, int components) {
-  const auto type_of = [&](const std::string& name) { return data.GetArray(name.c_str())->GetDataType(); };
-  const int first = type_of(names.front());
-  const bool same = std::all_of(names.begin(), names.end(), [&](const auto& name) { return type_of(name) == first; });
+vtkSmartPointer<vtkDataArray> new_array(const std::vector<Part>& parts, int components, Take take) {
+  const int first = parts.front().array->GetDataType();
+  const bool same =
+      std::all_of(parts.begin(), parts.end(), [&](const Part& part) { return part.array->GetDataType() == first; });
   vtkSmartPointer<vtkDataArray> array;
   array.TakeReference(vtkDataArray::CreateDataArray(same ? first : VTK_DOUBLE));
-  array->SetName(tensor_array);
+  array->SetName(take == Take::tensor ? tensor_array : "vector");
   array->SetNumberOfComponents(components);
-  array->SetNumberOfTuples(data.GetArray(names.front().c_str())->GetNumberOfTuples());
+  array->SetNumberOfTuples(parts.front().array->GetNumberOfTuples());
   return array;
 }
 
-ArrayChoice replace(vtkDataSet& mesh, vtkDataSetAttributes& data, const Names& names, vtkDataArray& joined) {
-  for (const std::string& name : names) data.RemoveArray(name.c_str());
-  data.AddArray(&joined);
-  return {tensor_array, &data == static_cast<vtkDataSetAttributes*>(mesh.GetCellData())};
+/// The name of a component by itself: of which the order of a tensor's components is found.
+std::string name_of(const Part& part) {
+  const std::string name = component_name(*part.array, part.component);
+  return name.empty() && part.array->GetNumberOfComponents() == 1 ? part.array->GetName() : name;
+}
+
+/// The components in the order of the parts.
+vtkSmartPointer<vtkDataArray> joined_in_order(const std::vector<Part>& parts, Take take) {
+  vtkSmartPointer<vtkDataArray> joined = new_array(parts, static_cast<int>(parts.size()), take);
+  for (int i = 0; i < joined->GetNumberOfComponents(); ++i) {
+    const Part& part = parts[static_cast<std::size_t>(i)];
+    joined->CopyComponent(i, part.array, part.component);
+    joined->SetComponentName(i, name_of(part).c_str());
+  }
+  return joined;
 }
 
 /// The position in VTK's order of the component that the last two letters of a name tell; −1 if they tell none of a
@@ -99,25 +166,23 @@ int plane_position(const std::string& name) {
   return -1;
 }
 
-/// Joins the components xx, yy, xy, and perhaps zz, of a tensor in the plane of x and y; the others are zero.
-ArrayChoice join_plane(vtkDataSet& mesh, const Names& names) {
-  vtkDataSetAttributes& data = attributes_with(mesh, names);
-  check_scalars(mesh, data, names);
+/// The components xx, yy, xy, and perhaps zz, of a tensor in the plane of x and y, in VTK's order; the others are zero.
+vtkSmartPointer<vtkDataArray> joined_of_plane(vtkDataSet& mesh, const std::vector<Part>& parts) {
   std::vector<int> positions;
-  for (const std::string& name : names) positions.push_back(plane_position(name));
-  for (const int needed : {0, 1, 3, names.size() == 4 ? 2 : 0})
+  for (const Part& part : parts) positions.push_back(plane_position(name_of(part)));
+  for (const int needed : {0, 1, 3, parts.size() == 4 ? 2 : 0})
     if (std::count(positions.begin(), positions.end(), needed) != 1)
       throw std::invalid_argument(
-          "--array lists " + std::to_string(names.size()) +
-          " arrays, and their last two letters do not tell xx, yy, xy (and zz) of a tensor of a plane; " +
-          list_of_arrays(mesh));
-  const vtkSmartPointer<vtkDataArray> joined = new_array(data, names, 6);
+          fmt::format("--array lists {} arrays, and their last two letters do not tell xx, yy, xy (and zz) of a tensor "
+                      "of a plane; {}",
+                      parts.size(), list_of_arrays(mesh)));
+  vtkSmartPointer<vtkDataArray> joined = new_array(parts, 6, Take::tensor);
   joined->Fill(0);
   constexpr const char* vtk_names[] = {"XX", "YY", "ZZ", "XY", "YZ", "XZ"};
   for (int i = 0; i < 6; ++i) joined->SetComponentName(i, vtk_names[i]);
-  for (std::size_t i = 0; i < names.size(); ++i)
-    joined->CopyComponent(positions[i], data.GetArray(names[i].c_str()), 0);
-  return replace(mesh, data, names, *joined);
+  for (std::size_t i = 0; i < parts.size(); ++i)
+    joined->CopyComponent(positions[i], parts[i].array, parts[i].component);
+  return joined;
 }
 
 }  // namespace
@@ -127,23 +192,15 @@ bool is_array_list(vtkDataSet& mesh, const std::string& names) {
          !mesh.GetCellData()->HasArray(names.c_str());
 }
 
-ArrayChoice join_arrays(vtkDataSet& mesh, const std::string& list) {
+ArrayChoice join_arrays(vtkDataSet& mesh, const std::string& list, Take take) {
   const Names names = names_in(list);
-  if (names.size() == 3 || names.size() == 4) return join_plane(mesh, names);
-  if (names.size() != 6 && names.size() != 9)
-    throw std::invalid_argument(
-        fmt::format("--array lists {} arrays, and a tensor has 6 or 9 components, of a plane 3 or "
-                    "4; {}",
-                    names.size(), list_of_arrays(mesh)));
   vtkDataSetAttributes& data = attributes_with(mesh, names);
-  check_scalars(mesh, data, names);
-  const vtkSmartPointer<vtkDataArray> joined = new_array(data, names, static_cast<int>(names.size()));
-  for (int i = 0; i < joined->GetNumberOfComponents(); ++i) {
-    const std::string& name = names[static_cast<std::size_t>(i)];
-    joined->CopyComponent(i, data.GetArray(name.c_str()), 0);
-    joined->SetComponentName(i, name.c_str());
-  }
-  return replace(mesh, data, names, *joined);
+  const std::vector<Part> parts = parts_of(mesh, data, names, take);
+  const vtkSmartPointer<vtkDataArray> joined =
+      is_plane(parts, take) ? joined_of_plane(mesh, parts) : joined_in_order(parts, take);
+  for (const std::string& name : names) data.RemoveArray(name.c_str());
+  data.AddArray(joined);
+  return {joined->GetName(), &data == static_cast<vtkDataSetAttributes*>(mesh.GetCellData())};
 }
 
 }  // namespace tensorray

@@ -1,22 +1,26 @@
 #pragma once
 /// @file tools/import/meshes/component_arrays.h
-/// Tensors whose components are scalar arrays of their own, as many solvers write them.
+/// Tensors and vectors whose components are arrays of their own, as many solvers write them.
 
 #include <string>
+
+#include "tools/import/meshes/mesh_tensors.h"
 
 class vtkDataSet;
 
 namespace tensorray {
 
-struct ArrayChoice;
-
 /// Whether `names` is a list of arrays, with commas between the names. An array whose own name has commas is no list.
 bool is_array_list(vtkDataSet& mesh, const std::string& names);
 
-/// Joins the six or nine scalar arrays listed in `names` to an array called "tensor", and removes them from `mesh`.
-/// Spaces around a name do not count. A name may occur twice. All arrays are at points, or else all are at cells. The
-/// components of the new array have the names of the arrays, of which with_tensors (mesh_tensors.h) finds their order.
+/// Joins what is listed in `names` to an array called "tensor", or "vector" of which a tensor is derived, and removes
+/// the arrays that are listed from `mesh`. A tensor has six or nine components, or three vectors as rows; one of the
+/// plane of x and y has three or four (xx, yy, xy, and perhaps zz, as the last two letters of their names tell). A
+/// vector has three components. Each is a scalar array, NAME:COMPONENT of another array (by the component's name, or
+/// its number from 0 on), or a component with that name, as VTK joins scalars of ExodusII. Spaces around a name do not
+/// count. A name may occur twice. All are at points, or else all are at cells. The components of the new array have the
+/// names of the old ones, of which with_tensors (mesh_tensors.h) finds their order.
 /// @throw std::invalid_argument that names the array and lists those that there are.
-ArrayChoice join_arrays(vtkDataSet& mesh, const std::string& names);
+ArrayChoice join_arrays(vtkDataSet& mesh, const std::string& names, Take take = Take::tensor);
 
 }  // namespace tensorray

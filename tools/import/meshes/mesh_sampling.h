@@ -27,15 +27,22 @@ struct SamplingReport {
   Eigen::Vector3i size = Eigen::Vector3i::Zero();   ///< Voxels of the lattice along each axis, active or not.
   Eigen::Vector3d voxel = Eigen::Vector3d::Zero();  ///< Edges of a voxel, world units.
   std::size_t active = 0;
-  double native_peak = 0, native_median = 0;    ///< ‖T‖ (Frobenius) at the cells' points in `bounds`.
+  bool of_cells = false;                      ///< Whether the mesh has its tensors at cells, else at points.
+  double native_peak = 0, native_median = 0;  ///< ‖T‖ (Frobenius) of the used cells, or their points, in `bounds`.
   double sampled_peak = 0, sampled_median = 0;  ///< ‖T‖ at the active voxels.
-  std::size_t non_finite_points = 0;            ///< Points of cells in `bounds` whose tensor is not finite.
+  std::size_t non_finite = 0;                   ///< Of those cells or points: whose tensor is not finite.
 };
 
-/// Samples the tensors of with_tensors at the centres of voxels. Each voxel uses the interpolation of the cell that
-/// contains it; where cells overlap, the cell with the lowest index. A voxel is inactive if it is in no cell, or if a
-/// point with a weight has NaN. The lattice is centred in the box as far as the box extends. Voxels within 1e-6 of
-/// the mesh's diagonal of a face count as inside.
+/// Samples the tensors of with_tensors at the voxels of a lattice. A voxel is active if its centre is in a cell whose
+/// tensor is finite; where cells overlap, the cell with the lowest index counts. Voxels within 1e-6 of the mesh's
+/// diagonal of a face count as inside. The lattice is centred in the box as far as the box extends.
+///
+/// A voxel takes the tensor at its centre, interpolated in the cell that contains it (it is NaN if a point with a
+/// weight has NaN), or the cell's own if the mesh has tensors at cells alone. Where cells are thinner than voxels, it
+/// takes the average over the part of the voxel that the mesh fills (voxel_average.h), wholly where the thinnest of
+/// these cells has at most half the thickness of a voxel, and less up to the thickness of a voxel, from where nothing
+/// is averaged. If the mesh has tensors at points and cells, the points' are sampled, and the cells' are those of the
+/// file: the report compares with them, and cells where they are not finite are left out.
 /// Threads: uses all threads. The result does not depend on their number.
 /// @throw std::invalid_argument if the mesh has no three-dimensional cells, a setting is out of range, no voxel is
 /// inside, or the grid would exceed 2^30 voxels.

@@ -1,5 +1,6 @@
 #include "tools/import/meshes/mesh_tensors.h"
 
+#include <algorithm>
 #include <cctype>
 #include <cmath>
 #include <limits>
@@ -16,11 +17,8 @@
 #include <vtkGradientFilter.h>
 #include <vtkNew.h>
 #include <vtkPointData.h>
-#include <vtkPointSet.h>
 #include <vtkSmartPointer.h>
-#include <vtkStructuredGrid.h>
 #include <vtkUnsignedCharArray.h>
-#include <vtkUnstructuredGrid.h>
 
 #include "tools/import/meshes/mesh_cell.h"
 
@@ -108,6 +106,14 @@ Array point_values(vtkDataArray& values) {
   return copy;
 }
 
+/// Makes means of sums; NaN where there is nothing.
+void divide(vtkDoubleArray& sums, const std::vector<int>& counts) {
+  const int components = sums.GetNumberOfComponents();
+  for (vtkIdType point = 0; point < sums.GetNumberOfTuples(); ++point)
+    for (int k = 0; k < components; ++k)
+      *sums.GetPointer(point * components + k) /= counts[static_cast<std::size_t>(point)];
+}
+
 Array averaged_to_points(vtkDataSet& mesh, vtkDataArray& of_cells) {
   const int components = of_cells.GetNumberOfComponents();
   Array sums = new_array(mesh.GetNumberOfPoints(), components);
@@ -115,59 +121,68 @@ Array averaged_to_points(vtkDataSet& mesh, vtkDataArray& of_cells) {
   std::vector<double> value(static_cast<std::size_t>(components));
   MeshCell cell;
   for (vtkIdType id = 0; id < mesh.GetNumberOfCells(); ++id) {
-    if (!cell.load(mesh, id)) continue;
     of_cells.GetTuple(id, value.data());
+    const auto is_finite = [](double v) { return std::isfinite(v); };
+    if (!std::all_of(value.begin(), value.end(), is_finite) || !cell.load(mesh, id)) continue;
     for (int i = 0; i < cell.points(); ++i) {
       ++counts[static_cast<std::size_t>(cell.point(i))];
       double* sum = sums->GetPointer(cell.point(i) * components);
       for (std::size_t k = 0; k < value.size(); ++k) sum[k] += value[k];
     }
   }
-  for (vtkIdType point = 0; point < mesh.GetNumberOfPoints(); ++point)
-    for (int k = 0; k < components; ++k)
-      *sums->GetPointer(point * components + k) /= counts[static_cast<std::size_t>(point)];  // 0/0 is NaN, as intended
+  divide(*sums, counts);
   return sums;
 }
 
-/// The cells of a mesh that are three-dimensional and not hidden, with all points of the mesh.
-vtkSmartPointer<vtkDataSet> visible_cells(vtkPointSet& mesh) {
-  auto visible = vtkSmartPointer<vtkUnstructuredGrid>::New();
-  visible->SetPoints(mesh.GetPoints());
-  visible->Allocate(mesh.GetNumberOfCells());
-  MeshCell cell;
-  for (vtkIdType id = 0; id < mesh.GetNumberOfCells(); ++id)
-    if (cell.load(mesh, id)) visible->InsertNextCell(cell.vtk().GetCellType(), cell.vtk().GetPointIds());
-  return visible;
+/// Whether VTK may take differences along the grid: it ignores that points are hidden, and spreads what is not finite.
+bool is_whole_grid(vtkDataSet& mesh, vtkDoubleArray& vectors) {
+  if (mesh.IsA("vtkUnstructuredGrid") || mesh.GetPointGhostArray() || mesh.GetCellGhostArray()) return false;
+  const double* const begin = vectors.GetPointer(0);
+  return std::all_of(begin, begin + vectors.GetNumberOfValues(), [](double v) { return std::isfinite(v); });
 }
 
-/// The mesh to differentiate on. On a curvilinear grid VTK takes differences along the grid and ignores that points
-/// are hidden; on an unstructured grid it takes the mean of the cells' own derivatives.
-vtkSmartPointer<vtkDataSet> differentiable(vtkDataSet& mesh) {
-  auto* const curvilinear = vtkStructuredGrid::SafeDownCast(&mesh);
-  if (curvilinear && (curvilinear->HasAnyBlankPoints() || curvilinear->HasAnyBlankCells()))
-    return visible_cells(*curvilinear);
-  auto bare = vtkSmartPointer<vtkDataSet>::Take(mesh.NewInstance());
+Array differences_along_grid(vtkDataSet& mesh, const Array& vectors) {
+  const auto bare = vtkSmartPointer<vtkDataSet>::Take(mesh.NewInstance());
   bare->CopyStructure(&mesh);
-  return bare;
-}
-
-/// ∂v_i/∂x_j as component 3 i + j.
-Array gradient_of(vtkDataSet& mesh, const Array& vectors) {
-  const vtkSmartPointer<vtkDataSet> domain = differentiable(mesh);
   vectors->SetName("vector");
-  domain->GetPointData()->AddArray(vectors);
+  bare->GetPointData()->AddArray(vectors);
   vtkNew<vtkGradientFilter> filter;
-  filter->SetInputData(domain);
+  filter->SetInputData(bare);
   filter->SetInputArrayToProcess(0, 0, 0, vtkDataObject::FIELD_ASSOCIATION_POINTS, "vector");
   filter->SetResultArrayName("gradient");
-  // A mesh may list its surface as two-dimensional cells, which have only tangential derivatives.
-  filter->SetContributingCellOption(vtkGradientFilter::DataSetMax);
   filter->Update();
   auto* const result = vtkDataSet::SafeDownCast(filter->GetOutputDataObject(0));
   vtkDataArray* const gradient = result ? result->GetPointData()->GetArray("gradient") : nullptr;
   if (!gradient || gradient->GetNumberOfComponents() != 9 || gradient->GetNumberOfTuples() != mesh.GetNumberOfPoints())
     throw std::runtime_error(fmt::format("VTK cannot differentiate on a mesh of class {}", mesh.GetClassName()));
   return point_values(*gradient);
+}
+
+/// At each point, the mean of the derivatives that its cells have there.
+Array mean_of_derivatives(vtkDataSet& mesh, vtkDoubleArray& vectors) {
+  Array sums = new_array(mesh.GetNumberOfPoints(), 9);
+  std::vector<int> counts(static_cast<std::size_t>(mesh.GetNumberOfPoints()), 0);
+  MeshCell cell;
+  Eigen::Matrix3Xd values;
+  for (vtkIdType id = 0; id < mesh.GetNumberOfCells(); ++id) {
+    if (!cell.load(mesh, id)) continue;
+    values.resize(3, cell.points());
+    for (int i = 0; i < cell.points(); ++i) vectors.GetTuple(cell.point(i), values.col(i).data());
+    if (!values.allFinite()) continue;
+    for (int i = 0; i < cell.points(); ++i) {
+      const Eigen::Matrix<double, 3, 3, Eigen::RowMajor> gradient = cell.gradient(values, i);
+      if (!gradient.allFinite()) continue;  // The cell is flat there.
+      ++counts[static_cast<std::size_t>(cell.point(i))];
+      Eigen::Map<Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>(sums->GetPointer(9 * cell.point(i))) += gradient;
+    }
+  }
+  divide(*sums, counts);
+  return sums;
+}
+
+/// ∂v_i/∂x_j as component 3 i + j.
+Array gradient_of(vtkDataSet& mesh, const Array& vectors) {
+  return is_whole_grid(mesh, *vectors) ? differences_along_grid(mesh, vectors) : mean_of_derivatives(mesh, *vectors);
 }
 
 void make_symmetric(vtkDoubleArray& tensors) {
@@ -194,14 +209,21 @@ void mark_unusable_points(vtkDataSet& mesh, vtkDoubleArray& tensors) {
   }
 }
 
-vtkSmartPointer<vtkDataSet> with_array(vtkDataSet& mesh, vtkDoubleArray& tensors) {
+/// The geometry of the mesh, with arrays of tensors, which may be null.
+vtkSmartPointer<vtkDataSet> with_arrays(vtkDataSet& mesh, const Array& of_points, const Array& of_cells) {
   auto result = vtkSmartPointer<vtkDataSet>::Take(mesh.NewInstance());
   result->CopyStructure(&mesh);
-  for (const bool of_cells : {false, true})
-    if (vtkDataArray* ghosts = attributes(mesh, of_cells).GetArray(vtkDataSetAttributes::GhostArrayName()))
-      attributes(*result, of_cells).AddArray(ghosts);
-  tensors.SetName(tensor_array);
-  result->GetPointData()->AddArray(&tensors);
+  for (const bool cells : {false, true}) {
+    if (vtkDataArray* ghosts = attributes(mesh, cells).GetArray(vtkDataSetAttributes::GhostArrayName()))
+      attributes(*result, cells).AddArray(ghosts);
+    if (const Array& tensors = cells ? of_cells : of_points) {
+      tensors->SetName(tensor_array);
+      attributes(*result, cells).AddArray(tensors);
+    }
+  }
+  // VTK 9.1 keeps that a structured grid has no ghosts from when its structure was copied.
+  result->UpdatePointGhostArrayCache();
+  result->UpdateCellGhostArrayCache();
   return result;
 }
 
@@ -218,39 +240,28 @@ std::string list_of_arrays(vtkDataSet& mesh) {
 }
 
 TensorOrder order_in(vtkDataArray& array, const std::optional<TensorOrder>& given) {
-  if (array.GetNumberOfComponents() == 9) return TensorOrder::full;
-  const std::optional<TensorOrder> said = order_of_names(array);
+  const bool six_first = array.GetNumberOfComponents() != 9;
+  const std::optional<TensorOrder> said = six_first ? order_of_names(array) : std::nullopt;
   if (given && said && *given != *said)
     throw std::invalid_argument(
         fmt::format("the file itself names the components of array \"{}\": they are {}, of which --order says "
                     "otherwise; leave --order out",
                     array.GetName(), component_names(array)));
-  if (said) return *said;
-  const int count = array.GetNumberOfComponents() == 4 ? 4 : 6;
-  if (given && component_count(*given) == count) return *given;
-  if (count == 4)
-    throw std::invalid_argument(
-        fmt::format("array \"{}\" has 4 components, a tensor of a plane in an order that it does not say: give --order "
-                    "plane (xx yy zz xy) or 2x2 (xx xy yx yy)",
-                    array.GetName()));
-  std::string names;
-  for (const std::string& name : tensor_order_names())
-    if (component_count(tensor_order_of(name)) == 6) names += (names.empty() ? "" : ", ") + name;
-  throw std::invalid_argument(
-      fmt::format("array \"{}\" has {} components, of which the first six are a symmetric tensor, in an order that it "
-                  "does not say: give --order, one of {}",
-                  array.GetName(), array.GetNumberOfComponents(), names));
+  return chosen_order(array.GetNumberOfComponents(), said, given, fmt::format("array \"{}\"", array.GetName()));
 }
 
-ArrayChoice choose_array(vtkDataSet& mesh, const std::string& name, Take take) {
+ArrayChoice choose_array(vtkDataSet& mesh, const std::string& name, Take take, CellValues cell_values) {
   std::vector<ArrayChoice> choices;
   int components_of_named = 0;
   for_each_array(mesh, [&](vtkDataArray& array, bool of_cells) {
     if (!name.empty() && array.GetName() != name) return;
     components_of_named = array.GetNumberOfComponents();
     if (!suits(components_of_named, take, !name.empty())) return;
-    for (const ArrayChoice& choice : choices)
-      if (choice.name == array.GetName()) return;
+    for (ArrayChoice& choice : choices) {
+      if (choice.name != array.GetName()) continue;
+      choice.of_cells = cell_values == CellValues::constant;
+      return;
+    }
     choices.push_back({array.GetName(), of_cells});
   });
   if (choices.size() == 1) return choices.front();
@@ -269,17 +280,24 @@ ArrayChoice choose_array(vtkDataSet& mesh, const std::string& name, Take take) {
 }
 
 vtkSmartPointer<vtkDataSet> with_tensors(vtkDataSet& mesh, const ArrayChoice& array, Take take,
-                                         const std::optional<TensorOrder>& order) {
+                                         const std::optional<TensorOrder>& order, CellValues cell_values) {
   vtkDataArray* const given = attributes(mesh, array.of_cells).GetArray(array.name.c_str());
   if (!given || !suits(given->GetNumberOfComponents(), take, true))
     throw std::invalid_argument(
         fmt::format("no array \"{}\" of which {}; {}", array.name, wanted(take), list_of_arrays(mesh)));
+  const bool tensors_of_cells = array.of_cells && take == Take::tensor;
+  if (cell_values == CellValues::constant && !tensors_of_cells)
+    throw std::invalid_argument(fmt::format(
+        "--cells constant needs tensors at cells, and {}: leave it out",
+        take == Take::tensor ? fmt::format("array \"{}\" is at points", array.name) : "derivatives are at points"));
   const TensorOrder known_order = take == Take::tensor ? order_in(*given, order) : TensorOrder::full;
+  const Array of_cells = tensors_of_cells ? tensors_in(point_values(*given), known_order) : nullptr;
+  if (cell_values == CellValues::constant) return with_arrays(mesh, nullptr, of_cells);
   const Array values = array.of_cells ? averaged_to_points(mesh, *given) : point_values(*given);
   const Array tensors = take == Take::tensor ? tensors_in(values, known_order) : gradient_of(mesh, values);
   if (take == Take::strain) make_symmetric(*tensors);
   mark_unusable_points(mesh, *tensors);
-  return with_array(mesh, *tensors);
+  return with_arrays(mesh, tensors, of_cells);
 }
 
 }  // namespace tensorray

@@ -35,7 +35,7 @@ constexpr double kept_peak = 0.95;
 
 struct ImportOptions {
   ImportSettings settings;
-  std::string array, gradient_of, strain_of, order, frame;
+  std::string array, gradient_of, strain_of, order, frame, cells = "linear";
   std::vector<int> resolution;
   std::vector<double> voxel_size, bounds, origin;
   double thickness = 0;
@@ -58,6 +58,7 @@ ImportSettings settings_of(const ImportOptions& options) {
   }
   if (!options.order.empty()) settings.order = tensor_order_of(options.order);
   if (!options.frame.empty()) settings.frame = component_frame_of(options.frame);
+  if (options.cells == "constant") settings.cell_values = CellValues::constant;
   if (options.voxel_size.size() == 1) settings.sampling.resolution = options.voxel_size[0];
   if (options.voxel_size.size() == 2) throw std::invalid_argument("--voxel-size needs one number, or three: x y z");
   if (options.voxel_size.size() == 3) settings.voxel = Eigen::Vector3d(options.voxel_size.data());
@@ -93,8 +94,8 @@ void print_sampling(const ImportReport& report) {
                         mesh.voxel.z(), mesh.active));
   tell_made(fmt::format("  norm of the tensor, mesh -> grid: peak {:.4g} -> {:.4g}, median {:.4g} -> {:.4g}",
                         mesh.native_peak, mesh.sampled_peak, mesh.native_median, mesh.sampled_median));
-  if (mesh.non_finite_points > 0)
-    tell_made(fmt::format("  {} points of the mesh are not finite", mesh.non_finite_points));
+  if (mesh.non_finite > 0)
+    tell_made(fmt::format("  {} {} of the mesh are not finite", mesh.non_finite, mesh.of_cells ? "cells" : "points"));
   if (mesh.sampled_peak < kept_peak * mesh.native_peak) {
     tell({fmt::format(
              "tensorray: warning: the grid holds {:.0f}% of the mesh's peak norm; a larger --resolution, or --bounds "
@@ -212,11 +213,13 @@ std::string positive(const std::string& text) {
 void add_what(CLI::App& command, ImportOptions& options) {
   auto* array =
       command.add_option("--array", options.array,
-                         "The array that is the tensor (default: the only one), or six or nine scalar arrays that "
-                         "are its components: sxx,syy,szz,sxy,syz,sxz");
+                         "The array that is the tensor (default: the only one), or its components: six or nine scalar "
+                         "arrays (sxx,syy,szz,sxy,syz,sxz), components of others (NAME:COMPONENT), or three vectors "
+                         "as rows");
   auto* gradient =
       command.add_option("--gradient-of", options.gradient_of,
-                         "Take the gradient of this vector array, T_ij = dv_i/dx_j, made on the mesh itself");
+                         "Take the gradient of this vector array, or of three scalar arrays (u,v,w): T_ij = dv_i/dx_j, "
+                         "made on the mesh itself");
   auto* strain = command.add_option("--strain-of", options.strain_of,
                                     "Take the symmetric part of the gradient of this displacement");
   array->excludes(gradient, strain);
@@ -236,6 +239,12 @@ void add_what(CLI::App& command, ImportOptions& options) {
                   "--order fsl and lower, else ras (MetaImage: lps)")
       ->check(CLI::IsMember(component_frame_names()))
       ->option_text("FRAME");
+  command
+      .add_option("--cells", options.cells,
+                  "What tensors at the cells of a mesh are in between: linear (averaged to the points, and "
+                  "interpolated), or constant in each cell (linear)")
+      ->check(CLI::IsMember({"linear", "constant"}))
+      ->option_text("VALUES");
   for (CLI::Option* option : command.get_options({}))
     if (option != command.get_help_ptr()) option->group("What to take");
 }

@@ -5,11 +5,14 @@
 #include <limits>
 #include <memory>
 #include <stdexcept>
+#include <vector>
 
 #include <vtkCellData.h>
 #include <vtkDataArray.h>
+#include <vtkIdList.h>
 #include <vtkImageData.h>
 #include <vtkMatrix3x3.h>
+#include <vtkNew.h>
 #include <vtkPointData.h>
 #include <vtkSmartPointer.h>
 #include <vtkUnsignedCharArray.h>
@@ -20,9 +23,8 @@ namespace {
 /// The arrays of the image, whose slices are freed as they are read.
 struct Source {
   vtkSmartPointer<vtkDataArray> values;
-  vtkSmartPointer<vtkUnsignedCharArray> ghosts;  ///< May be null.
-  unsigned char hidden = 0;                      ///< The bit of `ghosts` that marks hidden voxels.
-  vtkIdType slice = 0;                           ///< Voxels per slice.
+  std::vector<bool> hidden;  ///< Of each voxel; empty if none is.
+  vtkIdType slice = 0;       ///< Voxels per slice.
 };
 
 Eigen::Vector3i size_of(vtkImageData& image, bool of_cells) {
@@ -66,6 +68,30 @@ Eigen::Affine3d to_world_of(vtkImageData& image, bool of_cells) {
   return to_world;
 }
 
+/// Cells that are hidden or have a hidden point; or points that are hidden or have hidden cells alone.
+std::vector<bool> hidden_voxels(vtkImageData& image, bool of_cells) {
+  vtkUnsignedCharArray* const cells = image.GetCellGhostArray();
+  vtkUnsignedCharArray* const points = image.GetPointGhostArray();
+  if (!cells && !points) return {};
+  constexpr unsigned char hidden_cell = vtkDataSetAttributes::HIDDENCELL | vtkDataSetAttributes::REFINEDCELL;
+  const auto is_hidden_point = [&](vtkIdType i) {
+    return points && (points->GetValue(i) & vtkDataSetAttributes::HIDDENPOINT) != 0;
+  };
+  std::vector<bool> hidden(static_cast<std::size_t>(of_cells ? image.GetNumberOfCells() : image.GetNumberOfPoints()),
+                           !of_cells);
+  vtkNew<vtkIdList> corners;
+  for (vtkIdType cell = 0; cell < image.GetNumberOfCells(); ++cell) {
+    const bool is_hidden = cells && (cells->GetValue(cell) & hidden_cell) != 0;
+    image.GetCellPoints(cell, corners);
+    for (vtkIdType i = 0; i < corners->GetNumberOfIds(); ++i) {
+      const vtkIdType point = corners->GetId(i);
+      if (of_cells && (is_hidden || is_hidden_point(point))) hidden[static_cast<std::size_t>(cell)] = true;
+      if (!of_cells && !is_hidden && !is_hidden_point(point)) hidden[static_cast<std::size_t>(point)] = false;
+    }
+  }
+  return hidden;
+}
+
 void read_slice(Source& source, int z, double* out) {
   const vtkIdType begin = z * source.slice, end = begin + source.slice;
   vtkDataArray& values = *source.values;
@@ -74,8 +100,7 @@ void read_slice(Source& source, int z, double* out) {
   }
   const int components = values.GetNumberOfComponents();
   for (vtkIdType i = begin; i < end; ++i, out += components) {
-    const bool hidden = source.ghosts && (source.ghosts->GetValue(i) & source.hidden);
-    if (hidden) {
+    if (!source.hidden.empty() && source.hidden[static_cast<std::size_t>(i)]) {
       std::fill(out, out + components, std::numeric_limits<double>::quiet_NaN());
     } else {
       values.GetTuple(i, out);
@@ -96,9 +121,7 @@ Lattice lattice_of(vtkSmartPointer<vtkImageData> image, vtkSmartPointer<vtkDataA
 
   const auto source = std::make_shared<Source>();
   source->slice = static_cast<vtkIdType>(lattice.size.x()) * lattice.size.y();
-  source->ghosts = of_cells ? image->GetCellGhostArray() : image->GetPointGhostArray();
-  source->hidden = vtkDataSetAttributes::HIDDENPOINT;
-  if (of_cells) source->hidden = vtkDataSetAttributes::HIDDENCELL;
+  source->hidden = hidden_voxels(*image, of_cells);
   source->values = std::move(values);
   if (source->values->GetNumberOfTuples() != source->slice * lattice.size.z()) {
     throw std::runtime_error("the array '" + lattice.array + "' has " +

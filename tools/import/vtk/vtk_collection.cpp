@@ -1,5 +1,6 @@
 #include "tools/import/vtk/vtk_collection.h"
 
+#include <algorithm>
 #include <cmath>
 #include <map>
 #include <string>
@@ -27,13 +28,18 @@ double time_of(vtkXMLDataElement& element, const fs::path& path) {
   return time;
 }
 
+/// A file that is named twice for one time counts once.
+void add(std::vector<fs::path>& files, const fs::path& file) {
+  if (std::find(files.begin(), files.end(), file) == files.end()) files.push_back(file);
+}
+
 /// Collects the <DataSet file="..."> of volumes in a tree of blocks.
 void collect(vtkXMLDataElement& element, const fs::path& path, FilesByTime& steps) {
   for (int i = 0; i < element.GetNumberOfNestedElements(); ++i) {
     vtkXMLDataElement& nested = *element.GetNestedElement(i);
     const char* const file = nested.GetAttribute("file");
     if (nested.GetName() == std::string("DataSet") && file && lower_case_ending(file) != ".vtp")
-      steps[time_of(nested, path)].push_back(path.parent_path() / file);
+      add(steps[time_of(nested, path)], path.parent_path() / file);
     collect(nested, path, steps);
   }
 }

@@ -1,7 +1,9 @@
 #include "tools/import/vtk/vtk_pieces.h"
 
+#include <array>
 #include <limits>
 #include <map>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -11,6 +13,7 @@
 #include <vtkCompositeDataSet.h>
 #include <vtkDataSet.h>
 #include <vtkDataSetAttributes.h>
+#include <vtkIdList.h>
 #include <vtkNew.h>
 #include <vtkPointData.h>
 #include <vtkSmartPointer.h>
@@ -51,21 +54,47 @@ void keep_ghosts(vtkDataSetAttributes& attributes, unsigned char bits) {
   if (any) attributes.AddArray(kept);
 }
 
-void remove_ghosts(vtkDataSet& piece) {
-  if (auto* const grid = vtkUnstructuredGrid::SafeDownCast(&piece)) {
-    keep_ghosts(*grid->GetCellData(), vtkDataSetAttributes::DUPLICATECELL | vtkDataSetAttributes::HIDDENCELL);
-    if (auto* const ghosts =
-            vtkUnsignedCharArray::SafeDownCast(grid->GetCellData()->GetArray(vtkDataSetAttributes::GhostArrayName()))) {
-      // RemoveGhostCells removes only duplicates.
-      for (vtkIdType i = 0; i < ghosts->GetNumberOfValues(); ++i) {
-        if (ghosts->GetValue(i) != 0) ghosts->SetValue(i, vtkDataSetAttributes::DUPLICATECELL);
-      }
-      grid->RemoveGhostCells();
-    }
-    grid->GetCellData()->RemoveArray(vtkDataSetAttributes::GhostArrayName());
-  }
-  keep_ghosts(*piece.GetCellData(), vtkDataSetAttributes::HIDDENCELL);
+/// Marks only what is hidden; refined cells are covered by others. Copies of neighbours' cells and points have the
+/// neighbours' values, and stay.
+void keep_hidden(vtkDataSet& piece) {
+  keep_ghosts(*piece.GetCellData(), vtkDataSetAttributes::HIDDENCELL | vtkDataSetAttributes::REFINEDCELL);
   keep_ghosts(*piece.GetPointData(), vtkDataSetAttributes::HIDDENPOINT);
+}
+
+const vtkUnsignedCharArray* ghosts_of(vtkDataSetAttributes& attributes) {
+  return vtkUnsignedCharArray::SafeDownCast(attributes.GetArray(vtkDataSetAttributes::GhostArrayName()));
+}
+
+/// The piece without the cells that are to be left out beside other pieces: copies of neighbours' cells, hidden cells,
+/// and those with a hidden point.
+vtkSmartPointer<vtkDataSet> used_part(vtkDataSet& piece) {
+  const auto* const cells = ghosts_of(*piece.GetCellData());
+  const auto* const points = ghosts_of(*piece.GetPointData());
+  if (!cells && !points) return &piece;
+  constexpr unsigned char used = 0, copy = vtkDataSetAttributes::DUPLICATECELL;
+  constexpr unsigned char unused =
+      vtkDataSetAttributes::DUPLICATECELL | vtkDataSetAttributes::HIDDENCELL | vtkDataSetAttributes::REFINEDCELL;
+  vtkNew<vtkUnsignedCharArray> marks;
+  marks->SetName(vtkDataSetAttributes::GhostArrayName());
+  vtkNew<vtkIdList> ids;
+  for (vtkIdType cell = 0; cell < piece.GetNumberOfCells(); ++cell) {
+    bool is_unused = cells && (cells->GetValue(cell) & unused) != 0;
+    piece.GetCellPoints(cell, ids);
+    for (vtkIdType i = 0; points && i < ids->GetNumberOfIds(); ++i)
+      is_unused = is_unused || (points->GetValue(ids->GetId(i)) & vtkDataSetAttributes::HIDDENPOINT) != 0;
+    marks->InsertNextValue(is_unused ? copy : used);
+  }
+  for (vtkDataSetAttributes* const data : {static_cast<vtkDataSetAttributes*>(piece.GetPointData()),
+                                           static_cast<vtkDataSetAttributes*>(piece.GetCellData())})
+    data->RemoveArray(vtkDataSetAttributes::GhostArrayName());
+  vtkNew<vtkAppendFilter> to_unstructured;
+  to_unstructured->AddInputData(&piece);
+  to_unstructured->Update();
+  const vtkSmartPointer<vtkUnstructuredGrid> grid = to_unstructured->GetOutput();
+  grid->GetCellData()->AddArray(marks);
+  grid->RemoveGhostCells();  // Those that are marked as copies.
+  grid->GetCellData()->RemoveArray(vtkDataSetAttributes::GhostArrayName());
+  return grid;
 }
 
 /// Adds missing arrays, because vtkAppendFilter drops arrays that some of its inputs lack.
@@ -92,6 +121,37 @@ void complete_arrays(const DataSets& pieces, vtkDataObject::AttributeTypes type)
   }
 }
 
+/// Gives each point of `all` the values of the first piece that has it and the array. The cells of `all` are those of
+/// the pieces, in their order.
+void take_known_values(vtkUnstructuredGrid& all, const DataSets& pieces,
+                       const std::vector<std::set<std::string>>& known) {
+  vtkNew<vtkIdList> from, to;
+  vtkIdType end = all.GetNumberOfCells();
+  for (std::size_t k = pieces.size(); k-- > 0;) {
+    vtkDataSet& piece = *pieces[k];
+    end -= piece.GetNumberOfCells();
+    for (vtkIdType cell = 0; cell < piece.GetNumberOfCells(); ++cell) {
+      piece.GetCellPoints(cell, from);
+      all.GetCellPoints(end + cell, to);
+      for (const std::string& name : known[k]) {
+        vtkDataArray* const values = piece.GetPointData()->GetArray(name.c_str());
+        vtkDataArray* const merged = all.GetPointData()->GetArray(name.c_str());
+        for (vtkIdType i = 0; merged && i < from->GetNumberOfIds() && i < to->GetNumberOfIds(); ++i)
+          merged->SetTuple(to->GetId(i), from->GetId(i), values);
+      }
+    }
+  }
+}
+
+/// The names of the numeric arrays at points.
+std::set<std::string> point_arrays(vtkDataSet& piece) {
+  std::set<std::string> names;
+  for (int i = 0; i < piece.GetPointData()->GetNumberOfArrays(); ++i)
+    if (vtkDataArray* const array = piece.GetPointData()->GetArray(i); array && array->GetName())
+      names.insert(array->GetName());
+  return names;
+}
+
 }  // namespace
 
 DataSets data_sets_in(vtkDataObject* data) {
@@ -100,11 +160,29 @@ DataSets data_sets_in(vtkDataObject* data) {
   return pieces;
 }
 
-vtkSmartPointer<vtkDataSet> one_data_set(const DataSets& pieces, bool merges_points) {
-  for (vtkDataSet* const piece : pieces) remove_ghosts(*piece);
-  if (pieces.empty()) return nullptr;
-  if (pieces.size() == 1) return pieces.front();
+bool is_same_mesh(vtkDataSet& a, vtkDataSet& b) {
+  if (a.GetNumberOfPoints() != b.GetNumberOfPoints() || a.GetNumberOfCells() != b.GetNumberOfCells()) return false;
+  for (vtkIdType i = 0; i < a.GetNumberOfPoints(); ++i) {
+    std::array<double, 3> x{}, y{};
+    a.GetPoint(i, x.data());
+    b.GetPoint(i, y.data());
+    if (x != y) return false;
+  }
+  return true;
+}
 
+vtkSmartPointer<vtkDataSet> one_data_set(const DataSets& given, bool merges_points) {
+  if (given.empty()) return nullptr;
+  if (given.size() == 1) {
+    keep_hidden(*given.front());
+    return given.front();
+  }
+  DataSets pieces;
+  std::vector<std::set<std::string>> known;
+  for (vtkDataSet* const piece : given) {
+    pieces.push_back(used_part(*piece));
+    known.push_back(point_arrays(*pieces.back()));
+  }
   complete_arrays(pieces, vtkDataObject::POINT);
   complete_arrays(pieces, vtkDataObject::CELL);
   vtkNew<vtkAppendFilter> append;
@@ -113,7 +191,9 @@ vtkSmartPointer<vtkDataSet> one_data_set(const DataSets& pieces, bool merges_poi
   append->SetOutputPointsPrecision(vtkAlgorithm::DEFAULT_PRECISION);
   for (vtkDataSet* const piece : pieces) append->AddInputData(piece);
   append->Update();
-  return append->GetOutput();
+  const vtkSmartPointer<vtkUnstructuredGrid> all = append->GetOutput();
+  take_known_values(*all, pieces, known);
+  return all;
 }
 
 }  // namespace tensorray

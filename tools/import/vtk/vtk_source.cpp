@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cstdlib>
 #include <map>
 #include <new>
 #include <stdexcept>
@@ -34,9 +35,11 @@
 #include "base/temporary_folder.h"
 #include "base/text.h"
 #include "tools/import/vtk/ensight.h"
+#include "tools/import/vtk/exodus_names.h"
+#include "tools/import/vtk/openfoam_fields.h"
 #include "tools/import/vtk/openfoam_parts.h"
-#include "tools/import/vtk/point_seams.h"
 #include "tools/import/vtk/silent_stderr.h"
+#include "tools/import/vtk/symmetric_names.h"
 #include "tools/import/vtk/vtk_collection.h"
 #include "tools/import/vtk/vtk_geometry.h"
 #include "tools/import/vtk/vtk_kind.h"
@@ -106,6 +109,7 @@ vtkSmartPointer<vtkDataObject> read_exodus(const Path& path, std::optional<int> 
   if (const int steps = reader->GetNumberOfTimeSteps(); steps > 0 || step)
     reader->SetTimeStep(chosen_step(step, std::max(steps, 1)));
   reader->Update();
+  for (vtkDataSet* const set : data_sets_in(reader->GetOutputDataObject(0))) name_components(*set, *reader, path);
   return reader->GetOutputDataObject(0);
 }
 
@@ -150,6 +154,35 @@ std::vector<double> open_case(const Path& folder, vtkOpenFOAMReader& reader) {
   return times;
 }
 
+/// The folder in a case that has the fields of a time; the case itself if none has.
+Path time_folder(const Path& folder, double time) {
+  for (const auto& entry : std::filesystem::directory_iterator(folder)) {
+    const std::string name = entry.path().filename().string();
+    char* end = nullptr;
+    if (entry.is_directory() && std::strtod(name.c_str(), &end) == time && end != name.c_str() && *end == '\0')
+      return entry.path();
+  }
+  return folder;
+}
+
+/// The name of a block; empty if it has none.
+std::string block_name(vtkMultiBlockDataSet& blocks, unsigned int index) {
+  const char* const name =
+      blocks.HasMetaData(index) ? blocks.GetMetaData(index)->Get(vtkCompositeDataSet::NAME()) : nullptr;
+  return name ? name : "";
+}
+
+/// Corrects tensors and names their components. @param time  The folder of the fields, or of the regions' folders.
+void complete_fields(vtkMultiBlockDataSet& blocks, const Path& time) {
+  for (unsigned int i = 0; i < blocks.GetNumberOfBlocks(); ++i) {
+    const Path region = time / block_name(blocks, i);
+    for (vtkDataSet* const set : data_sets_in(blocks.GetBlock(i))) {
+      correct_uniform_tensors(*set, std::filesystem::is_directory(region) ? region : time);
+      name_symmetric_components(*set);
+    }
+  }
+}
+
 /// Reads a whole case: one block, or one for each region.
 vtkSmartPointer<vtkDataObject> read_case(const Path& folder, std::optional<int> step) {
   vtkNew<vtkOpenFOAMReader> reader;
@@ -160,9 +193,16 @@ vtkSmartPointer<vtkDataObject> read_case(const Path& folder, std::optional<int> 
   }
   reader->EnableAllCellArrays();
   reader->EnableAllPointArrays();
+  // The file has values at cells; they are averaged to points where cells are known to be finite.
+  reader->CreateCellToPointOff();
   const int count = static_cast<int>(times.size());
-  if (count > 0 || step) reader->UpdateTimeStep(times.at(static_cast<std::size_t>(chosen_step(step, count))));
+  double time = 0;
+  if (count > 0 || step) {
+    time = times.at(static_cast<std::size_t>(chosen_step(step, count)));
+    reader->UpdateTimeStep(time);
+  }
   reader->Update();
+  complete_fields(*reader->GetOutput(), time_folder(folder, time));
   return reader->GetOutputDataObject(0);
 }
 
@@ -177,19 +217,14 @@ vtkSmartPointer<vtkDataObject> read_openfoam(const Path& path, std::optional<int
     const vtkSmartPointer<vtkDataObject> data = read_case(one, std::nullopt);
     auto* const blocks = vtkMultiBlockDataSet::SafeDownCast(data);
     for (unsigned int i = 0; blocks && i < blocks->GetNumberOfBlocks(); ++i) {
-      const char* const name =
-          blocks->HasMetaData(i) ? blocks->GetMetaData(i)->Get(vtkCompositeDataSet::NAME()) : nullptr;
       for (const auto& set : data_sets_in(blocks->GetBlock(i))) {
         check_geometry(*set, path);
-        regions[name ? name : ""].push_back(set);
+        regions[block_name(*blocks, i)].push_back(set);
       }
     }
   }
   auto result = vtkSmartPointer<vtkMultiBlockDataSet>::New();
-  for (const auto& [name, sets] : regions) {
-    share_point_values(sets);
-    result->SetBlock(result->GetNumberOfBlocks(), one_data_set(sets));
-  }
+  for (const auto& [name, sets] : regions) result->SetBlock(result->GetNumberOfBlocks(), one_data_set(sets));
   return result;
 }
 
@@ -248,29 +283,28 @@ DataSets read_data_sets(VtkKind kind, const Path& path, const VtkMessages& messa
   if (kind != VtkKind::blocks && kind != VtkKind::time_series) {
     sets = data_sets_in(read_kind(kind, path, step));
     messages.throw_error(path);
-    for (vtkDataSet* const set : sets) check_geometry(*set, path);
+    for (vtkDataSet* const set : sets) {
+      check_geometry(*set, path);
+      if (kind == VtkKind::legacy) name_tensors6(*set, path);
+      name_active_tensors(*set);
+    }
     return sets;
   }
   const std::vector<std::vector<Path>> steps = collection_steps(path);
+  std::vector<Path> files;  // Of the data sets.
   for (const Path& file : steps[static_cast<std::size_t>(chosen_step(step, static_cast<int>(steps.size())))]) {
     const VtkKind kind_of_file = vtk_kind(file);
     if (kind_of_file >= kind) fail(path, "names the collection " + escaped(file.string()) + "; import that one");
-    const DataSets more = read_data_sets(kind_of_file, file, messages, std::nullopt);
-    sets.insert(sets.end(), more.begin(), more.end());
-  }
-  return sets;
-}
-
-/// Names the components, so that the user need not give the order. VTK has already reordered OpenFOAM's symmTensors.
-void name_symmetric_components(vtkDataSet& data) {
-  const char* const names[] = {"XX", "YY", "ZZ", "XY", "YZ", "XZ"};
-  for (const auto type : {vtkDataObject::POINT, vtkDataObject::CELL}) {
-    for (int i = 0; i < data.GetAttributes(type)->GetNumberOfArrays(); ++i) {
-      vtkDataArray* const array = data.GetAttributes(type)->GetArray(i);
-      if (!array || array->GetNumberOfComponents() != 6) continue;
-      for (int component = 0; component < 6; ++component) array->SetComponentName(component, names[component]);
+    for (const auto& set : read_data_sets(kind_of_file, file, messages, std::nullopt)) {
+      for (std::size_t i = 0; i < sets.size(); ++i)
+        if (files[i] != file && is_same_mesh(*sets[i], *set))
+          fail(path, "names the same mesh twice for one time, as " + escaped(files[i].filename().string()) +
+                         " and as " + escaped(file.filename().string()) + "; remove one of the two");
+      sets.push_back(set);
+      files.push_back(file);
     }
   }
+  return sets;
 }
 
 }  // namespace
@@ -290,7 +324,6 @@ vtkSmartPointer<vtkDataSet> read_vtk_source(const Path& path, std::optional<int>
     const std::string& warning = messages.first_warning();
     throw std::runtime_error(path.string() + ": holds no cells" + (warning.empty() ? "" : ": " + warning));
   }
-  if (kind == VtkKind::openfoam) name_symmetric_components(*result);
   return result;
 }
 

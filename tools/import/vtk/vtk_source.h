@@ -18,8 +18,8 @@ namespace tensorray {
 ///   .vtm (blocks)  .pvd (ParaView's collection, with steps of time)  of the files above
 ///   .foam, controlDict or a folder with system/controlDict (OpenFOAM: internal mesh, also of several regions, whose
 ///   points are not merged, and of cases that are decomposed)
-/// OpenFOAM stores fields at cells; VTK adds point arrays of the same names with the mean of the cells. A symmTensor
-/// (xx xy xz yy yz zz in OpenFOAM's files) is read in VTK's order, with its components named XX YY ZZ XY YZ XZ. A
+/// OpenFOAM's fields at cells stay there; mesh_tensors.h makes means at points. A symmTensor (xx xy xz yy yz zz in
+/// OpenFOAM's files) is read in VTK's order, with its components named XX YY ZZ XY YZ XZ. A
 /// volTensorField is read as it is: OpenFOAM's grad(U) is ∂_i u_j, the transpose of this program's gradients. Points
 /// of an ExodusII mesh are not displaced. Images stay vtkImageData, and structured and rectilinear grids keep their
 /// type, also if they are in pieces. Ghosts: see vtk_pieces.h. The kind is found from the contents where they state
