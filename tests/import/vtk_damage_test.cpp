@@ -25,11 +25,11 @@ TEST(VtkDamageTest, FilesThatAreNotWhatTheirEndingSays) {
     EXPECT_NE(text.find("a VTK structured grid; give it the ending .vts"), std::string::npos) << text;
   }
   std::filesystem::copy_file(folder / "grid.vts", folder / "grid.xml");
-  write_bytes(folder / "unknown.dat", "of no kind");
+  write_bytes(folder / "unknown.abc", "of no kind");
   for (const char* supported : {"ExodusII", ".nrrd", ".nii", ".npy", "PLOT3D needs two files, the grid and its q"})
-    EXPECT_NE(error("unknown.dat").find(supported), std::string::npos) << error("unknown.dat");
+    EXPECT_NE(error("unknown.abc").find(supported), std::string::npos) << error("unknown.abc");
   EXPECT_EQ(read_vtk_source(folder / "grid.xml")->GetNumberOfPoints(), 24);
-  for (const char* name : {"b.vtk", "b.vti", "b.vts", "b.pvtu", "b.ex2", "b.dat"}) {
+  for (const char* name : {"b.vtk", "b.vti", "b.vts", "b.pvtu", "b.ex2", "b.abc"}) {
     write_bytes(folder / name, std::string(5000, 'x') + '\x01');
     EXPECT_NE(error(name).find(std::string(name) + ": is n"), std::string::npos) << error(name);
     write_bytes(folder / name, "");

@@ -85,9 +85,9 @@ class RaysTest(unittest.TestCase):
         field = tr.Field(tensors)
         start, heading = [2, 2, 2.5], [0, 1, 0]
         turned = [tr.trace(field, start, heading, 1, smooth=smooth).directions[0, 0] for smooth in (0, 1.5, 0)]
-        self.assertEqual(turned[0], 0)
-        self.assertGreater(turned[1], 0)
-        self.assertEqual(turned[2], 0)
+        self.assertLess(abs(turned[0]), 1e-6)
+        self.assertGreater(turned[1], 1e-4)
+        self.assertEqual(turned[2], turned[0])
         ends = [tr.trace(rotation(), [-1, 0, 0], [1, 0, 0], 0.8, smooth=smooth).positions for smooth in (0, 2)]
         np.testing.assert_array_equal(ends[0], ends[1])
 

@@ -74,7 +74,7 @@ TEST_F(ReadScene, DefaultsAreThoseOfTheDescription) {
   EXPECT_EQ(scene.light.photons, standard.light.photons);
   EXPECT_EQ(scene.light.direction, standard.light.direction);
   EXPECT_EQ(scene.bending.flexibility.b, -0.001);
-  EXPECT_EQ(scene.bending.settings.method, BendingMethod::splitting);
+  EXPECT_EQ(scene.bending.settings.method, BendingMethod::automatic);
   EXPECT_FALSE(scene.field.scale);
   EXPECT_FALSE(scene.receiver.distance);
   EXPECT_EQ(scene.output.files, (Files{{"image", folder_ / "scene.png"}, {"exr", folder_ / "scene.exr"}}));
@@ -225,7 +225,6 @@ TEST_F(ReadScene, OverridesAreChecked) {
   EXPECT_THAT(error({"field.file.x=3"}), HasSubstr("`x` has no place in \"a.vdb\""));
   EXPECT_THAT(error({"obstacles.0.file=a", "obstacles.7.file=a"}), HasSubstr("no item 7"));
   EXPECT_THAT(error({"obstacles.0.file=a", "obstacles.x.file=a"}), HasSubstr("must be a number"));
-  EXPECT_THAT(error({"field.name=\xff"}), HasSubstr("UTF-8"));
   EXPECT_THAT(error({"seed=" + std::string(100000, '[')}), HasSubstr("nested deeper"));
   std::string deep = "a";
   for (int i = 0; i < 100000; ++i) deep += ".a";
@@ -252,7 +251,8 @@ TEST_F(ReadScene, WrongTypesSayWhatIsExpectedAndFound) {
   EXPECT_THAT(error({"light.photons=many"}),
               AllOf(HasSubstr("`/light/photons` must be an integer"), EndsWith("but is \"many\"")));
   EXPECT_THAT(error({"bending.method=rk5"}),
-              HasSubstr("must be one of \"euler\", \"splitting\", \"rk4\", \"bs23\", \"dopri5\", but is \"rk5\""));
+              HasSubstr("must be one of \"auto\", \"euler\", \"splitting\", \"splitting4\", \"rk4\", \"bs23\", "
+                        "\"dopri5\", but is \"rk5\""));
   EXPECT_THAT(error({"integrator.type=lenses"}),
               HasSubstr("must be one of \"photon_distribution\", \"lens\", \"path_tracing\", \"stretch\", \"scene\", "
                         "but is \"lenses\""));
