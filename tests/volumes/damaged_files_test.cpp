@@ -241,6 +241,13 @@ TEST(DamagedFiles, VoxelsFarAwayAreRefused) {
     openvdb::Coord min, max;  ///< Of active voxels.
   };
   const auto at = [](std::int32_t x) { return openvdb::Coord(x, 0, 0); };
+  // OpenVDB's own fill does not end at the greatest index.
+  const auto fill = [](auto& grid, const Case& each, const auto& value) {
+    if (each.min == each.max)
+      grid.tree().setValueOn(each.min, value);
+    else
+      grid.tree().addTile(2, each.min, value, true);
+  };
   const std::vector<Case> cases{{"tile at the end", openvdb::Coord(end - 127), openvdb::Coord(end)},
                                 {"tile at the beginning", openvdb::Coord(-end - 1), openvdb::Coord(-end - 1 + 127)},
                                 {"voxel at the end", at(end), at(end)},
@@ -251,12 +258,12 @@ TEST(DamagedFiles, VoxelsFarAwayAreRefused) {
     for (const Derive derive : {Derive::none, Derive::hessian}) {
       const auto scalar = stock_grid<openvdb::FloatGrid>("phi", 0);
       openvdb::GridPtrVec grids{scalar};
-      scalar->sparseFill({each.min, each.max}, 1.0f);
+      fill(*scalar, each, 1.0f);
       if (derive == Derive::none) {
         grids.clear();
         for (int row = 0; row < 3; ++row) {
           const auto grid = stock_grid<openvdb::Vec3SGrid>("phi_row" + std::to_string(row), openvdb::Vec3s(0));
-          grid->sparseFill({each.min, each.max}, openvdb::Vec3s(1));
+          fill(*grid, each, openvdb::Vec3s(1));
           grids.push_back(grid);
         }
       }
