@@ -66,4 +66,10 @@ inline const RungeKutta* runge_kutta(BendingMethod method) {
   return nullptr;
 }
 
+/// Whether an error estimate sets the lengths of steps. @param step  BendingSettings::step.
+inline bool is_adaptive(BendingMethod method, double step) {
+  const RungeKutta* const stages = runge_kutta(method);
+  return (stages && stages->adaptive) || (method == BendingMethod::splitting4 && step == 0);
+}
+
 }  // namespace tensorray

@@ -114,13 +114,6 @@ std::optional<RayEnd> Tracer<N>::cross_box() {
   return entry ? reach(entry) : leave();
 }
 
-/// Whether an error estimate sets the lengths of steps.
-template <int N>
-bool Tracer<N>::is_controlled() const {
-  const RungeKutta* const stages = runge_kutta(settings_.method);
-  return (stages && stages->adaptive) || (is_composed() && settings_.step == 0);
-}
-
 /// The length of an automatic step, in voxels.
 template <int N>
 double Tracer<N>::automatic_step() const {
@@ -266,7 +259,7 @@ double Tracer<N>::next_step() {
   const bool stages = runge_kutta(settings_.method) != nullptr;
   if (way > 0)
     return way + (stages ? step_lengths::past_straight_brick_by_stages : step_lengths::past_straight_brick) * voxel_;
-  if (is_controlled()) return voxel_ * adaptive_step_;
+  if (is_controlled_) return voxel_ * adaptive_step_;
   return voxel_ * (settings_.step == 0 ? automatic_step() : settings_.step);
 }
 
@@ -287,7 +280,7 @@ std::optional<RayEnd> Tracer<N>::bend(double first_step) {
     State<N> error;
     const State<N> next = step(h, error);
     if (next.direction().isZero() || !next.position().allFinite()) return RayEnd::degenerate;
-    if (is_controlled() && control_step(error) > 1 && wanted > step_lengths::shortest_adaptive * voxel_) continue;
+    if (is_controlled_ && control_step(error) > 1 && wanted > step_lengths::shortest_adaptive * voxel_) continue;
 
     Landing landing;
     const Event event = meet(next, h, landing);

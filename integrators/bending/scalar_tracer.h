@@ -107,7 +107,6 @@ class Tracer {
   bool ends_before(double distance) const { return length_ + distance >= settings_.max_length; }
   void meet_surface(const Eigen::Vector3d& normal, bool bends);
   bool is_composed() const { return settings_.method == BendingMethod::splitting4; }
-  bool is_controlled() const;
   Eigen::Vector3d between(const State<N>& next, double h, double t) const;
   int piece_count(double h) const;
   void record_inner(const State<N>& next, double h);
@@ -118,6 +117,7 @@ class Tracer {
   const TensorField& field_;
   const Geometry& geometry_;
   const BendingSettings& settings_;
+  const bool is_controlled_ = is_adaptive(settings_.method, settings_.step);
   TensorSampler sampler_;
 
   RayMedium<N> medium_{sampler_, 0};

@@ -10,7 +10,6 @@
 #endif
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <cstddef>
 #include <cstring>
@@ -20,6 +19,7 @@
 #include "integrators/packets/packet_composition-inl.h"
 #include "integrators/packets/packet_landing-inl.h"
 #include "integrators/packets/packet_medium.h"
+#include "integrators/packets/packet_path.h"
 #include "integrators/packets/packet_stages-inl.h"
 
 HWY_BEFORE_NAMESPACE();
@@ -54,13 +54,7 @@ class Kernel {
   void add_step(Packet& packet);
   void take_out(Packet& packet, std::uint32_t stop, std::uint32_t leave);
   void keep_points(const Packet& packet, std::uint32_t which);
-  void keep_inner_points(const Packet& packet, std::uint32_t which);
-  std::array<float, 3> direction_between(const Packet& packet, int lane, double t) const;
   std::uint32_t outside_between(const Packet& packet) const;
-  double length_of_step(const Packet& packet, int lane) const;
-  int chord_count(const Packet& packet, int lane) const;
-  void chord_ends(const Packet& packet, int lane, int i, int count, double (&from)[3], double (&to)[3]) const;
-  bool meets_surface(const Packet& packet, int lane) const;
   unsigned samples_per_step() const {
     return medium_.stages ? medium_.stages->stages : medium_.composed ? Composition::kicks : 1;
   }
@@ -186,66 +180,13 @@ template <class Bricks, bool uniform, bool differentials, bool changes>
 HWY_NOINLINE std::uint32_t Kernel<Bricks, uniform, differentials, changes>::outside_between(
     const Packet& packet) const {
   std::uint32_t result = 0;
-  PerRay points[3];
+  alignas(64) PerRay points[3];
   for (const double t : {0.25, 0.5, 0.75}) {
     for (int i = 0; i < packet.vectors * lanes; i += lanes)
       store(path_at<uniform>(packet, path_weights(t), i), points, i);
     result |= outside(packet, points);
   }
   return result;
-}
-
-/// Length of a lane's step, voxels.
-template <class Bricks, bool uniform, bool differentials, bool changes>
-double Kernel<Bricks, uniform, differentials, changes>::length_of_step(const Packet& packet, int lane) const {
-  if (uniform) return packet.time[lane];
-  double squares = 0;
-  for (const auto& u : packet.u) squares += double{u[lane]} * u[lane];
-  return packet.time[lane] * std::sqrt(squares);
-}
-
-/// Number of chords that stand for the step of a lane where it may meet surfaces.
-template <class Bricks, bool uniform, bool differentials, bool changes>
-int Kernel<Bricks, uniform, differentials, changes>::chord_count(const Packet& packet, int lane) const {
-  if (!is_composed()) return 1;
-  double squares = 0;
-  for (int axis = 0; axis < 3; ++axis) {
-    const double turn = packet.v_next[axis][lane] - packet.v[axis][lane];
-    squares += turn * turn;
-  }
-  return chords_of(length_of_step(packet, lane), std::sqrt(squares));
-}
-
-/// The ends of chord i of a lane's step, in index space.
-template <class Bricks, bool uniform, bool differentials, bool changes>
-void Kernel<Bricks, uniform, differentials, changes>::chord_ends(const Packet& packet, int lane, int i, int count,
-                                                                 double (&from)[3], double (&to)[3]) const {
-  const auto& v = uniform ? packet.v : packet.u;
-  const auto& v_next = uniform ? packet.v_next : packet.u_next;
-  for (int axis = 0; axis < 3; ++axis) {
-    const double base = double{TensorBrick::cells} * packet.brick[axis][lane], time = packet.time[lane];
-    const auto at = [&](int n) {
-      if (n == 0) return base + packet.p[axis][lane];
-      if (n == count) return base + packet.p_next[axis][lane];
-      const PathWeights w = path_weights(double(n) / count);
-      return base + w.from * packet.p[axis][lane] + time * w.from_direction * v[axis][lane] +
-             w.to * packet.p_next[axis][lane] + time * w.to_direction * v_next[axis][lane];
-    };
-    from[axis] = at(i);
-    to[axis] = at(i + 1);
-  }
-}
-
-/// Whether the step of a lane meets a surface.
-template <class Bricks, bool uniform, bool differentials, bool changes>
-bool Kernel<Bricks, uniform, differentials, changes>::meets_surface(const Packet& packet, int lane) const {
-  const int count = chord_count(packet, lane);
-  for (int i = 0; i < count; ++i) {
-    double from[3], to[3];
-    chord_ends(packet, lane, i, count, from, to);
-    if (medium_.meets_surface(from, to)) return true;
-  }
-  return false;
 }
 
 /// The lanes that cannot take this step, as bits.
@@ -262,7 +203,7 @@ HWY_NOINLINE std::uint32_t Kernel<Bricks, uniform, differentials, changes>::stop
     const float before = static_cast<float>(rays_[packet.ray[lane]].length);  // Length of the path up to the field.
     const float length = (packet.length[lane] + packet.time[lane]) * to_world() + before;
     bool stops = length >= medium_.settings.max_length;
-    stops |= packet.near_surface && meets_surface(packet, static_cast<int>(lane));
+    stops |= packet.near_surface && step_meets_surface(medium_, packet, static_cast<int>(lane));
     if (stops) stop |= 1u << lane;
   }
   return stop;
@@ -342,49 +283,6 @@ HWY_NOINLINE void Kernel<Bricks, uniform, differentials, changes>::keep_points(c
   }
 }
 
-/// The direction of the path at the part t of a lane's step, world axes, of any length.
-template <class Bricks, bool uniform, bool differentials, bool changes>
-std::array<float, 3> Kernel<Bricks, uniform, differentials, changes>::direction_between(const Packet& packet, int lane,
-                                                                                        double t) const {
-  const PathWeights w = path_slopes(t);
-  const auto& v = uniform ? packet.v : packet.u;
-  const auto& v_next = uniform ? packet.v_next : packet.u_next;
-  double along[3];
-  for (int axis = 0; axis < 3; ++axis)
-    along[axis] = w.from * packet.p[axis][lane] + w.to * packet.p_next[axis][lane] +
-                  packet.time[lane] * (w.from_direction * v[axis][lane] + w.to_direction * v_next[axis][lane]);
-  std::array<float, 3> result;
-  for (std::size_t row = 0; row < 3; ++row) {
-    const auto& m = medium_.to_world[row];
-    result[row] = static_cast<float>(uniform ? along[row] : m[0] * along[0] + m[1] * along[1] + m[2] * along[2]);
-  }
-  return result;
-}
-
-/// Records the path between the ends of some lanes' steps.
-template <class Bricks, bool uniform, bool differentials, bool changes>
-HWY_NOINLINE void Kernel<Bricks, uniform, differentials, changes>::keep_inner_points(const Packet& packet,
-                                                                                     std::uint32_t which) {
-  for (std::uint32_t rest = which; rest != 0; rest &= rest - 1) {
-    const int lane = static_cast<int>(hwy::Num0BitsBelowLS1Bit_Nonzero32(rest));
-    const int count = static_cast<int>(std::ceil(length_of_step(packet, lane) / piece_length - 1e-3));
-    for (int n = 1; n < count; ++n) {
-      const double t = double(n) / count;
-      double from[3], to[3];
-      chord_ends(packet, lane, n, count, from, to);
-      const std::array<float, 3> along = direction_between(packet, lane, t);
-      const float length = std::sqrt(along[0] * along[0] + along[1] * along[1] + along[2] * along[2]);
-      StepPoint& point = batch_.points[packet.ray[lane]]->emplace_back();
-      for (std::size_t axis = 0; axis < 3; ++axis) {
-        point.brick[axis] = packet.brick[axis][lane];
-        point.position[axis] = static_cast<float>(from[axis] - double{TensorBrick::cells} * packet.brick[axis][lane]);
-        point.direction[axis] = along[axis] / length;
-      }
-      point.length = (packet.length[lane] + static_cast<float>(t) * packet.time[lane]) * to_world();
-    }
-  }
-}
-
 /// Adds a step to what the lanes have travelled.
 template <class Bricks, bool uniform, bool differentials, bool changes>
 HWY_INLINE void Kernel<Bricks, uniform, differentials, changes>::add_step(Packet& packet) {
@@ -415,7 +313,11 @@ void Kernel<Bricks, uniform, differentials, changes>::end_step(Packet& packet, s
   stop &= packet.alive;
   leave &= packet.alive & ~stop;
   if ((stop | leave) != 0) take_out(packet, stop, leave);
-  if (is_composed() && !batch_.points.empty()) keep_inner_points(packet, packet.alive & ~staying);
+  if (is_composed() && !batch_.points.empty())
+    for (std::uint32_t rest = packet.alive & ~staying; rest != 0; rest &= rest - 1) {
+      const auto lane = static_cast<int>(hwy::Num0BitsBelowLS1Bit_Nonzero32(rest));
+      add_inner_points(medium_, packet, lane, *batch_.points[packet.ray[lane]]);
+    }
   for (int i = 0; i < packet.vectors * lanes; i += lanes) {
     store(load(packet.p_next, i), packet.p, i);
     store(load(packet.v_next, i), packet.v, i);

@@ -15,13 +15,10 @@ PacketMedium::PacketMedium(const TensorField& field_, const KernelSettings& sett
   const bool cubes = M == Eigen::Matrix3d(M(0, 0) * Eigen::Matrix3d::Identity()) && M(0, 0) > 0;
   uniform = cubes && settings.method == BendingMethod::splitting && !field.is_cubic();
   voxel = static_cast<float>(1 / M(0, 0));
-  const Eigen::Matrix3d world = field.to_world().linear();
-  longest_voxel = static_cast<float>(world.norm());  // The norm is not less than the greatest singular value.
+  const Eigen::Matrix3d to_world = field.to_world().linear();
+  longest_voxel = static_cast<float>(to_world.norm());  // The norm is not less than the greatest singular value.
   for (int row = 0; row < 3; ++row)
-    for (int column = 0; column < 3; ++column) {
-      to_index[row][column] = static_cast<float>(M(row, column));
-      to_world[row][column] = world(row, column);
-    }
+    for (int column = 0; column < 3; ++column) to_index[row][column] = static_cast<float>(M(row, column));
   for (int axis = 0; axis < 3; ++axis) {
     first[axis] = static_cast<std::int32_t>(field.voxels().min()[axis]);
     last[axis] = static_cast<std::int32_t>(field.voxels().max()[axis]);
@@ -31,7 +28,7 @@ PacketMedium::PacketMedium(const TensorField& field_, const KernelSettings& sett
   flat = (field.voxels().sizes().array() == 0).any();
   stages = runge_kutta(settings.method);
   composed = settings.method == BendingMethod::splitting4;
-  adaptive = (stages && stages->adaptive) || (composed && settings.step == 0);
+  adaptive = is_adaptive(settings.method, double{settings.step});
   clamps = flat || settings.method != BendingMethod::splitting || field.is_cubic();
   const double automatic = composed   ? step_lengths::longest_composed
                            : adaptive ? step_lengths::longest_adaptive
@@ -59,9 +56,8 @@ bool PacketMedium::near_surface(const std::int32_t at[3]) const {
       {first_voxel - margin_around, first_voxel + Eigen::Vector3d::Constant(TensorBrick::cells) + margin_around});
 }
 
-bool PacketMedium::meets_surface(const double from[3], const double to[3]) const {
-  return settings.meets_surface(field.to_world() * Eigen::Vector3d(from[0], from[1], from[2]),
-                                field.to_world() * Eigen::Vector3d(to[0], to[1], to[2]));
+bool PacketMedium::meets_surface(const Eigen::Vector3d& from, const Eigen::Vector3d& to) const {
+  return settings.meets_surface(field.to_world() * from, field.to_world() * to);
 }
 
 float strong_radiance_change(const float T[9], float factor, const float v[3]) {

@@ -5,6 +5,8 @@
 
 #include <cstdint>
 
+#include <Eigen/Core>
+
 #include "integrators/bending/composition.h"
 #include "integrators/bending/runge_kutta.h"
 #include "integrators/bending/step_lengths.h"
@@ -43,7 +45,6 @@ struct PacketMedium {
   float voxel;          // If uniform: edge of a voxel, world units.
   float longest_voxel;  // No voxel is longer along any direction, world units.
   float to_index[3][3];
-  double to_world[3][3];
   std::int32_t first[3], last[3];              // First and last voxels of the extent.
   std::int32_t first_inner[3], last_inner[3];  // No step from these bricks may leave the extent. May be none.
   float margin[3];     // Distance of the extent's faces from these voxels: ½ on an axis of a single voxel, else 0.
@@ -57,7 +58,7 @@ struct PacketMedium {
 
   TensorBrick brick(const std::int32_t at[3]) const { return field.brick({at[0], at[1], at[2]}); }
   bool near_surface(const std::int32_t at[3]) const;
-  bool meets_surface(const double from[3], const double to[3]) const;
+  bool meets_surface(const Eigen::Vector3d& from, const Eigen::Vector3d& to) const;
 };
 
 /// `run` in a cubic field. @param prefers_avx2  Not to use wider vectors.

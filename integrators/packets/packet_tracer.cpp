@@ -234,10 +234,7 @@ void trace_rays(const TensorField& field, const Geometry& geometry, const Bendin
 
 bool trace_in_packets(const TensorField& field, const Geometry& geometry, const BendingSettings& settings,
                       RayBatch& batch, const Recordings& recordings) {
-  const RungeKutta* const stages = runge_kutta(settings.method);
-  const bool adaptive =
-      (stages && stages->adaptive) || (settings.method == BendingMethod::splitting4 && settings.step == 0);
-  if (adaptive && settings.tolerance < least_tolerance) return false;
+  if (is_adaptive(settings.method, settings.step) && settings.tolerance < least_tolerance) return false;
   if (batch.differentials.empty())
     trace_rays<1>(field, geometry, settings, batch, recordings);
   else

@@ -14,6 +14,7 @@
 #include <gtest/gtest.h>
 
 #include "integrators/bending/bending.h"
+#include "integrators/bending/runge_kutta.h"
 #include "integrators/packets/packet_kernel.h"
 #include "tests/integrators/support.h"
 
@@ -224,10 +225,7 @@ constexpr double position_tolerance = 1e-3;  // Voxels.
 constexpr double length_tolerance = 1e-5;    // Relative to the length plus one voxel.
 
 /// Whether a method may repeat steps. Rounding can decide whether it repeats one.
-inline bool is_adaptive(const BendingSettings& settings) {
-  return settings.method == BendingMethod::bs23 || settings.method == BendingMethod::dopri5 ||
-         (settings.method == BendingMethod::splitting4 && settings.step == 0);
-}
+inline bool is_adaptive(const BendingSettings& settings) { return is_adaptive(settings.method, settings.step); }
 
 /// Whether ray i has the same path in both, to single precision.
 inline bool agree(const RayBatch& a, const RayBatch& b, std::size_t i, double steps_allowed = 1) {

@@ -229,6 +229,13 @@ BlockTable::BlockTable(const std::vector<BlockShape>& all) : shapes(all) {
   index = BrickIndex(places);
 }
 
+void sort_places(std::vector<Eigen::Vector3i>& places) {
+  tbb::parallel_sort(places.begin(), places.end(), [](const Eigen::Vector3i& a, const Eigen::Vector3i& b) {
+    return std::make_tuple(a.x(), a.y(), a.z()) < std::make_tuple(b.x(), b.y(), b.z());
+  });
+  places.erase(std::unique(places.begin(), places.end()), places.end());
+}
+
 Eigen::AlignedBox3i bricks_of(const Eigen::AlignedBox3i& voxels) {
   const auto brick_of = [](int cell) { return cell >> 3; };
   const Eigen::Vector3i last = (voxels.max().array() - 1).matrix().cwiseMax(voxels.min());
@@ -247,10 +254,7 @@ std::vector<Eigen::Vector3i> active_bricks(const BlockTable& table, const Eigen:
         bricks.push_back(brick);
     }
   }
-  tbb::parallel_sort(bricks.begin(), bricks.end(), [](const Eigen::Vector3i& a, const Eigen::Vector3i& b) {
-    return std::make_tuple(a.x(), a.y(), a.z()) < std::make_tuple(b.x(), b.y(), b.z());
-  });
-  bricks.erase(std::unique(bricks.begin(), bricks.end()), bricks.end());
+  sort_places(bricks);
   return bricks;
 }
 

@@ -31,6 +31,9 @@ struct BlockTable {
   BrickIndex index;
 };
 
+/// Orders places by x, then y, then z, and removes those that are there twice.
+void sort_places(std::vector<Eigen::Vector3i>& places);
+
 /// The range of bricks that hold the cells between the voxels of a box. An axis with a single voxel has one cell.
 Eigen::AlignedBox3i bricks_of(const Eigen::AlignedBox3i& voxels);
 

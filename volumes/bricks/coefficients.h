@@ -1,50 +1,13 @@
 #pragma once
 /// @file volumes/bricks/coefficients.h
-/// The B-spline coefficients of a field: which voxels have some, and how they follow from the voxels' values.
+/// From the voxels of a cubic field to the coefficients that its cells need.
 
-#include <array>
-#include <cstddef>
-#include <cstdint>
 #include <optional>
 #include <vector>
 
-#include <Eigen/Geometry>
-
-#include "volumes/bricks/brick_index.h"
-#include "volumes/bricks/brick_making.h"
-#include "volumes/bricks/interpolation.h"
+#include "volumes/bricks/coefficient_bricks.h"
 
 namespace tensorray {
-
-/// Which of a block's 8³ voxels: a row along z is a byte, whose bit z is voxel (x, y, z); rows are at 8 x + y.
-using VoxelMask = std::array<std::uint8_t, TensorBlock::size * TensorBlock::size>;
-
-/// The bricks of a cubic field. Each holds the coefficients of its own block of voxels, and, in the end, those about it
-/// that its cells need.
-struct CoefficientBricks {
-  /// First the bricks with a cell where the field is not zero, ordered by x, then y, then z. Then those that only hold
-  /// coefficients of other bricks' cells, until these have copies: of the extent's last voxels.
-  std::vector<Eigen::Vector3i> places;
-  std::size_t count = 0;  ///< Number of the first ones.
-  BrickIndex index;       ///< Of all places.
-
-  /// The voxels of each place that have coefficients: the active ones; and inactive ones within the extent that are
-  /// within a voxel of these (`fade`) or two (`extend`) along each axis.
-  std::vector<VoxelMask> filled;
-  std::vector<VoxelMask> active;
-};
-
-/// @param extent  The box of the active voxels. Runs on all threads.
-CoefficientBricks coefficient_bricks(const BlockTable& table, const Eigen::AlignedBox3i& extent, Border border);
-
-/// The memory of bricks in the layout of CubicBrick.
-struct CoefficientMemory {
-  float* first;
-  std::size_t stride;  ///< Floats of a brick.
-  int components;
-
-  float* brick(std::size_t i) const { return first + i * stride; }
-};
 
 /// Copies a block's voxels to the brick at its place. @return the greatest squared norm of a tensor; nothing, and
 /// leaves the brick as it is, if the brick is symmetric and the block is not.

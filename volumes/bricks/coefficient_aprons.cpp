@@ -1,0 +1,183 @@
+// `finish_bricks` and `widen_coefficients` of coefficients.h.
+
+#include <algorithm>
+#include <cmath>
+#include <cstring>
+
+#include <tbb/parallel_for.h>
+
+#include "volumes/bricks/coefficients.h"
+#include "volumes/grids/page_memory.h"
+
+namespace tensorray {
+namespace {
+
+using Eigen::AlignedBox3i;
+using Eigen::Vector3i;
+
+/// The coefficients of voxels within the extent, and their extrapolation.
+struct Extrapolation {
+  const CoefficientBricks& bricks;
+  const AlignedBox3i& extent;
+  const CoefficientMemory& memory;
+
+  /// The coefficient at any index.
+  StoredTensor at(const Vector3i& index) const {
+    for (int axis = 0; axis < 3; ++axis) {
+      const int low = extent.min()[axis], high = extent.max()[axis];
+      if (index[axis] >= low && index[axis] <= high) continue;
+      return beyond(index, axis, index[axis] < low ? low : high, index[axis] < low ? 1 : -1);
+    }
+    const auto voxel = find_voxel(bricks, bricks.filled, index);
+    return voxel ? read_coefficient(memory, *voxel) : StoredTensor(StoredTensor::Zero());
+  }
+
+  /// One voxel beyond a face of the extent: the polynomial that `solve_run` takes coefficients for.
+  StoredTensor beyond(Vector3i index, int axis, int face, int inward) const {
+    constexpr float weights[5][4] = {{}, {1}, {2, -1}, {3, -3, 1}, {4, -6, 4, -1}};
+    const int size = extent.max()[axis] - extent.min()[axis] + 1;
+    int run = 0;
+    for (Vector3i along = index.cwiseMax(extent.min()).cwiseMin(extent.max()); run < 3; ++run) {
+      along[axis] = face + run * inward;
+      if (!find_voxel(bricks, bricks.filled, along)) break;
+    }
+    const int terms = size == 1 ? 1 : run < 3 ? 2 : std::min(size, 4);
+    StoredTensor sum = StoredTensor::Zero();
+    for (int i = 0; i < terms; ++i) {
+      index[axis] = face + i * inward;
+      sum += weights[terms][i] * at(index);
+    }
+    return sum;
+  }
+};
+
+/// Calls visit(neighbour, first, end) for the parts of a brick's apron: the block that it belongs to, and the range of
+/// its voxels in the brick.
+template <class Visit>
+void for_apron(const Visit& visit) {
+  const auto first = [](int o) { return TensorBlock::size * o - (o < 0 ? CubicBrick::before - TensorBlock::size : 0); };
+  const auto size = [](int o) {
+    return o < 0 ? CubicBrick::before : o == 0 ? TensorBlock::size : CubicBrick::width - TensorBlock::size - 1;
+  };
+  for (int n = 0; n < neighbour_count; ++n) {
+    const Vector3i offset = neighbour(n);
+    if (offset.isZero()) continue;
+    const Vector3i from(first(offset.x()), first(offset.y()), first(offset.z()));
+    visit(offset, from, from + Vector3i(size(offset.x()), size(offset.y()), size(offset.z())));
+  }
+}
+
+/// Copies the part of an apron, `length` voxels along z, from the block that it belongs to.
+template <int components, int length>
+void copy_part_of(const float* block, const Vector3i& offset, const Vector3i& first, const Vector3i& end,
+                  float* brick) {
+  constexpr int trailing = CubicBrick::trailing_offset(components);
+  const int shift = CubicBrick::coefficient(TensorBlock::size * offset.x(), TensorBlock::size * offset.y(),
+                                            TensorBlock::size * offset.z()) -
+                    CubicBrick::coefficient(0, 0, 0);
+  for (int x = first.x(); x < end.x(); ++x)
+    for (int y = first.y(); y < end.y(); ++y) {
+      const int to = CubicBrick::coefficient(x, y, first.z()), from = to - shift;
+      std::memcpy(brick + CubicBrick::bending_offset(components, to),
+                  block + CubicBrick::bending_offset(components, from), length * components * sizeof(float));
+      std::memcpy(brick + trailing + to, block + trailing + from, length * sizeof(float));
+    }
+}
+
+template <int components>
+void copy_part(const float* block, const Vector3i& offset, const Vector3i& first, const Vector3i& end, float* brick) {
+  if (offset.z() < 0)
+    copy_part_of<components, CubicBrick::before>(block, offset, first, end, brick);
+  else if (offset.z() > 0)
+    copy_part_of<components, CubicBrick::width - TensorBlock::size - 1>(block, offset, first, end, brick);
+  else
+    copy_part_of<components, TensorBlock::size>(block, offset, first, end, brick);
+}
+
+/// Extrapolates the coefficients of a brick that are outside the extent.
+void extrapolate(const Extrapolation& field, const Vector3i& place, std::size_t brick) {
+  const Vector3i origin = TensorBlock::size * place;
+  const auto is_beyond = [&](int axis, int i) {
+    return origin[axis] + i == field.extent.min()[axis] - 1 || origin[axis] + i == field.extent.max()[axis] + 1;
+  };
+  const auto is_far = [&](int axis, int i) {
+    return origin[axis] + i < field.extent.min()[axis] - 1 || origin[axis] + i > field.extent.max()[axis] + 1;
+  };
+  for (int x = -1; x < CubicBrick::width - 1; ++x)
+    for (int y = -1; y < CubicBrick::width - 1; ++y)
+      for (int z = -1; z < CubicBrick::width - 1; ++z) {
+        if (is_far(0, x) || is_far(1, y) || is_far(2, z)) continue;  // No cell of the extent needs it.
+        if (is_beyond(0, x) || is_beyond(1, y) || is_beyond(2, z))
+          write_coefficient(field.at(origin + Vector3i(x, y, z)), field.memory, brick,
+                            CubicBrick::coefficient(x, y, z));
+      }
+}
+
+}  // namespace
+
+namespace {
+
+/// TensorBrick::strongest: a B-spline is a mean of its coefficients, so that none of its deviators is greater than
+/// theirs.
+template <int components>
+float strongest_of(const float* brick) {
+  const auto greatest = [&](auto number) {
+    using Number = decltype(number);
+    for (int i = 0; i < CubicBrick::coefficients; ++i) {
+      const float* const T = brick + CubicBrick::bending_offset(components, i);
+      const auto component = [&](int k) { return Number(T[TensorBrick::stored_component(components, k)]); };
+      Number squares = 0;
+      for (int k = 0; k < 8; ++k) squares += component(k) * component(k);
+      const Number trace = component(0) + component(4);
+      number = std::max(number, squares - trace * trace / 3);
+    }
+    return number;
+  };
+  constexpr float least = 1e-25f, most = 1e30f;  // Outside this range squares may underflow or overflow.
+  const float single = greatest(0.0f);
+  // Single precision errs by less than 2e-6 here, because the trace takes at most two thirds of the squares away.
+  const double squared = single > least && single < most ? double{single} : greatest(0.0);
+  return static_cast<float>(std::sqrt(squared) * (1 + 1.2e-5));  // Interpolation may round to slightly more.
+}
+
+template <int components>
+void finish_bricks_of(const CoefficientBricks& bricks, const AlignedBox3i& extent, const CoefficientMemory& memory,
+                      std::vector<float>& strongest) {
+  const Extrapolation field{bricks, extent, memory};
+  tbb::parallel_for(std::size_t{0}, bricks.count, [&](std::size_t i) {
+    make_room();
+    const Vector3i& place = bricks.places[i];
+    for_apron([&](const Vector3i& offset, const Vector3i& first, const Vector3i& end) {
+      const std::uint32_t block = bricks.index.find(place + offset);
+      if (block != BrickIndex::missing) copy_part<components>(memory.brick(block), offset, first, end, memory.brick(i));
+    });
+    const AlignedBox3i covered(TensorBlock::size * place - Vector3i::Ones(),
+                               TensorBlock::size * place + Vector3i::Constant(TensorBlock::size + 1));
+    if (!extent.contains(covered)) extrapolate(field, place, i);
+    strongest[i] = strongest_of<components>(memory.brick(i));
+  });
+}
+
+}  // namespace
+
+std::vector<float> finish_bricks(const CoefficientBricks& bricks, const AlignedBox3i& extent,
+                                 const CoefficientMemory& memory) {
+  std::vector<float> strongest(bricks.count);
+  if (memory.components == TensorBrick::symmetric)
+    finish_bricks_of<TensorBrick::symmetric>(bricks, extent, memory, strongest);
+  else
+    finish_bricks_of<TensorBrick::general>(bricks, extent, memory, strongest);
+  return strongest;
+}
+
+void widen_coefficients(const float* symmetric, float* general) {
+  constexpr int few = TensorBrick::symmetric, all = TensorBrick::general;
+  for (int i = 0; i < CubicBrick::coefficients; ++i)
+    for (int k = 0; k < all; ++k)
+      general[CubicBrick::bending_offset(all, i) + k] =
+          symmetric[CubicBrick::bending_offset(few, i) + TensorBrick::stored_component(few, k)];
+  std::copy_n(symmetric + CubicBrick::trailing_offset(few), CubicBrick::coefficients,
+              general + CubicBrick::trailing_offset(all));
+}
+
+}  // namespace tensorray

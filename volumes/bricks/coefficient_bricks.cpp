@@ -1,0 +1,172 @@
+#include "volumes/bricks/coefficient_bricks.h"
+
+#include <algorithm>
+
+#include <tbb/parallel_for.h>
+
+namespace tensorray {
+namespace {
+
+using Eigen::AlignedBox3i;
+using Eigen::Vector3i;
+
+constexpr int block_edge = CubicBrick::cells;  // Of a block, in voxels.
+int reach_of(Border border) { return border == Border::fade ? 1 : 2; }
+
+Vector3i place_of(const Vector3i& voxel) {
+  return voxel.unaryExpr([](int v) { return v >> 3; });
+}
+
+bool any_of(const VoxelMask& mask) {
+  return std::any_of(mask.begin(), mask.end(), [](std::uint8_t row) { return row != 0; });
+}
+
+VoxelMask mask_of(const BlockShape& shape) {
+  VoxelMask mask{};
+  for (std::size_t row = 0; row < mask.size(); ++row)
+    for (std::size_t z = 0; z < block_edge; ++z)
+      mask[row] = static_cast<std::uint8_t>(mask[row] | (shape.active[row * block_edge + z] ? 1u << z : 0u));
+  return mask;
+}
+
+/// The places of the blocks, and all about them.
+std::vector<Vector3i> places_about(const BlockTable& table) {
+  std::vector<Vector3i> places = table.places;
+  for (const Vector3i& place : table.places)
+    for (int n = 0; n < neighbour_count; ++n)
+      if (const Vector3i at = place + neighbour(n); table.index.find(at) == BrickIndex::missing) places.push_back(at);
+  sort_places(places);
+  return places;
+}
+
+/// Active voxels of a block and, on each side, of `margin` more: a row along z is a number whose bit z + margin is
+/// voxel z.
+struct WideMask {
+  static constexpr int margin = 2, width = block_edge + 2 * margin;
+
+  std::uint16_t rows[width][width] = {};
+
+  void add(const VoxelMask& mask, const Vector3i& offset) {
+    const auto first = [](int o) { return std::max(0, margin + block_edge * o); };
+    const auto end = [](int o) { return std::min(width, margin + block_edge * (o + 1)); };
+    for (int x = first(offset.x()); x < end(offset.x()); ++x)
+      for (int y = first(offset.y()); y < end(offset.y()); ++y) {
+        const int from_x = x - margin - block_edge * offset.x(), from_y = y - margin - block_edge * offset.y();
+        const unsigned row = mask[static_cast<std::size_t>(from_x * block_edge + from_y)];
+        const int shift = margin + block_edge * offset.z();
+        const unsigned bits = shift < 0 ? row >> -shift : row << shift;
+        rows[x][y] = static_cast<std::uint16_t>(rows[x][y] | (bits & ((1u << width) - 1)));
+      }
+  }
+
+  /// The block's voxels with an active voxel within `reach` along each axis.
+  VoxelMask spread(int reach) const {
+    VoxelMask mask{};
+    for (int x = 0; x < block_edge; ++x)
+      for (int y = 0; y < block_edge; ++y) {
+        unsigned any = 0;
+        for (int i = -reach; i <= reach; ++i)
+          for (int j = -reach; j <= reach; ++j) any |= rows[x + margin + i][y + margin + j];
+        unsigned spread = any;
+        for (int k = 1; k <= reach; ++k) spread |= any << k | any >> k;
+        mask[static_cast<std::size_t>(x * block_edge + y)] = static_cast<std::uint8_t>(spread >> margin);
+      }
+    return mask;
+  }
+};
+
+/// Removes voxels outside the extent.
+void cut(VoxelMask& mask, const Vector3i& place, const AlignedBox3i& extent) {
+  const Vector3i low = (extent.min() - block_edge * place).cwiseMax(0),
+                 high = (extent.max() - block_edge * place).cwiseMin(block_edge - 1);
+  unsigned along_z = 0;
+  for (int z = low.z(); z <= high.z(); ++z) along_z |= 1u << z;
+  for (int x = 0; x < block_edge; ++x)
+    for (int y = 0; y < block_edge; ++y) {
+      const bool inside = x >= low.x() && x <= high.x() && y >= low.y() && y <= high.y();
+      std::uint8_t& row = mask[static_cast<std::size_t>(x * block_edge + y)];
+      row = inside ? static_cast<std::uint8_t>(row & along_z) : std::uint8_t{0};
+    }
+}
+
+/// Whether a brick whose block is `offset` from another one's needs coefficients of that one.
+bool reaches(const VoxelMask& mask, const Vector3i& offset) {
+  // A brick needs the last voxel of the block before it, and the first two of the block behind it.
+  const auto first = [](int o) { return o > 0 ? block_edge - 1 : 0; };
+  const auto end = [](int o) { return o < 0 ? 2 : block_edge; };
+  unsigned along_z = 0;
+  for (int z = first(offset.z()); z < end(offset.z()); ++z) along_z |= 1u << z;
+  for (int x = first(offset.x()); x < end(offset.x()); ++x)
+    for (int y = first(offset.y()); y < end(offset.y()); ++y)
+      if ((mask[static_cast<std::size_t>(x * block_edge + y)] & along_z) != 0) return true;
+  return false;
+}
+
+}  // namespace
+
+CoefficientBricks coefficient_bricks(const BlockTable& table, const AlignedBox3i& extent, Border border) {
+  const std::vector<Vector3i> candidates = places_about(table);
+  const BrickIndex found(candidates);
+  std::vector<VoxelMask> active(candidates.size()), filled(candidates.size());
+  tbb::parallel_for(std::size_t{0}, candidates.size(), [&](std::size_t i) {
+    const std::uint32_t block = table.index.find(candidates[i]);
+    if (block != BrickIndex::missing) active[i] = mask_of(table.shapes[block]);
+  });
+  tbb::parallel_for(std::size_t{0}, candidates.size(), [&](std::size_t i) {
+    WideMask wide;
+    for (int n = 0; n < neighbour_count; ++n)
+      if (const std::uint32_t at = found.find(candidates[i] + neighbour(n)); at != BrickIndex::missing)
+        wide.add(active[at], neighbour(n));
+    filled[i] = wide.spread(reach_of(border));
+    cut(filled[i], candidates[i], extent);
+  });
+
+  const AlignedBox3i with_cells = bricks_of(extent);
+  CoefficientBricks result;
+  std::vector<Vector3i> others;
+  for (std::size_t i = 0; i < candidates.size(); ++i) {
+    if (!any_of(filled[i])) continue;
+    (with_cells.contains(candidates[i]) ? result.places : others).push_back(candidates[i]);
+    for (int n = 0; n < neighbour_count; ++n) {
+      const Vector3i offset = neighbour(n), at = candidates[i] + offset;
+      const std::uint32_t other = found.find(at);
+      if (other != BrickIndex::missing && any_of(filled[other])) continue;
+      if (with_cells.contains(at) && reaches(filled[i], offset)) result.places.push_back(at);
+    }
+  }
+  sort_places(result.places);
+  result.count = result.places.size();
+  result.places.insert(result.places.end(), others.begin(), others.end());
+  result.index = BrickIndex(result.places);
+  for (const Vector3i& place : result.places) {
+    const std::uint32_t at = found.find(place);
+    result.filled.push_back(at == BrickIndex::missing ? VoxelMask{} : filled[at]);
+    result.active.push_back(at == BrickIndex::missing ? VoxelMask{} : active[at]);
+  }
+  return result;
+}
+
+StoredTensor read_coefficient(const CoefficientMemory& memory, const BrickVoxel& voxel) {
+  StoredTensor value = StoredTensor::Zero();
+  const float* const floats = memory.brick(voxel.brick);
+  std::copy_n(floats + CubicBrick::bending_offset(memory.components, voxel.number()), memory.components, value.data());
+  value[8] = floats[CubicBrick::trailing_offset(memory.components) + voxel.number()];
+  return value;
+}
+
+void write_coefficient(const StoredTensor& value, const CoefficientMemory& memory, std::size_t brick, int number) {
+  float* const floats = memory.brick(brick);
+  std::copy_n(value.data(), memory.components, floats + CubicBrick::bending_offset(memory.components, number));
+  floats[CubicBrick::trailing_offset(memory.components) + number] = value[8];
+}
+
+std::optional<BrickVoxel> find_voxel(const CoefficientBricks& bricks, const std::vector<VoxelMask>& masks,
+                                     const Vector3i& index) {
+  const std::uint32_t brick = bricks.index.find(place_of(index));
+  if (brick == BrickIndex::missing) return std::nullopt;
+  const BrickVoxel voxel{brick, index.x() & 7, index.y() & 7, index.z() & 7};
+  if (!is_set(masks[brick], voxel.x, voxel.y, voxel.z)) return std::nullopt;
+  return voxel;
+}
+
+}  // namespace tensorray

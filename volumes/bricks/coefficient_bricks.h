@@ -1,0 +1,76 @@
+#pragma once
+/// @file volumes/bricks/coefficient_bricks.h
+/// The bricks of a cubic field while it is made: which voxels have coefficients, and where these are in memory.
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+#include <vector>
+
+#include <Eigen/Geometry>
+
+#include "volumes/bricks/brick_index.h"
+#include "volumes/bricks/brick_making.h"
+#include "volumes/bricks/cubic_brick.h"
+#include "volumes/bricks/interpolation.h"
+
+namespace tensorray {
+
+/// Which of a block's 8³ voxels: a row along z is a byte, whose bit z is voxel (x, y, z); rows are at 8 x + y.
+using VoxelMask = std::array<std::uint8_t, TensorBlock::size * TensorBlock::size>;
+
+inline bool is_set(const VoxelMask& mask, int x, int y, int z) {
+  return mask[static_cast<std::size_t>(x * TensorBlock::size + y)] >> z & 1;
+}
+
+/// The places about a block, and its own, which is the middle one: −1 to 1 along each axis.
+constexpr int neighbour_count = 27;
+inline Eigen::Vector3i neighbour(int n) { return {n / 9 - 1, n / 3 % 3 - 1, n % 3 - 1}; }
+
+/// The bricks of a cubic field. Each holds the coefficients of its own block of voxels, and, in the end, those about it
+/// that its cells need.
+struct CoefficientBricks {
+  /// First the bricks with a cell where the field is not zero, ordered by x, then y, then z. Then those that only hold
+  /// coefficients of other bricks' cells, until these have copies: of the extent's last voxels.
+  std::vector<Eigen::Vector3i> places;
+  std::size_t count = 0;  ///< Number of the first ones.
+  BrickIndex index;       ///< Of all places.
+
+  /// The voxels of each place that have coefficients: the active ones; and inactive ones within the extent that are
+  /// within a voxel of these (`fade`) or two (`extend`) along each axis.
+  std::vector<VoxelMask> filled;
+  std::vector<VoxelMask> active;
+};
+
+/// @param extent  The box of the active voxels. Runs on all threads.
+CoefficientBricks coefficient_bricks(const BlockTable& table, const Eigen::AlignedBox3i& extent, Border border);
+
+/// The memory of bricks in the layout of CubicBrick.
+struct CoefficientMemory {
+  float* first;
+  std::size_t stride;  ///< Floats of a brick.
+  int components;
+
+  float* brick(std::size_t i) const { return first + i * stride; }
+};
+
+/// What is stored of a coefficient, with T₂₂ last.
+using StoredTensor = Eigen::Array<float, 9, 1>;
+
+/// A voxel in the brick at its place.
+struct BrickVoxel {
+  std::size_t brick;
+  int x, y, z;
+
+  int number() const { return CubicBrick::coefficient(x, y, z); }
+};
+
+StoredTensor read_coefficient(const CoefficientMemory& memory, const BrickVoxel& voxel);
+void write_coefficient(const StoredTensor& value, const CoefficientMemory& memory, std::size_t brick, int number);
+
+/// The voxel at an index, if it is set in `masks`, which are `filled` or `active` of the bricks, or like them.
+std::optional<BrickVoxel> find_voxel(const CoefficientBricks& bricks, const std::vector<VoxelMask>& masks,
+                                     const Eigen::Vector3i& index);
+
+}  // namespace tensorray
