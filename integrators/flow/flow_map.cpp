@@ -187,20 +187,20 @@ class FlowMapBuilder {
     return area > 0 ? area / (reach.high - reach.low).maxCoeff() : 0;
   }
 
-  /// The error of landings that a square may have of a map that is drawn as light, pixels. It moves light, of which a
-  /// larger square has more, and is seen less where this light is spread over the plate.
-  /// @param width  Of the square's light, the least of all nodes, pixels.
-  /// @param sweep  The distance of its light from the first node to the last, pixels.
-  float light_bound(const Square& square, float width, float sweep) const {
-    const float size = std::ldexp(first_size_, -square.level), pixel = 1;
-    return static_cast<float>(settings_.tolerance) * std::max(width / size, gathered_part) *
-           std::cbrt(std::max(sweep / std::max(width, pixel), 1.0f));
+  /// The error of landings that a square may have, pixels, where it says what is seen at a place.
+  /// @param extent  The greatest of the square's landings, pixels.
+  float place_bound(float extent) const {
+    return static_cast<float>(settings_.tolerance) * std::sqrt(std::max(extent, 1.0f));
   }
 
-  /// Likewise of any other map.
-  /// @param size  The greatest extent of the square's landings, pixels.
-  float place_bound(float size) const {
-    return static_cast<float>(settings_.tolerance) * std::sqrt(std::max(size, 1.0f));
+  /// Likewise of a map that is drawn as light. The error moves light, of which a larger square has more, and is seen
+  /// less where this light is spread over the plate. But the map also says where light of each place comes from.
+  /// @param width  Of the square's light, the least of all nodes, pixels.
+  /// @param sweep  The distance of its light from the first node to the last, pixels.
+  float light_bound(const Square& square, float extent, float width, float sweep) const {
+    const float size = std::ldexp(first_size_, -square.level), pixel = 1;
+    const float bound = static_cast<float>(settings_.tolerance) * std::max(width / size, gathered_part);
+    return std::min(bound, place_bound(extent)) * std::cbrt(std::max(sweep / std::max(width, pixel), 1.0f));
   }
 
   bool needs_division(const Square& square) const {
@@ -209,21 +209,21 @@ class FlowMapBuilder {
     const bool is_at_edge = settings_.silhouette && lattice_.is_at_edge(square);
     if (square.level < (is_at_edge ? edge_levels : 1)) return true;  // There is no estimate of its error yet.
     bool is_seen = false;
-    float width = std::numeric_limits<float>::infinity(), size = 0;
+    float width = std::numeric_limits<float>::infinity(), extent = 0;
     Eigen::Vector2f first(0, 0), last(0, 0);
     for (const std::size_t node : tracer_.check_nodes()) {
       const Reach reach = reach_of(square.corners, node);
       if (!is_on_plate(reach)) continue;
       if (reach.landed < 4) return !is_for_still_light;
       width = std::min(width, width_of(square, reach, node));
-      size = std::max(size, (reach.high - reach.low).maxCoeff());
+      extent = std::max(extent, (reach.high - reach.low).maxCoeff());
       last = landing(square.corners[0], node);
       if (!is_seen) first = last;
       is_seen = true;
     }
     const float sweep = settings_.range ? (last - first).norm() : 0;
     if (!is_seen || (is_for_still_light && sweep > still_pixels)) return false;
-    return square.error > (is_light() ? light_bound(square, width, sweep) : place_bound(size));
+    return square.error > (is_light() ? light_bound(square, extent, width, sweep) : place_bound(extent));
   }
 
   /// The squares that need division, or those with the greatest errors if they are too many.

@@ -117,11 +117,11 @@ inline bool jumps(bool is_torn, const Eigen::Vector2d& a, const Eigen::Vector2d&
 /// for that (for an aperture that is no parallelogram, one lattice for each corner). Each is divided into four, and
 /// then again, down to the finest size, if the landings within its parent were so far from where the
 /// parent's corners predict that an error greater than `tolerance` is likely, or if some of its corners' light lands
-/// and some does not. In a map that is drawn as light, the tolerance is times w / n, at least 0.5, for a square of n
-/// pixels whose light is w pixels wide; and times the cube root of the distance by which the range spreads it, in w.
-/// Light that the range does not spread has squares of half the finest size, where all of it lands. In other maps the
-/// tolerance is times √n where a square's landings cover n pixels.
-/// Squares whose light falls beside the plate stay as they are.
+/// and some does not. In a map that is drawn as light, the tolerance is times w / n, from 0.5 to the √n of other
+/// maps, for a square of n pixels whose light is w pixels wide; and times the cube root of the distance by which the
+/// range spreads it, in w. Light that the range does not spread has squares of half the finest size, where all of it
+/// lands. In other maps the tolerance is times √n where a square's landings cover n pixels. Squares whose light falls
+/// beside the plate stay as they are.
 ///
 /// At the silhouette light leaves at once, through the face along which it goes, or is torn from light that stays: a
 /// map with √d, of the distance d from the edge, and with jumps. In the first squares there, positions have distances
