@@ -36,8 +36,8 @@ inline constexpr Composition splitting4_method = [] {
   return m;
 }();
 
-/// Where paths are recorded, steps are divided into pieces of this length, voxels.
-constexpr double piece_length = 1;
+/// Number of pieces, of a voxel at most, that a step is divided into where its path is recorded. @param length  Voxels.
+inline int pieces_of(double length) { return length > 1 ? static_cast<int>(std::ceil(length - 1e-3)) : 1; }
 
 /// Number of chords that stay within 0.02 voxels of the path, for surfaces that light may meet.
 /// @param length, turn  Of the step: voxels, and the distance of the directions at its ends.

@@ -134,17 +134,11 @@ Eigen::Vector3d Tracer<N>::between(const State<N>& next, double h, double t) con
          h * w.to_direction * next.direction();
 }
 
-/// Number of pieces of a step that are recorded: steps of `splitting4` may be long.
-template <int N>
-int Tracer<N>::piece_count(double h) const {
-  return is_composed() ? std::max(1, static_cast<int>(std::ceil(h / voxel_ / piece_length - 1e-3))) : 1;
-}
-
 /// Records the path between the ray and `next`.
 template <int N>
 void Tracer<N>::record_inner(const State<N>& next, double h) {
   if (!recording_.track && !recording_.points) return;
-  const int count = piece_count(h);
+  const int count = is_composed() ? pieces_of(h / voxel_) : 1;
   for (int i = 1; i < count; ++i) {
     const double t = double(i) / count;
     const PathWeights w = path_slopes(t);

@@ -108,7 +108,6 @@ class Tracer {
   void meet_surface(const Eigen::Vector3d& normal, bool bends);
   bool is_composed() const { return settings_.method == BendingMethod::splitting4; }
   Eigen::Vector3d between(const State<N>& next, double h, double t) const;
-  int piece_count(double h) const;
   void record_inner(const State<N>& next, double h);
   Event meet(const Eigen::Vector3d& from, const Eigen::Vector3d& to, Hit& hit) const;
   Event meet(const State<N>& next, double h, Landing& landing) const;

@@ -27,7 +27,8 @@ struct FlowSettings {
   bool range = false;
 
   double tolerance = 0.5;  ///< Wanted error of landings between positions, pixels; > 0.
-  double finest = 0.5;  ///< Size of the smallest squares, pixels of straight light, unless the tolerance is less; > 0.
+  double finest = 0.5;     ///< Size of the smallest squares (half of it for light that stays in one place), pixels of
+                           ///< straight light, unless the tolerance is less; > 0.
 
   bool silhouette = true;  ///< Whether the edge of the aperture is that of the volume, and the map is drawn as light.
                            ///< Rays from the edge start a little further inside, as they must enter the volume.

@@ -56,13 +56,18 @@ class TriangleBuilder {
     return false;
   }
 
-  /// Whether the map jumps, at any node, between two positions, and not between the two of the next side.
+  /// Whether the map jumps, at any node, between two positions, and not between the two of the next side, by the
+  /// lengths of both: at the beam's edge they differ.
   bool is_torn(std::uint32_t a, std::uint32_t b, std::uint32_t next_a, std::uint32_t next_b) const {
+    const auto length = [&](std::uint32_t from, std::uint32_t to) {
+      return static_cast<float>((map_.starts[to] - map_.starts[from]).norm());
+    };
+    const float by_length = torn_ratio * length(a, b) / length(next_a, next_b);
     for (std::size_t node = 0; node < map_.nodes; ++node) {
       if (!landed(a, node) || !landed(b, node) || !landed(next_a, node) || !landed(next_b, node)) continue;
       const float jump = (landing(a, node) - landing(b, node)).norm(),
                   next = (landing(next_a, node) - landing(next_b, node)).norm();
-      if (jump > torn_pixels && jump > torn_ratio * next) return true;
+      if (jump > torn_pixels && jump > by_length * next) return true;
     }
     return false;
   }

@@ -47,6 +47,7 @@ class Kernel {
   void step_otherwise(Packet& packet);
   void attempt(Packet& packet);
   void end_step(Packet& packet, std::uint32_t staying, std::uint32_t stop);
+  std::uint32_t outside(const Packet& packet, const PerRay& points, int axis) const;
   std::uint32_t outside(const Packet& packet, const PerRay (&points)[3]) const;
   std::uint32_t stopped(const Packet& packet) const;
   std::uint32_t spent(const Packet& packet) const;
@@ -54,7 +55,7 @@ class Kernel {
   void add_step(Packet& packet);
   void take_out(Packet& packet, std::uint32_t stop, std::uint32_t leave);
   void keep_points(const Packet& packet, std::uint32_t which);
-  std::uint32_t outside_between(const Packet& packet) const;
+  std::uint32_t outside_between(const Packet& packet, std::uint32_t leave) const;
   unsigned samples_per_step() const {
     return medium_.stages ? medium_.stages->stages : medium_.composed ? Composition::kicks : 1;
   }
@@ -160,33 +161,44 @@ void Kernel<Bricks, uniform, differentials, changes>::fill(Packet& packet) {
     begin<uniform>(medium_, packet);
 }
 
-/// The lanes whose points are outside the extent, as bits.
+/// The lanes whose points are outside the extent along an axis, as bits.
 template <class Bricks, bool uniform, bool differentials, bool changes>
 HWY_INLINE std::uint32_t Kernel<Bricks, uniform, differentials, changes>::outside(const Packet& packet,
-                                                                                  const PerRay (&points)[3]) const {
+                                                                                  const PerRay& points,
+                                                                                  int axis) const {
   std::uint32_t result = 0;
-  for (int i = 0; i < packet.vectors * lanes; i += lanes)
-    for (int axis = 0; axis < 3; ++axis) {
-      const F x = load(points[axis], i), margin = set(medium_.margin[axis]);
-      result |= to_bits(hn::Or(hn::Lt(hn::Add(x, margin), load(packet.low[axis], i)),
-                               hn::Gt(hn::Sub(x, margin), load(packet.high[axis], i))),
-                        i);
-    }
+  for (int i = 0; i < packet.vectors * lanes; i += lanes) {
+    const F x = load(points, i), margin = set(medium_.margin[axis]);
+    result |= to_bits(hn::Or(hn::Lt(hn::Add(x, margin), load(packet.low[axis], i)),
+                             hn::Gt(hn::Sub(x, margin), load(packet.high[axis], i))),
+                      i);
+  }
   return result;
 }
 
-/// The lanes whose long steps leave the extent on their way, as bits.
 template <class Bricks, bool uniform, bool differentials, bool changes>
-HWY_NOINLINE std::uint32_t Kernel<Bricks, uniform, differentials, changes>::outside_between(
-    const Packet& packet) const {
-  std::uint32_t result = 0;
-  alignas(64) PerRay points[3];
-  for (const double t : {0.25, 0.5, 0.75}) {
+HWY_INLINE std::uint32_t Kernel<Bricks, uniform, differentials, changes>::outside(const Packet& packet,
+                                                                                  const PerRay (&points)[3]) const {
+  return outside(packet, points[0], 0) | outside(packet, points[1], 1) | outside(packet, points[2], 2);
+}
+
+/// The lanes whose long steps leave the extent on their way, but for those that leave it along one axis and stay
+/// outside: the packet can find where these leave. As bits.
+template <class Bricks, bool uniform, bool differentials, bool changes>
+HWY_NOINLINE std::uint32_t Kernel<Bricks, uniform, differentials, changes>::outside_between(const Packet& packet,
+                                                                                            std::uint32_t leave) const {
+  std::uint32_t any = 0, edges = 0;
+  alignas(64) PerRay points[3][3];
+  for (int k = 0; k < 3; ++k)
     for (int i = 0; i < packet.vectors * lanes; i += lanes)
-      store(path_at<uniform>(packet, path_weights(t), i), points, i);
-    result |= outside(packet, points);
+      store(path_at<uniform>(packet, path_weights(0.25 * (k + 1)), i), points[k], i);
+  for (int axis = 0; axis < 3; ++axis) {
+    std::uint32_t along = outside(packet, packet.p_next[axis], axis);
+    for (const auto& point : points) along |= outside(packet, point[axis], axis);
+    edges |= any & along;
+    any |= along;
   }
-  return result;
+  return (any & ~leave) | edges;
 }
 
 /// The lanes that cannot take this step, as bits.
@@ -309,7 +321,7 @@ void Kernel<Bricks, uniform, differentials, changes>::end_step(Packet& packet, s
     stop |= leave;
     leave = 0;
   }
-  if (is_composed() && packet.near_border) stop |= outside_between(packet) & ~leave & ~staying;
+  if (is_composed() && packet.near_border) stop |= outside_between(packet, leave) & ~staying;
   stop &= packet.alive;
   leave &= packet.alive & ~stop;
   if ((stop | leave) != 0) take_out(packet, stop, leave);

@@ -62,14 +62,12 @@ bool is_zen4() {
 #endif
 }
 
+}  // namespace
+
 /// Zen 4 does the operations of AVX-512 in two halves: the kernel, of all code with vectors, is faster with AVX2 there.
 bool prefers_avx2 = is_zen4();
 
-#if HWY_TARGETS & HWY_AVX2
-#define KERNEL_DISPATCH(function) (prefers_avx2 ? &N_AVX2::function : &HWY_DYNAMIC_DISPATCH(function))
-#else
-#define KERNEL_DISPATCH(function) HWY_DYNAMIC_DISPATCH(function)
-#endif
+namespace {
 
 #if defined(__SSE__)
 /// Denormal numbers count as zero during the lifetime of this object, because arithmetic with them is many times
@@ -93,7 +91,7 @@ struct WithoutDenormals {};
 std::uint64_t run(const TensorField& field, const KernelSettings& settings, KernelRays& batch) {
   const PacketMedium medium(field, settings);
   [[maybe_unused]] const WithoutDenormals guard;
-  return field.is_cubic() ? trace_cubic(medium, batch, prefers_avx2) : KERNEL_DISPATCH(trace)(medium, batch);
+  return field.is_cubic() ? trace_cubic(medium, batch) : KERNEL_DISPATCH(trace)(medium, batch);
 }
 
 namespace {

@@ -56,9 +56,10 @@ struct KernelSettings {
 
 /// Traces every ray to the face of the extent where it leaves (then `axis` is set and the ray is on that face), or to
 /// the point before a step that the kernel does not take. These are steps onto a surface, beyond the greatest length or
-/// number of steps, and where σ·T cannot be followed; for rays with differentials, also steps out of the extent. The
-/// result of a ray depends on that ray alone, not on its neighbours. Tracing is fastest if rays of one origin, or of
-/// neighbouring origins, stand next to each other.
+/// number of steps, and where σ·T cannot be followed; for rays with differentials, also steps out of the extent. Steps
+/// of `splitting4` that leave the extent on their way, or across its edges, are of these, too. The result of a ray
+/// depends on that ray alone, not on its neighbours. Tracing is fastest if rays of one origin, or of neighbouring
+/// origins, stand next to each other.
 /// @return the number of tensor samples.
 std::uint64_t run(const TensorField& field, const KernelSettings& settings, KernelRays& batch);
 

@@ -34,11 +34,8 @@ namespace tensorray::packets {
 
 HWY_EXPORT(trace_cubic_field);
 
-std::uint64_t trace_cubic(const PacketMedium& medium, KernelRays& batch, [[maybe_unused]] bool prefers_avx2) {
-#if HWY_TARGETS & HWY_AVX2
-  if (prefers_avx2) return N_AVX2::trace_cubic_field(medium, batch);
-#endif
-  return HWY_DYNAMIC_DISPATCH(trace_cubic_field)(medium, batch);
+std::uint64_t trace_cubic(const PacketMedium& medium, KernelRays& batch) {
+  return KERNEL_DISPATCH(trace_cubic_field)(medium, batch);
 }
 
 }  // namespace tensorray::packets

@@ -61,8 +61,11 @@ struct PacketMedium {
   bool meets_surface(const Eigen::Vector3d& from, const Eigen::Vector3d& to) const;
 };
 
-/// `run` in a cubic field. @param prefers_avx2  Not to use wider vectors.
-std::uint64_t trace_cubic(const PacketMedium& medium, KernelRays& batch, bool prefers_avx2);
+/// `run` in a cubic field.
+std::uint64_t trace_cubic(const PacketMedium& medium, KernelRays& batch);
+
+/// Whether the kernel does not use vectors wider than AVX2's.
+extern bool prefers_avx2;
 
 /// Λ of a kick that is too strong for a series in single precision.
 /// @param T  T up to a multiple of I, column by column.

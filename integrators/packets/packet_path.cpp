@@ -53,7 +53,7 @@ bool step_meets_surface(const PacketMedium& medium, const Packet& packet, int la
 
 void add_inner_points(const PacketMedium& medium, const Packet& packet, int lane, std::vector<StepPoint>& points) {
   const LaneStep step(medium, packet, lane);
-  const int count = static_cast<int>(std::ceil(step.voxels() / piece_length - 1e-3));
+  const int count = pieces_of(step.voxels());
   for (int i = 1; i < count; ++i) {
     const double t = double(i) / count;
     const Eigen::Vector3d position = step.at(path_weights(t));

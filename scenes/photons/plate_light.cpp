@@ -1,5 +1,6 @@
 #include "scenes/photons/plate_light.h"
 
+#include <algorithm>
 #include <cmath>
 
 #include <fmt/format.h>
@@ -93,8 +94,14 @@ Sweep refined_sweep(double tolerance) {
   return {{4 * tolerance, static_cast<int>(std::ceil(16 / tolerance)), most_refined_bands}, 4 * tolerance};
 }
 
-/// Halves the tolerance and the steps of wavelengths until the picture changes by less than `bound`. The error falls at
-/// least as the tolerance does, so that what is left is less than the last change.
+/// What is left of the error after a change, if further ones fall as the last two did: the sum of a geometric series.
+/// Before there are two, and at the fastest, changes are taken to fall by half.
+double rest_after(double change, double last_change) {
+  const double ratio = last_change > 0 ? std::clamp(change / last_change, 0.5, 0.9) : 0.5;
+  return change * ratio / (1 - ratio);
+}
+
+/// Halves the tolerance and the steps of wavelengths until what is left of the error is less than `bound`.
 PlateLight refine(const Scene& scene, double bound, const Progress& progress) {
   std::string label;
   Progress labelled;  // Shows the error behind the phase.
@@ -102,12 +109,13 @@ PlateLight refine(const Scene& scene, double bound, const Progress& progress) {
     progress.update(phase + label, done, total);
     labelled.cancelled = progress.cancelled.load();
   };
-  double tolerance = 1;
+  double tolerance = 1, last_change = 0;
   PlateLight light = draw_map(scene, tolerance, refined_sweep(tolerance), labelled);
   for (;;) {
     tolerance /= 2;
     PlateLight finer = draw_map(scene, tolerance, refined_sweep(tolerance), labelled);
-    const double error = relative_distance(light.linear, finer.linear);
+    const double change = relative_distance(light.linear, finer.linear), error = rest_after(change, last_change);
+    last_change = change;
     finer.statistics.error = error;
     add_cost(light.statistics, finer.statistics);
     light = std::move(finer);

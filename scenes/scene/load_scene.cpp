@@ -336,10 +336,13 @@ FieldChoices choices_of(const SceneDescription& description) {
 }
 
 LoadedField prepare_field(TensorGrid grid, const FieldChoices& choices, const std::string& source) {
-  const std::size_t non_finite = remove_non_finite(grid);
-  smooth(grid, choices.smoothing);
+  std::size_t non_finite = 0;
+  if (choices.smoothing > 0) {
+    non_finite = remove_non_finite(grid);
+    smooth(grid, choices.smoothing);
+  }
   MadeField made = make_field(std::move(grid), choices.eigenvalues, choices.interpolant);
-  made.non_finite = non_finite;
+  made.non_finite += non_finite;
   LoadedField loaded = with_notes(std::move(made), source);
   if (choices.smoothing > 0)
     loaded.notes.push_back(fmt::format("field smoothed: a Gaussian of {:g} voxels", choices.smoothing));

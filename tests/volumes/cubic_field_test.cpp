@@ -212,6 +212,56 @@ TEST(CubicField, ExtendContinuesLines) {
       }
 }
 
+/// Layers of one to four voxels at a face of the extent, and another body far away: voxels keep their values.
+TEST(CubicField, ThinLayersAtFacesKeepTheirValues) {
+  const AlignedBox3i box(Vector3i::Zero(), Vector3i(23, 11, 11));
+  for (const Interpolant& interpolant : {fading, extending})
+    for (int layer = 1; layer <= 4; ++layer)
+      for (const bool is_last : {false, true}) {
+        const auto within = [&](const Vector3i& v) {
+          const int x = is_last ? 23 - v.x() : v.x();
+          return x < layer || x > 18;
+        };
+        const auto one = [](const Vector3i&) { return Matrix3d(Matrix3d::Constant(1)); };
+        const TensorField field(masked_grid(box, within, one), interpolant);
+        TensorSampler sampler(field);
+        for (int x = 0; x < 24; ++x)
+          if (within({x, 5, 5})) {
+            EXPECT_NEAR(sampler.at(Vector3d(x, 5, 5))(0, 1), 1, 1e-5) << layer << " voxels, at " << x;
+          }
+        if (interpolant == extending && layer > 1) {  // A constant goes on.
+          EXPECT_NEAR(sampler.at(Vector3d(is_last ? 22.5 : 0.5, 5, 5))(0, 1), 1, 1e-5) << layer;
+        }
+      }
+}
+
+/// Bricks that begin with five components, and are widened late, hold what bricks of eight do.
+TEST(CubicField, BricksAreWidenedLate) {
+  const AlignedBox3i box(Vector3i::Zero(), Vector3i(135, 135, 135));
+  const auto symmetric = [](const Vector3i& v) { return polynomial(v.cast<double>() / 8, {1, 2, 3}, true); };
+  TensorGrid late = dense_grid(box, oblique(), symmetric), early = late;
+  late.blocks.back().values[0](0, 1) += 1;
+  early.blocks.front().values[0](0, 1) += 1;
+  const TensorField a(late, fading), b(early, fading);
+  ASSERT_FALSE(a.is_symmetric());
+  TensorSampler one(a), other(b);
+  for (const Vector3d& index : {Vector3d(60.3, 70.1, 64.9), Vector3d(40, 90.5, 20.25), Vector3d(100.7, 30.2, 111.1)})
+    EXPECT_EQ(one.at(oblique() * index), other.at(oblique() * index));
+}
+
+/// Values beside each other whose squares are far apart, some beyond single precision.
+TEST(CubicField, TheBoundHoldsForValuesOfAnySize) {
+  for (const double large : {1e10, 1e20, 1e35}) {
+    const TensorField field(dense_grid(AlignedBox3i(Vector3i::Zero(), Vector3i(7, 7, 7)), oblique(),
+                                       [&](const Vector3i& v) {
+                                         Matrix3d T = Matrix3d(Vector3d(1, -2, 0.5).asDiagonal());
+                                         return v == Vector3i(3, 3, 3) ? Matrix3d(large * T) : T;
+                                       }),
+                            fading);
+    EXPECT_GT(field.brick({0, 0, 0}).strongest, large);
+  }
+}
+
 /// `sample_tensors` and TensorSampler agree, in sparse fields of both kinds, inside and outside.
 TEST(CubicField, VectorsSampleTheSame) {
   for (const bool symmetric : {false, true}) {

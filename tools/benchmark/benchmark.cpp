@@ -51,7 +51,7 @@ Json measure(const CommandLine& line) {
   if (wanted("jobs")) results["jobs"] = measure_jobs(line.options);
   if (wanted("keeping")) results["keeping"] = measure_keeping(line.options);
   if (wanted("caustics")) results["caustics"] = measure_caustics(line.options);
-  if (wanted("interpolation")) results["interpolation"] = measure_interpolation(line.options);
+  if (line.only == "interpolation") results["interpolation"] = measure_interpolation(line.options);
   if (wanted("view")) results["view"] = measure_view(line.options);
   return results;
 }

@@ -13,7 +13,7 @@ namespace tensorray {
 
 /// Maps the coordinates of bricks (voxel index / 8) to their numbers in a list, and to a value of each. Memory follows
 /// the number of bricks, not their extent. The index is a dense table over the box of all bricks where that takes at
-/// most 256 bytes per brick (a brick itself takes 18,000 or 26,000); finding a brick is then one load from a table that
+/// most 256 bytes per brick (a brick itself takes 18,000 to 48,000); finding a brick is then one load from a table that
 /// fits in caches. Otherwise it is a hash table. Any number of threads may read it at once.
 class BrickIndex {
  public:

@@ -9,7 +9,6 @@
 
 #include <tbb/parallel_sort.h>
 
-#include "volumes/bricks/coefficients.h"
 #include "volumes/bricks/cubic_brick.h"
 #include "volumes/grids/four_floats.h"
 
@@ -17,7 +16,6 @@ namespace tensorray {
 namespace {
 
 constexpr int cells = TensorBrick::cells;
-constexpr float least = 1e-25f, most = 1e30f;  // Outside this range squares may underflow or overflow.
 static_assert(cells == TensorBlock::size, "a brick holds a block and the near faces of its neighbours");
 
 /// The preceding bricks whose aprons contain an active voxel of `block`. Bit i is the brick at the place of the
@@ -125,7 +123,7 @@ double greatest_squared_norm(const TensorBlock& block) {
 
 /// @param norm  The greatest squared norm of a block's tensors in single precision.
 double squared_norm(float norm, const TensorBlock& block) {
-  return norm > least && norm < most ? double{norm} : greatest_squared_norm(block);
+  return norm > least_square && norm < greatest_square ? double{norm} : greatest_squared_norm(block);
 }
 
 /// Calls visit(offset, voxel) for the voxels that a block and a brick share: the offset of a row's first voxel in the
@@ -162,24 +160,15 @@ void set_share(const BlockVoxels& voxels, int bits, BlockShare& share) {
   share.squares[static_cast<std::size_t>(bits)] = squares;
 }
 
-/// The squared Frobenius norm of the deviator of T, from T − T₂₂ I.
-double squared_deviator(const TensorBrick& brick, int voxel) {
-  const auto component = [&](int i) {
-    const int offset = TensorBrick::bending_offset(brick.components, voxel);
-    return double{brick.bending[offset + TensorBrick::stored_component(brick.components, i)]};
-  };
-  double squares = 0;
-  for (int i = 0; i < TensorBrick::general; ++i) squares += component(i) * component(i);
-  const double trace = component(0) + component(4);
-  return std::max(0.0, squares - trace * trace / 3);
-}
-
-/// In double precision, for values of any size; NaN counts as zero.
+/// In double precision, for values of any size.
 double greatest_squared_deviator(const TensorBrick& brick) {
-  double greatest = 0;
-  for (int voxel = 0; voxel < TensorBrick::voxels; ++voxel)
-    greatest = std::max(greatest, squared_deviator(brick, voxel));
-  return greatest;
+  Deviators<double> deviators;
+  for (int voxel = 0; voxel < TensorBrick::voxels; ++voxel) {
+    const float* const stored = brick.bending + TensorBrick::bending_offset(brick.components, voxel);
+    brick.components == TensorBrick::symmetric ? deviators.add<TensorBrick::symmetric>(stored)
+                                               : deviators.add<TensorBrick::general>(stored);
+  }
+  return deviators.greatest;
 }
 
 template <int components>
@@ -283,9 +272,9 @@ float strongest_deviator(const BlockTable& table, const std::vector<BlockShare>&
     greatest = std::max(greatest, shares[block].strongest[static_cast<std::size_t>(bits)]);
     sum += shares[block].squares[static_cast<std::size_t>(bits)];
   }
-  const double squared = greatest > least && sum < most ? double{greatest} : greatest_squared_deviator(brick);
-  // Rounded up, because interpolation may round to slightly more than the tensor of any voxel.
-  return static_cast<float>(std::sqrt(squared) * (1 + 1.2e-5));
+  const double squared =
+      greatest > least_square && sum < greatest_square ? double{greatest} : greatest_squared_deviator(brick);
+  return strongest_bound(squared);
 }
 
 }  // namespace tensorray

@@ -2,7 +2,9 @@
 /// @file volumes/bricks/brick_making.h
 /// Makes the bricks of a TensorField from blocks, one block at a time and in any order.
 
+#include <algorithm>
 #include <array>
+#include <cmath>
 #include <optional>
 #include <vector>
 
@@ -13,6 +15,9 @@
 #include "volumes/grids/tensor_grid.h"
 
 namespace tensorray {
+
+/// Outside this range, sums of squares in single precision may be wrong: a term may underflow or overflow.
+constexpr float least_square = 1e-25f, greatest_square = 1e30f;
 
 /// Number of bricks that hold voxels of one block: that at its place, and seven preceding ones, whose aprons its near
 /// faces are.
@@ -57,8 +62,37 @@ struct BlockShare {
 std::optional<BlockShare> place_block(const TensorBlock& block, int components,
                                       const std::array<float*, bricks_of_block>& bricks);
 
+/// Copies the voxels of a block to the brick at its place in the layout of CubicBrick. @return the greatest squared
+/// norm of a tensor; nothing, and leaves the brick as it is, if the brick is symmetric and the block is not.
+std::optional<double> place_values(const TensorBlock& block, int components, float* brick);
+
 /// Copies a brick of symmetric tensors to one of tensors of any kind.
 void widen_brick(const float* symmetric, float* general);
+
+/// The greatest squared Frobenius norm of the deviators of tensors, from T − T₂₂ I. NaN counts as zero.
+template <class Number>
+struct Deviators {
+  Number greatest = 0, squares = 0;  ///< Of a deviator, and of T − T₂₂ I.
+
+  /// @param stored  The stored components of T − T₂₂ I.
+  template <int components>
+  void add(const float* stored) {
+    const auto component = [&](int k) { return Number(stored[TensorBrick::stored_component(components, k)]); };
+    Number sum = 0;
+    for (int k = 0; k < TensorBrick::general; ++k) sum += component(k) * component(k);
+    const Number trace = component(0) + component(4);
+    squares = std::max(squares, sum);
+    greatest = std::max(greatest, sum - trace * trace / 3);
+  }
+
+  /// Whether no square underflows or overflows, nearly. In single precision the error is then below 2e-6, because the
+  /// trace takes at most two thirds of the squares away.
+  bool are_exact() const { return greatest > Number(least_square) && squares < Number(greatest_square); }
+};
+
+/// TensorBrick::strongest, given the square. Rounded up, because interpolation may round to slightly more than the
+/// tensor of any voxel.
+inline float strongest_bound(double squared) { return static_cast<float>(std::sqrt(squared) * (1 + 1.2e-5)); }
 
 /// TensorBrick::strongest of a brick. @param shares  Of the blocks, in the order of the table.
 /// @param brick  The brick at `place`; it is complete but for `strongest`.

@@ -18,6 +18,7 @@ using Eigen::Vector3i;
 /// The coefficients of voxels within the extent, and their extrapolation.
 struct Extrapolation {
   const CoefficientBricks& bricks;
+  const Border border;
   const AlignedBox3i& extent;
   const CoefficientMemory& memory;
 
@@ -37,11 +38,12 @@ struct Extrapolation {
     constexpr float weights[5][4] = {{}, {1}, {2, -1}, {3, -3, 1}, {4, -6, 4, -1}};
     const int size = extent.max()[axis] - extent.min()[axis] + 1;
     int run = 0;
-    for (Vector3i along = index.cwiseMax(extent.min()).cwiseMin(extent.max()); run < 3; ++run) {
+    for (Vector3i along = index.cwiseMax(extent.min()).cwiseMin(extent.max()); run < 4; ++run) {
       along[axis] = face + run * inward;
       if (!find_voxel(bricks, bricks.filled, along)) break;
     }
-    const int terms = size == 1 ? 1 : run < 3 ? 2 : std::min(size, 4);
+    const bool is_parabola = run == 3 && (size == 3 || border == Border::extend);  // Both ends of the run continue.
+    const int terms = size == 1 ? 1 : run < 3 ? 2 : is_parabola ? 3 : 4;
     StoredTensor sum = StoredTensor::Zero();
     for (int i = 0; i < terms; ++i) {
       index[axis] = face + i * inward;
@@ -113,37 +115,24 @@ void extrapolate(const Extrapolation& field, const Vector3i& place, std::size_t 
       }
 }
 
-}  // namespace
-
-namespace {
-
 /// TensorBrick::strongest: a B-spline is a mean of its coefficients, so that none of its deviators is greater than
 /// theirs.
 template <int components>
 float strongest_of(const float* brick) {
-  const auto greatest = [&](auto number) {
-    using Number = decltype(number);
-    for (int i = 0; i < CubicBrick::coefficients; ++i) {
-      const float* const T = brick + CubicBrick::bending_offset(components, i);
-      const auto component = [&](int k) { return Number(T[TensorBrick::stored_component(components, k)]); };
-      Number squares = 0;
-      for (int k = 0; k < 8; ++k) squares += component(k) * component(k);
-      const Number trace = component(0) + component(4);
-      number = std::max(number, squares - trace * trace / 3);
-    }
-    return number;
-  };
-  constexpr float least = 1e-25f, most = 1e30f;  // Outside this range squares may underflow or overflow.
-  const float single = greatest(0.0f);
-  // Single precision errs by less than 2e-6 here, because the trace takes at most two thirds of the squares away.
-  const double squared = single > least && single < most ? double{single} : greatest(0.0);
-  return static_cast<float>(std::sqrt(squared) * (1 + 1.2e-5));  // Interpolation may round to slightly more.
+  Deviators<float> single;
+  for (int i = 0; i < CubicBrick::coefficients; ++i)
+    single.add<components>(brick + CubicBrick::bending_offset(components, i));
+  if (single.are_exact()) return strongest_bound(single.greatest);
+  Deviators<double> exact;
+  for (int i = 0; i < CubicBrick::coefficients; ++i)
+    exact.add<components>(brick + CubicBrick::bending_offset(components, i));
+  return strongest_bound(exact.greatest);
 }
 
 template <int components>
-void finish_bricks_of(const CoefficientBricks& bricks, const AlignedBox3i& extent, const CoefficientMemory& memory,
-                      std::vector<float>& strongest) {
-  const Extrapolation field{bricks, extent, memory};
+void finish_bricks_of(const CoefficientBricks& bricks, const AlignedBox3i& extent, Border border,
+                      const CoefficientMemory& memory, std::vector<float>& strongest) {
+  const Extrapolation field{bricks, border, extent, memory};
   tbb::parallel_for(std::size_t{0}, bricks.count, [&](std::size_t i) {
     make_room();
     const Vector3i& place = bricks.places[i];
@@ -160,13 +149,13 @@ void finish_bricks_of(const CoefficientBricks& bricks, const AlignedBox3i& exten
 
 }  // namespace
 
-std::vector<float> finish_bricks(const CoefficientBricks& bricks, const AlignedBox3i& extent,
+std::vector<float> finish_bricks(const CoefficientBricks& bricks, const AlignedBox3i& extent, Border border,
                                  const CoefficientMemory& memory) {
   std::vector<float> strongest(bricks.count);
   if (memory.components == TensorBrick::symmetric)
-    finish_bricks_of<TensorBrick::symmetric>(bricks, extent, memory, strongest);
+    finish_bricks_of<TensorBrick::symmetric>(bricks, extent, border, memory, strongest);
   else
-    finish_bricks_of<TensorBrick::general>(bricks, extent, memory, strongest);
+    finish_bricks_of<TensorBrick::general>(bricks, extent, border, memory, strongest);
   return strongest;
 }
 

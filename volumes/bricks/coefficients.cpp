@@ -67,7 +67,6 @@ void solve_run(float* const* run, int count, bool continues_before, bool continu
 
 /// A column of bricks along an axis, without gaps.
 struct Column {
-  std::size_t first;
   std::vector<std::uint32_t> bricks;
 };
 
@@ -196,7 +195,7 @@ void solve_along_z(const CoefficientBricks& bricks, const Column& column, const 
 
 /// The bricks of the column that begins with a brick; none if another brick is before it.
 Column column_of(const CoefficientBricks& bricks, std::size_t first, int axis) {
-  Column column{first, {}};
+  Column column;
   const Vector3i along = Vector3i::Unit(axis);
   Vector3i place = bricks.places[first];
   if (bricks.index.find(place - along) != BrickIndex::missing) return column;

@@ -2,16 +2,11 @@
 /// @file volumes/bricks/coefficients.h
 /// From the voxels of a cubic field to the coefficients that its cells need.
 
-#include <optional>
 #include <vector>
 
 #include "volumes/bricks/coefficient_bricks.h"
 
 namespace tensorray {
-
-/// Copies a block's voxels to the brick at its place. @return the greatest squared norm of a tensor; nothing, and
-/// leaves the brick as it is, if the brick is symmetric and the block is not.
-std::optional<double> place_values(const TensorBlock& block, int components, float* brick);
 
 /// Copies a brick of symmetric tensors to one of tensors of any kind.
 void widen_coefficients(const float* symmetric, float* general);
@@ -29,7 +24,7 @@ void make_coefficients(const CoefficientBricks& bricks, const Eigen::AlignedBox3
 
 /// Copies to each of the first bricks the coefficients of others that its cells need, and extrapolates those that are
 /// outside the extent. @return TensorBrick::strongest of these bricks.
-std::vector<float> finish_bricks(const CoefficientBricks& bricks, const Eigen::AlignedBox3i& extent,
+std::vector<float> finish_bricks(const CoefficientBricks& bricks, const Eigen::AlignedBox3i& extent, Border border,
                                  const CoefficientMemory& memory);
 
 }  // namespace tensorray

@@ -15,7 +15,7 @@ enum class Interpolation {
 
 /// What `cubic` takes inactive voxels for that are within its reach of active ones.
 enum class Border {
-  fade,   ///< Zero. The field fades out between an active voxel and its inactive neighbour.
+  fade,   ///< A fifth of the active neighbour's value, then zero: the field fades out over two voxels.
   extend  ///< The continuation of the active voxels' values, so that the field goes on behind the last active voxel.
 };
 

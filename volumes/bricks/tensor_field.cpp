@@ -144,10 +144,10 @@ double TensorField::make_cubic_bricks(const BlockTable& table, const Eigen::Alig
   const CoefficientMemory memory{floats_.get(), brick_floats_, components_};
   continue_values(coefficients, interpolant_.border, memory);
   make_coefficients(coefficients, active, interpolant_.border, memory);
-  const std::vector<float> strongest = finish_bricks(coefficients, active, memory);
+  const std::vector<float> strongest = finish_bricks(coefficients, active, interpolant_.border, memory);
   keep_bricks(coefficients.count);
   index_.set_values(strongest);
-  return norms.empty() ? 0 : *std::max_element(norms.begin(), norms.end());
+  return *std::max_element(norms.begin(), norms.end());
 }
 
 /// Fills the bricks. They store symmetric tensors until the first block comes that has others. Its part is then placed

@@ -1,37 +1,32 @@
 // `continue_values` of coefficients.h.
 
-#include <algorithm>
+#include <atomic>
+#include <cstddef>
 
 #include <tbb/parallel_for.h>
 
 #include "volumes/bricks/coefficients.h"
+#include "volumes/grids/page_memory.h"
 
 namespace tensorray {
 namespace {
 
 using Eigen::Vector3i;
 
-/// A voxel that is to be continued.
-struct Continued {
-  BrickVoxel voxel;
-  bool is_known = false;
-  StoredTensor value;
-};
-
 /// (3 − √3) / 6: where all voxels of a half space have the value 1, this is that of the spline, whose coefficients
 /// beyond are zero, at the first voxel beyond. It falls to zero from there without a change of sign, and hardly rings
 /// within.
 constexpr float faded = 0.21132487f;
 
-/// The continuation to the voxel at `index`, if one leads there.
-void continue_to(const Vector3i& index, const CoefficientBricks& bricks, const std::vector<VoxelMask>& known,
-                 Border border, const CoefficientMemory& memory, Continued& to) {
+/// The continuation to the voxel at `index`, if known voxels lead there: the mean of those along which most are known.
+std::optional<StoredTensor> continuation(const Vector3i& index, const CoefficientBricks& bricks,
+                                         const std::vector<VoxelMask>& known, Border border,
+                                         const CoefficientMemory& memory) {
   const int longest = border == Border::extend ? 2 : 1;
-  int most = 0, count = 0;
+  int most = 1, count = 0;
   StoredTensor sum = StoredTensor::Zero();
   for (int direction = 0; direction < 6; ++direction) {
-    Vector3i along = Vector3i::Zero();
-    along[direction / 2] = direction % 2 ? 1 : -1;
+    const Vector3i along = (direction % 2 ? 1 : -1) * Vector3i::Unit(direction / 2);
     StoredTensor values[2];
     int length = 0;
     for (; length < longest; ++length) {
@@ -39,7 +34,7 @@ void continue_to(const Vector3i& index, const CoefficientBricks& bricks, const s
       if (!voxel) break;
       values[length] = read_coefficient(memory, *voxel);
     }
-    if (length == 0 || length < most) continue;
+    if (length < most) continue;
     if (length > most) {
       most = length;
       count = 0;
@@ -48,38 +43,43 @@ void continue_to(const Vector3i& index, const CoefficientBricks& bricks, const s
     sum += length == 2 ? StoredTensor(2 * values[0] - values[1]) : values[0];
     ++count;
   }
-  to.is_known = count > 0;
-  if (count > 0) to.value = sum * ((border == Border::fade ? faded : 1.0f) / static_cast<float>(count));
+  if (count == 0) return std::nullopt;
+  return StoredTensor(sum * ((border == Border::fade ? faded : 1.0f) / static_cast<float>(count)));
+}
+
+/// Continues values to the voxels of a brick that known ones lead to. @return the voxels that are known now.
+VoxelMask continue_brick(std::size_t brick, const CoefficientBricks& bricks, const std::vector<VoxelMask>& known,
+                         Border border, const CoefficientMemory& memory) {
+  VoxelMask result = known[brick];
+  for (int x = 0; x < TensorBlock::size; ++x)
+    for (int y = 0; y < TensorBlock::size; ++y)
+      for (int z = 0; z < TensorBlock::size; ++z) {
+        if (!is_set(bricks.filled[brick], x, y, z) || is_set(known[brick], x, y, z)) continue;
+        const Vector3i index = TensorBlock::size * bricks.places[brick] + Vector3i(x, y, z);
+        const auto value = continuation(index, bricks, known, border, memory);
+        if (!value) continue;
+        write_coefficient(*value, memory, brick, CubicBrick::coefficient(x, y, z));
+        std::uint8_t& row = result[static_cast<std::size_t>(x * TensorBlock::size + y)];
+        row = static_cast<std::uint8_t>(row | 1u << z);
+      }
+  return result;
 }
 
 }  // namespace
 
 void continue_values(const CoefficientBricks& bricks, Border border, const CoefficientMemory& memory) {
-  std::vector<VoxelMask> known = bricks.active;
-  std::vector<Continued> rest;
-  for (std::size_t i = 0; i < bricks.places.size(); ++i)
-    for (int x = 0; x < TensorBlock::size; ++x)
-      for (int y = 0; y < TensorBlock::size; ++y)
-        for (int z = 0; z < TensorBlock::size; ++z)
-          if (is_set(bricks.filled[i], x, y, z) && !is_set(known[i], x, y, z))
-            rest.push_back({{i, x, y, z}, false, StoredTensor::Zero()});
-  // Each sweep leads one voxel further; those beside TensorBlock::sizes and corners are reached along one axis after
-  // the other.
-  while (!rest.empty()) {
-    tbb::parallel_for(std::size_t{0}, rest.size(), [&](std::size_t i) {
-      const BrickVoxel& voxel = rest[i].voxel;
-      const Vector3i index = TensorBlock::size * bricks.places[voxel.brick] + Vector3i(voxel.x, voxel.y, voxel.z);
-      continue_to(index, bricks, known, border, memory, rest[i]);
+  // Each sweep leads one voxel further; those beside edges and corners are reached along one axis after the other. A
+  // sweep reads only voxels that were known before it.
+  std::vector<VoxelMask> known = bricks.active, next = known;
+  for (std::atomic<bool> changed{true}; changed;) {
+    changed = false;
+    tbb::parallel_for(std::size_t{0}, bricks.places.size(), [&](std::size_t i) {
+      if (known[i] == bricks.filled[i]) return;
+      make_room();
+      next[i] = continue_brick(i, bricks, known, border, memory);
+      if (next[i] != known[i]) changed = true;
     });
-    const auto end = std::partition(rest.begin(), rest.end(), [](const Continued& c) { return !c.is_known; });
-    if (end == rest.end()) return;
-    for (auto done = end; done != rest.end(); ++done) {
-      const BrickVoxel& voxel = done->voxel;
-      write_coefficient(done->value, memory, voxel.brick, voxel.number());
-      std::uint8_t& row = known[voxel.brick][static_cast<std::size_t>(voxel.x * TensorBlock::size + voxel.y)];
-      row = static_cast<std::uint8_t>(row | 1u << voxel.z);
-    }
-    rest.erase(end, rest.end());
+    known = next;
   }
 }
 
