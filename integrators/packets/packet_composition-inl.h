@@ -132,6 +132,24 @@ HWY_INLINE F3 path_at(const Packet& packet, const PathWeights& weights, int at) 
              add(at_end(weights.to, load(packet.p_next, at)), along(weights.to_direction, v_next)));
 }
 
+/// The lanes that turn on their way along an axis, or may do so, as bits: there the path's cubic polynomial may cross a
+/// face more than once.
+template <bool uniform>
+HWY_NOINLINE std::uint32_t turning(const Packet& packet, int axis) {
+  const PerRay &u = uniform ? packet.v[axis] : packet.u[axis],
+               &u_next = uniform ? packet.v_next[axis] : packet.u_next[axis];
+  std::uint32_t result = 0;
+  for (int i = 0; i < packet.vectors * lanes; i += lanes) {
+    const F way = hn::Sub(load(packet.p_next[axis], i), load(packet.p[axis], i)), time = load(packet.time, i);
+    const auto is_steady = [&](const PerRay& slope) HWY_ATTR {  // Sufficient where it holds at both ends.
+      const F part = hn::Div(hn::Mul(time, load(slope, i)), way);
+      return hn::And(hn::Ge(part, hn::Zero(floats)), hn::Le(part, set(3)));
+    };
+    result |= to_bits(hn::Not(hn::And(is_steady(u), is_steady(u_next))), i);
+  }
+  return result;
+}
+
 }  // namespace tensorray::packets::HWY_NAMESPACE
 HWY_AFTER_NAMESPACE();
 

@@ -182,8 +182,8 @@ HWY_INLINE std::uint32_t Kernel<Bricks, uniform, differentials, changes>::outsid
   return outside(packet, points[0], 0) | outside(packet, points[1], 1) | outside(packet, points[2], 2);
 }
 
-/// The lanes whose long steps leave the extent on their way, but for those that leave it along one axis and stay
-/// outside: the packet can find where these leave. As bits.
+/// The lanes whose long steps leave the extent on their way, but for those that leave it along one axis, once: the
+/// packet can find where these leave. As bits.
 template <class Bricks, bool uniform, bool differentials, bool changes>
 HWY_NOINLINE std::uint32_t Kernel<Bricks, uniform, differentials, changes>::outside_between(const Packet& packet,
                                                                                             std::uint32_t leave) const {
@@ -195,7 +195,7 @@ HWY_NOINLINE std::uint32_t Kernel<Bricks, uniform, differentials, changes>::outs
   for (int axis = 0; axis < 3; ++axis) {
     std::uint32_t along = outside(packet, packet.p_next[axis], axis);
     for (const auto& point : points) along |= outside(packet, point[axis], axis);
-    edges |= any & along;
+    edges |= along & (any | turning<uniform>(packet, axis));
     any |= along;
   }
   return (any & ~leave) | edges;

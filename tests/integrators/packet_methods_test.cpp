@@ -24,7 +24,8 @@ constexpr Interpolant linear{Interpolation::linear, Border::fade}, cubic{Interpo
 constexpr Variant variants[] = {
     {BendingMethod::euler, linear},    {BendingMethod::splitting4, linear}, {BendingMethod::rk4, linear},
     {BendingMethod::bs23, linear},     {BendingMethod::dopri5, linear},     {BendingMethod::splitting4, cubic},
-    {BendingMethod::splitting, cubic}, {BendingMethod::euler, cubic},       {BendingMethod::rk4, cubic}};
+    {BendingMethod::splitting, cubic}, {BendingMethod::euler, cubic},       {BendingMethod::rk4, cubic},
+    {BendingMethod::bs23, cubic},      {BendingMethod::dopri5, cubic}};
 
 std::string name_of(const Variant& variant) {
   const char* const names[] = {"automatic", "euler", "splitting", "splitting4", "rk4", "bs23", "dopri5"};
