@@ -1,17 +1,38 @@
-// The entry of libFuzzer, for the target TENSORRAY_FUZZ_TARGET. The preset `fuzz` builds one program for each target:
-//   build/fuzz/bin/fuzz_ply NEW_CORPUS tests/fuzz/corpus/ply
+// The entries of libFuzzer, in the program `tensorray_fuzz` of the preset `fuzz`. TENSORRAY_FUZZ_TARGET names a target
+// of targets.cpp. tools/fuzz runs it.
 
 #include <algorithm>
 #include <cstdint>
+#include <cstdio>
+#include <cstdlib>
 #include <string>
 
 #include "tests/fuzz/targets.h"
 
+namespace {
+
+using tensorray::test::FuzzTarget, tensorray::test::fuzz_targets;
+
+const FuzzTarget* chosen = nullptr;
+
+}  // namespace
+
+extern "C" int LLVMFuzzerInitialize(int* /*count*/, char*** /*arguments*/) {
+  const char* const name = std::getenv("TENSORRAY_FUZZ_TARGET");
+  const auto& targets = fuzz_targets();
+  const auto found = std::find_if(targets.begin(), targets.end(),
+                                  [&](const FuzzTarget& target) { return name && std::string(target.name) == name; });
+  if (found == targets.end()) {
+    std::fputs("TENSORRAY_FUZZ_TARGET must be one of:", stderr);
+    for (const FuzzTarget& target : targets) std::fprintf(stderr, " %s", target.name);
+    std::fputs("\n", stderr);
+    std::exit(2);
+  }
+  chosen = &*found;
+  return 0;
+}
+
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
-  using tensorray::test::FuzzTarget, tensorray::test::fuzz_targets;
-  static const FuzzTarget target = *std::find_if(fuzz_targets().begin(), fuzz_targets().end(), [](const FuzzTarget& t) {
-    return std::string(t.name) == TENSORRAY_FUZZ_TARGET;
-  });
-  target.read(std::string(reinterpret_cast<const char*>(data), size));
+  chosen->read(std::string(reinterpret_cast<const char*>(data), size));
   return 0;
 }
