@@ -131,5 +131,11 @@ TEST(Mrtrix, DamageAndOtherKindsAreErrorsWithTheFile) {
   expect(changed("file: .", "file: a.dat 0\nfile: b.dat"), "mrconvert");
 }
 
+TEST(Mrtrix, NamesThatBeginAsTheLastLineAreNames) {
+  const test::TemporaryFile file("a.mif",
+                                 file_of("+0,+1,+2,+3", "Float32LE", 6, "END_of_acquisition: 12:30\nENDIAN: x\n"));
+  EXPECT_EQ(test::tensors_of(open_mrtrix(file)).active_voxels(), 24u);
+}
+
 }  // namespace
 }  // namespace tensorray

@@ -82,7 +82,7 @@ Header read_header(const Path& path) {
   std::string line;
   if (!std::getline(stream, line) || line.compare(0, 12, "mrtrix image") != 0) fail(path, "is not an image of MRtrix");
   while (std::getline(stream, line)) {
-    if (line.compare(0, 3, "END") == 0) return header;
+    if (line == "END" || line == "END\r") return header;
     read_line(header, line);
   }
   if (header.file.empty()) fail(path, "is cut off in its header");
