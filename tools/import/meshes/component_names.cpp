@@ -73,9 +73,9 @@ std::optional<TensorOrder> order_of_names(vtkDataArray& array) {
   return {};
 }
 
-vtkSmartPointer<vtkDataArray> in_known_order(vtkDataArray& array) {
+vtkSmartPointer<vtkDataArray> sorted_by_names(vtkDataArray& array) {
   const int components = array.GetNumberOfComponents();
-  if (components < 6 || (components != 9 && order_of_names(array))) return &array;
+  if (components < 6) return &array;
   const std::vector<int> places = places_of_entries(array);
   if (places.empty() || std::is_sorted(places.begin(), places.end())) return &array;
   const auto sorted = vtkSmartPointer<vtkDataArray>::Take(array.NewInstance());
@@ -89,6 +89,11 @@ vtkSmartPointer<vtkDataArray> in_known_order(vtkDataArray& array) {
     sorted->SetComponentName(i, component_name(array, from).c_str());
   }
   return sorted;
+}
+
+vtkSmartPointer<vtkDataArray> in_known_order(vtkDataArray& array) {
+  if (array.GetNumberOfComponents() != 9 && order_of_names(array)) return &array;
+  return sorted_by_names(array);
 }
 
 }  // namespace tensorray

@@ -23,8 +23,12 @@ int entry_named(const std::string& name);
 /// The order that the names of the first four or six components tell. The two indices of each may be swapped.
 std::optional<TensorOrder> order_of_names(vtkDataArray& array);
 
-/// If the names tell all entries of a tensor, but in an order that has no name: the tensor in VTK's order, of nine
-/// components row by row. Else the array itself.
+/// If the names tell all entries of a tensor: the tensor in VTK's order, of nine components row by row. Else the array
+/// itself.
+vtkSmartPointer<vtkDataArray> sorted_by_names(vtkDataArray& array);
+
+/// If the names tell all entries of a tensor, but in an order that has no name: the tensor sorted by them. Else the
+/// array itself.
 vtkSmartPointer<vtkDataArray> in_known_order(vtkDataArray& array);
 
 }  // namespace tensorray

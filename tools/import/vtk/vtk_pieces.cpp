@@ -6,7 +6,6 @@
 #include <limits>
 #include <map>
 #include <set>
-#include <stdexcept>
 #include <string>
 #include <vector>
 
@@ -24,7 +23,6 @@
 #include <vtkUnsignedCharArray.h>
 #include <vtkUnstructuredGrid.h>
 
-#include "base/text.h"
 #include "tools/import/meshes/component_names.h"
 
 namespace tensorray {
@@ -136,30 +134,16 @@ int common_type(const SameArrays& arrays) {
   return is_same && (is_real || !is_missing) ? type : VTK_DOUBLE;
 }
 
-/// An array with the components in the order of `like`, whose components have names. @throw std::runtime_error if the
-/// names are others.
-vtkSmartPointer<vtkDataArray> ordered_like(vtkDataArray& array, vtkDataArray& like) {
-  if (!array.HasAComponentName()) return &array;
-  const int count = array.GetNumberOfComponents();
-  std::vector<std::string> names, wanted;
-  for (int i = 0; i < count; ++i) {
-    names.push_back(component_name(array, i));
-    wanted.push_back(component_name(like, i));
+/// Whether arrays name their components, but not all alike.
+bool names_differ(const SameArrays& arrays) {
+  std::set<std::vector<std::string>> all;
+  for (const auto& array : arrays) {
+    if (!array || !array->HasAComponentName()) continue;
+    std::vector<std::string> names;
+    for (int i = 0; i < array->GetNumberOfComponents(); ++i) names.push_back(component_name(*array, i));
+    all.insert(names);
   }
-  if (names == wanted) return &array;
-  if (!std::is_permutation(names.begin(), names.end(), wanted.begin(), wanted.end()))
-    throw std::runtime_error("its parts name the components of array '" + std::string(array.GetName()) +
-                             "' differently: " + joined(wanted) + ", and " + joined(names) + "; write them alike");
-  const auto ordered = vtkSmartPointer<vtkDataArray>::Take(array.NewInstance());
-  ordered->SetName(array.GetName());
-  ordered->SetNumberOfComponents(count);
-  ordered->SetNumberOfTuples(array.GetNumberOfTuples());
-  for (int i = 0; i < count; ++i) {
-    const auto from = std::find(names.begin(), names.end(), wanted[static_cast<std::size_t>(i)]) - names.begin();
-    ordered->CopyComponent(i, &array, static_cast<int>(from));
-  }
-  ordered->CopyComponentNames(&like);
-  return ordered;
+  return all.size() > 1;
 }
 
 /// The first array with names of its components, or else the first one.
@@ -186,11 +170,12 @@ vtkSmartPointer<vtkDataArray> missing_array(vtkDataArray& like, int type, vtkIdT
 void unify_arrays(const DataSets& pieces, vtkDataObject::AttributeTypes type) {
   for (const auto& [name, arrays] : arrays_of(pieces, type)) {
     const int number_type = common_type(arrays);
+    const bool sorts = names_differ(arrays);
     vtkDataArray& like = first_named(arrays);
     for (std::size_t k = 0; k < pieces.size(); ++k) {
       vtkSmartPointer<vtkDataArray> array = arrays[k];
       if (!array) array = missing_array(like, number_type, pieces[k]->GetNumberOfElements(type));
-      if (array->GetNumberOfComponents() == like.GetNumberOfComponents()) array = ordered_like(*array, like);
+      if (sorts) array = sorted_by_names(*array);
       if (array->GetDataType() != number_type) {
         const auto converted = vtkSmartPointer<vtkDataArray>::Take(vtkDataArray::CreateDataArray(number_type));
         converted->DeepCopy(array);

@@ -21,8 +21,9 @@ bool is_same_mesh(vtkDataSet& a, vtkDataSet& b);
 
 /// Returns the only data set of `pieces`. If there are several, merges them into one unstructured grid, and merges
 /// points at equal positions, which take the values of the first piece in which they are finite. An array that a piece
-/// lacks is NaN there. Components that have names are joined by their names. Null if `pieces` is empty. Changes the
-/// ghost arrays of the pieces. The geometry of the pieces must have passed check_geometry (vtk_geometry.h).
+/// lacks is NaN there. Tensors whose components have different names there are sorted by them. Null if `pieces` is
+/// empty. Changes the ghost arrays of the pieces. The geometry of the pieces must have passed check_geometry
+/// (vtk_geometry.h).
 ///
 /// Ghosts of all kinds of data sets mean the same. Of an only data set hidden cells and points stay marked (refined
 /// cells count as hidden), and copies of neighbours' cells and points stay, whose values are right. Of several, hidden
