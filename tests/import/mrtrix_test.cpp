@@ -137,5 +137,12 @@ TEST(Mrtrix, NamesThatBeginAsTheLastLineAreNames) {
   EXPECT_EQ(test::tensors_of(open_mrtrix(file)).active_voxels(), 24u);
 }
 
+TEST(Mrtrix, WithoutATransformTheMiddleIsTheOrigin) {
+  const test::TemporaryFile file("a.mif", file_of("+0,+1,+2,+3", "Float32LE"));
+  const Lattice lattice = open_mrtrix(file);
+  EXPECT_EQ(lattice.to_world * Vector3d(0, 0, 0), Vector3d(-2, -3.75, -1.5));
+  EXPECT_EQ(lattice.to_world * Vector3d(2, 3, 1), Vector3d(2, 3.75, 1.5));
+}
+
 }  // namespace
 }  // namespace tensorray
