@@ -94,15 +94,19 @@ TEST(ComponentNames, UniformTensorsOfOpenFoamMayBeElsewhere) {
   write("macro", "inner uniform (1 .2 .3 2 .4 3);\ninternalField $inner;");
   write("list", "inner " + list + ");\ninternalField $inner;");
   write("included", "#include \"values\"");
+  write("included_list", "#include \"list_of_values\"");
+  write_bytes(folder / "0.5" / "list_of_values", "internalField " + list + ");\n");
   write_bytes(folder / "0.5" / "values", "internalField uniform (1 .2 .3 2 .4 3);\n");
   for (const char* name : {"macro", "included"})
     EXPECT_LT((tensor_of_file(folder, name) - expected()).norm(), 1e-6) << name;
   const auto read = read_vtk_source(folder);
-  vtkDataArray* const varied = read->GetCellData()->GetArray("list");
-  ASSERT_TRUE(varied);
-  EXPECT_EQ(varied->GetComponent(5, 0), 5);
-  EXPECT_EQ(varied->GetComponent(5, 1), 2);
-  EXPECT_NEAR(varied->GetComponent(5, 3), 0.2, 1e-6);
+  for (const char* name : {"list", "included_list"}) {
+    vtkDataArray* const varied = read->GetCellData()->GetArray(name);
+    ASSERT_TRUE(varied);
+    EXPECT_EQ(varied->GetComponent(5, 0), 5) << name;
+    EXPECT_EQ(varied->GetComponent(5, 1), 2) << name;
+    EXPECT_NEAR(varied->GetComponent(5, 3), 0.2, 1e-6) << name;
+  }
 }
 
 /// A file as MOOSE writes it: names of element variables in alphabetical order, which VTK joins where it can.

@@ -50,7 +50,8 @@ enum class Values { uniform, list, elsewhere };
 
 Values values_in(const std::string& head) {
   // Fields with patches have internalField, those without have value.
-  const bool has_patches = head.find("internalField") != std::string::npos;
+  const bool has_patches =
+      head.find("internalField") != std::string::npos || head.find("boundaryField") != std::string::npos;
   const std::regex entry(has_patches ? R"(\binternalField\s+(uniform|nonuniform)\b)"
                                      : R"(\bvalue\s+(uniform|nonuniform)\b)");
   std::smatch match;
