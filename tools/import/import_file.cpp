@@ -16,9 +16,9 @@
 #include <vtkSmartPointer.h>
 
 #include "base/text.h"
+#include "tools/import/lattices/component_names.h"
 #include "tools/import/lattices/lattice_files.h"
 #include "tools/import/meshes/component_arrays.h"
-#include "tools/import/meshes/component_names.h"
 #include "tools/import/meshes/flat_mesh.h"
 #include "tools/import/meshes/mesh_boundary.h"
 #include "tools/import/vtk/image_lattice.h"

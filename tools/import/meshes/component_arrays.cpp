@@ -16,7 +16,7 @@
 #include <vtkPointData.h>
 #include <vtkSmartPointer.h>
 
-#include "tools/import/meshes/component_names.h"
+#include "tools/import/lattices/component_names.h"
 
 namespace tensorray {
 namespace {

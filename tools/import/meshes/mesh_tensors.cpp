@@ -19,7 +19,7 @@
 #include <vtkSmartPointer.h>
 #include <vtkUnsignedCharArray.h>
 
-#include "tools/import/meshes/component_names.h"
+#include "tools/import/lattices/component_names.h"
 #include "tools/import/meshes/mesh_cell.h"
 
 namespace tensorray {

@@ -23,7 +23,7 @@
 #include <vtkUnsignedCharArray.h>
 #include <vtkUnstructuredGrid.h>
 
-#include "tools/import/meshes/component_names.h"
+#include "tools/import/lattices/component_names.h"
 
 namespace tensorray {
 namespace {

@@ -1,5 +1,5 @@
 #pragma once
-/// @file tools/import/meshes/component_names.h
+/// @file tools/import/lattices/component_names.h
 /// What the names of an array's components tell of their order. Private to the importer.
 
 #include <optional>

@@ -1,4 +1,4 @@
-#include "tools/import/meshes/component_names.h"
+#include "tools/import/lattices/component_names.h"
 
 #include <algorithm>
 #include <array>
