@@ -125,7 +125,8 @@ def make(kind, resolution=None, *, min=None, max=None, progress=None, **paramete
 def import_file(*files, array=None, gradient_of=None, strain_of=None, cells=None, order=None, frame=None,
                 resolution=None, voxel_size=None, origin=None, bounds=None, thickness=None, step=None, boundary=None,
                 name=None, units=None, progress=None):
-    """Makes a field of other programs' files: VTK, ExodusII, CGNS, OpenFOAM, PLOT3D, NRRD, NIfTI, NumPy.
+    """Makes a field of other programs' files: VTK, XDMF, EnSight, ExodusII, CGNS, OpenFOAM, PLOT3D, NRRD, NIfTI,
+    MetaImage, MRtrix, NumPy.
 
     files        One file, or several that belong together (a PLOT3D grid and its solution).
     array        Name of the array that is the tensor, or of its components, with commas: "sxx,syy,szz,sxy,syz,sxz";

@@ -2,6 +2,7 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <vtkCellData.h>
 #include <vtkUnstructuredGrid.h>
 #include <vtk_exodusII.h>
 #include <zlib.h>
@@ -76,6 +77,36 @@ TEST(ComponentNames, UniformTensorsOfOpenFoamHaveItsOrder) {
   gzclose(file);
   for (const char* name : {"plain", "list", "packed"})
     EXPECT_LT((tensor_of_file(folder, name) - expected()).norm(), 1e-6) << name;
+}
+
+/// The value of a uniform field may be a macro, or in another file.
+TEST(ComponentNames, UniformTensorsOfOpenFoamMayBeElsewhere) {
+  const TemporaryFolder folder;
+  OpenFoamCase::write(folder);
+  const auto write = [&](const std::string& name, const std::string& values) {
+    write_bytes(folder / "0.5" / name,
+                "FoamFile { version 2.0; format ascii; class volSymmTensorField; object " + name +
+                    "; }\ndimensions [0 0 0 0 0 0 0];\n" + values +
+                    "\nboundaryField { walls { type calculated; value uniform (9 9 9 9 9 9); } }\n");
+  };
+  std::string list = "nonuniform List<symmTensor> 8(";
+  for (int i = 0; i < 8; ++i) list += "(" + std::to_string(i) + " .2 .3 2 .4 3) ";
+  write("macro", "inner uniform (1 .2 .3 2 .4 3);\ninternalField $inner;");
+  write("list", "inner " + list + ");\ninternalField $inner;");
+  write("included", "#include \"values\"");
+  write("included_list", "#include \"list_of_values\"");
+  write_bytes(folder / "0.5" / "list_of_values", "internalField " + list + ");\n");
+  write_bytes(folder / "0.5" / "values", "internalField uniform (1 .2 .3 2 .4 3);\n");
+  for (const char* name : {"macro", "included"})
+    EXPECT_LT((tensor_of_file(folder, name) - expected()).norm(), 1e-6) << name;
+  const auto read = read_vtk_source(folder);
+  for (const char* name : {"list", "included_list"}) {
+    vtkDataArray* const varied = read->GetCellData()->GetArray(name);
+    ASSERT_TRUE(varied);
+    EXPECT_EQ(varied->GetComponent(5, 0), 5) << name;
+    EXPECT_EQ(varied->GetComponent(5, 1), 2) << name;
+    EXPECT_NEAR(varied->GetComponent(5, 3), 0.2, 1e-6) << name;
+  }
 }
 
 /// A file as MOOSE writes it: names of element variables in alphabetical order, which VTK joins where it can.
@@ -214,6 +245,60 @@ TEST(ComponentNames, ThreeScalarsAreAVector) {
     refuses(folder / ("a" + ending), "X Velocity,Y Velocity", {}, "--gradient-of lists 2 arrays, and a vector has 3",
             Take::gradient);
   }
+}
+
+/// The entries of a tensor that names tell, in orders that no program is known to use.
+TEST(ComponentNames, TellAnyOrder) {
+  const TemporaryFolder folder;
+  Matrix3d rows;
+  rows << 1, 2, 3, 4, 5, 6, 7, 8, 9;
+  const std::vector<std::string> six{"ZZ", "xy", "s_11", "YZ", "S22", "zx"};
+  const std::vector<std::string> nine{"xx", "yy", "zz", "xy", "yz", "xz", "yx", "zy", "zx"};
+  for (const auto& [ending, set] : data_sets()) {
+    add_array<6>(*set, "six",
+                 [](const Vector3d&) { return (Eigen::Matrix<double, 6, 1>() << 3, 0.2, 1, 0.4, 2, 0.3).finished(); });
+    add_array<9>(*set, "nine", [](const Vector3d&) {
+      return (Eigen::Matrix<double, 9, 1>() << 1, 5, 9, 2, 6, 3, 4, 8, 7).finished();
+    });
+    std::string list;
+    for (int i = 0; i < 9; ++i) {
+      const std::string& name = nine[static_cast<std::size_t>(i)];
+      if (i < 6) set->GetPointData()->GetArray("six")->SetComponentName(i, six[static_cast<std::size_t>(i)].c_str());
+      set->GetPointData()->GetArray("nine")->SetComponentName(i, name.c_str());
+      add_array<1>(*set, "s" + name,
+                   [&](const Vector3d&) { return Eigen::Matrix<double, 1, 1>(rows(name[0] - 'x', name[1] - 'x')); });
+      list += (i == 0 ? "s" : ",s") + name;
+    }
+    const std::filesystem::path file = folder / ("a" + ending);
+    write_xml(*set, file);
+    EXPECT_LT((tensor_of_file(file, "six") - expected()).norm(), 1e-6) << ending;
+    refuses(file, "six", TensorOrder::fsl, "leave --order out");
+    EXPECT_LT((tensor_of_file(file, "nine") - rows).norm(), 1e-6) << ending;
+    EXPECT_LT((tensor_of_file(file, list) - rows).norm(), 1e-6) << ending;
+    EXPECT_LT(
+        (tensor_of_file(file, "szz,syz,syy,sxz,sxy,sxx") - (Matrix3d() << 1, 2, 3, 2, 5, 6, 3, 6, 9).finished()).norm(),
+        1e-6)
+        << ending;
+    refuses(file, "szz,syz,syy,sxz,sxy,sxx", TensorOrder::fsl, "leave --order out");
+  }
+}
+
+TEST(ComponentNames, KeywordsOfLegacyFilesMayBeInSmallLetters) {
+  const TemporaryFolder folder;
+  std::string text =
+      "# vtk DataFile Version 3.0\nTENSORS6 field\nASCII\ndataset STRUCTURED_POINTS\nDIMENSIONS 2 2 2\nORIGIN 0 0 0\n"
+      "SPACING 1 1 1\npoint_data 8\n";
+  for (const char* name : {"a", "b"}) {
+    text += std::string("tensors6 ") + name + " float\n";
+    for (int i = 0; i < 8; ++i) text += "1 2 3 .2 .4 .3\n";
+  }
+  text += "FIELD FieldData 1\nfield 6 8 float\n";
+  for (int i = 0; i < 8; ++i) text += "1 2 3 .2 .4 .3\n";
+  text.replace(text.find("dataset"), 7, "DATASET");
+  write_bytes(folder / "a.vtk", text);
+  for (const char* name : {"a", "b"})
+    EXPECT_LT((tensor_of_file(folder / "a.vtk", name) - expected()).norm(), 1e-6) << name;
+  refuses(folder / "a.vtk", "field", {}, "give it with --order");  // The title is not a keyword.
 }
 
 }  // namespace

@@ -96,9 +96,41 @@ TEST(EnSight, DamageIsAnErrorWithTheFile) {
   const TemporaryFolder folder;
   write_case(folder);
   std::filesystem::remove(folder / "a.geo");
-  EXPECT_NE(error_of([&] { read_vtk_source(folder / "a.case"); }).find("a.case: "), std::string::npos);
+  EXPECT_NE(error_of([&] { read_vtk_source(folder / "a.case"); }).find("a.geo: is missing"), std::string::npos);
   write_bytes(folder / "b.case", "no case\n");
   EXPECT_NE(error_of([&] { read_vtk_source(folder / "b.case"); }).find("is not a case of EnSight"), std::string::npos);
+}
+
+/// VTK itself repeats the last number of a text that is cut off, and goes on for ever with some damaged cases.
+TEST(EnSight, WhatIsCutOffOrMissingIsNamed) {
+  const TemporaryFolder folder;
+  const auto error = [&] { return error_of([&] { read_vtk_source(folder / "a.case"); }); };
+  write_case(folder);
+  const std::string sound = bytes_of(folder / "a.case");
+  const auto damage = [&](const std::string& from, const std::string& to) {
+    std::string text = sound;
+    write_bytes(folder / "a.case", text.replace(text.find(from), from.size(), to));
+  };
+  for (const char* section : {"VARIABLE", "GEOMETRY", "TIME"}) {
+    damage(section, "V0R");
+    EXPECT_NE(error().find("is neither a section of EnSight nor an entry: 'V0R'"), std::string::npos) << error();
+  }
+  write_bytes(folder / "a.case", sound);
+  for (const auto& entry : std::filesystem::directory_iterator(folder)) {
+    if (entry.path().extension() == ".case" || entry.path().extension() == ".geo") continue;
+    const std::string text = bytes_of(entry.path());
+    for (const std::size_t lines : {1u, 3u}) {
+      std::size_t end = text.size() - 1;
+      for (std::size_t i = 0; i < lines; ++i) end = text.rfind('\n', end - 1);
+      write_bytes(entry.path(), text.substr(0, end + 1));
+      if (error().empty()) continue;  // It is of another step.
+      EXPECT_NE(error().find(entry.path().filename().string() + ": is cut off"), std::string::npos) << error();
+    }
+    write_bytes(entry.path(), text);
+  }
+  EXPECT_EQ(error(), "");
+  std::filesystem::remove(folder / "a.geo");
+  EXPECT_NE(error().find("a.geo: is missing, which a.case names"), std::string::npos) << error();
 }
 
 }  // namespace

@@ -247,5 +247,48 @@ TEST(FlatMesh, SurfacesInSpaceAndWrongFlagsAreErrors) {
               ThrowsMessage<std::invalid_argument>(HasSubstr("--thickness")));
 }
 
+/// Images keep their voxels, and are fields of a plane as meshes are.
+TEST(FlatMesh, VectorsOfImagesMayHaveTwoComponents) {
+  const TemporaryFolder folder;
+  auto image = vtkSmartPointer<vtkImageData>::New();
+  image->SetDimensions(5, 4, 1);
+  add_array<2>(*image, "v",
+               [](const Vector3d& p) { return Eigen::Vector2d(2 * p.x() + 3 * p.y(), 5 * p.x() - p.y()); });
+  add_array<1>(*image, "u", [](const Vector3d& p) { return Eigen::Matrix<double, 1, 1>(2 * p.x() + 3 * p.y()); });
+  add_array<1>(*image, "w", [](const Vector3d& p) { return Eigen::Matrix<double, 1, 1>(5 * p.x() - p.y()); });
+  write_xml(*image, folder / "a.vti");
+  const Matrix3d expected = (Matrix3d() << 2, 3, 0, 5, -1, 0, 0, 0, 0).finished();
+  for (const char* array : {"v", "u,w"})
+    for (const bool sampled : {false, true}) {
+      ImportSettings settings;
+      settings.array = array;
+      settings.take = Take::gradient;
+      if (sampled) settings.sampling.resolution = 0.5;
+      ImportReport report;
+      const TensorGrid grid = import(folder / "a.vti", settings, report);
+      EXPECT_EQ(grid.active_voxels(), sampled ? 9u * 7 : 5u * 4);
+      for_each_voxel(grid, [&](const Vector3d&, const Matrix3d& t) { EXPECT_LT((t - expected).norm(), 1e-5); });
+    }
+}
+
+TEST(FlatMesh, TheThicknessIsNoEdgeThatIsDivided) {
+  const TemporaryFolder folder;
+  const Grid mesh = square(VTK_QUAD);
+  add_array<4>(*mesh, "stress", plane);
+  write_xml(*mesh, folder / "a.vtu");
+  ImportSettings settings;
+  settings.array = "stress";
+  settings.order = TensorOrder::plane;
+  settings.thickness = 100;
+  ImportReport report;
+  for (const auto& resolution : {decltype(settings.sampling.resolution)(17), {Vector3i(17, 17, 1)}}) {
+    settings.sampling.resolution = resolution;
+    EXPECT_EQ(import(folder / "a.vtu", settings, report).active_voxels(), 17u * 17);
+  }
+  settings.sampling.resolution = {};
+  settings.sampling.bounds = Eigen::AlignedBox3d(Vector3d(1, 1, 0), Vector3d(1.25, 1.25, 0));  // Half of an edge.
+  EXPECT_EQ(import(folder / "a.vtu", settings, report).active_voxels(), 4u);
+}
+
 }  // namespace
 }  // namespace tensorray

@@ -37,6 +37,13 @@ class Hdf5Writer {
     write(name, shape, values.data(), H5T_NATIVE_INT, H5T_STD_I64LE);
   }
 
+  void text(const std::string& name, const std::string& value) {
+    const hid_t type = H5Tcopy(H5T_C_S1);
+    H5Tset_size(type, value.size());
+    write(name, {1}, value.data(), type, type);
+    H5Tclose(type);
+  }
+
   void attribute(const std::string& object, const std::string& name, const std::vector<double>& values) {
     const hsize_t count = values.size();
     const hid_t space = H5Screate_simple(1, &count, nullptr);

@@ -133,5 +133,12 @@ TEST(MetaImage, DamageAndOtherKindsAreErrorsWithTheFile) {
   expect(header_of(6, {2, 1, 1}, "", "MET_FLOAT", "LIST") + bytes, "several files");
 }
 
+TEST(MetaImage, AHeaderWithoutNumbersIsAnErrorAndNotRead) {
+  std::string header = header_of(6, {1, 1, 1}, "", "MET_UCHAR");
+  header.pop_back();  // The last line does not end.
+  const test::TemporaryFile file("a.mha", header);
+  test::expect_error([&] { open_metaimage(file); }, {"a.mha", "announces 6 bytes"});
+}
+
 }  // namespace
 }  // namespace tensorray

@@ -1,10 +1,12 @@
 // Cells and points without data leave a hole of their own size; all kinds of data sets treat ghosts alike.
 
+#include <array>
 #include <cmath>
 #include <limits>
 
 #include <gtest/gtest.h>
 #include <vtkCellData.h>
+#include <vtkIntArray.h>
 #include <vtkUnsignedCharArray.h>
 
 #include "base/progress.h"
@@ -236,6 +238,75 @@ TEST(Ghosts, VoxelsThatAreKeptAreHiddenAsInAMesh) {
   mark(*image->GetPointData(), 45, vtkDataSetAttributes::HIDDENPOINT, [](vtkIdType i) { return i % 5 >= 3; });
   EXPECT_EQ(count(false), 3u * 3 * 3);
   EXPECT_EQ(count(true), 2u * 2 * 2);
+}
+
+/// Writes a .vtm of two halves of the block, of which the array T of the second has another type or other names.
+std::filesystem::path write_halves(const std::filesystem::path& folder, vtkDataSet& first, vtkDataSet& second) {
+  write_xml(first, folder / "first.vtu");
+  write_xml(second, folder / "second.vtu");
+  write_bytes(folder / "a.vtm",
+              "<VTKFile type=\"vtkMultiBlockDataSet\"><vtkMultiBlockDataSet><DataSet file=\"first.vtu\"/>"
+              "<DataSet file=\"second.vtu\"/></vtkMultiBlockDataSet></VTKFile>\n");
+  return folder / "a.vtm";
+}
+
+TEST(MissingData, PointsOfTwoPiecesTakeTheFiniteValues) {
+  const TemporaryFolder folder;
+  const auto first = cubes(0, 2), second = cubes(2, 4);
+  add_ones(*first->GetPointData(), *first, "T", 9, false, [](double) { return true; });
+  add_ones(*second->GetPointData(), *second, "T", 9, false, [](double) { return false; });
+  EXPECT_EQ(active_voxels(write_halves(folder, *first, *second), "T").size(), half);
+  EXPECT_EQ(active_voxels(write_halves(folder, *second, *first), "T").size(), half);
+}
+
+TEST(MissingData, PiecesMayHaveNumbersOfOtherTypes) {
+  const TemporaryFolder folder;
+  const auto first = cubes(0, 2), second = cubes(2, 4);
+  add_ones(*first->GetPointData(), *first, "T", 9, false, [](double) { return false; });
+  add_ones(*second->GetPointData(), *second, "T", 9, false, [](double) { return false; });
+  vtkNew<vtkIntArray> integers;
+  integers->DeepCopy(first->GetPointData()->GetArray("T"));
+  first->GetPointData()->AddArray(integers);
+  EXPECT_EQ(active_voxels(write_halves(folder, *first, *second), "T").size(), whole);
+  second->GetPointData()->RemoveArray("T");
+  EXPECT_EQ(active_voxels(write_halves(folder, *first, *second), "T").size(), half);  // Not zeros.
+}
+
+TEST(MissingData, PiecesMayHaveComponentsInOtherOrders) {
+  const TemporaryFolder folder;
+  const auto first = cubes(0, 2), second = cubes(2, 4);
+  const auto add = [](vtkDataSet& mesh, const std::vector<const char*>& names, const Eigen::Matrix<double, 6, 1>& v) {
+    add_array<6>(mesh, "S", [&](const Vector3d&) { return v; });
+    for (int i = 0; i < 6; ++i)
+      mesh.GetPointData()->GetArray("S")->SetComponentName(i, names[static_cast<std::size_t>(i)]);
+  };
+  add(*first, {"s_xx", "s_xy", "s_xz", "s_yy", "s_yz", "s_zz"},
+      (Eigen::Matrix<double, 6, 1>() << 1, 4, 6, 2, 5, 3).finished());
+  add(*second, {"XX", "YY", "ZZ", "XY", "YZ", "XZ"}, (Eigen::Matrix<double, 6, 1>() << 1, 2, 3, 4, 5, 6).finished());
+  ImportSettings settings;
+  settings.files = {write_halves(folder, *first, *second)};
+  ImportReport report;
+  const TensorGrid grid = import_tensors(settings, Progress(), report);
+  const Matrix3d expected = (Matrix3d() << 1, 4, 6, 4, 2, 5, 6, 5, 3).finished();
+  for_each_voxel(grid, [&](const Vector3d& p, const Matrix3d& tensor) {
+    EXPECT_LT((tensor - expected).norm(), 1e-5) << p.transpose();
+  });
+}
+
+/// The parts of a mesh may share all points, and have as many cells.
+TEST(MissingData, PiecesOfTheSamePointsAreNotTheSameMesh) {
+  const TemporaryFolder folder;
+  const auto mesh = cubes();
+  add_ones(*mesh->GetPointData(), *mesh, "T", 9, false, [](double) { return false; });
+  std::array<vtkSmartPointer<vtkUnstructuredGrid>, 2> parts;
+  for (std::size_t part = 0; part < 2; ++part) {
+    parts[part] = vtkSmartPointer<vtkUnstructuredGrid>::New();
+    parts[part]->SetPoints(mesh->GetPoints());
+    parts[part]->GetPointData()->ShallowCopy(mesh->GetPointData());
+    for (vtkIdType id = static_cast<vtkIdType>(part); id < mesh->GetNumberOfCells(); id += 2)
+      parts[part]->InsertNextCell(VTK_HEXAHEDRON, mesh->GetCell(id)->GetPointIds());
+  }
+  EXPECT_EQ(active_voxels(write_halves(folder, *parts[0], *parts[1]), "T").size(), whole);
 }
 
 }  // namespace

@@ -131,5 +131,18 @@ TEST(Mrtrix, DamageAndOtherKindsAreErrorsWithTheFile) {
   expect(changed("file: .", "file: a.dat 0\nfile: b.dat"), "mrconvert");
 }
 
+TEST(Mrtrix, NamesThatBeginAsTheLastLineAreNames) {
+  const test::TemporaryFile file("a.mif",
+                                 file_of("+0,+1,+2,+3", "Float32LE", 6, "END_of_acquisition: 12:30\nENDIAN: x\n"));
+  EXPECT_EQ(test::tensors_of(open_mrtrix(file)).active_voxels(), 24u);
+}
+
+TEST(Mrtrix, WithoutATransformTheMiddleIsTheOrigin) {
+  const test::TemporaryFile file("a.mif", file_of("+0,+1,+2,+3", "Float32LE"));
+  const Lattice lattice = open_mrtrix(file);
+  EXPECT_EQ(lattice.to_world * Vector3d(0, 0, 0), Vector3d(-2, -3.75, -1.5));
+  EXPECT_EQ(lattice.to_world * Vector3d(2, 3, 1), Vector3d(2, 3.75, 1.5));
+}
+
 }  // namespace
 }  // namespace tensorray

@@ -373,8 +373,18 @@ TEST(Nifti, IntegersOfTheOtherByteOrderAndTwoFilesAreRead) {
   std::vector<std::int16_t> numbers = {1, 258, 0, 0, 0, 0, 2, 2, 0, 0, 3, 3};
   for (std::int16_t& number : numbers) swap(number);
   const test::TemporaryFile head("pair.hdr", file_of(header, "")), image("pair.img", test::bytes_of(numbers));
-  const TensorGrid grid = test::tensors_of(open_nifti(head), "fsl");
-  test::expect_near(Vector3d(258, 2, 3).asDiagonal(), test::voxel(grid, {1, 0, 0}));
+  for (const auto* const path : {&head, &image}) {
+    const std::filesystem::path& either = *path;
+    const TensorGrid grid = test::tensors_of(open_nifti(either), "fsl");
+    test::expect_near(Vector3d(258, 2, 3).asDiagonal(), test::voxel(grid, {1, 0, 0}));
+    ImportSettings settings;
+    settings.files = {either};
+    settings.order = TensorOrder::fsl;
+    settings.frame = ComponentFrame::voxels;
+    EXPECT_EQ(time_steps(settings), 1);
+    ImportReport report;
+    EXPECT_EQ(import_tensors(settings, Progress(), report).active_voxels(), 2u);
+  }
   std::filesystem::remove(image);
   test::expect_error([&] { open_nifti(head); }, {"pair.hdr", ".img"});
 }

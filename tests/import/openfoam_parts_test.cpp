@@ -102,6 +102,20 @@ TEST(OpenFoamParts, TheLaterTimesOfProcessorsAreTaken) {
   expect_both_parts(folder);
 }
 
+/// A run that goes on may have written its last time in part; and a processor may be lost.
+TEST(OpenFoamParts, ATimeIsOneOfAllProcessors) {
+  const TemporaryFolder folder;
+  write_decomposed(folder);
+  fs::remove_all(folder / "processor1" / "0.5");
+  EXPECT_EQ(time_steps(folder), 1);
+  expect_both_parts(folder, 0);
+  EXPECT_EQ(read_vtk_source(folder)->GetCellData()->GetArray("U")->GetComponent(0, 0), OpenFoamCase::value(0, 0, 0));
+  fs::remove_all(folder / "processor1" / "0");
+  EXPECT_NE(error_of([&] { read_vtk_source(folder); }).find("no time folder that all of its"), std::string::npos);
+  fs::rename(folder / "processor1", folder / "processor2");
+  EXPECT_NE(error_of([&] { read_vtk_source(folder); }).find("processor1: is missing"), std::string::npos);
+}
+
 TEST(OpenFoamParts, DamagedCollatedFilesAreErrorsWithTheFile) {
   const TemporaryFolder folder;
   write_decomposed(folder);

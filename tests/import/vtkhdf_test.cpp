@@ -86,6 +86,39 @@ TEST(VtkHdf, Images) {
   EXPECT_EQ(image->GetPointData()->GetArray("v")->GetComponent(11, 2), 35);
 }
 
+/// A file with steps may have arrays that are the same at all of them, and others that name their steps.
+TEST(VtkHdf, ArraysOfImagesMayStay) {
+  const TemporaryFolder folder;
+  {
+    Hdf5Writer file(folder / "a.vtkhdf");
+    file.group("/VTKHDF");
+    file.attribute("/VTKHDF", "Version", Doubles{2, 0});
+    file.attribute("/VTKHDF", "Type", "ImageData");
+    file.attribute("/VTKHDF", "WholeExtent", Doubles{0, 2, 0, 1, 0, 1});
+    file.attribute("/VTKHDF", "Origin", Doubles{0, 0, 0});
+    file.attribute("/VTKHDF", "Spacing", Doubles{1, 1, 1});
+    file.group("/VTKHDF/Steps");
+    file.attribute("/VTKHDF/Steps", "NSteps", Doubles{2});
+    Doubles values;
+    for (int i = 0; i < 12 * 3 * 2; ++i) values.push_back(i);
+    file.write("/VTKHDF/PointData/moving", {2, 2, 2, 3, 3}, values);
+    file.write("/VTKHDF/PointData/named", {2, 2, 2, 3, 3}, values);
+    file.write("/VTKHDF/Steps/PointDataOffsets/named", {2}, Ints{1, 0});
+    values.resize(12 * 3);
+    file.write("/VTKHDF/PointData/still", {2, 2, 3, 3}, values);
+    file.text("/VTKHDF/PointData/label", "water");
+  }
+  for (const int step : {0, 1}) {
+    const auto image = read_vtk_source(folder / "a.vtkhdf", step);
+    for (const auto& [name, first] : {std::pair("moving", 36 * step), {"named", 36 - 36 * step}, {"still", 0}}) {
+      vtkDataArray* const array = image->GetPointData()->GetArray(name);
+      ASSERT_TRUE(array) << name;
+      EXPECT_EQ(array->GetNumberOfComponents(), 3);
+      EXPECT_EQ(array->GetComponent(11, 2), first + 35) << name << step;
+    }
+  }
+}
+
 TEST(VtkHdf, DamageAndOtherKindsAreErrorsWithTheFile) {
   const TemporaryFolder folder;
   const auto error = [&] { return error_of([&] { read_vtk_source(folder / "a.vtkhdf"); }); };

@@ -216,5 +216,85 @@ TEST(Xdmf, DamageIsAnErrorWithTheFileAndTheReason) {
   EXPECT_THAT(error(changed("Format=\"XML\">0 0", "Format=\"HDF\">b.h5:/x")), HasSubstr("b.h5: is no HDF5"));
 }
 
+TEST(Xdmf, BlocksThatShareTheirPointsAreNotTheSameMesh) {
+  const TemporaryFolder folder;
+  std::string grids;
+  for (const std::string cell : {"0 1 2 3", "1 2 3 4"}) {
+    std::string items = mesh_items;
+    items.replace(items.find("2 4\""), 3, "1 4");
+    items.replace(items.find("0 1 2 3  1 2 3 4"), 16, cell);
+    grids += "<Grid Name=\"" + cell + "\">" + items + attribute("f", 7) + "</Grid>";
+  }
+  const auto mesh =
+      read(folder, document("<Grid GridType=\"Collection\" CollectionType=\"Spatial\">" + grids + "</Grid>"));
+  EXPECT_EQ(mesh->GetNumberOfCells(), 2);
+  EXPECT_EQ(mesh->GetNumberOfPoints(), 5);
+}
+
+TEST(Xdmf, PointsMayBeCountedFromOne) {
+  const TemporaryFolder folder;
+  const auto with = [](const std::string& type, const std::string& attributes, const std::string& cells) {
+    std::string items = mesh_items;
+    items.replace(items.find("Tetrahedron\""), 12, type + "\" " + attributes);
+    items.replace(items.find("0 1 2 3  1 2 3 4"), 16, cells);
+    return items.replace(items.find("\"2 4\""), 5, type == "Mixed" ? "\"10\"" : "\"2 4\"");
+  };
+  const auto grid = [&](const std::string& items) {
+    return document("<Grid Name=\"a\">" + items + attribute("f", 7) + "</Grid>");
+  };
+  for (const std::string& items : {with("Tetrahedron", "BaseOffset=\"1\"", "1 2 3 4  2 3 4 5"),
+                                   with("Mixed", "BaseOffset=\"1\"", "6 1 2 3 4  6 2 3 4 5")}) {
+    const auto mesh = read(folder, grid(items));
+    ASSERT_EQ(mesh->GetNumberOfCells(), 2);
+    EXPECT_EQ(mesh->GetCell(1)->GetPointId(3), 4);
+    EXPECT_EQ(mesh->GetCell(0)->GetPointId(0), 0);
+  }
+  const std::string ordered = grid(with("Tetrahedron", "Order=\"3 2 1 0\"", "0 1 2 3  1 2 3 4"));
+  EXPECT_THAT(error_of([&] { read(folder, ordered); }), HasSubstr("order of points of their own"));
+}
+
+TEST(Xdmf, JoinMayHaveSemicolons) {
+  const TemporaryFolder folder;
+  std::string items;
+  for (int i = 0; i < 3; ++i)
+    items += "<DataItem Dimensions=\"5\" Format=\"XML\">" + std::to_string(i) + " 0 0 0 0</DataItem>";
+  const auto mesh = read(folder, document("<Grid Name=\"a\">" + mesh_items +
+                                          "<Attribute Name=\"v\" Center=\"Node\"><DataItem ItemType=\"Function\" "
+                                          "Function=\"JOIN($0 ; $1 ; $2)\" Dimensions=\"5 3\">" +
+                                          items + "</DataItem></Attribute></Grid>"));
+  vtkDataArray* const v = mesh->GetPointData()->GetArray("v");
+  ASSERT_TRUE(v);
+  EXPECT_EQ(v->GetNumberOfComponents(), 3);
+  EXPECT_EQ(v->GetComponent(0, 2), 2);
+}
+
+/// Numbers whose products are beyond all integers, or that do not fit each other.
+TEST(Xdmf, SizesThatDoNotFitAreErrors) {
+  const TemporaryFolder folder;
+  const auto error = [&](const std::string& grid) {
+    return error_of([&] { read(folder, document("<Grid Name=\"a\">" + grid + "</Grid>")); });
+  };
+  const auto numbers = [](const std::string& list) { return "<DataItem Format=\"XML\">" + list + "</DataItem>"; };
+  const auto grid_of = [](const std::string& type, const std::string& size, const std::string& geometry,
+                          const std::string& items) {
+    return "<Topology TopologyType=\"" + type + "\" Dimensions=\"" + size + "\"/><Geometry GeometryType=\"" + geometry +
+           "\">" + items + "</Geometry>";
+  };
+  EXPECT_THAT(error(mesh_items + "<Attribute Name=\"f\"><DataItem ItemType=\"HyperSlab\" Dimensions=\"5\">" +
+                    numbers("0 17592186044416 1048577") + numbers("1 2 3 4 5") + "</DataItem></Attribute>"),
+              HasSubstr("a.xdmf: a DataItem is a HyperSlab beyond"));
+  EXPECT_THAT(error(grid_of("3DCoRectMesh", "1000000000 1000000000 1000000000", "Origin_DxDyDz",
+                            numbers("0 0 0") + numbers("1 1 1"))),
+              HasSubstr("senseless"));
+  EXPECT_THAT(error(grid_of("3DCoRectMesh", "2 2 2", "VxVyVz", numbers("5 6") + numbers("5 6") + numbers("5 6"))),
+              HasSubstr("type vxvyvz, which does not fit"));
+  EXPECT_THAT(error(grid_of("3DRectMesh", "2 2 2", "Origin_DxDyDz", numbers("5 6 7") + numbers("1 1 1"))),
+              HasSubstr("type origin_dxdydz, which does not fit"));
+  EXPECT_THAT(error(grid_of("3DRectMesh", "2 2 3", "VxVyVz", numbers("5 6") + numbers("5 6") + numbers("5 6"))),
+              HasSubstr("other numbers of coordinates"));
+  EXPECT_THAT(error(grid_of("3DSMesh", "2 2 2", "XYZ", numbers("0 0 0  1 0 0"))),
+              HasSubstr("another number of points"));
+}
+
 }  // namespace
 }  // namespace tensorray

@@ -1,18 +1,22 @@
 #include "tools/import/import_file.h"
 
 #include <algorithm>
+#include <limits>
 #include <stdexcept>
 #include <utility>
 #include <variant>
 
 #include <vtkCellData.h>
 #include <vtkDataArray.h>
+#include <vtkDataObject.h>
 #include <vtkDataSet.h>
 #include <vtkImageData.h>
+#include <vtkMatrix3x3.h>
 #include <vtkPointData.h>
 #include <vtkSmartPointer.h>
 
 #include "base/text.h"
+#include "tools/import/lattices/component_names.h"
 #include "tools/import/lattices/lattice_files.h"
 #include "tools/import/meshes/component_arrays.h"
 #include "tools/import/meshes/flat_mesh.h"
@@ -33,7 +37,7 @@ OpenLattice lattice_reader(const std::filesystem::path& path) {
   const std::string name = lower_case(path.filename().string());
   for (const char* ending : {".nrrd", ".nhdr"})
     if (ends_with(name, ending)) return open_nrrd;
-  for (const char* ending : {".nii", ".nii.gz", ".hdr"})
+  for (const char* ending : {".nii", ".nii.gz", ".hdr", ".hdr.gz", ".img", ".img.gz"})
     if (ends_with(name, ending)) return open_nifti;
   for (const char* ending : {".mha", ".mhd"})
     if (ends_with(name, ending)) return open_metaimage;
@@ -101,6 +105,14 @@ TensorGrid import_mesh(vtkDataSet& data, const ArrayChoice& array, const ImportS
   return grid;
 }
 
+/// Of the bounds that the user gives, in the plane of a flat mesh.
+double longest_edge(const ImportSettings& settings, const FlatMesh& flat) {
+  if (!settings.sampling.bounds) return std::numeric_limits<double>::infinity();
+  Eigen::Vector3d edges = settings.sampling.bounds->sizes();
+  edges[flat.axis] = 0;
+  return edges.maxCoeff();
+}
+
 /// Makes a slab of a flat mesh: one voxel across its plane.
 vtkSmartPointer<vtkDataSet> slab_of_flat(vtkSmartPointer<vtkDataSet> data, ImportSettings& settings,
                                          ImportReport& report) {
@@ -110,7 +122,7 @@ vtkSmartPointer<vtkDataSet> slab_of_flat(vtkSmartPointer<vtkDataSet> data, Impor
   if (!settings.boundary.empty()) throw std::invalid_argument("is flat, and has no body: leave --boundary out");
   report.thickness = settings.thickness.value_or(flat->edge);
   settings.sampling.flat_axis = flat->axis;
-  if (!wants_sampling(settings)) settings.sampling.resolution = flat->edge;
+  if (!wants_sampling(settings)) settings.sampling.resolution = std::min(flat->edge, longest_edge(settings, *flat));
   return slab_of(*data, *flat, report.thickness);
 }
 
@@ -128,6 +140,21 @@ void set_thickness(vtkImageData& image, double thickness) {
   if (!is_flat) throw std::invalid_argument("is not flat: leave --thickness out");
 }
 
+/// Whether an image has one voxel along z, several along x and y, and is not turned.
+bool is_flat_across_z(vtkImageData& image) {
+  const int* const size = image.GetDimensions();
+  return size[0] > 1 && size[1] > 1 && size[2] == 1 && image.GetDirectionMatrix()->IsIdentity();
+}
+
+/// The chosen array, with its components in an order that has a name.
+ArrayChoice chosen_array(vtkDataSet& data, const ImportSettings& settings, bool is_flat) {
+  if (is_array_list(data, settings.array)) return join_arrays(data, settings.array, settings.take, is_flat);
+  const ArrayChoice array = choose_array(data, settings.array, settings.take, settings.cell_values);
+  vtkDataSetAttributes& attributes = *data.GetAttributes(array.of_cells ? vtkDataObject::CELL : vtkDataObject::POINT);
+  if (settings.take == Take::tensor) attributes.AddArray(in_known_order(*attributes.GetArray(array.name.c_str())));
+  return array;
+}
+
 /// Keeps the voxels of a VTK image, unless the user asks for other voxels.
 TensorGrid import_data_set(vtkSmartPointer<vtkDataSet> data, ImportSettings settings, const Progress& progress,
                            ImportReport& report) {
@@ -135,10 +162,10 @@ TensorGrid import_data_set(vtkSmartPointer<vtkDataSet> data, ImportSettings sett
     data = slab_of_flat(std::move(data), settings, report);
   else if (settings.thickness)
     set_thickness(*vtkImageData::SafeDownCast(data), *settings.thickness);
-  const ArrayChoice array = is_array_list(*data, settings.array)
-                                ? join_arrays(*data, settings.array, settings.take)
-                                : choose_array(*data, settings.array, settings.take, settings.cell_values);
   auto image = vtkSmartPointer<vtkImageData>(vtkImageData::SafeDownCast(data));
+  const bool is_flat = image ? is_flat_across_z(*image) : settings.sampling.flat_axis == 2;
+  if (is_flat) pad_vectors(*data);
+  const ArrayChoice array = chosen_array(*data, settings, is_flat);
   if (!image || wants_sampling(settings)) return import_mesh(*data, array, settings, progress, report);
   data = nullptr;  // Leave the lattice as the only owner of the numbers, so that it can free them.
   vtkDataSetAttributes* attributes = array.of_cells ? static_cast<vtkDataSetAttributes*>(image->GetCellData())
@@ -181,11 +208,6 @@ TensorGrid import_any(const ImportSettings& settings, const Progress& progress, 
   if (open != open_npy && open != open_nifti) require_room_for(settings.files);
   if (settings.files.size() == 2) {
     return import_data_set(read_plot3d(file, settings.files[1]), settings, progress, report);
-  }
-  if (lower_case_ending(file) == ".img") {
-    ImportSettings with_header = settings;
-    with_header.files = {std::filesystem::path(file).replace_extension(".hdr")};
-    return import_any(with_header, progress, report);
   }
   if (!open) return import_data_set(read_vtk_source(file, settings.step), settings, progress, report);
   if (open == open_npy) return import_lattice(placed(open(file), settings), settings, report);

@@ -20,12 +20,12 @@ namespace tensorray {
 /// Threads: reads one file at a time.
 Lattice open_nrrd(const std::filesystem::path& path);
 
-/// Reads NIfTI-1 and NIfTI-2 (.nii, .nii.gz, .hdr/.img) with 6, 9 or 3 (a vector) volumes along the fourth or the
-/// fifth axis. World is RAS millimetres, from sform, else qform, else the voxel sizes with the first axis from right to
-/// left. Applies scl_slope and scl_inter. The order is known if the intent code is "symmetric matrix"; otherwise the
-/// user must give it. With the order `fsl` the components are in FSL's axes of the image, as lower triangles in those
-/// of the voxels, otherwise in world axes. Exactly zero is background. Holds all numbers in memory, and frees them
-/// slice by slice.
+/// Reads NIfTI-1 and NIfTI-2 (.nii, .hdr with .img, also with .gz; of a pair either file may be given) with 6, 9 or 3
+/// (a vector) volumes along the fourth or the fifth axis. World is RAS millimetres, from sform, else qform, else the
+/// voxel sizes with the first axis from right to left. Applies scl_slope and scl_inter. The order is known if the
+/// intent code is "symmetric matrix"; otherwise the user must give it. With the order `fsl` the components are in FSL's
+/// axes of the image, as lower triangles in those of the voxels, otherwise in world axes. Exactly zero is background.
+/// Holds all numbers in memory, and frees them slice by slice.
 Lattice open_nifti(const std::filesystem::path& path);
 
 /// Reads MetaImage (.mha, .mhd with its data file; ITK) with three axes and 6, 9 or 3 (a vector) channels. World is

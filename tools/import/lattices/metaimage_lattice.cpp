@@ -75,7 +75,7 @@ Header read_header(const Path& path) {
     const std::string name = trimmed(text.substr(0, sign));
     header.entries[name] = trimmed(text.substr(sign + 1));
     if (name != "ElementDataFile") continue;
-    if (!file.eof()) header.end = static_cast<std::uint64_t>(file.tellg());
+    header.end = file.eof() ? std::filesystem::file_size(path) : static_cast<std::uint64_t>(file.tellg());
     return header;
   }
   fail(path, "is not a MetaImage, or cut off in its header: it has no ElementDataFile");

@@ -82,7 +82,7 @@ Header read_header(const Path& path) {
   std::string line;
   if (!std::getline(stream, line) || line.compare(0, 12, "mrtrix image") != 0) fail(path, "is not an image of MRtrix");
   while (std::getline(stream, line)) {
-    if (line.compare(0, 3, "END") == 0) return header;
+    if (line == "END" || line == "END\r") return header;
     read_line(header, line);
   }
   if (header.file.empty()) fail(path, "is cut off in its header");
@@ -154,7 +154,8 @@ RawPlace place_of(const Header& header) {
   return place;
 }
 
-Eigen::Affine3d to_world(const Header& header) {
+/// Without a transform, the middle of the image is at the origin.
+Eigen::Affine3d to_world(const Header& header, const Eigen::Vector3i& size) {
   Eigen::Matrix4d matrix = Eigen::Matrix4d::Identity();
   if (!header.transform.empty() && header.transform.size() != 3 && header.transform.size() != 4)
     fail_header(header.path, "transform");
@@ -167,6 +168,8 @@ Eigen::Affine3d to_world(const Header& header) {
   if (vox.size() < 3) fail_header(header.path, "vox");
   Eigen::Affine3d transform(matrix);
   transform.linear() *= Eigen::Vector3d(vox.data()).asDiagonal();
+  if (header.transform.empty())
+    transform.translation() = transform.linear() * (-0.5 * (size.cast<double>().array() - 1)).matrix();
   const Eigen::Matrix3d linear = transform.linear();
   if (!transform.matrix().allFinite() || !(std::abs(linear.determinant()) > 1e-9 * linear.colwise().norm().prod()))
     fail(header.path, "its transform and voxel sizes cannot be inverted: correct them (mrtransform)");
@@ -184,7 +187,7 @@ Lattice open_mrtrix(const Path& path) {
   lattice.size = {static_cast<int>(extents[0]), static_cast<int>(extents[1]), static_cast<int>(extents[2])};
   lattice.components = static_cast<int>(extents[3]);
   if (lattice.components == 6) lattice.usual_order = TensorOrder::mrtrix;
-  lattice.to_world = to_world(header);
+  lattice.to_world = to_world(header, lattice.size);
   lattice.fsl_frame = axes_of(ComponentFrame::fsl, lattice.to_world.linear());
   lattice.lower_frame = axes_of(ComponentFrame::voxels, lattice.to_world.linear());
   lattice.takes_frame = true;

@@ -23,6 +23,7 @@
 #include <nifti2_io.h>
 
 #include "base/errors.h"
+#include "base/text.h"
 #include "tools/import/lattices/lattice_files.h"
 #include "volumes/grids/page_memory.h"
 
@@ -202,9 +203,18 @@ Eigen::Affine3d to_world(const nifti_image& image, const std::filesystem::path& 
   return transform;
 }
 
+/// The header of a pair of files, of which either may be given.
+std::filesystem::path header_of(const std::filesystem::path& path) {
+  std::string name = path.string();
+  for (const std::string ending : {".img", ".img.gz"})
+    if (ends_with(lower_case(name), ending)) name.replace(name.size() - ending.size(), 4, ".hdr");
+  return name;
+}
+
 }  // namespace
 
-Lattice open_nifti(const std::filesystem::path& path) {
+Lattice open_nifti(const std::filesystem::path& given) {
+  const std::filesystem::path path = header_of(given);
   const Image image = read_header(path);
   Lattice lattice;
   lattice.components = component_count(*image, path);

@@ -1,6 +1,7 @@
 #include "tools/import/meshes/component_arrays.h"
 
 #include <algorithm>
+#include <array>
 #include <optional>
 #include <sstream>
 #include <stdexcept>
@@ -15,7 +16,7 @@
 #include <vtkPointData.h>
 #include <vtkSmartPointer.h>
 
-#include "base/text.h"
+#include "tools/import/lattices/component_names.h"
 
 namespace tensorray {
 namespace {
@@ -38,11 +39,6 @@ struct Part {
   vtkDataArray* array = nullptr;
   int component = 0;
 };
-
-std::string component_name(vtkDataArray& array, int component) {
-  const char* const name = array.GetComponentName(component);
-  return name ? name : "";
-}
 
 /// A component by its name or its number from 0 on; -2 if there is none.
 int component_called(vtkDataArray& array, const std::string& name) {
@@ -87,7 +83,7 @@ bool is_plane(const std::vector<Part>& parts, Take take) {
 }
 
 /// The components that make the new array, in its order: three vectors are the rows of a tensor.
-std::vector<Part> parts_of(vtkDataSet& mesh, vtkDataSetAttributes& data, const Names& names, Take take) {
+std::vector<Part> parts_of(vtkDataSet& mesh, vtkDataSetAttributes& data, const Names& names, Take take, bool is_flat) {
   std::vector<Part> parts;
   for (const std::string& name : names) parts.push_back(*part_called(data, name));
   const auto is_vector = [](const Part& part) {
@@ -105,7 +101,8 @@ std::vector<Part> parts_of(vtkDataSet& mesh, vtkDataSetAttributes& data, const N
           "array \"{}\" has {} components, and each array of a list is one component: give {}:COMPONENT; {}", names[i],
           parts[i].array->GetNumberOfComponents(), names[i], list_of_arrays(mesh)));
   const std::size_t count = parts.size();
-  const bool fits = take == Take::tensor ? count == 6 || count == 9 || is_plane(parts, take) : count == 3;
+  const bool fits =
+      take == Take::tensor ? count == 6 || count == 9 || is_plane(parts, take) : count == 3 || (count == 2 && is_flat);
   if (fits) return parts;
   throw std::invalid_argument(
       fmt::format("{} lists {} arrays, and {}; {}",
@@ -114,7 +111,7 @@ std::vector<Part> parts_of(vtkDataSet& mesh, vtkDataSetAttributes& data, const N
                                            : "--strain-of",
                   names.size(),
                   take == Take::tensor ? "a tensor has 6 or 9 components, of a plane 3 or 4, or 3 vectors as rows"
-                                       : "a vector has 3 components",
+                                       : "a vector has 3 components, in a flat mesh across z also 2",
                   list_of_arrays(mesh)));
 }
 
@@ -137,10 +134,12 @@ std::string name_of(const Part& part) {
   return name.empty() && part.array->GetNumberOfComponents() == 1 ? part.array->GetName() : name;
 }
 
-/// The components in the order of the parts.
+/// The components in the order of the parts; a vector's third one is zero if it has two.
 vtkSmartPointer<vtkDataArray> joined_in_order(const std::vector<Part>& parts, Take take) {
-  vtkSmartPointer<vtkDataArray> joined = new_array(parts, static_cast<int>(parts.size()), take);
-  for (int i = 0; i < joined->GetNumberOfComponents(); ++i) {
+  const int count = static_cast<int>(parts.size());
+  vtkSmartPointer<vtkDataArray> joined = new_array(parts, std::max(count, 3), take);
+  joined->Fill(0);
+  for (int i = 0; i < count; ++i) {
     const Part& part = parts[static_cast<std::size_t>(i)];
     joined->CopyComponent(i, part.array, part.component);
     joined->SetComponentName(i, name_of(part).c_str());
@@ -151,19 +150,9 @@ vtkSmartPointer<vtkDataArray> joined_in_order(const std::vector<Part>& parts, Ta
 /// The position in VTK's order of the component that the last two letters of a name tell; −1 if they tell none of a
 /// plane.
 int plane_position(const std::string& name) {
-  const std::string axes = lower_case(name.size() < 2 ? "" : name.substr(name.size() - 2));
-  for (const auto& [letters, position] : {std::pair("xx", 0),
-                                          {"yy", 1},
-                                          {"zz", 2},
-                                          {"xy", 3},
-                                          {"yx", 3},
-                                          {"11", 0},
-                                          {"22", 1},
-                                          {"33", 2},
-                                          {"12", 3},
-                                          {"21", 3}})
-    if (axes == letters) return position;
-  return -1;
+  constexpr std::array positions{0, 3, -1, 3, 1, -1, -1, -1, 2};  // Of xx, xy, ..., zz.
+  const int entry = entry_named(name);
+  return entry < 0 ? -1 : positions[static_cast<std::size_t>(entry)];
 }
 
 /// The components xx, yy, xy, and perhaps zz, of a tensor in the plane of x and y, in VTK's order; the others are zero.
@@ -192,12 +181,13 @@ bool is_array_list(vtkDataSet& mesh, const std::string& names) {
          !mesh.GetCellData()->HasArray(names.c_str());
 }
 
-ArrayChoice join_arrays(vtkDataSet& mesh, const std::string& list, Take take) {
+ArrayChoice join_arrays(vtkDataSet& mesh, const std::string& list, Take take, bool is_flat) {
   const Names names = names_in(list);
   vtkDataSetAttributes& data = attributes_with(mesh, names);
-  const std::vector<Part> parts = parts_of(mesh, data, names, take);
-  const vtkSmartPointer<vtkDataArray> joined =
-      is_plane(parts, take) ? joined_of_plane(mesh, parts) : joined_in_order(parts, take);
+  const std::vector<Part> parts = parts_of(mesh, data, names, take, is_flat);
+  const vtkSmartPointer<vtkDataArray> joined = is_plane(parts, take)  ? joined_of_plane(mesh, parts)
+                                               : take == Take::tensor ? in_known_order(*joined_in_order(parts, take))
+                                                                      : joined_in_order(parts, take);
   for (const std::string& name : names) data.RemoveArray(name.c_str());
   data.AddArray(joined);
   return {joined->GetName(), &data == static_cast<vtkDataSetAttributes*>(mesh.GetCellData())};

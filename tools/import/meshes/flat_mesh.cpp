@@ -9,6 +9,7 @@
 #include <Eigen/Geometry>
 #include <vtkCellData.h>
 #include <vtkDataArray.h>
+#include <vtkDataObject.h>
 #include <vtkDataSet.h>
 #include <vtkGenericCell.h>
 #include <vtkIdList.h>
@@ -107,7 +108,6 @@ void add_cell(vtkDataSet& mesh, std::vector<vtkIdType> part, int axis, vtkUnstru
   slab.InsertNextCell(corners == 3 ? VTK_WEDGE : VTK_HEXAHEDRON, static_cast<vtkIdType>(part.size()), part.data());
 }
 
-/// Gives arrays of two components a third one.
 void pad_vectors(vtkDataSetAttributes& data) {
   for (int i = 0; i < data.GetNumberOfArrays(); ++i) {
     vtkDataArray* const array = data.GetArray(i);
@@ -124,6 +124,10 @@ void pad_vectors(vtkDataSetAttributes& data) {
 }
 
 }  // namespace
+
+void pad_vectors(vtkDataSet& mesh) {
+  for (const auto type : {vtkDataObject::POINT, vtkDataObject::CELL}) pad_vectors(*mesh.GetAttributes(type));
+}
 
 std::optional<FlatMesh> flat_mesh(vtkDataSet& mesh) {
   vtkNew<vtkGenericCell> cell;
@@ -169,10 +173,7 @@ vtkSmartPointer<vtkDataSet> slab_of(vtkDataSet& mesh, const FlatMesh& flat, doub
       add_cell(mesh, part, flat.axis, *slab);
     });
   }
-  if (flat.axis == 2) {
-    pad_vectors(*slab->GetPointData());
-    pad_vectors(*slab->GetCellData());
-  }
+  if (flat.axis == 2) pad_vectors(*slab);
   return slab;
 }
 

@@ -27,4 +27,7 @@ std::optional<FlatMesh> flat_mesh(vtkDataSet& mesh);
 /// third one, zero. @param thickness  > 0.
 vtkSmartPointer<vtkDataSet> slab_of(vtkDataSet& mesh, const FlatMesh& flat, double thickness);
 
+/// Gives vectors of two components a third one, zero.
+void pad_vectors(vtkDataSet& mesh);
+
 }  // namespace tensorray

@@ -1,7 +1,6 @@
 #include "tools/import/meshes/mesh_tensors.h"
 
 #include <algorithm>
-#include <cctype>
 #include <cmath>
 #include <limits>
 #include <stdexcept>
@@ -20,6 +19,7 @@
 #include <vtkSmartPointer.h>
 #include <vtkUnsignedCharArray.h>
 
+#include "tools/import/lattices/component_names.h"
 #include "tools/import/meshes/mesh_cell.h"
 
 namespace tensorray {
@@ -56,33 +56,6 @@ void for_each_array(vtkDataSet& mesh, const Visit& visit) {
 const char* wanted(Take take) {
   return take == Take::tensor ? "a tensor has 6, 9, or more than 9 components, of a plane 4"
                               : "a vector has 3 components";
-}
-
-/// The order that the names of the first six components tell, as ParaView, CalculiX's converters and others write
-/// them: XX, S_YY, xy, S13, ... The two indices may be swapped.
-std::optional<TensorOrder> order_of_names(vtkDataArray& array) {
-  std::string names;
-  const int count = array.GetNumberOfComponents() == 4 ? 4 : 6;
-  for (int i = 0; i < count; ++i) {
-    const char* given = array.GetComponentName(i);
-    const std::string name = given ? given : "";
-    if (name.size() < 2) return {};
-    std::string axes = name.substr(name.size() - 2);
-    for (char& axis : axes) {
-      axis = static_cast<char>(std::tolower(static_cast<unsigned char>(axis)));
-      if (axis >= '1' && axis <= '3') axis = static_cast<char>('x' + (axis - '1'));
-    }
-    if (axes[0] > axes[1]) std::swap(axes[0], axes[1]);
-    names += axes;
-  }
-  if (names == "xxyyzzxy") return TensorOrder::plane;
-  if (names == "xxxyxyyy") return TensorOrder::two_by_two;
-  if (names == "xxyyzzxyyzxz") return TensorOrder::vtk;
-  if (names == "xxxyxzyyyzzz") return TensorOrder::fsl;
-  if (names == "xxyyzzxyxzyz") return TensorOrder::mrtrix;
-  if (names == "xxyyzzyzxzxy") return TensorOrder::voigt;
-  if (names == "xxxyyyxzyzzz") return TensorOrder::lower_triangle;
-  return {};
 }
 
 std::string component_names(vtkDataArray& array) {

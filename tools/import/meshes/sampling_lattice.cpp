@@ -21,6 +21,7 @@ using Eigen::Vector3d;
 using Eigen::Vector3i;
 using CellRange = tbb::blocked_range<vtkIdType>;
 
+constexpr double rounded_one = 1 + 1e-9;
 constexpr double most_voxels = 1 << 30;         ///< Limit for any lattice.
 constexpr double most_chosen_voxels = 1 << 21;  ///< Limit for a lattice whose size the user did not set.
 
@@ -79,11 +80,14 @@ SamplingLattice sampling_lattice(vtkDataSet& mesh, const Solid& solid, const Sam
     throw std::invalid_argument(fmt::format("--bounds: nothing of the mesh is inside, which goes from {} to {}",
                                             text_of(solid.bounds.min()), text_of(solid.bounds.max())));
   SamplingLattice lattice;
-  const double longest = box.sizes().maxCoeff();
+  Vector3d edges = box.sizes();  // Those that are divided into voxels.
+  if (settings.flat_axis >= 0) edges[settings.flat_axis] = 0;
+  const double longest = edges.maxCoeff();
   Vector3d size;
   if (const auto* counts = std::get_if<Vector3i>(&settings.resolution)) {
-    require_two(counts->minCoeff());
     size = counts->cast<double>();
+    if (settings.flat_axis >= 0) size[settings.flat_axis] = 2;  // Whatever is given: there is one.
+    require_two(static_cast<int>(size.minCoeff()));
     lattice.voxel = box.sizes().array() / (size.array() - 1);
   } else {
     double voxel = 0;
@@ -92,7 +96,7 @@ SamplingLattice sampling_lattice(vtkDataSet& mesh, const Solid& solid, const Sam
       voxel = longest / (*count - 1);
     } else if (const auto* given = std::get_if<double>(&settings.resolution)) {
       voxel = *given;
-      if (!(voxel > 0) || voxel > longest)
+      if (!(voxel > 0) || voxel > longest * rounded_one)
         throw std::invalid_argument(
             fmt::format("--voxel-size {}: it must be greater than 0 and at most the longest edge of the bounds, {:.6g}",
                         voxel, longest));

@@ -236,7 +236,7 @@ void add_what(CLI::App& command, ImportOptions& options) {
                   "Axes of the components in anatomical files (NIfTI, NRRD, MetaImage, MRtrix): ras (scanner; MRtrix), "
                   "lps (displacements of "
                   "ITK and ANTs), voxels (tensors of ANTs and dipy), fsl (voxels, with FSL's flip); default: those of "
-                  "--order fsl and lower, else ras (MetaImage: lps)")
+                  "--order fsl and lower, else ras (MetaImage: lps; NRRD: its space)")
       ->check(CLI::IsMember(component_frame_names()))
       ->option_text("FRAME");
   command
@@ -255,7 +255,7 @@ void add_where(CLI::App& command, ImportOptions& options) {
                                      "Voxels along the longest edge, or along x, y and z (default: the median cell "
                                      "is a voxel; data on voxels keep theirs)")
                          ->expected(1, 3)
-                         ->check(CLI::Range(2, 8192))
+                         ->check(CLI::Range(1, 8192))
                          ->group("Grid");
   command
       .add_option("--voxel-size", options.voxel_size,
@@ -305,9 +305,8 @@ void add_import_options(CLI::App& program, Progress& progress) {
   program
       .add_option(
           "--steps", options->steps,
-          "Steps of time of an OpenFOAM case, an ExodusII or CGNS file, or a .pvd: last, first, a number from 1 on, or "
-          "all, each "
-          "in a file of its own (-o flow.####.vdb) (last)")
+          "Steps of time, of files that have some: last, first, a number from 1 on, or all, each in a file of its own "
+          "(-o flow.####.vdb) (last)")
       ->option_text("STEPS");
   program
       .add_option("--memory", options->memory,

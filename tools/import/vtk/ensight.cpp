@@ -12,12 +12,14 @@
 #include <vtkNew.h>
 #include <vtkSmartPointer.h>
 
+#include "tools/import/vtk/ensight_files.h"
 #include "tools/import/vtk/vtk_pieces.h"
 
 namespace tensorray {
 namespace {
 
 std::vector<double> open_ensight(const std::filesystem::path& path, vtkGenericEnSightReader& reader) {
+  ensight_case(path, std::nullopt);  // A damaged case is an error before VTK has it.
   reader.SetCaseFileName(std::filesystem::absolute(path).c_str());
   reader.UpdateInformation();
   std::vector<double> times;
@@ -47,12 +49,14 @@ std::vector<double> ensight_times(const std::filesystem::path& path) {
 }
 
 vtkSmartPointer<vtkDataObject> read_ensight(const std::filesystem::path& path, std::optional<double> time) {
+  const EnSightCase given = ensight_case(path, time);
   vtkNew<vtkGenericEnSightReader> reader;
   open_ensight(path, *reader);
   reader->ReadAllVariablesOn();
   if (time) reader->SetTimeValue(static_cast<float>(*time));
   reader->Update();
   const vtkSmartPointer<vtkDataObject> result = reader->GetOutputDataObject(0);
+  if (result) check_ensight_ends(given, *result);
   for (vtkDataSet* const part : data_sets_in(result))
     for (const auto type : {vtkDataObject::POINT, vtkDataObject::CELL}) name_components(*part->GetAttributes(type));
   return result;

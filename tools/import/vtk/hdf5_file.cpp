@@ -91,6 +91,13 @@ bool Hdf5File::has_attribute(const std::string& object, const std::string& attri
   return has(object) && H5Aexists_by_name(file_->id, object.c_str(), attribute.c_str(), H5P_DEFAULT) > 0;
 }
 
+bool Hdf5File::has_numbers(const std::string& dataset) const {
+  if (!has(dataset)) return false;
+  const Id data(H5Dopen2(file_->id, dataset.c_str(), H5P_DEFAULT), H5Dclose);
+  const Id type(data < 0 ? -1 : H5Dget_type(data), H5Tclose);
+  return type >= 0 && array_for(type).first;
+}
+
 std::vector<std::string> Hdf5File::children(const std::string& group) const {
   std::vector<std::string> names;
   if (!has(group)) return names;

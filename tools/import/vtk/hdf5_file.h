@@ -29,6 +29,7 @@ class Hdf5File {
 
   bool has(const std::string& name) const;
   bool has_attribute(const std::string& object, const std::string& attribute) const;
+  bool has_numbers(const std::string& dataset) const;  ///< False for text, groups, ...
 
   /// The names of what is in a group, sorted; empty if there is no such group.
   std::vector<std::string> children(const std::string& group) const;

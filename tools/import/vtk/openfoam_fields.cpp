@@ -2,9 +2,7 @@
 
 #include <array>
 #include <map>
-#include <optional>
 #include <regex>
-#include <sstream>
 #include <string>
 
 #include <vtkDataArray.h>
@@ -17,7 +15,6 @@ namespace tensorray {
 namespace {
 
 using Path = std::filesystem::path;
-using Symmetric = std::array<double, 6>;
 
 std::string without_comments(const std::string& text) {
   std::string result;
@@ -47,46 +44,63 @@ std::string head_of(const Path& path) {
   return without_comments(text);
 }
 
-/// The components of a uniform field of symmetric tensors, in OpenFOAM's order; none if it is something else.
-std::optional<Symmetric> uniform_tensor(const std::string& head) {
+/// What a file says of the values inside: one for all cells, or a list. Neither if they are elsewhere (a macro, or
+/// another file that it includes).
+enum class Values { uniform, list, elsewhere };
+
+Values values_in(const std::string& head) {
   // Fields with patches have internalField, those without have value.
-  const bool has_patches = head.find("internalField") != std::string::npos;
-  const std::regex entry(has_patches ? R"(\binternalField\s+uniform\s*\(([^()]*)\))"
-                                     : R"(\bvalue\s+uniform\s*\(([^()]*)\))");
+  const bool has_patches =
+      head.find("internalField") != std::string::npos || head.find("boundaryField") != std::string::npos;
+  const std::regex entry(has_patches ? R"(\binternalField\s+(uniform|nonuniform)\b)"
+                                     : R"(\bvalue\s+(uniform|nonuniform)\b)");
   std::smatch match;
-  if (!std::regex_search(head, match, entry)) return {};
-  std::istringstream numbers(match[1].str());
-  Symmetric tensor{};
-  for (double& number : tensor)
-    if (!(numbers >> number)) return {};
-  std::string more;
-  if (numbers >> more) return {};
-  return tensor;
+  if (!std::regex_search(head, match, entry)) return Values::elsewhere;
+  return match[1] == "uniform" ? Values::uniform : Values::list;
 }
 
-/// The uniform symmetric tensors in a folder, by the names of their objects, which are those of VTK's arrays.
-std::map<std::string, Symmetric> uniform_tensors(const Path& time) {
-  std::map<std::string, Symmetric> tensors;
+/// The fields in a folder, by the names of their objects, which are those of VTK's arrays.
+std::map<std::string, Values> fields_in(const Path& time) {
+  std::map<std::string, Values> fields;
   for (const auto& entry : std::filesystem::directory_iterator(time)) {
     if (!entry.is_regular_file()) continue;
     const std::string head = head_of(entry.path());
     std::smatch name;
-    if (!std::regex_search(head, name, std::regex(R"(\bobject\s+"?([^\s;"]+))"))) continue;
-    if (const auto tensor = uniform_tensor(head)) tensors[name[1].str()] = *tensor;
+    if (std::regex_search(head, name, std::regex(R"(\bobject\s+"?([^\s;"]+))")))
+      fields[name[1].str()] = values_in(head);
   }
-  return tensors;
+  return fields;
+}
+
+bool is_same_everywhere(vtkDataArray& array) {
+  for (int component = 0; component < array.GetNumberOfComponents(); ++component) {
+    const double first = array.GetComponent(0, component);
+    for (vtkIdType i = 1; i < array.GetNumberOfTuples(); ++i)
+      if (array.GetComponent(i, component) != first) return false;
+  }
+  return true;
+}
+
+/// From OpenFOAM's order to VTK's.
+void reorder(vtkDataArray& array) {
+  constexpr std::array<std::size_t, 6> order{0, 3, 5, 1, 4, 2};  // Of VTK's components among OpenFOAM's.
+  std::array<double, 6> theirs{}, ours{};
+  for (vtkIdType i = 0; i < array.GetNumberOfTuples(); ++i) {
+    array.GetTuple(i, theirs.data());
+    for (std::size_t component = 0; component < 6; ++component) ours[component] = theirs[order[component]];
+    array.SetTuple(i, ours.data());
+  }
 }
 
 }  // namespace
 
 void correct_uniform_tensors(vtkDataSet& data, const Path& time) {
-  constexpr std::array<std::size_t, 6> order{0, 3, 5, 1, 4, 2};  // Of VTK's components among OpenFOAM's.
-  for (const auto& [name, tensor] : uniform_tensors(time)) {
+  for (const auto& [name, values] : fields_in(time)) {
+    if (values == Values::list) continue;
     for (const auto type : {vtkDataObject::POINT, vtkDataObject::CELL}) {
       vtkDataArray* const array = data.GetAttributes(type)->GetArray(name.c_str());
-      if (!array || array->GetNumberOfComponents() != 6) continue;
-      for (int component = 0; component < 6; ++component)
-        array->FillComponent(component, tensor[order[static_cast<std::size_t>(component)]]);
+      if (!array || array->GetNumberOfComponents() != 6 || array->HasAComponentName()) continue;
+      if (values == Values::uniform || is_same_everywhere(*array)) reorder(*array);
     }
   }
 }

@@ -86,6 +86,23 @@ std::vector<OpenFoamTime> times_in(const fs::path& folder) {
   return times;
 }
 
+/// The times that all processors have: of a run that goes on, some have one that others have not yet.
+std::vector<OpenFoamTime> common_times(const std::vector<fs::path>& processors) {
+  std::vector<OpenFoamTime> times = times_in(processors.front());
+  for (const fs::path& processor : processors) {
+    const auto is_missing = [&](const OpenFoamTime& time) { return !fs::is_directory(processor / time.folder); };
+    times.erase(std::remove_if(times.begin(), times.end(), is_missing), times.end());
+  }
+  return times;
+}
+
+/// Without one of the processors, a part of the body would be missing.
+void check_processors(const OpenFoamParts& parts) {
+  for (std::size_t i = 0; i < parts.processors.size() && !parts.is_collated; ++i)
+    if (const fs::path folder = parts.folder / ("processor" + std::to_string(i)); parts.processors[i] != folder)
+      fail(folder, "is missing; copy it there too, with its constant/polyMesh");
+}
+
 /// Whether `times` go on after those of `other`.
 bool is_later(const std::vector<OpenFoamTime>& times, const std::vector<OpenFoamTime>& other) {
   return !times.empty() && (other.empty() || times.back().value > other.back().value);
@@ -186,8 +203,11 @@ OpenFoamParts openfoam_parts(const fs::path& path, const fs::path& folder) {
   std::vector<fs::path> meshes = meshes_in(folder);
   parts.times = times_in(folder);
   find_processors(parts);
-  if (!parts.processors.empty() && (meshes.empty() || is_later(times_in(parts.processors.front()), parts.times))) {
-    parts.times = times_in(parts.processors.front());
+  const std::vector<OpenFoamTime> times_of_parts =
+      parts.processors.empty() ? std::vector<OpenFoamTime>() : common_times(parts.processors);
+  if (!parts.processors.empty() && (meshes.empty() || is_later(times_of_parts, parts.times))) {
+    check_processors(parts);
+    parts.times = times_of_parts;
     meshes.clear();
     for (const fs::path& processor : parts.processors)
       for (const fs::path& mesh : meshes_in(processor)) meshes.push_back(mesh);
@@ -197,7 +217,9 @@ OpenFoamParts openfoam_parts(const fs::path& path, const fs::path& folder) {
   if (meshes.empty())
     fail(path, "has no mesh: " + (folder / "constant/polyMesh").string() + " is missing; run blockMesh first");
   for (const fs::path& mesh : meshes) check_mesh(mesh);
-  if (parts.times.empty()) fail(path, "has no time folder; run the case's solver first");
+  if (parts.times.empty())
+    fail(path, parts.processors.empty() ? "has no time folder; run the case's solver first"
+                                        : "has no time folder that all of its processors have; run the case's solver");
   return parts;
 }
 

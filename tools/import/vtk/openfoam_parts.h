@@ -21,11 +21,12 @@ struct OpenFoamParts {
   /// or several as processors8_0-3), which have files of several processors. Empty: the case is whole.
   std::vector<std::filesystem::path> processors;
   bool is_collated = false;
-  std::vector<OpenFoamTime> times;  ///< By their values.
+  std::vector<OpenFoamTime> times;  ///< By their values; of a decomposed case those that all processors have.
 };
 
 /// Finds the parts of a case. A case that is whole and decomposed is decomposed if its processors have later times.
-/// @throw std::runtime_error naming `path` and the fix: no controlDict, no mesh, a part of a mesh is missing, no times.
+/// @throw std::runtime_error naming `path` and the fix: no controlDict, no mesh, a part of a mesh or one of the
+/// processors is missing, no times.
 OpenFoamParts openfoam_parts(const std::filesystem::path& path, const std::filesystem::path& folder);
 
 /// Makes folders in `target` that are cases of one processor each, with one time: links to the folders of the

@@ -10,6 +10,8 @@
 #include <vtkDataSet.h>
 #include <vtkDataSetAttributes.h>
 
+#include "base/text.h"
+
 namespace tensorray {
 namespace {
 
@@ -51,8 +53,10 @@ void name_active_tensors(vtkDataSet& data) {
 
 void name_tensors6(vtkDataSet& data, const std::filesystem::path& path) {
   std::ifstream file(path, std::ios::binary);
-  for (std::string line; std::getline(file, line);) {
-    const std::size_t start = line.rfind("TENSORS6 ");  // Binary numbers may stand before it.
+  std::string line;
+  for (int i = 0; i < 2; ++i) std::getline(file, line);  // The version, and a title that may be any text.
+  while (std::getline(file, line)) {
+    const std::size_t start = lower_case(line).rfind("tensors6 ");  // Binary numbers may stand before it.
     if (start == std::string::npos) continue;
     std::istringstream words(line.substr(start));
     std::string keyword, name;

@@ -39,7 +39,7 @@ void collect(vtkXMLDataElement& element, const fs::path& path, FilesByTime& step
     vtkXMLDataElement& nested = *element.GetNestedElement(i);
     const char* const file = nested.GetAttribute("file");
     if (nested.GetName() == std::string("DataSet") && file && lower_case_ending(file) != ".vtp")
-      add(steps[time_of(nested, path)], path.parent_path() / file);
+      add(steps[time_of(nested, path)], (path.parent_path() / file).lexically_normal());
     collect(nested, path, steps);
   }
 }

@@ -1,6 +1,8 @@
 #include "tools/import/vtk/vtk_pieces.h"
 
+#include <algorithm>
 #include <array>
+#include <cmath>
 #include <limits>
 #include <map>
 #include <set>
@@ -11,6 +13,7 @@
 #include <vtkCellData.h>
 #include <vtkCompositeDataIterator.h>
 #include <vtkCompositeDataSet.h>
+#include <vtkDataArray.h>
 #include <vtkDataSet.h>
 #include <vtkDataSetAttributes.h>
 #include <vtkIdList.h>
@@ -19,6 +22,8 @@
 #include <vtkSmartPointer.h>
 #include <vtkUnsignedCharArray.h>
 #include <vtkUnstructuredGrid.h>
+
+#include "tools/import/lattices/component_names.h"
 
 namespace tensorray {
 namespace {
@@ -97,32 +102,98 @@ vtkSmartPointer<vtkDataSet> used_part(vtkDataSet& piece) {
   return grid;
 }
 
-/// Adds missing arrays, because vtkAppendFilter drops arrays that some of its inputs lack.
-void complete_arrays(const DataSets& pieces, vtkDataObject::AttributeTypes type) {
-  std::map<std::string, vtkDataArray*> wanted;
-  for (vtkDataSet* const piece : pieces) {
-    vtkDataSetAttributes& arrays = *piece->GetAttributes(type);
-    for (int i = 0; i < arrays.GetNumberOfArrays(); ++i) {
-      if (vtkDataArray* const array = arrays.GetArray(i); array && array->GetName()) wanted[array->GetName()] = array;
-    }
+/// The arrays with a name, by piece; null where a piece has none.
+using SameArrays = std::vector<vtkSmartPointer<vtkDataArray>>;
+
+std::map<std::string, SameArrays> arrays_of(const DataSets& pieces, vtkDataObject::AttributeTypes type) {
+  std::map<std::string, SameArrays> named;
+  for (std::size_t k = 0; k < pieces.size(); ++k) {
+    vtkDataSetAttributes& data = *pieces[k]->GetAttributes(type);
+    for (int i = 0; i < data.GetNumberOfArrays(); ++i)
+      if (vtkDataArray* const array = data.GetArray(i); array && array->GetName()) {
+        SameArrays& arrays = named[array->GetName()];
+        arrays.resize(pieces.size());
+        arrays[k] = array;
+      }
   }
-  for (vtkDataSet* const piece : pieces) {
-    for (const auto& [name, like] : wanted) {
-      if (piece->GetAttributes(type)->HasArray(name.c_str())) continue;
-      vtkSmartPointer<vtkDataArray> filled;
-      filled.TakeReference(like->NewInstance());
-      filled->SetName(name.c_str());
-      filled->SetNumberOfComponents(like->GetNumberOfComponents());
-      filled->SetNumberOfTuples(piece->GetNumberOfElements(type));
-      const bool real = like->GetDataType() == VTK_FLOAT || like->GetDataType() == VTK_DOUBLE;
-      filled->Fill(real ? std::numeric_limits<double>::quiet_NaN() : 0.0);
-      piece->GetAttributes(type)->AddArray(filled);
+  return named;
+}
+
+/// The type in which all of them can be one array. NaN stands for what is missing.
+int common_type(const SameArrays& arrays) {
+  vtkDataArray* first = nullptr;
+  bool is_missing = false, is_same = true;
+  for (const auto& array : arrays) {
+    is_missing = is_missing || !array;
+    if (!array) continue;
+    if (!first) first = array;
+    is_same = is_same && array->GetDataType() == first->GetDataType();
+  }
+  const int type = first->GetDataType();
+  const bool is_real = type == VTK_FLOAT || type == VTK_DOUBLE;
+  return is_same && (is_real || !is_missing) ? type : VTK_DOUBLE;
+}
+
+/// Whether arrays name their components, but not all alike.
+bool names_differ(const SameArrays& arrays) {
+  std::set<std::vector<std::string>> all;
+  for (const auto& array : arrays) {
+    if (!array || !array->HasAComponentName()) continue;
+    std::vector<std::string> names;
+    for (int i = 0; i < array->GetNumberOfComponents(); ++i) names.push_back(component_name(*array, i));
+    all.insert(names);
+  }
+  return all.size() > 1;
+}
+
+/// The first array with names of its components, or else the first one.
+vtkDataArray& first_named(const SameArrays& arrays) {
+  vtkDataArray* first = nullptr;
+  for (const auto& array : arrays) {
+    if (array && array->HasAComponentName()) return *array;
+    if (!first) first = array;
+  }
+  return *first;
+}
+
+vtkSmartPointer<vtkDataArray> missing_array(vtkDataArray& like, int type, vtkIdType count) {
+  auto filled = vtkSmartPointer<vtkDataArray>::Take(vtkDataArray::CreateDataArray(type));
+  filled->SetName(like.GetName());
+  filled->SetNumberOfComponents(like.GetNumberOfComponents());
+  filled->SetNumberOfTuples(count);
+  filled->Fill(std::numeric_limits<double>::quiet_NaN());
+  return filled;
+}
+
+/// Makes arrays of one name alike, and adds those that are missing: vtkAppendFilter drops arrays that some of its
+/// inputs lack or have as numbers of another type, and joins components by their numbers.
+void unify_arrays(const DataSets& pieces, vtkDataObject::AttributeTypes type) {
+  for (const auto& [name, arrays] : arrays_of(pieces, type)) {
+    const int number_type = common_type(arrays);
+    const bool sorts = names_differ(arrays);
+    vtkDataArray& like = first_named(arrays);
+    for (std::size_t k = 0; k < pieces.size(); ++k) {
+      vtkSmartPointer<vtkDataArray> array = arrays[k];
+      if (!array) array = missing_array(like, number_type, pieces[k]->GetNumberOfElements(type));
+      if (sorts) array = sorted_by_names(*array);
+      if (array->GetDataType() != number_type) {
+        const auto converted = vtkSmartPointer<vtkDataArray>::Take(vtkDataArray::CreateDataArray(number_type));
+        converted->DeepCopy(array);
+        array = converted;
+      }
+      pieces[k]->GetAttributes(type)->AddArray(array);
     }
   }
 }
 
-/// Gives each point of `all` the values of the first piece that has it and the array. The cells of `all` are those of
-/// the pieces, in their order.
+bool is_finite(vtkDataArray& array, vtkIdType tuple) {
+  for (int i = 0; i < array.GetNumberOfComponents(); ++i)
+    if (!std::isfinite(array.GetComponent(tuple, i))) return false;
+  return true;
+}
+
+/// Gives each point of `all` the values of the first piece that has it and finite values there. The cells of `all` are
+/// those of the pieces, in their order.
 void take_known_values(vtkUnstructuredGrid& all, const DataSets& pieces,
                        const std::vector<std::set<std::string>>& known) {
   vtkNew<vtkIdList> from, to;
@@ -137,7 +208,7 @@ void take_known_values(vtkUnstructuredGrid& all, const DataSets& pieces,
         vtkDataArray* const values = piece.GetPointData()->GetArray(name.c_str());
         vtkDataArray* const merged = all.GetPointData()->GetArray(name.c_str());
         for (vtkIdType i = 0; merged && i < from->GetNumberOfIds() && i < to->GetNumberOfIds(); ++i)
-          merged->SetTuple(to->GetId(i), from->GetId(i), values);
+          if (is_finite(*values, from->GetId(i))) merged->SetTuple(to->GetId(i), from->GetId(i), values);
       }
     }
   }
@@ -162,6 +233,14 @@ DataSets data_sets_in(vtkDataObject* data) {
 
 bool is_same_mesh(vtkDataSet& a, vtkDataSet& b) {
   if (a.GetNumberOfPoints() != b.GetNumberOfPoints() || a.GetNumberOfCells() != b.GetNumberOfCells()) return false;
+  vtkNew<vtkIdList> of_a, of_b;
+  for (vtkIdType id = 0; id < a.GetNumberOfCells(); ++id) {
+    a.GetCellPoints(id, of_a);
+    b.GetCellPoints(id, of_b);
+    if (a.GetCellType(id) != b.GetCellType(id) || of_a->GetNumberOfIds() != of_b->GetNumberOfIds() ||
+        !std::equal(of_a->begin(), of_a->end(), of_b->begin()))
+      return false;
+  }
   for (vtkIdType i = 0; i < a.GetNumberOfPoints(); ++i) {
     std::array<double, 3> x{}, y{};
     a.GetPoint(i, x.data());
@@ -183,8 +262,8 @@ vtkSmartPointer<vtkDataSet> one_data_set(const DataSets& given, bool merges_poin
     pieces.push_back(used_part(*piece));
     known.push_back(point_arrays(*pieces.back()));
   }
-  complete_arrays(pieces, vtkDataObject::POINT);
-  complete_arrays(pieces, vtkDataObject::CELL);
+  unify_arrays(pieces, vtkDataObject::POINT);
+  unify_arrays(pieces, vtkDataObject::CELL);
   vtkNew<vtkAppendFilter> append;
   append->SetMergePoints(merges_points);
   append->SetTolerance(0);

@@ -16,13 +16,14 @@ using DataSets = std::vector<vtkSmartPointer<vtkDataSet>>;
 /// The data sets with cells in `data`, which may be a tree of blocks. They are copies that share their arrays.
 DataSets data_sets_in(vtkDataObject* data);
 
-/// Whether both have the same points and as many cells.
+/// Whether both have the same points and cells.
 bool is_same_mesh(vtkDataSet& a, vtkDataSet& b);
 
 /// Returns the only data set of `pieces`. If there are several, merges them into one unstructured grid, and merges
-/// points at equal positions, which take the values of the first piece that has them. An array that a piece lacks is
-/// NaN there (zero if it holds integers). Null if `pieces` is empty. Changes the ghost arrays of the pieces. The
-/// geometry of the pieces must have passed check_geometry (vtk_geometry.h).
+/// points at equal positions, which take the values of the first piece in which they are finite. An array that a piece
+/// lacks is NaN there. Tensors whose components have different names there are sorted by them. Null if `pieces` is
+/// empty. Changes the ghost arrays of the pieces. The geometry of the pieces must have passed check_geometry
+/// (vtk_geometry.h).
 ///
 /// Ghosts of all kinds of data sets mean the same. Of an only data set hidden cells and points stay marked (refined
 /// cells count as hidden), and copies of neighbours' cells and points stay, whose values are right. Of several, hidden

@@ -53,6 +53,14 @@ struct File {
 
   bool has_steps() const { return hdf.has(root + "/Steps"); }
 
+  /// The arrays of numbers in a group: there may be text, too.
+  std::vector<std::string> arrays(const std::string& group) const {
+    std::vector<std::string> names = hdf.children(root + "/" + group);
+    const auto is_other = [&](const std::string& name) { return !hdf.has_numbers(root + "/" + group + "/" + name); };
+    names.erase(std::remove_if(names.begin(), names.end(), is_other), names.end());
+    return names;
+  }
+
   /// The rows from `first` on of a dataset.
   Array rows(const std::string& name, std::uint64_t first, std::uint64_t count) const {
     Sizes shape = hdf.shape(root + "/" + name), start(shape.size(), 0), stride(shape.size(), 1);
@@ -150,7 +158,7 @@ vtkSmartPointer<vtkUnstructuredGrid> grid_of(const File& file, const Part& part)
 /// Adds the values of a group of arrays. @param first  Of the rows of the step; @param before  Of parts before.
 void add_values(const File& file, const std::string& group, int step, std::uint64_t before, std::uint64_t count,
                 vtkDataSetAttributes& target) {
-  for (const std::string& name : file.hdf.children(root + "/" + group)) {
+  for (const std::string& name : file.arrays(group)) {
     const std::uint64_t first =
         file.has_steps() ? file.number("Steps/" + group + "Offsets/" + name, static_cast<std::uint64_t>(step), 0) : 0;
     const Array values = file.rows(group + "/" + name, first + before, count);
@@ -171,16 +179,18 @@ vtkSmartPointer<vtkDataObject> read_grids(const File& file, int step) {
   return blocks;
 }
 
-/// An image's arrays have the shape (z, y, x) or (z, y, x, components), with steps before it.
-void add_image_values(const File& file, const std::string& group, int step, std::uint64_t count,
+/// An image's arrays have the shape (z, y, x) or (z, y, x, components). Those that change in time have steps before it;
+/// their offsets tell which one.
+void add_image_values(const File& file, const std::string& group, int step, const Sizes& size,
                       vtkDataSetAttributes& target) {
-  for (const std::string& name : file.hdf.children(root + "/" + group)) {
+  for (const std::string& name : file.arrays(group)) {
     const std::string dataset = group + "/" + name;
     const Sizes shape = file.hdf.shape(root + "/" + dataset);
-    const bool has_steps = file.has_steps() && shape.size() > 3;
-    const Array values =
-        has_steps ? file.rows(dataset, static_cast<std::uint64_t>(step), 1) : file.hdf.read(root + "/" + dataset);
-    if (shape_array(*values, name, count)) target.AddArray(values);
+    const bool has_steps = file.has_steps() && shape.size() > 3 && std::equal(size.begin(), size.end(), &shape[1]);
+    const auto row = static_cast<std::uint64_t>(step);
+    const Array values = has_steps ? file.rows(dataset, file.number("Steps/" + group + "Offsets/" + name, row, row), 1)
+                                   : file.hdf.read(root + "/" + dataset);
+    if (shape_array(*values, name, size[0] * size[1] * size[2])) target.AddArray(values);
   }
 }
 
@@ -202,10 +212,13 @@ vtkSmartPointer<vtkDataObject> read_image(const File& file, int step) {
   if (file.hdf.has_attribute(root, "Direction"))
     if (const std::vector<double> direction = file.hdf.numbers(root, "Direction"); direction.size() == 9)
       image->SetDirectionMatrix(direction.data());
-  add_image_values(file, "PointData", step, static_cast<std::uint64_t>(image->GetNumberOfPoints()),
-                   *image->GetPointData());
-  add_image_values(file, "CellData", step, static_cast<std::uint64_t>(image->GetNumberOfCells()),
-                   *image->GetCellData());
+  Sizes points, cells;
+  for (const int axis : {2, 1, 0}) {
+    points.push_back(static_cast<std::uint64_t>(image->GetDimensions()[axis]));
+    cells.push_back(std::max<std::uint64_t>(1, points.back() - 1));
+  }
+  add_image_values(file, "PointData", step, points, *image->GetPointData());
+  add_image_values(file, "CellData", step, cells, *image->GetCellData());
   return image;
 }
 

@@ -27,6 +27,7 @@
 
 #include "base/errors.h"
 #include "base/text.h"
+#include "tools/import/vtk/vtk_pieces.h"
 #include "tools/import/vtk/xdmf_document.h"
 #include "tools/import/vtk/xdmf_values.h"
 
@@ -104,13 +105,18 @@ std::string type_of(Element& element, std::initializer_list<const char*> names) 
   return lower_case(xml_attribute(element, names));
 }
 
+void require_type(const Grid& grid, Element& geometry, std::initializer_list<const char*> types) {
+  const std::string type = type_of(geometry, {"GeometryType", "Type"});
+  if (std::none_of(types.begin(), types.end(), [&type](const char* one) { return type == one; }))
+    grid.fail("has a geometry of the type " + escaped(type) + ", which does not fit its topology");
+}
+
 vtkSmartPointer<vtkPoints> points_of(const Grid& grid, Element& geometry) {
   const std::string type = type_of(geometry, {"GeometryType", "Type"});
   auto points = vtkSmartPointer<vtkPoints>::New();
   const int axes = type == "xy" || type == "x_y" ? 2 : 3;
   const bool is_apart = type == "x_y_z" || type == "x_y";
-  if (!is_apart && type != "xyz" && type != "xy" && !type.empty())
-    grid.fail("has a geometry of the type " + escaped(type) + ", which does not fit its topology");
+  if (!type.empty()) require_type(grid, geometry, {"xyz", "xy", "x_y_z", "x_y"});
   const std::vector<XdmfValues> values = grid.values_in(geometry, is_apart ? static_cast<std::size_t>(axes) : 1);
   const vtkIdType numbers = values[0].numbers->GetNumberOfTuples(), count = is_apart ? numbers : numbers / axes;
   for (const XdmfValues& one : values)
@@ -134,8 +140,11 @@ std::vector<int> structured_size(const Grid& grid, Element& topology) {
   std::reverse(extents.begin(), extents.end());
   extents.resize(3, 1);
   std::vector<int> size;
+  double product = 1;
   for (const std::uint64_t extent : extents) {
-    if (extent < 1 || extent > 1u << 30) grid.fail("has a topology without sizes; write it again");
+    product *= static_cast<double>(extent);
+    if (extent < 1 || extent > 1u << 30 || product > 1e15)
+      grid.fail("has a topology without sizes, or with senseless ones; write it again");
     size.push_back(static_cast<int>(extent));
   }
   return size;
@@ -143,6 +152,7 @@ std::vector<int> structured_size(const Grid& grid, Element& topology) {
 
 /// @param rank  2 or 3 axes, of which the file has the slowest first.
 vtkSmartPointer<vtkDataSet> image_of(const Grid& grid, Element& topology, Element& geometry, std::size_t rank) {
+  require_type(grid, geometry, {"origin_dxdydz", "origin_dxdy"});
   const std::vector<XdmfValues> values = grid.values_in(geometry, 2);
   auto image = vtkSmartPointer<vtkImageData>::New();
   image->SetDimensions(structured_size(grid, topology).data());
@@ -161,9 +171,13 @@ vtkSmartPointer<vtkDataSet> image_of(const Grid& grid, Element& topology, Elemen
 }
 
 vtkSmartPointer<vtkDataSet> rectilinear_of(const Grid& grid, Element& topology, Element& geometry) {
+  require_type(grid, geometry, {"vxvyvz", "vxvy"});
   const std::vector<XdmfValues> values = grid.values_in(geometry, 2);
   auto result = vtkSmartPointer<vtkRectilinearGrid>::New();
   const std::vector<int> size = structured_size(grid, topology);
+  for (std::size_t axis = 0; axis < 3; ++axis)
+    if (size[axis] != (axis < values.size() ? values[axis].numbers->GetNumberOfTuples() : 1))
+      grid.fail("has other numbers of coordinates than its topology says");
   vtkNew<vtkDoubleArray> zero;
   zero->InsertNextValue(0);
   result->SetDimensions(size.data());
@@ -175,13 +189,27 @@ vtkSmartPointer<vtkDataSet> rectilinear_of(const Grid& grid, Element& topology, 
 
 vtkSmartPointer<vtkDataSet> structured_of(const Grid& grid, Element& topology, Element& geometry) {
   auto result = vtkSmartPointer<vtkStructuredGrid>::New();
-  result->SetDimensions(structured_size(grid, topology).data());
-  result->SetPoints(points_of(grid, geometry));
+  const std::vector<int> size = structured_size(grid, topology);
+  const vtkSmartPointer<vtkPoints> points = points_of(grid, geometry);
+  if (static_cast<double>(points->GetNumberOfPoints()) != 1.0 * size[0] * size[1] * size[2])
+    grid.fail("has another number of points than its topology says");
+  result->SetDimensions(size.data());
+  result->SetPoints(points);
   return result;
 }
 
+/// The number of the first point; 0 unless the file counts from another one.
+vtkIdType first_point(const Grid& grid, Element& topology) {
+  if (!xml_attribute(topology, {"Order"}).empty())
+    grid.fail("has cells with an order of points of their own (Order), which is not read; save it as .vtu in ParaView");
+  const std::string text = xml_attribute(topology, {"BaseOffset"});
+  const std::vector<std::uint64_t> offset = integers_in(text);
+  if (!text.empty() && (offset.size() != 1 || offset[0] > 1u << 30)) grid.fail("has a BaseOffset that is no number");
+  return text.empty() ? 0 : static_cast<vtkIdType>(offset[0]);
+}
+
 /// Each cell is the number of its type, for types without a number of points their number, and its points.
-void add_mixed_cells(const Grid& grid, vtkDataArray& numbers, vtkUnstructuredGrid& result) {
+void add_mixed_cells(const Grid& grid, vtkDataArray& numbers, vtkIdType first, vtkUnstructuredGrid& result) {
   const vtkIdType count = numbers.GetNumberOfTuples();
   const auto next = [&](vtkIdType& at) {
     if (at >= count) grid.fail("has a mixed topology that is cut off");
@@ -198,7 +226,7 @@ void add_mixed_cells(const Grid& grid, vtkDataArray& numbers, vtkUnstructuredGri
     const vtkIdType points = kind->points > 0 ? kind->points : next(at);
     if (points < 0 || points > count - at) grid.fail("has a mixed topology that is cut off");
     ids.clear();
-    for (vtkIdType i = 0; i < points; ++i) ids.push_back(next(at));
+    for (vtkIdType i = 0; i < points; ++i) ids.push_back(next(at) - first);
     result.InsertNextCell(kind->type, points, ids.data());
   }
 }
@@ -209,9 +237,10 @@ vtkSmartPointer<vtkDataSet> unstructured_of(const Grid& grid, Element& topology,
   result->SetPoints(points_of(grid, geometry));
   const XdmfValues values = grid.values_in(topology, 1).front();
   vtkDataArray& numbers = *values.numbers;
+  const vtkIdType first = first_point(grid, topology);
   result->Allocate(std::max<vtkIdType>(1, numbers.GetNumberOfTuples() / 4));
   if (type == "mixed") {
-    add_mixed_cells(grid, numbers, *result);
+    add_mixed_cells(grid, numbers, first, *result);
     return result;
   }
   const auto kind = std::find_if(cell_kinds().begin(), cell_kinds().end(), [&type](const CellKind& k) {
@@ -228,7 +257,7 @@ vtkSmartPointer<vtkDataSet> unstructured_of(const Grid& grid, Element& topology,
   std::vector<vtkIdType> ids(static_cast<std::size_t>(points));
   for (vtkIdType at = 0; at < numbers.GetNumberOfTuples(); at += points) {
     for (vtkIdType i = 0; i < points; ++i)
-      ids[static_cast<std::size_t>(i)] = static_cast<vtkIdType>(numbers.GetComponent(at + i, 0));
+      ids[static_cast<std::size_t>(i)] = static_cast<vtkIdType>(numbers.GetComponent(at + i, 0)) - first;
     result->InsertNextCell(kind->type, points, ids.data());
   }
   return result;
@@ -264,17 +293,6 @@ void add_attributes(const Grid& grid, vtkDataSet& mesh) {
   }
 }
 
-bool same_mesh(vtkDataSet& a, vtkDataSet& b) {
-  if (a.GetNumberOfPoints() != b.GetNumberOfPoints() || a.GetNumberOfCells() != b.GetNumberOfCells()) return false;
-  for (vtkIdType i = 0; i < a.GetNumberOfPoints(); ++i) {
-    double p[3], q[3];
-    a.GetPoint(i, p);
-    b.GetPoint(i, q);
-    if (!std::equal(p, p + 3, q)) return false;
-  }
-  return true;
-}
-
 void add_arrays(vtkDataSet& from, vtkDataSet& to) {
   for (int i = 0; i < from.GetPointData()->GetNumberOfArrays(); ++i)
     to.GetPointData()->AddArray(from.GetPointData()->GetArray(i));
@@ -293,8 +311,9 @@ vtkSmartPointer<vtkDataObject> read_xdmf(const Path& path, int step) {
     const Grid grid{document, *element};
     const vtkSmartPointer<vtkDataSet> mesh = mesh_of(grid);
     add_attributes(grid, *mesh);
-    const auto same = std::find_if(meshes.begin(), meshes.end(),
-                                   [&](const vtkSmartPointer<vtkDataSet>& other) { return same_mesh(*mesh, *other); });
+    const auto same = std::find_if(meshes.begin(), meshes.end(), [&](const vtkSmartPointer<vtkDataSet>& other) {
+      return is_same_mesh(*mesh, *other);
+    });
     if (same == meshes.end())
       meshes.push_back(mesh);
     else

@@ -162,9 +162,12 @@ std::vector<Element*> items_in(const XdmfDocument& document, Element& item, std:
 /// The part of numbers in memory.
 XdmfValues part_of(const XdmfDocument& document, const XdmfValues& whole, const HyperSlab& slab) {
   const std::size_t rank = whole.shape.size();
-  for (std::size_t axis = 0; axis < rank; ++axis)
-    if (slab.count[axis] > 0 && slab.start[axis] + (slab.count[axis] - 1) * slab.stride[axis] >= whole.shape[axis])
-      fail_item(document, "is a HyperSlab beyond what it is of");
+  for (std::size_t axis = 0; axis < rank; ++axis) {
+    const std::uint64_t extent = whole.shape[axis];  // Of products of hostile numbers, which overflow.
+    const std::uint64_t fitting =
+        slab.start[axis] < extent ? (extent - 1 - slab.start[axis]) / slab.stride[axis] + 1 : 0;
+    if (slab.count[axis] > fitting) fail_item(document, "is a HyperSlab beyond what it is of");
+  }
   XdmfValues part{Array::Take(whole.numbers->NewInstance()), slab.count};
   part.numbers->SetNumberOfTuples(static_cast<vtkIdType>(product(slab.count)));
   Sizes at(rank, 0);
@@ -198,10 +201,12 @@ XdmfValues values_of_slab(const XdmfDocument& document, Element& item, int depth
   return part_of(document, whole, slab);
 }
 
-/// JOIN($0, $1, ...): the items side by side; `0*$0`: zeros, as PyLith fills vectors of plane meshes.
+/// JOIN($0, $1, ...), also with semicolons: the items side by side; `0*$0`: zeros, as PyLith fills vectors of plane
+/// meshes.
 XdmfValues values_of_function(const XdmfDocument& document, Element& item, int depth) {
   std::string function = xml_attribute(item, {"Function"});
   function.erase(std::remove(function.begin(), function.end(), ' '), function.end());
+  std::replace(function.begin(), function.end(), ';', ',');
   std::vector<XdmfValues> parts;
   for (Element* const part : items_in(document, item, 1)) parts.push_back(values_of(document, *part, depth + 1));
   const vtkIdType count = parts.front().numbers->GetNumberOfTuples();
