@@ -7,6 +7,7 @@
 #include <fstream>
 #include <future>
 #include <limits>
+#include <new>
 #include <sstream>
 #include <stdexcept>
 #include <system_error>
@@ -129,11 +130,14 @@ void require_threads(unsigned count) {
   std::promise<void> end;
   const std::shared_future<void> ended = end.get_future().share();
   std::vector<std::thread> threads;
+  threads.reserve(count);
   std::string reason;
   try {
     while (threads.size() < count) threads.emplace_back([ended] { ended.wait(); });
   } catch (const std::system_error& error) {
     reason = error.code().message();
+  } catch (const std::bad_alloc&) {  // Those that have started must be joined.
+    reason = "out of memory";
   }
   const std::size_t started = threads.size();
   end.set_value();

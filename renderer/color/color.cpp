@@ -172,7 +172,12 @@ ColorConversion conversion_of(const FileColors& colors, const Matrix3d& xyz_to_w
   return [curves = colors.curves, matrix](float* rgba, std::size_t count) {
     for (std::size_t i = 0; i < count; ++i, rgba += 4) {
       const Eigen::Vector3f light(curves[0].at(rgba[0]), curves[1].at(rgba[1]), curves[2].at(rgba[2]));
-      Eigen::Map<Eigen::Vector3f>(rgba, 3) = matrix * light;
+      const Eigen::Vector3f working = matrix * light;
+      if (!working.allFinite()) {  // Beyond single precision.
+        std::fill_n(rgba, 3, 0.0f);
+        continue;
+      }
+      Eigen::Map<Eigen::Vector3f>(rgba, 3) = working;
     }
   };
 }
@@ -220,9 +225,9 @@ std::string printable_ascii(std::string text) {
   return text;
 }
 
-/// What a view of a display shows its pictures in, if that can be known. Configs of version 1 do not say what their
-/// displays are; only names tell.
-DisplayEncoding encoding_of(const OCIO::Config& config, const std::string& display, const std::string& view) {
+/// What a view of a display shows its pictures in. Configs of version 1 do not say what their displays are; only names
+/// tell. @throw OCIO::Exception if a conversion has no inverse.
+DisplayEncoding stated_encoding(const OCIO::Config& config, const std::string& display, const std::string& view) {
   const std::string name = config.getDisplayViewColorSpaceName(display.c_str(), view.c_str());
   const std::string space_name = name == "<USE_DISPLAY_NAME>" ? display : name;
   const OCIO::ConstColorSpaceRcPtr space = config.getColorSpace(space_name.c_str());
@@ -235,6 +240,15 @@ DisplayEncoding encoding_of(const OCIO::Config& config, const std::string& displ
   if (!profile) return {};
   if (is_srgb({profile->curves, profile->rgb_to_xyz})) return {true, ""};
   return {false, make_icc_profile(printable_ascii(space_name), *profile)};
+}
+
+/// The same, if that can be known: a display of which it cannot still shows pictures.
+DisplayEncoding encoding_of(const OCIO::Config& config, const std::string& display, const std::string& view) {
+  try {
+    return stated_encoding(config, display, view);
+  } catch (const OCIO::Exception&) {
+    return {};
+  }
 }
 
 }  // namespace

@@ -5,12 +5,15 @@
 #include <cstdint>
 #include <map>
 #include <stdexcept>
+#include <string>
+#include <string_view>
 #include <utility>
 #include <vector>
 
 #include <Eigen/LU>
 
 #include "base/byte_order.h"
+#include "base/text.h"
 #include "renderer/color/chromaticities.h"
 
 namespace tensorray {
@@ -22,47 +25,49 @@ using Eigen::Vector3d;
 const Vector3d profile_white(0.9642, 1, 0.8249);  // D50, as the format rounds it.
 constexpr std::size_t header_bytes = 128;
 
-std::string bytes_at(const std::string& bytes, std::size_t at, std::size_t count) {
+/// The contents of each tag by its signature. They may overlap, and are not copied.
+using Tags = std::map<std::string, std::string_view>;
+
+std::string_view bytes_at(std::string_view bytes, std::size_t at, std::size_t count) {
   if (at > bytes.size() || count > bytes.size() - at) throw std::runtime_error("it is cut off");
   return bytes.substr(at, count);
 }
 
 template <class Number>
-Number big_endian_at(const std::string& bytes, std::size_t at) {
+Number big_endian_at(std::string_view bytes, std::size_t at) {
   return read_number<Number>(bytes_at(bytes, at, sizeof(Number)).data(), ByteOrder::big);
 }
 
-double fixed_at(const std::string& bytes, std::size_t at) { return big_endian_at<std::int32_t>(bytes, at) / 65536.0; }
+double fixed_at(std::string_view bytes, std::size_t at) { return big_endian_at<std::int32_t>(bytes, at) / 65536.0; }
 
-/// The contents of each tag by its signature.
-std::map<std::string, std::string> tags_of(const std::string& bytes) {
+Tags tags_of(std::string_view bytes) {
   constexpr std::uint32_t most_tags = 1000;
   if (bytes_at(bytes, 36, 4) != "acsp") throw std::runtime_error("it is no ICC profile");
   const auto count = big_endian_at<std::uint32_t>(bytes, header_bytes);
   if (count > most_tags) throw std::runtime_error("it is damaged");
-  std::map<std::string, std::string> tags;
+  Tags tags;
   for (std::uint32_t i = 0; i < count; ++i) {
     const std::size_t entry = header_bytes + 4 + 12 * i;
-    tags[bytes_at(bytes, entry, 4)] =
+    tags[std::string(bytes_at(bytes, entry, 4))] =
         bytes_at(bytes, big_endian_at<std::uint32_t>(bytes, entry + 4), big_endian_at<std::uint32_t>(bytes, entry + 8));
   }
   return tags;
 }
 
 /// curveType: nothing, an exponent, or a table.
-TransferCurve parse_table(const std::string& tag) {
+TransferCurve parse_table(std::string_view tag) {
   const auto count = big_endian_at<std::uint32_t>(tag, 8);
   if (count == 0) return {};
   if (count == 1) return power_curve(big_endian_at<std::uint16_t>(tag, 12) / 256.0);
   TransferCurve curve;
-  const std::string values = bytes_at(tag, 12, 2 * std::size_t{count});
+  const std::string_view values = bytes_at(tag, 12, 2 * std::size_t{count});
   for (std::size_t i = 0; i < count; ++i)
     curve.table.push_back(static_cast<float>(big_endian_at<std::uint16_t>(values, 2 * i) / 65535.0));
   return curve;
 }
 
 /// parametricCurveType, of which all kinds are special cases of the last.
-TransferCurve parse_function(const std::string& tag) {
+TransferCurve parse_function(std::string_view tag) {
   const auto kind = big_endian_at<std::uint16_t>(tag, 8);
   const int counts[] = {1, 3, 4, 5, 7};
   if (kind > 4) throw std::runtime_error("it has an unknown kind of curve");
@@ -87,16 +92,25 @@ TransferCurve parse_function(const std::string& tag) {
   return curve;
 }
 
-TransferCurve parse_curve(const std::map<std::string, std::string>& tags, const std::string& name) {
-  const auto found = tags.find(name);
-  if (found == tags.end()) throw std::runtime_error("it consists of tables, not of curves and a matrix");
-  const std::string type = bytes_at(found->second, 0, 4);
-  if (type == "curv") return parse_table(found->second);
-  if (type == "para") return parse_function(found->second);
+TransferCurve parse_any_curve(std::string_view tag) {
+  const std::string_view type = bytes_at(tag, 0, 4);
+  if (type == "curv") return parse_table(tag);
+  if (type == "para") return parse_function(tag);
   throw std::runtime_error("it has an unknown kind of curve");
 }
 
-Vector3d parse_xyz(const std::map<std::string, std::string>& tags, const std::string& name) {
+TransferCurve parse_curve(const Tags& tags, const std::string& name) {
+  constexpr float most_light = 100;  // Damaged exponents give more, or nothing finite.
+  const auto found = tags.find(name);
+  if (found == tags.end()) throw std::runtime_error("it consists of tables, not of curves and a matrix");
+  const TransferCurve curve = parse_any_curve(found->second);
+  for (float x = 0; x <= 1; x += 1.0f / 64)
+    if (!(std::abs(curve.at(x)) < most_light)) throw std::runtime_error("it has a curve that is damaged");
+  if (!(curve.at(1) > curve.at(0))) throw std::runtime_error("it has a curve that does not rise");
+  return curve;
+}
+
+Vector3d parse_xyz(const Tags& tags, const std::string& name) {
   const auto found = tags.find(name);
   if (found == tags.end()) throw std::runtime_error("it consists of tables, not of curves and a matrix");
   return {fixed_at(found->second, 8), fixed_at(found->second, 12), fixed_at(found->second, 16)};
@@ -143,9 +157,9 @@ std::string curve_tag(const TransferCurve& curve) {
 }  // namespace
 
 IccProfile parse_icc_profile(const std::string& bytes, bool grey) {
-  const std::string space = bytes_at(bytes, 16, 4);
-  const std::map<std::string, std::string> tags = tags_of(bytes);
-  if (space != (grey ? "GRAY" : "RGB ")) throw std::runtime_error("it is for colours \"" + space + "\"");
+  const std::string space(bytes_at(bytes, 16, 4));
+  const Tags tags = tags_of(bytes);
+  if (space != (grey ? "GRAY" : "RGB ")) throw std::runtime_error("it is for colours \"" + escaped(space) + "\"");
   if (bytes_at(bytes, 20, 4) != "XYZ ") throw std::runtime_error("it consists of tables, not of curves and a matrix");
   IccProfile profile;
   const Vector3d d65 = xyz_of(d65_white);
@@ -157,6 +171,7 @@ IccProfile parse_icc_profile(const std::string& bytes, bool grey) {
   profile.curves = {parse_curve(tags, "rTRC"), parse_curve(tags, "gTRC"), parse_curve(tags, "bTRC")};
   Matrix3d matrix;
   matrix << parse_xyz(tags, "rXYZ"), parse_xyz(tags, "gXYZ"), parse_xyz(tags, "bXYZ");
+  if (!(std::abs(matrix.determinant()) > 1e-6)) throw std::runtime_error("its primaries are no colours");
   profile.rgb_to_xyz = *adaptation(profile_white, d65) * matrix;
   return profile;
 }

@@ -186,7 +186,8 @@ Image read_image(const std::filesystem::path& path) {
 
 NativeImage read_native_image(const std::filesystem::path& path, const std::string& layer) {
   return read(path, [&] {
-    std::optional<NativeImage> image = read_luminance_chroma(path);
+    std::optional<NativeImage> image;
+    if (layer.empty()) image = read_luminance_chroma(path);
     if (!image) image = ready_library().decode_native(path, layer);
     add_png_tags(path, image->tags);
     image->non_finite = non_finite_pixels(*image);

@@ -1,6 +1,7 @@
 #include "renderer/images/luminance_chroma.h"
 
-#include <fstream>
+#include <algorithm>
+#include <cstddef>
 #include <memory>
 #include <stdexcept>
 #include <string>
@@ -11,6 +12,7 @@
 #include <OpenEXR/ImfTestFile.h>
 
 #include "base/text.h"
+#include "renderer/images/stored_bytes.h"
 
 namespace tensorray {
 namespace {
@@ -35,10 +37,9 @@ NativeImage read_pixels_of(Imf::RgbaInputFile& file) {
   image.rgb = {0, 1, 2};
   image.alpha = 3;
   image.is_premultiplied = true;
+  stored_bytes(image);
   const auto width = static_cast<std::size_t>(image.data_width);
   const std::size_t count = width * static_cast<std::size_t>(image.data_height);
-  if (count * 4 * sizeof(float) > std::size_t{8} << 30)
-    throw std::runtime_error("its pixels take more than 8 GiB; make it smaller");
   std::vector<Imf::Rgba> pixels(count);
   // The address of pixel (0, 0), which need not be stored.
   file.setFrameBuffer(pixels.data() - data.min.x - data.min.y * static_cast<std::ptrdiff_t>(width), 1, width);

@@ -3,7 +3,9 @@
 #include <algorithm>
 #include <array>
 #include <cstdint>
+#include <cstdlib>
 #include <cstring>
+#include <limits>
 #include <memory>
 #include <set>
 #include <stdexcept>
@@ -14,6 +16,7 @@
 #include <OpenImageIO/imageio.h>
 
 #include "base/text.h"
+#include "renderer/images/stored_bytes.h"
 
 namespace tensorray::openimageio {
 namespace {
@@ -66,8 +69,9 @@ std::unique_ptr<OIIO::ImageInput> open_as_it_is(const std::filesystem::path& pat
 
 /// The index of a channel of a file, or -1 if there is none. Names match in upper and lower case.
 int find_channel(const OIIO::ImageSpec& spec, const std::string& name) {
-  for (int i = 0; i < spec.nchannels; ++i)
-    if (OIIO::Strutil::iequals(spec.channelnames[i], name)) return i;
+  const std::vector<std::string>& names = spec.channelnames;  // Formats with inks may name more or fewer of them.
+  for (std::size_t i = 0; i < names.size() && static_cast<int>(i) < spec.nchannels; ++i)
+    if (OIIO::Strutil::iequals(names[i], name)) return static_cast<int>(i);
   return -1;
 }
 
@@ -163,18 +167,14 @@ SampleType sample_type(const OIIO::ImageSpec& spec) {
   return spec.format == OIIO::TypeDesc::UINT16 ? SampleType::uint16 : SampleType::float32;
 }
 
-std::size_t bytes_of(SampleType type) { return type == SampleType::uint8 ? 1 : type == SampleType::uint16 ? 2 : 4; }
+/// Only TIFF has integers of 24 bits. Other formats have this attribute for other reasons.
+bool has_24_bits(const OIIO::ImageInput& input, const OIIO::ImageSpec& spec) {
+  return std::strcmp(input.format_name(), "tiff") == 0 && spec.format.size() == sizeof(std::uint32_t) &&
+         spec.get_int_attribute("oiio:BitsPerSample") == 24;
+}
 
-/// The number of bytes of a picture's values. @throw std::runtime_error if there are more than the limit; this check
-/// comes before memory is allocated.
-std::size_t checked_bytes(const NativeImage& image) {
-  constexpr double limit = 8.0 * (1 << 30);
-  const double bytes = static_cast<double>(image.channels) * static_cast<double>(bytes_of(image.type));
-  const double stored = bytes * image.data_width * image.data_height, whole = bytes * image.width * image.height;
-  if (!(std::max(stored, whole) <= limit))
-    throw std::runtime_error("its " + std::to_string(image.width) + " x " + std::to_string(image.height) +
-                             " pixels take more than 8 GiB; make it smaller");
-  return static_cast<std::size_t>(stored);
+void require_flat(const OIIO::ImageSpec& spec) {
+  if (spec.deep || spec.depth > 1) throw std::runtime_error("it is not a flat picture, but deep or a volume");
 }
 
 ColorTags tags_of(const OIIO::ImageSpec& spec) {
@@ -208,6 +208,13 @@ void convert_24_bits(unsigned char* values, std::size_t count) {
   }
 }
 
+/// The difference of two places, or the greatest integer if it is none.
+int offset(int place, int origin) {
+  const std::int64_t difference = std::int64_t{place} - origin;
+  constexpr int greatest = std::numeric_limits<int>::max();
+  return std::abs(difference) > greatest ? greatest : static_cast<int>(difference);
+}
+
 /// Turns a picture as Exif's orientation (1 to 8) says.
 void turn(int orientation, NativeImage& image) {
   if (orientation < 2 || orientation > 8) return;
@@ -224,7 +231,7 @@ void turn(int orientation, NativeImage& image) {
   }
   const std::size_t pixel = bytes_of(image.type) * static_cast<std::size_t>(image.channels);
   const auto* const source = static_cast<const unsigned char*>(from.samples.get());
-  const std::shared_ptr<unsigned char[]> target(new unsigned char[checked_bytes(image)]);
+  const std::shared_ptr<unsigned char[]> target(new unsigned char[stored_bytes(image)]);
   std::size_t at = 0;
   for (int y = 0; y < image.data_height; ++y)
     for (int x = 0; x < image.data_width; ++x, at += pixel) {
@@ -259,8 +266,11 @@ std::vector<unsigned char> encode(const Image& image, const PictureFormat& forma
 
 Image decode(const std::filesystem::path& path) {
   const std::unique_ptr<OIIO::ImageInput> input = open_as_it_is(path);
-  const OIIO::ImageSpec& spec = input->spec();
-  Image image(spec.width, spec.height, spec.channelnames);
+  const OIIO::ImageSpec spec = input->spec();
+  require_flat(spec);
+  std::vector<std::string> channels = spec.channelnames;
+  channels.resize(static_cast<std::size_t>(spec.nchannels));
+  Image image(spec.width, spec.height, std::move(channels));
   if (!input->read_image(0, 0, 0, spec.nchannels, OIIO::TypeDesc::FLOAT, image.pixels.data())) throw_read_error(*input);
   input->close();
   return image;
@@ -271,28 +281,28 @@ NativeImage decode_native(const std::filesystem::path& path, const std::string& 
   NativeImage image;
   const int part = find_channels(*input, layer, image);
   const OIIO::ImageSpec spec = input->spec(part, 0);
-  if (spec.deep || spec.depth > 1) throw std::runtime_error("it is not a flat picture, but deep or a volume");
+  require_flat(spec);
   image.width = spec.full_width;
   image.height = spec.full_height;
-  image.data_x = spec.x - spec.full_x;
-  image.data_y = spec.y - spec.full_y;
+  image.data_x = offset(spec.x, spec.full_x);
+  image.data_y = offset(spec.y, spec.full_y);
   image.data_width = spec.width;
   image.data_height = spec.height;
   image.type = sample_type(spec);
   image.is_integer = !spec.format.is_floating_point();
   image.tags = tags_of(spec);
-  const int bits = spec.get_int_attribute("oiio:BitsPerSample");
-  if (bits == 24 && !image.is_integer)
+  const bool is_24_bits = has_24_bits(*input, spec);
+  if (is_24_bits && !image.is_integer)
     throw std::runtime_error("floats of 24 bits are not read; save it with 16 or 32 bits");
   const int first = first_channel(image);
   image.is_premultiplied = image.alpha >= 0 && !spec.get_int_attribute("oiio:UnassociatedAlpha");
-  const std::size_t bytes = checked_bytes(image);
+  const std::size_t bytes = stored_bytes(image);
   const std::shared_ptr<unsigned char[]> samples(new unsigned char[bytes]);
   if (!input->read_image(part, 0, first, first + image.channels,
-                         bits == 24 ? OIIO::TypeDesc(OIIO::TypeDesc::UINT32) : type_desc(image.type), samples.get()))
+                         is_24_bits ? OIIO::TypeDesc(OIIO::TypeDesc::UINT32) : type_desc(image.type), samples.get()))
     throw_read_error(*input);
   input->close();
-  if (bits == 24) convert_24_bits(samples.get(), bytes / sizeof(float));
+  if (is_24_bits) convert_24_bits(samples.get(), bytes / sizeof(float));
   image.samples = samples;
   turn(spec.get_int_attribute("Orientation", 1), image);
   return image;

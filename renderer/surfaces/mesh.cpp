@@ -89,7 +89,12 @@ Eigen::Affine3d affine_of(const aiMatrix4x4& matrix) {
 void add_mesh(const aiMesh& part, const Eigen::Affine3d& to_world, MeshWithNormals& result) {
   TriangleMesh& mesh = result.mesh;
   const auto offset = static_cast<std::uint32_t>(mesh.vertices.size());
-  const Eigen::Matrix3d turn = to_world.linear().inverse().transpose();
+  const Eigen::Matrix3d& linear = to_world.linear();
+  const bool mirrored = linear.determinant() < 0;
+  // Normals follow the cofactors, which exist where the inverse does not: parts are hidden by a scale of 0.
+  Eigen::Matrix3d turn;
+  turn << linear.col(1).cross(linear.col(2)), linear.col(2).cross(linear.col(0)), linear.col(0).cross(linear.col(1));
+  if (mirrored) turn = -turn;
   for (unsigned i = 0; i < part.mNumVertices; ++i) {
     const aiVector3D& v = part.mVertices[i];
     mesh.vertices.push_back(to_world * Eigen::Vector3d(v.x, v.y, v.z));
@@ -97,7 +102,6 @@ void add_mesh(const aiMesh& part, const Eigen::Affine3d& to_world, MeshWithNorma
     if (part.HasNormals()) normal = Eigen::Vector3d(part.mNormals[i].x, part.mNormals[i].y, part.mNormals[i].z);
     result.normals.push_back((turn * normal).stableNormalized().cast<float>());
   }
-  const bool mirrored = to_world.linear().determinant() < 0;
   for (unsigned i = 0; i < part.mNumFaces; ++i) {
     check_face(part, part.mFaces[i]);
     if (part.mFaces[i].mNumIndices < 3) continue;  // Points and lines have no surface.
@@ -107,7 +111,10 @@ void add_mesh(const aiMesh& part, const Eigen::Affine3d& to_world, MeshWithNorma
 
 void add_node(const aiScene& scene, const aiNode& node, const Eigen::Affine3d& to_world, MeshWithNormals& mesh) {
   const Eigen::Affine3d here = to_world * affine_of(node.mTransformation);
-  for (unsigned i = 0; i < node.mNumMeshes; ++i) add_mesh(*scene.mMeshes[node.mMeshes[i]], here, mesh);
+  for (unsigned i = 0; i < node.mNumMeshes; ++i) {
+    if (node.mMeshes[i] >= scene.mNumMeshes) throw std::runtime_error("a node names a mesh that is not there");
+    add_mesh(*scene.mMeshes[node.mMeshes[i]], here, mesh);
+  }
   for (unsigned i = 0; i < node.mNumChildren; ++i) add_node(scene, *node.mChildren[i], here, mesh);
 }
 

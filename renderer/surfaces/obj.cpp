@@ -4,6 +4,7 @@
 #include <charconv>
 #include <cstdint>
 #include <fstream>
+#include <optional>
 #include <set>
 #include <sstream>
 #include <stdexcept>
@@ -11,6 +12,7 @@
 #include <unordered_map>
 #include <vector>
 
+#include "base/parse_number.h"
 #include "base/text.h"
 #include "renderer/surfaces/polygon.h"
 
@@ -51,26 +53,21 @@ bool is_without_surface(const std::string& keyword) {
   return keywords.count(keyword) > 0;
 }
 
-double number_of(const std::string& word) {
-  double value = 0;
-  const char* const begin = word.data() + (word[0] == '+' ? 1 : 0);
-  const char* const end = word.data() + word.size();
-  const std::from_chars_result result = std::from_chars(begin, end, value);
-  // Numbers too small for double precision are 0.
-  if (result.ptr != end || (result.ec != std::errc() && result.ec != std::errc::result_out_of_range))
-    throw std::runtime_error("\"" + escaped(word.substr(0, 20)) + "\" is not a number");
-  return value;
+double component_of(const std::string& word) {
+  const std::optional<double> value = parse_number(word);
+  if (!value) throw std::runtime_error("\"" + escaped(word.substr(0, 20)) + "\" is not a number");
+  return *value;
 }
 
 Eigen::Vector3d vector_of(const Words& words) {
   if (words.size() < 4) throw std::runtime_error("\"" + words[0] + "\" needs three numbers");
-  return {number_of(words[1]), number_of(words[2]), number_of(words[3])};
+  return {component_of(words[1]), component_of(words[2]), component_of(words[3])};
 }
 
 /// A vertex x y z, x y z w (homogeneous) or x y z r g b.
 Eigen::Vector3d vertex_of(const Words& words) {
   const Eigen::Vector3d position = vector_of(words);
-  const double weight = words.size() == 5 ? number_of(words[4]) : 1;
+  const double weight = words.size() == 5 ? component_of(words[4]) : 1;
   if (weight == 0) throw std::runtime_error("the vertex has the weight 0");
   return position / weight;
 }

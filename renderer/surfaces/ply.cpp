@@ -1,19 +1,22 @@
 #include "renderer/surfaces/ply.h"
 
 #include <algorithm>
-#include <charconv>
 #include <cmath>
 #include <cstdint>
 #include <fstream>
 #include <iterator>
 #include <map>
+#include <optional>
 #include <sstream>
 #include <stdexcept>
 #include <string>
+#include <string_view>
 #include <utility>
 #include <vector>
 
 #include "base/byte_order.h"
+#include "base/parse_number.h"
+#include "base/text.h"
 #include "renderer/surfaces/polygon.h"
 
 namespace tensorray {
@@ -137,13 +140,12 @@ class Numbers {
   double next_word() {
     while (position_ != end_ && is_blank(*position_)) ++position_;
     if (position_ == end_) throw_cut_off();
-    const char* const word = position_ + (*position_ == '+' ? 1 : 0);
+    const char* const begin = position_;
     while (position_ != end_ && !is_blank(*position_)) ++position_;
-    double value = 0;
-    const std::from_chars_result result = std::from_chars(word, position_, value);
-    if (result.ec != std::errc() || result.ptr != position_)
-      throw std::runtime_error("\"" + std::string(word, std::min(position_, word + 20)) + "\" is not a number");
-    return value;
+    const std::string_view word(begin, static_cast<std::size_t>(position_ - begin));
+    const std::optional<double> value = parse_number(word);
+    if (!value) throw std::runtime_error("\"" + escaped(std::string(word.substr(0, 20))) + "\" is not a number");
+    return *value;
   }
 
   double next_binary(const NumberType& type) {
@@ -167,9 +169,10 @@ std::size_t to_count(double value) {
 /// What the file holds, before polygons are divided.
 struct PlyContents {
   std::vector<Eigen::Vector3d> vertices;
-  std::vector<Eigen::Vector3f> normals;  ///< For each vertex; empty: the file has none.
-  std::vector<std::uint32_t> corners;    ///< Of all faces.
-  std::vector<std::size_t> face_ends;    ///< Corners up to the end of each face.
+  std::vector<Eigen::Vector3f> normals;  ///< For each vertex; zero: it has none.
+  bool has_normals = false;
+  std::vector<std::uint32_t> corners;  ///< Of all faces.
+  std::vector<std::size_t> face_ends;  ///< Corners up to the end of each face.
 };
 
 /// The place of a property among x, y, z, nx, ny, nz; −1: none of them.
@@ -181,18 +184,17 @@ int coordinate_of(const std::string& property) {
 
 void read_ply_vertex(const Element& element, Numbers& numbers, PlyContents& contents) {
   Eigen::Matrix<double, 6, 1> coordinates = Eigen::Matrix<double, 6, 1>::Zero();
-  bool has_normal = false;
   for (const Property& property : element.properties) {
     const std::size_t count = property.is_list ? to_count(numbers.next(property.count_type)) : 1;
     const int coordinate = coordinate_of(property.name);
-    has_normal = has_normal || coordinate >= 3;
+    contents.has_normals = contents.has_normals || coordinate >= 3;
     for (std::size_t i = 0; i < count; ++i) {
       const double value = numbers.next(property.type);
       if (coordinate >= 0) coordinates[coordinate] = value;
     }
   }
   contents.vertices.emplace_back(coordinates.head<3>());
-  if (has_normal) contents.normals.emplace_back(coordinates.tail<3>().cast<float>());
+  contents.normals.emplace_back(coordinates.tail<3>().cast<float>());
 }
 
 std::uint32_t to_index(double value) {
@@ -219,36 +221,36 @@ void read_ply_face(const Element& element, Numbers& numbers, PlyContents& conten
   }
 }
 
+void pass_over(const Property& property, std::size_t count, Numbers& numbers) {
+  for (std::size_t i = 0; i < count; ++i) numbers.next(property.type);
+}
+
 /// Adds the triangles of strips: each corner makes one with the two before it, and every second is turned round.
-void add_strips(const std::vector<double>& indices, PlyContents& contents) {
+void add_strips(const Property& property, std::size_t count, Numbers& numbers, PlyContents& contents) {
   std::vector<std::uint32_t> strip;
-  for (const double index : indices) {
+  for (std::size_t i = 0; i < count; ++i) {
+    const double index = numbers.next(property.type);
     if (index == -1) {
       strip.clear();
       continue;
     }
     strip.push_back(to_index(index));
-    const std::size_t count = strip.size();
-    if (count < 3) continue;
-    const bool turned = count % 2 == 0;
+    const std::size_t size = strip.size();
+    if (size < 3) continue;
+    const bool turned = size % 2 == 0;
     contents.corners.insert(contents.corners.end(),
-                            {strip[count - (turned ? 2 : 3)], strip[count - (turned ? 3 : 2)], strip[count - 1]});
+                            {strip[size - (turned ? 2 : 3)], strip[size - (turned ? 3 : 2)], strip[size - 1]});
     contents.face_ends.push_back(contents.corners.size());
   }
 }
 
 void read_strips(const Element& element, Numbers& numbers, PlyContents& contents) {
   for (const Property& property : element.properties) {
-    std::vector<double> indices(property.is_list ? to_count(numbers.next(property.count_type)) : 1);
-    for (double& index : indices) index = numbers.next(property.type);
-    if (is_corners(property)) add_strips(indices, contents);
-  }
-}
-
-void pass_over(const Element& element, Numbers& numbers) {
-  for (const Property& property : element.properties) {
     const std::size_t count = property.is_list ? to_count(numbers.next(property.count_type)) : 1;
-    for (std::size_t i = 0; i < count; ++i) numbers.next(property.type);
+    if (is_corners(property))
+      add_strips(property, count, numbers, contents);
+    else
+      pass_over(property, count, numbers);
   }
 }
 
@@ -262,7 +264,8 @@ void read_element(const Element& element, Numbers& numbers, PlyContents& content
     else if (element.name == "tristrips")
       read_strips(element, numbers, contents);
     else
-      pass_over(element, numbers);
+      for (const Property& property : element.properties)
+        pass_over(property, property.is_list ? to_count(numbers.next(property.count_type)) : 1, numbers);
   }
 }
 
@@ -284,7 +287,7 @@ MeshWithNormals mesh_of_ply(PlyContents contents) {
     first = end;
   }
   result.mesh.vertices = std::move(contents.vertices);
-  result.normals = std::move(contents.normals);
+  if (contents.has_normals) result.normals = std::move(contents.normals);
   return result;
 }
 

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <numeric>
+#include <optional>
 #include <stdexcept>
 #include <string>
 
@@ -14,6 +15,7 @@ using Eigen::Vector2d;
 using Eigen::Vector3d;
 
 constexpr std::size_t most_concave_corners = 10000;  // Time grows with their square.
+constexpr int most_failures = 64;  // Searches of all corners without an ear; else time would grow with the cube.
 
 /// Twice the vector area (Newell 1972).
 Vector3d newell_normal(const std::vector<Vector3d>& corners) {
@@ -71,17 +73,17 @@ class CornerRing {
 
   void cut(std::size_t i) { left_.erase(left_.begin() + static_cast<std::ptrdiff_t>(i)); }
 
+  /// The next ear from corner `from` on; nothing if the polygon crosses itself so that it has none.
+  std::optional<std::size_t> next_ear(std::size_t from) const {
+    for (std::size_t i = 0; i < size(); ++i)
+      if (is_ear((from + i) % size())) return (from + i) % size();
+    return std::nullopt;
+  }
+
  private:
   const std::vector<Vector2d>& corners_;
   std::vector<std::uint32_t> left_;
 };
-
-/// The next ear from corner `from` on; where there is none, the polygon crosses itself, and any corner will do.
-std::size_t next_ear(const CornerRing& ring, std::size_t from) {
-  for (std::size_t i = 0; i < ring.size(); ++i)
-    if (ring.is_ear((from + i) % ring.size())) return (from + i) % ring.size();
-  return from % ring.size();
-}
 
 std::vector<std::array<std::uint32_t, 3>> fan(std::size_t corners) {
   std::vector<std::array<std::uint32_t, 3>> triangles;
@@ -101,8 +103,11 @@ std::vector<std::array<std::uint32_t, 3>> triangulate(const std::vector<Vector3d
                              " corners; divide those with more than " + std::to_string(most_concave_corners));
   std::vector<std::array<std::uint32_t, 3>> triangles;
   CornerRing ring(flat);
+  int failures = 0;
   for (std::size_t at = 0; ring.size() > 3;) {
-    at = next_ear(ring, at);
+    const std::optional<std::size_t> ear = failures < most_failures ? ring.next_ear(at) : std::nullopt;
+    if (!ear) ++failures;
+    at = ear.value_or(at % ring.size());  // Where there is no ear, any corner will do.
     triangles.push_back(ring.triangle_at(at));
     ring.cut(at);
   }

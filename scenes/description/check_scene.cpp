@@ -8,6 +8,7 @@
 
 #include <fmt/core.h>
 
+#include "base/path_text.h"
 #include "base/process_limits.h"
 #include "base/text.h"
 #include "renderer/color/color.h"
@@ -150,7 +151,7 @@ void check_scene(SceneDescription& scene, const Json& json, const SceneSource& s
   scene.default_lights = !given(json, "/lights");
   scene.default_objects = !given(json, "/objects");
   std::string& ocio = scene.output.ocio;
-  if (!ocio.empty() && !is_library_config(ocio)) ocio = source.resolve(ocio).string();
+  if (!ocio.empty() && !is_library_config(ocio)) ocio = source.resolve(path_of_text(ocio)).string();
   if (!scene.bending.rgb) check_wavelengths(scene.light, source);
   check_normal(scene.receiver.normal, "/receiver", scene.light, source);
   check_lights(scene, source);

@@ -11,10 +11,10 @@ namespace tensorray {
 std::vector<NamedFile> input_files(const SceneDescription& scene) {
   std::vector<NamedFile> files{
       {scene.path, "the scene file"}, {scene.field.file, "`/field/file`"}, {scene.field.bounds, "`/field/bounds`"}};
-  if (!scene.output.ocio.empty() && !is_library_config(scene.output.ocio))
-    files.push_back({scene.output.ocio, "`/output/ocio`"});
-  const char* const config = std::getenv("OCIO");
-  if (config && !is_library_config(config)) files.push_back({config, "$OCIO"});
+  const char* const environment = std::getenv("OCIO");  // It counts only where the scene names no config.
+  const bool is_own = !scene.output.ocio.empty();
+  const std::string config = is_own ? scene.output.ocio : environment ? environment : "";
+  if (!is_library_config(config)) files.push_back({config, is_own ? "`/output/ocio`" : "$OCIO"});
   if (const auto* spectrum = std::get_if<std::filesystem::path>(&scene.light.spectrum))
     files.push_back({*spectrum, "`/light/spectrum`"});
   for (std::size_t i = 0; i < scene.obstacles.size(); ++i)

@@ -6,6 +6,7 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
+#include "base/path_text.h"
 #include "volumes/files/scalar_files.h"
 
 namespace tensorray {
@@ -55,9 +56,8 @@ ImageMetadata provenance(const Scene& scene, const Render& render) {
                    {"tensorray:version", TENSORRAY_VERSION},
                    {"tensorray:scene", scene.description.text},
                    {"tensorray:seed", std::to_string(scene.description.seed)},
-
                    {"tensorray:scale", fmt::format("{:.17g}", scene.scale.scale)},
-                   {"tensorray:ocio_config", scene.color.config_name()},
+                   {"tensorray:ocio_config", utf8_of(scene.color.config_name())},
                    {"tensorray:color_space", scene.color.working_space()}});
   return metadata;
 }

@@ -12,7 +12,10 @@
 #include "base/path_text.h"
 #include "integrators/paths/path_formats.h"
 #include "integrators/paths/seed_files.h"
+#include "renderer/color/icc_profile.h"
 #include "renderer/color/spectrum.h"
+#include "renderer/images/png_tags.h"
+#include "renderer/surfaces/obj.h"
 #include "renderer/surfaces/ply.h"
 #include "scenes/jobs/work_file.h"
 #include "scenes/keys/frames.h"
@@ -86,8 +89,33 @@ void read_kept_work(const std::string& bytes) {
   read_file(bytes, [](const std::filesystem::path& path) { read_work(path); });
 }
 
+/// Each vertex has a normal or none has, and triangles name vertices that are there.
+void require_whole(const MeshWithNormals& mesh) {
+  const std::size_t count = mesh.mesh.vertices.size();
+  if (!mesh.normals.empty() && mesh.normals.size() != count) throw std::logic_error("normals are missing");
+  for (const auto& triangle : mesh.mesh.triangles)
+    for (const std::uint32_t vertex : triangle)
+      if (vertex >= count) throw std::logic_error("a vertex is missing");
+}
+
 void read_ply_mesh(const std::string& bytes) {
-  read_file(bytes, [](const std::filesystem::path& path) { read_ply(path); });
+  read_file(bytes, [](const std::filesystem::path& path) { require_whole(read_ply(path)); });
+}
+
+void read_obj_mesh(const std::string& bytes) {
+  read_file(bytes, [](const std::filesystem::path& path) { require_whole(read_obj(path)); });
+}
+
+/// For grey pictures, too.
+void read_profile(const std::string& bytes) {
+  for (const bool grey : {false, true}) expect_one_line([&] { parse_icc_profile(bytes, grey); });
+}
+
+void read_png_tags(const std::string& bytes) {
+  read_file(bytes, [](const std::filesystem::path& path) {
+    ColorTags tags;
+    add_png_tags(path, tags);
+  });
 }
 
 void read_tck(const std::string& bytes) {
@@ -143,13 +171,23 @@ void read_vdb_table(const std::string& bytes) {
 }  // namespace
 
 const std::vector<FuzzTarget>& fuzz_targets() {
-  static const std::vector<FuzzTarget> targets{{"scene", read_scene_file},  {"override", read_overrides},
-                                               {"frames", read_frames},     {"text", read_seeds_and_spectrum},
-                                               {"work", read_kept_work},    {"ply", read_ply_mesh},
-                                               {"tck", read_tck},           {"npy", read_npy},
-                                               {"nrrd", read_nrrd},         {"nifti", read_nifti},
-                                               {"plot3d", read_plot3d},     {"netcdf", read_netcdf},
-                                               {"vdb_tree", read_vdb_tree}, {"vdb_table", read_vdb_table}};
+  static const std::vector<FuzzTarget> targets{{"scene", read_scene_file},
+                                               {"override", read_overrides},
+                                               {"frames", read_frames},
+                                               {"text", read_seeds_and_spectrum},
+                                               {"work", read_kept_work},
+                                               {"ply", read_ply_mesh},
+                                               {"obj", read_obj_mesh},
+                                               {"icc", read_profile},
+                                               {"png", read_png_tags},
+                                               {"tck", read_tck},
+                                               {"npy", read_npy},
+                                               {"nrrd", read_nrrd},
+                                               {"nifti", read_nifti},
+                                               {"plot3d", read_plot3d},
+                                               {"netcdf", read_netcdf},
+                                               {"vdb_tree", read_vdb_tree},
+                                               {"vdb_table", read_vdb_table}};
   return targets;
 }
 

@@ -139,21 +139,28 @@ TEST(IccProfileTest, ParametricCurves) {
     if (kind == 3) return x >= d ? std::pow(a * x + b, g) : c * x;
     return x >= d ? std::pow(a * x + b, g) + e : c * x + f;
   };
-  for (int kind = 0; kind < 5; ++kind) {
-    const std::vector<double> all{2, 0.8, 0.1, 0.25, 0.4, 0.05, 0.02};
-    const int counts[] = {1, 3, 4, 5, 7};
+  // Appended to a valid profile, of which the entry rTRC, the seventh, is directed to it.
+  const auto profile_with = [&](int kind, const std::vector<double>& numbers) {
     std::string curve = std::string("para\0\0\0\0\0", 9) + static_cast<char>(kind) + std::string(2, '\0');
-    for (int i = 0; i < counts[kind]; ++i) curve += fixed(all[static_cast<std::size_t>(i)]);
-    // Appended to a valid profile, of which the entry rTRC, the seventh, is directed to it.
+    for (const double number : numbers) curve += fixed(number);
     std::string profile = p3_profile();
     const std::size_t entry = 132 + 12 * 6;
     profile.replace(
         entry + 4, 8,
         big_endian(static_cast<std::uint32_t>(profile.size())) + big_endian(static_cast<std::uint32_t>(curve.size())));
-    const IccProfile parsed = parse_icc_profile(profile + curve, false);
+    return profile + curve;
+  };
+  for (int kind = 0; kind < 5; ++kind) {
+    const std::vector<double> all{2, 0.8, 0.1, 0.25, 0.4, 0.05, 0.02};
+    const int counts[] = {1, 3, 4, 5, 7};
+    const IccProfile parsed = parse_icc_profile(profile_with(kind, {all.begin(), all.begin() + counts[kind]}), false);
     for (const float x : {0.0f, 0.2f, 0.39f, 0.41f, 0.7f, 1.0f})
       EXPECT_NEAR(parsed.curves[0].at(x), expected(kind, x), 1e-4) << kind << " " << x;
   }
+  // What is infinite, falls, or is nothing.
+  for (const double exponent : {-1.0, 0.0})
+    EXPECT_THROW(parse_icc_profile(profile_with(0, {exponent}), false), std::runtime_error) << exponent;
+  EXPECT_THROW(parse_icc_profile(profile_with(1, {1, -1, 1}), false), std::runtime_error);
 }
 
 Vector3d light_of_exr(const Vector3d& rgb, const std::string& chromaticities) {
@@ -195,8 +202,12 @@ TEST(PictureColors, WorkingSpacesHaveTheirPublishedNumbers) {
   for (std::size_t i = 0; i < 8; ++i) EXPECT_NEAR(found[i], numbers_of(odd)[i], 1e-12);
 }
 
-/// A TIFF of RGB integers. @param values  One for each sample.
-std::string tiff_of(int width, int height, int bits, int orientation, const std::vector<std::uint32_t>& values) {
+/// A tag of a TIFF and its number.
+using TiffTag = std::pair<int, std::uint32_t>;
+
+/// A TIFF of RGB integers. @param values  One for each sample. @param more  Further tags from 280 on, in their order.
+std::string tiff_of(int width, int height, int bits, int orientation, const std::vector<std::uint32_t>& values,
+                    const std::vector<TiffTag>& more = {}) {
   std::string pixels;
   for (const std::uint32_t value : values) pixels += little_endian(value).substr(0, static_cast<std::size_t>(bits / 8));
   const auto entry = [](int tag, int type, std::uint32_t count, std::uint32_t value) {
@@ -206,12 +217,29 @@ std::string tiff_of(int width, int height, int bits, int orientation, const std:
   const auto size = static_cast<std::uint32_t>(pixels.size()), directory = 16 + size + size % 2;
   std::string file = std::string("II*\0", 4) + little_endian(directory);
   for (int i = 0; i < 4; ++i) file += little_endian(static_cast<std::uint16_t>(bits));
-  file += pixels + std::string(size % 2, '\0') + little_endian(std::uint16_t{10});
+  file += pixels + std::string(size % 2, '\0') + little_endian(static_cast<std::uint16_t>(10 + more.size()));
   file += entry(256, 4, 1, static_cast<std::uint32_t>(width)) + entry(257, 4, 1, static_cast<std::uint32_t>(height)) +
           entry(258, 3, 3, 8) + entry(259, 3, 1, 1) + entry(262, 3, 1, 2) + entry(273, 4, 1, 16) +
           entry(274, 3, 1, static_cast<std::uint32_t>(orientation)) + entry(277, 3, 1, 3) +
           entry(278, 4, 1, static_cast<std::uint32_t>(height)) + entry(279, 4, 1, size);
+  for (const auto& [tag, number] : more) file += entry(tag, 4, 1, number);
   return file + little_endian(std::uint32_t{0});
+}
+
+/// Headers that contradict the pixels, or other headers: no more is read or written than there is.
+TEST(PictureSizes, AreThoseOfThePixels) {
+  // Only TIFF has integers of 24 bits, whatever a text says.
+  const std::string text = png_chunk("tEXt", std::string("oiio:BitsPerSample\0", 19) + "24");
+  EXPECT_LT((light_of("a.png", png_with(text, {255, 0, 255})) - Vector3d(1, 0, 1)).norm(), 1e-5);
+
+  const std::vector<std::uint32_t> pixel{255, 0, 255};
+  constexpr int full_width = 33300, full_height = 33301;
+  for (const std::uint32_t size : {0xffffffffu, 0x80000000u, 0x40000000u})
+    EXPECT_THAT(message([&] {
+                  light_of("a.tif", tiff_of(1, 1, 8, 1, pixel, {{full_width, size}, {full_height, 1}}));
+                }),
+                HasSubstr("it may be damaged"))
+        << size;
 }
 
 TEST(PictureColors, IntegersOfAllSizesAreSrgb) {
@@ -335,6 +363,7 @@ std::string luminance_chroma(const Vector3d& rgb) {
 TEST(PictureColors, LuminanceAndChroma) {
   const Vector3d rgb(0.2, 0.5, 0.8);
   EXPECT_LT((light_of("a.exr", luminance_chroma(rgb)) - rgb).cwiseAbs().maxCoeff(), 1e-3);
+  EXPECT_THAT(message([&] { light_of("a.exr", luminance_chroma(rgb), "key"); }), HasSubstr("cannot read"));
   std::string cut = luminance_chroma(rgb);
   cut.resize(cut.size() - 4);
   EXPECT_THAT(message([&] { light_of("a.exr", cut); }), HasSubstr("cannot read"));

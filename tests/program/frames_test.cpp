@@ -89,6 +89,14 @@ TEST_F(Frames, ABadFrameStopsNoOthersOnRequest) {
     EXPECT_NE(outcome.error.find(line), std::string::npos) << line << outcome.error;
   EXPECT_EQ(std::count(outcome.error.begin(), outcome.error.end(), '\n'), 4) << outcome.error;
 
+  // No frame is well: each is named.
+  const Outcome none = run({"render", "scene.json", "--frames", "4,0", "-o", "c.#.exr", "-q", "--keep-going"});
+  EXPECT_EQ(none.status, 1);
+  for (const char* line : {"tensorray: frame 4: ", "tensorray: frame 0: ", "tensorray: 2 frames failed: 4, 0;"})
+    EXPECT_NE(none.error.find(line), std::string::npos) << line << none.error;
+  expect_error({"render", "scene.json", "--frames", "4,0", "-o", "c.#.exr", "--keep-going", "--set", "field.files=1"},
+               "unknown key `/field/files`");
+
   // A frame whose scene is wrong, and not its files.
   const Outcome wrong =
       run({"render", "scene.json", "--frames", "1-3", "--keep-going", "-q", "-o", "b.$F.exr", "--set",
@@ -105,7 +113,12 @@ TEST_F(Frames, MistakesAreNamed) {
   expect_error({"render", "scene.json", "--frames", "1-2", "-o", "a.#.exr", "--stats", "s.json"}, "s.json");
   expect_error({"render", "scene.json", "--frames", "2-1"}, "--frames 2-1");
   for (const char* name : {"a.%04d.exr", "a.$F4.exr"})
-    expect_error({"render", "scene.json", "-o", name}, "has the number of a frame; give --frames");
+    for (const std::vector<std::string>& option :
+         {std::vector<std::string>{"-o", name}, {"--set", std::string("output.exr=") + name}, {"--stats", name}}) {
+      std::vector<std::string> arguments{"render", "scene.json", "--set", "light.direction=[0,0,-1]"};
+      arguments.insert(arguments.end(), option.begin(), option.end());
+      expect_error(arguments, "has the number of a frame; give --frames");
+    }
   expect_error({"render", "scene.json", "--frames", "1-2", "--save-scene", "copy.json"}, "--save-scene");
   EXPECT_FALSE(exists(in_folder("one.exr")));
 }

@@ -230,6 +230,22 @@ TEST_F(ColorTest, UnknownNamesListTheKnownOnes) {
               AllOf(HasSubstr("\"Filmic\""), HasSubstr("\"Un-tone-mapped\", \"ACES SDR\", \"Raw\"")));
 }
 
+TEST_F(ColorTest, DisplaysWithoutAnInverseAreShownButNotStated) {
+  std::string text = config_text(linear_role + aces_role + xyz_role);
+  const auto insert = [&](const std::string& before, const std::string& addition) {
+    text.insert(text.find(before), addition);
+  };
+  insert("    - !<View> {name: Curve", "    - !<View> {name: Grey, view_transform: Plain, display_colorspace: grey}\n");
+  insert("colorspaces:\n  - !<ColorSpace>\n    name: aces",
+         "  - !<ColorSpace>\n    name: grey\n    from_display_reference: !<MatrixTransform> "
+         "{matrix: [0, 1, 0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0, 0, 0, 1]}\n");
+  const Temporary file("grey.ocio", text);
+  const ColorManagement color({file.path(), "Screen", "Grey"});
+  EXPECT_NEAR(displayed_grey(color, 0.5f), 0.5, 1e-3);
+  EXPECT_FALSE(color.display_encoding().is_srgb);
+  EXPECT_EQ(color.display_encoding().icc_profile, "");
+}
+
 TEST_F(ColorTest, BadConfigsAreOneClearLine) {
   EXPECT_THAT(error_of({"/no/such.ocio", "", ""}), HasSubstr("/no/such.ocio: no such file"));
   EXPECT_THAT(error_of({::testing::TempDir(), "", ""}), HasSubstr("folder"));

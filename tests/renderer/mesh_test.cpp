@@ -259,6 +259,17 @@ TEST(ReadMeshTest, PolygonsHaveTheirArea) {
     }
 }
 
+TEST(ReadMeshTest, PolygonsThatCrossThemselvesAreDivided) {
+  Polygon star;  // Its corners are on a circle, in an order that has no ear.
+  constexpr int count = 9999, step = 4999;
+  for (int i = 0; i < count; ++i) {
+    const double angle = 2 * M_PI * (i * static_cast<long>(step) % count) / count;
+    star.corners.emplace_back(std::cos(angle) + 1e-3 * (i % 7), std::sin(angle), 0);
+  }
+  const Temporary file("star.obj", obj_of(star));
+  EXPECT_NEAR(static_cast<double>(read_mesh(file.path()).triangles.size()), count - 2, 10);
+}
+
 TEST(ReadMeshTest, CornersInALineKeepNeighboursJoined) {
   // A tetrahedron of which one face is a quadrilateral: it has a corner in the middle of an edge, where the triangles
   // of the other face at this edge meet.
@@ -310,6 +321,7 @@ TEST(ReadMeshTest, ObjErrorsNameTheLine) {
                                                         {"f 1 2\n", "line 4: a face needs at least three"},
                                                         {"v 1 2\n", "line 4: \"v\" needs three numbers"},
                                                         {"v 1 2 three\n", "line 4: \"three\" is not a number"},
+                                                        {"v 1e400 0 0\nf 1 2 4\n", "vertex 2 is not finite"},
                                                         {"surf 0 1 0 1 1 2\n", "line 4: \"surf\" is not read"},
                                                         {"F 1 2 3\n", "line 4: \"F\" is not read"},
                                                         {"v 0 0 0 0\n", "line 4: the vertex has the weight 0"}}) {
@@ -465,6 +477,22 @@ TEST(MeshNormalsTest, OfObjBelongToCorners) {
   EXPECT_EQ(read_mesh(file.path()).vertices.size(), 4u);
 }
 
+TEST(MeshNormalsTest, OfPlyMayBeMissing) {
+  // Vertices with and without normals, and numbers that are too small for double precision.
+  const std::string position = "property float x\nproperty float y\nproperty float z\n";
+  for (const bool first : {true, false}) {
+    const std::string with = "element vertex 1\n" + position + "property float nz\n",
+                      without = "element vertex 2\n" + position;
+    const Temporary file("mixed.ply", "ply\nformat ascii 1.0\n" + (first ? with + without : without + with) +
+                                          "element face 1\nproperty list uchar int vertex_indices\nend_header\n" +
+                                          (first ? "0 0 1e-400 1\n+1 0 0\n0 1 0\n" : "1 0 0\n0 1 0\n0 0 0 1\n") +
+                                          "3 0 1 2\n");
+    const MeshWithNormals mesh = read_mesh_with_normals(file.path(), std::nullopt);
+    ASSERT_EQ(mesh.normals.size(), 3u);
+    for (std::size_t i = 0; i < 3; ++i) EXPECT_EQ(mesh.normals[i].z(), mesh.mesh.vertices[i].isZero() ? 1 : 0) << i;
+  }
+}
+
 TEST(ReadMeshTest, PlyFilesThatWereCutOffAreRefused) {
   for (const std::string& whole : {tetrahedron_ply.substr(0, tetrahedron_ply.size() - 2),  // Without "3\n".
                                    binary_tetrahedron(false, "\n")})
@@ -505,6 +533,11 @@ TEST(ReadMeshTest, BadFilesAreOneClearLine) {
   EXPECT_THAT(error("type.ply", "ply\nformat ascii 1.0\nelement vertex 1\nproperty complex x\nend_header\n1\n"),
               HasSubstr("\"complex\""));
   EXPECT_THAT(error("count.ply", "ply\nformat ascii 1.0\nelement vertex\nend_header\n"), HasSubstr("no count"));
+  EXPECT_THAT(error("strip.ply",
+                    "ply\nformat binary_little_endian 1.0\nelement tristrips 1\n"
+                    "property list int int vertex_indices\nend_header\n" +
+                        std::string("\xff\xc9\x9a\x3b", 4)),
+              HasSubstr("cut off"));
   EXPECT_THAT(error("huge.ply", ply_header("binary_little_endian", 2000000000, 3) + "abc"), HasSubstr("cut off"));
   std::string not_finite = tetrahedron_ply;
   not_finite.replace(not_finite.find("1 0 0"), 5, "nan 0 0");

@@ -1,5 +1,7 @@
 #include "scenes/pipeline/read_scene.h"
 
+#include <algorithm>
+#include <cstdlib>
 #include <filesystem>
 #include <fstream>
 #include <map>
@@ -348,6 +350,9 @@ TEST_F(ReadScene, PathsOfAnyBytesComeBack) {
   EXPECT_EQ(scene.field.file, folder_ / name);
   const SceneDescription again = read_scene_json(parse_value(scene.text), scene.path);
   EXPECT_EQ(again.field.file, folder_ / name);
+  const SceneDescription config = read({"output.ocio=/tmp/" + name});
+  EXPECT_EQ(config.output.ocio, "/tmp/" + name);
+  EXPECT_EQ(read_scene_json(parse_value(config.text), config.path).output.ocio, "/tmp/" + name);
   const SceneDescription alone = read_scene("/tmp/" + name, {});
   EXPECT_EQ(alone.field.file, "/tmp/" + name);
 }
@@ -428,6 +433,19 @@ TEST_F(ReadScene, NoOutputTakesThePlaceOfAnInput) {
   EXPECT_EQ(input_files(scene).size(), 10u) << "a new kind of input belongs into this test";
   EXPECT_NO_THROW(check_files(scene, {{folder_ / "new.json", "--stats"}}));
   EXPECT_NO_THROW(check_files(scene, {{"/dev/stdout", "--stats"}}));
+}
+
+/// A config that is not read is no input, which its file would have to exist for.
+TEST_F(ReadScene, TheConfigOfTheEnvironmentIsAnInputWhereItIsRead) {
+  setenv("OCIO", "/no/such.ocio", 1);
+  const auto reads_it = [&](const Overrides& overrides) {
+    const std::vector<NamedFile> files = input_files(read(overrides));
+    return std::any_of(files.begin(), files.end(), [](const NamedFile& file) { return file.path == "/no/such.ocio"; });
+  };
+  EXPECT_TRUE(reads_it({}));
+  for (const char* other : {"output.ocio=built-in", "output.ocio=own.ocio", "output.ocio=ocio://default"})
+    EXPECT_FALSE(reads_it({other})) << other;
+  unsetenv("OCIO");
 }
 
 TEST_F(ReadScene, Spectra) {

@@ -12,6 +12,7 @@
 #include <fmt/core.h>
 #include <nlohmann/json.hpp>
 
+#include "base/path_text.h"
 #include "base/text.h"
 #include "tools/command_line/threads.h"
 #include "tools/commands/commands.h"
@@ -117,7 +118,7 @@ Json to_json(const FieldInfo& field) {
 }
 
 void print_json(const InfoOptions& options, const std::vector<GridInfo>& grids, const std::vector<FieldInfo>& fields) {
-  Json json = {{"file", options.file.string()}, {"grids", Json::array()}, {"fields", Json::array()}};
+  Json json = {{"file", text_of_path(options.file)}, {"grids", Json::array()}, {"fields", Json::array()}};
   for (const GridInfo& grid : grids) {
     json["grids"].push_back({{"name", grid.name}, {"type", grid.type}, {"storage", grid.storage}});
   }

@@ -8,7 +8,6 @@
 #include <fmt/format.h>
 
 #include "base/distinct_files.h"
-#include "base/numbered_name.h"
 #include "base/text.h"
 #include "scenes/keys/frames.h"
 #include "scenes/pipeline/methods.h"
@@ -84,16 +83,6 @@ SceneChanges changes_of(const RenderOptions& options) {
   return changes;
 }
 
-/// Other programs' numbers of frames mean that frames are wanted. (# may be part of a name.)
-void refuse_number_signs(const SceneChanges& changes, const RenderRun& run) {
-  std::vector<std::filesystem::path> files = changes.outputs;
-  files.insert(files.end(), {run.statistics, run.keeping.shard_file});
-  for (const std::filesystem::path& file : files)
-    if (has_foreign_number_sign(file.filename().string()))
-      throw std::invalid_argument(printable(file.string()) +
-                                  ": has the number of a frame; give --frames, as --frames 7");
-}
-
 /// The end of a run that keeps going. @throw std::runtime_error if frames failed.
 void report_failed(const std::vector<int>& failed) {
   if (failed.empty()) return;
@@ -142,7 +131,6 @@ std::vector<int> render(const RenderOptions& options, Leader* leader, Progress& 
   if (!run.keeping.display.empty()) check_display_address(run.keeping.display);
   if (!options.shard.empty()) take_shard(options.shard, changes, run.keeping);
   if (options.frames.empty()) {
-    refuse_number_signs(changes, run);
     render_scene(options.scene, changes, run, progress);
     return {};
   }

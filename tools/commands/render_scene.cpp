@@ -11,6 +11,7 @@
 
 #include <fmt/format.h>
 
+#include "base/numbered_name.h"
 #include "base/path_text.h"
 #include "base/seconds.h"
 #include "base/text.h"
@@ -236,6 +237,16 @@ void check_names(const std::filesystem::path& scene_file, SceneChanges changes, 
                                 name.string())));
 }
 
+/// Other programs' numbers of frames mean that frames are wanted. (# may be part of a name.)
+void refuse_number_signs(const SceneDescription& description, const RenderRun& run) {
+  std::vector<std::filesystem::path> files = files_of(description, run);
+  if (!run.scene_copy.empty()) files.push_back(run.scene_copy);
+  for (const std::filesystem::path& file : files)
+    if (has_foreign_number_sign(file.filename().string()))
+      throw std::invalid_argument(printable(file.string()) +
+                                  ": has the number of a frame; give --frames, as --frames 7");
+}
+
 /// Pages of a field that is larger than the memory are on the disk of the result.
 void bound_memory_of(const RenderRun& run, const SceneDescription& description) {
   if (run.memory > 0)
@@ -248,7 +259,7 @@ void render_frame(const std::filesystem::path& scene_file, SceneChanges changes,
   const int frame = job.at("frame").get<int>();
   changes.frame = frame;
   SceneDescription description = read_scene(scene_file, changes);
-  set_chosen(job, description);
+  if (job.contains("scale")) set_chosen(job, description);
   bound_memory_of(run, description);
   const RenderRun with_number = at_frame(run, frame);
   const std::vector<std::filesystem::path> files = files_of(description, with_number);
@@ -281,11 +292,12 @@ void try_frame(const std::filesystem::path& scene_file, const SceneChanges& chan
 
 /// What the frames of a sequence have in common.
 struct Sequence {
-  Json job;  ///< The scale and the direction, where scenes leave them open.
+  Json job = Json::object();  ///< The scale and the direction, where scenes leave them open.
   bool is_divided = false;
 };
 
-/// That of its first frame; where the run keeps going, of the first one that can be loaded.
+/// That of its first frame; where the run keeps going, of the first one that can be loaded, or nothing if none can:
+/// each then fails when its turn comes.
 Sequence sequence_of(const std::filesystem::path& scene_file, SceneChanges changes, const std::vector<int>& frames,
                      const RenderRun& run, std::optional<Scene>& loaded, Progress& progress) {
   for (const int frame : frames) {
@@ -300,11 +312,13 @@ Sequence sequence_of(const std::filesystem::path& scene_file, SceneChanges chang
               first.integrator.method().is_divided()};
     } catch (const Cancelled&) {
       throw;
+    } catch (const std::invalid_argument&) {
+      if (!run.keep_going || frame == frames.back()) throw;
     } catch (const std::exception&) {
-      if (!run.keep_going || frame == frames.back()) throw;  // Else it is reported when its turn comes.
+      if (!run.keep_going) throw;
     }
   }
-  throw std::logic_error("a sequence has frames");
+  return {};
 }
 
 /// Does units of a render of rank 0, until there are none left. @throw SceneError if its files are not those of rank 0.
@@ -332,6 +346,7 @@ void render_scene(const std::filesystem::path& scene_file, const SceneChanges& c
   const Threads threads(run.threads);
   set_image_threads(static_cast<int>(running_threads()));
   const SceneDescription description = read_scene(scene_file, changes);
+  refuse_number_signs(description, run);
   bound_memory_of(run, description);
   const Method& method = description.integrator.method();
   if (run.leader && !method.is_divided())

@@ -21,7 +21,12 @@ constexpr double longest_tick = 0.2;  // Seconds after which a signal is noticed
 }  // namespace
 
 WorkKeeper::WorkKeeper(const Scene& scene, Work& work, const KeepSettings& settings)
-    : scene_(scene), work_(work), settings_(settings), thread_([this] { run(); }) {}
+    : scene_(scene), work_(work), settings_(settings), thread_([this] {
+        try {
+          run();
+        } catch (...) {  // There was no memory even for a warning: the render goes on.
+        }
+      }) {}
 
 WorkKeeper::~WorkKeeper() {
   {

@@ -63,11 +63,17 @@ class PageSocket : public std::enable_shared_from_this<PageSocket> {
       waiting_bytes_ -= waiting->data.size();
       queue_.erase(waiting);
     }
-    // What waited before counts: one message, such as a large picture, may have any size.
-    if (waiting_bytes_ > Server::most_waiting_bytes) return beast::get_lowest_layer(socket_).close();
+    if (waits_for_too_much()) return beast::get_lowest_layer(socket_).close();
     waiting_bytes_ += message.data.size();
     queue_.push_back(std::move(message));
     if (!writes_) write();
+  }
+
+  /// One message, such as a large picture, may have any size, and others behind it do not make it too large.
+  bool waits_for_too_much() const {
+    std::size_t largest = 0;
+    for (const PageMessage& message : queue_) largest = std::max(largest, message.data.size());
+    return waiting_bytes_ - largest > Server::most_waiting_bytes;
   }
 
   void write() {

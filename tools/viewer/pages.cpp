@@ -7,6 +7,7 @@
 #include <iterator>
 #include <set>
 #include <stdexcept>
+#include <utility>
 
 #include <fmt/format.h>
 
@@ -70,6 +71,19 @@ Json parsed(const std::string& text) {
     throw std::invalid_argument("the message `" + type + "` has no `scene`");
   return message;
 }
+
+/// Calls a function at the end of its life, however that comes.
+template <class Function>
+class WhenLeft {
+ public:
+  explicit WhenLeft(Function function) : function_(std::move(function)) {}
+  ~WhenLeft() { function_(); }
+  WhenLeft(const WhenLeft&) = delete;
+  WhenLeft& operator=(const WhenLeft&) = delete;
+
+ private:
+  Function function_;
+};
 
 double number(const Json& message, const char* key) {
   const auto found = message.find(key);
@@ -245,6 +259,12 @@ void Pages::make_stage(const PagePointer& page) {
     progress_.cancelled = ends_;
     rendering_ = is_first ? nullptr : page;
   }
+  const WhenLeft end([&] {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    rendering_.reset();
+    progress_.report = {};
+    progress_.cancelled = ends_;
+  });
   auto last = Clock::now();
   progress_.report = [&](const std::string& phase, std::uint64_t done, std::uint64_t total) {
     if (is_first || seconds_since(last) < 0.2) return;
@@ -271,10 +291,6 @@ void Pages::make_stage(const PagePointer& page) {
     page->stages.clear();
     page->send(error_message(page->shown_id, error.what()));
   }
-  const std::lock_guard<std::mutex> lock(mutex_);
-  rendering_.reset();
-  progress_.report = {};
-  progress_.cancelled = ends_;
 }
 
 void Pages::send_picture(Page& page, const Stage& stage, double seconds_loading) {

@@ -31,7 +31,7 @@ class Server {
 
   static constexpr std::size_t most_connections = 64, most_pages = 8;
   static constexpr std::size_t most_message_bytes = 1 << 20;
-  /// A page that still has more than this to read when another message comes is closed.
+  /// A page that still has more than this to read, beside its largest message, when another comes is closed.
   static constexpr std::size_t most_waiting_bytes = 64 << 20;
 
   /// Listens. @throw std::runtime_error if the address or port cannot be had, or the page is not built;
