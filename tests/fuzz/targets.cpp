@@ -22,6 +22,8 @@
 #include "scenes/keys/json_reader.h"
 #include "scenes/keys/overrides.h"
 #include "scenes/pipeline/read_scene.h"
+#include "tests/fuzz/view_targets.h"
+#include "tests/fuzz/view_targets.h"
 #include "tools/import/lattices/lattice_files.h"
 #include "tools/import/vtk/netcdf_size.h"
 #include "tools/import/vtk/plot3d_layout.h"
@@ -187,7 +189,9 @@ const std::vector<FuzzTarget>& fuzz_targets() {
                                                {"plot3d", read_plot3d},
                                                {"netcdf", read_netcdf},
                                                {"vdb_tree", read_vdb_tree},
-                                               {"vdb_table", read_vdb_table}};
+                                               {"vdb_table", read_vdb_table},
+                                               {"http", read_http},
+                                               {"page", read_page_message}};
   return targets;
 }
 

@@ -1,0 +1,105 @@
+#include "tests/fuzz/view_targets.h"
+
+#include <condition_variable>
+#include <fstream>
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <stdexcept>
+#include <thread>
+
+#include <boost/asio/ip/tcp.hpp>
+#include <boost/asio/read.hpp>
+#include <boost/asio/write.hpp>
+
+#include "tests/viewer/view_support.h"
+#include "tools/viewer/server.h"
+
+namespace tensorray::test {
+namespace {
+
+namespace asio = boost::asio;
+using tcp = asio::ip::tcp;
+
+/// A server of a small scene, until the program ends.
+class View {
+ public:
+  View() {
+    std::ofstream(folder_ / "scene.json") << small_scene();
+    for (const char* file : {"index.html", "view.js", "view.css"}) std::ofstream(folder_ / file) << file;
+    pages_.emplace(ViewedScene{folder_ / "scene.json", {}, folder_ / "saved.json"}, progress_);
+    ServerSettings settings;
+    settings.token = "secret";
+    settings.page = folder_ / "";
+    server_.emplace(settings, *pages_);
+    thread_ = std::thread([this] { server_->run(progress_); });
+  }
+  ~View() {
+    progress_.cancelled = true;
+    thread_.join();
+  }
+
+  Pages& pages() { return *pages_; }
+
+  std::string port() const {
+    const std::string url = server_->url(), before = "http://127.0.0.1:";
+    return url.substr(before.size(), url.find('/', before.size()) - before.size());
+  }
+
+ private:
+  TemporaryFolder folder_;
+  Progress progress_;
+  std::optional<Pages> pages_;
+  std::optional<Server> server_;
+  std::thread thread_;
+};
+
+View& view() {
+  static View only;
+  return only;
+}
+
+std::string replaced(std::string text, const std::string& what, const std::string& by) {
+  for (std::size_t at = 0; (at = text.find(what, at)) != std::string::npos; at += by.size())
+    text.replace(at, what.size(), by);
+  return text;
+}
+
+}  // namespace
+
+void read_http(const std::string& bytes) {
+  const std::string port = view().port();
+  asio::io_context context;
+  tcp::socket socket(context);
+  socket.connect({asio::ip::make_address("127.0.0.1"), static_cast<std::uint16_t>(std::stoi(port))});
+  boost::system::error_code ignored;  // The server may end the connection at any time.
+  asio::write(socket, asio::buffer(replaced(bytes, "PORT", port)), ignored);
+  socket.shutdown(tcp::socket::shutdown_send, ignored);
+  std::string answer;
+  asio::read(socket, asio::dynamic_buffer(answer), ignored);
+  if (!answer.empty() && answer.compare(0, 9, "HTTP/1.1 ") != 0 && answer.compare(0, 9, "HTTP/1.0 ") != 0)
+    throw std::logic_error("this is no answer of HTTP: " + answer.substr(0, 100));
+}
+
+void read_page_message(const std::string& bytes) {
+  struct Answer {
+    std::mutex mutex;
+    std::condition_variable arrived;
+    bool is_there = false;
+  };
+  const auto answer = std::make_shared<Answer>();  // A message may come after the page was closed.
+  const Pages::Id id = view().pages().open([answer](const PageMessage& message) {
+    const std::lock_guard<std::mutex> lock(answer->mutex);
+    answer->is_there |= received(message).json.value("id", Json()) == "the last message";
+    answer->arrived.notify_all();
+  });
+  view().pages().receive(id, bytes);
+  view().pages().receive(id, R"({"type": "space", "id": "the last message"})");
+  {
+    std::unique_lock<std::mutex> lock(answer->mutex);
+    answer->arrived.wait(lock, [&] { return answer->is_there; });
+  }
+  view().pages().close(id);
+}
+
+}  // namespace tensorray::test
