@@ -170,7 +170,10 @@ IccProfile parse_icc_profile(const std::string& bytes, bool grey) {
   }
   profile.curves = {parse_curve(tags, "rTRC"), parse_curve(tags, "gTRC"), parse_curve(tags, "bTRC")};
   Matrix3d matrix;
-  matrix << parse_xyz(tags, "rXYZ"), parse_xyz(tags, "gXYZ"), parse_xyz(tags, "bXYZ");
+  // Not by <<, which must not be left by an exception.
+  matrix.col(0) = parse_xyz(tags, "rXYZ");
+  matrix.col(1) = parse_xyz(tags, "gXYZ");
+  matrix.col(2) = parse_xyz(tags, "bXYZ");
   if (!(std::abs(matrix.determinant()) > 1e-6)) throw std::runtime_error("its primaries are no colours");
   profile.rgb_to_xyz = *adaptation(profile_white, d65) * matrix;
   return profile;

@@ -131,8 +131,10 @@ Eigen::Affine3d fbx_to_world(const aiScene& scene) {
     if (number < 0 || number > 2) throw std::runtime_error("its axes are not right, up and front");
     return Eigen::Vector3d(metadata(scene, (std::string(key) + "Sign").c_str(), 1) * Eigen::Vector3d::Unit(number));
   };
-  Eigen::Matrix3d turn;  // Rows: where x, y and z come from.
-  turn << axis("CoordAxis", 0).transpose(), -axis("FrontAxis", 2).transpose(), axis("UpAxis", 1).transpose();
+  Eigen::Matrix3d turn;                            // Rows: where x, y and z come from.
+  turn.row(0) = axis("CoordAxis", 0).transpose();  // Not by <<, which must not be left by an exception.
+  turn.row(1) = -axis("FrontAxis", 2).transpose();
+  turn.row(2) = axis("UpAxis", 1).transpose();
   if (std::abs(turn.determinant()) != 1) throw std::runtime_error("its axes are not right, up and front");
   float unit = 1;
   if (scene.mMetaData) scene.mMetaData->Get("UnitScaleFactor", unit);

@@ -1,6 +1,7 @@
 // Too few threads and too little memory: what is said, and that estimates are near what is needed.
 
 #include <cmath>
+#include <set>
 
 #include "tests/program/support.h"
 
@@ -37,20 +38,21 @@ TEST_F(Limits, AreSaidInOneLine) {
   struct Case {
     std::string shell;
     std::vector<std::string> more;
-    int status;
+    std::set<int> statuses;
     const char* line;
   };
   const std::string little = "ulimit -v 3000000; exec";
   const std::vector<Case> cases{
-      {without_threads(), {}, 1, "Resource temporarily unavailable"},
-      {little, {"--set", "receiver.resolution=[16000,16000]"}, 2, "`/receiver/resolution` needs about"},
-      {little, {"--set", "integrator.type=lens", "--set", "receiver.resolution=[8000,8000]"}, 2, "ulimit -v"},
-      {little, {"--set", "integrator.type=path_tracing", "--set", "camera.resolution=[6000,6000]"}, 2, "needs about"},
-      {little, {"--set", "integrator.type=scene", "--set", "camera.resolution=[6000,6000]"}, 2, "needs about"},
-      {"ulimit -v 300000; exec", {}, 1, "tensorray: "}};
+      {without_threads(), {}, {1}, "Resource temporarily unavailable"},
+      {little, {"--set", "receiver.resolution=[16000,16000]"}, {2}, "`/receiver/resolution` needs about"},
+      {little, {"--set", "integrator.type=lens", "--set", "receiver.resolution=[8000,8000]"}, {2}, "ulimit -v"},
+      {little, {"--set", "integrator.type=path_tracing", "--set", "camera.resolution=[6000,6000]"}, {2}, "needs about"},
+      {little, {"--set", "integrator.type=scene", "--set", "camera.resolution=[6000,6000]"}, {2}, "needs about"},
+      // Too little for the program: threads' memory decides whether the check notices it, or what is loaded later.
+      {"ulimit -v 300000; exec", {}, {1, 2}, "tensorray: "}};
   for (const Case& each : cases) {
     const Outcome outcome = run_in(each.shell, each.more);
-    EXPECT_EQ(outcome.status, each.status) << each.shell << outcome.error;
+    EXPECT_EQ(each.statuses.count(outcome.status), 1u) << each.shell << outcome.error;
     EXPECT_EQ(outcome.error.rfind("tensorray: ", 0), 0u) << outcome.error;
     EXPECT_NE(outcome.error.find(each.line), std::string::npos) << each.line << outcome.error;
     EXPECT_EQ(std::count(outcome.error.begin(), outcome.error.end(), '\n'), 1) << outcome.error;
