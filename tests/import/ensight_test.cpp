@@ -101,6 +101,21 @@ TEST(EnSight, DamageIsAnErrorWithTheFile) {
   EXPECT_NE(error_of([&] { read_vtk_source(folder / "b.case"); }).find("is not a case of EnSight"), std::string::npos);
 }
 
+/// VTK seeks the steps in all files of such a case, for ever in those without.
+TEST(EnSight, StepsInOneFileAreRefusedWhereOthersHaveNone) {
+  const TemporaryFolder folder;
+  write_case(folder);
+  std::string text = bytes_of(folder / "a.case");
+  text.replace(text.find("1 symmetric a.*.sym"), 19, "1 1 symmetric a.sym");
+  write_bytes(folder / "a.case", text + "FILE\nfile set: 1\nnumber of steps: 2\n");
+  std::string steps;
+  for (const char* step : {"a.0.sym", "a.1.sym"})
+    steps += "BEGIN TIME STEP\n" + bytes_of(folder / step) + "END TIME STEP\n";
+  write_bytes(folder / "a.sym", steps);
+  EXPECT_NE(error_of([&] { read_vtk_source(folder / "a.case"); }).find("a.geo: has no steps of time"),
+            std::string::npos);
+}
+
 /// VTK itself repeats the last number of a text that is cut off, and goes on for ever with some damaged cases.
 TEST(EnSight, WhatIsCutOffOrMissingIsNamed) {
   const TemporaryFolder folder;

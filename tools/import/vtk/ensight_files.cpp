@@ -170,10 +170,22 @@ std::set<std::uint64_t> sizes_in(vtkDataObject& read) {
   return sizes;
 }
 
-bool is_binary(const fs::path& geometry) {
-  std::string head(80, '\0');
-  std::ifstream(geometry, std::ios::binary).read(head.data(), static_cast<std::streamsize>(head.size()));
-  return head.find("inary") != std::string::npos;
+/// Whether a file has a text in its first lines.
+bool begins_with(const fs::path& path, const std::string& text) {
+  std::string head(240, '\0');
+  std::ifstream(path, std::ios::binary).read(head.data(), static_cast<std::streamsize>(head.size()));
+  return head.find(text) != std::string::npos;
+}
+
+/// In a case with file sets VTK seeks the steps in all files, and goes on for ever in one without.
+void check_file_sets(const std::vector<Entry>& entries, const EnSightCase& given) {
+  const auto is_set = [](const Entry& entry) { return entry.section == "FILE" && entry.name == "file set"; };
+  if (std::none_of(entries.begin(), entries.end(), is_set)) return;
+  for (const auto& [kind, file] : given.files)
+    if (!begins_with(file, "BEGIN TIME STEP"))
+      fail(file,
+           "has no steps of time, and other files of its case have several (FILE), which is not read; write a "
+           "file for each step");
 }
 
 }  // namespace
@@ -192,11 +204,14 @@ EnSightCase ensight_case(const fs::path& path, std::optional<double> time) {
     if (!fs::exists(file)) fail(file, "is missing, which " + path.filename().string() + " names; copy it there too");
     result.files.push_back({entry.name, file});
   }
+  check_file_sets(entries, result);
   return result;
 }
 
 void check_ensight_ends(const EnSightCase& given, vtkDataObject& read) {
-  const auto is_binary_model = [](const EnSightFile& file) { return file.kind == "model" && is_binary(file.file); };
+  const auto is_binary_model = [](const EnSightFile& file) {
+    return file.kind == "model" && begins_with(file.file, "inary");
+  };
   if (!given.is_gold || std::any_of(given.files.begin(), given.files.end(), is_binary_model)) return;
   const std::set<std::uint64_t> sizes = sizes_in(read);
   for (const auto& [kind, file] : given.files) {
