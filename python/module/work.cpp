@@ -44,7 +44,7 @@ void do_work(Call& shared, const std::function<void(const Progress&)>& work, int
   shared.ended.notify_one();
 }
 
-/// @throw py::error_already_set if a signal or `report` raised an exception.
+/// @throw py::error_already_set if a signal or `report` raised an exception; std::bad_alloc.
 void look_up(Call& shared, const py::object& report) {
   std::unique_lock<std::mutex> lock(shared.mutex);
   const std::string phase = shared.phase;
@@ -74,7 +74,7 @@ void run(const std::function<void(const Progress&)>& work, const py::object& rep
       lock.unlock();
       try {
         if (!interrupt) look_up(shared, report);
-      } catch (const py::error_already_set&) {
+      } catch (...) {
         interrupt = std::current_exception();
         shared.progress.cancelled = true;
       }

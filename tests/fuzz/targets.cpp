@@ -23,7 +23,6 @@
 #include "scenes/keys/overrides.h"
 #include "scenes/pipeline/read_scene.h"
 #include "tests/fuzz/view_targets.h"
-#include "tests/fuzz/view_targets.h"
 #include "tools/import/lattices/lattice_files.h"
 #include "tools/import/vtk/netcdf_size.h"
 #include "tools/import/vtk/plot3d_layout.h"

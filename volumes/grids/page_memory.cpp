@@ -33,7 +33,8 @@ constexpr double high = 0.75, low = 0.55;  ///< Parts of the bound: pages are dr
 
 /// What is resident of this process.
 std::size_t resident() {
-  static const Descriptor file = open_file("/proc/self/statm", O_RDONLY);
+  // It stays open: the thread that watches may read it until the process ends.
+  static const Descriptor& file = *new Descriptor(open_file("/proc/self/statm", O_RDONLY));
   std::array<char, 128> text{};
   if (pread(file.get(), text.data(), text.size() - 1, 0) <= 0) return 0;
   char* second = nullptr;
