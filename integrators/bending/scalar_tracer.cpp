@@ -126,10 +126,9 @@ double Tracer<N>::automatic_step() const {
   return std::max(strongest / kick, shortest);
 }
 
-/// The path at the part t of a step to `next`.
+/// The path at a part of a step to `next`, or its derivative by this part.
 template <int N>
-Eigen::Vector3d Tracer<N>::between(const State<N>& next, double h, double t) const {
-  const PathWeights w = path_weights(t);
+Eigen::Vector3d Tracer<N>::between(const State<N>& next, double h, const PathWeights& w) const {
   return w.from * position() + h * w.from_direction * direction() + w.to * next.position() +
          h * w.to_direction * next.direction();
 }
@@ -141,10 +140,7 @@ void Tracer<N>::record_inner(const State<N>& next, double h) {
   const int count = is_composed() ? pieces_of(h / voxel_) : 1;
   for (int i = 1; i < count; ++i) {
     const double t = double(i) / count;
-    const PathWeights w = path_slopes(t);
-    const Eigen::Vector3d point = between(next, h, t);
-    const Eigen::Vector3d along = w.from / h * position() + w.from_direction * direction() +
-                                  w.to / h * next.position() + w.to_direction * next.direction();
+    const Eigen::Vector3d point = between(next, h, path_weights(t)), along = between(next, h, path_slopes(t));
     if (recording_.track) recording_.track->push_back({point, length_ + t * h});
     if (recording_.points) recording_.points->push_back({point, along.normalized(), length_ + t * h, true});
   }
@@ -181,6 +177,19 @@ typename Tracer<N>::Event Tracer<N>::meet(const Eigen::Vector3d& from, const Eig
   return event;
 }
 
+/// Improves the length of a landing by the path of the whole step to `next`.
+template <int N>
+void Tracer<N>::aim_along_path(const State<N>& next, double h, Landing& landing) const {
+  double t = landing.length / h;
+  for (int i = 0; i < 3; ++i) {
+    const double way = landing.hit.normal.dot(between(next, h, path_weights(t)) - position());
+    const double change = (landing.to_plane - way) / landing.hit.normal.dot(between(next, h, path_slopes(t)));
+    if (!(std::abs(change) <= 1)) return;  // The light is nearly parallel to the plane.
+    t = std::clamp(t + change, 0.0, 1.0);
+  }
+  landing.length = t * h;
+}
+
 /// What the step from the ray to `next` meets first, on the chords that it is divided into.
 template <int N>
 typename Tracer<N>::Event Tracer<N>::meet(const State<N>& next, double h, Landing& landing) const {
@@ -189,13 +198,15 @@ typename Tracer<N>::Event Tracer<N>::meet(const State<N>& next, double h, Landin
   const Eigen::Vector3d start = position();
   Eigen::Vector3d from = start;
   for (int i = 0; i < count; ++i) {
-    const Eigen::Vector3d to = i + 1 == count ? Eigen::Vector3d(next.position()) : between(next, h, (i + 1.0) / count);
+    const Eigen::Vector3d to =
+        i + 1 == count ? Eigen::Vector3d(next.position()) : between(next, h, path_weights((i + 1.0) / count));
     Hit& hit = landing.hit;
     const Event event = meet(from, to, hit);
     if (event != Event::none) {
       const Eigen::Vector3d chord = to - from;
       landing.to_plane = hit.normal.dot(from - start) + hit.normal.dot(chord) / chord.norm() * hit.distance;
       landing.length = part * i + part * hit.distance / chord.norm();
+      if (is_composed()) aim_along_path(next, h, landing);
       return event;
     }
     from = to;
@@ -217,7 +228,7 @@ double Tracer<N>::land(double h, const Landing& landing) {
     const double gap =
         (landing.to_plane - hit.normal.dot(landed.position() - start)) / hit.normal.dot(landed.direction());
     if (!(std::abs(gap) <= h)) break;  // The light is nearly parallel to the plane.
-    if (std::abs(gap) <= (is_composed() ? 1e-5 : 1e-10) * h || i == 3) {
+    if (std::abs(gap) <= (is_composed() ? 1e-4 : 1e-10) * h || i == 3) {
       landed.P += gap * landed.V;
       length += gap;
       break;

@@ -9,6 +9,7 @@
 
 #include "integrators/bending/bending.h"
 #include "integrators/bending/bending_steps.h"
+#include "integrators/bending/composition.h"
 #include "integrators/bending/ray_record.h"
 #include "renderer/surfaces/geometry.h"
 #include "volumes/bricks/tensor_sampler.h"
@@ -107,7 +108,8 @@ class Tracer {
   bool ends_before(double distance) const { return length_ + distance >= settings_.max_length; }
   void meet_surface(const Eigen::Vector3d& normal, bool bends);
   bool is_composed() const { return settings_.method == BendingMethod::splitting4; }
-  Eigen::Vector3d between(const State<N>& next, double h, double t) const;
+  Eigen::Vector3d between(const State<N>& next, double h, const PathWeights& weights) const;
+  void aim_along_path(const State<N>& next, double h, Landing& landing) const;
   void record_inner(const State<N>& next, double h);
   Event meet(const Eigen::Vector3d& from, const Eigen::Vector3d& to, Hit& hit) const;
   Event meet(const State<N>& next, double h, Landing& landing) const;

@@ -1,7 +1,9 @@
 #include "volumes/bricks/tensor_sampler.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <cstddef>
 #include <limits>
 
 #include "volumes/bricks/cubic_brick.h"
@@ -75,31 +77,85 @@ Eight bending(const TensorBrick& brick, int voxel) {
   return Eigen::Map<const Eigen::Array<float, 8, 1>>(stored).cast<double>();
 }
 
-/// The cubic B-spline at a point, and its slopes if they are wanted. @param first  The number of the first of the 4³
-/// coefficients.
-struct CubicCell {
-  const TensorBrick& brick;
-  int first;
-  const Eigen::Vector3d& fraction;
+/// Weights of the four coefficients about a point along each axis.
+struct SplineWeights {
+  double value[3][4], slope[3][4];
 
-  /// A component of index space's gradient, 0 to 2, or the value, −1.
-  Eigen::Matrix3d at(int slope) const {
-    double weights[3][4];
-    for (int axis = 0; axis < 3; ++axis)
-      axis == slope ? cubic_slopes(fraction[axis], weights[axis]) : cubic_weights(fraction[axis], weights[axis]);
-    Eight eight = Eight::Zero();
-    double last = 0;
-    for (int i = 0; i < 64; ++i) {
-      const int x = i >> 4, y = i >> 2 & 3, z = i & 3;
-      const int number = first + (x * CubicBrick::width + y) * CubicBrick::width + z;
-      const double weight = weights[0][x] * weights[1][y] * weights[2][z];
-      const float* const stored = brick.bending + CubicBrick::bending_offset(brick.components, number);
-      eight += weight * Eigen::Map<const Eigen::Array<float, 8, 1>>(stored).cast<double>();
-      last += weight * double{brick.trailing[number]};
+  explicit SplineWeights(const Eigen::Vector3d& fraction) {
+    for (int axis = 0; axis < 3; ++axis) {
+      cubic_weights(fraction[axis], value[axis]);
+      cubic_slopes(fraction[axis], slope[axis]);
     }
-    return to_matrix(brick, eight, last);
   }
 };
+
+/// to += weight · from
+template <std::size_t count, class Number>
+void add(double weight, const Number* from, std::array<double, count>& to) {
+  for (std::size_t i = 0; i < count; ++i) to[i] += weight * from[i];
+}
+
+/// The cubic B-spline of the numbers of a coefficient, and its slopes if they are wanted: sums along y, then x, then z.
+/// @param first  Numbers of the first of 4³ coefficients; those along z follow each other.
+template <int numbers, bool slopes>
+Slopes<std::array<double, numbers>> spline(const float* first, const SplineWeights& weights) {
+  constexpr std::size_t row = 4 * numbers;
+  std::array<double, row> values{}, by_x{}, by_y{};
+  for (int x = 0; x < 4; ++x) {
+    std::array<double, row> lines{}, lines_by_y{};
+    for (int y = 0; y < 4; ++y) {
+      const float* const coefficients = first + (x * CubicBrick::width + y) * CubicBrick::width * numbers;
+      add(weights.value[1][y], coefficients, lines);
+      if constexpr (slopes) add(weights.slope[1][y], coefficients, lines_by_y);
+    }
+    add(weights.value[0][x], lines.data(), values);
+    if constexpr (slopes) {
+      add(weights.slope[0][x], lines.data(), by_x);
+      add(weights.value[0][x], lines_by_y.data(), by_y);
+    }
+  }
+  Slopes<std::array<double, numbers>> result{};
+  for (int z = 0; z < 4; ++z) {
+    add(weights.value[2][z], &values[z * numbers], result.value);
+    if constexpr (!slopes) continue;
+    add(weights.value[2][z], &by_x[z * numbers], result.x);
+    add(weights.value[2][z], &by_y[z * numbers], result.y);
+    add(weights.slope[2][z], &values[z * numbers], result.z);
+  }
+  return result;
+}
+
+template <std::size_t components>
+Eigen::Matrix3d to_matrix(const TensorBrick& brick, const std::array<double, components>& bending, double trailing) {
+  Eight eight;
+  std::copy(bending.begin(), bending.end(), eight.data());
+  return to_matrix(brick, eight, trailing);
+}
+
+template <int components, bool slopes>
+Slopes<Eigen::Matrix3d> cubic_tensor(const TensorBrick& brick, int first, const SplineWeights& weights) {
+  const float* const bending = brick.bending + CubicBrick::bending_offset(components, first);
+  const auto most = spline<components, slopes>(bending, weights);
+  const auto last = spline<1, slopes>(brick.trailing + first, weights);
+  Slopes<Eigen::Matrix3d> result;
+  result.value = to_matrix(brick, most.value, last.value[0]);
+  if constexpr (slopes) {
+    result.x = to_matrix(brick, most.x, last.x[0]);
+    result.y = to_matrix(brick, most.y, last.y[0]);
+    result.z = to_matrix(brick, most.z, last.z[0]);
+  }
+  return result;
+}
+
+/// The tensor of a cubic field, and its slopes if they are wanted. @param first  The number of the first of the 4³
+/// coefficients.
+template <bool slopes>
+Slopes<Eigen::Matrix3d> cubic_tensor(const TensorBrick& brick, int first, const Eigen::Vector3d& fraction) {
+  const SplineWeights weights(fraction);
+  return brick.components == TensorBrick::symmetric
+             ? cubic_tensor<TensorBrick::symmetric, slopes>(brick, first, weights)
+             : cubic_tensor<TensorBrick::general, slopes>(brick, first, weights);
+}
 
 }  // namespace
 
@@ -107,7 +163,7 @@ Eigen::Matrix3d TensorSampler::at(const Eigen::Vector3d& world) {
   ++samples_;
   Eigen::Vector3d f;
   const int voxel = locate(world, f);
-  if (field_->is_cubic()) return CubicCell{brick_, voxel, f}.at(-1);
+  if (field_->is_cubic()) return cubic_tensor<false>(brick_, voxel, f).value;
   const double wx[2] = {1 - f.x(), f.x()}, wy[2] = {1 - f.y(), f.y()}, wz[2] = {1 - f.z(), f.z()};
   Eight eight = Eight::Zero();
   double last = 0;
@@ -131,10 +187,9 @@ Eigen::Matrix3d TensorSampler::at(const Eigen::Vector3d& world, const Eigen::Mat
   for (int axis = 0; axis < 3; ++axis)
     if (field_->voxels().sizes()[axis] == 0) by_index.row(axis).setZero();
   if (field_->is_cubic()) {
-    const CubicCell cell{brick_, voxel, f};
-    const Eigen::Matrix3d x = cell.at(0), y = cell.at(1), z = cell.at(2);
-    for (int i = 0; i < 2; ++i) derivatives[i] = by_index(0, i) * x + by_index(1, i) * y + by_index(2, i) * z;
-    return cell.at(-1);
+    const Slopes<Eigen::Matrix3d> T = cubic_tensor<true>(brick_, voxel, f);
+    for (int i = 0; i < 2; ++i) derivatives[i] = by_index(0, i) * T.x + by_index(1, i) * T.y + by_index(2, i) * T.z;
+    return T.value;
   }
   const auto eight = interpolate<Eight>(voxel, f, [&](int at) { return bending(brick_, at); });
   const auto last = interpolate<double>(voxel, f, [&](int at) { return double{brick_.trailing[at]}; });
