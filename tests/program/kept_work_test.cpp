@@ -116,7 +116,7 @@ TEST_F(KeptWork, AKilledRenderContinuesToTheSameFiles) {
 /// Their sums on the plate are kept, of each estimator.
 TEST_F(KeptWork, KilledPhotonsContinueToTheSameFiles) {
   for (const char* density : {R"({"kind": "gaussian", "tau": 2})", R"({"kind": "photon_differential"})"}) {
-    make(fmt::format(R"({{"field": {{"file": "field.vdb"}}, "light": {{"photons": 2e6, "wavelengths": {{"count": 8}}}},
+    make(fmt::format(R"({{"field": {{"file": "field.vdb"}}, "light": {{"photons": 4e5, "wavelengths": {{"count": 8}}}},
                          "receiver": {{"resolution": [64, 64]}},
                          "integrator": {{"type": "photon_distribution", "density": {}}}}})",
                      density)

@@ -21,7 +21,7 @@ class Memory : public Program {
 TEST_F(Memory, AFieldOfFourTimesTheBoundGivesTheSameFiles) {
   if (std::filesystem::space(in_folder("")).available < (std::uintmax_t{5} << 30))
     GTEST_SKIP() << "the test needs 5 GB on the disk of " << in_folder("");
-  run_well({"make", "point_load", "-o", "field.vdb", "--resolution", "308"});
+  run_well({"make", "point_load", "-o", "field.vdb", "--resolution", "262"});
   write("scene.json", scene(R"({"file": "field.vdb", "eigenvalues": "raw", "scale": 4})"));
   run_well({"render", "scene.json", "-q", "-o", "all.exr", "--stats", "all.json"});
   run_well(
