@@ -74,9 +74,10 @@ HWY_INLINE F deviator_norm(const Tensor& T, F factor) {
 }
 
 /// Stores |kick| times the norm of T's deviator where it may make steps shorter.
-HWY_INLINE void keep_bending_rate(Packet& packet, const Tensor& T, int at) {
+HWY_INLINE void keep_bending_rate(const PacketMedium& medium, Packet& packet, const Tensor& T, int at) {
   if (packet.greatest_reach <= strongest_kick) return;
-  store(deviator_norm(T, load(packet.kick, at)), packet.bending_rate, at);
+  const F unit = set(medium.unit);
+  store(hn::Div(deviator_norm(T, hn::Mul(unit, load(packet.kick, at))), unit), packet.bending_rate, at);
 }
 
 /// exp(factor · T) V, normalised, for any strength. The result is stored: a returned value would pass through memory in

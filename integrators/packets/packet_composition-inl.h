@@ -90,9 +90,11 @@ HWY_INLINE void end_composed(const PacketMedium& medium, Packet& packet, const C
         store(load(step.dv[k], i), packet.dv_next[k], i);
       }
     if (!medium.adaptive) continue;
-    const F3 error = load(step.error, i), u = load(packet.u, i);
-    const F voxels = hn::Sqrt(uniform ? dot(error, error) : hn::Mul(dot(error, error), dot(u, u)));
-    store(hn::Mul(hn::Mul(load(packet.time, i), voxels), set(1 / medium.settings.tolerance)), packet.excess, i);
+    const F3 error = load(step.error, i);
+    F squares = dot(error, error);
+    if constexpr (!uniform) squares = hn::Mul(squares, squared_voxels_per_unit(medium, packet, i));
+    const F time = hn::Div(load(packet.time, i), set(uniform ? 1 : medium.unit));
+    store(hn::Mul(hn::Mul(time, hn::Sqrt(squares)), set(1 / medium.settings.tolerance)), packet.excess, i);
   }
 }
 

@@ -381,7 +381,7 @@ void Kernel<Bricks, uniform, differentials, changes>::attempt(Packet& packet) {
 /// A step of a method other than splitting.
 template <class Bricks, bool uniform, bool differentials, bool changes>
 HWY_NOINLINE void Kernel<Bricks, uniform, differentials, changes>::step_otherwise(Packet& packet) {
-  const std::uint32_t stop = too_short<uniform>(packet);
+  const std::uint32_t stop = too_short<uniform>(medium_, packet);
   attempt(packet);
   samples_ += hwy::PopCount(packet.alive) * samples_per_step();
   const std::uint32_t staying = medium_.adaptive ? control_steps<uniform, differentials>(medium_, packet) : 0;

@@ -16,6 +16,7 @@ PacketMedium::PacketMedium(const TensorField& field_, const KernelSettings& sett
   uniform = cubes && settings.method == BendingMethod::splitting && !field.is_cubic();
   voxel = static_cast<float>(1 / M(0, 0));
   const Eigen::Matrix3d to_world = field.to_world().linear();
+  unit = static_cast<float>(std::exp2(std::round(std::log2(to_world.col(0).norm()))));
   longest_voxel = static_cast<float>(to_world.norm());  // The norm is not less than the greatest singular value.
   for (int row = 0; row < 3; ++row)
     for (int column = 0; column < 3; ++column) to_index[row][column] = static_cast<float>(M(row, column));

@@ -43,6 +43,7 @@ struct PacketMedium {
   /// space is scaled world space. This usual case is faster; other methods and fields have one code for all voxels.
   bool uniform;
   float voxel;          // If uniform: edge of a voxel, world units.
+  float unit;           // A power of two near a voxel's edge, world units: squares of lengths in it are not extreme.
   float longest_voxel;  // No voxel is longer along any direction, world units.
   float to_index[3][3];
   std::int32_t first[3], last[3];              // First and last voxels of the extent.

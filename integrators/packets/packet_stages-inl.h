@@ -86,7 +86,7 @@ HWY_INLINE void end_stage(const PacketMedium& medium, Packet& packet, int stage,
         const F3 dchange = mul_add(hn::Neg(dalong), v, mul_add(hn::Neg(along), dv, dTv));
         store(mul(kick, dchange), stages.change[k + 1][stage], i);
       }
-    if (stage == medium.stages->stages - 1) keep_bending_rate(packet, T, i);
+    if (stage == medium.stages->stages - 1) keep_bending_rate(medium, packet, T, i);
   }
 }
 
@@ -111,13 +111,12 @@ HWY_INLINE F find_excess(const PacketMedium& medium, const Packet& packet, const
   const double* const factors = medium.stages->error;
   const int count = medium.stages->stages;
   const F3 by_v = combine(stages.v[0], factors, count, at), by_change = combine(stages.change[0], factors, count, at);
+  const F unit = set(uniform ? 1 : medium.unit);
+  const F3 change = mul(unit, by_change);
   F squares = dot(by_v, by_v);
-  if constexpr (!uniform) {
-    const F3 u = load(packet.u, at);
-    squares = hn::Mul(squares, dot(u, u));
-  }
-  const F greater = hn::Sqrt(hn::Max(squares, dot(by_change, by_change)));
-  return hn::Mul(hn::Mul(load(packet.time, at), greater), set(1 / medium.settings.tolerance));
+  if constexpr (!uniform) squares = hn::Mul(squares, squared_voxels_per_unit(medium, packet, at));
+  const F greater = hn::Sqrt(hn::Max(squares, dot(change, change)));
+  return hn::Mul(hn::Mul(hn::Div(load(packet.time, at), unit), greater), set(1 / medium.settings.tolerance));
 }
 
 template <bool uniform, bool differentials, bool changes>
@@ -207,7 +206,7 @@ HWY_NOINLINE void step_by_euler(const PacketMedium& medium, Packet& packet) {
     const F3 Tv = apply(T, v), after = mul_add(factor, mul_add(trailing.value, v, Tv), v);
     if constexpr (changes) store(divergence(T, factor, dot(v, Tv)), packet.change_of_step, i);
     keep_unit<uniform, differentials>(medium, packet, after, dv, i);
-    keep_bending_rate(packet, T, i);
+    keep_bending_rate(medium, packet, T, i);
     const auto on = [&](const PerRay(&p)[3], const PerRay(&along)[3])
                         HWY_ATTR { return add(load(p, i), way<uniform>(medium, time, load(along, i))); };
     store(on(packet.p, packet.v_next), packet.p_next, i);
@@ -220,22 +219,19 @@ HWY_NOINLINE void step_by_euler(const PacketMedium& medium, Packet& packet) {
 template <bool uniform>
 HWY_NOINLINE void begin_steps(const PacketMedium& medium, Packet& packet) {
   for (int i = 0; i < packet.vectors * lanes; i += lanes) {
-    const F voxel = voxel_along<uniform>(packet, i);
+    const F voxel = voxel_along<uniform>(medium, packet, i);
     store(automatic_step(medium, load(packet.bending_rate, i), voxel), packet.wanted, i);
   }
 }
 
 /// The lanes whose steps are too short for single precision, as bits.
 template <bool uniform>
-HWY_INLINE std::uint32_t too_short(const Packet& packet) {
+HWY_INLINE std::uint32_t too_short(const PacketMedium& medium, const Packet& packet) {
   std::uint32_t result = 0;
   for (int i = 0; i < packet.vectors * lanes; i += lanes) {
-    const F time = load(packet.time, i);
+    const F time = hn::Div(load(packet.time, i), set(uniform ? 1 : medium.unit));
     F squares = hn::Mul(time, time);
-    if constexpr (!uniform) {
-      const F3 u = load(packet.u, i);
-      squares = hn::Mul(squares, dot(u, u));
-    }
+    if constexpr (!uniform) squares = hn::Mul(squares, squared_voxels_per_unit(medium, packet, i));
     result |= to_bits(hn::Not(hn::Ge(squares, set(shortest_step * shortest_step))), i);
   }
   return result;

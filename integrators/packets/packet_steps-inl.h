@@ -77,12 +77,17 @@ HWY_INLINE F automatic_step(const PacketMedium& medium, F bending_rate, F voxel)
                         longest);
 }
 
+/// |u|², voxels per `medium.unit`. (In world units, the squares may be beyond single precision.)
+HWY_INLINE F squared_voxels_per_unit(const PacketMedium& medium, const Packet& packet, int at) {
+  const F3 u = mul(set(medium.unit), load(packet.u, at));
+  return dot(u, u);
+}
+
 /// Length of a voxel along the rays, in the units of `time`.
 template <bool uniform>
-HWY_INLINE F voxel_along(const Packet& packet, int at) {
+HWY_INLINE F voxel_along(const PacketMedium& medium, const Packet& packet, int at) {
   if (uniform) return set(1);
-  const F3 u = load(packet.u, at);
-  return hn::Div(set(1), hn::Sqrt(dot(u, u)));
+  return hn::Div(set(medium.unit), hn::Sqrt(squared_voxels_per_unit(medium, packet, at)));
 }
 
 /// Sets the length of the next step: in voxels, or, if voxels are not uniform, in world units.
@@ -92,7 +97,7 @@ HWY_NOINLINE void find_times(const PacketMedium& medium, Packet& packet) {
   const bool automatic = medium.settings.step == 0 && !(packet.greatest_reach <= strongest_kick);
   const F zero = hn::Zero(floats), end = set(TensorBrick::cells);
   for (int i = 0; i < packet.vectors * lanes; i += lanes) {
-    const F voxel = voxel_along<uniform>(packet, i);
+    const F voxel = voxel_along<uniform>(medium, packet, i);
     const F steps = medium.adaptive ? load(packet.wanted, i)
                     : automatic     ? automatic_step(medium, load(packet.bending_rate, i), voxel)
                                     : set(medium.longest_step);
