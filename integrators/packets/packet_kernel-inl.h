@@ -84,8 +84,8 @@ void Kernel<Bricks, uniform, differentials, changes>::enter(Packet& packet, int 
     packet.brick[axis][lane] = ray.place.brick[axis];
     if constexpr (differentials)
       for (int i = 0; i < 2; ++i) {
-        packet.dp[i][axis][lane] = batch_.differentials[packet.ray[lane]].position[i][axis];
-        packet.dv[i][axis][lane] = batch_.differentials[packet.ray[lane]].direction[i][axis];
+        packet.dp[i][axis][lane] = batch_.differentials[packet.ray[lane]].position[i][axis] * medium_.unit;
+        packet.dv[i][axis][lane] = batch_.differentials[packet.ray[lane]].direction[i][axis] * medium_.unit;
       }
   }
   packet.kick[lane] = uniform ? ray.strength * medium_.voxel : ray.strength;
@@ -257,8 +257,8 @@ HWY_NOINLINE void Kernel<Bricks, uniform, differentials, changes>::take_out(Pack
       ray.direction[axis] = packet.v[axis][lane];
       if constexpr (differentials)
         for (int i = 0; i < 2; ++i) {
-          batch_.differentials[packet.ray[lane]].position[i][axis] = packet.dp[i][axis][lane];
-          batch_.differentials[packet.ray[lane]].direction[i][axis] = packet.dv[i][axis][lane];
+          batch_.differentials[packet.ray[lane]].position[i][axis] = packet.dp[i][axis][lane] / medium_.unit;
+          batch_.differentials[packet.ray[lane]].direction[i][axis] = packet.dv[i][axis][lane] / medium_.unit;
         }
     }
     ray.length += double{packet.length[lane]} * to_world();
