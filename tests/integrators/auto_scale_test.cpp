@@ -28,6 +28,24 @@ TEST(AutoScale, CancelsTheUnitsOfTheField) {
   }
 }
 
+/// Squares of these lengths, or of their inverses, are beyond single precision.
+TEST(AutoScale, CancelsTheUnitOfLength) {
+  const Interpolant interpolants[] = {{}, {Interpolation::cubic, Border::fade}};
+  for (const Interpolant& interpolant : interpolants) {
+    const auto field_of_size = [&](double size) {
+      const Eigen::Affine3d placement(Eigen::Scaling(size));
+      const auto tensor = [&](const Vector3d& p) { return linear_tensor(p / size); };
+      return TensorField(cube_grid({9, 9, 9}, tensor, placement), interpolant);
+    };
+    const AutoScale one = scale_of(field_of_size(1));
+    for (const double size : {1e-12, 1e19, 1e26}) {
+      const AutoScale scaled = scale_of(field_of_size(size));
+      EXPECT_NEAR(scaled.scale * size / one.scale, 1, 1e-3) << size;
+      EXPECT_NEAR(scaled.shown, one.shown, 1e-3) << size;
+    }
+  }
+}
+
 /// A lens with x'' = −ω²x along the light, ω² = 0.2 · scale. Light converges to |cos 2ω − ω/2 sin 2ω| of its width on
 /// the plane, at a distance of half a unit behind a depth of 2.
 TEST(AutoScale, AgreesWithTheClosedFormOfALens) {
