@@ -17,6 +17,9 @@ std::string escaped(const std::string& text);
 /// Joins words to one text: "a, b, c".
 std::string joined(const std::vector<std::string>& words, const char* separator = ", ");
 
+/// Without the blanks, tabs and carriage returns at both ends.
+std::string trimmed(const std::string& text);
+
 bool starts_with(const std::string& text, const std::string& beginning);
 bool ends_with(const std::string& text, const std::string& ending);
 

@@ -62,11 +62,6 @@ std::uint64_t to_number(const std::string& key, const std::string& text) {
   return number;
 }
 
-std::string trimmed(const std::string& text) {
-  const std::size_t begin = text.find_first_not_of(" \t\r"), end = text.find_last_not_of(" \t\r");
-  return begin == std::string::npos ? "" : text.substr(begin, end + 1 - begin);
-}
-
 void parse_line(const std::string& line, Header& header) {
   const std::size_t colon = line.find(':');
   if (colon == std::string::npos) return;

@@ -70,6 +70,14 @@ TensorGrid import(const std::filesystem::path& file, ImportSettings settings, Im
   return import_tensors(settings, Progress(), report);
 }
 
+ImportSettings settings_of_plane(const char* array, double thickness) {
+  ImportSettings settings;
+  settings.array = array;
+  settings.order = TensorOrder::plane;
+  settings.thickness = thickness;
+  return settings;
+}
+
 TEST(FlatMesh, CellsOfEveryTypeBecomeASlabOfOneVoxel) {
   const TemporaryFolder folder;
   for (const int axis : {0, 1, 2})
@@ -78,10 +86,7 @@ TEST(FlatMesh, CellsOfEveryTypeBecomeASlabOfOneVoxel) {
       const Grid mesh = square(type, axis);
       add_array<4>(*mesh, "stress", plane);
       write_xml(*mesh, folder / "a.vtu");
-      ImportSettings settings;
-      settings.array = "stress";
-      settings.order = TensorOrder::plane;
-      settings.thickness = 0.75;
+      ImportSettings settings = settings_of_plane("stress", 0.75);
       settings.sampling.resolution = 0.25;
       ImportReport report;
       const TensorGrid grid = import(folder / "a.vtu", settings, report);
@@ -181,10 +186,7 @@ TEST(FlatMesh, FlatImagesAndRectilinearGrids) {
   image->SetDimensions(5, 4, 1);
   add_array<4>(*image, "S", plane);
   write_xml(*image, folder / "a.vti");
-  ImportSettings settings;
-  settings.array = "S";
-  settings.order = TensorOrder::plane;
-  settings.thickness = 3;
+  ImportSettings settings = settings_of_plane("S", 3);
   ImportReport report;
   const TensorGrid voxels = import(folder / "a.vti", settings, report);
   EXPECT_EQ(voxels.active_voxels(), 20u);
@@ -276,10 +278,7 @@ TEST(FlatMesh, TheThicknessIsNoEdgeThatIsDivided) {
   const Grid mesh = square(VTK_QUAD);
   add_array<4>(*mesh, "stress", plane);
   write_xml(*mesh, folder / "a.vtu");
-  ImportSettings settings;
-  settings.array = "stress";
-  settings.order = TensorOrder::plane;
-  settings.thickness = 100;
+  ImportSettings settings = settings_of_plane("stress", 100);
   ImportReport report;
   for (const auto& resolution : {decltype(settings.sampling.resolution)(17), {Vector3i(17, 17, 1)}}) {
     settings.sampling.resolution = resolution;

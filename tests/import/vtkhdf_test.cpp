@@ -65,16 +65,21 @@ TEST(VtkHdf, PartsAreMergedAndStepsAreRead) {
   }
 }
 
+/// An image of 3 x 2 x 2 points.
+void begin_image(Hdf5Writer& file, const Doubles& version, const Doubles& origin, const Doubles& spacing) {
+  file.group("/VTKHDF");
+  file.attribute("/VTKHDF", "Version", version);
+  file.attribute("/VTKHDF", "Type", "ImageData");
+  file.attribute("/VTKHDF", "WholeExtent", Doubles{0, 2, 0, 1, 0, 1});
+  file.attribute("/VTKHDF", "Origin", origin);
+  file.attribute("/VTKHDF", "Spacing", spacing);
+}
+
 TEST(VtkHdf, Images) {
   const TemporaryFolder folder;
   {
     Hdf5Writer file(folder / "a.hdf");
-    file.group("/VTKHDF");
-    file.attribute("/VTKHDF", "Version", Doubles{1, 0});
-    file.attribute("/VTKHDF", "Type", "ImageData");
-    file.attribute("/VTKHDF", "WholeExtent", Doubles{0, 2, 0, 1, 0, 1});
-    file.attribute("/VTKHDF", "Origin", Doubles{1, 2, 3});
-    file.attribute("/VTKHDF", "Spacing", Doubles{0.5, 1, 2});
+    begin_image(file, Doubles{1, 0}, Doubles{1, 2, 3}, Doubles{0.5, 1, 2});
     Doubles values;
     for (int i = 0; i < 12 * 3; ++i) values.push_back(i);
     file.write("/VTKHDF/PointData/v", {2, 2, 3, 3}, values);
@@ -91,12 +96,7 @@ TEST(VtkHdf, ArraysOfImagesMayStay) {
   const TemporaryFolder folder;
   {
     Hdf5Writer file(folder / "a.vtkhdf");
-    file.group("/VTKHDF");
-    file.attribute("/VTKHDF", "Version", Doubles{2, 0});
-    file.attribute("/VTKHDF", "Type", "ImageData");
-    file.attribute("/VTKHDF", "WholeExtent", Doubles{0, 2, 0, 1, 0, 1});
-    file.attribute("/VTKHDF", "Origin", Doubles{0, 0, 0});
-    file.attribute("/VTKHDF", "Spacing", Doubles{1, 1, 1});
+    begin_image(file, Doubles{2, 0}, Doubles{0, 0, 0}, Doubles{1, 1, 1});
     file.group("/VTKHDF/Steps");
     file.attribute("/VTKHDF/Steps", "NSteps", Doubles{2});
     Doubles values;

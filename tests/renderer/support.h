@@ -54,4 +54,11 @@ class Temporary {
   std::filesystem::path path_;
 };
 
+/// The header of a .ply file of vertices and polygons.
+inline std::string ply_header(const std::string& format, int vertices, int faces) {
+  return "ply\nformat " + format + " 1.0\nelement vertex " + std::to_string(vertices) +
+         "\nproperty float x\nproperty float y\nproperty float z\nelement face " + std::to_string(faces) +
+         "\nproperty list uchar int vertex_indices\nend_header\n";
+}
+
 }  // namespace tensorray

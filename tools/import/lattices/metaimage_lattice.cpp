@@ -54,11 +54,6 @@ struct Header {
   }
 };
 
-std::string trimmed(const std::string& text) {
-  const std::size_t begin = text.find_first_not_of(" \t\r");
-  return begin == std::string::npos ? "" : text.substr(begin, text.find_last_not_of(" \t\r") - begin + 1);
-}
-
 /// Lines "NAME = VALUE"; the last one is ElementDataFile.
 Header read_header(const Path& path) {
   std::error_code none;

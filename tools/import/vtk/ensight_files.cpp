@@ -33,11 +33,6 @@ struct TimeSet {
   double start = 0, increment = 1;
 };
 
-std::string trimmed(const std::string& text) {
-  const std::size_t begin = text.find_first_not_of(" \t\r");
-  return begin == std::string::npos ? "" : text.substr(begin, text.find_last_not_of(" \t\r") - begin + 1);
-}
-
 bool begins_with_number(const std::string& text) {
   char* end = nullptr;
   std::strtod(text.c_str(), &end);

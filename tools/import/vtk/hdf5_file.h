@@ -8,9 +8,9 @@
 #include <string>
 #include <vector>
 
-#include <vtkSmartPointer.h>
-
 class vtkDataArray;
+template <class T>
+class vtkSmartPointer;
 
 namespace tensorray {
 

@@ -237,7 +237,9 @@ std::string way_out(const std::string& ending, const std::string& name) {
   if (one_of({".med"}))
     return "is a file of MED (Salome, Code_Aster), which is not read; run `meshio convert " + name +
            " FILE.vtk` (Debian's meshio-tools and python3-h5py)";
-  if (one_of({".frd"})) return "is a result of CalculiX, which is not read; convert it to .vtu with ccx2paraview";
+  if (one_of({".frd"}))
+    return "is a result of CalculiX, which is not read; convert it to .vtu with ccx2paraview, or in FreeCAD (export "
+           "its Results)";
   if (one_of({".npz"}))
     return "holds several arrays of NumPy; save the one of the tensors: numpy.save(\"FILE.npy\", numpy.load(\"" + name +
            "\")[NAME])";

@@ -163,8 +163,8 @@ std::vector<Element*> items_in(const XdmfDocument& document, Element& item, std:
 XdmfValues part_of(const XdmfDocument& document, const XdmfValues& whole, const HyperSlab& slab) {
   const std::size_t rank = whole.shape.size();
   for (std::size_t axis = 0; axis < rank; ++axis) {
-    const std::uint64_t extent = whole.shape[axis];  // Of products of hostile numbers, which overflow.
-    const std::uint64_t fitting =
+    const std::uint64_t extent = whole.shape[axis];
+    const std::uint64_t fitting =  // Not by multiplying, which overflows for hostile numbers.
         slab.start[axis] < extent ? (extent - 1 - slab.start[axis]) / slab.stride[axis] + 1 : 0;
     if (slab.count[axis] > fitting) fail_item(document, "is a HyperSlab beyond what it is of");
   }

@@ -1,0 +1,61 @@
+#pragma once
+/// @file tests/scenes/read_scene_fixture.h
+/// Scene files in a folder of their own, and the errors that they give.
+
+#include <filesystem>
+#include <fstream>
+#include <map>
+#include <string>
+#include <vector>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <unistd.h>
+
+#include "scenes/pipeline/read_scene.h"
+
+namespace tensorray::test {
+
+using Overrides = std::vector<std::string>;
+using Files = std::map<std::string, std::filesystem::path>;
+
+inline const char* const smallest = R"({"field": {"file": "a.vdb"}, "integrator": {"type": "photon_distribution"}})";
+
+/// Makes a folder for each test, and removes it after the test.
+class ReadScene : public ::testing::Test {
+ protected:
+  ReadScene() {
+    const auto* test = ::testing::UnitTest::GetInstance()->current_test_info();
+    folder_ =
+        std::filesystem::path(::testing::TempDir()) / ("read_scene_" + std::to_string(getpid()) + "_" + test->name());
+    std::filesystem::create_directories(folder_);
+  }
+  ~ReadScene() override { std::filesystem::remove_all(folder_); }
+
+  std::filesystem::path file(const std::string& text) const {
+    std::filesystem::path path = folder_ / "scene.json";
+    std::ofstream(path, std::ios::binary) << text;
+    return path;
+  }
+
+  SceneDescription read(const Overrides& overrides = {}, const std::string& text = smallest) const {
+    return read_scene(file(text), {overrides, {}});
+  }
+
+  /// The message of the error, which must be one line; empty if nothing is thrown.
+  std::string error(const Overrides& overrides, const std::string& text = smallest) const {
+    try {
+      read(overrides, text);
+    } catch (const SceneError& error) {
+      EXPECT_THAT(error.what(), ::testing::Not(::testing::HasSubstr("\n")));
+      EXPECT_LT(std::string(error.what()).size(), 1000u);
+      return error.what();
+    }
+    ADD_FAILURE() << "no error: " << ::testing::PrintToString(overrides) << " on " << text.substr(0, 200);
+    return "";
+  }
+
+  std::filesystem::path folder_;
+};
+
+}  // namespace tensorray::test
