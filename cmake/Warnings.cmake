@@ -1,7 +1,7 @@
 # Strict warnings for the project's own code, and `tensorray_library(NAME)`, which makes a static library from a folder.
 
 add_library(tensorray_options INTERFACE)
-target_compile_options(tensorray_options INTERFACE -Wall -Wextra -Wpedantic -Wnon-virtual-dtor
+target_compile_options(tensorray_options INTERFACE -Wall -Wextra -Wpedantic -Wconversion -Wnon-virtual-dtor
                        -Woverloaded-virtual -Wcast-align -Wunused -Wnull-dereference)
 if(TENSORRAY_WERROR)
   target_compile_options(tensorray_options INTERFACE -Werror)

@@ -247,8 +247,9 @@ py::dict landings(const SceneRequest& request, std::vector<double> flexibilities
         map = trace_flow_map(scene->field, scene->geometry, scene->beam, scene->bending, settings, progress);
         if (settings.range) {
           const double first = range.flexibilities.front(), last = range.flexibilities.back();
+          const double steps = map.nodes < 2 ? 1 : static_cast<double>(map.nodes - 1);
           for (std::size_t node = 0; node < map.nodes; ++node)
-            flexibilities.push_back(map.nodes < 2 ? first : first + (last - first) * node / (map.nodes - 1.0));
+            flexibilities.push_back(first + (last - first) * static_cast<double>(node) / steps);
         } else {
           flexibilities = settings.flexibilities;
         }

@@ -5,6 +5,7 @@
 #include <stdexcept>
 #include <string>
 
+#include "base/constants.h"
 #include "base/errors.h"
 #include "renderer/surfaces/plate.h"
 
@@ -17,7 +18,7 @@ using Eigen::Vector3d;
 double height_of_angle(double angle) {
   require(angle > 0 && angle < 180,
           "the camera's angle of view must be above 0 and below 180 degrees, not " + std::to_string(angle));
-  return 2 * std::tan(angle / 2 * EIGEN_PI / 180);
+  return 2 * std::tan(angle / 2 * pi / 180);
 }
 
 /// Makes a camera without its projection and height.

@@ -100,7 +100,8 @@ TEST_P(EveryEnding, FilesThatWereCutOffAreRefused) {
   write_image(whole.path(), noise(100, 80, {"R", "G", "B"}));
   const std::string bytes = read_bytes(whole.path());
   for (const double part : {0.001, 0.3, 0.5, 0.9, 0.999}) {
-    const Temporary file("cut" + GetParam(), bytes.substr(0, static_cast<std::size_t>(part * bytes.size())));
+    const Temporary file("cut" + GetParam(),
+                         bytes.substr(0, static_cast<std::size_t>(part * static_cast<double>(bytes.size()))));
     const std::string text = message([&] { read_image(file.path()); });
     EXPECT_THAT(text, HasSubstr("cannot read " + file.path().string() + ": ")) << part;
     EXPECT_THAT(text, Not(::testing::EndsWith(": "))) << part;

@@ -47,9 +47,9 @@ TEST(LinearImageTest, EqualsTheSumOverBands) {
   for (int y = 0; y < 3; ++y)
     for (int x = 0; x < 4; ++x) {
       const double first = 0.25 * (y * 4 + x), second = 0.25 * (12 + y * 4 + x);
-      EXPECT_FLOAT_EQ(image.pixel(x, y)[0], first);
-      EXPECT_FLOAT_EQ(image.pixel(x, y)[1], 3 * first);
-      EXPECT_FLOAT_EQ(image.pixel(x, y)[2], 2 * (2 * first + 0.5 * second));
+      EXPECT_FLOAT_EQ(image.pixel(x, y)[0], static_cast<float>(first));
+      EXPECT_FLOAT_EQ(image.pixel(x, y)[1], static_cast<float>(3 * first));
+      EXPECT_FLOAT_EQ(image.pixel(x, y)[2], static_cast<float>(2 * (2 * first + 0.5 * second)));
     }
 }
 
@@ -75,8 +75,10 @@ TEST(SpectralImageTest, FollowsTheLayout) {
   EXPECT_EQ(radiance.metadata.at("emissiveUnits"), "W.m^-2.sr^-1.nm^-1");
   EXPECT_EQ(radiance.image.pixels, spectral.image.pixels);
   const Image rgb = linear_image(film, bands, Eigen::Matrix3d::Identity());
-  for (int k = 0; k < 4; ++k)
-    EXPECT_FLOAT_EQ(spectral.image.pixel(2, 1)[3 + k], film.plane(k)[6] * 10 * bands[k].power / bands[k].width);
+  for (int k = 0; k < 4; ++k) {
+    const double expected = film.plane(k)[6] * 10 * bands[k].power / bands[k].width;
+    EXPECT_FLOAT_EQ(spectral.image.pixel(2, 1)[3 + k], static_cast<float>(expected));
+  }
   for (int c = 0; c < 3; ++c) EXPECT_EQ(spectral.image.pixel(2, 1)[c], rgb.pixel(2, 1)[c]);
 }
 

@@ -263,7 +263,10 @@ TEST(TextureFileTest, EveryEightBitNumberIsDecodedExactly) {
   const Temporary file("all.png", png_file(256, 1, 3, 8, values));
   for (int i = 0; i < 256; ++i) EXPECT_LT(difference(texel_of(file.path(), i), linear(i, 255 - i, i / 2)), 1e-6) << i;
   for (int i = 0; i < 256; i += 15)  // Values that are already linear do not change.
-    EXPECT_LT(difference(texel_of(file.path(), i, "scene_linear"), Vector4f(i, 255 - i, i / 2, 255) / 255), 1e-7) << i;
+    EXPECT_LT(difference(texel_of(file.path(), i, "scene_linear"),
+                         Eigen::Vector4i(i, 255 - i, i / 2, 255).cast<float>() / 255),
+              1e-7)
+        << i;
 }
 
 TEST(TextureFileTest, FormatsOfPng) {
@@ -371,7 +374,8 @@ TEST(TextureFileTest, BadFilesAreOneClearLine) {
     write_image(whole.path(), noise(100, 80));
     const std::string bytes = read_bytes(whole.path());
     for (const double part : {0.3, 0.9}) {
-      const Temporary cut("cut" + ending, bytes.substr(0, static_cast<std::size_t>(part * bytes.size())));
+      const Temporary cut("cut" + ending,
+                          bytes.substr(0, static_cast<std::size_t>(part * static_cast<double>(bytes.size()))));
       EXPECT_THAT(error_of(cut.path()), HasSubstr("cannot read " + cut.path().string() + ": ")) << part;
     }
   }

@@ -59,7 +59,8 @@ inline int points_of(const CellKind& kind) {
     case VTK_LAGRANGE_WEDGE:
       return (n + 1) * (n + 1) * (n + 2) / 2;
     default:
-      return vtkSmartPointer<vtkCell>::Take(vtkGenericCell::InstantiateCell(kind.type))->GetNumberOfPoints();
+      return static_cast<int>(
+          vtkSmartPointer<vtkCell>::Take(vtkGenericCell::InstantiateCell(kind.type))->GetNumberOfPoints());
   }
 }
 

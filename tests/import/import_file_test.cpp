@@ -16,11 +16,11 @@ namespace {
 TEST(ImportFileTest, FlatCellsAreTakenInSilence) {
   const TemporaryFolder folder;
   const auto mesh = bar(0, 3);
-  for (vtkIdType i = 8; i < 12; ++i) mesh->GetPoints()->SetPoint(i, 1, i % 2, (i - 8) / 2);  // As those before them.
+  for (int i = 8; i < 12; ++i) mesh->GetPoints()->SetPoint(i, 1, i % 2, (i - 8) / 2);  // As those before them.
   vtkNew<vtkDoubleArray> velocity;
   velocity->SetName("velocity");
   velocity->SetNumberOfComponents(3);
-  for (vtkIdType i = 0; i < mesh->GetNumberOfPoints(); ++i) velocity->InsertNextTuple3(i, 2, 3);
+  for (int i = 0; i < mesh->GetNumberOfPoints(); ++i) velocity->InsertNextTuple3(i, 2, 3);
   mesh->GetPointData()->AddArray(velocity);
   write_xml(*mesh, folder / "a.vtu");
   ImportSettings settings;

@@ -82,7 +82,8 @@ TEST(MetaImage, VectorsAreDifferentiated) {
   std::vector<float> numbers;
   for (int z = 0; z < 3; ++z)
     for (int y = 0; y < 3; ++y)
-      for (int x = 0; x < 3; ++x) numbers.insert(numbers.end(), {2.0f * y, 0, 3.0f * x});
+      for (int x = 0; x < 3; ++x)
+        numbers.insert(numbers.end(), {2 * static_cast<float>(y), 0, 3 * static_cast<float>(x)});
   const test::TemporaryFile file("a.mha", header_of(3, {3, 3, 3}) + test::bytes_of(numbers));
   LatticeReport report;
   const TensorGrid grid = gradient_of(open_metaimage(file), report);

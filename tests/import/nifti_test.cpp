@@ -222,7 +222,8 @@ TEST(Nifti, DisplacementsOfItkAreInLps) {
   const Vector3i size(4, 4, 4);
   const test::TemporaryFile file("warp.nii", file_of(header_of(size, 3, Affine3d::Identity()),
                                                      volumes_of(size, [](const Vector3i& i) -> std::vector<float> {
-                                                       return {2.0f * i.y(), 3.0f * i.x(), 5.0f * i.x() + 1};
+                                                       const Eigen::Vector3f at = i.cast<float>();
+                                                       return {2 * at.y(), 3 * at.x(), 5 * at.x() + 1};
                                                      })));
   ImportSettings settings;
   settings.files = {file};

@@ -8,6 +8,7 @@
 #include <gtest/gtest.h>
 #include <tbb/global_control.h>
 
+#include "base/constants.h"
 #include "integrators/flow/ray_memory.h"
 #include "integrators/photons/photon_distribution.h"
 #include "renderer/color/spectrum.h"
@@ -157,7 +158,7 @@ TEST(FlowMap, EndsAtObstaclesAndCuts) {
 Matrix3d hook(const Vector3d& at) {
   constexpr double width = 0.04, flexibility = 0.4;
   Matrix3d tensor = Matrix3d::Zero();
-  tensor(0, 2) = -at.x() * width * M_PI * M_PI / 2 / flexibility * std::cos(M_PI * (1 - at.z()));
+  tensor(0, 2) = -at.x() * width * pi * pi / 2 / flexibility * std::cos(pi * (1 - at.z()));
   return tensor;
 }
 

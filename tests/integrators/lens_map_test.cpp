@@ -8,6 +8,7 @@
 #include <Eigen/LU>
 #include <gtest/gtest.h>
 
+#include "base/constants.h"
 #include "tests/integrators/support.h"
 #include "volumes/tensors/generators.h"
 
@@ -288,7 +289,7 @@ TEST(LensMap, TurningLightReachesNeitherBeyondThePlaneNorBehindItsStart) {
   for (const double beyond : {0.0, 0.8, 1.5}) {
     const LensLanding landing = land(make_map(field, from, plane_at(beyond), down), start, 1);
     EXPECT_EQ(landing.end, RayEnd::obstacle) << beyond;
-    EXPECT_NEAR(landing.length, M_PI * radius, 1e-3);
+    EXPECT_NEAR(landing.length, pi * radius, 1e-3);
   }
 }
 

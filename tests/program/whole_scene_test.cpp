@@ -7,6 +7,7 @@
 
 #include <fmt/core.h>
 
+#include "base/constants.h"
 #include "renderer/images/image.h"
 #include "tests/data_folder.h"
 #include "tests/program/support.h"
@@ -449,7 +450,7 @@ std::string coarse_sphere(int rows, bool normals) {
   const int columns = 2 * rows;
   for (int i = 0; i <= rows; ++i)
     for (int j = 0; j < columns; ++j) {
-      const double theta = M_PI * i / rows, phi = 2 * M_PI * j / columns;
+      const double theta = pi * i / rows, phi = 2 * pi * j / columns;
       const double x = std::sin(theta) * std::cos(phi), y = std::sin(theta) * std::sin(phi), z = std::cos(theta);
       text += fmt::format("v {} {} {}\n", x, y, z + 4);
       if (normals) text += fmt::format("vn {} {} {}\n", x, y, z);

@@ -7,6 +7,7 @@
 #include <gtest/gtest.h>
 
 #include "base/box.h"
+#include "base/constants.h"
 #include "renderer/sampling/random.h"
 
 namespace tensorray {
@@ -51,7 +52,7 @@ TEST(Camera, SeesTheNamedAngleOrHeight) {
   const Camera wide = perspective_camera({0, 0, 0}, {0, 1, 0}, Vector3d::UnitZ(), 50, {200, 100});
   const Vector3d top = camera_ray(wide, {100, 0}, Vector2d::Zero()).direction;
   const Vector3d bottom = camera_ray(wide, {100, 100}, Vector2d::Zero()).direction;
-  EXPECT_NEAR(std::acos(top.dot(bottom)), 50 * EIGEN_PI / 180, 1e-14);
+  EXPECT_NEAR(std::acos(top.dot(bottom)), 50 * pi / 180, 1e-14);
   EXPECT_GT(top.z(), 0);
   const Camera flat = orthographic_camera({0, 0, 0}, {0, 1, 0}, Vector3d::UnitZ(), 3, {200, 100});
   EXPECT_LT((camera_ray(flat, {0, 0}, Vector2d::Zero()).origin - Vector3d(-3, 0, 1.5)).norm(), 1e-14);

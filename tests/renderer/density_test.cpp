@@ -6,6 +6,8 @@
 #include <gtest/gtest.h>
 #include <tbb/global_control.h>
 
+#include "base/constants.h"
+
 namespace tensorray {
 namespace {
 
@@ -44,8 +46,7 @@ Film direct_sum(int width, int height, double tau, const Points& points) {
   for (int y = 0; y < height; ++y)
     for (int x = 0; x < width; ++x)
       for (const Eigen::Vector2d& p : points)
-        film.values[y * width + x] +=
-            line(x + 0.5, p.x(), width) * line(y + 0.5, p.y(), height) / (2 * M_PI * tau * tau);
+        film.values[y * width + x] += line(x + 0.5, p.x(), width) * line(y + 0.5, p.y(), height) / (2 * pi * tau * tau);
   return film;
 }
 

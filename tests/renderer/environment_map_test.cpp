@@ -38,7 +38,7 @@ EnvironmentLight uneven_sky() {
   return light;
 }
 
-double radiance(const EnvironmentMap& map, const Vector3d& direction) {
+float radiance(const EnvironmentMap& map, const Vector3d& direction) {
   std::vector<float> result{0};
   map.add_radiance(direction, result);
   return result[0];

@@ -9,6 +9,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "base/constants.h"
 #include "renderer/surfaces/mesh.h"
 #include "tests/renderer/support.h"
 
@@ -32,7 +33,7 @@ struct Sample {
 Sample torus(std::uint32_t rows, std::uint32_t columns) {
   Sample sample;
   for (std::uint32_t i = 0; i < rows * columns; ++i) {
-    const double u = 2 * M_PI * (i / columns) / rows, v = 2 * M_PI * (i % columns) / columns;
+    const double u = 2 * pi * (i / columns) / rows, v = 2 * pi * (i % columns) / columns;
     const Eigen::Vector3d normal(std::cos(v) * std::cos(u), std::cos(v) * std::sin(u), std::sin(v));
     Eigen::Vector3d position = Eigen::Vector3d(1000 + 3 * std::cos(u), 3 * std::sin(u), 0) + normal;
     for (double& coordinate : position) {

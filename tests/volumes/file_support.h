@@ -44,7 +44,8 @@ inline TensorGrid sparse_grid() {
   TensorGrid grid = dense_grid({Eigen::Vector3i(-11, -3, 5), Eigen::Vector3i(6, 12, 21)}, to_world,
                                [](const Eigen::Vector3i& i) -> Eigen::Matrix3d {
                                  return Eigen::Matrix3d::NullaryExpr([&](Eigen::Index r, Eigen::Index c) {
-                                   return std::sin(1.3 * i.x() + 0.7 * i.y() + 0.2 * i.z() + 2.1 * r + 0.9 * c);
+                                   const double at = 2.1 * static_cast<double>(r) + 0.9 * static_cast<double>(c);
+                                   return std::sin(1.3 * i.x() + 0.7 * i.y() + 0.2 * i.z() + at);
                                  });
                                });
   for (TensorBlock& block : grid.blocks)

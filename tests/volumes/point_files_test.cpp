@@ -72,8 +72,9 @@ TEST(VdbPoints, HoldEveryPointAndAttribute) {
     const auto grid = read_points(path);
     expect_records(records_of(*grid), cloud, 1e-5f);  // Single precision at 100.
     const double voxels = static_cast<double>(grid->tree().activeVoxelCount());
-    EXPECT_GT(cloud.positions.size() / voxels, 4) << thickness;
-    EXPECT_LT(cloud.positions.size() / voxels, 12) << thickness;
+    const double per_voxel = static_cast<double>(cloud.positions.size()) / voxels;
+    EXPECT_GT(per_voxel, 4) << thickness;
+    EXPECT_LT(per_voxel, 12) << thickness;
     openvdb::io::File file(path.string());
     file.open();
     EXPECT_EQ(file.getMetadata()->metaValue<std::string>("seed"), "7");

@@ -121,7 +121,8 @@ class PageStore {
   void drop_pages() {
     std::size_t dropped = 0, all = 0;
     for (const auto& [memory, region] : regions_) all += region.bytes;
-    while (dropped < all && resident() > low * static_cast<double>(bound_)) {
+    const double wanted = low * static_cast<double>(bound_);
+    while (dropped < all && wanted < static_cast<double>(resident())) {
       auto region = regions_.upper_bound(hand_);
       if (region != regions_.begin()) --region;  // The one that the hand points into, or the next.
       if (region->first + region->second.bytes <= hand_ && ++region == regions_.end()) region = regions_.begin();

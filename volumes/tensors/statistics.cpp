@@ -85,8 +85,8 @@ void join(const std::vector<BlockStatistics>& blocks, FieldStatistics& result) {
   result.real_max = all.real_max;
   result.imaginary_max = all.imaginary_max;
   result.deviator_max = all.deviator_max;
-  result.complex_fraction = all.complex / count;
-  result.negative_fraction = all.negative / count;
+  result.complex_fraction = static_cast<double>(all.complex) / count;
+  result.negative_fraction = static_cast<double>(all.negative) / count;
   result.absolute_loss = all.norm > 0 ? all.erased / all.norm : 0;
   take_percentiles(all.norms, result);
 }

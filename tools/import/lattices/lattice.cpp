@@ -117,7 +117,7 @@ template <class Block>
 void require_room_for(const Lattice& lattice) {
   constexpr double leaf_bytes = 600;
   const Eigen::Array3d blocks = ((lattice.size.array() - 1) / width + 1).cast<double>();
-  const double slice = lattice.size.x() * sizeof(double) * lattice.size.y() * lattice.components;
+  const double slice = lattice.size.head<2>().cast<double>().prod() * lattice.components * sizeof(double);
   require_room(0, blocks.x() * blocks.y() * sizeof(Block) + slice + leaf_bytes * blocks.prod());
 }
 

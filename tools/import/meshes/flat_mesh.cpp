@@ -136,7 +136,8 @@ std::optional<FlatMesh> flat_mesh(vtkDataSet& mesh) {
   for (vtkIdType id = 0; id < mesh.GetNumberOfCells(); ++id) {
     mesh.GetCell(id, cell);
     if (cell->GetCellDimension() != 2) continue;
-    for (vtkIdType i = 0; i < cell->GetNumberOfPoints(); ++i) box.extend(point_of(mesh, cell->GetPointId(i)));
+    for (vtkIdType i = 0; i < cell->GetNumberOfPoints(); ++i)
+      box.extend(point_of(mesh, cell->GetPointId(static_cast<int>(i))));
   }
   FlatMesh flat;
   flat.axis = axis_across(box);
