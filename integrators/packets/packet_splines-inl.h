@@ -62,29 +62,35 @@ struct Four {
   V8 z[4];
 };
 
-// A row is four coefficients along z as they are loaded: in four vectors, or with AVX-512 in two, of two coefficients
-// with eight components, or of three with five and the last one.
+// A row is four coefficients along z as they are loaded: in four vectors; with AVX-512 in two, of two coefficients with
+// eight components, or of three with five and the last one; with AVX2 in three, where coefficients have five
+// components.
 
 #if HWY_ARCH_X86 && HWY_TARGET <= HWY_AVX3
+template <int components>
 struct Row {
   F near, far;
 };
 
-HWY_INLINE Row empty_row() { return {hn::Zero(floats), hn::Zero(floats)}; }
+template <int components>
+HWY_INLINE Row<components> empty_row() {
+  return {hn::Zero(floats), hn::Zero(floats)};
+}
 
 template <int components>
-HWY_INLINE Row load_row(const float* from) {
+HWY_INLINE Row<components> load_row(const float* from) {
   return {hn::LoadU(floats, from),
           hn::LoadU(floats, from + (components == TensorBrick::general ? 16 : 3 * components))};
 }
 
-HWY_INLINE Row add_row(float weight, const Row& row, const Row& to) {
+template <int components>
+HWY_INLINE Row<components> add_row(float weight, const Row<components>& row, const Row<components>& to) {
   const F w = set(weight);
   return {hn::MulAdd(w, row.near, to.near), hn::MulAdd(w, row.far, to.far)};
 }
 
 template <int components>
-HWY_INLINE Four four_of(const Row& row) {
+HWY_INLINE Four four_of(const Row<components>& row) {
   const auto lower = [](F v) HWY_ATTR { return hn::LowerHalf(eight, v); };
   if constexpr (components == TensorBrick::general)
     return {{lower(row.near), hn::UpperHalf(eight, row.near), lower(row.far), hn::UpperHalf(eight, row.far)}};
@@ -96,28 +102,58 @@ HWY_INLINE Four four_of(const Row& row) {
   return {{lower(row.near), moved(0), moved(1), lower(row.far)}};
 }
 #else
-using Row = Four;
-
-HWY_INLINE Row empty_row() {
-  const V8 zero = hn::Zero(eight);
-  return {{zero, zero, zero, zero}};
-}
+/// Whether the vectors of a row follow each other without gaps, but for the last one, which is the last coefficient.
+template <int components>
+constexpr bool is_packed = (HWY_TARGET == HWY_AVX2) && (components == TensorBrick::symmetric);
 
 template <int components>
-HWY_INLINE Row load_row(const float* from) {
-  const auto at = [&](int z) HWY_ATTR { return hn::LoadU(eight, from + z * components); };
-  return {{at(0), at(1), at(2), at(3)}};
-}
+struct Row {
+  static constexpr int count = is_packed<components> ? 3 : 4;
+  V8 part[count];
 
-HWY_INLINE Row add_row(float weight, const Row& row, const Row& to) {
-  const V8 w = hn::Set(eight, weight);
-  const auto sum = [&](int z) HWY_ATTR { return hn::MulAdd(w, row.z[z], to.z[z]); };
-  return {{sum(0), sum(1), sum(2), sum(3)}};
-}
+  /// Where a vector begins in the row.
+  static constexpr int offset(int i) {
+    return is_packed<components> && i < count - 1 ? 8 * i : (i + 4 - count) * components;
+  }
+};
 
 template <int components>
-HWY_INLINE Four four_of(const Row& row) {
+HWY_INLINE Row<components> empty_row() {
+  Row<components> row;
+#pragma GCC unroll 4
+  for (V8& part : row.part) part = hn::Zero(eight);
   return row;
+}
+
+template <int components>
+HWY_INLINE Row<components> load_row(const float* from) {
+  Row<components> row;
+#pragma GCC unroll 4
+  for (int i = 0; i < row.count; ++i) row.part[i] = hn::LoadU(eight, from + row.offset(i));
+  return row;
+}
+
+template <int components>
+HWY_INLINE Row<components> add_row(float weight, const Row<components>& row, const Row<components>& to) {
+  const V8 w = hn::Set(eight, weight);
+  Row<components> sum;
+#pragma GCC unroll 4
+  for (int i = 0; i < row.count; ++i) sum.part[i] = hn::MulAdd(w, row.part[i], to.part[i]);
+  return sum;
+}
+
+template <int components>
+HWY_INLINE Four four_of(const Row<components>& row) {
+#if HWY_TARGET == HWY_AVX2
+  if constexpr (is_packed<components>) {
+    alignas(32) constexpr std::int32_t from[2][8] = {{1, 2, 3, 4, 5, 1, 1, 1}, {2, 3, 4, 5, 6, 2, 2, 2}};
+    const auto moved = [&](V8 v, int i)
+                           HWY_ATTR { return hn::TableLookupLanes(v, hn::SetTableIndices(eight, from[i])); };
+    const V8 across = hn::ConcatLowerUpper(eight, row.part[1], row.part[0]);  // The row from 4 to 11.
+    return {{row.part[0], moved(across, 0), moved(row.part[1], 1), row.part[2]}};
+  } else
+#endif
+    return {{row.part[0], row.part[1], row.part[2], row.part[3]}};
 }
 #endif
 
@@ -133,10 +169,10 @@ HWY_INLINE V8 along_z(const Four& sums, const float (&weights)[4][lanes], int la
 /// Components of a lane's tensor. @param first  Its first coefficient, from the first of these components on.
 template <int components>
 HWY_INLINE V8 spline_value(const float* first, const SplineWeights& weights, int lane) {
-  Row sums = empty_row();
+  Row<components> sums = empty_row<components>();
 #pragma GCC unroll 4
   for (int x = 0; x < 4; ++x) {
-    Row lines = empty_row();
+    Row<components> lines = empty_row<components>();
 #pragma GCC unroll 4
     for (int y = 0; y < 4; ++y)
       lines = add_row(weights.value[1][y][lane],
@@ -149,13 +185,14 @@ HWY_INLINE V8 spline_value(const float* first, const SplineWeights& weights, int
 /// The same with the slopes.
 template <int components>
 HWY_INLINE Slopes<V8> spline_slopes(const float* first, const SplineWeights& weights, int lane) {
-  Row sums = empty_row(), by_x = sums, by_y = sums;
+  Row<components> sums = empty_row<components>(), by_x = sums, by_y = sums;
 #pragma GCC unroll 4
   for (int x = 0; x < 4; ++x) {
-    Row lines = empty_row(), slopes = lines;
+    Row<components> lines = empty_row<components>(), slopes = lines;
 #pragma GCC unroll 4
     for (int y = 0; y < 4; ++y) {
-      const Row row = load_row<components>(first + x * sheet_stride<components> + y * row_stride<components>);
+      const Row<components> row =
+          load_row<components>(first + x * sheet_stride<components> + y * row_stride<components>);
       lines = add_row(weights.value[1][y][lane], row, lines);
       slopes = add_row(weights.slope[1][y][lane], row, slopes);
     }
