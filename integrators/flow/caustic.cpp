@@ -58,6 +58,7 @@ struct Job {
   const Eigen::Vector2i plate;
   const std::vector<CausticBand>& bands;
   double beam_area = 0;
+  Team* team = nullptr;
 };
 
 /// The number of bands that may be drawn as one: all if there is none between them.
@@ -223,9 +224,16 @@ struct Strip {
   }
 };
 
-/// As many rows as the memory of all threads allows. The result does not depend on it.
-std::vector<Strip> strips_of(const Eigen::Vector2i& plate) {
-  const auto threads = static_cast<std::size_t>(tbb::this_task_arena::max_concurrency());
+/// As many rows as the memory of all threads allows, of the process that has most of them. The result does not depend
+/// on it.
+std::vector<Strip> strips_of(const Eigen::Vector2i& plate, Team* team) {
+  auto threads = static_cast<std::size_t>(tbb::this_task_arena::max_concurrency());
+  if (team) {
+    std::vector<std::size_t> all(team->count(), threads);
+    exchange_parts(*team, all.size(), all.size(),
+                   [&](std::size_t process, PartBytes& bytes) { bytes.copy(&all[process], sizeof all[process]); });
+    threads = *std::max_element(all.begin(), all.end());
+  }
   const std::size_t row = 8 * planes * (static_cast<std::size_t>(plate.x()) + 3);
   const int rows = static_cast<int>(std::clamp<std::size_t>(most_memory / (threads * row), 1, plate.y()));
   std::vector<Strip> strips;
@@ -234,7 +242,9 @@ std::vector<Strip> strips_of(const Eigen::Vector2i& plate) {
 }
 
 /// Adds what the threads have deposited to the films.
-void add_to_films(const Pass& pass, const std::vector<const AreaDeposit*>& deposits, const Strip& strip, int width) {
+void add_to_films(const Pass& pass, const std::vector<AreaDeposit>& joined, const Strip& strip, int width) {
+  std::vector<const AreaDeposit*> deposits;
+  for (const AreaDeposit& each : joined) deposits.push_back(&each);
   tbb::parallel_for(strip.first, strip.end, [&](int y) {
     std::vector<double> row(static_cast<std::size_t>(width));
     for (std::size_t k = 0; k < planes; ++k) {
@@ -300,6 +310,28 @@ void count_ends(const FlowMap& map, const Plate& plate, const std::vector<Causti
   });
 }
 
+void add_power(const PowerSums& more, PowerSums& power) {
+  for (std::size_t channel = 0; channel < power.size(); ++channel)
+    for (int end = 0; end < ray_end_count; ++end) power[channel][end] += more[channel][end];
+}
+
+/// Gives process 0 what this one has drawn of a strip.
+/// @param deposits  Of the threads. They are joined, and process 0 adds those of the others.
+/// @param power     Of this process; at process 0, of all.
+void collect_strip(const Job& job, const Strip& strip, std::vector<AreaDeposit>& deposits, PowerSums& power) {
+  if (deposits.empty()) deposits.emplace_back(job.plate.x(), job.plate.y(), strip.first, strip.end);
+  for (; deposits.size() > 1; deposits.pop_back()) deposits[0].add(deposits.back().sums());
+  collect_parts(*job.team, job.team->count(), [&](std::size_t, PartBytes& bytes) {
+    PowerSums more = power;
+    std::vector<std::uint64_t> sums = deposits[0].sums();
+    bytes.copy(more.data(), more.size() * sizeof more[0]);
+    bytes.copy(sums.data(), sums.size() * sizeof sums[0]);
+    if (!bytes.reads()) return;
+    add_power(more, power);
+    deposits[0].add(sums);
+  });
+}
+
 /// Draws a strip of a pass.
 /// @param done,all  Groups, for the progress.
 void draw_strip(const Job& job, const Pass& pass, const Strip& strip, std::atomic<std::size_t>& done, std::size_t all,
@@ -312,38 +344,42 @@ void draw_strip(const Job& job, const Pass& pass, const Strip& strip, std::atomi
   tbb::parallel_for(std::size_t{0}, job.pieces.groups(), [&](std::size_t group) {
     if (progress.cancelled) throw Cancelled();
     const bool counts = strip.counts(job.pieces.rows[group], height);
-    if (counts || strip.has_light(job.pieces.rows[group])) draw_group(job, pass, group, counts, workers.local());
+    if (does_part(job.team, group) && (counts || strip.has_light(job.pieces.rows[group])))
+      draw_group(job, pass, group, counts, workers.local());
     const std::size_t drawn = ++done;
     if (std::this_thread::get_id() == caller) progress.update("drawing light", drawn, all);
   });
-  std::vector<const AreaDeposit*> deposits;
+  std::vector<AreaDeposit> deposits;
+  PowerSums drawn(power.size());
   for (Worker& worker : workers) {
     worker.deposit.flush();
-    deposits.push_back(&worker.deposit);
-    for (std::size_t channel = 0; channel < power.size(); ++channel)
-      for (int end = 0; end < ray_end_count; ++end) power[channel][end] += worker.power[channel][end];
+    deposits.push_back(std::move(worker.deposit));
+    add_power(worker.power, drawn);
   }
-  if (!deposits.empty()) add_to_films(pass, deposits, strip, width);
+  if (job.team) collect_strip(job, strip, deposits, drawn);
+  add_power(drawn, power);
+  if (!deposits.empty() && has_all(job.team)) add_to_films(pass, deposits, strip, width);
 }
 
 }  // namespace
 
 Caustic draw_caustic(const FlowMap& map, const Plate& plate, const std::vector<CausticBand>& bands,
-                     std::size_t channels, bool by_channel, const Progress& progress, double step) {
+                     const CausticSettings& settings, const Progress& progress) {
+  const std::size_t channels = settings.channels;
   const int width = plate.resolution.x(), height = plate.resolution.y();
   Caustic caustic;
   caustic.color = Film(width, height, 3);
-  if (by_channel) caustic.irradiance = Film(width, height, static_cast<int>(channels));
+  if (settings.by_channel) caustic.irradiance = Film(width, height, static_cast<int>(channels));
   caustic.power.assign(channels, {});
   caustic.ends.assign(channels, {});
   count_ends(map, plate, bands, caustic);
   double area = 0, widest = 0;
   for (const FlowTriangle& triangle : map.triangles) area += triangle.area;
   for (const CausticBand& band : bands) widest = std::max(widest, band.width);
-  const FlowPieces pieces = divide_map(map, widest / step, joined_bands(bands));
-  const Job job{map, pieces, plate.resolution, bands, area};
+  const FlowPieces pieces = divide_map(map, widest / settings.step, joined_bands(bands));
+  const Job job{map, pieces, plate.resolution, bands, area, settings.team};
   const std::vector<Pass> passes = passes_of(bands, area / plate.pixel_area(), caustic);
-  const std::vector<Strip> strips = strips_of(plate.resolution);
+  const std::vector<Strip> strips = strips_of(plate.resolution, settings.team);
   const std::size_t all = passes.size() * strips.size() * pieces.groups();
   std::atomic<std::size_t> done{0};
   PowerSums power(channels);

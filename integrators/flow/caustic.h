@@ -10,6 +10,7 @@
 #include <Eigen/Core>
 
 #include "base/progress.h"
+#include "base/team.h"
 #include "integrators/flow/flow_map.h"
 #include "renderer/film/film.h"
 
@@ -35,17 +36,23 @@ struct Caustic {
 /// Distance, in pixels, between the places where a triangle is drawn: an error of about 1% of a picture.
 constexpr double usual_step = 0.65;
 
+struct CausticSettings {
+  std::size_t channels = 1;
+  bool by_channel = true;    ///< Whether the result has the irradiance of each channel.
+  double step = usual_step;  ///< Pixels.
+  Team* team = nullptr;      ///< Processes that have the same map and draw it together; null: this one is alone.
+};
+
 /// Draws each triangle as often as its light moves by `step` from the first band to the last: once for several bands
 /// in a row where light moves less, at most 16 times for each band where it moves more (every two steps where these are
 /// more than 128). Triangles of which not all corners land leave their light at the corners: each corner takes a third.
 /// So do the small triangles at a tear. What lands beside the plate counts as missed.
-/// @param plate       The plate of the map.
-/// @param bands       In the order of their nodes, without gaps between those that have a width.
-/// @param by_channel  Whether the result has the irradiance of each channel.
-/// @param step        Pixels.
-/// The sums are integers, so that the result is the same for any number of threads. Memory: the films, and 32 bytes for
-/// each pixel and thread, if this is no more than 256 MiB; else the plate is drawn in strips. @throw Cancelled.
+/// @param plate  The plate of the map.
+/// @param bands  In the order of their nodes, without gaps between those that have a width.
+/// The sums are integers, so that the result is the same for any number of threads and processes; only process 0 of a
+/// team has it. Memory: the films, and 32 bytes for each pixel and thread, if this is no more than 256 MiB; else the
+/// plate is drawn in strips. @throw Cancelled; as Team::exchange.
 Caustic draw_caustic(const FlowMap& map, const Plate& plate, const std::vector<CausticBand>& bands,
-                     std::size_t channels, bool by_channel, const Progress& progress, double step = usual_step);
+                     const CausticSettings& settings, const Progress& progress);
 
 }  // namespace tensorray

@@ -10,6 +10,7 @@
 #include <tbb/parallel_for.h>
 
 #include "base/box.h"
+#include "base/team.h"
 #include "integrators/flow/flow_lattice.h"
 #include "integrators/flow/flow_triangles.h"
 #include "integrators/flow/node_tracer.h"
@@ -33,7 +34,8 @@ constexpr float gathered_part = 0.5f;  // Of the tolerance is left, at least, wh
 constexpr float still_pixels = 1;      // Light that moves by no more from the first node to the last is in one place.
 constexpr double swept_share = 0.99;   // The part of the positions whose light moves slowly enough from band to band.
 constexpr int most_levels = 14;
-constexpr std::size_t task_size = 64;  // Positions that one thread traces as one task.
+constexpr std::size_t task_size = 64;        // Positions that one thread traces as one task.
+constexpr std::size_t tasks_at_once = 4096;  // Whose landings processes give each other in one message: 100 MB.
 
 /// Positions in the middles of a square's sides, counter-clockwise from the lower one, and in its own.
 using Middles = std::array<std::uint32_t, 5>;
@@ -135,6 +137,7 @@ class FlowMapBuilder {
     const std::thread::id caller = std::this_thread::get_id();
     tbb::parallel_for(std::size_t{0}, tasks, [&](std::size_t task) {
       if (progress_.cancelled) throw Cancelled();
+      if (!does_part(settings_.team, task)) return;
       const std::size_t begin = first + task * task_size, end = std::min(begin + task_size, count);
       std::vector<NewPosition> positions;
       for (std::size_t i = begin; i < end; ++i) positions.push_back({beam_.start(origins_[i]), parents_[i]});
@@ -143,7 +146,22 @@ class FlowMapBuilder {
       if (std::this_thread::get_id() == caller)
         progress_.update("tracing rays", std::min(traced, settings_.most_starts), settings_.most_starts);
     });
+    if (settings_.team) exchange_landings(*settings_.team, tasks);
     traced_ = count;
+  }
+
+  /// Gives the others the landings of the positions that this process has traced, and takes theirs.
+  void exchange_landings(Team& team, std::size_t tasks) {
+    const std::size_t checks = tracer_.check_nodes().size();
+    exchange_parts(team, tasks, tasks_at_once, [&](std::size_t task, PartBytes& bytes) {
+      const std::size_t begin = traced_ + task * task_size, end = std::min(begin + task_size, map_.starts.size());
+      const auto copy = [&](auto& values, std::size_t of_each) {
+        bytes.copy(&values[begin * of_each], (end - begin) * of_each * sizeof values[0]);
+      };
+      copy(map_.landings, map_.nodes);
+      copy(map_.ends, map_.nodes);
+      copy(map_.lengths, checks);
+    });
   }
 
   bool landed(std::uint32_t position, std::size_t node) const {

@@ -19,6 +19,7 @@
 namespace tensorray {
 
 class RayMemory;
+class Team;
 
 struct FlowSettings {
   /// Flexibilities of the light that is followed. If they are the two ends of a `range`, the map holds a continuum
@@ -35,6 +36,8 @@ struct FlowSettings {
   bool beside = false;     ///< Whether light that lands beside the plate is as important as light on it.
 
   std::size_t most_starts = std::size_t{1} << 20;  ///< Refinement stops at so many positions; > 0.
+
+  Team* team = nullptr;  ///< Processes that trace the same map with this one, each a part of its rays; null: alone.
 
   /// Rays of maps that differ only in plate and range of flexibilities; null: none is remembered. The map is the same.
   std::shared_ptr<RayMemory> memory;
@@ -138,8 +141,9 @@ inline bool jumps(bool is_torn, const Eigen::Vector2d& a, const Eigen::Vector2d&
 /// only where nothing of the body is between its point and the light, on the side of the plate's normal: other points
 /// have the same projection.
 ///
-/// The result is the same for any number of threads. @throw std::invalid_argument if a setting is out of range or
-/// `geometry` has no plate; Cancelled.
+/// The result is the same for any number of threads and processes; but for the counts of rays, steps and samples, which
+/// are those of this process. @throw std::invalid_argument if a setting is out of range or `geometry` has no plate;
+/// Cancelled; as Team::exchange.
 FlowMap trace_flow_map(const TensorField& field, const Geometry& geometry, const Plate& plate, const Beam& beam,
                        const BendingSettings& bending, const FlowSettings& settings, const Progress& progress);
 

@@ -159,7 +159,9 @@ std::optional<LandedIrradiance> landed_irradiance(const TensorField& field, cons
   for (int pass = 0; pass < light.passes; ++pass) {
     const Beam beam = beam_of(field, surfaces, plate, light, pass);
     const FlowMap map = trace_flow_map(field, geometry, result.plate, beam, bending, settings, progress);
-    Caustic caustic = draw_caustic(map, result.plate, bands_of(light, map, settings), channels, true, progress);
+    CausticSettings drawing;
+    drawing.channels = channels;
+    Caustic caustic = draw_caustic(map, result.plate, bands_of(light, map, settings), drawing, progress);
     if (pass == 0) {
       result.irradiance = std::move(caustic.irradiance);
       result.folds = sheets_of(map, result.plate.resolution);

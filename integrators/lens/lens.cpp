@@ -92,6 +92,7 @@ FlowSettings flow_settings(const LensLight& light) {
   settings.finest = gathers(light) ? finest_of_gather : finest_of_scatter;
   settings.silhouette = false;
   settings.beside = gathers(light) && light.image.wraps;
+  settings.team = light.settings.team;
   settings.most_starts = most_starts + starts_per_pixel * static_cast<std::size_t>(light.receiver.resolution.prod());
   return settings;
 }
@@ -137,6 +138,23 @@ void draw_tile(const LensView& view, int tile, LensPicture& picture, TraceCounts
       picture.points[pixel] = make_point(view, at.cast<double>() + Vector2d(0.5, 0.5),
                                          centers[reference][static_cast<std::size_t>(y * columns + x)]);
     }
+}
+
+/// Gives process 0 the tiles that this process has drawn.
+void collect_tiles(const LensView& view, Team& team, LensPicture& picture) {
+  collect_parts(team, static_cast<std::size_t>(view.flow.tiles()), [&](std::size_t tile, PartBytes& bytes) {
+    const Eigen::AlignedBox2i box = view.flow.pixels(static_cast<int>(tile));
+    const auto columns = static_cast<std::size_t>(box.sizes().x()) + 1;
+    for (int y = box.min().y(); y <= box.max().y(); ++y) {
+      const std::size_t first = static_cast<std::size_t>(y) * static_cast<std::size_t>(picture.color.width) +
+                                static_cast<std::size_t>(box.min().x());
+      const auto copy = [&](auto* values) { bytes.copy(values + first, columns * sizeof *values); };
+      for (int c = 0; c < 3; ++c) copy(picture.color.plane(c));
+      for (int c = 0; c < picture.radiance.channels; ++c) copy(picture.radiance.plane(c));
+      copy(picture.alpha.data());
+      copy(picture.points.data());
+    }
+  });
 }
 
 void count_places(const LensView& view, LensPicture& picture) {
@@ -228,11 +246,13 @@ LensPicture draw_lens(const LensLight& light, const std::vector<LensBand>& bands
   progress.update("drawing the picture", 0, counts.size());
   tbb::parallel_for(0, view.flow.tiles(), [&](int tile) {
     if (progress.cancelled) throw Cancelled();
+    if (!does_part(light.settings.team, static_cast<std::size_t>(tile))) return;
     draw_tile(view, tile, picture, counts[static_cast<std::size_t>(tile)]);
     const std::uint64_t drawn = ++done;
     if (std::this_thread::get_id() == caller) progress.update("drawing the picture", drawn, counts.size());
   });
-  if (gathers(light)) count_places(view, picture);
+  if (light.settings.team) collect_tiles(view, *light.settings.team, picture);
+  if (gathers(light) && has_all(light.settings.team)) count_places(view, picture);
   picture.counts = {light.map.ray_steps, light.map.tensor_samples};
   for (const TraceCounts& each : counts) picture.counts += each;
   picture.seconds_drawing = seconds_since(start);

@@ -13,6 +13,7 @@
 #include <Eigen/Geometry>
 
 #include "base/progress.h"
+#include "base/team.h"
 #include "integrators/bending/light_channel.h"
 #include "integrators/flow/flow_map.h"
 #include "integrators/lens/lens_map.h"
@@ -62,6 +63,8 @@ struct LensSettings {
   /// Flexibilities of the light: each on its own, or the two ends of a range.
   std::vector<double> flexibilities;
   bool range = false;
+
+  Team* team = nullptr;  ///< Processes that trace the same light and draw it together; null: this one is alone.
 };
 
 /// Why a pixel sees the image, or does not. The values are the ends of rays: `image` is a ray that landed on the image,
@@ -119,8 +122,8 @@ struct LensLight {
 /// @param surfaces   Bounds, cut and obstacles of the scene; its plate is not used.
 /// @param direction  Direction of the light, unit.
 /// @param receiver   With the resolution of the picture.
-/// `field` and the image's texture must outlive the result, which is the same for any number of threads.
-/// @throw std::invalid_argument if a setting is out of range; Cancelled.
+/// `field` and the image's texture must outlive the result, which is the same for any number of threads and processes.
+/// @throw std::invalid_argument if a setting is out of range; Cancelled; as Team::exchange.
 LensLight trace_lens(const TensorField& field, const Surfaces& surfaces, const BendingSettings& bending,
                      const Eigen::Vector3d& direction, const Plate& receiver, const LensImage& image,
                      const LensSettings& settings, const Progress& progress);
@@ -128,7 +131,8 @@ LensLight trace_lens(const TensorField& field, const Surfaces& surfaces, const B
 /// The picture that `bands` make up.
 /// @param channels    Number of channels; the bands of a channel follow each other.
 /// @param by_channel  Whether the result has the radiance of each channel.
-/// @throw Cancelled. The result is the same for any number of threads.
+/// @throw Cancelled; as Team::exchange. The result is the same for any number of threads and processes; only process 0
+/// of a team has it.
 LensPicture draw_lens(const LensLight& light, const std::vector<LensBand>& bands, const LensRadiance& radiance,
                       std::size_t channels, bool by_channel, const Progress& progress);
 

@@ -127,6 +127,11 @@ void AreaDeposit::flush() {
   batch_.count = 0;
 }
 
+void AreaDeposit::add(const std::vector<std::uint64_t>& sums) {
+  if (sums.size() != sums_.size()) throw std::invalid_argument("light of another plate cannot be added");
+  for (std::size_t i = 0; i < sums.size(); ++i) sums_[i] += sums[i];
+}
+
 void AreaDeposit::read_row(const std::vector<const AreaDeposit*>& deposits, int y, int plane, double* power) {
   const AreaDeposit& any = *deposits[0];
   std::uint64_t sum = 0;

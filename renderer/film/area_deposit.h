@@ -56,6 +56,13 @@ class AreaDeposit {
   /// Adds the edges that wait.
   void flush();
 
+  /// The sums of the kept rows, which have no meaning of their own. Call flush() before.
+  const std::vector<std::uint64_t>& sums() const { return sums_; }
+
+  /// Adds the sums of a deposit of the same rows, maybe of another process. @throw std::invalid_argument if it is of
+  /// other rows.
+  void add(const std::vector<std::uint64_t>& sums);
+
   /// The power of each pixel of a row, in one plane: adds it up from deposits of the same rows that have been flushed.
   /// @param power  `width` values.
   static void read_row(const std::vector<const AreaDeposit*>& deposits, int y, int plane, double* power);

@@ -69,6 +69,9 @@ class Method {
   /// Whether its work has units that can be divided among machines (RenderJob).
   virtual bool is_divided() const { return false; }
 
+  /// Whether several processes can make one picture together, step by step (RenderJob::team).
+  virtual bool is_shared() const { return false; }
+
   /// Whether the pixels of its pictures are those of the plate.
   virtual bool shows_plate() const { return false; }
 

@@ -151,7 +151,7 @@ class LoadedLens : public LoadedMethod {
  public:
   LoadedLens(LensDescription settings, LensScene scene) : settings_(std::move(settings)), lens_(std::move(scene)) {}
 
-  Render render(const Scene& scene, const Progress& progress, RenderJob*) const override;
+  Render render(const Scene& scene, const Progress& progress, RenderJob* job) const override;
 
  private:
   LensDescription settings_;
@@ -165,8 +165,9 @@ SpectralImage spectra_side_by_side(std::vector<SpectralImage> spectra) {
   return {side_by_side(images), spectra.front().metadata};
 }
 
-Render LoadedLens::render(const Scene& scene, const Progress& progress, RenderJob*) const {
+Render LoadedLens::render(const Scene& scene, const Progress& progress, RenderJob* job) const {
   LensSettings settings;
+  settings.team = job ? job->team : nullptr;
   settings.mode = settings_.mode;
   settings.samples = settings_.samples;
   settings.reference = reference_place(scene);
@@ -199,6 +200,8 @@ Render LoadedLens::render(const Scene& scene, const Progress& progress, RenderJo
       spectra.push_back(spectral_image(picture.radiance, scene.bands, SpectralQuantity::radiance,
                                        scene.description.light.irradiance / pi, matrix));
   }
+  if (settings.team) collect_counts(*settings.team, result.statistics);
+  if (!has_all(settings.team)) return {};
   result.linear = side_by_side(pictures);
   if (!spectra.empty()) result.spectral = spectra_side_by_side(std::move(spectra));
   for (const std::uint64_t count : result.statistics.ends[reference_channel(scene)])
@@ -213,6 +216,7 @@ Render LoadedLens::render(const Scene& scene, const Progress& progress, RenderJo
 class LensMethod : public MethodWith<LensDescription> {
  public:
   const char* name() const override { return "lens"; }
+  bool is_shared() const override { return true; }
   bool shows_plate() const override { return true; }
 
   std::vector<Output> outputs() const override {

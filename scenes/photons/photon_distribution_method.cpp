@@ -66,12 +66,14 @@ class LoadedPhotons : public LoadedMethod {
 
 Render LoadedPhotons::render(const Scene& scene, const Progress& progress, RenderJob* job) const {
   const SceneDescription& description = scene.description;
-  PlateLight light = light_on_plate(scene, progress, job ? &job->work : nullptr);
+  PlateLight light = light_on_plate(scene, progress, job);
 
   const auto start = Clock::now();
   Render result;
   const bool has_map = !light.map.triangles.empty() && description.output.wants("exr");
-  result.linear = has_map ? with_channels(light.linear, plate_map(light.map, scene)) : std::move(light.linear);
+  Team* const team = job ? job->team : nullptr;
+  result.linear = has_map ? with_channels(light.linear, plate_map(light.map, scene, team)) : std::move(light.linear);
+  if (!has_all(team)) return {};
   if (description.output.wants("spectral"))
     result.spectral = spectral_image(light.irradiance, scene.bands, SpectralQuantity::irradiance,
                                      description.light.irradiance, to_working(scene));
@@ -124,6 +126,7 @@ class PhotonDistributionMethod : public MethodWith<PhotonDescription> {
  public:
   const char* name() const override { return "photon_distribution"; }
   bool shows_plate() const override { return true; }
+  bool is_shared() const override { return settings().density.kind == PhotonDensityKind::mesh; }
 
   std::vector<Output> outputs() const override {
     std::vector<Output> outputs = picture_outputs();

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include <fmt/format.h>
 
@@ -19,7 +20,7 @@ namespace {
 constexpr int most_refined_bands = 2048;
 constexpr double least_tolerance = 1e-3;  // Pixels; landings are single precision.
 
-FlowMap trace_map(const Scene& scene, double tolerance, const Progress& progress) {
+FlowMap trace_map(const Scene& scene, double tolerance, Team* team, const Progress& progress) {
   FlowSettings settings;
   settings.most_starts = static_cast<std::size_t>(scene.description.light.photons);
   settings.tolerance = tolerance;
@@ -27,6 +28,7 @@ FlowMap trace_map(const Scene& scene, double tolerance, const Progress& progress
   settings.flexibilities = range.flexibilities;
   settings.range = range.is_range;
   settings.memory = scene.rays;
+  settings.team = team;
   return trace_flow_map(scene.field, scene.geometry, scene.beam, scene.bending, settings, progress);
 }
 
@@ -62,15 +64,16 @@ std::vector<std::array<double, ray_end_count>> beam_power(const Scene& scene, co
   return power;
 }
 
-PlateLight draw_map(const Scene& scene, double tolerance, const Sweep& sweep, const Progress& progress) {
+PlateLight draw_map(const Scene& scene, double tolerance, const Sweep& sweep, Team* team, const Progress& progress) {
   Clock::time_point start = Clock::now();
   PlateLight light;
-  light.map = trace_map(scene, tolerance, progress);
+  light.map = trace_map(scene, tolerance, team, progress);
   const FlowMap& map = light.map;
   light.statistics.seconds_tracing = seconds_since(start);
   start = Clock::now();
-  Caustic caustic = draw_caustic(map, *scene.geometry.surfaces().plate, bands_of(scene, map, sweep.bands),
-                                 scene.bands.size(), scene.description.output.wants("spectral"), progress, sweep.step);
+  const CausticSettings settings{scene.bands.size(), scene.description.output.wants("spectral"), sweep.step, team};
+  Caustic caustic =
+      draw_caustic(map, *scene.geometry.surfaces().plate, bands_of(scene, map, sweep.bands), settings, progress);
   light.linear = color_image(caustic.color);
   light.irradiance = std::move(caustic.irradiance);
   light.statistics.seconds_density = seconds_since(start);
@@ -79,6 +82,7 @@ PlateLight draw_map(const Scene& scene, double tolerance, const Sweep& sweep, co
   light.statistics.power = beam_power(scene, caustic);
   light.statistics.ray_steps = map.ray_steps;
   light.statistics.tensor_samples = map.tensor_samples;
+  if (team) collect_counts(*team, light.statistics);
   return light;
 }
 
@@ -101,8 +105,15 @@ double rest_after(double change, double last_change) {
   return change * ratio / (1 - ratio);
 }
 
+/// A number of process 0, which has the picture.
+double of_first(Team* team, double number) {
+  if (!team) return number;
+  exchange_parts(*team, 1, 1, [&](std::size_t, PartBytes& bytes) { bytes.copy(&number, sizeof number); });
+  return number;
+}
+
 /// Halves the tolerance and the steps of wavelengths until what is left of the error is less than `bound`.
-PlateLight refine(const Scene& scene, double bound, const Progress& progress) {
+PlateLight refine(const Scene& scene, double bound, Team* team, const Progress& progress) {
   std::string label;
   Progress labelled;  // Shows the error behind the phase.
   labelled.report = [&](const std::string& phase, std::uint64_t done, std::uint64_t total) {
@@ -110,11 +121,12 @@ PlateLight refine(const Scene& scene, double bound, const Progress& progress) {
     labelled.cancelled = progress.cancelled.load();
   };
   double tolerance = 1, last_change = 0;
-  PlateLight light = draw_map(scene, tolerance, refined_sweep(tolerance), labelled);
+  PlateLight light = draw_map(scene, tolerance, refined_sweep(tolerance), team, labelled);
   for (;;) {
     tolerance /= 2;
-    PlateLight finer = draw_map(scene, tolerance, refined_sweep(tolerance), labelled);
-    const double change = relative_distance(light.linear, finer.linear), error = rest_after(change, last_change);
+    PlateLight finer = draw_map(scene, tolerance, refined_sweep(tolerance), team, labelled);
+    const double change = of_first(team, relative_distance(light.linear, finer.linear));
+    const double error = rest_after(change, last_change);
     last_change = change;
     finer.statistics.error = error;
     add_cost(light.statistics, finer.statistics);
@@ -130,10 +142,10 @@ PlateLight refine(const Scene& scene, double bound, const Progress& progress) {
   }
 }
 
-PlateLight draw_light(const Scene& scene, const Progress& progress) {
+PlateLight draw_light(const Scene& scene, Team* team, const Progress& progress) {
   const PhotonDensity& density = scene.description.integrator.settings<PhotonDescription>().density;
-  if (density.error) return refine(scene, *density.error, progress);
-  PlateLight light = draw_map(scene, density.tolerance, {}, progress);
+  if (density.error) return refine(scene, *density.error, team, progress);
+  PlateLight light = draw_map(scene, density.tolerance, {}, team, progress);
   if (!light.map.is_complete)
     light.warnings.push_back(
         "the light on the plate is coarser than `integrator.density.tolerance` asks: raise `light.photons`");
@@ -184,12 +196,13 @@ PlateLight trace_photons(const Scene& scene, const Progress& progress, Work* wor
 
 }  // namespace
 
-PlateLight light_on_plate(const Scene& scene, const Progress& progress, Work* work) {
+PlateLight light_on_plate(const Scene& scene, const Progress& progress, RenderJob* job) {
   if (scene.description.integrator.settings<PhotonDescription>().density.kind != PhotonDensityKind::mesh)
-    return trace_photons(scene, progress, work);
-  PlateLight light = draw_light(scene, progress);
+    return trace_photons(scene, progress, job ? &job->work : nullptr);
+  Team* const team = job ? job->team : nullptr;
+  PlateLight light = draw_light(scene, team, progress);
   const OutputDescription& output = scene.description.output;
-  if (!output.wants("photons") && !output.wants("fluence")) return light;
+  if ((!output.wants("photons") && !output.wants("fluence")) || !has_all(team)) return light;
   PlateLight photons = trace_photons(scene, progress);
   light.photons = std::move(photons.photons);
   light.fluence = std::move(photons.fluence);

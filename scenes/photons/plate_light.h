@@ -27,8 +27,8 @@ struct PlateLight {
 };
 
 /// Traces the light with the density estimator of the method photon_distribution. `mesh` draws the flow map of the
-/// beam; photons and fluence, if the scene asks for them, are then traced as for the other estimators. @throw
-/// Cancelled.
-PlateLight light_on_plate(const Scene& scene, const Progress& progress, Work* work = nullptr);
+/// beam, with the team of the job; photons and fluence, if the scene asks for them, are then traced as for the other
+/// estimators, by process 0. @throw Cancelled; as Team::exchange.
+PlateLight light_on_plate(const Scene& scene, const Progress& progress, RenderJob* job = nullptr);
 
 }  // namespace tensorray

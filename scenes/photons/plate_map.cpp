@@ -50,7 +50,7 @@ void describe(const FlowPoint& point, const Vector2d& pixel, const Plate& plate,
 
 }  // namespace
 
-Image plate_map(const FlowMap& map, const Scene& scene) {
+Image plate_map(const FlowMap& map, const Scene& scene, Team* team) {
   const Plate& plate = *scene.geometry.surfaces().plate;
   FlowPicture picture;
   picture.resolution = plate.resolution;
@@ -60,6 +60,7 @@ Image plate_map(const FlowMap& map, const Scene& scene) {
               {"displacement.x", "displacement.y", "displacement.z", "magnification.log", "magnification.major",
                "magnification.minor", "magnification.angle", "folds", "length", "error"});
   tbb::parallel_for(0, view.tiles(), [&](int tile) {
+    if (!does_part(team, static_cast<std::size_t>(tile))) return;
     std::vector<FlowPoint> points;
     view.draw(tile, 1, 0, {}, points);
     const Eigen::AlignedBox2i box = view.pixels(tile);
@@ -68,6 +69,12 @@ Image plate_map(const FlowMap& map, const Scene& scene) {
       for (int x = box.min().x(); x <= box.max().x(); ++x)
         describe(points[i++], {x + 0.5, y + 0.5}, plate, picture.straight, image.pixel(x, y));
   });
+  if (team)
+    collect_parts(*team, static_cast<std::size_t>(view.tiles()), [&](std::size_t tile, PartBytes& bytes) {
+      const Eigen::AlignedBox2i box = view.pixels(static_cast<int>(tile));
+      const std::size_t row = (static_cast<std::size_t>(box.sizes().x()) + 1) * image.channels.size() * sizeof(float);
+      for (int y = box.min().y(); y <= box.max().y(); ++y) bytes.copy(image.pixel(box.min().x(), y), row);
+    });
   return image;
 }
 

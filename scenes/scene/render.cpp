@@ -27,6 +27,16 @@ bool nothing_arrived(const Statistics& statistics) {
                      [](const EndCounts& counts) { return counts[static_cast<int>(RayEnd::plate)] == 0; });
 }
 
+void collect_counts(Team& team, Statistics& statistics) {
+  collect_parts(team, team.count(), [&](std::size_t, PartBytes& bytes) {
+    std::uint64_t counts[] = {statistics.ray_steps, statistics.tensor_samples};
+    bytes.copy(counts, sizeof counts);
+    if (!bytes.reads()) return;
+    statistics.ray_steps += counts[0];
+    statistics.tensor_samples += counts[1];
+  });
+}
+
 Render render(const Scene& scene, const Progress& progress, RenderJob* job) {
   Render result = scene.method->render(scene, progress, job);
   warn_of_step_limit(result);

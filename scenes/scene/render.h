@@ -10,6 +10,7 @@
 #include <string>
 #include <vector>
 
+#include "base/team.h"
 #include "base/work.h"
 #include "integrators/bending/light_channel.h"
 #include "integrators/paths/paths.h"
@@ -64,6 +65,9 @@ struct Render {
   std::vector<std::string> warnings;  ///< Problems that the picture does not show by itself; one line each.
 };
 
+/// Adds the steps and samples of the other processes; at process 0. @throw as Team::collect.
+void collect_counts(Team& team, Statistics& statistics);
+
 /// A render whose work is kept. Where Progress is cancelled while units are done, the work stops, and the result is
 /// what there is.
 struct RenderJob {
@@ -71,9 +75,12 @@ struct RenderJob {
 
   /// Gets what there is so far when `work` wants a picture; may be empty.
   std::function<void(Render)> show;
+
+  /// Processes that make the same picture together with this one, if the method can (Method::is_shared); null: alone.
+  Team* team = nullptr;
 };
 
-/// Renders the scene with its method. @param job  Null: nothing is kept.
+/// Renders the scene with its method. @param job  Null: nothing is kept. Of a team, only process 0 has the result.
 /// @throw Cancelled; std::runtime_error; SceneError.
 Render render(const Scene& scene, const Progress& progress, RenderJob* job = nullptr);
 

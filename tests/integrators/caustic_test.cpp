@@ -42,7 +42,7 @@ FlowMap lattice_map(int count, const Map& map) {
 
 /// L2 distance from `exact`, the power of each pixel, as a part of its norm. The power is exact.
 double distance(const FlowMap& map, const Plate& plate, const std::vector<double>& exact) {
-  const Caustic caustic = draw_caustic(map, plate, {CausticBand{}}, 1, true, Progress());
+  const Caustic caustic = draw_caustic(map, plate, {CausticBand{}}, {}, Progress());
   EXPECT_NEAR(power_of(caustic, RayEnd::plate), sum(exact), 1e-6);
   double squares = 0, all = 0;
   for (std::size_t i = 0; i < exact.size(); ++i) {
@@ -155,7 +155,7 @@ std::pair<Film, Film> swept_and_narrow(const std::function<Vector2d(const Vector
     narrow[i].weight = 1.0 / bands;
   }
   const auto draw = [&](const std::vector<CausticBand>& each) {
-    const Caustic caustic = draw_caustic(map, unit_plate(), each, 1, true, Progress(), 1);
+    const Caustic caustic = draw_caustic(map, unit_plate(), each, {1, true, 1}, Progress());
     EXPECT_NEAR(all_power(caustic), 1, 1e-9);
     return caustic.irradiance;
   };
@@ -179,7 +179,7 @@ TEST(Caustic, ABandIsSweptInStepsOfAPixel) {
 TEST(Caustic, LightWithoutColourHasPower) {
   const FlowBench bench = make_bench(lens, plate_at(2.2, 3, 48));
   const FlowMap map = map_of(bench, single(0.4));
-  const Caustic caustic = draw_caustic(map, bench.plate(), {CausticBand{}}, 1, false, Progress());
+  const Caustic caustic = draw_caustic(map, bench.plate(), {CausticBand{}}, {1, false}, Progress());
   EXPECT_EQ(sum(caustic.color.values), 0);
   EXPECT_EQ(caustic.power, caustic_of(bench, map).power);
   EXPECT_GT(power_of(caustic, RayEnd::plate), 0.5);
@@ -199,8 +199,8 @@ TEST(Caustic, ChannelsAddUpToTheColours) {
     bands[i].weight = 1.0 / parts;
     bands[i].color = Eigen::Vector3d(1, 0.5, -0.1) * static_cast<double>(1 + i / parts) / parts;
   }
-  const Caustic colors = draw_caustic(map, bench.plate(), bands, channels, false, Progress());
-  const Caustic both = draw_caustic(map, bench.plate(), bands, channels, true, Progress());
+  const Caustic colors = draw_caustic(map, bench.plate(), bands, {channels, false}, Progress());
+  const Caustic both = draw_caustic(map, bench.plate(), bands, {channels, true}, Progress());
   EXPECT_EQ(colors.color.values, both.color.values);
   EXPECT_EQ(colors.power, both.power);
   for (std::size_t channel = 0; channel < channels; ++channel)

@@ -69,7 +69,7 @@ inline FlowMap map_of(const FlowBench& bench, const FlowSettings& settings) {
 
 inline Caustic caustic_of(const FlowBench& bench, const FlowMap& map,
                           const std::vector<CausticBand>& bands = {CausticBand{}}) {
-  return draw_caustic(map, bench.plate(), bands, 1, true, Progress());
+  return draw_caustic(map, bench.plate(), bands, {}, Progress());
 }
 
 inline double sum(const std::vector<double>& values) { return std::accumulate(values.begin(), values.end(), 0.0); }

@@ -98,7 +98,46 @@ TEST_F(RanksProgram, GiveTheFilesOfOneProcess) {
   }
 }
 
-/// Methods whose work is one piece.
+struct SharedCase {
+  const char* integrator;
+  std::vector<std::string> endings;  // Of the pictures.
+  std::string option;
+};
+
+/// The steps of a mesh of light, or of a lens: all ranks trace it and draw it.
+TEST_F(RanksProgram, MakeOnePictureTogether) {
+  const SharedCase cases[] = {
+      {R"({"type": "photon_distribution"})", {"png", "exr", "spectral.exr", "vtp"}, ""},
+      {R"({"type": "photon_distribution"})", {"exr"}, "--until-error=20%"},
+      {R"({"type": "lens", "samples": 2, "mode": "gather"})", {"png", "exr", "spectral.exr"}, ""},
+      {R"({"type": "lens", "samples": 1, "mode": "scatter"})", {"exr"}, ""},
+  };
+  for (const SharedCase& each : cases) {
+    write("scene.json", fmt::format(R"({{"field": {{"file": "field.vdb"}}, "light": {{"wavelengths": {{"count": 6}}}},
+                                         "integrator": {}, "receiver": {{"resolution": [40, 32]}}}})",
+                                    each.integrator));
+    std::vector<std::string> alone{"render", "scene.json", "-q", "--stats", "one.json"};
+    std::string together = each.option + " -q --threads 1 --stats a.json";
+    for (const std::string& ending : each.endings) {
+      alone.insert(alone.end(), {"-o", "one." + ending});
+      together += " -o a." + ending;
+    }
+    if (!each.option.empty()) alone.push_back(each.option);
+    run_well(alone);
+    const nlohmann::json one = read_json("one.json");
+    for (const int ranks : {2, 3}) {
+      render_with_ranks(ranks, together);
+      for (const std::string& ending : each.endings) expect_same("a." + ending, "one." + ending);
+      const nlohmann::json many = read_json("a.json");
+      for (const char* key : {"positions", "photons", "ray_steps", "tensor_samples"})
+        EXPECT_EQ(many[key], one[key]) << each.integrator << ' ' << key;
+      EXPECT_EQ(many["ranks"]["count"], ranks);
+      for (const std::uint64_t parts : many["ranks"]["units"]) EXPECT_GT(parts, 2u);
+    }
+  }
+}
+
+/// Methods without units: ranks take whole frames.
 TEST_F(RanksProgram, DivideTheFramesOfASequence) {
   for (const char* method :
        {R"({"type": "photon_distribution"})", R"({"type": "lens", "samples": 1})", R"({"type": "stretch"})"}) {

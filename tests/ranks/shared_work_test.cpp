@@ -269,6 +269,75 @@ TEST(SharedWork, WholeJobsAreDoneOnceByAnyRank) {
   EXPECT_EQ(std::set<std::string>(done.begin(), done.end()), all);
 }
 
+/// What each rank has after some steps: in every step the parts of all, one after the other; and what rank 0 collects.
+std::vector<std::string> do_steps(Team& team, int steps) {
+  std::vector<std::string> seen;
+  for (int step = 0; step < steps; ++step) {
+    // Parts of any size, also empty ones.
+    const auto letter = static_cast<char>('a' + step);
+    const std::string mine(team.index() * static_cast<std::size_t>(step), letter);
+    std::string all;
+    for (const std::string& part : team.exchange(mine)) all += part + '|';
+    seen.push_back(all);
+    const std::vector<std::string> parts = team.collect(mine + std::to_string(team.index()));
+    EXPECT_EQ(parts.size(), team.index() == 0 ? team.count() : 0u);
+    for (std::size_t i = 0; i < parts.size(); ++i)
+      EXPECT_EQ(parts[i], std::string(i * static_cast<std::size_t>(step), letter) + std::to_string(i));
+  }
+  return seen;
+}
+
+TEST(SharedSteps, AllRanksHaveThePartsOfAll) {
+  for (const int ranks : {2, 3, 4}) {
+    Post post;
+    post.boxes.resize(static_cast<std::size_t>(ranks));
+    Progress progress;
+    std::vector<std::vector<std::string>> seen(static_cast<std::size_t>(ranks));
+    std::vector<std::thread> others;
+    for (int rank = 1; rank < ranks; ++rank)
+      others.emplace_back([&, rank] {
+        ThreadRanks mine(post, rank);
+        Follower follower(mine, progress, 0);
+        for (int jobs = 0; const auto job = follower.next_job(); ++jobs) {
+          const auto team = follower.team(*job);
+          EXPECT_EQ(job->text, jobs == 0 ? "the job" : "another job");
+          seen[static_cast<std::size_t>(rank)] = do_steps(*team, 5);
+        }
+      });
+    ThreadRanks first(post, 0);
+    Leader leader(first, progress);
+    for (const char* job : {"the job", "another job"}) {
+      seen[0] = do_steps(leader.share_steps(job), 5);
+      leader.end();
+    }
+    leader.finish();
+    for (std::thread& each : others) each.join();
+    std::string expected;
+    for (int rank = 0; rank < ranks; ++rank) expected += std::string(static_cast<std::size_t>(3 * rank), 'd') + '|';
+    EXPECT_EQ(seen[0][3], expected);
+    for (const auto& each : seen) EXPECT_EQ(each, seen[0]);
+  }
+}
+
+TEST(SharedSteps, ADamagedMessageIsRefused) {
+  const std::string bytes = packed({"one", "", "three"}, 1);
+  EXPECT_EQ(unpacked(bytes, 3), (std::vector<std::string>{"one", "", "three"}));
+  for (std::size_t size = 0; size < bytes.size(); ++size)
+    EXPECT_THROW(unpacked(bytes.substr(0, size), 3), std::runtime_error) << size;
+}
+
+TEST(SharedSteps, CancelledRanksDoNotWait) {
+  Post post;
+  post.boxes.resize(2);
+  Progress progress;
+  ThreadRanks first(post, 0);
+  Leader leader(first, progress);
+  Team& team = leader.share_steps("the job");
+  progress.cancelled = true;
+  EXPECT_THROW(team.exchange("mine"), Cancelled);
+  EXPECT_THROW(team.collect("mine"), Cancelled);
+}
+
 TEST(SharedWork, CancelledRanksStop) {
   Post post;
   post.boxes.resize(2);

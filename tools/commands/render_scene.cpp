@@ -124,24 +124,36 @@ Render render_or_keep(const Scene& scene, const Progress& progress, RenderJob& j
   }
 }
 
-/// While it lives, all ranks do units of the work. They get what the work belongs to, as `merge` does from shards.
+/// While it lives, all ranks do units of the work, or its steps together, if the method has such. They get what the
+/// work belongs to, as `merge` does from shards.
 class SharedWork {
  public:
-  SharedWork(Leader* leader, const Scene& scene, Work& work, unsigned threads) : leader_(leader) {
-    if (!leader_) return;
-    const Json job = {{"origin", origin_of(scene)},
-                      {"scene_file", text_of_path(std::filesystem::absolute(scene.description.path))},
-                      {"part", {work.part().index, work.part().count}}};
-    leader_->share(job.dump(), work, threads);
+  SharedWork(Leader* leader, const Scene& scene, RenderJob& job, unsigned threads) : job_(job) {
+    const Method& method = scene.description.integrator.method();
+    if (!leader || !(method.is_divided() || method.is_shared())) return;
+    leader_ = leader;
+    Json outputs = Json::object();
+    for (const auto& [kind, file] : scene.description.output.files)
+      outputs[kind] = text_of_path(std::filesystem::absolute(file));
+    const Json order = {{"origin", origin_of(scene)},
+                        {"outputs", outputs},
+                        {"scene_file", text_of_path(std::filesystem::absolute(scene.description.path))},
+                        {"part", {job.work.part().index, job.work.part().count}}};
+    if (method.is_divided())
+      leader_->share(order.dump(), job.work, threads);
+    else
+      job.team = &leader_->share_steps(order.dump());
   }
   ~SharedWork() {
     if (leader_) leader_->end();
+    job_.team = nullptr;
   }
   SharedWork(const SharedWork&) = delete;
   SharedWork& operator=(const SharedWork&) = delete;
 
  private:
-  Leader* const leader_;
+  Leader* leader_ = nullptr;
+  RenderJob& job_;
 };
 
 std::string run_statistics(const Scene& scene, const Statistics& statistics, double seconds, const RenderRun& run) {
@@ -164,8 +176,7 @@ void complete(const Scene& scene, RenderJob& job, OutputFiles files, const KeepS
   std::optional<TevDisplay> display;
   if (!run.keeping.display.empty())
     display.emplace(run.keeping.display, written_by(scene.description, run).front().filename().string());
-  const bool is_divided = scene.description.integrator.method().is_divided();
-  const SharedWork shared(is_divided ? run.leader : nullptr, scene, job.work, running_threads());
+  const SharedWork shared(run.leader, scene, job, running_threads());
   WorkKeeper keeper(scene, job.work, keep);
   job.show = [&](Render picture) {
     if (display) display->show(picture.linear);
@@ -328,13 +339,22 @@ void render_units(const RankJob& job, const Json& order, const RenderRun& run, s
   SceneDescription description =
       read_scene_json(origin.at("scene"), path_of_text(order.at("scene_file").get<std::string>()));
   set_chosen(origin, description);
+  if (description.integrator.method().is_shared()) {  // Steps depend on what rank 0 writes; the origin does not say it.
+    description.output.files.clear();
+    for (const auto& [kind, file] : order.at("outputs").items())
+      description.output.files[kind] = path_of_text(file.get<std::string>());
+  }
   bound_memory_of(run, description);
   Scene scene = load(description, loaded, progress);
   const std::string other = difference(origin, origin_of(scene));
   if (!other.empty())
     throw SceneError(printable(fmt::format("{}: is not that of rank 0: {}", description.path.string(), other)));
   RenderJob units{Work({order.at("part").at(0).get<std::size_t>(), order.at("part").at(1).get<std::size_t>()}), {}};
-  follower.share(job, units.work, running_threads());
+  const std::unique_ptr<Team> team = follower.team(job);
+  if (description.integrator.method().is_shared())
+    units.team = team.get();
+  else
+    follower.share(job, units.work, running_threads());
   render(scene, progress, &units);
   loaded.emplace(std::move(scene));
 }
@@ -349,7 +369,7 @@ void render_scene(const std::filesystem::path& scene_file, const SceneChanges& c
   refuse_number_signs(description, run);
   bound_memory_of(run, description);
   const Method& method = description.integrator.method();
-  if (run.leader && !method.is_divided())
+  if (run.leader && !method.is_divided() && !method.is_shared())
     tell({fmt::format("note: the work of {} is one piece, which one rank does; mpirun divides a sequence (--frames)",
                       method.name())},
          run.quiet);
@@ -371,7 +391,11 @@ std::vector<int> render_frames(const std::filesystem::path& scene_file, SceneCha
   }
   std::vector<int> failed;
   const bool is_handed_out = run.leader && !is_divided;
-  if (is_handed_out) run.leader->offer(std::exchange(jobs, {}));
+  RenderRun run_of_frame = run;
+  if (is_handed_out) {
+    run.leader->offer(std::exchange(jobs, {}));
+    run_of_frame.leader = nullptr;  // Each frame is that of one rank.
+  }
   for (;;) {
     std::optional<std::string> next = is_handed_out ? run.leader->take() : std::nullopt;
     if (!is_handed_out && !jobs.empty()) {
@@ -379,7 +403,7 @@ std::vector<int> render_frames(const std::filesystem::path& scene_file, SceneCha
       jobs.pop_front();
     }
     if (!next) return failed;
-    try_frame(scene_file, changes, parse_value(*next), run, loaded, failed, progress);
+    try_frame(scene_file, changes, parse_value(*next), run_of_frame, loaded, failed, progress);
   }
 }
 

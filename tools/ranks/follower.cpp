@@ -40,6 +40,32 @@ std::optional<RankJob> Follower::next_job() {
   return RankJob{answer.job, std::move(answer.bytes)};
 }
 
+class Follower::StepTeam : public Team {
+ public:
+  StepTeam(Follower& follower, std::uint32_t job) : follower_(follower), job_(job) {}
+
+  std::size_t index() const override { return static_cast<std::size_t>(follower_.ranks_.rank()); }
+  std::size_t count() const override { return static_cast<std::size_t>(follower_.ranks_.count()); }
+
+  std::vector<std::string> exchange(std::string mine) override {
+    follower_.ranks_.send(0, bytes_of({RankWord::part, job_, 0, 0, mine}));
+    std::vector<std::string> parts = unpacked(rank_message(follower_.wait()).bytes, count());
+    parts[index()] = std::move(mine);
+    return parts;
+  }
+
+  std::vector<std::string> collect(std::string mine) override {
+    follower_.ranks_.send(0, bytes_of({RankWord::part, job_, 0, 0, std::move(mine)}));
+    return {};
+  }
+
+ private:
+  Follower& follower_;
+  const std::uint32_t job_;
+};
+
+std::unique_ptr<Team> Follower::team(const RankJob& job) { return std::make_unique<StepTeam>(*this, job.number); }
+
 std::vector<std::size_t> Follower::next_units(std::uint32_t job, Work& work, std::size_t threads) {
   ranks_.send(0, bytes_of({RankWord::more, job, threads, 0, {}}));
   std::vector<std::size_t> units;

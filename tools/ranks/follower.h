@@ -3,10 +3,12 @@
 /// What all ranks but 0 do: they ask rank 0 for jobs, and for units of them.
 
 #include <cstdint>
+#include <memory>
 #include <optional>
 #include <string>
 
 #include "base/progress.h"
+#include "base/team.h"
 #include "base/work.h"
 #include "tools/ranks/ranks.h"
 
@@ -26,12 +28,17 @@ class Follower {
   /// Waits for what to do next; nothing: the end. @throw Cancelled.
   std::optional<RankJob> next_job();
 
+  /// This rank in the team that does the steps of the job. It uses the follower.
+  std::unique_ptr<Team> team(const RankJob& job);
+
   /// Makes `work` ask rank 0 for its units, and send them there. @param threads  Of this process.
   void share(const RankJob& job, Work& work, std::size_t threads);
 
  private:
   std::vector<std::size_t> next_units(std::uint32_t job, Work& work, std::size_t threads);
   std::string wait() const;
+
+  class StepTeam;
 
   Ranks& ranks_;
   const Progress& progress_;

@@ -29,14 +29,16 @@ Leader::~Leader() {
 void Leader::run() {
   try {
     for (;;) {
-      const auto message = ranks_.receive();
+      bool has_message = false;
       {
-        const std::lock_guard lock(mutex_);
+        const std::lock_guard lock(mutex_);  // `end` and `do_step` send from other threads.
         if (ends_) return;
-        if (message) receive(message->from, rank_message(message->bytes));
+        const auto message = ranks_.receive();
+        has_message = message.has_value();
+        if (has_message) receive(message->from, rank_message(message->bytes));
         answer();
       }
-      if (!message) std::this_thread::sleep_for(pause);
+      if (!has_message) std::this_thread::sleep_for(pause);
     }
   } catch (...) {
     const std::lock_guard lock(mutex_);
@@ -66,6 +68,10 @@ void Leader::receive(int from, RankMessage message) {
       shared_->waiting.emplace_back(from, message.number);
     else
       send_units(from, message.job, message.number);
+  }
+  if (message.word == RankWord::part && is_current) {
+    ++traffic_.units[static_cast<std::size_t>(from)];
+    shared_->parts[from].push_back(std::move(message.bytes));
   }
   if (message.word != RankWord::unit || !is_current) return;
   if (message.is_done != 0) {
@@ -145,6 +151,44 @@ void Leader::share(const std::string& job, Work& work, std::size_t threads) {
   shared_->number = ++jobs_;
   shared_->text = job;
   shared_->work = &work;
+}
+
+Team& Leader::share_steps(const std::string& job) {
+  const std::lock_guard lock(mutex_);
+  shared_.emplace();
+  shared_->number = ++jobs_;
+  shared_->text = job;
+  return *this;
+}
+
+/// The parts of the next step, by rank, with nothing for this one; none if a rank has not done its part.
+std::optional<std::vector<std::string>> Leader::take_parts() {
+  for (int rank = 1; rank < ranks_.count(); ++rank)
+    if (shared_->parts[rank].empty()) return std::nullopt;
+  std::vector<std::string> parts(given_.size());
+  for (auto& [rank, waiting] : shared_->parts) {
+    parts[static_cast<std::size_t>(rank)] = std::move(waiting.front());
+    waiting.pop_front();
+  }
+  return parts;
+}
+
+std::vector<std::string> Leader::do_step(std::string mine, bool gives_back) {
+  for (;;) {
+    rethrow();
+    if (progress_.cancelled) throw Cancelled();
+    {
+      const std::lock_guard lock(mutex_);
+      if (auto parts = take_parts()) {
+        ++traffic_.units[0];
+        parts->front() = std::move(mine);
+        for (int rank = 1; gives_back && rank < ranks_.count(); ++rank)
+          send(rank, {RankWord::part, shared_->number, 0, 0, packed(*parts, static_cast<std::size_t>(rank))});
+        return std::move(*parts);
+      }
+    }
+    std::this_thread::sleep_for(pause);
+  }
 }
 
 void Leader::end() {

@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <deque>
 #include <exception>
+#include <map>
 #include <mutex>
 #include <optional>
 #include <set>
@@ -15,6 +16,7 @@
 #include <vector>
 
 #include "base/progress.h"
+#include "base/team.h"
 #include "base/work.h"
 #include "tools/ranks/rank_message.h"
 #include "tools/ranks/ranks.h"
@@ -28,11 +30,11 @@ struct RankTraffic {
 };
 
 /// A thread of it uses `ranks`; nobody else may, before `finish`.
-class Leader {
+class Leader : private Team {
  public:
   /// Both must outlive it.
   Leader(Ranks& ranks, const Progress& progress);
-  ~Leader();
+  ~Leader() override;
   Leader(const Leader&) = delete;
   Leader& operator=(const Leader&) = delete;
 
@@ -40,7 +42,11 @@ class Leader {
   /// when the progress is cancelled. @param job  What the others need to begin. Ends with `end`.
   void share(const std::string& job, Work& work, std::size_t threads);
 
-  /// No rank uses the work of `share` from now on.
+  /// All ranks do the steps of the job together from now on. Ends with `end`. @param job  As above. @return of this
+  /// rank, which must not be used after `end`.
+  Team& share_steps(const std::string& job);
+
+  /// No rank uses the work of `share`, nor the team, from now on.
   void end();
 
   /// Jobs that one rank each does by itself, whichever has time.
@@ -55,11 +61,17 @@ class Leader {
   RankTraffic traffic() const;
 
  private:
-  /// Work that all ranks do.
+  std::size_t index() const override { return 0; }
+  std::size_t count() const override { return given_.size(); }
+  std::vector<std::string> exchange(std::string mine) override { return do_step(std::move(mine), true); }
+  std::vector<std::string> collect(std::string mine) override { return do_step(std::move(mine), false); }
+
+  /// Work that all ranks do: units, or steps.
   struct Shared {
     std::uint32_t number = 0;
     std::string text;
-    Work* work = nullptr;
+    Work* work = nullptr;                              ///< Null: steps.
+    std::map<int, std::deque<std::string>> parts;      ///< Of the next steps, by the other ranks.
     std::size_t next = 0;                              ///< The units before it were handed out.
     std::size_t away = 0;                              ///< Units that other ranks have.
     std::vector<std::size_t> mine;                     ///< Units that this rank has.
@@ -71,8 +83,10 @@ class Leader {
   void receive(int from, RankMessage message);
   void answer();
   void send(int to, const RankMessage& message);
-  bool has_begun() const { return shared_->work->size() > 0; }
+  bool has_begun() const { return shared_->work && shared_->work->size() > 0; }
   bool has_units() const { return !has_begun() || shared_->next < shared_->work->size(); }
+  std::optional<std::vector<std::string>> take_parts();
+  std::vector<std::string> do_step(std::string mine, bool gives_back);
   std::vector<std::size_t> take_units(std::size_t threads);
   void send_units(int to, std::uint32_t job, std::size_t threads);
   std::vector<std::size_t> next_units(std::size_t threads);

@@ -6,7 +6,7 @@
 #include <cstring>
 #include <stdexcept>
 #include <string>
-#include <type_traits>
+#include <vector>
 
 namespace tensorray {
 
@@ -14,6 +14,7 @@ enum class RankWord : std::uint32_t {
   job,     ///< To 0: I have nothing to do. The answer: what to do, as text.
   unit,    ///< A unit of the job, with its state. To 0: this far I have done it. From 0: do it.
   more,    ///< To 0: I need units, `number` for all threads. The answer ends their list; an empty list: there are none.
+  part,    ///< Of a step that all ranks do together. To 0: mine. From 0: those of all others, if they are given back.
   finish,  ///< From 0: there are no more jobs.
 };
 
@@ -40,6 +41,36 @@ inline RankMessage rank_message(const std::string& bytes) {
   std::memcpy(head, bytes.data(), sizeof head);
   return {static_cast<RankWord>(head[0] >> 32), static_cast<std::uint32_t>(head[0]), head[1], head[2],
           bytes.substr(sizeof head)};
+}
+
+/// Texts as one, without one of them.
+inline std::string packed(const std::vector<std::string>& texts, std::size_t without) {
+  std::string bytes;
+  for (std::size_t i = 0; i < texts.size(); ++i) {
+    const std::uint64_t size = i == without ? 0 : texts[i].size();
+    bytes.append(reinterpret_cast<const char*>(&size), sizeof size);
+    bytes.append(texts[i], 0, size);
+  }
+  return bytes;
+}
+
+/// Such texts again. @throw std::runtime_error if the bytes are not those of `count` texts.
+inline std::vector<std::string> unpacked(const std::string& bytes, std::size_t count) {
+  std::vector<std::string> texts;
+  std::size_t at = 0;
+  const auto require_rest = [&](std::uint64_t size) {
+    if (size > bytes.size() - at) throw std::runtime_error("mpirun: a message between ranks is damaged");
+  };
+  for (std::size_t i = 0; i < count; ++i) {
+    std::uint64_t size = 0;
+    require_rest(sizeof size);
+    std::memcpy(&size, bytes.data() + at, sizeof size);
+    at += sizeof size;
+    require_rest(size);
+    texts.push_back(bytes.substr(at, size));
+    at += size;
+  }
+  return texts;
 }
 
 }  // namespace tensorray
