@@ -7,8 +7,9 @@
 
 namespace tensorray {
 
-/// The processors that this process may use, at least 1: those of its affinity, or less where a container has a quota
-/// of time (cpu.max of cgroups, cpu.cfs_quota_us of their first version), of which a part counts as a whole one.
+/// The processors that this process may use, at least 1: those of its affinity, or fewer where a container has a
+/// quota of processor time (cpu.max of cgroups, cpu.cfs_quota_us of their first version); a fraction of a processor
+/// counts as one.
 /// @param root  The root of the file system, for tests.
 unsigned usable_processors(const std::filesystem::path& root = "/");
 

@@ -50,13 +50,13 @@ void describe(FieldDescription& field, Visitor& visit) {
   visit("smooth", field.smooth, "standard deviation of a Gaussian that smooths the field first, voxels; 0 is none",
         between(0, greatest_smoothing));
   visit("eigenvalues", field.eigenvalues,
-        "preprocessing: as they are, |T| or (T^2)^(1/2); auto is absolute where the field is symmetric, else raw");
+        "raw: as they are; absolute: |T|; positive: (T^2)^(1/2); auto: absolute if the field is symmetric, else raw");
   visit("interpolation", field.interpolation, "what the field is between its voxels: smooth (cubic), or linear");
   visit("border", field.border,
         "cubic: inactive voxels fade to zero, or extend the values of active ones; auto extends where obstacles or "
         "bounds are given");
   visit("scale", field.scale,
-        "factor on the flexibility; auto is where light shows the field's structure without tangling",
+        "factor on the flexibility; auto: the scale that shows the field's structure without tangling the light",
         not_zero().or_word("auto"));
   visit("bounds", field.bounds, "closed mesh that limits the volume; light is straight outside it");
 }
@@ -99,7 +99,8 @@ void describe(WavelengthKeys& keys, Visitor& visit) {
 template <class Visitor>
 void describe(LightDescription& light, Visitor& visit) {
   visit("direction", light.direction,
-        "direction in which light travels; its length has no effect. auto is the axis along which light shows most",
+        "direction in which light travels, of any length; auto: of the six axis directions, the one in which light "
+        "shows most of the field",
         not_zero().or_word("auto"));
   visit("up", light.up, "up axis of aperture and receiver; default: +z, or +y for light along z", not_zero());
   visit("photons", light.photons, "approximate number of positions that emit", between(1, 1e12));

@@ -212,9 +212,10 @@ void add_render_command(CLI::App& program, Progress& progress) {
                    "Show the picture in the viewer tev while it is rendered (14158)")
       ->option_text("HOST:PORT");
   command
-      ->add_option("--memory", options->run.memory,
-                   "Bound of what is in memory, as 8G or 500M: a field that is larger is kept on the disk of the "
-                   "pictures, and read from there in parts")
+      ->add_option(
+          "--memory", options->run.memory,
+          "Limit of memory, as 8G or 500M. A larger field is kept in a file on the disk of the pictures, and read "
+          "in parts")
       ->transform(CLI::AsSizeValue(false))
       ->option_text("SIZE");
   command->add_flag("--watch", options->run.keeping.watch, "Keep the pictures up to date while they are rendered");

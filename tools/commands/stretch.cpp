@@ -40,8 +40,8 @@ void add_stretch_command(CLI::App& program, Progress& progress) {
   const auto options = std::make_shared<StretchOptions>();
   CLI::App* command = program.add_subcommand(
       "stretch",
-      "Tell how fast a scene's field pulls neighbouring rays apart (the finite-time Lyapunov exponent of "
-      "light): short for `render` with the method stretch");
+      "Compute how fast a scene's field moves neighbouring rays apart (the finite-time Lyapunov exponent of "
+      "light); short for `render` with the method stretch");
   command->add_option("SCENE", options->scene, "Scene file, of which field, bending, light and obstacles count")
       ->required();
   command

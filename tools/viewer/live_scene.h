@@ -21,7 +21,8 @@ namespace tensorray {
 /// - the rays of the light on a plate, up to where they leave the volume, while `field`, `bending` and the direction of
 ///   the light stay;
 /// - the picture in linear light, while `output` changes only in `exposure`, `display` and `view`.
-/// Each picture has the bits of one of a scene that is loaded anew. One thread at a time may use it.
+/// Each picture is the same, bit for bit, as if its scene were loaded and rendered from the beginning. One thread at a
+/// time may use it.
 class LiveScene {
  public:
   /// @param file  The scene's file; its folder is that of relative paths.

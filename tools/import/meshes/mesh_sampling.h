@@ -39,9 +39,9 @@ struct SamplingReport {
 ///
 /// A voxel takes the tensor at its centre, interpolated in the cell that contains it (it is NaN if a point with a
 /// weight has NaN), or the cell's own if the mesh has tensors at cells alone. Where cells are thinner than voxels, it
-/// takes the average over the part of the voxel that the mesh fills (voxel_average.h), wholly where the thinnest of
-/// these cells has at most half the thickness of a voxel, and less up to the thickness of a voxel, from where nothing
-/// is averaged. If the mesh has tensors at points and cells, the points' are sampled, and the cells' are those of the
+/// takes the average over the part of the voxel that the mesh fills (voxel_average.h). The average counts fully where
+/// the thinnest of these cells has at most half the thickness of a voxel, then less, and not at all from the thickness
+/// of a voxel on. If the mesh has tensors at points and cells, the points' are sampled, and the cells' are those of the
 /// file: the report compares with them, and cells where they are not finite are left out.
 /// Threads: uses all threads. The result does not depend on their number.
 /// @throw std::invalid_argument if the mesh has no three-dimensional cells, a setting is out of range, no voxel is

@@ -18,8 +18,8 @@ class VoxelAverage {
 
   /// The average, corrected for samples that are not centred in the voxel: because the body fills the voxel in part,
   /// or because samples belong to one voxel as wholes. A linear function is fitted by least squares, and what it
-  /// changes from the centre to the centroid of the samples is subtracted: wholly where it explains all variance of the
-  /// tensor, not at all where it explains less than 3/4. So a linear field gives its value at the centre, whatever the
+  /// changes from the centre to the centroid of the samples is subtracted: in full if it explains all of the tensor's
+  /// variance, not at all if it explains less than 3/4. So a linear field gives its value at the centre, whatever the
   /// samples' positions, and a layer that is thinner than the voxel gives its plain average, as a line fitted to it
   /// says nothing.
   Tensor value() const;

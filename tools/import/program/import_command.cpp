@@ -310,7 +310,7 @@ void add_import_options(CLI::App& program, Progress& progress) {
       ->option_text("STEPS");
   program
       .add_option("--memory", options->memory,
-                  "Bound of what is in memory, as 8G or 500M; of .npy and NIfTI the rest is kept on the disk of the "
+                  "Limit of memory, as 8G or 500M; of .npy and NIfTI the rest is kept on the disk of the "
                   "output, and files of other kinds must be smaller")
       ->transform(CLI::AsSizeValue(false))
       ->option_text("SIZE");
