@@ -1,7 +1,7 @@
 #pragma once
 /// @file integrators/packets/packet_kernel.h
 /// Traces many rays at once inside a field. Steps are those of scalar_tracer.h, in single precision and in the widest
-/// vectors of the processor. A part of packet_tracer.cpp. docs/performance.md explains the method.
+/// vectors of the processor. A part of packet_tracer.cpp. docs/dev/performance_notes.md explains the method.
 
 #include <array>
 #include <cstdint>

@@ -23,7 +23,7 @@ constexpr std::uint32_t dimensions_per_vertex = 4;
 constexpr double least_cosine = 0.01;
 
 /// The part of its light's luminance that a path must carry to go on in any case. Measured on tubes in a studio's light
-/// (docs/performance.md, "Beside Cycles"): with 1/2 and 1/4 there is more noise for the time; with 1/16 it is the same.
+/// (docs/dev/performance_notes.md): with 1/2 and 1/4 there is more noise for the time; with 1/16 it is the same.
 constexpr double least_carried = 0.1;
 
 bool is_glass(const Material& material) { return std::holds_alternative<DielectricScattering>(material.scattering); }
