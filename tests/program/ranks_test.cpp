@@ -113,9 +113,11 @@ TEST_F(RanksProgram, MakeOnePictureTogether) {
       {R"({"type": "lens", "samples": 1, "mode": "scatter"})", {"exr"}, ""},
   };
   for (const SharedCase& each : cases) {
-    write("scene.json", fmt::format(R"({{"field": {{"file": "field.vdb"}}, "light": {{"wavelengths": {{"count": 6}}}},
+    write(
+        "scene.json",
+        fmt::format(R"({{"field": {{"file": "field.vdb"}}, "light": {{"photons": 20000, "wavelengths": {{"count": 6}}}},
                                          "integrator": {}, "receiver": {{"resolution": [40, 32]}}}})",
-                                    each.integrator));
+                    each.integrator));
     std::vector<std::string> alone{"render", "scene.json", "-q", "--stats", "one.json"};
     std::string together = each.option + " -q --threads 1 --stats a.json";
     for (const std::string& ending : each.endings) {
