@@ -11,6 +11,9 @@ if(CMAKE_CXX_COMPILER_ID STREQUAL "GNU")
   target_compile_options(tensorray_options INTERFACE -Wno-maybe-uninitialized -Wno-null-dereference
                          -Wno-array-bounds -Wno-stringop-overflow)
 endif()
+if(CMAKE_CXX_COMPILER_ID MATCHES "Clang")
+  target_compile_options(tensorray_options INTERFACE -Wno-sign-conversion)  # Which -Wconversion of GCC leaves out.
+endif()
 if(TENSORRAY_UNITY)
   # What is in the unnamed namespace of a source, its group may shadow, and its classes may contain.
   if(CMAKE_CXX_COMPILER_ID STREQUAL "GNU")

@@ -242,12 +242,12 @@ class RowGrid : public openvdb::Vec3SGrid {
  public:
   using Leaf = openvdb::Vec3STree::LeafNodeType;
 
-  RowGrid(const TensorGrid& grid, int row, bool half) : row_(row) {
+  RowGrid(const TensorGrid& grid, int row, bool is_half) : row_(row) {
     setName(grid.name + "_row" + std::to_string(row));
     place(*this, grid.to_world);
     setGridClass(openvdb::GRID_UNKNOWN);
     setVectorType(openvdb::VEC_INVARIANT);
-    setSaveFloatAsHalf(half);
+    setSaveFloatAsHalf(is_half);
     for (const auto& [key, value] : grid.metadata)
       if (!(*this)[key] && key != length_unit_key)
         insertMeta(key, openvdb::StringMetadata(value));  // Keep the grid's own entries: name, type, ...
@@ -379,10 +379,10 @@ TensorGrid read_tensor_vdb(const std::filesystem::path& path, const std::string&
   return result;
 }
 
-void write_tensor_vdb(const std::filesystem::path& path, const TensorGrid& grid, bool half) {
-  if (half) check_half_range(path, grid);
+void write_tensor_vdb(const std::filesystem::path& path, const TensorGrid& grid, bool is_half) {
+  if (is_half) check_half_range(path, grid);
   openvdb::GridPtrVec rows;
-  for (int row = 0; row < 3; ++row) rows.push_back(std::make_shared<RowGrid>(grid, row, half));
+  for (int row = 0; row < 3; ++row) rows.push_back(std::make_shared<RowGrid>(grid, row, is_half));
   openvdb::MetaMap metadata;
   for (const auto& [key, value] : grid.metadata)
     if (key != length_unit_key) metadata.insertMeta(key, openvdb::StringMetadata(value));
