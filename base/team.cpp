@@ -54,8 +54,11 @@ void exchange_parts(Team& team, std::size_t parts, std::size_t at_once, const Co
   }
 }
 
-void collect_parts(Team& team, std::size_t parts, const CopyPart& copy) {
-  take_others(team, team.collect(bytes_of_mine(team, 0, parts, copy)), 0, parts, copy);
+void collect_parts(Team& team, std::size_t parts, std::size_t at_once, const CopyPart& copy) {
+  for (std::size_t begin = 0; begin < parts; begin += at_once) {
+    const std::size_t end = std::min(begin + at_once, parts);
+    take_others(team, team.collect(bytes_of_mine(team, begin, end, copy)), begin, end, copy);
+  }
 }
 
 }  // namespace tensorray

@@ -60,7 +60,7 @@ using CopyPart = std::function<void(std::size_t part, PartBytes& bytes)>;
 /// processes that cross together. @throw as Team::exchange; std::runtime_error if the others have other parts.
 void exchange_parts(Team& team, std::size_t parts, std::size_t at_once, const CopyPart& copy);
 
-/// Gives process 0 the parts that this process has done, in one message. @throw as above.
-void collect_parts(Team& team, std::size_t parts, const CopyPart& copy);
+/// Gives process 0 the parts that this process has done. @param at_once, @throw as above.
+void collect_parts(Team& team, std::size_t parts, std::size_t at_once, const CopyPart& copy);
 
 }  // namespace tensorray

@@ -321,7 +321,8 @@ void add_power(const PowerSums& more, PowerSums& power) {
 void collect_strip(const Job& job, const Strip& strip, std::vector<AreaDeposit>& deposits, PowerSums& power) {
   if (deposits.empty()) deposits.emplace_back(job.plate.x(), job.plate.y(), strip.first, strip.end);
   for (; deposits.size() > 1; deposits.pop_back()) deposits[0].add(deposits.back().sums());
-  collect_parts(*job.team, job.team->count(), [&](std::size_t, PartBytes& bytes) {
+  const std::size_t processes = job.team->count();
+  collect_parts(*job.team, processes, processes, [&](std::size_t, PartBytes& bytes) {
     PowerSums more = power;
     std::vector<std::uint64_t> sums = deposits[0].sums();
     bytes.copy(more.data(), more.size() * sizeof more[0]);

@@ -142,7 +142,8 @@ void draw_tile(const LensView& view, int tile, LensPicture& picture, TraceCounts
 
 /// Gives process 0 the tiles that this process has drawn.
 void collect_tiles(const LensView& view, Team& team, LensPicture& picture) {
-  collect_parts(team, static_cast<std::size_t>(view.flow.tiles()), [&](std::size_t tile, PartBytes& bytes) {
+  const auto tiles = static_cast<std::size_t>(view.flow.tiles());
+  collect_parts(team, tiles, FlowView::tiles_at_once, [&](std::size_t tile, PartBytes& bytes) {
     const Eigen::AlignedBox2i box = view.flow.pixels(static_cast<int>(tile));
     const auto columns = static_cast<std::size_t>(box.sizes().x()) + 1;
     for (int y = box.min().y(); y <= box.max().y(); ++y) {

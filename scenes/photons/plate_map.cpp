@@ -69,8 +69,9 @@ Image plate_map(const FlowMap& map, const Scene& scene, Team* team) {
       for (int x = box.min().x(); x <= box.max().x(); ++x)
         describe(points[i++], {x + 0.5, y + 0.5}, plate, picture.straight, image.pixel(x, y));
   });
+  const auto tiles = static_cast<std::size_t>(view.tiles());
   if (team)
-    collect_parts(*team, static_cast<std::size_t>(view.tiles()), [&](std::size_t tile, PartBytes& bytes) {
+    collect_parts(*team, tiles, FlowView::tiles_at_once, [&](std::size_t tile, PartBytes& bytes) {
       const Eigen::AlignedBox2i box = view.pixels(static_cast<int>(tile));
       const std::size_t row = (static_cast<std::size_t>(box.sizes().x()) + 1) * image.channels.size() * sizeof(float);
       for (int y = box.min().y(); y <= box.max().y(); ++y) bytes.copy(image.pixel(box.min().x(), y), row);

@@ -28,7 +28,7 @@ bool nothing_arrived(const Statistics& statistics) {
 }
 
 void collect_counts(Team& team, Statistics& statistics) {
-  collect_parts(team, team.count(), [&](std::size_t, PartBytes& bytes) {
+  collect_parts(team, team.count(), team.count(), [&](std::size_t, PartBytes& bytes) {
     std::uint64_t counts[] = {statistics.ray_steps, statistics.tensor_samples};
     bytes.copy(counts, sizeof counts);
     if (!bytes.reads()) return;

@@ -132,6 +132,34 @@ class StrangeTeam : public Team {
   std::vector<std::string> collect(std::string mine) override { return {mine, "strange"}; }
 };
 
+TEST(Team, PartsCrossInAnyNumberOfMessages) {
+  constexpr std::size_t count = 3, parts = 11;
+  for (const std::size_t at_once : {std::size_t{1}, std::size_t{2}, std::size_t{4}, parts, 5 * parts}) {
+    Table table;
+    table.parts.resize(count);
+    std::vector<std::vector<std::size_t>> exchanged(count), collected(count);
+    std::vector<std::thread> members;
+    for (std::size_t index = 0; index < count; ++index)
+      members.emplace_back([&, index] {
+        ThreadTeam team(table, index);
+        std::vector<std::size_t> mine(parts);
+        for (std::size_t part = 0; part < parts; ++part) mine[part] = does_part(&team, part) ? part + 1 : 0;
+        exchanged[index] = collected[index] = mine;
+        const auto copy_to = [](std::vector<std::size_t>& values) {
+          return [to = values.data()](std::size_t part, PartBytes& bytes) { bytes.copy(to + part, sizeof *to); };
+        };
+        exchange_parts(team, parts, at_once, copy_to(exchanged[index]));
+        collect_parts(team, parts, at_once, copy_to(collected[index]));
+      });
+    for (std::thread& each : members) each.join();
+    for (std::size_t part = 0; part < parts; ++part) {
+      for (std::size_t index = 0; index < count; ++index) EXPECT_EQ(exchanged[index][part], part + 1) << at_once;
+      EXPECT_EQ(collected[0][part], part + 1) << at_once;
+      EXPECT_EQ(collected[1][part], part % count == 1 ? part + 1 : 0) << at_once;
+    }
+  }
+}
+
 TEST(Team, RefusesPartsOfOtherWork) {
   const FlowBench bench = make_bench(lens, plate_at(4, 2.4, 48));
   const FlowMap map = map_of(bench, single(0.3));
