@@ -25,6 +25,11 @@ pkg_check_modules(OpenImageIO REQUIRED IMPORTED_TARGET OpenImageIO>=2.4)
 pkg_check_modules(OpenColorIO REQUIRED IMPORTED_TARGET OpenColorIO>=2.1)
 
 pkg_check_modules(Highway REQUIRED IMPORTED_TARGET libhwy>=1.0)
+# Code with vectors is compiled once for each instruction set: on x86 for SSE2, AVX2 and AVX-512. Those between them
+# would make builds longer, and renders hardly faster. Structs of the kernel have vectors as members, which is not
+# possible where their size is unknown at compile time.
+target_compile_definitions(PkgConfig::Highway INTERFACE
+  "HWY_DISABLED_TARGETS=(HWY_SSSE3|HWY_SSE4|HWY_AVX3_DL|HWY_SVE|HWY_SVE2|HWY_SVE_256|HWY_SVE2_128|HWY_RVV)")
 if(CMAKE_SYSTEM_PROCESSOR MATCHES "^(aarch64|arm64)" AND CMAKE_CXX_COMPILER_ID STREQUAL "GNU")
   # Highway's NEON code uses these instructions, and GCC requires that its callers are compiled for them too.
   target_compile_options(PkgConfig::Highway INTERFACE -march=armv8-a+crypto)
@@ -62,7 +67,7 @@ if(TENSORRAY_PYTHON)
   find_package(pybind11 2.10 REQUIRED)
 endif()
 
-if(TENSORRAY_MPI AND NOT TENSORRAY_SANITIZE)  # MPI itself would have to be built with the sanitizers.
+if(NOT TENSORRAY_SANITIZE)  # MPI itself would have to be built with the sanitizers.
   find_package(MPI QUIET COMPONENTS C)
   if(NOT MPI_C_FOUND)
     message(STATUS "No MPI: mpirun cannot divide renders")
@@ -70,7 +75,7 @@ if(TENSORRAY_MPI AND NOT TENSORRAY_SANITIZE)  # MPI itself would have to be buil
 endif()
 
 # Libraries that the benchmark compares with, if they are installed.
-if(TENSORRAY_BENCHMARK)
+if(TENSORRAY_TESTS)
   find_path(NanoVDB_INCLUDE_DIR nanovdb/NanoVDB.h)
   find_package(VTK QUIET OPTIONAL_COMPONENTS FiltersFlowPaths FiltersGeneral)
 endif()

@@ -50,8 +50,5 @@ if(Python3_EXECUTABLE AND TARGET tensorray-import AND TARGET tensorray-view AND 
           COMPONENT programs)
 endif()
 
-if(TENSORRAY_LIBRARY)
-  include(Library)
-endif()
-
+include(Library)
 include(Packages)

@@ -3,8 +3,8 @@
 # The header tensorray/tensorray.h includes what is public. It is installed with all headers that these include in turn,
 # under their own paths.
 
-set(public_headers volumes/files/tensor_files.h volumes/tensors/eigenvalues.h volumes/tensors/generators.h
-    volumes/tensors/invariants.h volumes/bricks/tensor_field.h renderer/surfaces/mesh.h integrators/bending/bending.h
+set(public_headers volumes/files/tensor_files.h volumes/tensors/eigenvalues.h volumes/making/generators.h
+    volumes/tensors/invariants.h volumes/bricks/tensor_field.h renderer/meshes/mesh.h integrators/tracing/trace.h
     integrators/paths/paths.h integrators/flow/flow_map.h scenes/pipeline/read_scene.h scenes/scene/scene.h
     scenes/scene/render.h scenes/outputs/write_outputs.h)
 
@@ -59,8 +59,9 @@ foreach(header ${installed_headers})
 endforeach()
 install(FILES ${CMAKE_BINARY_DIR}/package/tensorray.h DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/tensorray
         COMPONENT development)
+# Optional: a folder that was set up for some parts alone does not have it.
 install(TARGETS libtensorray EXPORT tensorrayTargets
-        LIBRARY DESTINATION ${CMAKE_INSTALL_LIBDIR} COMPONENT programs NAMELINK_COMPONENT development)
+        LIBRARY DESTINATION ${CMAKE_INSTALL_LIBDIR} COMPONENT programs NAMELINK_COMPONENT development OPTIONAL)
 install(EXPORT tensorrayTargets NAMESPACE tensorray:: DESTINATION ${package_folder} COMPONENT development)
 install(FILES ${CMAKE_BINARY_DIR}/package/tensorrayConfig.cmake ${CMAKE_BINARY_DIR}/package/tensorrayConfigVersion.cmake
         DESTINATION ${package_folder} COMPONENT development)

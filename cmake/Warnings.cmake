@@ -40,8 +40,8 @@ function(tensorray_relocatable name)
   target_compile_options(${name} PRIVATE -fno-semantic-interposition)
 endfunction()
 
-# tensorray_library(NAME [EXCEPT FOLDER]): a static library of all sources in this folder and its subfolders, without
-# those of one subfolder (CONFIGURE_DEPENDS finds new files by itself).
+# tensorray_library(NAME [EXCEPT FOLDERS]): a static library of all sources in this folder and its subfolders, without
+# those of subfolders that match an expression (CONFIGURE_DEPENDS finds new files by itself).
 function(tensorray_library name)
   cmake_parse_arguments(PARSE_ARGV 1 ARG "" EXCEPT "")
   file(GLOB sources CONFIGURE_DEPENDS *.cpp */*.cpp)

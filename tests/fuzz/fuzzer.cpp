@@ -1,4 +1,4 @@
-// The entries of libFuzzer, in the program `tensorray_fuzz` of the preset `fuzz`. TENSORRAY_FUZZ_TARGET names a target
+// The entries of libFuzzer, in the program `tensorray_fuzz` of the preset `asan-ubsan`. TENSORRAY_FUZZ_TARGET names a target
 // of targets.cpp. tools/fuzz runs it.
 
 #include <algorithm>

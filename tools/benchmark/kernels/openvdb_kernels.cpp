@@ -2,9 +2,9 @@
 
 #include <openvdb/tools/Interpolation.h>
 
-#include "tools/benchmark/kernels.h"
-#include "tools/benchmark/openvdb_grids.h"
-#include "tools/benchmark/plain_tracer.h"
+#include "tools/benchmark/kernels/kernels.h"
+#include "tools/benchmark/kernels/openvdb_grids.h"
+#include "tools/benchmark/kernels/plain_tracer.h"
 
 namespace tensorray::benchmark {
 namespace {

@@ -1,4 +1,4 @@
-#include "tools/benchmark/kernels.h"
+#include "tools/benchmark/kernels/kernels.h"
 
 #ifdef TENSORRAY_HAS_NANOVDB
 
@@ -8,8 +8,8 @@
 #include <nanovdb/util/OpenToNanoVDB.h>
 #include <nanovdb/util/SampleFromVoxels.h>
 
-#include "tools/benchmark/openvdb_grids.h"
-#include "tools/benchmark/plain_tracer.h"
+#include "tools/benchmark/kernels/openvdb_grids.h"
+#include "tools/benchmark/kernels/plain_tracer.h"
 
 namespace tensorray::benchmark {
 namespace {

@@ -5,10 +5,11 @@
 #include <fmt/format.h>
 
 #include "integrators/packets/packet_kernel.h"
-#include "tools/benchmark/kernels.h"
+#include "integrators/tracing/trace.h"
+#include "tools/benchmark/kernels/kernels.h"
+#include "tools/benchmark/kernels/workload.h"
 #include "tools/benchmark/parts.h"
 #include "tools/benchmark/repeat.h"
-#include "tools/benchmark/workload.h"
 
 namespace tensorray::benchmark {
 namespace {

@@ -1,4 +1,4 @@
-#include "tools/benchmark/kernels.h"
+#include "tools/benchmark/kernels/kernels.h"
 
 #ifdef TENSORRAY_HAS_VTK_FLOW_PATHS
 

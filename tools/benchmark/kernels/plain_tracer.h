@@ -1,11 +1,11 @@
 #pragma once
-/// @file tools/benchmark/plain_tracer.h
+/// @file tools/benchmark/kernels/plain_tracer.h
 /// A plain loop that traces rays with the sampler of another library: scalar, single precision, in index space, with
 /// the splitting step and the series of the exponential up to the second order.
 
 #include <Eigen/Core>
 
-#include "tools/benchmark/workload.h"
+#include "tools/benchmark/kernels/workload.h"
 
 namespace tensorray::benchmark {
 

@@ -1,5 +1,5 @@
 #pragma once
-/// @file tools/benchmark/kernels.h
+/// @file tools/benchmark/kernels/kernels.h
 /// The kernels that are compared: those of tensorray, and the alternatives in other libraries.
 
 #include <functional>
@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "tools/benchmark/workload.h"
+#include "tools/benchmark/kernels/workload.h"
 
 namespace tensorray::benchmark {
 

@@ -1,11 +1,11 @@
-#include "tools/benchmark/workload.h"
+#include "tools/benchmark/kernels/workload.h"
 
 #include <algorithm>
 #include <cmath>
 
 #include "integrators/probes/auto_scale.h"
 #include "renderer/lights/beam.h"
-#include "renderer/surfaces/mesh.h"
+#include "renderer/meshes/mesh.h"
 
 namespace tensorray::benchmark {
 namespace {

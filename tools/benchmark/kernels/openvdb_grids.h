@@ -1,5 +1,5 @@
 #pragma once
-/// @file tools/benchmark/openvdb_grids.h
+/// @file tools/benchmark/kernels/openvdb_grids.h
 /// Fields as OpenVDB grids in memory. Only the .cpp files that measure OpenVDB include this header, because OpenVDB's
 /// headers are slow to compile.
 

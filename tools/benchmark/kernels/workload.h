@@ -1,5 +1,5 @@
 #pragma once
-/// @file tools/benchmark/workload.h
+/// @file tools/benchmark/kernels/workload.h
 /// The fields and the packets of rays of the measurements. They are the same for every kernel.
 
 #include <cstdint>
@@ -7,9 +7,9 @@
 #include <vector>
 
 #include "integrators/bending/bending.h"
-#include "renderer/surfaces/geometry.h"
+#include "integrators/bending/geometry.h"
 #include "volumes/bricks/tensor_field.h"
-#include "volumes/tensors/generators.h"
+#include "volumes/making/generators.h"
 
 namespace tensorray::benchmark {
 

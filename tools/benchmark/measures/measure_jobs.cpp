@@ -4,7 +4,7 @@
 #include <fmt/format.h>
 #include <unistd.h>
 
-#include "base/temporary_folder.h"
+#include "base/files/temporary_folder.h"
 #include "tools/benchmark/child.h"
 #include "tools/benchmark/machine.h"
 #include "tools/benchmark/parts.h"

@@ -3,12 +3,12 @@
 
 #include <fmt/format.h>
 
-#include "base/temporary_folder.h"
+#include "base/files/temporary_folder.h"
 #include "tools/benchmark/parts.h"
 #include "tools/benchmark/repeat.h"
 #include "volumes/bricks/tensor_field.h"
 #include "volumes/files/tensor_files.h"
-#include "volumes/tensors/generators.h"
+#include "volumes/making/generators.h"
 
 namespace tensorray::benchmark {
 
@@ -26,7 +26,7 @@ Json measure_loading(const Options& options, const Json& machine) {
   for (std::size_t i = 0; i < seconds.size(); ++i) {
     options.announce(fmt::format("loading, {} of {}", i + 1, seconds.size()));
     const double start = wall_seconds();
-    const BlockSource blocks = open_tensor_vdb(path).value();
+    const BlockSource blocks = open_tensor_vdb(path);
     opening[i] = wall_seconds() - start;
     const TensorField field(blocks);  // Block by block, as in render jobs.
     seconds[i] = wall_seconds() - start;

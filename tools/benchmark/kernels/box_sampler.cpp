@@ -1,8 +1,8 @@
-/// @file tools/benchmark/box_sampler.cpp
+/// @file tools/benchmark/kernels/box_sampler.cpp
 /// For comparison: `tensorray` with OpenVDB's BoxSampler instead of bricks, and without packets. This file replaces two
 /// source files, and keeps the contracts of their headers as far as tracing photons needs them. It replaces
-/// volumes/bricks/tensor_sampler.cpp with a TensorSampler on three OpenVDB grids, one for each row of the tensor. It
-/// replaces integrators/packets/packet_tracer.cpp with a `trace_in_packets` that leaves every ray to the scalar tracer.
+/// volumes/sampling/tensor_sampler.cpp with a TensorSampler on three OpenVDB grids, one for each row of the tensor. It
+/// replaces integrators/tracing/packet_tracer.cpp with a `trace_in_packets` that leaves every ray to the scalar tracer.
 /// CMakeLists.txt links all other objects of `tensorray` with this one; a missing or a second definition is an error of
 /// the linker. Except for sampling and packets, both programs therefore run the same machine code.
 
@@ -14,9 +14,9 @@
 
 #include <openvdb/tools/Interpolation.h>
 
-#include "integrators/packets/packet_tracer.h"
-#include "tools/benchmark/openvdb_grids.h"
-#include "volumes/bricks/tensor_sampler.h"
+#include "integrators/tracing/packet_tracer.h"
+#include "tools/benchmark/kernels/openvdb_grids.h"
+#include "volumes/sampling/tensor_sampler.h"
 
 namespace tensorray {
 namespace {
@@ -111,7 +111,7 @@ Eigen::Matrix3d TensorSampler::at(const Eigen::Vector3d&, const Eigen::Matrix<do
 
 double TensorSampler::way_through_straight_brick(const Eigen::Vector3d&, const Eigen::Vector3d&) { return 0; }
 
-bool trace_in_packets(const TensorField&, const Geometry&, const BendingSettings&, RayBatch&, const Recordings&) {
+bool trace_in_packets(const TensorField&, const Geometry&, const BendingSettings&, RayBatch&, RayRecord*) {
   return false;
 }
 

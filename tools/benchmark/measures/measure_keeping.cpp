@@ -7,8 +7,8 @@
 #include <tbb/blocked_range.h>
 #include <tbb/parallel_for.h>
 
-#include "base/temporary_folder.h"
-#include "renderer/film/density.h"
+#include "base/files/temporary_folder.h"
+#include "renderer/density/density.h"
 #include "tools/benchmark/child.h"
 #include "tools/benchmark/machine.h"
 #include "tools/benchmark/parts.h"

@@ -1,7 +1,8 @@
 #include <memory>
 
 #include "integrators/packets/packet_kernel.h"
-#include "tools/benchmark/kernels.h"
+#include "integrators/tracing/trace.h"
+#include "tools/benchmark/kernels/kernels.h"
 
 namespace tensorray::benchmark {
 namespace {

@@ -5,8 +5,8 @@
 
 #include <fmt/format.h>
 
-#include "base/temporary_folder.h"
-#include "renderer/images/image_distance.h"
+#include "base/files/temporary_folder.h"
+#include "renderer/film/image_distance.h"
 #include "tools/benchmark/child.h"
 #include "tools/benchmark/parts.h"
 
