@@ -2,24 +2,24 @@
 
 import "./view.css";
 import "uplot/dist/uPlot.min.css";
-import { fragment_of, patch_of } from "./address";
-import { command_line } from "./command_line";
-import { Connection } from "./connection";
-import { by_id } from "./dom";
-import { copy, download } from "./files";
-import { apply_patch, type JsonObject } from "./json";
-import { Knobs } from "./knobs";
-import { Picture } from "./picture";
-import type { BinaryMessage, Failure, FieldInformation, Hello, PictureHeader, TextMessage } from "./protocol";
-import { ReadOut } from "./read_out";
-import { SchemaForm } from "./schema_form";
-import { SpacePane } from "./space_pane";
-import { State } from "./state";
-import { StatusLine } from "./status_line";
-import { make_tabs } from "./tabs";
-import { Theme } from "./theme";
-import { Throttle } from "./throttle";
-import { show_toast } from "./toast";
+import { Knobs } from "./controls/knobs";
+import { SchemaForm } from "./controls/schema_form";
+import { by_id } from "./elements/dom";
+import { copy, download } from "./elements/files";
+import { make_tabs } from "./elements/tabs";
+import { Theme } from "./elements/theme";
+import { show_toast } from "./elements/toast";
+import { Picture } from "./panes/picture";
+import { ReadOut } from "./panes/read_out";
+import { SpacePane } from "./panes/space_pane";
+import { StatusLine } from "./panes/status_line";
+import { fragment_of, patch_of } from "./state/address";
+import { command_line } from "./state/command_line";
+import { Connection } from "./state/connection";
+import { apply_patch, type JsonObject } from "./state/json";
+import type { BinaryMessage, Failure, FieldInformation, Hello, PictureHeader, TextMessage } from "./state/protocol";
+import { State } from "./state/state";
+import { Throttle } from "./state/throttle";
 
 const space_interval = 250;  // ms, between requests for the content of the 3D pane
 const address_delay = 250;  // ms, before the address shows a change

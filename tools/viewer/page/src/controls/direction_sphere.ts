@@ -1,8 +1,8 @@
 // The knob for a direction: a sphere that one turns, with the axes of the world as the 3D pane shows them.
 
-import { button, element, style_value } from "./dom";
-import type { Vector } from "./protocol";
-import { dot, normalized, rounded, times, turned } from "./vector";
+import { button, element, style_value } from "../elements/dom";
+import type { Vector } from "../state/protocol";
+import { dot, normalized, rounded, times, turned } from "../state/vector";
 
 const size = 132;  // CSS pixels
 const radius = 54;

@@ -1,6 +1,6 @@
 // Knobs for names: a list to choose from, and a text with suggestions.
 
-import { element } from "./dom";
+import { element } from "../elements/dom";
 
 export interface ChoiceOptions {
   name: string;

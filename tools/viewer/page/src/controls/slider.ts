@@ -1,7 +1,7 @@
 // A knob for a number: label, slider, number box, and a button that makes the value automatic again.
 
-import { button, element } from "./dom";
-import { short_text, trimmed } from "./numbers";
+import { button, element } from "../elements/dom";
+import { short_text, trimmed } from "../elements/numbers";
 
 export interface SliderOptions {
   /** For ids. */

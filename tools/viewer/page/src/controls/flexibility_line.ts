@@ -1,8 +1,8 @@
 // The knob for s(λ) = a + b λ: a line over the visible spectrum whose two ends one drags.
 
-import { svg_element, element } from "./dom";
-import { short_text } from "./numbers";
-import { spectrum_color } from "./spectrum_color";
+import { svg_element, element } from "../elements/dom";
+import { short_text } from "../elements/numbers";
+import { spectrum_color } from "../elements/spectrum_color";
 
 const ends = [380, 780] as const;  // nm
 const [width, height] = [300, 128];

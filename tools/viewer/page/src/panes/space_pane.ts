@@ -5,8 +5,8 @@ import { OrbitControls } from "three/examples/jsm/controls/OrbitControls.js";
 import { LineMaterial } from "three/examples/jsm/lines/LineMaterial.js";
 import { LineSegments2 } from "three/examples/jsm/lines/LineSegments2.js";
 import { LineSegmentsGeometry } from "three/examples/jsm/lines/LineSegmentsGeometry.js";
-import { style_value } from "./dom";
-import type { FieldInformation, Mesh, Ray, Space, Vector } from "./protocol";
+import { style_value } from "../elements/dom";
+import type { FieldInformation, Mesh, Ray, Space, Vector } from "../state/protocol";
 
 const axis_colors = { x: "#d64545", y: "#3c9a3c", z: "#3d6fe0" };
 const view_from: Vector = [0.9, -1.5, 0.75];

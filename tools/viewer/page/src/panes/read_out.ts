@@ -1,10 +1,10 @@
 // What is under the pointer: values, colour, spectrum.
 
 import uPlot from "uplot";
-import { element, style_value } from "./dom";
-import type { Look } from "./protocol";
-import { short_text } from "./numbers";
-import { spectrum_color } from "./spectrum_color";
+import { element, style_value } from "../elements/dom";
+import { short_text } from "../elements/numbers";
+import { spectrum_color } from "../elements/spectrum_color";
+import type { Look } from "../state/protocol";
 
 export class ReadOut {
   private readonly values = element("dl", { id: "read-out-values" });

@@ -1,13 +1,13 @@
 // "All keys": a form with every key of the schema. A key that is absent shows its default, dimmed.
 
-import { button, element } from "./dom";
-import { equal, is_object, type Json, type Path } from "./json";
+import { button, element } from "../elements/dom";
+import { equal, is_object, type Json, type Path } from "../state/json";
 import {
   alternatives_of, fault_of, is_required, kind_of, kinds_of, number_of, names_of, owners_of, properties_of, text_of,
   with_kind,
   type Schema,
-} from "./schema";
-import type { State } from "./state";
+} from "../state/schema";
+import type { State } from "../state/state";
 
 interface Row {
   readonly node: HTMLElement;

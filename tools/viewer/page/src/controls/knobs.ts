@@ -1,17 +1,17 @@
 // The panel of knobs: the keys that one changes most while one looks at a picture.
 
+import { element } from "../elements/dom";
+import { trimmed } from "../elements/numbers";
+import { is_object, type Json, type JsonObject, type Path, with_value, without_value } from "../state/json";
+import { default_distance, default_size, diagonal, normal_of, tilt_of, type Tilt } from "../state/plate";
+import type { FieldInformation, PictureHeader, Vector } from "../state/protocol";
+import { names_of, number_of, schema_at, text_of, with_kind, type Schema } from "../state/schema";
+import type { State } from "../state/state";
+import { rounded, vector_of } from "../state/vector";
 import { Choice, SuggestedText } from "./choice";
 import { DirectionSphere } from "./direction_sphere";
-import { element } from "./dom";
 import { FlexibilityLine } from "./flexibility_line";
-import { is_object, type Json, type JsonObject, type Path, with_value, without_value } from "./json";
-import { default_distance, default_size, diagonal, normal_of, tilt_of, type Tilt } from "./plate";
-import type { FieldInformation, PictureHeader, Vector } from "./protocol";
-import { names_of, number_of, schema_at, text_of, with_kind, type Schema } from "./schema";
 import { Slider, type SliderOptions } from "./slider";
-import type { State } from "./state";
-import { trimmed } from "./numbers";
-import { rounded, vector_of } from "./vector";
 
 interface Knob {
   readonly node: HTMLElement;

@@ -1,7 +1,7 @@
 // The line below the picture: stage, seconds, progress, notes, warnings, and errors.
 
-import { by_id, element } from "./dom";
-import type { PictureHeader, Progress } from "./protocol";
+import { by_id, element } from "../elements/dom";
+import type { PictureHeader, Progress } from "../state/protocol";
 
 export class StatusLine {
   private readonly stage = by_id("status-stage");

@@ -1,6 +1,6 @@
 // The picture: draws coarse stages at the size of the finished one, and tells where the pointer is.
 
-import type { PictureHeader } from "./protocol";
+import type { PictureHeader } from "../state/protocol";
 
 /** The longest side of the canvas; browsers limit it. */
 const longest_side = 4096;
