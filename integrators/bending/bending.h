@@ -1,6 +1,6 @@
 #pragma once
 /// @file integrators/bending/bending.h
-/// Bends light through a tensor field by the rule (Zheng and Pang 2003, Eq. 5)
+/// Rays, and settings of how they are followed. In a tensor field light bends by (Zheng and Pang 2003, Eq. 5)
 ///   P' = V,  V' = σ (T V − (VᵀTV) V),  |V| = 1, with σ = s · scale.
 /// Only bending_steps.h and, for packets, packet_bending-inl.h and packet_stages-inl.h contain this rule.
 
@@ -13,8 +13,6 @@
 
 #include <Eigen/Core>
 
-#include "integrators/bending/ray_record.h"
-#include "renderer/surfaces/geometry.h"
 #include "volumes/bricks/tensor_field.h"
 
 namespace tensorray {
@@ -83,7 +81,7 @@ struct RayBatch {
   std::vector<Eigen::Vector3d> direction;      ///< Unit.
   std::vector<double> flexibility;             ///< s; any sign.
   std::vector<RayDifferential> differentials;  ///< One for every ray, or empty. They cost about as much as three rays.
-  bool wants_radiance_change = false;          ///< Only without differentials.
+  bool wants_log_radiance_scale = false;       ///< Only without differentials.
 
   // Set by `trace`.
   std::vector<RayEnd> end;
@@ -93,49 +91,12 @@ struct RayBatch {
   /// their power, light of strength σ has L_end = L_start e^(−Λ). A ray that is traced backwards, from the viewer, has
   /// −σ, and the radiance that it finds is multiplied by e^(+Λ). A step of `splitting` has exactly the change
   /// hσ tr T − 3 ln |exp(hσT) V|. Rays are the same with and without it.
-  std::vector<double> radiance_change;
+  std::vector<double> log_radiance_scale;
   std::uint64_t tensor_samples = 0;  ///< `trace` adds to it.
 
   std::size_t size() const { return position.size(); }
   void clear();
   void add(const Eigen::Vector3d& position, const Eigen::Vector3d& direction, double flexibility);
 };
-
-/// A vertex of the polyline that a ray's steps form.
-struct TrackPoint {
-  Eigen::Vector3d position = Eigen::Vector3d::Zero();
-  double length = 0;  ///< Length of the ray up to here, world units; a step is a little longer than its chord.
-};
-
-/// Vertices from the start to the end. There are no gaps within the volume, even if light leaves the cut and meets
-/// nothing more. Parts may lie outside the volume. Empty if the ray meets nothing.
-using Track = std::vector<TrackPoint>;
-
-/// Follows every ray of `batch` to its end, in place: position and direction become those at the end. A ray that missed
-/// stays where it last crossed the bounds (or where it started), unless there is a `max_length`. Differentials follow
-/// the variational equations; they are the derivatives of the method's own steps. On a surface they are the derivatives
-/// of the point where rays meet it, so that those of the position lie in the surface.
-/// @param field     World frame; s · scale · T in 1/length. Light goes straight outside its extent and outside the cut.
-/// @param geometry  Bounds (those of the field), cut, plate and obstacles.
-/// Accuracy: the method's order on smooth fields, 2 on trilinear data. A cubic field has kinks in its third
-/// derivatives: at steps much shorter than its voxels the order is 4 at most. Entry, exit and hits are located by
-/// repeating the step with the length that ends on the surface, which keeps the order. Threads: `field` and `geometry`
-/// are shared and immutable; one batch belongs to one thread.
-/// @throw std::invalid_argument if a setting is out of range.
-void trace(const TensorField& field, const Geometry& geometry, const BendingSettings& settings, RayBatch& batch);
-
-/// The same, one ray at a time and in double precision. Tests compare `trace` with this reference.
-void trace_reference(const TensorField& field, const Geometry& geometry, const BendingSettings& settings,
-                     RayBatch& batch);
-
-/// The same as `trace`; it also records the points of each ray, at little cost. The rays are the same.
-void trace(const TensorField& field, const Geometry& geometry, const BendingSettings& settings, RayBatch& batch,
-           std::vector<RayRecord>& records);
-void trace(const TensorField& field, const Geometry& geometry, const BendingSettings& settings, RayBatch& batch,
-           std::vector<RayPoints>& points);
-
-/// The same as `trace`; it also records a track for each ray, at almost no cost.
-void trace(const TensorField& field, const Geometry& geometry, const BendingSettings& settings, RayBatch& batch,
-           std::vector<Track>& tracks);
 
 }  // namespace tensorray

@@ -4,8 +4,8 @@
 
 namespace tensorray {
 
-RayPoint ray_point(const TensorField& field, const StepPoint& step, double entry_length) {
-  RayPoint point;
+PathPoint path_point(const TensorField& field, const StepPoint& step, double entry_length) {
+  PathPoint point;
   point.position = field.to_world() * index_position(step.place());
   point.direction = Eigen::Map<const Eigen::Vector3f>(step.direction).cast<double>().normalized();
   point.length = entry_length + double{step.length};
@@ -13,10 +13,10 @@ RayPoint ray_point(const TensorField& field, const StepPoint& step, double entry
   return point;
 }
 
-RayPoint ray_point(const TensorField& field, const RayRecord& record, std::size_t i) {
+PathPoint path_point(const TensorField& field, const RayRecord& record, std::size_t i) {
   if (i < record.before.size()) return record.before[i];
   i -= record.before.size();
-  return i < record.steps.size() ? ray_point(field, record.steps[i], record.before.back().length)
+  return i < record.steps.size() ? path_point(field, record.steps[i], record.before.back().length)
                                  : record.behind[i - record.steps.size()];
 }
 

@@ -6,7 +6,7 @@
 namespace tensorray {
 namespace {
 
-constexpr int most_columns = 1 << 12;  // Number of first squares along a side.
+constexpr int most_columns = 1 << 12;  // Number of first quads along a side.
 
 bool is_parallelogram(const std::vector<Eigen::Vector2d>& polygon) {
   if (polygon.size() != 4) return false;
@@ -14,9 +14,9 @@ bool is_parallelogram(const std::vector<Eigen::Vector2d>& polygon) {
   return skew.norm() < 1e-9 * (polygon[2] - polygon[0]).norm();
 }
 
-/// The place of a line of a lattice of `count` squares, in [0, 1].
-/// @param at      In squares.
-/// @param begins  Whether the lines of the first square gather at its begin; likewise `ends` for the last one.
+/// The place of a line of a lattice of `count` quads, in [0, 1].
+/// @param at      In quads.
+/// @param begins  Whether the lines of the first quad gather at its begin; likewise `ends` for the last one.
 double graded(double at, int count, bool begins, bool ends) {
   const double first = ends && count == 1 ? 0.5 : 1, last = begins && count == 1 ? 0.5 : 1;  // Sizes of what is graded.
   const double left = count - at;
@@ -29,7 +29,7 @@ double graded(double at, int count, bool begins, bool ends) {
 
 }  // namespace
 
-std::vector<Patch> patches_of(const std::vector<Eigen::Vector2d>& polygon, double square_size) {
+std::vector<Patch> patches_of(const std::vector<Eigen::Vector2d>& polygon, double quad_size) {
   std::vector<Patch> patches;
   const std::size_t n = polygon.size();
   if (is_parallelogram(polygon)) {
@@ -46,7 +46,7 @@ std::vector<Patch> patches_of(const std::vector<Eigen::Vector2d>& polygon, doubl
     const auto count = [&](int a, int b, int c, int d) {
       const double length =
           std::max((patch.corners[b] - patch.corners[a]).norm(), (patch.corners[d] - patch.corners[c]).norm());
-      return static_cast<int>(std::clamp(std::ceil(length / square_size), 1.0, double{most_columns}));
+      return static_cast<int>(std::clamp(std::ceil(length / quad_size), 1.0, double{most_columns}));
     };
     patch.columns = count(0, 1, 3, 2);
     patch.rows = count(1, 2, 0, 3);
@@ -64,19 +64,19 @@ double FlowLattice::v_of(std::uint32_t patch, std::uint32_t y) const {
   return graded(std::ldexp(y, -levels), p.rows, is_graded && p.is_edge[0], is_graded && p.is_edge[2]);
 }
 
-bool FlowLattice::is_at_edge(const Square& square) const {
-  const Patch& patch = patches[square.patch];
-  const std::uint32_t column = square.x >> levels, row = square.y >> levels;
+bool FlowLattice::is_at_edge(const Quad& quad) const {
+  const Patch& patch = patches[quad.patch];
+  const std::uint32_t column = quad.x >> levels, row = quad.y >> levels;
   return (patch.is_edge[0] && row == 0) ||
          (patch.is_edge[1] && column + 1 == static_cast<std::uint32_t>(patch.columns)) ||
          (patch.is_edge[2] && row + 1 == static_cast<std::uint32_t>(patch.rows)) || (patch.is_edge[3] && column == 0);
 }
 
-bool FlowLattice::is_on_border(const Square& square) const {
-  const Patch& patch = patches[square.patch];
-  const std::uint32_t side = side_of(square), right = static_cast<std::uint32_t>(patch.columns) << levels,
+bool FlowLattice::is_on_border(const Quad& quad) const {
+  const Patch& patch = patches[quad.patch];
+  const std::uint32_t side = side_of(quad), right = static_cast<std::uint32_t>(patch.columns) << levels,
                       top = static_cast<std::uint32_t>(patch.rows) << levels;
-  return square.x == 0 || square.y == 0 || square.x + side == right || square.y + side == top;
+  return quad.x == 0 || quad.y == 0 || quad.x + side == right || quad.y + side == top;
 }
 
 }  // namespace tensorray

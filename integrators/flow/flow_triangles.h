@@ -1,6 +1,6 @@
 #pragma once
 /// @file integrators/flow/flow_triangles.h
-/// Triangles of a flow map's squares. A part of flow_map.cpp.
+/// Triangles of a flow map's quads. A part of flow_map.cpp.
 
 #include <vector>
 
@@ -10,9 +10,9 @@
 
 namespace tensorray {
 
-/// Adds the triangles and edges of `squares`, which cover the lattice once, to `map`, which has the landings of their
-/// corners: two triangles a square; where a neighbour is finer, as many as there are positions about the square, and a
-/// position in its middle whose landings are the mean of the corners'.
-void add_triangles(const FlowLattice& lattice, const std::vector<Square>& squares, const Beam& beam, FlowMap& map);
+/// Adds the triangles and edges of `quads` to `map`. The quads cover the lattice once; the map has the landings of
+/// their corners. A quad becomes two triangles. If a neighbour is finer, it becomes as many as there are vertices on
+/// its outline, about a new vertex in its middle, whose landings are the mean of the corners'.
+void add_triangles(const FlowLattice& lattice, const std::vector<Quad>& quads, const Beam& beam, FlowMap& map);
 
 }  // namespace tensorray

@@ -6,6 +6,8 @@
 #include <utility>
 #include <vector>
 
+#include "integrators/tracing/trace.h"
+
 namespace tensorray {
 namespace {
 

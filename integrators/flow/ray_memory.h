@@ -1,6 +1,6 @@
 #pragma once
 /// @file integrators/flow/ray_memory.h
-/// Rays that were traced for one flow map, kept for others of the same light whose plates differ.
+/// Keeps the rays of a flow map, for other maps of the same light to other plates.
 
 #include <array>
 #include <cstddef>
@@ -9,6 +9,7 @@
 #include <tbb/concurrent_unordered_map.h>
 
 #include "integrators/bending/bending.h"
+#include "integrators/bending/geometry.h"
 
 namespace tensorray {
 
@@ -16,13 +17,14 @@ namespace tensorray {
 /// differ in where they start and in flexibility. Any number of threads may use it at once.
 class RayMemory {
  public:
-  /// Whether rays along `direction` meet the plate of `geometry` only behind the volume, and nothing else, so that
-  /// where they leave the volume says where they land.
+  /// Whether a ray's exit from the volume says where it lands: rays along `direction` must meet nothing but the plate
+  /// of `geometry`, and that only behind the volume.
   static bool serves(const TensorField& field, const Geometry& geometry, const Eigen::Vector3d& direction,
                      const BendingSettings& settings);
 
-  /// The same as trace(field, geometry, settings, batch), bit for bit, but that it counts only the samples of rays that
-  /// it does not remember. @param volume  `geometry` without its plate; `serves` must hold.
+  /// Does what trace(field, geometry, settings, batch) does, with the same bits. Rays that it remembers have 0 steps,
+  /// and add no tensor samples. `serves` must be true.
+  /// @param volume  `geometry` without its plate.
   void trace(const TensorField& field, const Geometry& volume, const Geometry& geometry,
              const BendingSettings& settings, RayBatch& batch);
 

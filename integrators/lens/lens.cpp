@@ -10,8 +10,8 @@
 #include <Eigen/LU>
 #include <tbb/parallel_for.h>
 
-#include "base/seconds.h"
-#include "integrators/flow/flow_view.h"
+#include "base/process/seconds.h"
+#include "integrators/flow_drawing/flow_view.h"
 #include "integrators/lens/lens_places.h"
 #include "integrators/lens/lens_shading.h"
 #include "integrators/lens/lens_view.h"
@@ -24,9 +24,9 @@ using Eigen::Matrix2d;
 using Eigen::Vector2d;
 
 constexpr double tolerance = 0.5;              // Wanted error of landings, pixels.
-constexpr double finest_of_scatter = 0.25;     // Size of the smallest squares, pixels: gaps at tears are as wide.
-constexpr double finest_of_gather = 1;         // There, samples in torn squares are traced on their own.
-constexpr std::size_t most_starts = 1u << 14;  // The map has at most so many positions,
+constexpr double finest_of_scatter = 0.25;     // Size of the smallest quads, pixels: gaps at tears are as wide.
+constexpr double finest_of_gather = 1;         // There, samples in torn quads are traced on their own.
+constexpr std::size_t most_starts = 1u << 14;  // The map has at most so many vertices,
 constexpr std::size_t starts_per_pixel = 2;    // plus so many for each pixel. A chaotic field could need any number.
 
 /// Maps pixels of the receiver along the light to coordinates in the image's plane.
@@ -44,13 +44,13 @@ Affine2d straight_map(const Plate& receiver, const Plate& image, const Eigen::Ve
 /// The part of the image whose light may reach the receiver: the part in front of the volume, and the part that
 /// straight light shows.
 Eigen::AlignedBox2d useful_starts(const LensLight& light, const TriangleMesh& volume) {
-  const Plate& plane = light.image.plane;
+  const Plate& plane = light.setup.image.plane;
   Eigen::AlignedBox2d useful;
   for (const Eigen::Vector3d& vertex : volume.vertices) {
-    const double ahead = plane.normal().dot(vertex - plane.center) / plane.normal().dot(light.direction);
-    useful.extend(plane_coordinates(plane, vertex - ahead * light.direction));
+    const double ahead = plane.normal().dot(vertex - plane.center) / plane.normal().dot(light.setup.direction);
+    useful.extend(plane_coordinates(plane, vertex - ahead * light.setup.direction));
   }
-  const Vector2d size = light.receiver.resolution.cast<double>();
+  const Vector2d size = light.setup.receiver.resolution.cast<double>();
   for (const Vector2d& corner : {Vector2d(0, 0), Vector2d(size.x(), 0), Vector2d(0, size.y()), size})
     useful.extend(light.straight * corner);
   const Eigen::AlignedBox2d image(-plane.size / 2, plane.size / 2);
@@ -60,8 +60,8 @@ Eigen::AlignedBox2d useful_starts(const LensLight& light, const TriangleMesh& vo
 
 /// The plate of the map. In `gather` its pixels are those of the receiver, as straight light projects them.
 Plate plate_of_landings(const LensLight& light) {
-  if (!gathers(light)) return light.receiver;
-  Plate plate = light.image.plane;
+  if (!gathers(light)) return light.setup.receiver;
+  Plate plate = light.setup.image.plane;
   const double pixel = std::sqrt(std::abs(light.straight.linear().determinant()));
   plate.resolution = (plate.size / pixel).array().ceil().max(1).min(1e6).cast<int>();
   plate.size = pixel * plate.resolution.cast<double>();
@@ -88,16 +88,19 @@ FlowSettings flow_settings(const LensLight& light) {
   if (gathers(light))
     for (double& flexibility : settings.flexibilities) flexibility = -flexibility;
   settings.range = light.settings.range;
+  settings.plate = light.landings;
   settings.tolerance = tolerance;
   settings.finest = gathers(light) ? finest_of_gather : finest_of_scatter;
   settings.silhouette = false;
-  settings.beside = gathers(light) && light.image.wraps;
+  settings.beside = gathers(light) && light.setup.image.wraps;
   settings.team = light.settings.team;
-  settings.most_starts = most_starts + starts_per_pixel * static_cast<std::size_t>(light.receiver.resolution.prod());
+  settings.most_starts =
+      most_starts + starts_per_pixel * static_cast<std::size_t>(light.setup.receiver.resolution.prod());
   return settings;
 }
 
-/// The LensPoint of a position (in pixels) of the receiver.
+/// The LensPoint of a place on the receiver.
+/// @param pixel  The place, in pixels.
 LensPoint make_point(const LensView& view, const Vector2d& pixel, const FlowPoint& seen) {
   const LensLight& light = view.light;
   LensPoint point;
@@ -107,9 +110,10 @@ LensPoint make_point(const LensView& view, const Vector2d& pixel, const FlowPoin
   const Matrix2d by_pixel = image_by_pixel(view, seen);
   point.st = texture_coordinates(light, at);
   point.end = sees_image(light, point.st) ? LensEnd::image : LensEnd::outside;
-  point.per_pixel = light.image.plane.size.cwiseInverse().asDiagonal() * by_pixel;
-  point.displacement = plane_point(light.image.plane, at) - plane_point(light.image.plane, light.straight * pixel);
-  point.log_stretch = -principal_stretch(by_pixel * to_pixels(light.receiver).linear()).logs.reverse();
+  point.per_pixel = light.setup.image.plane.size.cwiseInverse().asDiagonal() * by_pixel;
+  point.displacement =
+      plane_point(light.setup.image.plane, at) - plane_point(light.setup.image.plane, light.straight * pixel);
+  point.log_stretch = -principal_stretch(by_pixel * to_pixels(light.setup.receiver).linear()).logs.reverse();
   point.log_magnification = point.log_stretch.sum();
   point.length = seen.length;
   point.folds = seen.sheets;
@@ -119,7 +123,7 @@ LensPoint make_point(const LensView& view, const Vector2d& pixel, const FlowPoin
 void draw_tile(const LensView& view, int tile, LensPicture& picture, TraceCounts& counts) {
   const Eigen::AlignedBox2i box = view.flow.pixels(tile);
   const int columns = box.sizes().x() + 1, rows = box.sizes().y() + 1;
-  const std::size_t reference = view.nodes.size() - 1;
+  const std::size_t reference = view.wavelengths.size() - 1;
   const TileView centers = view_tile(view, tile, 1, {{0, 0, reference, reference}}, {}, counts);
   TileShader shader(view, tile, counts);
   PixelLight light;
@@ -160,7 +164,7 @@ void collect_tiles(const LensView& view, Team& team, LensPicture& picture) {
 
 void count_places(const LensView& view, LensPicture& picture) {
   const PlaceCounter counter(view.light);
-  const Plate& plane = view.light.image.plane;
+  const Plate& plane = view.light.setup.image.plane;
   tbb::parallel_for(std::size_t{0}, picture.points.size(), [&](std::size_t i) {
     LensPoint& point = picture.points[i];
     if (point.end != LensEnd::image && point.end != LensEnd::outside) return;
@@ -169,7 +173,7 @@ void count_places(const LensView& view, LensPicture& picture) {
   });
 }
 
-/// The number of positions by end, at the middle of each channel.
+/// The number of vertices by end, at the middle of each channel.
 std::vector<EndCounts> count_ends(const LensLight& light, const std::vector<LensBand>& bands, std::size_t channels) {
   std::vector<EndCounts> ends(channels, EndCounts{});
   for (std::size_t channel = 0; channel < channels; ++channel) {
@@ -179,9 +183,9 @@ std::vector<EndCounts> count_ends(const LensLight& light, const std::vector<Lens
       first = std::min(first, band.begin);
       last = std::max(last, band.end);
     }
-    const double node = node_at(light, (first + last) / 2);
+    const double place = sample_place(light, (first + last) / 2);
     for (std::size_t i = 0; i < light.map.starts.size(); ++i)
-      ++ends[channel][static_cast<int>(landing_at(light.map, i, node).end)];
+      ++ends[channel][static_cast<int>(landing_at(light.map, i, place).end)];
   }
   return ends;
 }
@@ -202,25 +206,23 @@ const char* to_string(LensEnd end) {
 }
 
 LensLight trace_lens(const TensorField& field, const Surfaces& surfaces, const BendingSettings& bending,
-                     const Eigen::Vector3d& direction, const Plate& receiver, const LensImage& image,
-                     const LensSettings& settings, const Progress& progress) {
-  check(image, settings);
+                     const LensSetup& setup, const LensSettings& settings, const Progress& progress) {
+  check(setup.image, settings);
   const auto start = Clock::now();
+  const Plate &receiver = setup.receiver, &image = setup.image.plane;
   const bool back = settings.mode == LensMode::gather;
-  const Plate &from = back ? receiver : image.plane, &to = back ? image.plane : receiver;
-  const Eigen::Vector3d along = back ? Eigen::Vector3d(-direction) : direction;
+  const Plate &from = back ? receiver : image, &to = back ? image : receiver;
+  const Eigen::Vector3d along = back ? Eigen::Vector3d(-setup.direction) : setup.direction;
   LensLight light{settings,
-                  direction,
-                  receiver,
-                  image,
-                  straight_map(receiver, image.plane, direction),
+                  setup,
+                  straight_map(receiver, image, setup.direction),
                   LensMap(field, surfaces, bending, from, to, along),
                   {},
                   {}};
   light.landings = plate_of_landings(light);
   const Eigen::AlignedBox2d starts =
       back ? Eigen::AlignedBox2d(-receiver.size / 2, receiver.size / 2) : useful_starts(light, surfaces.bounds);
-  light.map = trace_flow_map(field, light.planes.geometry(), light.landings, beam_from(from, starts, along), bending,
+  light.map = trace_flow_map(field, light.planes.geometry(), beam_from(from, starts, along), bending,
                              flow_settings(light), progress);
   light.seconds_tracing = seconds_since(start);
   return light;
@@ -229,7 +231,7 @@ LensLight trace_lens(const TensorField& field, const Surfaces& surfaces, const B
 LensPicture draw_lens(const LensLight& light, const std::vector<LensBand>& bands, const LensRadiance& radiance,
                       std::size_t channels, bool by_channel, const Progress& progress) {
   const auto start = Clock::now();
-  const Eigen::Vector2i size = light.receiver.resolution;
+  const Eigen::Vector2i size = light.setup.receiver.resolution;
   LensPicture picture;
   picture.color = Film(size.x(), size.y(), 3);
   if (by_channel) picture.radiance = Film(size.x(), size.y(), static_cast<int>(channels));
@@ -237,7 +239,7 @@ LensPicture draw_lens(const LensLight& light, const std::vector<LensBand>& bands
   picture.points.resize(picture.color.plane_size());
   picture.ends = count_ends(light, bands, channels);
   for (int i = 0; i < 2; ++i)
-    picture.straight.linear().row(i) = light.straight.linear().row(i) / light.image.plane.size[i];
+    picture.straight.linear().row(i) = light.straight.linear().row(i) / light.setup.image.plane.size[i];
   picture.straight.translation() = texture_coordinates(light, light.straight.translation());
 
   const LensView view = make_lens_view(light, bands, radiance);

@@ -5,6 +5,9 @@
 /// Light travels from the image to the receiver. The viewer stands behind the receiver and looks against the light.
 /// Both rectangles are given as the viewer sees them: their normals point to the viewer, along the light. This medium
 /// has no n² radiance law: the radiance of the image arrives unchanged.
+///
+/// Both modes are a flow map (integrators/flow/flow_map.h) of a LensMap, which all bands share: `scatter` draws its
+/// mesh over the landings, `gather` traces from the receiver and draws its mesh over the starts.
 
 #include <cstddef>
 #include <functional>
@@ -12,8 +15,8 @@
 
 #include <Eigen/Geometry>
 
-#include "base/progress.h"
-#include "base/team.h"
+#include "base/process/progress.h"
+#include "base/process/team.h"
 #include "integrators/bending/light_channel.h"
 #include "integrators/flow/flow_map.h"
 #include "integrators/lens/lens_map.h"
@@ -98,35 +101,37 @@ struct LensPicture {
                                   ///< and the remaining light is coloured.
   std::vector<LensPoint> points;  ///< One for each pixel, row by row from the top.
   Eigen::Affine2d straight = Eigen::Affine2d::Identity();  ///< Maps pixels to the (s, t) that straight light shows.
-  std::vector<EndCounts> ends;  ///< Number of positions of the map by channel and end; `plate` counts light that met
+  std::vector<EndCounts> ends;  ///< Number of vertices of the map by channel and end; `plate` counts light that met
                                 ///< the plane of the image (gather) or of the receiver (scatter).
   TraceCounts counts;
   double seconds_drawing = 0;
 };
 
+/// What stands before and behind the field.
+struct LensSetup {
+  Plate receiver;  ///< With the resolution of the picture.
+  LensImage image;
+  Eigen::Vector3d direction;  ///< Of the light, unit.
+};
+
 /// The light between an image and a receiver, before it is drawn.
 struct LensLight {
   LensSettings settings;
-  Eigen::Vector3d direction;
-  Plate receiver;
-  LensImage image;
-  Eigen::Affine2d
-      straight;    ///< From pixels to the point of the image's plane (its coordinates) that straight light shows.
+  LensSetup setup;
+  /// From pixels to coordinates, in the image's plane, of the point that straight light shows.
+  Eigen::Affine2d straight;
   LensMap planes;  ///< From the image to the receiver (scatter), or back (gather).
   Plate landings;  ///< The plate of `map`, in whose pixels its landings are.
-  FlowMap map;     ///< Between the planes. Starts are coordinates in the plane where light starts.
+  FlowMap map;     ///< Its starts are coordinates in the plane where light starts.
   double seconds_tracing = 0;
 };
 
 /// Traces the light.
-/// @param surfaces   Bounds, cut and obstacles of the scene; its plate is not used.
-/// @param direction  Direction of the light, unit.
-/// @param receiver   With the resolution of the picture.
+/// @param surfaces  Bounds, cut and obstacles of the scene; its plate is not used.
 /// `field` and the image's texture must outlive the result, which is the same for any number of threads and processes.
 /// @throw std::invalid_argument if a setting is out of range; Cancelled; as Team::exchange.
 LensLight trace_lens(const TensorField& field, const Surfaces& surfaces, const BendingSettings& bending,
-                     const Eigen::Vector3d& direction, const Plate& receiver, const LensImage& image,
-                     const LensSettings& settings, const Progress& progress);
+                     const LensSetup& setup, const LensSettings& settings, const Progress& progress);
 
 /// The picture that `bands` make up.
 /// @param channels    Number of channels; the bands of a channel follow each other.

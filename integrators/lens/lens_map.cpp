@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <numeric>
 
+#include "integrators/tracing/trace.h"
+
 namespace tensorray {
 namespace {
 

@@ -9,6 +9,7 @@
 #include <Eigen/Core>
 
 #include "integrators/bending/bending.h"
+#include "integrators/bending/geometry.h"
 
 namespace tensorray {
 

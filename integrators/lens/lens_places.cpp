@@ -18,7 +18,7 @@ PlanarMesh mesh_of(const LensLight& light) {
   const FlowMap& map = light.map;
   std::vector<bool> landed;
   for (std::size_t i = 0; i < map.starts.size(); ++i) {
-    const FlowLanding landing = landing_at(map, i, node_at(light, light.settings.reference));
+    const FlowLanding landing = landing_at(map, i, sample_place(light, light.settings.reference));
     mesh.vertices.push_back(landing.at);
     landed.push_back(landing.end == RayEnd::plate);
   }
@@ -38,7 +38,7 @@ int PlaceCounter::count(const Vector2d& landing) const {
   thread_local std::vector<Vector2d> starts;
   search_.find(landing, hits);
   starts.clear();
-  const double least = same_place * light_.receiver.pixel_size().minCoeff();
+  const double least = same_place * light_.setup.receiver.pixel_size().minCoeff();
   for (const PlanarHit& hit : hits) {
     Vector2d start(0, 0);
     for (int i = 0; i < 3; ++i) start += hit.weights[i] * light_.map.starts[mesh_.triangles[hit.triangle][i]];

@@ -17,12 +17,14 @@ using Eigen::Vector2d;
 constexpr double same_look = 0.25;     // Pixels: bands whose light sees points this near share a look at the image.
 constexpr std::size_t few_spans = 4;   // Of light that is hardly spread.
 constexpr double span_pixels = 0.5;    // Over which light moves within a span.
-constexpr double smooth_pixels = 0.5;  // From the parabola through three of five nodes, at the others: how far light
-                                       // may be, so that light between the nodes can be interpolated.
-constexpr double swept_pixels = 2;  // Of the image, over which a pixel's light is spread, so that one sample is enough.
-constexpr double wide_pixels = 2;   // Of the image, that a sample sees: where it may be at a fold.
-constexpr double fold_ratio = 0.95;   // Of the slope's determinants at the end of a torn span and beyond it, at a fold.
-constexpr double joined_pixels = 32;  // A band. Farther apart, the points that both ends see are on different sheets.
+constexpr double smooth_pixels = 0.5;  // Three of five wavelengths give a parabola. If light of the others is no
+                                       // farther from it, light between the wavelengths is interpolated.
+constexpr double swept_pixels = 2;     // A pixel whose light is spread over so many of the image needs only one sample.
+constexpr double wide_pixels = 2;      // A sample that sees so many pixels of the image may be at a fold.
+constexpr double fold_ratio = 0.95;    // A torn span ends at a fold if the determinant of the slope there is less than
+                                       // this part of that beyond it.
+constexpr double joined_pixels = 32;   // For each band of a span. Points that its ends see farther apart are on
+                                       // different sheets.
 
 /// The footprint of a sample whose point moves along `sweep`: each is a box whose variance adds to that of the other.
 Matrix2d swept(const Matrix2d& footprint, const Vector2d& sweep) {
@@ -39,14 +41,14 @@ std::vector<double> polynomial_weights(const std::vector<double>& at, double x) 
   return weights;
 }
 
-/// The nodes of spans of which each begins where the one before it ends; empty if one does not.
+/// The wavelengths of spans of which each begins where the one before it ends; empty if one does not.
 std::vector<std::size_t> chain(const std::vector<Span>& spans) {
-  std::vector<std::size_t> nodes{spans.front().from};
+  std::vector<std::size_t> wavelengths{spans.front().from};
   for (const Span& span : spans) {
-    if (span.from != nodes.back() || span.to == span.from) return {};
-    nodes.push_back(span.to);
+    if (span.from != wavelengths.back() || span.to == span.from) return {};
+    wavelengths.push_back(span.to);
   }
-  return nodes;
+  return wavelengths;
 }
 
 /// What one sample sees of the image.
@@ -99,33 +101,36 @@ class SampleView {
     return length;
   }
 
-  /// Whether the points seen at `nodes` are at most `distance` (pixels) from the parabola through every second of them.
-  bool is_smooth(const std::vector<std::size_t>& nodes, double distance) const {
+  /// Whether the points seen at `wavelengths` are at most `distance` (pixels) from the parabola through every second of
+  /// them.
+  bool is_smooth(const std::vector<std::size_t>& wavelengths, double distance) const {
     std::vector<double> places;
-    for (std::size_t i = 0; i < nodes.size(); i += 2) places.push_back(view_.nodes[nodes[i]]);
-    for (std::size_t i = 1; i < nodes.size(); i += 2) {
-      const std::vector<double> weights = polynomial_weights(places, view_.nodes[nodes[i]]);
+    for (std::size_t i = 0; i < wavelengths.size(); i += 2) places.push_back(view_.wavelengths[wavelengths[i]]);
+    for (std::size_t i = 1; i < wavelengths.size(); i += 2) {
+      const std::vector<double> weights = polynomial_weights(places, view_.wavelengths[wavelengths[i]]);
       Vector2d predicted(0, 0);
-      for (std::size_t k = 0; k < weights.size(); ++k) predicted += weights[k] * st(nodes[2 * k]);
-      if (!(Glimpse(*this, nodes[i]).distance(predicted) <= distance * n_)) return false;
+      for (std::size_t k = 0; k < weights.size(); ++k) predicted += weights[k] * st(wavelengths[2 * k]);
+      if (!(Glimpse(*this, wavelengths[i]).distance(predicted) <= distance * n_)) return false;
     }
     return true;
   }
 
  private:
-  const FlowPoint& point(std::size_t node) const { return points_[node][sample_]; }
+  const FlowPoint& point(std::size_t wavelength) const { return points_[wavelength][sample_]; }
 
   /// The change of (s, t) per sample along x and y, as the map's slope says.
-  Matrix2d by_slope(std::size_t node) const {
-    return view_.light.image.plane.size.cwiseInverse().asDiagonal() * image_by_pixel(view_, point(node)) / n_;
+  Matrix2d by_slope(std::size_t wavelength) const {
+    return view_.light.setup.image.plane.size.cwiseInverse().asDiagonal() * image_by_pixel(view_, point(wavelength)) /
+           n_;
   }
 
   /// The same, but for a fold, where the slope has no limit: no more than what is between a sample and the next ones.
-  Matrix2d footprint(std::size_t node) const {
-    Matrix2d by_sample = by_slope(node);
+  Matrix2d footprint(std::size_t wavelength) const {
+    Matrix2d by_sample = by_slope(wavelength);
     const auto limit = [&](int axis, bool exists, std::size_t neighbor) {
-      if (!exists || points_[node][neighbor].end != RayEnd::plate) return;
-      const Vector2d change = texture_coordinates(view_.light, image_point(view_, points_[node][neighbor])) - st(node);
+      if (!exists || points_[wavelength][neighbor].end != RayEnd::plate) return;
+      const Vector2d change =
+          texture_coordinates(view_.light, image_point(view_, points_[wavelength][neighbor])) - st(wavelength);
       if (change.squaredNorm() < by_sample.col(axis).squaredNorm()) by_sample.col(axis) = change;
     };
     const double wide = wide_pixels * view_.straight_pixel / n_;
@@ -135,28 +140,30 @@ class SampleView {
     }
     if (by_sample.col(1).norm() > wide) {
       limit(1, sample_ >= width_, sample_ - width_);
-      limit(1, sample_ + width_ < points_[node].size(), sample_ + width_);
+      limit(1, sample_ + width_ < points_[wavelength].size(), sample_ + width_);
     }
     return by_sample;
   }
 
-  bool lands(std::size_t node) const { return point(node).end == RayEnd::plate; }
+  bool lands(std::size_t wavelength) const { return point(wavelength).end == RayEnd::plate; }
 
   /// Whether the points that both ends of a span see, so many pixels apart, are on one sheet.
   static bool are_joined(const Span& span, double distance) {
     return distance <= joined_pixels * static_cast<double>(span.last - span.first);
   }
 
-  Vector2d st(std::size_t node) const { return texture_coordinates(view_.light, image_point(view_, point(node))); }
+  Vector2d st(std::size_t wavelength) const {
+    return texture_coordinates(view_.light, image_point(view_, point(wavelength)));
+  }
 
   /// A point of the image, and what a sample sees about it.
   struct Glimpse {
-    std::size_t node;
+    std::size_t wavelength;
     Vector2d st;
     Matrix2d to_samples;  // The change of the sample per (s, t), as the map's slope says.
 
     Glimpse(const SampleView& sample, std::size_t at)
-        : node(at), st(sample.st(at)), to_samples(sample.by_slope(at).inverse()) {}
+        : wavelength(at), st(sample.st(at)), to_samples(sample.by_slope(at).inverse()) {}
 
     /// In samples.
     double distance(const Vector2d& other) const { return (to_samples * (other - st)).norm(); }
@@ -173,7 +180,7 @@ class SampleView {
 
   /// This part if the sheet begins at a fold. Light sees points whose distance from the fold's grows as the root of the
   /// light's own distance, and so does the determinant of the map's slope.
-  /// @param beyond  The next node after the end, on the same sheet.
+  /// @param beyond  The next wavelength after the end, on the same sheet.
   std::optional<Part> part_at_fold(const Span& next, std::size_t end, std::size_t beyond) const {
     if (!lands(beyond)) return std::nullopt;
     const Glimpse at(*this, end), after(*this, beyond);
@@ -202,9 +209,9 @@ class SampleView {
     const Vector2d middle = (from.st + end) / 2;
     if (!sees_image(view_.light, middle)) return;
     const bool is_long = from.distance(end) > same_look * n_;
-    const Matrix2d box = footprint(from.node);
+    const Matrix2d box = footprint(from.wavelength);
     const Eigen::Vector4d texel =
-        view_.light.image.texture->lookup(middle, is_long ? swept(box, end - from.st) : box).cast<double>();
+        view_.light.setup.image.texture->lookup(middle, is_long ? swept(box, end - from.st) : box).cast<double>();
     const bool glows = !(texel.w() > 0);  // Light of a flame, say, that covers nothing.
     if (glows && texel.head<3>().isZero(0)) return;
     const double covered = glows ? 0 : texel.w(), amount = glows ? 1 : texel.w();
@@ -259,25 +266,25 @@ void TileShader::find_sweeps() {
 }
 
 bool TileShader::moves_smoothly() const {
-  const std::vector<std::size_t> nodes = chain(few_);
-  if (nodes.size() != few_spans + 1) return false;
+  const std::vector<std::size_t> wavelengths = chain(few_);
+  if (wavelengths.size() != few_spans + 1) return false;
   for (std::size_t i = 0; i < sweeps_.size(); ++i)
-    if (std::isfinite(sweeps_[i]) && !SampleView(view_, whole_, i, 1, columns_).is_smooth(nodes, smooth_pixels))
+    if (std::isfinite(sweeps_[i]) && !SampleView(view_, whole_, i, 1, columns_).is_smooth(wavelengths, smooth_pixels))
       return false;
   return true;
 }
 
-/// Sets what pixels see at the nodes of `spans_` that are not drawn. It is valid where the sweep is finite.
+/// Sets what pixels see at the wavelengths of `spans_` that are not drawn. It is valid where the sweep is finite.
 void TileShader::interpolate() {
   const std::vector<std::size_t> known = chain(few_);
   std::vector<double> places;
-  for (const std::size_t node : known) places.push_back(view_.nodes[node]);
-  for (const std::size_t node : chain(spans_)) {
-    if (!whole_[node].empty()) continue;
-    const std::vector<double> weights = polynomial_weights(places, view_.nodes[node]);
-    whole_[node] = whole_[known.front()];
+  for (const std::size_t wavelength : known) places.push_back(view_.wavelengths[wavelength]);
+  for (const std::size_t wavelength : chain(spans_)) {
+    if (!whole_[wavelength].empty()) continue;
+    const std::vector<double> weights = polynomial_weights(places, view_.wavelengths[wavelength]);
+    whole_[wavelength] = whole_[known.front()];
     for (std::size_t i = 0; i < sweeps_.size(); ++i) {
-      FlowPoint& point = whole_[node][i];
+      FlowPoint& point = whole_[wavelength][i];
       point.other.setZero();
       point.jacobian.setZero();
       for (std::size_t k = 0; k < known.size(); ++k) {

@@ -36,9 +36,9 @@ class TileShader {
   const int tile_, columns_;
   TraceCounts& counts_;
   std::vector<Span> few_, spans_;  // For light that is hardly spread, and for all light of the tile.
-  TileView whole_;                 // A sample for each pixel, at the nodes of `few_` and `spans_`.
+  TileView whole_;                 // A sample for each pixel, at the wavelengths of `few_` and `spans_`.
   std::vector<double> sweeps_;     // By pixel: the length of the line that it sees, in pixels. Infinite: it is not one.
-  TileView few_samples_, samples_;  // All samples of the pixels that need them: at the nodes of `few_`, and at all.
+  TileView few_samples_, samples_;  // All samples of the pixels that need them: at `few_`, and at all wavelengths.
 };
 
 }  // namespace tensorray

@@ -15,19 +15,19 @@ using Eigen::Vector2d;
 /// The view of a map whose `other` ends are pixels of the landings (gather) or coordinates of starts (scatter).
 FlowPicture flow_picture(const LensLight& light) {
   FlowPicture picture;
-  picture.resolution = light.receiver.resolution;
+  picture.resolution = light.setup.receiver.resolution;
   picture.straight = light.straight;
   if (!gathers(light)) return picture;
   picture.side = FlowSide::starts;
-  picture.to_pixel = to_pixels(light.receiver);
+  picture.to_pixel = to_pixels(light.setup.receiver);
   picture.straight = to_pixels(light.landings) * light.straight;
   return picture;
 }
 
-double flexibility_at(const LensLight& light, double node) {
+double flexibility_at(const LensLight& light, double place) {
   const std::vector<double>& s = light.settings.flexibilities;
-  if (!light.settings.range) return s[static_cast<std::size_t>(node)];
-  const double part = light.map.nodes > 1 ? node / static_cast<double>(light.map.nodes - 1) : 0;
+  if (!light.settings.range) return s[static_cast<std::size_t>(place)];
+  const double part = light.map.wavelengths > 1 ? place / static_cast<double>(light.map.wavelengths - 1) : 0;
   return (1 - part) * s[0] + part * s[1];
 }
 
@@ -36,10 +36,10 @@ void trace_unknown(const LensView& view, const Eigen::AlignedBox2i& pixels, int 
                    TraceCounts& counts) {
   std::vector<std::vector<FlowPoint>*> drawn;
   std::vector<double> flexibilities;
-  for (std::size_t node = 0; node < points.size(); ++node) {
-    if (points[node].empty()) continue;
-    drawn.push_back(&points[node]);
-    flexibilities.push_back(-flexibility_at(view.light, view.nodes[node]));
+  for (std::size_t wavelength = 0; wavelength < points.size(); ++wavelength) {
+    if (points[wavelength].empty()) continue;
+    drawn.push_back(&points[wavelength]);
+    flexibilities.push_back(-flexibility_at(view.light, view.wavelengths[wavelength]));
   }
   std::vector<std::size_t> unknown;
   std::vector<Vector2d> starts;
@@ -78,30 +78,33 @@ Affine2d to_pixels(const Plate& plate) {
   return map;
 }
 
-double node_at(const LensLight& light, double place) { return place * static_cast<double>(light.map.nodes - 1); }
+double sample_place(const LensLight& light, double place) {
+  return place * static_cast<double>(light.map.wavelengths - 1);
+}
 
 LensView make_lens_view(const LensLight& light, const std::vector<LensBand>& bands, const LensRadiance& radiance) {
-  std::vector<double> nodes;
+  std::vector<double> wavelengths;
   std::vector<Span> spans;
   const auto index_of = [&](double place) {
-    const double node = node_at(light, place);
-    if (nodes.empty() || nodes.back() != node) nodes.push_back(node);
-    return nodes.size() - 1;
+    const double at = sample_place(light, place);
+    if (wavelengths.empty() || wavelengths.back() != at) wavelengths.push_back(at);
+    return wavelengths.size() - 1;
   };
   for (std::size_t band = 0; band < bands.size(); ++band) {
     const std::size_t from = index_of(bands[band].begin);
     spans.push_back({band, band + 1, from, index_of(bands[band].end)});
   }
-  nodes.push_back(node_at(light, light.settings.reference));
-  FlowView flow(light.map, flow_picture(light), nodes, light.settings.samples);
-  const Eigen::Matrix2d st_by_pixel = light.image.plane.size.cwiseInverse().asDiagonal() * light.straight.linear();
+  wavelengths.push_back(sample_place(light, light.settings.reference));
+  FlowView flow(light.map, flow_picture(light), wavelengths, light.settings.samples);
+  const Eigen::Matrix2d st_by_pixel =
+      light.setup.image.plane.size.cwiseInverse().asDiagonal() * light.straight.linear();
   return {light,
           bands,
           radiance,
-          to_pixels(light.receiver),
+          to_pixels(light.setup.receiver),
           to_pixels(light.landings),
           std::move(spans),
-          std::move(nodes),
+          std::move(wavelengths),
           st_by_pixel.colwise().norm().maxCoeff(),
           std::move(flow)};
 }
@@ -122,10 +125,10 @@ std::vector<Span> joined(const std::vector<Span>& spans, std::size_t count) {
 
 TileView view_tile(const LensView& view, int tile, int n, const std::vector<Span>& spans,
                    const std::vector<char>& wanted, TraceCounts& counts) {
-  TileView points(view.nodes.size());
+  TileView points(view.wavelengths.size());
   for (const Span& span : spans)
-    for (const std::size_t node : {span.from, span.to})
-      if (points[node].empty()) view.flow.draw(tile, n, node, wanted, points[node]);
+    for (const std::size_t wavelength : {span.from, span.to})
+      if (points[wavelength].empty()) view.flow.draw(tile, n, wavelength, wanted, points[wavelength]);
   if (gathers(view.light)) trace_unknown(view, view.flow.pixels(tile), n, points, counts);
   return points;
 }
@@ -142,12 +145,12 @@ Matrix2d image_by_pixel(const LensView& view, const FlowPoint& point) {
 }
 
 Vector2d texture_coordinates(const LensLight& light, const Vector2d& at) {
-  return (at.array() / light.image.plane.size.array() + 0.5).matrix();
+  return (at.array() / light.setup.image.plane.size.array() + 0.5).matrix();
 }
 
 bool sees_image(const LensLight& light, const Vector2d& st) {
   const double rounding = 1e-6;  // Landings are single precision.
-  return light.image.wraps || ((st.array() >= -rounding).all() && (st.array() <= 1 + rounding).all());
+  return light.setup.image.wraps || ((st.array() >= -rounding).all() && (st.array() <= 1 + rounding).all());
 }
 
 }  // namespace tensorray

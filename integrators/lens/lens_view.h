@@ -7,13 +7,13 @@
 
 #include <Eigen/Geometry>
 
-#include "integrators/flow/flow_view.h"
+#include "integrators/flow_drawing/flow_view.h"
 #include "integrators/lens/lens.h"
 
 namespace tensorray {
 
-/// Bands that follow each other, from `first` to `last`, without it. Their light sees what the nodes `from` and `to`
-/// (indices) see, and what is between.
+/// Bands that follow each other, from `first` to `last`, without it. Their light sees what light of LensView's
+/// wavelengths `from` and `to` (indices) sees, and what is between.
 struct Span {
   std::size_t first, last, from, to;
 };
@@ -23,11 +23,11 @@ struct LensView {
   const LensLight& light;
   const std::vector<LensBand>& bands;
   const LensRadiance& radiance;
-  Eigen::Affine2d starts;     ///< From coordinates to pixels, in the plane where the map's light starts in `gather`.
-  Eigen::Affine2d landings;   ///< From coordinates to pixels, in the plane where it lands.
-  std::vector<Span> spans;    ///< Each band.
-  std::vector<double> nodes;  ///< Places among the map's nodes: the ends of bands, and as the last the reference.
-  double straight_pixel;      ///< The change of (s, t) per pixel for straight light, at most.
+  Eigen::Affine2d starts;    ///< From coordinates to pixels, in the plane where the map's light starts in `gather`.
+  Eigen::Affine2d landings;  ///< From coordinates to pixels, in the plane where it lands.
+  std::vector<Span> spans;   ///< Each band.
+  std::vector<double> wavelengths;  ///< Places among the map's wavelength samples: the ends of bands; the reference.
+  double straight_pixel;            ///< The change of (s, t) per pixel for straight light, at most.
   FlowView flow;
 };
 
@@ -38,10 +38,11 @@ LensView make_lens_view(const LensLight& light, const std::vector<LensBand>& ban
 /// nothing in common and stay apart.
 std::vector<Span> joined(const std::vector<Span>& spans, std::size_t count);
 
-/// What the samples of a tile see, by node and sample; empty for nodes that are not drawn.
+/// What the samples of a tile see, by wavelength and sample; empty for wavelengths that are not drawn.
 using TileView = std::vector<std::vector<FlowPoint>>;
 
-/// The nodes of `spans`, as the samples of a tile see them. In `gather`, light that the map does not know is traced.
+/// What the samples of a tile see at the wavelengths of `spans`. In `gather`, light that the map does not know is
+/// traced.
 /// @param n       Samples of a pixel along x and along y.
 /// @param wanted  By pixel of the tile: whether its samples are wanted. Empty: all are.
 TileView view_tile(const LensView& view, int tile, int n, const std::vector<Span>& spans,
@@ -63,7 +64,7 @@ bool gathers(const LensLight& light);
 /// From coordinates in a plate's plane to its pixels.
 Eigen::Affine2d to_pixels(const Plate& plate);
 
-/// A place between the first and the last flexibility, as one among the nodes of the map.
-double node_at(const LensLight& light, double place);
+/// The place among the map's wavelength samples of one between the first flexibility (0) and the last (1).
+double sample_place(const LensLight& light, double place);
 
 }  // namespace tensorray

@@ -21,7 +21,8 @@ namespace tensorray::packets::HWY_NAMESPACE {
 /// The bits of a vector's lanes, given those of the packet.
 HWY_INLINE std::uint32_t bits_of_vector(std::uint32_t packet, int at) { return packet >> at & ((1u << lanes) - 1); }
 
-/// The brick of a lane. To compare it with that of the lane before costs more, where rays part, than it saves.
+/// The brick of a lane. It is not compared with that of the lane before: where rays part, this costs more than it
+/// saves.
 HWY_INLINE TensorBrick brick_of(const PacketMedium& medium, const Packet& packet, int lane) {
   const std::int32_t at[3] = {packet.brick[0][lane], packet.brick[1][lane], packet.brick[2][lane]};
   return medium.brick(at);

@@ -203,8 +203,8 @@ HWY_INLINE void sample_cell(const Cell& cell, Packet& packet, int first, int cou
   if (count > 0) sample_cell<components, 1>(cell, rises, packet, first);
 }
 
-/// Prefetches the memory of a cell, given its first voxel. A symmetric tensor's neighbour along z is in the same cache
-/// line in three of four cells; to ask for it costs more than it gains.
+/// Prefetches the memory of a cell, given its first voxel. In three of four cells of a symmetric field the next voxel
+/// along z is in the same cache line. Prefetching it costs more than it gains.
 template <int components>
 HWY_INLINE void prefetch_cell(const float* cell) {
   for (const int edge : {0, y_stride<components>, x_stride<components>, x_stride<components> + y_stride<components>}) {

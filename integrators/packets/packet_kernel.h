@@ -23,7 +23,7 @@ struct KernelRay {
   float norm = 0;                  ///< Norm of the deviator of T as last sampled; 0 if it does not make steps shorter.
   double length = 0;               ///< Length of the path, world units; the kernel adds to it.
   std::uint32_t steps = 0;         ///< Number of steps; the kernel adds to it.
-  float radiance_change = 0;       ///< Λ in the kernel, if it is wanted.
+  float log_radiance_scale = 0;    ///< Λ in the kernel, if it is wanted.
   std::int8_t axis = -1;           ///< Axis of the face of the extent where the ray left; -1: it has not left.
   float step = 0;                  ///< If the ray has not left: length of its next step, world units; 0: not known.
 };
@@ -37,7 +37,7 @@ struct KernelRays {
   std::vector<KernelRay> rays;
   std::vector<KernelDifferential> differentials;  ///< One for every ray, or empty.
   std::vector<std::vector<StepPoint>*> points;    ///< One list for every ray, to which the kernel adds; or empty.
-  bool wants_radiance_change = false;             ///< Only without differentials: see RayBatch.
+  bool wants_log_radiance_scale = false;          ///< Only without differentials: see RayBatch.
 };
 
 /// Whether the step from one point to another meets a surface, so that packets cannot take it. Called where surfaces
@@ -56,15 +56,15 @@ struct KernelSettings {
 
 /// Traces every ray to the face of the extent where it leaves (then `axis` is set and the ray is on that face), or to
 /// the point before a step that the kernel does not take. These are steps onto a surface, beyond the greatest length or
-/// number of steps, and where σ·T cannot be followed; for rays with differentials, also steps out of the extent. Steps
-/// of `splitting4` that leave the extent on their way, or across its edges, are of these, too. The result of a ray
-/// depends on that ray alone, not on its neighbours. Tracing is fastest if rays of one origin, or of neighbouring
-/// origins, stand next to each other.
+/// number of steps, and where σ·T cannot be followed; for rays with differentials, also steps out of the extent. The
+/// kernel does not take steps of `splitting4` that leave the extent between their ends or across its edges, either. The
+/// result of a ray depends on that ray alone, not on its neighbours. Tracing is fastest if rays of one origin, or of
+/// neighbouring origins, stand next to each other.
 /// @return the number of tensor samples.
 std::uint64_t run(const TensorField& field, const KernelSettings& settings, KernelRays& batch);
 
-/// Names of the processor's vector instruction sets for which the kernel is compiled, the widest first. It is used,
-/// unless a narrower one is faster.
+/// Names of the processor's vector instruction sets for which the kernel is compiled, the widest first. The widest is
+/// used, unless a narrower one is faster.
 std::vector<std::string> instruction_sets();
 
 /// Selects one of `instruction_sets()`; empty: the fastest. For tests and benchmarks.

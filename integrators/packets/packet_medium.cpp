@@ -5,7 +5,7 @@
 
 #include <Eigen/Geometry>
 
-#include "integrators/bending/exponential.h"
+#include "integrators/steps/exponential.h"
 
 namespace tensorray::packets {
 
@@ -61,7 +61,7 @@ bool PacketMedium::meets_surface(const Eigen::Vector3d& from, const Eigen::Vecto
   return settings.meets_surface(field.to_world() * from, field.to_world() * to);
 }
 
-float strong_radiance_change(const float T[9], float factor, const float v[3]) {
+float strong_log_radiance_scale(const float T[9], float factor, const float v[3]) {
   const Eigen::Matrix3d A = double{factor} * Eigen::Map<const Eigen::Matrix3f>(T).cast<double>();
   const Eigen::Vector3d direction = Eigen::Map<const Eigen::Vector3f>(v).cast<double>();
   return static_cast<float>(-3 * exponential_direction(A, direction).log_length);

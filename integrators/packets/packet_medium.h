@@ -7,10 +7,10 @@
 
 #include <Eigen/Core>
 
-#include "integrators/bending/composition.h"
-#include "integrators/bending/runge_kutta.h"
-#include "integrators/bending/step_lengths.h"
 #include "integrators/packets/packet_kernel.h"
+#include "integrators/steps/composition.h"
+#include "integrators/steps/runge_kutta.h"
+#include "integrators/steps/step_lengths.h"
 #include "volumes/bricks/cubic_brick.h"
 
 namespace tensorray::packets {
@@ -70,7 +70,7 @@ extern bool prefers_avx2;
 
 /// Λ of a kick that is too strong for a series in single precision.
 /// @param T  T up to a multiple of I, column by column.
-float strong_radiance_change(const float T[9], float factor, const float v[3]);
+float strong_log_radiance_scale(const float T[9], float factor, const float v[3]);
 
 constexpr float strongest_kick = static_cast<float>(step_lengths::strongest_kick);
 /// Voxels. Shorter steps are taken in double precision; splitting never takes them.
@@ -110,7 +110,7 @@ struct alignas(64) Packet {
   PerRay tensor[8];    // Tensors of all lanes, component after component.
   PerRay p_next[3], v_next[3], u_next[3];
   // Only if the change of radiance is wanted: Λ since the ray entered the packet, and that of this step.
-  PerRay radiance_change, change_of_step;
+  PerRay log_radiance_scale, change_of_step;
   // Adaptive methods: the next step, voxels, and the error of this one divided by the tolerance.
   PerRay wanted, excess;
 

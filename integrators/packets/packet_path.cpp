@@ -4,7 +4,7 @@
 
 #include <Eigen/Core>
 
-#include "integrators/bending/composition.h"
+#include "integrators/steps/composition.h"
 
 namespace tensorray::packets {
 namespace {

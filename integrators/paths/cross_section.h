@@ -4,7 +4,7 @@
 
 #include <vector>
 
-#include "integrators/bending/path_points.h"
+#include "integrators/bending/ray_record.h"
 
 namespace tensorray {
 

@@ -6,7 +6,7 @@ namespace tensorray {
 namespace {
 
 /// A point that was traced backwards.
-RayPoint turned(RayPoint point, double seed_length) {
+PathPoint turned(PathPoint point, double seed_length) {
   point.direction = -point.direction;
   point.length = seed_length - point.length;
   return point;
@@ -14,19 +14,19 @@ RayPoint turned(RayPoint point, double seed_length) {
 
 /// Adds steps: the first and the last one as points of the ray.
 void add_steps(const TensorField& field, const StepRun& run, JoinedRay& ray) {
-  ray.points.push_back({ray_point(field, ray, run, 0), {}});
+  ray.points.push_back({path_point(field, ray, run, 0), {}});
   if (run.count == 1) return;
   ray.points.back().steps = {run.first + run.stride, run.stride, run.count - 2, run.entry_length};
-  ray.points.push_back({ray_point(field, ray, run, run.count - 1), {}});
+  ray.points.push_back({path_point(field, ray, run, run.count - 1), {}});
 }
 
-void add_backwards(const RayPoints& points, std::size_t first, JoinedRay& ray) {
+void add_backwards(const PathPoints& points, std::size_t first, JoinedRay& ray) {
   for (std::size_t i = points.size(); i > first; --i)
     ray.points.push_back({turned(points[i - 1], ray.seed_length), {}});
 }
 
-void add_forwards(const RayPoints& points, JoinedRay& ray) {
-  for (const RayPoint& point : points) {
+void add_forwards(const PathPoints& points, JoinedRay& ray) {
+  for (const PathPoint& point : points) {
     ray.points.push_back({point, {}});
     ray.points.back().point.length += ray.seed_length;
   }
@@ -38,7 +38,7 @@ bool in_field(const JoinedPoint& joined) { return joined.point.in_field; }
 /// @return false if the piece is too short.
 bool separate(std::vector<JoinedPoint>& points, std::size_t first, std::size_t last, double gap) {
   if (points[last - 1].point.length - points[first].point.length <= 2 * gap) return false;
-  const auto move = [&](RayPoint& point, double by) {
+  const auto move = [&](PathPoint& point, double by) {
     point.position += by * point.direction;
     point.length += by;
   };
@@ -49,8 +49,8 @@ bool separate(std::vector<JoinedPoint>& points, std::size_t first, std::size_t l
 
 }  // namespace
 
-RayPoint ray_point(const TensorField& field, const JoinedRay& ray, const StepRun& run, std::size_t i) {
-  RayPoint point = ray_point(field, run[i], run.entry_length);
+PathPoint path_point(const TensorField& field, const JoinedRay& ray, const StepRun& run, std::size_t i) {
+  PathPoint point = path_point(field, run[i], run.entry_length);
   if (run.stride < 0) return turned(point, ray.seed_length);
   point.length += ray.seed_length;
   return point;
@@ -58,7 +58,7 @@ RayPoint ray_point(const TensorField& field, const JoinedRay& ray, const StepRun
 
 void join(const TensorField& field, const RayRecord& back, const RayRecord& on, JoinedRay& ray) {
   ray.points.clear();
-  ray.seed_length = back.size() > 0 ? ray_point(field, back, back.size() - 1).length : 0;
+  ray.seed_length = back.size() > 0 ? path_point(field, back, back.size() - 1).length : 0;
   add_backwards(back.behind, 0, ray);
   if (!back.steps.empty())
     add_steps(field, {&back.steps.back(), -1, back.steps.size(), back.before.back().length}, ray);

@@ -21,7 +21,7 @@ struct StepRun {
 
 /// A point, and the steps between it and the next one.
 struct JoinedPoint {
-  RayPoint point;
+  PathPoint point;
   StepRun steps;
 };
 
@@ -41,7 +41,7 @@ struct JoinedRay {
 void join(const TensorField& field, const RayRecord& back, const RayRecord& on, JoinedRay& ray);
 
 /// Point i of a run.
-RayPoint ray_point(const TensorField& field, const JoinedRay& ray, const StepRun& run, std::size_t i);
+PathPoint path_point(const TensorField& field, const JoinedRay& ray, const StepRun& run, std::size_t i);
 
 /// Removes the straight parts in front of and behind the volume.
 void remove_outside(JoinedRay& ray);

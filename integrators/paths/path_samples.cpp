@@ -6,7 +6,7 @@
 
 #include <Eigen/LU>
 
-#include "volumes/bricks/sample_tensors.h"
+#include "volumes/sampling/sample_tensors.h"
 
 namespace tensorray {
 namespace {
@@ -32,7 +32,7 @@ std::size_t count_of(const JoinedRay& ray) {
 Eigen::Vector3i first_brick(const TensorField& field, const JoinedRay& ray) {
   const auto found = std::find_if(ray.points.begin(), ray.points.end(),
                                   [](const JoinedPoint& joined) { return joined.point.in_field; });
-  const RayPoint& point = found == ray.points.end() ? ray.points.front().point : found->point;
+  const PathPoint& point = found == ray.points.end() ? ray.points.front().point : found->point;
   const auto at = brick_point(field, field.to_index() * point.position).brick;
   return {at[0], at[1], at[2]};
 }
@@ -43,7 +43,7 @@ class SampleWriter {
   SampleWriter(const JoinedRay& ray, const Eigen::Vector3i& brick, PathSamples& samples)
       : ray_(ray), brick_(brick), start_(ray.points.front().point.length), samples_(samples) {}
 
-  void add(const TensorField& field, const RayPoint& point) {
+  void add(const TensorField& field, const PathPoint& point) {
     const Eigen::Vector3d place =
         field.to_index() * point.position - index_position({{brick_[0], brick_[1], brick_[2]}, {}});
     add(place.cast<float>(), point.length);

@@ -9,6 +9,8 @@
 
 #include "integrators/paths/joined_ray.h"
 #include "integrators/paths/path_thinning.h"
+#include "integrators/steps/path_tensors.h"
+#include "integrators/tracing/trace.h"
 
 namespace tensorray {
 namespace {
@@ -40,7 +42,7 @@ RayBatch follow(const PathJob& job, const PathSeed* seeds, std::size_t count, bo
   const double sign = backwards ? -1 : 1;
   for (std::size_t i = 0; i < count; ++i)
     batch.add(seeds[i].position, sign * seeds[i].direction, sign * seeds[i].flexibility);
-  trace(job.field, job.geometry, job.bending, batch, records);
+  trace(job.field, job.geometry, job.bending, batch, &records);
   return batch;
 }
 
@@ -48,9 +50,9 @@ RayBatch follow(const PathJob& job, const PathSeed* seeds, std::size_t count, bo
 PathPoints chosen(const TensorField& field, const JoinedRay& ray, const std::vector<std::size_t>& numbers) {
   PathPoints points;
   points.reserve(numbers.size());  // Saves memory: there may be many paths.
-  const auto add = [&](RayPoint point) {
+  const auto add = [&](PathPoint point) {
     point.length -= ray.points.front().point.length;
-    points.push_back(path_point(point));
+    points.push_back(point);
   };
   std::size_t first = 0;  // Number of the joined point.
   auto number = numbers.begin();
@@ -60,7 +62,7 @@ PathPoints chosen(const TensorField& field, const JoinedRay& ray, const std::vec
       ++number;
     }
     for (++first; number != numbers.end() && *number < first + joined.steps.count; ++number)
-      add(ray_point(field, ray, joined.steps, *number - first));
+      add(path_point(field, ray, joined.steps, *number - first));
     first += joined.steps.count;
   }
   return points;

@@ -6,9 +6,10 @@
 #include <optional>
 #include <vector>
 
-#include "base/progress.h"
+#include "base/process/progress.h"
 #include "integrators/bending/bending.h"
-#include "integrators/bending/path_points.h"
+#include "integrators/bending/geometry.h"
+#include "integrators/bending/ray_record.h"
 
 namespace tensorray {
 

@@ -9,7 +9,7 @@
 #include <Eigen/LU>
 #include <tbb/parallel_for.h>
 
-#include "volumes/bricks/voxel_walk.h"
+#include "volumes/grids/voxel_walk.h"
 
 namespace tensorray {
 namespace {
@@ -83,17 +83,19 @@ FluenceSums::Sum* FluenceSums::sums_of(std::uint32_t number) {
   return sums;
 }
 
-void FluenceSums::add(std::size_t channel, const Track& track) {
+void FluenceSums::add(std::size_t channel, const RayRecord& ray) {
   const std::size_t plane = bands_ ? channel : 0;
   const double weight = (bands_ ? 1 : powers_[channel] / greatest_power_) / (edge_ * quantum_);
-  // Rounds what is added so that the sum over the whole track is exact to one quantum.
+  // Rounds what is added so that the sum over the whole ray is exact to one quantum.
   double way = 0;
   std::uint64_t added = 0;
   Eigen::Vector3d from;
-  for (std::size_t i = 0; i < track.size(); ++i) {
-    const Eigen::Vector3d to = field_.to_index() * track[i].position;
+  double from_length = 0;
+  for (std::size_t i = 0; i < ray.size(); ++i) {
+    const PathPoint point = path_point(field_, ray, i);
+    const Eigen::Vector3d to = field_.to_index() * point.position;
     if (i > 0) {
-      const double length = weight * (track[i].length - track[i - 1].length);
+      const double length = weight * (point.length - from_length);
       walk_voxels(from, to, field_.index_bounds(), [&](const Eigen::Vector3i& voxel, double begin, double end) {
         way += length * (end - begin);
         const auto more = static_cast<std::uint64_t>(std::llround(way)) - added;
@@ -106,6 +108,7 @@ void FluenceSums::add(std::size_t channel, const Track& track) {
       });
     }
     from = to;
+    from_length = point.length;
   }
 }
 

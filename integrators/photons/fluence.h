@@ -7,7 +7,7 @@
 #include <memory>
 #include <vector>
 
-#include "integrators/bending/bending.h"
+#include "integrators/bending/ray_record.h"
 #include "volumes/bricks/brick_index.h"
 #include "volumes/bricks/tensor_field.h"
 #include "volumes/grids/scalar_grid.h"
@@ -36,7 +36,7 @@ class FluenceSums {
   FluenceSums& operator=(const FluenceSums&) = delete;
 
   /// Adds a ray of the channel. Any number of threads may add rays at once.
-  void add(std::size_t channel, const Track& track);
+  void add(std::size_t channel, const RayRecord& ray);
 
   /// The grids, as fog volumes: the one of all channels, then, with `bands`, one for each channel (1 is the undisturbed
   /// beam of that channel). Voxels that light has reached are active. The grids have no names yet. Runs on all threads.

@@ -12,10 +12,11 @@
 #include <tbb/parallel_for.h>
 #include <tbb/parallel_sort.h>
 
-#include "base/seconds.h"
+#include "base/process/seconds.h"
 #include "integrators/photons/fluence.h"
 #include "integrators/photons/photon_state.h"
-#include "renderer/film/footprint_deposit.h"
+#include "integrators/tracing/trace.h"
+#include "renderer/density/footprint_deposit.h"
 
 namespace tensorray {
 namespace {
@@ -50,7 +51,6 @@ struct PhotonJob {
   const Geometry& geometry;
   const Beam& beam;
   const std::vector<LightChannel>& channels;
-  const BendingSettings& bending;
   const PhotonSettings& settings;
   const Progress& progress;
   const BeamSampler& positions;
@@ -68,20 +68,20 @@ struct PhotonJob {
 };
 
 /// The buffers of a thread, and its counts.
-struct Worker {
+struct PhotonWorker {
   RayBatch batch;
-  std::vector<Track> tracks;
+  std::vector<RayRecord> records;
   std::vector<std::uint16_t> channels;  // The channel of each ray of the batch.
   std::vector<EndCounts> ends;
   std::uint64_t ray_steps = 0;
 };
-using Workers = tbb::enumerable_thread_specific<Worker>;
+using PhotonWorkers = tbb::enumerable_thread_specific<PhotonWorker>;
 
 /// A part of the emission, with its landings.
 struct Chunk {
-  std::vector<Emission> emissions;           // Ordered along a Morton curve.
-  std::vector<DensityPoint> landings;        // One for each ray; a default DensityPoint if it is not on the plate.
-  std::vector<std::vector<Photon>> photons;  // One list for each task, if photons are kept.
+  std::vector<Emission> emissions;                // Ordered along a Morton curve.
+  std::vector<DensityPoint> landings;             // One for each ray; a default DensityPoint if it is not on the plate.
+  std::vector<std::vector<PlatePhoton>> photons;  // One list for each task, if photons are kept.
 };
 
 /// The channel of ray number `ray` of a position: one from each of `rays_per_position` equal ranges of channels.
@@ -122,7 +122,7 @@ void emit(const BeamSampler& positions, std::uint64_t first, std::uint64_t last,
   for (const std::uint64_t key : order) emissions.push_back(sampled[static_cast<std::uint32_t>(key)]);
 }
 
-void fill_batch(const PhotonJob& job, const Emission* first, const Emission* last, Worker& worker) {
+void fill_batch(const PhotonJob& job, const Emission* first, const Emission* last, PhotonWorker& worker) {
   RayBatch& batch = worker.batch;
   batch.clear();
   worker.channels.clear();
@@ -141,15 +141,32 @@ void fill_batch(const PhotonJob& job, const Emission* first, const Emission* las
   batch.differentials.assign(batch.position.size(), across);
 }
 
-void trace_batch(const PhotonJob& job, Worker& worker) {
-  if (!job.fluence) return trace(job.field, job.geometry, job.bending, worker.batch);
-  trace(job.field, job.geometry, job.bending, worker.batch, worker.tracks);
-  for (std::size_t i = 0; i < worker.batch.size(); ++i) job.fluence->add(worker.channels[i], worker.tracks[i]);
+/// A ray that leaves the cut and meets nothing more still crosses the rest of the volume: adds this piece to its
+/// record.
+void record_way_out(const PhotonJob& job, const RayBatch& batch, std::size_t ray, RayRecord& record) {
+  const Eigen::Vector3d &position = batch.position[ray], &direction = batch.direction[ray];
+  const bool is_open = batch.end[ray] == RayEnd::missed && !std::isfinite(job.settings.bending.max_length);
+  if (!is_open || !job.field.contains(position)) return;
+  const auto exit = job.geometry.crossing(Surface::bounds, false, position, direction);
+  if (!exit) return;
+  const double length = batch.length[ray];
+  record.behind.push_back({position, direction, length});
+  record.behind.push_back({position + exit->distance * direction, direction, length + exit->distance});
 }
 
-Photon make_photon(const PhotonJob& job, const Worker& worker, std::size_t ray, const Eigen::Vector3d& origin) {
+void trace_batch(const PhotonJob& job, PhotonWorker& worker) {
+  trace(job.field, job.geometry, job.settings.bending, worker.batch, job.fluence ? &worker.records : nullptr);
+  if (!job.fluence) return;
+  for (std::size_t i = 0; i < worker.batch.size(); ++i) {
+    record_way_out(job, worker.batch, i, worker.records[i]);
+    job.fluence->add(worker.channels[i], worker.records[i]);
+  }
+}
+
+PlatePhoton make_photon(const PhotonJob& job, const PhotonWorker& worker, std::size_t ray,
+                        const Eigen::Vector3d& origin) {
   const LightChannel& channel = job.channels[worker.channels[ray]];
-  Photon photon;
+  PlatePhoton photon;
   photon.position = worker.batch.position[ray].cast<float>();
   photon.direction = worker.batch.direction[ray].cast<float>();
   photon.origin = origin.cast<float>();
@@ -167,7 +184,7 @@ Eigen::Matrix2d footprint(const PhotonJob& job, const RayDifferential& different
 /// Counts the rays of a batch and writes their landings: those of the first ray of each position from `landings` on,
 /// those of the second rays `step` further on, and so on. Landings of one wavelength from neighbouring positions, which
 /// fall on the same pixels, are then next to each other.
-void collect_batch(const PhotonJob& job, Worker& worker, DensityPoint* landings, std::size_t step) {
+void collect_batch(const PhotonJob& job, PhotonWorker& worker, DensityPoint* landings, std::size_t step) {
   const std::size_t rays = job.rays_per_position;
   for (std::size_t i = 0, position = 0; i < worker.batch.size(); ++position)
     for (std::size_t ray = 0; ray < rays; ++ray, ++i) {
@@ -186,7 +203,7 @@ void collect_batch(const PhotonJob& job, Worker& worker, DensityPoint* landings,
 }
 
 /// Traces the rays of a task's positions.
-void trace_task(const PhotonJob& job, std::size_t task, Worker& worker, Chunk& chunk) {
+void trace_task(const PhotonJob& job, std::size_t task, PhotonWorker& worker, Chunk& chunk) {
   const std::size_t rays = job.rays_per_position, first = task * task_size;
   const std::size_t count = std::min<std::size_t>(task_size, chunk.emissions.size() - first);
   const std::size_t batch = std::max<std::size_t>(1, rays_in_batch / rays);
@@ -206,7 +223,7 @@ void trace_task(const PhotonJob& job, std::size_t task, Worker& worker, Chunk& c
 }
 
 /// Traces the positions of a chunk. Only the calling thread reports progress.
-void trace_chunk(const PhotonJob& job, std::uint64_t first, std::uint64_t last, Workers& workers, Chunk& chunk) {
+void trace_chunk(const PhotonJob& job, std::uint64_t first, std::uint64_t last, PhotonWorkers& workers, Chunk& chunk) {
   emit(job.positions, first, last, chunk.emissions);
   const std::size_t count = chunk.emissions.size(), tasks = (count + task_size - 1) / task_size;
   chunk.landings.resize(count * job.rays_per_position);
@@ -223,8 +240,8 @@ void trace_chunk(const PhotonJob& job, std::uint64_t first, std::uint64_t last, 
 }
 
 /// Adds the counts of all threads. They are integers, so that the order does not matter.
-void add_counts(const Workers& workers, PhotonState& counts) {
-  for (const Worker& worker : workers) {
+void add_counts(const PhotonWorkers& workers, PhotonState& counts) {
+  for (const PhotonWorker& worker : workers) {
     counts.ray_steps += worker.ray_steps;
     counts.tensor_samples += worker.batch.tensor_samples;
     for (std::size_t channel = 0; channel < worker.ends.size(); ++channel)
@@ -285,14 +302,14 @@ int rays_per_position(const std::vector<LightChannel>& channels, const PhotonSet
 }  // namespace
 
 PhotonDistribution distribute_photons(const TensorField& field, const Geometry& geometry, const Beam& beam,
-                                      const std::vector<LightChannel>& channels, const BendingSettings& bending,
-                                      const PhotonSettings& settings, const Progress& progress, Work* work) {
+                                      const std::vector<LightChannel>& channels, const PhotonSettings& settings,
+                                      const Progress& progress) {
   if (!geometry.surfaces().plate) throw std::invalid_argument("photon distribution needs a receiver");
   const Plate& plate = *geometry.surfaces().plate;
   const int rays = rays_per_position(channels, settings);
   const BeamSampler positions(beam, settings.pattern, settings.photons, settings.seed);
   // The references first; each has a different type, so that they cannot be confused.
-  PhotonJob job{field, geometry, beam, channels, bending, settings, progress, positions, PixelMap(plate)};
+  PhotonJob job{field, geometry, beam, channels, settings, progress, positions, PixelMap(plate)};
   job.rays_per_position = rays;
   job.channels_per_ray = static_cast<int>(channels.size()) / rays;
   job.ray_area = job.positions.area_per_candidate() * static_cast<double>(channels.size()) / rays;
@@ -309,12 +326,12 @@ PhotonDistribution distribute_photons(const TensorField& field, const Geometry& 
     job.footprints = &footprints.emplace(width, height, count, settings.colors);
   else
     job.points = &points.emplace(width, height, count, settings.density, settings.colors);
-  Workers workers;
+  PhotonWorkers workers;
   Chunk chunk;
   const std::uint64_t candidates = job.positions.candidates();
   PhotonState before;
   before.ends.assign(channels.size(), EndCounts{});
-  if (fluence || settings.keep_photons) work = nullptr;  // They are not kept.
+  Work* const work = fluence || settings.keep_photons ? nullptr : settings.work;  // These are not kept.
   if (work) work->begin(1);
   if (const auto state = work ? work->state(0) : nullptr) {
     before = photon_state(*state, channels.size());
@@ -329,7 +346,7 @@ PhotonDistribution distribute_photons(const TensorField& field, const Geometry& 
     result.seconds_tracing += seconds_since(start);
     start = Clock::now();
     if (points) points->add(chunk.landings);
-    for (const std::vector<Photon>& photons : chunk.photons)
+    for (const std::vector<PlatePhoton>& photons : chunk.photons)
       result.photons.insert(result.photons.end(), photons.begin(), photons.end());
     result.seconds_density += seconds_since(start);
     if (!keeper.is_due()) continue;

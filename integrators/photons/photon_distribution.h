@@ -5,12 +5,13 @@
 #include <cstdint>
 #include <vector>
 
-#include "base/progress.h"
-#include "base/work.h"
+#include "base/process/progress.h"
+#include "base/process/work.h"
 #include "integrators/bending/bending.h"
+#include "integrators/bending/geometry.h"
 #include "integrators/bending/light_channel.h"
-#include "renderer/film/density.h"
-#include "renderer/film/photon_map.h"
+#include "renderer/density/density.h"
+#include "renderer/film/plate_photon.h"
 #include "renderer/lights/beam.h"
 #include "volumes/grids/scalar_grid.h"
 
@@ -20,6 +21,7 @@ namespace tensorray {
 enum class FluenceKind { none, all_light, bands };
 
 struct PhotonSettings {
+  BendingSettings bending;
   std::uint64_t photons = 1u << 20;  ///< Approximate number of positions that emit; > 0.
   BeamPattern pattern = BeamPattern::stratified;
 
@@ -33,12 +35,17 @@ struct PhotonSettings {
   /// Colour of each channel's light; or empty. With colours, the film has the channels red, green and blue instead of
   /// one for each channel. Compared with 32 channels this takes a third of the time and a tenth of the memory.
   std::vector<Eigen::Vector3d> colors;
+
+  /// Keeps the work so far, every now and then, as its only unit, if neither photons nor fluence are wanted; null:
+  /// nothing is kept.
+  Work* work = nullptr;
 };
 
 struct PhotonDistribution {
   Film irradiance;  ///< One plane for each channel, where 1 is the irradiance of the undisturbed beam in that channel;
                     ///< or their sum in colour.
-  PhotonMap photons;  ///< Empty unless `keep_photons`; ordered by emission (neighbours together), then by channel.
+  /// Empty unless `keep_photons`; ordered by emission (neighbours together), then by channel.
+  std::vector<PlatePhoton> photons;
   std::vector<ScalarGrid> fluence;  ///< Empty unless `fluence` is set: all channels, then, for bands, each one; without
                                     ///< names. See fluence.h.
 
@@ -53,11 +60,9 @@ struct PhotonDistribution {
 
 /// Emits parallel light, bends it through the field and estimates its density on the plate of `geometry`.
 /// The result is the same for any number of threads.
-/// @param work  Keeps the work so far, every now and then, as its only unit, if neither photons nor fluence are wanted;
-///              null: nothing is kept.
 /// @throw std::invalid_argument if a setting is out of range or `geometry` has no plate; Cancelled.
 PhotonDistribution distribute_photons(const TensorField& field, const Geometry& geometry, const Beam& beam,
-                                      const std::vector<LightChannel>& channels, const BendingSettings& bending,
-                                      const PhotonSettings& settings, const Progress& progress, Work* work = nullptr);
+                                      const std::vector<LightChannel>& channels, const PhotonSettings& settings,
+                                      const Progress& progress);
 
 }  // namespace tensorray

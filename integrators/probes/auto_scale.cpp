@@ -6,6 +6,8 @@
 #include <Eigen/LU>
 #include <tbb/parallel_for.h>
 
+#include "integrators/tracing/trace.h"
+
 namespace tensorray {
 namespace {
 
@@ -28,7 +30,7 @@ constexpr double smallest_turn = 1e-7;   // Radians; a ray that turns less count
 constexpr double plane_distance = 0.25;  // Of the plane, behind the volume, in depths of the volume.
 constexpr double least_slope = 0.1;      // Cosine between light and the plane's normal, for light that lands.
 constexpr std::uint64_t probe_count = 1024;
-constexpr std::size_t batch_size = 64;  // Rays that one thread traces together.
+constexpr std::size_t probe_batch = 64;  // Rays that one thread traces together.
 
 /// Probe rays and the plane behind the volume on which they land.
 struct ProbeBeam {
@@ -101,10 +103,10 @@ AutoScale probe(const TensorField& field, const Geometry& geometry, const ProbeB
   RayDifferential start;
   start.position << beam.right, beam.up;
   std::vector<double> turns(rays), changes(rays);
-  const std::size_t batches = (rays + batch_size - 1) / batch_size;
+  const std::size_t batches = (rays + probe_batch - 1) / probe_batch;
   tbb::parallel_for(std::size_t{0}, batches, [&](std::size_t task) {
     if (progress.cancelled) throw Cancelled();
-    const std::size_t first = task * batch_size, count = std::min(batch_size, rays - first);
+    const std::size_t first = task * probe_batch, count = std::min(probe_batch, rays - first);
     RayBatch batch;
     for (std::size_t i = 0; i < count; ++i)
       batch.add(probes.origins[(first + i) * each], beam.direction, probe_flexibility);

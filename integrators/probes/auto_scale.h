@@ -8,8 +8,9 @@
 /// x e^(1−x) of the field: 1 for a factor of e, less for a smaller change, and less for a greater one, where light is
 /// tangled. Rays that do not land show nothing.
 
-#include "base/progress.h"
+#include "base/process/progress.h"
 #include "integrators/bending/bending.h"
+#include "integrators/bending/geometry.h"
 #include "renderer/lights/beam.h"
 
 namespace tensorray {

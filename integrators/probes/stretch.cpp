@@ -9,10 +9,12 @@
 #include <Eigen/Geometry>
 #include <tbb/parallel_for.h>
 
+#include "integrators/tracing/trace.h"
+
 namespace tensorray {
 namespace {
 
-constexpr std::size_t chunk_size = 64;  // Blocks, or rows, between two progress reports.
+constexpr std::size_t stretch_chunk = 64;  // Blocks, or rows, between two progress reports.
 
 /// ln of the greatest singular value.
 double log_stretch(const Eigen::Matrix<double, 3, 2>& m) {
@@ -25,9 +27,9 @@ double log_stretch(const Eigen::Matrix<double, 3, 2>& m) {
 /// Calls `work(i)` for each i below `count` on all threads, and reports progress.
 template <class Work>
 void in_parallel(std::size_t count, const Progress& progress, const Work& work) {
-  for (std::size_t first = 0; first < count; first += chunk_size) {
+  for (std::size_t first = 0; first < count; first += stretch_chunk) {
     progress.update("tracing rays", first, count);
-    tbb::parallel_for(first, std::min(first + chunk_size, count), [&](std::size_t i) {
+    tbb::parallel_for(first, std::min(first + stretch_chunk, count), [&](std::size_t i) {
       if (progress.cancelled) throw Cancelled();
       work(i);
     });

@@ -8,8 +8,9 @@
 
 #include <Eigen/Core>
 
-#include "base/progress.h"
+#include "base/process/progress.h"
 #include "integrators/bending/bending.h"
+#include "integrators/bending/geometry.h"
 #include "renderer/surfaces/plate.h"
 #include "volumes/grids/scalar_grid.h"
 

@@ -1,13 +1,12 @@
 #pragma once
 /// @file integrators/view/band_interpolation.h
-/// The ways of one ray's bands are a smooth function of the wavelength almost everywhere. Some of them are traced, and
-/// the others are interpolated where one more that is traced agrees with the interpolation (polynomials of Lagrange
-/// through nodes that stand as Chebyshev's).
+/// Interpolates bands of a ray between bands that were traced. Almost everywhere, the way of light is a smooth function
+/// of its wavelength. A Lagrange polynomial through Chebyshev nodes is used if one more traced band agrees with it.
 
 #include <cstddef>
 #include <vector>
 
-#include "renderer/shading/bending_region.h"
+#include "renderer/lights/bending_region.h"
 
 namespace tensorray {
 
@@ -20,16 +19,16 @@ struct BandGroup {
   bool is_traced(std::size_t way) const;  ///< Whether the way is a node or the check.
 };
 
-/// The rays of which some bands may be interpolated: ways that stand next to each other, start alike, and allow a
-/// `tolerance`; at least 6, as fewer would gain too little.
-std::vector<BandGroup> interpolation_groups(const std::vector<BentWay>& ways);
+/// The groups in which ways may be interpolated: 6 or more neighbours that start alike and allow a `tolerance`. Fewer
+/// would gain too little.
+std::vector<BandGroup> interpolation_groups(const std::vector<BentRay>& ways);
 
 /// Whether the nodes predict the check: its direction within its tolerance, its position within the tolerance as seen
-/// from `start`, and its compression within 1%. All of them must have been followed, and arrive.
+/// from `start`, and its jacobian within 1%. All of these ways must have been traced, and must arrive.
 /// @param start  Where the ways of the group started.
-bool is_predictable(const BandGroup& group, const std::vector<BentWay>& ways, const Eigen::Vector3d& start);
+bool is_predictable(const BandGroup& group, const std::vector<BentRay>& ways, const Eigen::Vector3d& start);
 
-/// Sets position, direction, compression and `arrives` of the ways that were not traced.
-void interpolate(const BandGroup& group, std::vector<BentWay>& ways);
+/// Sets position, direction, jacobian and `arrives` of the ways that were not traced.
+void interpolate(const BandGroup& group, std::vector<BentRay>& ways);
 
 }  // namespace tensorray

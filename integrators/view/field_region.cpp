@@ -6,6 +6,8 @@
 #include <numeric>
 #include <utility>
 
+#include "integrators/tracing/trace.h"
+
 namespace tensorray {
 
 using Eigen::Vector3d;
@@ -38,64 +40,66 @@ double FieldRegion::entry(const Vector3d& origin, const Vector3d& direction) con
   return leaves - enters > rounding_ ? enters : infinite;
 }
 
-/// Where a way is followed from. Nothing is before the volume, and it does not meet the surface on which it starts.
-Vector3d FieldRegion::start_of(const BentWay& way) const {
+/// Where a way is followed from. With obstacles this is a little behind the entry into the volume, so that the way does
+/// not meet the surface on which it starts.
+Vector3d FieldRegion::start_of(const BentRay& way) const {
   if (geometry_.surfaces().obstacles.empty()) return way.position;
   const double before = entry(way.position, way.direction);
   return way.position + ((std::isinf(before) ? 0 : before) + 2 * geometry_.margin()) * way.direction;
 }
 
 /// @param sign   Of the flexibility: 1 for light, −1 for light that is followed back.
-/// @param gains  Whether the gain of a way is that along its ray; otherwise it is 1.
-void FieldRegion::follow(double sign, bool gains, std::vector<BentWay>& ways) const {
+/// @param scales  Whether to set radiance_scale to the factor along the ray; otherwise it is 1.
+void FieldRegion::follow(double sign, bool scales, std::vector<BentRay>& ways) const {
   RayBatch& rays = memory_.local();
   rays.clear();
-  for (const BentWay& way : ways)
+  for (const BentRay& way : ways)
     rays.add(start_of(way), way.direction, sign * settings_.flexibility(way.band, way.place));
-  rays.wants_radiance_change = true;
+  rays.wants_log_radiance_scale = true;
   rays.tensor_samples = 0;
   trace(field_, geometry_, settings_.bending, rays);
   tensor_samples_ += rays.tensor_samples;
   steps_ += std::accumulate(rays.steps.begin(), rays.steps.end(), std::uint64_t{0});
   for (std::size_t i = 0; i < ways.size(); ++i) {
-    BentWay& way = ways[i];
+    BentRay& way = ways[i];
     const RayEnd end = rays.end[i];
     way.position = rays.position[i];
     way.direction = rays.direction[i];
     way.arrives = end == RayEnd::missed || end == RayEnd::obstacle;
     way.on_surface = end == RayEnd::obstacle;
-    way.gain = gains && way.arrives ? std::exp(rays.radiance_change[i]) : 1;
-    way.compression = std::exp(-sign * rays.radiance_change[i]);
+    way.radiance_scale = scales && way.arrives ? std::exp(rays.log_radiance_scale[i]) : 1;
+    way.jacobian = std::exp(-sign * rays.log_radiance_scale[i]);
     if (sign < 0) ++ends_[static_cast<std::size_t>(end)];
   }
 }
 
-void FieldRegion::follow_back(std::vector<BentWay>& ways) const {
+void FieldRegion::trace_radiance(std::vector<BentRay>& ways) const {
   std::vector<BandGroup> groups;
   if (geometry_.surfaces().obstacles.empty()) groups = interpolation_groups(ways);
   if (groups.empty())
     follow(-1, settings_.conserve == Conserve::power, ways);
   else
     follow_groups(std::move(groups), ways);
-  for (BentWay& way : ways) {
-    if (way.arrives && settings_.most_gain > 0 && !(way.gain <= settings_.most_gain)) {
-      way.gain = settings_.most_gain;
+  for (BentRay& way : ways) {
+    if (way.arrives && settings_.most_radiance_scale > 0 && !(way.radiance_scale <= settings_.most_radiance_scale)) {
+      way.radiance_scale = settings_.most_radiance_scale;
       ++limited_;
     }
-    way.arrives = way.arrives && std::isfinite(way.gain);
+    way.arrives = way.arrives && std::isfinite(way.radiance_scale);
   }
 }
 
 /// Follows back the ways with these indices.
-void FieldRegion::follow_some(const std::vector<std::size_t>& which, std::vector<BentWay>& ways) const {
-  std::vector<BentWay> some;
+void FieldRegion::follow_some(const std::vector<std::size_t>& which, std::vector<BentRay>& ways) const {
+  std::vector<BentRay> some;
   for (const std::size_t i : which) some.push_back(ways[i]);
   follow(-1, settings_.conserve == Conserve::power, some);
   for (std::size_t k = 0; k < which.size(); ++k) ways[which[k]] = some[k];
 }
 
-/// Follows what must be followed in two calls: before and after the interpolation of groups is known to be good.
-void FieldRegion::follow_groups(std::vector<BandGroup> groups, std::vector<BentWay>& ways) const {
+/// Follows some ways of each group and all that are in none; then the rest of groups that cannot be interpolated. Each
+/// is one call of `trace`.
+void FieldRegion::follow_groups(std::vector<BandGroup> groups, std::vector<BentRay>& ways) const {
   std::vector<std::size_t> wanted;
   std::vector<Vector3d> starts;
   std::size_t next = 0;
@@ -114,7 +118,7 @@ void FieldRegion::follow_groups(std::vector<BandGroup> groups, std::vector<BentW
     if (end_alike(group, ways) && is_predictable(group, ways, starts[k])) {
       interpolate(group, ways);
       for (std::size_t i = group.first; i < group.first + group.count; ++i)
-        ways[i].gain = settings_.conserve == Conserve::power ? ways[i].compression : 1;
+        ways[i].radiance_scale = settings_.conserve == Conserve::power ? ways[i].jacobian : 1;
     } else {
       for (std::size_t i = group.first; i < group.first + group.count; ++i)
         if (!group.is_traced(i)) wanted.push_back(i);
@@ -124,7 +128,7 @@ void FieldRegion::follow_groups(std::vector<BandGroup> groups, std::vector<BentW
 }
 
 /// Whether the traced ways of a group leave the volume by one face of its box.
-bool FieldRegion::end_alike(const BandGroup& group, const std::vector<BentWay>& ways) const {
+bool FieldRegion::end_alike(const BandGroup& group, const std::vector<BentRay>& ways) const {
   const int face = face_at(ways[group.check].position);
   const auto leaves = [&](std::size_t i) {
     return ways[i].arrives && !ways[i].on_surface && face_at(ways[i].position) == face;
@@ -142,10 +146,11 @@ int FieldRegion::face_at(const Vector3d& position) const {
   return -1;
 }
 
-/// Where radiance stays, the power of a photon changes as the radiance of a photon of constant power, the other way.
-void FieldRegion::follow_light(std::vector<BentWay>& ways) const {
+/// If radiance is constant, a photon's power changes by e^Λ: the inverse of the factor on radiance if power is
+/// constant.
+void FieldRegion::trace_importance(std::vector<BentRay>& ways) const {
   follow(1, settings_.conserve == Conserve::radiance, ways);
-  for (BentWay& way : ways) way.arrives = way.arrives && std::isfinite(way.gain);
+  for (BentRay& way : ways) way.arrives = way.arrives && std::isfinite(way.radiance_scale);
 }
 
 }  // namespace tensorray

@@ -1,8 +1,8 @@
 #pragma once
 /// @file integrators/view/field_region.h
-/// A tensor field as the viewer of a scene sees through it: light is followed backwards, which is Eq. 5 with −s. Ways
-/// with a tolerance are interpolated (band_interpolation.h) where the traced ones leave the volume by one face of its
-/// box, and no obstacle is within it.
+/// A tensor field in the view of a camera. Light is followed backwards, by Eq. 5 with −s. If there are no obstacles,
+/// some ways that allow a tolerance are interpolated (band_interpolation.h). The traced ways of their group must leave
+/// the volume through the same face of its box.
 
 #include <array>
 #include <atomic>
@@ -13,12 +13,13 @@
 #include <tbb/enumerable_thread_specific.h>
 
 #include "integrators/bending/bending.h"
+#include "integrators/bending/geometry.h"
 #include "integrators/view/band_interpolation.h"
-#include "renderer/shading/bending_region.h"
+#include "renderer/lights/bending_region.h"
 
 namespace tensorray {
 
-/// What light keeps on its way through the field. Both are consistent, and differ in what they call physical.
+/// What stays constant along light in the field. Each choice is consistent; they are different models of the medium.
 enum class Conserve {
   power,     ///< A photon's power, as on the plates of this project: radiance changes (RayBatch).
   radiance,  ///< Radiance, as in the lens of this project: a photon's power changes instead.
@@ -27,7 +28,7 @@ enum class Conserve {
 struct FieldViewSettings {
   BendingSettings bending;  ///< With the scale of the field.
   Conserve conserve = Conserve::power;
-  double most_gain = 0;  ///< Greatest factor on radiance, > 0, or 0: no limit. The limit loses light and is counted.
+  double most_radiance_scale = 0;  ///< Greatest factor on radiance, > 0, or 0: no limit. Limited ways lose light.
   /// Flexibility of the light at a place, 0 to 1, within a band. Any thread may call it.
   std::function<double(int band, double place)> flexibility;
 };
@@ -36,28 +37,29 @@ struct FieldViewSettings {
 class FieldRegion final : public BendingRegion {
  public:
   /// @param geometry  Bounds, cut, and all obstacles that lie in the volume. Ways end on them; those that leave the
-  ///                  volume may end on obstacles outside it, too. Ways may start on obstacles; nothing is looked for
-  ///                  before the volume.
+  ///                  volume may end on obstacles outside it, too. Ways may start on obstacles. Obstacles in front of
+  ///                  the volume are not looked for.
   FieldRegion(const TensorField& field, const Geometry& geometry, FieldViewSettings settings);
 
   double entry(const Eigen::Vector3d& origin, const Eigen::Vector3d& direction) const override;
-  void follow_back(std::vector<BentWay>& ways) const override;
-  void follow_light(std::vector<BentWay>& ways) const override;
+  void trace_radiance(std::vector<BentRay>& ways) const override;
+  void trace_importance(std::vector<BentRay>& ways) const override;
 
   /// Tensor samples and steps of all ways so far.
   std::uint64_t tensor_samples() const { return tensor_samples_; }
   std::uint64_t steps() const { return steps_; }
 
-  /// Ways followed back so far, by their end, without those that were interpolated; those that were limited.
+  /// Number of ways that were followed back to this end. Interpolated ways do not count.
   std::uint64_t ways(RayEnd end) const { return ends_[static_cast<std::size_t>(end)]; }
+  /// Number of ways whose factor on radiance was above the limit.
   std::uint64_t limited() const { return limited_; }
 
  private:
-  Eigen::Vector3d start_of(const BentWay& way) const;
-  void follow(double sign, bool gains, std::vector<BentWay>& ways) const;
-  void follow_some(const std::vector<std::size_t>& which, std::vector<BentWay>& ways) const;
-  void follow_groups(std::vector<BandGroup> groups, std::vector<BentWay>& ways) const;
-  bool end_alike(const BandGroup& group, const std::vector<BentWay>& ways) const;
+  Eigen::Vector3d start_of(const BentRay& way) const;
+  void follow(double sign, bool scales, std::vector<BentRay>& ways) const;
+  void follow_some(const std::vector<std::size_t>& which, std::vector<BentRay>& ways) const;
+  void follow_groups(std::vector<BandGroup> groups, std::vector<BentRay>& ways) const;
+  bool end_alike(const BandGroup& group, const std::vector<BentRay>& ways) const;
   int face_at(const Eigen::Vector3d& position) const;
 
   const TensorField& field_;

@@ -1,8 +1,8 @@
 #pragma once
 /// @file python/module/field.h
-/// A tensor field as Python holds it.
+/// A tensor field as Python holds it. Its voxels are made when they are first needed, so that an array of the user's is
+/// not copied twice.
 
-#include <functional>
 #include <mutex>
 #include <optional>
 #include <string>
@@ -11,7 +11,7 @@
 
 #include "scenes/keys/json_reader.h"
 #include "scenes/scene/scene.h"
-#include "volumes/grids/tensor_grid.h"
+#include "volumes/grids/block_source.h"
 
 namespace tensorray {
 
@@ -19,13 +19,13 @@ namespace tensorray {
 class Field {
  public:
   /// @param keys    `field` of a scene that has this field. Renders write it into the headers of their files.
-  /// @param make    Makes the voxels. It must not touch Python's objects.
-  /// @param memory  What `make` reads; kept alive. None: nothing.
-  Field(Json keys, std::function<TensorGrid()> make, pybind11::object memory = pybind11::none())
-      : keys_(std::move(keys)), make_(std::move(make)), memory_(std::move(memory)) {}
+  /// @param blocks  The voxels. Filling a block must not touch Python's objects.
+  /// @param memory  What the blocks read; kept alive. None: nothing.
+  Field(Json keys, BlockSource blocks, pybind11::object memory = pybind11::none())
+      : keys_(std::move(keys)), blocks_(std::move(blocks)), memory_(std::move(memory)) {}
 
   const Json& keys() const { return keys_; }
-  TensorGrid grid() const { return make_(); }
+  TensorGrid grid() const { return to_grid(blocks_); }
 
   /// The field without voxels that are not finite, smoothed and preprocessed. Made anew if a choice differs from the
   /// last one.
@@ -33,7 +33,7 @@ class Field {
 
  private:
   Json keys_;
-  std::function<TensorGrid()> make_;
+  BlockSource blocks_;
   pybind11::object memory_;
   mutable std::mutex mutex_;
   mutable FieldChoices choices_;

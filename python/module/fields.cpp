@@ -9,7 +9,7 @@
 #include <pybind11/stl/filesystem.h>
 
 #include "base/errors.h"
-#include "base/output_file.h"
+#include "base/files/output_file.h"
 #include "python/module/arrays.h"
 #include "python/module/choices.h"
 #include "python/module/field.h"
@@ -25,7 +25,7 @@ LoadedField Field::loaded(const FieldChoices& choices) const {
   if (!loaded_ || choices_ != choices) {
     loaded_.reset();  // Its memory is needed.
     const std::string source = keys_.contains("file") ? keys_["file"] : keys_["generate"]["kind"];
-    loaded_ = prepare_field(make_(), choices, source);
+    loaded_ = prepare_field(blocks_, choices, source);
     choices_ = choices;
   }
   return *loaded_;
@@ -60,18 +60,9 @@ std::shared_ptr<Field> field_of_array(const py::array_t<Number, 0>& tensors, con
         result(i, j) = *reinterpret_cast<const Number*>(voxel + i * strides[3] + j * strides[4]);
     return result;
   };
-  const auto make = [=, name = keys.value("name", std::string("tensor"))] {
-    TensorGrid grid = dense_grid({Eigen::Vector3i::Zero(), size - Eigen::Vector3i::Ones()}, transform, tensor);
-    grid.name = name;
-    return grid;
-  };
-  return std::make_shared<Field>(std::move(keys), make, tensors);
-}
-
-/// A field whose voxels are already made. Loading copies them, as it changes them.
-std::shared_ptr<Field> field_of_grid(Json keys, TensorGrid grid) {
-  const auto kept = std::make_shared<const TensorGrid>(std::move(grid));
-  return std::make_shared<Field>(std::move(keys), [kept] { return *kept; });
+  BlockSource blocks = dense_source({Eigen::Vector3i::Zero(), size - Eigen::Vector3i::Ones()}, transform, tensor);
+  blocks.name = keys.value("name", blocks.name);
+  return std::make_shared<Field>(std::move(keys), std::move(blocks), tensors);
 }
 
 std::shared_ptr<Field> read_field(const std::filesystem::path& file, const std::string& keys, const std::string& name,
@@ -83,7 +74,7 @@ std::shared_ptr<Field> read_field(const std::filesystem::path& file, const std::
         grid = read_tensor_vdb(file, name, value_of<Derive>("derive", derive));
       },
       report, 0);
-  return field_of_grid(parse_value(keys), std::move(grid));
+  return std::make_shared<Field>(parse_value(keys), source_of(std::move(grid)));
 }
 
 /// @param generator  `field.generate` of a scene, as JSON.
@@ -98,7 +89,7 @@ std::shared_ptr<Field> make_field(const std::string& generator, const py::object
         grid = generate(description.field.generate->generator, description.field.generate->grid);
       },
       report, 0);
-  return field_of_grid(std::move(keys), std::move(grid));
+  return std::make_shared<Field>(std::move(keys), source_of(std::move(grid)));
 }
 
 /// The voxels of a grid as an array (nz, ny, nx, ...) over the box of its active voxels. `set(from, to)` copies one.

@@ -9,9 +9,9 @@
 #include <pybind11/pybind11.h>
 #include <pybind11/stl/filesystem.h>
 
-#include "base/child_program.h"
-#include "base/progress.h"
-#include "base/text.h"
+#include "base/process/child_program.h"
+#include "base/process/progress.h"
+#include "base/text/text.h"
 #include "python/module/field.h"
 #include "python/module/renders.h"
 #include "python/module/scene_request.h"

@@ -9,9 +9,9 @@
 #include <pybind11/stl.h>
 #include <pybind11/stl/filesystem.h>
 
-#include "base/process_limits.h"
-#include "base/seconds.h"
-#include "base/text.h"
+#include "base/process/process_limits.h"
+#include "base/process/seconds.h"
+#include "base/text/text.h"
 #include "python/module/arrays.h"
 #include "python/module/scene_request.h"
 #include "python/module/work.h"
@@ -90,8 +90,8 @@ py::object spectral(const py::object& self) {
 
 /// Photons as rows of 11 floats, which Python names.
 py::array photons(const py::object& self) {
-  static_assert(sizeof(Photon) == 11 * sizeof(float), "a photon is 11 floats");
-  const PhotonMap& photons = self.cast<const Rendered&>().render.photons;
+  static_assert(sizeof(PlatePhoton) == 11 * sizeof(float), "a photon is 11 floats");
+  const std::vector<PlatePhoton>& photons = self.cast<const Rendered&>().render.photons;
   return view(reinterpret_cast<const float*>(photons.data()), {static_cast<py::ssize_t>(photons.size()), 11}, self);
 }
 

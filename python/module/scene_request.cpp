@@ -6,9 +6,9 @@
 #include <pybind11/stl.h>
 #include <pybind11/stl/filesystem.h>
 
-#include "base/text.h"
-#include "scenes/keys/overrides.h"
+#include "base/text/text.h"
 #include "scenes/pipeline/read_scene.h"
+#include "scenes/source/overrides.h"
 
 namespace tensorray {
 namespace {

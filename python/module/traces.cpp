@@ -16,14 +16,15 @@
 
 #include "base/errors.h"
 #include "integrators/flow/flow_map.h"
+#include "integrators/tracing/trace.h"
 #include "python/module/arrays.h"
 #include "python/module/choices.h"
 #include "python/module/field.h"
 #include "python/module/scene_request.h"
 #include "python/module/work.h"
-#include "renderer/surfaces/mesh.h"
+#include "renderer/meshes/mesh.h"
 #include "scenes/scene/fine_bands.h"
-#include "volumes/tensors/smoothing.h"
+#include "volumes/making/smoothing.h"
 
 namespace tensorray {
 namespace {
@@ -41,7 +42,7 @@ struct TraceRequest {
 
 struct Traced {
   RayBatch rays;
-  std::vector<RayPoints> paths;
+  std::vector<std::vector<Eigen::Vector3d>> ways;  ///< Of each ray; or empty.
 };
 
 Eigen::Matrix<double, 3, 2> columns(const double* numbers) {
@@ -88,15 +89,23 @@ void put(std::vector<T>& all, std::size_t begin, std::vector<T>& part) {
   std::move(part.begin(), part.end(), all.begin() + static_cast<std::ptrdiff_t>(begin));
 }
 
+/// The positions of a ray's points.
+std::vector<Eigen::Vector3d> way(const TensorField& field, const RayRecord& record) {
+  std::vector<Eigen::Vector3d> positions;
+  positions.reserve(record.size());
+  for (std::size_t i = 0; i < record.size(); ++i) positions.push_back(path_point(field, record, i).position);
+  return positions;
+}
+
 /// Follows all rays, on all threads: in batches, as a batch belongs to one thread.
-void trace_all(const TensorField& field, const Geometry& geometry, const BendingSettings& bending, bool with_paths,
+void trace_all(const TensorField& field, const Geometry& geometry, const BendingSettings& bending, bool with_ways,
                Traced& traced, const Progress& progress) {
   constexpr std::size_t batch_size = 512;
   RayBatch& rays = traced.rays;
   rays.end.resize(rays.size());
   rays.length.resize(rays.size());
   rays.steps.resize(rays.size());
-  traced.paths.resize(with_paths ? rays.size() : 0);
+  traced.ways.resize(with_ways ? rays.size() : 0);
   tbb::parallel_for(tbb::blocked_range<std::size_t>(0, rays.size(), batch_size), [&](const auto& range) {
     if (progress.cancelled) throw Cancelled();
     RayBatch batch;
@@ -104,15 +113,15 @@ void trace_all(const TensorField& field, const Geometry& geometry, const Bending
     batch.direction = slice(rays.direction, range.begin(), range.end());
     batch.flexibility = slice(rays.flexibility, range.begin(), range.end());
     batch.differentials = slice(rays.differentials, range.begin(), range.end());
-    std::vector<RayPoints> paths;
-    with_paths ? trace(field, geometry, bending, batch, paths) : trace(field, geometry, bending, batch);
+    std::vector<RayRecord> records;
+    trace(field, geometry, bending, batch, with_ways ? &records : nullptr);
     put(rays.position, range.begin(), batch.position);
     put(rays.direction, range.begin(), batch.direction);
     if (!rays.differentials.empty()) put(rays.differentials, range.begin(), batch.differentials);
     put(rays.end, range.begin(), batch.end);
     put(rays.length, range.begin(), batch.length);
     put(rays.steps, range.begin(), batch.steps);
-    put(traced.paths, range.begin(), paths);
+    for (std::size_t i = 0; i < records.size(); ++i) traced.ways[range.begin() + i] = way(field, records[i]);
   });
 }
 
@@ -120,14 +129,6 @@ py::array ends_array(std::vector<RayEnd> ends, const Shape& shape) {
   std::vector<std::uint8_t> numbers(ends.size());
   std::transform(ends.begin(), ends.end(), numbers.begin(), [](RayEnd end) { return static_cast<std::uint8_t>(end); });
   return taken(std::move(numbers), shape);
-}
-
-/// The positions of a path's points.
-py::array way(const RayPoints& points) {
-  std::vector<Eigen::Vector3d> positions;
-  for (const RayPoint& point : points) positions.push_back(point.position);
-  const auto count = static_cast<py::ssize_t>(positions.size());
-  return taken_matrices(std::move(positions), {count, 3});
 }
 
 py::dict arrays_of(Traced traced) {
@@ -143,9 +144,12 @@ py::dict arrays_of(Traced traced) {
     arrays["position_jacobians"] = taken_matrices(std::move(positions), {count, 2, 3}).attr("swapaxes")(1, 2);
     arrays["direction_jacobians"] = taken_matrices(std::move(directions), {count, 2, 3}).attr("swapaxes")(1, 2);
   }
-  if (!traced.paths.empty()) {
+  if (!traced.ways.empty()) {
     py::list ways;
-    for (const RayPoints& points : traced.paths) ways.append(way(points));
+    for (std::vector<Eigen::Vector3d>& way : traced.ways) {
+      const auto points = static_cast<py::ssize_t>(way.size());
+      ways.append(taken_matrices(std::move(way), {points, 3}));
+    }
     arrays["ways"] = ways;
   }
   arrays["positions"] = taken_matrices(std::move(rays.position), {count, 3});
@@ -211,7 +215,8 @@ std::vector<Eigen::Vector3d> world_starts(const FlowMap& map, const Beam& beam) 
 }
 
 py::dict arrays_of(FlowMap map, const Scene& scene, std::vector<double> flexibilities) {
-  const auto starts = static_cast<py::ssize_t>(map.starts.size()), nodes = static_cast<py::ssize_t>(map.nodes);
+  const auto starts = static_cast<py::ssize_t>(map.starts.size()),
+             wavelengths = static_cast<py::ssize_t>(map.wavelengths);
   const auto triangles = static_cast<py::ssize_t>(map.triangles.size());
   std::vector<std::uint32_t> corners;
   std::vector<double> areas;
@@ -222,11 +227,11 @@ py::dict arrays_of(FlowMap map, const Scene& scene, std::vector<double> flexibil
   py::dict arrays;
   put_plate(arrays, *scene.geometry.surfaces().plate);
   arrays["starts"] = taken_matrices(world_starts(map, scene.beam), {starts, 3});
-  arrays["landings"] = taken_matrices(std::move(map.landings), {starts, nodes, 2});
-  arrays["ends"] = ends_array(std::move(map.ends), {starts, nodes});
+  arrays["landings"] = taken_matrices(std::move(map.landings), {starts, wavelengths, 2});
+  arrays["ends"] = ends_array(std::move(map.ends), {starts, wavelengths});
   arrays["triangles"] = taken(std::move(corners), {triangles, 3});
   arrays["areas"] = taken(std::move(areas), {triangles});
-  arrays["flexibilities"] = taken(std::move(flexibilities), {nodes});
+  arrays["flexibilities"] = taken(std::move(flexibilities), {wavelengths});
   return arrays;
 }
 
@@ -247,9 +252,9 @@ py::dict landings(const SceneRequest& request, std::vector<double> flexibilities
         map = trace_flow_map(scene->field, scene->geometry, scene->beam, scene->bending, settings, progress);
         if (settings.range) {
           const double first = range.flexibilities.front(), last = range.flexibilities.back();
-          const double steps = map.nodes < 2 ? 1 : static_cast<double>(map.nodes - 1);
-          for (std::size_t node = 0; node < map.nodes; ++node)
-            flexibilities.push_back(first + (last - first) * static_cast<double>(node) / steps);
+          const double steps = map.wavelengths < 2 ? 1 : static_cast<double>(map.wavelengths - 1);
+          for (std::size_t sample = 0; sample < map.wavelengths; ++sample)
+            flexibilities.push_back(first + (last - first) * static_cast<double>(sample) / steps);
         } else {
           flexibilities = settings.flexibilities;
         }

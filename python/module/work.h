@@ -6,7 +6,7 @@
 
 #include <pybind11/pybind11.h>
 
-#include "base/progress.h"
+#include "base/process/progress.h"
 
 namespace tensorray {
 

@@ -13,7 +13,7 @@
 #include <tbb/parallel_for.h>
 
 #include "base/errors.h"
-#include "base/text.h"
+#include "base/text/text.h"
 #include "renderer/color/builtin_config.h"
 #include "renderer/color/chromaticities.h"
 #include "renderer/color/file_colors.h"

@@ -12,8 +12,8 @@
 
 #include <Eigen/LU>
 
-#include "base/byte_order.h"
-#include "base/text.h"
+#include "base/text/byte_order.h"
+#include "base/text/text.h"
 #include "renderer/color/chromaticities.h"
 
 namespace tensorray {

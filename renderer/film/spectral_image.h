@@ -6,9 +6,9 @@
 
 #include <Eigen/Core>
 
-#include "renderer/color/spectrum.h"
 #include "renderer/film/film.h"
 #include "renderer/images/image.h"
+#include "renderer/spectra/spectrum.h"
 
 namespace tensorray {
 

@@ -20,7 +20,7 @@
 #include <OpenEXR/ImfStringAttribute.h>
 #include <OpenEXR/ImfThreading.h>
 
-#include "base/text.h"
+#include "base/text/text.h"
 
 namespace tensorray {
 namespace {

@@ -1,7 +1,7 @@
 #pragma once
 /// @file renderer/images/exr_encoder.h
 /// Encodes EXR files with OpenEXR, because most renders write one, and OpenImageIO, which would use OpenEXR too, takes
-/// longer to load than a small render takes (picture_library.h).
+/// longer to load than a small render takes (image_plugin.h).
 
 #include <vector>
 

@@ -16,10 +16,10 @@
 #include <system_error>
 
 #include "base/errors.h"
-#include "base/text.h"
+#include "base/text/text.h"
 #include "renderer/images/exr_encoder.h"
+#include "renderer/images/image_plugin.h"
 #include "renderer/images/luminance_chroma.h"
-#include "renderer/images/picture_library.h"
 #include "renderer/images/png_encoder.h"
 #include "renderer/images/png_tags.h"
 
@@ -97,8 +97,8 @@ int image_threads = 0;  ///< 0: all.
 
 /// The library, with its number of threads. Several threads may write pictures at once, but OpenImageIO's threads must
 /// not be changed by two of them, nor while one works.
-const PictureLibrary& ready_library() {
-  const PictureLibrary& library = picture_library();
+const ImagePlugin& ready_library() {
+  const ImagePlugin& library = image_plugin();
   static std::mutex mutex;
   static int threads = -1;
   const std::lock_guard<std::mutex> lock(mutex);
@@ -167,7 +167,7 @@ void prepare_images(const std::vector<std::filesystem::path>& files) {
     const bool is_picture = std::find(known.begin(), known.end(), lower_case_ending(file)) != known.end();
     if (!is_picture) continue;
     const PictureFormat format = find_format(file);
-    if (!is_exr(format) && !is_png(format)) picture_library();
+    if (!is_exr(format) && !is_png(format)) image_plugin();
   }
 }
 

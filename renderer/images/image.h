@@ -63,7 +63,7 @@ void prepare_images(const std::vector<std::filesystem::path>& files);
 /// `ICCProfile` give. In EXR, the metadata `chromaticities` (eight numbers) become the attribute. They store the first
 /// three channels, or only the first if there are fewer than three. PNG and TIFF also store the fourth channel if it is
 /// "A"; its values do not change, and the colours are neither multiplied nor divided by it. The file is encoded in
-/// memory and then written in place: use an OutputFile (base/output_file.h) to never leave an incomplete file.
+/// memory and then written in place: use an OutputFile (base/files/output_file.h) to never leave an incomplete file.
 /// @throw std::invalid_argument if the picture has no pixels, or not as many as its size and channels require.
 /// @throw std::runtime_error naming the file and the reason (also if the disk is full).
 void write_image(const std::filesystem::path& path, const Image& image, const ImageMetadata& metadata = {});

@@ -11,7 +11,7 @@
 #include <OpenEXR/ImfStandardAttributes.h>
 #include <OpenEXR/ImfTestFile.h>
 
-#include "base/text.h"
+#include "base/text/text.h"
 #include "renderer/images/stored_bytes.h"
 
 namespace tensorray {

@@ -1,7 +1,7 @@
 #pragma once
 /// @file renderer/images/png_encoder.h
 /// Encodes PNG files with libpng, because most renders write one picture, and OpenImageIO, which would use libpng too,
-/// takes longer to load than a small render takes (picture_library.h).
+/// takes longer to load than a small render takes (image_plugin.h).
 
 #include <vector>
 

@@ -4,7 +4,7 @@
 #include <fstream>
 #include <vector>
 
-#include "base/byte_order.h"
+#include "base/text/byte_order.h"
 
 namespace tensorray {
 namespace {

@@ -5,7 +5,7 @@
 #include <limits>
 #include <stdexcept>
 
-#include "base/box.h"
+#include "base/geometry/box.h"
 #include "renderer/sampling/random.h"
 #include "renderer/surfaces/plate.h"
 

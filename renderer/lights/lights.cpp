@@ -78,6 +78,22 @@ void set(const std::vector<float>& values, std::vector<float>& part, std::ptrdif
   part.assign(first, first + static_cast<std::ptrdiff_t>(count));
 }
 
+/// The triangles of the area lights, if there are more than are looked at one by one in the time of a search.
+std::shared_ptr<const TriangleScene> many_triangles(const std::vector<Light>& lights,
+                                                    const std::vector<int>& area_lights) {
+  constexpr std::size_t few = 16;
+  std::vector<const TriangleMesh*> meshes;
+  Eigen::AlignedBox3d bounds;
+  std::size_t count = 0;
+  for (const int light : area_lights) {
+    meshes.push_back(&std::get<AreaLight>(lights[static_cast<std::size_t>(light)]).mesh);
+    bounds.extend(meshes.back()->bounds());
+    count += meshes.back()->triangles.size();
+  }
+  if (count <= few) return nullptr;
+  return std::make_shared<const TriangleScene>(meshes, bounds.center(), bounds.diagonal().norm());
+}
+
 }  // namespace
 
 TriangleMesh rectangle_mesh(const Vector3d& center, const Vector3d& right, const Vector3d& up, const Vector2d& size) {
@@ -103,7 +119,9 @@ LightSampler::LightSampler(std::vector<Light> lights, const std::vector<float>& 
       throw std::invalid_argument("light " + std::to_string(i) + ": " + error.what());
     }
     powers.push_back(prepared_.back().power);
+    if (std::holds_alternative<AreaLight>(lights_[i])) area_lights_.push_back(static_cast<int>(i));
   }
+  triangles_ = many_triangles(lights_, area_lights_);
   if (std::any_of(powers.begin(), powers.end(), [](double power) { return power > 0; })) choice_.emplace(powers);
 }
 
@@ -248,14 +266,26 @@ double LightSampler::background_pdf(const Vector3d& direction) const {
 
 double LightSampler::direction_pdf(const Vector3d& point, const Vector3d& direction) const {
   double sum = background_pdf(direction);
-  for (int i = 0; i < static_cast<int>(lights_.size()); ++i) {
-    const auto* area = std::get_if<AreaLight>(&lights_[i]);
-    if (!area) continue;
-    for (std::size_t t = 0; t < area->mesh.triangles.size(); ++t)
-      if (const auto distance = distance_to(area->mesh, t, point, direction))
-        sum += area_pdf(i, point, point + *distance * direction, triangle_normal(area->mesh, t).normalized());
+  if (triangles_) {
+    thread_local std::vector<TriangleId> candidates;
+    triangles_->along(point, direction, candidates);
+    for (const TriangleId& each : candidates)
+      sum += triangle_pdf(area_lights_[each.mesh], each.triangle, point, direction);
+    return sum;
   }
+  for (const int light : area_lights_)
+    for (std::size_t i = 0; i < std::get<AreaLight>(lights_[light]).mesh.triangles.size(); ++i)
+      sum += triangle_pdf(light, i, point, direction);
   return sum;
+}
+
+/// The density of `direction` by a triangle of an area light; 0 if a straight ray does not meet it.
+double LightSampler::triangle_pdf(int light, std::size_t triangle, const Vector3d& point,
+                                  const Vector3d& direction) const {
+  const TriangleMesh& mesh = std::get<AreaLight>(lights_[light]).mesh;
+  const auto distance = distance_to(mesh, triangle, point, direction);
+  if (!distance) return 0;
+  return area_pdf(light, point, point + *distance * direction, triangle_normal(mesh, triangle).normalized());
 }
 
 bool LightSampler::is_concentrated() const {

@@ -3,14 +3,16 @@
 /// The lights of a scene, and how to sample directions towards them. Radiance is given for each band, relative to the
 /// light that the bands are made from: see Band.
 
+#include <memory>
 #include <optional>
 #include <variant>
 #include <vector>
 
 #include <Eigen/Geometry>
 
-#include "base/triangle_mesh.h"
-#include "renderer/color/band_range.h"
+#include "base/geometry/triangle_mesh.h"
+#include "renderer/spectra/band_range.h"
+#include "renderer/surfaces/triangle_scene.h"
 #include "renderer/textures/environment_map.h"
 
 namespace tensorray {
@@ -149,11 +151,15 @@ class LightSampler {
     return static_cast<std::size_t>(bands.size(static_cast<std::ptrdiff_t>(bands_)));
   }
   double directional_pdf(int light, const Eigen::Vector3d& direction) const;
+  double triangle_pdf(int light, std::size_t triangle, const Eigen::Vector3d& point,
+                      const Eigen::Vector3d& direction) const;
 
   std::size_t bands_ = 0;
   std::vector<Light> lights_;
   std::vector<Prepared> prepared_;
-  std::optional<Distribution1D> choice_;  ///< Empty if there are no lights to choose.
+  std::vector<int> area_lights_;                    ///< Their indices.
+  std::shared_ptr<const TriangleScene> triangles_;  ///< Of `area_lights_`, if these have many.
+  std::optional<Distribution1D> choice_;            ///< Empty if there are no lights to choose.
 };
 
 }  // namespace tensorray

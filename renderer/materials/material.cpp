@@ -52,9 +52,9 @@ bool scatters(const Material& material, const Eigen::Vector3d& wi, const Eigen::
 /// Metals alone have values of each band.
 template <class Model>
 double evaluate(const Model& model, const ViewedMaterial& view, const BandsIn& reflectance, const Eigen::Vector3d& wi,
-                const Eigen::Vector3d& wo, BandsOut f, Eigen::Index first_band) {
+                const Eigen::Vector3d& wo, BandsOut f) {
   if constexpr (std::is_same_v<Model, ConductorScattering>)
-    return tensorray::evaluate(model, reflectance, wi, wo, f, first_band);
+    return tensorray::evaluate(model, reflectance, wi, wo, f, view.first_band);
   else if constexpr (std::is_same_v<Model, PrincipledScattering>)
     return tensorray::evaluate(model, view.principled, reflectance, wi, wo, f);
   else
@@ -84,25 +84,29 @@ Material make_material(const MaterialSettings& settings, const BandValues& refle
   return material;
 }
 
-ViewedMaterial viewed(const Material& material, const BandsIn& reflectance, const Eigen::Vector3d& wo) {
-  const auto* principled = std::get_if<PrincipledScattering>(&material.scattering);
-  return principled ? ViewedMaterial{viewed(*principled, reflectance, std::abs(wo.z()))} : ViewedMaterial{};
+ViewedMaterial viewed(const Material& material, const BandsIn& reflectance, const Eigen::Vector3d& wo,
+                      Eigen::Index first_band) {
+  ViewedMaterial view{wo, first_band, {}};
+  if (const auto* principled = std::get_if<PrincipledScattering>(&material.scattering))
+    view.principled = viewed(*principled, reflectance, std::abs(wo.z()));
+  return view;
 }
 
 double evaluate(const Material& material, const ViewedMaterial& view, const BandsIn& reflectance,
-                const Eigen::Vector3d& wi, const Eigen::Vector3d& wo, BandsOut f, Eigen::Index first_band) {
+                const Eigen::Vector3d& wi, BandsOut f) {
+  const Eigen::Vector3d& wo = view.wo;
   if (!scatters(material, wi, wo)) {
     f.setZero();
     return 0;
   }
   const Eigen::Vector3d i = seen(material, wi, wo), o = seen(material, wo, wo);
-  const auto of = [&](const auto& model) { return evaluate(model, view, reflectance, i, o, f, first_band); };
+  const auto of = [&](const auto& model) { return evaluate(model, view, reflectance, i, o, f); };
   return std::visit(of, material.scattering);
 }
 
 double evaluate(const Material& material, const BandsIn& reflectance, const Eigen::Vector3d& wi,
                 const Eigen::Vector3d& wo, BandsOut f, Eigen::Index first_band) {
-  return evaluate(material, viewed(material, reflectance, wo), reflectance, wi, wo, f, first_band);
+  return evaluate(material, viewed(material, reflectance, wo, first_band), reflectance, wi, f);
 }
 
 double pdf(const Material& material, const BandsIn& reflectance, const Eigen::Vector3d& wi, const Eigen::Vector3d& wo) {
@@ -111,15 +115,15 @@ double pdf(const Material& material, const BandsIn& reflectance, const Eigen::Ve
 }
 
 std::optional<ScatteringSample> sample(const Material& material, const ViewedMaterial& view, const BandsIn& reflectance,
-                                       const Eigen::Vector3d& wo, const Eigen::Vector3d& u, BandsOut weight,
-                                       Eigen::Index first_band) {
+                                       const Eigen::Vector3d& u, BandsOut weight) {
+  const Eigen::Vector3d& wo = view.wo;
   weight.setZero();
   if (wo.z() == 0) return std::nullopt;
   const Eigen::Vector3d o = seen(material, wo, wo);
   const auto direction = [&](const auto& model) { return sample(model, view, reflectance, o, u); };
   ScatteringSample result;
   result.wi = seen(material, std::visit(direction, material.scattering), wo);
-  result.pdf = evaluate(material, view, reflectance, result.wi, wo, weight, first_band);
+  result.pdf = evaluate(material, view, reflectance, result.wi, weight);
   if (!(result.pdf > 0)) {
     weight.setZero();
     return std::nullopt;
@@ -131,7 +135,7 @@ std::optional<ScatteringSample> sample(const Material& material, const ViewedMat
 
 std::optional<ScatteringSample> sample(const Material& material, const BandsIn& reflectance, const Eigen::Vector3d& wo,
                                        const Eigen::Vector3d& u, BandsOut weight, Eigen::Index first_band) {
-  return sample(material, viewed(material, reflectance, wo), reflectance, wo, u, weight, first_band);
+  return sample(material, viewed(material, reflectance, wo, first_band), reflectance, u, weight);
 }
 
 }  // namespace tensorray

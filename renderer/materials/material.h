@@ -35,11 +35,14 @@ Material make_material(const MaterialSettings& settings, const BandValues& refle
 
 /// What all directions of light share at a point that a viewer sees.
 struct ViewedMaterial {
-  PrincipledView principled;  ///< Of that material only.
+  Eigen::Vector3d wo;
+  Eigen::Index first_band = 0;  ///< Of the reflectance, and of f.
+  PrincipledView principled;    ///< Of that material only.
 };
 
-/// @param reflectance, wo  As in `evaluate`.
-ViewedMaterial viewed(const Material& material, const BandsIn& reflectance, const Eigen::Vector3d& wo);
+/// @param reflectance, wo, first_band  As in `evaluate`.
+ViewedMaterial viewed(const Material& material, const BandsIn& reflectance, const Eigen::Vector3d& wo,
+                      Eigen::Index first_band = 0);
 
 /// Sets f(wi, wo) in every band, without a cosine. It is 0 if a direction lies in the surface (z = 0), and on the far
 /// side of opaque materials.
@@ -51,9 +54,9 @@ ViewedMaterial viewed(const Material& material, const BandsIn& reflectance, cons
 double evaluate(const Material& material, const BandsIn& reflectance, const Eigen::Vector3d& wi,
                 const Eigen::Vector3d& wo, BandsOut f, Eigen::Index first_band = 0);
 
-/// The same, where several directions light one point. @param view  That of `reflectance` and wo.
+/// The same, where several directions light one point. @param view  That of `reflectance`.
 double evaluate(const Material& material, const ViewedMaterial& view, const BandsIn& reflectance,
-                const Eigen::Vector3d& wi, const Eigen::Vector3d& wo, BandsOut f, Eigen::Index first_band = 0);
+                const Eigen::Vector3d& wi, BandsOut f);
 
 /// The density, per steradian, with which `sample` gives wi; the same for all bands of `reflectance`. Its integral is 1
 /// minus the probability that `sample` returns nothing.
@@ -79,7 +82,6 @@ std::optional<ScatteringSample> sample(const Material& material, const BandsIn& 
 
 /// The same. @param view  As in `evaluate`.
 std::optional<ScatteringSample> sample(const Material& material, const ViewedMaterial& view, const BandsIn& reflectance,
-                                       const Eigen::Vector3d& wo, const Eigen::Vector3d& u, BandsOut weight,
-                                       Eigen::Index first_band = 0);
+                                       const Eigen::Vector3d& u, BandsOut weight);
 
 }  // namespace tensorray

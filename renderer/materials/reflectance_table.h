@@ -6,8 +6,8 @@
 
 #include <Eigen/Core>
 
-#include "renderer/color/reflectance.h"
 #include "renderer/materials/scattering.h"
+#include "renderer/spectra/reflectance.h"
 
 namespace tensorray {
 

@@ -4,7 +4,7 @@
 #include <iterator>
 #include <stdexcept>
 
-#include "base/text.h"
+#include "base/text/text.h"
 #include "renderer/sampling/sampling.h"
 
 namespace tensorray {

@@ -12,7 +12,7 @@
 namespace tensorray {
 namespace {
 
-double square(double x) { return x * x; }
+double squared(double x) { return x * x; }
 
 /// The surface seen from wo, turned so that wo has z > 0.
 struct View {
@@ -27,7 +27,7 @@ View view_of(const DielectricScattering& glass, bool outside) {
   // The refracting lobe is near · far · c / π. By reciprocity, it is n² times larger for light that leaves to the
   // inside than for light that leaves to the outside. A cone of light from one side is compressed by the same factor on
   // the other.
-  const double index2 = square(glass.index);
+  const double index2 = squared(glass.index);
   if (outside)
     return {glass.index, glass.missing_outside, glass.missing_inside,
             glass.refracted * index2 * glass.missing_inside.mean(), glass.refracted};
@@ -42,7 +42,7 @@ Eigen::Vector3d turned(const Eigen::Vector3d& w, bool outside) {
 /// The refracted direction; zero for total reflection. `index` is as for Fresnel; wo and m are on the same side.
 Eigen::Vector3d refracted(const Eigen::Vector3d& wo, const Eigen::Vector3d& m, double index) {
   const double cosine = wo.dot(m);
-  const double cosine2 = 1 - (1 - square(cosine)) / square(index);
+  const double cosine2 = 1 - (1 - squared(cosine)) / squared(index);
   if (cosine2 <= 0) return Eigen::Vector3d::Zero();
   return ((cosine / index - std::sqrt(cosine2)) * m - wo / index).normalized();
 }
@@ -65,7 +65,7 @@ Refraction refraction_between(const Eigen::Vector3d& wi, const Eigen::Vector3d& 
   m /= length;
   const double o = wo.dot(m), i = wi.dot(m);
   if (o <= 0 || i >= 0) return {m, 0};
-  return {m, square(index) * -i / square(o + index * i)};
+  return {m, squared(index) * -i / squared(o + index * i)};
 }
 
 double single_bounce_share(const View& view, const Eigen::Vector3d& wo) { return 1 - view.near.at(wo.z()); }
@@ -106,7 +106,7 @@ DielectricScattering prepare(const RoughDielectric& settings) {
   // `refracted` is the largest factor with which neither fraction exceeds that of smooth glass.
   const double smooth = 1 - hemispherical_mean([=](double cosine) { return fresnel_dielectric(cosine, index); });
   const double missing = std::max(glass.missing_outside.mean(), glass.missing_inside.mean());
-  glass.refracted = missing > 0 ? smooth / (square(index) * missing) : 0;
+  glass.refracted = missing > 0 ? smooth / (squared(index) * missing) : 0;
   return glass;
 }
 
@@ -128,7 +128,7 @@ double evaluate(const DielectricScattering& glass, const BandsIn& reflectance, c
     const auto [m, jacobian] = refraction_between(i, o, view.index);
     if (jacobian > 0) {
       const double single = (1 - fresnel(o, m, view.index)) * ggx_visible_pdf(glass.alpha, o, m) * jacobian;
-      value += single * ggx_shadowing(glass.alpha, o.z(), -i.z()) / (-i.z() * square(view.index));
+      value += single * ggx_shadowing(glass.alpha, o.z(), -i.z()) / (-i.z() * squared(view.index));
       density += share * single;
     }
   }

@@ -15,7 +15,7 @@
 #include <OpenImageIO/filesystem.h>
 #include <OpenImageIO/imageio.h>
 
-#include "base/text.h"
+#include "base/text/text.h"
 #include "renderer/images/stored_bytes.h"
 
 namespace tensorray::openimageio {

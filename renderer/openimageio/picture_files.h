@@ -1,12 +1,12 @@
 #pragma once
 /// @file renderer/openimageio/picture_files.h
-/// Pictures in the formats of files; see PictureLibrary.
+/// Pictures in the formats of files; see ImagePlugin.
 
 #include <filesystem>
 #include <string>
 #include <vector>
 
-#include "renderer/images/picture_library.h"
+#include "renderer/images/image_plugin.h"
 
 namespace tensorray::openimageio {
 

@@ -10,7 +10,7 @@
 #include <OpenImageIO/imageio.h>
 #include <OpenImageIO/texture.h>
 
-#include "base/text.h"
+#include "base/text/text.h"
 #include "renderer/textures/texture.h"
 
 namespace tensorray::openimageio {
@@ -70,7 +70,7 @@ class SourceInput final : public OIIO::ImageInput {
       std::fill_n(rgba, tile_size * tile_size * 4, 0.0f);
       const int columns = std::min(tile_size, source_->width(level) - x);
       const int rows = std::min(tile_size, source_->height(level) - y);
-      source_->read(level, x, y, columns, rows, tile_size, rgba);
+      source_->read({level, x, y, columns, rows}, tile_size, rgba);
       return true;
     } catch (const std::exception& error) {
       errorfmt("{}", error.what());

@@ -4,7 +4,7 @@
 
 #include <memory>
 
-#include "renderer/images/picture_library.h"
+#include "renderer/images/image_plugin.h"
 
 namespace tensorray::openimageio {
 

@@ -62,6 +62,50 @@ inline void intersect(RTCScene scene, std::vector<RTCRayHit>& rays) {
 #endif
 }
 
+/// What a query of all triangles along a ray adds to Embree's context.
+struct AllTriangles {
+#if RTC_VERSION_MAJOR >= 4
+  RTCRayQueryContext context;
+#else
+  RTCIntersectContext context;
+#endif
+  void (*add)(void* user, unsigned geometry, unsigned primitive);
+  void* user;
+
+  /// A filter that refuses all hits, so that the search goes on.
+  static void take(const RTCFilterFunctionNArguments* arguments) {
+    auto* const all = reinterpret_cast<AllTriangles*>(arguments->context);
+    all->add(all->user, RTCHitN_geomID(arguments->hit, arguments->N, 0),
+             RTCHitN_primID(arguments->hit, arguments->N, 0));
+    arguments->valid[0] = 0;
+  }
+};
+
+/// Calls `add` for each triangle along a ray, some of them more than once. The scene needs `all_triangles_flag`.
+inline void visit_all(RTCScene scene, RTCRayHit ray, void (*add)(void*, unsigned, unsigned), void* user) {
+  if (!is_valid(ray.ray)) return;
+  AllTriangles all{{}, add, user};
+#if RTC_VERSION_MAJOR >= 4
+  rtcInitRayQueryContext(&all.context);
+  RTCIntersectArguments arguments;
+  rtcInitIntersectArguments(&arguments);
+  arguments.flags = static_cast<RTCRayQueryFlags>(arguments.flags | RTC_RAY_QUERY_FLAG_INVOKE_ARGUMENT_FILTER);
+  arguments.context = &all.context;
+  arguments.filter = AllTriangles::take;
+  rtcIntersect1(scene, &ray, &arguments);
+#else
+  rtcInitIntersectContext(&all.context);
+  all.context.filter = AllTriangles::take;
+  rtcIntersect1(scene, &all.context, &ray);
+#endif
+}
+
+#if RTC_VERSION_MAJOR >= 4
+constexpr RTCSceneFlags all_triangles_flag = RTC_SCENE_FLAG_FILTER_FUNCTION_IN_ARGUMENTS;
+#else
+constexpr RTCSceneFlags all_triangles_flag = RTC_SCENE_FLAG_CONTEXT_FILTER_FUNCTION;
+#endif
+
 /// Sets tfar to −infinity if the ray meets anything. A ray that is not valid meets nothing.
 inline void occluded(RTCScene scene, RTCRay& ray) {
   if (!is_valid(ray)) return;

@@ -9,7 +9,7 @@
 
 #include <Eigen/Core>
 
-#include "base/triangle_mesh.h"
+#include "base/geometry/triangle_mesh.h"
 #include "renderer/surfaces/surface_texture.h"
 
 namespace tensorray {

@@ -89,7 +89,7 @@ void TriangleScene::State::start(RTCBuildQuality quality) {
   device = embree::make_device();
   scene.reset(rtcNewScene(device.get()));
   check(device.get());
-  rtcSetSceneFlags(scene.get(), RTC_SCENE_FLAG_ROBUST);
+  rtcSetSceneFlags(scene.get(), static_cast<RTCSceneFlags>(RTC_SCENE_FLAG_ROBUST | embree::all_triangles_flag));
   rtcSetSceneBuildQuality(scene.get(), quality);
 }
 
@@ -170,6 +170,24 @@ std::optional<TriangleHit> TriangleScene::nearest(const Eigen::Vector3d& from, c
   embree::intersect(state_->scene.get(), ray);
   if (ray.hit.geomID == RTC_INVALID_GEOMETRY_ID) return std::nullopt;
   return TriangleHit{min_distance + ray.ray.tfar * state_->unit, ray.hit.geomID, ray.hit.primID};
+}
+
+void TriangleScene::along(const Eigen::Vector3d& from, const Eigen::Vector3d& direction,
+                          std::vector<TriangleId>& candidates) const {
+  candidates.clear();
+  if (empty()) return;
+  double start = -1e-5 * state_->unit;  // Triangles at the start must not be lost.
+  if (state_->is_far(from)) {
+    const auto way = entry(state_->box, from, direction);
+    if (!way) return;
+    start = std::max(start, *way);
+  }
+  const auto add = [](void* user, unsigned mesh, unsigned triangle) {
+    static_cast<std::vector<TriangleId>*>(user)->push_back({mesh, triangle});
+  };
+  embree::visit_all(state_->scene.get(), state_->ray(from, direction, start, std::numeric_limits<double>::infinity()),
+                    add, &candidates);
+  sort_and_join(candidates);
 }
 
 void TriangleScene::near(const Eigen::Vector3d& point, double radius, std::vector<TriangleId>& candidates) const {

@@ -10,7 +10,7 @@
 
 #include <Eigen/Core>
 
-#include "base/triangle_mesh.h"
+#include "base/geometry/triangle_mesh.h"
 
 namespace tensorray {
 
@@ -55,6 +55,10 @@ class TriangleScene {
   /// The nearest triangle between the two distances (world units; the first may be negative), from either side.
   std::optional<TriangleHit> nearest(const Eigen::Vector3d& from, const Eigen::Vector3d& direction, double min_distance,
                                      double max_distance) const;
+
+  /// Sets `candidates` to the triangles that a ray meets, in order of mesh and triangle; some of them it misses by
+  /// single precision.
+  void along(const Eigen::Vector3d& from, const Eigen::Vector3d& direction, std::vector<TriangleId>& candidates) const;
 
   /// Sets `candidates` to all triangles whose bounding boxes come within `radius` of the point, and some others, in
   /// order of mesh and triangle. A radius of 1e-6 units makes up for single precision if coordinates are below one

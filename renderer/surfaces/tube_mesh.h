@@ -7,7 +7,7 @@
 
 #include <Eigen/Core>
 
-#include "base/triangle_mesh.h"
+#include "base/geometry/triangle_mesh.h"
 
 namespace tensorray {
 

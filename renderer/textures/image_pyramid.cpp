@@ -87,8 +87,9 @@ Eigen::Vector4f ImagePyramid::mean() const {
   return rgba;
 }
 
-void ImagePyramid::read(int level, int x, int y, int columns, int rows, std::size_t row_pixels, float* rgba) const {
-  for (int row = 0; row < rows; ++row) read_row(level, x, y + row, columns, rgba + row * row_pixels * 4);
+void ImagePyramid::read(const LevelRectangle& part, std::size_t row_pixels, float* rgba) const {
+  for (int row = 0; row < part.rows; ++row)
+    read_row(part.level, part.x, part.y + row, part.columns, rgba + row * row_pixels * 4);
 }
 
 void ImagePyramid::read_row(int level, int x, int y, int count, float* rgba) const {

@@ -9,7 +9,7 @@
 
 #include "renderer/color/color.h"
 #include "renderer/images/image.h"
-#include "renderer/images/picture_library.h"
+#include "renderer/images/image_plugin.h"
 
 namespace tensorray {
 
@@ -29,7 +29,7 @@ class ImagePyramid final : public TileSource {
   int height(int level) const override;
   Eigen::Vector4f mean() const;  ///< Mean of all pixels.
 
-  void read(int level, int x, int y, int columns, int rows, std::size_t row_pixels, float* rgba) const override;
+  void read(const LevelRectangle& part, std::size_t row_pixels, float* rgba) const override;
 
   /// The pixels of a level (R, G, B, A, row by row) if it is stored, otherwise null.
   const float* stored(int level) const;

@@ -11,15 +11,15 @@
 #include <tbb/parallel_for.h>
 
 #include "base/constants.h"
-#include "renderer/images/ink.h"
-#include "renderer/images/lettering.h"
+#include "renderer/charts/ink.h"
+#include "renderer/charts/lettering.h"
 
 namespace tensorray {
 namespace {
 
-constexpr int cells = 16;  // Number of cells along the shorter side.
+constexpr int cells_across = 16;  // Number of cells along the shorter side.
 
-double cell_size(const Image& image) { return std::min(image.width, image.height) / static_cast<double>(cells); }
+double cell_size(const Image& image) { return std::min(image.width, image.height) / static_cast<double>(cells_across); }
 
 /// Sets each pixel (x, y) to `color(x, y)`.
 template <class Color>

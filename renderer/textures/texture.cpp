@@ -6,7 +6,7 @@
 #include <stdexcept>
 #include <utility>
 
-#include "renderer/images/picture_library.h"
+#include "renderer/images/image_plugin.h"
 #include "renderer/textures/image_pyramid.h"
 
 namespace tensorray {
@@ -113,7 +113,7 @@ struct Texture::State {
   ImagePyramid pyramid;
   Wrap wrap;
   std::string name;  ///< For error messages.
-  std::unique_ptr<TileLookup> tiles = pyramid.stored(0) ? nullptr : picture_library().make_lookup(pyramid, wrap);
+  std::unique_ptr<TileLookup> tiles = pyramid.stored(0) ? nullptr : image_plugin().make_lookup(pyramid, wrap);
 };
 
 /// @param st  Here t goes from the top downwards.

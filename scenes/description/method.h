@@ -9,7 +9,7 @@
 #include <string>
 #include <vector>
 
-#include "base/distinct_files.h"
+#include "base/files/distinct_files.h"
 #include "scenes/keys/json_reader.h"
 #include "scenes/keys/scene_source.h"
 #include "scenes/keys/schema_writer.h"
@@ -37,6 +37,12 @@ struct Output {
   const char* option_ending = nullptr;
 };
 
+/// Channels of a picture that belong together.
+struct ChannelText {
+  std::vector<std::string> names;  ///< "normal.X", "normal.Y", "normal.Z"
+  std::string meaning;             ///< What they are, with the unit, as docs/scenes.md says it.
+};
+
 /// A method that has loaded everything that it needs for a scene. Immutable: any number of threads may render with it.
 class LoadedMethod {
  public:
@@ -62,6 +68,9 @@ class Method {
 
   /// The kinds of output that the method can write.
   virtual std::vector<Output> outputs() const = 0;
+
+  /// The channels that its EXR can have, as docs/scenes.md lists them for it: without those that are listed elsewhere.
+  virtual std::vector<ChannelText> channels() const = 0;
 
   /// Whether its pictures have noise, which `integrator.max_samples` samples a pixel average.
   virtual bool is_sampled() const { return false; }

@@ -2,7 +2,7 @@
 /// @file scenes/description/run_files.h
 /// Lists and checks all files that a render of a scene reads and writes.
 
-#include "base/distinct_files.h"
+#include "base/files/distinct_files.h"
 #include "scenes/description/description.h"
 
 namespace tensorray {

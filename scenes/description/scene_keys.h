@@ -15,11 +15,11 @@
 #include <filesystem>
 #include <string>
 
-#include "renderer/color/spectrum.h"
+#include "renderer/spectra/spectrum.h"
 #include "scenes/description/choices.h"
 #include "scenes/description/description.h"
 #include "scenes/keys/limits.h"
-#include "volumes/tensors/smoothing.h"
+#include "volumes/making/smoothing.h"
 
 namespace tensorray {
 

@@ -4,7 +4,7 @@
 #include <charconv>
 #include <vector>
 
-#include "base/text.h"
+#include "base/text/text.h"
 
 namespace tensorray {
 namespace {

@@ -6,7 +6,7 @@
 #include <string>
 #include <variant>
 
-#include "renderer/color/spectrum.h"
+#include "renderer/spectra/spectrum.h"
 #include "scenes/keys/values.h"
 
 namespace tensorray {

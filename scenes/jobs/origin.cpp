@@ -4,7 +4,7 @@
 
 #include <fmt/format.h>
 
-#include "base/content_hash.h"
+#include "base/text/content_hash.h"
 #include "scenes/description/run_files.h"
 #include "scenes/keys/values.h"
 

@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "base/work.h"
+#include "base/process/work.h"
 #include "scenes/keys/json_reader.h"
 
 namespace tensorray {

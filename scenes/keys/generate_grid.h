@@ -8,7 +8,7 @@
 #include <Eigen/Core>
 
 #include "scenes/keys/limits.h"
-#include "volumes/tensors/generators.h"
+#include "volumes/making/generators.h"
 
 namespace tensorray {
 

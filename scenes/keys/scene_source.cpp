@@ -2,7 +2,7 @@
 
 #include <cstddef>
 
-#include "base/text.h"
+#include "base/text/text.h"
 
 namespace tensorray {
 

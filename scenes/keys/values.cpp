@@ -5,7 +5,7 @@
 #include <cstddef>
 #include <limits>
 
-#include "base/path_text.h"
+#include "base/text/path_text.h"
 
 namespace tensorray {
 namespace {

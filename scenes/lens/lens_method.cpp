@@ -8,10 +8,11 @@
 
 #include "base/constants.h"
 #include "integrators/lens/lens.h"
-#include "renderer/color/reflectance.h"
-#include "renderer/images/grid_lines.h"
+#include "renderer/charts/grid_lines.h"
+#include "renderer/spectra/reflectance.h"
 #include "scenes/description/check_scene.h"
 #include "scenes/lens/load_lens.h"
+#include "scenes/outputs/channel_table.h"
 #include "scenes/outputs/picture_outputs.h"
 #include "scenes/scene/fine_bands.h"
 
@@ -55,43 +56,57 @@ std::vector<LensBand> lens_bands(const std::vector<FineBand>& fine, const Scene&
   return bands;
 }
 
-/// The channels that write_point writes, in its order.
-const std::vector<std::string> point_channels{"texture.s",
-                                              "texture.t",
-                                              "displacement.x",
-                                              "displacement.y",
-                                              "displacement.z",
-                                              "magnification.log",
-                                              "magnification.major",
-                                              "magnification.minor",
-                                              "folds",
-                                              "length",
-                                              "end"};
+/// What is known of a pixel.
+struct LensPixel {
+  Eigen::Vector3f color;
+  double alpha;
+  const LensPoint& point;
+};
 
-void write_point(const LensPoint& point, float* values) {
-  const auto finite = [](double value) { return std::clamp(value, -100.0, 100.0); };
-  const auto next = [&values](double value) { *values++ = static_cast<float>(value); };
-  for (int i = 0; i < 2; ++i) next(point.st[i]);
-  for (int i = 0; i < 3; ++i) next(point.displacement[i]);
-  for (const double logarithm : {point.log_magnification, point.log_stretch[0], point.log_stretch[1]})
-    next(finite(logarithm));
-  next(point.folds);
-  next(point.length);
-  next(static_cast<int>(point.end));
+double bounded(double logarithm) { return std::clamp(logarithm, -100.0, 100.0); }
+
+ChannelTable<LensPixel> lens_channels() {
+  using Pixel = const LensPixel&;
+  return {{{"R", "G", "B"},
+           "The picture, scene-linear: 1 is the white of the image. Multiplied by A.",
+           [](Pixel pixel) { return pixel.color; }},
+          {{"A"},
+           "The part of the pixel that sees the image, of the band that sees the largest part: it is 0 only where no "
+           "band sees any, and colours are dark where bands are missing.",
+           [](Pixel pixel) { return std::min(pixel.alpha, 1.0); }},  // Rounding may make the sum greater than 1.
+          {{"texture.s", "texture.t"},
+           "The place in the image: (0, 0) is the lower left, (1, 1) the upper right corner, as in ST maps.",
+           [](Pixel pixel) { return pixel.point.st; }},
+          {{"displacement.x", "displacement.y", "displacement.z"},
+           "From the point that straight light would show to the point that is seen; world units.",
+           [](Pixel pixel) { return pixel.point.displacement; }},
+          {{"magnification.log"},
+           "ln of the area that a part of the image has in the picture, divided by its own area: positive where the "
+           "part is enlarged.",
+           [](Pixel pixel) { return bounded(pixel.point.log_magnification); }},
+          {{"magnification.major", "magnification.minor"},
+           "The same along the two principal directions: ln σ₁ ≥ ln σ₂ of the Jacobian. From −100 to 100.",
+           [](Pixel pixel) -> Eigen::Vector2d {
+             return {bounded(pixel.point.log_stretch[0]), bounded(pixel.point.log_stretch[1])};
+           }},
+          {{"folds"},
+           "`scatter`: the number of sheets of the image at this pixel. `gather`: the number of places in the picture "
+           "that show what is seen here. 1: no fold.",
+           [](Pixel pixel) { return pixel.point.folds; }},
+          {{"length"}, "The length of the ray, world units.", [](Pixel pixel) { return pixel.point.length; }},
+          {{"end"},
+           "`gather`: 0 sees the image, 1 missed it, 2 met an obstacle (or turned back), 3 step limit, 4 degenerate, 5 "
+           "beside the image. `scatter`: 0 sees the image, 1 no light lands here.",
+           [](Pixel pixel) { return static_cast<int>(pixel.point.end); }}};
 }
 
-/// R, G, B, A, and the channels of the picture's points.
 Image make_image(const LensPicture& picture) {
   const Image colors = color_image(picture.color);
-  std::vector<std::string> channels{"R", "G", "B", "A"};
-  channels.insert(channels.end(), point_channels.begin(), point_channels.end());
-  Image image(colors.width, colors.height, channels);
-  for (std::size_t i = 0; i < picture.points.size(); ++i) {
-    float* const pixel = &image.pixels[i * channels.size()];
-    std::copy_n(&colors.pixels[3 * i], 3, pixel);
-    pixel[3] = static_cast<float>(std::min(picture.alpha[i], 1.0));  // Rounding may make the sum greater than 1.
-    write_point(picture.points[i], pixel + 4);
-  }
+  const ChannelTable<LensPixel> table = lens_channels();
+  Image image(colors.width, colors.height, channel_names(table));
+  for (std::size_t i = 0; i < picture.points.size(); ++i)
+    write_channels(table, {Eigen::Vector3f(&colors.pixels[3 * i]), picture.alpha[i], picture.points[i]},
+                   &image.pixels[i * image.channels.size()]);
   return image;
 }
 
@@ -186,8 +201,8 @@ Render LoadedLens::render(const Scene& scene, const Progress& progress, RenderJo
   std::vector<SpectralImage> spectra;
   for (const Plate& plane : lens_.planes) {
     image.plane = plane;
-    const LensLight light = trace_lens(scene.field, scene.geometry.surfaces(), scene.bending, scene.beam.direction,
-                                       lens_.receiver, image, settings, progress);
+    const LensLight light = trace_lens(scene.field, scene.geometry.surfaces(), scene.bending,
+                                       {lens_.receiver, image, scene.beam.direction}, settings, progress);
     const std::vector<FineBand> fine = fine_bands(scene, band_count(light.map, channels, band_step));
     const LensPicture picture =
         draw_lens(light, lens_bands(fine, scene), radiance_in(fine, scene), scene.bands.size(), by_channel, progress);
@@ -224,6 +239,8 @@ class LensMethod : public MethodWith<LensDescription> {
     outputs.push_back(spectral_output());
     return outputs;
   }
+
+  std::vector<ChannelText> channels() const override { return channel_texts(lens_channels()); }
 
   std::vector<NamedFile> inputs() const override {
     const auto* file = std::get_if<std::filesystem::path>(&settings().image);

@@ -11,8 +11,8 @@
 namespace tensorray {
 namespace {
 
-constexpr double default_distance = 0.25;  // Distance of the image before the volume, in depths of the volume.
-constexpr int test_image_pixels = 4096;    // Most pixels along the longer side; otherwise 4 per pixel of the receiver.
+constexpr double default_image_distance = 0.25;  // Distance of the image before the volume, in depths of the volume.
+constexpr int test_image_pixels = 4096;  // Most pixels along the longer side; otherwise 4 per pixel of the receiver.
 
 Image load_test_image(TestImage which, const Plate& receiver, const ColorManagement& color) {
   const int longest = std::min(test_image_pixels, 4 * receiver.resolution.maxCoeff());
@@ -91,7 +91,7 @@ LensScene load_lens(const Scene& scene, const LensDescription& lens, std::vector
   } else if (lens.plane.depth) {
     for (const double part : *lens.plane.depth) add(along(depths.near + part * depth));
   } else {
-    add(along(depths.near - lens.plane.distance.value_or(default_distance * depth)));
+    add(along(depths.near - lens.plane.distance.value_or(default_image_distance * depth)));
   }
   return result;
 }

@@ -6,7 +6,7 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
-#include "base/path_text.h"
+#include "base/text/path_text.h"
 #include "volumes/files/scalar_files.h"
 
 namespace tensorray {

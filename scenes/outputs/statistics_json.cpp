@@ -6,7 +6,7 @@
 #include <nlohmann/json.hpp>
 #include <sys/resource.h>
 
-#include "base/path_text.h"
+#include "base/text/path_text.h"
 
 namespace tensorray {
 namespace {
@@ -24,7 +24,7 @@ Json balance(const std::array<Number, ray_end_count>& ends) {
   return {{"emitted", emitted}, {"deposited", of(RayEnd::plate)}, {"missed", of(RayEnd::missed)}, {"stopped", stopped}};
 }
 
-/// Photons of a whole scene.
+/// Photons of the method "scene".
 Json photon_counts(const PhotonCounts& counts) {
   const auto of = [&](PhotonEnd end) { return counts[static_cast<std::size_t>(end)]; };
   return {{"emitted", std::accumulate(counts.begin(), counts.end(), std::uint64_t{0})},
@@ -34,15 +34,15 @@ Json photon_counts(const PhotonCounts& counts) {
           {"stopped", of(PhotonEnd::stopped)}};
 }
 
-void add_whole(const WholeStatistics& whole, Json& json) {
+void add_scene_method(const SceneMethodStatistics& work, Json& json) {
   PhotonCounts all{};
   Json passes = Json::array();
-  for (const PhotonCounts& counts : whole.photons) {
+  for (const PhotonCounts& counts : work.photons) {
     for (std::size_t end = 0; end < all.size(); ++end) all[end] += counts[end];
     passes.push_back(photon_counts(counts));
   }
   json["bent_rays"] = json["photons"];
-  json["samples"] = whole.samples;
+  json["samples"] = work.samples;
   json["photons"] = photon_counts(all);
   json["photons"]["passes"] = passes;
   json.erase("positions");
@@ -102,7 +102,7 @@ std::string statistics_json(const Scene& scene, const Statistics& statistics, do
                {"channels", channels}};
   if (statistics.error) json["error"] = *statistics.error;
   if (has_power) json["power"] = balance(power);
-  if (statistics.whole) add_whole(*statistics.whole, json);
+  if (statistics.scene_method) add_scene_method(*statistics.scene_method, json);
   return json.dump(2) + "\n";
 }
 

@@ -5,7 +5,7 @@
 #include <map>
 #include <string>
 
-#include "base/output_file.h"
+#include "base/files/output_file.h"
 #include "scenes/description/description.h"
 #include "scenes/scene/render.h"
 #include "scenes/scene/scene.h"

@@ -6,13 +6,13 @@
 #include <fmt/format.h>
 
 #include "base/constants.h"
+#include "renderer/charts/colormap.h"
 #include "renderer/color/color.h"
-#include "renderer/color/colormap.h"
 #include "renderer/film/spectral_image.h"
-#include "renderer/surfaces/mesh.h"
+#include "renderer/meshes/mesh.h"
 #include "scenes/path_tracing/path_tracing_keys.h"
 #include "scenes/photons/plate_light.h"
-#include "volumes/bricks/tensor_sampler.h"
+#include "volumes/sampling/tensor_sampler.h"
 #include "volumes/tensors/isosurface.h"
 
 namespace tensorray {

@@ -6,7 +6,7 @@
 #include <optional>
 #include <vector>
 
-#include "base/progress.h"
+#include "base/process/progress.h"
 #include "renderer/materials/material.h"
 #include "renderer/surfaces/surface.h"
 #include "scenes/path_tracing/load_paths.h"

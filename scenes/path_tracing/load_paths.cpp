@@ -7,10 +7,10 @@
 #include <fmt/format.h>
 
 #include "base/constants.h"
-#include "integrators/paths/path_files.h"
-#include "integrators/paths/seed_files.h"
-#include "integrators/paths/seeds.h"
-#include "integrators/paths/threshold_seeds.h"
+#include "integrators/path_files/path_files.h"
+#include "integrators/seeds/seed_files.h"
+#include "integrators/seeds/seeds.h"
+#include "integrators/seeds/threshold_seeds.h"
 #include "renderer/images/image.h"
 #include "volumes/tensors/invariants.h"
 

@@ -4,10 +4,10 @@
 
 #include <vector>
 
-#include "base/progress.h"
+#include "base/process/progress.h"
 #include "integrators/paths/paths.h"
-#include "renderer/color/reflectance.h"
 #include "renderer/lights/lights.h"
+#include "renderer/spectra/reflectance.h"
 #include "scenes/path_tracing/path_tracing_description.h"
 #include "scenes/scene/render.h"
 #include "scenes/scene/scene.h"

@@ -5,9 +5,9 @@
 
 #include <Eigen/LU>
 
+#include "renderer/charts/color_bar.h"
 #include "renderer/color/color.h"
-#include "renderer/color/color_bar.h"
-#include "renderer/color/spectrum.h"
+#include "renderer/spectra/spectrum.h"
 #include "scenes/path_tracing/path_tracing_keys.h"
 #include "volumes/tensors/invariants.h"
 

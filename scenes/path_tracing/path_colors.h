@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "integrators/paths/paths.h"
-#include "renderer/color/colormap.h"
+#include "renderer/charts/colormap.h"
 #include "renderer/images/image.h"
 #include "scenes/path_tracing/path_tracing_description.h"
 

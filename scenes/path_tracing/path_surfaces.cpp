@@ -9,7 +9,7 @@
 
 #include "integrators/paths/cross_section.h"
 #include "renderer/color/color.h"
-#include "renderer/surfaces/mesh_files.h"
+#include "renderer/meshes/mesh_files.h"
 
 namespace tensorray {
 namespace {

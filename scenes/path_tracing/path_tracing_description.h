@@ -11,8 +11,8 @@
 
 #include <Eigen/Core>
 
-#include "renderer/color/colormap.h"
-#include "renderer/shading/pixel_filter.h"
+#include "renderer/camera/pixel_filter.h"
+#include "renderer/charts/colormap.h"
 #include "renderer/shading/shading.h"
 #include "renderer/surfaces/tube_mesh.h"
 #include "scenes/description/material_description.h"

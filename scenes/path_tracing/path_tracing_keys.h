@@ -4,7 +4,7 @@
 
 #include <array>
 
-#include "renderer/color/spectrum.h"
+#include "renderer/spectra/spectrum.h"
 #include "scenes/description/choices.h"
 #include "scenes/keys/limits.h"
 #include "scenes/path_tracing/path_tracing_description.h"

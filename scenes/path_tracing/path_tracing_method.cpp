@@ -4,11 +4,11 @@
 
 #include <fmt/format.h>
 
-#include "base/progress.h"
-#include "base/seconds.h"
-#include "integrators/paths/path_files.h"
+#include "base/process/progress.h"
+#include "base/process/seconds.h"
+#include "integrators/path_files/path_files.h"
 #include "integrators/paths/paths.h"
-#include "renderer/shading/path_tracer.h"
+#include "renderer/camera/path_tracer.h"
 #include "scenes/description/check_scene.h"
 #include "scenes/outputs/picture_outputs.h"
 #include "scenes/path_tracing/context_surfaces.h"
@@ -106,28 +106,31 @@ class LoadedPaths : public LoadedMethod {
   Render render(const Scene& scene, const Progress& progress, RenderJob* job) const override;
 
  private:
+  /// Renders the paths, their context and the lamps.
+  SurfacePicture render_stage(const Scene& scene, const std::vector<Path>& paths, ShadedSurface path_surface,
+                              const Camera& camera, const Progress& progress, const RenderCallbacks& callbacks) const;
+
   PathScene paths_;
 };
 
-/// Renders the paths, their context and the lamps.
-SurfacePicture render_stage(const Scene& scene, const PathScene& path_scene, const std::vector<Path>& paths,
-                            ShadedSurface path_surface, const Camera& camera, const Progress& progress,
-                            const RenderCallbacks& callbacks) {
-  const ShownLight& light = path_scene.lights.light;
-  std::vector<Material> materials{load_material(path_scene.settings.material, light)};
+SurfacePicture LoadedPaths::render_stage(const Scene& scene, const std::vector<Path>& paths, ShadedSurface path_surface,
+                                         const Camera& camera, const Progress& progress,
+                                         const RenderCallbacks& callbacks) const {
+  const ShownLight& light = paths_.lights.light;
+  std::vector<Material> materials{load_material(paths_.settings.material, light)};
   std::vector<ShadedSurface> surfaces{std::move(path_surface)};
-  add_context(scene, path_scene, progress, surfaces, materials);
-  const std::vector<Light> lights = make_lights(scene.description, path_scene.lights, camera);
+  add_context(scene, paths_, progress, surfaces, materials);
+  const std::vector<Light> lights = make_lights(scene.description, paths_.lights, camera);
   add_lamps(lights, light, surfaces, materials);
   const SurfaceScene stage(std::move(surfaces));
-  require_fine(scene, path_scene.settings.radius, stage, paths);
+  require_fine(scene, paths_.settings.radius, stage, paths);
   std::vector<float> luminance;
   for (const Band& band : light.bands) luminance.push_back(static_cast<float>(band.xyz.y()));
   const LightSampler sampler(lights, luminance, stage.bounds());
   const ReflectanceTable table(light.model, light.bands, light.xyz_to_working);
   ShadedScene shaded{stage, materials, sampler, table};
   set_groups(light_groups(scene.description), shaded);
-  return render_surfaces(shaded, camera, tracer_settings(scene.description, path_scene.settings), callbacks);
+  return render_surfaces(shaded, camera, tracer_settings(scene.description, paths_.settings), callbacks);
 }
 
 /// Whether the file of paths has the tensors at their points.
@@ -176,8 +179,7 @@ Render LoadedPaths::render(const Scene& scene, const Progress& progress, RenderJ
     add_picture(picture, shown);
     return shown;
   });
-  add_picture(render_stage(scene, paths_, result.paths, std::move(shapes.surface), camera, progress, callbacks),
-              result);
+  add_picture(render_stage(scene, result.paths, std::move(shapes.surface), camera, progress, callbacks), result);
   result.statistics.seconds_drawing = seconds_since(drawing);
   return result;
 }
@@ -219,6 +221,8 @@ class PathTracingMethod : public MethodWith<PathTracingDescription> {
     outputs.push_back({"tubes", "the bent rays as a mesh", {".ply", ".obj"}, write_tube_file});
     return outputs;
   }
+
+  std::vector<ChannelText> channels() const override { return surface_channel_texts(false); }
 
   std::vector<NamedFile> inputs() const override {
     return {{settings().paths, "`/integrator/paths`"}, {settings().seeds.file, "`/integrator/seeds/file`"}};

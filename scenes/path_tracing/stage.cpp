@@ -3,12 +3,100 @@
 #include <algorithm>
 #include <utility>
 
+#include "scenes/outputs/channel_table.h"
 #include "scenes/path_tracing/context_surfaces.h"
 
 namespace tensorray {
 namespace {
 
 constexpr float nothing_depth = 1e10f;  // Depth of pixels that show nothing: behind everything.
+
+/// What is known of a pixel.
+struct SurfacePixel {
+  const SurfacePicture& picture;
+  std::size_t index;
+  Eigen::Vector3f radiance;  ///< In the working space.
+  Eigen::Vector3f color;     ///< The same before the background.
+  float alpha;               ///< Of `color`.
+};
+
+/// The pixel's value of a plane of the picture.
+template <class Value>
+auto plane(std::vector<Value> SurfacePicture::*values) {
+  return [values](const SurfacePixel& pixel) -> Value { return (pixel.picture.*values)[pixel.index]; };
+}
+
+/// Red, green and blue of a film's layer.
+Eigen::Vector3f layer_color(const Film& film, std::size_t layer, std::size_t index) {
+  Eigen::Vector3f color;
+  for (int c = 0; c < 3; ++c) color[c] = static_cast<float>(film.plane(static_cast<int>(3 * layer) + c)[index]);
+  return color;
+}
+
+ChannelTable<SurfacePixel> surface_channels(const SurfacePicture& picture, const std::vector<std::string>& groups) {
+  using Pixel = const SurfacePixel&;
+  const bool bends = !picture.radiance_scale.empty(), has_landed = !picture.landed.values.empty();
+  ChannelTable<SurfacePixel> table{
+      {{"R", "G", "B"},
+       "The picture, scene-linear: 1 is white. If `background` is `transparent`, multiplied by A.",
+       [](Pixel pixel) { return pixel.color; }},
+      {{"A"},
+       "The part of the pixel that shows something; 1 unless `background` is `transparent`.",
+       [](Pixel pixel) { return pixel.alpha; }},
+      {{"Z"},
+       "Distance along the view, world units; 1e10 where nothing is seen.",
+       [](Pixel pixel) {
+         return pixel.picture.alpha[pixel.index] > 0 ? pixel.picture.depth[pixel.index] : nothing_depth;
+       }},
+      {{"normal.X", "normal.Y", "normal.Z"}, "In world space, towards the viewer.", plane(&SurfacePicture::normal)},
+      {{"albedo.R", "albedo.G", "albedo.B"},
+       "The surface's own colour, without light.",
+       plane(&SurfacePicture::albedo)},
+      {{"path"},
+       "The number of the path nearest to the pixel's centre; −1: none. Paths that meet the volume are numbered from 0 "
+       "in the order of their seeds.",
+       plane(&SurfacePicture::path)},
+      {{"force"}, "‖T V‖ of the path, in the unit of T.", plane(&SurfacePicture::force)},
+      {{"length"}, "The length from the beginning of the path, world units.", plane(&SurfacePicture::arc_length)},
+      {{"samples"}, "The number of samples that the pixel has taken.", plane(&SurfacePicture::samples)},
+      {{"variance"}, "Of the pixel's luminance: the square of its standard error.", plane(&SurfacePicture::variance)},
+      {{"gain"},
+       "The mean factor on radiance; 1 where the camera's light is straight.",
+       plane(&SurfacePicture::radiance_scale),
+       bends},
+      {{"deflection"},
+       "The mean angle by which the camera's light is turned, radians.",
+       plane(&SurfacePicture::deflection),
+       bends},
+      {{"arrives"},
+       "The part of the ways that could be followed to their ends.",
+       plane(&SurfacePicture::arrives),
+       bends},
+      {{"folds"},
+       "The number of sheets of a light that lie on each other where it has landed.",
+       plane(&SurfacePicture::folds),
+       bends},
+      {{"texture.s", "texture.t"},
+       "The place in a plate's texture: (0, 0) is its lower left, (1, 1) its upper right corner.",
+       plane(&SurfacePicture::texture),
+       bends},
+      {{"caustic.R", "caustic.G", "caustic.B"},
+       "If the field throws light on objects: all light that they have received from directional lights and points "
+       "through the volume.",
+       [](Pixel pixel) { return layer_color(pixel.picture.landed, 0, pixel.index); },
+       has_landed},
+      {{"straight.R", "straight.G", "straight.B"},
+       "The picture without `caustic`.",
+       [](Pixel pixel) -> Eigen::Vector3f {
+         return pixel.radiance - layer_color(pixel.picture.landed, 0, pixel.index);
+       },
+       has_landed}};
+  for (std::size_t i = 0; i < groups.size(); ++i)
+    table.push_back({{groups[i] + ".R", groups[i] + ".G", groups[i] + ".B"},
+                     "The part of the picture that the `lights` of a `group` of this name light.",
+                     [i](Pixel pixel) { return layer_color(pixel.picture.groups, i, pixel.index); }});
+  return table;
+}
 
 }  // namespace
 
@@ -45,43 +133,26 @@ void set_groups(const LightGroups& groups, ShadedScene& scene) {
   if (scene.groups > 0) scene.group_of_light = groups.of_light;
 }
 
+std::vector<ChannelText> surface_channel_texts(bool bent) {
+  std::vector<ChannelText> texts;
+  for (const ChannelRow<SurfacePixel>& row : surface_channels({}, {"GROUP"}))
+    if (row.is_there != bent) texts.push_back(row);
+  return texts;
+}
+
 Image make_image(const SurfacePicture& picture, const ShownLight& light, const PathTracingDescription& description,
                  const LightGroups& groups) {
   const Image colors = linear_image(picture.radiance, light.bands, light.xyz_to_working);
-  std::vector<std::string> channels{"R",        "G",        "B",        "A",        "Z",        "normal.X",
-                                    "normal.Y", "normal.Z", "albedo.R", "albedo.G", "albedo.B", "path",
-                                    "force",    "length",   "samples",  "variance"};
-  if (!picture.gain.empty())
-    channels.insert(channels.end(), {"gain", "deflection", "arrives", "folds", "texture.s", "texture.t"});
-  std::vector<std::string> layers;
-  if (!picture.landed.values.empty()) layers = {"caustic", "straight"};
-  layers.insert(layers.end(), groups.names.begin(), groups.names.end());
-  for (const std::string& layer : layers)
-    for (const char* color : {".R", ".G", ".B"}) channels.push_back(layer + color);
-  Image image(colors.width, colors.height, std::move(channels));
-  const Eigen::Vector3d background = description.background == Background::color
-                                         ? Eigen::Vector3d(light.rec709_to_working * description.background_color)
-                                         : Eigen::Vector3d::Zero();
+  const ChannelTable<SurfacePixel> table = surface_channels(picture, groups.names);
+  Image image(colors.width, colors.height, channel_names(table));
+  const bool is_colored = description.background == Background::color;
+  Eigen::Vector3f background = Eigen::Vector3f::Zero();
+  if (is_colored) background = Eigen::Vector3d(light.rec709_to_working * description.background_color).cast<float>();
   for (std::size_t i = 0; i < picture.alpha.size(); ++i) {
-    float* out = &image.pixels[i * image.channels.size()];
+    const Eigen::Vector3f radiance(&colors.pixels[3 * i]);
     const float alpha = picture.alpha[i];
-    for (int c = 0; c < 3; ++c)
-      *out++ = colors.pixels[3 * i + static_cast<std::size_t>(c)] + (1 - alpha) * static_cast<float>(background[c]);
-    *out++ = description.background == Background::color ? 1 : alpha;
-    *out++ = alpha > 0 ? picture.depth[i] : nothing_depth;
-    for (int c = 0; c < 3; ++c) *out++ = picture.normal[i][c];
-    for (int c = 0; c < 3; ++c) *out++ = picture.albedo[i][c];
-    for (const float value :
-         {picture.path[i], picture.force[i], picture.arc_length[i], picture.samples[i], picture.variance[i]})
-      *out++ = value;
-    if (!picture.gain.empty())
-      for (const float value : {picture.gain[i], picture.deflection[i], picture.arrives[i], picture.folds[i],
-                                picture.texture[i].x(), picture.texture[i].y()})
-        *out++ = value;
-    for (int c = 0; c < picture.landed.channels; ++c) *out++ = static_cast<float>(picture.landed.plane(c)[i]);
-    for (int c = 0; c < picture.landed.channels; ++c)
-      *out++ = colors.pixels[3 * i + static_cast<std::size_t>(c)] - static_cast<float>(picture.landed.plane(c)[i]);
-    for (int c = 0; c < picture.groups.channels; ++c) *out++ = static_cast<float>(picture.groups.plane(c)[i]);
+    const SurfacePixel pixel{picture, i, radiance, radiance + (1 - alpha) * background, is_colored ? 1 : alpha};
+    write_channels(table, pixel, &image.pixels[i * image.channels.size()]);
   }
   return image;
 }

@@ -7,13 +7,14 @@
 #include <string>
 #include <vector>
 
-#include "base/progress.h"
+#include "base/process/progress.h"
+#include "renderer/camera/path_tracer.h"
 #include "renderer/images/image.h"
 #include "renderer/lights/lights.h"
 #include "renderer/materials/material.h"
-#include "renderer/shading/path_tracer.h"
 #include "renderer/surfaces/surface.h"
 #include "scenes/description/description.h"
+#include "scenes/description/method.h"
 #include "scenes/path_tracing/load_paths.h"
 #include "scenes/scene/render.h"
 
@@ -31,8 +32,10 @@ LightGroups light_groups(const SceneDescription& scene);
 
 void set_groups(const LightGroups& groups, ShadedScene& scene);
 
-/// R, G, B, A, and the channels that denoisers and compositors use. If light bends, also `gain` and `deflection`; if
-/// some has landed on surfaces, also `caustic` and `straight`, whose sum is the picture; and the light of each group.
+/// What the channels of the picture are. @param bent  Those that it has only if light bends; otherwise the others.
+std::vector<ChannelText> surface_channel_texts(bool bent);
+
+/// The picture with all channels that it has.
 Image make_image(const SurfacePicture& picture, const ShownLight& light, const PathTracingDescription& description,
                  const LightGroups& groups);
 

@@ -6,8 +6,8 @@
 
 #include <Eigen/Geometry>
 
+#include "renderer/camera/camera.h"
 #include "renderer/lights/lights.h"
-#include "renderer/shading/camera.h"
 #include "scenes/path_tracing/load_paths.h"
 #include "scenes/path_tracing/path_tracing_description.h"
 

@@ -5,15 +5,15 @@
 
 #include <fmt/format.h>
 
-#include "base/progress.h"
-#include "base/seconds.h"
+#include "base/process/progress.h"
+#include "base/process/seconds.h"
 #include "scenes/description/check_scene.h"
 #include "scenes/outputs/picture_outputs.h"
 #include "scenes/photons/plate_light.h"
 #include "scenes/photons/plate_map.h"
 #include "scenes/scene/render.h"
 #include "scenes/scene/scene.h"
-#include "volumes/files/point_files.h"
+#include "volumes/points/point_files.h"
 
 namespace tensorray {
 namespace {
@@ -90,12 +90,12 @@ Render LoadedPhotons::render(const Scene& scene, const Progress& progress, Rende
   return result;
 }
 
-PointCloud point_cloud(const PhotonMap& photons, const ImageMetadata& metadata) {
+PointCloud point_cloud(const std::vector<PlatePhoton>& photons, const ImageMetadata& metadata) {
   PointCloud points;
   points.metadata = metadata;
   std::vector<float>&wavelength = points.scalars["wavelength"], &power = points.scalars["power"];
   std::vector<Eigen::Vector3f>&direction = points.vectors["direction"], &origin = points.vectors["origin"];
-  for (const Photon& photon : photons) {
+  for (const PlatePhoton& photon : photons) {
     points.positions.push_back(photon.position);
     wavelength.push_back(photon.wavelength);
     power.push_back(photon.power);
@@ -136,6 +136,8 @@ class PhotonDistributionMethod : public MethodWith<PhotonDescription> {
         {"fluence", "the light inside the volume, as a fog volume", {".vdb"}, write_grids, ".fluence.vdb"});
     return outputs;
   }
+
+  std::vector<ChannelText> channels() const override { return plate_map_texts(); }
 
   void check(SceneDescription& scene, const Json& json, const SceneSource& source, bool chosen) const override {
     const bool draws_mesh = settings().density.kind == PhotonDensityKind::mesh;

@@ -6,7 +6,7 @@
 #include <memory>
 #include <optional>
 
-#include "renderer/film/density.h"
+#include "renderer/density/density.h"
 #include "scenes/description/method.h"
 
 namespace tensorray {

@@ -6,11 +6,11 @@
 
 #include <fmt/format.h>
 
-#include "base/seconds.h"
-#include "integrators/flow/caustic.h"
+#include "base/process/seconds.h"
+#include "integrators/flow_drawing/caustic.h"
 #include "integrators/photons/photon_distribution.h"
+#include "renderer/film/image_distance.h"
 #include "renderer/film/spectral_image.h"
-#include "renderer/images/image_distance.h"
 #include "scenes/photons/photon_distribution_method.h"
 #include "scenes/scene/fine_bands.h"
 
@@ -43,10 +43,10 @@ std::vector<CausticBand> bands_of(const Scene& scene, const FlowMap& map, const 
   const Eigen::Matrix3d xyz_to_working = to_working(scene);
   const int channels = static_cast<int>(scene.bands.size());
   std::vector<CausticBand> bands;
-  const double last = static_cast<double>(map.nodes - 1);
+  const double last = static_cast<double>(map.wavelengths - 1);
   for (const FineBand& fine : fine_bands(scene, band_count(map, channels, step))) {
     CausticBand band;
-    band.node = last * (fine.begin + fine.end) / 2;
+    band.sample = last * (fine.begin + fine.end) / 2;
     band.width = last * (fine.end - fine.begin);
     band.channel = fine.channel;
     band.weight = fine.weight;
@@ -157,9 +157,11 @@ bool is_collected_in_color(const Scene& scene) {
   return !scene.description.output.wants("spectral") && scene.bands.size() > 3;
 }
 
-PhotonSettings photon_settings(const Scene& scene) {
+PhotonSettings photon_settings(const Scene& scene, Work* work) {
   const SceneDescription& description = scene.description;
   PhotonSettings settings;
+  settings.bending = scene.bending;
+  settings.work = work;
   settings.photons = description.light.photons;
   settings.pattern = description.light.pattern;
   settings.channels_per_photon = description.bending.rgb ? 0 : description.light.wavelengths_per_photon;
@@ -174,8 +176,8 @@ PhotonSettings photon_settings(const Scene& scene) {
 }
 
 PlateLight trace_photons(const Scene& scene, const Progress& progress, Work* work = nullptr) {
-  PhotonDistribution traced = distribute_photons(scene.field, scene.geometry, scene.beam, scene.channels, scene.bending,
-                                                 photon_settings(scene), progress, work);
+  PhotonDistribution traced = distribute_photons(scene.field, scene.geometry, scene.beam, scene.channels,
+                                                 photon_settings(scene, work), progress);
   PlateLight light;
   light.linear = is_collected_in_color(scene) ? color_image(traced.irradiance)
                                               : linear_image(traced.irradiance, scene.bands, to_working(scene));

@@ -5,10 +5,10 @@
 #include <string>
 #include <vector>
 
-#include "base/progress.h"
+#include "base/process/progress.h"
 #include "integrators/flow/flow_map.h"
 #include "renderer/film/film.h"
-#include "renderer/film/photon_map.h"
+#include "renderer/film/plate_photon.h"
 #include "renderer/images/image.h"
 #include "scenes/scene/render.h"
 #include "scenes/scene/scene.h"
@@ -17,12 +17,12 @@
 namespace tensorray {
 
 struct PlateLight {
-  Image linear;                     ///< R, G, B in the working space; 1 is the undisturbed light.
-  FlowMap map;                      ///< The map that `mesh` has drawn; empty for other estimators.
-  Film irradiance;                  ///< A plane for each band, if the scene writes spectral pictures.
-  PhotonMap photons;                ///< If the scene writes photons.
-  std::vector<ScalarGrid> fluence;  ///< If the scene writes the fluence; see PhotonDistribution.
-  Statistics statistics;            ///< Without `seconds_color`.
+  Image linear;                      ///< R, G, B in the working space; 1 is the undisturbed light.
+  FlowMap map;                       ///< The map that `mesh` has drawn; empty for other estimators.
+  Film irradiance;                   ///< A plane for each band, if the scene writes spectral pictures.
+  std::vector<PlatePhoton> photons;  ///< If the scene writes photons.
+  std::vector<ScalarGrid> fluence;   ///< If the scene writes the fluence; see PhotonDistribution.
+  Statistics statistics;             ///< Without `seconds_color`.
   std::vector<std::string> warnings;
 };
 

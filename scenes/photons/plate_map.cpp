@@ -5,7 +5,8 @@
 #include <Eigen/Geometry>
 #include <tbb/parallel_for.h>
 
-#include "integrators/flow/flow_view.h"
+#include "integrators/flow_drawing/flow_view.h"
+#include "scenes/outputs/channel_table.h"
 #include "scenes/scene/fine_bands.h"
 
 namespace tensorray {
@@ -27,47 +28,68 @@ Eigen::Affine2d straight_starts(const Plate& plate, const Beam& beam) {
   return map;
 }
 
-double limited(double logarithm) { return std::clamp(logarithm, -100.0, 100.0); }
+/// How light lands at the centre of a pixel.
+struct PlateLanding {
+  const FlowPoint& point;
+  Vector3d moved;  ///< From where straight light would land.
+  PrincipalStretch stretch;
+};
 
-void describe(const FlowPoint& point, const Vector2d& pixel, const Plate& plate, const Eigen::Affine2d& straight,
-              float* values) {
-  if (point.end != RayEnd::plate) return;
-  const auto next = [&values](double value) { *values++ = static_cast<float>(value); };
-  const Vector3d moved = plate.to_world(pixel) - plate.to_world(straight.inverse() * point.other.cast<double>());
-  for (int i = 0; i < 3; ++i) next(moved[i]);
+PlateLanding landing_of(const FlowPoint& point, const Vector2d& pixel, const Plate& plate,
+                        const Eigen::Affine2d& straight) {
   // World units on the plate, along right and up, by those across the beam.
   const Vector2d pixel_size = plate.pixel_size();
   const Matrix2d jacobian = Vector2d(pixel_size.x(), -pixel_size.y()).asDiagonal() * point.jacobian.cast<double>();
-  const PrincipalStretch stretch = principal_stretch(jacobian);
-  next(limited(stretch.logs.sum()));
-  next(limited(stretch.logs[0]));
-  next(limited(stretch.logs[1]));
-  next(stretch.angle);
-  next(point.sheets);
-  next(point.length);
-  next(std::min(point.error, 100.0f));
+  return {point, plate.to_world(pixel) - plate.to_world(straight.inverse() * point.other.cast<double>()),
+          principal_stretch(jacobian)};
+}
+
+double limited(double logarithm) { return std::clamp(logarithm, -100.0, 100.0); }
+
+ChannelTable<PlateLanding> plate_channels() {
+  using Landing = const PlateLanding&;
+  return {
+      {{"displacement.x", "displacement.y", "displacement.z"},
+       "From where straight light would land to where the light lands; world units.",
+       [](Landing landing) { return landing.moved; }},
+      {{"magnification.log"},
+       "ln of the area on which light lands, divided by its area across the beam: negative where light is gathered.",
+       [](Landing landing) { return limited(landing.stretch.logs.sum()); }},
+      {{"magnification.major", "magnification.minor", "magnification.angle"},
+       "The same along the two principal directions (ln σ₁ ≥ ln σ₂ of the Jacobian, from −100 to 100), and the angle "
+       "of the first on the plate, from its right axis towards its up axis, from −π/2 to π/2.",
+       [](Landing landing) -> Vector3d {
+         return {limited(landing.stretch.logs[0]), limited(landing.stretch.logs[1]), landing.stretch.angle};
+       }},
+      {{"folds"}, "The number of sheets that land here.", [](Landing landing) { return landing.point.sheets; }},
+      {{"length"}, "The length of the light's way, world units.", [](Landing landing) { return landing.point.length; }},
+      {{"error"}, "The estimated error of landings about here, in pixels; at most 100.", [](Landing landing) {
+         return std::min(landing.point.error, 100.0f);
+       }}};
 }
 
 }  // namespace
+
+std::vector<ChannelText> plate_map_texts() { return channel_texts(plate_channels()); }
 
 Image plate_map(const FlowMap& map, const Scene& scene, Team* team) {
   const Plate& plate = *scene.geometry.surfaces().plate;
   FlowPicture picture;
   picture.resolution = plate.resolution;
   picture.straight = straight_starts(plate, scene.beam);
-  const FlowView view(map, picture, {reference_place(scene) * static_cast<double>(map.nodes - 1)}, 1);
-  Image image(plate.resolution.x(), plate.resolution.y(),
-              {"displacement.x", "displacement.y", "displacement.z", "magnification.log", "magnification.major",
-               "magnification.minor", "magnification.angle", "folds", "length", "error"});
+  const FlowView view(map, picture, {reference_place(scene) * static_cast<double>(map.wavelengths - 1)}, 1);
+  const ChannelTable<PlateLanding> table = plate_channels();
+  Image image(plate.resolution.x(), plate.resolution.y(), channel_names(table));
   tbb::parallel_for(0, view.tiles(), [&](int tile) {
     if (!does_part(team, static_cast<std::size_t>(tile))) return;
     std::vector<FlowPoint> points;
     view.draw(tile, 1, 0, {}, points);
     const Eigen::AlignedBox2i box = view.pixels(tile);
-    std::size_t i = 0;
+    auto point = points.begin();
     for (int y = box.min().y(); y <= box.max().y(); ++y)
-      for (int x = box.min().x(); x <= box.max().x(); ++x)
-        describe(points[i++], {x + 0.5, y + 0.5}, plate, picture.straight, image.pixel(x, y));
+      for (int x = box.min().x(); x <= box.max().x(); ++x, ++point)
+        if (point->end == RayEnd::plate)
+          write_channels(table, landing_of(*point, {x + 0.5, y + 0.5}, plate, picture.straight), image.pixel(x, y));
   });
   const auto tiles = static_cast<std::size_t>(view.tiles());
   if (team)

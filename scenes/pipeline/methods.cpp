@@ -7,13 +7,13 @@
 #include "scenes/path_tracing/path_tracing_method.h"
 #include "scenes/photons/photon_distribution_method.h"
 #include "scenes/stretch/stretch_method.h"
-#include "scenes/whole/whole_method.h"
+#include "scenes/scene_method/scene_method.h"
 
 namespace tensorray {
 namespace {
 
 std::vector<std::shared_ptr<Method>> all_methods() {
-  return {photon_distribution_method(), lens_method(), path_tracing_method(), stretch_method(), whole_method()};
+  return {photon_distribution_method(), lens_method(), path_tracing_method(), stretch_method(), scene_method()};
 }
 
 }  // namespace

@@ -5,13 +5,13 @@
 
 #include <fmt/core.h>
 
-#include "base/path_text.h"
-#include "base/text.h"
+#include "base/text/path_text.h"
+#include "base/text/text.h"
 #include "scenes/description/check_scene.h"
 #include "scenes/description/scene_keys.h"
-#include "scenes/keys/frames.h"
-#include "scenes/keys/keyframe_schema.h"
-#include "scenes/keys/overrides.h"
+#include "scenes/source/frames.h"
+#include "scenes/source/keyframe_schema.h"
+#include "scenes/source/overrides.h"
 #include "scenes/pipeline/methods.h"
 
 namespace tensorray {

@@ -5,7 +5,7 @@
 #include <cstddef>
 #include <vector>
 
-#include "renderer/color/spectrum.h"
+#include "renderer/spectra/spectrum.h"
 #include "scenes/scene/scene.h"
 
 namespace tensorray {

@@ -5,14 +5,13 @@
 
 #include <fmt/format.h>
 
-#include "base/seconds.h"
-#include "renderer/surfaces/mesh.h"
+#include "base/process/seconds.h"
+#include "renderer/meshes/mesh.h"
 #include "scenes/description/choices.h"
 #include "scenes/scene/scene.h"
 #include "volumes/files/tensor_files.h"
-#include "volumes/grids/page_memory.h"
-#include "volumes/tensors/field_making.h"
-#include "volumes/tensors/smoothing.h"
+#include "volumes/making/field_making.h"
+#include "volumes/making/smoothing.h"
 
 namespace tensorray {
 namespace {
@@ -23,39 +22,20 @@ constexpr double greatest_size = 1e5;  // Largest size of the scene, in sizes of
 constexpr double narrowest_white = 100;  // nm: light of a narrower range has no white.
 constexpr int default_resolution = 512;  // Pixels along the plate's longer side.
 
-/// Calls make(generator, grid) with what a scene generates.
-template <class Make>
-auto generated(const SceneDescription& scene, const Make& make) {
+BlockSource open_field(const SceneDescription& scene) {
+  const FieldDescription& field = scene.field;
+  if (!field.generate) return open_tensor_vdb(field.file, field.name, field.derive, field.components);
   try {
-    return make(scene.field.generate->generator, scene.field.generate->grid);
+    return generator_source(field.generate->generator, field.generate->grid);
   } catch (const std::invalid_argument& error) {
     throw SceneError(fmt::format("{}: `/field/generate`: {}", scene.path.string(), error.what()));
   }
 }
 
-TensorGrid load_grid(const SceneDescription& scene) {
-  const FieldDescription& field = scene.field;
-  if (!field.generate) return read_tensor_vdb(field.file, field.name, field.derive, field.components);
-  return generated(scene, generate);
-}
-
-/// The blocks of the field; nothing if it must be read as a whole.
-std::optional<BlockSource> load_blocks(const SceneDescription& scene) {
-  const FieldDescription& field = scene.field;
-  if (memory_bound() || field.smooth > 0) return std::nullopt;
-  if (field.generate) return generated(scene, generator_source);
-  return field.derive == Derive::none ? open_tensor_vdb(field.file, field.name, field.components) : std::nullopt;
-}
-
-std::string source_of(const FieldDescription& field) {
-  return field.generate ? kind_of(field.generate->generator) : field.file.string();
-}
-
 LoadedField load_field(const SceneDescription& scene) {
   const FieldDescription& field = scene.field;
-  if (const std::optional<BlockSource> blocks = load_blocks(scene))
-    return prepare_field(*blocks, choices_of(scene), source_of(field));
-  return prepare_field(load_grid(scene), choices_of(scene), source_of(field));
+  const std::string source = field.generate ? kind_of(field.generate->generator) : field.file.string();
+  return prepare_field(open_field(scene), choices_of(scene), source);
 }
 
 TriangleMesh load_closed_mesh(const std::filesystem::path& path) {
@@ -335,22 +315,16 @@ FieldChoices choices_of(const SceneDescription& description) {
   return {description.field.smooth, description.field.eigenvalues, interpolant_of(description)};
 }
 
-LoadedField prepare_field(TensorGrid grid, const FieldChoices& choices, const std::string& source) {
-  std::size_t non_finite = 0;
-  if (choices.smoothing > 0) {
-    non_finite = remove_non_finite(grid);
-    smooth(grid, choices.smoothing);
-  }
-  MadeField made = make_field(std::move(grid), choices.eigenvalues, choices.interpolant);
+LoadedField prepare_field(const BlockSource& blocks, const FieldChoices& choices, const std::string& source) {
+  if (choices.smoothing == 0) return with_notes(make_field(blocks, choices.eigenvalues, choices.interpolant), source);
+  TensorGrid grid = to_grid(blocks);
+  const std::size_t non_finite = remove_non_finite(grid);
+  smooth(grid, choices.smoothing);
+  MadeField made = make_field(source_of(std::move(grid)), choices.eigenvalues, choices.interpolant);
   made.non_finite += non_finite;
   LoadedField loaded = with_notes(std::move(made), source);
-  if (choices.smoothing > 0)
-    loaded.notes.push_back(fmt::format("field smoothed: a Gaussian of {:g} voxels", choices.smoothing));
+  loaded.notes.push_back(fmt::format("field smoothed: a Gaussian of {:g} voxels", choices.smoothing));
   return loaded;
-}
-
-LoadedField prepare_field(const BlockSource& blocks, const FieldChoices& choices, const std::string& source) {
-  return with_notes(make_field(blocks, choices.eigenvalues, choices.interpolant), source);
 }
 
 Scene load_scene(const SceneDescription& description, const Progress& progress) {

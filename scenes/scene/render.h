@@ -10,14 +10,14 @@
 #include <string>
 #include <vector>
 
-#include "base/team.h"
-#include "base/work.h"
+#include "base/process/team.h"
+#include "base/process/work.h"
 #include "integrators/bending/light_channel.h"
 #include "integrators/paths/paths.h"
-#include "renderer/film/photon_map.h"
+#include "renderer/film/plate_photon.h"
 #include "renderer/film/spectral_image.h"
 #include "renderer/images/image.h"
-#include "renderer/shading/photon_counts.h"
+#include "renderer/light_maps/photon_counts.h"
 #include "volumes/grids/scalar_grid.h"
 
 namespace tensorray {
@@ -25,8 +25,8 @@ namespace tensorray {
 struct Progress;
 struct Scene;
 
-/// The work of a whole scene.
-struct WholeStatistics {
+/// The work of the method "scene".
+struct SceneMethodStatistics {
   std::uint64_t samples = 0;          ///< Of all pixels.
   std::vector<PhotonCounts> photons;  ///< Of each pass, by their end.
 };
@@ -38,8 +38,8 @@ struct Statistics {
   std::vector<double> channel_power;
   /// Power by channel and end, for a beam of irradiance 1; if rays of a channel differ in power. Empty otherwise.
   std::vector<std::array<double, ray_end_count>> power;
-  std::optional<WholeStatistics> whole;  ///< Of the method scene, whose `ends` are those of all rays that bend.
-  std::optional<double> error;           ///< Estimated relative error of the picture, if the scene bounds it.
+  std::optional<SceneMethodStatistics> scene_method;  ///< Its `ends` are those of all rays that bend.
+  std::optional<double> error;  ///< Estimated relative error of the picture, if the scene bounds it.
   std::uint64_t ray_steps = 0, tensor_samples = 0;
   double seconds_tracing = 0, seconds_density = 0, seconds_drawing = 0, seconds_color = 0;
 };
@@ -53,7 +53,7 @@ struct Render {
   Image linear;
   std::optional<Image> display;           ///< The picture as a display shows it; none: it is computed from `linear`.
   std::optional<SpectralImage> spectral;  ///< Set if the scene asks for it.
-  PhotonMap photons;                      ///< Filled if the scene asks for it.
+  std::vector<PlatePhoton> photons;       ///< Filled if the scene asks for it.
   std::vector<ScalarGrid> grids;          ///< Volumes that the method computes, if the scene asks for them.
   std::vector<Path> paths;                ///< Paths of the method path_tracing.
   std::optional<double> exposure;         ///< Exposure of the picture in stops; none: chosen by its brightness.

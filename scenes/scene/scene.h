@@ -8,12 +8,12 @@
 #include <vector>
 
 #include "integrators/bending/bending.h"
+#include "integrators/bending/geometry.h"
 #include "integrators/bending/light_channel.h"
 #include "integrators/probes/auto_scale.h"
 #include "renderer/color/color.h"
-#include "renderer/color/spectrum.h"
 #include "renderer/lights/beam.h"
-#include "renderer/surfaces/geometry.h"
+#include "renderer/spectra/spectrum.h"
 #include "scenes/description/description.h"
 #include "volumes/bricks/tensor_field.h"
 #include "volumes/tensors/eigenvalues.h"
@@ -76,9 +76,6 @@ FieldChoices choices_of(const SceneDescription& description);
 
 /// Removes voxels that are not finite, smooths the others, and then changes their eigenvalues.
 /// @param source  Names the field in notes and errors. @throw std::runtime_error if no voxel is left.
-LoadedField prepare_field(TensorGrid grid, const FieldChoices& choices, const std::string& source);
-
-/// The same; the choices have no smoothing, which needs a grid.
 LoadedField prepare_field(const BlockSource& blocks, const FieldChoices& choices, const std::string& source);
 
 /// SceneDescription → Scene: loads fields, meshes and spectra, and chooses all values that the scene leaves open.

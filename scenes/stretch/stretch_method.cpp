@@ -5,12 +5,13 @@
 
 #include <fmt/format.h>
 
-#include "base/progress.h"
-#include "base/seconds.h"
+#include "base/process/progress.h"
+#include "base/process/seconds.h"
 #include "integrators/probes/stretch.h"
-#include "renderer/color/color_bar.h"
-#include "renderer/color/colormap.h"
+#include "renderer/charts/color_bar.h"
+#include "renderer/charts/colormap.h"
 #include "scenes/description/check_scene.h"
+#include "scenes/outputs/channel_table.h"
 #include "scenes/outputs/picture_outputs.h"
 
 namespace tensorray {
@@ -64,20 +65,34 @@ ImageMetadata metadata_of(const StretchSettings& settings) {
           {"tensorray:direction", fmt::format("{} {} {}", direction.x(), direction.y(), direction.z())}};
 }
 
+/// What is known of a pixel whose ray has a value.
+struct StretchPixel {
+  Eigen::Vector3f color;
+  float stretch;
+};
+
+ChannelTable<StretchPixel> stretch_channels() {
+  using Pixel = const StretchPixel&;
+  return {{{"R", "G", "B"},
+           "The colour of the colour map, scene-linear; 0 where A is.",
+           [](Pixel pixel) { return pixel.color; }},
+          {{"A"}, "1; 0 if the ray does not meet the volume, or ends before the length.", [](Pixel) { return 1; }},
+          {{"stretch"}, "ln σ / L, in 1 / world unit; 0 where A is.", [](Pixel pixel) { return pixel.stretch; }}};
+}
+
 /// Makes the pictures from the values at the pixels of the entry plane, which is seen along the light as the plate is.
-/// `linear` has R, G, B, A and `stretch`. A is 0 if the ray does not meet the volume, or ends before the length.
 void draw(const Scene& scene, const std::vector<float>& values, const Eigen::Vector2i& resolution, Render& render) {
   const ValueRange range = choose_range({values.begin(), values.end()});
   const Eigen::Matrix3d to_working = scene.color.xyz_to_working() * rec709_to_xyz();
-  Image linear(resolution.x(), resolution.y(), {"R", "G", "B", "A", "stretch"});
+  const ChannelTable<StretchPixel> table = stretch_channels();
+  Image linear(resolution.x(), resolution.y(), channel_names(table));
   Image display(resolution.x(), resolution.y(), {"R", "G", "B", "A"});
   for (std::size_t i = 0; i < values.size(); ++i) {
     if (std::isnan(values[i])) continue;
     const double position = range.position(values[i]);
-    Eigen::Map<Eigen::Vector3f>(&linear.pixels[5 * i]) = (to_working * colormap_linear(map, position)).cast<float>();
-    Eigen::Map<Eigen::Vector3f>(&display.pixels[4 * i]) = colormap_srgb(map, position).cast<float>();
-    linear.pixels[5 * i + 3] = display.pixels[4 * i + 3] = 1;
-    linear.pixels[5 * i + 4] = values[i];
+    write_channels(table, {(to_working * colormap_linear(map, position)).cast<float>(), values[i]},
+                   &linear.pixels[i * linear.channels.size()]);
+    Eigen::Map<Eigen::Vector4f>(&display.pixels[4 * i]) = colormap_srgb(map, position).cast<float>().homogeneous();
   }
   draw_color_bar(display, {"stretch", range, [](double position) { return colormap_srgb(map, position); }});
   render.linear = std::move(linear);
@@ -124,6 +139,8 @@ class StretchMethod : public MethodWith<StretchKeys> {
     outputs.push_back({"stretch", "the stretch in the volume, as a float grid", {".vdb"}, write_grids});
     return outputs;
   }
+
+  std::vector<ChannelText> channels() const override { return channel_texts(stretch_channels()); }
 
   void check(SceneDescription& scene, const Json&, const SceneSource& source, bool chosen) const override {
     if (chosen && scene.bending.rgb && settings().stretch.wavelength)

@@ -6,7 +6,7 @@
 #include <memory>
 #include <optional>
 
-#include "renderer/color/spectrum.h"
+#include "renderer/spectra/spectrum.h"
 #include "scenes/description/method.h"
 
 namespace tensorray {

@@ -8,26 +8,26 @@
 #include <fcntl.h>
 #include <sys/mman.h>
 
-#include "base/descriptor.h"
-#include "base/path_text.h"
-#include "integrators/paths/path_formats.h"
-#include "integrators/paths/seed_files.h"
+#include "base/files/descriptor.h"
+#include "base/text/path_text.h"
+#include "integrators/path_files/path_formats.h"
+#include "integrators/seeds/seed_files.h"
 #include "renderer/color/icc_profile.h"
-#include "renderer/color/spectrum.h"
+#include "renderer/spectra/spectrum.h"
 #include "renderer/images/png_tags.h"
-#include "renderer/surfaces/obj.h"
-#include "renderer/surfaces/ply.h"
+#include "renderer/meshes/obj.h"
+#include "renderer/meshes/ply.h"
 #include "scenes/jobs/work_file.h"
-#include "scenes/keys/frames.h"
+#include "scenes/source/frames.h"
 #include "scenes/keys/json_reader.h"
-#include "scenes/keys/overrides.h"
+#include "scenes/source/overrides.h"
 #include "scenes/pipeline/read_scene.h"
 #include "tests/fuzz/view_targets.h"
-#include "tools/import/lattices/lattice_files.h"
-#include "tools/import/vtk/netcdf_size.h"
-#include "tools/import/vtk/plot3d_layout.h"
-#include "volumes/files/file_bytes.h"
-#include "volumes/files/vdb_tree_check.h"
+#include "tools/import/lattice_files/lattice_files.h"
+#include "tools/import/vtk_formats/netcdf_size.h"
+#include "tools/import/cases/plot3d_layout.h"
+#include "volumes/vdb/file_bytes.h"
+#include "volumes/vdb/vdb_tree_check.h"
 
 namespace tensorray::test {
 namespace {
@@ -161,13 +161,11 @@ void read_vdb_tree(const std::string& bytes) {
                         (choice & 32) != 0};
   const MemoryFile file(bytes.substr(1));
   const FileBytes content(file.path());
-  StoredLeaves leaves;
+  std::vector<StoredLeaf> leaves;
   tree_fits(content, 0, tree, leaves);
 }
 
-void read_vdb_table(const std::string& bytes) {
-  if (delayed_load_fits(bytes, std::int64_t{1} << 30)) read_leaf_table(bytes);
-}
+void read_vdb_table(const std::string& bytes) { delayed_load_fits(bytes, std::int64_t{1} << 30); }
 
 }  // namespace
 

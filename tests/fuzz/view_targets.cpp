@@ -13,7 +13,7 @@
 #include <boost/asio/write.hpp>
 
 #include "tests/viewer/view_support.h"
-#include "tools/viewer/server.h"
+#include "tools/viewer/server/server.h"
 
 namespace tensorray::test {
 namespace {

@@ -5,7 +5,7 @@
 #include <vtkPointData.h>
 #include <vtkPoints.h>
 
-#include "base/progress.h"
+#include "base/process/progress.h"
 #include "tests/import/mesh_files.h"
 #include "tests/import/vtk_files.h"
 

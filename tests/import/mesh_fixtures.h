@@ -19,6 +19,7 @@
 #include <vtkStructuredGrid.h>
 #include <vtkUnstructuredGrid.h>
 
+#include "base/constants.h"
 #include "volumes/grids/tensor_grid.h"
 
 namespace tensorray::mesh_fixtures {
@@ -46,8 +47,7 @@ inline vtkSmartPointer<vtkStructuredGrid> curvilinear(const Vector3i& nodes, con
 
 /// Bends the unit cube: moves its inner nodes, and keeps its faces in place.
 inline Vector3d bent(const Vector3d& p) {
-  const double s = 0.15 * std::sin(3.14159265358979 * p.x()) * std::sin(3.14159265358979 * p.y()) *
-                   std::sin(3.14159265358979 * p.z());
+  const double s = 0.15 * std::sin(pi * p.x()) * std::sin(pi * p.y()) * std::sin(pi * p.z());
   return p + s * Vector3d(1, -0.7, 0.5);
 }
 
@@ -102,7 +102,7 @@ inline Grid unit_cube(int cell_type, int n, const Map& map) {
 /// two faces at the seam have separate points.
 inline vtkSmartPointer<vtkStructuredGrid> hollow_cylinder(int around, double height) {
   return curvilinear({around + 1, 5, 5}, [=](const Vector3d& p) {
-    const double angle = static_cast<double>(std::lround(p.x() * around) % around) * (2 * 3.14159265358979 / around);
+    const double angle = static_cast<double>(std::lround(p.x() * around) % around) * (2 * pi / around);
     return Vector3d((1 + p.y()) * std::cos(angle), (1 + p.y()) * std::sin(angle), height * (p.z() - 0.5));
   });
 }

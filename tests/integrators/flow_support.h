@@ -7,8 +7,8 @@
 #include <utility>
 #include <vector>
 
-#include "integrators/flow/caustic.h"
 #include "integrators/flow/flow_map.h"
+#include "integrators/flow_drawing/caustic.h"
 #include "tests/integrators/support.h"
 
 namespace tensorray::test {

@@ -90,7 +90,7 @@ struct Bench {
       bands.push_back({place, place, i, 1, Vector3d::Unit(static_cast<int>(i))});
     }
     const LensLight light =
-        trace_lens(field, surfaces, bending, Vector3d::UnitZ(), receiver, image, with_mode, progress);
+        trace_lens(field, surfaces, bending, {receiver, image, Vector3d::UnitZ()}, with_mode, progress);
     return draw_lens(light, bands, radiance, channels.size(), true, progress);
   }
 

@@ -13,9 +13,11 @@
 
 #include <gtest/gtest.h>
 
+#include "base/constants.h"
 #include "integrators/bending/bending.h"
-#include "integrators/bending/runge_kutta.h"
 #include "integrators/packets/packet_kernel.h"
+#include "integrators/steps/runge_kutta.h"
+#include "integrators/tracing/trace.h"
 #include "tests/integrators/support.h"
 
 namespace tensorray::test {
@@ -55,7 +57,6 @@ inline TensorFunction smooth_tensor(unsigned seed) {
     Eigen::Vector3d k;
     double phase;
   };
-  constexpr double pi = 3.14159265358979324;
   Numbers numbers(seed);
   std::vector<Wave> waves(4);
   for (Wave& wave : waves) {

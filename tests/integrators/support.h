@@ -8,7 +8,8 @@
 #include <gtest/gtest.h>
 
 #include "integrators/bending/bending.h"
-#include "renderer/surfaces/mesh.h"
+#include "integrators/tracing/trace.h"
+#include "renderer/meshes/mesh.h"
 #include "volumes/bricks/tensor_field.h"
 
 namespace tensorray::test {
@@ -74,6 +75,13 @@ inline Ray trace_one(const TensorField& field, const Geometry& geometry, const B
   batch.add(position, direction.normalized(), flexibility);
   trace_reference(field, geometry, settings, batch);
   return {batch.position[0], batch.direction[0], batch.end[0], batch.steps[0]};
+}
+
+/// All points of a ray.
+inline PathPoints points_of(const TensorField& field, const RayRecord& record) {
+  PathPoints points;
+  for (std::size_t i = 0; i < record.size(); ++i) points.push_back(path_point(field, record, i));
+  return points;
 }
 
 /// Follows a ray for exactly `steps` steps. For cubic voxels it is then at the arc length steps · step · voxel_size.

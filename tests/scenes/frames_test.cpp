@@ -1,6 +1,6 @@
 // Tests keyframes, and numbers of frames in file names.
 
-#include "scenes/keys/frames.h"
+#include "scenes/source/frames.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

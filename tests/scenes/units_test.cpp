@@ -9,11 +9,11 @@
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 
-#include "base/progress.h"
+#include "base/process/progress.h"
 #include "scenes/pipeline/read_scene.h"
 #include "scenes/scene/render.h"
 #include "scenes/scene/scene.h"
-#include "volumes/tensors/generators.h"
+#include "volumes/making/generators.h"
 
 namespace tensorray {
 namespace {
@@ -70,8 +70,9 @@ Image picture_of(const SceneCase& one, double unit) {
   if (!json.contains("camera")) json["camera"]["resolution"] = {24, 24};
   TensorGrid grid = generate(Helix(), GridSettings{{17, 17, 17}});
   grid.to_world = Eigen::Affine3d(Eigen::Scaling(unit)) * grid.to_world;
-  const Scene scene = load_scene(read_scene_json(json, "scene.json"),
-                                 prepare_field(std::move(grid), {0, Eigenvalues::automatic, {}}, "helix"), Progress());
+  const Scene scene =
+      load_scene(read_scene_json(json, "scene.json"),
+                 prepare_field(source_of(std::move(grid)), {0, Eigenvalues::automatic, {}}, "helix"), Progress());
   return render(scene, Progress()).linear;
 }
 

@@ -42,7 +42,7 @@ inline std::vector<Line> lines_of(const std::string& folder) {
     const std::string name = std::filesystem::relative(entry.path(), source_folder()).string();
     for (std::string text; std::getline(file, text);) lines.push_back({name, text});
   }
-  EXPECT_GT(lines.size(), 100u) << "no sources in " << folder;
+  EXPECT_FALSE(lines.empty()) << "no sources in " << folder;
   return lines;
 }
 

@@ -1,6 +1,6 @@
 // The web server, by real connections: what it refuses, and that it lives on.
 
-#include "tools/viewer/server.h"
+#include "tools/viewer/server/server.h"
 
 #include <map>
 #include <thread>
@@ -14,7 +14,7 @@
 #include <boost/beast/websocket.hpp>
 
 #include "tests/viewer/view_support.h"
-#include "tools/viewer/token.h"
+#include "tools/viewer/server/token.h"
 
 namespace tensorray {
 namespace {

@@ -12,7 +12,7 @@
 
 #include <gtest/gtest.h>
 
-#include "base/temporary_folder.h"
+#include "base/files/temporary_folder.h"
 #include "tools/viewer/pages.h"
 
 namespace tensorray::test {

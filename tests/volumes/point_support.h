@@ -9,7 +9,7 @@
 
 #include <gtest/gtest.h>
 
-#include "volumes/files/point_files.h"
+#include "volumes/points/point_files.h"
 
 namespace tensorray {
 

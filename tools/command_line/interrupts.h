@@ -2,7 +2,7 @@
 /// @file tools/command_line/interrupts.h
 /// How the programs handle signals.
 
-#include "base/progress.h"
+#include "base/process/progress.h"
 
 namespace tensorray {
 

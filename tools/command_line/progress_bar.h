@@ -6,7 +6,7 @@
 #include <cstdint>
 #include <string>
 
-#include "base/progress.h"
+#include "base/process/progress.h"
 
 namespace tensorray {
 

@@ -11,9 +11,9 @@
 #include <CLI/Error.hpp>
 #include <unistd.h>
 
-#include "base/process_limits.h"
-#include "base/progress.h"
-#include "base/text.h"
+#include "base/process/process_limits.h"
+#include "base/process/progress.h"
+#include "base/text/text.h"
 #include "tools/command_line/tell.h"
 
 namespace tensorray {

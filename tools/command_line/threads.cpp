@@ -5,7 +5,7 @@
 
 #include <tbb/task_arena.h>
 
-#include "base/process_limits.h"
+#include "base/process/process_limits.h"
 
 namespace tensorray {
 namespace {

@@ -8,10 +8,10 @@
 #include <CLI/CLI.hpp>
 #include <fmt/core.h>
 
-#include "base/distinct_files.h"
-#include "base/output_file.h"
-#include "base/progress.h"
-#include "base/text.h"
+#include "base/files/distinct_files.h"
+#include "base/files/output_file.h"
+#include "base/process/progress.h"
+#include "base/text/text.h"
 #include "tools/command_line/tell.h"
 #include "tools/command_line/threads.h"
 #include "tools/command_line/vdb_output.h"

@@ -9,10 +9,10 @@
 #include <CLI/CLI.hpp>
 #include <fmt/format.h>
 
-#include "base/output_file.h"
-#include "base/text.h"
+#include "base/files/output_file.h"
+#include "base/text/text.h"
+#include "renderer/charts/lettering.h"
 #include "renderer/images/image.h"
-#include "renderer/images/lettering.h"
 #include "scenes/description/run_files.h"
 #include "scenes/keys/json_reader.h"
 #include "scenes/outputs/picture_outputs.h"

@@ -2,7 +2,7 @@
 
 #include <CLI/CLI.hpp>
 
-#include "base/child_program.h"
+#include "base/process/child_program.h"
 #include "tools/commands/commands.h"
 #include "tools/commands/imported_field.h"
 

@@ -4,8 +4,8 @@
 #include <stdexcept>
 #include <vector>
 
-#include "base/child_program.h"
-#include "base/text.h"
+#include "base/process/child_program.h"
+#include "base/text/text.h"
 #include "scenes/pipeline/read_scene.h"
 #include "tools/command_line/tell.h"
 

@@ -6,7 +6,7 @@
 #include <filesystem>
 #include <string>
 
-#include "base/temporary_folder.h"
+#include "base/files/temporary_folder.h"
 
 namespace tensorray {
 

@@ -12,12 +12,12 @@
 #include <fmt/core.h>
 #include <nlohmann/json.hpp>
 
-#include "base/path_text.h"
-#include "base/text.h"
+#include "base/text/path_text.h"
+#include "base/text/text.h"
 #include "tools/command_line/threads.h"
 #include "tools/commands/commands.h"
 #include "volumes/files/tensor_files.h"
-#include "volumes/tensors/field_making.h"
+#include "volumes/making/field_making.h"
 #include "volumes/tensors/statistics.h"
 
 namespace tensorray {
@@ -50,7 +50,7 @@ FieldInfo field_info(const std::filesystem::path& file, const std::string& name)
   TensorGrid grid = read_tensor_vdb(file, name);
   FieldInfo info{grid.name, grid.to_world.matrix(), grid.metadata, field_statistics(grid), {}};
   if (info.statistics.active_voxels > info.statistics.non_finite) {
-    const MadeField made = make_field(std::move(grid), Eigenvalues::raw, {Interpolation::cubic, Border::fade});
+    const MadeField made = make_field(view_of(grid), Eigenvalues::raw, {Interpolation::cubic, Border::fade});
     info.resolution = made.resolution;
     info.statistics.memory_bytes = made.field->memory_bytes();
   }

@@ -10,16 +10,16 @@
 #include <CLI/CLI.hpp>
 #include <fmt/core.h>
 
-#include "base/output_file.h"
-#include "base/progress.h"
-#include "base/text.h"
+#include "base/files/output_file.h"
+#include "base/process/progress.h"
+#include "base/text/text.h"
 #include "scenes/keys/generate_grid.h"
 #include "tools/command_line/tell.h"
 #include "tools/command_line/threads.h"
 #include "tools/command_line/vdb_output.h"
 #include "tools/commands/commands.h"
 #include "volumes/files/tensor_files.h"
-#include "volumes/tensors/generators.h"
+#include "volumes/making/generators.h"
 
 namespace tensorray {
 namespace {

@@ -6,12 +6,12 @@
 #include <CLI/CLI.hpp>
 #include <fmt/format.h>
 
-#include "base/distinct_files.h"
-#include "base/text.h"
+#include "base/files/distinct_files.h"
+#include "base/text/text.h"
 #include "scenes/jobs/origin.h"
 #include "scenes/jobs/work_file.h"
 #include "tools/commands/commands.h"
-#include "tools/commands/render_scene.h"
+#include "tools/rendering/render_scene.h"
 
 namespace tensorray {
 namespace {

@@ -7,17 +7,17 @@
 #include <CLI/CLI.hpp>
 #include <fmt/format.h>
 
-#include "base/distinct_files.h"
-#include "base/text.h"
-#include "scenes/keys/frames.h"
+#include "base/files/distinct_files.h"
+#include "base/text/text.h"
 #include "scenes/pipeline/methods.h"
+#include "scenes/source/frames.h"
 #include "tools/commands/commands.h"
 #include "tools/commands/imported_field.h"
-#include "tools/commands/render_scene.h"
-#include "tools/commands/tev_display.h"
 #include "tools/ranks/follower.h"
 #include "tools/ranks/leader.h"
 #include "tools/ranks/ranks.h"
+#include "tools/rendering/render_scene.h"
+#include "tools/rendering/tev_display.h"
 
 namespace tensorray {
 namespace {

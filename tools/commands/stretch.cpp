@@ -5,9 +5,9 @@
 #include <CLI/CLI.hpp>
 #include <fmt/format.h>
 
-#include "renderer/color/spectrum.h"
+#include "renderer/spectra/spectrum.h"
 #include "tools/commands/commands.h"
-#include "tools/commands/render_scene.h"
+#include "tools/rendering/render_scene.h"
 
 namespace tensorray {
 namespace {

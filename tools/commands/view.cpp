@@ -3,7 +3,7 @@
 
 #include <CLI/CLI.hpp>
 
-#include "base/child_program.h"
+#include "base/process/child_program.h"
 #include "tools/commands/commands.h"
 
 namespace tensorray {

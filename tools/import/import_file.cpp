@@ -15,16 +15,16 @@
 #include <vtkPointData.h>
 #include <vtkSmartPointer.h>
 
-#include "base/text.h"
+#include "base/text/text.h"
+#include "tools/import/cases/plot3d.h"
+#include "tools/import/lattice_files/lattice_files.h"
 #include "tools/import/lattices/component_names.h"
-#include "tools/import/lattices/lattice_files.h"
 #include "tools/import/meshes/component_arrays.h"
 #include "tools/import/meshes/flat_mesh.h"
 #include "tools/import/meshes/mesh_boundary.h"
-#include "tools/import/vtk/image_lattice.h"
-#include "tools/import/vtk/plot3d.h"
 #include "tools/import/vtk/vtk_messages.h"
-#include "tools/import/vtk/vtk_source.h"
+#include "tools/import/vtk_formats/image_lattice.h"
+#include "tools/import/vtk_source/vtk_source.h"
 #include "volumes/grids/page_memory.h"
 
 namespace tensorray {

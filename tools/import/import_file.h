@@ -1,6 +1,8 @@
 #pragma once
 /// @file tools/import/import_file.h
-/// Reads tensors from files of other programs: finds the format and calls its reader.
+/// Reads tensors from files of other programs: finds the format and calls its reader. Two ways lead to a TensorGrid.
+/// The voxels of a Lattice are kept. A mesh is a VTK data set whose cells are checked (vtk_geometry.h): it gets tensors
+/// at its points or cells (mesh_tensors.h), and is sampled at voxels (mesh_sampling.h).
 
 #include <cstddef>
 #include <filesystem>
@@ -9,8 +11,8 @@
 #include <vector>
 
 #include "tools/import/lattices/lattice.h"
-#include "tools/import/meshes/mesh_sampling.h"
 #include "tools/import/meshes/mesh_tensors.h"
+#include "tools/import/sampling/mesh_sampling.h"
 
 namespace tensorray {
 

@@ -6,7 +6,7 @@
 #include <thread>
 #include <utility>
 
-#include "base/seconds.h"
+#include "base/process/seconds.h"
 #include "tools/ranks/rank_message.h"
 
 namespace tensorray {

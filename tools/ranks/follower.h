@@ -7,9 +7,9 @@
 #include <optional>
 #include <string>
 
-#include "base/progress.h"
-#include "base/team.h"
-#include "base/work.h"
+#include "base/process/progress.h"
+#include "base/process/team.h"
+#include "base/process/work.h"
 #include "tools/ranks/ranks.h"
 
 namespace tensorray {

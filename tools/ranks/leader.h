@@ -15,9 +15,9 @@
 #include <utility>
 #include <vector>
 
-#include "base/progress.h"
-#include "base/team.h"
-#include "base/work.h"
+#include "base/process/progress.h"
+#include "base/process/team.h"
+#include "base/process/work.h"
 #include "tools/ranks/rank_message.h"
 #include "tools/ranks/ranks.h"
 

@@ -1,6 +1,7 @@
 #pragma once
 /// @file tools/ranks/ranks.h
 /// The processes of one job that `mpirun` started together. Each has a number, its rank, from 0 on.
+/// Rank 0 is a Leader, all others are Followers. `Ranks` is what both need of MPI; in tests, ranks are threads.
 
 #include <memory>
 #include <optional>

@@ -7,8 +7,8 @@
 
 #include <fmt/format.h>
 
-#include "base/text.h"
-#include "integrators/bending/bending.h"
+#include "base/text/text.h"
+#include "integrators/tracing/trace.h"
 
 namespace tensorray {
 namespace {
@@ -44,12 +44,12 @@ std::string color_of(const Scene& scene, std::size_t channel) {
   return hex(0.85 * color + Vector3d::Constant(0.15));  // Also dark violet must be seen.
 }
 
-/// Every few points of a path, and its last one.
-Json polyline(const RayPoints& path) {
+/// Every few points of a ray that has some, and its last one.
+Json polyline(const TensorField& field, const RayRecord& ray) {
   Json points = Json::array();
-  const std::size_t step = std::max<std::size_t>(1, (path.size() + most_points - 1) / most_points);
-  for (std::size_t i = 0; i < path.size(); i += step) points.push_back(to_json(path[i].position));
-  if (!path.empty() && (path.size() - 1) % step != 0) points.push_back(to_json(path.back().position));
+  const std::size_t step = (ray.size() + most_points - 1) / most_points, last = ray.size() - 1;
+  for (std::size_t i = 0; i < last; i += step) points.push_back(to_json(path_point(field, ray, i).position));
+  points.push_back(to_json(path_point(field, ray, last).position));
   return points;
 }
 
@@ -58,10 +58,10 @@ void add_rays(const Scene& scene, std::size_t channel, double flexibility, const
               Json& rays) {
   RayBatch batch;
   for (const Vector3d& start : starts) batch.add(start, scene.beam.direction, flexibility);
-  std::vector<RayPoints> paths;
-  trace(scene.field, scene.geometry, scene.bending, batch, paths);
-  for (const RayPoints& path : paths)
-    if (!path.empty()) rays.push_back({{"points", polyline(path)}, {"color", color_of(scene, channel)}});
+  std::vector<RayRecord> records;
+  trace(scene.field, scene.geometry, scene.bending, batch, &records);
+  for (const RayRecord& ray : records)
+    if (ray.size() > 0) rays.push_back({{"points", polyline(scene.field, ray)}, {"color", color_of(scene, channel)}});
 }
 
 /// Positions of a lattice over the beam's aperture, its outline included, row by row.

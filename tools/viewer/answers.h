@@ -1,7 +1,7 @@
 #pragma once
 /// @file tools/viewer/answers.h
 /// What a page can ask about a scene and its picture. All functions return messages of the page's protocol
-/// (tools/viewer/page/src/protocol.ts), without `type` and `id`.
+/// (tools/viewer/page/src/state/protocol.ts), without `type` and `id`.
 
 #include <memory>
 #include <vector>

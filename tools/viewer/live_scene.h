@@ -8,7 +8,7 @@
 #include <string>
 #include <vector>
 
-#include "base/progress.h"
+#include "base/process/progress.h"
 #include "scenes/keys/json_reader.h"
 #include "scenes/scene/render.h"
 #include "scenes/scene/scene.h"

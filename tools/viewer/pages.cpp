@@ -11,9 +11,9 @@
 
 #include <fmt/format.h>
 
-#include "base/output_file.h"
-#include "base/seconds.h"
-#include "base/text.h"
+#include "base/files/output_file.h"
+#include "base/process/seconds.h"
+#include "base/text/text.h"
 #include "scenes/description/run_files.h"
 #include "scenes/outputs/picture_outputs.h"
 #include "scenes/pipeline/read_scene.h"

@@ -15,8 +15,8 @@
 #include <thread>
 #include <vector>
 
-#include "base/progress.h"
-#include "base/temporary_folder.h"
+#include "base/files/temporary_folder.h"
+#include "base/process/progress.h"
 #include "scenes/keys/json_reader.h"
 #include "tools/viewer/answers.h"
 #include "tools/viewer/live_scene.h"
@@ -39,8 +39,8 @@ struct ViewedScene {
   std::filesystem::path copy;  ///< Pages may save their scene to this file.
 };
 
-/// Answers the messages of all pages (their protocol: tools/viewer/page/src/protocol.ts). One thread renders, for one
-/// page after another, a stage at a time. A page's newest scene replaces its older ones: their coarse pictures are
+/// Answers the messages of all pages (their protocol: tools/viewer/page/src/state/protocol.ts). One thread renders, for
+/// one page after another, a stage at a time. A page's newest scene replaces its older ones: their coarse pictures are
 /// finished, everything finer is cancelled.
 class Pages {
  public:

@@ -13,7 +13,7 @@
 #include "volumes/bricks/brick_index.h"
 #include "volumes/bricks/brick_making.h"
 #include "volumes/bricks/cubic_brick.h"
-#include "volumes/bricks/interpolation.h"
+#include "volumes/grids/interpolation.h"
 
 namespace tensorray {
 

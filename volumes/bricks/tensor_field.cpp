@@ -11,7 +11,7 @@
 #include <tbb/blocked_range.h>
 #include <tbb/parallel_for.h>
 
-#include "base/box.h"
+#include "base/geometry/box.h"
 #include "volumes/bricks/brick_making.h"
 #include "volumes/bricks/coefficients.h"
 #include "volumes/bricks/cubic_brick.h"
@@ -25,7 +25,7 @@ struct alignas(64) ZeroBrick {
 };
 constexpr ZeroBrick zero_brick;
 
-/// Number of blocks that are placed before they are freed; enough to keep all threads busy.
+/// Number of blocks that are placed before all threads wait; enough to keep them busy.
 constexpr std::size_t part_size = 4096;
 
 /// Number of blocks that a thread places in a row. Neighbours along z share bricks.
@@ -55,63 +55,31 @@ Eigen::Matrix3d TensorBrick::tensor(int voxel) const {
   return T;
 }
 
-/// Where the blocks of a field come from.
-struct TensorField::Blocks {
-  /// Gives block i, which may be `own`, a block of the calling thread.
-  std::function<const TensorBlock&(std::size_t i, TensorBlock& own)> get;
-  /// Called when the blocks before `end` are not needed any more.
-  std::function<void(std::size_t end)> give_back = [](std::size_t) {};
-};
-
 TensorField::TensorField(const TensorGrid& grid, const Interpolant& interpolant)
-    : interpolant_(interpolant), to_world_(grid.to_world), to_index_(grid.to_world.inverse()) {
-  Blocks blocks;
-  blocks.get = [&](std::size_t i, TensorBlock&) -> const TensorBlock& { return grid.blocks[i]; };
-  make_bricks(grid.shapes(), blocks);
-}
-
-TensorField::TensorField(TensorGrid&& grid, const Interpolant& interpolant)
-    : interpolant_(interpolant), to_world_(grid.to_world), to_index_(grid.to_world.inverse()) {
-  std::size_t freed = 0;
-  Blocks blocks;
-  blocks.get = [&](std::size_t i, TensorBlock&) -> const TensorBlock& { return grid.blocks[i - freed]; };
-  blocks.give_back = [&](std::size_t end) {
-    for (; freed < end; ++freed) grid.blocks.pop_front();
-  };
-  make_bricks(grid.shapes(), blocks);
-}
+    : TensorField(view_of(grid), interpolant) {}
 
 TensorField::TensorField(const BlockSource& source, const Interpolant& interpolant)
     : interpolant_(interpolant), to_world_(source.to_world), to_index_(source.to_world.inverse()) {
-  Blocks blocks;
-  blocks.get = [&](std::size_t i, TensorBlock& own) -> const TensorBlock& {
-    read_block(source, i, own);
-    return own;
-  };
-  make_bricks(source.shapes, blocks);
-}
-
-void TensorField::make_bricks(const std::vector<BlockShape>& shapes, const Blocks& blocks) {
-  const Eigen::AlignedBox3i active = active_box(shapes);
+  const Eigen::AlignedBox3i active = active_box(source.shapes);
   if (active.isEmpty()) throw std::invalid_argument("the tensor field has no active voxel");
   if (!to_world_.matrix().allFinite() || !to_index_.matrix().allFinite())
     throw std::invalid_argument("the tensor field's transform cannot be inverted");
   index_bounds_ = extent_of(active);
   voxels_ = Eigen::AlignedBox3d(active.min().cast<double>(), active.max().cast<double>());
 
-  const BlockTable table(shapes);
-  const double norm = is_cubic() ? make_cubic_bricks(table, active, blocks) : make_linear_bricks(table, active, blocks);
+  const BlockTable table(source.shapes);
+  const double norm = is_cubic() ? make_cubic_bricks(table, active, source) : make_linear_bricks(table, active, source);
   greatest_norm_ = std::sqrt(norm);
 }
 
 /// @return the greatest squared norm of a voxel.
 double TensorField::make_linear_bricks(const BlockTable& table, const Eigen::AlignedBox3i& active,
-                                       const Blocks& blocks) {
+                                       const BlockSource& source) {
   bricks_ = active_bricks(table, bricks_of(active));
   bricks_.shrink_to_fit();
   index_ = BrickIndex(bricks_);
   std::vector<BlockShare> shares(table.shapes.size());
-  place_blocks(shares.size(), blocks, [&](std::size_t i, const TensorBlock& block) {
+  place_blocks(source, [&](std::size_t i, const TensorBlock& block) {
     std::array<float*, bricks_of_block> bricks{};
     for (int bits = 0; bits < bricks_of_block; ++bits)
       if (const std::uint32_t brick = index_.find(table.places[i] - corner(bits)); brick != BrickIndex::missing)
@@ -132,11 +100,11 @@ double TensorField::make_linear_bricks(const BlockTable& table, const Eigen::Ali
 
 /// The same. Voxels become coefficients in place.
 double TensorField::make_cubic_bricks(const BlockTable& table, const Eigen::AlignedBox3i& active,
-                                      const Blocks& blocks) {
+                                      const BlockSource& source) {
   CoefficientBricks coefficients = coefficient_bricks(table, active, interpolant_.border);
   bricks_ = coefficients.places;
   std::vector<double> norms(table.shapes.size());
-  place_blocks(norms.size(), blocks, [&](std::size_t i, const TensorBlock& block) {
+  place_blocks(source, [&](std::size_t i, const TensorBlock& block) {
     const auto norm = place_values(block, components_, floats_of(coefficients.index.find(table.places[i])));
     if (norm) norms[i] = *norm;
     return norm.has_value();
@@ -152,26 +120,26 @@ double TensorField::make_cubic_bricks(const BlockTable& table, const Eigen::Alig
 
 /// Fills the bricks. They store symmetric tensors until the first block comes that has others. Its part is then placed
 /// again.
-void TensorField::place_blocks(std::size_t count, const Blocks& blocks, const Place& place) {
+void TensorField::place_blocks(const BlockSource& source, const Place& place) {
   allocate(TensorBrick::symmetric);
   std::atomic<bool> fits{true};
   const auto place_part = [&](const tbb::blocked_range<std::size_t>& range) {
-    TensorBlock own;
+    TensorBlock block;
     for (std::size_t i = range.begin(); i < range.end() && fits; ++i) {
       make_room();
-      if (!place(i, blocks.get(i, own))) fits = false;
+      read_block(source, i, block);
+      if (!place(i, block)) fits = false;
     }
   };
+  const std::size_t count = source.shapes.size();
   for (std::size_t first = 0; first < count; first += part_size) {
-    const std::size_t end = std::min(first + part_size, count);
-    const tbb::blocked_range<std::size_t> part(first, end, grain);
+    const tbb::blocked_range<std::size_t> part(first, std::min(first + part_size, count), grain);
     tbb::parallel_for(part, place_part);
     if (!fits) {
       widen(first > 0);
       fits = true;
       tbb::parallel_for(part, place_part);
     }
-    blocks.give_back(end);
   }
 }
 

@@ -11,8 +11,8 @@
 #include <Eigen/Geometry>
 
 #include "volumes/bricks/brick_index.h"
-#include "volumes/bricks/interpolation.h"
 #include "volumes/grids/block_source.h"
+#include "volumes/grids/interpolation.h"
 #include "volumes/grids/tensor_grid.h"
 
 namespace tensorray {
@@ -64,16 +64,14 @@ struct TensorBrick {
 /// number of threads may read it at once. Copies share the voxels.
 class TensorField {
  public:
-  /// The voxels of a cubic field must be finite: one that is not spoils all about it.
-  /// @throw std::invalid_argument if the grid has no active voxel or its transform cannot be inverted.
-  explicit TensorField(const TensorGrid& grid, const Interpolant& interpolant = {});
-
-  /// The same, but frees the blocks of the grid while it makes bricks, so that memory never holds the whole field
-  /// twice.
-  explicit TensorField(TensorGrid&& grid, const Interpolant& interpolant = {});
-
-  /// The same from blocks that are read once each, on all threads. @throw also what `source` throws.
+  /// Reads each block once, on all threads. The voxels of a cubic field must be finite: one that is not spoils all
+  /// about it.
+  /// @throw std::invalid_argument if there is no active voxel or the transform cannot be inverted; what `source`
+  /// throws.
   explicit TensorField(const BlockSource& source, const Interpolant& interpolant = {});
+
+  /// The same from a grid.
+  explicit TensorField(const TensorGrid& grid, const Interpolant& interpolant = {});
 
   const Eigen::Affine3d& to_world() const { return to_world_; }
   const Eigen::Affine3d& to_index() const { return to_index_; }
@@ -123,8 +121,6 @@ class TensorField {
   bool is_stored(const Eigen::Vector3i& brick) const { return index_.find(brick) != BrickIndex::missing; }
 
  private:
-  struct Blocks;
-
   static const float* const zeros;  // A brick of either kind.
 
   struct Release {
@@ -137,10 +133,9 @@ class TensorField {
   /// Places block i in its bricks. @return false, and leaves them as they are, if they do not have enough components.
   using Place = std::function<bool(std::size_t i, const TensorBlock& block)>;
 
-  void make_bricks(const std::vector<BlockShape>& shapes, const Blocks& blocks);
-  double make_linear_bricks(const BlockTable& table, const Eigen::AlignedBox3i& active, const Blocks& blocks);
-  double make_cubic_bricks(const BlockTable& table, const Eigen::AlignedBox3i& active, const Blocks& blocks);
-  void place_blocks(std::size_t count, const Blocks& blocks, const Place& place);
+  double make_linear_bricks(const BlockTable& table, const Eigen::AlignedBox3i& active, const BlockSource& source);
+  double make_cubic_bricks(const BlockTable& table, const Eigen::AlignedBox3i& active, const BlockSource& source);
+  void place_blocks(const BlockSource& source, const Place& place);
   void widen(bool keep);
   void allocate(int components);
   void keep_bricks(std::size_t count);

@@ -3,7 +3,7 @@
 #include <algorithm>
 
 #include "base/errors.h"
-#include "base/text.h"
+#include "base/text/text.h"
 
 namespace tensorray {
 namespace {

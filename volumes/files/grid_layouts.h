@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "volumes/files/tensor_entry.h"
+#include "volumes/vdb/tensor_entry.h"
 
 namespace tensorray {
 

@@ -1,7 +1,7 @@
 #include "volumes/files/scalar_files.h"
 
-#include "volumes/files/vdb_archive.h"
-#include "volumes/files/vdb_transform.h"
+#include "volumes/vdb/vdb_archive.h"
+#include "volumes/vdb/vdb_transform.h"
 
 namespace tensorray {
 namespace {

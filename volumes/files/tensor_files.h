@@ -3,7 +3,6 @@
 /// Tensor fields in OpenVDB files. Only the .cpp file includes OpenVDB.
 
 #include <filesystem>
-#include <optional>
 #include <string>
 #include <vector>
 
@@ -12,24 +11,23 @@
 
 namespace tensorray {
 
-/// Reads a tensor field of the grids that field_grids (grid_layouts.h) finds. Precision is single, half or double. A
-/// voxel is active where any component is active; the inactive components are zero there. With Derive::gradient, a
-/// vector grid of the class "staggered" has component i on the voxels' faces towards −i, and is differentiated there.
+/// A tensor field of the grids that field_grids (grid_layouts.h) finds. Its blocks are read when they are needed; the
+/// file stays open. Precision is single, half or double. A voxel is active where any component is active; the inactive
+/// components are zero there. With Derive::gradient, a vector grid of the class "staggered" has component i on the
+/// voxels' faces towards −i, and is differentiated there. Derived tensors are in memory.
 /// @param name  Empty: the only tensor (or, with `derive`, the only suitable grid) in the file.
 /// @param components  The grids that are the components; empty: they are found by their names.
-/// @return the grid, with the file's metadata as text. Entries `tensorray:...` that the file lacks are taken from the
+/// @return the blocks, with the file's metadata as text. Entries `tensorray:...` that the file lacks are taken from the
 /// first grid. Values that are not finite are kept: see remove_non_finite.
 /// @throw std::runtime_error, one line that names the file and the fix: missing, not a VDB, truncated, no such field
 /// (the message lists the grids of the file), several fields and no name, rows with different transforms, a transform
-/// that is not affine, no active voxel.
+/// that is not affine, no active voxel. Damage within the values of voxels shows when blocks are read.
+BlockSource open_tensor_vdb(const std::filesystem::path& path, const std::string& name = "",
+                            Derive derive = Derive::none, const ComponentGrids& components = {});
+
+/// The same with all blocks in memory.
 TensorGrid read_tensor_vdb(const std::filesystem::path& path, const std::string& name = "",
                            Derive derive = Derive::none, const ComponentGrids& components = {});
-
-/// The same field block by block. Its blocks are read when they are needed; the file stays open.
-/// @return nothing if the file cannot be read so (tiles, trees that grids share, files of OpenVDB 2): use
-/// read_tensor_vdb. @throw as read_tensor_vdb. Damage within the values of voxels shows when blocks are read.
-std::optional<BlockSource> open_tensor_vdb(const std::filesystem::path& path, const std::string& name = "",
-                                           const ComponentGrids& components = {});
 
 /// Writes the rows of a field as three Vec3S grids NAME_row0 … NAME_row2 with vector type "invariant" and one
 /// transform. Writes the grid's metadata on the file and on each grid. Equal grids give equal bytes. Writes the file
@@ -39,7 +37,7 @@ std::optional<BlockSource> open_tensor_vdb(const std::filesystem::path& path, co
 /// exceeds 65504).
 void write_tensor_vdb(const std::filesystem::path& path, const TensorGrid& grid, bool half = false);
 
-/// The grids of a file, in the file's order. @throw std::runtime_error as read_tensor_vdb.
+/// The grids of a file, in the file's order. @throw std::runtime_error as open_tensor_vdb.
 std::vector<GridInfo> list_vdb(const std::filesystem::path& path);
 
 }  // namespace tensorray

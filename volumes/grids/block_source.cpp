@@ -1,5 +1,8 @@
 #include "volumes/grids/block_source.h"
 
+#include <memory>
+#include <utility>
+
 #include <tbb/parallel_for.h>
 
 #include "volumes/grids/page_memory.h"
@@ -51,6 +54,19 @@ BlockSource dense_source(const Eigen::AlignedBox3i& box, const Eigen::Affine3d& 
   source.to_world = to_world;
   source.shapes = dense_shapes(box);
   source.fill = [value](std::size_t, TensorBlock& block) { fill_block(block, value); };
+  return source;
+}
+
+BlockSource view_of(const TensorGrid& grid) {
+  BlockSource source{grid.name, grid.to_world, grid.shapes(), grid.metadata, {}};
+  source.fill = [&grid](std::size_t i, TensorBlock& block) { block.values = grid.blocks[i].values; };
+  return source;
+}
+
+BlockSource source_of(TensorGrid grid) {
+  const auto kept = std::make_shared<const TensorGrid>(std::move(grid));
+  BlockSource source = view_of(*kept);
+  source.fill = [kept, fill = source.fill](std::size_t i, TensorBlock& block) { fill(i, block); };
   return source;
 }
 

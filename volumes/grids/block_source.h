@@ -1,6 +1,6 @@
 #pragma once
 /// @file volumes/grids/block_source.h
-/// Tensors block by block: those of a file or a generator, from which a field is made without a grid in between.
+/// Tensors block by block: those of a file, a generator, an array or a grid. This is what fields are made of.
 
 #include <cstddef>
 #include <functional>
@@ -32,6 +32,10 @@ void read_block(const BlockSource& source, std::size_t i, TensorBlock& block);
 /// threads at once.
 BlockSource dense_source(const Eigen::AlignedBox3i& box, const Eigen::Affine3d& to_world,
                          const std::function<Eigen::Matrix3d(const Eigen::Vector3i&)>& value);
+
+/// The blocks of a grid, which must outlive them; or which they keep in memory.
+BlockSource view_of(const TensorGrid& grid);
+BlockSource source_of(TensorGrid grid);
 
 /// All blocks in memory. Runs on all threads. @throw as `fill`.
 TensorGrid to_grid(const BlockSource& source);

@@ -19,9 +19,9 @@
 #include <sys/statvfs.h>
 #include <unistd.h>
 
-#include "base/descriptor.h"
-#include "base/temporary_folder.h"
-#include "base/text.h"
+#include "base/files/descriptor.h"
+#include "base/files/temporary_folder.h"
+#include "base/text/text.h"
 
 namespace tensorray {
 namespace {

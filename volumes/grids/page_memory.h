@@ -1,7 +1,7 @@
 #pragma once
 /// @file volumes/grids/page_memory.h
-/// Memory of fields, in whole pages. It may have a bound: its pages are then those of a file, and of those that were
-/// not used lately the process keeps only as many as the bound allows. Code that reads and writes it does not notice.
+/// Memory of fields, in whole pages. The memory of the process may have a bound. The pages are then those of a file:
+/// they leave memory when the bound is near, and return when they are used. Code that uses them does not notice.
 
 #include <cstddef>
 #include <filesystem>
@@ -10,10 +10,9 @@
 
 namespace tensorray {
 
-/// From now on, what is resident of this process, with everything, stays below `bytes`: pages of fields are in a file
-/// without a name in `folder`, and return from there when they are needed. The bound holds but for what is used within
-/// a few milliseconds, up to some 64 MB for each thread. Called once, before fields are made; later calls have no
-/// effect.
+/// Sets the bound: the resident memory of the whole process then stays below `bytes`. Pages of fields are in a file
+/// without a name in `folder`. Memory may exceed the bound by what is used within a few milliseconds, up to 64 MB for
+/// each thread. Called once, before fields are made; later calls have no effect.
 /// @throw std::invalid_argument if the bound is below what a render takes beside its field; std::runtime_error if the
 /// folder cannot have such a file.
 void bound_memory(std::size_t bytes, const std::filesystem::path& folder);
@@ -21,11 +20,11 @@ void bound_memory(std::size_t bytes, const std::filesystem::path& folder);
 /// The bound, if there is one.
 std::optional<std::size_t> memory_bound();
 
-/// Waits, where there is a bound and it is near, until there is room below it. Code that goes through a whole field
-/// calls it from time to time: it is faster than what watches the bound. Any thread may call it.
+/// Drops pages if the bound is near. Code that goes through a whole field calls it for each block, because it may fill
+/// memory faster than the thread that watches the bound looks. Any thread may call it.
 void make_room();
 
-/// Checks, where there is a bound, that a field can be loaded within it.
+/// Checks that a field can be loaded within the bound, if there is one.
 /// @param stored  Bytes of the field's pages. @param resident  Bytes that it needs beside them.
 /// @throw std::runtime_error with the numbers, if the disk has less space, or the bound is too small.
 void require_room(double stored, double resident);
@@ -40,8 +39,7 @@ void unmap_pages(void* memory, std::size_t bytes) noexcept;
 /// @return the number of bytes that `unmap_pages` then needs.
 std::size_t shrink_pages(void* memory, std::size_t bytes, std::size_t kept) noexcept;
 
-/// An allocator of large arrays, which are pages where there is a bound. The bound must not come between an array and
-/// its end.
+/// An allocator of large arrays. They are pages if there is a bound, which must be set before an array is made.
 template <class T>
 struct PageAllocator {
   using value_type = T;

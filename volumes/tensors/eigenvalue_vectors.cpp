@@ -4,8 +4,6 @@
 // other headers: the linker would keep only one of their copies, which may be compiled for the wrong processor.
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "volumes/tensors/eigenvalue_vectors.cpp"
-// Structs below have vectors as members. That is not possible with vectors whose size is unknown at compile time.
-#define HWY_DISABLED_TARGETS (HWY_SSSE3 | HWY_SVE | HWY_SVE2 | HWY_SVE_256 | HWY_SVE2_128 | HWY_RVV)
 #include <hwy/foreach_target.h>  // IWYU pragma: keep
 // Must come after foreach_target.h:
 #include <hwy/contrib/math/math-inl.h>

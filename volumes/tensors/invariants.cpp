@@ -10,7 +10,7 @@
 #include <Eigen/LU>
 #include <tbb/parallel_for.h>
 
-#include "base/text.h"
+#include "base/text/text.h"
 #include "volumes/tensors/eigenvalues.h"
 
 namespace tensorray {

@@ -6,7 +6,7 @@
 
 #include <Eigen/Core>
 
-#include "base/triangle_mesh.h"
+#include "base/geometry/triangle_mesh.h"
 #include "volumes/bricks/tensor_field.h"
 #include "volumes/tensors/invariants.h"
 

@@ -6,7 +6,7 @@
 
 #include <tbb/parallel_for.h>
 
-#include "volumes/bricks/tensor_sampler.h"
+#include "volumes/sampling/tensor_sampler.h"
 
 namespace tensorray {
 namespace {

@@ -8,7 +8,7 @@
 #include <vtkDataArray.h>
 #include <vtkSmartPointer.h>
 
-#include "base/text.h"
+#include "base/text/text.h"
 
 namespace tensorray {
 namespace {

@@ -17,8 +17,8 @@
 #include <vtkStaticPointLocator.h>
 
 #include "base/constants.h"
-#include "base/ply_writer.h"
-#include "base/triangle_mesh.h"
+#include "base/geometry/ply_writer.h"
+#include "base/geometry/triangle_mesh.h"
 #include "tools/import/meshes/mesh_cell.h"
 
 namespace tensorray {

@@ -5,7 +5,7 @@
 #include <functional>
 #include <string>
 
-#include "base/progress.h"
+#include "base/process/progress.h"
 
 namespace tensorray {
 

@@ -12,12 +12,12 @@
 #include <CLI/CLI.hpp>
 #include <fmt/core.h>
 
-#include "base/distinct_files.h"
-#include "base/numbered_name.h"
-#include "base/output_file.h"
-#include "base/progress.h"
-#include "base/temporary_folder.h"
-#include "base/text.h"
+#include "base/files/distinct_files.h"
+#include "base/files/output_file.h"
+#include "base/files/temporary_folder.h"
+#include "base/process/progress.h"
+#include "base/text/numbered_name.h"
+#include "base/text/text.h"
 #include "tools/command_line/progress_bar.h"
 #include "tools/command_line/tell.h"
 #include "tools/command_line/threads.h"

@@ -2,7 +2,7 @@
 /// The program `tensorray-import`: everything that needs VTK, Teem or the NIfTI library.
 ///   tensorray-import ARGUMENTS...                    runs `tensorray import ARGUMENTS...`
 ///   tensorray-import --read-vtp EXCHANGE FILE NAME...    VTK polydata, with the named arrays → a file of poly_data.h
-/// Only volumes/files/vtk_files.h uses the last one. Its errors are one line, without the program's name.
+/// Only volumes/points/vtk_files.h uses the last one. Its errors are one line, without the program's name.
 
 #include <csignal>
 #include <cstdio>
@@ -12,12 +12,12 @@
 
 #include <CLI/CLI.hpp>
 
-#include "base/child_program.h"
+#include "base/process/child_program.h"
 #include "tools/command_line/interrupts.h"
 #include "tools/command_line/run_and_report.h"
 #include "tools/command_line/tell.h"
 #include "tools/import/program/import_command.h"
-#include "tools/import/vtk/vtp_files.h"
+#include "tools/import/vtk_formats/vtp_files.h"
 
 namespace {
 

@@ -2,7 +2,7 @@
 /// @file tools/import/vtk/silent_stderr.h
 /// Silences standard error, because netCDF and the C++ runtime write to it directly. Private to the importer.
 
-#include "base/descriptor.h"
+#include "base/files/descriptor.h"
 
 namespace tensorray {
 

@@ -14,7 +14,7 @@
 #include <CLI/CLI.hpp>
 #include <fmt/format.h>
 
-#include "base/child_program.h"
+#include "base/process/child_program.h"
 #include "renderer/images/image.h"
 #include "tools/command_line/interrupts.h"
 #include "tools/command_line/progress_bar.h"
@@ -22,8 +22,8 @@
 #include "tools/command_line/tell.h"
 #include "tools/command_line/threads.h"
 #include "tools/viewer/pages.h"
-#include "tools/viewer/server.h"
-#include "tools/viewer/token.h"
+#include "tools/viewer/server/server.h"
+#include "tools/viewer/server/token.h"
 
 namespace {
 

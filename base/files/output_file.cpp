@@ -1,0 +1,198 @@
+#include "base/files/output_file.h"
+
+#include <atomic>
+#include <cerrno>
+#include <cstddef>
+#include <cstring>
+#include <stdexcept>
+#include <string>
+#include <system_error>
+#include <utility>
+
+#include <fcntl.h>
+#include <fmt/core.h>
+#include <unistd.h>
+
+#include "base/errors.h"
+#include "base/files/descriptor.h"
+#include "base/files/temporary_folder.h"
+
+namespace tensorray {
+namespace {
+
+namespace fs = std::filesystem;
+
+/// Makes an empty file with a new name in `folder`.
+fs::path make_temporary(const fs::path& folder, const fs::path& target) {
+  static std::atomic<unsigned> counter{0};
+  // Longer endings name no format, and a name has a greatest length.
+  constexpr std::size_t longest_ending = 32;
+  const std::string ending = target.extension().string().size() <= longest_ending ? target.extension().string() : "";
+  while (true) {
+    const fs::path path = folder / fmt::format(".tensorray-{}-{}{}", getpid(), counter++, ending);
+    const Descriptor file = open_file(path, O_WRONLY | O_CREAT | O_EXCL);
+    if (file.is_open()) return path;
+    if (errno == EEXIST) continue;  // A killed process with the same process number left this file.
+    fail(target, fmt::format("cannot write to the folder {}: {}", folder.string(), std::strerror(errno)));
+  }
+}
+
+void copy_into(const fs::path& source, const fs::path& device) {
+  const Descriptor from = open_file(source, O_RDONLY);
+  if (!from.is_open()) fail(device, fmt::format("cannot read {}: {}", source.string(), std::strerror(errno)));
+  Descriptor to = open_file(device, O_WRONLY);
+  if (!to.is_open()) fail(device, fmt::format("cannot be opened: {}", std::strerror(errno)));
+  std::vector<char> buffer(1 << 20);
+  while (true) {
+    const ssize_t size = ::read(from.get(), buffer.data(), buffer.size());
+    if (size < 0 && errno == EINTR) continue;
+    if (size < 0) fail(device, fmt::format("cannot read {}: {}", source.string(), std::strerror(errno)));
+    if (size == 0) break;
+    if (!write_whole(to.get(), {buffer.data(), static_cast<std::size_t>(size)}))
+      fail(device, fmt::format("cannot be written: {}", std::strerror(errno)));
+  }
+  if (!to.close()) fail(device, fmt::format("cannot be written: {}", std::strerror(errno)));
+}
+
+fs::path folder_of(const fs::path& file) { return file.has_parent_path() ? file.parent_path() : fs::path("."); }
+
+}  // namespace
+
+OutputFile::OutputFile(fs::path target) : target_(std::move(target)) {
+  std::error_code error;
+  const fs::file_status status = fs::status(target_, error);
+  const bool is_loop = error == std::errc::too_many_symbolic_link_levels;  // behind_links reports it.
+  if (status.type() == fs::file_type::none && !is_loop)
+    fail(target_, fmt::format("cannot be written: {}", error.message()));
+  if (fs::is_directory(status) || !target_.has_filename()) fail(target_, "is a folder; give the name of a file");
+  if (fs::exists(status) && ::access(target_.c_str(), W_OK) != 0) {
+    fail(target_, fmt::format("cannot be written: {}", std::strerror(errno)));
+  }
+  is_device_ = fs::exists(status) && !fs::is_regular_file(status);
+  if (is_device_) {
+    resolved_ = target_;
+    temporary_ = make_temporary(temporary_files(), target_);
+    return;
+  }
+  resolved_ = fs::exists(status) ? fs::canonical(target_) : behind_links(target_);
+  const fs::path folder = folder_of(resolved_);
+  if (!fs::is_directory(folder, error)) fail(target_, fmt::format("there is no folder {}; make it", folder.string()));
+  temporary_ = make_temporary(folder, target_);
+}
+
+OutputFile::~OutputFile() { discard(); }
+
+OutputFile::OutputFile(OutputFile&& other) noexcept
+    : target_(std::move(other.target_)),
+      resolved_(std::move(other.resolved_)),
+      temporary_(std::exchange(other.temporary_, {})),
+      backup_(std::exchange(other.backup_, {})),
+      is_device_(other.is_device_) {}
+
+OutputFile& OutputFile::operator=(OutputFile&& other) noexcept {
+  if (this == &other) return *this;
+  discard();
+  target_ = std::move(other.target_);
+  resolved_ = std::move(other.resolved_);
+  temporary_ = std::exchange(other.temporary_, {});
+  backup_ = std::exchange(other.backup_, {});
+  is_device_ = other.is_device_;
+  return *this;
+}
+
+void OutputFile::rethrow_for_target(std::string message) const {
+  const std::string name = temporary_.string();
+  for (std::size_t at = message.find(name); at != std::string::npos; at = message.find(name, at + 1))
+    message.replace(at, name.size(), target_.string());
+  throw std::runtime_error(message);
+}
+
+void OutputFile::copy_into_device() {
+  if (is_device_) copy_into(temporary_, resolved_);
+}
+
+/// Gives the old file at the target a second name, so that it can be restored.
+void OutputFile::keep_old() {
+  if (is_device_) return;
+  std::error_code error;
+  const fs::file_status old = fs::status(resolved_, error);
+  if (!fs::exists(old)) return;
+  if (!fs::is_regular_file(old))
+    fail(target_, "has become a folder or a device while it was written; choose another name");
+  fs::permissions(temporary_, old.permissions(), error);
+  backup_ = make_temporary(folder_of(resolved_), target_);
+  fs::remove(backup_, error);
+  fs::create_hard_link(resolved_, backup_, error);
+  if (!error) return;
+  fs::rename(resolved_, backup_, error);  // The file system has no hard links.
+  if (error) {
+    backup_.clear();
+    fail(target_, fmt::format("cannot be replaced: {}", error.message()));
+  }
+}
+
+void OutputFile::replace_old() {
+  if (is_device_) return;
+  std::error_code error;
+  fs::rename(temporary_, resolved_, error);
+  if (error) fail(target_, fmt::format("cannot be replaced: {}", error.message()));
+  temporary_.clear();
+}
+
+/// Restores the old file at the target.
+void OutputFile::undo() noexcept {
+  if (is_device_) return;
+  std::error_code error;
+  const bool replaced = temporary_.empty();
+  if (!backup_.empty()) {
+    fs::rename(backup_, resolved_, error);
+    // If both names belong to one file, rename does nothing, and the backup is left.
+    fs::remove(backup_, error);
+  } else if (replaced) {
+    fs::remove(resolved_, error);
+  }
+  backup_.clear();
+}
+
+void OutputFile::discard() noexcept {
+  std::error_code error;
+  for (fs::path* path : {&temporary_, &backup_}) {
+    if (!path->empty()) fs::remove(*path, error);
+    path->clear();
+  }
+}
+
+fs::path behind_links(const fs::path& target) {
+  constexpr int longest_chain = 40;  // The limit of Linux.
+  fs::path path = target;
+  for (int i = 0; i < longest_chain; ++i) {
+    std::error_code error;
+    if (!fs::is_symlink(fs::symlink_status(path, error))) return path;
+    const fs::path next = fs::read_symlink(path, error);
+    if (error) fail(target, fmt::format("cannot follow the link {}: {}", path.string(), error.message()));
+    path = next.is_absolute() ? next : path.parent_path() / next;
+  }
+  fail(target, "is a loop of symbolic links; remove it or choose another name");
+}
+
+void OutputFile::commit() {
+  std::vector<OutputFile> files;
+  files.push_back(std::move(*this));
+  commit_all(files);
+}
+
+void commit_all(std::vector<OutputFile>& files) {
+  for (const OutputFile& file : files)
+    if (file.temporary_.empty()) throw std::logic_error(file.target_.string() + ": was committed before");
+  for (OutputFile& file : files) file.copy_into_device();
+  try {
+    for (OutputFile& file : files) file.keep_old();
+    for (OutputFile& file : files) file.replace_old();
+  } catch (...) {
+    for (OutputFile& file : files) file.undo();
+    throw;
+  }
+  for (OutputFile& file : files) file.discard();
+}
+
+}  // namespace tensorray

@@ -1,0 +1,74 @@
+#pragma once
+/// @file base/files/output_file.h
+/// Output files that are either complete or absent.
+
+#include <filesystem>
+#include <vector>
+
+namespace tensorray {
+
+/// A file that is being written. It has a temporary name first, and replaces the target when it is complete. An older
+/// file at the target stays until then, and stays if the work fails.
+///
+/// Symbolic links are followed: the link stays, and the file that it points to is replaced. A target that is not a
+/// regular file (a device, a pipe) is never replaced: the bytes are copied into it.
+class OutputFile {
+ public:
+  /// Makes the empty temporary file, so that a target that cannot be written is reported before the work begins.
+  /// @throw std::runtime_error naming the target and the fix, if the target is a folder or is write-protected, or if
+  /// its folder is missing or cannot be written.
+  explicit OutputFile(std::filesystem::path target);
+
+  /// Removes the temporary file if it was not committed.
+  ~OutputFile();
+  OutputFile(OutputFile&& other) noexcept;
+  OutputFile& operator=(OutputFile&& other) noexcept;
+
+  /// The temporary file to write. It has the ending of the target, because writers choose the format by the ending.
+  const std::filesystem::path& path() const { return temporary_; }
+  const std::filesystem::path& target() const { return target_; }
+  bool is_device() const { return is_device_; }
+
+  /// Calls `writer(path())`. In the text of an error that it throws, the target's name replaces the temporary name.
+  template <class Writer>
+  void write(const Writer& writer) {
+    try {
+      writer(temporary_);
+    } catch (const std::runtime_error& error) {
+      rethrow_for_target(error.what());
+    }
+  }
+
+  /// Does what commit_all does, for this file alone.
+  void commit();
+
+ private:
+  friend void commit_all(std::vector<OutputFile>& files);
+
+  [[noreturn]] void rethrow_for_target(std::string message) const;
+  void copy_into_device();
+  void keep_old();
+  void replace_old();
+  void undo() noexcept;
+  void discard() noexcept;
+
+  std::filesystem::path target_;     ///< The target as the caller gave it.
+  std::filesystem::path resolved_;   ///< The target after following symbolic links.
+  std::filesystem::path temporary_;  ///< Empty if the file was committed or moved from.
+  std::filesystem::path backup_;     ///< The older file of the target, until all files of a commit are in place.
+  bool is_device_ = false;
+};
+
+/// Replaces each target by the file that was written. A new file takes over the permissions of the old one. Either all
+/// targets change or none: the old files are kept until all new files are in place, and are restored if one cannot be
+/// placed. There are two exceptions. Bytes that were copied into a device cannot be taken back; devices come first, so
+/// that nothing else has changed if one fails. If the process is killed in the short time between two renames, each
+/// target is a complete file, but some may be old and some new, and hidden files `.tensorray-*` may be left over.
+/// @throw std::runtime_error naming the target and the reason, for example a device that is full.
+void commit_all(std::vector<OutputFile>& files);
+
+/// Follows symbolic links. The last one may point to a file that does not exist yet.
+/// @throw std::runtime_error if the links form a loop.
+std::filesystem::path behind_links(const std::filesystem::path& target);
+
+}  // namespace tensorray

@@ -1,0 +1,33 @@
+#pragma once
+/// @file base/process/process_limits.h
+/// What this process may use of the machine.
+
+#include <filesystem>
+#include <string>
+
+namespace tensorray {
+
+/// The processors that this process may use, at least 1: those of its affinity, or fewer where a container has a
+/// quota of processor time (cpu.max of cgroups, cpu.cfs_quota_us of their first version); a fraction of a processor
+/// counts as one.
+/// @param root  The root of the file system, for tests.
+unsigned usable_processors(const std::filesystem::path& root = "/");
+
+struct MemoryLimit {
+  double bytes = 0;   ///< Infinite if nothing is known.
+  std::string cause;  ///< What sets it, for a message: "this machine's memory".
+};
+
+/// The least of: the machine's memory and swap, the memory of containers (cgroups), and what the limits of this process
+/// (`ulimit -v`, `ulimit -d`) leave.
+MemoryLimit memory_limit(const std::filesystem::path& root = "/");
+
+/// Checks that stacks are large enough: one that ends cannot be reported.
+/// @throw std::runtime_error with the fix.
+void require_stack();
+
+/// Checks that `count` threads can be started at once, besides those that run. Libraries that meet this only later end
+/// the process. @throw std::runtime_error with the cause and the fix.
+void require_threads(unsigned count);
+
+}  // namespace tensorray

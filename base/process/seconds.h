@@ -1,0 +1,15 @@
+#pragma once
+/// @file base/process/seconds.h
+/// Time that work takes, for statistics.
+
+#include <chrono>
+
+namespace tensorray {
+
+using Clock = std::chrono::steady_clock;
+
+inline double seconds_since(Clock::time_point start) {
+  return std::chrono::duration<double>(Clock::now() - start).count();
+}
+
+}  // namespace tensorray

@@ -1,0 +1,25 @@
+#pragma once
+/// @file base/text/path_text.h
+/// Paths as UTF-8, which JSON and other text formats need. A path of Linux is any bytes.
+
+#include <filesystem>
+#include <string>
+
+namespace tensorray {
+
+/// `bytes` as valid UTF-8. Bytes that are no UTF-8 become characters that no name has for another reason, U+F700 and
+/// the byte, from Unicode's private use area; UTF-8 stays as it is. Characters of that kind in `bytes` are written byte
+/// by byte, too, so that each text has one meaning.
+std::string utf8_of(const std::string& bytes);
+
+/// The bytes that utf8_of was given. Any other text stays as it is.
+std::string bytes_of_utf8(const std::string& text);
+
+inline std::string text_of_path(const std::filesystem::path& path) { return utf8_of(path.string()); }
+inline std::filesystem::path path_of_text(const std::string& text) { return bytes_of_utf8(text); }
+
+/// `file` with `suffix` at its end. Where the name would be longer than names may be, its middle is left out, and a
+/// hash of it takes its place: names that differ stay different.
+std::filesystem::path with_suffix(const std::filesystem::path& file, const std::string& suffix);
+
+}  // namespace tensorray

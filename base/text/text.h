@@ -1,0 +1,35 @@
+#pragma once
+/// @file base/text/text.h
+/// Small helpers for text.
+
+#include <filesystem>
+#include <string>
+#include <vector>
+
+namespace tensorray {
+
+/// Makes one line of a library's error text: line ends become "; ", and blanks at the ends of lines are removed.
+std::string one_line(const std::string& text);
+
+/// `text` with its control characters as escapes ("\n", "\x1b"), so that a message stays one line on any terminal.
+std::string escaped(const std::string& text);
+
+/// Joins words to one text: "a, b, c".
+std::string joined(const std::vector<std::string>& words, const char* separator = ", ");
+
+/// Without the blanks, tabs and carriage returns at both ends.
+std::string trimmed(const std::string& text);
+
+bool starts_with(const std::string& text, const std::string& beginning);
+bool ends_with(const std::string& text, const std::string& ending);
+
+/// Changes ASCII letters to lower case.
+std::string lower_case(std::string text);
+
+/// The file name's ending with its dot, in lower case: ".png".
+std::string lower_case_ending(const std::filesystem::path& path);
+
+/// A number of bytes with its unit: "693.0 KiB", "1.5 MiB", "2.3 GiB".
+std::string bytes_text(double bytes);
+
+}  // namespace tensorray

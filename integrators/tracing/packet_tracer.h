@@ -1,0 +1,20 @@
+#pragma once
+/// @file integrators/tracing/packet_tracer.h
+/// Traces a batch of rays in packets (packet_kernel.h) inside the field. The scalar tracer (scalar_tracer.h)
+/// does the rest, ray by ray: the way to the field and behind it, steps that end on surfaces or are too short for
+/// single precision, and the last step of rays with differentials. A part of trace.cpp.
+
+#include "integrators/bending/bending.h"
+#include "integrators/bending/geometry.h"
+#include "integrators/bending/ray_record.h"
+#include "volumes/bricks/tensor_field.h"
+
+namespace tensorray {
+
+/// The same as `trace`.
+/// @param records  Empty, one for each ray; or null.
+/// @return false if packets cannot trace this batch; the batch is then unchanged.
+bool trace_in_packets(const TensorField& field, const Geometry& geometry, const BendingSettings& settings,
+                      RayBatch& batch, RayRecord* records);
+
+}  // namespace tensorray

@@ -1,0 +1,372 @@
+#include "renderer/camera/path_tracer.h"
+
+#include <algorithm>
+#include <atomic>
+#include <cmath>
+#include <limits>
+#include <numeric>
+#include <optional>
+#include <stdexcept>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include <tbb/parallel_for.h>
+
+#include "base/errors.h"
+#include "base/process/seconds.h"
+#include "renderer/camera/picture_tile.h"
+
+namespace tensorray {
+namespace {
+
+using Eigen::Vector2d;
+using Eigen::Vector2f;
+using Eigen::Vector3f;
+
+constexpr int tile_size = 16;    ///< Pixels.
+constexpr int neighborhood = 2;  ///< Pixels in each direction that help decide whether a pixel is done.
+/// Samples that are shaded together. Where light bends, their rays fill packets; otherwise, all that is known of them
+/// should stay in the cache of the first level.
+constexpr std::size_t bent_batch = 256, straight_batch = 32;
+constexpr double least_luminance = 0.05;  ///< To which errors are compared; fraction of the picture's mean.
+
+void require_valid(const Camera& camera, const PathTracerSettings& settings) {
+  require(camera.resolution.minCoeff() >= 1, "the camera's resolution must be >= 1");
+  require(settings.min_samples >= 1, "min_samples must be >= 1");
+  require(settings.max_samples >= settings.min_samples, "max_samples must be >= min_samples");
+  require(settings.pass_samples >= 1, "pass_samples must be >= 1");
+  require(settings.noise_threshold >= 0 && std::isfinite(settings.noise_threshold), "noise_threshold must be >= 0");
+  require(settings.noise_threshold == 0 || settings.min_samples >= 2,
+          "min_samples must be >= 2 where there is a noise_threshold");
+  require(settings.max_seconds >= 0, "max_seconds must be >= 0");
+  require(settings.first_samples >= 1 && settings.first_samples <= settings.min_samples,
+          "first_samples must be 1 to min_samples");
+}
+
+/// Adds one value to a mean; `count` includes it.
+template <class Mean, class Value>
+void extend_mean(Mean&& mean, int count, const Value& value) {
+  mean += (value - mean) / static_cast<float>(count);
+}
+
+/// Sets the means of a pixel's bands after `samples` more of `count` samples.
+void extend_means(const BandsIn& sum, int samples, double count, double* means) {
+  for (Eigen::Index band = 0; band < sum.size(); ++band) means[band] += (sum[band] - samples * means[band]) / count;
+}
+
+class Rendering {
+ public:
+  Rendering(const ShadedScene& scene, const Camera& camera, const PathTracerSettings& settings,
+            const RenderCallbacks& callbacks, Work& work)
+      : scene_(scene),
+        camera_(camera),
+        settings_(settings),
+        callbacks_(callbacks),
+        work_(work),
+        width_(camera.resolution.x()),
+        height_(camera.resolution.y()),
+        columns_((width_ + tile_size - 1) / tile_size),
+        tiles_(static_cast<std::size_t>(columns_) * ((height_ + tile_size - 1) / tile_size)),
+        light_values_(scene.colors.bands() + 3 * static_cast<std::size_t>(scene.layers())),
+        batch_samples_(scene.region ? bent_batch : straight_batch) {}
+
+  SurfacePicture run();
+
+ private:
+  /// Samples of pixels, to be shaded together; and the memory of one thread.
+  struct Batch {
+    Batch(const ShadedScene& scene, const ShadingSettings& settings)
+        : shader(scene, settings), sum(Eigen::ArrayXXd::Zero(scene.colors.bands(), 1 + scene.layers())) {}
+    RayShader shader;
+    std::vector<ViewRay> rays;
+    std::vector<Vector2d> offsets;  // Of each sample from its pixel's centre.
+    Eigen::ArrayXXd sum;            // Of one pixel's samples: radiance and layers.
+  };
+
+  Tile load(std::size_t number) const;
+  std::vector<std::size_t> wanted() const;
+  double mean_luminance() const;
+  void count_samples();
+  void count_tiles();
+  double time_used() const;
+  int next_samples(int before) const;
+  void add_ray(int x, int y, int sample, Batch& batch) const;
+  void pass(const std::vector<std::size_t>& tiles);
+  void extend(std::size_t number, Batch& batch);
+  void shade(Tile& tile, int before, int after, Batch& batch);
+  void add_sample(PixelState& pixel, std::size_t number, Batch& batch) const;
+  void add_light(Tile& tile, int x, int y, int samples, Batch& batch) const;
+  void add_surface(PixelState& pixel, const Vector2d& offset, const FirstSurface& surface) const;
+  void add_place(PixelState& pixel, const FirstSurface& surface) const;
+  bool finish_pixels(Tile& tile);
+  bool is_precise(Tile& tile, int x, int y) const;
+  SurfacePicture picture() const;
+
+  const ShadedScene& scene_;
+  const Camera& camera_;
+  const PathTracerSettings& settings_;
+  const RenderCallbacks& callbacks_;
+  Work& work_;
+  const int width_, height_, columns_;  ///< Columns of tiles.
+  const std::size_t tiles_;
+  const std::size_t light_values_;  ///< For each pixel.
+  const std::size_t batch_samples_;
+  double floor_ = 0;  ///< Least luminance to which errors are compared.
+  Clock::time_point start_ = Clock::now();
+  std::uint64_t total_samples_ = 0;
+  std::atomic<std::uint64_t> finished_samples_{0};
+};
+
+SurfacePicture Rendering::run() {
+  work_.begin(tiles_);
+  if (settings_.noise_threshold > 0) floor_ = least_luminance * mean_luminance();
+  count_samples();
+  while (!work_.stopping) {
+    const std::vector<std::size_t> tiles = work_.next ? work_.next() : wanted();
+    if (tiles.empty()) break;
+    if (work_.next) count_tiles();
+    pass(tiles);
+  }
+  return picture();
+}
+
+/// An estimate of the picture's mean luminance from one sample of some pixels. It is the same for every part of the
+/// work, and takes less than a hundredth of its time, but for tiny pictures.
+double Rendering::mean_luminance() const {
+  const int step = 1 + std::max(width_, height_) / 128;
+  const int columns = (width_ + step - 1) / step, rows = (height_ + step - 1) / step;
+  std::vector<double> luminances(static_cast<std::size_t>(columns) * rows);
+  tbb::parallel_for(0, rows, [&](int row) {
+    Batch batch(scene_, settings_.shading);
+    for (int column = 0; column < columns; ++column) add_ray(column * step, row * step, 0, batch);
+    batch.shader.shade(batch.rays, !settings_.transparent);
+    for (int column = 0; column < columns; ++column)
+      luminances[static_cast<std::size_t>(row) * columns + column] =
+          scene_.colors.luminance(batch.shader.radiance(static_cast<std::size_t>(column)));
+  });
+  return std::accumulate(luminances.begin(), luminances.end(), 0.0) / static_cast<double>(luminances.size());
+}
+
+/// For the progress: counts the samples of the part, and those that are kept.
+void Rendering::count_samples() {
+  const auto most = static_cast<std::uint64_t>(settings_.max_samples);
+  for (std::size_t number = 0; number < tiles_; ++number) {
+    if (!work_.is_in_part(number)) continue;
+    const Tile tile = load(number);
+    total_samples_ += tile.pixels.size() * most;
+    for (const PixelState& pixel : tile.pixels)
+      finished_samples_ += pixel.done != 0 ? most : static_cast<std::uint64_t>(pixel.samples);
+  }
+}
+
+/// For the progress where other processes render tiles, too: counts the tiles of the part that are done.
+void Rendering::count_tiles() {
+  std::uint64_t done = 0, all = 0;
+  for (std::size_t number = 0; number < tiles_; ++number) {
+    all += work_.is_in_part(number) ? 1 : 0;
+    done += work_.is_in_part(number) && !work_.wants(number) ? 1 : 0;
+  }
+  if (all > 0) finished_samples_ = total_samples_ * done / all;
+}
+
+/// The fraction of the time that is used up.
+double Rendering::time_used() const {
+  return std::isinf(settings_.max_seconds) ? 0 : seconds_since(start_) / std::max(settings_.max_seconds, 1e-300);
+}
+
+/// How many more samples pixels of a tile get that have `before`; 0: none, as the time is over.
+int Rendering::next_samples(int before) const {
+  const int most = std::min(settings_.pass_samples, settings_.max_samples - before);
+  if (std::isinf(settings_.max_seconds)) return before == 0 ? settings_.min_samples : most;
+  if (before == 0) return settings_.first_samples;
+  return time_used() < 1 ? std::min(before, most) : 0;
+}
+
+/// A tile as it is kept.
+Tile Rendering::load(std::size_t number) const {
+  const int left = static_cast<int>(number) % columns_ * tile_size,
+            top = static_cast<int>(number) / columns_ * tile_size;
+  Tile tile(left, top, std::min(tile_size, width_ - left), std::min(tile_size, height_ - top), light_values_);
+  if (const auto state = work_.state(number)) tile.set_bytes(*state);
+  return tile;
+}
+
+std::vector<std::size_t> Rendering::wanted() const {
+  std::vector<std::size_t> tiles;
+  for (std::size_t number = 0; number < tiles_; ++number)
+    if (work_.wants(number)) tiles.push_back(number);
+  return tiles;
+}
+
+/// Gives all `tiles` more samples.
+void Rendering::pass(const std::vector<std::size_t>& tiles) {
+  const auto caller = std::this_thread::get_id();
+  tbb::parallel_for(std::size_t{0}, tiles.size(), [&](std::size_t i) {
+    if (work_.stopping) return;
+    Batch batch(scene_, settings_.shading);
+    extend(tiles[i], batch);
+    if (std::this_thread::get_id() != caller) return;
+    if (callbacks_.progress) {
+      const auto by_time = static_cast<std::uint64_t>(std::min(1.0, time_used()) * static_cast<double>(total_samples_));
+      callbacks_.progress(std::max(finished_samples_.load(), by_time), total_samples_);
+    }
+    if (callbacks_.show && work_.picture_wanted.exchange(false)) callbacks_.show(picture());
+  });
+}
+
+void Rendering::extend(std::size_t number, Batch& batch) {
+  Tile tile = load(number);
+  const int before = tile.samples(), more = next_samples(before), after = before + more;
+  for (int y = 0; y < tile.height; ++y)
+    for (int x = 0; x < tile.width; ++x) {
+      if (tile.pixel(x, y).done != 0) continue;
+      for (int sample = before; sample < after; ++sample) {
+        add_ray(tile.left + x, tile.top + y, sample, batch);
+        if (batch.rays.size() == batch_samples_) shade(tile, before, after, batch);
+      }
+    }
+  shade(tile, before, after, batch);
+  const bool has_enough = after == settings_.max_samples || (after >= settings_.min_samples && finish_pixels(tile));
+  const bool done = has_enough || more == 0;
+  work_.keep(number, tile.bytes(), done);
+}
+
+/// Adds the ray of a sample of pixel x, y of the picture.
+void Rendering::add_ray(int x, int y, int sample, Batch& batch) const {
+  PathSampler sampler(settings_.seed, static_cast<std::size_t>(y) * width_ + x, static_cast<std::uint32_t>(sample));
+  const Vector2d offset = settings_.filter.sample(sampler.in_pixel());
+  const Vector2d lens = camera_.lens_radius > 0 ? square_to_disk(sampler.next_2d()) : Vector2d(0, 0);
+  const CameraRay ray = camera_ray(camera_, Vector2d(x + 0.5, y + 0.5) + offset, lens);
+  batch.rays.push_back({ray.origin, ray.direction, sampler});
+  batch.offsets.push_back(offset);
+}
+
+/// Shades the batch and adds its samples to their pixels. These had `before` samples, and will have `after`.
+void Rendering::shade(Tile& tile, int before, int after, Batch& batch) {
+  batch.shader.shade(batch.rays, !settings_.transparent);
+  for (std::size_t i = 0; i < batch.rays.size(); ++i) {
+    const auto width = static_cast<std::uint64_t>(width_), index = batch.rays[i].sampler.pixel;
+    const int x = static_cast<int>(index % width) - tile.left, y = static_cast<int>(index / width) - tile.top;
+    PixelState& pixel = tile.pixel(x, y);
+    add_sample(pixel, i, batch);
+    if (pixel.samples == after) add_light(tile, x, y, after - before, batch);
+  }
+  finished_samples_ += batch.rays.size();
+  batch.rays.clear();
+  batch.offsets.clear();
+}
+
+/// Adds sample `number` of the batch: all but its light to the pixel, and its light to the pixel's sum.
+void Rendering::add_sample(PixelState& pixel, std::size_t number, Batch& batch) const {
+  const RayShader& shader = batch.shader;
+  const RayView& view = shader.view(number);
+  batch.sum.col(0) += shader.radiance(number);
+  for (int layer = 0; layer < scene_.layers(); ++layer) batch.sum.col(1 + layer) += shader.layer(number, layer);
+  if (view.bent) {
+    extend_mean(pixel.radiance_scale, ++pixel.bent, static_cast<float>(view.bent->radiance_scale));
+    extend_mean(pixel.deflection, pixel.bent, static_cast<float>(view.bent->deflection));
+    extend_mean(pixel.arrives, pixel.bent, static_cast<float>(view.bent->arrives));
+  }
+  ++pixel.samples;
+  const double luminance = scene_.colors.luminance(shader.radiance(number)), change = luminance - pixel.luminance;
+  pixel.luminance += change / pixel.samples;
+  pixel.squares += change * (luminance - pixel.luminance);
+  if (view.surface) add_surface(pixel, batch.offsets[number], *view.surface);
+}
+
+/// Adds the light of a pixel's `samples` to the tile.
+void Rendering::add_light(Tile& tile, int x, int y, int samples, Batch& batch) const {
+  const int count = tile.pixel(x, y).samples;
+  double* light = tile.light_of(x, y);
+  extend_means(batch.sum.col(0), samples, count, light);
+  light += batch.sum.rows();
+  for (int layer = 0; layer < scene_.layers(); ++layer, light += 3)
+    extend_means(scene_.colors.color(batch.sum.col(1 + layer)).cast<double>().array(), samples, count, light);
+  batch.sum.setZero();
+}
+
+void Rendering::add_surface(PixelState& pixel, const Vector2d& offset, const FirstSurface& surface) const {
+  const double depth = (surface.hit.position - camera_.position).dot(camera_.forward);
+  ++pixel.hits;
+  extend_mean(pixel.depth, pixel.hits, static_cast<float>(depth));
+  extend_mean(Eigen::Map<Vector3f>(pixel.normal), pixel.hits, Vector3f(surface.normal.cast<float>()));
+  extend_mean(Eigen::Map<Vector3f>(pixel.albedo), pixel.hits, surface.albedo);
+  const SurfaceData data = scene_.surfaces.data(surface.hit);
+  if (data.force) extend_mean(pixel.force, ++pixel.force_hits, *data.force);
+  if (data.arc_length) extend_mean(pixel.arc_length, ++pixel.length_hits, *data.arc_length);
+  if (data.path && offset.squaredNorm() < pixel.nearest) {
+    pixel.nearest = offset.squaredNorm();
+    pixel.path = static_cast<float>(*data.path);
+  }
+  if (scene_.region) add_place(pixel, surface);
+}
+
+/// The place in a texture, and the sheets of light that have landed there.
+void Rendering::add_place(PixelState& pixel, const FirstSurface& surface) const {
+  const SurfaceHit& hit = surface.hit;
+  if (const auto& texture = scene_.surfaces.surfaces()[hit.surface].texture) {
+    const Vector2d place =
+        texture->plate.to_pixel(hit.position).cwiseQuotient(texture->plate.resolution.cast<double>());
+    extend_mean(Eigen::Map<Vector2f>(pixel.texture), ++pixel.texture_hits,
+                Vector2f(Vector2d(place.x(), 1 - place.y()).cast<float>()));
+  }
+  float folds = 0;
+  bool is_landed = false;
+  for (const IrradianceMap& light : scene_.irradiance_maps) {
+    if (light.surface != hit.surface || !is_lit(light, hit.position, surface.direction)) continue;
+    folds += folds_at(light, hit.position);
+    is_landed = true;
+  }
+  if (is_landed) extend_mean(pixel.folds, ++pixel.folds_hits, folds);
+}
+
+/// Marks the pixels that are done. Pixels of other tiles do not matter.
+/// @return whether all are done.
+bool Rendering::finish_pixels(Tile& tile) {
+  if (settings_.noise_threshold == 0) return false;
+  bool all_done = true;
+  for (int y = 0; y < tile.height; ++y)
+    for (int x = 0; x < tile.width; ++x) {
+      PixelState& pixel = tile.pixel(x, y);
+      if (pixel.done != 0) continue;
+      pixel.done = is_precise(tile, x, y) ? 1 : 0;
+      all_done = all_done && pixel.done != 0;
+      if (pixel.done != 0) finished_samples_ += static_cast<std::uint64_t>(settings_.max_samples - pixel.samples);
+    }
+  return all_done;
+}
+
+bool Rendering::is_precise(Tile& tile, int x, int y) const {
+  const auto precise = [&](double variance, double luminance) {
+    return std::sqrt(variance) <= settings_.noise_threshold * std::max(luminance, floor_);
+  };
+  if (!precise(tile.pixel(x, y).variance(), tile.pixel(x, y).luminance)) return false;
+  double variance = 0, luminance = 0, count = 0;
+  for (int row = std::max(y - neighborhood, 0); row <= std::min(y + neighborhood, tile.height - 1); ++row)
+    for (int column = std::max(x - neighborhood, 0); column <= std::min(x + neighborhood, tile.width - 1); ++column) {
+      variance += tile.pixel(column, row).variance();
+      luminance += tile.pixel(column, row).luminance;
+      count += 1;
+    }
+  return precise(variance / count, luminance / count);
+}
+
+/// The picture of the tiles as they are kept.
+SurfacePicture Rendering::picture() const {
+  SurfacePicture picture = empty_picture(width_, height_, scene_);
+  for (std::size_t number = 0; number < tiles_; ++number) add_tile(load(number), settings_.transparent, picture);
+  return picture;
+}
+
+}  // namespace
+
+SurfacePicture render_surfaces(const ShadedScene& scene, const Camera& camera, const PathTracerSettings& settings,
+                               const RenderCallbacks& callbacks) {
+  require_valid(camera, settings);
+  require_shadable(scene, settings.shading);
+  Work own;
+  return Rendering(scene, camera, settings, callbacks, callbacks.work ? *callbacks.work : own).run();
+}
+
+}  // namespace tensorray

@@ -1,0 +1,244 @@
+#include "renderer/charts/color_bar.h"
+
+#include <algorithm>
+#include <array>
+#include <charconv>
+#include <cmath>
+#include <cstddef>
+#include <stdexcept>
+
+#include <Eigen/Geometry>
+
+#include "renderer/charts/ink.h"
+#include "renderer/charts/lettering.h"
+
+namespace tensorray {
+namespace {
+
+using Box = Eigen::AlignedBox2d;  // In pixels from the upper left corner, continuous.
+
+// --- Scales
+
+/// Tolerance at the ends of the range, as a fraction of a step: a tick this close outside is still in the range.
+constexpr double rounding = 1e-9;
+
+std::string fixed(double value, int decimals) {
+  std::array<char, 400> text;
+  const auto end = std::to_chars(text.begin(), text.end(), value, std::chars_format::fixed, decimals);
+  return {text.begin(), end.ptr};
+}
+
+int decade_of(double value) { return static_cast<int>(std::floor(std::log10(std::abs(value)) + rounding)); }
+
+/// @param largest  Decade of the largest number of the scale. @param last  Decade of the last digit to be written.
+std::string label_of(double value, int largest, int last) {
+  if (value == 0) return "0";
+  if (largest < 5 && last >= -4) return fixed(value, std::max(0, -last));
+  return fixed(value / std::pow(10.0, largest), std::max(0, largest - last)) + "e" + std::to_string(largest);
+}
+
+/// The smallest step of the form 1, 2 or 5 times a power of ten that divides `size` into at most `most` steps.
+double round_step(double size, int most) {
+  const double raw = size / most * (1 - rounding), decade = std::pow(10.0, std::floor(std::log10(raw)));
+  for (const double factor : {1.0, 2.0, 5.0})
+    if (factor * decade >= raw) return factor * decade;
+  return 10 * decade;
+}
+
+std::vector<Tick> linear_ticks(const ValueRange& range, int most) {
+  const double step = round_step(range.high - range.low, most - 1);
+  const double first = std::ceil(range.low / step - rounding), last = std::floor(range.high / step + rounding);
+  const int largest = decade_of(std::max(std::abs(first), std::abs(last)) * step);
+  std::vector<Tick> ticks;
+  for (double i = first; i <= last; ++i) ticks.push_back({i * step, label_of(i * step, largest, decade_of(step))});
+  return ticks;
+}
+
+/// Ticks at `factors` times powers of ten within the range. Only every `stride`-th power is used.
+std::vector<Tick> decades(const ValueRange& range, const std::vector<double>& factors, int stride) {
+  std::vector<Tick> ticks;
+  for (int decade = decade_of(range.low); decade <= decade_of(range.high); ++decade)
+    for (const double factor : factors) {
+      const double value = factor * std::pow(10.0, decade);
+      if (decade % stride != 0 || value < range.low * (1 - rounding) || value > range.high * (1 + rounding)) continue;
+      ticks.push_back({value, label_of(value, decade, decade)});
+    }
+  return ticks;
+}
+
+std::vector<Tick> logarithmic_ticks(const ValueRange& range, int most) {
+  const auto few = static_cast<std::size_t>(most);
+  std::vector<Tick> ticks = decades(range, {1}, 1);
+  for (int stride = 2; ticks.size() > few; ++stride) ticks = decades(range, {1}, stride);
+  if (ticks.size() < 2) ticks = decades(range, {1, 2, 5}, 1);
+  return ticks.size() < 2 || ticks.size() > few ? linear_ticks(range, most) : ticks;
+}
+
+// --- Drawing
+
+/// Length of the part of [low, high] that lies in the pixel [at, at + 1].
+double overlap(double low, double high, int at) {
+  return std::max(0.0, std::min(high, at + 1.0) - std::max(low, static_cast<double>(at)));
+}
+
+Eigen::AlignedBox2i pixels_of(const Image& image, const Box& box) {
+  const Eigen::Vector2d size(image.width, image.height);
+  const auto within = [&](const Eigen::Vector2d& p) { return p.cwiseMax(0).cwiseMin(size).eval(); };
+  return {within(box.min()).array().floor().cast<int>().matrix(),
+          (within(box.max()).array().ceil() - 1).cast<int>().matrix()};
+}
+
+/// Calls `visit(x, y, coverage)` for each pixel that the box covers, also partly.
+template <class Visit>
+void for_each_pixel(const Image& image, const Box& box, const Visit& visit) {
+  const Eigen::AlignedBox2i pixels = pixels_of(image, box);
+  for (int y = pixels.min().y(); y <= pixels.max().y(); ++y)
+    for (int x = pixels.min().x(); x <= pixels.max().x(); ++x)
+      visit(x, y, overlap(box.min().x(), box.max().x(), x) * overlap(box.min().y(), box.max().y(), y));
+}
+
+void fill(Image& image, const Box& box, const Eigen::Vector3d& color, double opacity = 1) {
+  for_each_pixel(image, box, [&](int x, int y, double coverage) { lay_over(image, x, y, color, opacity * coverage); });
+}
+
+/// Draws a frame around a box.
+void frame(Image& image, const Box& box, double width, const Eigen::Vector3d& color) {
+  const Eigen::Vector2d a = box.min(), b = box.max();
+  const Eigen::Vector2d w(width, width);
+  fill(image, {a - w, Eigen::Vector2d(b.x() + width, a.y())}, color);
+  fill(image, {Eigen::Vector2d(a.x() - width, b.y()), b + w}, color);
+  fill(image, {Eigen::Vector2d(a.x() - width, a.y()), Eigen::Vector2d(a.x(), b.y())}, color);
+  fill(image, {Eigen::Vector2d(b.x(), a.y()), Eigen::Vector2d(b.x() + width, b.y())}, color);
+}
+
+/// Sizes in pixels. All are proportional to the height of a capital letter.
+struct Layout {
+  double letter;  ///< Height of a capital letter.
+  double line;    ///< Width of lines; a whole number of pixels, so that lines are sharp.
+
+  explicit Layout(const Image& image)
+      : letter(std::max(7.0, 0.024 * std::min(image.width, image.height))),
+        line(std::max(1.0, std::round(0.09 * letter))) {}
+
+  double padding() const { return 0.9 * letter; }
+  double gap() const { return 0.5 * letter; }    ///< Distance between a mark and its label.
+  double title() const { return 2.1 * letter; }  ///< Distance from the top of the title to the contents below.
+  double swatch() const { return std::round(1.5 * letter); }  ///< Width of the colour bar and of the squares of a key.
+};
+
+/// The place of a legend, and the colour of its text.
+struct Panel {
+  Box inside;  ///< The panel without padding; its corners lie on whole pixels.
+  Eigen::Vector3d ink;
+};
+
+double mean_brightness(const Image& image, const Box& box) {
+  double sum = 0, weight = 0;
+  for_each_pixel(image, box, [&](int x, int y, double coverage) {
+    const float* const p = image.pixel(x, y);
+    const double brightness = 0.2126 * p[0] + 0.7152 * p[1] + 0.0722 * p[2];
+    if (!std::isfinite(brightness)) return;
+    sum += coverage * std::clamp(brightness, 0.0, 1.0);
+    weight += coverage;
+  });
+  return weight > 0 ? sum / weight : 0;
+}
+
+/// Draws a panel at the right edge of the picture, with room for contents of the given size, and writes the title.
+Panel lay_panel(Image& image, const Layout& layout, const Eigen::Vector2d& size, const std::string& title) {
+  const double padding = std::round(layout.padding());
+  const Eigen::Vector2d full = (size + Eigen::Vector2d::Constant(2 * padding)).array().ceil();
+  const Eigen::Vector2d corner(image.width - full.x() - padding, std::floor((image.height - full.y()) / 2));
+  const Box outside(corner, Eigen::Vector2d(corner + full));
+  // Middle grey is 0.5 in display-referred and about 0.2 in scene-linear pictures; the threshold suits both.
+  const bool is_light = mean_brightness(image, outside) > 0.35;
+  fill(image, outside, Eigen::Vector3d::Constant(is_light), is_light ? 0.75 : 0.6);
+  const Eigen::Vector2d inset = Eigen::Vector2d::Constant(padding);
+  const Panel panel{Box(outside.min() + inset, outside.max() - inset), Eigen::Vector3d::Constant(!is_light)};
+  draw_text(image, panel.inside.min() + Eigen::Vector2d(0, layout.letter), layout.letter, title, panel.ink);
+  return panel;
+}
+
+void check(const Image& image) {
+  const std::vector<std::string>& channels = image.channels;
+  if (channels.size() < 3 || channels[0] != "R" || channels[1] != "G" || channels[2] != "B")
+    throw std::invalid_argument("a legend needs a picture that begins with channels R, G, B");
+}
+
+void check(const ValueRange& range) {
+  if (!(range.low < range.high) || !std::isfinite(range.high - range.low) || (range.logarithmic && range.low <= 0))
+    throw std::invalid_argument("a scale needs a finite range that rises, and on a logarithmic one values above 0");
+}
+
+template <class Items>
+double widest(const Items& items, double height) {
+  double width = 0;
+  for (const auto& item : items) width = std::max(width, text_width(item.label, height));
+  return width;
+}
+
+/// Writes to the right of `left`. Small letters are centred vertically on `middle`.
+void write_label(Image& image, const Layout& layout, double left, double middle, const std::string& label,
+                 const Eigen::Vector3d& ink) {
+  draw_text(image, {left, middle + layout.letter / 2}, layout.letter, label, ink);
+}
+
+}  // namespace
+
+std::vector<Tick> round_ticks(const ValueRange& range, int most) {
+  check(range);
+  if (most < 2) throw std::invalid_argument("a scale needs at least two ticks");
+  return range.logarithmic ? logarithmic_ticks(range, most) : linear_ticks(range, most);
+}
+
+ColorKey direction_key() {
+  return {"", {{"x", Eigen::Vector3d(1, 0, 0)}, {"y", Eigen::Vector3d(0, 1, 0)}, {"z", Eigen::Vector3d(0, 0, 1)}}};
+}
+
+void draw_color_bar(Image& image, const ColorBar& bar) {
+  check(image);
+  check(bar.range);
+  if (!bar.color) throw std::invalid_argument("a colour bar needs colours");
+  const Layout layout(image);
+  const std::vector<Tick> ticks = round_ticks(bar.range, 7);
+  const double height = std::round(0.6 * image.height), top = bar.title.empty() ? layout.letter / 2 : layout.title();
+  const double mark = std::round(0.4 * layout.letter), labels = layout.swatch() + 2 * layout.line + mark + layout.gap();
+  const Eigen::Vector2d size(std::max(labels + widest(ticks, layout.letter), text_width(bar.title, layout.letter)),
+                             top + height + layout.letter / 2);
+  const Panel panel = lay_panel(image, layout, size, bar.title);
+
+  const Eigen::Vector2d corner = panel.inside.min() + Eigen::Vector2d(layout.line, std::round(top));
+  const Box box(corner, Eigen::Vector2d(corner + Eigen::Vector2d(layout.swatch(), height)));
+  for_each_pixel(image, box, [&](int x, int y, double coverage) {
+    lay_over(image, x, y, bar.color(std::clamp((box.max().y() - y - 0.5) / height, 0.0, 1.0)), coverage);
+  });
+  frame(image, box, layout.line, panel.ink);
+  for (const Tick& tick : ticks) {
+    const double y = box.max().y() - bar.range.position(tick.value) * height;
+    const double line = std::round(y - layout.line / 2), right = box.max().x() + layout.line;
+    fill(image, {Eigen::Vector2d(right, line), Eigen::Vector2d(right + mark, line + layout.line)}, panel.ink);
+    write_label(image, layout, right + mark + layout.gap(), line + layout.line / 2, tick.label, panel.ink);
+  }
+}
+
+void draw_color_key(Image& image, const ColorKey& key) {
+  check(image);
+  if (key.entries.empty()) throw std::invalid_argument("a key of colours needs entries");
+  const Layout layout(image);
+  const double top = key.title.empty() ? 0 : layout.title(), row = std::round(2.1 * layout.letter);
+  const double label = layout.swatch() + 2 * layout.line + layout.gap();
+  const double rows = row * static_cast<double>(key.entries.size() - 1) + layout.swatch() + 2 * layout.line;
+  const Eigen::Vector2d size(std::max(label + widest(key.entries, layout.letter), text_width(key.title, layout.letter)),
+                             top + rows);
+  const Panel panel = lay_panel(image, layout, size, key.title);
+  Eigen::Vector2d corner = panel.inside.min() + Eigen::Vector2d(layout.line, std::round(top) + layout.line);
+  for (const ColorKeyEntry& entry : key.entries) {
+    const Box square(corner, Eigen::Vector2d(corner + Eigen::Vector2d::Constant(layout.swatch())));
+    fill(image, square, entry.color);
+    frame(image, square, layout.line, panel.ink);
+    write_label(image, layout, panel.inside.min().x() + label, square.center().y(), entry.label, panel.ink);
+    corner.y() += row;
+  }
+}
+
+}  // namespace tensorray

@@ -1,0 +1,118 @@
+#include "renderer/coverage/polygon.h"
+
+#include <algorithm>
+#include <numeric>
+#include <optional>
+#include <stdexcept>
+#include <string>
+
+#include <Eigen/Geometry>
+
+namespace tensorray {
+namespace {
+
+using Eigen::Vector2d;
+using Eigen::Vector3d;
+
+constexpr std::size_t most_concave_corners = 10000;  // Time grows with their square.
+constexpr int most_failures = 64;  // Searches of all corners without an ear; else time would grow with the cube.
+
+/// Twice the vector area (Newell 1972).
+Vector3d newell_normal(const std::vector<Vector3d>& corners) {
+  Vector3d normal = Vector3d::Zero();
+  for (std::size_t i = 1; i + 1 < corners.size(); ++i)
+    normal += (corners[i] - corners[0]).cross(corners[i + 1] - corners[0]);
+  return normal;
+}
+
+/// The corners as seen against the normal, relative to the first one.
+std::vector<Vector2d> projected(const std::vector<Vector3d>& corners, const Vector3d& normal) {
+  const Vector3d u = normal.unitOrthogonal(), v = normal.normalized().cross(u);
+  std::vector<Vector2d> result;
+  for (const Vector3d& corner : corners)
+    result.emplace_back((corner - corners[0]).dot(u), (corner - corners[0]).dot(v));
+  return result;
+}
+
+/// Twice the area of a triangle; positive if it is counter-clockwise.
+double corner_area(const Vector2d& a, const Vector2d& b, const Vector2d& c) {
+  return (b - a).x() * (c - a).y() - (b - a).y() * (c - a).x();
+}
+
+bool is_convex(const std::vector<Vector2d>& corners) {
+  const std::size_t count = corners.size();
+  for (std::size_t i = 0; i < count; ++i)
+    if (!(corner_area(corners[i], corners[(i + 1) % count], corners[(i + 2) % count]) > 0)) return false;
+  return true;
+}
+
+/// The corners that are left, as a ring.
+class CornerRing {
+ public:
+  explicit CornerRing(const std::vector<Vector2d>& corners) : corners_(corners), left_(corners.size()) {
+    std::iota(left_.begin(), left_.end(), 0);
+  }
+
+  std::size_t size() const { return left_.size(); }
+
+  std::array<std::uint32_t, 3> triangle_at(std::size_t i) const {
+    return {left_[(i + size() - 1) % size()], left_[i], left_[(i + 1) % size()]};
+  }
+
+  /// Whether the triangle at corner i has an area and no other corner in it or on its edges.
+  bool is_ear(std::size_t i) const {
+    const auto [p, q, r] = triangle_at(i);
+    const Vector2d &a = corners_[p], &b = corners_[q], &c = corners_[r];
+    if (!(corner_area(a, b, c) > 0)) return false;
+    return std::none_of(left_.begin(), left_.end(), [&](std::uint32_t other) {
+      const Vector2d& x = corners_[other];
+      if (x == a || x == b || x == c) return false;  // Also its own corners. Outlines of holes repeat corners.
+      return corner_area(a, b, x) >= 0 && corner_area(b, c, x) >= 0 && corner_area(c, a, x) >= 0;
+    });
+  }
+
+  void cut(std::size_t i) { left_.erase(left_.begin() + static_cast<std::ptrdiff_t>(i)); }
+
+  /// The next ear from corner `from` on; nothing if the polygon crosses itself so that it has none.
+  std::optional<std::size_t> next_ear(std::size_t from) const {
+    for (std::size_t i = 0; i < size(); ++i)
+      if (is_ear((from + i) % size())) return (from + i) % size();
+    return std::nullopt;
+  }
+
+ private:
+  const std::vector<Vector2d>& corners_;
+  std::vector<std::uint32_t> left_;
+};
+
+std::vector<std::array<std::uint32_t, 3>> fan(std::size_t corners) {
+  std::vector<std::array<std::uint32_t, 3>> triangles;
+  for (std::uint32_t i = 2; i < corners; ++i) triangles.push_back({0, i - 1, i});
+  return triangles;
+}
+
+}  // namespace
+
+std::vector<std::array<std::uint32_t, 3>> triangulate(const std::vector<Vector3d>& corners) {
+  const Vector3d normal = newell_normal(corners);
+  if (corners.size() == 3 || !(normal.squaredNorm() > 0)) return fan(corners.size());
+  const std::vector<Vector2d> flat = projected(corners, normal);
+  if (is_convex(flat)) return fan(corners.size());
+  if (corners.size() > most_concave_corners)
+    throw std::runtime_error("a concave polygon has " + std::to_string(corners.size()) +
+                             " corners; divide those with more than " + std::to_string(most_concave_corners));
+  std::vector<std::array<std::uint32_t, 3>> triangles;
+  CornerRing ring(flat);
+  int failures = 0;
+  for (std::size_t at = 0; ring.size() > 3;) {
+    const std::optional<std::size_t> ear = failures < most_failures ? ring.next_ear(at) : std::nullopt;
+    if (!ear) ++failures;
+    at = ear.value_or(at % ring.size());  // Where there is no ear, any corner will do.
+    triangles.push_back(ring.triangle_at(at));
+    ring.cut(at);
+  }
+  triangles.push_back(ring.triangle_at(1));
+  return triangles;
+}
+
+}  // namespace tensorray

@@ -1,0 +1,106 @@
+#pragma once
+/// @file renderer/light_maps/photon_map.h
+/// Photons where they have landed on surfaces, and the irradiance that they give (Jensen 1996). The photons of one pass
+/// have one radius. Over the passes it shrinks, so that the mean over them converges to the truth (Knaus and Zwicker
+/// 2011, "Progressive Photon Mapping: A Probabilistic Approach").
+
+#include <algorithm>
+#include <cstdint>
+#include <optional>
+#include <vector>
+
+#include <Eigen/Core>
+
+#include "renderer/light_maps/photon_counts.h"
+#include "renderer/lights/photon_emitter.h"
+#include "renderer/surfaces/surface_scene.h"
+
+namespace tensorray {
+
+/// Single precision: seven digits of world coordinates.
+struct Photon {
+  Eigen::Vector3f position;   ///< World.
+  Eigen::Vector3f direction;  ///< Unit; in which it travelled.
+  Eigen::Vector3f normal;     ///< Unit, geometric, of the surface.
+  std::uint32_t surface = 0;  ///< Index of the surface.
+  std::int32_t light = 0;     ///< Index of the light that it comes from.
+  std::int32_t band = 0;
+  double power = 0;    ///< In its band. Like the density in double precision: areas are in any unit.
+  double density = 0;  ///< Of an area light: expected number of photons of the pass and band, per area across their
+                       ///< direction and per steradian, where this one has landed. Of other lights: 0.
+};
+
+/// The radius of a pass: r²(pass + 1) / r²(pass) = (pass + 1 + α) / (pass + 2), α = ⅔. @param pass  From 0.
+double photon_radius(double first, int pass);
+
+/// An area light whose light photons find through the region, as other techniques do (multiple importance sampling).
+struct AreaPhotons {
+  PhotonEmitter emitter;
+  double count = 0;            ///< Photons of a band in each pass.
+  std::vector<bool> surfaces;  ///< By index: whether photons light them.
+};
+
+/// The photons of one pass, sorted by cells of a lattice, then by band, then by their order before. Immutable: any
+/// thread may use it.
+class PhotonMap {
+ public:
+  /// @param radius  Within which a photon lights its surface, world units; > 0.
+  PhotonMap(std::vector<Photon> photons, double radius);
+
+  /// Calls `use(photon, density)` for all photons that light a point, in their order. The irradiance of the point is
+  /// the sum of power × density: the kernel of Epanechnikov across the surface, 2 / (π r²) (1 − d² / r²).
+  /// Photons of other surfaces, of parts that face elsewhere (more than 45°), and off the point's plane do not count.
+  /// @param band  The band that is looked for; −1: all.
+  template <class Use>
+  void visit(const SurfaceHit& point, int band, const Use& use) const;
+
+  double radius() const { return radius_; }
+  const std::vector<Photon>& photons() const { return photons_; }
+
+ private:
+  struct Cell {
+    std::uint64_t key = 0;
+    std::size_t begin = 0;  ///< Index of its first photon.
+  };
+
+  Eigen::Array3i cell_of(const Eigen::Vector3d& position) const;
+  static std::uint64_t key_of(const Eigen::Array3i& cell);
+  double density(const Photon& photon, const SurfaceHit& point) const;
+
+  double radius_;
+  double cell_size_ = 1;
+  Eigen::Vector3d corner_ = Eigen::Vector3d::Zero();
+  std::vector<Photon> photons_;
+  std::vector<Cell> cells_;  ///< By key, with an end.
+};
+
+/// The photons of all passes.
+struct PhotonMaps {
+  std::vector<PhotonMap> passes;                  ///< The photons that `serves` wants.
+  std::vector<PhotonCounts> counts;               ///< Of each pass.
+  std::vector<std::optional<AreaPhotons>> areas;  ///< By light; those of area lights that have photons.
+};
+
+template <class Use>
+void PhotonMap::visit(const SurfaceHit& point, int band, const Use& use) const {
+  if (photons_.empty()) return;
+  const Eigen::Vector3d reach = Eigen::Vector3d::Constant(radius_);
+  const Eigen::Array3i low = cell_of(point.position - reach), high = cell_of(point.position + reach);
+  for (int z = low.z(); z <= high.z(); ++z)
+    for (int y = low.y(); y <= high.y(); ++y) {
+      const std::uint64_t last = key_of({high.x(), y, z});
+      auto cell = std::lower_bound(cells_.begin(), cells_.end() - 1, key_of({low.x(), y, z}),
+                                   [](const Cell& each, std::uint64_t key) { return each.key < key; });
+      for (; cell + 1 != cells_.end() && cell->key <= last; ++cell) {
+        auto photon = photons_.begin() + static_cast<std::ptrdiff_t>(cell->begin);
+        const auto end = photons_.begin() + static_cast<std::ptrdiff_t>((cell + 1)->begin);
+        if (band >= 0)
+          photon =
+              std::lower_bound(photon, end, band, [](const Photon& each, int wanted) { return each.band < wanted; });
+        for (; photon != end && (band < 0 || photon->band == band); ++photon)
+          if (const double weight = density(*photon, point); weight > 0) use(*photon, weight);
+      }
+    }
+}
+
+}  // namespace tensorray

@@ -1,0 +1,212 @@
+#include "renderer/meshes/obj.h"
+
+#include <array>
+#include <charconv>
+#include <cstdint>
+#include <fstream>
+#include <optional>
+#include <set>
+#include <sstream>
+#include <stdexcept>
+#include <string>
+#include <unordered_map>
+#include <vector>
+
+#include "base/text/parse_number.h"
+#include "base/text/text.h"
+#include "renderer/coverage/polygon.h"
+
+namespace tensorray {
+namespace {
+
+using Words = std::vector<std::string>;
+
+constexpr std::uint32_t none = 0xffffffff;
+
+/// A corner of a face: its vertex and its normal, from 0.
+struct ObjCorner {
+  std::uint32_t vertex = none, normal = none;
+
+  friend bool operator==(const ObjCorner& a, const ObjCorner& b) {
+    return a.vertex == b.vertex && a.normal == b.normal;
+  }
+};
+
+struct ObjCornerHash {
+  std::size_t operator()(const ObjCorner& corner) const {
+    return std::hash<std::uint64_t>()(std::uint64_t{corner.vertex} << 32 | corner.normal);
+  }
+};
+
+struct ObjContents {
+  std::vector<Eigen::Vector3d> vertices;
+  std::vector<Eigen::Vector3f> normals;
+  std::vector<ObjCorner> corners;       ///< Of all faces.
+  std::vector<std::size_t> face_ends;   ///< Corners up to the end of each face.
+  std::vector<std::size_t> face_lines;  ///< The line of each face.
+};
+
+bool is_without_surface(const std::string& keyword) {
+  static const std::set<std::string> keywords{"p",     "l",   "vt",       "vp",       "o",         "g",
+                                              "s",     "mg",  "usemtl",   "mtllib",   "usemap",    "maplib",
+                                              "bevel", "lod", "c_interp", "d_interp", "trace_obj", "shadow_obj"};
+  return keywords.count(keyword) > 0;
+}
+
+double component_of(const std::string& word) {
+  const std::optional<double> value = parse_number(word);
+  if (!value) throw std::runtime_error("\"" + escaped(word.substr(0, 20)) + "\" is not a number");
+  return *value;
+}
+
+Eigen::Vector3d vector_of(const Words& words) {
+  if (words.size() < 4) throw std::runtime_error("\"" + words[0] + "\" needs three numbers");
+  return {component_of(words[1]), component_of(words[2]), component_of(words[3])};
+}
+
+/// A vertex x y z, x y z w (homogeneous) or x y z r g b.
+Eigen::Vector3d vertex_of(const Words& words) {
+  const Eigen::Vector3d position = vector_of(words);
+  const double weight = words.size() == 5 ? component_of(words[4]) : 1;
+  if (weight == 0) throw std::runtime_error("the vertex has the weight 0");
+  return position / weight;
+}
+
+/// An index, which counts from 1, or backwards from -1, the last of `count`.
+std::uint32_t index_of(const std::string& word, std::size_t count, const char* what) {
+  std::int64_t index = 0;
+  const std::from_chars_result result = std::from_chars(word.data(), word.data() + word.size(), index);
+  if (result.ec != std::errc() || result.ptr != word.data() + word.size())
+    throw std::runtime_error("the face has \"" + escaped(word.substr(0, 20)) + "\" where it should name a " + what);
+  const std::int64_t from_zero = index < 0 ? static_cast<std::int64_t>(count) + index : index - 1;
+  if (index == 0 || from_zero < 0 || from_zero >= none)
+    throw std::runtime_error("the face names " + std::string(what) + " " + word + ", which is not there");
+  return static_cast<std::uint32_t>(from_zero);
+}
+
+/// v, v/vt, v//vn or v/vt/vn. Texture coordinates need not exist.
+ObjCorner obj_corner_of(const std::string& word, const ObjContents& contents) {
+  const std::size_t first = word.find('/');
+  const std::size_t second = first == std::string::npos ? first : word.find('/', first + 1);
+  ObjCorner corner;
+  corner.vertex = index_of(word.substr(0, first), contents.vertices.size(), "vertex");
+  if (second != std::string::npos && second + 1 < word.size())
+    corner.normal = index_of(word.substr(second + 1), contents.normals.size(), "normal");
+  return corner;
+}
+
+void read_obj_face(const Words& words, std::size_t line, ObjContents& contents) {
+  if (words.size() < 4) throw std::runtime_error("a face needs at least three corners");
+  for (std::size_t i = 1; i < words.size(); ++i) contents.corners.push_back(obj_corner_of(words[i], contents));
+  contents.face_ends.push_back(contents.corners.size());
+  contents.face_lines.push_back(line);
+}
+
+void read_obj_statement(const Words& words, std::size_t line, ObjContents& contents) {
+  const std::string& keyword = words[0];
+  if (keyword == "v")
+    contents.vertices.push_back(vertex_of(words));
+  else if (keyword == "vn")
+    contents.normals.push_back(vector_of(words).cast<float>());
+  else if (keyword == "f" || keyword == "fo")
+    read_obj_face(words, line, contents);
+  else if (!is_without_surface(keyword))
+    throw std::runtime_error("\"" + escaped(keyword.substr(0, 20)) +
+                             "\" is not read; of an .obj file only polygons are (v, vn, f)");
+}
+
+/// The words of a statement, up to a comment. A backslash at the end of a line continues it. @return whether there was
+/// a line.
+bool next_statement(std::istream& file, Words& words, std::size_t& line) {
+  words.clear();
+  std::string text;
+  for (bool goes_on = true; goes_on;) {
+    if (!std::getline(file, text)) return !words.empty();
+    ++line;
+    if (line == 1 && starts_with(text, "\xef\xbb\xbf")) text.erase(0, 3);  // The mark of UTF-8.
+    text.erase(std::min(text.find('#'), text.size()));
+    while (!text.empty() && std::isspace(static_cast<unsigned char>(text.back()))) text.pop_back();
+    goes_on = !text.empty() && text.back() == '\\';
+    if (goes_on) text.pop_back();
+    std::istringstream stream(text);
+    for (std::string word; stream >> word;) words.push_back(word);
+  }
+  return true;
+}
+
+ObjContents read_contents(const std::filesystem::path& path) {
+  std::ifstream file(path, std::ios::binary);
+  ObjContents contents;
+  Words words;
+  std::size_t line = 0;
+  try {
+    while (next_statement(file, words, line))
+      if (!words.empty()) read_obj_statement(words, line, contents);
+  } catch (const std::runtime_error& error) {
+    throw std::runtime_error("line " + std::to_string(line) + ": " + error.what());
+  }
+  return contents;
+}
+
+void check_corner(const ObjCorner& corner, const ObjContents& contents) {
+  const auto check = [](std::uint32_t index, std::size_t count, const std::string& what) {
+    if (index != none && index >= count)
+      throw std::runtime_error("the face names " + what + " " + std::to_string(index + 1) + " of " +
+                               std::to_string(count));
+  };
+  check(corner.vertex, contents.vertices.size(), "vertex");
+  check(corner.normal, contents.normals.size(), "normal");
+}
+
+/// Makes a vertex of each pair of a vertex and a normal.
+class MeshBuilder {
+ public:
+  explicit MeshBuilder(const ObjContents& contents) : contents_(contents) {}
+
+  void add_face(const ObjCorner* corners, std::size_t count) {
+    std::vector<Eigen::Vector3d> positions;
+    for (std::size_t i = 0; i < count; ++i) {
+      check_corner(corners[i], contents_);
+      positions.push_back(contents_.vertices[corners[i].vertex]);
+    }
+    for (const auto& triangle : triangulate(positions))
+      result_.mesh.triangles.push_back(
+          {vertex(corners[triangle[0]]), vertex(corners[triangle[1]]), vertex(corners[triangle[2]])});
+  }
+
+  MeshWithNormals take() { return std::move(result_); }
+
+ private:
+  std::uint32_t vertex(const ObjCorner& corner) {
+    const auto [entry, is_new] = indices_.try_emplace(corner, static_cast<std::uint32_t>(result_.mesh.vertices.size()));
+    if (!is_new) return entry->second;
+    result_.mesh.vertices.push_back(contents_.vertices[corner.vertex]);
+    if (!contents_.normals.empty())
+      result_.normals.push_back(corner.normal == none ? Eigen::Vector3f(Eigen::Vector3f::Zero())
+                                                      : contents_.normals[corner.normal]);
+    return entry->second;
+  }
+
+  const ObjContents& contents_;
+  std::unordered_map<ObjCorner, std::uint32_t, ObjCornerHash> indices_;
+  MeshWithNormals result_;
+};
+
+}  // namespace
+
+MeshWithNormals read_obj(const std::filesystem::path& path) {
+  const ObjContents contents = read_contents(path);
+  MeshBuilder builder(contents);
+  std::size_t first = 0;
+  for (std::size_t face = 0; face < contents.face_ends.size(); ++face) {
+    try {
+      builder.add_face(&contents.corners[first], contents.face_ends[face] - first);
+    } catch (const std::runtime_error& error) {
+      throw std::runtime_error("line " + std::to_string(contents.face_lines[face]) + ": " + error.what());
+    }
+    first = contents.face_ends[face];
+  }
+  return builder.take();
+}
+
+}  // namespace tensorray

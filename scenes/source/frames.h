@@ -1,0 +1,32 @@
+#pragma once
+/// @file scenes/source/frames.h
+/// Scenes that change from frame to frame: keyframes, and numbers in file names.
+
+#include <string>
+#include <vector>
+
+#include "base/text/numbered_name.h"
+#include "scenes/keys/json_reader.h"
+#include "scenes/keys/scene_source.h"
+
+namespace tensorray {
+
+/// The frames of "7", "1-240", "1-240x2" (every second one), or of a list of these, "1,3,7-9": in this order, each
+/// once; from 0 to 10^9.
+/// @throw std::invalid_argument if the text does not have that form, or names more than a million frames.
+std::vector<int> parse_frames(const std::string& text);
+
+/// Replaces, everywhere in a scene, keyframes by their value at a frame, and # in texts (also %04d and $F4, see
+/// numbered_name.h) by the frame's number.
+///
+/// Keyframes take the place of a number or of a list of numbers:
+///   {"keys": [[1, [0, 0, -1]], [240, [0, 1, -1]]], "ease": "smooth"}
+/// Before the first key and behind the last one their values hold. "linear" (the default) goes straight from one to the
+/// next, "smooth" begins and ends each way slowly (t²(3 − 2t)).
+/// @throw SceneError, with the place, if keyframes are not like this.
+void set_frame(Json& scene, int frame, const SceneSource& source);
+
+/// @throw SceneError, with the place, if the scene has keyframes.
+void refuse_keyframes(const Json& scene, const SceneSource& source);
+
+}  // namespace tensorray

@@ -1,0 +1,125 @@
+// Limits of containers, which are files of the system.
+
+#include "base/process/process_limits.h"
+
+#include <cmath>
+#include <fstream>
+#include <map>
+#include <thread>
+
+#include <gtest/gtest.h>
+#include <sys/resource.h>
+#include <unistd.h>
+
+#include "base/files/temporary_folder.h"
+
+namespace tensorray {
+namespace {
+
+/// A system's files: path → content.
+using Files = std::map<std::string, std::string>;
+
+class System {
+ public:
+  explicit System(const Files& files) {
+    for (const auto& [name, text] : files) {
+      std::filesystem::create_directories((root() / name).parent_path());
+      std::ofstream(root() / name) << text;
+    }
+  }
+  std::filesystem::path root() const { return folder_ / "root"; }
+
+ private:
+  TemporaryFolder folder_;
+};
+
+const std::string memory_of_1000_kib = "MemTotal:        800 kB\nMemFree: 9 kB\nSwapTotal:   200 kB\n";
+
+TEST(ProcessLimitsTest, QuotasAreFoundWhereSystemsHaveThem) {
+  const double all = std::thread::hardware_concurrency();
+  struct Case {
+    const char* what;
+    Files files;
+    double processors;  ///< Infinite: no quota.
+  };
+  const double none = INFINITY;
+  const std::vector<Case> cases{
+      {"nothing is known", {}, none},
+      {"a container", {{"proc/self/cgroup", "0::/\n"}, {"sys/fs/cgroup/cpu.max", "100000 100000\n"}}, 1},
+      {"no quota", {{"proc/self/cgroup", "0::/\n"}, {"sys/fs/cgroup/cpu.max", "max 100000\n"}}, none},
+      {"a part", {{"proc/self/cgroup", "0::/\n"}, {"sys/fs/cgroup/cpu.max", "50000 100000\n"}}, 1},
+      {"more than one", {{"proc/self/cgroup", "0::/\n"}, {"sys/fs/cgroup/cpu.max", "150000 100000\n"}}, 2},
+      {"of an outer group",
+       {{"proc/self/cgroup", "0::/jobs/17/step\n"},
+        {"sys/fs/cgroup/jobs/17/step/cpu.max", "max 100000\n"},
+        {"sys/fs/cgroup/jobs/17/cpu.max", "100000 100000\n"},
+        {"sys/fs/cgroup/jobs/cpu.max", "800000 100000\n"}},
+       1},
+      {"a group that is not shown inside the container",
+       {{"proc/self/cgroup", "0::/docker/abc\n"}, {"sys/fs/cgroup/cpu.max", "100000 100000\n"}},
+       1},
+      {"the first version of cgroups",
+       {{"proc/self/cgroup", "5:memory:/a\n4:cpu,cpuacct:/a\n"},
+        {"sys/fs/cgroup/cpu/a/cpu.cfs_quota_us", "100000\n"},
+        {"sys/fs/cgroup/cpu/a/cpu.cfs_period_us", "100000\n"}},
+       1},
+      {"the first version without a quota",
+       {{"proc/self/cgroup", "4:cpu,cpuacct:/a\n"},
+        {"sys/fs/cgroup/cpu/a/cpu.cfs_quota_us", "-1\n"},
+        {"sys/fs/cgroup/cpu/a/cpu.cfs_period_us", "100000\n"}},
+       none},
+      {"not a number", {{"proc/self/cgroup", "0::/\n"}, {"sys/fs/cgroup/cpu.max", "much of it\n"}}, none},
+      {"nonsense", {{"proc/self/cgroup", "\n:\n::\n0\n"}, {"sys/fs/cgroup/cpu.max", "0 0\n"}}, none}};
+  for (const Case& each : cases)
+    EXPECT_EQ(usable_processors(System(each.files).root()), std::min(all, each.processors)) << each.what;
+}
+
+TEST(ProcessLimitsTest, TheLeastMemoryCounts) {
+  struct Case {
+    const char* what;
+    Files files;
+    double bytes;
+    const char* cause;
+  };
+  const std::vector<Case> cases{
+      {"a machine", {{"proc/meminfo", memory_of_1000_kib}}, 1024000, "this machine's memory"},
+      {"a container",
+       {{"proc/meminfo", memory_of_1000_kib}, {"proc/self/cgroup", "0::/\n"}, {"sys/fs/cgroup/memory.max", "5000\n"}},
+       5000,
+       "the container's limit"},
+      {"without a limit",
+       {{"proc/meminfo", memory_of_1000_kib}, {"proc/self/cgroup", "0::/\n"}, {"sys/fs/cgroup/memory.max", "max\n"}},
+       1024000,
+       "this machine's memory"},
+      {"the first version",
+       {{"proc/meminfo", memory_of_1000_kib},
+        {"proc/self/cgroup", "5:memory:/a\n"},
+        {"sys/fs/cgroup/memory/a/memory.limit_in_bytes", "7000\n"},
+        {"sys/fs/cgroup/memory/memory.limit_in_bytes", "9223372036854771712\n"}},
+       7000,
+       "the container's limit"}};
+  for (const Case& each : cases) {
+    const MemoryLimit limit = memory_limit(System(each.files).root());
+    EXPECT_EQ(limit.bytes, each.bytes) << each.what;
+    EXPECT_EQ(limit.cause, each.cause) << each.what;
+  }
+  EXPECT_TRUE(std::isinf(memory_limit(System({}).root()).bytes));
+}
+
+TEST(ProcessLimitsTest, LimitsOfTheProcessCount) {
+  rlimit before{};
+  ASSERT_EQ(getrlimit(RLIMIT_DATA, &before), 0);
+  rlim_t pages = 0;  // That are in use; sanitizers use thousands of gigabytes.
+  std::ifstream statm("/proc/self/statm");
+  for (int column = 0; column <= 5; ++column) statm >> pages;
+  const rlim_t limit = rlim_t{1} << 33;
+  const rlimit lower{pages * static_cast<rlim_t>(sysconf(_SC_PAGESIZE)) + limit, before.rlim_max};
+  ASSERT_EQ(setrlimit(RLIMIT_DATA, &lower), 0);
+  const MemoryLimit found = memory_limit(System({}).root());
+  setrlimit(RLIMIT_DATA, &before);
+  EXPECT_NEAR(found.bytes, static_cast<double>(limit), 1 << 26);  // Some is taken meanwhile.
+  EXPECT_NE(found.cause.find("ulimit -d"), std::string::npos);
+}
+
+}  // namespace
+}  // namespace tensorray

@@ -1,0 +1,76 @@
+#include "base/process/work.h"
+
+#include <fstream>
+#include <iterator>
+
+#include <gtest/gtest.h>
+
+#include "base/text/content_hash.h"
+#include "base/files/replace_file.h"
+
+namespace tensorray {
+namespace {
+
+std::string text_of(const std::filesystem::path& file) {
+  std::ifstream stream(file, std::ios::binary);
+  return {std::istreambuf_iterator<char>(stream), {}};
+}
+
+TEST(WorkTest, PartsShareAllUnits) {
+  std::vector<int> owners(10);
+  for (std::size_t part = 0; part < 3; ++part) {
+    Work work({part, 3});
+    work.begin(owners.size());
+    for (std::size_t unit = 0; unit < owners.size(); ++unit) owners[unit] += work.wants(unit) ? 1 : 0;
+  }
+  EXPECT_EQ(owners, std::vector<int>(10, 1));
+}
+
+TEST(WorkTest, ContinuesWithItsUnits) {
+  Work first;
+  first.begin(3);
+  EXPECT_EQ(first.state(1), nullptr);
+  first.keep(1, "half", false);
+  first.keep(2, "all", true);
+  const std::vector<WorkUnit> kept = first.units();
+  first.keep(1, "more", true);
+
+  Work second({}, kept);
+  EXPECT_THROW(second.begin(4), std::runtime_error);
+  second.begin(3);
+  EXPECT_EQ(*second.state(1), "half");
+  EXPECT_TRUE(second.wants(0) && second.wants(1));
+  EXPECT_FALSE(second.wants(2));
+}
+
+TEST(ReplaceFileTest, WritesAllOrNothing) {
+  const std::filesystem::path folder = std::filesystem::path(::testing::TempDir()) / "replace_file";
+  std::filesystem::create_directories(folder);
+  const std::filesystem::path file = folder / "a";
+  replace_file(file, {"one ", "two"});
+  EXPECT_EQ(text_of(file), "one two");
+  std::ofstream(folder / "a.new") << "what a killed process left, which is longer than the next";
+  replace_file(file, {"three"});
+  EXPECT_EQ(text_of(file), "three");
+  EXPECT_THROW(replace_file(folder / "none" / "a", {"x"}), std::runtime_error);
+  std::filesystem::remove(folder / "full.new");
+  std::filesystem::create_symlink("/dev/full", folder / "full.new");
+  EXPECT_THROW(replace_file(folder / "full", {"x"}), std::runtime_error);
+  EXPECT_FALSE(std::filesystem::exists(folder / "full"));
+  std::filesystem::remove_all(folder);
+}
+
+TEST(ContentHashTest, NoticesEveryBit) {
+  const std::string text = "a text that is no multiple of eight long";
+  std::string changed = text;
+  for (std::size_t bit = 0; bit < 8 * text.size(); ++bit) {
+    changed[bit / 8] = static_cast<char>(changed[bit / 8] ^ (1 << bit % 8));
+    EXPECT_NE(content_hash(changed), content_hash(text)) << bit;
+    changed = text;
+  }
+  EXPECT_NE(content_hash(text + std::string(1, '\0')), content_hash(text));
+  EXPECT_NE(content_hash(text), content_hash(text, 1));
+}
+
+}  // namespace
+}  // namespace tensorray

@@ -1,0 +1,152 @@
+// EnSight's cases, as its manual describes them: Gold, in ASCII.
+
+#include <gmock/gmock.h>
+#include <vtkCellData.h>
+#include <vtkPointData.h>
+
+#include "base/process/progress.h"
+#include "tests/import/mesh_files.h"
+#include "tests/import/mesh_fixtures.h"
+#include "tools/import/import_file.h"
+#include "tools/import/vtk_source/vtk_source.h"
+
+namespace tensorray {
+namespace {
+
+using Eigen::Matrix3d;
+
+std::string number(double value) {
+  char text[16];
+  std::snprintf(text, sizeof text, "%12.5e\n", value);
+  return text;
+}
+
+std::string integer(int value) {
+  char text[16];
+  std::snprintf(text, sizeof text, "%10d", value);
+  return text;
+}
+
+/// Values of a variable: for each component, as many equal values as there are points or cells.
+std::string variable(const std::string& of, int count, const std::vector<double>& components) {
+  std::string text = "a variable\npart\n" + integer(1) + "\n" + of + "\n";
+  for (const double component : components)
+    for (int i = 0; i < count; ++i) text += number(component);
+  return text;
+}
+
+/// One cube from 0 to 2 along each axis, with three tensors at two times.
+void write_case(const std::filesystem::path& folder) {
+  std::string geometry =
+      "one\ncube\nnode id assign\nelement id assign\npart\n" + integer(1) + "\nbody\ncoordinates\n" + integer(8) + "\n";
+  for (int axis = 0; axis < 3; ++axis)
+    for (int i = 0; i < 8; ++i) geometry += number(2 * (i >> axis & 1));
+  geometry += "hexa8\n" + integer(1) + "\n";
+  for (const int corner : {1, 2, 4, 3, 5, 6, 8, 7}) geometry += integer(corner);
+  write_bytes(folder / "a.geo", geometry + "\n");
+  for (const int time : {0, 1}) {
+    const std::string name = "a." + std::to_string(time);
+    const double t = 100 * time;
+    write_bytes(folder / (name + ".sym"), variable("coordinates", 8, {t + 11, 22, 33, 12, 13, 23}));
+    write_bytes(folder / (name + ".gen"), variable("coordinates", 8, {t + 11, 12, 13, 21, 22, 23, 31, 32, 33}));
+    write_bytes(folder / (name + ".ele"), variable("hexa8", 1, {t + 11, 22, 33, 12, 13, 23}));
+  }
+  write_bytes(folder / "a.case",
+              "# a comment\nFORMAT\ntype: ensight gold\n\nGEOMETRY\nmodel: a.geo\n\nVARIABLE\n"
+              "tensor symm per node: 1 symmetric a.*.sym\ntensor asym per node: 1 general a.*.gen\n"
+              "tensor symm per element: 1 of_cells a.*.ele\n\nTIME\ntime set: 1\nnumber of steps: 2\n"
+              "filename start number: 0\nfilename increment: 1\ntime values: 0.5 2.5\n");
+}
+
+Matrix3d tensor_of(const std::filesystem::path& path, const std::string& array, std::optional<int> step = {}) {
+  ImportSettings settings;
+  settings.files = {path};
+  settings.array = array;
+  settings.step = step;
+  settings.sampling.resolution = 2;
+  ImportReport report;
+  const TensorGrid grid = import_tensors(settings, Progress(), report);
+  Matrix3d tensor = Matrix3d::Constant(NAN);
+  mesh_fixtures::for_each_voxel(grid, [&](const auto&, const Matrix3d& value) { tensor = value; });
+  EXPECT_EQ(grid.active_voxels(), 8u);
+  return tensor;
+}
+
+TEST(EnSight, TensorsHaveTheirOrderWithoutBeingTold) {
+  const TemporaryFolder folder;
+  write_case(folder);
+  Matrix3d symmetric, general;
+  symmetric << 111, 12, 13, 12, 22, 23, 13, 23, 33;
+  general << 111, 12, 13, 21, 22, 23, 31, 32, 33;
+  EXPECT_LT((tensor_of(folder / "a.case", "symmetric") - symmetric).norm(), 1e-3);
+  EXPECT_LT((tensor_of(folder / "a.case", "of_cells") - symmetric).norm(), 1e-3);
+  EXPECT_LT((tensor_of(folder / "a.case", "general") - general).norm(), 1e-3);
+}
+
+TEST(EnSight, StepsOfTime) {
+  const TemporaryFolder folder;
+  write_case(folder);
+  EXPECT_EQ(time_steps(folder / "a.case"), 2);
+  EXPECT_NEAR(tensor_of(folder / "a.case", "general", 0)(0, 0), 11, 1e-4);
+  EXPECT_NEAR(tensor_of(folder / "a.case", "general", 1)(0, 0), 111, 1e-4);
+  EXPECT_THROW(tensor_of(folder / "a.case", "general", 2), std::invalid_argument);
+}
+
+TEST(EnSight, DamageIsAnErrorWithTheFile) {
+  const TemporaryFolder folder;
+  write_case(folder);
+  std::filesystem::remove(folder / "a.geo");
+  EXPECT_NE(error_of([&] { read_vtk_source(folder / "a.case"); }).find("a.geo: is missing"), std::string::npos);
+  write_bytes(folder / "b.case", "no case\n");
+  EXPECT_NE(error_of([&] { read_vtk_source(folder / "b.case"); }).find("is not a case of EnSight"), std::string::npos);
+}
+
+/// VTK seeks the steps in all files of such a case, for ever in those without.
+TEST(EnSight, StepsInOneFileAreRefusedWhereOthersHaveNone) {
+  const TemporaryFolder folder;
+  write_case(folder);
+  std::string text = bytes_of(folder / "a.case");
+  text.replace(text.find("1 symmetric a.*.sym"), 19, "1 1 symmetric a.sym");
+  write_bytes(folder / "a.case", text + "FILE\nfile set: 1\nnumber of steps: 2\n");
+  std::string steps;
+  for (const char* step : {"a.0.sym", "a.1.sym"})
+    steps += "BEGIN TIME STEP\n" + bytes_of(folder / step) + "END TIME STEP\n";
+  write_bytes(folder / "a.sym", steps);
+  EXPECT_NE(error_of([&] { read_vtk_source(folder / "a.case"); }).find("a.geo: has no steps of time"),
+            std::string::npos);
+}
+
+/// VTK itself repeats the last number of a text that is cut off, and goes on for ever with some damaged cases.
+TEST(EnSight, WhatIsCutOffOrMissingIsNamed) {
+  const TemporaryFolder folder;
+  const auto error = [&] { return error_of([&] { read_vtk_source(folder / "a.case"); }); };
+  write_case(folder);
+  const std::string sound = bytes_of(folder / "a.case");
+  const auto damage = [&](const std::string& from, const std::string& to) {
+    std::string text = sound;
+    write_bytes(folder / "a.case", text.replace(text.find(from), from.size(), to));
+  };
+  for (const char* section : {"VARIABLE", "GEOMETRY", "TIME"}) {
+    damage(section, "V0R");
+    EXPECT_NE(error().find("is neither a section of EnSight nor an entry: 'V0R'"), std::string::npos) << error();
+  }
+  write_bytes(folder / "a.case", sound);
+  for (const auto& entry : std::filesystem::directory_iterator(folder)) {
+    if (entry.path().extension() == ".case" || entry.path().extension() == ".geo") continue;
+    const std::string text = bytes_of(entry.path());
+    for (const std::size_t lines : {1u, 3u}) {
+      std::size_t end = text.size() - 1;
+      for (std::size_t i = 0; i < lines; ++i) end = text.rfind('\n', end - 1);
+      write_bytes(entry.path(), text.substr(0, end + 1));
+      if (error().empty()) continue;  // It is of another step.
+      EXPECT_NE(error().find(entry.path().filename().string() + ": is cut off"), std::string::npos) << error();
+    }
+    write_bytes(entry.path(), text);
+  }
+  EXPECT_EQ(error(), "");
+  std::filesystem::remove(folder / "a.geo");
+  EXPECT_NE(error().find("a.geo: is missing, which a.case names"), std::string::npos) << error();
+}
+
+}  // namespace
+}  // namespace tensorray

@@ -1,0 +1,217 @@
+#include <algorithm>
+#include <array>
+#include <random>
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+#include <sys/resource.h>
+#include <sys/wait.h>
+
+#include "tests/import/voxel_support.h"
+#include "tools/import/lattice_files/lattice_files.h"
+
+namespace tensorray {
+namespace {
+
+using Eigen::Matrix3d;
+using Eigen::Vector3i;
+
+/// A header as numpy.save writes it: padded with spaces to a multiple of 64 bytes.
+std::string header_of(const std::string& descr, bool fortran, const std::vector<std::size_t>& shape, char version = 1) {
+  std::string dictionary = fmt::format("{{'descr': '{}', 'fortran_order': {}, 'shape': ({},), }}", descr,
+                                       fortran ? "True" : "False", fmt::join(shape, ", "));
+  const std::size_t start = version == 1 ? 10 : 12;
+  while ((start + dictionary.size() + 1) % 64 != 0) dictionary += ' ';
+  dictionary += '\n';
+  std::string length;
+  for (std::size_t i = 0; i < start - 8; ++i) length += static_cast<char>(dictionary.size() >> (8 * i));
+  return std::string("\x93NUMPY") + version + '\0' + length + dictionary;
+}
+
+/// Entry (row, column) at (x, y, z): exact in half precision.
+double entry(int x, int y, int z, int row, int column) { return x + 4 * y + 16 * z + 0.25 * row + 0.0625 * column; }
+
+/// The numbers of a field of shape (nz, ny, nx, 3, 3), each written by `put(value)`.
+template <class Number, class Put>
+std::string numbers_of(const Vector3i& size, bool fortran, const Put& put) {
+  const std::array<int, 5> shape = {size.z(), size.y(), size.x(), 3, 3};
+  std::vector<Number> numbers;
+  const auto count = static_cast<std::size_t>(size.prod()) * 9;
+  for (std::size_t i = 0; i < count; ++i) {
+    std::array<int, 5> at{};
+    std::size_t rest = i;
+    for (std::size_t n = 0; n < 5; ++n) {
+      const std::size_t axis = fortran ? n : 4 - n;
+      at[axis] = static_cast<int>(rest % static_cast<std::size_t>(shape[axis]));
+      rest /= static_cast<std::size_t>(shape[axis]);
+    }
+    numbers.push_back(put(entry(at[2], at[1], at[0], at[3], at[4])));
+  }
+  return test::bytes_of(numbers);
+}
+
+void expect_field(const std::filesystem::path& path, const Vector3i& size) {
+  const TensorGrid grid = test::tensors_of(open_npy(path));
+  EXPECT_EQ(grid.active_voxels(), static_cast<std::size_t>(size.prod()));
+  EXPECT_TRUE(grid.to_world.matrix().isIdentity());
+  int wrong = 0;
+  test::for_each_voxel(grid, [&](const Vector3i& i, const Matrix3d& tensor) {
+    for (int row = 0; row < 3; ++row)
+      for (int column = 0; column < 3; ++column)
+        if (tensor(row, column) != entry(i.x(), i.y(), i.z(), row, column)) ++wrong;
+  });
+  EXPECT_EQ(wrong, 0) << path;
+}
+
+template <class Number>
+Number swapped(Number number) {
+  auto* bytes = reinterpret_cast<char*>(&number);
+  std::reverse(bytes, bytes + sizeof number);
+  return number;
+}
+
+const Vector3i size(4, 3, 19);
+const std::vector<std::size_t> shape = {19, 3, 4, 3, 3};
+
+TEST(Npy, EveryPrecisionByteOrderAndArrangementIsRead) {
+  for (const bool fortran : {false, true}) {
+    const test::TemporaryFile file("field.npy");
+    const auto as_float = [](double value) { return static_cast<float>(value); };
+    file.write(header_of("<f4", fortran, shape) + numbers_of<float>(size, fortran, as_float));
+    expect_field(file, size);
+    file.write(header_of(">f4", fortran, shape, 2) +
+               numbers_of<float>(size, fortran, [&](double value) { return swapped(as_float(value)); }));
+    expect_field(file, size);
+    file.write(header_of("<f8", fortran, shape, 3) + numbers_of<double>(size, fortran, [](double v) { return v; }));
+    expect_field(file, size);
+    file.write(header_of(">f8", fortran, shape) + numbers_of<double>(size, fortran, swapped<double>));
+    expect_field(file, size);
+  }
+}
+
+TEST(Npy, HalfPrecisionIsRead) {
+  const auto half = [](double value) {
+    const Eigen::half number(static_cast<float>(value));
+    std::uint16_t bits;
+    std::memcpy(&bits, &number, 2);
+    return bits;
+  };
+  // The numbers need at most eleven bits: 1.5 in half precision is 0x3e00.
+  ASSERT_EQ(half(1.5), 0x3e00);
+  const Vector3i small(4, 2, 2);
+  const test::TemporaryFile file("half.npy");
+  file.write(header_of("<f2", false, {2, 2, 4, 3, 3}) + numbers_of<std::uint16_t>(small, false, half));
+  expect_field(file, small);
+  file.write(header_of(">f2", true, {2, 2, 4, 3, 3}) +
+             numbers_of<std::uint16_t>(small, true, [&](double value) { return swapped(half(value)); }));
+  expect_field(file, small);
+}
+
+TEST(Npy, NineInARowAreRowByRow) {
+  const auto numbers = numbers_of<double>(size, false, [](double value) { return value; });
+  const test::TemporaryFile file("nine.npy", header_of("<f8", false, {19, 3, 4, 9}) + numbers);
+  expect_field(file, size);
+}
+
+TEST(Npy, SixAskForTheirOrderAndThreeAreAVector) {
+  const std::vector<double> six = {11, 22, 33, 23, 13, 12};
+  const test::TemporaryFile file("six.npy", header_of("<f8", false, {1, 1, 1, 6}) + test::bytes_of(six));
+  test::expect_error([&] { test::tensors_of(open_npy(file)); }, {"--order"});
+  const TensorGrid grid = test::tensors_of(open_npy(file), "voigt");
+  test::expect_near((Matrix3d() << 11, 12, 13, 12, 22, 23, 13, 23, 33).finished(), test::voxel(grid, {0, 0, 0}));
+
+  const std::vector<double> vectors = {0, 0, 0, 5, 0, 0};  // v = (5 y, 0, 0)
+  file.write(header_of("<f8", false, {1, 2, 1, 3}) + test::bytes_of(vectors));
+  LatticeReport report;
+  const TensorGrid gradient = gradient_of(open_npy(file), report);
+  Matrix3d expected = Matrix3d::Zero();
+  expected(0, 1) = 5;
+  test::expect_near(expected, test::voxel(gradient, {0, 0, 0}));
+}
+
+TEST(Npy, NotANumberIsInactive) {
+  std::vector<float> numbers(18, 1);
+  numbers[13] = NAN;
+  const test::TemporaryFile file("nan.npy", header_of("<f4", false, {1, 1, 2, 3, 3}) + test::bytes_of(numbers));
+  LatticeReport report;
+  tensors_of(open_npy(file), {}, report);
+  EXPECT_EQ(report.active, 1u);
+  EXPECT_EQ(report.non_finite, 1u);
+}
+
+TEST(Npy, WrongFilesAreErrorsOfOneLine) {
+  const std::string numbers(9 * 8 * 4, '\1');
+  const auto expect = [&](const std::string& contents, const std::vector<std::string>& words) {
+    const test::TemporaryFile file("wrong.npy", contents);
+    std::vector<std::string> all = {"wrong.npy"};
+    all.insert(all.end(), words.begin(), words.end());
+    test::expect_error([&] { open_npy(file); }, all);
+  };
+  const auto header = [](const std::string& descr, const std::vector<std::size_t>& extents) {
+    return header_of(descr, false, extents);
+  };
+  test::expect_error([] { open_npy("absent.npy"); }, {"absent.npy", "no such file"});
+  expect("", {"not a .npy"});
+  expect("NRRD0004\ntype: float\n", {"not a .npy"});
+  expect(header("<f4", {2, 2, 2, 3, 3}).substr(0, 40), {"cut off"});
+  expect(header("<f4", {2, 2, 2, 3, 3}) + numbers.substr(1), {"288 bytes", "287", "cut off"});
+  expect(header("<f4", {2, 2, 2, 3, 3}) + numbers + "1", {"several arrays"});
+  expect(header("<f4", {2, 2, 2, 9, 1}) + numbers, {"shape is (2, 2, 2, 9, 1)", "(nz, ny, nx, 3, 3)"});
+  expect(header("<f4", {2, 2, 18}) + numbers, {"shape is (2, 2, 18)"});
+  expect(header("<f4", {2, 2, 2, 7}) + numbers, {"shape is (2, 2, 2, 7)"});
+  expect(header("<f4", {0, 2, 2, 3, 3}), {"empty"});
+  expect(header("<i4", {2, 2, 2, 3, 3}) + numbers, {"astype"});
+  expect(header("|O", {2, 2, 2, 3, 3}) + numbers, {"astype"});
+  expect(header("<f4", {2147483647, 2147483647, 2147483647, 3, 3}) + numbers, {"cut off"});
+  expect(header("<f4", {99999999999, 2, 2, 3, 3}) + numbers, {"damaged"});
+}
+
+TEST(Npy, GarbledHeadersNeverCrash) {
+  const std::string good = header_of("<f4", false, {2, 2, 2, 3, 3}) + std::string(9 * 8 * 4, '\1');
+  std::mt19937 random(1);
+  const test::TemporaryFile file("garbled.npy");
+  for (int i = 0; i < 500; ++i) {
+    std::string bad = good;
+    for (int n = 0; n < 1 + i % 4; ++n) bad[random() % 80] = static_cast<char>(random());
+    file.write(bad);
+    try {
+      test::tensors_of(open_npy(file));
+    } catch (const std::exception& error) {
+      EXPECT_EQ(std::string(error.what()).find('\n'), std::string::npos);
+    }
+  }
+}
+
+/// Peak memory of an import in its own process, megabytes.
+double import_megabytes(const std::filesystem::path& path) {
+  const pid_t child = fork();
+  if (child == 0) {
+    {  // Threads and libraries allocate their own memory once.
+      const test::TemporaryFile small("small.npy", header_of("<f4", false, {2, 2, 2, 3, 3}) + std::string(288, '\1'));
+      test::tensors_of(open_npy(small));
+    }
+    rusage before{}, after{};
+    getrusage(RUSAGE_SELF, &before);
+    const TensorGrid grid = test::tensors_of(open_npy(path));
+    getrusage(RUSAGE_SELF, &after);
+    const long megabytes = (after.ru_maxrss - before.ru_maxrss) / 1024;
+    _exit(grid.blocks.empty() || megabytes > 255 ? 255 : static_cast<int>(megabytes));
+  }
+  int status = 0;
+  waitpid(child, &status, 0);
+  EXPECT_TRUE(WIFEXITED(status));
+  return WEXITSTATUS(status);
+}
+
+TEST(Npy, AnImportTakesLittleMoreMemoryThanItsNumbers) {
+  constexpr std::size_t n = 128;
+  constexpr double data = n * n * n * 9 * 4 / 1048576.0;
+  for (const bool fortran : {false, true}) {
+    const test::TemporaryFile file("large.npy", header_of("<f4", fortran, {n, n, n, 3, 3}));
+    std::filesystem::resize_file(file, std::filesystem::file_size(file) + n * n * n * 9 * 4);
+    EXPECT_LT(import_megabytes(file), 1.3 * data);
+  }
+}
+
+}  // namespace
+}  // namespace tensorray

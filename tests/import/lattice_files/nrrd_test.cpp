@@ -1,0 +1,312 @@
+#include <random>
+
+#include <fmt/format.h>
+
+#include "tests/import/voxel_support.h"
+#include "tools/import/lattice_files/lattice_files.h"
+
+namespace tensorray {
+namespace {
+
+using Eigen::Matrix3d;
+using Eigen::Vector3d;
+using Eigen::Vector3i;
+
+const std::string oblique_fields = "space directions: none (0,2,0) (-1.5,0,0) (0,0.5,3)\nspace origin: (10,20,30)\n";
+
+/// The header of a single-precision file. `fields` are further lines.
+std::string header_of(const std::string& kind, int components, const Vector3i& size, const std::string& fields,
+                      const std::string& space = "right-anterior-superior") {
+  return fmt::format(
+      "NRRD0005\ntype: float\ndimension: 4\nspace: {}\nsizes: {} {} {} {}\nkinds: {} space space space\n"
+      "endian: little\nencoding: raw\n{}\n",
+      space, components, size.x(), size.y(), size.z(), kind, fields);
+}
+
+std::vector<float> floats(std::initializer_list<double> numbers) { return {numbers.begin(), numbers.end()}; }
+
+std::vector<float> six(const Matrix3d& t) { return floats({t(0, 0), t(0, 1), t(0, 2), t(1, 1), t(1, 2), t(2, 2)}); }
+
+std::vector<float> nine(const Matrix3d& t) {
+  return floats({t(0, 0), t(0, 1), t(0, 2), t(1, 0), t(1, 1), t(1, 2), t(2, 0), t(2, 1), t(2, 2)});
+}
+
+/// The header line of a measurement frame. Its vectors are the columns of `frame`.
+std::string measurement_frame(const Matrix3d& frame) {
+  const auto vector = [&](int i) { return fmt::format("({},{},{})", frame(0, i), frame(1, i), frame(2, i)); };
+  return "measurement frame: " + vector(0) + " " + vector(1) + " " + vector(2) + "\n";
+}
+
+/// Reads a file of one voxel, and returns the tensor.
+Matrix3d read_one(const std::string& header, const std::vector<float>& components) {
+  const test::TemporaryFile file("one.nrrd", header + test::bytes_of(components));
+  const TensorGrid grid = test::tensors_of(open_nrrd(file));
+  const Eigen::Matrix3f* tensor = test::voxel(grid, {0, 0, 0});
+  return tensor ? Matrix3d(tensor->cast<double>()) : Matrix3d(Matrix3d::Constant(NAN));
+}
+
+TEST(Nrrd, HelixHasItsFacts) {
+  const auto path = test::data_file("dt_helix/dt-helix.nrrd");
+  TENSORRAY_NEEDS(path);
+  const Lattice lattice = open_nrrd(path);
+  EXPECT_EQ(lattice.size, Vector3i(38, 39, 40));
+  EXPECT_TRUE(lattice.masked);
+  LatticeReport report;
+  const TensorGrid grid = tensors_of(lattice, {}, report);
+  EXPECT_EQ(report.voxels, 38u * 39 * 40);
+  EXPECT_GT(report.active, 0u);
+  EXPECT_LT((grid.to_world.translation() - Vector3d(-2.336842, -2.338462, -2.34)).norm(), 1e-9);
+  const test::Spectrum spectrum = test::spectrum_of(grid);
+  EXPECT_GT(spectrum.least, 0.2365);
+  EXPECT_LT(spectrum.greatest, 0.3035);
+}
+
+TEST(Nrrd, HelixInLpsIsTurnedToRas) {
+  const auto path = test::data_file("dt_helix/dt-helix-ref-RotationAndAffine.nrrd");
+  TENSORRAY_NEEDS(path);
+  const Lattice lattice = open_nrrd(path);
+  EXPECT_LT((lattice.to_world.linear() - Matrix3d(Vector3d(0.126316, 0.123077, 0.12).asDiagonal())).norm(), 1e-9);
+  EXPECT_LT((lattice.to_world.translation() - Vector3d(-2.336842, -2.338462, -2.34)).norm(), 1e-9);
+  // The file has no mask; the tensors around the helix are nearly zero.
+  int inside = 0;
+  test::for_each_voxel(test::tensors_of(lattice), [&](const Vector3i&, const Matrix3d& tensor) {
+    const Vector3d values = Eigen::SelfAdjointEigenSolver<Matrix3d>(tensor).eigenvalues();
+    if (values.maxCoeff() < 1e-9) return;
+    ++inside;
+    EXPECT_GT(values.minCoeff(), 0.2365);
+    EXPECT_LT(values.maxCoeff(), 0.3035);
+  });
+  EXPECT_GT(inside, 1000);
+}
+
+TEST(Nrrd, EachKindHasItsComponentsOrderAndMask) {
+  const Matrix3d symmetric = test::symmetric_tensor(), general = test::general_tensor();
+  const auto with_mask = [](double mask, std::vector<float> components) {
+    components.insert(components.begin(), static_cast<float>(mask));
+    return components;
+  };
+  const auto header = [](const std::string& kind, int components) {
+    return header_of(kind, components, {1, 1, 1}, oblique_fields);
+  };
+  EXPECT_LT((read_one(header("3D-symmetric-matrix", 6), six(symmetric)) - symmetric).norm(), 1e-6);
+  EXPECT_LT((read_one(header("3D-masked-symmetric-matrix", 7), with_mask(1, six(symmetric))) - symmetric).norm(), 1e-6);
+  EXPECT_LT((read_one(header("???", 7), with_mask(1, six(symmetric))) - symmetric).norm(), 1e-6);
+  EXPECT_LT((read_one(header("3D-matrix", 9), nine(general)) - general).norm(), 1e-6);
+  EXPECT_LT((read_one(header("3D-masked-matrix", 10), with_mask(1, nine(general))) - general).norm(), 1e-6);
+  EXPECT_TRUE(read_one(header("3D-masked-symmetric-matrix", 7), with_mask(0, six(symmetric))).hasNaN());
+  EXPECT_TRUE(read_one(header("3D-masked-matrix", 10), with_mask(0, nine(general))).hasNaN());
+  test::expect_error([&] { read_one(header("list", 6), six(symmetric)); }, {"--order"});
+}
+
+TEST(Nrrd, TheMeasurementFrameIsAppliedOnceAndNotTransposed) {
+  const Matrix3d frame = test::rotation(), t = test::general_tensor(), expected = frame * t * frame.transpose();
+  const std::string fields = oblique_fields + measurement_frame(frame);
+  const Matrix3d found = read_one(header_of("3D-matrix", 9, {1, 1, 1}, fields), nine(t));
+  EXPECT_LT((found - expected).norm(), 1e-5);
+  // The result must differ, so that leaving out, transposing or repeating the frame would be detected.
+  EXPECT_GT((found - t).norm(), 0.1);
+  EXPECT_GT((found - frame.transpose() * t * frame).norm(), 0.1);
+  EXPECT_GT((found - frame * expected * frame.transpose()).norm(), 0.1);
+}
+
+TEST(Nrrd, AnatomicalSpacesAreTurnedToRasWithTheMeasurementFrame) {
+  const Matrix3d frame = test::rotation(), t = test::general_tensor();
+  const std::string fields = oblique_fields + measurement_frame(frame);
+  Matrix3d directions;  // The vectors in the file are columns.
+  directions << 0, -1.5, 0, 2, 0, 0.5, 0, 0, 3;
+  const std::vector<std::pair<std::string, Vector3d>> spaces = {{"right-anterior-superior", {1, 1, 1}},
+                                                                {"left-anterior-superior", {-1, 1, 1}},
+                                                                {"left-posterior-superior", {-1, -1, 1}},
+                                                                {"scanner-xyz", {1, 1, 1}}};
+  for (const auto& [space, signs] : spaces) {
+    const test::TemporaryFile file("space.nrrd",
+                                   header_of("3D-matrix", 9, {1, 1, 1}, fields, space) + test::bytes_of(nine(t)));
+    const TensorGrid grid = test::tensors_of(open_nrrd(file));
+    const Matrix3d turn = signs.asDiagonal();
+    EXPECT_LT((grid.to_world.linear() - turn * directions).norm(), 1e-9) << space;
+    EXPECT_LT((grid.to_world.translation() - turn * Vector3d(10, 20, 30)).norm(), 1e-9) << space;
+    test::expect_near(turn * frame * t * frame.transpose() * turn, test::voxel(grid, {0, 0, 0}), 1e-5);
+  }
+}
+
+TEST(Nrrd, ComponentsMayStandAnywhereAmongTheAxes) {
+  // Some programs write components last: x fastest, then y, z, component.
+  const Vector3i size(3, 2, 10);
+  std::vector<float> numbers;
+  for (int c = 0; c < 6; ++c)
+    for (int i = 0; i < size.prod(); ++i) numbers.push_back(static_cast<float>(100 * (c + 1) + i));
+  const test::TemporaryFile file(
+      "last.nrrd",
+      "NRRD0005\ntype: float\ndimension: 4\nspace dimension: 3\nsizes: 3 2 10 6\nkinds: space space "
+      "space 3D-symmetric-matrix\nendian: little\nencoding: raw\nspace directions: (1,0,0) (0,1,0) "
+      "(0,0,1) none\n\n" +
+          test::bytes_of(numbers));
+  const TensorGrid grid = test::tensors_of(open_nrrd(file));
+  EXPECT_EQ(grid.active_voxels(), 60u);
+  test::for_each_voxel(grid, [](const Vector3i& i, const Matrix3d& tensor) {
+    const double n = i.x() + 3 * i.y() + 6 * i.z();
+    const Matrix3d expected = (Matrix3d() << 100, 200, 300, 200, 400, 500, 300, 500, 600).finished();
+    EXPECT_EQ(tensor, Matrix3d(expected + Matrix3d::Constant(n)));
+  });
+}
+
+TEST(Nrrd, EveryVoxelKeepsItsTensorWhileMemoryIsGivenBack) {
+  const Vector3i size(5, 4, 19);
+  std::vector<float> numbers;
+  for (int i = 0; i < 9 * size.prod(); ++i) numbers.push_back(static_cast<float>(i + 1));
+  const test::TemporaryFile file("all.nrrd", header_of("3D-matrix", 9, size, oblique_fields) + test::bytes_of(numbers));
+  const TensorGrid grid = test::tensors_of(open_nrrd(file));
+  EXPECT_EQ(grid.active_voxels(), 5u * 4 * 19);
+  test::for_each_voxel(grid, [](const Vector3i& i, const Matrix3d& tensor) {
+    const int first = 9 * (i.x() + 5 * (i.y() + 4 * i.z())) + 1;
+    EXPECT_EQ(tensor(0, 0), first);
+    EXPECT_EQ(tensor(0, 2), first + 2);
+    EXPECT_EQ(tensor(2, 1), first + 7);
+  });
+}
+
+TEST(Nrrd, SpacingsAndMinimaPlaceVoxelsByTheirCentering) {
+  const auto transform = [](const std::string& centering) {
+    const test::TemporaryFile file(
+        "spacing.nrrd",
+        "NRRD0005\ntype: float\ndimension: 4\nsizes: 9 1 1 1\nkinds: 3D-matrix domain domain domain\n"
+        "endian: little\nencoding: raw\nspacings: nan 2 3 4\naxis mins: nan 10 20 30\ncenterings: ??? " +
+            centering + "\n\n" + test::bytes_of(std::vector<float>(9, 1)));
+    return open_nrrd(file).to_world;
+  };
+  EXPECT_EQ(transform("node node node").linear(), Matrix3d(Vector3d(2, 3, 4).asDiagonal()));
+  EXPECT_EQ(transform("node node node").translation(), Vector3d(10, 20, 30));
+  EXPECT_EQ(transform("cell cell cell").translation(), Vector3d(11, 21.5, 32));
+}
+
+TEST(Nrrd, TextDetachedDataAndIntegersAreRead) {
+  const std::string fields =
+      "NRRD0005\ntype: short\ndimension: 4\nspace dimension: 3\nsizes: 6 1 1 2\nkinds: "
+      "3D-symmetric-matrix space space space\nspace directions: none (1,0,0) (0,1,0) (0,0,1)\n";
+  const auto expect = [](const std::filesystem::path& path) {
+    const TensorGrid grid = test::tensors_of(open_nrrd(path));
+    EXPECT_EQ(grid.active_voxels(), 1u);  // Exactly zero is background.
+    test::expect_near((Matrix3d() << 1, 2, 3, 2, 4, 5, 3, 5, -6).finished(), test::voxel(grid, {0, 0, 1}));
+  };
+  const test::TemporaryFile text("text.nrrd", fields + "encoding: ascii\n\n0 0 0 0 0 0\n1 2 3 4 5 -6\n");
+  expect(text);
+  std::string big(12, '\0');
+  for (const int n : {1, 2, 3, 4, 5, -6}) (big += static_cast<char>(n < 0 ? -1 : 0)) += static_cast<char>(n);
+  const test::TemporaryFile raw("data.raw", big);
+  const test::TemporaryFile head("head.nhdr",
+                                 fields + "endian: big\nencoding: raw\ndata file: " + raw.filename().string() + "\n");
+  expect(head);
+  std::filesystem::remove(raw);
+  test::expect_error([&] { open_nrrd(head); }, {"head.nhdr", "data.raw"});
+}
+
+TEST(Nrrd, NotANumberIsInactive) {
+  std::vector<float> numbers(18, 1);
+  numbers[13] = NAN;
+  const test::TemporaryFile file("nan.nrrd",
+                                 header_of("3D-matrix", 9, {2, 1, 1}, oblique_fields) + test::bytes_of(numbers));
+  LatticeReport report;
+  tensors_of(open_nrrd(file), {}, report);
+  EXPECT_EQ(report.active, 1u);
+  EXPECT_EQ(report.non_finite, 1u);
+}
+
+TEST(Nrrd, GradientTurnsVectorsWithTheMeasurementFrame) {
+  const Matrix3d frame = test::rotation();
+  std::vector<float> numbers;
+  for (int i = 0; i < 27; ++i) {
+    const Vector3d v = frame.transpose() * Vector3d(5.0 * (i / 3 % 3) + 1, 0, 0);  // v = (5 y + 1, 0, 0)
+    for (int c = 0; c < 3; ++c) numbers.push_back(static_cast<float>(v[c]));
+  }
+  const test::TemporaryFile file(
+      "vector.nrrd",
+      header_of("vector", 3, {3, 3, 3}, "space directions: none (1,0,0) (0,1,0) (0,0,1)\n" + measurement_frame(frame)) +
+          test::bytes_of(numbers));
+  LatticeReport report;
+  const TensorGrid grid = gradient_of(open_nrrd(file), report);
+  Matrix3d expected = Matrix3d::Zero();
+  expected(0, 1) = 5;
+  test::expect_near(expected, test::voxel(grid, {1, 1, 1}), 1e-5);
+}
+
+TEST(Nrrd, WrongFilesAreErrorsOfOneLine) {
+  const std::string numbers(9 * 8 * 4, '\1');
+  const auto expect = [](const std::string& contents, const std::vector<std::string>& words) {
+    const test::TemporaryFile file("wrong.nrrd", contents);
+    std::vector<std::string> all = {"wrong.nrrd"};
+    all.insert(all.end(), words.begin(), words.end());
+    test::expect_error([&] { open_nrrd(file); }, all);
+  };
+  const auto header = [](const std::string& kind, int components, const Vector3i& size, const std::string& fields) {
+    return header_of(kind, components, size, fields);
+  };
+  test::expect_error([] { open_nrrd("absent.nrrd"); }, {"absent.nrrd", "no such file"});
+  expect("", {"not a NRRD"});
+  expect("P6\n1 1\n255\n...", {"not a NRRD"});
+  expect("1 2 3\n4 5 6\n", {"not a NRRD"});
+  expect("NRRD0005\ntype: float\ndimension: 4\n", {"damaged"});
+  expect("NRRD0005\ntype: colour\n\n", {"damaged"});
+  expect(header("3D-matrix", 9, {2, 2, 2}, oblique_fields) + numbers.substr(200), {"cut off"});
+  expect(header("3D-matrix", 9, {2, 2, 2}, oblique_fields) + numbers.substr(1), {"cut off"});
+  expect(header("3D-matrix", 9, {20000, 20000, 20000}, oblique_fields) + numbers, {"announces", "cut off"});
+  expect(header("3D-matrix", 9, {2, 2, 0}, oblique_fields) + numbers, {"damaged"});
+  expect(header("3D-matrix", 6, {2, 2, 2}, oblique_fields) + numbers, {});
+  expect(header("list", 8, {2, 2, 2}, oblique_fields) + numbers, {"8 components"});
+  expect(header("3D-matrix", 9, {2, 2, 2}, "space directions: none (1,0,0) (2,0,0) (0,0,1)\n") + numbers,
+         {"space directions", "inverted"});
+  expect(header("3D-matrix", 9, {2, 2, 2}, oblique_fields + "measurement frame: (1,0,0) (0,0,0) (0,0,1)\n") + numbers,
+         {"measurement frame"});
+  expect(header("3D-matrix", 9, {2, 2, 2}, oblique_fields + "data file: s%s%d 1 9 1\n"), {"several files"});
+  expect(header("3D-matrix", 9, {2, 2, 2}, oblique_fields + "Data File: -\n"), {"standard input"});
+  expect("NRRD0005\ntype: float\ndimension: 3\nsizes: 2 2 2\nencoding: raw\nendian: little\n\n" + numbers, {"axes"});
+}
+
+TEST(Nrrd, TheFrameOfComponentsIsGivenWhereTheFileDoesNotStateIt) {
+  const Matrix3d t = test::symmetric_tensor(), flip = Vector3d(-1, 1, 1).asDiagonal();
+  const std::string lps = "left-posterior-superior",
+                    directions = "space directions: none (2,0,0) (0,-2,0) (0,0,3)\n";  // in RAS: (−2, 0, 0) (0, 2, 0)
+  const auto take = [&](const std::string& header) {
+    const test::TemporaryFile file("frame.nrrd", header + test::bytes_of(six(t)));
+    Lattice lattice = open_nrrd(file);
+    take_frame(lattice, ComponentFrame::voxels);
+    return test::tensors_of(lattice);
+  };
+  const std::string start = header_of("3D-symmetric-matrix", 6, {1, 1, 1}, directions, lps);
+  test::expect_near(flip * t * flip, test::voxel(take(start), {0, 0, 0}));
+  const std::string stated =
+      header_of("3D-symmetric-matrix", 6, {1, 1, 1}, directions + measurement_frame(Matrix3d::Identity()), lps);
+  test::expect_error([&] { take(stated); }, {"--frame"});
+  test::expect_error(
+      [&] {
+        take(header_of("3D-symmetric-matrix", 6, {1, 1, 1}, directions, "scanner-xyz"));
+      },
+      {"--frame"});
+}
+
+TEST(Nrrd, CompressedFilesThatAreCutOffAreErrors) {
+  const auto path = test::data_file("dt_helix/dt-helix-ref-RotationAndAffine.nrrd");
+  TENSORRAY_NEEDS(path);
+  const std::string contents = test::contents_of(path);
+  const test::TemporaryFile file("cut.nrrd", contents.substr(0, contents.size() / 2));
+  test::expect_error([&] { open_nrrd(file); }, {"cut.nrrd", "cut off"});
+}
+
+TEST(Nrrd, GarbledHeadersNeverCrash) {
+  const std::string header = header_of("3D-matrix", 9, {2, 2, 2}, oblique_fields + measurement_frame(test::rotation()));
+  const std::string good = header + std::string(9 * 8 * 4, '\1');
+  std::mt19937 random(1);
+  const test::TemporaryFile file("garbled.nrrd");
+  for (int i = 0; i < 500; ++i) {
+    std::string bad = good;
+    for (int n = 0; n < 1 + i % 4; ++n) bad[8 + random() % header.size()] = static_cast<char>(random());
+    file.write(bad);
+    try {
+      test::tensors_of(open_nrrd(file));
+    } catch (const std::exception& error) {
+      EXPECT_EQ(std::string(error.what()).find('\n'), std::string::npos);
+    }
+  }
+}
+
+}  // namespace
+}  // namespace tensorray

@@ -1,0 +1,293 @@
+// Meshes in a plane become slabs of one voxel.
+
+#include "tools/import/meshes/flat_mesh.h"
+
+#include <gmock/gmock.h>
+#include <vtkCellData.h>
+#include <vtkImageData.h>
+#include <vtkPointData.h>
+#include <vtkRectilinearGrid.h>
+
+#include "base/process/progress.h"
+#include "tests/import/mesh_files.h"
+#include "tests/import/mesh_fixtures.h"
+#include "tests/import/vtk_files.h"
+#include "tools/import/import_file.h"
+
+namespace tensorray {
+namespace {
+
+using namespace mesh_fixtures;
+using testing::HasSubstr;
+using testing::ThrowsMessage;
+
+/// The square from 0 to 4 as 8 × 8 cells of a type, in a plane across `axis` at 1.5.
+Grid square(int cell_type, int axis = 2, int n = 8) {
+  auto grid = Grid::New();
+  vtkNew<vtkPoints> points;
+  points->SetDataTypeToDouble();
+  grid->SetPoints(points);
+  const auto at = [&](double i, double j) {
+    Vector3d p = Vector3d::Constant(1.5);
+    p[(axis + 1) % 3] = 4 * i / n;
+    p[(axis + 2) % 3] = 4 * j / n;
+    return points->InsertNextPoint(p.data());
+  };
+  const auto cell = [&](std::vector<vtkIdType> ids) {
+    grid->InsertNextCell(cell_type, static_cast<vtkIdType>(ids.size()), ids.data());
+  };
+  for (int i = 0; i < n; ++i)
+    for (int j = 0; j < n; ++j) {
+      const double x = i, y = j;
+      if (cell_type == VTK_QUAD) cell({at(x, y), at(x + 1, y), at(x + 1, y + 1), at(x, y + 1)});
+      if (cell_type == VTK_TRIANGLE) {
+        cell({at(x, y), at(x + 1, y), at(x + 1, y + 1)});
+        cell({at(x, y + 1), at(x, y), at(x + 1, y + 1)});  // one of them clockwise
+      }
+      if (cell_type == VTK_QUADRATIC_QUAD)
+        cell({at(x, y), at(x + 1, y), at(x + 1, y + 1), at(x, y + 1), at(x + 0.5, y), at(x + 1, y + 0.5),
+              at(x + 0.5, y + 1), at(x, y + 0.5)});
+      if (cell_type == VTK_QUADRATIC_TRIANGLE) {
+        cell({at(x, y), at(x + 1, y), at(x, y + 1), at(x + 0.5, y), at(x + 0.5, y + 0.5), at(x, y + 0.5)});
+        cell({at(x + 1, y), at(x, y + 1), at(x + 1, y + 1), at(x + 0.5, y + 0.5), at(x + 0.5, y + 1),
+              at(x + 1, y + 0.5)});
+      }
+      if (cell_type == VTK_POLYGON) cell({at(x, y), at(x + 0.5, y), at(x + 1, y), at(x + 1, y + 1), at(x, y + 1)});
+    }
+  return grid;
+}
+
+/// A plane tensor that is linear in the position: xx, yy, zz, xy.
+Eigen::Vector4d plane(const Vector3d& p) { return {1 + p.x(), 2 - p.y() + p.z(), 0.25, 0.5 * p.x() - 0.25 * p.y()}; }
+
+Matrix3d plane_tensor(const Vector3d& p) {
+  const Eigen::Vector4d c = plane(p);
+  return (Matrix3d() << c[0], c[3], 0, c[3], c[1], 0, 0, 0, c[2]).finished();
+}
+
+TensorGrid import(const std::filesystem::path& file, ImportSettings settings, ImportReport& report) {
+  settings.files = {file};
+  return import_tensors(settings, Progress(), report);
+}
+
+ImportSettings settings_of_plane(const char* array, double thickness) {
+  ImportSettings settings;
+  settings.array = array;
+  settings.order = TensorOrder::plane;
+  settings.thickness = thickness;
+  return settings;
+}
+
+TEST(FlatMesh, CellsOfEveryTypeBecomeASlabOfOneVoxel) {
+  const TemporaryFolder folder;
+  for (const int axis : {0, 1, 2})
+    for (const int type : {VTK_TRIANGLE, VTK_QUAD, VTK_POLYGON, VTK_QUADRATIC_TRIANGLE, VTK_QUADRATIC_QUAD}) {
+      SCOPED_TRACE(std::to_string(type) + " across " + std::to_string(axis));
+      const Grid mesh = square(type, axis);
+      add_array<4>(*mesh, "stress", plane);
+      write_xml(*mesh, folder / "a.vtu");
+      ImportSettings settings = settings_of_plane("stress", 0.75);
+      settings.sampling.resolution = 0.25;
+      ImportReport report;
+      const TensorGrid grid = import(folder / "a.vtu", settings, report);
+      EXPECT_EQ(report.thickness, 0.75);
+      EXPECT_EQ(grid.active_voxels(), 17u * 17);
+      const Eigen::AlignedBox3i box = grid.active_box();
+      EXPECT_EQ(box.min()[axis], box.max()[axis]);
+      EXPECT_NEAR(grid.to_world.linear()(axis, axis), 0.75, 1e-12);
+      for_each_voxel(grid, [&](const Vector3d& p, const Matrix3d& tensor) {
+        EXPECT_NEAR(p[axis], 1.5, 1e-12);
+        EXPECT_LT((tensor - plane_tensor(p)).norm(), 1e-5);
+      });
+    }
+}
+
+TEST(FlatMesh, DefaultsAreATypicalEdge) {
+  const TemporaryFolder folder;
+  const Grid mesh = square(VTK_QUAD);
+  add_array<9>(*mesh, "T", [](const Vector3d& p) { return flat(plane_tensor(p)); });
+  write_xml(*mesh, folder / "a.vtu");
+  ImportReport report;
+  const TensorGrid grid = import(folder / "a.vtu", {}, report);
+  EXPECT_NEAR(report.thickness, 0.5, 1e-12);
+  EXPECT_EQ(grid.active_voxels(), 81u);
+  EXPECT_NEAR(grid.to_world.linear()(0, 0), 0.5, 1e-12);
+}
+
+TEST(FlatMesh, GradientsOfVectorsOfTwoComponents) {
+  const TemporaryFolder folder;
+  const Grid mesh = square(VTK_TRIANGLE);
+  add_array<2>(*mesh, "u", [](const Vector3d& p) { return Eigen::Vector2d(2 * p.x() + 3 * p.y(), 5 * p.x() - p.y()); });
+  write_xml(*mesh, folder / "a.vtu");
+  ImportSettings settings;
+  settings.array = "u";
+  settings.take = Take::gradient;
+  ImportReport report;
+  const Matrix3d expected = (Matrix3d() << 2, 3, 0, 5, -1, 0, 0, 0, 0).finished();
+  for_each_voxel(import(folder / "a.vtu", settings, report),
+                 [&](const Vector3d&, const Matrix3d& tensor) { EXPECT_LT((tensor - expected).norm(), 1e-5); });
+}
+
+TEST(FlatMesh, FourComponentsNeedTheirOrderUnlessTheirNamesTell) {
+  const TemporaryFolder folder;
+  const Grid mesh = square(VTK_QUAD);
+  add_array<4>(*mesh, "S", plane);
+  write_xml(*mesh, folder / "a.vtu");
+  ImportSettings settings;
+  ImportReport report;
+  EXPECT_THAT([&] { import(folder / "a.vtu", settings, report); },
+              ThrowsMessage<std::invalid_argument>(HasSubstr("no array suits")));  // Four may be colours.
+  settings.array = "S";
+  EXPECT_THAT([&] { import(folder / "a.vtu", settings, report); },
+              ThrowsMessage<std::invalid_argument>(HasSubstr("plane (xx yy zz xy) or 2x2")));
+  settings.order = TensorOrder::vtk;
+  EXPECT_THROW(import(folder / "a.vtu", settings, report), std::invalid_argument);
+  settings.order = TensorOrder::two_by_two;
+  for_each_voxel(import(folder / "a.vtu", settings, report), [&](const Vector3d& p, const Matrix3d& tensor) {
+    const Eigen::Vector4d c = plane(p);
+    EXPECT_LT((tensor - (Matrix3d() << c[0], c[1], 0, c[2], c[3], 0, 0, 0, 0).finished()).norm(), 1e-5);
+  });
+  const char* const names[] = {"XX", "YY", "ZZ", "XY"};
+  for (int i = 0; i < 4; ++i) mesh->GetPointData()->GetArray("S")->SetComponentName(i, names[i]);
+  write_xml(*mesh, folder / "b.vtu");
+  settings.order.reset();
+  for_each_voxel(import(folder / "b.vtu", settings, report), [&](const Vector3d& p, const Matrix3d& tensor) {
+    EXPECT_LT((tensor - plane_tensor(p)).norm(), 1e-5);
+  });
+}
+
+TEST(FlatMesh, ScalarArraysOfAPlaneAreJoined) {
+  const TemporaryFolder folder;
+  const Grid mesh = square(VTK_QUAD);
+  const char* const names[] = {"sxx", "syy", "szz", "sxy"};
+  for (int i = 0; i < 4; ++i)
+    add_array<1>(*mesh, names[i], [i](const Vector3d& p) { return Eigen::Matrix<double, 1, 1>(plane(p)[i]); });
+  write_xml(*mesh, folder / "a.vtu");
+  for (const bool with_zz : {false, true}) {
+    ImportSettings settings;
+    settings.array = with_zz ? "sxy,szz,sxx,syy" : "sxx,syy,sxy";
+    ImportReport report;
+    for_each_voxel(import(folder / "a.vtu", settings, report), [&](const Vector3d& p, const Matrix3d& tensor) {
+      Matrix3d expected = plane_tensor(p);
+      if (!with_zz) expected(2, 2) = 0;
+      EXPECT_LT((tensor - expected).norm(), 1e-5);
+    });
+  }
+  ImportSettings settings;
+  settings.array = "sxx,syy,szz";
+  ImportReport report;
+  EXPECT_THAT([&] { import(folder / "a.vtu", settings, report); },
+              ThrowsMessage<std::invalid_argument>(HasSubstr("xx, yy, xy")));
+}
+
+TEST(FlatMesh, FlatImagesAndRectilinearGrids) {
+  const TemporaryFolder folder;
+  vtkNew<vtkImageData> image;
+  image->SetDimensions(5, 4, 1);
+  add_array<4>(*image, "S", plane);
+  write_xml(*image, folder / "a.vti");
+  ImportSettings settings = settings_of_plane("S", 3);
+  ImportReport report;
+  const TensorGrid voxels = import(folder / "a.vti", settings, report);
+  EXPECT_EQ(voxels.active_voxels(), 20u);
+  EXPECT_EQ(voxels.to_world.linear()(2, 2), 3);
+  for_each_voxel(
+      voxels, [&](const Vector3d& p, const Matrix3d& tensor) { EXPECT_LT((tensor - plane_tensor(p)).norm(), 1e-5); });
+
+  vtkNew<vtkRectilinearGrid> rectilinear;
+  vtkNew<vtkDoubleArray> x, y, z;
+  for (const double value : {0.0, 1.0, 4.0}) x->InsertNextValue(value), y->InsertNextValue(value);
+  z->InsertNextValue(2);
+  rectilinear->SetDimensions(3, 3, 1);
+  rectilinear->SetXCoordinates(x);
+  rectilinear->SetYCoordinates(y);
+  rectilinear->SetZCoordinates(z);
+  add_array<4>(*rectilinear, "S", plane);
+  write_xml(*rectilinear, folder / "a.vtr");
+  settings.sampling.resolution = 0.5;
+  const TensorGrid sampled = import(folder / "a.vtr", settings, report);
+  EXPECT_EQ(sampled.active_voxels(), 81u);
+}
+
+TEST(FlatMesh, ValuesOfCells) {
+  const TemporaryFolder folder;
+  const Grid mesh = square(VTK_POLYGON);
+  vtkNew<vtkDoubleArray> values;
+  values->SetName("S");
+  values->SetNumberOfComponents(9);
+  values->SetNumberOfTuples(mesh->GetNumberOfCells());
+  for (int c = 0; c < 9; ++c) values->FillComponent(c, c);
+  mesh->GetCellData()->AddArray(values);
+  write_xml(*mesh, folder / "a.vtu");
+  ImportReport report;
+  const TensorGrid grid = import(folder / "a.vtu", {}, report);
+  EXPECT_GT(grid.active_voxels(), 50u);
+  for_each_voxel(grid, [&](const Vector3d&, const Matrix3d& tensor) { EXPECT_EQ(tensor(1, 2), 5); });
+}
+
+TEST(FlatMesh, SurfacesInSpaceAndWrongFlagsAreErrors) {
+  const TemporaryFolder folder;
+  ImportSettings settings;
+  ImportReport report;
+  const Grid bent_square = square(VTK_QUAD);
+  for (vtkIdType i = 0; i < bent_square->GetNumberOfPoints(); ++i) {
+    Vector3d p(bent_square->GetPoint(i));
+    p.z() += 0.1 * p.x();
+    bent_square->GetPoints()->SetPoint(i, p.data());
+  }
+  add_array<9>(*bent_square, "T", [](const Vector3d& p) { return flat(linear_tensor(p)); });
+  write_xml(*bent_square, folder / "bent.vtu");
+  EXPECT_THAT(
+      [&] { import(folder / "bent.vtu", settings, report); },
+      ThrowsMessage<std::invalid_argument>(testing::AllOf(HasSubstr("bent.vtu"), HasSubstr("surface in space"))));
+  settings.thickness = 1;
+  write_xml(*bar(0, 3), folder / "solid.vtu");
+  EXPECT_THAT([&] { import(folder / "solid.vtu", settings, report); },
+              ThrowsMessage<std::invalid_argument>(HasSubstr("--thickness")));
+  write_xml(*image(), folder / "solid.vti");
+  EXPECT_THAT([&] { import(folder / "solid.vti", settings, report); },
+              ThrowsMessage<std::invalid_argument>(HasSubstr("--thickness")));
+}
+
+/// Images keep their voxels, and are fields of a plane as meshes are.
+TEST(FlatMesh, VectorsOfImagesMayHaveTwoComponents) {
+  const TemporaryFolder folder;
+  auto image = vtkSmartPointer<vtkImageData>::New();
+  image->SetDimensions(5, 4, 1);
+  add_array<2>(*image, "v",
+               [](const Vector3d& p) { return Eigen::Vector2d(2 * p.x() + 3 * p.y(), 5 * p.x() - p.y()); });
+  add_array<1>(*image, "u", [](const Vector3d& p) { return Eigen::Matrix<double, 1, 1>(2 * p.x() + 3 * p.y()); });
+  add_array<1>(*image, "w", [](const Vector3d& p) { return Eigen::Matrix<double, 1, 1>(5 * p.x() - p.y()); });
+  write_xml(*image, folder / "a.vti");
+  const Matrix3d expected = (Matrix3d() << 2, 3, 0, 5, -1, 0, 0, 0, 0).finished();
+  for (const char* array : {"v", "u,w"})
+    for (const bool sampled : {false, true}) {
+      ImportSettings settings;
+      settings.array = array;
+      settings.take = Take::gradient;
+      if (sampled) settings.sampling.resolution = 0.5;
+      ImportReport report;
+      const TensorGrid grid = import(folder / "a.vti", settings, report);
+      EXPECT_EQ(grid.active_voxels(), sampled ? 9u * 7 : 5u * 4);
+      for_each_voxel(grid, [&](const Vector3d&, const Matrix3d& t) { EXPECT_LT((t - expected).norm(), 1e-5); });
+    }
+}
+
+TEST(FlatMesh, TheThicknessIsNoEdgeThatIsDivided) {
+  const TemporaryFolder folder;
+  const Grid mesh = square(VTK_QUAD);
+  add_array<4>(*mesh, "stress", plane);
+  write_xml(*mesh, folder / "a.vtu");
+  ImportSettings settings = settings_of_plane("stress", 100);
+  ImportReport report;
+  for (const auto& resolution : {decltype(settings.sampling.resolution)(17), {Vector3i(17, 17, 1)}}) {
+    settings.sampling.resolution = resolution;
+    EXPECT_EQ(import(folder / "a.vtu", settings, report).active_voxels(), 17u * 17);
+  }
+  settings.sampling.resolution = {};
+  settings.sampling.bounds = Eigen::AlignedBox3d(Vector3d(1, 1, 0), Vector3d(1.25, 1.25, 0));  // Half of an edge.
+  EXPECT_EQ(import(folder / "a.vtu", settings, report).active_voxels(), 4u);
+}
+
+}  // namespace
+}  // namespace tensorray

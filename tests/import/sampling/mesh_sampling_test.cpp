@@ -1,0 +1,338 @@
+#include "tools/import/sampling/mesh_sampling.h"
+
+#include <cmath>
+#include <limits>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <tbb/global_control.h>
+#include <vtkCellData.h>
+#include <vtkUnsignedCharArray.h>
+
+#include "base/constants.h"
+#include "tests/import/mesh_fixtures.h"
+#include "tools/import/meshes/mesh_tensors.h"
+
+namespace tensorray {
+namespace {
+
+using namespace mesh_fixtures;
+using ::testing::HasSubstr;
+using ::testing::ThrowsMessage;
+
+const Map identity = [](const Vector3d& p) { return p; };
+
+void add_linear_tensor(vtkDataSet& mesh) {
+  add_array<9>(mesh, tensor_array, [](const Vector3d& p) { return flat(linear_tensor(p)); });
+}
+
+TensorGrid sampled(vtkDataSet& mesh, const SamplingSettings& settings, SamplingReport& report) {
+  const Progress progress;
+  return sample_mesh(mesh, settings, progress, report);
+}
+
+TensorGrid sampled(vtkDataSet& mesh, const SamplingSettings& settings) {
+  SamplingReport report;
+  return sampled(mesh, settings, report);
+}
+
+SamplingSettings resolution(int count) {
+  SamplingSettings settings;
+  settings.resolution = count;
+  return settings;
+}
+
+void expect_linear(const TensorGrid& grid) {
+  double worst = 0;
+  for_each_voxel(grid, [&](const Vector3d& p, const Matrix3d& tensor) {
+    worst = std::max(worst, (tensor - linear_tensor(p)).cwiseAbs().maxCoeff());
+  });
+  EXPECT_LT(worst, 5e-6);  // single precision of numbers up to 23, and a position error of at most 1e-6 of the diagonal
+}
+
+struct CellCase {
+  const char* name;
+  int type;
+  bool is_bent;
+};
+
+class EveryCell : public ::testing::TestWithParam<CellCase> {};
+
+// Spacings of 1/(n − 1), and cells of edge 1/3, put voxels on faces, edges and corners of the cells and of the cube.
+TEST_P(EveryCell, SamplesALinearFieldExactlyAtEveryVoxelOfACube) {
+  const auto mesh = unit_cube(GetParam().type, 3, GetParam().is_bent ? Map(bent) : identity);
+  add_linear_tensor(*mesh);
+  for (const int count : {13, 26}) {
+    SamplingReport report;
+    const TensorGrid grid = sampled(*mesh, resolution(count), report);
+    EXPECT_EQ(report.size, Vector3i::Constant(count));
+    EXPECT_EQ(report.active, static_cast<std::size_t>(count) * count * count);
+    EXPECT_EQ(grid.active_voxels(), report.active);
+    expect_linear(grid);
+  }
+}
+
+// The curved faces of a bent quadratic cell fit its neighbours, because its middle nodes are bent too.
+INSTANTIATE_TEST_SUITE_P(Types, EveryCell,
+                         ::testing::Values(CellCase{"Hexahedron", VTK_HEXAHEDRON, false},
+                                           CellCase{"BentHexahedron", VTK_HEXAHEDRON, true},
+                                           CellCase{"LagrangeHexahedron", VTK_LAGRANGE_HEXAHEDRON, false},
+                                           CellCase{"BentLagrangeHexahedron", VTK_LAGRANGE_HEXAHEDRON, true},
+                                           CellCase{"Wedge", VTK_WEDGE, false}, CellCase{"BentWedge", VTK_WEDGE, true},
+                                           CellCase{"Pyramid", VTK_PYRAMID, false},
+                                           CellCase{"Tetrahedron", VTK_TETRA, false},
+                                           CellCase{"BentTetrahedron", VTK_TETRA, true},
+                                           CellCase{"QuadraticTetrahedron", VTK_QUADRATIC_TETRA, false},
+                                           CellCase{"BentQuadraticTetrahedron", VTK_QUADRATIC_TETRA, true},
+                                           CellCase{"QuadraticHexahedron", VTK_QUADRATIC_HEXAHEDRON, false},
+                                           CellCase{"BentQuadraticHexahedron", VTK_QUADRATIC_HEXAHEDRON, true}),
+                         [](const auto& test) { return std::string(test.param.name); });
+
+TEST(MeshSampling, QuadraticCellsGiveAQuadraticFieldExactly) {
+  const auto mesh = unit_cube(VTK_QUADRATIC_TETRA, 2, identity);
+  const auto value = [](const Vector3d& p) { return Matrix3d(linear_tensor(p) * (1 + p.x() - 2 * p.y() + p.z())); };
+  add_array<9>(*mesh, tensor_array, [&](const Vector3d& p) { return flat(value(p)); });
+  double worst = 0;
+  for_each_voxel(sampled(*mesh, resolution(15)), [&](const Vector3d& p, const Matrix3d& tensor) {
+    worst = std::max(worst, (tensor - value(p)).cwiseAbs().maxCoeff());
+  });
+  EXPECT_LT(worst, 1e-5);
+}
+
+TEST(MeshSampling, CurvilinearGridsAreSampledLikeLooseHexahedra) {
+  const auto mesh = curvilinear({6, 9, 5}, bent);
+  add_linear_tensor(*mesh);
+  SamplingReport report;
+  expect_linear(sampled(*mesh, resolution(20), report));
+  EXPECT_EQ(report.active, 20u * 20u * 20u);
+}
+
+TEST(MeshSampling, HolesAndTheOutsideAreInactive) {
+  const int around = 64;
+  const auto mesh = hollow_cylinder(around, 1);
+  add_linear_tensor(*mesh);
+  const double inner_flat = std::cos(pi / around);  // where the faceted circle is closest to the axis
+  std::size_t inside = 0;
+  for_each_voxel(sampled(*mesh, resolution(50)), [&](const Vector3d& p, const Matrix3d&) {
+    const double radius = p.head<2>().norm();
+    EXPECT_GT(radius, inner_flat - 1e-5);
+    EXPECT_LT(radius, 2 + 1e-5);
+    ++inside;
+  });
+  SamplingReport report;
+  sampled(*mesh, resolution(101), report);
+  const double expected = pi * (4 - 1) / 16;
+  const double fraction = static_cast<double>(report.active) / report.size.cast<double>().prod();
+  EXPECT_NEAR(fraction, expected, 0.02);
+}
+
+TEST(MeshSampling, ResolutionIsOfTheLongestEdgeOrOfEachOrAVoxelOrChosen) {
+  const auto mesh =
+      unit_cube(VTK_HEXAHEDRON, 4, [](const Vector3d& p) { return Vector3d(2 * p.x() + 1, p.y(), p.z() / 2); });
+  add_linear_tensor(*mesh);
+  SamplingReport report;
+  const TensorGrid longest = sampled(*mesh, resolution(21), report);
+  EXPECT_EQ(report.size, Vector3i(21, 11, 6));
+  EXPECT_NEAR(report.voxel.x(), 0.1, 1e-12);
+  EXPECT_TRUE(longest.to_world.translation().isApprox(Vector3d(1, 0, 0)));
+  expect_linear(longest);
+
+  SamplingSettings settings;
+  settings.resolution = Vector3i(5, 6, 7);
+  expect_linear(sampled(*mesh, settings, report));
+  EXPECT_EQ(report.size, Vector3i(5, 6, 7));
+  EXPECT_TRUE(report.voxel.isApprox(Vector3d(0.5, 0.2, 0.5 / 6)));
+  EXPECT_EQ(report.active, 5u * 6u * 7u);
+
+  settings.resolution = 0.3;
+  sampled(*mesh, settings, report);
+  EXPECT_EQ(report.size, Vector3i(7, 4, 2));
+
+  sampled(*mesh, {}, report);  // the cells are 1/2 x 1/4 x 1/8: a cube of the same volume has an edge of 1/4
+  EXPECT_NEAR(report.voxel.x(), 0.25, 1e-9);
+  EXPECT_EQ(report.size, Vector3i(9, 5, 3));
+}
+
+TEST(MeshSampling, ChosenVoxelsAreAtMostTwoToThe21) {
+  // 200 thin slices beside a long cell: for the median cell, 10^7 voxels would be needed.
+  const auto mesh = curvilinear(
+      {202, 2, 2}, [](const Vector3d& p) { return Vector3d(p.x() < 0.999 ? p.x() * 1e-4 : 1.0, p.y(), p.z()); });
+  add_linear_tensor(*mesh);
+  SamplingReport report;
+  sampled(*mesh, {}, report);
+  EXPECT_LE(report.size.cast<double>().prod(), 1 << 21);
+  EXPECT_GE(report.size.cast<double>().prod(), 0.9 * (1 << 21));
+}
+
+TEST(MeshSampling, BoundsCropTheLatticeAndTheReport) {
+  const auto mesh = unit_cube(VTK_HEXAHEDRON, 4, identity);
+  add_linear_tensor(*mesh);
+  SamplingSettings settings;
+  settings.bounds = Eigen::AlignedBox3d(Vector3d(0.25, 0.25, 0), Vector3d(0.5, 0.5, 2));
+  settings.resolution = 0.125;
+  SamplingReport report;
+  const TensorGrid grid = sampled(*mesh, settings, report);
+  EXPECT_EQ(report.size, Vector3i(3, 3, 17));
+  EXPECT_EQ(report.active, 3u * 3u * 9u);  // the mesh ends at z = 1
+  expect_linear(grid);
+  EXPECT_NEAR(report.native_peak,
+              std::max({linear_tensor({0.5, 0.25, 1}).norm(), linear_tensor({0.5, 0.5, 0}).norm(),
+                        linear_tensor({0.5, 0.5, 1}).norm(), linear_tensor({0.5, 0.25, 0}).norm(),
+                        linear_tensor({0.25, 0.5, 1}).norm()}),
+              1e-12);
+}
+
+TEST(MeshSampling, ReportsThePeakThatCoarseVoxelsMiss) {
+  // |T| = √3 max(0, 1 − 8 |x − 1/16|) on cells of edge 1/16. Voxels of edge 1/8 miss the peak by half a tooth, where
+  // |T| has half its peak value.
+  const auto mesh = unit_cube(VTK_HEXAHEDRON, 16, identity);
+  add_array<9>(*mesh, tensor_array, [](const Vector3d& p) {
+    return flat(Matrix3d::Identity() * std::max(0.0, 1 - 8 * std::abs(p.x() - 0.0625)));
+  });
+  SamplingReport report;
+  sampled(*mesh, resolution(9), report);
+  EXPECT_NEAR(report.native_peak, std::sqrt(3.0), 1e-12);
+  EXPECT_NEAR(report.sampled_peak, std::sqrt(3.0) / 2, 1e-6);
+  EXPECT_EQ(report.sampled_median, 0);
+  sampled(*mesh, resolution(17), report);
+  EXPECT_NEAR(report.sampled_peak, std::sqrt(3.0), 1e-6);
+}
+
+TEST(MeshSampling, VoxelsThatNeedAPointThatIsNotANumberAreInactive) {
+  const auto mesh = curvilinear({5, 5, 5}, identity);
+  add_array<9>(*mesh, tensor_array, [](const Vector3d& p) {
+    Eigen::Matrix<double, 9, 1> tensor = flat(linear_tensor(p));
+    if (p.isApprox(Vector3d(0.5, 0.5, 0.5))) tensor.setConstant(std::numeric_limits<double>::quiet_NaN());
+    return tensor;
+  });
+  SamplingReport report;
+  const TensorGrid grid = sampled(*mesh, resolution(17), report);
+  EXPECT_EQ(report.non_finite, 1u);
+  EXPECT_EQ(report.active,
+            17u * 17u * 17u - 7u * 7u * 7u);  // all points strictly within the eight cells around the hidden point
+  expect_linear(grid);
+}
+
+TEST(MeshSampling, OfCellsThatListMorePointsThanTheirTypeHasTheFirstCount) {
+  const auto quadratic = unit_cube(VTK_QUADRATIC_HEXAHEDRON, 2, identity);
+  const auto mesh = Grid::New();
+  mesh->SetPoints(quadratic->GetPoints());
+  for (vtkIdType i = 0; i < quadratic->GetNumberOfCells(); ++i) {
+    vtkNew<vtkIdList> ids;
+    quadratic->GetCellPoints(i, ids);
+    mesh->InsertNextCell(VTK_HEXAHEDRON, ids);
+  }
+  vtkIdType point = 0;
+  add_array<9>(*mesh, tensor_array, [&](const Vector3d& p) {
+    return Eigen::Matrix<double, 9, 1>(flat(linear_tensor(p)) * (point++ % 20 < 8 ? 1 : 0));
+  });
+  SamplingReport report;
+  expect_linear(sampled(*mesh, resolution(9), report));
+  EXPECT_EQ(report.active, 9u * 9u * 9u);
+  EXPECT_GT(report.native_median, 10);  // the zeros at middle nodes do not count
+}
+
+TEST(MeshSampling, HiddenCellsAreNotThere) {
+  const auto mesh = unit_cube(VTK_HEXAHEDRON, 2, identity);
+  add_linear_tensor(*mesh);
+  vtkNew<vtkUnsignedCharArray> ghosts;
+  ghosts->SetName(vtkDataSetAttributes::GhostArrayName());
+  for (int i = 0; i < 8; ++i)
+    ghosts->InsertNextValue(i == 0   ? vtkDataSetAttributes::HIDDENCELL
+                            : i == 1 ? vtkDataSetAttributes::DUPLICATECELL
+                                     : 0);
+  mesh->GetCellData()->AddArray(ghosts);
+  SamplingReport report;
+  sampled(*mesh, resolution(9), report);
+  EXPECT_EQ(report.active, 9u * 9u * 9u - 4u * 4u * 4u);
+}
+
+TEST(MeshSampling, OverlappingCellsGiveTheSameOnAnyNumberOfThreads) {
+  const auto mesh = unit_cube(VTK_TETRA, 6, [](const Vector3d& p) { return p; });
+  const auto other = unit_cube(VTK_HEXAHEDRON, 5, bent);
+  const vtkIdType first = mesh->GetNumberOfPoints();
+  for (vtkIdType i = 0; i < other->GetNumberOfPoints(); ++i) mesh->GetPoints()->InsertNextPoint(other->GetPoint(i));
+  for (vtkIdType i = 0; i < other->GetNumberOfCells(); ++i) {
+    std::vector<vtkIdType> ids;
+    for (int k = 0; k < 8; ++k) ids.push_back(first + 8 * i + k);
+    mesh->InsertNextCell(VTK_HEXAHEDRON, 8, ids.data());
+  }
+  double point = 0;
+  add_array<9>(*mesh, tensor_array, [&](const Vector3d&) {
+    point += 1;
+    return Eigen::Matrix<double, 9, 1>(Eigen::Matrix<double, 9, 1>::LinSpaced(point, point + 1.0));
+  });
+  std::vector<TensorGrid> grids;
+  for (const std::size_t threads : {1u, 2u, 3u}) {
+    const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, threads);
+    grids.push_back(sampled(*mesh, resolution(40)));
+  }
+  for (std::size_t i = 1; i < grids.size(); ++i) {
+    ASSERT_EQ(grids[i].blocks.size(), grids[0].blocks.size());
+    for (std::size_t k = 0; k < grids[0].blocks.size(); ++k) {
+      EXPECT_EQ(grids[i].blocks[k].origin, grids[0].blocks[k].origin);
+      EXPECT_EQ(grids[i].blocks[k].active, grids[0].blocks[k].active);
+      EXPECT_TRUE(grids[i].blocks[k].values == grids[0].blocks[k].values);
+    }
+  }
+}
+
+TEST(MeshSampling, BlocksAreOrderedAndNoneIsEmpty) {
+  const auto mesh = hollow_cylinder(32, 4);
+  add_linear_tensor(*mesh);
+  const TensorGrid grid = sampled(*mesh, resolution(60));
+  const auto key = [](const TensorBlock& b) { return std::make_tuple(b.origin.x(), b.origin.y(), b.origin.z()); };
+  for (std::size_t i = 0; i < grid.blocks.size(); ++i) {
+    EXPECT_TRUE(grid.blocks[i].active.any());
+    if (i == 0) continue;
+    EXPECT_LT(key(grid.blocks[i - 1]), key(grid.blocks[i]));
+  }
+}
+
+TEST(MeshSampling, StopsWhenCancelledAndReportsToTheCaller) {
+  const auto mesh = unit_cube(VTK_HEXAHEDRON, 3, identity);
+  add_linear_tensor(*mesh);
+  SamplingReport report;
+  Progress progress;
+  std::uint64_t last = 0, total = 0;
+  progress.report = [&](const std::string&, std::uint64_t done, std::uint64_t of) { last = done, total = of; };
+  sample_mesh(*mesh, resolution(33), progress, report);
+  EXPECT_EQ(last, 125u);
+  EXPECT_EQ(total, 125u);
+  progress.cancelled = true;
+  EXPECT_THROW(sample_mesh(*mesh, resolution(33), progress, report), Cancelled);
+}
+
+TEST(MeshSampling, RefusesWhatCannotBeSampled) {
+  const auto cube = unit_cube(VTK_HEXAHEDRON, 1, identity);
+  add_linear_tensor(*cube);
+  const auto flat_mesh = curvilinear({4, 4, 1}, [](const Vector3d& p) { return Vector3d(p.x(), p.y(), 0); });
+  add_linear_tensor(*flat_mesh);
+  EXPECT_THAT([&] { sampled(*flat_mesh, {}); }, ThrowsMessage<std::invalid_argument>(HasSubstr("flat")));
+  const auto refuses = [&](const SamplingSettings& settings, const char* part) {
+    EXPECT_THAT([&] { sampled(*cube, settings); }, ThrowsMessage<std::invalid_argument>(HasSubstr(part)));
+  };
+  refuses(resolution(1), "--resolution");
+  refuses(resolution(1025), "2^30");
+  SamplingSettings settings;
+  settings.resolution = Vector3i(4, 0, 4);
+  refuses(settings, "--resolution");
+  for (const double voxel : {0.0, -1.0, 3.0, std::numeric_limits<double>::quiet_NaN()}) {
+    settings.resolution = voxel;
+    refuses(settings, "--voxel-size");
+  }
+  settings.resolution = 1e-300;
+  refuses(settings, "2^30");
+  settings = {};
+  settings.bounds = Eigen::AlignedBox3d(Vector3d(2, 2, 2), Vector3d(3, 3, 3));
+  refuses(settings, "nothing of the mesh is inside, which goes from (0, 0, 0) to (1, 1, 1)");
+  settings.bounds = Eigen::AlignedBox3d(Vector3d(0, 0, 0), Vector3d(1, 0, 1));
+  refuses(settings, "is not a box");
+  add_array<9>(*cube, tensor_array, [](const Vector3d&) {
+    return Eigen::Matrix<double, 9, 1>(Eigen::Matrix<double, 9, 1>::Constant(std::nan("")));
+  });
+  refuses(resolution(3), "none of the 3 x 3 x 3 voxels");
+}
+
+}  // namespace
+}  // namespace tensorray

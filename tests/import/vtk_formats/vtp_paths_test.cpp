@@ -1,0 +1,310 @@
+// Paths as VTK polydata: written and read by the program through `tensorray-import`, and damaged files.
+
+#include <array>
+#include <cmath>
+#include <cstdio>
+#include <functional>
+#include <limits>
+#include <random>
+#include <sstream>
+#include <stdexcept>
+#include <string>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <sys/wait.h>
+#include <unistd.h>
+#include <vtkNew.h>
+#include <vtkPolyData.h>
+#include <vtkXMLPolyDataReader.h>
+#include <vtkXMLPolyDataWriter.h>
+
+#include "integrators/paths/cross_section.h"
+#include "integrators/path_files/path_files.h"
+#include "tests/import/mesh_files.h"
+#include "tests/integrators/path_support.h"
+#include "tools/import/vtk_formats/vtp_files.h"
+
+namespace tensorray {
+namespace {
+
+using ::testing::AllOf;
+using ::testing::HasSubstr;
+using ::testing::StartsWith;
+
+/// Reads a file with these bytes, and expects that nothing is written to the terminal meanwhile.
+/// @return the error message; empty if the file was read.
+std::string error_of_bytes(const std::string& bytes) {
+  const TemporaryFolder folder;
+  const std::filesystem::path file = folder / "a.vtp";
+  write_bytes(file, bytes);
+  ::testing::internal::CaptureStdout();
+  ::testing::internal::CaptureStderr();
+  const std::string text = error_of([&] { read_paths(file); });
+  EXPECT_EQ(::testing::internal::GetCapturedStdout() + ::testing::internal::GetCapturedStderr(), "");
+  if (!text.empty()) {
+    EXPECT_THAT(text, AllOf(StartsWith("cannot read "), HasSubstr(file.string() + ": ")));
+  }
+  return text;
+}
+
+std::string written(const std::vector<Path>& paths) {
+  const TemporaryFolder folder;
+  write_paths(folder / "a.vtp", paths);
+  return bytes_of(folder / "a.vtp");
+}
+
+/// Whether VTK reads a file with these bytes. Runs VTK in a child process, which is faster than to start the program.
+bool is_taken(const std::string& bytes) {
+  const TemporaryFolder folder;
+  write_bytes(folder / "a.vtp", bytes);
+  const pid_t child = fork();
+  if (child == 0) {
+    if (!std::freopen("/dev/null", "w", stderr)) _exit(2);
+    try {
+      read_vtp_file(folder / "a.vtp", {"direction", "length", "tensor", "change", "in_field", "wavelength", "end"});
+      _exit(0);
+    } catch (const std::runtime_error&) {
+      _exit(1);
+    }
+  }
+  int status = 0;
+  waitpid(child, &status, 0);
+  return status == 0;
+}
+
+/// A file as other programs write it: two lines that share a point, and also a vertex and a triangle.
+std::string foreign_vtp(const std::string& connectivity = "0 1 2 2 3") {
+  const auto cells = [](const std::string& corners, const std::string& offsets) {
+    return "<DataArray type=\"Int32\" Name=\"connectivity\" format=\"ascii\">" + corners +
+           "</DataArray><DataArray type=\"Int32\" Name=\"offsets\" format=\"ascii\">" + offsets + "</DataArray>\n";
+  };
+  return "<?xml version=\"1.0\"?>\n<VTKFile type=\"PolyData\" version=\"0.1\" byte_order=\"LittleEndian\">\n<PolyData>"
+         "<Piece NumberOfPoints=\"4\" NumberOfVerts=\"1\" NumberOfLines=\"2\" NumberOfStrips=\"0\" "
+         "NumberOfPolys=\"1\">\n<CellData><DataArray type=\"Float32\" Name=\"wavelength\" format=\"ascii\">1 450 650 2"
+         "</DataArray></CellData>\n<Points><DataArray type=\"Float32\" NumberOfComponents=\"3\" format=\"ascii\">"
+         "0 0 0  1 0 0  2 0 0  2 3 0</DataArray></Points>\n<Verts>" +
+         cells("3", "1") + "</Verts><Lines>" + cells(connectivity, "3 5") + "</Lines><Polys>" + cells("0 1 3", "3") +
+         "</Polys></Piece></PolyData></VTKFile>\n";
+}
+
+TEST(VtpPathsTest, ReadBackExactly) {
+  const std::vector<Path> paths = some_paths(12);
+  const TemporaryFolder folder;
+  write_paths(folder / "a.vtp", paths);
+  expect_same(read_paths(folder / "a.vtp"), without_empty(paths));
+}
+
+TEST(VtpPathsTest, CutFilesFail) {
+  const std::string bytes = written(some_paths(3));
+  for (std::size_t size = 1; size < bytes.size() - 1; size += 10) {
+    EXPECT_FALSE(is_taken(bytes.substr(0, size))) << size;
+    if (size % 500 != 1) continue;
+    EXPECT_NE(error_of_bytes(bytes.substr(0, size)), "") << size;
+  }
+  EXPECT_TRUE(is_taken(bytes.substr(0, bytes.size() - 1)));  // Only the last line end is missing.
+}
+
+TEST(VtpPathsTest, DamagedFilesNeverCrash) {
+  const std::string bytes = written(some_paths(3));
+  std::mt19937 engine(7);
+  for (int i = 0; i < 300; ++i) {
+    std::string changed = i % 2 ? bytes : foreign_vtp();
+    for (int j = 0; j < 1 + i % 3; ++j) changed[engine() % changed.size()] = static_cast<char>(engine());
+    if (is_taken(changed) || i % 10 == 0) error_of_bytes(changed);
+  }
+}
+
+TEST(VtpPathsTest, LinesOfOtherPrograms) {
+  const TemporaryFolder folder;
+  write_bytes(folder / "a.vtp", foreign_vtp());
+  const std::vector<Path> paths = read_paths(folder / "a.vtp");
+  ASSERT_EQ(paths.size(), 2u);
+  EXPECT_EQ(paths[0].wavelength, 450);
+  EXPECT_EQ(paths[1].wavelength, 650);
+  EXPECT_EQ(paths[0].backward_end, std::nullopt);
+  ASSERT_EQ(paths[0].points.size(), 3u);
+  ASSERT_EQ(paths[1].points.size(), 2u);
+  EXPECT_EQ(paths[1].points[1].position, Eigen::Vector3d(2, 3, 0));
+  EXPECT_EQ(paths[1].points[1].length, 3);
+  for (const PathPoint& point : paths[0].points) {
+    EXPECT_EQ(point.direction, Eigen::Vector3d::UnitX());
+    EXPECT_TRUE(point.tensor.isZero(0) && point.change.isZero(0));
+  }
+}
+
+TEST(VtpPathsTest, ErrorsNameTheFix) {
+  const std::string foreign = foreign_vtp();
+  const auto error = [](const std::string& content) { return error_of_bytes(content); };
+  EXPECT_THAT(error("solid nothing of the kind\n"), HasSubstr("not VTK polydata"));
+  EXPECT_THAT(error(replaced(foreign, "type=\"PolyData\"", "type=\"Image\nData\"")),
+              HasSubstr("not VTK polydata but \"Image\\nData\""));
+  EXPECT_THAT(error(foreign_vtp("0 1 2 2 4")), HasSubstr("not there"));
+  EXPECT_THAT(error(foreign_vtp("0 1 2 2 -1")), HasSubstr("not there"));
+  EXPECT_THAT(error(foreign_vtp("0 1 2 2")), HasSubstr("damaged"));
+  EXPECT_THAT(error(replaced(foreign, "3 5<", "3 9000000000000000000<")), HasSubstr("damaged"));
+  EXPECT_THAT(error(replaced(foreign, "3 5<", "3 2000000000<")), HasSubstr("damaged"));
+  EXPECT_THAT(error(replaced(foreign, "3 5<", "5 3<")), testing::Not(""));
+  EXPECT_THAT(error(replaced(foreign, "1 0 0", "1 nan 0")), testing::Not(""));
+  EXPECT_THAT(error(replaced(foreign, "NumberOfPoints=\"4\"", "NumberOfPoints=\"4000000000\"")), HasSubstr("damaged"));
+  EXPECT_THAT(error(replaced(foreign, "NumberOfLines=\"2\"", "NumberOfLines=\"99999999999999999999999\"")),
+              HasSubstr("NumberOfLines is no count"));
+  EXPECT_THAT(error(replaced(foreign, "NumberOfLines=\"2\"", "NumberOfLines=\"0\"")), HasSubstr("no path"));
+
+  std::vector<Path> paths = some_paths(3);
+  paths[2].points[1].position.y() = std::numeric_limits<double>::quiet_NaN();
+  EXPECT_THAT(error(written(paths)), HasSubstr("point 3 of its lines is not finite"));
+  paths = some_paths(3);
+  paths[2].points[1].tensor(0, 1) = std::numeric_limits<double>::quiet_NaN();
+  EXPECT_THAT(error(written(paths)), HasSubstr("\"tensor\" has a value that is not finite"));
+  paths = some_paths(3);
+  paths[2].points[1].length = 0;
+  EXPECT_THAT(error(written(paths)), HasSubstr("\"length\" does not grow"));
+}
+
+TEST(VtpPathsTest, PiecesThatDoNotHaveTheSameArrays) {
+  std::string piece = foreign_vtp();
+  const std::size_t begin = piece.find("<Piece"), end = piece.find("</PolyData>");
+  std::string both = piece;
+  both.insert(end, replaced(piece.substr(begin, end - begin), "wavelength", "wave_number"));
+  const TemporaryFolder folder;
+  write_bytes(folder / "a.vtp", both);
+  std::vector<Path> paths;
+  const std::string error = error_of([&] { paths = read_paths(folder / "a.vtp"); });
+  if (error.empty()) {
+    ASSERT_EQ(paths.size(), 4u);
+    for (const Path& path : paths) EXPECT_EQ(path.wavelength, Path().wavelength);
+  }
+}
+
+TEST(VtpPathsTest, UnwritableFilesAreNoticed) {
+  const std::vector<Path> paths = some_paths(100);
+  const std::filesystem::path missing = "/no/such/folder/a.vtp";
+  EXPECT_THAT(error_of([&] { write_paths(missing, paths); }), HasSubstr(missing.string() + ": cannot be written"));
+  if (!std::filesystem::exists("/dev/full")) return;
+  const TemporaryFolder folder;
+  std::filesystem::create_symlink("/dev/full", folder / "a.vtp");
+  EXPECT_THAT(error_of([&] { write_paths(folder / "a.vtp", paths); }), HasSubstr("cannot be written"));
+}
+
+/// The output of a python3 program that reads the file with VTK; empty if python3 has no VTK.
+std::string printed_by_vtk(const std::filesystem::path& file, const std::string& program) {
+  const TemporaryFolder folder;
+  const std::filesystem::path script = folder / "read.py";
+  write_bytes(script,
+              "import sys\ntry:\n  import vtk\nexcept ImportError:\n  sys.exit()\n"
+              "reader = vtk.vtkXMLPolyDataReader()\nreader.SetFileName(sys.argv[1])\nreader.Update()\n"
+              "data = reader.GetOutput()\npoints, lines = data.GetPointData(), data.GetCellData()\n" +
+                  program);
+  std::string text;
+  for (const std::string python : {"python3", "/usr/bin/python3"}) {
+    FILE* pipe = popen((python + " '" + script.string() + "' '" + file.string() + "' 2>&1").c_str(), "r");
+    std::array<char, 256> piece;
+    text.clear();
+    while (pipe && std::fgets(piece.data(), piece.size(), pipe)) text += piece.data();
+    const int status = pipe ? pclose(pipe) : 1;
+    if (status == 0 && !text.empty()) return text;
+  }
+  return text.find("not found") == std::string::npos ? text : "";
+}
+
+TEST(VtpPathsTest, VtkReadsThem) {
+  const std::vector<Path> paths = some_paths(4);
+  const TemporaryFolder files;
+  const std::filesystem::path file = files / "paths.vtp";
+  write_paths(file, paths);
+  const std::string text = printed_by_vtk(
+      file,
+      "print(data.GetNumberOfPoints(), data.GetNumberOfLines(), data.GetNumberOfCells())\n"
+      "for a in (points, lines):\n"
+      "  print(' '.join(sorted(a.GetArrayName(i) for i in range(a.GetNumberOfArrays()))))\n"
+      "names = data.GetFieldData().GetAbstractArray('end_names')\n"
+      "print(names.GetValue(int(lines.GetArray('end').GetTuple1(2))), lines.GetArray('backward_end').GetTuple1(2))\n"
+      "print(data.GetCell(1).GetPointId(2), repr(data.GetPoint(4)[0]), "
+      "repr(points.GetArray('tensor').GetTuple9(4)[1]))\n"
+      "print('%.6f' % points.GetArray('force').GetTuple3(4)[0], '%.6f' % points.GetArray('axis_major').GetTuple3(4)[2],"
+      " '%.6f' % points.GetArray('curvature').GetTuple1(4), points.GetArray('axis_minor').GetTuple3(2))\n");
+  if (text.empty()) GTEST_SKIP() << "python3 has no VTK (python3-vtk9)";
+
+  const PathPoint& point = paths[2].points[2];  // The last point of the second polyline: point 4 of the file.
+  char expected[1000];
+  const auto section = cross_sections(paths[2].points, {1, 1e-300, 1e300})[2];
+  std::snprintf(
+      expected, sizeof expected,
+      "14 4 4\naxis_major axis_minor change curvature direction force in_field length tensor\n"
+      "backward_end end flexibility wavelength\nobstacle -1.0\n4 %.17g %.17g\n%.6f %.6f %.6f (0.0, 0.0, 0.0)\n",
+      point.position.x(), point.tensor(0, 1), point.force().x(), section.major.z(), point.change.norm());
+  // Python prints as few digits as possible. Compare the values, not the text.
+  std::istringstream have(text), want(expected);
+  for (std::string a, b; want >> b;) {
+    ASSERT_TRUE(have >> a) << text;
+    char* end = nullptr;
+    const double value = std::strtod(b.c_str(), &end);
+    if (*end == 0 && b.find('.') != std::string::npos && b.size() < 12)
+      EXPECT_NEAR(std::strtod(a.c_str(), nullptr), value, 2e-6) << text;
+    else if (*end == 0)
+      EXPECT_EQ(std::strtod(a.c_str(), nullptr), value) << text;
+    else
+      EXPECT_EQ(a, b) << text;
+  }
+}
+
+enum class Encoding { ascii, inline_base64, appended_base64, appended_raw };
+
+void rewrite(const std::filesystem::path& from, const std::filesystem::path& to, Encoding encoding,
+             const std::function<void(vtkXMLWriter&)>& set) {
+  vtkNew<vtkXMLPolyDataReader> reader;
+  reader->SetFileName(from.c_str());
+  reader->Update();
+  vtkNew<vtkXMLPolyDataWriter> writer;
+  writer->SetInputData(reader->GetOutput());
+  writer->SetFileName(to.c_str());
+  writer->SetDataMode(encoding == Encoding::ascii           ? vtkXMLWriter::Ascii
+                      : encoding == Encoding::inline_base64 ? vtkXMLWriter::Binary
+                                                            : vtkXMLWriter::Appended);
+  writer->SetEncodeAppendedData(encoding == Encoding::appended_base64);
+  set(*writer);
+  ASSERT_EQ(writer->Write(), 1);
+}
+
+TEST(VtpPathsTest, EveryEncodingOfVtk) {
+  const std::vector<std::function<void(vtkXMLWriter&)>> settings{
+      [](vtkXMLWriter&) {},  // ZLib, the default of VTK and ParaView.
+      [](vtkXMLWriter& writer) { writer.SetCompressorTypeToNone(); },
+      [](vtkXMLWriter& writer) { writer.SetCompressorTypeToLZ4(); },
+      [](vtkXMLWriter& writer) { writer.SetCompressorTypeToLZMA(); },
+      [](vtkXMLWriter& writer) { writer.SetHeaderTypeToUInt64(); },
+      [](vtkXMLWriter& writer) { writer.SetByteOrderToBigEndian(); },
+  };
+  const std::vector<Path> paths = some_paths(4);
+  const TemporaryFolder folder;
+  write_paths(folder / "a.vtp", paths);
+  for (const Encoding encoding :
+       {Encoding::ascii, Encoding::inline_base64, Encoding::appended_base64, Encoding::appended_raw})
+    for (std::size_t i = 0; i < settings.size(); ++i) {
+      SCOPED_TRACE(std::to_string(static_cast<int>(encoding)) + " " + std::to_string(i));
+      rewrite(folder / "a.vtp", folder / "b.vtp", encoding, settings[i]);
+      const std::vector<Path> read = read_paths(folder / "b.vtp");
+      if (encoding != Encoding::ascii)
+        expect_same(read, without_empty(paths));
+      else  // Written with fewer digits.
+        EXPECT_NEAR(read.at(3).points.at(4).tensor(2, 0), paths[4].points[4].tensor(2, 0), 1e-6);
+    }
+}
+
+TEST(VtpPathsTest, AppendedDataThatAreElsewhere) {
+  const TemporaryFolder folder;
+  write_paths(folder / "a.vtp", some_paths(3));
+  rewrite(folder / "a.vtp", folder / "b.vtp", Encoding::appended_raw, [](vtkXMLWriter&) {});
+  const std::string bytes = bytes_of(folder / "b.vtp");
+  const std::size_t offset = bytes.find("offset=\"", bytes.find("Name=\"tensor\""));
+  ASSERT_NE(offset, std::string::npos);
+  for (const char* more : {"9", "99999999999999"}) {
+    std::string moved = bytes;
+    moved.insert(offset + 8, more);
+    EXPECT_THAT(error_of_bytes(moved), HasSubstr("damaged"));
+  }
+}
+
+}  // namespace
+}  // namespace tensorray

@@ -1,0 +1,359 @@
+// Tests pictures that are seen through a tensor field, in both modes.
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+
+#include <Eigen/LU>
+#include <gtest/gtest.h>
+#include <tbb/global_control.h>
+
+#include "tests/integrators/lens_support.h"
+
+namespace tensorray {
+namespace {
+
+using namespace test;
+
+/// Landings are single precision: an error of (s, t).
+constexpr double rounding = 5e-7;
+
+TEST(Lens, WithoutFieldThePictureIsTheImage) {
+  const Vector2i size(48, 32);
+  const Image picture = noise(size.x(), size.y());
+  Bench bench(no_field(), plate_at(1.5, {1.5, 1}, size), {1.5, 1}, picture);
+  bench.channels = {{0.1, 650, 1}, {0.2, 550, 1}, {-0.5, 450, 1}};
+  bench.settings.reference = 0.5;
+  for (const LensMode mode : modes) {
+    const LensPicture seen = bench.simulate(mode);
+    ASSERT_EQ(seen.radiance.channels, 3);
+    EXPECT_EQ(seen.color.values, seen.radiance.values);  // The bands' colours are red, green and blue.
+    for (int y = 0; y < size.y(); ++y)
+      for (int x = 0; x < size.x(); ++x) {
+        const std::size_t pixel = static_cast<std::size_t>(y * size.x() + x);
+        for (int channel = 0; channel < 3; ++channel)
+          ASSERT_NEAR(seen.radiance.plane(channel)[pixel], picture.pixel(x, y)[channel], 1e-5) << x << " " << y;
+        EXPECT_NEAR(seen.alpha[pixel], 1, 1e-6);
+        const LensPoint& point = seen.points[pixel];
+        ASSERT_EQ(point.end, LensEnd::image);
+        EXPECT_LT((point.st - center_of(x, y, size)).norm(), rounding);
+        EXPECT_LT((point.per_pixel - Matrix2d(Vector2d(1.0 / 48, -1.0 / 32).asDiagonal())).norm(), rounding);
+        EXPECT_LT(point.displacement.norm(), 3 * rounding);
+        EXPECT_NEAR(point.log_magnification, 0, 100 * rounding);
+        EXPECT_NEAR(point.log_stretch[0], 0, 100 * rounding);
+        EXPECT_NEAR(point.log_stretch[1], 0, 100 * rounding);
+        EXPECT_EQ(point.folds, 1);
+        EXPECT_NEAR(point.length, 3, 3 * rounding);
+        EXPECT_LT((seen.straight * Vector2d(x + 0.5, y + 0.5) - point.st).norm(), rounding);
+      }
+    for (const EndCounts& ends : seen.ends)
+      for (int end = 0; end < ray_end_count; ++end) {
+        if (end == static_cast<int>(RayEnd::plate)) {
+          EXPECT_GT(ends[end], 0u);
+        } else {
+          EXPECT_EQ(ends[end], 0u);
+        }
+      }
+  }
+}
+
+TEST(Lens, ASmallerImageLeavesPixelsThatSeeNothing) {
+  const Image picture = noise(24, 16);
+  const Bench bench(no_field(), plate_at(1.5, {1.5, 1}, {48, 32}), {0.75, 0.5}, picture);
+  for (const LensMode mode : modes) {
+    const LensPicture seen = bench.simulate(mode);
+    for (int y = 0; y < 32; ++y)
+      for (int x = 0; x < 48; ++x) {
+        const std::size_t pixel = static_cast<std::size_t>(y * 48 + x);
+        const bool inside = x >= 12 && x < 36 && y >= 8 && y < 24;
+        const LensEnd nothing = mode == LensMode::gather ? LensEnd::outside : LensEnd::missed;
+        ASSERT_EQ(seen.points[pixel].end, inside ? LensEnd::image : nothing) << x << " " << y;
+        EXPECT_NEAR(seen.alpha[pixel], inside ? 1 : 0, 1e-6);
+        EXPECT_NEAR(seen.radiance.plane(0)[pixel], inside ? picture.pixel(x - 12, y - 8)[0] : 0, 1e-5);
+        if (!inside && mode == LensMode::gather) {
+          EXPECT_LT((seen.points[pixel].st - center_of(x - 12, y - 8, {24, 16})).norm(), 2 * rounding);
+        }
+      }
+  }
+}
+
+TEST(Lens, AWrappedImageIsEverywhere) {
+  const Image picture = noise(24, 16);
+  const Bench bench(no_field(), plate_at(1.5, {1.5, 1}, {48, 32}), {0.75, 0.5}, picture, Wrap::repeat);
+  const LensPicture seen = bench.simulate(LensMode::gather);
+  for (int y = 0; y < 32; ++y)
+    for (int x = 0; x < 48; ++x) {
+      const std::size_t pixel = static_cast<std::size_t>(y * 48 + x);
+      EXPECT_EQ(seen.points[pixel].end, LensEnd::image);
+      EXPECT_NEAR(seen.alpha[pixel], 1, 1e-6);
+      EXPECT_NEAR(seen.radiance.plane(0)[pixel], picture.pixel((x + 12) % 24, (y + 8) % 16)[0], 1e-5);
+    }
+}
+
+TEST(Lens, AnObstacleHidesTheImage) {
+  Bench bench(no_field(), plate_at(1.5, {1.5, 1}, {48, 32}), {1.5, 1}, uniform(0.5f), Wrap::clamp);
+  const double pixel = 1.5 / 48;  // Its edges lie between pixels.
+  bench.surfaces.obstacles.push_back(
+      box_mesh(Eigen::AlignedBox3d(Vector3d(-8 * pixel, -4 * pixel, 1.1), Vector3d(12 * pixel, 6 * pixel, 1.2)),
+               Eigen::Affine3d::Identity()));
+  for (const LensMode mode : modes) {
+    const LensPicture seen = bench.simulate(mode);
+    for (int y = 0; y < 32; ++y)
+      for (int x = 0; x < 48; ++x) {
+        const bool hidden = x >= 16 && x < 36 && y >= 10 && y < 20;
+        const LensEnd end = mode == LensMode::gather ? LensEnd::obstacle : LensEnd::missed;
+        ASSERT_EQ(point_at(seen, x, y).end, hidden ? end : LensEnd::image) << x << " " << y;
+        EXPECT_NEAR(seen.alpha[static_cast<std::size_t>(y * 48 + x)], hidden ? 0 : 1, 1e-6);
+        EXPECT_NEAR(seen.radiance.values[static_cast<std::size_t>(y * 48 + x)], hidden ? 0 : 0.5, 1e-6);
+      }
+    EXPECT_GT(seen.ends[0][static_cast<int>(RayEnd::obstacle)], 0u);
+  }
+}
+
+TEST(Lens, SamplesOfAUniformImageHaveItsRadiance) {
+  Bench bench(cube_field(9, linear_tensor), plate_at(1.5, {0.6, 0.4}, {24, 16}), {3, 3}, uniform(0.75f), Wrap::repeat);
+  for (const LensMode mode : modes)
+    for (const int samples : {1, 2, 3}) {
+      bench.settings.samples = samples;
+      const LensPicture seen = bench.simulate(mode);
+      for (std::size_t i = 0; i < seen.alpha.size(); ++i) {
+        ASSERT_NEAR(seen.radiance.values[i], 0.75, 1e-5) << samples;
+        ASSERT_NEAR(seen.alpha[i], 1, 1e-6);
+      }
+    }
+}
+
+TEST(Lens, SamplesDescribeTheSamePoints) {
+  Bench bench(cube_field(9, linear_tensor), plate_at(1.5, {0.6, 0.4}, {24, 16}), {3, 3}, noise(64, 64));
+  bench.channels = {{0.1, 0, 1}, {0.15, 0, 1}};
+  bench.settings.reference = 1;
+  for (const LensMode mode : modes) {
+    const LensPicture one = bench.simulate(mode);
+    for (const int samples : {2, 3}) {
+      bench.settings.samples = samples;
+      const LensPicture more = bench.simulate(mode);
+      for (std::size_t i = 0; i < one.points.size(); ++i) {
+        ASSERT_LT((more.points[i].st - one.points[i].st).norm(), 1e-12);
+        ASSERT_EQ(more.points[i].folds, one.points[i].folds);
+      }
+    }
+    bench.settings.samples = 1;
+  }
+}
+
+TEST(Lens, AStronglyMagnifiedImageHasNoCracks) {
+  const auto tensor = [](const Vector3d& p) {
+    Matrix3d T = Matrix3d::Zero();
+    T.col(2) << 1.5 * std::sin(2 * p.x()) * std::cos(p.y()), 1.5 * std::sin(2 * p.y()) + 0.8 * p.x(), 0;
+    return T;
+  };
+  Bench bench(cube_field(17, tensor), plate_at(1.5, {1.6, 1.6}, {40, 40}), {0.8, 0.8}, uniform(1));
+  bench.settings.samples = 3;
+  const LensPicture seen = bench.simulate(LensMode::scatter, 0.5);
+  double most = 0;
+  for (std::size_t i = 0; i < seen.points.size(); ++i) {
+    ASSERT_EQ(seen.points[i].end, LensEnd::image);
+    ASSERT_NEAR(seen.alpha[i], 1, 1e-6);
+    most = std::max(most, seen.points[i].log_magnification);
+  }
+  EXPECT_GT(most, std::log(15.0));
+}
+
+TEST(Lens, ATornImageShowsAGap) {
+  const double rate = 0.3, angle = std::asin(2 * rate), pixel = 3.0 / 60;
+  const double aside = (1 - std::cos(angle)) / rate + 0.5 * std::tan(angle);
+  Matrix3d T = Matrix3d::Zero();  // Light along +z turns towards +y; beside the volume it is straight.
+  T(1, 2) = rate;
+  T(2, 1) = -rate;
+  Bench bench(constant_field(T), plate_at(1.5, {3, 3}, {60, 60}), {3, 3}, uniform(1), Wrap::clamp);
+  const LensPicture seen = bench.simulate(LensMode::scatter, 1);
+  int dark = 0;
+  for (int row = 0; row < 60; ++row)
+    for (int column = 0; column < 60; ++column) {
+      const double x = (column + 0.5) * pixel - 1.5, y = 1.5 - (row + 0.5) * pixel;
+      const auto near = [&](double value, double edge) { return std::abs(value - edge) < 0.6 * pixel; };
+      if (near(x, -1) || near(x, 1) || near(y, -1) || near(y, -1 + aside)) continue;
+      const bool in_gap = std::abs(x) < 1 && y > -1 && y < -1 + aside;
+      EXPECT_NEAR(seen.alpha[static_cast<std::size_t>(row * 60 + column)], in_gap ? 0 : 1, 1e-6) << x << " " << y;
+      dark += in_gap;
+    }
+  EXPECT_GT(dark, 200);
+}
+
+TEST(Lens, TheSameOnAnyNumberOfThreads) {
+  Bench bench(cube_field(9, linear_tensor), plate_at(1.5, {1.5, 1}, {48, 32}), {1.5, 1}, noise(48, 32));
+  bench.channels = {{0.1, 0, 1}, {0.3, 0, 1}};
+  bench.settings.samples = 2;
+  for (const LensMode mode : modes) {
+    LensPicture seen[2];
+    for (const std::size_t i : {0, 1}) {
+      const tbb::global_control threads(tbb::global_control::max_allowed_parallelism, i + 1);
+      seen[i] = bench.simulate(mode);
+    }
+    EXPECT_EQ(seen[0].radiance.values, seen[1].radiance.values);
+    EXPECT_EQ(seen[0].alpha, seen[1].alpha);
+    EXPECT_EQ(seen[0].ends, seen[1].ends);
+    EXPECT_EQ(seen[0].counts.ray_steps, seen[1].counts.ray_steps);
+    EXPECT_EQ(seen[0].counts.tensor_samples, seen[1].counts.tensor_samples);
+    for (std::size_t i = 0; i < seen[0].points.size(); ++i) {
+      ASSERT_EQ(seen[0].points[i].end, seen[1].points[i].end);
+      ASSERT_EQ(seen[0].points[i].st, seen[1].points[i].st);
+      ASSERT_EQ(seen[0].points[i].per_pixel, seen[1].points[i].per_pixel);
+      ASSERT_EQ(seen[0].points[i].folds, seen[1].points[i].folds);
+    }
+  }
+}
+
+/// A few bands of a range show what many single wavelengths show together, without steps between them.
+TEST(Lens, ARangeIsAContinuumOfWavelengths) {
+  Image edge(256, 256, {"R", "G", "B"});  // White on its left side.
+  for (int y = 0; y < 256; ++y)
+    for (int x = 0; x < 128; ++x) std::fill_n(edge.pixel(x, y), 3, 1.0f);
+  Bench bench(cube_field(9,
+                         [](const Vector3d&) -> Matrix3d {
+                           Matrix3d T = Matrix3d::Zero();
+                           T(0, 2) = 1;  // Moves all light along x, by about s.
+                           return T;
+                         }),
+              plate_at(1.5, {1, 1}, {64, 16}), {4, 4}, edge);
+  for (const LensMode mode : modes) {
+    const auto seen = [&](std::vector<double> flexibilities, bool range, int count) {
+      LensSettings settings;
+      settings.mode = mode;
+      settings.samples = 2;
+      settings.flexibilities = std::move(flexibilities);
+      settings.range = range;
+      std::vector<LensBand> bands;
+      for (int i = 0; i < count; ++i) {
+        const double begin = range ? static_cast<double>(i) / count : static_cast<double>(i) / (count - 1),
+                     end = range ? (i + 1.0) / count : begin;
+        bands.push_back({begin, end, 0, 1.0 / count, Vector3d(1, 1, 1) / count});
+      }
+      const LensLight light = trace_lens(bench.field, bench.surfaces, bench.bending,
+                                         {bench.receiver, bench.image, Vector3d::UnitZ()}, settings, Progress());
+      const auto radiance = [](const Vector3d& rgb, std::size_t first, std::size_t last, double* radiances) {
+        std::fill(radiances, radiances + (last - first), rgb.x());
+      };
+      return draw_lens(light, bands, radiance, 1, true, Progress());
+    };
+    constexpr int many = 256;
+    std::vector<double> each;
+    for (int i = 0; i < many; ++i) each.push_back(-0.1 + 0.2 * (i + 0.5) / many);
+    const LensPicture continuum = seen({-0.1, 0.1}, true, 8), single = seen(each, false, many);
+    EXPECT_EQ(continuum.color.plane(0)[5], continuum.radiance.plane(0)[5]);
+    int between = 0;
+    for (int x = 0; x < 64; ++x) {
+      const double value = continuum.radiance.plane(0)[8 * 64 + x],
+                   step = x == 0 ? 0 : value - continuum.radiance.plane(0)[8 * 64 + x - 1];
+      EXPECT_NEAR(value, single.radiance.plane(0)[8 * 64 + x], 0.03) << x;
+      EXPECT_LT(std::abs(step), 0.1) << x;
+      between += value > 0.05 && value < 0.95;
+    }
+    EXPECT_GT(between, 10);
+  }
+}
+
+/// Display values of smooth pictures are those of rays that are traced for each pixel, to within a step of 8 bits.
+TEST(Lens, PixelsHaveTheDisplayValueOfTheirRays) {
+  Image waves(256, 256, {"R", "G", "B"});
+  for (int y = 0; y < 256; ++y)
+    for (int x = 0; x < 256; ++x)
+      std::fill_n(waves.pixel(x, y), 3, static_cast<float>(0.5 + 0.2 * std::sin(0.2 * x) + 0.2 * std::cos(0.15 * y)));
+  const auto smooth = [](const Vector3d& at) -> Matrix3d {
+    Matrix3d T = Matrix3d::Zero();
+    T(0, 2) = std::sin(2 * at.x() + at.y());
+    T(1, 2) = std::cos(1.5 * at.y() - at.z());
+    T(2, 2) = 0.3 * at.x();
+    return T;
+  };
+  const Vector2i size(96, 96);
+  Bench bench(cube_field(33, smooth), plate_at(1.5, {1, 1}, size), {3, 3}, waves);
+  constexpr double s = 0.2;
+  const auto display = [](double radiance) { return std::pow(radiance, 1 / 2.4); };
+  for (const LensMode mode : modes) {
+    const LensPicture seen = bench.simulate(mode, s);
+    const bool back = mode == LensMode::gather;
+    const Plate &from = back ? bench.receiver : bench.image.plane, &to = back ? bench.image.plane : bench.receiver;
+    const LensMap map(bench.field, bench.surfaces, bench.bending, from, to, (back ? -1 : 1) * Vector3d::UnitZ());
+    double most = 0;
+    for (int y = 0; y < size.y(); ++y)
+      for (int x = 0; x < size.x(); ++x) {
+        const LensPoint& point = point_at(seen, x, y);
+        ASSERT_EQ(point.end, LensEnd::image);
+        const Vector2d at = plane_coordinates(bench.receiver, bench.receiver.to_world(Vector2d(x + 0.5, y + 0.5)));
+        Vector2d start = back ? at : Vector2d((point.st.array() - 0.5) * bench.image.plane.size.array());
+        LensLanding landing;
+        for (int i = 0; i < (back ? 1 : 4); ++i) {  // Newton's method finds the light that lands in the middle.
+          map.trace({start}, {back ? -s : s}, &landing);
+          ASSERT_EQ(landing.end, RayEnd::plate);
+          if (!back) start += landing.jacobian.inverse() * (at - landing.at);
+        }
+        const Vector2d st = ((back ? landing.at : start).array() / bench.image.plane.size.array() + 0.5).matrix();
+        const double expected = bench.texture.lookup(st, point.per_pixel)[0];
+        const double value = seen.radiance.plane(0)[static_cast<std::size_t>(y * size.x() + x)];
+        most = std::max(most, std::abs(display(value) - display(expected)));
+      }
+    EXPECT_LT(most, 1.0 / 255);
+  }
+}
+
+TEST(Lens, CanBeCancelled) {
+  const Bench bench(no_field(), plate_at(1.5, {1, 1}, {32, 32}), {1, 1}, uniform(1));
+  for (const LensMode mode : modes) {
+    Progress before;
+    before.cancelled = true;
+    EXPECT_THROW(bench.simulate(mode, before), Cancelled);
+    Progress during;
+    during.report = [&](const std::string&, std::uint64_t, std::uint64_t) { during.cancelled = true; };
+    EXPECT_THROW(bench.simulate(mode, during), Cancelled);
+  }
+}
+
+TEST(Lens, PixelsThatAreNotSquareTakeRaysByTheirNumber) {
+  constexpr int width = 3, height = 3000;  // 81 million squares of a pixel's shorter side.
+  const Bench bench(no_field(), plate_at(1.5, {1, 1}, {width, height}), {1, 1}, uniform(1));
+  // One thread does all tasks; of several, the caller's report, whose number differs from run to run.
+  const tbb::global_control single(tbb::global_control::max_allowed_parallelism, 1);
+  for (const LensMode mode : modes) {
+    std::map<std::string, std::vector<double>> parts;
+    Progress progress;
+    progress.report = [&](const std::string& phase, std::uint64_t done, std::uint64_t total) {
+      parts[phase].push_back(static_cast<double>(done) / static_cast<double>(total));
+    };
+    const LensPicture picture = bench.simulate(mode, progress);
+    EXPECT_EQ(parts.size(), 2u);
+    for (const auto& [phase, each] : parts) {
+      EXPECT_GE(each.size(), 10u) << phase;
+      EXPECT_TRUE(std::is_sorted(each.begin(), each.end())) << phase;
+    }
+    std::uint64_t rays = 0;
+    for (const std::uint64_t count : picture.ends[0]) rays += count;
+    EXPECT_LE(rays, std::uint64_t{width * height});
+    for (int y = 0; y < height; y += 100)
+      EXPECT_LT((point_at(picture, 1, y).st - Vector2d(0.5, 1 - (y + 0.5) / height)).norm(), 1e-6) << y;
+  }
+}
+
+TEST(Lens, SettingsOutOfRangeAreRefused) {
+  const auto refused = [](const std::function<void(Bench&)>& change) {
+    Bench bench(no_field(), plate_at(1.5, {1, 1}, {4, 4}), {1, 1}, uniform(1));
+    change(bench);
+    for (const LensMode mode : modes) EXPECT_THROW(bench.simulate(mode), std::invalid_argument);
+  };
+  refused([](Bench& bench) { bench.channels.clear(); });
+  refused([](Bench& bench) { bench.settings.samples = 0; });
+  refused([](Bench& bench) { bench.settings.reference = 1.5; });
+  refused([](Bench& bench) { bench.image.texture = nullptr; });
+  refused([](Bench& bench) { bench.bending.step = -1; });
+  refused([](Bench& bench) { bench.bending.max_steps = 0; });
+}
+
+TEST(Lens, EveryEndHasAName) {
+  EXPECT_STREQ(to_string(LensEnd::image), "image");
+  EXPECT_STREQ(to_string(LensEnd::outside), "outside");
+  for (const RayEnd end : {RayEnd::missed, RayEnd::obstacle, RayEnd::step_limit, RayEnd::degenerate})
+    EXPECT_STREQ(to_string(static_cast<LensEnd>(end)), to_string(end));
+}
+
+}  // namespace
+}  // namespace tensorray

@@ -1,0 +1,289 @@
+// Importing files of other programs keeps their numbers, places and axes.
+
+#include "base/constants.h"
+#include "tests/program/import_support.h"
+
+namespace tensorray {
+namespace {
+
+using namespace test;
+
+TEST_F(Import, NotchWhoseMidSideNodesHoldNothing) {
+  const std::string folder = data_file("notch_stress");
+  SKIP_WITHOUT(folder);
+  const auto arguments = [&](const char* file) {
+    return Arguments{folder + file, "--array", "Nodal Stress", "--order", "vtk", "--voxel-size", "0.002"};
+  };
+  const json notch = import(arguments("/notch_stress.vtk"), "notch");
+  // On the mesh the eigenvalues reach from -3.402e5 to 8.1078e6. No warning means that the grid has 95% of that.
+  EXPECT_EQ(imported_.error, "");
+  EXPECT_GT(at(notch, "eigenvalues", "real_max"), 0.94 * 8.1078e6);
+  EXPECT_LE(at(notch, "eigenvalues", "real_max"), 8.1078e6);
+  EXPECT_GE(at(notch, "eigenvalues", "real_min"), -3.4021e5);
+  EXPECT_EQ(notch["asymmetry"], 0);
+  EXPECT_EQ(notch["name"], "Nodal Stress");
+  expect_extent(notch, Vector3d::Zero(), Vector3d(0.4, 0.1, 0.01), 0.004);
+  import(arguments("/notch_stress_fixed.vtk"), "fixed");
+  expect_same(field("notch"), field("fixed"));
+}
+
+TEST_F(Import, BrainInItsObliqueAxes) {
+  const std::string file = data_file("brain_dti/tensorLAS.nii.gz");
+  SKIP_WITHOUT(file);
+  const json brain = import({file, "--order", "fsl"}, "brain");
+  EXPECT_EQ(brain["active_voxels"], 93524);
+  EXPECT_NE(imported_.out.find("367276 background"), std::string::npos) << imported_.out;
+  EXPECT_NEAR(at(brain, "eigenvalues", "real_min"), -4.9e-3, 5e-5);
+  EXPECT_NEAR(at(brain, "eigenvalues", "real_max"), 5.5e-3, 5e-5);
+  EXPECT_NEAR(at(brain, "eigenvalues", "negative_fraction") * 93524, 864, 0.01);
+  const std::array<std::array<double, 4>, 3> sform{{{-2.49987030, -0.00688329, 0.02452171, 121.26437378},
+                                                    {-0.00939895, 2.48641157, -0.26002878, -102.28897095},
+                                                    {0.02368196, 0.26021153, 2.48531413, -126.12567902}}};
+  for (std::size_t i = 0; i < 3; ++i)
+    for (std::size_t j = 0; j < 4; ++j) EXPECT_NEAR(brain["index_to_world"][i][j].get<double>(), sform[i][j], 1e-7);
+}
+
+TEST_F(Import, BrainWithItsBackgroundNotANumber) {
+  const std::string file = data_file("nan/brain_nan_background.vti");
+  SKIP_WITHOUT(file);
+  const json brain = import({file}, "brain");
+  EXPECT_EQ(brain["name"], "diffusion_tensor");
+  EXPECT_EQ(brain["active_voxels"], 93524);
+  EXPECT_EQ(brain["non_finite_voxels"], 0);
+  EXPECT_NE(imported_.out.find("367276 not finite"), std::string::npos) << imported_.out;
+  EXPECT_NEAR(at(brain, "eigenvalues", "negative_fraction") * 93524, 864, 0.01);
+}
+
+TEST_F(Import, DiffusionThatDoesNotSayItsOrder) {
+  const std::string file = data_file("dmri_crop/tensor.nii.gz");
+  SKIP_WITHOUT(file);
+  refuses({file}, 2, {"--order", "mrtrix"});
+  const json crop = import({file, "--order", "mrtrix", "--name", "water", "--units", "mm2/s"}, "crop");
+  EXPECT_EQ(crop["active_voxels"], 16 * 16 * 5);
+  EXPECT_NEAR(at(crop, "eigenvalues", "real_min"), 1.5e-4, 5e-6);
+  EXPECT_NEAR(at(crop, "eigenvalues", "real_max"), 1.7e-3, 5e-5);
+  EXPECT_EQ(crop["name"], "water");
+  EXPECT_EQ(crop["metadata"]["tensorray:field"], "water");
+  EXPECT_EQ(crop["metadata"]["tensorray:units"], "mm2/s");
+}
+
+TEST_F(Import, HelixInBothSpaces) {
+  const std::string folder = data_file("dt_helix");
+  SKIP_WITHOUT(folder);
+  const json ras = import({folder + "/dt-helix.nrrd"}, "ras");
+  EXPECT_NEAR(at(ras, "eigenvalues", "real_min"), 0.237, 5e-4);
+  EXPECT_NEAR(at(ras, "eigenvalues", "real_max"), 0.303, 5e-4);
+  EXPECT_EQ(voxels_of(ras), Vector3i(38, 39, 40));
+  const json lps = import({folder + "/dt-helix-ref-RotationAndAffine.nrrd"}, "lps");
+  EXPECT_NEAR(at(lps, "eigenvalues", "real_max"), 0.303, 5e-4);
+  EXPECT_GT(at(lps, "eigenvalues", "real_min"), 0);
+  for (const json& helix : {ras, lps})
+    expect_extent(helix, {-2.336842, -2.338462, -2.34}, {2.33685, 2.338464, 2.34}, 1e-6);
+}
+
+TEST_F(Import, BluntFinWhoseBoundaryLayerIsThinnerThanAVoxel) {
+  const std::string folder = data_file("bluntfin");
+  SKIP_WITHOUT(folder);
+  // With a number of voxels for each axis, voxels are on the walls.
+  const json fin = import({folder + "/bluntfinxyz.bin", folder + "/bluntfinq.bin", "--gradient-of", "velocity",
+                           "--resolution", "100", "38", "26", "--boundary", "fin.ply"},
+                          "fin");
+  EXPECT_NE(imported_.out.find("peak 1942 ->"), std::string::npos) << imported_.out;
+  const std::size_t median = imported_.out.find("median ");
+  ASSERT_NE(median, std::string::npos) << imported_.out;
+  EXPECT_NEAR(std::stod(imported_.out.substr(median + 7)), 6.49, 0.03);  // Some nodes have no gradient.
+  EXPECT_EQ(std::count(imported_.error.begin(), imported_.error.end(), '\n'), 1) << imported_.error;
+  EXPECT_NE(imported_.error.find("warning: the grid holds"), std::string::npos) << imported_.error;
+  EXPECT_EQ(voxels_of(fin).x(), 100);
+  EXPECT_NEAR(fin["asymmetry"].get<double>(), std::sqrt(2.0), 0.02);  // That of simple shear, as in boundary layers.
+  EXPECT_LT(at(fin, "norm", "p100"), 1942.5);
+  EXPECT_EQ(read_file(in_folder("fin.ply")).compare(0, 4, "ply\n"), 0);
+  EXPECT_EQ(files(), (std::vector<std::string>{"fin.ply", "fin.vdb"}));
+}
+
+TEST_F(Import, CarotidAwayFromTheOrigin) {
+  const std::string file = data_file("carotid/carotid.vtk");
+  SKIP_WITHOUT(file);
+  const json flow = import({file, "--gradient-of", "vectors"}, "flow");
+  EXPECT_EQ(flow["active_voxels"], 76 * 49 * 45);
+  expect_extent(flow, {100, 80, 1}, {175, 128, 45}, 1e-9);
+  float least = 0, greatest = 0;
+  for_each_voxel(field("flow"), [&](const Vector3i&, const Eigen::Matrix3f& gradient) {
+    least = std::min(least, gradient.minCoeff());
+    greatest = std::max(greatest, gradient.maxCoeff());
+  });
+  EXPECT_NEAR(least, -15.9, 0.05);
+  EXPECT_NEAR(greatest, 15.4, 0.05);
+  const json strain =
+      import({file, "--strain-of", "vectors", "--bounds", "110", "120", "90", "100", "5", "8"}, "strain");
+  EXPECT_LT(strain["asymmetry"].get<double>(), 1e-7);
+  EXPECT_EQ(strain["active_voxels"], 11 * 11 * 4);
+  expect_extent(strain, {110, 90, 5}, {120, 100, 8}, 1e-9);
+}
+
+TEST_F(Import, DiskThatFillsItsBoxInPart) {
+  const std::string file = data_file("disk_out_ref/disk_out_ref.ex2");
+  SKIP_WITHOUT(file);
+  const json disk = import({file, "--gradient-of", "V", "--voxel-size", "0.2"}, "disk");
+  const double box = 11.5 * 11.5 * 20.16 / std::pow(0.2, 3);
+  EXPECT_NEAR(disk["active_voxels"].get<double>() / box, 0.59, 0.03);
+  expect_extent(disk, {-5.75, -5.75, -10}, {5.75, 5.75, 10.16}, 0.81);
+  EXPECT_GT(disk["asymmetry"].get<double>(), 0.5);
+}
+
+TEST_F(Import, PlasmaOfOneSliceInFourPieces) {
+  const std::string file = data_file("pv_tensors/tensors.pvti");
+  SKIP_WITHOUT(file);
+  const json plasma = import({file}, "plasma");
+  EXPECT_EQ(voxels_of(plasma), Vector3i(64, 1, 64));
+  EXPECT_EQ(plasma["active_voxels"], 64 * 64);
+  EXPECT_EQ(plasma["index_to_world"][0][3], 6950 + 256);
+  EXPECT_EQ(plasma["index_to_world"][2][3], 900 + 81);
+  EXPECT_GT(plasma["asymmetry"].get<double>(), 0.5);
+  float greatest = 0;
+  for_each_voxel(field("plasma"), [&](const Vector3i&, const Eigen::Matrix3f& gradient) {
+    greatest = std::max(greatest, gradient.cwiseAbs().maxCoeff());
+  });
+  EXPECT_NEAR(greatest, 1.4e-3, 5e-5);
+}
+
+TEST_F(Import, EightTensorsOfOneCell) {
+  const std::string file = data_file("vtk_tensors/tensors.vtk");
+  SKIP_WITHOUT(file);
+  const json eight = import({file, "--resolution", "2"}, "eight");
+  EXPECT_EQ(eight["active_voxels"], 8);
+  std::map<std::array<int, 3>, Matrix3d> tensors;
+  for_each_voxel(field("eight"), [&](const Vector3i& index, const Eigen::Matrix3f& tensor) {
+    tensors[{index.x(), index.y(), index.z()}] = tensor.cast<double>();
+  });
+  Matrix3d dense;
+  dense << 2, 1, 1, 1, 2, 1, 1, 1, 3;
+  EXPECT_LT((tensors[{0, 0, 0}] - Matrix3d::Identity()).norm(), 1e-6);
+  EXPECT_LT((tensors[{1, 0, 0}] - Matrix3d(Vector3d(-2, -2, 3).asDiagonal())).norm(), 1e-6);
+  EXPECT_LT((tensors[{1, 1, 0}] - dense).norm(), 1e-6);
+  EXPECT_LT((tensors[{1, 1, 1}]).norm(), 1e-6);
+}
+
+TEST_F(Import, PointLoadIsBoussinesqs) {
+  const std::string file = data_file("pointload/pointload_32.vti");
+  SKIP_WITHOUT(file);
+  const json load = import({file}, "load");
+  EXPECT_EQ(load["active_voxels"], 32 * 32 * 32);
+  expect_extent(load, {-10, -10, -10}, {10, 10, 10}, 1e-9);
+  const TensorGrid grid = field("load");
+  for_each_voxel(grid, [&](const Vector3i& index, const Eigen::Matrix3f& stress) {
+    const Vector3d r = grid.to_world * index.cast<double>() - Vector3d(0, 0, 10);
+    const double pressed = 3 * 100 / (2 * pi) * std::pow(r.z(), 3) / std::pow(r.norm(), 5);
+    ASSERT_NEAR(stress(2, 2), pressed, 1e-6 * (1 + std::abs(pressed)));  // r.z() <= 0: pressure is negative.
+    ASSERT_NEAR(stress(0, 2) * r.z(), pressed * r.x(), 1e-5 * (1 + std::abs(pressed)));
+  });
+}
+
+TEST_F(Import, WhatMakeMadeComesBackBitForBit) {
+  run_well({"make", "vortex", "-o", "made.vdb", "--resolution", "9"});
+  const TensorGrid made = field("made");
+  const Vector3i size = made.active_box().sizes() + Vector3i::Ones();
+  std::vector<float> numbers(static_cast<std::size_t>(size.prod()) * 9);
+  for_each_voxel(made, [&](const Vector3i& index, const Eigen::Matrix3f& tensor) {
+    const auto first = static_cast<std::size_t>((index.z() * size.y() + index.y()) * size.x() + index.x()) * 9;
+    for (std::size_t i = 0; i < 9; ++i) numbers[first + i] = tensor(static_cast<int>(i / 3), static_cast<int>(i % 3));
+  });
+  const Matrix3d edges = made.to_world.linear();
+  write("made.vti", vti(size, made.to_world.translation(), edges.diagonal(), Matrix3d::Identity(), numbers));
+  EXPECT_EQ(import({"made.vti"}, "image")["name"], "lumps");
+  expect_same(made, field("image"));
+
+  write("made.npy", npy_header(fmt::format("{}, {}, {}, 3, 3", size.z(), size.y(), size.x())) + bytes_of(numbers));
+  import({"made.npy"}, "array");
+  TensorGrid array = field("array");
+  EXPECT_TRUE(array.to_world.matrix().isIdentity());
+  array.to_world = made.to_world;
+  expect_same(made, array);
+
+  const json half = import({"made.npy", "--half"}, "half");
+  EXPECT_EQ(half["active_voxels"], size.prod());
+  EXPECT_NEAR(at(half, "norm", "p100"), at(info("made"), "norm", "p100"), 1e-3 * at(half, "norm", "p100"));
+}
+
+TEST_F(Import, PythonReadsTheRows) {
+  write("lumps.npy", npy_header("12, 14, 18, 3, 3") + bytes_of(components(Matrix3d::Identity(), nine)));
+  import({"lumps.npy"}, "lumps");
+  write("rows.py",
+        "try: import pyopenvdb as vdb\nexcept ImportError: import openvdb as vdb\n"
+        "for row in range(3):\n"
+        "  grid = vdb.read('lumps.vdb', 'tensor_row%d' % row)\n"
+        "  read = grid.getConstAccessor()\n"
+        "  print(grid.activeVoxelCount(), *read.getValue((5, 3, 2)), *read.getValue((17, 13, 11)))\n");
+  const std::string command = "cd '" + in_folder("").string() + "' && /usr/bin/python3 rows.py > rows.txt 2> /dev/null";
+  if (std::system(command.c_str()) != 0) GTEST_SKIP() << "python3 has no OpenVDB (python3-openvdb)";
+  std::ifstream rows(in_folder("rows.txt"));
+  const Vector3d center(8.5, 6.5, 5.5);
+  for (int row = 0; row < 3; ++row) {
+    std::size_t active = 0;
+    rows >> active;
+    EXPECT_EQ(active, 18u * 14 * 12);
+    for (const Vector3d& index : {Vector3d(5, 3, 2), Vector3d(17, 13, 11)})
+      for (int column = 0; column < 3; ++column) {
+        double value = -1;
+        rows >> value;
+        EXPECT_EQ(static_cast<float>(value), static_cast<float>(lumps(index - center)(row, column)));
+      }
+  }
+}
+
+TEST_F(Import, OpenFoamsLastTimeStep) {
+  OpenFoamCase::write(in_folder("case"));
+  const json stress = import({"case", "--array", "sigma", "--order", "vtk", "--resolution", "4"}, "stress");
+  EXPECT_EQ(stress["name"], "sigma");
+  EXPECT_GT(at(stress, "norm", "p0"), 1000);  // The values of the time step before are smaller.
+  EXPECT_EQ(import({"case", "--gradient-of", "U", "--resolution", "4"}, "flow")["name"], "U_gradient");
+}
+
+TEST_F(Import, StepsOfTime) {
+  OpenFoamCase::write(in_folder("case"));
+  const std::vector<std::string> sigma{"import", "case",         "--array", "sigma", "--order",
+                                       "vtk",    "--resolution", "4",       "-q"};
+  const auto steps = [&](const std::string& which, const std::string& output) {
+    std::vector<std::string> arguments = sigma;
+    arguments.insert(arguments.end(), {"--steps", which, "-o", output});
+    return run(arguments);
+  };
+  EXPECT_EQ(steps("all", "all.##.vdb").status, 0);
+  EXPECT_EQ(steps("first", "first.vdb").status, 0);
+  EXPECT_EQ(steps("last", "last.vdb").status, 0);
+  EXPECT_EQ(steps("2", "second.vdb").status, 0);
+  const auto bytes = [&](const std::string& name) { return read_file(in_folder(name)); };
+  EXPECT_FALSE(std::filesystem::exists(in_folder("all.03.vdb")));
+  EXPECT_TRUE(bytes("all.01.vdb") == bytes("first.vdb"));
+  EXPECT_TRUE(bytes("all.02.vdb") == bytes("last.vdb") && bytes("second.vdb") == bytes("last.vdb"));
+  EXPECT_FALSE(bytes("first.vdb") == bytes("last.vdb"));
+  const std::pair<const char*, const char*> wrong[] = {{"3", "there are 2 steps"},
+                                                       {"0", "a number from 1 on"},
+                                                       {"some", "a number from 1 on"},
+                                                       {"all", "flow.####.vdb"}};
+  for (const auto& [which, text] : wrong) {
+    const Outcome outcome = steps(which, "none.vdb");
+    EXPECT_NE(outcome.status, 0) << which;
+    EXPECT_NE(outcome.error.find(text), std::string::npos) << outcome.error;
+    EXPECT_FALSE(std::filesystem::exists(in_folder("none.vdb")));
+  }
+}
+
+/// ParaView's collections name a file for each time, and a .vtm its blocks.
+TEST_F(Import, StepsOfCollections) {
+  for (const double value : {1.0, 2.0})
+    write(fmt::format("{}.vti", value), vti({2, 2, 2}, Vector3d::Zero(), Vector3d::Ones(), Matrix3d::Identity(),
+                                            std::vector<float>(72, static_cast<float>(value))));
+  write("block.vtm", R"(<VTKFile type="vtkMultiBlockDataSet"><vtkMultiBlockDataSet><DataSet index="0" file="2.vti"/>)"
+                     "</vtkMultiBlockDataSet></VTKFile>");
+  write("all.pvd", R"(<VTKFile type="Collection"><Collection><DataSet timestep="3" file="block.vtm"/>)"
+                   R"(<DataSet timestep="1.5" file="1.vti"/></Collection></VTKFile>)");
+  run_well({"import", "all.pvd", "--steps", "all", "-q", "-o", "all.#.vdb"});
+  for (const int step : {1, 2}) {
+    const json field = info(fmt::format("all.{}", step));
+    EXPECT_EQ(at(field, "norm", "p0"), 3 * step) << field;  // Of nine equal components.
+  }
+}
+
+}  // namespace
+}  // namespace tensorray

@@ -1,0 +1,246 @@
+// The density "mesh" of the method photon_distribution, in the whole program.
+
+#include <algorithm>
+#include <cmath>
+
+#include <fmt/format.h>
+
+#include "renderer/film/image_distance.h"
+#include "tests/data_folder.h"
+#include "tests/program/support.h"
+
+namespace tensorray {
+namespace {
+
+using namespace test;
+using nlohmann::json;
+
+class MeshLight : public Program {
+ protected:
+  void SetUp() override {
+    Program::SetUp();
+    write("scene.json", R"({
+      "field": { "generate": { "kind": "point_load", "resolution": 33 }, "eigenvalues": "absolute", "scale": 6 },
+      "light": { "direction": [0, 0, -1], "wavelengths": { "count": 8 } },
+      "receiver": { "distance": 0.5, "size": [2.6, 2.6], "resolution": [96, 96] },
+      "integrator": { "type": "photon_distribution" }
+    })");
+  }
+
+  Image picture(const std::vector<std::string>& more) {
+    std::vector<std::string> arguments{"render", "scene.json", "-o", "out.exr", "--stats", "stats.json", "-q"};
+    arguments.insert(arguments.end(), more.begin(), more.end());
+    run_well(arguments);
+    return read_image(in_folder("out.exr"));
+  }
+};
+
+TEST_F(MeshLight, AllPowerIsAccountedFor) {
+  picture({});
+  const json power = read_json("stats.json")["power"];
+  double stopped = 0;
+  for (const auto& each : power["stopped"]) stopped += each.get<double>();
+  EXPECT_NEAR(power["emitted"].get<double>(), 4, 1e-6);  // The volume's silhouette is a square of edge 2.
+  EXPECT_NEAR(power["deposited"].get<double>() + power["missed"].get<double>() + stopped, 4, 1e-6);
+  EXPECT_GT(power["deposited"].get<double>(), 3);
+}
+
+TEST_F(MeshLight, TheErrorIsBelowTheOneAskedFor) {
+  const Image exact = picture({"--set", "integrator.density.error=0.004"});
+  for (const auto& [text, bound] : {std::pair("10%", 0.1), std::pair("0.03", 0.03)}) {
+    const double error = relative_distance(picture({"--until-error", text}), exact);
+    const double estimate = read_json("stats.json")["error"].get<double>();
+    EXPECT_LE(estimate, bound);
+    EXPECT_LT(error, estimate);
+    EXPECT_GT(error, estimate / 20);
+  }
+}
+
+/// The mean light of blocks of 4 × 4 pixels.
+std::vector<double> block_means(const Image& image) {
+  const auto channel = std::find(image.channels.begin(), image.channels.end(), "G") - image.channels.begin();
+  const int columns = image.width / 4, rows = image.height / 4;
+  std::vector<double> means(static_cast<std::size_t>(columns) * static_cast<std::size_t>(rows));
+  for (int y = 0; y < 4 * rows; ++y)
+    for (int x = 0; x < 4 * columns; ++x)
+      means[static_cast<std::size_t>(y / 4) * columns + x / 4] += image.pixel(x, y)[channel] / 16;
+  return means;
+}
+
+/// At the default tolerance the mesh shows what a histogram of many photons shows: blocks of pixels differ by 3% of the
+/// picture's own light and by the noise of the photons' number, root mean square.
+TEST_F(MeshLight, IsThatOfAHistogramInExampleScenes) {
+  constexpr double photons = 2e6, bound = 0.03;
+  struct Case {
+    const char* scene;
+    int resolution;
+    const char* change;
+  };
+  for (const Case& each : {Case{"helix", 128, ""}, Case{"vortex", 128, ""}, Case{"point_load_photons", 128, ""},
+                           Case{"two_point_load", 128, ""}, Case{"hemisphere_photons_front", 128, ""},
+                           Case{"hemisphere_photons_side", 128, ""}, Case{"hemisphere_photons_top", 128, ""},
+                           Case{"hemisphere_photons_front", 256, "field.scale=0.675"}}) {
+    const auto blocks_of = [&](const char* kind) {
+      std::vector<std::string> arguments{"render",
+                                         (source_folder() / "scenes" / each.scene).string() + ".json",
+                                         "-o",
+                                         "out.exr",
+                                         "--stats",
+                                         "stats.json",
+                                         "-q",
+                                         "--set",
+                                         fmt::format("receiver.resolution=[{0},{0}]", each.resolution),
+                                         "--set",
+                                         "light.wavelengths.min=549",
+                                         "--set",
+                                         "light.wavelengths.max=551",
+                                         "--set",
+                                         "light.wavelengths.count=1",
+                                         "--set",
+                                         fmt::format("light.photons={}", photons),
+                                         "--set",
+                                         fmt::format("integrator.density.kind={}", kind)};
+      if (*each.change) arguments.insert(arguments.end(), {"--set", each.change});
+      run_well(arguments);
+      return block_means(read_image(in_folder("out.exr")));
+    };
+    const std::vector<double> expected = blocks_of("histogram");
+    const json power = read_json("stats.json")["power"];
+    const double on_plate = power["deposited"].get<double>() / power["emitted"].get<double>() * photons;
+    const std::vector<double> light = blocks_of("mesh");
+    double all = 0, squares = 0, differences = 0;
+    for (std::size_t i = 0; i < light.size(); ++i) {
+      all += expected[i];
+      squares += expected[i] * expected[i];
+      differences += std::pow(light[i] - expected[i], 2);
+    }
+    // The variance of a number of photons is the number.
+    const double noise = all * all / on_plate;
+    EXPECT_LT(differences, 1.1 * noise + bound * bound * squares) << each.scene << " " << each.resolution;
+    EXPECT_LT(noise, 0.005 * squares) << each.scene << ": too few photons";
+  }
+}
+
+TEST_F(MeshLight, WithoutBendingTheMapIsThatOfStraightLight) {
+  const Image image = picture({"--set", "bending.a=0", "--set", "bending.b=0"});
+  const auto at = [&](const std::string& name, int x, int y) {
+    const auto channel = std::find(image.channels.begin(), image.channels.end(), name) - image.channels.begin();
+    return image.pixel(x, y)[channel];
+  };
+  for (const int i : {20, 48, 70}) {
+    EXPECT_EQ(at("folds", i, 48), 1);
+    EXPECT_NEAR(at("displacement.x", i, 48), 0, 1e-5);
+    EXPECT_NEAR(at("magnification.log", i, 48), 0, 1e-4);
+    EXPECT_NEAR(at("magnification.major", i, 48), 0, 1e-4);
+    EXPECT_NEAR(at("length", i, 48), at("length", 48, 48), 1e-5);
+    EXPECT_LT(at("error", i, 48), 1e-3);
+  }
+  EXPECT_NEAR(at("length", 48, 48), 2.5, 0.05);  // The volume is nearly 2 high, and the plate half a unit below it.
+  EXPECT_EQ(at("folds", 2, 48), 0) << "beside the silhouette";
+  EXPECT_EQ(at("length", 2, 48), 0);
+}
+
+/// The magnification is that of the displacement, from pixel to pixel.
+TEST_F(MeshLight, TheMapsChannelsDescribeOneMap) {
+  const Image image = picture({});
+  const auto index = [&](const std::string& name) {
+    return std::find(image.channels.begin(), image.channels.end(), name) - image.channels.begin();
+  };
+  const auto dx = index("displacement.x"), dy = index("displacement.y"), log = index("magnification.log"),
+             major = index("magnification.major"), minor = index("magnification.minor"), folds = index("folds");
+  const double pixel = 2.6 / 96;
+  int compared = 0;
+  for (int y = 1; y < 95; ++y)
+    for (int x = 1; x < 95; ++x) {
+      const float* const here = image.pixel(x, y);
+      EXPECT_NEAR(here[log], here[major] + here[minor], 1e-4);
+      EXPECT_GE(here[major], here[minor]);
+      if (std::hypot(x - 47.5, y - 47.5) > 25 || here[folds] != 1) continue;  // Within the bright disc.
+      // By the position across the beam where the light of neighbouring pixels starts; y of the plate is along −y.
+      const auto slope = [&](const float* after, const float* before, int axis) {
+        return (axis == 0 ? after[dx] - before[dx] : after[dy] - before[dy]) / (2 * pixel);
+      };
+      const float *right = image.pixel(x + 1, y), *left = image.pixel(x - 1, y), *above = image.pixel(x, y - 1),
+                  *below = image.pixel(x, y + 1);
+      const double a = 1 - slope(right, left, 0), b = -slope(above, below, 0), c = -slope(right, left, 1),
+                   d = 1 - slope(above, below, 1);
+      EXPECT_NEAR(-std::log(std::abs(a * d - b * c)), here[log], 0.15) << x << " " << y;
+      ++compared;
+    }
+  EXPECT_GT(compared, 1000);
+}
+
+TEST_F(MeshLight, ErrorsThatCannotBeReachedAreTold) {
+  const Outcome outcome =
+      run_well({"render", "scene.json", "-o", "out.exr", "--until-error", "0.1%", "--set", "light.photons=2000"});
+  EXPECT_NE(outcome.error.find("raise `light.photons`"), std::string::npos) << outcome.error;
+}
+
+TEST_F(MeshLight, TheNumberOfBandsHardlyChangesThePicture) {
+  const Image many = picture({"--set", "light.wavelengths.count=64"});
+  EXPECT_LT(relative_distance(picture({}), many), 0.02);
+  EXPECT_LT(relative_distance(picture({"--set", "light.wavelengths.count=2"}), many), 0.02);
+}
+
+TEST_F(MeshLight, PhotonDifferentialsAreNearerThanPointsOfFixedWidth) {
+  write("scene.json", R"({
+      "field": { "generate": { "kind": "helix" } },
+      "light": { "direction": [0, 0, -1], "wavelengths": { "count": 16 } },
+      "receiver": { "resolution": [128, 128] },
+      "integrator": { "type": "photon_distribution" }
+    })");
+  const Image exact = picture({"--set", "integrator.density.error=0.02"});
+  const auto error_of = [&](const std::string& kind, const std::string& tau) {
+    return relative_distance(picture({"--set", "integrator.density.kind=" + kind, "--set",
+                                      "integrator.density.tau=" + tau, "--set", "light.photons=2304"}),
+                             exact);
+  };
+  const double error = error_of("photon_differential", "1");
+  EXPECT_LT(error, 0.5 * error_of("histogram", "1"));
+  for (const char* tau : {"0.5", "1", "2", "4"}) EXPECT_LT(error, error_of("gaussian", tau)) << tau;
+}
+
+TEST_F(MeshLight, OtherOutputsDoNotChangeThePicture) {
+  const Image alone = picture({"--set", "light.photons=50000"});
+  const Image beside = picture({"-o", "out.spectral.exr", "-o", "photons.vdb", "-o", "light.fluence.vdb", "--set",
+                                "light.wavelengths.per_photon=1", "--set", "light.photons=50000"});
+  EXPECT_EQ(alone.pixels, beside.pixels);
+  const Image spectral = read_image(in_folder("out.spectral.exr"));
+  EXPECT_EQ(spectral.channels.size(), 3 + 8u);
+  EXPECT_GT(std::filesystem::file_size(in_folder("photons.vdb")), 1000u);
+  EXPECT_GT(std::filesystem::file_size(in_folder("light.fluence.vdb")), 1000u);
+}
+
+TEST_F(MeshLight, ColoursOfRgbModeAreDrawnOnTheirOwn) {
+  const Image image = picture({"--set", "bending.rgb=[0.1,0.2,0.3]"});
+  for (const float value : image.pixels) ASSERT_TRUE(std::isfinite(value));
+  EXPECT_EQ(read_json("stats.json")["channels"].size(), 3u);
+}
+
+TEST_F(MeshLight, WrongSettingsAreRefused) {
+  for (const char* text : {"-1%", "0", "much", "%"}) {
+    const Outcome outcome = run({"render", "scene.json", "-o", "out.exr", "--until-error", text});
+    EXPECT_EQ(outcome.status, 2) << text;
+    EXPECT_NE(outcome.error.find("--until-error"), std::string::npos) << outcome.error;
+  }
+  const Outcome outcome = run_well({"render", "scene.json", "-o", "out.exr", "--set", "integrator.density.tau=3"});
+  EXPECT_NE(outcome.error.find("`/integrator/density/tau` has no effect"), std::string::npos) << outcome.error;
+}
+
+TEST_F(MeshLight, SettingsOfOtherKindsAreWarnedOf) {
+  const auto expect_warning = [&](const std::vector<std::string>& more, const std::string& warning) {
+    std::vector<std::string> arguments{"render", "scene.json", "-o", "out.exr"};
+    arguments.insert(arguments.end(), more.begin(), more.end());
+    const Outcome outcome = run_well(arguments);
+    EXPECT_NE(outcome.error.find(warning), std::string::npos) << outcome.error;
+  };
+  const std::string no_effect = "`/integrator/density/error` has no effect: it belongs to the density \"mesh\"";
+  expect_warning({"--until-error", "1%", "--set", "integrator.density.kind=histogram", "--set", "light.photons=2000"},
+                 no_effect);
+  expect_warning({"--until-error", "1%", "--set", "integrator.type=stretch"},
+                 "`/integrator/density/error` bounds only the error of the light on a plate");
+  expect_warning({"--set", "light.photons=2000"}, "raise `light.photons`");
+}
+
+}  // namespace
+}  // namespace tensorray

@@ -1,0 +1,203 @@
+#include "renderer/camera/camera.h"
+
+#include <algorithm>
+#include <cmath>
+#include <stdexcept>
+
+#include <gtest/gtest.h>
+
+#include "base/geometry/box.h"
+#include "base/constants.h"
+#include "renderer/sampling/random.h"
+
+namespace tensorray {
+namespace {
+
+using Eigen::Vector2d;
+using Eigen::Vector3d;
+
+/// Several cameras of each kind.
+std::vector<Camera> cameras() {
+  std::vector<Camera> result;
+  for (const double lens : {0.0, 0.2}) {
+    result.push_back(perspective_camera({1, -5, 3}, {0.5, 1, 0}, {0, 0, 1}, 40, {640, 480}));
+    result.push_back(orthographic_camera({-4, -3, -2}, {1, 1, 1}, {0, 1, 0.2}, 3, {300, 500}));
+    for (auto camera = result.end() - 2; camera != result.end(); ++camera) camera->lens_radius = lens;
+  }
+  return result;
+}
+
+Vector2d random_pixel(const Camera& camera, int i) {
+  return Vector2d(random_uniform(1, i, 0), random_uniform(1, i, 1)).cwiseProduct(camera.resolution.cast<double>());
+}
+
+TEST(Camera, LooksAtItsTarget) {
+  const Vector3d position(1, -5, 3), target(0.5, 1, 0);
+  for (const Camera& camera : {perspective_camera(position, target, Vector3d::UnitZ(), 40, {640, 480}),
+                               orthographic_camera(position, target, Vector3d::UnitZ(), 2, {640, 480})}) {
+    const CameraRay ray = camera_ray(camera, {320, 240}, Vector2d::Zero());
+    EXPECT_LT((ray.origin - position).norm(), 1e-14);
+    EXPECT_LT((ray.direction - (target - position).normalized()).norm(), 1e-14);
+    EXPECT_LT((camera.up.cross(camera.right) - camera.forward).norm(), 1e-14);
+    EXPECT_NEAR(camera.right.z(), 0, 1e-14);
+    EXPECT_GT(camera.up.z(), 0);
+    EXPECT_NEAR(camera.focus_distance, (target - position).norm(), 1e-14);
+    // Pixel coordinates increase to the right and downwards.
+    EXPECT_GT(to_pixel(camera, target + 0.1 * camera.right)->x(), 320);
+    EXPECT_LT(to_pixel(camera, target + 0.1 * camera.up)->y(), 240);
+  }
+}
+
+TEST(Camera, SeesTheNamedAngleOrHeight) {
+  const Camera wide = perspective_camera({0, 0, 0}, {0, 1, 0}, Vector3d::UnitZ(), 50, {200, 100});
+  const Vector3d top = camera_ray(wide, {100, 0}, Vector2d::Zero()).direction;
+  const Vector3d bottom = camera_ray(wide, {100, 100}, Vector2d::Zero()).direction;
+  EXPECT_NEAR(std::acos(top.dot(bottom)), 50 * pi / 180, 1e-14);
+  EXPECT_GT(top.z(), 0);
+  const Camera flat = orthographic_camera({0, 0, 0}, {0, 1, 0}, Vector3d::UnitZ(), 3, {200, 100});
+  EXPECT_LT((camera_ray(flat, {0, 0}, Vector2d::Zero()).origin - Vector3d(-3, 0, 1.5)).norm(), 1e-14);
+}
+
+TEST(Camera, LooksStraightDown) {
+  const Camera camera = perspective_camera({0, 0, 5}, {0, 0, 0}, Vector3d::UnitZ(), 40, {10, 10});
+  EXPECT_EQ(camera.up, Vector3d::UnitY());
+  EXPECT_EQ(camera.right, Vector3d::UnitX());
+}
+
+TEST(Camera, ToPixelUndoesTheRay) {
+  for (Camera camera : cameras()) {
+    camera.lens_radius = 0;
+    for (int i = 0; i < 100; ++i) {
+      const Vector2d pixel = random_pixel(camera, i);
+      const CameraRay ray = camera_ray(camera, pixel, Vector2d::Zero());
+      EXPECT_NEAR(ray.direction.norm(), 1, 1e-14);
+      EXPECT_LT((*to_pixel(camera, ray.origin + 7 * ray.direction) - pixel).norm(), 1e-10);
+    }
+    EXPECT_EQ(to_pixel(camera, camera.position - camera.forward).has_value(),
+              camera.projection == Projection::orthographic);
+  }
+}
+
+TEST(Camera, TheLensIsSharpInThePlaneOfFocus) {
+  for (const Camera& camera : cameras()) {
+    const Vector2d pixel(77, 201);
+    const auto in_plane = [&](const Vector2d& lens, double distance) -> Vector3d {
+      const CameraRay ray = camera_ray(camera, pixel, lens);
+      const double depth = distance - (ray.origin - camera.position).dot(camera.forward);
+      return ray.origin + depth / ray.direction.dot(camera.forward) * ray.direction;
+    };
+    const Vector3d sharp = in_plane({0, 0}, camera.focus_distance);
+    EXPECT_LT((*to_pixel(camera, sharp) - pixel).norm(), 1e-10);
+    for (const Vector2d& lens : {Vector2d(1, 0), Vector2d(-0.6, 0.8), Vector2d(0.1, -0.4)}) {
+      EXPECT_LT((in_plane(lens, camera.focus_distance) - sharp).norm(), 1e-12);
+      // At twice the focus distance the circle of confusion is as large as the lens.
+      const double blur =
+          (in_plane(lens, 2 * camera.focus_distance) - in_plane({0, 0}, 2 * camera.focus_distance)).norm();
+      EXPECT_NEAR(blur, camera.lens_radius * lens.norm(), 1e-12);
+    }
+  }
+}
+
+TEST(Camera, PixelSizeIsTheDistanceOfNeighbours) {
+  for (const Camera& camera : cameras()) {
+    const Vector3d point = camera.position + 3 * camera.forward + 0.2 * camera.up - 0.4 * camera.right;
+    const Vector3d next = point + pixel_size(camera, point) * camera.right;
+    EXPECT_NEAR((*to_pixel(camera, next) - *to_pixel(camera, point)).norm(), 1, 1e-10);
+  }
+}
+
+TEST(Camera, RefusesWhatIsNoView) {
+  const Vector3d up = Vector3d::UnitZ();
+  EXPECT_THROW(perspective_camera({1, 2, 3}, {1, 2, 3}, up, 40, {10, 10}), std::invalid_argument);
+  EXPECT_THROW(perspective_camera({0, 0, 0}, {1, 2, std::nan("")}, up, 40, {10, 10}), std::invalid_argument);
+  EXPECT_THROW(perspective_camera({0, 0, 0}, {1, 2, 3}, {0, std::nan(""), 0}, 40, {10, 10}), std::invalid_argument);
+  for (const double angle : {0.0, -1.0, 180.0, std::nan("")})
+    EXPECT_THROW(perspective_camera({0, 0, 0}, {1, 2, 3}, up, angle, {10, 10}), std::invalid_argument);
+  EXPECT_THROW(perspective_camera({0, 0, 0}, {1, 2, 3}, up, 40, {0, 10}), std::invalid_argument);
+  for (const double height : {0.0, -1.0, static_cast<double>(INFINITY), std::nan("")})
+    EXPECT_THROW(orthographic_camera({0, 0, 0}, {1, 2, 3}, up, height, {10, 10}), std::invalid_argument);
+}
+
+/// The extent of a box in the picture, from 0 to 1 along both axes of the picture.
+Eigen::AlignedBox2d extent_in_picture(const Camera& camera, const Eigen::AlignedBox3d& box) {
+  Eigen::AlignedBox2d extent;
+  for (const Vector3d& corner : corners_of(box)) {
+    const auto pixel = to_pixel(camera, corner);
+    EXPECT_TRUE(pixel.has_value());
+    extent.extend(pixel.value_or(Vector2d(NAN, NAN)).cwiseQuotient(camera.resolution.cast<double>()));
+  }
+  return extent;
+}
+
+TEST(Framing, ShowsTheWholeBoxAsLargeAsItCanBe) {
+  for (int i = 0; i < 500; ++i) {
+    const auto random = [i](int dimension) { return random_uniform(2, i, dimension); };
+    const double scale = std::pow(10, 12 * random(0) - 6);
+    const Vector3d size(std::pow(10, 3 * random(1) - 3), std::pow(10, 3 * random(2) - 3), 1);
+    const Vector3d corner = 10 * Vector3d(random(3) - 0.5, random(4) - 0.5, random(5) - 0.5);
+    const Eigen::AlignedBox3d box(scale * corner, scale * (corner + size));
+    Framing framing;
+    if (i % 2) framing.projection = Projection::orthographic;
+    if (i % 5) framing.direction = Vector3d(random(6) - 0.5, random(7) - 0.5, random(8) - 0.5);
+    framing.angle = 1 + 120 * random(9);
+    framing.margin = 0.3 * random(10);
+    framing.resolution = {1 + static_cast<int>(2000 * random(11)), 1 + static_cast<int>(2000 * random(12))};
+
+    const Camera camera = frame_points(corners_of(box), framing);
+    const Eigen::AlignedBox2d extent = extent_in_picture(camera, box);
+    const Vector2d size_in_picture = extent.sizes();
+    EXPECT_GE(extent.min().minCoeff(), framing.margin - 1e-9) << i;
+    EXPECT_LE(extent.max().maxCoeff(), 1 - framing.margin + 1e-9) << i;
+    EXPECT_LT((extent.center() - Vector2d(0.5, 0.5)).norm(), 1e-6) << i;
+    // In at least one direction there is no free space except the margin.
+    EXPECT_NEAR(size_in_picture.maxCoeff(), 1 - 2 * framing.margin, 1e-6) << i;
+    EXPECT_GT(camera.focus_distance, 0);
+    EXPECT_EQ(camera.lens_radius, 0);
+  }
+}
+
+TEST(Framing, LooksFromAboveByDefault) {
+  const Camera camera = frame_points(corners_of({Vector3d(-1, -1, -1), Vector3d(1, 1, 1)}), {});
+  EXPECT_GT(camera.position.z(), 1);
+  EXPECT_LT(camera.position.y(), -1);
+  EXPECT_GT(camera.position.x(), 1);
+  // The three faces towards the viewer are all clearly visible.
+  for (int axis = 0; axis < 3; ++axis) EXPECT_GT(std::abs(camera.forward[axis]), 0.4);
+  EXPECT_GT(camera.up.z(), 0.8);
+  const Vector2d origin = *to_pixel(camera, {0, 0, 0});
+  EXPECT_GT(to_pixel(camera, {1, 0, 0})->x(), origin.x());
+  EXPECT_GT(to_pixel(camera, {0, 1, 0})->x(), origin.x());
+  EXPECT_LT(to_pixel(camera, {0, 0, 1})->y(), origin.y());
+}
+
+TEST(Framing, ShowsWhatHasNoVolume) {
+  for (const Projection projection : {Projection::perspective, Projection::orthographic})
+    for (const Vector3d& size : {Vector3d(0, 0, 0), Vector3d(1, 0, 0), Vector3d(0, 2, 3)})
+      for (const Vector3d& direction : {Vector3d(-0.5, 0.7, -0.5), Vector3d(1, 0, 0), Vector3d(0, 0, -1)}) {
+        Framing framing;
+        framing.projection = projection;
+        framing.direction = direction;
+        const Eigen::AlignedBox3d box(Vector3d(5, 6, 7), Vector3d(5, 6, 7) + size);
+        const Camera camera = frame_points(corners_of(box), framing);
+        const Eigen::AlignedBox2d extent = extent_in_picture(camera, box);
+        EXPECT_GE(extent.min().minCoeff(), 0.05 - 1e-9);
+        EXPECT_LE(extent.max().maxCoeff(), 0.95 + 1e-9);
+        if (size.isZero()) {
+          EXPECT_NEAR(pixel_size(camera, box.center()) * 512 * 0.9, 1, 1e-9);
+        }
+      }
+}
+
+TEST(Framing, RefusesNothing) {
+  Framing framing;
+  EXPECT_THROW(frame_points({}, framing), std::invalid_argument);
+  EXPECT_THROW(frame_points({{0, 0, 0}, {1, std::nan(""), 0}}, framing), std::invalid_argument);
+  framing.margin = 0.5;
+  EXPECT_THROW(frame_points({{0, 0, 0}}, framing), std::invalid_argument);
+  framing.margin = 0;
+  framing.direction.setZero();
+  EXPECT_THROW(frame_points({{0, 0, 0}}, framing), std::invalid_argument);
+}
+
+}  // namespace
+}  // namespace tensorray

@@ -1,0 +1,525 @@
+#include "renderer/camera/path_tracer.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+#include <set>
+#include <stdexcept>
+#include <string>
+#include <utility>
+
+#include <Eigen/LU>
+#include <gtest/gtest.h>
+#include <tbb/global_control.h>
+
+#include "base/constants.h"
+#include "renderer/meshes/mesh.h"
+#include "renderer/sampling/random.h"
+#include "tests/renderer/statistics.h"
+#include "tests/renderer/support.h"
+
+namespace tensorray {
+namespace {
+
+using Eigen::Vector2d;
+using Eigen::Vector3d;
+using Eigen::Vector3f;
+
+/// Three bands whose colours are red, green and blue.
+std::vector<Band> rgb_bands() {
+  return {
+      {610, 80, 0.3, Vector3d(1, 0.3, 0)}, {545, 80, 0.4, Vector3d(0, 0.6, 0)}, {460, 80, 0.3, Vector3d(0, 0.1, 1)}};
+}
+
+Eigen::Matrix3d xyz_to_rgb() {
+  Eigen::Matrix3d columns;
+  for (int i = 0; i < 3; ++i) columns.col(i) = rgb_bands()[i].xyz;
+  return columns.inverse();
+}
+
+const ReflectanceTable& colors() {
+  static const ReflectanceTable table(ReflectanceModel(rgb_bands(), xyz_to_rgb()), rgb_bands(), xyz_to_rgb());
+  return table;
+}
+
+BandValues grey(double value) { return BandValues::Constant(3, value); }
+std::vector<float> even(float value) { return std::vector<float>(3, value); }
+
+RoughConductor mirror(double roughness) { return {roughness, {BandValues::Zero(3), BandValues::Ones(3)}}; }
+
+ShadedSurface surface_of(TriangleMesh mesh, int material = 0, int light = -1) {
+  ShadedSurface surface;
+  surface.shape = std::move(mesh);
+  surface.material = material;
+  surface.light = light;
+  return surface;
+}
+
+/// A sphere of radius 1 with smooth normals.
+ShadedSurface sphere(int rings) {
+  TriangleMesh mesh;
+  ShadedSurface surface;
+  const auto around = static_cast<std::uint32_t>(2 * rings);
+  for (int ring = 0; ring <= rings; ++ring)
+    for (std::uint32_t i = 0; i < around; ++i) {
+      const double polar = pi * ring / rings, turn = 2 * pi * i / around;
+      mesh.vertices.emplace_back(std::sin(polar) * std::cos(turn), std::sin(polar) * std::sin(turn), std::cos(polar));
+      surface.normals.push_back(mesh.vertices.back().cast<float>());
+    }
+  for (std::uint32_t ring = 0; ring < static_cast<std::uint32_t>(rings); ++ring)
+    for (std::uint32_t i = 0; i < around; ++i) {
+      const std::uint32_t a = ring * around + i, b = ring * around + (i + 1) % around;
+      if (ring > 0) mesh.triangles.push_back({a, a + around, b});
+      if (ring + 1 < static_cast<std::uint32_t>(rings)) mesh.triangles.push_back({a + around, b + around, b});
+    }
+  surface.shape = std::move(mesh);
+  return surface;
+}
+
+TriangleMesh floor_mesh(double size) { return rectangle_mesh({0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {size, size}); }
+
+/// A scene and the objects that it refers to.
+struct World {
+  World(std::vector<ShadedSurface> parts, std::vector<Material> materials_, const std::vector<Light>& lights_)
+      : surfaces(std::move(parts)),
+        materials(std::move(materials_)),
+        lights(lights_, {0.3f, 0.6f, 0.1f}, surfaces.bounds()),
+        scene{surfaces, materials, lights, colors()} {}
+
+  SurfaceScene surfaces;
+  std::vector<Material> materials;
+  LightSampler lights;
+  ShadedScene scene;
+};
+
+/// The radiance in the first band, averaged over rays from `from` to `to`.
+Mean seen(const World& world, const ShadingSettings& settings, const Vector3d& from, const Vector3d& to, int samples) {
+  RayShader shader(world.scene, settings);
+  Mean mean;
+  for (int i = 0; i < samples; ++i) {
+    // Each ray has its own pixel, so that samples are independent and the error estimate is valid.
+    shader.shade({{from, (to - from).normalized(), {11, static_cast<std::uint64_t>(i), 0, 0}}}, true);
+    mean.add(shader.radiance(0)[0]);
+  }
+  return mean;
+}
+
+/// Irradiance from a polygon of radiance 1 that is completely above the horizon (Lambert 1760).
+double polygon_irradiance(const std::vector<Vector3d>& polygon, const Vector3d& point, const Vector3d& normal) {
+  double sum = 0;
+  for (std::size_t i = 0; i < polygon.size(); ++i) {
+    const Vector3d a = (polygon[i] - point).normalized(), b = (polygon[(i + 1) % polygon.size()] - point).normalized();
+    sum += std::acos(a.dot(b)) * a.cross(b).normalized().dot(normal) / 2;
+  }
+  return std::abs(sum);
+}
+
+// --- Light ----------------------------------------------------------------------------------------------------------
+
+/// Deep enough for all light; without noise from Russian roulette at the first bounces.
+ShadingSettings deep() {
+  ShadingSettings settings;
+  settings.max_depth = 200;
+  return settings;
+}
+
+TEST(FurnaceTest, WhiteThingsInAWhiteSkyCannotBeSeen) {
+  std::vector<std::pair<std::string, Material>> whites{
+      {"diffuse", make_material(Diffuse{}, grey(1))},
+      {"mirror", make_material(mirror(0.3), grey(1))},
+      {"plastic", make_material(Principled{0, 0.3, 0.5, 0.5, 0.1}, grey(1))},
+      {"metal", make_material(Principled{1, 0.5, 0.5, 0, 0.1}, grey(1))},
+      {"glass", make_material(RoughDielectric{0.2, 1.5}, grey(1))}};
+  for (const auto& [name, material] : whites) {
+    // A coarse sphere with smooth normals on a floor, for interreflection and silhouettes.
+    ShadedSurface coarse = sphere(8);
+    TriangleMesh ground = rectangle_mesh({0, 0, -1.1}, {1, 0, 0}, {0, 1, 0}, {6, 6});
+    const World world({coarse, surface_of(ground, 1)}, {material, make_material(Diffuse{}, grey(1))},
+                      {ConstantLight{even(1)}});
+    for (const Vector3d& target : {Vector3d(0, 0, 0), Vector3d(0.7, 0, 0.65), Vector3d(0.6, -0.5, -0.9)}) {
+      const Mean mean = seen(world, deep(), {0.3, -4, 1}, target, 1500);
+      // White materials return all light up to 2e-3 per bounce; glass up to 1e-2 near the horizon.
+      EXPECT_NEAR(mean.mean(), 1, 4 * mean.error() + (name == "glass" ? 0.03 : 0.01)) << name << target.transpose();
+      EXPECT_LT(mean.error(), 0.03) << name;
+    }
+  }
+}
+
+/// A box whose triangles face inwards, where they emit light.
+TriangleMesh room(const Eigen::AlignedBox3d& box) {
+  TriangleMesh mesh = box_mesh(box, Eigen::Affine3d::Identity());
+  for (auto& triangle : mesh.triangles) std::swap(triangle[1], triangle[2]);
+  return mesh;
+}
+
+TEST(FurnaceTest, GreyBoxHasTheGeometricSeries) {
+  // In a closed box of reflectance ρ whose walls emit radiance e, the radiance is e / (1 − ρ) everywhere.
+  const TriangleMesh box = room({Vector3d(-1, -1, -1), Vector3d(1, 2, 1)});
+  AreaLight light{box, even(0.5f)};
+  const World world({surface_of(box, 0, 0)}, {make_material(Diffuse{}, grey(0.6))}, {light});
+  for (const DirectLight direct : {DirectLight::both, DirectLight::lights, DirectLight::material}) {
+    ShadingSettings settings = deep();
+    settings.direct = direct;
+    settings.indirect_clamp = 0;
+    const Mean mean = seen(world, settings, {0.2, 0.1, 0.3}, {1, 0.7, 0.2}, 3000);
+    EXPECT_NEAR(mean.mean(), 0.5 / 0.4, 4 * mean.error());
+    // Sampling only lights makes noise in the corners.
+    EXPECT_LT(mean.error(), direct == DirectLight::lights ? 0.1 : 0.02);
+  }
+  ShadingSettings twice;
+  twice.max_depth = 2;
+  const Mean mean = seen(world, twice, {0.2, 0.1, 0.3}, {1, 0.7, 0.2}, 3000);
+  EXPECT_NEAR(mean.mean(), 0.5 * (1 + 0.6 + 0.36), 4 * mean.error());
+}
+
+TEST(DirectLightTest, AreaLightOnAPlaneIsLambertsFormula) {
+  const AreaLight lamp{rectangle_mesh({0.3, -0.2, 1.5}, {0.8, 0, -0.6}, {0, -1, 0}, {2, 1.2}), even(3)};
+  const World world({surface_of(floor_mesh(10)), surface_of(lamp.mesh, 0, 0)}, {make_material(Diffuse{}, grey(0.7))},
+                    {lamp});
+  for (const DirectLight direct : {DirectLight::both, DirectLight::lights, DirectLight::material}) {
+    ShadingSettings settings;
+    settings.max_depth = 1;
+    settings.direct = direct;
+    for (const Vector3d& target :
+         {Vector3d(0, 0, 0), Vector3d(2, 0.5, 0), Vector3d(-1.5, 1, 0)}) {  // The second sees a narrow strip.
+      const double exact = 0.7 / pi * 3 * polygon_irradiance(lamp.mesh.vertices, target, {0, 0, 1});
+      const Mean mean = seen(world, settings, target + Vector3d(0.5, -4, 0.4), target, 4000);
+      EXPECT_NEAR(mean.mean(), exact, 4 * mean.error());
+      EXPECT_LT(mean.error(), direct == DirectLight::material ? 0.2 * exact : 0.02 * exact);
+    }
+  }
+}
+
+TEST(DirectLightTest, OcclusionHidesWhatIsBehind) {
+  const AreaLight lamp{rectangle_mesh({0, 0, 3}, {1, 0, 0}, {0, -1, 0}, {1, 1}), even(1)};
+  // The plate hides the half of the lamp with x > 0 from the origin.
+  const TriangleMesh plate = rectangle_mesh({1, 0, 1.5}, {1, 0, 0}, {0, 1, 0}, {2, 4});
+  const World world({surface_of(floor_mesh(10)), surface_of(lamp.mesh, 0, 0), surface_of(plate)},
+                    {make_material(Diffuse{}, grey(1))}, {lamp});
+  ShadingSettings settings;
+  settings.max_depth = 1;
+  const std::vector<Vector3d> half{{-0.5, -0.5, 3}, {0, -0.5, 3}, {0, 0.5, 3}, {-0.5, 0.5, 3}};
+  const Mean mean = seen(world, settings, {-2, -1, 0.5}, {0, 0, 0}, 4000);
+  EXPECT_NEAR(mean.mean(), polygon_irradiance(half, {0, 0, 0}, {0, 0, 1}) / pi, 4 * mean.error());
+}
+
+TEST(DirectLightTest, ParallelLightHasTheCosineOnEverySide) {
+  const DirectionalLight sun{{1, 0, -1}, even(2), 0};
+  const World world({surface_of(floor_mesh(10))}, {make_material(Diffuse{}, grey(0.5))}, {sun});
+  for (const DirectLight direct : {DirectLight::both, DirectLight::lights, DirectLight::material}) {
+    ShadingSettings settings;
+    settings.direct = direct;
+    EXPECT_NEAR(seen(world, settings, {0, 0, 3}, {1, 1, 0}, 4).mean(), 0.5 / pi * 2 * std::sqrt(0.5), 1e-6);
+    EXPECT_EQ(seen(world, settings, {0, 0, -3}, {1, 1, 0}, 4).mean(), 0);  // No light passes through.
+  }
+}
+
+TEST(MultipleImportanceSamplingTest, HasTheMeanOfEachStrategy) {
+  const AreaLight small{rectangle_mesh({0, 0.5, 2}, {1, 0, 0}, {0, -1, 0}, {0.6, 0.6}), even(20)};
+  const AreaLight large{rectangle_mesh({-2, 0, 1.5}, {0, 1, 0}, {0, 0, 1}, {3, 2.9}), even(1)};
+  for (const double roughness : {0.3, 0.6}) {
+    const World world(
+        {surface_of(floor_mesh(8)), surface_of(small.mesh, 1, 0), surface_of(large.mesh, 1, 1)},
+        {make_material(Principled{0.3, roughness, 0.5, 0.5, 0.3}, grey(0.6)), make_material(Diffuse{}, grey(0.5))},
+        {small, large, ConstantLight{even(0.2f)}});
+    ShadingSettings settings;
+    settings.max_depth = 3;
+    settings.indirect_clamp = 0;
+    const auto mean_of = [&](DirectLight direct) {
+      settings.direct = direct;
+      return seen(world, settings, {0.4, -2.5, 1.6}, {0.1, -0.6, 0}, 12000);
+    };
+    const Mean both = mean_of(DirectLight::both);
+    for (const DirectLight direct : {DirectLight::lights, DirectLight::material}) {
+      const Mean single = mean_of(direct);
+      EXPECT_NEAR(single.mean(), both.mean(), 4 * std::hypot(single.error(), both.error()));
+      EXPECT_LT(both.error(), 1.1 * single.error());
+    }
+    EXPECT_LT(both.error(), 0.02 * both.mean());
+  }
+}
+
+TEST(IndirectClampTest, LimitsWhatIsScatteredTwiceOnly) {
+  const TriangleMesh box = room({Vector3d(-1, -1, -1), Vector3d(1, 1, 1)});
+  const World world({surface_of(box, 0, 0)}, {make_material(Diffuse{}, grey(0.5))}, {AreaLight{box, even(8)}});
+  ShadingSettings settings;
+  settings.direct = DirectLight::material;  // Each contribution is 8 / 2^depth.
+  settings.roulette_depth = 100;
+  settings.max_depth = 3;
+  settings.indirect_clamp = 0.5;
+  EXPECT_NEAR(seen(world, settings, {0.2, 0.1, 0.3}, {1, 0.2, 0.5}, 8).mean(), 8 + 4 + 0.5 + 0.5, 1e-6);
+  settings.indirect_clamp = 0;
+  EXPECT_NEAR(seen(world, settings, {0.2, 0.1, 0.3}, {1, 0.2, 0.5}, 8).mean(), 8 + 4 + 2 + 1, 1e-6);
+}
+
+TEST(ShadingNormalTest, SmoothSpheresHaveNoFringesAndDoNotLeak) {
+  // The sun is behind the viewer, then beside. The shading of a Lambertian sphere follows the smooth normal.
+  for (const Vector3d& travels : {Vector3d(0, 1, 0), Vector3d(1, 0.2, 0)}) {
+    const World world({sphere(10)}, {make_material(Diffuse{}, grey(1))}, {DirectionalLight{travels, even(1), 0}});
+    ShadingSettings settings;
+    settings.max_depth = 1;
+    RayShader shader(world.scene, settings);
+    for (int i = 0; i < 2000; ++i) {
+      const double x = -1 + 2 * random_uniform(2, i, 0), z = -1 + 2 * random_uniform(2, i, 1);
+      shader.shade({{{x, -5, z}, {0, 1, 0}, {}}}, false);
+      const auto& surface = shader.view(0).surface;
+      if (!surface) continue;
+      const double cosine = -surface->normal.dot(travels.normalized());
+      EXPECT_LT(surface->normal.y(), 0);  // The viewer is above the surface.
+      EXPECT_NEAR(shader.radiance(0)[0] * pi, std::max(0.0, cosine), 1e-6) << x << " " << z;
+    }
+  }
+}
+
+// --- Previews -------------------------------------------------------------------------------------------------------
+
+TEST(AmbientOcclusionTest, HasItsClosedForms) {
+  ShadingSettings settings;
+  settings.shading = Shading::ambient_occlusion;
+  const Material material = make_material(Diffuse{}, grey(0.8));
+  const World plane({surface_of(floor_mesh(4))}, {material}, {});
+  EXPECT_NEAR(seen(plane, settings, {0, -3, 1}, {0, 0, 0}, 100).mean(), 0.8, 1e-12);
+
+  // A high wall hides half of the sky from its foot. At a distance it hides (1 − cos θ) / 2, where θ is the elevation
+  // of its upper edge.
+  const TriangleMesh wall = rectangle_mesh({0, 1, 1}, {1, 0, 0}, {0, 0, 1}, {4000, 2});
+  const World corner({surface_of(floor_mesh(4)), surface_of(wall)}, {material}, {});
+  const Mean mean = seen(corner, settings, {0, -3, 1}, {0, 0, 0}, 4000);
+  EXPECT_NEAR(mean.mean(), 0.8 * (1 - (1 - std::sqrt(0.2)) / 2), 4 * mean.error() + 1e-3);
+  settings.occlusion_distance = 0.9;
+  EXPECT_NEAR(seen(corner, settings, {0, -3, 1}, {0, 0, 0}, 100).mean(), 0.8, 1e-12);
+}
+
+TEST(HeadlightTest, IsTheCosineToTheViewer) {
+  ShadingSettings settings;
+  settings.shading = Shading::headlight;
+  const World plane({surface_of(floor_mesh(4))}, {make_material(Diffuse{}, grey(0.8))}, {});
+  EXPECT_NEAR(seen(plane, settings, {0, -3, 4}, {0, 0, 0}, 1).mean(), 0.8 * 0.8, 1e-12);
+  EXPECT_NEAR(seen(plane, settings, {0, -3, -4}, {0, 0, 0}, 1).mean(), 0.8 * 0.8, 1e-12);
+}
+
+// --- Pictures -------------------------------------------------------------------------------------------------------
+
+/// A sphere with data on a floor, lit by a lamp and a dim sky.
+World still_life() {
+  ShadedSurface ball = sphere(16);
+  for (const Vector3f& n : ball.normals) {
+    ball.colors.emplace_back(0.7f, 0.4f, 0.2f + 0.1f * n.z());
+    ball.forces.push_back(2);
+    ball.arc_lengths.push_back(n.z());
+  }
+  ball.path_ends = {static_cast<std::uint32_t>(std::get<TriangleMesh>(ball.shape).triangles.size())};
+  ball.first_path = 5;
+  const AreaLight lamp{rectangle_mesh({2, -2, 4}, {1, 0, 0}, {0, -1, 0}, {1.5, 1.5}), even(6)};
+  TriangleMesh ground = floor_mesh(10);
+  for (Vector3d& p : ground.vertices) p.z() = -1;
+  return World({ball, surface_of(ground, 1), surface_of(lamp.mesh, 1, 0)},
+               {make_material(Principled{}, grey(0.5)), make_material(Diffuse{}, grey(0.5))},
+               {lamp, ConstantLight{even(0.3f)}});
+}
+
+Camera camera(int size) { return perspective_camera({0, -6, 1}, {0, 0, 0}, {0, 0, 1}, 30, {size, size}); }
+
+TEST(PictureTest, DoesNotDependOnTheNumberOfThreads) {
+  const World world = still_life();
+  PathTracerSettings settings;
+  settings.min_samples = 4;
+  settings.pass_samples = 4;
+  settings.max_samples = 16;
+  settings.noise_threshold = 0.1;
+  std::vector<SurfacePicture> pictures;
+  for (const std::size_t threads : {1, 2, 8}) {
+    const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, threads);
+    pictures.push_back(render_surfaces(world.scene, camera(48), settings));
+  }
+  for (std::size_t i = 1; i < pictures.size(); ++i) {
+    EXPECT_EQ(pictures[0].radiance.values, pictures[i].radiance.values);
+    EXPECT_EQ(pictures[0].samples, pictures[i].samples);
+    EXPECT_EQ(pictures[0].path, pictures[i].path);
+    EXPECT_EQ(pictures[0].normal, pictures[i].normal);
+  }
+}
+
+TEST(PictureTest, PassesAddUpToThePictureThatOnePassMakes) {
+  const World world = still_life();
+  PathTracerSettings settings;
+  settings.min_samples = settings.max_samples = 12;
+  const SurfacePicture at_once = render_surfaces(world.scene, camera(20), settings);
+  settings.min_samples = 5;
+  settings.pass_samples = 4;
+  std::uint64_t last_done = 0, last_total = 0;
+  RenderCallbacks callbacks;
+  callbacks.progress = [&](std::uint64_t done, std::uint64_t total) {
+    EXPECT_GE(done, last_done);
+    last_done = done;
+    last_total = total;
+  };
+  const SurfacePicture passed = render_surfaces(world.scene, camera(20), settings, callbacks);
+  EXPECT_EQ(passed.samples, std::vector<float>(20 * 20, 12));
+  EXPECT_EQ(last_total, 20u * 20 * 12);
+  for (std::size_t i = 0; i < at_once.radiance.values.size(); ++i)
+    EXPECT_NEAR(passed.radiance.values[i], at_once.radiance.values[i], 1e-12);
+
+  struct Stop {};
+  callbacks.progress = [](std::uint64_t, std::uint64_t) { throw Stop(); };
+  EXPECT_THROW(render_surfaces(world.scene, camera(20), settings, callbacks), Stop);
+}
+
+/// Without time, each pixel gets its first samples, whoever renders its tile; with more time than it takes, it gets
+/// all.
+TEST(PictureTest, TimeLimitsTheSamples) {
+  const World world = still_life();
+  PathTracerSettings settings;
+  settings.min_samples = settings.pass_samples = 6;
+  settings.max_samples = 12;
+  const SurfacePicture all = render_surfaces(world.scene, camera(20), settings);
+  settings.max_seconds = 1e9;
+  settings.first_samples = 2;
+  const SurfacePicture in_time = render_surfaces(world.scene, camera(20), settings);
+  EXPECT_EQ(in_time.samples, all.samples);
+  for (std::size_t i = 0; i < all.radiance.values.size(); ++i)
+    EXPECT_NEAR(in_time.radiance.values[i], all.radiance.values[i], 1e-12);
+
+  settings.max_seconds = 0;
+  Work work({1, 2});
+  RenderCallbacks callbacks;
+  callbacks.work = &work;
+  const SurfacePicture part = render_surfaces(world.scene, camera(20), settings, callbacks);
+  EXPECT_TRUE(work.units()[1].done);
+  EXPECT_FALSE(work.units()[0].done);
+  EXPECT_EQ(*std::max_element(part.samples.begin(), part.samples.end()), 2);
+  EXPECT_EQ(render_surfaces(world.scene, camera(20), settings).samples, std::vector<float>(20 * 20, 2));
+}
+
+/// Work that is divided, stopped after each pass of a tile, and continued, gives the picture of one render.
+TEST(PictureTest, PartsThatStopAndContinueGiveTheSamePicture) {
+  const World world = still_life();
+  PathTracerSettings settings;
+  settings.min_samples = settings.pass_samples = 4;
+  settings.max_samples = 16;
+  settings.noise_threshold = 0.1;
+  const SurfacePicture whole = render_surfaces(world.scene, camera(40), settings);
+  std::vector<WorkUnit> all(9);
+  for (std::size_t part = 0; part < 2; ++part) {
+    std::vector<WorkUnit> units;
+    for (bool is_done = false; !is_done;) {
+      Work work({part, 2}, units);
+      RenderCallbacks callbacks;
+      callbacks.work = &work;
+      callbacks.progress = [&](std::uint64_t, std::uint64_t) { work.stopping = true; };
+      const SurfacePicture some = render_surfaces(world.scene, camera(40), settings, callbacks);
+      EXPECT_LT(std::count(some.samples.begin(), some.samples.end(), 0), 40 * 40);
+      units = work.units();
+      is_done = true;
+      for (std::size_t i = part; i < units.size(); i += 2) is_done = is_done && units[i].done;
+    }
+    for (std::size_t i = 0; i < units.size(); ++i) EXPECT_EQ(units[i].done, i % 2 == part);
+    for (std::size_t i = part; i < units.size(); i += 2) all[i] = units[i];
+  }
+  Work united({}, all);
+  RenderCallbacks callbacks;
+  callbacks.work = &united;
+  const SurfacePicture picture = render_surfaces(world.scene, camera(40), settings, callbacks);
+  EXPECT_EQ(picture.radiance.values, whole.radiance.values);
+  EXPECT_EQ(picture.samples, whole.samples);
+  EXPECT_EQ(picture.path, whole.path);
+  EXPECT_EQ(picture.variance, whole.variance);
+}
+
+TEST(PictureTest, AdaptiveSamplingKeepsTheMeanAndWorksWhereItIsNoisy) {
+  const World world = still_life();
+  PathTracerSettings settings;
+  settings.min_samples = 16;
+  settings.pass_samples = 16;
+  settings.max_samples = 128;
+  const SurfacePicture full = render_surfaces(world.scene, camera(32), settings);
+  settings.noise_threshold = 0.06;
+  settings.seed = 1;
+  const SurfacePicture adaptive = render_surfaces(world.scene, camera(32), settings);
+  const auto sum = [](const auto& values) { return std::accumulate(values.begin(), values.end(), 0.0); };
+  const double samples = sum(adaptive.samples), pixels = 32 * 32;
+  EXPECT_LT(samples, 0.7 * 128 * pixels);
+  EXPECT_GT(samples, 17 * pixels);
+  // Error of the mean over the picture, from the variances of the pixels (of the luminance, which is nearly common to
+  // all bands).
+  const double error = std::sqrt(sum(full.variance) + sum(adaptive.variance)) / pixels;
+  EXPECT_NEAR(sum(adaptive.radiance.values) / pixels / 3, sum(full.radiance.values) / pixels / 3, 5 * error);
+
+  double noise_of_many = 0, noise_of_few = 0, many = 0, few = 0;
+  for (std::size_t i = 0; i < adaptive.samples.size(); ++i) {
+    const double noise = full.variance[i];
+    (adaptive.samples[i] > 64 ? noise_of_many : noise_of_few) += noise;
+    (adaptive.samples[i] > 64 ? many : few) += 1;
+  }
+  ASSERT_GT(many, 5);
+  ASSERT_GT(few, 5);
+  EXPECT_GT(noise_of_many / many, 1.5 * noise_of_few / few);
+}
+
+TEST(PictureTest, AuxiliaryPlanesAreThoseOfTheFirstSurface) {
+  const World world = still_life();
+  PathTracerSettings settings;
+  settings.min_samples = settings.max_samples = 16;
+  settings.filter = PixelFilter(PixelFilterShape::box);
+  settings.transparent = true;
+  const Camera view = orthographic_camera({0, -6, 0}, {0, 0, 0}, {0, 0, 1}, 4, {40, 40});
+  const SurfacePicture picture = render_surfaces(world.scene, view, settings);
+  // Pixel (20, 20) is 0.05 right of the middle and 0.05 below it. Coarse triangles are up to 0.01 below the sphere.
+  const std::size_t middle = 20 * 40 + 20, sky = 2 * 40 + 2, ground = 38 * 40 + 3;
+  EXPECT_EQ(picture.alpha[middle], 1);
+  EXPECT_NEAR(picture.depth[middle], 5, 0.02);
+  EXPECT_LT((picture.normal[middle] - Vector3f(0.05f, -1, -0.05f)).norm(), 0.01);
+  EXPECT_LT((picture.albedo[middle] - Vector3f(0.7f, 0.4f, 0.195f)).norm(), 2e-3);
+  EXPECT_EQ(picture.path[middle], 5);
+  EXPECT_EQ(picture.force[middle], 2);
+  EXPECT_NEAR(picture.arc_length[middle], -0.05, 0.01);
+  EXPECT_EQ(picture.samples[middle], 16);
+  EXPECT_GT(picture.variance[middle], 0);
+
+  EXPECT_EQ(picture.alpha[sky], 0);
+  EXPECT_EQ(picture.depth[sky], 0);
+  EXPECT_EQ(picture.path[sky], -1);
+  EXPECT_EQ(picture.radiance.plane(0)[sky], 0);
+  EXPECT_EQ(picture.alpha[ground], 0);  // The floor is seen edge-on.
+
+  settings.transparent = false;
+  const SurfacePicture opaque = render_surfaces(world.scene, view, settings);
+  EXPECT_EQ(opaque.alpha[sky], 1);
+  EXPECT_NEAR(opaque.radiance.plane(0)[sky], 0.3, 1e-6);
+  // At the edge of the sphere, values are averages over the part of the pixel that hits it.
+  for (std::size_t i = 0; i < picture.alpha.size(); ++i)
+    if (picture.path[i] == 5) {
+      EXPECT_EQ(picture.force[i], 2);
+      EXPECT_GT(picture.depth[i], 4.9);
+    }
+}
+
+TEST(PictureTest, ColorsAreThoseThatWereAskedFor) {
+  BandValues reflectance(3);
+  for (const Vector3f& color :
+       {Vector3f(0.3f, 0.7f, 0.11f), Vector3f(0, 0, 0), Vector3f(1, 1, 1), Vector3f(0.9f, 0.2f, 0.6f)}) {
+    colors().reflectance(color, reflectance);
+    EXPECT_LT((colors().color(reflectance) - color).norm(), 2e-3) << color.transpose();
+  }
+}
+
+TEST(PictureTest, WhatIsMissingIsNamed) {
+  const AreaLight lamp{floor_mesh(1), even(1)};
+  const Material material = make_material(Diffuse{}, grey(1));
+  const auto error = [&](const World& world, const PathTracerSettings& settings) {
+    return message([&] { render_surfaces(world.scene, camera(4), settings); });
+  };
+  EXPECT_EQ(error(World({surface_of(floor_mesh(1), 1)}, {material}, {}), {}), "surface 0 has no material");
+  EXPECT_EQ(error(World({surface_of(floor_mesh(1))}, {material}, {lamp}), {}),
+            "light 0 must have a surface of its mesh");
+  EXPECT_EQ(error(World({surface_of(floor_mesh(1), 0, 1)}, {material}, {lamp}), {}),
+            "surface 0 must be that of an area light");
+  EXPECT_EQ(error(World({}, {make_material(Diffuse{}, BandValues::Ones(2))}, {}), {}),
+            "material 0 must have a reflectance for each band of the light");
+  PathTracerSettings settings;
+  settings.max_samples = 8;
+  EXPECT_EQ(error(World({}, {}, {}), settings), "max_samples must be >= min_samples");
+}
+
+}  // namespace
+}  // namespace tensorray

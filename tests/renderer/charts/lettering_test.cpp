@@ -1,0 +1,189 @@
+#include "renderer/charts/lettering.h"
+
+#include <algorithm>
+#include <array>
+#include <cctype>
+#include <cmath>
+#include <limits>
+#include <map>
+#include <numeric>
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "base/constants.h"
+#include "tests/renderer/support.h"
+
+namespace tensorray {
+namespace {
+
+using ::testing::HasSubstr;
+
+const Eigen::Vector3d white(1, 1, 1);
+
+/// Draws white text on black, in one channel; `position` is its lower left corner.
+Image drawn(const std::string& text, double height, const Eigen::Vector2d& position, int columns, int rows) {
+  Image image(columns, rows, {"Y"});
+  draw_text(image, position, height, text, white);
+  return image;
+}
+
+/// Draws text with a margin on all sides.
+Image drawn(const std::string& text, double height) {
+  const int size = static_cast<int>(2 * height);
+  return drawn(text, height, {height / 2, 1.5 * height}, size + static_cast<int>(text_width(text, height)), size);
+}
+
+double ink(const Image& image) { return std::accumulate(image.pixels.begin(), image.pixels.end(), 0.0); }
+
+double largest_outside(const Image& image, double left, double right, double top, double bottom) {
+  double largest = 0;
+  for (int y = 0; y < image.height; ++y)
+    for (int x = 0; x < image.width; ++x)
+      if (x + 1 <= left || x >= right || y + 1 <= top || y >= bottom)
+        largest = std::max<double>(largest, *image.pixel(x, y));
+  return largest;
+}
+
+TEST(LetteringTest, EveryPrintableCharacterIsDrawnAndDiffersFromAllOthers) {
+  std::map<std::vector<float>, char> seen;
+  for (char c = ' '; c <= '~'; ++c) {
+    const Image image = drawn(std::string(1, c), 32, {16, 48}, 80, 64);
+    EXPECT_EQ(ink(image) > 0, c != ' ') << c;
+    const auto [other, is_new] = seen.emplace(image.pixels, c);
+    EXPECT_TRUE(is_new) << c << " looks like " << other->second;
+  }
+  EXPECT_TRUE(seen.emplace(drawn("\n", 32, {16, 48}, 80, 64).pixels, '\n').second) << "the box looks like a character";
+}
+
+/// The ink is as wide as text_width says. It stays between the base line and the height of a capital, or a quarter of
+/// that height below the base line if a character has a descender. (The digit 1 is narrower than its width.)
+TEST(LetteringTest, InkIsWithinTheLine) {
+  for (char c = '!'; c <= '~'; ++c)
+    for (const double height : {10.0, 33.7, 64.0}) {
+      const std::string text(1, c);
+      const double left = 20.25, right = left + text_width(text, height), bottom = 70.5, top = bottom - height;
+      const bool descends = std::string("gjpqy(),;@[]_{}|").find(c) != std::string::npos;
+      const Image image = drawn(text, height, {left, bottom}, 120, 100);
+      EXPECT_LT(largest_outside(image, left, right, top, bottom + (descends ? height / 4 : 0)), 1e-6) << c;
+      EXPECT_TRUE(c == '1' || largest_outside(image, left + 1.5, right, 0, 100) > 0)
+          << c << " does not reach its left edge";
+      EXPECT_TRUE(c == '1' || largest_outside(image, left, right - 1.5, 0, 100) > 0)
+          << c << " does not reach its right edge";
+      if (std::isupper(static_cast<unsigned char>(c)) || std::isdigit(static_cast<unsigned char>(c))) {
+        EXPECT_GT(largest_outside(image, left, right, top + 1.5, 100), 0) << c << " is no capital";
+        EXPECT_GT(largest_outside(image, left, right, 0, bottom - 1.5), 0) << c << " does not stand on the line";
+      }
+    }
+}
+
+TEST(LetteringTest, WidthsAddUp) {
+  EXPECT_EQ(text_width("", 20), 0);
+  EXPECT_DOUBLE_EQ(text_width("Tensor", 50), 5 * text_width("Tensor", 10));
+  const double gap = text_width("II", 32) - 2 * text_width("I", 32);
+  EXPECT_GT(gap, 0);
+  EXPECT_DOUBLE_EQ(text_width("|T V| 0.25", 32), text_width("|T V|", 32) + gap + text_width(" 0.25", 32));
+  EXPECT_LT(text_width("i", 32), text_width("n", 32));
+  EXPECT_LT(text_width("n", 32), text_width("m", 32));
+  for (char digit = '1'; digit <= '9'; ++digit) EXPECT_EQ(text_width(std::string(1, digit), 32), text_width("0", 32));
+}
+
+/// The position of each character is the width of the text before it.
+TEST(LetteringTest, TextIsItsCharactersSideBySide) {
+  const std::string text = "Ag 1e-3";
+  const double height = 24.5;
+  Image apart(200, 40, {"Y"});
+  for (std::size_t i = 0; i < text.size(); ++i) {
+    const double x = 5 + text_width(text.substr(0, i + 1), height) - text_width(text.substr(i, 1), height);
+    draw_text(apart, {x, 30}, height, text.substr(i, 1), white);
+  }
+  const Image together = drawn(text, height, {5, 30}, 200, 40);
+  for (std::size_t i = 0; i < apart.pixels.size(); ++i) ASSERT_NEAR(apart.pixels[i], together.pixels[i], 1e-5);
+}
+
+/// A stroke of width w and length l with round ends covers w l + π w² / 4; a closed one covers w l. A capital O has two
+/// half circles with a radius of 10/32 of the height, and straight lines of 8/32; a stroke is 4/32 wide.
+TEST(LetteringTest, StrokesCoverTheirArea) {
+  const double height = 160, unit = height / 32, end_caps = pi * 4 * unit * unit;
+  EXPECT_NEAR(ink(drawn(".", height)), end_caps, 0.01 * end_caps);
+  EXPECT_NEAR(ink(drawn("I", height)), 4 * 28 * unit * unit + end_caps, 0.003 * 4 * 28 * unit * unit);
+  const double ring = 4 * (2 * pi * 10 + 2 * 8) * unit * unit;
+  EXPECT_NEAR(ink(drawn("O", height)), ring, 0.003 * ring);
+}
+
+TEST(LetteringTest, InkDoesNotDependOnWhereItLies) {
+  const double expected = ink(drawn("R&5", 20, {20, 40}, 100, 60));
+  for (const double shift : {0.2, 0.37, 0.5, 0.81})
+    EXPECT_NEAR(ink(drawn("R&5", 20, {20 + shift, 40 - shift}, 100, 60)), expected, 0.01 * expected);
+}
+
+TEST(LetteringTest, SymmetricLettersAreSymmetric) {
+  for (const char c : std::string("AHIMOTUVWXY08+=|*^ovwx\"")) {
+    const std::string text(1, c);
+    const Image image = drawn(text, 40, {50 - text_width(text, 40) / 2, 60}, 100, 80);
+    for (int y = 0; y < 80; ++y)
+      for (int x = 0; x < 50; ++x) ASSERT_NEAR(*image.pixel(x, y), *image.pixel(99 - x, y), 1e-5) << c;
+  }
+  for (const char c :
+       std::string("IOXN0")) {  // Rotated by 180° (not H and S: their middles lie above the centre on purpose).
+    const std::string text(1, c);
+    const Image image = drawn(text, 40, {50 - text_width(text, 40) / 2, 60}, 100, 80);
+    for (int y = 0; y < 80; ++y)
+      for (int x = 0; x < 100; ++x) ASSERT_NEAR(*image.pixel(x, y), *image.pixel(99 - x, 79 - y), 1e-5) << c;
+  }
+}
+
+TEST(LetteringTest, WhatLiesOutsideIsCutOff) {
+  const Image whole = drawn("Query @", 30, {40, 60}, 240, 100);
+  const int left = 55, top = 42, width = 90, height = 20;
+  const Image part = drawn("Query @", 30, {40 - left, 60 - top}, width, height);
+  for (int y = 0; y < height; ++y)
+    for (int x = 0; x < width; ++x) ASSERT_NEAR(*part.pixel(x, y), *whole.pixel(x + left, y + top), 1e-5);
+  EXPECT_EQ(ink(drawn("far", 10, {1e300, -1e300}, 5, 5)), 0);
+  EXPECT_EQ(ink(drawn("far", 10, {-1000, 3}, 5, 5)), 0);
+  EXPECT_EQ(ink(drawn("I", 1e9, {-0.05e9, 0.5e9}, 1, 1)), 1);  // The pixel is well inside the stroke.
+  EXPECT_GT(ink(drawn("I", 1e-3, {0.5, 0.5}, 1, 1)), 0);
+}
+
+TEST(LetteringTest, LaysItsColorOverThePicture) {
+  Image image(60, 40, {"R", "G", "B", "A", "Z"});
+  for (std::size_t i = 0; i < image.pixels.size(); i += 5)
+    std::copy_n(std::array<float, 5>{0.5f, 0.25f, 1, 0.2f, 7}.begin(), 5, &image.pixels[i]);
+  draw_text(image, {10.4, 30}, 20, "Tag", {0.9, 0, 0.3});
+  const Image mask = drawn("Tag", 20, {10.4, 30}, 60, 40);
+  for (std::size_t i = 0; i < mask.pixels.size(); ++i) {
+    const float* pixel = &image.pixels[5 * i];
+    const float m = mask.pixels[i];
+    ASSERT_NEAR(pixel[0], 0.5f + m * 0.4f, 1e-6);
+    ASSERT_NEAR(pixel[1], 0.25f - m * 0.25f, 1e-6);
+    ASSERT_NEAR(pixel[2], 1 - m * 0.7f, 1e-6);
+    ASSERT_NEAR(pixel[3], 0.2f + m * 0.8f, 1e-6);
+    ASSERT_EQ(pixel[4], 7);
+  }
+}
+
+TEST(LetteringTest, OtherCharactersAreBoxes) {
+  const std::vector<float> box = drawn("\t", 20, {5, 25}, 80, 40).pixels;
+  for (const char* text : {"\n", "\x7f", "\xC3\xA9", "\xE2\x82\xAC", "\xF0\x9F\x98\x80"}) {
+    EXPECT_EQ(drawn(text, 20, {5, 25}, 80, 40).pixels, box) << text;
+    EXPECT_EQ(text_width(text, 20), text_width("\t", 20)) << text;
+  }
+  EXPECT_EQ(drawn("caf\xC3\xA9s", 20, {5, 25}, 120, 40).pixels, drawn("caf\ts", 20, {5, 25}, 120, 40).pixels);
+}
+
+TEST(LetteringTest, RefusesWhatCannotBeDrawn) {
+  Image image(8, 8, {"R", "G", "B"});
+  const double nan = std::numeric_limits<double>::quiet_NaN(), infinite = std::numeric_limits<double>::infinity();
+  for (const double height : {0.0, -1.0, nan, infinite}) {
+    EXPECT_THROW(draw_text(image, {1, 1}, height, "a", white), std::invalid_argument);
+    EXPECT_THAT(message([&] { draw_text(image, {1, 1}, height, "a", white); }), HasSubstr("height"));
+  }
+  EXPECT_THROW(draw_text(image, {nan, 1}, 5, "a", white), std::invalid_argument);
+  EXPECT_THROW(draw_text(image, {1, infinite}, 5, "a", white), std::invalid_argument);
+}
+
+}  // namespace
+}  // namespace tensorray

@@ -1,0 +1,335 @@
+#include "renderer/color/color.h"
+
+#include <cmath>
+#include <cstdlib>
+#include <stdexcept>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "renderer/spectra/spectrum.h"
+#include "tests/renderer/support.h"
+
+namespace tensorray {
+namespace {
+
+using ::testing::AllOf;
+using ::testing::HasSubstr;
+
+/// $OCIO is unset at the beginning of each test; a test may set it.
+class ColorTest : public ::testing::Test {
+ protected:
+  ColorTest() {
+    if (const char* value = std::getenv("OCIO")) before_ = value;
+    unsetenv("OCIO");
+  }
+  ~ColorTest() override {
+    unsetenv("OCIO");
+    if (!before_.empty()) setenv("OCIO", before_.c_str(), 1);
+  }
+
+ private:
+  std::string before_;
+};
+
+Eigen::Vector3d from_chromaticity(double x, double y) { return {x / y, 1, (1 - x - y) / y}; }
+
+Eigen::Vector3d xyz_of(const Spectrum& light) { return make_bands(light, observer_min, observer_max, 1).front().xyz; }
+
+/// The value that a display shows for scene-linear grey.
+double displayed_grey(const ColorManagement& color, float value) {
+  Image image(1, 1, {"R", "G", "B"});
+  image.pixels = {value, value, value};
+  color.to_display(image);
+  EXPECT_NEAR(image.pixels[0], image.pixels[1], 2e-3);
+  EXPECT_NEAR(image.pixels[0], image.pixels[2], 2e-3);
+  return image.pixels[1];
+}
+
+std::string error_of(const ColorSettings& settings) {
+  return message([&] { ColorManagement color(settings); });
+}
+
+/// A config with the given roles. Its working space resembles ACEScg.
+std::string config_text(const std::string& roles) {
+  return "ocio_profile_version: 2\n"
+         "environment: {}\n"
+         "search_path: \"\"\n"
+         "strictparsing: true\n"
+         "roles:\n"
+         "  default: linear\n" +
+         roles +
+         "file_rules:\n"
+         "  - !<Rule> {name: Default, colorspace: default}\n"
+         "displays:\n"
+         "  Screen:\n"
+         "    - !<View> {name: Curve, colorspace: curve}\n"
+         "    - !<View> {name: Plain, colorspace: linear}\n"
+         "view_transforms:\n"
+         "  - !<ViewTransform>\n"
+         "    name: Plain\n"
+         "    from_scene_reference: !<BuiltinTransform> {style: UTILITY - ACES-AP0_to_CIE-XYZ-D65_BFD}\n"
+         "display_colorspaces:\n"
+         "  - !<ColorSpace>\n"
+         "    name: xyz\n"
+         "colorspaces:\n"
+         "  - !<ColorSpace>\n"
+         "    name: aces\n"
+         "  - !<ColorSpace>\n"
+         "    name: linear\n"
+         "    to_scene_reference: !<BuiltinTransform> {style: ACEScg_to_ACES2065-1}\n"
+         "  - !<ColorSpace>\n"
+         "    name: curve\n"
+         "    to_scene_reference: !<ExponentTransform> {value: 2}\n";
+}
+
+const std::string linear_role = "  scene_linear: linear\n";
+const std::string aces_role = "  aces_interchange: aces\n";
+const std::string xyz_role = "  cie_xyz_d65_interchange: xyz\n";
+
+TEST_F(ColorTest, BuiltInConfig) {
+  const ColorManagement color({});
+  EXPECT_EQ(color.config_name(), "built-in");
+  EXPECT_EQ(color.working_space(), "lin_rec709");
+  EXPECT_EQ(color.display(), "sRGB");
+  EXPECT_EQ(color.view(), "Un-tone-mapped");
+}
+
+TEST_F(ColorTest, WhiteAndPrimariesOfRec709) {
+  const Eigen::Matrix3d matrix = ColorManagement({}).xyz_to_working();
+  EXPECT_TRUE((matrix * from_chromaticity(0.3127, 0.3290)).isApprox(Eigen::Vector3d::Ones(), 1e-5));
+  const double xy[3][2] = {{0.64, 0.33}, {0.30, 0.60}, {0.15, 0.06}};
+  const double luminance[3] = {0.2126390, 0.7151687, 0.0721923};
+  for (int i = 0; i < 3; ++i) {
+    const Eigen::Vector3d rgb = matrix * (luminance[i] * from_chromaticity(xy[i][0], xy[i][1]));
+    EXPECT_LT((rgb - Eigen::Vector3d::Unit(i)).norm(), 1e-4) << rgb.transpose();
+  }
+}
+
+TEST_F(ColorTest, AdaptedWhitesAreNeutral) {
+  const ColorManagement color({});
+  for (const Spectrum& light :
+       {illuminant("A"), illuminant("D65"), illuminant("E"), blackbody(2000), blackbody(20000)}) {
+    const Eigen::Vector3d white = 3 * xyz_of(light);
+    EXPECT_TRUE((color.xyz_to_working_adapted(white) * white).isApprox(Eigen::Vector3d::Constant(3), 1e-5));
+  }
+  const Eigen::Vector3d d65 = from_chromaticity(0.3127, 0.3290);
+  EXPECT_TRUE(color.xyz_to_working_adapted(d65).isApprox(color.xyz_to_working(), 1e-12));
+}
+
+TEST_F(ColorTest, AdaptationIsBradfords) {
+  // The adaptation from A to D65 as published with the CIE's whites (Lindbloom); XYZ to linear sRGB by IEC 61966-2-1.
+  Eigen::Matrix3d adaptation, to_rgb;
+  adaptation << 0.8446965, -0.1179225, 0.3948108, -0.1366303, 1.1041226, 0.1291718, 0.0798489, -0.1348999, 3.1924009;
+  to_rgb << 3.2404542, -1.5371385, -0.4985314, -0.9692660, 1.8760108, 0.0415560, 0.0556434, -0.2040259, 1.0572252;
+  const Eigen::Matrix3d actual = ColorManagement({}).xyz_to_working_adapted({1.09850, 1, 0.35585});
+  EXPECT_TRUE(actual.isApprox(to_rgb * adaptation, 1e-3)) << actual << "\n\n" << to_rgb * adaptation;
+}
+
+TEST_F(ColorTest, SaturatedWhitesStayFiniteAndNeutral) {
+  const ColorManagement color({});
+  for (int wavelength = 380; wavelength <= 780; wavelength += 5) {
+    const Eigen::Vector3d white = observer(wavelength) / observer(wavelength).y();
+    const Eigen::Matrix3d matrix = color.xyz_to_working_adapted(white);
+    EXPECT_TRUE((matrix * white).isApprox(Eigen::Vector3d::Ones(), 1e-4)) << wavelength;
+    EXPECT_LT(matrix.norm(), 1e3) << wavelength;
+  }
+  EXPECT_THROW(color.xyz_to_working_adapted({1, 0, 1}), std::invalid_argument);
+  EXPECT_THROW(color.xyz_to_working_adapted({1, std::nan(""), 1}), std::invalid_argument);
+}
+
+TEST_F(ColorTest, DisplayCurves) {
+  const auto srgb = [](double v) { return v <= 0.0031308 ? 12.92 * v : 1.055 * std::pow(v, 1 / 2.4) - 0.055; };
+  const ColorManagement color({}), rec1886({"", "Rec.1886", ""}), raw({"", "", "Raw"});
+  for (const float value : {0.0f, 0.001f, 0.18f, 0.5f, 1.0f}) {
+    EXPECT_NEAR(displayed_grey(color, value), srgb(value), 1e-4);
+    EXPECT_NEAR(displayed_grey(rec1886, value), std::pow(value, 1 / 2.4), 1e-4);
+    EXPECT_NEAR(displayed_grey(raw, value), value, 1e-6);
+  }
+  EXPECT_NEAR(displayed_grey(color, 0.18f), 0.4613, 1e-4);
+}
+
+TEST_F(ColorTest, ViewsAreMonotone) {
+  for (const std::string display : {"sRGB", "Rec.1886"})
+    for (const std::string view : {"Un-tone-mapped", "ACES SDR"}) {
+      const ColorManagement color({"", display, view});
+      double last = -1e-6;
+      for (float value = 1e-4f; value < 1; value *= 1.3f) {
+        const double shown = displayed_grey(color, value);
+        const bool black = value < 0.003f;  // The ACES transform shows smaller values as black.
+        EXPECT_GT(shown, last - (black ? 1e-9 : 0)) << display << " " << view << " " << value;
+        last = shown;
+      }
+      EXPECT_GT(last, 0.7) << view;
+    }
+  const ColorManagement aces({"", "sRGB", "ACES SDR"});
+  EXPECT_LT(displayed_grey(aces, 4), 1);  // Highlights are compressed, not clipped.
+  EXPECT_GT(displayed_grey(aces, 8), displayed_grey(aces, 4));
+}
+
+TEST_F(ColorTest, OtherChannelsAreLeftAlone) {
+  Image image(33, 17, {"R", "G", "B", "A", "Z"});
+  for (std::size_t i = 0; i < image.pixels.size(); ++i) image.pixels[i] = static_cast<float>(i % 101) / 100;
+  const Image before = image;
+  const ColorManagement color({});
+  color.to_display(image);
+  for (int y = 0; y < 17; ++y)
+    for (int x = 0; x < 33; ++x) {
+      EXPECT_EQ(image.pixel(x, y)[3], before.pixel(x, y)[3]);
+      EXPECT_EQ(image.pixel(x, y)[4], before.pixel(x, y)[4]);
+      Image one(1, 1, {"R", "G", "B"});
+      std::copy_n(before.pixel(x, y), 3, one.pixels.begin());
+      color.to_display(one);
+      for (int c = 0; c < 3; ++c) EXPECT_NEAR(image.pixel(x, y)[c], one.pixels[c], 1e-6);
+    }
+  Image grey(2, 2, {"Y"}), swapped(2, 2, {"B", "G", "R"});
+  EXPECT_THROW(color.to_display(grey), std::invalid_argument);
+  EXPECT_THROW(color.to_display(swapped), std::invalid_argument);
+}
+
+TEST_F(ColorTest, ConfigsAreFoundByPathAndByEnvironment) {
+  const Temporary file("config.ocio", config_text(linear_role + aces_role + xyz_role));
+  const ColorManagement by_path({file.path(), "", ""});
+  EXPECT_EQ(by_path.config_name(), file.path().string());
+  EXPECT_EQ(by_path.working_space(), "linear");
+  EXPECT_EQ(by_path.display(), "Screen");
+  EXPECT_EQ(by_path.view(), "Curve");
+  setenv("OCIO", file.path().c_str(), 1);
+  const ColorManagement by_environment({"", "Screen", "Plain"});
+  EXPECT_EQ(by_environment.config_name(), file.path().string());
+  EXPECT_EQ(by_environment.view(), "Plain");
+  setenv("OCIO", "", 1);
+  EXPECT_EQ(ColorManagement({}).config_name(), "built-in");
+  setenv("OCIO", "/no/such.ocio", 1);
+  EXPECT_EQ(ColorManagement({file.path(), "", ""}).config_name(), file.path().string());
+  EXPECT_EQ(ColorManagement({"built-in", "", ""}).config_name(), "built-in");
+}
+
+TEST_F(ColorTest, EitherInterchangeRoleLeadsToTheWorkingSpace) {
+  // ACEScg's primaries and white (D60), adapted to D65 by Bradford's method.
+  for (const std::string& roles : {aces_role, xyz_role, aces_role + xyz_role}) {
+    const Temporary file("roles.ocio", config_text(linear_role + roles));
+    const Eigen::Matrix3d matrix = ColorManagement({file.path(), "", ""}).xyz_to_working();
+    EXPECT_TRUE((matrix * from_chromaticity(0.3127, 0.3290)).isApprox(Eigen::Vector3d::Ones(), 1e-4)) << roles;
+    // The published matrix from linear sRGB (D65) to ACEScg; the expected values are its first column.
+    const Eigen::Vector3d red = matrix * (0.2126390 * from_chromaticity(0.64, 0.33));
+    EXPECT_LT((red - Eigen::Vector3d(0.613097, 0.070194, 0.020616)).norm(), 2e-4) << roles << red.transpose();
+  }
+}
+
+TEST_F(ColorTest, WithoutInterchangeRolesPrimariesAreThoseOfRec709) {
+  const Temporary file("no_roles.ocio", config_text(linear_role));
+  const Eigen::Matrix3d matrix = ColorManagement({file.path(), "", ""}).xyz_to_working();
+  EXPECT_TRUE(matrix.isApprox(ColorManagement({}).xyz_to_working(), 1e-4));
+}
+
+TEST_F(ColorTest, UnknownNamesListTheKnownOnes) {
+  EXPECT_THAT(error_of({"", "CRT", ""}),
+              AllOf(HasSubstr("built-in"), HasSubstr("\"CRT\""), HasSubstr("\"sRGB\", \"Rec.1886\"")));
+  EXPECT_THAT(error_of({"", "sRGB", "Filmic"}),
+              AllOf(HasSubstr("\"Filmic\""), HasSubstr("\"Un-tone-mapped\", \"ACES SDR\", \"Raw\"")));
+}
+
+TEST_F(ColorTest, DisplaysWithoutAnInverseAreShownButNotStated) {
+  std::string text = config_text(linear_role + aces_role + xyz_role);
+  const auto insert = [&](const std::string& before, const std::string& addition) {
+    text.insert(text.find(before), addition);
+  };
+  insert("    - !<View> {name: Curve", "    - !<View> {name: Grey, view_transform: Plain, display_colorspace: grey}\n");
+  insert("colorspaces:\n  - !<ColorSpace>\n    name: aces",
+         "  - !<ColorSpace>\n    name: grey\n    from_display_reference: !<MatrixTransform> "
+         "{matrix: [0, 1, 0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0, 0, 0, 1]}\n");
+  const Temporary file("grey.ocio", text);
+  const ColorManagement color({file.path(), "Screen", "Grey"});
+  EXPECT_NEAR(displayed_grey(color, 0.5f), 0.5, 1e-3);
+  EXPECT_FALSE(color.display_encoding().is_srgb);
+  EXPECT_EQ(color.display_encoding().icc_profile, "");
+}
+
+TEST_F(ColorTest, BadConfigsAreOneClearLine) {
+  EXPECT_THAT(error_of({"/no/such.ocio", "", ""}), HasSubstr("/no/such.ocio: no such file"));
+  EXPECT_THAT(error_of({::testing::TempDir(), "", ""}), HasSubstr("folder"));
+  const Temporary garbage("garbage.ocio", "this: [is not\n a config");
+  EXPECT_THAT(error_of({garbage.path(), "", ""}), HasSubstr(garbage.path().string()));
+  const Temporary no_role("no_role.ocio", config_text(""));
+  EXPECT_THAT(error_of({no_role.path(), "", ""}), AllOf(HasSubstr(no_role.path().string()), HasSubstr("scene_linear")));
+  const Temporary curved("curved.ocio", config_text("  scene_linear: curve\n" + aces_role));
+  EXPECT_THAT(error_of({curved.path(), "", ""}), HasSubstr("not linear"));
+  const Temporary missing("missing.ocio", config_text("  scene_linear: nowhere\n"));
+  EXPECT_THAT(error_of({missing.path(), "", ""}), HasSubstr("nowhere"));
+  const Temporary newer("newer.ocio", "ocio_profile_version: 2.9\nroles:\n  default: raw\n");
+  EXPECT_THAT(error_of({newer.path(), "", ""}),
+              AllOf(HasSubstr(newer.path().string()), HasSubstr("for a newer library than OpenColorIO"),
+                    HasSubstr("\"built-in\"")));
+  EXPECT_THAT(error_of({"ocio://no-such-config", "", ""}), HasSubstr("OCIO config ocio://no-such-config"));
+  setenv("OCIO", "/no/such.ocio", 1);
+  EXPECT_THAT(error_of({}), AllOf(HasSubstr("/no/such.ocio: no such file"), HasSubstr("$OCIO")));
+}
+
+double srgb_decoded(double v) { return v <= 0.04045 ? v / 12.92 : std::pow((v + 0.055) / 1.055, 2.4); }
+
+TEST_F(ColorTest, PicturesAreDecodedToSinglePrecision) {
+  const ColorManagement color({});
+  const ColorConversion conversion = color.to_working(color.texture_space("a.png", true, ""));
+  for (int i = 0; i <= 65535; i += 5) {
+    const double value = i / 65535.0;
+    float rgba[8] = {static_cast<float>(value), 0, 1, 0.25f, 1, static_cast<float>(value), 0, 7};
+    conversion(rgba, 2);
+    EXPECT_NEAR(rgba[0], srgb_decoded(value), 1e-6);
+    EXPECT_NEAR(rgba[1], 0, 1e-6);
+    EXPECT_NEAR(rgba[2], 1, 1e-6);
+    EXPECT_EQ(rgba[3], 0.25f);
+    EXPECT_NEAR(rgba[5], srgb_decoded(value), 1e-6);
+    EXPECT_EQ(rgba[7], 7);
+  }
+}
+
+TEST_F(ColorTest, ConversionsOutliveTheirConfig) {
+  ColorConversion conversion;
+  {
+    const ColorManagement color({});
+    conversion = color.to_working("ACEScg");
+    EXPECT_FALSE(color.to_working("scene_linear"));
+    EXPECT_FALSE(color.to_working("lin_rec709"));
+    EXPECT_FALSE(color.to_working("Raw"));
+  }
+  float white[4] = {1, 1, 1, 0.5f};
+  conversion(white, 1);
+  for (int c = 0; c < 3; ++c) EXPECT_NEAR(white[c], 1, 1e-5);
+  EXPECT_THAT(message([] { ColorManagement({}).to_working("nowhere"); }), HasSubstr("nowhere"));
+}
+
+TEST_F(ColorTest, TextureSpaces) {
+  const ColorManagement color({});
+  EXPECT_EQ(color.texture_space("a.png", true, ""), "srgb_texture");
+  EXPECT_EQ(color.texture_space("a.exr", false, ""), "scene_linear");
+  EXPECT_EQ(color.texture_space("a.png", true, "ACEScg"), "ACEScg");
+  EXPECT_EQ(color.texture_space("a.png", true, "scene_linear"), "scene_linear");
+  EXPECT_THAT(message([&] { color.texture_space("a.png", true, "Technicolor"); }),
+              AllOf(HasSubstr("\"Technicolor\""), HasSubstr("\"ACEScg\""), HasSubstr("\"srgb_texture\"")));
+}
+
+TEST_F(ColorTest, TextureSpacesOfConfigs) {
+  const std::string text = config_text(linear_role + aces_role);
+  const Temporary plain("plain.ocio", text);
+  const ColorManagement without({plain.path(), "", ""});
+  EXPECT_EQ(without.texture_space("a.exr", false, ""), "scene_linear");
+  EXPECT_THAT(message([&] { without.texture_space("a.png", true, ""); }),
+              AllOf(HasSubstr(plain.path().string()), HasSubstr("a.png"), HasSubstr("integrator.image_color_space")));
+  const std::string aliased = text + "    aliases: [srgb_tx]\n";
+  const Temporary alias("alias.ocio", aliased);
+  EXPECT_EQ(ColorManagement({alias.path(), "", ""}).texture_space("a.png", true, ""), "srgb_tx");
+  std::string ruled = text;
+  const std::string rules = "file_rules:\n";
+  ruled.insert(ruled.find(rules) + rules.size(),
+               "  - !<Rule> {name: scans, colorspace: curve, pattern: \"*scan*\", extension: \"*\"}\n");
+  const Temporary rule("rule.ocio", ruled);
+  const ColorManagement with({rule.path(), "", ""});
+  EXPECT_EQ(with.texture_space("/x/my_scan_1.png", true, ""), "curve");
+  EXPECT_EQ(with.texture_space("/x/my_scan_1.exr", false, ""), "curve");
+  EXPECT_EQ(with.texture_space("/x/my_scan_1.png", true, "aces"), "aces");
+  EXPECT_EQ(with.texture_space("/x/other.exr", false, ""), "scene_linear");
+}
+
+}  // namespace
+}  // namespace tensorray

@@ -1,0 +1,252 @@
+// Photons of area lights, and their weights beside the other techniques that find this light.
+
+#include <algorithm>
+#include <cmath>
+#include <cstring>
+
+#include <gtest/gtest.h>
+#include <tbb/global_control.h>
+
+#include "base/constants.h"
+#include "renderer/light_maps/photon_tracer.h"
+#include "renderer/shading/shading.h"
+#include "tests/renderer/statistics.h"
+
+namespace tensorray {
+namespace {
+
+using Eigen::Vector3d;
+
+constexpr int bands = 2;
+constexpr double half_size = 1, half_height = 0.3;
+
+/// A flat box about the plane z = 0. Light that crosses the plane turns about z by an angle for each band, and its
+/// slope is multiplied by `steeper`. Photons keep their power, so that radiance changes by cos⁴ θ / (steeper² cos⁴ θ').
+class BendingPlane : public BendingRegion {
+ public:
+  explicit BendingPlane(double angle, double steeper = 1) : angle_(angle), steeper_(steeper) {}
+
+  double entry(const Vector3d& origin, const Vector3d& direction) const override {
+    double enters = 0, leaves = INFINITY;
+    for (int axis = 0; axis < 3; ++axis) {
+      const double size = axis < 2 ? half_size : half_height;
+      const double a = (-size - origin[axis]) / direction[axis], b = (size - origin[axis]) / direction[axis];
+      enters = std::max(enters, std::min(a, b));
+      leaves = std::min(leaves, std::max(a, b));
+    }
+    return leaves > enters ? enters : INFINITY;
+  }
+
+  void trace_radiance(std::vector<BentRay>& rays) const override {
+    for (BentRay& ray : rays) {
+      bend(-1, ray);
+      ray.radiance_scale = ray.jacobian;
+    }
+  }
+
+  void trace_importance(std::vector<BentRay>& rays) const override {
+    for (BentRay& ray : rays) bend(1, ray);
+  }
+
+ private:
+  /// @param sign  1: light; −1: followed back.
+  void bend(double sign, BentRay& ray) const {
+    ray.arrives = true;
+    ray.jacobian = 1;
+    const Vector3d crossing = ray.position - ray.position.z() / ray.direction.z() * ray.direction;
+    if (!(crossing.head<2>().cwiseAbs().maxCoeff() < half_size)) return;  // Through the sides.
+    const double before = ray.direction.z();
+    const double slope = sign > 0 ? steeper_ : 1 / steeper_;
+    Vector3d turned = Eigen::AngleAxisd(sign * angle_ * (1 + ray.band), Vector3d::UnitZ()) * ray.direction;
+    turned.head<2>() *= slope;
+    ray.direction = turned.normalized();
+    ray.position = crossing;
+    const double volume = slope * slope * std::pow(ray.direction.z() / before, 4);  // Of phase space, by that before.
+    ray.jacobian = sign > 0 ? 1 / volume : volume;
+  }
+
+  double angle_, steeper_;
+};
+
+std::vector<Vector3d> corners() {
+  std::vector<Vector3d> result;
+  for (int i = 0; i < 8; ++i)
+    result.push_back(
+        {(i % 2 - 0.5) * 2 * half_size, (i / 2 % 2 - 0.5) * 2 * half_size, (i / 4 - 0.5) * 2 * half_height});
+  return result;
+}
+
+AreaLight lamp() { return {rectangle_mesh({1.8, 0.2, 3}, {1, 0, 0}, {0, -1, 0}, {1.2, 0.9}), {5, 7}}; }
+
+AreaLight lamp_within() { return {rectangle_mesh({0.2, 0.2, 0.2}, {1, 0, 0}, {0, -1, 0}, {0.3, 0.2}), {5, 7}}; }
+
+const std::vector<Band>& both_bands() {
+  static const std::vector<Band> result{{600, 100, 0.5, Vector3d(1, 1, 0)}, {500, 100, 0.5, Vector3d(0, 1, 1)}};
+  return result;
+}
+
+const ReflectanceTable& colors() {
+  static const Eigen::Matrix3d matrix = Eigen::Matrix3d::Identity();
+  static const ReflectanceTable table(ReflectanceModel(both_bands(), matrix), both_bands(), matrix);
+  return table;
+}
+
+/// A floor below the plane, a lamp above it, and the lamp's photons on the floor.
+struct Stage {
+  Stage(const BendingRegion& region_, const MaterialSettings& floor, std::uint64_t per_pass, int passes,
+        const AreaLight& light = lamp())
+      : region(region_),
+        light_list{light},
+        materials{make_material(floor, BandValues::Constant(bands, 0.6)),
+                  make_material(Diffuse{}, BandValues::Zero(bands))},
+        surfaces(parts(light)),
+        lights(light_list, {0.5f, 0.5f}, surfaces.bounds()),
+        scene{surfaces, materials, lights, colors()} {
+    scene.region = &region;
+    scene.bands_per_view = scene.bands_per_bounce = 2;
+    PhotonTracerSettings settings;
+    settings.per_pass = per_pass;
+    settings.passes = passes;
+    settings.radius = 0.12;
+    settings.serves = [](int, std::uint32_t surface) { return surface == 0; };
+    photons = trace_photons(region, corners(), surfaces, light_list, settings, {});
+  }
+
+  static std::vector<ShadedSurface> parts(const AreaLight& light) {
+    std::vector<ShadedSurface> result(2);
+    result[0].shape = rectangle_mesh({0, 0, -0.8}, {1, 0, 0}, {0, 1, 0}, {8, 8});
+    result[1].shape = light.mesh;
+    result[1].material = 1;
+    result[1].light = 0;
+    return result;
+  }
+
+  /// Radiance of a point of the floor in a band. @param with_photons  Whether photons are a technique, too.
+  Mean seen(DirectLight direct, bool with_photons, int band) {
+    ShadingSettings settings;
+    settings.direct = direct;
+    settings.max_depth = 1;
+    scene.photons = with_photons ? &photons : nullptr;
+    RayShader shader(scene, settings);
+    const Vector3d from(0.4, -2.9, -0.6), to(0.3, -0.1, -0.8);
+    Mean mean;
+    for (std::uint64_t i = 0; i < 60000; ++i) {
+      shader.shade({{from, (to - from).normalized(), {3, i, 0, 0}}}, true);
+      mean.add(shader.radiance(0)[band]);
+    }
+    return mean;
+  }
+
+  const BendingRegion& region;
+  std::vector<Light> light_list;
+  std::vector<Material> materials;
+  SurfaceScene surfaces;
+  LightSampler lights;
+  ShadedScene scene;
+  PhotonMaps photons;
+};
+
+/// Of a diffuse floor, all photons together, without weights.
+double by_photons_alone(const Stage& stage, int band) {
+  const auto point = *stage.surfaces.intersect({0.3, -0.1, -0.5}, {0, 0, -1});
+  double sum = 0;
+  for (const PhotonMap& pass : stage.photons.passes)
+    pass.visit(point, band, [&](const Photon& photon, double density) { sum += photon.power * density; });
+  return 0.6 / pi * sum / static_cast<double>(stage.photons.passes.size());
+}
+
+MaterialSettings glossy() {
+  Principled material;
+  material.roughness = 0.3;
+  return material;
+}
+
+/// Aim and material find the light with each other's weights or alone; each with photons and without. There are so few
+/// photons in each pass that no technique has all the weight. Their noise is common to all samples: without weights 7%
+/// of the light (by seeds), with them less.
+TEST(AreaPhotonsTest, EverySubsetOfTechniquesHasTheSameMean) {
+  for (const MaterialSettings& floor : {MaterialSettings(Diffuse{}), glossy()})
+    for (const double steeper : {1.0, 1.6}) {
+      const BendingPlane plane(0.15, steeper), wrong(-0.15, 1 / steeper);
+      Stage stage(plane, floor, 300, 1024);
+      const Mean truth = stage.seen(DirectLight::both, false, 1);
+      EXPECT_LT(truth.error(), 0.03 * truth.mean());
+      for (const DirectLight direct : {DirectLight::both, DirectLight::lights, DirectLight::material})
+        for (const bool with_photons : {false, true}) {
+          const Mean mean = stage.seen(direct, with_photons, 1);
+          const double noise = with_photons ? 0.05 * truth.mean() : 0;
+          EXPECT_NEAR(mean.mean(), truth.mean(), 4.5 * std::hypot(mean.error(), truth.error()) + noise)
+              << static_cast<int>(direct) << with_photons << " " << steeper;
+        }
+      if (std::holds_alternative<Diffuse>(floor)) {
+        const double alone = by_photons_alone(Stage(plane, floor, 30000, 32), 1);
+        EXPECT_NEAR(alone, truth.mean(), 4.5 * truth.error() + 0.06 * truth.mean()) << steeper;
+      }
+      if (steeper == 1) continue;
+      // Photons that bend the wrong way do not add up with rays that bend the right way.
+      stage.photons = Stage(wrong, floor, 300, 1024).photons;
+      const double difference = stage.seen(DirectLight::both, true, 1).mean() - truth.mean();
+      EXPECT_GT(std::abs(difference), 0.15 * truth.mean());
+    }
+}
+
+/// Photons have most of the weight where aim misses a small lamp and many photons are near.
+TEST(AreaPhotonsTest, PhotonsRemoveNoiseWhereAimMisses) {
+  const BendingPlane plane(0.8);
+  Stage stage(plane, Diffuse{}, 30000, 32);
+  const Mean without = stage.seen(DirectLight::both, false, 1), with = stage.seen(DirectLight::both, true, 1);
+  EXPECT_NEAR(with.mean(), without.mean(), 4.5 * without.error() + 0.06 * without.mean());
+  EXPECT_LT(with.error(), 0.3 * without.error());
+}
+
+/// All light of the lamp that meets the box lands on a large floor: the lamp is small, so that its light is that of its
+/// middle, radiance × area × ∫ cos θ dω.
+TEST(AreaPhotonsTest, PowerIsThatOfTheLampTowardsTheVolume) {
+  const double height = 4, side = 0.02;
+  const std::vector<Light> lights{
+      AreaLight{rectangle_mesh({0, 0, height}, {1, 0, 0}, {0, -1, 0}, {side, side}), {5, 7}}};
+  std::vector<ShadedSurface> parts(1);
+  parts[0].shape = rectangle_mesh({0, 0, -2}, {1, 0, 0}, {0, 1, 0}, {400, 400});
+  const SurfaceScene floor(std::move(parts));
+  PhotonTracerSettings settings;
+  settings.per_pass = 40000;
+  settings.serves = [](int, std::uint32_t) { return true; };
+  const PhotonMaps photons = trace_photons(BendingPlane(0.3), corners(), floor, lights, settings, {});
+  double power = 0;
+  for (const Photon& photon : photons.passes[0].photons()) power += photon.band == 1 ? photon.power : 0;
+  const double h = height - half_height, root = std::sqrt(half_size * half_size + h * h);
+  const double projected = 4 * half_size / root * std::atan(half_size / root);  // Four quarters of the upper face.
+  EXPECT_NEAR(power, 7 * side * side * projected, 0.02 * power);
+  EXPECT_EQ(photons.counts[0][0] + photons.counts[0][1] + photons.counts[0][2] + photons.counts[0][3], 40000u * bands);
+  ASSERT_TRUE(photons.areas[0]);
+  EXPECT_EQ(photons.areas[0]->count, 40000);
+}
+
+TEST(AreaPhotonsTest, TheSameBytesOnAnyNumberOfThreads) {
+  std::vector<PhotonMaps> results;
+  for (const std::size_t threads : {1, 2, 7}) {
+    const tbb::global_control control(tbb::global_control::max_allowed_parallelism, threads);
+    results.push_back(Stage(BendingPlane(0.3), Diffuse{}, 3000, 4).photons);
+  }
+  for (const PhotonMaps& result : results) {
+    const auto &photons = result.passes[3].photons(), &first = results[0].passes[3].photons();
+    ASSERT_EQ(photons.size(), first.size());
+    ASSERT_GT(photons.size(), 1000u);
+    EXPECT_EQ(std::memcmp(photons.data(), first.data(), photons.size() * sizeof(Photon)), 0);
+  }
+}
+
+/// Photons of a lamp within the region start in all directions, as it shines.
+TEST(AreaPhotonsTest, ALampWithinTheRegionHasTheSameMeanByPhotons) {
+  const BendingPlane plane(0.15, 1.3);
+  Stage stage(plane, Diffuse{}, 300, 1024, lamp_within());
+  const Mean truth = stage.seen(DirectLight::both, false, 1), with = stage.seen(DirectLight::both, true, 1);
+  EXPECT_LT(truth.error(), 0.03 * truth.mean());
+  EXPECT_NEAR(with.mean(), truth.mean(), 4.5 * std::hypot(with.error(), truth.error()) + 0.05 * truth.mean());
+  const Stage many(plane, Diffuse{}, 30000, 32, lamp_within());
+  EXPECT_NEAR(by_photons_alone(many, 1), truth.mean(), 4.5 * truth.error() + 0.06 * truth.mean());
+  EXPECT_DOUBLE_EQ(PhotonEmitter(lamp_within(), corners(), {}).power(), pi * 0.3 * 0.2);
+}
+
+}  // namespace
+}  // namespace tensorray

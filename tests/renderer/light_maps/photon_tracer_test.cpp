@@ -1,0 +1,307 @@
+#include "renderer/light_maps/photon_tracer.h"
+
+#include <cmath>
+#include <cstring>
+#include <numeric>
+
+#include <gtest/gtest.h>
+#include <tbb/global_control.h>
+
+#include "base/constants.h"
+#include "renderer/sampling/random.h"
+#include "renderer/shading/shading.h"
+#include "tests/renderer/statistics.h"
+
+namespace tensorray {
+namespace {
+
+using Eigen::Vector3d;
+
+constexpr int bands = 2;
+
+/// The cube [−½, ½]³, which bends nothing, but changes the power of photons. It stops light in its middle on request.
+class ClearCube : public BendingRegion {
+ public:
+  explicit ClearCube(double radiance_scale = 1, bool stops = false) : radiance_scale_(radiance_scale), stops_(stops) {}
+
+  double entry(const Vector3d& origin, const Vector3d& direction) const override {
+    double enters = 0, leaves = INFINITY;
+    for (int axis = 0; axis < 3; ++axis) {
+      const double a = (-0.5 - origin[axis]) / direction[axis], b = (0.5 - origin[axis]) / direction[axis];
+      enters = std::max(enters, std::min(a, b));
+      leaves = std::min(leaves, std::max(a, b));
+    }
+    return leaves > enters ? enters : INFINITY;
+  }
+
+  void trace_radiance(std::vector<BentRay>& rays) const override { trace_importance(rays); }
+
+  void trace_importance(std::vector<BentRay>& rays) const override {
+    for (BentRay& ray : rays) {
+      ray.position += entry(ray.position, ray.direction) * ray.direction;
+      ray.arrives = !stops_ || ray.position.x() > 0;
+      ray.radiance_scale = radiance_scale_;
+    }
+  }
+
+ private:
+  double radiance_scale_;
+  bool stops_;
+};
+
+std::vector<Vector3d> corners() {
+  std::vector<Vector3d> result;
+  for (int i = 0; i < 8; ++i) result.push_back({i % 2 - 0.5, i / 2 % 2 - 0.5, static_cast<double>(i / 4) - 0.5});
+  return result;
+}
+
+/// A floor at `height`, of a size, and perhaps a roof above everything.
+SurfaceScene floor_at(double height, double size, bool roof = false) {
+  std::vector<ShadedSurface> surfaces(roof ? 2 : 1);
+  surfaces[0].shape = rectangle_mesh({0, 0, height}, {1, 0, 0}, {0, 1, 0}, {size, size});
+  if (roof) surfaces[1].shape = rectangle_mesh({0.25, 0, 0.8}, {1, 0, 0}, {0, 1, 0}, {0.5, 4});
+  return SurfaceScene(std::move(surfaces));
+}
+
+DirectionalLight sun(const Vector3d& direction, double angle = 0) { return {direction, {2, 3}, angle}; }
+
+PhotonTracerSettings settings_of(std::uint64_t per_pass, int passes = 1, double radius = 0.05) {
+  PhotonTracerSettings settings;
+  settings.per_pass = per_pass;
+  settings.passes = passes;
+  settings.radius = radius;
+  settings.seed = 4;
+  settings.serves = [](int, std::uint32_t surface) { return surface == 0; };
+  return settings;
+}
+
+PhotonMaps traced(const BendingRegion& region, const SurfaceScene& surfaces, const std::vector<Light>& lights,
+                  const PhotonTracerSettings& settings) {
+  return trace_photons(region, corners(), surfaces, lights, settings, {});
+}
+
+SurfaceHit floor_point(const SurfaceScene& surfaces, double x, double y) {
+  return *surfaces.intersect({x, y, 0.49}, {0, 0, -1});
+}
+
+/// Irradiance of a point in a band; the mean over the passes.
+Mean irradiance(const PhotonMaps& photons, const SurfaceHit& point, int band) {
+  Mean mean;
+  for (const PhotonMap& pass : photons.passes) {
+    double sum = 0;
+    pass.visit(point, band, [&](const Photon& photon, double density) { sum += photon.power * density; });
+    mean.add(sum);
+  }
+  return mean;
+}
+
+double power_in(const PhotonMaps& photons, int band) {
+  double sum = 0;
+  for (const PhotonMap& pass : photons.passes)
+    for (const Photon& photon : pass.photons())
+      if (photon.band == band) sum += photon.power;
+  return sum / static_cast<double>(photons.passes.size());
+}
+
+/// Every photon of the sun lands, and the floor has the power of the cube's silhouette.
+TEST(PhotonTracerTest, TheSunsPowerIsThatOfTheSilhouette) {
+  const SurfaceScene floor = floor_at(-0.8, 40);
+  const Vector3d direction = Vector3d(0.4, 0.3, -1).normalized();
+  const double silhouette = direction.cwiseAbs().sum();
+  const PhotonMaps photons = traced(ClearCube(0.5), floor, {sun(3 * direction)}, settings_of(1000, 2));
+  EXPECT_EQ(photons.counts, std::vector<PhotonCounts>(2, {0, 1000 * bands, 0, 0}));
+  EXPECT_NEAR(power_in(photons, 0), 0.5 * 2 * silhouette, 1e-6);
+  EXPECT_NEAR(power_in(photons, 1), 0.5 * 3 * silhouette, 1e-6);
+}
+
+/// The power of a point within the solid angle of the cube: that of a face seen from a place above its middle.
+TEST(PhotonTracerTest, APointsPowerIsThatOfItsSolidAngle) {
+  const PointLight point{{0, 0, 2}, {5, 7}};
+  const PhotonMaps photons = traced(ClearCube(), floor_at(-0.8, 40), {point}, settings_of(40000));
+  const double solid_angle = 4 * std::asin(1 / (1 + 4 * 1.5 * 1.5));
+  EXPECT_NEAR(power_in(photons, 0), 5 * solid_angle, 1e-3 * 5 * solid_angle);
+  EXPECT_NEAR(power_in(photons, 1), 7 * solid_angle, 1e-3 * 7 * solid_angle);
+}
+
+/// Before the region, behind it, beside everything, and within it.
+TEST(PhotonTracerTest, EveryPhotonEnds) {
+  const PhotonMaps photons =
+      traced(ClearCube(1, true), floor_at(-0.8, 0.5, true), {sun({0, 0, -1})}, settings_of(4000, 3));
+  ASSERT_EQ(photons.counts.size(), 3u);
+  for (const PhotonCounts& counts : photons.counts)
+    EXPECT_EQ(std::accumulate(counts.begin(), counts.end(), std::uint64_t{0}), 4000u * bands);
+  const auto part = [&](PhotonEnd end) {
+    return static_cast<double>(photons.counts[0][static_cast<std::size_t>(end)]) / (4000.0 * bands);
+  };
+  EXPECT_NEAR(part(PhotonEnd::before), 0.5, 0.02);  // The roof, at x > 0; the rest is stopped.
+  EXPECT_NEAR(part(PhotonEnd::stopped), 0.5, 0.02);
+  const PhotonMaps open = traced(ClearCube(), floor_at(-0.8, 0.5), {sun({0, 0, -1})}, settings_of(4000));
+  EXPECT_NEAR(static_cast<double>(open.counts[0][1]) / (4000.0 * bands), 0.25, 0.01);
+  EXPECT_NEAR(static_cast<double>(open.counts[0][2]) / (4000.0 * bands), 0.75, 0.01);
+}
+
+/// A region that bends nothing: photons give the irradiance of straight light, within the region and behind it.
+TEST(PhotonTracerTest, StraightLightHasItsClosedForm) {
+  const Vector3d slanted(0.2, -0.1, -1);
+  const PointLight point{{0.3, 0.2, 2}, {5, 7}};
+  for (const double height : {-0.8, 0.1}) {
+    const SurfaceScene floor = floor_at(height, 40);
+    const SurfaceHit at = floor_point(floor, 0.05, -0.08);
+    const Vector3d way = at.position - point.position;
+    const std::vector<std::pair<Light, double>> cases{{sun({0, 0, -1}), 3},
+                                                      {sun(slanted), 3 / slanted.norm()},
+                                                      {sun(slanted, 0.1), 3 / slanted.norm()},
+                                                      {point, 7 * -way.z() / std::pow(way.norm(), 3)}};
+    for (std::size_t i = 0; i < cases.size(); ++i) {
+      const PhotonMaps photons = traced(ClearCube(), floor, {cases[i].first}, settings_of(4000, 32, 0.1));
+      const Mean mean = irradiance(photons, at, 1);
+      EXPECT_NEAR(mean.mean(), cases[i].second, 5 * mean.error()) << i << " " << height;
+      EXPECT_LT(mean.error(), 0.04 * cases[i].second) << i;
+    }
+  }
+}
+
+/// The light of a small plate is that of the photons that land on it, in spite of the radius.
+TEST(PhotonTracerTest, PlatesKeepTheirLightAtTheirEdges) {
+  const SurfaceScene floor = floor_at(-0.8, 0.5);
+  PhotonTracerSettings settings = settings_of(3000, 4, 0.12);
+  const auto mean_on_plate = [&] {
+    const PhotonMaps photons = traced(ClearCube(), floor, {sun({0, 0, -1})}, settings);
+    Mean mean;
+    for (int i = 0; i < 1600; ++i)
+      mean.add(irradiance(photons, floor_point(floor, (i % 40 - 19.5) / 80, (i / 40 - 19.5) / 80), 0).mean());
+    return mean.mean();
+  };
+  EXPECT_LT(mean_on_plate(), 0.9 * 2);
+  Plate plate;
+  plate.center = {0, 0, -0.8};
+  plate.right = {1, 0, 0};
+  plate.up = {0, 1, 0};
+  plate.size = {0.5, 0.5};
+  settings.plates = {plate};
+  EXPECT_NEAR(mean_on_plate(), 2, 0.01 * 2);
+}
+
+/// The shading of photons is that of next-event estimation where nothing bends: one or the other, never both.
+TEST(PhotonTracerTest, ShadingIsThatOfStraightLight) {
+  const SurfaceScene floor = floor_at(-0.8, 8);
+  const std::vector<Material> materials{make_material(Diffuse{}, BandValues::Constant(bands, 0.6))};
+  const std::vector<Light> lights{sun({0.2, -0.1, -1}), PointLight{{0.3, 0.2, 2}, {5, 7}}};
+  const LightSampler sampler(lights, {0.5f, 0.5f}, floor.bounds());
+  const std::vector<Band> both{{600, 100, 0.5, Vector3d(1, 1, 0)}, {500, 100, 0.5, Vector3d(0, 1, 1)}};
+  const Eigen::Matrix3d matrix = Eigen::Matrix3d::Identity();
+  const ReflectanceTable colors(ReflectanceModel(both, matrix), both, matrix);
+  const ClearCube cube;
+  const PhotonMaps photons = traced(cube, floor, lights, settings_of(4000, 16, 0.1));
+  ShadedScene straight{floor, materials, sampler, colors}, bent = straight;
+  bent.region = &cube;
+  bent.photons = &photons;
+  const auto mean_of = [&](const ShadedScene& scene, double x) {
+    RayShader shader(scene, {});
+    Mean mean;
+    for (std::uint32_t i = 0; i < 16 * 8; ++i) {
+      const Vector3d from(x, -3, 1);
+      shader.shade({{from, (Vector3d(x, 0.05, -0.8) - from).normalized(), {3, 7, i, 0}}}, true);
+      mean.add(shader.radiance(0)[1]);
+    }
+    return mean;
+  };
+  const Mean with = mean_of(bent, 0.1), without = mean_of(straight, 0.1), beside = mean_of(bent, 2);
+  EXPECT_NEAR(with.mean(), without.mean(), 0.03 * without.mean());
+  EXPECT_GT(without.mean(), 0.1);
+  EXPECT_NEAR(beside.mean(), mean_of(straight, 2).mean(), 5 * beside.error() + 1e-9);
+}
+
+TEST(PhotonTracerTest, TheSameBytesOnAnyNumberOfThreads) {
+  const SurfaceScene floor = floor_at(-0.8, 40);
+  const std::vector<Light> lights{sun({0.1, 0, -1}, 0.05), PointLight{{0, 0, 2}, {5, 7}}};
+  std::vector<PhotonMaps> results;
+  for (const std::size_t threads : {1, 2, 7}) {
+    const tbb::global_control control(tbb::global_control::max_allowed_parallelism, threads);
+    results.push_back(traced(ClearCube(), floor, lights, settings_of(5000, 2)));
+  }
+  for (const PhotonMaps& result : results)
+    for (std::size_t pass = 0; pass < 2; ++pass) {
+      const auto &photons = result.passes[pass].photons(), &first = results[0].passes[pass].photons();
+      ASSERT_EQ(photons.size(), first.size());
+      EXPECT_EQ(std::memcmp(photons.data(), first.data(), photons.size() * sizeof(Photon)), 0);
+    }
+}
+
+/// The mean over the passes at a point in the shadow, near its edge, falls as the radius shrinks.
+TEST(PhotonTracerTest, TheBiasFallsWithTheRadius) {
+  EXPECT_NEAR(std::pow(photon_radius(2, 1) / photon_radius(2, 0), 2), (1 + 2.0 / 3) / 2, 1e-12);
+  EXPECT_NEAR(std::pow(photon_radius(2, 9) / photon_radius(2, 8), 2), (9 + 2.0 / 3) / 10, 1e-12);
+  const SurfaceScene floor = floor_at(-0.8, 40);
+  const SurfaceHit shadow = *floor.intersect({0.57, 0, 0}, {0, 0, -1});
+  std::vector<double> means;
+  for (const int passes : {1, 8, 64}) {
+    const PhotonMaps photons = traced(ClearCube(), floor, {sun({0, 0, -1})}, settings_of(20000, passes, 0.15));
+    means.push_back(irradiance(photons, shadow, 0).mean());
+  }
+  EXPECT_GT(means[0], 0.1);
+  EXPECT_LT(means[1], 0.7 * means[0]);
+  EXPECT_LT(means[2], 0.5 * means[1]);
+}
+
+/// The lattice finds what a search through all photons finds.
+TEST(PhotonTracerTest, VisitsAllPhotonsInReach) {
+  std::vector<Photon> photons(3000);
+  for (std::size_t i = 0; i < photons.size(); ++i) {
+    const auto number = [&](std::uint32_t dimension) { return static_cast<float>(random_uniform(1, i, dimension)); };
+    photons[i].position = {number(0), number(1), 0.1f * number(2)};
+    photons[i].normal = number(3) < 0.8f ? Eigen::Vector3f(0, 0, 1) : Eigen::Vector3f(1, 0, 0);
+    photons[i].surface = number(4) < 0.8f ? 0 : 1;
+    photons[i].band = number(5) < 0.5f ? 0 : 1;
+    photons[i].power = 1;
+  }
+  const double radius = 0.13;
+  const PhotonMap pass(photons, radius);
+  for (int i = 0; i < 60; ++i) {
+    SurfaceHit point;
+    point.position = {1.4 * random_uniform(2, i, 0) - 0.2, 1.4 * random_uniform(2, i, 1) - 0.2, 0.05};
+    point.normal = {0, 0, 1};
+    for (const int band : {-1, 0, 1}) {
+      double found = 0, expected = 0;
+      pass.visit(point, band, [&](const Photon&, double density) { found += density; });
+      for (const Photon& photon : photons) {
+        const Vector3d way = photon.position.cast<double>() - point.position;
+        const double squared = way.head<2>().squaredNorm() / (radius * radius);
+        if (photon.surface == 0 && photon.normal.z() == 1 && (band < 0 || photon.band == band) && squared < 1 &&
+            std::abs(way.z()) <= radius / 4)
+          expected += 2 * (1 - squared) / (pi * radius * radius);
+      }
+      EXPECT_NEAR(found, expected, 1e-9 * (1 + expected)) << i << " " << band;
+    }
+  }
+}
+
+/// Within the region, and so near to it that it is on all sides: the floor has the irradiance I cos θ / r², and
+/// (1 − cos θ) / 2 of the photons, where θ is the angle of its inscribed circle, or a little more. The radius blurs by
+/// half a percent.
+TEST(PhotonTracerTest, APointWithinTheRegionShinesAllAround) {
+  constexpr double size = 40;
+  constexpr std::uint64_t count = 200000;
+  for (const double z : {0.2, 0.505}) {
+    const PointLight point{{0.1, 0, z}, {5, 7}};
+    const double height = z + 0.8, part = (1 - height / std::hypot(height, size / 2)) / 2;
+    const SurfaceScene floor = floor_at(-0.8, size);
+    const PhotonMaps photons = traced(ClearCube(), floor, {point}, settings_of(count, 8, 0.1));
+    const double landed = static_cast<double>(photons.counts[0][static_cast<std::size_t>(PhotonEnd::landed)]) /
+                          static_cast<double>(count * bands);
+    if (z < 0.5) {  // From above, light that passes the cube is left to others.
+      EXPECT_GT(landed, part - 0.006);
+      EXPECT_LT(landed, 0.5);
+    }
+    for (const double x : {0.1, 0.4}) {
+      const double squared = height * height + (x - 0.1) * (x - 0.1);
+      const Mean found = irradiance(photons, floor_point(floor, x, 0), 1);
+      EXPECT_NEAR(found.mean(), 7 * height / std::pow(squared, 1.5), 4.5 * found.error() + 0.01 * found.mean()) << z;
+    }
+  }
+  EXPECT_TRUE(
+      traced(ClearCube(), floor_at(-0.8, 40), {PointLight{{0, 0, 0.2}, {5, 7}}}, settings_of(0)).passes.empty());
+}
+
+}  // namespace
+}  // namespace tensorray

@@ -1,0 +1,241 @@
+#include "renderer/lights/bending_region.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include <gtest/gtest.h>
+
+#include "base/constants.h"
+#include "renderer/camera/path_tracer.h"
+#include "renderer/meshes/mesh.h"
+#include "tests/renderer/statistics.h"
+
+namespace tensorray {
+namespace {
+
+using Eigen::Vector3d;
+
+constexpr int bands = 4;
+
+/// The ball of radius ½ about the origin. All light that passes through it turns about z by one angle for each band, at
+/// its centre, which keeps radiance; the ray goes on from the ball's centre.
+class TurningBall : public BendingRegion {
+ public:
+  explicit TurningBall(double angle, double radiance_scale = 1) : angle_(angle), radiance_scale_(radiance_scale) {}
+
+  double entry(const Vector3d& origin, const Vector3d& direction) const override {
+    const double along = -origin.dot(direction);
+    const double half = 0.25 - (origin + along * direction).squaredNorm();
+    return half > 0 && along + std::sqrt(half) > 1e-9 ? std::max(0.0, along - std::sqrt(half)) : INFINITY;
+  }
+
+  void trace_radiance(std::vector<BentRay>& rays) const override {
+    for (BentRay& ray : rays) {
+      ray.position += entry(ray.position, ray.direction) * ray.direction;
+      ray.direction = Eigen::AngleAxisd(angle_ * (1 + ray.band), Vector3d::UnitZ()) * ray.direction;
+      ray.arrives = true;
+      ray.radiance_scale = radiance_scale_;
+    }
+  }
+
+  /// Light that passes the ball at its centre height turns back.
+  void trace_importance(std::vector<BentRay>& rays) const override {
+    for (BentRay& ray : rays) {
+      ray.position += entry(ray.position, ray.direction) * ray.direction;
+      ray.direction = Eigen::AngleAxisd(-angle_ * (1 + ray.band), Vector3d::UnitZ()) * ray.direction;
+      ray.arrives = true;
+    }
+  }
+
+ private:
+  double angle_, radiance_scale_;
+};
+
+std::vector<Band> test_bands() {
+  return {{620, 60, 0.25, Vector3d(1, 0.3, 0)},
+          {560, 60, 0.25, Vector3d(0.2, 0.5, 0)},
+          {500, 60, 0.25, Vector3d(0, 0.15, 0.2)},
+          {440, 60, 0.25, Vector3d(0.1, 0.05, 0.8)}};
+}
+
+const ReflectanceTable& colors() {
+  static const Eigen::Matrix3d matrix = Eigen::Matrix3d::Identity();
+  static const ReflectanceTable table(ReflectanceModel(test_bands(), matrix), test_bands(), matrix);
+  return table;
+}
+
+std::vector<float> even(float value) { return std::vector<float>(bands, value); }
+
+/// A floor below the ball, lit by `lights`, of which the first may be the area light of a lamp.
+struct Stage {
+  explicit Stage(const std::vector<Light>& light_list, double albedo = 0.6)
+      : materials{make_material(Diffuse{}, BandValues::Constant(bands, albedo)),
+                  make_material(Diffuse{}, BandValues::Zero(bands))},
+        surfaces(parts(light_list)),
+        lights(light_list, {0.3f, 0.5f, 0.15f, 0.05f}, surfaces.bounds()),
+        scene{surfaces, materials, lights, colors()} {}
+
+  static std::vector<ShadedSurface> parts(const std::vector<Light>& lights) {
+    std::vector<ShadedSurface> result(1);
+    result[0].shape = rectangle_mesh({0, 0, -0.8}, {1, 0, 0}, {0, 1, 0}, {8, 8});
+    if (const auto* lamp = std::get_if<AreaLight>(&lights[0])) {
+      ShadedSurface surface;
+      surface.shape = lamp->mesh;
+      surface.material = 1;
+      surface.light = 0;
+      result.push_back(surface);
+    }
+    return result;
+  }
+
+  std::vector<Material> materials;
+  SurfaceScene surfaces;
+  LightSampler lights;
+  ShadedScene scene;
+};
+
+/// The mean over the bands, averaged over rays from one point to another.
+Mean seen(const ShadedScene& scene, const ShadingSettings& settings, const Vector3d& from, const Vector3d& to,
+          std::uint64_t samples) {
+  RayShader shader(scene, settings);
+  Mean mean;
+  for (std::uint64_t i = 0; i < samples; ++i) {
+    shader.shade({{from, (to - from).normalized(), {3, i, 0, 0}}}, true);
+    mean.add(shader.radiance(0).mean());
+  }
+  return mean;
+}
+
+AreaLight lamp() { return {rectangle_mesh({0.3, 0, 1.2}, {1, 0, 0}, {0, -1, 0}, {0.8, 0.8}), even(5)}; }
+
+TEST(BendingRegionTest, AWhiteFloorInAWhiteSkyCannotBeSeen) {
+  Stage stage({ConstantLight{even(1)}}, 1);
+  const TurningBall ball(0.3);
+  stage.scene.region = &ball;
+  stage.scene.bands_per_view = 4;
+  stage.scene.bands_per_bounce = 4;
+  for (const Vector3d& to : {Vector3d(0, 0, 0), Vector3d(0.1, 0, -0.8), Vector3d(0.9, 0.4, -0.8)}) {
+    const Mean mean = seen(stage.scene, {}, {0, -3, 1.5}, to, 4000);
+    EXPECT_NEAR(mean.mean(), 1, 5 * mean.error() + 1e-9);
+  }
+}
+
+/// Turns about z keep everything about a lit point, if all bands turn by less than the lamp is large or not.
+TEST(BendingRegionTest, EverySubsetOfTechniquesHasTheSameMean) {
+  for (const double angle : {0.2, 1.3}) {
+    Stage stage({lamp(), ConstantLight{even(0.2f)}});
+    const TurningBall ball(angle);
+    stage.scene.region = &ball;
+    stage.scene.bands_per_view = 2;
+    stage.scene.bands_per_bounce = 1;
+    std::vector<Mean> means;
+    for (const DirectLight direct : {DirectLight::both, DirectLight::lights, DirectLight::material}) {
+      ShadingSettings settings;
+      settings.direct = direct;
+      settings.max_depth = 2;
+      settings.indirect_clamp = 0;
+      means.push_back(seen(stage.scene, settings, {1, -3, 0.4}, {0.05, 0.1, -0.8}, 60000));
+    }
+    for (std::size_t i = 1; i < means.size(); ++i)
+      EXPECT_NEAR(means[i].mean(), means[0].mean(), 4.5 * std::hypot(means[i].error(), means[0].error())) << i;
+  }
+}
+
+TEST(BendingRegionTest, BandsThatAreFollowedStandForAll) {
+  Stage stage({lamp(), ConstantLight{even(0.2f)}});
+  const TurningBall ball(0.4, 1.5);
+  stage.scene.region = &ball;
+  std::vector<Mean> means;
+  for (const int count : {1, 2, 4}) {
+    stage.scene.bands_per_view = stage.scene.bands_per_bounce = count;
+    means.push_back(seen(stage.scene, {}, {0, -3, 0.7}, {0, 0, 0.02}, 40000));
+  }
+  for (std::size_t i = 1; i < means.size(); ++i)
+    EXPECT_NEAR(means[i].mean(), means[0].mean(), 4.5 * std::hypot(means[i].error(), means[0].error())) << i;
+}
+
+/// Rays that are shaded together are followed together, and see what each of them sees alone, bit for bit.
+TEST(BendingRegionTest, WhatARaySeesDoesNotDependOnTheOthers) {
+  Stage stage({lamp(), ConstantLight{even(0.2f)}});
+  const TurningBall ball(0.4, 1.5);
+  stage.scene.region = &ball;
+  stage.scene.bands_per_view = 2;
+  stage.scene.group_of_light = {0, 1};
+  stage.scene.groups = 2;
+  std::vector<ViewRay> rays;
+  for (std::uint64_t i = 0; i < 300; ++i) {
+    const Vector3d from(0.2, -3, 0.7),
+        to(0.006 * static_cast<double>(i) - 0.9, 0, 0.3 - 0.003 * static_cast<double>(i));
+    rays.push_back({from, (to - from).normalized(), {3, i / 4, static_cast<std::uint32_t>(i % 4), 0}});
+  }
+  RayShader together(stage.scene, {}), alone(stage.scene, {});
+  together.shade(rays, true);
+  int bent = 0;
+  for (std::size_t i = 0; i < rays.size(); ++i) {
+    alone.shade({rays[i]}, true);
+    EXPECT_TRUE((together.radiance(i) == alone.radiance(0)).all()) << i;
+    for (int group = 0; group < 2; ++group) EXPECT_TRUE((together.layer(i, group) == alone.layer(0, group)).all()) << i;
+    const RayView &view = together.view(i), &other = alone.view(0);
+    ASSERT_EQ(view.bent.has_value(), other.bent.has_value());
+    ASSERT_EQ(view.surface.has_value(), other.surface.has_value());
+    if (view.surface) {
+      EXPECT_EQ(view.surface->hit.position, other.surface->hit.position);
+    }
+    if (!view.bent) continue;
+    EXPECT_EQ(view.bent->deflection, other.bent->deflection);
+    ++bent;
+  }
+  EXPECT_GT(bent, 50);
+  EXPECT_LT(bent, 290);
+}
+
+/// A directional light reaches no surface through the region, because landed light has it; the camera still sees it.
+TEST(BendingRegionTest, AnIrradianceMapReplacesTheSunBehindTheRegion) {
+  DirectionalLight sun;
+  sun.irradiance = even(2);
+  Stage stage({sun});
+  const TurningBall ball(0.1);
+  stage.scene.region = &ball;
+  const auto radiance = [&](const Vector3d& to) { return seen(stage.scene, {}, {0, -3, 1}, to, 100).mean(); };
+  const Vector3d below(0.1, 0.1, -0.8), beside(0.9, 0.1, -0.8);
+  EXPECT_EQ(radiance(below), 0);
+  EXPECT_NEAR(radiance(beside), 2 * 0.6 / pi, 1e-6);
+
+  IrradianceMap landed;
+  landed.plate.center = {0, 0, -0.8};
+  landed.plate.resolution = {4, 4};
+  landed.bands = bands;
+  landed.irradiance.assign(16 * bands, 3);
+  stage.scene.irradiance_maps = {landed};
+  EXPECT_NEAR(radiance(below), 3 * 0.6 / pi, 1e-6);
+  stage.scene.irradiance_maps[0].side = -1;
+  EXPECT_EQ(radiance(below), 0);
+}
+
+/// A room that emits, about the ball. Every surface sends on half of the light, in all bands alike.
+TEST(BendingRegionTest, BentLightIsLimitedInAllBandsAlike) {
+  TriangleMesh room = box_mesh({Vector3d(-1, -1, -1), Vector3d(1, 1, 1)}, Eigen::Affine3d::Identity());
+  for (auto& triangle : room.triangles) std::swap(triangle[1], triangle[2]);  // They face inwards.
+  const AreaLight walls{room, even(8)};
+  ShadedSurface surface;
+  surface.shape = room;
+  surface.light = 0;
+  const std::vector<Material> materials{make_material(Diffuse{}, BandValues::Constant(bands, 0.5))};
+  const SurfaceScene surfaces({surface});
+  const LightSampler lights({walls}, {0.3f, 0.5f, 0.15f, 0.05f}, surfaces.bounds());
+  ShadedScene scene{surfaces, materials, lights, colors()};
+  const TurningBall ball(0.7);
+  scene.region = &ball;
+  ShadingSettings settings;
+  settings.direct = DirectLight::material;  // Each contribution is 8 / 2^depth.
+  settings.roulette_depth = 100;
+  settings.max_depth = 3;
+  settings.indirect_clamp = 0.5;
+  for (const int count : {1, 2, 4}) {
+    scene.bands_per_view = scene.bands_per_bounce = count;
+    EXPECT_NEAR(seen(scene, settings, {0.9, 0.1, 0.3}, {0, 0, 0.1}, 200).mean(), 8 + 4 + 0.5 + 0.5, 1e-6) << count;
+  }
+}
+
+}  // namespace
+}  // namespace tensorray

@@ -1,0 +1,302 @@
+#include "renderer/lights/lights.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <stdexcept>
+#include <string>
+
+#include <gtest/gtest.h>
+
+#include "base/constants.h"
+#include "renderer/sampling/random.h"
+#include "renderer/sampling/sampling.h"
+#include "tests/renderer/statistics.h"
+#include "tests/renderer/support.h"
+
+namespace tensorray {
+namespace {
+
+using Eigen::Vector2d;
+using Eigen::Vector3d;
+
+const Eigen::AlignedBox3d unit_scene(Vector3d(-1, -1, -1), Vector3d(1, 1, 1));
+
+/// A light of one band, 2 by 1.2, above the origin and tilted; it emits downwards.
+AreaLight lamp(float radiance) {
+  const Vector3d right(0.8, 0, -0.6), up(0, -1, 0);
+  return {rectangle_mesh({0.3, -0.2, 1.5}, right, up, {2, 1.2}), {radiance}};
+}
+
+/// Lambert's formula (Schröder and Hanrahan 1993, "On the Form Factor Between Two Polygons"): the irradiance from a
+/// polygon of radiance 1 that is completely above the horizon of the surface.
+double polygon_irradiance(const std::vector<Vector3d>& polygon, const Vector3d& point, const Vector3d& normal) {
+  double sum = 0;
+  for (std::size_t i = 0; i < polygon.size(); ++i) {
+    const Vector3d a = (polygon[i] - point).normalized(), b = (polygon[(i + 1) % polygon.size()] - point).normalized();
+    sum += std::acos(a.dot(b)) * a.cross(b).normalized().dot(normal) / 2;
+  }
+  return std::abs(sum);
+}
+
+/// The irradiance of a surface without occluders, estimated as a renderer would do it.
+Mean irradiance(const LightSampler& lights, const Vector3d& point, const Vector3d& normal, std::size_t band = 0,
+                int samples = 20000) {
+  Mean mean;
+  LightSample sample;
+  for (int i = 0; i < samples; ++i) {
+    const Vector2d u(random_uniform(1, i, 1), random_uniform(1, i, 2));
+    const bool found = lights.sample(point, u, sample);
+    mean.add(found ? sample.radiance[band] * std::max(0.0, sample.direction.dot(normal)) / sample.pdf : 0);
+  }
+  return mean;
+}
+
+/// A picture with a bright spot on a dim background.
+EnvironmentLight sky(int bands) {
+  EnvironmentLight light;
+  light.picture = Image(16, 8, {"Y"});
+  for (int i = 0; i < 16 * 8; ++i) light.picture.pixels[i] = 0.2f + 0.1f * static_cast<float>(i % 7);
+  *light.picture.pixel(3, 2) = 50;
+  light.channel_spectra = Eigen::MatrixXf::Ones(bands, 1);
+  return light;
+}
+
+TEST(AreaLight, IrradianceIsThatOfLambertsFormula) {
+  const AreaLight light = lamp(3);
+  const LightSampler lights({light}, {1}, unit_scene);
+  for (const Vector3d& normal : {Vector3d(0, 0, 1), Vector3d(0.2, -0.1, 1).normalized()})
+    for (const Vector3d& point : {Vector3d(0, 0, 0), Vector3d(0.4, -0.7, -1), Vector3d(-0.5, 0.5, 0.2)}) {
+      const double exact = 3 * polygon_irradiance(light.mesh.vertices, point, normal);
+      const Mean mean = irradiance(lights, point, normal);
+      EXPECT_NEAR(mean.mean(), exact, 4 * mean.error());
+      EXPECT_LT(mean.error(), 0.01 * exact);
+    }
+}
+
+TEST(AreaLight, ShinesFromItsFrontOnlyUnlessBothSidesDo) {
+  AreaLight light = lamp(3);
+  const Vector3d above(0.3, -0.2, 3), down(0, 0, -1), normal(-0.6, 0, -0.8);
+  EXPECT_EQ(irradiance(LightSampler({light}, {1}, unit_scene), above, down).mean(), 0);
+  const LightSampler one({light}, {1}, unit_scene);
+  EXPECT_EQ(one.area_pdf(0, above, {0.3, -0.2, 1.5}, normal), 0);
+  EXPECT_EQ(one.emitted(0, normal, down), nullptr);
+  ASSERT_NE(one.emitted(0, normal, -down), nullptr);
+  EXPECT_EQ(*one.emitted(0, normal, -down), std::vector<float>{3});
+}
+
+TEST(AreaLight, SamplesLieOnTheMeshEvenly) {
+  // A strip of triangles of unequal areas. Positions are computed from the sampled direction and distance.
+  AreaLight light;
+  light.radiance = {1};
+  light.mesh.vertices = {{0, 0, 2}, {0, 1, 2}, {0.25, 0, 2}, {1, 1, 2}, {1, 0, 2}};
+  light.mesh.triangles = {{0, 1, 2}, {2, 1, 3}, {2, 3, 4}};
+  const LightSampler lights({light}, {1}, unit_scene);
+  std::vector<int> counts(16 * 16);
+  LightSample sample;
+  const Vector3d point(0.2, 0.4, -1);
+  for (int i = 0; i < 50000; ++i) {
+    const Vector2d u(random_uniform(2, i, 1), random_uniform(2, i, 2));
+    ASSERT_TRUE(lights.sample(point, u, sample));
+    EXPECT_FALSE(sample.is_delta);
+    const Vector3d p = point + sample.distance * sample.direction;
+    EXPECT_NEAR(p.z(), 2, 1e-14);
+    ++counts[static_cast<int>(p.x() * 16) * 16 + static_cast<int>(p.y() * 16)];
+    EXPECT_NEAR(sample.pdf, lights.area_pdf(0, point, p, {0, 0, -1}), 1e-12 * sample.pdf);
+  }
+  EXPECT_LT(std::abs(chi_square_score(counts)), 4);
+}
+
+TEST(AreaLight, DensityIntegratesToOne) {
+  const LightSampler lights({lamp(1), lamp(3)}, {1}, unit_scene);
+  const Vector3d point(0, 0, 0.3), center(0.3, -0.2, 1.5), right(0.8, 0, -0.6), up(0, -1, 0);
+  const Vector3d normal = right.cross(up);
+  constexpr int rows = 1000;
+  double sum = 0;
+  for (int y = 0; y < rows; ++y)
+    for (int x = 0; x < 2 * rows; ++x) {
+      const Vector3d d = square_to_sphere({(y + 0.5) / rows, (x + 0.5) / (2 * rows)});
+      const double distance = (center - point).dot(normal) / d.dot(normal);
+      const Vector3d position = point + distance * d, p = position - center;
+      if (distance > 0 && std::abs(p.dot(right)) < 1 && std::abs(p.dot(up)) < 0.6)
+        sum += lights.area_pdf(1, point, position, normal);
+    }
+  EXPECT_NEAR(sum * 2 * pi / rows / rows, 0.75, 0.75 * 5e-3);  // Cells at the border count either fully or not at all.
+}
+
+/// Adds a rectangle of 10 × 10 × 2 triangles, lit below, about (0, 0, height).
+void add_fine_rectangle(double height, TriangleMesh& mesh) {
+  for (int y = 0; y < 10; ++y)
+    for (int x = 0; x < 10; ++x) {
+      const TriangleMesh part =
+          rectangle_mesh({0.1 * x - 0.45, 0.1 * y - 0.45, height}, {1, 0, 0}, {0, -1, 0}, {0.1, 0.1});
+      const auto first = static_cast<std::uint32_t>(mesh.vertices.size());
+      mesh.vertices.insert(mesh.vertices.end(), part.vertices.begin(), part.vertices.end());
+      for (const auto& [a, b, c] : part.triangles) mesh.triangles.push_back({first + a, first + b, first + c});
+    }
+}
+
+/// Lamps of many triangles are searched; each that a ray meets counts, not only the nearest.
+TEST(AreaLight, DensityOfADirectionDoesNotDependOnTheNumberOfTriangles) {
+  AreaLight fine{{}, {1}}, near{rectangle_mesh({0, 0, 1}, {1, 0, 0}, {0, -1, 0}, {1, 1}), {1}}, far = near;
+  add_fine_rectangle(1, fine.mesh);
+  add_fine_rectangle(2, fine.mesh);
+  for (Vector3d& vertex : far.mesh.vertices) vertex.z() = 2;
+  const LightSampler many({fine}, {1}, unit_scene), few({near, far}, {1}, unit_scene);
+  int both = 0, one = 0;
+  for (int i = 0; i < 10000; ++i) {
+    const Vector3d point(random_uniform(7, i, 1) - 0.5, random_uniform(7, i, 2) - 0.5, i % 50 == 0 ? 100 * -i : 0.3);
+    const Vector3d at(1.6 * random_uniform(7, i, 3) - 0.8, 1.6 * random_uniform(7, i, 4) - 0.8, 1);
+    const Vector3d direction = (at - point).normalized();
+    const double expected = few.direction_pdf(point, direction);
+    EXPECT_NEAR(many.direction_pdf(point, direction), expected, 1e-6 * expected);
+    const Vector3d there = point + (2 - point.z()) / direction.z() * direction;  // In the plane of the far one.
+    (there.head<2>().lpNorm<Eigen::Infinity>() < 0.5 ? both : one) += expected > 0 ? 1 : 0;
+  }
+  EXPECT_GT(both, 1000);
+  EXPECT_GT(one, 100);
+}
+
+TEST(DirectionalLight, ParallelLightIsADelta) {
+  const LightSampler lights({DirectionalLight{{0, 3, -4}, {5, 7}, 0}}, {1, 1}, unit_scene);
+  LightSample sample;
+  ASSERT_TRUE(lights.sample({1, 2, 3}, {0.1, 0.2}, sample));
+  EXPECT_TRUE(sample.is_delta);
+  EXPECT_EQ(sample.pdf, 1);
+  EXPECT_LT((sample.direction - Vector3d(0, -0.6, 0.8)).norm(), 1e-15);
+  EXPECT_EQ(sample.radiance, (std::vector<float>{5, 7}));
+  EXPECT_TRUE(std::isinf(sample.distance));
+  EXPECT_EQ(lights.background_pdf(sample.direction), 0);
+  std::vector<float> radiance;
+  lights.background(sample.direction, radiance);
+  EXPECT_EQ(radiance, (std::vector<float>{0, 0}));
+}
+
+TEST(DirectionalLight, ADiskGivesItsIrradiance) {
+  const Vector3d to_light(0, -0.6, 0.8);
+  for (const double angle : {1e-6, 0.00465, 0.3, pi / 2}) {
+    const LightSampler lights({DirectionalLight{-to_light, {5}, angle}}, {1}, unit_scene);
+    const Mean facing = irradiance(lights, Vector3d::Zero(), to_light);
+    EXPECT_NEAR(facing.mean(), 5, 4 * facing.error() + 1e-5) << angle;
+    if (angle > 0.5) continue;
+    // A uniform disk that is completely above the horizon has the same effect as a point light at its centre.
+    const Mean tilted = irradiance(lights, Vector3d::Zero(), {0, 0, 1});
+    EXPECT_NEAR(tilted.mean(), 5 * 0.8, 4 * tilted.error() + 1e-5) << angle;
+    LightSample sample;
+    ASSERT_TRUE(lights.sample(Vector3d::Zero(), {0.99, 0.3}, sample));
+    EXPECT_FALSE(sample.is_delta);
+    EXPECT_NEAR(sample.pdf * cone_solid_angle(angle), 1, 1e-12);
+    EXPECT_EQ(lights.background_pdf(to_light), 1 / cone_solid_angle(angle));
+  }
+}
+
+TEST(ConstantLight, IsLeftToTheMaterial) {
+  for (const bool has_other : {false, true}) {
+    std::vector<Light> list{ConstantLight{{2, 0.5f}}};
+    if (has_other) list.emplace_back(DirectionalLight{{0, 0, -1}, {1, 1}, 0.1});
+    const LightSampler lights(list, {1, 1}, unit_scene);
+    LightSample sample;
+    EXPECT_EQ(lights.sample(Vector3d::Zero(), {0.5, 0.5}, sample), has_other);
+    EXPECT_EQ(lights.choice_probability(0), 0);
+    EXPECT_EQ(lights.background_pdf({0.6, 0, 0.8}), 0);
+    std::vector<float> radiance;
+    lights.background({0.6, 0, 0.8}, radiance);
+    EXPECT_EQ(radiance, (std::vector<float>{2, 0.5f}));
+  }
+}
+
+TEST(LightSampler, IrradianceOfAllLightsIsTheSum) {
+  const Vector3d point(0.1, 0.2, -0.3), normal = Vector3d(0.1, 0, 1).normalized();
+  const AreaLight area = lamp(3);
+  const DirectionalLight parallel{{0, 0.6, -0.8}, {0.7f}, 0}, sun{{0.6, 0, -0.8}, {1.5f}, 0.05};
+  const LightSampler lights({area, parallel, sun, ConstantLight{{0.25f}}, sky(1)}, {1}, unit_scene);
+
+  EnvironmentMap map(sky(1), {1});
+  constexpr int rows = 1000;
+  double from_sky = 0, background_density = 0;
+  std::vector<float> radiance{0};
+  for (int y = 0; y < rows; ++y)
+    for (int x = 0; x < 2 * rows; ++x) {
+      const Vector3d d = square_to_sphere({(y + 0.5) / rows, (x + 0.5) / (2 * rows)});
+      radiance[0] = 0;
+      map.add_radiance(d, radiance);
+      from_sky += radiance[0] * std::max(0.0, d.dot(normal)) * 2 * pi / rows / rows;
+      background_density += lights.background_pdf(d) * 2 * pi / rows / rows;
+    }
+  const double exact = 3 * polygon_irradiance(area.mesh.vertices, point, normal) +
+                       0.7 * -parallel.direction.dot(normal) + 1.5 * -sun.direction.dot(normal) + 0.25 * pi + from_sky;
+  const Mean mean = irradiance(lights, point, normal, 0, 100000);
+  EXPECT_NEAR(mean.mean(), exact, 4 * mean.error() + 1e-4 * exact);
+  EXPECT_LT(mean.error(), 0.01 * exact);
+
+  const double chosen = lights.choice_probability(2) + lights.choice_probability(3) + lights.choice_probability(4);
+  EXPECT_NEAR(background_density, chosen, 0.01 * chosen);
+  EXPECT_NEAR(chosen + lights.choice_probability(0) + lights.choice_probability(1), 1, 1e-14);
+}
+
+TEST(LightSampler, SampledBackgroundIsWhatARayWouldSee) {
+  const LightSampler lights({DirectionalLight{{0.6, 0, -0.8}, {1.5f}, 0.05}, ConstantLight{{0.25f}}, sky(1)}, {1},
+                            unit_scene);
+  LightSample sample;
+  std::vector<float> radiance;
+  for (int i = 0; i < 1000; ++i) {
+    const Vector2d u(random_uniform(3, i, 1), random_uniform(3, i, 2));
+    ASSERT_TRUE(lights.sample(Vector3d::Zero(), u, sample));
+    lights.background(sample.direction, radiance);
+    EXPECT_EQ(radiance, sample.radiance);
+    EXPECT_EQ(lights.background_pdf(sample.direction), sample.pdf);
+    EXPECT_TRUE(std::isinf(sample.distance));
+  }
+}
+
+TEST(LightSampler, ChoosesByPower) {
+  // The bounding sphere of the scene has the radius √3 and the cross section 3 π.
+  const double lamp_power = pi * 2.4 * 3, parallel_power = 3 * pi * 2, point_power = 4 * pi * 0.1;
+  const LightSampler lights({lamp(3), DirectionalLight{{0, 0, -1}, {2}, 0}, PointLight{{0, 0, 3}, {0.1f}}, lamp(0)},
+                            {1}, unit_scene);
+  const double sum = lamp_power + parallel_power + point_power;
+  EXPECT_NEAR(lights.choice_probability(0), lamp_power / sum, 1e-7);
+  EXPECT_NEAR(lights.choice_probability(1), parallel_power / sum, 1e-7);
+  EXPECT_NEAR(lights.choice_probability(2), point_power / sum, 1e-7);
+  EXPECT_EQ(lights.choice_probability(3), 0);
+}
+
+TEST(LightSampler, PowerIsLuminanceAboveAll) {
+  // One light in a band that is hardly visible, one in a bright band.
+  const LightSampler lights({PointLight{{0, 0, 1}, {1, 0}}, PointLight{{0, 0, 1}, {0, 1}}}, {0, 2}, unit_scene);
+  EXPECT_NEAR(lights.choice_probability(0), 0.05, 1e-7);
+  EXPECT_NEAR(lights.choice_probability(1), 0.95, 1e-7);
+}
+
+TEST(LightSampler, NoLightIsDark) {
+  const LightSampler lights({}, {1, 1}, {});
+  LightSample sample;
+  EXPECT_FALSE(lights.sample(Vector3d::Zero(), {0.5, 0.5}, sample));
+  EXPECT_EQ(lights.background_pdf({0, 0, 1}), 0);
+  std::vector<float> radiance;
+  lights.background({0, 0, 1}, radiance);
+  EXPECT_EQ(radiance, (std::vector<float>{0, 0}));
+}
+
+TEST(LightSampler, NamesTheLightThatIsWrong) {
+  const auto error = [](const Light& light) {
+    return message([&] { LightSampler({ConstantLight{{1, 1}}, light}, {1, 1}, unit_scene); });
+  };
+  EXPECT_EQ(error(ConstantLight{{1}}), "light 1: radiance must have a finite value >= 0 for each of the 2 bands");
+  EXPECT_THROW(LightSampler({ConstantLight{{1}}}, {0}, unit_scene), std::invalid_argument);
+  const auto is_named = [&](const Light& light, const std::string& what) {
+    EXPECT_EQ(error(light).find("light 1: "), 0u) << error(light);
+    EXPECT_NE(error(light).find(what), std::string::npos) << error(light);
+  };
+  is_named(ConstantLight{{1, NAN}}, "radiance");
+  is_named(AreaLight{{}, {1, 1}}, "triangles");
+  is_named(AreaLight{{{{0, 0, 0}, {1, 0, 0}, {2, 0, 0}}, {{0, 1, 2}}}, {1, 1}}, "area");
+  is_named(AreaLight{lamp(1).mesh, {1, -1}}, "radiance");
+  is_named(DirectionalLight{{0, 0, 0}, {1, 1}, 0}, "direction");
+  is_named(DirectionalLight{{0, 0, 1}, {1}, 0}, "irradiance");
+  is_named(DirectionalLight{{0, 0, 1}, {1, 1}, 2}, "angle");
+  is_named(sky(1), "bands");
+}
+
+}  // namespace
+}  // namespace tensorray

@@ -1,0 +1,141 @@
+#include "renderer/materials/microfacet.h"
+
+#include <cmath>
+#include <complex>
+#include <stdexcept>
+
+#include <gtest/gtest.h>
+
+#include "base/constants.h"
+#include "renderer/materials/rough_conductor.h"
+#include "renderer/sampling/random.h"
+#include "tests/renderer/support.h"
+
+namespace tensorray {
+namespace {
+
+Eigen::Vector3d direction(double cosine, double azimuth) {
+  const double sine = std::sqrt(1 - cosine * cosine);
+  return {sine * std::cos(azimuth), sine * std::sin(azimuth), cosine};
+}
+
+/// ∫ over the hemisphere by the midpoint rule. Steps are small near the pole, where highlights are.
+template <class Function>
+double hemisphere(const Function& function) {
+  constexpr int rows = 1000, columns = 200;
+  double sum = 0;
+  for (int row = 0; row < rows; ++row)
+    for (int column = 0; column < columns; ++column) {
+      const double t = (row + 0.5) / rows;
+      sum += 2 * t * function(direction(1 - t * t, (column + 0.5) / columns * 2 * pi));
+    }
+  return sum * 2 * pi / rows / columns;
+}
+
+TEST(MicrofacetTest, FacetsCoverTheSurface) {
+  for (const double alpha : {0.1, 0.4, 1.0})
+    EXPECT_NEAR(hemisphere([&](const Eigen::Vector3d& m) { return ggx_facets(alpha, m) * m.z(); }), 1, 1e-4) << alpha;
+}
+
+TEST(MicrofacetTest, VisibleFacetsAreADistribution) {
+  for (const double alpha : {0.1, 0.4, 1.0})
+    for (const double cosine : {1.0, 0.6, 0.1}) {
+      const Eigen::Vector3d wo = direction(cosine, 0.3);
+      EXPECT_NEAR(hemisphere([&](const Eigen::Vector3d& m) { return ggx_visible_pdf(alpha, wo, m); }), 1, 1e-3)
+          << alpha << " " << cosine;
+    }
+}
+
+TEST(MicrofacetTest, ReflectionIsItsDensityTimesShadowing) {
+  for (const double alpha : {0.0004, 0.3, 1.0})
+    for (const double cosine : {1.0, 0.5, 1e-4}) {
+      const Eigen::Vector3d wo = direction(cosine, 0), wi = direction(0.4, 2);
+      const GgxReflection there = ggx_reflection(alpha, wi, wo);
+      EXPECT_NEAR(there.f * wi.z() / (there.pdf * ggx_shadowing(alpha, wo.z(), wi.z())), 1, 1e-12);
+      EXPECT_NEAR(there.f / ggx_reflection(alpha, wo, wi).f, 1, 1e-12);
+    }
+}
+
+TEST(MicrofacetTest, DielectricFresnelHasItsClosedForms) {
+  EXPECT_NEAR(fresnel_dielectric(1, 1.5), 0.04, 1e-15);
+  EXPECT_NEAR(fresnel_dielectric(1, 1 / 1.5), 0.04, 1e-15);
+  EXPECT_EQ(fresnel_dielectric(0.7, 1), 0);
+  EXPECT_NEAR(fresnel_dielectric(0, 1.5), 1, 1e-15);
+  const double critical = std::sqrt(1 - 1 / (1.5 * 1.5));
+  EXPECT_EQ(fresnel_dielectric(critical - 1e-9, 1 / 1.5), 1);
+  EXPECT_LT(fresnel_dielectric(critical + 1e-3, 1 / 1.5), 1);
+  // At Brewster's angle only one polarisation is reflected, by ((n² - 1) / (n² + 1))².
+  const double n2 = 1.5 * 1.5;
+  EXPECT_NEAR(fresnel_dielectric(1 / std::sqrt(1 + n2), 1.5), std::pow((n2 - 1) / (n2 + 1), 2) / 2, 1e-15);
+}
+
+TEST(MicrofacetTest, ConductorFresnelIsThatOfComplexNumbers) {
+  const std::complex<double> indices[] = {{0.2, 3.3}, {1.3, 7.4}, {1.5, 0}, {0.05, 0.4}, {3, 1}};
+  for (const auto& index : indices)
+    for (const double cosine : {1.0, 0.8, 0.3, 0.01}) {
+      const std::complex<double> refracted = std::sqrt(1.0 - (1 - cosine * cosine) / (index * index));
+      const double across = std::norm((cosine - index * refracted) / (cosine + index * refracted));
+      const double along = std::norm((index * cosine - refracted) / (index * cosine + refracted));
+      EXPECT_NEAR(fresnel_conductor(cosine, index.real(), index.imag()), (across + along) / 2, 1e-12)
+          << index << " " << cosine;
+    }
+  for (const double cosine : {0.0, 1e-9, 0.5, 1.0}) EXPECT_EQ(fresnel_conductor(cosine, 0, 1), 1);
+}
+
+TEST(MicrofacetTest, MeansUnderUniformLight) {
+  EXPECT_NEAR(hemispherical_mean([](double) { return 1.0; }), 1, 1e-12);
+  EXPECT_NEAR(hemispherical_mean([](double cosine) { return fresnel_schlick(cosine, 0.3); }), 0.3 + 0.7 / 21, 1e-4);
+  EXPECT_NEAR(visible_mean(0.5, 0.3, [](const auto&, const auto&) { return 0.25; }), 0.25, 1e-12);
+  // With alpha 1 the facets have the normals of a hemisphere; from above they are visible by their cosine: ∫ cos² / π.
+  EXPECT_NEAR(visible_mean(1, 1, [](const auto&, const Eigen::Vector3d& m) { return m.z(); }), 2.0 / 3, 1e-3);
+}
+
+TEST(CosineTableTest, FollowsItsFunction) {
+  const auto function = [](double cosine) { return 0.2 + 0.5 * cosine * cosine; };
+  for (const double alpha : {0.0004, 0.1, 1.0}) {
+    const CosineTable table = make_cosine_table(alpha, function);
+    for (int i = 0; i <= 1000; ++i) EXPECT_NEAR(table.at(i / 1000.0), function(i / 1000.0), 1e-4);
+    EXPECT_NEAR(table.mean(), 0.45, 1e-4);
+    EXPECT_NEAR(hemisphere([&](const Eigen::Vector3d& w) { return table.pdf(w.z()); }), 1, 1e-3);
+    double sum = 0;
+    for (int i = 0; i < 4096; ++i) sum += std::pow(table.sample({sobol(1, i, 0), sobol(1, i, 1)}).z(), 2) / 4096;
+    EXPECT_NEAR(sum, (0.1 + 0.5 / 3) / 0.45, 1e-3);
+  }
+  EXPECT_EQ(make_cosine_table(1, [](double) { return 0.0; }).pdf(0.5), 0);
+}
+
+TEST(MetalTest, HasThePublishedValuesAndTheirMeans) {
+  const ConductorIndex gold = metal_index("gold", {548.6, (548.6 + 582.1) / 2, 100, 2000});
+  EXPECT_NEAR(gold.n[0], 0.43, 1e-12);
+  EXPECT_NEAR(gold.k[0], 2.455, 1e-12);
+  EXPECT_NEAR(gold.n[1], 0.36, 1e-12);
+  EXPECT_NEAR(gold.k[2], 1.871, 1e-12);
+  EXPECT_NEAR(gold.k[3], 5.663, 1e-12);
+}
+
+TEST(MetalTest, HaveTheirColours) {
+  const auto reflectance = [](const std::string& name, double wavelength) {
+    const ConductorIndex index = metal_index(name, {wavelength});
+    return fresnel_conductor(1, index.n[0], index.k[0]);
+  };
+  EXPECT_GT(reflectance("gold", 650), 0.95);
+  EXPECT_LT(reflectance("gold", 450), 0.45);
+  EXPECT_GT(reflectance("copper", 650), 0.92);
+  EXPECT_LT(reflectance("copper", 500), 0.62);
+  for (double wavelength = 400; wavelength <= 700; wavelength += 25)
+    EXPECT_GT(reflectance("silver", wavelength), 0.95) << wavelength;
+  // Handbook values for fresh evaporated films.
+  EXPECT_NEAR(reflectance("aluminium", 400), 0.924, 0.005);
+  EXPECT_NEAR(reflectance("aluminium", 550), 0.915, 0.005);
+  EXPECT_NEAR(reflectance("aluminium", 700), 0.897, 0.005);
+}
+
+TEST(MetalTest, UnknownNamesAreRefused) {
+  const std::string text = message([] { metal_index("gould", {500}); });
+  EXPECT_NE(text.find("gould"), std::string::npos);
+  for (const char* const name : {"gold", "silver", "copper", "aluminium"})
+    EXPECT_NE(text.find(name), std::string::npos) << name;
+}
+
+}  // namespace
+}  // namespace tensorray

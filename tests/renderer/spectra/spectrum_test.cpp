@@ -1,0 +1,235 @@
+#include "renderer/spectra/spectrum.h"
+
+#include <algorithm>
+#include <cmath>
+#include <fstream>
+#include <stdexcept>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "tests/data_folder.h"
+#include "tests/renderer/support.h"
+
+namespace tensorray {
+namespace {
+
+using ::testing::HasSubstr;
+
+/// The chromaticity of a light over the whole range of the observer.
+Eigen::Vector2d chromaticity(const Spectrum& light, int count = 1) {
+  Eigen::Vector3d xyz = Eigen::Vector3d::Zero();
+  for (const Band& band : make_bands(light, observer_min, observer_max, count)) xyz += band.xyz;
+  return xyz.head<2>() / xyz.sum();
+}
+
+void expect_near(const Eigen::Vector2d& actual, double x, double y, double tolerance) {
+  EXPECT_NEAR(actual.x(), x, tolerance);
+  EXPECT_NEAR(actual.y(), y, tolerance);
+}
+
+TEST(SpectrumTest, IsLinearBetweenSamplesAndZeroOutside) {
+  const Spectrum spectrum{{400, 500, 520}, {1, 3, 0}};
+  EXPECT_EQ(spectrum.at(399.999), 0);
+  EXPECT_EQ(spectrum.at(400), 1);
+  EXPECT_DOUBLE_EQ(spectrum.at(450), 2);
+  EXPECT_EQ(spectrum.at(500), 3);
+  EXPECT_DOUBLE_EQ(spectrum.at(510), 1.5);
+  EXPECT_EQ(spectrum.at(520), 0);
+  EXPECT_EQ(spectrum.at(521), 0);
+  const Spectrum line{{589}, {2}};
+  EXPECT_EQ(line.at(589), 2);
+  EXPECT_EQ(line.at(589.1), 0);
+}
+
+TEST(ObserverTest, FollowsTheTable) {
+  EXPECT_EQ(observer(555), Eigen::Vector3d(0.5120501, 1, 0.005749999));  // CIE 015.
+  EXPECT_EQ(observer(360).y(), 3.917e-06);
+  EXPECT_EQ(observer(830).y(), 4.5181e-07);
+  EXPECT_TRUE(observer(555.5).isApprox((observer(555) + observer(556)) / 2, 1e-14));
+  EXPECT_TRUE(observer(359.9).isZero());
+  EXPECT_TRUE(observer(830.1).isZero());
+}
+
+TEST(ObserverTest, ThreeFunctionsHaveEqualArea) {
+  // The CIE scaled them so that equal energy is white; the sum of ȳ at 1 nm is 106.857.
+  Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+  for (int wavelength = 360; wavelength <= 830; ++wavelength) sum += observer(wavelength);
+  EXPECT_NEAR(sum.x(), 106.8655, 1e-3);
+  EXPECT_NEAR(sum.y(), 106.8569, 1e-3);
+  EXPECT_NEAR(sum.z(), 106.8922, 1e-3);
+}
+
+TEST(ObserverTest, EqualsTheReferenceTable) {
+  const std::filesystem::path folder = test::data_folder();
+  std::ifstream file(folder / "../reference/cie1931_2deg_1nm.csv");
+  if (!file) GTEST_SKIP() << "no reference table beside " << folder;
+  std::string heading;
+  std::getline(file, heading);
+  double wavelength = 0, x = 0, y = 0, z = 0;
+  char comma = 0;
+  int rows = 0;
+  for (; file >> wavelength >> comma >> x >> comma >> y >> comma >> z; ++rows)
+    EXPECT_EQ(observer(wavelength), Eigen::Vector3d(x, y, z)) << wavelength;
+  EXPECT_EQ(rows, 471);
+}
+
+TEST(IlluminantTest, WhitePoints) {
+  expect_near(chromaticity(illuminant("D65")), 0.3127, 0.3290, 1e-4);
+  expect_near(chromaticity(illuminant("A")), 0.4476, 0.4074, 1e-4);
+  expect_near(chromaticity(illuminant("E")), 1 / 3.0, 1 / 3.0, 1e-4);
+}
+
+TEST(IlluminantTest, KnowsItsNames) {
+  for (const std::string& name : illuminant_names()) EXPECT_DOUBLE_EQ(illuminant(name).at(560), 100) << name;
+  EXPECT_THAT(message([] { illuminant("D50"); }), HasSubstr("\"D50\"; known: D65, E, A"));
+}
+
+TEST(BlackbodyTest, Chromaticities) {
+  // Points of the Planckian locus (CIE 1931).
+  expect_near(chromaticity(blackbody(6500)), 0.3135, 0.3237, 2e-4);
+  expect_near(chromaticity(blackbody(5000)), 0.3451, 0.3516, 2e-4);
+  expect_near(chromaticity(blackbody(2856)), 0.4476, 0.4074, 2e-4);
+  expect_near(chromaticity(blackbody(2000)), 0.5267, 0.4133, 2e-4);
+}
+
+TEST(BlackbodyTest, FollowsPlanckAtAllTemperatures) {
+  EXPECT_DOUBLE_EQ(blackbody(6500).at(560), 1);
+  // Wien's displacement: 2.897771955e6 nm K / 5000 K = 579.55 nm.
+  const Spectrum light = blackbody(5000);
+  const std::size_t peak = std::max_element(light.values.begin(), light.values.end()) - light.values.begin();
+  EXPECT_NEAR(light.wavelengths[peak], 579.55, 0.6);
+  for (const double kelvin : {100.0, 1000.0, 1e9})
+    for (const double value : blackbody(kelvin).values) ASSERT_TRUE(std::isfinite(value) && value >= 0) << kelvin;
+  EXPECT_NEAR(blackbody(1e9).at(400), std::pow(560 / 400.0, 4), 1e-4);  // Rayleigh and Jeans.
+  EXPECT_THROW(blackbody(0), std::invalid_argument);
+  EXPECT_THROW(blackbody(-1), std::invalid_argument);
+  EXPECT_THROW(blackbody(std::nan("")), std::invalid_argument);
+}
+
+TEST(BandsTest, SumsHoldForEveryCount) {
+  for (const std::string& name : illuminant_names())
+    for (const int count : {1, 2, 3, 7, 32, 89, 470, 1000}) {
+      double power = 0, luminance = 0, width = 0;
+      for (const Band& band : make_bands(illuminant(name), 380, 730, count)) {
+        power += band.power;
+        luminance += band.xyz.y();
+        width += band.width;
+        EXPECT_GT(band.wavelength, 380);
+        EXPECT_LT(band.wavelength, 730);
+      }
+      EXPECT_NEAR(power, 1, 1e-12);
+      EXPECT_NEAR(luminance, 1, 1e-12);
+      EXPECT_NEAR(width, 350, 1e-9);
+    }
+}
+
+TEST(BandsTest, ColorDoesNotDependOnTheCount) {
+  const Eigen::Vector2d one = chromaticity(illuminant("D65"), 1);
+  for (const int count : {2, 3, 32, 333, 1000})
+    EXPECT_TRUE(chromaticity(illuminant("D65"), count).isApprox(one, 1e-12)) << count;
+}
+
+TEST(BandsTest, EqualsAFineSum) {
+  // Midpoint rule with steps of 1e-3 nm; its error is second order, and first order only at jumps of the light.
+  const Spectrum light{{450.25, 500, 612.5}, {1, 4, 2}};
+  const std::vector<Band> bands = make_bands(light, 430, 650, 3);
+  double total = 0, total_y = 0;
+  std::vector<double> power(3), z(3);
+  for (int i = 0; i < 220000; ++i) {
+    const double wavelength = 430 + (i + 0.5) * 1e-3;
+    const int band = i * 3 / 220000;
+    power[band] += light.at(wavelength);
+    z[band] += light.at(wavelength) * observer(wavelength).z();
+    total += light.at(wavelength);
+    total_y += light.at(wavelength) * observer(wavelength).y();
+  }
+  for (int band = 0; band < 3; ++band) {
+    EXPECT_NEAR(bands[band].power, power[band] / total, 1e-5);
+    EXPECT_NEAR(bands[band].xyz.z(), z[band] / total_y, 1e-5);
+  }
+}
+
+TEST(BandsTest, BandsLieSideBySide) {
+  const std::vector<Band> bands = make_bands(illuminant("E"), 400, 700, 3);
+  ASSERT_EQ(bands.size(), 3u);
+  for (int i = 0; i < 3; ++i) {
+    EXPECT_DOUBLE_EQ(bands[i].wavelength, 450 + 100 * i);
+    EXPECT_DOUBLE_EQ(bands[i].width, 100);
+    EXPECT_NEAR(bands[i].power, 1 / 3.0, 1e-12);
+  }
+}
+
+TEST(BandsTest, MonochromaticLight) {
+  const std::vector<Band> bands = make_bands(Spectrum{{550}, {5}}, 550, 550, 1);
+  ASSERT_EQ(bands.size(), 1u);
+  EXPECT_EQ(bands[0].wavelength, 550);
+  EXPECT_EQ(bands[0].width, 1);
+  EXPECT_EQ(bands[0].power, 1);
+  EXPECT_TRUE(bands[0].xyz.isApprox(observer(550) / observer(550).y(), 1e-14));
+}
+
+TEST(BandsTest, RangesBeyondTheObserverAreAllowed) {
+  double power = 0, luminance = 0;
+  for (const Band& band : make_bands(illuminant("E"), 200, 1200, 10)) {
+    power += band.power;
+    luminance += band.xyz.y();
+  }
+  EXPECT_NEAR(power, 1, 1e-12);
+  EXPECT_NEAR(luminance, 1, 1e-12);
+}
+
+TEST(BandsTest, RefusesWhatHasNoLight) {
+  const Spectrum d65 = illuminant("D65");
+  EXPECT_THAT(message([&] { make_bands(d65, 400, 700, 0); }), HasSubstr("at least 1"));
+  EXPECT_THAT(message([&] { make_bands(d65, 700, 400, 8); }), HasSubstr("700 to 400"));
+  EXPECT_THAT(message([&] { make_bands(d65, -1, 400, 8); }), HasSubstr("-1 to 400"));
+  EXPECT_THAT(message([&] { make_bands(d65, 500, std::nan(""), 8); }), HasSubstr("min <= max"));
+  EXPECT_THAT(message([&] { make_bands(d65, 550, 550, 8); }), HasSubstr("550 nm"));
+  EXPECT_THAT(message([&] { make_bands(d65, 900, 1000, 8); }), HasSubstr("no power between 900 and 1000 nm"));
+  EXPECT_THAT(message([&] { make_bands(d65, 310, 340, 8); }), HasSubstr("no visible power between 310 and 340 nm"));
+  EXPECT_THAT(message([&] { make_bands(Spectrum{{400}, {1}}, 500, 500, 1); }), HasSubstr("no power at 500 nm"));
+  EXPECT_THROW(make_bands(d65, 400, 700, 0), std::invalid_argument);
+}
+
+TEST(ReadSpectrumTest, ReadsColumns) {
+  const std::vector<std::string> contents{
+      "400 1\n500 2.5e0\n600 0\n",
+      "# a lamp\nwavelength_nm,power\n400,1\n\n500, +2.5 # peak\r\n600,0",
+      "\xEF\xBB\xBFnm;value\r\n400;1\r\n500;2.5\r\n600;0\r\n",
+      "  400\t1\n\t500\t2.50\n600 0\n",
+  };
+  for (const std::string& content : contents) {
+    const Temporary file("good.csv", content);
+    const Spectrum spectrum = read_spectrum(file.path());
+    EXPECT_EQ(spectrum.wavelengths, (std::vector<double>{400, 500, 600})) << content;
+    EXPECT_EQ(spectrum.values, (std::vector<double>{1, 2.5, 0})) << content;
+  }
+}
+
+TEST(ReadSpectrumTest, ErrorsNameFileLineAndMend) {
+  const auto error = [](const std::string& content) {
+    const Temporary file("bad.csv", content);
+    const std::string text = message([&] { read_spectrum(file.path()); });
+    EXPECT_THAT(text, HasSubstr(file.path().string()));
+    return text;
+  };
+  EXPECT_THAT(error(""), HasSubstr("empty"));
+  EXPECT_THAT(error("# nothing\n"), HasSubstr("no samples"));
+  EXPECT_THAT(error("nm,value\n"), HasSubstr("no samples"));
+  EXPECT_THAT(error("400 1\n500\n"), HasSubstr("line 2: expected two columns"));
+  EXPECT_THAT(error("400 1 2\n"), HasSubstr("line 1: expected two columns"));
+  EXPECT_THAT(error("nm value\nmore words\n400 1\n"), HasSubstr("line 2: expected two numbers"));
+  EXPECT_THAT(error("400 1\n500 2x\n"), HasSubstr("line 2: expected two numbers"));
+  EXPECT_THAT(error("400 1\n400 2\n"), HasSubstr("line 2: wavelengths must increase"));
+  EXPECT_THAT(error("500 1\n400 2\n"), HasSubstr("line 2: wavelengths must increase"));
+  EXPECT_THAT(error("400 -1\n"), HasSubstr("line 1: the value must be finite and not negative"));
+  EXPECT_THAT(error("400 inf\n"), HasSubstr("line 1: the value must be finite and not negative"));
+  EXPECT_THAT(error("400 nan\n"), HasSubstr("line 1: the value must be finite and not negative"));
+  EXPECT_THAT(error("-400 1\n"), HasSubstr("line 1: the wavelength must be above 0"));
+  EXPECT_THAT(message([] { read_spectrum("/no/such.csv"); }), HasSubstr("/no/such.csv: no such file"));
+  EXPECT_THAT(message([] { read_spectrum(::testing::TempDir()); }), HasSubstr("folder"));
+}
+
+}  // namespace
+}  // namespace tensorray

@@ -1,0 +1,383 @@
+#include "renderer/surfaces/surface_scene.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <optional>
+#include <string>
+
+#include <gtest/gtest.h>
+
+#include "base/constants.h"
+#include "renderer/lights/lights.h"
+#include "renderer/meshes/mesh.h"
+#include "renderer/sampling/random.h"
+#include "renderer/sampling/sampling.h"
+#include "tests/renderer/support.h"
+
+namespace tensorray {
+namespace {
+
+using Eigen::Vector3d;
+using Eigen::Vector3f;
+
+Vector3d random_direction(int index) {
+  return square_to_sphere({random_uniform(7, index, 0), random_uniform(7, index, 1)});
+}
+
+Vector3d random_point(int index) {
+  return Vector3d(random_uniform(8, index, 0), random_uniform(8, index, 1), random_uniform(8, index, 2)) * 2 -
+         Vector3d::Ones();
+}
+
+/// Where a ray enters a box, or leaves it if it starts inside.
+struct BoxCrossing {
+  double distance;
+  Vector3d normal;
+};
+
+std::optional<BoxCrossing> cross_box(const Eigen::AlignedBox3d& box, const Vector3d& origin,
+                                     const Vector3d& direction) {
+  double enter = -std::numeric_limits<double>::infinity(), leave = -enter;
+  int enter_axis = 0, leave_axis = 0;
+  for (int axis = 0; axis < 3; ++axis) {
+    const double a = (box.min()[axis] - origin[axis]) / direction[axis];
+    const double b = (box.max()[axis] - origin[axis]) / direction[axis];
+    if (std::min(a, b) > enter) enter = std::min(a, b), enter_axis = axis;
+    if (std::max(a, b) < leave) leave = std::max(a, b), leave_axis = axis;
+  }
+  if (enter > leave || leave < 0) return std::nullopt;
+  const bool within = enter < 0;
+  const int axis = within ? leave_axis : enter_axis;
+  Vector3d normal = Vector3d::Zero();
+  normal[axis] = (direction[axis] > 0) == within ? 1 : -1;
+  return BoxCrossing{within ? leave : enter, normal};
+}
+
+ShadedSurface surface_of(TriangleMesh mesh) {
+  ShadedSurface surface;
+  surface.shape = std::move(mesh);
+  return surface;
+}
+
+/// A sphere of radius 1 with smooth normals; its colours and data are z.
+ShadedSurface sphere(int rings, const Vector3d& center = Vector3d::Zero()) {
+  TriangleMesh mesh;
+  ShadedSurface surface;
+  const auto around = static_cast<std::uint32_t>(2 * rings);
+  for (int ring = 0; ring <= rings; ++ring)
+    for (std::uint32_t i = 0; i < around; ++i) {
+      const double polar = pi * ring / rings, turn = 2 * pi * i / around;
+      const Vector3d n(std::sin(polar) * std::cos(turn), std::sin(polar) * std::sin(turn), std::cos(polar));
+      mesh.vertices.push_back(center + n);
+      surface.normals.push_back(n.cast<float>());
+    }
+  for (std::uint32_t ring = 0; ring < static_cast<std::uint32_t>(rings); ++ring)
+    for (std::uint32_t i = 0; i < around; ++i) {
+      const std::uint32_t a = ring * around + i, b = ring * around + (i + 1) % around;
+      if (ring > 0) mesh.triangles.push_back({a, a + around, b});
+      if (ring + 1 < static_cast<std::uint32_t>(rings)) mesh.triangles.push_back({a + around, b + around, b});
+    }
+  surface.shape = std::move(mesh);
+  return surface;
+}
+
+ShadedSurface curve(const std::vector<Vector3d>& points, const std::vector<float>& radii) {
+  ShadedSurface surface;
+  surface.shape = RoundCurves{points, radii, {static_cast<std::uint32_t>(points.size())}};
+  return surface;
+}
+
+TEST(SurfaceSceneTest, BoxIsMetWhereTheFormulaSays) {
+  // Also with small boxes far from the origin of the world, where single precision is not sufficient.
+  for (const double scale : {1.0, 1e-4, 1e4})
+    for (const Vector3d& shift : {Vector3d(0, 0, 0), Vector3d(300, -2000, 70)}) {
+      const Vector3d center = scale * shift;
+      const Eigen::AlignedBox3d box(center - scale * Vector3d(0.5, 0.6, 0.2), center + scale * Vector3d(0.5, 0.3, 0.7));
+      const SurfaceScene scene({surface_of(box_mesh(box, Eigen::Affine3d::Identity()))});
+      int hits = 0;
+      for (int i = 0; i < 2000; ++i) {
+        const double far = i % 3 == 0 ? 1000 : 1;
+        const Vector3d direction =
+            (random_direction(i) * 1e-3 * (far > 1) + random_direction(i) * (far == 1)).normalized();
+        const Vector3d origin = center + scale * (random_point(i) - (far > 1 ? far : 0) * direction);
+        const auto exact = cross_box(box, origin, direction);
+        const auto hit = scene.intersect(origin, direction);
+        // Rays along an edge may fall on either side of it.
+        const Eigen::AlignedBox3d inner(center + (box.min() - center) * (1 - 1e-5),
+                                        center + (box.max() - center) * (1 - 1e-5));
+        if (exact.has_value() != cross_box(inner, origin, direction).has_value()) continue;
+        ASSERT_EQ(hit.has_value(), exact.has_value()) << i;
+        if (!hit) continue;
+        ++hits;
+        if (hit->normal.dot(exact->normal) < 0.99) continue;  // Edges seen from inside.
+        EXPECT_NEAR(hit->distance, exact->distance, 2e-6 * scale);
+        EXPECT_NEAR((origin + hit->distance * direction - hit->position).norm(), 0, 2e-6 * scale);
+        EXPECT_NEAR((hit->normal - exact->normal).norm(), 0, 1e-9);
+        EXPECT_EQ(hit->shading_normal, hit->normal);
+      }
+      EXPECT_GT(hits, 500);
+    }
+}
+
+TEST(SurfaceSceneTest, BoxHasNoCracks) {
+  const Eigen::AlignedBox3d box(Vector3d(-1, -1, -1), Vector3d(1, 1, 1));
+  const SurfaceScene scene(
+      {surface_of(box_mesh(box, Eigen::Affine3d(Eigen::AngleAxisd(0.7, Vector3d(1, 2, 3) / std::sqrt(14.0)))))});
+  const auto& mesh = std::get<TriangleMesh>(scene.surfaces()[0].shape);
+  for (const auto& triangle : mesh.triangles)
+    for (int i = 0; i <= 200; ++i) {
+      const Vector3d edge =
+          mesh.vertices[triangle[0]] + i / 200.0 * (mesh.vertices[triangle[1]] - mesh.vertices[triangle[0]]);
+      EXPECT_TRUE(scene.occluded(Vector3d(0.1, 0.2, -0.1), (edge - Vector3d(0.1, 0.2, -0.1)).normalized()));
+    }
+}
+
+TEST(SurfaceSceneTest, StraightCurvesAreCylindersWithRoundEnds) {
+  const double radius = 0.1;
+  const SurfaceScene scene({curve({{0, 0, -1}, {0, 0, -0.3}, {0, 0, 0.2}, {0, 0, 1}}, std::vector<float>(4, 0.1f))});
+  int sides = 0, ends = 0;
+  for (int i = 0; i < 4000; ++i) {
+    const Vector3d target(0.3 * random_point(i).x(), 0.3 * random_point(i).y(), 1.3 * random_point(i).z());
+    const Vector3d direction = random_direction(i), origin = target - 3 * direction;
+    // The distance to the capsule, by sphere tracing.
+    double distance = 0, gap = 1;
+    const auto nearest = [](const Vector3d& p) { return Vector3d(0, 0, std::clamp(p.z(), -1.0, 1.0)); };
+    for (int step = 0; step < 500 && distance < 6 && gap > 1e-10; ++step) {
+      const Vector3d p = origin + distance * direction;
+      gap = (p - nearest(p)).norm() - radius;
+      distance += gap;
+    }
+    if (gap > 1e-10 && distance < 6) continue;  // The ray nearly touches the capsule: either result is correct.
+    const auto hit = scene.intersect(origin, direction);
+    if (distance >= 6) {
+      EXPECT_FALSE(hit) << i;
+      continue;
+    }
+    ASSERT_TRUE(hit) << i;
+    const Vector3d exact = origin + distance * direction, normal = (exact - nearest(exact)) / radius;
+    const double cosine = -normal.dot(direction);
+    EXPECT_NEAR(hit->distance, distance, 1e-6 / cosine) << i;
+    EXPECT_NEAR((hit->normal - normal).norm(), 0, 2e-5 / cosine) << i;
+    EXPECT_NEAR((hit->shading_normal - normal).norm(), 0, 2e-5 / cosine) << i;
+    (std::abs(exact.z()) > 1 ? ends : sides) += 1;
+  }
+  EXPECT_GT(sides, 300);
+  EXPECT_GT(ends, 20);
+}
+
+TEST(SurfaceSceneTest, TaperedCurvesAreCones) {
+  // Tangent to two spheres: the sine of the half angle of the cone is (r0 − r1) / length.
+  const SurfaceScene scene({curve({{0, 0, 0}, {0, 0, 1}}, {0.3f, 0.1f})});
+  const double sine = 0.2, cosine = std::sqrt(1 - sine * sine);
+  for (int i = 0; i < 200; ++i) {
+    const double t = 0.05 + 0.9 * random_uniform(3, i, 0), turn = 2 * pi * random_uniform(3, i, 1);
+    const Vector3d normal(cosine * std::cos(turn), cosine * std::sin(turn), sine);
+    const Vector3d point = Vector3d(0, 0, t) + (0.3 - 0.2 * t) * normal;
+    const auto hit = scene.intersect(point + normal, -normal);
+    ASSERT_TRUE(hit);
+    EXPECT_NEAR(hit->distance, 1, 2e-6);
+    EXPECT_NEAR((hit->normal - normal).norm(), 0, 1e-5);
+    EXPECT_NEAR((hit->shading_normal - normal).norm(), 0, 1e-5);
+  }
+}
+
+/// A quarter of a circle of radius 1 about the origin, in the plane z = 0.
+std::vector<Vector3d> arc(int segments) {
+  std::vector<Vector3d> points;
+  for (int i = 0; i <= segments; ++i) {
+    const double angle = pi / 2 * i / segments;
+    points.emplace_back(std::cos(angle), std::sin(angle), 0);
+  }
+  return points;
+}
+
+TEST(SurfaceSceneTest, BentCurvesHaveNoGapsAndSmoothNormals) {
+  const int segments = 12;
+  const SurfaceScene scene({curve(arc(segments), std::vector<float>(segments + 1, 0.05f))});
+  const double bend = pi / 2 / segments;
+  double faceted = 0, smooth = 0, count = 0;
+  for (int i = 0; i < 5000; ++i) {
+    const double angle = pi / 2 * random_uniform(4, i, 0);
+    const Vector3d axis(std::cos(angle), std::sin(angle), 0);
+    const Vector3d direction = random_direction(i);
+    const auto hit = scene.intersect(std::cos(bend / 2) * axis - 0.5 * direction, direction);
+    ASSERT_TRUE(hit) << i;
+    // Normals of the torus about the circle have no component along it; the ends are round.
+    const Vector3d center = Vector3d(hit->position.x(), hit->position.y(), 0).normalized();
+    const double at = std::atan2(center.y(), center.x());
+    if (at < bend || at > pi / 2 - bend) continue;
+    const Vector3d along = Vector3d::UnitZ().cross(center);
+    faceted += std::pow(along.dot(hit->normal), 2);
+    smooth += std::pow(along.dot(hit->shading_normal), 2);
+    count += 1;
+    EXPECT_GT(hit->shading_normal.dot(hit->position - center) / 0.05, 0.95);
+  }
+  // Normals of facets are off by up to bend / 2, uniformly. The spheres at the joints are not smoothed: a few percent.
+  EXPECT_NEAR(std::sqrt(faceted / count), bend / std::sqrt(12), 0.1 * bend);
+  EXPECT_LT(std::sqrt(smooth / count), 0.4 * std::sqrt(faceted / count));
+}
+
+TEST(SurfaceSceneTest, ConvexSurfacesDoNotShadowThemselves) {
+  std::vector<float> radii(4, 0.1f);
+  const SurfaceScene round({curve({{50, 0, -1}, {50, 0, -0.3}, {50, 0, 0.2}, {50, 0, 1}}, radii)});
+  const SurfaceScene box(
+      {surface_of(box_mesh({Vector3d(49, -1, -1), Vector3d(51, 1, 1)}, Eigen::Affine3d::Identity()))});
+  // A thin tube in a large scene.
+  ShadedSurface floor =
+      surface_of(box_mesh({Vector3d(-20, -20, -9), Vector3d(120, 20, -8)}, Eigen::Affine3d::Identity()));
+  const SurfaceScene thin(
+      {curve({{50, 0, -1}, {50, 0, -0.3}, {50, 0, 0.2}, {50, 0, 1}}, {0.02f, 0.02f, 0.02f, 0.02f}), floor});
+  for (const SurfaceScene* scene : {&round, &box, &thin}) {
+    int hits = 0;
+    for (int i = 0; i < 3000; ++i) {
+      const Vector3d target(50, 0, 1.2 * random_point(i).z()), from = target + 2.5 * random_direction(i);
+      const auto hit = scene->intersect(from, (target - from).normalized());
+      if (!hit || hit->surface == 1) continue;
+      ++hits;
+      const double side = hit->normal.dot(target - from) < 0 ? 1 : -1;
+      // Up to a tenth of a degree above the surface.
+      Vector3d out = random_direction(i + 5000);
+      if (out.dot(hit->normal) * side < 0) out = -out;
+      if (std::abs(out.dot(hit->normal)) < 2e-3) continue;
+      if (scene != &box || side > 0) {
+        EXPECT_FALSE(scene->occluded(scene->start(*hit, hit->position, side), out, 2)) << i;
+      }
+    }
+    EXPECT_GT(hits, 1000);
+  }
+}
+
+TEST(SurfaceSceneTest, RaysThatEnterASurfaceMeetItsFarSide) {
+  const SurfaceScene scene({sphere(24, {30, 10, 0})});
+  for (int i = 0; i < 1000; ++i) {
+    const Vector3d target = Vector3d(30, 10, 0) + 0.5 * random_point(i), direction = random_direction(i);
+    const auto hit = scene.intersect(target - 3 * direction, direction);
+    ASSERT_TRUE(hit);
+    ASSERT_LT(hit->normal.dot(direction), 0);
+    const auto inner = scene.intersect(scene.start(*hit, hit->position, -1), direction);
+    ASSERT_TRUE(inner);
+    EXPECT_GT(inner->normal.dot(direction), 0);
+    EXPECT_GT(inner->distance, 0.1);
+  }
+}
+
+TEST(SurfaceSceneTest, OccludersBehindTheTargetDoNotCount) {
+  const SurfaceScene scene({surface_of(rectangle_mesh({0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {2, 2}))});
+  const Vector3d down(0, 0, -1);
+  EXPECT_FALSE(scene.occluded({0.1, 0.2, 1}, down, 1));  // The surface hit is the target itself.
+  EXPECT_FALSE(scene.occluded({0.1, 0.2, 1}, down, 0.9));
+  EXPECT_TRUE(scene.occluded({0.1, 0.2, 1}, down, 1.01));
+  EXPECT_TRUE(scene.occluded({0.1, 0.2, 1}, down));
+  EXPECT_FALSE(scene.occluded({0.1, 0.2, 1}, -down));
+  EXPECT_TRUE(scene.occluded({0.1, 0.2, 1e7}, down));
+}
+
+TEST(SurfaceSceneTest, SmoothNormalsLiftPointsToTheSmoothSurface) {
+  const SurfaceScene scene({sphere(12)});
+  double flat = 0;
+  for (int i = 0; i < 500; ++i) {
+    const Vector3d direction = random_direction(i);
+    const auto outer = scene.intersect(-3 * direction, direction);
+    const auto inner = scene.intersect(Vector3d::Zero(), direction);
+    ASSERT_TRUE(outer && inner);
+    flat = std::max(flat, 1 - outer->position.norm());
+    EXPECT_NEAR((outer->shading_normal - outer->position.normalized()).norm(), 0, 0.03);
+    // The smooth surface is closer to the sphere than the triangles are, and never below them.
+    EXPECT_GE(outer->lifted_position.norm(), outer->position.norm());
+    EXPECT_LT(std::abs(outer->lifted_position.norm() - 1), 0.035);
+    EXPECT_NEAR((inner->lifted_position - inner->position).norm(), 0, 1e-12);  // From inside, the surface is concave.
+  }
+  EXPECT_GT(flat, 0.015);
+}
+
+TEST(SurfaceSceneTest, DataAreInterpolatedAndPathsAreCounted) {
+  ShadedSurface square = surface_of(rectangle_mesh({0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {2, 2}));
+  for (const Vector3d& p : std::get<TriangleMesh>(square.shape).vertices) {
+    square.colors.emplace_back(Vector3f(0.5f, 0.25f, 0.1f) * static_cast<float>(1 + p.x() / 2));
+    square.forces.push_back(static_cast<float>(3 + p.x() - p.y()));
+    square.arc_lengths.push_back(static_cast<float>(5 + 2 * p.y()));
+  }
+  square.path_ends = {0, 1, 1, 2};  // Two of the four paths have no triangles.
+  square.first_path = 10;
+  ShadedSurface curves;
+  curves.shape = RoundCurves{{{5, 0, 0}, {6, 0, 0}, {7, 0, 0}, {5, 1, 0}, {6, 1, 0}, {6, 1, 0}, {7, 1, 0}},
+                             std::vector<float>(7, 0.1f),
+                             {3, 3, 7}};
+  curves.forces = {0, 1, 2, 5, 6, 6, 7};
+  curves.strands_are_paths = true;
+  const SurfaceScene scene({square, surface_of({}), curves});
+
+  const auto data_at = [&](double x, double y) {
+    const auto hit = scene.intersect({x, y, 3}, {0, 0, -1});
+    EXPECT_TRUE(hit);
+    return scene.data(*hit);
+  };
+  const auto hit = scene.intersect({0.5, 0.25, 3}, {0, 0, -1});
+  ASSERT_TRUE(hit);
+  EXPECT_NEAR((hit->color - Vector3f(0.5f, 0.25f, 0.1f) * 1.25f).norm(), 0, 1e-6);
+  EXPECT_NEAR(*data_at(0.5, 0.25).force, 3.25, 1e-5);
+  EXPECT_NEAR(*data_at(0.5, 0.25).arc_length, 5.5, 1e-5);
+  EXPECT_EQ(data_at(0.5, 0.25).path, 11u);
+  EXPECT_EQ(data_at(-0.5, 0.25).path, 13u);
+  EXPECT_NEAR(*data_at(5.75, 0.02).force, 0.75, 1e-5);
+  EXPECT_FALSE(data_at(5.75, 0.02).arc_length);
+  EXPECT_EQ(data_at(6.5, 0).path, 0u);
+  EXPECT_EQ(data_at(6.5, 1).path, 2u);
+  EXPECT_NEAR(*data_at(6.5, 1).force, 6.5, 1e-5);  // After a point that occurs twice.
+}
+
+TEST(SurfaceSceneTest, NothingMeetsAnEmptyScene) {
+  const SurfaceScene scene({});
+  EXPECT_FALSE(scene.intersect({0, 0, 0}, {0, 0, 1}));
+  EXPECT_FALSE(scene.occluded({0, 0, 0}, {0, 0, 1}));
+  EXPECT_TRUE(scene.bounds().isEmpty());
+}
+
+/// Embree aborts the process on some rays; SurfaceScene must not pass them on.
+TEST(SurfaceSceneTest, RaysMayStartAnywhere) {
+  const SurfaceScene scene({surface_of(rectangle_mesh({0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {2, 2}))});
+  const Vector3d down(0, 0, -1);
+  for (const double far : {1e3, 1e9}) {
+    EXPECT_NEAR(scene.intersect({0.3, 0.2, far}, down)->distance, far, 1e-6 + 1e-15 * far);
+    EXPECT_TRUE(scene.occluded({0.3, 0.2, far}, down));
+  }
+  const double nan = std::nan(""), infinite = std::numeric_limits<double>::infinity();
+  for (const double far : {1e20, 1e40, 1e200, 1e300, infinite, nan})
+    for (const Vector3d& from : {Vector3d(far, 0, 0), Vector3d(0.3, 0.2, far), Vector3d(far, -far, far)})
+      for (const Vector3d& direction : {down, Vector3d(0.6, 0, -0.8), Vector3d(nan, 0, 1)}) {
+        const auto hit = scene.intersect(from, direction);  // Any result is correct, but the call must return.
+        const bool shadowed = scene.occluded(from, direction, 1e300);
+        if (from.x() == far || !direction.allFinite()) {
+          EXPECT_FALSE(hit);
+          EXPECT_FALSE(shadowed);
+        }
+      }
+}
+
+TEST(SurfaceSceneTest, BadSurfacesAreNamed) {
+  const ShadedSurface good = surface_of(rectangle_mesh({0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {2, 2}));
+  const auto error = [&](const ShadedSurface& bad) { return message([&] { SurfaceScene({good, bad}); }); };
+  ShadedSurface bad = good;
+  bad.forces = {1, 2};
+  EXPECT_EQ(error(bad), "surface 1: there must be no forces, or a finite one for each point");
+  bad = good;
+  std::get<TriangleMesh>(bad.shape).triangles.push_back({0, 1, 4});
+  EXPECT_EQ(error(bad), "surface 1: a triangle has a corner that is none of the vertices");
+  bad = good;
+  std::get<TriangleMesh>(bad.shape).vertices[0].x() = std::nan("");
+  EXPECT_EQ(error(bad), "surface 1: a vertex is not finite in single precision");
+  std::get<TriangleMesh>(bad.shape).vertices[0].x() = 1e39;
+  EXPECT_EQ(error(bad), "surface 1: a vertex is not finite in single precision");
+  bad = good;
+  bad.path_ends = {1};
+  EXPECT_EQ(error(bad), "surface 1: path_ends must ascend to the number of triangles");
+  bad = curve({{0, 0, 0}, {1, 0, 0}}, {0.1f, -0.1f});
+  EXPECT_EQ(error(bad), "surface 1: a radius is not a finite value >= 0");
+  bad = curve({{0, 0, 0}, {1, 0, 0}}, {0.1f, 0.1f});
+  std::get<RoundCurves>(bad.shape).strand_ends = {3};
+  EXPECT_EQ(error(bad), "surface 1: strand_ends must ascend to the number of points");
+}
+
+}  // namespace
+}  // namespace tensorray

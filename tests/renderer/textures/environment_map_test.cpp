@@ -1,0 +1,217 @@
+#include "renderer/textures/environment_map.h"
+
+#include <algorithm>
+#include <cmath>
+#include <stdexcept>
+
+#include <Eigen/Geometry>
+#include <gtest/gtest.h>
+
+#include "base/constants.h"
+#include "renderer/sampling/random.h"
+#include "renderer/sampling/sampling.h"
+#include "tests/renderer/statistics.h"
+
+namespace tensorray {
+namespace {
+
+using Eigen::Vector2d;
+using Eigen::Vector3d;
+
+/// A light whose only channel is its only band.
+EnvironmentLight grey(int width, int height) {
+  EnvironmentLight light;
+  light.picture = Image(width, height, {"Y"});
+  light.channel_spectra = Eigen::MatrixXf::Identity(1, 1);
+  return light;
+}
+
+/// A dark, uneven sky in a general orientation: one row and some texels are 0, and one texel is bright.
+EnvironmentLight uneven_sky() {
+  EnvironmentLight light = grey(16, 9);
+  for (int i = 0; i < 16 * 9; ++i) light.picture.pixels[i] = static_cast<float>(random_uniform(1, i, 0));
+  for (int y = 3; y < 7; ++y)
+    for (int x = 4; x < 9; ++x) *light.picture.pixel(x, y) = 0;
+  *light.picture.pixel(12, 2) = 300;
+  light.to_world = Eigen::AngleAxisd(1.1, Vector3d(1, -2, 0.5).normalized()).toRotationMatrix();
+  return light;
+}
+
+float radiance(const EnvironmentMap& map, const Vector3d& direction) {
+  std::vector<float> result{0};
+  map.add_radiance(direction, result);
+  return result[0];
+}
+
+/// The integral over the sphere by the midpoint rule, in latitudes and longitudes of the world frame.
+template <class Function>
+double integrate(const Function& function, int rows) {
+  double sum = 0;
+  for (int y = 0; y < rows; ++y)
+    for (int x = 0; x < 2 * rows; ++x) {
+      const double z = 1 - 2 * (y + 0.5) / rows, turn = pi * (x + 0.5) / rows, across = std::sqrt(1 - z * z);
+      sum += function(Vector3d(across * std::cos(turn), across * std::sin(turn), z));
+    }
+  return sum * 2 * pi / rows / rows;
+}
+
+TEST(EnvironmentMap, UpIsZAndTheMiddleIsX) {
+  // With 8 x 5 texels, centres are at most half a texel from the poles and the axes.
+  EnvironmentLight light = grey(8, 5);
+  const auto set = [&](int x, int y, float value) { *light.picture.pixel(x, y) = value; };
+  for (int x = 0; x < 8; ++x) set(x, 0, 1), set(x, 4, 2);
+  set(3, 2, 10), set(4, 2, 10);  // On both sides of the middle.
+  set(1, 2, 20), set(2, 2, 20);  // A quarter of the width to the left.
+  set(5, 2, 30), set(6, 2, 30);  // A quarter of the width to the right.
+  set(0, 2, 40), set(7, 2, 40);  // At the edges.
+  const EnvironmentMap map(light, {1});
+  EXPECT_FLOAT_EQ(radiance(map, {0, 0, 1}), 1);
+  EXPECT_FLOAT_EQ(radiance(map, {0, 0, -1}), 2);
+  EXPECT_FLOAT_EQ(radiance(map, {1, 0, 0}), 10);
+  EXPECT_FLOAT_EQ(radiance(map, {0, 1, 0}), 20);
+  EXPECT_FLOAT_EQ(radiance(map, {0, -1, 0}), 30);
+  EXPECT_FLOAT_EQ(radiance(map, {-1, 0, 0}), 40);
+
+  // The middle of the picture becomes +y.
+  light.to_world = Eigen::AngleAxisd(pi / 2, Vector3d::UnitZ()).toRotationMatrix();
+  EXPECT_FLOAT_EQ(radiance(EnvironmentMap(light, {1}), {0, 1, 0}), 10);
+  EXPECT_FLOAT_EQ(radiance(EnvironmentMap(light, {1}), {0, 0, 1}), 1);
+}
+
+TEST(EnvironmentMap, HasNoSeam) {
+  EnvironmentLight light = uneven_sky();
+  light.to_world.setIdentity();
+  const EnvironmentMap map(light, {1});
+  for (double z = -0.9; z < 1; z += 0.1)
+    EXPECT_NEAR(radiance(map, Vector3d(-1, 1e-7, z).normalized()), radiance(map, Vector3d(-1, -1e-7, z).normalized()),
+                1e-4);
+}
+
+TEST(EnvironmentMap, ChannelsHaveSpectra) {
+  EnvironmentLight light;
+  light.picture = Image(4, 2, {"R", "G"});
+  for (int i = 0; i < 8; ++i) light.picture.pixels[2 * i] = 2, light.picture.pixels[2 * i + 1] = 5;
+  light.channel_spectra.resize(3, 2);
+  light.channel_spectra << 1, 0, 0.5, 0.25, 0, 4;
+  const EnvironmentMap map(light, {1, 1, 1});
+  std::vector<float> sum{100, 0, 0};
+  map.add_radiance({0, 0.6, 0.8}, sum);
+  EXPECT_FLOAT_EQ(sum[0], 102);
+  EXPECT_FLOAT_EQ(sum[1], 2.25);
+  EXPECT_FLOAT_EQ(sum[2], 20);
+  EXPECT_NEAR(map.importance(), 4 * pi * 24.25, 1e-5);
+}
+
+TEST(EnvironmentMap, DensityIntegratesToOne) {
+  const EnvironmentMap map(uneven_sky(), {1});
+  // The density jumps at the edges of texels. There the midpoint rule is off by up to one row of its cells.
+  EXPECT_NEAR(integrate([&](const Vector3d& d) { return map.pdf(d); }, 1000), 1, 2e-3);
+}
+
+TEST(EnvironmentMap, SamplesFollowTheDensity) {
+  const EnvironmentLight light = uneven_sky();
+  const EnvironmentMap map(light, {1});
+  constexpr int rows = 12, columns = 24;  // Bins that differ from the texels and have equal solid angles.
+  std::vector<double> weights(rows * columns);
+  const auto bin = [](const Vector3d& d) {
+    const int y = std::min(static_cast<int>((1 - d.z()) / 2 * rows), rows - 1);
+    return y * columns + std::min(static_cast<int>((std::atan2(d.y(), d.x()) / (2 * pi) + 0.5) * columns), columns - 1);
+  };
+  integrate([&](const Vector3d& d) { return weights[bin(d)] += map.pdf(d); }, 1200);
+  std::vector<int> counts(rows * columns);
+  for (int i = 0; i < 50000; ++i) {
+    const Vector3d d = map.sample({random_uniform(2, i, 0), random_uniform(2, i, 1)});
+    ASSERT_NEAR(d.norm(), 1, 1e-14);
+    ++counts[bin(d)];
+  }
+  // Bins with few expected samples are not normally distributed: merge them into one.
+  double total = 0, rare_weight = 0;
+  for (const double w : weights) total += w;
+  int rare_count = 0;
+  std::vector<int> kept_counts;
+  std::vector<double> kept_weights;
+  for (int i = 0; i < rows * columns; ++i) {
+    const bool is_rare = weights[i] / total * 50000 < 10;
+    (is_rare ? rare_count : kept_counts.emplace_back()) += counts[i];
+    (is_rare ? rare_weight : kept_weights.emplace_back()) += weights[i];
+  }
+  kept_counts.push_back(rare_count);
+  kept_weights.push_back(rare_weight);
+  EXPECT_GT(kept_counts.size(), 20u);
+  EXPECT_LT(std::abs(chi_square_score(kept_counts, kept_weights)), 4);
+}
+
+TEST(EnvironmentMap, SamplesIntegrateAsQuadratureDoes) {
+  const EnvironmentMap map(uneven_sky(), {1});
+  const Vector3d normal = Vector3d(1, 2, 3).normalized();
+  const auto integrand = [&](const Vector3d& d) { return radiance(map, d) * (0.1 + std::max(0.0, d.dot(normal))); };
+  const double exact = integrate(integrand, 1500);
+  Mean mean;
+  for (int i = 0; i < 20000; ++i) {
+    const Vector3d d = map.sample({random_uniform(3, i, 0), random_uniform(3, i, 1)});
+    mean.add(integrand(d) / map.pdf(d));
+  }
+  EXPECT_NEAR(mean.mean(), exact, 4 * mean.error() + 1e-4 * exact);
+  EXPECT_LT(mean.error(), 0.01 * exact);
+  // Sampling by the light must be far better than uniform sampling: at most a tenth of the variance.
+  Mean even;
+  for (int i = 0; i < 20000; ++i)
+    even.add(4 * pi * integrand(square_to_sphere({random_uniform(4, i, 0), random_uniform(4, i, 1)})));
+  EXPECT_LT(mean.error(), even.error() / std::sqrt(10.0));
+}
+
+TEST(EnvironmentMap, LightIsNeverMissed) {
+  const EnvironmentMap map(uneven_sky(), {1});
+  int dark = 0;
+  for (int i = 0; i < 20000; ++i) {
+    const Vector3d d = square_to_sphere({random_uniform(5, i, 0), random_uniform(5, i, 1)});
+    if (radiance(map, d) > 0) {
+      EXPECT_GT(map.pdf(d), 0);
+    }
+    dark += map.pdf(d) == 0;
+  }
+  EXPECT_GT(dark, 0);
+}
+
+TEST(EnvironmentMap, ImportanceOfAnEvenSkyIsExact) {
+  EnvironmentLight light = grey(7, 4);
+  for (float& value : light.picture.pixels) value = 3;
+  const EnvironmentMap map(light, {2});
+  EXPECT_NEAR(map.importance(), 4 * pi * 6, 1e-12);
+  for (int i = 0; i < 100; ++i)
+    EXPECT_NEAR(map.pdf(map.sample({random_uniform(6, i, 0), random_uniform(6, i, 1)})), 1 / (4 * pi), 1e-13);
+}
+
+TEST(EnvironmentMap, WhatIsNoLightIsDark) {
+  EnvironmentLight light = grey(4, 2);
+  light.picture.pixels = {1, -1, NAN, INFINITY, 1, 1, 1, 1};
+  const EnvironmentMap map(light, {1});
+  for (int i = 0; i < 1000; ++i) {
+    const Vector3d d = map.sample({random_uniform(7, i, 0), random_uniform(7, i, 1)});
+    EXPECT_TRUE(radiance(map, d) >= 0 && radiance(map, d) <= 1 + 1e-6);
+    EXPECT_TRUE(std::isfinite(map.pdf(d)));
+  }
+  for (float& value : light.picture.pixels) value = 0;
+  const EnvironmentMap black(light, {1});
+  EXPECT_EQ(black.importance(), 0);
+  EXPECT_NEAR(black.sample({0.3, 0.7}).norm(), 1, 1e-14);
+}
+
+TEST(EnvironmentMap, RefusesWhatDoesNotFit) {
+  EXPECT_THROW(EnvironmentMap(EnvironmentLight(), {1}), std::invalid_argument);
+  EXPECT_THROW(EnvironmentMap(grey(4, 2), {1, 1}), std::invalid_argument);
+  EnvironmentLight light = grey(4, 2);
+  light.picture.pixels.pop_back();
+  EXPECT_THROW(EnvironmentMap(light, {1}), std::invalid_argument);
+  light = grey(4, 2);
+  light.channel_spectra(0, 0) = -1;
+  EXPECT_THROW(EnvironmentMap(light, {1}), std::invalid_argument);
+  light = grey(4, 2);
+  light.to_world(0, 0) = -1;  // A reflection.
+  EXPECT_THROW(EnvironmentMap(light, {1}), std::invalid_argument);
+  light.to_world = 2 * Eigen::Matrix3d::Identity();
+  EXPECT_THROW(EnvironmentMap(light, {1}), std::invalid_argument);
+}
+
+}  // namespace
+}  // namespace tensorray

@@ -1,0 +1,244 @@
+#include "renderer/textures/test_images.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+#include <set>
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+#include <Eigen/Core>
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "base/constants.h"
+#include "tests/renderer/support.h"
+
+namespace tensorray {
+namespace {
+
+using ::testing::HasSubstr;
+using Channels = std::vector<std::string>;
+
+double mean(const Image& image) {
+  return std::accumulate(image.pixels.begin(), image.pixels.end(), 0.0) / static_cast<double>(image.pixels.size());
+}
+
+/// A smaller picture, each pixel of which is the mean of `factor` × `factor` pixels.
+Image reduced(const Image& image, int factor) {
+  Image result(image.width / factor, image.height / factor, image.channels);
+  for (int y = 0; y < result.height * factor; ++y)
+    for (int x = 0; x < result.width * factor; ++x)
+      for (int c = 0; c < 3; ++c)
+        result.pixel(x / factor, y / factor)[c] += image.pixel(x, y)[c] / static_cast<float>(factor * factor);
+  return result;
+}
+
+double largest_difference(const Image& a, const Image& b) {
+  EXPECT_EQ(a.pixels.size(), b.pixels.size());
+  double largest = 0;
+  for (std::size_t i = 0; i < a.pixels.size(); ++i)
+    largest = std::max<double>(largest, std::abs(a.pixels[i] - b.pixels[i]));
+  return largest;
+}
+
+class EveryTestImage : public ::testing::TestWithParam<TestImage> {};
+INSTANTIATE_TEST_SUITE_P(TestImagesTest, EveryTestImage,
+                         ::testing::Values(TestImage::checkerboard, TestImage::grid, TestImage::color_wheel,
+                                           TestImage::line));
+
+TEST_P(EveryTestImage, HasItsSizeAndValuesFromZeroToOne) {
+  for (const auto& [width, height] : {std::pair(1, 1), {1, 9}, {9, 1}, {37, 23}, {255, 301}, {640, 480}}) {
+    const Image image = test_image(GetParam(), width, height);
+    EXPECT_EQ(image.width, width);
+    EXPECT_EQ(image.height, height);
+    EXPECT_EQ(image.channels, (Channels{"R", "G", "B"}));
+    ASSERT_EQ(image.pixels.size(), static_cast<std::size_t>(3 * width * height));
+    for (const float value : image.pixels) ASSERT_TRUE(value >= 0 && value <= 1) << value;
+  }
+}
+
+TEST_P(EveryTestImage, RefusesEmptySizes) {
+  for (const auto& [width, height] : {std::pair(0, 5), {5, 0}, {-1, 5}, {5, -1}}) {
+    EXPECT_THROW(test_image(GetParam(), width, height), std::invalid_argument);
+    EXPECT_THAT(message([&, w = width, h = height] { test_image(GetParam(), w, h); }), HasSubstr("one pixel"));
+  }
+}
+
+/// Edges are anti-aliased exactly: a small picture equals a large one after reduction. (The grids are so small that
+/// neither has labels.)
+TEST(TestImagesTest, SmallPicturesAreLargeOnesReduced) {
+  for (const TestImage which : {TestImage::checkerboard, TestImage::grid, TestImage::line})
+    for (const auto& [width, height] : {std::pair(1, 1), {5, 3}, {31, 47}, {32, 32}, {50, 41}})
+      EXPECT_LT(
+          largest_difference(test_image(which, width, height), reduced(test_image(which, 4 * width, 4 * height), 4)),
+          1e-5)
+          << static_cast<int>(which) << ": " << width << " x " << height;
+}
+
+TEST(TestImagesTest, CheckerboardIsBlackAndWhiteInEqualParts) {
+  const Image image = test_image(TestImage::checkerboard, 96, 64);  // Cells of 4 pixels.
+  for (int y = 0; y < 64; ++y)
+    for (int x = 0; x < 96; ++x)
+      for (int c = 0; c < 3; ++c) ASSERT_EQ(image.pixel(x, y)[c], (x / 4 + y / 4) % 2 == 0 ? 1 : 0);
+  EXPECT_EQ(mean(image), 0.5);
+  EXPECT_NEAR(mean(test_image(TestImage::checkerboard, 101, 101)), 0.5, 1e-6);
+  EXPECT_NEAR(mean(test_image(TestImage::checkerboard, 1, 1)), 0.5, 1e-6);
+}
+
+TEST(TestImagesTest, CheckerboardIsSymmetric) {
+  for (const auto& [width, height] : {std::pair(101, 101), {130, 77}, {64, 200}}) {
+    const Image image = test_image(TestImage::checkerboard, width, height);
+    for (int y = 0; y < height; ++y)
+      for (int x = 0; x < width; ++x) {
+        const float value = *image.pixel(x, y);
+        ASSERT_NEAR(value, *image.pixel(width - 1 - x, height - 1 - y), 1e-5);
+        ASSERT_NEAR(value, 1 - *image.pixel(width - 1 - x, y), 1e-5);
+        if (width == height) {
+          ASSERT_NEAR(value, *image.pixel(y, x), 1e-5);
+        }
+      }
+  }
+}
+
+TEST(TestImagesTest, LineIsASixtyFourthOfTheWidthInTheMiddle) {
+  for (const int width : {1, 7, 64, 100, 128, 1001}) {
+    const Image image = test_image(TestImage::line, width, 3);
+    EXPECT_NEAR(mean(image), 1 / 64.0, 1e-8) << width;
+    for (int x = 0; x < width; ++x) {
+      ASSERT_NEAR(*image.pixel(x, 0), *image.pixel(width - 1 - x, 0), 1e-6);
+      if (std::abs(x + 0.5 - width / 2.0) > width / 128.0 + 0.5) {
+        ASSERT_EQ(*image.pixel(x, 1), 0);
+      }
+    }
+  }
+  const Image image = test_image(TestImage::line, 128, 2);
+  for (int x = 0; x < 128; ++x) EXPECT_EQ(*image.pixel(x, 1), x == 63 || x == 64 ? 1 : 0) << x;
+}
+
+/// The pixels of a cell of the grid without its lines, for comparison.
+std::vector<float> cell_of(const Image& image, int left, int top, int cell) {
+  std::vector<float> pixels;
+  for (int y = top + cell / 8; y < top + cell - cell / 8; ++y)
+    for (int x = left + cell / 8; x < left + cell - cell / 8; ++x)
+      pixels.insert(pixels.end(), image.pixel(x, y), image.pixel(x, y) + 3);
+  return pixels;
+}
+
+TEST(TestImagesTest, GridHasALabelOfItsOwnInEveryWholeCell) {
+  const int cell = 32, columns = 40, rows = 16;  // With 40 columns, labels continue after Z.
+  const Image image = test_image(TestImage::grid, columns * cell + 30, rows * cell);
+  std::set<std::vector<float>> labels;
+  for (int row = 0; row < rows; ++row)
+    for (int column = 0; column < columns; ++column) {
+      const std::vector<float> pixels = cell_of(image, 15 + column * cell, row * cell, cell);
+      EXPECT_LT(*std::min_element(pixels.begin(), pixels.end()), 0.3) << "no label in column " << column;
+      labels.insert(pixels);
+    }
+  EXPECT_EQ(labels.size(), static_cast<std::size_t>(columns * rows));
+}
+
+TEST(TestImagesTest, GridOfOddSizeHasLabelsUpToTheEdges) {
+  const int size = 513, cell = 32;
+  const Image image = test_image(TestImage::grid, size, size);
+  for (const int left : {0, size - cell})
+    for (const int top : {0, size - cell}) {
+      const std::vector<float> pixels = cell_of(image, left, top, cell);
+      EXPECT_LT(*std::min_element(pixels.begin(), pixels.end()), 0.3) << left << " " << top;
+    }
+}
+
+TEST(TestImagesTest, GridLinesAreDarkEvenAndThickerEveryFourthTime) {
+  const int cell = 48, size = 16 * cell;
+  const Image image = test_image(TestImage::grid, size, size);
+  const int y = cell + cell / 8;  // Below a line and above the labels.
+  const auto line_width = [&](int index) {
+    double dark = 0;
+    for (int x = index * cell - cell / 4; x < index * cell + cell / 4; ++x)
+      dark += 1 - *image.pixel(x, y) / *image.pixel(index * cell + (index < 8 ? -1 : 1) * cell / 4, y);
+    return dark;
+  };
+  for (int index = 1; index < 16; ++index)
+    if (index != 8) {
+      EXPECT_NEAR(line_width(index), index % 4 == 0 ? cell / 12.0 : cell / 24.0, 1e-4) << index;
+    }
+}
+
+TEST(TestImagesTest, GridQuadrantsDifferFaintly) {
+  const int size = 100;  // Too small for labels.
+  const Image image = test_image(TestImage::grid, size, size);
+  std::set<std::vector<float>> tints;
+  for (const int y : {9, 90})
+    for (const int x : {9, 90}) {
+      const float* tint = image.pixel(x, y);
+      tints.insert({tint, tint + 3});
+      EXPECT_GT(*std::min_element(tint, tint + 3), 0.7);
+    }
+  EXPECT_EQ(tints.size(), 4u);
+}
+
+/// Centre and size of the wheel in a square picture: it fills 92 %.
+struct Wheel {
+  Image image = test_image(TestImage::color_wheel, 1024, 1024);
+
+  /// @param radius  Relative to the radius of the wheel.
+  Eigen::Vector3d at(double radius, double angle) const {
+    const double r = 0.46 * 1024 * radius;
+    const float* pixel =
+        image.pixel(static_cast<int>(512 + r * std::cos(angle)), static_cast<int>(512 - r * std::sin(angle)));
+    return {pixel[0], pixel[1], pixel[2]};
+  }
+};
+
+double saturation(const Eigen::Vector3d& color) { return 1 - color.minCoeff() / color.maxCoeff(); }
+
+TEST(TestImagesTest, ColorWheelGoesFromWhiteToSaturatedColorsAndIsGreyAround) {
+  const Wheel wheel;
+  EXPECT_LT((wheel.at(0, 0) - Eigen::Vector3d::Ones()).norm(), 0.02);
+  for (const double angle : {0.1, 1.3, 2.8, 4.0, 5.5}) {
+    double before = 0;
+    for (const double radius : {0.2, 0.45, 0.7, 0.95}) {  // Between the circles.
+      EXPECT_GT(saturation(wheel.at(radius, angle)), before + 0.05) << angle << " " << radius;
+      before = saturation(wheel.at(radius, angle));
+    }
+    EXPECT_GT(before, 0.8) << angle;
+    const Eigen::Vector3d around = wheel.at(1.02, angle);
+    EXPECT_EQ(around, Eigen::Vector3d::Constant(around[0]));
+  }
+}
+
+TEST(TestImagesTest, ColorWheelHasRedAtTheRightAndGoesOnCounterClockwise) {
+  const Wheel wheel;
+  const double shift = 0.06;  // Away from the radial lines.
+  const auto largest = [&](double angle) {
+    Eigen::Index channel = 0;
+    wheel.at(0.94, angle + shift).maxCoeff(&channel);
+    return channel;
+  };
+  EXPECT_EQ(largest(0), 0);
+  EXPECT_EQ(largest(2 * pi / 3), 1);
+  EXPECT_EQ(largest(4 * pi / 3), 2);
+  const Eigen::Vector3d yellow = wheel.at(0.94, 1.4 + shift);
+  EXPECT_LT(yellow[2], 0.3 * std::min(yellow[0], yellow[1]));
+}
+
+/// Along a circle, colours change slowly except at the 24 radial lines.
+TEST(TestImagesTest, ColorWheelHasRaysAndNoCreases) {
+  const Wheel wheel;
+  const int steps = 24 * 60;
+  int rays = 0;
+  for (int i = 0; i < steps; ++i) {
+    const double angle = 2 * pi * i / steps, aside = 2 * pi * 15 / steps;
+    const Eigen::Vector3d between = (wheel.at(0.69, angle - aside) + wheel.at(0.69, angle + aside)) / 2;
+    const double darkening = 1 - wheel.at(0.69, angle).sum() / between.sum();
+    if (i % 60 == 0) rays += darkening > 0.15;
+    if (i % 60 == 30) {
+      EXPECT_LT(std::abs(darkening), 0.03) << i;
+    }
+  }
+  EXPECT_EQ(rays, 24);
+}
+
+}  // namespace
+}  // namespace tensorray

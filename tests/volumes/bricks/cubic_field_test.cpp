@@ -1,0 +1,313 @@
+// A cubic field: what it reproduces, what it does at borders, and that all readers see the same.
+
+#include <cmath>
+#include <functional>
+#include <random>
+#include <vector>
+
+#include <gtest/gtest.h>
+
+#include "volumes/sampling/sample_tensors.h"
+#include "volumes/bricks/tensor_field.h"
+#include "volumes/sampling/tensor_sampler.h"
+#include "volumes/grids/tensor_grid.h"
+
+namespace tensorray {
+namespace {
+
+using Eigen::AlignedBox3i;
+using Eigen::Matrix3d;
+using Eigen::Vector3d;
+using Eigen::Vector3i;
+
+constexpr Interpolant fading{Interpolation::cubic, Border::fade}, extending{Interpolation::cubic, Border::extend};
+constexpr double rounding = 4e-6;  // Of single precision, for values of 1: a coefficient is a sum of some 10 of them.
+
+/// A transform that turns, shears and scales.
+Eigen::Affine3d oblique() {
+  Eigen::Affine3d to_world = Eigen::Affine3d::Identity();
+  to_world.linear() << 0.5, 0.1, 0, -0.2, 0.3, 0.05, 0, 0.1, 0.8;
+  to_world.translation() = Vector3d(1, -2, 0.5);
+  return to_world;
+}
+
+/// A polynomial of degree `degrees` along each axis of index space, of values up to about 1 in a box of the size `box`.
+Matrix3d polynomial(const Vector3d& index, const Vector3i& degrees, bool symmetric) {
+  Matrix3d T;
+  for (int i = 0; i < 9; ++i) {
+    double value = 1;
+    for (int axis = 0; axis < 3; ++axis) {
+      const double x = (index[axis] - 7 + 0.7 * i) / 20;
+      double sum = 0.3;
+      for (int n = 1; n <= degrees[axis]; ++n) sum += (0.5 - 0.3 * n + 0.05 * i) * std::pow(x, n);
+      value *= sum;
+    }
+    T.data()[i] = value;
+  }
+  return symmetric ? Matrix3d((T + T.transpose()) / 2) : T;
+}
+
+struct ExtentCase {
+  Vector3i first, size;
+  bool symmetric;
+};
+
+void PrintTo(const ExtentCase& c, std::ostream* out) {
+  *out << c.size.transpose() << " voxels from " << c.first.transpose() << (c.symmetric ? ", symmetric" : "");
+}
+
+class Extents : public testing::TestWithParam<ExtentCase> {};
+
+/// Along an axis with n voxels, polynomials of degree up to min(3, n − 1) are exact, and their derivatives, up to the
+/// faces.
+TEST_P(Extents, PolynomialsAreReproduced) {
+  const auto [first, size, symmetric] = GetParam();
+  const Vector3i degrees = (size.array() - 1).min(3);
+  const bool sym = symmetric;
+  const TensorField field(dense_grid(AlignedBox3i(first, first + size - Vector3i::Ones()), oblique(),
+                                     [&, from = first](const Vector3i& index) {
+                                       return polynomial((index - from).cast<double>(), degrees, sym);
+                                     }),
+                          fading);
+  EXPECT_EQ(field.is_symmetric(), symmetric);
+  TensorSampler sampler(field);
+  std::mt19937 random(1);
+  std::uniform_real_distribution<double> uniform(0, 1);
+  const auto at = [&](const Vector3d& index) { return polynomial(index, degrees, sym); };
+  for (int n = 0; n < 400; ++n) {
+    Vector3d index;
+    for (int axis = 0; axis < 3; ++axis) {
+      const double u = uniform(random);
+      index[axis] = (u < 0.1 ? 0 : u > 0.9 ? 1 : uniform(random)) * (size[axis] - 1);
+    }
+    const Vector3d world = field.to_world() * (index + first.cast<double>());
+    Eigen::Matrix<double, 3, 2> along;
+    for (double& value : along.reshaped()) value = uniform(random) - 0.5;
+    std::array<Matrix3d, 2> derivatives;
+    const Matrix3d value = sampler.at(world, along, derivatives);
+    EXPECT_LT((value - at(index)).norm(), rounding) << index.transpose();
+    EXPECT_LT((sampler.at(world) - value).norm(), 1e-12);
+    for (int i = 0; i < 2; ++i) {
+      const Vector3d step = field.to_index().linear() * along.col(i) * 1e-4;
+      const Matrix3d expected = (at(index + step) - at(index - step)) / 2e-4;
+      EXPECT_LT((derivatives[i] - expected).norm(), 4 * rounding * step.norm() / 1e-4 + 1e-6) << index.transpose();
+    }
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(
+    CubicField, Extents,
+    testing::Values(ExtentCase{{0, 0, 0}, {16, 16, 16}, false}, ExtentCase{{0, 0, 0}, {17, 17, 17}, true},
+                    ExtentCase{{-3, 5, 7}, {18, 12, 26}, false}, ExtentCase{{7, 7, 15}, {10, 11, 19}, true},
+                    ExtentCase{{2, 0, -9}, {1, 2, 3}, false}, ExtentCase{{6, 6, 6}, {4, 5, 3}, false},
+                    ExtentCase{{7, 15, -1}, {2, 1, 4}, true}, ExtentCase{{0, 0, 0}, {9, 10, 8}, false}));
+
+Matrix3d noise(std::mt19937& random) {
+  std::normal_distribution<double> normal;
+  Matrix3d T;
+  for (double& value : T.reshaped()) value = normal(random);
+  return T;
+}
+
+/// A grid whose voxels within `box` are active where `is_active`.
+TensorGrid masked_grid(const AlignedBox3i& box, const std::function<bool(const Vector3i&)>& is_active,
+                       const std::function<Matrix3d(const Vector3i&)>& value) {
+  TensorGrid grid = dense_grid(box, Eigen::Affine3d::Identity(), value);
+  for (TensorBlock& block : grid.blocks)
+    for (int i = 0; i < TensorBlock::voxels; ++i)
+      if (block.active[i] && !is_active(block.origin + TensorBlock::position(i))) {
+        block.active[i] = false;
+        block.values[static_cast<std::size_t>(i)].setZero();
+      }
+  remove_empty_blocks(grid);
+  return grid;
+}
+
+/// A dense field of any values has them at its voxels.
+TEST(CubicField, InterpolatesItsVoxels) {
+  std::mt19937 random(3);
+  const TensorGrid grid =
+      dense_grid(AlignedBox3i(Vector3i(-5, 1, 6), Vector3i(12, 20, 22)), oblique(), [](auto& index) {
+        std::mt19937 own(static_cast<unsigned>(index.dot(Vector3i(1, 100, 10000)) + 1000000));
+        return noise(own);
+      });
+  const TensorField field(grid, fading);
+  TensorSampler sampler(field);
+  for (const TensorBlock& block : grid.blocks)
+    for (int i = 0; i < TensorBlock::voxels; ++i) {
+      if (!block.active[i]) continue;
+      const Vector3d at = grid.to_world * (block.origin + TensorBlock::position(i)).cast<double>();
+      const Matrix3d expected = block.values[static_cast<std::size_t>(i)].cast<double>();
+      ASSERT_LT((sampler.at(at) - expected).norm(), 3e-5);  // White noise: coefficients are up to ten times as large.
+    }
+}
+
+/// Beside inactive voxels: a step from a constant to nothing.
+TEST(CubicField, AStepHardlyRings) {
+  const AlignedBox3i box(Vector3i::Zero(), Vector3i(23, 23, 23));
+  const auto one = [](const Vector3i&) { return Matrix3d(Matrix3d::Constant(1)); };
+  const TensorField field(masked_grid(
+                              box, [](const Vector3i& v) { return v.x() >= 12 || v.x() == 0; }, one),
+                          fading);
+  TensorSampler sampler(field);
+  for (double x = 3; x < 23; x += 1.0 / 16) {
+    const double value = sampler.at({x, 11.3, 9.8})(0, 1);
+    EXPECT_LT(value, 1.1) << x;
+    EXPECT_GT(value, -0.1) << x;
+    if (x >= 14) {
+      EXPECT_NEAR(value, 1, 0.01) << x;
+    }
+    if (x <= 10) {
+      EXPECT_NEAR(value, 0, 1e-6) << x;
+    }
+    if (x <= 12) {
+      EXPECT_GE(value, -1e-6) << x;
+    }
+  }
+}
+
+/// The same beside a body of any shape: its voxels keep their values, and nothing is far from 0 and 1 but beside edges.
+TEST(CubicField, ABallHardlyRings) {
+  const AlignedBox3i box(Vector3i::Zero(), Vector3i(31, 31, 31));
+  const Vector3d centre = Vector3d::Constant(15.3);
+  const auto one = [](const Vector3i&) { return Matrix3d(Matrix3d::Constant(1)); };
+  const auto within = [&](const Vector3i& v) { return (v.cast<double>() - centre).norm() < 12; };
+  const TensorField field(masked_grid(box, within, one), fading);
+  TensorSampler sampler(field);
+  int far_from = 0, count = 0;
+  for (int x = 8; x < 54; ++x)
+    for (int y = 8; y < 54; ++y)
+      for (int z = 8; z < 54; ++z) {
+        const Vector3i half(x, y, z);
+        const double value = sampler.at(half.cast<double>() / 2)(0, 1);
+        EXPECT_GT(value, -0.3);
+        EXPECT_LT(value, 1.2);
+        far_from += value < -0.1 || value > 1.1;
+        ++count;
+        if ((half.array() / 2 * 2 == half.array()).all() && within(half / 2)) {
+          EXPECT_NEAR(value, 1, 2e-4);
+        }
+      }
+  EXPECT_LT(far_from, 0.02 * count);
+}
+
+/// A field that is linear goes on behind the last voxels of a body.
+TEST(CubicField, ExtendContinuesLines) {
+  const AlignedBox3i box(Vector3i::Zero(), Vector3i(31, 31, 31));
+  const Vector3d centre = Vector3d::Constant(15.3);
+  const auto line = [](const Vector3d& index) {
+    return Matrix3d((0.2 + 0.02 * index.x() - 0.03 * index.y() + 0.01 * index.z()) * Matrix3d::Constant(1));
+  };
+  const auto within = [&](const Vector3i& v) { return (v.cast<double>() - centre).norm() < 12; };
+  const TensorField field(masked_grid(box, within, [&](const Vector3i& v) { return line(v.cast<double>()); }),
+                          extending);
+  TensorSampler sampler(field);
+  for (int x = 8; x < 54; ++x)
+    for (int y = 8; y < 54; ++y)
+      for (int z = 8; z < 54; ++z) {
+        const Vector3d at = Vector3d(x, y, z) / 2;
+        if ((at - centre).norm() < 12.4) {
+          EXPECT_LT((sampler.at(at) - line(at)).norm(), 1e-4) << at.transpose();
+        }
+      }
+}
+
+/// Layers of one to four voxels at a face of the extent, and another body far away: voxels keep their values.
+TEST(CubicField, ThinLayersAtFacesKeepTheirValues) {
+  const AlignedBox3i box(Vector3i::Zero(), Vector3i(23, 11, 11));
+  for (const Interpolant& interpolant : {fading, extending})
+    for (int layer = 1; layer <= 4; ++layer)
+      for (const bool is_last : {false, true}) {
+        const auto within = [&](const Vector3i& v) {
+          const int x = is_last ? 23 - v.x() : v.x();
+          return x < layer || x > 18;
+        };
+        const auto one = [](const Vector3i&) { return Matrix3d(Matrix3d::Constant(1)); };
+        const TensorField field(masked_grid(box, within, one), interpolant);
+        TensorSampler sampler(field);
+        for (int x = 0; x < 24; ++x)
+          if (within({x, 5, 5})) {
+            EXPECT_NEAR(sampler.at(Vector3d(x, 5, 5))(0, 1), 1, 1e-5) << layer << " voxels, at " << x;
+          }
+        if (interpolant == extending && layer > 1) {  // A constant goes on.
+          EXPECT_NEAR(sampler.at(Vector3d(is_last ? 22.5 : 0.5, 5, 5))(0, 1), 1, 1e-5) << layer;
+        }
+      }
+}
+
+/// Bricks that begin with five components, and are widened late, hold what bricks of eight do.
+TEST(CubicField, BricksAreWidenedLate) {
+  const AlignedBox3i box(Vector3i::Zero(), Vector3i(135, 135, 135));
+  const auto symmetric = [](const Vector3i& v) { return polynomial(v.cast<double>() / 8, {1, 2, 3}, true); };
+  TensorGrid late = dense_grid(box, oblique(), symmetric), early = late;
+  late.blocks.back().values[0](0, 1) += 1;
+  early.blocks.front().values[0](0, 1) += 1;
+  const TensorField a(late, fading), b(early, fading);
+  ASSERT_FALSE(a.is_symmetric());
+  TensorSampler one(a), other(b);
+  for (const Vector3d& index : {Vector3d(60.3, 70.1, 64.9), Vector3d(40, 90.5, 20.25), Vector3d(100.7, 30.2, 111.1)})
+    EXPECT_EQ(one.at(oblique() * index), other.at(oblique() * index));
+}
+
+/// Values beside each other whose squares are far apart, some beyond single precision.
+TEST(CubicField, TheBoundHoldsForValuesOfAnySize) {
+  for (const double large : {1e10, 1e20, 1e35}) {
+    const TensorField field(dense_grid(AlignedBox3i(Vector3i::Zero(), Vector3i(7, 7, 7)), oblique(),
+                                       [&](const Vector3i& v) {
+                                         Matrix3d T = Matrix3d(Vector3d(1, -2, 0.5).asDiagonal());
+                                         return v == Vector3i(3, 3, 3) ? Matrix3d(large * T) : T;
+                                       }),
+                            fading);
+    EXPECT_GT(field.brick({0, 0, 0}).strongest, large);
+  }
+}
+
+/// `sample_tensors` and TensorSampler agree, in sparse fields of both kinds, inside and outside.
+TEST(CubicField, VectorsSampleTheSame) {
+  for (const bool symmetric : {false, true}) {
+    const AlignedBox3i box(Vector3i(-5, 3, 9), Vector3i(20, 22, 30));
+    const auto value = [&](const Vector3i& v) { return polynomial(v.cast<double>(), {3, 3, 3}, symmetric); };
+    const TensorField field(masked_grid(
+                                box, [](const Vector3i& v) { return (v.x() + 2 * v.y()) % 7 > 1; }, value),
+                            fading);
+    EXPECT_EQ(field.is_symmetric(), symmetric);
+    TensorSampler sampler(field);
+    std::mt19937 random(5);
+    std::uniform_real_distribution<float> uniform(-3, 27);
+    constexpr std::size_t count = 200;
+    std::vector<float> positions[3], components(9 * sampled_room(count));
+    for (auto& axis : positions)
+      for (std::size_t i = 0; i < sampled_room(count); ++i) axis.push_back(uniform(random));
+    const Vector3i brick(-1, 0, 1);
+    sample_tensors(field, {brick, {positions[0].data(), positions[1].data(), positions[2].data()}, count}, 2,
+                   components.data(), sampled_room(count));
+    for (std::size_t p = 0; p < count; ++p) {
+      const Vector3d index = 8 * brick.cast<double>() + Vector3d(positions[0][p], positions[1][p], positions[2][p]);
+      const Matrix3d expected = 2 * sampler.at(field.to_world() * index);
+      for (std::size_t c = 0; c < 9; ++c)
+        EXPECT_NEAR(components[c * sampled_room(count) + p], expected.data()[c], 2e-5 * (1 + expected.norm()));
+    }
+  }
+}
+
+/// The bound of a brick holds everywhere in it.
+TEST(CubicField, NoDeviatorExceedsTheBoundOfItsBrick) {
+  const TensorField field(dense_grid(AlignedBox3i(Vector3i::Zero(), Vector3i(17, 17, 17)), oblique(),
+                                     [](auto& index) {
+                                       std::mt19937 own(static_cast<unsigned>(index.dot(Vector3i(1, 100, 10000))));
+                                       return noise(own);
+                                     }),
+                          fading);
+  TensorSampler sampler(field);
+  std::mt19937 random(1);
+  std::uniform_real_distribution<double> uniform(0, 17);
+  for (int i = 0; i < 1000; ++i) {
+    const Vector3d index(uniform(random), uniform(random), uniform(random));
+    const Matrix3d T = sampler.at(field.to_world() * index);
+    const Vector3i brick = (index / 8).cast<int>();
+    EXPECT_LE((T - T.trace() / 3 * Matrix3d::Identity()).norm(), field.brick(brick).strongest);
+  }
+}
+
+}  // namespace
+}  // namespace tensorray

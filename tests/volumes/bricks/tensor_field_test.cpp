@@ -1,0 +1,270 @@
+#include "volumes/bricks/tensor_field.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <random>
+
+#include <gtest/gtest.h>
+
+#include "volumes/sampling/tensor_sampler.h"
+
+namespace tensorray {
+namespace {
+
+using Eigen::Matrix3d;
+using Eigen::Vector3d;
+using Eigen::Vector3i;
+
+Eigen::AlignedBox3i box(const Vector3i& min, const Vector3i& max) { return {min, max}; }
+
+/// Linear along each axis, but not in all together: trilinear interpolation reproduces it exactly.
+Matrix3d trilinear(const Vector3d& p) {
+  Matrix3d a, b, c;
+  a << 1, 2, 3, 4, 5, 6, 7, 8, 9;
+  b << 0, 1, -1, 2, 0, -2, 1, 1, 3;
+  c << -1, 0, 2, 0, 1, 0, 3, 0, -2;
+  return a + p.x() * b + p.y() * c + p.z() * (a - c) + p.x() * p.y() * p.z() * b;
+}
+
+Eigen::Affine3d oblique() {
+  Eigen::Affine3d transform = Eigen::Affine3d::Identity();
+  transform.linear() =
+      Eigen::AngleAxisd(0.4, Vector3d(1, 2, 3).normalized()).toRotationMatrix() * Vector3d(0.5, 1, 2).asDiagonal();
+  transform.translation() = Vector3d(10, -20, 30);
+  return transform;
+}
+
+std::vector<Vector3d> points_in(const Eigen::AlignedBox3d& extent, int count) {
+  std::mt19937 random(1);
+  std::uniform_real_distribution<double> uniform(0, 1);
+  std::vector<Vector3d> points;
+  for (int i = 0; i < count; ++i)
+    points.push_back(extent.min() +
+                     Vector3d(uniform(random), uniform(random), uniform(random)).cwiseProduct(extent.sizes()));
+  return points;
+}
+
+TEST(TensorField, InterpolatesTrilinearFunctionsExactlyAcrossBricks) {
+  const auto index_box = box({-11, -3, 5}, {9, 14, 30});  // Several bricks, negative indices, no multiple of 8.
+  const TensorGrid grid =
+      dense_grid(index_box, oblique(), [](const Vector3i& i) { return trilinear(i.cast<double>() / 8); });
+  const TensorField field(grid);
+  TensorSampler sampler(field);
+  for (const Vector3d& index : points_in(field.index_bounds(), 2000))
+    EXPECT_LT((sampler.at(oblique() * index) - trilinear(index / 8)).norm(), 1e-5 * trilinear(index / 8).norm());
+  EXPECT_EQ(sampler.samples(), 2000u);
+}
+
+TEST(TensorField, GradientIsTheDerivativeOfTheInterpolation) {
+  const TensorGrid grid = dense_grid(box({0, 0, 0}, {20, 20, 20}), oblique(),
+                                     [](const Vector3i& i) { return trilinear(i.cast<double>() / 8); });
+  const TensorField field(grid);
+  TensorSampler sampler(field);
+  for (const Vector3d& index : points_in({Vector3d::Constant(0.1), Vector3d::Constant(19.9)}, 200)) {
+    const Vector3d world = oblique() * index;
+    Eigen::Matrix<double, 3, 2> along;
+    along << Vector3d(0.5, -1, 2), Vector3d(1, 0.25, 0);
+    std::array<Matrix3d, 2> derivatives;
+    EXPECT_TRUE(sampler.at(world, along, derivatives).isApprox(sampler.at(world), 1e-12));
+    for (int i = 0; i < 2; ++i) {
+      // Derivatives of the analytic function along the index axes: central differences are exact, because it is linear
+      // along each.
+      const double h = 1e-4;
+      const Vector3d by_index = oblique().linear().inverse() * along.col(i);
+      Matrix3d expected = Matrix3d::Zero();
+      for (int axis = 0; axis < 3; ++axis) {
+        const Vector3d step = h * Vector3d::Unit(axis);
+        expected += by_index[axis] * (trilinear((index + step) / 8) - trilinear((index - step) / 8)) / (2 * h);
+      }
+      EXPECT_LT((derivatives[static_cast<std::size_t>(i)] - expected).norm(), 1e-4 * expected.norm() + 1e-5);
+    }
+  }
+}
+
+TEST(TensorField, ExtentIsSpannedByActiveVoxels) {
+  const TensorField field(dense_grid(box({2, 3, 4}, {10, 20, 30}), Eigen::Affine3d::Identity(),
+                                     [](const Vector3i&) { return Matrix3d::Identity(); }));
+  EXPECT_EQ(field.index_bounds().min(), Vector3d(2, 3, 4));
+  EXPECT_EQ(field.index_bounds().max(), Vector3d(10, 20, 30));
+  EXPECT_TRUE(field.contains({2, 3, 4}));
+  EXPECT_FALSE(field.contains({1.999, 3, 4}));
+}
+
+TEST(TensorField, InactiveVoxelsCountAsZero) {
+  TensorGrid grid = dense_grid(box({0, 0, 0}, {2, 2, 2}), Eigen::Affine3d::Identity(),
+                               [](const Vector3i&) { return Matrix3d::Identity(); });
+  const int middle = TensorBlock::offset(1, 1, 1);
+  grid.blocks[0].active.reset(middle);
+  grid.blocks[0].values[middle].setZero();
+  const TensorField field(grid);
+  TensorSampler sampler(field);
+  EXPECT_DOUBLE_EQ(sampler.at({1, 1, 1})(0, 0), 0);
+  EXPECT_DOUBLE_EQ(sampler.at({0.5, 1, 1})(0, 0), 0.5);
+  EXPECT_DOUBLE_EQ(sampler.at({0, 0, 0})(0, 0), 1);
+}
+
+TEST(TensorField, ASingleVoxelAcrossIsOneVoxelThick) {
+  const TensorField field(dense_grid(box({0, 5, 0}, {9, 5, 9}), Eigen::Affine3d::Identity(),
+                                     [](const Vector3i& i) { return Matrix3d(i.x() * Matrix3d::Identity()); }));
+  EXPECT_EQ(field.index_bounds().min().y(), 4.5);
+  EXPECT_EQ(field.index_bounds().max().y(), 5.5);
+  TensorSampler sampler(field);
+  for (const double y : {4.5, 4.9, 5.0, 5.5}) EXPECT_DOUBLE_EQ(sampler.at({3.5, y, 2})(0, 0), 3.5);
+  Eigen::Matrix<double, 3, 2> along;
+  along << Vector3d::UnitY(), Vector3d::UnitX();
+  std::array<Matrix3d, 2> derivatives;
+  sampler.at({3.5, 5.2, 2}, along, derivatives);
+  EXPECT_TRUE(derivatives[0].isZero());
+  EXPECT_DOUBLE_EQ(derivatives[1](0, 0), 1);
+}
+
+TEST(TensorField, MemoryFollowsActiveVoxelsNotTheExtent) {
+  const auto cluster = [](int at) {
+    return dense_grid(box(Vector3i::Constant(at), Vector3i::Constant(at + 7)), Eigen::Affine3d::Identity(),
+                      [](const Vector3i&) { return Matrix3d::Identity(); });
+  };
+  TensorGrid grid = cluster(0);
+  const TensorGrid far = cluster(1 << 24);
+  grid.blocks.insert(grid.blocks.end(), far.blocks.begin(), far.blocks.end());
+  const TensorField field(grid);
+  EXPECT_LT(field.memory_bytes(), 1u << 20);
+  TensorSampler sampler(field);
+  EXPECT_EQ(sampler.at({3.5, 3.5, 3.5})(1, 1), 1);
+  EXPECT_EQ(sampler.at(Vector3d::Constant((1 << 24) + 3.5))(1, 1), 1);
+  EXPECT_TRUE(sampler.at({1e6, 1e6, 1e6}).isZero());
+}
+
+TEST(TensorField, PointsOutsideAreTakenToTheExtent) {
+  const TensorField field(dense_grid(box({0, 0, 0}, {4, 4, 4}), Eigen::Affine3d::Identity(),
+                                     [](const Vector3i& i) { return Matrix3d(i.x() * Matrix3d::Identity()); }));
+  TensorSampler sampler(field);
+  EXPECT_DOUBLE_EQ(sampler.at({9, 2, 2})(0, 0), 4);
+  EXPECT_DOUBLE_EQ(sampler.at({-1e300, 2, 2})(0, 0), 0);
+  EXPECT_TRUE(sampler.at(Vector3d::Constant(std::nan(""))).allFinite());
+}
+
+TEST(TensorField, KnowsItsGreatestNorm) {
+  const TensorField field(dense_grid(box({0, 0, 0}, {4, 4, 4}), Eigen::Affine3d::Identity(), [](const Vector3i& i) {
+    return Matrix3d((i.sum() == 12 ? -2.5 : 1) * Matrix3d::Identity());
+  }));
+  EXPECT_NEAR(field.greatest_norm(), 2.5 * std::sqrt(3.0), 1e-6);
+}
+
+/// Checks that two fields have the same bricks, bit for bit.
+void expect_same(const TensorField& a, const TensorField& b, const Eigen::AlignedBox3i& bricks) {
+  ASSERT_EQ(a.brick_count(), b.brick_count());
+  for (int x = bricks.min().x(); x <= bricks.max().x(); ++x)
+    for (int y = bricks.min().y(); y <= bricks.max().y(); ++y)
+      for (int z = bricks.min().z(); z <= bricks.max().z(); ++z) {
+        const TensorBrick one = a.brick({x, y, z}), other = b.brick({x, y, z});
+        ASSERT_EQ(a.is_stored({x, y, z}), b.is_stored({x, y, z}));
+        ASSERT_EQ(one.strongest, other.strongest);
+        ASSERT_TRUE(std::equal(one.bending, one.bending + TensorBrick::trailing_offset(one.components), other.bending));
+        ASSERT_TRUE(std::equal(one.trailing, one.trailing + TensorBrick::voxels, other.trailing));
+      }
+}
+
+TEST(TensorField, IsTheSameIfTheSourceKeepsTheBlocks) {
+  const auto value = [](const Vector3i& i) { return trilinear(i.cast<double>() / 8); };
+  TensorGrid grid = dense_grid(box({-200, -3, 5}, {170, 140, 200}), oblique(), value);  // Several parts are made.
+  for (int turn = 0; turn < 2; ++turn) {
+    const TensorField field(grid);
+    const TensorField kept(source_of(grid));
+    expect_same(field, kept, box({-26, -2, -1}, {23, 19, 27}));
+    std::mt19937 random(3);
+    std::bernoulli_distribution leaves(0.6);
+    grid.blocks.erase(
+        std::remove_if(grid.blocks.begin(), grid.blocks.end(), [&](const TensorBlock&) { return leaves(random); }),
+        grid.blocks.end());
+  }
+}
+
+/// The Frobenius norm, in double precision, of the tensor of a voxel.
+double deviator(const TensorBrick& brick, int voxel) {
+  const Matrix3d T = brick.tensor(voxel);
+  return (T - T.trace() / 3 * Matrix3d::Identity()).norm();
+}
+
+TEST(TensorField, KnowsTheStrongestDeviatorOfABrickAtAnyScale) {
+  std::mt19937 random(2);
+  std::normal_distribution<double> normal;
+  for (const double scale : {1e-37, 1e-30, 1e-20, 1e-13, 1e-6, 1.0, 1e6, 1e14, 1e15, 1e20, 1e37})
+    for (const double isotropic : {0.0, 1.0}) {
+      const TensorField field(dense_grid(box({0, 0, 0}, {15, 8, 8}), Eigen::Affine3d::Identity(), [&](const Vector3i&) {
+        Matrix3d T = isotropic * Matrix3d::Identity();
+        for (int i = 0; i < 9; ++i) T(i / 3, i % 3) += (1 - 0.9 * isotropic) * normal(random);
+        return Matrix3d(scale * T);
+      }));
+      for (int x = 0; x < 2; ++x) {
+        const TensorBrick brick = field.brick({x, 0, 0});
+        double greatest = 0;
+        for (int voxel = 0; voxel < TensorBrick::voxels; ++voxel) greatest = std::max(greatest, deviator(brick, voxel));
+        EXPECT_GE(brick.strongest, greatest * (1 + 9e-6)) << scale;
+        EXPECT_LE(brick.strongest, greatest * (1 + 2e-5)) << scale;
+      }
+    }
+}
+
+TEST(TensorField, BricksThatBendNothingHaveNoDeviator) {
+  for (const double value : {0.0, 3.0, 1e-30, 1e38}) {
+    const TensorField field(dense_grid(box({0, 0, 0}, {7, 7, 7}), Eigen::Affine3d::Identity(),
+                                       [&](const Vector3i&) { return Matrix3d(value * Matrix3d::Identity()); }));
+    EXPECT_EQ(field.brick({0, 0, 0}).strongest, 0);
+  }
+}
+
+TEST(TensorField, WhatIsNotFiniteDoesNotHideTheStrongestDeviator) {
+  const float infinity = std::numeric_limits<float>::infinity();
+  TensorGrid grid = dense_grid(box({0, 0, 0}, {7, 7, 7}), Eigen::Affine3d::Identity(),
+                               [](const Vector3i& i) { return Matrix3d(i.x() * Vector3d::UnitX().asDiagonal()); });
+  grid.blocks[0].values[100].setConstant(std::nanf(""));
+  grid.blocks[0].values[200](1, 1) = infinity;
+  EXPECT_NEAR(TensorField(grid).brick({0, 0, 0}).strongest, 7 * std::sqrt(2.0 / 3), 1e-3);
+  grid.blocks[0].values[300](0, 1) = infinity;
+  EXPECT_EQ(TensorField(grid).brick({0, 0, 0}).strongest, infinity);
+}
+
+TEST(TensorField, RefusesWhatCannotBeTraced) {
+  EXPECT_THROW(TensorField{TensorGrid{}}, std::invalid_argument);
+  TensorGrid flat = dense_grid(box({0, 0, 0}, {1, 1, 1}), Eigen::Affine3d::Identity(),
+                               [](const Vector3i&) { return Matrix3d::Identity(); });
+  flat.to_world.linear().col(2).setZero();
+  EXPECT_THROW(TensorField{flat}, std::invalid_argument);
+}
+
+TEST(TensorGrid, DenseGridHasEveryVoxelOfItsBox) {
+  const TensorGrid grid = dense_grid(box({-9, 0, 7}, {8, 0, 8}), Eigen::Affine3d::Identity(),
+                                     [](const Vector3i& i) { return Matrix3d(i.x() * Matrix3d::Identity()); });
+  EXPECT_EQ(grid.active_voxels(), 18u * 1 * 2);
+  EXPECT_EQ(grid.active_box().min(), Vector3i(-9, 0, 7));
+  EXPECT_EQ(grid.active_box().max(), Vector3i(8, 0, 8));
+  for (const TensorBlock& block : grid.blocks)
+    for (int i = 0; i < 3; ++i) EXPECT_EQ(block.origin[i] % TensorBlock::size, 0);
+}
+
+TEST(TensorGrid, NonFiniteVoxelsAreRemovedAndCounted) {
+  const double nan = std::nan(""), infinity = std::numeric_limits<double>::infinity();
+  TensorGrid grid = dense_grid(box({0, 0, 0}, {9, 0, 0}), Eigen::Affine3d::Identity(), [&](const Vector3i& i) {
+    return Matrix3d::Constant(i.x() == 3 ? nan : i.x() >= 8 ? infinity : 1).eval();
+  });
+  EXPECT_EQ(remove_non_finite(grid), 3u);
+  EXPECT_EQ(grid.active_voxels(), 7u);
+  EXPECT_EQ(grid.blocks.size(), 1u);  // The second block has no active voxel left.
+  EXPECT_EQ(remove_non_finite(grid), 0u);
+}
+
+TEST(TensorGrid, AsymmetryTellsSymmetricFromAntisymmetric) {
+  const auto of = [](const Matrix3d& tensor) {
+    return asymmetry(
+        dense_grid(box({0, 0, 0}, {3, 3, 3}), Eigen::Affine3d::Identity(), [&](const Vector3i&) { return tensor; }));
+  };
+  Matrix3d skew;
+  skew << 0, 1, -2, -1, 0, 3, 2, -3, 0;
+  EXPECT_EQ(of(Vector3d(1, 2, 3).asDiagonal().toDenseMatrix()), 0);
+  EXPECT_NEAR(of(skew), 2, 1e-12);
+  EXPECT_EQ(of(Matrix3d::Zero()), 0);
+}
+
+}  // namespace
+}  // namespace tensorray

@@ -1,0 +1,535 @@
+#include "volumes/files/tensor_files.h"
+
+#include <fstream>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <openvdb/io/Stream.h>
+#include <openvdb/openvdb.h>
+
+#include "base/text/byte_order.h"
+#include "tests/volumes/file_support.h"
+
+namespace tensorray {
+namespace {
+
+namespace fs = std::filesystem;
+using Eigen::Matrix3d;
+using Eigen::Matrix3f;
+using Eigen::Vector3d;
+using Eigen::Vector3i;
+using testing::AllOf;
+using testing::HasSubstr;
+using testing::ThrowsMessage;
+
+TEST(TensorFiles, RoundTripIsExact) {
+  const TensorGrid grid = sparse_grid();
+  const Temporary path("a.vdb");
+  write_tensor_vdb(path, grid);
+  const TensorGrid read = read_tensor_vdb(path);
+  EXPECT_EQ(read.name, "stress");
+  EXPECT_EQ(read.metadata, grid.metadata);
+  EXPECT_LE((read.to_world.matrix() - grid.to_world.matrix()).norm(), 1e-14);
+  expect_same_blocks(read, grid);
+}
+
+TEST(TensorFiles, HalfRoundTripErrsByHalfsPrecision) {
+  const TensorGrid grid = sparse_grid();
+  const Temporary path("a.vdb"), full("b.vdb");
+  write_tensor_vdb(path, grid, true);
+  write_tensor_vdb(full, grid);
+  EXPECT_LT(fs::file_size(path), fs::file_size(full));
+  const TensorGrid read = read_tensor_vdb(path);
+  ASSERT_EQ(read.blocks.size(), grid.blocks.size());
+  for (std::size_t i = 0; i < grid.blocks.size(); ++i) {
+    EXPECT_EQ(read.blocks[i].active, grid.blocks[i].active);
+    // Half floats have 11 bits, and steps of 2^-24 below 2^-14.
+    for (int offset = 0; offset < TensorBlock::voxels; ++offset)
+      for (int c = 0; c < 9; ++c) {
+        const float value = grid.blocks[i].values[offset](c);
+        ASSERT_NEAR(read.blocks[i].values[offset](c), value, std::max(std::abs(value) / 2048, 3e-8f));
+      }
+  }
+  EXPECT_EQ(list_vdb(path)[0].storage, "half");
+  EXPECT_EQ(list_vdb(full)[0].storage, "full");
+}
+
+TEST(TensorFiles, HalfRefusesGreatValues) {
+  TensorGrid grid = sparse_grid();
+  grid.blocks[1].values[1](2, 0) = -70000;
+  const Temporary path("a.vdb");
+  EXPECT_THAT([&] { write_tensor_vdb(path, grid, true); },
+              ThrowsMessage<std::runtime_error>(AllOf(HasSubstr(path.string()), HasSubstr("65504"))));
+  EXPECT_NO_THROW(write_tensor_vdb(path, grid, false));
+}
+
+TEST(TensorFiles, KeepsNonFiniteValues) {
+  TensorGrid grid = sparse_grid();
+  grid.blocks[0].values[grid.blocks[0].active[1] ? 1 : 2](0, 1) = std::numeric_limits<float>::quiet_NaN();
+  const std::size_t active = grid.active_voxels();
+  const Temporary path("a.vdb");
+  write_tensor_vdb(path, grid);
+  TensorGrid read = read_tensor_vdb(path);
+  EXPECT_EQ(read.active_voxels(), active);
+  EXPECT_EQ(remove_non_finite(read), remove_non_finite(grid));
+}
+
+TEST(TensorFiles, SameGridGivesSameBytes) {
+  const Temporary a("a.vdb"), b("b.vdb"), c("c.vdb");
+  TensorGrid grid = sparse_grid();
+  write_tensor_vdb(a, grid);
+  write_tensor_vdb(b, grid);
+  EXPECT_TRUE(bytes_of(a) == bytes_of(b));
+  grid.blocks[3].active.set(4);
+  grid.blocks[3].values[4](1, 1) += 1;
+  write_tensor_vdb(c, grid);
+  EXPECT_NE(bytes_of(a).substr(21, 36), bytes_of(c).substr(21, 36));  // The unique tag tells them apart.
+}
+
+TEST(TensorFiles, StockOpenVdbReadsThem) {
+  const TensorGrid grid = sparse_grid();
+  const Temporary path("a.vdb");
+  write_tensor_vdb(path, grid);
+  openvdb::io::File file(path.string());
+  file.open();
+  const auto metadata = file.getMetadata();
+  EXPECT_EQ(metadata->metaValue<std::string>("tensorray:units"), "Pa/m");
+  for (int row = 0; row < 3; ++row) {
+    const auto base = file.readGrid("stress_row" + std::to_string(row));
+    const auto vectors = openvdb::gridPtrCast<openvdb::Vec3SGrid>(base);
+    ASSERT_TRUE(vectors);
+    EXPECT_EQ(vectors->getVectorType(), openvdb::VEC_INVARIANT);
+    EXPECT_EQ(vectors->activeVoxelCount(), grid.active_voxels());
+    EXPECT_EQ(vectors->metaValue<std::string>("tensorray:source"), "a test");
+    const openvdb::Vec3d world = vectors->indexToWorld(openvdb::Vec3d(2, 3, 4));
+    EXPECT_LE((Vector3d(world.x(), world.y(), world.z()) - grid.to_world * Vector3d(2, 3, 4)).norm(), 1e-12);
+    auto accessor = vectors->getConstAccessor();
+    for (const Vector3i& i : {Vector3i(-11, -3, 6), Vector3i(0, 0, 13), Vector3i(6, 12, 21)}) {
+      const openvdb::Vec3s value = accessor.getValue(openvdb::Coord(i.x(), i.y(), i.z()));
+      const Matrix3f* expected = find(grid, i);
+      for (int column = 0; column < 3; ++column) EXPECT_EQ(value[column], expected ? (*expected)(row, column) : 0);
+    }
+  }
+}
+
+TEST(TensorFiles, NumberedAndLetteredScalars) {
+  const auto scalar = [](const std::string& name, double value) -> openvdb::GridBase::Ptr {
+    const auto grid = stock_grid<openvdb::FloatGrid>(name, 0);
+    grid->tree().setValue(openvdb::Coord(1, 2, -3), static_cast<float>(value));
+    return grid;
+  };
+  openvdb::GridPtrVec numbered, full, six;
+  for (int i = 0; i < 9; ++i) {
+    numbered.push_back(scalar("T_" + std::to_string(i), i + 1));
+    full.push_back(scalar(std::string("T.") + "xyz"[i / 3] + "xyz"[i % 3], i + 1));
+    if (i % 3 >= i / 3) six.push_back(scalar(std::string("T.") + "xyz"[i / 3] + "xyz"[i % 3], i + 1));
+  }
+  std::reverse(full.begin(), full.end());  // The order in the file does not matter.
+  Matrix3f all, symmetric;
+  all << 1, 2, 3, 4, 5, 6, 7, 8, 9;
+  symmetric << 1, 2, 3, 2, 5, 6, 3, 6, 9;
+  const Temporary path("a.vdb");
+  for (const auto& [grids, expected] : {std::pair(numbered, all), std::pair(full, all), std::pair(six, symmetric)}) {
+    write_stock(path, grids);
+    const TensorGrid read = read_tensor_vdb(path);
+    EXPECT_EQ(read.name, "T");
+    ASSERT_EQ(read.active_voxels(), 1u);
+    ASSERT_NE(find(read, {1, 2, -3}), nullptr);
+    EXPECT_EQ(*find(read, {1, 2, -3}), expected);
+  }
+}
+
+TEST(TensorFiles, DoublePrecisionRows) {
+  openvdb::GridPtrVec rows;
+  for (int row = 0; row < 3; ++row) {
+    rows.push_back(stock_grid<openvdb::Vec3DGrid>("T_row" + std::to_string(row), openvdb::Vec3d(0)));
+    openvdb::gridPtrCast<openvdb::Vec3DGrid>(rows.back())->tree().setValue({0, 0, 0}, {row + 0.5, row + 1.5, 1e300});
+  }
+  const Temporary path("a.vdb");
+  write_stock(path, rows);
+  const TensorGrid read = read_tensor_vdb(path, "T");
+  EXPECT_EQ((*find(read, {0, 0, 0}))(2, 1), 3.5f);
+  EXPECT_EQ((*find(read, {0, 0, 0}))(2, 2), std::numeric_limits<float>::infinity());
+}
+
+TEST(TensorFiles, ActiveWhereAnyComponentIsAndZeroElsewhere) {
+  openvdb::GridPtrVec rows;
+  for (int row = 0; row < 3; ++row) {
+    const auto grid = stock_grid<openvdb::Vec3SGrid>("T_row" + std::to_string(row), openvdb::Vec3s(7));
+    grid->tree().setValueOn({row, 0, 0}, openvdb::Vec3s(1, 2, 3));
+    grid->tree().setValueOff({5, 5, 5}, openvdb::Vec3s(9));  // Inactive voxels do not count, whatever their values.
+    rows.push_back(grid);
+  }
+  const Temporary path("a.vdb");
+  write_stock(path, rows);
+  const TensorGrid read = read_tensor_vdb(path);
+  EXPECT_EQ(read.active_voxels(), 3u);
+  Matrix3f expected = Matrix3f::Zero();
+  expected.row(1) << 1, 2, 3;
+  EXPECT_EQ(*find(read, {1, 0, 0}), expected);
+  EXPECT_EQ(read.blocks[0].values[TensorBlock::offset(5, 5, 5)], Matrix3f(Matrix3f::Zero()));
+}
+
+/// Also where all voxels of a block are active, and a block was read before it.
+TEST(TensorFiles, ComponentsOfGridsWithoutAVoxelAreZero) {
+  openvdb::GridPtrVec rows;
+  for (int row = 0; row < 3; ++row) {
+    const auto grid = stock_grid<openvdb::Vec3SGrid>("T_row" + std::to_string(row), openvdb::Vec3s(0));
+    grid->denseFill({{0, 0, 0}, {7, 7, row == 0 ? 15 : 7}}, openvdb::Vec3s(1, 2, 3));
+    rows.push_back(grid);
+  }
+  openvdb::gridPtrCast<openvdb::Vec3SGrid>(rows[1])->tree().setValueOn({0, 0, 8}, openvdb::Vec3s(4, 5, 6));
+  const Temporary path("a.vdb");
+  write_stock(path, rows);
+  const BlockSource source = open_tensor_vdb(path);
+  TensorBlock block;
+  read_block(source, 0, block);
+  read_block(source, 1, block);
+  EXPECT_TRUE(block.active.all());
+  Matrix3f expected = Matrix3f::Zero();
+  expected.row(0) << 1, 2, 3;
+  EXPECT_EQ(block.values[1], expected);
+  expected.row(1) << 4, 5, 6;
+  EXPECT_EQ(block.values[0], expected);
+}
+
+TEST(TensorFiles, OfGridsWithOneNameTheSameIsReadEachTime) {
+  openvdb::GridPtrVec rows;
+  for (int i = 0; i < 6; ++i) {
+    rows.push_back(
+        stock_grid<openvdb::Vec3SGrid>((i < 3 ? "T_row" : "U_row") + std::to_string(i % 3), openvdb::Vec3s(0)));
+    openvdb::gridPtrCast<openvdb::Vec3SGrid>(rows.back())
+        ->denseFill({{0, 0, 0}, {7, 7, 7}}, openvdb::Vec3s(static_cast<float>(i / 3 + 1)));
+  }
+  const Temporary path("a.vdb");
+  write_stock(path, rows);
+  std::string bytes = bytes_of(path);
+  for (std::size_t at = bytes.find("U_row"); at != std::string::npos; at = bytes.find("U_row", at)) bytes[at] = 'T';
+  write_bytes(path, bytes);
+  for (int i = 0; i < 10; ++i) {
+    const Matrix3f tensor = read_tensor_vdb(path).blocks[0].values[0];
+    EXPECT_EQ(tensor, Matrix3f(Matrix3f::Constant(tensor(0, 0))));
+  }
+}
+
+/// OpenVDB's own files, whose tables of leaves say other flags than the leaves, or lengths that nothing has.
+TEST(TensorFiles, StockFilesOfAllCompressions) {
+  using namespace openvdb::io;
+  TensorGrid grid = sparse_grid();
+  const Temporary path("a.vdb"), stock("b.vdb");
+  for (const bool half : {false, true})
+    for (const bool dense : {false, true}) {
+      if (dense)
+        for (TensorBlock& block : grid.blocks) block.active.set();
+      write_tensor_vdb(path, grid, half);
+      openvdb::io::File file(path.string());
+      file.open(/*delayLoad=*/false);
+      const auto grids = file.getGrids();
+      for (const openvdb::GridBase::Ptr& row : *grids)  // A leaf without active voxels.
+        openvdb::gridPtrCast<openvdb::Vec3SGrid>(row)->tree().setValueOff({100, 0, 0}, openvdb::Vec3s(1));
+      for (const std::uint32_t values : {COMPRESS_NONE, COMPRESS_ZIP, COMPRESS_BLOSC})
+        for (const std::uint32_t mask : {0u, std::uint32_t{COMPRESS_ACTIVE_MASK}}) {
+          write_stock(stock, *grids, values | mask);
+          expect_same_blocks(read_tensor_vdb(stock), read_tensor_vdb(path));
+        }
+    }
+}
+
+TEST(TensorFiles, BlocksAreReadInAnyOrder) {
+  const TensorGrid grid = sparse_grid();
+  const Temporary path("a.vdb");
+  for (const bool half : {false, true}) {
+    write_tensor_vdb(path, grid, half);
+    const BlockSource source = open_tensor_vdb(path, grid.name);
+    EXPECT_EQ(source.metadata.at("tensorray:units"), "Pa/m");
+    EXPECT_TRUE(source.to_world.isApprox(grid.to_world, 1e-15));
+    ASSERT_EQ(source.shapes.size(), grid.blocks.size());
+    TensorBlock block;
+    for (int turn = 0; turn < 2; ++turn)
+      for (std::size_t i = grid.blocks.size(); i-- > 0;) {
+        read_block(source, i, block);
+        EXPECT_EQ(block.origin, grid.blocks[i].origin);
+        EXPECT_EQ(block.active, grid.blocks[i].active);
+        for (int offset = 0; offset < TensorBlock::voxels; ++offset)
+          ASSERT_LE((block.values[offset] - grid.blocks[i].values[offset]).norm(), half ? 1e-3 : 0);
+      }
+  }
+}
+
+TEST(TensorFiles, DamagedVoxelsAreNoticedWhenTheyAreRead) {
+  const Temporary path("a.vdb"), damaged("b.vdb");
+  write_tensor_vdb(path, sparse_grid());
+  std::string bytes = bytes_of(path);
+  // The values of the last leaf end with the file. Its chunk of Blosc begins with the versions of Blosc and its format.
+  const std::size_t chunk = bytes.rfind("\x02\x01");
+  ASSERT_NE(chunk, std::string::npos);
+  for (std::size_t i = chunk + 16; i < bytes.size(); ++i) bytes[i] = static_cast<char>(0xff);
+  write_bytes(damaged, bytes);
+  const BlockSource source = open_tensor_vdb(damaged);
+  EXPECT_THAT([&] { to_grid(source); }, testing::ThrowsMessage<std::runtime_error>(testing::AllOf(
+                                            testing::HasSubstr(damaged.string()), testing::HasSubstr("damaged"))));
+}
+
+/// Files have a table of their leaves' lengths.
+TEST(TensorFiles, OpenVdbSkipsLeavesByTheTable) {
+  const TensorGrid grid = sparse_grid();
+  const Temporary path("a.vdb");
+  for (const bool half : {false, true}) {
+    write_tensor_vdb(path, grid, half);
+    openvdb::io::File file(path.string());
+    file.open();
+    const auto all = openvdb::gridPtrCast<openvdb::Vec3SGrid>(file.readGrid("stress_row1"));
+    for (const TensorBlock& block : grid.blocks) {
+      const openvdb::Coord origin(block.origin.x(), block.origin.y(), block.origin.z());
+      const openvdb::CoordBBox box(origin, origin.offsetBy(TensorBlock::size - 1));
+      const openvdb::BBoxd world(all->indexToWorld(box.min()), all->indexToWorld(box.max()));
+      const auto part = openvdb::gridPtrCast<openvdb::Vec3SGrid>(file.readGrid("stress_row1", world));
+      for (int i = 0; i < TensorBlock::voxels; ++i) {
+        const Vector3i at = TensorBlock::position(i);
+        const openvdb::Coord voxel = origin.offsetBy(at.x(), at.y(), at.z());
+        if (!block.active[i]) continue;
+        ASSERT_EQ(part->getConstAccessor().getValue(voxel), all->getConstAccessor().getValue(voxel));
+      }
+    }
+  }
+}
+
+TEST(TensorFiles, WrongTablesOfLeavesDoNoHarm) {
+  const TensorGrid grid = sparse_grid();
+  const Temporary path("a.vdb"), damaged("b.vdb");
+  write_tensor_vdb(path, grid);
+  const std::string bytes = bytes_of(path);
+  // The number of leaves, their flags and their lengths follow the name, the type, and the length of the value. Lists
+  // begin with a zero where they are not packed.
+  const std::string type = "__delayedload";
+  const std::size_t table = bytes.find(type) + type.size() + 4, leaves = grid.blocks.size(),
+                    lengths = table + 12 + leaves;
+  ASSERT_EQ(read_number<std::uint32_t>(&bytes[table], ByteOrder::little), leaves);
+  const auto read_changed = [&](std::size_t at, std::int64_t first, std::int64_t second) {
+    std::string changed = bytes;
+    std::string numbers;
+    append_number(read_number<std::int64_t>(&bytes[at], ByteOrder::little) + first, ByteOrder::little, numbers);
+    append_number(read_number<std::int64_t>(&bytes[at + 8], ByteOrder::little) + second, ByteOrder::little, numbers);
+    write_bytes(damaged, changed.replace(at, 16, numbers));
+    return read_tensor_vdb(damaged);
+  };
+  for (std::size_t i = 0; i + 1 < leaves; ++i) {
+    const std::size_t at = lengths + 8 * i;
+    expect_same_blocks(read_changed(at, 0, 0), grid);
+    expect_same_blocks(read_changed(at, 1, 0), grid);
+    expect_same_blocks(read_changed(at, -(std::int64_t{1} << 40), 0), grid);
+    for (const std::int64_t difference : {-70, -1, 1, 8, 70})
+      expect_same_blocks(read_changed(at, difference, -difference), grid);
+  }
+}
+
+TEST(TensorFiles, ActiveTilesAreVoxels) {
+  openvdb::GridPtrVec rows;
+  for (int row = 0; row < 3; ++row) {
+    const auto grid = stock_grid<openvdb::Vec3SGrid>("T_row" + std::to_string(row), openvdb::Vec3s(0));
+    // One tile of a leaf's size with voxels beside it, and one tile of the next level (128³).
+    grid->sparseFill(openvdb::CoordBBox(-1, -8, 0, 8, -1, 7), openvdb::Vec3s(static_cast<float>(row + 1)));
+    grid->tree().addTile(2, openvdb::Coord(128, 0, 0), openvdb::Vec3s(4), true);
+    rows.push_back(grid);
+  }
+  EXPECT_GT(openvdb::gridPtrCast<openvdb::Vec3SGrid>(rows[0])->tree().activeTileCount(), 1u);
+  const Temporary path("a.vdb");
+  write_stock(path, rows);
+  const TensorGrid read = read_tensor_vdb(path);
+  EXPECT_EQ(read.active_voxels(), 10u * 8 * 8 + 128u * 128 * 128);
+  EXPECT_EQ((*find(read, {3, -4, 4}))(2, 0), 3.0f);
+  EXPECT_EQ((*find(read, {200, 100, 127}))(0, 2), 4.0f);
+  EXPECT_TRUE(std::is_sorted(read.blocks.begin(), read.blocks.end(), [](const auto& a, const auto& b) {
+    return std::lexicographical_compare(a.origin.data(), a.origin.data() + 3, b.origin.data(), b.origin.data() + 3);
+  }));
+}
+
+TEST(TensorFiles, GridsThatShareATree) {
+  const auto first = stock_grid<openvdb::FloatGrid>("T_1", 0);
+  first->tree().setValue({1, 1, 1}, 3);
+  openvdb::GridPtrVec grids{first};
+  for (const int i : {0, 2, 3, 4, 5, 6, 7, 8}) {
+    const openvdb::FloatGrid::Ptr shared = first->copy();  // Grids share one tree, written once.
+    shared->setName("T_" + std::to_string(i));
+    grids.push_back(shared);
+  }
+  const Temporary path("a.vdb");
+  write_stock(path, grids);
+  EXPECT_EQ(*find(read_tensor_vdb(path), {1, 1, 1}), Matrix3f(Matrix3f::Constant(3)));
+}
+
+TEST(TensorFiles, FilesWrittenAsAStream) {
+  const TensorGrid grid = sparse_grid();
+  const Temporary path("a.vdb"), streamed("b.vdb");
+  write_tensor_vdb(path, grid);
+  openvdb::io::File file(path.string());
+  file.open();
+  {
+    std::ofstream out(streamed, std::ios::binary);
+    openvdb::io::Stream(out).write(*file.getGrids());
+  }
+  expect_same_blocks(read_tensor_vdb(streamed), grid);
+  const std::string bytes = bytes_of(streamed);
+  for (int i = 0; i < 50; ++i) {
+    write_bytes(path, bytes.substr(0, bytes.size() * i / 50));
+    EXPECT_THROW(read_tensor_vdb(path), std::runtime_error) << i;
+  }
+}
+
+TEST(TensorFiles, ChoosesAmongFieldsByName) {
+  const Temporary path("a.vdb");
+  openvdb::GridPtrVec grids;
+  for (const std::string name : {"A", "B"})
+    for (int row = 0; row < 3; ++row) {
+      const auto grid = stock_grid<openvdb::Vec3SGrid>(name + "_row" + std::to_string(row), openvdb::Vec3s(0));
+      grid->tree().setValue({0, 0, 0}, openvdb::Vec3s(name == "A" ? 1 : 2));
+      grids.push_back(grid);
+    }
+  grids.push_back(stock_grid<openvdb::FloatGrid>("density", 0));
+  grids.push_back(stock_grid<openvdb::BoolGrid>("mask", false));
+  write_stock(path, grids);
+  EXPECT_EQ((*find(read_tensor_vdb(path, "B"), {0, 0, 0}))(0, 0), 2);
+  EXPECT_EQ(tensor_names(list_vdb(path)), (std::vector<std::string>{"A", "B"}));
+  EXPECT_THAT([&] { read_tensor_vdb(path); },
+              ThrowsMessage<std::runtime_error>(AllOf(HasSubstr(path.string()), HasSubstr("name one of: A, B"))));
+  EXPECT_THAT([&] { read_tensor_vdb(path, "C"); },
+              ThrowsMessage<std::runtime_error>(
+                  AllOf(HasSubstr("\"C\""), HasSubstr("density (float)"), HasSubstr("mask (bool)"))));
+  EXPECT_THAT([&] { read_tensor_vdb(path, "density", Derive::hessian); },
+              ThrowsMessage<std::runtime_error>(HasSubstr("no active voxel")));
+}
+
+TEST(TensorFiles, IncompleteFieldIsNoField) {
+  const Temporary path("a.vdb");
+  write_stock(path, {stock_grid<openvdb::Vec3SGrid>("T_row0", openvdb::Vec3s(0)),
+                     stock_grid<openvdb::Vec3SGrid>("T_row2", openvdb::Vec3s(0))});
+  EXPECT_THAT([&] { read_tensor_vdb(path); },
+              ThrowsMessage<std::runtime_error>(HasSubstr("T_row0 (vec3s), T_row2 (vec3s)")));
+}
+
+TEST(TensorFiles, RefusesDifferentTransformsAndFrustums) {
+  const Temporary path("a.vdb");
+  openvdb::GridPtrVec rows;
+  for (int row = 0; row < 3; ++row) {
+    rows.push_back(stock_grid<openvdb::Vec3SGrid>("T_row" + std::to_string(row), openvdb::Vec3s(0)));
+    openvdb::gridPtrCast<openvdb::Vec3SGrid>(rows.back())->tree().setValue({0, 0, 0}, openvdb::Vec3s(1));
+  }
+  rows[2]->setTransform(openvdb::math::Transform::createLinearTransform(0.5));
+  write_stock(path, rows);
+  EXPECT_THAT([&] { read_tensor_vdb(path); }, ThrowsMessage<std::runtime_error>(HasSubstr("different transforms")));
+  for (const auto& row : rows)
+    row->setTransform(
+        openvdb::math::Transform::createFrustumTransform(openvdb::BBoxd({0, 0, 0}, {8, 8, 8}), 0.5, 10, 1));
+  write_stock(path, rows);
+  EXPECT_THAT([&] { read_tensor_vdb(path); }, ThrowsMessage<std::runtime_error>(HasSubstr("not affine")));
+}
+
+/// A grid of `value(world)` at the voxels of a ball, so that every kind of edge occurs.
+template <class Grid, class Value>
+typename Grid::Ptr ball(const std::string& name, const openvdb::math::Transform::Ptr& transform, const Value& value) {
+  const auto grid = stock_grid<Grid>(name, openvdb::zeroVal<typename Grid::ValueType>());
+  grid->setTransform(transform);
+  for (int x = -9; x <= 9; ++x)
+    for (int y = -9; y <= 9; ++y)
+      for (int z = -9; z <= 9; ++z)
+        if (x * x + y * y + z * z <= 80)
+          grid->tree().setValue({x, y, z}, value(transform->indexToWorld(openvdb::Coord(x, y, z))));
+  return grid;
+}
+
+openvdb::math::Transform::Ptr oblique_transform() {
+  const auto transform = openvdb::math::Transform::createLinearTransform(0.5);
+  transform->preScale(openvdb::Vec3d(1, 0.5, 2));
+  transform->postRotate(0.7, openvdb::math::X_AXIS);
+  transform->postRotate(-0.4, openvdb::math::Z_AXIS);
+  transform->postTranslate(openvdb::Vec3d(3, -1, 2));
+  return transform;
+}
+
+TEST(TensorFiles, GradientOfALinearFieldIsExactInWorldAxes) {
+  Matrix3d jacobian;
+  jacobian << 1, -2, 0.5, 3, 0.25, -1, 0.125, 4, -0.75;
+  const auto velocity = [&](const openvdb::Vec3d& p) {
+    const Vector3d v = jacobian * Vector3d(p.x(), p.y(), p.z());
+    return openvdb::Vec3d(v.x(), v.y(), v.z());
+  };
+  const Temporary path("a.vdb");
+  write_stock(path, {ball<openvdb::Vec3DGrid>("velocity", oblique_transform(), velocity)});
+  const TensorGrid read = read_tensor_vdb(path, "", Derive::gradient);
+  EXPECT_EQ(read.name, "velocity");
+  EXPECT_GT(read.active_voxels(), 2000u);
+  for (const TensorBlock& block : read.blocks)
+    for (int offset = 0; offset < TensorBlock::voxels; ++offset) {
+      if (!block.active[offset]) continue;
+      // The six poles of the ball have no neighbour along two axes, where the field counts as constant.
+      if ((block.origin + TensorBlock::position(offset)).cast<double>().norm() > 8.5) continue;
+      ASSERT_LE((block.values[offset].cast<double>() - jacobian).norm(), 1e-5);
+    }
+}
+
+TEST(TensorFiles, HessianOfAQuadraticIsExactInWorldAxes) {
+  Matrix3d second;
+  second << 2, 1, -0.5, 1, -3, 0.25, -0.5, 0.25, 1;
+  const auto potential = [&](const openvdb::Vec3d& p) {
+    const Vector3d x(p.x(), p.y(), p.z());
+    return 0.5 * x.dot(second * x) + x.dot(Vector3d(1, 2, 3)) - 5;
+  };
+  const Temporary path("a.vdb");
+  write_stock(path, {ball<openvdb::DoubleGrid>("potential", oblique_transform(), potential)});
+  const TensorGrid read = read_tensor_vdb(path, "potential", Derive::hessian);
+  std::size_t inside = 0;
+  for (const TensorBlock& block : read.blocks)
+    for (int offset = 0; offset < TensorBlock::voxels; ++offset) {
+      if (!block.active[offset]) continue;
+      ASSERT_EQ(block.values[offset], Matrix3f(block.values[offset].transpose()));
+      const Vector3i index = block.origin + TensorBlock::position(offset);
+      if (index.cast<double>().norm() > 6.5) continue;  // Deep enough for all differences.
+      ++inside;
+      ASSERT_LE((block.values[offset].cast<double>() - second).norm(), 1e-5);
+    }
+  EXPECT_GT(inside, 1000u);
+}
+
+TEST(TensorFiles, VoxelsOfAnySizeAreWrittenAndRead) {
+  for (const double unit : {1e-30, 1e-12, 1e-9, 3e-6, 1e-5, 1e-3, 1.0, 1e10, 1e26}) {
+    TensorGrid grid = sparse_grid();
+    grid.to_world = Eigen::Affine3d(Eigen::Scaling(unit)) * grid.to_world;
+    grid.metadata["tensorray:length_unit"] = "7";  // As of a file that was read and changed: it is not kept.
+    const Temporary path("a.vdb");
+    write_tensor_vdb(path, grid);
+    const TensorGrid read = read_tensor_vdb(path);
+    EXPECT_LE((read.to_world.matrix() - grid.to_world.matrix()).topRows<3>().norm(), 1e-14 * unit) << unit;
+    EXPECT_EQ(read.metadata.count("tensorray:length_unit"), 0u);
+    expect_same_blocks(read, grid);
+    openvdb::io::File stock(path.string());
+    stock.open();
+    const auto row = stock.readGridMetadata("stress_row0");
+    const bool has_unit = row->getMetadata<openvdb::StringMetadata>("tensorray:length_unit") != nullptr;
+    EXPECT_EQ(has_unit, unit < 1e-4) << unit;  // Others read the voxels where they are, if OpenVDB can say it.
+    const double stored = row->transform().voxelSize().length();
+    EXPECT_TRUE(!has_unit || (stored > 0.5 && stored < 50)) << unit << ' ' << stored;
+  }
+}
+
+TEST(TensorFiles, AUnitThatIsNoNumberIsAnErrorWithTheGrid) {
+  const Temporary path("a.vdb");
+  openvdb::GridPtrVec rows;
+  for (const char* name : {"t_row0", "t_row1", "t_row2"}) {
+    rows.push_back(stock_grid<openvdb::Vec3SGrid>(name, openvdb::Vec3s(0)));
+    openvdb::gridPtrCast<openvdb::Vec3SGrid>(rows.back())->tree().setValue({0, 0, 0}, openvdb::Vec3s(1));
+    rows.back()->insertMeta("tensorray:length_unit", openvdb::StringMetadata("-1e-6"));
+  }
+  write_stock(path, rows);
+  EXPECT_THAT([&] { read_tensor_vdb(path); },
+              ThrowsMessage<std::runtime_error>(AllOf(HasSubstr("a.vdb"), HasSubstr("length_unit"))));
+}
+
+TEST(TensorFiles, DeriveNeedsTheRightKindOfGrid) {
+  const Temporary path("a.vdb");
+  write_stock(path, {stock_grid<openvdb::FloatGrid>("f", 0)});
+  EXPECT_THAT([&] { read_tensor_vdb(path, "", Derive::gradient); },
+              ThrowsMessage<std::runtime_error>(AllOf(HasSubstr("vector grid"), HasSubstr("f (float)"))));
+}
+
+}  // namespace
+}  // namespace tensorray

@@ -1,0 +1,70 @@
+// The bound of resident memory, step by step: after each step that waits for room, there is some.
+
+#include "volumes/grids/page_memory.h"
+
+#include <algorithm>
+#include <cstdint>
+#include <fstream>
+#include <string>
+#include <vector>
+
+#include <gtest/gtest.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include "base/files/temporary_folder.h"
+
+namespace tensorray {
+namespace {
+
+constexpr std::size_t bound = std::size_t{256} << 20, piece = std::size_t{4} << 20, pieces = 200;
+
+std::size_t resident_bytes() {
+  std::size_t all = 0, resident = 0;
+  std::ifstream("/proc/self/statm") >> all >> resident;
+  return resident * static_cast<std::size_t>(sysconf(_SC_PAGESIZE));
+}
+
+char content_of(std::size_t i) { return static_cast<char>(i % 251 + 1); }
+
+/// Writes pieces of three times the bound, and reads them again. @return what went wrong; empty: nothing.
+std::string use_pages(const std::filesystem::path& folder) {
+  bound_memory(bound, folder);
+  std::vector<char*> memory;
+  for (std::size_t i = 0; i < pieces; ++i) {
+    make_room();
+    if (resident_bytes() > bound) return "writing: " + std::to_string(resident_bytes());
+    memory.push_back(static_cast<char*>(map_pages(piece, 4096)));
+    std::fill_n(memory.back(), piece, content_of(i));
+  }
+  for (std::size_t i = 0; i < pieces; ++i) {
+    make_room();
+    if (resident_bytes() > bound) return "reading: " + std::to_string(resident_bytes());
+    for (const std::size_t at : {std::size_t{0}, piece / 2, piece - 1})
+      if (memory[i][at] != content_of(i)) return "a page has lost its bytes";
+  }
+  for (char* each : memory) unmap_pages(each, piece);
+  return "";
+}
+
+/// In a process of its own, as the bound stays.
+TEST(PageMemory, StaysBelowItsBoundAndKeepsAllBytes) {
+  const TemporaryFolder folder;
+  if (std::filesystem::space(folder / "").available < (std::uintmax_t{2} << 30))
+    GTEST_SKIP() << "the test needs 2 GB in " << folder / "";
+  const std::filesystem::path report = folder / "report";
+  const pid_t child = fork();
+  if (child == 0) {
+    std::ofstream(report) << "[" << use_pages(folder / "") << "]";
+    _exit(0);
+  }
+  int status = 0;
+  waitpid(child, &status, 0);
+  EXPECT_TRUE(WIFEXITED(status));
+  std::string text;
+  std::getline(std::ifstream(report), text);
+  EXPECT_EQ(text, "[]");
+}
+
+}  // namespace
+}  // namespace tensorray

@@ -1,0 +1,92 @@
+#include "volumes/making/field_making.h"
+
+#include <cmath>
+#include <limits>
+#include <random>
+
+#include <gtest/gtest.h>
+#include <tbb/global_control.h>
+
+namespace tensorray {
+namespace {
+
+using Eigen::Matrix3d;
+using Eigen::Vector3i;
+
+const Eigen::AlignedBox3i box(Vector3i(-11, -3, 5), Vector3i(25, 14, 30));
+
+/// A source of values that depend on the voxel alone.
+BlockSource source_of(const std::function<Matrix3d(const Vector3i&)>& value) {
+  return dense_source(box, Eigen::Affine3d(Eigen::Scaling(0.25)), value);
+}
+
+Matrix3d general(const Vector3i& i) {
+  return Matrix3d::NullaryExpr([&](Eigen::Index row, Eigen::Index column) {
+    return std::sin(1.3 * i.x() + 0.7 * i.y() + 0.2 * i.z() + 2.1 * double(row) + 0.9 * double(column));
+  });
+}
+
+Matrix3d symmetric(const Vector3i& i) { return general(i) + general(i).transpose(); }
+
+/// Symmetric in most blocks, but not in all that are looked at for a guess.
+Matrix3d mixed(const Vector3i& i) { return i.x() >= 8 && i.x() < 10 && i.y() == 9 ? general(i) : symmetric(i); }
+
+/// Not finite in a layer at the edge, of more than a block, and in single voxels.
+Matrix3d damaged(const Vector3i& i) {
+  const double nan = std::numeric_limits<double>::quiet_NaN();
+  const bool is_damaged = i.x() > 14 || i == Vector3i(0, 0, 8) || i == Vector3i(-11, 3, 30);
+  return is_damaged ? Matrix3d(Matrix3d::Constant(nan)) : symmetric(i);
+}
+
+void expect_same_bricks(const TensorField& a, const TensorField& b) {
+  ASSERT_EQ(a.bricks(), b.bricks());
+  EXPECT_EQ(a.index_bounds().min(), b.index_bounds().min());
+  EXPECT_EQ(a.index_bounds().max(), b.index_bounds().max());
+  EXPECT_EQ(a.greatest_norm(), b.greatest_norm());
+  for (const Vector3i& place : a.bricks()) {
+    const TensorBrick one = a.brick(place), other = b.brick(place);
+    EXPECT_EQ(one.strongest, other.strongest);
+    ASSERT_TRUE(std::equal(one.bending, one.bending + TensorBrick::trailing_offset(one.components), other.bending));
+    ASSERT_TRUE(std::equal(one.trailing, one.trailing + TensorBrick::voxels, other.trailing));
+  }
+}
+
+void expect_as_from_grid(const std::function<Matrix3d(const Vector3i&)>& value, Eigenvalues mode) {
+  TensorGrid grid = dense_grid(box, Eigen::Affine3d(Eigen::Scaling(0.25)), value);
+  const std::size_t non_finite = remove_non_finite(grid);
+  const EigenvalueReport report = apply_eigenvalues(grid, mode);
+  const MadeField made = make_field(source_of(value), mode);
+  ASSERT_TRUE(made.field);
+  EXPECT_EQ(made.non_finite, non_finite);
+  EXPECT_EQ(made.voxels, grid.active_voxels());
+  EXPECT_EQ(made.eigenvalues.chosen, report.chosen);
+  EXPECT_EQ(made.eigenvalues.defective, report.defective);
+  EXPECT_EQ(made.eigenvalues.norm_lost, report.norm_lost);
+  expect_same_bricks(*made.field, TensorField(grid));
+}
+
+TEST(FieldMaking, GivesTheFieldOfThePreprocessedGrid) {
+  for (const Eigenvalues mode :
+       {Eigenvalues::automatic, Eigenvalues::raw, Eigenvalues::absolute, Eigenvalues::positive})
+    for (const auto& value : {general, symmetric, mixed, damaged}) expect_as_from_grid(value, mode);
+}
+
+TEST(FieldMaking, DoesNotDependOnThreads) {
+  const MadeField many = make_field(source_of(general), Eigenvalues::absolute);
+  const tbb::global_control single(tbb::global_control::max_allowed_parallelism, 1);
+  const MadeField one = make_field(source_of(general), Eigenvalues::absolute);
+  EXPECT_EQ(many.eigenvalues.norm_lost, one.eigenvalues.norm_lost);
+  expect_same_bricks(*many.field, *one.field);
+}
+
+TEST(FieldMaking, NothingIsLeftOfAFieldThatIsNotFinite) {
+  const double infinite = std::numeric_limits<double>::infinity();
+  const MadeField made =
+      make_field(source_of([&](const Vector3i&) { return Matrix3d(Matrix3d::Constant(infinite)); }), Eigenvalues::raw);
+  EXPECT_FALSE(made.field);
+  EXPECT_EQ(made.voxels, 0u);
+  EXPECT_EQ(made.non_finite, static_cast<std::size_t>((box.sizes() + Vector3i::Ones()).prod()));
+}
+
+}  // namespace
+}  // namespace tensorray

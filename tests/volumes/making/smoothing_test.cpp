@@ -1,0 +1,178 @@
+#include "volumes/making/smoothing.h"
+
+#include <cmath>
+#include <limits>
+#include <stdexcept>
+
+#include <gtest/gtest.h>
+#include <tbb/global_control.h>
+
+namespace tensorray {
+namespace {
+
+using Eigen::AlignedBox3i;
+using Eigen::Matrix3d;
+using Eigen::Matrix3f;
+using Eigen::Vector3d;
+using Eigen::Vector3i;
+
+const AlignedBox3i box(Vector3i(-13, -3, 5), Vector3i(25, 14, 30));
+
+TensorGrid grid_of(const AlignedBox3i& voxels, const std::function<Matrix3d(const Vector3i&)>& value) {
+  return dense_grid(voxels, Eigen::Affine3d(Eigen::Scaling(0.5, 1.0, 3.0)), value);
+}
+
+Matrix3d general(const Vector3i& i) {
+  return Matrix3d::NullaryExpr([&](Eigen::Index row, Eigen::Index column) {
+    return std::sin(1.3 * i.x() + 0.7 * i.y() + 0.2 * i.z() + 2.1 * double(row) + 0.9 * double(column));
+  });
+}
+
+/// Holes, from single voxels to whole blocks, so that sums along one axis pass through voxels and blocks without value.
+void make_holes(TensorGrid& grid) {
+  for (TensorBlock& block : grid.blocks)
+    for (int offset = 0; offset < TensorBlock::voxels; ++offset) {
+      const Vector3i i = block.origin + TensorBlock::position(offset);
+      const bool is_hole = (i.x() * 7 + i.y() * 5 + i.z() * 3) % 4 == 0 || (i.x() >= 0 && i.x() < 8 && i.y() >= 0);
+      if (!is_hole) continue;
+      block.active.reset(offset);
+      block.values[offset].setZero();
+    }
+  remove_empty_blocks(grid);
+}
+
+template <class Function>
+void for_each_active(const TensorGrid& grid, const Function& function) {
+  for (const TensorBlock& block : grid.blocks)
+    for (int offset = 0; offset < TensorBlock::voxels; ++offset)
+      if (block.active[offset]) function(Vector3i(block.origin + TensorBlock::position(offset)), block.values[offset]);
+}
+
+Matrix3f value_at(const TensorGrid& grid, const Vector3i& wanted) {
+  Matrix3f found = Matrix3f::Constant(std::numeric_limits<float>::quiet_NaN());
+  for_each_active(grid, [&](const Vector3i& i, const Matrix3f& value) {
+    if (i == wanted) found = value;
+  });
+  return found;
+}
+
+/// The definition, without separating axes.
+Matrix3d mean_about(const TensorGrid& grid, const Vector3i& middle, double deviation) {
+  Matrix3d sum = Matrix3d::Zero();
+  double weights = 0;
+  for_each_active(grid, [&](const Vector3i& i, const Matrix3f& value) {
+    if ((i - middle).cwiseAbs().maxCoeff() > 4 * deviation) return;
+    const double weight = std::exp(-(i - middle).cast<double>().squaredNorm() / (2 * deviation * deviation));
+    sum += weight * value.cast<double>();
+    weights += weight;
+  });
+  return sum / weights;
+}
+
+void expect_same(const TensorGrid& a, const TensorGrid& b) {
+  ASSERT_EQ(a.blocks.size(), b.blocks.size());
+  for (std::size_t i = 0; i < a.blocks.size(); ++i) {
+    EXPECT_EQ(a.blocks[i].origin, b.blocks[i].origin);
+    EXPECT_EQ(a.blocks[i].active, b.blocks[i].active);
+    EXPECT_EQ(a.blocks[i].values, b.blocks[i].values);
+  }
+}
+
+TEST(Smoothing, ConstantsStayAtBordersAndBesideHoles) {
+  Matrix3d constant;
+  constant << 1.1, 0.3, -7, 1e-9, 3e5, 0.7, -0.2, 1.0 / 3, 13;
+  TensorGrid grid = grid_of(box, [&](const Vector3i&) { return constant; });
+  make_holes(grid);
+  for (const double deviation : {0.3, 1.0, 2.7}) {
+    TensorGrid smoothed = grid;
+    smooth(smoothed, deviation);
+    expect_same(smoothed, grid);
+  }
+}
+
+TEST(Smoothing, LinearFieldsStayInside) {
+  const auto linear = [](const Vector3i& i) {
+    return Matrix3d(0.5 * Matrix3d::Identity() +
+                    Matrix3d(Vector3d(0.1 * i.x(), -0.2 * i.y(), 0.3 * i.z()).asDiagonal()));
+  };
+  TensorGrid grid = grid_of(box, linear);
+  smooth(grid, 1);
+  const AlignedBox3i inside(box.min() + Vector3i::Constant(4), box.max() - Vector3i::Constant(4));
+  for_each_active(grid, [&](const Vector3i& i, const Matrix3f& value) {
+    if (!inside.contains(i)) return;
+    EXPECT_LT((value.cast<double>() - linear(i)).cwiseAbs().maxCoeff(), 2e-6) << i.transpose();
+  });
+}
+
+TEST(Smoothing, OneVoxelBecomesTheSampledGaussian) {
+  constexpr double deviation = 1.5;  // Cut at 6 voxels along each axis.
+  const Vector3i middle(6, 6, 16);
+  TensorGrid grid = grid_of(box, [&](const Vector3i& i) { return Matrix3d(Matrix3d::Constant(i == middle ? 1 : 0)); });
+  smooth(grid, deviation);
+  double line = 0;
+  for (int i = -6; i <= 6; ++i) line += std::exp(-i * i / (2 * deviation * deviation));
+  const AlignedBox3i inside(box.min() + Vector3i::Constant(6), box.max() - Vector3i::Constant(6));
+  int compared = 0;
+  for_each_active(grid, [&](const Vector3i& i, const Matrix3f& value) {
+    if (!inside.contains(i)) return;
+    const Vector3i d = i - middle;
+    const bool reached = d.cwiseAbs().maxCoeff() <= 6;
+    const double expected =
+        reached ? std::exp(-d.cast<double>().squaredNorm() / (2 * deviation * deviation)) / std::pow(line, 3) : 0;
+    EXPECT_NEAR(value(1, 2), expected, 1e-7 * expected) << i.transpose();
+    compared += reached;
+  });
+  EXPECT_GT(compared, 500);
+}
+
+TEST(Smoothing, VariancesAdd) {
+  constexpr double variance = 4, deviation = 1.5;
+  const AlignedBox3i line(Vector3i(-40, 0, 0), Vector3i(40, 0, 0));
+  TensorGrid grid = grid_of(line, [&](const Vector3i& i) {
+    return Matrix3d(std::exp(-i.x() * i.x() / (2 * variance)) * Matrix3d::Identity());
+  });
+  smooth(grid, deviation);
+  double sum = 0, moment = 0;
+  for_each_active(grid, [&](const Vector3i& i, const Matrix3f& value) {
+    sum += value(0, 0);
+    moment += i.x() * i.x() * double(value(0, 0));
+  });
+  // The cut at 4σ takes 0.1% of the kernel's variance.
+  EXPECT_NEAR(moment / sum, variance + deviation * deviation, 0.002 * deviation * deviation);
+}
+
+TEST(Smoothing, IsTheMeanOfActiveVoxels) {
+  TensorGrid grid = grid_of(box, general);
+  make_holes(grid);
+  for (const double deviation : {0.7, 2.5}) {
+    TensorGrid smoothed = grid;
+    smooth(smoothed, deviation);
+    for (const Vector3i& i : {Vector3i(-13, -3, 7), Vector3i(9, 7, 17), Vector3i(-1, 14, 30), Vector3i(25, 0, 6)}) {
+      const Matrix3f value = value_at(smoothed, i);
+      EXPECT_LT((value.cast<double>() - mean_about(grid, i, deviation)).cwiseAbs().maxCoeff(), 1e-7) << i.transpose();
+    }
+  }
+}
+
+TEST(Smoothing, SymmetricFieldsStaySymmetric) {
+  TensorGrid grid = grid_of(box, [](const Vector3i& i) { return Matrix3d(general(i) + general(i).transpose()); });
+  smooth(grid, 1.2);
+  EXPECT_EQ(asymmetry(grid), 0);
+}
+
+TEST(Smoothing, DoesNotDependOnThreads) {
+  TensorGrid many = grid_of(box, general), one = many;
+  smooth(many, 2);
+  const tbb::global_control single(tbb::global_control::max_allowed_parallelism, 1);
+  smooth(one, 2);
+  expect_same(many, one);
+}
+
+TEST(Smoothing, RejectsDeviationsOutOfRange) {
+  TensorGrid grid = grid_of(box, general);
+  for (const double deviation : {-1.0, 20.5, std::numeric_limits<double>::quiet_NaN()})
+    EXPECT_THROW(smooth(grid, deviation), std::invalid_argument) << deviation;
+}
+
+}  // namespace
+}  // namespace tensorray

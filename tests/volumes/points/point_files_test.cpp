@@ -1,0 +1,142 @@
+#include "volumes/points/point_files.h"
+
+#include <algorithm>
+#include <random>
+#include <tuple>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <openvdb/openvdb.h>
+#include <openvdb/points/AttributeArray.h>
+#include <openvdb/points/PointConversion.h>
+#include <openvdb/points/PointCount.h>
+#include <openvdb/points/PointDataGrid.h>
+
+#include "tests/volumes/file_support.h"
+#include "tests/volumes/point_support.h"
+
+namespace tensorray {
+namespace {
+
+namespace fs = std::filesystem;
+using testing::AllOf;
+using testing::HasSubstr;
+using testing::ThrowsMessage;
+
+openvdb::points::PointDataGrid::Ptr read_points(const fs::path& path) {
+  openvdb::initialize();
+  openvdb::io::File file(path.string());
+  file.open(/*delayLoad=*/false);
+  return openvdb::gridPtrCast<openvdb::points::PointDataGrid>(file.readGrid("points"));
+}
+
+std::vector<Record> records_of(const openvdb::points::PointDataGrid& grid) {
+  using namespace openvdb::points;
+  const auto eigen = [](const openvdb::Vec3f& v) { return Eigen::Vector3f(v.x(), v.y(), v.z()); };
+  std::vector<Record> records;
+  for (auto leaf = grid.tree().cbeginLeaf(); leaf; ++leaf) {
+    const AttributeHandle<openvdb::Vec3f> position(leaf->constAttributeArray("P"));
+    const AttributeHandle<openvdb::Vec3f> direction(leaf->constAttributeArray("direction"));
+    const AttributeHandle<float> power(leaf->constAttributeArray("power"));
+    const AttributeHandle<float> wavelength(leaf->constAttributeArray("wavelength"));
+    for (auto index = leaf->beginIndexOn(); index; ++index) {
+      const openvdb::Vec3d inside = openvdb::Vec3d(position.get(*index)) + index.getCoord().asVec3d();
+      records.emplace_back(power.get(*index), eigen(openvdb::Vec3f(grid.indexToWorld(inside))), wavelength.get(*index),
+                           eigen(direction.get(*index)));
+    }
+  }
+  return records;
+}
+
+TEST(VdbPoints, OfAnyUnitOfLength) {
+  for (const double unit : {1e-12, 1e-7, 1.0, 1e26}) {
+    PointCloud cloud = cloud_of(2000, 0.5f);
+    for (Eigen::Vector3f& position : cloud.positions) position = (unit * position.cast<double>()).cast<float>();
+    const Temporary path("a.vdb");
+    write_points(path, cloud);
+    const auto grid = read_points(path);
+    const auto stored = grid->getMetadata<openvdb::StringMetadata>("tensorray:length_unit");
+    EXPECT_EQ(stored != nullptr, unit < 1e-6);
+    const double length = stored ? std::stod(stored->value()) : 1;
+    PointCloud expected = cloud;
+    for (Eigen::Vector3f& position : expected.positions) position = (position.cast<double>() / length).cast<float>();
+    expect_records(records_of(*grid), expected, static_cast<float>(1e-5 * std::max(1.0, unit)));
+  }
+}
+
+TEST(VdbPoints, HoldEveryPointAndAttribute) {
+  for (const float thickness : {0.0f, 0.5f}) {
+    const PointCloud cloud = cloud_of(20000, thickness);
+    const Temporary path("a.vdb");
+    write_points(path, cloud);
+    const auto grid = read_points(path);
+    expect_records(records_of(*grid), cloud, 1e-5f);  // Single precision at 100.
+    const double voxels = static_cast<double>(grid->tree().activeVoxelCount());
+    const double per_voxel = static_cast<double>(cloud.positions.size()) / voxels;
+    EXPECT_GT(per_voxel, 4) << thickness;
+    EXPECT_LT(per_voxel, 12) << thickness;
+    openvdb::io::File file(path.string());
+    file.open();
+    EXPECT_EQ(file.getMetadata()->metaValue<std::string>("seed"), "7");
+  }
+}
+
+TEST(VdbPoints, SamePointsGiveSameBytes) {
+  const Temporary a("a.vdb"), b("b.vdb");
+  write_points(a, cloud_of(5000, 0));
+  write_points(b, cloud_of(5000, 0));
+  EXPECT_EQ(bytes_of(a), bytes_of(b));
+}
+
+TEST(VdbPoints, FewOrEqualPoints) {
+  const Temporary path("a.vdb");
+  write_points(path, {});
+  EXPECT_EQ(openvdb::points::pointCount(read_points(path)->tree()), 0u);
+  PointCloud cloud = cloud_of(100, 0);
+  std::fill(cloud.positions.begin(), cloud.positions.end(), Eigen::Vector3f(0, 0, 0));
+  write_points(path, cloud);
+  expect_records(records_of(*read_points(path)), cloud, 0);
+  for (std::size_t i = 0; i < cloud.positions.size(); ++i) cloud.positions[i].x() = static_cast<float>(i);  // A line.
+  write_points(path, cloud);
+  expect_records(records_of(*read_points(path)), cloud, 1e-5f);
+}
+
+TEST(PointFiles, FullDiskIsNoticed) {
+  const PointCloud cloud = cloud_of(20000, 0.5f);
+  const Temporary path("a.vdb");
+  write_points(path, cloud);
+  const auto size = fs::file_size(path);
+  for (const auto limit : {std::uintmax_t{0}, size / 50, size / 3, size / 2, size * 9 / 10, size - 1}) {
+    fs::remove(path);
+    const FileSizeLimit limited(limit);
+    testing::internal::CaptureStderr();
+    EXPECT_THAT([&] { write_points(path, cloud); }, ThrowsMessage<std::runtime_error>(HasSubstr(path.string())))
+        << limit << " of " << size;
+    EXPECT_EQ(testing::internal::GetCapturedStderr(), "");
+  }
+}
+
+TEST(PointFiles, UnwritableFilesAreNoticed) {
+  const PointCloud cloud = cloud_of(10, 0);
+  testing::internal::CaptureStderr();
+  const fs::path missing = Temporary("no_such_folder") / "a.vdb";
+  EXPECT_THAT([&] { write_points(missing, cloud); }, ThrowsMessage<std::runtime_error>(HasSubstr(missing.string())));
+  if (fs::exists("/dev/full")) {
+    const Temporary link("a.vdb");  // Removing a link leaves the device.
+    fs::create_symlink("/dev/full", link);
+    EXPECT_THAT([&] { write_points(link, cloud); }, ThrowsMessage<std::runtime_error>(HasSubstr(link.string())));
+  }
+  EXPECT_EQ(testing::internal::GetCapturedStderr(), "");
+}
+
+TEST(PointFiles, RefuseOtherEndingsAndMissingValues) {
+  PointCloud cloud = cloud_of(3, 0);
+  EXPECT_THAT([&] { write_points("a.csv", cloud); },
+              ThrowsMessage<std::invalid_argument>(AllOf(HasSubstr("a.csv"), HasSubstr(".vtp"))));
+  cloud.scalars["power"].pop_back();
+  EXPECT_THAT([&] { write_points(Temporary("a.vdb"), cloud); },
+              ThrowsMessage<std::invalid_argument>(HasSubstr("power")));
+}
+
+}  // namespace
+}  // namespace tensorray

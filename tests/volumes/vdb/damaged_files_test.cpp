@@ -1,0 +1,314 @@
+#include <cstring>
+#include <functional>
+#include <limits>
+#include <random>
+#include <tuple>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <openvdb/openvdb.h>
+
+#include "base/text/byte_order.h"
+#include "tests/volumes/file_support.h"
+#include "volumes/files/tensor_files.h"
+
+namespace tensorray {
+namespace {
+
+namespace fs = std::filesystem;
+using testing::AllOf;
+using testing::HasSubstr;
+using testing::ThrowsMessage;
+
+/// Runs `read` on a file cut at every fiftieth of its length and at some lengths near its ends. Each call must throw
+/// one line that names the file.
+void expect_all_truncations_fail(const std::string& bytes, const std::string& label) {
+  std::vector<std::size_t> lengths{1, 7, 8, 11, 12, 20, 21, 57, bytes.size() - 1, bytes.size() - 2, bytes.size() - 9};
+  for (std::size_t i = 0; i < 50; ++i) lengths.push_back(bytes.size() * i / 50);
+  const Temporary path("short.vdb");
+  for (const std::size_t length : lengths) {
+    write_bytes(path, bytes.substr(0, length));
+    EXPECT_THAT([&] { read_tensor_vdb(path); },
+                ThrowsMessage<std::runtime_error>(AllOf(HasSubstr(path.string()), testing::Not(HasSubstr("\n")))))
+        << label << " " << length;
+    EXPECT_THROW(list_vdb(path), std::runtime_error) << label << " " << length;
+  }
+}
+
+TEST(DamagedFiles, TruncationIsNoticed) {
+  using namespace openvdb::io;
+  const Temporary path("a.vdb"), recompressed("b.vdb");
+  for (const bool half : {false, true}) {
+    write_tensor_vdb(path, sparse_grid(), half);
+    openvdb::io::File file(path.string());
+    file.open(/*delayLoad=*/false);
+    const auto grids = file.getGrids();
+    for (const std::uint32_t compression :
+         std::initializer_list<std::uint32_t>{COMPRESS_NONE, COMPRESS_ACTIVE_MASK, COMPRESS_ZIP | COMPRESS_ACTIVE_MASK,
+                                              COMPRESS_BLOSC | COMPRESS_ACTIVE_MASK}) {
+      write_stock(recompressed, *grids, compression);
+      expect_same_blocks(read_tensor_vdb(recompressed), read_tensor_vdb(path));
+      expect_all_truncations_fail(bytes_of(recompressed), compressionToString(compression));
+    }
+  }
+}
+
+TEST(DamagedFiles, DamageBeforeTheTreesNeverCrashes) {
+  const Temporary path("a.vdb"), damaged("b.vdb");
+  write_tensor_vdb(path, sparse_grid());
+  const std::string bytes = bytes_of(path);
+  std::mt19937 engine(3);
+  // The bytes before the first grid's tree: header, metadata, table.
+  const std::size_t end = bytes.find("AffineMap") + 9;
+  for (int i = 0; i < 300; ++i) {
+    std::string changed = bytes;
+    for (int j = 0; j < 3; ++j) changed[engine() % end] = static_cast<char>(engine());
+    write_bytes(damaged, changed);
+    try {
+      read_tensor_vdb(damaged);
+    } catch (const std::runtime_error& error) {
+      EXPECT_THAT(error.what(), HasSubstr(damaged.string()));
+    }
+  }
+}
+
+TEST(DamagedFiles, LengthsOfZipThatAreTooLarge) {
+  using namespace openvdb::io;
+  const Temporary path("a.vdb"), stock("b.vdb"), damaged("c.vdb");
+  write_tensor_vdb(path, sparse_grid());
+  openvdb::io::File file(path.string());
+  file.open(/*delayLoad=*/false);
+  for (const std::uint32_t mask : {0u, std::uint32_t{COMPRESS_ACTIVE_MASK}}) {
+    write_stock(stock, *file.getGrids(), COMPRESS_ZIP | mask);
+    const std::string bytes = bytes_of(stock);
+    // A chunk of a leaf begins with its length, which is below that of the leaf's values; its stream of zlib follows.
+    std::size_t chunk = bytes.rfind("\x78\x9c");
+    while (read_number<std::uint64_t>(&bytes.at(chunk - 8), ByteOrder::little) > 12 * TensorBlock::voxels)
+      chunk = bytes.rfind("\x78\x9c", chunk - 1);
+    for (const std::int64_t length : {std::int64_t{1} << 21, std::int64_t{1} << 31, std::int64_t{1} << 40}) {
+      std::string number;
+      append_number(length, ByteOrder::little, number);
+      write_bytes(damaged, std::string(bytes).replace(chunk - 8, 8, number));
+      std::filesystem::resize_file(damaged, bytes.size() + 100);
+      EXPECT_THROW(read_tensor_vdb(damaged), std::runtime_error) << length << " " << mask;
+    }
+  }
+}
+
+/// What a TensorGrid promises (tensor_grid.h), whatever the file says.
+void expect_sound(const TensorGrid& grid) {
+  const Eigen::Vector3i* before = nullptr;
+  for (const TensorBlock& block : grid.blocks) {
+    EXPECT_TRUE(block.active.any());
+    EXPECT_TRUE(block.origin.unaryExpr([](int i) { return i & (TensorBlock::size - 1); }).isZero());
+    const auto key = [](const Eigen::Vector3i& at) { return std::make_tuple(at.x(), at.y(), at.z()); };
+    EXPECT_TRUE(!before || key(*before) < key(block.origin));
+    before = &block.origin;
+    for (int offset = 0; offset < TensorBlock::voxels; ++offset)
+      EXPECT_TRUE(block.active[offset] || block.values[offset].isZero(0)) << offset;
+  }
+}
+
+/// Values that are made of what happens to be in memory differ from one reading to the next.
+void expect_same_bits(const TensorGrid& a, const TensorGrid& b) {
+  ASSERT_EQ(a.blocks.size(), b.blocks.size());
+  for (std::size_t i = 0; i < a.blocks.size(); ++i) {
+    EXPECT_EQ(a.blocks[i].active, b.blocks[i].active);
+    EXPECT_EQ(std::memcmp(&a.blocks[i].values, &b.blocks[i].values, sizeof a.blocks[i].values), 0);
+  }
+}
+
+/// Compression of a file's trees: half floats or not, and OpenVDB's flags.
+class FlippedBytes : public testing::TestWithParam<std::tuple<bool, std::uint32_t>> {};
+
+/// Changes bytes all over a file, one at a time: in trees, a length or a mask that is wrong made OpenVDB write beyond
+/// its memory. (A change that leaves every length as it was is read: the format has no checksum.)
+TEST_P(FlippedBytes, NeverCrash) {
+  const auto [half, compression] = GetParam();
+  const Temporary path("a.vdb"), stock("b.vdb"), damaged("c.vdb");
+  write_tensor_vdb(path, sparse_grid(), half);
+  openvdb::io::File file(path.string());
+  file.open(/*delayLoad=*/false);
+  write_stock(stock, *file.getGrids(), compression);
+  const std::string bytes = bytes_of(stock);
+  int refused = 0;
+  constexpr std::size_t flips = 250;
+  for (std::size_t i = 0; i < flips; ++i) {
+    std::string changed = bytes;
+    char& flipped = changed[bytes.size() * i / flips];
+    flipped = static_cast<char>(flipped ^ (i % 4 == 3 ? 0xff : 1 << (i % 8)));
+    write_bytes(damaged, changed);
+    try {
+      const TensorGrid grid = read_tensor_vdb(damaged);
+      expect_sound(grid);
+      expect_same_bits(grid, read_tensor_vdb(damaged));
+    } catch (const std::runtime_error& error) {
+      ++refused;
+      EXPECT_THAT(error.what(), AllOf(HasSubstr(damaged.string()), testing::Not(HasSubstr("\n"))));
+    }
+  }
+  EXPECT_GT(refused, 0);
+  EXPECT_LT(refused, static_cast<int>(flips));
+}
+
+INSTANTIATE_TEST_SUITE_P(
+    Compressions, FlippedBytes,
+    testing::Combine(testing::Bool(),
+                     testing::Values<std::uint32_t>(openvdb::io::COMPRESS_ACTIVE_MASK,
+                                                    openvdb::io::COMPRESS_ZIP | openvdb::io::COMPRESS_ACTIVE_MASK,
+                                                    openvdb::io::COMPRESS_BLOSC | openvdb::io::COMPRESS_ACTIVE_MASK,
+                                                    openvdb::io::COMPRESS_BLOSC)));
+
+/// Each length in the trees, as the greatest and the least number, and a little off.
+TEST(DamagedFiles, WrongLengthsInTreesAreNoticed) {
+  const Temporary path("a.vdb"), damaged("b.vdb");
+  write_tensor_vdb(path, sparse_grid());
+  const std::string bytes = bytes_of(path);
+  // A chunk of Blosc begins with its version (2) and that of its format (1); its length stands before it.
+  int chunks = 0;
+  for (std::size_t at = bytes.find("AffineMap"); (at = bytes.find("\x02\x01", at + 1)) != std::string::npos;) {
+    const auto length = read_number<std::int64_t>(&bytes[at - 8], ByteOrder::little);
+    if (length != read_number<std::uint32_t>(&bytes[std::min(at + 12, bytes.size() - 4)], ByteOrder::little)) continue;
+    ++chunks;
+    if (chunks % 7 != 1) continue;
+    for (const std::int64_t wrong :
+         {std::int64_t{0}, -length, length - 1, length + 1, -length * 1000, std::int64_t{1} << 40,
+          -(std::int64_t{1} << 40), std::numeric_limits<std::int64_t>::max(),
+          std::numeric_limits<std::int64_t>::min()}) {
+      std::string number;
+      append_number(wrong, ByteOrder::little, number);
+      write_bytes(damaged, std::string(bytes).replace(at - 8, 8, number));
+      EXPECT_THAT([&] { read_tensor_vdb(damaged); }, ThrowsMessage<std::runtime_error>(HasSubstr(damaged.string())))
+          << at << " " << wrong;
+    }
+  }
+  EXPECT_GT(chunks, 20);
+}
+
+TEST(DamagedFiles, NotVdbFiles) {
+  const Temporary path("a.vdb");
+  const auto expect = [&](const fs::path& file, const std::string& what) {
+    for (const auto& read :
+         {std::function<void()>([&] { read_tensor_vdb(file); }), std::function<void()>([&] { list_vdb(file); })})
+      EXPECT_THAT(read, ThrowsMessage<std::runtime_error>(AllOf(HasSubstr(file.string()), HasSubstr(what))));
+  };
+  expect(Temporary("missing.vdb"), "No such file");
+  expect(testing::TempDir(), "is a folder");
+  write_bytes(path, "");
+  expect(path, "not an OpenVDB file");
+  write_bytes(path, "{ \"field\": \"this is text, and long enough for a header of OpenVDB, or so one thinks\" }\n");
+  expect(path, "not an OpenVDB file");
+  std::mt19937 engine(5);
+  std::string noise(100000, ' ');
+  for (char& c : noise) c = static_cast<char>(engine());
+  write_bytes(path, noise);
+  expect(path, "not an OpenVDB file");
+  const std::int64_t magic = openvdb::OPENVDB_MAGIC;
+  const std::uint32_t format = openvdb::OPENVDB_FILE_VERSION;
+  std::string header(reinterpret_cast<const char*>(&magic), sizeof magic);
+  header.append(reinterpret_cast<const char*>(&format), sizeof format);
+  write_bytes(path, header + noise);
+  expect(path, "damaged");
+  header.back() = 1;
+  write_bytes(path, header + noise);
+  expect(path, "newer OpenVDB");
+}
+
+TEST(DamagedFiles, ReadsFormatsThatHoldUnknownGrids) {
+  // An unknown type in the table of grids does not hide other grids: rename the type of an unrelated grid.
+  const Temporary path("a.vdb");
+  openvdb::GridPtrVec grids;
+  for (int row = 0; row < 3; ++row) {
+    grids.push_back(stock_grid<openvdb::Vec3SGrid>("T_row" + std::to_string(row), openvdb::Vec3s(0)));
+    openvdb::gridPtrCast<openvdb::Vec3SGrid>(grids.back())->tree().setValue({0, 0, 0}, openvdb::Vec3s(1));
+  }
+  grids.insert(grids.begin(), stock_grid<openvdb::Int32Grid>("other", 0));
+  write_stock(path, grids);
+  std::string bytes = bytes_of(path);
+  const std::size_t at = bytes.find("Tree_int32_5_4_3");
+  ASSERT_NE(at, std::string::npos);
+  bytes.replace(at, 10, "Tree_mat3x");
+  write_bytes(path, bytes);
+  EXPECT_EQ(list_vdb(path)[0].type, "mat3x");
+  EXPECT_EQ(read_tensor_vdb(path).active_voxels(), 1u);
+}
+
+/// A tile at the greatest index has no index behind it, where a loop over its blocks could end.
+TEST(DamagedFiles, VoxelsFarAwayAreRefused) {
+  constexpr std::int32_t end = std::numeric_limits<std::int32_t>::max();
+  struct Case {
+    const char* what;
+    openvdb::Coord min, max;  ///< Of active voxels.
+  };
+  const auto at = [](std::int32_t x) { return openvdb::Coord(x, 0, 0); };
+  // OpenVDB's own fill does not end at the greatest index.
+  const auto fill = [](auto& grid, const Case& each, const auto& value) {
+    if (each.min == each.max)
+      grid.tree().setValueOn(each.min, value);
+    else
+      grid.tree().addTile(2, each.min, value, true);
+  };
+  const std::vector<Case> cases{{"tile at the end", openvdb::Coord(end - 127), openvdb::Coord(end)},
+                                {"tile at the beginning", openvdb::Coord(-end - 1), openvdb::Coord(-end - 1 + 127)},
+                                {"voxel at the end", at(end), at(end)},
+                                {"voxel at the beginning", at(-end - 1), at(-end - 1)},
+                                {"voxel just out of range", at((1 << 29) + 8), at((1 << 29) + 8)}};
+  const Temporary path("far.vdb");
+  for (const Case& each : cases)
+    for (const Derive derive : {Derive::none, Derive::hessian}) {
+      const auto scalar = stock_grid<openvdb::FloatGrid>("phi", 0);
+      openvdb::GridPtrVec grids{scalar};
+      fill(*scalar, each, 1.0f);
+      if (derive == Derive::none) {
+        grids.clear();
+        for (int row = 0; row < 3; ++row) {
+          const auto grid = stock_grid<openvdb::Vec3SGrid>("phi_row" + std::to_string(row), openvdb::Vec3s(0));
+          fill(*grid, each, openvdb::Vec3s(1));
+          grids.push_back(grid);
+        }
+      }
+      write_stock(path, grids);
+      EXPECT_THAT([&] { read_tensor_vdb(path, "", derive); },
+                  ThrowsMessage<std::runtime_error>(AllOf(HasSubstr(path.string()), HasSubstr("indices are beyond"))))
+          << each.what;
+    }
+}
+
+/// Tiles take a few bytes in the file, and 2 GB each in memory.
+TEST(DamagedFiles, TilesThatFitInNoMemoryAreRefused) {
+  const auto grid = stock_grid<openvdb::FloatGrid>("phi", 0);
+  for (int i = 0; i < 4000; ++i)
+    grid->tree().addTile(2, openvdb::Coord(128 * (i % 20), 128 * (i / 20 % 20), 128 * (i / 400)), 1.0f, true);
+  const Temporary path("tiles.vdb");
+  write_stock(path, {grid});
+  EXPECT_LT(fs::file_size(path), 1000000u);
+  EXPECT_THAT([&] { read_tensor_vdb(path, "", Derive::hessian); },
+              ThrowsMessage<std::runtime_error>(AllOf(HasSubstr(path.string()), HasSubstr("active voxels need"))));
+}
+
+TEST(TensorFileWriting, FullDiskIsNoticed) {
+  const TensorGrid grid = sparse_grid();
+  const Temporary path("a.vdb");
+  write_tensor_vdb(path, grid);
+  const auto size = fs::file_size(path);
+  for (const auto limit : {std::uintmax_t{0}, std::uintmax_t{30}, size / 3, size / 2, size - 1}) {
+    fs::remove(path);
+    const FileSizeLimit limited(limit);
+    EXPECT_THROW(write_tensor_vdb(path, grid), std::runtime_error) << limit << " of " << size;
+  }
+  fs::remove(path);
+  const FileSizeLimit enough(size);
+  EXPECT_NO_THROW(write_tensor_vdb(path, grid));
+}
+
+TEST(TensorFileWriting, ToAFullDeviceOrAMissingFolderFails) {
+  const fs::path missing = Temporary("no_such_folder") / "a.vdb";
+  EXPECT_THAT([&] { write_tensor_vdb(missing, sparse_grid()); },
+              ThrowsMessage<std::runtime_error>(AllOf(HasSubstr(missing.string()), HasSubstr("No such file"))));
+  if (!fs::exists("/dev/full")) GTEST_SKIP() << "no /dev/full";
+  EXPECT_THAT([&] { write_tensor_vdb("/dev/full", sparse_grid()); },
+              ThrowsMessage<std::runtime_error>(HasSubstr("/dev/full: cannot be written")));
+}
+
+}  // namespace
+}  // namespace tensorray

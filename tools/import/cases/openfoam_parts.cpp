@@ -1,0 +1,244 @@
+#include "tools/import/cases/openfoam_parts.h"
+
+#include <algorithm>
+#include <cctype>
+#include <cstdint>
+#include <cstdlib>
+#include <fstream>
+#include <limits>
+#include <optional>
+#include <utility>
+
+#include "base/errors.h"
+
+namespace tensorray {
+namespace {
+
+namespace fs = std::filesystem;
+
+/// The value of a folder's name that is a time.
+std::optional<double> time_value(const std::string& name) {
+  char* end = nullptr;
+  const double value = std::strtod(name.c_str(), &end);
+  if (name.empty() || *end != '\0' || !(std::isdigit(static_cast<unsigned char>(name[0])) || name[0] == '-')) return {};
+  return value;
+}
+
+/// The number after "processor", or the first one of collated files in "processorsN" and "processorsN_FIRST-LAST".
+struct ProcessorName {
+  bool is_collated = false;
+  int first = 0;
+};
+
+std::optional<ProcessorName> processor_name(const std::string& name) {
+  const std::string word = "processor";
+  if (name.compare(0, word.size(), word) != 0) return {};
+  const bool is_collated = name.size() > word.size() && name[word.size()] == 's';
+  const std::string numbers = name.substr(word.size() + (is_collated ? 1 : 0));
+  if (numbers.empty() || numbers.find_first_not_of("0123456789_-") != std::string::npos) return {};
+  const std::size_t underscore = numbers.find('_');
+  if (!is_collated) return ProcessorName{false, std::atoi(numbers.c_str())};
+  return ProcessorName{true, underscore == std::string::npos ? 0 : std::atoi(numbers.substr(underscore + 1).c_str())};
+}
+
+std::vector<fs::path> folders_in(const fs::path& folder) {
+  std::vector<fs::path> folders;
+  if (!fs::is_directory(folder)) return folders;
+  for (const fs::directory_entry& entry : fs::directory_iterator(folder))
+    if (entry.is_directory()) folders.push_back(entry.path());
+  std::sort(folders.begin(), folders.end());
+  return folders;
+}
+
+/// The meshes of a case or of a processor: its only one, or those of its regions.
+std::vector<fs::path> meshes_in(const fs::path& folder) {
+  std::vector<fs::path> meshes;
+  if (fs::is_directory(folder / "constant" / "polyMesh")) meshes.push_back(folder / "constant" / "polyMesh");
+  for (const fs::path& region : folders_in(folder / "constant"))
+    if (fs::is_directory(region / "polyMesh")) meshes.push_back(region / "polyMesh");
+  return meshes;
+}
+
+void find_processors(OpenFoamParts& parts) {
+  std::vector<std::pair<int, fs::path>> plain, collated;
+  for (const fs::path& folder : folders_in(parts.folder)) {
+    const std::optional<ProcessorName> name = processor_name(folder.filename().string());
+    if (name && !meshes_in(folder).empty()) (name->is_collated ? collated : plain).emplace_back(name->first, folder);
+  }
+  parts.is_collated = plain.empty();
+  std::vector<std::pair<int, fs::path>>& found = plain.empty() ? collated : plain;
+  std::sort(found.begin(), found.end());
+  for (const auto& [number, folder] : found) parts.processors.push_back(folder);
+}
+
+void check_mesh(const fs::path& mesh) {
+  for (const char* name : {"points", "faces", "owner", "neighbour"})
+    if (!fs::exists(mesh / name) && !fs::exists((mesh / name).string() + ".gz"))
+      fail(mesh / name, "is missing; run blockMesh again");
+}
+
+std::vector<OpenFoamTime> times_in(const fs::path& folder) {
+  std::vector<OpenFoamTime> times;
+  for (const fs::path& time : folders_in(folder))
+    if (const std::optional<double> value = time_value(time.filename().string()))
+      times.push_back({time.filename().string(), *value});
+  std::sort(times.begin(), times.end(), [](const auto& a, const auto& b) { return a.value < b.value; });
+  return times;
+}
+
+/// The times that all processors have: of a run that goes on, some have one that others have not yet.
+std::vector<OpenFoamTime> common_times(const std::vector<fs::path>& processors) {
+  std::vector<OpenFoamTime> times = times_in(processors.front());
+  for (const fs::path& processor : processors) {
+    const auto is_missing = [&](const OpenFoamTime& time) { return !fs::is_directory(processor / time.folder); };
+    times.erase(std::remove_if(times.begin(), times.end(), is_missing), times.end());
+  }
+  return times;
+}
+
+/// Without one of the processors, a part of the body would be missing.
+void check_processors(const OpenFoamParts& parts) {
+  for (std::size_t i = 0; i < parts.processors.size() && !parts.is_collated; ++i)
+    if (const fs::path folder = parts.folder / ("processor" + std::to_string(i)); parts.processors[i] != folder)
+      fail(folder, "is missing; copy it there too, with its constant/polyMesh");
+}
+
+/// Whether `times` go on after those of `other`.
+bool is_later(const std::vector<OpenFoamTime>& times, const std::vector<OpenFoamTime>& other) {
+  return !times.empty() && (other.empty() || times.back().value > other.back().value);
+}
+
+[[noreturn]] void fail_collated(const fs::path& file) {
+  fail(file, "is damaged or cut off: it announces more bytes than it has; copy or write it again");
+}
+
+/// A file of parts in OpenFOAM's class decomposedBlockData: after the header, for each part a comment, the number of
+/// its bytes, and these in parentheses. Only the first part has a header of
+/// its own, which is that of all.
+class BlockFile {
+ public:
+  explicit BlockFile(const fs::path& path) : path_(path), file_(path, std::ios::binary) {
+    std::string head(4096, '\0');
+    file_.read(head.data(), static_cast<std::streamsize>(head.size()));
+    head.resize(static_cast<std::size_t>(file_.gcount()));
+    file_.clear();
+    const std::size_t end = head.find('}');
+    has_parts_ = head.substr(0, std::min(end, head.size())).find("decomposedBlockData") != std::string::npos;
+    if (has_parts_) file_.seekg(static_cast<std::streamoff>(end + 1));
+  }
+
+  bool has_parts() const { return has_parts_; }
+
+  /// Copies the next part to `target`. @return false at the end.
+  bool copy_next(const fs::path& target) {
+    if (!skip_to_number()) return false;
+    std::uint64_t count = 0;
+    char parenthesis = 0;
+    file_ >> count >> parenthesis;
+    const std::uint64_t left =
+        fs::file_size(path_) - static_cast<std::uint64_t>(std::max<std::streamoff>(0, file_.tellg()));
+    if (!file_ || parenthesis != '(' || count > left) fail_collated(path_);
+    std::ofstream out(target, std::ios::binary);
+    out << header_;
+    std::vector<char> buffer(1 << 20);
+    for (std::uint64_t done = 0; done < count && file_;) {
+      file_.read(buffer.data(), static_cast<std::streamsize>(std::min<std::uint64_t>(buffer.size(), count - done)));
+      out.write(buffer.data(), file_.gcount());
+      if (header_.empty()) header_ = header_in(std::string(buffer.data(), static_cast<std::size_t>(file_.gcount())));
+      done += static_cast<std::uint64_t>(file_.gcount());
+    }
+    if (!(file_ >> parenthesis) || parenthesis != ')') fail_collated(path_);
+    if (!out.flush()) fail(target, "cannot be written; is the disk full?");
+    return true;
+  }
+
+ private:
+  /// The text to the end of the entry FoamFile.
+  static std::string header_in(const std::string& part) {
+    const std::size_t name = part.find("FoamFile"), end = part.find('}', std::min(name, part.size()));
+    return name == std::string::npos || end == std::string::npos ? "" : part.substr(name, end + 1 - name) + "\n";
+  }
+
+  bool skip_to_number() {
+    constexpr auto any_number = std::numeric_limits<std::streamsize>::max();
+    while (file_ >> std::ws && file_.peek() == '/') file_.ignore(any_number, '\n');
+    return file_ && std::isdigit(file_.peek());
+  }
+
+  fs::path path_;
+  std::ifstream file_;
+  bool has_parts_ = false;
+  std::string header_;  ///< Of the first part, once it has been read.
+};
+
+/// Distributes the files of `from` and of the folders in it to as many cases as there are parts.
+void split_folder(const fs::path& from, const fs::path& relative, int first, const fs::path& target,
+                  std::vector<fs::path>& cases) {
+  const auto case_of = [&](int processor) {
+    const fs::path folder = target / ("processor" + std::to_string(processor));
+    if (std::find(cases.begin(), cases.end(), folder) == cases.end()) cases.push_back(folder);
+    fs::create_directories(folder / relative);
+    return folder;
+  };
+  for (const fs::directory_entry& entry : fs::directory_iterator(from)) {
+    const fs::path name = relative / entry.path().filename();
+    if (entry.is_directory()) split_folder(entry.path(), name, first, target, cases);
+    if (!entry.is_regular_file()) continue;
+    BlockFile file(entry.path());
+    if (!file.has_parts()) continue;
+    for (int processor = first;; ++processor) {
+      const fs::path part = target / "part";
+      if (!file.copy_next(part)) break;
+      fs::rename(part, case_of(processor) / name);
+    }
+  }
+}
+
+}  // namespace
+
+OpenFoamParts openfoam_parts(const fs::path& path, const fs::path& folder) {
+  OpenFoamParts parts{fs::absolute(folder), {}, false, {}};
+  if (!fs::exists(folder / "system" / "controlDict"))
+    fail(path, "is no OpenFOAM case: " + (folder / "system/controlDict").string() + " is missing");
+  std::vector<fs::path> meshes = meshes_in(folder);
+  parts.times = times_in(folder);
+  find_processors(parts);
+  const std::vector<OpenFoamTime> times_of_parts =
+      parts.processors.empty() ? std::vector<OpenFoamTime>() : common_times(parts.processors);
+  if (!parts.processors.empty() && (meshes.empty() || is_later(times_of_parts, parts.times))) {
+    check_processors(parts);
+    parts.times = times_of_parts;
+    meshes.clear();
+    for (const fs::path& processor : parts.processors)
+      for (const fs::path& mesh : meshes_in(processor)) meshes.push_back(mesh);
+  } else {
+    parts.processors.clear();
+  }
+  if (meshes.empty())
+    fail(path, "has no mesh: " + (folder / "constant/polyMesh").string() + " is missing; run blockMesh first");
+  for (const fs::path& mesh : meshes) check_mesh(mesh);
+  if (parts.times.empty())
+    fail(path, parts.processors.empty() ? "has no time folder; run the case's solver first"
+                                        : "has no time folder that all of its processors have; run the case's solver");
+  return parts;
+}
+
+std::vector<fs::path> processor_cases(const OpenFoamParts& parts, const OpenFoamTime& time, const fs::path& target) {
+  std::vector<fs::path> cases;
+  for (const fs::path& processor : parts.processors) {
+    if (parts.is_collated) {
+      const int first = processor_name(processor.filename().string())->first;
+      for (const std::string& name : {std::string("constant"), time.folder})
+        if (fs::is_directory(processor / name)) split_folder(processor / name, name, first, target, cases);
+      continue;
+    }
+    cases.push_back(target / processor.filename());
+    fs::create_directories(cases.back());
+    for (const std::string& name : {std::string("constant"), time.folder})
+      if (fs::is_directory(processor / name)) fs::create_directory_symlink(processor / name, cases.back() / name);
+  }
+  for (const fs::path& one : cases) fs::create_directory_symlink(parts.folder / "system", one / "system");
+  return cases;
+}
+
+}  // namespace tensorray

@@ -1,0 +1,38 @@
+#pragma once
+/// @file tools/import/cases/openfoam_parts.h
+/// The folders of an OpenFOAM case: regions, and the parts that processors wrote. Private to the importer.
+
+#include <filesystem>
+#include <string>
+#include <vector>
+
+namespace tensorray {
+
+/// A time of a case: the name of its folder, and its value.
+struct OpenFoamTime {
+  std::string folder;
+  double value = 0;
+};
+
+/// A case as it is on the disk.
+struct OpenFoamParts {
+  std::filesystem::path folder;  ///< Has system/controlDict.
+  /// Of a decomposed case, the folders of the processors: processor0, processor1, ..., or collated ones (processors4,
+  /// or several as processors8_0-3), which have files of several processors. Empty: the case is whole.
+  std::vector<std::filesystem::path> processors;
+  bool is_collated = false;
+  std::vector<OpenFoamTime> times;  ///< By their values; of a decomposed case those that all processors have.
+};
+
+/// Finds the parts of a case. A case that is whole and decomposed is decomposed if its processors have later times.
+/// @throw std::runtime_error naming `path` and the fix: no controlDict, no mesh, a part of a mesh or one of the
+/// processors is missing, no times.
+OpenFoamParts openfoam_parts(const std::filesystem::path& path, const std::filesystem::path& folder);
+
+/// Makes folders in `target` that are cases of one processor each, with one time: links to the folders of the
+/// processors, or, of a collated case, files that are parts of its files.
+/// @throw std::runtime_error naming the file: a collated file is damaged.
+std::vector<std::filesystem::path> processor_cases(const OpenFoamParts& parts, const OpenFoamTime& time,
+                                                   const std::filesystem::path& target);
+
+}  // namespace tensorray

@@ -1,0 +1,187 @@
+#include "tools/import/hdf5/hdf5_file.h"
+
+#include <algorithm>
+#include <stdexcept>
+#include <utility>
+
+#include <vtkDataArray.h>
+#include <vtkDoubleArray.h>
+#include <vtkFloatArray.h>
+#include <vtkIdTypeArray.h>
+#include <vtk_hdf5.h>
+
+#include "base/errors.h"
+
+namespace tensorray {
+namespace {
+
+/// An identifier of HDF5, and the function that closes it.
+class Id {
+ public:
+  Id(hid_t id, herr_t (*close)(hid_t)) : id_(id), close_(close) {}
+  ~Id() {
+    if (id_ >= 0) close_(id_);
+  }
+  Id(const Id&) = delete;
+  Id& operator=(const Id&) = delete;
+  operator hid_t() const { return id_; }
+
+ private:
+  hid_t id_;
+  herr_t (*close_)(hid_t);
+};
+
+/// Stops HDF5 from printing its errors.
+void silence() {
+  static const bool once = [] { return H5Eset_auto2(H5E_DEFAULT, nullptr, nullptr) >= 0; }();
+  (void)once;
+}
+
+/// Whether each group of a path is there: H5Lexists fails on others.
+bool exists(hid_t file, const std::string& name) {
+  for (std::size_t end = name.find('/', 1);; end = name.find('/', end + 1)) {
+    const std::string part = name.substr(0, end);
+    if (part != "/" && !part.empty() && H5Lexists(file, part.c_str(), H5P_DEFAULT) <= 0) return false;
+    if (end == std::string::npos) return true;
+  }
+}
+
+std::vector<hsize_t> extents_of(hid_t space) {
+  const int rank = H5Sget_simple_extent_ndims(space);
+  std::vector<hsize_t> extents(static_cast<std::size_t>(std::max(0, rank)));
+  if (rank > 0) H5Sget_simple_extent_dims(space, extents.data(), nullptr);
+  return extents;
+}
+
+/// An array for numbers of a type, and the type in memory; null if it is none of numbers.
+std::pair<vtkSmartPointer<vtkDataArray>, hid_t> array_for(hid_t type) {
+  switch (H5Tget_class(type)) {
+    case H5T_FLOAT:
+      if (H5Tget_size(type) <= 4) return {vtkSmartPointer<vtkFloatArray>::New(), H5T_NATIVE_FLOAT};
+      return {vtkSmartPointer<vtkDoubleArray>::New(), H5T_NATIVE_DOUBLE};
+    case H5T_INTEGER:
+    case H5T_ENUM:
+      static_assert(sizeof(vtkIdType) == sizeof(long long));
+      return {vtkSmartPointer<vtkIdTypeArray>::New(), H5T_NATIVE_LLONG};
+    default:
+      return {nullptr, -1};
+  }
+}
+
+}  // namespace
+
+struct Hdf5File::Handle {
+  Id id;
+};
+
+Hdf5File::Hdf5File(const std::filesystem::path& path) : path_(path) {
+  silence();
+  if (!std::filesystem::is_regular_file(path)) tensorray::fail(path, "is missing; copy it there too");
+  file_.reset(new Handle{{H5Fopen(path.c_str(), H5F_ACC_RDONLY, H5P_DEFAULT), H5Fclose}});
+  if (file_->id < 0) fail("is no HDF5 file, or cut off; copy or write it again");
+}
+
+Hdf5File::~Hdf5File() = default;
+
+void Hdf5File::fail(const std::string& what) const { tensorray::fail(path_, what); }
+
+bool Hdf5File::has(const std::string& name) const { return exists(file_->id, name); }
+
+bool Hdf5File::has_attribute(const std::string& object, const std::string& attribute) const {
+  return has(object) && H5Aexists_by_name(file_->id, object.c_str(), attribute.c_str(), H5P_DEFAULT) > 0;
+}
+
+bool Hdf5File::has_numbers(const std::string& dataset) const {
+  if (!has(dataset)) return false;
+  const Id data(H5Dopen2(file_->id, dataset.c_str(), H5P_DEFAULT), H5Dclose);
+  const Id type(data < 0 ? -1 : H5Dget_type(data), H5Tclose);
+  return type >= 0 && array_for(type).first;
+}
+
+std::vector<std::string> Hdf5File::children(const std::string& group) const {
+  std::vector<std::string> names;
+  if (!has(group)) return names;
+  const Id id(H5Gopen2(file_->id, group.c_str(), H5P_DEFAULT), H5Gclose);
+  if (id < 0) return names;
+  const auto add = [](hid_t, const char* name, const H5L_info_t*, void* list) -> herr_t {
+    static_cast<std::vector<std::string>*>(list)->emplace_back(name);
+    return 0;
+  };
+  H5Literate(id, H5_INDEX_NAME, H5_ITER_INC, nullptr, add, &names);
+  return names;
+}
+
+std::vector<std::uint64_t> Hdf5File::shape(const std::string& dataset) const {
+  if (!has(dataset)) fail("has no dataset " + dataset);
+  const Id data(H5Dopen2(file_->id, dataset.c_str(), H5P_DEFAULT), H5Dclose);
+  const Id space(data < 0 ? -1 : H5Dget_space(data), H5Sclose);
+  if (space < 0) fail("its " + dataset + " is no dataset");
+  const std::vector<hsize_t> extents = extents_of(space);
+  return {extents.begin(), extents.end()};
+}
+
+vtkSmartPointer<vtkDataArray> Hdf5File::read(const std::string& dataset) const {
+  const std::vector<std::uint64_t> extents = shape(dataset);
+  return read(dataset,
+              {std::vector<std::uint64_t>(extents.size(), 0), std::vector<std::uint64_t>(extents.size(), 1), extents});
+}
+
+vtkSmartPointer<vtkDataArray> Hdf5File::read(const std::string& dataset, const HyperSlab& part) const {
+  const std::vector<std::uint64_t> extents = shape(dataset);
+  const bool fits = part.start.size() == extents.size() && part.stride.size() == extents.size() &&
+                    part.count.size() == extents.size();
+  std::uint64_t count = 1;
+  for (std::size_t i = 0; i < extents.size(); ++i) {
+    if (!fits || part.stride[i] < 1 || part.start[i] > extents[i] ||
+        (part.count[i] > 0 && (part.count[i] - 1) > (extents[i] - part.start[i]) / part.stride[i]) ||
+        (part.count[i] > 0 && part.start[i] + (part.count[i] - 1) * part.stride[i] >= extents[i]))
+      fail("its dataset " + dataset + " is smaller than what is wanted of it: cut off, or of another mesh");
+    count *= part.count[i];
+  }
+  const Id data(H5Dopen2(file_->id, dataset.c_str(), H5P_DEFAULT), H5Dclose);
+  const Id space(H5Dget_space(data), H5Sclose), type(H5Dget_type(data), H5Tclose);
+  auto [array, memory_type] = array_for(type);
+  if (!array) fail("its dataset " + dataset + " has no numbers");
+  array->SetNumberOfTuples(static_cast<vtkIdType>(count));
+  if (count == 0) return array;
+  const std::vector<hsize_t> start(part.start.begin(), part.start.end()),
+      stride(part.stride.begin(), part.stride.end()), counts(part.count.begin(), part.count.end());
+  if (!extents.empty()) H5Sselect_hyperslab(space, H5S_SELECT_SET, start.data(), stride.data(), counts.data(), nullptr);
+  const hsize_t total = count;
+  const Id memory(H5Screate_simple(1, &total, nullptr), H5Sclose);
+  if (H5Dread(data, memory_type, memory, space, H5P_DEFAULT, array->GetVoidPointer(0)) < 0)
+    fail("its dataset " + dataset +
+         " cannot be read: damaged, cut off, or compressed by a filter that is not installed");
+  return array;
+}
+
+std::vector<double> Hdf5File::numbers(const std::string& object, const std::string& attribute) const {
+  if (!has_attribute(object, attribute)) fail("has no attribute " + attribute + " of " + object);
+  const Id id(H5Aopen_by_name(file_->id, object.c_str(), attribute.c_str(), H5P_DEFAULT, H5P_DEFAULT), H5Aclose);
+  const Id space(H5Aget_space(id), H5Sclose);
+  const hssize_t count = H5Sget_simple_extent_npoints(space);
+  std::vector<double> values(static_cast<std::size_t>(std::clamp<hssize_t>(count, 0, 64)));
+  if (count < 1 || count > 64 || H5Aread(id, H5T_NATIVE_DOUBLE, values.data()) < 0)
+    fail("its attribute " + attribute + " of " + object + " has no numbers");
+  return values;
+}
+
+std::string Hdf5File::text(const std::string& object, const std::string& attribute) const {
+  if (!has_attribute(object, attribute)) fail("has no attribute " + attribute + " of " + object);
+  const Id id(H5Aopen_by_name(file_->id, object.c_str(), attribute.c_str(), H5P_DEFAULT, H5P_DEFAULT), H5Aclose);
+  const Id type(H5Aget_type(id), H5Tclose);
+  if (H5Tget_class(type) != H5T_STRING) fail("its attribute " + attribute + " of " + object + " is no text");
+  if (H5Tis_variable_str(type) > 0) {
+    char* text = nullptr;
+    if (H5Aread(id, type, &text) < 0 || !text) fail("its attribute " + attribute + " cannot be read");
+    const std::string result = text;
+    H5free_memory(text);
+    return result;
+  }
+  std::string result(std::min<std::size_t>(H5Tget_size(type), 4096), '\0');
+  if (result.size() != H5Tget_size(type) || H5Aread(id, type, result.data()) < 0)
+    fail("its attribute " + attribute + " cannot be read");
+  return result.c_str();
+}
+
+}  // namespace tensorray

@@ -1,0 +1,253 @@
+// FSL and MRtrix both write files of six volumes, but with different orders and different axes:
+// - MRtrix writes components in world (scanner) axes: https://mrtrix.readthedocs.io, "dwi2tensor".
+// - FSL's dtifit takes gradient directions in the image's axes, and flips the first axis if the transform has a
+//   positive determinant ("neurological" storage): https://fsl.fmrib.ox.ac.uk, "bvecs". Its components have the
+//   same axes.
+// Hence FSL's frame is the rotation of the transform, with that flip. The format does not state the axes of symmetric
+// matrices by intent code (1005) either. ANTs and dipy write them in the axes of the voxels
+// (https://github.com/ANTsX/ANTs/wiki/Warp-and-reorient-a-diffusion-tensor-image), and so they are read. Vectors and
+// nine components are read in world axes. --frame says otherwise.
+
+#include <array>
+#include <cmath>
+#include <cstdint>
+#include <cstdlib>
+#include <cstring>
+#include <limits>
+#include <memory>
+#include <stdexcept>
+#include <utility>
+#include <vector>
+
+#include <fmt/format.h>
+#include <nifti2_io.h>
+
+#include "base/errors.h"
+#include "base/text/text.h"
+#include "tools/import/lattice_files/lattice_files.h"
+#include "volumes/grids/page_memory.h"
+
+namespace tensorray {
+namespace {
+
+using Eigen::Matrix3d;
+
+using Image = std::unique_ptr<nifti_image, decltype(&nifti_image_free)>;
+
+/// The bytes of one component of one slice.
+using Plane = std::vector<char, PageAllocator<char>>;
+
+template <class Number>
+double number(const char* bytes, std::size_t index) {
+  Number value;
+  std::memcpy(&value, bytes + index * sizeof value, sizeof value);
+  return static_cast<double>(value);
+}
+
+using NumberOf = double (*)(const char*, std::size_t);
+
+NumberOf number_reader(int datatype, const std::filesystem::path& path) {
+  switch (datatype) {
+    case NIFTI_TYPE_INT8:
+      return number<std::int8_t>;
+    case NIFTI_TYPE_UINT8:
+      return number<std::uint8_t>;
+    case NIFTI_TYPE_INT16:
+      return number<std::int16_t>;
+    case NIFTI_TYPE_UINT16:
+      return number<std::uint16_t>;
+    case NIFTI_TYPE_INT32:
+      return number<std::int32_t>;
+    case NIFTI_TYPE_UINT32:
+      return number<std::uint32_t>;
+    case NIFTI_TYPE_INT64:
+      return number<std::int64_t>;
+    case NIFTI_TYPE_UINT64:
+      return number<std::uint64_t>;
+    case NIFTI_TYPE_FLOAT32:
+      return number<float>;
+    case NIFTI_TYPE_FLOAT64:
+      return number<double>;
+    default:
+      fail(path, fmt::format("its numbers are {}, not integers or reals", nifti_datatype_string(datatype)));
+  }
+}
+
+/// Checks a header, in either byte order, for errors that the library would print.
+template <class Header>
+void check_header(Header& header, void (*swap)(Header*), const std::filesystem::path& path) {
+  if (header.sizeof_hdr != static_cast<int>(sizeof header)) swap(&header);
+  bool sound = header.sizeof_hdr == static_cast<int>(sizeof header) && header.dim[0] >= 1 && header.dim[0] <= 7;
+  for (int axis = 1; sound && axis <= header.dim[0]; ++axis) sound = header.dim[axis] >= 1;
+  if (!sound) fail(path, "its NIfTI header is damaged");
+  number_reader(header.datatype, path);
+}
+
+struct Close {
+  void operator()(znzFile file) const { znzclose(file); }
+};
+using OpenFile = std::unique_ptr<znzptr, Close>;
+
+/// Whether the file begins with the size of a header. NIfTI files with a text header do not; the library would print
+/// messages while it reads them.
+bool begins_with_size(const std::string& name) {
+  const OpenFile file(znzopen(name.c_str(), "rb", nifti_is_gzfile(name.c_str())));
+  std::int32_t size = 0;
+  if (!file || znzread(&size, 1, sizeof size, file.get()) != sizeof size) return false;
+  std::int32_t swapped = size;
+  nifti_swap_4bytes(1, &swapped);
+  return size == 348 || swapped == 348 || size == 540 || swapped == 540;
+}
+
+Image read_header(const std::filesystem::path& path) {
+  std::error_code none;
+  if (!std::filesystem::is_regular_file(path, none)) fail(path, "no such file");
+  nifti_set_debug_level(0);  // Stop the library from printing.
+  const std::string name = path.string();
+  if (!begins_with_size(name)) fail(path, "is not a NIfTI file, or cut off in its header");
+  int version = 0;
+  const std::unique_ptr<void, decltype(&std::free)> raw(nifti_read_header(name.c_str(), &version, 0), &std::free);
+  // ANALYZE files have no magic word, no order and no orientation; the library gives them version 0 or 1.
+  const auto has_magic = [&](const char* magic, char number) {
+    return magic[0] == 'n' && (magic[1] == '+' || magic[1] == 'i') && magic[2] == number && magic[3] == '\0';
+  };
+  auto* const first = static_cast<nifti_1_header*>(raw.get());
+  auto* const second = static_cast<nifti_2_header*>(raw.get());
+  if (raw && version == 1 && has_magic(first->magic, '1'))
+    check_header(*first, nifti_swap_as_nifti1, path);
+  else if (raw && version == 2 && has_magic(second->magic, '2'))
+    check_header(*second, nifti_swap_as_nifti2, path);
+  else
+    fail(path, "is not a NIfTI file, or cut off in its header");
+  Image image(nifti_image_read(name.c_str(), 0), &nifti_image_free);
+  if (!image || !image->iname) fail(path, "its NIfTI header is damaged, or its .img is missing");
+  return image;
+}
+
+/// Counts the components along the fourth axis, or along the fifth, which the format prescribes for vectors and
+/// matrices.
+int component_count(const nifti_image& image, const std::filesystem::path& path) {
+  const auto extent = [&](int axis) { return axis <= image.dim[0] ? image.dim[axis] : 1; };
+  const std::int64_t four = extent(4), five = extent(5);
+  const std::int64_t count = four > 1 ? four : five;
+  if ((count != 3 && count != 6 && count != 9) || four * five != count || extent(6) != 1 || extent(7) != 1)
+    fail(path, fmt::format("its size is {} x {} x {} x {} x {}: a tensor has six or nine volumes, a vector three",
+                           extent(1), extent(2), extent(3), four, five));
+  return static_cast<int>(count);
+}
+
+/// Checks the sizes before memory is allocated. zlib expands one byte to at most 1032.
+void check_sizes(const nifti_image& image, const std::filesystem::path& path, int components) {
+  std::error_code none;
+  const std::uintmax_t bytes = std::filesystem::file_size(image.iname, none);
+  if (none) fail(path, fmt::format("its data file {} is missing", image.iname));
+  const bool compressed = nifti_is_gzfile(image.iname);
+  double needed = static_cast<double>(image.nbyper) * components;
+  for (int axis = 1; axis <= 3; ++axis) {
+    const std::int64_t extent = axis <= image.dim[0] ? image.dim[axis] : 1;
+    if (extent < 1 || extent > std::numeric_limits<int>::max()) fail(path, "its NIfTI header is damaged: sizes");
+    needed *= static_cast<double>(extent);
+  }
+  if (needed > static_cast<double>(bytes) * (compressed ? 1032 : 1))
+    fail(path, fmt::format("announces {:.0f} bytes of numbers, and holds no more than {}: cut off, or a damaged header",
+                           needed, bytes));
+}
+
+/// The planes of each slice, one for each component. Allocates memory while the numbers are read. nifti_image_load is
+/// not used, because it replaces numbers that are not finite by zero, and because its memory cannot be freed in
+/// parts.
+std::vector<std::vector<Plane>> read_planes(const nifti_image& image, const std::filesystem::path& path,
+                                            int components) {
+  const OpenFile file(znzopen(image.iname, "rb", nifti_is_gzfile(image.iname)));
+  if (!file) fail(path, fmt::format("its data file {} cannot be read", image.iname));
+  if (image.iname_offset < 0 || znzseek(file.get(), image.iname_offset, SEEK_SET) < 0)
+    fail(path, "its NIfTI header is damaged: vox_offset");
+  std::vector<std::vector<Plane>> slices(static_cast<std::size_t>(image.nz));
+  const auto values = static_cast<std::size_t>(image.nx) * static_cast<std::size_t>(image.ny);
+  for (int component = 0; component < components; ++component)
+    for (std::vector<Plane>& slice : slices) {
+      make_room();
+      Plane& plane = slice.emplace_back(values * static_cast<std::size_t>(image.nbyper));
+      if (znzread(plane.data(), 1, plane.size(), file.get()) != plane.size())
+        fail(path, "is cut off, or its compressed data are damaged");
+      if (image.swapsize > 1 && image.byteorder != nifti_short_order())
+        nifti_swap_Nbytes(static_cast<std::int64_t>(plane.size() / static_cast<std::size_t>(image.swapsize)),
+                          image.swapsize, plane.data());
+    }
+  char beyond = 0;
+  if (znzread(&beyond, 1, 1, file.get()) > 1)  // zlib compares checksums only at the end of a stream.
+    fail(path, "its compressed data are damaged");
+  return slices;
+}
+
+bool has_orientation(const nifti_image& image) { return image.sform_code > 0 || image.qform_code > 0; }
+
+/// From voxel indices to RAS millimetres. Files that do not state their unit are in millimetres. Files without an
+/// orientation are taken as FSL, nibabel and SPM take ANALYZE: the first axis runs from right to left.
+Eigen::Affine3d to_world(const nifti_image& image, const std::filesystem::path& path) {
+  Eigen::Matrix4d matrix = Eigen::Vector4d(-std::abs(image.dx), image.dy, image.dz, 1).asDiagonal();
+  if (has_orientation(image)) {
+    const nifti_dmat44& form = image.sform_code > 0 ? image.sto_xyz : image.qto_xyz;
+    matrix = Eigen::Map<const Eigen::Matrix<double, 4, 4, Eigen::RowMajor>>(&form.m[0][0]);
+  }
+  const double unit = image.xyz_units == NIFTI_UNITS_METER ? 1e3 : image.xyz_units == NIFTI_UNITS_MICRON ? 1e-3 : 1.0;
+  Eigen::Affine3d transform;
+  transform.matrix() << unit * matrix.topRows<3>(), Eigen::RowVector4d::UnitW();
+  const Matrix3d linear = transform.linear();
+  const double volume = linear.colwise().norm().prod();
+  if (!transform.matrix().allFinite() || !(std::abs(linear.determinant()) > 1e-9 * volume))
+    fail(path, fmt::format("its {} cannot be inverted: set it (with fslorient, mrtransform or nibabel)",
+                           image.sform_code > 0   ? "sform"
+                           : image.qform_code > 0 ? "qform"
+                                                  : "voxel size"));
+  return transform;
+}
+
+/// The header of a pair of files, of which either may be given.
+std::filesystem::path header_of(const std::filesystem::path& path) {
+  std::string name = path.string();
+  for (const std::string ending : {".img", ".img.gz"})
+    if (ends_with(lower_case(name), ending)) name.replace(name.size() - ending.size(), 4, ".hdr");
+  return name;
+}
+
+}  // namespace
+
+Lattice open_nifti(const std::filesystem::path& given) {
+  const std::filesystem::path path = header_of(given);
+  const Image image = read_header(path);
+  Lattice lattice;
+  lattice.components = component_count(*image, path);
+  const NumberOf number_of = number_reader(image->datatype, path);
+  check_sizes(*image, path, lattice.components);
+  lattice.size = {static_cast<int>(image->nx), static_cast<int>(image->ny), static_cast<int>(image->nz)};
+  lattice.to_world = to_world(*image, path);
+  lattice.fsl_frame = axes_of(ComponentFrame::fsl, lattice.to_world.linear());
+  lattice.lower_frame = axes_of(ComponentFrame::voxels, lattice.to_world.linear());
+  lattice.takes_frame = true;
+  if (!has_orientation(*image))
+    lattice.notes.push_back(
+        "states no orientation (the codes of sform and qform are 0): its first axis is taken to run from right to "
+        "left, as FSL does; set the sform if it does not");
+  lattice.zero_is_background = true;
+  if (image->intent_code == NIFTI_INTENT_SYMMATRIX && lattice.components == 6)
+    lattice.order = TensorOrder::lower_triangle;
+  if (lattice.order)
+    lattice.frame_note =
+        "does not say the axes of its symmetric matrices: taken as those of the voxels, as ANTs and dipy write them; "
+        "--frame says otherwise";
+  // A slope of zero means no scaling; some programs write NaN instead.
+  const bool scaled = std::isfinite(image->scl_slope) && image->scl_slope != 0;
+  const double slope = scaled ? image->scl_slope : 1;
+  const double intercept = scaled && std::isfinite(image->scl_inter) ? image->scl_inter : 0;
+  const auto slices = std::make_shared<std::vector<std::vector<Plane>>>(read_planes(*image, path, lattice.components));
+  lattice.read_slice = [slices, number_of, slope, intercept, bytes = image->nbyper](int z, double* values) {
+    const std::vector<Plane> planes = std::exchange((*slices)[static_cast<std::size_t>(z)], {});
+    for (std::size_t component = 0; component < planes.size(); ++component)
+      for (std::size_t i = 0; i < planes[component].size() / static_cast<std::size_t>(bytes); ++i)
+        values[i * planes.size() + component] = slope * number_of(planes[component].data(), i) + intercept;
+  };
+  return lattice;
+}
+
+}  // namespace tensorray

@@ -1,0 +1,217 @@
+// The format: https://numpy.org/doc/stable/reference/generated/numpy.lib.format.html. Numbers are read from the file
+// slice by slice, and are never all in memory.
+
+#include <algorithm>
+#include <array>
+#include <charconv>
+#include <cstdint>
+#include <cstring>
+#include <fstream>
+#include <limits>
+#include <memory>
+#include <stdexcept>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include "base/errors.h"
+#include "base/text/byte_order.h"
+#include "base/text/text.h"
+#include "tools/import/lattice_files/lattice_files.h"
+
+namespace tensorray {
+namespace {
+
+/// The contents of the file's header.
+struct Header {
+  std::size_t number_bytes = 0;
+  ByteOrder order = host_byte_order();
+  bool fortran = false;  ///< The first index runs fastest.
+  std::vector<std::size_t> shape;
+  std::uint64_t data_start = 0;  ///< Offset in the file, in bytes.
+};
+
+/// The header's text, a Python dictionary.
+std::string read_dictionary(std::ifstream& file, const std::filesystem::path& path, Header& header) {
+  std::array<unsigned char, 12> start{};
+  file.read(reinterpret_cast<char*>(start.data()), 10);
+  if (std::memcmp(start.data(), "\x93NUMPY", 6) != 0) fail(path, "is not a .npy file of NumPy");
+  const bool wide = start[6] >= 2;  // From version 2 on, the length has four bytes.
+  if (wide) file.read(reinterpret_cast<char*>(start.data()) + 10, 2);
+  if (!file || start[6] > 3) fail(path, "its .npy header is damaged or cut off");
+  const std::size_t length = wide ? read_number<std::uint32_t>(start.data() + 8, ByteOrder::little)
+                                  : read_number<std::uint16_t>(start.data() + 8, ByteOrder::little);
+  constexpr std::size_t reasonable = 1 << 16;
+  std::string text(std::min(length, reasonable), '\0');
+  file.read(text.data(), static_cast<std::streamsize>(text.size()));
+  if (!file || length > reasonable) fail(path, "its .npy header is damaged or cut off");
+  header.data_start = (wide ? 12u : 10u) + length;
+  return text;
+}
+
+/// The text after a key of the dictionary and its colon.
+std::string value_of(const std::string& dictionary, const std::string& key, const std::filesystem::path& path) {
+  const std::size_t found = dictionary.find("'" + key + "':");
+  const std::size_t start =
+      found == std::string::npos ? found : dictionary.find_first_not_of(' ', found + key.size() + 3);
+  if (start == std::string::npos) fail(path, "its .npy header is damaged: no " + key);
+  return dictionary.substr(start);
+}
+
+std::vector<std::size_t> shape_of(const std::string& text, const std::filesystem::path& path) {
+  const std::size_t end = text.find(')');
+  if (text[0] != '(' || end == std::string::npos) fail(path, "its .npy header is damaged: shape");
+  std::vector<std::size_t> shape;
+  for (std::size_t i = 1; i < end;) {
+    const std::size_t comma = std::min(text.find(',', i), end);
+    std::size_t extent = 0;
+    const auto [last, error] =
+        std::from_chars(text.data() + text.find_first_not_of(' ', i), text.data() + comma, extent);
+    const bool none = i > 1 && comma == end && text.find_first_not_of(' ', i) == end;  // "(3,)"
+    if (none) break;
+    if (error != std::errc() || last != text.data() + comma || extent < 1 ||
+        extent > static_cast<std::size_t>(std::numeric_limits<int>::max()))
+      fail(path, "its .npy header is damaged, or the array is empty: shape " + escaped(text.substr(0, end + 1)));
+    shape.push_back(extent);
+    i = comma + 1;
+  }
+  return shape;
+}
+
+Header read_header(std::ifstream& file, const std::filesystem::path& path) {
+  Header header;
+  const std::string dictionary = read_dictionary(file, path, header);
+  const std::string descr = value_of(dictionary, "descr", path);
+  const auto one_of = [&](std::size_t i, const std::string& characters) {
+    return i < descr.size() && characters.find(descr[i]) != std::string::npos;
+  };
+  const bool real = one_of(0, "'") && one_of(1, "<>=|") && one_of(2, "f") && one_of(3, "248") && one_of(4, "'");
+  if (!real) fail(path, "its numbers are not float16, float32 or float64: save array.astype(\"float32\")");
+  header.number_bytes = static_cast<std::size_t>(descr[3] - '0');
+  if (descr[1] == '<') header.order = ByteOrder::little;
+  if (descr[1] == '>') header.order = ByteOrder::big;
+  header.fortran = value_of(dictionary, "fortran_order", path).compare(0, 4, "True") == 0;
+  header.shape = shape_of(value_of(dictionary, "shape", path), path);
+  return header;
+}
+
+/// The number of components of an accepted shape.
+std::size_t component_count(const Header& header, const std::filesystem::path& path) {
+  const auto& shape = header.shape;
+  if (shape.size() == 5 && shape[3] == 3 && shape[4] == 3) return 9;
+  if (shape.size() == 4 && (shape[3] == 9 || shape[3] == 6 || shape[3] == 3)) return shape[3];
+  fail(path, fmt::format("its shape is ({}): a field of tensors is (nz, ny, nx, 3, 3), (nz, ny, nx, 9) or (nz, ny, nx, "
+                         "6), one of vectors (nz, ny, nx, 3)",
+                         fmt::join(shape, ", ")));
+}
+
+void check_size(const Header& header, const std::filesystem::path& path) {
+  double needed = static_cast<double>(header.number_bytes);
+  for (const std::size_t extent : header.shape) needed *= static_cast<double>(extent);
+  const auto held = static_cast<double>(std::filesystem::file_size(path)) - static_cast<double>(header.data_start);
+  if (needed == held) return;
+  fail(path, fmt::format("its shape ({}) needs {:.0f} bytes of numbers, and there are {:.0f}: {}",
+                         fmt::join(header.shape, ", "), needed, held,
+                         held < needed ? "cut off, or a damaged header" : "a damaged header, or several arrays"));
+}
+
+template <class Number>
+double number(const char* bytes, ByteOrder order) {
+  return static_cast<double>(read_number<Number>(bytes, order));
+}
+
+/// Reads slices of a file. In Fortran order the numbers of a slice are scattered over the whole file, so several
+/// slices are read at once.
+class Slices {
+ public:
+  Slices(std::filesystem::path path, std::ifstream file, Header header, std::size_t components)
+      : path_(std::move(path)), file_(std::move(file)), header_(std::move(header)), components_(components) {
+    number_of_ = header_.number_bytes == 2   ? number<Eigen::half>
+                 : header_.number_bytes == 4 ? number<float>
+                                             : number<double>;
+  }
+
+  void read(int z, double* values) {
+    const auto slice = static_cast<std::size_t>(z);
+    if (header_.fortran)
+      read_scattered(slice, values);
+    else
+      read_contiguous(slice, values);
+  }
+
+ private:
+  std::size_t bytes() const { return header_.number_bytes; }
+  std::size_t slice_numbers() const { return header_.shape[1] * header_.shape[2] * components_; }
+
+  void read_bytes(std::uint64_t offset, std::vector<char>& buffer) {
+    file_.seekg(static_cast<std::streamoff>(header_.data_start + offset));
+    file_.read(buffer.data(), static_cast<std::streamsize>(buffer.size()));
+    if (!file_) fail(path_, "cannot be read to its end");
+  }
+
+  void read_contiguous(std::size_t z, double* values) {
+    held_.resize(slice_numbers() * bytes());
+    read_bytes(z * held_.size(), held_);
+    for (std::size_t i = 0; i < slice_numbers(); ++i) values[i] = number_of_(&held_[i * bytes()], header_.order);
+  }
+
+  /// A run is the numbers of one component at one x and y, for all z.
+  void read_scattered(std::size_t z, double* values) {
+    if (held_.empty() || z < first_held_) hold_up_to(z);
+    const std::size_t ny = header_.shape[1], nx = header_.shape[2], held = held_.size() / slice_numbers();
+    for (std::size_t run = 0; run < slice_numbers(); ++run) {
+      const std::size_t y = run % ny, x = run / ny % nx, component = run / ny / nx;
+      const std::size_t by_rows = header_.shape.size() == 5 ? component % 3 * 3 + component / 3 : component;
+      values[(y * nx + x) * components_ + by_rows] =
+          number_of_(&held_[run * held + (z - first_held_) * bytes()], header_.order);
+    }
+  }
+
+  /// Reads an eighth of the file's slices, the last of which is `last`.
+  void hold_up_to(std::size_t last) {
+    const std::size_t nz = header_.shape[0], count = std::min(last + 1, (nz + 7) / 8);
+    first_held_ = last + 1 - count;
+    held_.resize(slice_numbers() * count * bytes());
+    const std::size_t runs_at_once = std::max<std::size_t>(1, (1 << 20) / (nz * bytes()));
+    std::vector<char> runs;
+    for (std::size_t run = 0; run < slice_numbers(); run += runs_at_once) {
+      const std::size_t runs_here = std::min(runs_at_once, slice_numbers() - run);
+      runs.resize(runs_here * nz * bytes());
+      read_bytes(std::uint64_t{run} * nz * bytes(), runs);
+      for (std::size_t i = 0; i < runs_here; ++i)
+        std::copy_n(&runs[(i * nz + first_held_) * bytes()], count * bytes(), &held_[(run + i) * count * bytes()]);
+    }
+  }
+
+  std::filesystem::path path_;
+  std::ifstream file_;
+  Header header_;
+  std::size_t components_;
+  double (*number_of_)(const char*, ByteOrder);
+  std::vector<char> held_;      ///< Bytes of one slice or of several slices, run by run.
+  std::size_t first_held_ = 0;  ///< The first of the slices in `held_`.
+};
+
+}  // namespace
+
+Lattice open_npy(const std::filesystem::path& path) {
+  std::error_code none;
+  if (!std::filesystem::is_regular_file(path, none)) fail(path, "no such file");
+  std::ifstream file(path, std::ios::binary);
+  if (!file) fail(path, "cannot be read");
+  Header header = read_header(file, path);
+  const std::size_t components = component_count(header, path);
+  check_size(header, path);
+  Lattice lattice;
+  for (std::size_t i = 0; i < 3; ++i) lattice.size[static_cast<int>(i)] = static_cast<int>(header.shape[2 - i]);
+  lattice.components = static_cast<int>(components);
+  if (components == 9) lattice.order = TensorOrder::full;
+  const auto slices = std::make_shared<Slices>(path, std::move(file), std::move(header), components);
+  lattice.read_slice = [slices](int z, double* values) { slices->read(z, values); };
+  return lattice;
+}
+
+}  // namespace tensorray

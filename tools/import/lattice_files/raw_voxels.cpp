@@ -1,0 +1,145 @@
+#include "tools/import/lattice_files/raw_voxels.h"
+
+#include <algorithm>
+#include <fstream>
+#include <memory>
+#include <stdexcept>
+#include <utility>
+
+#include <fmt/format.h>
+#include <zlib.h>
+
+#include "base/errors.h"
+#include "base/text/text.h"
+
+namespace tensorray {
+namespace {
+
+constexpr double greatest_expansion = 1032;  // Of zlib.
+
+std::ifstream open_at(const std::filesystem::path& path, std::uint64_t offset) {
+  std::ifstream file(path, std::ios::binary);
+  file.seekg(static_cast<std::streamoff>(offset));
+  if (!file) fail(path, "cannot be read");
+  return file;
+}
+
+/// Inflates a stream, and gives its contents part by part to `take`, until this returns false.
+template <class Take>
+void inflate_stream(const RawPlace& place, const Take& take) {
+  std::ifstream file = open_at(place.file, place.offset);
+  z_stream stream{};
+  constexpr int any_header = 47;  // the largest window; the header tells whether it is zlib or gzip
+  if (inflateInit2(&stream, any_header) != Z_OK) throw std::bad_alloc();
+  const std::unique_ptr<z_stream, decltype(&inflateEnd)> end(&stream, &inflateEnd);
+  std::vector<char> in(1 << 16), out(1 << 18);
+  for (int state = Z_OK; state != Z_STREAM_END;) {
+    if (stream.avail_in == 0) {
+      file.read(in.data(), static_cast<std::streamsize>(in.size()));
+      if (file.gcount() == 0) return;  // Cut off: the caller counts what it got.
+      stream.next_in = reinterpret_cast<Bytef*>(in.data());
+      stream.avail_in = static_cast<uInt>(file.gcount());
+    }
+    stream.next_out = reinterpret_cast<Bytef*>(out.data());
+    stream.avail_out = static_cast<uInt>(out.size());
+    state = inflate(&stream, Z_NO_FLUSH);
+    if (state != Z_OK && state != Z_STREAM_END) fail(place.file, "its compressed data are damaged");
+    if (!take(out.data(), out.size() - stream.avail_out)) return;
+  }
+}
+
+template <class Number>
+double number(const char* bytes, ByteOrder order) {
+  return static_cast<double>(read_number<Number>(bytes, order));
+}
+
+using NumberOf = double (*)(const char*, ByteOrder);
+
+NumberOf reader_of(const NumberType& type) {
+  using Kind = NumberType::Kind;
+  switch (type.bytes) {
+    case 1:
+      return type.kind == Kind::signed_integer ? number<std::int8_t> : number<std::uint8_t>;
+    case 2:
+      return type.kind == Kind::real             ? number<Eigen::half>
+             : type.kind == Kind::signed_integer ? number<std::int16_t>
+                                                 : number<std::uint16_t>;
+    case 4:
+      return type.kind == Kind::real             ? number<float>
+             : type.kind == Kind::signed_integer ? number<std::int32_t>
+                                                 : number<std::uint32_t>;
+    default:
+      return type.kind == Kind::real             ? number<double>
+             : type.kind == Kind::signed_integer ? number<std::int64_t>
+                                                 : number<std::uint64_t>;
+  }
+}
+
+}  // namespace
+
+std::optional<NumberType> number_type(const std::string& name) {
+  using Kind = NumberType::Kind;
+  const std::pair<const char*, Kind> kinds[] = {
+      {"int", Kind::signed_integer}, {"uint", Kind::unsigned_integer}, {"float", Kind::real}};
+  for (const auto& [word, kind] : kinds)
+    for (const int bytes : {1, 2, 4, 8})
+      if (lower_case(name) == word + std::to_string(8 * bytes) && !(kind == Kind::real && bytes == 1))
+        return NumberType{kind, bytes};
+  return {};
+}
+
+RawBytes read_some(const RawPlace& place, std::size_t count) {
+  RawBytes bytes;
+  if (!place.is_compressed) {
+    std::ifstream file = open_at(place.file, place.offset + place.skipped);
+    bytes.resize(count);
+    file.read(bytes.data(), static_cast<std::streamsize>(count));
+    bytes.resize(static_cast<std::size_t>(file.gcount()));
+    return bytes;
+  }
+  std::uint64_t before = place.skipped;
+  inflate_stream(place, [&](const char* part, std::size_t size) {
+    const std::size_t skip = std::min<std::uint64_t>(before, size);
+    before -= skip;
+    const std::size_t taken = std::min(size - skip, count - bytes.size());
+    bytes.insert(bytes.end(), part + skip, part + skip + taken);
+    return bytes.size() < count;
+  });
+  return bytes;
+}
+
+RawBytes read_numbers(const std::filesystem::path& path, const RawPlace& place, const NumberType& type,
+                      const Eigen::Vector3i& size, int components) {
+  std::error_code none;
+  const std::uintmax_t bytes = std::filesystem::file_size(place.file, none);
+  if (none || !std::filesystem::is_regular_file(place.file, none))
+    fail(path, "its data file " + place.file.string() + " is missing");
+  const double needed = size.cast<double>().prod() * components * type.bytes;
+  const double held = static_cast<double>(bytes) - static_cast<double>(place.offset);
+  if (needed + static_cast<double>(place.skipped) > held * (place.is_compressed ? greatest_expansion : 1))
+    fail(path, fmt::format("announces {:.0f} bytes of numbers, and holds no more than {:.0f}: cut off, or a damaged "
+                           "header",
+                           needed, std::max(0.0, held - static_cast<double>(place.skipped))));
+  const auto count = static_cast<std::size_t>(needed);
+  RawBytes numbers = read_some(place, count);
+  if (numbers.size() != count) fail(path, "is cut off, or its compressed data are damaged");
+  return numbers;
+}
+
+std::function<void(int z, double* values)> slices_of(RawVoxels voxels, const Eigen::Vector3i& size, int components) {
+  const NumberOf number_of = reader_of(voxels.type);
+  const auto held = std::make_shared<const RawVoxels>(std::move(voxels));
+  return [held, number_of, size, components](int z, double* values) {
+    const auto& [x_stride, y_stride, z_stride, component_stride] = held->strides;
+    for (int y = 0; y < size.y(); ++y)
+      for (int x = 0; x < size.x(); ++x)
+        for (int c = 0; c < components; ++c) {
+          const std::int64_t index = held->first + x * x_stride + y * y_stride + z * z_stride + c * component_stride;
+          *values++ =
+              held->slope * number_of(&held->bytes[static_cast<std::size_t>(index * held->type.bytes)], held->order) +
+              held->intercept;
+        }
+  };
+}
+
+}  // namespace tensorray

@@ -1,0 +1,61 @@
+#pragma once
+/// @file tools/import/lattice_files/raw_voxels.h
+/// The numbers of a file of voxels, as plain bytes in any order of the axes. Private to the importer.
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <filesystem>
+#include <functional>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include <Eigen/Core>
+
+#include "base/text/byte_order.h"
+#include "volumes/grids/page_memory.h"
+
+namespace tensorray {
+
+struct NumberType {
+  enum class Kind { signed_integer, unsigned_integer, real };
+  Kind kind = Kind::real;
+  int bytes = 4;  ///< 1 (not real), 2, 4 or 8.
+};
+
+/// The type with a name as in "Float32", "uint8", without a byte order; nothing if there is no such type.
+std::optional<NumberType> number_type(const std::string& name);
+
+using RawBytes = std::vector<char, PageAllocator<char>>;
+
+/// Where bytes are in a file.
+struct RawPlace {
+  std::filesystem::path file;
+  std::uint64_t offset = 0;    ///< Of the bytes, or of the compressed stream.
+  bool is_compressed = false;  ///< A stream of zlib or gzip, which ends with the file or before.
+  std::uint64_t skipped = 0;   ///< Bytes of the stream's contents that are before the wanted ones.
+};
+
+/// Reads at most `count` bytes. @throw std::runtime_error naming the file: it cannot be read, or its stream is damaged.
+RawBytes read_some(const RawPlace& place, std::size_t count);
+
+/// Numbers of voxels.
+struct RawVoxels {
+  RawBytes bytes;
+  NumberType type;
+  ByteOrder order = host_byte_order();
+  std::int64_t first = 0;                 ///< Which number is component 0 of voxel (0, 0, 0).
+  std::array<std::int64_t, 4> strides{};  ///< From one x, y, z or component to the next, in numbers; may be negative.
+  double slope = 1, intercept = 0;        ///< The value is slope · number + intercept.
+};
+
+/// Reads the numbers of size.x() · size.y() · size.z() · components values, and checks first that the file may hold
+/// them. @throw std::runtime_error naming `path`, the file that the user gave.
+RawBytes read_numbers(const std::filesystem::path& path, const RawPlace& place, const NumberType& type,
+                      const Eigen::Vector3i& size, int components);
+
+/// The `read_slice` of a lattice (lattice.h).
+std::function<void(int z, double* values)> slices_of(RawVoxels voxels, const Eigen::Vector3i& size, int components);
+
+}  // namespace tensorray

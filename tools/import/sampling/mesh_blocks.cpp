@@ -1,0 +1,309 @@
+#include "tools/import/sampling/mesh_blocks.h"
+
+#include <algorithm>
+#include <array>
+#include <atomic>
+#include <bitset>
+#include <cmath>
+#include <thread>
+#include <vector>
+
+#include <tbb/blocked_range.h>
+#include <tbb/parallel_for.h>
+#include <vtkDataSet.h>
+
+#include "tools/import/meshes/mesh_cell.h"
+#include "tools/import/sampling/cell_parts.h"
+#include "tools/import/sampling/voxel_average.h"
+#include "volumes/grids/page_memory.h"
+
+namespace tensorray {
+namespace {
+
+using Eigen::AlignedBox3d;
+using Eigen::AlignedBox3i;
+using Eigen::Vector3d;
+using Eigen::Vector3i;
+using Tensor = VoxelAverage::Tensor;
+using Voxels = std::bitset<TensorBlock::voxels>;
+
+/// For each block of the lattice, the cells that may have voxels in it, by ascending index: the cells of block b are
+/// cells[first[b]] to cells[first[b + 1] − 1].
+struct Bins {
+  Vector3i blocks = Vector3i::Zero();
+  std::vector<std::size_t> first;
+  std::vector<vtkIdType> cells;
+
+  std::size_t index(int x, int y, int z) const {
+    return (static_cast<std::size_t>(x) * static_cast<std::size_t>(blocks.y()) + static_cast<std::size_t>(y)) *
+               static_cast<std::size_t>(blocks.z()) +
+           static_cast<std::size_t>(z);
+  }
+  Vector3i block(std::size_t index) const {
+    const auto ny = static_cast<std::size_t>(blocks.y()), nz = static_cast<std::size_t>(blocks.z());
+    return {static_cast<int>(index / nz / ny), static_cast<int>(index / nz % ny), static_cast<int>(index % nz)};
+  }
+};
+
+/// Indices of the voxels whose centres may be in a box, or no farther than `margin` from it; empty if there are none.
+AlignedBox3i voxels_in(const AlignedBox3d& box, const SamplingLattice& lattice, const Vector3d& margin) {
+  if (box.isEmpty()) return {};
+  const auto index_of = [&](const Vector3d& position, const Vector3d& offset) {
+    return Eigen::Array3d((position - lattice.origin + offset).array() / lattice.voxel.array());
+  };
+  const Eigen::Array3d last = (lattice.size.array() - 1).cast<double>();
+  const Eigen::Array3d from = index_of(box.min(), -margin).ceil().max(0);
+  const Eigen::Array3d to = index_of(box.max(), margin).floor().min(last);
+  if ((from > to).any()) return {};
+  return {from.cast<int>().matrix(), to.cast<int>().matrix()};
+}
+
+/// Calls `visit(block)` with the index of each block that has voxels among `voxels`.
+template <class Visit>
+void for_each_block(const Bins& bins, const AlignedBox3i& voxels, const Visit& visit) {
+  if (voxels.isEmpty()) return;
+  const Vector3i from = voxels.min() / TensorBlock::size, to = voxels.max() / TensorBlock::size;
+  for (int x = from.x(); x <= to.x(); ++x)
+    for (int y = from.y(); y <= to.y(); ++y)
+      for (int z = from.z(); z <= to.z(); ++z) visit(bins.index(x, y, z));
+}
+
+Bins bins_of(const Solid& solid, const SamplingLattice& lattice, const Vector3d& margin) {
+  Bins bins;
+  bins.blocks = (lattice.size.array() + (TensorBlock::size - 1)) / TensorBlock::size;
+  bins.first.assign(bins.index(bins.blocks.x(), 0, 0) + 1, 0);
+  for (const AlignedBox3d& box : solid.boxes)
+    for_each_block(bins, voxels_in(box, lattice, margin), [&](std::size_t block) { ++bins.first[block + 1]; });
+  for (std::size_t block = 1; block < bins.first.size(); ++block) bins.first[block] += bins.first[block - 1];
+  bins.cells.resize(bins.first.back());
+  std::vector<std::size_t> next(bins.first.begin(), bins.first.end() - 1);
+  for (std::size_t id = 0; id < solid.boxes.size(); ++id)
+    for_each_block(bins, voxels_in(solid.boxes[id], lattice, margin),
+                   [&](std::size_t block) { bins.cells[next[block]++] = static_cast<vtkIdType>(id); });
+  return bins;
+}
+
+/// The tensor of `cell`, whose weights are those at a position; not finite if a point with a weight has no finite
+/// tensor.
+Tensor tensor_in(const MeshSource& source, const MeshCell& cell, vtkIdType id, const std::vector<double>& weights) {
+  using Given = Eigen::Map<const Tensor>;
+  if (!source.point_tensors) return Given(source.cell_tensors + 9 * id);
+  constexpr double rounding = 1e-9;
+  Tensor sum = Tensor::Zero();
+  for (int i = 0; i < cell.points(); ++i) {
+    const double weight = weights[static_cast<std::size_t>(i)];
+    if (std::abs(weight) > rounding) sum += weight * Given(source.point_tensors + 9 * cell.point(i));
+  }
+  return sum;
+}
+
+Eigen::Matrix3f matrix_of(const Tensor& tensor) {
+  return Eigen::Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>(tensor.data()).cast<float>();
+}
+
+/// @return false if the cell is not used.
+bool load(const MeshSource& source, MeshCell& cell, vtkIdType id) {
+  if (source.cell_tensors && !Eigen::Map<const Tensor>(source.cell_tensors + 9 * id).allFinite()) return false;
+  return cell.load(source.mesh, id);
+}
+
+/// What one thread needs to fill a block.
+struct Workspace {
+  MeshCell cell;
+  std::vector<VoxelAverage> averages = std::vector<VoxelAverage>(TensorBlock::voxels);
+  std::array<double, TensorBlock::voxels> fineness{};  ///< Of the finest cell in each voxel.
+};
+
+/// Sets the tensors of the block's voxels whose centres are in the cell and were in no earlier cell.
+void fill_from_cell(const MeshSource& source, MeshCell& cell, vtkIdType id, TensorBlock& block, Voxels& taken) {
+  const AlignedBox3i voxels =
+      voxels_in(source.solid.boxes[static_cast<std::size_t>(id)], source.lattice, Vector3d::Constant(source.tolerance));
+  if (voxels.isEmpty()) return;
+  const Vector3i from = (voxels.min() - block.origin).cwiseMax(0);
+  const Vector3i to = (voxels.max() - block.origin).cwiseMin(TensorBlock::size - 1);
+  for (int x = from.x(); x <= to.x(); ++x)
+    for (int y = from.y(); y <= to.y(); ++y)
+      for (int z = from.z(); z <= to.z(); ++z) {
+        const auto offset = static_cast<std::size_t>(TensorBlock::offset(x, y, z));
+        if (taken[offset]) continue;
+        if (!cell.find(source.lattice.position(block.origin + Vector3i(x, y, z)), source.tolerance)) continue;
+        taken.set(offset);
+        const Eigen::Matrix3f tensor = matrix_of(tensor_in(source, cell, id, cell.weights()));
+        if (!tensor.allFinite()) continue;
+        block.values[offset] = tensor;
+        block.active.set(offset);
+      }
+}
+
+/// The tensors at the centres of the block's voxels.
+void fill_centres(const MeshSource& source, const vtkIdType* begin, const vtkIdType* end, MeshCell& cell,
+                  TensorBlock& block) {
+  Voxels taken;
+  for (const vtkIdType* id = begin; id != end && !taken.all(); ++id)
+    if (load(source, cell, *id)) fill_from_cell(source, cell, *id, block, taken);
+}
+
+/// How a cell is averaged.
+struct AveragedCell {
+  vtkIdType id = 0;
+  double fineness = 0;             ///< How far its voxels are: from 0 (no part of their values) to 1 (all of it).
+  double samples_along_voxel = 0;  ///< In each direction, where it is in several voxels.
+};
+
+/// A mesh and a lattice that are equally fine have the same detail; only what is finer than voxels is aliased.
+/// @param cell  That of `id`, loaded.
+AveragedCell averaged_cell(const MeshCell& cell, vtkIdType id, const Vector3d& voxel) {
+  const double thickness = cell.thickness(voxel.cwiseInverse());
+  // Layers that are many in a voxel need fewer samples each.
+  return {id, std::clamp(2 * (1 - thickness), 0.0, 1.0), thickness < 0.125 ? 2.0 : 4.0};
+}
+
+/// Whether the cell may be thinner than a voxel. Needs no cell to be loaded.
+bool may_be_fine(const MeshSource& source, vtkIdType id) {
+  return source.solid.thickness[static_cast<std::size_t>(id)] < source.lattice.voxel.maxCoeff();
+}
+
+/// The box of voxels of the lattice, with all their volume.
+AlignedBox3d box_of(const SamplingLattice& lattice, const AlignedBox3i& voxels) {
+  return {lattice.position(voxels.min()) - 0.5 * lattice.voxel, lattice.position(voxels.max()) + 0.5 * lattice.voxel};
+}
+
+/// The change of the tensor along the edges of a part of `cell`.
+Eigen::Matrix<double, 9, 3> changes_in(const MeshSource& source, const MeshCell& cell, const CellPart& part) {
+  Eigen::Matrix<double, 9, 3> sum = Eigen::Matrix<double, 9, 3>::Zero();
+  if (!source.point_tensors) return sum;
+  for (int i = 0; i < cell.points(); ++i)
+    sum.noalias() += Eigen::Map<const Tensor>(source.point_tensors + 9 * cell.point(i)) * part.changes.row(i);
+  return sum;
+}
+
+/// The number of samples along each edge of a part: more where the part is in several voxels, among which samples
+/// divide it. All in voxels.
+Eigen::Array3d sample_counts(const Vector3d& centre, const Eigen::Matrix3d& edges, double samples_along_voxel) {
+  constexpr double rounding = 1e-6, least = 3, thin = 0.125;
+  Eigen::Array3d counts;
+  for (int axis = 0; axis < 3; ++axis) {
+    const double length = edges.col(axis).norm();
+    const Eigen::Array3d reach = 0.5 * edges.col(axis).array().abs() - rounding;
+    const Eigen::Array3d from = (centre.array() + 0.5 - reach).floor(), to = (centre.array() + 0.5 + reach).floor();
+    counts[axis] = (from < to).any() ? std::max(least, std::ceil(samples_along_voxel * length - rounding))
+                                     : std::max(length > thin ? 2.0 : 1.0, std::ceil(2 * length - rounding));
+  }
+  return counts;
+}
+
+/// Adds samples of a part, evenly spaced along its edges, to the averages of the voxels of the block that they are in.
+void add_samples(const MeshSource& source, Workspace& work, const AveragedCell& cell, const TensorBlock& block,
+                 const Voxels& voxels, const CellPart& part) {
+  const SamplingLattice& lattice = source.lattice;
+  const Tensor tensor = tensor_in(source, work.cell, cell.id, part.weights);
+  const Eigen::Matrix<double, 9, 3> changes = changes_in(source, work.cell, part);
+  if (!tensor.allFinite() || !changes.allFinite()) return;
+  const Vector3d centre = (part.position - lattice.position(block.origin)).cwiseQuotient(lattice.voxel);
+  const Eigen::Matrix3d edges = lattice.voxel.cwiseInverse().asDiagonal() * part.edges;
+  const Eigen::Array3d counts = sample_counts(centre, edges, cell.samples_along_voxel);
+  const double weight = part.volume / lattice.voxel.prod() / counts.prod();
+  for (double x = 0.5; x < counts[0]; ++x)
+    for (double y = 0.5; y < counts[1]; ++y)
+      for (double z = 0.5; z < counts[2]; ++z) {
+        const Vector3d along = (Eigen::Array3d(x, y, z) / counts - 0.5).matrix();
+        const Eigen::Array3d position = (centre + edges * along).array();
+        const Eigen::Array3d index = (position + 0.5).floor();
+        if (!(index >= 0).all() || !(index < TensorBlock::size).all()) continue;
+        const auto offset = static_cast<std::size_t>(
+            TensorBlock::offset(static_cast<int>(index.x()), static_cast<int>(index.y()), static_cast<int>(index.z())));
+        if (!voxels[offset]) continue;
+        work.averages[offset].add((position - index).matrix(), weight, tensor + changes * along);
+        work.fineness[offset] = std::max(work.fineness[offset], cell.fineness);
+      }
+}
+
+/// Adds the part of the cell that is in `voxels` of the block to their averages.
+void add_parts(const MeshSource& source, Workspace& work, const AveragedCell& cell, const TensorBlock& block,
+               const Voxels& voxels, const AlignedBox3d& where) {
+  visit_parts(work.cell, source.lattice.voxel, where,
+              [&](const CellPart& part) { add_samples(source, work, cell, block, voxels, part); });
+}
+
+/// Adds the cells that are thinner than voxels. @return the voxels that have some.
+Voxels add_fine_cells(const MeshSource& source, const vtkIdType* begin, const vtkIdType* end, Workspace& work,
+                      const TensorBlock& block) {
+  const AlignedBox3i all(block.origin, block.origin + Vector3i::Constant(TensorBlock::size - 1));
+  const AlignedBox3d where = box_of(source.lattice, all);
+  for (const vtkIdType* id = begin; id != end; ++id) {
+    if (!may_be_fine(source, *id) || !load(source, work.cell, *id)) continue;
+    const AveragedCell cell = averaged_cell(work.cell, *id, source.lattice.voxel);
+    if (cell.fineness > 0) add_parts(source, work, cell, block, block.active, where);
+  }
+  Voxels voxels;
+  for (std::size_t offset = 0; offset < TensorBlock::voxels; ++offset) voxels[offset] = !work.averages[offset].empty();
+  return voxels;
+}
+
+/// Adds the other cells, in voxels that have some thin ones.
+void add_coarse_cells(const MeshSource& source, const vtkIdType* begin, const vtkIdType* end, Workspace& work,
+                      const TensorBlock& block, const Voxels& voxels) {
+  AlignedBox3i some;
+  for (int offset = 0; offset < TensorBlock::voxels; ++offset)
+    if (voxels[static_cast<std::size_t>(offset)]) some.extend(Vector3i(block.origin + TensorBlock::position(offset)));
+  const AlignedBox3d where = box_of(source.lattice, some);
+  for (const vtkIdType* id = begin; id != end; ++id) {
+    const AlignedBox3d& box = source.solid.boxes[static_cast<std::size_t>(*id)];
+    if (!box.intersects(where) || !load(source, work.cell, *id)) continue;
+    const AveragedCell cell = averaged_cell(work.cell, *id, source.lattice.voxel);
+    if (cell.fineness == 0) add_parts(source, work, cell, block, voxels, where.intersection(box));
+  }
+}
+
+/// Replaces the values of voxels with cells that are thinner than voxels by averages.
+void average_voxels(const MeshSource& source, const vtkIdType* begin, const vtkIdType* end, Workspace& work,
+                    TensorBlock& block) {
+  if (std::none_of(begin, end, [&](vtkIdType id) { return may_be_fine(source, id); })) return;
+  const Voxels voxels = add_fine_cells(source, begin, end, work, block);
+  if (voxels.none()) return;
+  add_coarse_cells(source, begin, end, work, block, voxels);
+  for (std::size_t offset = 0; offset < TensorBlock::voxels; ++offset) {
+    if (!voxels[offset]) continue;
+    const auto part = static_cast<float>(work.fineness[offset]);
+    block.values[offset] = (1 - part) * block.values[offset] + part * matrix_of(work.averages[offset].value());
+    work.averages[offset] = {};
+    work.fineness[offset] = 0;
+  }
+}
+
+/// How far beyond a cell the centres of voxels may be that have a part of it.
+Vector3d margin_of(const MeshSource& source) {
+  const auto least = std::min_element(source.solid.thickness.begin(), source.solid.thickness.end());
+  const bool averages = least != source.solid.thickness.end() && *least < source.lattice.voxel.maxCoeff();
+  return (averages ? 0.5 : 0.0) * source.lattice.voxel + Vector3d::Constant(source.tolerance);
+}
+
+}  // namespace
+
+TensorBlocks mesh_blocks(const MeshSource& source, const Progress& progress) {
+  const Bins bins = bins_of(source.solid, source.lattice, margin_of(source));
+  std::vector<std::size_t> used;
+  for (std::size_t block = 0; block + 1 < bins.first.size(); ++block)
+    if (bins.first[block] < bins.first[block + 1]) used.push_back(block);
+  TensorBlocks blocks = make_blocks(used.size());
+  const std::thread::id caller = std::this_thread::get_id();
+  std::atomic<std::uint64_t> done{0};
+  using Range = tbb::blocked_range<std::size_t>;
+  tbb::parallel_for(Range(0, used.size(), 4), [&](const Range& range) {
+    Workspace work;
+    for (std::size_t i = range.begin(); i < range.end(); ++i) {
+      make_room();
+      const vtkIdType* const begin = bins.cells.data() + bins.first[used[i]];
+      const vtkIdType* const end = bins.cells.data() + bins.first[used[i] + 1];
+      blocks[i].origin = TensorBlock::size * bins.block(used[i]);
+      fill_centres(source, begin, end, work.cell, blocks[i]);
+      if (blocks[i].active.any()) average_voxels(source, begin, end, work, blocks[i]);
+    }
+    done += range.size();
+    if (std::this_thread::get_id() == caller) progress.update("sampling", done, used.size());
+  });
+  progress.update("sampling", used.size(), used.size());
+  return blocks;
+}
+
+}  // namespace tensorray

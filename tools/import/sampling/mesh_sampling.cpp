@@ -1,0 +1,119 @@
+#include "tools/import/sampling/mesh_sampling.h"
+
+#include <algorithm>
+#include <cmath>
+#include <stdexcept>
+#include <tuple>
+#include <utility>
+#include <vector>
+
+#include <fmt/format.h>
+#include <vtkCellData.h>
+#include <vtkDataSet.h>
+#include <vtkDoubleArray.h>
+#include <vtkPointData.h>
+
+#include "tools/import/meshes/mesh_solid.h"
+#include "tools/import/meshes/mesh_tensors.h"
+#include "tools/import/sampling/mesh_blocks.h"
+#include "tools/import/sampling/sampling_lattice.h"
+#include "volumes/grids/page_memory.h"
+
+namespace tensorray {
+namespace {
+
+using Eigen::AlignedBox3d;
+using Eigen::Vector3d;
+
+constexpr double face_tolerance = 1e-6;  ///< As a fraction of the mesh's diagonal.
+
+/// There may be as many as voxels.
+using Norms = std::vector<double, PageAllocator<double>>;
+
+double norm_of(const double* tensor) { return Eigen::Map<const Eigen::Matrix<double, 9, 1>>(tensor).norm(); }
+
+/// @return peak and median; zeros if there are no norms.
+std::pair<double, double> peak_and_median(Norms& norms) {
+  if (norms.empty()) return {0, 0};
+  const auto middle = norms.begin() + static_cast<std::ptrdiff_t>(norms.size() / 2);
+  std::nth_element(norms.begin(), middle, norms.end());
+  return {*std::max_element(norms.begin(), norms.end()), *middle};
+}
+
+Norms norms_of_points(vtkDataSet& mesh, const double* tensors, const Solid& solid, const AlignedBox3d& bounds) {
+  Norms norms;
+  for (vtkIdType point = 0; point < mesh.GetNumberOfPoints(); ++point) {
+    Vector3d position;
+    mesh.GetPoint(point, position.data());
+    if (solid.points[static_cast<std::size_t>(point)] && bounds.contains(position))
+      norms.push_back(norm_of(tensors + 9 * point));
+  }
+  return norms;
+}
+
+/// Of the cells that have a part in `bounds`.
+Norms norms_of_cells(const double* tensors, const Solid& solid, const AlignedBox3d& bounds, double tolerance) {
+  const AlignedBox3d inside(bounds.min().array() + tolerance, bounds.max().array() - tolerance);
+  Norms norms;
+  for (std::size_t cell = 0; cell < solid.boxes.size(); ++cell)
+    if (!solid.boxes[cell].isEmpty() && solid.boxes[cell].intersects(inside))
+      norms.push_back(norm_of(tensors + 9 * cell));
+  return norms;
+}
+
+void report_native(const MeshSource& source, const AlignedBox3d& bounds, SamplingReport& report) {
+  Norms norms = source.cell_tensors ? norms_of_cells(source.cell_tensors, source.solid, bounds, source.tolerance)
+                                    : norms_of_points(source.mesh, source.point_tensors, source.solid, bounds);
+  const auto is_not_finite = [](double norm) { return !std::isfinite(norm); };
+  const auto finite_end = std::remove_if(norms.begin(), norms.end(), is_not_finite);
+  report.of_cells = source.cell_tensors != nullptr;
+  report.non_finite = static_cast<std::size_t>(norms.end() - finite_end);
+  norms.erase(finite_end, norms.end());
+  std::tie(report.native_peak, report.native_median) = peak_and_median(norms);
+}
+
+void report_sampled(const TensorGrid& grid, SamplingReport& report) {
+  Norms norms;
+  for (const TensorBlock& block : grid.blocks) {
+    make_room();
+    for (std::size_t offset = 0; offset < TensorBlock::voxels; ++offset)
+      if (block.active[offset]) norms.push_back(block.values[offset].cast<double>().norm());
+  }
+  report.active = norms.size();
+  std::tie(report.sampled_peak, report.sampled_median) = peak_and_median(norms);
+}
+
+/// The tensors of with_tensors at points or cells; null if there are none.
+const double* tensors_in(vtkDataSetAttributes& attributes) {
+  auto* const array = vtkDoubleArray::SafeDownCast(attributes.GetArray(tensor_array));
+  return array && array->GetNumberOfComponents() == 9 ? array->GetPointer(0) : nullptr;
+}
+
+}  // namespace
+
+TensorGrid sample_mesh(vtkDataSet& mesh, const SamplingSettings& settings, const Progress& progress,
+                       SamplingReport& report) {
+  const double* const of_points = tensors_in(*mesh.GetPointData());
+  const double* const of_cells = tensors_in(*mesh.GetCellData());
+  if (!of_points && !of_cells) throw std::invalid_argument("the mesh has no tensors: it must come from with_tensors");
+  const Solid solid = solid_part(mesh);
+  const SamplingLattice lattice = sampling_lattice(mesh, solid, settings);
+  const double tolerance = face_tolerance * solid.bounds.diagonal().norm();
+  const MeshSource source{mesh, of_points, of_cells, solid, lattice, tolerance};
+  TensorGrid grid;
+  grid.to_world = Eigen::Translation3d(lattice.origin) * Eigen::Scaling(lattice.voxel);
+  grid.blocks = mesh_blocks(source, progress);
+  remove_empty_blocks(grid);
+  report.size = lattice.size;
+  report.voxel = lattice.voxel;
+  report_native(source, sampled_box(solid, settings), report);
+  report_sampled(grid, report);
+  if (report.active == 0)
+    throw std::invalid_argument(
+        fmt::format("none of the {} x {} x {} voxels is inside of the mesh where its tensors are finite: give other "
+                    "--bounds or smaller voxels",
+                    lattice.size.x(), lattice.size.y(), lattice.size.z()));
+  return grid;
+}
+
+}  // namespace tensorray

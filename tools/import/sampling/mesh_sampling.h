@@ -1,0 +1,52 @@
+#pragma once
+/// @file tools/import/sampling/mesh_sampling.h
+/// Samples tensors on a mesh at the voxels of a lattice.
+
+#include <cstddef>
+#include <optional>
+#include <variant>
+
+#include <Eigen/Geometry>
+
+#include "base/process/progress.h"
+#include "volumes/grids/tensor_grid.h"
+
+class vtkDataSet;
+
+namespace tensorray {
+
+struct SamplingSettings {
+  /// The number of voxels along the longest edge (int), the numbers along x, y, z (>= 2 each), or the edge of a voxel
+  /// (double). If none is given, a voxel is about as large as the median cell, with at most 2^21 voxels.
+  std::variant<std::monostate, int, Eigen::Vector3i, double> resolution;
+  std::optional<Eigen::AlignedBox3d> bounds;  ///< World; default: bounds of the three-dimensional cells.
+  int flat_axis = -1;  ///< The axis across a slab (flat_mesh.h), along which there is one voxel; -1: none.
+};
+
+struct SamplingReport {
+  Eigen::Vector3i size = Eigen::Vector3i::Zero();   ///< Voxels of the lattice along each axis, active or not.
+  Eigen::Vector3d voxel = Eigen::Vector3d::Zero();  ///< Edges of a voxel, world units.
+  std::size_t active = 0;
+  bool of_cells = false;                      ///< Whether the mesh has its tensors at cells, else at points.
+  double native_peak = 0, native_median = 0;  ///< ‖T‖ (Frobenius) of the used cells, or their points, in `bounds`.
+  double sampled_peak = 0, sampled_median = 0;  ///< ‖T‖ at the active voxels.
+  std::size_t non_finite = 0;                   ///< Of those cells or points: whose tensor is not finite.
+};
+
+/// Samples the tensors of with_tensors at the voxels of a lattice. A voxel is active if its centre is in a cell whose
+/// tensor is finite; where cells overlap, the cell with the lowest index counts. Voxels within 1e-6 of the mesh's
+/// diagonal of a face count as inside. The lattice is centred in the box as far as the box extends.
+///
+/// A voxel takes the tensor at its centre, interpolated in the cell that contains it (it is NaN if a point with a
+/// weight has NaN), or the cell's own if the mesh has tensors at cells alone. Where cells are thinner than voxels, it
+/// takes the average over the part of the voxel that the mesh fills (voxel_average.h). The average counts fully where
+/// the thinnest of these cells has at most half the thickness of a voxel, then less, and not at all from the thickness
+/// of a voxel on. If the mesh has tensors at points and cells, the points' are sampled, and the cells' are those of the
+/// file: the report compares with them, and cells where they are not finite are left out.
+/// Threads: uses all threads. The result does not depend on their number.
+/// @throw std::invalid_argument if the mesh has no three-dimensional cells, a setting is out of range, no voxel is
+/// inside, or the grid would exceed 2^30 voxels.
+TensorGrid sample_mesh(vtkDataSet& mesh, const SamplingSettings& settings, const Progress& progress,
+                       SamplingReport& report);
+
+}  // namespace tensorray

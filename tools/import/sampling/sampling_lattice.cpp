@@ -1,0 +1,121 @@
+#include "tools/import/sampling/sampling_lattice.h"
+
+#include <algorithm>
+#include <cmath>
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+#include <fmt/format.h>
+#include <tbb/blocked_range.h>
+#include <tbb/parallel_for.h>
+#include <vtkDataSet.h>
+
+#include "tools/import/meshes/mesh_cell.h"
+
+namespace tensorray {
+namespace {
+
+using Eigen::AlignedBox3d;
+using Eigen::Vector3d;
+using Eigen::Vector3i;
+using CellRange = tbb::blocked_range<vtkIdType>;
+
+constexpr double rounded_one = 1 + 1e-9;
+constexpr double most_voxels = 1 << 30;         ///< Limit for any lattice.
+constexpr double most_chosen_voxels = 1 << 21;  ///< Limit for a lattice whose size the user did not set.
+
+std::string text_of(const Vector3d& v) { return fmt::format("({:.6g}, {:.6g}, {:.6g})", v.x(), v.y(), v.z()); }
+
+/// The cube root of the median volume of the cells that meet `bounds`.
+double typical_edge(vtkDataSet& mesh, const Solid& solid, const AlignedBox3d& bounds) {
+  std::vector<double> volumes(solid.boxes.size(), 0);
+  tbb::parallel_for(CellRange(0, mesh.GetNumberOfCells(), 256), [&](const CellRange& range) {
+    MeshCell cell;
+    for (vtkIdType id = range.begin(); id < range.end(); ++id) {
+      const auto i = static_cast<std::size_t>(id);
+      if (!solid.boxes[i].isEmpty() && solid.boxes[i].intersects(bounds) && cell.load(mesh, id))
+        volumes[i] = cell.volume();
+    }
+  });
+  volumes.erase(std::remove_if(volumes.begin(), volumes.end(), [](double v) { return !(v > 0); }), volumes.end());
+  if (volumes.empty()) return bounds.sizes().maxCoeff();
+  const auto middle = volumes.begin() + static_cast<std::ptrdiff_t>(volumes.size() / 2);
+  std::nth_element(volumes.begin(), middle, volumes.end());
+  return std::cbrt(*middle);
+}
+
+/// Voxels that fit along edges, from one end. Doubles, because the numbers may exceed all integers.
+Vector3d voxels_along(const Vector3d& edges, double voxel) {
+  constexpr double rounding = 1e-6;  // keeps a last voxel that is beyond the end only by rounding
+  return (edges.array() / voxel + rounding).floor() + 1;
+}
+
+double chosen_voxel(vtkDataSet& mesh, const Solid& solid, const AlignedBox3d& box) {
+  double voxel = std::min(typical_edge(mesh, solid, box), box.sizes().maxCoeff());
+  while (voxels_along(box.sizes(), voxel).prod() > most_chosen_voxels) voxel *= 1.01;
+  return voxel;
+}
+
+void require_two(int count) {
+  if (count < 2) throw std::invalid_argument(fmt::format("--resolution {}: at least 2 voxels are needed", count));
+}
+
+}  // namespace
+
+AlignedBox3d sampled_box(const Solid& solid, const SamplingSettings& settings) {
+  AlignedBox3d box = settings.bounds.value_or(solid.bounds);
+  if (const int flat = settings.flat_axis; flat >= 0) {
+    box.min()[flat] = solid.bounds.min()[flat];
+    box.max()[flat] = solid.bounds.max()[flat];
+  }
+  return box;
+}
+
+SamplingLattice sampling_lattice(vtkDataSet& mesh, const Solid& solid, const SamplingSettings& settings) {
+  const AlignedBox3d box = sampled_box(solid, settings);
+  if (!(box.sizes().minCoeff() > 0) || !box.sizes().allFinite())
+    throw std::invalid_argument(fmt::format("--bounds: {} to {} is not a box", text_of(box.min()), text_of(box.max())));
+  if (!box.intersects(solid.bounds))
+    throw std::invalid_argument(fmt::format("--bounds: nothing of the mesh is inside, which goes from {} to {}",
+                                            text_of(solid.bounds.min()), text_of(solid.bounds.max())));
+  SamplingLattice lattice;
+  Vector3d edges = box.sizes();  // Those that are divided into voxels.
+  if (settings.flat_axis >= 0) edges[settings.flat_axis] = 0;
+  const double longest = edges.maxCoeff();
+  Vector3d size;
+  if (const auto* counts = std::get_if<Vector3i>(&settings.resolution)) {
+    size = counts->cast<double>();
+    if (settings.flat_axis >= 0) size[settings.flat_axis] = 2;  // Whatever is given: there is one.
+    require_two(static_cast<int>(size.minCoeff()));
+    lattice.voxel = box.sizes().array() / (size.array() - 1);
+  } else {
+    double voxel = 0;
+    if (const auto* count = std::get_if<int>(&settings.resolution)) {
+      require_two(*count);
+      voxel = longest / (*count - 1);
+    } else if (const auto* given = std::get_if<double>(&settings.resolution)) {
+      voxel = *given;
+      if (!(voxel > 0) || voxel > longest * rounded_one)
+        throw std::invalid_argument(
+            fmt::format("--voxel-size {}: it must be greater than 0 and at most the longest edge of the bounds, {:.6g}",
+                        voxel, longest));
+    } else {
+      voxel = chosen_voxel(mesh, solid, box);
+    }
+    size = voxels_along(box.sizes(), voxel);
+    lattice.voxel.setConstant(voxel);
+  }
+  if (const int flat = settings.flat_axis; flat >= 0) size[flat] = 1, lattice.voxel[flat] = box.sizes()[flat];
+  if (size.prod() > most_voxels)
+    throw std::invalid_argument(
+        fmt::format("a grid of {:.0f} x {:.0f} x {:.0f} voxels is beyond the limit of 2^30: give "
+                    "a larger --voxel-size or a lower --resolution",
+                    size.x(), size.y(), size.z()));
+  lattice.size = size.cast<int>();
+  // Centre the voxels, so that both sides have the same rest.
+  lattice.origin = box.center() - 0.5 * (lattice.voxel.array() * (size.array() - 1)).matrix();
+  return lattice;
+}
+
+}  // namespace tensorray

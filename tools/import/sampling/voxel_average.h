@@ -1,0 +1,35 @@
+#pragma once
+/// @file tools/import/sampling/voxel_average.h
+/// The average of a tensor field over the part of a voxel that a mesh fills. Private to the importer.
+
+#include <Eigen/Core>
+
+namespace tensorray {
+
+/// Moments of a tensor field over samples in a voxel. Positions are relative to the voxel's centre, in voxels.
+class VoxelAverage {
+ public:
+  using Tensor = Eigen::Matrix<double, 9, 1>;
+
+  /// @param weight  The volume of which the sample is the value; > 0.
+  void add(const Eigen::Vector3d& position, double weight, const Tensor& tensor);
+
+  bool empty() const { return weight_ == 0; }
+
+  /// The average, corrected for samples that are not centred in the voxel: because the body fills the voxel in part,
+  /// or because samples belong to one voxel as wholes. A linear function is fitted by least squares, and what it
+  /// changes from the centre to the centroid of the samples is subtracted: in full if it explains all of the tensor's
+  /// variance, not at all if it explains less than 3/4. So a linear field gives its value at the centre, whatever the
+  /// samples' positions, and a layer that is thinner than the voxel gives its plain average, as a line fitted to it
+  /// says nothing.
+  Tensor value() const;
+
+ private:
+  double weight_ = 0, squares_ = 0;
+  Eigen::Vector3d first_ = Eigen::Vector3d::Zero();
+  Eigen::Matrix3d second_ = Eigen::Matrix3d::Zero();
+  Tensor sum_ = Tensor::Zero();
+  Eigen::Matrix<double, 9, 3> mixed_ = Eigen::Matrix<double, 9, 3>::Zero();
+};
+
+}  // namespace tensorray

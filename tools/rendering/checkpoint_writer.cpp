@@ -1,0 +1,107 @@
+#include "tools/rendering/checkpoint_writer.h"
+
+#include <algorithm>
+#include <chrono>
+#include <exception>
+#include <utility>
+
+#include <fmt/format.h>
+
+#include "base/process/seconds.h"
+#include "base/text/text.h"
+#include "scenes/jobs/origin.h"
+#include "tools/command_line/interrupts.h"
+#include "tools/command_line/tell.h"
+
+namespace tensorray {
+namespace {
+
+constexpr double longest_tick = 0.2;  // Seconds after which a signal is noticed.
+
+}  // namespace
+
+CheckpointWriter::CheckpointWriter(const Scene& scene, Work& work, const KeepSettings& settings)
+    : scene_(scene), work_(work), settings_(settings), thread_([this] {
+        try {
+          run();
+        } catch (...) {  // There was no memory even for a warning: the render goes on.
+        }
+      }) {}
+
+CheckpointWriter::~CheckpointWriter() {
+  {
+    const std::lock_guard lock(waiting_);
+    ends_ = true;
+  }
+  wake_.notify_all();
+  thread_.join();
+}
+
+WorkFile CheckpointWriter::work_file() {
+  if (!origin_) origin_ = origin_of(scene_);
+  return {*origin_, std::filesystem::absolute(scene_.description.path), work_.part(), work_.units()};
+}
+
+bool CheckpointWriter::write() {
+  const std::lock_guard lock(writing_);
+  if (settings_.file.empty() || is_over_) return false;
+  try {
+    const WorkFile file = work_file();
+    if (file.units.empty()) return false;
+    write_work(settings_.file, file);
+    is_written_ = true;
+  } catch (const std::exception& error) {  // Whatever it is: the render goes on.
+    if (!has_failed_) tell({fmt::format("warning: no checkpoint: {}", escaped(error.what()))}, false);
+    has_failed_ = true;
+  }
+  std::error_code none;
+  return is_written_ || std::filesystem::exists(settings_.file, none);
+}
+
+void CheckpointWriter::remove() {
+  const std::lock_guard lock(writing_);
+  is_over_ = true;  // The thread may be about to write.
+  std::error_code error;
+  if (!settings_.file.empty()) std::filesystem::remove(settings_.file, error);
+}
+
+/// Finds what the work belongs to while the files are those that were loaded.
+void CheckpointWriter::begin() {
+  const std::lock_guard lock(writing_);
+  if (origin_ || settings_.file.empty() || work_.units().empty()) return;
+  try {
+    origin_ = origin_of(scene_);
+  } catch (const std::exception&) {  // write() reports it.
+  }
+}
+
+void CheckpointWriter::run() {
+  const std::chrono::duration<double> tick(settings_.interval > 0 ? std::min(longest_tick, settings_.interval / 2)
+                                                                  : longest_tick);
+  Clock::time_point written = Clock::now(), shown = written, displayed = written;
+  bool is_cancelled = false;
+  std::unique_lock lock(waiting_);
+  while (!wake_.wait_for(lock, tick, [this] { return ends_; })) {
+    lock.unlock();
+    begin();
+    // Soon after SIGTERM, mpirun and queues kill a process, which may still be busy with units.
+    if (settings_.cancelled && *settings_.cancelled && !std::exchange(is_cancelled, true)) write();
+    const bool is_asked = take_picture_request();
+    if (is_asked || (settings_.watch > 0 && seconds_since(shown) > settings_.watch)) {
+      files_wanted_ = true;
+      work_.picture_wanted = true;
+      shown = Clock::now();
+    }
+    if (settings_.display > 0 && seconds_since(displayed) > settings_.display) {
+      work_.picture_wanted = true;
+      displayed = Clock::now();
+    }
+    if (is_asked || (settings_.interval > 0 && seconds_since(written) > settings_.interval)) {
+      write();
+      written = Clock::now();
+    }
+    lock.lock();
+  }
+}
+
+}  // namespace tensorray

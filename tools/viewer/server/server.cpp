@@ -1,0 +1,109 @@
+#include "tools/viewer/server/server.h"
+
+#include <algorithm>
+#include <array>
+#include <chrono>
+#include <fstream>
+#include <iterator>
+#include <stdexcept>
+#include <utility>
+
+#include <fmt/format.h>
+
+#include "tools/viewer/server/http_connection.h"
+#include "tools/viewer/server/server_state.h"
+
+namespace tensorray {
+namespace {
+
+/// Compares in a time that does not tell where two texts differ.
+bool same_secret(beast::string_view a, const std::string& b) {
+  unsigned difference = a.size() == b.size() ? 0 : 1;
+  for (std::size_t i = 0; i < std::min<std::size_t>(a.size(), b.size()); ++i)
+    difference |= static_cast<unsigned>(static_cast<unsigned char>(a[i]) ^ static_cast<unsigned char>(b[i]));
+  return difference == 0;
+}
+
+std::string with_brackets(const std::string& address) {
+  return address.find(':') == std::string::npos ? address : "[" + address + "]";  // IPv6
+}
+
+/// Accepts connections; those above the limit are closed at once.
+void accept_next(const std::shared_ptr<Server::State>& state) {
+  state->acceptor->async_accept([state](beast::error_code error, tcp::socket socket) {
+    if (error == asio::error::operation_aborted) return;
+    if (!error && state->connections < Server::most_connections) serve_connection(state, std::move(socket));
+    accept_next(state);
+  });
+}
+
+}  // namespace
+
+Server::State::State(const ServerSettings& s, Pages& p) : settings(s), pages(p), acceptor(*io) {
+  for (const auto& [path, file, type] :
+       {std::array<const char*, 3>{"", "index.html", "text/html; charset=utf-8"},
+        std::array<const char*, 3>{"view.js", "view.js", "text/javascript; charset=utf-8"},
+        std::array<const char*, 3>{"view.css", "view.css", "text/css; charset=utf-8"}}) {
+    std::ifstream stream(settings.page / file, std::ios::binary);
+    if (!stream)
+      throw std::runtime_error((settings.page / file).string() + ": the page is not built; `tools/view` builds it");
+    files[path] = {type, {std::istreambuf_iterator<char>(stream), {}}};
+  }
+}
+
+std::optional<std::string> Server::State::path_of(const HttpRequest& request) const {
+  const beast::string_view whole = request.target(), target = whole.substr(0, whole.find('?'));
+  const std::size_t end = std::min(target.find('/', 1), target.size());
+  if (target.empty() || target[0] != '/') return std::nullopt;
+  if (!same_secret(target.substr(1, end - 1), settings.token)) return std::nullopt;
+  return end == target.size() ? no_slash : std::string(target.substr(end + 1));
+}
+
+bool Server::State::is_own_host(const HttpRequest& request) const {
+  return request.count(http::field::host) == 1 && hosts.count(std::string(request[http::field::host])) > 0;
+}
+
+bool Server::State::is_own_origin(const HttpRequest& request) const {
+  const beast::string_view scheme = "http://", origin = request[http::field::origin];
+  return request.count(http::field::origin) == 1 && origin.starts_with(scheme) &&
+         hosts.count(std::string(origin.substr(scheme.size()))) > 0;
+}
+
+Server::Server(const ServerSettings& settings, Pages& pages) : state_(std::make_shared<State>(settings, pages)) {
+  boost::system::error_code is_no_address;
+  const tcp::endpoint endpoint(asio::ip::make_address(settings.address, is_no_address), settings.port);
+  if (is_no_address)
+    throw std::invalid_argument("--listen " + settings.address + ": not an IP address, such as 127.0.0.1");
+  try {
+    state_->acceptor->open(endpoint.protocol());
+    state_->acceptor->set_option(asio::socket_base::reuse_address(true));
+    state_->acceptor->bind(endpoint);
+    state_->acceptor->listen();
+  } catch (const boost::system::system_error& error) {
+    throw std::runtime_error(fmt::format("cannot listen on {}:{}: {}; choose another --port or --listen",
+                                         settings.address, settings.port, error.code().message()));
+  }
+  const int port = state_->acceptor->local_endpoint().port();
+  std::vector<std::string> names = settings.hosts;
+  names.insert(names.end(), {with_brackets(settings.address), "localhost"});
+  for (const std::string& name : names) state_->hosts.insert(fmt::format("{}:{}", name, port));
+  accept_next(state_);
+}
+
+/// Connections hold the state, whose handlers hold them.
+Server::~Server() {
+  state_->acceptor.reset();
+  state_->io.reset();
+}
+
+std::string Server::url() const {
+  return fmt::format("http://{}:{}/{}/", with_brackets(state_->settings.address),
+                     state_->acceptor->local_endpoint().port(), state_->settings.token);
+}
+
+void Server::run(const Progress& progress) {
+  constexpr auto between_looks = std::chrono::milliseconds(100);
+  while (!progress.cancelled) state_->io->run_for(between_looks);
+}
+
+}  // namespace tensorray

@@ -1,0 +1,67 @@
+#pragma once
+/// @file tools/viewer/server/server_state.h
+/// What all connections of a Server share. Private to the sources of the server: it includes Boost.
+
+#include <cstddef>
+#include <map>
+#include <memory>
+#include <optional>
+#include <set>
+#include <string>
+
+#include <boost/asio/io_context.hpp>
+#include <boost/asio/ip/tcp.hpp>
+#include <boost/beast/core.hpp>
+#include <boost/beast/http.hpp>
+
+#include "tools/viewer/server/server.h"
+
+namespace tensorray {
+
+namespace asio = boost::asio;
+namespace beast = boost::beast;
+namespace http = beast::http;
+using tcp = asio::ip::tcp;
+using HttpRequest = http::request<http::empty_body>;
+
+struct PageFile {
+  const char* type;
+  std::string bytes;
+};
+
+/// All handlers run on the one thread that calls Server::run.
+struct Server::State {
+  /// Reads the page's files. @throw std::runtime_error naming a file that is missing.
+  State(const ServerSettings& settings, Pages& pages);
+
+  /// A path that ends with the token, which is no path of the page.
+  static constexpr const char* no_slash = "/";
+
+  /// What follows the token in the path of a request, without a query; none if the token is wrong.
+  std::optional<std::string> path_of(const HttpRequest& request) const;
+
+  bool is_own_host(const HttpRequest& request) const;
+  bool is_own_origin(const HttpRequest& request) const;
+
+  ServerSettings settings;
+  Pages& pages;
+  std::map<std::string, PageFile> files;  ///< The page's files, by what follows the token in their paths.
+  std::shared_ptr<asio::io_context> io = std::make_shared<asio::io_context>(1);
+  std::optional<tcp::acceptor> acceptor;
+  std::set<std::string> hosts;  ///< With the port.
+  std::size_t connections = 0, sockets = 0;
+};
+
+/// Counts something while it exists.
+class Counted {
+ public:
+  explicit Counted(std::size_t& count) : count_(count) { ++count_; }
+  ~Counted() { --count_; }
+  Counted(const Counted&) = delete;
+  Counted& operator=(const Counted&) = delete;
+
+ private:
+  std::size_t& count_;
+};
+
+}  // namespace tensorray

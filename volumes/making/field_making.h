@@ -1,0 +1,27 @@
+#pragma once
+/// @file volumes/making/field_making.h
+/// Makes a field of blocks in one pass: each block is read, cleaned, preprocessed and placed in its bricks while it is
+/// in the processor's caches, without a grid in between.
+
+#include <optional>
+
+#include "volumes/bricks/tensor_field.h"
+#include "volumes/tensors/eigenvalues.h"
+#include "volumes/tensors/resolution.h"
+
+namespace tensorray {
+
+struct MadeField {
+  std::optional<TensorField> field;  ///< Nothing if no voxel is finite.
+  EigenvalueReport eigenvalues;
+  Resolution resolution;       ///< Of a cubic field.
+  std::size_t voxels = 0;      ///< Active voxels of the field.
+  std::size_t non_finite = 0;  ///< Active voxels that were not finite and are not in the field.
+};
+
+/// The field of `TensorField` after remove_non_finite and apply_eigenvalues, bit for bit. Runs on all threads. Blocks
+/// are read a second time if some are not finite, or if `automatic` is not what some of them made it look like.
+/// @throw what `source` throws.
+MadeField make_field(const BlockSource& source, Eigenvalues mode, const Interpolant& interpolant = {});
+
+}  // namespace tensorray

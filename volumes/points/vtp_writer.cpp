@@ -1,0 +1,191 @@
+#include "volumes/points/vtp_writer.h"
+
+#include <algorithm>
+#include <array>
+#include <cerrno>
+#include <cstdint>
+#include <cstring>
+#include <numeric>
+#include <stdexcept>
+#include <string>
+#include <system_error>
+
+#include <fcntl.h>
+#include <tbb/parallel_for.h>
+
+#include "base/text/byte_order.h"
+#include "base/files/descriptor.h"
+
+namespace tensorray {
+namespace {
+
+/// Bytes that are encoded at once; a multiple of 3.
+constexpr std::size_t piece_bytes = 3 << 17;
+
+constexpr std::size_t encoded_size(std::size_t bytes) { return (bytes + 2) / 3 * 4; }
+
+/// The two characters of twelve bits.
+const std::array<std::array<char, 2>, 4096>& pairs() {
+  static const auto table = [] {
+    const char* const digits = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
+    std::array<std::array<char, 2>, 4096> all{};
+    for (std::size_t bits = 0; bits < all.size(); ++bits) all[bits] = {digits[bits >> 6], digits[bits & 63]};
+    return all;
+  }();
+  return table;
+}
+
+void encode_base64(const char* bytes, std::size_t count, std::string& text) {
+  const auto& table = pairs();
+  text.resize(encoded_size(count));
+  char* to = text.data();
+  const auto put = [&](std::uint32_t bits) {
+    std::memcpy(to, table[bits >> 12].data(), 2);
+    std::memcpy(to + 2, table[bits & 4095].data(), 2);
+    to += 4;
+  };
+  const auto byte = [&](std::size_t i) { return std::uint32_t{static_cast<unsigned char>(bytes[i])}; };
+  std::size_t i = 0;
+  for (; i + 3 <= count; i += 3) put(byte(i) << 16 | byte(i + 1) << 8 | byte(i + 2));
+  if (i == count) return;
+  put(byte(i) << 16 | (i + 1 < count ? byte(i + 1) << 8 : 0));
+  std::fill(to - (3 - (count - i)), to, '=');
+}
+
+class VtpWriter {
+ public:
+  explicit VtpWriter(const std::filesystem::path& path) : file_(open_file(path, O_WRONLY | O_CREAT | O_TRUNC)) {
+    if (!file_.is_open()) fail();
+  }
+
+  void text(const std::string& text) {
+    write(end_, text);
+    end_ += text.size();
+  }
+
+  /// `attributes` of the element, and the bytes of numbers.
+  void array(const std::string& element, const std::string& attributes, const void* data, std::size_t bytes) {
+    std::string length;
+    append_number(std::uint64_t{bytes}, host_byte_order(), length);
+    std::string encoded;
+    encode_base64(length.data(), length.size(), encoded);
+    text("<" + element + attributes + " format=\"binary\">\n" + encoded);
+    tbb::parallel_for(std::size_t{0}, (bytes + piece_bytes - 1) / piece_bytes, [&](std::size_t i) {
+      thread_local std::string piece;
+      const std::size_t first = i * piece_bytes;
+      encode_base64(static_cast<const char*>(data) + first, std::min(piece_bytes, bytes - first), piece);
+      write(end_ + encoded_size(first), piece);
+    });
+    end_ += encoded_size(bytes);
+    text("\n</" + element + ">\n");
+  }
+
+  void close() {
+    if (!file_.close()) fail();
+  }
+
+ private:
+  [[noreturn]] static void fail() { throw std::runtime_error(std::generic_category().message(errno)); }
+
+  void write(std::size_t at, const std::string& text) const {
+    if (!write_whole_at(file_.get(), text, at)) fail();
+  }
+
+  Descriptor file_;
+  std::size_t end_ = 0;
+};
+
+/// As the value of an attribute.
+std::string quoted(const std::string& text) {
+  std::string result = "\"";
+  for (const char c : text) {
+    const std::string entity = c == '&' ? "&amp;" : c == '<' ? "&lt;" : c == '"' ? "&quot;" : "";
+    result += entity.empty() ? std::string(1, c) : entity;
+  }
+  return result + "\"";
+}
+
+const char* type_name(double) { return "Float64"; }
+const char* type_name(float) { return "Float32"; }
+const char* type_name(std::int64_t) { return "Int64"; }
+const char* type_name(std::int32_t) { return "Int32"; }
+const char* type_name(std::uint8_t) { return "UInt8"; }
+
+template <class Number>
+void write_numbers(VtpWriter& file, const std::string& name, const Number* numbers, std::size_t count, int components) {
+  std::string attributes = std::string(" type=\"") + type_name(Number()) + "\" Name=" + quoted(name);
+  if (components > 1) attributes += " NumberOfComponents=\"" + std::to_string(components) + "\"";
+  file.array("DataArray", attributes, numbers, count * sizeof(Number));
+}
+
+void write_array(VtpWriter& file, const std::string& name, const DataView& view) {
+  std::visit([&](const auto& numbers) { write_numbers(file, name, numbers.data, numbers.size, view.components); },
+             view.values);
+}
+
+void write_texts(VtpWriter& file, const std::string& name, const Texts& texts) {
+  std::string bytes;
+  for (const std::string& text : texts) bytes.append(text.c_str(), text.size() + 1);
+  file.array("Array",
+             " type=\"String\" Name=" + quoted(name) + " NumberOfTuples=\"" + std::to_string(texts.size()) + "\"",
+             bytes.data(), bytes.size());
+}
+
+/// Cells of consecutive points. @param ends  The number of points up to the end of each.
+void write_cells(VtpWriter& file, const std::string& element, std::size_t points,
+                 const std::vector<std::int64_t>& ends) {
+  std::vector<std::int64_t> corners(points);
+  std::iota(corners.begin(), corners.end(), std::int64_t{0});
+  file.text("<" + element + ">\n");
+  write_numbers(file, "connectivity", corners.data(), corners.size(), 1);
+  write_numbers(file, "offsets", ends.data(), ends.size(), 1);
+  file.text("</" + element + ">\n");
+}
+
+std::size_t value_count(const DataView& view) {
+  return std::visit([&](const auto& numbers) { return numbers.size / static_cast<std::size_t>(view.components); },
+                    view.values);
+}
+
+/// Names what ParaView shows at first, and what its filters of vectors and tensors take.
+std::string active_arrays(const PolyDataView& data) {
+  std::string attributes, scalars;
+  for (const auto& [name, values] : data.point_data) {
+    if (name == "force" || (name == "wavelength" && scalars.empty())) scalars = name;
+    if (name == "direction") attributes += " Vectors=\"direction\"";
+    if (name == "tensor") attributes += " Tensors=\"tensor\"";
+  }
+  return attributes + (scalars.empty() ? "" : " Scalars=\"" + scalars + "\"");
+}
+
+}  // namespace
+
+void write_vtp_file(const std::filesystem::path& path, const PolyDataView& data) {
+  const std::size_t points = value_count(data.points);
+  std::vector<std::int64_t> ends(data.line_ends ? data.line_ends->size() : points);
+  if (data.line_ends)
+    std::copy(data.line_ends->begin(), data.line_ends->end(), ends.begin());
+  else
+    std::iota(ends.begin(), ends.end(), std::int64_t{1});
+  const auto count = [&](bool here) { return "\"" + std::to_string(here ? ends.size() : 0) + "\""; };
+  const std::string order = host_byte_order() == ByteOrder::little ? "LittleEndian" : "BigEndian";
+
+  VtpWriter file(path);
+  file.text("<?xml version=\"1.0\"?>\n<VTKFile type=\"PolyData\" version=\"1.0\" byte_order=\"" + order +
+            "\" header_type=\"UInt64\">\n<PolyData>\n<FieldData>\n");
+  for (const auto& [name, texts] : data.texts) write_texts(file, name, texts);
+  file.text("</FieldData>\n<Piece NumberOfPoints=\"" + std::to_string(points) +
+            "\" NumberOfVerts=" + count(!data.line_ends) + " NumberOfLines=" + count(data.line_ends != nullptr) +
+            " NumberOfStrips=\"0\" NumberOfPolys=\"0\">\n<PointData" + active_arrays(data) + ">\n");
+  for (const auto& [name, values] : data.point_data) write_array(file, name, values);
+  file.text("</PointData>\n<CellData>\n");
+  for (const auto& [name, values] : data.line_data) write_array(file, name, values);
+  file.text("</CellData>\n<Points>\n");
+  write_array(file, "Points", data.points);
+  file.text("</Points>\n");
+  write_cells(file, data.line_ends ? "Lines" : "Verts", points, ends);
+  file.text("</Piece>\n</PolyData>\n</VTKFile>\n");
+  file.close();
+}
+
+}  // namespace tensorray

@@ -1,0 +1,390 @@
+#include "volumes/vdb/vdb_archive.h"
+
+#include <algorithm>
+#include <array>
+#include <cerrno>
+#include <cstdint>
+#include <fstream>
+#include <map>
+#include <memory>
+#include <stdexcept>
+#include <string_view>
+#include <system_error>
+#include <utility>
+
+#include <openvdb/io/Archive.h>
+#include <openvdb/io/DelayedLoadMetadata.h>
+#include <openvdb/io/GridDescriptor.h>
+#include <tbb/parallel_for.h>
+
+#include "base/errors.h"
+#include "base/text/byte_order.h"
+#include "base/text/content_hash.h"
+#include "base/text/text.h"
+#include "volumes/grids/page_memory.h"
+#include "volumes/vdb/vdb_tree_check.h"
+
+namespace tensorray {
+namespace {
+
+constexpr std::ios::iostate any_failure = std::ios::failbit | std::ios::badbit | std::ios::eofbit;
+constexpr std::size_t stream_buffer = 1 << 20;
+
+// OpenVDB's header: magic number, versions of the format (4 bytes) and of the library (8 bytes), a flag, then the
+// unique tag as text.
+constexpr std::streamoff version_offset = 8, tag_offset = 21;
+
+[[noreturn]] void fail_damaged(const std::filesystem::path& path, const std::string& how) {
+  fail(path, "the file is truncated or damaged" + how + "; copy or write it again");
+}
+
+StoredTree stored_tree(const openvdb::io::GridDescriptor& descriptor, std::uint32_t compression) {
+  StoredTree tree;
+  tree.type = descriptor.gridType();
+  tree.half = descriptor.saveFloatAsHalf();
+  tree.blosc = compression & openvdb::io::COMPRESS_BLOSC;
+  tree.zip = compression & openvdb::io::COMPRESS_ZIP;
+  tree.active_only = compression & openvdb::io::COMPRESS_ACTIVE_MASK;
+  return tree;
+}
+
+/// Reads the table of grids itself. GridDescriptor::read refuses the whole file if one grid has an unknown type.
+class Reader : private openvdb::io::Archive {
+ public:
+  explicit Reader(const std::filesystem::path& path) : path_(path), buffer_(stream_buffer) {
+    if (std::filesystem::is_directory(path)) fail(path, "is a folder; name an OpenVDB file");
+    in_.rdbuf()->pubsetbuf(buffer_.data(), static_cast<std::streamsize>(buffer_.size()));
+    errno = 0;
+    in_.open(path, std::ios::binary);
+    if (!in_) fail(path, "cannot be opened: " + std::generic_category().message(errno) + "; check the path");
+    in_.exceptions(any_failure);
+    size_ = static_cast<std::int64_t>(std::filesystem::file_size(path));
+  }
+
+  VdbFile read(const std::set<std::string>& wanted) {
+    VdbFile file;
+    read_file_header();
+    check_lengths(in_.tellg(), 0);
+    file.metadata.readMeta(in_);
+    const std::int32_t count = readGridCount(in_);
+    std::vector<openvdb::io::GridDescriptor> table;
+    std::map<std::string, ReadGrid> grids;
+    for (std::int32_t i = 0; i < count; ++i) {
+      table.push_back(read_descriptor());
+      if (inputHasGridOffsets())
+        skip(table.back());
+      else  // Written as a stream: only reading a grid tells where it ends.
+        grids[table.back().uniqueName()] = read_one(table.back());
+    }
+    if (inputHasGridOffsets()) read_wanted(table, wanted, grids);
+    for (const auto& descriptor : table) {
+      const std::string name = openvdb::io::GridDescriptor::nameAsString(descriptor.uniqueName());
+      file.grids.push_back({name, descriptor.gridType(), descriptor.saveFloatAsHalf(), nullptr, nullptr});
+      if (!wanted.count(name)) continue;
+      ReadGrid& read = grids.at(descriptor.uniqueName());
+      if (descriptor.isInstance()) {
+        const ReadGrid& parent = grids.at(descriptor.instanceParentName());
+        read.grid->setTree(parent.grid->baseTreePtr());
+        read.stored = parent.stored;
+      }
+      file.grids.back().grid = read.grid;
+      file.grids.back().stored = read.stored;
+    }
+    return file;
+  }
+
+ private:
+  struct ReadGrid {
+    openvdb::GridBase::Ptr grid;
+    std::shared_ptr<const StoredLeaves> stored;  // As in VdbGrid.
+  };
+
+  template <class Number>
+  Number read_stored() {
+    std::array<char, sizeof(Number)> bytes;
+    in_.read(bytes.data(), bytes.size());
+    return read_number<Number>(bytes.data(), ByteOrder::little);
+  }
+
+  void read_file_header() {
+    if (size_ < version_offset + 4 || read_stored<std::int64_t>() != openvdb::OPENVDB_MAGIC)
+      fail(path_, "is not an OpenVDB file");
+    if (read_stored<std::uint32_t>() > openvdb::OPENVDB_FILE_VERSION)
+      fail(path_, "was written by a newer OpenVDB than this program has; write it in an older format");
+    in_.seekg(0);
+    readHeader(in_);
+    setFormatVersion(in_);
+    setLibraryVersion(in_);
+    setDataCompression(in_);
+  }
+
+  std::uint32_t read_length() {
+    const std::uint32_t length = read_stored<std::uint32_t>();
+    if (length > size_ - in_.tellg()) fail_damaged(path_, "");
+    return length;
+  }
+
+  std::string read_string() {
+    std::string text(read_length(), ' ');
+    in_.read(&text[0], static_cast<std::streamsize>(text.size()));
+    return text;
+  }
+
+  /// Whether the metadata at `start` and the `strings` strings after them fit in the file. OpenVDB allocates and
+  /// fills as many bytes as a length says, up to 4 GB, before it reads. Restores the stream's position.
+  void check_lengths(std::streamoff start, int strings) {
+    const std::streamoff before = in_.tellg();
+    in_.seekg(start);
+    const auto skip_string = [&] { in_.seekg(read_length(), std::ios::cur); };
+    for (std::uint32_t left = read_stored<std::uint32_t>(); left > 0; --left) {
+      skip_string();  // Skips the name.
+      if (read_string() == openvdb::io::DelayedLoadMetadata::staticTypeName()) {
+        const std::string value = read_string();
+        if (!delayed_load_fits(value, size_)) fail_damaged(path_, "");
+      } else {
+        skip_string();
+      }
+    }
+    for (int i = 0; i < strings; ++i) skip_string();
+    in_.seekg(before);
+  }
+
+  openvdb::io::GridDescriptor read_descriptor() {
+    static const std::string half_suffix = "_HalfFloat";
+    const std::string name = read_string();
+    std::string type = read_string();
+    const bool half = type.size() > half_suffix.size() &&
+                      type.compare(type.size() - half_suffix.size(), half_suffix.size(), half_suffix) == 0;
+    if (half) type.resize(type.size() - half_suffix.size());
+    openvdb::io::GridDescriptor descriptor(name, type, half);
+    if (fileVersion() >= openvdb::OPENVDB_FILE_VERSION_GRID_INSTANCING) descriptor.setInstanceParentName(read_string());
+    descriptor.setGridPos(read_stored<std::int64_t>());
+    descriptor.setBlockPos(read_stored<std::int64_t>());
+    descriptor.setEndPos(read_stored<std::int64_t>());
+    return descriptor;
+  }
+
+  void skip(const openvdb::io::GridDescriptor& descriptor) {
+    if (descriptor.getGridPos() < in_.tellg() || descriptor.getEndPos() < descriptor.getGridPos() ||
+        descriptor.getEndPos() > size_)
+      fail_damaged(path_, "");
+    descriptor.seekToEnd(in_);
+  }
+
+  /// Reads the grid that begins at the stream's position, and goes behind it.
+  ReadGrid read_one(const openvdb::io::GridDescriptor& descriptor) {
+    check_lengths(in_.tellg() + std::streamoff(has_node_compression() ? 4 : 0),
+                  1);  // The transform's type is a string.
+    ReadGrid read{openvdb::GridBase::createGrid(descriptor.gridType()), nullptr};
+    read.grid->setSaveFloatAsHalf(descriptor.saveFloatAsHalf());
+    if (has_node_compression() && !descriptor.isInstance() && value_size(descriptor.gridType())) {
+      read.stored = read_topology(descriptor, *read.grid);
+      return read;
+    }
+    if (!has_node_compression() && memory_bound())
+      fail(path_, "is of OpenVDB 2, which --memory cannot read in parts; write it again with this program");
+    readGrid(read.grid, descriptor, in_);
+    return read;
+  }
+
+  bool has_node_compression() const { return fileVersion() >= openvdb::OPENVDB_FILE_VERSION_NODE_MASK_COMPRESSION; }
+
+  /// Reads a grid whose leaves keep their values in the file.
+  std::shared_ptr<const StoredLeaves> read_topology(const openvdb::io::GridDescriptor& descriptor,
+                                                    openvdb::GridBase& grid) {
+    readGridCompression(in_);
+    const std::uint32_t compression = openvdb::io::getDataCompression(in_);
+    grid.readMeta(in_);
+    grid.setSaveFloatAsHalf(descriptor.saveFloatAsHalf());  // Whatever its metadata say.
+    grid.readTransform(in_);
+    const auto stored = std::make_shared<StoredLeaves>(
+        StoredLeaves{FileBytes(path_), stored_tree(descriptor, compression), compression, {}});
+    if (!tree_fits(stored->file, in_.tellg(), stored->tree, stored->leaves)) fail_damaged(path_, "");
+    grid.readTopology(in_);
+    number_leaves(grid, stored->leaves);
+    if (!stored->leaves.empty()) in_.seekg(stored->leaves.back().at + stored->leaves.back().bytes);
+    return stored;
+  }
+
+  /// The file has the leaves in the order of the tree, unless it is damaged.
+  void number_leaves(openvdb::GridBase& grid, const std::vector<StoredLeaf>& stored) const {
+    std::size_t count = 0;
+    grid.apply<FieldGridTypes>([&](auto& typed) {
+      for (auto leaf = typed.tree().beginLeaf(); leaf; ++leaf, ++count) {
+        if (count >= stored.size() || voxel_mask(*leaf) != stored[count].active) fail_damaged(path_, "");
+        leaf->setTransientData(static_cast<openvdb::Index32>(count));
+      }
+    });
+    if (count != stored.size()) fail_damaged(path_, "");
+  }
+
+  /// Reads the wanted grids, and the grids whose trees they share, in parallel. Each grid has its own stream.
+  void read_wanted(const std::vector<openvdb::io::GridDescriptor>& table, const std::set<std::string>& wanted,
+                   std::map<std::string, ReadGrid>& grids) {
+    std::set<std::string> needed;
+    for (const auto& descriptor : table) {
+      if (!wanted.count(openvdb::io::GridDescriptor::nameAsString(descriptor.uniqueName()))) continue;
+      needed.insert(descriptor.uniqueName());
+      if (descriptor.isInstance()) needed.insert(descriptor.instanceParentName());
+    }
+    std::vector<std::pair<const openvdb::io::GridDescriptor*, ReadGrid>> read;
+    for (const auto& descriptor : table)
+      if (needed.count(descriptor.uniqueName())) read.emplace_back(&descriptor, ReadGrid());
+    tbb::parallel_for(std::size_t{0}, read.size(), [&](std::size_t i) {
+      Reader reader(path_);
+      reader.read_file_header();
+      read[i].first->seekToGrid(reader.in_);
+      read[i].second = reader.read_one(*read[i].first);
+    });
+    for (const auto& [descriptor, grid] : read) grids[descriptor->uniqueName()] = grid;
+  }
+
+  std::filesystem::path path_;
+  std::vector<char> buffer_;
+  std::ifstream in_;
+  std::int64_t size_ = 0;
+};
+
+/// The table of a grid's leaves. Their lengths are known when they are written; this only makes room for them, and says
+/// where it is.
+class LeafTableRoom : public openvdb::io::DelayedLoadMetadata {
+ public:
+  LeafTableRoom(const StoredTree& tree, std::size_t leaves, std::streamoff& at)
+      : at_(&at), text_(delayed_load_text(tree, std::vector<StoredLeaf>(leaves))) {}
+
+  openvdb::Metadata::Ptr copy() const override { return std::make_shared<LeafTableRoom>(*this); }
+  openvdb::Index32 size() const override { return static_cast<openvdb::Index32>(text_.size()); }
+
+ protected:
+  void writeValue(std::ostream& file) const override {
+    *at_ = file.tellp();
+    file << text_;
+  }
+
+ private:
+  std::streamoff* at_;
+  std::string text_;
+};
+
+class Writer : private openvdb::io::Archive {
+ public:
+  explicit Writer(const std::filesystem::path& path) : path_(path) {}
+
+  void write_file(std::fstream& file, const openvdb::GridPtrVec& grids, const openvdb::MetaMap& metadata) {
+    auto stream_metadata = std::make_shared<openvdb::io::StreamMetadata>();
+    openvdb::io::setStreamMetadataPtr(file, stream_metadata, /*transfer=*/false);
+    writeHeader(file, /*seekable=*/true);
+    metadata.writeMeta(file);
+    const auto count = static_cast<std::int32_t>(grids.size());
+    file.write(reinterpret_cast<const char*>(&count), sizeof count);
+    for (const openvdb::GridBase::Ptr& grid : grids) write_grid(file, *grid);
+    file.flush();
+    make_tag_of_contents(file);
+  }
+
+ private:
+  /// As Archive::writeGrid, which compresses values twice, because it writes the table of leaves first; for that, all
+  /// values must be in memory.
+  void write_grid(std::ostream& file, openvdb::GridBase& grid) const {
+    openvdb::io::GridDescriptor descriptor(grid.getName(), grid.type(), grid.saveFloatAsHalf());
+    descriptor.writeHeader(file);
+    const std::streampos positions = file.tellp();
+    descriptor.writeStreamPos(file);
+    descriptor.setGridPos(file.tellp());
+    setGridCompression(file, grid);
+    grid.addStatsMetadata();
+    const std::string compressed = openvdb::io::compressionToString(openvdb::io::getDataCompression(file));
+    grid.insertMeta(openvdb::GridBase::META_FILE_COMPRESSION, openvdb::StringMetadata(compressed));
+    std::streamoff table = 0;
+    const bool has_table = value_size(grid.type()).has_value();
+    const StoredTree tree = stored_tree(descriptor, openvdb::io::getDataCompression(file));
+    if (has_table)
+      grid.insertMeta(openvdb::GridBase::META_FILE_DELAYED_LOAD,
+                      LeafTableRoom(tree, grid.constBaseTree().leafCount(), table));
+    grid.writeMeta(file);
+    grid.removeMeta(openvdb::GridBase::META_FILE_DELAYED_LOAD);
+    grid.writeTransform(file);
+    const std::streamoff topology = file.tellp();
+    grid.writeTopology(file);
+    descriptor.setBlockPos(file.tellp());
+    grid.writeBuffers(file);
+    descriptor.setEndPos(file.tellp());
+    if (has_table) {
+      file.flush();
+      std::vector<StoredLeaf> written;
+      if (!tree_fits(FileBytes(path_), topology, tree, written)) throw std::ios_base::failure("leaves");
+      file.seekp(table);
+      file << delayed_load_text(tree, written);
+    }
+    file.seekp(positions);
+    descriptor.writeStreamPos(file);
+    descriptor.seekToEnd(file);
+  }
+
+  /// Replaces the random tag in the header by a hash of the bytes after the tag.
+  void make_tag_of_contents(std::fstream& file) const {
+    const std::streamoff end = file.tellp();
+    std::string tag = getUniqueTag();
+    std::string stored(tag.size(), ' ');
+    file.seekg(tag_offset);
+    file.read(&stored[0], static_cast<std::streamsize>(stored.size()));
+    if (stored != tag) return;        // The format is not the expected one.
+    std::uint64_t low = 0, high = 1;  // Two hashes of the same bytes, as a tag has 128 bits.
+    std::vector<char> chunk(stream_buffer);
+    for (std::streamoff at = file.tellg(); at < end; at += static_cast<std::streamoff>(chunk.size())) {
+      chunk.resize(static_cast<std::size_t>(std::min<std::streamoff>(end - at, stream_buffer)));
+      file.read(chunk.data(), static_cast<std::streamsize>(chunk.size()));
+      const std::string_view bytes(chunk.data(), chunk.size());
+      low = content_hash(bytes, low);
+      high = content_hash(bytes, high);
+    }
+    for (std::size_t i = 0, digit = 0; i < tag.size(); ++i)
+      if (tag[i] != '-') {
+        tag[i] = "0123456789abcdef"[(digit < 16 ? low : high) >> (digit % 16 * 4) & 15];
+        ++digit;
+      }
+    file.seekp(tag_offset);
+    file.write(tag.data(), static_cast<std::streamsize>(tag.size()));
+  }
+
+  const std::filesystem::path& path_;
+};
+
+}  // namespace
+
+VdbFile read_vdb(const std::filesystem::path& path, const std::set<std::string>& wanted) {
+  openvdb::initialize();
+  try {
+    return Reader(path).read(wanted);
+  } catch (const std::ios_base::failure&) {
+    fail_damaged(path, "");
+  } catch (const openvdb::Exception& error) {
+    fail_damaged(path, " (" + one_line(error.what()) + ")");
+  } catch (const std::bad_alloc&) {
+    fail_damaged(path, ", or larger than the memory");
+  } catch (const std::logic_error&) {  // A damaged length, or a name that is not in a table.
+    fail_damaged(path, "");
+  }
+}
+
+void fail_damaged_voxels(const std::filesystem::path& path) { fail_damaged(path, ""); }
+
+void write_vdb(const std::filesystem::path& path, const openvdb::GridPtrVec& grids, const openvdb::MetaMap& metadata) {
+  openvdb::initialize();
+  std::vector<char> buffer(stream_buffer);
+  std::fstream file;
+  file.rdbuf()->pubsetbuf(buffer.data(), static_cast<std::streamsize>(buffer.size()));
+  errno = 0;
+  try {
+    file.exceptions(any_failure);
+    file.open(path, std::ios::in | std::ios::out | std::ios::binary | std::ios::trunc);
+    Writer(path).write_file(file, grids, metadata);
+    file.close();
+  } catch (const std::ios_base::failure&) {
+    fail(path, "cannot be written: " + (errno ? std::generic_category().message(errno) : "the write failed"));
+  } catch (const openvdb::Exception& error) {
+    fail(path, "cannot be written: " + one_line(error.what()));
+  }
+}
+
+}  // namespace tensorray

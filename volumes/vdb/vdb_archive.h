@@ -1,0 +1,77 @@
+#pragma once
+/// @file volumes/vdb/vdb_archive.h
+/// Reads and writes OpenVDB files, and reports damage and full disks. OpenVDB's own io::File does neither: it does
+/// not check the state of its stream, so that it reads uncompressed files cut short as if they were whole, and it
+/// trusts the lengths in damaged trees, which may end the process. vdb_tree_check.h checks the lengths first.
+/// Not detected: changed bytes within voxel values or active masks where all lengths still fit, because the format
+/// has no checksum. Not checked: lengths in files older than format 222 (OpenVDB 3), and, in files without a table of
+/// grids, lengths in trees of types that this program does not read.
+/// Only .cpp files of this folder that use OpenVDB themselves include this header: it includes all of OpenVDB.
+
+#include <bitset>
+#include <cstdint>
+#include <filesystem>
+#include <memory>
+#include <set>
+#include <string>
+#include <vector>
+
+#include <Eigen/Geometry>
+#include <openvdb/openvdb.h>
+
+#include "volumes/vdb/file_bytes.h"
+#include "volumes/vdb/vdb_tree_check.h"
+
+namespace tensorray {
+
+/// The types of grids that fields are made of.
+using FieldGridTypes =
+    openvdb::TypeList<openvdb::Vec3SGrid, openvdb::Vec3DGrid, openvdb::FloatGrid, openvdb::DoubleGrid>;
+
+/// Where a file has the values of a tree's leaves.
+struct StoredLeaves {
+  FileBytes file;
+  StoredTree tree;
+  std::uint32_t compression = 0;   ///< OpenVDB's flags.
+  std::vector<StoredLeaf> leaves;  ///< Leaf i is that of the tree whose transientData() is i.
+};
+
+/// A grid of a file.
+struct VdbGrid {
+  std::string name;                            ///< Unique in the file: the second of two grids "T" is "T[1]".
+  std::string type;                            ///< Type of the tree: "Tree_vec3s_5_4_3".
+  bool half = false;                           ///< The file stores 16-bit floats.
+  openvdb::GridBase::Ptr grid;                 ///< Null unless the caller asked for it.
+  std::shared_ptr<const StoredLeaves> stored;  ///< The leaves of `grid` have masks, but no values. Null: they have.
+};
+
+struct VdbFile {
+  openvdb::MetaMap metadata;
+  std::vector<VdbGrid> grids;  ///< All grids, in the file's order.
+};
+
+/// Reads the table of grids. Also reads the grids whose names are in `wanted`; the values of leaves stay in the file,
+/// unless it is of OpenVDB 2, or the grid of another type than tree_fits checks.
+/// @throw std::runtime_error, one line that names the file and the fix: missing, not a VDB, truncated, damaged.
+VdbFile read_vdb(const std::filesystem::path& path, const std::set<std::string>& wanted = {});
+
+/// The active voxels of a leaf, in the order of a TensorBlock.
+template <class Leaf>
+std::bitset<TensorBlock::voxels> voxel_mask(const Leaf& leaf) {
+  std::bitset<TensorBlock::voxels> active;
+  if (leaf.isDense()) return active.set();
+  for (openvdb::Index word = TensorBlock::voxels / 64; word-- > 0;)
+    active = active << 64 | std::bitset<TensorBlock::voxels>(leaf.valueMask().template getWord<openvdb::Index64>(word));
+  return active;
+}
+
+/// Reports damage in the voxels of a leaf. @throw std::runtime_error as read_vdb.
+[[noreturn]] void fail_damaged_voxels(const std::filesystem::path& path);
+
+/// Writes grids in place with OpenVDB's default compression, and adds their statistics to their metadata; writeBuffers
+/// is called once for each, and is the only one of their functions that needs voxels' values. Equal grids give equal
+/// bytes: the file's unique tag, which OpenVDB draws at random, is replaced by a hash of the contents.
+/// @throw std::runtime_error naming the file and the reason, also when the disk is full.
+void write_vdb(const std::filesystem::path& path, const openvdb::GridPtrVec& grids, const openvdb::MetaMap& metadata);
+
+}  // namespace tensorray

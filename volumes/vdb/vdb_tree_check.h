@@ -1,0 +1,62 @@
+#pragma once
+/// @file volumes/vdb/vdb_tree_check.h
+/// Checks that the lengths in a stored OpenVDB tree fit the tree and the file. OpenVDB does not check them: it
+/// allocates memory for the values that a chunk should have, and then writes as many bytes as the chunk claims to
+/// have.
+
+#include <bitset>
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "volumes/grids/tensor_grid.h"
+#include "volumes/vdb/file_bytes.h"
+
+namespace tensorray {
+
+/// How a file stores a tree.
+struct StoredTree {
+  std::string type;          ///< "Tree_vec3s_5_4_3".
+  bool half = false;         ///< Values of voxels are 16-bit floats.
+  bool blosc = false;        ///< Chunks of values are compressed by Blosc.
+  bool zip = false;          ///< If `blosc` is false: chunks of values are compressed by zlib.
+  bool active_only = false;  ///< Chunks may leave out inactive values.
+};
+
+/// Where a file has the values of a leaf, which has the voxels of a TensorBlock.
+struct StoredLeaf {
+  std::bitset<TensorBlock::voxels> active;
+  std::int64_t at = 0;     ///< Position of the flag before its values.
+  std::int32_t bytes = 0;  ///< From the flag on.
+  std::int8_t flag = 0;
+};
+
+/// Reads through a tree whose topology begins at position `at`, and through the values that follow it. Only for files
+/// of OpenVDB 3 (format 222) and later. It accepts without a check trees of other types than float, double, vec3s and
+/// vec3d with nodes of 5, 4 and 3, and finds no leaves in them.
+/// @param leaves  Gets the leaves, in the file's order.
+/// @return whether all lengths fit.
+bool tree_fits(const FileBytes& file, std::int64_t at, const StoredTree& tree, std::vector<StoredLeaf>& leaves);
+
+/// Whether the values of a leaf still have the lengths that tree_fits has found: the file may have changed.
+/// @param bytes  Those of the leaf, from its flag on.
+bool is_same(const StoredLeaf& leaf, const StoredTree& tree, const char* bytes);
+
+/// Bytes of a value in memory, and in a file with 16-bit floats.
+struct ValueSize {
+  std::int64_t full, half;
+};
+
+/// Nothing for a type that tree_fits does not check.
+std::optional<ValueSize> value_size(const std::string& type);
+
+/// Whether the lengths in the value of a grid's metadata "file_delayed_load" fit. OpenVDB unpacks this value when it
+/// reads the metadata.
+bool delayed_load_fits(const std::string& value, std::int64_t file_size);
+
+/// The value of these metadata for leaves that were read through. It is not packed, so that its length depends on the
+/// number of leaves alone.
+std::string delayed_load_text(const StoredTree& tree, const std::vector<StoredLeaf>& leaves);
+
+}  // namespace tensorray
