@@ -1,14 +1,12 @@
-#include "integrators/packets/packet_kernel.h"
+#include "integrators/kernels/packet_kernel.h"
 
 #include <algorithm>
 #include <stdexcept>
 
-#include "integrators/packets/packet_medium.h"
-
 // The code below is compiled once for each instruction set. The best one of the processor is selected at run time.
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "integrators/kernels/packet_kernel.cpp"  // NOLINT
-#include "integrators/packets/packet_targets.h"
+#include "integrators/kernels/packet_targets.h"
 // Must come after packet_targets.h:
 #include <hwy/highway.h>
 

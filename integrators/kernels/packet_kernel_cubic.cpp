@@ -1,10 +1,10 @@
 // The kernel for cubic fields. It is apart because it takes as long to compile as that for linear ones.
 
-#include "integrators/packets/packet_medium.h"
+#include "integrators/kernels/packet_kernel.h"
 
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "integrators/kernels/packet_kernel_cubic.cpp"  // NOLINT
-#include "integrators/packets/packet_targets.h"
+#include "integrators/kernels/packet_targets.h"
 // Must come after packet_targets.h:
 #include <hwy/highway.h>
 

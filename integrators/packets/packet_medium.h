@@ -7,7 +7,7 @@
 
 #include <Eigen/Core>
 
-#include "integrators/packets/packet_kernel.h"
+#include "integrators/packets/kernel_rays.h"
 #include "integrators/steps/composition.h"
 #include "integrators/steps/runge_kutta.h"
 #include "integrators/steps/step_lengths.h"
@@ -61,12 +61,6 @@ struct PacketMedium {
   bool near_surface(const std::int32_t at[3]) const;
   bool meets_surface(const Eigen::Vector3d& from, const Eigen::Vector3d& to) const;
 };
-
-/// `run` in a cubic field.
-std::uint64_t trace_cubic(const PacketMedium& medium, KernelRays& batch);
-
-/// Whether the kernel does not use vectors wider than AVX2's.
-extern bool prefers_avx2;
 
 /// Λ of a kick that is too strong for a series in single precision.
 /// @param T  T up to a multiple of I, column by column.

@@ -6,7 +6,7 @@
 #include <Eigen/Geometry>
 
 #include "base/geometry/box.h"
-#include "integrators/packets/packet_kernel.h"
+#include "integrators/kernels/packet_kernel.h"
 #include "integrators/steps/runge_kutta.h"
 #include "integrators/steps/scalar_tracer.h"
 

@@ -8,8 +8,8 @@
 
 #include <fmt/core.h>
 
-#include "base/text/path_text.h"
 #include "base/process/process_limits.h"
+#include "base/text/path_text.h"
 #include "base/text/text.h"
 #include "renderer/color/color.h"
 #include "scenes/description/run_files.h"

@@ -5,9 +5,9 @@
 #include <array>
 
 #include "integrators/bending/bending.h"
+#include "renderer/camera/camera.h"
 #include "renderer/charts/colormap.h"
 #include "renderer/lights/beam.h"
-#include "renderer/camera/camera.h"
 #include "scenes/description/description.h"
 #include "scenes/keys/choice.h"
 #include "volumes/files/tensor_files.h"

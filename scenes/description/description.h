@@ -17,8 +17,8 @@
 
 #include "integrators/bending/bending.h"
 #include "integrators/bending/flexibility.h"
-#include "renderer/lights/beam.h"
 #include "renderer/camera/camera.h"
+#include "renderer/lights/beam.h"
 #include "renderer/textures/test_images.h"
 #include "scenes/description/material_description.h"
 #include "scenes/description/method.h"

@@ -6,10 +6,10 @@
 #include <iterator>
 #include <utility>
 
-#include "base/text/content_hash.h"
 #include "base/errors.h"
-#include "base/text/path_text.h"
 #include "base/files/replace_file.h"
+#include "base/text/content_hash.h"
+#include "base/text/path_text.h"
 
 // The file: the mark; the length of the header; the header, as JSON; for each unit, twice the length of its state, plus
 // 1 if it is done; the states; the hash of all this. Numbers have 64 bits.

@@ -6,8 +6,8 @@
 #include "scenes/lens/lens_method.h"
 #include "scenes/path_tracing/path_tracing_method.h"
 #include "scenes/photons/photon_distribution_method.h"
-#include "scenes/stretch/stretch_method.h"
 #include "scenes/scene_method/scene_method.h"
+#include "scenes/stretch/stretch_method.h"
 
 namespace tensorray {
 namespace {

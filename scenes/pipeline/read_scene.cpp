@@ -9,10 +9,10 @@
 #include "base/text/text.h"
 #include "scenes/description/check_scene.h"
 #include "scenes/description/scene_keys.h"
+#include "scenes/pipeline/methods.h"
 #include "scenes/source/frames.h"
 #include "scenes/source/keyframe_schema.h"
 #include "scenes/source/overrides.h"
-#include "scenes/pipeline/methods.h"
 
 namespace tensorray {
 namespace {

@@ -1,5 +1,5 @@
-// The entries of libFuzzer, in the program `tensorray_fuzz` of the preset `asan-ubsan`. TENSORRAY_FUZZ_TARGET names a target
-// of targets.cpp. tools/fuzz runs it.
+// The entries of libFuzzer, in the program `tensorray_fuzz` of the preset `asan-ubsan`. TENSORRAY_FUZZ_TARGET names a
+// target of targets.cpp. tools/fuzz runs it.
 
 #include <algorithm>
 #include <cstdint>

@@ -15,7 +15,7 @@
 
 #include "base/constants.h"
 #include "integrators/bending/bending.h"
-#include "integrators/packets/packet_kernel.h"
+#include "integrators/kernels/packet_kernel.h"
 #include "integrators/steps/runge_kutta.h"
 #include "integrators/tracing/trace.h"
 #include "tests/integrators/support.h"

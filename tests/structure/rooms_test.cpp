@@ -65,7 +65,8 @@ const std::vector<Room> rooms{
     {"integrators/packets", {"integrators/bending", "integrators/steps", "renderer/*", "volumes/*"}},
     {"integrators/kernels", {"integrators/packets", "renderer/*", "volumes/*"}},
     {"integrators/tracing",
-     {"integrators/bending", "integrators/packets", "integrators/steps", "renderer/*", "volumes/*"}},
+     {"integrators/bending", "integrators/kernels", "integrators/packets", "integrators/steps", "renderer/*",
+      "volumes/*"}},
     {"integrators/flow", {"integrators/bending", "integrators/tracing", "renderer/*", "volumes/*"}},
     {"integrators/flow_drawing",
      {"integrators/bending", "integrators/flow", "integrators/tracing", "renderer/*", "volumes/*"}},
@@ -127,11 +128,12 @@ const std::vector<Room> rooms{
     {"tools/commands",
      {"tools/rendering", "tools/command_line", "tools/ranks", "scenes/*", "integrators/*", "renderer/*", "volumes/*"}},
     {"tools", {"tools/commands", "tools/command_line"}},
-    {"tools/benchmark", {"tools/command_line"}},
     {"tools/benchmark/kernels", {"integrators/*", "renderer/*", "volumes/*"}},
+    {"tools/benchmark/support", {}},
     {"tools/benchmark/measures",
-     {"tools/benchmark", "tools/benchmark/kernels", "tools/viewer", "scenes/*", "integrators/*", "renderer/*",
+     {"tools/benchmark/kernels", "tools/benchmark/support", "tools/viewer", "scenes/*", "integrators/*", "renderer/*",
       "volumes/*"}},
+    {"tools/benchmark", {"tools/benchmark/measures", "tools/command_line"}},
 };
 
 /// Whether `name`, an item of `may_include`, means the room `folder`.

@@ -10,8 +10,8 @@
 #include <fmt/format.h>
 #include <unistd.h>
 
-#include "tools/benchmark/parts.h"
-#include "tools/benchmark/tables.h"
+#include "tools/benchmark/measures/parts.h"
+#include "tools/benchmark/measures/tables.h"
 #include "tools/command_line/run_and_report.h"
 
 namespace tensorray::benchmark {

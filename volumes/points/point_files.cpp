@@ -9,9 +9,9 @@
 #include <openvdb/points/PointDataGrid.h>
 
 #include "base/geometry/box.h"
+#include "volumes/points/vtk_files.h"
 #include "volumes/vdb/vdb_archive.h"
 #include "volumes/vdb/vdb_transform.h"
-#include "volumes/points/vtk_files.h"
 
 namespace tensorray {
 namespace {

@@ -4,8 +4,8 @@
 #include <system_error>
 #include <utility>
 
-#include "base/process/child_program.h"
 #include "base/errors.h"
+#include "base/process/child_program.h"
 #include "base/text/text.h"
 #include "volumes/points/vtp_writer.h"
 

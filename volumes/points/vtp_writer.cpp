@@ -13,8 +13,8 @@
 #include <fcntl.h>
 #include <tbb/parallel_for.h>
 
-#include "base/text/byte_order.h"
 #include "base/files/descriptor.h"
+#include "base/text/byte_order.h"
 
 namespace tensorray {
 namespace {

@@ -5,8 +5,8 @@
 
 #include <gtest/gtest.h>
 
-#include "base/text/content_hash.h"
 #include "base/files/replace_file.h"
+#include "base/text/content_hash.h"
 
 namespace tensorray {
 namespace {

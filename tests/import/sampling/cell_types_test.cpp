@@ -7,10 +7,10 @@
 #include "base/process/progress.h"
 #include "tests/import/mesh_files.h"
 #include "tests/import/mesh_fixtures.h"
-#include "tools/import/sampling/cell_parts.h"
 #include "tools/import/meshes/mesh_cell.h"
-#include "tools/import/sampling/mesh_sampling.h"
 #include "tools/import/meshes/mesh_tensors.h"
+#include "tools/import/sampling/cell_parts.h"
+#include "tools/import/sampling/mesh_sampling.h"
 #include "tools/import/vtk/vtk_geometry.h"
 
 namespace tensorray {

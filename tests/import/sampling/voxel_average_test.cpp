@@ -13,8 +13,8 @@
 
 #include "base/process/progress.h"
 #include "tests/import/mesh_fixtures.h"
-#include "tools/import/sampling/mesh_sampling.h"
 #include "tools/import/meshes/mesh_tensors.h"
+#include "tools/import/sampling/mesh_sampling.h"
 
 namespace tensorray {
 namespace {

@@ -19,8 +19,8 @@
 #include <vtkXMLPolyDataReader.h>
 #include <vtkXMLPolyDataWriter.h>
 
-#include "integrators/paths/cross_section.h"
 #include "integrators/path_files/path_files.h"
+#include "integrators/paths/cross_section.h"
 #include "tests/import/mesh_files.h"
 #include "tests/integrators/path_support.h"
 #include "tools/import/vtk_formats/vtp_files.h"

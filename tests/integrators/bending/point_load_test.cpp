@@ -11,8 +11,8 @@
 
 #include "tests/data_folder.h"
 #include "tests/integrators/support.h"
-#include "volumes/tensors/eigenvalues.h"
 #include "volumes/making/generators.h"
+#include "volumes/tensors/eigenvalues.h"
 
 namespace tensorray {
 namespace {

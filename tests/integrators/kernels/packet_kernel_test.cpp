@@ -1,7 +1,7 @@
 // Tests that the result of a ray does not depend on the other rays, and that the work is proportional to the length of
 // its path.
 
-#include "integrators/packets/packet_kernel.h"
+#include "integrators/kernels/packet_kernel.h"
 
 #include <numeric>
 

@@ -7,8 +7,8 @@
 #include "base/constants.h"
 #include "integrators/tracing/trace.h"
 #include "integrators/view/field_region.h"
-#include "renderer/sampling/random.h"
 #include "renderer/light_maps/photon_tracer.h"
+#include "renderer/sampling/random.h"
 #include "tests/integrators/support.h"
 
 namespace tensorray {

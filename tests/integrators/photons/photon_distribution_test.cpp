@@ -254,8 +254,7 @@ TEST(PhotonDistribution, StopsWhenCancelledAndReportsProgress) {
   progress.report = [&](const std::string&, std::uint64_t done, std::uint64_t) {
     if (done > 0) progress.cancelled = true;
   };
-  EXPECT_THROW(distribute_photons(bench.field, bench.geometry, bench.beam, channels(1), settings, progress),
-               Cancelled);
+  EXPECT_THROW(distribute_photons(bench.field, bench.geometry, bench.beam, channels(1), settings, progress), Cancelled);
 }
 
 TEST(PhotonDistribution, RefusesSettingsOutOfRange) {

@@ -1,4 +1,3 @@
-#include "integrators/tracing/trace.h"
 #include "integrators/view/field_region.h"
 
 #include <array>
@@ -9,6 +8,7 @@
 #include <gtest/gtest.h>
 
 #include "base/constants.h"
+#include "integrators/tracing/trace.h"
 #include "renderer/lights/lights.h"
 #include "renderer/sampling/random.h"
 #include "renderer/sampling/sampling.h"

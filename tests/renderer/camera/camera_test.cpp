@@ -6,8 +6,8 @@
 
 #include <gtest/gtest.h>
 
-#include "base/geometry/box.h"
 #include "base/constants.h"
+#include "base/geometry/box.h"
 #include "renderer/sampling/random.h"
 
 namespace tensorray {

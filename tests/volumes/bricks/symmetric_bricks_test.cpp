@@ -8,10 +8,10 @@
 
 #include <gtest/gtest.h>
 
-#include "volumes/sampling/sample_tensors.h"
 #include "volumes/bricks/tensor_field.h"
-#include "volumes/sampling/tensor_sampler.h"
 #include "volumes/grids/block_source.h"
+#include "volumes/sampling/sample_tensors.h"
+#include "volumes/sampling/tensor_sampler.h"
 
 namespace tensorray {
 namespace {

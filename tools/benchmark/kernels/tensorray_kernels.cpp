@@ -1,6 +1,6 @@
 #include <memory>
 
-#include "integrators/packets/packet_kernel.h"
+#include "integrators/kernels/packet_kernel.h"
 #include "integrators/tracing/trace.h"
 #include "tools/benchmark/kernels/kernels.h"
 
@@ -63,6 +63,13 @@ std::vector<Kernel> tensorray_kernels() {
   kernels.push_back(other_method("rk4", BendingMethod::rk4));
   kernels.push_back(other_method("bs23", BendingMethod::bs23));
   kernels.push_back(other_method("dopri5", BendingMethod::dopri5));
+  return kernels;
+}
+
+std::vector<Kernel> all_kernels() {
+  std::vector<Kernel> kernels{openvdb_rows_kernel(), openvdb_matrix_kernel(), nanovdb_rows_kernel()};
+  for (Kernel& kernel : vtk_kernels()) kernels.push_back(std::move(kernel));
+  for (Kernel& kernel : tensorray_kernels()) kernels.push_back(std::move(kernel));
   return kernels;
 }
 

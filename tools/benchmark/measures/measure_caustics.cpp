@@ -9,9 +9,9 @@
 
 #include "base/files/temporary_folder.h"
 #include "renderer/film/image_distance.h"
-#include "tools/benchmark/child.h"
-#include "tools/benchmark/machine.h"
-#include "tools/benchmark/parts.h"
+#include "tools/benchmark/measures/parts.h"
+#include "tools/benchmark/support/child.h"
+#include "tools/benchmark/support/machine.h"
 
 namespace tensorray::benchmark {
 namespace {

@@ -9,10 +9,10 @@
 
 #include "base/files/temporary_folder.h"
 #include "renderer/density/density.h"
-#include "tools/benchmark/child.h"
-#include "tools/benchmark/machine.h"
-#include "tools/benchmark/parts.h"
-#include "tools/benchmark/repeat.h"
+#include "tools/benchmark/measures/parts.h"
+#include "tools/benchmark/support/child.h"
+#include "tools/benchmark/support/machine.h"
+#include "tools/benchmark/support/repeat.h"
 
 namespace tensorray::benchmark {
 namespace {

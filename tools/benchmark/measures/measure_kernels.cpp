@@ -4,12 +4,12 @@
 
 #include <fmt/format.h>
 
-#include "integrators/packets/packet_kernel.h"
+#include "integrators/kernels/packet_kernel.h"
 #include "integrators/tracing/trace.h"
 #include "tools/benchmark/kernels/kernels.h"
 #include "tools/benchmark/kernels/workload.h"
-#include "tools/benchmark/parts.h"
-#include "tools/benchmark/repeat.h"
+#include "tools/benchmark/measures/parts.h"
+#include "tools/benchmark/support/repeat.h"
 
 namespace tensorray::benchmark {
 namespace {
@@ -179,13 +179,6 @@ std::vector<Kernel> kernels_named(const std::string& text) {
 }
 
 }  // namespace
-
-std::vector<Kernel> all_kernels() {
-  std::vector<Kernel> kernels{openvdb_rows_kernel(), openvdb_matrix_kernel(), nanovdb_rows_kernel()};
-  for (Kernel& kernel : vtk_kernels()) kernels.push_back(std::move(kernel));
-  for (Kernel& kernel : tensorray_kernels()) kernels.push_back(std::move(kernel));
-  return kernels;
-}
 
 Json measure_kernels(const Options& options, const Json& machine) {
   const double seconds = options.quick ? 0.001 : 0.25;

@@ -4,8 +4,8 @@
 #include <fmt/format.h>
 
 #include "base/files/temporary_folder.h"
-#include "tools/benchmark/parts.h"
-#include "tools/benchmark/repeat.h"
+#include "tools/benchmark/measures/parts.h"
+#include "tools/benchmark/support/repeat.h"
 #include "volumes/bricks/tensor_field.h"
 #include "volumes/files/tensor_files.h"
 #include "volumes/making/generators.h"

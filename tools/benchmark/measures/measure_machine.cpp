@@ -1,7 +1,7 @@
 #include <algorithm>
 
-#include "tools/benchmark/machine.h"
-#include "tools/benchmark/parts.h"
+#include "tools/benchmark/measures/parts.h"
+#include "tools/benchmark/support/machine.h"
 
 namespace tensorray::benchmark {
 

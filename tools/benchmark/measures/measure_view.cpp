@@ -10,8 +10,8 @@
 #include <fmt/format.h>
 
 #include "scenes/pipeline/read_scene.h"
-#include "tools/benchmark/parts.h"
-#include "tools/benchmark/repeat.h"
+#include "tools/benchmark/measures/parts.h"
+#include "tools/benchmark/support/repeat.h"
 #include "tools/viewer/pages.h"
 
 namespace tensorray::benchmark {

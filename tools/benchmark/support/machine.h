@@ -1,5 +1,5 @@
 #pragma once
-/// @file tools/benchmark/machine.h
+/// @file tools/benchmark/support/machine.h
 /// Describes the machine and measures its limits, which kernels are compared with.
 
 #include <cstddef>

@@ -1,4 +1,4 @@
-#include "tools/benchmark/machine.h"
+#include "tools/benchmark/support/machine.h"
 
 #include <array>
 #include <atomic>
@@ -9,7 +9,7 @@
 #include <tbb/parallel_for.h>
 #include <tbb/task_arena.h>
 
-#include "tools/benchmark/repeat.h"
+#include "tools/benchmark/support/repeat.h"
 
 namespace tensorray::benchmark {
 namespace {

@@ -1,4 +1,4 @@
-/// @file integrators/packets/packet_targets.h
+/// @file integrators/kernels/packet_targets.h
 /// The instruction sets for which the kernel is compiled. Included by sources that define HWY_TARGET_INCLUDE.
 
 #include <hwy/foreach_target.h>  // IWYU pragma: keep

@@ -1,11 +1,11 @@
 #undef HWY_TARGET_INCLUDE
-#define HWY_TARGET_INCLUDE "tools/benchmark/vector_rates.cpp"
+#define HWY_TARGET_INCLUDE "tools/benchmark/support/vector_rates.cpp"
 #include <hwy/foreach_target.h>
 // highway.h must come after foreach_target.h, which compiles this file once for every set of instructions.
 #include <hwy/highway.h>
 
-#include "tools/benchmark/machine.h"
-#include "tools/benchmark/repeat.h"
+#include "tools/benchmark/support/machine.h"
+#include "tools/benchmark/support/repeat.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace tensorray::benchmark::HWY_NAMESPACE {

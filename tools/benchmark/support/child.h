@@ -1,5 +1,5 @@
 #pragma once
-/// @file tools/benchmark/child.h
+/// @file tools/benchmark/support/child.h
 /// Runs the programs that whole jobs need.
 
 #include <filesystem>

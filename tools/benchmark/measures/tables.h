@@ -1,10 +1,10 @@
 #pragma once
-/// @file tools/benchmark/tables.h
+/// @file tools/benchmark/measures/tables.h
 /// Prints measurements as readable tables.
 
 #include <string>
 
-#include "tools/benchmark/parts.h"
+#include "tools/benchmark/measures/parts.h"
 
 namespace tensorray::benchmark {
 

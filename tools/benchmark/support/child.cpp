@@ -1,4 +1,4 @@
-#include "tools/benchmark/child.h"
+#include "tools/benchmark/support/child.h"
 
 #include <stdexcept>
 

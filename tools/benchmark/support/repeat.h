@@ -1,5 +1,5 @@
 #pragma once
-/// @file tools/benchmark/repeat.h
+/// @file tools/benchmark/support/repeat.h
 /// Measures the rate of work, in several repetitions.
 
 #include <algorithm>

@@ -1,4 +1,4 @@
-#include "tools/benchmark/tables.h"
+#include "tools/benchmark/measures/tables.h"
 
 #include <algorithm>
 #include <vector>

@@ -1,5 +1,5 @@
 #pragma once
-/// @file tools/benchmark/parts.h
+/// @file tools/benchmark/measures/parts.h
 /// The parts of the benchmark. Each part returns its measurements as JSON, and the tables are made from that.
 
 #include <functional>
