@@ -29,6 +29,18 @@ struct RankTraffic {
   std::vector<std::uint64_t> units;                                ///< The units that each rank has done.
 };
 
+/// Work that all ranks do: units, or steps.
+struct SharedJob {
+  std::uint32_t number = 0;
+  std::string text;
+  Work* work = nullptr;                              ///< Null: steps.
+  std::map<int, std::deque<std::string>> parts;      ///< Of the next steps, by the other ranks.
+  std::size_t next = 0;                              ///< The units before it were handed out.
+  std::size_t away = 0;                              ///< Units that other ranks have.
+  std::vector<std::size_t> mine;                     ///< Units that this rank has.
+  std::vector<std::pair<int, std::size_t>> waiting;  ///< Ranks that need units, and their threads, before it begins.
+};
+
 /// A thread of it uses `ranks`; nobody else may, before `finish`.
 class Leader : private Team {
  public:
@@ -66,18 +78,6 @@ class Leader : private Team {
   std::vector<std::string> exchange(std::string mine) override { return do_step(std::move(mine), true); }
   std::vector<std::string> collect(std::string mine) override { return do_step(std::move(mine), false); }
 
-  /// Work that all ranks do: units, or steps.
-  struct Shared {
-    std::uint32_t number = 0;
-    std::string text;
-    Work* work = nullptr;                              ///< Null: steps.
-    std::map<int, std::deque<std::string>> parts;      ///< Of the next steps, by the other ranks.
-    std::size_t next = 0;                              ///< The units before it were handed out.
-    std::size_t away = 0;                              ///< Units that other ranks have.
-    std::vector<std::size_t> mine;                     ///< Units that this rank has.
-    std::vector<std::pair<int, std::size_t>> waiting;  ///< Ranks that need units, and their threads, before it begins.
-  };
-
   void run();
   void rethrow() const;
   void receive(int from, RankMessage message);
@@ -96,7 +96,7 @@ class Leader : private Team {
   mutable std::mutex mutex_;  ///< For all that follows.
   RankTraffic traffic_;
   std::uint32_t jobs_ = 0;  ///< The number of jobs so far.
-  std::optional<Shared> shared_;
+  std::optional<SharedJob> shared_;
   std::deque<std::string> offered_;
   std::set<int> idle_;                ///< Ranks that wait for a job.
   std::vector<std::uint32_t> given_;  ///< The last job of each rank.
