@@ -11,8 +11,7 @@
 namespace tensorray {
 namespace {
 
-constexpr double relative_margin =
-    1e-6;  // Fraction of the volume's size; single precision resolves it, with some margin.
+constexpr double relative_margin = 1e-6;  // Of the volume's size; single precision resolves a tenth of it.
 
 /// What collects light; empty if nothing does.
 TriangleMesh receiver_mesh(const Surfaces& surfaces) {

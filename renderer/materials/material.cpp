@@ -36,8 +36,6 @@ Eigen::Vector3d sample(const Model& model, const ViewedMaterial& view, const Ban
     return sample(model, reflectance, wo, place);
 }
 
-bool is_glass(const Material& material) { return std::holds_alternative<DielectricScattering>(material.scattering); }
-
 /// Mirrors `w` in z if the material is opaque and wo is below the surface: opaque models need wo above it.
 Eigen::Vector3d seen(const Material& material, const Eigen::Vector3d& w, const Eigen::Vector3d& wo) {
   return wo.z() < 0 && !is_glass(material) ? Eigen::Vector3d(w.x(), w.y(), -w.z()) : w;
@@ -69,6 +67,8 @@ double refraction(const Material& material, const Eigen::Vector3d& wi, const Eig
 }
 
 }  // namespace
+
+bool is_glass(const Material& material) { return std::holds_alternative<DielectricScattering>(material.scattering); }
 
 Material make_material(const MaterialSettings& settings, const BandValues& reflectance) {
   if (!(reflectance.allFinite() && (reflectance >= 0).all() && (reflectance <= 1).all()))

@@ -27,6 +27,9 @@ struct Material {
   BandValues reflectance;  ///< For surfaces without their own colours: one value for each band, 0 to 1.
 };
 
+/// Whether light may go through the surface.
+bool is_glass(const Material& material);
+
 /// Takes 10 to 30 ms (integrals over the facets).
 /// @param reflectance  One value for each band. Metals: a factor of Fresnel's reflectance. Glass: a factor of all
 ///                     scattered light. Normally 1 for both.

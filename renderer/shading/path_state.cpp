@@ -34,8 +34,6 @@ void set_reflectance(const ShadedScene& scene, const SurfaceHit& hit, Eigen::Ind
     scene.colors.reflectance(hit.color, reflectance, first_band);
 }
 
-bool is_glass(const Material& material) { return std::holds_alternative<DielectricScattering>(material.scattering); }
-
 void meet_surface(const ShadedScene& scene, const SurfaceHit& hit, const Vector3d& direction, PathState& path) {
   ++path.depth;
   Vertex& vertex = path.vertex;

@@ -63,6 +63,4 @@ void set_reflectance(const ShadedScene& scene, const SurfaceHit& hit, Eigen::Ind
 /// @param reflectance  Of the surface, in all bands; changed.
 Eigen::Vector3f albedo(const ShadedScene& scene, const SurfaceHit& hit, BandValues& reflectance);
 
-bool is_glass(const Material& material);
-
 }  // namespace tensorray

@@ -33,10 +33,10 @@ Eigen::Vector3f layer_color(const Film& film, std::size_t layer, std::size_t ind
   return color;
 }
 
-ChannelTable<SurfacePixel> surface_channels(const SurfacePicture& picture, const std::vector<std::string>& groups) {
+/// The picture, and what denoisers and compositors use of the first surface.
+ChannelTable<SurfacePixel> first_surface_channels() {
   using Pixel = const SurfacePixel&;
-  const bool bends = !picture.radiance_scale.empty(), has_landed = !picture.landed.values.empty();
-  ChannelTable<SurfacePixel> table{
+  return {
       {{"R", "G", "B"},
        "The picture, scene-linear: 1 is white. If `background` is `transparent`, multiplied by A.",
        [](Pixel pixel) { return pixel.color; }},
@@ -59,42 +59,53 @@ ChannelTable<SurfacePixel> surface_channels(const SurfacePicture& picture, const
       {{"force"}, "‖T V‖ of the path, in the unit of T.", plane(&SurfacePicture::force)},
       {{"length"}, "The length from the beginning of the path, world units.", plane(&SurfacePicture::arc_length)},
       {{"samples"}, "The number of samples that the pixel has taken.", plane(&SurfacePicture::samples)},
-      {{"variance"}, "Of the pixel's luminance: the square of its standard error.", plane(&SurfacePicture::variance)},
-      {{"gain"},
-       "The mean factor on radiance; 1 where the camera's light is straight.",
-       plane(&SurfacePicture::radiance_scale),
-       bends},
-      {{"deflection"},
-       "The mean angle by which the camera's light is turned, radians.",
-       plane(&SurfacePicture::deflection),
-       bends},
-      {{"arrives"},
-       "The part of the ways that could be followed to their ends.",
-       plane(&SurfacePicture::arrives),
-       bends},
-      {{"folds"},
-       "The number of sheets of a light that lie on each other where it has landed.",
-       plane(&SurfacePicture::folds),
-       bends},
-      {{"texture.s", "texture.t"},
-       "The place in a plate's texture: (0, 0) is its lower left, (1, 1) its upper right corner.",
-       plane(&SurfacePicture::texture),
-       bends},
-      {{"caustic.R", "caustic.G", "caustic.B"},
-       "If the field throws light on objects: all light that they have received from directional lights and points "
-       "through the volume.",
-       [](Pixel pixel) { return layer_color(pixel.picture.landed, 0, pixel.index); },
-       has_landed},
-      {{"straight.R", "straight.G", "straight.B"},
-       "The picture without `caustic`.",
-       [](Pixel pixel) -> Eigen::Vector3f {
-         return pixel.radiance - layer_color(pixel.picture.landed, 0, pixel.index);
-       },
-       has_landed}};
+      {{"variance"}, "Of the pixel's luminance: the square of its standard error.", plane(&SurfacePicture::variance)}};
+}
+
+/// @param bends, has_landed  Whether the camera's light bends, and whether light was traced to surfaces beforehand.
+ChannelTable<SurfacePixel> bent_light_channels(bool bends, bool has_landed) {
+  using Pixel = const SurfacePixel&;
+  return {{{"gain"},
+           "The mean factor on radiance; 1 where the camera's light is straight.",
+           plane(&SurfacePicture::radiance_scale),
+           bends},
+          {{"deflection"},
+           "The mean angle by which the camera's light is turned, radians.",
+           plane(&SurfacePicture::deflection),
+           bends},
+          {{"arrives"},
+           "The part of the bent rays that could be traced to their ends.",
+           plane(&SurfacePicture::arrives),
+           bends},
+          {{"folds"},
+           "The number of sheets of a light that lie on each other where it has landed.",
+           plane(&SurfacePicture::folds),
+           bends},
+          {{"texture.s", "texture.t"},
+           "The place in a plate's texture: (0, 0) is its lower left, (1, 1) its upper right corner.",
+           plane(&SurfacePicture::texture),
+           bends},
+          {{"caustic.R", "caustic.G", "caustic.B"},
+           "If the field throws light on objects: all light that they have received from directional lights and points "
+           "through the volume.",
+           [](Pixel pixel) { return layer_color(pixel.picture.landed, 0, pixel.index); },
+           has_landed},
+          {{"straight.R", "straight.G", "straight.B"},
+           "The picture without `caustic`.",
+           [](Pixel pixel) -> Eigen::Vector3f {
+             return pixel.radiance - layer_color(pixel.picture.landed, 0, pixel.index);
+           },
+           has_landed}};
+}
+
+ChannelTable<SurfacePixel> surface_channels(const SurfacePicture& picture, const std::vector<std::string>& groups) {
+  ChannelTable<SurfacePixel> table = first_surface_channels();
+  for (auto& row : bent_light_channels(!picture.radiance_scale.empty(), !picture.landed.values.empty()))
+    table.push_back(std::move(row));
   for (std::size_t i = 0; i < groups.size(); ++i)
     table.push_back({{groups[i] + ".R", groups[i] + ".G", groups[i] + ".B"},
                      "The part of the picture that the `lights` of a `group` of this name light.",
-                     [i](Pixel pixel) { return layer_color(pixel.picture.groups, i, pixel.index); }});
+                     [i](const SurfacePixel& pixel) { return layer_color(pixel.picture.groups, i, pixel.index); }});
   return table;
 }
 
