@@ -59,6 +59,13 @@ class Work {
   /// process does all units that are wanted.
   std::function<std::vector<std::size_t>()> next;
 
+  /// Set from outside, before the work begins: the states of the units are wanted, and no picture.
+  bool is_shard = false;
+
+  /// Set from outside, before the work begins: seconds between two times when the states of units are written; 0: only
+  /// when the run is interrupted.
+  double interval = 0;
+
   std::atomic<bool> stopping{false};        ///< Set from outside: the work ends soon, with the units that it has.
   std::atomic<double> fraction{0};          ///< Set by the work: how much of it is done.
   std::atomic<bool> picture_wanted{false};  ///< Set from outside: the work shows what it has so far, and goes on.

@@ -9,7 +9,7 @@ BendingSettings resolved(BendingSettings settings, const TensorField& field) {
 }
 
 const char* to_string(RayEnd end) {
-  constexpr const char* names[ray_end_count] = {"plate", "missed", "obstacle", "step_limit", "degenerate"};
+  constexpr const char* names[ray_end_count] = {"plate", "missed", "obstacle", "step_limit", "degenerate", "side"};
   return names[static_cast<int>(end)];
 }
 

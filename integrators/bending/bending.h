@@ -60,8 +60,9 @@ enum class RayEnd : std::uint8_t {
   obstacle,    ///< It reached an obstacle.
   step_limit,  ///< It took BendingSettings::max_steps steps.
   degenerate,  ///< It has no next direction: σ·T is not finite, or takes the direction to zero.
+  side,        ///< It left the volume by a side face, and is left out; set by SideFaces alone.
 };
-constexpr int ray_end_count = 5;
+constexpr int ray_end_count = 6;
 const char* to_string(RayEnd end);
 
 /// Derivatives of a ray along two parameters (Igehy 1999, "Tracing Ray Differentials"), one column for each parameter.

@@ -1,19 +1,17 @@
 #include "integrators/flow/flow_map.h"
 
 #include <algorithm>
-#include <atomic>
+#include <array>
 #include <cmath>
 #include <limits>
 #include <stdexcept>
-#include <thread>
 
 #include <tbb/parallel_for.h>
 
 #include "base/geometry/box.h"
-#include "base/process/team.h"
-#include "integrators/flow/flow_lattice.h"
+#include "base/process/kept_results.h"
 #include "integrators/flow/flow_triangles.h"
-#include "integrators/flow/wavelength_tracer.h"
+#include "integrators/flow/flow_vertices.h"
 
 namespace tensorray {
 namespace {
@@ -26,8 +24,6 @@ constexpr double first_voxels = 1;       // In voxels, so that no part of the fi
 constexpr double most_for_voxels = 64;   // ... but voxels ask for no more quads than this along a side.
 constexpr double usual_tolerance = 0.5;  // Pixels.
 
-constexpr double inset = 3e-6;  // Rays from the aperture's edge start this part of a patch further inside: at the edge,
-                                // rounding decides whether they enter the volume.
 constexpr int edge_levels = 2;  // Divisions of first quads at the edge before their error is estimated: light may go
                                 // its own way within a part of one.
 constexpr float gathered_part = 0.5f;  // Where light is gathered, no less than this part of the tolerance is allowed.
@@ -35,8 +31,7 @@ constexpr float still_pixels = 1;  // Light that moves by no more, from the firs
                                    // one place.
 constexpr double swept_share = 0.99;  // The part of the vertices whose light moves slowly enough from band to band.
 constexpr int most_levels = 14;
-constexpr std::size_t task_size = 64;        // Vertices that one thread traces as one task.
-constexpr std::size_t tasks_at_once = 4096;  // Tasks whose landings processes give each other in a message: 100 MB.
+constexpr int block_size = 4;  // A shard has blocks of so many first quads along each side.
 
 /// Vertices in the middles of a quad's sides, counter-clockwise from the lower one, and in its own.
 using Middles = std::array<std::uint32_t, 5>;
@@ -75,95 +70,60 @@ class FlowMapBuilder {
       : plate_(*settings.plate),
         beam_(beam),
         settings_(settings),
-        progress_(progress),
-        tracer_(field, geometry, beam, bending, settings) {
-    map_.wavelengths = tracer_.wavelengths();
-    map_.check_step = tracer_.check_step();
+        vertices_(field, geometry, beam, bending, settings, progress) {
     const double pixel = pixel_of_starts(plate_, beam);
     const double size = first_size(field, beam, pixel, settings);
-    lattice_.patches = patches_of(beam.aperture, size);
-    lattice_.is_graded = settings.silhouette;
+    lattice().patches = patches_of(beam.aperture, size);
+    lattice().is_graded = settings.silhouette;
     first_size_ = static_cast<float>(size / pixel);
     const double finest = std::min(settings.finest, settings.tolerance) * pixel;
-    while (lattice_.levels < most_levels && std::ldexp(size, -lattice_.levels) > finest) ++lattice_.levels;
-    lattice_.still_levels = is_light() && lattice_.levels < most_levels ? 1 : 0;
-    lattice_.levels += lattice_.still_levels;
+    while (lattice().levels < most_levels && std::ldexp(size, -lattice().levels) > finest) ++lattice().levels;
+    lattice().still_levels = is_light() && lattice().levels < most_levels ? 1 : 0;
+    lattice().levels += lattice().still_levels;
   }
 
   FlowMap build() && {
     add_first_quads();
-    trace_new();
-    while (divide_quads()) continue;
-    add_triangles(lattice_, quads_, beam_, map_);
-    map_.rays = tracer_.rays();
-    map_.ray_steps = tracer_.ray_steps();
-    map_.tensor_samples = tracer_.tensor_samples();
-    return std::move(map_);
+    vertices_.trace_new();
+    while (divide_quads())
+      if (settings_.show) settings_.show([&] { return with_triangles(map()); });
+    if (settings_.kept && settings_.kept->is_shard()) vertices_.keep();
+    FlowMap map = with_triangles(vertices_.take());
+    map.is_complete = is_complete_;
+    return map;
   }
 
  private:
-  std::uint32_t vertex(std::uint32_t patch, std::uint32_t x, std::uint32_t y, const Parents& parents = {}) {
-    const auto [found, is_new] =
-        lattice_.vertices.emplace(FlowLattice::key(patch, x, y), static_cast<std::uint32_t>(map_.starts.size()));
-    if (is_new) {
-      const Patch& p = lattice_.patches[patch];
-      const double u = lattice_.u_of(patch, x), v = lattice_.v_of(patch, y);
-      map_.starts.push_back(p.at(u, v));
-      const double least = settings_.silhouette ? inset : 0;
-      origins_.push_back(p.at(std::clamp(u, least, 1 - least), std::clamp(v, least, 1 - least)));
-      parents_.push_back(parents);
-    }
-    return found->second;
-  }
+  const FlowMap& map() const { return vertices_.map(); }
+  FlowLattice& lattice() { return vertices_.lattice; }
+  const FlowLattice& lattice() const { return vertices_.lattice; }
 
   void add_first_quads() {
-    const std::uint32_t side = 1u << lattice_.levels;
-    for (std::uint32_t p = 0; p < lattice_.patches.size(); ++p)
-      for (std::uint32_t row = 0; row < static_cast<std::uint32_t>(lattice_.patches[p].rows); ++row)
-        for (std::uint32_t column = 0; column < static_cast<std::uint32_t>(lattice_.patches[p].columns); ++column) {
+    const std::uint32_t side = 1u << lattice().levels;
+    for (std::uint32_t p = 0; p < lattice().patches.size(); ++p)
+      for (std::uint32_t row = 0; row < static_cast<std::uint32_t>(lattice().patches[p].rows); ++row)
+        for (std::uint32_t column = 0; column < static_cast<std::uint32_t>(lattice().patches[p].columns); ++column) {
+          if (!is_in_part(row, column)) continue;
           const std::uint32_t x = column * side, y = row * side;
           Quad quad{p, x, y};
-          quad.corners = {vertex(p, x, y), vertex(p, x + side, y), vertex(p, x + side, y + side),
-                          vertex(p, x, y + side)};
+          quad.corners = {vertices_.at(p, x, y), vertices_.at(p, x + side, y), vertices_.at(p, x + side, y + side),
+                          vertices_.at(p, x, y + side)};
           quads_.push_back(quad);
         }
   }
 
-  void trace_new() {
-    const std::size_t first = traced_, count = map_.starts.size();
-    map_.landings.resize(count * map_.wavelengths);
-    map_.ends.resize(count * map_.wavelengths);
-    map_.lengths.resize(count * tracer_.check_samples().size());
-    const std::size_t tasks = (count - first + task_size - 1) / task_size;
-    std::atomic<std::size_t> done{first};
-    const std::thread::id caller = std::this_thread::get_id();
-    tbb::parallel_for(std::size_t{0}, tasks, [&](std::size_t task) {
-      if (progress_.cancelled) throw Cancelled();
-      if (!does_part(settings_.team, task)) return;
-      const std::size_t begin = first + task * task_size, end = std::min(begin + task_size, count);
-      std::vector<NewVertex> vertices;
-      for (std::size_t i = begin; i < end; ++i) vertices.push_back({beam_.start(origins_[i]), parents_[i]});
-      tracer_.trace(map_, begin, vertices);
-      const std::size_t traced = done += end - begin;
-      if (std::this_thread::get_id() == caller)
-        progress_.update("tracing rays", std::min(traced, settings_.most_starts), settings_.most_starts);
-    });
-    if (settings_.team) exchange_landings(*settings_.team, tasks);
-    traced_ = count;
+  /// Whether a first quad belongs to the part of this shard. Blocks of a shard are far apart, so that shards have
+  /// nearly the same work.
+  bool is_in_part(std::uint32_t row, std::uint32_t column) const {
+    if (!settings_.kept) return true;
+    const WorkPart part = settings_.kept->part();
+    const std::size_t step = std::max<std::size_t>(1, part.count * 3 / 8);
+    return (column / block_size + row / block_size * step) % part.count == part.index;
   }
 
-  /// Gives the others the landings of the vertices that this process has traced, and takes theirs.
-  void exchange_landings(Team& team, std::size_t tasks) {
-    const std::size_t checks = tracer_.check_samples().size();
-    exchange_parts(team, tasks, tasks_at_once, [&](std::size_t task, PartBytes& bytes) {
-      const std::size_t begin = traced_ + task * task_size, end = std::min(begin + task_size, map_.starts.size());
-      const auto copy = [&](auto& values, std::size_t of_each) {
-        bytes.copy(&values[begin * of_each], (end - begin) * of_each * sizeof values[0]);
-      };
-      copy(map_.landings, map_.wavelengths);
-      copy(map_.ends, map_.wavelengths);
-      copy(map_.lengths, checks);
-    });
+  FlowMap with_triangles(FlowMap map) const {
+    add_triangles(lattice(), quads_, beam_, map);
+    return map;
   }
 
   /// Where the light of some vertices lands at one sample.
@@ -176,10 +136,10 @@ class FlowMapBuilder {
   Reach reach_of(const std::array<std::uint32_t, count>& vertices, std::size_t sample) const {
     Reach reach;
     for (const std::uint32_t vertex : vertices) {
-      if (!map_.landed(vertex, sample)) continue;
+      if (!map().landed(vertex, sample)) continue;
       ++reach.landed;
-      reach.low = reach.low.min(map_.landing(vertex, sample).array());
-      reach.high = reach.high.max(map_.landing(vertex, sample).array());
+      reach.low = reach.low.min(map().landing(vertex, sample).array());
+      reach.high = reach.high.max(map().landing(vertex, sample).array());
     }
     return reach;
   }
@@ -195,8 +155,8 @@ class FlowMapBuilder {
   /// The lesser extent of a quad's light on the plate, pixels; 0 on a fold.
   float width_of(const Quad& quad, const Reach& reach, std::size_t sample) const {
     const auto& [a, b, c, d] = quad.corners;
-    const Eigen::Vector2f up = map_.landing(c, sample) - map_.landing(a, sample),
-                          down = map_.landing(d, sample) - map_.landing(b, sample);
+    const Eigen::Vector2f up = map().landing(c, sample) - map().landing(a, sample),
+                          down = map().landing(d, sample) - map().landing(b, sample);
     const float area = std::abs(up.x() * down.y() - up.y() * down.x()) / 2;
     return area > 0 ? area / (reach.high - reach.low).maxCoeff() : 0;
   }
@@ -219,20 +179,20 @@ class FlowMapBuilder {
   }
 
   bool needs_division(const Quad& quad) const {
-    if (quad.level >= lattice_.levels) return false;
-    const bool is_for_still_light = quad.level >= lattice_.levels - lattice_.still_levels;
-    const bool is_at_edge = settings_.silhouette && lattice_.is_at_edge(quad);
+    if (quad.level >= lattice().levels) return false;
+    const bool is_for_still_light = quad.level >= lattice().levels - lattice().still_levels;
+    const bool is_at_edge = settings_.silhouette && lattice().is_at_edge(quad);
     if (quad.level < (is_at_edge ? edge_levels : 1)) return true;  // There is no estimate of its error yet.
     bool is_seen = false;
     float width = std::numeric_limits<float>::infinity(), extent = 0;
     Eigen::Vector2f first(0, 0), last(0, 0);
-    for (const std::size_t sample : tracer_.check_samples()) {
+    for (const std::size_t sample : vertices_.check_samples()) {
       const Reach reach = reach_of(quad.corners, sample);
       if (!is_on_plate(reach)) continue;
       if (reach.landed < 4) return !is_for_still_light;
       width = std::min(width, width_of(quad, reach, sample));
       extent = std::max(extent, (reach.high - reach.low).maxCoeff());
-      last = map_.landing(quad.corners[0], sample);
+      last = map().landing(quad.corners[0], sample);
       if (!is_seen) first = last;
       is_seen = true;
     }
@@ -249,9 +209,9 @@ class FlowMapBuilder {
     for (std::size_t i = 0; i < quads_.size(); ++i)
       if (needs[i]) chosen.push_back(i);
     // A division adds up to five vertices, and about three as neighbours share them.
-    const std::size_t room = (settings_.most_starts - std::min(settings_.most_starts, map_.starts.size())) / 3;
+    const std::size_t room = (settings_.most_starts - std::min(settings_.most_starts, map().starts.size())) / 3;
     if (chosen.size() > room) {
-      map_.is_complete = false;
+      is_complete_ = false;
       std::stable_sort(chosen.begin(), chosen.end(),
                        [&](std::size_t a, std::size_t b) { return quads_[a].error > quads_[b].error; });
       chosen.resize(room);
@@ -265,7 +225,7 @@ class FlowMapBuilder {
     const std::vector<std::size_t> chosen = choose_quads();
     std::vector<Middles> added;
     for (const std::size_t i : chosen) added.push_back(middles_of(quads_[i]));
-    trace_new();
+    vertices_.trace_new();
     std::vector<float> deviations(chosen.size());
     tbb::parallel_for(std::size_t{0}, chosen.size(),
                       [&](std::size_t i) { deviations[i] = deviation_of(quads_[chosen[i]], added[i]); });
@@ -285,12 +245,12 @@ class FlowMapBuilder {
   }
 
   Middles middles_of(const Quad& quad) {
-    const std::uint32_t side = lattice_.side_of(quad), half = side / 2, x = quad.x, y = quad.y, p = quad.patch;
+    const std::uint32_t side = lattice().side_of(quad), half = side / 2, x = quad.x, y = quad.y, p = quad.patch;
     const auto& [a, b, c, d] = quad.corners;
     // At the silhouette, landings are singular: neighbours say little about each other.
-    const bool has_parents = !settings_.silhouette || !lattice_.is_on_border(quad);
+    const bool has_parents = !settings_.silhouette || !lattice().is_on_border(quad);
     const auto middle = [&](std::uint32_t at_x, std::uint32_t at_y, const Parents& parents) {
-      return vertex(p, at_x, at_y, has_parents ? parents : Parents());
+      return vertices_.at(p, at_x, at_y, has_parents ? parents : Parents());
     };
     return {middle(x + half, y, {{a, b}, 2}), middle(x + side, y + half, {{b, c}, 2}),
             middle(x + half, y + side, {{c, d}, 2}), middle(x, y + half, {{d, a}, 2}),
@@ -300,7 +260,7 @@ class FlowMapBuilder {
   /// The error is what the part's own deviation will be if deviations go on to fall by the same ratio: to a quarter
   /// from level to level where landings are smooth, by less at singular places.
   Quad quarter_of(const Quad& quad, std::uint32_t quarter, const Middles& middles, float deviation) const {
-    const std::uint32_t half = lattice_.side_of(quad) / 2;
+    const std::uint32_t half = lattice().side_of(quad) / 2;
     const auto& [a, b, c, d] = quad.corners;
     const auto& [ab, bc, cd, da, center] = middles;
     Quad part{quad.patch, quad.x + quarter % 2 * half, quad.y + quarter / 2 * half, quad.level + 1};
@@ -317,8 +277,8 @@ class FlowMapBuilder {
   float deviation_at(const Quad& quad, const Middles& middles, std::size_t sample) const {
     std::array<Eigen::Vector2f, 4> at;
     for (int i = 0; i < 4; ++i) {
-      if (!map_.landed(quad.corners[i], sample)) return std::numeric_limits<float>::infinity();
-      at[i] = map_.landing(quad.corners[i], sample);
+      if (!map().landed(quad.corners[i], sample)) return std::numeric_limits<float>::infinity();
+      at[i] = map().landing(quad.corners[i], sample);
     }
     const auto [u, v] = middle_of(quad);
     const auto between = [](const Eigen::Vector2f& from, const Eigen::Vector2f& to, float part) {
@@ -329,20 +289,20 @@ class FlowMapBuilder {
                                                   between(bottom, top, v)};
     float greatest = 0;
     for (int i = 0; i < 5; ++i) {
-      if (!map_.landed(middles[i], sample)) return std::numeric_limits<float>::infinity();
-      greatest = std::max(greatest, (map_.landing(middles[i], sample) - expected[i]).norm());
+      if (!map().landed(middles[i], sample)) return std::numeric_limits<float>::infinity();
+      greatest = std::max(greatest, (map().landing(middles[i], sample) - expected[i]).norm());
     }
     return greatest;
   }
 
   /// Where the middle of a quad lies in it; (½, ½) but at the aperture's edge.
   std::pair<float, float> middle_of(const Quad& quad) const {
-    const std::uint32_t side = lattice_.side_of(quad), half = side / 2;
+    const std::uint32_t side = lattice().side_of(quad), half = side / 2;
     const auto part = [](double first, double middle, double last) {
       return static_cast<float>((middle - first) / (last - first));
     };
-    const auto u = [&](std::uint32_t x) { return lattice_.u_of(quad.patch, quad.x + x); };
-    const auto v = [&](std::uint32_t y) { return lattice_.v_of(quad.patch, quad.y + y); };
+    const auto u = [&](std::uint32_t x) { return lattice().u_of(quad.patch, quad.x + x); };
+    const auto v = [&](std::uint32_t y) { return lattice().v_of(quad.patch, quad.y + y); };
     return {part(u(0), u(half), u(side)), part(v(0), v(half), v(side))};
   }
 
@@ -351,7 +311,7 @@ class FlowMapBuilder {
     const auto& [a, b, c, d] = quad.corners;
     const std::array<std::uint32_t, 9> all{a, b, c, d, middles[0], middles[1], middles[2], middles[3], middles[4]};
     float greatest = 0;
-    for (const std::size_t sample : tracer_.check_samples())
+    for (const std::size_t sample : vertices_.check_samples())
       if (is_on_plate(reach_of(all, sample))) greatest = std::max(greatest, deviation_at(quad, middles, sample));
     return greatest;
   }
@@ -359,15 +319,10 @@ class FlowMapBuilder {
   const Plate plate_;
   const Beam& beam_;
   const FlowSettings& settings_;
-  const Progress& progress_;
-  WavelengthTracer tracer_;
-  FlowLattice lattice_;
+  FlowVertices vertices_;
   std::vector<Quad> quads_;
-  std::vector<Eigen::Vector2d> origins_;  // Where the rays of the vertices start, in the beam's frame.
-  std::vector<Parents> parents_;          // Of the vertices.
-  float first_size_ = 1;                  // Of the first quads, pixels of straight light.
-  std::size_t traced_ = 0;                // Number of vertices that have landings.
-  FlowMap map_;
+  float first_size_ = 1;  // Of the first quads, pixels of straight light.
+  bool is_complete_ = true;
 };
 
 }  // namespace

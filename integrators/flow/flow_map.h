@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <array>
 #include <cstdint>
+#include <functional>
 #include <memory>
 #include <optional>
 #include <vector>
@@ -20,8 +21,10 @@
 
 namespace tensorray {
 
+class KeptResults;
 class RayMemory;
 class Team;
+struct FlowMap;
 
 struct FlowSettings {
   /// Flexibilities of the light that is followed. If they are the two ends of a `range`, the map holds a continuum
@@ -41,9 +44,19 @@ struct FlowSettings {
                            ///< Rays from the edge start a little further inside, as they must enter the volume.
   bool beside = false;     ///< Whether light that lands beside the plate is as important as light on it.
 
+  bool side_light = true;  ///< Whether light that leaves the volume by a side face counts (SideFaces; parallel light).
+
   std::size_t most_starts = std::size_t{1} << 20;  ///< Refinement stops at so many vertices; > 0.
 
   Team* team = nullptr;  ///< Processes that trace the same map with this one, each a part of its rays; null: alone.
+
+  /// Vertices that an earlier run or a shard has traced, for the same field and light; the map is the same. It keeps
+  /// its own there while it is traced. Where they are those of a shard, the map is only that of the shard's part: first
+  /// quads in blocks, of which each shard has some everywhere. Null: none is kept.
+  KeptResults* kept = nullptr;
+
+  /// Called after each division of quads, with a function that makes the map so far. Empty: nobody wants it.
+  std::function<void(const std::function<FlowMap()>& so_far)> show;
 
   /// Rays of maps that differ only in plate and range of flexibilities; null: none is remembered. The map is the same.
   std::shared_ptr<RayMemory> memory;

@@ -47,9 +47,10 @@ WavelengthTracer::WavelengthTracer(const TensorField& field, const Geometry& geo
     Surfaces alone;
     alone.bounds = geometry.surfaces().bounds;
     alone.body = geometry.surfaces().body;
-    off_body_ = off_surface * alone.body->bounds().diagonal().norm();
-    body_.emplace(std::move(alone));
+    const double off = off_surface * alone.body->bounds().diagonal().norm();
+    body_.emplace(Body{Geometry(std::move(alone)), off});
   }
+  if (!settings.side_light) sides_.emplace(field, beam.direction);
   const std::size_t step = is_range_ ? first_step : 1;
   for (std::size_t sample = 0; sample < wavelengths(); sample += step) check_samples_.push_back(sample);
 }
@@ -79,26 +80,27 @@ void WavelengthTracer::predict_lengths(FlowMap& map, std::size_t vertex, const P
   }
 }
 
-void WavelengthTracer::trace(FlowMap& map, std::size_t first, const std::vector<NewVertex>& vertices) {
+void WavelengthTracer::trace(FlowMap& map, const std::vector<NewVertex>& vertices) {
   std::vector<SampleRay> rays;
   std::vector<ExitFaces> faces(vertices.size());
   if (!is_range_) {
     for (std::size_t sample = 0; sample < wavelengths(); ++sample)
-      for (std::size_t i = 0; i < vertices.size(); ++i) rays.push_back({first + i, sample});
-    return trace_rays(map, first, vertices, rays, faces);
+      for (std::size_t i = 0; i < vertices.size(); ++i) rays.push_back({i, sample});
+    return trace_rays(map, vertices, rays, faces);
   }
   std::vector<PartlyTraced> rest;
   for (std::size_t i = 0; i < vertices.size(); ++i) {
-    const WavelengthPrediction prediction(map, first + i, vertices[i].parents, plate_.resolution.cast<float>());
+    const WavelengthPrediction prediction(map, vertices[i].index, vertices[i].parents, plate_.resolution.cast<float>());
     const bool agree = prediction.parents_agree(coarsest_step, tolerance_);
-    rest.push_back({first + i, agree ? coarsest_step : first_step, prediction});
+    rest.push_back({i, agree ? coarsest_step : first_step, prediction});
   }
   for (bool is_first = true; !rest.empty(); is_first = false) {
     add_rays(rest, is_first, rays);
-    trace_rays(map, first, vertices, rays, faces);
+    trace_rays(map, vertices, rays, faces);
     const auto is_done = [&](PartlyTraced& each) {
-      if (!each.prediction.predict(each.step, tolerance_, faces[each.vertex - first])) return false;
-      if (each.step == coarsest_step) predict_lengths(map, each.vertex, vertices[each.vertex - first].parents);
+      if (!each.prediction.predict(each.step, tolerance_, faces[each.vertex])) return false;
+      const NewVertex& vertex = vertices[each.vertex];
+      if (each.step == coarsest_step) predict_lengths(map, vertex.index, vertex.parents);
       return true;
     };
     rest.erase(std::remove_if(rest.begin(), rest.end(), is_done), rest.end());
@@ -113,7 +115,7 @@ RayEnd WavelengthTracer::end_of(const RayBatch& rays, std::size_t ray, const Eig
     return RayEnd::missed;
   const Eigen::Vector3d back =
       beam_.source ? Eigen::Vector3d((*beam_.source - rays.position[ray]).normalized()) : plate_.normal();
-  return body_->absorber(rays.position[ray] + off_body_ * back, back) ? RayEnd::obstacle : RayEnd::plate;
+  return body_->alone.absorber(rays.position[ray] + body_->off * back, back) ? RayEnd::obstacle : RayEnd::plate;
 }
 
 /// The face of the volume's box through which the straight end of a ray left it, 0 to 5.
@@ -126,25 +128,27 @@ std::uint8_t WavelengthTracer::exit_face(const Eigen::Vector3d& position, const 
   return static_cast<std::uint8_t>(2 * axis + (along[axis] > 0 ? 1 : 0));
 }
 
-void WavelengthTracer::trace_rays(FlowMap& map, std::size_t first, const std::vector<NewVertex>& vertices,
+void WavelengthTracer::trace_rays(FlowMap& map, const std::vector<NewVertex>& vertices,
                                   const std::vector<SampleRay>& rays, std::vector<ExitFaces>& faces) {
   RayBatch batch;
   for (const SampleRay& ray : rays) {
-    const Eigen::Vector3d& origin = vertices[ray.vertex - first].origin;
+    const Eigen::Vector3d& origin = vertices[ray.vertex].origin;
     batch.add(origin, beam_.direction_at(origin), flexibilities_[ray.sample]);
   }
   if (memory_)
     memory_->trace(field_, *volume_, geometry_, bending_, batch);
   else
     tensorray::trace(field_, geometry_, bending_, batch);
+  if (sides_) sides_->mark(batch);
   for (std::size_t i = 0; i < rays.size(); ++i) {
     const auto& [vertex, sample] = rays[i];
-    const std::size_t at = vertex * wavelengths() + sample;
+    const NewVertex& of = vertices[vertex];
+    const std::size_t at = of.index * wavelengths() + sample;
     map.landings[at] = plate_.to_pixel(place_on(plate_, geometry_, beam_, batch.position[i])).cast<float>();
-    map.ends[at] = end_of(batch, i, vertices[vertex - first].origin);
-    if (is_range_) faces[vertex - first][sample] = exit_face(batch.position[i], batch.direction[i]);
+    map.ends[at] = end_of(batch, i, of.origin);
+    if (is_range_) faces[vertex][sample] = exit_face(batch.position[i], batch.direction[i]);
     if (sample % map.check_step == 0)
-      map.lengths[vertex * check_samples_.size() + sample / map.check_step] = static_cast<float>(batch.length[i]);
+      map.lengths[of.index * check_samples_.size() + sample / map.check_step] = static_cast<float>(batch.length[i]);
   }
   rays_ += batch.size();
   tensor_samples_ += batch.tensor_samples;

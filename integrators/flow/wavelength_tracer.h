@@ -10,6 +10,7 @@
 
 #include <Eigen/Core>
 
+#include "integrators/bending/side_faces.h"
 #include "integrators/flow/flow_map.h"
 #include "integrators/flow/wavelength_prediction.h"
 
@@ -21,6 +22,7 @@ Eigen::Vector3d place_on(const Plate& plate, const Geometry& geometry, const Bea
 
 /// A vertex whose light is to be traced.
 struct NewVertex {
+  std::size_t index;  ///< In the map.
   Eigen::Vector3d origin;
   Parents parents;
 };
@@ -40,9 +42,9 @@ class WavelengthTracer {
 
   std::size_t check_step() const { return check_samples_.size() > 1 ? check_samples_[1] : 1; }
 
-  /// Sets landings, ends and lengths of the vertices from `first` on, for which the map has room. Different vertices
-  /// may be traced at once; their parents must be traced already.
-  void trace(FlowMap& map, std::size_t first, const std::vector<NewVertex>& vertices);
+  /// Sets landings, ends and lengths of the vertices, for which the map has room. Different vertices may be traced at
+  /// once; their parents must be traced already.
+  void trace(FlowMap& map, const std::vector<NewVertex>& vertices);
 
   std::uint64_t rays() const { return rays_; }
   std::uint64_t ray_steps() const { return ray_steps_; }
@@ -50,7 +52,7 @@ class WavelengthTracer {
 
  private:
   struct SampleRay {
-    std::size_t vertex, sample;
+    std::size_t vertex, sample;  // The vertex is a number of a new one.
   };
   /// A vertex of which every `step`-th sample is traced next.
   struct PartlyTraced {
@@ -58,9 +60,14 @@ class WavelengthTracer {
     WavelengthPrediction prediction;
   };
 
+  struct Body {
+    Geometry alone;
+    double off;  // Distance from its surface at which it is looked for.
+  };
+
   static void add_rays(const std::vector<PartlyTraced>& vertices, bool is_first, std::vector<SampleRay>& rays);
-  void trace_rays(FlowMap& map, std::size_t first, const std::vector<NewVertex>& vertices,
-                  const std::vector<SampleRay>& rays, std::vector<ExitFaces>& faces);
+  void trace_rays(FlowMap& map, const std::vector<NewVertex>& vertices, const std::vector<SampleRay>& rays,
+                  std::vector<ExitFaces>& faces);
   void predict_lengths(FlowMap& map, std::size_t vertex, const Parents& parents) const;
   RayEnd end_of(const RayBatch& rays, std::size_t ray, const Eigen::Vector3d& origin) const;
   std::uint8_t exit_face(const Eigen::Vector3d& position, const Eigen::Vector3d& direction) const;
@@ -72,8 +79,8 @@ class WavelengthTracer {
   const BendingSettings& bending_;
   std::shared_ptr<RayMemory> memory_;  // Null: rays are not remembered.
   std::optional<Geometry> volume_;     // With `memory_`: the geometry without its plate.
-  std::optional<Geometry> body_;       // The body alone, if it collects the light.
-  double off_body_ = 0;                // Distance from its surface at which it is looked for.
+  std::optional<Body> body_;           // If it collects the light.
+  std::optional<SideFaces> sides_;     // If light that leaves through them does not count.
   float tolerance_;                    // Of predicted landings, pixels.
   bool is_range_;
   std::vector<double> flexibilities_;  // One for each wavelength sample.

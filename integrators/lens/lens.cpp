@@ -94,6 +94,7 @@ FlowSettings flow_settings(const LensLight& light) {
   settings.silhouette = false;
   settings.beside = gathers(light) && light.setup.image.wraps;
   settings.team = light.settings.team;
+  settings.kept = light.settings.kept;
   settings.most_starts =
       most_starts + starts_per_pixel * static_cast<std::size_t>(light.setup.receiver.resolution.prod());
   return settings;

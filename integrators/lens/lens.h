@@ -26,6 +26,8 @@
 namespace tensorray {
 
 /// Two different maps. Their results differ where the field acts between different planes; see docs/scenes.md.
+class KeptResults;
+
 enum class LensMode {
   gather,  ///< Parallel light leaves every pixel of the receiver against the light and bends with −s. The pixel shows
            ///< the point of the image where the light arrives. Every pixel is covered.
@@ -68,6 +70,7 @@ struct LensSettings {
   bool range = false;
 
   Team* team = nullptr;  ///< Processes that trace the same light and draw it together; null: this one is alone.
+  KeptResults* kept = nullptr;  ///< As FlowSettings has it; with those of a shard, the light cannot be drawn.
 };
 
 /// Why a pixel sees the image, or does not. The values are the ends of rays: `image` is a ray that landed on the image,

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstring>
 #include <numeric>
 #include <stdexcept>
 #include <utility>
@@ -109,6 +110,37 @@ void FluenceSums::add(std::size_t channel, const RayRecord& ray) {
     }
     from = to;
     from_length = point.length;
+  }
+}
+
+/// The number of planes; then, for each block with light, its number and its sums.
+void FluenceSums::append_sums(std::string& bytes) const {
+  const auto append = [&](std::uint64_t value) { bytes.append(reinterpret_cast<const char*>(&value), sizeof value); };
+  append(planes_);
+  for (std::size_t block = 0; block < blocks_.size(); ++block) {
+    const Sum* const sums = blocks_[block].load();
+    if (!sums) continue;
+    append(block);
+    for (std::size_t i = 0; i < planes_ * TensorBlock::voxels; ++i) append(sums[i].load(std::memory_order_relaxed));
+  }
+}
+
+void FluenceSums::add_sums(std::string_view bytes) {
+  constexpr std::size_t size = sizeof(std::uint64_t);
+  const std::size_t of_block = planes_ * TensorBlock::voxels, record = size * (1 + of_block);
+  const auto number = [&](std::size_t at) {
+    std::uint64_t value = 0;
+    std::memcpy(&value, bytes.data() + at, size);
+    return value;
+  };
+  if (bytes.size() % record != size || number(0) != planes_)
+    throw std::runtime_error("fluence that was kept has other bands");
+  for (std::size_t at = size; at < bytes.size(); at += record) {
+    const std::uint64_t block = number(at);
+    if (block >= blocks_.size()) throw std::runtime_error("fluence that was kept is that of another field");
+    Sum* const sums = sums_of(static_cast<std::uint32_t>(block));
+    for (std::size_t i = 0; i < of_block; ++i)
+      sums[i].fetch_add(number(at + size * (1 + i)), std::memory_order_relaxed);
   }
 }
 

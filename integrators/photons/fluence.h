@@ -5,6 +5,8 @@
 #include <atomic>
 #include <cstdint>
 #include <memory>
+#include <string>
+#include <string_view>
 #include <vector>
 
 #include "integrators/bending/ray_record.h"
@@ -37,6 +39,13 @@ class FluenceSums {
 
   /// Adds a ray of the channel. Any number of threads may add rays at once.
   void add(std::size_t channel, const RayRecord& ray);
+
+  /// Appends the sums so far to `bytes`; not while rays are added.
+  void append_sums(std::string& bytes) const;
+
+  /// Adds the sums of other rays. @throw std::runtime_error if they are those of other channels, bands or another
+  /// field.
+  void add_sums(std::string_view bytes);
 
   /// The grids, as fog volumes: the one of all channels, then, with `bands`, one for each channel (1 is the undisturbed
   /// beam of that channel). Voxels that light has reached are active. The grids have no names yet. Runs on all threads.

@@ -3,9 +3,11 @@
 /// Density of light on a plate behind a field (Zheng and Pang 2003, section on photon distribution).
 
 #include <cstdint>
+#include <functional>
 #include <vector>
 
 #include "base/process/progress.h"
+#include "base/process/team.h"
 #include "base/process/work.h"
 #include "integrators/bending/bending.h"
 #include "integrators/bending/geometry.h"
@@ -19,6 +21,8 @@ namespace tensorray {
 
 /// Which grids of the light inside the volume are returned.
 enum class FluenceKind { none, all_light, bands };
+
+struct PhotonDistribution;
 
 struct PhotonSettings {
   BendingSettings bending;
@@ -36,9 +40,16 @@ struct PhotonSettings {
   /// one for each channel. Compared with 32 channels this takes a third of the time and a tenth of the memory.
   std::vector<Eigen::Vector3d> colors;
 
-  /// Keeps the work so far, every now and then, as its only unit, if neither photons nor fluence are wanted; null:
-  /// nothing is kept.
+  /// Keeps what was traced, every now and then; null: nothing is kept. It has as many units as it has parts, or as it
+  /// was given. States of units depend on the kinds of outputs: those that are wanted must have been from the
+  /// beginning.
   Work* work = nullptr;
+
+  /// Processes that trace the photons together with this one; null: it is alone.
+  Team* team = nullptr;
+
+  /// Gets what there is so far when `work` wants a picture; may be empty. Called by the calling thread, at process 0.
+  std::function<void(PhotonDistribution)> show;
 };
 
 struct PhotonDistribution {
@@ -59,8 +70,11 @@ struct PhotonDistribution {
 };
 
 /// Emits parallel light, bends it through the field and estimates its density on the plate of `geometry`.
-/// The result is the same for any number of threads.
-/// @throw std::invalid_argument if a setting is out of range or `geometry` has no plate; Cancelled.
+/// The result is the same for any number of threads, processes and units. Of a team, only process 0 has it. Of work
+/// that has several parts, it is what the units that were given and those of this part have: incomplete, unless all
+/// units are done.
+/// @throw std::invalid_argument if a setting is out of range or `geometry` has no plate; std::runtime_error if the
+/// states of `work` are those of other light or outputs; Cancelled; as Team::exchange.
 PhotonDistribution distribute_photons(const TensorField& field, const Geometry& geometry, const Beam& beam,
                                       const std::vector<LightChannel>& channels, const PhotonSettings& settings,
                                       const Progress& progress);

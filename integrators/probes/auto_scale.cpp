@@ -23,7 +23,7 @@ constexpr double first_turn = 0.015;  // No ray turns by more at the first scale
 // A scale that shows less than this, with less turn, is too small. A few rays tell: one of so many.
 constexpr double weak_shown = 0.1, weak_turn = 0.05;
 constexpr std::size_t few = 4;
-constexpr double least_shown = 1e-6, least_growth = 1.5;  // Less may be rounding, or not be what grows with the scale.
+constexpr double least_shown = 1e-6, least_gain = 1.5;  // Less may be rounding, or not be what grows with the scale.
 constexpr int doublings = 30, halvings = 8;
 constexpr int patience = 12;             // Doublings after which light that has not turned at all will not.
 constexpr double smallest_turn = 1e-7;   // Radians; a ray that turns less counts as straight.
@@ -129,7 +129,7 @@ double last_weak_scale(const TensorField& field, const Geometry& geometry, const
   for (int i = 0; i < doublings; ++i, scale *= 2) {
     const AutoScale by_few = probe(field, geometry, probes, scale, progress, few);
     const bool is_weak = by_few.shown < weak_shown && by_few.median_turn < weak_turn;
-    if (!is_weak || by_few.shown < least_growth * shown) return i > 0 ? scale / 2 : scale;
+    if (!is_weak || by_few.shown < least_gain * shown) return i > 0 ? scale / 2 : scale;
     shown = by_few.shown;
   }
   return scale;

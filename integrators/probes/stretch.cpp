@@ -3,12 +3,18 @@
 #include <algorithm>
 #include <cmath>
 #include <deque>
+#include <functional>
 #include <limits>
+#include <optional>
 #include <stdexcept>
+#include <string>
+#include <utility>
 
 #include <Eigen/Geometry>
 #include <tbb/parallel_for.h>
 
+#include "base/process/kept_results.h"
+#include "base/process/team.h"
 #include "integrators/tracing/trace.h"
 
 namespace tensorray {
@@ -24,17 +30,78 @@ double log_stretch(const Eigen::Matrix<double, 3, 2>& m) {
   return std::log(std::max(greatest, std::numeric_limits<double>::min())) / 2;
 }
 
-/// Calls `work(i)` for each i below `count` on all threads, and reports progress.
-template <class Work>
-void in_parallel(std::size_t count, const Progress& progress, const Work& work) {
-  for (std::size_t first = 0; first < count; first += stretch_chunk) {
-    progress.update("tracing rays", first, count);
-    tbb::parallel_for(first, std::min(first + stretch_chunk, count), [&](std::size_t i) {
-      if (progress.cancelled) throw Cancelled();
-      work(i);
-    });
+/// Parts of a result, each of so many numbers, that are computed on their own.
+struct StretchParts {
+  std::size_t count, size;
+  std::uint64_t hash;                              // Of what they depend on.
+  std::function<float*(std::size_t part)> values;  // Where its numbers are.
+  std::function<void(std::size_t part)> compute;   // Sets them.
+};
+
+/// Computes parts on all threads, or takes them from those that were kept.
+class StretchComputer {
+ public:
+  StretchComputer(StretchParts parts, const StretchSettings& settings)
+      : parts_(std::move(parts)), team_(settings.team), kept_(settings.kept) {}
+
+  void run(const Progress& progress) {
+    for (std::size_t first = 0; first < parts_.count; first += stretch_chunk) {
+      progress.update("tracing rays", first, parts_.count);
+      if (kept_ && (progress.cancelled || kept_->is_due())) keep(first);
+      const std::size_t last = std::min(first + stretch_chunk, parts_.count);
+      tbb::parallel_for(first, last, [&](std::size_t part) {
+        if (progress.cancelled) throw Cancelled();
+        if (is_mine(part) && !restore(part)) parts_.compute(part);
+      });
+    }
+    if (kept_ && kept_->is_shard()) keep(parts_.count);
+    if (team_)
+      collect_parts(*team_, parts_.count, std::max<std::size_t>(1, floats_at_once / parts_.size),
+                    [&](std::size_t part, PartBytes& bytes) { copy(part, bytes); });
+    progress.update("tracing rays", parts_.count, parts_.count);
   }
-  progress.update("tracing rays", count, count);
+
+ private:
+  static constexpr std::size_t floats_at_once = std::size_t{1} << 24;  // In a message between processes.
+
+  std::size_t bytes() const { return parts_.size * sizeof(float); }
+  ResultKey key(std::size_t part) const { return {part, parts_.size, parts_.hash}; }
+  void copy(std::size_t part, PartBytes& bytes_of_part) { bytes_of_part.copy(parts_.values(part), bytes()); }
+
+  bool is_mine(std::size_t part) const {
+    return does_part(team_, part) && (!kept_ || part % kept_->part().count == kept_->part().index);
+  }
+
+  bool restore(std::size_t part) {
+    std::optional<std::string> values = kept_ ? kept_->find(key(part), bytes()) : std::nullopt;
+    if (!values) return false;
+    PartBytes from(std::move(*values));
+    copy(part, from);
+    return true;
+  }
+
+  /// Keeps the parts up to `last` that this process has.
+  void keep(std::size_t last) {
+    for (; added_ < last; ++added_) {
+      if (!is_mine(added_)) continue;
+      PartBytes to;
+      copy(added_, to);
+      kept_->add(key(added_), to.take());
+    }
+    kept_->keep(false);
+  }
+
+  StretchParts parts_;
+  Team* team_;
+  KeptResults* kept_;
+  std::size_t added_ = 0;
+};
+
+/// @param more  What the numbers depend on, beside the settings.
+std::uint64_t hash_of_stretch(const StretchSettings& settings, const std::vector<double>& more) {
+  const double numbers[] = {settings.direction.x(), settings.direction.y(), settings.direction.z(),
+                            settings.flexibility, settings.length};
+  return hash_of(more.data(), more.size() * sizeof more[0], hash_of(numbers, sizeof numbers));
 }
 
 constexpr double most_voxels = 1 << 30;
@@ -104,7 +171,7 @@ ScalarGrid stretch_grid(const TensorField& field, const Geometry& geometry, cons
   grid.name = "stretch";
   grid.to_world = lattice.to_world;
   grid.blocks = blocks_of(lattice);
-  in_parallel(grid.blocks.size(), progress, [&](std::size_t i) {
+  const auto compute = [&](std::size_t i) {
     ScalarBlock& block = grid.blocks[i];
     std::vector<Eigen::Vector3d> starts;
     std::vector<int> offsets;
@@ -115,12 +182,21 @@ ScalarGrid stretch_grid(const TensorField& field, const Geometry& geometry, cons
       offsets.push_back(offset);
     }
     const std::vector<float> values = stretches(field, geometry, bending, settings, starts);
-    for (std::size_t k = 0; k < values.size(); ++k) {
-      if (std::isnan(values[k])) continue;
-      block.active.set(offsets[k]);
-      block.values[offsets[k]] = values[k];
+    for (std::size_t k = 0; k < values.size(); ++k) block.values[offsets[k]] = values[k];
+  };
+  for (ScalarBlock& block : grid.blocks) block.values.fill(std::numeric_limits<float>::quiet_NaN());
+  StretchParts parts{grid.blocks.size(), TensorBlock::voxels,
+                     hash_of_stretch(settings, {static_cast<double>(resolution)}),
+                     [&](std::size_t i) { return grid.blocks[i].values.data(); }, compute};
+  StretchComputer(std::move(parts), settings).run(progress);
+  for (ScalarBlock& block : grid.blocks)
+    for (int offset = 0; offset < TensorBlock::voxels; ++offset) {
+      float& value = block.values[offset];
+      if (std::isnan(value))
+        value = 0;
+      else
+        block.active.set(offset);
     }
-  });
   grid.blocks.erase(std::remove_if(grid.blocks.begin(), grid.blocks.end(),
                                    [](const ScalarBlock& block) { return block.active.none(); }),
                     grid.blocks.end());
@@ -131,14 +207,20 @@ std::vector<float> stretch_picture(const TensorField& field, const Geometry& geo
                                    const StretchSettings& settings, const Plate& pixels, const Progress& progress) {
   const auto width = static_cast<std::size_t>(pixels.resolution.x());
   const auto height = static_cast<std::size_t>(pixels.resolution.y());
-  std::vector<float> picture(width * height);
-  in_parallel(height, progress, [&](std::size_t y) {
+  std::vector<float> picture(width * height, std::numeric_limits<float>::quiet_NaN());
+  const auto compute = [&](std::size_t y) {
     std::vector<Eigen::Vector3d> starts;
     for (std::size_t x = 0; x < width; ++x)
       starts.push_back(pixels.to_world(Eigen::Vector2d(static_cast<double>(x) + 0.5, static_cast<double>(y) + 0.5)));
     const std::vector<float> row = stretches(field, geometry, bending, settings, starts);
     std::copy(row.begin(), row.end(), picture.begin() + static_cast<std::ptrdiff_t>(y * width));
-  });
+  };
+  const Eigen::Vector3d corner = pixels.to_world({0, 0}), opposite = pixels.to_world(pixels.resolution.cast<double>());
+  StretchParts parts{height, width,
+                     hash_of_stretch(settings, {corner.x(), corner.y(), corner.z(), opposite.x(), opposite.y(),
+                                                opposite.z(), static_cast<double>(height)}),
+                     [&](std::size_t y) { return &picture[y * width]; }, compute};
+  StretchComputer(std::move(parts), settings).run(progress);
   return picture;
 }
 

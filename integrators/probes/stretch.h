@@ -16,6 +16,9 @@
 
 namespace tensorray {
 
+class KeptResults;
+class Team;
+
 /// The stretch at P₀ is ln σ / L, in 1/length, where σ is the greatest singular value of ∂P(L)/∂P₀. P(L) is the point
 /// of the ray from P₀ at length L, and P₀ moves across the light. The distance of two rays grows by a factor of at most
 /// exp(L · stretch). The stretch is 0 where light goes straight, and negative where all neighbours come nearer. Behind
@@ -24,6 +27,10 @@ struct StretchSettings {
   Eigen::Vector3d direction = -Eigen::Vector3d::UnitZ();  ///< Direction of the light at its start; unit.
   double flexibility = 0.2;                               ///< s.
   double length = 1;                                      ///< L, world units; > 0.
+
+  Team* team = nullptr;         ///< Processes that compute the same together, for process 0; null: alone.
+  KeptResults* kept = nullptr;  ///< Rows of pictures and blocks of grids that an earlier run or a shard has computed.
+                                ///< Where they are those of a shard, only its own are computed; the others are NaN.
 };
 
 /// The stretch at each start, inside or outside the volume. NaN where the ray does not reach the length (it ends on an
@@ -36,13 +43,13 @@ std::vector<float> stretches(const TensorField& field, const Geometry& geometry,
 /// The stretch at every point of a lattice in the volume, along the axes of the field's voxels. Voxels without a value
 /// are inactive.
 /// @param resolution  Voxels along the longest side of the extent in index space; the spacing is the same on all axes.
-/// The result is the same for any number of threads. @throw std::invalid_argument if a setting is out of range;
-/// Cancelled.
+/// The result is the same for any number of threads and processes. @throw std::invalid_argument if a setting is out of
+/// range; Cancelled; as Team::collect.
 ScalarGrid stretch_grid(const TensorField& field, const Geometry& geometry, const BendingSettings& bending,
                         const StretchSettings& settings, int resolution, const Progress& progress);
 
-/// The stretch at every pixel of a rectangle, row by row. The result is the same for any number of threads. @throw as
-/// stretch_grid.
+/// The stretch at every pixel of a rectangle, row by row. The result is the same for any number of threads and
+/// processes. @throw as stretch_grid.
 std::vector<float> stretch_picture(const TensorField& field, const Geometry& geometry, const BendingSettings& bending,
                                    const StretchSettings& settings, const Plate& pixels, const Progress& progress);
 

@@ -1,6 +1,8 @@
+#include <algorithm>
 #include <cmath>
 #include <cstdint>
 #include <limits>
+#include <map>
 #include <memory>
 #include <stdexcept>
 #include <utility>
@@ -32,6 +34,8 @@ LoadedField Field::loaded(const FieldChoices& choices) const {
 }
 
 namespace {
+
+constexpr int block_floats = 9 * TensorBlock::voxels;
 
 /// A field of an array (nz, ny, nx, 3, 3) of floats or doubles with any strides. The array is not copied: the field
 /// keeps it, and reads it when its bricks are made.
@@ -123,6 +127,47 @@ py::tuple tensors_of(const Field& field) {
   return py::make_tuple(tensors, rows_first(to_world.matrix()), grid.name, grid.metadata);
 }
 
+/// All that a grid holds, for another process: name, transform, metadata; and of its blocks the origins, the active
+/// voxels, and the tensors, as their memory is.
+py::tuple voxels_of(const Field& field) {
+  TensorGrid grid;
+  run([&](const Progress&) { grid = field.grid(); }, py::none(), 0);
+  std::vector<int> origins;
+  std::vector<std::uint8_t> active;
+  std::vector<float> values;
+  for (const TensorBlock& block : grid.blocks) {
+    origins.insert(origins.end(), block.origin.data(), block.origin.data() + 3);
+    for (std::size_t i = 0; i < TensorBlock::voxels; ++i) active.push_back(block.active[i] ? 1 : 0);
+    const float* const first = block.values.front().data();
+    values.insert(values.end(), first, first + block_floats);
+  }
+  const auto count = static_cast<py::ssize_t>(grid.blocks.size());
+  return py::make_tuple(grid.name, rows_first(grid.to_world.matrix()), grid.metadata,
+                        taken(std::move(origins), {count, 3}), taken(std::move(active), {count, TensorBlock::voxels}),
+                        taken(std::move(values), {count, block_floats}));
+}
+
+/// @param voxels  Of `voxels_of`.
+std::shared_ptr<Field> field_of_voxels(const std::string& keys, const py::tuple& voxels) {
+  TensorGrid grid;
+  grid.name = voxels[0].cast<std::string>();
+  grid.to_world.matrix() =
+      Eigen::Map<const Eigen::Matrix<double, 4, 4, Eigen::RowMajor>>(voxels[1].cast<Doubles>().data());
+  grid.metadata = voxels[2].cast<std::map<std::string, std::string>>();
+  const auto origins = voxels[3].cast<py::array_t<int, py::array::c_style>>();
+  const auto active = voxels[4].cast<py::array_t<std::uint8_t, py::array::c_style>>();
+  const auto values = voxels[5].cast<py::array_t<float, py::array::c_style>>();
+  grid.blocks = make_blocks(static_cast<std::size_t>(origins.shape(0)));
+  for (py::ssize_t i = 0; i < origins.shape(0); ++i) {
+    TensorBlock& block = grid.blocks[static_cast<std::size_t>(i)];
+    block.origin = Eigen::Map<const Eigen::Vector3i>(origins.data(i, 0));
+    for (py::ssize_t voxel = 0; voxel < TensorBlock::voxels; ++voxel)
+      block.active[static_cast<std::size_t>(voxel)] = active.at(i, voxel) != 0;
+    std::copy_n(values.data(i, 0), block_floats, block.values.front().data());
+  }
+  return std::make_shared<Field>(parse_value(keys), source_of(std::move(grid)));
+}
+
 py::array invariant_of_field(const Field& field, const std::string& name, const py::object& report) {
   const Invariant which = invariant_of(name);
   ScalarGrid invariant;
@@ -171,6 +216,8 @@ void add_fields(py::module_& module) {
   module.def("make_field", &make_field);
   module.def("write_field", &write_field);
   module.def("tensors_of", &tensors_of);
+  module.def("voxels_of", &voxels_of);
+  module.def("field_of_voxels", &field_of_voxels);
   module.def("invariant", &invariant_of_field);
   module.def("invariant_names", &invariant_names);
 }

@@ -15,6 +15,9 @@
 #include "python/module/arrays.h"
 #include "python/module/scene_request.h"
 #include "python/module/work.h"
+#include "scenes/jobs/origin.h"
+#include "scenes/jobs/read_shards.h"
+#include "scenes/jobs/work_file.h"
 #include "scenes/outputs/picture_outputs.h"
 #include "scenes/outputs/statistics_json.h"
 #include "scenes/outputs/write_outputs.h"
@@ -35,14 +38,41 @@ struct Rendered {
 
 int threads_of(int threads) { return threads > 0 ? threads : static_cast<int>(usable_processors()); }
 
-/// What `tensorray render` does, with the scene of a request.
-std::shared_ptr<Rendered> render_request(const SceneRequest& request, int threads, const Progress& progress) {
-  const RequestedScene requested = read_request(request);
+OutputFiles open_requested(const RequestedScene& requested) {
   OutputDescription written = requested.description.output;
   written.files = requested.files;
-  OutputFiles files = open_outputs(written);
+  return open_outputs(written);
+}
+
+/// What the scene's shards belong to. A field that Python has is no file, whatever its keys say.
+Json origin_of_request(const SceneRequest& request, Scene& scene) {
+  if (!request.field) return origin_of(scene);
+  std::filesystem::path& file = scene.description.field.file;
+  const std::filesystem::path name = std::exchange(file, {});
+  Json origin = origin_of(scene);
+  file = name;
+  return origin;
+}
+
+/// The picture of a scene whose shards, with this origin, are made.
+Render merge(const Scene& scene, const Json& origin, const std::vector<std::string>& shards, const Progress& progress) {
+  WorkFile work = read_shards(shards);
+  const std::string other = difference(work.origin, origin);
+  if (!other.empty()) throw std::runtime_error(printable("the scene has changed since its shards were made: " + other));
+  RenderJob job{Work({}, std::move(work.units)), {}};
+  Render result = render(scene, progress, &job);
+  if (job.work.stopping) throw Cancelled();
+  return result;
+}
+
+/// What `tensorray render` does, with the scene of a request. @param shards  All of its shards, if there are such.
+std::shared_ptr<Rendered> render_request(const SceneRequest& request, const std::vector<std::string>& shards,
+                                         int threads, const Progress& progress) {
+  const RequestedScene requested = read_request(request);
+  OutputFiles files = open_requested(requested);
   Scene scene = load_request(request, requested, progress);
-  Render result = render(scene, progress);
+  Render result =
+      shards.empty() ? render(scene, progress) : merge(scene, origin_of_request(request, scene), shards, progress);
   const auto start = Clock::now();
   write_outputs(result, scene, files);
   Image display = display_image(scene, result, true);
@@ -53,10 +83,34 @@ std::shared_ptr<Rendered> render_request(const SceneRequest& request, int thread
   return rendered;
 }
 
-std::shared_ptr<Rendered> render_for_python(const SceneRequest& request, int threads, const py::object& report) {
+std::shared_ptr<Rendered> render_for_python(const SceneRequest& request, const std::vector<std::string>& shards,
+                                            int threads, const py::object& report) {
   std::shared_ptr<Rendered> rendered;
-  run([&](const Progress& progress) { rendered = render_request(request, threads, progress); }, report, threads);
+  run([&](const Progress& progress) { rendered = render_request(request, shards, threads, progress); }, report,
+      threads);
   return rendered;
+}
+
+/// Finds what would be an error of each shard, or after all of them, before the first one begins.
+void check_shards(const SceneRequest& request) {
+  const RequestedScene requested = read_request(request);
+  const Method& method = requested.description.integrator.method();
+  if (!method.has_shards())
+    throw SceneError(std::string("shards: the work of ") + method.name() + " is one piece; render it without them");
+  open_requested(requested);
+}
+
+/// What `tensorray render --shard` does.
+void render_shard(const SceneRequest& request, const WorkPart& part, const std::filesystem::path& file,
+                  const Progress& progress) {
+  const RequestedScene requested = read_request(request);
+  Scene scene = load_request(request, requested, progress);
+  const Json origin = origin_of_request(request, scene);  // Now, while files are those that were loaded.
+  RenderJob job{Work(part), {}};
+  job.work.is_shard = true;
+  render(scene, progress, &job);
+  if (job.work.stopping) throw Cancelled();
+  write_work(file, {origin, std::filesystem::absolute(scene.description.path), part, job.work.units()});
 }
 
 /// Writes further files of a render: of kinds that it has made.
@@ -137,6 +191,11 @@ void add_renders(py::module_& module) {
       .def("warnings", [](const Rendered& self) { return self.render.warnings; })
       .def("write", &write_more);
   module.def("render", &render_for_python);
+  module.def("check_shards", &check_shards);
+  module.def("render_shard", [](const SceneRequest& request, std::size_t index, std::size_t count,
+                                const std::filesystem::path& file, int threads, const py::object& report) {
+    run([&](const Progress& progress) { render_shard(request, {index, count}, file, progress); }, report, threads);
+  });
   module.def("schema", [] { return scene_schema(); });
 }
 

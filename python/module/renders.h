@@ -1,12 +1,12 @@
 #pragma once
 /// @file python/module/renders.h
-/// Renders of scenes.
+/// Renders of scenes, as a whole and in shards.
 
 #include <pybind11/pybind11.h>
 
 namespace tensorray {
 
-/// Adds `render` and its result to the module.
+/// Adds `render` with its result, and the functions for shards, to the module.
 void add_renders(pybind11::module_& module);
 
 }  // namespace tensorray

@@ -1,5 +1,5 @@
 from os import PathLike
-from typing import Any, Callable, Dict, List, Literal, Mapping, Optional, Sequence, Tuple, Union
+from typing import Any, Callable, Dict, List, Literal, Mapping, Optional, Protocol, Sequence, Tuple, Union
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -15,6 +15,9 @@ _Border = Literal["fade", "extend"]
 __version__: str
 RAY_ENDS: Tuple[str, ...]
 INVARIANTS: Tuple[str, ...]
+
+class _Executor(Protocol):
+    def submit(self, function: Callable[..., Any], /, *arguments: Any) -> Any: ...
 
 class SceneError(ValueError): ...
 
@@ -83,7 +86,9 @@ class Render:
 def render(scene: Union[_Scene, Field] = ..., field: Optional[Field] = ..., *,
            outputs: Union[_Path, Sequence[_Path]] = ..., keep: Union[str, Sequence[str]] = ...,
            changes: Optional[Mapping[str, Any]] = ..., frame: Optional[int] = ..., seed: Optional[int] = ...,
-           threads: int = ..., folder: Optional[_Path] = ..., progress: _Progress = ...) -> Render: ...
+           threads: int = ..., folder: Optional[_Path] = ..., shards: Optional[int] = ...,
+           executor: Optional[_Executor] = ..., shard_folder: Optional[_Path] = ...,
+           progress: _Progress = ...) -> Render: ...
 
 class Plate:
     center: ArrayLike

@@ -39,7 +39,7 @@ def module_field(function, field):
     return field._field
 
 
-def request_of(function, scene, field, *, changes, frame, folder, seed=None):
+def request_of(function, scene, field, *, changes, frame, folder, seed=None, outputs=(), keep=()):
     """A scene, as a dictionary or a file, or the scene of a field alone, as the module takes it."""
     if scene is None:
         if field is None:
@@ -53,5 +53,6 @@ def request_of(function, scene, field, *, changes, frame, folder, seed=None):
     else:
         request.file = os.fspath(scene)
     request.changes, request.frame = changes_of(changes, seed), frame
+    request.outputs, request.keep = outputs, keep
     request.field = None if field is None else module_field(function, field)
     return request

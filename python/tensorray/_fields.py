@@ -1,5 +1,6 @@
 """Tensor fields."""
 
+import functools
 import os
 import subprocess
 import tempfile
@@ -38,13 +39,14 @@ class Field:
         if to_world.shape != (4, 4):
             raise ValueError("to_world must be an array of shape (4, 4)")
         make_field = _tensorray.field_of_floats if tensors.dtype == np.float32 else _tensorray.field_of_doubles
-        self._field = make_field(tensors, to_world, json_of({"file": "array", "name": name}))
+        self._field, self._keys = make_field(tensors, to_world, json_of({"file": "array", "name": name})), None
         self._set(tensors, to_world, name, {})
 
     @classmethod
-    def _of(cls, field):
+    def _of(cls, field, keys):
+        """A field that is no array. `keys`: `field` of a scene that has it, as JSON."""
         self = cls.__new__(cls)
-        self._field = field
+        self._field, self._keys = field, keys
         self._set(*_tensorray.tensors_of(field))
         return self
 
@@ -89,9 +91,19 @@ class Field:
         with shown(progress) as report:
             _tensorray.write_field(self._field, os.fspath(file), half, report)
 
+    def __reduce__(self):
+        """For pickle: other processes get the same bits."""
+        if self._keys is None:
+            return functools.partial(Field, to_world=self._to_world, name=self._name), (self._tensors,)
+        return _of_voxels, (self._keys, _tensorray.voxels_of(self._field))
+
     def __repr__(self):
         nz, ny, nx = self._tensors.shape[:3]
         return f"<tensorray.Field {self._name!r}: {nx} x {ny} x {nz} voxels>"
+
+
+def _of_voxels(keys, voxels):
+    return Field._of(_tensorray.field_of_voxels(keys, voxels), keys)
 
 
 def read_vdb(file, name="", *, derive="none", progress=None):
@@ -106,7 +118,7 @@ def read_vdb(file, name="", *, derive="none", progress=None):
     if derive != "none":
         keys["derive"] = derive
     with shown(progress) as report:
-        return Field._of(_tensorray.read_field(os.fspath(file), json_of(keys), name, derive, report))
+        return Field._of(_tensorray.read_field(os.fspath(file), json_of(keys), name, derive, report), json_of(keys))
 
 
 def make(kind, resolution=None, *, min=None, max=None, progress=None, **parameters):
@@ -119,7 +131,7 @@ def make(kind, resolution=None, *, min=None, max=None, progress=None, **paramete
     keys = {"kind": kind, "resolution": resolution, "min": min, "max": max, **parameters}
     keys = {key: value for key, value in keys.items() if value is not None}
     with shown(progress) as report:
-        return Field._of(_tensorray.make_field(json_of(keys), report))
+        return Field._of(_tensorray.make_field(json_of(keys), report), json_of({"generate": keys}))
 
 
 def import_file(*files, array=None, gradient_of=None, strain_of=None, cells=None, order=None, frame=None,
@@ -171,8 +183,8 @@ def import_file(*files, array=None, gradient_of=None, strain_of=None, cells=None
             raise (ValueError if status == 2 else RuntimeError)(error)
         for message in messages:
             warnings.warn(message.removeprefix("warning: "), stacklevel=2)
-        keys = {"file": os.fspath(files[0])}
-        return Field._of(_tensorray.read_field(vdb, json_of(keys), "", "none", None))
+        keys = json_of({"file": os.fspath(files[0])})
+        return Field._of(_tensorray.read_field(vdb, keys, "", "none", None), keys)
 
 
 def _run(command, report):

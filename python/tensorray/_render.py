@@ -1,12 +1,13 @@
 """Renders of scenes."""
 
+import contextlib
 import functools
 import json
 import os
 
 import numpy as np
 
-from . import _png, _tensorray
+from . import _png, _shards, _tensorray
 from ._arguments import request_of
 from ._fields import Field
 from ._progress import shown
@@ -16,7 +17,7 @@ _PHOTON = np.dtype([("position", "f4", 3), ("direction", "f4", 3), ("origin", "f
 
 
 def render(scene=None, field=None, *, outputs=(), keep=(), changes=None, frame=None, seed=None, threads=0, folder=None,
-           progress=None):
+           shards=None, executor=None, shard_folder=None, progress=None):
     """Renders a scene, as `tensorray render` does.
 
     scene     A dictionary with the keys of a scene file (docs/scenes.md, tr.schema()), or the name of a scene file or
@@ -29,21 +30,33 @@ def render(scene=None, field=None, *, outputs=(), keep=(), changes=None, frame=N
     changes   Changes of the scene, as {"light.photons": 1e5, "integrator.type": "lens"}.
     frame     Number of the frame, if the scene has keyframes; # in names of files is this number ("flow.####.vdb").
     seed      Seed of all random numbers; None: the scene's.
-    threads   Greatest number of threads; 0: all. The result does not depend on it.
+    threads   Greatest number of threads, of each shard if there are such; 0: all. The result does not depend on it.
     folder    Relative paths in a dictionary are relative to this folder; None: the working folder.
+    shards    Number of parts that the work is divided into, as by --shard of the command line; None: it is not divided.
+              The result has the same bits.
+    executor  What makes the shards: an object whose `submit` returns futures, as a ProcessPoolExecutor or Dask's
+              Client. None: they are made here, one after the other. The first error, or Ctrl-C, ends all shards.
+    shard_folder  A folder that all processes of the executor share: shards are files in it until the call ends. None:
+              the folder for temporary files, which all processes of one machine share.
     progress  True or False: whether to show a bar; or a function of (phase, done, total); None: show a bar if standard
               error is a terminal, or in a notebook.
 
     Returns a Render. Several threads may render at once, also with one field.
     """
+    if shards is None and not (executor is None and shard_folder is None):
+        raise ValueError("executor, shard_folder: give the number of shards, too, as shards=4")
     if isinstance(scene, Field) and field is None:
         scene, field = None, scene
-    request = request_of("render", scene, field, changes=changes, frame=frame, folder=folder, seed=seed)
     files = [outputs] if isinstance(outputs, (str, os.PathLike)) else outputs
-    request.outputs = [os.fspath(name) for name in files]
-    request.keep = list(dict.fromkeys(["image", "exr", *([keep] if isinstance(keep, str) else keep)]))
-    with shown(progress) as report:
-        return Render(_tensorray.render(request, threads, report))
+    arguments = {"function": "render", "scene": scene, "field": field, "changes": changes, "frame": frame,
+                 "folder": folder, "seed": seed, "outputs": [os.fspath(name) for name in files],
+                 "keep": list(dict.fromkeys(["image", "exr", *([keep] if isinstance(keep, str) else keep)]))}
+    with shown(progress) as report, contextlib.ExitStack() as stack:
+        made = []
+        if shards is not None:
+            made = stack.enter_context(_shards.made(arguments, threads, shards=shards, executor=executor,
+                                                    shard_folder=shard_folder, report=report))
+        return Render(_tensorray.render(request_of(**arguments), made, threads, report))
 
 
 class Render:

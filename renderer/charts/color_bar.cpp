@@ -76,39 +76,14 @@ std::vector<Tick> logarithmic_ticks(const ValueRange& range, int most) {
 
 // --- Drawing
 
-/// Length of the part of [low, high] that lies in the pixel [at, at + 1].
-double overlap(double low, double high, int at) {
-  return std::max(0.0, std::min(high, at + 1.0) - std::max(low, static_cast<double>(at)));
-}
-
-Eigen::AlignedBox2i pixels_of(const Image& image, const Box& box) {
-  const Eigen::Vector2d size(image.width, image.height);
-  const auto within = [&](const Eigen::Vector2d& p) { return p.cwiseMax(0).cwiseMin(size).eval(); };
-  return {within(box.min()).array().floor().cast<int>().matrix(),
-          (within(box.max()).array().ceil() - 1).cast<int>().matrix()};
-}
-
-/// Calls `visit(x, y, coverage)` for each pixel that the box covers, also partly.
-template <class Visit>
-void for_each_pixel(const Image& image, const Box& box, const Visit& visit) {
-  const Eigen::AlignedBox2i pixels = pixels_of(image, box);
-  for (int y = pixels.min().y(); y <= pixels.max().y(); ++y)
-    for (int x = pixels.min().x(); x <= pixels.max().x(); ++x)
-      visit(x, y, overlap(box.min().x(), box.max().x(), x) * overlap(box.min().y(), box.max().y(), y));
-}
-
-void fill(Image& image, const Box& box, const Eigen::Vector3d& color, double opacity = 1) {
-  for_each_pixel(image, box, [&](int x, int y, double coverage) { lay_over(image, x, y, color, opacity * coverage); });
-}
-
 /// Draws a frame around a box.
 void frame(Image& image, const Box& box, double width, const Eigen::Vector3d& color) {
   const Eigen::Vector2d a = box.min(), b = box.max();
   const Eigen::Vector2d w(width, width);
-  fill(image, {a - w, Eigen::Vector2d(b.x() + width, a.y())}, color);
-  fill(image, {Eigen::Vector2d(a.x() - width, b.y()), b + w}, color);
-  fill(image, {Eigen::Vector2d(a.x() - width, a.y()), Eigen::Vector2d(a.x(), b.y())}, color);
-  fill(image, {Eigen::Vector2d(b.x(), a.y()), Eigen::Vector2d(b.x() + width, b.y())}, color);
+  fill_box(image, {a - w, Eigen::Vector2d(b.x() + width, a.y())}, color);
+  fill_box(image, {Eigen::Vector2d(a.x() - width, b.y()), b + w}, color);
+  fill_box(image, {Eigen::Vector2d(a.x() - width, a.y()), Eigen::Vector2d(a.x(), b.y())}, color);
+  fill_box(image, {Eigen::Vector2d(b.x(), a.y()), Eigen::Vector2d(b.x() + width, b.y())}, color);
 }
 
 /// Sizes in pixels. All are proportional to the height of a capital letter.
@@ -132,29 +107,16 @@ struct Panel {
   Eigen::Vector3d ink;
 };
 
-double mean_brightness(const Image& image, const Box& box) {
-  double sum = 0, weight = 0;
-  for_each_pixel(image, box, [&](int x, int y, double coverage) {
-    const float* const p = image.pixel(x, y);
-    const double brightness = 0.2126 * p[0] + 0.7152 * p[1] + 0.0722 * p[2];
-    if (!std::isfinite(brightness)) return;
-    sum += coverage * std::clamp(brightness, 0.0, 1.0);
-    weight += coverage;
-  });
-  return weight > 0 ? sum / weight : 0;
-}
-
 /// Draws a panel at the right edge of the picture, with room for contents of the given size, and writes the title.
 Panel lay_panel(Image& image, const Layout& layout, const Eigen::Vector2d& size, const std::string& title) {
   const double padding = std::round(layout.padding());
   const Eigen::Vector2d full = (size + Eigen::Vector2d::Constant(2 * padding)).array().ceil();
   const Eigen::Vector2d corner(image.width - full.x() - padding, std::floor((image.height - full.y()) / 2));
   const Box outside(corner, Eigen::Vector2d(corner + full));
-  // Middle grey is 0.5 in display-referred and about 0.2 in scene-linear pictures; the threshold suits both.
-  const bool is_light = mean_brightness(image, outside) > 0.35;
-  fill(image, outside, Eigen::Vector3d::Constant(is_light), is_light ? 0.75 : 0.6);
+  const bool on_light = is_light(image, outside);
+  fill_box(image, outside, Eigen::Vector3d::Constant(on_light), on_light ? 0.75 : 0.6);
   const Eigen::Vector2d inset = Eigen::Vector2d::Constant(padding);
-  const Panel panel{Box(outside.min() + inset, outside.max() - inset), Eigen::Vector3d::Constant(!is_light)};
+  const Panel panel{Box(outside.min() + inset, outside.max() - inset), Eigen::Vector3d::Constant(!on_light)};
   draw_text(image, panel.inside.min() + Eigen::Vector2d(0, layout.letter), layout.letter, title, panel.ink);
   return panel;
 }
@@ -216,7 +178,7 @@ void draw_color_bar(Image& image, const ColorBar& bar) {
   for (const Tick& tick : ticks) {
     const double y = box.max().y() - bar.range.position(tick.value) * height;
     const double line = std::round(y - layout.line / 2), right = box.max().x() + layout.line;
-    fill(image, {Eigen::Vector2d(right, line), Eigen::Vector2d(right + mark, line + layout.line)}, panel.ink);
+    fill_box(image, {Eigen::Vector2d(right, line), Eigen::Vector2d(right + mark, line + layout.line)}, panel.ink);
     write_label(image, layout, right + mark + layout.gap(), line + layout.line / 2, tick.label, panel.ink);
   }
 }
@@ -234,7 +196,7 @@ void draw_color_key(Image& image, const ColorKey& key) {
   Eigen::Vector2d corner = panel.inside.min() + Eigen::Vector2d(layout.line, std::round(top) + layout.line);
   for (const ColorKeyEntry& entry : key.entries) {
     const Box square(corner, Eigen::Vector2d(corner + Eigen::Vector2d::Constant(layout.swatch())));
-    fill(image, square, entry.color);
+    fill_box(image, square, entry.color);
     frame(image, square, layout.line, panel.ink);
     write_label(image, layout, panel.inside.min().x() + label, square.center().y(), entry.label, panel.ink);
     corner.y() += row;

@@ -233,30 +233,31 @@ Eigen::Vector2i pixel_range(double low, double high, int size) {
 }
 
 /// @param origin  Position of (0, 0) of the grid. @param unit  Size of a grid unit, in pixels.
-void draw_glyph(Image& image, const Glyph& glyph, const Eigen::Vector2d& origin, double unit,
+/// @param width   Of strokes, in pixels.
+void draw_glyph(Image& image, const Glyph& glyph, const Eigen::Vector2d& origin, double unit, double width,
                 const Eigen::Vector3d& color) {
-  const double margin = stroke / 2 * unit + 1;
+  const double margin = width / 2 + 1;
   const Eigen::Vector2i xs = pixel_range(origin.x() - margin, origin.x() + glyph.width * unit + margin, image.width);
   const Eigen::Vector2i ys =
       pixel_range(origin.y() - highest * unit - margin, origin.y() - lowest * unit + margin, image.height);
   for (int y = ys[0]; y < ys[1]; ++y)
     for (int x = xs[0]; x < xs[1]; ++x) {
       const Eigen::Vector2d point((x + 0.5 - origin.x()) / unit, (origin.y() - y - 0.5) / unit);
-      lay_over(image, x, y, color, line_coverage(distance(glyph, point) * unit, stroke * unit));
+      lay_over(image, x, y, color, line_coverage(distance(glyph, point) * unit, width));
     }
 }
 
 }  // namespace
 
 void draw_text(Image& image, const Eigen::Vector2d& position, double height, const std::string& text,
-               const Eigen::Vector3d& color) {
+               const Eigen::Vector3d& color, double outline) {
   if (!(height > 0) || !std::isfinite(height) || !position.allFinite())
     throw std::invalid_argument("the position and height of lettering must be finite, and the height above 0");
   const double unit = height / (highest + stroke);
   Eigen::Vector2d origin = position + Eigen::Vector2d(stroke / 2, -stroke / 2) * unit;
   for (const char character : drawable(text)) {
     const Glyph& glyph = glyph_of(character);
-    draw_glyph(image, glyph, origin, unit, color);
+    draw_glyph(image, glyph, origin, unit, stroke * unit + 2 * outline, color);
     origin.x() += (glyph.width + stroke + gap) * unit;
   }
 }

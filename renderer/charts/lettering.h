@@ -18,9 +18,11 @@ namespace tensorray {
 ///                  picture. It is continuous: pixel (x, y) covers [x, x+1) × [y, y+1).
 /// @param height    Height of a capital letter, in pixels. Parts outside the picture are cut off.
 /// @param color     One value for each of the first three channels. A channel "A" becomes opaque under the text.
+/// @param outline   Strokes are wider by this on both sides, in pixels: text in another colour under the text itself
+///                  makes it legible on any ground.
 /// @throw std::invalid_argument unless position and height are finite and the height is above 0.
 void draw_text(Image& image, const Eigen::Vector2d& position, double height, const std::string& text,
-               const Eigen::Vector3d& color);
+               const Eigen::Vector3d& color, double outline = 0);
 
 /// The width of the line that `draw_text` draws, in pixels, from the left edge of the first character to the right edge
 /// of the last one. A line that starts at x = centre - width / 2 is centred.

@@ -19,6 +19,7 @@ constexpr double smallest_spline_tau = 2;  // For less the spline interpolant of
 constexpr double cut_off = 4.5;            // In units of tau; the Gaussian is 4e-5 of its peak there.
 constexpr std::size_t most_buckets = 1u << 14;  // Largest number of buckets to sort points into.
 constexpr int largest_size = 65000;             // Largest width and height: columns and rows of points are 16 bits.
+constexpr int fraction_bits = 26;               // Of what a point adds to a pixel, as a part of the brightest colour.
 
 bool uses_splines(const DensitySettings& settings) {
   return settings.kind == DensityKind::gaussian && settings.tau >= smallest_spline_tau;
@@ -103,6 +104,22 @@ PointBucketing make_bucketing(int width, int height, int planes, int least_tile_
   }
 }
 
+/// 2^-26, or 2^-26 of the power of two above the largest component of a colour.
+double quantum_of(const std::vector<Eigen::Vector3d>& colors) {
+  double largest = 0;
+  for (const Eigen::Vector3d& color : colors) largest = std::max(largest, color.cwiseAbs().maxCoeff());
+  int exponent = 0;
+  std::frexp(largest, &exponent);
+  return std::ldexp(1.0, exponent - fraction_bits);
+}
+
+/// For each row of a plate, the rows of the plane with margins that fall on it.
+std::vector<std::vector<int>> mirrored_rows(int height, int margin) {
+  std::vector<std::vector<int>> rows(height);
+  for (int y = -margin; y < height + margin; ++y) rows[mirror(y, height)].push_back(y + margin);
+  return rows;
+}
+
 void check(int width, int height, int channels, const DensitySettings& settings,
            const std::vector<Eigen::Vector3d>& colors) {
   if (width < 1 || height < 1 || channels < 1)
@@ -124,6 +141,7 @@ DensityEstimator::DensityEstimator(int width, int height, int channels, const De
     : settings_(settings), width_(width), height_(height), channels_(channels) {
   check(width, height, channels, settings, colors);
   for (const Eigen::Vector3d& color : colors) colors_.push_back({{color.x(), color.y(), color.z(), 0}});
+  quantum_ = quantum_of(colors);
   int taps = 1;
   if (uses_splines(settings)) {
     taps = spline_taps;
@@ -181,6 +199,7 @@ void DensityEstimator::add(const std::vector<DensityPoint>& points) {
 void DensityEstimator::deposit(std::uint32_t bucket) {
   const std::size_t first = buckets_.begin[bucket], last = buckets_.begin[bucket + 1];
   DepositTarget target;
+  target.rounding = 1.5 * (std::uint64_t{1} << 52) * quantum_;
   target.width = width_ + 2 * margin_;
   target.colors = colors_.empty() ? nullptr : colors_.data();
   target.pixels = sums_[0].values + (colors_.empty() ? bucket / bucketing_.tiles() * plane_size() : 0);
@@ -193,32 +212,22 @@ void DensityEstimator::deposit(std::uint32_t bucket) {
   }
 }
 
-/// Adds each row of the margins to the row that it mirrors.
-void DensityEstimator::fold_rows(int plane) {
-  const std::size_t values = (colors_.empty() ? 1 : 4) * static_cast<std::size_t>(width_ + 2 * margin_);
-  double* const sums = sums_[0].values + plane * plane_size();
-  for (int y = -margin_; y < height_ + margin_; ++y) {
-    if (y >= 0 && y < height_) continue;
-    const double* const from = sums + (y + margin_) * values;
-    double* const to = sums + (mirror(y, height_) + margin_) * values;
-    for (std::size_t i = 0; i < values; ++i) to[i] += from[i];
+void DensityEstimator::append_sums(std::string& bytes) const {
+  bytes.append(reinterpret_cast<const char*>(sums_.data()), sums_size());
+}
+
+void DensityEstimator::add_sums(std::string_view bytes) {
+  if (bytes.size() != sums_size())
+    throw std::runtime_error("sums that were kept have another size");
+  for (std::size_t i = 0; i < sums_.size(); ++i) {
+    PixelColor more;
+    std::memcpy(&more, bytes.data() + i * sizeof more, sizeof more);
+    for (int k = 0; k < 4; ++k) sums_[i].values[k] += more.values[k];
   }
 }
 
-std::string DensityEstimator::sums() const {
-  std::string bytes(sums_.size() * sizeof(PixelColor), 0);
-  std::memcpy(bytes.data(), sums_.data(), bytes.size());
-  return bytes;
-}
-
-void DensityEstimator::set_sums(const std::string& bytes) {
-  if (bytes.size() != sums_.size() * sizeof(PixelColor))
-    throw std::runtime_error("sums that were kept have another size");
-  std::memcpy(sums_.data(), bytes.data(), bytes.size());
-}
-
-Film DensityEstimator::finish(double weight) && {
-  tbb::parallel_for(0, static_cast<int>(bucketing_.planes), [&](int plane) { fold_rows(plane); });
+Film DensityEstimator::finish(double weight) const {
+  const std::vector<std::vector<int>> rows = mirrored_rows(height_, margin_);
   const bool is_colored = !colors_.empty();
   const std::vector<double> filter = uses_splines(settings_) ? spline_filter(settings_.tau) : std::vector<double>();
   Film film(width_, height_, is_colored ? 3 : channels_);
@@ -226,9 +235,11 @@ Film DensityEstimator::finish(double weight) && {
   tbb::parallel_for(0, film.channels * height_, [&](int task) {
     const int channel = task / height_, y = task % height_;
     const double* const plane = sums_[0].values + (is_colored ? channel : channel * plane_size());
-    const double* const row = plane + (y + margin_) * row_pixels * step;
     double* const line = film.plane(channel) + static_cast<std::size_t>(y) * width_;
-    for (int x = -margin_; x < width_ + margin_; ++x) line[mirror(x, width_)] += weight * row[(x + margin_) * step];
+    for (const int from : rows[y]) {
+      const double* const row = plane + from * row_pixels * step;
+      for (int x = -margin_; x < width_ + margin_; ++x) line[mirror(x, width_)] += weight * row[(x + margin_) * step];
+    }
     if (!filter.empty()) filter_line(line, width_, filter);
   });
   if (!filter.empty()) filter_columns(film, filter);

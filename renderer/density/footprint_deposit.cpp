@@ -86,22 +86,21 @@ void FootprintDeposit::add(int channel, const Vector2d& at, const Matrix2d& axes
   for (const Tap& tap : taps) add_to_pixel(channel, tap.x, tap.y, tap.weight);
 }
 
-std::string FootprintDeposit::sums() const {
-  std::string bytes;
+void FootprintDeposit::append_sums(std::string& bytes) const {
+  bytes.reserve(bytes.size() + sums_size());
   for (const auto& sum : sums_) {
-    const std::int64_t value = sum;
+    const std::int64_t value = sum.load(std::memory_order_relaxed);
     bytes.append(reinterpret_cast<const char*>(&value), sizeof value);
   }
-  return bytes;
 }
 
-void FootprintDeposit::set_sums(const std::string& bytes) {
-  if (bytes.size() != sums_.size() * sizeof(std::int64_t))
+void FootprintDeposit::add_sums(std::string_view bytes) {
+  if (bytes.size() != sums_size())
     throw std::runtime_error("sums that were kept have another size");
   for (std::size_t i = 0; i < sums_.size(); ++i) {
     std::int64_t value = 0;
     std::memcpy(&value, bytes.data() + i * sizeof value, sizeof value);
-    sums_[i] = value;
+    sums_[i].fetch_add(value, std::memory_order_relaxed);
   }
 }
 

@@ -44,38 +44,43 @@ void set_axis_weights(const double* beyond, std::size_t count, AxisWeights& weig
   }
 }
 
-/// Adds the outer product of `line` and the weights of the rows. These weights are `step` elements apart.
-HWY_INLINE void add_rows(double* pixels, std::size_t width, const double* line, const double* row_weights,
-                         std::size_t step, std::size_t taps) {
-  const hn::CappedTag<double, 4> d;
-  for (std::size_t j = 0; j < taps; ++j, pixels += 4 * width) {
-    const auto weight = hn::Set(d, row_weights[j * step]);
-    for (std::size_t i = 0; i < 4 * taps; i += hn::Lanes(d))
-      hn::Store(hn::MulAdd(weight, hn::Load(d, line + i), hn::Load(d, pixels + i)), d, pixels + i);
-  }
-}
-
 /// The weights of one kernel: its columns and rows, `step` elements apart.
 struct KernelWeights {
   const double *columns, *rows;
-  std::size_t step, taps;
+  std::size_t step, taps;  // The number of taps is even.
 };
 
-/// Adds one kernel in colour. @param line  Work space: four values per column.
-HWY_INLINE void add_colored(double* pixels, std::size_t width, const PixelColor& color, const KernelWeights& weights,
-                            double* line) {
+/// Adds the outer product of `line` and the weights of the rows. @param pixels  Where the kernel begins; it and `line`
+/// have so many `values` for each column.
+template <std::size_t values>
+HWY_INLINE void add_rows(double* pixels, const double* line, const KernelWeights& weights,
+                         const DepositTarget& target) {
+  const hn::CappedTag<double, values == 1 ? 2 : values> d;
+  const auto rounding = hn::Set(d, target.rounding);
+  for (std::size_t j = 0; j < weights.taps; ++j, pixels += values * target.width) {
+    const auto weight = hn::Set(d, weights.rows[j * weights.step]);
+    for (std::size_t i = 0; i < values * weights.taps; i += hn::Lanes(d)) {
+      const auto rounded = hn::Sub(hn::MulAdd(weight, hn::LoadU(d, line + i), rounding), rounding);
+      hn::StoreU(hn::Add(hn::LoadU(d, pixels + i), rounded), d, pixels + i);
+    }
+  }
+}
+
+/// Adds the kernel of one point. @param line  Work space: a value for each column, or four if there are colours.
+HWY_INLINE void add_kernel(const DensityPoint& point, const KernelWeights& weights, const DepositTarget& target,
+                           double* line) {
+  const std::size_t pixel = point.row * target.width + point.column;
+  if (!target.colors) {
+    for (std::size_t i = 0; i < weights.taps; ++i) line[i] = weights.columns[i * weights.step];
+    return add_rows<1>(target.pixels + pixel, line, weights, target);
+  }
+  const PixelColor& color = target.colors[point.channel];
   const hn::CappedTag<double, 4> d;
   for (std::size_t i = 0; i < weights.taps; ++i)
     for (std::size_t c = 0; c < 4; c += hn::Lanes(d))
       hn::Store(hn::Mul(hn::Set(d, weights.columns[i * weights.step]), hn::Load(d, &color.values[c])), d,
                 line + 4 * i + c);
-  add_rows(pixels, width, line, weights.rows, weights.step, weights.taps);
-}
-
-HWY_INLINE void add_plain(double* pixels, std::size_t width, const KernelWeights& weights) {
-  for (std::size_t j = 0; j < weights.taps; ++j, pixels += width)
-    for (std::size_t i = 0; i < weights.taps; ++i)
-      pixels[i] += weights.rows[j * weights.step] * weights.columns[i * weights.step];
+  add_rows<4>(target.pixels + 4 * pixel, line, weights, target);
 }
 
 void deposit_splines(const DensityPoint* points, std::size_t count, const DepositTarget& target) {
@@ -89,15 +94,8 @@ void deposit_splines(const DensityPoint* points, std::size_t count, const Deposi
     }
     set_axis_weights(beyond_x, size, x);
     set_axis_weights(beyond_y, size, y);
-    for (std::size_t i = 0; i < size; ++i) {
-      const DensityPoint& point = points[first + i];
-      const std::size_t pixel = point.row * target.width + point.column;
-      const KernelWeights weights{&x.of[0][i], &y.of[0][i], block, spline_taps};
-      if (target.colors)
-        add_colored(target.pixels + 4 * pixel, target.width, target.colors[point.channel], weights, line);
-      else
-        add_plain(target.pixels + pixel, target.width, weights);
-    }
+    for (std::size_t i = 0; i < size; ++i)
+      add_kernel(points[first + i], {&x.of[0][i], &y.of[0][i], block, spline_taps}, target, line);
   }
 }
 
@@ -106,15 +104,10 @@ void deposit_gaussians(const DensityPoint* points, std::size_t count, const Gaus
                        const DepositTarget& target) {
   const auto taps = static_cast<std::size_t>(kernel.taps());
   double *const line = work, *const x = line + 4 * taps, *const y = x + taps;
-  const KernelWeights weights{x, y, 1, taps};
   for (const DensityPoint* point = points; point != points + count; ++point) {
     kernel.weights(point->x, x);
     kernel.weights(point->y, y);
-    const std::size_t pixel = point->row * target.width + point->column;
-    if (target.colors)
-      add_colored(target.pixels + 4 * pixel, target.width, target.colors[point->channel], weights, line);
-    else
-      add_plain(target.pixels + pixel, target.width, weights);
+    add_kernel(*point, {x, y, 1, taps}, target, line);
   }
 }
 
@@ -144,10 +137,12 @@ void deposit_counts(const std::vector<DensityPoint>& points, std::size_t first, 
                     const DepositTarget& target) {
   for (std::size_t i = first; i < last; ++i) {
     const std::size_t pixel = points[i].row * target.width + points[i].column;
-    if (target.colors)
-      for (int c = 0; c < 3; ++c) target.pixels[4 * pixel + c] += target.colors[points[i].channel].values[c];
-    else
+    if (!target.colors) {
       ++target.pixels[pixel];
+      continue;
+    }
+    for (int c = 0; c < 3; ++c)
+      target.pixels[4 * pixel + c] += target.colors[points[i].channel].values[c] + target.rounding - target.rounding;
   }
 }
 

@@ -25,15 +25,19 @@ struct alignas(32) PixelColor {
 };
 
 /// Pixels that kernels are added to, rows from the top; large enough for the kernels of all points.
+///
+/// Each value can be rounded to a multiple of a quantum, a power of two, before it is added. Sums are then exact, and
+/// do not depend on the order of the points, while they are below 2^53 quanta. Values must be below 2^51 quanta.
 struct DepositTarget {
   double* pixels = nullptr;            ///< One value per pixel, or four if there are colours (aligned as PixelColor).
   std::size_t width = 0;               ///< In pixels.
   const PixelColor* colors = nullptr;  ///< For each channel, the factor of a point's weights; null: no colours.
+  double rounding = 0;                 ///< 1.5 · 2^52 quanta: adding and subtracting it rounds. 0: nothing is rounded.
 };
 
 constexpr int spline_taps = 6;  ///< Number of pixels that a quintic B-spline covers along an axis.
 
-/// Adds quintic B-splines about points, in the order of the points. A spline has 6 × 6 pixels with the sum 1; the point
+/// Adds quintic B-splines about points. A spline has 6 × 6 pixels with the sum 1; the point
 /// lies between the centres of the third and the fourth pixel along each axis.
 void deposit_splines(const std::vector<DensityPoint>& points, std::size_t first, std::size_t last,
                      const DepositTarget& target);
@@ -53,7 +57,7 @@ class GaussianKernel {
   std::vector<double> samples_;  // exp(−i² / 2τ²), i from 1 − taps/2 to taps/2.
 };
 
-/// Adds Gaussians about points, in the order of the points.
+/// Adds Gaussians about points.
 void deposit_gaussians(const std::vector<DensityPoint>& points, std::size_t first, std::size_t last,
                        const GaussianKernel& kernel, const DepositTarget& target);
 

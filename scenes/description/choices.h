@@ -72,6 +72,11 @@ inline auto choices(LightCaustic) {
                     C{"photons", LightCaustic::photons}};
 }
 
+inline auto choices(Annotation) {
+  using C = Choice<Annotation>;
+  return std::array{C{"scale", Annotation::scale}, C{"axes", Annotation::axes}, C{"legend", Annotation::legend}};
+}
+
 inline auto choices(Pattern) {
   return std::array{Choice<Pattern>{"none", Pattern::none}, Choice<Pattern>{"checkerboard", Pattern::checkerboard}};
 }

@@ -3,6 +3,7 @@
 /// A scene file as plain data: the values that the file gives, and defaults for the others. No other file is loaded.
 /// Lengths are in world units (those of the field), wavelengths in nm.
 
+#include <algorithm>
 #include <cstdint>
 #include <filesystem>
 #include <map>
@@ -162,6 +163,9 @@ struct IntegratorDescription {
   }
 };
 
+/// What is drawn over `image`.
+enum class Annotation { scale, axes, legend };
+
 struct OutputDescription {
   std::vector<Output> kinds;                           ///< All kinds of output that any method can write.
   std::map<std::string, std::filesystem::path> files;  ///< Files to write, by Output::key.
@@ -170,8 +174,12 @@ struct OutputDescription {
   bool white_balance = true;  ///< Whether the white of the light is adapted to that of the working space.
   std::string ocio;           ///< OCIO config, as of ColorSettings; empty: $OCIO, or the built-in one.
   std::string display, view;  ///< Empty: the default of the config.
+  std::vector<Annotation> annotations;
 
   bool wants(const std::string& key) const { return files.count(key) > 0; }
+  bool wants(Annotation annotation) const {
+    return std::find(annotations.begin(), annotations.end(), annotation) != annotations.end();
+  }
 };
 
 struct SceneDescription {

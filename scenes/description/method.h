@@ -78,8 +78,12 @@ class Method {
   /// Whether its work has units that can be divided among machines (RenderJob).
   virtual bool is_divided() const { return false; }
 
-  /// Whether several processes can make one picture together, step by step (RenderJob::team).
+  /// Whether several processes can make one picture together, step by step (RenderJob::team), or one by one, with what
+  /// they have computed as a unit each (KeptResults).
   virtual bool is_shared() const { return false; }
+
+  /// Whether shards of its work can be made one by one, and merged.
+  bool has_shards() const { return is_divided() || is_shared(); }
 
   /// Whether the pixels of its pictures are those of the plate.
   virtual bool shows_plate() const { return false; }

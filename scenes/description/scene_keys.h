@@ -218,6 +218,7 @@ void describe(OutputDescription& output, Visitor& visit) {
         "OpenColorIO config: a file, ocio://NAME, or built-in; default: $OCIO, or the built-in one");
   visit("display", output.display, "OpenColorIO display; default: that of the config");
   visit("view", output.view, "OpenColorIO view; default: that of the display");
+  visit("annotations", output.annotations, "what is drawn over `image`: a scale bar, the world's axes, a legend");
 }
 
 /// An item of `obstacles`.

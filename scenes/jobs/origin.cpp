@@ -44,6 +44,7 @@ Json origin_of(const Scene& scene) {
   const SceneDescription& description = scene.description;
   Json json = parse_value(description.text);
   json.erase("output");
+  if (description.output.fluence_bands) json["output"]["fluence_bands"] = true;  // It is no file, but a setting.
   const Eigen::Vector3d direction = *description.light.direction;
   return {{"version", TENSORRAY_VERSION},
           {"method", description.integrator.method().name()},

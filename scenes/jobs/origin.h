@@ -9,7 +9,7 @@
 
 namespace tensorray {
 
-/// The version of the program; the method; the scene with its changes, but without its outputs; the scale and the
+/// The version of the program; the method; the scene with its changes, but without its output files; the scale and the
 /// direction of the light, which a scene may leave open; and the hash of each file that the scene reads.
 /// @throw std::runtime_error naming a file that cannot be read.
 Json origin_of(const Scene& scene);

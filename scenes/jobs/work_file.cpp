@@ -70,7 +70,7 @@ void write_work(const std::filesystem::path& path, const WorkFile& work) {
   std::vector<std::string_view> pieces{{}};
   for (const WorkUnit& unit : work.units) {
     begin += bytes_of(2 * (unit.state ? unit.state->size() : 0) + (unit.done ? 1 : 0));
-    if (unit.state) pieces.push_back(*unit.state);
+    if (unit.state && !unit.state->empty()) pieces.push_back(*unit.state);
   }
   pieces.front() = begin;
   std::uint64_t hash = 0;

@@ -2,6 +2,7 @@
 /// @file scenes/keys/values.h
 /// How values of each type are written in a scene file: one trait for each type.
 
+#include <algorithm>
 #include <cstdint>
 #include <filesystem>
 #include <optional>
@@ -129,6 +130,37 @@ struct Value<Enum, std::enable_if_t<std::is_enum_v<Enum>>> {
   }
 
   static Json json(const Enum& value) { return choice_name(value); }
+};
+
+/// A list of different values of an enumeration, or one of them.
+template <class Enum>
+struct Value<std::vector<Enum>, std::enable_if_t<std::is_enum_v<Enum>>> {
+  static bool read(const Json& json, const Limits& limits, std::vector<Enum>& target) {
+    const Json list = json.is_array() ? json : Json::array({json});
+    target.clear();
+    for (const Json& item : list) {
+      Enum value{};
+      if (!Value<Enum>::read(item, limits, value)) return false;
+      if (std::find(target.begin(), target.end(), value) != target.end()) return false;
+      target.push_back(value);
+    }
+    return true;
+  }
+
+  static std::string expectation(const std::vector<Enum>&, const Limits&) {
+    return fmt::format("a list of {}, each at most once", quoted_choices<Enum>());
+  }
+
+  static Json schema(const std::vector<Enum>&, const Limits& limits) {
+    const Json item = Value<Enum>::schema(Enum{}, limits);
+    return {{"anyOf", {{{"type", "array"}, {"items", item}, {"uniqueItems", true}}, item}}};
+  }
+
+  static Json json(const std::vector<Enum>& value) {
+    Json names = Json::array();
+    for (const Enum each : value) names.push_back(choice_name(each));
+    return names;
+  }
 };
 
 /// Whether a text names a file and not a word: it has an ending or a folder.

@@ -7,11 +7,13 @@
 #include <fmt/format.h>
 
 #include "base/constants.h"
+#include "base/process/kept_results.h"
 #include "integrators/lens/lens.h"
 #include "renderer/charts/grid_lines.h"
 #include "renderer/spectra/reflectance.h"
 #include "scenes/description/check_scene.h"
 #include "scenes/lens/load_lens.h"
+#include "scenes/outputs/annotations.h"
 #include "scenes/outputs/channel_table.h"
 #include "scenes/outputs/picture_outputs.h"
 #include "scenes/scene/fine_bands.h"
@@ -183,6 +185,8 @@ SpectralImage spectra_side_by_side(std::vector<SpectralImage> spectra) {
 Render LoadedLens::render(const Scene& scene, const Progress& progress, RenderJob* job) const {
   LensSettings settings;
   settings.team = job ? job->team : nullptr;
+  KeptResults kept(job ? &job->work : nullptr, settings.team);
+  settings.kept = &kept;
   settings.mode = settings_.mode;
   settings.samples = settings_.samples;
   settings.reference = reference_place(scene);
@@ -203,6 +207,7 @@ Render LoadedLens::render(const Scene& scene, const Progress& progress, RenderJo
     image.plane = plane;
     const LensLight light = trace_lens(scene.field, scene.geometry.surfaces(), scene.bending,
                                        {lens_.receiver, image, scene.beam.direction}, settings, progress);
+    if (kept.is_shard()) continue;
     const std::vector<FineBand> fine = fine_bands(scene, band_count(light.map, channels, band_step));
     const LensPicture picture =
         draw_lens(light, lens_bands(fine, scene), radiance_in(fine, scene), scene.bands.size(), by_channel, progress);
@@ -215,6 +220,10 @@ Render LoadedLens::render(const Scene& scene, const Progress& progress, RenderJo
       spectra.push_back(spectral_image(picture.radiance, scene.bands, SpectralQuantity::radiance,
                                        scene.description.light.irradiance / pi, matrix));
   }
+  if (kept.is_shard()) {
+    kept.keep(true);
+    return {};
+  }
   if (settings.team) collect_counts(*settings.team, result.statistics);
   if (!has_all(settings.team)) return {};
   result.linear = side_by_side(pictures);
@@ -222,6 +231,7 @@ Render LoadedLens::render(const Scene& scene, const Progress& progress, RenderJo
   for (const std::uint64_t count : result.statistics.ends[reference_channel(scene)])
     result.statistics.positions += count;
   result.metadata["tensorray:end"] = end_codes();
+  result.view = view_of(lens_.receiver);
   result.exposure = 0;  // Shows the colours of the image unchanged.
   if (nothing_arrived(result.statistics))
     result.warnings.push_back("no ray met the image; check `receiver` and `integrator.image_plane`");

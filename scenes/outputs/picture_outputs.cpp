@@ -7,6 +7,7 @@
 #include <fmt/ranges.h>
 
 #include "base/text/path_text.h"
+#include "scenes/outputs/annotations.h"
 #include "volumes/files/scalar_files.h"
 
 namespace tensorray {
@@ -68,9 +69,14 @@ double display_exposure(const Scene& scene, const Render& render) {
 }
 
 Image display_image(const Scene& scene, const Render& render, bool holds_alpha) {
-  if (render.display) return *render.display;
+  if (render.display) {
+    Image image = *render.display;
+    draw_annotations(scene.description.output, render, image);
+    return image;
+  }
   const Image& linear = render.linear;
-  const auto gain = static_cast<float>(std::exp2(display_exposure(scene, render)));
+  const double exposure = display_exposure(scene, render);
+  const auto gain = static_cast<float>(std::exp2(exposure));
   const bool has_alpha = linear.channels.size() > 3 && linear.channels[3] == "A";
   const bool divides = has_alpha && holds_alpha;
   const std::size_t from = linear.channels.size(), to = has_alpha ? 4 : 3;
@@ -83,7 +89,8 @@ Image display_image(const Scene& scene, const Render& render, bool holds_alpha) 
     for (int c = 0; c < 3; ++c) out[c] = gain * in[c] / alpha;
     if (has_alpha) out[3] = in[3];
   }
-  if (render.annotate) render.annotate(image);
+  if (render.draw_legend) render.draw_legend(image, exposure);
+  draw_annotations(scene.description.output, render, image);
   scene.color.to_display(image);
   return image;
 }

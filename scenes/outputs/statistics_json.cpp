@@ -21,7 +21,10 @@ Json balance(const std::array<Number, ray_end_count>& ends) {
   const auto of = [&](RayEnd end) { return ends[static_cast<int>(end)]; };
   Json stopped;
   for (const RayEnd end : {RayEnd::obstacle, RayEnd::step_limit, RayEnd::degenerate}) stopped[to_string(end)] = of(end);
-  return {{"emitted", emitted}, {"deposited", of(RayEnd::plate)}, {"missed", of(RayEnd::missed)}, {"stopped", stopped}};
+  Json json{{"emitted", emitted}, {"deposited", of(RayEnd::plate)}, {"missed", of(RayEnd::missed)}};
+  if (of(RayEnd::side) != 0) json["side"] = of(RayEnd::side);
+  json["stopped"] = stopped;
+  return json;
 }
 
 /// Photons of the method "scene".

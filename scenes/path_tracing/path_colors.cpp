@@ -3,19 +3,14 @@
 #include <algorithm>
 #include <cmath>
 
-#include <Eigen/LU>
-
 #include "renderer/charts/color_bar.h"
-#include "renderer/color/color.h"
-#include "renderer/spectra/spectrum.h"
+#include "scenes/outputs/wavelength_color.h"
 #include "scenes/path_tracing/path_tracing_keys.h"
 #include "volumes/tensors/invariants.h"
 
 namespace tensorray {
 namespace {
 
-constexpr double unseen = 0.5;          // Grey of wavelengths that the eye does not see.
-constexpr double pale = 0.03;           // Part of white in the colour of a wavelength, which makes it reproducible.
 constexpr std::size_t judged = 200000;  // Number of points that is enough to choose a range.
 
 double transverse_force(const PathPoint& point) {
@@ -70,15 +65,6 @@ ValueRange range_of(const PathColorDescription& description, const std::vector<P
   choice.logarithmic = description.logarithmic;
   choice.symmetric = description.map == Colormap::cool_warm && !description.logarithmic;
   return choose_range(std::move(values), choice);
-}
-
-/// The colour of light of one wavelength for the eye, linear Rec. 709, as saturated as a display can show it.
-Eigen::Vector3d wavelength_color(double wavelength) {
-  Eigen::Vector3d rgb = rec709_to_xyz().inverse() * observer(wavelength);
-  rgb.array() -= std::min(0.0, rgb.minCoeff());
-  const double greatest = rgb.maxCoeff();
-  if (!(greatest > 0)) return Eigen::Vector3d::Constant(unseen);
-  return rgb / greatest * (1 - pale) + Eigen::Vector3d::Constant(pale);
 }
 
 PathColors wavelength_colors(const std::vector<Path>& paths) {

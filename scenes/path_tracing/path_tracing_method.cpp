@@ -10,6 +10,7 @@
 #include "integrators/paths/paths.h"
 #include "renderer/camera/path_tracer.h"
 #include "scenes/description/check_scene.h"
+#include "scenes/outputs/annotations.h"
 #include "scenes/outputs/picture_outputs.h"
 #include "scenes/path_tracing/context_surfaces.h"
 #include "scenes/path_tracing/path_colors.h"
@@ -152,12 +153,14 @@ Render LoadedPaths::render(const Scene& scene, const Progress& progress, RenderJ
 
   const auto drawing = Clock::now();
   const PathColors colors = path_colors(description.color, result.paths);
-  const bool has_legend = description.color.legend && colors.legend;
-  const Camera camera = scene_camera(scene, description.context, result.paths, has_legend ? legend_width : 0);
+  // As an annotation, the legend covers a part of the picture: it has no effect on other files.
+  const bool has_room = description.color.legend && colors.legend;
+  const Camera camera = scene_camera(scene, description.context, result.paths, has_room ? legend_width : 0);
   PathShapes shapes = make_shapes(scene, paths_, result.paths, colors, camera);
   result.exposure = 0;
-  if (has_legend)
-    result.annotate = [legend = colors.legend, matrix = light.rec709_to_working](Image& image) {
+  if (has_picture) result.view = view_of(camera);
+  if (colors.legend && (description.color.legend || output.wants(Annotation::legend)))
+    result.draw_legend = [legend = colors.legend, matrix = light.rec709_to_working](Image& image, double) {
       legend(image, matrix);
     };
   if (output.wants("tubes"))

@@ -8,6 +8,7 @@
 #include "base/process/progress.h"
 #include "base/process/seconds.h"
 #include "scenes/description/check_scene.h"
+#include "scenes/outputs/annotations.h"
 #include "scenes/outputs/picture_outputs.h"
 #include "scenes/photons/plate_light.h"
 #include "scenes/photons/plate_map.h"
@@ -59,24 +60,33 @@ Image with_channels(const Image& first, const Image& second) {
   return both;
 }
 
-class LoadedPhotons : public LoadedMethod {
- public:
-  Render render(const Scene& scene, const Progress& progress, RenderJob* job) const override;
-};
+/// The part of the power that `integrator.side_light` leaves out.
+double side_share(const Statistics& statistics) {
+  double side = 0, all = 0;
+  for (std::size_t channel = 0; channel < statistics.ends.size(); ++channel)
+    for (int end = 0; end < ray_end_count; ++end) {
+      const double power = statistics.power.empty()
+                               ? static_cast<double>(statistics.ends[channel][end]) * statistics.channel_power[channel]
+                               : statistics.power[channel][end];
+      all += power;
+      if (end == static_cast<int>(RayEnd::side)) side += power;
+    }
+  return all > 0 ? side / all : 0;
+}
 
-Render LoadedPhotons::render(const Scene& scene, const Progress& progress, RenderJob* job) const {
+/// @param team  Processes that have the same map; only process 0 has the result.
+Render render_of(const Scene& scene, PlateLight light, Team* team) {
   const SceneDescription& description = scene.description;
-  PlateLight light = light_on_plate(scene, progress, job);
-
   const auto start = Clock::now();
   Render result;
   const bool has_map = !light.map.triangles.empty() && description.output.wants("exr");
-  Team* const team = job ? job->team : nullptr;
   result.linear = has_map ? with_channels(light.linear, plate_map(light.map, scene, team)) : std::move(light.linear);
   if (!has_all(team)) return {};
   if (description.output.wants("spectral"))
     result.spectral = spectral_image(light.irradiance, scene.bands, SpectralQuantity::irradiance,
                                      description.light.irradiance, to_working(scene));
+  result.view = view_of(*scene.geometry.surfaces().plate);
+  if (description.output.wants(Annotation::legend)) result.draw_legend = light_legend(scene);
   result.photons = std::move(light.photons);
   result.grids = std::move(light.fluence);
   name_fluence(scene, result.grids);
@@ -85,10 +95,27 @@ Render LoadedPhotons::render(const Scene& scene, const Progress& progress, Rende
   if (result.statistics.error) result.metadata["tensorray:error"] = fmt::format("{:.3g}", *result.statistics.error);
   result.metadata["tensorray:photons"] = std::to_string(result.statistics.positions);
   result.statistics.seconds_color = seconds_since(start);
+  if (const double share = side_share(result.statistics); share > 0)
+    result.warnings.push_back(
+        fmt::format("{:.2g}% of the light leaves the volume by its side faces and is left out "
+                    "(`integrator.side_light`)",
+                    100 * share));
   if (nothing_arrived(result.statistics))
     result.warnings.push_back("no light reached the plate; look at `receiver` and `light`");
   return result;
 }
+
+class LoadedPhotons : public LoadedMethod {
+ public:
+  Render render(const Scene& scene, const Progress& progress, RenderJob* job) const override {
+    const auto show = [&](PlateLight so_far) {
+      if (job->show) job->show(render_of(scene, std::move(so_far), nullptr));
+    };
+    PlateLight light = light_on_plate(scene, progress, job, show);
+    if (job && job->work.is_shard) return {};
+    return render_of(scene, std::move(light), job ? job->team : nullptr);
+  }
+};
 
 PointCloud point_cloud(const std::vector<PlatePhoton>& photons, const ImageMetadata& metadata) {
   PointCloud points;
@@ -126,7 +153,7 @@ class PhotonDistributionMethod : public MethodWith<PhotonDescription> {
  public:
   const char* name() const override { return "photon_distribution"; }
   bool shows_plate() const override { return true; }
-  bool is_shared() const override { return settings().density.kind == PhotonDensityKind::mesh; }
+  bool is_shared() const override { return true; }
 
   std::vector<Output> outputs() const override {
     std::vector<Output> outputs = picture_outputs();

@@ -29,6 +29,7 @@ struct PhotonDensity {
 
 struct PhotonDescription {
   PhotonDensity density;
+  bool side_light = true;  ///< Whether light that leaves the volume by its side faces falls on the plate.
 };
 
 inline auto choices(PhotonDensityKind) {
@@ -60,6 +61,8 @@ void describe(PhotonDensity& density, Visitor& visit) {
 template <class Visitor>
 void describe(PhotonDescription& photons, Visitor& visit) {
   visit.section("density", photons.density, "photon_distribution: estimation of irradiance on the plate");
+  visit("side_light", photons.side_light,
+        "photon_distribution: whether light that leaves the volume by its side faces falls on the plate");
 }
 
 std::shared_ptr<Method> photon_distribution_method();

@@ -2,6 +2,7 @@
 /// @file scenes/photons/plate_light.h
 /// The light of a scene on its plate and inside its volume.
 
+#include <functional>
 #include <string>
 #include <vector>
 
@@ -26,9 +27,18 @@ struct PlateLight {
   std::vector<std::string> warnings;
 };
 
-/// Traces the light with the density estimator of the method photon_distribution. `mesh` draws the flow map of the
-/// beam, with the team of the job; photons and fluence, if the scene asks for them, are then traced as for the other
-/// estimators, by process 0. @throw Cancelled; as Team::exchange.
-PlateLight light_on_plate(const Scene& scene, const Progress& progress, RenderJob* job = nullptr);
+/// Adds the time, the steps and the samples of other work.
+void add_cost(const Statistics& more, Statistics& statistics);
+
+/// Gets light that is not complete yet.
+using ShowLight = std::function<void(PlateLight)>;
+
+/// Traces the light with the density estimator of the method photon_distribution, with the team of the job. `mesh`
+/// draws the flow map of the beam; photons and fluence, if the scene asks for them, are then traced as for the other
+/// estimators. Of a shard, the result is not complete: what it has traced is in the work of the job.
+/// @param show  Gets the light so far when the job wants a picture; may be empty.
+/// @throw Cancelled; as Team::exchange.
+PlateLight light_on_plate(const Scene& scene, const Progress& progress, RenderJob* job = nullptr,
+                          const ShowLight& show = {});
 
 }  // namespace tensorray

@@ -20,6 +20,20 @@ void warn_of_step_limit(Render& render) {
                                           100.0 * static_cast<double>(limited) / static_cast<double>(emitted)));
 }
 
+/// Where an annotation has no meaning for a picture.
+void warn_of_annotations(const Scene& scene, Render& render) {
+  if (!render.view) return;
+  const OutputDescription& output = scene.description.output;
+  if (output.wants(Annotation::scale) && !render.view->pixel_size)
+    render.warnings.push_back(
+        "`/output/annotations`: a picture of a perspective camera has no single scale, and gets no scale bar; choose "
+        "the `/camera/projection` \"orthographic\"");
+  if (output.wants(Annotation::legend) && !render.draw_legend && !render.display)
+    render.warnings.push_back(
+        fmt::format("`/output/annotations`: this picture of {} has no colours with a meaning, and gets no legend",
+                    scene.description.integrator.method().name()));
+}
+
 }  // namespace
 
 bool nothing_arrived(const Statistics& statistics) {
@@ -40,6 +54,7 @@ void collect_counts(Team& team, Statistics& statistics) {
 Render render(const Scene& scene, const Progress& progress, RenderJob* job) {
   Render result = scene.method->render(scene, progress, job);
   warn_of_step_limit(result);
+  warn_of_annotations(scene, result);
   return result;
 }
 

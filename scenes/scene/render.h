@@ -10,6 +10,8 @@
 #include <string>
 #include <vector>
 
+#include <Eigen/Core>
+
 #include "base/process/team.h"
 #include "base/process/work.h"
 #include "integrators/bending/light_channel.h"
@@ -47,6 +49,12 @@ struct Statistics {
 /// Whether no ray of any channel ended on the plate (lens: on the image), so that the picture shows nothing.
 bool nothing_arrived(const Statistics& statistics);
 
+/// How the pixels of a picture lie in the world.
+struct PictureView {
+  Eigen::Vector3d right, up;         ///< Unit; along x of the picture, and against its y.
+  std::optional<double> pixel_size;  ///< Of all pixels along x, world units; none: of a perspective camera.
+};
+
 struct Render {
   /// R, G, B in the scene-linear working space (1 is the undisturbed light, or the image's white), then A (colours are
   /// multiplied by it) and other channels, if the method has them.
@@ -60,7 +68,9 @@ struct Render {
   ImageMetadata metadata;                 ///< Entries of the method for the headers of its files.
   /// Writes the tubes about `paths`; empty unless the scene asks for them.
   std::function<void(const std::filesystem::path&, const std::vector<Path>& paths)> write_tubes;
-  std::function<void(Image&)> annotate;  ///< Draws a legend over a scene-linear picture; empty: no legend.
+  std::optional<PictureView> view;  ///< Of `linear`; none: there is no picture.
+  /// Draws a legend over a scene-linear picture whose exposure is so many stops; empty: no legend.
+  std::function<void(Image&, double exposure)> draw_legend;
   Statistics statistics;
   std::vector<std::string> warnings;  ///< Problems that the picture does not show by itself; one line each.
 };

@@ -11,6 +11,7 @@
 #include "integrators/view/field_region.h"
 #include "renderer/camera/path_tracer.h"
 #include "scenes/description/check_scene.h"
+#include "scenes/outputs/annotations.h"
 #include "scenes/outputs/picture_outputs.h"
 #include "scenes/path_tracing/path_tracing_description.h"
 #include "scenes/path_tracing/stage.h"
@@ -219,6 +220,7 @@ Render LoadedObjects::render(const Scene& scene, const Progress& progress, Rende
           spectral_image(picture.radiance, light.bands, SpectralQuantity::radiance, 1, light.xyz_to_working);
   };
   result.exposure = 0;
+  result.view = view_of(camera);
   const RenderCallbacks callbacks = callbacks_of(progress, job, [&](const SurfacePicture& picture) {
     Render shown = result;
     add_picture(picture, shown);

@@ -5,12 +5,14 @@
 
 #include <fmt/format.h>
 
+#include "base/process/kept_results.h"
 #include "base/process/progress.h"
 #include "base/process/seconds.h"
 #include "integrators/probes/stretch.h"
 #include "renderer/charts/color_bar.h"
 #include "renderer/charts/colormap.h"
 #include "scenes/description/check_scene.h"
+#include "scenes/outputs/annotations.h"
 #include "scenes/outputs/channel_table.h"
 #include "scenes/outputs/picture_outputs.h"
 
@@ -104,25 +106,31 @@ class LoadedStretch : public LoadedMethod {
   LoadedStretch(const StretchDescription& description, const StretchSettings& settings)
       : description_(description), settings_(settings) {}
 
-  Render render(const Scene& scene, const Progress& progress, RenderJob*) const override {
+  Render render(const Scene& scene, const Progress& progress, RenderJob* job) const override {
     const auto start = Clock::now();
+    StretchSettings settings = settings_;
+    settings.team = job ? job->team : nullptr;
+    KeptResults kept(job ? &job->work : nullptr, settings.team);
+    settings.kept = &kept;
     const OutputDescription& output = scene.description.output;
     const Geometry geometry = without_plate(scene);
     Render result;
     result.metadata = metadata_of(settings_);
     if (output.wants("stretch")) {
       result.grids.push_back(
-          stretch_grid(scene.field, geometry, scene.bending, settings_, description_.resolution, progress));
+          stretch_grid(scene.field, geometry, scene.bending, settings, description_.resolution, progress));
       const ImageMetadata metadata = provenance(scene, result);
       result.grids.back().metadata.insert(metadata.begin(), metadata.end());
     }
     if (output.wants("image") || output.wants("exr")) {
       const Plate plane = entry_plane(scene, description_.pixels);
-      draw(scene, stretch_picture(scene.field, geometry, scene.bending, settings_, plane, progress), plane.resolution,
+      draw(scene, stretch_picture(scene.field, geometry, scene.bending, settings, plane, progress), plane.resolution,
            result);
+      result.view = view_of(plane);
     }
     result.statistics.seconds_tracing = seconds_since(start);
-    return result;
+    if (kept.is_shard()) kept.keep(true);
+    return has_all(settings.team) ? std::move(result) : Render();
   }
 
  private:
@@ -133,6 +141,7 @@ class LoadedStretch : public LoadedMethod {
 class StretchMethod : public MethodWith<StretchKeys> {
  public:
   const char* name() const override { return "stretch"; }
+  bool is_shared() const override { return true; }
 
   std::vector<Output> outputs() const override {
     std::vector<Output> outputs = picture_outputs();

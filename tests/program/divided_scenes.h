@@ -1,6 +1,11 @@
 #pragma once
 /// @file tests/program/divided_scenes.h
-/// Small scenes of the two methods whose work is divided, of the field in field.vdb.
+/// Small scenes of all methods, of the field in field.vdb.
+
+#include <string>
+#include <vector>
+
+#include <fmt/core.h>
 
 namespace tensorray::test {
 
@@ -14,5 +19,22 @@ inline const char* const path_scene = R"({
   "field": {"file": "field.vdb", "eigenvalues": "absolute", "scale": 4},
   "integrator": {"type": "path_tracing", "max_samples": 64, "min_samples": 8, "noise": 0.01},
   "camera": {"resolution": [60, 50]}})";
+
+/// A scene of light on a plate, of a lens or of stretch. @param integrator  The value of its key.
+inline std::string plate_scene(const std::string& integrator, int photons = 20000) {
+  return fmt::format(R"({{
+  "field": {{"file": "field.vdb", "eigenvalues": "absolute", "scale": 4}}, "integrator": {},
+  "light": {{"photons": {}, "wavelengths": {{"count": 6}}}}, "receiver": {{"resolution": [64, 48]}}}})",
+                     integrator, photons);
+}
+
+inline const std::vector<std::string> plate_integrators{
+    R"({"type": "photon_distribution"})",
+    R"({"type": "photon_distribution", "density": {"kind": "gaussian", "tau": 2}})",
+    R"({"type": "photon_distribution", "density": {"kind": "histogram"}})",
+    R"({"type": "photon_distribution", "density": {"kind": "photon_differential"}})",
+    R"({"type": "lens", "samples": 2, "mode": "scatter"})",
+    R"({"type": "lens", "samples": 1, "mode": "gather", "image_plane": {"depth": [-0.25, -1]}})",
+    R"({"type": "stretch"})"};
 
 }  // namespace tensorray::test

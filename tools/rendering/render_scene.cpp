@@ -70,7 +70,7 @@ KeepSettings keep_settings(const SceneDescription& description, const RenderRun&
   settings.display = run.keeping.display.empty() ? 0 : display_interval;
   settings.quiet = run.quiet;
   const Method& method = description.integrator.method();
-  if (run.keeping.shard && !method.is_divided())
+  if (run.keeping.shard && !method.has_shards())
     throw SceneError(
         fmt::format("--shard: the work of {} is one piece; divide a sequence by --frames instead", method.name()));
   if (!run.keeping.resume && !settings.file.empty() && is_there(settings.file))
@@ -130,7 +130,7 @@ class SharedWork {
  public:
   SharedWork(Leader* leader, const Scene& scene, RenderJob& job, unsigned threads) : job_(job) {
     const Method& method = scene.description.integrator.method();
-    if (!leader || !(method.is_divided() || method.is_shared())) return;
+    if (!leader || !method.has_shards()) return;
     leader_ = leader;
     Json outputs = Json::object();
     for (const auto& [kind, file] : scene.description.output.files)
@@ -138,7 +138,8 @@ class SharedWork {
     const Json order = {{"origin", origin_of(scene)},
                         {"outputs", outputs},
                         {"scene_file", text_of_path(std::filesystem::absolute(scene.description.path))},
-                        {"part", {job.work.part().index, job.work.part().count}}};
+                        {"part", {job.work.part().index, job.work.part().count}},
+                        {"is_shard", job.work.is_shard}};
     if (method.is_divided())
       leader_->share(order.dump(), job.work, threads);
     else
@@ -176,6 +177,8 @@ void complete(const Scene& scene, RenderJob& job, OutputFiles files, const KeepS
   std::optional<TevDisplay> display;
   if (!run.keeping.display.empty())
     display.emplace(run.keeping.display, written_by(scene.description, run).front().filename().string());
+  job.work.is_shard = run.keeping.shard.has_value();
+  job.work.interval = keep.file.empty() ? 0 : keep.interval;
   const SharedWork shared(run.leader, scene, job, running_threads());
   CheckpointWriter keeper(scene, job.work, keep);
   job.show = [&](Render picture) {
@@ -356,6 +359,7 @@ void render_units(const RankJob& job, const Json& order, const RenderRun& run, s
   if (!other.empty())
     throw SceneError(printable(fmt::format("{}: is not that of rank 0: {}", description.path.string(), other)));
   RenderJob units{Work({order.at("part").at(0).get<std::size_t>(), order.at("part").at(1).get<std::size_t>()}), {}};
+  units.work.is_shard = order.at("is_shard").get<bool>();
   const std::unique_ptr<Team> team = follower.team(job);
   if (description.integrator.method().is_shared())
     units.team = team.get();
@@ -375,7 +379,7 @@ void render_scene(const std::filesystem::path& scene_file, const SceneChanges& c
   refuse_number_signs(description, run);
   bound_memory_of(run, description);
   const Method& method = description.integrator.method();
-  if (run.leader && !method.is_divided() && !method.is_shared())
+  if (run.leader && !method.has_shards())
     tell({fmt::format("note: the work of {} is one piece, which one rank does; mpirun divides a sequence (--frames)",
                       method.name())},
          run.quiet);

@@ -2,61 +2,18 @@
 
 #include "base/process/team.h"
 
-#include <condition_variable>
-#include <mutex>
 #include <optional>
-#include <string>
-#include <thread>
 #include <vector>
 
 #include <gtest/gtest.h>
 
 #include "tests/integrators/flow_support.h"
+#include "tests/integrators/team_support.h"
 
 namespace tensorray {
 namespace {
 
 using namespace test;
-
-/// What the members of a team give each other. All wait until all have given it.
-struct Table {
-  std::mutex mutex;
-  std::condition_variable changed;
-  std::vector<std::string> parts, given;
-  std::size_t waiting = 0, rounds = 0, bytes = 0;
-};
-
-class ThreadTeam : public Team {
- public:
-  ThreadTeam(Table& table, std::size_t index) : table_(table), index_(index) {}
-
-  std::size_t index() const override { return index_; }
-  std::size_t count() const override { return table_.parts.size(); }
-
-  std::vector<std::string> exchange(std::string mine) override {
-    std::unique_lock lock(table_.mutex);
-    table_.bytes += mine.size();
-    table_.parts[index_] = std::move(mine);
-    const std::size_t round = table_.rounds;
-    if (++table_.waiting == count()) {
-      table_.given = table_.parts;
-      table_.waiting = 0;
-      ++table_.rounds;
-      table_.changed.notify_all();
-    }
-    table_.changed.wait(lock, [&] { return table_.rounds > round; });
-    return table_.given;
-  }
-
-  std::vector<std::string> collect(std::string mine) override {
-    std::vector<std::string> parts = exchange(std::move(mine));
-    return index_ == 0 ? parts : std::vector<std::string>();
-  }
-
- private:
-  Table& table_;
-  const std::size_t index_;
-};
 
 struct Drawn {
   FlowMap map;
@@ -95,16 +52,9 @@ TEST(Team, HasTheMapAndTheLightOfOneProcess) {
   for (const FlowSettings& settings : {single(0.3), range(0.1, 0.4)}) {
     const Drawn alone = draw(bench, settings, nullptr);
     for (const std::size_t count : {std::size_t{1}, std::size_t{2}, std::size_t{3}}) {
-      Table table;
-      table.parts.resize(count);
       std::vector<std::optional<Drawn>> drawn(count);
-      std::vector<std::thread> members;
-      for (std::size_t index = 0; index < count; ++index)
-        members.emplace_back([&, index] {
-          ThreadTeam team(table, index);
-          drawn[index] = draw(bench, settings, &team);
-        });
-      for (std::thread& each : members) each.join();
+      const std::size_t bytes =
+          run_team(count, [&](Team& team) { drawn[team.index()] = draw(bench, settings, &team); });
       std::size_t rays = 0;
       for (const auto& each : drawn) {
         expect_same_map(each->map, alone.map);
@@ -118,40 +68,26 @@ TEST(Team, HasTheMapAndTheLightOfOneProcess) {
       // A vertex crosses once, and the sums of the plate once for each pass.
       const std::size_t vertices = alone.map.starts.size() * (9 * alone.map.wavelengths + 4 * 5);
       constexpr std::size_t passes = 3, sums = 8 * 4 * (48 + 3) * 48;
-      EXPECT_LE(table.bytes, vertices + count * passes * (sums + 5 * 64) + 100);
+      EXPECT_LE(bytes, vertices + count * passes * (sums + 5 * 64) + 100);
     }
   }
 }
 
-/// Of a member that is another program, say.
-class StrangeTeam : public Team {
- public:
-  std::size_t index() const override { return 0; }
-  std::size_t count() const override { return 2; }
-  std::vector<std::string> exchange(std::string mine) override { return {mine, "strange"}; }
-  std::vector<std::string> collect(std::string mine) override { return {mine, "strange"}; }
-};
-
 TEST(Team, PartsCrossInAnyNumberOfMessages) {
   constexpr std::size_t count = 3, parts = 11;
   for (const std::size_t at_once : {std::size_t{1}, std::size_t{2}, std::size_t{4}, parts, 5 * parts}) {
-    Table table;
-    table.parts.resize(count);
     std::vector<std::vector<std::size_t>> exchanged(count), collected(count);
-    std::vector<std::thread> members;
-    for (std::size_t index = 0; index < count; ++index)
-      members.emplace_back([&, index] {
-        ThreadTeam team(table, index);
-        std::vector<std::size_t> mine(parts);
-        for (std::size_t part = 0; part < parts; ++part) mine[part] = does_part(&team, part) ? part + 1 : 0;
-        exchanged[index] = collected[index] = mine;
-        const auto copy_to = [](std::vector<std::size_t>& values) {
-          return [to = values.data()](std::size_t part, PartBytes& bytes) { bytes.copy(to + part, sizeof *to); };
-        };
-        exchange_parts(team, parts, at_once, copy_to(exchanged[index]));
-        collect_parts(team, parts, at_once, copy_to(collected[index]));
-      });
-    for (std::thread& each : members) each.join();
+    run_team(count, [&](Team& team) {
+      const std::size_t index = team.index();
+      std::vector<std::size_t> mine(parts);
+      for (std::size_t part = 0; part < parts; ++part) mine[part] = does_part(&team, part) ? part + 1 : 0;
+      exchanged[index] = collected[index] = mine;
+      const auto copy_to = [](std::vector<std::size_t>& values) {
+        return [to = values.data()](std::size_t part, PartBytes& bytes) { bytes.copy(to + part, sizeof *to); };
+      };
+      exchange_parts(team, parts, at_once, copy_to(exchanged[index]));
+      collect_parts(team, parts, at_once, copy_to(collected[index]));
+    });
     for (std::size_t part = 0; part < parts; ++part) {
       for (std::size_t index = 0; index < count; ++index) EXPECT_EQ(exchanged[index][part], part + 1) << at_once;
       EXPECT_EQ(collected[0][part], part + 1) << at_once;

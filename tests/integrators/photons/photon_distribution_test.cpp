@@ -87,7 +87,9 @@ TEST(PhotonDistribution, EveryRayIsAccountedFor) {
       for (std::size_t i = 0; i < light.irradiance.plane_size(); ++i)
         on_film += light.irradiance.plane(channel)[i] * plate.pixel_area();
       const double deposited = static_cast<double>(ends[static_cast<int>(RayEnd::plate)]) * light.ray_area;
-      EXPECT_NEAR(on_film, deposited, 1e-9 * deposited);
+      // Rounding changes a photon by up to half a quantum at each of 36 pixels.
+      const double most = kind == DensityKind::gaussian ? 36 * std::ldexp(0.5, -26) : 1e-9;
+      EXPECT_NEAR(on_film, deposited, most * deposited);
     }
     EXPECT_NEAR(static_cast<double>(light.positions) * light.ray_area, 4, 1e-9);  // The beam's cross section.
   }
@@ -160,7 +162,7 @@ TEST(PhotonDistribution, InColourItIsTheChannelsColoured) {
     for (std::size_t i = 0; i < rgb.irradiance.plane_size(); ++i) {
       double sum = 0;
       for (int k = 0; k < 8; ++k) sum += settings.colors[k][c] * bands.irradiance.plane(k)[i];
-      ASSERT_NEAR(rgb.irradiance.plane(c)[i], sum, 1e-12);
+      ASSERT_NEAR(rgb.irradiance.plane(c)[i], sum, 1e-7);  // Quanta of 2^-25 of hundreds of photons.
     }
   settings.colors.pop_back();
   EXPECT_THROW(distribute(bench, channels(8), settings), std::invalid_argument);

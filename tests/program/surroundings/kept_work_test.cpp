@@ -113,17 +113,14 @@ TEST_F(KeptWork, AKilledRenderContinuesToTheSameFiles) {
   }
 }
 
-/// Their sums on the plate are kept, of each estimator.
-TEST_F(KeptWork, KilledPhotonsContinueToTheSameFiles) {
-  for (const char* density : {R"({"kind": "gaussian", "tau": 2})", R"({"kind": "photon_differential"})"}) {
-    make(fmt::format(R"({{"field": {{"file": "field.vdb"}}, "light": {{"photons": 4e5, "wavelengths": {{"count": 8}}}},
-                         "receiver": {{"resolution": [64, 64]}},
-                         "integrator": {{"type": "photon_distribution", "density": {}}}}})",
-                     density)
-             .c_str());
-    EXPECT_EQ(end_by(SIGKILL).status, 128 + SIGKILL);
+/// What the other methods keep: rays of a mesh, sums on the plate, values of pixels.
+TEST_F(KeptWork, KilledPlatesContinueToTheSameFiles) {
+  for (const std::string& integrator : plate_integrators) {
+    const bool is_mesh = integrator.find("density") == std::string::npos;
+    make(plate_scene(integrator, is_mesh ? 40000 : 400000).c_str());
+    EXPECT_EQ(end_by(SIGKILL, {"--threads", "1"}).status, 128 + SIGKILL) << integrator;
     const Outcome interrupted = end_by(SIGINT, {"--resume", "--threads", "1"});
-    EXPECT_EQ(interrupted.status, 130);
+    EXPECT_EQ(interrupted.status, 130) << integrator;
     EXPECT_NE(interrupted.error.find("--resume continues from"), std::string::npos) << interrupted.error;
     run_well(render("a", {"--resume"}));
     expect_same("a");
@@ -201,6 +198,42 @@ TEST_F(KeptWork, ShardsMergeToTheSameFiles) {
     for (int i = count; i >= 1; --i) shards.push_back(shard(i));
     run_well(merge(shards));
     expect_same("a");
+  }
+}
+
+TEST_F(KeptWork, ShardsOfPlatesMergeToTheSameFiles) {
+  for (const std::string& integrator : plate_integrators) {
+    make(plate_scene(integrator).c_str());
+    for (const int count : {1, 3, 16}) {
+      make_shards(count);
+      std::vector<std::string> shards;
+      for (int i = count; i >= 1; --i) shards.push_back(shard(i));
+      run_well(merge(shards));
+      expect_same("a");
+    }
+  }
+}
+
+/// Shards refine their own parts. What the whole picture needs more, or less, is found where they are merged.
+TEST_F(KeptWork, ShardsOfABoundedErrorMergeToTheSameFiles) {
+  make(plate_scene(R"({"type": "photon_distribution", "density": {"error": 0.2}})").c_str());
+  make_shards(3);
+  run_well(merge({"1.shard", "2.shard", "3.shard"}));
+  expect_same("a");
+}
+
+/// Files beside the picture, which the scene of the shards asks for.
+TEST_F(KeptWork, ShardsOfPhotonsMergeToTheSameFiles) {
+  for (const std::string density : {"mesh", "histogram"}) {
+    make(
+        plate_scene(fmt::format(R"({{"type": "photon_distribution", "density": {{"kind": "{}"}}}})", density)).c_str());
+    run_well({"render", "scene.json", "-q", "-o", "whole.vtp", "-o", "whole.fluence.vdb"});
+    for (int i = 1; i <= 3; ++i)
+      run_well({"render", "scene.json", "-q", "--shard", fmt::format("{}/3", i), "-o", shard(i), "--set",
+                "output.photons=p.vtp", "--set", "output.fluence=p.fluence.vdb"});
+    run_well({"merge", "-q", "1.shard", "2.shard", "3.shard", "-o", "a.vtp", "-o", "a.fluence.vdb"});
+    EXPECT_TRUE(is_equal("a.vtp", "whole.vtp")) << density;
+    EXPECT_TRUE(is_equal("a.fluence.vdb", "whole.fluence.vdb")) << density;
   }
 }
 

@@ -104,13 +104,17 @@ struct SharedCase {
   std::string option;
 };
 
-/// The steps of a mesh of light, or of a lens: all ranks trace it and draw it.
+/// The steps of light on a plate, of a lens, of stretch: all ranks trace it and draw it.
 TEST_F(RanksProgram, MakeOnePictureTogether) {
   const SharedCase cases[] = {
       {R"({"type": "photon_distribution"})", {"png", "exr", "spectral.exr", "vtp"}, ""},
       {R"({"type": "photon_distribution"})", {"exr"}, "--until-error=20%"},
       {R"({"type": "lens", "samples": 2, "mode": "gather"})", {"png", "exr", "spectral.exr"}, ""},
       {R"({"type": "lens", "samples": 1, "mode": "scatter"})", {"exr"}, ""},
+      {R"({"type": "photon_distribution", "density": {"kind": "gaussian", "tau": 2}})", {"png", "exr", "vtp"}, ""},
+      {R"({"type": "photon_distribution", "density": {"kind": "histogram"}})", {"spectral.exr", "fluence.vdb"}, ""},
+      {R"({"type": "photon_distribution", "density": {"kind": "photon_differential"}})", {"exr"}, ""},
+      {R"({"type": "stretch"})", {"png", "exr", "vdb"}, ""},
   };
   for (const SharedCase& each : cases) {
     write(
@@ -139,7 +143,7 @@ TEST_F(RanksProgram, MakeOnePictureTogether) {
   }
 }
 
-/// Methods without units: ranks take whole frames.
+/// Methods without units of tiles: ranks take whole frames.
 TEST_F(RanksProgram, DivideTheFramesOfASequence) {
   for (const char* method :
        {R"({"type": "photon_distribution"})", R"({"type": "lens", "samples": 1})", R"({"type": "stretch"})"}) {

@@ -4,6 +4,8 @@
 
 #include <cmath>
 #include <limits>
+#include <stdexcept>
+#include <string>
 
 #include <Eigen/Geometry>
 #include <gtest/gtest.h>
@@ -82,6 +84,21 @@ TEST(FootprintDeposit, ColoursAreFactorsAndTheOrderDoesNotMatter) {
   EXPECT_NEAR(sum_of(film, 0), 100, 1e-6);
   EXPECT_NEAR(sum_of(film, 1), 250, 1e-6);
   EXPECT_NEAR(sum_of(film, 2), 75, 1e-6);
+}
+
+TEST(FootprintDeposit, SumsOfPartsCanBeAdded) {
+  FootprintDeposit all(32, 20, 2), joined(32, 20, 2);
+  for (int part = 0; part < 3; ++part) {
+    FootprintDeposit some(32, 20, 2);
+    for (int i = part; i < 200; i += 3)
+      for (FootprintDeposit* each : {&all, &some})
+        each->add(i % 2, {16 + 12 * std::sin(i), 10 + 9 * std::cos(3 * i)}, Vector2d(1 + i % 3, 0.5).asDiagonal());
+    std::string sums;
+    some.append_sums(sums);
+    joined.add_sums(sums);
+    EXPECT_THROW(joined.add_sums(sums.substr(8)), std::runtime_error);
+  }
+  EXPECT_EQ(all.finish(0.3).values, joined.finish(0.3).values);
 }
 
 TEST(FootprintDeposit, WrongSizesAreRefused) {

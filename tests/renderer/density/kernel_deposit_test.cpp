@@ -62,6 +62,30 @@ TEST(KernelDeposit, ColoursMultiplyTheKernel) {
   }
 }
 
+TEST(KernelDeposit, WhatIsAddedIsRounded) {
+  constexpr std::size_t width = 40, height = 8;
+  const double quantum = std::ldexp(1.0, -26);
+  const std::vector<PixelColor> colors{{{0.9, 0.3, -0.01, 0}}};
+  const std::vector<DensityPoint> points{make_point(0.37f, 0.81f, 5, 1, 0)};
+  const GaussianKernel gaussian(1.5, 2.25);
+  for (const PixelColor* const color : {colors.data(), static_cast<const PixelColor*>(nullptr)})
+    for (const bool splines : {true, false}) {
+      const auto deposit = [&](double rounding) {
+        std::vector<PixelColor> pixels(width * height);
+        const DepositTarget target{pixels[0].values, width, color, rounding};
+        splines ? deposit_splines(points, 0, 1, target) : deposit_gaussians(points, 0, 1, gaussian, target);
+        return pixels;
+      };
+      const std::vector<PixelColor> exact = deposit(0), rounded = deposit(std::ldexp(1.5, 52) * quantum);
+      for (std::size_t pixel = 0; pixel < exact.size(); ++pixel)
+        for (int c = 0; c < 4; ++c) {
+          const double value = rounded[pixel].values[c] / quantum;
+          ASSERT_EQ(value, std::round(value));
+          ASSERT_NEAR(value, exact[pixel].values[c] / quantum, 0.5 + 1e-6);
+        }
+    }
+}
+
 TEST(KernelDeposit, GaussiansAreCutAndNormalised) {
   for (const double tau : {0.3, 0.7, 1.9}) {
     const double reach = 4.5 * tau + 0.5;

@@ -1,0 +1,94 @@
+#include "base/process/kept_results.h"
+
+#include <algorithm>
+#include <cstring>
+#include <stdexcept>
+
+#include "base/process/team.h"
+
+namespace tensorray {
+namespace {
+
+constexpr auto least_interval = std::chrono::seconds(10);    // Between two times of keeping.
+constexpr int least_ratio = 50;                              // Of the time between them to the time they take.
+constexpr std::size_t bytes_at_once = std::size_t{1} << 26;  // In a message to other processes.
+
+/// What stands before the bytes of a result.
+struct ResultHead {
+  ResultKey key;
+  std::uint64_t size;
+};
+
+/// Gives the other processes the bytes of process 0.
+void share_bytes(Team& team, std::string& bytes) {
+  const auto of_first = [&](std::string mine) {
+    return std::move(team.exchange(has_all(&team) ? std::move(mine) : std::string()).front());
+  };
+  const std::size_t size = std::stoull(of_first(std::to_string(bytes.size())));
+  if (has_all(&team)) {
+    for (std::size_t begin = 0; begin < size; begin += bytes_at_once) team.exchange(bytes.substr(begin, bytes_at_once));
+    return;
+  }
+  while (bytes.size() < size) bytes += of_first({});
+}
+
+}  // namespace
+
+std::size_t KeptResults::Hash::operator()(const ResultKey& key) const { return hash_of(&key, sizeof key); }
+
+KeptResults::KeptResults(Work* work, Team* team) : work_(has_all(team) ? work : nullptr) {
+  if (work) {
+    part_ = work->part();
+    is_shard_ = work->is_shard;
+  }
+  std::string kept;
+  if (work_) {
+    work_->begin(work_->size() > 0 ? work_->size() : part_.count);
+    for (const WorkUnit& unit : work_->units())
+      if (unit.state) kept += *unit.state;
+  }
+  if (team) share_bytes(*team, kept);
+  take(kept);
+}
+
+void KeptResults::take(const std::string& bytes) {
+  const auto fail = [] { throw std::runtime_error("what was kept of the render is damaged; render it again"); };
+  for (std::size_t at = 0; at < bytes.size();) {
+    ResultHead head;
+    if (bytes.size() - at < sizeof head) fail();
+    std::memcpy(&head, &bytes[at], sizeof head);
+    if (head.size > bytes.size() - at - sizeof head) fail();
+    places_.emplace(head.key, at);
+    at += sizeof head + head.size;
+  }
+  bytes_ = bytes;
+}
+
+std::optional<std::string> KeptResults::find(const ResultKey& key, std::size_t size) const {
+  const auto place = places_.find(key);
+  if (place == places_.end()) return std::nullopt;
+  ResultHead head;
+  std::memcpy(&head, &bytes_[place->second], sizeof head);
+  if (head.size != size) return std::nullopt;
+  return bytes_.substr(place->second + sizeof head, size);
+}
+
+bool KeptResults::is_due() const {
+  return work_ && work_->interval > 0 && seconds_since(kept_) > std::max(work_->interval / 2, least_ratio * cost_);
+}
+
+void KeptResults::add(const ResultKey& key, const std::string& values) {
+  if (!work_ || places_.count(key) > 0) return;
+  const ResultHead head{key, values.size()};
+  bytes_.append(reinterpret_cast<const char*>(&head), sizeof head).append(values);
+}
+
+void KeptResults::keep(bool done) {
+  if (!work_) return;
+  const auto start = Clock::now();
+  work_->keep(part_.index, bytes_, done);
+  kept_ = Clock::now();
+  cost_ = seconds_since(start);
+}
+
+}  // namespace tensorray

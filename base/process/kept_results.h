@@ -1,0 +1,80 @@
+#pragma once
+/// @file base/process/kept_results.h
+/// Results of small parts of a render, which are computed once for several runs: a run that is interrupted keeps them
+/// for the one that resumes it, and a shard for the run that merges the shards.
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <unordered_map>
+
+#include "base/process/seconds.h"
+#include "base/process/work.h"
+#include "base/text/content_hash.h"
+
+namespace tensorray {
+
+class Team;
+
+/// All that a result depends on, or a hash of it, beside the scene and the program.
+using ResultKey = std::array<std::uint64_t, 3>;
+
+/// Results as bytes, by key. As the key says all that the bytes depend on, a picture has the same bits whether its
+/// results are found here or computed. Results of an earlier run that are not needed do no harm, and those that are
+/// missing are computed.
+///
+/// They are kept in the units of a Work: unit i has those of shard i, and of a render that is not divided, unit 0 has
+/// all.
+class KeptResults {
+ public:
+  /// Begins the work, which has as many units as it has parts, or as many as earlier runs have kept, and takes the
+  /// results of these. @param work  Null: there are none, and none are kept.
+  /// @param team  Processes that render together; process 0 gives the others its results, and it alone keeps some. All
+  /// of them make one at the same time. Null: alone.
+  /// @throw std::runtime_error if a unit is damaged; as Team::exchange.
+  KeptResults(Work* work, Team* team);
+
+  /// The part of the work that this run does: all of it, unless it makes a shard.
+  WorkPart part() const { return part_; }
+  bool is_shard() const { return is_shard_; }
+
+  /// The bytes of a result, if there are `size` of them. Any number of threads may call it at once, but not beside
+  /// `add`.
+  std::optional<std::string> find(const ResultKey& key, std::size_t size) const;
+
+  /// Whether there are any of earlier runs.
+  bool has_any() const { return !places_.empty(); }
+
+  /// Whether it is time to add results and to `keep` them: twice in the work's interval, and so that keeping takes at
+  /// most a fiftieth of the time.
+  bool is_due() const;
+
+  /// Adds a result for later runs.
+  void add(const ResultKey& key, const std::string& values);
+
+  /// Keeps what was added as the unit of this run. @param done  Whether the unit is complete.
+  void keep(bool done);
+
+ private:
+  struct Hash {
+    std::size_t operator()(const ResultKey& key) const;
+  };
+  void take(const std::string& bytes);
+
+  Work* work_;  // Null: this process keeps nothing.
+  WorkPart part_;
+  bool is_shard_ = false;
+  std::string bytes_;                                        // Of all results, one after the other.
+  std::unordered_map<ResultKey, std::size_t, Hash> places_;  // In `bytes_`; of those of earlier runs.
+  Clock::time_point kept_ = Clock::now();
+  double cost_ = 0;  // Seconds of keeping, the last time.
+};
+
+/// A hash of values for a key; they continue those of which `before` is the hash.
+inline std::uint64_t hash_of(const void* values, std::size_t size, std::uint64_t before = 0) {
+  return content_hash({static_cast<const char*>(values), size}, before);
+}
+
+}  // namespace tensorray

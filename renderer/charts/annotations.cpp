@@ -1,0 +1,161 @@
+#include "renderer/charts/annotations.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <vector>
+
+#include <Eigen/Geometry>
+
+#include "renderer/charts/color_bar.h"
+#include "renderer/charts/ink.h"
+#include "renderer/charts/lettering.h"
+
+namespace tensorray {
+namespace {
+
+using Eigen::AlignedBox2d, Eigen::Vector2d, Eigen::Vector3d;
+
+constexpr double longest_bar = 0.4;  // Of the picture's shorter side.
+constexpr double end_on = 0.1;       // An axis that is shorter than this in the picture points at the viewer, or away.
+
+/// Sizes in pixels.
+struct Sizes {
+  double letter;   // Height of a capital letter.
+  double line;     // Width of lines.
+  double outline;  // Width of the outline on each side.
+  double margin;   // Distance from the edges of the picture.
+
+  explicit Sizes(const Image& image)
+      : letter(std::max(11.0, 0.024 * image.height)),
+        line(std::max(2.0, std::round(letter / 7))),
+        outline(std::max(1.0, letter / 11)),
+        margin(std::round(letter)) {}
+};
+
+/// A text or a line of a drawing.
+struct Mark {
+  Vector2d from, to;  // Ends of a line; of a text, `from` is its lower left corner.
+  std::string text;   // Empty: a line.
+  double width = 0;   // Of a line; of a text, its height.
+};
+
+AlignedBox2d extent_of(const std::vector<Mark>& marks) {
+  AlignedBox2d box;
+  for (const Mark& mark : marks) {
+    const Vector2d half = Vector2d::Constant(mark.width / 2);
+    if (mark.text.empty()) {
+      box.extend((mark.from.cwiseMin(mark.to) - half).eval()).extend((mark.from.cwiseMax(mark.to) + half).eval());
+    } else {
+      box.extend(mark.from).extend(Vector2d(mark.from + Vector2d(text_width(mark.text, mark.width), -mark.width)));
+    }
+  }
+  return box;
+}
+
+void shift(const Vector2d& by, std::vector<Mark>& marks) {
+  for (Mark& mark : marks) {
+    mark.from += by;
+    mark.to += by;
+  }
+}
+
+/// Draws the outlines of all marks, and then the marks: an outline never covers a mark.
+/// @param on_light  Whether ink is black.
+void draw_marks(Image& image, const std::vector<Mark>& marks, double outline, bool on_light) {
+  for (const bool is_ink : {false, true}) {
+    const Vector3d color = Vector3d::Constant(is_ink != on_light);
+    const double wider = is_ink ? 0 : outline;
+    for (const Mark& mark : marks)
+      if (mark.text.empty())
+        draw_stroke(image, mark.from, mark.to, mark.width + 2 * wider, color);
+      else
+        draw_text(image, mark.from, mark.width, mark.text, color, wider);
+  }
+}
+
+/// The letter of an axis, centred. Small letters have three quarters of the height of capital ones.
+Mark axis_letter(int axis, const Vector2d& center, double letter) {
+  const std::string text(1, "xyz"[axis]);
+  return {center + Vector2d(-text_width(text, letter), 0.75 * letter) / 2, {}, text, letter};
+}
+
+/// The marks of an axis from the origin. @param direction  To the right, upwards, and towards the viewer.
+std::vector<Mark> axis_marks(int axis, const Vector3d& direction, const Sizes& sizes) {
+  const Vector2d origin = Vector2d::Zero(), along(direction.x(), -direction.y());
+  if (along.norm() >= end_on) {
+    const Vector2d tip = 3 * sizes.letter * along;
+    return {{origin, tip, "", sizes.line},
+            axis_letter(axis, tip + 0.9 * sizes.letter * along.normalized(), sizes.letter)};
+  }
+  const Mark letter = axis_letter(axis, Vector2d(-0.9, 0.9) * sizes.letter, sizes.letter);
+  if (direction.z() > 0) return {{origin, origin, "", 3 * sizes.line}, letter};
+  const Vector2d a = Vector2d(0.35, 0.35) * sizes.letter, b(a.x(), -a.y());
+  return {{-a, a, "", sizes.line}, {-b, b, "", sizes.line}, letter};
+}
+
+}  // namespace
+
+double round_length(double limit) {
+  const double decade = std::pow(10.0, std::floor(std::log10(limit)));
+  for (const double factor : {5.0, 2.0})
+    if (factor * decade <= limit) return factor * decade;
+  return decade;
+}
+
+void draw_scale_bar(Image& image, double pixel_size) {
+  const Sizes sizes(image);
+  const double length = round_length(longest_bar * std::min(image.width, image.height) * pixel_size);
+  const std::string number = round_ticks({0, length}, 2).back().label;
+  const Vector2d left(sizes.margin, image.height - sizes.margin), right(left + Vector2d(length / pixel_size, 0));
+  const Vector2d end(0, sizes.letter / 2), thick(0, sizes.line), wide(sizes.line, 0);
+  // They do not overlap: ink that lies twice on a pixel at the end would make the bar longer.
+  const std::array<AlignedBox2d, 3> bars{AlignedBox2d(left - thick, right),
+                                         AlignedBox2d(left - end, Vector2d(left + wide - thick)),
+                                         AlignedBox2d(Vector2d(right - wide - end), Vector2d(right - thick))};
+  const std::vector<Mark> text{{left - 1.5 * end, {}, number, sizes.letter}};
+  const AlignedBox2d whole = extent_of(text).merged(bars[0]);
+  const bool on_light = is_light(image, whole);
+  const Vector2d outline = Vector2d::Constant(sizes.outline);
+  for (const AlignedBox2d& bar : bars)
+    fill_box(image, {bar.min() - outline, bar.max() + outline}, Vector3d::Constant(on_light));
+  for (const AlignedBox2d& bar : bars) fill_box(image, bar, Vector3d::Constant(!on_light));
+  draw_marks(image, text, sizes.outline, on_light);
+}
+
+void draw_axes(Image& image, const Vector3d& right, const Vector3d& up) {
+  const Sizes sizes(image);
+  const Vector3d towards = right.cross(up);
+  std::vector<Mark> marks;
+  for (int axis = 0; axis < 3; ++axis)
+    for (Mark& mark : axis_marks(axis, {right[axis], up[axis], towards[axis]}, sizes)) marks.push_back(std::move(mark));
+  shift(Vector2d::Constant(sizes.margin) - extent_of(marks).min(), marks);
+  draw_marks(image, marks, sizes.outline, is_light(image, extent_of(marks)));
+}
+
+void draw_color_strip(Image& image, const ColorStrip& strip) {
+  const Sizes sizes(image);
+  const double gap = sizes.letter / 2, length = std::round(std::min(0.2 * image.width, 10 * sizes.letter));
+  const double behind = strip.right.empty() ? 0 : text_width(strip.right, sizes.letter) + gap;
+  const double top = sizes.margin, bottom = top + std::round(sizes.letter);
+  const double end = std::round(image.width - sizes.margin - behind), begin = end - length;
+  const double below = image.width - sizes.margin - text_width(strip.note, sizes.letter);
+  std::vector<Mark> texts;
+  const auto add = [&](double x, double y, const std::string& text) {
+    if (!text.empty()) texts.push_back({{x, y}, {}, text, sizes.letter});
+  };
+  add(begin - gap - text_width(strip.left, sizes.letter), bottom, strip.left);
+  add(end + gap, bottom, strip.right);
+  add(below, bottom + gap + sizes.letter, strip.note);
+  const AlignedBox2d bar(Vector2d(begin, top), Vector2d(end, bottom));
+  const bool on_light = is_light(image, extent_of(texts).merged(bar));
+  const Vector2d outline = Vector2d::Constant(sizes.outline), frame = Vector2d::Constant(sizes.line / 2) + outline;
+  fill_box(image, {bar.min() - frame, bar.max() + frame}, Vector3d::Constant(on_light));
+  fill_box(image, {bar.min() - frame + outline, bar.max() + frame - outline}, Vector3d::Constant(!on_light));
+  for_each_pixel(image, bar, [&](int x, int y, double coverage) {
+    lay_over(image, x, y, strip.color(std::clamp((x + 0.5 - begin) / length, 0.0, 1.0)), coverage);
+  });
+  draw_marks(image, texts, sizes.outline, on_light);
+}
+
+}  // namespace tensorray

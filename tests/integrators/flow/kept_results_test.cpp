@@ -1,0 +1,133 @@
+// Flow maps whose vertices were traced in earlier runs or by shards: the same bits, and hardly a ray more.
+
+#include "base/process/kept_results.h"
+
+#include <utility>
+#include <vector>
+
+#include <gtest/gtest.h>
+
+#include "tests/integrators/flow_support.h"
+
+namespace tensorray {
+namespace {
+
+using namespace test;
+
+const FlowBench& bench() {
+  static const FlowBench bench = make_bench(lens, plate_at(4, 2.4, 48));
+  return bench;
+}
+
+/// The light of a map, which depends on all of it.
+std::vector<double> light_of(const FlowMap& map) {
+  std::vector<CausticBand> bands(3);
+  for (std::size_t i = 0; i < bands.size(); ++i) {
+    bands[i].width = static_cast<double>(map.wavelengths - 1) / 3;
+    bands[i].sample = (static_cast<double>(i) + 0.5) * bands[i].width;
+  }
+  return caustic_of(bench(), map, bands).color.values;
+}
+
+FlowMap map_with(FlowSettings settings, Work& work, bool done = false) {
+  KeptResults kept(&work, nullptr);
+  settings.kept = &kept;
+  FlowMap map = map_of(bench(), settings);
+  if (done) kept.keep(true);
+  return map;
+}
+
+/// The units that the shards of a map give.
+std::vector<WorkUnit> shards_of(const FlowSettings& settings, std::size_t count, std::size_t& rays) {
+  std::vector<WorkUnit> all(count);
+  for (std::size_t index = 0; index < count; ++index) {
+    Work work({index, count});
+    work.is_shard = true;
+    rays += map_with(settings, work, true).rays;
+    EXPECT_TRUE(work.units()[index].done);
+    all[index] = work.units()[index];
+  }
+  return all;
+}
+
+TEST(KeptResults, OfShardsGiveTheMapOfOneRun) {
+  for (const FlowSettings& settings : {single(0.3), range(0.1, 0.4)}) {
+    const FlowMap alone = map_of(bench(), settings);
+    for (const std::size_t count : {1, 2, 3, 16}) {
+      std::size_t rays = 0;
+      Work merged({}, shards_of(settings, count, rays));
+      const FlowMap map = map_with(settings, merged);
+      EXPECT_TRUE(map.starts == alone.starts) << count;
+      EXPECT_TRUE(map.ends == alone.ends) << count;
+      EXPECT_TRUE(map.lengths == alone.lengths) << count;
+      EXPECT_TRUE(light_of(map) == light_of(alone)) << count;
+      // Vertices on the borders of blocks are traced by both shards. In a range, the parents of a vertex at the
+      // silhouette may be those of the other shard's quad.
+      EXPECT_LE(map.rays, alone.rays / 100) << count;
+      EXPECT_LE(rays, alone.rays * 3 / 2) << count;
+    }
+  }
+}
+
+TEST(KeptResults, OfAnInterruptedRunAreNotTracedAgain) {
+  const FlowSettings settings = range(0.1, 0.4);
+  const FlowMap alone = map_of(bench(), settings);
+  for (const std::uint64_t stop : {1, 3, 6}) {
+    Work work;
+    Progress progress;
+    std::uint64_t reports = 0;
+    progress.report = [&](const std::string&, std::uint64_t, std::uint64_t) {
+      if (++reports >= 4 * stop) progress.cancelled = true;
+    };
+    KeptResults kept(&work, nullptr);
+    FlowSettings interrupted = settings;
+    interrupted.kept = &kept;
+    ASSERT_THROW(trace_flow_map(bench().field, bench().geometry, bench().beam, {}, interrupted, progress), Cancelled);
+    ASSERT_TRUE(work.state(0));
+    Work resumed({}, work.units());
+    const FlowMap map = map_with(settings, resumed);
+    EXPECT_LT(map.rays, alone.rays) << stop;
+    EXPECT_TRUE(light_of(map) == light_of(alone)) << stop;
+  }
+}
+
+TEST(KeptResults, OfAnotherMapAreNotUsed) {
+  Work first({0, 2});
+  const FlowSettings settings = range(0.1, 0.4);
+  map_with(settings, first, true);
+  FlowSettings finer = settings, other = range(0.1, 0.5);
+  finer.tolerance = 0.25;
+  for (const FlowSettings& each : {finer, other}) {
+    Work work({}, first.units());
+    EXPECT_EQ(map_with(each, work).rays, map_of(bench(), each).rays);
+  }
+}
+
+TEST(KeptResults, FindsWhatWasKept) {
+  Work work;
+  const ResultKey a{1, 2, 3}, b{1, 2, 4};
+  {
+    KeptResults kept(&work, nullptr);
+    kept.add(a, "first");
+    kept.add(b, "");
+    kept.keep(false);
+  }
+  Work resumed({}, work.units());
+  KeptResults kept(&resumed, nullptr);
+  EXPECT_EQ(kept.find(a, 5), "first");
+  EXPECT_EQ(kept.find(b, 0), "");
+  EXPECT_FALSE(kept.find(a, 4));
+  EXPECT_FALSE(kept.find({1, 2, 5}, 5));
+}
+
+TEST(KeptResults, SaysThatAUnitIsDamaged) {
+  Work work;
+  work.begin(1);
+  for (const std::string& bytes : {std::string("short"), std::string(32, '\xff')}) {
+    work.keep(0, bytes, false);
+    EXPECT_THROW(KeptResults(&work, nullptr), std::runtime_error);
+  }
+}
+
+}  // namespace
+}  // namespace tensorray

@@ -1,0 +1,129 @@
+#include "renderer/charts/annotations.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include <Eigen/Geometry>
+#include <gtest/gtest.h>
+
+namespace tensorray {
+namespace {
+
+Image blank(int width, int height, float value) {
+  Image image(width, height, {"R", "G", "B"});
+  std::fill(image.pixels.begin(), image.pixels.end(), value);
+  return image;
+}
+
+/// The box of the pixels that differ from `value` by more than half.
+Eigen::AlignedBox2i drawn_box(const Image& image, float value) {
+  Eigen::AlignedBox2i box;
+  for (int y = 0; y < image.height; ++y)
+    for (int x = 0; x < image.width; ++x)
+      if (std::abs(image.pixel(x, y)[0] - value) > 0.5f) box.extend(Eigen::Vector2i(x, y));
+  return box;
+}
+
+TEST(AnnotationsTest, RoundLengthsAreTheGreatestThatFit) {
+  const std::vector<std::pair<double, double>> cases{{1, 1},     {1.99, 1},      {2, 2},      {4.9, 2},
+                                                     {5, 5},     {9.99, 5},      {10, 10},    {0.013, 0.01},
+                                                     {0.5, 0.5}, {3e-24, 2e-24}, {7e25, 5e25}};
+  for (const auto& [limit, length] : cases) EXPECT_DOUBLE_EQ(round_length(limit), length) << limit;
+}
+
+/// The bar is black on white and white on black, and as long as its number says: length / pixel size.
+TEST(AnnotationsTest, ScaleBarHasItsLength) {
+  for (const float ground : {0.0f, 1.0f})
+    for (const double pixel_size : {0.013, 0.0049, 1.0, 3.3e-9, 7e20}) {
+      const int width = 300, height = 200, margin = 11;
+      Image image = blank(width, height, ground);
+      draw_scale_bar(image, pixel_size);
+      double ink = 0;
+      for (int x = 0; x < width; ++x) ink += std::abs(image.pixel(x, height - margin - 1)[0] - ground);
+      const double length = round_length(0.4 * height * pixel_size);
+      EXPECT_NEAR(ink, length / pixel_size, 1e-4) << pixel_size << " on " << ground;
+      EXPECT_EQ(drawn_box(image, ground).min().x(), margin);
+      EXPECT_EQ(drawn_box(image, ground).max().y(), height - margin - 1);
+    }
+}
+
+/// A disk of ink with an outline: on any ground there is both, black and white.
+TEST(AnnotationsTest, InkIsSeenOnEveryGround) {
+  for (const float ground : {0.0f, 0.2f, 0.5f, 1.0f, 30.0f}) {
+    Image image = blank(200, 200, ground);
+    draw_axes(image, {1, 0, 0}, {0, 1, 0});
+    float least = std::numeric_limits<float>::infinity(), greatest = -least;
+    for (int y = 0; y < 100; ++y)
+      for (int x = 0; x < 100; ++x) {
+        least = std::min(least, image.pixel(x, y)[0]);
+        greatest = std::max(greatest, image.pixel(x, y)[0]);
+      }
+    EXPECT_LT(least, 0.01f) << ground;
+    EXPECT_GT(greatest, 0.99f) << ground;
+  }
+}
+
+/// Letters grow with the height of the picture, and are never too small: as high as the letters of the note are.
+TEST(AnnotationsTest, LettersHaveElevenPixelsOrMore) {
+  for (const int size : {96, 200, 512, 2048}) {
+    Image with = blank(size, size, 0), without = with;
+    const auto color = [](double) { return Eigen::Vector3d(0, 0, 0); };
+    draw_color_strip(with, {"", "", color, "H"});
+    draw_color_strip(without, {"", "", color, ""});
+    for (std::size_t i = 0; i < with.pixels.size(); ++i) with.pixels[i] -= without.pixels[i];
+    const double height = drawn_box(with, 0).sizes().y() + 1;
+    EXPECT_NEAR(height, std::max(11.0, 0.024 * size), 1.5) << size;
+  }
+}
+
+/// Axes of a plate lie along its right and up; an axis that points at the viewer is no line.
+TEST(AnnotationsTest, AxesPointAsThePictureShowsThem) {
+  const auto extent = [](const Eigen::Vector3d& right, const Eigen::Vector3d& up) {
+    Image image = blank(400, 400, 0);
+    draw_axes(image, right, up);
+    return image;
+  };
+  // x to the right and y upwards, or y to the right and z upwards: the lines are the same, the letters are not.
+  EXPECT_NE(extent({1, 0, 0}, {0, 1, 0}).pixels, extent({0, 1, 0}, {0, 0, 1}).pixels);
+  // Seen from behind: a cross instead of a dot, and x to the left.
+  EXPECT_NE(extent({1, 0, 0}, {0, 1, 0}).pixels, extent({-1, 0, 0}, {0, 1, 0}).pixels);
+  // x has 3 letters and a half, and y as much; the letter of z is left and below of the origin.
+  const Eigen::AlignedBox2i flat = drawn_box(extent({1, 0, 0}, {0, 1, 0}), 0);
+  EXPECT_NEAR(flat.sizes().x(), (3 + 0.9 + 0.9) * 11, 11);
+  EXPECT_NEAR(flat.sizes().y(), (3 + 0.9 + 0.9) * 11, 11);
+  EXPECT_EQ(flat.min().x(), 11);
+  EXPECT_NEAR(flat.min().y(), 11, 3);  // Small letters are lower than capital ones, for which there is room.
+  // Seen along the diagonal, all three are lines.
+  const Eigen::Vector3d view = Eigen::Vector3d(-1, -1, -1).normalized();
+  const Eigen::Vector3d right = view.cross(Eigen::Vector3d::UnitZ()).normalized();
+  EXPECT_FALSE(drawn_box(extent(right, right.cross(view)), 0).isEmpty());
+}
+
+TEST(AnnotationsTest, StripShowsItsColors) {
+  Image image = blank(500, 300, 0);
+  draw_color_strip(image, {"380", "730 nm", [](double at) { return Eigen::Vector3d(at, 0.25, 1 - at); }, "+1.0 stops"});
+  std::vector<float> reds;
+  for (int x = 0; x < 500; ++x) {
+    const float* const pixel = image.pixel(x, 11 + 5);
+    if (pixel[1] == 0.25f && std::abs(pixel[0] + pixel[2] - 1) < 1e-6f) reds.push_back(pixel[0]);
+  }
+  ASSERT_EQ(reds.size(), 100u);  // A fifth of the width.
+  for (std::size_t i = 0; i < reds.size(); ++i) EXPECT_NEAR(reds[i], (static_cast<double>(i) + 0.5) / 100, 1e-6);
+}
+
+TEST(AnnotationsTest, WhatHasNoRoomIsCutOff) {
+  for (const int size : {1, 2, 7, 30}) {
+    Image image = blank(size, size, 0.5f);
+    draw_scale_bar(image, 1);
+    draw_axes(image, {1, 0, 0}, {0, 0, 1});
+    draw_color_strip(image, {"380", "730 nm", [](double) { return Eigen::Vector3d(1, 0, 0); }, "+0.0 stops"});
+    for (const float value : image.pixels) EXPECT_TRUE(value >= 0 && value <= 1);
+  }
+}
+
+}  // namespace
+}  // namespace tensorray

@@ -1,0 +1,156 @@
+// Annotations of display pictures: what each method draws, where, and that no other file changes.
+
+#include "scenes/outputs/annotations.h"
+
+#include <algorithm>
+#include <cmath>
+#include <string>
+#include <vector>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "base/process/progress.h"
+#include "scenes/outputs/picture_outputs.h"
+#include "scenes/pipeline/read_scene.h"
+#include "scenes/scene/render.h"
+#include "scenes/scene/scene.h"
+
+namespace tensorray {
+namespace {
+
+using ::testing::ElementsAre, ::testing::HasSubstr, ::testing::IsEmpty;
+
+constexpr int size = 200;  // Pixels along both sides of all pictures.
+
+/// The part of the picture that an annotation is in.
+enum class Part { none, lower_left, upper_left, upper_right, right, changes_nothing };
+
+struct MethodCase {
+  std::string name, text;
+  Part scale, legend;  ///< `none`: it is left out, with a warning. Axes are always there.
+};
+
+const std::vector<MethodCase> methods{
+    {"photons", R"({"integrator": {"type": "photon_distribution"}})", Part::lower_left, Part::upper_right},
+    {"three colours", R"({"bending": {"rgb": [0.1, 0.2, 0.3]}, "integrator": {"type": "photon_distribution"}})",
+     Part::lower_left, Part::upper_right},
+    {"lens", R"({"integrator": {"type": "lens"}})", Part::lower_left, Part::none},
+    {"stretch", R"({"integrator": {"type": "stretch", "stretch": {"pixels": 200, "resolution": 8}}})", Part::lower_left,
+     Part::changes_nothing},
+    {"paths", R"({"integrator": {"type": "path_tracing"}})", Part::none, Part::right},
+    {"paths of one colour", R"({"integrator": {"type": "path_tracing", "color": {"by": "none"}}})", Part::none,
+     Part::none},
+    {"parallel paths", R"({"integrator": {"type": "path_tracing"}, "camera": {"projection": "orthographic"}})",
+     Part::lower_left, Part::right},
+    {"whole", R"({"integrator": {"type": "scene"}, "lights": [{"kind": "constant"}]})", Part::none, Part::none},
+};
+
+struct Rendered {
+  Scene scene;
+  Render render;
+  Image display;
+};
+
+/// @param annotations  The value of the key; null: it is not given.
+Rendered rendered(const MethodCase& method, const Json& annotations) {
+  Json json = Json::parse(method.text);
+  json["field"] = {{"generate", {{"kind", "helix"}, {"resolution", 9}}}, {"scale", 0.6}};
+  json["light"] = {{"photons", 2000}, {"wavelengths", {{"count", 4}}}};
+  json["receiver"] = {{"size", {2.5, 2.5}}, {"resolution", {size, size}}};
+  json["camera"]["resolution"] = {size, size};
+  for (const auto& [key, value] : {std::pair("max_samples", 4), {"min_samples", 4}, {"bands", 8}})
+    json["integrator"][key] = value;
+  json["integrator"]["seeds"] = {{"count", 20}};
+  if (!annotations.is_null()) json["output"] = {{"annotations", annotations}};
+  Scene scene = load_scene(read_scene_json(json, "scene.json"), Progress());
+  Render render = tensorray::render(scene, Progress());
+  Image display = display_image(scene, render, true);
+  return {std::move(scene), std::move(render), std::move(display)};
+}
+
+bool is_within(Part part, int x, int y) {
+  switch (part) {
+    case Part::lower_left:
+      return 2 * x < size && 4 * y > 3 * size;
+    case Part::upper_left:
+      return 2 * x < size && 2 * y < size;
+    case Part::upper_right:
+      return 4 * x > size && 4 * y < size;
+    case Part::right:
+      return 2 * x > size;
+    default:
+      return false;
+  }
+}
+
+/// Expects that two pictures differ within a part of them, and nowhere else.
+void expect_only_within(Part part, const Image& with, const Image& without, const std::string& what) {
+  ASSERT_EQ(with.channels, without.channels) << what;
+  std::size_t within = 0, elsewhere = 0;
+  for (int y = 0; y < with.height; ++y)
+    for (int x = 0; x < with.width; ++x)
+      if (!std::equal(with.pixel(x, y), with.pixel(x, y) + with.channels.size(), without.pixel(x, y)))
+        ++(is_within(part, x, y) ? within : elsewhere);
+  const bool is_drawn = part != Part::none && part != Part::changes_nothing;
+  EXPECT_EQ(within > 20, is_drawn) << what;
+  EXPECT_EQ(elsewhere, 0u) << what;
+}
+
+TEST(Annotations, AreInTheirCornersAndNowhereElse) {
+  for (const MethodCase& method : methods) {
+    const Rendered plain = rendered(method, nullptr);
+    EXPECT_EQ(rendered(method, Json::array()).display.pixels, plain.display.pixels) << method.name;
+    const std::vector<std::pair<std::string, Part>> parts{
+        {"scale", method.scale}, {"axes", Part::upper_left}, {"legend", method.legend}};
+    for (const auto& [annotation, part] : parts) {
+      const Rendered annotated = rendered(method, annotation);
+      const std::string what = annotation + " of " + method.name;
+      expect_only_within(part, annotated.display, plain.display, what);
+      EXPECT_EQ(annotated.render.linear.pixels, plain.render.linear.pixels) << what;  // What an EXR holds.
+      const std::size_t warnings = annotated.render.warnings.size() - plain.render.warnings.size();
+      EXPECT_EQ(warnings, part == Part::none ? 1u : 0u) << what;
+      if (part == Part::none) {
+        EXPECT_THAT(annotated.render.warnings.back(), HasSubstr("/output/annotations")) << what;
+      }
+    }
+  }
+}
+
+/// Pixels of a plate have its size / resolution, those of an orthographic camera its height / resolution.
+TEST(Annotations, KnowTheSizeOfPixels) {
+  Plate plate;
+  plate.size = {3, 2};
+  plate.resolution = {600, 100};
+  EXPECT_DOUBLE_EQ(view_of(plate).pixel_size.value(), 0.005);
+  const Eigen::Vector3d position(0, -5, 0), target(0, 0, 0), up(0, 0, 1);
+  const Camera parallel = orthographic_camera(position, target, up, 4, {100, 200});
+  EXPECT_DOUBLE_EQ(view_of(parallel).pixel_size.value(), 0.02);
+  EXPECT_TRUE(view_of(parallel).right.isApprox(Eigen::Vector3d::UnitX()));
+  EXPECT_TRUE(view_of(parallel).up.isApprox(Eigen::Vector3d::UnitZ()));
+  EXPECT_FALSE(view_of(perspective_camera(position, target, up, 30, {100, 200})).pixel_size);
+}
+
+SceneDescription described(const Json& annotations) {
+  return read_scene_json({{"field", {{"file", "a.vdb"}}},
+                          {"integrator", {{"type", "photon_distribution"}}},
+                          {"output", {{"annotations", annotations}}}},
+                         "scene.json");
+}
+
+TEST(Annotations, AreAListOfNames) {
+  EXPECT_THAT(described(Json::array()).output.annotations, IsEmpty());
+  EXPECT_THAT(described({"legend", "scale"}).output.annotations, ElementsAre(Annotation::legend, Annotation::scale));
+  EXPECT_THAT(described("axes").output.annotations, ElementsAre(Annotation::axes));
+  for (const Json& wrong : {Json("bar"), Json({"axes", "bar"}), Json({"axes", "axes"}), Json(true), Json({1, 2})}) {
+    try {
+      described(wrong);
+      ADD_FAILURE() << wrong;
+    } catch (const SceneError& error) {
+      EXPECT_THAT(error.what(), HasSubstr(R"(`/output/annotations` must be a list of "scale", "axes", "legend")"));
+    }
+  }
+}
+
+}  // namespace
+}  // namespace tensorray

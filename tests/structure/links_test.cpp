@@ -1,0 +1,158 @@
+// The links of all pages in Markdown: files, folders and pictures that exist, and headings, by the anchors that GitHub
+// gives them.
+
+#include <cctype>
+#include <filesystem>
+#include <fstream>
+#include <istream>
+#include <map>
+#include <regex>
+#include <set>
+#include <sstream>
+#include <string>
+#include <vector>
+
+#include <gtest/gtest.h>
+
+#include "tests/data_folder.h"
+
+namespace tensorray {
+namespace {
+
+namespace fs = std::filesystem;
+
+/// The lines of a page without blocks of code: those between fences, and those that are indented after an empty line.
+std::vector<std::string> prose_of(std::istream& page) {
+  std::vector<std::string> lines;
+  bool is_fenced = false, may_begin_code = true;
+  for (std::string line; std::getline(page, line);) {
+    const bool is_fence = line.rfind("```", 0) == 0;
+    const bool is_code = is_fenced || is_fence || (may_begin_code && line.rfind("    ", 0) == 0);
+    if (is_fence) is_fenced = !is_fenced;
+    may_begin_code = line.empty() || is_code;
+    lines.push_back(is_code ? "" : line);
+  }
+  return lines;
+}
+
+/// The anchor of a heading: letters, digits, `_` and `-` in lower case, and `-` for blanks. All of a character beyond
+/// ASCII counts as a letter.
+std::string anchor_of(const std::string& heading) {
+  std::string anchor;
+  for (const char c : std::regex_replace(heading, std::regex(R"(\[([^\]]*)\]\([^)]*\))"), "$1")) {
+    const auto byte = static_cast<unsigned char>(c);
+    if (std::isalnum(byte) || byte >= 0x80 || c == '_' || c == '-') anchor += static_cast<char>(std::tolower(byte));
+    if (c == ' ') anchor += '-';
+  }
+  return anchor;
+}
+
+/// The anchors of a page: of equal ones, the second ends in -1, and so on.
+std::set<std::string> anchors_in(std::istream& page) {
+  static const std::regex heading("#{1,6} +(.*)");
+  std::map<std::string, int> counts;
+  std::set<std::string> anchors;
+  for (const std::string& line : prose_of(page)) {
+    std::smatch match;
+    if (!std::regex_match(line, match, heading)) continue;
+    const std::string anchor = anchor_of(match[1]);
+    const int count = counts[anchor]++;
+    anchors.insert(count == 0 ? anchor : anchor + "-" + std::to_string(count));
+  }
+  return anchors;
+}
+
+/// Where the links and the pictures of a page lead, without those that are within code.
+std::vector<std::string> targets_in(std::istream& page) {
+  static const std::regex target(R"(\]\(([^()\s]+)\)|<(?:img|a) (?:src|href)="([^"]*)\")");
+  std::string text;
+  bool is_code = false;
+  for (const std::string& line : prose_of(page)) {
+    if (line.empty()) is_code = false;  // Code within a text ends with its paragraph.
+    for (const char c : line) {
+      if (c == '`') is_code = !is_code;
+      if (!is_code) text += c;
+    }
+    text += '\n';
+  }
+  std::vector<std::string> targets;
+  for (std::sregex_iterator match(text.begin(), text.end(), target), end; match != end; ++match)
+    targets.push_back((*match)[1].matched ? (*match)[1] : (*match)[2]);
+  return targets;
+}
+
+/// What is wrong with a link on a page; empty: nothing.
+std::string fault_of(const fs::path& page, const std::string& target) {
+  if (std::regex_search(target, std::regex("^[a-z]+:"))) return "";  // Of another site.
+  const std::size_t hash = target.find('#');
+  const fs::path file = hash == 0 ? page : (page.parent_path() / target.substr(0, hash)).lexically_normal();
+  if (fs::relative(file, test::source_folder()).string().rfind("..", 0) == 0) return "leads out of the project";
+  if (!fs::exists(file)) return "does not exist";
+  if (hash == std::string::npos) return "";
+  std::ifstream stream(file);
+  return anchors_in(stream).count(target.substr(hash + 1)) ? "" : "no heading has this anchor";
+}
+
+/// All pages of the project.
+std::vector<fs::path> pages() {
+  std::vector<fs::path> found;
+  for (fs::recursive_directory_iterator entry(test::source_folder()), end; entry != end; ++entry) {
+    const std::string name = entry->path().filename().string();
+    const bool is_made_here = name == "build" || name == "node_modules" || name.front() == '.';
+    if (entry->is_directory() && is_made_here) entry.disable_recursion_pending();
+    if (entry->path().extension() == ".md") found.push_back(entry->path());
+  }
+  return found;
+}
+
+TEST(Links, LeadSomewhere) {
+  std::size_t count = 0;
+  for (const fs::path& page : pages()) {
+    std::ifstream stream(page);
+    for (const std::string& target : targets_in(stream)) {
+      EXPECT_EQ(fault_of(page, target), "") << fs::relative(page, test::source_folder()).string() << ": " << target;
+      ++count;
+    }
+  }
+  EXPECT_GT(count, 100u);
+}
+
+/// Otherwise only a search finds it.
+TEST(Links, LeadFromTheReadmeToEachPageForUsers) {
+  std::ifstream stream(test::source_folder() / "README.md");
+  std::set<fs::path> linked;
+  for (const std::string& target : targets_in(stream)) linked.insert(fs::path(target.substr(0, target.find('#'))));
+  for (const char* folder : {"docs", "docs/tutorials"})
+    for (const auto& entry : fs::directory_iterator(test::source_folder() / folder))
+      if (entry.path().extension() == ".md") {
+        const fs::path page = fs::relative(entry.path(), test::source_folder());
+        EXPECT_TRUE(linked.count(page)) << "README.md does not link to " << page;
+      }
+}
+
+TEST(Links, AnchorsAreThoseOfGitHub) {
+  EXPECT_EQ(anchor_of("`light` and `lights`"), "light-and-lights");
+  EXPECT_EQ(anchor_of("Figure 4: the point load, light on a plate"), "figure-4-the-point-load-light-on-a-plate");
+  EXPECT_EQ(anchor_of("per_photon (a [link](page.md))"), "per_photon-a-link");
+  std::istringstream page("# A B\n\n## a b\n\n    # code\n\n```\n# code\n```\n");
+  EXPECT_EQ(anchors_in(page), (std::set<std::string>{"a-b", "a-b-1"}));
+}
+
+TEST(Links, ThatLeadNowhereAreNamed) {
+  const fs::path page = test::source_folder() / "docs" / "view.md";
+  EXPECT_EQ(fault_of(page, "../README.md#more"), "");
+  EXPECT_EQ(fault_of(page, "gallery/"), "");
+  EXPECT_EQ(fault_of(page, "README.md"), "does not exist");
+  EXPECT_EQ(fault_of(page, "../README.md#less"), "no heading has this anchor");
+  EXPECT_EQ(fault_of(page, "#less"), "no heading has this anchor");
+  EXPECT_EQ(fault_of(page, "../../README.md"), "leads out of the project");
+}
+
+TEST(Links, AreFoundOutsideOfCode) {
+  std::istringstream page(
+      "[a](a.md) ![](b.png) `[c](c.md)`\n    [d](d.md#e)\n\n    [code](f.md)\n\n<img src=\"g.png\" width=\"1\">\n");
+  EXPECT_EQ(targets_in(page), (std::vector<std::string>{"a.md", "b.png", "d.md#e", "g.png"}));
+}
+
+}  // namespace
+}  // namespace tensorray
