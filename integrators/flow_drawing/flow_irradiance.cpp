@@ -123,11 +123,12 @@ std::vector<CausticBand> bands_of(const LandingLight& light, const FlowMap& map,
 std::vector<float> sheets_of(const FlowMap& map, const Eigen::Vector2i& resolution) {
   FlowPicture picture;
   picture.resolution = resolution;
-  const FlowView view(map, picture, {static_cast<double>(map.wavelengths - 1) / 2}, 1);
+  const double place = static_cast<double>(map.wavelengths - 1) / 2;
+  const FlowView view(map, picture, {FlowRange{place, place}}, 1);
   std::vector<float> sheets(static_cast<std::size_t>(resolution.x()) * static_cast<std::size_t>(resolution.y()));
   tbb::parallel_for(0, view.tiles(), [&](int tile) {
     std::vector<FlowPoint> points;
-    view.draw(tile, 1, 0, {}, points);
+    view.draw(tile, 1, 0, place, {}, points);
     const Eigen::AlignedBox2i box = view.pixels(tile);
     auto point = points.begin();
     for (int y = box.min().y(); y <= box.max().y(); ++y)

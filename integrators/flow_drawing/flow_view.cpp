@@ -179,6 +179,29 @@ struct Corners {
   }
 };
 
+/// The ends of a range, and the map's wavelength samples between them: light moves straight from each to the next.
+std::vector<double> knots_of(const FlowRange& range) {
+  std::vector<double> knots{range.first};
+  for (double sample = std::floor(range.first) + 1; sample < range.last; ++sample) knots.push_back(sample);
+  if (range.last > range.first) knots.push_back(range.last);
+  return knots;
+}
+
+/// The part of the picture, in pixels, that a triangle may cover between some wavelengths; empty: it covers none.
+/// @param landings  Of all vertices, by wavelength.
+Eigen::AlignedBox2d reach_of(const FlowMap& map, const FlowPicture& picture, const FlowTriangle& triangle,
+                             const std::vector<std::vector<FlowLanding>>& landings) {
+  Eigen::AlignedBox2d reach;
+  bool is_mapped = picture.side == FlowSide::starts;
+  for (const std::vector<FlowLanding>& each : landings) {
+    const Corners corners(map, picture, triangle, [&](auto i) -> const auto& { return each[i]; });
+    is_mapped = is_mapped || corners.is_mapped;
+    for (const Corner& corner : corners.corners)
+      if (picture.side == FlowSide::starts || corner.end == RayEnd::plate) reach.extend(corner.sample);
+  }
+  return is_mapped ? reach : Eigen::AlignedBox2d();
+}
+
 }  // namespace
 
 PrincipalStretch principal_stretch(const Matrix2d& m) {
@@ -190,17 +213,17 @@ PrincipalStretch principal_stretch(const Matrix2d& m) {
           std::atan2(2 * square(0, 1), square(0, 0) - square(1, 1)) / 2};
 }
 
-FlowView::FlowView(const FlowMap& map, const FlowPicture& picture, std::vector<double> wavelengths, int samples)
+FlowView::FlowView(const FlowMap& map, const FlowPicture& picture, std::vector<FlowRange> ranges, int samples)
     : map_(map),
       picture_(picture),
-      wavelengths_(std::move(wavelengths)),
+      ranges_(std::move(ranges)),
       samples_(samples),
       columns_((picture.resolution.x() + tile_size - 1) / tile_size),
       rows_((picture.resolution.y() + tile_size - 1) / tile_size),
       checks_(map.checks()),
-      sorted_(wavelengths_.size()) {
+      sorted_(ranges_.size()) {
   find_jacobians();
-  tbb::parallel_for(std::size_t{0}, wavelengths_.size(), [&](std::size_t wavelength) { sort_triangles(wavelength); });
+  tbb::parallel_for(std::size_t{0}, ranges_.size(), [&](std::size_t range) { sort_triangles(range); });
 }
 
 Eigen::AlignedBox2i FlowView::pixels(int tile) const {
@@ -229,20 +252,20 @@ void FlowView::find_jacobians() {
   });
 }
 
-void FlowView::sort_triangles(std::size_t wavelength) {
+void FlowView::sort_triangles(std::size_t range) {
   struct Tiles {
     std::uint32_t triangle;
     int left, top, right, bottom;
   };
   std::vector<Tiles> touched;
-  std::vector<FlowLanding> landings(map_.starts.size());
-  for (std::size_t i = 0; i < landings.size(); ++i) landings[i] = landing_at(map_, i, wavelengths_[wavelength]);
+  const std::vector<double> places = knots_of(ranges_[range]);
+  std::vector<std::vector<FlowLanding>> landings(places.size(), std::vector<FlowLanding>(map_.starts.size()));
+  for (std::size_t k = 0; k < places.size(); ++k)
+    for (std::size_t i = 0; i < landings[k].size(); ++i) landings[k][i] = landing_at(map_, i, places[k]);
   const Eigen::Array2d last = picture_.resolution.cast<double>().array() - 1;
   for (std::uint32_t t = 0; t < map_.triangles.size(); ++t) {
-    const Corners corners(
-        map_, picture_, map_.triangles[t], [&](auto i) -> const auto& { return landings[i]; });
-    if (!corners.is_mapped && picture_.side == FlowSide::landings) continue;
-    const Eigen::AlignedBox2d box = corners.box();
+    const Eigen::AlignedBox2d box = reach_of(map_, picture_, map_.triangles[t], landings);
+    if (box.isEmpty()) continue;
     if (!has_samples(box, 1) && !has_samples(box, samples_)) continue;
     if ((box.min().array() > last + 1).any() || (box.max().array() < 0).any()) continue;
     const Eigen::Array2i first = (box.min().array().max(0.0).min(last) / tile_size).cast<int>(),
@@ -255,7 +278,7 @@ void FlowView::sort_triangles(std::size_t wavelength) {
         for (int x = tiles.left; x <= tiles.right; ++x)
           call(static_cast<std::size_t>(y * columns_ + x), tiles.triangle);
   };
-  Sorted& sorted = sorted_[wavelength];
+  Sorted& sorted = sorted_[range];
   sorted.first_of_tile.assign(static_cast<std::size_t>(tiles()) + 1, 0);
   for_each_tile([&](std::size_t tile, std::uint32_t) { ++sorted.first_of_tile[tile + 1]; });
   std::partial_sum(sorted.first_of_tile.begin(), sorted.first_of_tile.end(), sorted.first_of_tile.begin());
@@ -279,16 +302,16 @@ struct FlowView::TileSamples {
   }
 };
 
-void FlowView::draw(int tile, int n, std::size_t wavelength, const std::vector<char>& wanted,
+void FlowView::draw(int tile, int n, std::size_t range, double place, const std::vector<char>& wanted,
                     std::vector<FlowPoint>& points) const {
   const Eigen::AlignedBox2i box = pixels(tile);
   const Eigen::AlignedBox2i samples(n * box.min(), n * (box.max() + Eigen::Vector2i(1, 1)) - Eigen::Vector2i(1, 1));
   const auto count = static_cast<std::size_t>((samples.sizes() + Eigen::Vector2i(1, 1)).prod());
   points.assign(count, FlowPoint());
   TileSamples drawn{samples, n, wanted, points, std::vector<double>(count, std::numeric_limits<double>::infinity())};
-  const Sorted& sorted = sorted_[wavelength];
+  const Sorted& sorted = sorted_[range];
   for (std::uint32_t i = sorted.first_of_tile[tile]; i < sorted.first_of_tile[tile + 1]; ++i)
-    draw_triangle(map_.triangles[sorted.triangles[i]], wavelengths_[wavelength], drawn);
+    draw_triangle(map_.triangles[sorted.triangles[i]], place, drawn);
 }
 
 /// Sets the slope and the length of a corner: linear between the wavelength samples that have them.

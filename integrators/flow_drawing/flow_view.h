@@ -37,6 +37,11 @@ struct FlowPicture {
   Eigen::Affine2d straight = Eigen::Affine2d::Identity();
 };
 
+/// A range of a flow map's light: from one place among its wavelength samples to another. One wavelength if they agree.
+struct FlowRange {
+  double first = 0, last = 0;
+};
+
 /// The stretch of a linear map along its two principal directions.
 struct PrincipalStretch {
   Eigen::Vector2d logs{0, 0};  ///< ln σ₁ >= ln σ₂ of the Jacobian; −∞ where it is singular, 0 where it is not finite.
@@ -54,9 +59,9 @@ class FlowView {
   static constexpr std::size_t tiles_at_once = 2048;  ///< That processes give each other in one message: no more than
                                                       ///< 700 MB, for pictures with 128 bands.
 
-  /// @param wavelengths  For `draw`: places among the map's wavelength samples.
-  /// @param samples      `draw` has so many samples of a pixel along x and along y, or one.
-  FlowView(const FlowMap& map, const FlowPicture& picture, std::vector<double> wavelengths, int samples);
+  /// @param ranges   The light that `draw` can draw.
+  /// @param samples  `draw` has so many samples of a pixel along x and along y, or one.
+  FlowView(const FlowMap& map, const FlowPicture& picture, std::vector<FlowRange> ranges, int samples);
 
   int tiles() const { return columns_ * rows_; }
 
@@ -65,19 +70,20 @@ class FlowView {
 
   /// Sets `points` to what the samples of a tile see, row by row: n × n samples of each pixel, at the middles of its
   /// equal parts.
-  /// @param wavelength  Index in the list of wavelengths.
-  /// @param wanted      By pixel of the tile: whether its samples are drawn. Empty: all are.
-  void draw(int tile, int n, std::size_t wavelength, const std::vector<char>& wanted,
+  /// @param range   Index in the list of ranges.
+  /// @param place   The wavelength's place among the map's samples, in the range.
+  /// @param wanted  By pixel of the tile: whether its samples are drawn. Empty: all are.
+  void draw(int tile, int n, std::size_t range, double place, const std::vector<char>& wanted,
             std::vector<FlowPoint>& points) const;
 
  private:
   void find_jacobians();
-  void sort_triangles(std::size_t wavelength);
+  void sort_triangles(std::size_t range);
   void set_slope(double place, std::uint32_t vertex, Eigen::Matrix2f& jacobian, float& length) const;
   struct TileSamples;
   void draw_triangle(const FlowTriangle& triangle, double place, TileSamples& tile) const;
 
-  /// Triangles that contain samples, by the tile that they touch.
+  /// Triangles that contain samples at some wavelength of a range, by the tile that they touch.
   struct Sorted {
     std::vector<std::uint32_t> first_of_tile;  // Ranges of `triangles`; one more than there are tiles.
     std::vector<std::uint32_t> triangles;
@@ -85,12 +91,12 @@ class FlowView {
 
   const FlowMap& map_;
   const FlowPicture picture_;
-  const std::vector<double> wavelengths_;
+  const std::vector<FlowRange> ranges_;
   const int samples_;
   int columns_, rows_;
   std::size_t checks_;                      // Number of the map's wavelength samples that have Jacobians and lengths.
   std::vector<Eigen::Matrix2f> jacobians_;  // ∂landing/∂start of vertices, at these samples.
-  std::vector<Sorted> sorted_;              // By wavelength.
+  std::vector<Sorted> sorted_;              // By range.
 };
 
 }  // namespace tensorray

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <atomic>
 #include <cmath>
+#include <functional>
 #include <stdexcept>
 #include <thread>
 
@@ -124,7 +125,7 @@ LensPoint make_point(const LensView& view, const Vector2d& pixel, const FlowPoin
 void draw_tile(const LensView& view, int tile, LensPicture& picture, TraceCounts& counts) {
   const Eigen::AlignedBox2i box = view.flow.pixels(tile);
   const int columns = box.sizes().x() + 1, rows = box.sizes().y() + 1;
-  const std::size_t reference = view.wavelengths.size() - 1;
+  const std::size_t reference = view.reference;
   const TileView centers = view_tile(view, tile, 1, {{0, 0, reference, reference}}, {}, counts);
   TileShader shader(view, tile, counts);
   PixelLight light;
@@ -223,8 +224,17 @@ LensLight trace_lens(const TensorField& field, const Surfaces& surfaces, const B
   light.landings = plate_of_landings(light);
   const Eigen::AlignedBox2d starts =
       back ? Eigen::AlignedBox2d(-receiver.size / 2, receiver.size / 2) : useful_starts(light, surfaces.bounds);
-  light.map = trace_flow_map(field, light.planes.geometry(), beam_from(from, starts, along), bending,
-                             flow_settings(light), progress);
+  FlowSettings flow = flow_settings(light);
+  if (settings.show)
+    flow.show = [&](const std::function<FlowMap()>& so_far) {
+      settings.show([&]() -> const LensLight& {
+        light.map = so_far();
+        light.settings.team = nullptr;
+        return light;
+      });
+      light.settings.team = settings.team;
+    };
+  light.map = trace_flow_map(field, light.planes.geometry(), beam_from(from, starts, along), bending, flow, progress);
   light.seconds_tracing = seconds_since(start);
   return light;
 }

@@ -59,6 +59,8 @@ struct LensBand {
 using LensRadiance =
     std::function<void(const Eigen::Vector3d& rgb, std::size_t first, std::size_t last, double* radiances)>;
 
+struct LensLight;
+
 struct LensSettings {
   LensMode mode = LensMode::scatter;
   int samples = 1;       ///< Samples per pixel along x and along y; > 0.
@@ -69,8 +71,12 @@ struct LensSettings {
   std::vector<double> flexibilities;
   bool range = false;
 
-  Team* team = nullptr;  ///< Processes that trace the same light and draw it together; null: this one is alone.
+  Team* team = nullptr;         ///< Processes that trace the same light and draw it together; null: this one is alone.
   KeptResults* kept = nullptr;  ///< As FlowSettings has it; with those of a shard, the light cannot be drawn.
+
+  /// Called after each division of the map's quads, with a function that gives the light so far, which this process
+  /// alone can draw. Empty: nobody wants it.
+  std::function<void(const std::function<const LensLight&()>& so_far)> show;
 };
 
 /// Why a pixel sees the image, or does not. The values are the ends of rays: `image` is a ray that landed on the image,

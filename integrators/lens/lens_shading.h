@@ -17,6 +17,7 @@ struct PixelLight {
 };
 
 /// Shades the pixels of a tile. Light that hardly moves from band to band is looked at for several bands together.
+/// Where light of a band sees two sheets of the image, or the image and nothing, the band is looked at in parts.
 class TileShader {
  public:
   TileShader(const LensView& view, int tile, TraceCounts& counts);
@@ -28,16 +29,19 @@ class TileShader {
 
  private:
   void find_sweeps();
+  bool is_bent(std::size_t pixel) const;
   bool moves_smoothly() const;
   void interpolate();
   TileView view_samples(const std::vector<Span>& spans, bool still);
+  void view_torn_bands();
 
   const LensView& view_;
   const int tile_, columns_;
   TraceCounts& counts_;
   std::vector<Span> few_, spans_;  // For light that is hardly spread, and for all light of the tile.
   TileView whole_;                 // A sample for each pixel, at the wavelengths of `few_` and `spans_`.
-  std::vector<double> sweeps_;     // By pixel: the length of the line that it sees, in pixels. Infinite: it is not one.
+  std::vector<double> sweeps_;     // By pixel: the length of the line that it sees, in pixels. Infinite: it is not one,
+                                   // or one sample does not tell what the pixel sees of it.
   TileView few_samples_, samples_;  // All samples of the pixels that need them: at `few_`, and at all wavelengths.
 };
 

@@ -12,6 +12,8 @@ using Eigen::Affine2d;
 using Eigen::Matrix2d;
 using Eigen::Vector2d;
 
+constexpr int band_parts = 8;  // In which light that is torn within a band is looked at.
+
 /// The view of a map whose `other` ends are pixels of the landings (gather) or coordinates of starts (scatter).
 FlowPicture flow_picture(const LensLight& light) {
   FlowPicture picture;
@@ -39,7 +41,7 @@ void trace_unknown(const LensView& view, const Eigen::AlignedBox2i& pixels, int 
   for (std::size_t wavelength = 0; wavelength < points.size(); ++wavelength) {
     if (points[wavelength].empty()) continue;
     drawn.push_back(&points[wavelength]);
-    flexibilities.push_back(-flexibility_at(view.light, view.wavelengths[wavelength]));
+    flexibilities.push_back(-flexibility_at(view.light, view.wavelengths[wavelength].place));
   }
   std::vector<std::size_t> unknown;
   std::vector<Vector2d> starts;
@@ -83,19 +85,30 @@ double sample_place(const LensLight& light, double place) {
 }
 
 LensView make_lens_view(const LensLight& light, const std::vector<LensBand>& bands, const LensRadiance& radiance) {
-  std::vector<double> wavelengths;
+  std::vector<LensWavelength> wavelengths;
+  std::vector<FlowRange> ranges;
   std::vector<Span> spans;
+  std::vector<std::vector<Span>> parts(bands.size());
   const auto index_of = [&](double place) {
-    const double at = sample_place(light, place);
-    if (wavelengths.empty() || wavelengths.back() != at) wavelengths.push_back(at);
+    if (wavelengths.empty() || wavelengths.back().place != place) wavelengths.push_back({place, ranges.size() - 1});
     return wavelengths.size() - 1;
   };
   for (std::size_t band = 0; band < bands.size(); ++band) {
-    const std::size_t from = index_of(bands[band].begin);
-    spans.push_back({band, band + 1, from, index_of(bands[band].end)});
+    const double begin = sample_place(light, bands[band].begin), end = sample_place(light, bands[band].end);
+    ranges.push_back({begin, end});
+    std::size_t from = index_of(begin);
+    spans.push_back({band, band + 1, from, from});
+    for (int i = 1; i <= band_parts && end != begin; ++i) {
+      const double part = static_cast<double>(i) / band_parts;
+      const std::size_t to = index_of(i == band_parts ? end : begin + part * (end - begin));
+      parts[band].push_back({band, band + 1, from, to, 1.0 / band_parts});
+      spans.back().to = from = to;
+    }
   }
-  wavelengths.push_back(sample_place(light, light.settings.reference));
-  FlowView flow(light.map, flow_picture(light), wavelengths, light.settings.samples);
+  const double reference = sample_place(light, light.settings.reference);
+  ranges.push_back({reference, reference});
+  wavelengths.push_back({reference, ranges.size() - 1});
+  FlowView flow(light.map, flow_picture(light), std::move(ranges), light.settings.samples);
   const Eigen::Matrix2d st_by_pixel =
       light.setup.image.plane.size.cwiseInverse().asDiagonal() * light.straight.linear();
   return {light,
@@ -104,7 +117,9 @@ LensView make_lens_view(const LensLight& light, const std::vector<LensBand>& ban
           to_pixels(light.setup.receiver),
           to_pixels(light.landings),
           std::move(spans),
-          std::move(wavelengths),
+          wavelengths,
+          std::move(parts),
+          wavelengths.size() - 1,
           st_by_pixel.colwise().norm().maxCoeff(),
           std::move(flow)};
 }
@@ -128,7 +143,8 @@ TileView view_tile(const LensView& view, int tile, int n, const std::vector<Span
   TileView points(view.wavelengths.size());
   for (const Span& span : spans)
     for (const std::size_t wavelength : {span.from, span.to})
-      if (points[wavelength].empty()) view.flow.draw(tile, n, wavelength, wanted, points[wavelength]);
+      if (const auto& [place, range] = view.wavelengths[wavelength]; points[wavelength].empty())
+        view.flow.draw(tile, n, range, place, wanted, points[wavelength]);
   if (gathers(view.light)) trace_unknown(view, view.flow.pixels(tile), n, points, counts);
   return points;
 }

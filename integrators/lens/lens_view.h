@@ -16,6 +16,16 @@ namespace tensorray {
 /// wavelengths `from` and `to` (indices) sees, and what is between.
 struct Span {
   std::size_t first, last, from, to;
+  double part = 1;  ///< Of the light of the bands; less than 1: the span is a part of one band.
+
+  /// In bands.
+  double width() const { return part * static_cast<double>(last - first); }
+};
+
+/// A wavelength that can be looked at.
+struct LensWavelength {
+  double place;       ///< Among the map's wavelength samples.
+  std::size_t range;  ///< Of LensView::flow: a band, or the reference.
 };
 
 /// The light of a lens, ready to be looked at. Immutable; threads share it.
@@ -26,8 +36,10 @@ struct LensView {
   Eigen::Affine2d starts;    ///< From coordinates to pixels, in the plane where the map's light starts in `gather`.
   Eigen::Affine2d landings;  ///< From coordinates to pixels, in the plane where it lands.
   std::vector<Span> spans;   ///< Each band.
-  std::vector<double> wavelengths;  ///< Places among the map's wavelength samples: the ends of bands; the reference.
-  double straight_pixel;            ///< The change of (s, t) per pixel for straight light, at most.
+  std::vector<LensWavelength> wavelengths;  ///< The ends of bands and of their parts; the reference.
+  std::vector<std::vector<Span>> parts;     ///< Of each band that is a range, in equal parts; else empty.
+  std::size_t reference;                    ///< Index of the wavelength.
+  double straight_pixel;                    ///< The change of (s, t) per pixel for straight light, at most.
   FlowView flow;
 };
 

@@ -205,11 +205,11 @@ void ChunkTracer::fill_batch(std::size_t begin, std::size_t end, Worker& worker)
 void ChunkTracer::trace_batch(Worker& worker, PhotonSums& sums) const {
   tensorray::trace(job_.field, job_.geometry, job_.settings.bending, worker.batch,
                    sums.fluence ? &worker.records : nullptr);
-  if (!sums.fluence) return;
-  for (std::size_t i = 0; i < worker.batch.size(); ++i) {
+  for (std::size_t i = 0; sums.fluence && i < worker.batch.size(); ++i) {
     record_way_out(job_, worker.batch, i, worker.records[i]);
     sums.fluence->add(worker.channels[i], worker.records[i]);
   }
+  if (job_.sides) job_.sides->mark(worker.batch);
 }
 
 /// Counts the rays of a batch and writes their landings: those of the first ray of each position from `landings` on,

@@ -3,6 +3,7 @@
 /// Traces photons in chunks of positions. What a chunk gives is a function of its number alone.
 
 #include <cstdint>
+#include <optional>
 #include <vector>
 
 #include <Eigen/Core>
@@ -13,6 +14,7 @@
 #include "integrators/bending/geometry.h"
 #include "integrators/bending/light_channel.h"
 #include "integrators/bending/ray_record.h"
+#include "integrators/bending/side_faces.h"
 #include "integrators/photons/photon_distribution.h"
 #include "integrators/photons/photon_sums.h"
 #include "renderer/density/kernel_deposit.h"
@@ -48,6 +50,7 @@ struct PhotonJob {
   int rays_per_position = 0;
   int channels_per_ray = 0;  ///< A ray carries one of this number of channels.
   double ray_area = 0;
+  std::optional<SideFaces> sides = {};  ///< If light that leaves through them does not count.
 
   std::uint64_t chunk_size() const;  ///< Positions of a chunk; the last one may have fewer.
   std::uint64_t chunks() const { return (positions.candidates() + chunk_size() - 1) / chunk_size(); }

@@ -140,7 +140,8 @@ class PhotonUnits {
       clear_sums();
       return;
     }
-    if (work_) work_->keep(unit, bytes_of(sums_), is_done);
+    // What a picture follows from at once, and is all there is, need not be kept: it takes memory.
+    if (work_ && (!is_done || units_ > 1 || work_->is_shard)) work_->keep(unit, bytes_of(sums_), is_done);
     seconds_keeping_ = seconds_since(start);
     if (!is_done) show();
     kept_ = Clock::now();
@@ -180,6 +181,7 @@ PhotonDistribution distribute_photons(const TensorField& field, const Geometry& 
   const BeamSampler positions(beam, settings.pattern, settings.photons, settings.seed);
   // The references first; each has a different type, so that they cannot be confused.
   PhotonJob job{field, geometry, beam, channels, settings, progress, positions, PixelMap(*geometry.surfaces().plate)};
+  if (!settings.side_light) job.sides.emplace(field, beam.direction);
   job.rays_per_position = rays;
   job.channels_per_ray = static_cast<int>(channels.size()) / rays;
   job.ray_area = positions.area_per_candidate() * static_cast<double>(channels.size()) / rays;

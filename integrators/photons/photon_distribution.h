@@ -32,6 +32,7 @@ struct PhotonSettings {
   /// Number of channels that each position carries, stratified; a divisor of the number of channels; 0: all.
   int channels_per_photon = 0;
   std::uint64_t seed = 0;
+  bool side_light = true;  ///< Whether light that leaves the volume by a side face counts (SideFaces).
   DensitySettings density;
   bool keep_photons = false;  ///< Whether to return the photon map, which takes 44 bytes for each photon and channel.
   FluenceKind fluence = FluenceKind::none;

@@ -36,6 +36,7 @@ struct StretchParts {
   std::uint64_t hash;                              // Of what they depend on.
   std::function<float*(std::size_t part)> values;  // Where its numbers are.
   std::function<void(std::size_t part)> compute;   // Sets them.
+  std::function<void()> show = {};                 // Called from time to time; may be empty.
 };
 
 /// Computes parts on all threads, or takes them from those that were kept.
@@ -48,6 +49,7 @@ class StretchComputer {
     for (std::size_t first = 0; first < parts_.count; first += stretch_chunk) {
       progress.update("tracing rays", first, parts_.count);
       if (kept_ && (progress.cancelled || kept_->is_due())) keep(first);
+      if (first > 0 && parts_.show) parts_.show();
       const std::size_t last = std::min(first + stretch_chunk, parts_.count);
       tbb::parallel_for(first, last, [&](std::size_t part) {
         if (progress.cancelled) throw Cancelled();
@@ -220,6 +222,7 @@ std::vector<float> stretch_picture(const TensorField& field, const Geometry& geo
                      hash_of_stretch(settings, {corner.x(), corner.y(), corner.z(), opposite.x(), opposite.y(),
                                                 opposite.z(), static_cast<double>(height)}),
                      [&](std::size_t y) { return &picture[y * width]; }, compute};
+  if (settings.show) parts.show = [&] { settings.show(picture); };
   StretchComputer(std::move(parts), settings).run(progress);
   return picture;
 }

@@ -4,6 +4,7 @@
 /// Distinguished material surfaces and coherent structures in three-dimensional fluid flows, Physica D 149, 2001) of
 /// the flow along the rays. Length along the ray takes the place of time.
 
+#include <functional>
 #include <vector>
 
 #include <Eigen/Core>
@@ -31,6 +32,9 @@ struct StretchSettings {
   Team* team = nullptr;         ///< Processes that compute the same together, for process 0; null: alone.
   KeptResults* kept = nullptr;  ///< Rows of pictures and blocks of grids that an earlier run or a shard has computed.
                                 ///< Where they are those of a shard, only its own are computed; the others are NaN.
+
+  /// Called from time to time with the picture so far, where it is NaN beyond; empty: nobody wants it.
+  std::function<void(const std::vector<float>& picture)> show;
 };
 
 /// The stretch at each start, inside or outside the volume. NaN where the ray does not reach the length (it ends on an

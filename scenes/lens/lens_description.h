@@ -33,6 +33,9 @@ struct ImagePlaneDescription {
 
 enum class Overlay { none, grid };
 
+/// How the picture shows obstacles, where no light of the image arrives.
+enum class ObstacleLook { hidden, shaded };
+
 struct LensDescription {
   LensMode mode = LensMode::scatter;
   std::variant<TestImage, std::filesystem::path> image = TestImage::checkerboard;
@@ -42,6 +45,7 @@ struct LensDescription {
   Wrap wrap = Wrap::none;
   int samples = 1;  ///< Samples per pixel along x and along y.
   Overlay overlay = Overlay::none;
+  ObstacleLook obstacles = ObstacleLook::hidden;
 };
 
 inline auto choices(LensMode) {
@@ -58,6 +62,11 @@ inline auto choices(Wrap) {
 inline auto choices(Overlay) {
   using C = Choice<Overlay>;
   return std::array{C{"none", Overlay::none}, C{"grid", Overlay::grid}};
+}
+
+inline auto choices(ObstacleLook) {
+  using C = Choice<ObstacleLook>;
+  return std::array{C{"hidden", ObstacleLook::hidden}, C{"shaded", ObstacleLook::shaded}};
 }
 
 /// Names of the built-in images for `integrator.image`.
@@ -96,6 +105,7 @@ void describe(LensDescription& lens, Visitor& visit) {
   visit("wrap", lens.wrap, "lens: how the image continues beyond its edges (gather)");
   visit("samples", lens.samples, "lens: samples of a pixel along x and along y", between(1, 16));
   visit("overlay", lens.overlay, "lens: grid draws straight and distorted grid lines over the picture");
+  visit("obstacles", lens.obstacles, "lens: shaded draws the obstacles where no light of the image arrives");
 }
 
 }  // namespace tensorray

@@ -12,6 +12,7 @@
 #include "renderer/charts/grid_lines.h"
 #include "renderer/spectra/reflectance.h"
 #include "scenes/description/check_scene.h"
+#include "scenes/lens/lens_obstacles.h"
 #include "scenes/lens/load_lens.h"
 #include "scenes/outputs/annotations.h"
 #include "scenes/outputs/channel_table.h"
@@ -164,6 +165,13 @@ std::string end_codes() {
   return text;
 }
 
+/// The pictures of some depths, and their statistics.
+struct LensPictures {
+  std::vector<Image> pictures;
+  std::vector<SpectralImage> spectra;
+  Statistics statistics;
+};
+
 class LoadedLens : public LoadedMethod {
  public:
   LoadedLens(LensDescription settings, LensScene scene) : settings_(std::move(settings)), lens_(std::move(scene)) {}
@@ -171,6 +179,10 @@ class LoadedLens : public LoadedMethod {
   Render render(const Scene& scene, const Progress& progress, RenderJob* job) const override;
 
  private:
+  LensSettings trace_settings(const Scene& scene) const;
+  void add_picture(const Scene& scene, const LensLight& light, const Progress& progress, LensPictures& all) const;
+  Render render_of(const Scene& scene, LensPictures all) const;
+
   LensDescription settings_;
   LensScene lens_;
 };
@@ -182,52 +194,44 @@ SpectralImage spectra_side_by_side(std::vector<SpectralImage> spectra) {
   return {side_by_side(images), spectra.front().metadata};
 }
 
-Render LoadedLens::render(const Scene& scene, const Progress& progress, RenderJob* job) const {
+LensSettings LoadedLens::trace_settings(const Scene& scene) const {
   LensSettings settings;
-  settings.team = job ? job->team : nullptr;
-  KeptResults kept(job ? &job->work : nullptr, settings.team);
-  settings.kept = &kept;
   settings.mode = settings_.mode;
   settings.samples = settings_.samples;
   settings.reference = reference_place(scene);
   const LightRange range = light_range(scene);
   settings.flexibilities = range.flexibilities;
   settings.range = range.is_range;
-  LensImage image;
-  image.texture = &lens_.image;
-  image.wraps = lens_.wraps;
+  return settings;
+}
 
-  Render result;
-  const Eigen::Matrix3d matrix = to_working(scene);
+/// Draws the light of one depth. Of a team, process 0 has the picture.
+void LoadedLens::add_picture(const Scene& scene, const LensLight& light, const Progress& progress,
+                             LensPictures& all) const {
   const int channels = static_cast<int>(scene.bands.size());
   const bool by_channel = scene.description.output.wants("spectral");
-  std::vector<Image> pictures;
-  std::vector<SpectralImage> spectra;
-  for (const Plate& plane : lens_.planes) {
-    image.plane = plane;
-    const LensLight light = trace_lens(scene.field, scene.geometry.surfaces(), scene.bending,
-                                       {lens_.receiver, image, scene.beam.direction}, settings, progress);
-    if (kept.is_shard()) continue;
-    const std::vector<FineBand> fine = fine_bands(scene, band_count(light.map, channels, band_step));
-    const LensPicture picture =
-        draw_lens(light, lens_bands(fine, scene), radiance_in(fine, scene), scene.bands.size(), by_channel, progress);
-    pictures.push_back(make_image(picture));
-    if (settings_.overlay == Overlay::grid) draw_overlay(picture, plane, pictures.back());
-    add_statistics(picture, result.statistics);
-    result.statistics.seconds_tracing += light.seconds_tracing;
-    if (by_channel)
-      // A white image has the radiance of a white diffuse surface in the scene's light.
-      spectra.push_back(spectral_image(picture.radiance, scene.bands, SpectralQuantity::radiance,
-                                       scene.description.light.irradiance / pi, matrix));
-  }
-  if (kept.is_shard()) {
-    kept.keep(true);
-    return {};
-  }
-  if (settings.team) collect_counts(*settings.team, result.statistics);
-  if (!has_all(settings.team)) return {};
-  result.linear = side_by_side(pictures);
-  if (!spectra.empty()) result.spectral = spectra_side_by_side(std::move(spectra));
+  const std::vector<FineBand> fine = fine_bands(scene, band_count(light.map, channels, band_step));
+  const LensPicture picture =
+      draw_lens(light, lens_bands(fine, scene), radiance_in(fine, scene), scene.bands.size(), by_channel, progress);
+  const Plate& plane = light.setup.image.plane;
+  all.pictures.push_back(make_image(picture));
+  if (settings_.obstacles == ObstacleLook::shaded)
+    LensObstacles(scene.geometry.surfaces(), lens_.receiver, scene.beam.direction)
+        .draw(plane, settings_.samples, all.pictures.back());
+  if (settings_.overlay == Overlay::grid) draw_overlay(picture, plane, all.pictures.back());
+  add_statistics(picture, all.statistics);
+  all.statistics.seconds_tracing += light.seconds_tracing;
+  if (by_channel)
+    // A white image has the radiance of a white diffuse surface in the scene's light.
+    all.spectra.push_back(spectral_image(picture.radiance, scene.bands, SpectralQuantity::radiance,
+                                         scene.description.light.irradiance / pi, to_working(scene)));
+}
+
+Render LoadedLens::render_of(const Scene& scene, LensPictures all) const {
+  Render result;
+  result.linear = side_by_side(all.pictures);
+  if (!all.spectra.empty()) result.spectral = spectra_side_by_side(std::move(all.spectra));
+  result.statistics = std::move(all.statistics);
   for (const std::uint64_t count : result.statistics.ends[reference_channel(scene)])
     result.statistics.positions += count;
   result.metadata["tensorray:end"] = end_codes();
@@ -236,6 +240,33 @@ Render LoadedLens::render(const Scene& scene, const Progress& progress, RenderJo
   if (nothing_arrived(result.statistics))
     result.warnings.push_back("no ray met the image; check `receiver` and `integrator.image_plane`");
   return result;
+}
+
+Render LoadedLens::render(const Scene& scene, const Progress& progress, RenderJob* job) const {
+  LensSettings settings = trace_settings(scene);
+  settings.team = job ? job->team : nullptr;
+  KeptResults kept(job ? &job->work : nullptr, settings.team);
+  settings.kept = &kept;
+  LensPictures all;
+  if (job && job->show && has_all(settings.team))
+    settings.show = [&](const std::function<const LensLight&()>& so_far) {
+      if (!job->work.picture_wanted.exchange(false)) return;
+      LensPictures shown = all;
+      add_picture(scene, so_far(), progress, shown);
+      job->show(render_of(scene, std::move(shown)));
+    };
+  LensImage image;
+  image.texture = &lens_.image;
+  image.wraps = lens_.wraps;
+  for (const Plate& plane : lens_.planes) {
+    image.plane = plane;
+    const LensLight light = trace_lens(scene.field, scene.geometry.surfaces(), scene.bending,
+                                       {lens_.receiver, image, scene.beam.direction}, settings, progress);
+    if (!kept.is_shard()) add_picture(scene, light, progress, all);
+  }
+  if (kept.is_shard()) kept.keep(true);
+  if (settings.team) collect_counts(*settings.team, all.statistics);
+  return kept.is_shard() || !has_all(settings.team) ? Render() : render_of(scene, std::move(all));
 }
 
 class LensMethod : public MethodWith<LensDescription> {

@@ -25,6 +25,7 @@ PhotonSettings photon_settings(const Scene& scene, Team* team) {
   settings.pattern = description.light.pattern;
   settings.channels_per_photon = description.bending.rgb ? 0 : description.light.wavelengths_per_photon;
   settings.seed = description.seed;
+  settings.side_light = description.integrator.settings<PhotonDescription>().side_light;
   settings.density = estimator_of(description.integrator.settings<PhotonDescription>().density);
   settings.keep_photons = description.output.wants("photons");
   if (description.output.wants("fluence"))

@@ -77,13 +77,14 @@ Image plate_map(const FlowMap& map, const Scene& scene, Team* team) {
   FlowPicture picture;
   picture.resolution = plate.resolution;
   picture.straight = straight_starts(plate, scene.beam);
-  const FlowView view(map, picture, {reference_place(scene) * static_cast<double>(map.wavelengths - 1)}, 1);
+  const double place = reference_place(scene) * static_cast<double>(map.wavelengths - 1);
+  const FlowView view(map, picture, {FlowRange{place, place}}, 1);
   const ChannelTable<PlateLanding> table = plate_channels();
   Image image(plate.resolution.x(), plate.resolution.y(), channel_names(table));
   tbb::parallel_for(0, view.tiles(), [&](int tile) {
     if (!does_part(team, static_cast<std::size_t>(tile))) return;
     std::vector<FlowPoint> points;
-    view.draw(tile, 1, 0, {}, points);
+    view.draw(tile, 1, 0, place, {}, points);
     const Eigen::AlignedBox2i box = view.pixels(tile);
     auto point = points.begin();
     for (int y = box.min().y(); y <= box.max().y(); ++y)

@@ -124,6 +124,13 @@ class LoadedStretch : public LoadedMethod {
     }
     if (output.wants("image") || output.wants("exr")) {
       const Plate plane = entry_plane(scene, description_.pixels);
+      if (job && job->show && !job->team)
+        settings.show = [&](const std::vector<float>& picture) {
+          if (!job->work.picture_wanted.exchange(false)) return;
+          Render so_far = result;
+          draw(scene, picture, plane.resolution, so_far);
+          job->show(std::move(so_far));
+        };
       draw(scene, stretch_picture(scene.field, geometry, scene.bending, settings, plane, progress), plane.resolution,
            result);
       result.view = view_of(plane);

@@ -188,7 +188,7 @@ class ShardsTest(unittest.TestCase):
             with self.assertRaisesRegex(RuntimeError, "shard 2/2: lost"):
                 tr.render(LONG, shards=2, executor=executor)
             with self.assertRaisesRegex(RuntimeError, "the render has ended|is not there"):
-                executor.running.result(timeout=60)
+                executor.running.result()
 
     def test_interrupts(self):
         """Ctrl-C of the calling process alone."""
@@ -206,7 +206,7 @@ class ShardsTest(unittest.TestCase):
                                      stderr=subprocess.PIPE, text=True)
             self.assertEqual(child.stdout.readline(), "working\n")
             child.send_signal(signal.SIGINT)
-            _, error = child.communicate(timeout=120)
+            _, error = child.communicate()
             self.assertEqual(error.strip().splitlines()[-1], "KeyboardInterrupt", error)
             self.assertEqual(os.listdir(os.path.join(self.folder, "shards")), [])
 

@@ -93,7 +93,7 @@ TEST_F(ReadScene, ReadsTheLens) {
     "field": { "file": "a.vdb" },
     "integrator": { "type": "lens", "mode": "gather", "image": "photo.jpg", "image_color_space": "ACEScg",
                     "image_plane": { "depth": [0, 0.5], "normal": [0, 1, -1], "up": [1, 0, 0], "size": [2, 3] },
-                    "wrap": "mirror", "samples": 3, "overlay": "grid" }
+                    "wrap": "mirror", "samples": 3, "overlay": "grid", "obstacles": "shaded" }
   })");
   const LensDescription& lens = scene.integrator.settings<LensDescription>();
   EXPECT_STREQ(scene.integrator.method().name(), "lens");
@@ -107,6 +107,7 @@ TEST_F(ReadScene, ReadsTheLens) {
   EXPECT_EQ(lens.wrap, Wrap::mirror);
   EXPECT_EQ(lens.samples, 3);
   EXPECT_EQ(lens.overlay, Overlay::grid);
+  EXPECT_EQ(lens.obstacles, ObstacleLook::shaded);
 
   const LensDescription changed =
       read({"integrator.image=color_wheel", "integrator.image_plane.depth=0.25", "integrator.image_color_space=auto"})

@@ -47,7 +47,8 @@ bool CheckpointWriter::write() {
   if (settings_.file.empty() || is_over_) return false;
   try {
     const WorkFile file = work_file();
-    if (file.units.empty()) return false;
+    if (std::none_of(file.units.begin(), file.units.end(), [](const WorkUnit& unit) { return unit.state; }))
+      return false;
     write_work(settings_.file, file);
     is_written_ = true;
   } catch (const std::exception& error) {  // Whatever it is: the render goes on.

@@ -39,12 +39,13 @@ FlowMap lattice(const Map& landing, int n) {
 }
 
 /// All points of a picture, by row. `n` samples along each side of a pixel.
-std::vector<FlowPoint> draw(const FlowMap& map, const FlowPicture& picture, int n = 1) {
-  const FlowView view(map, picture, {0}, n);
+std::vector<FlowPoint> draw(const FlowMap& map, const FlowPicture& picture, int n = 1, const FlowRange& range = {},
+                            double place = 0) {
+  const FlowView view(map, picture, {range}, n);
   const Vector2i size = n * picture.resolution;
   std::vector<FlowPoint> all(static_cast<std::size_t>(size.prod())), points;
   for (int tile = 0; tile < view.tiles(); ++tile) {
-    view.draw(tile, n, 0, {}, points);
+    view.draw(tile, n, 0, place, {}, points);
     const Eigen::AlignedBox2i box = view.pixels(tile);
     const int columns = n * (box.sizes().x() + 1);
     for (int i = 0; i < static_cast<int>(points.size()); ++i)
@@ -157,6 +158,37 @@ TEST(FlowView, ShowsTheNearestOfItsSheets) {
     EXPECT_NEAR(seen[i].other.x(), start, start < 0.2 ? 0.05 : 1e-5);
   }
   EXPECT_EQ(twofold, 24 * 36);
+}
+
+/// A view of a range draws each of its wavelengths as a view of this wavelength alone does.
+TEST(FlowView, DrawsAnyWavelengthOfARange) {
+  FlowMap map = lattice([](const Vector2d& at) -> Vector2d { return Vector2d(30, 40) + 20 * at; }, 8);
+  constexpr std::size_t samples = 5;
+  FlowMap range = map;
+  range.wavelengths = samples;
+  range.check_step = samples - 1;
+  range.landings.clear();
+  range.ends.clear();
+  range.lengths.assign(map.starts.size() * 2, 3.0f);
+  for (std::size_t i = 0; i < map.starts.size(); ++i)
+    for (std::size_t sample = 0; sample < samples; ++sample) {
+      const auto way = static_cast<float>(sample * sample);  // Light turns back in y.
+      range.landings.emplace_back(map.landings[i] + Eigen::Vector2f(4 * way, 8 * std::abs(way - 6)));
+      range.ends.push_back((i + sample) % 13 == 0 ? RayEnd::missed : RayEnd::plate);
+    }
+  for (std::size_t t = 0; t < range.triangles.size(); t += 7) range.triangles[t].is_torn = true;
+  for (const double place : {0.75, 1.0, 1.4, 1.5, 2.0, 2.2, 3.5}) {
+    const std::vector<FlowPoint> one = draw(range, landings_of(96), 2, {place, place}, place),
+                                 seen = draw(range, landings_of(96), 2, {0.75, 3.5}, place);
+    ASSERT_EQ(one.size(), seen.size());
+    std::size_t covered = 0;
+    for (std::size_t i = 0; i < one.size(); ++i) {
+      ASSERT_EQ(one[i].sheets, seen[i].sheets) << place;
+      ASSERT_EQ(one[i].other, seen[i].other) << place;
+      covered += one[i].sheets > 0;
+    }
+    EXPECT_GT(covered, 1000u) << place;
+  }
 }
 
 TEST(FlowView, TearsAndShadowsAreHolesOrUnknown) {

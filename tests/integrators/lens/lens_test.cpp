@@ -253,6 +253,84 @@ TEST(Lens, ARangeIsAContinuumOfWavelengths) {
   }
 }
 
+/// A picture of one channel in the light of a range of flexibilities, which has equal bands.
+LensPicture picture_of_range(const Bench& bench, LensMode mode, const std::vector<double>& ends, int count) {
+  LensSettings settings = bench.settings;
+  settings.mode = mode;
+  settings.flexibilities = ends;
+  settings.range = true;
+  std::vector<LensBand> bands;
+  for (int i = 0; i < count; ++i)
+    bands.push_back({static_cast<double>(i) / count, (i + 1.0) / count, 0, 1.0 / count, Vector3d(1, 1, 1) / count});
+  const LensLight light = trace_lens(bench.field, bench.surfaces, bench.bending,
+                                     {bench.receiver, bench.image, Vector3d::UnitZ()}, settings, Progress());
+  const auto radiance = [](const Vector3d& rgb, std::size_t first, std::size_t last, double* radiances) {
+    std::fill(radiances, radiances + (last - first), rgb.x());
+  };
+  return draw_lens(light, bands, radiance, 1, true, Progress());
+}
+
+/// The edge of white light that turns aside lies elsewhere in each wavelength: a pixel has the part of the spectrum
+/// whose edge it is beyond, whatever the bands are.
+TEST(Lens, AtATearPixelsHaveTheirPartOfEachBand) {
+  constexpr double least = 0.1, most = 0.3, pixel = 3.0 / 96;
+  Matrix3d T = Matrix3d::Zero();  // Light along +z turns towards +y; beside the volume it is straight.
+  T(1, 2) = 1;
+  T(2, 1) = -1;
+  const auto aside = [](double s) {
+    const double angle = std::asin(2 * s);
+    return (1 - std::cos(angle)) / s + 0.5 * std::tan(angle);
+  };
+  Bench bench(constant_field(T), plate_at(1.5, {3, 3}, {96, 96}), {3, 3}, uniform(1), Wrap::clamp);
+  constexpr int count = 3;
+  const LensPicture seen = picture_of_range(bench, LensMode::scatter, {least, most}, count);
+  int partly = 0;
+  for (int row = 0; row < 96; ++row) {
+    const double y = 1.5 - (row + 0.5) * pixel;
+    if (y < -1 + pixel || y > 0.9) continue;  // Beside the volume.
+    double low = least, high = most;          // The most flexible light that arrives, by bisection.
+    for (int i = 0; i < 40; ++i) (aside((low + high) / 2) < y + 1 ? low : high) = (low + high) / 2;
+    const double expected = (low - least) / (most - least);
+    // Half of an eighth of a band, and the quarter of a pixel that is lost at the edge.
+    const double slope = (aside(most) - aside(least)) / pixel;
+    EXPECT_NEAR(seen.radiance.plane(0)[static_cast<std::size_t>(row * 96 + 48)], expected,
+                1.0 / (16 * count) + 0.5 / slope)
+        << row;
+    partly += expected > 0.05 && expected < 0.95;
+  }
+  EXPECT_GT(partly, 10);
+}
+
+/// Where the map bends within a pixel, its samples are the mean of what smaller pixels see, in dispersed light, too.
+TEST(Lens, PixelsAreTheMeanOfTheirPartsWhereTheMapBends) {
+  Image stripes(512, 512, {"R", "G", "B"});
+  for (int y = 0; y < 512; ++y)
+    for (int x = 0; x < 512; ++x) std::fill_n(stripes.pixel(x, y), 3, y / 32 % 2 ? 1.0f : 0.0f);
+  const auto tensor = [](const Vector3d& at) -> Matrix3d {
+    Matrix3d T = Matrix3d::Zero();
+    T(0, 2) = 4;  // Dispersion along x, bends along y.
+    T(1, 2) = 6 * std::sin(9 * at.y());
+    return T;
+  };
+  constexpr int n = 4, size = 16;
+  Bench coarse(cube_field(33, tensor), plate_at(1.5, {1, 1}, {size, size}), {4, 4}, stripes);
+  Bench fine(cube_field(33, tensor), plate_at(1.5, {1, 1}, {n * size, n * size}), {4, 4}, stripes);
+  coarse.settings.samples = n;
+  for (const LensMode mode : modes) {
+    const LensPicture seen = picture_of_range(coarse, mode, {0.05, 0.15}, 4),
+                      parts = picture_of_range(fine, mode, {0.05, 0.15}, 4);
+    double sum = 0;
+    for (int y = 0; y < size; ++y)
+      for (int x = 0; x < size; ++x) {
+        double mean = 0;
+        for (int i = 0; i < n * n; ++i)
+          mean += parts.radiance.plane(0)[static_cast<std::size_t>((n * y + i / n) * n * size + n * x + i % n)];
+        sum += std::abs(seen.radiance.plane(0)[static_cast<std::size_t>(y * size + x)] - mean / (n * n));
+      }
+    EXPECT_LT(sum / (size * size), 0.01) << static_cast<int>(mode);
+  }
+}
+
 /// Display values of smooth pictures are those of rays that are traced for each pixel, to within a step of 8 bits.
 TEST(Lens, PixelsHaveTheDisplayValueOfTheirRays) {
   Image waves(256, 256, {"R", "G", "B"});

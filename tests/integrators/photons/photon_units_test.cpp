@@ -108,6 +108,7 @@ TEST_P(PhotonUnits, OfAllPartsAreThatOfOneProcess) {
     std::vector<WorkUnit> units;
     for (std::size_t index = 0; index < count; ++index) {
       Work work({index, count});
+      work.is_shard = true;
       distribute(settings, &work);
       EXPECT_FALSE(work.wants(index));
       units.push_back(work.units().at(index));
@@ -137,6 +138,7 @@ TEST_P(PhotonUnits, OfATeamAreThatOfOneProcess) {
 TEST_P(PhotonUnits, ContinueFromTheirState) {
   const WorkUnit unit = interrupted(settings);
   Work work({}, {unit});
+  work.is_shard = true;
   expect_same(distribute(settings, &work), alone);
   EXPECT_TRUE(work.units().at(0).done);
   Work again({}, work.units());
