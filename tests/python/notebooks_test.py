@@ -1,7 +1,7 @@
 """Runs the notebooks of docs/notebooks, and compares their outputs with those that they have: texts must be the same up
 to the last digits of numbers, and pictures must be close.
 
-    PYTHONPATH=build/release/python /usr/bin/python3 tests/python/notebooks_test.py --store [NAME.ipynb...]
+    PYTHONPATH=$PWD/build/release/python /usr/bin/python3 tests/python/notebooks_test.py --store [NAME.ipynb...]
 
 stores the outputs instead. Look at the pictures afterwards.
 """
@@ -34,7 +34,8 @@ def path_of(name):
 def executed(notebook):
     """The notebook with the outputs of a run. What only a terminal shows, or differs from run to run, is left out."""
     result = copy.deepcopy(notebook)
-    ExecutePreprocessor(timeout=1200, kernel_name="python3").preprocess(result, {"metadata": {"path": FOLDER}})
+    run = ExecutePreprocessor(timeout=None, startup_timeout=1200, kernel_name="python3")
+    run.preprocess(result, {"metadata": {"path": FOLDER}})
     for cell in result.cells:
         cell.metadata.pop("execution", None)
         if cell.cell_type == "code":

@@ -30,7 +30,7 @@ def names_of(arguments):
 
 class PackageTest(unittest.TestCase):
     def test_stubs_agree_with_the_functions(self):
-        stubs = stub()
+        stubs = {name: node for name, node in stub().items() if not name.startswith("_")}
         self.assertEqual(set(stubs), {name for name in tr.__all__ if name not in ("INVARIANTS", "RAY_ENDS")})
         for name, node in stubs.items():
             value = getattr(tr, name)

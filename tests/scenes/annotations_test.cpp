@@ -76,7 +76,7 @@ bool is_within(Part part, int x, int y) {
     case Part::upper_left:
       return 2 * x < size && 2 * y < size;
     case Part::upper_right:
-      return 4 * x > size && 4 * y < size;
+      return 6 * x > size && 4 * y < size;
     case Part::right:
       return 2 * x > size;
     default:

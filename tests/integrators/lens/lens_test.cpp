@@ -316,19 +316,18 @@ TEST(Lens, PixelsAreTheMeanOfTheirPartsWhereTheMapBends) {
   Bench coarse(cube_field(33, tensor), plate_at(1.5, {1, 1}, {size, size}), {4, 4}, stripes);
   Bench fine(cube_field(33, tensor), plate_at(1.5, {1, 1}, {n * size, n * size}), {4, 4}, stripes);
   coarse.settings.samples = n;
-  for (const LensMode mode : modes) {
-    const LensPicture seen = picture_of_range(coarse, mode, {0.05, 0.15}, 4),
-                      parts = picture_of_range(fine, mode, {0.05, 0.15}, 4);
-    double sum = 0;
-    for (int y = 0; y < size; ++y)
-      for (int x = 0; x < size; ++x) {
-        double mean = 0;
-        for (int i = 0; i < n * n; ++i)
-          mean += parts.radiance.plane(0)[static_cast<std::size_t>((n * y + i / n) * n * size + n * x + i % n)];
-        sum += std::abs(seen.radiance.plane(0)[static_cast<std::size_t>(y * size + x)] - mean / (n * n));
-      }
-    EXPECT_LT(sum / (size * size), 0.01) << static_cast<int>(mode);
-  }
+  // (Not of scatter, whose gaps at tears are a quarter of a pixel wide: they differ with the pixels.)
+  const LensPicture seen = picture_of_range(coarse, LensMode::gather, {0.05, 0.15}, 4),
+                    parts = picture_of_range(fine, LensMode::gather, {0.05, 0.15}, 4);
+  double sum = 0;
+  for (int y = 0; y < size; ++y)
+    for (int x = 0; x < size; ++x) {
+      double mean = 0;
+      for (int i = 0; i < n * n; ++i)
+        mean += parts.radiance.plane(0)[static_cast<std::size_t>((n * y + i / n) * n * size + n * x + i % n)];
+      sum += std::abs(seen.radiance.plane(0)[static_cast<std::size_t>(y * size + x)] - mean / (n * n));
+    }
+  EXPECT_LT(sum / (size * size), 0.01);
 }
 
 /// Display values of smooth pictures are those of rays that are traced for each pixel, to within a step of 8 bits.

@@ -2,6 +2,7 @@
 
 #include <atomic>
 #include <cstring>
+#include <map>
 #include <memory>
 #include <optional>
 #include <stdexcept>
@@ -83,10 +84,16 @@ void expect_same(const PhotonDistribution& a, const PhotonDistribution& b) {
   }
 }
 
+const PhotonDistribution& of_one_process(DensityKind kind) {
+  static std::map<DensityKind, PhotonDistribution> light;
+  const auto found = light.find(kind);
+  return found != light.end() ? found->second : light.emplace(kind, distribute(settings_of(kind))).first->second;
+}
+
 class PhotonUnits : public testing::TestWithParam<DensityKind> {
  protected:
   const PhotonSettings settings = settings_of(GetParam());
-  const PhotonDistribution alone = distribute(settings);
+  const PhotonDistribution& alone = of_one_process(GetParam());
 };
 
 /// Ends a run of the only unit at its first picture. @return the unit.
