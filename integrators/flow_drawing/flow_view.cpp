@@ -194,7 +194,8 @@ Eigen::AlignedBox2d reach_of(const FlowMap& map, const FlowPicture& picture, con
   Eigen::AlignedBox2d reach;
   bool is_mapped = picture.side == FlowSide::starts;
   for (const std::vector<FlowLanding>& each : landings) {
-    const Corners corners(map, picture, triangle, [&](auto i) -> const auto& { return each[i]; });
+    const Corners corners(
+        map, picture, triangle, [&](auto i) -> const auto& { return each[i]; });
     is_mapped = is_mapped || corners.is_mapped;
     for (const Corner& corner : corners.corners)
       if (picture.side == FlowSide::starts || corner.end == RayEnd::plate) reach.extend(corner.sample);

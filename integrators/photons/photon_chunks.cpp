@@ -124,6 +124,7 @@ PhotonSums empty_sums(const PhotonJob& job) {
   else
     sums.points.emplace(pixels.x(), pixels.y(), channels, settings.density, settings.colors);
   sums.fluence = make_fluence(job);
+  sums.is_colored = !settings.colors.empty();
   sums.has_photons = settings.keep_photons;
   return sums;
 }

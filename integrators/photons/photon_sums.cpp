@@ -12,7 +12,7 @@ namespace {
 
 struct SumsHead {
   std::uint64_t candidates, ray_steps, tensor_samples;
-  std::uint64_t channels, fluence_bytes, has_photons, chunks;
+  std::uint64_t channels, fluence_bytes, is_colored, has_photons, chunks;
 };
 
 /// Takes bytes apart from their front.
@@ -72,8 +72,13 @@ std::string bytes_of(const PhotonSums& sums) {
   std::size_t photons_size = 0;
   for (const auto& [chunk, photons] : sums.photons)
     photons_size += 2 * sizeof chunk + photons.size() * sizeof photons[0];
-  const SumsHead head{sums.candidates,    sums.ray_steps, sums.tensor_samples,
-                      sums.ends.size(),   fluence.size(), sums.has_photons ? 1u : 0u,
+  const SumsHead head{sums.candidates,
+                      sums.ray_steps,
+                      sums.tensor_samples,
+                      sums.ends.size(),
+                      fluence.size(),
+                      sums.is_colored ? 1u : 0u,
+                      sums.has_photons ? 1u : 0u,
                       sums.photons.size()};
   std::string bytes;
   bytes.reserve(sizeof head + sums.ends.size() * sizeof sums.ends[0] + fluence.size() + photons_size +
@@ -98,7 +103,7 @@ void add_bytes(const std::string& bytes, PhotonSums& sums) {
   const std::string_view fluence = reader.take(head.fluence_bytes);
   for (std::uint64_t chunk = 0; chunk < head.chunks; ++chunk) add_photons(reader, sums);
   const bool has_all_outputs = !(sums.fluence && fluence.empty()) && !(sums.has_photons && head.has_photons == 0);
-  if (!has_all_outputs || reader.rest().size() != plate_size(sums))
+  if (!has_all_outputs || sums.is_colored != (head.is_colored != 0) || reader.rest().size() != plate_size(sums))
     throw std::runtime_error(
         "the photons that were kept are those of other outputs: from the beginning, ask for the same of `spectral`, "
         "`photons` and `fluence`");

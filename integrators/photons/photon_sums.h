@@ -27,8 +27,9 @@ struct PhotonSums {
   std::vector<EndCounts> ends;             ///< By channel.
   std::optional<DensityEstimator> points;  ///< Either this or `footprints` has the light on the plate.
   std::optional<FootprintDeposit> footprints;
-  std::unique_ptr<FluenceSums> fluence;                       ///< Null: not wanted.
-  bool has_photons = false;                                   ///< Whether photons are wanted.
+  std::unique_ptr<FluenceSums> fluence;  ///< Null: not wanted.
+  bool is_colored = false;               ///< Whether the light on the plate is red, green and blue, not by channel.
+  bool has_photons = false;              ///< Whether photons are wanted.
   std::map<std::uint64_t, std::vector<PlatePhoton>> photons;  ///< By the number of their chunk.
 };
 

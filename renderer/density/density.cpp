@@ -217,8 +217,7 @@ void DensityEstimator::append_sums(std::string& bytes) const {
 }
 
 void DensityEstimator::add_sums(std::string_view bytes) {
-  if (bytes.size() != sums_size())
-    throw std::runtime_error("sums that were kept have another size");
+  if (bytes.size() != sums_size()) throw std::runtime_error("sums that were kept have another size");
   for (std::size_t i = 0; i < sums_.size(); ++i) {
     PixelColor more;
     std::memcpy(&more, bytes.data() + i * sizeof more, sizeof more);

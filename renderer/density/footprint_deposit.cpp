@@ -95,8 +95,7 @@ void FootprintDeposit::append_sums(std::string& bytes) const {
 }
 
 void FootprintDeposit::add_sums(std::string_view bytes) {
-  if (bytes.size() != sums_size())
-    throw std::runtime_error("sums that were kept have another size");
+  if (bytes.size() != sums_size()) throw std::runtime_error("sums that were kept have another size");
   for (std::size_t i = 0; i < sums_.size(); ++i) {
     std::int64_t value = 0;
     std::memcpy(&value, bytes.data() + i * sizeof value, sizeof value);

@@ -1,12 +1,13 @@
 // Tests how the picture of a lens shows obstacles.
 
+#include "scenes/lens/lens_obstacles.h"
+
 #include <cmath>
 
 #include <gtest/gtest.h>
 
 #include "base/geometry/triangle_mesh.h"
 #include "renderer/meshes/mesh.h"
-#include "scenes/lens/lens_obstacles.h"
 
 namespace tensorray {
 namespace {

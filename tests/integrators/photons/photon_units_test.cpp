@@ -23,8 +23,8 @@ using namespace test;
 using Eigen::Vector3d;
 
 const std::vector<LightChannel>& channels() {
-  static const std::vector<LightChannel> two{{0.1, 650, 0.6}, {0.3, 450, 0.4}};
-  return two;
+  static const std::vector<LightChannel> four{{0.1, 650, 0.3}, {0.2, 600, 0.2}, {0.3, 550, 0.1}, {0.4, 450, 0.4}};
+  return four;
 }
 
 struct Bench {
@@ -185,7 +185,7 @@ TEST(PhotonStates, WantTheOutputsOfTheirBeginning) {
   Work less({}, {interrupted(fewer)});
   EXPECT_THROW(distribute(all, &less), std::runtime_error);
   PhotonSettings colored = fewer;
-  colored.colors = {{1, 0, 0}, {0, 0, 1}};
+  colored.colors.assign(4, {0.5, 0.2, 0.1});  // As many values for a pixel as channels.
   Work plain({}, {interrupted(fewer)});
   EXPECT_THROW(distribute(colored, &plain), std::runtime_error);
   PhotonSettings unbanded = all;
