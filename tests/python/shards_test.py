@@ -22,6 +22,8 @@ PATHS = {"field": FIELD, "camera": {"resolution": [60, 50]},
 WHOLE = {"field": FIELD, "camera": {"resolution": [50, 40]},
          "integrator": {"type": "scene", "max_samples": 8, "min_samples": 4, "bands": 4, "bands_per_sample": 4,
                         "caustic": {"resolution": 32, "rays": 1000, "passes": 1}}}
+PLATE = {"field": FIELD, "light": {"photons": 2000, "wavelengths": {"count": 4}}, "receiver": {"resolution": [40, 30]},
+         "integrator": {"type": "photon_distribution"}}
 LONG = {**PATHS, "integrator": {"type": "path_tracing", "max_samples": 10**6, "noise": 0}}  # Hours.
 
 
@@ -75,6 +77,14 @@ class ShardsTest(unittest.TestCase):
                 for shards, executor in ((1, None), (3, None), (3, pool), (40, None)):
                     self.expect_same(tr.render(scene, shards=shards, executor=executor, shard_folder=self.folder), whole)
         self.assertEqual(os.listdir(self.folder), [])
+
+    def test_what_is_kept_beside_the_picture_is_the_same(self):
+        for changes in ({}, {"integrator.density.kind": "histogram"}):
+            whole, shards = (tr.render(PLATE, changes=changes, keep=["spectral", "photons"], shards=shards)
+                             for shards in (None, 3))
+            self.expect_same(shards, whole)
+            self.assertEqual(shards.spectral.tobytes(), whole.spectral.tobytes())
+            self.assertEqual(shards.photons.tobytes(), whole.photons.tobytes())
 
     def test_the_files_are_those_of_one_render(self):
         endings = (".png", ".exr")
