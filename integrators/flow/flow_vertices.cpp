@@ -145,8 +145,12 @@ ResultKey FlowVertices::key_of(std::size_t vertex) const {
   const auto& [origin, parents] = starts_[vertex];
   ResultKey key{0, 0, map_hash_};
   std::memcpy(key.data(), origin.data(), 2 * sizeof key[0]);
-  // The sum does not depend on which of the parents is first, nor do the landings.
-  for (std::size_t i = 0; i < parents.count; ++i) key[2] += hash_of_landings(parents.vertices[i]);
+  // In their order: lengths are sums in this order. A vertex between the parts of two shards has the parents of either
+  // quad, and each shard keeps it in its own way.
+  for (std::size_t i = 0; i < parents.count; ++i) {
+    const std::uint64_t hash = hash_of_landings(parents.vertices[i]);
+    key[2] = hash_of(&hash, sizeof hash, key[2]);
+  }
   return key;
 }
 
