@@ -214,7 +214,7 @@ class SampleView {
 
   /// This part if the sheet begins at a fold. Light sees points whose distance from the fold's grows as the root of the
   /// light's own distance, and so does the determinant of the map's slope.
-  /// @param next    The span beside `span`, from `end` to `beyond`, on the same sheet.
+  /// @param next  The span beside `span`, from `end` to `beyond`, on the same sheet.
   std::optional<Part> part_at_fold(const Span& span, const Span& next, std::size_t end, std::size_t beyond) const {
     if (!lands(beyond)) return std::nullopt;
     const Glimpse at(*this, end), after(*this, beyond);
