@@ -21,15 +21,12 @@ struct ResultHead {
 
 /// Gives the other processes the bytes of process 0.
 void share_bytes(Team& team, std::string& bytes) {
-  const auto of_first = [&](std::string mine) {
-    return std::move(team.exchange(has_all(&team) ? std::move(mine) : std::string()).front());
-  };
-  const std::size_t size = std::stoull(of_first(std::to_string(bytes.size())));
+  const std::size_t size = of_first(&team, bytes.size());
   if (has_all(&team)) {
     for (std::size_t begin = 0; begin < size; begin += bytes_at_once) team.exchange(bytes.substr(begin, bytes_at_once));
     return;
   }
-  while (bytes.size() < size) bytes += of_first({});
+  while (bytes.size() < size) bytes += team.exchange({}).front();
 }
 
 }  // namespace

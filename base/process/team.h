@@ -60,6 +60,13 @@ using CopyPart = std::function<void(std::size_t part, PartBytes& bytes)>;
 /// processes that cross together. @throw as Team::exchange; std::runtime_error if the others have other parts.
 void exchange_parts(Team& team, std::size_t parts, std::size_t at_once, const CopyPart& copy);
 
+/// A number of process 0, at all processes. @param team  Null: this process is alone. @throw as Team::exchange.
+template <class Number>
+Number of_first(Team* team, Number number) {
+  if (team) exchange_parts(*team, 1, 1, [&](std::size_t, PartBytes& bytes) { bytes.copy(&number, sizeof number); });
+  return number;
+}
+
 /// Gives process 0 the parts that this process has done. @param at_once, @throw as above.
 void collect_parts(Team& team, std::size_t parts, std::size_t at_once, const CopyPart& copy);
 

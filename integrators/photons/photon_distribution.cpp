@@ -72,7 +72,7 @@ class PhotonUnits {
       : job_(job),
         work_(job.settings.work),
         team_(job.settings.team),
-        units_(of_first(work_ ? std::max(work_->size(), work_->part().count) : 1)),
+        units_(of_first(team_, work_ ? std::max(work_->size(), work_->part().count) : std::size_t{1})),
         tracer_(job) {
     if (work_) work_->begin(units_);
   }
@@ -80,7 +80,7 @@ class PhotonUnits {
   /// At process 0.
   PhotonDistribution run() {
     for (std::size_t unit = 0; unit < units_; ++unit)
-      if (units_ == 1 || of_first(!work_ || work_->wants(unit) ? 1 : 0) != 0) trace_unit(unit);
+      if (units_ == 1 || of_first(team_, !work_ || work_->wants(unit))) trace_unit(unit);
     if (!has_all(team_)) return {};
     if (units_ > 1) add_units();
     job_.progress.update("tracing photons", job_.positions.candidates(), job_.positions.candidates());
@@ -93,12 +93,6 @@ class PhotonUnits {
   }
 
  private:
-  /// Process 0's number, at all processes.
-  std::uint64_t of_first(std::uint64_t number) const {
-    if (team_) exchange_parts(*team_, 1, 1, [&](std::size_t, PartBytes& bytes) { bytes.copy(&number, sizeof number); });
-    return number;
-  }
-
   /// Its memory is freed first.
   void clear_sums() {
     sums_ = PhotonSums();
@@ -112,13 +106,13 @@ class PhotonUnits {
     const std::uint64_t chunks = unit < job_.chunks() ? (job_.chunks() - unit - 1) / units_ + 1 : 0;
     const std::uint64_t members = team_ ? team_->count() : 1, member = team_ ? team_->index() : 0;
     const std::uint64_t round = team_ ? chunks_in_round * members : 1;
-    std::uint64_t next = of_first((sums_.candidates + job_.chunk_size() - 1) / job_.chunk_size());
+    std::uint64_t next = of_first(team_, (sums_.candidates + job_.chunk_size() - 1) / job_.chunk_size());
     while (next < chunks) {
       const std::uint64_t end = std::min(next + round, chunks);
       for (std::uint64_t i = next + member; i < end; i += members) tracer_.trace(unit + i * units_, sums_);
       next = end;
       if (work_) work_->fraction = static_cast<double>(next) / static_cast<double>(chunks);
-      if (next < chunks && of_first(is_due() ? 1 : 0) != 0) keep(unit, false);
+      if (next < chunks && of_first(team_, is_due())) keep(unit, false);
     }
     keep(unit, true);
   }

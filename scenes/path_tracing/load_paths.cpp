@@ -163,6 +163,12 @@ ShownLights load_lights(const Scene& scene, int bands, std::vector<std::string>&
   return lights;
 }
 
+std::vector<float> ShownLight::luminances() const {
+  std::vector<float> luminances;
+  for (const Band& band : bands) luminances.push_back(static_cast<float>(band.xyz.y()));
+  return luminances;
+}
+
 std::vector<float> ShownLight::radiance(const Eigen::Vector3d& rec709, double factor) const {
   const ReflectanceSpectrum spectrum = model.spectrum(rec709_to_working * rec709);
   std::vector<float> values;

@@ -23,6 +23,9 @@ struct ShownLight {
 
   /// The spectrum of a colour of linear Rec. 709, times a factor; one value for each band.
   std::vector<float> radiance(const Eigen::Vector3d& rec709, double factor) const;
+
+  /// The luminance of each band.
+  std::vector<float> luminances() const;
 };
 
 /// The lights that need loaded data.

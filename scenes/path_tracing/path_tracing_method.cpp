@@ -125,9 +125,7 @@ SurfacePicture LoadedPaths::render_stage(const Scene& scene, const std::vector<P
   add_lamps(lights, light, surfaces, materials);
   const SurfaceScene stage(std::move(surfaces));
   require_fine(scene, paths_.settings.radius, stage, paths);
-  std::vector<float> luminance;
-  for (const Band& band : light.bands) luminance.push_back(static_cast<float>(band.xyz.y()));
-  const LightSampler sampler(lights, luminance, stage.bounds());
+  const LightSampler sampler(lights, light.luminances(), stage.bounds());
   const ReflectanceTable table(light.model, light.bands, light.xyz_to_working);
   ShadedScene shaded{stage, materials, sampler, table};
   set_groups(light_groups(scene.description), shaded);

@@ -125,13 +125,6 @@ double rest_after(double change, double last_change) {
   return change * ratio / (1 - ratio);
 }
 
-/// A number of process 0, which has the picture.
-double of_first(Team* team, double number) {
-  if (!team) return number;
-  exchange_parts(*team, 1, 1, [&](std::size_t, PartBytes& bytes) { bytes.copy(&number, sizeof number); });
-  return number;
-}
-
 /// Halves the tolerance and the steps of wavelengths until what is left of the error is less than `bound`.
 PlateLight refine(MeshJob& job, double bound, const Progress& progress) {
   std::string label;

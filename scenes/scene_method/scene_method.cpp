@@ -186,9 +186,7 @@ Render LoadedObjects::render(const Scene& scene, const Progress& progress, Rende
   add_objects(objects, light, surfaces, materials);
   add_lamps(lights, light, surfaces, materials);
   const SurfaceScene stage(std::move(surfaces));
-  std::vector<float> luminance;
-  for (const Band& band : light.bands) luminance.push_back(static_cast<float>(band.xyz.y()));
-  const LightSampler sampler(lights, luminance, stage.bounds());
+  const LightSampler sampler(lights, light.luminances(), stage.bounds());
   const ReflectanceTable table(light.model, light.bands, light.xyz_to_working);
   const Geometry geometry = seen_geometry(scene, stage);
   const FieldRegion region(scene.field, geometry, view_settings(scene, loaded_));

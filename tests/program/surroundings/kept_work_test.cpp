@@ -110,6 +110,14 @@ class KeptWork : public Program {
 
   static std::string shard(int i) { return fmt::format("{}.shard", i); }
 
+  void expect_shards_merge(int count) const {
+    make_shards(count);
+    std::vector<std::string> shards;
+    for (int i = count; i >= 1; --i) shards.push_back(shard(i));
+    run_well(merge(shards));
+    expect_same("a");
+  }
+
   static std::vector<std::string> merge(std::vector<std::string> shards) {
     shards.insert(shards.begin(), {"merge", "-q", "-o", "a.png", "-o", "a.exr"});
     return shards;
@@ -205,11 +213,7 @@ TEST_F(KeptWork, AFullDiskLeavesTheOldCheckpoint) {
 TEST_F(KeptWork, ShardsMergeToTheSameFiles) {
   for (const int count : {1, 16, 3}) {
     if (count == 3) make(path_scene);
-    make_shards(count);
-    std::vector<std::string> shards;
-    for (int i = count; i >= 1; --i) shards.push_back(shard(i));
-    run_well(merge(shards));
-    expect_same("a");
+    expect_shards_merge(count);
   }
 }
 
@@ -218,11 +222,7 @@ TEST_F(KeptWork, ShardsOfPlatesMergeToTheSameFiles) {
     make(plate_scene(integrator).c_str());
     const bool is_first = integrator == plate_integrators.front();
     for (const int count : is_first ? std::vector<int>{1, 3, 16} : std::vector<int>{3}) {
-      make_shards(count);
-      std::vector<std::string> shards;
-      for (int i = count; i >= 1; --i) shards.push_back(shard(i));
-      run_well(merge(shards));
-      expect_same("a");
+      expect_shards_merge(count);
     }
   }
 }
