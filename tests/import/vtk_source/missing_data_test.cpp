@@ -195,7 +195,9 @@ TEST(Ghosts, EachKindOfDataSetTreatsThemAlike) {
 
 TEST(Ghosts, DerivativesDoNotLookAtHiddenPointsOfAnyKindOfDataSet) {
   const TemporaryFolder folder;
-  for (const auto& [ending, set] : kinds_of_cubes()) {
+  for (const auto& kind : kinds_of_cubes()) {
+    const auto& ending = kind.first;  // No structured binding: a lambda below captures it.
+    const auto& set = kind.second;
     add_array<3>(*set, "v",
                  [](const Vector3d& p) { return Vector3d(p.x() < 2.5 ? p.x() : 1e6, 2 * p.y(), 3 * p.z()); });
     mark(*set->GetPointData(), set->GetNumberOfPoints(), vtkDataSetAttributes::HIDDENPOINT,
