@@ -9,6 +9,7 @@
 #include "base/constants.h"
 #include "base/errors.h"
 #include "base/text/text.h"
+#include "volumes/making/load_stress.h"
 
 namespace tensorray {
 namespace {
@@ -46,13 +47,15 @@ Eigen::Matrix<double, size, size> outer_square(const Eigen::Matrix<double, size,
   return v * v.transpose();
 }
 
-void check_poisson_ratio(double ratio) {
-  require(ratio >= -1 && ratio <= 0.5, "poisson_ratio must be between -1 and 0.5");
+template <class Load>
+void check_load(const Load& g) {
+  require(g.poisson_ratio >= -1 && g.poisson_ratio <= 0.5, "poisson_ratio must be between -1 and 0.5");
+  require(g.radius >= 0, "radius must not be negative; 0 is a load on a point");
 }
 
 // Checks the ranges of the parameters, which `describe` does not contain.
-void check(const PointLoad& g) { check_poisson_ratio(g.poisson_ratio); }
-void check(const TwoPointLoad& g) { check_poisson_ratio(g.poisson_ratio); }
+void check(const PointLoad& g) { check_load(g); }
+void check(const TwoPointLoad& g) { check_load(g); }
 void check(const Constant&) {}
 void check(const Rotation& g) { require(g.axis.norm() > 0, "axis must not be zero"); }
 void check(const Shear& g) {
@@ -106,14 +109,19 @@ Vector3d load_position(const GridSettings& grid) {
 
 // `sample(generator, position)` is the tensor at a world position; for loads, relative to the load.
 
+Matrix3d load_stress(const Vector3d& position, double load, double radius, double poisson_ratio) {
+  return radius > 0 ? disc_load_stress(position, load, radius, poisson_ratio)
+                    : point_load_stress(position, load, poisson_ratio);
+}
+
 Matrix3d sample(const PointLoad& g, const Vector3d& position) {
-  return point_load_stress(position, g.load, g.poisson_ratio);
+  return load_stress(position, g.load, g.radius, g.poisson_ratio);
 }
 
 Matrix3d sample(const TwoPointLoad& g, const Vector3d& from_middle) {
   const Vector3d half = 0.5 * g.separation * Vector3d::UnitX();
-  return point_load_stress(from_middle + half, g.load, g.poisson_ratio) +
-         point_load_stress(from_middle - half, g.second_load, g.poisson_ratio);
+  return load_stress(from_middle + half, g.load, g.radius, g.poisson_ratio) +
+         load_stress(from_middle - half, g.second_load, g.radius, g.poisson_ratio);
 }
 
 Matrix3d sample(const Constant& g, const Vector3d&) { return g.tensor; }
@@ -257,20 +265,6 @@ BlockSource generator_source(const Generator& generator, const GridSettings& gri
 
 TensorGrid generate(const Generator& generator, const GridSettings& grid) {
   return to_grid(generator_source(generator, grid));
-}
-
-Matrix3d point_load_stress(const Vector3d& position, double load, double poisson_ratio) {
-  // Timoshenko's cylindrical components, with depth = −z, regrouped so that nothing is divided by the distance to the
-  // axis. The radial part is −3 depth p pᵀ/R⁵; the rest lies in the plane of the surface.
-  const double depth = -position.z(), distance = position.norm();
-  const double cube = distance * distance * distance, reach = distance + depth;
-  Matrix3d tensor = -3 * depth / (cube * distance * distance) * outer_square(position);
-  const double compressibility = 1 - 2 * poisson_ratio;
-  const Eigen::Vector2d across = position.head<2>();
-  tensor.topLeftCorner<2, 2>() +=
-      compressibility * ((depth / cube - 1 / (distance * reach)) * Eigen::Matrix2d::Identity() +
-                         (distance + reach) / (cube * reach * reach) * outer_square(across));
-  return load / (2 * pi) * tensor;
 }
 
 }  // namespace tensorray

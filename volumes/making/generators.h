@@ -23,19 +23,21 @@ struct GridSettings {
 // The parameters of each generator: plain data with defaults. `describe`, below, names them for scene files,
 // command-line flags and metadata.
 
-/// Boussinesq's point load on the half space z < 0: stress, tension positive. The load is at the centre of the face z =
-/// max.z + one voxel, so that the singular point is one voxel outside the grid.
+/// A load on the half space z < 0 (load_stress.h): stress, tension positive. The load is at the centre of the face z =
+/// max.z + one voxel, so that the singular point of a point load is one voxel outside the grid.
 struct PointLoad {
   double load = 1;             ///< Force pushing towards −z.
   double poisson_ratio = 0.3;  ///< In [-1, 0.5].
+  double radius = 0;           ///< Of the disc that the load presses on; 0: a point.
 };
 
-/// Two point loads on the same face, `separation` apart along x. Their stresses add.
+/// Two loads on the same face, `separation` apart along x. Their stresses add.
 struct TwoPointLoad {
   double load = 1;
   double second_load = 1;
   double separation = 0.8;
   double poisson_ratio = 0.3;
+  double radius = 0;
 };
 
 /// The same tensor everywhere.
@@ -83,6 +85,7 @@ template <class Visit>
 void describe(PointLoad& g, Visit&& visit) {
   visit("load", g.load, "force of the load, pushing towards -z");
   visit("poisson_ratio", g.poisson_ratio, "Poisson ratio of the material, -1 to 0.5");
+  visit("radius", g.radius, "radius of the disc on which the load presses, as a sphere would; 0: a point");
 }
 
 template <class Visit>
@@ -91,6 +94,7 @@ void describe(TwoPointLoad& g, Visit&& visit) {
   visit("second_load", g.second_load, "force of the load at +x, pushing towards -z");
   visit("separation", g.separation, "distance between the loads along x");
   visit("poisson_ratio", g.poisson_ratio, "Poisson ratio of the material, -1 to 0.5");
+  visit("radius", g.radius, "radius of the disc on which each load presses, as a sphere would; 0: a point");
 }
 
 template <class Visit>
@@ -150,9 +154,5 @@ TensorGrid generate(const Generator& generator, const GridSettings& grid);
 
 /// The same, block by block.
 BlockSource generator_source(const Generator& generator, const GridSettings& grid);
-
-/// The stress of a unit-less Boussinesq load at the origin, acting on the half space z < 0, at `position` (z <= 0,
-/// not the origin); tension positive (Boussinesq 1885; Timoshenko & Goodier, Theory of Elasticity, §138).
-Eigen::Matrix3d point_load_stress(const Eigen::Vector3d& position, double load, double poisson_ratio);
 
 }  // namespace tensorray

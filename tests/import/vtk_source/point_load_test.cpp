@@ -11,7 +11,7 @@
 #include <vtkXMLImageDataReader.h>
 
 #include "tests/data_folder.h"
-#include "volumes/making/generators.h"
+#include "volumes/making/load_stress.h"
 
 namespace tensorray {
 namespace {
