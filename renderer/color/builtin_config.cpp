@@ -10,7 +10,7 @@ search_path: ""
 strictparsing: true
 luma: [0.2126, 0.7152, 0.0722]
 name: tensorray
-description: Linear Rec.709 working space; sRGB and Rec.1886 displays, un-tone-mapped or through ACES 1.0 for SDR video.
+description: Linear Rec.709 working space; sRGB and Rec.1886 displays, un-tone-mapped, with soft highlights, or through ACES 1.0 for SDR video.
 
 roles:
   aces_interchange: ACES2065-1
@@ -24,14 +24,15 @@ file_rules:
 
 shared_views:
   - !<View> {name: Un-tone-mapped, view_transform: Un-tone-mapped, display_colorspace: <USE_DISPLAY_NAME>}
+  - !<View> {name: Soft highlights, view_transform: Soft highlights, display_colorspace: <USE_DISPLAY_NAME>}
   - !<View> {name: ACES SDR, view_transform: ACES SDR, display_colorspace: <USE_DISPLAY_NAME>}
   - !<View> {name: Raw, colorspace: Raw}
 
 displays:
   sRGB:
-    - !<Views> [Un-tone-mapped, ACES SDR, Raw]
+    - !<Views> [Un-tone-mapped, Soft highlights, ACES SDR, Raw]
   Rec.1886:
-    - !<Views> [Un-tone-mapped, ACES SDR, Raw]
+    - !<Views> [Un-tone-mapped, Soft highlights, ACES SDR, Raw]
 
 active_displays: []
 active_views: []
@@ -43,6 +44,21 @@ view_transforms:
     name: Un-tone-mapped
     description: Shows 0 to 1 as they are, and clips above; white stays white.
     from_scene_reference: !<BuiltinTransform> {style: UTILITY - ACES-AP0_to_CIE-XYZ-D65_BFD}
+
+  - !<ViewTransform>
+    name: Soft highlights
+    description: Shows 1 - exp(-x) of linear Rec.709, so that dark light is shown as it is, and bright light stays below white.
+    from_scene_reference: !<GroupTransform>
+      children:
+        - !<BuiltinTransform> {style: ACEScg_to_ACES2065-1, direction: inverse}
+        - !<BuiltinTransform> {style: UTILITY - ACES-AP1_to_LINEAR-REC709_BFD}
+        - !<RangeTransform> {min_in_value: 0, min_out_value: 0}
+        - !<MatrixTransform> {matrix: [-1, 0, 0, 0, 0, -1, 0, 0, 0, 0, -1, 0, 0, 0, 0, 1]}
+        - !<LogTransform> {base: 2.718281828459045, direction: inverse}
+        - !<MatrixTransform> {matrix: [-1, 0, 0, 0, 0, -1, 0, 0, 0, 0, -1, 0, 0, 0, 0, 1], offset: [1, 1, 1, 0]}
+        - !<BuiltinTransform> {style: UTILITY - ACES-AP1_to_LINEAR-REC709_BFD, direction: inverse}
+        - !<BuiltinTransform> {style: ACEScg_to_ACES2065-1}
+        - !<BuiltinTransform> {style: UTILITY - ACES-AP0_to_CIE-XYZ-D65_BFD}
 
   - !<ViewTransform>
     name: ACES SDR

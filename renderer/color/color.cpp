@@ -255,6 +255,8 @@ DisplayEncoding encoding_of(const OCIO::Config& config, const std::string& displ
 
 const char* const builtin_config_word = "built-in";
 
+const char* const soft_highlights_view = "Soft highlights";
+
 bool is_library_config(const std::string& name) { return name == builtin_config_word || starts_with(name, "ocio://"); }
 
 Matrix3d rec709_to_xyz() { return rgb_to_xyz(rec709_chromaticities); }
@@ -277,8 +279,10 @@ ColorManagement::ColorManagement(const ColorSettings& settings) : state_(std::ma
       throw std::runtime_error("no role scene_linear; give it to the config's linear working space");
     state_->working_space = config->getColorSpace(OCIO::ROLE_SCENE_LINEAR)->getName();
     state_->display = choose(settings.display, config->getDefaultDisplay(), displays(*config), "the list of displays");
-    state_->view = choose(settings.view, config->getDefaultView(state_->display.c_str()),
-                          views(*config, state_->display), "display " + in_quotes(state_->display));
+    const std::vector<std::string> known = views(*config, state_->display);
+    const bool prefers = std::find(known.begin(), known.end(), settings.preferred_view) != known.end();
+    const std::string usual = prefers ? settings.preferred_view : config->getDefaultView(state_->display.c_str());
+    state_->view = choose(settings.view, usual, known, "display " + in_quotes(state_->display));
     state_->to_display = display_processor(*config, state_->display, state_->view);
     state_->encoding = encoding_of(*config, state_->display, state_->view);
     state_->xyz_to_working = find_xyz_to_working(*config);

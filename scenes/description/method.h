@@ -88,6 +88,9 @@ class Method {
   /// Whether the pixels of its pictures are those of the plate.
   virtual bool shows_plate() const { return false; }
 
+  /// The view of a display that suits its pictures, if the scene names none (ColorSettings::preferred_view).
+  virtual std::string preferred_view() const { return {}; }
+
   /// The files that the method reads, as its keys name them.
   virtual std::vector<NamedFile> inputs() const { return {}; }
 

@@ -24,6 +24,7 @@ void add_display(const Scene& scene, const Render& render, ImageMetadata& metada
 void write_display(const std::filesystem::path& file, const Scene& scene, const Render& render) {
   ImageMetadata metadata = provenance(scene, render);
   add_display(scene, render, metadata);
+  if (!render.display) metadata["tensorray:exposure"] = fmt::format("{:.4g}", display_exposure(scene, render));
   write_image(file, display_image(scene, render, holds_alpha(file)), metadata);
 }
 
@@ -65,7 +66,13 @@ ImageMetadata provenance(const Scene& scene, const Render& render) {
 
 double display_exposure(const Scene& scene, const Render& render) {
   if (scene.description.output.exposure) return *scene.description.output.exposure;
-  return render.exposure ? *render.exposure : automatic_exposure(render.linear);
+  if (render.exposure) return *render.exposure;
+  const std::optional<double> bright = brightest_hundredth(render.linear);
+  if (!bright) return 0;
+  // Soft highlights show undisturbed light (1) as 0.63 of white, and eight times as much not quite as white.
+  if (scene.color.view() == soft_highlights_view) return std::log2(std::clamp(*bright, 1.0, 8.0) / *bright);
+  constexpr double shown_as = 0.9;  // Display-linear.
+  return std::log2(shown_as / *bright);
 }
 
 Image display_image(const Scene& scene, const Render& render, bool holds_alpha) {
@@ -95,11 +102,10 @@ Image display_image(const Scene& scene, const Render& render, bool holds_alpha) 
   return image;
 }
 
-double automatic_exposure(const Image& linear) {
+std::optional<double> brightest_hundredth(const Image& linear) {
   // A pixel is lit above this part of the undisturbed light, or of the brightest pixel if that is darker.
   constexpr float lit = 0.02f;
-  constexpr double brightest = 0.99;  // This fraction of the lit pixels is darker than `shown_as`.
-  constexpr double shown_as = 0.9;    // Display-linear.
+  constexpr double brightest = 0.99;  // This fraction of the lit pixels is darker.
   const std::size_t channels = linear.channels.size();
   std::vector<float> values;
   for (std::size_t i = 0; i + 2 < linear.pixels.size(); i += channels) {
@@ -107,13 +113,13 @@ double automatic_exposure(const Image& linear) {
     values.push_back(value);
   }
   const float brightest_value = values.empty() ? 0 : *std::max_element(values.begin(), values.end());
-  if (!(brightest_value > 0)) return 0;
+  if (!(brightest_value > 0)) return std::nullopt;
   const float threshold = lit * std::min(1.0f, brightest_value);
   values.erase(std::remove_if(values.begin(), values.end(), [&](float value) { return value <= threshold; }),
                values.end());
   const auto bright = values.begin() + static_cast<std::ptrdiff_t>(brightest * static_cast<double>(values.size() - 1));
   std::nth_element(values.begin(), bright, values.end());
-  return std::log2(shown_as / *bright);
+  return *bright;
 }
 
 void write_grids(const std::filesystem::path& file, const Scene& scene, const Render& render) {

@@ -2,6 +2,7 @@
 /// @file scenes/outputs/picture_outputs.h
 /// The pictures that every method can write, and the header entries of all files.
 
+#include <optional>
 #include <vector>
 
 #include "renderer/images/image.h"
@@ -25,8 +26,8 @@ Image display_image(const Scene& scene, const Render& render, bool holds_alpha);
 /// The exposure of the picture that a display shows, in stops: the scene's, or the one that "auto" chooses.
 double display_exposure(const Scene& scene, const Render& render);
 
-/// The exposure, in stops, that shows the brightest hundredth of a scene-linear picture just below white.
-double automatic_exposure(const Image& linear);
+/// The value of R, G or B that 99% of the lit pixels of a scene-linear picture do not exceed; nothing if it is black.
+std::optional<double> brightest_hundredth(const Image& linear);
 
 /// Header entries about the origin of a file: program, scene, seed, scale, colour, and Render::metadata.
 ImageMetadata provenance(const Scene& scene, const Render& render);

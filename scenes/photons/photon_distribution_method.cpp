@@ -154,6 +154,7 @@ class PhotonDistributionMethod : public MethodWith<PhotonDescription> {
   const char* name() const override { return "photon_distribution"; }
   bool shows_plate() const override { return true; }
   bool is_shared() const override { return true; }
+  std::string preferred_view() const override { return soft_highlights_view; }
 
   std::vector<Output> outputs() const override {
     std::vector<Output> outputs = picture_outputs();

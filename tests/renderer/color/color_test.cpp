@@ -95,6 +95,26 @@ TEST_F(ColorTest, BuiltInConfig) {
   EXPECT_EQ(color.view(), "Un-tone-mapped");
 }
 
+TEST_F(ColorTest, APreferredViewCountsWhereTheDisplayHasItAndNoneIsNamed) {
+  EXPECT_EQ(ColorManagement({"", "", "", soft_highlights_view}).view(), soft_highlights_view);
+  EXPECT_EQ(ColorManagement({"", "", "Raw", soft_highlights_view}).view(), "Raw");
+  EXPECT_EQ(ColorManagement({"", "", "", "Elsewhere"}).view(), "Un-tone-mapped");
+}
+
+TEST_F(ColorTest, SoftHighlightsAreExponential) {
+  const ColorManagement color({"", "sRGB", soft_highlights_view}), rec1886({"", "Rec.1886", soft_highlights_view});
+  for (const float value : {-30.0f, -1.0f, 0.0f, 1e-3f, 0.18f, 1.0f, 3.0f, 20.0f, 1e4f}) {
+    const double shown = 1 - std::exp(-std::max(value, 0.0f));
+    EXPECT_NEAR(displayed_grey(color, value), srgb(shown), 1e-3) << value;
+    EXPECT_NEAR(displayed_grey(rec1886, value), std::pow(shown, 1 / 2.4), 1e-3) << value;
+  }
+  Image pure(1, 1, {"R", "G", "B"});
+  pure.pixels = {0.5f, -40, 0};  // Out of gamut, as light of one wavelength is.
+  color.to_display(pure);
+  EXPECT_NEAR(pure.pixels[0], srgb(1 - std::exp(-0.5)), 1e-3);
+  EXPECT_NEAR(pure.pixels[1], 0, 1e-3);
+}
+
 TEST_F(ColorTest, WhiteAndPrimariesOfRec709) {
   const Eigen::Matrix3d matrix = ColorManagement({}).xyz_to_working();
   EXPECT_TRUE((matrix * from_chromaticity(0.3127, 0.3290)).isApprox(Eigen::Vector3d::Ones(), 1e-5));
@@ -151,7 +171,7 @@ TEST_F(ColorTest, DisplayCurves) {
 
 TEST_F(ColorTest, ViewsAreMonotone) {
   for (const std::string display : {"sRGB", "Rec.1886"})
-    for (const std::string view : {"Un-tone-mapped", "ACES SDR"}) {
+    for (const std::string view : {"Un-tone-mapped", soft_highlights_view, "ACES SDR"}) {
       const ColorManagement color({"", display, view});
       double last = -1e-6;
       for (float value = 1e-4f; value < 1; value *= 1.3f) {
@@ -226,8 +246,9 @@ TEST_F(ColorTest, WithoutInterchangeRolesPrimariesAreThoseOfRec709) {
 TEST_F(ColorTest, UnknownNamesListTheKnownOnes) {
   EXPECT_THAT(error_of({"", "CRT", ""}),
               AllOf(HasSubstr("built-in"), HasSubstr("\"CRT\""), HasSubstr("\"sRGB\", \"Rec.1886\"")));
-  EXPECT_THAT(error_of({"", "sRGB", "Filmic"}),
-              AllOf(HasSubstr("\"Filmic\""), HasSubstr("\"Un-tone-mapped\", \"ACES SDR\", \"Raw\"")));
+  EXPECT_THAT(
+      error_of({"", "sRGB", "Filmic"}),
+      AllOf(HasSubstr("\"Filmic\""), HasSubstr("\"Un-tone-mapped\", \"Soft highlights\", \"ACES SDR\", \"Raw\"")));
 }
 
 TEST_F(ColorTest, DisplaysWithoutAnInverseAreShownButNotStated) {

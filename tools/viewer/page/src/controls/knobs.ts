@@ -33,7 +33,7 @@ interface NumberKnob {
   also?: (scene: JsonObject) => JsonObject;
 }
 
-const views = ["Un-tone-mapped", "ACES SDR", "Raw"];
+const views = ["Un-tone-mapped", "Soft highlights", "ACES SDR", "Raw"];
 const displays = ["sRGB", "Rec.1886"];
 const spectra = ["D65", "E", "A", "blackbody 3000", "blackbody 5500", "blackbody 9000"];
 
