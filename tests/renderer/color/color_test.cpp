@@ -36,6 +36,8 @@ Eigen::Vector3d from_chromaticity(double x, double y) { return {x / y, 1, (1 - x
 
 Eigen::Vector3d xyz_of(const Spectrum& light) { return make_bands(light, observer_min, observer_max, 1).front().xyz; }
 
+double srgb(double v) { return v <= 0.0031308 ? 12.92 * v : 1.055 * std::pow(v, 1 / 2.4) - 0.055; }
+
 /// The value that a display shows for scene-linear grey.
 double displayed_grey(const ColorManagement& color, float value) {
   Image image(1, 1, {"R", "G", "B"});
@@ -159,7 +161,6 @@ TEST_F(ColorTest, SaturatedWhitesStayFiniteAndNeutral) {
 }
 
 TEST_F(ColorTest, DisplayCurves) {
-  const auto srgb = [](double v) { return v <= 0.0031308 ? 12.92 * v : 1.055 * std::pow(v, 1 / 2.4) - 0.055; };
   const ColorManagement color({}), rec1886({"", "Rec.1886", ""}), raw({"", "", "Raw"});
   for (const float value : {0.0f, 0.001f, 0.18f, 0.5f, 1.0f}) {
     EXPECT_NEAR(displayed_grey(color, value), srgb(value), 1e-4);
