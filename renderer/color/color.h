@@ -31,8 +31,8 @@ bool is_library_config(const std::string& name);
 struct ColorSettings {
   /// An OCIO config: a file, or what is_library_config tells. Empty: $OCIO, or the built-in config if that is not set.
   std::string config;
-  std::string display;  ///< A display of the config. Empty: the config's default display.
-  std::string view;     ///< A view of the display. Empty: preferred_view, or else the display's default view.
+  std::string display;           ///< A display of the config. Empty: the config's default display.
+  std::string view;              ///< A view of the display. Empty: preferred_view, or else the display's default view.
   std::string preferred_view{};  ///< Any name: counts if `view` is empty, and the display has such a view.
 };
 
