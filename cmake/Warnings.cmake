@@ -23,6 +23,7 @@ else()
   target_compile_options(tensorray_options INTERFACE -Wshadow)
 endif()
 if(TENSORRAY_SANITIZE)
+  target_compile_definitions(tensorray_options INTERFACE TENSORRAY_SANITIZED)  # Clang 14 has no macro for all of them.
   target_compile_options(tensorray_options INTERFACE -fsanitize=${TENSORRAY_SANITIZE} -fno-omit-frame-pointer)
   if(TENSORRAY_SANITIZE MATCHES undefined)
     target_compile_options(tensorray_options INTERFACE -fno-sanitize-recover=undefined)

@@ -33,6 +33,7 @@ std::string text_of(const std::filesystem::filesystem_error& error) {
   return "the working folder cannot be found: " + error.code().message();
 }
 
+#ifndef TENSORRAY_SANITIZED
 /// The end of a program whose exception nobody catches: one line and a status, as of any other error.
 [[noreturn]] void end_by_exception() {
   std::string reason = "an unknown error";
@@ -48,7 +49,6 @@ std::string text_of(const std::filesystem::filesystem_error& error) {
   _exit(failed);
 }
 
-#ifndef __SANITIZE_ADDRESS__
 void expect_exceptions() { std::set_terminate(end_by_exception); }
 
 /// Called before the libraries are initialized: one of OpenVDB's (log4cplus) starts threads then, and where it cannot,

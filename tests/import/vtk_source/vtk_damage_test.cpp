@@ -52,7 +52,7 @@ TEST(VtkDamageTest, TypesAreQuotedOnOneLine) {
 TEST(VtkDamageTest, NothingButTheErrorIsSaid) {
   const std::filesystem::path data = data_file("disk_out_ref/disk_out_ref.ex2");
   SKIP_WITHOUT(data);
-#ifdef __SANITIZE_ADDRESS__
+#ifdef TENSORRAY_SANITIZED
   GTEST_SKIP() << "the sanitizer's report is not to be lost, so that nothing is silenced";
 #endif
   const TemporaryFolder folder;

@@ -263,7 +263,7 @@ TEST_F(ImportProcess, AnInterruptedImportLeavesNothing) {
 }
 
 TEST_F(ImportProcess, TakesLessThanTwiceTheData) {
-#ifdef __SANITIZE_ADDRESS__
+#ifdef TENSORRAY_SANITIZED
   GTEST_SKIP() << "the sanitizer's own memory is larger";
 #endif
   write("small.npy", npy_header("2, 2, 2, 3, 3") + bytes_of(std::vector<float>(72, 1.0f)));
@@ -283,7 +283,7 @@ TEST_F(ImportProcess, TakesLessThanTwiceTheData) {
 }
 
 TEST_F(ImportProcess, OfWhatIsLargerThanItsMemoryGivesTheSameFile) {
-#ifdef __SANITIZE_ADDRESS__
+#ifdef TENSORRAY_SANITIZED
   GTEST_SKIP() << "the sanitizer's own memory is larger";
 #endif
   if (std::filesystem::space(in_folder("")).available < (std::uintmax_t{3} << 30))
@@ -298,7 +298,7 @@ TEST_F(ImportProcess, OfWhatIsLargerThanItsMemoryGivesTheSameFile) {
 
 /// A mesh may become more voxels than fit in memory.
 TEST_F(ImportProcess, OfAMeshWithMoreVoxelsThanItsMemoryGivesTheSameFile) {
-#ifdef __SANITIZE_ADDRESS__
+#ifdef TENSORRAY_SANITIZED
   GTEST_SKIP() << "the sanitizer's own memory is larger";
 #endif
   if (std::filesystem::space(in_folder("")).available < (std::uintmax_t{3} << 30))

@@ -13,7 +13,7 @@ using namespace test;
 class Limits : public Program {
  protected:
   void SetUp() override {
-#ifdef __SANITIZE_ADDRESS__
+#ifdef TENSORRAY_SANITIZED
     GTEST_SKIP() << "the address sanitizer needs terabytes of addresses";
 #endif
     Program::SetUp();

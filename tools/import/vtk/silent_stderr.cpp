@@ -8,7 +8,7 @@
 namespace tensorray {
 
 SilentStderr::SilentStderr() {
-#ifndef __SANITIZE_ADDRESS__
+#ifndef TENSORRAY_SANITIZED
   std::fflush(stderr);
   const Descriptor nowhere = open_file("/dev/null", O_WRONLY);
   if (!nowhere.is_open()) return;
