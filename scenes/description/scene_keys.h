@@ -217,7 +217,8 @@ void describe(OutputDescription& output, Visitor& visit) {
   visit("ocio", output.ocio,
         "OpenColorIO config: a file, ocio://NAME, or built-in; default: $OCIO, or the built-in one");
   visit("display", output.display, "OpenColorIO display; default: that of the config");
-  visit("view", output.view, "OpenColorIO view; default: that of the display");
+  visit("view", output.view,
+        "OpenColorIO view; default: Soft highlights for light on a plate, otherwise that of the display");
   visit("annotations", output.annotations, "what is drawn over `image`: a scale bar, the world's axes, a legend");
 }
 
