@@ -9,25 +9,14 @@
 namespace tensorray {
 namespace {
 
-constexpr auto least_interval = std::chrono::seconds(10);    // Between two times of keeping.
-constexpr int least_ratio = 50;                              // Of the time between them to the time they take.
-constexpr std::size_t bytes_at_once = std::size_t{1} << 26;  // In a message to other processes.
+constexpr auto least_interval = std::chrono::seconds(10);  // Between two times of keeping.
+constexpr int least_ratio = 50;                            // Of the time between them to the time they take.
 
 /// What stands before the bytes of a result.
 struct ResultHead {
   ResultKey key;
   std::uint64_t size;
 };
-
-/// Gives the other processes the bytes of process 0.
-void share_bytes(Team& team, std::string& bytes) {
-  const std::size_t size = of_first(&team, bytes.size());
-  if (has_all(&team)) {
-    for (std::size_t begin = 0; begin < size; begin += bytes_at_once) team.exchange(bytes.substr(begin, bytes_at_once));
-    return;
-  }
-  while (bytes.size() < size) bytes += team.exchange({}).front();
-}
 
 }  // namespace
 
@@ -44,7 +33,7 @@ KeptResults::KeptResults(Work* work, Team* team) : work_(has_all(team) ? work : 
     for (const WorkUnit& unit : work_->units())
       if (unit.state) kept += *unit.state;
   }
-  if (team) share_bytes(*team, kept);
+  if (team) share_values(*team, kept);
   take(kept);
 }
 

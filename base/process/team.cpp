@@ -7,6 +7,8 @@
 namespace tensorray {
 namespace {
 
+constexpr std::size_t bytes_at_once = std::size_t{1} << 26;  // In a message.
+
 [[noreturn]] void fail() {
   throw std::runtime_error("mpirun: the ranks do not do the same work; start the same program on all machines");
 }
@@ -51,6 +53,16 @@ void exchange_parts(Team& team, std::size_t parts, std::size_t at_once, const Co
   for (std::size_t begin = 0; begin < parts; begin += at_once) {
     const std::size_t end = std::min(begin + at_once, parts);
     take_others(team, team.exchange(bytes_of_mine(team, begin, end, copy)), begin, end, copy);
+  }
+}
+
+void copy_of_first(Team& team, void* values, std::size_t size) {
+  auto* const bytes = static_cast<char*>(values);
+  for (std::size_t begin = 0; begin < size; begin += bytes_at_once) {
+    const std::size_t count = std::min(bytes_at_once, size - begin);
+    const std::string first = team.exchange(has_all(&team) ? std::string(bytes + begin, count) : std::string()).front();
+    if (first.size() != count) fail();
+    std::memcpy(bytes + begin, first.data(), count);
   }
 }
 

@@ -67,6 +67,17 @@ Number of_first(Team* team, Number number) {
   return number;
 }
 
+/// Copies bytes of process 0 to all processes, which have room for as many. @throw as Team::exchange.
+void copy_of_first(Team& team, void* values, std::size_t size);
+
+/// Gives all processes the values of process 0 instead of theirs: a vector of numbers, or of structs of them, or a
+/// string. @throw as Team::exchange.
+template <class Values>
+void share_values(Team& team, Values& values) {
+  values.resize(of_first(&team, values.size()));
+  copy_of_first(team, values.data(), values.size() * sizeof values[0]);
+}
+
 /// Gives process 0 the parts that this process has done. @param at_once, @throw as above.
 void collect_parts(Team& team, std::size_t parts, std::size_t at_once, const CopyPart& copy);
 

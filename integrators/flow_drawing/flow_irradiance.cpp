@@ -7,6 +7,7 @@
 #include <tbb/parallel_for.h>
 
 #include "base/constants.h"
+#include "base/process/team.h"
 #include "integrators/flow/flow_map.h"
 #include "integrators/flow/wavelength_tracer.h"
 #include "integrators/flow_drawing/caustic.h"
@@ -92,14 +93,15 @@ Plate part_of(const Plate& plate, Eigen::AlignedBox2d box, int resolution) {
 }
 
 /// For the flexibilities of the light, as a range if they differ.
-FlowSettings flow_settings(const LandingLight& light, const Plate& plate, std::size_t rays) {
+FlowSettings flow_settings(const LandingLight& light, const Plate& plate, const FlowIrradianceSettings& wanted) {
   const auto [least, greatest] = std::minmax_element(light.flexibilities.begin(), light.flexibilities.end());
   FlowSettings settings;
   settings.range = *least < *greatest;
   settings.flexibilities = settings.range ? std::vector<double>{*least, *greatest} : std::vector<double>{*least};
   settings.plate = plate;
   settings.tolerance = landing_tolerance;
-  settings.most_starts = rays;
+  settings.most_starts = wanted.rays;
+  settings.team = wanted.team;
   return settings;
 }
 
@@ -156,13 +158,14 @@ std::optional<FlowIrradiance> flow_irradiance(const TensorField& field, const Su
   if (box.isEmpty()) return std::nullopt;
   FlowIrradiance result;
   result.plate = part_of(plate, box, settings.resolution);
-  const FlowSettings tracing = flow_settings(light, result.plate, settings.rays);
+  const FlowSettings tracing = flow_settings(light, result.plate, settings);
   const std::size_t channels = light.flexibilities.size() - 1;
   for (int pass = 0; pass < light.passes; ++pass) {
     const Beam beam = beam_of(field, surfaces, plate, light, pass);
     const FlowMap map = trace_flow_map(field, geometry, beam, settings.bending, tracing, progress);
     CausticSettings drawing;
     drawing.channels = channels;
+    drawing.team = settings.team;
     Caustic caustic = draw_caustic(map, result.plate, bands_of(light, map, tracing), drawing, progress);
     if (pass == 0) {
       result.irradiance = std::move(caustic.irradiance);
@@ -173,6 +176,7 @@ std::optional<FlowIrradiance> flow_irradiance(const TensorField& field, const Su
       result.irradiance.values[i] += caustic.irradiance.values[i];
   }
   for (double& value : result.irradiance.values) value /= light.passes;
+  if (settings.team) share_values(*settings.team, result.irradiance.values);
   return result;
 }
 

@@ -13,6 +13,8 @@
 
 namespace tensorray {
 
+class Team;
+
 struct LandingLight {
   std::optional<Eigen::Vector3d> source;                  ///< Of a point light: where it is, outside the volume.
   Eigen::Vector3d direction = -Eigen::Vector3d::UnitZ();  ///< Unit; in which the light of a disk's centre travels.
@@ -25,6 +27,7 @@ struct FlowIrradianceSettings {
   BendingSettings bending;
   int resolution = 64;         ///< Pixels along the longer side of the part of the plate where light lands.
   std::size_t rays = 1 << 16;  ///< Vertices of the flow map, at most, for each direction.
+  Team* team = nullptr;        ///< Processes that compute the same together; null: this one is alone.
 };
 
 struct FlowIrradiance {
@@ -41,7 +44,7 @@ struct FlowIrradiance {
 /// are
 ///               projected on it, from the source if there is one.
 /// @return nothing if no light lands, or if the light meets the plane before the volume. The same for any number of
-/// threads. @throw Cancelled.
+/// threads, and at all processes of a team of any size. @throw Cancelled; as Team::exchange.
 std::optional<FlowIrradiance> flow_irradiance(const TensorField& field, const Surfaces& surfaces, const Plate& plate,
                                               const LandingLight& light, const FlowIrradianceSettings& settings,
                                               const Progress& progress);

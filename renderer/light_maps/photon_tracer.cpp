@@ -8,6 +8,7 @@
 
 #include <tbb/parallel_for.h>
 
+#include "base/process/team.h"
 #include "renderer/lights/photon_emitter.h"
 
 namespace tensorray {
@@ -17,6 +18,7 @@ using Eigen::Vector3d;
 
 constexpr std::uint64_t photon_seed = 0x9e3779b97f4a7c15;  // Photons do not share the numbers of pixels.
 constexpr std::size_t chunk_size = 128;                    // Positions.
+constexpr std::size_t chunks_at_once = 256;                // That cross together: 100 MB, of 32 bands.
 
 /// A light that emits photons.
 struct Source {
@@ -184,6 +186,17 @@ PhotonEnd PhotonTracer::land(const Source& source, const BentRay& ray, const Emi
   return PhotonEnd::landed;
 }
 
+/// Takes the photons of the chunks that the others of the team have traced.
+void exchange_chunks(Team& team, std::vector<ChunkPhotons>& parts) {
+  exchange_parts(team, parts.size(), chunks_at_once, [&](std::size_t i, PartBytes& bytes) {
+    std::size_t count = parts[i].landed.size();
+    bytes.copy(&count, sizeof count);
+    parts[i].landed.resize(count);
+    bytes.copy(parts[i].landed.data(), count * sizeof(Photon));
+    bytes.copy(parts[i].counts.data(), sizeof parts[i].counts);
+  });
+}
+
 }  // namespace
 
 PhotonMaps trace_photons(const BendingRegion& region, const std::vector<Vector3d>& corners,
@@ -199,8 +212,10 @@ PhotonMaps trace_photons(const BendingRegion& region, const std::vector<Vector3d
     progress.update("tracing photons", static_cast<std::uint64_t>(pass), static_cast<std::uint64_t>(settings.passes));
     const PhotonTracer tracer(region, surfaces, settings, pass);
     std::vector<ChunkPhotons> parts(chunks.size());
-    tbb::parallel_for(std::size_t{0}, chunks.size(),
-                      [&](std::size_t i) { parts[i] = tracer.trace(sources[chunks[i].source], chunks[i]); });
+    tbb::parallel_for(std::size_t{0}, chunks.size(), [&](std::size_t i) {
+      if (does_part(settings.team, i)) parts[i] = tracer.trace(sources[chunks[i].source], chunks[i]);
+    });
+    if (settings.team) exchange_chunks(*settings.team, parts);
     std::vector<Photon> landed;
     result.counts.push_back({});
     for (const ChunkPhotons& part : parts) {

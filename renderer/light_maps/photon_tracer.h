@@ -19,12 +19,15 @@
 
 namespace tensorray {
 
+class Team;
+
 struct PhotonTracerSettings {
   std::uint64_t per_pass = 16384;  ///< Positions from which light starts, of all lights; each is at least one. Every
                                    ///< position has a photon of each band. 0: none.
   int passes = 1;                  ///< >= 1
   double radius = 1;               ///< Of the first pass, world units; > 0.
   std::uint64_t seed = 0;
+  Team* team = nullptr;  ///< Processes that trace the same photons, each a part, and all have them; null: alone.
   /// Whether a light lights a surface by photons.
   std::function<bool(int light, std::uint32_t surface)> serves;
   /// Of surfaces that are rectangles, by their index: photons near an edge are mirrored at it, so that the light that
@@ -34,7 +37,7 @@ struct PhotonTracerSettings {
 
 /// @param corners  Of the region's hull.
 /// @return the same for any number of threads: random numbers are functions of (seed, pass, light, photon, dimension).
-/// @throw Cancelled.
+/// @throw Cancelled; as Team::exchange.
 PhotonMaps trace_photons(const BendingRegion& region, const std::vector<Eigen::Vector3d>& corners,
                          const SurfaceScene& surfaces, const std::vector<Light>& lights,
                          const PhotonTracerSettings& settings, const Progress& progress);

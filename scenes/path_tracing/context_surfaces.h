@@ -13,6 +13,8 @@
 
 namespace tensorray {
 
+class Team;
+
 /// Makes a material from its description, for the bands of the light that shows the paths.
 /// @throw std::invalid_argument if a metal is unknown.
 Material load_material(const MaterialDescription& description, const ShownLight& light);
@@ -22,8 +24,10 @@ Material load_material(const MaterialDescription& description, const ShownLight&
 ShadedSurface read_mesh_surface(const std::filesystem::path& file, std::optional<double> smooth_angle = {});
 
 /// Adds the scene's context to `surfaces`, and the materials that it needs to `materials`.
-/// @throw SceneError if a slice or an isosurface is empty; Cancelled (photons are traced for the plate).
-void add_context(const Scene& scene, const PathScene& paths, const Progress& progress,
+/// @param team  Processes that make the light on the plate together, and all have it; null: this one is alone.
+/// @throw SceneError if a slice or an isosurface is empty; Cancelled (light is traced for the plate); as
+/// Team::exchange.
+void add_context(const Scene& scene, const PathScene& paths, Team* team, const Progress& progress,
                  std::vector<ShadedSurface>& surfaces, std::vector<Material>& materials);
 
 }  // namespace tensorray

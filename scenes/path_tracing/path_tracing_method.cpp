@@ -109,18 +109,19 @@ class LoadedPaths : public LoadedMethod {
  private:
   /// Renders the paths, their context and the lamps.
   SurfacePicture render_stage(const Scene& scene, const std::vector<Path>& paths, ShadedSurface path_surface,
-                              const Camera& camera, const Progress& progress, const RenderCallbacks& callbacks) const;
+                              const Camera& camera, Team* team, const Progress& progress,
+                              const RenderCallbacks& callbacks) const;
 
   PathScene paths_;
 };
 
 SurfacePicture LoadedPaths::render_stage(const Scene& scene, const std::vector<Path>& paths, ShadedSurface path_surface,
-                                         const Camera& camera, const Progress& progress,
+                                         const Camera& camera, Team* team, const Progress& progress,
                                          const RenderCallbacks& callbacks) const {
   const ShownLight& light = paths_.lights.light;
   std::vector<Material> materials{load_material(paths_.settings.material, light)};
   std::vector<ShadedSurface> surfaces{std::move(path_surface)};
-  add_context(scene, paths_, progress, surfaces, materials);
+  add_context(scene, paths_, team, progress, surfaces, materials);
   const std::vector<Light> lights = make_lights(scene.description, paths_.lights, camera);
   add_lamps(lights, light, surfaces, materials);
   const SurfaceScene stage(std::move(surfaces));
@@ -180,7 +181,9 @@ Render LoadedPaths::render(const Scene& scene, const Progress& progress, RenderJ
     add_picture(picture, shown);
     return shown;
   });
-  add_picture(render_stage(scene, result.paths, std::move(shapes.surface), camera, progress, callbacks), result);
+  add_picture(render_stage(scene, result.paths, std::move(shapes.surface), camera, job ? job->team : nullptr, progress,
+                           callbacks),
+              result);
   result.statistics.seconds_drawing = seconds_since(drawing);
   return result;
 }

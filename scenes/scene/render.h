@@ -86,7 +86,8 @@ struct RenderJob {
   /// Gets what there is so far when `work` wants a picture; may be empty.
   std::function<void(Render)> show;
 
-  /// Processes that make the same picture together with this one, if the method can (Method::is_shared); null: alone.
+  /// Processes that make the same picture together with this one, if the method can (Method::is_shared); or that make
+  /// together what is needed before the units of the work. Null: alone.
   Team* team = nullptr;
 };
 

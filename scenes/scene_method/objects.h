@@ -16,6 +16,8 @@
 
 namespace tensorray {
 
+class Team;
+
 /// A plate, a mesh, or paths of light.
 struct SceneObject {
   std::optional<Plate> plate;  ///< If it is flat.
@@ -32,6 +34,7 @@ struct LitObjects {
   const std::vector<Light>& lights;
   const std::vector<SceneObject>& objects;
   const SurfaceScene& surfaces;  ///< All surfaces, of which that of object i has the index i, and lamps are the last.
+  Team* team = nullptr;          ///< Processes that trace the light together, and all have it; null: this one is alone.
 };
 
 /// The objects of the scene (without any, a checkerboard as floor below the volume), then its obstacles.

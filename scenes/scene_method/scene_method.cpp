@@ -200,7 +200,7 @@ Render LoadedObjects::render(const Scene& scene, const Progress& progress, Rende
   const PathTracerSettings samples = object_tracer_settings(scene, loaded_, camera, 0);
   PhotonMaps photons;
   if (bends) {
-    const LitObjects lit{scene, lights, objects, stage};
+    const LitObjects lit{scene, lights, objects, stage, job ? job->team : nullptr};
     const PhotonPairs pairs = photon_pairs(lit, loaded_.settings);
     photons =
         photons_of(lit, pairs, region, loaded_.settings.photons, samples.max_samples / samples.first_samples, progress);

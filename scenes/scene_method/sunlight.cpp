@@ -139,7 +139,7 @@ std::optional<IrradianceMap> land(const LitObjects& lit, std::size_t number, con
   std::optional<FlowIrradiance> landed;
   try {
     landed = flow_irradiance(scene.field, surfaces_before(lit, receiver), plate, light,
-                             {scene.bending, caustic.resolution, caustic.rays}, progress);
+                             {scene.bending, caustic.resolution, caustic.rays, lit.team}, progress);
   } catch (const std::invalid_argument& error) {
     throw SceneError(fmt::format("{}: `/lights/{}` has no map of its light: {}; move it away, or use photons",
                                  scene.description.path.string(), number, error.what()));

@@ -1,10 +1,12 @@
 // Ranks that are threads of this process: jobs and units are handed out, and come back.
 
+#include <algorithm>
 #include <atomic>
 #include <condition_variable>
 #include <deque>
 #include <functional>
 #include <mutex>
+#include <numeric>
 #include <set>
 #include <string>
 #include <thread>
@@ -287,8 +289,23 @@ std::vector<std::string> do_steps(Team& team, int steps) {
   return seen;
 }
 
+TEST(SharedSteps, WhatIsPassedOnReachesEachRankOnce) {
+  for (int count = 1; count < 70; ++count) {
+    std::vector<int> reached{0};
+    for (std::size_t i = 0; i < reached.size(); ++i) {
+      const std::vector<int> next = next_ranks(reached[i], count);
+      EXPECT_LT(1 << next.size(), 2 * count);
+      reached.insert(reached.end(), next.begin(), next.end());
+    }
+    std::sort(reached.begin(), reached.end());
+    std::vector<int> all(static_cast<std::size_t>(count));
+    std::iota(all.begin(), all.end(), 0);
+    EXPECT_EQ(reached, all);
+  }
+}
+
 TEST(SharedSteps, AllRanksHaveThePartsOfAll) {
-  for (const int ranks : {2, 3, 4}) {
+  for (const int ranks : {2, 3, 4, 7}) {
     Post post;
     post.boxes.resize(static_cast<std::size_t>(ranks));
     Progress progress;
@@ -319,8 +336,42 @@ TEST(SharedSteps, AllRanksHaveThePartsOfAll) {
   }
 }
 
+/// A job may have steps before its units. A unit is counted where it is done, and steps are not.
+TEST(SharedSteps, ComeBeforeUnits) {
+  for (const int ranks : {2, 3}) {
+    Post post;
+    post.boxes.resize(static_cast<std::size_t>(ranks));
+    Progress progress;
+    std::vector<std::thread> others;
+    for (int rank = 1; rank < ranks; ++rank)
+      others.emplace_back([&, rank] {
+        ThreadRanks mine(post, rank);
+        Follower follower(mine, progress, 0);
+        while (const auto job = follower.next_job()) {
+          Work work;
+          follower.share(*job, work, 2);
+          do_steps(*follower.team(*job), 3);
+          do_units(work, 20, rank);
+        }
+      });
+    ThreadRanks first(post, 0);
+    Leader leader(first, progress);
+    for (int job = 0; job < 2; ++job) {
+      Work work;
+      do_steps(leader.share("the job", work, 2), 3);
+      do_units(work, 20);
+      leader.end();
+      expect_complete(work.units(), 20);
+    }
+    leader.finish();
+    for (std::thread& each : others) each.join();
+    const std::vector<std::uint64_t> units = leader.traffic().units;
+    EXPECT_EQ(std::accumulate(units.begin(), units.end(), std::uint64_t{0}), 40u);
+  }
+}
+
 TEST(SharedSteps, ADamagedMessageIsRefused) {
-  const std::string bytes = packed({"one", "", "three"}, 1);
+  const std::string bytes = packed({"one", "", "three"});
   EXPECT_EQ(unpacked(bytes, 3), (std::vector<std::string>{"one", "", "three"}));
   for (std::size_t size = 0; size < bytes.size(); ++size)
     EXPECT_THROW(unpacked(bytes.substr(0, size), 3), std::runtime_error) << size;

@@ -48,10 +48,11 @@ class Follower::StepTeam : public Team {
   std::size_t count() const override { return static_cast<std::size_t>(follower_.ranks_.count()); }
 
   std::vector<std::string> exchange(std::string mine) override {
-    follower_.ranks_.send(0, bytes_of({RankWord::part, job_, 0, 0, mine}));
-    std::vector<std::string> parts = unpacked(rank_message(follower_.wait()).bytes, count());
-    parts[index()] = std::move(mine);
-    return parts;
+    follower_.ranks_.send(0, bytes_of({RankWord::part, job_, 0, 0, std::move(mine)}));
+    const std::string all = follower_.wait();
+    for (const int rank : next_ranks(follower_.ranks_.rank(), follower_.ranks_.count()))
+      follower_.ranks_.send(rank, all);
+    return unpacked(rank_message(all).bytes, count());
   }
 
   std::vector<std::string> collect(std::string mine) override {

@@ -70,7 +70,7 @@ void Leader::receive(int from, RankMessage message) {
       send_units(from, message.job, message.number);
   }
   if (message.word == RankWord::part && is_current) {
-    ++traffic_.units[static_cast<std::size_t>(from)];
+    if (!shared_->work) ++traffic_.units[static_cast<std::size_t>(from)];
     shared_->parts[from].push_back(std::move(message.bytes));
   }
   if (message.word != RankWord::unit || !is_current) return;
@@ -144,13 +144,14 @@ std::vector<std::size_t> Leader::next_units(std::size_t threads) {
   }
 }
 
-void Leader::share(const std::string& job, Work& work, std::size_t threads) {
+Team& Leader::share(const std::string& job, Work& work, std::size_t threads) {
   work.next = [this, threads] { return next_units(threads); };
   const std::lock_guard lock(mutex_);
   shared_.emplace();
   shared_->number = ++jobs_;
   shared_->text = job;
   shared_->work = &work;
+  return *this;
 }
 
 Team& Leader::share_steps(const std::string& job) {
@@ -180,10 +181,11 @@ std::vector<std::string> Leader::do_step(std::string mine, bool gives_back) {
     {
       const std::lock_guard lock(mutex_);
       if (auto parts = take_parts()) {
-        ++traffic_.units[0];
+        if (!shared_->work) ++traffic_.units[0];
         parts->front() = std::move(mine);
-        for (int rank = 1; gives_back && rank < ranks_.count(); ++rank)
-          send(rank, {RankWord::part, shared_->number, 0, 0, packed(*parts, static_cast<std::size_t>(rank))});
+        if (gives_back)
+          for (const int rank : next_ranks(0, ranks_.count()))
+            send(rank, {RankWord::part, shared_->number, 0, 0, packed(*parts)});
         return std::move(*parts);
       }
     }

@@ -50,9 +50,10 @@ class Leader : private Team {
   Leader(const Leader&) = delete;
   Leader& operator=(const Leader&) = delete;
 
-  /// All ranks do units of `work` from now on, this one with `threads` threads, until all are done. The work ends early
-  /// when the progress is cancelled. @param job  What the others need to begin. Ends with `end`.
-  void share(const std::string& job, Work& work, std::size_t threads);
+  /// All ranks do units of `work` from now on, this one with `threads` threads, until all are done. Before it
+  /// begins, they may do steps together. The work ends early when the progress is cancelled. @param job  What the
+  /// others need to begin. Ends with `end`. @return of this rank, for the steps.
+  Team& share(const std::string& job, Work& work, std::size_t threads);
 
   /// All ranks do the steps of the job together from now on. Ends with `end`. @param job  As above. @return of this
   /// rank, which must not be used after `end`.

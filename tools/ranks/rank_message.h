@@ -14,7 +14,8 @@ enum class RankWord : std::uint32_t {
   job,     ///< To 0: I have nothing to do. The answer: what to do, as text.
   unit,    ///< A unit of the job, with its state. To 0: this far I have done it. From 0: do it.
   more,    ///< To 0: I need units, `number` for all threads. The answer ends their list; an empty list: there are none.
-  part,    ///< Of a step that all ranks do together. To 0: mine. From 0: those of all others, if they are given back.
+  part,    ///< Of a step that all ranks do together. To 0: mine. From 0: those of all ranks, if they are given back;
+           ///< they are passed on (next_ranks).
   finish,  ///< From 0: there are no more jobs.
 };
 
@@ -43,13 +44,13 @@ inline RankMessage rank_message(const std::string& bytes) {
           bytes.substr(sizeof head)};
 }
 
-/// Texts as one, without one of them.
-inline std::string packed(const std::vector<std::string>& texts, std::size_t without) {
+/// Texts as one.
+inline std::string packed(const std::vector<std::string>& texts) {
   std::string bytes;
-  for (std::size_t i = 0; i < texts.size(); ++i) {
-    const std::uint64_t size = i == without ? 0 : texts[i].size();
+  for (const std::string& text : texts) {
+    const std::uint64_t size = text.size();
     bytes.append(reinterpret_cast<const char*>(&size), sizeof size);
-    bytes.append(texts[i], 0, size);
+    bytes += text;
   }
   return bytes;
 }

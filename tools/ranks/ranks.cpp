@@ -31,6 +31,12 @@ Ranks* (*load())() {
 
 }  // namespace
 
+std::vector<int> next_ranks(int rank, int count) {
+  std::vector<int> ranks;
+  for (int more = 1; rank + more < count && (rank & more) == 0; more *= 2) ranks.insert(ranks.begin(), rank + more);
+  return ranks;
+}
+
 std::unique_ptr<Ranks> join_ranks() {
   if (!has_others()) return nullptr;
   std::unique_ptr<Ranks> ranks(load()());

@@ -6,6 +6,7 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <vector>
 
 namespace tensorray {
 
@@ -32,6 +33,10 @@ class Ranks {
   /// Waits until all ranks have called it. None can be used afterwards.
   virtual void finish() = 0;
 };
+
+/// The ranks to which a rank passes on what comes from rank 0 to all: a binomial tree, so that no rank sends it more
+/// than log2(count) times. The first has the most ranks behind it.
+std::vector<int> next_ranks(int rank, int count);
 
 /// Joins the other processes. @return null if this process was started alone, or is the only one: MPI, which takes half
 /// a second to start, is not loaded then.

@@ -140,10 +140,8 @@ class SharedWork {
                         {"scene_file", text_of_path(std::filesystem::absolute(scene.description.path))},
                         {"part", {job.work.part().index, job.work.part().count}},
                         {"is_shard", job.work.is_shard}};
-    if (method.is_divided())
-      leader_->share(order.dump(), job.work, threads);
-    else
-      job.team = &leader_->share_steps(order.dump());
+    job.team =
+        method.is_divided() ? &leader_->share(order.dump(), job.work, threads) : &leader_->share_steps(order.dump());
   }
   ~SharedWork() {
     if (leader_) leader_->end();
@@ -348,11 +346,10 @@ void render_units(const RankJob& job, const Json& order, const RenderRun& run, s
   SceneDescription description =
       read_scene_json(origin.at("scene"), path_of_text(order.at("scene_file").get<std::string>()));
   set_chosen(origin, description);
-  if (description.integrator.method().is_shared()) {  // Steps depend on what rank 0 writes; the origin does not say it.
-    description.output.files.clear();
-    for (const auto& [kind, file] : order.at("outputs").items())
-      description.output.files[kind] = path_of_text(file.get<std::string>());
-  }
+  // Steps depend on what rank 0 writes; the origin does not say it.
+  description.output.files.clear();
+  for (const auto& [kind, file] : order.at("outputs").items())
+    description.output.files[kind] = path_of_text(file.get<std::string>());
   bound_memory_of(run, description);
   Scene scene = load(description, loaded, progress);
   const std::string other = difference(origin, origin_of(scene));
@@ -361,10 +358,8 @@ void render_units(const RankJob& job, const Json& order, const RenderRun& run, s
   RenderJob units{Work({order.at("part").at(0).get<std::size_t>(), order.at("part").at(1).get<std::size_t>()}), {}};
   units.work.is_shard = order.at("is_shard").get<bool>();
   const std::unique_ptr<Team> team = follower.team(job);
-  if (description.integrator.method().is_shared())
-    units.team = team.get();
-  else
-    follower.share(job, units.work, running_threads());
+  units.team = team.get();
+  if (description.integrator.method().is_divided()) follower.share(job, units.work, running_threads());
   render(scene, progress, &units);
   loaded.emplace(std::move(scene));
 }

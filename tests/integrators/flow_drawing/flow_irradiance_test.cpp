@@ -3,12 +3,14 @@
 #include <cmath>
 #include <memory>
 #include <numeric>
+#include <optional>
 #include <vector>
 
 #include <gtest/gtest.h>
 #include <tbb/global_control.h>
 
 #include "renderer/light_maps/irradiance_map.h"
+#include "tests/base/team_support.h"
 #include "tests/integrators/support.h"
 
 namespace tensorray {
@@ -78,6 +80,27 @@ TEST(FlowIrradianceTest, BentLightKeepsItsPower) {
     const FlowIrradiance landed = land(field, light, floor_plate(40));
     for (int band = 0; band < 2; ++band)
       EXPECT_NEAR(power(landed, band), straight * -light.direction.z(), 0.01 * straight) << band;
+  }
+}
+
+TEST(FlowIrradianceTest, OfATeamIsThatOfOneProcess) {
+  const TensorField field = cube_field(9, [](const Vector3d& p) { return Matrix3d(p.asDiagonal()); });
+  LandingLight light = sun({0.2, 0.1, -1});
+  light.angle = 0.03;
+  light.passes = 2;
+  const FlowIrradiance alone = land(field, light, floor_plate(8));
+  for (const std::size_t count : {std::size_t{2}, std::size_t{3}}) {
+    std::vector<std::optional<FlowIrradiance>> landed(count);
+    run_team(count, [&](Team& team) {
+      landed[team.index()] =
+          flow_irradiance(field, surfaces_of(field), floor_plate(8), light, {{}, 64, 20000, &team}, {});
+    });
+    for (const auto& each : landed) {
+      ASSERT_TRUE(each);
+      EXPECT_EQ(each->plate.center, alone.plate.center);
+      EXPECT_TRUE(each->irradiance.values == alone.irradiance.values);
+      EXPECT_TRUE(each->folds == alone.folds);
+    }
   }
 }
 

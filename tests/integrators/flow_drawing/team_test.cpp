@@ -7,8 +7,8 @@
 
 #include <gtest/gtest.h>
 
+#include "tests/base/team_support.h"
 #include "tests/integrators/flow_support.h"
-#include "tests/integrators/team_support.h"
 
 namespace tensorray {
 namespace {

@@ -13,8 +13,8 @@
 
 #include "integrators/photons/photon_distribution.h"
 #include "integrators/photons/photon_sums.h"
+#include "tests/base/team_support.h"
 #include "tests/integrators/support.h"
-#include "tests/integrators/team_support.h"
 
 namespace tensorray {
 namespace {

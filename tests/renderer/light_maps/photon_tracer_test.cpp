@@ -10,6 +10,7 @@
 #include "base/constants.h"
 #include "renderer/sampling/random.h"
 #include "renderer/shading/shading.h"
+#include "tests/base/team_support.h"
 #include "tests/renderer/statistics.h"
 
 namespace tensorray {
@@ -121,6 +122,30 @@ TEST(PhotonTracerTest, APointsPowerIsThatOfItsSolidAngle) {
   const double solid_angle = 4 * std::asin(1 / (1 + 4 * 1.5 * 1.5));
   EXPECT_NEAR(power_in(photons, 0), 5 * solid_angle, 1e-3 * 5 * solid_angle);
   EXPECT_NEAR(power_in(photons, 1), 7 * solid_angle, 1e-3 * 7 * solid_angle);
+}
+
+TEST(PhotonTracerTest, OfATeamAreThoseOfOneProcess) {
+  const SurfaceScene floor = floor_at(-0.8, 3);
+  const std::vector<Light> lights{sun({0.4, 0.3, -1}), PointLight{{0, 0, 2}, {5, 7}}};
+  PhotonTracerSettings settings = settings_of(1000, 2);
+  const PhotonMaps alone = traced(ClearCube(0.5), floor, lights, settings);
+  for (const std::size_t count : {std::size_t{2}, std::size_t{3}}) {
+    std::vector<PhotonMaps> photons(count);
+    run_team(count, [&](Team& team) {
+      PhotonTracerSettings mine = settings;
+      mine.team = &team;
+      photons[team.index()] = traced(ClearCube(0.5), floor, lights, mine);
+    });
+    for (const PhotonMaps& each : photons) {
+      EXPECT_EQ(each.counts, alone.counts);
+      ASSERT_EQ(each.passes.size(), alone.passes.size());
+      for (std::size_t pass = 0; pass < each.passes.size(); ++pass) {
+        const std::vector<Photon>&a = each.passes[pass].photons(), &b = alone.passes[pass].photons();
+        ASSERT_EQ(a.size(), b.size());
+        EXPECT_EQ(std::memcmp(a.data(), b.data(), a.size() * sizeof(Photon)), 0);
+      }
+    }
+  }
 }
 
 /// Before the region, behind it, beside everything, and within it.

@@ -1,5 +1,5 @@
 #pragma once
-/// @file tests/integrators/team_support.h
+/// @file tests/base/team_support.h
 /// Teams whose members are threads.
 
 #include <condition_variable>
