@@ -2,6 +2,7 @@
 
 #include <cstdint>
 #include <new>
+#include <optional>
 #include <sstream>
 #include <stdexcept>
 
@@ -23,8 +24,12 @@
 #include "scenes/source/frames.h"
 #include "scenes/source/overrides.h"
 #include "tests/fuzz/view_targets.h"
+#include "tools/import/cases/ensight_files.h"
 #include "tools/import/cases/plot3d_layout.h"
+#include "tools/import/hdf5/xdmf_document.h"
+#include "tools/import/hdf5/xdmf_values.h"
 #include "tools/import/lattice_files/lattice_files.h"
+#include "tools/import/vtk/vtk_messages.h"
 #include "tools/import/vtk_formats/netcdf_size.h"
 #include "volumes/vdb/file_bytes.h"
 #include "volumes/vdb/vdb_tree_check.h"
@@ -124,21 +129,39 @@ void read_tck(const std::string& bytes) {
 }
 
 /// The values of all slices, too.
-void read_npy(const std::string& bytes) {
-  read_file(bytes, [](const std::filesystem::path& path) {
-    const Lattice lattice = open_npy(path);
+void read_lattice(const std::string& bytes, Lattice (*open)(const std::filesystem::path&)) {
+  read_file(bytes, [open](const std::filesystem::path& path) {
+    const Lattice lattice = open(path);
     std::vector<double> values(static_cast<std::size_t>(lattice.size.x()) * static_cast<std::size_t>(lattice.size.y()) *
                                static_cast<std::size_t>(lattice.components));
     for (int z = lattice.size.z() - 1; z >= 0; --z) lattice.read_slice(z, values.data());
   });
 }
 
-void read_nrrd(const std::string& bytes) {
-  read_file(bytes, [](const std::filesystem::path& path) { open_nrrd(path); });
+void read_npy(const std::string& bytes) { read_lattice(bytes, open_npy); }
+void read_nrrd(const std::string& bytes) { read_lattice(bytes, open_nrrd); }
+void read_nifti(const std::string& bytes) { read_lattice(bytes, open_nifti); }
+void read_mrtrix(const std::string& bytes) { read_lattice(bytes, open_mrtrix); }
+void read_metaimage(const std::string& bytes) { read_lattice(bytes, open_metaimage); }
+
+/// All numbers that stand in the document itself.
+void read_xdmf(const std::string& bytes) {
+  read_file(bytes, [](const std::filesystem::path& path) {
+    const VtkMessages messages;
+    const XdmfDocument document(path);
+    for (int step = 0; step < document.steps(); ++step)
+      for (vtkXMLDataElement* const grid : document.grids(step))
+        for (vtkXMLDataElement* const part : document.children(*grid, {"Topology", "Geometry", "Attribute"}))
+          for (vtkXMLDataElement* const item : document.children(*part, {"DataItem"}))
+            expect_one_line([&] { xdmf_values(document, *item); });
+  });
 }
 
-void read_nifti(const std::string& bytes) {
-  read_file(bytes, [](const std::filesystem::path& path) { open_nifti(path); });
+void read_ensight(const std::string& bytes) {
+  read_file(bytes, [](const std::filesystem::path& path) {
+    for (const std::optional<double> time : {std::optional<double>(), std::optional<double>(1)})
+      expect_one_line([&] { ensight_case(path, time); });
+  });
 }
 
 void read_plot3d(const std::string& bytes) {
@@ -183,6 +206,10 @@ const std::vector<FuzzTarget>& fuzz_targets() {
                                                {"npy", read_npy},
                                                {"nrrd", read_nrrd},
                                                {"nifti", read_nifti},
+                                               {"mrtrix", read_mrtrix},
+                                               {"metaimage", read_metaimage},
+                                               {"xdmf", read_xdmf},
+                                               {"ensight", read_ensight},
                                                {"plot3d", read_plot3d},
                                                {"netcdf", read_netcdf},
                                                {"vdb_tree", read_vdb_tree},
