@@ -123,6 +123,13 @@ void draw_scale_bar(Image& image, double pixel_size) {
   draw_marks(image, text, sizes.outline, on_light);
 }
 
+void draw_caption(Image& image, const std::string& text) {
+  const Sizes sizes(image);
+  const Vector2d right(image.width - sizes.margin, image.height - sizes.margin);
+  const std::vector<Mark> marks{{right - Vector2d(text_width(text, sizes.letter), 0), {}, text, sizes.letter}};
+  draw_marks(image, marks, sizes.outline, is_light(image, extent_of(marks)));
+}
+
 void draw_axes(Image& image, const Vector3d& right, const Vector3d& up) {
   const Sizes sizes(image);
   const Vector3d towards = right.cross(up);

@@ -1,7 +1,7 @@
 #pragma once
 /// @file renderer/charts/annotations.h
-/// Small drawings in the corners of a picture that say how to read it: a scale bar, the axes of the world, a strip of
-/// colours.
+/// Small drawings in the corners of a picture that say how to read it: a scale bar, a caption, the axes of the
+/// world, a strip of colours.
 
 #include <functional>
 #include <string>
@@ -23,6 +23,9 @@ double round_length(double limit);
 /// Draws a scale bar in the lower left corner: a round length of at most 0.4 of the picture's shorter side, and its
 /// number. @param pixel_size  World units along x; finite, > 0.
 void draw_scale_bar(Image& image, double pixel_size);
+
+/// Draws a line of text in the lower right corner.
+void draw_caption(Image& image, const std::string& text);
 
 /// Draws the axes of the world as the picture shows them, in the upper left corner, with the letters x, y, z. An axis
 /// that points at the viewer is a dot, one that points away is a cross.

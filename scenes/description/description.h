@@ -175,6 +175,7 @@ struct OutputDescription {
   std::string ocio;           ///< OCIO config, as of ColorSettings; empty: $OCIO, or the built-in one.
   std::string display, view;  ///< Empty: the default of the config.
   std::vector<Annotation> annotations;
+  std::string caption;  ///< A line that is drawn over `image`; with the values of keys.
 
   bool wants(const std::string& key) const { return files.count(key) > 0; }
   bool wants(Annotation annotation) const {

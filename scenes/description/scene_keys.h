@@ -220,6 +220,7 @@ void describe(OutputDescription& output, Visitor& visit) {
   visit("view", output.view,
         "OpenColorIO view; default: Soft highlights for light on a plate, otherwise that of the display");
   visit("annotations", output.annotations, "what is drawn over `image`: a scale bar, the world's axes, a legend");
+  visit("caption", output.caption, "a line over `image`; {field.scale} is the value of a key, # counts frames");
 }
 
 /// An item of `obstacles`.

@@ -60,6 +60,7 @@ std::function<void(Image&, double)> light_legend(const Scene& scene) {
 }
 
 void draw_annotations(const OutputDescription& output, const Render& render, Image& image) {
+  if (!output.caption.empty()) draw_caption(image, output.caption);
   if (!render.view) return;
   if (output.wants(Annotation::scale) && render.view->pixel_size) draw_scale_bar(image, *render.view->pixel_size);
   if (output.wants(Annotation::axes)) draw_axes(image, render.view->right, render.view->up);

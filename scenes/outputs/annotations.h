@@ -22,7 +22,7 @@ PictureView view_of(const Camera& camera);
 /// exposure.
 std::function<void(Image&, double exposure)> light_legend(const Scene& scene);
 
-/// Draws the scale bar and the axes that `output` asks for, if the picture has them.
+/// Draws the caption, the scale bar and the axes that `output` asks for, if the picture has them.
 void draw_annotations(const OutputDescription& output, const Render& render, Image& image);
 
 }  // namespace tensorray

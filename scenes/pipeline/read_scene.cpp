@@ -10,6 +10,7 @@
 #include "scenes/description/check_scene.h"
 #include "scenes/description/scene_keys.h"
 #include "scenes/pipeline/methods.h"
+#include "scenes/source/caption.h"
 #include "scenes/source/frames.h"
 #include "scenes/source/keyframe_schema.h"
 #include "scenes/source/overrides.h"
@@ -107,6 +108,7 @@ SceneDescription read_scene_json(Json json, const std::filesystem::path& path, c
   SectionReader reader(json, "", source);
   describe(scene, reader);
   reader.finish();
+  scene.output.caption = with_values(scene.output.caption, json, source);
   replace_outputs(scene, outputs);
   choose_outputs(scene, changes.frame);
   check_scene(scene, json, source);

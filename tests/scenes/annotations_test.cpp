@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -129,6 +130,35 @@ TEST(Annotations, KnowTheSizeOfPixels) {
   EXPECT_TRUE(view_of(parallel).right.isApprox(Eigen::Vector3d::UnitX()));
   EXPECT_TRUE(view_of(parallel).up.isApprox(Eigen::Vector3d::UnitZ()));
   EXPECT_FALSE(view_of(perspective_camera(position, target, up, 30, {100, 200})).pixel_size);
+}
+
+/// @return the caption of a scene with these overrides, at a frame if one is given.
+std::string caption(const std::string& text, std::optional<int> frame = {}) {
+  SceneChanges changes;
+  changes.frame = frame;
+  const Json scale = frame ? Json::parse(R"({"keys": [[1, 0.5], [3, 1.5]]})") : Json(0.0123456);
+  return read_scene_json({{"field", {{"file", "a.vdb"}, {"scale", scale}}},
+                          {"light", {{"direction", {0, 0.5, -1}}}},
+                          {"lights", {{{"kind", "constant"}}}},
+                          {"integrator", {{"type", "scene"}}},
+                          {"output", {{"caption", text}}}},
+                         "scene.json", changes)
+      .output.caption;
+}
+
+TEST(Captions, HaveTheValuesOfKeys) {
+  EXPECT_EQ(caption("none"), "none");
+  EXPECT_EQ(caption("scale {field.scale}, light along {light.direction}"), "scale 0.01235, light along 0, 0.5, -1");
+  EXPECT_EQ(caption("{lights.0.kind}{light.direction.2}"), "constant-1");
+  EXPECT_EQ(caption("##: {field.scale}", 2), "02: 1");
+  for (const char* wrong : {"{field.sclae}", "{field.scale", "{}", "{lights.1}", "{field.scale.x}", "{lights.}"}) {
+    try {
+      caption(wrong);
+      ADD_FAILURE() << wrong;
+    } catch (const SceneError& error) {
+      EXPECT_THAT(error.what(), HasSubstr("`/output/caption`")) << wrong;
+    }
+  }
 }
 
 SceneDescription described(const Json& annotations) {

@@ -10,6 +10,8 @@
 #include <Eigen/Geometry>
 #include <gtest/gtest.h>
 
+#include "renderer/charts/lettering.h"
+
 namespace tensorray {
 namespace {
 
@@ -81,6 +83,21 @@ TEST(AnnotationsTest, LettersHaveElevenPixelsOrMore) {
 }
 
 /// Axes of a plate lie along its right and up; an axis that points at the viewer is no line.
+/// A caption ends at the margin, on its base line, and changes nothing left of its width.
+TEST(AnnotationsTest, CaptionIsInTheLowerRightCorner) {
+  Image image(300, 200, {"R", "G", "B"});
+  draw_caption(image, "scale 7");
+  Eigen::AlignedBox2i ink;
+  for (int y = 0; y < image.height; ++y)
+    for (int x = 0; x < image.width; ++x)
+      if (image.pixel(x, y)[0] > 0.5f) ink.extend(Eigen::Vector2i(x, y));
+  const double letter = 11;
+  EXPECT_NEAR(ink.max().x(), 300 - letter, 3);
+  EXPECT_NEAR(ink.max().y(), 200 - letter, 2);
+  EXPECT_NEAR(ink.min().x(), 300 - letter - text_width("scale 7", letter), 3);
+  EXPECT_NEAR(ink.min().y(), 200 - 2 * letter, 2);
+}
+
 TEST(AnnotationsTest, AxesPointAsThePictureShowsThem) {
   const auto extent = [](const Eigen::Vector3d& right, const Eigen::Vector3d& up) {
     Image image = blank(400, 400, 0);
