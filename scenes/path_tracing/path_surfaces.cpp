@@ -41,32 +41,29 @@ Place place_on(const PathPoints& way, double value) {
 
 /// What surfaces show of the points of a path.
 struct PointValues {
-  std::vector<Eigen::Vector3d> colors;  ///< Linear Rec. 709; empty without colours.
   std::vector<double> forces, lengths;
 };
 
-PointValues values_of(const Path& path, const PathColors& colors) {
+PointValues values_of(const Path& path) {
   PointValues values;
   for (const PathPoint& point : path.points) {
-    if (colors.color) values.colors.push_back(colors.color(path, point));
     values.forces.push_back(point.force().norm());
     values.lengths.push_back(point.length);
   }
   return values;
 }
 
-/// Calls `visit(vertex, place, values)` once for every vertex of the mesh, on all threads.
+/// Calls `visit(vertex, tube, place, values)` once for every vertex of the mesh, on all threads.
 template <class Visit>
-void for_each_vertex(const TubeMesh& mesh, const std::vector<Path>& paths, const PathColors& colors,
-                     const Visit& visit) {
+void for_each_vertex(const TubeMesh& mesh, const std::vector<Path>& paths, const Visit& visit) {
   std::vector<std::uint8_t> visited(mesh.mesh.vertices.size());  // No two tubes have a vertex in common.
   tbb::parallel_for(std::size_t{0}, paths.size(), [&](std::size_t tube) {
-    const PointValues values = values_of(paths[tube], colors);
+    const PointValues values = values_of(paths[tube]);
     const std::uint32_t first = tube == 0 ? 0 : mesh.tube_ends[tube - 1];
     for (std::uint32_t triangle = first; triangle < mesh.tube_ends[tube]; ++triangle)
       for (const std::uint32_t vertex : mesh.mesh.triangles[triangle])
         if (!std::exchange(visited[vertex], std::uint8_t{1}))
-          visit(vertex, place_on(paths[tube].points, static_cast<double>(mesh.values[vertex])), values);
+          visit(vertex, tube, place_on(paths[tube].points, static_cast<double>(mesh.values[vertex])), values);
   });
 }
 
@@ -85,9 +82,9 @@ bool is_bare(const PathPoints& way) {
 }
 
 /// One number that changes where the displayed colour changes.
-double shade_of(const PathColors& colors, const Path& path, const PathPoint& point) {
-  if (!colors.color) return 0;
-  return linear_to_srgb(colors.color(path, point)).dot(Eigen::Vector3d(0.7, 1, 0.4));
+double shade_of(const PathColors& colors, std::size_t path, std::size_t point) {
+  if (colors.of_points.empty()) return 0;
+  return linear_to_srgb(colors.of_points[path][point]).dot(Eigen::Vector3d(0.7, 1, 0.4));
 }
 
 /// The scale at which the median semi-axis of all paths is `typical`.
@@ -128,7 +125,7 @@ TubeMesh path_mesh(const std::vector<Path>& paths, const PathTracingDescription&
     tubes[i].reserve(ellipses.size());
     for (std::size_t k = 0; k < ellipses.size(); ++k)
       tubes[i].push_back(
-          {way[k].position, ellipses[k].x, ellipses[k].y, static_cast<double>(k), shade_of(colors, paths[i], way[k])});
+          {way[k].position, ellipses[k].x, ellipses[k].y, static_cast<double>(k), shade_of(colors, i, k)});
   });
   TubeSettings settings;
   settings.style = tube_style(description.style);
@@ -143,14 +140,17 @@ ShadedSurface path_surface(TubeMesh mesh, const std::vector<Path>& paths, const 
                            const Eigen::Matrix3d& to_working) {
   ShadedSurface surface;
   const std::size_t count = mesh.mesh.vertices.size();
-  if (colors.color) surface.colors.resize(count);
+  const bool has_colors = !colors.of_points.empty();
+  if (has_colors) surface.colors.resize(count);
   surface.forces.resize(count);
   surface.arc_lengths.resize(count);
-  for_each_vertex(mesh, paths, colors, [&](std::uint32_t vertex, const Place& place, const PointValues& values) {
-    if (colors.color) surface.colors[vertex] = reflectance(to_working, place.interpolate(values.colors));
-    surface.forces[vertex] = static_cast<float>(place.interpolate(values.forces));
-    surface.arc_lengths[vertex] = static_cast<float>(place.interpolate(values.lengths));
-  });
+  for_each_vertex(mesh, paths,
+                  [&](std::uint32_t vertex, std::size_t tube, const Place& place, const PointValues& values) {
+                    if (has_colors)
+                      surface.colors[vertex] = reflectance(to_working, place.interpolate(colors.of_points[tube]));
+                    surface.forces[vertex] = static_cast<float>(place.interpolate(values.forces));
+                    surface.arc_lengths[vertex] = static_cast<float>(place.interpolate(values.lengths));
+                  });
   surface.shape = std::move(mesh.mesh);
   surface.normals = std::move(mesh.normals);
   surface.path_ends = std::move(mesh.tube_ends);
@@ -161,13 +161,14 @@ ShadedSurface line_surface(const std::vector<Path>& paths, double radius, const 
                            const Eigen::Matrix3d& to_working) {
   ShadedSurface surface;
   RoundCurves curves;
-  for (const Path& path : paths) {
-    for (const PathPoint& point : path.points) {
+  for (std::size_t i = 0; i < paths.size(); ++i) {
+    for (const PathPoint& point : paths[i].points) {
       curves.points.push_back(point.position);
-      if (colors.color) surface.colors.push_back(reflectance(to_working, colors.color(path, point)));
       surface.forces.push_back(static_cast<float>(point.force().norm()));
       surface.arc_lengths.push_back(static_cast<float>(point.length));
     }
+    if (!colors.of_points.empty())
+      for (const Eigen::Vector3d& color : colors.of_points[i]) surface.colors.push_back(reflectance(to_working, color));
     curves.strand_ends.push_back(static_cast<std::uint32_t>(curves.points.size()));
   }
   curves.radii.assign(curves.points.size(), static_cast<float>(radius));
@@ -180,13 +181,15 @@ void write_tubes(const std::filesystem::path& path, const TubeMesh& mesh, const 
                  const PathColors& colors) {
   std::vector<std::array<std::uint8_t, 3>> rgb(mesh.mesh.vertices.size());
   std::vector<float> forces(rgb.size());
-  for_each_vertex(mesh, paths, colors, [&](std::uint32_t vertex, const Place& place, const PointValues& values) {
-    if (colors.color) rgb[vertex] = bytes_of(place.interpolate(values.colors));
-    forces[vertex] = static_cast<float>(place.interpolate(values.forces));
-  });
+  const bool has_colors = !colors.of_points.empty();
+  for_each_vertex(mesh, paths,
+                  [&](std::uint32_t vertex, std::size_t tube, const Place& place, const PointValues& values) {
+                    if (has_colors) rgb[vertex] = bytes_of(place.interpolate(colors.of_points[tube]));
+                    forces[vertex] = static_cast<float>(place.interpolate(values.forces));
+                  });
   VertexAttributes attributes;
   attributes.normals = &mesh.normals;
-  if (colors.color) attributes.colors = &rgb;
+  if (has_colors) attributes.colors = &rgb;
   attributes.values = &forces;
   attributes.value_name = "force";
   write_mesh(path, mesh.mesh, attributes);

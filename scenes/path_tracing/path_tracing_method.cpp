@@ -151,7 +151,8 @@ Render LoadedPaths::render(const Scene& scene, const Progress& progress, RenderJ
   if (!is_drawn) return result;
 
   const auto drawing = Clock::now();
-  const PathColors colors = path_colors(description.color, result.paths);
+  const PathColors colors = path_colors(
+      description.color, result.paths, typical_radius(description.radius, result.paths.size(), world_box(scene.field)));
   // As an annotation, the legend covers a part of the picture: it has no effect on other files.
   const bool has_room = description.color.legend && colors.legend;
   const Camera camera = scene_camera(scene, description.context, result.paths, has_room ? legend_width : 0);

@@ -122,8 +122,8 @@ void make_tubes(const Scene& scene, double tolerance, const Progress& progress, 
     Statistics ends;
     const PathTracingDescription& tracing = object.paths->settings;
     const std::vector<Path> paths = follow_paths(scene, *object.paths, true, progress, ends);
-    const PathColors colors = path_colors(tracing.color, paths);
     const double radius = typical_radius(tracing.radius, paths.size(), world_box(scene.field));
+    const PathColors colors = path_colors(tracing.color, paths, radius);
     object.surface = path_surface(path_mesh(paths, tracing, colors, radius, tolerance), paths, colors,
                                   object.paths->lights.light.rec709_to_working);
   }
