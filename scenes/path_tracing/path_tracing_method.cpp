@@ -100,6 +100,13 @@ void require_fine(const Scene& scene, const RadiusDescription& radius, const Sur
       scene.description.path.string(), typical, stage.bounds().diagonal().norm()));
 }
 
+/// Who renders a picture, and who hears of it.
+struct StageRun {
+  Team* team;  ///< Null: this process alone.
+  const Progress& progress;
+  const RenderCallbacks& callbacks;
+};
+
 class LoadedPaths : public LoadedMethod {
  public:
   explicit LoadedPaths(PathScene paths) : paths_(std::move(paths)) {}
@@ -109,19 +116,17 @@ class LoadedPaths : public LoadedMethod {
  private:
   /// Renders the paths, their context and the lamps.
   SurfacePicture render_stage(const Scene& scene, const std::vector<Path>& paths, ShadedSurface path_surface,
-                              const Camera& camera, Team* team, const Progress& progress,
-                              const RenderCallbacks& callbacks) const;
+                              const Camera& camera, const StageRun& run) const;
 
   PathScene paths_;
 };
 
 SurfacePicture LoadedPaths::render_stage(const Scene& scene, const std::vector<Path>& paths, ShadedSurface path_surface,
-                                         const Camera& camera, Team* team, const Progress& progress,
-                                         const RenderCallbacks& callbacks) const {
+                                         const Camera& camera, const StageRun& run) const {
   const ShownLight& light = paths_.lights.light;
   std::vector<Material> materials{load_material(paths_.settings.material, light)};
   std::vector<ShadedSurface> surfaces{std::move(path_surface)};
-  add_context(scene, paths_, team, progress, surfaces, materials);
+  add_context(scene, paths_, run.team, run.progress, surfaces, materials);
   const std::vector<Light> lights = make_lights(scene.description, paths_.lights, camera);
   add_lamps(lights, light, surfaces, materials);
   const SurfaceScene stage(std::move(surfaces));
@@ -130,7 +135,7 @@ SurfacePicture LoadedPaths::render_stage(const Scene& scene, const std::vector<P
   const ReflectanceTable table(light.model, light.bands, light.xyz_to_working);
   ShadedScene shaded{stage, materials, sampler, table};
   set_groups(light_groups(scene.description), shaded);
-  return render_surfaces(shaded, camera, tracer_settings(scene.description, paths_.settings), callbacks);
+  return render_surfaces(shaded, camera, tracer_settings(scene.description, paths_.settings), run.callbacks);
 }
 
 /// Whether the file of paths has the tensors at their points.
@@ -182,9 +187,8 @@ Render LoadedPaths::render(const Scene& scene, const Progress& progress, RenderJ
     add_picture(picture, shown);
     return shown;
   });
-  add_picture(render_stage(scene, result.paths, std::move(shapes.surface), camera, job ? job->team : nullptr, progress,
-                           callbacks),
-              result);
+  const StageRun run{job ? job->team : nullptr, progress, callbacks};
+  add_picture(render_stage(scene, result.paths, std::move(shapes.surface), camera, run), result);
   result.statistics.seconds_drawing = seconds_since(drawing);
   return result;
 }

@@ -33,7 +33,7 @@ std::vector<std::vector<Vector3d>> colors_of(const std::vector<Path>& paths, dou
 /// Where paths of one seed lie in one another they have one colour, so that it does not matter which is seen.
 TEST(PathColors, WavelengthsMixUntilTheyPart) {
   const std::vector<Path> paths{path_of(450, 0), path_of(550, 1), path_of(650, 2)};
-  const auto colors = colors_of(paths, 0.5);
+  const auto colors = colors_of(paths, 0.4);
   const Vector3d mean = (wavelength_color(450) + wavelength_color(550) + wavelength_color(650)) / 3;
   for (std::size_t path = 0; path < paths.size(); ++path) {
     for (const std::size_t point : {0, 1}) EXPECT_TRUE(colors[path][point].isApprox(mean)) << path << point;
@@ -55,12 +55,11 @@ TEST(PathColors, MixByTheirDistance) {
   EXPECT_TRUE(colors[0][3].isApprox((wavelength_color(450) + 0.5 * wavelength_color(650)) / 1.5));
 }
 
-/// Paths of other seeds keep their colours.
+/// Paths have none of the colours of another seed.
 TEST(PathColors, SeedsDoNotMix) {
-  const auto colors = colors_of({path_of(650, 0), path_of(650, 0), path_of(450, 0)}, 1);
-  EXPECT_TRUE(colors[0][0].isApprox(wavelength_color(650)));
-  EXPECT_TRUE(colors[1][0].isApprox(wavelength_color(650)));
-  EXPECT_TRUE(colors[2][0].isApprox(wavelength_color(450)));
+  const auto colors = colors_of({path_of(450, 0), path_of(650, 0), path_of(550, 0), path_of(700, 0)}, 1);
+  EXPECT_TRUE(colors[0][0].isApprox((wavelength_color(450) + wavelength_color(650)) / 2));
+  EXPECT_TRUE(colors[3][0].isApprox((wavelength_color(550) + wavelength_color(700)) / 2));
 }
 
 }  // namespace

@@ -16,6 +16,7 @@
 namespace tensorray {
 namespace {
 
+using namespace test;
 using Eigen::Vector3d;
 
 constexpr int bands = 2;
