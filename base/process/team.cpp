@@ -1,8 +1,9 @@
 #include "base/process/team.h"
 
 #include <algorithm>
-#include <cstring>
 #include <stdexcept>
+
+#include "base/text/copy_bytes.h"
 
 namespace tensorray {
 namespace {
@@ -45,7 +46,7 @@ void PartBytes::copy(void* values, std::size_t size) {
     return;
   }
   if (size > bytes_.size() - at_) fail();
-  std::memcpy(values, bytes_.data() + at_, size);
+  copy_bytes(values, bytes_.data() + at_, size);
   at_ += size;
 }
 
@@ -62,7 +63,7 @@ void copy_of_first(Team& team, void* values, std::size_t size) {
     const std::size_t count = std::min(bytes_at_once, size - begin);
     const std::string first = team.exchange(has_all(&team) ? std::string(bytes + begin, count) : std::string()).front();
     if (first.size() != count) fail();
-    std::memcpy(bytes + begin, first.data(), count);
+    copy_bytes(bytes + begin, first.data(), count);
   }
 }
 

@@ -1,8 +1,9 @@
 #include "integrators/photons/photon_sums.h"
 
-#include <cstring>
 #include <stdexcept>
 #include <string_view>
+
+#include "base/text/copy_bytes.h"
 
 // The bytes: the numbers of SumsHead; for each channel, how its rays ended; the fluence; for each chunk with photons,
 // its number, how many they are, and the photons; the light on the plate.
@@ -31,7 +32,7 @@ class SumsReader {
   std::vector<Value> values(std::uint64_t count) {
     const std::string_view bytes = take(count, sizeof(Value));
     std::vector<Value> copies(count);
-    if (count > 0) std::memcpy(static_cast<void*>(copies.data()), bytes.data(), bytes.size());
+    copy_bytes(static_cast<void*>(copies.data()), bytes.data(), bytes.size());
     return copies;
   }
 

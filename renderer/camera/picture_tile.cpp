@@ -1,8 +1,9 @@
 #include "renderer/camera/picture_tile.h"
 
 #include <algorithm>
-#include <cstring>
 #include <stdexcept>
+
+#include "base/text/copy_bytes.h"
 
 namespace tensorray {
 
@@ -26,16 +27,16 @@ int Tile::samples() const {
 std::string Tile::bytes() const {
   const std::size_t of_pixels = pixels.size() * sizeof(PixelState), of_light = light.size() * sizeof(double);
   std::string bytes(of_pixels + of_light, 0);
-  std::memcpy(bytes.data(), pixels.data(), of_pixels);
-  std::memcpy(bytes.data() + of_pixels, light.data(), of_light);
+  copy_bytes(bytes.data(), pixels.data(), of_pixels);
+  copy_bytes(bytes.data() + of_pixels, light.data(), of_light);
   return bytes;
 }
 
 void Tile::set_bytes(const std::string& bytes) {
   const std::size_t of_pixels = pixels.size() * sizeof(PixelState), of_light = light.size() * sizeof(double);
   if (bytes.size() != of_pixels + of_light) throw std::runtime_error("a tile that was kept has another size");
-  std::memcpy(pixels.data(), bytes.data(), of_pixels);
-  std::memcpy(light.data(), bytes.data() + of_pixels, of_light);
+  copy_bytes(pixels.data(), bytes.data(), of_pixels);
+  copy_bytes(light.data(), bytes.data() + of_pixels, of_light);
 }
 
 SurfacePicture empty_picture(int width, int height, const ShadedScene& scene) {

@@ -1,7 +1,6 @@
 #include "scenes/jobs/work_file.h"
 
 #include <cstdint>
-#include <cstring>
 #include <fstream>
 #include <iterator>
 #include <utility>
@@ -9,6 +8,7 @@
 #include "base/errors.h"
 #include "base/files/replace_file.h"
 #include "base/text/content_hash.h"
+#include "base/text/copy_bytes.h"
 #include "base/text/path_text.h"
 
 // The file: the mark; the length of the header; the header, as JSON; for each unit, twice the length of its state, plus
@@ -21,7 +21,7 @@ const std::string mark = "tensorray work 1\n";
 
 std::string bytes_of(std::uint64_t number) {
   std::string bytes(sizeof number, 0);
-  std::memcpy(bytes.data(), &number, sizeof number);
+  copy_bytes(bytes.data(), &number, sizeof number);
   return bytes;
 }
 
@@ -39,7 +39,7 @@ class Reader {
 
   std::uint64_t number() {
     std::uint64_t number = 0;
-    std::memcpy(&number, take(sizeof number).data(), sizeof number);
+    copy_bytes(&number, take(sizeof number).data(), sizeof number);
     return number;
   }
 
@@ -94,7 +94,7 @@ WorkFile read_work(const std::filesystem::path& path) {
     work.part = {header.at("part").at(0).get<std::size_t>(), header.at("part").at(1).get<std::size_t>()};
     const std::string_view table = reader.take(sizeof(std::uint64_t) * header.at("units").get<std::uint32_t>());
     sizes.resize(table.size() / sizeof(std::uint64_t));
-    std::memcpy(sizes.data(), table.data(), table.size());
+    copy_bytes(sizes.data(), table.data(), table.size());
   } catch (const Json::exception&) {
     fail(path, "is damaged; remove it and render it again");
   }
