@@ -60,7 +60,7 @@ void Leader::send(int to, const RankMessage& message) {
 
 void Leader::receive(int from, RankMessage message) {
   ++traffic_.messages;
-  traffic_.bytes_received += bytes_of(message).size();
+  traffic_.bytes_received += size_of(message);
   const bool is_current = shared_ && shared_->number == message.job;
   if (message.word == RankWord::job) idle_.insert(from);
   if (message.word == RankWord::more) {

@@ -27,6 +27,9 @@ struct RankMessage {
   std::string bytes;
 };
 
+/// The number of bytes that it has on its way.
+inline std::size_t size_of(const RankMessage& message) { return 3 * sizeof(std::uint64_t) + message.bytes.size(); }
+
 /// Numbers have the byte order of the machine: all machines of a job must have the same.
 inline std::string bytes_of(const RankMessage& message) {
   const std::uint64_t head[] = {static_cast<std::uint64_t>(message.word) << 32 | message.job, message.number,
