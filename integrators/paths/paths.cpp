@@ -7,6 +7,7 @@
 #include <tbb/enumerable_thread_specific.h>
 #include <tbb/parallel_for.h>
 
+#include "base/process/team.h"
 #include "integrators/paths/joined_ray.h"
 #include "integrators/paths/path_thinning.h"
 #include "integrators/steps/path_tensors.h"
@@ -98,6 +99,24 @@ void trace_batch(const PathJob& job, const PathSeed* seeds, std::size_t count, P
   }
 }
 
+/// Takes the batches that the others of the team have traced.
+/// @param paths  `count` ones, from the first batch on.
+void exchange_batches(Team& team, Path* paths, std::size_t count) {
+  const std::size_t batches = (count + batch_size - 1) / batch_size;
+  exchange_parts(team, batches, batches, [&](std::size_t batch, PartBytes& bytes) {
+    for (Path* path = paths + batch * batch_size; path != paths + std::min((batch + 1) * batch_size, count); ++path) {
+      std::size_t points = path->points.size();
+      bytes.copy(&points, sizeof points);
+      path->points.resize(points);
+      bytes.copy(path->points.data(), points * sizeof(PathPoint));
+      bytes.copy(&path->flexibility, sizeof path->flexibility);
+      bytes.copy(&path->wavelength, sizeof path->wavelength);
+      bytes.copy(&path->end, sizeof path->end);
+      bytes.copy(&path->backward_end, sizeof path->backward_end);
+    }
+  });
+}
+
 }  // namespace
 
 std::vector<Path> trace_paths(const TensorField& field, const Geometry& geometry, const BendingSettings& bending,
@@ -109,15 +128,18 @@ std::vector<Path> trace_paths(const TensorField& field, const Geometry& geometry
   PathJob job{field, geometry, bending, settings};
   job.voxel = std::cbrt(std::abs(field.to_world().linear().determinant()));
   std::vector<Path> paths(seeds.size());
+  Team* const team = seeds.size() > chunk_size ? settings.team : nullptr;  // A few are traced sooner than sent.
   tbb::enumerable_thread_specific<PathWorker> workers;
   for (std::size_t first = 0; first < seeds.size(); first += chunk_size) {
     progress.update("tracing paths", first, seeds.size());
     const std::size_t count = std::min(chunk_size, seeds.size() - first);
     tbb::parallel_for(std::size_t{0}, (count + batch_size - 1) / batch_size, [&](std::size_t batch) {
       if (progress.cancelled) throw Cancelled();
+      if (!does_part(team, batch)) return;
       const std::size_t begin = first + batch * batch_size, end = std::min(begin + batch_size, first + count);
       trace_batch(job, &seeds[begin], end - begin, workers.local(), &paths[begin]);
     });
+    if (team) exchange_batches(*team, &paths[first], count);
   }
   progress.update("tracing paths", seeds.size(), seeds.size());
   return paths;

@@ -13,6 +13,8 @@
 
 namespace tensorray {
 
+class Team;
+
 /// A point and direction of a path, and its light.
 struct PathSeed {
   Eigen::Vector3d position = Eigen::Vector3d::Zero();     ///< World; inside or outside the volume.
@@ -34,6 +36,9 @@ struct PathSettings {
   double tolerance = 0.05;  ///< In position, in voxels; >= 0.
   double tensor_tolerance =
       0.02;  ///< In T, as a fraction of the greatest norm of T there; >= 0. Unused without tensors.
+
+  /// Processes that trace the same paths together, if these are thousands, and all have them; null: this one is alone.
+  Team* team = nullptr;
 };
 
 /// The path of one ray, in the light's direction. Points are those that `trace` records, thinned; lengths increase from
@@ -47,8 +52,8 @@ struct Path {
   std::optional<RayEnd> backward_end;  ///< Why the ray ended at the path's beginning, if it was followed backwards.
 };
 
-/// One path for each seed, in the order of the seeds. The result is the same for any number of threads.
-/// @throw std::invalid_argument if a setting is out of range; Cancelled.
+/// One path for each seed, in the order of the seeds. The result is the same for any number of threads
+/// and processes. @throw std::invalid_argument if a setting is out of range; Cancelled; as Team::exchange.
 std::vector<Path> trace_paths(const TensorField& field, const Geometry& geometry, const BendingSettings& bending,
                               const std::vector<PathSeed>& seeds, const PathSettings& settings,
                               const Progress& progress);

@@ -62,8 +62,9 @@ PathScene load_paths(const Scene& scene, const PathTracingDescription& settings,
 
 /// Follows the rays, counts them by channel and end, and leaves out those that do not meet the volume.
 /// @param tensors  Whether the points of paths need the tensor (PathSettings).
-/// @throw std::runtime_error if no path is left; Cancelled.
-std::vector<Path> follow_paths(const Scene& scene, const PathScene& paths, bool tensors, const Progress& progress,
-                               Statistics& statistics);
+/// @param team  Processes that trace them together, and all have them; null: this one is alone.
+/// @throw std::runtime_error if no path is left; Cancelled; as Team::exchange.
+std::vector<Path> follow_paths(const Scene& scene, const PathScene& paths, bool tensors, Team* team,
+                               const Progress& progress, Statistics& statistics);
 
 }  // namespace tensorray

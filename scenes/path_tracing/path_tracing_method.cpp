@@ -151,7 +151,8 @@ Render LoadedPaths::render(const Scene& scene, const Progress& progress, RenderJ
   const ShownLight& light = paths_.lights.light;
   const auto start = Clock::now();
   Render result;
-  result.paths = follow_paths(scene, paths_, is_drawn || stores_tensors(output), progress, result.statistics);
+  Team* const team = job ? job->team : nullptr;
+  result.paths = follow_paths(scene, paths_, is_drawn || stores_tensors(output), team, progress, result.statistics);
   result.statistics.seconds_tracing = seconds_since(start);
   if (!is_drawn) return result;
 
@@ -187,7 +188,7 @@ Render LoadedPaths::render(const Scene& scene, const Progress& progress, RenderJ
     add_picture(picture, shown);
     return shown;
   });
-  const StageRun run{job ? job->team : nullptr, progress, callbacks};
+  const StageRun run{team, progress, callbacks};
   add_picture(render_stage(scene, result.paths, std::move(shapes.surface), camera, run), result);
   result.statistics.seconds_drawing = seconds_since(drawing);
   return result;

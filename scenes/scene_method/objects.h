@@ -45,7 +45,8 @@ std::vector<SceneObject> load_objects(const Scene& scene, const PathTracingDescr
 /// Follows the paths of objects that consist of paths, and makes their tubes.
 /// @param tolerance  Greatest distance of triangles from the tubes, world units.
 /// @throw SceneError if no path meets the volume; Cancelled.
-void make_tubes(const Scene& scene, double tolerance, const Progress& progress, std::vector<SceneObject>& objects);
+void make_tubes(const Scene& scene, double tolerance, Team* team, const Progress& progress,
+                std::vector<SceneObject>& objects);
 
 /// Adds their surfaces and materials.
 void add_objects(const std::vector<SceneObject>& objects, const ShownLight& light, std::vector<ShadedSurface>& surfaces,

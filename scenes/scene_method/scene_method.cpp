@@ -180,7 +180,8 @@ Render LoadedObjects::render(const Scene& scene, const Progress& progress, Rende
   const std::vector<Light> lights = scene_lights(scene, loaded_.lights, {});
   const Camera camera = scene_camera(scene, points_of_interest(scene, loaded_.objects, lights));
   std::vector<SceneObject> objects = loaded_.objects;
-  make_tubes(scene, tube_error * pixel_size(camera, scene.field.world_box().center()), progress, objects);
+  Team* const team = job ? job->team : nullptr;
+  make_tubes(scene, tube_error * pixel_size(camera, scene.field.world_box().center()), team, progress, objects);
   std::vector<ShadedSurface> surfaces;
   std::vector<Material> materials;
   add_objects(objects, light, surfaces, materials);
@@ -200,7 +201,7 @@ Render LoadedObjects::render(const Scene& scene, const Progress& progress, Rende
   const PathTracerSettings samples = object_tracer_settings(scene, loaded_, camera, 0);
   PhotonMaps photons;
   if (bends) {
-    const LitObjects lit{scene, lights, objects, stage, job ? job->team : nullptr};
+    const LitObjects lit{scene, lights, objects, stage, team};
     const PhotonPairs pairs = photon_pairs(lit, loaded_.settings);
     photons =
         photons_of(lit, pairs, region, loaded_.settings.photons, samples.max_samples / samples.first_samples, progress);

@@ -8,22 +8,13 @@ namespace tensorray {
 namespace {
 
 /// The value of a key that is named as "light.direction" or "objects.0.plate"; null if the scene does not give it.
-const Json* value_of(const Json& scene, const std::string& key) {
-  const Json* value = &scene;
-  for (std::size_t begin = 0; begin <= key.size();) {
-    const std::size_t end = std::min(key.find('.', begin), key.size());
-    const std::string name = key.substr(begin, end - begin);
-    if (value->is_object() && value->contains(name)) {
-      value = &(*value)[name];
-    } else {
-      const bool is_number =
-          !name.empty() && name.size() < 7 && name.find_first_not_of("0123456789") == std::string::npos;
-      if (!value->is_array() || !is_number || std::stoul(name) >= value->size()) return nullptr;
-      value = &(*value)[std::stoul(name)];
-    }
-    begin = end + 1;
+const Json* value_of(const Json& scene, std::string key) {
+  std::replace(key.begin(), key.end(), '.', '/');
+  try {
+    return &scene.at(Json::json_pointer("/" + key));
+  } catch (const Json::exception&) {
+    return nullptr;
   }
-  return value;
 }
 
 std::string text_of(const Json& value) {

@@ -82,6 +82,7 @@ using OnDone = std::function<void(int rank)>;
 struct Watch {
   OnUnits on_units = [](int, const std::vector<std::size_t>&) {};
   OnDone on_done = [](int) {};
+  std::function<void(Team& team)> first = [](Team&) {};  // Called by each rank before its units.
 };
 
 /// Does units as the path tracer does: each in two passes.
@@ -120,13 +121,14 @@ Result share_work(int ranks, std::size_t units, std::vector<WorkUnit> kept = {},
         EXPECT_EQ(job->text, "the job");
         Work work;
         follower.share(*job, work, 2);
+        watch.first(*follower.team(*job));
         do_units(work, units, rank, watch);
       }
     });
   ThreadRanks first(post, 0);
   Leader leader(first, progress);
   Work work({}, std::move(kept));
-  leader.share("the job", work, 2);
+  watch.first(leader.share("the job", work, 2));
   do_units(work, units, 0, watch);
   leader.end();
   leader.finish();
@@ -339,34 +341,12 @@ TEST(SharedSteps, AllRanksHaveThePartsOfAll) {
 /// A job may have steps before its units. A unit is counted where it is done, and steps are not.
 TEST(SharedSteps, ComeBeforeUnits) {
   for (const int ranks : {2, 3}) {
-    Post post;
-    post.boxes.resize(static_cast<std::size_t>(ranks));
-    Progress progress;
-    std::vector<std::thread> others;
-    for (int rank = 1; rank < ranks; ++rank)
-      others.emplace_back([&, rank] {
-        ThreadRanks mine(post, rank);
-        Follower follower(mine, progress, 0);
-        while (const auto job = follower.next_job()) {
-          Work work;
-          follower.share(*job, work, 2);
-          do_steps(*follower.team(*job), 3);
-          do_units(work, 20, rank);
-        }
-      });
-    ThreadRanks first(post, 0);
-    Leader leader(first, progress);
-    for (int job = 0; job < 2; ++job) {
-      Work work;
-      do_steps(leader.share("the job", work, 2), 3);
-      do_units(work, 20);
-      leader.end();
-      expect_complete(work.units(), 20);
-    }
-    leader.finish();
-    for (std::thread& each : others) each.join();
-    const std::vector<std::uint64_t> units = leader.traffic().units;
-    EXPECT_EQ(std::accumulate(units.begin(), units.end(), std::uint64_t{0}), 40u);
+    Watch watch;
+    watch.first = [](Team& team) { do_steps(team, 3); };
+    const Result result = share_work(ranks, 20, {}, watch);
+    expect_complete(result.units, 20);
+    const std::vector<std::uint64_t>& units = result.traffic.units;
+    EXPECT_EQ(std::accumulate(units.begin(), units.end(), std::uint64_t{0}), 20u);
   }
 }
 

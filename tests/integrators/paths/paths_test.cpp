@@ -11,6 +11,7 @@
 #include "integrators/steps/scalar_tracer.h"
 #include "integrators/tracing/trace.h"
 #include "renderer/surfaces/tube_mesh.h"
+#include "tests/base/team_support.h"
 #include "tests/integrators/support.h"
 
 namespace tensorray {
@@ -329,6 +330,42 @@ TEST(Paths, AStraightFieldMakesStraightCircularTubes) {
   for (const Vector3d& p : tubes.mesh.vertices) EXPECT_NEAR(std::hypot(p.x() - 0.3, p.y() + 0.2), 0.1, 1e-7);
   EXPECT_NEAR(tubes.mesh.bounds().max().z(), 1, 1e-9);
   EXPECT_NEAR(tubes.mesh.bounds().min().z(), -1, 1e-9);
+}
+
+/// Thousands of paths, which processes divide.
+TEST(Paths, OfATeamAreThoseOfOneProcess) {
+  const TensorField field = cube_field(5, linear_tensor);
+  const Geometry geometry(surfaces_of(field));
+  std::vector<PathSeed> seeds;
+  for (int i = 0; i < 5000; ++i) seeds.push_back(seed_at({std::sin(1.0 * i), std::cos(1.7 * i), 2}, 2e-5 * i));
+  const std::vector<Path> alone = trace_paths(field, geometry, {}, seeds, {}, Progress());
+  std::vector<std::vector<Path>> paths(3);
+  const std::size_t bytes = run_team(paths.size(), [&](Team& team) {
+    PathSettings settings;
+    settings.team = &team;
+    paths[team.index()] = trace_paths(field, geometry, {}, seeds, settings, Progress());
+  });
+  std::size_t points = 0;
+  for (const Path& path : alone) points += path.points.size();
+  EXPECT_EQ(bytes, points * sizeof(PathPoint) + alone.size() * (sizeof(std::size_t) + 2 * sizeof(double) + 3));
+  for (const std::vector<Path>& each : paths) {
+    ASSERT_EQ(each.size(), alone.size());
+    for (std::size_t i = 0; i < alone.size(); ++i) {
+      EXPECT_EQ(each[i].wavelength, alone[i].wavelength);
+      EXPECT_EQ(each[i].flexibility, alone[i].flexibility);
+      EXPECT_EQ(each[i].end, alone[i].end);
+      EXPECT_EQ(each[i].backward_end, alone[i].backward_end);
+      ASSERT_EQ(each[i].points.size(), alone[i].points.size());
+      for (std::size_t k = 0; k < alone[i].points.size(); ++k) {
+        ASSERT_EQ(each[i].points[k].position, alone[i].points[k].position);
+        ASSERT_EQ(each[i].points[k].direction, alone[i].points[k].direction);
+        ASSERT_EQ(each[i].points[k].length, alone[i].points[k].length);
+        ASSERT_EQ(each[i].points[k].in_field, alone[i].points[k].in_field);
+        ASSERT_EQ(each[i].points[k].tensor, alone[i].points[k].tensor);
+        ASSERT_EQ(each[i].points[k].change, alone[i].points[k].change);
+      }
+    }
+  }
 }
 
 TEST(Paths, OnePathASeedInTheirOrder) {

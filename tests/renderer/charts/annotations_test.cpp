@@ -82,7 +82,6 @@ TEST(AnnotationsTest, LettersHaveElevenPixelsOrMore) {
   }
 }
 
-/// Axes of a plate lie along its right and up; an axis that points at the viewer is no line.
 /// A caption ends at the margin, on its base line, and changes nothing left of its width.
 TEST(AnnotationsTest, CaptionIsInTheLowerRightCorner) {
   Image image(300, 200, {"R", "G", "B"});
@@ -98,6 +97,7 @@ TEST(AnnotationsTest, CaptionIsInTheLowerRightCorner) {
   EXPECT_NEAR(ink.min().y(), 200 - 2 * letter, 2);
 }
 
+/// Axes of a plate lie along its right and up; an axis that points at the viewer is no line.
 TEST(AnnotationsTest, AxesPointAsThePictureShowsThem) {
   const auto extent = [](const Eigen::Vector3d& right, const Eigen::Vector3d& up) {
     Image image = blank(400, 400, 0);
