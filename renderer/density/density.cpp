@@ -202,7 +202,7 @@ void DensityEstimator::deposit(std::uint32_t bucket) {
   target.rounding = 1.5 * (std::uint64_t{1} << 52) * quantum_;
   target.width = width_ + 2 * margin_;
   target.colors = colors_.empty() ? nullptr : colors_.data();
-  target.pixels = sums_[0].values + (colors_.empty() ? bucket / bucketing_.tiles() * plane_size() : 0);
+  target.pixels = &sums_[0].values[0] + (colors_.empty() ? bucket / bucketing_.tiles() * plane_size() : 0);
   if (uses_splines(settings_)) {
     deposit_splines(buckets_.points, first, last, target);
   } else if (gaussian_) {
@@ -233,7 +233,7 @@ Film DensityEstimator::finish(double weight) const {
   const std::size_t step = is_colored ? 4 : 1, row_pixels = width_ + 2 * margin_;
   tbb::parallel_for(0, film.channels * height_, [&](int task) {
     const int channel = task / height_, y = task % height_;
-    const double* const plane = sums_[0].values + (is_colored ? channel : channel * plane_size());
+    const double* const plane = &sums_[0].values[0] + (is_colored ? channel : channel * plane_size());
     double* const line = film.plane(channel) + static_cast<std::size_t>(y) * width_;
     for (const int from : rows[y]) {
       const double* const row = plane + from * row_pixels * step;
