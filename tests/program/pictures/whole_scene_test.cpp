@@ -247,7 +247,9 @@ TEST_F(WholeScene, PhotonsGiveTheLightOfTheFlowMap) {
 
 /// Where radiance is conserved, light of points gains as the lamp's does.
 TEST_F(WholeScene, PhotonsConserveRadianceOnRequest) {
-  const auto [points, lamp] = points_and_lamp(R"("max_samples": 64, "min_samples": 64, "conserve": "radiance")");
+  const auto [points, lamp] = points_and_lamp(R"("max_samples": 64, "min_samples": 64, "conserve": "radiance",
+                                                 "photons": {"per_pass": 8192},
+                                                 "caustic": {"resolution": 256, "rays": 20000})");
   write("scene.json", points);
   const Image forwards = picture({}), map = picture({"integrator.photons.per_pass=0"});
   write("scene.json", lamp);
