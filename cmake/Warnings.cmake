@@ -3,6 +3,8 @@
 add_library(tensorray_options INTERFACE)
 target_compile_options(tensorray_options INTERFACE -Wall -Wextra -Wpedantic -Wconversion -Wnon-virtual-dtor
                        -Woverloaded-virtual -Wcast-align -Wunused -Wnull-dereference)
+# No code here looks at errno of mathematical functions; without it, a square root is one instruction.
+target_compile_options(tensorray_options INTERFACE -fno-math-errno)
 if(TENSORRAY_WERROR)
   target_compile_options(tensorray_options INTERFACE -Werror)
 endif()
@@ -45,6 +47,17 @@ function(tensorray_relocatable name)
   target_compile_options(${name} PRIVATE -fno-semantic-interposition)
 endfunction()
 
+# Half of the time to compile most files is the headers that nearly all of them include: these are compiled once, for
+# relocatable code.
+function(tensorray_common_headers name)
+  if(name STREQUAL base)
+    target_precompile_headers(base PRIVATE <Eigen/Geometry> <algorithm> <filesystem> <functional> <map> <memory>
+                              <optional> <string> <variant> <vector>)
+  else()
+    target_precompile_headers(${name} REUSE_FROM base)
+  endif()
+endfunction()
+
 # tensorray_library(NAME [EXCEPT FOLDERS]): a static library of all sources in this folder and its subfolders, without
 # those of subfolders that match an expression (CONFIGURE_DEPENDS finds new files by itself).
 function(tensorray_library name)
@@ -57,7 +70,5 @@ function(tensorray_library name)
   set_target_properties(${name} PROPERTIES UNITY_BUILD ${TENSORRAY_UNITY})
   tensorray_relocatable(${name})
   target_link_libraries(${name} PUBLIC Eigen3::Eigen PRIVATE tensorray_options)
-  # Half of the time to compile most files is the headers that nearly all of them include.
-  target_precompile_headers(${name} PRIVATE <Eigen/Geometry> <algorithm> <filesystem> <functional> <map> <memory>
-                            <optional> <string> <variant> <vector>)
+  tensorray_common_headers(${name})
 endfunction()
