@@ -77,8 +77,12 @@ std::array<std::uint8_t, 3> bytes_of(const Eigen::Vector3d& rec709) {
   return {byte(srgb.x()), byte(srgb.y()), byte(srgb.z())};
 }
 
-bool is_bare(const PathPoints& way) {
-  return std::all_of(way.begin(), way.end(), [](const PathPoint& point) { return point.tensor.isZero(0); });
+/// Whether nothing is known of the tensors along the paths, as in most files of other programs.
+bool are_bare(const std::vector<Path>& paths) {
+  return std::all_of(paths.begin(), paths.end(), [](const Path& path) {
+    return std::all_of(path.points.begin(), path.points.end(),
+                       [](const PathPoint& point) { return point.tensor.isZero(0); });
+  });
 }
 
 /// One number that changes where the displayed colour changes.
@@ -116,12 +120,11 @@ TubeMesh path_mesh(const std::vector<Path>& paths, const PathTracingDescription&
   // A user who gives a scale wants true sizes.
   const double greatest = description.radius.scale ? std::numeric_limits<double>::max() : thickest * typical;
   sections.greatest_radius = std::max(sections.least_radius, description.radius.max.value_or(greatest));
+  if (are_bare(paths)) sections.least_radius = sections.greatest_radius = typical;
   std::vector<Tube> tubes(paths.size());
   tbb::parallel_for(std::size_t{0}, paths.size(), [&](std::size_t i) {
     const PathPoints& way = paths[i].points;
-    CrossSectionSettings section = sections;
-    if (is_bare(way)) section.least_radius = section.greatest_radius = typical;
-    const std::vector<CrossSection> ellipses = cross_sections(way, section);
+    const std::vector<CrossSection> ellipses = cross_sections(way, sections);
     tubes[i].reserve(ellipses.size());
     for (std::size_t k = 0; k < ellipses.size(); ++k)
       tubes[i].push_back(

@@ -6,6 +6,7 @@
 #include <gmock/gmock.h>
 
 #include "tests/program/paths_support.h"
+#include "volumes/files/tensor_files.h"
 
 namespace tensorray {
 namespace {
@@ -221,6 +222,24 @@ TEST_F(Paths, TubesAreObstaclesOfAnotherScene) {
   Settings hiding = settings;
   hiding.push_back("integrator.context.obstacles=false");
   EXPECT_GT(covered(render(settings)), covered(render(hiding)) + 1);
+}
+
+/// A tensor that is zero for x below 0, and the identity above. The seeds are at x = ±0.25 and ±0.75.
+TEST_F(Paths, WhereTheTensorIsZeroTubesHaveTheLeastRadius) {
+  const Eigen::Affine3d to_world = Eigen::Translation3d(-1, -1, -1) * Eigen::Scaling(0.125);
+  write_tensor_vdb(in_folder("half.vdb"), dense_grid({Eigen::Vector3i(0, 0, 0), Eigen::Vector3i(16, 16, 16)}, to_world,
+                                                     [](const Eigen::Vector3i& index) -> Eigen::Matrix3d {
+                                                       return (index.x() < 8 ? 0 : 1) * Eigen::Matrix3d::Identity();
+                                                     }));
+  run_well(arguments({"tubes.obj"}, {R"(field={"file": "half.vdb", "interpolation": "linear", "scale": 1})",
+                                     "integrator.radius={\"typical\": 0.05, \"min\": 0.01}"}));
+  double where_zero = 0, elsewhere = 0;
+  for (const Eigen::Vector3d& vertex : vertices("tubes.obj")) {
+    double& widest = vertex.x() < 0 ? where_zero : elsewhere;
+    widest = std::max(widest, std::abs(std::abs(vertex.x()) - (std::abs(vertex.x()) < 0.5 ? 0.25 : 0.75)));
+  }
+  EXPECT_NEAR(where_zero, 0.01, 1e-6);
+  EXPECT_NEAR(elsewhere, 0.05, 1e-6);
 }
 
 TEST_F(Paths, WithoutAFieldTheyAreStraightRoundAndOfTheTypicalRadius) {
