@@ -36,6 +36,10 @@ TEST_F(Import, BrainInItsObliqueAxes) {
   EXPECT_NEAR(at(brain, "eigenvalues", "real_min"), -4.9e-3, 5e-5);
   EXPECT_NEAR(at(brain, "eigenvalues", "real_max"), 5.5e-3, 5e-5);
   EXPECT_NEAR(at(brain, "eigenvalues", "negative_fraction") * 93524, 864, 0.01);
+  EXPECT_EQ(imported_.error, "");
+  import({file, "--order", "mrtrix"}, "wrong");
+  EXPECT_NE(imported_.error.find("100% of the voxels have a negative eigenvalue"), std::string::npos)
+      << imported_.error;
   const std::array<std::array<double, 4>, 3> sform{{{-2.49987030, -0.00688329, 0.02452171, 121.26437378},
                                                     {-0.00939895, 2.48641157, -0.26002878, -102.28897095},
                                                     {0.02368196, 0.26021153, 2.48531413, -126.12567902}}};

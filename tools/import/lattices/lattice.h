@@ -46,8 +46,9 @@ struct Lattice {
 /// Counts of the voxels.
 struct LatticeReport {
   std::size_t voxels = 0, active = 0;
-  std::size_t non_finite = 0;      ///< Made inactive, because a component was NaN or infinite.
-  std::size_t background = 0;      ///< Inactive because of the mask, or because they are exactly zero.
+  std::size_t non_finite = 0;  ///< Made inactive, because a component was NaN or infinite.
+  std::size_t background = 0;  ///< Inactive because of the mask, or because they are exactly zero.
+  double negative = 0;  ///< The part of the active voxels with a negative eigenvalue, where the user gave the order.
   std::vector<std::string> notes;  ///< Those of the lattice.
 };
 
