@@ -6,6 +6,7 @@
 #include <fmt/format.h>
 
 #include "base/process/seconds.h"
+#include "base/text/numbered_name.h"
 #include "renderer/meshes/mesh.h"
 #include "scenes/description/choices.h"
 #include "scenes/scene/scene.h"
@@ -20,10 +21,13 @@ constexpr double default_margin = 1.25;    // Size of the plate, in extents of t
 constexpr double default_distance = 0.25;  // Distance of the plate behind the volume, in depths of the volume.
 constexpr double greatest_size = 1e5;  // Largest size of the scene, in sizes of the volume: Embree is single precision.
 constexpr double narrowest_white = 100;  // nm: light of a narrower range has no white.
+constexpr double most_stretched = 1.05;  // Pixels' longer side over the shorter one.
 constexpr int default_resolution = 512;  // Pixels along the plate's longer side.
 
 BlockSource open_field(const SceneDescription& scene) {
   const FieldDescription& field = scene.field;
+  if (!field.generate && has_number_sign(field.file.filename().string()) && !std::filesystem::exists(field.file))
+    throw SceneError(field.file.string() + ": # is for the number of a frame: give --frames");
   if (!field.generate) return open_tensor_vdb(field.file, field.name, field.derive, field.components);
   try {
     return generator_source(field.generate->generator, field.generate->grid);
@@ -133,6 +137,19 @@ Plate make_plate(const SceneDescription& description, const TensorField& field, 
   const Eigen::Vector2d pixels = default_resolution * plate.size / plate.size.maxCoeff();
   plate.resolution = receiver.resolution.value_or(pixels.array().round().max(1).cast<int>().matrix());
   return plate;
+}
+
+/// Where pixels are no squares, the picture is stretched: says which numbers make squares.
+void note_pixels(const Plate& plate, std::vector<std::string>& notes) {
+  const Eigen::Vector2d pixel = plate.size.cwiseQuotient(plate.resolution.cast<double>());
+  if (pixel.maxCoeff() < most_stretched * pixel.minCoeff()) return;
+  const Eigen::Vector2i square =
+      (plate.resolution.maxCoeff() * plate.size / plate.size.maxCoeff()).array().round().max(1).cast<int>();
+  notes.push_back(
+      fmt::format("warning: the picture is stretched, as pixels of the plate are {:.2g} times as {} as {}; [{}, {}] "
+                  "pixels are squares",
+                  pixel.maxCoeff() / pixel.minCoeff(), pixel.x() > pixel.y() ? "wide" : "high",
+                  pixel.x() > pixel.y() ? "high" : "wide", square.x(), square.y()));
 }
 
 [[noreturn]] void fail_size(const SceneDescription& description, const char* pointer) {
@@ -266,6 +283,7 @@ Scene make_scene(SceneDescription description, LoadedLight light, LoadedField lo
   description.light.direction = load_direction(description, loaded.field, progress, notes);
   Beam beam = make_beam(description, loaded.field);
   Geometry geometry(load_surfaces(description, loaded.field, beam));
+  note_pixels(*geometry.surfaces().plate, notes);
   Scene scene(description, std::move(loaded.field), std::move(geometry), std::move(light.color));
   scene.eigenvalues = loaded.eigenvalues;
   scene.non_finite = loaded.non_finite;

@@ -13,6 +13,8 @@
 namespace tensorray {
 namespace {
 
+constexpr std::chrono::milliseconds drawing_interval{100}, logging_interval{60'000};
+constexpr int logged_width = 100;
 constexpr const char* clear_line = "\r\033[K";
 
 int terminal_width() {
@@ -51,8 +53,9 @@ std::string progress_line(const std::string& phase, std::uint64_t done, std::uin
 
 }  // namespace
 
-ProgressBar::ProgressBar(Progress& progress, bool quiet) : progress_(progress) {
-  if (quiet || isatty(STDERR_FILENO) == 0) return;
+ProgressBar::ProgressBar(Progress& progress, bool quiet)
+    : progress_(progress), is_terminal_(isatty(STDERR_FILENO) != 0), last_drawn_(Clock::now()) {
+  if (quiet) return;
   progress_.report = [this](const std::string& phase, std::uint64_t done, std::uint64_t total) {
     update(phase, done, total);
   };
@@ -70,12 +73,13 @@ void ProgressBar::update(const std::string& phase, std::uint64_t done, std::uint
     phase_ = phase;
     phase_start_ = now;
     done_at_start_ = done;
-  } else if (now - last_drawn_ < std::chrono::milliseconds(100)) {
-    return;
+    if (is_terminal_) last_drawn_ = {};
   }
+  if (now - last_drawn_ < (is_terminal_ ? drawing_interval : logging_interval)) return;
   last_drawn_ = now;
   const double seconds = std::chrono::duration<double>(now - phase_start_).count();
   const double rate = seconds > 0.2 ? static_cast<double>(done - done_at_start_) / seconds : 0;
+  if (!is_terminal_) return tell({"tensorray: " + progress_line(phase, done, total, rate, logged_width)}, false);
   // Leave one column free, because some terminals wrap a full line.
   print_error(clear_line + progress_line(phase, done, total, rate, terminal_width() - 1));
   drawn_ = true;

@@ -28,6 +28,7 @@ class ProgressBar {
   void update(const std::string& phase, std::uint64_t done, std::uint64_t total);
 
   Progress& progress_;
+  const bool is_terminal_;  ///< Otherwise the progress is a line each minute.
   bool drawn_ = false;
   std::string phase_;
   std::uint64_t done_at_start_ = 0;

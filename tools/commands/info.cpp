@@ -30,6 +30,7 @@ constexpr double voxel_step_flexibility = 0.3;  // The strongest flexibility in 
 struct InfoOptions {
   std::filesystem::path file;
   std::string field;
+  Derive derive = Derive::none;
   bool json = false;
 };
 
@@ -46,8 +47,8 @@ struct FieldInfo {
   }
 };
 
-FieldInfo field_info(const std::filesystem::path& file, const std::string& name) {
-  TensorGrid grid = read_tensor_vdb(file, name);
+FieldInfo field_info(const InfoOptions& options, const std::string& name) {
+  TensorGrid grid = read_tensor_vdb(options.file, name, options.derive);
   FieldInfo info{grid.name, grid.to_world.matrix(), grid.metadata, field_statistics(grid), {}};
   if (info.statistics.active_voxels > info.statistics.non_finite) {
     const MadeField made = make_field(view_of(grid), Eigenvalues::raw, {Interpolation::cubic, Border::fade});
@@ -59,9 +60,9 @@ FieldInfo field_info(const std::filesystem::path& file, const std::string& name)
 
 std::vector<FieldInfo> field_infos(const InfoOptions& options, const std::vector<GridInfo>& grids) {
   std::vector<std::string> names = tensor_names(grids);
-  if (!options.field.empty()) names = {options.field};
+  if (!options.field.empty() || options.derive != Derive::none) names = {options.field};
   std::vector<FieldInfo> fields;
-  for (const std::string& name : names) fields.push_back(field_info(options.file, name));
+  for (const std::string& name : names) fields.push_back(field_info(options, name));
   return fields;
 }
 
@@ -206,7 +207,9 @@ void print_text(const InfoOptions& options, const std::vector<GridInfo>& grids, 
   for (const FieldInfo& field : fields) print_field(field);
   if (fields.empty()) {
     fmt::print(
-        "no tensor field; `field.derive` in a scene makes one of a vector (gradient) or scalar grid (hessian)\n");
+        "no tensor field; `--derive gradient` tells of that of a vector grid, `--derive hessian` of that of a scalar "
+        "grid, "
+        "and `field.derive` in a scene makes it\n");
   }
 }
 
@@ -228,6 +231,12 @@ void add_info_command(CLI::App& program) {
   CLI::App* command = program.add_subcommand("info", "Tell what an OpenVDB file holds");
   command->add_option("file", options->file, "The file, FILE.vdb")->required();
   command->add_option("--field", options->field, "Only this tensor field; without it, all");
+  command
+      ->add_option("--derive", options->derive,
+                   "Tell of the tensor that is derived from the grid --field, or from the only one: the gradient of a "
+                   "vector grid, or the hessian of a scalar grid")
+      ->transform(CLI::Transformer(
+          std::map<std::string, Derive>{{"gradient", Derive::gradient}, {"hessian", Derive::hessian}}));
   command->add_flag("--json", options->json, "As JSON");
   command->callback([options] {
     std::signal(SIGINT, SIG_DFL);  // This command writes no file, so Ctrl-C may end it at once.

@@ -91,6 +91,15 @@ void report_failed(const std::vector<int>& failed) {
                                        fmt::join(failed, ",")));
 }
 
+/// The flags of an import as they were given, each after a blank.
+std::string flags_of(const ImportChoices& import) {
+  std::string flags;
+  for (const auto& [flag, value] : {std::pair("--order", import.order), std::pair("--array", import.array),
+                                    std::pair("--gradient-of", import.gradient_of)})
+    if (!value.empty()) flags += fmt::format(" {} '{}'", flag, printable(value));
+  return flags;
+}
+
 /// Renders another program's file. Its pictures are named after the file.
 void render_import(const std::string& file, SceneChanges changes, const RenderOptions& options, Progress& progress) {
   if (!options.frames.empty()) throw std::invalid_argument("--frames: import the files first, with `tensorray import`");
@@ -98,7 +107,7 @@ void render_import(const std::string& file, SceneChanges changes, const RenderOp
     throw std::invalid_argument("--shard, --resume: import the file first, with `tensorray import`");
   if (!options.run.scene_copy.empty())
     throw std::invalid_argument("--save-scene: a scene needs a field that stays; make it with `tensorray import " +
-                                printable(file) + " -o FIELD.vdb`");
+                                printable(file) + flags_of(options.import) + " -o FIELD.vdb`");
   if (changes.outputs.empty()) {
     std::filesystem::path name(file);
     while (name.has_extension()) name.replace_extension();  // .nii.gz
@@ -123,9 +132,10 @@ std::vector<int> render(const RenderOptions& options, Leader* leader, Progress& 
     render_import(options.scene, changes, options, progress);
     return {};
   }
-  const ImportChoices& import = options.import;
-  if (!import.order.empty() || !import.array.empty() || !import.gradient_of.empty())
-    throw std::invalid_argument("--order, --array and --gradient-of are for files that have to be imported");
+  if (const std::string flags = flags_of(options.import); !flags.empty()) {
+    if (!std::filesystem::exists(options.scene)) throw std::runtime_error(printable(options.scene) + " does not exist");
+    throw std::invalid_argument(flags.substr(1) + ": only files that have to be imported have this choice");
+  }
   RenderRun run = options.run;
   run.leader = leader;
   if (!run.keeping.display.empty()) check_display_address(run.keeping.display);

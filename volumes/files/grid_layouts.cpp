@@ -136,6 +136,14 @@ std::string described(const std::vector<GridInfo>& grids) {
   return joined_or_none(words);
 }
 
+/// How a tensor can be made of the grids of a file that has none.
+std::string derivable(const std::vector<GridInfo>& grids) {
+  const std::vector<std::string> vectors = names_in(grids, layouts_for(Derive::gradient));
+  if (!vectors.empty()) return "; `--set field.derive=gradient` makes one of " + joined(vectors);
+  const std::vector<std::string> scalars = names_in(grids, layouts_for(Derive::hessian));
+  return scalars.empty() ? "" : "; `--set field.derive=hessian` makes one of " + joined(scalars);
+}
+
 std::string chosen_name(const std::filesystem::path& path, const std::vector<GridInfo>& grids, const std::string& name,
                         Derive derive) {
   const std::string kind = derive == Derive::none       ? "tensor field"
@@ -152,8 +160,10 @@ std::string chosen_name(const std::filesystem::path& path, const std::vector<Gri
                    "; the grids are: " + described(grids) + fix);
   }
   if (names.size() == 1) return names.front();
-  if (names.empty()) fail(path, "has no " + kind + "; the grids are: " + described(grids) + fix);
-  fail(path, "has several of what could be the " + kind + "; name one of: " + joined(names));
+  if (names.empty())
+    fail(path, "has no " + kind + "; the grids are: " + described(grids) + fix +
+                   (derive == Derive::none ? derivable(grids) : ""));
+  fail(path, "has several of what could be the " + kind + "; `field.name` must be one of: " + joined(names));
 }
 
 const char* const entry_names[] = {"xx", "xy", "xz", "yx", "yy", "yz", "zx", "zy", "zz"};

@@ -212,6 +212,35 @@ TEST_F(Program, FilesGoThroughMakeInfoAndRender) {
   EXPECT_EQ(read_image(in_folder("scene.exr")).pixels, from_file);
 }
 
+/// A row of a tensor is a vector grid: without the others it is no tensor, but has a gradient.
+TEST_F(Program, GridsWithoutATensorAreDerived) {
+  using nlohmann::json;
+  run_well({"make", "vortex", "-o", "vortex.vdb", "--resolution", "16"});
+  run_well({"derive", "vortex.vdb", "--invariant", "norm", "-o", "norm.vdb"});
+  const std::string error = run({"render", "norm.vdb", "-o", "a.png"}).error;
+  EXPECT_NE(error.find("`--set field.derive=hessian` makes one of"), std::string::npos) << error;
+  EXPECT_NE(run_well({"info", "norm.vdb"}).out.find("--derive hessian"), std::string::npos);
+  const json hessian = json::parse(run_well({"info", "norm.vdb", "--derive", "hessian", "--json"}).out);
+  EXPECT_EQ(hessian["fields"][0]["active_voxels"], 4096);
+  const std::string row = "vortex_row0";
+  const json gradient =
+      json::parse(run_well({"info", "vortex.vdb", "--field", row, "--derive", "gradient", "--json"}).out);
+  EXPECT_EQ(gradient["fields"][0]["name"], row);
+  write("scene.json", small_scene(R"({"file": "missing.####.vdb"})"));
+  EXPECT_NE(run({"render", "scene.json"}).error.find("give --frames"), std::string::npos);
+}
+
+TEST_F(Program, PixelsThatAreNoSquaresAreToldOf) {
+  write("scene.json", small_scene());
+  const auto error = [&](const std::string& resolution) {
+    return run_well({"render", "scene.json", "-o", "a.png", "--set", "receiver.size=[2,4]", "--set",
+                     "receiver.resolution=" + resolution})
+        .error;
+  };
+  EXPECT_EQ(error("[20,40]").find("stretched"), std::string::npos);
+  EXPECT_NE(error("40").find("2 times as high as wide; [20, 40] pixels are squares"), std::string::npos) << error("40");
+}
+
 TEST_F(Program, ObstaclesAndCutsAreLoaded) {
   write("wall.obj", "v -9 -9 -2.2\nv 9 -9 -2.2\nv 9 9 -2.2\nv -9 9 -2.2\nf 1 2 3 4\n");
   write("scene.json", small_scene());
