@@ -391,7 +391,8 @@ TEST(TensorFiles, ChoosesAmongFieldsByName) {
   EXPECT_EQ((*find(read_tensor_vdb(path, "B"), {0, 0, 0}))(0, 0), 2);
   EXPECT_EQ(tensor_names(list_vdb(path)), (std::vector<std::string>{"A", "B"}));
   EXPECT_THAT([&] { read_tensor_vdb(path); },
-              ThrowsMessage<std::runtime_error>(AllOf(HasSubstr(path.string()), HasSubstr("`field.name` must be one of: A, B"))));
+              ThrowsMessage<std::runtime_error>(
+                  AllOf(HasSubstr(path.string()), HasSubstr("`field.name` must be one of: A, B"))));
   EXPECT_THAT([&] { read_tensor_vdb(path, "C"); },
               ThrowsMessage<std::runtime_error>(
                   AllOf(HasSubstr("\"C\""), HasSubstr("density (float)"), HasSubstr("mask (bool)"))));
