@@ -3,6 +3,7 @@
 #include <fstream>
 #include <memory>
 #include <optional>
+#include <stdexcept>
 #include <string>
 #include <vector>
 
@@ -15,6 +16,7 @@
 #include "renderer/images/image.h"
 #include "scenes/description/run_files.h"
 #include "scenes/keys/json_reader.h"
+#include "scenes/keys/scene_source.h"
 #include "scenes/outputs/picture_outputs.h"
 #include "scenes/pipeline/read_scene.h"
 #include "scenes/scene/render.h"
@@ -23,6 +25,7 @@
 #include "tools/command_line/tell.h"
 #include "tools/command_line/threads.h"
 #include "tools/commands/commands.h"
+#include "tools/commands/imported_field.h"
 
 namespace tensorray {
 namespace {
@@ -172,6 +175,9 @@ void check(const ExploreOptions& options, const SceneDescription& description) {
 void explore(const ExploreOptions& options, Progress& progress) {
   const Threads threads(options.threads);
   set_image_threads(static_cast<int>(running_threads()));
+  if (needs_import(options.scene))
+    throw std::invalid_argument(printable(options.scene) + ": make a field of it first, with `tensorray import " +
+                                printable(options.scene) + " -o FIELD.vdb`");
   check(options, with(options, {}));
   std::vector<OutputFile> files;
   for (const std::string& file : {options.sheet, options.scene_copy})

@@ -53,6 +53,7 @@ ImportedField::ImportedField(const std::filesystem::path& file, const ImportChoi
   add("--order", choices.order);
   add("--array", choices.array);
   add("--gradient-of", choices.gradient_of);
+  add("--frame", choices.frame);
   if (choices.memory > 0) add("--memory", std::to_string(choices.memory));
   arguments.insert(arguments.end(), {"--", file.string()});
   const ProgramEnd end = run_program(import_program(), arguments, UnnamedFile());

@@ -12,7 +12,7 @@ namespace tensorray {
 
 /// The choices of an import that a render offers, as the options of `tensorray import`; empty: none.
 struct ImportChoices {
-  std::string order, array, gradient_of;
+  std::string order, array, gradient_of, frame;
   std::size_t memory = 0;  ///< What may be resident, in bytes; 0: without a bound.
 };
 

@@ -95,7 +95,7 @@ void report_failed(const std::vector<int>& failed) {
 std::string flags_of(const ImportChoices& import) {
   std::string flags;
   for (const auto& [flag, value] : {std::pair("--order", import.order), std::pair("--array", import.array),
-                                    std::pair("--gradient-of", import.gradient_of)})
+                                    std::pair("--gradient-of", import.gradient_of), std::pair("--frame", import.frame)})
     if (!value.empty()) flags += fmt::format(" {} '{}'", flag, printable(value));
   return flags;
 }
@@ -234,6 +234,7 @@ void add_render_command(CLI::App& program, Progress& progress) {
   command->add_option("--array", options->import.array, "The array that is the tensor, likewise")->group("Import");
   command->add_option("--gradient-of", options->import.gradient_of, "The velocity whose gradient it is, likewise")
       ->group("Import");
+  command->add_option("--frame", options->import.frame, "The axes of the components, likewise")->group("Import");
   command->add_flag("-q,--quiet", options->run.quiet, "Print nothing but errors");
   command->callback([options, &progress] { render_alone_or_with_others(*options, progress); });
 }

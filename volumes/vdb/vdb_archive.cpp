@@ -108,7 +108,7 @@ class Reader : private openvdb::io::Archive {
 
   void read_file_header() {
     if (size_ < version_offset + 4 || read_stored<std::int64_t>() != openvdb::OPENVDB_MAGIC)
-      fail(path_, "is not an OpenVDB file");
+      fail(path_, "is not an OpenVDB file; `tensorray import` makes one of other programs' files");
     if (read_stored<std::uint32_t>() > openvdb::OPENVDB_FILE_VERSION)
       fail(path_, "was written by a newer OpenVDB than this program has; write it in an older format");
     in_.seekg(0);

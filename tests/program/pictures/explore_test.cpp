@@ -107,6 +107,10 @@ TEST_F(Explore, WrongOptionsAreRefused) {
   expect_error({"--pick", "3", "--save-scene", "stress.vdb"}, "--save-scene");
   expect_error({"-o", "sheet.png", "--method", "nothing"}, "nothing");
   EXPECT_EQ(read_file(in_folder("stress.vdb")), field);
+  write("stress.nii", std::string(400, 'n'));
+  const Outcome outcome = run({"explore", "stress.nii", "-o", "sheet.png"});
+  EXPECT_EQ(outcome.status, 2);
+  EXPECT_NE(outcome.error.find("tensorray import stress.nii"), std::string::npos) << outcome.error;
   EXPECT_FALSE(exists(in_folder("sheet.png")));
 }
 

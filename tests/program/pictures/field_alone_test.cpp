@@ -100,6 +100,9 @@ TEST_F(FieldAlone, FilesThatHaveToBeImportedAreRenderedAsTheyAreAfterAnImport) {
   expect_error({"render", "tensors.nrrd", "--stats", "tensors.nrrd"}, "--stats");
   expect_error({"render", "tensors.nrrd", "--array", "stress"}, "tensors.nrrd");
   expect_error({"render", "stress.vdb", "--order", "vtk"}, "have to be imported");
+  expect_error({"render", "tensors.nrrd", "--array", "stress", "--save-scene", "scene.json"},
+               "`tensorray import tensors.nrrd --array 'stress' -o FIELD.vdb`");
+  expect_error({"render", "missing.nii.gz", "--order", "fsl"}, "missing.nii.gz does not exist");
   write("noise.vti", "noise");
   expect_error({"render", "noise.vti"}, "noise.vti");
 }
