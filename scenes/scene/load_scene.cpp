@@ -139,8 +139,9 @@ Plate make_plate(const SceneDescription& description, const TensorField& field, 
   return plate;
 }
 
-/// Where pixels are no squares, the picture is stretched: says which numbers make squares.
-void note_pixels(const Plate& plate, std::vector<std::string>& notes) {
+/// Where the scene's pixels are no squares, the picture is stretched: says which numbers make squares.
+void note_pixels(const ReceiverDescription& receiver, const Plate& plate, std::vector<std::string>& notes) {
+  if (!receiver.resolution) return;
   const Eigen::Vector2d pixel = plate.size.cwiseQuotient(plate.resolution.cast<double>());
   if (pixel.maxCoeff() < most_stretched * pixel.minCoeff()) return;
   const Eigen::Vector2i square =
@@ -283,7 +284,7 @@ Scene make_scene(SceneDescription description, LoadedLight light, LoadedField lo
   description.light.direction = load_direction(description, loaded.field, progress, notes);
   Beam beam = make_beam(description, loaded.field);
   Geometry geometry(load_surfaces(description, loaded.field, beam));
-  note_pixels(*geometry.surfaces().plate, notes);
+  note_pixels(description.receiver, *geometry.surfaces().plate, notes);
   Scene scene(description, std::move(loaded.field), std::move(geometry), std::move(light.color));
   scene.eigenvalues = loaded.eigenvalues;
   scene.non_finite = loaded.non_finite;
