@@ -1,15 +1,11 @@
 #include "tools/import/import_file.h"
 
 #include <algorithm>
-#include <functional>
 #include <limits>
 #include <stdexcept>
 #include <utility>
 #include <variant>
 
-#include <Eigen/Eigenvalues>
-#include <tbb/blocked_range.h>
-#include <tbb/parallel_reduce.h>
 #include <vtkCellData.h>
 #include <vtkDataArray.h>
 #include <vtkDataObject.h>
@@ -202,23 +198,6 @@ void require_room_for(const std::vector<std::filesystem::path>& files) {
   require_room(0, bytes);
 }
 
-/// The part of the active voxels that have a negative eigenvalue, beyond a thousandth of the norm.
-double negative_part(const TensorGrid& grid) {
-  const auto is_negative = [](const Eigen::Matrix3d& T) {
-    Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> solver;
-    return solver.computeDirect(T, Eigen::EigenvaluesOnly).eigenvalues()[0] < -1e-3 * T.norm();
-  };
-  const std::size_t negative = tbb::parallel_reduce(
-      tbb::blocked_range<std::size_t>(0, grid.blocks.size()), std::size_t{0},
-      [&](const tbb::blocked_range<std::size_t>& range, std::size_t count) {
-        for (std::size_t i = range.begin(); i != range.end(); ++i)
-          for (const Eigen::Matrix3f& T : grid.blocks[i].values) count += is_negative(T.cast<double>()) ? 1 : 0;
-        return count;
-      },
-      std::plus<>());
-  return static_cast<double>(negative) / static_cast<double>(std::max<std::size_t>(1, grid.active_voxels()));
-}
-
 TensorGrid import_any(const ImportSettings& settings, const Progress& progress, ImportReport& report) {
   const std::filesystem::path& file = settings.files.front();
   const OpenLattice open = lattice_reader(file);
@@ -236,9 +215,7 @@ TensorGrid import_any(const ImportSettings& settings, const Progress& progress, 
     throw std::invalid_argument("has voxels of its own, which are kept: leave --resolution and --voxel-size out");
   Lattice lattice = open(file);
   if (settings.frame) take_frame(lattice, *settings.frame);
-  TensorGrid grid = import_lattice(lattice, settings, report);
-  if (settings.order && settings.take == Take::tensor) report.lattice->negative = negative_part(grid);
-  return grid;
+  return import_lattice(lattice, settings, report);
 }
 
 /// An error message in one line that names the file.

@@ -1,12 +1,14 @@
 #include "tools/import/lattices/lattice.h"
 
 #include <algorithm>
+#include <atomic>
 #include <memory>
 #include <stdexcept>
 #include <tuple>
 #include <utility>
 #include <vector>
 
+#include <Eigen/Eigenvalues>
 #include <fmt/format.h>
 #include <tbb/parallel_for.h>
 
@@ -160,6 +162,13 @@ Matrix3d frame_of(const Lattice& lattice, TensorOrder order) {
   return lattice.frame;
 }
 
+/// Whether an eigenvalue of a symmetric tensor is negative, by more than rounding or a thousandth of the norm.
+bool has_negative_eigenvalue(const Eigen::Matrix3f& tensor) {
+  const Matrix3d T = tensor.cast<double>();
+  Eigen::SelfAdjointEigenSolver<Matrix3d> solver;
+  return solver.computeDirect(T, Eigen::EigenvaluesOnly).eigenvalues()[0] < -1e-3 * T.norm();
+}
+
 TensorGrid empty_grid(const Lattice& lattice) {
   TensorGrid grid;
   grid.to_world = lattice.to_world;
@@ -184,13 +193,19 @@ TensorGrid tensors_of(const Lattice& lattice, const std::optional<TensorOrder>& 
   const TensorOrder chosen = order_of(lattice, order);
   const Matrix3d frame = frame_of(lattice, chosen);
   TensorGrid grid = empty_grid(lattice);
+  // Anatomical files hold diffusion tensors, whose eigenvalues are positive unless the user's order is wrong.
+  const bool checks_order = lattice.takes_frame && order && !lattice.order && chosen != TensorOrder::full;
+  std::atomic<std::size_t> negative{0};
   const auto tensor = [&](const double* components) -> Eigen::Matrix3f {
     const Matrix3d turned = frame * tensor_of(components, chosen) * frame.transpose();
     if (chosen == TensorOrder::full) return turned.cast<float>();
-    return (0.5 * (turned + turned.transpose()))
-        .cast<float>();  // Symmetrizing removes rounding errors, so that symmetric tensors stay symmetric.
+    // Symmetrizing removes rounding errors, so that symmetric tensors stay symmetric.
+    const Eigen::Matrix3f symmetric = (0.5 * (turned + turned.transpose())).cast<float>();
+    if (checks_order && has_negative_eigenvalue(symmetric)) negative.fetch_add(1, std::memory_order_relaxed);
+    return symmetric;
   };
   read_blocks(lattice, tensor, grid.blocks, report);
+  report.negative = static_cast<double>(negative) / static_cast<double>(std::max<std::size_t>(1, report.active));
   return grid;
 }
 

@@ -46,9 +46,10 @@ struct Lattice {
 /// Counts of the voxels.
 struct LatticeReport {
   std::size_t voxels = 0, active = 0;
-  std::size_t non_finite = 0;  ///< Made inactive, because a component was NaN or infinite.
-  std::size_t background = 0;  ///< Inactive because of the mask, or because they are exactly zero.
-  double negative = 0;  ///< The part of the active voxels with a negative eigenvalue, where the user gave the order.
+  std::size_t non_finite = 0;      ///< Made inactive, because a component was NaN or infinite.
+  std::size_t background = 0;      ///< Inactive because of the mask, or because they are exactly zero.
+  double negative = 0;             ///< Of an anatomical file whose order the user gave: the part of the active voxels
+                                   ///< that have a negative eigenvalue.
   std::vector<std::string> notes;  ///< Those of the lattice.
 };
 

@@ -1,0 +1,199 @@
+// The method "scene": the light of suns, points and lamps, as maps, photons and paths find it.
+
+#include <cmath>
+#include <string>
+#include <utility>
+
+#include <fmt/core.h>
+
+#include "tests/program/whole_support.h"
+
+namespace tensorray {
+namespace {
+
+using namespace test;
+
+/// A plate below a bending field, in the light of nine points (`first`) or of a lamp (`second`): a square of 3 × 3 with
+/// the intensity π 100. The lamp is darker by 1% towards the edges.
+/// @param integrator  More keys of the integrator.
+std::pair<std::string, std::string> points_and_lamp(const std::string& integrator) {
+  const std::string common = R"({
+    "field": {"generate": {"kind": "point_load", "resolution": 17}, "eigenvalues": "raw", "scale": 1},
+    "objects": [{"plate": {"center": [0, 0, -1.5], "size": [1.6, 1.6]}, "material": {"kind": "diffuse"}}],
+    "camera": {"projection": "orthographic", "position": [0, 0.001, -1.2], "target": [0, 0, -1.5], "height": 1.4,
+               "resolution": [20, 20]},
+    "integrator": {"type": "scene", "noise": 0, "max_gain": 0, "bands": 8, "max_depth": 1, )" +
+                             integrator + R"(},
+    "lights": [)";
+  std::string points;
+  for (const int x : {-1, 0, 1})
+    for (const int y : {-1, 0, 1})
+      points += fmt::format(R"({}{{"kind": "point", "position": [{}, {}, 12], "strength": 11.111}})",
+                            points.empty() ? "" : ", ", x, y);
+  return {common + points + "]}",
+          common + R"({"kind": "area", "center": [0, 0, 12], "size": [3, 3], "strength": 34.907}]})"};
+}
+
+/// The light of points, traced forwards to the floor, is that of a lamp that the path tracer finds backwards.
+TEST_F(WholeScene, TheLightOfPointsThroughTheFieldIsThatOfALamp) {
+  const auto [points, lamp] =
+      points_and_lamp(R"("max_samples": 512, "min_samples": 512, "caustic": {"resolution": 256, "rays": 20000})");
+  write("scene.json", points);
+  const Image forwards = picture({});
+  write("scene.json", lamp);
+  const std::string none = "integrator.photons.per_pass=0";
+  const Image backwards = picture({none}), other_law = picture({none, "integrator.conserve=radiance"});
+  EXPECT_GT(mean(forwards, "G"), 0.2);
+  EXPECT_NEAR(mean(forwards, "G"), mean(backwards, "G"), 0.03 * mean(backwards, "G"));
+  // Photons beside the other ways to find the lamp: whatever law light follows.
+  std::vector<std::string> few{"integrator.photons.per_pass=1024", "integrator.max_samples=128",
+                               "integrator.min_samples=128"};
+  const Image photons = picture(few);
+  few.push_back("integrator.conserve=radiance");
+  const Image other_photons = picture(few);
+  EXPECT_NE(photons.pixels, backwards.pixels);
+  EXPECT_NEAR(mean(photons, "G"), mean(backwards, "G"), 0.03 * mean(backwards, "G"));
+  EXPECT_NEAR(mean(other_photons, "G"), mean(other_law, "G"), 0.03 * mean(other_law, "G"));
+  EXPECT_GT(std::abs(mean(other_law, "G") / mean(backwards, "G") - 1), 0.1);
+}
+
+/// Photons and the flow map are two ways to the same light.
+TEST_F(WholeScene, PhotonsGiveTheLightOfTheFlowMap) {
+  const std::vector<std::string> sets{
+      "lights=[{\"kind\":\"directional\",\"direction\":[0.1,0.15,-1],\"caustic\":\"map\"}]",
+      "integrator.max_samples=64",
+      "integrator.min_samples=64",
+      "integrator.max_depth=1",
+      "integrator.caustic={\"resolution\":256,\"rays\":40000,\"passes\":1}",
+      "objects=[{\"plate\":{\"center\":[0,0,-2.6],\"size\":[6,6]},\"material\":{\"kind\":\"diffuse\"}}]",
+      "camera={\"projection\":\"orthographic\",\"position\":[0,0.001,-2.1],\"target\":[0,0,-2.6],\"height\":5,"
+      "\"resolution\":[32,32]}"};
+  std::vector<std::string> other = sets;
+  other.push_back("lights.0.caustic=photons");
+  const Image map = picture(sets), photons = picture(other);
+  other.push_back("integrator.photons.per_pass=2048");
+  const Image few = picture(other);
+  const auto difference = [&](const Image& image) {
+    double sum = 0;
+    for (std::size_t i = 0; i < image.pixels.size(); i += image.channels.size())
+      sum += std::pow(image.pixels[i + 1] - map.pixels[i + 1], 2);
+    return std::sqrt(sum / image.width / image.height);
+  };
+  for (const char* channel : {"caustic.R", "caustic.G", "caustic.B"})
+    EXPECT_NEAR(mean(photons, channel), mean(map, channel), 0.01 * mean(map, channel)) << channel;
+  EXPECT_NEAR(mean(photons, "straight.G"), mean(map, "straight.G"), 1e-3 * mean(map, "straight.G"));
+  EXPECT_LT(difference(photons), 0.02 * mean(map, "G"));
+  EXPECT_LT(difference(photons), 0.7 * difference(few));
+}
+
+/// Where radiance is conserved, light of points gains as the lamp's does.
+TEST_F(WholeScene, PhotonsConserveRadianceOnRequest) {
+  const auto [points, lamp] = points_and_lamp(R"("max_samples": 64, "min_samples": 64, "conserve": "radiance",
+                                                 "photons": {"per_pass": 8192},
+                                                 "caustic": {"resolution": 256, "rays": 20000})");
+  write("scene.json", points);
+  const Image forwards = picture({}), map = picture({"integrator.photons.per_pass=0"});
+  write("scene.json", lamp);
+  const Image backwards = picture({});
+  EXPECT_NEAR(mean(forwards, "G"), mean(backwards, "G"), 0.03 * mean(backwards, "G"));
+  EXPECT_GT(std::abs(mean(map, "G") / mean(backwards, "G") - 1), 0.1);  // A flow map keeps power.
+}
+
+/// A plate that light meets before the middle of the volume, and one along the light, which both sides of light meet.
+TEST_F(WholeScene, AWeakFieldLightsPlatesWithinTheVolume) {
+  const std::vector<std::string> sets{
+      "objects=[{\"plate\":{\"center\":[0,0,-0.4],\"size\":[1.2,1.2]},\"material\":{\"kind\":\"diffuse\"}},"
+      "{\"plate\":{\"center\":[0,0.4,-1],\"normal\":[0,1,0],\"size\":[1.6,1]},\"material\":{\"kind\":\"diffuse\"}}]",
+      "lights=[{\"kind\":\"directional\",\"direction\":[0.3,0.2,-1],\"caustic\":\"photons\"},"
+      "{\"kind\":\"point\",\"position\":[0.4,-0.8,2],\"strength\":5}]",
+      "integrator.max_samples=32",
+      "integrator.min_samples=32",
+      "integrator.max_depth=1",
+      "camera.position=[1,-3,2]",
+      "camera.target=[0,0,-0.6]"};
+  std::vector<std::string> weak = sets, none = sets;
+  weak.push_back("field.scale=1e-7");
+  none.insert(none.end(), {"bending.a=0", "bending.b=0"});
+  const Image with = picture(weak), without = picture(none);
+  EXPECT_GT(mean(with, "caustic.G"), 0.9 * mean(with, "G"));
+  for (const char* channel : {"R", "G", "B"})
+    EXPECT_NEAR(mean(with, channel) / mean(without, channel), 1, 0.02) << channel;
+  EXPECT_EQ(picture(weak, "1").pixels, with.pixels);
+  EXPECT_EQ(picture(weak, "7").pixels, with.pixels);
+}
+
+/// A point within the volume, and lamps there, of which the large one has no photons, light a plate below and one
+/// within, beside a sky.
+TEST_F(WholeScene, AWeakFieldIsLitFromWithinAsIfItWereNotThere) {
+  for (const char* light : {R"({"kind":"point","position":[0.1,0.2,-0.5],"strength":1})",
+                            R"({"kind":"area","center":[0.1,0.2,-0.5],"size":[0.2,0.2],"strength":20})",
+                            R"({"kind":"area","center":[0.1,0.2,-0.5],"size":[0.6,0.6],"strength":3})"}) {
+    const std::vector<std::string> sets{
+        "objects=[{\"plate\":{\"center\":[0,0,-2.6],\"size\":[4,4]},\"material\":{\"kind\":\"diffuse\"}},"
+        "{\"plate\":{\"center\":[0.4,0,-1.2],\"size\":[0.8,0.8]},\"material\":{\"kind\":\"diffuse\"}}]",
+        std::string("lights=[{\"kind\":\"constant\",\"strength\":0.2},") + light + "]",
+        "integrator.max_samples=32",
+        "integrator.min_samples=32",
+        "camera.position=[1,-4,3]",
+        "camera.target=[0,0,-1.6]"};
+    std::vector<std::string> weak = sets, none = sets;
+    weak.push_back("field.scale=1e-7");
+    none.insert(none.end(), {"bending.a=0", "bending.b=0"});
+    const Image with = picture(weak), without = picture(none);
+    EXPECT_GT(mean(without, "G"), 0.01);
+    for (const char* channel : {"R", "G", "B"})
+      EXPECT_NEAR(mean(with, channel) / mean(without, channel), 1, 0.02) << channel << light;
+    EXPECT_EQ(picture(weak, "1").pixels, with.pixels);
+  }
+}
+
+/// Where aim finds some of a lamp's light within a bending field, photons beside it do not change the mean, beside a
+/// plate there that stops light. Without its photons the lamp is found because it stops the rays that are followed
+/// back.
+TEST_F(WholeScene, ALampWithinTheFieldHasTheSameLightWithPhotons) {
+  const std::vector<std::string> sets{
+      "field.scale=0.5",
+      "objects=[{\"plate\":{\"center\":[0,0,-2.6],\"size\":[3,3]},\"material\":{\"kind\":\"diffuse\"}},"
+      "{\"plate\":{\"center\":[-0.5,0,-1.4],\"size\":[0.8,1.2]},\"material\":{\"kind\":\"diffuse\"}}]",
+      R"(lights=[{"kind":"area","center":[0.1,0.2,-0.5],"size":[0.5,0.5],"strength":10,"caustic":"photons"}])",
+      "integrator.bands=8",
+      "integrator.photons.per_pass=1024",
+      "integrator.max_samples=128",
+      "integrator.min_samples=128",
+      "integrator.max_depth=1",
+      R"(camera={"projection":"orthographic","position":[0,0.001,-2.2],"target":[0,0,-2.6],"height":2.4,)"
+      R"("resolution":[12,12]})"};
+  std::vector<std::string> none = sets;
+  none.push_back("integrator.photons.per_pass=0");
+  const Image with = picture(sets), without = picture(none);
+  EXPECT_NE(with.pixels, without.pixels);
+  EXPECT_GT(mean(without, "G"), 0.05);
+  for (const char* channel : {"R", "G", "B"})
+    EXPECT_NEAR(mean(with, channel) / mean(without, channel), 1, 0.03) << channel;
+}
+
+/// A plate along the light in the lower half of the volume, and one below the volume. Light that hardly bends meets
+/// their outer sides; light that bends more meets the inner ones. A flow map has one side.
+TEST_F(WholeScene, PlatesAlongTheLightAreLitOnBothSides) {
+  for (const double z : {-1.5, -2.4}) {
+    std::vector<double> automatic, map;
+    for (const double side : {-1.0, 1.0}) {
+      std::vector<std::string> sets{
+          fmt::format(R"(objects=[{{"plate":{{"center":[0,0.35,{}],"normal":[0,1,0],"size":[1.4,0.6]}}}}])", z),
+          R"(lights=[{"kind":"directional","direction":[0,-0.1,-1]}])",
+          "integrator.max_samples=16",
+          "integrator.min_samples=16",
+          "integrator.max_depth=1",
+          fmt::format("camera.position=[0,{},{}]", 4 * side, z),
+          fmt::format("camera.target=[0,0.35,{}]", z)};
+      automatic.push_back(mean(picture(sets), "R"));
+      sets.push_back("lights.0.caustic=map");
+      map.push_back(mean(picture(sets), "R"));
+    }
+    for (const double each : automatic) EXPECT_GT(each, 4e-4) << z;
+    EXPECT_LT(std::min(map[0] / automatic[0], map[1] / automatic[1]), 0.1) << z;
+  }
+}
+
+}  // namespace
+}  // namespace tensorray
