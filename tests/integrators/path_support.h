@@ -1,6 +1,6 @@
 #pragma once
 /// @file tests/integrators/path_support.h
-/// Paths that files must keep, for the tests of their formats.
+/// Paths that files must keep, and comparisons of paths.
 
 #include <random>
 #include <string>

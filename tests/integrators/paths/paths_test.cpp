@@ -12,6 +12,7 @@
 #include "integrators/tracing/trace.h"
 #include "renderer/surfaces/tube_mesh.h"
 #include "tests/base/team_support.h"
+#include "tests/integrators/path_support.h"
 #include "tests/integrators/support.h"
 
 namespace tensorray {
@@ -348,24 +349,7 @@ TEST(Paths, OfATeamAreThoseOfOneProcess) {
   std::size_t points = 0;
   for (const Path& path : alone) points += path.points.size();
   EXPECT_EQ(bytes, points * sizeof(PathPoint) + alone.size() * (sizeof(std::size_t) + 2 * sizeof(double) + 3));
-  for (const std::vector<Path>& each : paths) {
-    ASSERT_EQ(each.size(), alone.size());
-    for (std::size_t i = 0; i < alone.size(); ++i) {
-      EXPECT_EQ(each[i].wavelength, alone[i].wavelength);
-      EXPECT_EQ(each[i].flexibility, alone[i].flexibility);
-      EXPECT_EQ(each[i].end, alone[i].end);
-      EXPECT_EQ(each[i].backward_end, alone[i].backward_end);
-      ASSERT_EQ(each[i].points.size(), alone[i].points.size());
-      for (std::size_t k = 0; k < alone[i].points.size(); ++k) {
-        ASSERT_EQ(each[i].points[k].position, alone[i].points[k].position);
-        ASSERT_EQ(each[i].points[k].direction, alone[i].points[k].direction);
-        ASSERT_EQ(each[i].points[k].length, alone[i].points[k].length);
-        ASSERT_EQ(each[i].points[k].in_field, alone[i].points[k].in_field);
-        ASSERT_EQ(each[i].points[k].tensor, alone[i].points[k].tensor);
-        ASSERT_EQ(each[i].points[k].change, alone[i].points[k].change);
-      }
-    }
-  }
+  for (const std::vector<Path>& each : paths) expect_same(each, alone);
 }
 
 TEST(Paths, OnePathASeedInTheirOrder) {
