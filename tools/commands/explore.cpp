@@ -148,7 +148,8 @@ void for_each_cell(const ExploreOptions& options, const Progress& progress, cons
       const std::string scaled = fmt::format("field.scale={}", factors[row] * scale);
       std::vector<std::string> changes = quick;
       changes.insert(changes.end(),
-                     {direction, scaled, pixels, fmt::format("camera.resolution=[{0},{0}]", options.size)});
+                     {direction, scaled, pixels, fmt::format("camera.resolution=[{0},{0}]", options.size),
+                      fmt::format("integrator.stretch.pixels={}", options.size)});
       load(with(options, changes));
       visit(column, row, static_cast<int>(row * directions.size() + column) + 1, *scene,
             with(options, {direction, scaled}));

@@ -140,7 +140,7 @@ TEST_F(KeptWork, AKilledRenderContinuesToTheSameFiles) {
 TEST_F(KeptWork, KilledPlatesContinueToTheSameFiles) {
   for (const std::string& integrator : plate_integrators) {
     const bool is_mesh = integrator.find("density") == std::string::npos;
-    make(plate_scene(integrator, is_mesh ? 40000 : 400000).c_str());
+    make(plate_scene(integrator, is_mesh ? 40000 : 150000).c_str());
     EXPECT_EQ(end_by(SIGKILL, {"--threads", "1"}).status, 128 + SIGKILL) << integrator;
     const Outcome interrupted = end_by(SIGINT, {"--resume", "--threads", "1"});
     EXPECT_EQ(interrupted.status, 130) << integrator;
@@ -168,7 +168,7 @@ TEST_F(KeptWork, ARequestWritesAPictureAndTheRenderGoesOn) {
   for (const char* integrator : {R"({"type": "photon_distribution", "density": {"tolerance": 0.1}})",
                                  R"({"type": "photon_distribution", "density": {"kind": "gaussian", "tau": 2}})",
                                  R"({"type": "lens", "samples": 2})", R"({"type": "stretch"})"}) {
-    make(plate_scene(integrator, 400000).c_str());
+    make(plate_scene(integrator, 150000).c_str());
     SCOPED_TRACE(integrator);
     expect_picture_on_request();
   }
