@@ -130,33 +130,33 @@ float strongest_of(const float* brick) {
 }
 
 template <int components>
-void finish_bricks_of(const CoefficientBricks& bricks, const AlignedBox3i& extent, Border border,
-                      const CoefficientMemory& memory, std::vector<float>& strongest) {
-  const Extrapolation field{bricks, border, extent, memory};
-  tbb::parallel_for(std::size_t{0}, bricks.count, [&](std::size_t i) {
-    make_room();
-    const Vector3i& place = bricks.places[i];
-    for_apron([&](const Vector3i& offset, const Vector3i& first, const Vector3i& end) {
-      const std::uint32_t block = bricks.index.find(place + offset);
-      if (block != BrickIndex::missing) copy_part<components>(memory.brick(block), offset, first, end, memory.brick(i));
-    });
-    const AlignedBox3i covered(TensorBlock::size * place - Vector3i::Ones(),
-                               TensorBlock::size * place + Vector3i::Constant(TensorBlock::size + 1));
-    if (!extent.contains(covered)) extrapolate(field, place, i);
-    strongest[i] = strongest_of<components>(memory.brick(i));
+void finish_brick(const Extrapolation& field, std::size_t i, float& strongest) {
+  const Vector3i& place = field.bricks.places[i];
+  for_apron([&](const Vector3i& offset, const Vector3i& first, const Vector3i& end) {
+    const std::uint32_t block = field.bricks.index.find(place + offset);
+    if (block != BrickIndex::missing)
+      copy_part<components>(field.memory.brick(block), offset, first, end, field.memory.brick(i));
   });
+  const AlignedBox3i covered(TensorBlock::size * place - Vector3i::Ones(),
+                             TensorBlock::size * place + Vector3i::Constant(TensorBlock::size + 1));
+  if (!field.extent.contains(covered)) extrapolate(field, place, i);
+  strongest = strongest_of<components>(field.memory.brick(i));
 }
 
 }  // namespace
 
-std::vector<float> finish_bricks(const CoefficientBricks& bricks, const AlignedBox3i& extent, Border border,
-                                 const CoefficientMemory& memory) {
-  std::vector<float> strongest(bricks.count);
-  if (memory.components == TensorBrick::symmetric)
-    finish_bricks_of<TensorBrick::symmetric>(bricks, extent, border, memory, strongest);
-  else
-    finish_bricks_of<TensorBrick::general>(bricks, extent, border, memory, strongest);
-  return strongest;
+void finish_bricks(const CoefficientBricks& bricks, const BrickNumbers& numbers, const AlignedBox3i& extent,
+                   Border border, const CoefficientMemory& memory, std::vector<float>& strongest) {
+  const Extrapolation field{bricks, border, extent, memory};
+  tbb::parallel_for(std::size_t{0}, numbers.size(), [&](std::size_t i) {
+    const std::uint32_t brick = numbers[i];
+    if (brick >= bricks.count) return;
+    make_room();
+    if (memory.components == TensorBrick::symmetric)
+      finish_brick<TensorBrick::symmetric>(field, brick, strongest[brick]);
+    else
+      finish_brick<TensorBrick::general>(field, brick, strongest[brick]);
+  });
 }
 
 void widen_coefficients(const float* symmetric, float* general) {

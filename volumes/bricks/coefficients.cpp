@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <cstring>
+#include <limits>
+#include <map>
 #include <type_traits>
 
 #include <tbb/parallel_for.h>
@@ -205,30 +207,62 @@ Column column_of(const CoefficientBricks& bricks, std::size_t first, int axis) {
 }
 
 template <int components>
-void make_coefficients_of(const CoefficientBricks& bricks, const AlignedBox3i& extent, Border border,
-                          const CoefficientMemory& memory) {
-  for (int axis = 0; axis < 3; ++axis)
-    tbb::parallel_for(std::size_t{0}, bricks.places.size(), [&](std::size_t i) {
-      const Column column = column_of(bricks, i, axis);
-      if (column.bricks.empty()) return;
-      make_room();
-      const Runs runs{axis, edge * bricks.places[i][axis], edge * static_cast<int>(column.bricks.size()), extent,
-                      border};
-      if (axis == 2)
-        solve_along_z<components>(bricks, column, runs, memory);
-      else
-        solve_across<components>(bricks, column, runs, memory);
-    });
+void solve_columns(int axis, const CoefficientBricks& bricks, const BrickNumbers& numbers, const AlignedBox3i& extent,
+                   Border border, const CoefficientMemory& memory) {
+  tbb::parallel_for(std::size_t{0}, numbers.size(), [&](std::size_t i) {
+    const Column column = column_of(bricks, numbers[i], axis);
+    if (column.bricks.empty()) return;
+    make_room();
+    const int begin = edge * bricks.places[numbers[i]][axis], count = edge * static_cast<int>(column.bricks.size());
+    const Runs runs{axis, begin, count, extent, border};
+    if (axis == 2)
+      solve_along_z<components>(bricks, column, runs, memory);
+    else
+      solve_across<components>(bricks, column, runs, memory);
+  });
+}
+
+/// The bricks in slabs across x, each of at most `bytes` or with one place along x, in their order.
+std::vector<BrickNumbers> slabs_of(const CoefficientBricks& bricks, std::size_t bytes, std::size_t bytes_of_brick) {
+  std::map<int, BrickNumbers> by_x;
+  for (std::uint32_t i = 0; i < bricks.places.size(); ++i) by_x[bricks.places[i].x()].push_back(i);
+  std::vector<BrickNumbers> slabs;
+  for (const auto& [x, numbers] : by_x)
+    if (slabs.empty() || (slabs.back().size() + numbers.size()) * bytes_of_brick > bytes)
+      slabs.push_back(numbers);
+    else
+      slabs.back().insert(slabs.back().end(), numbers.begin(), numbers.end());
+  return slabs;
+}
+
+/// Three slabs are in use at a time: one is solved, and the one before it is finished with what it needs of a third.
+std::size_t bytes_of_slab() { return memory_bound() ? *memory_bound() / 12 : std::numeric_limits<std::size_t>::max(); }
+
+template <int components>
+std::vector<float> make_coefficients_of(const CoefficientBricks& bricks, const AlignedBox3i& extent, Border border,
+                                        const CoefficientMemory& memory) {
+  const auto solve = [&](int axis, const BrickNumbers& numbers) {
+    solve_columns<components>(axis, bricks, numbers, extent, border, memory);
+  };
+  const std::vector<BrickNumbers> slabs = slabs_of(bricks, bytes_of_slab(), memory.stride * sizeof(float));
+  std::vector<float> strongest(bricks.count);
+  for (const BrickNumbers& slab : slabs) solve(0, slab);
+  for (std::size_t i = 0; i < slabs.size(); ++i) {
+    solve(1, slabs[i]);
+    solve(2, slabs[i]);
+    if (i > 0) finish_bricks(bricks, slabs[i - 1], extent, border, memory, strongest);
+  }
+  finish_bricks(bricks, slabs.back(), extent, border, memory, strongest);
+  return strongest;
 }
 
 }  // namespace
 
-void make_coefficients(const CoefficientBricks& bricks, const AlignedBox3i& extent, Border border,
-                       const CoefficientMemory& memory) {
+std::vector<float> make_coefficients(const CoefficientBricks& bricks, const AlignedBox3i& extent, Border border,
+                                     const CoefficientMemory& memory) {
   if (memory.components == TensorBrick::symmetric)
-    make_coefficients_of<TensorBrick::symmetric>(bricks, extent, border, memory);
-  else
-    make_coefficients_of<TensorBrick::general>(bricks, extent, border, memory);
+    return make_coefficients_of<TensorBrick::symmetric>(bricks, extent, border, memory);
+  return make_coefficients_of<TensorBrick::general>(bricks, extent, border, memory);
 }
 
 }  // namespace tensorray

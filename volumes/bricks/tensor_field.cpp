@@ -111,8 +111,7 @@ double TensorField::make_cubic_bricks(const BlockTable& table, const Eigen::Alig
   });
   const CoefficientMemory memory{floats_.get(), brick_floats_, components_};
   continue_values(coefficients, interpolant_.border, memory);
-  make_coefficients(coefficients, active, interpolant_.border, memory);
-  const std::vector<float> strongest = finish_bricks(coefficients, active, interpolant_.border, memory);
+  const std::vector<float> strongest = make_coefficients(coefficients, active, interpolant_.border, memory);
   keep_bricks(coefficients.count);
   index_.set_values(strongest);
   return *std::max_element(norms.begin(), norms.end());
@@ -141,6 +140,7 @@ void TensorField::place_blocks(const BlockSource& source, const Place& place) {
       tbb::parallel_for(part, place_part);
     }
   }
+  expect_first_writes(floats_.get(), std::get_deleter<Release>(floats_)->bytes, false);
 }
 
 /// Replaces the bricks by those of tensors of any kind. `keep`: with the tensors that they hold.
@@ -166,6 +166,7 @@ void TensorField::allocate(int components) {
   const std::size_t bytes = bricks_.size() * brick_floats_ * sizeof(float);
   constexpr std::size_t alignment = 4096;
   floats_ = {static_cast<float*>(map_pages(bytes, alignment)), Release{bytes}};
+  expect_first_writes(floats_.get(), bytes, true);
 }
 
 /// Frees all bricks but the first ones.

@@ -208,6 +208,10 @@ void unmap_pages(void* memory, std::size_t bytes) noexcept {
   munmap(memory, bytes);
 }
 
+void expect_first_writes(void* memory, std::size_t bytes, bool expected) noexcept {
+  if (store) madvise(memory, bytes, expected ? MADV_RANDOM : MADV_NORMAL);
+}
+
 std::size_t shrink_pages(void* memory, std::size_t bytes, std::size_t kept) noexcept {
   const std::size_t page = static_cast<std::size_t>(sysconf(_SC_PAGESIZE));
   const std::size_t end = (kept + page - 1) / page * page;

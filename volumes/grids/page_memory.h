@@ -35,6 +35,11 @@ void* map_pages(std::size_t bytes, std::size_t alignment);
 
 void unmap_pages(void* memory, std::size_t bytes) noexcept;
 
+/// Tells whether the next writes to pages of `map_pages` are mostly the first ones. While they are, a page comes alone:
+/// file systems that keep pages in large groups take time for the whole group whenever one of its pages is first
+/// written. Otherwise a page brings its neighbours from the disk. Without a bound this has no effect.
+void expect_first_writes(void* memory, std::size_t bytes, bool expected) noexcept;
+
 /// Frees the pages behind the first `kept` bytes; pages of a file are kept whole.
 /// @return the number of bytes that `unmap_pages` then needs.
 std::size_t shrink_pages(void* memory, std::size_t bytes, std::size_t kept) noexcept;
