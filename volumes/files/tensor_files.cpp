@@ -84,12 +84,11 @@ std::set<std::string> grid_names(const FieldGrids& field) {
 }
 
 /// Checks that a field can be loaded within the bound of memory.
-void require_room_for(const std::vector<BlockShape>& shapes, std::size_t grids, bool derives) {
-  constexpr double voxel_bytes = 36, sample_bytes = 24, brick_part = 1.5, leaf_bytes = 700;
-  const double leaves = static_cast<double>(shapes.size() * grids);
+void require_room_for(const std::vector<BlockShape>& shapes, bool derives) {
+  constexpr double voxel_bytes = 36, sample_bytes = 24, brick_part = 1.5, table_bytes = 700;
   require_room((brick_part * voxel_bytes + (derives ? voxel_bytes + sample_bytes : 0)) *
                    static_cast<double>(active_voxels(shapes)),
-               leaf_bytes * leaves);
+               table_bytes * static_cast<double>(shapes.size()));
 }
 
 /// The tensors that are derived from the values of grids. All of them are in memory.
@@ -196,7 +195,7 @@ BlockSource open_tensor_vdb(const std::filesystem::path& path, const std::string
   try {
     result.shapes = find_blocks(path, grids, derives ? sizeof(SampleBlock) : least_brick_bytes);
     if (result.shapes.empty()) fail(path, "\"" + result.name + "\" has no active voxel");
-    require_room_for(result.shapes, grids.size(), derives);
+    require_room_for(result.shapes, derives);
     if (derives) return derived_source(path, grids, derive, result);
   } catch (const std::bad_alloc&) {
     fail_too_large(path, result.name);
