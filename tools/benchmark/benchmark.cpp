@@ -25,6 +25,7 @@ constexpr const char* description =
     "  jobs     whole renders, from scene file to picture, by phase, with one thread and with all\n"
     "  keeping  what checkpoints cost, and sums in a fixed order\n"
     "  caustics the error of the light on a plate, with the flow map and with photons\n"
+    "  interpolation  the error of a picture against the formula that its voxels sample, by interpolant and step\n"
     "  view     a live view: from a change to its first and its finished picture\n\n"
     "A sample is one look-up of a tensor, with the step that uses it. Numbers are medians of five repetitions; ratios "
     "are to the first row. A complete run takes about a quarter of an hour on two cores. Run no other programs at the "

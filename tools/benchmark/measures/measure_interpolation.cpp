@@ -18,14 +18,30 @@ struct KnownField {
   const char* name;
   Json generate, eigenvalues;
   double scale;
-  Json direction;
+  Json light, plate;
 };
 
+KnownField wholly_lit(const char* name, const char* kind, const Json& eigenvalues, double scale,
+                      const Json& direction) {
+  return {name, {{"kind", kind}}, eigenvalues, scale, {{"direction", direction}}, Json::object()};
+}
+
+/// A load in light that passes below it: it is singular where it acts, and the box ends a voxel below. Eigenvalues
+/// without their signs would draw the light up there.
+KnownField load(const char* name, Json generate) {
+  return {name,
+          std::move(generate),
+          "raw",
+          8,
+          {{"direction", {0, 1, 0}}, {"aperture", {{"center", {0, -1, -1}}, {"size", {1.6, 1.2}}}}},
+          {{"center", {0, 2, -1}}}};
+}
+
 std::vector<KnownField> fields() {
-  return {{"vortex", {{"kind", "vortex"}}, "raw", 0.75, {0, 1, -0.5}},
-          {"helix", {{"kind", "helix"}}, "absolute", 4, {0, 1, 0}},
-          {"two-point load", {{"kind", "two_point_load"}}, "absolute", 2, {0, 0, -1}},
-          {"point load", {{"kind", "point_load"}}, "absolute", 2, {0, 1, 0}}};
+  return {wholly_lit("vortex", "vortex", "raw", 0.75, {0, 1, -0.5}),
+          wholly_lit("helix", "helix", "absolute", 4, {0, 1, 0}), load("two-point load", {{"kind", "two_point_load"}}),
+          load("point load", {{"kind", "point_load"}}),
+          load("load on a disc", {{"kind", "point_load"}, {"radius", 0.3}})};
 }
 
 /// How a field is sampled and followed.
@@ -38,17 +54,17 @@ struct Variant {
 Json scene_of(const KnownField& field, const Variant& variant, double tolerance, int side) {
   Json generate = field.generate;
   generate["resolution"] = variant.voxels;
+  Json light = field.light, plate = field.plate;
+  light.update({{"photons", 1u << 24}, {"wavelengths", {{"min", 550}, {"max", 551}, {"count", 1}}}});
+  plate.update({{"size", {3.2, 3.2}}, {"resolution", {side, side}}});
   return {{"field",
            {{"generate", generate},
             {"eigenvalues", field.eigenvalues},
             {"scale", field.scale},
             {"interpolation", variant.interpolation}}},
           {"bending", {{"method", variant.method}, {"step", variant.step}}},
-          {"light",
-           {{"direction", field.direction},
-            {"photons", 1u << 24},
-            {"wavelengths", {{"min", 550}, {"max", 551}, {"count", 1}}}}},
-          {"receiver", {{"size", {3.2, 3.2}}, {"resolution", {side, side}}}},
+          {"light", light},
+          {"receiver", plate},
           {"integrator", {{"type", "photon_distribution"}, {"density", {{"kind", "mesh"}, {"tolerance", tolerance}}}}}};
 }
 
