@@ -10,6 +10,7 @@
 #include <sys/mman.h>
 
 #include "base/files/descriptor.h"
+#include "base/files/temporary_folder.h"
 #include "base/text/path_text.h"
 #include "integrators/path_files/path_formats.h"
 #include "integrators/seeds/seed_files.h"
@@ -140,7 +141,16 @@ void read_lattice(const std::string& bytes, Lattice (*open)(const std::filesyste
 
 void read_npy(const std::string& bytes) { read_lattice(bytes, open_npy); }
 void read_nrrd(const std::string& bytes) { read_lattice(bytes, open_nrrd); }
-void read_nifti(const std::string& bytes) { read_lattice(bytes, open_nifti); }
+void read_nifti(const std::string& bytes) {
+  read_lattice(bytes, [](const std::filesystem::path& path) {
+    // The library reads only files with this ending.
+    static const TemporaryFolder folder;
+    const std::filesystem::path named = folder / "fuzz.nii";
+    std::filesystem::remove(named);
+    std::filesystem::create_symlink(path, named);
+    return open_nifti(named);
+  });
+}
 void read_mrtrix(const std::string& bytes) { read_lattice(bytes, open_mrtrix); }
 void read_metaimage(const std::string& bytes) { read_lattice(bytes, open_metaimage); }
 
