@@ -40,6 +40,23 @@ class WholeScene : public Program {
     return sum / image.width / image.height;
   }
 
+  /// The changes, and a field so weak that light hardly bends.
+  static std::vector<std::string> weakened(std::vector<std::string> sets) {
+    sets.push_back("field.scale=1e-7");
+    return sets;
+  }
+
+  /// A weak field gives the mean colours of a scene in which nothing bends, though light is found in other ways.
+  /// @return the picture with the weak field.
+  Image expect_weak_as_none(const std::vector<std::string>& sets, double tolerance = 0.02) {
+    std::vector<std::string> none = sets;
+    none.insert(none.end(), {"bending.a=0", "bending.b=0"});
+    const Image with = picture(weakened(sets)), without = picture(none);
+    for (const char* channel : {"R", "G", "B"})
+      EXPECT_NEAR(mean(with, channel) / mean(without, channel), 1, tolerance) << channel;
+    return with;
+  }
+
   /// A wedge with a roof's slopes, whose ridge is at (x, y, z).
   void write_roof(const std::string& name, double x, double y, double z) {
     std::string text =

@@ -236,6 +236,7 @@ std::vector<BrickNumbers> slabs_of(const CoefficientBricks& bricks, std::size_t 
 }
 
 /// Three slabs are in use at a time: one is solved, and the one before it is finished with what it needs of a third.
+/// They may take a quarter of the bound.
 std::size_t bytes_of_slab() { return memory_bound() ? *memory_bound() / 12 : std::numeric_limits<std::size_t>::max(); }
 
 template <int components>

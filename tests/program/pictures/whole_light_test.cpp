@@ -112,15 +112,10 @@ TEST_F(WholeScene, AWeakFieldLightsPlatesWithinTheVolume) {
       "integrator.max_depth=1",
       "camera.position=[1,-3,2]",
       "camera.target=[0,0,-0.6]"};
-  std::vector<std::string> weak = sets, none = sets;
-  weak.push_back("field.scale=1e-7");
-  none.insert(none.end(), {"bending.a=0", "bending.b=0"});
-  const Image with = picture(weak), without = picture(none);
+  const Image with = expect_weak_as_none(sets);
   EXPECT_GT(mean(with, "caustic.G"), 0.9 * mean(with, "G"));
-  for (const char* channel : {"R", "G", "B"})
-    EXPECT_NEAR(mean(with, channel) / mean(without, channel), 1, 0.02) << channel;
-  EXPECT_EQ(picture(weak, "1").pixels, with.pixels);
-  EXPECT_EQ(picture(weak, "7").pixels, with.pixels);
+  EXPECT_EQ(picture(weakened(sets), "1").pixels, with.pixels);
+  EXPECT_EQ(picture(weakened(sets), "7").pixels, with.pixels);
 }
 
 /// A point within the volume, and lamps there, of which the large one has no photons, light a plate below and one
@@ -137,14 +132,10 @@ TEST_F(WholeScene, AWeakFieldIsLitFromWithinAsIfItWereNotThere) {
         "integrator.min_samples=32",
         "camera.position=[1,-4,3]",
         "camera.target=[0,0,-1.6]"};
-    std::vector<std::string> weak = sets, none = sets;
-    weak.push_back("field.scale=1e-7");
-    none.insert(none.end(), {"bending.a=0", "bending.b=0"});
-    const Image with = picture(weak), without = picture(none);
-    EXPECT_GT(mean(without, "G"), 0.01);
-    for (const char* channel : {"R", "G", "B"})
-      EXPECT_NEAR(mean(with, channel) / mean(without, channel), 1, 0.02) << channel << light;
-    EXPECT_EQ(picture(weak, "1").pixels, with.pixels);
+    SCOPED_TRACE(light);
+    const Image with = expect_weak_as_none(sets);
+    EXPECT_GT(mean(with, "G"), 0.01);
+    EXPECT_EQ(picture(weakened(sets), "1").pixels, with.pixels);
   }
 }
 
