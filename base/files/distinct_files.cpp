@@ -28,18 +28,22 @@ Identity identity_of(const fs::path& path) {
   return {0, 0, target.lexically_normal().string()};
 }
 
-/// Whether `path` exists and is neither a regular file nor a folder.
+}  // namespace
+
 bool is_device(const fs::path& path) {
   struct stat status {};
   return stat(path.c_str(), &status) == 0 && !S_ISREG(status.st_mode) && !S_ISDIR(status.st_mode);
 }
 
-}  // namespace
-
 void require_distinct_files(const std::vector<NamedFile>& inputs, const std::vector<NamedFile>& outputs) {
   std::map<Identity, std::string> taken;
-  for (const NamedFile& input : inputs)
-    if (!input.path.empty()) taken.emplace(identity_of(input.path), input.name);
+  for (const NamedFile& input : inputs) {
+    if (input.path.empty()) continue;
+    if (is_device(input.path))
+      throw std::invalid_argument(input.name + " (" + input.path.string() +
+                                  ") is a pipe or a device; write what it gives to a file");
+    taken.emplace(identity_of(input.path), input.name);
+  }
   for (const NamedFile& output : outputs) {
     if (output.path.empty() || is_device(output.path)) continue;
     const auto [other, is_new] = taken.emplace(identity_of(output.path), output.name);

@@ -14,9 +14,14 @@ struct NamedFile {
   std::string name;            ///< How an error names the file: "`/field/file`", "--stats".
 };
 
+/// Whether a path leads to what is neither a file nor a folder: a pipe, a device or a socket. To open it may take for
+/// ever.
+bool is_device(const std::filesystem::path& path);
+
 /// Compares files by device and inode, after following links. A file that does not exist yet is compared by its folder
 /// and name. Several outputs may go to the same device or pipe, one after the other.
-/// @throw std::invalid_argument that names both files, if an output is the same file as an input or another output.
+/// @throw std::invalid_argument that names both files, if an output is the same file as an input or another output; or
+/// if an input is a device.
 void require_distinct_files(const std::vector<NamedFile>& inputs, const std::vector<NamedFile>& outputs);
 
 }  // namespace tensorray

@@ -9,8 +9,10 @@
 namespace tensorray {
 
 std::vector<NamedFile> input_files(const SceneDescription& scene) {
-  std::vector<NamedFile> files{
-      {scene.path, "the scene file"}, {scene.field.file, "`/field/file`"}, {scene.field.bounds, "`/field/bounds`"}};
+  std::vector<NamedFile> files;
+  if (!is_device(scene.path)) files.push_back({scene.path, "the scene file"});  // A scene may come through a pipe.
+  files.push_back({scene.field.file, "`/field/file`"});
+  files.push_back({scene.field.bounds, "`/field/bounds`"});
   const char* const environment = std::getenv("OCIO");  // It counts only where the scene names no config.
   const bool is_own = !scene.output.ocio.empty();
   const std::string config = is_own ? scene.output.ocio : environment ? environment : "";

@@ -104,6 +104,7 @@ std::vector<int> parse_frames(const std::string& text) {
   std::string rest = text;
   std::vector<int> frames;
   std::unordered_set<int> seen;
+  long named = 0;  // Also those that are named again, so that a short text does not take long.
   do {
     const long first = take_number(rest);
     const long last = take(rest, '-') ? take_number(rest) : first;
@@ -112,7 +113,8 @@ std::vector<int> parse_frames(const std::string& text) {
     if (!is_range)
       throw std::invalid_argument("--frames " + printable(text) +
                                   ": give frames such as 7, 1-240, 1-240x2, or a list of these, 1,3,7-9");
-    if ((last - first) / step >= most_frames - static_cast<long>(frames.size()))
+    named += (last - first) / step + 1;
+    if (named > most_frames)
       throw std::invalid_argument("--frames " + printable(text) + ": more than a million frames");
     for (long frame = first; frame <= last; frame += step)
       if (seen.insert(static_cast<int>(frame)).second) frames.push_back(static_cast<int>(frame));

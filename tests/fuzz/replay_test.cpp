@@ -37,6 +37,15 @@ TEST_P(Replay, NoBytesBreakAParser) {
   EXPECT_GT(files, 0u) << target.name;
 }
 
+/// A fuzzer that has no accepted bytes to begin with sees little of its parser.
+TEST_P(Replay, AParserAcceptsSomeOfItsBytes) {
+  const FuzzTarget& target = fuzz_targets()[GetParam()];
+  std::size_t accepted = 0;
+  for (const auto& entry : std::filesystem::directory_iterator(corpus() / target.name))
+    if (target.read(bytes_of(entry.path()))) ++accepted;
+  EXPECT_GT(accepted, 0u) << target.name;
+}
+
 INSTANTIATE_TEST_SUITE_P(Targets, Replay, ::testing::Range(std::size_t{0}, fuzz_targets().size()),
                          [](const auto& test) { return std::string(fuzz_targets()[test.param].name); });
 

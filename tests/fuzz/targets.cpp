@@ -1,6 +1,7 @@
 #include "tests/fuzz/targets.h"
 
 #include <cstdint>
+#include <fstream>
 #include <new>
 #include <optional>
 #include <sstream>
@@ -50,50 +51,63 @@ class MemoryFile {
   Descriptor file_;
 };
 
-/// Calls `read`. Errors of the kinds that readers report are fine, if they are one line.
+/// Calls `read`. Errors of the kinds that readers report are fine, if they are one line. @return whether there is none.
 template <class Read>
-void expect_one_line(const Read& read) {
+bool expect_one_line(const Read& read) {
   try {
     read();
+    return true;
   } catch (const std::runtime_error& error) {
     if (std::string(error.what()).find('\n') != std::string::npos) throw std::logic_error(error.what());
   } catch (const std::invalid_argument& error) {
     if (std::string(error.what()).find('\n') != std::string::npos) throw std::logic_error(error.what());
   }
+  return false;
+}
+
+/// A link to a file, with a name, in a folder of its own.
+std::filesystem::path named(const std::filesystem::path& path, const std::string& name) {
+  static const TemporaryFolder folder;
+  const std::filesystem::path link = folder / name;
+  std::filesystem::remove(link);
+  std::filesystem::create_symlink(path, link);
+  return link;
 }
 
 template <class Read>
-void read_file(const std::string& bytes, const Read& read) {
+bool read_file(const std::string& bytes, const Read& read) {
   const MemoryFile file(bytes);
-  expect_one_line([&] { read(file.path()); });
+  return expect_one_line([&] { read(file.path()); });
 }
 
-void read_scene_file(const std::string& bytes) {
-  read_file(bytes, [](const std::filesystem::path& path) { read_scene_json(read_json_object(path), "scene.json"); });
+bool read_scene_file(const std::string& bytes) {
+  return read_file(bytes,
+                   [](const std::filesystem::path& path) { read_scene_json(read_json_object(path), "scene.json"); });
 }
 
 /// Lines of KEY=VALUE.
-void read_overrides(const std::string& bytes) {
+bool read_overrides(const std::string& bytes) {
   Json scene = Json::object();
   std::istringstream lines(bytes);
-  for (std::string line; std::getline(lines, line);) expect_one_line([&] { apply_override(scene, line); });
-  expect_one_line([&] { set_frame(scene, 7, {"scene.json"}); });
-  expect_one_line([&] { read_scene_json(scene, "scene.json"); });
+  bool are_right = true;
+  for (std::string line; std::getline(lines, line);) are_right &= expect_one_line([&] { apply_override(scene, line); });
+  are_right &= expect_one_line([&] { set_frame(scene, 7, {"scene.json"}); });
+  return expect_one_line([&] { read_scene_json(scene, "scene.json"); }) && are_right;
 }
 
-void read_frames(const std::string& bytes) {
-  expect_one_line([&] { parse_frames(bytes); });
+bool read_frames(const std::string& bytes) {
   numbered(bytes, 7);
   if (bytes_of_utf8(utf8_of(bytes)) != bytes) throw std::logic_error("a path does not come back");
+  return expect_one_line([&] { parse_frames(bytes); });
 }
 
-void read_seeds_and_spectrum(const std::string& bytes) {
-  read_file(bytes, [](const std::filesystem::path& path) { read_seeds(path); });
-  read_file(bytes, [](const std::filesystem::path& path) { read_spectrum(path); });
+bool read_seeds_and_spectrum(const std::string& bytes) {
+  const bool are_seeds = read_file(bytes, [](const std::filesystem::path& path) { read_seeds(path); });
+  return read_file(bytes, [](const std::filesystem::path& path) { read_spectrum(path); }) || are_seeds;
 }
 
-void read_kept_work(const std::string& bytes) {
-  read_file(bytes, [](const std::filesystem::path& path) { read_work(path); });
+bool read_kept_work(const std::string& bytes) {
+  return read_file(bytes, [](const std::filesystem::path& path) { read_work(path); });
 }
 
 /// Each vertex has a normal or none has, and triangles name vertices that are there.
@@ -105,33 +119,34 @@ void require_whole(const MeshWithNormals& mesh) {
       if (vertex >= count) throw std::logic_error("a vertex is missing");
 }
 
-void read_ply_mesh(const std::string& bytes) {
-  read_file(bytes, [](const std::filesystem::path& path) { require_whole(read_ply(path)); });
+bool read_ply_mesh(const std::string& bytes) {
+  return read_file(bytes, [](const std::filesystem::path& path) { require_whole(read_ply(path)); });
 }
 
-void read_obj_mesh(const std::string& bytes) {
-  read_file(bytes, [](const std::filesystem::path& path) { require_whole(read_obj(path)); });
+bool read_obj_mesh(const std::string& bytes) {
+  return read_file(bytes, [](const std::filesystem::path& path) { require_whole(read_obj(path)); });
 }
 
 /// For grey pictures, too.
-void read_profile(const std::string& bytes) {
-  for (const bool grey : {false, true}) expect_one_line([&] { parse_icc_profile(bytes, grey); });
+bool read_profile(const std::string& bytes) {
+  const bool is_grey = expect_one_line([&] { parse_icc_profile(bytes, true); });
+  return expect_one_line([&] { parse_icc_profile(bytes, false); }) || is_grey;
 }
 
-void read_png_tags(const std::string& bytes) {
-  read_file(bytes, [](const std::filesystem::path& path) {
+bool read_png_tags(const std::string& bytes) {
+  return read_file(bytes, [](const std::filesystem::path& path) {
     ColorTags tags;
     add_png_tags(path, tags);
   });
 }
 
-void read_tck(const std::string& bytes) {
-  read_file(bytes, [](const std::filesystem::path& path) { read_tck_paths(path); });
+bool read_tck(const std::string& bytes) {
+  return read_file(bytes, [](const std::filesystem::path& path) { read_tck_paths(path); });
 }
 
 /// The values of all slices, too.
-void read_lattice(const std::string& bytes, Lattice (*open)(const std::filesystem::path&)) {
-  read_file(bytes, [open](const std::filesystem::path& path) {
+bool read_lattice(const std::string& bytes, Lattice (*open)(const std::filesystem::path&)) {
+  return read_file(bytes, [open](const std::filesystem::path& path) {
     const Lattice lattice = open(path);
     std::vector<double> values(static_cast<std::size_t>(lattice.size.x()) * static_cast<std::size_t>(lattice.size.y()) *
                                static_cast<std::size_t>(lattice.components));
@@ -139,55 +154,50 @@ void read_lattice(const std::string& bytes, Lattice (*open)(const std::filesyste
   });
 }
 
-void read_npy(const std::string& bytes) { read_lattice(bytes, open_npy); }
-void read_nrrd(const std::string& bytes) { read_lattice(bytes, open_nrrd); }
-void read_nifti(const std::string& bytes) {
-  read_lattice(bytes, [](const std::filesystem::path& path) {
-    // The library reads only files with this ending.
-    static const TemporaryFolder folder;
-    const std::filesystem::path named = folder / "fuzz.nii";
-    std::filesystem::remove(named);
-    std::filesystem::create_symlink(path, named);
-    return open_nifti(named);
-  });
+bool read_npy(const std::string& bytes) { return read_lattice(bytes, open_npy); }
+bool read_nrrd(const std::string& bytes) { return read_lattice(bytes, open_nrrd); }
+bool read_nifti(const std::string& bytes) {  // The library reads only files with this ending.
+  return read_lattice(bytes, [](const std::filesystem::path& path) { return open_nifti(named(path, "fuzz.nii")); });
 }
-void read_mrtrix(const std::string& bytes) { read_lattice(bytes, open_mrtrix); }
-void read_metaimage(const std::string& bytes) { read_lattice(bytes, open_metaimage); }
+bool read_mrtrix(const std::string& bytes) { return read_lattice(bytes, open_mrtrix); }
+bool read_metaimage(const std::string& bytes) { return read_lattice(bytes, open_metaimage); }
 
 /// All numbers that stand in the document itself.
-void read_xdmf(const std::string& bytes) {
-  read_file(bytes, [](const std::filesystem::path& path) {
+bool read_xdmf(const std::string& bytes) {
+  return read_file(bytes, [](const std::filesystem::path& path) {
     const VtkMessages messages;
     const XdmfDocument document(path);
     for (int step = 0; step < document.steps(); ++step)
       for (vtkXMLDataElement* const grid : document.grids(step))
         for (vtkXMLDataElement* const part : document.children(*grid, {"Topology", "Geometry", "Attribute"}))
-          for (vtkXMLDataElement* const item : document.children(*part, {"DataItem"}))
-            expect_one_line([&] { xdmf_values(document, *item); });
+          for (vtkXMLDataElement* const item : document.children(*part, {"DataItem"})) xdmf_values(document, *item);
   });
 }
 
-void read_ensight(const std::string& bytes) {
-  read_file(bytes, [](const std::filesystem::path& path) {
-    for (const std::optional<double> time : {std::optional<double>(), std::optional<double>(1)})
-      expect_one_line([&] { ensight_case(path, time); });
+/// Beside the case there are files that it may name.
+bool read_ensight(const std::string& bytes) {
+  return read_file(bytes, [](const std::filesystem::path& path) {
+    const std::filesystem::path file = named(path, "fuzz.case");
+    for (const char* other : {"a.0.geo", "a.0.sym", "a.0.gen", "a.1.geo"}) std::ofstream(file.parent_path() / other);
+    expect_one_line([&] { ensight_case(file, 1); });
+    ensight_case(file, std::nullopt);
   });
 }
 
-void read_plot3d(const std::string& bytes) {
-  read_file(bytes, [](const std::filesystem::path& path) {
+bool read_plot3d(const std::string& bytes) {
+  return read_file(bytes, [](const std::filesystem::path& path) {
     const Plot3dLayout layout = plot3d_grid_layout(path);
-    plot3d_q_layout(path, layout.size);
+    expect_one_line([&] { plot3d_q_layout(path, layout.size); });
   });
 }
 
-void read_netcdf(const std::string& bytes) {
-  read_file(bytes, [](const std::filesystem::path& path) { netcdf_size(path); });
+bool read_netcdf(const std::string& bytes) {
+  return read_file(bytes, [](const std::filesystem::path& path) { netcdf_size(path); });
 }
 
 /// The first byte chooses how the file stores its tree.
-void read_vdb_tree(const std::string& bytes) {
-  if (bytes.empty()) return;
+bool read_vdb_tree(const std::string& bytes) {
+  if (bytes.empty()) return false;
   const char* const types[] = {"Tree_vec3s_5_4_3", "Tree_float_5_4_3", "Tree_double_5_4_3", "Tree_vec3d_5_4_3"};
   const auto choice = static_cast<unsigned char>(bytes[0]);
   const StoredTree tree{types[choice & 3], (choice & 4) != 0, (choice & 8) != 0, (choice & 16) != 0,
@@ -195,10 +205,10 @@ void read_vdb_tree(const std::string& bytes) {
   const MemoryFile file(bytes.substr(1));
   const FileBytes content(file.path());
   std::vector<StoredLeaf> leaves;
-  tree_fits(content, 0, tree, leaves);
+  return tree_fits(content, 0, tree, leaves) && !leaves.empty();
 }
 
-void read_vdb_table(const std::string& bytes) { delayed_load_fits(bytes, std::int64_t{1} << 30); }
+bool read_vdb_table(const std::string& bytes) { return delayed_load_fits(bytes, std::int64_t{1} << 30); }
 
 }  // namespace
 

@@ -10,9 +10,10 @@ namespace tensorray::test {
 
 struct FuzzTarget {
   const char* name;
-  /// Reads the bytes. An error that the reader reports is fine. @throw std::logic_error if it is not one line, or is no
-  /// kind of error that run_and_report puts into words; whatever else the reader throws.
-  void (*read)(const std::string& bytes);
+  /// Reads the bytes. An error that the reader reports is fine. @return whether there is none. @throw std::logic_error
+  /// if it is not one line, or is no kind of error that run_and_report puts into words; whatever else the reader
+  /// throws.
+  bool (*read)(const std::string& bytes);
 };
 
 const std::vector<FuzzTarget>& fuzz_targets();

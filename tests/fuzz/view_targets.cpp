@@ -67,10 +67,14 @@ std::string replaced(std::string text, const std::string& what, const std::strin
 
 }  // namespace
 
-void read_http(const std::string& bytes) {
+bool read_http(const std::string& bytes) {
   const std::string port = view().port();
   asio::io_context context;
-  tcp::socket socket(context);
+  tcp::socket socket(context, tcp::v4());
+  // Of one address, a port may not be used again for a minute: ports would come to an end.
+  static std::uint32_t connections = 0;
+  const std::uint32_t address = 0x7F000100u + connections++ % 0xFFFFu;
+  socket.bind({asio::ip::address_v4(address), 0});
   socket.connect({asio::ip::make_address("127.0.0.1"), static_cast<std::uint16_t>(std::stoi(port))});
   boost::system::error_code ignored;  // The server may end the connection at any time.
   asio::write(socket, asio::buffer(replaced(bytes, "PORT", port)), ignored);
@@ -79,18 +83,22 @@ void read_http(const std::string& bytes) {
   asio::read(socket, asio::dynamic_buffer(answer), ignored);
   if (!answer.empty() && answer.compare(0, 9, "HTTP/1.1 ") != 0 && answer.compare(0, 9, "HTTP/1.0 ") != 0)
     throw std::logic_error("this is no answer of HTTP: " + answer.substr(0, 100));
+  const std::string status = answer.substr(0, 12);
+  return status == "HTTP/1.1 200" || status == "HTTP/1.1 101";
 }
 
-void read_page_message(const std::string& bytes) {
+bool read_page_message(const std::string& bytes) {
   struct Answer {
     std::mutex mutex;
     std::condition_variable arrived;
-    bool is_there = false;
+    bool is_there = false, has_error = false;
   };
   const auto answer = std::make_shared<Answer>();  // A message may come after the page was closed.
   const Pages::Id id = view().pages().open([answer](const PageMessage& message) {
     const std::lock_guard<std::mutex> lock(answer->mutex);
-    answer->is_there |= received(message).json.value("id", Json()) == "the last message";
+    const Json json = received(message).json;
+    answer->is_there |= json.value("id", Json()) == "the last message";
+    answer->has_error |= json.value("type", Json()) == "error";
     answer->arrived.notify_all();
   });
   view().pages().receive(id, bytes);
@@ -100,6 +108,8 @@ void read_page_message(const std::string& bytes) {
     answer->arrived.wait(lock, [&] { return answer->is_there; });
   }
   view().pages().close(id);
+  const std::lock_guard<std::mutex> lock(answer->mutex);
+  return !answer->has_error;
 }
 
 }  // namespace tensorray::test

@@ -7,6 +7,8 @@
 #include <string>
 #include <vector>
 
+#include <sys/stat.h>
+
 #include "scenes/description/run_files.h"
 #include "tests/scenes/read_scene_fixture.h"
 
@@ -90,6 +92,23 @@ TEST_F(ReadScene, NoOutputTakesThePlaceOfAnInput) {
   EXPECT_EQ(input_files(scene).size(), 10u) << "a new kind of input belongs into this test";
   EXPECT_NO_THROW(check_files(scene, {{folder_ / "new.json", "--stats"}}));
   EXPECT_NO_THROW(check_files(scene, {{"/dev/stdout", "--stats"}}));
+
+  // To open a pipe may take for ever. Only the scene itself may come through one.
+  for (const NamedFile& input : input_files(scene)) {
+    if (!fs::exists(input.path)) continue;
+    const fs::path aside = folder_ / "aside";
+    fs::rename(input.path, aside);
+    ASSERT_EQ(mkfifo(input.path.c_str(), 0600), 0);
+    std::string refusal;
+    try {
+      check_files(scene, {});
+    } catch (const SceneError& error) {
+      refusal = error.what();
+    }
+    EXPECT_EQ(refusal.find("is a pipe or a device") != std::string::npos, input.path != scene.path) << input.name;
+    fs::remove(input.path);
+    fs::rename(aside, input.path);
+  }
 }
 
 /// A config that is not read is no input, which its file would have to exist for.

@@ -5,6 +5,7 @@
 
 #include <fmt/format.h>
 
+#include "base/files/distinct_files.h"
 #include "base/text/path_text.h"
 #include "base/text/text.h"
 #include "scenes/description/run_files.h"
@@ -22,12 +23,6 @@ void check_scene_copy(const std::filesystem::path& scene, const std::filesystem:
   if (folder(scene) != folder(copy))
     throw SceneError(printable(fmt::format("{} {}: must be in the folder of {}, to which paths in it are relative",
                                            scene_key, copy.string(), scene.string())));
-}
-
-bool is_device(const std::filesystem::path& file) {
-  std::error_code error;
-  const std::filesystem::file_status status = std::filesystem::status(file, error);
-  return std::filesystem::exists(status) && !std::filesystem::is_regular_file(status);
 }
 
 }  // namespace

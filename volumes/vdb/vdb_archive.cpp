@@ -18,6 +18,7 @@
 #include <tbb/parallel_for.h>
 
 #include "base/errors.h"
+#include "base/files/distinct_files.h"
 #include "base/text/byte_order.h"
 #include "base/text/content_hash.h"
 #include "base/text/text.h"
@@ -53,6 +54,7 @@ class Reader : private openvdb::io::Archive {
  public:
   explicit Reader(const std::filesystem::path& path) : path_(path), buffer_(stream_buffer) {
     if (std::filesystem::is_directory(path)) fail(path, "is a folder; name an OpenVDB file");
+    if (is_device(path)) fail(path, "is a pipe or a device; write what it gives to a file");
     in_.rdbuf()->pubsetbuf(buffer_.data(), static_cast<std::streamsize>(buffer_.size()));
     errno = 0;
     in_.open(path, std::ios::binary);

@@ -73,7 +73,7 @@ void find_processors(OpenFoamParts& parts) {
 
 void check_mesh(const fs::path& mesh) {
   for (const char* name : {"points", "faces", "owner", "neighbour"})
-    if (!fs::exists(mesh / name) && !fs::exists((mesh / name).string() + ".gz"))
+    if (!fs::is_regular_file(mesh / name) && !fs::is_regular_file((mesh / name).string() + ".gz"))
       fail(mesh / name, "is missing; run blockMesh again");
 }
 
@@ -198,7 +198,7 @@ void split_folder(const fs::path& from, const fs::path& relative, int first, con
 
 OpenFoamParts openfoam_parts(const fs::path& path, const fs::path& folder) {
   OpenFoamParts parts{fs::absolute(folder), {}, false, {}};
-  if (!fs::exists(folder / "system" / "controlDict"))
+  if (!fs::is_regular_file(folder / "system" / "controlDict"))
     fail(path, "is no OpenFOAM case: " + (folder / "system/controlDict").string() + " is missing");
   std::vector<fs::path> meshes = meshes_in(folder);
   parts.times = times_in(folder);

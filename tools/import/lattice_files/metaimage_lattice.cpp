@@ -149,11 +149,11 @@ Lattice open_metaimage(const Path& path) {
   RawPlace place = place_of(header);
   const double skipped = header.numbers({"HeaderSize"}, {0})[0];
   const double bytes = lattice.size.cast<double>().prod() * channels * voxels.type.bytes;
-  std::error_code none;
+  std::error_code none;  // What is missing is read_numbers' to say.
+  const std::uintmax_t size = std::filesystem::file_size(place.file, none);
   if (skipped > 0) place.offset += static_cast<std::uint64_t>(std::min(skipped, 1e15));
-  if (skipped < 0 && !place.is_compressed)  // The numbers are at the end of the file.
-    place.offset = static_cast<std::uint64_t>(
-        std::max(0.0, static_cast<double>(std::filesystem::file_size(place.file, none)) - bytes));
+  if (skipped < 0 && !place.is_compressed && !none)  // The numbers are at the end of the file.
+    place.offset = static_cast<std::uint64_t>(std::max(0.0, static_cast<double>(size) - bytes));
   voxels.order = header.is_true({"BinaryDataByteOrderMSB", "ElementByteOrderMSB"}) ? ByteOrder::big : ByteOrder::little;
   voxels.bytes = read_numbers(path, place, voxels.type, lattice.size, lattice.components);
   const std::int64_t n = lattice.components, nx = lattice.size.x(), ny = lattice.size.y();

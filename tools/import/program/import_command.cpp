@@ -197,8 +197,11 @@ void import_all_steps(ImportOptions options, ImportSettings settings, Progress& 
 
 void import(const ImportOptions& options, Progress& progress) {
   ImportSettings settings = settings_of(options);
-  for (const std::filesystem::path& file : settings.files)
+  for (const std::filesystem::path& file : settings.files) {
     if (!std::filesystem::exists(file)) throw std::runtime_error(file.string() + " does not exist");
+    if (is_device(file))
+      throw std::runtime_error(file.string() + " is a pipe or a device; write what it gives to a file");
+  }
   if (options.steps == "all") return import_all_steps(options, settings, progress);
   int step = 1;
   if (options.steps != "last" && options.steps != "first" &&
