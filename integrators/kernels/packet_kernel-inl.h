@@ -41,6 +41,7 @@ class Kernel {
   void fill(Packet& packet);
   void enter(Packet& packet, int lane);
   static void copy_lane(const Packet& from, int of, Packet& to, int lane);
+  static void copy_end(const Packet& from, int of, Packet& to, int lane);
   void compact(Packet& packet);
   void step_split(Packet& packet);
   void step_watched(Packet& packet);
@@ -71,7 +72,8 @@ class Kernel {
   std::size_t next_ = 0;  // The first ray that no packet has held yet.
   std::uint64_t samples_ = 0;
   Packet packets_[in_flight];
-  Packet leaving_[in_flight];  // Rays of these packets that leave the extent, as they were before their last step.
+  /// Rays of these packets that leave the extent, as they were before their last step, and the end of that step.
+  Packet leaving_[in_flight];
 };
 
 /// Copies a ray into a lane.
@@ -116,6 +118,16 @@ void Kernel<Bricks, uniform, differentials, changes>::copy_lane(const Packet& fr
   to.time[lane] = from.time[of];
   to.wanted[lane] = from.wanted[of];
   to.ray[lane] = from.ray[of];
+}
+
+/// Copies the end of a lane's step.
+template <class Bricks, bool uniform, bool differentials, bool changes>
+void Kernel<Bricks, uniform, differentials, changes>::copy_end(const Packet& from, int of, Packet& to, int lane) {
+  for (int axis = 0; axis < 3; ++axis) {
+    to.p_next[axis][lane] = from.p_next[axis][of];
+    to.v_next[axis][lane] = from.v_next[axis][of];
+    if constexpr (!uniform) to.u_next[axis][lane] = from.u_next[axis][of];
+  }
 }
 
 /// Moves the remaining rays to the front if that frees a vector. The other lanes repeat one of these rays.
@@ -267,7 +279,9 @@ HWY_NOINLINE void Kernel<Bricks, uniform, differentials, changes>::retire(Packet
     ray.steps += packet.steps;
     packet.alive &= ~(1u << lane);
     if (!(leave >> lane & 1)) continue;
-    copy_lane(packet, lane, leaving, static_cast<int>(hwy::PopCount(leaving.alive)));
+    const int to = static_cast<int>(hwy::PopCount(leaving.alive));
+    copy_lane(packet, lane, leaving, to);
+    copy_end(packet, lane, leaving, to);
     leaving.alive = leaving.alive << 1 | 1;
   }
 }
@@ -392,10 +406,11 @@ HWY_NOINLINE void Kernel<Bricks, uniform, differentials, changes>::step_otherwis
 template <class Bricks, bool uniform, bool differentials, bool changes>
 HWY_NOINLINE void Kernel<Bricks, uniform, differentials, changes>::land(Packet& packet) {
   packet.vectors = packet_rays / lanes;
+  for (int lane = static_cast<int>(hwy::PopCount(packet.alive)); lane < packet_rays; ++lane)
+    copy_end(packet, 0, packet, lane);
   compact(packet);
   packet.clamps = true;
   FaceLanding landing;
-  attempt(packet);
   aim(medium_, packet, landing);
   if (is_composed()) aim_along_path<uniform>(medium_, packet, landing);
   for (int n = 0; n < landing_count(); ++n) {
@@ -423,7 +438,7 @@ void Kernel<Bricks, uniform, differentials, changes>::arrive(Packet& packet, con
     ray.length += double{packet.time[lane]} * to_world();
     if constexpr (changes) ray.log_radiance_scale += packet.change_of_step[lane];
     ++ray.steps;
-    samples_ += (1 + landing_count()) * samples_per_step();
+    samples_ += landing_count() * samples_per_step();
   }
   packet.alive = 0;
 }

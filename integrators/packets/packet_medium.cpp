@@ -46,15 +46,21 @@ PacketMedium::PacketMedium(const TensorField& field_, const KernelSettings& sett
     last_inner[axis] = static_cast<std::int32_t>(std::floor((last[axis] - margin_of_steps) / TensorBrick::cells)) - 1;
     if (clamps) first_inner[axis] = last_inner[axis] + 1;
   }
+  find_bricks_near_surfaces(margin_of_steps);
   bounded = std::isfinite(settings.max_length);
 }
 
-bool PacketMedium::near_surface(const std::int32_t at[3]) const {
-  if (!settings.meets_surface) return false;
-  const Eigen::Vector3d first_voxel = TensorBrick::cells * Eigen::Vector3d(at[0], at[1], at[2]);
-  const Eigen::Vector3d margin_around = Eigen::Vector3d::Constant(longest_step + 1);
-  return settings.surfaces.intersects(
-      {first_voxel - margin_around, first_voxel + Eigen::Vector3d::Constant(TensorBrick::cells) + margin_around});
+void PacketMedium::find_bricks_near_surfaces(double margin_of_steps) {
+  constexpr double cells = TensorBrick::cells, most = 1e8;
+  for (int axis = 0; axis < 3; ++axis) {
+    first_near[axis] = 1;
+    last_near[axis] = 0;
+    if (!settings.meets_surface) continue;
+    const double first = settings.surfaces.min()[axis] - margin_of_steps - cells;
+    const double last = settings.surfaces.max()[axis] + margin_of_steps;
+    first_near[axis] = static_cast<std::int32_t>(std::clamp(std::ceil(first / cells), -most, most));
+    last_near[axis] = static_cast<std::int32_t>(std::clamp(std::floor(last / cells), -most, most));
+  }
 }
 
 bool PacketMedium::meets_surface(const Eigen::Vector3d& from, const Eigen::Vector3d& to) const {

@@ -48,6 +48,7 @@ struct PacketMedium {
   float to_index[3][3];
   std::int32_t first[3], last[3];              // First and last voxels of the extent.
   std::int32_t first_inner[3], last_inner[3];  // No step from these bricks may leave the extent. May be none.
+  std::int32_t first_near[3], last_near[3];    // Bricks from which a step may meet a surface. May be none.
   float margin[3];     // Distance of the extent's faces from these voxels: ½ on an axis of a single voxel, else 0.
   bool flat;           // Whether an axis has a single voxel.
   float slope[3];      // 0 along axes with a single voxel, 1 along the others.
@@ -58,8 +59,16 @@ struct PacketMedium {
   bool bounded;               // Whether the limit of length may end rays within the field.
 
   TensorBrick brick(const std::int32_t at[3]) const { return field.brick({at[0], at[1], at[2]}); }
-  bool near_surface(const std::int32_t at[3]) const;
+  /// Whether a step from a brick may meet a surface.
+  bool near_surface(const std::int32_t at[3]) const {
+    bool near = true;
+    for (int axis = 0; axis < 3; ++axis) near &= at[axis] >= first_near[axis] && at[axis] <= last_near[axis];
+    return near;
+  }
   bool meets_surface(const Eigen::Vector3d& from, const Eigen::Vector3d& to) const;
+
+ private:
+  void find_bricks_near_surfaces(double margin_of_steps);
 };
 
 /// Λ of a kick that is too strong for a series in single precision.

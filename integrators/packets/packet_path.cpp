@@ -2,7 +2,7 @@
 
 #include <cmath>
 
-#include <Eigen/Core>
+#include <Eigen/Geometry>
 
 #include "integrators/steps/composition.h"
 
@@ -31,6 +31,15 @@ struct LaneStep {
 
   double voxels() const { return time * from_direction.norm(); }
 
+  /// A box around the path, of the control points of its Bézier curve, with a margin for rounding.
+  Eigen::AlignedBox3d bounds() const {
+    constexpr double margin = 0.01;  // Voxels.
+    Eigen::AlignedBox3d box(from.cwiseMin(to), from.cwiseMax(to));
+    box.extend(from + time / 3 * from_direction).extend(to - time / 3 * to_direction);
+    return {origin + box.min() - Eigen::Vector3d::Constant(margin),
+            origin + box.max() + Eigen::Vector3d::Constant(margin)};
+  }
+
   /// The combination of its ends with the weights of path_weights, or of path_slopes.
   Eigen::Vector3d at(const PathWeights& w) const {
     return w.from * from + w.to * to + time * (w.from_direction * from_direction + w.to_direction * to_direction);
@@ -41,6 +50,7 @@ struct LaneStep {
 
 bool step_meets_surface(const PacketMedium& medium, const Packet& packet, int lane) {
   const LaneStep step(medium, packet, lane);
+  if (!medium.settings.surfaces.intersects(step.bounds())) return false;
   const int count = medium.composed ? chords_of(step.voxels(), step.turn) : 1;
   Eigen::Vector3d begin = step.from;
   for (int i = 1; i <= count; ++i) {

@@ -9,6 +9,8 @@
 #define TENSORRAY_INTEGRATORS_PACKET_SPLINES_TOGGLE
 #endif
 
+#include <type_traits>
+
 #include <hwy/highway.h>
 
 #include "integrators/packets/packet_cells-inl.h"
@@ -68,38 +70,43 @@ struct Four {
 
 #if HWY_ARCH_X86 && HWY_TARGET <= HWY_AVX3
 template <int components>
+using Far = std::conditional_t<components == TensorBrick::general, Floats, Eight>;
+
+template <int components>
 struct Row {
-  F near, far;
+  F near;
+  hn::Vec<Far<components>> far;
 };
 
 template <int components>
 HWY_INLINE Row<components> empty_row() {
-  return {hn::Zero(floats), hn::Zero(floats)};
+  return {hn::Zero(floats), hn::Zero(Far<components>())};
 }
 
 template <int components>
 HWY_INLINE Row<components> load_row(const float* from) {
   return {hn::LoadU(floats, from),
-          hn::LoadU(floats, from + (components == TensorBrick::general ? 16 : 3 * components))};
+          hn::LoadU(Far<components>(), from + (components == TensorBrick::general ? 16 : 3 * components))};
 }
 
 template <int components>
 HWY_INLINE Row<components> add_row(float weight, const Row<components>& row, const Row<components>& to) {
-  const F w = set(weight);
-  return {hn::MulAdd(w, row.near, to.near), hn::MulAdd(w, row.far, to.far)};
+  return {hn::MulAdd(set(weight), row.near, to.near), hn::MulAdd(hn::Set(Far<components>(), weight), row.far, to.far)};
 }
 
 template <int components>
 HWY_INLINE Four four_of(const Row<components>& row) {
   const auto lower = [](F v) HWY_ATTR { return hn::LowerHalf(eight, v); };
-  if constexpr (components == TensorBrick::general)
+  if constexpr (components == TensorBrick::general) {
     return {{lower(row.near), hn::UpperHalf(eight, row.near), lower(row.far), hn::UpperHalf(eight, row.far)}};
-  alignas(64) constexpr std::int32_t from[2][16] = {{5, 6, 7, 8, 9, 5, 5, 5, 5, 5, 5, 5, 5, 5, 5, 5},
-                                                    {10, 11, 12, 13, 14, 5, 5, 5, 5, 5, 5, 5, 5, 5, 5, 5}};
-  const auto moved = [&](int i) HWY_ATTR {
-    return lower(hn::TableLookupLanes(row.near, hn::SetTableIndices(floats, from[i])));
-  };
-  return {{lower(row.near), moved(0), moved(1), lower(row.far)}};
+  } else {
+    alignas(64) constexpr std::int32_t from[2][16] = {{5, 6, 7, 8, 9, 5, 5, 5, 5, 5, 5, 5, 5, 5, 5, 5},
+                                                      {10, 11, 12, 13, 14, 5, 5, 5, 5, 5, 5, 5, 5, 5, 5, 5}};
+    const auto moved = [&](int i) HWY_ATTR {
+      return lower(hn::TableLookupLanes(row.near, hn::SetTableIndices(floats, from[i])));
+    };
+    return {{lower(row.near), moved(0), moved(1), row.far}};
+  }
 }
 #else
 /// Whether the vectors of a row follow each other without gaps, but for the last one, which is the last coefficient.
