@@ -27,7 +27,7 @@ struct Sizes {
   double margin;   // Distance from the edges of the picture.
 
   explicit Sizes(const Image& image)
-      : letter(std::max(11.0, 0.024 * image.height)),
+      : letter(std::max(11.0, 0.024 * std::min(image.width, image.height))),
         line(std::max(2.0, std::round(letter / 7))),
         outline(std::max(1.0, letter / 11)),
         margin(std::round(letter)) {}
