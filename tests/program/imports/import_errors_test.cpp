@@ -111,6 +111,10 @@ TEST_F(ImportErrors, FilesThatAreSomethingElse) {
   write("flat.npy", npy_header("12, 14, 18, 4") + std::string(12 * 14 * 18 * 4 * 4, 'a'));
   refuses({"flat.npy"}, 1, {"flat.npy"});
   refuses({"missing.vti"}, 1, {"missing.vti", "does not exist"});
+  for (const char* pipe : {"pipe.vti", "pipe.npy", "pipe.vdb"}) {
+    ASSERT_EQ(mkfifo(in_folder(pipe).c_str(), 0600), 0);
+    refuses({pipe}, 1, {pipe, "is a pipe or a device"});
+  }
   std::filesystem::create_directory(in_folder("folder"));
   refuses({"folder"}, 1, {"folder", "OpenFOAM"});
 }

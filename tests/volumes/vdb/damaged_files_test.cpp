@@ -194,6 +194,7 @@ TEST(DamagedFiles, NotVdbFiles) {
   };
   expect(Temporary("missing.vdb"), "No such file");
   expect(testing::TempDir(), "is a folder");
+  expect("/dev/zero", "is a pipe or a device");
   write_bytes(path, "");
   expect(path, "not an OpenVDB file");
   write_bytes(path, "{ \"field\": \"this is text, and long enough for a header of OpenVDB, or so one thinks\" }\n");
