@@ -13,8 +13,8 @@ namespace tensorray {
 
 /// The frames of "7", "1-240", "1-240x2" (every second one), or of a list of these, "1,3,7-9": in this order, each
 /// once; from 0 to 10^9.
-/// @throw std::invalid_argument if the text does not have that form, or names more than a million frames, where one that
-/// is named twice counts twice.
+/// @throw std::invalid_argument if the text does not have that form, or names more than a million frames, where one
+/// that is named twice counts twice.
 std::vector<int> parse_frames(const std::string& text);
 
 /// Replaces, everywhere in a scene, keyframes by their value at a frame, and # in texts (also %04d and $F4, see

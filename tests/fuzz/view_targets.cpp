@@ -75,8 +75,9 @@ bool read_http(const std::string& bytes) {
   static std::uint32_t connections = 0;
   const std::uint32_t address = 0x7F000100u + connections++ % 0xFFFFu;
   socket.bind({asio::ip::address_v4(address), 0});
-  socket.connect({asio::ip::make_address("127.0.0.1"), static_cast<std::uint16_t>(std::stoi(port))});
   boost::system::error_code ignored;  // The server may end the connection at any time.
+  socket.connect({asio::ip::make_address("127.0.0.1"), static_cast<std::uint16_t>(std::stoi(port))}, ignored);
+  if (ignored) return false;  // The fuzzer's clock has interrupted it.
   asio::write(socket, asio::buffer(replaced(bytes, "PORT", port)), ignored);
   socket.shutdown(tcp::socket::shutdown_send, ignored);
   std::string answer;

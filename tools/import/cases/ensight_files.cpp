@@ -196,7 +196,8 @@ EnSightCase ensight_case(const fs::path& path, std::optional<double> time) {
     if (!is_model && (entry.section != "VARIABLE" || components_of(entry.name) == 0)) continue;
     const fs::path name = file_of(entry, sets, time), file = path.parent_path() / name;
     if (name.empty()) continue;
-    if (!fs::is_regular_file(file)) fail(file, "is missing, which " + path.filename().string() + " names; copy it there too");
+    if (!fs::is_regular_file(file))
+      fail(file, "is missing, which " + path.filename().string() + " names; copy it there too");
     result.files.push_back({entry.name, file});
   }
   check_file_sets(entries, result);
