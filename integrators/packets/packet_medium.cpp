@@ -56,10 +56,10 @@ void PacketMedium::find_bricks_near_surfaces(double margin_of_steps) {
     first_near[axis] = 1;
     last_near[axis] = 0;
     if (!settings.meets_surface) continue;
-    const double first = settings.surfaces.min()[axis] - margin_of_steps - cells;
-    const double last = settings.surfaces.max()[axis] + margin_of_steps;
-    first_near[axis] = static_cast<std::int32_t>(std::clamp(std::ceil(first / cells), -most, most));
-    last_near[axis] = static_cast<std::int32_t>(std::clamp(std::floor(last / cells), -most, most));
+    const double low = settings.surfaces.min()[axis] - margin_of_steps - cells;
+    const double high = settings.surfaces.max()[axis] + margin_of_steps;
+    first_near[axis] = static_cast<std::int32_t>(std::clamp(std::ceil(low / cells), -most, most));
+    last_near[axis] = static_cast<std::int32_t>(std::clamp(std::floor(high / cells), -most, most));
   }
 }
 
