@@ -10,6 +10,7 @@ from paraview.util.vtkAlgorithm import VTKPythonAlgorithmBase, smdomain, smprope
 from vtkmodules.util import numpy_support
 from vtkmodules.vtkCommonCore import vtkPoints
 from vtkmodules.vtkCommonDataModel import vtkCellArray, vtkDataObject, vtkPolyData, vtkStructuredGrid
+from vtkmodules.vtkCommonExecutionModel import vtkStreamingDemandDrivenPipeline
 
 import tensorray as tr
 
@@ -189,6 +190,21 @@ class BentLight(VTKPythonAlgorithmBase):
     def SetSamplingResolution(self, count):
         """Voxels along the longest side, for data that are not an image."""
         self._set("_resolution", count)
+
+    def RequestInformation(self, request, inputs, outputs):
+        """Says how large the plate is: without it, VTK takes the extent of an image that comes in for the plate's."""
+        whole = vtkStreamingDemandDrivenPipeline.WHOLE_EXTENT()
+        outputs.GetInformationObject(1).Set(whole, 0, self._pixels, 0, self._pixels, 0, 0)
+        return 1
+
+    def RequestUpdateExtent(self, request, inputs, outputs):
+        """Asks for all of an image, whatever part of the plate is asked for."""
+        whole = vtkStreamingDemandDrivenPipeline.WHOLE_EXTENT()
+        data = inputs[0].GetInformationObject(0)
+        if data.Has(whole):
+            extent = [data.Get(whole, i) for i in range(6)]
+            data.Set(vtkStreamingDemandDrivenPipeline.UPDATE_EXTENT(), *extent)
+        return 1
 
     def RequestData(self, request, inputs, outputs):
         blocks = blocks_of(vtkDataObject.GetData(inputs[0]))
