@@ -97,6 +97,8 @@ class AddOnTest(unittest.TestCase):
         self.assertGreater(np.ptp(colors.reshape(-1, 4)[:, :3], axis=0).min(), 0.3)
 
     def test_renders_from_its_camera(self):
+        with open(self.path, "w", encoding="utf-8") as file:
+            json.dump({**self.scene, "camera": {"direction": [1, 1, -1]}}, file)  # Blender's camera takes its place.
         bpy.ops.import_scene.tensorray(filepath=self.path, tubes=False, plate=False, bodies=False)
         camera = bpy.context.scene.camera
         camera.location, camera.rotation_euler = (0, -6, 0), (np.pi / 2, 0, 0)

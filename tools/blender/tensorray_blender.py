@@ -256,8 +256,8 @@ def camera_changes(scene):
     place = np.array(camera.matrix_world)
     position, forward, up = place[:3, 3], -place[:3, 2], place[:3, 1]
     size = [max(1, side * render.resolution_percentage // 100) for side in (render.resolution_x, render.resolution_y)]
-    changes = {"camera.position": position.tolist(), "camera.target": (position + forward).tolist(),
-               "camera.up": up.tolist(), "camera.resolution": size}
+    changes = {"camera.direction": None, "camera.position": position.tolist(),
+               "camera.target": (position + forward).tolist(), "camera.up": up.tolist(), "camera.resolution": size}
     if camera.data.type == "ORTHO":
         height = camera.data.ortho_scale * size[1] / max(size)
         return {**changes, "camera.projection": "orthographic", "camera.height": height}
