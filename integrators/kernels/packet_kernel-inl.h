@@ -248,10 +248,9 @@ HWY_NOINLINE std::uint32_t Kernel<Bricks, uniform, differentials, changes>::spen
 /// Moves the middles of steps that lie outside the extent to the nearest points on it, where the tensor is that of the
 /// outermost voxels. Light may turn back into the extent from there.
 template <class Bricks, bool uniform, bool differentials, bool changes>
-HWY_NOINLINE void Kernel<Bricks, uniform, differentials, changes>::locate_on_extent(Packet& packet) {
+void Kernel<Bricks, uniform, differentials, changes>::locate_on_extent(Packet& packet) {
   packet.clamps = true;
-  locate_middles<Bricks, uniform, differentials>(medium_, packet);
-  interpolate<Bricks, uniform, differentials>(packet);
+  sample_middles<Bricks, uniform, differentials>(medium_, packet);
   packet.clamps = medium_.clamps;
 }
 
@@ -387,8 +386,7 @@ void Kernel<Bricks, uniform, differentials, changes>::attempt(Packet& packet) {
     if (medium_.settings.method == BendingMethod::euler)
       return step_by_euler<Bricks, uniform, differentials, changes>(medium_, packet);
   }
-  locate_middles<Bricks, uniform, differentials>(medium_, packet);
-  interpolate<Bricks, uniform, differentials>(packet);
+  sample_middles<Bricks, uniform, differentials>(medium_, packet);
   take_step<Bricks, uniform, differentials, changes>(medium_, packet, packet.p_next, packet.v_next, packet.u_next);
 }
 

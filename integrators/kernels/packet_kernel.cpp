@@ -19,17 +19,20 @@
 HWY_BEFORE_NAMESPACE();
 namespace tensorray::packets::HWY_NAMESPACE {
 
-template <class Bricks, bool differentials, bool changes>
-std::uint64_t trace_as(const PacketMedium& medium, KernelRays& batch) {
-  return medium.uniform ? Kernel<Bricks, true, differentials, changes>(medium, batch).run()
-                        : Kernel<Bricks, false, differentials, changes>(medium, batch).run();
-}
-
+/// More kernels would be a little faster, but take longer to compile. Most fields have voxels that are cubes along the
+/// axes; where others do, and where there are no vectors, one kernel always computes the change of radiance.
 template <class Bricks>
 std::uint64_t trace_components(const PacketMedium& medium, KernelRays& batch) {
-  if (!batch.differentials.empty()) return trace_as<Bricks, true, false>(medium, batch);
-  return batch.wants_log_radiance_scale ? trace_as<Bricks, false, true>(medium, batch)
-                                        : trace_as<Bricks, false, false>(medium, batch);
+  constexpr bool has_vectors = HWY_TARGET != HWY_SCALAR;
+  const bool differentials = !batch.differentials.empty();
+  if constexpr (has_vectors) {
+    if (medium.uniform && differentials) return Kernel<Bricks, true, true, false>(medium, batch).run();
+    if (medium.uniform)
+      return batch.wants_log_radiance_scale ? Kernel<Bricks, true, false, true>(medium, batch).run()
+                                            : Kernel<Bricks, true, false, false>(medium, batch).run();
+  }
+  return differentials ? Kernel<Bricks, false, true, false>(medium, batch).run()
+                       : Kernel<Bricks, false, false, true>(medium, batch).run();
 }
 
 std::uint64_t trace(const PacketMedium& medium, KernelRays& batch) {
@@ -86,8 +89,11 @@ struct WithoutDenormals {};
 
 }  // namespace
 
+int lane_count() { return KERNEL_DISPATCH(vector_lanes)(); }
+
 std::uint64_t run(const TensorField& field, const KernelSettings& settings, KernelRays& batch) {
-  const PacketMedium medium(field, settings);
+  PacketMedium medium(field, settings);
+  medium.uniform &= lane_count() > 1;
   [[maybe_unused]] const WithoutDenormals guard;
   return field.is_cubic() ? trace_cubic(medium, batch) : KERNEL_DISPATCH(trace)(medium, batch);
 }
@@ -116,8 +122,6 @@ void use_instruction_set(const std::string& name) {
   prefers_avx2 = name.empty() && is_zen4();
   hwy::SetSupportedTargetsForTest(name.empty() ? 0 : *found);
 }
-
-int lane_count() { return KERNEL_DISPATCH(vector_lanes)(); }
 
 }  // namespace tensorray::packets
 #endif

@@ -229,6 +229,13 @@ HWY_INLINE void interpolate(Packet& packet) {
   }
 }
 
+/// The first two parts of a step, where it is not among the most frequent ones: compiled once for all who need it.
+template <class Bricks, bool uniform, bool differentials>
+HWY_NOINLINE void sample_middles(const PacketMedium& medium, Packet& packet) {
+  locate_middles<Bricks, uniform, differentials>(medium, packet);
+  interpolate<Bricks, uniform, differentials>(packet);
+}
+
 /// A change of position, without its components along axes of a single voxel, where the tensor does not change.
 HWY_INLINE F3 along_slopes(const PacketMedium& medium, const F3& dp) {
   return {hn::Mul(dp.x, set(medium.slope[0])), hn::Mul(dp.y, set(medium.slope[1])),

@@ -88,6 +88,9 @@ class Method {
   /// Whether the pixels of its pictures are those of the plate.
   virtual bool shows_plate() const { return false; }
 
+  /// Whether `light.direction` has an effect on the picture.
+  virtual bool needs_light_direction(const SceneDescription&) const { return true; }
+
   /// The view of a display that suits its pictures, if the scene names none (ColorSettings::preferred_view).
   virtual std::string preferred_view() const { return {}; }
 

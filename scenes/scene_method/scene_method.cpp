@@ -241,6 +241,13 @@ class SceneMethod : public MethodWith<SceneMethodDescription> {
   bool is_sampled() const override { return true; }
   bool is_divided() const override { return true; }
 
+  /// The sun of a scene without `lights` shines along it, paths begin with it, and the automatic scale is for it.
+  bool needs_light_direction(const SceneDescription& scene) const override {
+    return scene.default_lights || !scene.field.scale ||
+           std::any_of(scene.objects.begin(), scene.objects.end(),
+                       [](const ObjectDescription& object) { return object.paths.has_value(); });
+  }
+
   std::vector<Output> outputs() const override {
     std::vector<Output> outputs = picture_outputs();
     outputs.push_back(spectral_output());
@@ -308,6 +315,10 @@ void SceneMethod::check(SceneDescription& scene, const Json& json, const SceneSo
   if (given(json, "/integrator/conserve") && given(json, "/integrator/max_gain") &&
       settings().conserve == Conserve::radiance)
     scene.warnings.push_back("`/integrator/max_gain` has no effect where radiance is conserved");
+  if (given(json, "/light/direction") && !needs_light_direction(scene))
+    scene.warnings.push_back(
+        "`/light/direction` has no effect: the light is that of `/lights`, there are no `paths`, and "
+        "`/field/scale` is given");
 }
 
 }  // namespace

@@ -360,6 +360,22 @@ TEST_F(ReadScene, Warnings) {
   EXPECT_THAT(read({"bending.rgb=[1,2,3]", "light.wavelengths.count=4"}).warnings.at(0), HasSubstr("no effect"));
 }
 
+TEST_F(ReadScene, WarnsWhereTheDirectionOfTheLightHasNoEffect) {
+  const auto warns = [this](Overrides overrides, const std::string& rest) {
+    overrides.insert(overrides.end(), {"integrator.type=scene", "light.direction=[0,1,0]"});
+    const std::vector<std::string> warnings = read(overrides, "{" + rest + "}").warnings;
+    return std::any_of(warnings.begin(), warnings.end(), [](const std::string& warning) {
+      return warning.find("`/light/direction` has no effect") != std::string::npos;
+    });
+  };
+  const std::string lights = R"("field": {"generate": {"kind": "vortex"}, "scale": 2}, "lights": [{"kind": "constant"}])";
+  EXPECT_TRUE(warns({}, lights));
+  EXPECT_FALSE(warns({"field.scale=auto"}, lights)) << "the scale is for this light";
+  EXPECT_FALSE(warns({"lights=null"}, lights)) << "the sun shines along it";
+  EXPECT_FALSE(warns({R"(objects=[{"paths":{},"material":{"kind":"diffuse"}}])"}, lights)) << "paths begin with it";
+  EXPECT_FALSE(warns({"integrator.type=path_tracing"}, lights));
+}
+
 TEST_F(ReadScene, SyntaxErrorsHaveAPosition) {
   const std::string file = (folder_ / "scene.json").string();
   EXPECT_THAT(error({}, "{\n  \"seed\": 1,\n  \"field\" {}\n}"), HasSubstr(file + ": line 3, column 11: "));
