@@ -191,25 +191,22 @@ std::optional<BlockShare> place(const TensorBlock& block, const std::array<float
 }
 
 template <int components>
-std::optional<double> place_own(const TensorBlock& block, float* brick) {
+std::optional<double> place_own(const TensorBlock& block, float* values) {
   BlockVoxels voxels;
   const auto [norm, is_symmetric] = convert<components>(block, voxels);
   if (components == TensorBrick::symmetric && !is_symmetric) return std::nullopt;
-  for (int i = 0; i < TensorBlock::voxels; i += cells) {
-    const int to = CubicBrick::coefficient(i / cells / cells, i / cells % cells, 0);
-    for (int z = 0; z < cells; ++z)
-      std::memcpy(brick + CubicBrick::bending_offset(components, to + z),
-                  voxels.bending + block_offset<components>(i + z), components * sizeof(float));
-    std::memcpy(brick + CubicBrick::trailing_offset(components) + to, voxels.trailing + i, cells * sizeof(float));
-  }
+  for (int i = 0; i < TensorBlock::voxels; ++i)
+    std::memcpy(values + CoefficientBlock::bending_offset(components, i), voxels.bending + block_offset<components>(i),
+                components * sizeof(float));
+  std::memcpy(values + CoefficientBlock::trailing_offset(components), voxels.trailing, sizeof voxels.trailing);
   return squared_norm(norm, block);
 }
 
 }  // namespace
 
-std::optional<double> place_values(const TensorBlock& block, int components, float* brick) {
-  return components == TensorBrick::symmetric ? place_own<TensorBrick::symmetric>(block, brick)
-                                              : place_own<TensorBrick::general>(block, brick);
+std::optional<double> place_values(const TensorBlock& block, int components, float* values) {
+  return components == TensorBrick::symmetric ? place_own<TensorBrick::symmetric>(block, values)
+                                              : place_own<TensorBrick::general>(block, values);
 }
 
 BlockTable::BlockTable(const std::vector<BlockShape>& all) : shapes(all) {

@@ -62,9 +62,9 @@ struct BlockShare {
 std::optional<BlockShare> place_block(const TensorBlock& block, int components,
                                       const std::array<float*, bricks_of_block>& bricks);
 
-/// Copies the voxels of a block to the brick at its place in the layout of CubicBrick. @return the greatest squared
-/// norm of a tensor; nothing, and leaves the brick as it is, if the brick is symmetric and the block is not.
-std::optional<double> place_values(const TensorBlock& block, int components, float* brick);
+/// Copies the voxels of a block to the layout of CoefficientBlock. @return the greatest squared norm of a tensor;
+/// nothing, and leaves the copy as it is, if that is of symmetric tensors and the block is not.
+std::optional<double> place_values(const TensorBlock& block, int components, float* values);
 
 /// Copies a brick of symmetric tensors to one of tensors of any kind.
 void widen_brick(const float* symmetric, float* general);

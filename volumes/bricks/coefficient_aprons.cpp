@@ -1,4 +1,4 @@
-// `finish_bricks` and `widen_coefficients` of coefficients.h.
+// `finish_bricks` of coefficients.h.
 
 #include <algorithm>
 #include <cmath>
@@ -15,74 +15,67 @@ namespace {
 using Eigen::AlignedBox3i;
 using Eigen::Vector3i;
 
-/// The coefficients of voxels within the extent, and their extrapolation.
-struct Extrapolation {
-  const CoefficientBricks& bricks;
-  const Border border;
-  const AlignedBox3i& extent;
-  const CoefficientMemory& memory;
+StoredTensor beyond(const Coefficients& field, Vector3i index, int axis, int face, int inward);
 
-  /// The coefficient at any index.
-  StoredTensor at(const Vector3i& index) const {
-    for (int axis = 0; axis < 3; ++axis) {
-      const int low = extent.min()[axis], high = extent.max()[axis];
-      if (index[axis] >= low && index[axis] <= high) continue;
-      return beyond(index, axis, index[axis] < low ? low : high, index[axis] < low ? 1 : -1);
-    }
-    const auto voxel = find_voxel(bricks, bricks.filled, index);
-    return voxel ? read_coefficient(memory, *voxel) : StoredTensor(StoredTensor::Zero());
+/// The coefficient at any index.
+StoredTensor coefficient_at(const Coefficients& field, const Vector3i& index) {
+  for (int axis = 0; axis < 3; ++axis) {
+    const int low = field.extent.min()[axis], high = field.extent.max()[axis];
+    if (index[axis] >= low && index[axis] <= high) continue;
+    return beyond(field, index, axis, index[axis] < low ? low : high, index[axis] < low ? 1 : -1);
   }
+  const auto voxel = find_voxel(field.bricks, field.bricks.filled, index);
+  return voxel ? read_coefficient(field.blocks, *voxel) : StoredTensor(StoredTensor::Zero());
+}
 
-  /// One voxel beyond a face of the extent: the polynomial that `solve_run` takes coefficients for.
-  StoredTensor beyond(Vector3i index, int axis, int face, int inward) const {
-    constexpr float weights[5][4] = {{}, {1}, {2, -1}, {3, -3, 1}, {4, -6, 4, -1}};
-    const int size = extent.max()[axis] - extent.min()[axis] + 1;
-    int run = 0;
-    for (Vector3i along = index.cwiseMax(extent.min()).cwiseMin(extent.max()); run < 4; ++run) {
-      along[axis] = face + run * inward;
-      if (!find_voxel(bricks, bricks.filled, along)) break;
-    }
-    const bool is_parabola = run == 3 && (size == 3 || border == Border::extend);  // Both ends of the run continue.
-    const int terms = size == 1 ? 1 : run < 3 ? 2 : is_parabola ? 3 : 4;
-    StoredTensor sum = StoredTensor::Zero();
-    for (int i = 0; i < terms; ++i) {
-      index[axis] = face + i * inward;
-      sum += weights[terms][i] * at(index);
-    }
-    return sum;
+/// One voxel beyond a face of the extent: the polynomial that `solve_run` takes coefficients for.
+StoredTensor beyond(const Coefficients& field, Vector3i index, int axis, int face, int inward) {
+  constexpr float weights[5][4] = {{}, {1}, {2, -1}, {3, -3, 1}, {4, -6, 4, -1}};
+  const AlignedBox3i& extent = field.extent;
+  const int size = extent.max()[axis] - extent.min()[axis] + 1;
+  int run = 0;
+  for (Vector3i along = index.cwiseMax(extent.min()).cwiseMin(extent.max()); run < 4; ++run) {
+    along[axis] = face + run * inward;
+    if (!find_voxel(field.bricks, field.bricks.filled, along)) break;
   }
-};
+  const bool is_parabola = run == 3 && (size == 3 || field.border == Border::extend);  // Both ends of the run continue.
+  const int terms = size == 1 ? 1 : run < 3 ? 2 : is_parabola ? 3 : 4;
+  StoredTensor sum = StoredTensor::Zero();
+  for (int i = 0; i < terms; ++i) {
+    index[axis] = face + i * inward;
+    sum += weights[terms][i] * coefficient_at(field, index);
+  }
+  return sum;
+}
 
-/// Calls visit(neighbour, first, end) for the parts of a brick's apron: the block that it belongs to, and the range of
-/// its voxels in the brick.
+/// Calls visit(neighbour, first, end) for the parts of a brick: the block that it belongs to, and the range of its
+/// voxels in the brick.
 template <class Visit>
-void for_apron(const Visit& visit) {
+void for_parts(const Visit& visit) {
   const auto first = [](int o) { return TensorBlock::size * o - (o < 0 ? CubicBrick::before - TensorBlock::size : 0); };
   const auto size = [](int o) {
     return o < 0 ? CubicBrick::before : o == 0 ? TensorBlock::size : CubicBrick::width - TensorBlock::size - 1;
   };
   for (int n = 0; n < neighbour_count; ++n) {
     const Vector3i offset = neighbour(n);
-    if (offset.isZero()) continue;
     const Vector3i from(first(offset.x()), first(offset.y()), first(offset.z()));
     visit(offset, from, from + Vector3i(size(offset.x()), size(offset.y()), size(offset.z())));
   }
 }
 
-/// Copies the part of an apron, `length` voxels along z, from the block that it belongs to.
+/// Copies a part of a brick, `length` voxels along z, from the block that it belongs to.
 template <int components, int length>
 void copy_part_of(const float* block, const Vector3i& offset, const Vector3i& first, const Vector3i& end,
                   float* brick) {
-  constexpr int trailing = CubicBrick::trailing_offset(components);
-  const int shift = CubicBrick::coefficient(TensorBlock::size * offset.x(), TensorBlock::size * offset.y(),
-                                            TensorBlock::size * offset.z()) -
-                    CubicBrick::coefficient(0, 0, 0);
+  const Vector3i origin = TensorBlock::size * offset;
   for (int x = first.x(); x < end.x(); ++x)
     for (int y = first.y(); y < end.y(); ++y) {
-      const int to = CubicBrick::coefficient(x, y, first.z()), from = to - shift;
+      const int to = CubicBrick::coefficient(x, y, first.z());
+      const int from = CoefficientBlock::coefficient(x - origin.x(), y - origin.y(), first.z() - origin.z());
       std::memcpy(brick + CubicBrick::bending_offset(components, to),
-                  block + CubicBrick::bending_offset(components, from), length * components * sizeof(float));
-      std::memcpy(brick + trailing + to, block + trailing + from, length * sizeof(float));
+                  block + CoefficientBlock::bending_offset(components, from), length * components * sizeof(float));
+      std::memcpy(brick + CubicBrick::trailing_offset(components) + to,
+                  block + CoefficientBlock::trailing_offset(components) + from, length * sizeof(float));
     }
 }
 
@@ -97,7 +90,7 @@ void copy_part(const float* block, const Vector3i& offset, const Vector3i& first
 }
 
 /// Extrapolates the coefficients of a brick that are outside the extent.
-void extrapolate(const Extrapolation& field, const Vector3i& place, std::size_t brick) {
+void extrapolate(const Coefficients& field, const Vector3i& place, float* brick) {
   const Vector3i origin = TensorBlock::size * place;
   const auto is_beyond = [&](int axis, int i) {
     return origin[axis] + i == field.extent.min()[axis] - 1 || origin[axis] + i == field.extent.max()[axis] + 1;
@@ -110,8 +103,8 @@ void extrapolate(const Extrapolation& field, const Vector3i& place, std::size_t 
       for (int z = -1; z < CubicBrick::width - 1; ++z) {
         if (is_far(0, x) || is_far(1, y) || is_far(2, z)) continue;  // No cell of the extent needs it.
         if (is_beyond(0, x) || is_beyond(1, y) || is_beyond(2, z))
-          write_coefficient(field.at(origin + Vector3i(x, y, z)), field.memory, brick,
-                            CubicBrick::coefficient(x, y, z));
+          write_coefficient<CubicBrick>(coefficient_at(field, origin + Vector3i(x, y, z)), field.blocks.components,
+                                        brick, CubicBrick::coefficient(x, y, z));
       }
 }
 
@@ -129,44 +122,33 @@ float strongest_of(const float* brick) {
   return strongest_bound(exact.greatest);
 }
 
+/// @return TensorBrick::strongest.
 template <int components>
-void finish_brick(const Extrapolation& field, std::size_t i, float& strongest) {
-  const Vector3i& place = field.bricks.places[i];
-  for_apron([&](const Vector3i& offset, const Vector3i& first, const Vector3i& end) {
+float finish_brick(const Coefficients& field, const Vector3i& place, float* brick) {
+  for_parts([&](const Vector3i& offset, const Vector3i& first, const Vector3i& end) {
     const std::uint32_t block = field.bricks.index.find(place + offset);
-    if (block != BrickIndex::missing)
-      copy_part<components>(field.memory.brick(block), offset, first, end, field.memory.brick(i));
+    if (block != BrickIndex::missing) copy_part<components>(field.blocks.brick(block), offset, first, end, brick);
   });
   const AlignedBox3i covered(TensorBlock::size * place - Vector3i::Ones(),
                              TensorBlock::size * place + Vector3i::Constant(TensorBlock::size + 1));
-  if (!field.extent.contains(covered)) extrapolate(field, place, i);
-  strongest = strongest_of<components>(field.memory.brick(i));
+  if (!field.extent.contains(covered)) extrapolate(field, place, brick);
+  return strongest_of<components>(brick);
 }
 
 }  // namespace
 
-void finish_bricks(const CoefficientBricks& bricks, const BrickNumbers& numbers, const AlignedBox3i& extent,
-                   Border border, const CoefficientMemory& memory, std::vector<float>& strongest) {
-  const Extrapolation field{bricks, border, extent, memory};
-  tbb::parallel_for(std::size_t{0}, numbers.size(), [&](std::size_t i) {
-    const std::uint32_t brick = numbers[i];
-    if (brick >= bricks.count) return;
+void finish_bricks(const Coefficients& field, const BrickNumbers& numbers, const BrickMemory& result,
+                   std::vector<float>& strongest) {
+  tbb::parallel_for(std::size_t{0}, numbers.size(), [&](std::size_t n) {
+    const std::uint32_t i = numbers[n];
+    if (i >= field.bricks.count) return;
     make_room();
-    if (memory.components == TensorBrick::symmetric)
-      finish_brick<TensorBrick::symmetric>(field, brick, strongest[brick]);
-    else
-      finish_brick<TensorBrick::general>(field, brick, strongest[brick]);
+    const Vector3i& place = field.bricks.places[i];
+    std::fill_n(result.brick(i), result.stride, 0.0f);  // It may have held blocks.
+    strongest[i] = result.components == TensorBrick::symmetric
+                       ? finish_brick<TensorBrick::symmetric>(field, place, result.brick(i))
+                       : finish_brick<TensorBrick::general>(field, place, result.brick(i));
   });
-}
-
-void widen_coefficients(const float* symmetric, float* general) {
-  constexpr int few = TensorBrick::symmetric, all = TensorBrick::general;
-  for (int i = 0; i < CubicBrick::coefficients; ++i)
-    for (int k = 0; k < all; ++k)
-      general[CubicBrick::bending_offset(all, i) + k] =
-          symmetric[CubicBrick::bending_offset(few, i) + TensorBrick::stored_component(few, k)];
-  std::copy_n(symmetric + CubicBrick::trailing_offset(few), CubicBrick::coefficients,
-              general + CubicBrick::trailing_offset(all));
 }
 
 }  // namespace tensorray

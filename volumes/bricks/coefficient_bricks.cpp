@@ -146,26 +146,21 @@ CoefficientBricks coefficient_bricks(const BlockTable& table, const AlignedBox3i
   return result;
 }
 
-StoredTensor read_coefficient(const CoefficientMemory& memory, const BrickVoxel& voxel) {
+StoredTensor read_coefficient(const BrickMemory& blocks, const BlockVoxel& voxel) {
   StoredTensor value = StoredTensor::Zero();
-  const float* const floats = memory.brick(voxel.brick);
-  std::copy_n(floats + CubicBrick::bending_offset(memory.components, voxel.number()), memory.components, value.data());
-  value[8] = floats[CubicBrick::trailing_offset(memory.components) + voxel.number()];
+  const float* const floats = blocks.brick(voxel.block);
+  const int number = CoefficientBlock::coefficient(voxel.x, voxel.y, voxel.z);
+  std::copy_n(floats + CoefficientBlock::bending_offset(blocks.components, number), blocks.components, value.data());
+  value[8] = floats[CoefficientBlock::trailing_offset(blocks.components) + number];
   return value;
 }
 
-void write_coefficient(const StoredTensor& value, const CoefficientMemory& memory, std::size_t brick, int number) {
-  float* const floats = memory.brick(brick);
-  std::copy_n(value.data(), memory.components, floats + CubicBrick::bending_offset(memory.components, number));
-  floats[CubicBrick::trailing_offset(memory.components) + number] = value[8];
-}
-
-std::optional<BrickVoxel> find_voxel(const CoefficientBricks& bricks, const std::vector<VoxelMask>& masks,
+std::optional<BlockVoxel> find_voxel(const CoefficientBricks& bricks, const std::vector<VoxelMask>& masks,
                                      const Vector3i& index) {
-  const std::uint32_t brick = bricks.index.find(place_of(index));
-  if (brick == BrickIndex::missing) return std::nullopt;
-  const BrickVoxel voxel{brick, index.x() & 7, index.y() & 7, index.z() & 7};
-  if (!is_set(masks[brick], voxel.x, voxel.y, voxel.z)) return std::nullopt;
+  const std::uint32_t block = bricks.index.find(place_of(index));
+  if (block == BrickIndex::missing) return std::nullopt;
+  const BlockVoxel voxel{block, index.x() & 7, index.y() & 7, index.z() & 7};
+  if (!is_set(masks[block], voxel.x, voxel.y, voxel.z)) return std::nullopt;
   return voxel;
 }
 

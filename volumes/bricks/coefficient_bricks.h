@@ -2,6 +2,7 @@
 /// @file volumes/bricks/coefficient_bricks.h
 /// The bricks of a cubic field while it is made: which voxels have coefficients, and where these are in memory.
 
+#include <algorithm>
 #include <array>
 #include <cstddef>
 #include <cstdint>
@@ -12,6 +13,7 @@
 
 #include "volumes/bricks/brick_index.h"
 #include "volumes/bricks/brick_making.h"
+#include "volumes/bricks/brick_memory.h"
 #include "volumes/bricks/cubic_brick.h"
 #include "volumes/grids/interpolation.h"
 
@@ -28,11 +30,11 @@ inline bool is_set(const VoxelMask& mask, int x, int y, int z) {
 constexpr int neighbour_count = 27;
 inline Eigen::Vector3i neighbour(int n) { return {n / 9 - 1, n / 3 % 3 - 1, n % 3 - 1}; }
 
-/// The bricks of a cubic field. Each holds the coefficients of its own block of voxels, and, in the end, those about it
-/// that its cells need.
+/// The bricks of a cubic field. Each holds the coefficients of its own block of voxels, and those about it that its
+/// cells need.
 struct CoefficientBricks {
-  /// First the bricks with a cell where the field is not zero, ordered by x, then y, then z. Then those that only hold
-  /// coefficients of other bricks' cells, until these have copies: of the extent's last voxels.
+  /// First the bricks with a cell where the field is not zero, ordered by x, then y, then z. Then places of blocks that
+  /// hold only coefficients of other bricks' cells: of the extent's last voxels.
   std::vector<Eigen::Vector3i> places;
   std::size_t count = 0;  ///< Number of the first ones.
   BrickIndex index;       ///< Of all places.
@@ -46,31 +48,34 @@ struct CoefficientBricks {
 /// @param extent  The box of the active voxels. Runs on all threads.
 CoefficientBricks coefficient_bricks(const BlockTable& table, const Eigen::AlignedBox3i& extent, Border border);
 
-/// The memory of bricks in the layout of CubicBrick.
-struct CoefficientMemory {
-  float* first;
-  std::size_t stride;  ///< Floats of a brick.
-  int components;
-
-  float* brick(std::size_t i) const { return first + i * stride; }
+/// The coefficients of all voxels, or their values before.
+struct Coefficients {
+  const CoefficientBricks& bricks;
+  const Eigen::AlignedBox3i& extent;  ///< The box of the active voxels.
+  Border border;
+  const BrickMemory& blocks;  ///< Of `bricks.places`, in the layout of CoefficientBlock.
 };
 
 /// What is stored of a coefficient, with T₂₂ last.
 using StoredTensor = Eigen::Array<float, 9, 1>;
 
-/// A voxel in the brick at its place.
-struct BrickVoxel {
-  std::size_t brick;
+/// A voxel in the block at its place.
+struct BlockVoxel {
+  std::size_t block;
   int x, y, z;
-
-  int number() const { return CubicBrick::coefficient(x, y, z); }
 };
 
-StoredTensor read_coefficient(const CoefficientMemory& memory, const BrickVoxel& voxel);
-void write_coefficient(const StoredTensor& value, const CoefficientMemory& memory, std::size_t brick, int number);
+StoredTensor read_coefficient(const BrickMemory& blocks, const BlockVoxel& voxel);
+
+/// @param floats  A brick or a block. @param number  Of the coefficient in it.
+template <class Layout>
+void write_coefficient(const StoredTensor& value, int components, float* floats, int number) {
+  std::copy_n(value.data(), components, floats + Layout::bending_offset(components, number));
+  floats[Layout::trailing_offset(components) + number] = value[8];
+}
 
 /// The voxel at an index, if it is set in `masks`, which are `filled` or `active` of the bricks, or like them.
-std::optional<BrickVoxel> find_voxel(const CoefficientBricks& bricks, const std::vector<VoxelMask>& masks,
+std::optional<BlockVoxel> find_voxel(const CoefficientBricks& bricks, const std::vector<VoxelMask>& masks,
                                      const Eigen::Vector3i& index);
 
 }  // namespace tensorray

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cstring>
-#include <limits>
 #include <map>
 #include <type_traits>
 
@@ -99,8 +98,8 @@ struct Runs {
 /// Solves the runs of a line of voxels or of rows of eight voxels along z. `number(i)` is the number, in brick
 /// i / 8, of what is at place i of the line.
 template <int components, int voxels, class Set, class Number>
-void solve_line(const Column& column, const Runs& runs, const CoefficientMemory& memory, const Set& set,
-                const Number& number, std::vector<float*>& pointers) {
+void solve_line(const Column& column, const Runs& runs, const BrickMemory& memory, const Set& set, const Number& number,
+                std::vector<float*>& pointers) {
   runs.visit(set, [&](int from, int length, bool continues_before, bool continues_after) {
     pointers.resize(2 * static_cast<std::size_t>(length));
     float** const bending = pointers.data();
@@ -108,8 +107,8 @@ void solve_line(const Column& column, const Runs& runs, const CoefficientMemory&
     for (int i = 0; i < length; ++i) {
       float* const brick = memory.brick(column.bricks[static_cast<std::size_t>((from + i) / edge)]);
       const int at = number((from + i) % edge);
-      bending[i] = brick + CubicBrick::bending_offset(components, at);
-      trailing[i] = brick + CubicBrick::trailing_offset(components) + at;
+      bending[i] = brick + CoefficientBlock::bending_offset(components, at);
+      trailing[i] = brick + CoefficientBlock::trailing_offset(components) + at;
     }
     solve_run<voxels * components>(bending, length, continues_before, continues_after);
     solve_run<voxels>(trailing, length, continues_before, continues_after);
@@ -118,8 +117,7 @@ void solve_line(const Column& column, const Runs& runs, const CoefficientMemory&
 
 /// Solves the lines of a column along x or y: eight neighbours along z together where they have the same runs.
 template <int components>
-void solve_across(const CoefficientBricks& bricks, const Column& column, const Runs& runs,
-                  const CoefficientMemory& memory) {
+void solve_across(const CoefficientBricks& bricks, const Column& column, const Runs& runs, const BrickMemory& memory) {
   std::vector<float*> pointers;
   const bool along_x = runs.axis == 0;
   for (int across = 0; across < edge; ++across) {
@@ -129,7 +127,7 @@ void solve_across(const CoefficientBricks& bricks, const Column& column, const R
                           [static_cast<std::size_t>(along_x ? within * edge + across : across * edge + within)];
     };
     const auto number = [&](int i, int z) {
-      return along_x ? CubicBrick::coefficient(i, across, z) : CubicBrick::coefficient(across, i, z);
+      return along_x ? CoefficientBlock::coefficient(i, across, z) : CoefficientBlock::coefficient(across, i, z);
     };
     bool same = true;
     for (int i = 0; i < runs.count && same; ++i) same = row(i) == 0 || row(i) == 0xff;
@@ -146,7 +144,7 @@ void solve_across(const CoefficientBricks& bricks, const Column& column, const R
 
 /// Copies the lines of a sheet of voxels, at x, to a buffer in which those of one z follow each other, or back.
 template <int components, bool back>
-void copy_sheet(const Column& column, int x, const CoefficientMemory& memory, float* buffer) {
+void copy_sheet(const Column& column, int x, const BrickMemory& memory, float* buffer) {
   constexpr int floats = components + 1;
   const auto copy = [](float* voxel, float* place, std::size_t count) {
     back ? std::memcpy(voxel, place, count * sizeof(float)) : std::memcpy(place, voxel, count * sizeof(float));
@@ -154,11 +152,11 @@ void copy_sheet(const Column& column, int x, const CoefficientMemory& memory, fl
   for (const std::uint32_t number : column.bricks) {
     float* const brick = memory.brick(number);
     for (int y = 0; y < edge; ++y) {
-      const int first = CubicBrick::coefficient(x, y, 0);
+      const int first = CoefficientBlock::coefficient(x, y, 0);
       for (int z = 0; z < edge; ++z) {
         float* const place = buffer + (z * edge + y) * floats;
-        copy(brick + CubicBrick::bending_offset(components, first + z), place, components);
-        copy(brick + CubicBrick::trailing_offset(components) + first + z, place + components, 1);
+        copy(brick + CoefficientBlock::bending_offset(components, first + z), place, components);
+        copy(brick + CoefficientBlock::trailing_offset(components) + first + z, place + components, 1);
       }
     }
     buffer += edge * edge * floats;
@@ -167,8 +165,7 @@ void copy_sheet(const Column& column, int x, const CoefficientMemory& memory, fl
 
 /// Solves the lines of a column along z: eight neighbours along y together where they have the same runs.
 template <int components>
-void solve_along_z(const CoefficientBricks& bricks, const Column& column, const Runs& runs,
-                   const CoefficientMemory& memory) {
+void solve_along_z(const CoefficientBricks& bricks, const Column& column, const Runs& runs, const BrickMemory& memory) {
   constexpr int floats = components + 1, all = edge * floats;
   std::vector<float> buffer(static_cast<std::size_t>(runs.count * all));
   std::vector<float*> pointers(static_cast<std::size_t>(runs.count));
@@ -207,63 +204,106 @@ Column column_of(const CoefficientBricks& bricks, std::size_t first, int axis) {
 }
 
 template <int components>
-void solve_columns(int axis, const CoefficientBricks& bricks, const BrickNumbers& numbers, const AlignedBox3i& extent,
-                   Border border, const CoefficientMemory& memory) {
+void solve_columns(int axis, const Coefficients& field, const BrickNumbers& numbers) {
   tbb::parallel_for(std::size_t{0}, numbers.size(), [&](std::size_t i) {
-    const Column column = column_of(bricks, numbers[i], axis);
+    const Column column = column_of(field.bricks, numbers[i], axis);
     if (column.bricks.empty()) return;
     make_room();
-    const int begin = edge * bricks.places[numbers[i]][axis], count = edge * static_cast<int>(column.bricks.size());
-    const Runs runs{axis, begin, count, extent, border};
+    const int begin = edge * field.bricks.places[numbers[i]][axis];
+    const int count = edge * static_cast<int>(column.bricks.size());
+    const Runs runs{axis, begin, count, field.extent, field.border};
     if (axis == 2)
-      solve_along_z<components>(bricks, column, runs, memory);
+      solve_along_z<components>(field.bricks, column, runs, field.blocks);
     else
-      solve_across<components>(bricks, column, runs, memory);
+      solve_across<components>(field.bricks, column, runs, field.blocks);
   });
 }
 
-/// The bricks in slabs across x, each of at most `bytes` or with one place along x, in their order.
-std::vector<BrickNumbers> slabs_of(const CoefficientBricks& bricks, std::size_t bytes, std::size_t bytes_of_brick) {
+/// The places in slabs across x, each of at most `bytes` or with one place along x, in their order.
+std::vector<BrickNumbers> slabs_of(const CoefficientBricks& bricks, std::size_t bytes, std::size_t bytes_of_block) {
   std::map<int, BrickNumbers> by_x;
   for (std::uint32_t i = 0; i < bricks.places.size(); ++i) by_x[bricks.places[i].x()].push_back(i);
   std::vector<BrickNumbers> slabs;
   for (const auto& [x, numbers] : by_x)
-    if (slabs.empty() || (slabs.back().size() + numbers.size()) * bytes_of_brick > bytes)
+    if (slabs.empty() || (slabs.back().size() + numbers.size()) * bytes_of_block > bytes)
       slabs.push_back(numbers);
     else
       slabs.back().insert(slabs.back().end(), numbers.begin(), numbers.end());
   return slabs;
 }
 
-/// Three slabs are in use at a time: one is solved, and the one before it is finished with what it needs of a third.
-/// They may take a quarter of the bound.
-std::size_t bytes_of_slab() { return memory_bound() ? *memory_bound() / 12 : std::numeric_limits<std::size_t>::max(); }
+/// Three slabs are in use at a time: one is solved, and bricks are made of the one before it with what they need of a
+/// third. With a bound of memory they may take a quarter of it.
+std::vector<BrickNumbers> slabs_of(const CoefficientBricks& bricks, int components) {
+  const std::size_t bytes = memory_bound() ? *memory_bound() / 12 : std::size_t{1} << 27;
+  return slabs_of(bricks, bytes, static_cast<std::size_t>(CoefficientBlock::stored_floats(components)) * sizeof(float));
+}
 
-template <int components>
-std::vector<float> make_coefficients_of(const CoefficientBricks& bricks, const AlignedBox3i& extent, Border border,
-                                        const CoefficientMemory& memory) {
-  const auto solve = [&](int axis, const BrickNumbers& numbers) {
-    solve_columns<components>(axis, bricks, numbers, extent, border, memory);
-  };
-  const std::vector<BrickNumbers> slabs = slabs_of(bricks, bytes_of_slab(), memory.stride * sizeof(float));
-  std::vector<float> strongest(bricks.count);
-  for (const BrickNumbers& slab : slabs) solve(0, slab);
-  for (std::size_t i = 0; i < slabs.size(); ++i) {
-    solve(1, slabs[i]);
-    solve(2, slabs[i]);
-    if (i > 0) finish_bricks(bricks, slabs[i - 1], extent, border, memory, strongest);
+/// Where the blocks begin in the memory, in floats: so far behind that the bricks of a slab end before the blocks of
+/// the slab before it, and on a page. Blocks of places without bricks are behind all others, whatever their slab.
+std::size_t begin_of_blocks(const CoefficientBricks& bricks, int components) {
+  const auto brick = static_cast<std::size_t>(CubicBrick::stored_floats(components));
+  const auto block = static_cast<std::size_t>(CoefficientBlock::stored_floats(components));
+  std::size_t begin = 0, first_before = 0;
+  for (const BrickNumbers& slab : slabs_of(bricks, components)) {
+    std::size_t first = bricks.count, end = 0;
+    for (const std::size_t i : slab) {
+      if (i >= bricks.count) continue;
+      first = std::min(first, i);
+      end = std::max(end, i + 1);
+    }
+    if (end * brick > first_before * block) begin = std::max(begin, end * brick - first_before * block);
+    first_before = first;
   }
-  finish_bricks(bricks, slabs.back(), extent, border, memory, strongest);
-  return strongest;
+  constexpr std::size_t page = 4096 / sizeof(float);
+  return (begin + page - 1) / page * page;
 }
 
 }  // namespace
 
-std::vector<float> make_coefficients(const CoefficientBricks& bricks, const AlignedBox3i& extent, Border border,
-                                     const CoefficientMemory& memory) {
-  if (memory.components == TensorBrick::symmetric)
-    return make_coefficients_of<TensorBrick::symmetric>(bricks, extent, border, memory);
-  return make_coefficients_of<TensorBrick::general>(bricks, extent, border, memory);
+BrickMemory cubic_memory(const CoefficientBricks& bricks, int components) {
+  const std::size_t brick = static_cast<std::size_t>(CubicBrick::stored_floats(components));
+  const std::size_t block = static_cast<std::size_t>(CoefficientBlock::stored_floats(components));
+  const std::size_t floats = begin_of_blocks(bricks, components) + bricks.places.size() * block;
+  return make_bricks((floats + brick - 1) / brick, static_cast<int>(brick), components);
+}
+
+BrickMemory blocks_within(const BrickMemory& memory, const CoefficientBricks& bricks) {
+  BrickMemory blocks;
+  blocks.components = memory.components;
+  blocks.count = bricks.places.size();
+  blocks.stride = static_cast<std::size_t>(CoefficientBlock::stored_floats(memory.components));
+  const std::size_t begin = begin_of_blocks(bricks, memory.components);
+  blocks.floats = std::shared_ptr<float[]>(memory.floats, memory.floats.get() + begin);
+  return blocks;
+}
+
+std::vector<float> make_coefficients(const Coefficients& field, const BrickMemory& result) {
+  const auto solve = [&](int axis, const BrickNumbers& numbers) {
+    field.blocks.components == TensorBrick::symmetric ? solve_columns<TensorBrick::symmetric>(axis, field, numbers)
+                                                      : solve_columns<TensorBrick::general>(axis, field, numbers);
+  };
+  const std::vector<BrickNumbers> slabs = slabs_of(field.bricks, field.blocks.components);
+  std::vector<float> strongest(field.bricks.count);
+  for (const BrickNumbers& slab : slabs) solve(0, slab);
+  for (std::size_t i = 0; i <= slabs.size(); ++i) {
+    if (i < slabs.size()) {
+      solve(1, slabs[i]);
+      solve(2, slabs[i]);
+    }
+    if (i > 0) finish_bricks(field, slabs[i - 1], result, strongest);
+  }
+  return strongest;
+}
+
+void widen_values(const float* symmetric, float* general) {
+  constexpr int few = TensorBrick::symmetric, all = TensorBrick::general;
+  for (int i = 0; i < CoefficientBlock::coefficients; ++i)
+    for (int k = 0; k < all; ++k)
+      general[CoefficientBlock::bending_offset(all, i) + k] =
+          symmetric[CoefficientBlock::bending_offset(few, i) + TensorBrick::stored_component(few, k)];
+  std::copy_n(symmetric + CoefficientBlock::trailing_offset(few), CoefficientBlock::coefficients,
+              general + CoefficientBlock::trailing_offset(all));
 }
 
 }  // namespace tensorray

@@ -1,6 +1,6 @@
 #pragma once
 /// @file volumes/bricks/cubic_brick.h
-/// The layout of a brick of B-spline coefficients, and the B-spline's weights.
+/// The layouts of B-spline coefficients in bricks and blocks, and the B-spline's weights.
 
 #include "volumes/bricks/tensor_field.h"
 
@@ -23,6 +23,17 @@ struct CubicBrick {
   static constexpr int stored_floats(int components) {
     return (trailing_offset(components) + coefficients + 15) / 16 * 16;
   }
+};
+
+/// The layout of a block's 8³ voxels, whose values become coefficients: of each what a CubicBrick stores.
+struct CoefficientBlock {
+  static constexpr int coefficients = TensorBlock::voxels;
+
+  /// The number of the coefficient at a voxel of the block; each coordinate is from 0 to 7.
+  static constexpr int coefficient(int x, int y, int z) { return (x * TensorBlock::size + y) * TensorBlock::size + z; }
+  static constexpr int bending_offset(int components, int number) { return number * components; }
+  static constexpr int trailing_offset(int components) { return coefficients * components; }
+  static constexpr int stored_floats(int components) { return coefficients * (components + 1); }
 };
 
 /// Weights of the four coefficients about a point, the first one of them before its cell. @param t  In the cell, 0

@@ -11,6 +11,7 @@
 #include <Eigen/Geometry>
 
 #include "volumes/bricks/brick_index.h"
+#include "volumes/bricks/brick_memory.h"
 #include "volumes/grids/block_source.h"
 #include "volumes/grids/interpolation.h"
 #include "volumes/grids/tensor_grid.h"
@@ -97,7 +98,7 @@ class TensorField {
   double greatest_norm() const { return greatest_norm_; }
 
   /// Whether T = Tᵀ in all voxels, bit for bit. Bricks then store five components, and tracing is faster.
-  bool is_symmetric() const { return components_ == TensorBrick::symmetric; }
+  bool is_symmetric() const { return memory_.components == TensorBrick::symmetric; }
 
   const Interpolant& interpolant() const { return interpolant_; }
   bool is_cubic() const { return interpolant_.between == Interpolation::cubic; }
@@ -114,7 +115,7 @@ class TensorField {
   /// outside the extent.
   TensorBrick brick(const Eigen::Vector3i& brick) const {
     const BrickIndex::Entry entry = index_.entry(brick);
-    return brick_at(entry.number == BrickIndex::missing ? zeros : floats_of(entry.number), entry.value);
+    return brick_at(entry.number == BrickIndex::missing ? zeros : memory_.brick(entry.number), entry.value);
   }
 
   /// Whether the brick is in memory. If not, `brick` returns the brick of zeros.
@@ -123,34 +124,18 @@ class TensorField {
  private:
   static const float* const zeros;  // A brick of either kind.
 
-  struct Release {
-    std::size_t bytes;
-
-    void operator()(float* floats) const;
-  };
-  using Floats = std::shared_ptr<float[]>;
-
-  /// Places block i in its bricks. @return false, and leaves them as they are, if they do not have enough components.
-  using Place = std::function<bool(std::size_t i, const TensorBlock& block)>;
-
   double make_linear_bricks(const BlockTable& table, const Eigen::AlignedBox3i& active, const BlockSource& source);
   double make_cubic_bricks(const BlockTable& table, const Eigen::AlignedBox3i& active, const BlockSource& source);
-  void place_blocks(const BlockSource& source, const Place& place);
-  void widen(bool keep);
-  void allocate(int components);
-  void keep_bricks(std::size_t count);
-  float* floats_of(std::size_t index) const { return floats_.get() + index * brick_floats_; }
   TensorBrick brick_at(const float* floats, float strongest) const {
-    return {floats, floats + trailing_offset_, strongest, components_};
+    return {floats, floats + trailing_offset_, strongest, memory_.components};
   }
 
   Interpolant interpolant_;
   Eigen::Affine3d to_world_, to_index_;
   Eigen::AlignedBox3d index_bounds_, voxels_;
   std::vector<Eigen::Vector3i> bricks_;
-  Floats floats_;  ///< The bricks, in the order of `bricks_`.
-  int components_ = TensorBrick::symmetric;
-  std::size_t brick_floats_ = 0, trailing_offset_ = 0;
+  BrickMemory memory_;  ///< In the order of `bricks_`.
+  std::size_t trailing_offset_ = 0;
   double greatest_norm_ = 0;
   BrickIndex index_;  ///< Finds a brick, and its TensorBrick::strongest, by its coordinates.
 };

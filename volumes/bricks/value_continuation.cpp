@@ -19,10 +19,9 @@ using Eigen::Vector3i;
 constexpr float faded = 0.21132487f;
 
 /// The continuation to the voxel at `index`, if known voxels lead there: the mean of those along which most are known.
-std::optional<StoredTensor> continuation(const Vector3i& index, const CoefficientBricks& bricks,
-                                         const std::vector<VoxelMask>& known, Border border,
-                                         const CoefficientMemory& memory) {
-  const int longest = border == Border::extend ? 2 : 1;
+std::optional<StoredTensor> continuation(const Vector3i& index, const Coefficients& field,
+                                         const std::vector<VoxelMask>& known) {
+  const int longest = field.border == Border::extend ? 2 : 1;
   int most = 1, count = 0;
   StoredTensor sum = StoredTensor::Zero();
   for (int direction = 0; direction < 6; ++direction) {
@@ -30,9 +29,9 @@ std::optional<StoredTensor> continuation(const Vector3i& index, const Coefficien
     StoredTensor values[2];
     int length = 0;
     for (; length < longest; ++length) {
-      const auto voxel = find_voxel(bricks, known, index + (length + 1) * along);
+      const auto voxel = find_voxel(field.bricks, known, index + (length + 1) * along);
       if (!voxel) break;
-      values[length] = read_coefficient(memory, *voxel);
+      values[length] = read_coefficient(field.blocks, *voxel);
     }
     if (length < most) continue;
     if (length > most) {
@@ -44,21 +43,21 @@ std::optional<StoredTensor> continuation(const Vector3i& index, const Coefficien
     ++count;
   }
   if (count == 0) return std::nullopt;
-  return StoredTensor(sum * ((border == Border::fade ? faded : 1.0f) / static_cast<float>(count)));
+  return StoredTensor(sum * ((field.border == Border::fade ? faded : 1.0f) / static_cast<float>(count)));
 }
 
-/// Continues values to the voxels of a brick that known ones lead to. @return the voxels that are known now.
-VoxelMask continue_brick(std::size_t brick, const CoefficientBricks& bricks, const std::vector<VoxelMask>& known,
-                         Border border, const CoefficientMemory& memory) {
-  VoxelMask result = known[brick];
+/// Continues values to the voxels of a block that known ones lead to. @return the voxels that are known now.
+VoxelMask continue_block(std::size_t block, const Coefficients& field, const std::vector<VoxelMask>& known) {
+  VoxelMask result = known[block];
   for (int x = 0; x < TensorBlock::size; ++x)
     for (int y = 0; y < TensorBlock::size; ++y)
       for (int z = 0; z < TensorBlock::size; ++z) {
-        if (!is_set(bricks.filled[brick], x, y, z) || is_set(known[brick], x, y, z)) continue;
-        const Vector3i index = TensorBlock::size * bricks.places[brick] + Vector3i(x, y, z);
-        const auto value = continuation(index, bricks, known, border, memory);
+        if (!is_set(field.bricks.filled[block], x, y, z) || is_set(known[block], x, y, z)) continue;
+        const Vector3i index = TensorBlock::size * field.bricks.places[block] + Vector3i(x, y, z);
+        const auto value = continuation(index, field, known);
         if (!value) continue;
-        write_coefficient(*value, memory, brick, CubicBrick::coefficient(x, y, z));
+        write_coefficient<CoefficientBlock>(*value, field.blocks.components, field.blocks.brick(block),
+                                            CoefficientBlock::coefficient(x, y, z));
         std::uint8_t& row = result[static_cast<std::size_t>(x * TensorBlock::size + y)];
         row = static_cast<std::uint8_t>(row | 1u << z);
       }
@@ -67,16 +66,16 @@ VoxelMask continue_brick(std::size_t brick, const CoefficientBricks& bricks, con
 
 }  // namespace
 
-void continue_values(const CoefficientBricks& bricks, Border border, const CoefficientMemory& memory) {
+void continue_values(const Coefficients& field) {
   // Each sweep leads one voxel further; those beside edges and corners are reached along one axis after the other. A
   // sweep reads only voxels that were known before it.
-  std::vector<VoxelMask> known = bricks.active, next = known;
+  std::vector<VoxelMask> known = field.bricks.active, next = known;
   for (std::atomic<bool> changed{true}; changed;) {
     changed = false;
-    tbb::parallel_for(std::size_t{0}, bricks.places.size(), [&](std::size_t i) {
-      if (known[i] == bricks.filled[i]) return;
+    tbb::parallel_for(std::size_t{0}, field.bricks.places.size(), [&](std::size_t i) {
+      if (known[i] == field.bricks.filled[i]) return;
       make_room();
-      next[i] = continue_brick(i, bricks, known, border, memory);
+      next[i] = continue_block(i, field, known);
       if (next[i] != known[i]) changed = true;
     });
     known = next;

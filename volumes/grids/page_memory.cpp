@@ -212,12 +212,12 @@ void expect_first_writes(void* memory, std::size_t bytes, bool expected) noexcep
   if (store) madvise(memory, bytes, expected ? MADV_RANDOM : MADV_NORMAL);
 }
 
-std::size_t shrink_pages(void* memory, std::size_t bytes, std::size_t kept) noexcept {
-  const std::size_t page = static_cast<std::size_t>(sysconf(_SC_PAGESIZE));
-  const std::size_t end = (kept + page - 1) / page * page;
-  if (store || end >= bytes) return bytes;
-  munmap(static_cast<char*>(memory) + end, bytes - end);
-  return end;
+void release_pages(void* part, std::size_t bytes) noexcept {
+  if (store) return;
+  const auto page = static_cast<std::uintptr_t>(sysconf(_SC_PAGESIZE));
+  const std::uintptr_t first = reinterpret_cast<std::uintptr_t>(part), end = (first + bytes) / page * page;
+  const std::uintptr_t begin = (first + page - 1) / page * page;
+  if (begin < end) madvise(reinterpret_cast<void*>(begin), end - begin, MADV_DONTNEED);
 }
 
 }  // namespace tensorray

@@ -40,9 +40,8 @@ void unmap_pages(void* memory, std::size_t bytes) noexcept;
 /// written. Otherwise a page brings its neighbours from the disk. Without a bound this has no effect.
 void expect_first_writes(void* memory, std::size_t bytes, bool expected) noexcept;
 
-/// Frees the pages behind the first `kept` bytes; pages of a file are kept whole.
-/// @return the number of bytes that `unmap_pages` then needs.
-std::size_t shrink_pages(void* memory, std::size_t bytes, std::size_t kept) noexcept;
+/// Frees the whole pages within a part of what `map_pages` gave, which is not used any more. Those of a file are kept.
+void release_pages(void* part, std::size_t bytes) noexcept;
 
 /// An allocator of large arrays. They are pages if there is a bound, which must be set before an array is made.
 template <class T>

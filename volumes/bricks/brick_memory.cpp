@@ -1,0 +1,76 @@
+#include "volumes/bricks/brick_memory.h"
+
+#include <algorithm>
+#include <atomic>
+
+#include <tbb/blocked_range.h>
+#include <tbb/parallel_for.h>
+
+#include "volumes/bricks/tensor_field.h"
+#include "volumes/grids/page_memory.h"
+
+namespace tensorray {
+namespace {
+
+/// Number of blocks that are placed before all threads wait; enough to keep them busy.
+constexpr std::size_t part_size = 4096;
+
+/// Number of blocks that a thread places in a row. Neighbours along z share bricks.
+constexpr std::size_t grain = 16;
+
+/// The same bricks with tensors of any kind. `keep`: with the tensors that they hold.
+BrickMemory widened(const BrickMemory& narrow, const BlockPlaces& places, bool keep) {
+  BrickMemory wide = places.make(TensorBrick::general);
+  if (keep)
+    tbb::parallel_for(std::size_t{0}, narrow.count, [&](std::size_t i) {
+      make_room();
+      places.widen(narrow.brick(i), wide.brick(i));
+    });
+  return wide;
+}
+
+}  // namespace
+
+BrickMemory make_bricks(std::size_t count, int stored_floats, int components) {
+  BrickMemory bricks;
+  bricks.count = count;
+  bricks.stride = static_cast<std::size_t>(stored_floats);
+  bricks.components = components;
+  constexpr std::size_t alignment = 4096;
+  const std::size_t bytes = bricks.bytes();
+  bricks.floats = {static_cast<float*>(map_pages(bytes, alignment)),
+                   [bytes](float* floats) { unmap_pages(floats, bytes); }};
+  expect_first_writes(bricks.floats.get(), bytes, true);
+  return bricks;
+}
+
+void keep_bricks(BrickMemory& bricks, std::size_t count) {
+  release_pages(bricks.brick(count), (bricks.count - count) * bricks.stride * sizeof(float));
+  bricks.count = count;
+}
+
+BrickMemory place_blocks(const BlockSource& source, const BlockPlaces& places) {
+  BrickMemory bricks = places.make(TensorBrick::symmetric);
+  std::atomic<bool> fits{true};
+  const auto place_part = [&](const tbb::blocked_range<std::size_t>& range) {
+    TensorBlock block;
+    for (std::size_t i = range.begin(); i < range.end() && fits; ++i) {
+      make_room();
+      read_block(source, i, block);
+      if (!places.place(i, block, bricks)) fits = false;
+    }
+  };
+  const std::size_t count = source.shapes.size();
+  for (std::size_t first = 0; first < count; first += part_size) {
+    const tbb::blocked_range<std::size_t> part(first, std::min(first + part_size, count), grain);
+    tbb::parallel_for(part, place_part);
+    if (fits) continue;
+    bricks = widened(bricks, places, first > 0);
+    fits = true;
+    tbb::parallel_for(part, place_part);  // It was not placed whole.
+  }
+  expect_first_writes(bricks.floats.get(), bricks.bytes(), false);
+  return bricks;
+}
+
+}  // namespace tensorray
