@@ -213,12 +213,12 @@ AutoScale load_scale(const SceneDescription& description, const TensorField& fie
 Eigen::Vector3d load_direction(const SceneDescription& description, const TensorField& field, const Progress& progress,
                                std::vector<std::string>& notes) {
   if (description.light.direction) return *description.light.direction;
-  if (!description.integrator.method().needs_light_direction(description)) return -Eigen::Vector3d::UnitZ();
   const AutoDirection chosen = choose_direction(field, Geometry(load_volume(description, field)),
                                                 description.light.up.value_or(Eigen::Vector3d::UnitZ()), progress);
   const Eigen::Vector3d V = chosen.direction + Eigen::Vector3d::Zero();  // 0, not -0.
-  notes.push_back(
-      fmt::format("light: along [{:g}, {:g}, {:g}], where it shows most of the six axes", V.x(), V.y(), V.z()));
+  if (description.integrator.method().needs_light_direction(description))
+    notes.push_back(
+        fmt::format("light: along [{:g}, {:g}, {:g}], where it shows most of the six axes", V.x(), V.y(), V.z()));
   return V;
 }
 

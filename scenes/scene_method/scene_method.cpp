@@ -317,7 +317,7 @@ void SceneMethod::check(SceneDescription& scene, const Json& json, const SceneSo
     scene.warnings.push_back("`/integrator/max_gain` has no effect where radiance is conserved");
   if (given(json, "/light/direction") && !needs_light_direction(scene))
     scene.warnings.push_back(
-        "`/light/direction` has no effect: the light is that of `/lights`, there are no `paths`, and "
+        "`/light/direction` has no effect on the picture: its light is that of `/lights`, there are no `paths`, and "
         "`/field/scale` is given");
 }
 

@@ -362,7 +362,7 @@ TEST_F(ReadScene, Warnings) {
 
 TEST_F(ReadScene, WarnsWhereTheDirectionOfTheLightHasNoEffect) {
   const auto warns = [this](Overrides overrides, const std::string& rest) {
-    overrides.insert(overrides.end(), {"integrator.type=scene", "light.direction=[0,1,0]"});
+    overrides.insert(overrides.begin(), {"integrator.type=scene", "light.direction=[0,1,0]"});
     const std::vector<std::string> warnings = read(overrides, "{" + rest + "}").warnings;
     return std::any_of(warnings.begin(), warnings.end(), [](const std::string& warning) {
       return warning.find("`/light/direction` has no effect") != std::string::npos;

@@ -8,6 +8,7 @@ The file READY appears when the window shows what it is to show.
 import os
 import pathlib
 import sys
+import traceback
 
 import bpy
 from mathutils import Vector
@@ -87,7 +88,11 @@ def in_turn(*steps):
     left = list(steps)
 
     def step():
-        left.pop(0)()
+        try:
+            left.pop(0)()
+        except Exception:
+            traceback.print_exc()
+            os._exit(1)  # Blender would go on without this step.
         return 1 if left else None
     bpy.app.timers.register(step, first_interval=1)
 

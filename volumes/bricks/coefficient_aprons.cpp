@@ -137,7 +137,7 @@ float finish_brick(const Coefficients& field, const Vector3i& place, float* bric
 
 }  // namespace
 
-void finish_bricks(const Coefficients& field, const BrickNumbers& numbers, const BrickMemory& result,
+void finish_bricks(const Coefficients& field, const PlaceNumbers& numbers, const BrickMemory& result,
                    std::vector<float>& strongest) {
   tbb::parallel_for(std::size_t{0}, numbers.size(), [&](std::size_t n) {
     const std::uint32_t i = numbers[n];

@@ -1,8 +1,11 @@
 #include "volumes/bricks/coefficient_bricks.h"
 
 #include <algorithm>
+#include <map>
 
 #include <tbb/parallel_for.h>
+
+#include "volumes/grids/page_memory.h"
 
 namespace tensorray {
 namespace {
@@ -102,7 +105,26 @@ bool reaches(const VoxelMask& mask, const Vector3i& offset) {
   return false;
 }
 
+/// Three slabs are in use at a time: one is solved, and bricks are made of the one before it with what they need of a
+/// third. With a bound of memory, these may take half of it.
+std::size_t most_places_of_slab() {
+  const std::size_t bytes = memory_bound() ? *memory_bound() / 12 : std::size_t{1} << 26;
+  return bytes / (static_cast<std::size_t>(CoefficientBlock::stored_floats(TensorBrick::general)) * sizeof(float));
+}
+
 }  // namespace
+
+std::vector<PlaceNumbers> slabs_of(const std::vector<Vector3i>& places, std::size_t most) {
+  std::map<int, PlaceNumbers> by_x;
+  for (std::uint32_t i = 0; i < places.size(); ++i) by_x[places[i].x()].push_back(i);
+  std::vector<PlaceNumbers> slabs;
+  for (const auto& [x, numbers] : by_x)
+    if (slabs.empty() || slabs.back().size() + numbers.size() > most)
+      slabs.push_back(numbers);
+    else
+      slabs.back().insert(slabs.back().end(), numbers.begin(), numbers.end());
+  return slabs;
+}
 
 CoefficientBricks coefficient_bricks(const BlockTable& table, const AlignedBox3i& extent, Border border) {
   const std::vector<Vector3i> candidates = places_about(table);
@@ -138,6 +160,7 @@ CoefficientBricks coefficient_bricks(const BlockTable& table, const AlignedBox3i
   result.count = result.places.size();
   result.places.insert(result.places.end(), others.begin(), others.end());
   result.index = BrickIndex(result.places);
+  result.slabs = slabs_of(result.places, most_places_of_slab());
   for (const Vector3i& place : result.places) {
     const std::uint32_t at = found.find(place);
     result.filled.push_back(at == BrickIndex::missing ? VoxelMask{} : filled[at]);

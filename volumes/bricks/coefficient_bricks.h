@@ -13,8 +13,8 @@
 
 #include "volumes/bricks/brick_index.h"
 #include "volumes/bricks/brick_making.h"
-#include "volumes/bricks/brick_memory.h"
 #include "volumes/bricks/cubic_brick.h"
+#include "volumes/grids/brick_memory.h"
 #include "volumes/grids/interpolation.h"
 
 namespace tensorray {
@@ -30,6 +30,9 @@ inline bool is_set(const VoxelMask& mask, int x, int y, int z) {
 constexpr int neighbour_count = 27;
 inline Eigen::Vector3i neighbour(int n) { return {n / 9 - 1, n / 3 % 3 - 1, n % 3 - 1}; }
 
+/// Numbers of places in CoefficientBricks.
+using PlaceNumbers = std::vector<std::uint32_t>;
+
 /// The bricks of a cubic field. Each holds the coefficients of its own block of voxels, and those about it that its
 /// cells need.
 struct CoefficientBricks {
@@ -43,7 +46,13 @@ struct CoefficientBricks {
   /// within a voxel of these (`fade`) or two (`extend`) along each axis.
   std::vector<VoxelMask> filled;
   std::vector<VoxelMask> active;
+
+  /// All places, in slabs across x: what is made at a time (make_coefficients).
+  std::vector<PlaceNumbers> slabs;
 };
+
+/// Places in slabs across x, in their order: each of at most `most` places, or with one place along x.
+std::vector<PlaceNumbers> slabs_of(const std::vector<Eigen::Vector3i>& places, std::size_t most);
 
 /// @param extent  The box of the active voxels. Runs on all threads.
 CoefficientBricks coefficient_bricks(const BlockTable& table, const Eigen::AlignedBox3i& extent, Border border);

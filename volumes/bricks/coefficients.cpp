@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cstring>
-#include <map>
 #include <type_traits>
 
 #include <tbb/parallel_for.h>
@@ -66,9 +65,9 @@ void solve_run(float* const* run, int count, bool continues_before, bool continu
   if (cubic_after) at(count - 1) = 6 * second_last - 4 * at(count - 2) - at(count - 3);
 }
 
-/// A column of bricks along an axis, without gaps.
+/// A column of blocks along an axis, without gaps.
 struct Column {
-  std::vector<std::uint32_t> bricks;
+  std::vector<std::uint32_t> blocks;
 };
 
 /// The voxels of a column on a line along its axis: `set(i)` says whether voxel i has a coefficient.
@@ -95,7 +94,7 @@ struct Runs {
   }
 };
 
-/// Solves the runs of a line of voxels or of rows of eight voxels along z. `number(i)` is the number, in brick
+/// Solves the runs of a line of voxels or of rows of eight voxels along z. `number(i)` is the number, in block
 /// i / 8, of what is at place i of the line.
 template <int components, int voxels, class Set, class Number>
 void solve_line(const Column& column, const Runs& runs, const BrickMemory& memory, const Set& set, const Number& number,
@@ -105,10 +104,10 @@ void solve_line(const Column& column, const Runs& runs, const BrickMemory& memor
     float** const bending = pointers.data();
     float** const trailing = bending + length;
     for (int i = 0; i < length; ++i) {
-      float* const brick = memory.brick(column.bricks[static_cast<std::size_t>((from + i) / edge)]);
+      float* const block = memory.brick(column.blocks[static_cast<std::size_t>((from + i) / edge)]);
       const int at = number((from + i) % edge);
-      bending[i] = brick + CoefficientBlock::bending_offset(components, at);
-      trailing[i] = brick + CoefficientBlock::trailing_offset(components) + at;
+      bending[i] = block + CoefficientBlock::bending_offset(components, at);
+      trailing[i] = block + CoefficientBlock::trailing_offset(components) + at;
     }
     solve_run<voxels * components>(bending, length, continues_before, continues_after);
     solve_run<voxels>(trailing, length, continues_before, continues_after);
@@ -123,7 +122,7 @@ void solve_across(const CoefficientBricks& bricks, const Column& column, const R
   for (int across = 0; across < edge; ++across) {
     const auto row = [&](int i) {
       const int within = i % edge;
-      return bricks.filled[column.bricks[static_cast<std::size_t>(i / edge)]]
+      return bricks.filled[column.blocks[static_cast<std::size_t>(i / edge)]]
                           [static_cast<std::size_t>(along_x ? within * edge + across : across * edge + within)];
     };
     const auto number = [&](int i, int z) {
@@ -149,14 +148,14 @@ void copy_sheet(const Column& column, int x, const BrickMemory& memory, float* b
   const auto copy = [](float* voxel, float* place, std::size_t count) {
     back ? std::memcpy(voxel, place, count * sizeof(float)) : std::memcpy(place, voxel, count * sizeof(float));
   };
-  for (const std::uint32_t number : column.bricks) {
-    float* const brick = memory.brick(number);
+  for (const std::uint32_t number : column.blocks) {
+    float* const block = memory.brick(number);
     for (int y = 0; y < edge; ++y) {
       const int first = CoefficientBlock::coefficient(x, y, 0);
       for (int z = 0; z < edge; ++z) {
         float* const place = buffer + (z * edge + y) * floats;
-        copy(brick + CoefficientBlock::bending_offset(components, first + z), place, components);
-        copy(brick + CoefficientBlock::trailing_offset(components) + first + z, place + components, 1);
+        copy(block + CoefficientBlock::bending_offset(components, first + z), place, components);
+        copy(block + CoefficientBlock::trailing_offset(components) + first + z, place + components, 1);
       }
     }
     buffer += edge * edge * floats;
@@ -170,7 +169,7 @@ void solve_along_z(const CoefficientBricks& bricks, const Column& column, const 
   std::vector<float> buffer(static_cast<std::size_t>(runs.count * all));
   std::vector<float*> pointers(static_cast<std::size_t>(runs.count));
   const auto row = [&](int i, int x, int y) {
-    return bricks.filled[column.bricks[static_cast<std::size_t>(i)]][static_cast<std::size_t>(x * edge + y)];
+    return bricks.filled[column.blocks[static_cast<std::size_t>(i)]][static_cast<std::size_t>(x * edge + y)];
   };
   for (int x = 0; x < edge; ++x) {
     copy_sheet<components, false>(column, x, memory, buffer.data());
@@ -192,25 +191,25 @@ void solve_along_z(const CoefficientBricks& bricks, const Column& column, const 
   }
 }
 
-/// The bricks of the column that begins with a brick; none if another brick is before it.
+/// The blocks of the column that begins with a block; none if another block is before it.
 Column column_of(const CoefficientBricks& bricks, std::size_t first, int axis) {
   Column column;
   const Vector3i along = Vector3i::Unit(axis);
   Vector3i place = bricks.places[first];
   if (bricks.index.find(place - along) != BrickIndex::missing) return column;
   for (std::uint32_t brick; (brick = bricks.index.find(place)) != BrickIndex::missing; place += along)
-    column.bricks.push_back(brick);
+    column.blocks.push_back(brick);
   return column;
 }
 
 template <int components>
-void solve_columns(int axis, const Coefficients& field, const BrickNumbers& numbers) {
+void solve_columns(int axis, const Coefficients& field, const PlaceNumbers& numbers) {
   tbb::parallel_for(std::size_t{0}, numbers.size(), [&](std::size_t i) {
     const Column column = column_of(field.bricks, numbers[i], axis);
-    if (column.bricks.empty()) return;
+    if (column.blocks.empty()) return;
     make_room();
     const int begin = edge * field.bricks.places[numbers[i]][axis];
-    const int count = edge * static_cast<int>(column.bricks.size());
+    const int count = edge * static_cast<int>(column.blocks.size());
     const Runs runs{axis, begin, count, field.extent, field.border};
     if (axis == 2)
       solve_along_z<components>(field.bricks, column, runs, field.blocks);
@@ -219,33 +218,13 @@ void solve_columns(int axis, const Coefficients& field, const BrickNumbers& numb
   });
 }
 
-/// The places in slabs across x, each of at most `bytes` or with one place along x, in their order.
-std::vector<BrickNumbers> slabs_of(const CoefficientBricks& bricks, std::size_t bytes, std::size_t bytes_of_block) {
-  std::map<int, BrickNumbers> by_x;
-  for (std::uint32_t i = 0; i < bricks.places.size(); ++i) by_x[bricks.places[i].x()].push_back(i);
-  std::vector<BrickNumbers> slabs;
-  for (const auto& [x, numbers] : by_x)
-    if (slabs.empty() || (slabs.back().size() + numbers.size()) * bytes_of_block > bytes)
-      slabs.push_back(numbers);
-    else
-      slabs.back().insert(slabs.back().end(), numbers.begin(), numbers.end());
-  return slabs;
-}
-
-/// Three slabs are in use at a time: one is solved, and bricks are made of the one before it with what they need of a
-/// third. With a bound of memory they may take a quarter of it.
-std::vector<BrickNumbers> slabs_of(const CoefficientBricks& bricks, int components) {
-  const std::size_t bytes = memory_bound() ? *memory_bound() / 12 : std::size_t{1} << 27;
-  return slabs_of(bricks, bytes, static_cast<std::size_t>(CoefficientBlock::stored_floats(components)) * sizeof(float));
-}
-
 /// Where the blocks begin in the memory, in floats: so far behind that the bricks of a slab end before the blocks of
 /// the slab before it, and on a page. Blocks of places without bricks are behind all others, whatever their slab.
 std::size_t begin_of_blocks(const CoefficientBricks& bricks, int components) {
   const auto brick = static_cast<std::size_t>(CubicBrick::stored_floats(components));
   const auto block = static_cast<std::size_t>(CoefficientBlock::stored_floats(components));
   std::size_t begin = 0, first_before = 0;
-  for (const BrickNumbers& slab : slabs_of(bricks, components)) {
+  for (const PlaceNumbers& slab : bricks.slabs) {
     std::size_t first = bricks.count, end = 0;
     for (const std::size_t i : slab) {
       if (i >= bricks.count) continue;
@@ -253,7 +232,7 @@ std::size_t begin_of_blocks(const CoefficientBricks& bricks, int components) {
       end = std::max(end, i + 1);
     }
     if (end * brick > first_before * block) begin = std::max(begin, end * brick - first_before * block);
-    first_before = first;
+    if (end > 0) first_before = first;
   }
   constexpr std::size_t page = 4096 / sizeof(float);
   return (begin + page - 1) / page * page;
@@ -279,13 +258,13 @@ BrickMemory blocks_within(const BrickMemory& memory, const CoefficientBricks& br
 }
 
 std::vector<float> make_coefficients(const Coefficients& field, const BrickMemory& result) {
-  const auto solve = [&](int axis, const BrickNumbers& numbers) {
+  const auto solve = [&](int axis, const PlaceNumbers& numbers) {
     field.blocks.components == TensorBrick::symmetric ? solve_columns<TensorBrick::symmetric>(axis, field, numbers)
                                                       : solve_columns<TensorBrick::general>(axis, field, numbers);
   };
-  const std::vector<BrickNumbers> slabs = slabs_of(field.bricks, field.blocks.components);
+  const std::vector<PlaceNumbers>& slabs = field.bricks.slabs;
   std::vector<float> strongest(field.bricks.count);
-  for (const BrickNumbers& slab : slabs) solve(0, slab);
+  for (const PlaceNumbers& slab : slabs) solve(0, slab);
   for (std::size_t i = 0; i <= slabs.size(); ++i) {
     if (i < slabs.size()) {
       solve(1, slabs[i]);

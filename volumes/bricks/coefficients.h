@@ -12,8 +12,10 @@ namespace tensorray {
 /// Copies a block of symmetric tensors to one of tensors of any kind, in the layout of CoefficientBlock.
 void widen_values(const float* symmetric, float* general);
 
-/// Memory for the bricks of a cubic field, zeros, which holds its blocks first: where it is written last.
+/// Memory for the bricks of a cubic field, zeros. Its end holds the blocks, until bricks overwrite them.
 BrickMemory cubic_memory(const CoefficientBricks& bricks, int components);
+
+/// The blocks within this memory, which they keep.
 BrickMemory blocks_within(const BrickMemory& memory, const CoefficientBricks& bricks);
 
 /// Continues the values of the active voxels to the others that have coefficients, as the mean of all axes that lead to
@@ -29,13 +31,10 @@ void continue_values(const Coefficients& field);
 /// @return TensorBrick::strongest of the bricks.
 std::vector<float> make_coefficients(const Coefficients& field, const BrickMemory& result);
 
-/// Numbers of places in CoefficientBricks.
-using BrickNumbers = std::vector<std::uint32_t>;
-
 /// Copies to each brick the coefficients that its cells need, and extrapolates those that are outside the extent.
 /// @param numbers  The bricks; numbers of other places are passed over. @param strongest  Gets TensorBrick::strongest
 /// of the bricks.
-void finish_bricks(const Coefficients& field, const BrickNumbers& numbers, const BrickMemory& result,
+void finish_bricks(const Coefficients& field, const PlaceNumbers& numbers, const BrickMemory& result,
                    std::vector<float>& strongest);
 
 }  // namespace tensorray

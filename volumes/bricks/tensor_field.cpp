@@ -79,7 +79,8 @@ double TensorField::make_linear_bricks(const BlockTable& table, const Eigen::Ali
     if (share) shares[i] = *share;
     return share.has_value();
   };
-  const auto make = [&](int components) {
+  const auto make = [&](bool symmetric) {
+    const int components = symmetric ? TensorBrick::symmetric : TensorBrick::general;
     return make_bricks(bricks_.size(), TensorBrick::stored_floats(components), components);
   };
   memory_ = place_blocks(source, {make, widen_brick, place});
@@ -105,8 +106,8 @@ double TensorField::make_cubic_bricks(const BlockTable& table, const Eigen::Alig
     if (norm) norms[i] = *norm;
     return norm.has_value();
   };
-  const auto make = [&](int components) {
-    memory_ = cubic_memory(bricks, components);
+  const auto make = [&](bool symmetric) {
+    memory_ = cubic_memory(bricks, symmetric ? TensorBrick::symmetric : TensorBrick::general);
     return blocks_within(memory_, bricks);
   };
   const BrickMemory blocks = place_blocks(source, {make, widen_values, place});
@@ -115,6 +116,7 @@ double TensorField::make_cubic_bricks(const BlockTable& table, const Eigen::Alig
   continue_values(coefficients);
   const std::vector<float> strongest = make_coefficients(coefficients, memory_);
   keep_bricks(memory_, bricks.count);
+  expect_first_writes(memory_.floats.get(), memory_.bytes(), false);
   bricks_.assign(bricks.places.begin(), bricks.places.begin() + static_cast<std::ptrdiff_t>(bricks.count));
   index_ = BrickIndex(bricks_);
   index_.set_values(strongest);

@@ -3,16 +3,13 @@
 /// A tensor field that light can be traced through: immutable bricks in memory, and what is between their voxels.
 
 #include <cstddef>
-#include <cstdint>
-#include <functional>
-#include <memory>
 #include <vector>
 
 #include <Eigen/Geometry>
 
 #include "volumes/bricks/brick_index.h"
-#include "volumes/bricks/brick_memory.h"
 #include "volumes/grids/block_source.h"
+#include "volumes/grids/brick_memory.h"
 #include "volumes/grids/interpolation.h"
 #include "volumes/grids/tensor_grid.h"
 

@@ -1,5 +1,5 @@
 #pragma once
-/// @file volumes/bricks/brick_memory.h
+/// @file volumes/grids/brick_memory.h
 /// Memory for the bricks of a field, and for blocks of voxels on their way to these.
 
 #include <cstddef>
@@ -14,7 +14,7 @@ namespace tensorray {
 struct BrickMemory {
   std::shared_ptr<float[]> floats;
   std::size_t count = 0, stride = 0;  ///< Number of bricks; floats of one.
-  int components = 0;                 ///< Stored of each tensor beside T₂₂: TensorBrick::symmetric or general.
+  int components = 0;                 ///< Stored of each tensor beside T₂₂.
 
   float* brick(std::size_t i) const { return floats.get() + i * stride; }
   std::size_t bytes() const { return count * stride * sizeof(float); }
@@ -29,8 +29,8 @@ void keep_bricks(BrickMemory& bricks, std::size_t count);
 
 /// What blocks are placed in.
 struct BlockPlaces {
-  /// Makes bricks of zeros that store so many components.
-  std::function<BrickMemory(int components)> make;
+  /// Makes bricks of zeros, for symmetric tensors or for any.
+  std::function<BrickMemory(bool symmetric)> make;
   /// Copies a brick of symmetric tensors to one of tensors of any kind.
   void (*widen)(const float* symmetric, float* general);
   /// Places block i. @return false, and leaves the bricks as they are, if they do not have enough components.

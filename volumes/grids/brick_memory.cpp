@@ -1,4 +1,4 @@
-#include "volumes/bricks/brick_memory.h"
+#include "volumes/grids/brick_memory.h"
 
 #include <algorithm>
 #include <atomic>
@@ -6,7 +6,6 @@
 #include <tbb/blocked_range.h>
 #include <tbb/parallel_for.h>
 
-#include "volumes/bricks/tensor_field.h"
 #include "volumes/grids/page_memory.h"
 
 namespace tensorray {
@@ -20,7 +19,7 @@ constexpr std::size_t grain = 16;
 
 /// The same bricks with tensors of any kind. `keep`: with the tensors that they hold.
 BrickMemory widened(const BrickMemory& narrow, const BlockPlaces& places, bool keep) {
-  BrickMemory wide = places.make(TensorBrick::general);
+  BrickMemory wide = places.make(false);
   if (keep)
     tbb::parallel_for(std::size_t{0}, narrow.count, [&](std::size_t i) {
       make_room();
@@ -50,7 +49,7 @@ void keep_bricks(BrickMemory& bricks, std::size_t count) {
 }
 
 BrickMemory place_blocks(const BlockSource& source, const BlockPlaces& places) {
-  BrickMemory bricks = places.make(TensorBrick::symmetric);
+  BrickMemory bricks = places.make(true);
   std::atomic<bool> fits{true};
   const auto place_part = [&](const tbb::blocked_range<std::size_t>& range) {
     TensorBlock block;
