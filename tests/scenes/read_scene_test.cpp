@@ -368,7 +368,8 @@ TEST_F(ReadScene, WarnsWhereTheDirectionOfTheLightHasNoEffect) {
       return warning.find("`/light/direction` has no effect") != std::string::npos;
     });
   };
-  const std::string lights = R"("field": {"generate": {"kind": "vortex"}, "scale": 2}, "lights": [{"kind": "constant"}])";
+  const std::string lights =
+      R"("field": {"generate": {"kind": "vortex"}, "scale": 2}, "lights": [{"kind": "constant"}])";
   EXPECT_TRUE(warns({}, lights));
   EXPECT_FALSE(warns({"field.scale=auto"}, lights)) << "the scale is for this light";
   EXPECT_FALSE(warns({"lights=null"}, lights)) << "the sun shines along it";
