@@ -197,8 +197,8 @@ Column column_of(const CoefficientBricks& bricks, std::size_t first, int axis) {
   const Vector3i along = Vector3i::Unit(axis);
   Vector3i place = bricks.places[first];
   if (bricks.index.find(place - along) != BrickIndex::missing) return column;
-  for (std::uint32_t brick; (brick = bricks.index.find(place)) != BrickIndex::missing; place += along)
-    column.blocks.push_back(brick);
+  for (std::uint32_t block; (block = bricks.index.find(place)) != BrickIndex::missing; place += along)
+    column.blocks.push_back(block);
   return column;
 }
 
