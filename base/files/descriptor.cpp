@@ -25,6 +25,8 @@ Descriptor open_file(const std::filesystem::path& path, int flags, unsigned mode
   return Descriptor(::open(path.c_str(), flags | O_CLOEXEC, mode));
 }
 
+Descriptor duplicate(const Descriptor& file) { return Descriptor(fcntl(file.get(), F_DUPFD_CLOEXEC, 0)); }
+
 namespace {
 
 /// Calls `move(done)`, which moves some of `count` bytes from number `done` on and returns how many, until all are.

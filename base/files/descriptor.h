@@ -32,6 +32,9 @@ class Descriptor {
 /// 0666 without the bits of the umask. @return a descriptor that is not open if it fails; `errno` says why.
 Descriptor open_file(const std::filesystem::path& path, int flags, unsigned mode = 0666);
 
+/// Another descriptor of the same open file. @return a descriptor that is not open if it fails; `errno` says why.
+Descriptor duplicate(const Descriptor& file);
+
 /// Writes all bytes, however many calls it takes. @return false if it fails; `errno` says why.
 bool write_whole(int descriptor, std::string_view bytes);
 

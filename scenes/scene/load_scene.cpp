@@ -10,6 +10,7 @@
 #include "renderer/meshes/mesh.h"
 #include "scenes/description/choices.h"
 #include "scenes/scene/scene.h"
+#include "scenes/scene/shared_field.h"
 #include "volumes/files/tensor_files.h"
 #include "volumes/making/field_making.h"
 #include "volumes/making/smoothing.h"
@@ -36,10 +37,11 @@ BlockSource open_field(const SceneDescription& scene) {
   }
 }
 
-LoadedField load_field(const SceneDescription& scene) {
+LoadedField load_field(const SceneDescription& scene, const Progress& progress) {
   const FieldDescription& field = scene.field;
   const std::string source = field.generate ? kind_of(field.generate->generator) : field.file.string();
-  return prepare_field(open_field(scene), choices_of(scene), source);
+  const auto load = [&] { return prepare_field(open_field(scene), choices_of(scene), source); };
+  return share_field(scene, load, progress);
 }
 
 TriangleMesh load_closed_mesh(const std::filesystem::path& path) {
@@ -352,7 +354,7 @@ Scene load_scene(const SceneDescription& description, const Progress& progress) 
   const auto start = Clock::now();
   LoadedLight light = load_light(description);
   progress.update("loading", 0, 1);
-  LoadedField loaded = load_field(description);
+  LoadedField loaded = load_field(description, progress);
   std::vector<std::string> notes = notes_of(description, loaded);
   Scene scene = make_scene(description, std::move(light), std::move(loaded), std::move(notes), progress);
   scene.seconds = seconds_since(start);

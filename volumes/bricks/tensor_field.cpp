@@ -5,6 +5,7 @@
 #include <cmath>
 #include <optional>
 #include <stdexcept>
+#include <utility>
 
 #include <tbb/parallel_for.h>
 
@@ -61,6 +62,21 @@ TensorField::TensorField(const BlockSource& source, const Interpolant& interpola
   const BlockTable table(source.shapes);
   const double norm = is_cubic() ? make_cubic_bricks(table, active, source) : make_linear_bricks(table, active, source);
   greatest_norm_ = std::sqrt(norm);
+}
+
+TensorField::TensorField(FieldParts parts)
+    : interpolant_(parts.interpolant),
+      to_world_(parts.to_world),
+      to_index_(parts.to_world.inverse()),
+      index_bounds_(extent_of(parts.voxels)),
+      voxels_(parts.voxels.cast<double>()),
+      bricks_(std::move(parts.bricks)),
+      memory_(std::move(parts.memory)),
+      trailing_offset_(static_cast<std::size_t>(is_cubic() ? CubicBrick::trailing_offset(memory_.components)
+                                                           : TensorBrick::trailing_offset(memory_.components))),
+      greatest_norm_(parts.greatest_norm),
+      index_(bricks_) {
+  index_.set_values(parts.strongest);
 }
 
 /// @return the greatest squared norm of a voxel.
@@ -121,6 +137,11 @@ double TensorField::make_cubic_bricks(const BlockTable& table, const Eigen::Alig
   index_ = BrickIndex(bricks_);
   index_.set_values(strongest);
   return *std::max_element(norms.begin(), norms.end());
+}
+
+void TensorField::keep_with_bricks(std::shared_ptr<const void> other) {
+  float* const floats = memory_.floats.get();
+  memory_.floats = {floats, [bricks = memory_.floats, other = std::move(other)](float*) {}};
 }
 
 std::vector<Eigen::Vector3d> TensorField::corners() const { return corners_of(index_bounds_, to_world_); }

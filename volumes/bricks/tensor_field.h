@@ -3,6 +3,7 @@
 /// A tensor field that light can be traced through: immutable bricks in memory, and what is between their voxels.
 
 #include <cstddef>
+#include <memory>
 #include <vector>
 
 #include <Eigen/Geometry>
@@ -58,6 +59,17 @@ struct TensorBrick {
   Eigen::Matrix3d tensor(int voxel) const;  ///< The tensor T at a voxel of a linear field.
 };
 
+/// What a field consists of.
+struct FieldParts {
+  Interpolant interpolant;
+  Eigen::Affine3d to_world;
+  Eigen::AlignedBox3i voxels;           ///< From the least to the greatest active one.
+  std::vector<Eigen::Vector3i> bricks;  ///< As `TensorField::bricks`.
+  std::vector<float> strongest;         ///< TensorBrick::strongest of each.
+  BrickMemory memory;                   ///< In the order of `bricks`.
+  double greatest_norm = 0;
+};
+
 /// A field as bricks in memory. Its size grows with the number of active voxels, not with the extent. Immutable; any
 /// number of threads may read it at once. Copies share the voxels.
 class TensorField {
@@ -70,6 +82,9 @@ class TensorField {
 
   /// The same from a grid.
   explicit TensorField(const TensorGrid& grid, const Interpolant& interpolant = {});
+
+  /// The same from bricks that are made.
+  explicit TensorField(FieldParts parts);
 
   const Eigen::Affine3d& to_world() const { return to_world_; }
   const Eigen::Affine3d& to_index() const { return to_index_; }
@@ -107,6 +122,11 @@ class TensorField {
   /// is not zero.
   const std::vector<Eigen::Vector3i>& bricks() const { return bricks_; }
   std::size_t memory_bytes() const;
+
+  const BrickMemory& memory() const { return memory_; }
+
+  /// Keeps something until the bricks are freed.
+  void keep_with_bricks(std::shared_ptr<const void> other);
 
   /// The brick whose first cell is at `brick` * 8. It is the brick of zeros wherever no brick is in memory, also
   /// outside the extent.

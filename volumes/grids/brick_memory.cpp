@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <atomic>
+#include <utility>
 
 #include <tbb/blocked_range.h>
 #include <tbb/parallel_for.h>
@@ -16,6 +17,10 @@ constexpr std::size_t part_size = 4096;
 
 /// Number of blocks that a thread places in a row. Neighbours along z share bricks.
 constexpr std::size_t grain = 16;
+
+std::shared_ptr<float[]> owned_pages(void* pages, std::size_t bytes) {
+  return {static_cast<float*>(pages), [bytes](float* floats) { unmap_pages(floats, bytes); }};
+}
 
 /// The same bricks with tensors of any kind. `keep`: with the tensors that they hold.
 BrickMemory widened(const BrickMemory& narrow, const BlockPlaces& places, bool keep) {
@@ -37,9 +42,19 @@ BrickMemory make_bricks(std::size_t count, int stored_floats, int components) {
   bricks.components = components;
   constexpr std::size_t alignment = 4096;
   const std::size_t bytes = bricks.bytes();
-  bricks.floats = {static_cast<float*>(map_pages(bytes, alignment)),
-                   [bytes](float* floats) { unmap_pages(floats, bytes); }};
+  if (memory_bound()) {
+    bricks.file = std::make_shared<const Descriptor>(make_page_file(bytes));
+    bricks.floats = owned_pages(map_page_file(*bricks.file, bytes, true), bytes);
+  } else {
+    bricks.floats = owned_pages(map_pages(bytes, alignment), bytes);
+  }
   expect_first_writes(bricks.floats.get(), bytes, true);
+  return bricks;
+}
+
+BrickMemory bricks_of_file(Descriptor file, std::size_t count, std::size_t stride, int components) {
+  BrickMemory bricks{{}, count, stride, components, std::make_shared<const Descriptor>(std::move(file))};
+  bricks.floats = owned_pages(map_page_file(*bricks.file, bricks.bytes(), false), bricks.bytes());
   return bricks;
 }
 

@@ -50,7 +50,7 @@ Descriptor open_nameless(const std::filesystem::path& folder) {
   return file;
 }
 
-/// The file, and where its pages are in memory.
+/// The file, and where its pages and those of other files are in memory.
 class PageStore {
  public:
   PageStore(std::size_t bound, std::filesystem::path folder)
@@ -76,19 +76,26 @@ class PageStore {
   /// Replaces memory by pages of the file.
   void place(char* memory, std::size_t bytes) {
     const std::lock_guard lock(mutex_);
-    if (is_near()) drop_pages();
-    if (resident() > bound_)
-      throw std::runtime_error("--memory " + bytes_text(static_cast<double>(bound_)) +
-                               ": what is beside the field takes " + bytes_text(static_cast<double>(resident())) +
-                               "; give more");
-    // The disk must have the space now: a page that cannot be stored would end the process.
-    if (posix_fallocate(file_.get(), end_, static_cast<off_t>(bytes)) != 0)
-      throw std::runtime_error("--memory: the disk of " + folder_.string() + " has no space for " +
-                               bytes_text(static_cast<double>(bytes)) + " more of the field");
+    take_space(file_, end_, bytes);
     if (mmap(memory, bytes, PROT_READ | PROT_WRITE, MAP_SHARED | MAP_FIXED, file_.get(), end_) == MAP_FAILED)
       throw std::bad_alloc();
     regions_[memory] = {bytes, end_};
     end_ += static_cast<off_t>(bytes);
+  }
+
+  Descriptor make_file(std::size_t bytes) {
+    Descriptor file = open_nameless(folder_);
+    const std::lock_guard lock(mutex_);
+    take_space(file, 0, bytes);
+    return file;
+  }
+
+  void* map_file(const Descriptor& file, std::size_t bytes, int protection) {
+    void* const memory = mmap(nullptr, bytes, protection, MAP_SHARED, file.get(), 0);
+    if (memory == MAP_FAILED) throw std::bad_alloc();
+    const std::lock_guard lock(mutex_);
+    regions_[static_cast<char*>(memory)] = {bytes, in_own_file};
+    return memory;
   }
 
   /// Gives the space of these pages back to the disk. Where the file system cannot, they take it until the end.
@@ -98,7 +105,8 @@ class PageStore {
     if (region == regions_.end()) return;
     constexpr int hole = FALLOC_FL_PUNCH_HOLE | FALLOC_FL_KEEP_SIZE;
     const auto size = static_cast<off_t>(region->second.bytes);
-    static_cast<void>(fallocate(file_.get(), hole, region->second.offset, size));
+    if (region->second.offset != in_own_file)
+      static_cast<void>(fallocate(file_.get(), hole, region->second.offset, size));
     regions_.erase(region);
   }
 
@@ -107,8 +115,22 @@ class PageStore {
     std::size_t bytes;
     off_t offset;
   };
+  static constexpr off_t in_own_file = -1;
 
   bool is_near() const { return static_cast<double>(resident()) > high * static_cast<double>(bound_); }
+
+  /// Makes room in memory, and takes space on the disk.
+  void take_space(const Descriptor& file, off_t offset, std::size_t bytes) {
+    if (is_near()) drop_pages();
+    if (resident() > bound_)
+      throw std::runtime_error("--memory " + bytes_text(static_cast<double>(bound_)) +
+                               ": what is beside the field takes " + bytes_text(static_cast<double>(resident())) +
+                               "; give more");
+    // The disk must have the space now: a page that cannot be stored would end the process.
+    if (posix_fallocate(file.get(), offset, static_cast<off_t>(bytes)) != 0)
+      throw std::runtime_error("--memory: the disk of " + folder_.string() + " has no space for " +
+                               bytes_text(static_cast<double>(bytes)) + " more of the field");
+  }
 
   void watch() {
     for (;;) {
@@ -206,6 +228,12 @@ void* map_pages(std::size_t bytes, std::size_t alignment) {
 void unmap_pages(void* memory, std::size_t bytes) noexcept {
   if (store) store->remove(static_cast<char*>(memory));
   munmap(memory, bytes);
+}
+
+Descriptor make_page_file(std::size_t bytes) { return store->make_file(bytes); }
+
+void* map_page_file(const Descriptor& file, std::size_t bytes, bool writable) {
+  return store->map_file(file, bytes, writable ? PROT_READ | PROT_WRITE : PROT_READ);
 }
 
 void expect_first_writes(void* memory, std::size_t bytes, bool expected) noexcept {

@@ -8,6 +8,8 @@
 #include <memory>
 #include <optional>
 
+#include "base/files/descriptor.h"
+
 namespace tensorray {
 
 /// Sets the bound: the resident memory of the whole process then stays below `bytes`. Pages of fields are in a file
@@ -34,6 +36,13 @@ void require_room(double stored, double resident);
 void* map_pages(std::size_t bytes, std::size_t alignment);
 
 void unmap_pages(void* memory, std::size_t bytes) noexcept;
+
+/// With a bound: a file of zeros, without a name, whose pages other processes can map as well. @throw as map_pages.
+Descriptor make_page_file(std::size_t bytes);
+
+/// With a bound: maps the first bytes of such a file; `unmap_pages` unmaps them. @param writable  Else they are only
+/// read. @throw std::bad_alloc.
+void* map_page_file(const Descriptor& file, std::size_t bytes, bool writable);
 
 /// Tells whether the next writes to pages of `map_pages` are mostly the first ones. While they are, a page comes alone:
 /// file systems that keep pages in large groups take time for the whole group whenever one of its pages is first

@@ -58,6 +58,42 @@ TEST_F(Memory, SmallFieldsAreTheSame) {
   EXPECT_TRUE(read_file(in_folder("all.exr")) == read_file(in_folder("part.exr")));
 }
 
+/// The first process is stopped in the midst of a long render, and killed, while others use its field.
+TEST_F(Memory, ProcessesOfAMachineHaveOneFieldInCommon) {
+  const std::string field = R"({"generate": {"kind": "vortex", "resolution": 40}, "scale": 1})",
+                    note = "another process";
+  write("scene.json", scene(field));
+  const std::vector<std::string> render = {"render", "scene.json", "--memory", "1G", "-o"};
+  const auto with = [&](std::vector<std::string> more) {
+    more.insert(more.begin(), render.begin(), render.end());
+    return more;
+  };
+  std::filesystem::create_directory(in_folder("tmp"));
+  const std::string shell = "export TMPDIR=\"$PWD/tmp\"; ";
+  const auto notes_of = [&](const std::string& name) {
+    const Outcome outcome = wait_for(start_in(shell + "exec", with({name})));
+    EXPECT_EQ(outcome.status, 0) << outcome.error;
+    return outcome.error;
+  };
+  EXPECT_EQ(notes_of("alone.exr").find(note), std::string::npos);
+
+  const pid_t first =
+      start_in(shell + "exec 2>first.log; exec", with({"first.exr", "--set", "light.photons=4000000000"}));
+  while (read_file(in_folder("first.log")).find("voxels") == std::string::npos) {
+    ASSERT_EQ(waitpid(first, nullptr, WNOHANG), 0) << read_file(in_folder("first.log"));
+    std::this_thread::sleep_for(std::chrono::milliseconds(5));
+  }
+  kill(first, SIGSTOP);
+  EXPECT_NE(notes_of("shared.exr").find(note), std::string::npos);
+  kill(first, SIGKILL);
+  wait_for(first);
+  EXPECT_EQ(notes_of("again.exr").find(note), std::string::npos);
+
+  for (const char* name : {"shared.exr", "again.exr"})
+    EXPECT_TRUE(read_file(in_folder("alone.exr")) == read_file(in_folder(name))) << name;
+  EXPECT_TRUE(std::filesystem::is_empty(in_folder("tmp")));
+}
+
 TEST_F(Memory, WhatCannotFitIsSaid) {
   write("scene.json", scene(R"({"generate": {"kind": "vortex", "resolution": 9}})"));
   const std::pair<const char*, const char*> wrong[] = {

@@ -1,0 +1,45 @@
+#pragma once
+/// @file base/files/shared_file.h
+/// Files without a name that processes of one user on one machine have in common.
+
+#include <filesystem>
+#include <functional>
+#include <string>
+
+#include "base/files/descriptor.h"
+
+namespace tensorray {
+
+/// The file of a key. The process that makes it offers it; others find it as long as any of them holds it. It vanishes
+/// with the last one, however that ends. What is left then is at most a list of a few bytes in the temporary folder,
+/// which the next process with this key uses.
+///
+/// Where processes cannot share (a temporary folder that cannot be written, a system that hides processes from each
+/// other), each is alone, and makes its own file. Not for several threads at once.
+class SharedFile {
+ public:
+  /// Finds the file of another process. Waits while another one makes it. If no process has it, others that ask for it
+  /// wait until this one offers its own, or until this object ends.
+  /// @param key      Letters and digits. @param waiting  Called every few hundredths of a second of waiting; what it
+  /// throws ends it.
+  SharedFile(const std::string& key, const std::function<void()>& waiting);
+  ~SharedFile();
+  SharedFile(const SharedFile&) = delete;
+  SharedFile& operator=(const SharedFile&) = delete;
+
+  /// The file that another process has made, for reading. Not open: there is none.
+  const Descriptor& file() const { return file_; }
+
+  /// Lets other processes have a file that is complete, while this object lives. Called once at most, and only if there
+  /// was none.
+  void offer(const Descriptor& file);
+
+ private:
+  void write_list();
+
+  std::filesystem::path path_;  ///< Of the list of the processes that have the file.
+  Descriptor list_;             ///< Open while it is locked.
+  Descriptor file_;
+};
+
+}  // namespace tensorray
