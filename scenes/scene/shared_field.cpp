@@ -4,16 +4,18 @@
 #include <utility>
 
 #include <fmt/format.h>
+#include <nlohmann/json.hpp>
 #include <sys/stat.h>
 
 #include "base/files/shared_file.h"
 #include "base/text/content_hash.h"
-#include "scenes/keys/json_reader.h"
 #include "volumes/grids/page_memory.h"
 #include "volumes/making/field_file.h"
 
 namespace tensorray {
 namespace {
+
+using Json = nlohmann::json;
 
 /// What tells whether a file has the bytes that it had.
 Json identity_of(const std::filesystem::path& file) {
@@ -25,7 +27,7 @@ Json identity_of(const std::filesystem::path& file) {
 /// Of the program, and of all that the field depends on.
 std::string key_of(const SceneDescription& scene) {
   const Interpolant interpolant = interpolant_of(scene);
-  Json field = parse_value(scene.text).at("field");
+  Json field = Json::parse(scene.text).at("field");
   if (field.is_object()) {
     field.erase("scale");
     field.erase("bounds");
@@ -46,7 +48,7 @@ std::string words_of(const LoadedField& loaded) {
 }
 
 LoadedField loaded_of(FieldOfFile made) {
-  const Json words = parse_value(made.words);
+  const Json words = Json::parse(made.words);
   LoadedField loaded{std::move(made.field),
                      {},
                      words.at("non_finite").get<std::size_t>(),
