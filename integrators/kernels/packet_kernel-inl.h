@@ -50,7 +50,7 @@ class Kernel {
   void end_step(Packet& packet, std::uint32_t staying, std::uint32_t stop);
   std::uint32_t outside(const Packet& packet, const PerRay& points, int axis) const;
   std::uint32_t outside(const Packet& packet, const PerRay (&points)[3]) const;
-  std::uint32_t stopped(const Packet& packet) const;
+  std::uint32_t stopped(Packet& packet) const;
   std::uint32_t spent(const Packet& packet) const;
   void locate_on_extent(Packet& packet);
   void add_step(Packet& packet);
@@ -213,9 +213,9 @@ HWY_NOINLINE std::uint32_t Kernel<Bricks, uniform, differentials, changes>::outs
   return (any & ~leave) | edges;
 }
 
-/// The lanes that cannot take this step, as bits.
+/// The lanes that cannot take this step, as bits. Sets those that meet a surface.
 template <class Bricks, bool uniform, bool differentials, bool changes>
-HWY_NOINLINE std::uint32_t Kernel<Bricks, uniform, differentials, changes>::stopped(const Packet& packet) const {
+HWY_NOINLINE std::uint32_t Kernel<Bricks, uniform, differentials, changes>::stopped(Packet& packet) const {
   std::uint32_t stop = 0;
   for (int i = 0; i < packet.vectors * lanes; i += lanes) {
     const F3 v = load(packet.v_next, i);
@@ -226,11 +226,12 @@ HWY_NOINLINE std::uint32_t Kernel<Bricks, uniform, differentials, changes>::stop
     const auto lane = hwy::Num0BitsBelowLS1Bit_Nonzero32(rest);
     const float before = static_cast<float>(rays_[packet.ray[lane]].length);  // Length of the path up to the field.
     const float length = (packet.length[lane] + packet.time[lane]) * to_world() + before;
-    bool stops = length >= medium_.settings.max_length;
-    stops |= packet.near_surface && step_meets_surface(medium_, packet, static_cast<int>(lane));
-    if (stops) stop |= 1u << lane;
+    if (length >= medium_.settings.max_length)
+      stop |= 1u << lane;
+    else if (packet.near_surface && step_meets_surface(medium_, packet, static_cast<int>(lane)))
+      packet.lands |= 1u << lane;
   }
-  return stop;
+  return stop | packet.lands;
 }
 
 /// The lanes that may take no further step, as bits. Rays that have crossed a cut have taken more steps than the
@@ -275,6 +276,11 @@ HWY_NOINLINE void Kernel<Bricks, uniform, differentials, changes>::retire(Packet
     ray.length += double{packet.length[lane]} * to_world();
     if constexpr (changes) ray.log_radiance_scale += packet.log_radiance_scale[lane];
     ray.step = packet.time[lane] * to_world();
+    ray.lands = (packet.lands & stop) >> lane & 1;
+    for (int axis = 0; axis < 3; ++axis) {
+      ray.end[axis] = packet.p_next[axis][lane];
+      ray.end_direction[axis] = packet.v_next[axis][lane];
+    }
     ray.steps += packet.steps;
     packet.alive &= ~(1u << lane);
     if (!(leave >> lane & 1)) continue;
@@ -325,6 +331,7 @@ template <class Bricks, bool uniform, bool differentials, bool changes>
 void Kernel<Bricks, uniform, differentials, changes>::end_step(Packet& packet, std::uint32_t staying,
                                                                std::uint32_t stop) {
   std::uint32_t leave = 0;
+  packet.lands = 0;
   if (packet.near_border) leave = outside(packet, packet.p_next) & ~staying;
   const bool may_fail = Bricks::cubic || medium_.settings.method != BendingMethod::splitting;
   if (may_fail || packet.near_surface || medium_.bounded || !(packet.greatest_reach <= strongest_kick))
@@ -332,9 +339,14 @@ void Kernel<Bricks, uniform, differentials, changes>::end_step(Packet& packet, s
   if (packet.steps >= packet.most_steps) stop |= spent(packet);
   if constexpr (differentials) {  // The reference computes the differentials at a crossing.
     stop |= leave;
+    packet.lands |= leave;
     leave = 0;
   }
-  if (is_composed() && packet.near_border) stop |= outside_between(packet, leave) & ~staying;
+  if (is_composed() && packet.near_border) {
+    const std::uint32_t between = outside_between(packet, leave) & ~staying;
+    stop |= between;
+    packet.lands |= between;
+  }
   stop &= packet.alive;
   leave &= packet.alive & ~stop;
   if ((stop | leave) != 0) retire(packet, stop, leave);

@@ -24,6 +24,8 @@ struct KernelRay {
   float log_radiance_scale = 0;    ///< Λ in the kernel, if it is wanted.
   std::int8_t axis = -1;           ///< Axis of the face of the extent where the ray left; -1: it has not left.
   float step = 0;                  ///< If the ray has not left: length of its next step, world units; 0: not known.
+  bool lands = false;              ///< Whether this step meets a surface. Without it, the step would end at
+  std::array<float, 3> end{}, end_direction{};  ///< a position as that of `place`, with this direction.
 };
 
 /// Derivatives of a ray along two parameters: voxels, in index space, and radians.

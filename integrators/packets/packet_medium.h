@@ -128,6 +128,7 @@ struct alignas(64) Packet {
   std::int32_t ray[packet_rays];
   std::uint32_t alive = 0;  // One bit for each lane.
   std::uint32_t moved = 0;  // The lanes that have entered other bricks for these samples; may be more.
+  std::uint32_t lands = 0;  // The lanes whose step meets a surface, or a face of the extent.
   int vectors = 0;          // Number of vectors in use.
   std::uint32_t steps = 0, most_steps = 0;
   float greatest_reach = 0;

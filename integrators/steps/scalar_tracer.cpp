@@ -221,7 +221,7 @@ double Tracer<N>::land(double h, const Landing& landing) {
     const double gap =
         (landing.to_plane - hit.normal.dot(landed.position() - start)) / hit.normal.dot(landed.direction());
     if (!(std::abs(gap) <= h)) break;  // The light is nearly parallel to the plane.
-    if (std::abs(gap) <= (is_composed() ? 1e-4 : 1e-10) * h || i == 3) {
+    if (std::abs(gap) <= (is_composed() ? 1e-3 : 1e-10) * h || i == 3) {
       landed.P += gap * landed.V;
       length += gap;
       break;
@@ -263,9 +263,9 @@ double Tracer<N>::next_step() {
 
 /// Steps through the field to an absorber, out of the box or out of the cut. Returns nothing if the ray leaves the cut.
 template <int N>
-std::optional<RayEnd> Tracer<N>::bend(double first_step) {
+std::optional<RayEnd> Tracer<N>::bend(double first_step, const State<N>* first_end) {
   voxel_ = length_of_voxel();
-  medium_.sample(ray_.P);
+  if (!(first_step > 0)) medium_.sample(ray_.P);  // For `automatic_step`.
   adaptive_step_ = first_step > 0 ? first_step / voxel_ : settings_.step == 0 ? automatic_step() : settings_.step;
   record(true);
   while (true) {
@@ -275,13 +275,16 @@ std::optional<RayEnd> Tracer<N>::bend(double first_step) {
     const double wanted = first_step > 0 ? first_step : next_step();
     const double rest = settings_.max_length - length_, h = std::min(wanted, rest);
     first_step = 0;
-    State<N> error;
-    const State<N> next = step(h, error);
-    if (next.direction().isZero() || !next.position().allFinite()) return RayEnd::degenerate;
-    if (is_controlled_ && control_step(error) > 1 && wanted > step_lengths::shortest_adaptive * voxel_) continue;
-
     Landing landing;
-    const Event event = meet(next, h, landing);
+    Event event = first_end && is_composed() && h == wanted ? meet(*first_end, h, landing) : Event::none;
+    first_end = nullptr;
+    State<N> next, error;
+    if (event == Event::none) {
+      next = step(h, error);
+      if (next.direction().isZero() || !next.position().allFinite()) return RayEnd::degenerate;
+      if (is_controlled_ && control_step(error) > 1 && wanted > step_lengths::shortest_adaptive * voxel_) continue;
+      event = meet(next, h, landing);
+    }
     if (event == Event::none) {
       record_inner(next, h);
       ray_ = next;
@@ -306,11 +309,12 @@ double Tracer<N>::deviator_here() {
 }
 
 template <int N>
-RayEnd Tracer<N>::follow(double first_step) {
+RayEnd Tracer<N>::follow(double first_step, const State<N>* first_end) {
   while (true) {
-    if (const auto end = bend(first_step)) return *end;
+    if (const auto end = bend(first_step, first_end)) return *end;
     ++steps_;
     first_step = 0;
+    first_end = nullptr;
     if (const auto end = cross_box()) return *end;
     ++steps_;
   }

@@ -46,8 +46,9 @@ class Tracer {
   void take_over(const State<N>& state, double strength, const Travelled& travelled, PathPoints* record);
 
   /// Follows the ray from a point in the field to its end. `first_step` is the length of the first step, world units;
-  /// 0: as any other step.
-  RayEnd follow(double first_step = 0);
+  /// 0: as any other step. `first_end` is where this step of `splitting4` ends, nearly; null: not known. If what it
+  /// meets is found without taking it, it need not be taken.
+  RayEnd follow(double first_step = 0, const State<N>* first_end = nullptr);
 
   /// Follows the ray from a face of the volume, through free space, to its end.
   RayEnd leave();
@@ -76,7 +77,7 @@ class Tracer {
   std::optional<RayEnd> reach(const std::optional<Hit>& entry);
   std::optional<RayEnd> reach_box();
   std::optional<RayEnd> cross_box();
-  std::optional<RayEnd> bend(double first_step);
+  std::optional<RayEnd> bend(double first_step, const State<N>* first_end);
   RayEnd miss();
 
   Eigen::Vector3d position() const { return ray_.position(); }

@@ -119,6 +119,15 @@ State<N> state_of(const TensorField& field, const packets::KernelRays& kernel, s
   return bending_steps::normalized(state);
 }
 
+/// Where the step of a ray ends that lands on a surface.
+template <int N>
+State<N> end_of_step(const TensorField& field, const KernelRay& ray) {
+  State<N> end{Eigen::Matrix<double, 3, N>::Zero(), Eigen::Matrix<double, 3, N>::Zero()};
+  end.P.col(0) = field.to_world() * index_position({ray.place.brick, ray.end});
+  end.V.col(0) = to_vector(ray.end_direction).normalized();
+  return end;
+}
+
 bool same_start(const RayBatch& batch, std::size_t i, std::size_t j) {
   const bool same = batch.position[i] == batch.position[j] && batch.direction[i] == batch.direction[j];
   return same &&
@@ -192,7 +201,9 @@ RayEnd finish(const TensorField& field, const TracedBatch& traced, std::size_t i
   }
   // The last point is recorded again.
   if (record) record->steps.empty() ? record->before.pop_back() : record->steps.pop_back();
-  return tracer.follow(double{ray.step});
+  const State<N> end = end_of_step<N>(field, ray);
+  const bool is_known = ray.lands && end.P.allFinite() && !end.direction().isZero();
+  return tracer.follow(double{ray.step}, is_known ? &end : nullptr);
 }
 
 template <int N>
