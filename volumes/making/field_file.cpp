@@ -89,7 +89,8 @@ std::optional<FieldOfFile> field_of_file(Descriptor file) {
   Ending ending{};
   const std::uint64_t size = size_of(file);
   if (size < sizeof ending || !read_whole_at(file.get(), &ending, sizeof ending, size - sizeof ending) ||
-      ending.mark != mark || ending.words > size || ending.count > size / (ending.stride * sizeof(float)))
+      ending.mark != mark || ending.words > size || ending.stride == 0 ||
+      ending.count > size / (ending.stride * sizeof(float)))
     return {};
   FieldParts parts = parts_of(ending);
   std::string words(ending.words, '\0');
