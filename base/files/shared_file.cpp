@@ -102,7 +102,7 @@ SharedFile::~SharedFile() {
 void SharedFile::offer(const Descriptor& file) {
   if (!list_.is_open()) return;
   file_ = duplicate(file);
-  if (file_.is_open()) write_list();
+  write_list();
 }
 
 /// Writes the processes that have a file, and unlocks the list; removes it if there are none.

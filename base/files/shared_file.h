@@ -19,7 +19,7 @@ namespace tensorray {
 class SharedFile {
  public:
   /// Finds the file of another process. Waits while another one makes it. If no process has it, others that ask for it
-  /// wait until this one offers its own, or until this object ends.
+  /// wait until this one offers its own, or until this object ends: one that will not offer must end.
   /// @param key      Letters and digits. @param waiting  Called every few hundredths of a second of waiting; what it
   /// throws ends it.
   SharedFile(const std::string& key, const std::function<void()>& waiting);
@@ -30,8 +30,8 @@ class SharedFile {
   /// The file that another process has made, for reading. Not open: there is none.
   const Descriptor& file() const { return file_; }
 
-  /// Lets other processes have a file that is complete, while this object lives. Called once at most, and only if there
-  /// was none.
+  /// Lets other processes have a file that is complete, while this object lives; if that fails, they make their own.
+  /// Without effect if another process's file was found.
   void offer(const Descriptor& file);
 
  private:

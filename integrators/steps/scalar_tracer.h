@@ -46,8 +46,8 @@ class Tracer {
   void take_over(const State<N>& state, double strength, const Travelled& travelled, PathPoints* record);
 
   /// Follows the ray from a point in the field to its end. `first_step` is the length of the first step, world units;
-  /// 0: as any other step. `first_end` is where this step of `splitting4` ends, nearly; null: not known. If what it
-  /// meets is found without taking it, it need not be taken.
+  /// 0: as any other step. `first_end` is where this step of `splitting4` would end, in single precision; null: not
+  /// known. Where it tells what the step meets, only the part of the step up to there is taken.
   RayEnd follow(double first_step = 0, const State<N>* first_end = nullptr);
 
   /// Follows the ray from a face of the volume, through free space, to its end.

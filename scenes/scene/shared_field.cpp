@@ -69,7 +69,8 @@ LoadedField share_field(const SceneDescription& scene, const std::function<Loade
   std::optional<FieldOfFile> found;
   if (shared->file().is_open()) found = field_of_file(duplicate(shared->file()));
   LoadedField loaded = found ? loaded_of(std::move(*found)) : load();
-  if (!found && complete_field_file(loaded.field, words_of(loaded))) shared->offer(*loaded.field.memory().file);
+  if (!found && !complete_field_file(loaded.field, words_of(loaded))) return loaded;  // Others need not wait.
+  if (!found) shared->offer(*loaded.field.memory().file);
   loaded.field.keep_with_bricks(shared);
   return loaded;
 }

@@ -134,6 +134,14 @@ TEST_F(SharedFiles, AreMadeAgainIfTheirProcessIsKilled) {
   EXPECT_TRUE(is_empty());
 }
 
+/// Others then do not wait for it.
+TEST_F(SharedFiles, WhatCannotBeOfferedIsNotWaitedFor) {
+  const auto enough = [] { throw std::runtime_error("waits"); };
+  SharedFile first("key", nothing_);
+  first.offer(Descriptor());
+  EXPECT_FALSE(SharedFile("key", enough).file().is_open());
+}
+
 TEST_F(SharedFiles, ListsThatAreNotTrueAreOfNoUse) {
   const Descriptor file = whole_file();
   const std::string own = std::to_string(getpid()) + " " + std::to_string(file.get());
