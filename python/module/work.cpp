@@ -85,6 +85,7 @@ void run(const std::function<void(const Progress&)>& work, const py::object& rep
   }
   if (interrupt) std::rethrow_exception(interrupt);
   if (shared.error) std::rethrow_exception(shared.error);
+  look_up(shared, report);  // Short work, too, is reported.
 }
 
 }  // namespace tensorray

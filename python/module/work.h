@@ -12,7 +12,8 @@ namespace tensorray {
 
 /// Calls `work` on a thread of its own. Meanwhile this thread has released the GIL; twenty times a second it takes it
 /// to call `report(phase, done, total)`, and to see whether a signal has come. An exception of `report` or of a signal
-/// handler (KeyboardInterrupt) cancels the work, and is thrown when it has ended.
+/// handler (KeyboardInterrupt) cancels the work, and is thrown when it has ended. What the work has said last is
+/// reported when it has ended without an error, however short it was.
 /// @param report   A function, or None. @param threads  Greatest number of threads that the work uses; 0: all.
 /// @throw whatever `work` throws. It must not touch Python's objects.
 void run(const std::function<void(const Progress&)>& work, const pybind11::object& report, int threads);

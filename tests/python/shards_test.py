@@ -135,7 +135,7 @@ class ShardsTest(unittest.TestCase):
     def test_progress(self):
         seen = []
         tr.render(PATHS, shards=2, progress=lambda *report: seen.append(report))
-        self.assertTrue({"shard 1/2: rendering", "shard 2/2: rendering"} & {phase for phase, _, _ in seen})
+        self.assertLessEqual({"shard 1/2", "shard 2/2"}, {phase.split(":")[0] for phase, _, _ in seen})
         seen.clear()
         with concurrent.futures.ThreadPoolExecutor(1) as pool:
             tr.render(PATHS, shards=2, executor=pool, progress=lambda *report: seen.append(report))
