@@ -25,6 +25,7 @@
 #include "tools/import/vtk/vtk_messages.h"
 #include "tools/import/vtk_formats/image_lattice.h"
 #include "tools/import/vtk_source/vtk_source.h"
+#include "volumes/grids/block_loops.h"
 #include "volumes/grids/page_memory.h"
 
 namespace tensorray {
@@ -54,23 +55,22 @@ bool wants_sampling(const ImportSettings& settings) {
 void crop(TensorGrid& grid, Eigen::AlignedBox3d bounds) {
   const Eigen::Vector3d rounding = Eigen::Vector3d::Constant(1e-6 * grid.to_world.linear().colwise().norm().minCoeff());
   bounds = {bounds.min() - rounding, bounds.max() + rounding};
-  for (TensorBlock& block : grid.blocks) {
-    make_room();
+  for_blocks(grid.blocks.size(), [&](std::size_t i) {
+    TensorBlock& block = grid.blocks[i];
     for (int offset = 0; offset < TensorBlock::voxels; ++offset) {
       const Eigen::Vector3i index = block.origin + TensorBlock::position(offset);
       if (!block.active[offset] || bounds.contains(grid.to_world * index.cast<double>())) continue;
       block.active.reset(offset);
       block.values[offset].setZero();
     }
-  }
+  });
   remove_empty_blocks(grid);
 }
 
 void make_symmetric(TensorGrid& grid) {
-  for (TensorBlock& block : grid.blocks) {
-    make_room();
-    for (Eigen::Matrix3f& value : block.values) value = (0.5f * (value + value.transpose())).eval();
-  }
+  for_blocks(grid.blocks.size(), [&](std::size_t i) {
+    for (Eigen::Matrix3f& value : grid.blocks[i].values) value = (0.5f * (value + value.transpose())).eval();
+  });
 }
 
 TensorGrid import_lattice(const Lattice& lattice, const ImportSettings& settings, ImportReport& report) {

@@ -4,10 +4,8 @@
 #include <cmath>
 #include <cstring>
 
-#include <tbb/parallel_for.h>
-
 #include "volumes/bricks/coefficients.h"
-#include "volumes/grids/page_memory.h"
+#include "volumes/grids/block_loops.h"
 
 namespace tensorray {
 namespace {
@@ -139,10 +137,9 @@ float finish_brick(const Coefficients& field, const Vector3i& place, float* bric
 
 void finish_bricks(const Coefficients& field, const PlaceNumbers& numbers, const BrickMemory& result,
                    std::vector<float>& strongest) {
-  tbb::parallel_for(std::size_t{0}, numbers.size(), [&](std::size_t n) {
+  for_blocks(numbers.size(), [&](std::size_t n) {
     const std::uint32_t i = numbers[n];
     if (i >= field.bricks.count) return;
-    make_room();
     const Vector3i& place = field.bricks.places[i];
     std::fill_n(result.brick(i), result.stride, 0.0f);  // It may have held blocks.
     strongest[i] = result.components == TensorBrick::symmetric

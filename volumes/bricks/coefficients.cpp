@@ -4,9 +4,7 @@
 #include <cstring>
 #include <type_traits>
 
-#include <tbb/parallel_for.h>
-
-#include "volumes/grids/page_memory.h"
+#include "volumes/grids/block_loops.h"
 
 namespace tensorray {
 namespace {
@@ -204,10 +202,9 @@ Column column_of(const CoefficientBricks& bricks, std::size_t first, int axis) {
 
 template <int components>
 void solve_columns(int axis, const Coefficients& field, const PlaceNumbers& numbers) {
-  tbb::parallel_for(std::size_t{0}, numbers.size(), [&](std::size_t i) {
+  for_blocks(numbers.size(), [&](std::size_t i) {
     const Column column = column_of(field.bricks, numbers[i], axis);
     if (column.blocks.empty()) return;
-    make_room();
     const int begin = edge * field.bricks.places[numbers[i]][axis];
     const int count = edge * static_cast<int>(column.blocks.size());
     const Runs runs{axis, begin, count, field.extent, field.border};

@@ -3,10 +3,8 @@
 #include <atomic>
 #include <cstddef>
 
-#include <tbb/parallel_for.h>
-
 #include "volumes/bricks/coefficients.h"
-#include "volumes/grids/page_memory.h"
+#include "volumes/grids/block_loops.h"
 
 namespace tensorray {
 namespace {
@@ -72,9 +70,8 @@ void continue_values(const Coefficients& field) {
   std::vector<VoxelMask> known = field.bricks.active, next = known;
   for (std::atomic<bool> changed{true}; changed;) {
     changed = false;
-    tbb::parallel_for(std::size_t{0}, field.bricks.places.size(), [&](std::size_t i) {
+    for_blocks(field.bricks.places.size(), [&](std::size_t i) {
       if (known[i] == field.bricks.filled[i]) return;
-      make_room();
       next[i] = continue_block(i, field, known);
       if (next[i] != known[i]) changed = true;
     });

@@ -7,11 +7,10 @@
 #include <stdexcept>
 #include <unordered_map>
 
-#include <tbb/parallel_for.h>
-
 #include "base/errors.h"
 #include "base/text/text.h"
 #include "volumes/files/grid_voxels.h"
+#include "volumes/grids/block_loops.h"
 #include "volumes/grids/page_memory.h"
 #include "volumes/vdb/vdb_transform.h"
 #include "volumes/vdb/voxel_extent.h"
@@ -97,8 +96,7 @@ BlockSource derived_source(const std::filesystem::path& path, const std::vector<
   SampleBlocks samples;
   SampleBlocks::allocator_type::prepare(field.shapes.size());
   samples.resize(field.shapes.size());
-  tbb::parallel_for(std::size_t{0}, samples.size(), [&](std::size_t i) {
-    make_room();
+  for_blocks(samples.size(), [&](std::size_t i) {
     samples[i].origin = field.shapes[i].origin;
     samples[i].active = field.shapes[i].active;
     put_values(path, grids, samples[i]);
@@ -131,13 +129,13 @@ class RowGrid : public openvdb::Vec3SGrid {
     for (const auto& [key, value] : grid.metadata)
       if (!(*this)[key] && key != length_unit_key)
         insertMeta(key, openvdb::StringMetadata(value));  // Keep the grid's own entries: name, type, ...
-    for (const TensorBlock& block : grid.blocks) {
-      make_room();
-      auto* const leaf = new Leaf(openvdb::PartialCreate(), coord_of(block.origin));
+    const std::vector<BlockShape> shapes = grid.shapes();
+    for (std::size_t i = 0; i < shapes.size(); ++i) {
+      auto* const leaf = new Leaf(openvdb::PartialCreate(), coord_of(shapes[i].origin));
       tree().addLeaf(leaf);  // The tree owns it.
-      blocks_.emplace(leaf, &block);
+      blocks_.emplace(leaf, &grid.blocks[i]);
       for (int offset = 0; offset < TensorBlock::voxels; ++offset)
-        leaf->setActiveState(static_cast<openvdb::Index>(offset), block.active[offset]);
+        leaf->setActiveState(static_cast<openvdb::Index>(offset), shapes[i].active[offset]);
     }
   }
 
@@ -170,12 +168,11 @@ class RowGrid : public openvdb::Vec3SGrid {
 };
 
 void check_half_range(const std::filesystem::path& path, const TensorGrid& grid) {
-  for (const TensorBlock& block : grid.blocks) {
-    make_room();
-    for (const Eigen::Matrix3f& value : block.values)
+  for_blocks(grid.blocks.size(), [&](std::size_t i) {
+    for (const Eigen::Matrix3f& value : grid.blocks[i].values)
       if ((value.array().abs() > greatest_half).any())
         fail(path, "a component exceeds 65504, the greatest 16-bit float; write single precision or scale the field");
-  }
+  });
 }
 
 }  // namespace

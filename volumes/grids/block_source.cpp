@@ -3,8 +3,7 @@
 #include <memory>
 #include <utility>
 
-#include <tbb/parallel_for.h>
-
+#include "volumes/grids/block_loops.h"
 #include "volumes/grids/page_memory.h"
 
 namespace tensorray {
@@ -42,6 +41,7 @@ void fill_block(TensorBlock& block, const std::function<Eigen::Matrix3d(const Ei
 }  // namespace
 
 void read_block(const BlockSource& source, std::size_t i, TensorBlock& block) {
+  make_room();
   block.origin = source.shapes[i].origin;
   block.active = source.shapes[i].active;
   if (!block.active.all()) block.values.fill(Eigen::Matrix3f::Zero());
@@ -76,10 +76,7 @@ TensorGrid to_grid(const BlockSource& source) {
   grid.to_world = source.to_world;
   grid.metadata = source.metadata;
   grid.blocks = unset_blocks(source.shapes.size());
-  tbb::parallel_for(std::size_t{0}, source.shapes.size(), [&](std::size_t i) {
-    make_room();
-    read_block(source, i, grid.blocks[i]);
-  });
+  for_blocks(source.shapes.size(), [&](std::size_t i) { read_block(source, i, grid.blocks[i]); });
   return grid;
 }
 

@@ -7,6 +7,7 @@
 #include <tbb/blocked_range.h>
 #include <tbb/parallel_for.h>
 
+#include "volumes/grids/block_loops.h"
 #include "volumes/grids/page_memory.h"
 
 namespace tensorray {
@@ -25,11 +26,7 @@ std::shared_ptr<float[]> owned_pages(void* pages, std::size_t bytes) {
 /// The same bricks with tensors of any kind. `keep`: with the tensors that they hold.
 BrickMemory widened(const BrickMemory& narrow, const BlockPlaces& places, bool keep) {
   BrickMemory wide = places.make(false);
-  if (keep)
-    tbb::parallel_for(std::size_t{0}, narrow.count, [&](std::size_t i) {
-      make_room();
-      places.widen(narrow.brick(i), wide.brick(i));
-    });
+  if (keep) for_blocks(narrow.count, [&](std::size_t i) { places.widen(narrow.brick(i), wide.brick(i)); });
   return wide;
 }
 
@@ -69,7 +66,6 @@ BrickMemory place_blocks(const BlockSource& source, const BlockPlaces& places) {
   const auto place_part = [&](const tbb::blocked_range<std::size_t>& range) {
     TensorBlock block;
     for (std::size_t i = range.begin(); i < range.end() && fits; ++i) {
-      make_room();
       read_block(source, i, block);
       if (!places.place(i, block, bricks)) fits = false;
     }

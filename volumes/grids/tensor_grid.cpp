@@ -4,8 +4,7 @@
 #include <atomic>
 #include <cmath>
 
-#include <tbb/parallel_for.h>
-
+#include "volumes/grids/block_loops.h"
 #include "volumes/grids/block_source.h"
 #include "volumes/grids/page_memory.h"
 
@@ -29,10 +28,7 @@ TensorBlocks unset_blocks(std::size_t count) {
 
 TensorBlocks make_blocks(std::size_t count) {
   TensorBlocks blocks = unset_blocks(count);
-  tbb::parallel_for(std::size_t{0}, count, [&](std::size_t i) {
-    make_room();
-    blocks[i].values.fill(Eigen::Matrix3f::Zero());
-  });
+  for_blocks(count, [&](std::size_t i) { blocks[i].values.fill(Eigen::Matrix3f::Zero()); });
   return blocks;
 }
 
@@ -58,12 +54,8 @@ Eigen::AlignedBox3i active_box(const std::vector<BlockShape>& shapes) {
 }
 
 std::vector<BlockShape> TensorGrid::shapes() const {
-  std::vector<BlockShape> result;
-  result.reserve(blocks.size());
-  for (const TensorBlock& block : blocks) {
-    make_room();
-    result.push_back({block.origin, block.active});
-  }
+  std::vector<BlockShape> result(blocks.size());
+  for_blocks(blocks.size(), [&](std::size_t i) { result[i] = {blocks[i].origin, blocks[i].active}; });
   return result;
 }
 
@@ -93,10 +85,7 @@ void remove_empty_blocks(TensorGrid& grid) {
 
 std::size_t remove_non_finite(TensorGrid& grid) {
   std::atomic<std::size_t> removed{0};
-  tbb::parallel_for(std::size_t{0}, grid.blocks.size(), [&](std::size_t i) {
-    make_room();
-    removed += remove_non_finite(grid.blocks[i]);
-  });
+  for_blocks(grid.blocks.size(), [&](std::size_t i) { removed += remove_non_finite(grid.blocks[i]); });
   remove_empty_blocks(grid);
   return removed;
 }
@@ -123,10 +112,7 @@ AsymmetrySums asymmetry_sums(const TensorBlock& block) {
 
 double asymmetry(const TensorGrid& grid) {
   std::vector<AsymmetrySums> blocks(grid.blocks.size());
-  tbb::parallel_for(std::size_t{0}, blocks.size(), [&](std::size_t i) {
-    make_room();
-    blocks[i] = asymmetry_sums(grid.blocks[i]);
-  });
+  for_blocks(blocks.size(), [&](std::size_t i) { blocks[i] = asymmetry_sums(grid.blocks[i]); });
   AsymmetrySums all;  // Summed in the order of the blocks: the result does not depend on the number of threads.
   for (const AsymmetrySums& block : blocks) all.add(block);
   return all.asymmetry();

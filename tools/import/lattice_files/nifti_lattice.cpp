@@ -166,7 +166,6 @@ std::vector<std::vector<Plane>> read_planes(const nifti_image& image, const std:
   const auto values = static_cast<std::size_t>(image.nx) * static_cast<std::size_t>(image.ny);
   for (int component = 0; component < components; ++component)
     for (std::vector<Plane>& slice : slices) {
-      make_room();
       Plane& plane = slice.emplace_back(values * static_cast<std::size_t>(image.nbyper));
       if (znzread(plane.data(), 1, plane.size(), file.get()) != plane.size())
         fail(path, "is cut off, or its compressed data are damaged");

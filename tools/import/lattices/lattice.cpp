@@ -12,6 +12,7 @@
 #include <fmt/format.h>
 #include <tbb/parallel_for.h>
 
+#include "volumes/grids/block_loops.h"
 #include "volumes/grids/page_memory.h"
 #include "volumes/tensors/finite_differences.h"
 
@@ -91,11 +92,11 @@ void add_slab(const Lattice& lattice, const ValueOf& value_of, int first_z, std:
 /// Sorts blocks by origin. Moves each block only once, because blocks are large.
 template <class Blocks>
 void sort(Blocks& blocks) {
-  std::vector<std::tuple<int, int, int, std::size_t>> order;
-  for (const auto& block : blocks) {
-    make_room();
-    order.emplace_back(block.origin.x(), block.origin.y(), block.origin.z(), order.size());
-  }
+  std::vector<std::tuple<int, int, int, std::size_t>> order(blocks.size());
+  for_blocks(blocks.size(), [&](std::size_t i) {
+    const Eigen::Vector3i& origin = blocks[i].origin;
+    order[i] = {origin.x(), origin.y(), origin.z(), i};
+  });
   std::sort(order.begin(), order.end());
   std::vector<std::size_t> source;
   for (const auto& place : order) source.push_back(std::get<3>(place));
