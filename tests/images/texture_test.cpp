@@ -27,7 +27,7 @@ using ::testing::HasSubstr;
 const std::vector<Wrap> every_wrap{Wrap::none, Wrap::clamp, Wrap::repeat, Wrap::mirror};
 
 /// A picture whose values are all different.
-Image noise(int width, int height, std::vector<std::string> channels = {"R", "G", "B"}) {
+Image noise_image(int width, int height, std::vector<std::string> channels = {"R", "G", "B"}) {
   Image image(width, height, std::move(channels));
   std::uint32_t state = 1;
   for (float& value : image.pixels)
@@ -67,10 +67,11 @@ Vector4f mean_of(const Image& image) {
 
 double difference(const Vector4f& a, const Vector4f& b) { return (a - b).cwiseAbs().maxCoeff(); }
 
-double decoded(double value) { return value <= 0.04045 ? value / 12.92 : std::pow((value + 0.055) / 1.055, 2.4); }
+double linear_of(double value) { return value <= 0.04045 ? value / 12.92 : std::pow((value + 0.055) / 1.055, 2.4); }
 
 TEST(TextureTest, FootprintsOfATexelGiveTheTexels) {
-  for (const Image& image : {noise(512, 512), noise(300, 200), noise(37, 211, {"R", "G", "B", "A"}), noise(1000, 3)})
+  for (const Image& image :
+       {noise_image(512, 512), noise_image(300, 200), noise_image(37, 211, {"R", "G", "B", "A"}), noise_image(1000, 3)})
     for (const Wrap wrap : every_wrap) {
       const Texture texture(image, wrap);
       EXPECT_EQ(texture.width(), image.width);
@@ -86,7 +87,7 @@ TEST(TextureTest, FootprintsOfATexelGiveTheTexels) {
 }
 
 TEST(TextureTest, RotatedAndMirroredFootprintsOfATexelGiveTheTexels) {
-  const Image image = noise(300, 200);
+  const Image image = noise_image(300, 200);
   const Texture texture(image, Wrap::clamp);
   for (const double angle : {0.3, 1.0, 2.5}) {
     Matrix2d turn;
@@ -98,7 +99,7 @@ TEST(TextureTest, RotatedAndMirroredFootprintsOfATexelGiveTheTexels) {
 }
 
 TEST(TextureTest, MagnifiedTexelsAreInterpolatedLinearly) {
-  const Image image = noise(50, 40);
+  const Image image = noise_image(50, 40);
   const Texture texture(image, Wrap::clamp);
   for (const Matrix2d& footprint : {texels(image, 0.1, 0.1), texels(image, 0.9, 0.01)})
     for (double x = 0; x < 48; x += 1.13)
@@ -169,7 +170,8 @@ TEST(TextureTest, ALinearRampStaysLinearAtEveryFootprint) {
 
 TEST(TextureTest, HugeFootprintsGiveTheMean) {
   const double nan = std::numeric_limits<double>::quiet_NaN(), infinity = std::numeric_limits<double>::infinity();
-  for (const Image& image : {noise(300, 200), noise(1, 1), noise(513, 2), noise(100, 100, {"R", "G", "B", "A"})})
+  for (const Image& image :
+       {noise_image(300, 200), noise_image(1, 1), noise_image(513, 2), noise_image(100, 100, {"R", "G", "B", "A"})})
     for (const Wrap wrap : every_wrap) {
       const Texture texture(image, wrap);
       const Vector4f mean = mean_of(image);
@@ -188,7 +190,7 @@ TEST(TextureTest, HugeFootprintsGiveTheMean) {
 }
 
 TEST(TextureTest, Wraps) {
-  const Image image = noise(30, 20);
+  const Image image = noise_image(30, 20);
   const Matrix2d footprint = texels(image, 1, 1);
   const auto seen = [&](Wrap wrap, int x, int y) {
     return Texture(image, wrap).lookup(centre(image, x, y), footprint);
@@ -220,7 +222,7 @@ TEST(TextureTest, EdgesAreAsSoftAsTheFootprint) {
 }
 
 TEST(TextureTest, AnyNumberOfThreadsSeesTheSame) {
-  const Image image = noise(700, 500);
+  const Image image = noise_image(700, 500);
   const Texture texture(image, Wrap::mirror);
   const auto look = [&] {
     std::vector<Vector4f> seen;
@@ -253,7 +255,8 @@ Vector4f texel_of(const std::filesystem::path& file, int x, const std::string& s
 
 /// Converts 8-bit sRGB values to linear light and multiplies them by alpha.
 Vector4f linear(int r, int g, int b, double alpha = 1) {
-  return Eigen::Vector4d(alpha * decoded(r / 255.0), alpha * decoded(g / 255.0), alpha * decoded(b / 255.0), alpha)
+  return Eigen::Vector4d(alpha * linear_of(r / 255.0), alpha * linear_of(g / 255.0), alpha * linear_of(b / 255.0),
+                         alpha)
       .cast<float>();
 }
 
@@ -279,7 +282,8 @@ TEST(TextureFileTest, FormatsOfPng) {
   EXPECT_LT(difference(texel_of(rgba.path(), 0), linear(10, 20, 250, 0.2)), 1e-6);
   EXPECT_LT(difference(texel_of(rgba.path(), 1), linear(3, 2, 1)), 1e-6);
   const Temporary deep("deep.png", png_file(2, 1, 3, 16, {1, 256, 65535, 30000, 2, 0}));
-  const Vector4f expected(static_cast<float>(decoded(1 / 65535.0)), static_cast<float>(decoded(256 / 65535.0)), 1, 1);
+  const Vector4f expected(static_cast<float>(linear_of(1 / 65535.0)), static_cast<float>(linear_of(256 / 65535.0)), 1,
+                          1);
   EXPECT_LT(difference(texel_of(deep.path(), 0), expected), 1e-6);
 }
 
@@ -348,7 +352,7 @@ TEST(TextureFileTest, LevelsOfLargeFilesHaveTheirMean) {
   double sum = 0;
   for (int i = 0; i < width * height; ++i) {
     values.push_back((i % width * 7 + i / width * 13) % 256);
-    sum += decoded(values.back() / 255.0);
+    sum += linear_of(values.back() / 255.0);
   }
   const Temporary file("large.png", png_file(width, height, 1, 8, values));
   const Texture texture(file.path(), ColorManagement({}), "", Wrap::repeat);
@@ -371,7 +375,7 @@ TEST(TextureFileTest, BadFilesAreOneClearLine) {
   EXPECT_THAT(error_of(text.path()), HasSubstr("cannot read " + text.path().string() + ": "));
   for (const std::string ending : {".png", ".jpg", ".tif", ".exr"}) {
     const Temporary whole("whole" + ending);
-    write_image(whole.path(), noise(100, 80));
+    write_image(whole.path(), noise_image(100, 80));
     const std::string bytes = read_bytes(whole.path());
     for (const double part : {0.3, 0.9}) {
       const Temporary cut("cut" + ending,

@@ -14,13 +14,13 @@ namespace {
 
 using Eigen::Vector3d;
 
-constexpr int size = 16;  // Pixels of 1/16.
+constexpr int pixels = 16;  // Pixels of 1/16.
 
 Plate plate_at(double z) {
   Plate plate;
   plate.center = {0, 0, z};
   plate.size = {1, 1};
-  plate.resolution = {size, size};
+  plate.resolution = {pixels, pixels};
   return plate;
 }
 
@@ -37,17 +37,17 @@ LensObstacles obstacles_of(std::vector<TriangleMesh> obstacles) {
 }
 
 TEST(LensObstacles, CoverTheirPartOfEachPixelWhereThePictureIsTransparent) {
-  const double pixel = 1.0 / size;  // The box covers pixels 4 to 11 along x, and a half of pixel 12.
+  const double pixel = 1.0 / pixels;  // The box covers pixels 4 to 11 along x, and a half of pixel 12.
   const LensObstacles obstacles = obstacles_of({box({-4 * pixel, -2 * pixel, 0}, {4.5 * pixel, 3 * pixel, 0.5})});
-  Image image(size, size, {"R", "G", "B", "A", "length"});
-  for (int y = 0; y < size; ++y)
-    for (int x = 0; x < size; ++x) image.pixel(x, y)[3] = static_cast<float>(y % 2) / 2;
+  Image image(pixels, pixels, {"R", "G", "B", "A", "length"});
+  for (int y = 0; y < pixels; ++y)
+    for (int x = 0; x < pixels; ++x) image.pixel(x, y)[3] = static_cast<float>(y % 2) / 2;
   const Image before = image;
   obstacles.draw(plate_at(-2), 4, image);
   const float grey = image.pixel(6, 6)[0];
   EXPECT_GT(grey, 0.2f);
-  for (int y = 0; y < size; ++y)
-    for (int x = 0; x < size; ++x) {
+  for (int y = 0; y < pixels; ++y)
+    for (int x = 0; x < pixels; ++x) {
       const float covered = y < 5 || y >= 10 || x < 4 || x > 12 ? 0.0f : x == 12 ? 0.5f : 1.0f;
       const float open = 1 - before.pixel(x, y)[3];
       for (int c = 0; c < 3; ++c) EXPECT_NEAR(image.pixel(x, y)[c], open * covered * grey, 1e-6) << x << " " << y;
@@ -63,9 +63,9 @@ TEST(LensObstacles, AreDarkerWhereTheyTurnFromTheViewer) {
   facing.vertices = {{-0.5, -0.5, 0}, {0, -0.5, 0}, {0, 0.5, 0}, {-0.5, 0.5, 0}};
   turned.vertices = {{0, -0.5, 0}, {0.5, -0.5, rise / 2}, {0.5, 0.5, rise / 2}, {0, 0.5, 0}};
   facing.triangles = turned.triangles = {{0, 1, 2}, {0, 2, 3}};
-  Image image(size, size, {"R", "G", "B", "A"});
+  Image image(pixels, pixels, {"R", "G", "B", "A"});
   obstacles_of({facing, turned}).draw(plate_at(-2), 1, image);
-  Image half(size, size, {"R", "G", "B", "A"});
+  Image half(pixels, pixels, {"R", "G", "B", "A"});
   obstacles_of({facing}).draw(plate_at(-2), 1, half);
   EXPECT_FLOAT_EQ(image.pixel(3, 8)[0], half.pixel(3, 8)[0]);
   EXPECT_EQ(half.pixel(12, 8)[3], 0);
@@ -74,7 +74,7 @@ TEST(LensObstacles, AreDarkerWhereTheyTurnFromTheViewer) {
 }
 
 TEST(LensObstacles, BehindTheImageTheyAreNotSeen) {
-  Image image(size, size, {"R", "G", "B", "A"});
+  Image image(pixels, pixels, {"R", "G", "B", "A"});
   const LensObstacles obstacles = obstacles_of({box({-0.5, -0.5, -0.5}, {0.5, 0.5, -0.25})});
   obstacles.draw(plate_at(0), 1, image);
   for (const float value : image.pixels) EXPECT_EQ(value, 0);

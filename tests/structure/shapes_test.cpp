@@ -163,7 +163,7 @@ std::set<std::string> free_functions(const std::string& code, char mark) {
   return names;
 }
 
-std::string room_of(const std::string& file) { return file.substr(0, file.rfind('/')); }
+std::string folder_of(const std::string& file) { return file.substr(0, file.rfind('/')); }
 
 /// Otherwise two rooms may need each other without an include that shows it: only the linker would see the circle.
 TEST(Structure, FunctionsAreDefinedInTheRoomThatDeclaresThem) {
@@ -171,12 +171,12 @@ TEST(Structure, FunctionsAreDefinedInTheRoomThatDeclaresThem) {
   std::map<std::string, std::set<std::string>> rooms;
   for (const std::string& file : files())
     if (file.substr(file.rfind('.')) == ".h")
-      for (const std::string& name : free_functions(code_of(file), ';')) rooms[name].insert(room_of(file));
+      for (const std::string& name : free_functions(code_of(file), ';')) rooms[name].insert(folder_of(file));
   for (const std::string& file : files()) {
     if (file.substr(file.rfind('.')) == ".h") continue;
     const std::string of_targets = without(code_of(file), "HWY_BEFORE_NAMESPACE", "HWY_AFTER_NAMESPACE");
     for (const std::string& name : free_functions(without(of_targets, "namespace {\n", "\n}  \n"), '{'))
-      EXPECT_TRUE(replaced.count(name) || !rooms.count(name) || rooms[name].count(room_of(file)))
+      EXPECT_TRUE(replaced.count(name) || !rooms.count(name) || rooms[name].count(folder_of(file)))
           << file << " defines " << name << ", which a header of another room declares";
   }
   EXPECT_TRUE(rooms.at("trace").count("integrators/tracing"));

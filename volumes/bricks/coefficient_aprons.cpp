@@ -5,7 +5,7 @@
 #include <cstring>
 
 #include "volumes/bricks/coefficients.h"
-#include "volumes/grids/block_loops.h"
+#include "volumes/grids/page_memory.h"
 
 namespace tensorray {
 namespace {

@@ -4,7 +4,7 @@
 #include <cstring>
 #include <type_traits>
 
-#include "volumes/grids/block_loops.h"
+#include "volumes/grids/page_memory.h"
 
 namespace tensorray {
 namespace {

@@ -4,7 +4,7 @@
 #include <cstddef>
 
 #include "volumes/bricks/coefficients.h"
-#include "volumes/grids/block_loops.h"
+#include "volumes/grids/page_memory.h"
 
 namespace tensorray {
 namespace {

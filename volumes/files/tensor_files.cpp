@@ -10,7 +10,6 @@
 #include "base/errors.h"
 #include "base/text/text.h"
 #include "volumes/files/grid_voxels.h"
-#include "volumes/grids/block_loops.h"
 #include "volumes/grids/page_memory.h"
 #include "volumes/vdb/vdb_transform.h"
 #include "volumes/vdb/voxel_extent.h"

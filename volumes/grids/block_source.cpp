@@ -3,7 +3,6 @@
 #include <memory>
 #include <utility>
 
-#include "volumes/grids/block_loops.h"
 #include "volumes/grids/page_memory.h"
 
 namespace tensorray {

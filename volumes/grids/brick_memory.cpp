@@ -7,7 +7,6 @@
 #include <tbb/blocked_range.h>
 #include <tbb/parallel_for.h>
 
-#include "volumes/grids/block_loops.h"
 #include "volumes/grids/page_memory.h"
 
 namespace tensorray {

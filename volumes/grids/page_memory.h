@@ -8,6 +8,8 @@
 #include <memory>
 #include <optional>
 
+#include <tbb/parallel_for.h>
+
 #include "base/files/descriptor.h"
 
 namespace tensorray {
@@ -25,6 +27,16 @@ std::optional<std::size_t> memory_bound();
 /// Drops pages if the bound is near. Code that goes through a whole field calls it for each block, because it may fill
 /// memory faster than the thread that watches the bound looks. Any thread may call it.
 void make_room();
+
+/// The loop over the blocks or bricks of a field: calls `body(i)` for all i below `count`, on all threads, in any
+/// order, and makes room before each call. @throw what `body` throws; then not all calls were made.
+template <class Body>
+void for_blocks(std::size_t count, const Body& body) {
+  tbb::parallel_for(std::size_t{0}, count, [&](std::size_t i) {
+    make_room();
+    body(i);
+  });
+}
 
 /// Checks that a field can be loaded within the bound, if there is one.
 /// @param stored  Bytes of the field's pages. @param resident  Bytes that it needs beside them.

@@ -4,7 +4,6 @@
 #include <atomic>
 #include <cmath>
 
-#include "volumes/grids/block_loops.h"
 #include "volumes/grids/block_source.h"
 #include "volumes/grids/page_memory.h"
 

@@ -8,7 +8,7 @@
 
 #include <Eigen/Eigenvalues>
 
-#include "volumes/grids/block_loops.h"
+#include "volumes/grids/page_memory.h"
 #include "volumes/tensors/eigenvalue_vectors.h"
 
 namespace tensorray {

@@ -4,7 +4,7 @@
 #include <array>
 #include <tuple>
 
-#include "volumes/grids/block_loops.h"
+#include "volumes/grids/page_memory.h"
 
 namespace tensorray {
 namespace {

@@ -11,7 +11,7 @@
 namespace tensorray {
 namespace {
 
-std::string text_of(const std::filesystem::path& file) {
+std::string content_of(const std::filesystem::path& file) {
   std::ifstream stream(file, std::ios::binary);
   return {std::istreambuf_iterator<char>(stream), {}};
 }
@@ -48,10 +48,10 @@ TEST(ReplaceFileTest, WritesAllOrNothing) {
   std::filesystem::create_directories(folder);
   const std::filesystem::path file = folder / "a";
   replace_file(file, {"one ", "two"});
-  EXPECT_EQ(text_of(file), "one two");
+  EXPECT_EQ(content_of(file), "one two");
   std::ofstream(folder / "a.new") << "what a killed process left, which is longer than the next";
   replace_file(file, {"three"});
-  EXPECT_EQ(text_of(file), "three");
+  EXPECT_EQ(content_of(file), "three");
   EXPECT_THROW(replace_file(folder / "none" / "a", {"x"}), std::runtime_error);
   std::filesystem::remove(folder / "full.new");
   std::filesystem::create_symlink("/dev/full", folder / "full.new");

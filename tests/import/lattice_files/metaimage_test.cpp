@@ -21,7 +21,7 @@ std::string header_of(int channels, const Vector3i& size, const std::string& fie
       fields, size.x(), size.y(), size.z(), channels, type, file);
 }
 
-std::vector<float> six(const Matrix3d& t, double factor = 1) {
+std::vector<float> upper_triangle(const Matrix3d& t, double factor = 1) {
   std::vector<float> numbers;
   for (const double c : {t(0, 0), t(0, 1), t(0, 2), t(1, 1), t(1, 2), t(2, 2)})
     numbers.push_back(static_cast<float>(factor * c));
@@ -30,8 +30,8 @@ std::vector<float> six(const Matrix3d& t, double factor = 1) {
 
 /// 2 × 1 × 1 voxels: a tensor, and its half.
 std::vector<float> two_voxels() {
-  std::vector<float> numbers = six(test::symmetric_tensor());
-  for (const float number : six(test::symmetric_tensor(), 0.5)) numbers.push_back(number);
+  std::vector<float> numbers = upper_triangle(test::symmetric_tensor());
+  for (const float number : upper_triangle(test::symmetric_tensor(), 0.5)) numbers.push_back(number);
   return numbers;
 }
 
@@ -66,7 +66,7 @@ TEST(MetaImage, ComponentsAndWorldAreOfLps) {
 
 TEST(MetaImage, TheUserGivesAnotherFrameOrOrder) {
   const test::TemporaryFile file("a.mha", header_of(6, {1, 1, 1}, "TransformMatrix = 1 0 0 0 -1 0 0 0 1\n") +
-                                              test::bytes_of(six(test::symmetric_tensor())));
+                                              test::bytes_of(upper_triangle(test::symmetric_tensor())));
   Lattice lattice = open_metaimage(file);
   take_frame(lattice, ComponentFrame::voxels);
   const Matrix3d axes = Vector3d(-1, 1, 1).asDiagonal();

@@ -14,7 +14,7 @@ using Eigen::Matrix3d;
 using Eigen::Vector3d;
 using Eigen::Vector3i;
 
-const Vector3i size(3, 4, 2);
+const Vector3i lattice_size(3, 4, 2);
 
 /// Component c of a voxel: a number that tells voxel and component.
 double value_at(const Vector3i& index, int c) { return 1 + index.x() + 10 * index.y() + 100 * index.z() + 1000 * c; }
@@ -22,7 +22,7 @@ double value_at(const Vector3i& index, int c) { return 1 + index.x() + 10 * inde
 /// A file with these numbers. @param layout  Rank and sense of each axis, as the format writes it.
 std::string file_of(const std::string& layout, const std::string& datatype, int volumes = 6,
                     const std::string& fields = "") {
-  const std::array<int, 4> extents{size.x(), size.y(), size.z(), volumes};
+  const std::array<int, 4> extents{lattice_size.x(), lattice_size.y(), lattice_size.z(), volumes};
   std::array<int, 4> axis_of_rank{}, reversed{};
   for (std::size_t i = 0, at = 0; i < 4; ++i, at = layout.find(',', at) + 1) {
     reversed[i] = layout[at] == '-';

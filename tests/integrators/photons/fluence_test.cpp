@@ -21,13 +21,13 @@ using Eigen::Vector3d;
 using Eigen::Vector3i;
 
 /// A volume in parallel light, and a plate behind it.
-struct Bench {
+struct FluenceBench {
   TensorField field;
   Geometry geometry;
   Beam beam;
 };
 
-Bench make_bench(TensorField field, const Vector3d& direction, Surfaces extra = {}) {
+FluenceBench make_bench(TensorField field, const Vector3d& direction, Surfaces extra = {}) {
   Surfaces surfaces = std::move(extra);
   surfaces.bounds = box_mesh(field.index_bounds(), field.to_world());
   surfaces.plate = plate_across(direction, 9);
@@ -38,7 +38,7 @@ Bench make_bench(TensorField field, const Vector3d& direction, Surfaces extra = 
 /// The weights are different and sum to 1.
 std::vector<LightChannel> channels() { return {{0.1, 650, 0.5}, {0.2, 550, 0.125}, {-0.3, 450, 0.375}}; }
 
-PhotonDistribution distribute(const Bench& bench, FluenceKind kind, std::uint64_t photons, BeamPattern pattern,
+PhotonDistribution distribute(const FluenceBench& bench, FluenceKind kind, std::uint64_t photons, BeamPattern pattern,
                               int channels_per_photon = 0) {
   PhotonSettings settings;
   settings.photons = photons;
@@ -49,7 +49,7 @@ PhotonDistribution distribute(const Bench& bench, FluenceKind kind, std::uint64_
   return distribute_photons(bench.field, bench.geometry, bench.beam, channels(), settings, Progress());
 }
 
-Matrix3d zero(const Vector3d&) { return Matrix3d::Zero(); }
+Matrix3d no_bending(const Vector3d&) { return Matrix3d::Zero(); }
 
 /// Visits the voxels with light: visit(voxel, value).
 template <class Visit>
@@ -73,7 +73,7 @@ double sum(const TensorField& field, const ScalarGrid& grid) {
 }
 
 TEST(Fluence, OfStraightLightIsOneAtEveryVoxel) {
-  const Bench bench = make_bench(cube_field(9, zero), {0, 0, -1});
+  const FluenceBench bench = make_bench(cube_field(9, no_bending), {0, 0, -1});
   // 64 × 64 rays: 8 across a voxel along each axis, 4 across the half voxels at the sides.
   const auto grids = distribute(bench, FluenceKind::bands, 64 * 64, BeamPattern::grid).fluence;
   ASSERT_EQ(grids.size(), 4u);
@@ -93,7 +93,7 @@ TEST(Fluence, OfObliqueLightThroughASkewVolumeIsOne) {
   Affine3d placement = Affine3d::Identity();
   placement.linear() << 1, 0.3, 0, 0, 0.5, 0.2, 0.1, 0, 2;
   placement.translation() = Vector3d(5, -3, 2);
-  const Bench bench = make_bench(TensorField(cube_grid({12, 7, 9}, zero, placement)), {0.3, -0.5, -1});
+  const FluenceBench bench = make_bench(TensorField(cube_grid({12, 7, 9}, no_bending, placement)), {0.3, -0.5, -1});
   const auto grids = distribute(bench, FluenceKind::all_light, 60000, BeamPattern::stratified).fluence;
   ASSERT_EQ(grids.size(), 1u);
   int voxels = 0;
@@ -106,7 +106,7 @@ TEST(Fluence, OfObliqueLightThroughASkewVolumeIsOne) {
 }
 
 /// Σ power · length in the volume, of each channel, by tracing the same rays and recording their complete records.
-std::vector<double> lengths_by_channel(const Bench& bench, std::uint64_t photons, BeamPattern pattern) {
+std::vector<double> lengths_by_channel(const FluenceBench& bench, std::uint64_t photons, BeamPattern pattern) {
   const BeamSampler positions(bench.beam, pattern, photons, 0);
   std::vector<double> lengths(channels().size());
   Emission emission;
@@ -131,9 +131,10 @@ TEST(Fluence, SumsToPowerTimesLengthOfTheWaysInTheVolume) {
       box_mesh(Eigen::AlignedBox3d(Vector3d(-0.3, -0.3, -0.3), Vector3d(0.2, 0.2, 0.2)), Affine3d::Identity()));
   Affine3d placement = Affine3d::Identity();
   placement.linear() = Eigen::AngleAxisd(0.4, Vector3d(1, 2, 3).normalized()).toRotationMatrix();
-  const Bench bench = make_bench(cube_field(
-                                     20, [](const Vector3d& p) { return Matrix3d(4 * linear_tensor(p)); }, placement),
-                                 {0.2, 0.1, -1}, std::move(obstacle));
+  const FluenceBench bench =
+      make_bench(cube_field(
+                     20, [](const Vector3d& p) { return Matrix3d(4 * linear_tensor(p)); }, placement),
+                 {0.2, 0.1, -1}, std::move(obstacle));
   const PhotonDistribution light = distribute(bench, FluenceKind::bands, 1000, BeamPattern::sobol);
   const std::vector<double> lengths = lengths_by_channel(bench, 1000, BeamPattern::sobol);
   double all = 0;
@@ -150,7 +151,7 @@ TEST(Fluence, SumsToPowerTimesLengthOfTheWaysInTheVolume) {
 TEST(Fluence, CountsLightThatIsStraightBesideACutAndMissesThePlate) {
   Surfaces cut;
   cut.cut = box_mesh(Eigen::AlignedBox3d(Vector3d::Constant(-0.55), Vector3d::Constant(0.55)), Affine3d::Identity());
-  Bench bench = make_bench(cube_field(9, zero), {0, 0, -1}, std::move(cut));
+  FluenceBench bench = make_bench(cube_field(9, no_bending), {0, 0, -1}, std::move(cut));
   Surfaces surfaces = bench.geometry.surfaces();
   surfaces.plate->size = {0.3, 0.3};
   bench.geometry = Geometry(surfaces);
@@ -166,7 +167,7 @@ TEST(Fluence, CountsLightThatIsStraightBesideACutAndMissesThePlate) {
 TEST(Fluence, ASingleLayerOfVoxelsIsCrossedWhole) {
   TensorField layer(dense_grid({Vector3i(0, 0, 3), Vector3i(8, 8, 3)}, Affine3d::Identity(),
                                [](const Vector3i&) { return Matrix3d::Zero(); }));
-  const Bench bench = make_bench(std::move(layer), {0, 0, -1});
+  const FluenceBench bench = make_bench(std::move(layer), {0, 0, -1});
   int voxels = 0;
   for_each(distribute(bench, FluenceKind::all_light, 64 * 64, BeamPattern::grid).fluence[0],
            [&](const Vector3i&, float value) {
@@ -195,8 +196,8 @@ TensorGrid corner_blocks(int size, bool filled) {
 }
 
 TEST(Fluence, OfASparseFieldIsThatOfAFullOneAtTheFieldsBlocks) {
-  const Bench sparse = make_bench(TensorField(corner_blocks(40, false)), {0.1, 0.2, -1});
-  const Bench full = make_bench(TensorField(corner_blocks(40, true)), {0.1, 0.2, -1});
+  const FluenceBench sparse = make_bench(TensorField(corner_blocks(40, false)), {0.1, 0.2, -1});
+  const FluenceBench full = make_bench(TensorField(corner_blocks(40, true)), {0.1, 0.2, -1});
   const ScalarGrid found = distribute(sparse, FluenceKind::all_light, 5000, BeamPattern::stratified).fluence[0];
   const ScalarGrid all = distribute(full, FluenceKind::all_light, 5000, BeamPattern::stratified).fluence[0];
   std::map<std::array<int, 3>, const ScalarBlock*> blocks;
@@ -236,7 +237,7 @@ TEST(Fluence, MemoryFollowsTheFieldsBlocksAndNotTheExtent) {
 }
 
 TEST(Fluence, IsTheSameOnAnyNumberOfThreads) {
-  const Bench bench = make_bench(cube_field(20, linear_tensor), {0.2, 0.1, -1});
+  const FluenceBench bench = make_bench(cube_field(20, linear_tensor), {0.2, 0.1, -1});
   const auto on_threads = [&](int threads) {
     const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, threads);
     return distribute(bench, FluenceKind::bands, 5000, BeamPattern::stratified).fluence;
@@ -256,7 +257,7 @@ TEST(Fluence, IsTheSameOnAnyNumberOfThreads) {
 }
 
 TEST(Fluence, SomeChannelsPerPhotonEstimateTheSame) {
-  const Bench bench = make_bench(cube_field(9, linear_tensor), {0.2, 0.1, -1});
+  const FluenceBench bench = make_bench(cube_field(9, linear_tensor), {0.2, 0.1, -1});
   const auto all = distribute(bench, FluenceKind::bands, 20000, BeamPattern::stratified).fluence;
   const auto some = distribute(bench, FluenceKind::bands, 20000, BeamPattern::stratified, 1).fluence;
   for (std::size_t i = 0; i < all.size(); ++i)  // 7000 rays per channel, spread evenly.
@@ -264,7 +265,7 @@ TEST(Fluence, SomeChannelsPerPhotonEstimateTheSame) {
 }
 
 TEST(Fluence, ChangesNothingElse) {
-  const Bench bench = make_bench(cube_field(9, linear_tensor), {0.2, 0.1, -1});
+  const FluenceBench bench = make_bench(cube_field(9, linear_tensor), {0.2, 0.1, -1});
   const PhotonDistribution with = distribute(bench, FluenceKind::bands, 2000, BeamPattern::stratified);
   const PhotonDistribution without = distribute(bench, FluenceKind::none, 2000, BeamPattern::stratified);
   EXPECT_TRUE(without.fluence.empty());

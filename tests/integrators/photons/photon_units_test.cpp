@@ -22,12 +22,12 @@ namespace {
 using namespace test;
 using Eigen::Vector3d;
 
-const std::vector<LightChannel>& channels() {
+const std::vector<LightChannel>& unit_channels() {
   static const std::vector<LightChannel> four{{0.1, 650, 0.3}, {0.2, 600, 0.2}, {0.3, 550, 0.1}, {0.4, 450, 0.4}};
   return four;
 }
 
-struct Bench {
+struct SharedBench {
   TensorField field = cube_field(9, linear_tensor);
   Geometry geometry{surfaces()};
   Beam beam = silhouette_beam(field.corners(), {0, 0, -1}, Vector3d::UnitY());
@@ -41,8 +41,8 @@ struct Bench {
   }
 };
 
-const Bench& bench() {
-  static const Bench one;
+const SharedBench& bench() {
+  static const SharedBench one;
   return one;
 }
 
@@ -62,7 +62,7 @@ PhotonDistribution distribute(const PhotonSettings& settings, Work* work = nullp
   PhotonSettings all = settings;
   all.work = work;
   all.team = team;
-  return distribute_photons(bench().field, bench().geometry, bench().beam, channels(), all, Progress());
+  return distribute_photons(bench().field, bench().geometry, bench().beam, unit_channels(), all, Progress());
 }
 
 void expect_same(const PhotonDistribution& a, const PhotonDistribution& b) {
@@ -103,7 +103,7 @@ WorkUnit interrupted(PhotonSettings settings) {
   Progress progress;
   settings.work = &work;
   settings.show = [&](const PhotonDistribution&) { progress.cancelled = true; };
-  EXPECT_THROW(distribute_photons(bench().field, bench().geometry, bench().beam, channels(), settings, progress),
+  EXPECT_THROW(distribute_photons(bench().field, bench().geometry, bench().beam, unit_channels(), settings, progress),
                Cancelled);
   EXPECT_FALSE(work.units().at(0).done);
   return work.units().at(0);

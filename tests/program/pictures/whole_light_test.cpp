@@ -37,7 +37,7 @@ std::pair<std::string, std::string> points_and_lamp(const std::string& integrato
 /// The light of points, traced forwards to the floor, is that of a lamp that the path tracer finds backwards.
 TEST_F(WholeScene, TheLightOfPointsThroughTheFieldIsThatOfALamp) {
   const auto [points, lamp] =
-      points_and_lamp(R"("max_samples": 512, "min_samples": 512, "caustic": {"resolution": 256, "rays": 20000})");
+      points_and_lamp(R"("max_samples": 256, "min_samples": 256, "caustic": {"resolution": 256, "rays": 20000})");
   write("scene.json", points);
   // Light that is traced beforehand has little noise.
   const Image forwards = picture({"integrator.max_samples=16", "integrator.min_samples=16"});
@@ -47,8 +47,8 @@ TEST_F(WholeScene, TheLightOfPointsThroughTheFieldIsThatOfALamp) {
   EXPECT_GT(mean(forwards, "G"), 0.2);
   EXPECT_NEAR(mean(forwards, "G"), mean(backwards, "G"), 0.03 * mean(backwards, "G"));
   // Photons beside the other ways to find the lamp: whatever law light follows.
-  std::vector<std::string> few{"integrator.photons.per_pass=1024", "integrator.max_samples=128",
-                               "integrator.min_samples=128"};
+  std::vector<std::string> few{"integrator.photons.per_pass=1024", "integrator.max_samples=96",
+                               "integrator.min_samples=96"};
   const Image photons = picture(few);
   few.push_back("integrator.conserve=radiance");
   const Image other_photons = picture(few);
@@ -150,7 +150,7 @@ TEST_F(WholeScene, ALampWithinTheFieldHasTheSameLightWithPhotons) {
       R"(lights=[{"kind":"area","center":[0.1,0.2,-0.5],"size":[0.5,0.5],"strength":10,"caustic":"photons"}])",
       "integrator.bands=8",
       "integrator.photons.per_pass=1024",
-      "integrator.max_samples=128",
+      "integrator.max_samples=96",
       "integrator.min_samples=128",
       "integrator.max_depth=1",
       R"(camera={"projection":"orthographic","position":[0,0.001,-2.2],"target":[0,0,-2.6],"height":2.4,)"

@@ -18,7 +18,7 @@ namespace {
 
 using ::testing::HasSubstr;
 
-const double nan_value = std::numeric_limits<double>::quiet_NaN();
+const double no_landing = std::numeric_limits<double>::quiet_NaN();
 
 using Coordinate = std::function<double(double x, double y)>;
 
@@ -61,7 +61,7 @@ GridLines white_lines(int cells, double width) {
   return lines;
 }
 
-double ink(const Image& image) { return std::accumulate(image.pixels.begin(), image.pixels.end(), 0.0) / 3; }
+double white_pixels(const Image& image) { return std::accumulate(image.pixels.begin(), image.pixels.end(), 0.0) / 3; }
 
 /// Coverage is exact along the axes: 15 lines inside and half of each border line, minus the overlaps at crossings.
 TEST(GridLinesTest, UndistortedLinesHaveTheirWidth) {
@@ -69,7 +69,7 @@ TEST(GridLinesTest, UndistortedLinesHaveTheirWidth) {
   for (const double width : {0.5, 1.0, 1.5, 3.0}) {
     const Image image = drawn(size, size, undistorted(size, size), white_lines(cells, width));
     const double covered = cells * width / size;
-    EXPECT_NEAR(ink(image), size * size * (1 - (1 - covered) * (1 - covered)), 1e-3) << width;
+    EXPECT_NEAR(white_pixels(image), size * size * (1 - (1 - covered) * (1 - covered)), 1e-3) << width;
   }
 }
 
@@ -99,7 +99,7 @@ TEST(GridLinesTest, WidthDoesNotDependOnAngleOrMagnification) {
       };
       const Image image = drawn(size, size, seen(size, size, s, nothing), white_lines(cells, 1.5));
       // One line more or less at the border covers 1.5 size of size² pixels.
-      EXPECT_NEAR(ink(image) / (size * size), 1.5 / spacing, 1.5 / size) << angle << " " << spacing;
+      EXPECT_NEAR(white_pixels(image) / (size * size), 1.5 / spacing, 1.5 / size) << angle << " " << spacing;
     }
 }
 
@@ -110,14 +110,14 @@ TEST(GridLinesTest, DenseLinesFadeAway) {
     const int cells = 10000;
     const Coordinate s = [=](double x, double) { return 0.5 + (x - 150) / (spacing * cells); };
     const Image image = drawn(size, 4, seen(size, 4, s, nothing), white_lines(cells, 1));
-    const double strength = ink(image) / (4 * size / spacing);  // Of one line; 1 if it has not faded.
+    const double strength = white_pixels(image) / (4 * size / spacing);  // Of one line; 1 if it has not faded.
     EXPECT_LT(strength, before + 0.02) << spacing;
     before = strength;
   }
   EXPECT_LT(before, 0.1);
   for (const double spacing : {3.0, 1.0, 0.01}) {
     const Coordinate s = [=](double x, double) { return 0.5 + (x - 150) / (spacing * 10000); };
-    EXPECT_EQ(ink(drawn(size, 4, seen(size, 4, s, nothing), white_lines(10000, 1))), 0) << spacing;
+    EXPECT_EQ(white_pixels(drawn(size, 4, seen(size, 4, s, nothing), white_lines(10000, 1))), 0) << spacing;
   }
 }
 
@@ -127,14 +127,14 @@ TEST(GridLinesTest, FoldsAreNotFlooded) {
   for (const double turning : {0.5, 0.5 - 1e-6, 0.5 - 1e-5, 0.5 - 1e-4}) {
     const Coordinate s = [=](double x, double) { return turning - 2e-6 * (x - 200.5) * (x - 200.5); };
     const Image image = drawn(width, height, seen(width, height, s, nothing), white_lines(2, 2));
-    EXPECT_LE(ink(image) / height, 2 * 2 + 0.5) << turning;
+    EXPECT_LE(white_pixels(image) / height, 2 * 2 + 0.5) << turning;
   }
 }
 
 TEST(GridLinesTest, WhatSeesASinglePointHasNoLines) {
-  EXPECT_EQ(ink(drawn(20, 20, seen(20, 20, nothing, nothing), white_lines(2, 2))), 0);
+  EXPECT_EQ(white_pixels(drawn(20, 20, seen(20, 20, nothing, nothing), white_lines(2, 2))), 0);
   const Coordinate nearly = [](double x, double y) { return 0.5 + 1e-9 * std::sin(x * y); };
-  EXPECT_EQ(ink(drawn(20, 20, seen(20, 20, nearly, nearly), white_lines(2, 2))), 0);
+  EXPECT_EQ(white_pixels(drawn(20, 20, seen(20, 20, nearly, nearly), white_lines(2, 2))), 0);
 }
 
 TEST(GridLinesTest, NoLinesBeyondThePicture) {
@@ -149,8 +149,8 @@ TEST(GridLinesTest, NoLinesBeyondThePicture) {
 TEST(GridLinesTest, LeavesAloneWhatIsNotValidOrNotFinite) {
   std::vector<PixelCoordinates> coordinates = undistorted(8, 1);
   coordinates[1].valid = false;
-  coordinates[2].st.x() = nan_value;
-  coordinates[3].per_pixel(0, 0) = nan_value;
+  coordinates[2].st.x() = no_landing;
+  coordinates[3].per_pixel(0, 0) = no_landing;
   coordinates[4].per_pixel(1, 1) = std::numeric_limits<double>::infinity();
   coordinates[5].st.setConstant(1e300);
   coordinates[6].per_pixel.setConstant(1e300);
@@ -172,7 +172,7 @@ TEST(GridLinesTest, BlendsByOpacityAndMakesOpaque) {
 
 TEST(GridLinesTest, SinglePixelAndEmptyPicture) {
   // Lines at a distance of one pixel are too dense.
-  EXPECT_NEAR(ink(drawn(1, 1, undistorted(1, 1), white_lines(1, 1))), 0, 1e-9);
+  EXPECT_NEAR(white_pixels(drawn(1, 1, undistorted(1, 1), white_lines(1, 1))), 0, 1e-9);
   EXPECT_EQ(drawn(0, 0, {}, white_lines(1, 1)).pixels.size(), 0u);
 }
 
@@ -191,11 +191,11 @@ TEST(GridLinesTest, RefusesWhatDoesNotFit) {
   expect_refusal("cell");
   lines.width = -1;
   expect_refusal("width");
-  lines.width = nan_value;
+  lines.width = no_landing;
   expect_refusal("width");
   lines.opacity = 1.5;
   expect_refusal("opacity");
-  lines.opacity = nan_value;
+  lines.opacity = no_landing;
   expect_refusal("opacity");
 }
 

@@ -19,7 +19,7 @@ namespace {
 using namespace test;
 using Eigen::Vector3d;
 
-constexpr int bands = 2;
+constexpr int traced_bands = 2;
 
 /// The cube [−½, ½]³, which bends nothing, but changes the power of photons. It stops light in its middle on request.
 class ClearCube : public BendingRegion {
@@ -51,7 +51,7 @@ class ClearCube : public BendingRegion {
   bool stops_;
 };
 
-std::vector<Vector3d> corners() {
+std::vector<Vector3d> unit_corners() {
   std::vector<Vector3d> result;
   for (int i = 0; i < 8; ++i) result.push_back({i % 2 - 0.5, i / 2 % 2 - 0.5, static_cast<double>(i / 4) - 0.5});
   return result;
@@ -79,7 +79,7 @@ PhotonTracerSettings settings_of(std::uint64_t per_pass, int passes = 1, double 
 
 PhotonMaps traced(const BendingRegion& region, const SurfaceScene& surfaces, const std::vector<Light>& lights,
                   const PhotonTracerSettings& settings) {
-  return trace_photons(region, corners(), surfaces, lights, settings, {});
+  return trace_photons(region, unit_corners(), surfaces, lights, settings, {});
 }
 
 SurfaceHit floor_point(const SurfaceScene& surfaces, double x, double y) {
@@ -111,7 +111,7 @@ TEST(PhotonTracerTest, TheSunsPowerIsThatOfTheSilhouette) {
   const Vector3d direction = Vector3d(0.4, 0.3, -1).normalized();
   const double silhouette = direction.cwiseAbs().sum();
   const PhotonMaps photons = traced(ClearCube(0.5), floor, {sun(3 * direction)}, settings_of(1000, 2));
-  EXPECT_EQ(photons.counts, std::vector<PhotonCounts>(2, {0, 1000 * bands, 0, 0}));
+  EXPECT_EQ(photons.counts, std::vector<PhotonCounts>(2, {0, 1000 * traced_bands, 0, 0}));
   EXPECT_NEAR(power_in(photons, 0), 0.5 * 2 * silhouette, 1e-6);
   EXPECT_NEAR(power_in(photons, 1), 0.5 * 3 * silhouette, 1e-6);
 }
@@ -155,15 +155,15 @@ TEST(PhotonTracerTest, EveryPhotonEnds) {
       traced(ClearCube(1, true), floor_at(-0.8, 0.5, true), {sun({0, 0, -1})}, settings_of(4000, 3));
   ASSERT_EQ(photons.counts.size(), 3u);
   for (const PhotonCounts& counts : photons.counts)
-    EXPECT_EQ(std::accumulate(counts.begin(), counts.end(), std::uint64_t{0}), 4000u * bands);
+    EXPECT_EQ(std::accumulate(counts.begin(), counts.end(), std::uint64_t{0}), 4000u * traced_bands);
   const auto part = [&](PhotonEnd end) {
-    return static_cast<double>(photons.counts[0][static_cast<std::size_t>(end)]) / (4000.0 * bands);
+    return static_cast<double>(photons.counts[0][static_cast<std::size_t>(end)]) / (4000.0 * traced_bands);
   };
   EXPECT_NEAR(part(PhotonEnd::before), 0.5, 0.02);  // The roof, at x > 0; the rest is stopped.
   EXPECT_NEAR(part(PhotonEnd::stopped), 0.5, 0.02);
   const PhotonMaps open = traced(ClearCube(), floor_at(-0.8, 0.5), {sun({0, 0, -1})}, settings_of(4000));
-  EXPECT_NEAR(static_cast<double>(open.counts[0][1]) / (4000.0 * bands), 0.25, 0.01);
-  EXPECT_NEAR(static_cast<double>(open.counts[0][2]) / (4000.0 * bands), 0.75, 0.01);
+  EXPECT_NEAR(static_cast<double>(open.counts[0][1]) / (4000.0 * traced_bands), 0.25, 0.01);
+  EXPECT_NEAR(static_cast<double>(open.counts[0][2]) / (4000.0 * traced_bands), 0.75, 0.01);
 }
 
 /// A region that bends nothing: photons give the irradiance of straight light, within the region and behind it.
@@ -211,7 +211,7 @@ TEST(PhotonTracerTest, PlatesKeepTheirLightAtTheirEdges) {
 /// The shading of photons is that of next-event estimation where nothing bends: one or the other, never both.
 TEST(PhotonTracerTest, ShadingIsThatOfStraightLight) {
   const SurfaceScene floor = floor_at(-0.8, 8);
-  const std::vector<Material> materials{make_material(Diffuse{}, BandValues::Constant(bands, 0.6))};
+  const std::vector<Material> materials{make_material(Diffuse{}, BandValues::Constant(traced_bands, 0.6))};
   const std::vector<Light> lights{sun({0.2, -0.1, -1}), PointLight{{0.3, 0.2, 2}, {5, 7}}};
   const LightSampler sampler(lights, {0.5f, 0.5f}, floor.bounds());
   const std::vector<Band> both{{600, 100, 0.5, Vector3d(1, 1, 0)}, {500, 100, 0.5, Vector3d(0, 1, 1)}};
@@ -314,7 +314,7 @@ TEST(PhotonTracerTest, APointWithinTheRegionShinesAllAround) {
     const SurfaceScene floor = floor_at(-0.8, size);
     const PhotonMaps photons = traced(ClearCube(), floor, {point}, settings_of(count, 8, 0.1));
     const double landed = static_cast<double>(photons.counts[0][static_cast<std::size_t>(PhotonEnd::landed)]) /
-                          static_cast<double>(count * bands);
+                          static_cast<double>(count * traced_bands);
     if (z < 0.5) {  // From above, light that passes the cube is left to others.
       EXPECT_GT(landed, part - 0.006);
       EXPECT_LT(landed, 0.5);

@@ -14,7 +14,7 @@
 namespace tensorray {
 namespace {
 
-Eigen::Vector3d direction(double cosine, double azimuth) {
+Eigen::Vector3d direction_at(double cosine, double azimuth) {
   const double sine = std::sqrt(1 - cosine * cosine);
   return {sine * std::cos(azimuth), sine * std::sin(azimuth), cosine};
 }
@@ -27,7 +27,7 @@ double hemisphere(const Function& function) {
   for (int row = 0; row < rows; ++row)
     for (int column = 0; column < columns; ++column) {
       const double t = (row + 0.5) / rows;
-      sum += 2 * t * function(direction(1 - t * t, (column + 0.5) / columns * 2 * pi));
+      sum += 2 * t * function(direction_at(1 - t * t, (column + 0.5) / columns * 2 * pi));
     }
   return sum * 2 * pi / rows / columns;
 }
@@ -40,7 +40,7 @@ TEST(MicrofacetTest, FacetsCoverTheSurface) {
 TEST(MicrofacetTest, VisibleFacetsAreADistribution) {
   for (const double alpha : {0.1, 0.4, 1.0})
     for (const double cosine : {1.0, 0.6, 0.1}) {
-      const Eigen::Vector3d wo = direction(cosine, 0.3);
+      const Eigen::Vector3d wo = direction_at(cosine, 0.3);
       EXPECT_NEAR(hemisphere([&](const Eigen::Vector3d& m) { return ggx_visible_pdf(alpha, wo, m); }), 1, 1e-3)
           << alpha << " " << cosine;
     }
@@ -49,7 +49,7 @@ TEST(MicrofacetTest, VisibleFacetsAreADistribution) {
 TEST(MicrofacetTest, ReflectionIsItsDensityTimesShadowing) {
   for (const double alpha : {0.0004, 0.3, 1.0})
     for (const double cosine : {1.0, 0.5, 1e-4}) {
-      const Eigen::Vector3d wo = direction(cosine, 0), wi = direction(0.4, 2);
+      const Eigen::Vector3d wo = direction_at(cosine, 0), wi = direction_at(0.4, 2);
       const GgxReflection there = ggx_reflection(alpha, wi, wo);
       EXPECT_NEAR(there.f * wi.z() / (there.pdf * ggx_shadowing(alpha, wo.z(), wi.z())), 1, 1e-12);
       EXPECT_NEAR(there.f / ggx_reflection(alpha, wo, wi).f, 1, 1e-12);

@@ -24,7 +24,7 @@ constexpr Interpolant fading{Interpolation::cubic, Border::fade}, extending{Inte
 constexpr double rounding = 4e-6;  // Of single precision, for values of 1: a coefficient is a sum of some 10 of them.
 
 /// A transform that turns, shears and scales.
-Eigen::Affine3d oblique() {
+Eigen::Affine3d sheared() {
   Eigen::Affine3d to_world = Eigen::Affine3d::Identity();
   to_world.linear() << 0.5, 0.1, 0, -0.2, 0.3, 0.05, 0, 0.1, 0.8;
   to_world.translation() = Vector3d(1, -2, 0.5);
@@ -64,7 +64,7 @@ TEST_P(Extents, PolynomialsAreReproduced) {
   const auto [first, size, symmetric] = GetParam();
   const Vector3i degrees = (size.array() - 1).min(3);
   const bool sym = symmetric;
-  const TensorField field(dense_grid(AlignedBox3i(first, first + size - Vector3i::Ones()), oblique(),
+  const TensorField field(dense_grid(AlignedBox3i(first, first + size - Vector3i::Ones()), sheared(),
                                      [&, from = first](const Vector3i& index) {
                                        return polynomial((index - from).cast<double>(), degrees, sym);
                                      }),
@@ -127,7 +127,7 @@ TensorGrid masked_grid(const AlignedBox3i& box, const std::function<bool(const V
 TEST(CubicField, InterpolatesItsVoxels) {
   std::mt19937 random(3);
   const TensorGrid grid =
-      dense_grid(AlignedBox3i(Vector3i(-5, 1, 6), Vector3i(12, 20, 22)), oblique(), [](auto& index) {
+      dense_grid(AlignedBox3i(Vector3i(-5, 1, 6), Vector3i(12, 20, 22)), sheared(), [](auto& index) {
         std::mt19937 own(static_cast<unsigned>(index.dot(Vector3i(1, 100, 10000)) + 1000000));
         return noise(own);
       });
@@ -239,20 +239,20 @@ TEST(CubicField, ThinLayersAtFacesKeepTheirValues) {
 TEST(CubicField, BricksAreWidenedLate) {
   const AlignedBox3i box(Vector3i::Zero(), Vector3i(135, 135, 135));
   const auto symmetric = [](const Vector3i& v) { return polynomial(v.cast<double>() / 8, {1, 2, 3}, true); };
-  TensorGrid late = dense_grid(box, oblique(), symmetric), early = late;
+  TensorGrid late = dense_grid(box, sheared(), symmetric), early = late;
   late.blocks.back().values[0](0, 1) += 1;
   early.blocks.front().values[0](0, 1) += 1;
   const TensorField a(late, fading), b(early, fading);
   ASSERT_FALSE(a.is_symmetric());
   TensorSampler one(a), other(b);
   for (const Vector3d& index : {Vector3d(60.3, 70.1, 64.9), Vector3d(40, 90.5, 20.25), Vector3d(100.7, 30.2, 111.1)})
-    EXPECT_EQ(one.at(oblique() * index), other.at(oblique() * index));
+    EXPECT_EQ(one.at(sheared() * index), other.at(sheared() * index));
 }
 
 /// Values beside each other whose squares are far apart, some beyond single precision.
 TEST(CubicField, TheBoundHoldsForValuesOfAnySize) {
   for (const double large : {1e10, 1e20, 1e35}) {
-    const TensorField field(dense_grid(AlignedBox3i(Vector3i::Zero(), Vector3i(7, 7, 7)), oblique(),
+    const TensorField field(dense_grid(AlignedBox3i(Vector3i::Zero(), Vector3i(7, 7, 7)), sheared(),
                                        [&](const Vector3i& v) {
                                          Matrix3d T = Matrix3d(Vector3d(1, -2, 0.5).asDiagonal());
                                          return v == Vector3i(3, 3, 3) ? Matrix3d(large * T) : T;
@@ -292,7 +292,7 @@ TEST(CubicField, VectorsSampleTheSame) {
 
 /// The bound of a brick holds everywhere in it.
 TEST(CubicField, NoDeviatorExceedsTheBoundOfItsBrick) {
-  const TensorField field(dense_grid(AlignedBox3i(Vector3i::Zero(), Vector3i(17, 17, 17)), oblique(),
+  const TensorField field(dense_grid(AlignedBox3i(Vector3i::Zero(), Vector3i(17, 17, 17)), sheared(),
                                      [](auto& index) {
                                        std::mt19937 own(static_cast<unsigned>(index.dot(Vector3i(1, 100, 10000))));
                                        return noise(own);

@@ -16,13 +16,13 @@ using Eigen::Matrix3f;
 using Eigen::Vector3d;
 using Eigen::Vector3i;
 
-const AlignedBox3i box(Vector3i(-13, -3, 5), Vector3i(25, 14, 30));
+const AlignedBox3i smoothed_box(Vector3i(-13, -3, 5), Vector3i(25, 14, 30));
 
 TensorGrid grid_of(const AlignedBox3i& voxels, const std::function<Matrix3d(const Vector3i&)>& value) {
   return dense_grid(voxels, Eigen::Affine3d(Eigen::Scaling(0.5, 1.0, 3.0)), value);
 }
 
-Matrix3d general(const Vector3i& i) {
+Matrix3d waves(const Vector3i& i) {
   return Matrix3d::NullaryExpr([&](Eigen::Index row, Eigen::Index column) {
     return std::sin(1.3 * i.x() + 0.7 * i.y() + 0.2 * i.z() + 2.1 * double(row) + 0.9 * double(column));
   });
@@ -81,7 +81,7 @@ void expect_same(const TensorGrid& a, const TensorGrid& b) {
 TEST(Smoothing, ConstantsStayAtBordersAndBesideHoles) {
   Matrix3d constant;
   constant << 1.1, 0.3, -7, 1e-9, 3e5, 0.7, -0.2, 1.0 / 3, 13;
-  TensorGrid grid = grid_of(box, [&](const Vector3i&) { return constant; });
+  TensorGrid grid = grid_of(smoothed_box, [&](const Vector3i&) { return constant; });
   make_holes(grid);
   for (const double deviation : {0.3, 1.0, 2.7}) {
     TensorGrid smoothed = grid;
@@ -95,9 +95,9 @@ TEST(Smoothing, LinearFieldsStayInside) {
     return Matrix3d(0.5 * Matrix3d::Identity() +
                     Matrix3d(Vector3d(0.1 * i.x(), -0.2 * i.y(), 0.3 * i.z()).asDiagonal()));
   };
-  TensorGrid grid = grid_of(box, linear);
+  TensorGrid grid = grid_of(smoothed_box, linear);
   smooth(grid, 1);
-  const AlignedBox3i inside(box.min() + Vector3i::Constant(4), box.max() - Vector3i::Constant(4));
+  const AlignedBox3i inside(smoothed_box.min() + Vector3i::Constant(4), smoothed_box.max() - Vector3i::Constant(4));
   for_each_active(grid, [&](const Vector3i& i, const Matrix3f& value) {
     if (!inside.contains(i)) return;
     EXPECT_LT((value.cast<double>() - linear(i)).cwiseAbs().maxCoeff(), 2e-6) << i.transpose();
@@ -107,11 +107,12 @@ TEST(Smoothing, LinearFieldsStayInside) {
 TEST(Smoothing, OneVoxelBecomesTheSampledGaussian) {
   constexpr double deviation = 1.5;  // Cut at 6 voxels along each axis.
   const Vector3i middle(6, 6, 16);
-  TensorGrid grid = grid_of(box, [&](const Vector3i& i) { return Matrix3d(Matrix3d::Constant(i == middle ? 1 : 0)); });
+  TensorGrid grid =
+      grid_of(smoothed_box, [&](const Vector3i& i) { return Matrix3d(Matrix3d::Constant(i == middle ? 1 : 0)); });
   smooth(grid, deviation);
   double line = 0;
   for (int i = -6; i <= 6; ++i) line += std::exp(-i * i / (2 * deviation * deviation));
-  const AlignedBox3i inside(box.min() + Vector3i::Constant(6), box.max() - Vector3i::Constant(6));
+  const AlignedBox3i inside(smoothed_box.min() + Vector3i::Constant(6), smoothed_box.max() - Vector3i::Constant(6));
   int compared = 0;
   for_each_active(grid, [&](const Vector3i& i, const Matrix3f& value) {
     if (!inside.contains(i)) return;
@@ -142,7 +143,7 @@ TEST(Smoothing, VariancesAdd) {
 }
 
 TEST(Smoothing, IsTheMeanOfActiveVoxels) {
-  TensorGrid grid = grid_of(box, general);
+  TensorGrid grid = grid_of(smoothed_box, waves);
   make_holes(grid);
   for (const double deviation : {0.7, 2.5}) {
     TensorGrid smoothed = grid;
@@ -155,13 +156,13 @@ TEST(Smoothing, IsTheMeanOfActiveVoxels) {
 }
 
 TEST(Smoothing, SymmetricFieldsStaySymmetric) {
-  TensorGrid grid = grid_of(box, [](const Vector3i& i) { return Matrix3d(general(i) + general(i).transpose()); });
+  TensorGrid grid = grid_of(smoothed_box, [](const Vector3i& i) { return Matrix3d(waves(i) + waves(i).transpose()); });
   smooth(grid, 1.2);
   EXPECT_EQ(asymmetry(grid), 0);
 }
 
 TEST(Smoothing, DoesNotDependOnThreads) {
-  TensorGrid many = grid_of(box, general), one = many;
+  TensorGrid many = grid_of(smoothed_box, waves), one = many;
   smooth(many, 2);
   const tbb::global_control single(tbb::global_control::max_allowed_parallelism, 1);
   smooth(one, 2);
@@ -169,7 +170,7 @@ TEST(Smoothing, DoesNotDependOnThreads) {
 }
 
 TEST(Smoothing, RejectsDeviationsOutOfRange) {
-  TensorGrid grid = grid_of(box, general);
+  TensorGrid grid = grid_of(smoothed_box, waves);
   for (const double deviation : {-1.0, 20.5, std::numeric_limits<double>::quiet_NaN()})
     EXPECT_THROW(smooth(grid, deviation), std::invalid_argument) << deviation;
 }

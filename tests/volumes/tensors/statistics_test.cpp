@@ -16,17 +16,17 @@ using Eigen::Matrix3d;
 using Eigen::Vector3d;
 using Eigen::Vector3i;
 
-Matrix3d matrix(std::initializer_list<double> rows) {
+Matrix3d matrix_of_rows(std::initializer_list<double> rows) {
   return Eigen::Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>(rows.begin());
 }
 
-TensorGrid grid_of(const std::function<Matrix3d(const Vector3i&)>& value) {
+TensorGrid stretched_grid(const std::function<Matrix3d(const Vector3i&)>& value) {
   const Eigen::Affine3d to_world = Eigen::Translation3d(1, 2, 3) * Eigen::Scaling(0.5, 1.0, 2.0);
   return dense_grid({Vector3i(-2, 0, 0), Vector3i(7, 9, 9)}, to_world, value);
 }
 
 TEST(FieldStatistics, DescribesTheExtent) {
-  const TensorGrid grid = grid_of([](const Vector3i&) { return Matrix3d::Identity(); });
+  const TensorGrid grid = stretched_grid([](const Vector3i&) { return Matrix3d::Identity(); });
   const FieldStatistics s = field_statistics(grid);
   EXPECT_EQ(s.active_voxels, 1000u);
   EXPECT_EQ(s.non_finite, 0u);
@@ -41,7 +41,7 @@ TEST(FieldStatistics, DescribesTheExtent) {
 
 TEST(FieldStatistics, PercentilesOfTheNorm) {
   // Norms 0 … 999, each once.
-  const TensorGrid grid = grid_of([](const Vector3i& i) -> Matrix3d {
+  const TensorGrid grid = stretched_grid([](const Vector3i& i) -> Matrix3d {
     const double n = (i.x() + 2) * 100 + i.y() * 10 + i.z();
     return n / std::sqrt(3.0) * Matrix3d::Identity();
   });
@@ -53,8 +53,8 @@ TEST(FieldStatistics, PercentilesOfTheNorm) {
 TEST(FieldStatistics, EigenvaluesAndFractions) {
   // A tenth of the voxels (x = −2) has the eigenvalues −1 ± 3i and 4. The others are diag(5, 0, 0), neither complex nor
   // negative.
-  const TensorGrid grid = grid_of([](const Vector3i& i) -> Matrix3d {
-    if (i.x() == -2) return matrix({-1, -3, 0, 3, -1, 0, 0, 0, 4});
+  const TensorGrid grid = stretched_grid([](const Vector3i& i) -> Matrix3d {
+    if (i.x() == -2) return matrix_of_rows({-1, -3, 0, 3, -1, 0, 0, 0, 4});
     return Vector3d(5, 0, 0).asDiagonal();
   });
   const FieldStatistics s = field_statistics(grid);
@@ -75,7 +75,9 @@ TEST(FieldStatistics, EigenvaluesAndFractions) {
 }
 
 TEST(FieldStatistics, DeviatorIsTheSpectralNorm) {
-  const TensorGrid grid = grid_of([](const Vector3i& i) { return matrix({0, 0, 0.1 * i.y(), 0, 0, 0, 0, 0, 0}); });
+  const TensorGrid grid = stretched_grid([](const Vector3i& i) {
+    return matrix_of_rows({0, 0, 0.1 * i.y(), 0, 0, 0, 0, 0, 0});
+  });
   const FieldStatistics s = field_statistics(grid);
   EXPECT_NEAR(s.deviator_max, 0.9, 1e-6);
   EXPECT_NEAR(s.absolute_loss, 1, 1e-12);  // Simple shear vanishes.
@@ -84,7 +86,7 @@ TEST(FieldStatistics, DeviatorIsTheSpectralNorm) {
 }
 
 TEST(FieldStatistics, LeavesNonFiniteVoxelsOut) {
-  const TensorGrid grid = grid_of([](const Vector3i& i) -> Matrix3d {
+  const TensorGrid grid = stretched_grid([](const Vector3i& i) -> Matrix3d {
     return (i.x() > 4 ? std::numeric_limits<double>::quiet_NaN() : 2.0) * Matrix3d::Identity();
   });
   const FieldStatistics s = field_statistics(grid);
@@ -96,7 +98,7 @@ TEST(FieldStatistics, LeavesNonFiniteVoxelsOut) {
 }
 
 TEST(FieldStatistics, OfNothingFinite) {
-  const TensorGrid grid = grid_of([](const Vector3i&) -> Matrix3d { return Matrix3d::Constant(INFINITY); });
+  const TensorGrid grid = stretched_grid([](const Vector3i&) -> Matrix3d { return Matrix3d::Constant(INFINITY); });
   const FieldStatistics s = field_statistics(grid);
   EXPECT_EQ(s.non_finite, 1000u);
   EXPECT_TRUE(s.index_box.isEmpty());

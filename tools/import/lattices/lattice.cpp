@@ -12,7 +12,6 @@
 #include <fmt/format.h>
 #include <tbb/parallel_for.h>
 
-#include "volumes/grids/block_loops.h"
 #include "volumes/grids/page_memory.h"
 #include "volumes/tensors/finite_differences.h"
 
