@@ -4,6 +4,7 @@
 #include <cstring>
 #include <stdexcept>
 
+#include "base/process/progress.h"
 #include "base/process/team.h"
 
 namespace tensorray {
@@ -48,19 +49,29 @@ void KeptResults::take(const std::string& bytes) {
     at += sizeof head + head.size;
   }
   bytes_ = bytes;
+  kept_size_ = bytes_.size();
 }
 
-std::optional<std::string> KeptResults::find(const ResultKey& key, std::size_t size) const {
+std::optional<std::string> KeptResults::find(const ResultKey& key) const {
   const auto place = places_.find(key);
   if (place == places_.end()) return std::nullopt;
   ResultHead head;
   std::memcpy(&head, &bytes_[place->second], sizeof head);
-  if (head.size != size) return std::nullopt;
-  return bytes_.substr(place->second + sizeof head, size);
+  return bytes_.substr(place->second + sizeof head, head.size);
+}
+
+std::optional<std::string> KeptResults::find(const ResultKey& key, std::size_t size) const {
+  std::optional<std::string> found = find(key);
+  if (found && found->size() != size) found.reset();
+  return found;
 }
 
 bool KeptResults::is_due() const {
   return work_ && work_->interval > 0 && seconds_since(kept_) > std::max(work_->interval / 2, least_ratio * cost_);
+}
+
+bool KeptResults::is_long() const {
+  return work_ && work_->interval > 0 && seconds_since(begun_) >= work_->interval / 2;
 }
 
 void KeptResults::add(const ResultKey& key, const std::string& values) {
@@ -73,8 +84,33 @@ void KeptResults::keep(bool done) {
   if (!work_) return;
   const auto start = Clock::now();
   work_->keep(part_.index, bytes_, done);
+  kept_size_ = bytes_.size();
   kept_ = Clock::now();
   cost_ = seconds_since(start);
+}
+
+void KeptResults::finish() {
+  if (bytes_.size() > kept_size_) keep(true);
+}
+
+void find_or_make(KeptResults* kept, const ResultKey& key, const std::function<void()>& make,
+                  const std::function<void(PartBytes& bytes)>& copy) {
+  if (std::optional<std::string> found = kept ? kept->find(key) : std::nullopt) {
+    PartBytes bytes(std::move(*found));
+    copy(bytes);
+    return;
+  }
+  try {
+    make();
+  } catch (const Cancelled&) {
+    if (kept) kept->finish();  // What was made before.
+    throw;
+  }
+  if (!kept || !kept->is_long()) return;
+  PartBytes bytes;
+  copy(bytes);
+  kept->add(key, bytes.take());
+  if (kept->is_due()) kept->keep(false);
 }
 
 }  // namespace tensorray

@@ -6,6 +6,7 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <optional>
 #include <string>
 #include <unordered_map>
@@ -16,6 +17,7 @@
 
 namespace tensorray {
 
+class PartBytes;
 class Team;
 
 /// All that a result depends on, or a hash of it, beside the scene and the program.
@@ -44,6 +46,9 @@ class KeptResults {
   /// `add`.
   std::optional<std::string> find(const ResultKey& key, std::size_t size) const;
 
+  /// The same with any number of bytes.
+  std::optional<std::string> find(const ResultKey& key) const;
+
   /// Whether there are any of earlier runs.
   bool has_any() const { return !places_.empty(); }
 
@@ -51,11 +56,17 @@ class KeptResults {
   /// most a fiftieth of the time.
   bool is_due() const;
 
+  /// Whether results are worth keeping: half of the work's interval has passed since this was made.
+  bool is_long() const;
+
   /// Adds a result for later runs.
   void add(const ResultKey& key, const std::string& values);
 
   /// Keeps what was added as the unit of this run. @param done  Whether the unit is complete.
   void keep(bool done);
+
+  /// Keeps what was added since the last time, if anything was.
+  void finish();
 
  private:
   struct Hash {
@@ -68,8 +79,22 @@ class KeptResults {
   bool is_shard_ = false;
   std::string bytes_;                                        // Of all results, one after the other.
   std::unordered_map<ResultKey, std::size_t, Hash> places_;  // In `bytes_`; of those of earlier runs.
-  Clock::time_point kept_ = Clock::now();
+  std::size_t kept_size_ = 0;                                // Of `bytes_`, the last time.
+  Clock::time_point begun_ = Clock::now(), kept_ = begun_;
   double cost_ = 0;  // Seconds of keeping, the last time.
+};
+
+/// A result that is the same for all runs of a scene: from those that were kept; else it is made, and kept if the run
+/// is a long one. @param kept  Null: nothing is kept. @param make  Makes it; all processes of a team do, and process 0
+/// has it then. @param copy  Copies it to or from bytes. @throw what `make` and `copy` throw. Where that is Cancelled,
+/// the results before are kept.
+void find_or_make(KeptResults* kept, const ResultKey& key, const std::function<void()>& make,
+                  const std::function<void(PartBytes& bytes)>& copy);
+
+/// Who makes together what is needed before the units of a work, and what was kept of it.
+struct Preparation {
+  Team* team = nullptr;         ///< Null: this process is alone.
+  KeptResults* kept = nullptr;  ///< Null: nothing is kept.
 };
 
 /// A hash of values for a key; they continue those of which `before` is the hash.

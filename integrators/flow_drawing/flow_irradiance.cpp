@@ -7,6 +7,7 @@
 #include <tbb/parallel_for.h>
 
 #include "base/constants.h"
+#include "base/process/kept_results.h"
 #include "base/process/team.h"
 #include "integrators/flow/flow_map.h"
 #include "integrators/flow/wavelength_tracer.h"
@@ -141,6 +142,17 @@ std::vector<float> sheets_of(const FlowMap& map, const Eigen::Vector2i& resoluti
   return sheets;
 }
 
+/// Copies the light of a direction to or from bytes.
+/// @param folds  Of the first direction; else null.
+void copy_light(PartBytes& bytes, const Eigen::Vector2i& resolution, std::size_t channels, Film& irradiance,
+                std::vector<float>* folds) {
+  if (bytes.reads()) irradiance = Film(resolution.x(), resolution.y(), static_cast<int>(channels));
+  bytes.copy(irradiance.values.data(), irradiance.values.size() * sizeof irradiance.values[0]);
+  if (!folds) return;
+  folds->resize(irradiance.plane_size());
+  bytes.copy(folds->data(), folds->size() * sizeof(float));
+}
+
 }  // namespace
 
 std::optional<FlowIrradiance> flow_irradiance(const TensorField& field, const Surfaces& surfaces, const Plate& plate,
@@ -161,19 +173,25 @@ std::optional<FlowIrradiance> flow_irradiance(const TensorField& field, const Su
   const FlowSettings tracing = flow_settings(light, result.plate, settings);
   const std::size_t channels = light.flexibilities.size() - 1;
   for (int pass = 0; pass < light.passes; ++pass) {
-    const Beam beam = beam_of(field, surfaces, plate, light, pass);
-    const FlowMap map = trace_flow_map(field, geometry, beam, settings.bending, tracing, progress);
-    CausticSettings drawing;
-    drawing.channels = channels;
-    drawing.team = settings.team;
-    Caustic caustic = draw_caustic(map, result.plate, bands_of(light, map, tracing), drawing, progress);
+    Film irradiance;  // Of this direction.
+    const auto make = [&] {
+      const Beam beam = beam_of(field, surfaces, plate, light, pass);
+      const FlowMap map = trace_flow_map(field, geometry, beam, settings.bending, tracing, progress);
+      CausticSettings drawing;
+      drawing.channels = channels;
+      drawing.team = settings.team;
+      irradiance = draw_caustic(map, result.plate, bands_of(light, map, tracing), drawing, progress).irradiance;
+      if (pass == 0) result.folds = sheets_of(map, result.plate.resolution);
+    };
+    find_or_make(settings.kept, {settings.key, static_cast<std::uint64_t>(pass), 0}, make, [&](PartBytes& bytes) {
+      copy_light(bytes, result.plate.resolution, channels, irradiance, pass == 0 ? &result.folds : nullptr);
+    });
     if (pass == 0) {
-      result.irradiance = std::move(caustic.irradiance);
-      result.folds = sheets_of(map, result.plate.resolution);
+      result.irradiance = std::move(irradiance);
       continue;
     }
     for (std::size_t i = 0; i < result.irradiance.values.size(); ++i)
-      result.irradiance.values[i] += caustic.irradiance.values[i];
+      result.irradiance.values[i] += irradiance.values[i];
   }
   for (double& value : result.irradiance.values) value /= light.passes;
   if (settings.team) share_values(*settings.team, result.irradiance.values);

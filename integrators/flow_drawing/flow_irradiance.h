@@ -2,6 +2,7 @@
 /// @file integrators/flow_drawing/flow_irradiance.h
 /// The irradiance that the disk of a distant light, or a point light, gives a surface through the field, band by band.
 
+#include <cstdint>
 #include <optional>
 #include <vector>
 
@@ -13,6 +14,7 @@
 
 namespace tensorray {
 
+class KeptResults;
 class Team;
 
 struct LandingLight {
@@ -25,9 +27,11 @@ struct LandingLight {
 
 struct FlowIrradianceSettings {
   BendingSettings bending;
-  int resolution = 64;         ///< Pixels along the longer side of the part of the plate where light lands.
-  std::size_t rays = 1 << 16;  ///< Vertices of the flow map, at most, for each direction.
-  Team* team = nullptr;        ///< Processes that compute the same together; null: this one is alone.
+  int resolution = 64;          ///< Pixels along the longer side of the part of the plate where light lands.
+  std::size_t rays = 1 << 16;   ///< Vertices of the flow map, at most, for each direction.
+  Team* team = nullptr;         ///< Processes that compute the same together; null: this one is alone.
+  KeptResults* kept = nullptr;  ///< The light of the directions that earlier runs have made. Null: none is kept.
+  std::uint64_t key = 0;        ///< A number of this light among all that is kept.
 };
 
 struct FlowIrradiance {

@@ -8,6 +8,7 @@
 
 #include <tbb/parallel_for.h>
 
+#include "base/process/kept_results.h"
 #include "base/process/team.h"
 #include "renderer/lights/photon_emitter.h"
 
@@ -33,6 +34,8 @@ struct Chunk {
   std::size_t source = 0;
   std::uint64_t first = 0, last = 0;
 };
+
+constexpr std::uint64_t photon_key = 0;  // Among what is kept; no map of light has it.
 
 struct ChunkPhotons {
   std::vector<Photon> landed;
@@ -186,15 +189,18 @@ PhotonEnd PhotonTracer::land(const Source& source, const BentRay& ray, const Emi
   return PhotonEnd::landed;
 }
 
+void copy_chunk(ChunkPhotons& part, PartBytes& bytes) {
+  std::size_t count = part.landed.size();
+  bytes.copy(&count, sizeof count);
+  part.landed.resize(count);
+  bytes.copy(part.landed.data(), count * sizeof(Photon));
+  bytes.copy(part.counts.data(), sizeof part.counts);
+}
+
 /// Takes the photons of the chunks that the others of the team have traced.
 void exchange_chunks(Team& team, std::vector<ChunkPhotons>& parts) {
-  exchange_parts(team, parts.size(), chunks_at_once, [&](std::size_t i, PartBytes& bytes) {
-    std::size_t count = parts[i].landed.size();
-    bytes.copy(&count, sizeof count);
-    parts[i].landed.resize(count);
-    bytes.copy(parts[i].landed.data(), count * sizeof(Photon));
-    bytes.copy(parts[i].counts.data(), sizeof parts[i].counts);
-  });
+  exchange_parts(team, parts.size(), chunks_at_once,
+                 [&](std::size_t i, PartBytes& bytes) { copy_chunk(parts[i], bytes); });
 }
 
 }  // namespace
@@ -212,10 +218,15 @@ PhotonMaps trace_photons(const BendingRegion& region, const std::vector<Vector3d
     progress.update("tracing photons", static_cast<std::uint64_t>(pass), static_cast<std::uint64_t>(settings.passes));
     const PhotonTracer tracer(region, surfaces, settings, pass);
     std::vector<ChunkPhotons> parts(chunks.size());
-    tbb::parallel_for(std::size_t{0}, chunks.size(), [&](std::size_t i) {
-      if (does_part(settings.team, i)) parts[i] = tracer.trace(sources[chunks[i].source], chunks[i]);
+    const auto trace = [&] {
+      tbb::parallel_for(std::size_t{0}, chunks.size(), [&](std::size_t i) {
+        if (does_part(settings.team, i)) parts[i] = tracer.trace(sources[chunks[i].source], chunks[i]);
+      });
+      if (settings.team) exchange_chunks(*settings.team, parts);
+    };
+    find_or_make(settings.kept, {photon_key, static_cast<std::uint64_t>(pass), 0}, trace, [&](PartBytes& bytes) {
+      for (ChunkPhotons& part : parts) copy_chunk(part, bytes);
     });
-    if (settings.team) exchange_chunks(*settings.team, parts);
     std::vector<Photon> landed;
     result.counts.push_back({});
     for (const ChunkPhotons& part : parts) {

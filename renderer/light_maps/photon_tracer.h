@@ -19,6 +19,7 @@
 
 namespace tensorray {
 
+class KeptResults;
 class Team;
 
 struct PhotonTracerSettings {
@@ -27,7 +28,8 @@ struct PhotonTracerSettings {
   int passes = 1;                  ///< >= 1
   double radius = 1;               ///< Of the first pass, world units; > 0.
   std::uint64_t seed = 0;
-  Team* team = nullptr;  ///< Processes that trace the same photons, each a part, and all have them; null: alone.
+  Team* team = nullptr;         ///< Processes that trace the same photons, each a part, and all have them; null: alone.
+  KeptResults* kept = nullptr;  ///< The photons of passes that earlier runs have traced. Null: none are kept.
   /// Whether a light lights a surface by photons.
   std::function<bool(int light, std::uint32_t surface)> serves;
   /// Of surfaces that are rectangles, by their index: photons near an edge are mirrored at it, so that the light that

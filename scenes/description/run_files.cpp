@@ -39,11 +39,14 @@ std::vector<NamedFile> output_files(const SceneDescription& scene) {
   return files;
 }
 
-void check_files(const SceneDescription& scene, const std::vector<NamedFile>& more) {
+void check_files(const SceneDescription& scene, const std::vector<NamedFile>& more,
+                 const std::vector<NamedFile>& read) {
   std::vector<NamedFile> outputs = output_files(scene);
   outputs.insert(outputs.end(), more.begin(), more.end());
   try {
-    require_distinct_files(input_files(scene), outputs);
+    std::vector<NamedFile> inputs = input_files(scene);
+    inputs.insert(inputs.end(), read.begin(), read.end());
+    require_distinct_files(inputs, outputs);
   } catch (const std::invalid_argument& error) {
     throw SceneError(printable(scene.path.string() + ": " + error.what()));
   }

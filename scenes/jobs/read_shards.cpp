@@ -26,6 +26,7 @@ void unite(const std::string& file, WorkFile shard, WorkFile& all) {
                        shard.part.count));
     all.units[i] = std::move(shard.units[i]);
   }
+  if (!all.before.state) all.before = std::move(shard.before);
 }
 
 }  // namespace

@@ -12,7 +12,8 @@
 #include "base/text/path_text.h"
 
 // The file: the mark; the length of the header; the header, as JSON; for each unit, twice the length of its state, plus
-// 1 if it is done; the states; the hash of all this. Numbers have 64 bits.
+// 1 if it is done (with "before": also for what is made before all units, behind them); the states; the hash of all
+// this. Numbers have 64 bits.
 
 namespace tensorray {
 namespace {
@@ -64,11 +65,14 @@ void write_work(const std::filesystem::path& path, const WorkFile& work) {
   const Json header = {{"origin", work.origin},
                        {"scene_file", text_of_path(work.scene_file)},
                        {"part", {work.part.index, work.part.count}},
-                       {"units", work.units.size()}};
+                       {"units", work.units.size()},
+                       {"before", work.before.state != nullptr}};
   const std::string text = header.dump();
   std::string begin = mark + bytes_of(text.size()) + text;
   std::vector<std::string_view> pieces{{}};
-  for (const WorkUnit& unit : work.units) {
+  std::vector<WorkUnit> units = work.units;
+  if (work.before.state) units.push_back(work.before);
+  for (const WorkUnit& unit : units) {
     begin += bytes_of(2 * (unit.state ? unit.state->size() : 0) + (unit.done ? 1 : 0));
     if (unit.state && !unit.state->empty()) pieces.push_back(*unit.state);
   }
@@ -88,11 +92,14 @@ WorkFile read_work(const std::filesystem::path& path) {
   const Json header = Json::parse(reader.take(reader.number()), nullptr, false);
   WorkFile work;
   std::vector<std::uint64_t> sizes;
+  bool has_before = false;
   try {
     work.origin = header.at("origin");
     work.scene_file = path_of_text(header.at("scene_file").get<std::string>());
     work.part = {header.at("part").at(0).get<std::size_t>(), header.at("part").at(1).get<std::size_t>()};
-    const std::string_view table = reader.take(sizeof(std::uint64_t) * header.at("units").get<std::uint32_t>());
+    has_before = header.value("before", false);
+    const std::uint64_t units = header.at("units").get<std::uint32_t>() + std::uint64_t{has_before};
+    const std::string_view table = reader.take(sizeof(std::uint64_t) * units);
     sizes.resize(table.size() / sizeof(std::uint64_t));
     copy_bytes(sizes.data(), table.data(), table.size());
   } catch (const Json::exception&) {
@@ -110,6 +117,10 @@ WorkFile read_work(const std::filesystem::path& path) {
     work.units.push_back(std::move(unit));
   }
   if (reader.number() != hash || reader.left() > 0) fail(path, "is damaged; remove it and render it again");
+  if (has_before) {
+    work.before = std::move(work.units.back());
+    work.units.pop_back();
+  }
   return work;
 }
 

@@ -6,6 +6,7 @@
 #include <fmt/format.h>
 
 #include "base/constants.h"
+#include "base/process/kept_results.h"
 #include "base/process/team.h"
 #include "renderer/charts/colormap.h"
 #include "renderer/color/color.h"
@@ -70,19 +71,24 @@ void add_lattice(int columns, int rows, const Keeps& keeps, TriangleMesh& mesh) 
 }
 
 /// The light on the plate, of which each process of a team makes a part.
-Image plate_image(const Scene& scene, Team* team, const Progress& progress) {
-  if (!team) return light_on_plate(scene, progress).linear;
-  RenderJob job{Work(), {}, team};
-  Image image = light_on_plate(scene, progress, &job).linear;
+Image plate_image(const Scene& scene, const Preparation& preparation, const Progress& progress) {
   const Eigen::Vector2i& resolution = scene.geometry.surfaces().plate->resolution;
-  if (!has_all(team)) image = Image(resolution.x(), resolution.y(), {"R", "G", "B"});
-  share_values(*team, image.pixels);
+  Image image(resolution.x(), resolution.y(), {"R", "G", "B"});
+  const auto make = [&] {
+    RenderJob job{Work(), {}, preparation.team};
+    Image made = light_on_plate(scene, progress, preparation.team ? &job : nullptr).linear;
+    if (has_all(preparation.team)) image = std::move(made);
+    if (preparation.team) share_values(*preparation.team, image.pixels);
+  };
+  find_or_make(preparation.kept, {}, make, [&](PartBytes& bytes) {
+    bytes.copy(image.pixels.data(), image.pixels.size() * sizeof image.pixels[0]);
+  });
   return image;
 }
 
 /// The plate with the light of the photons as its colour: a vertex in the middle of each pixel.
-ShadedSurface lit_plate(const Scene& scene, Team* team, const Progress& progress) {
-  const Image image = plate_image(scene, team, progress);
+ShadedSurface lit_plate(const Scene& scene, const Preparation& preparation, const Progress& progress) {
+  const Image image = plate_image(scene, preparation, progress);
   std::vector<float> greatest;
   for (std::size_t i = 0; i < image.pixels.size(); i += 3)
     greatest.push_back(std::max({image.pixels[i], image.pixels[i + 1], image.pixels[i + 2]}));
@@ -220,7 +226,7 @@ Material load_material(const MaterialDescription& description, const ShownLight&
   return make_material(settings_of(description, light.bands), reflectance);
 }
 
-void add_context(const Scene& scene, const PathScene& paths, Team* team, const Progress& progress,
+void add_context(const Scene& scene, const PathScene& paths, const Preparation& preparation, const Progress& progress,
                  std::vector<ShadedSurface>& surfaces, std::vector<Material>& materials) {
   const ContextDescription& context = paths.settings.context;
   const auto add_surface = [&](ShadedSurface surface, const MaterialDescription& material) {
@@ -230,7 +236,7 @@ void add_context(const Scene& scene, const PathScene& paths, Team* team, const P
   if (context.obstacles)
     for (const std::filesystem::path& file : scene.description.obstacles)
       add_surface(read_mesh_surface(file), plain(0.6, 0.5));
-  if (context.plate) add_surface(lit_plate(scene, team, progress), plain(0.8, 1));
+  if (context.plate) add_surface(lit_plate(scene, preparation, progress), plain(0.8, 1));
   if (context.slice) add_surface(make_slice(scene, paths.lights.light, *context.slice), plain(0.8, 1));
   for (const IsosurfaceDescription& each : context.isosurfaces)
     add_surface(make_isosurface(scene, each), each.material);

@@ -13,7 +13,7 @@
 
 namespace tensorray {
 
-class Team;
+struct Preparation;
 
 /// Makes a material from its description, for the bands of the light that shows the paths.
 /// @throw std::invalid_argument if a metal is unknown.
@@ -24,10 +24,10 @@ Material load_material(const MaterialDescription& description, const ShownLight&
 ShadedSurface read_mesh_surface(const std::filesystem::path& file, std::optional<double> smooth_angle = {});
 
 /// Adds the scene's context to `surfaces`, and the materials that it needs to `materials`.
-/// @param team  Processes that make the light on the plate together, and all have it; null: this one is alone.
+/// @param preparation  Processes of a team make the light on the plate together, and all have it.
 /// @throw SceneError if a slice or an isosurface is empty; Cancelled (light is traced for the plate); as
 /// Team::exchange.
-void add_context(const Scene& scene, const PathScene& paths, Team* team, const Progress& progress,
+void add_context(const Scene& scene, const PathScene& paths, const Preparation& preparation, const Progress& progress,
                  std::vector<ShadedSurface>& surfaces, std::vector<Material>& materials);
 
 }  // namespace tensorray

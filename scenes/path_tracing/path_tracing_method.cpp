@@ -4,6 +4,7 @@
 
 #include <fmt/format.h>
 
+#include "base/process/kept_results.h"
 #include "base/process/progress.h"
 #include "base/process/seconds.h"
 #include "integrators/path_files/path_files.h"
@@ -102,7 +103,7 @@ void require_fine(const Scene& scene, const RadiusDescription& radius, const Sur
 
 /// Who renders a picture, and who hears of it.
 struct StageRun {
-  Team* team;  ///< Null: this process alone.
+  RenderJob* job;  ///< Null: this process alone, and nothing is kept.
   const Progress& progress;
   const RenderCallbacks& callbacks;
 };
@@ -126,7 +127,12 @@ SurfacePicture LoadedPaths::render_stage(const Scene& scene, const std::vector<P
   const ShownLight& light = paths_.lights.light;
   std::vector<Material> materials{load_material(paths_.settings.material, light)};
   std::vector<ShadedSurface> surfaces{std::move(path_surface)};
-  add_context(scene, paths_, run.team, run.progress, surfaces, materials);
+  {
+    Team* const team = run.job ? run.job->team : nullptr;
+    KeptResults kept(run.job ? &run.job->before : nullptr, team);
+    add_context(scene, paths_, {team, &kept}, run.progress, surfaces, materials);
+    kept.finish();
+  }
   const std::vector<Light> lights = make_lights(scene.description, paths_.lights, camera);
   add_lamps(lights, light, surfaces, materials);
   const SurfaceScene stage(std::move(surfaces));
@@ -188,7 +194,7 @@ Render LoadedPaths::render(const Scene& scene, const Progress& progress, RenderJ
     add_picture(picture, shown);
     return shown;
   });
-  const StageRun run{team, progress, callbacks};
+  const StageRun run{job, progress, callbacks};
   add_picture(render_stage(scene, result.paths, std::move(shapes.surface), camera, run), result);
   result.statistics.seconds_drawing = seconds_since(drawing);
   return result;

@@ -89,6 +89,10 @@ struct RenderJob {
   /// Processes that make the same picture together with this one, if the method can (Method::is_shared); or that make
   /// together what is needed before the units of the work. Null: alone.
   Team* team = nullptr;
+
+  /// What is made before the units of `work` (KeptResults): the light of maps, photons, the light on a plate. It is the
+  /// same for all shards.
+  Work before = Work();
 };
 
 /// Renders the scene with its method. @param job  Null: nothing is kept. Of a team, only process 0 has the result.

@@ -16,7 +16,7 @@
 
 namespace tensorray {
 
-class Team;
+struct Preparation;
 
 /// A plate, a mesh, or paths of light.
 struct SceneObject {
@@ -33,8 +33,8 @@ struct LitObjects {
   const Scene& scene;
   const std::vector<Light>& lights;
   const std::vector<SceneObject>& objects;
-  const SurfaceScene& surfaces;  ///< All surfaces, of which that of object i has the index i, and lamps are the last.
-  Team* team = nullptr;          ///< Processes that trace the light together, and all have it; null: this one is alone.
+  const SurfaceScene& surfaces;    ///< All surfaces, of which that of object i has the index i, and lamps are the last.
+  const Preparation& preparation;  ///< Processes of a team trace the light together, and all have it.
 };
 
 /// The objects of the scene (without any, a checkerboard as floor below the volume), then its obstacles.

@@ -6,6 +6,7 @@
 
 #include <fmt/format.h>
 
+#include "base/process/kept_results.h"
 #include "base/process/progress.h"
 #include "base/process/seconds.h"
 #include "integrators/view/field_region.h"
@@ -201,12 +202,15 @@ Render LoadedObjects::render(const Scene& scene, const Progress& progress, Rende
   const PathTracerSettings samples = object_tracer_settings(scene, loaded_, camera, 0);
   PhotonMaps photons;
   if (bends) {
-    const LitObjects lit{scene, lights, objects, stage, team};
+    KeptResults kept(job ? &job->before : nullptr, team);
+    const Preparation preparation{team, &kept};
+    const LitObjects lit{scene, lights, objects, stage, preparation};
     const PhotonPairs pairs = photon_pairs(lit, loaded_.settings);
     photons =
         photons_of(lit, pairs, region, loaded_.settings.photons, samples.max_samples / samples.first_samples, progress);
     shaded.photons = &photons;
     shaded.irradiance_maps = land_light(lit, pairs, light, loaded_.settings.caustic, progress);
+    kept.finish();
   }
   report(photons.counts, result);
   result.statistics.seconds_tracing = seconds_since(start);

@@ -217,6 +217,9 @@ void add_render_command(CLI::App& program, Progress& progress) {
   command->add_option(
       "--shard", options->shard,
       "K/N: do part K of N of the work, from 1 to N, and write it to the file of -o, for `tensorray merge`");
+  command->add_option("--light", options->run.keeping.light,
+                      "A shard (the first) or a checkpoint of this render: the light that it has made before the tiles "
+                      "is used, and not made again");
   command
       ->add_option("--display", options->run.keeping.display,
                    "Show the picture in the viewer tev while it is rendered (14158)")

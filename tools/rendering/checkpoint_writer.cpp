@@ -20,8 +20,8 @@ constexpr double longest_tick = 0.2;  // Seconds after which a signal is noticed
 
 }  // namespace
 
-CheckpointWriter::CheckpointWriter(const Scene& scene, Work& work, const KeepSettings& settings)
-    : scene_(scene), work_(work), settings_(settings), thread_([this] {
+CheckpointWriter::CheckpointWriter(const Scene& scene, RenderJob& job, const KeepSettings& settings)
+    : scene_(scene), job_(job), settings_(settings), thread_([this] {
         try {
           run();
         } catch (...) {  // There was no memory even for a warning: the render goes on.
@@ -39,7 +39,9 @@ CheckpointWriter::~CheckpointWriter() {
 
 WorkFile CheckpointWriter::work_file() {
   if (!origin_) origin_ = origin_of(scene_);
-  return {*origin_, std::filesystem::absolute(scene_.description.path), work_.part(), work_.units()};
+  const std::vector<WorkUnit> before = job_.before.units();
+  return {*origin_, std::filesystem::absolute(scene_.description.path), job_.work.part(), job_.work.units(),
+          before.empty() ? WorkUnit() : before.front()};
 }
 
 bool CheckpointWriter::write() {
@@ -47,7 +49,8 @@ bool CheckpointWriter::write() {
   if (settings_.file.empty() || is_over_) return false;
   try {
     const WorkFile file = work_file();
-    if (std::none_of(file.units.begin(), file.units.end(), [](const WorkUnit& unit) { return unit.state; }))
+    if (!file.before.state &&
+        std::none_of(file.units.begin(), file.units.end(), [](const WorkUnit& unit) { return unit.state; }))
       return false;
     write_work(settings_.file, file);
     is_written_ = true;
@@ -69,7 +72,7 @@ void CheckpointWriter::remove() {
 /// Finds what the work belongs to while the files are those that were loaded.
 void CheckpointWriter::begin() {
   const std::lock_guard lock(writing_);
-  if (origin_ || settings_.file.empty() || work_.units().empty()) return;
+  if (origin_ || settings_.file.empty() || (job_.work.units().empty() && job_.before.units().empty())) return;
   try {
     origin_ = origin_of(scene_);
   } catch (const std::exception&) {  // write() reports it.
@@ -90,11 +93,11 @@ void CheckpointWriter::run() {
     const bool is_asked = take_picture_request();
     if (is_asked || (settings_.watch > 0 && seconds_since(shown) > settings_.watch)) {
       files_wanted_ = true;
-      work_.picture_wanted = true;
+      job_.work.picture_wanted = true;
       shown = Clock::now();
     }
     if (settings_.display > 0 && seconds_since(displayed) > settings_.display) {
-      work_.picture_wanted = true;
+      job_.work.picture_wanted = true;
       displayed = Clock::now();
     }
     if (is_asked || (settings_.interval > 0 && seconds_since(written) > settings_.interval)) {

@@ -31,7 +31,7 @@ struct KeepSettings {
 class CheckpointWriter {
  public:
   /// All arguments must outlive it.
-  CheckpointWriter(const Scene& scene, Work& work, const KeepSettings& settings);
+  CheckpointWriter(const Scene& scene, RenderJob& job, const KeepSettings& settings);
   ~CheckpointWriter();
   CheckpointWriter(const CheckpointWriter&) = delete;
   CheckpointWriter& operator=(const CheckpointWriter&) = delete;
@@ -53,7 +53,7 @@ class CheckpointWriter {
   void begin();
 
   const Scene& scene_;
-  Work& work_;
+  RenderJob& job_;
   const KeepSettings& settings_;
   std::mutex writing_;
   std::optional<Json> origin_;

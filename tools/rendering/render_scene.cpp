@@ -81,8 +81,8 @@ KeepSettings keep_settings(const SceneDescription& description, const RenderRun&
   return settings;
 }
 
-/// The units of the checkpoint, if the run continues one. @throw SceneError if it is that of another render.
-std::vector<WorkUnit> kept_units(const std::filesystem::path& file, const RenderRun& run, const Scene& scene) {
+/// The checkpoint, if the run continues one. @throw SceneError if it is that of another render.
+WorkFile kept_work(const std::filesystem::path& file, const RenderRun& run, const Scene& scene) {
   if (!run.keeping.resume || file.empty() || !is_there(file)) return {};
   WorkFile kept = read_work(file);
   const WorkPart part = run.keeping.shard.value_or(WorkPart{});
@@ -92,7 +92,21 @@ std::vector<WorkUnit> kept_units(const std::filesystem::path& file, const Render
   if (!other.empty())
     throw SceneError(printable(fmt::format(
         "{}: is the checkpoint of another render: {}; undo the change, or remove the file", file.string(), other)));
-  return std::move(kept.units);
+  return kept;
+}
+
+/// What is made before the units, as earlier runs have kept it.
+std::vector<WorkUnit> kept_before(const WorkFile& kept) {
+  return kept.before.state ? std::vector{kept.before} : std::vector<WorkUnit>();
+}
+
+/// What --light names. @throw SceneError if it is of another render; as read_work.
+std::vector<WorkUnit> read_light(const std::filesystem::path& file, const Scene& scene) {
+  const WorkFile work = read_work(file);
+  if (const std::string other = difference(work.origin, origin_of(scene)); !other.empty())
+    throw SceneError(printable(
+        fmt::format("{}: is of another render: {}; undo the change, or leave --light out", file.string(), other)));
+  return kept_before(work);
 }
 
 /// Writes the outputs of what there is so far.
@@ -122,6 +136,12 @@ Render render_or_keep(const Scene& scene, const Progress& progress, RenderJob& j
     if (!keeper.write()) throw;
     throw Interrupted(fmt::format("interrupted; --resume continues from {}", checkpoint.string()));
   }
+}
+
+/// What a shard's file has: what all shards make before their units is in the first one alone.
+WorkFile shard_of(WorkFile work) {
+  if (work.part.index > 0) work.before = {};
+  return work;
 }
 
 /// While it lives, all ranks do units of the work, or its steps together, if the method has such. They get what the
@@ -176,9 +196,9 @@ void complete(const Scene& scene, RenderJob& job, OutputFiles files, const KeepS
   if (!run.keeping.display.empty())
     display.emplace(run.keeping.display, written_by(scene.description, run).front().filename().string());
   job.work.is_shard = run.keeping.shard.has_value();
-  job.work.interval = keep.file.empty() ? 0 : keep.interval;
+  job.before.interval = job.work.interval = keep.file.empty() ? 0 : keep.interval;
   const SharedWork shared(run.leader, scene, job, running_threads());
-  CheckpointWriter keeper(scene, job.work, keep);
+  CheckpointWriter keeper(scene, job, keep);
   job.show = [&](Render picture) {
     if (display) display->show(picture.linear);
     if (!keeper.take_file_request() || run.keeping.shard) return;
@@ -195,7 +215,7 @@ void complete(const Scene& scene, RenderJob& job, OutputFiles files, const KeepS
   for (const std::string& warning : result.warnings) tell({"warning: " + warning}, run.quiet);
   const auto start = Clock::now();
   try {
-    if (run.keeping.shard) write_work(run.keeping.shard_file, keeper.work_file());
+    if (run.keeping.shard) write_work(run.keeping.shard_file, shard_of(keeper.work_file()));
     files.erase(shard_key);
     write_outputs(result, scene, files);
     if (!run.statistics.empty())
@@ -221,7 +241,10 @@ Scene render_to_files(const SceneDescription& description, const RenderRun& run,
   tell(scene.notes, run.quiet);
   // Errors come with the first image.
   const std::future<void> images = std::async(std::launch::async, prepare_images, written_by(description, run));
-  RenderJob job{Work(run.keeping.shard.value_or(WorkPart{}), kept_units(keep.file, run, scene)), {}};
+  const WorkFile kept = kept_work(keep.file, run, scene);
+  std::vector<WorkUnit> before = kept_before(kept);
+  if (!run.keeping.light.empty() && before.empty()) before = read_light(run.keeping.light, scene);
+  RenderJob job{Work(run.keeping.shard.value_or(WorkPart{}), kept.units), {}, nullptr, Work({}, std::move(before))};
   complete(scene, job, std::move(files), keep, run, progress);
   for (const std::filesystem::path& file : written_by(description, run))
     if (!run.quiet) tell_made("wrote " + file.string());
@@ -437,7 +460,7 @@ void write_merged(const SceneDescription& description, const WorkFile& work, con
         printable(fmt::format("{}: has changed since the shards were made: {}; undo the change, or make them "
                               "again",
                               description.path.string(), other)));
-  RenderJob job{Work({}, work.units), {}};
+  RenderJob job{Work({}, work.units), {}, nullptr, Work({}, kept_before(work))};
   complete(scene, job, std::move(files), {}, run, progress);
   for (const std::filesystem::path& file : written_by(description, run))
     if (!run.quiet) tell_made("wrote " + file.string());

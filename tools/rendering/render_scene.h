@@ -26,6 +26,7 @@ struct RunKeeping {
   bool watch = false;                ///< Keep the pictures up to date while they are rendered.
   std::optional<WorkPart> shard;     ///< Do only this part of the work,
   std::filesystem::path shard_file;  ///< and write it to this file, and no picture.
+  std::filesystem::path light;       ///< A shard or checkpoint that has what is made before the tiles; empty: none.
 };
 
 struct RenderRun {

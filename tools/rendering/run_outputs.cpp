@@ -40,7 +40,7 @@ OutputFiles open_files(const SceneDescription& description, const RenderRun& run
   check_scene_copy(description.path, run.scene_copy);
   const std::vector<NamedFile> more{
       {run.statistics, statistics_key}, {run.scene_copy, scene_key}, {run.keeping.shard_file, shard_key}};
-  check_files(description, more);
+  check_files(description, more, {{run.keeping.light, "--light"}});
   OutputFiles files;
   if (!run.keeping.shard) files = open_outputs(description.output);
   for (const NamedFile& file : more)
@@ -51,6 +51,7 @@ OutputFiles open_files(const SceneDescription& description, const RenderRun& run
 RenderRun at_frame(RenderRun run, int frame) {
   run.statistics = numbered(run.statistics.string(), frame);
   run.keeping.shard_file = numbered(run.keeping.shard_file.string(), frame);
+  run.keeping.light = numbered(run.keeping.light.string(), frame);
   return run;
 }
 

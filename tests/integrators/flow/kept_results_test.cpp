@@ -7,6 +7,8 @@
 
 #include <gtest/gtest.h>
 
+#include "base/process/progress.h"
+#include "base/process/team.h"
 #include "tests/integrators/flow_support.h"
 
 namespace tensorray {
@@ -130,6 +132,56 @@ TEST(KeptResults, FindsWhatWasKept) {
   EXPECT_EQ(kept.find(b, 0), "");
   EXPECT_FALSE(kept.find(a, 4));
   EXPECT_FALSE(kept.find({1, 2, 5}, 5));
+}
+
+/// A result of any size is made once, by the first run that is long enough.
+TEST(KeptResults, AreFoundOrMade) {
+  std::vector<int> values;
+  int made = 0;
+  const auto find_or_make_values = [&](Work& work, std::uint64_t number) {
+    KeptResults kept(&work, nullptr);
+    values.clear();
+    const auto make = [&] {
+      values.assign(number, 7);
+      ++made;
+    };
+    const auto copy = [&](PartBytes& bytes) {
+      std::size_t count = values.size();
+      bytes.copy(&count, sizeof count);
+      values.resize(count);
+      bytes.copy(values.data(), count * sizeof(int));
+    };
+    find_or_make(&kept, {number, 0, 0}, make, copy);
+    kept.finish();
+    EXPECT_EQ(values, std::vector<int>(number, 7));
+  };
+  Work quick, work;  // Without an interval nothing is kept.
+  find_or_make_values(quick, 3);
+  find_or_make_values(quick, 3);
+  EXPECT_EQ(made, 2);
+  EXPECT_EQ(quick.units().front().state, nullptr);
+  work.interval = 1e-9;
+  find_or_make_values(work, 3);
+  find_or_make_values(work, 0);
+  EXPECT_EQ(made, 4);
+  Work resumed({}, work.units());
+  find_or_make_values(resumed, 3);
+  find_or_make_values(resumed, 0);
+  EXPECT_EQ(made, 4);
+  find_or_make_values(resumed, 2);
+  EXPECT_EQ(made, 5);
+}
+
+/// A run that is cancelled while it makes a result keeps those before it.
+TEST(KeptResults, AreKeptWhereTheNextOneIsCancelled) {
+  Work work;
+  work.interval = 1000;
+  KeptResults kept(&work, nullptr);
+  kept.add({1, 0, 0}, "first");
+  const auto cancel = [] { throw Cancelled(); };
+  EXPECT_THROW(find_or_make(&kept, {2, 0, 0}, cancel, [](PartBytes&) {}), Cancelled);
+  Work resumed({}, work.units());
+  EXPECT_EQ(KeptResults(&resumed, nullptr).find({1, 0, 0}), "first");
 }
 
 TEST(KeptResults, SaysThatAUnitIsDamaged) {

@@ -150,6 +150,42 @@ TEST_F(KeptWork, KilledPlatesContinueToTheSameFiles) {
   }
 }
 
+/// What is made before the tiles: maps of light, photons, the light on a plate.
+TEST_F(KeptWork, LightBeforeTheTilesIsKept) {
+  for (const std::string& scene : {std::string(lit_scene), plate_under_paths("mesh")}) {
+    make(scene.c_str());
+    EXPECT_EQ(end_by(SIGKILL, {"--threads", "1"}).status, 128 + SIGKILL) << scene;
+    EXPECT_NE(read_file(in_folder("a.png.checkpoint")).find(R"("before":true)"), std::string::npos) << scene;
+    EXPECT_EQ(end_by(SIGINT, {"--resume", "--threads", "1"}).status, 130) << scene;
+    run_well(render("a", {"--resume"}));
+    expect_same("a");
+  }
+}
+
+/// The first shard has it; others may take it from there, and merge does.
+TEST_F(KeptWork, ShardsHaveTheirLightFromTheFirst) {
+  make(lit_scene);
+  const auto make_shard = [](int i, const std::vector<std::string>& more) {
+    std::vector<std::string> arguments{"render",  "scene.json",           "-q", "--checkpoint", "0.01",
+                                       "--shard", fmt::format("{}/3", i), "-o", shard(i)};
+    arguments.insert(arguments.end(), more.begin(), more.end());
+    return arguments;
+  };
+  const std::string mark = R"("before":true)";
+  run_well(make_shard(1, {}));
+  run_well(make_shard(2, {"--light", shard(1)}));
+  run_well(make_shard(3, {}));
+  EXPECT_NE(read_file(in_folder(shard(1))).find(mark), std::string::npos);
+  EXPECT_EQ(read_file(in_folder(shard(2))).find(mark), std::string::npos);
+  run_well(merge({shard(1), shard(2), shard(3)}));
+  expect_same("a");
+  expect_error("of another render", make_shard(3, {"--light", shard(1), "--seed", "7"}));
+  expect_error("is the same file as --light", make_shard(3, {"--light", shard(3)}));
+  expect_error("none.shard", make_shard(3, {"--light", "none.shard"}), 1);
+  run_well(render("a", {"--light", shard(1)}));
+  expect_same("a");
+}
+
 TEST_F(KeptWork, AnInterruptedRenderWritesWhatItHas) {
   for (const int signal : {SIGINT, SIGTERM}) {
     std::filesystem::remove(in_folder("a.png.checkpoint"));  // The first one is written when tiles are done.
