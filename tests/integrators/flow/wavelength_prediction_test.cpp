@@ -13,7 +13,7 @@ namespace {
 using Eigen::Vector2f;
 
 /// A map of vertices on a line; their light moves with the sample t, from 0 to 1, as `landing` says.
-FlowMap map_of(const std::vector<double>& vertices, const std::function<Vector2f(double, double)>& landing) {
+FlowMap small_map(const std::vector<double>& vertices, const std::function<Vector2f(double, double)>& landing) {
   FlowMap map;
   map.wavelengths = range_samples;
   for (const double x : vertices)
@@ -51,7 +51,7 @@ Vector2f smooth(double x, double t) {
 }
 
 TEST(WavelengthPrediction, CubicsAreExact) {
-  const FlowMap map = map_of({0, 1, 0.5}, [](double x, double t) {
+  const FlowMap map = small_map({0, 1, 0.5}, [](double x, double t) {
     return Vector2f(static_cast<float>(40 + x + 10 * t * t * t), static_cast<float>(50 - 20 * t * t));
   });
   // Five samples: the second one deviates from a parabola by 10 · 3/64 pixels.
@@ -62,7 +62,7 @@ TEST(WavelengthPrediction, CubicsAreExact) {
 /// The error of a cubic through samples at a distance h is at most 1/24 h⁴ times the fourth derivative, here 160: it
 /// falls to a sixteenth with half the distance.
 TEST(WavelengthPrediction, IsOfFourthOrder) {
-  const FlowMap map = map_of({0, 1, 0.5}, smooth);
+  const FlowMap map = small_map({0, 1, 0.5}, smooth);
   const double coarse = error_of(map, {}, 8, 10), fine = error_of(map, {}, 4, 10);
   EXPECT_LT(coarse, 160.0 / 24 * std::pow(0.25, 4));
   EXPECT_GT(coarse, 1e-3);
@@ -71,23 +71,23 @@ TEST(WavelengthPrediction, IsOfFourthOrder) {
 
 /// What the polynomials miss is the same of neighbours, to second order in their distance.
 TEST(WavelengthPrediction, ParentsLeaveOnlyWhatDiffers) {
-  const double alone = error_of(map_of({0, 1, 0.5}, smooth), {}, 8, 10);
-  const FlowMap far = map_of({0, 1, 0.5}, smooth), near = map_of({0, 0.5, 0.25}, smooth);
+  const double alone = error_of(small_map({0, 1, 0.5}, smooth), {}, 8, 10);
+  const FlowMap far = small_map({0, 1, 0.5}, smooth), near = small_map({0, 0.5, 0.25}, smooth);
   EXPECT_LT(error_of(far, both, 8, 10), alone / 50);
   EXPECT_NEAR(error_of(far, both, 16, 10) / error_of(near, both, 16, 10), 4, 0.5);
 }
 
 TEST(WavelengthPrediction, ThreeSamplesNeedParentsThatAgree) {
-  const FlowMap map = map_of({0, 1, 0.5}, smooth);
+  const FlowMap map = small_map({0, 1, 0.5}, smooth);
   EXPECT_EQ(error_of(map, {}, 16, 10), -1);
   EXPECT_GE(error_of(map, both, 16, 0.1f), 0);
   EXPECT_LT(error_of(map, both, 16, 0.1f), 0.1);
-  const FlowMap apart = map_of({0, 100, 50}, smooth);  // A parent of another phase.
+  const FlowMap apart = small_map({0, 100, 50}, smooth);  // A parent of another phase.
   EXPECT_EQ(error_of(apart, both, 16, 0.1f), -1);
 }
 
 TEST(WavelengthPrediction, AJumpIsNoticed) {
-  const FlowMap map = map_of({0, 1, 0.5}, [](double x, double t) {
+  const FlowMap map = small_map({0, 1, 0.5}, [](double x, double t) {
     return Vector2f(static_cast<float>(40 + x + (t > 0.6 && x == 0.5 ? 1 : 0)), static_cast<float>(50 * t));
   });
   for (const std::size_t step : {16, 8, 4, 2}) EXPECT_EQ(error_of(map, both, step, 0.03f), -1) << step;
@@ -95,7 +95,7 @@ TEST(WavelengthPrediction, AJumpIsNoticed) {
 
 /// Light that leaves by another face from sample 12 on.
 TEST(WavelengthPrediction, AKinkNeedsAllSamplesOnlyWhereItIs) {
-  FlowMap map = map_of({0, 1, 0.5}, [](double x, double t) {
+  FlowMap map = small_map({0, 1, 0.5}, [](double x, double t) {
     return Vector2f(static_cast<float>(40 + x + 10 * std::max(t - 0.35, 0.0)), static_cast<float>(50 * t));
   });
   ExitFaces faces{};
@@ -110,7 +110,7 @@ TEST(WavelengthPrediction, AKinkNeedsAllSamplesOnlyWhereItIs) {
 
 /// Light of a parent that does not land says nothing about others.
 TEST(WavelengthPrediction, ParentsWhoseLightEndsElsewhereAreLeftOut) {
-  FlowMap map = map_of({0, 1, 0.5}, smooth);
+  FlowMap map = small_map({0, 1, 0.5}, smooth);
   map.ends[5] = RayEnd::obstacle;
   EXPECT_FALSE(WavelengthPrediction(map, 2, both, {100, 100}).parents_agree(16, 10));
   EXPECT_EQ(error_of(map, both, 8, 10), error_of(map, {}, 8, 10));

@@ -31,26 +31,27 @@ std::string small_lens(const std::string& rest, const std::string& kind = R"("ki
          rest + "}}";
 }
 
-constexpr const char* zero = R"("kind": "constant", "resolution": 9, "tensor": [[0, 0, 0], [0, 0, 0], [0, 0, 0]])";
+constexpr const char* no_bending =
+    R"("kind": "constant", "resolution": 9, "tensor": [[0, 0, 0], [0, 0, 0], [0, 0, 0]])";
 
-const std::vector<std::string> all_channels{"R",
-                                            "G",
-                                            "B",
-                                            "A",
-                                            "texture.s",
-                                            "texture.t",
-                                            "displacement.x",
-                                            "displacement.y",
-                                            "displacement.z",
-                                            "magnification.log",
-                                            "magnification.major",
-                                            "magnification.minor",
-                                            "folds",
-                                            "length",
-                                            "end"};
+const std::vector<std::string> lens_channels{"R",
+                                             "G",
+                                             "B",
+                                             "A",
+                                             "texture.s",
+                                             "texture.t",
+                                             "displacement.x",
+                                             "displacement.y",
+                                             "displacement.z",
+                                             "magnification.log",
+                                             "magnification.major",
+                                             "magnification.minor",
+                                             "folds",
+                                             "length",
+                                             "end"};
 
 /// The named channel of a picture, by pixel.
-std::vector<float> channel(const Image& image, const std::string& name) {
+std::vector<float> lens_channel(const Image& image, const std::string& name) {
   const auto found = std::find(image.channels.begin(), image.channels.end(), name);
   if (found == image.channels.end()) ADD_FAILURE() << "no channel " << name;
   std::vector<float> values;
@@ -72,7 +73,7 @@ class Lens : public Program {
 TEST_F(Lens, WithoutAFieldThePictureIsTheImage) {
   const Image picture = random_picture(48, 32);
   write_image(in_folder("photo.png"), picture);
-  write("scene.json", small_lens(R"("image": "photo.png")", zero));
+  write("scene.json", small_lens(R"("image": "photo.png")", no_bending));
   for (const std::string settings : {"integrator.mode=gather", "integrator.mode=scatter", "bending.rgb=[0.1,0.2,0.3]",
                                      "light.spectrum=A", "integrator.image_plane.depth=0.5"}) {
     run_well({"render", "scene.json", "-q", "-o", "out.png", "--set", settings});
@@ -85,7 +86,7 @@ TEST_F(Lens, WithoutAFieldThePictureIsTheImage) {
         difference = std::max<double>(difference, std::abs(seen.pixels[4 * pixel + c] - picture.pixels[3 * pixel + c]));
     // Half a step of 8 bits is 0.002. The slope of sRGB near black makes an error of 1e-4 from single precision.
     EXPECT_LT(difference, 2e-4) << settings;
-    for (const float alpha : channel(seen, "A")) EXPECT_EQ(alpha, 1);
+    for (const float alpha : lens_channel(seen, "A")) EXPECT_EQ(alpha, 1);
   }
 }
 
@@ -100,7 +101,8 @@ TEST_F(Lens, LightWithoutAlphaIsKept) {
   glow.pixel(0, 0)[3] = NAN;
   write_image(in_folder("glow.exr"), glow);
   for (const std::string mode : {"gather", "scatter"}) {
-    write("scene.json", small_lens(R"("image": "glow.exr", "image_layer": "fire", "mode": ")" + mode + "\"", zero));
+    write("scene.json",
+          small_lens(R"("image": "glow.exr", "image_layer": "fire", "mode": ")" + mode + "\"", no_bending));
     const Image seen = render({});
     const float* const pixel = seen.pixel(24, 16);
     EXPECT_NEAR(pixel[0], 3, 1e-3) << mode;
@@ -116,18 +118,18 @@ TEST_F(Lens, EveryChannelIsInTheExr) {
   write("scene.json", small_lens(R"("image": "checkerboard")"));
   for (const std::string mode : {"gather", "scatter"}) {
     const Image image = render({"integrator.mode=" + mode});
-    EXPECT_THAT(image.channels, ::testing::UnorderedElementsAreArray(all_channels));  // The file sorts them.
+    EXPECT_THAT(image.channels, ::testing::UnorderedElementsAreArray(lens_channels));  // The file sorts them.
     for (const float value : image.pixels) ASSERT_TRUE(std::isfinite(value));
-    const std::vector<float> length = channel(image, "length"), end = channel(image, "end");
+    const std::vector<float> length = lens_channel(image, "length"), end = lens_channel(image, "end");
     for (std::size_t i = 0; i < length.size(); ++i) EXPECT_EQ(length[i] > 0, end[i] == 0 || end[i] == 5) << i;
   }
 }
 
 TEST_F(Lens, PixelsThatSeeNoImageAreTransparent) {
-  write("scene.json", small_lens(R"("image": "checkerboard", "image_plane": {"size": [1.2, 0.8]})", zero));
+  write("scene.json", small_lens(R"("image": "checkerboard", "image_plane": {"size": [1.2, 0.8]})", no_bending));
   for (const std::string mode : {"gather", "scatter"}) {
     const Image image = render({"integrator.mode=" + mode});
-    const std::vector<float> alpha = channel(image, "A"), end = channel(image, "end");
+    const std::vector<float> alpha = lens_channel(image, "A"), end = lens_channel(image, "end");
     for (int y = 0; y < 32; ++y)
       for (int x = 0; x < 48; ++x) {
         const bool inside = x >= 12 && x < 36 && y >= 8 && y < 24;
@@ -137,7 +139,7 @@ TEST_F(Lens, PixelsThatSeeNoImageAreTransparent) {
       }
   }
   const Image repeated = render({"integrator.mode=gather", "integrator.wrap=repeat"});
-  for (const float alpha : channel(repeated, "A")) EXPECT_EQ(alpha, 1);
+  for (const float alpha : lens_channel(repeated, "A")) EXPECT_EQ(alpha, 1);
 }
 
 /// The greatest difference between the chromaticity of a pixel and that of the sum of all pixels.
@@ -172,7 +174,7 @@ TEST_F(Lens, DepthsStandSideBySideAndLessOfTheVolumeBendsLess) {
     const Image image = render({"integrator.mode=" + mode, "light.direction=[0,1,0]", "receiver.resolution=[32,32]",
                                 "receiver.size=[3,3]", "field.scale=1"});
     ASSERT_EQ(image.width, 5 * 32 + 4);
-    const std::vector<float> aside = channel(image, "displacement.x");
+    const std::vector<float> aside = lens_channel(image, "displacement.x");
     for (int panel = 1; panel < 5; ++panel) {
       const auto middle = [&](int which) {
         return std::abs(aside[static_cast<std::size_t>(16 * image.width + 33 * which + 16)]);
@@ -193,7 +195,7 @@ TEST_F(Lens, NoPixelStandsOutBesideAFold) {
   const Image image = render({});
   int count = 0;
   for (const char* name : {"R", "G", "B"}) {
-    std::vector<float> values = channel(image, name);
+    std::vector<float> values = lens_channel(image, name);
     for (float& value : values) value = std::min(value, 1.0f);
     for (int y = 1; y < 255; ++y)
       for (int x = 1; x < 255; ++x) {
@@ -210,9 +212,9 @@ TEST_F(Lens, NoPixelStandsOutBesideAFold) {
 TEST_F(Lens, OverlayDrawsOverThePictureAlone) {
   write("scene.json", small_lens(R"("image": "color_wheel", "mode": "gather")"));
   const Image plain = render({}), drawn = render({"integrator.overlay=grid"});
-  EXPECT_NE(channel(plain, "R"), channel(drawn, "R"));
-  for (std::size_t i = 4; i < all_channels.size(); ++i)
-    EXPECT_EQ(channel(plain, all_channels[i]), channel(drawn, all_channels[i])) << all_channels[i];
+  EXPECT_NE(lens_channel(plain, "R"), lens_channel(drawn, "R"));
+  for (std::size_t i = 4; i < lens_channels.size(); ++i)
+    EXPECT_EQ(lens_channel(plain, lens_channels[i]), lens_channel(drawn, lens_channels[i])) << lens_channels[i];
 }
 
 TEST_F(Lens, TheSameBytesOnAnyNumberOfThreads) {
@@ -234,7 +236,7 @@ TEST_F(Lens, TheImageIsSeenUprightFromBehindTheReceiver) {
   picture.pixel(0, 0)[0] = 1;
   picture.pixel(0, 1)[1] = 1;
   write_image(in_folder("photo.png"), picture);
-  write("scene.json", small_lens(R"("image": "photo.png")", zero));
+  write("scene.json", small_lens(R"("image": "photo.png")", no_bending));
   const Image image = render({"receiver.resolution=[2,2]", "receiver.size=[2,2]"});
   EXPECT_NEAR(image.pixel(0, 0)[0], 1, 1e-4);
   EXPECT_NEAR(image.pixel(0, 1)[1], 1, 1e-4);
@@ -245,14 +247,14 @@ TEST_F(Lens, AlphaIsMultipliedInWhereTheFormatWantsItSo) {
   Image picture(2, 2, {"R", "G", "B", "A"});
   for (std::size_t i = 0; i < picture.pixels.size(); ++i) picture.pixels[i] = i % 4 == 3 ? 0.5f : 1;
   write_image(in_folder("photo.png"), picture);
-  write("scene.json", small_lens(R"("image": "photo.png")", zero));
+  write("scene.json", small_lens(R"("image": "photo.png")", no_bending));
   run_well({"render", "scene.json", "-q", "-o", "out.exr", "-o", "out.png", "--set", "receiver.resolution=[2,2]",
             "--set", "receiver.size=[2,2]"});
   const Image linear = read_image(in_folder("out.exr")), shown = read_image(in_folder("out.png"));
-  EXPECT_NEAR(channel(linear, "R")[0], 0.5, 1e-4);
-  EXPECT_NEAR(channel(linear, "A")[0], 0.5, 1e-4);
-  EXPECT_NEAR(channel(shown, "R")[0], 1, 1e-4);
-  EXPECT_NEAR(channel(shown, "A")[0], 0.5, 1e-4);
+  EXPECT_NEAR(lens_channel(linear, "R")[0], 0.5, 1e-4);
+  EXPECT_NEAR(lens_channel(linear, "A")[0], 0.5, 1e-4);
+  EXPECT_NEAR(lens_channel(shown, "R")[0], 1, 1e-4);
+  EXPECT_NEAR(lens_channel(shown, "A")[0], 0.5, 1e-4);
   run_well({"render", "scene.json", "-q", "-o", "out.jpg", "--set", "receiver.resolution=[2,2]", "--set",
             "receiver.size=[2,2]"});
   EXPECT_NEAR(read_image(in_folder("out.jpg")).pixels[0], 0.735, 0.01) << "half the light, on the sRGB curve";

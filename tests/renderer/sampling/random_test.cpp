@@ -13,7 +13,7 @@ namespace tensorray {
 namespace {
 
 /// Chi-square of counts against equal expectation, in standard deviations from its mean (normal for many bins).
-double chi_square_score(const std::vector<int>& counts) {
+double uniform_score(const std::vector<int>& counts) {
   double total = 0, sum = 0;
   for (const int count : counts) total += count;
   const double expected = total / static_cast<double>(counts.size());
@@ -27,7 +27,7 @@ template <class First, class Second>
 double pair_score(const First& first, const Second& second) {
   std::vector<int> counts(32 * 32);
   for (int i = 0; i < 65536; ++i) ++counts[static_cast<int>(first(i) * 32) * 32 + static_cast<int>(second(i) * 32)];
-  return chi_square_score(counts);
+  return uniform_score(counts);
 }
 
 TEST(RandomUniformTest, IsAFunctionOfItsKeys) {
@@ -50,7 +50,7 @@ TEST(RandomUniformTest, IsUniform) {
     const double fine = value * 0x1p40;
     low_bits += fine - std::floor(fine);
   }
-  EXPECT_LT(std::abs(chi_square_score(counts)), 4);
+  EXPECT_LT(std::abs(uniform_score(counts)), 4);
   EXPECT_NEAR(low_bits / 1e6, 0.5, 4 / std::sqrt(12e6));
 }
 
