@@ -10,8 +10,7 @@
 namespace tensorray {
 namespace {
 
-constexpr auto least_interval = std::chrono::seconds(10);  // Between two times of keeping.
-constexpr int least_ratio = 50;                            // Of the time between them to the time they take.
+constexpr int least_ratio = 50;  // Of the time between two times of keeping to the time they take.
 
 /// What stands before the bytes of a result.
 struct ResultHead {

@@ -164,6 +164,12 @@ void report(const std::vector<PhotonCounts>& passes, Render& result) {
                                           100.0 * static_cast<double>(stopped) / static_cast<double>(emitted)));
 }
 
+/// The light that falls through the field on objects, as it is found before the picture.
+struct FieldLight {
+  PhotonMaps photons;
+  std::vector<IrradianceMap> maps;
+};
+
 class LoadedObjects : public LoadedMethod {
  public:
   explicit LoadedObjects(ObjectScene loaded) : loaded_(std::move(loaded)) {}
@@ -171,8 +177,28 @@ class LoadedObjects : public LoadedMethod {
   Render render(const Scene& scene, const Progress& progress, RenderJob* job) const override;
 
  private:
+  FieldLight trace_light(const LitObjects& lit, const FieldRegion& region, int passes, const Progress& progress) const;
+  void add_picture(const Scene& scene, const LightGroups& groups, const SurfacePicture& picture, Render& render) const;
+
   ObjectScene loaded_;
 };
+
+/// @param passes  Of photons.
+FieldLight LoadedObjects::trace_light(const LitObjects& lit, const FieldRegion& region, int passes,
+                                      const Progress& progress) const {
+  const PhotonPairs pairs = photon_pairs(lit, loaded_.settings);
+  return {photons_of(lit, pairs, region, loaded_.settings.photons, passes, progress),
+          land_light(lit, pairs, loaded_.lights.light, loaded_.settings.caustic, progress)};
+}
+
+void LoadedObjects::add_picture(const Scene& scene, const LightGroups& groups, const SurfacePicture& picture,
+                                Render& render) const {
+  const ShownLight& light = loaded_.lights.light;
+  render.linear = make_image(picture, light, loaded_.tracing, groups);
+  if (scene.description.output.wants("spectral"))
+    render.spectral =
+        spectral_image(picture.radiance, light.bands, SpectralQuantity::radiance, 1, light.xyz_to_working);
+}
 
 Render LoadedObjects::render(const Scene& scene, const Progress& progress, RenderJob* job) const {
   const ShownLight& light = loaded_.lights.light;
@@ -200,38 +226,30 @@ Render LoadedObjects::render(const Scene& scene, const Progress& progress, Rende
   shaded.bands_per_view = loaded_.settings.bands_per_sample;
   shaded.bands_per_bounce = bands_per_bounce(loaded_.settings);
   const PathTracerSettings samples = object_tracer_settings(scene, loaded_, camera, 0);
-  PhotonMaps photons;
+  FieldLight before;
   if (bends) {
     KeptResults kept(job ? &job->before : nullptr, team);
     const Preparation preparation{team, &kept};
     const LitObjects lit{scene, lights, objects, stage, preparation};
-    const PhotonPairs pairs = photon_pairs(lit, loaded_.settings);
-    photons =
-        photons_of(lit, pairs, region, loaded_.settings.photons, samples.max_samples / samples.first_samples, progress);
-    shaded.photons = &photons;
-    shaded.irradiance_maps = land_light(lit, pairs, light, loaded_.settings.caustic, progress);
+    before = trace_light(lit, region, samples.max_samples / samples.first_samples, progress);
     kept.finish();
+    shaded.photons = &before.photons;
+    shaded.irradiance_maps = std::move(before.maps);
   }
-  report(photons.counts, result);
+  report(before.photons.counts, result);
   result.statistics.seconds_tracing = seconds_since(start);
 
   start = Clock::now();
-  const auto add_picture = [&](const SurfacePicture& picture, Render& render) {
-    render.linear = make_image(picture, light, loaded_.tracing, groups);
-    if (scene.description.output.wants("spectral"))
-      render.spectral =
-          spectral_image(picture.radiance, light.bands, SpectralQuantity::radiance, 1, light.xyz_to_working);
-  };
   result.exposure = 0;
   result.view = view_of(camera);
   const RenderCallbacks callbacks = callbacks_of(progress, job, [&](const SurfacePicture& picture) {
     Render shown = result;
-    add_picture(picture, shown);
+    add_picture(scene, groups, picture, shown);
     return shown;
   });
   const PathTracerSettings settings = object_tracer_settings(scene, loaded_, camera, result.statistics.seconds_tracing);
   const SurfacePicture picture = render_surfaces(shaded, camera, settings, callbacks);
-  add_picture(picture, result);
+  add_picture(scene, groups, picture, result);
   for (const float count : picture.samples)
     result.statistics.scene_method->samples += static_cast<std::uint64_t>(count);
   report(region, loaded_, result);

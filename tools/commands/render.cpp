@@ -177,6 +177,14 @@ void render_alone_or_with_others(const RenderOptions& options, Progress& progres
   if (!is_well) throw CLI::RuntimeError(1);  // The frames were named when they failed.
 }
 
+void add_import_options(CLI::App& command, ImportChoices& import) {
+  command.add_option("--order", import.order, "Of the tensor's components, as for `tensorray import`")->group("Import");
+  command.add_option("--array", import.array, "The array that is the tensor, likewise")->group("Import");
+  command.add_option("--gradient-of", import.gradient_of, "The velocity whose gradient it is, likewise")
+      ->group("Import");
+  command.add_option("--frame", import.frame, "The axes of the components, likewise")->group("Import");
+}
+
 }  // namespace
 
 void add_render_command(CLI::App& program, Progress& progress) {
@@ -232,12 +240,7 @@ void add_render_command(CLI::App& program, Progress& progress) {
       ->transform(CLI::AsSizeValue(false))
       ->option_text("SIZE");
   command->add_flag("--watch", options->run.keeping.watch, "Keep the pictures up to date while they are rendered");
-  command->add_option("--order", options->import.order, "Of the tensor's components, as for `tensorray import`")
-      ->group("Import");
-  command->add_option("--array", options->import.array, "The array that is the tensor, likewise")->group("Import");
-  command->add_option("--gradient-of", options->import.gradient_of, "The velocity whose gradient it is, likewise")
-      ->group("Import");
-  command->add_option("--frame", options->import.frame, "The axes of the components, likewise")->group("Import");
+  add_import_options(*command, options->import);
   command->add_flag("-q,--quiet", options->run.quiet, "Print nothing but errors");
   command->callback([options, &progress] { render_alone_or_with_others(*options, progress); });
 }

@@ -96,17 +96,22 @@ WorkFile kept_work(const std::filesystem::path& file, const RenderRun& run, cons
 }
 
 /// What is made before the units, as earlier runs have kept it.
-std::vector<WorkUnit> kept_before(const WorkFile& kept) {
-  return kept.before.state ? std::vector{kept.before} : std::vector<WorkUnit>();
+std::vector<WorkUnit> kept_before(WorkUnit before) {
+  return before.state ? std::vector{std::move(before)} : std::vector<WorkUnit>();
 }
 
-/// What --light names. @throw SceneError if it is of another render; as read_work.
-std::vector<WorkUnit> read_light(const std::filesystem::path& file, const Scene& scene) {
-  const WorkFile work = read_work(file);
+/// What --light names. Says it if that has no light. @throw SceneError if it is of another render; as read_work.
+std::vector<WorkUnit> read_light(const std::filesystem::path& file, const Scene& scene, bool quiet) {
+  WorkFile work = read_work(file);
   if (const std::string other = difference(work.origin, origin_of(scene)); !other.empty())
     throw SceneError(printable(
         fmt::format("{}: is of another render: {}; undo the change, or leave --light out", file.string(), other)));
-  return kept_before(work);
+  if (!work.before.state)
+    tell({fmt::format("note: {} has no light, because it was made quickly, or because another shard is the first one; "
+                      "it is made again",
+                      file.string())},
+         quiet);
+  return kept_before(std::move(work.before));
 }
 
 /// Writes the outputs of what there is so far.
@@ -241,10 +246,11 @@ Scene render_to_files(const SceneDescription& description, const RenderRun& run,
   tell(scene.notes, run.quiet);
   // Errors come with the first image.
   const std::future<void> images = std::async(std::launch::async, prepare_images, written_by(description, run));
-  const WorkFile kept = kept_work(keep.file, run, scene);
-  std::vector<WorkUnit> before = kept_before(kept);
-  if (!run.keeping.light.empty() && before.empty()) before = read_light(run.keeping.light, scene);
-  RenderJob job{Work(run.keeping.shard.value_or(WorkPart{}), kept.units), {}, nullptr, Work({}, std::move(before))};
+  WorkFile kept = kept_work(keep.file, run, scene);
+  std::vector<WorkUnit> before = kept_before(std::move(kept.before));
+  if (!run.keeping.light.empty() && before.empty()) before = read_light(run.keeping.light, scene, run.quiet);
+  RenderJob job{
+      Work(run.keeping.shard.value_or(WorkPart{}), std::move(kept.units)), {}, nullptr, Work({}, std::move(before))};
   complete(scene, job, std::move(files), keep, run, progress);
   for (const std::filesystem::path& file : written_by(description, run))
     if (!run.quiet) tell_made("wrote " + file.string());
@@ -460,7 +466,7 @@ void write_merged(const SceneDescription& description, const WorkFile& work, con
         printable(fmt::format("{}: has changed since the shards were made: {}; undo the change, or make them "
                               "again",
                               description.path.string(), other)));
-  RenderJob job{Work({}, work.units), {}, nullptr, Work({}, kept_before(work))};
+  RenderJob job{Work({}, work.units), {}, nullptr, Work({}, kept_before(work.before))};
   complete(scene, job, std::move(files), {}, run, progress);
   for (const std::filesystem::path& file : written_by(description, run))
     if (!run.quiet) tell_made("wrote " + file.string());

@@ -75,7 +75,8 @@ TensorGrid to_grid(const BlockSource& source) {
   grid.to_world = source.to_world;
   grid.metadata = source.metadata;
   grid.blocks = unset_blocks(source.shapes.size());
-  for_blocks(source.shapes.size(), [&](std::size_t i) { read_block(source, i, grid.blocks[i]); });
+  tbb::parallel_for(std::size_t{0}, source.shapes.size(),
+                    [&](std::size_t i) { read_block(source, i, grid.blocks[i]); });
   return grid;
 }
 

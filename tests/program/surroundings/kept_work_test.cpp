@@ -181,6 +181,11 @@ TEST_F(KeptWork, ShardsHaveTheirLightFromTheFirst) {
   expect_same("a");
   expect_error("of another render", make_shard(3, {"--light", shard(1), "--seed", "7"}));
   expect_error("is the same file as --light", make_shard(3, {"--light", shard(3)}));
+  std::vector<std::string> loud = make_shard(3, {"--light", shard(2)});
+  loud.erase(std::find(loud.begin(), loud.end(), "-q"));
+  const Outcome outcome = run(loud);
+  EXPECT_EQ(outcome.status, 0);
+  EXPECT_NE(outcome.error.find("2.shard has no light"), std::string::npos) << outcome.error;
   expect_error("none.shard", make_shard(3, {"--light", "none.shard"}), 1);
   run_well(render("a", {"--light", shard(1)}));
   expect_same("a");
