@@ -16,7 +16,7 @@ struct WorkFile {
   std::filesystem::path scene_file;  ///< Absolute. Paths in the scene are relative to its folder.
   WorkPart part;
   std::vector<WorkUnit> units;  ///< All units of the work, whether begun or not.
-  WorkUnit before;              ///< What is made before them (RenderJob).
+  WorkUnit before = {};         ///< What is made before them (RenderJob).
 };
 
 /// Replaces `path` so that it is complete at any moment (replace_file.h). Numbers have the byte order of the machine:
