@@ -79,6 +79,11 @@ void KeptResults::add(const ResultKey& key, const std::string& values) {
   bytes_.append(reinterpret_cast<const char*>(&head), sizeof head).append(values);
 }
 
+void KeptResults::forget_from(std::size_t size) {
+  bytes_.resize(std::min(size, bytes_.size()));
+  kept_size_ = std::min(kept_size_, bytes_.size());
+}
+
 void KeptResults::keep(bool done) {
   if (!work_) return;
   const auto start = Clock::now();
@@ -99,13 +104,16 @@ void find_or_make(KeptResults* kept, const ResultKey& key, const std::function<v
     copy(bytes);
     return;
   }
+  const std::size_t before = kept ? kept->size() : 0;
   try {
     make();
   } catch (const Cancelled&) {
-    if (kept) kept->finish();  // What was made before.
+    if (kept) kept->finish();
     throw;
   }
-  if (!kept || !kept->is_long()) return;
+  if (!kept) return;
+  kept->forget_from(before);
+  if (!kept->is_long()) return;
   PartBytes bytes;
   copy(bytes);
   kept->add(key, bytes.take());

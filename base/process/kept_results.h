@@ -62,6 +62,12 @@ class KeptResults {
   /// Adds a result for later runs.
   void add(const ResultKey& key, const std::string& values);
 
+  /// The bytes of all results so far.
+  std::size_t size() const { return bytes_.size(); }
+
+  /// Forgets what was added since there were `size` bytes.
+  void forget_from(std::size_t size);
+
   /// Keeps what was added as the unit of this run. @param done  Whether the unit is complete.
   void keep(bool done);
 
@@ -86,8 +92,8 @@ class KeptResults {
 
 /// A result that is the same for all runs of a scene: from those that were kept; else it is made, and kept if the run
 /// is a long one. @param kept  Null: nothing is kept. @param make  Makes it; all processes of a team do, and process 0
-/// has it then. @param copy  Copies it to or from bytes. @throw what `make` and `copy` throw. Where that is Cancelled,
-/// the results before are kept.
+/// has it then. It may keep parts of it there, which are forgotten once all of it is made. @param copy  Copies it to or
+/// from bytes. @throw what `make` and `copy` throw. Where that is Cancelled, what was added so far is kept.
 void find_or_make(KeptResults* kept, const ResultKey& key, const std::function<void()>& make,
                   const std::function<void(PartBytes& bytes)>& copy);
 

@@ -25,6 +25,7 @@ std::uint64_t hash_of_map(const Beam& beam, const FlowSettings& settings) {
   std::uint64_t hash = 0;
   const auto add = [&](const auto& values) { hash = hash_of(values.data(), values.size() * sizeof values[0], hash); };
   const Plate& plate = *settings.plate;
+  if (settings.key != 0) add(std::array{settings.key});
   add(std::array<double, 4>{settings.tolerance, static_cast<double>(settings.range), plate.size.x(), plate.size.y()});
   add(settings.flexibilities);
   add(plate.resolution);

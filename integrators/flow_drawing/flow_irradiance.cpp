@@ -103,6 +103,8 @@ FlowSettings flow_settings(const LandingLight& light, const Plate& plate, const 
   settings.tolerance = landing_tolerance;
   settings.most_starts = wanted.rays;
   settings.team = wanted.team;
+  settings.kept = wanted.kept;
+  settings.key = wanted.key;
   return settings;
 }
 

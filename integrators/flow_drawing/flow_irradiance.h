@@ -30,7 +30,8 @@ struct FlowIrradianceSettings {
   int resolution = 64;          ///< Pixels along the longer side of the part of the plate where light lands.
   std::size_t rays = 1 << 16;   ///< Vertices of the flow map, at most, for each direction.
   Team* team = nullptr;         ///< Processes that compute the same together; null: this one is alone.
-  KeptResults* kept = nullptr;  ///< The light of the directions that earlier runs have made. Null: none is kept.
+  KeptResults* kept = nullptr;  ///< The light of directions, and vertices of one that is not complete, that earlier
+                                ///< runs have made. Null: none is kept.
   std::uint64_t key = 0;        ///< A number of this light among all that is kept.
 };
 

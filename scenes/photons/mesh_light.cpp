@@ -28,8 +28,10 @@ struct MeshJob {
   const Scene& scene;
   RenderJob* const job;  // Null: nobody else wants anything of it.
   const ShowLight& show;
+  KeptResults* const given;  // Null: what is kept is in the work of the job.
   Team* const team = job ? job->team : nullptr;
-  KeptResults kept{job ? &job->work : nullptr, team};
+  KeptResults own{job && !given ? &job->work : nullptr, team};
+  KeptResults& kept = given ? *given : own;
 
   bool is_shown() const { return job && has_all(team) && job->work.picture_wanted.exchange(false); }
 };
@@ -157,9 +159,10 @@ PlateLight refine(MeshJob& job, double bound, const Progress& progress) {
 
 }  // namespace
 
-PlateLight mesh_light(const Scene& scene, const Progress& progress, RenderJob* job, const ShowLight& show) {
+PlateLight mesh_light(const Scene& scene, const Progress& progress, RenderJob* job, const ShowLight& show,
+                      KeptResults* kept) {
   const PhotonDensity& density = scene.description.integrator.settings<PhotonDescription>().density;
-  MeshJob mesh{scene, job, show};
+  MeshJob mesh{scene, job, show, kept};
   PlateLight light;
   if (density.error) {
     light = refine(mesh, *density.error, progress);

@@ -13,7 +13,8 @@ namespace tensorray {
 /// vertices (KeptResults): of a shard, the result is empty. With a bound of the error, a shard refines until the error
 /// of its own part is below it; what more the whole picture needs is traced where the shards are merged.
 /// @param job   Null: alone, and nothing is kept. @param show  Gets the light so far when the job wants a picture.
-/// @throw Cancelled; as Team::exchange.
-PlateLight mesh_light(const Scene& scene, const Progress& progress, RenderJob* job, const ShowLight& show);
+/// @param kept  As in light_on_plate. @throw Cancelled; as Team::exchange.
+PlateLight mesh_light(const Scene& scene, const Progress& progress, RenderJob* job, const ShowLight& show,
+                      KeptResults* kept);
 
 }  // namespace tensorray

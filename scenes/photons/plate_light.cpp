@@ -69,14 +69,15 @@ void add_cost(const Statistics& more, Statistics& statistics) {
   statistics.tensor_samples += more.tensor_samples;
 }
 
-PlateLight light_on_plate(const Scene& scene, const Progress& progress, RenderJob* job, const ShowLight& show) {
+PlateLight light_on_plate(const Scene& scene, const Progress& progress, RenderJob* job, const ShowLight& show,
+                          KeptResults* kept) {
   PhotonSettings settings = photon_settings(scene, job ? job->team : nullptr);
   if (scene.description.integrator.settings<PhotonDescription>().density.kind != PhotonDensityKind::mesh) {
     settings.work = job ? &job->work : nullptr;
     if (show) settings.show = [&](PhotonDistribution so_far) { show(light_of(scene, std::move(so_far))); };
     return trace_photons(scene, settings, progress);
   }
-  PlateLight light = mesh_light(scene, progress, job, show);
+  PlateLight light = mesh_light(scene, progress, job, show, kept);
   const OutputDescription& output = scene.description.output;
   const bool is_shard = job && job->work.is_shard;  // Photons are then traced where shards are merged.
   if ((!output.wants("photons") && !output.wants("fluence")) || is_shard) return light;

@@ -17,6 +17,8 @@
 
 namespace tensorray {
 
+class KeptResults;
+
 struct PlateLight {
   Image linear;                      ///< R, G, B in the working space; 1 is the undisturbed light.
   FlowMap map;                       ///< The map that `mesh` has drawn; empty for other estimators.
@@ -37,8 +39,9 @@ using ShowLight = std::function<void(PlateLight)>;
 /// draws the flow map of the beam; photons and fluence, if the scene asks for them, are then traced as for the other
 /// estimators. Of a shard, the result is not complete: what it has traced is in the work of the job.
 /// @param show  Gets the light so far when the job wants a picture; may be empty.
+/// @param kept  Where `mesh` keeps the vertices of its map; null: in the work of the job.
 /// @throw Cancelled; as Team::exchange.
 PlateLight light_on_plate(const Scene& scene, const Progress& progress, RenderJob* job = nullptr,
-                          const ShowLight& show = {});
+                          const ShowLight& show = {}, KeptResults* kept = nullptr);
 
 }  // namespace tensorray

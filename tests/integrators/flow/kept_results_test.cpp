@@ -109,9 +109,10 @@ TEST(KeptResults, OfAnotherMapAreNotUsed) {
   Work first({0, 2});
   const FlowSettings settings = range(0.1, 0.4);
   map_with(settings, first, true);
-  FlowSettings finer = settings, other = range(0.1, 0.5);
+  FlowSettings finer = settings, other = range(0.1, 0.5), numbered = settings;
   finer.tolerance = 0.25;
-  for (const FlowSettings& each : {finer, other}) {
+  numbered.key = 1;
+  for (const FlowSettings& each : {finer, other, numbered}) {
     Work work({}, first.units());
     EXPECT_EQ(map_with(each, work).rays, map_of(bench(), each).rays);
   }
@@ -182,6 +183,27 @@ TEST(KeptResults, AreKeptWhereTheNextOneIsCancelled) {
   EXPECT_THROW(find_or_make(&kept, {2, 0, 0}, cancel, [](PartBytes&) {}), Cancelled);
   Work resumed({}, work.units());
   EXPECT_EQ(KeptResults(&resumed, nullptr).find({1, 0, 0}), "first");
+}
+
+/// What a long result keeps while it is made is there until all of it is made, and no longer.
+TEST(KeptResults, OfPartsAreForgottenWithTheWhole) {
+  Work work;
+  work.interval = 1e-9;
+  KeptResults kept(&work, nullptr);
+  kept.add({1, 0, 0}, "before");
+  const auto make = [&] {
+    kept.add({2, 0, 0}, "a part");
+    kept.keep(false);
+    Work killed({}, work.units());
+    EXPECT_EQ(KeptResults(&killed, nullptr).find({2, 0, 0}), "a part");
+  };
+  find_or_make(&kept, {3, 0, 0}, make, [](PartBytes&) {});
+  kept.finish();
+  Work resumed({}, work.units());
+  const KeptResults found(&resumed, nullptr);
+  EXPECT_EQ(found.find({1, 0, 0}), "before");
+  EXPECT_FALSE(found.find({2, 0, 0}));
+  EXPECT_EQ(found.find({3, 0, 0}), "");
 }
 
 TEST(KeptResults, SaysThatAUnitIsDamaged) {

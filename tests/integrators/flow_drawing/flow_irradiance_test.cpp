@@ -9,6 +9,8 @@
 #include <gtest/gtest.h>
 #include <tbb/global_control.h>
 
+#include "base/process/kept_results.h"
+#include "base/process/progress.h"
 #include "renderer/light_maps/irradiance_map.h"
 #include "tests/base/team_support.h"
 #include "tests/integrators/support.h"
@@ -102,6 +104,35 @@ TEST(FlowIrradianceTest, OfATeamIsThatOfOneProcess) {
       EXPECT_TRUE(each->folds == alone.folds);
     }
   }
+}
+
+TEST(FlowIrradianceTest, ADirectionThatIsInterruptedGoesOn) {
+  const TensorField field = cube_field(9, [](const Vector3d& p) { return Matrix3d(p.asDiagonal()); });
+  const LandingLight light = sun({0.2, 0.1, -1});
+  const FlowIrradiance alone = land(field, light, floor_plate(8));
+  Work work;
+  const auto land_until = [&](int most_reports) {
+    KeptResults kept(&work, nullptr);
+    Progress progress;
+    int reports = 0;
+    progress.report = [&](const std::string&, std::uint64_t, std::uint64_t) {
+      progress.cancelled = ++reports > most_reports;
+    };
+    return flow_irradiance(field, surfaces_of(field), floor_plate(8), light, {{}, 64, 20000, nullptr, &kept, 1},
+                           progress);
+  };
+  std::optional<FlowIrradiance> landed;
+  std::size_t size = 0;  // Of what was kept by the runs so far: it only grows.
+  for (int reports = 2; !landed; reports *= 2) try {
+      landed = land_until(reports);
+    } catch (const Cancelled&) {
+      ASSERT_TRUE(work.state(0));
+      EXPECT_GE(work.state(0)->size(), size);
+      size = work.state(0)->size();
+    }
+  EXPECT_GT(size, std::size_t{0});
+  EXPECT_TRUE(landed->irradiance.values == alone.irradiance.values);
+  EXPECT_TRUE(landed->folds == alone.folds);
 }
 
 LandingLight lamp(const Vector3d& source) {
