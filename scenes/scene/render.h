@@ -91,7 +91,7 @@ struct RenderJob {
   Team* team = nullptr;
 
   /// What is made before the units of `work` (KeptResults): the light of maps, photons, the light on a plate. It is the
-  /// same for all shards.
+  /// same for all shards. Beside the mesh of photon_distribution: the photons and the fluence.
   Work before = Work();
 };
 

@@ -150,6 +150,33 @@ TEST_F(KeptWork, KilledPlatesContinueToTheSameFiles) {
   }
 }
 
+/// Photons and fluence are made when the mesh is complete.
+TEST_F(KeptWork, PhotonsBesideAMeshAreKept) {
+  make(plate_scene(R"({"type": "photon_distribution", "density": {"tolerance": 8}})", 200000).c_str());
+  std::vector<std::string> arguments{
+      "render", "scene.json", "-q", "--threads", "1", "--set", "light.wavelengths.count=2"};
+  const auto with_files = [&](const std::string& name) {
+    std::vector<std::string> all = arguments;
+    all.insert(all.end(), {"-o", name + ".fluence.vdb"});
+    return all;
+  };
+  run_well(with_files("whole"));
+  const std::string checkpoint = "a.fluence.vdb.checkpoint";
+  arguments.insert(arguments.end(), {"--checkpoint", "0.01"});
+  for (int i = 0; i < 20 && !has(checkpoint); ++i) {  // A render that was quicker is tried again.
+    const pid_t child = start(with_files("a"));
+    while (is_running(child) &&
+           !(has(checkpoint) && read_file(in_folder(checkpoint)).find(R"("before":true)") != std::string::npos))
+      std::this_thread::sleep_for(std::chrono::milliseconds(1));
+    kill(child, SIGKILL);
+    wait_for(child);
+  }
+  EXPECT_TRUE(has(checkpoint));
+  arguments.push_back("--resume");
+  run_well(with_files("a"));
+  EXPECT_TRUE(is_equal("a.fluence.vdb", "whole.fluence.vdb"));
+}
+
 /// What is made before the tiles: maps of light, photons, the light on a plate.
 TEST_F(KeptWork, LightBeforeTheTilesIsKept) {
   for (const std::string& scene : {std::string(lit_scene), plate_under_paths("mesh")}) {
