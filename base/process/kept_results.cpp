@@ -18,6 +18,19 @@ struct ResultHead {
   std::uint64_t size;
 };
 
+[[noreturn]] void fail_damaged() { throw std::runtime_error("what was kept of the render is damaged; render it again"); }
+
+/// Copies a result from its bytes, which must be all there are of it.
+void take_result(std::string from, const std::function<void(PartBytes& bytes)>& copy) {
+  PartBytes bytes(std::move(from));
+  try {
+    copy(bytes);
+  } catch (const std::runtime_error&) {
+    fail_damaged();
+  }
+  if (!bytes.ends()) fail_damaged();
+}
+
 }  // namespace
 
 std::size_t KeptResults::Hash::operator()(const ResultKey& key) const { return hash_of(&key, sizeof key); }
@@ -38,12 +51,11 @@ KeptResults::KeptResults(Work* work, Team* team) : work_(has_all(team) ? work : 
 }
 
 void KeptResults::take(const std::string& bytes) {
-  const auto fail = [] { throw std::runtime_error("what was kept of the render is damaged; render it again"); };
   for (std::size_t at = 0; at < bytes.size();) {
     ResultHead head;
-    if (bytes.size() - at < sizeof head) fail();
+    if (bytes.size() - at < sizeof head) fail_damaged();
     std::memcpy(&head, &bytes[at], sizeof head);
-    if (head.size > bytes.size() - at - sizeof head) fail();
+    if (head.size > bytes.size() - at - sizeof head) fail_damaged();
     places_.emplace(head.key, at);
     at += sizeof head + head.size;
   }
@@ -99,11 +111,8 @@ void KeptResults::finish() {
 
 void find_or_make(KeptResults* kept, const ResultKey& key, const std::function<void()>& make,
                   const std::function<void(PartBytes& bytes)>& copy) {
-  if (std::optional<std::string> found = kept ? kept->find(key) : std::nullopt) {
-    PartBytes bytes(std::move(*found));
-    copy(bytes);
-    return;
-  }
+  if (std::optional<std::string> found = kept ? kept->find(key) : std::nullopt)
+    return take_result(std::move(*found), copy);
   const std::size_t before = kept ? kept->size() : 0;
   try {
     make();

@@ -93,7 +93,8 @@ class KeptResults {
 /// A result that is the same for all runs of a scene: from those that were kept; else it is made, and kept if the run
 /// is a long one. @param kept  Null: nothing is kept. @param make  Makes it; all processes of a team do, and process 0
 /// has it then. It may keep parts of it there, which are forgotten once all of it is made. @param copy  Copies it to or
-/// from bytes. @throw what `make` and `copy` throw. Where that is Cancelled, what was added so far is kept.
+/// from bytes. @throw what `make` throws: where that is Cancelled, what was added so far is kept; std::runtime_error if
+/// the bytes that were kept are not those of a result.
 void find_or_make(KeptResults* kept, const ResultKey& key, const std::function<void()>& make,
                   const std::function<void(PartBytes& bytes)>& copy);
 

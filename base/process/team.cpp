@@ -50,6 +50,11 @@ void PartBytes::copy(void* values, std::size_t size) {
   at_ += size;
 }
 
+std::size_t PartBytes::there_are(std::size_t count, std::size_t size) const {
+  if (count > (bytes_.size() - at_) / size) fail();
+  return count;
+}
+
 void exchange_parts(Team& team, std::size_t parts, std::size_t at_once, const CopyPart& copy) {
   for (std::size_t begin = 0; begin < parts; begin += at_once) {
     const std::size_t end = std::min(begin + at_once, parts);

@@ -43,11 +43,23 @@ class PartBytes {
   /// @throw std::runtime_error if there are not so many bytes.
   void copy(void* values, std::size_t size);
 
+  /// Copies numbers, or structs of them, and how many there are. @throw as `copy`.
+  template <class Value>
+  void copy_vector(std::vector<Value>& values) {
+    std::size_t count = values.size();
+    copy(&count, sizeof count);
+    values.resize(reads_ ? there_are(count, sizeof(Value)) : count);
+    copy(values.data(), count * sizeof(Value));
+  }
+
   bool reads() const { return reads_; }
   bool ends() const { return at_ == bytes_.size(); }  ///< Whether all bytes have been copied from.
   std::string take() { return std::move(bytes_); }
 
  private:
+  /// The count. @throw as `copy` if there are not so many values of so many bytes: before there is memory for them.
+  std::size_t there_are(std::size_t count, std::size_t size) const;
+
   std::string bytes_;
   std::size_t at_ = 0;
   bool reads_ = false;

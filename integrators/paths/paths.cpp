@@ -105,10 +105,7 @@ void exchange_batches(Team& team, Path* paths, std::size_t count) {
   const std::size_t batches = (count + batch_size - 1) / batch_size;
   exchange_parts(team, batches, batches, [&](std::size_t batch, PartBytes& bytes) {
     for (Path* path = paths + batch * batch_size; path != paths + std::min((batch + 1) * batch_size, count); ++path) {
-      std::size_t points = path->points.size();
-      bytes.copy(&points, sizeof points);
-      path->points.resize(points);
-      bytes.copy(path->points.data(), points * sizeof(PathPoint));
+      bytes.copy_vector(path->points);
       bytes.copy(&path->flexibility, sizeof path->flexibility);
       bytes.copy(&path->wavelength, sizeof path->wavelength);
       bytes.copy(&path->end, sizeof path->end);

@@ -190,10 +190,7 @@ PhotonEnd PhotonTracer::land(const Source& source, const BentRay& ray, const Emi
 }
 
 void copy_chunk(ChunkPhotons& part, PartBytes& bytes) {
-  std::size_t count = part.landed.size();
-  bytes.copy(&count, sizeof count);
-  part.landed.resize(count);
-  bytes.copy(part.landed.data(), count * sizeof(Photon));
+  bytes.copy_vector(part.landed);
   bytes.copy(part.counts.data(), sizeof part.counts);
 }
 

@@ -206,6 +206,25 @@ TEST(KeptResults, OfPartsAreForgottenWithTheWhole) {
   EXPECT_EQ(found.find({3, 0, 0}), "");
 }
 
+/// A count that no bytes follow asks for no memory.
+TEST(KeptResults, SaysThatAResultIsDamaged) {
+  std::vector<double> values;
+  const auto copy = [&](PartBytes& bytes) { bytes.copy_vector(values); };
+  const std::uint64_t huge = ~std::uint64_t{0} / 64, two = 2;
+  for (const std::uint64_t count : {huge, two}) {
+    Work work;
+    KeptResults before(&work, nullptr);
+    before.add({1, 0, 0}, std::string(reinterpret_cast<const char*>(&count), sizeof count) + std::string(12, 'x'));
+    before.keep(true);
+    KeptResults kept(&work, nullptr);
+    EXPECT_THROW(find_or_make(
+                     &kept, {1, 0, 0}, [] {}, copy),
+                 std::runtime_error)
+        << count;
+    EXPECT_TRUE(values.empty()) << count;
+  }
+}
+
 TEST(KeptResults, SaysThatAUnitIsDamaged) {
   Work work;
   work.begin(1);

@@ -219,6 +219,7 @@ TEST_F(KeptWork, ShardsHaveTheirLightFromTheFirst) {
 }
 
 TEST_F(KeptWork, AnInterruptedRenderWritesWhatItHas) {
+  make(path_scene);  // Nothing is kept before its tiles.
   for (const int signal : {SIGINT, SIGTERM}) {
     std::filesystem::remove(in_folder("a.png.checkpoint"));  // The first one is written when tiles are done.
     const Outcome outcome = end_by(signal);
@@ -372,6 +373,7 @@ TEST_F(KeptWork, TasksOfAnArrayMakeTheShards) {
 
 /// A frame that was interrupted has files, which are not its picture.
 TEST_F(KeptWork, ASequenceContinuesAtTheFrameThatWasInterrupted) {
+  make(path_scene);
   const std::vector<std::string> turn{"--set", R"(camera.angle={"keys":[[1,20],[3,30]]})"};
   const auto frames = [&](const std::string& name, const std::vector<std::string>& more = {}) {
     std::vector<std::string> arguments = render(name + ".#", turn);
