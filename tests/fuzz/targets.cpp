@@ -12,8 +12,11 @@
 
 #include "base/files/descriptor.h"
 #include "base/files/temporary_folder.h"
+#include "base/process/kept_results.h"
+#include "base/process/team.h"
 #include "base/text/path_text.h"
 #include "integrators/path_files/path_formats.h"
+#include "integrators/photons/photon_sums.h"
 #include "integrators/seeds/seed_files.h"
 #include "renderer/color/icc_profile.h"
 #include "renderer/images/png_tags.h"
@@ -108,6 +111,30 @@ bool read_seeds_and_spectrum(const std::string& bytes) {
 
 bool read_kept_work(const std::string& bytes) {
   return read_file(bytes, [](const std::filesystem::path& path) { read_work(path); });
+}
+
+/// What files of work hold: the sums of photons, or results by their keys. Their first byte chooses. (Few of the bytes
+/// that a fuzzer makes of such a file have the right hash.)
+bool read_kept_unit(const std::string& bytes) {
+  if (bytes.empty()) return false;
+  const std::string unit = bytes.substr(1);
+  if ((bytes[0] & 1) == 0) {
+    PhotonSums sums;
+    sums.ends.resize(2);
+    sums.points.emplace(4, 4, 2, DensitySettings{DensityKind::histogram});
+    sums.has_photons = true;
+    return expect_one_line([&] { add_bytes(unit, sums); });
+  }
+  Work work;
+  work.begin(1);
+  work.keep(0, unit, true);
+  return expect_one_line([&] {
+    KeptResults kept(&work, nullptr);
+    std::vector<double> values;
+    find_or_make(
+        &kept, {1, 0, 0}, [] { throw std::runtime_error("there is no such result"); },
+        [&](PartBytes& part) { part.copy_vector(values); });
+  });
 }
 
 /// Each vertex has a normal or none has, and triangles name vertices that are there.
@@ -213,29 +240,18 @@ bool read_vdb_table(const std::string& bytes) { return delayed_load_fits(bytes, 
 }  // namespace
 
 const std::vector<FuzzTarget>& fuzz_targets() {
-  static const std::vector<FuzzTarget> targets{{"scene", read_scene_file},
-                                               {"override", read_overrides},
-                                               {"frames", read_frames},
-                                               {"text", read_seeds_and_spectrum},
-                                               {"work", read_kept_work},
-                                               {"ply", read_ply_mesh},
-                                               {"obj", read_obj_mesh},
-                                               {"icc", read_profile},
-                                               {"png", read_png_tags},
-                                               {"tck", read_tck},
-                                               {"npy", read_npy},
-                                               {"nrrd", read_nrrd},
-                                               {"nifti", read_nifti},
-                                               {"mrtrix", read_mrtrix},
-                                               {"metaimage", read_metaimage},
-                                               {"xdmf", read_xdmf},
-                                               {"ensight", read_ensight},
-                                               {"plot3d", read_plot3d},
-                                               {"netcdf", read_netcdf},
-                                               {"vdb_tree", read_vdb_tree},
-                                               {"vdb_table", read_vdb_table},
-                                               {"http", read_http},
-                                               {"page", read_page_message}};
+  static const std::vector<FuzzTarget> targets{{"scene", read_scene_file},  {"override", read_overrides},
+                                               {"frames", read_frames},     {"text", read_seeds_and_spectrum},
+                                               {"work", read_kept_work},    {"kept", read_kept_unit},
+                                               {"ply", read_ply_mesh},      {"obj", read_obj_mesh},
+                                               {"icc", read_profile},       {"png", read_png_tags},
+                                               {"tck", read_tck},           {"npy", read_npy},
+                                               {"nrrd", read_nrrd},         {"nifti", read_nifti},
+                                               {"mrtrix", read_mrtrix},     {"metaimage", read_metaimage},
+                                               {"xdmf", read_xdmf},         {"ensight", read_ensight},
+                                               {"plot3d", read_plot3d},     {"netcdf", read_netcdf},
+                                               {"vdb_tree", read_vdb_tree}, {"vdb_table", read_vdb_table},
+                                               {"http", read_http},         {"page", read_page_message}};
   return targets;
 }
 
