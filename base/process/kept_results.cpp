@@ -12,13 +12,27 @@ namespace {
 
 constexpr int least_ratio = 50;  // Of the time between two times of keeping to the time they take.
 
+constexpr std::uint64_t part_bit = std::uint64_t{1} << 63;
+constexpr std::size_t changed = ~std::size_t{0};
+
 /// What stands before the bytes of a result.
 struct ResultHead {
   ResultKey key;
-  std::uint64_t size;
+  std::uint64_t size;  // With part_bit if it is a part of one.
 };
 
-[[noreturn]] void fail_damaged() { throw std::runtime_error("what was kept of the render is damaged; render it again"); }
+bool is_part(const ResultHead& head) { return (head.size & part_bit) != 0; }
+std::uint64_t size_of(const ResultHead& head) { return head.size & ~part_bit; }
+
+ResultHead head_at(const std::string& bytes, std::size_t at) {
+  ResultHead head;
+  std::memcpy(&head, &bytes[at], sizeof head);
+  return head;
+}
+
+[[noreturn]] void fail_damaged() {
+  throw std::runtime_error("what was kept of the render is damaged; render it again");
+}
 
 /// Copies a result from its bytes, which must be all there are of it.
 void take_result(std::string from, const std::function<void(PartBytes& bytes)>& copy) {
@@ -52,23 +66,22 @@ KeptResults::KeptResults(Work* work, Team* team) : work_(has_all(team) ? work : 
 
 void KeptResults::take(const std::string& bytes) {
   for (std::size_t at = 0; at < bytes.size();) {
-    ResultHead head;
-    if (bytes.size() - at < sizeof head) fail_damaged();
-    std::memcpy(&head, &bytes[at], sizeof head);
-    if (head.size > bytes.size() - at - sizeof head) fail_damaged();
+    if (bytes.size() - at < sizeof(ResultHead)) fail_damaged();
+    const ResultHead head = head_at(bytes, at);
+    if (size_of(head) > bytes.size() - at - sizeof head) fail_damaged();
     places_.emplace(head.key, at);
-    at += sizeof head + head.size;
+    at += sizeof head + size_of(head);
   }
   bytes_ = bytes;
-  kept_size_ = bytes_.size();
+  earlier_size_ = kept_size_ = bytes_.size();
 }
 
 std::optional<std::string> KeptResults::find(const ResultKey& key) const {
   const auto place = places_.find(key);
   if (place == places_.end()) return std::nullopt;
-  ResultHead head;
-  std::memcpy(&head, &bytes_[place->second], sizeof head);
-  return bytes_.substr(place->second + sizeof head, head.size);
+  const ResultHead head = head_at(bytes_, place->second);
+  if (is_part(head)) has_found_part_ = true;
+  return bytes_.substr(place->second + sizeof head, size_of(head));
 }
 
 std::optional<std::string> KeptResults::find(const ResultKey& key, std::size_t size) const {
@@ -87,13 +100,32 @@ bool KeptResults::is_long() const {
 
 void KeptResults::add(const ResultKey& key, const std::string& values) {
   if (!work_ || places_.count(key) > 0) return;
-  const ResultHead head{key, values.size()};
+  const ResultHead head{key, values.size() | (adds_parts_ ? part_bit : 0)};
   bytes_.append(reinterpret_cast<const char*>(&head), sizeof head).append(values);
 }
 
-void KeptResults::forget_from(std::size_t size) {
-  bytes_.resize(std::min(size, bytes_.size()));
-  kept_size_ = std::min(kept_size_, bytes_.size());
+void KeptResults::forget_parts() {
+  const std::size_t parts_from = has_found_part_ ? 0 : earlier_size_;
+  std::string rest;
+  std::size_t earlier = 0;
+  bool was_kept = false;  // Any of the parts.
+  for (std::size_t at = 0; at < bytes_.size();) {
+    const ResultHead head = head_at(bytes_, at);
+    const std::size_t size = sizeof head + size_of(head);
+    if (is_part(head) && at >= parts_from) {
+      places_.erase(head.key);
+      was_kept = was_kept || at < kept_size_;
+    } else {
+      if (at < earlier_size_) places_[head.key] = rest.size();
+      rest.append(bytes_, at, size);
+    }
+    at += size;
+    if (at <= earlier_size_) earlier = rest.size();
+  }
+  bytes_ = std::move(rest);
+  earlier_size_ = earlier;
+  if (was_kept) kept_size_ = changed;
+  has_found_part_ = adds_parts_ = false;
 }
 
 void KeptResults::keep(bool done) {
@@ -106,14 +138,14 @@ void KeptResults::keep(bool done) {
 }
 
 void KeptResults::finish() {
-  if (bytes_.size() > kept_size_) keep(true);
+  if (bytes_.size() != kept_size_) keep(true);
 }
 
 void find_or_make(KeptResults* kept, const ResultKey& key, const std::function<void()>& make,
                   const std::function<void(PartBytes& bytes)>& copy) {
   if (std::optional<std::string> found = kept ? kept->find(key) : std::nullopt)
     return take_result(std::move(*found), copy);
-  const std::size_t before = kept ? kept->size() : 0;
+  if (kept) kept->begin_parts();
   try {
     make();
   } catch (const Cancelled&) {
@@ -121,7 +153,7 @@ void find_or_make(KeptResults* kept, const ResultKey& key, const std::function<v
     throw;
   }
   if (!kept) return;
-  kept->forget_from(before);
+  kept->forget_parts();
   if (!kept->is_long()) return;
   PartBytes bytes;
   copy(bytes);

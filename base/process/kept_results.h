@@ -4,6 +4,7 @@
 /// for the one that resumes it, and a shard for the run that merges the shards.
 
 #include <array>
+#include <atomic>
 #include <cstddef>
 #include <cstdint>
 #include <functional>
@@ -62,11 +63,12 @@ class KeptResults {
   /// Adds a result for later runs.
   void add(const ResultKey& key, const std::string& values);
 
-  /// The bytes of all results so far.
-  std::size_t size() const { return bytes_.size(); }
+  /// What is added from now on is parts of one result, until `forget_parts`.
+  void begin_parts() { adds_parts_ = true; }
 
-  /// Forgets what was added since there were `size` bytes.
-  void forget_from(std::size_t size);
+  /// Forgets the parts, as the result is complete. Those of earlier runs are forgotten, too, if any was found: they are
+  /// of this result. Not while other threads call `find`.
+  void forget_parts();
 
   /// Keeps what was added as the unit of this run. @param done  Whether the unit is complete.
   void keep(bool done);
@@ -83,18 +85,21 @@ class KeptResults {
   Work* work_;  // Null: this process keeps nothing.
   WorkPart part_;
   bool is_shard_ = false;
+  bool adds_parts_ = false;
+  mutable std::atomic<bool> has_found_part_{false};
   std::string bytes_;                                        // Of all results, one after the other.
-  std::unordered_map<ResultKey, std::size_t, Hash> places_;  // In `bytes_`; of those of earlier runs.
-  std::size_t kept_size_ = 0;                                // Of `bytes_`, the last time.
+  std::size_t earlier_size_ = 0;                             // Of those of earlier runs, which come first.
+  std::unordered_map<ResultKey, std::size_t, Hash> places_;  // Of these, in `bytes_`.
+  std::size_t kept_size_ = 0;  // Of `bytes_`, the last time; they have changed since if it is another one.
   Clock::time_point begun_ = Clock::now(), kept_ = begun_;
   double cost_ = 0;  // Seconds of keeping, the last time.
 };
 
 /// A result that is the same for all runs of a scene: from those that were kept; else it is made, and kept if the run
 /// is a long one. @param kept  Null: nothing is kept. @param make  Makes it; all processes of a team do, and process 0
-/// has it then. It may keep parts of it there, which are forgotten once all of it is made. @param copy  Copies it to or
-/// from bytes. @throw what `make` throws: where that is Cancelled, what was added so far is kept; std::runtime_error if
-/// the bytes that were kept are not those of a result.
+/// has it then. What it adds to `kept` is parts of the result, which are forgotten once all of it is made. @param copy
+/// Copies it to or from bytes. @throw what `make` throws: where that is Cancelled, what was added so far is kept;
+/// std::runtime_error if the bytes that were kept are not those of a result.
 void find_or_make(KeptResults* kept, const ResultKey& key, const std::function<void()>& make,
                   const std::function<void(PartBytes& bytes)>& copy);
 

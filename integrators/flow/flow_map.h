@@ -54,7 +54,8 @@ struct FlowSettings {
   /// its own there while it is traced. Where they are those of a shard, the map is only that of the shard's part: first
   /// quads in blocks, of which each shard has some everywhere. Null: none is kept.
   KeptResults* kept = nullptr;
-  std::uint64_t key = 0;  ///< A number of this map among those that are kept together.
+  std::uint64_t key = 0;  ///< A number of this map among those that are kept together and may have other surfaces
+                          ///< before the plate.
 
   /// Called after each division of quads, with a function that makes the map so far. Empty: nobody wants it.
   std::function<void(const std::function<FlowMap()>& so_far)> show;

@@ -81,6 +81,7 @@ void FlowVertices::trace_round(std::size_t end) {
   std::vector<std::uint8_t> is_traced((end - traced_ + task_size - 1) / task_size);
   try {
     trace_tasks(end, is_traced);
+    if (settings_.team) exchange_landings(*settings_.team, end);
   } catch (const Cancelled&) {
     if (!settings_.kept) throw;
     for (std::size_t task = 0; task < is_traced.size(); ++task)
@@ -88,7 +89,6 @@ void FlowVertices::trace_round(std::size_t end) {
     keep();
     throw;
   }
-  if (settings_.team) exchange_landings(*settings_.team, end);
   traced_ = end;
   if (settings_.kept && settings_.kept->is_due()) keep();
 }

@@ -99,10 +99,22 @@ class PhotonUnits {
     sums_ = empty_sums(job_);
   }
 
+  /// Begins with what was kept of a unit.
+  void restore(std::size_t unit) {
+    const auto state = work_ ? work_->state(unit) : nullptr;
+    if (!state) return;
+    try {
+      add_bytes(*state, sums_);
+    } catch (const std::runtime_error&) {
+      if (!job_.settings.restarts) throw;
+      clear_sums();
+    }
+  }
+
   /// Traces what is left of a unit: every chunk whose number, divided by the number of units, leaves that of the unit.
   void trace_unit(std::size_t unit) {
     clear_sums();
-    if (const auto state = work_ ? work_->state(unit) : nullptr) add_bytes(*state, sums_);
+    restore(unit);
     const std::uint64_t chunks = unit < job_.chunks() ? (job_.chunks() - unit - 1) / units_ + 1 : 0;
     const std::uint64_t members = team_ ? team_->count() : 1, member = team_ ? team_->index() : 0;
     const std::uint64_t round = team_ ? chunks_in_round * members : 1;

@@ -46,6 +46,8 @@ struct PhotonSettings {
   /// beginning.
   Work* work = nullptr;
 
+  bool restarts = false;  ///< Whether a unit whose state is that of other outputs begins anew; else it is an error.
+
   /// Processes that trace the photons together with this one; null: it is alone.
   Team* team = nullptr;
 

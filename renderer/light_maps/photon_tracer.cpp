@@ -212,10 +212,10 @@ PhotonMaps trace_photons(const BendingRegion& region, const std::vector<Vector3d
   result.areas = areas_of(sources, lights, surfaces, settings);
   const std::vector<Chunk> chunks = chunks_of(sources);
   for (int pass = 0; pass < settings.passes; ++pass) {
-    progress.update("tracing photons", static_cast<std::uint64_t>(pass), static_cast<std::uint64_t>(settings.passes));
     const PhotonTracer tracer(region, surfaces, settings, pass);
     std::vector<ChunkPhotons> parts(chunks.size());
     const auto trace = [&] {
+      progress.update("tracing photons", static_cast<std::uint64_t>(pass), static_cast<std::uint64_t>(settings.passes));
       tbb::parallel_for(std::size_t{0}, chunks.size(), [&](std::size_t i) {
         if (does_part(settings.team, i)) parts[i] = tracer.trace(sources[chunks[i].source], chunks[i]);
       });

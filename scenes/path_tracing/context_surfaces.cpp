@@ -76,7 +76,7 @@ Image plate_image(const Scene& scene, const Preparation& preparation, const Prog
   Image image(resolution.x(), resolution.y(), {"R", "G", "B"});
   const auto make = [&] {
     RenderJob job{Work(), {}, preparation.team};
-    Image made = light_on_plate(scene, progress, &job, {}, preparation.kept).linear;
+    Image made = light_on_plate(scene, progress, preparation.team ? &job : nullptr, {}, preparation.kept).linear;
     if (has_all(preparation.team)) image = std::move(made);
     if (preparation.team) share_values(*preparation.team, image.pixels);
   };

@@ -82,6 +82,7 @@ PlateLight light_on_plate(const Scene& scene, const Progress& progress, RenderJo
   const bool is_shard = job && job->work.is_shard;  // Photons are then traced where shards are merged.
   if ((!output.wants("photons") && !output.wants("fluence")) || is_shard) return light;
   settings.work = job ? &job->before : nullptr;
+  settings.restarts = true;
   PlateLight photons = trace_photons(scene, settings, progress);
   light.photons = std::move(photons.photons);
   light.fluence = std::move(photons.fluence);

@@ -37,7 +37,8 @@ using ShowLight = std::function<void(PlateLight)>;
 
 /// Traces the light with the density estimator of the method photon_distribution, with the team of the job. `mesh`
 /// draws the flow map of the beam; photons and fluence, if the scene asks for them, are then traced as for the other
-/// estimators. Of a shard, the result is not complete: what it has traced is in the work of the job.
+/// estimators, and kept before the work of the job. Of a shard, the result is not complete: what it has traced is in
+/// the work of the job.
 /// @param show  Gets the light so far when the job wants a picture; may be empty.
 /// @param kept  Where `mesh` keeps the vertices of its map; null: in the work of the job.
 /// @throw Cancelled; as Team::exchange.

@@ -206,6 +206,44 @@ TEST(KeptResults, OfPartsAreForgottenWithTheWhole) {
   EXPECT_EQ(found.find({3, 0, 0}), "");
 }
 
+/// Parts that an earlier run has left are forgotten with the result that needs them, and not before.
+TEST(KeptResults, OfEarlierPartsAreForgottenWithTheWhole) {
+  Work killed;
+  {
+    KeptResults kept(&killed, nullptr);
+    kept.add({1, 0, 0}, "before");
+    kept.begin_parts();
+    kept.add({2, 0, 0}, "a part");
+    kept.add({2, 1, 0}, "another part");
+    kept.keep(false);
+  }
+  Work work({}, killed.units());
+  work.interval = 1e-9;
+  {
+    KeptResults kept(&work, nullptr);
+    const auto copy = [](PartBytes&) {};
+    find_or_make(
+        &kept, {4, 0, 0}, [] {}, copy);
+    EXPECT_EQ(kept.find({2, 1, 0}), "another part");
+    find_or_make(
+        &kept, {3, 0, 0},
+        [&] {
+          EXPECT_EQ(kept.find({2, 0, 0}), "a part");
+        },
+        copy);
+    EXPECT_FALSE(kept.find({2, 1, 0}));
+    EXPECT_EQ(kept.find({1, 0, 0}), "before");
+    kept.add({5, 0, 0}, "after");
+    kept.finish();
+  }
+  Work resumed({}, work.units());
+  const KeptResults found(&resumed, nullptr);
+  EXPECT_EQ(found.find({1, 0, 0}), "before");
+  EXPECT_EQ(found.find({5, 0, 0}), "after");
+  for (const ResultKey& part : {ResultKey{2, 0, 0}, ResultKey{2, 1, 0}}) EXPECT_FALSE(found.find(part));
+  for (const ResultKey& whole : {ResultKey{3, 0, 0}, ResultKey{4, 0, 0}}) EXPECT_TRUE(found.find(whole));
+}
+
 /// A count that no bytes follow asks for no memory.
 TEST(KeptResults, SaysThatAResultIsDamaged) {
   std::vector<double> values;

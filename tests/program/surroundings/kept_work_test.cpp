@@ -171,10 +171,18 @@ TEST_F(KeptWork, PhotonsBesideAMeshAreKept) {
     kill(child, SIGKILL);
     wait_for(child);
   }
-  EXPECT_TRUE(has(checkpoint));
+  ASSERT_TRUE(has(checkpoint));
+  const std::string kept = read_file(in_folder(checkpoint));
+  EXPECT_NE(kept.find(R"("before":true)"), std::string::npos);
   arguments.push_back("--resume");
   run_well(with_files("a"));
   EXPECT_TRUE(is_equal("a.fluence.vdb", "whole.fluence.vdb"));
+  write(checkpoint, kept);  // Of other outputs, they begin anew.
+  std::filesystem::remove(in_folder("a.fluence.vdb"));
+  std::vector<std::string> more = with_files("a");
+  more.insert(more.end(), {"-o", "a.vtp"});
+  run_well(more);
+  EXPECT_TRUE(has("a.vtp") && is_equal("a.fluence.vdb", "whole.fluence.vdb"));
 }
 
 /// What is made before the tiles: maps of light, photons, the light on a plate.
