@@ -100,21 +100,27 @@ bool KeptResults::is_long() const {
 
 void KeptResults::add(const ResultKey& key, const std::string& values) {
   if (!work_ || places_.count(key) > 0) return;
-  const ResultHead head{key, values.size() | (adds_parts_ ? part_bit : 0)};
+  const ResultHead head{key, values.size() | (parts_from_ ? part_bit : 0)};
   bytes_.append(reinterpret_cast<const char*>(&head), sizeof head).append(values);
 }
 
 void KeptResults::forget_parts() {
-  const std::size_t parts_from = has_found_part_ ? 0 : earlier_size_;
+  if (bytes_.size() > *parts_from_) {
+    if (kept_size_ > *parts_from_) kept_size_ = changed;
+    bytes_.resize(*parts_from_);
+  }
+  parts_from_.reset();
+  if (has_found_part_) forget_earlier_parts();
+}
+
+void KeptResults::forget_earlier_parts() {
   std::string rest;
   std::size_t earlier = 0;
-  bool was_kept = false;  // Any of the parts.
   for (std::size_t at = 0; at < bytes_.size();) {
     const ResultHead head = head_at(bytes_, at);
     const std::size_t size = sizeof head + size_of(head);
-    if (is_part(head) && at >= parts_from) {
+    if (is_part(head)) {
       places_.erase(head.key);
-      was_kept = was_kept || at < kept_size_;
     } else {
       if (at < earlier_size_) places_[head.key] = rest.size();
       rest.append(bytes_, at, size);
@@ -124,8 +130,8 @@ void KeptResults::forget_parts() {
   }
   bytes_ = std::move(rest);
   earlier_size_ = earlier;
-  if (was_kept) kept_size_ = changed;
-  has_found_part_ = adds_parts_ = false;
+  kept_size_ = changed;
+  has_found_part_ = false;
 }
 
 void KeptResults::keep(bool done) {

@@ -64,7 +64,7 @@ class KeptResults {
   void add(const ResultKey& key, const std::string& values);
 
   /// What is added from now on is parts of one result, until `forget_parts`.
-  void begin_parts() { adds_parts_ = true; }
+  void begin_parts() { parts_from_ = bytes_.size(); }
 
   /// Forgets the parts, as the result is complete. Those of earlier runs are forgotten, too, if any was found: they are
   /// of this result. Not while other threads call `find`.
@@ -81,13 +81,14 @@ class KeptResults {
     std::size_t operator()(const ResultKey& key) const;
   };
   void take(const std::string& bytes);
+  void forget_earlier_parts();
 
   Work* work_;  // Null: this process keeps nothing.
   WorkPart part_;
   bool is_shard_ = false;
-  bool adds_parts_ = false;
-  mutable std::atomic<bool> has_found_part_{false};
   std::string bytes_;                                        // Of all results, one after the other.
+  std::optional<std::size_t> parts_from_;                    // Where in `bytes_` the parts begin that are added now.
+  mutable std::atomic<bool> has_found_part_{false};          // Of an earlier run.
   std::size_t earlier_size_ = 0;                             // Of those of earlier runs, which come first.
   std::unordered_map<ResultKey, std::size_t, Hash> places_;  // Of these, in `bytes_`.
   std::size_t kept_size_ = 0;  // Of `bytes_`, the last time; they have changed since if it is another one.
