@@ -68,6 +68,12 @@ class Program : public ::testing::Test {
     _exit(127);
   }
 
+  /// Whether a process has not ended yet. It can still be waited for.
+  static bool is_running(pid_t child) {
+    siginfo_t info{};
+    return waitid(P_PID, static_cast<id_t>(child), &info, WEXITED | WNOHANG | WNOWAIT) == 0 && info.si_pid == 0;
+  }
+
   Outcome wait_for(pid_t child) const {
     int status = 0;
     waitpid(child, &status, 0);

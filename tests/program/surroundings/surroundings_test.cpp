@@ -121,11 +121,7 @@ class Surroundings : public Program, public ::testing::WithParamInterface<std::s
     std::filesystem::remove(in_folder("stdout"));  // That of another run has an address, too.
     const pid_t child = start_in(place.shell, arguments_of(command, results));
     if (std::string(command.name) == "view") {
-      siginfo_t info{};
-      const auto is_running = [&] {
-        return waitid(P_PID, static_cast<id_t>(child), &info, WEXITED | WNOHANG | WNOWAIT) == 0 && info.si_pid == 0;
-      };
-      while (is_running() && read_file(in_folder("stdout")).find("http://") == std::string::npos)
+      while (is_running(child) && read_file(in_folder("stdout")).find("http://") == std::string::npos)
         std::this_thread::sleep_for(std::chrono::milliseconds(1));
       kill(child, SIGTERM);
     }
