@@ -22,12 +22,16 @@ namespace {
 
 namespace fs = std::filesystem;
 
+constexpr int longest_chain = 40;  // Of links: the limit of Linux.
+
 /// Makes an empty file with a new name in `folder`.
 fs::path make_temporary(const fs::path& folder, const fs::path& target) {
   static std::atomic<unsigned> counter{0};
   // Longer endings name no format, and a name has a greatest length.
   constexpr std::size_t longest_ending = 32;
-  const std::string ending = target.extension().string().size() <= longest_ending ? target.extension().string() : "";
+  const std::string name = target.filename().string();  // `.png` has an ending, too.
+  const std::size_t dot = name.rfind('.');
+  const std::string ending = dot != name.npos && name.size() - dot <= longest_ending ? name.substr(dot) : "";
   while (true) {
     const fs::path path = folder / fmt::format(".tensorray-{}-{}{}", getpid(), counter++, ending);
     const Descriptor file = open_file(path, O_WRONLY | O_CREAT | O_EXCL);
@@ -37,10 +41,32 @@ fs::path make_temporary(const fs::path& folder, const fs::path& target) {
   }
 }
 
+/// The number of an open descriptor of this process that a path names, as /dev/stdout and /dev/fd/3 do; −1: none.
+int own_descriptor(fs::path path) {
+  const std::string own = fmt::format("/proc/{}/fd", getpid());
+  for (int i = 0; i < longest_chain; ++i) {
+    const std::string folder = path.parent_path().string(), name = path.filename().string();
+    const bool is_number = !name.empty() && name.size() < 10 && name.find_first_not_of("0123456789") == name.npos;
+    if (is_number && (folder == "/dev/fd" || folder == "/proc/self/fd" || folder == own)) return std::stoi(name);
+    std::error_code error;
+    const fs::path next = fs::read_symlink(path, error);
+    if (error) return -1;
+    path = next.is_absolute() ? next : path.parent_path() / next;
+  }
+  return -1;
+}
+
+/// Opens a device. What this process has open gets more bytes where the last ones ended: it may be a file that a shell
+/// has begun.
+Descriptor open_device(const fs::path& device) {
+  const int own = own_descriptor(device);
+  return own < 0 ? open_file(device, O_WRONLY) : Descriptor(fcntl(own, F_DUPFD_CLOEXEC, 0));
+}
+
 void copy_into(const fs::path& source, const fs::path& device) {
   const Descriptor from = open_file(source, O_RDONLY);
   if (!from.is_open()) fail(device, fmt::format("cannot read {}: {}", source.string(), std::strerror(errno)));
-  Descriptor to = open_file(device, O_WRONLY);
+  Descriptor to = open_device(device);
   if (!to.is_open()) fail(device, fmt::format("cannot be opened: {}", std::strerror(errno)));
   std::vector<char> buffer(1 << 20);
   while (true) {
@@ -68,7 +94,7 @@ OutputFile::OutputFile(fs::path target) : target_(std::move(target)) {
   if (fs::exists(status) && ::access(target_.c_str(), W_OK) != 0) {
     fail(target_, fmt::format("cannot be written: {}", std::strerror(errno)));
   }
-  is_device_ = fs::exists(status) && !fs::is_regular_file(status);
+  is_device_ = fs::exists(status) && (!fs::is_regular_file(status) || own_descriptor(target_) >= 0);
   if (is_device_) {
     resolved_ = target_;
     temporary_ = make_temporary(temporary_files(), target_);
@@ -163,7 +189,6 @@ void OutputFile::discard() noexcept {
 }
 
 fs::path behind_links(const fs::path& target) {
-  constexpr int longest_chain = 40;  // The limit of Linux.
   fs::path path = target;
   for (int i = 0; i < longest_chain; ++i) {
     std::error_code error;

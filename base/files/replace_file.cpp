@@ -1,6 +1,7 @@
 #include "base/files/replace_file.h"
 
 #include <cerrno>
+#include <cstdint>
 #include <cstring>
 
 #include <fcntl.h>
@@ -9,7 +10,7 @@
 
 #include "base/errors.h"
 #include "base/files/descriptor.h"
-#include "base/text/path_text.h"
+#include "base/text/content_hash.h"
 
 namespace tensorray {
 namespace {
@@ -24,8 +25,9 @@ bool write_pieces(Descriptor& file, const std::vector<std::string_view>& pieces)
 }  // namespace
 
 void replace_file(const std::filesystem::path& file, const std::vector<std::string_view>& pieces) {
-  const std::filesystem::path temporary = with_suffix(file, ".new");
-  Descriptor written = open_file(temporary, O_WRONLY | O_CREAT | O_TRUNC);
+  const std::uint64_t name = content_hash(file.filename().string());
+  const std::filesystem::path temporary = file.parent_path() / fmt::format(".tensorray-{:016x}.new", name);
+  Descriptor written = open_file(temporary, O_WRONLY | O_CREAT | O_TRUNC | O_NOFOLLOW);
   if (!write_pieces(written, pieces) || ::rename(temporary.c_str(), file.c_str()) != 0) {
     const int error = errno;
     ::unlink(temporary.c_str());

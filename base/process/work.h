@@ -15,6 +15,9 @@
 
 namespace tensorray {
 
+/// The most parts that work is divided into.
+constexpr std::size_t most_parts = 100000;
+
 /// Of all units, every `count`-th one from number `index` on.
 struct WorkPart {
   std::size_t index = 0, count = 1;

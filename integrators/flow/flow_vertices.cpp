@@ -5,6 +5,7 @@
 #include <atomic>
 #include <cstring>
 #include <optional>
+#include <stdexcept>
 #include <string>
 #include <thread>
 #include <utility>
@@ -116,7 +117,7 @@ void FlowVertices::trace_vertices(std::size_t begin, std::size_t end) {
   tracer_.trace(map_, vertices);
 }
 
-/// Copies the landings of vertices to or from bytes.
+/// Copies the landings of vertices to or from bytes. @throw std::runtime_error if they cannot be those of light.
 void FlowVertices::copy_landings(std::size_t begin, std::size_t end, PartBytes& bytes) {
   const auto copy = [&](auto& values, std::size_t of_each) {
     bytes.copy(&values[begin * of_each], (end - begin) * of_each * sizeof values[0]);
@@ -124,6 +125,11 @@ void FlowVertices::copy_landings(std::size_t begin, std::size_t end, PartBytes& 
   copy(map_.landings, map_.wavelengths);
   copy(map_.ends, map_.wavelengths);
   copy(map_.lengths, map_.checks());
+  if (!bytes.reads()) return;
+  for (std::size_t i = begin * map_.wavelengths; i < end * map_.wavelengths; ++i)
+    if (static_cast<std::size_t>(map_.ends[i]) >= ray_end_count ||
+        (map_.ends[i] == RayEnd::plate && !map_.landings[i].allFinite()))
+      throw std::runtime_error("the landings of light that were kept or sent are damaged; render it again");
 }
 
 /// Gives the others the landings of the vertices that this process has traced, up to `end`, and takes theirs.

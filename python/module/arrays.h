@@ -4,6 +4,8 @@
 
 #include <cstddef>
 #include <memory>
+#include <stdexcept>
+#include <string>
 #include <utility>
 #include <vector>
 
@@ -50,7 +52,11 @@ py::array taken_matrices(std::vector<Matrix> values, const Shape& shape) {
   return py::array(py::dtype::of<Number>(), shape, data, owner);
 }
 
-inline Eigen::Vector3d vector3(const Doubles& numbers) { return Eigen::Vector3d(numbers.data()); }
+/// @throw std::invalid_argument unless there are three numbers.
+inline Eigen::Vector3d vector3(const Doubles& numbers, const char* name) {
+  if (numbers.size() != 3) throw std::invalid_argument(std::string(name) + ": give three numbers");
+  return Eigen::Vector3d(numbers.data());
+}
 
 /// A matrix as an array with rows first.
 inline py::array rows_first(const Eigen::Matrix4d& matrix) {

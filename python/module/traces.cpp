@@ -187,13 +187,16 @@ py::dict trace_for_python(const Field& field, const TraceRequest& request, int t
 
 Plate plate_of(const Doubles& center, const Doubles& normal, const Doubles& up, const Doubles& size) {
   Plate plate;
-  plate.center = vector3(center);
-  const Eigen::Vector3d across = vector3(normal).normalized();
-  plate.up = upright(across, vector3(up));
+  plate.center = vector3(center, "center");
+  const Eigen::Vector3d across = vector3(normal, "normal").normalized();
+  const Eigen::Vector3d upper = vector3(up, "up");
+  plate.up = upright(across, upper);
   plate.right = plate.up.cross(across);
-  plate.size = Eigen::Vector2d(size.data());
-  require(plate.center.allFinite() && plate.right.allFinite() && plate.size.minCoeff() > 0,
-          "plate: center and normal must be finite, normal not zero, and size greater than 0");
+  if (size.size() != 1 && size.size() != 2) throw std::invalid_argument("size: give one number, or two");
+  plate.size = Eigen::Vector2d(size.data()[0], size.data()[size.size() - 1]);
+  require(plate.center.allFinite() && plate.right.allFinite() && upper.allFinite() && plate.size.allFinite() &&
+              plate.size.minCoeff() > 0,
+          "plate: center, normal, up and size must be finite, normal not zero, and size greater than 0");
   return plate;
 }
 

@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <exception>
 #include <mutex>
+#include <stdexcept>
 #include <string>
 #include <thread>
 
@@ -58,6 +59,7 @@ void look_up(Call& shared, const py::object& report) {
 }  // namespace
 
 void run(const std::function<void(const Progress&)>& work, const py::object& report, int threads) {
+  if (threads < 0 || threads > 4096) throw std::invalid_argument("threads: from 1 to 4096, or 0 for all");
   Call shared;
   shared.progress.report = [&shared](const std::string& phase, std::uint64_t done, std::uint64_t total) {
     const std::lock_guard<std::mutex> lock(shared.mutex);

@@ -112,7 +112,7 @@ def read_vdb(file, name="", *, derive="none", progress=None):
     name    Name of the field; not needed if the file has one.
     derive  "gradient" of a vector grid, "hessian" of a scalar grid, or "none": the grids are the tensor's components.
     """
-    keys = {"file": os.fspath(file)}
+    keys = {"file": os.path.abspath(os.fspath(file))}  # The field stays that of this file in other folders.
     if name:
         keys["name"] = name
     if derive != "none":
@@ -183,7 +183,7 @@ def import_file(*files, array=None, gradient_of=None, strain_of=None, cells=None
             raise (ValueError if status == 2 else RuntimeError)(error)
         for message in messages:
             warnings.warn(message.removeprefix("warning: "), stacklevel=2)
-        keys = json_of({"file": os.fspath(files[0])})
+        keys = json_of({"file": os.path.abspath(os.fspath(files[0]))})
         return Field._of(_tensorray.read_field(vdb, keys, "", "none", None), keys)
 
 

@@ -183,12 +183,15 @@ int Rendering::next_samples(int before) const {
   return time_used() < 1 ? std::min(before, most) : 0;
 }
 
-/// A tile as it is kept.
+/// A tile as it is kept. @throw std::runtime_error if it is damaged.
 Tile Rendering::load(std::size_t number) const {
   const int left = static_cast<int>(number) % columns_ * tile_size,
             top = static_cast<int>(number) / columns_ * tile_size;
   Tile tile(left, top, std::min(tile_size, width_ - left), std::min(tile_size, height_ - top), light_values_);
-  if (const auto state = work_.state(number)) tile.set_bytes(*state);
+  if (const auto state = work_.state(number))
+    tile.set_bytes(*state);
+  else if (work_.is_in_part(number) && !work_.wants(number))
+    throw std::runtime_error("a tile that was kept has no samples; render it again");
   return tile;
 }
 

@@ -58,7 +58,9 @@ SpectralImage spectral_image(const Film& film, const std::vector<Band>& bands, S
   for (const Band& band : bands) channels.push_back(channel_name(band.wavelength));
   const char* const unit = quantity == SpectralQuantity::radiance ? "W.m^-2.sr^-1.nm^-1" : "W.m^-2.nm^-1";
   SpectralImage result{Image(film.width, film.height, channels),
-                       {{"spectralLayoutVersion", "1.0"}, {"emissiveUnits", unit}}};
+                       {{"spectralLayoutVersion", "1.0"}, {"emissiveUnits", unit}},
+                       bands,
+                       quantity};
   fill_colors(film, bands, xyz_to_rgb, result.image);
   tbb::parallel_for(0, film.height, [&](int y) {
     for (std::size_t k = 0; k < bands.size(); ++k) {

@@ -21,12 +21,14 @@ Image linear_image(const Film& film, const std::vector<Band>& bands, const Eigen
 /// The picture of a film whose channels are red, green and blue of the working space.
 Image color_image(const Film& color);
 
-struct SpectralImage {
-  Image image;
-  ImageMetadata metadata;  ///< The metadata that the layout requires; callers may add more.
-};
-
 enum class SpectralQuantity { irradiance, radiance };
+
+struct SpectralImage {
+  Image image;             ///< Three channels of colour, then one for each band.
+  ImageMetadata metadata;  ///< The metadata that the layout requires; callers may add more.
+  std::vector<Band> bands;
+  SpectralQuantity quantity = SpectralQuantity::irradiance;
+};
 
 /// The film as spectral irradiance or radiance, in the layout of Fichet et al. 2021 ("An OpenEXR Layout for Spectral
 /// Images", JCGT 10(3)). The first channels are R, G, B as in `linear_image`, which let other programs show the

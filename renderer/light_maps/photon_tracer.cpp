@@ -4,6 +4,7 @@
 #include <cmath>
 #include <limits>
 #include <numeric>
+#include <stdexcept>
 #include <utility>
 
 #include <tbb/parallel_for.h>
@@ -189,15 +190,15 @@ PhotonEnd PhotonTracer::land(const Source& source, const BentRay& ray, const Emi
   return PhotonEnd::landed;
 }
 
-void copy_chunk(ChunkPhotons& part, PartBytes& bytes) {
+/// @throw std::runtime_error if the photons cannot be those of the source.
+void copy_chunk(ChunkPhotons& part, const Source& source, std::size_t surfaces, PartBytes& bytes) {
   bytes.copy_vector(part.landed);
   bytes.copy(part.counts.data(), sizeof part.counts);
-}
-
-/// Takes the photons of the chunks that the others of the team have traced.
-void exchange_chunks(Team& team, std::vector<ChunkPhotons>& parts) {
-  exchange_parts(team, parts.size(), chunks_at_once,
-                 [&](std::size_t i, PartBytes& bytes) { copy_chunk(parts[i], bytes); });
+  if (!bytes.reads()) return;
+  for (const Photon& photon : part.landed)
+    if (photon.light != source.light || photon.surface >= surfaces || photon.band < 0 ||
+        static_cast<std::size_t>(photon.band) >= source.strength->size())
+      throw std::runtime_error("the photons that were kept or sent are damaged; render it again");
 }
 
 }  // namespace
@@ -214,15 +215,18 @@ PhotonMaps trace_photons(const BendingRegion& region, const std::vector<Vector3d
   for (int pass = 0; pass < settings.passes; ++pass) {
     const PhotonTracer tracer(region, surfaces, settings, pass);
     std::vector<ChunkPhotons> parts(chunks.size());
+    const auto copy = [&](std::size_t i, PartBytes& bytes) {
+      copy_chunk(parts[i], sources[chunks[i].source], surfaces.surfaces().size(), bytes);
+    };
     const auto trace = [&] {
       progress.update("tracing photons", static_cast<std::uint64_t>(pass), static_cast<std::uint64_t>(settings.passes));
       tbb::parallel_for(std::size_t{0}, chunks.size(), [&](std::size_t i) {
         if (does_part(settings.team, i)) parts[i] = tracer.trace(sources[chunks[i].source], chunks[i]);
       });
-      if (settings.team) exchange_chunks(*settings.team, parts);
+      if (settings.team) exchange_parts(*settings.team, parts.size(), chunks_at_once, copy);
     };
     find_or_make(settings.kept, {photon_key, static_cast<std::uint64_t>(pass), 0}, trace, [&](PartBytes& bytes) {
-      for (ChunkPhotons& part : parts) copy_chunk(part, bytes);
+      for (std::size_t i = 0; i < parts.size(); ++i) copy(i, bytes);
     });
     std::vector<Photon> landed;
     result.counts.push_back({});

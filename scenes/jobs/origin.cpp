@@ -1,5 +1,6 @@
 #include "scenes/jobs/origin.h"
 
+#include <algorithm>
 #include <set>
 
 #include <fmt/format.h>
@@ -52,6 +53,17 @@ Json origin_of(const Scene& scene) {
           {"scale", scene.scale.scale},
           {"direction", {direction.x(), direction.y(), direction.z()}},
           {"files", files_of(description)}};
+}
+
+bool is_origin(const Json& json) {
+  const auto has = [&](const char* key, bool (Json::*is_right)() const) {
+    return json.is_object() && json.contains(key) && (json.at(key).*is_right)();
+  };
+  const auto is_number = [](const Json& each) { return each.is_number(); };
+  return has("version", &Json::is_string) && has("method", &Json::is_string) && has("scene", &Json::is_object) &&
+         has("scale", &Json::is_number) && has("files", &Json::is_object) && has("direction", &Json::is_array) &&
+         json.at("direction").size() == 3 &&
+         std::all_of(json.at("direction").begin(), json.at("direction").end(), is_number);
 }
 
 std::string difference(const Json& there, const Json& here) {

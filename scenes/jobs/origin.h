@@ -14,6 +14,9 @@ namespace tensorray {
 /// @throw std::runtime_error naming a file that cannot be read.
 Json origin_of(const Scene& scene);
 
+/// Whether a file's JSON has all that an origin has.
+bool is_origin(const Json& json);
+
 /// The first difference between two origins, as "`/camera/resolution` is [800,800] there, [400,400] here"; empty if
 /// there is none. @param there  Of a file. @param here  Of the scene that is loaded.
 std::string difference(const Json& there, const Json& here);

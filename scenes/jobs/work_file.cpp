@@ -10,6 +10,7 @@
 #include "base/text/content_hash.h"
 #include "base/text/copy_bytes.h"
 #include "base/text/path_text.h"
+#include "scenes/jobs/origin.h"
 
 // The file: the mark; the length of the header; the header, as JSON; for each unit, twice the length of its state, plus
 // 1 if it is done (with "before": also for what is made before all units, behind them); the states; the hash of all
@@ -89,20 +90,24 @@ WorkFile read_work(const std::filesystem::path& path) {
   if (bytes.compare(0, mark.size(), mark) != 0) fail(path, "is no checkpoint or shard of this version of tensorray");
   Reader reader(path, bytes);
   reader.take(mark.size());
-  const Json header = Json::parse(reader.take(reader.number()), nullptr, false);
   WorkFile work;
   std::vector<std::uint64_t> sizes;
   bool has_before = false;
   try {
+    const Json header = parse_value(std::string(reader.take(reader.number())));
     work.origin = header.at("origin");
     work.scene_file = path_of_text(header.at("scene_file").get<std::string>());
     work.part = {header.at("part").at(0).get<std::size_t>(), header.at("part").at(1).get<std::size_t>()};
+    if (!is_origin(work.origin) || work.part.index >= work.part.count || work.part.count > most_parts)
+      throw SceneError("it belongs to no render");
     has_before = header.value("before", false);
     const std::uint64_t units = header.at("units").get<std::uint32_t>() + std::uint64_t{has_before};
     const std::string_view table = reader.take(sizeof(std::uint64_t) * units);
     sizes.resize(table.size() / sizeof(std::uint64_t));
     copy_bytes(sizes.data(), table.data(), table.size());
   } catch (const Json::exception&) {
+    fail(path, "is damaged; remove it and render it again");
+  } catch (const SceneError&) {
     fail(path, "is damaged; remove it and render it again");
   }
   const std::size_t begun = bytes.size() - reader.left();

@@ -100,7 +100,11 @@ class RaysTest(unittest.TestCase):
                 tr.trace(field, *arguments)
         for text, options in [("method", {"method": "guess"}), ("eigenvalues", {"eigenvalues": "some"}),
                               ("plate", {"plate": tr.Plate((0, 0, 0), size=(0, 1))}), ("step", {"max_steps": 0}),
-                              ("smooth", {"smooth": -1})]:
+                              ("center", {"plate": tr.Plate((0, 0), size=1)}),
+                              ("normal", {"plate": tr.Plate((0, 0, 0), 1, size=1)}),
+                              ("size", {"plate": tr.Plate((0, 0, 0), size=(1, 1, 1))}),
+                              ("up", {"plate": tr.Plate((0, 0, 0), size=1, up=(np.nan, 0, 0))}),
+                              ("threads", {"threads": 2**24}), ("smooth", {"smooth": -1})]:
             with self.assertRaisesRegex(ValueError, text):
                 tr.trace(field, [0, 0, 0], [0, 0, 1], 1, **options)
 

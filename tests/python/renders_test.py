@@ -116,6 +116,21 @@ class RendersTest(unittest.TestCase):
         with self.assertRaisesRegex(RuntimeError, "f.vdb"):
             tr.render(scene)
 
+    def test_no_output_takes_the_place_of_the_field_in_any_folder(self):
+        tr.make("vortex", resolution=8).write(self.path("f.vdb"))
+        before, here = bytes_of(self.folder, "f.vdb"), os.getcwd()
+        os.mkdir(self.path("sub"))
+        os.chdir(self.folder)
+        try:
+            field = tr.read_vdb("f.vdb")
+            os.chdir("sub")
+            for folder, output in [(None, "../f.vdb"), (self.path("sub"), "../f.vdb"), (self.folder, "f.vdb")]:
+                with self.assertRaisesRegex(tr.SceneError, "f.vdb"):
+                    tr.render(PHOTONS, field=field, outputs=[os.path.join(folder or "", output)], folder=folder)
+        finally:
+            os.chdir(here)
+        self.assertEqual(bytes_of(self.folder, "f.vdb"), before)
+
     def test_arrays(self):
         picture = tr.render(PHOTONS, keep=["spectral", "photons"])
         self.assertEqual(picture.linear.shape, (32, 40, 3))

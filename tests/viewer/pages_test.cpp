@@ -106,6 +106,22 @@ TEST_F(PagesTest, TellsAboutAPixelAndTheLightThere) {
     EXPECT_LT((vector(ray.at("points").back()) - expected).norm(), 0.03 * right.norm()) << ray;
 }
 
+/// A picture of a camera has bands of its own, fewer than the light has or more.
+TEST_F(PagesTest, APixelHasTheBandsOfItsPicture) {
+  Json scene = test::small_scene();
+  scene["integrator"] = {{"type", "path_tracing"}, {"bands", 6}, {"max_samples", 1}, {"min_samples", 1}};
+  scene["camera"] = {{"resolution", {16, 16}}};
+  for (const int count : {3, 12}) {
+    scene["light"]["wavelengths"]["count"] = count;
+    send_scene(count, scene);
+    mailbox_.final_picture(count);
+    send({{"type", "look"}, {"id", 100 + count}, {"x", 0}, {"y", 0}});
+    const Json spectrum = mailbox_.wait("look", 100 + count).json.at("spectrum");
+    EXPECT_EQ(spectrum.at("nm").size(), 6u);
+    for (const Json& value : spectrum.at("values")) EXPECT_TRUE(value >= 0 && value < 100) << value;
+  }
+}
+
 TEST_F(PagesTest, SavesToItsOwnFileAlone) {
   Json scene = test::small_scene();
   scene["field"]["scale"] = 7;

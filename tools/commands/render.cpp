@@ -32,8 +32,6 @@ struct RenderOptions {
   RenderRun run;
 };
 
-constexpr std::size_t most_shards = 100000;
-
 /// The kinds of outputs and their endings, from the table of methods.
 std::string output_help() {
   std::string text =
@@ -64,10 +62,10 @@ void take_shard(const std::string& text, SceneChanges& changes, RunKeeping& keep
   std::size_t number = 0, count = 0;
   const bool is_read = slash != std::string::npos && CLI::detail::lexical_cast(text.substr(0, slash), number) &&
                        CLI::detail::lexical_cast(text.substr(slash + 1), count);
-  if (!is_read || number < 1 || number > count || count > most_shards)
+  if (!is_read || number < 1 || number > count || count > most_parts)
     throw std::invalid_argument(
         fmt::format("--shard {}: give number and count, as 3/16; numbers begin with 1, and there may be {}",
-                    printable(text), most_shards));
+                    printable(text), most_parts));
   if (changes.outputs.size() != 1)
     throw std::invalid_argument("--shard: name one file for the shard, as -o part" + std::to_string(number) + ".shard");
   keeping.shard = WorkPart{number - 1, count};

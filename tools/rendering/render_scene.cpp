@@ -220,8 +220,9 @@ void complete(const Scene& scene, RenderJob& job, OutputFiles files, const KeepS
   for (const std::string& warning : result.warnings) tell({"warning: " + warning}, run.quiet);
   const auto start = Clock::now();
   try {
-    if (run.keeping.shard) write_work(run.keeping.shard_file, shard_of(keeper.work_file()));
-    files.erase(shard_key);
+    if (run.keeping.shard)
+      files.at(shard_key).write(
+          [&](const std::filesystem::path& path) { write_work(path, shard_of(keeper.work_file())); });
     write_outputs(result, scene, files);
     if (!run.statistics.empty())
       write_text(files.at(statistics_key), run_statistics(scene, result.statistics, seconds_since(start), run));

@@ -40,7 +40,9 @@ OutputFiles open_files(const SceneDescription& description, const RenderRun& run
   check_scene_copy(description.path, run.scene_copy);
   const std::vector<NamedFile> more{
       {run.statistics, statistics_key}, {run.scene_copy, scene_key}, {run.keeping.shard_file, shard_key}};
-  check_files(description, more, {{run.keeping.light, "--light"}});
+  std::vector<NamedFile> all = more;
+  all.push_back({checkpoint_of(description, run.keeping), "the checkpoint"});
+  check_files(description, all, {{run.keeping.light, "--light"}});
   OutputFiles files;
   if (!run.keeping.shard) files = open_outputs(description.output);
   for (const NamedFile& file : more)
@@ -71,7 +73,7 @@ std::vector<std::filesystem::path> files_of(const SceneDescription& description,
 std::filesystem::path checkpoint_of(const SceneDescription& description, const RunKeeping& keeping) {
   const auto beside = [](const std::filesystem::path& file) { return with_suffix(file, ".checkpoint"); };
   if (!keeping.is_on) return {};
-  if (keeping.shard) return beside(keeping.shard_file);
+  if (keeping.shard) return is_device(keeping.shard_file) ? std::filesystem::path() : beside(keeping.shard_file);
   const auto& files = description.output.files;
   const auto picture = files.find("image");
   if (picture != files.end() && !is_device(picture->second)) return beside(picture->second);

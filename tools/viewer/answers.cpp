@@ -136,15 +136,18 @@ const float* pixel_at(const Image& image, const Vector2d& place) {
   return image.pixel(index(place.x(), image.width), index(place.y(), image.height));
 }
 
-Json spectrum_at(const Scene& scene, const Render& render, const Vector2d& place) {
+/// The values of all bands.
+const float* bands_at(const SpectralImage& spectral, const Vector2d& place) {
+  return pixel_at(spectral.image, place) + (spectral.image.channels.size() - spectral.bands.size());
+}
+
+Json spectrum_at(const Render& render, const Vector2d& place) {
   if (!render.spectral) return nullptr;
-  const Image& image = render.spectral->image;
-  const float* const pixel = pixel_at(image, place);
+  const float* const bands = bands_at(*render.spectral, place);
   Json wavelengths = Json::array(), values = Json::array();
-  const std::size_t first = image.channels.size() - scene.bands.size();
-  for (std::size_t i = 0; i < scene.bands.size(); ++i) {
-    wavelengths.push_back(scene.bands[i].wavelength);
-    values.push_back(pixel[first + i]);
+  for (std::size_t i = 0; i < render.spectral->bands.size(); ++i) {
+    wavelengths.push_back(render.spectral->bands[i].wavelength);
+    values.push_back(bands[i]);
   }
   return {{"nm", std::move(wavelengths)}, {"values", std::move(values)}};
 }
@@ -218,17 +221,18 @@ Json LandedRays::to(const Scene& scene, const Vector2d& place) const {
   return rays;
 }
 
-Json describe_pixel(const Scene& scene, const Render& render, const Image& display, const Vector2d& place) {
+Json describe_pixel(const Render& render, const Image& display, const Vector2d& place) {
   Json lines = Json::array();
   const Image& linear = render.linear;
   const float* const pixel = pixel_at(linear, place);
   lines.push_back({"R, G, B", fmt::format("{:.3g}, {:.3g}, {:.3g}", pixel[0], pixel[1], pixel[2])});
   if (render.spectral) {
-    const Image& spectral = render.spectral->image;
-    const float* const bands = pixel_at(spectral, place) + (spectral.channels.size() - scene.bands.size());
+    const SpectralImage& spectral = *render.spectral;
+    const float* const bands = bands_at(spectral, place);
     double sum = 0;
-    for (std::size_t i = 0; i < scene.bands.size(); ++i) sum += bands[i] * scene.bands[i].width;
-    lines.push_back({"irradiance", fmt::format("{:.4g}", sum)});
+    for (std::size_t i = 0; i < spectral.bands.size(); ++i) sum += bands[i] * spectral.bands[i].width;
+    const bool is_radiance = spectral.quantity == SpectralQuantity::radiance;
+    lines.push_back({is_radiance ? "radiance" : "irradiance", fmt::format("{:.4g}", sum)});
   }
   // What one looks for first is seen without scrolling.
   const auto rank = [](const std::string& channel) {
@@ -240,7 +244,7 @@ Json describe_pixel(const Scene& scene, const Render& render, const Image& displ
   const float* const shown = pixel_at(display, place);
   return {{"lines", std::move(lines)},
           {"color", hex(Vector3d(shown[0], shown[1], shown[2]))},
-          {"spectrum", spectrum_at(scene, render, place)}};
+          {"spectrum", spectrum_at(render, place)}};
 }
 
 }  // namespace tensorray

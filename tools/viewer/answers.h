@@ -42,6 +42,6 @@ class LandedRays {
 
 /// The values of a pixel: `lines`, `color` and `spectrum`.
 /// @param display  The picture as the page shows it. @param place  Part of width and height, from the top left corner.
-Json describe_pixel(const Scene& scene, const Render& render, const Image& display, const Eigen::Vector2d& place);
+Json describe_pixel(const Render& render, const Image& display, const Eigen::Vector2d& place);
 
 }  // namespace tensorray

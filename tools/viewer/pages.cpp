@@ -266,17 +266,19 @@ void Pages::make_stage(const PagePointer& page) {
     progress_.cancelled = ends_;
   });
   auto last = Clock::now();
+  bool is_loaded = false;  // Before, the scene is that of the last picture, perhaps of another page.
   progress_.report = [&](const std::string& phase, std::uint64_t done, std::uint64_t total) {
     if (is_first || seconds_since(last) < 0.2) return;
     last = Clock::now();
     if (!stage.is_known)
       page->send(text_message(
           {{"type", "progress"}, {"id", page->shown_id}, {"phase", phase}, {"done", done}, {"total", total}}));
-    answer_requests(page, true);
+    if (is_loaded) answer_requests(page, true);
   };
   try {
     const auto start = Clock::now();
     load_for(*page, stage);
+    is_loaded = true;
     const double seconds_loading = seconds_since(start);
     page->render = live_.render(progress_);
     if (stage.is_known)
@@ -368,9 +370,9 @@ void Pages::answer(Page& page, const Request& request) {
 
 void Pages::look(Page& page, const Json& message) {
   const Eigen::Vector2d place(number(message, "x"), number(message, "y"));
-  if (!page.render) throw std::invalid_argument("there is no picture yet");
+  if (!page.render || page.display.pixels.empty()) throw std::invalid_argument("there is no picture yet");
   const Scene& scene = live_.scene();
-  Json content = describe_pixel(scene, *page.render, page.display, place);
+  Json content = describe_pixel(*page.render, page.display, place);
   content["rays"] = Json::array();
   if (scene.description.integrator.method().shows_plate()) {
     if (!page.landed) page.landed = std::make_shared<const LandedRays>(scene);
@@ -407,11 +409,11 @@ void Pages::export_file(Page& page, const Json& message) {
   const std::string ending = "." + message.value("file", "");
   if (ending != ".png" && ending != ".exr") throw std::invalid_argument("a page can have `png` and `exr`");
   if (!page.shown.is_object()) throw std::invalid_argument("there is no picture yet");
-  page.render = live_.render(progress_);
+  const std::shared_ptr<const Render> render = live_.render(progress_);
   const std::filesystem::path file = folder_ / ("export" + ending);
   for (const Output& output : picture_outputs())
     if (std::find(output.endings.begin(), output.endings.end(), ending) != output.endings.end())
-      output.write(file, live_.scene(), *page.render);
+      output.write(file, live_.scene(), *render);
   const std::string name = viewed_.file.stem().string() + ending;
   page.send(binary_message(answer_to(message, "file", {{"name", name}}), bytes_of(file), false));
 }

@@ -15,6 +15,8 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include "base/files/descriptor.h"
+
 namespace tensorray {
 namespace {
 
@@ -67,6 +69,23 @@ TEST_F(OutputFileTest, AppearsWhenCommitted) {
   file.commit();
   EXPECT_EQ(text_of(folder_ / "a.spectral.exr"), "new");
   EXPECT_EQ(names().size(), 1u) << "no temporary is left";
+}
+
+/// As of a shell's `>> log`: the file is not replaced, but gets more bytes.
+TEST_F(OutputFileTest, AppendsToWhatTheProcessHasOpen) {
+  const Descriptor log = open_file(folder_ / "log", O_WRONLY | O_CREAT);
+  ASSERT_TRUE(write_whole(log.get(), "before, "));
+  const std::string number = std::to_string(log.get());
+  for (const char* const folder : {"/proc/self/fd/", "/dev/fd/"}) {
+    fs::create_symlink(folder + number, folder_ / "link");
+    for (const fs::path& target : {fs::path(folder + number), folder_ / "link"}) {
+      OutputFile file(target);
+      write(file.path(), "more, ");
+      file.commit();
+    }
+    fs::remove(folder_ / "link");
+  }
+  EXPECT_EQ(text_of(folder_ / "log"), "before, more, more, more, more, ");
 }
 
 TEST_F(OutputFileTest, LeavesTheOldFileUntilCommitted) {

@@ -339,6 +339,28 @@ TEST_F(KeptWork, ShardsThatDoNotFitAreNamed) {
   expect_same("a");
 }
 
+/// As other outputs do: a link stays, a device is written to, and no file is that of the checkpoint.
+TEST_F(KeptWork, AShardIsAnOutputLikeOthers) {
+  const auto make_shard = [](const std::string& file) {
+    return std::vector<std::string>{"render", "scene.json", "-q", "--shard", "1/2", "-o", file};
+  };
+  std::filesystem::create_symlink("1.shard", in_folder("link"));
+  run_well(make_shard("link"));
+  EXPECT_TRUE(std::filesystem::is_symlink(in_folder("link")) && has("1.shard"));
+  ASSERT_EQ(mkfifo(in_folder("pipe").c_str(), 0600), 0);
+  const pid_t child = start(make_shard("pipe"));
+  EXPECT_TRUE(read_file(in_folder("pipe")) == read_file(in_folder("1.shard")));
+  EXPECT_EQ(wait_for(child).status, 0);
+  EXPECT_TRUE(std::filesystem::is_fifo(in_folder("pipe")));
+  write("2.shard.new", "somebody's");
+  run_well(make_shard("2.shard"));
+  EXPECT_EQ(read_file(in_folder("2.shard.new")), "somebody's");
+  std::vector<std::string> arguments = make_shard("3.shard");
+  arguments.insert(arguments.end(), {"--stats", "3.shard.checkpoint"});
+  expect_error("the checkpoint", arguments);
+  expect_error("the checkpoint", render("a", {"--stats", "a.png.checkpoint"}));
+}
+
 TEST_F(KeptWork, AShardContinues) {
   make_shards(2);
   const std::string whole = read_file(in_folder("2.shard"));
