@@ -66,7 +66,7 @@ class Import : public Program {
 
   /// Expects `status`, one line that contains `parts`, and that all files stay unchanged, also an older output.
   void refuses(const Arguments& arguments, int status, const std::vector<std::string>& parts) const {
-    write("old.vdb", "what was there before");
+    write("old.vdb", " BDV, which was there before");
     const auto before = files();
     Arguments all{"import", "-q", "-o", "old.vdb"};
     all.insert(all.end(), arguments.begin(), arguments.end());
@@ -78,7 +78,7 @@ class Import : public Program {
     for (const std::string& part : parts)
       EXPECT_NE(outcome.error.find(part), std::string::npos) << part << "\n" << trace;
     EXPECT_EQ(files(), before) << trace;
-    EXPECT_EQ(read_file(in_folder("old.vdb")), "what was there before") << trace;
+    EXPECT_EQ(read_file(in_folder("old.vdb")), " BDV, which was there before") << trace;
   }
 
   Outcome imported_;  ///< Result of the last import.

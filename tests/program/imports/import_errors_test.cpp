@@ -163,12 +163,27 @@ TEST_F(ImportErrors, BoundsWithNothingInside) {
 
 TEST_F(ImportErrors, AFullDiskLeavesWhatWasThere) {
   write("array.npy", npy());
-  write("old.vdb", "what was there before");
+  write("old.vdb", " BDV, which was there before");
   const Outcome outcome = run({"import", "array.npy", "-q", "-o", "old.vdb"}, 16);
   EXPECT_EQ(outcome.status, 1);
   EXPECT_EQ(std::count(outcome.error.begin(), outcome.error.end(), '\n'), 1) << outcome.error;
-  EXPECT_EQ(read_file(in_folder("old.vdb")), "what was there before");
+  EXPECT_EQ(read_file(in_folder("old.vdb")), " BDV, which was there before");
   EXPECT_EQ(files(), (std::vector<std::string>{"array.npy", "old.vdb"}));
+}
+
+/// Headers name their data by any name.
+TEST_F(ImportErrors, DataThatTheInputNamesAreNotReplaced) {
+  const std::string numbers(9 * 8 * sizeof(float), 1);
+  write("data.vdb", numbers);
+  write("a.nhdr",
+        "NRRD0004\ntype: float\ndimension: 4\nsizes: 9 2 2 2\nkinds: 3D-matrix space space space\nendian: little\n"
+        "encoding: raw\ndata file: data.vdb\n");
+  const Outcome outcome = run({"import", "a.nhdr", "-o", "data.vdb"});
+  EXPECT_EQ(outcome.status, 2) << outcome.error;
+  EXPECT_NE(outcome.error.find("data.vdb: is there, and is no OpenVDB file"), std::string::npos) << outcome.error;
+  EXPECT_TRUE(read_file(in_folder("data.vdb")) == numbers);
+  run_well({"import", "a.nhdr", "-q", "-o", "b.vdb"});
+  run_well({"import", "a.nhdr", "-q", "-o", "b.vdb"});
 }
 
 TEST_F(ImportErrors, HelpNamesEveryFlagAndFormat) {

@@ -147,10 +147,25 @@ void import_to(const ImportOptions& options, const ImportSettings& settings, Out
         fmt::format("{}: the body's surface, {} triangles", options.boundary.string(), report.boundary_triangles));
 }
 
+/// A file that the input names (the data of a header, a part of a data set) may have any name, also that of the output.
+/// None of them is an OpenVDB file, and no other file is replaced. @throw std::invalid_argument
+void require_replaceable(const std::filesystem::path& output) {
+  std::error_code error;
+  if (!std::filesystem::is_regular_file(output, error) || std::filesystem::file_size(output, error) == 0) return;
+  const std::string mark = " BDV";  // With which OpenVDB files begin.
+  std::string start(mark.size(), 0);
+  std::ifstream(output, std::ios::binary).read(start.data(), static_cast<std::streamsize>(start.size()));
+  if (start != mark)
+    throw std::invalid_argument(escaped(output.string()) +
+                                ": is there, and is no OpenVDB file; it may belong to what is imported: remove it, or "
+                                "choose another name");
+}
+
 void check_files(const ImportOptions& options, const std::vector<std::filesystem::path>& read) {
   std::vector<NamedFile> inputs;
   for (const std::filesystem::path& file : read) inputs.push_back({file, "the file to import"});
   require_distinct_files(inputs, {{options.output, "-o"}, {options.boundary, "--boundary"}});
+  require_replaceable(options.output);
 }
 
 std::string crash_message(const ImportSettings& settings) {
