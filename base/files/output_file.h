@@ -11,8 +11,8 @@ namespace tensorray {
 /// file at the target stays until then, and stays if the work fails.
 ///
 /// Symbolic links are followed: the link stays, and the file that it points to is replaced. A target that is not a
-/// regular file (a device, a pipe), or that this process has open (/dev/stdout, /dev/fd/3), is never replaced: the bytes
-/// are copied into it.
+/// regular file (a device, a pipe), or that this process has open (/dev/stdout, /dev/fd/3), is never replaced: the
+/// bytes are copied into it.
 class OutputFile {
  public:
   /// Makes the empty temporary file, so that a target that cannot be written is reported before the work begins.
