@@ -24,6 +24,8 @@ namespace fs = std::filesystem;
 
 constexpr int longest_chain = 40;  // Of links: the limit of Linux.
 
+fs::path folder_of(const fs::path& file) { return file.has_parent_path() ? file.parent_path() : fs::path("."); }
+
 /// Makes an empty file with a new name in `folder`.
 fs::path make_temporary(const fs::path& folder, const fs::path& target) {
   static std::atomic<unsigned> counter{0};
@@ -45,10 +47,10 @@ fs::path make_temporary(const fs::path& folder, const fs::path& target) {
 int own_descriptor(fs::path path) {
   const std::string own = fmt::format("/proc/{}/fd", getpid());
   for (int i = 0; i < longest_chain; ++i) {
-    const std::string folder = path.parent_path().string(), name = path.filename().string();
-    const bool is_number = !name.empty() && name.size() < 10 && name.find_first_not_of("0123456789") == name.npos;
-    if (is_number && (folder == "/dev/fd" || folder == "/proc/self/fd" || folder == own)) return std::stoi(name);
     std::error_code error;
+    const std::string name = path.filename().string();
+    const bool is_number = !name.empty() && name.size() < 10 && name.find_first_not_of("0123456789") == name.npos;
+    if (is_number && fs::canonical(folder_of(path), error) == own) return std::stoi(name);
     const fs::path next = fs::read_symlink(path, error);
     if (error) return -1;
     path = next.is_absolute() ? next : path.parent_path() / next;
@@ -80,8 +82,6 @@ void copy_into(const fs::path& source, const fs::path& device) {
   if (!to.close()) fail(device, fmt::format("cannot be written: {}", std::strerror(errno)));
 }
 
-fs::path folder_of(const fs::path& file) { return file.has_parent_path() ? file.parent_path() : fs::path("."); }
-
 }  // namespace
 
 OutputFile::OutputFile(fs::path target) : target_(std::move(target)) {
@@ -94,7 +94,9 @@ OutputFile::OutputFile(fs::path target) : target_(std::move(target)) {
   if (fs::exists(status) && ::access(target_.c_str(), W_OK) != 0) {
     fail(target_, fmt::format("cannot be written: {}", std::strerror(errno)));
   }
-  is_device_ = fs::exists(status) && (!fs::is_regular_file(status) || own_descriptor(target_) >= 0);
+  const int own = fs::exists(status) ? own_descriptor(target_) : -1;
+  if (own >= 0 && (fcntl(own, F_GETFL) & O_ACCMODE) == O_RDONLY) fail(target_, "is not open for writing");
+  is_device_ = own >= 0 || (fs::exists(status) && !fs::is_regular_file(status));
   if (is_device_) {
     resolved_ = target_;
     temporary_ = make_temporary(temporary_files(), target_);

@@ -16,8 +16,8 @@ namespace tensorray {
 class OutputFile {
  public:
   /// Makes the empty temporary file, so that a target that cannot be written is reported before the work begins.
-  /// @throw std::runtime_error naming the target and the fix, if the target is a folder or is write-protected, or if
-  /// its folder is missing or cannot be written.
+  /// @throw std::runtime_error naming the target and the fix, if the target is a folder, is write-protected, or is open
+  /// for reading only, or if its folder is missing or cannot be written.
   explicit OutputFile(std::filesystem::path target);
 
   /// Removes the temporary file if it was not committed.

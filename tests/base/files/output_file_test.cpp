@@ -76,7 +76,8 @@ TEST_F(OutputFileTest, AppendsToWhatTheProcessHasOpen) {
   const Descriptor log = open_file(folder_ / "log", O_WRONLY | O_CREAT);
   ASSERT_TRUE(write_whole(log.get(), "before, "));
   const std::string number = std::to_string(log.get());
-  for (const char* const folder : {"/proc/self/fd/", "/dev/fd/"}) {
+  const std::vector<std::string> folders{"/proc/self/fd/", "/dev/fd/", "/dev/./fd/"};
+  for (const std::string& folder : folders) {
     fs::create_symlink(folder + number, folder_ / "link");
     for (const fs::path& target : {fs::path(folder + number), folder_ / "link"}) {
       OutputFile file(target);
@@ -85,7 +86,9 @@ TEST_F(OutputFileTest, AppendsToWhatTheProcessHasOpen) {
     }
     fs::remove(folder_ / "link");
   }
-  EXPECT_EQ(text_of(folder_ / "log"), "before, more, more, more, more, ");
+  EXPECT_EQ(text_of(folder_ / "log"), "before, more, more, more, more, more, more, ");
+  const Descriptor reading = open_file(folder_ / "log", O_RDONLY);
+  EXPECT_THROW(OutputFile("/dev/fd/" + std::to_string(reading.get())), std::runtime_error);
 }
 
 TEST_F(OutputFileTest, LeavesTheOldFileUntilCommitted) {

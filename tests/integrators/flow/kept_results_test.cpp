@@ -2,6 +2,8 @@
 
 #include "base/process/kept_results.h"
 
+#include <cmath>
+#include <cstring>
 #include <utility>
 #include <vector>
 
@@ -106,9 +108,12 @@ TEST(KeptResults, OfAnInterruptedRunAreNotTracedAgain) {
 }
 
 TEST(KeptResults, OfAnotherMapAreNotUsed) {
-  Work first({0, 2});
+  Work first;
+  first.is_shard = true;  // Its landings are kept, whether it takes long or not.
   const FlowSettings settings = range(0.1, 0.4);
   map_with(settings, first, true);
+  Work same({}, first.units());
+  EXPECT_EQ(map_with(settings, same).rays, 0u);
   FlowSettings finer = settings, other = range(0.1, 0.5), numbered = settings;
   finer.tolerance = 0.25;
   numbered.key = 1;
@@ -261,6 +266,31 @@ TEST(KeptResults, SaysThatAResultIsDamaged) {
         << count;
     EXPECT_TRUE(values.empty()) << count;
   }
+}
+
+/// What no light does would be an index, or a place, beyond all memory.
+TEST(KeptResults, LandingsThatNoLightHasAreRefused) {
+  const FlowSettings settings = single(0.3);
+  Work work;
+  work.is_shard = true;
+  map_with(settings, work, true);
+  const std::string kept = *work.state(0);
+  // The first result: its key and its size; the landing; how it ends.
+  constexpr std::size_t landing = sizeof(ResultKey) + sizeof(std::uint64_t), end = landing + 2 * sizeof(float);
+  for (const int wrong : {ray_end_count, 255}) {
+    std::string bytes = kept;
+    bytes[end] = static_cast<char>(wrong);
+    work.keep(0, bytes, true);
+    EXPECT_THROW(map_with(settings, work), std::runtime_error) << wrong;
+  }
+  std::string bytes = kept;
+  const float infinite = INFINITY;
+  std::memcpy(&bytes[landing], &infinite, sizeof infinite);
+  bytes[end] = static_cast<char>(RayEnd::plate);
+  work.keep(0, bytes, true);
+  EXPECT_THROW(map_with(settings, work), std::runtime_error);
+  work.keep(0, kept, true);
+  EXPECT_NO_THROW(map_with(settings, work));
 }
 
 TEST(KeptResults, SaysThatAUnitIsDamaged) {

@@ -8,6 +8,8 @@
 #include <tbb/global_control.h>
 
 #include "base/constants.h"
+#include "base/process/kept_results.h"
+#include "base/process/work.h"
 #include "renderer/sampling/random.h"
 #include "renderer/shading/shading.h"
 #include "tests/base/team_support.h"
@@ -147,6 +149,37 @@ TEST(PhotonTracerTest, OfATeamAreThoseOfOneProcess) {
       }
     }
   }
+}
+
+/// A band, a surface or a light that is not there would be an index beyond all memory.
+TEST(PhotonTracerTest, KeptPhotonsThatAreNoneAreRefused) {
+  const SurfaceScene floor = floor_at(-0.8, 40);
+  PhotonTracerSettings settings = settings_of(100);
+  const auto trace = [&](Work& work) {
+    work.interval = 1e-9;
+    KeptResults kept(&work, nullptr);
+    settings.kept = &kept;
+    return traced(ClearCube(), floor, {sun({0.4, 0.3, -1})}, settings);
+  };
+  Work work;
+  trace(work);
+  const std::string kept = *work.state(0);
+  // The key and the size of the result; how many photons its first chunk has; the first one.
+  constexpr std::size_t first = sizeof(ResultKey) + sizeof(std::uint64_t) + sizeof(std::size_t);
+  const auto trace_with = [&](const auto& change) {
+    std::string bytes = kept;
+    Photon photon;
+    std::memcpy(static_cast<void*>(&photon), &bytes[first], sizeof photon);
+    change(photon);
+    std::memcpy(&bytes[first], &photon, sizeof photon);
+    work.keep(0, bytes, true);
+    trace(work);
+  };
+  EXPECT_NO_THROW(trace_with([](Photon&) {}));
+  for (const int band : {-1, traced_bands})
+    EXPECT_THROW(trace_with([&](Photon& photon) { photon.band = band; }), std::runtime_error) << band;
+  EXPECT_THROW(trace_with([](Photon& photon) { photon.surface = 1; }), std::runtime_error);
+  EXPECT_THROW(trace_with([](Photon& photon) { photon.light = 1; }), std::runtime_error);
 }
 
 /// Before the region, behind it, beside everything, and within it.
