@@ -191,7 +191,9 @@ class LoadedLens : public LoadedMethod {
 SpectralImage spectra_side_by_side(std::vector<SpectralImage> spectra) {
   std::vector<Image> images;
   for (SpectralImage& spectrum : spectra) images.push_back(std::move(spectrum.image));
-  return {side_by_side(images), spectra.front().metadata};
+  SpectralImage all = std::move(spectra.front());
+  all.image = side_by_side(images);
+  return all;
 }
 
 LensSettings LoadedLens::trace_settings(const Scene& scene) const {
