@@ -17,6 +17,7 @@
 
 #include "base/text/text.h"
 #include "renderer/images/stored_bytes.h"
+#include "renderer/openimageio/png_chunks.h"
 
 namespace tensorray::openimageio {
 namespace {
@@ -53,13 +54,42 @@ OIIO::ImageSpec make_spec(const Image& image, const PictureFormat& format, const
   return spec;
 }
 
-/// Throws the reader's message. Some readers give none if a file is cut off; the error then says so.
-[[noreturn]] void throw_read_error(const OIIO::ImageInput& input) {
-  const std::string reason = one_line(input.geterror());
-  throw std::runtime_error(reason.empty() ? "the file is cut off or damaged" : reason);
+bool is_tiff(const OIIO::ImageInput& input) { return std::strcmp(input.format_name(), "tiff") == 0; }
+
+/// A tile may be larger than its picture, but memory is reserved for all of it before the file is found to be shorter.
+/// Lines are counted from a place that the file sets.
+void require_likely_layout(const OIIO::ImageSpec& spec) {
+  if (std::abs(std::int64_t{spec.y}) > 1 << 30) throw std::runtime_error("its pixels are far outside of it");
+  const double tile = double(spec.tile_width) * spec.tile_height, picture = double(spec.width) * spec.height;
+  if (tile > std::max(4096.0 * 4096, 4 * picture))
+    throw std::runtime_error("its header is damaged: its tiles have " + std::to_string(spec.tile_width) + " x " +
+                             std::to_string(spec.tile_height) + " pixels");
+}
+
+/// Reads channels of a part as `type` into `samples`, which holds them all.
+/// @throw std::runtime_error with the reader's first message. Some readers give none if a file is cut off, and that of
+/// TIFF says that it has read what it has not: of strips that are cut off, and of damaged ones that it reads together.
+/// It therefore reads lines, as fast.
+void read_samples(OIIO::ImageInput& input, int part, int first, int count, OIIO::TypeDesc type, void* samples) {
+  const OIIO::ImageSpec spec = input.spec(part, 0);
+  require_likely_layout(spec);
+  bool done = true;
+  if (is_tiff(input) && spec.tile_width == 0) {
+    const std::size_t line = type.size() * static_cast<std::size_t>(count) * static_cast<std::size_t>(spec.width);
+    auto* target = static_cast<unsigned char*>(samples);
+    for (int y = spec.y; done && y < spec.y + spec.height; ++y, target += line)
+      done = input.read_scanlines(part, 0, y, y + 1, spec.z, first, first + count, type, target) && !input.has_error();
+  } else {
+    done = input.read_image(part, 0, first, first + count, type, samples) && !input.has_error();
+  }
+  if (done) return;
+  const std::string reasons = input.geterror();
+  const std::string reason = one_line(reasons.substr(0, reasons.find('\n')));
+  throw std::runtime_error("the file is cut off or damaged" + (reason.empty() ? "" : ": " + reason));
 }
 
 std::unique_ptr<OIIO::ImageInput> open_as_it_is(const std::filesystem::path& path) {
+  check_png(path);
   OIIO::ImageSpec as_it_is;
   as_it_is.attribute("oiio:UnassociatedAlpha", 1);
   std::unique_ptr<OIIO::ImageInput> input = OIIO::ImageInput::open(path.string(), &as_it_is);
@@ -169,7 +199,7 @@ SampleType sample_type(const OIIO::ImageSpec& spec) {
 
 /// Only TIFF has integers of 24 bits. Other formats have this attribute for other reasons.
 bool has_24_bits(const OIIO::ImageInput& input, const OIIO::ImageSpec& spec) {
-  return std::strcmp(input.format_name(), "tiff") == 0 && spec.format.size() == sizeof(std::uint32_t) &&
+  return is_tiff(input) && spec.format.size() == sizeof(std::uint32_t) &&
          spec.get_int_attribute("oiio:BitsPerSample") == 24;
 }
 
@@ -271,7 +301,7 @@ Image decode(const std::filesystem::path& path) {
   std::vector<std::string> channels = spec.channelnames;
   channels.resize(static_cast<std::size_t>(spec.nchannels));
   Image image(spec.width, spec.height, std::move(channels));
-  if (!input->read_image(0, 0, 0, spec.nchannels, OIIO::TypeDesc::FLOAT, image.pixels.data())) throw_read_error(*input);
+  read_samples(*input, 0, 0, spec.nchannels, OIIO::TypeDesc::FLOAT, image.pixels.data());
   input->close();
   return image;
 }
@@ -298,9 +328,8 @@ NativeImage decode_native(const std::filesystem::path& path, const std::string& 
   image.is_premultiplied = image.alpha >= 0 && !spec.get_int_attribute("oiio:UnassociatedAlpha");
   const std::size_t bytes = stored_bytes(image);
   const std::shared_ptr<unsigned char[]> samples(new unsigned char[bytes]);
-  if (!input->read_image(part, 0, first, first + image.channels,
-                         is_24_bits ? OIIO::TypeDesc(OIIO::TypeDesc::UINT32) : type_desc(image.type), samples.get()))
-    throw_read_error(*input);
+  read_samples(*input, part, first, image.channels,
+               is_24_bits ? OIIO::TypeDesc(OIIO::TypeDesc::UINT32) : type_desc(image.type), samples.get());
   input->close();
   if (is_24_bits) convert_24_bits(samples.get(), bytes / sizeof(float));
   image.samples = samples;

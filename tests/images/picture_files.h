@@ -65,6 +65,32 @@ inline std::string png_file(int width, int height, int channels, int bits, const
   return "\x89PNG\r\n\x1A\n" + png_chunk("IHDR", header) + png_chunk("IDAT", zlib_stored(rows)) + png_chunk("IEND", "");
 }
 
+/// An RGB TIFF of 64 x 64 pixels of 8 bits in eight strips, whose directory is in front of them. @param is_deflated
+/// Each strip is a stream of zlib. @param first_strip  Where the directory says that the first strip is; 0: where it
+/// is.
+inline std::string striped_tiff(bool is_deflated, std::uint32_t first_strip = 0) {
+  const auto entry = [](int tag, int type, std::uint32_t count, std::uint32_t value) {
+    return little_endian(static_cast<std::uint16_t>(tag)) + little_endian(static_cast<std::uint16_t>(type)) +
+           little_endian(count) + little_endian(value);
+  };
+  constexpr std::uint32_t strips = 8, rows = 8, bits_at = 122, offsets_at = 128, counts_at = offsets_at + 4 * strips;
+  std::string strip(64 * rows * 3, '\0');
+  for (std::size_t i = 0; i < strip.size(); ++i) strip[i] = static_cast<char>(100 + i * i % 101);
+  if (is_deflated) strip = zlib_stored(strip);
+  const auto size = static_cast<std::uint32_t>(strip.size());
+  std::string file = std::string("II*\0\x08\0\0\0\x09\0", 10);
+  file +=
+      entry(256, 4, 1, 64) + entry(257, 4, 1, 64) + entry(258, 3, 3, bits_at) + entry(259, 3, 1, is_deflated ? 8 : 1);
+  file += entry(262, 3, 1, 2) + entry(273, 4, strips, offsets_at) + entry(277, 3, 1, 3) + entry(278, 4, 1, rows);
+  file += entry(279, 4, strips, counts_at) + std::string(4, '\0');
+  for (int i = 0; i < 3; ++i) file += little_endian(std::uint16_t{8});
+  for (std::uint32_t i = 0; i < strips; ++i)
+    file += little_endian(i == 0 && first_strip > 0 ? first_strip : counts_at + 4 * strips + i * size);
+  for (std::uint32_t i = 0; i < strips; ++i) file += little_endian(size);
+  for (std::uint32_t i = 0; i < strips; ++i) file += strip;
+  return file;
+}
+
 /// A TIFF of one row of 8-bit values. @param photometric  2: RGB, 5: CMYK. @param extra  Meaning of the channel after
 /// the colours. 0: there is none, 1: alpha, colours multiplied by it, 2: alpha, colours not multiplied by it.
 inline std::string tiff_file(int width, int channels, int photometric, int extra, const std::string& values) {

@@ -380,13 +380,36 @@ TEST(TextureFileTest, BadFilesAreOneClearLine) {
     for (const double part : {0.3, 0.9}) {
       const Temporary cut("cut" + ending,
                           bytes.substr(0, static_cast<std::size_t>(part * static_cast<double>(bytes.size()))));
+      ::testing::internal::CaptureStderr();  // Libraries add no lines of their own.
       EXPECT_THAT(error_of(cut.path()), HasSubstr("cannot read " + cut.path().string() + ": ")) << part;
+      EXPECT_EQ(::testing::internal::GetCapturedStderr(), "") << ending;
     }
   }
   const Temporary silent("silent.ppm", "P6 9 9 255\nshort");  // The reader of this format gives no error message.
   EXPECT_EQ(error_of(silent.path()), "cannot read " + silent.path().string() + ": the file is cut off or damaged");
   const Temporary good("good.png", png_file(1, 1, 1, 8, {7}));
   EXPECT_THAT(error_of(good.path(), "Technicolor"), AllOf(HasSubstr("\"Technicolor\""), HasSubstr("\"srgb_texture\"")));
+}
+
+TEST(TextureFileTest, NoPartOfATiffIsMadeUp) {
+  const auto error_of = [](const std::string& bytes) {
+    const Temporary file("strips.tif", bytes);
+    return message([&] { Texture(file.path(), ColorManagement({}), "", Wrap::none); });
+  };
+  for (const bool is_deflated : {false, true}) {
+    const std::string whole = striped_tiff(is_deflated);
+    EXPECT_EQ(error_of(whole), "nothing was thrown") << is_deflated;
+    for (const double part : {0.2, 0.5, 0.99}) {
+      const auto kept = static_cast<std::size_t>(part * static_cast<double>(whole.size()));
+      EXPECT_THAT(error_of(whole.substr(0, kept)), HasSubstr("the file is cut off or damaged")) << is_deflated << part;
+    }
+    EXPECT_THAT(error_of(striped_tiff(is_deflated, 4000000000u)), HasSubstr("damaged")) << is_deflated;
+  }
+  for (std::size_t at = 400; at < striped_tiff(true).size(); at += 997) {
+    std::string changed = striped_tiff(true);
+    changed[at] = static_cast<char>(~changed[at]);  // Only the sum of zlib's stream tells.
+    EXPECT_THAT(error_of(changed), HasSubstr("damaged")) << at;
+  }
 }
 
 TEST(TextureFileTest, FilesTooLargeAreRefusedBeforeTheyAreRead) {
