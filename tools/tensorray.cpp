@@ -1,5 +1,7 @@
 /// @file tools/tensorray.cpp
 /// The program `tensorray`: selects the command.
+///   tensorray --read-mesh EXCHANGE FILE    a mesh → the file that renderer/meshes/assimp_mesh.h describes, which alone
+///                                          uses this
 
 #include <stdexcept>
 #include <string>
@@ -7,6 +9,8 @@
 #include <CLI/CLI.hpp>
 #include <fmt/format.h>
 
+#include "renderer/meshes/assimp_mesh.h"
+#include "tools/command_line/answer_parent.h"
 #include "tools/command_line/interrupts.h"
 #include "tools/command_line/run_and_report.h"
 #include "tools/command_line/tell.h"
@@ -29,6 +33,8 @@ void require_known_command(const CLI::App& app, int argc, char** argv) {
 
 int main(int argc, char** argv) {
   tensorray::open_standard_streams();
+  if (argc == 4 && std::string(argv[1]) == "--read-mesh")
+    return tensorray::answer_parent([&] { tensorray::write_assimp_mesh(argv[3], argv[2]); });
   tensorray::Progress& progress = tensorray::progress_until_interrupted();
   if (argc > 1 && std::string(argv[1]) == "import")
     return tensorray::run_and_report([&] { tensorray::become_import_program(argv + 1); });

@@ -118,6 +118,16 @@ MemoryLimit memory_limit(const fs::path& root) {
                            [](const MemoryLimit& a, const MemoryLimit& b) { return a.bytes < b.bytes; });
 }
 
+void limit_memory() {
+#ifndef TENSORRAY_SANITIZED  // Which reserve memory many times over.
+  const double most = 0.875 * memory_limit().bytes;
+  rlimit limit{};
+  if (most >= 0x1p62 || getrlimit(RLIMIT_DATA, &limit) != 0) return;
+  limit.rlim_cur = std::min(limit.rlim_cur, static_cast<rlim_t>(most));
+  setrlimit(RLIMIT_DATA, &limit);
+#endif
+}
+
 void require_stack() {
   constexpr rlim_t least = 256 << 10;  // Twice what renders and imports were seen to need.
   rlimit limit{};

@@ -22,6 +22,10 @@ struct MemoryLimit {
 /// (`ulimit -v`, `ulimit -d`) leave.
 MemoryLimit memory_limit(const std::filesystem::path& root = "/");
 
+/// Has allocations fail where this process alone would take most of memory_limit(), for programs that read files which
+/// may announce any size: the system would end this program otherwise, or others. Does nothing under sanitizers.
+void limit_memory();
+
 /// Checks that stacks are large enough: one that ends cannot be reported.
 /// @throw std::runtime_error with the fix.
 void require_stack();

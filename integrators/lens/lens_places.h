@@ -3,7 +3,7 @@
 /// How often a point of the image is in the picture of a lens.
 
 #include "integrators/lens/lens.h"
-#include "renderer/meshes/planar_mesh.h"
+#include "renderer/coverage/planar_mesh.h"
 
 namespace tensorray {
 

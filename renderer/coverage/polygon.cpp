@@ -15,7 +15,11 @@ using Eigen::Vector2d;
 using Eigen::Vector3d;
 
 constexpr std::size_t most_concave_corners = 10000;  // Time grows with their square.
-constexpr int most_failures = 64;  // Searches of all corners without an ear; else time would grow with the cube.
+
+/// How often all corners may be searched without an ear, which takes the square of their number.
+int most_searches(std::size_t corners) {
+  return static_cast<int>(std::clamp(1e9 / (static_cast<double>(corners) * static_cast<double>(corners)), 8.0, 64.0));
+}
 
 /// Twice the vector area (Newell 1972).
 Vector3d newell_normal(const std::vector<Vector3d>& corners) {
@@ -49,7 +53,8 @@ bool is_convex(const std::vector<Vector2d>& corners) {
 /// The corners that are left, as a ring.
 class CornerRing {
  public:
-  explicit CornerRing(const std::vector<Vector2d>& corners) : corners_(corners), left_(corners.size()) {
+  explicit CornerRing(const std::vector<Vector2d>& corners)
+      : corners_(corners), left_(corners.size()), known_(corners.size(), Known::nothing) {
     std::iota(left_.begin(), left_.end(), 0);
   }
 
@@ -58,6 +63,29 @@ class CornerRing {
   std::array<std::uint32_t, 3> triangle_at(std::size_t i) const {
     return {left_[(i + size() - 1) % size()], left_[i], left_[(i + 1) % size()]};
   }
+
+  /// Removes corner i. Of the others, only its neighbours become an ear by that, or are one no longer, except where the
+  /// polygon touches or crosses itself.
+  void cut(std::size_t i) {
+    left_.erase(left_.begin() + static_cast<std::ptrdiff_t>(i));
+    known_.erase(known_.begin() + static_cast<std::ptrdiff_t>(i));
+    known_[i % size()] = known_[(i + size() - 1) % size()] = Known::nothing;
+  }
+
+  /// The next ear from corner `from` on, as far as is known; nothing if there is none.
+  std::optional<std::size_t> next_ear(std::size_t from) {
+    for (std::size_t i = 0; i < size(); ++i) {
+      const std::size_t at = (from + i) % size();
+      if (known_[at] == Known::nothing) known_[at] = is_ear(at) ? Known::ear : Known::no_ear;
+      if (known_[at] == Known::ear) return at;
+    }
+    return std::nullopt;
+  }
+
+  void forget() { std::fill(known_.begin(), known_.end(), Known::nothing); }
+
+ private:
+  enum class Known : char { nothing, ear, no_ear };
 
   /// Whether the triangle at corner i has an area and no other corner in it or on its edges.
   bool is_ear(std::size_t i) const {
@@ -71,18 +99,9 @@ class CornerRing {
     });
   }
 
-  void cut(std::size_t i) { left_.erase(left_.begin() + static_cast<std::ptrdiff_t>(i)); }
-
-  /// The next ear from corner `from` on; nothing if the polygon crosses itself so that it has none.
-  std::optional<std::size_t> next_ear(std::size_t from) const {
-    for (std::size_t i = 0; i < size(); ++i)
-      if (is_ear((from + i) % size())) return (from + i) % size();
-    return std::nullopt;
-  }
-
- private:
   const std::vector<Vector2d>& corners_;
   std::vector<std::uint32_t> left_;
+  std::vector<Known> known_;  ///< Of each of the corners that are left.
 };
 
 std::vector<std::array<std::uint32_t, 3>> fan(std::size_t corners) {
@@ -103,10 +122,13 @@ std::vector<std::array<std::uint32_t, 3>> triangulate(const std::vector<Vector3d
                              " corners; divide those with more than " + std::to_string(most_concave_corners));
   std::vector<std::array<std::uint32_t, 3>> triangles;
   CornerRing ring(flat);
-  int failures = 0;
+  int searches = 0;
   for (std::size_t at = 0; ring.size() > 3;) {
-    const std::optional<std::size_t> ear = failures < most_failures ? ring.next_ear(at) : std::nullopt;
-    if (!ear) ++failures;
+    std::optional<std::size_t> ear = ring.next_ear(at);
+    if (!ear && searches++ < most_searches(corners.size())) {
+      ring.forget();
+      ear = ring.next_ear(at);
+    }
     at = ear.value_or(at % ring.size());  // Where there is no ear, any corner will do.
     triangles.push_back(ring.triangle_at(at));
     ring.cut(at);

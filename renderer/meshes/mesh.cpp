@@ -9,12 +9,9 @@
 #include <unordered_map>
 #include <utility>
 
-#include <assimp/Importer.hpp>
-#include <assimp/scene.h>
-
 #include "base/errors.h"
 #include "base/text/text.h"
-#include "renderer/coverage/polygon.h"
+#include "renderer/meshes/assimp_mesh.h"
 #include "renderer/meshes/obj.h"
 #include "renderer/meshes/ply.h"
 #include "renderer/meshes/smooth_normals.h"
@@ -63,104 +60,6 @@ MeshWithNormals without_repeats(const MeshWithNormals& given) {
   return result;
 }
 
-void check_face(const aiMesh& part, const aiFace& face) {
-  if (face.mNumIndices == 0) throw std::runtime_error("a face has no vertices");
-  if (*std::max_element(face.mIndices, face.mIndices + face.mNumIndices) >= part.mNumVertices)
-    throw std::runtime_error("a face names a vertex that is not there");
-}
-
-void add_face(const TriangleMesh& mesh, const aiFace& face, std::uint32_t offset, bool mirrored,
-              std::vector<Triangle>& triangles) {
-  std::vector<Eigen::Vector3d> corners;
-  for (unsigned i = 0; i < face.mNumIndices; ++i) corners.push_back(mesh.vertices[offset + face.mIndices[i]]);
-  for (Triangle t : triangulate(corners)) {
-    if (mirrored) std::swap(t[1], t[2]);
-    triangles.push_back({offset + face.mIndices[t[0]], offset + face.mIndices[t[1]], offset + face.mIndices[t[2]]});
-  }
-}
-
-Eigen::Affine3d affine_of(const aiMatrix4x4& matrix) {
-  Eigen::Affine3d result;
-  for (int row = 0; row < 4; ++row)
-    for (int column = 0; column < 4; ++column) result.matrix()(row, column) = double(matrix[row][column]);
-  return result;
-}
-
-void add_mesh(const aiMesh& part, const Eigen::Affine3d& to_world, MeshWithNormals& result) {
-  TriangleMesh& mesh = result.mesh;
-  const auto offset = static_cast<std::uint32_t>(mesh.vertices.size());
-  const Eigen::Matrix3d& linear = to_world.linear();
-  const bool mirrored = linear.determinant() < 0;
-  // Normals follow the cofactors, which exist where the inverse does not: parts are hidden by a scale of 0.
-  Eigen::Matrix3d turn;
-  turn << linear.col(1).cross(linear.col(2)), linear.col(2).cross(linear.col(0)), linear.col(0).cross(linear.col(1));
-  if (mirrored) turn = -turn;
-  for (unsigned i = 0; i < part.mNumVertices; ++i) {
-    const aiVector3D& v = part.mVertices[i];
-    mesh.vertices.push_back(to_world * Eigen::Vector3d(v.x, v.y, v.z));
-    Eigen::Vector3d normal = Eigen::Vector3d::Zero();
-    if (part.HasNormals()) normal = Eigen::Vector3d(part.mNormals[i].x, part.mNormals[i].y, part.mNormals[i].z);
-    result.normals.push_back((turn * normal).stableNormalized().cast<float>());
-  }
-  for (unsigned i = 0; i < part.mNumFaces; ++i) {
-    check_face(part, part.mFaces[i]);
-    if (part.mFaces[i].mNumIndices < 3) continue;  // Points and lines have no surface.
-    add_face(mesh, part.mFaces[i], offset, mirrored, mesh.triangles);
-  }
-}
-
-void add_node(const aiScene& scene, const aiNode& node, const Eigen::Affine3d& to_world, MeshWithNormals& mesh) {
-  const Eigen::Affine3d here = to_world * affine_of(node.mTransformation);
-  for (unsigned i = 0; i < node.mNumMeshes; ++i) {
-    if (node.mMeshes[i] >= scene.mNumMeshes) throw std::runtime_error("a node names a mesh that is not there");
-    add_mesh(*scene.mMeshes[node.mMeshes[i]], here, mesh);
-  }
-  for (unsigned i = 0; i < node.mNumChildren; ++i) add_node(scene, *node.mChildren[i], here, mesh);
-}
-
-int metadata(const aiScene& scene, const char* key, int otherwise) {
-  std::int32_t value = otherwise;
-  if (scene.mMetaData) scene.mMetaData->Get(key, value);
-  return value;
-}
-
-/// FBX says which of its axes are right, up and front, and its unit in centimetres. assimp 5.2 passes on both.
-Eigen::Affine3d fbx_to_world(const aiScene& scene) {
-  const auto axis = [&](const char* key, int otherwise) {
-    const int number = metadata(scene, key, otherwise);
-    if (number < 0 || number > 2) throw std::runtime_error("its axes are not right, up and front");
-    return Eigen::Vector3d(metadata(scene, (std::string(key) + "Sign").c_str(), 1) * Eigen::Vector3d::Unit(number));
-  };
-  Eigen::Matrix3d turn;                            // Rows: where x, y and z come from.
-  turn.row(0) = axis("CoordAxis", 0).transpose();  // Not by <<, which must not be left by an exception.
-  turn.row(1) = -axis("FrontAxis", 2).transpose();
-  turn.row(2) = axis("UpAxis", 1).transpose();
-  if (std::abs(turn.determinant()) != 1) throw std::runtime_error("its axes are not right, up and front");
-  float unit = 1;
-  if (scene.mMetaData) scene.mMetaData->Get("UnitScaleFactor", unit);
-  return Eigen::Affine3d(0.01 * double(unit) * turn);
-}
-
-/// From assimp's coordinates to metres with +z up, for the formats that say what theirs are. assimp has already brought
-/// COLLADA's to metres with +y up, which are those of glTF.
-Eigen::Affine3d to_world(const aiScene& scene, const std::string& ending) {
-  if (ending == ".fbx") return fbx_to_world(scene);
-  if (ending != ".dae" && ending != ".gltf" && ending != ".glb") return Eigen::Affine3d::Identity();
-  Eigen::Matrix3d turn;
-  turn << 1, 0, 0, 0, 0, -1, 0, 1, 0;
-  return Eigen::Affine3d(turn);
-}
-
-/// Uses none of assimp's processing steps, since they abort the program on unexpected input.
-MeshWithNormals import(const std::filesystem::path& path, const std::string& ending) {
-  Assimp::Importer importer;
-  const aiScene* scene = importer.ReadFile(path.string(), 0);
-  if (!scene) throw std::runtime_error(one_line(importer.GetErrorString()));
-  MeshWithNormals mesh;
-  if (scene->mRootNode) add_node(*scene, *scene->mRootNode, to_world(*scene, ending), mesh);
-  return mesh;
-}
-
 MeshWithNormals read_any(const std::filesystem::path& path) {
   const std::string ending = lower_case_ending(path);
   if (ending == ".ply") return read_ply(path);
@@ -169,7 +68,7 @@ MeshWithNormals read_any(const std::filesystem::path& path) {
   if (std::find(others.begin(), others.end(), ending) == others.end())
     throw std::runtime_error("a mesh is a .ply, .obj, " + joined(others) +
                              " file; convert other formats to one of these, for example with Blender");
-  MeshWithNormals mesh = import(path, ending);
+  MeshWithNormals mesh = read_assimp_mesh(path);
   if (ending == ".stl") mesh.normals.clear();  // They are those of the triangles.
   return mesh;
 }

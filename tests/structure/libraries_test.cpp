@@ -42,7 +42,7 @@ TEST(Structure, HeavyLibrariesStayOutOfHeadersAndInTheirFolder) {
       {"OpenColorIO", {"renderer/color/color.cpp"}},
       {"OpenEXR", {"renderer/images/exr_encoder.cpp", "renderer/images/luminance_chroma.cpp"}},
       {"png", {"renderer/images/png_encoder.cpp"}},
-      {"assimp", {"renderer/meshes/mesh.cpp"}},
+      {"assimp", {"renderer/meshes/assimp_mesh.cpp"}},
       {"boost",
        {"tools/viewer/server/http_connection.cpp", "tools/viewer/server/page_socket.cpp",
         "tools/viewer/server/server_state.h"}}};

@@ -265,6 +265,20 @@ TEST(ReadMeshTest, PolygonsThatCrossThemselvesAreDivided) {
   EXPECT_NEAR(static_cast<double>(read_mesh(file.path()).triangles.size()), count - 2, 10);
 }
 
+/// Most of its corners are no ear, and each ear that is cut makes only its neighbours one.
+TEST(ReadMeshTest, PolygonsWithManyConcaveCornersAreDivided) {
+  Polygon crescent;
+  constexpr int count = 4999;
+  const auto add = [&](double radius, double centre, double angle) {
+    crescent.corners.emplace_back(centre + radius * std::cos(angle), radius * std::sin(angle), 0);
+  };
+  for (int i = 0; i <= count; ++i) add(1, 0, -pi / 2 + pi * i / count);
+  for (int i = count - 1; i > 0; --i) add(1.25, -0.75, std::asin(1 / 1.25) * (2.0 * i / count - 1));
+  const Temporary file("crescent.obj", obj_of(crescent));
+  const double segment = 1.25 * 1.25 * (std::asin(0.8) - 0.5 * std::sin(2 * std::asin(0.8)));
+  EXPECT_NEAR(surface_area(read_mesh(file.path())), pi / 2 - segment, 1e-4);
+}
+
 TEST(ReadMeshTest, CornersInALineKeepNeighboursJoined) {
   // A tetrahedron of which one face is a quadrilateral: it has a corner in the middle of an edge, where the triangles
   // of the other face at this edge meet.

@@ -4,15 +4,13 @@
 ///   tensorray-import --read-vtp EXCHANGE FILE NAME...    VTK polydata, with the named arrays → a file of poly_data.h
 /// Only volumes/points/vtk_files.h uses the last one. Its errors are one line, without the program's name.
 
-#include <csignal>
-#include <cstdio>
-#include <exception>
 #include <set>
+#include <stdexcept>
 #include <string>
 
 #include <CLI/CLI.hpp>
 
-#include "base/process/child_program.h"
+#include "tools/command_line/answer_parent.h"
 #include "tools/command_line/interrupts.h"
 #include "tools/command_line/run_and_report.h"
 #include "tools/command_line/tell.h"
@@ -21,21 +19,13 @@
 
 namespace {
 
-int convert(int argc, char** argv) {
-  tensorray::end_with_parent();
-  std::signal(SIGXFSZ, SIG_IGN);
-  try {
+int read_vtp(int argc, char** argv) {
+  return tensorray::answer_parent([&] {
     if (argc < 4) throw std::runtime_error("--read-vtp is for tensorray alone");
     const std::set<std::string> wanted(argv + 4, argv + argc);
     const tensorray::PolyData data = tensorray::read_vtp_file(argv[3], wanted);
     tensorray::write_poly_data(argv[2], view_of(data));
-    return 0;
-  } catch (const std::bad_alloc&) {
-    tensorray::print_error("it does not fit in memory\n");
-  } catch (const std::exception& error) {
-    tensorray::print_error(std::string(error.what()) + "\n");
-  }
-  return 1;
+  });
 }
 
 }  // namespace
@@ -43,7 +33,7 @@ int convert(int argc, char** argv) {
 int main(int argc, char** argv) {
   tensorray::open_standard_streams();
   const std::string first = argc > 1 ? argv[1] : "";
-  if (first == "--read-vtp") return convert(argc, argv);
+  if (first == "--read-vtp") return read_vtp(argc, argv);
   tensorray::Progress& progress = tensorray::progress_until_interrupted();
   CLI::App app("Make a tensor field of another program's file", "tensorray import");
   tensorray::add_import_options(app, progress);

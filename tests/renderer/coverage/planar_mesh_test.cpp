@@ -1,4 +1,4 @@
-#include "renderer/meshes/planar_mesh.h"
+#include "renderer/coverage/planar_mesh.h"
 
 #include <algorithm>
 #include <cmath>

@@ -1,5 +1,5 @@
 #pragma once
-/// @file renderer/meshes/planar_mesh.h
+/// @file renderer/coverage/planar_mesh.h
 /// Finds the triangles that cover a point, in a planar mesh that may fold over itself.
 
 #include <array>
