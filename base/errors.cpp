@@ -17,6 +17,11 @@ void fail(const std::filesystem::path& path, const std::string& what) {
   throw std::runtime_error(path.string() + ": " + what);
 }
 
+void require_no_device(const std::filesystem::path& path) {
+  std::error_code none;
+  if (std::filesystem::is_other(path, none)) fail(path, "is a pipe or a device, where a file is expected; remove it");
+}
+
 void require_readable(const std::filesystem::path& path) {
   const auto fail = [&path](const std::string& reason) {
     throw std::runtime_error("cannot read " + path.string() + ": " + reason);

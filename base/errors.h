@@ -19,4 +19,8 @@ void require(bool condition, const std::string& message);
 /// @throw std::runtime_error naming the file and the reason: missing, a folder, not permitted, empty.
 void require_readable(const std::filesystem::path& path);
 
+/// Checks a path that a file names, or that is in a folder with files: to open a pipe or a device waits, or never ends.
+/// @throw std::runtime_error naming the path if it is there, and is neither a file nor a folder.
+void require_no_device(const std::filesystem::path& path);
+
 }  // namespace tensorray

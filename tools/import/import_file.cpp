@@ -2,10 +2,12 @@
 
 #include <algorithm>
 #include <limits>
+#include <new>
 #include <stdexcept>
 #include <utility>
 #include <variant>
 
+#include <fmt/format.h>
 #include <vtkCellData.h>
 #include <vtkDataArray.h>
 #include <vtkDataObject.h>
@@ -15,6 +17,7 @@
 #include <vtkPointData.h>
 #include <vtkSmartPointer.h>
 
+#include "base/errors.h"
 #include "base/text/text.h"
 #include "tools/import/cases/plot3d.h"
 #include "tools/import/lattice_files/lattice_files.h"
@@ -154,9 +157,15 @@ ArrayChoice chosen_array(vtkDataSet& data, const ImportSettings& settings, bool 
   return array;
 }
 
+/// Of a mesh without any, nothing else is looked at: a small file may announce one that takes hours.
+bool has_no_arrays(vtkDataSet& data) {
+  return data.GetPointData()->GetNumberOfArrays() == 0 && data.GetCellData()->GetNumberOfArrays() == 0;
+}
+
 /// Keeps the voxels of a VTK image, unless the user asks for other voxels.
 TensorGrid import_data_set(vtkSmartPointer<vtkDataSet> data, ImportSettings settings, const Progress& progress,
                            ImportReport& report) {
+  if (has_no_arrays(*data)) choose_array(*data, settings.array, settings.take, settings.cell_values);  // Throws.
   if (!vtkImageData::SafeDownCast(data) || wants_sampling(settings))
     data = slab_of_flat(std::move(data), settings, report);
   else if (settings.thickness)
@@ -223,6 +232,22 @@ std::string about(const std::filesystem::path& file, const std::string& error) {
   return message.find(file.string()) == std::string::npos ? file.string() + ": " + message : message;
 }
 
+/// Checks that positions of voxels are numbers that differ, and that OpenVDB takes them.
+void require_place(const std::filesystem::path& file, const TensorGrid& grid) {
+  const Eigen::Vector3d edges = grid.to_world.linear().colwise().norm();
+  const Eigen::AlignedBox3i box = grid.active_box();
+  double farthest = 0;
+  for (const Eigen::Vector3i& corner : {box.min(), box.max()})
+    farthest = std::max(farthest, (grid.to_world * corner.cast<double>()).cwiseAbs().maxCoeff());
+  if (!(edges.minCoeff() >= 1e-30 && edges.maxCoeff() <= 1e30))
+    fail(file, "has voxels with an edge of " +
+                   fmt::format("({:.6g}, {:.6g}, {:.6g})", edges.x(), edges.y(), edges.z()) +
+                   ", and not between 1e-30 and 1e30; change its unit");
+  if (!(farthest <= 1e13 * edges.minCoeff()))
+    fail(file, fmt::format("its voxels are {:.6g} from the origin, where edges of {:.6g} vanish; move the origin",
+                           farthest, edges.minCoeff()));
+}
+
 std::string tensor_name(const std::string& array, Take take) {
   const std::string base = array.empty() ? "tensor" : array;
   if (take == Take::tensor) return base;
@@ -249,12 +274,16 @@ TensorGrid import_tensors(const ImportSettings& settings, const Progress& progre
     throw;
   } catch (const std::invalid_argument& error) {
     throw std::invalid_argument(about(file, error.what()));
-  } catch (const std::runtime_error& error) {
+  } catch (const std::bad_alloc&) {
+    throw std::runtime_error(about(
+        file, "does not fit in memory: it may be damaged, or has many cells; else give --memory, or fewer voxels"));
+  } catch (const std::exception& error) {
     throw std::runtime_error(about(file, error.what()));
   }
   if (grid.blocks.empty() && settings.sampling.bounds)
     throw std::invalid_argument(file.string() + ": --bounds: no voxel is inside that has a tensor");
   if (grid.blocks.empty()) throw std::runtime_error(file.string() + ": all voxels are background or not finite");
+  require_place(file, grid);
   grid.name = tensor_name(grid.name, settings.take);
   grid.metadata["tensorray:source"] = file.filename().string();
   return grid;

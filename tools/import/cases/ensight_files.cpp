@@ -5,6 +5,7 @@
 #include <cmath>
 #include <cstdlib>
 #include <fstream>
+#include <limits>
 #include <map>
 #include <set>
 #include <sstream>
@@ -156,8 +157,9 @@ std::set<std::uint64_t> sizes_in(vtkDataObject& read) {
   for (unsigned int i = 0; blocks && i < blocks->GetNumberOfBlocks(); ++i) {
     auto* const part = vtkDataSet::SafeDownCast(blocks->GetBlock(i));
     if (!part) continue;
-    std::map<int, std::uint64_t> of_type;
-    for (vtkIdType id = 0; id < part->GetNumberOfCells(); ++id) ++of_type[part->GetCellType(id)];
+    std::map<int, std::uint64_t> of_type;  // Blocks of other kinds have cells of one type.
+    if (part->IsA("vtkUnstructuredGrid"))
+      for (vtkIdType id = 0; id < part->GetNumberOfCells(); ++id) ++of_type[part->GetCellType(id)];
     for (const auto& [type, count] : of_type) sizes.insert(count);
     sizes.insert(static_cast<std::uint64_t>(part->GetNumberOfPoints()));
     sizes.insert(static_cast<std::uint64_t>(part->GetNumberOfCells()));
@@ -170,6 +172,42 @@ bool begins_with(const fs::path& path, const std::string& text) {
   std::string head(240, '\0');
   std::ifstream(path, std::ios::binary).read(head.data(), static_cast<std::streamsize>(head.size()));
   return head.find(text) != std::string::npos;
+}
+
+/// VTK also opens files of kinds that are not imported: of measured points, and of complex numbers.
+void require_no_devices(const Entry& entry, const fs::path& folder) {
+  std::istringstream words(entry.value);
+  for (std::string word; words >> word;) {
+    const fs::path named = folder / word;
+    const std::string name = named.filename().string(), start = name.substr(0, name.find('*'));
+    if (start == name) require_no_device(named);
+    std::error_code none;
+    fs::directory_iterator file(start == name ? fs::path() : fs::absolute(named).parent_path(), none);
+    for (; file != fs::directory_iterator(); ++file)
+      if (starts_with(file->path().filename().string(), start)) require_no_device(file->path());
+  }
+}
+
+/// The readers of text take memory for as many points and cells as a part announces. @throw std::runtime_error naming
+/// the file, if a line after the name of a type announces more than there are bytes.
+void check_counts(const fs::path& path) {
+  static const std::set<std::string> types{"coordinates", "point",   "bar2",   "bar3",    "tria3",    "tria6",
+                                           "quad4",       "quad8",   "tetra4", "tetra10", "pyramid5", "pyramid13",
+                                           "penta6",      "penta15", "hexa8",  "hexa20",  "nsided",   "nfaced"};
+  const auto most = static_cast<double>(fs::file_size(path));
+  std::ifstream file(path, std::ios::binary);
+  std::string line(81, '\0');  // Longer lines are of binary files, or of numbers.
+  for (std::string before; file.getline(line.data(), static_cast<std::streamsize>(line.size())) || !file.eof();) {
+    if (file.bad()) return;
+    const bool is_long = file.fail();
+    file.clear();
+    if (is_long) file.ignore(std::numeric_limits<std::streamsize>::max(), '\n');
+    const std::string text = is_long ? "" : trimmed(line.c_str());
+    if (types.count(before) > 0 && std::strtod(text.c_str(), nullptr) > most)
+      fail(path, "is damaged or cut off: it announces \"" + before + " " + escaped(text) +
+                     "\", which it cannot hold; copy or write it again");
+    before = starts_with(text, "g_") ? text.substr(2) : text;
+  }
 }
 
 /// In a case with file sets VTK seeks the steps in all files, and goes on for ever in one without.
@@ -187,17 +225,23 @@ void check_file_sets(const std::vector<Entry>& entries, const EnSightCase& given
 
 EnSightCase ensight_case(const fs::path& path, std::optional<double> time) {
   const std::vector<Entry> entries = entries_of(path);
+  constexpr double most_steps = 1e6;
+  for (const Entry& entry : entries)
+    if (entry.name == "number of steps" && !(std::strtod(entry.value.c_str(), nullptr) <= most_steps))
+      fail(path, "has more than a million steps of time; it may be damaged: copy or write it again");
   const std::map<int, TimeSet> sets = time_sets(entries);
   EnSightCase result;
   for (const Entry& entry : entries) {
     if (entry.section == "FORMAT" && entry.name == "type")
       result.is_gold = lower_case(entry.value).find("gold") != std::string::npos;
+    if (entry.section == "GEOMETRY" || entry.section == "VARIABLE") require_no_devices(entry, path.parent_path());
     const bool is_model = entry.section == "GEOMETRY" && entry.name == "model";
     if (!is_model && (entry.section != "VARIABLE" || components_of(entry.name) == 0)) continue;
     const fs::path name = file_of(entry, sets, time), file = path.parent_path() / name;
     if (name.empty()) continue;
     if (!fs::is_regular_file(file))
       fail(file, "is missing, which " + path.filename().string() + " names; copy it there too");
+    if (is_model) check_counts(file);
     result.files.push_back({entry.name, file});
   }
   check_file_sets(entries, result);

@@ -1,9 +1,11 @@
 #include "tools/import/cases/openfoam_fields.h"
 
+#include <algorithm>
 #include <array>
+#include <cctype>
 #include <map>
-#include <regex>
 #include <string>
+#include <vector>
 
 #include <vtkDataArray.h>
 #include <vtkDataObject.h>
@@ -44,6 +46,21 @@ std::string head_of(const Path& path) {
   return without_comments(text);
 }
 
+/// The words, perhaps in quotation marks, that follow a key and blanks.
+std::vector<std::string> words_after(const std::string& text, const std::string& key) {
+  const auto is_of_word = [](char c) { return std::isalnum(static_cast<unsigned char>(c)) || c == '_'; };
+  std::vector<std::string> words;
+  for (std::size_t at = text.find(key); at != std::string::npos; at = text.find(key, at + 1)) {
+    const std::size_t end_of_key = at + key.size();
+    std::size_t begin = text.find_first_not_of(" \t\r\n\v\f", end_of_key);
+    if ((at > 0 && is_of_word(text[at - 1])) || begin == std::string::npos || begin == end_of_key) continue;
+    if (text[begin] == '"') ++begin;
+    const std::size_t end = std::min(text.find_first_of(" \t\r\n\v\f;\"", begin), text.size());
+    if (end > begin) words.push_back(text.substr(begin, end - begin));
+  }
+  return words;
+}
+
 /// What a file says of the values inside: one for all cells, or a list. Neither if they are elsewhere (a macro, or
 /// another file that it includes).
 enum class Values { uniform, list, elsewhere };
@@ -52,11 +69,11 @@ Values values_in(const std::string& head) {
   // Fields with patches have internalField, those without have value.
   const bool has_patches =
       head.find("internalField") != std::string::npos || head.find("boundaryField") != std::string::npos;
-  const std::regex entry(has_patches ? R"(\binternalField\s+(uniform|nonuniform)\b)"
-                                     : R"(\bvalue\s+(uniform|nonuniform)\b)");
-  std::smatch match;
-  if (!std::regex_search(head, match, entry)) return Values::elsewhere;
-  return match[1] == "uniform" ? Values::uniform : Values::list;
+  for (const std::string& word : words_after(head, has_patches ? "internalField" : "value")) {
+    if (word == "uniform") return Values::uniform;
+    if (word == "nonuniform") return Values::list;
+  }
+  return Values::elsewhere;
 }
 
 /// The fields in a folder, by the names of their objects, which are those of VTK's arrays.
@@ -65,9 +82,8 @@ std::map<std::string, Values> fields_in(const Path& time) {
   for (const auto& entry : std::filesystem::directory_iterator(time)) {
     if (!entry.is_regular_file()) continue;
     const std::string head = head_of(entry.path());
-    std::smatch name;
-    if (std::regex_search(head, name, std::regex(R"(\bobject\s+"?([^\s;"]+))")))
-      fields[name[1].str()] = values_in(head);
+    const std::vector<std::string> names = words_after(head, "object");
+    if (!names.empty()) fields[names.front()] = values_in(head);
   }
   return fields;
 }

@@ -71,7 +71,13 @@ void find_processors(OpenFoamParts& parts) {
   for (const auto& [number, folder] : found) parts.processors.push_back(folder);
 }
 
+/// VTK opens what it finds in the folders of meshes and times.
+void require_no_devices(const fs::path& folder) {
+  for (const fs::directory_entry& entry : fs::recursive_directory_iterator(folder)) require_no_device(entry.path());
+}
+
 void check_mesh(const fs::path& mesh) {
+  require_no_devices(mesh);
   for (const char* name : {"points", "faces", "owner", "neighbour"})
     if (!fs::is_regular_file(mesh / name) && !fs::is_regular_file((mesh / name).string() + ".gz"))
       fail(mesh / name, "is missing; run blockMesh again");
@@ -80,8 +86,10 @@ void check_mesh(const fs::path& mesh) {
 std::vector<OpenFoamTime> times_in(const fs::path& folder) {
   std::vector<OpenFoamTime> times;
   for (const fs::path& time : folders_in(folder))
-    if (const std::optional<double> value = time_value(time.filename().string()))
+    if (const std::optional<double> value = time_value(time.filename().string())) {
+      require_no_devices(time);
       times.push_back({time.filename().string(), *value});
+    }
   std::sort(times.begin(), times.end(), [](const auto& a, const auto& b) { return a.value < b.value; });
   return times;
 }

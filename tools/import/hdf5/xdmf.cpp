@@ -282,7 +282,7 @@ void add_attributes(const Grid& grid, vtkDataSet& mesh) {
     const vtkIdType count = centre == "cell" ? mesh.GetNumberOfCells() : mesh.GetNumberOfPoints();
     const vtkSmartPointer<vtkDataArray> values = grid.values_in(*attribute, 1).front().numbers;
     const vtkIdType numbers = values->GetNumberOfValues();
-    if (count == 0 || numbers % count != 0 || numbers / count > 64)
+    if (count == 0 || numbers == 0 || numbers % count != 0 || numbers / count > 64)
       grid.fail("has an attribute '" + escaped(name) + "' of " + std::to_string(numbers) + " numbers for " +
                 std::to_string(count) + (centre == "cell" ? " cells" : " points") + ": cut off, or of another mesh");
     values->SetName(name.c_str());

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cstdlib>
+#include <unordered_set>
 #include <utility>
 
 #include <vtkXMLUtilities.h>
@@ -45,6 +46,14 @@ std::vector<PathStep> steps_of(const std::string& xpath) {
     steps.push_back(step);
   }
   return steps;
+}
+
+constexpr std::size_t most_elements = 1u << 20;  // That a path or a collection may name.
+
+constexpr int deepest = 16;  // Where each includes two others, there are 65,536 then.
+
+void require_few(const std::filesystem::path& path, std::size_t elements) {
+  if (elements > most_elements) fail(path, "its paths or grids name more than a million of others; write it again");
 }
 
 void add_below(Element& element, Elements& all) {
@@ -93,7 +102,7 @@ XdmfDocument::XdmfDocument(const std::filesystem::path& path)
   for (Element* const domain : children(*root_, {"Domain"}))
     for (Element* const grid : children(*domain, {"Grid"})) {
       std::vector<std::vector<Element*>> steps;
-      add_steps(*grid, steps);
+      add_steps(*grid, steps, 0);
       if (steps.size() > 1 && steps_.size() > 1 && steps.size() != steps_.size())
         fail(path, "has grids with " + std::to_string(steps_.size()) + " and with " + std::to_string(steps.size()) +
                        " steps of time; write each to a file of its own");
@@ -133,6 +142,8 @@ std::vector<Element*> XdmfDocument::find(const std::string& xpath, Element& from
   bool at_root = is_absolute;  // The root itself is a child of the document.
   for (const PathStep& step : steps_of(xpath)) {
     Elements next;
+    std::unordered_set<Element*> known;
+    std::size_t looked_at = 0;
     for (Element* const element : here) {
       Elements candidates;
       if (at_root) candidates.push_back(element);
@@ -144,7 +155,9 @@ std::vector<Element*> XdmfDocument::find(const std::string& xpath, Element& from
       for (Element* const candidate : candidates)
         if (step.name == "*" || step.name == name_of(*candidate)) named.push_back(candidate);
       for (const std::string& condition : step.conditions) named = filtered(named, condition);
-      next.insert(next.end(), named.begin(), named.end());
+      for (Element* const one : named)
+        if (known.insert(one).second) next.push_back(one);
+      require_few(path_, looked_at += candidates.size());
     }
     here = next;
     at_root = false;
@@ -153,7 +166,8 @@ std::vector<Element*> XdmfDocument::find(const std::string& xpath, Element& from
 }
 
 /// A collection in time has one step for each of its grids; all others have one step.
-void XdmfDocument::add_steps(Element& grid, std::vector<std::vector<Element*>>& steps) const {
+void XdmfDocument::add_steps(Element& grid, std::vector<std::vector<Element*>>& steps, int depth) const {
+  if (depth > deepest) fail(path_, "its grids are in others more than sixteen deep; write it again");
   const std::string type = lower_case(xml_attribute(grid, {"GridType"})),
                     collection = lower_case(xml_attribute(grid, {"CollectionType"}));
   if (type != "collection" && type != "tree") {
@@ -162,7 +176,7 @@ void XdmfDocument::add_steps(Element& grid, std::vector<std::vector<Element*>>& 
   }
   for (Element* const inner : children(grid, {"Grid"})) {
     std::vector<std::vector<Element*>> of_inner;
-    add_steps(*inner, of_inner);
+    add_steps(*inner, of_inner, depth + 1);
     if (of_inner.empty()) continue;
     if (type == "collection" && collection == "temporal") {
       steps.push_back(of_inner.front());
@@ -173,6 +187,9 @@ void XdmfDocument::add_steps(Element& grid, std::vector<std::vector<Element*>>& 
         steps[i].insert(steps[i].end(), more.begin(), more.end());
       }
     }
+    std::size_t grids = 0;
+    for (const std::vector<Element*>& step : steps) grids += step.size();
+    require_few(path_, grids);
   }
 }
 

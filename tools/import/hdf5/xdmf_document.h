@@ -33,7 +33,7 @@ class XdmfDocument {
   std::vector<vtkXMLDataElement*> find(const std::string& xpath, vtkXMLDataElement& from) const;
 
  private:
-  void add_steps(vtkXMLDataElement& grid, std::vector<std::vector<vtkXMLDataElement*>>& steps) const;
+  void add_steps(vtkXMLDataElement& grid, std::vector<std::vector<vtkXMLDataElement*>>& steps, int depth) const;
 
   std::filesystem::path path_;
   vtkSmartPointer<vtkXMLDataElement> root_;

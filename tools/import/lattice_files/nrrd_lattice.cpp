@@ -22,6 +22,7 @@
 #include <teem/nrrd.h>
 
 #include "base/errors.h"
+#include "base/text/text.h"
 #include "tools/import/lattice_files/lattice_files.h"
 
 namespace tensorray {
@@ -85,6 +86,8 @@ std::string check_header(const std::filesystem::path& path) {
       data_file.compare(0, 8, "SKIPLIST") == 0)
     fail(path, "its numbers are in several files: join them (unu save -f nrrd -i " + path.filename().string() + ")");
   if (data_file == "-") fail(path, "its data file is standard input");
+  if (!data_file.empty() && !std::filesystem::is_regular_file(path.parent_path() / data_file, none))
+    fail(path, "its data file " + escaped(data_file) + " is missing, or no file; copy it there too");
   return data_file;
 }
 
@@ -114,7 +117,7 @@ void check_sizes(const std::filesystem::path& path, const Nrrd& nrrd, const std:
   const std::filesystem::path data = data_file.empty() ? path : path.parent_path() / data_file;
   std::error_code none;
   const std::uintmax_t bytes = std::filesystem::file_size(data, none);
-  if (none || !std::filesystem::is_regular_file(data, none)) fail(path, "its data file " + data_file + " is missing");
+  if (none) fail(path, "its data cannot be read: " + none.message());
   double needed = static_cast<double>(nrrdElementSize(&nrrd));
   for (unsigned int axis = 0; axis < nrrd.dim; ++axis) {
     needed *= static_cast<double>(nrrd.axis[axis].size);

@@ -9,12 +9,11 @@
 #include <utility>
 
 #include <CLI/Error.hpp>
-#ifdef __linux__
-#include <sys/prctl.h>
-#endif
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include "base/process/child_program.h"
+#include "base/process/process_limits.h"
 #include "tools/command_line/run_and_report.h"
 
 namespace tensorray {
@@ -27,14 +26,14 @@ sigset_t interrupts() {
   return signals;
 }
 
-/// Makes the child end at once on SIGINT and SIGTERM, because the parent removes the files that it leaves; and makes
-/// it end when its parent ends. @param mask  The signals that the parent had blocked before it forked.
+/// Makes the child end at once on SIGINT and SIGTERM, because the parent removes the files that it leaves; makes it end
+/// when its parent ends, and fail where it would take all memory. @param mask  The signals that the parent had blocked
+/// before it forked.
 void be_mortal(const sigset_t& mask) {
   for (const int signal : {SIGINT, SIGTERM}) std::signal(signal, SIG_DFL);
   pthread_sigmask(SIG_SETMASK, &mask, nullptr);
-#ifdef __linux__
-  prctl(PR_SET_PDEATHSIG, SIGTERM);
-#endif
+  end_with_parent();
+  limit_memory();
 }
 
 int wait_for(pid_t child, const Progress& progress) {

@@ -339,6 +339,9 @@ void add_import_options(CLI::App& program, Progress& progress) {
                   "Limit of memory, as 8G or 500M; of .npy and NIfTI the rest is kept on the disk of the "
                   "output, and files of other kinds must be smaller")
       ->transform(CLI::AsSizeValue(false))
+      ->check([](const std::string& bytes) {  // A negative one has become a large one.
+        return bytes.size() > 18 ? "it must be a size, as 8G" : "";
+      })
       ->option_text("SIZE");
   program.add_option("--name", options->name, "Name of the field (default: the array's)");
   program.add_option("--units", options->units, "Units of the tensor, noted in the file");

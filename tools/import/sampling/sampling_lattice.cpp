@@ -51,9 +51,16 @@ Vector3d voxels_along(const Vector3d& edges, double voxel) {
   return (edges.array() / voxel + rounding).floor() + 1;
 }
 
+/// Whether a lattice whose size the user did not set is small: of long thin ones, blocks have more voxels than it has.
+bool is_small(const Vector3d& voxels) {
+  constexpr double block = 8;
+  const double stored = (block * (voxels / block).array().ceil()).prod();
+  return voxels.prod() <= most_chosen_voxels && stored <= 8 * most_chosen_voxels;
+}
+
 double chosen_voxel(vtkDataSet& mesh, const Solid& solid, const AlignedBox3d& box) {
   double voxel = std::min(typical_edge(mesh, solid, box), box.sizes().maxCoeff());
-  while (voxels_along(box.sizes(), voxel).prod() > most_chosen_voxels) voxel *= 1.01;
+  while (!is_small(voxels_along(box.sizes(), voxel))) voxel *= 1.01;
   return voxel;
 }
 

@@ -17,8 +17,11 @@
 #include <vtkDataSet.h>
 #include <vtkDataSetAttributes.h>
 #include <vtkIdList.h>
+#include <vtkImageData.h>
+#include <vtkMatrix3x3.h>
 #include <vtkNew.h>
 #include <vtkPointData.h>
+#include <vtkRectilinearGrid.h>
 #include <vtkSmartPointer.h>
 #include <vtkUnsignedCharArray.h>
 #include <vtkUnstructuredGrid.h>
@@ -223,6 +226,26 @@ std::set<std::string> point_arrays(vtkDataSet& piece) {
   return names;
 }
 
+bool is_same_image(vtkImageData& a, vtkImageData& b) {
+  const auto is_equal = [](const auto* one, const auto* other, int count) {
+    return std::equal(one, one + count, other);
+  };
+  return is_equal(a.GetExtent(), b.GetExtent(), 6) && is_equal(a.GetOrigin(), b.GetOrigin(), 3) &&
+         is_equal(a.GetSpacing(), b.GetSpacing(), 3) &&
+         is_equal(a.GetDirectionMatrix()->GetData(), b.GetDirectionMatrix()->GetData(), 9);
+}
+
+bool is_same_grid(vtkRectilinearGrid& a, vtkRectilinearGrid& b) {
+  const auto is_equal = [](vtkDataArray* one, vtkDataArray* other) {
+    if (!one || !other || one->GetNumberOfTuples() != other->GetNumberOfTuples()) return one == other;
+    for (vtkIdType i = 0; i < one->GetNumberOfTuples(); ++i)
+      if (one->GetComponent(i, 0) != other->GetComponent(i, 0)) return false;
+    return true;
+  };
+  return is_equal(a.GetXCoordinates(), b.GetXCoordinates()) && is_equal(a.GetYCoordinates(), b.GetYCoordinates()) &&
+         is_equal(a.GetZCoordinates(), b.GetZCoordinates());
+}
+
 }  // namespace
 
 DataSets data_sets_in(vtkDataObject* data) {
@@ -233,6 +256,10 @@ DataSets data_sets_in(vtkDataObject* data) {
 
 bool is_same_mesh(vtkDataSet& a, vtkDataSet& b) {
   if (a.GetNumberOfPoints() != b.GetNumberOfPoints() || a.GetNumberOfCells() != b.GetNumberOfCells()) return false;
+  if (vtkImageData::SafeDownCast(&a) && vtkImageData::SafeDownCast(&b))
+    return is_same_image(*vtkImageData::SafeDownCast(&a), *vtkImageData::SafeDownCast(&b));
+  if (vtkRectilinearGrid::SafeDownCast(&a) && vtkRectilinearGrid::SafeDownCast(&b))
+    return is_same_grid(*vtkRectilinearGrid::SafeDownCast(&a), *vtkRectilinearGrid::SafeDownCast(&b));
   vtkNew<vtkIdList> of_a, of_b;
   for (vtkIdType id = 0; id < a.GetNumberOfCells(); ++id) {
     a.GetCellPoints(id, of_a);

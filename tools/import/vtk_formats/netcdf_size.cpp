@@ -122,6 +122,11 @@ Variable read_variable(Header& header, const std::vector<std::uint64_t>& dimensi
   return variable;
 }
 
+/// Also of dimensions that no variable has, a reader takes memory for each element.
+std::uint64_t longest(const std::vector<std::uint64_t>& dimensions) {
+  return dimensions.empty() ? 0 : *std::max_element(dimensions.begin(), dimensions.end());
+}
+
 std::uint64_t needed_size(std::istream& stream, std::uint64_t file_size) {
   Header header(stream, file_size);
   const std::uint64_t records = header.count();
@@ -133,7 +138,7 @@ std::uint64_t needed_size(std::istream& stream, std::uint64_t file_size) {
   std::uint64_t record_size = 0;
   for (const Variable& variable : variables)
     if (variable.is_record) record_size = sum(record_size, padded(variable.size));
-  std::uint64_t size = 0;
+  std::uint64_t size = longest(dimensions);
   for (const Variable& variable : variables) {
     if (variable.is_record && records == 0) continue;
     const std::uint64_t before = variable.is_record ? product(records - 1, record_size) : 0;

@@ -19,6 +19,7 @@
 #include "base/text/text.h"
 #include "tools/import/cases/openfoam_parts.h"
 #include "tools/import/vtk_formats/netcdf_size.h"
+#include "tools/import/vtk_source/vtk_counts.h"
 
 namespace tensorray {
 namespace {
@@ -256,6 +257,7 @@ VtkKind checked_kind(const fs::path& path) {
     openfoam_parts(path, openfoam_case(path));
     return VtkKind::openfoam;
   }
+  require_no_device(path);
   const std::string head = read_head(path);
   const std::optional<VtkKind> promised = promised_kind(path), found = kind_of_contents(path, head);
   if (head.empty() && promised != VtkKind::openfoam) fail(path, "is empty; write it again");
@@ -272,9 +274,15 @@ VtkKind checked_kind(const fs::path& path) {
     fail(path, std::string("its ending says ") + facts_of(*promised).text + ", its contents are " +
                    facts_of(*found).text + "; give it the ending " + facts_of(*found).endings.front());
   }
-  if (facts_of(*found).xml_type) check_xml_end(path);
+  if (facts_of(*found).xml_type) {
+    check_xml_end(path);
+    check_xml_counts(path);
+  }
   if (*found >= VtkKind::image_pieces && *found <= VtkKind::unstructured_pieces) check_pieces(path, *found);
-  if (*found == VtkKind::legacy) check_legacy(path, head);
+  if (*found == VtkKind::legacy) {
+    check_legacy(path, head);
+    check_legacy_counts(path);
+  }
   if (*found == VtkKind::openfoam) openfoam_parts(path, openfoam_case(path));
   if (*found == VtkKind::exodus) check_netcdf_size(path);
   return *found;

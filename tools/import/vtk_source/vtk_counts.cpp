@@ -1,0 +1,115 @@
+#include "tools/import/vtk_source/vtk_counts.h"
+
+#include <algorithm>
+#include <array>
+#include <cstdint>
+#include <cstdlib>
+#include <fstream>
+#include <limits>
+#include <sstream>
+#include <string>
+#include <vector>
+
+#include <fmt/format.h>
+
+#include "base/errors.h"
+#include "base/text/text.h"
+
+namespace tensorray {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr double most_expanded = 8000;  // LZMA makes this much of a byte, where all are the same.
+constexpr double most_components = 100000;
+constexpr auto any_number = std::numeric_limits<std::streamsize>::max();
+
+[[noreturn]] void fail_announced(const fs::path& path, const std::string& what) {
+  fail(path, "is damaged or cut off: it announces " + what + ", which it cannot hold; copy or write it again");
+}
+
+/// The number in `name="number"` of a tag; 0 if there is none.
+double number_of(const std::string& tag, const std::string& name) {
+  const std::size_t at = tag.find(name + "=");
+  return at == std::string::npos ? 0 : std::strtod(tag.c_str() + std::min(tag.size(), at + name.size() + 2), nullptr);
+}
+
+/// The points of an extent in a tag; 0 if there is none.
+double points_of(const std::string& tag) {
+  const std::size_t at = tag.find("Extent=");
+  if (at == std::string::npos) return 0;
+  std::istringstream stream(tag.substr(std::min(tag.size(), at + 8)));
+  std::array<double, 6> extent{};
+  for (double& bound : extent) stream >> bound;
+  double points = stream ? 1 : 0;
+  for (std::size_t axis = 0; axis < 3; ++axis) points *= std::max(0.0, extent[2 * axis + 1] - extent[2 * axis] + 1);
+  return points;
+}
+
+/// The greatest number in a line of a legacy file that announces others; 0 in all other lines.
+double announced(const std::string& line) {
+  static const std::array<const char*, 17> first{
+      "points",  "cells",        "cell_types",    "point_data",    "cell_data",     "vertices",
+      "lines",   "polygons",     "field",         "scalars",       "color_scalars", "lookup_table",
+      "offsets", "connectivity", "x_coordinates", "y_coordinates", "z_coordinates"};
+  static const std::array<const char*, 14> last{"bit",   "unsigned_char", "char",         "unsigned_short", "short",
+                                                "int",   "unsigned_int",  "long",         "unsigned_long",  "vtkidtype",
+                                                "float", "double",        "vtktypeint64", "string"};
+  static const std::array<const char*, 4> named{"field", "scalars", "color_scalars", "lookup_table"};
+  std::istringstream stream(lower_case(line));
+  std::vector<std::string> words;
+  for (std::string word; words.size() < 6 && stream >> word;) words.push_back(word);
+  if (words.size() < 2) return 0;
+  const bool is_array = words.size() == 4 && std::count(last.begin(), last.end(), words.back()) > 0;
+  if (!is_array && std::count(first.begin(), first.end(), words.front()) == 0) return 0;
+  const bool is_named = std::count(named.begin(), named.end(), words.front()) > 0;  // The name may be a number.
+  double greatest = 0, product = 1;
+  for (std::size_t i = is_named ? 2 : 1; i < words.size(); ++i) {
+    char* end = nullptr;
+    const double number = std::strtod(words[i].c_str(), &end);
+    if (*end != '\0') continue;
+    greatest = std::max(greatest, number);
+    product *= number;
+  }
+  return is_array ? std::max(greatest, product) : greatest;
+}
+
+}  // namespace
+
+void check_xml_counts(const fs::path& path) {
+  const double most = most_expanded * static_cast<double>(fs::file_size(path));
+  std::ifstream file(path, std::ios::binary);
+  bool has_arrays = false;
+  double points = 0;
+  for (std::string tag; file.ignore(any_number, '<') && std::getline(file, tag, '>');) {
+    if (starts_with(tag, "AppendedData")) break;  // Bytes that may look like tags.
+    if (starts_with(tag, "Piece"))
+      for (const char* count : {"NumberOfPoints", "NumberOfCells"})
+        if (const double number = number_of(tag, count); !(number <= most))
+          fail_announced(path, fmt::format("{} {:.0f}", count, number));
+    if (starts_with(tag, "DataArray")) {
+      has_arrays = true;
+      const double components = number_of(tag, "NumberOfComponents");
+      if (!(components >= 0 && components <= std::min(most, most_components)))
+        fail_announced(path, fmt::format("{:.0f} components of an array", components));
+    }
+    points = std::max(points, points_of(tag));
+  }
+  if (has_arrays && points > most) fail_announced(path, fmt::format("{:.0f} points", points));
+}
+
+void check_legacy_counts(const fs::path& path) {
+  const double most = 8 * static_cast<double>(fs::file_size(path));
+  std::ifstream file(path, std::ios::binary);
+  std::string line(256, '\0');
+  while (file.getline(line.data(), static_cast<std::streamsize>(line.size())) || !(file.eof() || file.bad())) {
+    if (file.fail()) {  // A longer line, of numbers.
+      file.clear();
+      file.ignore(any_number, '\n');
+    } else if (const std::string text = line.c_str(); !(announced(text) <= most)) {
+      fail_announced(path, "\"" + escaped(text) + "\"");
+    }
+  }
+}
+
+}  // namespace tensorray
