@@ -44,6 +44,14 @@ void set_changes(PathPoints& points) {
   }
 }
 
+/// Surfaces have single precision, and directions are of squared distances.
+void require_representable(const Path& path) {
+  constexpr double most = 1e18;
+  for (const PathPoint& point : path.points)
+    if (!(point.position.cwiseAbs().maxCoeff() <= most) || !point.direction.allFinite())
+      throw std::runtime_error("a point is beyond 1e18, or not finite; write it again, or in a larger unit of length");
+}
+
 }  // namespace
 
 PathPoints bare_way(const std::vector<Eigen::Vector3d>& positions) {
@@ -79,6 +87,7 @@ std::vector<Path> read_paths(const std::filesystem::path& path) {
   try {
     std::vector<Path> paths = ending == ".vtp" ? read_vtp_paths(path) : read_tck_paths(path);
     if (paths.empty()) throw std::runtime_error("it contains no path with two or more points");
+    for (const Path& each : paths) require_representable(each);
     return paths;
   } catch (const Cancelled&) {
     throw;

@@ -9,6 +9,7 @@
 #include <system_error>
 
 #include "base/errors.h"
+#include "base/text/text.h"
 
 namespace tensorray {
 namespace {
@@ -33,6 +34,15 @@ bool parse(const std::string& word, double& value) {
   return result.ec == std::errc() && result.ptr == last;
 }
 
+/// A line, which ends with a line feed, a carriage return, or both. @return false at the end of the file.
+bool get_line(std::istream& file, std::string& line) {
+  line.clear();
+  std::istream::int_type c = 0;
+  while ((c = file.get()) != std::istream::traits_type::eof() && c != '\n' && c != '\r') line += static_cast<char>(c);
+  if (c == '\r' && file.peek() == '\n') file.get();
+  return !line.empty() || c != std::istream::traits_type::eof();
+}
+
 bool is_header(const std::vector<std::string>& words) {
   double unused;
   for (const std::string& word : words)
@@ -44,7 +54,7 @@ void add_seed(const std::vector<std::string>& words, SeedList& seeds) {
   double numbers[6];
   for (std::size_t i = 0; i < words.size(); ++i)
     if (!parse(words[i], numbers[i]) || !std::isfinite(numbers[i]))
-      throw std::runtime_error("\"" + words[i] + "\" is not a finite number");
+      throw std::runtime_error("\"" + escaped(words[i].substr(0, 40)) + "\" is not a finite number");
   seeds.positions.emplace_back(numbers[0], numbers[1], numbers[2]);
   if (words.size() == 3) return;
   const Eigen::Vector3d direction = Eigen::Vector3d(numbers[3], numbers[4], numbers[5]).stableNormalized();
@@ -60,7 +70,7 @@ SeedList read_seeds(const std::filesystem::path& path) {
   SeedList seeds;
   std::size_t columns = 0;
   std::string line;
-  for (std::size_t number = 1; std::getline(file, line); ++number) {
+  for (std::size_t number = 1; get_line(file, line); ++number) {
     if (number == 1 && line.compare(0, 3, "\xef\xbb\xbf") == 0) line.erase(0, 3);
     const std::vector<std::string> words = words_of(line);
     if (words.empty()) continue;
