@@ -5,6 +5,7 @@
 #include <filesystem>
 #include <new>
 #include <stdexcept>
+#include <string>
 
 #include <pybind11/pybind11.h>
 #include <pybind11/stl/filesystem.h>
@@ -16,6 +17,7 @@
 #include "python/module/renders.h"
 #include "python/module/scene_request.h"
 #include "python/module/traces.h"
+#include "python/module/work.h"
 #include "renderer/images/image.h"
 #include "scenes/keys/scene_source.h"
 
@@ -23,6 +25,14 @@ namespace tensorray {
 namespace {
 
 namespace py = pybind11;
+
+/// Raises an exception whose text may have bytes that are not UTF-8, as a file's name.
+void raise(PyObject* type, const std::string& what) {
+  const std::string line = escaped(what);
+  const py::object text = py::reinterpret_steal<py::object>(
+      PyUnicode_DecodeUTF8(line.data(), static_cast<Py_ssize_t>(line.size()), "surrogateescape"));
+  if (text) PyErr_SetObject(type, text.ptr());
+}
 
 /// Exceptions with the line that the command line prints after its name.
 void add_exceptions(py::module_& module) {
@@ -33,9 +43,9 @@ void add_exceptions(py::module_& module) {
     try {
       if (error) std::rethrow_exception(error);
     } catch (const SceneError& wrong) {
-      PyErr_SetString(scene_error, escaped(wrong.what()).c_str());
+      raise(scene_error, wrong.what());
     } catch (const std::invalid_argument& wrong) {
-      PyErr_SetString(PyExc_ValueError, escaped(wrong.what()).c_str());
+      raise(PyExc_ValueError, wrong.what());
     } catch (const Cancelled&) {
       PyErr_SetString(PyExc_KeyboardInterrupt, "interrupted; nothing was written");
     } catch (const std::bad_alloc&) {
@@ -43,7 +53,7 @@ void add_exceptions(py::module_& module) {
     } catch (const py::builtin_exception&) {
       throw;  // pybind11's own.
     } catch (const std::runtime_error& failed) {
-      PyErr_SetString(PyExc_RuntimeError, escaped(failed.what()).c_str());
+      raise(PyExc_RuntimeError, failed.what());
     }
   });
 }
@@ -59,5 +69,6 @@ PYBIND11_MODULE(_tensorray, module) {
   add_renders(module);
   add_traces(module);
   module.def("use_programs_in", &use_programs_in);
+  pybind11::module_::import("atexit").attr("register")(pybind11::cpp_function(&end_all_work));
   module.attr("version") = TENSORRAY_VERSION;
 }

@@ -5,11 +5,13 @@
 #include <cstdint>
 #include <exception>
 #include <mutex>
+#include <set>
 #include <stdexcept>
 #include <string>
 #include <thread>
 
 #include <tbb/task_arena.h>
+#include <unistd.h>
 
 #include "base/process/process_limits.h"
 
@@ -29,6 +31,39 @@ struct Call {
   std::exception_ptr error;
   std::string phase;
   std::uint64_t done = 0, total = 0;
+};
+
+/// The calls that run, of all threads of this process.
+struct Calls {
+  std::mutex mutex;
+  std::condition_variable ended;
+  std::set<Call*> running;
+  bool is_exiting = false;
+  pid_t process = getpid();  // A process that was forked has the set, but not the threads.
+};
+
+Calls& calls() {
+  static Calls* const all = new Calls;  // Never deleted: threads may outlive the library's other objects.
+  return *all;
+}
+
+class Running {
+ public:
+  explicit Running(Call& call) : call_(call) {
+    const std::lock_guard<std::mutex> lock(calls().mutex);
+    if (calls().is_exiting) throw Cancelled();
+    calls().running.insert(&call);
+  }
+  ~Running() {
+    const std::lock_guard<std::mutex> lock(calls().mutex);
+    calls().running.erase(&call_);
+    calls().ended.notify_all();
+  }
+  Running(const Running&) = delete;
+  Running& operator=(const Running&) = delete;
+
+ private:
+  Call& call_;
 };
 
 void do_work(Call& shared, const std::function<void(const Progress&)>& work, int threads) {
@@ -61,6 +96,7 @@ void look_up(Call& shared, const py::object& report) {
 void run(const std::function<void(const Progress&)>& work, const py::object& report, int threads) {
   if (threads < 0 || threads > 4096) throw std::invalid_argument("threads: from 1 to 4096, or 0 for all");
   Call shared;
+  const Running running(shared);  // Until this thread has the GIL again.
   shared.progress.report = [&shared](const std::string& phase, std::uint64_t done, std::uint64_t total) {
     const std::lock_guard<std::mutex> lock(shared.mutex);
     shared.phase = phase;
@@ -88,6 +124,15 @@ void run(const std::function<void(const Progress&)>& work, const py::object& rep
   if (interrupt) std::rethrow_exception(interrupt);
   if (shared.error) std::rethrow_exception(shared.error);
   look_up(shared, report);  // Short work, too, is reported.
+}
+
+void end_all_work() {
+  if (calls().process != getpid()) return;
+  const py::gil_scoped_release released;
+  std::unique_lock<std::mutex> lock(calls().mutex);
+  calls().is_exiting = true;
+  for (Call* const call : calls().running) call->progress.cancelled = true;
+  calls().ended.wait(lock, [] { return calls().running.empty(); });
 }
 
 }  // namespace tensorray

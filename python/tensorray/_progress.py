@@ -45,7 +45,12 @@ class _Text:
 
 def _is_watched():
     """Whether somebody looks at a terminal or a notebook."""
-    return "ipykernel" in sys.modules or (sys.stderr is not None and sys.stderr.isatty())
+    if "ipykernel" in sys.modules:
+        return True
+    try:
+        return sys.stderr.isatty()
+    except (AttributeError, ValueError):  # None, another object that only writes, or closed.
+        return False
 
 
 @contextlib.contextmanager

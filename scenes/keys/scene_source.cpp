@@ -10,7 +10,11 @@ std::string printable(const std::string& text) {
   constexpr std::size_t longest = 600;
   const std::string line = escaped(text);
   if (line.size() <= longest) return line;
-  return line.substr(0, longest / 2) + " ... " + line.substr(line.size() - longest / 2);
+  const auto is_within = [&line](std::size_t at) { return (static_cast<unsigned char>(line[at]) & 0xc0) == 0x80; };
+  std::size_t end = longest / 2, begin = line.size() - longest / 2;  // Not within a character of UTF-8.
+  while (end > longest / 2 - 3 && is_within(end)) --end;
+  while (begin < line.size() - longest / 2 + 3 && is_within(begin)) ++begin;
+  return line.substr(0, end) + " ... " + line.substr(begin);
 }
 
 std::filesystem::path SceneSource::resolve(const std::filesystem::path& written) const {

@@ -109,6 +109,7 @@ class FieldsTest(unittest.TestCase):
             (ValueError, "core", lambda: tr.make("vortex", core=-1)),
             (ValueError, "unknown", lambda: tr.make("vortex", heart=1)),
             (RuntimeError, "nowhere.vdb", lambda: tr.read_vdb("nowhere.vdb")),
+            (RuntimeError, "nowhere", lambda: tr.read_vdb("nowhere\udcff.vdb")),  # A name that is not UTF-8.
             (ValueError, "derive", lambda: tr.read_vdb("nowhere.vdb", derive="curl")),
             (ValueError, "vorticity", lambda: tr.invariant(tr.Field(tensors), "curl")),
             (RuntimeError, "finite", lambda: tr.trace(tr.Field(tensors * np.nan), [0, 0, 0], [0, 0, 1], 1)),

@@ -63,6 +63,36 @@ class LongCallsTest(unittest.TestCase):
             tr.render(LONG, field=field)
         thread.join()
 
+    def test_a_daemon_that_works_does_not_end_the_process_badly(self):
+        code = """if True:
+            import threading
+            import tensorray as tr
+            field, begun = tr.make("vortex", resolution=24), threading.Event()
+            scene = {"light": {"photons": 1e9}, "integrator": {"type": "photon_distribution"}}
+            threading.Thread(target=tr.render, args=(scene,), kwargs={
+                "field": field, "progress": lambda *report: begun.set()}, daemon=True).start()
+            begun.wait()
+        """
+        ended = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
+        self.assertEqual(ended.returncode, 0, ended.stderr)
+        self.assertNotIn("terminate", ended.stderr)
+
+    def test_streams_that_only_write(self):
+        class Writer:
+            def write(self, text):
+                pass
+
+        closed = open(os.devnull, "w")
+        closed.close()
+        field, stream = tr.make("vortex", resolution=24), sys.stderr
+        for stderr in (None, Writer(), closed):
+            try:
+                sys.stderr = stderr
+                picture = tr.render(SCENE, field=field)
+            finally:
+                sys.stderr = stream
+            self.assertTrue(np.isfinite(picture.linear).all())
+
     def test_progress(self):
         seen = []
         tr.render(SCENE, field=tr.make("vortex", resolution=24), changes={"light.photons": 3e5},
