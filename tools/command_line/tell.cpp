@@ -6,6 +6,7 @@
 #include <unistd.h>
 
 #include "base/files/descriptor.h"
+#include "base/text/text.h"
 
 namespace tensorray {
 
@@ -26,7 +27,7 @@ void tell(const std::vector<std::string>& lines, bool quiet) {
 
 void tell_made(const std::string& line) {
   std::fflush(stdout);  // In the order of what was printed before.
-  static_cast<void>(write_whole(STDOUT_FILENO, line + "\n"));
+  static_cast<void>(write_whole(STDOUT_FILENO, escaped(line) + "\n"));
 }
 
 }  // namespace tensorray

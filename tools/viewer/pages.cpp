@@ -39,7 +39,10 @@ PageMessage binary_message(const Json& header, const std::string& bytes, bool is
 }
 
 PageMessage error_message(const Json& id, const std::string& text) {
-  return text_message({{"type", "error"}, {"id", id}, {"message", one_line(text)}});
+  const std::size_t end =
+      starts_with(text, "[json.exception") ? text.find("] ") : std::string::npos;  // Of the library.
+  const std::string reason = end == std::string::npos ? text : "a message has a wrong part: " + text.substr(end + 2);
+  return text_message({{"type", "error"}, {"id", id}, {"message", one_line(reason)}});
 }
 
 Json answer_to(const Json& request, const char* type, Json content) {

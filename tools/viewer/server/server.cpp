@@ -10,6 +10,7 @@
 
 #include <fmt/format.h>
 
+#include "base/text/text.h"
 #include "tools/viewer/server/http_connection.h"
 #include "tools/viewer/server/server_state.h"
 
@@ -28,11 +29,22 @@ std::string with_brackets(const std::string& address) {
   return address.find(':') == std::string::npos ? address : "[" + address + "]";  // IPv6
 }
 
+void accept_next(const std::shared_ptr<Server::State>& state);
+
+/// Where a connection cannot be accepted (there are no descriptors left), the next attempt would fail at once.
+void accept_later(const std::shared_ptr<Server::State>& state) {
+  const auto timer = std::make_shared<asio::steady_timer>(*state->io, std::chrono::milliseconds(100));
+  timer->async_wait([state, timer](beast::error_code error) {
+    if (!error) accept_next(state);
+  });
+}
+
 /// Accepts connections; those above the limit are closed at once.
 void accept_next(const std::shared_ptr<Server::State>& state) {
   state->acceptor->async_accept([state](beast::error_code error, tcp::socket socket) {
     if (error == asio::error::operation_aborted) return;
-    if (!error && state->connections < Server::most_connections) serve_connection(state, std::move(socket));
+    if (error) return accept_later(state);
+    if (state->connections < Server::most_connections) serve_connection(state, std::move(socket));
     accept_next(state);
   });
 }
@@ -60,13 +72,13 @@ std::optional<std::string> Server::State::path_of(const HttpRequest& request) co
 }
 
 bool Server::State::is_own_host(const HttpRequest& request) const {
-  return request.count(http::field::host) == 1 && hosts.count(std::string(request[http::field::host])) > 0;
+  return request.count(http::field::host) == 1 && hosts.count(lower_case(std::string(request[http::field::host]))) > 0;
 }
 
 bool Server::State::is_own_origin(const HttpRequest& request) const {
   const beast::string_view scheme = "http://", origin = request[http::field::origin];
   return request.count(http::field::origin) == 1 && origin.starts_with(scheme) &&
-         hosts.count(std::string(origin.substr(scheme.size()))) > 0;
+         hosts.count(lower_case(std::string(origin.substr(scheme.size())))) > 0;
 }
 
 Server::Server(const ServerSettings& settings, Pages& pages) : state_(std::make_shared<State>(settings, pages)) {
@@ -86,7 +98,10 @@ Server::Server(const ServerSettings& settings, Pages& pages) : state_(std::make_
   const int port = state_->acceptor->local_endpoint().port();
   std::vector<std::string> names = settings.hosts;
   names.insert(names.end(), {with_brackets(settings.address), "localhost"});
-  for (const std::string& name : names) state_->hosts.insert(fmt::format("{}:{}", name, port));
+  for (const std::string& name : names) {
+    state_->hosts.insert(lower_case(fmt::format("{}:{}", name, port)));
+    if (port == 80) state_->hosts.insert(lower_case(name));  // Which browsers leave out.
+  }
   accept_next(state_);
 }
 
