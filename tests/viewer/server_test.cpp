@@ -201,6 +201,7 @@ TEST_F(ServerTest, RefusesForeignHostAndOrigin) {
   for (const std::string& host : {std::string("evil.example"), "evil.example:" + port_, std::string("127.0.0.1"),
                                   std::string("127.0.0.1:1"), own_host() + ".evil.example", std::string()})
     EXPECT_EQ(get(path(""), host).result_int(), 403u) << host;
+  EXPECT_EQ(get(path(""), "LocalHost:" + port_).result_int(), 200u);  // Names have no case.
   for (const std::string& origin : {std::string("http://evil.example"), "https://" + own_host(), std::string("null"),
                                     "http://" + own_host() + ".evil.example", std::string()})
     EXPECT_THROW(open_socket(origin, path("socket")), boost::system::system_error) << origin;

@@ -51,6 +51,15 @@ Json answer_to(const Json& request, const char* type, Json content) {
   return message;
 }
 
+Json hello(const ViewedScene& viewed, const Json& scene) {
+  return {{"type", "hello"},
+          {"version", TENSORRAY_VERSION},
+          {"scene", scene},
+          {"schema", Json::parse(scene_schema())},
+          {"file", viewed.file.string()},
+          {"saves", viewed.copy.string()}};
+}
+
 std::string bytes_of(const std::filesystem::path& file) {
   std::ifstream stream(file, std::ios::binary);
   return {std::istreambuf_iterator<char>(stream), {}};
@@ -70,6 +79,9 @@ Json parsed(const std::string& text) {
   if (type != "scene" && request_types.count(type) == 0)
     throw std::invalid_argument("unknown message `" + printable(type) +
                                 "`; there are scene, look, space, save, export");
+  constexpr std::size_t longest = 1 << 16;
+  if (type != "scene" && type != "save" && text.size() > longest)
+    throw std::invalid_argument("the message `" + type + "` is too long");
   if ((type == "scene" || type == "save") && !(message.contains("scene") && message["scene"].is_object()))
     throw std::invalid_argument("the message `" + type + "` has no `scene`");
   return message;
@@ -120,15 +132,6 @@ Pages::~Pages() {
   thread_.join();
 }
 
-Json Pages::hello() const {
-  return {{"type", "hello"},
-          {"version", TENSORRAY_VERSION},
-          {"scene", scene_},
-          {"schema", Json::parse(scene_schema())},
-          {"file", viewed_.file.string()},
-          {"saves", viewed_.copy.string()}};
-}
-
 Pages::Id Pages::open(Send send) {
   const auto page = std::make_shared<Page>();
   page->send = std::move(send);
@@ -145,7 +148,7 @@ Pages::Id Pages::open(Send send) {
 void Pages::close(Id id) {
   const std::lock_guard<std::mutex> lock(mutex_);
   pages_.remove_if([&](const PagePointer& page) { return page->id == id; });
-  if (rendering_ && rendering_->id == id) progress_.cancelled = true;
+  if (rendering_.page && rendering_.page->id == id) progress_.cancelled = true;
 }
 
 void Pages::receive(Id id, const std::string& text) {
@@ -161,7 +164,7 @@ void Pages::receive(Id id, const std::string& text) {
     const std::string type = message["type"];
     if (type == "scene") {
       page.scene = Request{type, std::move(message)};
-      if (rendering_ == *found) progress_.cancelled = true;
+      if (rendering_.page == *found && !rendering_.is_first) progress_.cancelled = true;
     } else {
       if (page.requests.size() >= most_requests) throw std::invalid_argument("too many requests are waiting");
       page.requests.push_back({type, std::move(message)});
@@ -260,14 +263,9 @@ void Pages::make_stage(const PagePointer& page) {
     const std::lock_guard<std::mutex> lock(mutex_);
     if (page->scene && !is_first) return;
     progress_.cancelled = ends_;
-    rendering_ = is_first ? nullptr : page;
+    rendering_ = {page, is_first};
   }
-  const WhenLeft end([&] {
-    const std::lock_guard<std::mutex> lock(mutex_);
-    rendering_.reset();
-    progress_.report = {};
-    progress_.cancelled = ends_;
-  });
+  const WhenLeft end([&] { end_work(); });
   auto last = Clock::now();
   bool is_loaded = false;  // Before, the scene is that of the last picture, perhaps of another page.
   progress_.report = [&](const std::string& phase, std::uint64_t done, std::uint64_t total) {
@@ -296,6 +294,13 @@ void Pages::make_stage(const PagePointer& page) {
     page->stages.clear();
     page->send(error_message(page->shown_id, error.what()));
   }
+}
+
+void Pages::end_work() {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  rendering_ = {};
+  progress_.report = {};
+  progress_.cancelled = ends_;
 }
 
 void Pages::send_picture(Page& page, const Stage& stage, double seconds_loading) {
@@ -352,23 +357,26 @@ void Pages::answer_requests(const PagePointer& page, bool renders) {
     }
     try {
       if (!renders && page->shown.is_object()) load_for(*page, {1, 0, true});  // It may be another page's scene.
-      answer(*page, request);
+      answer(page, request);
+    } catch (const Cancelled&) {
+      page->send(error_message(request.message.value("id", Json()), "another scene came before it was made"));
     } catch (const std::exception& error) {
       page->send(error_message(request.message.value("id", Json()), error.what()));
     }
   }
 }
 
-void Pages::answer(Page& page, const Request& request) {
+void Pages::answer(const PagePointer& pointer, const Request& request) {
+  Page& page = *pointer;
   if (request.type == "hello") {
-    Json message = hello();
+    Json message = hello(viewed_, scene_);
     message["field"] = describe_field(live_.scene());
     page.send(text_message(std::move(message)));
   }
   if (request.type == "look") look(page, request.message);
   if (request.type == "space") space(page, request.message);
   if (request.type == "save") save(page, request.message);
-  if (request.type == "export") export_file(page, request.message);
+  if (request.type == "export") export_file(pointer, request.message);
 }
 
 void Pages::look(Page& page, const Json& message) {
@@ -408,10 +416,18 @@ void Pages::save(Page& page, const Json& message) {
 }
 
 /// Sends the picture as a file, as `tensorray render` would write it.
-void Pages::export_file(Page& page, const Json& message) {
+void Pages::export_file(const PagePointer& pointer, const Json& message) {
+  Page& page = *pointer;
   const std::string ending = "." + message.value("file", "");
   if (ending != ".png" && ending != ".exr") throw std::invalid_argument("a page can have `png` and `exr`");
   if (!page.shown.is_object()) throw std::invalid_argument("there is no picture yet");
+  {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    if (page.scene) throw Cancelled();
+    progress_.cancelled = ends_;
+    rendering_ = {pointer, false};
+  }
+  const WhenLeft end([&] { end_work(); });
   const std::shared_ptr<const Render> render = live_.render(progress_);
   const std::filesystem::path file = folder_ / ("export" + ending);
   for (const Output& output : picture_outputs())

@@ -77,6 +77,12 @@ class Pages {
     Image display;                             ///< ... and as the page shows it.
   };
   using PagePointer = std::shared_ptr<Page>;
+  /// What is being made, a stage or an export: the page's end cancels it, and a new scene does, unless it is the first
+  /// stage.
+  struct Rendering {
+    PagePointer page;
+    bool is_first = false;
+  };
 
   void work();
   PagePointer next_page();
@@ -84,15 +90,15 @@ class Pages {
   void begin_scene(Page& page, const Request& request);
   void make_stage(const PagePointer& page);
   void answer_requests(const PagePointer& page, bool renders);
-  void answer(Page& page, const Request& request);
+  void answer(const PagePointer& pointer, const Request& request);
   void look(Page& page, const Json& message);
   void space(Page& page, const Json& message);
   void save(Page& page, const Json& message);
-  void export_file(Page& page, const Json& message);
+  void export_file(const PagePointer& pointer, const Json& message);
+  void end_work();
   void send_picture(Page& page, const Stage& stage, double seconds_loading);
   void load_for(Page& page, const Stage& stage);
   void check(const Json& scene) const;
-  Json hello() const;
 
   const ViewedScene viewed_;
   Json scene_;  ///< The scene that all pages begin with.
@@ -108,8 +114,8 @@ class Pages {
   std::list<PagePointer> pages_;  ///< The next one to be served is the first.
   Id next_id_ = 1;
   bool ends_ = false;
-  PagePointer rendering_;  ///< The page whose finer stage is being made.
-  Progress progress_;      ///< Of the present render.
+  Rendering rendering_;
+  Progress progress_;  ///< Of the present render.
   std::thread thread_;
 };
 
