@@ -6,6 +6,7 @@
 
 #include "base/process/progress.h"
 #include "base/process/team.h"
+#include "base/process/work.h"
 
 namespace tensorray {
 namespace {
@@ -30,9 +31,7 @@ ResultHead head_at(const std::string& bytes, std::size_t at) {
   return head;
 }
 
-[[noreturn]] void fail_damaged() {
-  throw std::runtime_error("what was kept of the render is damaged; render it again");
-}
+[[noreturn]] void fail_damaged() { throw DamagedWork("what was kept of the render is damaged; render it again"); }
 
 /// Copies a result from its bytes, which must be all there are of it.
 void take_result(std::string from, const std::function<void(PartBytes& bytes)>& copy) {

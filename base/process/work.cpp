@@ -10,7 +10,7 @@ namespace tensorray {
 void Work::begin(std::size_t units) {
   const std::lock_guard lock(mutex_);
   if (!units_.empty() && units_.size() != units)
-    throw std::runtime_error(fmt::format("the work has {} units, but {} were kept", units, units_.size()));
+    throw DamagedWork(fmt::format("the work has {} units, but {} were kept", units, units_.size()));
   units_.resize(units);
 }
 

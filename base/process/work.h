@@ -9,11 +9,17 @@
 #include <functional>
 #include <memory>
 #include <mutex>
+#include <stdexcept>
 #include <string>
 #include <utility>
 #include <vector>
 
 namespace tensorray {
+
+/// What an earlier run has kept, or another process has sent, cannot be of this work. Who knows its file names it.
+struct DamagedWork : std::runtime_error {
+  using std::runtime_error::runtime_error;
+};
 
 /// The most parts that work is divided into.
 constexpr std::size_t most_parts = 100000;

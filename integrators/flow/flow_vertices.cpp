@@ -12,6 +12,8 @@
 
 #include <tbb/parallel_for.h>
 
+#include "base/process/work.h"
+
 namespace tensorray {
 namespace {
 
@@ -129,7 +131,7 @@ void FlowVertices::copy_landings(std::size_t begin, std::size_t end, PartBytes& 
   for (std::size_t i = begin * map_.wavelengths; i < end * map_.wavelengths; ++i)
     if (static_cast<std::size_t>(map_.ends[i]) >= ray_end_count ||
         (map_.ends[i] == RayEnd::plate && !map_.landings[i].allFinite()))
-      throw std::runtime_error("the landings of light that were kept or sent are damaged; render it again");
+      throw DamagedWork("the landings of light that were kept or sent are damaged; render it again");
 }
 
 /// Gives the others the landings of the vertices that this process has traced, up to `end`, and takes theirs.

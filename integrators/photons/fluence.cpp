@@ -10,6 +10,7 @@
 #include <Eigen/LU>
 #include <tbb/parallel_for.h>
 
+#include "base/process/work.h"
 #include "volumes/grids/voxel_walk.h"
 
 namespace tensorray {
@@ -133,11 +134,10 @@ void FluenceSums::add_sums(std::string_view bytes) {
     std::memcpy(&value, bytes.data() + at, size);
     return value;
   };
-  if (bytes.size() % record != size || number(0) != planes_)
-    throw std::runtime_error("fluence that was kept has other bands");
+  if (bytes.size() % record != size || number(0) != planes_) throw DamagedWork("fluence that was kept has other bands");
   for (std::size_t at = size; at < bytes.size(); at += record) {
     const std::uint64_t block = number(at);
-    if (block >= blocks_.size()) throw std::runtime_error("fluence that was kept is that of another field");
+    if (block >= blocks_.size()) throw DamagedWork("fluence that was kept is that of another field");
     Sum* const sums = sums_of(static_cast<std::uint32_t>(block));
     for (std::size_t i = 0; i < of_block; ++i)
       sums[i].fetch_add(number(at + size * (1 + i)), std::memory_order_relaxed);

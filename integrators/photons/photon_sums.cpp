@@ -3,6 +3,7 @@
 #include <stdexcept>
 #include <string_view>
 
+#include "base/process/work.h"
 #include "base/text/copy_bytes.h"
 
 // The bytes: the numbers of SumsHead; for each channel, how its rays ended; the fluence; for each chunk with photons,
@@ -22,7 +23,7 @@ class SumsReader {
   explicit SumsReader(const std::string& bytes) : rest_(bytes) {}
 
   std::string_view take(std::uint64_t count, std::size_t size = 1) {
-    if (count > rest_.size() / size) throw std::runtime_error("photons that were kept are cut off");
+    if (count > rest_.size() / size) throw DamagedWork("photons that were kept are cut off");
     const std::string_view bytes = rest_.substr(0, count * size);
     rest_.remove_prefix(bytes.size());
     return bytes;
@@ -99,13 +100,13 @@ std::string bytes_of(const PhotonSums& sums) {
 void add_bytes(const std::string& bytes, PhotonSums& sums) {
   SumsReader reader(bytes);
   const SumsHead head = reader.values<SumsHead>(1).front();
-  if (head.channels != sums.ends.size()) throw std::runtime_error("photons that were kept have other channels");
+  if (head.channels != sums.ends.size()) throw DamagedWork("photons that were kept have other channels");
   const std::vector<EndCounts> ends = reader.values<EndCounts>(head.channels);
   const std::string_view fluence = reader.take(head.fluence_bytes);
   for (std::uint64_t chunk = 0; chunk < head.chunks; ++chunk) add_photons(reader, sums);
   const bool has_all_outputs = !(sums.fluence && fluence.empty()) && !(sums.has_photons && head.has_photons == 0);
   if (!has_all_outputs || sums.is_colored != (head.is_colored != 0) || reader.rest().size() != plate_size(sums))
-    throw std::runtime_error(
+    throw DamagedWork(
         "the photons that were kept are those of other outputs: from the beginning, ask for the same of `spectral`, "
         "`photons` and `fluence`");
   sums.candidates += head.candidates;

@@ -15,6 +15,7 @@
 
 #include "base/errors.h"
 #include "base/process/seconds.h"
+#include "base/process/work.h"
 #include "renderer/camera/picture_tile.h"
 
 namespace tensorray {
@@ -191,7 +192,7 @@ Tile Rendering::load(std::size_t number) const {
   if (const auto state = work_.state(number))
     tile.set_bytes(*state);
   else if (work_.is_in_part(number) && !work_.wants(number))
-    throw std::runtime_error("a tile that was kept has no samples; render it again");
+    throw DamagedWork("a tile that was kept has no samples; render it again");
   return tile;
 }
 

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <stdexcept>
 
+#include "base/process/work.h"
 #include "base/text/copy_bytes.h"
 
 namespace tensorray {
@@ -34,7 +35,7 @@ std::string Tile::bytes() const {
 
 void Tile::set_bytes(const std::string& bytes) {
   const std::size_t of_pixels = pixels.size() * sizeof(PixelState), of_light = light.size() * sizeof(double);
-  if (bytes.size() != of_pixels + of_light) throw std::runtime_error("a tile that was kept has another size");
+  if (bytes.size() != of_pixels + of_light) throw DamagedWork("a tile that was kept has another size");
   copy_bytes(pixels.data(), bytes.data(), of_pixels);
   copy_bytes(light.data(), bytes.data() + of_pixels, of_light);
 }

@@ -9,6 +9,7 @@
 #include <tbb/partitioner.h>
 
 #include "base/constants.h"
+#include "base/process/work.h"
 #include "renderer/density/convolution.h"
 #include "renderer/density/mirror.h"
 
@@ -217,7 +218,7 @@ void DensityEstimator::append_sums(std::string& bytes) const {
 }
 
 void DensityEstimator::add_sums(std::string_view bytes) {
-  if (bytes.size() != sums_size()) throw std::runtime_error("sums that were kept have another size");
+  if (bytes.size() != sums_size()) throw DamagedWork("sums that were kept have another size");
   for (std::size_t i = 0; i < sums_.size(); ++i) {
     PixelColor more;
     std::memcpy(&more, bytes.data() + i * sizeof more, sizeof more);

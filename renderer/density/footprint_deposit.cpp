@@ -8,6 +8,7 @@
 #include <Eigen/Eigenvalues>
 #include <Eigen/LU>
 
+#include "base/process/work.h"
 #include "renderer/density/mirror.h"
 
 namespace tensorray {
@@ -95,7 +96,7 @@ void FootprintDeposit::append_sums(std::string& bytes) const {
 }
 
 void FootprintDeposit::add_sums(std::string_view bytes) {
-  if (bytes.size() != sums_size()) throw std::runtime_error("sums that were kept have another size");
+  if (bytes.size() != sums_size()) throw DamagedWork("sums that were kept have another size");
   for (std::size_t i = 0; i < sums_.size(); ++i) {
     std::int64_t value = 0;
     std::memcpy(&value, bytes.data() + i * sizeof value, sizeof value);

@@ -11,6 +11,7 @@
 
 #include "base/process/kept_results.h"
 #include "base/process/team.h"
+#include "base/process/work.h"
 #include "renderer/lights/photon_emitter.h"
 
 namespace tensorray {
@@ -198,7 +199,7 @@ void copy_chunk(ChunkPhotons& part, const Source& source, std::size_t surfaces, 
   for (const Photon& photon : part.landed)
     if (photon.light != source.light || photon.surface >= surfaces || photon.band < 0 ||
         static_cast<std::size_t>(photon.band) >= source.strength->size())
-      throw std::runtime_error("the photons that were kept or sent are damaged; render it again");
+      throw DamagedWork("the photons that were kept or sent are damaged; render it again");
 }
 
 }  // namespace

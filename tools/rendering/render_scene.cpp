@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <deque>
+#include <functional>
 #include <future>
 #include <optional>
 #include <string>
@@ -11,6 +12,7 @@
 
 #include <fmt/format.h>
 
+#include "base/errors.h"
 #include "base/process/seconds.h"
 #include "base/text/numbered_name.h"
 #include "base/text/path_text.h"
@@ -235,6 +237,16 @@ void complete(const Scene& scene, RenderJob& job, OutputFiles files, const KeepS
   keeper.remove();
 }
 
+/// Calls `work`, with errors of kept work that name where it is from.
+void naming_kept_work(const std::filesystem::path& from, const std::function<void()>& work) {
+  try {
+    work();
+  } catch (const DamagedWork& error) {
+    if (from.empty()) throw;
+    fail(from, error.what());
+  }
+}
+
 /// Renders a scene to its files. @return the loaded scene.
 Scene render_to_files(const SceneDescription& description, const RenderRun& run, std::optional<Scene> loaded,
                       Progress& progress) {
@@ -252,7 +264,8 @@ Scene render_to_files(const SceneDescription& description, const RenderRun& run,
   if (!run.keeping.light.empty() && before.empty()) before = read_light(run.keeping.light, scene, run.quiet);
   RenderJob job{
       Work(run.keeping.shard.value_or(WorkPart{}), std::move(kept.units)), {}, nullptr, Work({}, std::move(before))};
-  complete(scene, job, std::move(files), keep, run, progress);
+  const std::filesystem::path& kept_in = run.keeping.light.empty() ? keep.file : run.keeping.light;
+  naming_kept_work(kept_in, [&] { complete(scene, job, std::move(files), keep, run, progress); });
   for (const std::filesystem::path& file : written_by(description, run))
     if (!run.quiet) tell_made("wrote " + file.string());
   return scene;
@@ -468,7 +481,7 @@ void write_merged(const SceneDescription& description, const WorkFile& work, con
                               "again",
                               description.path.string(), other)));
   RenderJob job{Work({}, work.units), {}, nullptr, Work({}, kept_before(work.before))};
-  complete(scene, job, std::move(files), {}, run, progress);
+  naming_kept_work("a shard", [&] { complete(scene, job, std::move(files), {}, run, progress); });
   for (const std::filesystem::path& file : written_by(description, run))
     if (!run.quiet) tell_made("wrote " + file.string());
 }

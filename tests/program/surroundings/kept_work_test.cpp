@@ -3,6 +3,7 @@
 #include <fmt/core.h>
 #include <sys/stat.h>
 
+#include "scenes/jobs/work_file.h"
 #include "tests/data_folder.h"
 #include "tests/program/divided_scenes.h"
 #include "tests/program/support.h"
@@ -220,8 +221,9 @@ TEST_F(KeptWork, ShardsHaveTheirLightFromTheFirst) {
 }
 
 TEST_F(KeptWork, AnInterruptedRenderWritesWhatItHas) {
-  make(path_scene);  // Nothing is kept before its tiles.
-  for (const int signal : {SIGINT, SIGTERM}) {
+  make(path_scene);              // Nothing is kept before its tiles.
+  std::signal(SIGHUP, SIG_DFL);  // Where nohup runs the tests, it is ignored.
+  for (const int signal : {SIGINT, SIGTERM, SIGHUP}) {
     std::filesystem::remove(in_folder("a.png.checkpoint"));  // The first one is written when tiles are done.
     const Outcome outcome = end_by(signal);
     EXPECT_EQ(outcome.status, 130);
@@ -260,6 +262,14 @@ TEST_F(KeptWork, ACheckpointOfAnotherRenderIsRefused) {
   damaged[damaged.size() / 2] = static_cast<char>(damaged[damaged.size() / 2] + 1);
   write("a.png.checkpoint", damaged);
   expect_error("a.png.checkpoint: is damaged", render("a", {"--resume"}), 1);
+  write("a.png.checkpoint", kept);
+  WorkFile forged = read_work(in_folder("a.png.checkpoint"));  // Whose hash is right.
+  const auto state = std::make_shared<const std::string>("of another size");
+  for (WorkUnit& unit : forged.units)
+    if (unit.state) unit.state = state;
+  if (forged.before.state) forged.before.state = state;
+  write_work(in_folder("a.png.checkpoint"), forged);
+  expect_error("a.png.checkpoint: ", render("a", {"--resume"}), 1);
   write("a.png.checkpoint", kept);
   run_well(render("a", {"--resume"}));
   expect_same("a");
