@@ -13,7 +13,8 @@ _FIELD_ALONE = {"light": {"direction": "auto"}, "integrator": {"type": "photon_d
 
 
 def json_of(value):
-    """A dictionary as JSON; NumPy's numbers and arrays, paths and tuples may be in it."""
+    """A dictionary as JSON; NumPy's numbers and arrays, paths and tuples may be in it. Bytes of paths that are not
+    UTF-8 become the characters that base/text/path_text.h names."""
     def plain(item):
         if isinstance(item, (np.ndarray, np.generic)):
             return item.tolist()
@@ -22,7 +23,8 @@ def json_of(value):
         if isinstance(item, collections.abc.Mapping):
             return dict(item)
         raise TypeError(f"a scene cannot contain {type(item).__name__}")
-    return json.dumps(value, default=plain, allow_nan=False)
+    text = json.dumps(value, default=plain, allow_nan=False, ensure_ascii=False)
+    return text.translate({0xDC00 + byte: 0xF700 + byte for byte in range(0x80, 0x100)})
 
 
 def changes_of(changes, seed=None):

@@ -19,7 +19,8 @@ class Field:
     T           Tensors, shape (nz, ny, nx, 3, 3), world axes: T[k, j, i] is the tensor at voxel (i, j, k), with rows
                 before columns, so that T[k, j, i] @ V is T V. float32 and float64 of any strides are not copied: the
                 field shares the array's memory, so do not change the array afterwards; make another field, which costs
-                nothing. Other types are converted. Tensors that are not finite bend no light.
+                nothing. Other types are converted. Tensors that are not finite bend no light, nor do those that a
+                masked array masks.
     voxel_size  Distance of neighbouring voxels' centres, world units: a number, or three (x, y, z).
     origin      Centre of the voxel T[0, 0, 0], world (x, y, z).
     to_world    Instead of these two: a (4, 4) matrix from voxel indices (i, j, k, 1) to the world.
@@ -29,7 +30,7 @@ class Field:
     """
 
     def __init__(self, T, voxel_size=1.0, origin=(0.0, 0.0, 0.0), *, to_world=None, name="tensor"):
-        tensors = np.asarray(T)
+        tensors = np.asarray(T.astype(float).filled(np.nan) if np.ma.isMaskedArray(T) else T)
         if tensors.dtype not in (np.float32, np.float64) or not tensors.dtype.isnative or not tensors.flags.aligned:
             tensors = tensors.astype(np.float64)
         if to_world is None:
@@ -189,8 +190,9 @@ def import_file(*files, array=None, gradient_of=None, strain_of=None, cells=None
 
 def _run(command, report):
     """Runs tensorray-import. Returns its status, and the lines of its standard error."""
-    with tempfile.TemporaryFile("w+") as errors:
-        with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=errors, text=True) as child:
+    with tempfile.TemporaryFile("w+", errors="surrogateescape") as errors:
+        with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=errors, text=True,
+                              errors="surrogateescape") as child:
             try:
                 for line in child.stdout:
                     phase, *counts = line.rstrip().split("\t")

@@ -155,5 +155,7 @@ def landings(scene=None, field=None, s=None, *, tolerance=0.5, changes=None, fra
     """
     request = request_of("landings", scene, field, changes=changes, frame=frame, folder=folder)
     flexibilities = [] if s is None else [float(value) for value in np.atleast_1d(s)]
+    if not np.isfinite(flexibilities).all():
+        raise ValueError("landings: s must be finite")
     with shown(progress) as report:
         return Landings(**_tensorray.landings(request, flexibilities, float(tolerance), threads, report))

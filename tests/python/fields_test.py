@@ -98,6 +98,24 @@ class FieldsTest(unittest.TestCase):
         np.testing.assert_allclose(rotation.tensors[1, 2, 3], [[0, -2, 0], [2, 0, 0], [0, 0, 0]])
         self.assertEqual(tr.make("shear", resolution=(3, 4, 5)).tensors.shape, (5, 4, 3, 3, 3))
 
+    def test_masked_tensors_bend_no_light(self):
+        tensors = random_tensors()
+        mask = np.zeros(tensors.shape, bool)
+        mask[:, :, : tensors.shape[2] // 2] = True
+        masked = tr.Field(np.ma.array(tensors, mask=mask)).tensors
+        expected = tr.Field(np.where(mask, np.nan, tensors)).tensors
+        np.testing.assert_array_equal(masked, expected)
+
+    def test_paths_that_are_no_utf8(self):
+        with tempfile.TemporaryDirectory() as folder:
+            name = os.fsdecode(os.path.join(os.fsencode(folder), b"f\xffield.vdb"))
+            tr.Field(random_tensors()).write(name)
+            field = tr.read_vdb(name)
+            picture = tr.render({"field": {"file": name}, "light": {"photons": 100, "wavelengths": {"count": 2}},
+                                 "integrator": {"type": "photon_distribution"}, "receiver": {"resolution": 8}})
+            self.assertTrue(np.isfinite(picture.linear).all())
+            self.assertEqual(field.tensors.shape, random_tensors().shape)
+
     def test_errors_are_one_line(self):
         tensors = random_tensors()
         cases = [
