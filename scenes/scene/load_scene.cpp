@@ -31,6 +31,7 @@ BlockSource open_field(const SceneDescription& scene) {
     throw SceneError(field.file.string() + ": # is for the number of a frame: give --frames");
   if (!field.generate) return open_tensor_vdb(field.file, field.name, field.derive, field.components);
   try {
+    require_memory_for(field.generate->grid, 65);  // With the bricks.
     return generator_source(field.generate->generator, field.generate->grid);
   } catch (const std::invalid_argument& error) {
     throw SceneError(fmt::format("{}: `/field/generate`: {}", scene.path.string(), error.what()));

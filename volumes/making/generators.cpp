@@ -8,7 +8,9 @@
 
 #include "base/constants.h"
 #include "base/errors.h"
+#include "base/process/process_limits.h"
 #include "base/text/text.h"
+#include "volumes/grids/page_memory.h"
 #include "volumes/making/load_stress.h"
 
 namespace tensorray {
@@ -263,7 +265,16 @@ BlockSource generator_source(const Generator& generator, const GridSettings& gri
   return result;
 }
 
+void require_memory_for(const GridSettings& grid, double bytes) {
+  if (memory_bound()) return;
+  const double needed = bytes * grid.resolution.cast<double>().prod();
+  const MemoryLimit limit = memory_limit();
+  require(needed <= limit.bytes, "resolution: the voxels need about " + bytes_text(needed) + ", more than " +
+                                     limit.cause + ", " + bytes_text(limit.bytes) + "; make fewer");
+}
+
 TensorGrid generate(const Generator& generator, const GridSettings& grid) {
+  require_memory_for(grid, 38);
   return to_grid(generator_source(generator, grid));
 }
 

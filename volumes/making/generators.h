@@ -148,8 +148,13 @@ Generator generator_of(const std::string& kind);
 /// `resolution` is the number of voxels along the longest axis of the box; voxels are cubes.
 GridSettings default_grid(const Generator& generator, int resolution = 64);
 
+/// Checks that a grid fits in memory, unless there is a bound of memory. @param bytes  For each voxel.
+/// @throw std::invalid_argument with what it needs, and what there is.
+void require_memory_for(const GridSettings& grid, double bytes);
+
 /// Samples the field. The name of the result is the kind; its metadata hold kind and parameters (`tensorray:source`).
-/// @throw std::invalid_argument if a parameter is out of range; the message names it.
+/// @throw std::invalid_argument if a parameter is out of range, or the grid does not fit in memory; the message names
+/// it.
 TensorGrid generate(const Generator& generator, const GridSettings& grid);
 
 /// The same, block by block.

@@ -48,6 +48,7 @@ TEST_F(Limits, AreSaidInOneLine) {
       {little, {"--set", "integrator.type=lens", "--set", "receiver.resolution=[8000,8000]"}, {2}, "ulimit -v"},
       {little, {"--set", "integrator.type=path_tracing", "--set", "camera.resolution=[6000,6000]"}, {2}, "needs about"},
       {little, {"--set", "integrator.type=scene", "--set", "camera.resolution=[6000,6000]"}, {2}, "needs about"},
+      {little, {"--set", "field.generate.resolution=600"}, {2}, "resolution: the voxels need about"},
       {"ulimit -v 200000; exec", {"--threads", "2"}, {1}, "threads can be started"},
       // Almost enough for the program: chance decides whether the check notices it, or what is loaded later.
       {"ulimit -v 300000; exec", {}, {1, 2}, "tensorray: "}};
