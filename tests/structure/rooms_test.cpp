@@ -127,7 +127,7 @@ const std::vector<Room> rooms{
     {"tools/rendering", {"tools/command_line", "tools/ranks", "scenes/*", "integrators/*", "renderer/*", "volumes/*"}},
     {"tools/commands",
      {"tools/rendering", "tools/command_line", "tools/ranks", "scenes/*", "integrators/*", "renderer/*", "volumes/*"}},
-    {"tools", {"tools/commands", "tools/command_line"}},
+    {"tools", {"tools/commands", "tools/command_line", "renderer/meshes"}},
     {"tools/benchmark/kernels", {"integrators/*", "renderer/*", "volumes/*"}},
     {"tools/benchmark/support", {}},
     {"tools/benchmark/measures",

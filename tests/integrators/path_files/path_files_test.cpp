@@ -158,6 +158,9 @@ TEST(TckPathsTest, ErrorsNameTheMend) {
   std::string not_finite = bytes;
   not_finite.replace(bytes.find("END\n") + 8, 4, bytes_of(std::numeric_limits<float>::quiet_NaN(), true));
   EXPECT_THAT(error(not_finite), HasSubstr("track 0 is not finite"));
+  std::string far = bytes;
+  far.replace(bytes.find("END\n") + 4, 4, bytes_of(3e38f, true));
+  EXPECT_THAT(error(far), HasSubstr("beyond 1e18"));
   EXPECT_THAT(error(written("b.tck", {})), HasSubstr("no path"));
 }
 

@@ -28,6 +28,24 @@ TEST(SeedFiles, MayHaveDirectionsAndAHeader) {
   EXPECT_LT((seeds.directions[1] - Vector3d(0.6, 0.8, 0)).norm(), 1e-15);
 }
 
+TEST(SeedFiles, LinesEndAsOnAnySystem) {
+  for (const std::string end : {"\n", "\r", "\r\n"}) {
+    const SeedList seeds = read_text("# text" + end + "1 2 3" + end + end + "4 5 6" + end);
+    EXPECT_EQ(seeds.positions, (std::vector<Vector3d>{{1, 2, 3}, {4, 5, 6}})) << seeds.positions.size();
+    const std::string said = message([&] { read_text("1 2 3" + end + end + "4 five 6" + end); });
+    EXPECT_NE(said.find("line 3: "), std::string::npos) << said;
+  }
+}
+
+TEST(SeedFiles, ErrorsAreShortLines) {
+  for (const std::string& word : {std::string(5000000, 'x'), std::string("a\0b\x1b[31m", 8)}) {
+    const std::string said = message([&] { read_text("1 2 3\n1 2 " + word + "\n"); });
+    EXPECT_LT(said.size(), 300u);
+    EXPECT_EQ(said.find('\0'), std::string::npos);
+    EXPECT_EQ(said.find('\x1b'), std::string::npos);
+  }
+}
+
 TEST(SeedFiles, SayWhichLineIsWrong) {
   const auto complaint = [](const std::string& text) { return message([&] { read_text(text); }); };
   const auto expect = [&](const std::string& text, const std::string& words) {

@@ -147,9 +147,22 @@ TEST_F(ImportErrors, WrongArguments) {
   refuses({"image.vti", "-o", "image.txt"}, 2, {"--output"});
   write("array.npy", npy());
   refuses({"array.npy", "--resolution", "8"}, 2, {"array.npy", "--resolution"});
+  refuses({"array.npy", "--memory", "-1"}, 2, {"--memory"});
   const Outcome elsewhere = run({"import", "image.vti", "-q", "-o", "missing/image.vdb"});
   EXPECT_EQ(elsewhere.status, 1);
   EXPECT_NE(elsewhere.error.find("missing"), std::string::npos) << elsewhere.error;
+}
+
+/// Numbers that a file or a user may give, and that OpenVDB refuses, or writes and does not read.
+TEST_F(ImportErrors, VoxelsThatAreNowhere) {
+  write("array.npy", npy());
+  for (const char* size : {"1e300", "1e150", "1e-300"})
+    refuses({"array.npy", "--voxel-size", size}, 1, {"array.npy", "1e-30"});
+  for (const char* origin : {"1e300", "1e20"})
+    refuses({"array.npy", "--origin", origin, "0", "0"}, 1, {"array.npy", "origin"});
+  write("far.vti", vti(lumps_size, Vector3d(1e29, 0, 0), Vector3d::Ones(), Matrix3d::Identity(),
+                       components(Matrix3d::Identity(), nine)));
+  refuses({"far.vti"}, 1, {"far.vti", "origin"});
 }
 
 TEST_F(ImportErrors, BoundsWithNothingInside) {

@@ -11,7 +11,9 @@
 
 #include <CLI/CLI.hpp>
 #include <fmt/core.h>
+#include <unistd.h>
 
+#include "base/files/descriptor.h"
 #include "base/files/distinct_files.h"
 #include "base/files/output_file.h"
 #include "base/files/temporary_folder.h"
@@ -115,7 +117,7 @@ void print_sampling(const ImportReport& report) {
 
 /// Progress as a line of phase, done and total, for a program that has started this one.
 void tell_progress(const std::string& phase, std::uint64_t done, std::uint64_t total) {
-  tell_made(fmt::format("{}\t{}\t{}", phase, done, total));
+  static_cast<void>(write_whole(STDOUT_FILENO, fmt::format("{}\t{}\t{}\n", phase, done, total)));
 }
 
 /// The work of the child: everything except giving the files their final names.
@@ -339,8 +341,9 @@ void add_import_options(CLI::App& program, Progress& progress) {
                   "Limit of memory, as 8G or 500M; of .npy and NIfTI the rest is kept on the disk of the "
                   "output, and files of other kinds must be smaller")
       ->transform(CLI::AsSizeValue(false))
-      ->check([](const std::string& bytes) {  // A negative one has become a large one.
-        return bytes.size() > 18 ? "it must be a size, as 8G" : "";
+      ->check([](const std::string& bytes) {  // CLI11 makes large numbers of negative ones.
+        const bool is_size = bytes.find('-') == std::string::npos && bytes.size() <= 18;
+        return is_size ? "" : "it must be a size, as 8G";
       })
       ->option_text("SIZE");
   program.add_option("--name", options->name, "Name of the field (default: the array's)");
