@@ -37,6 +37,13 @@ class Hdf5Writer {
     write(name, shape, values.data(), H5T_NATIVE_INT, H5T_STD_I64LE);
   }
 
+  /// A dataset that has a shape, and no numbers yet.
+  void announce(const std::string& name, const std::vector<hsize_t>& shape) {
+    const hid_t space = H5Screate_simple(static_cast<int>(shape.size()), shape.data(), nullptr);
+    H5Dclose(H5Dcreate2(file_, name.c_str(), H5T_IEEE_F64LE, space, with_groups_, H5P_DEFAULT, H5P_DEFAULT));
+    H5Sclose(space);
+  }
+
   void text(const std::string& name, const std::string& value) {
     const hid_t type = H5Tcopy(H5T_C_S1);
     H5Tset_size(type, value.size());

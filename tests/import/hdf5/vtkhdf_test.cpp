@@ -10,6 +10,7 @@
 
 #include "tests/import/hdf5_writer.h"
 #include "tests/import/mesh_files.h"
+#include "tools/import/hdf5/hdf5_file.h"
 #include "tools/import/vtk_source/vtk_source.h"
 
 namespace tensorray {
@@ -116,6 +117,22 @@ TEST(VtkHdf, ArraysOfImagesMayStay) {
       EXPECT_EQ(array->GetNumberOfComponents(), 3);
       EXPECT_EQ(array->GetComponent(11, 2), first + 35) << name << step;
     }
+  }
+}
+
+TEST(VtkHdf, NumbersThatWereNeverWrittenTakeNoMemory) {
+  const TemporaryFolder folder;
+  {
+    Hdf5Writer file(folder / "a.h5");
+    file.announce("few", {100});
+    file.announce("many", {100000, 1000, 100});
+    file.announce("more", {1 << 30, 1 << 20});
+  }
+  const Hdf5File file(folder / "a.h5");
+  EXPECT_EQ(file.read("few")->GetNumberOfTuples(), 100);
+  for (const char* name : {"many", "more"}) {
+    const std::string error = error_of([&] { file.read(name); });
+    EXPECT_NE(error.find("a.h5: is damaged: its dataset " + std::string(name)), std::string::npos) << error;
   }
 }
 

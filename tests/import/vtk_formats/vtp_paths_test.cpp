@@ -149,6 +149,10 @@ TEST(VtpPathsTest, ErrorsNameTheFix) {
   EXPECT_THAT(error(replaced(foreign, "NumberOfPoints=\"4\"", "NumberOfPoints=\"4000000000\"")), HasSubstr("damaged"));
   EXPECT_THAT(error(replaced(foreign, "NumberOfLines=\"2\"", "NumberOfLines=\"99999999999999999999999\"")),
               HasSubstr("NumberOfLines is no count"));
+  for (const char* count : {"2000000000", "-9"})
+    EXPECT_THAT(
+        error(replaced(foreign, "NumberOfComponents=\"3\"", std::string("NumberOfComponents=\"") + count + "\"")),
+        HasSubstr("components of an array"));
   EXPECT_THAT(error(replaced(foreign, "NumberOfLines=\"2\"", "NumberOfLines=\"0\"")), HasSubstr("no path"));
 
   std::vector<Path> paths = some_paths(3);

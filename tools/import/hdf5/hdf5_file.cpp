@@ -68,6 +68,16 @@ std::pair<vtkSmartPointer<vtkDataArray>, hid_t> array_for(hid_t type) {
   }
 }
 
+/// Whether a dataset may have so many numbers: one whose chunks were never written takes no bytes of the file, and any
+/// memory. Numbers of virtual datasets are in other files.
+bool is_likely(hid_t data, std::uint64_t count) {
+  constexpr double unwritten = 64 << 20, most_expanded = 8000;
+  const Id list(H5Dget_create_plist(data), H5Pclose);
+  if (H5Pget_layout(list) == H5D_VIRTUAL || H5Pget_external_count(list) > 0) return true;
+  const double bytes = 8 * static_cast<double>(count);
+  return bytes <= std::max(unwritten, most_expanded * static_cast<double>(H5Dget_storage_size(data)));
+}
+
 }  // namespace
 
 struct Hdf5File::Handle {
@@ -136,10 +146,14 @@ vtkSmartPointer<vtkDataArray> Hdf5File::read(const std::string& dataset, const H
         (part.count[i] > 0 && (part.count[i] - 1) > (extents[i] - part.start[i]) / part.stride[i]) ||
         (part.count[i] > 0 && part.start[i] + (part.count[i] - 1) * part.stride[i] >= extents[i]))
       fail("its dataset " + dataset + " is smaller than what is wanted of it: cut off, or of another mesh");
+    if (part.count[i] > 0 && count > ~std::uint64_t{0} / part.count[i]) fail("its dataset " + dataset + " is damaged");
     count *= part.count[i];
   }
   const Id data(H5Dopen2(file_->id, dataset.c_str(), H5P_DEFAULT), H5Dclose);
   const Id space(H5Dget_space(data), H5Sclose), type(H5Dget_type(data), H5Tclose);
+  if (!is_likely(data, count))
+    fail("is damaged: its dataset " + dataset + " announces " + std::to_string(count) +
+         " numbers, which it cannot hold");
   auto [array, memory_type] = array_for(type);
   if (!array) fail("its dataset " + dataset + " has no numbers");
   array->SetNumberOfTuples(static_cast<vtkIdType>(count));

@@ -19,6 +19,7 @@
 
 #include "base/text/text.h"
 #include "tools/import/vtk/vtk_messages.h"
+#include "tools/import/vtk_formats/vtk_counts.h"
 #include "tools/import/vtk_formats/vtp_files.h"
 
 namespace tensorray {
@@ -171,6 +172,7 @@ PolyData read_vtp_file(const Path& path, const std::set<std::string>& asked) {
   check_kind_and_end(path);
   const std::string text = xml_of(path);
   check_counts(text);
+  if (const std::string reason = impossible_xml_count(path); !reason.empty()) throw std::runtime_error("it " + reason);
   const std::set<std::string> wanted = in_every_piece(text, asked);
   const VtkMessages messages;
   try {

@@ -19,7 +19,7 @@
 #include "base/text/text.h"
 #include "tools/import/cases/openfoam_parts.h"
 #include "tools/import/vtk_formats/netcdf_size.h"
-#include "tools/import/vtk_source/vtk_counts.h"
+#include "tools/import/vtk_formats/vtk_counts.h"
 
 namespace tensorray {
 namespace {
@@ -250,6 +250,11 @@ std::string way_out(const std::string& ending, const std::string& name) {
   return {};
 }
 
+/// @param reason  Empty if the file is possible.
+void require_possible(const fs::path& path, const std::string& reason) {
+  if (!reason.empty()) fail(path, reason);
+}
+
 /// Also checks pieces, which may have the extent of the whole.
 VtkKind checked_kind(const fs::path& path) {
   if (!fs::exists(path)) fail(path, "does not exist");
@@ -276,12 +281,12 @@ VtkKind checked_kind(const fs::path& path) {
   }
   if (facts_of(*found).xml_type) {
     check_xml_end(path);
-    check_xml_counts(path);
+    require_possible(path, impossible_xml_count(path));
   }
   if (*found >= VtkKind::image_pieces && *found <= VtkKind::unstructured_pieces) check_pieces(path, *found);
   if (*found == VtkKind::legacy) {
     check_legacy(path, head);
-    check_legacy_counts(path);
+    require_possible(path, impossible_legacy_count(path));
   }
   if (*found == VtkKind::openfoam) openfoam_parts(path, openfoam_case(path));
   if (*found == VtkKind::exodus) check_netcdf_size(path);

@@ -1,4 +1,4 @@
-#include "tools/import/vtk_source/vtk_counts.h"
+#include "tools/import/vtk_formats/vtk_counts.h"
 
 #include <algorithm>
 #include <array>
@@ -12,7 +12,6 @@
 
 #include <fmt/format.h>
 
-#include "base/errors.h"
 #include "base/text/text.h"
 
 namespace tensorray {
@@ -24,8 +23,8 @@ constexpr double most_expanded = 8000;  // LZMA makes this much of a byte, where
 constexpr double most_components = 100000;
 constexpr auto any_number = std::numeric_limits<std::streamsize>::max();
 
-[[noreturn]] void fail_announced(const fs::path& path, const std::string& what) {
-  fail(path, "is damaged or cut off: it announces " + what + ", which it cannot hold; copy or write it again");
+std::string impossible(const std::string& what) {
+  return "is damaged or cut off: it announces " + what + ", which it cannot hold; copy or write it again";
 }
 
 /// The number in `name="number"` of a tag; 0 if there is none.
@@ -76,7 +75,7 @@ double announced(const std::string& line) {
 
 }  // namespace
 
-void check_xml_counts(const fs::path& path) {
+std::string impossible_xml_count(const fs::path& path) {
   const double most = most_expanded * static_cast<double>(fs::file_size(path));
   std::ifstream file(path, std::ios::binary);
   bool has_arrays = false;
@@ -84,21 +83,21 @@ void check_xml_counts(const fs::path& path) {
   for (std::string tag; file.ignore(any_number, '<') && std::getline(file, tag, '>');) {
     if (starts_with(tag, "AppendedData")) break;  // Bytes that may look like tags.
     if (starts_with(tag, "Piece"))
-      for (const char* count : {"NumberOfPoints", "NumberOfCells"})
+      for (const char* count : {"NumberOfPoints", "NumberOfCells", "NumberOfVerts", "NumberOfLines", "NumberOfPolys"})
         if (const double number = number_of(tag, count); !(number <= most))
-          fail_announced(path, fmt::format("{} {:.0f}", count, number));
+          return impossible(fmt::format("{} {:.0f}", count, number));
     if (starts_with(tag, "DataArray")) {
       has_arrays = true;
       const double components = number_of(tag, "NumberOfComponents");
       if (!(components >= 0 && components <= std::min(most, most_components)))
-        fail_announced(path, fmt::format("{:.0f} components of an array", components));
+        return impossible(fmt::format("{:.0f} components of an array", components));
     }
     points = std::max(points, points_of(tag));
   }
-  if (has_arrays && points > most) fail_announced(path, fmt::format("{:.0f} points", points));
+  return has_arrays && points > most ? impossible(fmt::format("{:.0f} points", points)) : "";
 }
 
-void check_legacy_counts(const fs::path& path) {
+std::string impossible_legacy_count(const fs::path& path) {
   const double most = 8 * static_cast<double>(fs::file_size(path));
   std::ifstream file(path, std::ios::binary);
   std::string line(256, '\0');
@@ -107,9 +106,10 @@ void check_legacy_counts(const fs::path& path) {
       file.clear();
       file.ignore(any_number, '\n');
     } else if (const std::string text = line.c_str(); !(announced(text) <= most)) {
-      fail_announced(path, "\"" + escaped(text) + "\"");
+      return impossible("\"" + escaped(text) + "\"");
     }
   }
+  return {};
 }
 
 }  // namespace tensorray
