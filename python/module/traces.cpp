@@ -100,7 +100,7 @@ std::vector<Eigen::Vector3d> way(const TensorField& field, const RayRecord& reco
 /// Follows all rays, on all threads: in batches, as a batch belongs to one thread.
 void trace_all(const TensorField& field, const Geometry& geometry, const BendingSettings& bending, bool with_ways,
                Traced& traced, const Progress& progress) {
-  constexpr std::size_t batch_size = 512;
+  const std::size_t batch_size = with_ways ? 64 : 512;  // Ctrl-C waits for one, and rays with ways may be long.
   RayBatch& rays = traced.rays;
   rays.end.resize(rays.size());
   rays.length.resize(rays.size());

@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "base/process/child_program.h"
+#include "base/process/progress.h"
 #include "base/text/text.h"
 #include "scenes/pipeline/read_scene.h"
 #include "tools/command_line/tell.h"
@@ -58,6 +59,7 @@ ImportedField::ImportedField(const std::filesystem::path& file, const ImportChoi
   arguments.insert(arguments.end(), {"--", file.string()});
   const ProgramEnd end = run_program(import_program(), arguments, UnnamedFile());
   if (end.signal != 0) throw std::runtime_error(file.string() + ": the import crashed; the file may be damaged");
+  if (end.status == 130) throw Cancelled();
   if (end.status != 0) throw std::runtime_error(last_line(end.error));
   if (!quiet) print_error(end.error);
 }

@@ -271,6 +271,15 @@ Scene render_to_files(const SceneDescription& description, const RenderRun& run,
   return scene;
 }
 
+/// A sequence reads its scene for each frame. @throw SceneError if it comes through a pipe.
+void require_file(const std::filesystem::path& scene_file) {
+  std::error_code none;
+  if (std::filesystem::exists(scene_file, none) && !std::filesystem::is_regular_file(scene_file, none))
+    throw SceneError(printable(scene_file.string()) +
+                     ": a sequence reads its scene for each frame, and a pipe is read "
+                     "once; save the scene to a file");
+}
+
 /// @throw SceneError if two frames have a file in common.
 void check_names(const std::filesystem::path& scene_file, SceneChanges changes, const std::vector<int>& frames,
                  const RenderRun& run) {
@@ -429,6 +438,7 @@ std::vector<int> render_frames(const std::filesystem::path& scene_file, SceneCha
                                const std::vector<int>& frames, const RenderRun& run, Progress& progress) {
   const Threads threads(run.threads);
   set_image_threads(static_cast<int>(running_threads()));
+  require_file(scene_file);
   check_names(scene_file, changes, frames, run);
   EarlierFrames earlier;
   auto [job, is_divided] = sequence_of(scene_file, changes, frames, run, earlier.loaded, progress);

@@ -121,6 +121,10 @@ TEST_F(Frames, MistakesAreNamed) {
     }
   expect_error({"render", "scene.json", "--frames", "1-2", "--save-scene", "copy.json"}, "--save-scene");
   EXPECT_FALSE(exists(in_folder("one.exr")));
+  const Outcome piped =
+      wait_for(start_in("cat scene.json |", {"render", "/dev/stdin", "--frames", "1-2", "-o", "a.#.exr"}));
+  EXPECT_EQ(piped.status, 2);
+  EXPECT_NE(piped.error.find("a pipe is read once"), std::string::npos) << piped.error;
 }
 
 }  // namespace
