@@ -64,8 +64,8 @@ class CornerRing {
     return {left_[(i + size() - 1) % size()], left_[i], left_[(i + 1) % size()]};
   }
 
-  /// Removes corner i. Of the others, only its neighbours become an ear by that, or are one no longer, except where the
-  /// polygon touches or crosses itself.
+  /// Removes corner i, an ear. Of the others, only its neighbours become an ear by that, or are one no longer, except
+  /// where the polygon touches or crosses itself: a triangle that is no ear has a concave corner in it, which stays.
   void cut(std::size_t i) {
     left_.erase(left_.begin() + static_cast<std::ptrdiff_t>(i));
     known_.erase(known_.begin() + static_cast<std::ptrdiff_t>(i));

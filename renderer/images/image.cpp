@@ -20,8 +20,8 @@
 #include "renderer/images/exr_encoder.h"
 #include "renderer/images/image_plugin.h"
 #include "renderer/images/luminance_chroma.h"
+#include "renderer/images/png_chunks.h"
 #include "renderer/images/png_encoder.h"
-#include "renderer/images/png_tags.h"
 
 namespace tensorray {
 namespace {
@@ -119,6 +119,7 @@ auto read(const std::filesystem::path& path, const Decode& decode) {
   require_readable(path);
   try {
     if (is_cut_off(path)) throw std::runtime_error("the file is cut off");
+    check_png(path);
     return decode();
   } catch (const std::bad_alloc&) {
     throw std::runtime_error("cannot read " + path.string() + ": not enough memory for a picture of its size");

@@ -18,6 +18,7 @@
 #include <assimp/Importer.hpp>
 #include <assimp/LogStream.hpp>
 #include <assimp/scene.h>
+#include <unistd.h>
 
 #include "base/process/child_program.h"
 #include "base/text/text.h"
@@ -156,7 +157,7 @@ class IndexErrors : public Assimp::LogStream {
 /// Uses none of assimp's processing steps, since they abort the program on unexpected input.
 MeshWithNormals import(const std::filesystem::path& path) {
   Assimp::Importer importer;
-  importer.SetIOHandler(new FilesOnly);  // Which it deletes.
+  importer.SetIOHandler(new FilesOnly);  // The importer deletes it.
   const aiScene* scene = importer.ReadFile(path.string(), 0);
   const std::string error = importer.GetErrorString();
   if (error.find("bad_alloc") != std::string::npos) throw std::bad_alloc();
@@ -198,13 +199,16 @@ MeshWithNormals read_exchanged(const std::filesystem::path& exchange) {
 MeshWithNormals read_assimp_mesh(const std::filesystem::path& path) {
   const std::filesystem::path program = sibling_program("tensorray");
   std::error_code none;
-  if (!std::filesystem::exists(program, none)) return import(path);
+  if (!std::filesystem::is_regular_file(program, none) || access(program.c_str(), X_OK) != 0) return import(path);
   const UnnamedFile exchange;
   const ProgramEnd end = run_program(program, {"--read-mesh", shared_file, path.string()}, exchange);
   if (end.signal == 0 && end.status == 0) return read_exchanged(exchange.path());
-  const std::string reason = end.signal == 0 ? one_line(end.error) : "";
-  throw std::runtime_error(reason.empty() ? "it ended its reader; it is damaged or cut off, or does not fit in memory"
-                                          : reason);
+  if (end.signal != 0)
+    throw std::runtime_error("it ended its reader; it is damaged or cut off, or does not fit in memory");
+  const std::string reason = one_line(end.error);
+  if (!reason.empty()) throw std::runtime_error(reason);
+  throw std::runtime_error("its reader failed without a word; the folder for temporary files, " +
+                           temporary_files().string() + ", may be full");
 }
 
 void write_assimp_mesh(const std::filesystem::path& path, const std::filesystem::path& exchange) {

@@ -17,7 +17,6 @@
 
 #include "base/text/text.h"
 #include "renderer/images/stored_bytes.h"
-#include "renderer/openimageio/png_chunks.h"
 
 namespace tensorray::openimageio {
 namespace {
@@ -59,7 +58,8 @@ bool is_tiff(const OIIO::ImageInput& input) { return std::strcmp(input.format_na
 /// A tile may be larger than its picture, but memory is reserved for all of it before the file is found to be shorter.
 /// Lines are counted from a place that the file sets.
 void require_likely_layout(const OIIO::ImageSpec& spec) {
-  if (std::abs(std::int64_t{spec.y}) > 1 << 30) throw std::runtime_error("its pixels are far outside of it");
+  if (std::abs(std::int64_t{spec.y}) > 1 << 30)
+    throw std::runtime_error("its header is damaged: its first line is " + std::to_string(spec.y));
   const double tile = double(spec.tile_width) * spec.tile_height, picture = double(spec.width) * spec.height;
   if (tile > std::max(4096.0 * 4096, 4 * picture))
     throw std::runtime_error("its header is damaged: its tiles have " + std::to_string(spec.tile_width) + " x " +
@@ -67,9 +67,9 @@ void require_likely_layout(const OIIO::ImageSpec& spec) {
 }
 
 /// Reads channels of a part as `type` into `samples`, which holds them all.
-/// @throw std::runtime_error with the reader's first message. Some readers give none if a file is cut off, and that of
-/// TIFF says that it has read what it has not: of strips that are cut off, and of damaged ones that it reads together.
-/// It therefore reads lines, as fast.
+/// OpenImageIO's reader of TIFF reports success for strips that are cut off or damaged if it reads several at once.
+/// TIFF is therefore read line by line, which takes the same time.
+/// @throw std::runtime_error with the reader's first message. Some readers give none if a file is cut off.
 void read_samples(OIIO::ImageInput& input, int part, int first, int count, OIIO::TypeDesc type, void* samples) {
   const OIIO::ImageSpec spec = input.spec(part, 0);
   require_likely_layout(spec);
@@ -89,7 +89,6 @@ void read_samples(OIIO::ImageInput& input, int part, int first, int count, OIIO:
 }
 
 std::unique_ptr<OIIO::ImageInput> open_as_it_is(const std::filesystem::path& path) {
-  check_png(path);
   OIIO::ImageSpec as_it_is;
   as_it_is.attribute("oiio:UnassociatedAlpha", 1);
   std::unique_ptr<OIIO::ImageInput> input = OIIO::ImageInput::open(path.string(), &as_it_is);

@@ -19,7 +19,7 @@
 #include "integrators/photons/photon_sums.h"
 #include "integrators/seeds/seed_files.h"
 #include "renderer/color/icc_profile.h"
-#include "renderer/images/png_tags.h"
+#include "renderer/images/png_chunks.h"
 #include "renderer/meshes/obj.h"
 #include "renderer/meshes/ply.h"
 #include "renderer/spectra/spectrum.h"
@@ -36,6 +36,7 @@
 #include "tools/import/lattice_files/lattice_files.h"
 #include "tools/import/vtk/vtk_messages.h"
 #include "tools/import/vtk_formats/netcdf_size.h"
+#include "tools/import/vtk_formats/vtk_counts.h"
 #include "volumes/vdb/file_bytes.h"
 #include "volumes/vdb/vdb_tree_check.h"
 
@@ -160,10 +161,11 @@ bool read_profile(const std::string& bytes) {
   return expect_one_line([&] { parse_icc_profile(bytes, false); }) || is_grey;
 }
 
-bool read_png_tags(const std::string& bytes) {
+bool read_png_chunks(const std::string& bytes) {
   return read_file(bytes, [](const std::filesystem::path& path) {
     ColorTags tags;
     add_png_tags(path, tags);
+    check_png(path);
   });
 }
 
@@ -211,6 +213,14 @@ bool read_ensight(const std::string& bytes) {
   });
 }
 
+/// Both are for any bytes.
+bool read_vtk_counts(const std::string& bytes) {
+  return read_file(bytes, [](const std::filesystem::path& path) {
+    const std::string xml = impossible_xml_count(path), legacy = impossible_legacy_count(path);
+    if (!xml.empty() || !legacy.empty()) throw std::runtime_error(xml + legacy);
+  });
+}
+
 bool read_plot3d(const std::string& bytes) {
   return read_file(bytes, [](const std::filesystem::path& path) {
     const Plot3dLayout layout = plot3d_grid_layout(path);
@@ -240,18 +250,31 @@ bool read_vdb_table(const std::string& bytes) { return delayed_load_fits(bytes, 
 }  // namespace
 
 const std::vector<FuzzTarget>& fuzz_targets() {
-  static const std::vector<FuzzTarget> targets{{"scene", read_scene_file},  {"override", read_overrides},
-                                               {"frames", read_frames},     {"text", read_seeds_and_spectrum},
-                                               {"work", read_kept_work},    {"kept", read_kept_unit},
-                                               {"ply", read_ply_mesh},      {"obj", read_obj_mesh},
-                                               {"icc", read_profile},       {"png", read_png_tags},
-                                               {"tck", read_tck},           {"npy", read_npy},
-                                               {"nrrd", read_nrrd},         {"nifti", read_nifti},
-                                               {"mrtrix", read_mrtrix},     {"metaimage", read_metaimage},
-                                               {"xdmf", read_xdmf},         {"ensight", read_ensight},
-                                               {"plot3d", read_plot3d},     {"netcdf", read_netcdf},
-                                               {"vdb_tree", read_vdb_tree}, {"vdb_table", read_vdb_table},
-                                               {"http", read_http},         {"page", read_page_message}};
+  static const std::vector<FuzzTarget> targets{{"scene", read_scene_file},
+                                               {"override", read_overrides},
+                                               {"frames", read_frames},
+                                               {"text", read_seeds_and_spectrum},
+                                               {"work", read_kept_work},
+                                               {"kept", read_kept_unit},
+                                               {"ply", read_ply_mesh},
+                                               {"obj", read_obj_mesh},
+                                               {"icc", read_profile},
+                                               {"png", read_png_chunks},
+                                               {"tck", read_tck},
+                                               {"npy", read_npy},
+                                               {"nrrd", read_nrrd},
+                                               {"nifti", read_nifti},
+                                               {"mrtrix", read_mrtrix},
+                                               {"metaimage", read_metaimage},
+                                               {"xdmf", read_xdmf},
+                                               {"ensight", read_ensight},
+                                               {"plot3d", read_plot3d},
+                                               {"netcdf", read_netcdf},
+                                               {"vtk_counts", read_vtk_counts},
+                                               {"vdb_tree", read_vdb_tree},
+                                               {"vdb_table", read_vdb_table},
+                                               {"http", read_http},
+                                               {"page", read_page_message}};
   return targets;
 }
 

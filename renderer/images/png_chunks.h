@@ -1,0 +1,19 @@
+#pragma once
+/// @file renderer/images/png_chunks.h
+/// What a PNG says about its colours, and whether its chunks are those that were written. OpenImageIO 2.4 does not pass
+/// on chromaticities and code points, and libpng prints a line of its own about damaged files.
+
+#include <filesystem>
+
+#include "renderer/images/color_tags.h"
+
+namespace tensorray {
+
+/// Does nothing if the file is no PNG. @throw std::runtime_error with the reason, without the file: it is cut off, or a
+/// chunk that pictures need has another CRC.
+void check_png(const std::filesystem::path& path);
+
+/// Adds cICP, sRGB, gAMA and cHRM to `tags`. Changes nothing if the file is no PNG. Damaged chunks are left out.
+void add_png_tags(const std::filesystem::path& path, ColorTags& tags);
+
+}  // namespace tensorray
