@@ -5,7 +5,6 @@
 #include <cmath>
 #include <cstdlib>
 #include <fstream>
-#include <limits>
 #include <map>
 #include <set>
 #include <sstream>
@@ -15,6 +14,7 @@
 #include <vtkMultiBlockDataSet.h>
 
 #include "base/errors.h"
+#include "base/text/short_lines.h"
 #include "base/text/text.h"
 
 namespace tensorray {
@@ -179,12 +179,18 @@ void require_no_devices(const Entry& entry, const fs::path& folder) {
   std::istringstream words(entry.value);
   for (std::string word; words >> word;) {
     const fs::path named = folder / word;
-    const std::string name = named.filename().string(), start = name.substr(0, name.find('*'));
-    if (start == name) require_no_device(named);
+    const std::string name = named.filename().string();
+    const std::size_t first = name.find('*'), last = name.rfind('*');
+    if (first == std::string::npos) {
+      require_no_device(named);
+      continue;
+    }
     std::error_code none;
-    fs::directory_iterator file(start == name ? fs::path() : fs::absolute(named).parent_path(), none);
-    for (; file != fs::directory_iterator(); ++file)
-      if (starts_with(file->path().filename().string(), start)) require_no_device(file->path());
+    for (fs::directory_iterator file(fs::absolute(named).parent_path(), none), end; file != end; ++file) {
+      const std::string other = file->path().filename().string();
+      if (starts_with(other, name.substr(0, first)) && ends_with(other, name.substr(last + 1)))
+        require_no_device(file->path());
+    }
   }
 }
 
@@ -195,19 +201,18 @@ void check_counts(const fs::path& path) {
                                            "quad4",       "quad8",   "tetra4", "tetra10", "pyramid5", "pyramid13",
                                            "penta6",      "penta15", "hexa8",  "hexa20",  "nsided",   "nfaced"};
   const auto most = static_cast<double>(fs::file_size(path));
-  std::ifstream file(path, std::ios::binary);
-  std::string line(81, '\0');  // Longer lines are of binary files, or of numbers.
-  for (std::string before; file.getline(line.data(), static_cast<std::streamsize>(line.size())) || !file.eof();) {
-    if (file.bad()) return;
-    const bool is_long = file.fail();
-    file.clear();
-    if (is_long) file.ignore(std::numeric_limits<std::streamsize>::max(), '\n');
-    const std::string text = is_long ? "" : trimmed(line.c_str());
+  std::string before;
+  int left_out = 2;  // Lines of a description, or of a part's number and description.
+  for_each_short_line(path, 80, [&](const std::string& line) {
+    if (left_out-- > 0) return true;
+    const std::string text = trimmed(line);
     if (types.count(before) > 0 && std::strtod(text.c_str(), nullptr) > most)
       fail(path, "is damaged or cut off: it announces \"" + before + " " + escaped(text) +
                      "\", which it cannot hold; copy or write it again");
+    left_out = text == "part" ? 2 : 0;
     before = starts_with(text, "g_") ? text.substr(2) : text;
-  }
+    return true;
+  });
 }
 
 /// In a case with file sets VTK seeks the steps in all files, and goes on for ever in one without.

@@ -73,7 +73,10 @@ void find_processors(OpenFoamParts& parts) {
 
 /// VTK opens what it finds in the folders of meshes and times.
 void require_no_devices(const fs::path& folder) {
-  for (const fs::directory_entry& entry : fs::recursive_directory_iterator(folder)) require_no_device(entry.path());
+  std::error_code none;
+  for (fs::recursive_directory_iterator entry(folder, fs::directory_options::skip_permission_denied, none), end;
+       entry != end; entry.increment(none))
+    if (entry->is_other(none)) require_no_device(entry->path());
 }
 
 void check_mesh(const fs::path& mesh) {

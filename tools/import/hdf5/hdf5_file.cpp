@@ -70,11 +70,11 @@ std::pair<vtkSmartPointer<vtkDataArray>, hid_t> array_for(hid_t type) {
 
 /// Whether a dataset may have so many numbers: one whose chunks were never written takes no bytes of the file, and any
 /// memory. Numbers of virtual datasets are in other files.
-bool is_likely(hid_t data, std::uint64_t count) {
-  constexpr double unwritten = 64 << 20, most_expanded = 8000;
+bool is_likely(hid_t data, hid_t type, std::uint64_t count) {
+  constexpr double unwritten = 64 << 20, most_expanded = 1e5;  // zstd makes 30,000 bytes of one.
   const Id list(H5Dget_create_plist(data), H5Pclose);
   if (H5Pget_layout(list) == H5D_VIRTUAL || H5Pget_external_count(list) > 0) return true;
-  const double bytes = 8 * static_cast<double>(count);
+  const double bytes = static_cast<double>(H5Tget_size(type)) * static_cast<double>(count);
   return bytes <= std::max(unwritten, most_expanded * static_cast<double>(H5Dget_storage_size(data)));
 }
 
@@ -151,9 +151,9 @@ vtkSmartPointer<vtkDataArray> Hdf5File::read(const std::string& dataset, const H
   }
   const Id data(H5Dopen2(file_->id, dataset.c_str(), H5P_DEFAULT), H5Dclose);
   const Id space(H5Dget_space(data), H5Sclose), type(H5Dget_type(data), H5Tclose);
-  if (!is_likely(data, count))
+  if (!is_likely(data, type, count))
     fail("is damaged: its dataset " + dataset + " announces " + std::to_string(count) +
-         " numbers, which it cannot hold");
+         " numbers, which it cannot hold; copy or write it again");
   auto [array, memory_type] = array_for(type);
   if (!array) fail("its dataset " + dataset + " has no numbers");
   array->SetNumberOfTuples(static_cast<vtkIdType>(count));

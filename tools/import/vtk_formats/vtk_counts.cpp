@@ -4,24 +4,23 @@
 #include <array>
 #include <cstdint>
 #include <cstdlib>
-#include <fstream>
-#include <limits>
 #include <sstream>
 #include <string>
 #include <vector>
 
 #include <fmt/format.h>
 
+#include "base/text/short_lines.h"
 #include "base/text/text.h"
+#include "tools/import/vtk_formats/vtk_tags.h"
 
 namespace tensorray {
 namespace {
 
 namespace fs = std::filesystem;
 
-constexpr double most_expanded = 8000;  // LZMA makes this much of a byte, where all are the same.
+constexpr double most_expanded = 8000;  // Points for each byte of a file: LZMA makes 7000 bytes of one.
 constexpr double most_components = 100000;
-constexpr auto any_number = std::numeric_limits<std::streamsize>::max();
 
 std::string impossible(const std::string& what) {
   return "is damaged or cut off: it announces " + what + ", which it cannot hold; copy or write it again";
@@ -29,15 +28,12 @@ std::string impossible(const std::string& what) {
 
 /// The number in `name="number"` of a tag; 0 if there is none.
 double number_of(const std::string& tag, const std::string& name) {
-  const std::size_t at = tag.find(name + "=");
-  return at == std::string::npos ? 0 : std::strtod(tag.c_str() + std::min(tag.size(), at + name.size() + 2), nullptr);
+  return std::strtod(attribute(tag, name).c_str(), nullptr);
 }
 
-/// The points of an extent in a tag; 0 if there is none.
+/// The points of the extent of a piece; 0 if it has none.
 double points_of(const std::string& tag) {
-  const std::size_t at = tag.find("Extent=");
-  if (at == std::string::npos) return 0;
-  std::istringstream stream(tag.substr(std::min(tag.size(), at + 8)));
+  std::istringstream stream(attribute(tag, "Extent"));
   std::array<double, 6> extent{};
   for (double& bound : extent) stream >> bound;
   double points = stream ? 1 : 0;
@@ -77,39 +73,34 @@ double announced(const std::string& line) {
 
 std::string impossible_xml_count(const fs::path& path) {
   const double most = most_expanded * static_cast<double>(fs::file_size(path));
-  std::ifstream file(path, std::ios::binary);
-  bool has_arrays = false;
-  double points = 0;
-  for (std::string tag; file.ignore(any_number, '<') && std::getline(file, tag, '>');) {
-    if (starts_with(tag, "AppendedData")) break;  // Bytes that may look like tags.
-    if (starts_with(tag, "Piece"))
+  std::string found;
+  double points = 0;  // Of the piece whose arrays come; pieces of other files (Source) have theirs there.
+  for_each_tag(path, [&](const std::string& tag) {
+    if (starts_with(tag, "Piece")) {
       for (const char* count : {"NumberOfPoints", "NumberOfCells", "NumberOfVerts", "NumberOfLines", "NumberOfPolys"})
         if (const double number = number_of(tag, count); !(number <= most))
-          return impossible(fmt::format("{} {:.0f}", count, number));
-    if (starts_with(tag, "DataArray")) {
-      has_arrays = true;
-      const double components = number_of(tag, "NumberOfComponents");
-      if (!(components >= 0 && components <= std::min(most, most_components)))
-        return impossible(fmt::format("{:.0f} components of an array", components));
+          found = impossible(fmt::format("{} {:.0f}", count, number));
+      points = attribute(tag, "Source").empty() ? points_of(tag) : 0;
     }
-    points = std::max(points, points_of(tag));
-  }
-  return has_arrays && points > most ? impossible(fmt::format("{:.0f} points", points)) : "";
+    if (!starts_with(tag, "DataArray")) return;
+    const double components = number_of(tag, "NumberOfComponents");
+    if (!(components >= 0 && components <= std::min(most, most_components)))
+      found = impossible(fmt::format("{:.0f} components of an array", components));
+    if (points > most) found = impossible(fmt::format("{:.0f} points", points));
+  });
+  return found;
 }
 
 std::string impossible_legacy_count(const fs::path& path) {
+  constexpr int first_line = 3;  // After the version, and a title of any words.
   const double most = 8 * static_cast<double>(fs::file_size(path));
-  std::ifstream file(path, std::ios::binary);
-  std::string line(256, '\0');
-  while (file.getline(line.data(), static_cast<std::streamsize>(line.size())) || !(file.eof() || file.bad())) {
-    if (file.fail()) {  // A longer line, of numbers.
-      file.clear();
-      file.ignore(any_number, '\n');
-    } else if (const std::string text = line.c_str(); !(announced(text) <= most)) {
-      return impossible("\"" + escaped(text) + "\"");
-    }
-  }
-  return {};
+  std::string found;
+  int number = 0;
+  for_each_short_line(path, 254, [&](const std::string& line) {
+    if (++number >= first_line && !(announced(line) <= most)) found = impossible("\"" + escaped(line) + "\"");
+    return found.empty();
+  });
+  return found;
 }
 
 }  // namespace tensorray

@@ -7,8 +7,8 @@
 
 namespace tensorray {
 
-/// What a tag announces (points, cells or components) that no file of this size holds, however well it is compressed, as
-/// a reason without the file; empty if there is none.
+/// What a tag announces (points, cells or components) that no file of this size holds, however well it is compressed,
+/// as a reason without the file; empty if there is none.
 std::string impossible_xml_count(const std::filesystem::path& path);
 
 /// The same of a line in a legacy file, where it announces more numbers than the file has bits.

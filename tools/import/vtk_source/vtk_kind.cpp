@@ -20,6 +20,7 @@
 #include "tools/import/cases/openfoam_parts.h"
 #include "tools/import/vtk_formats/netcdf_size.h"
 #include "tools/import/vtk_formats/vtk_counts.h"
+#include "tools/import/vtk_formats/vtk_tags.h"
 
 namespace tensorray {
 namespace {
@@ -80,17 +81,6 @@ std::string read_part(const fs::path& path, std::uintmax_t offset, std::uintmax_
 }
 
 std::string read_head(const fs::path& path) { return read_part(path, 0, 4096); }
-
-/// The value of `name="value"` at or after `from`; moves `from` past it. Empty if there is none.
-std::string attribute(const std::string& text, const std::string& name, std::size_t& from) {
-  const std::size_t start = text.find(name + "=", from);
-  if (start == std::string::npos || start + name.size() + 1 >= text.size()) return {};
-  const std::size_t open = start + name.size() + 1;
-  const std::size_t close = text.find(text[open], open + 1);  // either kind of quotation mark
-  if (close == std::string::npos) return {};
-  from = close + 1;
-  return text.substr(open + 1, close - open - 1);
-}
 
 std::optional<VtkKind> xml_kind(const fs::path& path, const std::string& head) {
   std::size_t root = head.find("<VTKFile");
@@ -164,8 +154,7 @@ std::optional<Extent> extent_of(const std::string& text) {
 /// VTK reads invalid numbers as 0 or 1.
 void check_placement(const fs::path& path, const std::string& tag) {
   for (const char* name : {"Origin", "Spacing"}) {
-    std::size_t from = 0;
-    const std::string text = attribute(tag, name, from);
+    const std::string text = attribute(tag, name);
     std::istringstream stream(text);
     double x, y, z;
     if (!text.empty() && !(stream >> x >> y >> z))
@@ -175,22 +164,18 @@ void check_placement(const fs::path& path, const std::string& tag) {
 
 /// VTK does not initialize the part of an extent that no piece covers.
 void check_extents(const fs::path& path) {
-  std::ifstream file(path, std::ios::binary);
   vtkNew<vtkExtentSplitter> splitter;
   std::optional<Extent> whole;
   int pieces = 0;
-  constexpr auto any_number = std::numeric_limits<std::streamsize>::max();
-  for (std::string tag; file.ignore(any_number, '<') && std::getline(file, tag, '>');) {
-    if (tag.compare(0, 12, "AppendedData") == 0) break;  // bytes that may look like tags
-    std::size_t from = 0;
+  for_each_tag(path, [&](const std::string& tag) {
     if (!whole) {
-      whole = extent_of(attribute(tag, "WholeExtent", from));
+      whole = extent_of(attribute(tag, "WholeExtent"));
       if (whole) check_placement(path, tag);
-    } else if (tag.compare(0, 5, "Piece") == 0) {
-      std::optional<Extent> extent = extent_of(attribute(tag, "Extent", from));
+    } else if (starts_with(tag, "Piece")) {
+      std::optional<Extent> extent = extent_of(attribute(tag, "Extent"));
       if (extent) splitter->AddExtentSource(pieces++, 0, extent->data());
     }
-  }
+  });
   if (!whole) return;
   splitter->AddExtent(whole->data());
   if (splitter->ComputeSubExtents() == 0)
