@@ -67,7 +67,7 @@ ProgramEnd run_program(const std::filesystem::path& program, const std::vector<s
   ProgramEnd end;
   if (WIFSIGNALED(status)) end.signal = WTERMSIG(status);
   if (WIFEXITED(status)) end.status = WEXITSTATUS(status);
-  if (end.signal == SIGINT || end.signal == SIGTERM) throw Cancelled();
+  if (end.signal == SIGINT || end.signal == SIGTERM || end.signal == SIGHUP) throw Cancelled();
   std::ifstream file(error.path(), std::ios::binary);
   end.error.assign(std::istreambuf_iterator<char>(file), {});
   return end;

@@ -119,7 +119,7 @@ MemoryLimit memory_limit(const fs::path& root) {
 }
 
 void limit_memory() {
-#ifndef TENSORRAY_SANITIZED  // Which reserve memory many times over.
+#ifndef TENSORRAY_SANITIZED  // Sanitizers reserve memory many times over.
   const double most = 0.875 * memory_limit().bytes;
   rlimit limit{};
   if (most >= 0x1p62 || getrlimit(RLIMIT_DATA, &limit) != 0) return;

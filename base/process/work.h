@@ -16,7 +16,8 @@
 
 namespace tensorray {
 
-/// What an earlier run has kept, or another process has sent, cannot be of this work. Who knows its file names it.
+/// Results that an earlier run has kept, or that another process has sent, do not belong to this work. The caller that
+/// knows their file adds its name.
 struct DamagedWork : std::runtime_error {
   using std::runtime_error::runtime_error;
 };

@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <exception>
 #include <mutex>
+#include <optional>
 #include <set>
 #include <stdexcept>
 #include <string>
@@ -38,8 +39,8 @@ struct Calls {
   std::mutex mutex;
   std::condition_variable ended;
   std::set<Call*> running;
-  bool is_exiting = false;
-  pid_t process = getpid();  // A process that was forked has the set, but not the threads.
+  std::optional<std::thread::id> exiting;  ///< The thread that ends Python; it may still work, in other exit handlers.
+  pid_t process = getpid();                // A process that was forked has the set, but not the threads.
 };
 
 Calls& calls() {
@@ -47,11 +48,14 @@ Calls& calls() {
   return *all;
 }
 
+/// Whether Python ends, and this thread is another one than that which ends it. The caller holds the mutex.
+bool is_exiting() { return calls().exiting && *calls().exiting != std::this_thread::get_id(); }
+
 class Running {
  public:
   explicit Running(Call& call) : call_(call) {
     const std::lock_guard<std::mutex> lock(calls().mutex);
-    if (calls().is_exiting) throw Cancelled();
+    if (is_exiting()) throw std::runtime_error("Python ends: no work begins any more");
     calls().running.insert(&call);
   }
   ~Running() {
@@ -86,6 +90,10 @@ void look_up(Call& shared, const py::object& report) {
   const std::string phase = shared.phase;
   const std::uint64_t done = shared.done, total = shared.total;
   lock.unlock();
+  {
+    const std::lock_guard<std::mutex> all(calls().mutex);
+    if (is_exiting()) throw Cancelled();  // What `report` does could take for ever.
+  }
   const py::gil_scoped_acquire gil;
   if (PyErr_CheckSignals() != 0) throw py::error_already_set();
   if (!report.is_none() && total > 0) report(phase, done, total);
@@ -130,9 +138,10 @@ void end_all_work() {
   if (calls().process != getpid()) return;
   const py::gil_scoped_release released;
   std::unique_lock<std::mutex> lock(calls().mutex);
-  calls().is_exiting = true;
+  calls().exiting = std::this_thread::get_id();
   for (Call* const call : calls().running) call->progress.cancelled = true;
-  calls().ended.wait(lock, [] { return calls().running.empty(); });
+  constexpr std::chrono::seconds patience(5);  // A function of the user that reports progress may never return.
+  calls().ended.wait_for(lock, patience, [] { return calls().running.empty(); });
 }
 
 }  // namespace tensorray

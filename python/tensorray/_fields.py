@@ -30,7 +30,9 @@ class Field:
     """
 
     def __init__(self, T, voxel_size=1.0, origin=(0.0, 0.0, 0.0), *, to_world=None, name="tensor"):
-        tensors = np.asarray(T.astype(float).filled(np.nan) if np.ma.isMaskedArray(T) else T)
+        if np.ma.isMaskedArray(T):
+            T = T.astype(np.result_type(T.dtype, np.float32)).filled(np.nan)
+        tensors = np.asarray(T)
         if tensors.dtype not in (np.float32, np.float64) or not tensors.dtype.isnative or not tensors.flags.aligned:
             tensors = tensors.astype(np.float64)
         if to_world is None:

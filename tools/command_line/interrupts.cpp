@@ -22,7 +22,8 @@ void on_picture_request(int) { picture_request = true; }
 Progress& progress_until_interrupted() {
   std::signal(SIGINT, on_interrupt);
   std::signal(SIGTERM, on_interrupt);
-  if (std::signal(SIGHUP, on_interrupt) == SIG_IGN) std::signal(SIGHUP, SIG_IGN);  // As nohup wants it.
+  struct sigaction hangup {};  // nohup has it ignored.
+  if (sigaction(SIGHUP, nullptr, &hangup) == 0 && hangup.sa_handler != SIG_IGN) std::signal(SIGHUP, on_interrupt);
   std::signal(SIGUSR1, on_picture_request);
   std::signal(SIGXFSZ, SIG_IGN);
   std::signal(SIGPIPE, SIG_IGN);

@@ -261,10 +261,13 @@ Scene render_to_files(const SceneDescription& description, const RenderRun& run,
   const std::future<void> images = std::async(std::launch::async, prepare_images, written_by(description, run));
   WorkFile kept = kept_work(keep.file, run, scene);
   std::vector<WorkUnit> before = kept_before(std::move(kept.before));
-  if (!run.keeping.light.empty() && before.empty()) before = read_light(run.keeping.light, scene, run.quiet);
+  std::filesystem::path kept_in = before.empty() && kept.units.empty() ? "" : keep.file;
+  if (!run.keeping.light.empty() && before.empty()) {
+    before = read_light(run.keeping.light, scene, run.quiet);
+    if (kept_in.empty()) kept_in = run.keeping.light;
+  }
   RenderJob job{
       Work(run.keeping.shard.value_or(WorkPart{}), std::move(kept.units)), {}, nullptr, Work({}, std::move(before))};
-  const std::filesystem::path& kept_in = run.keeping.light.empty() ? keep.file : run.keeping.light;
   naming_kept_work(kept_in, [&] { complete(scene, job, std::move(files), keep, run, progress); });
   for (const std::filesystem::path& file : written_by(description, run))
     if (!run.quiet) tell_made("wrote " + file.string());
@@ -274,7 +277,7 @@ Scene render_to_files(const SceneDescription& description, const RenderRun& run,
 /// A sequence reads its scene for each frame. @throw SceneError if it comes through a pipe.
 void require_file(const std::filesystem::path& scene_file) {
   std::error_code none;
-  if (std::filesystem::exists(scene_file, none) && !std::filesystem::is_regular_file(scene_file, none))
+  if (std::filesystem::is_other(scene_file, none))
     throw SceneError(printable(scene_file.string()) +
                      ": a sequence reads its scene for each frame, and a pipe is read "
                      "once; save the scene to a file");

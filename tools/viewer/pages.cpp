@@ -39,8 +39,8 @@ PageMessage binary_message(const Json& header, const std::string& bytes, bool is
 }
 
 PageMessage error_message(const Json& id, const std::string& text) {
-  const std::size_t end =
-      starts_with(text, "[json.exception") ? text.find("] ") : std::string::npos;  // Of the library.
+  // The JSON library begins its messages with a name in brackets.
+  const std::size_t end = starts_with(text, "[json.exception") ? text.find("] ") : std::string::npos;
   const std::string reason = end == std::string::npos ? text : "a message has a wrong part: " + text.substr(end + 2);
   return text_message({{"type", "error"}, {"id", id}, {"message", one_line(reason)}});
 }
