@@ -30,8 +30,8 @@ std::filesystem::path sibling_program(const std::string& name);
 
 /// Runs a program and waits for its end. The program shares the working folder, the environment, standard output, and
 /// `shared` as `shared_file`. Its standard error is returned in ProgramEnd::error. Any thread may call this.
-/// @throw std::runtime_error with the reason if the program cannot be started; Cancelled if SIGINT, SIGTERM or SIGHUP ended it
-/// (Ctrl-C on a terminal reaches both programs).
+/// @throw std::runtime_error with the reason if the program cannot be started; Cancelled if SIGINT, SIGTERM or SIGHUP
+/// ended it (Ctrl-C on a terminal reaches both programs).
 ProgramEnd run_program(const std::filesystem::path& program, const std::vector<std::string>& arguments,
                        const UnnamedFile& shared);
 
