@@ -9,6 +9,7 @@
 
 #include <fcntl.h>
 #include <sys/mman.h>
+#include <vtkXMLDataElement.h>
 
 #include "base/files/descriptor.h"
 #include "base/files/temporary_folder.h"

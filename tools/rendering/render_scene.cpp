@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 #include <deque>
-#include <functional>
 #include <future>
 #include <optional>
 #include <string>
@@ -12,7 +11,6 @@
 
 #include <fmt/format.h>
 
-#include "base/errors.h"
 #include "base/process/seconds.h"
 #include "base/text/numbered_name.h"
 #include "base/text/path_text.h"
@@ -32,6 +30,7 @@
 #include "tools/ranks/follower.h"
 #include "tools/ranks/leader.h"
 #include "tools/rendering/checkpoint_writer.h"
+#include "tools/rendering/kept_work.h"
 #include "tools/rendering/run_outputs.h"
 #include "tools/rendering/tev_display.h"
 #include "volumes/grids/page_memory.h"
@@ -81,39 +80,6 @@ KeepSettings keep_settings(const SceneDescription& description, const RenderRun&
                               "or remove the file",
                               settings.file.string())));
   return settings;
-}
-
-/// The checkpoint, if the run continues one. @throw SceneError if it is that of another render.
-WorkFile kept_work(const std::filesystem::path& file, const RenderRun& run, const Scene& scene) {
-  if (!run.keeping.resume || file.empty() || !is_there(file)) return {};
-  WorkFile kept = read_work(file);
-  const WorkPart part = run.keeping.shard.value_or(WorkPart{});
-  std::string other = difference(kept.origin, origin_of(scene));
-  if (kept.part.index != part.index || kept.part.count != part.count)
-    other = fmt::format("it is part {} of {}", kept.part.index + 1, kept.part.count);
-  if (!other.empty())
-    throw SceneError(printable(fmt::format(
-        "{}: is the checkpoint of another render: {}; undo the change, or remove the file", file.string(), other)));
-  return kept;
-}
-
-/// What is made before the units, as earlier runs have kept it.
-std::vector<WorkUnit> kept_before(WorkUnit before) {
-  return before.state ? std::vector{std::move(before)} : std::vector<WorkUnit>();
-}
-
-/// What --light names. Says it if that has no light. @throw SceneError if it is of another render; as read_work.
-std::vector<WorkUnit> read_light(const std::filesystem::path& file, const Scene& scene, bool quiet) {
-  WorkFile work = read_work(file);
-  if (const std::string other = difference(work.origin, origin_of(scene)); !other.empty())
-    throw SceneError(printable(
-        fmt::format("{}: is of another render: {}; undo the change, or leave --light out", file.string(), other)));
-  if (!work.before.state)
-    tell({fmt::format("note: {} has no light, because it was made quickly, or because another shard is the first one; "
-                      "it is made again",
-                      file.string())},
-         quiet);
-  return kept_before(std::move(work.before));
 }
 
 /// Writes the outputs of what there is so far.
@@ -237,16 +203,6 @@ void complete(const Scene& scene, RenderJob& job, OutputFiles files, const KeepS
   keeper.remove();
 }
 
-/// Calls `work`, with errors of kept work that name where it is from.
-void naming_kept_work(const std::filesystem::path& from, const std::function<void()>& work) {
-  try {
-    work();
-  } catch (const DamagedWork& error) {
-    if (from.empty()) throw;
-    fail(from, error.what());
-  }
-}
-
 /// Renders a scene to its files. @return the loaded scene.
 Scene render_to_files(const SceneDescription& description, const RenderRun& run, std::optional<Scene> loaded,
                       Progress& progress) {
@@ -259,16 +215,12 @@ Scene render_to_files(const SceneDescription& description, const RenderRun& run,
   tell(scene.notes, run.quiet);
   // Errors come with the first image.
   const std::future<void> images = std::async(std::launch::async, prepare_images, written_by(description, run));
-  WorkFile kept = kept_work(keep.file, run, scene);
-  std::vector<WorkUnit> before = kept_before(std::move(kept.before));
-  std::filesystem::path kept_in = before.empty() && kept.units.empty() ? "" : keep.file;
-  if (!run.keeping.light.empty() && before.empty()) {
-    before = read_light(run.keeping.light, scene, run.quiet);
-    if (kept_in.empty()) kept_in = run.keeping.light;
-  }
-  RenderJob job{
-      Work(run.keeping.shard.value_or(WorkPart{}), std::move(kept.units)), {}, nullptr, Work({}, std::move(before))};
-  naming_kept_work(kept_in, [&] { complete(scene, job, std::move(files), keep, run, progress); });
+  KeptWork kept = read_kept_work(keep.file, run, scene);
+  RenderJob job{Work(run.keeping.shard.value_or(WorkPart{}), std::move(kept.units)),
+                {},
+                nullptr,
+                Work({}, std::move(kept.before))};
+  naming_kept_work(kept.file, [&] { complete(scene, job, std::move(files), keep, run, progress); });
   for (const std::filesystem::path& file : written_by(description, run))
     if (!run.quiet) tell_made("wrote " + file.string());
   return scene;
@@ -279,8 +231,7 @@ void require_file(const std::filesystem::path& scene_file) {
   std::error_code none;
   if (std::filesystem::is_other(scene_file, none))
     throw SceneError(printable(scene_file.string()) +
-                     ": a sequence reads its scene for each frame, and a pipe is read "
-                     "once; save the scene to a file");
+                     ": a sequence reads its scene for each frame, and a pipe is read once; save the scene to a file");
 }
 
 /// @throw SceneError if two frames have a file in common.

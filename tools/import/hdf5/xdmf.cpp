@@ -24,6 +24,7 @@
 #include <vtkStructuredGrid.h>
 #include <vtkUnsignedCharArray.h>
 #include <vtkUnstructuredGrid.h>
+#include <vtkXMLDataElement.h>
 
 #include "base/errors.h"
 #include "base/text/text.h"

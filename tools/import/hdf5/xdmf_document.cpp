@@ -5,6 +5,7 @@
 #include <unordered_set>
 #include <utility>
 
+#include <vtkXMLDataElement.h>
 #include <vtkXMLUtilities.h>
 
 #include "base/errors.h"

@@ -9,7 +9,8 @@
 #include <vector>
 
 #include <vtkSmartPointer.h>
-#include <vtkXMLDataElement.h>
+
+class vtkXMLDataElement;
 
 namespace tensorray {
 
