@@ -5,6 +5,8 @@
 #include <future>
 #include <set>
 
+#include <sys/stat.h>
+
 #include "renderer/images/image.h"
 #include "scenes/outputs/picture_outputs.h"
 #include "tests/viewer/view_support.h"
@@ -135,6 +137,10 @@ TEST_F(PagesTest, SavesToItsOwnFileAlone) {
   mailbox_.wait("error", 6);
   EXPECT_EQ(read_json_object(in_folder("scene.view.json")), scene);
   EXPECT_THROW(Pages({scene_file(), {}, scene_file()}, progress_), std::invalid_argument);
+  std::filesystem::remove(in_folder("scene.view.json"));
+  ASSERT_EQ(mkfifo(in_folder("scene.view.json").c_str(), 0600), 0);  // To open it would wait for a reader.
+  send({{"type", "save"}, {"id", 7}, {"scene", scene}});
+  mailbox_.wait("error", 7);
 }
 
 TEST_F(PagesTest, RefusesInOneLineAndGoesOn) {
@@ -186,6 +192,17 @@ TEST_F(PagesTest, ANewPageAfterAFailureSeesTheSceneBefore) {
   scene["field"]["scale"] = "auto";  // There is none for a field of zeros.
   send_scene(2, scene);
   mailbox_.wait([](const Json& json) { return json.value("id", Json()) == 2; });
+  pages_.open(other_mailbox_.sender());
+  const Json hello = other_mailbox_.wait([](const Json& json) { return json.value("type", "") == "hello"; }).json;
+  EXPECT_EQ(hello.at("field").at("voxels")[0], 12);
+}
+
+/// Also a page that comes while another one looks at another field.
+TEST_F(PagesTest, AllPagesBeginWithTheSameField) {
+  Json scene = test::small_scene();
+  scene["field"]["generate"]["resolution"] = 7;
+  send_scene(1, scene);
+  mailbox_.final_picture(1);
   pages_.open(other_mailbox_.sender());
   const Json hello = other_mailbox_.wait([](const Json& json) { return json.value("type", "") == "hello"; }).json;
   EXPECT_EQ(hello.at("field").at("voxels")[0], 12);

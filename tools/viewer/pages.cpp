@@ -11,6 +11,7 @@
 
 #include <fmt/format.h>
 
+#include "base/errors.h"
 #include "base/files/output_file.h"
 #include "base/process/seconds.h"
 #include "base/text/text.h"
@@ -51,10 +52,12 @@ Json answer_to(const Json& request, const char* type, Json content) {
   return message;
 }
 
-Json hello(const ViewedScene& viewed, const Json& scene) {
+/// @param scene, field  What all pages begin with, whatever scene another page sees by then.
+Json hello(const ViewedScene& viewed, const Json& scene, const Json& field) {
   return {{"type", "hello"},
           {"version", TENSORRAY_VERSION},
           {"scene", scene},
+          {"field", field},
           {"schema", Json::parse(scene_schema())},
           {"file", viewed.file.string()},
           {"saves", viewed.copy.string()}};
@@ -119,6 +122,7 @@ Pages::Pages(const ViewedScene& viewed, const Progress& progress)
   // Coarse pictures are JPEG. Errors come with the first one.
   const auto images = std::async(std::launch::async, prepare_images, std::vector<std::filesystem::path>{"page.jpg"});
   live_.load(scene_, outputs_of(description, {}, folder_ / ""), progress);
+  field_ = describe_field(live_.scene());
   thread_ = std::thread([this] { work(); });
 }
 
@@ -368,11 +372,7 @@ void Pages::answer_requests(const PagePointer& page, bool renders) {
 
 void Pages::answer(const PagePointer& pointer, const Request& request) {
   Page& page = *pointer;
-  if (request.type == "hello") {
-    Json message = hello(viewed_, scene_);
-    message["field"] = describe_field(live_.scene());
-    page.send(text_message(std::move(message)));
-  }
+  if (request.type == "hello") page.send(text_message(hello(viewed_, scene_, field_)));
   if (request.type == "look") look(page, request.message);
   if (request.type == "space") space(page, request.message);
   if (request.type == "save") save(page, request.message);
@@ -404,6 +404,7 @@ void Pages::space(Page& page, const Json& message) {
 
 void Pages::save(Page& page, const Json& message) {
   check(message["scene"]);
+  require_no_device(viewed_.copy);
   OutputFile file(viewed_.copy);
   file.write([&](const std::filesystem::path& path) {
     std::ofstream stream(path, std::ios::binary);

@@ -101,7 +101,7 @@ class Pages {
   void check(const Json& scene) const;
 
   const ViewedScene viewed_;
-  Json scene_;  ///< The scene that all pages begin with.
+  Json scene_, field_;  ///< The scene that all pages begin with, and the description of its field.
   AllowedFiles allowed_;
   TemporaryFolder folder_;
   LiveScene live_;
