@@ -50,7 +50,7 @@ TEST_F(MeshLight, TheErrorIsBelowTheOneAskedFor) {
     more.insert(more.end(), {"--set", "light.wavelengths.count=3", "--set", "receiver.resolution=[48,48]"});
     return picture(more);
   };
-  const Image exact = small_picture({"--set", "integrator.density.error=0.004"});
+  const Image exact = small_picture({"--set", "integrator.density.error=0.008"});
   for (const auto& [text, bound] : {std::pair("10%", 0.1), std::pair("0.03", 0.03)}) {
     const double error = relative_distance(small_picture({"--until-error", text}), exact);
     const double estimate = read_json("stats.json")["error"].get<double>();

@@ -37,7 +37,7 @@ std::pair<std::string, std::string> points_and_lamp(const std::string& integrato
 /// The light of points, traced forwards to the floor, is that of a lamp that the path tracer finds backwards.
 TEST_F(WholeScene, TheLightOfPointsThroughTheFieldIsThatOfALamp) {
   const auto [points, lamp] =
-      points_and_lamp(R"("max_samples": 256, "min_samples": 256, "caustic": {"resolution": 256, "rays": 20000})");
+      points_and_lamp(R"("max_samples": 128, "min_samples": 128, "caustic": {"resolution": 256, "rays": 20000})");
   write("scene.json", points);
   // Light that is traced beforehand has little noise.
   const Image forwards = picture({"integrator.max_samples=16", "integrator.min_samples=16"});
@@ -47,8 +47,8 @@ TEST_F(WholeScene, TheLightOfPointsThroughTheFieldIsThatOfALamp) {
   EXPECT_GT(mean(forwards, "G"), 0.2);
   EXPECT_NEAR(mean(forwards, "G"), mean(backwards, "G"), 0.03 * mean(backwards, "G"));
   // Photons beside the other ways to find the lamp: whatever law light follows.
-  std::vector<std::string> few{"integrator.photons.per_pass=1024", "integrator.max_samples=96",
-                               "integrator.min_samples=96"};
+  std::vector<std::string> few{"integrator.photons.per_pass=1024", "integrator.max_samples=48",
+                               "integrator.min_samples=48"};
   const Image photons = picture(few);
   few.push_back("integrator.conserve=radiance");
   const Image other_photons = picture(few);
@@ -89,7 +89,7 @@ TEST_F(WholeScene, PhotonsGiveTheLightOfTheFlowMap) {
 
 /// Where radiance is conserved, light of points gains as the lamp's does.
 TEST_F(WholeScene, PhotonsConserveRadianceOnRequest) {
-  const auto [points, lamp] = points_and_lamp(R"("max_samples": 64, "min_samples": 64, "conserve": "radiance",
+  const auto [points, lamp] = points_and_lamp(R"("max_samples": 32, "min_samples": 32, "conserve": "radiance",
                                                  "photons": {"per_pass": 8192},
                                                  "caustic": {"resolution": 256, "rays": 20000})");
   write("scene.json", points);
@@ -128,8 +128,8 @@ TEST_F(WholeScene, AWeakFieldIsLitFromWithinAsIfItWereNotThere) {
         "objects=[{\"plate\":{\"center\":[0,0,-2.6],\"size\":[4,4]},\"material\":{\"kind\":\"diffuse\"}},"
         "{\"plate\":{\"center\":[0.4,0,-1.2],\"size\":[0.8,0.8]},\"material\":{\"kind\":\"diffuse\"}}]",
         std::string("lights=[{\"kind\":\"constant\",\"strength\":0.2},") + light + "]",
-        "integrator.max_samples=32",
-        "integrator.min_samples=32",
+        "integrator.max_samples=16",
+        "integrator.min_samples=16",
         "camera.position=[1,-4,3]",
         "camera.target=[0,0,-1.6]"};
     SCOPED_TRACE(light);

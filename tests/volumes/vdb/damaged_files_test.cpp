@@ -132,7 +132,7 @@ TEST_P(FlippedBytes, NeverCrash) {
   write_stock(stock, *file.getGrids(), compression);
   const std::string bytes = bytes_of(stock);
   int refused = 0;
-  constexpr std::size_t flips = 250;
+  constexpr std::size_t flips = 150;
   for (std::size_t i = 0; i < flips; ++i) {
     std::string changed = bytes;
     char& flipped = changed[bytes.size() * i / flips];
