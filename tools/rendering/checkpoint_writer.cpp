@@ -38,6 +38,11 @@ CheckpointWriter::~CheckpointWriter() {
 }
 
 WorkFile CheckpointWriter::work_file() {
+  const std::lock_guard lock(writing_);
+  return file_of_work();
+}
+
+WorkFile CheckpointWriter::file_of_work() {
   if (!origin_) origin_ = origin_of(scene_);
   const std::vector<WorkUnit> before = job_.before.units();
   return {*origin_, std::filesystem::absolute(scene_.description.path), job_.work.part(), job_.work.units(),
@@ -48,7 +53,7 @@ bool CheckpointWriter::write() {
   const std::lock_guard lock(writing_);
   if (settings_.file.empty() || is_over_) return false;
   try {
-    const WorkFile file = work_file();
+    const WorkFile file = file_of_work();
     if (!file.before.state &&
         std::none_of(file.units.begin(), file.units.end(), [](const WorkUnit& unit) { return unit.state; }))
       return false;

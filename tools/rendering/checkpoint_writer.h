@@ -51,11 +51,12 @@ class CheckpointWriter {
  private:
   void run();
   void begin();
+  WorkFile file_of_work();
 
   const Scene& scene_;
   RenderJob& job_;
   const KeepSettings& settings_;
-  std::mutex writing_;
+  std::mutex writing_;  ///< Guards what follows.
   std::optional<Json> origin_;
   bool is_written_ = false, has_failed_ = false, is_over_ = false;
   std::atomic<bool> files_wanted_{false};
