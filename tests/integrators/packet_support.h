@@ -22,7 +22,8 @@
 
 namespace tensorray::test {
 
-/// Random numbers that are the same with every standard library.
+/// Random numbers that are the same with every standard library and compiler. (These may evaluate the arguments of a
+/// call in any order: two numbers are drawn in two statements.)
 class Numbers {
  public:
   explicit Numbers(unsigned seed) : engine_(seed) {}
@@ -32,13 +33,19 @@ class Numbers {
   std::size_t below(std::size_t count) { return static_cast<std::size_t>(next() * static_cast<double>(count)); }
 
   Eigen::Vector3d in(const Eigen::AlignedBox3d& box) {
-    return box.min() + box.sizes().cwiseProduct(Eigen::Vector3d(next(), next(), next()));
+    const double z = next(), y = next(), x = next();
+    return box.min() + box.sizes().cwiseProduct(Eigen::Vector3d(x, y, z));
   }
   Eigen::Vector3d direction() {
     while (true) {
-      const Eigen::Vector3d v(between(-1, 1), between(-1, 1), between(-1, 1));
+      const double z = between(-1, 1), y = between(-1, 1), x = between(-1, 1);
+      const Eigen::Vector3d v(x, y, z);
       if (v.norm() < 1 && v.norm() > 0.1) return v.normalized();
     }
+  }
+  Eigen::Vector2d two_between(double low, double high) {
+    const double y = between(low, high), x = between(low, high);
+    return {x, y};
   }
   Eigen::Matrix3d tensor() {
     Eigen::Matrix3d T;
@@ -61,7 +68,8 @@ inline TensorFunction smooth_tensor(unsigned seed) {
   std::vector<Wave> waves(4);
   for (Wave& wave : waves) {
     wave.amplitude = numbers.tensor().normalized() / static_cast<double>(waves.size());
-    wave.k = 2 * pi / numbers.between(24, 64) * numbers.direction();
+    const Eigen::Vector3d along = numbers.direction();
+    wave.k = 2 * pi / numbers.between(24, 64) * along;
     wave.phase = numbers.between(0, 2 * pi);
   }
   return [waves](const Eigen::Vector3d& p) {
@@ -169,8 +177,8 @@ inline RayBatch rays_under_load(const TensorField& field, int bundles, unsigned 
   RayBatch rays;
   for (int i = 0; i < bundles; ++i) {
     const double reach = i % 10 ? 20 : 2;
-    const Eigen::Vector3d from(23.5 + numbers.between(-reach, reach), 23.5 + numbers.between(-reach, reach), 60);
-    add_bundle(rays, field, from, {0, 0, -1}, {0.1, 0.2, 0.3});
+    const Eigen::Vector2d from = numbers.two_between(-reach, reach);
+    add_bundle(rays, field, {23.5 + from.x(), 23.5 + from.y(), 60}, {0, 0, -1}, {0.1, 0.2, 0.3});
   }
   return rays;
 }

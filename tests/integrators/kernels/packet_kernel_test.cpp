@@ -150,9 +150,10 @@ TEST_P(PacketKernel, FieldsDependOnNothingBeyondTheBricksOfTheWay) {
     TensorField volume = field(far);
     Numbers numbers(28);
     RayBatch rays;
-    for (int i = 0; i < 300; ++i)
-      add_bundle(rays, volume, numbers.in({Vector3d::Constant(2), Vector3d::Constant(6)}), numbers.direction(),
-                 {0.1, 0.3, 30});
+    for (int i = 0; i < 300; ++i) {
+      const Vector3d along = numbers.direction();
+      add_bundle(rays, volume, numbers.in({Vector3d::Constant(2), Vector3d::Constant(6)}), along, {0.1, 0.3, 30});
+    }
     ends.push_back(traced(make_scene("", std::move(volume), surfaces, 0.5, rays), rays));
   }
   for (std::size_t i = 0; i < ends[0].size(); ++i) {
@@ -168,8 +169,8 @@ Scene dense_scene(int voxels) {
   Numbers numbers(30);
   RayBatch rays;
   for (int i = 0; i < 16; ++i) {
-    const Vector3d from(numbers.between(0.2, 0.8) * voxels, numbers.between(0.2, 0.8) * voxels, -1);
-    add_bundle(rays, field, from, {numbers.between(-0.1, 0.1), numbers.between(-0.1, 0.1), 1},
+    const Eigen::Vector2d from = voxels * numbers.two_between(0.2, 0.8);
+    add_bundle(rays, field, {from.x(), from.y(), -1}, {numbers.between(-0.1, 0.1), numbers.between(-0.1, 0.1), 1},
                {0.001, 0.002, 0.003, 0.004, 0.005, 0.006, 0.007, 0.008});
   }
   return make_scene("", std::move(field), {}, 0, std::move(rays));

@@ -38,8 +38,9 @@ TEST_P(Packets, KeepToAThousandthOfAVoxelAfter500Steps) {
     Numbers numbers(4);
     RayBatch rays;
     for (int i = 0; i < 30; ++i) {
-      const Vector3d across(numbers.between(-0.01, 0.01), numbers.between(-0.01, 0.01), 1);
-      add_bundle(rays, field, {numbers.between(18, 28), numbers.between(28, 38), -110}, across, wavelengths(0.002));
+      const Eigen::Vector2d across = numbers.two_between(-0.01, 0.01);
+      add_bundle(rays, field, {numbers.between(18, 28), numbers.between(28, 38), -110}, {across.x(), across.y(), 1},
+                 wavelengths(0.002));
     }
     const Scene scene = make_scene(lattice.name + ", long", std::move(field), {}, 0, std::move(rays));
     expect_reference(scene);
