@@ -46,9 +46,9 @@ std::optional<Matrix3d> adaptation(const Vector3d& from, const Vector3d& to) {
 
 Chromaticities named_chromaticities(const Matrix3d& matrix) {
   constexpr double rounding = 2e-3;  // Of the matrices' entries; configs have numbers of six digits, and other D65s.
-  const Vector2d d65 = d65_white, aces = aces_white;
+  const Vector2d d65 = d65_white(), aces = aces_white();
   for (const Chromaticities& named :
-       {rec709_chromaticities, Chromaticities{{0.708, 0.292}, {0.170, 0.797}, {0.131, 0.046}, d65},
+       {rec709_chromaticities(), Chromaticities{{0.708, 0.292}, {0.170, 0.797}, {0.131, 0.046}, d65},
         Chromaticities{{0.680, 0.320}, {0.265, 0.690}, {0.150, 0.060}, d65},
         Chromaticities{{0.64, 0.33}, {0.21, 0.71}, {0.15, 0.06}, d65},
         Chromaticities{{0.713, 0.293}, {0.165, 0.830}, {0.128, 0.044}, aces},

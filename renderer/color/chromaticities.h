@@ -17,8 +17,10 @@ struct Chromaticities {
 Chromaticities chromaticities_of(const std::array<double, 8>& numbers);  ///< In the order of the members.
 std::array<double, 8> numbers_of(const Chromaticities& colors);
 
-inline const Eigen::Vector2d d65_white(0.3127, 0.3290), aces_white(0.32168, 0.33767);
-inline const Chromaticities rec709_chromaticities{{0.64, 0.33}, {0.30, 0.60}, {0.15, 0.06}, d65_white};
+// Functions: Clang 14 may initialize an object before the one that it is made of.
+inline Eigen::Vector2d d65_white() { return {0.3127, 0.3290}; }
+inline Eigen::Vector2d aces_white() { return {0.32168, 0.33767}; }
+inline Chromaticities rec709_chromaticities() { return {{0.64, 0.33}, {0.30, 0.60}, {0.15, 0.06}, d65_white()}; }
 
 /// XYZ with Y = 1.
 Eigen::Vector3d xyz_of(const Eigen::Vector2d& chromaticity);

@@ -27,10 +27,10 @@ namespace {
 using Eigen::Matrix3d;
 using Eigen::Vector3d;
 
-const Vector3d white_d65 = xyz_of(d65_white);
+Vector3d white_d65() { return xyz_of(d65_white()); }
 
 /// From ACES2065-1 (SMPTE ST 2065-1) to XYZ. The blue primary has a negative y.
-Matrix3d aces_to_xyz() { return rgb_to_xyz({{0.7347, 0.2653}, {0, 1}, {0.0001, -0.0770}, aces_white}); }
+Matrix3d aces_to_xyz() { return rgb_to_xyz({{0.7347, 0.2653}, {0, 1}, {0.0001, -0.0770}, aces_white()}); }
 
 /// A config and its name for messages and provenance.
 struct NamedConfig {
@@ -159,7 +159,7 @@ Matrix3d matrix_to_working(const OCIO::Config& config, const char* space) {
 Matrix3d find_xyz_to_working(const OCIO::Config& config) {
   if (config.hasRole("aces_interchange"))
     return matrix_to_working(config, "aces_interchange") * aces_to_xyz().inverse() *
-           adaptation(white_d65, xyz_of(aces_white)).value();
+           adaptation(white_d65(), xyz_of(aces_white())).value();
   if (config.hasRole("cie_xyz_d65_interchange")) return matrix_to_working(config, "cie_xyz_d65_interchange");
   return rec709_to_xyz().inverse();
 }
@@ -259,7 +259,7 @@ const char* const soft_highlights_view = "Soft highlights";
 
 bool is_library_config(const std::string& name) { return name == builtin_config_word || starts_with(name, "ocio://"); }
 
-Matrix3d rec709_to_xyz() { return rgb_to_xyz(rec709_chromaticities); }
+Matrix3d rec709_to_xyz() { return rgb_to_xyz(rec709_chromaticities()); }
 
 struct ColorManagement::State {
   OCIO::ConstConfigRcPtr config;
@@ -302,8 +302,8 @@ Matrix3d ColorManagement::xyz_to_working() const { return state_->xyz_to_working
 Matrix3d ColorManagement::xyz_to_working_adapted(const Vector3d& white) const {
   if (!(white.y() > 0 && white.allFinite()))
     throw std::invalid_argument("the white to adapt to must be finite and have Y > 0");
-  const std::optional<Matrix3d> adapted = adaptation(white / white.y(), white_d65);
-  if (!adapted) return state_->xyz_to_working * white_d65 * Vector3d::UnitY().transpose();
+  const std::optional<Matrix3d> adapted = adaptation(white / white.y(), white_d65());
+  if (!adapted) return state_->xyz_to_working * white_d65() * Vector3d::UnitY().transpose();
   return state_->xyz_to_working * *adapted;
 }
 

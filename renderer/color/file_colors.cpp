@@ -29,7 +29,7 @@ Matrix3d matrix_of(const Chromaticities& colors, const std::optional<std::array<
     throw std::runtime_error("its chromaticities are no colours");
   if (is_xyz(colors) && !neutral) return to_xyz;
   const Vector2d white = neutral ? Vector2d((*neutral)[0], (*neutral)[1]) : colors.white;
-  const std::optional<Matrix3d> adapted = adaptation(xyz_of(white), xyz_of(d65_white));
+  const std::optional<Matrix3d> adapted = adaptation(xyz_of(white), xyz_of(d65_white()));
   if (!adapted || !adapted->allFinite()) throw std::runtime_error("its white is no white");
   return *adapted * to_xyz;
 }
@@ -37,9 +37,9 @@ Matrix3d matrix_of(const Chromaticities& colors, const std::optional<std::array<
 /// ITU-T H.273, as far as pictures of standard range use it.
 FileColors colors_of_code_points(int primaries, int curve) {
   FileColors colors;
-  Chromaticities chromaticities = rec709_chromaticities;
-  if (primaries == 9) chromaticities = {{0.708, 0.292}, {0.170, 0.797}, {0.131, 0.046}, d65_white};
-  if (primaries == 12) chromaticities = {{0.680, 0.320}, {0.265, 0.690}, {0.150, 0.060}, d65_white};
+  Chromaticities chromaticities = rec709_chromaticities();
+  if (primaries == 9) chromaticities = {{0.708, 0.292}, {0.170, 0.797}, {0.131, 0.046}, d65_white()};
+  if (primaries == 12) chromaticities = {{0.680, 0.320}, {0.265, 0.690}, {0.150, 0.060}, d65_white()};
   const bool is_known = (primaries == 1 || primaries == 9 || primaries == 12) && (curve == 8 || curve == 13);
   if (!is_known)
     throw std::runtime_error("its code points (primaries " + std::to_string(primaries) + ", curve " +
@@ -61,7 +61,7 @@ std::optional<FileColors> colors_of(const ColorTags& tags, bool integer, bool gr
   if (tags.is_srgb || (!tags.gamma && !tags.chromaticities)) return std::nullopt;
   FileColors colors;
   const Chromaticities chromaticities =
-      tags.chromaticities ? chromaticities_of(*tags.chromaticities) : rec709_chromaticities;
+      tags.chromaticities ? chromaticities_of(*tags.chromaticities) : rec709_chromaticities();
   colors.rgb_to_xyz = matrix_of(chromaticities, tags.adopted_neutral);
   const bool is_srgb_curve = !tags.gamma || is_gamma_of_srgb(*tags.gamma);
   if (integer) colors.curves = alike(is_srgb_curve ? srgb_curve() : power_curve(1 / *tags.gamma));
@@ -73,7 +73,7 @@ std::optional<FileColors> colors_of(const ColorTags& tags, bool integer, bool gr
 bool is_srgb(const FileColors& colors) {
   constexpr double rounding = 2e-3;  // Profiles of sRGB differ by so much.
   const TransferCurve expected = srgb_curve();
-  double difference = (colors.rgb_to_xyz - rgb_to_xyz(rec709_chromaticities)).cwiseAbs().maxCoeff();
+  double difference = (colors.rgb_to_xyz - rgb_to_xyz(rec709_chromaticities())).cwiseAbs().maxCoeff();
   for (const TransferCurve& curve : colors.curves)
     for (float x = 0; x <= 1; x += 1.0f / 64)
       difference = std::max(difference, static_cast<double>(std::abs(curve.at(x) - expected.at(x))));

@@ -162,10 +162,10 @@ IccProfile parse_icc_profile(const std::string& bytes, bool grey) {
   if (space != (grey ? "GRAY" : "RGB ")) throw std::runtime_error("it is for colours \"" + escaped(space) + "\"");
   if (bytes_at(bytes, 20, 4) != "XYZ ") throw std::runtime_error("it consists of tables, not of curves and a matrix");
   IccProfile profile;
-  const Vector3d d65 = xyz_of(d65_white);
+  const Vector3d d65 = xyz_of(d65_white());
   if (grey) {
     profile.curves.fill(parse_curve(tags, "kTRC"));
-    profile.rgb_to_xyz = rgb_to_xyz(rec709_chromaticities);
+    profile.rgb_to_xyz = rgb_to_xyz(rec709_chromaticities());
     return profile;
   }
   profile.curves = {parse_curve(tags, "rTRC"), parse_curve(tags, "gTRC"), parse_curve(tags, "bTRC")};
@@ -180,7 +180,7 @@ IccProfile parse_icc_profile(const std::string& bytes, bool grey) {
 }
 
 std::string make_icc_profile(const std::string& name, const IccProfile& profile) {
-  const Matrix3d matrix = *adaptation(xyz_of(d65_white), profile_white) * profile.rgb_to_xyz;
+  const Matrix3d matrix = *adaptation(xyz_of(d65_white()), profile_white) * profile.rgb_to_xyz;
   const std::vector<std::pair<std::string, std::string>> tags{
       {"desc", description_tag(name)},        {"cprt", text_tag("No copyright, use freely")},
       {"wtpt", xyz_tag(profile_white)},       {"rXYZ", xyz_tag(matrix.col(0))},

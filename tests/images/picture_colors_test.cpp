@@ -195,9 +195,9 @@ TEST(PictureColors, WorkingSpacesHaveTheirPublishedNumbers) {
   const std::array<double, 8> rec709{0.64, 0.33, 0.30, 0.60, 0.15, 0.06, 0.3127, 0.3290};
   EXPECT_EQ(color().working_chromaticities(), rec709);
   const Chromaticities acescg{{0.713, 0.293}, {0.165, 0.830}, {0.128, 0.044}, {0.32168, 0.33767}};
-  const Matrix3d adapted = *adaptation(xyz_of(acescg.white), xyz_of(d65_white)) * rgb_to_xyz(acescg);
+  const Matrix3d adapted = *adaptation(xyz_of(acescg.white), xyz_of(d65_white())) * rgb_to_xyz(acescg);
   EXPECT_EQ(numbers_of(named_chromaticities(adapted)), numbers_of(acescg));
-  const Chromaticities odd{{0.7, 0.31}, {0.2, 0.7}, {0.14, 0.05}, d65_white};
+  const Chromaticities odd{{0.7, 0.31}, {0.2, 0.7}, {0.14, 0.05}, d65_white()};
   const std::array<double, 8> found = numbers_of(named_chromaticities(rgb_to_xyz(odd)));
   for (std::size_t i = 0; i < 8; ++i) EXPECT_NEAR(found[i], numbers_of(odd)[i], 1e-12);
 }
