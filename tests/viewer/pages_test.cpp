@@ -208,6 +208,22 @@ TEST_F(PagesTest, AllPagesBeginWithTheSameField) {
   EXPECT_EQ(hello.at("field").at("voxels")[0], 12);
 }
 
+TEST_F(PagesTest, RequestsWaitForTheSceneBeforeThem) {
+  std::promise<Pages::Id> opened;
+  std::future<Pages::Id> id = opened.get_future();
+  const Pages::Send send = other_mailbox_.sender();
+  opened.set_value(pages_.open([this, &id, send](const PageMessage& message) {
+    if (test::received(message).json.at("type") == "hello") {  // Its thread then looks for more requests.
+      const Pages::Id page = id.get();
+      pages_.receive(page, Json{{"type", "scene"}, {"id", 1}, {"scene", test::small_scene()}}.dump());
+      pages_.receive(page, Json{{"type", "space"}, {"id", 2}}.dump());
+    }
+    send(message);
+  }));
+  const Json answer = other_mailbox_.wait([](const Json& json) { return json.value("id", Json()) == 2; }).json;
+  EXPECT_EQ(answer.at("type"), "space") << answer;
+}
+
 TEST_F(PagesTest, PagesDoNotDisturbEachOther) {
   const Pages::Id other = pages_.open(other_mailbox_.sender());
   Json scene = test::small_scene();

@@ -139,7 +139,7 @@ Pages::~Pages() {
 Pages::Id Pages::open(Send send) {
   const auto page = std::make_shared<Page>();
   page->send = std::move(send);
-  page->requests.push_back({"hello", Json::object()});
+  page->requests.push_back({"hello", Json::object(), false});
   {
     const std::lock_guard<std::mutex> lock(mutex_);
     page->id = next_id_++;
@@ -167,11 +167,11 @@ void Pages::receive(Id id, const std::string& text) {
     message_id = message.value("id", Json());
     const std::string type = message["type"];
     if (type == "scene") {
-      page.scene = Request{type, std::move(message)};
+      page.scene = Request{type, std::move(message), false};
       if (rendering_.page == *found && !rendering_.is_first) progress_.cancelled = true;
     } else {
       if (page.requests.size() >= most_requests) throw std::invalid_argument("too many requests are waiting");
-      page.requests.push_back({type, std::move(message)});
+      page.requests.push_back({type, std::move(message), page.scene.has_value()});
     }
   } catch (const std::exception& error) {
     page.send(error_message(message_id, error.what()));
@@ -209,6 +209,7 @@ void Pages::serve(const PagePointer& page) {
   {
     const std::lock_guard<std::mutex> lock(mutex_);
     scene.swap(page->scene);
+    for (Request& request : page->requests) request.waits = false;
   }
   if (scene) begin_scene(*page, *scene);
   if (!page->stages.empty()) make_stage(page);
@@ -348,7 +349,7 @@ void Pages::send_picture(Page& page, const Stage& stage, double seconds_loading)
 /// @param renders  Whether a picture of this page is being made: only requests that need no other scene are answered.
 void Pages::answer_requests(const PagePointer& page, bool renders) {
   const auto is_possible = [&](const Request& request) {
-    return !renders || request.type == "look" || request.type == "space";
+    return !request.waits && (!renders || request.type == "look" || request.type == "space");
   };
   for (;;) {
     Request request;

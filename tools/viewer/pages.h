@@ -63,6 +63,7 @@ class Pages {
   struct Request {
     std::string type;
     Json message;
+    bool waits = false;  ///< For a scene that came before it.
   };
   struct Page {
     Id id = 0;
