@@ -250,13 +250,13 @@ void Pages::load_for(Page& page, const Stage& stage) {
   const SceneDescription description = read_scene_json(page.shown, viewed_.file);
   const auto outputs = outputs_of(description, stage, folder_ / "");
   if (description.receiver.resolution) {
-    resolution_ = *description.receiver.resolution;
-  } else if (stage.coarseness > 1 && resolution_of_ != page.shown) {
+    plate_.resolution = *description.receiver.resolution;
+  } else if (stage.coarseness > 1 && plate_.scene != page.shown) {
     // It follows from the size of the plate, which the scene may leave open, too.
-    resolution_ = live_.load(page.shown, outputs, progress_).geometry.surfaces().plate->resolution;
-    resolution_of_ = page.shown;
+    plate_.resolution = live_.load(page.shown, outputs, progress_).geometry.surfaces().plate->resolution;
+    plate_.scene = page.shown;
   }
-  live_.load(at_stage(page.shown, description, resolution_, stage), outputs, progress_);
+  live_.load(at_stage(page.shown, description, plate_.resolution, stage), outputs, progress_);
 }
 
 /// Makes the page's next picture. A new scene of the page cancels all but the first.

@@ -77,6 +77,11 @@ class Pages {
     std::shared_ptr<const Render> render;      ///< The last picture, ...
     Image display;                             ///< ... and as the page shows it.
   };
+  /// The resolution of a plate, in the finished picture of a scene.
+  struct KnownPlate {
+    Eigen::Vector2i resolution{1, 1};
+    Json scene;
+  };
   using PagePointer = std::shared_ptr<Page>;
   /// What is being made, a stage or an export: the page's end cancels it, and a new scene does, unless it is the first
   /// stage.
@@ -106,9 +111,8 @@ class Pages {
   AllowedFiles allowed_;
   TemporaryFolder folder_;
   LiveScene live_;
-  int coarseness_ = 8;                ///< Of first pictures; it follows the time that they take.
-  Eigen::Vector2i resolution_{1, 1};  ///< Of the plate of `resolution_of_`, in the finished picture.
-  Json resolution_of_;
+  int coarseness_ = 8;  ///< Of first pictures; it follows the time that they take.
+  KnownPlate plate_;
 
   std::mutex mutex_;  ///< Guards what follows, and `requests` and `scene` of pages.
   std::condition_variable wake_;
