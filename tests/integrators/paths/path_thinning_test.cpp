@@ -97,7 +97,7 @@ class Reference {
 TEST_P(PathThinning, SamplesAreThePointsOfTheRay) {
   const Traced traced = bent_ray();
   const PathPoints points = all_points(traced);
-  ASSERT_GT(points.size(), 50u);
+  ASSERT_GT(points.size(), 60u);
   PathSamples samples;
   sample_path(traced.field, traced.ray, true, samples);
   ASSERT_EQ(samples.count, points.size());

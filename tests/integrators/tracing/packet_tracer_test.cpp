@@ -61,7 +61,7 @@ TEST_P(Packets, FollowStrongFieldsOnAnyLattice) {
       expect_reference(random_scene(lattice, step, 1 / std::max(step, 0.5), 40), 0.2);
       // There each step has an error of 50 roundings, so that few steps are compared.
       Scene scene = random_scene(lattice, step, 50 / std::max(step, 0.5), 40);
-      scene.settings.max_steps = 10;
+      scene.settings.max_steps = 20;
       expect_reference(scene, 0.5);
     }
   }

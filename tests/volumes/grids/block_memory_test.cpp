@@ -11,6 +11,8 @@
 #include <gtest/gtest.h>
 #include <tbb/parallel_for.h>
 
+#include "tests/thread_sanitizer.h"
+
 namespace tensorray {
 namespace {
 
@@ -64,9 +66,7 @@ TEST(BlockMemory, HoldsWhatADequeDoesToIt) {
 }
 
 TEST(BlockMemory, IsGivenBackWhileTheRestIsUsed) {
-#ifdef TENSORRAY_SANITIZED
-  GTEST_SKIP() << "the sanitizer's own memory is larger";
-#endif
+  if (test::has_thread_sanitizer) GTEST_SKIP() << "the sanitizer's own memory is larger";
   const double before = resident_megabytes();
   Deque numbers = make(0, 5000);
   const double all = resident_megabytes();
@@ -77,9 +77,7 @@ TEST(BlockMemory, IsGivenBackWhileTheRestIsUsed) {
 }
 
 TEST(BlockMemory, PreparedMemoryIsUsedFirst) {
-#ifdef TENSORRAY_SANITIZED
-  GTEST_SKIP() << "the sanitizer's own memory is larger";
-#endif
+  if (test::has_thread_sanitizer) GTEST_SKIP() << "the sanitizer's own memory is larger";
   SlotAllocator<Large>::prepare(5000);
   const double before = resident_megabytes();
   const Deque numbers = make(0, 4000);

@@ -13,15 +13,12 @@
 #include <unistd.h>
 
 #include "base/files/temporary_folder.h"
+#include "tests/thread_sanitizer.h"
 
 namespace tensorray {
 namespace {
 
-#if defined(__clang__) && __has_feature(thread_sanitizer)
-constexpr std::size_t times = 16;  // It has four bytes of its own for each of a page, which are beside the field.
-#else
-constexpr std::size_t times = 1;
-#endif
+constexpr std::size_t times = test::has_thread_sanitizer ? 16 : 1;  // Its bytes are beside the field.
 constexpr std::size_t bound = times * (std::size_t{256} << 20), piece = std::size_t{4} << 20, pieces = 200;
 
 /// With sanitizers, whose own memory would count, 0: then only the bytes of pages are tested.
