@@ -36,6 +36,15 @@ if(TENSORRAY_SANITIZE)
   endif()
   target_link_options(tensorray_options INTERFACE -fsanitize=${TENSORRAY_SANITIZE})
 endif()
+# Python is not built with the sanitizer of addresses, and must load its library first. Programs use the same library,
+# because those that Python starts inherit it.
+if(TENSORRAY_SANITIZE MATCHES address AND CMAKE_CXX_COMPILER_ID MATCHES Clang)
+  execute_process(COMMAND ${CMAKE_CXX_COMPILER} -print-file-name=libclang_rt.asan-${CMAKE_SYSTEM_PROCESSOR}.so
+                  OUTPUT_VARIABLE TENSORRAY_SANITIZER_LIBRARY OUTPUT_STRIP_TRAILING_WHITESPACE COMMAND_ERROR_IS_FATAL ANY)
+  get_filename_component(folder "${TENSORRAY_SANITIZER_LIBRARY}" DIRECTORY)
+  # It opens libraries for the program, and looks for them where DT_RPATH says, not DT_RUNPATH.
+  target_link_options(tensorray_options INTERFACE -shared-libsan -Wl,-rpath,${folder} -Wl,--disable-new-dtags)
+endif()
 if(TENSORRAY_FUZZ)
   target_compile_options(tensorray_options INTERFACE -fsanitize=fuzzer-no-link)
 endif()

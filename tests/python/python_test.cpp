@@ -11,12 +11,23 @@
 namespace tensorray {
 namespace {
 
+/// What Python needs to load a module that is built with the sanitizer of addresses: the sanitizer's library first,
+/// that of C++, whose functions it replaces, and where the module's libraries are, since it opens them for the module.
+/// Python itself leaves objects at its end.
+std::string sanitizer() {
+  const std::string library = TENSORRAY_SANITIZER_LIBRARY;
+  if (library.empty()) return "";
+  return "LD_PRELOAD='" + library + ":libstdc++.so.6' LD_LIBRARY_PATH='" +
+         std::filesystem::path(TENSORRAY_BINARY).parent_path().string() +
+         "' ASAN_OPTIONS=\"$ASAN_OPTIONS:detect_leaks=0\" ";
+}
+
 void run(const std::string& file) {
   const std::string python = "PYTHONDONTWRITEBYTECODE=1 '" TENSORRAY_PYTHON_PROGRAM "' ";
   if (std::system((python + "-c 'import numpy' 2>/dev/null").c_str()) != 0) GTEST_SKIP() << "NumPy is not installed";
   const std::filesystem::path test = test::source_folder() / "tests" / "python" / file;
   const std::string command = "PYTHONPATH='" TENSORRAY_PYTHON_FOLDER "' TENSORRAY_BINARY='" TENSORRAY_BINARY "' " +
-                              python + "'" + test.string() + "' -v";
+                              sanitizer() + python + "'" + test.string() + "' -v";
   EXPECT_EQ(std::system(command.c_str()), 0);
 }
 

@@ -7,7 +7,13 @@ namespace {
 
 using namespace test;
 
-constexpr double bound = 256.0 * (1 << 20);
+#ifdef TENSORRAY_SANITIZED  // It has memory of its own beside the program's, which is not measured then.
+constexpr int bound = 768;
+constexpr bool is_measured = false;
+#else
+constexpr int bound = 256;  // MiB
+constexpr bool is_measured = true;
+#endif
 
 class Memory : public Program {
  protected:
@@ -16,6 +22,14 @@ class Memory : public Program {
                "receiver": {"resolution": [128, 128]},
                "integrator": {"type": "photon_distribution", "density": {"kind": "gaussian"}}})";
   }
+
+  /// Makes all.exr and part.exr of scene.json, and their statistics.
+  void render_with_and_without_the_bound() const {
+    run_well({"render", "scene.json", "-q", "-o", "all.exr", "--stats", "all.json"});
+    run_well({"render", "scene.json", "-q", "-o", "part.exr", "--stats", "part.json", "--memory",
+              std::to_string(bound) + "M", "--threads", "1"});
+    EXPECT_TRUE(read_file(in_folder("all.exr")) == read_file(in_folder("part.exr")));
+  }
 };
 
 TEST_F(Memory, AFieldOfEightTimesTheBoundGivesTheSameFiles) {
@@ -23,15 +37,14 @@ TEST_F(Memory, AFieldOfEightTimesTheBoundGivesTheSameFiles) {
     GTEST_SKIP() << "the test needs 5 GB on the disk of " << in_folder("");
   run_well({"make", "point_load", "-o", "field.vdb", "--resolution", "322"});
   write("scene.json", scene(R"({"file": "field.vdb", "eigenvalues": "raw", "scale": 4})"));
-  run_well({"render", "scene.json", "-q", "-o", "all.exr", "--stats", "all.json"});
-  run_well(
-      {"render", "scene.json", "-q", "-o", "part.exr", "--stats", "part.json", "--memory", "256M", "--threads", "1"});
-  EXPECT_TRUE(read_file(in_folder("all.exr")) == read_file(in_folder("part.exr")));
+  render_with_and_without_the_bound();
   const nlohmann::json all = read_json("all.json"), part = read_json("part.json");
-  EXPECT_GE(part["field"]["memory_bytes"], 8 * bound);
-  EXPECT_GT(all["peak_memory_bytes"], 8 * bound);
-  // What rays touch before the process looks again depends on how busy the machine is; PageMemory tests the bound.
-  EXPECT_LT(2 * part["peak_memory_bytes"].get<double>(), all["peak_memory_bytes"].get<double>());
+  if (is_measured) {
+    EXPECT_GE(part["field"]["memory_bytes"], 8.0 * (bound << 20));
+    EXPECT_GT(all["peak_memory_bytes"], 8.0 * (bound << 20));
+    // What rays touch before the process looks again depends on how busy the machine is; PageMemory tests the bound.
+    EXPECT_LT(2 * part["peak_memory_bytes"].get<double>(), all["peak_memory_bytes"].get<double>());
+  }
   RecordProperty("seconds_without", all["seconds"].dump());
   RecordProperty("seconds_with", part["seconds"].dump());
   for (const std::string& name : files()) EXPECT_NE(name.rfind(".tensorray", 0), 0u) << name;
@@ -43,11 +56,8 @@ TEST_F(Memory, DerivedTensorsAreTheSame) {
   write("scene.json",
         scene(R"({"file": "field.vdb", "name": "point_load_row0", "derive": "gradient", "eigenvalues": "raw",
                   "scale": 0.5})"));
-  run_well({"render", "scene.json", "-q", "-o", "all.exr", "--stats", "all.json"});
-  run_well(
-      {"render", "scene.json", "-q", "-o", "part.exr", "--stats", "part.json", "--memory", "256M", "--threads", "1"});
-  EXPECT_TRUE(read_file(in_folder("all.exr")) == read_file(in_folder("part.exr")));
-  EXPECT_LT(read_json("part.json")["peak_memory_bytes"], read_json("all.json")["peak_memory_bytes"]);
+  render_with_and_without_the_bound();
+  if (is_measured) EXPECT_LT(read_json("part.json")["peak_memory_bytes"], read_json("all.json")["peak_memory_bytes"]);
 }
 
 /// A field that fits is not slower, and also fields that are made within the bound are the same.
