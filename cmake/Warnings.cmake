@@ -40,10 +40,13 @@ endif()
 # because those that Python starts inherit it.
 if(TENSORRAY_SANITIZE MATCHES address AND CMAKE_CXX_COMPILER_ID MATCHES Clang)
   execute_process(COMMAND ${CMAKE_CXX_COMPILER} -print-file-name=libclang_rt.asan-${CMAKE_SYSTEM_PROCESSOR}.so
-                  OUTPUT_VARIABLE TENSORRAY_SANITIZER_LIBRARY OUTPUT_STRIP_TRAILING_WHITESPACE COMMAND_ERROR_IS_FATAL ANY)
-  get_filename_component(folder "${TENSORRAY_SANITIZER_LIBRARY}" DIRECTORY)
-  # It opens libraries for the program, and looks for them where DT_RPATH says, not DT_RUNPATH.
-  target_link_options(tensorray_options INTERFACE -shared-libsan -Wl,-rpath,${folder} -Wl,--disable-new-dtags)
+                  OUTPUT_VARIABLE library OUTPUT_STRIP_TRAILING_WHITESPACE)
+  if(EXISTS "${library}")  # Otherwise Python is left out.
+    set(TENSORRAY_SANITIZER_LIBRARY "${library}")
+    get_filename_component(folder "${library}" DIRECTORY)
+    # It opens libraries for the program, and looks for them where DT_RPATH says, not DT_RUNPATH.
+    target_link_options(tensorray_options INTERFACE -shared-libsan -Wl,-rpath,${folder} -Wl,--disable-new-dtags)
+  endif()
 endif()
 if(TENSORRAY_FUZZ)
   target_compile_options(tensorray_options INTERFACE -fsanitize=fuzzer-no-link)

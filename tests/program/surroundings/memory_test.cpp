@@ -57,7 +57,9 @@ TEST_F(Memory, DerivedTensorsAreTheSame) {
         scene(R"({"file": "field.vdb", "name": "point_load_row0", "derive": "gradient", "eigenvalues": "raw",
                   "scale": 0.5})"));
   render_with_and_without_the_bound();
-  if (is_measured) EXPECT_LT(read_json("part.json")["peak_memory_bytes"], read_json("all.json")["peak_memory_bytes"]);
+  if (is_measured) {
+    EXPECT_LT(read_json("part.json")["peak_memory_bytes"], read_json("all.json")["peak_memory_bytes"]);
+  }
 }
 
 /// A field that fits is not slower, and also fields that are made within the bound are the same.
