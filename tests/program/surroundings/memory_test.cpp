@@ -7,11 +7,11 @@ namespace {
 
 using namespace test;
 
-#ifdef TENSORRAY_SANITIZED  // It has memory of its own beside the program's, which is not measured then.
-constexpr int bound = 768;
+#ifdef TENSORRAY_SANITIZED  // A sanitizer has memory of its own: the process's is not measured then.
+constexpr int bound = 768;  // MiB
 constexpr bool is_measured = false;
 #else
-constexpr int bound = 256;  // MiB
+constexpr int bound = 256;
 constexpr bool is_measured = true;
 #endif
 
