@@ -70,6 +70,20 @@ function(tensorray_common_headers name)
   endif()
 endfunction()
 
+# Compiles the sources of a target in groups, one for each folder ("room"), where headers and templates, which take most
+# of the time, are compiled once. Names in unnamed namespaces must then differ within a room. Call it where the target
+# was made, after its sources are known.
+function(tensorray_compile_by_room target)
+  get_target_property(sources ${target} SOURCES)
+  foreach(source ${sources})
+    get_filename_component(folder ${source} DIRECTORY)
+    file(RELATIVE_PATH room ${PROJECT_SOURCE_DIR} ${folder})
+    string(REPLACE / _ room "${room}")
+    set_source_files_properties(${source} PROPERTIES UNITY_GROUP ${room})
+  endforeach()
+  set_target_properties(${target} PROPERTIES UNITY_BUILD ${TENSORRAY_UNITY} UNITY_BUILD_MODE GROUP)
+endfunction()
+
 # tensorray_library(NAME [EXCEPT FOLDERS]): a static library of all sources in this folder and its subfolders, without
 # those of subfolders that match an expression (CONFIGURE_DEPENDS finds new files by itself).
 function(tensorray_library name)
@@ -79,7 +93,7 @@ function(tensorray_library name)
     list(FILTER sources EXCLUDE REGEX "/${ARG_EXCEPT}/")
   endif()
   add_library(${name} STATIC ${sources})
-  set_target_properties(${name} PROPERTIES UNITY_BUILD ${TENSORRAY_UNITY})
+  tensorray_compile_by_room(${name})
   tensorray_relocatable(${name})
   target_link_libraries(${name} PUBLIC Eigen3::Eigen PRIVATE tensorray_options)
   tensorray_common_headers(${name})
