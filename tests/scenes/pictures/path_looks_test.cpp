@@ -5,7 +5,7 @@
 
 #include <gmock/gmock.h>
 
-#include "tests/program/paths_support.h"
+#include "tests/scenes/pictures/paths_support.h"
 
 namespace tensorray {
 namespace {
@@ -160,7 +160,7 @@ TEST_F(Paths, TheLegendIsDrawnIntoThePictureAlone) {
 }
 
 TEST_F(Paths, SpectraAreWritten) {
-  run_well(arguments({"out.spectral.exr"}, {"integrator.bands=8"}));
+  render({"integrator.bands=8"}, {"out.spectral.exr"});
   const Image image = read_image(in_folder("out.spectral.exr"));
   EXPECT_GE(image.channels.size(), 8u);
   EXPECT_EQ(std::count_if(image.channels.begin(), image.channels.end(),

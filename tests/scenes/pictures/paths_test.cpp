@@ -5,7 +5,7 @@
 
 #include <gmock/gmock.h>
 
-#include "tests/program/paths_support.h"
+#include "tests/scenes/pictures/paths_support.h"
 #include "volumes/files/tensor_files.h"
 
 namespace tensorray {
@@ -21,7 +21,6 @@ TEST_F(Paths, APictureWithEveryChannel) {
   const Image shown = read_image(in_folder("out.png"));
   EXPECT_EQ(shown.width, 24);
   EXPECT_LT(*std::min_element(shown.pixels.begin(), shown.pixels.end()), 0.7f) << "something is on the white ground";
-  EXPECT_THAT(files(), ::testing::UnorderedElementsAre("out.exr", "out.png", "scene.json"));
 }
 
 TEST_F(Paths, AuxiliaryPlanesSayWhatTheyShould) {
@@ -90,19 +89,15 @@ TEST_F(Paths, PixelsHaveBetweenTheLeastAndTheMostSamples) {
 
 TEST_F(Paths, TheSameBytesOnAnyNumberOfThreads) {
   const Settings names{"out.png", "out.exr", "out.spectral.exr", "out.vtp", "out.ply"};
-  std::vector<std::vector<std::string>> contents;
-  for (const std::string threads : {"1", "2", "8"}) {
-    std::vector<std::string> all =
-        arguments(names, {"integrator.context.plate=true", "integrator.context.slice={}", "camera.lens_radius=0.1",
-                          "integrator.min_samples=2", "integrator.noise=0.1", "integrator.seeds.kind=poisson_disk"});
-    all.insert(all.end(), {"--threads", threads});
-    run_well(all);
-    contents.emplace_back();
-    for (const std::string& name : names) contents.back().push_back(read_file(in_folder(name)));
-  }
-  for (std::size_t i = 0; i < names.size(); ++i) {
-    EXPECT_TRUE(contents[0][i] == contents[1][i]) << names[i];
-    EXPECT_TRUE(contents[0][i] == contents[2][i]) << names[i];
+  std::vector<std::string> one;
+  for (const int threads : {1, 2, 7}) {
+    render({"integrator.context.plate=true", "integrator.context.slice={}", "camera.lens_radius=0.1",
+            "integrator.min_samples=2", "integrator.noise=0.1", "integrator.seeds.kind=poisson_disk"},
+           names, threads);
+    std::vector<std::string> contents;
+    for (const std::string& name : names) contents.push_back(read_file(in_folder(name)));
+    if (one.empty()) one = contents;
+    for (std::size_t i = 0; i < names.size(); ++i) EXPECT_TRUE(contents[i] == one[i]) << names[i];
   }
 }
 
@@ -189,34 +184,29 @@ TEST_F(Paths, TracksAreWrittenAndRead) {
 }
 
 TEST_F(Paths, FilesOfPathsNeedNoPicture) {
-  render({}, {"out.vtp", "out.ply"});
-  for (const char* ending : {".ply", ".vtp"}) {
-    std::vector<std::string> all = arguments({std::string("alone") + ending}, {});
-    all.insert(all.end(), {"--stats", "stats.json"});
-    run_well(all);
-    EXPECT_TRUE(read_file(in_folder(std::string("alone") + ending)) ==
-                read_file(in_folder(std::string("out") + ending)))
-        << ending;
+  render({}, {"out.vtp", "out.ply", "out.png"});
+  for (const std::string ending : {".ply", ".vtp"}) {
+    render({}, {"alone" + ending});
+    EXPECT_TRUE(read_file(in_folder("alone" + ending)) == read_file(in_folder("out" + ending))) << ending;
   }
-  EXPECT_EQ(read_json("stats.json")["seconds"]["draw"], 0);
+  EXPECT_EQ(statistics_["seconds"]["draw"], 0);
 }
 
 /// A file without tensors holds only the points that positions need.
 TEST_F(Paths, TracksAloneAreShortAndTheSameOnAnyNumberOfThreads) {
+  const Settings many{"integrator.seeds.count=500"};
   std::set<std::string> contents;
-  for (const std::string threads : {"1", "2", "7"}) {
-    std::vector<std::string> all = arguments({"alone.tck"}, {"integrator.seeds.count=500"});
-    all.insert(all.end(), {"--threads", threads});
-    run_well(all);
+  for (const int threads : {1, 2, 7}) {
+    render(many, {"alone.tck"}, threads);
     contents.insert(read_file(in_folder("alone.tck")));
   }
   EXPECT_EQ(contents.size(), 1u);
-  run_well(arguments({"with.ply", "with.tck"}, {"integrator.seeds.count=500"}));
+  render(many, {"with.ply", "with.tck"});
   EXPECT_LT(contents.begin()->size(), read_file(in_folder("with.tck")).size());
 }
 
 TEST_F(Paths, TubesAreObstaclesOfAnotherScene) {
-  run_well(arguments({"tube.ply"}, {"integrator.seeds.count=1", "integrator.radius.typical=0.1"}));
+  render({"integrator.seeds.count=1", "integrator.radius.typical=0.1"}, {"tube.ply"});
   EXPECT_EQ(read_file(in_folder("tube.ply")).compare(0, 4, "ply\n"), 0);
   const Settings settings{R"(obstacles=[{"file": "tube.ply"}])", transparent, seen_from_the_side, without_box};
   Settings hiding = settings;
@@ -231,8 +221,9 @@ TEST_F(Paths, WhereTheTensorIsZeroTubesHaveTheLeastRadius) {
                                                      [](const Eigen::Vector3i& index) -> Eigen::Matrix3d {
                                                        return (index.x() < 8 ? 0 : 1) * Eigen::Matrix3d::Identity();
                                                      }));
-  run_well(arguments({"tubes.obj"}, {R"(field={"file": "half.vdb", "interpolation": "linear", "scale": 1})",
-                                     "integrator.radius={\"typical\": 0.05, \"min\": 0.01}"}));
+  render({R"(field={"file": "half.vdb", "interpolation": "linear", "scale": 1})",
+          R"(integrator.radius={"typical": 0.05, "min": 0.01})"},
+         {"tubes.obj"});
   double where_zero = 0, elsewhere = 0;
   for (const Eigen::Vector3d& vertex : vertices("tubes.obj")) {
     double& widest = vertex.x() < 0 ? where_zero : elsewhere;
