@@ -42,8 +42,8 @@ TEST_F(MeshLight, TheErrorIsBelowTheOneAskedFor) {
     return render({"light.wavelengths.count=3", "receiver.resolution=[48,48]",
                    fmt::format("integrator.density.error={}", error)});
   };
-  const Image exact = with_error(0.008);
-  for (const double bound : {0.1, 0.03}) {
+  const Image exact = with_error(0.03);
+  for (const double bound : {0.3, 0.1}) {
     const double error = relative_distance(with_error(bound), exact);
     const double estimate = statistics_["error"].get<double>();
     EXPECT_LE(estimate, bound);
@@ -66,16 +66,16 @@ std::vector<double> block_means(const Image& image) {
 /// At the default tolerance the mesh shows what a histogram of many photons shows: blocks of pixels differ by 3% of the
 /// picture's own light and by the noise of the photons' number, root mean square.
 TEST_F(MeshLight, IsThatOfAHistogramInExampleScenes) {
-  constexpr double photons = 1e6, bound = 0.03;
+  constexpr double photons = 1e5, bound = 0.03;
   struct Case {
     const char* scene;
     int resolution;
     const char* change;
   };
-  for (const Case& each : {Case{"helix", 128, ""}, Case{"vortex", 128, ""}, Case{"point_load_photons", 128, ""},
-                           Case{"two_point_load", 128, ""}, Case{"hemisphere_photons_front", 128, ""},
-                           Case{"hemisphere_photons_side", 128, ""}, Case{"hemisphere_photons_top", 128, ""},
-                           Case{"hemisphere_photons_front", 256, "field.scale=0.675"}}) {
+  for (const Case& each :
+       {Case{"helix", 64, ""}, Case{"vortex", 64, ""}, Case{"point_load_photons", 64, ""},
+        Case{"two_point_load", 64, ""}, Case{"hemisphere_photons_front", 64, ""},
+        Case{"hemisphere_photons_side", 64, ""}, Case{"hemisphere_photons_front", 96, "field.scale=0.675"}}) {
     const auto blocks_of = [&](const char* kind) {
       Settings settings{fmt::format("receiver.resolution=[{0},{0}]", each.resolution),
                         R"(light.wavelengths={"min":549,"max":551,"count":1})",
@@ -160,13 +160,13 @@ TEST_F(MeshLight, PhotonDifferentialsAreNearerThanPointsOfFixedWidth) {
   write("scene.json", R"({
       "field": { "generate": { "kind": "helix" } },
       "light": { "direction": [0, 0, -1], "wavelengths": { "count": 16 } },
-      "receiver": { "resolution": [128, 128] },
+      "receiver": { "resolution": [64, 64] },
       "integrator": { "type": "photon_distribution" }
     })");
-  const Image exact = render({"integrator.density.error=0.02"});
+  const Image exact = render({"integrator.density.error=0.05"});
   const auto error_of = [&](const std::string& kind, const std::string& tau) {
     return relative_distance(
-        render({"integrator.density.kind=" + kind, "integrator.density.tau=" + tau, "light.photons=2304"}), exact);
+        render({"integrator.density.kind=" + kind, "integrator.density.tau=" + tau, "light.photons=576"}), exact);
   };
   const double error = error_of("photon_differential", "1");
   EXPECT_LT(error, 0.5 * error_of("histogram", "1"));
@@ -176,7 +176,7 @@ TEST_F(MeshLight, PhotonDifferentialsAreNearerThanPointsOfFixedWidth) {
 TEST_F(MeshLight, OtherOutputsDoNotChangeThePicture) {
   const Image alone = render({"light.photons=50000"});
   const Image beside = render({"light.photons=50000", "light.wavelengths.per_photon=1"},
-                              {"out.exr", "out.spectral.exr", "photons.vdb", "light.fluence.vdb"});
+                              {"out.spectral.exr", "photons.vdb", "light.fluence.vdb"});
   EXPECT_EQ(alone.pixels, beside.pixels);
   EXPECT_EQ(read_image(in_folder("out.spectral.exr")).channels.size(), 3 + 8u);
   EXPECT_GT(std::filesystem::file_size(in_folder("photons.vdb")), 1000u);

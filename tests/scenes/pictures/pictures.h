@@ -105,8 +105,9 @@ class Pictures : public ::testing::Test {
     return result;
   }
 
-  /// The scene-linear picture. All values must be finite.
-  Image render(const Settings& settings, const Settings& outputs = {}, int threads = 0) {
+  /// The scene-linear picture, which is also in linear.exr if there are other outputs. All values must be finite.
+  Image render(const Settings& settings, Settings outputs = {}, int threads = 0) {
+    if (!outputs.empty()) outputs.emplace_back("linear.exr");
     Image image = render_all(settings, outputs, threads).linear;
     expect_finite(image, settings.empty() ? "" : settings.back());
     return image;
