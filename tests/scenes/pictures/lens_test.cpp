@@ -105,23 +105,6 @@ TEST_F(Lens, EveryChannelIsInTheExr) {
   }
 }
 
-TEST_F(Lens, PixelsThatSeeNoImageAreTransparent) {
-  write("scene.json", small_lens(R"("image": "checkerboard", "image_plane": {"size": [1.2, 0.8]})", no_bending));
-  for (const std::string mode : {"gather", "scatter"}) {
-    const Image image = render({"integrator.mode=" + mode});
-    const std::vector<float> alpha = channel(image, "A"), end = channel(image, "end");
-    for (int y = 0; y < 32; ++y)
-      for (int x = 0; x < 48; ++x) {
-        const bool inside = x >= 12 && x < 36 && y >= 8 && y < 24;
-        EXPECT_EQ(alpha[static_cast<std::size_t>(48 * y + x)], inside ? 1 : 0) << mode << " " << x << " " << y;
-        const float outside = mode == "gather" ? 5 : 1;  // `outside`, or `missed`: no light lands there.
-        EXPECT_EQ(end[static_cast<std::size_t>(48 * y + x)], inside ? 0 : outside);
-      }
-  }
-  const Image repeated = render({"integrator.mode=gather", "integrator.wrap=repeat"});
-  for (const float alpha : channel(repeated, "A")) EXPECT_EQ(alpha, 1);
-}
-
 /// The greatest difference between the chromaticity of a pixel and that of the sum of all pixels.
 double colour_range(const Image& image) {
   Eigen::Vector3d sum = Eigen::Vector3d::Zero();
@@ -195,12 +178,6 @@ TEST_F(Lens, OverlayDrawsOverThePictureAlone) {
   EXPECT_NE(channel(plain, "R"), channel(drawn, "R"));
   for (std::size_t i = 4; i < lens_channels.size(); ++i)
     EXPECT_EQ(channel(plain, lens_channels[i]), channel(drawn, lens_channels[i])) << lens_channels[i];
-}
-
-TEST_F(Lens, TheSamePictureOnAnyNumberOfThreads) {
-  write("scene.json", small_lens(R"("image": "grid")"));
-  for (const std::string mode : {"gather", "scatter"})
-    EXPECT_EQ(render({"integrator.mode=" + mode}, {}, 1).pixels, render({"integrator.mode=" + mode}, {}, 3).pixels);
 }
 
 TEST_F(Lens, TheImageIsSeenUprightFromBehindTheReceiver) {

@@ -1,12 +1,10 @@
 // Path tracing: pictures and files of the bent rays.
 
-#include <numeric>
 #include <set>
 
 #include <gmock/gmock.h>
 
 #include "tests/scenes/pictures/paths_support.h"
-#include "volumes/files/tensor_files.h"
 
 namespace tensorray {
 namespace {
@@ -74,19 +72,6 @@ TEST_F(Paths, AuxiliaryPlanesSayWhatTheyShould) {
   EXPECT_GT(greatest(length), 1);
 }
 
-TEST_F(Paths, PixelsHaveBetweenTheLeastAndTheMostSamples) {
-  const Image image = render({"integrator.min_samples=4", "integrator.max_samples=16", "integrator.noise=0.1"});
-  const std::vector<float> samples = channel(image, "samples");
-  for (const float count : samples) {
-    EXPECT_GE(count, 4);
-    EXPECT_LE(count, 16);
-  }
-  EXPECT_EQ(*std::min_element(samples.begin(), samples.end()), 4) << "the ground is done at once";
-  EXPECT_GT(greatest(samples), 4);
-  for (const float count : channel(render({"integrator.min_samples=1", "integrator.max_samples=3"}), "samples"))
-    EXPECT_EQ(count, 3);
-}
-
 TEST_F(Paths, TheSameBytesOnAnyNumberOfThreads) {
   const Settings names{"out.png", "linear.exr", "out.spectral.exr", "out.vtp", "out.ply"};
   std::vector<std::string> one;
@@ -143,21 +128,6 @@ TEST_F(Paths, ColoursOfEveryKind) {
   EXPECT_EQ(pictures.size(), 7u) << "curvature is s times the transverse force: within its own range, the same";
 }
 
-TEST_F(Paths, LightIsFollowedBackFromSeedsWithinTheVolume) {
-  // The paths go straight through the volume and are 2 long. Without `backwards` they begin near the middle.
-  write("scene.json", small_paths(zero));
-  const Settings settings{"integrator.seeds.kind=sphere", "integrator.seeds.radius=0.3", without_box};
-  EXPECT_NEAR(greatest(channel(render(settings), "length")), 2, 0.2);
-  Settings forwards = settings;
-  forwards.push_back("integrator.backwards=false");
-  const float length = greatest(channel(render(forwards), "length"));
-  EXPECT_LT(length, 1.35f);
-  EXPECT_GT(length, 0.7f);
-  Settings outside = settings;
-  outside.push_back("integrator.outside=true");
-  EXPECT_GT(greatest(channel(render(outside), "length")), 2.3f);
-}
-
 TEST_F(Paths, PathsOfAFileGiveTheSamePictureWithoutTracing) {
   // A given radius does not depend on the seeds, which a file of paths does not contain.
   const Settings settings{"integrator.radius.typical=0.04"};
@@ -192,19 +162,6 @@ TEST_F(Paths, FilesOfPathsNeedNoPicture) {
   EXPECT_EQ(statistics_["seconds"]["draw"], 0);
 }
 
-/// A file without tensors holds only the points that positions need.
-TEST_F(Paths, TracksAloneAreShortAndTheSameOnAnyNumberOfThreads) {
-  const Settings many{"integrator.seeds.count=500"};
-  std::set<std::string> contents;
-  for (const int threads : {1, 2, 7}) {
-    render_all(many, {"alone.tck"}, threads);
-    contents.insert(read_file(in_folder("alone.tck")));
-  }
-  EXPECT_EQ(contents.size(), 1u);
-  render_all(many, {"with.ply", "with.tck"});
-  EXPECT_LT(contents.begin()->size(), read_file(in_folder("with.tck")).size());
-}
-
 TEST_F(Paths, TubesAreObstaclesOfAnotherScene) {
   render({"integrator.seeds.count=1", "integrator.radius.typical=0.1"}, {"tube.ply"});
   EXPECT_EQ(read_file(in_folder("tube.ply")).compare(0, 4, "ply\n"), 0);
@@ -212,47 +169,6 @@ TEST_F(Paths, TubesAreObstaclesOfAnotherScene) {
   Settings hiding = settings;
   hiding.push_back("integrator.context.obstacles=false");
   EXPECT_GT(covered(render(settings)), covered(render(hiding)) + 1);
-}
-
-/// A tensor that is zero for x below 0, and the identity above. The seeds are at x = ±0.25 and ±0.75.
-TEST_F(Paths, WhereTheTensorIsZeroTubesHaveTheLeastRadius) {
-  const Eigen::Affine3d to_world = Eigen::Translation3d(-1, -1, -1) * Eigen::Scaling(0.125);
-  write_tensor_vdb(in_folder("half.vdb"), dense_grid({Eigen::Vector3i(0, 0, 0), Eigen::Vector3i(16, 16, 16)}, to_world,
-                                                     [](const Eigen::Vector3i& index) -> Eigen::Matrix3d {
-                                                       return (index.x() < 8 ? 0 : 1) * Eigen::Matrix3d::Identity();
-                                                     }));
-  render({R"(field={"file": "half.vdb", "interpolation": "linear", "scale": 1})",
-          R"(integrator.radius={"typical": 0.05, "min": 0.01})"},
-         {"tubes.obj"});
-  double where_zero = 0, elsewhere = 0;
-  for (const Eigen::Vector3d& vertex : vertices("tubes.obj")) {
-    double& widest = vertex.x() < 0 ? where_zero : elsewhere;
-    widest = std::max(widest, std::abs(std::abs(vertex.x()) - (std::abs(vertex.x()) < 0.5 ? 0.25 : 0.75)));
-  }
-  EXPECT_NEAR(where_zero, 0.01, 1e-6);
-  EXPECT_NEAR(elsewhere, 0.05, 1e-6);
-}
-
-TEST_F(Paths, WithoutAFieldTheyAreStraightRoundAndOfTheTypicalRadius) {
-  write("scene.json", small_paths(zero));
-  for (const std::string from : {"[0,-5,0]", "[5,0,0]"}) {
-    const Image image =
-        render({"integrator.seeds.count=1", "integrator.radius.typical=0.1", "integrator.caps=flat", without_box,
-                transparent, "camera.projection=orthographic", "camera.position=" + from, "camera.target=[0,0,0]",
-                "camera.height=1", "camera.resolution=[40,40]", "integrator.max_samples=16"},
-               {"tube.obj"});
-    // The tube is 0.2 wide. The picture is 1 high and has 40 pixels, so that the tube covers 8 pixels.
-    const std::vector<float> alpha = channel(image, "A");
-    for (int row = 0; row < 40; ++row)
-      EXPECT_NEAR(std::accumulate(alpha.begin() + 40 * row, alpha.begin() + 40 * (row + 1), 0.0), 8, 0.5)
-          << from << " " << row;
-  }
-  double farthest = 0;
-  for (const Eigen::Vector3d& vertex : vertices("tube.obj")) {
-    farthest = std::max(farthest, std::abs(vertex.head<2>().norm() - 0.1));
-    EXPECT_NEAR(std::abs(vertex.z()), 1, 1e-6);  // A straight tube needs no ring between its ends.
-  }
-  EXPECT_LT(farthest, 1e-6);
 }
 
 TEST_F(Paths, WhatAUserCanGetWrong) {

@@ -86,19 +86,6 @@ TEST_F(WholeScene, PhotonsGiveTheLightOfTheFlowMap) {
   EXPECT_LT(difference(photons), 0.7 * difference(few));
 }
 
-/// Where radiance is conserved, light of points gains as the lamp's does.
-TEST_F(WholeScene, PhotonsConserveRadianceOnRequest) {
-  const auto [points, lamp] = points_and_lamp(R"("max_samples": 32, "min_samples": 32, "conserve": "radiance",
-                                                 "photons": {"per_pass": 8192},
-                                                 "caustic": {"resolution": 256, "rays": 20000})");
-  write("scene.json", points);
-  const Image forwards = render({}), map = render({"integrator.photons.per_pass=0"});
-  write("scene.json", lamp);
-  const Image backwards = render({});
-  EXPECT_NEAR(mean(forwards, "G"), mean(backwards, "G"), 0.03 * mean(backwards, "G"));
-  EXPECT_GT(std::abs(mean(map, "G") / mean(backwards, "G") - 1), 0.1);  // A flow map keeps power.
-}
-
 /// A plate that light meets before the middle of the volume, and one along the light, which both sides of light meet.
 TEST_F(WholeScene, AWeakFieldLightsPlatesWithinTheVolume) {
   const Settings sets{
