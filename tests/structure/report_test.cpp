@@ -1,17 +1,14 @@
 // tests/report.awk, which makes the report of tools/test: a list of tests by name, from the output of GoogleTest
 // and ctest.
 
-#include <array>
-#include <cstdio>
 #include <filesystem>
 #include <fstream>
 #include <string>
 
 #include <gtest/gtest.h>
-#include <sys/wait.h>
 #include <unistd.h>
 
-#include "tests/data_folder.h"
+#include "tests/structure/commands.h"
 
 namespace tensorray {
 namespace {
@@ -42,87 +39,65 @@ class Report : public ::testing::Test {
 
   void write(const std::string& name, const std::string& text) const { std::ofstream(folder_ / name) << text; }
 
-  /// Runs the report on the log, expected.txt and the given results. @return Its output.
-  std::string report(const std::string& results = "") {
-    const std::string command = "cd '" + folder_.string() + "' && awk -f '" +
-                                (test::source_folder() / "tests" / "report.awk").string() +
-                                "' LastTest.log expected.txt " + results;
-    FILE* const pipe = popen(command.c_str(), "r");
-    std::string text;
-    std::array<char, 4096> buffer;
-    while (const std::size_t size = fread(buffer.data(), 1, buffer.size(), pipe)) text.append(buffer.data(), size);
-    status_ = WEXITSTATUS(pclose(pipe));
-    return text;
+  /// The report on the log, expected.txt and the given results.
+  test::CommandResult report(const std::string& results) const {
+    const std::string program = (test::source_folder() / "tests" / "report.awk").string();
+    return test::run_command("cd '" + folder_.string() + "' && awk -f '" + program + "' LastTest.log expected.txt " +
+                             results);
   }
-
-  int status_ = -1;  ///< Exit status of the last report.
 
  private:
   std::filesystem::path folder_;
 };
 
-TEST_F(Report, CountsTestsOfAllProcesses) {
-  write("LastTest.log", in_log("base.0", "", true) + in_log("base.1", "", true));
-  write("base.0.xml", results_of(test_case("A", "completed") + test_case("B/0", "completed")));
-  write("base.1.xml", results_of(test_case("C", "completed")));
-  EXPECT_EQ(report("base.0.xml base.1.xml"), "\n3 passed, 0 failed, 0 skipped\n");
-  EXPECT_EQ(status_, 0);
-}
-
-TEST_F(Report, FailedTestsComeWithTheirOutput) {
+/// Processes that ended: passed tests, a failed one with its output, a skipped one with its reason.
+TEST_F(Report, NamesTestsThatFailedOrWereSkipped) {
   write("LastTest.log", in_log("base.0",
                                "[ RUN      ] Suite.A\n[       OK ] Suite.A (0 ms)\n"
                                "[ RUN      ] Suite.B\nprinted a.cpp:1: Failure\n[  FAILED  ] Suite.B (0 ms)\n",
-                               false));
+                               false) +
+                            in_log("base.1", "", true));
   write("base.0.xml",
         results_of(test_case("A", "completed") + test_case("B", "completed", "      <failure message=\"x\"/>\n")));
-  EXPECT_EQ(
-      report("base.0.xml"),
-      "\n== base.Suite.B\n  printed a.cpp:1: Failure\n\n== failed:\nbase.Suite.B\n\n1 passed, 1 failed, 0 skipped\n");
-  EXPECT_EQ(status_, 1);
+  write(
+      "base.1.xml",
+      results_of(test_case("C/0", "completed") +
+                 test_case("D", "skipped",
+                           "      <skipped message=\"/a/b.cpp:11&#x0A;no &quot;x&quot; &amp; &lt;y&gt;&#x0A;z\"/>\n")));
+  const auto [text, status] = report("base.0.xml base.1.xml");
+  EXPECT_EQ(text,
+            "\n== base.Suite.B\n  printed a.cpp:1: Failure\n\n== failed:\nbase.Suite.B\n"
+            "\n== skipped:\nbase.Suite.D: no \"x\" & <y> z\n\n2 passed, 1 failed, 1 skipped\n");
+  EXPECT_EQ(status, 1);
 }
 
-TEST_F(Report, SkippedTestsComeWithTheirReasons) {
-  write("LastTest.log", in_log("base.0", "", true));
-  write("base.0.xml", results_of(test_case(
-                          "A", "skipped",
-                          "      <skipped message=\"/a/b.cpp:11&#x0A;no &quot;x&quot; &amp; &lt;y&gt;&#x0A;z\"/>\n")));
-  EXPECT_EQ(report("base.0.xml"), "\n== skipped:\nbase.Suite.A: no \"x\" & <y> z\n\n0 passed, 0 failed, 1 skipped\n");
-  EXPECT_EQ(status_, 0);
-}
-
-TEST_F(Report, CrashesFailTheTestThatRanAndThoseThatDidNotRun) {
+/// A process that crashed, one that could not start, and one that failed after its last test.
+TEST_F(Report, NamesTestsOfProcessesThatFailed) {
   write("LastTest.log", in_log("base.0",
                                "[ RUN      ] Suite.A\n[       OK ] Suite.A (0 ms)\n"
                                "[ RUN      ] Suite.S\n/a/b.cpp:11: Skipped\nno x\n[  SKIPPED ] Suite.S (0 ms)\n"
                                "[ RUN      ] Suite.B\nlast words\n",
-                               false));
+                               false) +
+                            in_log("base.1", "cannot load\n", false) + in_log("base.2", "leak\n", false));
   write("expected.txt", "base.Suite.A\nbase.Suite.B\nbase.Suite.C\nbase.Suite.S\n");
-  EXPECT_EQ(report(),
-            "\n== base.Suite.B\n  last words\n  its process crashed, or was stopped after its time\n"
-            "\n== base.Suite.C\n  not run: its process ended in a test before it\n"
-            "\n== failed:\nbase.Suite.B\nbase.Suite.C\n\n== skipped:\nbase.Suite.S: no x\n"
-            "\n1 passed, 2 failed, 1 skipped\n");
-  EXPECT_EQ(status_, 1);
+  write("base.2.xml", results_of(test_case("D", "completed")));
+  const auto [text, status] = report("base.2.xml");
+  for (const char* part : {"\n== base.Suite.B\n  last words\n  its process crashed, or was stopped after its time\n",
+                           "\n== base.Suite.C\n  not run: its process ended in a test before it\n", "cannot load",
+                           "leak", "base.1 (could not start)", "base.2 (after its last test)\n",
+                           "\n== skipped:\nbase.Suite.S: no x\n\n2 passed, 4 failed, 1 skipped\n"})
+    EXPECT_NE(text.find(part), std::string::npos) << part << "\nis missing in " << text;
+  EXPECT_EQ(status, 1);
 }
 
-TEST_F(Report, ProcessesMayFailBeforeTheirFirstTestAndAfterTheirLast) {
-  write("LastTest.log", in_log("base.0", "cannot load\n", false) + in_log("base.1", "leak\n", false));
-  write("base.1.xml", results_of(test_case("A", "completed")));
-  const std::string text = report("base.1.xml");
-  EXPECT_NE(text.find("base.0 (could not start)\nbase.1 (after its last test)\n\n1 passed, 2 failed, 0 skipped\n"),
-            std::string::npos)
-      << text;
-  EXPECT_NE(text.find("cannot load"), std::string::npos) << text;
-  EXPECT_NE(text.find("leak"), std::string::npos) << text;
-  EXPECT_EQ(status_, 1);
-}
-
-TEST_F(Report, NoTestIsAFailure) {
+TEST_F(Report, StatusIsZeroOnlyIfATestPassed) {
   write("LastTest.log", in_log("base.0", "", true));
+  write("base.0.xml", results_of(test_case("A", "completed")));
+  EXPECT_EQ(report("base.0.xml").status, 0);
   write("base.0.xml", results_of(""));
-  EXPECT_EQ(report("base.0.xml"), "no test ran\n\n0 passed, 0 failed, 0 skipped\n");
-  EXPECT_EQ(status_, 1);
+  const auto [text, status] = report("base.0.xml");
+  EXPECT_EQ(text, "no test ran\n\n0 passed, 0 failed, 0 skipped\n");
+  EXPECT_EQ(status, 1);
 }
 
 }  // namespace

@@ -1,17 +1,14 @@
 // The scripts in tools/, which may install packages, and must not where one only asks what they do.
 
-#include <array>
-#include <cstdio>
 #include <filesystem>
 #include <fstream>
 #include <string>
 #include <vector>
 
 #include <gtest/gtest.h>
-#include <sys/wait.h>
 #include <unistd.h>
 
-#include "tests/data_folder.h"
+#include "tests/structure/commands.h"
 
 namespace tensorray {
 namespace {
@@ -42,27 +39,20 @@ class Scripts : public ::testing::Test {
   }
   void TearDown() override { fs::remove_all(folder_); }
 
-  /// Runs a script with --help. @return what it prints, also as errors.
-  std::string help_of(const fs::path& script) {
-    const std::string command = "PATH='" + folder_.string() + "':\"$PATH\" '" + script.string() + "' --help 2>&1";
-    FILE* const pipe = popen(command.c_str(), "r");
-    std::string text;
-    std::array<char, 4096> buffer;
-    while (const std::size_t size = fread(buffer.data(), 1, buffer.size(), pipe)) text.append(buffer.data(), size);
-    status_ = WEXITSTATUS(pclose(pipe));
-    return text;
+  /// What a script prints with --help, also as errors.
+  test::CommandResult help_of(const fs::path& script) const {
+    return test::run_command("PATH='" + folder_.string() + "':\"$PATH\" '" + script.string() + "' --help 2>&1");
   }
 
   fs::path folder_;
-  int status_ = -1;  ///< Exit status of the last script.
 };
 
 TEST_F(Scripts, HelpOnlyPrints) {
   const std::vector<fs::path> all = scripts();
   ASSERT_FALSE(all.empty());
   for (const fs::path& script : all) {
-    const std::string text = help_of(script);
-    EXPECT_EQ(status_, 0) << script << ": " << text;
+    const auto [text, status] = help_of(script);
+    EXPECT_EQ(status, 0) << script << ": " << text;
     EXPECT_NE(text.find(script.filename().string()), std::string::npos) << script << ": " << text;
     EXPECT_EQ(text.find("was called"), std::string::npos) << script << ": " << text;
   }

@@ -1,4 +1,4 @@
-// The shape of functions and classes: short lists of parameters, and few members.
+// The shape of functions: short lists of parameters, and a definition in the room of the declaration.
 
 #include <algorithm>
 #include <cctype>
@@ -80,27 +80,6 @@ std::map<std::string, std::size_t> parameters_in(const std::string& code) {
   return result;
 }
 
-/// The classes of a file with the number of their members, whose names end in "_".
-std::map<std::string, std::size_t> members_in(const std::string& code) {
-  static const std::regex begin(R"(\bclass (\w+)[^;{(]*\{)"), member(R"(\b[a-z]\w*_\b)");
-  std::map<std::string, std::size_t> result;
-  for (auto match = std::sregex_iterator(code.begin(), code.end(), begin); match != std::sregex_iterator(); ++match) {
-    std::string level;
-    end_of_bracket(code, static_cast<std::size_t>(match->position() + match->length()), level);
-    std::set<std::string> names;
-    for (std::size_t first = 0, last; (last = level.find_first_of(";}", first)) != std::string::npos;
-         first = last + 1) {
-      const std::string statement = level.substr(first, last - first);
-      if (statement.find('(') != std::string::npos) continue;
-      for (auto name = std::sregex_iterator(statement.begin(), statement.end(), member); name != std::sregex_iterator();
-           ++name)
-        names.insert(name->str());
-    }
-    result[(*match)[1]] = names.size();
-  }
-  return result;
-}
-
 std::set<std::string> files() {
   std::set<std::string> result;
   for (const std::string& top : top_folders())
@@ -120,24 +99,6 @@ TEST(Structure, FunctionsHaveAtMostSixParameters) {
       found.insert(name);
     }
   EXPECT_EQ(found, vector_code);
-}
-
-/// A class has one task. Those with more members name the reason.
-TEST(Structure, ClassesHaveAboutADozenMembers) {
-  const std::map<std::string, std::size_t> larger{
-      {"MeshCell", 17},          // The arrays that VTK's cells use again for each cell.
-      {"WavelengthTracer", 16},  // The arrays of a batch of vertices, used again for each.
-      {"Pages", 16},             // The state between two threads, under one lock.
-      {"Rendering", 14},         // What all stages of one picture read.
-      {"Leader", 14},            // The state of a job on all ranks.
-  };
-  constexpr std::size_t most = 13;
-  for (const std::string& file : files())
-    for (const auto& [name, count] : members_in(code_of(file))) {
-      const auto exception = larger.find(name);
-      EXPECT_LE(count, exception == larger.end() ? most : exception->second) << file << ": " << name;
-      EXPECT_TRUE(exception == larger.end() || count > most) << name << " is no exception any more";
-    }
 }
 
 /// Code without what stands between two texts, every time.
@@ -180,17 +141,6 @@ TEST(Structure, FunctionsAreDefinedInTheRoomThatDeclaresThem) {
           << file << " defines " << name << ", which a header of another room declares";
   }
   EXPECT_TRUE(rooms.at("trace").count("integrators/tracing"));
-}
-
-TEST(Structure, ShapesAreCounted) {
-  const std::string code =
-      "class A final : public B {\n void f(int a, std::map<int, int> b, int c) const;\n int g() { return h(1, 2, 3, "
-      "4); }"
-      "\n int a_ = 1, b_;\n std::vector<int> c_{1, 2};\n};\n";
-  EXPECT_EQ(parameters_in(code).at("f"), 3u);
-  EXPECT_EQ(parameters_in(code).count("h"), 0u);
-  EXPECT_EQ(members_in(code).at("A"), 3u);
-  EXPECT_EQ(free_functions("\nint f(int a);\nvoid g() {}\n  int h();\n", ';'), std::set<std::string>{"f"});
 }
 
 }  // namespace

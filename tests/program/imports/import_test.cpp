@@ -1,31 +1,11 @@
-// Importing files of other programs keeps their numbers, places and axes.
+// Importing files of other programs: the whole way, and what the program reports of it. tests/import has the readers.
 
-#include "base/constants.h"
 #include "tests/program/import_support.h"
 
 namespace tensorray {
 namespace {
 
 using namespace test;
-
-TEST_F(Import, NotchWhoseMidSideNodesHoldNothing) {
-  const std::string folder = data_file("notch_stress");
-  SKIP_WITHOUT(folder);
-  const auto arguments = [&](const char* file) {
-    return Arguments{folder + file, "--array", "Nodal Stress", "--order", "vtk", "--voxel-size", "0.002"};
-  };
-  const json notch = import(arguments("/notch_stress.vtk"), "notch");
-  // On the mesh the eigenvalues reach from -3.402e5 to 8.1078e6. No warning means that the grid has 95% of that.
-  EXPECT_EQ(imported_.error, "");
-  EXPECT_GT(at(notch, "eigenvalues", "real_max"), 0.94 * 8.1078e6);
-  EXPECT_LE(at(notch, "eigenvalues", "real_max"), 8.1078e6);
-  EXPECT_GE(at(notch, "eigenvalues", "real_min"), -3.4021e5);
-  EXPECT_EQ(notch["asymmetry"], 0);
-  EXPECT_EQ(notch["name"], "Nodal Stress");
-  expect_extent(notch, Vector3d::Zero(), Vector3d(0.4, 0.1, 0.01), 0.004);
-  import(arguments("/notch_stress_fixed.vtk"), "fixed");
-  expect_same(field("notch"), field("fixed"));
-}
 
 TEST_F(Import, BrainInItsObliqueAxes) {
   const std::string file = data_file("brain_dti/tensorLAS.nii.gz");
@@ -40,22 +20,6 @@ TEST_F(Import, BrainInItsObliqueAxes) {
   import({file, "--order", "mrtrix"}, "wrong");
   EXPECT_NE(imported_.error.find("100% of the voxels have a negative eigenvalue"), std::string::npos)
       << imported_.error;
-  const std::array<std::array<double, 4>, 3> sform{{{-2.49987030, -0.00688329, 0.02452171, 121.26437378},
-                                                    {-0.00939895, 2.48641157, -0.26002878, -102.28897095},
-                                                    {0.02368196, 0.26021153, 2.48531413, -126.12567902}}};
-  for (std::size_t i = 0; i < 3; ++i)
-    for (std::size_t j = 0; j < 4; ++j) EXPECT_NEAR(brain["index_to_world"][i][j].get<double>(), sform[i][j], 1e-7);
-}
-
-TEST_F(Import, BrainWithItsBackgroundNotANumber) {
-  const std::string file = data_file("nan/brain_nan_background.vti");
-  SKIP_WITHOUT(file);
-  const json brain = import({file}, "brain");
-  EXPECT_EQ(brain["name"], "diffusion_tensor");
-  EXPECT_EQ(brain["active_voxels"], 93524);
-  EXPECT_EQ(brain["non_finite_voxels"], 0);
-  EXPECT_NE(imported_.out.find("367276 not finite"), std::string::npos) << imported_.out;
-  EXPECT_NEAR(at(brain, "eigenvalues", "negative_fraction") * 93524, 864, 0.01);
 }
 
 TEST_F(Import, DiffusionThatDoesNotSayItsOrder) {
@@ -69,20 +33,6 @@ TEST_F(Import, DiffusionThatDoesNotSayItsOrder) {
   EXPECT_EQ(crop["name"], "water");
   EXPECT_EQ(crop["metadata"]["tensorray:field"], "water");
   EXPECT_EQ(crop["metadata"]["tensorray:units"], "mm2/s");
-}
-
-TEST_F(Import, HelixInBothSpaces) {
-  const std::string folder = data_file("dt_helix");
-  SKIP_WITHOUT(folder);
-  const json ras = import({folder + "/dt-helix.nrrd"}, "ras");
-  EXPECT_NEAR(at(ras, "eigenvalues", "real_min"), 0.237, 5e-4);
-  EXPECT_NEAR(at(ras, "eigenvalues", "real_max"), 0.303, 5e-4);
-  EXPECT_EQ(voxels_of(ras), Vector3i(38, 39, 40));
-  const json lps = import({folder + "/dt-helix-ref-RotationAndAffine.nrrd"}, "lps");
-  EXPECT_NEAR(at(lps, "eigenvalues", "real_max"), 0.303, 5e-4);
-  EXPECT_GT(at(lps, "eigenvalues", "real_min"), 0);
-  for (const json& helix : {ras, lps})
-    expect_extent(helix, {-2.336842, -2.338462, -2.34}, {2.33685, 2.338464, 2.34}, 1e-6);
 }
 
 TEST_F(Import, BluntFinWhoseBoundaryLayerIsThinnerThanAVoxel) {
@@ -103,84 +53,6 @@ TEST_F(Import, BluntFinWhoseBoundaryLayerIsThinnerThanAVoxel) {
   EXPECT_LT(at(fin, "norm", "p100"), 1942.5);
   EXPECT_EQ(read_file(in_folder("fin.ply")).compare(0, 4, "ply\n"), 0);
   EXPECT_EQ(files(), (std::vector<std::string>{"fin.ply", "fin.vdb"}));
-}
-
-TEST_F(Import, CarotidAwayFromTheOrigin) {
-  const std::string file = data_file("carotid/carotid.vtk");
-  SKIP_WITHOUT(file);
-  const json flow = import({file, "--gradient-of", "vectors"}, "flow");
-  EXPECT_EQ(flow["active_voxels"], 76 * 49 * 45);
-  expect_extent(flow, {100, 80, 1}, {175, 128, 45}, 1e-9);
-  float least = 0, greatest = 0;
-  for_each_voxel(field("flow"), [&](const Vector3i&, const Eigen::Matrix3f& gradient) {
-    least = std::min(least, gradient.minCoeff());
-    greatest = std::max(greatest, gradient.maxCoeff());
-  });
-  EXPECT_NEAR(least, -15.9, 0.05);
-  EXPECT_NEAR(greatest, 15.4, 0.05);
-  const json strain =
-      import({file, "--strain-of", "vectors", "--bounds", "110", "120", "90", "100", "5", "8"}, "strain");
-  EXPECT_LT(strain["asymmetry"].get<double>(), 1e-7);
-  EXPECT_EQ(strain["active_voxels"], 11 * 11 * 4);
-  expect_extent(strain, {110, 90, 5}, {120, 100, 8}, 1e-9);
-}
-
-TEST_F(Import, DiskThatFillsItsBoxInPart) {
-  const std::string file = data_file("disk_out_ref/disk_out_ref.ex2");
-  SKIP_WITHOUT(file);
-  const json disk = import({file, "--gradient-of", "V", "--voxel-size", "0.2"}, "disk");
-  const double box = 11.5 * 11.5 * 20.16 / std::pow(0.2, 3);
-  EXPECT_NEAR(disk["active_voxels"].get<double>() / box, 0.59, 0.03);
-  expect_extent(disk, {-5.75, -5.75, -10}, {5.75, 5.75, 10.16}, 0.81);
-  EXPECT_GT(disk["asymmetry"].get<double>(), 0.5);
-}
-
-TEST_F(Import, PlasmaOfOneSliceInFourPieces) {
-  const std::string file = data_file("pv_tensors/tensors.pvti");
-  SKIP_WITHOUT(file);
-  const json plasma = import({file}, "plasma");
-  EXPECT_EQ(voxels_of(plasma), Vector3i(64, 1, 64));
-  EXPECT_EQ(plasma["active_voxels"], 64 * 64);
-  EXPECT_EQ(plasma["index_to_world"][0][3], 6950 + 256);
-  EXPECT_EQ(plasma["index_to_world"][2][3], 900 + 81);
-  EXPECT_GT(plasma["asymmetry"].get<double>(), 0.5);
-  float greatest = 0;
-  for_each_voxel(field("plasma"), [&](const Vector3i&, const Eigen::Matrix3f& gradient) {
-    greatest = std::max(greatest, gradient.cwiseAbs().maxCoeff());
-  });
-  EXPECT_NEAR(greatest, 1.4e-3, 5e-5);
-}
-
-TEST_F(Import, EightTensorsOfOneCell) {
-  const std::string file = data_file("vtk_tensors/tensors.vtk");
-  SKIP_WITHOUT(file);
-  const json eight = import({file, "--resolution", "2"}, "eight");
-  EXPECT_EQ(eight["active_voxels"], 8);
-  std::map<std::array<int, 3>, Matrix3d> tensors;
-  for_each_voxel(field("eight"), [&](const Vector3i& index, const Eigen::Matrix3f& tensor) {
-    tensors[{index.x(), index.y(), index.z()}] = tensor.cast<double>();
-  });
-  Matrix3d dense;
-  dense << 2, 1, 1, 1, 2, 1, 1, 1, 3;
-  EXPECT_LT((tensors[{0, 0, 0}] - Matrix3d::Identity()).norm(), 1e-6);
-  EXPECT_LT((tensors[{1, 0, 0}] - Matrix3d(Vector3d(-2, -2, 3).asDiagonal())).norm(), 1e-6);
-  EXPECT_LT((tensors[{1, 1, 0}] - dense).norm(), 1e-6);
-  EXPECT_LT((tensors[{1, 1, 1}]).norm(), 1e-6);
-}
-
-TEST_F(Import, PointLoadIsBoussinesqs) {
-  const std::string file = data_file("pointload/pointload_32.vti");
-  SKIP_WITHOUT(file);
-  const json load = import({file}, "load");
-  EXPECT_EQ(load["active_voxels"], 32 * 32 * 32);
-  expect_extent(load, {-10, -10, -10}, {10, 10, 10}, 1e-9);
-  const TensorGrid grid = field("load");
-  for_each_voxel(grid, [&](const Vector3i& index, const Eigen::Matrix3f& stress) {
-    const Vector3d r = grid.to_world * index.cast<double>() - Vector3d(0, 0, 10);
-    const double pressed = 3 * 100 / (2 * pi) * std::pow(r.z(), 3) / std::pow(r.norm(), 5);
-    ASSERT_NEAR(stress(2, 2), pressed, 1e-6 * (1 + std::abs(pressed)));  // r.z() <= 0: pressure is negative.
-    ASSERT_NEAR(stress(0, 2) * r.z(), pressed * r.x(), 1e-5 * (1 + std::abs(pressed)));
-  });
 }
 
 TEST_F(Import, WhatMakeMadeComesBackBitForBit) {
@@ -207,32 +79,6 @@ TEST_F(Import, WhatMakeMadeComesBackBitForBit) {
   const json half = import({"made.npy", "--half"}, "half");
   EXPECT_EQ(half["active_voxels"], size.prod());
   EXPECT_NEAR(at(half, "norm", "p100"), at(info("made"), "norm", "p100"), 1e-3 * at(half, "norm", "p100"));
-}
-
-TEST_F(Import, PythonReadsTheRows) {
-  write("lumps.npy", npy_header("12, 14, 18, 3, 3") + bytes_of(components(Matrix3d::Identity(), nine)));
-  import({"lumps.npy"}, "lumps");
-  write("rows.py",
-        "try: import pyopenvdb as vdb\nexcept ImportError: import openvdb as vdb\n"
-        "for row in range(3):\n"
-        "  grid = vdb.read('lumps.vdb', 'tensor_row%d' % row)\n"
-        "  read = grid.getConstAccessor()\n"
-        "  print(grid.activeVoxelCount(), *read.getValue((5, 3, 2)), *read.getValue((17, 13, 11)))\n");
-  const std::string command = "cd '" + in_folder("").string() + "' && /usr/bin/python3 rows.py > rows.txt 2> /dev/null";
-  if (std::system(command.c_str()) != 0) GTEST_SKIP() << "python3 has no OpenVDB (python3-openvdb)";
-  std::ifstream rows(in_folder("rows.txt"));
-  const Vector3d center(8.5, 6.5, 5.5);
-  for (int row = 0; row < 3; ++row) {
-    std::size_t active = 0;
-    rows >> active;
-    EXPECT_EQ(active, 18u * 14 * 12);
-    for (const Vector3d& index : {Vector3d(5, 3, 2), Vector3d(17, 13, 11)})
-      for (int column = 0; column < 3; ++column) {
-        double value = -1;
-        rows >> value;
-        EXPECT_EQ(static_cast<float>(value), static_cast<float>(lumps(index - center)(row, column)));
-      }
-  }
 }
 
 TEST_F(Import, OpenFoamsLastTimeStep) {

@@ -36,52 +36,36 @@ class Errors : public Program {
     write("scene.json", small_scene());
     expect_error(status, pattern, {"render", "scene.json", "-q", "--set", set});
   }
-
-  void make_field(const std::string& name) { run_well({"make", "shear", "-o", name, "--resolution", "12"}); }
 };
 
-TEST_F(Errors, SceneFiles) {
-  expect_error(2, "none.json", {"render", "none.json"});
+TEST_F(Errors, ScenesAndCommandLines) {
+  write("scene.json", small_scene());
   write("empty.json", "");
-  expect_error(2, "empty.json", {"render", "empty.json"});
   write("broken.json", "{\n  \"field\": }");
-  expect_error(2, "broken.json.*line 2", {"render", "broken.json"});
   write("partial.json", R"({"field": {"file": "a.vdb"}})");
-  expect_error(2, "integrator", {"render", "partial.json"});
-}
-
-TEST_F(Errors, SceneValues) {
+  const std::vector<std::pair<std::string, std::vector<std::string>>> all{
+      {"none.json", {"render", "none.json"}},
+      {"empty.json", {"render", "empty.json"}},
+      {"broken.json.*line 2", {"render", "broken.json"}},
+      {"integrator", {"render", "partial.json"}},
+      {"", {}},
+      {"photograph", {"photograph"}},
+      {"threads", {"render", "scene.json", "--threads", "0"}},
+      {"threads", {"render", "scene.json", "--threads", "many"}},
+      {"one kind", {"render", "scene.json", "-o", "a.png", "-o", "b.jpg"}},
+      {"--stats.*scene.json", {"render", "scene.json", "--stats", "scene.json"}},
+      {"--stats.*a.png", {"render", "scene.json", "-o", "a.png", "--stats", "a.png"}},
+      {"", {"make", "cheese", "-o", "a.vdb"}},
+      {"resolution", {"make", "vortex", "-o", "a.vdb", "--resolution", "0"}},
+      {"", {"make", "vortex"}}};
+  for (const auto& [pattern, arguments] : all) expect_error(2, pattern, arguments);
+  // tests/scenes has all values.
   expect_scene_error(2, "unknown key `/lihgt`; did you mean `light`", "lihgt.photons=5");
-  expect_scene_error(2, "/light/photons.*many", "light.photons=many");
-  expect_scene_error(2, "/light/photons", "light.photons=-5");
-  expect_scene_error(2, "/light/direction", "light.direction=[0,0,0]");
-  expect_scene_error(2, "/receiver/size", "receiver.size=[0,1]");
-  expect_scene_error(2, "/receiver/size", "receiver.size=[-1,1]");
-  expect_scene_error(2, "/receiver/resolution", "receiver.resolution=[0,5]");
-  expect_scene_error(2, "/receiver/normal", "receiver.normal=[1,0,0]");  // A plate parallel to the light.
-  expect_scene_error(2, "/integrator/type.*photon_distribution", "integrator.type=magic");
-  expect_scene_error(2, "/field/generate.*point_load", "field.generate.kind=cheese");
   expect_scene_error(2, "poisson_ratio", "field.generate.poisson_ratio=0.9");
-  expect_scene_error(2, "/light/spectrum|cheese", "light.spectrum=cheese");
-  expect_scene_error(2, "output", "output.image=out.gif");
-  for (const char* size : {"1e15", "1e25", "1e300"}) {
+  for (const char* size : {"1e15", "1e300"}) {
     expect_scene_error(2, "/receiver", fmt::format("receiver.size=[{0},{0}]", size));
     expect_scene_error(2, "/light/aperture", fmt::format("light.aperture.size=[{0},{0}]", size));
   }
-}
-
-TEST_F(Errors, CommandLines) {
-  expect_error(2, "", {});
-  expect_error(2, "photograph", {"photograph"});
-  write("scene.json", small_scene());
-  expect_error(2, "threads", {"render", "scene.json", "--threads", "0"});
-  expect_error(2, "threads", {"render", "scene.json", "--threads", "many"});
-  expect_error(2, "one kind", {"render", "scene.json", "-o", "a.png", "-o", "b.jpg"});
-  expect_error(2, "--stats.*scene.json", {"render", "scene.json", "--stats", "scene.json"});
-  expect_error(2, "--stats.*a.png", {"render", "scene.json", "-o", "a.png", "--stats", "a.png"});
-  expect_error(2, "", {"make", "cheese", "-o", "a.vdb"});
-  expect_error(2, "resolution", {"make", "vortex", "-o", "a.vdb", "--resolution", "0"});
-  expect_error(2, "", {"make", "vortex"});
 }
 
 TEST_F(Errors, FieldFiles) {
@@ -92,21 +76,16 @@ TEST_F(Errors, FieldFiles) {
     return arguments;
   };
   write("scene.json", small_scene());
-  make_field("good.vdb");
-  run_well(render("good.vdb"));
-  for (const char* name : {"scene.png", "scene.exr"}) std::filesystem::remove(in_folder(name));
-
+  run_well({"make", "shear", "-o", "good.vdb", "--resolution", "12"});
   expect_error(1, "none.vdb", render("none.vdb"));
   expect_error(1, "good.vdb.*cheese.*shear", render("good.vdb", "cheese"));
   const std::string bytes = read_file(in_folder("good.vdb"));
-  for (const double part : {0.01, 0.1, 0.5, 0.9, 0.999}) {
-    write("truncated.vdb", bytes.substr(0, static_cast<std::size_t>(part * static_cast<double>(bytes.size()))));
-    expect_error(1, "truncated.vdb", render("truncated.vdb"));
-    expect_error(1, "truncated.vdb", {"info", "truncated.vdb"});
-  }
+  write("cut.vdb", bytes.substr(0, bytes.size() / 2));
   write("text.vdb", "this is no VDB");
-  expect_error(1, "text.vdb", render("text.vdb"));
-  expect_error(1, "none.vdb", {"info", "none.vdb"});
+  for (const char* file : {"cut.vdb", "text.vdb", "none.vdb"}) {
+    expect_error(1, file, render(file));
+    expect_error(1, file, {"info", file});
+  }
 }
 
 TEST_F(Errors, Meshes) {
@@ -174,18 +153,13 @@ TEST_F(Errors, HostileMeshes) {
   }
 }
 
-TEST_F(Errors, LightThatTheFieldMakesOddIsWarnedOf) {
-  write("scene.json", small_scene());
-  const Outcome outcome = run_well({"render", "scene.json", "--set", "bending.a=0.5"});
-  EXPECT_TRUE(std::regex_search(outcome.error, std::regex("warning.*negative"))) << outcome.error;
-}
-
-TEST_F(Errors, PicturesThatShowNothingAreWarnedOf) {
+TEST_F(Errors, OddLightIsWarnedOf) {
   write("scene.json", small_scene());
   const auto expect_warning = [&](const std::string& pattern, const std::string& set) {
     const Outcome outcome = run_well({"render", "scene.json", "--set", set});
     EXPECT_TRUE(std::regex_search(outcome.error, std::regex(pattern))) << outcome.error;
   };
+  expect_warning("warning.*negative", "bending.a=0.5");
   expect_warning("warning: no light reached the plate", "receiver={\"center\":[900,0,0],\"size\":[1,1]}");
   expect_warning("warning: (99|100)% of the rays.*max_steps", "bending.max_steps=1");
   expect_warning("warning: no probe ray is turned",
@@ -204,20 +178,18 @@ TEST_F(Errors, OutputsThatCannotBeWritten) {
 
 TEST_F(Errors, AFullDiskLeavesTheOldPictureAndNoHalfOne) {
   write("scene.json", small_scene());
-  for (const char* name : {"a.png", "a.exr", "a.spectral.exr", "a.vdb", "a.vtp", "a.jpg", "a.tif"}) {
+  for (const char* name : {"a.png", "a.exr", "a.vdb", "a.vtp", "a.jpg"}) {
     write(name, "old");
     expect_error(1, name, {"render", "scene.json", "-q", "-o", name, "--set", "receiver.resolution=[200,200]"}, 8);
     EXPECT_EQ(read_file(in_folder(name)), "old") << name;
-    // A link to a device that is full.
-    std::filesystem::remove(in_folder(name));
-    std::filesystem::create_symlink("/dev/full", in_folder(name));
-    expect_error(1, name, {"render", "scene.json", "-q", "-o", name});
-    EXPECT_TRUE(std::filesystem::is_character_file("/dev/full"));
   }
-  expect_error(1, "big.vdb", {"make", "helix", "-o", "big.vdb", "--resolution", "24"}, 8);
+  // A link to a device that is full.
+  std::filesystem::create_symlink("/dev/full", in_folder("full.png"));
+  expect_error(1, "full.png", {"render", "scene.json", "-q", "-o", "full.png"});
   expect_error(1, "/dev/full", {"make", "helix", "-o", "/dev/full", "--resolution", "24"});
   write("complete.png", "");
   expect_error(1, "/dev/full", {"render", "scene.json", "-q", "-o", "complete.png", "--stats", "/dev/full"});
+  EXPECT_TRUE(std::filesystem::is_character_file("/dev/full"));
 }
 
 }  // namespace

@@ -1,7 +1,6 @@
 // Too few threads and too little memory: what is said, and that estimates are near what is needed.
 
 #include <cmath>
-#include <set>
 
 #include "tests/program/support.h"
 
@@ -18,12 +17,14 @@ class Limits : public Program {
 #endif
     Program::SetUp();
     write("scene.json", small_scene());
-    std::filesystem::permissions(in_folder(""), std::filesystem::perms::all);
   }
 
-  /// Without further threads, as a user whom this limit binds: it does not bind root.
+  /// Without further threads: a limit that does not bind root. Another user may not see the program's folder, or this
+  /// one, but for a capability.
   static std::string without_threads() {
-    const std::string user = geteuid() == 0 ? "setpriv --reuid=65534 --regid=65534 --clear-groups " : "";
+    const std::string user = geteuid() != 0 ? ""
+                                            : "setpriv --reuid=65534 --regid=65534 --clear-groups "
+                                              "--inh-caps=+dac_override --ambient-caps=+dac_override ";
     return "exec " + user + "prlimit --nproc=1";
   }
 
@@ -38,23 +39,21 @@ TEST_F(Limits, AreSaidInOneLine) {
   struct Case {
     std::string shell;
     std::vector<std::string> more;
-    std::set<int> statuses;
+    int status;
     const char* line;
   };
   const std::string little = "ulimit -v 3000000; exec";
   const std::vector<Case> cases{
-      {without_threads(), {}, {1}, "Resource temporarily unavailable"},
-      {little, {"--set", "receiver.resolution=[16000,16000]"}, {2}, "`/receiver/resolution` needs about"},
-      {little, {"--set", "integrator.type=lens", "--set", "receiver.resolution=[8000,8000]"}, {2}, "ulimit -v"},
-      {little, {"--set", "integrator.type=path_tracing", "--set", "camera.resolution=[6000,6000]"}, {2}, "needs about"},
-      {little, {"--set", "integrator.type=scene", "--set", "camera.resolution=[6000,6000]"}, {2}, "needs about"},
-      {little, {"--set", "field.generate.resolution=600"}, {2}, "resolution: the voxels need about"},
-      {"ulimit -v 200000; exec", {"--threads", "2"}, {1}, "threads can be started"},
-      // Almost enough for the program: chance decides whether the check notices it, or what is loaded later.
-      {"ulimit -v 300000; exec", {}, {1, 2}, "tensorray: "}};
+      {without_threads(), {}, 1, "Resource temporarily unavailable"},
+      {little, {"--set", "receiver.resolution=[16000,16000]"}, 2, "`/receiver/resolution` needs about"},
+      {little, {"--set", "integrator.type=lens", "--set", "receiver.resolution=[8000,8000]"}, 2, "ulimit -v"},
+      {little, {"--set", "integrator.type=path_tracing", "--set", "camera.resolution=[6000,6000]"}, 2, "needs about"},
+      {little, {"--set", "integrator.type=scene", "--set", "camera.resolution=[6000,6000]"}, 2, "needs about"},
+      {little, {"--set", "field.generate.resolution=600"}, 2, "resolution: the voxels need about"},
+      {"ulimit -v 200000; exec", {"--threads", "2"}, 1, "threads can be started"}};
   for (const Case& each : cases) {
     const Outcome outcome = run_in(each.shell, each.more);
-    EXPECT_EQ(each.statuses.count(outcome.status), 1u) << each.shell << outcome.error;
+    EXPECT_EQ(outcome.status, each.status) << each.shell << outcome.error;
     EXPECT_EQ(outcome.error.rfind("tensorray: ", 0), 0u) << outcome.error;
     EXPECT_NE(outcome.error.find(each.line), std::string::npos) << each.line << outcome.error;
     EXPECT_EQ(std::count(outcome.error.begin(), outcome.error.end(), '\n'), 1) << outcome.error;
@@ -64,8 +63,7 @@ TEST_F(Limits, AreSaidInOneLine) {
 
 TEST_F(Limits, OfProcessorsAreThoseOfTheRun) {
   for (const auto& [shell, more, threads] :
-       {std::tuple{"exec taskset 1", std::vector<std::string>{}, 1},
-        std::tuple{"exec taskset 1", std::vector<std::string>{"--threads", "4"}, 1},
+       {std::tuple{"exec taskset 1", std::vector<std::string>{"--threads", "4"}, 1},
         std::tuple{"exec", std::vector<std::string>{"--threads", "1"}, 1}}) {
     std::vector<std::string> arguments = more;
     arguments.insert(arguments.end(), {"--stats", "stats.json"});
@@ -98,7 +96,7 @@ TEST_F(Limits, EstimatesOfMemoryAreNearWhatIsMeasured) {
                                        "--set", "integrator.min_samples=1",     "--set", "integrator.seeds.count=10"},
       histogram{"--set", R"(integrator.density={"kind":"histogram"})"};
   for (const Case& each :
-       {Case{histogram, "receiver.resolution", 2500, 5000}, Case{paths, "camera.resolution", 300, 1000}}) {
+       {Case{histogram, "receiver.resolution", 1500, 3000}, Case{paths, "camera.resolution", 300, 1000}}) {
     double estimate[2], measured[2];
     for (const int i : {0, 1}) {
       const int size = i == 0 ? each.small : each.large;

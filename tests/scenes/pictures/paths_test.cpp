@@ -1,12 +1,10 @@
 // Path tracing: pictures and files of the bent rays.
 
-#include <numeric>
 #include <set>
 
 #include <gmock/gmock.h>
 
-#include "tests/program/paths_support.h"
-#include "volumes/files/tensor_files.h"
+#include "tests/scenes/pictures/paths_support.h"
 
 namespace tensorray {
 namespace {
@@ -21,7 +19,6 @@ TEST_F(Paths, APictureWithEveryChannel) {
   const Image shown = read_image(in_folder("out.png"));
   EXPECT_EQ(shown.width, 24);
   EXPECT_LT(*std::min_element(shown.pixels.begin(), shown.pixels.end()), 0.7f) << "something is on the white ground";
-  EXPECT_THAT(files(), ::testing::UnorderedElementsAre("out.exr", "out.png", "scene.json"));
 }
 
 TEST_F(Paths, AuxiliaryPlanesSayWhatTheyShould) {
@@ -75,34 +72,17 @@ TEST_F(Paths, AuxiliaryPlanesSayWhatTheyShould) {
   EXPECT_GT(greatest(length), 1);
 }
 
-TEST_F(Paths, PixelsHaveBetweenTheLeastAndTheMostSamples) {
-  const Image image = render({"integrator.min_samples=4", "integrator.max_samples=16", "integrator.noise=0.1"});
-  const std::vector<float> samples = channel(image, "samples");
-  for (const float count : samples) {
-    EXPECT_GE(count, 4);
-    EXPECT_LE(count, 16);
-  }
-  EXPECT_EQ(*std::min_element(samples.begin(), samples.end()), 4) << "the ground is done at once";
-  EXPECT_GT(greatest(samples), 4);
-  for (const float count : channel(render({"integrator.min_samples=1", "integrator.max_samples=3"}), "samples"))
-    EXPECT_EQ(count, 3);
-}
-
 TEST_F(Paths, TheSameBytesOnAnyNumberOfThreads) {
-  const Settings names{"out.png", "out.exr", "out.spectral.exr", "out.vtp", "out.ply"};
-  std::vector<std::vector<std::string>> contents;
-  for (const std::string threads : {"1", "2", "8"}) {
-    std::vector<std::string> all =
-        arguments(names, {"integrator.context.plate=true", "integrator.context.slice={}", "camera.lens_radius=0.1",
-                          "integrator.min_samples=2", "integrator.noise=0.1", "integrator.seeds.kind=poisson_disk"});
-    all.insert(all.end(), {"--threads", threads});
-    run_well(all);
-    contents.emplace_back();
-    for (const std::string& name : names) contents.back().push_back(read_file(in_folder(name)));
-  }
-  for (std::size_t i = 0; i < names.size(); ++i) {
-    EXPECT_TRUE(contents[0][i] == contents[1][i]) << names[i];
-    EXPECT_TRUE(contents[0][i] == contents[2][i]) << names[i];
+  const Settings names{"out.png", "linear.exr", "out.spectral.exr", "out.vtp", "out.ply"};
+  std::vector<std::string> one;
+  for (const int threads : {1, 2, 7}) {
+    render_all({"integrator.context.plate=true", "integrator.context.slice={}", "camera.lens_radius=0.1",
+                "integrator.min_samples=2", "integrator.noise=0.1", "integrator.seeds.kind=poisson_disk"},
+               names, threads);
+    std::vector<std::string> contents;
+    for (const std::string& name : names) contents.push_back(read_file(in_folder(name)));
+    if (one.empty()) one = contents;
+    for (std::size_t i = 0; i < names.size(); ++i) EXPECT_TRUE(contents[i] == one[i]) << names[i];
   }
 }
 
@@ -148,21 +128,6 @@ TEST_F(Paths, ColoursOfEveryKind) {
   EXPECT_EQ(pictures.size(), 7u) << "curvature is s times the transverse force: within its own range, the same";
 }
 
-TEST_F(Paths, LightIsFollowedBackFromSeedsWithinTheVolume) {
-  // The paths go straight through the volume and are 2 long. Without `backwards` they begin near the middle.
-  write("scene.json", small_paths(zero));
-  const Settings settings{"integrator.seeds.kind=sphere", "integrator.seeds.radius=0.3", without_box};
-  EXPECT_NEAR(greatest(channel(render(settings), "length")), 2, 0.2);
-  Settings forwards = settings;
-  forwards.push_back("integrator.backwards=false");
-  const float length = greatest(channel(render(forwards), "length"));
-  EXPECT_LT(length, 1.35f);
-  EXPECT_GT(length, 0.7f);
-  Settings outside = settings;
-  outside.push_back("integrator.outside=true");
-  EXPECT_GT(greatest(channel(render(outside), "length")), 2.3f);
-}
-
 TEST_F(Paths, PathsOfAFileGiveTheSamePictureWithoutTracing) {
   // A given radius does not depend on the seeds, which a file of paths does not contain.
   const Settings settings{"integrator.radius.typical=0.04"};
@@ -189,79 +154,21 @@ TEST_F(Paths, TracksAreWrittenAndRead) {
 }
 
 TEST_F(Paths, FilesOfPathsNeedNoPicture) {
-  render({}, {"out.vtp", "out.ply"});
-  for (const char* ending : {".ply", ".vtp"}) {
-    std::vector<std::string> all = arguments({std::string("alone") + ending}, {});
-    all.insert(all.end(), {"--stats", "stats.json"});
-    run_well(all);
-    EXPECT_TRUE(read_file(in_folder(std::string("alone") + ending)) ==
-                read_file(in_folder(std::string("out") + ending)))
-        << ending;
+  render({}, {"out.vtp", "out.ply", "out.png"});
+  for (const std::string ending : {".ply", ".vtp"}) {
+    render_all({}, {"alone" + ending});
+    EXPECT_TRUE(read_file(in_folder("alone" + ending)) == read_file(in_folder("out" + ending))) << ending;
   }
-  EXPECT_EQ(read_json("stats.json")["seconds"]["draw"], 0);
-}
-
-/// A file without tensors holds only the points that positions need.
-TEST_F(Paths, TracksAloneAreShortAndTheSameOnAnyNumberOfThreads) {
-  std::set<std::string> contents;
-  for (const std::string threads : {"1", "2", "7"}) {
-    std::vector<std::string> all = arguments({"alone.tck"}, {"integrator.seeds.count=500"});
-    all.insert(all.end(), {"--threads", threads});
-    run_well(all);
-    contents.insert(read_file(in_folder("alone.tck")));
-  }
-  EXPECT_EQ(contents.size(), 1u);
-  run_well(arguments({"with.ply", "with.tck"}, {"integrator.seeds.count=500"}));
-  EXPECT_LT(contents.begin()->size(), read_file(in_folder("with.tck")).size());
+  EXPECT_EQ(statistics_["seconds"]["draw"], 0);
 }
 
 TEST_F(Paths, TubesAreObstaclesOfAnotherScene) {
-  run_well(arguments({"tube.ply"}, {"integrator.seeds.count=1", "integrator.radius.typical=0.1"}));
+  render({"integrator.seeds.count=1", "integrator.radius.typical=0.1"}, {"tube.ply"});
   EXPECT_EQ(read_file(in_folder("tube.ply")).compare(0, 4, "ply\n"), 0);
   const Settings settings{R"(obstacles=[{"file": "tube.ply"}])", transparent, seen_from_the_side, without_box};
   Settings hiding = settings;
   hiding.push_back("integrator.context.obstacles=false");
   EXPECT_GT(covered(render(settings)), covered(render(hiding)) + 1);
-}
-
-/// A tensor that is zero for x below 0, and the identity above. The seeds are at x = ±0.25 and ±0.75.
-TEST_F(Paths, WhereTheTensorIsZeroTubesHaveTheLeastRadius) {
-  const Eigen::Affine3d to_world = Eigen::Translation3d(-1, -1, -1) * Eigen::Scaling(0.125);
-  write_tensor_vdb(in_folder("half.vdb"), dense_grid({Eigen::Vector3i(0, 0, 0), Eigen::Vector3i(16, 16, 16)}, to_world,
-                                                     [](const Eigen::Vector3i& index) -> Eigen::Matrix3d {
-                                                       return (index.x() < 8 ? 0 : 1) * Eigen::Matrix3d::Identity();
-                                                     }));
-  run_well(arguments({"tubes.obj"}, {R"(field={"file": "half.vdb", "interpolation": "linear", "scale": 1})",
-                                     "integrator.radius={\"typical\": 0.05, \"min\": 0.01}"}));
-  double where_zero = 0, elsewhere = 0;
-  for (const Eigen::Vector3d& vertex : vertices("tubes.obj")) {
-    double& widest = vertex.x() < 0 ? where_zero : elsewhere;
-    widest = std::max(widest, std::abs(std::abs(vertex.x()) - (std::abs(vertex.x()) < 0.5 ? 0.25 : 0.75)));
-  }
-  EXPECT_NEAR(where_zero, 0.01, 1e-6);
-  EXPECT_NEAR(elsewhere, 0.05, 1e-6);
-}
-
-TEST_F(Paths, WithoutAFieldTheyAreStraightRoundAndOfTheTypicalRadius) {
-  write("scene.json", small_paths(zero));
-  for (const std::string from : {"[0,-5,0]", "[5,0,0]"}) {
-    const Image image =
-        render({"integrator.seeds.count=1", "integrator.radius.typical=0.1", "integrator.caps=flat", without_box,
-                transparent, "camera.projection=orthographic", "camera.position=" + from, "camera.target=[0,0,0]",
-                "camera.height=1", "camera.resolution=[40,40]", "integrator.max_samples=16"},
-               {"tube.obj"});
-    // The tube is 0.2 wide. The picture is 1 high and has 40 pixels, so that the tube covers 8 pixels.
-    const std::vector<float> alpha = channel(image, "A");
-    for (int row = 0; row < 40; ++row)
-      EXPECT_NEAR(std::accumulate(alpha.begin() + 40 * row, alpha.begin() + 40 * (row + 1), 0.0), 8, 0.5)
-          << from << " " << row;
-  }
-  double farthest = 0;
-  for (const Eigen::Vector3d& vertex : vertices("tube.obj")) {
-    farthest = std::max(farthest, std::abs(vertex.head<2>().norm() - 0.1));
-    EXPECT_NEAR(std::abs(vertex.z()), 1, 1e-6);  // A straight tube needs no ring between its ends.
-  }
-  EXPECT_LT(farthest, 1e-6);
 }
 
 TEST_F(Paths, WhatAUserCanGetWrong) {

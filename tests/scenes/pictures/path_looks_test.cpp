@@ -1,11 +1,10 @@
 // Path tracing: surroundings, lights and cameras of pictures of bent rays.
 
-#include <numeric>
 #include <set>
 
-#include <gmock/gmock.h>
+#include <Eigen/Core>
 
-#include "tests/program/paths_support.h"
+#include "tests/scenes/pictures/paths_support.h"
 
 namespace tensorray {
 namespace {
@@ -58,29 +57,6 @@ TEST_F(Paths, Backgrounds) {
   const Eigen::Vector4f sky =
       corner({"integrator.background=lights", R"(lights=[{"kind": "constant", "strength": 0.3}])"});
   EXPECT_LT((sky - Eigen::Vector4f(0.3f, 0.3f, 0.3f, 1)).norm(), 2e-3f);
-}
-
-TEST_F(Paths, Cameras) {
-  // The picture of an orthographic camera does not depend on its distance.
-  const auto seen = [&](int distance) {
-    return render({transparent, "camera.projection=orthographic", "camera.target=[0,0,0]", "camera.height=3",
-                   "camera.position=[0,-" + std::to_string(distance) + ",0]"});
-  };
-  const Image near = seen(4), far = seen(6);
-  EXPECT_NEAR(covered(near), covered(far), 0.5);
-  const std::vector<float> near_depth = channel(near, "Z"), far_depth = channel(far, "Z");
-  for (std::size_t i = 0; i < near_depth.size(); ++i)
-    if (channel(near, "A")[i] == 1 && channel(far, "A")[i] == 1) {
-      EXPECT_NEAR(far_depth[i] - near_depth[i], 2, 0.3);
-    }
-  // A thin lens is sharp only at its focus.
-  const auto partly_covered = [&](const std::string& lens) {
-    const Image image = render({transparent, without_box, "integrator.max_samples=16", "camera.lens_radius=" + lens,
-                                "camera.focus_distance=1", "camera.direction=[0,1,0]"});
-    const std::vector<float> alpha = channel(image, "A");
-    return std::count_if(alpha.begin(), alpha.end(), [](float value) { return value > 0 && value < 1; });
-  };
-  EXPECT_GT(partly_covered("0.3"), partly_covered("0") + 20);
 }
 
 TEST_F(Paths, LightsOfEveryKind) {
@@ -160,7 +136,7 @@ TEST_F(Paths, TheLegendIsDrawnIntoThePictureAlone) {
 }
 
 TEST_F(Paths, SpectraAreWritten) {
-  run_well(arguments({"out.spectral.exr"}, {"integrator.bands=8"}));
+  render({"integrator.bands=8"}, {"out.spectral.exr"});
   const Image image = read_image(in_folder("out.spectral.exr"));
   EXPECT_GE(image.channels.size(), 8u);
   EXPECT_EQ(std::count_if(image.channels.begin(), image.channels.end(),

@@ -65,44 +65,9 @@ TEST_F(OddFields, NonFiniteVoxelsAreCountedAndLightGoesStraightThere) {
   EXPECT_EQ(read_json("stats.json")["photons"]["stopped"]["degenerate"], 0);
 }
 
-TEST_F(OddFields, VoxelsThatAreNotFiniteAreRemovedBeforeSmoothing) {
-  Rows grids = rows(9);
-  grids[0]->tree().setValue(openvdb::Coord(4, 4, 4), openvdb::Vec3f(std::nanf("")));
-  save(grids);
-  write("scene.json", small_scene(R"({"file": "odd.vdb", "smooth": 1.5})"));
-  const Outcome outcome = run({"render", "scene.json", "--stats", "stats.json"});
-  EXPECT_EQ(outcome.status, 0) << outcome.error;
-  EXPECT_TRUE(std::regex_search(outcome.error, std::regex("field smoothed: a Gaussian of 1.5 voxels")))
-      << outcome.error;
-  EXPECT_EQ(read_json("stats.json")["field"]["non_finite_voxels"], 1);
-  EXPECT_EQ(read_json("stats.json")["photons"]["stopped"]["degenerate"], 0);
-}
-
-TEST_F(OddFields, AllVoxelsNotFinite) {
-  Rows grids = rows(3);
-  for (auto& grid : grids) grid->denseFill({openvdb::Coord(0), openvdb::Coord(2)}, openvdb::Vec3f(std::nanf("")), true);
-  save(grids);
-  expect_failure("odd.vdb.*finite");
-}
-
 TEST_F(OddFields, EmptyGrids) {
   save(rows(0));
   expect_failure("odd.vdb.*active voxel");
-}
-
-TEST_F(OddFields, RowsWithDifferentTransforms) {
-  Rows grids = rows(5);
-  grids[1]->setTransform(openvdb::math::Transform::createLinearTransform(0.5));
-  save(grids);
-  expect_failure("odd.vdb.*transform");
-}
-
-TEST_F(OddFields, NoTensorInTheFile) {
-  auto density = openvdb::FloatGrid::create();
-  density->setName("density");
-  density->denseFill({openvdb::Coord(0), openvdb::Coord(3)}, 1.0f, true);
-  save(openvdb::GridCPtrVec{density});
-  expect_failure("odd.vdb.*density");
 }
 
 TEST_F(OddFields, AFlatFieldSeenEdgeOn) {

@@ -7,7 +7,7 @@
 
 #include "renderer/film/image_distance.h"
 #include "tests/data_folder.h"
-#include "tests/program/support.h"
+#include "tests/scenes/pictures/pictures.h"
 
 namespace tensorray {
 namespace {
@@ -15,10 +15,9 @@ namespace {
 using namespace test;
 using nlohmann::json;
 
-class MeshLight : public Program {
+class MeshLight : public Pictures {
  protected:
-  void SetUp() override {
-    Program::SetUp();
+  MeshLight() {
     write("scene.json", R"({
       "field": { "generate": { "kind": "point_load", "resolution": 33 }, "eigenvalues": "absolute", "scale": 6 },
       "light": { "direction": [0, 0, -1], "wavelengths": { "count": 8 } },
@@ -26,18 +25,11 @@ class MeshLight : public Program {
       "integrator": { "type": "photon_distribution" }
     })");
   }
-
-  Image picture(const std::vector<std::string>& more) {
-    std::vector<std::string> arguments{"render", "scene.json", "-o", "out.exr", "--stats", "stats.json", "-q"};
-    arguments.insert(arguments.end(), more.begin(), more.end());
-    run_well(arguments);
-    return read_image(in_folder("out.exr"));
-  }
 };
 
 TEST_F(MeshLight, AllPowerIsAccountedFor) {
-  picture({});
-  const json power = read_json("stats.json")["power"];
+  render({});
+  const json power = statistics_["power"];
   double stopped = 0;
   for (const auto& each : power["stopped"]) stopped += each.get<double>();
   EXPECT_NEAR(power["emitted"].get<double>(), 4, 1e-6);  // The volume's silhouette is a square of edge 2.
@@ -46,14 +38,14 @@ TEST_F(MeshLight, AllPowerIsAccountedFor) {
 }
 
 TEST_F(MeshLight, TheErrorIsBelowTheOneAskedFor) {
-  const auto small_picture = [&](std::vector<std::string> more) {
-    more.insert(more.end(), {"--set", "light.wavelengths.count=3", "--set", "receiver.resolution=[48,48]"});
-    return picture(more);
+  const auto with_error = [&](double error) {
+    return render({"light.wavelengths.count=3", "receiver.resolution=[48,48]",
+                   fmt::format("integrator.density.error={}", error)});
   };
-  const Image exact = small_picture({"--set", "integrator.density.error=0.008"});
-  for (const auto& [text, bound] : {std::pair("10%", 0.1), std::pair("0.03", 0.03)}) {
-    const double error = relative_distance(small_picture({"--until-error", text}), exact);
-    const double estimate = read_json("stats.json")["error"].get<double>();
+  const Image exact = with_error(0.03);
+  for (const double bound : {0.3, 0.1}) {
+    const double error = relative_distance(with_error(bound), exact);
+    const double estimate = statistics_["error"].get<double>();
     EXPECT_LE(estimate, bound);
     EXPECT_LT(error, estimate);
     EXPECT_GT(error, estimate / 20);
@@ -74,42 +66,26 @@ std::vector<double> block_means(const Image& image) {
 /// At the default tolerance the mesh shows what a histogram of many photons shows: blocks of pixels differ by 3% of the
 /// picture's own light and by the noise of the photons' number, root mean square.
 TEST_F(MeshLight, IsThatOfAHistogramInExampleScenes) {
-  constexpr double photons = 1e6, bound = 0.03;
+  constexpr double photons = 1e5, bound = 0.03;
   struct Case {
     const char* scene;
     int resolution;
     const char* change;
   };
-  for (const Case& each : {Case{"helix", 128, ""}, Case{"vortex", 128, ""}, Case{"point_load_photons", 128, ""},
-                           Case{"two_point_load", 128, ""}, Case{"hemisphere_photons_front", 128, ""},
-                           Case{"hemisphere_photons_side", 128, ""}, Case{"hemisphere_photons_top", 128, ""},
-                           Case{"hemisphere_photons_front", 256, "field.scale=0.675"}}) {
+  for (const Case& each :
+       {Case{"helix", 64, ""}, Case{"vortex", 64, ""}, Case{"point_load_photons", 64, ""},
+        Case{"two_point_load", 64, ""}, Case{"hemisphere_photons_front", 64, ""},
+        Case{"hemisphere_photons_side", 64, ""}, Case{"hemisphere_photons_front", 96, "field.scale=0.675"}}) {
     const auto blocks_of = [&](const char* kind) {
-      std::vector<std::string> arguments{"render",
-                                         (source_folder() / "scenes" / each.scene).string() + ".json",
-                                         "-o",
-                                         "out.exr",
-                                         "--stats",
-                                         "stats.json",
-                                         "-q",
-                                         "--set",
-                                         fmt::format("receiver.resolution=[{0},{0}]", each.resolution),
-                                         "--set",
-                                         "light.wavelengths.min=549",
-                                         "--set",
-                                         "light.wavelengths.max=551",
-                                         "--set",
-                                         "light.wavelengths.count=1",
-                                         "--set",
-                                         fmt::format("light.photons={}", photons),
-                                         "--set",
-                                         fmt::format("integrator.density.kind={}", kind)};
-      if (*each.change) arguments.insert(arguments.end(), {"--set", each.change});
-      run_well(arguments);
-      return block_means(read_image(in_folder("out.exr")));
+      Settings settings{fmt::format("receiver.resolution=[{0},{0}]", each.resolution),
+                        R"(light.wavelengths={"min":549,"max":551,"count":1})",
+                        fmt::format("light.photons={}", photons), fmt::format("integrator.density.kind={}", kind)};
+      if (*each.change) settings.push_back(each.change);
+      return block_means(
+          render_all(settings, {}, 0, source_folder() / "scenes" / fmt::format("{}.json", each.scene)).linear);
     };
     const std::vector<double> expected = blocks_of("histogram");
-    const json power = read_json("stats.json")["power"];
+    const json power = statistics_["power"];
     const double on_plate = power["deposited"].get<double>() / power["emitted"].get<double>() * photons;
     const std::vector<double> light = blocks_of("mesh");
     double all = 0, squares = 0, differences = 0;
@@ -126,7 +102,7 @@ TEST_F(MeshLight, IsThatOfAHistogramInExampleScenes) {
 }
 
 TEST_F(MeshLight, WithoutBendingTheMapIsThatOfStraightLight) {
-  const Image image = picture({"--set", "bending.a=0", "--set", "bending.b=0"});
+  const Image image = render({"bending.a=0", "bending.b=0"});
   const auto at = [&](const std::string& name, int x, int y) {
     const auto channel = std::find(image.channels.begin(), image.channels.end(), name) - image.channels.begin();
     return image.pixel(x, y)[channel];
@@ -146,7 +122,7 @@ TEST_F(MeshLight, WithoutBendingTheMapIsThatOfStraightLight) {
 
 /// The magnification is that of the displacement, from pixel to pixel.
 TEST_F(MeshLight, TheMapsChannelsDescribeOneMap) {
-  const Image image = picture({});
+  const Image image = render({});
   const auto index = [&](const std::string& name) {
     return std::find(image.channels.begin(), image.channels.end(), name) - image.channels.begin();
   };
@@ -174,30 +150,23 @@ TEST_F(MeshLight, TheMapsChannelsDescribeOneMap) {
   EXPECT_GT(compared, 1000);
 }
 
-TEST_F(MeshLight, ErrorsThatCannotBeReachedAreTold) {
-  const Outcome outcome =
-      run_well({"render", "scene.json", "-o", "out.exr", "--until-error", "0.1%", "--set", "light.photons=2000"});
-  EXPECT_NE(outcome.error.find("raise `light.photons`"), std::string::npos) << outcome.error;
-}
-
 TEST_F(MeshLight, TheNumberOfBandsHardlyChangesThePicture) {
-  const Image many = picture({"--set", "light.wavelengths.count=64"});
-  EXPECT_LT(relative_distance(picture({}), many), 0.02);
-  EXPECT_LT(relative_distance(picture({"--set", "light.wavelengths.count=2"}), many), 0.02);
+  const Image many = render({"light.wavelengths.count=64"});
+  EXPECT_LT(relative_distance(render({}), many), 0.02);
+  EXPECT_LT(relative_distance(render({"light.wavelengths.count=2"}), many), 0.02);
 }
 
 TEST_F(MeshLight, PhotonDifferentialsAreNearerThanPointsOfFixedWidth) {
   write("scene.json", R"({
       "field": { "generate": { "kind": "helix" } },
       "light": { "direction": [0, 0, -1], "wavelengths": { "count": 16 } },
-      "receiver": { "resolution": [128, 128] },
+      "receiver": { "resolution": [64, 64] },
       "integrator": { "type": "photon_distribution" }
     })");
-  const Image exact = picture({"--set", "integrator.density.error=0.02"});
+  const Image exact = render({"integrator.density.error=0.05"});
   const auto error_of = [&](const std::string& kind, const std::string& tau) {
-    return relative_distance(picture({"--set", "integrator.density.kind=" + kind, "--set",
-                                      "integrator.density.tau=" + tau, "--set", "light.photons=2304"}),
-                             exact);
+    return relative_distance(
+        render({"integrator.density.kind=" + kind, "integrator.density.tau=" + tau, "light.photons=576"}), exact);
   };
   const double error = error_of("photon_differential", "1");
   EXPECT_LT(error, 0.5 * error_of("histogram", "1"));
@@ -205,45 +174,32 @@ TEST_F(MeshLight, PhotonDifferentialsAreNearerThanPointsOfFixedWidth) {
 }
 
 TEST_F(MeshLight, OtherOutputsDoNotChangeThePicture) {
-  const Image alone = picture({"--set", "light.photons=50000"});
-  const Image beside = picture({"-o", "out.spectral.exr", "-o", "photons.vdb", "-o", "light.fluence.vdb", "--set",
-                                "light.wavelengths.per_photon=1", "--set", "light.photons=50000"});
+  const Image alone = render({"light.photons=50000"});
+  const Image beside = render({"light.photons=50000", "light.wavelengths.per_photon=1"},
+                              {"out.spectral.exr", "photons.vdb", "light.fluence.vdb"});
   EXPECT_EQ(alone.pixels, beside.pixels);
-  const Image spectral = read_image(in_folder("out.spectral.exr"));
-  EXPECT_EQ(spectral.channels.size(), 3 + 8u);
+  EXPECT_EQ(read_image(in_folder("out.spectral.exr")).channels.size(), 3 + 8u);
   EXPECT_GT(std::filesystem::file_size(in_folder("photons.vdb")), 1000u);
   EXPECT_GT(std::filesystem::file_size(in_folder("light.fluence.vdb")), 1000u);
 }
 
 TEST_F(MeshLight, ColoursOfRgbModeAreDrawnOnTheirOwn) {
-  const Image image = picture({"--set", "bending.rgb=[0.1,0.2,0.3]"});
-  for (const float value : image.pixels) ASSERT_TRUE(std::isfinite(value));
-  EXPECT_EQ(read_json("stats.json")["channels"].size(), 3u);
+  render({"bending.rgb=[0.1,0.2,0.3]"});
+  EXPECT_EQ(statistics_["channels"].size(), 3u);
 }
 
-TEST_F(MeshLight, WrongSettingsAreRefused) {
-  for (const char* text : {"-1%", "0", "much", "%"}) {
-    const Outcome outcome = run({"render", "scene.json", "-o", "out.exr", "--until-error", text});
-    EXPECT_EQ(outcome.status, 2) << text;
-    EXPECT_NE(outcome.error.find("--until-error"), std::string::npos) << outcome.error;
+TEST_F(MeshLight, SettingsWithoutEffectAndErrorsThatCannotBeReachedAreTold) {
+  const std::pair<Settings, const char*> cases[] = {
+      {{"integrator.density.tau=3"}, "`/integrator/density/tau` has no effect"},
+      {{"integrator.density.error=0.01", "integrator.density.kind=histogram"},
+       "`/integrator/density/error` has no effect: it belongs to the density \"mesh\""},
+      {{"integrator.density.error=0.001"}, "raise `light.photons`"}};
+  for (const auto& [settings, warning] : cases) {
+    Settings few = settings;
+    few.push_back("light.photons=2000");
+    render(few);
+    EXPECT_THAT(notes_, ::testing::Contains(::testing::HasSubstr(warning)));
   }
-  const Outcome outcome = run_well({"render", "scene.json", "-o", "out.exr", "--set", "integrator.density.tau=3"});
-  EXPECT_NE(outcome.error.find("`/integrator/density/tau` has no effect"), std::string::npos) << outcome.error;
-}
-
-TEST_F(MeshLight, SettingsOfOtherKindsAreWarnedOf) {
-  const auto expect_warning = [&](const std::vector<std::string>& more, const std::string& warning) {
-    std::vector<std::string> arguments{"render", "scene.json", "-o", "out.exr"};
-    arguments.insert(arguments.end(), more.begin(), more.end());
-    const Outcome outcome = run_well(arguments);
-    EXPECT_NE(outcome.error.find(warning), std::string::npos) << outcome.error;
-  };
-  const std::string no_effect = "`/integrator/density/error` has no effect: it belongs to the density \"mesh\"";
-  expect_warning({"--until-error", "1%", "--set", "integrator.density.kind=histogram", "--set", "light.photons=2000"},
-                 no_effect);
-  expect_warning({"--until-error", "1%", "--set", "integrator.type=stretch"},
-                 "`/integrator/density/error` bounds only the error of the light on a plate");
-  expect_warning({"--set", "light.photons=2000"}, "raise `light.photons`");
 }
 
 }  // namespace

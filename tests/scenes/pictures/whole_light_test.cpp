@@ -6,7 +6,7 @@
 
 #include <fmt/core.h>
 
-#include "tests/program/whole_support.h"
+#include "tests/scenes/pictures/whole_support.h"
 
 namespace tensorray {
 namespace {
@@ -40,18 +40,17 @@ TEST_F(WholeScene, TheLightOfPointsThroughTheFieldIsThatOfALamp) {
       points_and_lamp(R"("max_samples": 128, "min_samples": 128, "caustic": {"resolution": 256, "rays": 20000})");
   write("scene.json", points);
   // Light that is traced beforehand has little noise.
-  const Image forwards = picture({"integrator.max_samples=16", "integrator.min_samples=16"});
+  const Image forwards = render({"integrator.max_samples=16", "integrator.min_samples=16"});
   write("scene.json", lamp);
   const std::string none = "integrator.photons.per_pass=0";
-  const Image backwards = picture({none}), other_law = picture({none, "integrator.conserve=radiance"});
+  const Image backwards = render({none}), other_law = render({none, "integrator.conserve=radiance"});
   EXPECT_GT(mean(forwards, "G"), 0.2);
   EXPECT_NEAR(mean(forwards, "G"), mean(backwards, "G"), 0.03 * mean(backwards, "G"));
   // Photons beside the other ways to find the lamp: whatever law light follows.
-  std::vector<std::string> few{"integrator.photons.per_pass=1024", "integrator.max_samples=48",
-                               "integrator.min_samples=48"};
-  const Image photons = picture(few);
+  Settings few{"integrator.photons.per_pass=1024", "integrator.max_samples=48", "integrator.min_samples=48"};
+  const Image photons = render(few);
   few.push_back("integrator.conserve=radiance");
-  const Image other_photons = picture(few);
+  const Image other_photons = render(few);
   EXPECT_NE(photons.pixels, backwards.pixels);
   EXPECT_NEAR(mean(photons, "G"), mean(backwards, "G"), 0.03 * mean(backwards, "G"));
   EXPECT_NEAR(mean(other_photons, "G"), mean(other_law, "G"), 0.03 * mean(other_law, "G"));
@@ -60,7 +59,7 @@ TEST_F(WholeScene, TheLightOfPointsThroughTheFieldIsThatOfALamp) {
 
 /// Photons and the flow map are two ways to the same light.
 TEST_F(WholeScene, PhotonsGiveTheLightOfTheFlowMap) {
-  const std::vector<std::string> sets{
+  const Settings sets{
       "lights=[{\"kind\":\"directional\",\"direction\":[0.1,0.15,-1],\"caustic\":\"map\"}]",
       "integrator.max_samples=64",
       "integrator.min_samples=64",
@@ -69,11 +68,11 @@ TEST_F(WholeScene, PhotonsGiveTheLightOfTheFlowMap) {
       "objects=[{\"plate\":{\"center\":[0,0,-2.6],\"size\":[6,6]},\"material\":{\"kind\":\"diffuse\"}}]",
       "camera={\"projection\":\"orthographic\",\"position\":[0,0.001,-2.1],\"target\":[0,0,-2.6],\"height\":5,"
       "\"resolution\":[32,32]}"};
-  std::vector<std::string> other = sets;
+  Settings other = sets;
   other.push_back("lights.0.caustic=photons");
-  const Image map = picture(sets), photons = picture(other);
+  const Image map = render(sets), photons = render(other);
   other.push_back("integrator.photons.per_pass=2048");
-  const Image few = picture(other);
+  const Image few = render(other);
   const auto difference = [&](const Image& image) {
     double sum = 0;
     for (std::size_t i = 0; i < image.pixels.size(); i += image.channels.size())
@@ -87,22 +86,9 @@ TEST_F(WholeScene, PhotonsGiveTheLightOfTheFlowMap) {
   EXPECT_LT(difference(photons), 0.7 * difference(few));
 }
 
-/// Where radiance is conserved, light of points gains as the lamp's does.
-TEST_F(WholeScene, PhotonsConserveRadianceOnRequest) {
-  const auto [points, lamp] = points_and_lamp(R"("max_samples": 32, "min_samples": 32, "conserve": "radiance",
-                                                 "photons": {"per_pass": 8192},
-                                                 "caustic": {"resolution": 256, "rays": 20000})");
-  write("scene.json", points);
-  const Image forwards = picture({}), map = picture({"integrator.photons.per_pass=0"});
-  write("scene.json", lamp);
-  const Image backwards = picture({});
-  EXPECT_NEAR(mean(forwards, "G"), mean(backwards, "G"), 0.03 * mean(backwards, "G"));
-  EXPECT_GT(std::abs(mean(map, "G") / mean(backwards, "G") - 1), 0.1);  // A flow map keeps power.
-}
-
 /// A plate that light meets before the middle of the volume, and one along the light, which both sides of light meet.
 TEST_F(WholeScene, AWeakFieldLightsPlatesWithinTheVolume) {
-  const std::vector<std::string> sets{
+  const Settings sets{
       "objects=[{\"plate\":{\"center\":[0,0,-0.4],\"size\":[1.2,1.2]},\"material\":{\"kind\":\"diffuse\"}},"
       "{\"plate\":{\"center\":[0,0.4,-1],\"normal\":[0,1,0],\"size\":[1.6,1]},\"material\":{\"kind\":\"diffuse\"}}]",
       "lights=[{\"kind\":\"directional\",\"direction\":[0.3,0.2,-1],\"caustic\":\"photons\"},"
@@ -114,8 +100,8 @@ TEST_F(WholeScene, AWeakFieldLightsPlatesWithinTheVolume) {
       "camera.target=[0,0,-0.6]"};
   const Image with = expect_weak_as_none(sets);
   EXPECT_GT(mean(with, "caustic.G"), 0.9 * mean(with, "G"));
-  EXPECT_EQ(picture(weakened(sets), "1").pixels, with.pixels);
-  EXPECT_EQ(picture(weakened(sets), "7").pixels, with.pixels);
+  EXPECT_EQ(render(weakened(sets), {}, 1).pixels, with.pixels);
+  EXPECT_EQ(render(weakened(sets), {}, 7).pixels, with.pixels);
 }
 
 /// A point within the volume, and lamps there, of which the large one has no photons, light a plate below and one
@@ -124,7 +110,7 @@ TEST_F(WholeScene, AWeakFieldIsLitFromWithinAsIfItWereNotThere) {
   for (const char* light : {R"({"kind":"point","position":[0.1,0.2,-0.5],"strength":1})",
                             R"({"kind":"area","center":[0.1,0.2,-0.5],"size":[0.2,0.2],"strength":20})",
                             R"({"kind":"area","center":[0.1,0.2,-0.5],"size":[0.6,0.6],"strength":3})"}) {
-    const std::vector<std::string> sets{
+    const Settings sets{
         "objects=[{\"plate\":{\"center\":[0,0,-2.6],\"size\":[4,4]},\"material\":{\"kind\":\"diffuse\"}},"
         "{\"plate\":{\"center\":[0.4,0,-1.2],\"size\":[0.8,0.8]},\"material\":{\"kind\":\"diffuse\"}}]",
         std::string("lights=[{\"kind\":\"constant\",\"strength\":0.2},") + light + "]",
@@ -135,7 +121,7 @@ TEST_F(WholeScene, AWeakFieldIsLitFromWithinAsIfItWereNotThere) {
     SCOPED_TRACE(light);
     const Image with = expect_weak_as_none(sets);
     EXPECT_GT(mean(with, "G"), 0.01);
-    EXPECT_EQ(picture(weakened(sets), "1").pixels, with.pixels);
+    EXPECT_EQ(render(weakened(sets), {}, 1).pixels, with.pixels);
   }
 }
 
@@ -143,7 +129,7 @@ TEST_F(WholeScene, AWeakFieldIsLitFromWithinAsIfItWereNotThere) {
 /// plate there that stops light. Without its photons the lamp is found because it stops the rays that are followed
 /// back.
 TEST_F(WholeScene, ALampWithinTheFieldHasTheSameLightWithPhotons) {
-  const std::vector<std::string> sets{
+  const Settings sets{
       "field.scale=0.5",
       "objects=[{\"plate\":{\"center\":[0,0,-2.6],\"size\":[3,3]},\"material\":{\"kind\":\"diffuse\"}},"
       "{\"plate\":{\"center\":[-0.5,0,-1.4],\"size\":[0.8,1.2]},\"material\":{\"kind\":\"diffuse\"}}]",
@@ -155,9 +141,9 @@ TEST_F(WholeScene, ALampWithinTheFieldHasTheSameLightWithPhotons) {
       "integrator.max_depth=1",
       R"(camera={"projection":"orthographic","position":[0,0.001,-2.2],"target":[0,0,-2.6],"height":2.4,)"
       R"("resolution":[12,12]})"};
-  std::vector<std::string> none = sets;
+  Settings none = sets;
   none.push_back("integrator.photons.per_pass=0");
-  const Image with = picture(sets), without = picture(none);
+  const Image with = render(sets), without = render(none);
   EXPECT_NE(with.pixels, without.pixels);
   EXPECT_GT(mean(without, "G"), 0.05);
   for (const char* channel : {"R", "G", "B"})
@@ -170,7 +156,7 @@ TEST_F(WholeScene, PlatesAlongTheLightAreLitOnBothSides) {
   for (const double z : {-1.5, -2.4}) {
     std::vector<double> automatic, map;
     for (const double side : {-1.0, 1.0}) {
-      std::vector<std::string> sets{
+      Settings sets{
           fmt::format(R"(objects=[{{"plate":{{"center":[0,0.35,{}],"normal":[0,1,0],"size":[1.4,0.6]}}}}])", z),
           R"(lights=[{"kind":"directional","direction":[0,-0.1,-1]}])",
           "integrator.max_samples=16",
@@ -178,9 +164,9 @@ TEST_F(WholeScene, PlatesAlongTheLightAreLitOnBothSides) {
           "integrator.max_depth=1",
           fmt::format("camera.position=[0,{},{}]", 4 * side, z),
           fmt::format("camera.target=[0,0.35,{}]", z)};
-      automatic.push_back(mean(picture(sets), "R"));
+      automatic.push_back(mean(render(sets), "R"));
       sets.push_back("lights.0.caustic=map");
-      map.push_back(mean(picture(sets), "R"));
+      map.push_back(mean(render(sets), "R"));
     }
     for (const double each : automatic) EXPECT_GT(each, 4e-4) << z;
     EXPECT_LT(std::min(map[0] / automatic[0], map[1] / automatic[1]), 0.1) << z;

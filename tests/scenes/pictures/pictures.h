@@ -1,0 +1,141 @@
+#pragma once
+/// @file tests/scenes/pictures/pictures.h
+/// Renders small scenes as `tensorray render` does, in the process of the test.
+
+#include <algorithm>
+#include <cmath>
+#include <filesystem>
+#include <fstream>
+#include <iterator>
+#include <optional>
+#include <regex>
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <nlohmann/json.hpp>
+#include <tbb/global_control.h>
+#include <unistd.h>
+
+#include "base/process/progress.h"
+#include "renderer/images/image.h"
+#include "scenes/outputs/statistics_json.h"
+#include "scenes/outputs/write_outputs.h"
+#include "scenes/pipeline/read_scene.h"
+#include "scenes/scene/render.h"
+#include "scenes/scene/scene.h"
+
+namespace tensorray::test {
+
+using Settings = std::vector<std::string>;
+
+inline std::string read_file(const std::filesystem::path& path) {
+  std::ifstream file(path, std::ios::binary);
+  return {std::istreambuf_iterator<char>(file), {}};
+}
+
+/// The named channel of a picture, by pixel.
+inline std::vector<float> channel(const Image& image, const std::string& name) {
+  const auto found = std::find(image.channels.begin(), image.channels.end(), name);
+  if (found == image.channels.end()) {
+    ADD_FAILURE() << "no channel " << name;
+    return {};
+  }
+  std::vector<float> values;
+  for (auto i = static_cast<std::size_t>(found - image.channels.begin()); i < image.pixels.size();
+       i += image.channels.size())
+    values.push_back(image.pixels[i]);
+  return values;
+}
+
+inline double sum(const std::vector<float>& values) {
+  double total = 0;
+  for (const float value : values) total += static_cast<double>(value);
+  return total;
+}
+
+inline double mean(const Image& image, const std::string& name) {
+  return sum(channel(image, name)) / image.width / image.height;
+}
+
+inline float greatest(const std::vector<float>& values) { return *std::max_element(values.begin(), values.end()); }
+
+inline void expect_finite(const Image& image, const std::string& what = "") {
+  for (const float value : image.pixels) ASSERT_TRUE(std::isfinite(value)) << what;
+}
+
+/// Makes a folder for each test, with scene.json, and removes it after the test.
+class Pictures : public ::testing::Test {
+ protected:
+  Pictures() {
+    std::string name = ::testing::UnitTest::GetInstance()->current_test_info()->name();
+    std::replace(name.begin(), name.end(), '/', '_');
+    folder_ = std::filesystem::path(::testing::TempDir()) / ("tensorray_" + std::to_string(getpid()) + "_" + name);
+    std::filesystem::create_directories(folder_);
+  }
+  ~Pictures() override { std::filesystem::remove_all(folder_); }
+
+  std::filesystem::path in_folder(const std::string& name) const { return folder_ / name; }
+
+  void write(const std::string& name, const std::string& text) const {
+    std::ofstream(in_folder(name), std::ios::binary) << text;
+  }
+
+  /// Renders the scene and writes `outputs`; without any, no file.
+  /// @param threads  0: all. @param scene  Relative to the folder.
+  Render render_all(const Settings& settings, const Settings& outputs = {}, int threads = 0,
+                    const std::filesystem::path& scene_file = "scene.json") {
+    std::optional<tbb::global_control> control;
+    if (threads > 0) control.emplace(tbb::global_control::max_allowed_parallelism, static_cast<std::size_t>(threads));
+    SceneChanges changes{settings, {}};
+    for (const std::string& output : outputs) changes.outputs.push_back(in_folder(output));
+    const SceneDescription description = read_scene(folder_ / scene_file, changes);
+    OutputFiles files;
+    if (!outputs.empty()) files = open_outputs(description.output);
+    const Scene scene = load_scene(description, Progress());
+    Render result = tensorray::render(scene, Progress());
+    notes_ = scene.notes;
+    notes_.insert(notes_.end(), description.warnings.begin(), description.warnings.end());
+    notes_.insert(notes_.end(), result.warnings.begin(), result.warnings.end());
+    statistics_ = nlohmann::json::parse(statistics_json(scene, result.statistics, 0, threads));
+    if (!outputs.empty()) write_outputs(result, scene, files);
+    commit_outputs(std::move(files));
+    return result;
+  }
+
+  /// The scene-linear picture, which is also in linear.exr if there are other outputs. All values must be finite.
+  Image render(const Settings& settings, Settings outputs = {}, int threads = 0) {
+    if (!outputs.empty()) outputs.emplace_back("linear.exr");
+    Image image = render_all(settings, outputs, threads).linear;
+    expect_finite(image, settings.empty() ? "" : settings.back());
+    return image;
+  }
+
+  /// A render that must fail as wrong input (status 2) or otherwise (1), with one line that matches `pattern`.
+  void expect_error(int status, const std::string& pattern, const Settings& settings, const Settings& outputs = {}) {
+    int found = 0;
+    std::string line;
+    try {
+      render_all(settings, outputs);
+    } catch (const std::invalid_argument& error) {
+      found = 2;
+      line = error.what();
+    } catch (const std::exception& error) {
+      found = 1;
+      line = error.what();
+    }
+    EXPECT_EQ(found, status) << line << "\nexpected " << pattern;
+    EXPECT_TRUE(std::regex_search(line, std::regex(pattern))) << line << "\nexpected " << pattern;
+    EXPECT_EQ(line.find('\n'), std::string::npos) << line;
+  }
+
+  std::vector<std::string> notes_;  ///< Notes and warnings of the last render.
+  nlohmann::json statistics_;       ///< Of the last render.
+
+ private:
+  std::filesystem::path folder_;
+};
+
+}  // namespace tensorray::test

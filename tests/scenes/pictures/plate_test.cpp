@@ -1,0 +1,152 @@
+// The method photon_distribution: colours, places and statistics of light on a plate.
+
+#include <fmt/format.h>
+
+#include "tests/scenes/pictures/pictures.h"
+#include "tests/scenes/small_scene.h"
+
+namespace tensorray {
+namespace {
+
+using namespace test;
+
+class PlatePicture : public Pictures {
+ protected:
+  PlatePicture() { write("scene.json", small_scene()); }
+  /// Light that goes straight.
+  void remove_field() const {
+    write("scene.json",
+          small_scene(
+              R"({"generate": {"kind": "constant", "resolution": 9, "tensor": [[0, 0, 0], [0, 0, 0], [0, 0, 0]]}})"));
+  }
+};
+
+TEST_F(PlatePicture, IsTheSameWithAndWithoutSpectra) {
+  const Settings light{"field.scale=20", "light.wavelengths.count=16"};
+  const Image colors = render(light), bands = render(light, {"out.spectral.exr"});
+  ASSERT_EQ(colors.pixels.size(), bands.pixels.size());
+  for (std::size_t i = 0; i < bands.pixels.size(); ++i)
+    ASSERT_NEAR(colors.pixels[i], bands.pixels[i], 1e-6f * greatest(bands.pixels)) << i;
+}
+
+TEST_F(PlatePicture, WithoutAFieldItIsNeutralAndUniform) {
+  remove_field();
+  for (const std::string illuminant : {"D65", "A", "blackbody 3000"}) {
+    const Image image = render({"light.pattern=grid", "light.photons=40000", "receiver.size=[1.5,1.5]",
+                                "light.spectrum=" + illuminant, "receiver.resolution=[64,64]"});
+    double sum = 0, least = 1e9, most = 0;
+    for (int y = 12; y < 52; ++y)  // Six standard deviations of the estimate away from the edge of the plate.
+      for (int x = 12; x < 52; ++x)
+        for (int c = 0; c < 3; ++c) {
+          const double value = image.pixel(x, y)[c];
+          sum += value / (40 * 40 * 3);
+          least = std::min(least, value);
+          most = std::max(most, value);
+        }
+    EXPECT_NEAR(sum, 1, 0.02) << illuminant;
+    EXPECT_LT((most - least) / sum, 1e-6) << illuminant;
+  }
+}
+
+TEST_F(PlatePicture, WithoutWhiteBalanceItHasTheLightsColour) {
+  remove_field();
+  const Image image = render(
+      {"light.spectrum=A", "output.white_balance=false", R"(light.wavelengths={"min":360,"max":830,"count":4})"});
+  const float* rgb = image.pixel(16, 16);
+  // Illuminant A, x = 0.4476, y = 0.4074, in linear Rec. 709 (IEC 61966-2-1) at Y = 1.
+  const double X = 0.4476 / 0.4074, Z = (1 - 0.4476 - 0.4074) / 0.4074;
+  const double red = 3.2406 * X - 1.5372 - 0.4986 * Z, green = -0.9689 * X + 1.8758 + 0.0415 * Z;
+  const double blue = 0.0557 * X - 0.2040 + 1.0570 * Z;
+  EXPECT_NEAR(rgb[0] / rgb[1], red / green, 3e-3);
+  EXPECT_NEAR(rgb[2] / rgb[1], blue / green, 3e-3);
+}
+
+TEST_F(PlatePicture, RgbModeIsThePapers) {
+  EXPECT_EQ(render({"bending.rgb=[0.1,0.2,0.3]"}).channels.size(), 3u);
+  const Image grey = render({"bending.rgb=[0.2,0.2,0.2]"});  // Equal flexibilities give no colour at all.
+  for (int i = 0; i < 32 * 32; ++i) {
+    const float* rgb = grey.pixel(i % 32, i / 32);
+    ASSERT_NEAR(rgb[0], rgb[1], 1e-5);
+    ASSERT_NEAR(rgb[0], rgb[2], 1e-5);
+  }
+}
+
+TEST_F(PlatePicture, OfOneBandIsNeutralIfItIsBroadAndColouredIfItIsNarrow) {
+  remove_field();
+  const auto middle = [&](const std::string& wavelengths) {
+    const Image image = render({"light.wavelengths=" + wavelengths});
+    return std::vector<float>(image.pixel(16, 16), image.pixel(16, 16) + 3);
+  };
+  const auto broad = middle(R"({"min": 380, "max": 730, "count": 1})");
+  EXPECT_NEAR(broad[0], broad[1], 1e-4);
+  EXPECT_NEAR(broad[2], broad[1], 1e-4);
+  for (const char* green : {R"({"min": 550, "max": 550, "count": 1})", R"({"min": 549, "max": 551, "count": 2})"})
+    EXPECT_GT(middle(green)[1], 2 * middle(green)[0]);
+}
+
+TEST_F(PlatePicture, IsSeenAlongTheLightAnywhere) {
+  remove_field();
+  const auto column_of_light = [&](Settings receiver) {
+    receiver.push_back(R"(light.aperture={"center":[0.5,0,0],"size":[0.5,0.5]})");
+    const Image image = render(receiver);
+    double sum = 0, moment = 0;
+    for (int y = 0; y < 32; ++y)
+      for (int x = 0; x < 32; ++x) {
+        sum += image.pixel(x, y)[1];
+        moment += image.pixel(x, y)[1] * (x + 0.5);
+      }
+    return moment / sum;
+  };
+  const std::string size = "receiver.size=[2,2]";
+  EXPECT_NEAR(column_of_light({size}), 24, 0.2);
+  EXPECT_NEAR(column_of_light({size, "receiver.normal=[0,0,-1]"}), 24, 0.2);  // The opposite normal.
+  EXPECT_NEAR(column_of_light({size, "receiver.center=[0,0,5]"}), 24, 0.2);   // A plate before the volume.
+  EXPECT_NEAR(column_of_light({size, "receiver.center=[0,0,0]"}), 24, 0.2);   // A plate in the volume.
+  EXPECT_NEAR(column_of_light({"receiver.size=[4000,4000]", "receiver.distance=1e4"}), 16, 0.2);
+}
+
+TEST_F(PlatePicture, HasStatisticsThatBalance) {
+  render({"field.scale=20"});
+  const nlohmann::json& stats = statistics_;
+  const auto count = [&](const char* key) { return stats["photons"][key].get<std::uint64_t>(); };
+  EXPECT_EQ(count("emitted"), 4 * stats["positions"].get<std::uint64_t>());
+  std::uint64_t ended = count("deposited") + count("missed");
+  for (const auto& [reason, stopped] : stats["photons"]["stopped"].items()) ended += stopped.get<std::uint64_t>();
+  EXPECT_EQ(ended, count("emitted"));
+  EXPECT_GT(count("deposited"), 0u);
+  ASSERT_EQ(stats["channels"].size(), 4u);
+  for (const auto& channel : stats["channels"]) {
+    EXPECT_EQ(channel["rays"]["emitted"], stats["positions"]);
+    EXPECT_GT(channel["ray_power"], 0);
+  }
+  EXPECT_NEAR(stats["power"]["emitted"], 4, 1e-3);  // Irradiance 1 times the area of the beam's cross section.
+  for (const char* key : {"ray_steps", "tensor_samples", "peak_memory_bytes"}) EXPECT_GT(stats[key], 0) << key;
+  for (const char* phase : {"load", "trace", "density", "color", "write"})
+    EXPECT_GE(stats["seconds"][phase], 0) << phase;
+}
+
+TEST_F(PlatePicture, WithPixelsThatAreNoSquaresIsToldOf) {
+  const auto stretched = ::testing::Contains(::testing::HasSubstr("stretched"));
+  render({"receiver.size=[2,4]", "receiver.resolution=[20,40]"});
+  EXPECT_THAT(notes_, ::testing::Not(stretched));
+  render({"receiver.size=[2,4]", "receiver.resolution=40"});
+  EXPECT_THAT(notes_,
+              ::testing::Contains(::testing::HasSubstr("2 times as high as wide; [20, 40] pixels are squares")));
+}
+
+TEST_F(PlatePicture, HasTheShadowOfObstaclesAndStraightLightBesideACutVolume) {
+  write("wall.obj", "v -9 -9 -2.2\nv 9 -9 -2.2\nv 9 9 -2.2\nv -9 9 -2.2\nf 1 2 3 4\n");
+  render({R"(obstacles=[{"file":"wall.obj"}])"});
+  EXPECT_EQ(statistics_["photons"]["deposited"], 0);
+  EXPECT_GT(statistics_["photons"]["stopped"]["obstacle"], 0);
+
+  // The volume is cut to a small box in a corner. Light outside the box goes straight.
+  write("box.obj",
+        "v 0.5 0.5 -1\nv 0.9 0.5 -1\nv 0.9 0.9 -1\nv 0.5 0.9 -1\n"
+        "v 0.5 0.5 -0.5\nv 0.9 0.5 -0.5\nv 0.9 0.9 -0.5\nv 0.5 0.9 -0.5\n"
+        "f 4 3 2 1\nf 5 6 7 8\nf 1 2 6 5\nf 2 3 7 6\nf 3 4 8 7\nf 4 1 5 8\n");
+  EXPECT_NEAR(render({"field.bounds=box.obj"}).pixel(8, 24)[1], 1, 0.05);
+}
+
+}  // namespace
+}  // namespace tensorray

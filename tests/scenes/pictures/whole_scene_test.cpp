@@ -1,0 +1,227 @@
+// The method "scene": surfaces in light that a field bends, seen through the field.
+
+#include <cmath>
+#include <string>
+
+#include "tests/scenes/pictures/whole_support.h"
+
+namespace tensorray {
+namespace {
+
+using namespace test;
+
+TEST_F(WholeScene, HasTheSameBytesOnAnyNumberOfThreads) {
+  const Image one = render({}, {}, 1);
+  for (const int threads : {2, 7}) EXPECT_EQ(one.pixels, render({}, {}, threads).pixels) << threads;
+}
+
+TEST_F(WholeScene, BendsWhatTheCameraSeesAndTheSunsLight) {
+  const Image image = render({});
+  for (const float value : image.pixels) ASSERT_TRUE(std::isfinite(value));
+  EXPECT_GT(mean(image, "deflection"), 0.01);
+  EXPECT_GT(mean(image, "caustic.G"), 0.01);
+  EXPECT_NEAR(mean(image, "caustic.G") + mean(image, "straight.G"), mean(image, "G"), 1e-4);
+}
+
+/// A field that bends nothing, of either kind, gives the picture of the straight path tracer, bit for bit.
+TEST_F(WholeScene, AnIsotropicFieldIsNotThere) {
+  const std::string grid =
+      "field.generate={\"kind\":\"constant\",\"resolution\":9,\"tensor\":[[{0},0,0],[0,{0},0],[0,0,{0}]]}";
+  std::vector<Image> images;
+  for (const char* value : {"0", "3.7"}) {
+    std::string set = grid;
+    for (std::size_t at; (at = set.find("{0}")) != std::string::npos;) set.replace(at, 3, value);
+    images.push_back(render({set, "field.scale=1", "field.eigenvalues=raw"}));
+  }
+  EXPECT_EQ(images[0].pixels, images[1].pixels);
+  EXPECT_EQ(mean(images[0], "R") > 0.05, true);
+}
+
+/// Light that hardly bends must give that picture, too, though it is found in other ways: the sun by its flow map, the
+/// rest band by band.
+TEST_F(WholeScene, AWeakFieldGivesThePictureWithoutIt) {
+  expect_weak_as_none({"integrator.max_samples=64", "integrator.min_samples=64"}, 0.01);
+}
+
+/// Bodies below the volume, within it, and through its side, in light that goes through the volume and past it.
+TEST_F(WholeScene, AWeakFieldLightsBodiesAsIfItWereNotThere) {
+  write_roof("below.ply", 0.5, 0, -2.5);
+  write_roof("within.ply", -0.4, 0.3, -1);
+  write_roof("through.ply", 0, -1, -1.4);
+  const Settings sets{"objects=[{\"file\":\"below.ply\"},{\"file\":\"within.ply\"},{\"file\":\"through.ply\"}]",
+                      "lights=[{\"kind\":\"directional\",\"direction\":[0.3,0.2,-1]}]",
+                      "integrator.max_samples=64",
+                      "integrator.min_samples=64",
+                      "integrator.max_depth=1",
+                      "camera.position=[3,-6,3]",
+                      "camera.target=[0,0,-1.5]",
+                      "integrator.caustic={\"resolution\":256,\"rays\":20000,\"passes\":1}"};
+  const Image with = expect_weak_as_none(sets);
+  EXPECT_GT(mean(with, "caustic.G"), 0.3 * mean(with, "G"));
+}
+
+TEST_F(WholeScene, PathsAreObjects) {
+  const std::string floor = "{\"plate\":{\"center\":[0,0,-2.6],\"size\":[8,8]}}";
+  const Image with = render({"objects=[" + floor + ",{\"paths\":{\"count\":9}}]"});
+  const Image without = render({"objects=[" + floor + "]"});
+  EXPECT_GT(mean(with, "force"), 0);
+  EXPECT_EQ(mean(without, "force"), 0);
+  EXPECT_NE(with.pixels, without.pixels);
+  expect_error(2, "/objects/0/paths/count", {"objects=[{\"paths\":{\"count\":0}}]"});
+  expect_error(2, "/objects/0", {"objects=[{\"paths\":{},\"file\":\"a.ply\"}]"});
+  expect_error(2, "`/integrator/style`", {"objects=[{\"paths\":{}}]", "integrator.style=lines"});
+}
+
+/// In an even sky, conserved radiance makes the volume invisible; conserved power does not.
+TEST_F(WholeScene, AnEvenSkyThroughTheFieldIsEvenIfRadianceIsConserved) {
+  const Settings sky{"lights=[{\"kind\":\"constant\"}]", "integrator.max_depth=1",
+                     "objects=[{\"plate\":{\"center\":[0,0,-50],\"size\":[0.01,0.01]}}]", "camera.position=[0,-6,0]",
+                     "camera.target=[0,0,0]"};
+  Settings radiance = sky;
+  radiance.push_back("integrator.conserve=radiance");
+  const auto differs = [](const Image& image) {
+    double most = 0;
+    for (std::size_t i = 0; i < image.pixels.size(); i += image.channels.size())
+      most = std::max<double>(most, std::abs(image.pixels[i + 1] - 1));
+    return most;
+  };
+  // At the volume's edge, straight and bent samples of a pixel share the bands unevenly: noise, not a bias.
+  EXPECT_LT(differs(render(radiance)), 0.02);
+  EXPECT_GT(differs(render(sky)), 0.1);
+}
+
+TEST_F(WholeScene, StatisticsCountPhotonsAndBentRays) {
+  render({R"(lights=[{"kind":"directional","direction":[0.1,0,-1],"caustic":"photons"}])",
+          "integrator.photons.per_pass=100", "integrator.max_samples=16"});
+  const auto& stats = statistics_;
+  const auto& photons = stats["photons"];
+  const auto sum_of_ends = [](const auto& counts) {
+    std::uint64_t sum = 0;
+    for (const char* end : {"before", "landed", "escaped", "stopped"}) sum += counts[end].template get<std::uint64_t>();
+    return sum;
+  };
+  EXPECT_EQ(photons["emitted"], 4 * 100 * 16);
+  EXPECT_EQ(photons["emitted"], sum_of_ends(photons));
+  ASSERT_EQ(photons["passes"].size(), 4u);  // Of 4 samples each.
+  EXPECT_EQ(photons["passes"][1]["emitted"], 100 * 16);
+  EXPECT_GT(photons["passes"][1]["landed"], 0);
+  EXPECT_GE(stats["samples"], 4 * 40 * 32);
+  EXPECT_LE(stats["samples"], 16 * 40 * 32);
+  EXPECT_GT(stats["bent_rays"]["emitted"], 1000);
+  EXPECT_GT(stats["ray_steps"], stats["bent_rays"]["emitted"]);
+  EXPECT_GT(stats["tensor_samples"], 0);
+}
+
+TEST_F(WholeScene, SaysWhenPhotonsAreLost) {
+  const auto lost = ::testing::Contains(::testing::HasSubstr("of the photons could not be followed"));
+  const std::string lights = "lights=[{\"kind\":\"directional\",\"caustic\":\"photons\"}]";
+  render({lights, "bending.max_steps=5"});
+  EXPECT_THAT(notes_, lost);
+  render({lights, "bending.max_steps=20000"});
+  EXPECT_THAT(notes_, ::testing::Not(lost));
+}
+
+TEST_F(WholeScene, GroupsOfLightsAddUpToThePicture) {
+  write("scene.json", R"({
+    "field": {"generate": {"kind": "point_load", "resolution": 17}, "eigenvalues": "absolute"},
+    "integrator": {"type": "scene", "max_samples": 8, "min_samples": 8, "noise": 0,
+                   "caustic": {"resolution": 64, "rays": 4000, "passes": 1}},
+    "camera": {"resolution": [40, 32]},
+    "lights": [{"kind": "constant", "color": [0.2, 0.3, 0.6], "group": "around"},
+               {"kind": "directional", "direction": [0.2, 0, -1], "angle": 2, "group": "sun"},
+               {"kind": "point", "position": [1, 1, 3], "strength": 5, "group": "lamps"},
+               {"kind": "area", "center": [-1, 0, 3], "group": "lamps"}]})");
+  const Image photons = render({"lights.1.caustic=photons", "lights.2.caustic=photons"}), all = render({});
+  for (const std::string color : {"sun.G", "lamps.G"})
+    EXPECT_NEAR(mean(photons, color), mean(all, color), 0.03 * mean(all, color)) << color;
+  for (const char* color : {"R", "G", "B"}) {
+    double sum = 0;
+    for (const std::string group : {"around.", "sun.", "lamps."}) {
+      EXPECT_GT(mean(all, group + color), 0.01) << group;
+      sum += mean(all, group + color);
+    }
+    EXPECT_NEAR(sum, mean(all, color), 1e-4 * sum) << color;
+  }
+  EXPECT_GE(mean(all, "folds"), 0.05);
+  // A group has the light that the picture has if all others are dark.
+  const Image sun = render({"lights.0.strength=0", "lights.2.strength=0", "lights.3.strength=0"});
+  EXPECT_NEAR(mean(all, "sun.G"), mean(sun, "G"), 0.1 * mean(sun, "G"));
+}
+
+TEST_F(WholeScene, RefusesWhatDoesNotFit) {
+  expect_error(2, "/integrator/bands_per_sample", {"integrator.bands_per_sample=7"});
+  expect_error(2, "/integrator/conserve", {"integrator.conserve=light"});
+  expect_error(1, "none.ply", {"objects=[{\"file\":\"none.ply\"}]"});
+  expect_error(2, "/objects/0", {"objects=[{}]"});
+  expect_error(2, "/objects/0/plate", {"objects=[{\"plate\":{}}]"});
+  expect_error(2, "/objects/0/texture", {"objects=[{\"file\":\"none.ply\",\"texture\":\"checkerboard\"}]"});
+  expect_error(1, "none.png", {"objects=[{\"plate\":{\"center\":[0,0,0]},\"texture\":\"none.png\"}]"});
+  expect_error(2, "/objects/0/plate/colour", {"objects=[{\"plate\":{\"center\":[0,0,0],\"colour\":1}}]"});
+  expect_error(2, "/lights/0` is a point and needs its `position`", {"lights=[{\"kind\":\"point\"}]"});
+  expect_error(2,
+               "/lights/0` has no map of its light: the light is within the volume, or too near; move it away, or use",
+               {"lights=[{\"kind\":\"point\",\"position\":[0,0,-0.9],\"caustic\":\"map\"}]"});
+  expect_error(2, "/lights/0/caustic", {"lights=[{\"kind\":\"point\",\"position\":[0,0,3],\"caustic\":\"none\"}]"});
+  expect_error(2, "/lights/0/caustic", {"lights=[{\"kind\":\"area\",\"center\":[0,0,3],\"caustic\":\"map\"}]"});
+  expect_error(2, "/integrator/indirect_clamp", {"integrator.indirect_clamp=-1"});
+  expect_error(2, "/integrator/max_seconds", {"integrator.max_seconds=0"});
+  expect_error(2, "/integrator/photons/max_radius", {"integrator.photons.max_radius=0"});
+  expect_error(2, "/lights/0/group", {"lights=[{\"kind\":\"constant\",\"group\":\"albedo\"}]"});
+}
+
+TEST_F(WholeScene, EmptyListsMeanNone) {
+  // Without objects there is only the sky; without lights, nothing shines.
+  const Image sky = render({"objects=[]", R"(lights=[{"kind":"constant","strength":0.5}])", "field.scale=1e-9"});
+  EXPECT_NEAR(mean(sky, "G"), 0.5, 1e-3);
+  EXPECT_GT(mean(render({"objects=[]"}), "B"), 0);  // The default lights.
+  EXPECT_EQ(mean(render({"lights=[]"}), "G"), 0);
+  EXPECT_EQ(mean(render({"lights=[]", "objects=[]"}), "G"), 0);
+  EXPECT_GT(mean(render({}), "G"), 0);
+  const Settings paths{"integrator.type=path_tracing", "integrator.background_color=[0,0,0]"};
+  EXPECT_EQ(mean(render({paths[0], paths[1], "lights=[]"}), "G"), 0);
+  EXPECT_GT(mean(render(paths), "G"), 0);
+}
+
+TEST_F(WholeScene, SmoothAnglesRoundEdges) {
+  write_roof("roof.ply", 0, 0, -2.2);
+  const auto roof = [&](const std::string& angle) {
+    return render({"objects=[{\"file\":\"roof.ply\",\"smooth_angle\":" + angle + "}]"});
+  };
+  EXPECT_EQ(roof("0").pixels, roof("\"auto\"").pixels);
+  EXPECT_NE(roof("0").pixels, roof("180").pixels);
+}
+
+TEST_F(WholeScene, RefusesMoreLightThanFitsIntoMemory) {
+  std::string lights;
+  for (int i = 0; i < 10000; ++i) lights += "{\"kind\":\"point\",\"position\":[0,0,3]},";
+  lights.back() = ']';
+  std::string scene = read_file(in_folder("scene.json"));
+  scene.insert(scene.find("\"camera\""), "\"lights\": [" + lights + ", ");
+  write("scene.json", scene);
+  expect_error(2, "`/lights`", {"integrator.caustic.resolution=1024"});
+  scene.insert(scene.find("{\"kind\":\"point\","), "{\"kind\":\"directional\",\"caustic\":\"photons\"},");
+  write("scene.json", scene);
+  expect_error(2, "/integrator/photons/per_pass", {"integrator.photons.per_pass=4000000000"});
+}
+
+/// A sun in the plane of the floor, a floor through the volume, a camera inside the volume, one inside a body, one that
+/// looks away, one that looks into the point under the load, where the stress is singular, and a lamp inside a body.
+TEST_F(WholeScene, OddPlacesGiveAPicture) {
+  write_roof("body.ply", 0, 0, -2.3);
+  for (const Settings& sets : std::vector<Settings>{
+           {"lights=[{\"kind\":\"directional\",\"direction\":[1,0,0]}]"},
+           {"objects=[{\"plate\":{\"center\":[0,0,0],\"size\":[8,8]},\"texture\":\"checkerboard\"}]"},
+           {"camera.position=[0.1,0.2,-0.4]", "camera.target=[0,0,-3]"},
+           {"obstacles=[{\"file\":\"body.ply\"}]", "camera.position=[0,0,-2.5]", "camera.target=[0,0,-3]"},
+           {"camera.position=[0,-6,0]", "camera.target=[0,-9,0]"},
+           {"camera.position=[0,-3,0.4]", "camera.target=[0,0,0]", "camera.angle=3"},
+           {"obstacles=[{\"file\":\"body.ply\"}]",
+            "lights=[{\"kind\":\"constant\"},{\"kind\":\"point\",\"position\":[0,0,-2.5]}]"}}) {
+    const Image image = render(sets);
+    for (const float value : image.pixels) ASSERT_TRUE(std::isfinite(value)) << sets[0];
+    EXPECT_GT(mean(image, "A"), 0.99) << sets[0];
+  }
+}
+
+}  // namespace
+}  // namespace tensorray
