@@ -1,5 +1,5 @@
 /// @file integrators/kernels/packet_landing-inl.h
-/// The last step of rays in the extent, which ends on a face of the extent. A part of packet_kernel-inl.h.
+/// The last step of rays in the extent, which ends on a face of the extent, and the path within a step.
 
 // Included once for each instruction set: see Highway's foreach_target.h.
 #if defined(TENSORRAY_INTEGRATORS_PACKET_LANDING_TOGGLE) == defined(HWY_TARGET_TOGGLE)
@@ -11,7 +11,7 @@
 
 #include <hwy/highway.h>
 
-#include "integrators/kernels/packet_steps-inl.h"
+#include "integrators/kernels/packet_step-inl.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace tensorray::packets::HWY_NAMESPACE {
@@ -30,7 +30,7 @@ HWY_INLINE F face(const PacketMedium& medium, const Packet& packet, const FaceLa
 }
 
 /// Finds the face that the chord of the whole step meets, and the approximate length of a step that ends there.
-static HWY_NOINLINE void aim(const PacketMedium& medium, Packet& packet, FaceLanding& landing) {
+static HWY_NOINLINE void aim_along_chord(const PacketMedium& medium, Packet& packet, FaceLanding& landing) {
   const F zero = hn::Zero(floats), one = set(1);
   for (int i = 0; i < packet.vectors * lanes; i += lanes) {
     const F longest = load(packet.time, i);
@@ -48,8 +48,7 @@ static HWY_NOINLINE void aim(const PacketMedium& medium, Packet& packet, FaceLan
 }
 
 /// Improves the lengths by the path between the ends of the whole step.
-template <bool uniform>
-HWY_NOINLINE void aim_along_path(const PacketMedium& medium, Packet& packet, const FaceLanding& landing) {
+static HWY_NOINLINE void aim_along_path(const PacketMedium& medium, Packet& packet, const FaceLanding& landing) {
   const F one = set(1), two = set(2), three = set(3);
   for (int i = 0; i < packet.vectors * lanes; i += lanes) {
     const F longest = load(landing.longest, i), axis = load(landing.axis, i);
@@ -57,11 +56,9 @@ HWY_NOINLINE void aim_along_path(const PacketMedium& medium, Packet& packet, con
       return hn::IfThenElse(hn::Eq(axis, hn::Zero(floats)), v.x, hn::IfThenElse(hn::Eq(axis, one), v.y, v.z));
     };
     const auto on_face = [&](int k) HWY_ATTR { return face(medium, packet, landing, k, i); };
-    const F3 v = uniform ? load(packet.v, i) : load(packet.u, i);
-    const F3 v_next = uniform ? load(packet.v_next, i) : load(packet.u_next, i);
     const F from = of_axis(load(packet.p, i)), way = hn::Sub(of_axis(load(packet.p_next, i)), from);
     const F gap = hn::Sub(of_axis({on_face(0), on_face(1), on_face(2)}), from);
-    const F a = hn::Mul(longest, of_axis(v)), b = hn::Mul(longest, of_axis(v_next));
+    const F a = hn::Mul(longest, of_axis(load(packet.u, i))), b = hn::Mul(longest, of_axis(load(packet.u_next, i)));
     // The path is a t + (3 way − 2 a − b) t² + (a + b − 2 way) t³.
     const F square = hn::Sub(hn::MulSub(three, way, hn::Mul(two, a)), b), cube = hn::NegMulAdd(two, way, hn::Add(a, b));
     F t = hn::Div(load(packet.time, i), longest);
@@ -76,38 +73,76 @@ HWY_NOINLINE void aim_along_path(const PacketMedium& medium, Packet& packet, con
   }
 }
 
-/// How much longer, to first order, steps must be to end on the faces; 0 for light nearly parallel to its face.
-template <bool uniform>
-HWY_INLINE F rest_of_way(const PacketMedium& medium, const Packet& packet, const FaceLanding& landing, int at) {
-  const F zero = hn::Zero(floats), axis = load(landing.axis, at);
-  const auto of_axis = [&](F a, F b, F c) HWY_ATTR {
-    return hn::IfThenElse(hn::Eq(axis, zero), a, hn::IfThenElse(hn::Eq(axis, set(1)), b, c));
-  };
-  const auto on_face = [&](int k) HWY_ATTR { return face(medium, packet, landing, k, at); };
-  const F3 to = load(packet.p_next, at), u = uniform ? load(packet.v_next, at) : load(packet.u_next, at);
-  const F gap = hn::Sub(of_axis(on_face(0), on_face(1), on_face(2)), of_axis(to.x, to.y, to.z));
-  const F rest = hn::Div(gap, of_axis(u.x, u.y, u.z));
-  return hn::IfThenElseZero(hn::Le(hn::Abs(rest), load(landing.longest, at)), rest);
-}
-
-/// A step of Newton's method for the lengths of the steps.
-template <bool uniform>
-HWY_NOINLINE void improve(const PacketMedium& medium, Packet& packet, const FaceLanding& landing) {
+/// Moves the rays straight to their faces, but not those nearly parallel to them.
+static HWY_NOINLINE void move_to_faces(const PacketMedium& medium, Packet& packet, const FaceLanding& landing) {
   for (int i = 0; i < packet.vectors * lanes; i += lanes) {
-    const F time = hn::Add(load(packet.time, i), rest_of_way<uniform>(medium, packet, landing, i));
-    store(hn::Min(hn::Max(time, hn::Zero(floats)), load(landing.longest, i)), packet.time, i);
-  }
-}
-
-/// Moves the rays straight to the faces.
-template <bool uniform>
-HWY_NOINLINE void move_to_faces(const PacketMedium& medium, Packet& packet, const FaceLanding& landing) {
-  for (int i = 0; i < packet.vectors * lanes; i += lanes) {
-    const F rest = rest_of_way<uniform>(medium, packet, landing, i);
-    const F3 u = uniform ? load(packet.v_next, i) : load(packet.u_next, i);
-    store(mul_add(rest, u, load(packet.p_next, i)), packet.p_next, i);
+    const F zero = hn::Zero(floats), axis = load(landing.axis, i);
+    const auto of_axis = [&](F a, F b, F c) HWY_ATTR {
+      return hn::IfThenElse(hn::Eq(axis, zero), a, hn::IfThenElse(hn::Eq(axis, set(1)), b, c));
+    };
+    const auto on_face = [&](int k) HWY_ATTR { return face(medium, packet, landing, k, i); };
+    const F3 to = load(packet.p_next, i), u = load(packet.u_next, i);
+    const F gap = hn::Sub(of_axis(on_face(0), on_face(1), on_face(2)), of_axis(to.x, to.y, to.z));
+    const F way = hn::Div(gap, of_axis(u.x, u.y, u.z));
+    const F rest = hn::IfThenElseZero(hn::Le(hn::Abs(way), load(landing.longest, i)), way);
+    store(mul_add(rest, u, to), packet.p_next, i);
     store(hn::Add(load(packet.time, i), rest), packet.time, i);
   }
+}
+
+/// The path at the part t of the step (see path_weights), in index space.
+HWY_INLINE F3 path_at(const Packet& packet, double t, int at) {
+  const PathWeights weights = path_weights(t);
+  const F time = load(packet.time, at);
+  const auto along = [&](double weight, const F3& v)
+                         HWY_ATTR { return mul(hn::Mul(set(static_cast<float>(weight)), time), v); };
+  const auto at_end = [&](double weight, const F3& p) HWY_ATTR { return mul(set(static_cast<float>(weight)), p); };
+  return add(add(at_end(weights.from, load(packet.p, at)), along(weights.from_direction, load(packet.u, at))),
+             add(at_end(weights.to, load(packet.p_next, at)), along(weights.to_direction, load(packet.u_next, at))));
+}
+
+/// The lanes that turn on their way along an axis, or may do so, as bits: there the path's cubic polynomial may cross a
+/// face more than once.
+static HWY_NOINLINE std::uint32_t turning(const Packet& packet, int axis) {
+  std::uint32_t result = 0;
+  for (int i = 0; i < packet.vectors * lanes; i += lanes) {
+    const F way = hn::Sub(load(packet.p_next[axis], i), load(packet.p[axis], i)), time = load(packet.time, i);
+    const auto is_steady = [&](const PerRay& slope) HWY_ATTR {  // Sufficient where it holds at both ends.
+      const F part = hn::Div(hn::Mul(time, load(slope, i)), way);
+      return hn::And(hn::Ge(part, hn::Zero(floats)), hn::Le(part, set(3)));
+    };
+    result |= to_bits(hn::Not(hn::And(is_steady(packet.u[axis]), is_steady(packet.u_next[axis]))), i);
+  }
+  return result;
+}
+
+/// The lanes whose points are outside the extent along an axis, as bits.
+HWY_INLINE std::uint32_t outside(const PacketMedium& medium, const Packet& packet, const PerRay& points, int axis) {
+  std::uint32_t result = 0;
+  for (int i = 0; i < packet.vectors * lanes; i += lanes) {
+    const F x = load(points, i), margin = set(medium.margin[axis]);
+    result |= to_bits(hn::Or(hn::Lt(hn::Add(x, margin), load(packet.low[axis], i)),
+                             hn::Gt(hn::Sub(x, margin), load(packet.high[axis], i))),
+                      i);
+  }
+  return result;
+}
+
+/// The lanes whose steps leave the extent between their ends, as bits. Lanes of `leave` that leave it only once, along
+/// one axis, are not among them: the packet can find where they leave.
+static HWY_NOINLINE std::uint32_t outside_between(const PacketMedium& medium, const Packet& packet,
+                                                  std::uint32_t leave) {
+  std::uint32_t any = 0, edges = 0;
+  alignas(64) PerRay points[3][3];
+  for (int k = 0; k < 3; ++k)
+    for (int i = 0; i < packet.vectors * lanes; i += lanes) store(path_at(packet, 0.25 * (k + 1), i), points[k], i);
+  for (int axis = 0; axis < 3; ++axis) {
+    std::uint32_t along = outside(medium, packet, packet.p_next[axis], axis);
+    for (const auto& point : points) along |= outside(medium, packet, point[axis], axis);
+    edges |= along & (any | turning(packet, axis));
+    any |= along;
+  }
+  return (any & ~leave) | edges;
 }
 
 }  // namespace tensorray::packets::HWY_NAMESPACE

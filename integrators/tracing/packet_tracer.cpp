@@ -7,7 +7,6 @@
 
 #include "base/geometry/box.h"
 #include "integrators/kernels/packet_kernel.h"
-#include "integrators/steps/runge_kutta.h"
 #include "integrators/steps/scalar_tracer.h"
 
 namespace tensorray {
@@ -17,7 +16,7 @@ using packets::KernelRay;
 using packets::KernelSettings;
 
 constexpr double face_margin = 1e-3;      // Voxels; above the error of single precision.
-constexpr double least_tolerance = 1e-5;  // Of adaptive methods; below it, errors of single precision would show.
+constexpr double least_tolerance = 1e-5;  // Of automatic steps; below it, errors of single precision would show.
 constexpr double surface_margin = 4e-6;   // In sizes of the volume; above the margin of Geometry.
 
 /// A box around the surfaces that rays may meet within the field, in index space; empty if there are none.
@@ -43,7 +42,6 @@ bool meets_surface(const Geometry& geometry, const Eigen::Vector3d& from, const 
 
 KernelSettings kernel_settings(const TensorField& field, const Geometry& geometry, const BendingSettings& settings) {
   KernelSettings result;
-  result.method = settings.method;
   result.step = static_cast<float>(settings.step);
   result.tolerance = static_cast<float>(settings.tolerance);
   result.max_steps = static_cast<std::uint32_t>(settings.max_steps);
@@ -213,7 +211,6 @@ void trace_rays(const TensorField& field, const Geometry& geometry, const Bendin
   Tracer<N> tracer(field, geometry, settings);
   approach(field, settings, batch, records, tracer, traced);
   record_steps(records, traced);
-  traced.kernel.wants_log_radiance_scale = batch.wants_log_radiance_scale;
   batch.tensor_samples += packets::run(field, kernel_settings(field, geometry, settings), traced.kernel);
   for (std::size_t i = 0; i < traced.numbers.size(); ++i) {
     const std::size_t number = traced.numbers[i];
@@ -227,7 +224,8 @@ void trace_rays(const TensorField& field, const Geometry& geometry, const Bendin
 
 bool trace_in_packets(const TensorField& field, const Geometry& geometry, const BendingSettings& settings,
                       RayBatch& batch, RayRecord* records) {
-  if (is_adaptive(settings.method, settings.step) && settings.tolerance < least_tolerance) return false;
+  if (!field.is_cubic() || settings.method != BendingMethod::splitting4 || packets::lane_count() == 1) return false;
+  if (settings.step == 0 && settings.tolerance < least_tolerance) return false;
   if (batch.differentials.empty())
     trace_rays<1>(field, geometry, settings, batch, records);
   else

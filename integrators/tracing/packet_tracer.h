@@ -2,7 +2,7 @@
 /// @file integrators/tracing/packet_tracer.h
 /// Traces a batch of rays in packets (packet_kernel.h) inside the field. The scalar tracer (scalar_tracer.h)
 /// does the rest, ray by ray: the way to the field and behind it, steps that end on surfaces or are too short for
-/// single precision, and the last step of rays with differentials. A part of trace.cpp.
+/// single precision, and the last step of rays with differentials.
 
 #include "integrators/bending/bending.h"
 #include "integrators/bending/geometry.h"
@@ -13,7 +13,8 @@ namespace tensorray {
 
 /// The same as `trace`.
 /// @param records  Empty, one for each ray; or null.
-/// @return false if packets cannot trace this batch; the batch is then unchanged.
+/// @return false, with the batch unchanged, if packets cannot trace it: they have only `splitting4` in cubic fields,
+/// and no automatic steps with a tolerance below 1e-5.
 bool trace_in_packets(const TensorField& field, const Geometry& geometry, const BendingSettings& settings,
                       RayBatch& batch, RayRecord* records);
 

@@ -67,7 +67,7 @@ struct Ray {
   std::uint32_t steps = 0;
 };
 
-/// Traces with the reference: these tests check its mathematics in double precision, and packet_tracer_test.cpp
+/// Traces with the reference: these tests check its mathematics in double precision, and packet_kernel_test.cpp
 /// compares `trace` with it.
 inline Ray trace_one(const TensorField& field, const Geometry& geometry, const BendingSettings& settings,
                      const Eigen::Vector3d& position, const Eigen::Vector3d& direction, double flexibility) {

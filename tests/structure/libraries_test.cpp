@@ -82,8 +82,7 @@ TEST(Structure, LibrariesNeitherPrintNorExit) {
 /// Eq. 5 needs the tensor at the position of a ray: from a sampler or, in packets, from the bricks.
 TEST(Structure, OnlyBendingKnowsTheRule) {
   const std::regex tensor_at_a_point(R"(\b(TensorSampler|TensorBrick)\b|\bbrick\()");
-  const std::set<std::string> rooms{"integrators/kernels", "integrators/packets", "integrators/steps",
-                                    "integrators/tracing"};
+  const std::set<std::string> rooms{"integrators/kernels", "integrators/steps", "integrators/tracing"};
   std::set<std::string> readers;
   for (const Line& line : lines_of("integrators"))
     if (std::regex_search(line.text, tensor_at_a_point)) {
@@ -91,7 +90,7 @@ TEST(Structure, OnlyBendingKnowsTheRule) {
       readers.insert(line.folder());
     }
   // Both tracers must use the names that this test looks for.
-  EXPECT_TRUE(readers.count("integrators/packets") && readers.count("integrators/steps"));
+  EXPECT_TRUE(readers.count("integrators/kernels") && readers.count("integrators/steps"));
 }
 
 TEST(Structure, IntegratorsNeverSeeAScene) {

@@ -62,11 +62,9 @@ const std::vector<Room> rooms{
 
     {"integrators/bending", {"renderer/*", "volumes/*"}},
     {"integrators/steps", {"integrators/bending", "renderer/*", "volumes/*"}},
-    {"integrators/packets", {"integrators/bending", "integrators/steps", "renderer/*", "volumes/*"}},
-    {"integrators/kernels", {"integrators/packets", "renderer/*", "volumes/*"}},
+    {"integrators/kernels", {"integrators/bending", "integrators/steps", "renderer/*", "volumes/*"}},
     {"integrators/tracing",
-     {"integrators/bending", "integrators/kernels", "integrators/packets", "integrators/steps", "renderer/*",
-      "volumes/*"}},
+     {"integrators/bending", "integrators/kernels", "integrators/steps", "renderer/*", "volumes/*"}},
     {"integrators/flow", {"integrators/bending", "integrators/tracing", "renderer/*", "volumes/*"}},
     {"integrators/flow_drawing",
      {"integrators/bending", "integrators/flow", "integrators/tracing", "renderer/*", "volumes/*"}},

@@ -33,21 +33,13 @@ std::bitset<8> shared_faces(const BlockShape& block) {
   return touched;
 }
 
-/// The voxels of a block as bricks hold them. Voxels of `bending` are at `block_offset`.
+/// The voxels of a block as bricks hold them.
 struct BlockVoxels {
   alignas(64) float bending[TensorBlock::voxels * TensorBrick::general];
   alignas(64) float trailing[TensorBlock::voxels];
   alignas(64) float deviator[TensorBlock::voxels];  // Squared norm.
   alignas(64) float squares[TensorBlock::voxels];   // Sum of the squares of `bending`.
 };
-
-/// Offset of a voxel in BlockVoxels::bending, in floats. Rows along z are as in bricks.
-template <int components>
-int block_offset(int voxel) {
-  constexpr int size = TensorBlock::size;
-  return voxel / size * TensorBrick::bending_offset(components, size) +
-         TensorBrick::bending_offset(components, voxel % size);
-}
 
 Four square(const Four& x) { return x * x; }
 
@@ -81,7 +73,7 @@ Conversion convert(const TensorBlock& block, BlockVoxels& voxels) {
     FourVoxels squares, diagonal;
     for (int k = 0; k < 4; ++k) {
       const float* const T = block.values[i + k].data();
-      float* const bending = voxels.bending + block_offset<components>(i + k);
+      float* const bending = voxels.bending + (i + k) * components;
       const Four begin = read_four(T), end = read_four(T + 4), last{T[8], T[8], T[8], T[8]};
       const Four low = low_pairs(begin, end), high = high_pairs(begin, end);
       asymmetry |= difference(low, high);          // In the upper half.
@@ -89,8 +81,7 @@ Conversion convert(const TensorBlock& block, BlockVoxels& voxels) {
       const Four second = end - kept(last, first_one);
       write_four(begin - kept(last, first_one), bending);
       if constexpr (components == TensorBrick::symmetric)
-        write_four(kept(second, first_two),
-                   bending + 3);  // The next voxel, or a zero that fills a cache line, follows.
+        write_four(kept(second, first_two), bending + 3);  // The next voxel follows.
       else
         write_four(second, bending + 4);
       squares.v[k] = square(begin) + square(end);
@@ -141,9 +132,8 @@ void for_shared_rows(const Eigen::Vector3i& ahead, const Visit& visit) {
 /// Copies `length` voxels.
 template <int components, int length>
 void copy_row(const BlockVoxels& voxels, int from, float* brick, int to) {
-  constexpr std::size_t floats = TensorBrick::bending_offset(components, length - 1) + components;
-  std::memcpy(brick + TensorBrick::bending_offset(components, to), voxels.bending + block_offset<components>(from),
-              floats * sizeof(float));
+  std::memcpy(brick + TensorBrick::bending_offset(components, to), voxels.bending + from * components,
+              length * components * sizeof(float));
   std::memcpy(brick + TensorBrick::trailing_offset(components) + to, voxels.trailing + from, length * sizeof(float));
 }
 
@@ -195,9 +185,7 @@ std::optional<double> place_own(const TensorBlock& block, float* values) {
   BlockVoxels voxels;
   const auto [norm, is_symmetric] = convert<components>(block, voxels);
   if (components == TensorBrick::symmetric && !is_symmetric) return std::nullopt;
-  for (int i = 0; i < TensorBlock::voxels; ++i)
-    std::memcpy(values + CoefficientBlock::bending_offset(components, i), voxels.bending + block_offset<components>(i),
-                components * sizeof(float));
+  std::copy_n(voxels.bending, TensorBlock::voxels * components, values);
   std::memcpy(values + CoefficientBlock::trailing_offset(components), voxels.trailing, sizeof voxels.trailing);
   return squared_norm(norm, block);
 }

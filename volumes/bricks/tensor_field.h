@@ -23,9 +23,8 @@ struct BlockTable;
 /// one brick of zeros. (A cubic field's bricks hold coefficients instead: see cubic_brick.h.)
 ///
 /// A tensor T is stored in two parts. T − T₂₂ I bends light as T does, because a multiple of the identity bends nothing
-/// (Zheng and Pang 2003, Eq. 5). Its last component is zero, so that a tracer reads only eight floats, which fill one
-/// or two vector registers. If T = Tᵀ in all voxels of the field, bit for bit, five of them are stored: those on and
-/// below the diagonal. T₂₂ is stored separately.
+/// (Zheng and Pang 2003, Eq. 5). Its last component is zero, so that eight floats suffice. If T = Tᵀ in all voxels of
+/// the field, bit for bit, five of them are stored: those on and below the diagonal. T₂₂ is stored separately.
 struct TensorBrick {
   static constexpr int cells = 8;
   static constexpr int width = cells + 1;  ///< Voxels along an edge, with the apron.
@@ -41,11 +40,8 @@ struct TensorBrick {
     constexpr int of_symmetric[] = {0, 1, 2, 1, 3, 4, 2, 4};
     return components == symmetric ? of_symmetric[i] : i;
   }
-  /// Offset of a voxel's components from `bending`, in floats. Three voxels of five fill a cache line but for its last
-  /// float, so that fewer lines are read. A row along z begins a line.
-  static constexpr int bending_offset(int components, int voxel) {
-    return components == symmetric ? voxel / 3 * 16 + voxel % 3 * symmetric : voxel * components;
-  }
+  /// Offset of a voxel's components from `bending`, in floats.
+  static constexpr int bending_offset(int components, int voxel) { return voxel * components; }
   /// Offset of `trailing` from `bending`, in floats.
   static constexpr int trailing_offset(int components) { return bending_offset(components, voxels); }
   /// Number of floats of a brick, rounded up to whole cache lines.

@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "volumes/bricks/cubic_brick.h"
+#include "volumes/sampling/tensor_sampler.h"
 
 // The code before HWY_AFTER_NAMESPACE is compiled once for each kind of processor. It calls no inline functions of
 // other headers: the linker would keep only one of their copies, which may be compiled for the wrong processor.
@@ -24,7 +25,7 @@ struct Cells {
   std::size_t count = 0;                                    // Of the points.
   alignas(64) float fraction[3][cell_block] = {};           // Position within the cell.
   alignas(64) std::int32_t brick[3][cell_block] = {};       // Coordinates of the brick.
-  alignas(64) std::int32_t voxel[cell_block] = {};          // Number, in the brick, of the cell's first voxel.
+  alignas(64) std::int32_t voxel[cell_block] = {};          // Number, in the brick, of the cell's first coefficient.
   const float *bending[cell_block], *trailing[cell_block];  // Of the brick.
 };
 
@@ -32,7 +33,6 @@ struct Cells {
 struct CellRange {
   float first[3], last[3], last_cell[3];
   std::int32_t origin[3];
-  std::int32_t width;  // Numbers of a brick along an edge.
 };
 
 }  // namespace
@@ -63,23 +63,10 @@ void find_cells(const CellRange& range, const IndexPoints& points, std::size_t f
       const auto index = hn::Add(hn::ConvertTo(ints, cell), hn::Set(ints, range.origin[axis]));
       hn::Store(hn::ShiftRight<3>(index), ints, cells.brick[axis] + p);
       const auto within = hn::And(index, hn::Set(ints, TensorBrick::cells - 1));
-      voxel = hn::Add(hn::Mul(voxel, hn::Set(ints, range.width)), within);
+      voxel = hn::Add(hn::Mul(voxel, hn::Set(ints, CubicBrick::width)), within);
     }
     hn::Store(voxel, ints, cells.voxel + p);
   }
-}
-
-template <class V>
-HWY_INLINE V between(V near, V far, V fraction) {
-  return hn::MulAdd(hn::Sub(far, near), fraction, near);
-}
-
-/// Trilinear interpolation. `corner(x, y, z)` is the value at a corner.
-template <class V, class Corner>
-HWY_INLINE V trilinear(const Corner& corner, V x, V y, V z) {
-  const auto edge = [&](int i, int j) HWY_ATTR { return between(corner(i, j, 0), corner(i, j, 1), z); };
-  const auto face = [&](int i) HWY_ATTR { return between(edge(i, 0), edge(i, 1), y); };
-  return between(face(0), face(1), x);
 }
 
 /// Stores components c and following of point p: the first four of all points, then the other four.
@@ -95,36 +82,6 @@ HWY_INLINE void store_components(V values, std::size_t c, std::size_t p, float (
   hn::Store(values, hn::DFromV<V>(), components[c / 4] + 4 * p + c % 4);
 }
 
-/// The stored components of T − T₂₂ I.
-template <int stored>
-void sample_bending(const Cells& cells, float (*components)[4 * cell_block]) {
-  const Eight d;
-  for (std::size_t p = 0; p < cells.count; ++p)
-    for (std::size_t c = 0; c < stored; c += hn::Lanes(d)) {
-      // Where vectors hold more than a voxel's components, the others are those of the next voxel, and are not used.
-      const auto corner = [&](int x, int y, int z) HWY_ATTR {
-        const int voxel = cells.voxel[p] + TensorBrick::voxel(x, y, z);
-        return hn::LoadU(d, cells.bending[p] + TensorBrick::bending_offset(stored, voxel) + c);
-      };
-      const auto fraction = [&](int axis) HWY_ATTR { return hn::Set(d, cells.fraction[axis][p]); };
-      const auto sampled = trilinear(corner, fraction(0), fraction(1), fraction(2));
-      store_components(sampled, c, p, components);
-    }
-}
-
-/// T₂₂.
-void sample_trailing(const Cells& cells, float* trailing) {
-  const auto at = [](float near, float far, float fraction) { return near + fraction * (far - near); };
-  for (std::size_t p = 0; p < cells.count; ++p) {
-    const float* const cell = cells.trailing[p] + cells.voxel[p];
-    const float x = cells.fraction[0][p], y = cells.fraction[1][p], z = cells.fraction[2][p];
-    const auto face = [&](const float* first) {
-      return at(at(first[0], first[1], z), at(first[TensorBrick::width], first[TensorBrick::width + 1], z), y);
-    };
-    trailing[p] = at(face(cell), face(cell + TensorBrick::width * TensorBrick::width), x);
-  }
-}
-
 /// The weights of the cubic B-spline along an axis (see cubic_brick.h).
 HWY_INLINE void spline_weights(float t, float (&weights)[4]) {
   const float u = 1 - t;
@@ -134,7 +91,7 @@ HWY_INLINE void spline_weights(float t, float (&weights)[4]) {
   weights[3] = t * t * t / 6;
 }
 
-/// The same from the coefficients of a cubic field: the stored components of T − T₂₂ I, and T₂₂.
+/// The stored components of T − T₂₂ I, and T₂₂.
 template <int stored>
 void sample_spline(const Cells& cells, float (*components)[4 * cell_block], float* trailing) {
   const Eight d;
@@ -167,15 +124,10 @@ void sample_spline(const Cells& cells, float (*components)[4 * cell_block], floa
 
 /// Samples the cells. @param components, stride  As in sample_tensors.
 template <int stored>
-void sample_cells_of(const Cells& cells, bool cubic, float factor, float* components, std::size_t stride) {
+void sample_cells_of(const Cells& cells, float factor, float* components, std::size_t stride) {
   const Floats d;
   alignas(64) float bending[2][4 * cell_block], trailing[cell_block];
-  if (cubic) {
-    sample_spline<stored>(cells, bending, trailing);
-  } else {
-    sample_bending<stored>(cells, bending);
-    sample_trailing(cells, trailing);
-  }
+  sample_spline<stored>(cells, bending, trailing);
   for (std::size_t p = 0; p < cells.count; p += hn::Lanes(d)) {
     hn::Vec<Floats> s[8], T[9];
     hn::LoadInterleaved4(d, bending[0] + 4 * p, s[0], s[1], s[2], s[3]);
@@ -188,11 +140,11 @@ void sample_cells_of(const Cells& cells, bool cubic, float factor, float* compon
   }
 }
 
-void sample_cells(const Cells& cells, int stored, bool cubic, float factor, float* components, std::size_t stride) {
+void sample_cells(const Cells& cells, int stored, float factor, float* components, std::size_t stride) {
   if (stored == TensorBrick::symmetric)
-    sample_cells_of<TensorBrick::symmetric>(cells, cubic, factor, components, stride);
+    sample_cells_of<TensorBrick::symmetric>(cells, factor, components, stride);
   else
-    sample_cells_of<TensorBrick::general>(cells, cubic, factor, components, stride);
+    sample_cells_of<TensorBrick::general>(cells, factor, components, stride);
 }
 
 }  // namespace
@@ -217,9 +169,6 @@ CellRange cell_range(const TensorField& field, const Eigen::Vector3i& origin) {
     range.last_cell[axis] = static_cast<float>(std::max(first, last - 1) - origin[axis]);
     range.origin[axis] = origin[axis];
   }
-  // In a cubic brick the number of a cell's voxel, as if it began with its own voxels, is that of the first coefficient
-  // that the cell needs.
-  range.width = field.is_cubic() ? CubicBrick::width : TensorBrick::width;
   return range;
 }
 
@@ -238,8 +187,25 @@ void find_voxels(const TensorField& field, Eigen::Vector3i& at, TensorBrick& bri
 
 }  // namespace
 
+namespace {
+
+/// In a linear field: one by one.
+void sample_linear(const TensorField& field, const IndexPoints& points, float factor, float* components,
+                   std::size_t stride) {
+  TensorSampler sampler(field);
+  const Eigen::Vector3d origin = (TensorBrick::cells * points.brick).cast<double>();
+  for (std::size_t p = 0; p < points.count; ++p) {
+    const Eigen::Vector3d from(points.position[0][p], points.position[1][p], points.position[2][p]);
+    const Eigen::Matrix3f T = factor * sampler.at(field.to_world() * (origin + from)).cast<float>();
+    for (std::size_t c = 0; c < 9; ++c) components[c * stride + p] = T.data()[c];
+  }
+}
+
+}  // namespace
+
 void sample_tensors(const TensorField& field, const IndexPoints& points, float factor, float* components,
                     std::size_t stride) {
+  if (!field.is_cubic()) return sample_linear(field, points, factor, components, stride);
   const CellRange range = cell_range(field, TensorBrick::cells * points.brick);
   Cells cells;
   Eigen::Vector3i at = Eigen::Vector3i::Constant(INT32_MIN);
@@ -249,7 +215,7 @@ void sample_tensors(const TensorField& field, const IndexPoints& points, float f
     HWY_DYNAMIC_DISPATCH(find_cells)(range, points, first, cells);
     find_voxels(field, at, brick, cells);
     HWY_DYNAMIC_DISPATCH(sample_cells)
-    (cells, brick.components, field.is_cubic(), factor, components + first, stride);
+    (cells, brick.components, factor, components + first, stride);
   }
 }
 

@@ -1,6 +1,6 @@
 #pragma once
 /// @file volumes/sampling/sample_tensors.h
-/// The tensors at many points, in single precision and in the vectors of the processor.
+/// The tensors at many points, in single precision; of cubic fields in the vectors of the processor.
 
 #include <cstddef>
 

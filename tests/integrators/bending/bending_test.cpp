@@ -114,25 +114,6 @@ TEST(Bending, RadianceOfConstantTensorsChangesAsInTheClosedForm) {
   }
 }
 
-TEST(Bending, DiagonalTensorsMatchTheClosedForm) {
-  const Vector3d diagonal(1.5, -0.75, 0.25), V = Vector3d(1, 2, -3).normalized();
-  const TensorField field = constant_field(diagonal.asDiagonal().toDenseMatrix());
-  const Ray ray = trace_steps(field, settings_of(BendingMethod::splitting, 0.5), 4, {0, 0, 0.5}, V, 0.7);
-  const double t = 4 * 0.5 * voxel_size(field);
-  const Vector3d expected = ((0.7 * t * diagonal).array().exp() * V.array()).matrix().normalized();
-  EXPECT_LT((ray.direction - expected).norm(), 1e-11);
-}
-
-TEST(Bending, AntisymmetricTensorsTurnLightAboutTheirAxis) {
-  const Vector3d axis(0, 0, 2);
-  const TensorField field = constant_field(rotation_about(axis));
-  for (const double s : {0.3, -0.6}) {
-    const Ray ray = trace_steps(field, settings_of(BendingMethod::splitting, 0.25), 8, {-0.4, 0, 0}, {1, 0, 0}, s);
-    const double angle = s * 2 * 8 * 0.25 * voxel_size(field);
-    EXPECT_LT((ray.direction - Vector3d(std::cos(angle), std::sin(angle), 0)).norm(), 1e-11);
-  }
-}
-
 TEST(Bending, AddingAnIsotropicTensorChangesNoPath) {
   const TensorField field = cube_field(9, linear_tensor);
   const TensorField shifted =
@@ -162,17 +143,6 @@ TEST(Bending, PathsAreRetracedWithTheOppositeSign) {
   EXPECT_LT(there_and_back(BendingMethod::splitting, -0.5), 1e-10);  // Symmetric in time: exact but for rounding.
   EXPECT_LT(there_and_back(BendingMethod::rk4, -0.5), 1e-6);
   EXPECT_GT(there_and_back(BendingMethod::splitting, 0.5), 0.05);
-}
-
-TEST(Bending, OnlyTheProductOfFlexibilityAndTensorCounts) {
-  const TensorField field = cube_field(9, linear_tensor);
-  const TensorField strong = cube_field(9, [](const Vector3d& p) { return Matrix3d(8 * linear_tensor(p)); });
-  for (const BendingMethod method : all_methods) {
-    const BendingSettings settings = settings_of(method, 0.25);
-    const Vector3d P(0, 0, -0.5), V(0, 0, 1);
-    EXPECT_EQ(trace_steps(field, settings, 12, P, V, 0.4).position,
-              trace_steps(strong, settings, 12, P, V, 0.05).position);
-  }
 }
 
 TEST(Bending, TheScaleIsAFactorOnTheFlexibility) {

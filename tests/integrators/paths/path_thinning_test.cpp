@@ -44,7 +44,7 @@ Traced trace_both(const TensorField& field, const Vector3d& index, double flexib
 Traced bent_ray(double flexibility = 0.2) {
   const TensorFunction smooth = smooth_tensor(3);
   const auto strong = [&](const Vector3d& p) { return Matrix3d(smooth(p) + 0.2 * Matrix3d::Identity()); };
-  return trace_both(TensorField(lattice_grid(odd_box(), lattices()[2], strong)), {3, 20, 5}, flexibility);
+  return trace_both(lattice_field(odd_box(), lattices()[2], strong), {3, 20, 5}, flexibility);
 }
 
 /// All points of a ray, in double precision.

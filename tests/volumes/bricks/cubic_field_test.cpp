@@ -9,7 +9,6 @@
 
 #include "volumes/bricks/tensor_field.h"
 #include "volumes/grids/tensor_grid.h"
-#include "volumes/sampling/sample_tensors.h"
 #include "volumes/sampling/tensor_sampler.h"
 
 namespace tensorray {
@@ -259,34 +258,6 @@ TEST(CubicField, TheBoundHoldsForValuesOfAnySize) {
                                        }),
                             fading);
     EXPECT_GT(field.brick({0, 0, 0}).strongest, large);
-  }
-}
-
-/// `sample_tensors` and TensorSampler agree, in sparse fields of both kinds, inside and outside.
-TEST(CubicField, VectorsSampleTheSame) {
-  for (const bool symmetric : {false, true}) {
-    const AlignedBox3i box(Vector3i(-5, 3, 9), Vector3i(20, 22, 30));
-    const auto value = [&](const Vector3i& v) { return polynomial(v.cast<double>(), {3, 3, 3}, symmetric); };
-    const TensorField field(masked_grid(
-                                box, [](const Vector3i& v) { return (v.x() + 2 * v.y()) % 7 > 1; }, value),
-                            fading);
-    EXPECT_EQ(field.is_symmetric(), symmetric);
-    TensorSampler sampler(field);
-    std::mt19937 random(5);
-    std::uniform_real_distribution<float> uniform(-3, 27);
-    constexpr std::size_t count = 200;
-    std::vector<float> positions[3], components(9 * sampled_room(count));
-    for (auto& axis : positions)
-      for (std::size_t i = 0; i < sampled_room(count); ++i) axis.push_back(uniform(random));
-    const Vector3i brick(-1, 0, 1);
-    sample_tensors(field, {brick, {positions[0].data(), positions[1].data(), positions[2].data()}, count}, 2,
-                   components.data(), sampled_room(count));
-    for (std::size_t p = 0; p < count; ++p) {
-      const Vector3d index = 8 * brick.cast<double>() + Vector3d(positions[0][p], positions[1][p], positions[2][p]);
-      const Matrix3d expected = 2 * sampler.at(field.to_world() * index);
-      for (std::size_t c = 0; c < 9; ++c)
-        EXPECT_NEAR(components[c * sampled_room(count) + p], expected.data()[c], 2e-5 * (1 + expected.norm()));
-    }
   }
 }
 

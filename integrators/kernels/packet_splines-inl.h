@@ -1,5 +1,5 @@
-/// @file integrators/packets/packet_splines-inl.h
-/// The tensor at the rays of a packet in a cubic field. A part of packet_kernel-inl.h.
+/// @file integrators/kernels/packet_splines-inl.h
+/// The tensor at the sample points of a packet: sums of 4³ coefficients of cubic B-splines.
 
 // Included once for each instruction set: see Highway's foreach_target.h.
 #if defined(TENSORRAY_INTEGRATORS_PACKET_SPLINES_TOGGLE) == defined(HWY_TARGET_TOGGLE)
@@ -13,7 +13,7 @@
 
 #include <hwy/highway.h>
 
-#include "integrators/packets/packet_cells-inl.h"
+#include "integrators/kernels/packet_vectors-inl.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace tensorray::packets::HWY_NAMESPACE {
@@ -56,8 +56,6 @@ template <int components>
 constexpr int row_stride = CubicBrick::bending_offset(components, CubicBrick::width);
 template <int components>
 constexpr int sheet_stride = row_stride<components>* CubicBrick::width;
-
-using V8 = hn::Vec<Eight>;
 
 /// Components of four coefficients along z, or of sums of such.
 struct Four {
@@ -164,6 +162,11 @@ HWY_INLINE Four four_of(const Row<components>& row) {
 }
 #endif
 
+/// A value and its slopes.
+struct Slopes {
+  V8 value, x, y, z;
+};
+
 // The sums along y, then x, then z. The operations of a lane and their order are the same in all functions below, and
 // so are the results, bit for bit.
 
@@ -191,7 +194,7 @@ HWY_INLINE V8 spline_value(const float* first, const SplineWeights& weights, int
 
 /// The same with the slopes.
 template <int components>
-HWY_INLINE Slopes<V8> spline_slopes(const float* first, const SplineWeights& weights, int lane) {
+HWY_INLINE Slopes spline_slopes(const float* first, const SplineWeights& weights, int lane) {
   Row<components> sums = empty_row<components>(), by_x = sums, by_y = sums;
 #pragma GCC unroll 4
   for (int x = 0; x < 4; ++x) {
@@ -213,10 +216,34 @@ HWY_INLINE Slopes<V8> spline_slopes(const float* first, const SplineWeights& wei
           along_z(four_of<components>(by_y), along, lane), along_z(values, weights.slope[2], lane)};
 }
 
+/// Stores the stored component c of the tensors of a vector.
+template <int components>
+HWY_INLINE void store_component(F value, int c, PerRay (&tensor)[8], int at) {
+  for (int i = 0; i < 8; ++i)
+    if (TensorBrick::stored_component(components, i) == c) store(value, tensor[i], at);
+}
+
+/// The same of components c and following, of which a row holds those of a lane (or two lanes: see row_of).
+template <int components>
+HWY_INLINE void store_rows(F (&rows)[eight_lanes], int c, PerRay (&tensor)[8], int at) {
+  transpose_rows(rows);
+#pragma GCC unroll 8
+  for (int row = 0; row < std::min(eight_lanes, components - c); ++row)
+    store_component<components>(rows[row], c + row, tensor, at);
+}
+
+/// Whether all lanes of a vector are in one cell.
+HWY_INLINE bool in_one_cell(const Packet& packet, int at) {
+  Mask same = hn::Eq(load(packet.voxel, at), set(packet.voxel[at]));
+  for (const auto& brick : packet.brick)
+    same = hn::And(same, hn::RebindMask(floats, hn::Eq(hn::Load(ints, brick + at), hn::Set(ints, brick[at]))));
+  return hn::AllTrue(floats, same);
+}
+
 /// Samples the tensors of a vector whose lanes are all in one cell. Each coefficient is loaded once, and copied to all
 /// lanes.
 template <int components>
-HWY_INLINE void sample_spline_cell(Packet& packet, int at) {
+HWY_INLINE void sample_cell(Packet& packet, int at) {
   SplineWeights weights;
   find_weights<false>(packet, at, weights);
   const float* const first = first_coefficient<components>(packet, at);
@@ -239,13 +266,13 @@ HWY_INLINE void sample_spline_cell(Packet& packet, int at) {
     const F value = hn::MulAdd(
         weight(2, 0), sums[0],
         hn::MulAdd(weight(2, 1), sums[1], hn::MulAdd(weight(2, 2), sums[2], hn::Mul(weight(2, 3), sums[3]))));
-    store(value, packet.tensor[c], at);
+    store_component<components>(value, c, packet.tensor, at);
   }
 }
 
-/// Samples the tensors of a vector.
+/// Samples the tensors of a vector whose lanes are in several cells: lane by lane.
 template <int components>
-HWY_INLINE void sample_spline(Packet& packet, int at) {
+HWY_INLINE void sample_cells(Packet& packet, int at) {
   SplineWeights weights;
   find_weights<false>(packet, at, weights);
   for (int c = 0; c < components; c += eight_lanes) {
@@ -256,67 +283,49 @@ HWY_INLINE void sample_spline(Packet& packet, int at) {
             return spline_value<components>(first_coefficient<components>(packet, at + lane) + c, weights, lane);
           },
           row);
-    transpose_rows(rows);
-    for (int row = 0; row < std::min(eight_lanes, components - c); ++row) store(rows[row], packet.tensor[c + row], at);
+    store_rows<components>(rows, c, packet.tensor, at);
   }
 }
 
 /// The same with their slopes.
 template <int components>
-HWY_INLINE void sample_spline_slopes(Packet& packet, int at) {
+HWY_INLINE void sample_slopes(Packet& packet, int at) {
   SplineWeights weights;
   find_weights<true>(packet, at, weights);
-  alignas(64) float values[4][lanes * 8];
-  for (int c = 0; c < components; c += eight_lanes)
-    for (int lane = 0; lane < lanes; ++lane) {
-      const auto sampled =
-          spline_slopes<components>(first_coefficient<components>(packet, at + lane) + c, weights, lane);
-      store_components(sampled.value, c, lane, values[0]);
-      store_components(sampled.x, c, lane, values[1]);
-      store_components(sampled.y, c, lane, values[2]);
-      store_components(sampled.z, c, lane, values[3]);
-    }
-  transpose<components>(values[0], packet.tensor, at);
-  for (int axis = 0; axis < 3; ++axis) transpose<components>(values[1 + axis], packet.slopes[axis], at);
+  for (int c = 0; c < components; c += eight_lanes) {
+    Slopes sampled[lanes];
+    for (int lane = 0; lane < lanes; ++lane)
+      sampled[lane] = spline_slopes<components>(first_coefficient<components>(packet, at + lane) + c, weights, lane);
+    const auto store_all = [&](V8 Slopes::*member, PerRay(&tensor)[8]) HWY_ATTR {
+      F rows[eight_lanes];
+      for (int row = 0; row < eight_lanes; ++row)
+        rows[row] = row_of([&](int lane) HWY_ATTR { return sampled[lane].*member; }, row);
+      store_rows<components>(rows, c, tensor, at);
+    };
+    store_all(&Slopes::value, packet.tensor);
+    store_all(&Slopes::x, packet.slopes[0]);
+    store_all(&Slopes::y, packet.slopes[1]);
+    store_all(&Slopes::z, packet.slopes[2]);
+  }
 }
 
-/// Samples the tensors of all lanes, and their slopes for rays with differentials.
+/// Samples the tensors of all lanes, and, with `differentials`, their slopes.
 template <int components, bool differentials>
-HWY_INLINE void sample_splines(Packet& packet) {
+HWY_NOINLINE void sample_tensors(Packet& packet) {
   for (int i = 0; i < packet.vectors * lanes; i += lanes) {
     if constexpr (differentials)
-      sample_spline_slopes<components>(packet, i);
+      sample_slopes<components>(packet, i);
     else if (in_one_cell(packet, i))
-      sample_spline_cell<components>(packet, i);
+      sample_cell<components>(packet, i);
     else
-      sample_spline<components>(packet, i);
+      sample_cells<components>(packet, i);
   }
 }
 
-/// T₂₂ and its slopes at the points where the lanes' tensors were sampled.
-template <int components>
-HWY_NOINLINE Slopes<F> sample_trailing_spline(const Packet& packet, int at) {
-  SplineWeights weights;
-  find_weights<true>(packet, at, weights);
-  alignas(64) float values[4][lanes];
-  for (int lane = 0; lane < lanes; ++lane) {
-    const float* const first =
-        packet.bending[at + lane] + CubicBrick::trailing_offset(components) + static_cast<int>(packet.voxel[at + lane]);
-    float sums[4] = {};  // The value, and its slopes along x, y and z.
-    for (int i = 0; i < 64; ++i) {
-      const int k[3] = {i >> 4, i >> 2 & 3, i & 3};
-      const float coefficient = first[(k[0] * CubicBrick::width + k[1]) * CubicBrick::width + k[2]];
-      for (int n = 0; n < 4; ++n) {
-        float product = coefficient;
-        for (int axis = 0; axis < 3; ++axis)
-          product *= (n == axis + 1 ? weights.slope : weights.value)[axis][k[axis]][lane];
-        sums[n] += product;
-      }
-    }
-    for (int n = 0; n < 4; ++n) values[n][lane] = sums[n];
-  }
-  return {hn::Load(floats, values[0]), hn::Load(floats, values[1]), hn::Load(floats, values[2]),
-          hn::Load(floats, values[3])};
+template <bool differentials>
+HWY_INLINE void sample_tensors(const PacketMedium& medium, Packet& packet) {
+  medium.field.is_symmetric() ? sample_tensors<TensorBrick::symmetric, differentials>(packet)
+                              : sample_tensors<TensorBrick::general, differentials>(packet);
 }
 
 }  // namespace tensorray::packets::HWY_NAMESPACE

@@ -1,5 +1,5 @@
-/// @file integrators/packets/packet_bricks-inl.h
-/// The bricks of a packet's lanes. A part of packet_kernel-inl.h.
+/// @file integrators/kernels/packet_bricks-inl.h
+/// The bricks of a packet's lanes, and their sample points in these bricks.
 
 // Included once for each instruction set: see Highway's foreach_target.h.
 #if defined(TENSORRAY_INTEGRATORS_PACKET_BRICKS_TOGGLE) == defined(HWY_TARGET_TOGGLE)
@@ -13,13 +13,10 @@
 
 #include <hwy/highway.h>
 
-#include "integrators/packets/packet_cells-inl.h"
+#include "integrators/kernels/packet_vectors-inl.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace tensorray::packets::HWY_NAMESPACE {
-
-/// The bits of a vector's lanes, given those of the packet.
-HWY_INLINE std::uint32_t bits_of_vector(std::uint32_t packet, int at) { return packet >> at & ((1u << lanes) - 1); }
 
 /// The brick of a lane. It is not compared with that of the lane before: where rays part, this costs more than it
 /// saves.
@@ -52,27 +49,18 @@ HWY_INLINE void find_bricks(const PacketMedium& medium, Packet& packet, std::uin
 }
 
 /// Sets the values that depend on the strength of the lanes' bricks.
-template <bool uniform>
 HWY_INLINE void find_reach(const PacketMedium& medium, Packet& packet) {
-  const F most = set(1e30f);
-  const F longest = set(medium.longest_kick * (uniform ? 1.0f : medium.longest_voxel));
-  const bool euler = medium.settings.method == BendingMethod::euler;  // The trace of T, which has no bound, affects it.
+  const F most = set(1e30f), longest = set(medium.longest_kick);
   F greatest = hn::Zero(floats);
   packet.straight = false;
   for (int i = 0; i < packet.vectors * lanes; i += lanes) {
     const F strongest = load(packet.strongest, i);
-    F reach = hn::Mul(hn::Mul(hn::Abs(load(packet.kick, i)), longest), strongest);
-    if (euler) reach = most;
+    const F reach = hn::Mul(hn::Mul(hn::Abs(load(packet.kick, i)), longest), strongest);
     store(reach, packet.reach, i);
-    const Mask long_steps = hn::Le(reach, set(strongest_kick));
-    store(hn::IfThenZeroElse(long_steps, load(packet.bending_rate, i)), packet.bending_rate, i);
     greatest = hn::Max(greatest, hn::IfThenElse(hn::Le(reach, most), reach, most));  // NaN counts as strong.
-    packet.straight |= !euler && !hn::AllFalse(floats, hn::Eq(strongest, hn::Zero(floats)));
+    packet.straight |= !hn::AllFalse(floats, hn::Eq(strongest, hn::Zero(floats)));
   }
   packet.greatest_reach = hn::GetLane(hn::MaxOfLanes(floats, greatest));
-  const bool weak = packet.greatest_reach <= strongest_kick;
-  packet.varied = !uniform || packet.straight || medium.adaptive || (!weak && medium.settings.step == 0);
-  packet.timed = packet.timed && !packet.varied;
 }
 
 /// Finds the box of the voxels, relative to the lanes' bricks.
@@ -89,55 +77,33 @@ HWY_INLINE void find_extent(const PacketMedium& medium, Packet& packet) {
 }
 
 /// Sets the values that depend on the lanes' bricks.
-template <bool uniform>
 HWY_INLINE void summarize(const PacketMedium& medium, Packet& packet) {
-  find_reach<uniform>(medium, packet);
-  auto apart = hn::Zero(ints), beyond = apart;
-  for (int axis = 0; axis < 3; ++axis) {
-    const auto first = hn::Set(ints, packet.brick[axis][0]);
-    auto least = first, most = first;
-    for (int i = 0; i < packet.vectors * lanes; i += lanes) {
-      const auto brick = hn::Load(ints, packet.brick[axis] + i);
-      least = hn::Min(least, brick);
-      most = hn::Max(most, brick);
-    }
-    apart = hn::Or(apart, hn::Or(hn::Xor(least, first), hn::Xor(most, first)));
-    beyond = hn::Or(beyond, hn::Or(hn::Sub(least, hn::Set(ints, medium.first_inner[axis])),
-                                   hn::Sub(hn::Set(ints, medium.last_inner[axis]), most)));
-  }
-  const auto zero = hn::Zero(ints);
-  packet.one_brick = hn::AllTrue(ints, hn::Eq(apart, zero));
-  packet.near_border = !hn::AllFalse(ints, hn::Lt(beyond, zero));
-  if (packet.near_border) find_extent(medium, packet);
+  find_reach(medium, packet);
+  find_extent(medium, packet);
   packet.near_surface = false;
-  if (medium.settings.meets_surface)
-    for (int lane = 0; lane < packet.vectors * lanes; ++lane) {
-      const std::int32_t at[3] = {packet.brick[0][lane], packet.brick[1][lane], packet.brick[2][lane]};
-      packet.near_surface |= medium.near_surface(at);
-    }
-  packet.watched =
-      packet.near_border || packet.near_surface || medium.bounded || !(packet.greatest_reach <= strongest_kick);
+  if (!medium.settings.meets_surface) return;
+  for (int lane = 0; lane < packet.vectors * lanes; ++lane) {
+    const std::int32_t at[3] = {packet.brick[0][lane], packet.brick[1][lane], packet.brick[2][lane]};
+    packet.near_surface |= medium.near_surface(at);
+  }
 }
 
 /// Sets the values that depend on the rays of the lanes. Call it after lanes have been set.
-template <bool uniform>
-void begin(const PacketMedium& medium, Packet& packet) {
-  packet.timed = false;
+static HWY_NOINLINE void begin(const PacketMedium& medium, Packet& packet) {
   find_bricks(medium, packet, ~0u >> (packet_rays - packet.vectors * lanes));
-  summarize<uniform>(medium, packet);
+  summarize(medium, packet);
 }
 
 /// Moves the lanes whose point is outside their brick to the brick of the point. `point(i)` gives the points of the
 /// vector at lane i, relative to the lanes' bricks. `which` has the bits of lanes that may move.
-template <bool uniform, class Point>
+template <class Point>
 HWY_INLINE void move_to_bricks(const PacketMedium& medium, Packet& packet, std::uint32_t which, const Point& point) {
   const F zero = hn::Zero(floats), cells = set(TensorBrick::cells);
   std::uint32_t moved = 0;
   for (int i = 0; i < packet.vectors * lanes; i += lanes) {
     if (bits_of_vector(which, i) == 0) continue;
-    F3 cell = floor(point(i));
     // The cell between the last two voxels is the last one, also for points on its far face.
-    if (packet.near_border) cell = minimum(cell, load(packet.last, i));
+    const F3 cell = minimum(floor(point(i)), load(packet.last, i));
     const auto away = [](F to) HWY_ATTR { return hn::Floor(hn::Mul(to, set(1.0f / TensorBrick::cells))); };
     const F bricks[3] = {away(cell.x), away(cell.y), away(cell.z)};
     const Mask moves = hn::Or(hn::Ne(bricks[0], zero), hn::Or(hn::Ne(bricks[1], zero), hn::Ne(bricks[2], zero)));
@@ -149,7 +115,45 @@ HWY_INLINE void move_to_bricks(const PacketMedium& medium, Packet& packet, std::
     }
   }
   find_bricks(medium, packet, moved);
-  summarize<uniform>(medium, packet);
+  summarize(medium, packet);
+}
+
+/// Finds the sample points (`point_of(i)` gives those of the vector at lane i) and their cells. Points outside the
+/// extent are moved to it: the tensor there is that of the nearest point.
+/// @param moved  Bits of lanes; only their vectors are found again, and points outside their bricks count as on the
+///               faces of the bricks. 0: all vectors.
+/// @return bits of the lanes whose points are not within their bricks.
+template <class Point>
+HWY_INLINE std::uint32_t find_cells(Packet& packet, std::uint32_t moved, const Point& point_of) {
+  const F last = set(CubicBrick::cells - 1), width = set(CubicBrick::width);
+  std::uint32_t beyond = 0;
+  for (int i = 0; i < packet.vectors * lanes; i += lanes) {
+    if (moved != 0 && bits_of_vector(moved, i) == 0) continue;
+    F3 point = point_of(i);
+    store(point, packet.sample, i);
+    point = clamp(point, load(packet.low, i), load(packet.high, i));
+    F3 near = clamp(floor(point), load(packet.low, i), load(packet.last, i));
+    // As unsigned integers, negative floats are the greatest.
+    const auto greatest =
+        hn::Max(hn::BitCast(bits, near.x), hn::Max(hn::BitCast(bits, near.y), hn::BitCast(bits, near.z)));
+    beyond |= to_bits(hn::RebindMask(floats, hn::Gt(greatest, hn::BitCast(bits, last))), i);
+    if (moved != 0) near = clamp(near, zeros(), {last, last, last});
+    store(sub(point, near), packet.fraction, i);
+    store(hn::MulAdd(hn::MulAdd(near.x, width, near.y), width, near.z), packet.voxel, i);
+  }
+  return beyond;
+}
+
+/// Finds the sample points, and moves lanes to the bricks of these points.
+template <class Point>
+HWY_INLINE void locate(const PacketMedium& medium, Packet& packet, const Point& point_of) {
+  const std::uint32_t beyond = find_cells(packet, 0, point_of);
+  if (HWY_LIKELY(beyond == 0)) return;
+  move_to_bricks(medium, packet, beyond, [&](int i) HWY_ATTR {
+    return clamp(load(packet.sample, i), load(packet.low, i), load(packet.high, i));
+  });
+  // The remaining points are outside the extent, or rounding put them on a face.
+  find_cells(packet, beyond, point_of);
 }
 
 }  // namespace tensorray::packets::HWY_NAMESPACE
