@@ -1,10 +1,11 @@
 #include "base/files/shared_file.h"
 
+#include <array>
 #include <cerrno>
 #include <chrono>
 #include <sstream>
 #include <thread>
-#include <vector>
+#include <utility>
 
 #include <fcntl.h>
 #include <sys/file.h>
@@ -17,110 +18,77 @@ namespace tensorray {
 namespace {
 
 constexpr std::chrono::milliseconds pause(30);
-constexpr int most_tries = 30;  ///< Of a process that ends.
 
-/// A line of the list: a process, and its descriptor of the file. Inodes tell whether it is still that file.
-struct Holder {
-  long process = 0;
-  int descriptor = -1;
-  unsigned long long device = 0, inode = 0;
-};
+using NotedInode = std::pair<unsigned long long, unsigned long long>;
 
-Holder holder_of(const Descriptor& file) {
+NotedInode inode_of(const Descriptor& file) {
   struct stat status {};
-  fstat(file.get(), &status);
-  return {getpid(), file.get(), status.st_dev, status.st_ino};
+  return fstat(file.get(), &status) == 0 ? NotedInode(status.st_dev, status.st_ino) : NotedInode();
 }
 
-/// The file of a holder, if it still has it.
-Descriptor open_of(const Holder& holder) {
-  const std::string path = "/proc/" + std::to_string(holder.process) + "/fd/" + std::to_string(holder.descriptor);
-  Descriptor file = open_file(path, O_RDONLY | O_NONBLOCK);
-  const Holder found = file.is_open() ? holder_of(file) : Holder();
-  return found.device == holder.device && found.inode == holder.inode ? std::move(file) : Descriptor();
+/// Whether a note that is open is that of the path: another process may have removed it meanwhile.
+bool is_at(const Descriptor& note, const std::filesystem::path& path) {
+  struct stat named {};
+  return stat(path.c_str(), &named) == 0 && inode_of(note) == NotedInode(named.st_dev, named.st_ino);
 }
 
-std::vector<Holder> read_list(const Descriptor& list) {
-  struct stat status {};
-  std::string text;
-  if (fstat(list.get(), &status) == 0 && status.st_size < 1 << 20)
-    text.resize(static_cast<std::size_t>(status.st_size));
-  if (!read_whole_at(list.get(), text.data(), text.size(), 0)) return {};
-  std::istringstream lines(text);
-  std::vector<Holder> holders;
-  for (Holder each; lines >> each.process >> each.descriptor >> each.device >> each.inode;) holders.push_back(each);
-  return holders;
-}
-
-/// Whether a list that is open is that of the path: another process may have removed it meanwhile.
-bool is_at(const Descriptor& list, const std::filesystem::path& path) {
-  struct stat open {
-  }, named{};
-  return fstat(list.get(), &open) == 0 && stat(path.c_str(), &named) == 0 && open.st_dev == named.st_dev &&
-         open.st_ino == named.st_ino;
-}
-
-bool is_ours(const Descriptor& list) {
-  struct stat status {};
-  return fstat(list.get(), &status) == 0 && S_ISREG(status.st_mode) && status.st_uid == geteuid();
-}
-
-/// Opens the list and locks it. @param waits  Whether to wait on, while another process has it locked.
-/// @return not open if it cannot be had.
-Descriptor locked_list(const std::filesystem::path& path, const std::function<bool()>& waits) {
+/// Opens the note and locks it. @return not open if it cannot be had.
+Descriptor locked_note(const std::filesystem::path& path, const std::function<void()>& waiting) {
   for (;;) {
-    Descriptor list = open_file(path, O_RDWR | O_CREAT | O_NOFOLLOW | O_NONBLOCK, 0600);
-    if (!list.is_open() || !is_ours(list)) return {};
-    while (flock(list.get(), LOCK_EX | LOCK_NB) != 0) {
-      if ((errno != EWOULDBLOCK && errno != EINTR) || !waits()) return {};
+    Descriptor note = open_file(path, O_RDWR | O_CREAT | O_NOFOLLOW | O_NONBLOCK, 0600);
+    struct stat status {};
+    if (!note.is_open() || fstat(note.get(), &status) != 0 || !S_ISREG(status.st_mode) || status.st_uid != geteuid())
+      return {};
+    while (flock(note.get(), LOCK_EX | LOCK_NB) != 0) {
+      if (errno != EWOULDBLOCK && errno != EINTR) return {};
+      waiting();
       std::this_thread::sleep_for(pause);
     }
-    if (is_at(list, path)) return list;
+    if (is_at(note, path)) return note;
   }
+}
+
+/// Unlocks explicitly: a child process may have the descriptor, too.
+void unlock(const Descriptor& note) { flock(note.get(), LOCK_UN); }
+
+/// The file that a note names by a process, its descriptor, and what tells whether that is still the file.
+Descriptor open_noted(const Descriptor& note) {
+  std::array<char, 128> text{};
+  if (pread(note.get(), text.data(), text.size() - 1, 0) <= 0) return {};
+  std::istringstream words(text.data());
+  std::string process, descriptor;
+  NotedInode inode;
+  if (!(words >> process >> descriptor >> inode.first >> inode.second)) return {};
+  Descriptor file = open_file("/proc/" + process + "/fd/" + descriptor, O_RDONLY | O_NONBLOCK);
+  return file.is_open() && inode_of(file) == inode ? std::move(file) : Descriptor();
 }
 
 }  // namespace
 
 SharedFile::SharedFile(const std::string& key, const std::function<void()>& waiting)
-    : path_(temporary_files() / ("tensorray-" + std::to_string(geteuid()) + "-" + key)), list_(locked_list(path_, [&] {
-        waiting();
-        return true;
-      })) {
-  if (!list_.is_open()) return;
-  for (const Holder& holder : read_list(list_))
-    if (!file_.is_open()) file_ = open_of(holder);
-  if (file_.is_open()) write_list();
+    : path_(temporary_files() / ("tensorray-" + std::to_string(geteuid()) + "-" + key)),
+      note_(locked_note(path_, waiting)) {
+  if (note_.is_open()) file_ = open_noted(note_);
+  if (!file_.is_open()) return;
+  unlock(note_);
+  note_ = Descriptor();
 }
 
 SharedFile::~SharedFile() {
-  // Where another process begins to make a file, that one cleans up.
-  if (!list_.is_open()) list_ = locked_list(path_, [tries = 0]() mutable { return ++tries < most_tries; });
-  file_ = Descriptor();
-  if (list_.is_open()) write_list();
+  if (!note_.is_open()) return;
+  if (is_at(note_, path_)) unlink(path_.c_str());
+  unlock(note_);
 }
 
 void SharedFile::offer(const Descriptor& file) {
-  if (!list_.is_open()) return;
+  if (!note_.is_open()) return;
   file_ = duplicate(file);
-  write_list();
-}
-
-/// Writes the processes that have a file, and unlocks the list; removes it if there are none.
-void SharedFile::write_list() {
-  std::vector<Holder> holders;
-  for (const Holder& each : read_list(list_))
-    if (open_of(each).is_open()) holders.push_back(each);
-  if (file_.is_open()) holders.insert(holders.begin(), holder_of(file_));
   std::ostringstream text;
-  for (const Holder& each : holders)
-    text << each.process << ' ' << each.descriptor << ' ' << each.device << ' ' << each.inode << '\n';
-  // A list that could not be written whole has fewer processes; they then do not share.
-  if (holders.empty())
-    unlink(path_.c_str());
-  else if (ftruncate(list_.get(), 0) == 0)
-    static_cast<void>(write_whole_at(list_.get(), text.str(), 0));
-  flock(list_.get(), LOCK_UN);  // A child process may have it, too.
-  list_ = Descriptor();
+  const NotedInode inode = inode_of(file_);
+  text << getpid() << ' ' << file_.get() << ' ' << inode.first << ' ' << inode.second << '\n';
+  // With a note that could not be written whole, the others make their own files.
+  if (ftruncate(note_.get(), 0) == 0) static_cast<void>(write_whole_at(note_.get(), text.str(), 0));
+  unlock(note_);
 }
 
 }  // namespace tensorray

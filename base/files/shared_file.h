@@ -10,9 +10,9 @@
 
 namespace tensorray {
 
-/// The file of a key. The process that makes it offers it; others find it as long as any of them holds it. It vanishes
-/// with the last one, however that ends. What is left then is at most a list of a few bytes in the temporary folder,
-/// which the next process with this key uses.
+/// The file of a key. The process that makes it offers it, and others find it for as long as that one has this object.
+/// A file without a name vanishes with the last process that holds it, however that ends. What may be left is a note of
+/// a few bytes in the temporary folder, which the next process with this key uses.
 ///
 /// Where processes cannot share (a temporary folder that cannot be written, a system that hides processes from each
 /// other), each is alone, and makes its own file. Not for several threads at once.
@@ -35,10 +35,8 @@ class SharedFile {
   void offer(const Descriptor& file);
 
  private:
-  void write_list();
-
-  std::filesystem::path path_;  ///< Of the list of the processes that have the file.
-  Descriptor list_;             ///< Open while it is locked.
+  std::filesystem::path path_;  ///< Of the note, which says where the file is.
+  Descriptor note_;             ///< Of the process that makes or offers the file; locked until it does.
   Descriptor file_;
 };
 

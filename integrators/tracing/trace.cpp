@@ -6,7 +6,6 @@
 
 #include "integrators/steps/scalar_tracer.h"
 #include "integrators/tracing/packet_tracer.h"
-#include "volumes/grids/page_memory.h"
 
 namespace tensorray {
 namespace {
@@ -36,7 +35,6 @@ bool has_differentials(const RayBatch& batch) { return !batch.differentials.empt
 
 void prepare(const BendingSettings& settings, RayBatch& batch) {
   check(settings);
-  make_room();  // Rays bring pages of a field that has a bound into memory.
   if (has_differentials(batch) && batch.differentials.size() != batch.size())
     throw std::invalid_argument("a batch must have differentials for every ray or for none");
   if (has_differentials(batch) && batch.wants_log_radiance_scale)

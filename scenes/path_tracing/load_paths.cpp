@@ -46,7 +46,7 @@ std::vector<Eigen::Vector3d> threshold_positions(const SeedDescription& seeds, c
   if (seeds.above) threshold.least = *seeds.above;
   if (seeds.below) threshold.greatest = *seeds.below;
   try {
-    return threshold_seeds(field, world_box(field), threshold, seeds.count, seed);
+    return threshold_seeds(field, field.world_box(), threshold, seeds.count, seed);
   } catch (const std::runtime_error& error) {
     throw std::invalid_argument(error.what());
   }
@@ -56,7 +56,7 @@ SeedList seed_list(const Scene& scene, const SeedDescription& seeds) {
   const TensorField& field = scene.field;
   const Beam& beam = scene.beam;
   const std::uint64_t seed = scene.description.seed;
-  const Eigen::AlignedBox3d box = world_box(field);
+  const Eigen::AlignedBox3d box = field.world_box();
   switch (seeds.kind) {
     case SeedKind::grid:
       return {grid_seeds(beam, seeds.count), {}};

@@ -65,7 +65,7 @@ struct PathShapes {
 PathShapes make_shapes(const Scene& scene, const PathScene& path_scene, const std::vector<Path>& paths,
                        const PathColors& colors, const Camera& camera) {
   const PathTracingDescription& description = path_scene.settings;
-  const double typical = typical_radius(description.radius, paths.size(), world_box(scene.field));
+  const double typical = typical_radius(description.radius, paths.size(), scene.field.world_box());
   const double pixel = pixel_size(camera, camera.position + near_depth(paths, camera) * camera.forward);
   const Eigen::Matrix3d& to_working = path_scene.lights.light.rec709_to_working;
   PathShapes shapes;
@@ -93,7 +93,7 @@ Camera scene_camera(const Scene& scene, const ContextDescription& context, const
 /// size of the whole scene.
 void require_fine(const Scene& scene, const RadiusDescription& radius, const SurfaceScene& stage,
                   const std::vector<Path>& paths) {
-  const double typical = typical_radius(radius, paths.size(), world_box(scene.field));
+  const double typical = typical_radius(radius, paths.size(), scene.field.world_box());
   if (stage.bounds().diagonal().norm() < most_radii * typical) return;
   throw SceneError(fmt::format(
       "{}: paths are too thin ({:.3g}) for the size of the scene ({:.3g}); bring lamps, obstacles and plate nearer, or "
@@ -163,8 +163,9 @@ Render LoadedPaths::render(const Scene& scene, const Progress& progress, RenderJ
   if (!is_drawn) return result;
 
   const auto drawing = Clock::now();
-  const PathColors colors = path_colors(
-      description.color, result.paths, typical_radius(description.radius, result.paths.size(), world_box(scene.field)));
+  const PathColors colors =
+      path_colors(description.color, result.paths,
+                  typical_radius(description.radius, result.paths.size(), scene.field.world_box()));
   // As an annotation, the legend covers a part of the picture: it has no effect on other files.
   const bool has_room = description.color.legend && colors.legend;
   const Camera camera = scene_camera(scene, description.context, result.paths, has_room ? legend_width : 0);

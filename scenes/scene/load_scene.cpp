@@ -4,6 +4,9 @@
 #include <optional>
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
+#include <nlohmann/json.hpp>
+#include <sys/stat.h>
 
 #include "base/process/seconds.h"
 #include "base/text/numbered_name.h"
@@ -38,11 +41,20 @@ BlockSource open_field(const SceneDescription& scene) {
   }
 }
 
+/// What tells whether a file has the bytes that it had.
+std::vector<long long> identity_of(const std::filesystem::path& file) {
+  struct stat status {};
+  if (stat(file.c_str(), &status) != 0) return {};
+  return {static_cast<long long>(status.st_dev), static_cast<long long>(status.st_ino), status.st_size,
+          status.st_mtim.tv_sec, status.st_mtim.tv_nsec};
+}
+
 LoadedField load_field(const SceneDescription& scene, const Progress& progress) {
   const FieldDescription& field = scene.field;
   const std::string source = field.generate ? kind_of(field.generate->generator) : field.file.string();
-  const auto load = [&] { return prepare_field(open_field(scene), choices_of(scene), source); };
-  return share_field(scene, load, progress);
+  const std::string key = field_key(scene) + fmt::format("{}", fmt::join(identity_of("/proc/self/exe"), " "));
+  return share_field(
+      key, [&] { return prepare_field(open_field(scene), choices_of(scene), source); }, progress);
 }
 
 TriangleMesh load_closed_mesh(const std::filesystem::path& path) {
@@ -306,12 +318,6 @@ Scene make_scene(SceneDescription description, LoadedLight light, LoadedField lo
 
 }  // namespace
 
-Eigen::AlignedBox3d world_box(const TensorField& field) {
-  Eigen::AlignedBox3d box;
-  for (const Eigen::Vector3d& corner : field.corners()) box.extend(corner);
-  return box;
-}
-
 DepthRange depth_range(const TensorField& field, const Eigen::Vector3d& origin, const Eigen::Vector3d& direction) {
   DepthRange range{std::numeric_limits<double>::infinity(), -std::numeric_limits<double>::infinity()};
   for (const Eigen::Vector3d& corner : field.corners()) {
@@ -351,29 +357,35 @@ LoadedField prepare_field(const BlockSource& blocks, const FieldChoices& choices
   return loaded;
 }
 
-Scene load_scene(const SceneDescription& description, const Progress& progress) {
+std::string field_key(const SceneDescription& description) {
+  nlohmann::json field = nlohmann::json::parse(description.text).at("field");
+  if (field.is_object()) {
+    field.erase("scale");
+    field.erase("bounds");
+  }
+  const Interpolant interpolant = interpolant_of(description);
+  return nlohmann::json{field, identity_of(description.field.file), interpolant.between, interpolant.border}.dump();
+}
+
+std::optional<LoadedField> field_of(const std::optional<Scene>& before, const SceneDescription& description) {
+  if (!before || before->field_key != field_key(description)) return {};
+  LoadedField field{before->field, before->eigenvalues, before->non_finite, {}};
+  field.is_known = true;
+  return field;
+}
+
+Scene load_scene(SceneDescription description, const Progress& progress, std::optional<LoadedField> field) {
   const auto start = Clock::now();
+  const std::string key = field_key(description);  // Of the file as it is now.
   LoadedLight light = load_light(description);
-  progress.update("loading", 0, 1);
-  LoadedField loaded = load_field(description, progress);
-  std::vector<std::string> notes = notes_of(description, loaded);
-  Scene scene = make_scene(description, std::move(light), std::move(loaded), std::move(notes), progress);
-  scene.seconds = seconds_since(start);
-  return scene;
-}
-
-Scene load_scene(const SceneDescription& description, LoadedField field, const Progress& progress) {
-  const auto start = Clock::now();
-  std::vector<std::string> notes = notes_of(description, field);
-  Scene scene = make_scene(description, load_light(description), std::move(field), std::move(notes), progress);
-  scene.seconds = seconds_since(start);
-  return scene;
-}
-
-Scene reload_scene(const Scene& loaded, const SceneDescription& description, const Progress& progress) {
-  const auto start = Clock::now();
-  Scene scene = make_scene(description, load_light(description),
-                           {loaded.field, loaded.eigenvalues, loaded.non_finite, {}}, {}, progress);
+  if (!field) {
+    progress.update("loading", 0, 1);
+    field = load_field(description, progress);
+  }
+  std::vector<std::string> notes;
+  if (!field->is_known) notes = notes_of(description, *field);
+  Scene scene = make_scene(std::move(description), std::move(light), *std::move(field), std::move(notes), progress);
+  scene.field_key = key;
   scene.seconds = seconds_since(start);
   return scene;
 }

@@ -4,6 +4,7 @@
 
 #include <cstddef>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -27,7 +28,8 @@ struct Scene {
       : description(std::move(d)), field(std::move(f)), geometry(std::move(g)), color(std::move(c)) {}
 
   SceneDescription description;
-  TensorField field;  ///< Preprocessed; values in the units of its file.
+  TensorField field;      ///< Preprocessed; values in the units of its file.
+  std::string field_key;  ///< Of the field, when it was loaded.
   Geometry geometry;
   ColorManagement color;
   Beam beam;
@@ -57,6 +59,7 @@ struct LoadedField {
   EigenvalueReport eigenvalues;
   std::size_t non_finite = 0;
   std::vector<std::string> notes;
+  bool is_known = false;  ///< Notes about it, and warnings about the description, were told with an earlier scene.
 };
 
 /// What is made of a field's voxels.
@@ -78,25 +81,24 @@ FieldChoices choices_of(const SceneDescription& description);
 /// @param source  Names the field in notes and errors. @throw std::runtime_error if no voxel is left.
 LoadedField prepare_field(const BlockSource& blocks, const FieldChoices& choices, const std::string& source);
 
+/// Descriptions of scenes with the same field have the same key: all keys of the field but `scale` and `bounds`, what
+/// is between its voxels, and what tells whether its file has changed.
+std::string field_key(const SceneDescription& description);
+
+/// The field of a scene that was loaded before, if a description has the same; both share the voxels.
+std::optional<LoadedField> field_of(const std::optional<Scene>& before, const SceneDescription& description);
+
 /// SceneDescription → Scene: loads fields, meshes and spectra, and chooses all values that the scene leaves open.
+/// @param field  A field that is in memory; then only `scale` and `bounds` of `description.field` are used. Nothing:
+/// the field of the description is loaded.
 /// @throw std::runtime_error, one line that names the file and the fix; SceneError if a value of the scene does not fit
 /// the loaded data; Cancelled.
-Scene load_scene(const SceneDescription& description, const Progress& progress);
-
-/// The same with a field that is already in memory. Of `description.field` only `scale` and `bounds` are used.
-Scene load_scene(const SceneDescription& description, LoadedField field, const Progress& progress);
-
-/// The same for another description of a scene whose field is loaded: its `field` may differ in `scale` and `bounds`,
-/// if it has the same interpolant. Both scenes share the voxels. Notes about the field are left out.
-Scene reload_scene(const Scene& loaded, const SceneDescription& description, const Progress& progress);
+Scene load_scene(SceneDescription description, const Progress& progress, std::optional<LoadedField> field = {});
 
 /// Where the volume begins and ends along a direction, as signed distances from an origin, world units.
 struct DepthRange {
   double near = 0, far = 0;
 };
-
-/// The bounding box of a field's volume, world frame.
-Eigen::AlignedBox3d world_box(const TensorField& field);
 
 /// @param direction  Unit.
 DepthRange depth_range(const TensorField& field, const Eigen::Vector3d& origin, const Eigen::Vector3d& direction);

@@ -246,8 +246,6 @@ bool read_vdb_tree(const std::string& bytes) {
   return tree_fits(content, 0, tree, leaves) && !leaves.empty();
 }
 
-bool read_vdb_table(const std::string& bytes) { return delayed_load_fits(bytes, std::int64_t{1} << 30); }
-
 }  // namespace
 
 const std::vector<FuzzTarget>& fuzz_targets() {
@@ -273,7 +271,6 @@ const std::vector<FuzzTarget>& fuzz_targets() {
                                                {"netcdf", read_netcdf},
                                                {"vtk_counts", read_vtk_counts},
                                                {"vdb_tree", read_vdb_tree},
-                                               {"vdb_table", read_vdb_table},
                                                {"http", read_http},
                                                {"page", read_page_message}};
   return targets;

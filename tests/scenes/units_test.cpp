@@ -70,9 +70,8 @@ Image picture_of(const SceneCase& one, double unit) {
   if (!json.contains("camera")) json["camera"]["resolution"] = {24, 24};
   TensorGrid grid = generate(Helix(), GridSettings{{17, 17, 17}});
   grid.to_world = Eigen::Affine3d(Eigen::Scaling(unit)) * grid.to_world;
-  const Scene scene =
-      load_scene(read_scene_json(json, "scene.json"),
-                 prepare_field(source_of(std::move(grid)), {0, Eigenvalues::automatic, {}}, "helix"), Progress());
+  const Scene scene = load_scene(read_scene_json(json, "scene.json"), Progress(),
+                                 prepare_field(source_of(std::move(grid)), {0, Eigenvalues::automatic, {}}, "helix"));
   return render(scene, Progress()).linear;
 }
 

@@ -136,7 +136,7 @@ template <class Visit>
 void for_each_cell(const ExploreOptions& options, const Progress& progress, const Visit& visit) {
   std::optional<Scene> scene;
   const auto load = [&](const SceneDescription& description) {
-    Scene next = scene ? reload_scene(*scene, description, progress) : load_scene(description, progress);
+    Scene next = load_scene(description, progress, field_of(scene, description));
     scene.emplace(std::move(next));
   };
   for (std::size_t column = 0; column < directions.size(); ++column) {

@@ -233,8 +233,8 @@ void add_render_command(CLI::App& program, Progress& progress) {
   command
       ->add_option(
           "--memory", options->run.memory,
-          "Limit of memory, as 8G or 500M. A larger field is kept in a file on the disk of the pictures, and read "
-          "in parts")
+          "Keep the field in a file on the disk of the pictures, of which the system has in memory what is free, and "
+          "make it in so much memory, as 8G or 500M")
       ->transform(CLI::AsSizeValue(false))
       ->option_text("SIZE");
   command->add_flag("--watch", options->run.keeping.watch, "Keep the pictures up to date while they are rendered");

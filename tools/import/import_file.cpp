@@ -8,6 +8,7 @@
 #include <variant>
 
 #include <fmt/format.h>
+#include <tbb/parallel_for.h>
 #include <vtkCellData.h>
 #include <vtkDataArray.h>
 #include <vtkDataObject.h>
@@ -28,7 +29,6 @@
 #include "tools/import/vtk/vtk_messages.h"
 #include "tools/import/vtk_formats/image_lattice.h"
 #include "tools/import/vtk_source/vtk_source.h"
-#include "volumes/grids/page_memory.h"
 
 namespace tensorray {
 namespace {
@@ -57,7 +57,7 @@ bool wants_sampling(const ImportSettings& settings) {
 void crop(TensorGrid& grid, Eigen::AlignedBox3d bounds) {
   const Eigen::Vector3d rounding = Eigen::Vector3d::Constant(1e-6 * grid.to_world.linear().colwise().norm().minCoeff());
   bounds = {bounds.min() - rounding, bounds.max() + rounding};
-  for_blocks(grid.blocks.size(), [&](std::size_t i) {
+  tbb::parallel_for(std::size_t{0}, grid.blocks.size(), [&](std::size_t i) {
     TensorBlock& block = grid.blocks[i];
     for (int offset = 0; offset < TensorBlock::voxels; ++offset) {
       const Eigen::Vector3i index = block.origin + TensorBlock::position(offset);
@@ -70,7 +70,7 @@ void crop(TensorGrid& grid, Eigen::AlignedBox3d bounds) {
 }
 
 void make_symmetric(TensorGrid& grid) {
-  for_blocks(grid.blocks.size(), [&](std::size_t i) {
+  tbb::parallel_for(std::size_t{0}, grid.blocks.size(), [&](std::size_t i) {
     for (Eigen::Matrix3f& value : grid.blocks[i].values) value = (0.5f * (value + value.transpose())).eval();
   });
 }
@@ -196,16 +196,6 @@ Lattice placed(Lattice lattice, const ImportSettings& settings) {
   return lattice;
 }
 
-/// Checks, where there is a bound of memory, that it holds the files: readers of other formats than .npy and NIfTI
-/// read them as a whole.
-void require_room_for(const std::vector<std::filesystem::path>& files) {
-  double bytes = 0;
-  std::error_code none;
-  for (const std::filesystem::path& file : files)
-    if (std::filesystem::is_regular_file(file, none)) bytes += static_cast<double>(std::filesystem::file_size(file));
-  require_room(0, bytes);
-}
-
 TensorGrid import_any(const ImportSettings& settings, const Progress& progress, ImportReport& report) {
   const std::filesystem::path& file = settings.files.front();
   const OpenLattice open = lattice_reader(file);
@@ -213,7 +203,6 @@ TensorGrid import_any(const ImportSettings& settings, const Progress& progress, 
   if (open && settings.thickness) throw std::invalid_argument("has voxels of its own: leave --thickness out");
   if (!has_steps && settings.step.value_or(0) > 0)
     throw std::invalid_argument("has one step of time; leave --steps out");
-  if (open != open_npy && open != open_nifti) require_room_for(settings.files);
   if (settings.files.size() == 2) {
     return import_data_set(read_plot3d(file, settings.files[1]), settings, progress, report);
   }

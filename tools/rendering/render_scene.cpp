@@ -46,21 +46,11 @@ bool is_there(const std::filesystem::path& file) {
   return std::filesystem::exists(file, none);
 }
 
-/// What does not change while a field stays the same.
-Json field_of(const SceneDescription& description) {
-  Json field = parse_value(description.text)["field"];
-  for (const char* key : {"scale", "bounds"}) field.erase(key);
-  return field;
-}
-
-/// Loads a scene; from `loaded`, if that has the same field.
+/// Loads a scene, with the field of `loaded` if that has the same.
 Scene load(const SceneDescription& description, std::optional<Scene>& loaded, const Progress& progress) {
-  if (!loaded || field_of(loaded->description) != field_of(description) ||
-      loaded->field.interpolant() != interpolant_of(description)) {
-    loaded.reset();  // Its memory is needed.
-    return load_scene(description, progress);
-  }
-  return reload_scene(*loaded, description, progress);
+  std::optional<LoadedField> field = field_of(loaded, description);
+  if (!field) loaded.reset();  // Its memory is needed.
+  return load_scene(description, progress, std::move(field));
 }
 
 KeepSettings keep_settings(const SceneDescription& description, const RenderRun& run) {

@@ -102,7 +102,7 @@ Json describe_meshes(const Scene& scene) {
 }
 
 Json describe_beam(const Scene& scene) {
-  const Eigen::AlignedBox3d box = world_box(scene.field);
+  const Eigen::AlignedBox3d box = scene.field.world_box();
   const Vector3d start = box.center() - 0.75 * box.diagonal().norm() * scene.beam.direction;
   double radius = 0;
   for (const Vector2d& corner : scene.beam.aperture) radius = std::max(radius, corner.norm());
@@ -114,7 +114,7 @@ Json describe_camera(const Scene& scene) {
   const CameraDescription& camera = scene.description.camera;
   if (!camera.position) return nullptr;
   return {{"eye", to_json(*camera.position)},
-          {"target", to_json(camera.target.value_or(world_box(scene.field).center()))},
+          {"target", to_json(camera.target.value_or(scene.field.world_box().center()))},
           {"up", to_json(camera.up.value_or(Vector3d::UnitZ()))},
           {"fov", camera.angle}};
 }

@@ -18,9 +18,6 @@ Json without(Json section, const std::vector<const char*>& keys) {
   return section;
 }
 
-/// What the voxels depend on.
-Json field_keys(const Json& scene) { return without(section(scene, "field"), {"scale", "bounds"}); }
-
 /// What automatic scale and direction depend on.
 Json choice_keys(const Json& scene) {
   const Json light = section(scene, "light");
@@ -57,9 +54,7 @@ const Scene& LiveScene::load(const Json& json, const std::vector<std::filesystem
   if (chooses_scale && !chooses_anew) description.field.scale = scale_;
   if (chooses_direction && !chooses_anew) description.light.direction = direction_;
 
-  const bool has_field =
-      scene_ && field_keys(json) == field_ && scene_->field.interpolant() == interpolant_of(description);
-  Scene scene = has_field ? reload_scene(*scene_, description, progress) : load_scene(description, progress);
+  Scene scene = load_scene(description, progress, field_of(scene_, description));
   // A change that moves all rays begins without a memory: it would cost time and give nothing.
   const Json rays = ray_keys(json, scene);
   if (rays == rays_of_) scene.rays = scene_ && scene_->rays ? scene_->rays : std::make_shared<RayMemory>();
@@ -74,7 +69,6 @@ const Scene& LiveScene::load(const Json& json, const std::vector<std::filesystem
   if (chooses_direction) direction_ = scene.description.light.direction;
   scene_.emplace(std::move(scene));
   loaded_ = loaded;
-  field_ = field_keys(json);
   chosen_for_ = choice_keys(json);
   rays_of_ = rays;
   rendered_ = picture_keys(json, outputs);

@@ -3,9 +3,11 @@
 #include <algorithm>
 #include <cmath>
 #include <cstring>
+#include <type_traits>
+
+#include <tbb/parallel_for.h>
 
 #include "volumes/bricks/coefficients.h"
-#include "volumes/grids/page_memory.h"
 
 namespace tensorray {
 namespace {
@@ -36,7 +38,8 @@ StoredTensor beyond(const Coefficients& field, Vector3i index, int axis, int fac
     along[axis] = face + run * inward;
     if (!find_voxel(field.bricks, field.bricks.filled, along)) break;
   }
-  const bool is_parabola = run == 3 && (size == 3 || field.border == Border::extend);  // Both ends of the run continue.
+  const bool is_parabola =
+      run == 3 && (size == 3 || field.interpolant.border == Border::extend);  // Both ends of the run continue.
   const int terms = size == 1 ? 1 : run < 3 ? 2 : is_parabola ? 3 : 4;
   StoredTensor sum = StoredTensor::Zero();
   for (int i = 0; i < terms; ++i) {
@@ -48,12 +51,10 @@ StoredTensor beyond(const Coefficients& field, Vector3i index, int axis, int fac
 
 /// Calls visit(neighbour, first, end) for the parts of a brick: the block that it belongs to, and the range of its
 /// voxels in the brick.
-template <class Visit>
+template <class Brick, class Visit>
 void for_parts(const Visit& visit) {
-  const auto first = [](int o) { return TensorBlock::size * o - (o < 0 ? CubicBrick::before - TensorBlock::size : 0); };
-  const auto size = [](int o) {
-    return o < 0 ? CubicBrick::before : o == 0 ? TensorBlock::size : CubicBrick::width - TensorBlock::size - 1;
-  };
+  const auto first = [](int o) { return o < 0 ? -Brick::before : TensorBlock::size * o; };
+  const auto size = [](int o) { return o < 0 ? Brick::before : o == 0 ? TensorBlock::size : Brick::behind; };
   for (int n = 0; n < neighbour_count; ++n) {
     const Vector3i offset = neighbour(n);
     const Vector3i from(first(offset.x()), first(offset.y()), first(offset.z()));
@@ -62,29 +63,32 @@ void for_parts(const Visit& visit) {
 }
 
 /// Copies a part of a brick, `length` voxels along z, from the block that it belongs to.
-template <int components, int length>
+template <class Brick, int components, int length>
 void copy_part_of(const float* block, const Vector3i& offset, const Vector3i& first, const Vector3i& end,
                   float* brick) {
+  // A linear brick of symmetric tensors has a gap after each third voxel.
+  constexpr int run = Brick::bending_offset(components, 3) == 3 * components ? length : 1;
   const Vector3i origin = TensorBlock::size * offset;
   for (int x = first.x(); x < end.x(); ++x)
     for (int y = first.y(); y < end.y(); ++y) {
-      const int to = CubicBrick::coefficient(x, y, first.z());
+      const int to = Brick::coefficient(x, y, first.z());
       const int from = CoefficientBlock::coefficient(x - origin.x(), y - origin.y(), first.z() - origin.z());
-      std::memcpy(brick + CubicBrick::bending_offset(components, to),
-                  block + CoefficientBlock::bending_offset(components, from), length * components * sizeof(float));
-      std::memcpy(brick + CubicBrick::trailing_offset(components) + to,
+      for (int z = 0; z < length; z += run)
+        std::memcpy(brick + Brick::bending_offset(components, to + z),
+                    block + CoefficientBlock::bending_offset(components, from + z), run * components * sizeof(float));
+      std::memcpy(brick + Brick::trailing_offset(components) + to,
                   block + CoefficientBlock::trailing_offset(components) + from, length * sizeof(float));
     }
 }
 
-template <int components>
+template <class Brick, int components>
 void copy_part(const float* block, const Vector3i& offset, const Vector3i& first, const Vector3i& end, float* brick) {
-  if (offset.z() < 0)
-    copy_part_of<components, CubicBrick::before>(block, offset, first, end, brick);
+  if (offset.z() == 0)
+    copy_part_of<Brick, components, TensorBlock::size>(block, offset, first, end, brick);
   else if (offset.z() > 0)
-    copy_part_of<components, CubicBrick::width - TensorBlock::size - 1>(block, offset, first, end, brick);
-  else
-    copy_part_of<components, TensorBlock::size>(block, offset, first, end, brick);
+    copy_part_of<Brick, components, Brick::behind>(block, offset, first, end, brick);
+  else if constexpr (Brick::before > 0)
+    copy_part_of<Brick, components, Brick::before>(block, offset, first, end, brick);
 }
 
 /// Extrapolates the coefficients of a brick that are outside the extent.
@@ -106,45 +110,51 @@ void extrapolate(const Coefficients& field, const Vector3i& place, float* brick)
       }
 }
 
-/// TensorBrick::strongest: a B-spline is a mean of its coefficients, so that none of its deviators is greater than
-/// theirs.
-template <int components>
+/// TensorBrick::strongest: what is between voxels is a mean of coefficients, so that none of its deviators is greater
+/// than theirs.
+template <class Brick, int components>
 float strongest_of(const float* brick) {
   Deviators<float> single;
-  for (int i = 0; i < CubicBrick::coefficients; ++i)
-    single.add<components>(brick + CubicBrick::bending_offset(components, i));
+  for (int i = 0; i < Brick::coefficients; ++i) single.add<components>(brick + Brick::bending_offset(components, i));
   if (single.are_exact()) return strongest_bound(single.greatest);
   Deviators<double> exact;
-  for (int i = 0; i < CubicBrick::coefficients; ++i)
-    exact.add<components>(brick + CubicBrick::bending_offset(components, i));
+  for (int i = 0; i < Brick::coefficients; ++i) exact.add<components>(brick + Brick::bending_offset(components, i));
   return strongest_bound(exact.greatest);
 }
 
 /// @return TensorBrick::strongest.
-template <int components>
+template <class Brick, int components>
 float finish_brick(const Coefficients& field, const Vector3i& place, float* brick) {
-  for_parts([&](const Vector3i& offset, const Vector3i& first, const Vector3i& end) {
+  for_parts<Brick>([&](const Vector3i& offset, const Vector3i& first, const Vector3i& end) {
     const std::uint32_t block = field.bricks.index.find(place + offset);
-    if (block != BrickIndex::missing) copy_part<components>(field.blocks.brick(block), offset, first, end, brick);
+    if (block != BrickIndex::missing)
+      copy_part<Brick, components>(field.blocks.brick(block), offset, first, end, brick);
   });
   const AlignedBox3i covered(TensorBlock::size * place - Vector3i::Ones(),
                              TensorBlock::size * place + Vector3i::Constant(TensorBlock::size + 1));
-  if (!field.extent.contains(covered)) extrapolate(field, place, brick);
-  return strongest_of<components>(brick);
+  if (std::is_same_v<Brick, CubicBrick> && !field.extent.contains(covered)) extrapolate(field, place, brick);
+  return strongest_of<Brick, components>(brick);
+}
+
+template <class Brick>
+float finish_brick(const Coefficients& field, const Vector3i& place, float* brick) {
+  return field.blocks.components == TensorBrick::symmetric
+             ? finish_brick<Brick, TensorBrick::symmetric>(field, place, brick)
+             : finish_brick<Brick, TensorBrick::general>(field, place, brick);
 }
 
 }  // namespace
 
 void finish_bricks(const Coefficients& field, const PlaceNumbers& numbers, const BrickMemory& result,
                    std::vector<float>& strongest) {
-  for_blocks(numbers.size(), [&](std::size_t n) {
+  tbb::parallel_for(std::size_t{0}, numbers.size(), [&](std::size_t n) {
     const std::uint32_t i = numbers[n];
     if (i >= field.bricks.count) return;
     const Vector3i& place = field.bricks.places[i];
     std::fill_n(result.brick(i), result.stride, 0.0f);  // It may have held blocks.
-    strongest[i] = result.components == TensorBrick::symmetric
-                       ? finish_brick<TensorBrick::symmetric>(field, place, result.brick(i))
-                       : finish_brick<TensorBrick::general>(field, place, result.brick(i));
+    strongest[i] = field.interpolant.between == Interpolation::linear
+                       ? finish_brick<LinearBrick>(field, place, result.brick(i))
+                       : finish_brick<CubicBrick>(field, place, result.brick(i));
   });
 }
 

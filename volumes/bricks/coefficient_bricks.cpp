@@ -14,7 +14,10 @@ using Eigen::AlignedBox3i;
 using Eigen::Vector3i;
 
 constexpr int block_edge = CubicBrick::cells;  // Of a block, in voxels.
-int reach_of(Border border) { return border == Border::fade ? 1 : 2; }
+
+int reach_of(const Interpolant& interpolant) {
+  return interpolant.between == Interpolation::linear ? 0 : interpolant.border == Border::fade ? 1 : 2;
+}
 
 Vector3i place_of(const Vector3i& voxel) {
   return voxel.unaryExpr([](int v) { return v >> 3; });
@@ -92,11 +95,20 @@ void cut(VoxelMask& mask, const Vector3i& place, const AlignedBox3i& extent) {
     }
 }
 
+/// How many voxels a brick needs of the blocks before and behind its own, along each axis.
+struct Apron {
+  int before, behind;
+};
+
+Apron apron_of(Interpolation between) {
+  return between == Interpolation::linear ? Apron{LinearBrick::before, LinearBrick::behind}
+                                          : Apron{CubicBrick::before, CubicBrick::behind};
+}
+
 /// Whether a brick whose block is `offset` from another one's needs coefficients of that one.
-bool reaches(const VoxelMask& mask, const Vector3i& offset) {
-  // A brick needs the last voxel of the block before it, and the first two of the block behind it.
-  const auto first = [](int o) { return o > 0 ? block_edge - 1 : 0; };
-  const auto end = [](int o) { return o < 0 ? 2 : block_edge; };
+bool reaches(const VoxelMask& mask, const Vector3i& offset, const Apron& apron) {
+  const auto first = [&](int o) { return o > 0 ? block_edge - apron.before : 0; };
+  const auto end = [&](int o) { return o < 0 ? apron.behind : block_edge; };
   unsigned along_z = 0;
   for (int z = first(offset.z()); z < end(offset.z()); ++z) along_z |= 1u << z;
   for (int x = first(offset.x()); x < end(offset.x()); ++x)
@@ -126,7 +138,8 @@ std::vector<PlaceNumbers> slabs_of(const std::vector<Vector3i>& places, std::siz
   return slabs;
 }
 
-CoefficientBricks coefficient_bricks(const BlockTable& table, const AlignedBox3i& extent, Border border) {
+CoefficientBricks coefficient_bricks(const BlockTable& table, const AlignedBox3i& extent,
+                                     const Interpolant& interpolant) {
   const std::vector<Vector3i> candidates = places_about(table);
   const BrickIndex found(candidates);
   std::vector<VoxelMask> active(candidates.size()), filled(candidates.size());
@@ -139,7 +152,7 @@ CoefficientBricks coefficient_bricks(const BlockTable& table, const AlignedBox3i
     for (int n = 0; n < neighbour_count; ++n)
       if (const std::uint32_t at = found.find(candidates[i] + neighbour(n)); at != BrickIndex::missing)
         wide.add(active[at], neighbour(n));
-    filled[i] = wide.spread(reach_of(border));
+    filled[i] = wide.spread(reach_of(interpolant));
     cut(filled[i], candidates[i], extent);
   });
 
@@ -153,7 +166,8 @@ CoefficientBricks coefficient_bricks(const BlockTable& table, const AlignedBox3i
       const Vector3i offset = neighbour(n), at = candidates[i] + offset;
       const std::uint32_t other = found.find(at);
       if (other != BrickIndex::missing && any_of(filled[other])) continue;
-      if (with_cells.contains(at) && reaches(filled[i], offset)) result.places.push_back(at);
+      if (with_cells.contains(at) && reaches(filled[i], offset, apron_of(interpolant.between)))
+        result.places.push_back(at);
     }
   }
   sort_places(result.places);

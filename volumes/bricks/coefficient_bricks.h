@@ -1,6 +1,7 @@
 #pragma once
 /// @file volumes/bricks/coefficient_bricks.h
-/// The bricks of a cubic field while it is made: which voxels have coefficients, and where these are in memory.
+/// The bricks of a field while it is made: which voxels have coefficients, and where these are in memory. The
+/// coefficients of a linear field are its values.
 
 #include <algorithm>
 #include <array>
@@ -33,7 +34,7 @@ inline Eigen::Vector3i neighbour(int n) { return {n / 9 - 1, n / 3 % 3 - 1, n % 
 /// Numbers of places in CoefficientBricks.
 using PlaceNumbers = std::vector<std::uint32_t>;
 
-/// The bricks of a cubic field. Each holds the coefficients of its own block of voxels, and those about it that its
+/// The bricks of a field. Each holds the coefficients of its own block of voxels, and those about it that its
 /// cells need.
 struct CoefficientBricks {
   /// First the bricks with a cell where the field is not zero, ordered by x, then y, then z. Then places of blocks that
@@ -42,8 +43,8 @@ struct CoefficientBricks {
   std::size_t count = 0;  ///< Number of the first ones.
   BrickIndex index;       ///< Of all places.
 
-  /// The voxels of each place that have coefficients: the active ones; and inactive ones within the extent that are
-  /// within a voxel of these (`fade`) or two (`extend`) along each axis.
+  /// The voxels of each place that have coefficients: the active ones; and of a cubic field inactive ones within the
+  /// extent that are within a voxel of these (`fade`) or two (`extend`) along each axis.
   std::vector<VoxelMask> filled;
   std::vector<VoxelMask> active;
 
@@ -55,13 +56,14 @@ struct CoefficientBricks {
 std::vector<PlaceNumbers> slabs_of(const std::vector<Eigen::Vector3i>& places, std::size_t most);
 
 /// @param extent  The box of the active voxels. Runs on all threads.
-CoefficientBricks coefficient_bricks(const BlockTable& table, const Eigen::AlignedBox3i& extent, Border border);
+CoefficientBricks coefficient_bricks(const BlockTable& table, const Eigen::AlignedBox3i& extent,
+                                     const Interpolant& interpolant);
 
 /// The coefficients of all voxels, or their values before.
 struct Coefficients {
   const CoefficientBricks& bricks;
   const Eigen::AlignedBox3i& extent;  ///< The box of the active voxels.
-  Border border;
+  Interpolant interpolant;
   const BrickMemory& blocks;  ///< Of `bricks.places`, in the layout of CoefficientBlock.
 };
 

@@ -4,7 +4,7 @@
 #include <cstring>
 #include <type_traits>
 
-#include "volumes/grids/page_memory.h"
+#include <tbb/parallel_for.h>
 
 namespace tensorray {
 namespace {
@@ -202,12 +202,12 @@ Column column_of(const CoefficientBricks& bricks, std::size_t first, int axis) {
 
 template <int components>
 void solve_columns(int axis, const Coefficients& field, const PlaceNumbers& numbers) {
-  for_blocks(numbers.size(), [&](std::size_t i) {
+  tbb::parallel_for(std::size_t{0}, numbers.size(), [&](std::size_t i) {
     const Column column = column_of(field.bricks, numbers[i], axis);
     if (column.blocks.empty()) return;
     const int begin = edge * field.bricks.places[numbers[i]][axis];
     const int count = edge * static_cast<int>(column.blocks.size());
-    const Runs runs{axis, begin, count, field.extent, field.border};
+    const Runs runs{axis, begin, count, field.extent, field.interpolant.border};
     if (axis == 2)
       solve_along_z<components>(field.bricks, column, runs, field.blocks);
     else
@@ -217,8 +217,8 @@ void solve_columns(int axis, const Coefficients& field, const PlaceNumbers& numb
 
 /// Where the blocks begin in the memory, in floats: so far behind that the bricks of a slab end before the blocks of
 /// the slab before it, and on a page. Blocks of places without bricks are behind all others, whatever their slab.
-std::size_t begin_of_blocks(const CoefficientBricks& bricks, int components) {
-  const auto brick = static_cast<std::size_t>(CubicBrick::stored_floats(components));
+/// @param brick  Floats of a brick.
+std::size_t begin_of_blocks(const CoefficientBricks& bricks, std::size_t brick, int components) {
   const auto block = static_cast<std::size_t>(CoefficientBlock::stored_floats(components));
   std::size_t begin = 0, first_before = 0;
   for (const PlaceNumbers& slab : bricks.slabs) {
@@ -237,10 +237,11 @@ std::size_t begin_of_blocks(const CoefficientBricks& bricks, int components) {
 
 }  // namespace
 
-BrickMemory cubic_memory(const CoefficientBricks& bricks, int components) {
-  const std::size_t brick = static_cast<std::size_t>(CubicBrick::stored_floats(components));
+BrickMemory brick_memory(const CoefficientBricks& bricks, Interpolation between, int components) {
+  const auto brick = static_cast<std::size_t>(between == Interpolation::linear ? LinearBrick::stored_floats(components)
+                                                                               : CubicBrick::stored_floats(components));
   const std::size_t block = static_cast<std::size_t>(CoefficientBlock::stored_floats(components));
-  const std::size_t floats = begin_of_blocks(bricks, components) + bricks.places.size() * block;
+  const std::size_t floats = begin_of_blocks(bricks, brick, components) + bricks.places.size() * block;
   return make_bricks((floats + brick - 1) / brick, static_cast<int>(brick), components);
 }
 
@@ -249,7 +250,7 @@ BrickMemory blocks_within(const BrickMemory& memory, const CoefficientBricks& br
   blocks.components = memory.components;
   blocks.count = bricks.places.size();
   blocks.stride = static_cast<std::size_t>(CoefficientBlock::stored_floats(memory.components));
-  const std::size_t begin = begin_of_blocks(bricks, memory.components);
+  const std::size_t begin = begin_of_blocks(bricks, memory.stride, memory.components);
   blocks.floats = std::shared_ptr<float[]>(memory.floats, memory.floats.get() + begin);
   return blocks;
 }
@@ -261,25 +262,16 @@ std::vector<float> make_coefficients(const Coefficients& field, const BrickMemor
   };
   const std::vector<PlaceNumbers>& slabs = field.bricks.slabs;
   std::vector<float> strongest(field.bricks.count);
-  for (const PlaceNumbers& slab : slabs) solve(0, slab);
+  const bool is_cubic = field.interpolant.between == Interpolation::cubic;
+  for (std::size_t i = 0; is_cubic && i < slabs.size(); ++i) solve(0, slabs[i]);
   for (std::size_t i = 0; i <= slabs.size(); ++i) {
-    if (i < slabs.size()) {
+    if (is_cubic && i < slabs.size()) {
       solve(1, slabs[i]);
       solve(2, slabs[i]);
     }
     if (i > 0) finish_bricks(field, slabs[i - 1], result, strongest);
   }
   return strongest;
-}
-
-void widen_values(const float* symmetric, float* general) {
-  constexpr int few = TensorBrick::symmetric, all = TensorBrick::general;
-  for (int i = 0; i < CoefficientBlock::coefficients; ++i)
-    for (int k = 0; k < all; ++k)
-      general[CoefficientBlock::bending_offset(all, i) + k] =
-          symmetric[CoefficientBlock::bending_offset(few, i) + TensorBrick::stored_component(few, k)];
-  std::copy_n(symmetric + CoefficientBlock::trailing_offset(few), CoefficientBlock::coefficients,
-              general + CoefficientBlock::trailing_offset(all));
 }
 
 }  // namespace tensorray

@@ -1,6 +1,6 @@
 #pragma once
 /// @file volumes/bricks/coefficients.h
-/// From the voxels of a cubic field to the coefficients that its cells need.
+/// From the voxels of a field to the coefficients that its cells need.
 
 #include <cstdint>
 #include <vector>
@@ -9,29 +9,27 @@
 
 namespace tensorray {
 
-/// Copies a block of symmetric tensors to one of tensors of any kind, in the layout of CoefficientBlock.
-void widen_values(const float* symmetric, float* general);
-
-/// Memory for the bricks of a cubic field, zeros. Its end holds the blocks, until bricks overwrite them.
-BrickMemory cubic_memory(const CoefficientBricks& bricks, int components);
+/// Memory of zeros for the bricks of a field. Its end holds the blocks, until bricks overwrite them.
+BrickMemory brick_memory(const CoefficientBricks& bricks, Interpolation between, int components);
 
 /// The blocks within this memory, which they keep.
 BrickMemory blocks_within(const BrickMemory& memory, const CoefficientBricks& bricks);
 
-/// Continues the values of the active voxels to the others that have coefficients, as the mean of all axes that lead to
-/// a voxel: with `extend` by a line through two voxels, or the value of a single one; with `fade` a fifth of the
-/// neighbour's value.
+/// Continues the values of a cubic field's active voxels to the others that have coefficients, as the mean of all axes
+/// that lead to a voxel: with `extend` by a line through two voxels, or the value of a single one; with `fade` a fifth
+/// of the neighbour's value.
 void continue_values(const Coefficients& field);
 
-/// Makes coefficients of the values, in place, axis after axis: the cubic spline through the voxels of each run of
-/// voxels that have coefficients. At the end of a run coefficients continue as a cubic polynomial (not a knot) at faces
-/// of the extent, and everywhere with `extend`; otherwise they are zero. Then makes the bricks, which overwrite blocks
-/// that no other brick needs. It goes through all blocks twice.
+/// Makes coefficients of a cubic field's values, in place, axis after axis: the cubic spline through the voxels of each
+/// run of voxels that have coefficients. At the end of a run coefficients continue as a cubic polynomial (not a knot)
+/// at faces of the extent, and everywhere with `extend`; otherwise they are zero. Then makes the bricks of any field,
+/// which overwrite blocks that no other brick needs. It goes through all blocks twice.
 /// @param result  The memory that the blocks are within.
 /// @return TensorBrick::strongest of the bricks.
 std::vector<float> make_coefficients(const Coefficients& field, const BrickMemory& result);
 
-/// Copies to each brick the coefficients that its cells need, and extrapolates those that are outside the extent.
+/// Copies to each brick the coefficients that its cells need; of a cubic field, extrapolates those that are outside the
+/// extent.
 /// @param numbers  The bricks; numbers of other places are passed over. @param strongest  Gets TensorBrick::strongest
 /// of the bricks.
 void finish_bricks(const Coefficients& field, const PlaceNumbers& numbers, const BrickMemory& result,

@@ -1,6 +1,6 @@
 #pragma once
 /// @file volumes/bricks/cubic_brick.h
-/// The layouts of B-spline coefficients in bricks and blocks, and the B-spline's weights.
+/// The layouts of coefficients in bricks and blocks, and the B-spline's weights.
 
 #include "volumes/bricks/tensor_field.h"
 
@@ -10,8 +10,8 @@ namespace tensorray {
 /// is stored of a coefficient is what a TensorBrick stores of a tensor; coefficients follow each other without gaps.
 struct CubicBrick {
   static constexpr int cells = TensorBrick::cells;
-  static constexpr int before = 1;  ///< Coefficients before the first cell, along each axis.
-  static constexpr int width = cells + 3;
+  static constexpr int before = 1, behind = 2;  ///< Coefficients before the first cell, and behind 8, along each axis.
+  static constexpr int width = before + cells + behind;
   static constexpr int coefficients = width * width * width;
 
   /// The number of the coefficient at a voxel of the brick; each coordinate is from −1 to 9.
@@ -25,7 +25,21 @@ struct CubicBrick {
   }
 };
 
-/// The layout of a block's 8³ voxels, whose values become coefficients: of each what a CubicBrick stores.
+/// A TensorBrick, whose coefficients are the tensors at its voxels, as CubicBrick has them.
+struct LinearBrick {
+  static constexpr int before = 0, behind = 1;
+  static constexpr int width = TensorBrick::width;
+  static constexpr int coefficients = TensorBrick::voxels;
+
+  static constexpr int coefficient(int x, int y, int z) { return TensorBrick::voxel(x, y, z); }
+  static constexpr int bending_offset(int components, int number) {
+    return TensorBrick::bending_offset(components, number);
+  }
+  static constexpr int trailing_offset(int components) { return TensorBrick::trailing_offset(components); }
+  static constexpr int stored_floats(int components) { return TensorBrick::stored_floats(components); }
+};
+
+/// The layout of a block's 8³ voxels, whose values become coefficients: of each what a brick stores.
 struct CoefficientBlock {
   static constexpr int coefficients = TensorBlock::voxels;
 

@@ -1,19 +1,15 @@
 #include "volumes/bricks/tensor_field.h"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <optional>
 #include <stdexcept>
 #include <utility>
 
-#include <tbb/parallel_for.h>
-
 #include "base/geometry/box.h"
 #include "volumes/bricks/brick_making.h"
 #include "volumes/bricks/coefficients.h"
 #include "volumes/bricks/cubic_brick.h"
-#include "volumes/grids/page_memory.h"
 
 namespace tensorray {
 namespace {
@@ -59,9 +55,31 @@ TensorField::TensorField(const BlockSource& source, const Interpolant& interpola
   index_bounds_ = extent_of(active);
   voxels_ = Eigen::AlignedBox3d(active.min().cast<double>(), active.max().cast<double>());
 
+  // Blocks of voxels become those of coefficients, from which bricks are made.
   const BlockTable table(source.shapes);
-  const double norm = is_cubic() ? make_cubic_bricks(table, active, source) : make_linear_bricks(table, active, source);
-  greatest_norm_ = std::sqrt(norm);
+  const CoefficientBricks bricks = coefficient_bricks(table, active, interpolant);
+  std::vector<double> norms(table.shapes.size());
+  const auto place = [&](std::size_t i, const TensorBlock& block, const BrickMemory& blocks) {
+    const std::optional<double> norm =
+        place_values(block, blocks.components, blocks.brick(bricks.index.find(table.places[i])));
+    if (norm) norms[i] = *norm;
+    return norm.has_value();
+  };
+  const auto make = [&](bool symmetric) {
+    memory_ = {};
+    memory_ = brick_memory(bricks, interpolant.between, symmetric ? TensorBrick::symmetric : TensorBrick::general);
+    return blocks_within(memory_, bricks);
+  };
+  const BrickMemory blocks = place_blocks(source, make, place);
+  const Coefficients coefficients{bricks, active, interpolant, blocks};
+  continue_values(coefficients);
+  const std::vector<float> strongest = make_coefficients(coefficients, memory_);
+  keep_bricks(memory_, bricks.count);
+  greatest_norm_ = std::sqrt(*std::max_element(norms.begin(), norms.end()));
+  bricks_.assign(bricks.places.begin(), bricks.places.begin() + static_cast<std::ptrdiff_t>(bricks.count));
+  index_ = BrickIndex(bricks_);
+  index_.set_values(strongest);
+  set_trailing_offset();
 }
 
 TensorField::TensorField(FieldParts parts)
@@ -72,71 +90,15 @@ TensorField::TensorField(FieldParts parts)
       voxels_(parts.voxels.cast<double>()),
       bricks_(std::move(parts.bricks)),
       memory_(std::move(parts.memory)),
-      trailing_offset_(static_cast<std::size_t>(is_cubic() ? CubicBrick::trailing_offset(memory_.components)
-                                                           : TensorBrick::trailing_offset(memory_.components))),
       greatest_norm_(parts.greatest_norm),
       index_(bricks_) {
   index_.set_values(parts.strongest);
+  set_trailing_offset();
 }
 
-/// @return the greatest squared norm of a voxel.
-double TensorField::make_linear_bricks(const BlockTable& table, const Eigen::AlignedBox3i& active,
-                                       const BlockSource& source) {
-  bricks_ = active_bricks(table, bricks_of(active));
-  bricks_.shrink_to_fit();
-  index_ = BrickIndex(bricks_);
-  std::vector<BlockShare> shares(table.shapes.size());
-  const auto place = [&](std::size_t i, const TensorBlock& block, const BrickMemory& memory) {
-    std::array<float*, bricks_of_block> bricks{};
-    for (int bits = 0; bits < bricks_of_block; ++bits)
-      if (const std::uint32_t brick = index_.find(table.places[i] - corner(bits)); brick != BrickIndex::missing)
-        bricks[static_cast<std::size_t>(bits)] = memory.brick(brick);
-    const std::optional<BlockShare> share = place_block(block, memory.components, bricks);
-    if (share) shares[i] = *share;
-    return share.has_value();
-  };
-  const auto make = [&](bool symmetric) {
-    const int components = symmetric ? TensorBrick::symmetric : TensorBrick::general;
-    return make_bricks(bricks_.size(), TensorBrick::stored_floats(components), components);
-  };
-  memory_ = place_blocks(source, {make, widen_brick, place});
-  trailing_offset_ = static_cast<std::size_t>(TensorBrick::trailing_offset(memory_.components));
-  std::vector<float> strongest(bricks_.size());
-  tbb::parallel_for(std::size_t{0}, bricks_.size(), [&](std::size_t i) {
-    strongest[i] = strongest_deviator(table, shares, bricks_[i], brick_at(memory_.brick(i), 0));
-  });
-  index_.set_values(strongest);
-  double norm = 0;
-  for (const BlockShare& share : shares) norm = std::max(norm, share.norm);
-  return norm;
-}
-
-/// The same. Blocks of voxels become those of coefficients, from which bricks are made.
-double TensorField::make_cubic_bricks(const BlockTable& table, const Eigen::AlignedBox3i& active,
-                                      const BlockSource& source) {
-  const CoefficientBricks bricks = coefficient_bricks(table, active, interpolant_.border);
-  std::vector<double> norms(table.shapes.size());
-  const auto place = [&](std::size_t i, const TensorBlock& block, const BrickMemory& memory) {
-    const std::uint32_t brick = bricks.index.find(table.places[i]);
-    const auto norm = place_values(block, memory.components, memory.brick(brick));
-    if (norm) norms[i] = *norm;
-    return norm.has_value();
-  };
-  const auto make = [&](bool symmetric) {
-    memory_ = cubic_memory(bricks, symmetric ? TensorBrick::symmetric : TensorBrick::general);
-    return blocks_within(memory_, bricks);
-  };
-  const BrickMemory blocks = place_blocks(source, {make, widen_values, place});
-  trailing_offset_ = static_cast<std::size_t>(CubicBrick::trailing_offset(memory_.components));
-  const Coefficients coefficients{bricks, active, interpolant_.border, blocks};
-  continue_values(coefficients);
-  const std::vector<float> strongest = make_coefficients(coefficients, memory_);
-  keep_bricks(memory_, bricks.count);
-  expect_first_writes(memory_.floats.get(), memory_.bytes(), false);
-  bricks_.assign(bricks.places.begin(), bricks.places.begin() + static_cast<std::ptrdiff_t>(bricks.count));
-  index_ = BrickIndex(bricks_);
-  index_.set_values(strongest);
-  return *std::max_element(norms.begin(), norms.end());
+void TensorField::set_trailing_offset() {
+  trailing_offset_ = static_cast<std::size_t>(is_cubic() ? CubicBrick::trailing_offset(memory_.components)
+                                                         : TensorBrick::trailing_offset(memory_.components));
 }
 
 void TensorField::keep_with_bricks(std::shared_ptr<const void> other) {

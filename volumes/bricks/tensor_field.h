@@ -16,9 +16,6 @@
 
 namespace tensorray {
 
-struct BlockShare;
-struct BlockTable;
-
 /// 8³ cells, with the far apron that trilinear interpolation needs: 9³ voxels. All bricks without an active voxel share
 /// one brick of zeros. (A cubic field's bricks hold coefficients instead: see cubic_brick.h.)
 ///
@@ -137,8 +134,7 @@ class TensorField {
  private:
   static const float* const zeros;  // A brick of either kind.
 
-  double make_linear_bricks(const BlockTable& table, const Eigen::AlignedBox3i& active, const BlockSource& source);
-  double make_cubic_bricks(const BlockTable& table, const Eigen::AlignedBox3i& active, const BlockSource& source);
+  void set_trailing_offset();
   TensorBrick brick_at(const float* floats, float strongest) const {
     return {floats, floats + trailing_offset_, strongest, memory_.components};
   }

@@ -3,8 +3,9 @@
 #include <atomic>
 #include <cstddef>
 
+#include <tbb/parallel_for.h>
+
 #include "volumes/bricks/coefficients.h"
-#include "volumes/grids/page_memory.h"
 
 namespace tensorray {
 namespace {
@@ -19,7 +20,7 @@ constexpr float faded = 0.21132487f;
 /// The continuation to the voxel at `index`, if known voxels lead there: the mean of those along which most are known.
 std::optional<StoredTensor> continuation(const Vector3i& index, const Coefficients& field,
                                          const std::vector<VoxelMask>& known) {
-  const int longest = field.border == Border::extend ? 2 : 1;
+  const int longest = field.interpolant.border == Border::extend ? 2 : 1;
   int most = 1, count = 0;
   StoredTensor sum = StoredTensor::Zero();
   for (int direction = 0; direction < 6; ++direction) {
@@ -41,7 +42,7 @@ std::optional<StoredTensor> continuation(const Vector3i& index, const Coefficien
     ++count;
   }
   if (count == 0) return std::nullopt;
-  return StoredTensor(sum * ((field.border == Border::fade ? faded : 1.0f) / static_cast<float>(count)));
+  return StoredTensor(sum * ((field.interpolant.border == Border::fade ? faded : 1.0f) / static_cast<float>(count)));
 }
 
 /// Continues values to the voxels of a block that known ones lead to. @return the voxels that are known now.
@@ -65,12 +66,13 @@ VoxelMask continue_block(std::size_t block, const Coefficients& field, const std
 }  // namespace
 
 void continue_values(const Coefficients& field) {
+  if (field.interpolant.between == Interpolation::linear) return;
   // Each sweep leads one voxel further; those beside edges and corners are reached along one axis after the other. A
   // sweep reads only voxels that were known before it.
   std::vector<VoxelMask> known = field.bricks.active, next = known;
   for (std::atomic<bool> changed{true}; changed;) {
     changed = false;
-    for_blocks(field.bricks.places.size(), [&](std::size_t i) {
+    tbb::parallel_for(std::size_t{0}, field.bricks.places.size(), [&](std::size_t i) {
       if (known[i] == field.bricks.filled[i]) return;
       next[i] = continue_block(i, field, known);
       if (next[i] != known[i]) changed = true;

@@ -82,7 +82,7 @@ void read_leaf(const StoredLeaves& stored, const Leaf& leaf, typename Leaf::Valu
   const StoredLeaf& place = stored.leaves[leaf.transientData()];
   thread_local std::vector<char> bytes;
   bytes.resize(static_cast<std::size_t>(place.bytes));
-  if (!stored.file.read(place.at, bytes.data(), bytes.size()) || !is_same(place, stored.tree, bytes.data()))
+  if (!stored.file->read(place.at, bytes.data(), bytes.size()) || !is_same(place, stored.tree, bytes.data()))
     throw FormatError();
   ByteBuffer buffer(bytes);
   std::istream stream(&buffer);
@@ -130,7 +130,6 @@ void put_tree(const Tree& tree, const FieldGrid& grid, Block& block) {
   if (mask.none()) return;
   std::array<typename Leaf::ValueType, Leaf::SIZE> values;
   const Leaf* const leaf = tree.probeConstLeaf(origin);
-  if (leaf && !grid.file.stored) return put_all(mask, grid.entries, leaf->buffer().data(), block);
   if (leaf)
     read_leaf(*grid.file.stored, *leaf, values.data());
   else

@@ -7,10 +7,11 @@
 #include <stdexcept>
 #include <unordered_map>
 
+#include <tbb/parallel_for.h>
+
 #include "base/errors.h"
 #include "base/text/text.h"
 #include "volumes/files/grid_voxels.h"
-#include "volumes/grids/page_memory.h"
 #include "volumes/vdb/vdb_transform.h"
 #include "volumes/vdb/voxel_extent.h"
 
@@ -81,21 +82,11 @@ std::set<std::string> grid_names(const FieldGrids& field) {
   return names;
 }
 
-/// Checks that a field can be loaded within the bound of memory.
-void require_room_for(const std::vector<BlockShape>& shapes, bool derives) {
-  constexpr double voxel_bytes = 36, sample_bytes = 24, brick_part = 1.5, table_bytes = 700;
-  require_room((brick_part * voxel_bytes + (derives ? voxel_bytes + sample_bytes : 0)) *
-                   static_cast<double>(active_voxels(shapes)),
-               table_bytes * static_cast<double>(shapes.size()));
-}
-
 /// The tensors that are derived from the values of grids. All of them are in memory.
 BlockSource derived_source(const std::filesystem::path& path, const std::vector<FieldGrid>& grids, Derive derive,
                            const BlockSource& field) {
-  SampleBlocks samples;
-  SampleBlocks::allocator_type::prepare(field.shapes.size());
-  samples.resize(field.shapes.size());
-  for_blocks(samples.size(), [&](std::size_t i) {
+  SampleBlocks samples(field.shapes.size());
+  tbb::parallel_for(std::size_t{0}, samples.size(), [&](std::size_t i) {
     samples[i].origin = field.shapes[i].origin;
     samples[i].active = field.shapes[i].active;
     put_values(path, grids, samples[i]);
@@ -146,7 +137,6 @@ class RowGrid : public openvdb::Vec3SGrid {
   /// The format: the buffers of all leaves, in their order in the tree.
   void writeBuffers(std::ostream& file) const override {
     for (auto leaf = tree().cbeginLeaf(); leaf; ++leaf) {
-      make_room();
       filled(*blocks_.at(&*leaf)).writeBuffers(file, saveFloatAsHalf());
     }
   }
@@ -167,7 +157,7 @@ class RowGrid : public openvdb::Vec3SGrid {
 };
 
 void check_half_range(const std::filesystem::path& path, const TensorGrid& grid) {
-  for_blocks(grid.blocks.size(), [&](std::size_t i) {
+  tbb::parallel_for(std::size_t{0}, grid.blocks.size(), [&](std::size_t i) {
     for (const Eigen::Matrix3f& value : grid.blocks[i].values)
       if ((value.array().abs() > greatest_half).any())
         fail(path, "a component exceeds 65504, the greatest 16-bit float; write single precision or scale the field");
@@ -191,7 +181,6 @@ BlockSource open_tensor_vdb(const std::filesystem::path& path, const std::string
   try {
     result.shapes = find_blocks(path, grids, derives ? sizeof(SampleBlock) : least_brick_bytes);
     if (result.shapes.empty()) fail(path, "\"" + result.name + "\" has no active voxel");
-    require_room_for(result.shapes, derives);
     if (derives) return derived_source(path, grids, derive, result);
   } catch (const std::bad_alloc&) {
     fail_too_large(path, result.name);

@@ -3,7 +3,7 @@
 #include <memory>
 #include <utility>
 
-#include "volumes/grids/page_memory.h"
+#include <tbb/parallel_for.h>
 
 namespace tensorray {
 namespace {
@@ -40,7 +40,6 @@ void fill_block(TensorBlock& block, const std::function<Eigen::Matrix3d(const Ei
 }  // namespace
 
 void read_block(const BlockSource& source, std::size_t i, TensorBlock& block) {
-  make_room();
   block.origin = source.shapes[i].origin;
   block.active = source.shapes[i].active;
   if (!block.active.all()) block.values.fill(Eigen::Matrix3f::Zero());

@@ -25,7 +25,7 @@ struct BlockSource {
   std::function<void(std::size_t i, TensorBlock& block)> fill;
 };
 
-/// Empties `block`, and fills it with block i of `source`, after making room for it.
+/// Empties `block`, and fills it with block i of `source`.
 void read_block(const BlockSource& source, std::size_t i, TensorBlock& block);
 
 /// A dense grid: `value(index)` at every index of `box` (inclusive), all active. `value` may be called from several

@@ -1,7 +1,7 @@
 #include "volumes/grids/brick_memory.h"
 
-#include <algorithm>
 #include <atomic>
+#include <stdexcept>
 #include <utility>
 
 #include <tbb/blocked_range.h>
@@ -12,21 +12,11 @@
 namespace tensorray {
 namespace {
 
-/// Number of blocks that are placed before all threads wait; enough to keep them busy.
-constexpr std::size_t part_size = 4096;
-
-/// Number of blocks that a thread places in a row. Neighbours along z share bricks.
+/// Number of blocks that a thread places in a row.
 constexpr std::size_t grain = 16;
 
 std::shared_ptr<float[]> owned_pages(void* pages, std::size_t bytes) {
   return {static_cast<float*>(pages), [bytes](float* floats) { unmap_pages(floats, bytes); }};
-}
-
-/// The same bricks with tensors of any kind. `keep`: with the tensors that they hold.
-BrickMemory widened(const BrickMemory& narrow, const BlockPlaces& places, bool keep) {
-  BrickMemory wide = places.make(false);
-  if (keep) for_blocks(narrow.count, [&](std::size_t i) { places.widen(narrow.brick(i), wide.brick(i)); });
-  return wide;
 }
 
 }  // namespace
@@ -36,21 +26,15 @@ BrickMemory make_bricks(std::size_t count, int stored_floats, int components) {
   bricks.count = count;
   bricks.stride = static_cast<std::size_t>(stored_floats);
   bricks.components = components;
-  constexpr std::size_t alignment = 4096;
-  const std::size_t bytes = bricks.bytes();
-  if (memory_bound()) {
-    bricks.file = std::make_shared<const Descriptor>(make_page_file(bytes));
-    bricks.floats = owned_pages(map_page_file(*bricks.file, bytes, true), bytes);
-  } else {
-    bricks.floats = owned_pages(map_pages(bytes, alignment), bytes);
-  }
-  expect_first_writes(bricks.floats.get(), bytes, true);
+  Descriptor file;
+  bricks.floats = owned_pages(map_pages(bricks.bytes(), &file), bricks.bytes());
+  if (file.is_open()) bricks.file = std::make_shared<const Descriptor>(std::move(file));
   return bricks;
 }
 
 BrickMemory bricks_of_file(Descriptor file, std::size_t count, std::size_t stride, int components) {
   BrickMemory bricks{{}, count, stride, components, std::make_shared<const Descriptor>(std::move(file))};
-  bricks.floats = owned_pages(map_page_file(*bricks.file, bricks.bytes(), false), bricks.bytes());
+  bricks.floats = owned_pages(map_file(*bricks.file, bricks.bytes()), bricks.bytes());
   return bricks;
 }
 
@@ -59,27 +43,23 @@ void keep_bricks(BrickMemory& bricks, std::size_t count) {
   bricks.count = count;
 }
 
-BrickMemory place_blocks(const BlockSource& source, const BlockPlaces& places) {
-  BrickMemory bricks = places.make(true);
-  std::atomic<bool> fits{true};
-  const auto place_part = [&](const tbb::blocked_range<std::size_t>& range) {
-    TensorBlock block;
-    for (std::size_t i = range.begin(); i < range.end() && fits; ++i) {
-      read_block(source, i, block);
-      if (!places.place(i, block, bricks)) fits = false;
-    }
-  };
-  const std::size_t count = source.shapes.size();
-  for (std::size_t first = 0; first < count; first += part_size) {
-    const tbb::blocked_range<std::size_t> part(first, std::min(first + part_size, count), grain);
-    tbb::parallel_for(part, place_part);
-    if (fits) continue;
-    bricks = widened(bricks, places, first > 0);
-    fits = true;
-    tbb::parallel_for(part, place_part);  // It was not placed whole.
+BrickMemory place_blocks(
+    const BlockSource& source, const std::function<BrickMemory(bool symmetric)>& make,
+    const std::function<bool(std::size_t i, const TensorBlock& block, const BrickMemory& blocks)>& place) {
+  for (const bool symmetric : {true, false}) {
+    const BrickMemory blocks = make(symmetric);
+    std::atomic<bool> fits{true};
+    const tbb::blocked_range<std::size_t> all(0, source.shapes.size(), grain);
+    tbb::parallel_for(all, [&](const tbb::blocked_range<std::size_t>& range) {
+      TensorBlock block;
+      for (std::size_t i = range.begin(); i < range.end() && fits; ++i) {
+        read_block(source, i, block);
+        if (!place(i, block, blocks)) fits = false;
+      }
+    });
+    if (fits) return blocks;
   }
-  expect_first_writes(bricks.floats.get(), bricks.bytes(), false);
-  return bricks;
+  throw std::logic_error("a block has no place");  // Any tensors fit the second time.
 }
 
 }  // namespace tensorray

@@ -23,27 +23,22 @@ struct BrickMemory {
 };
 
 /// Bricks of zeros. They use large pages where the system has them, because rays visit bricks that are far apart in
-/// memory. The first writes are expected (`expect_first_writes`). @throw as map_pages.
+/// memory. @throw as map_pages.
 BrickMemory make_bricks(std::size_t count, int stored_floats, int components);
 
-/// The bricks that another process has made in a file, to be read only. Memory has a bound. @throw std::bad_alloc.
+/// The bricks at the beginning of a file, to be read only. @throw std::bad_alloc.
 BrickMemory bricks_of_file(Descriptor file, std::size_t count, std::size_t stride, int components);
 
-/// Frees the pages of all bricks but the first ones; pages of a file stay until all are freed.
+/// Frees the pages of all bricks but the first ones.
 void keep_bricks(BrickMemory& bricks, std::size_t count);
 
-/// What blocks are placed in.
-struct BlockPlaces {
-  /// Makes bricks of zeros, for symmetric tensors or for any.
-  std::function<BrickMemory(bool symmetric)> make;
-  /// Copies a brick of symmetric tensors to one of tensors of any kind.
-  void (*widen)(const float* symmetric, float* general);
-  /// Places block i. @return false, and leaves the bricks as they are, if they do not have enough components.
-  std::function<bool(std::size_t i, const TensorBlock& block, const BrickMemory& bricks)> place;
-};
-
-/// Reads each block once, on all threads, and places it. The bricks store symmetric tensors until the first block comes
-/// that has others. @throw what `places` and `source` throw.
-BrickMemory place_blocks(const BlockSource& source, const BlockPlaces& places);
+/// Reads each block once, on all threads, and places it: first where tensors are symmetric; once more, where they are
+/// any, if some block has others.
+/// @param make   Makes what blocks are placed in, for symmetric tensors or for any.
+/// @param place  Places block i. @return false if the tensors are not symmetric, as those of `blocks` must be.
+/// @throw what these and `source` throw.
+BrickMemory place_blocks(
+    const BlockSource& source, const std::function<BrickMemory(bool symmetric)>& make,
+    const std::function<bool(std::size_t i, const TensorBlock& block, const BrickMemory& blocks)>& place);
 
 }  // namespace tensorray

@@ -4,8 +4,9 @@
 #include <atomic>
 #include <cmath>
 
+#include <tbb/parallel_for.h>
+
 #include "volumes/grids/block_source.h"
-#include "volumes/grids/page_memory.h"
 
 namespace tensorray {
 namespace {
@@ -19,7 +20,6 @@ bool has_only_finite(const TensorBlock& block) {
 }  // namespace
 
 TensorBlocks unset_blocks(std::size_t count) {
-  SlotAllocator<TensorBlock>::prepare(count);
   TensorBlocks blocks;
   for (std::size_t i = 0; i < count; ++i) blocks.emplace_back(TensorBlock::Unset());
   return blocks;
@@ -27,7 +27,7 @@ TensorBlocks unset_blocks(std::size_t count) {
 
 TensorBlocks make_blocks(std::size_t count) {
   TensorBlocks blocks = unset_blocks(count);
-  for_blocks(count, [&](std::size_t i) { blocks[i].values.fill(Eigen::Matrix3f::Zero()); });
+  tbb::parallel_for(std::size_t{0}, count, [&](std::size_t i) { blocks[i].values.fill(Eigen::Matrix3f::Zero()); });
   return blocks;
 }
 
@@ -54,7 +54,9 @@ Eigen::AlignedBox3i active_box(const std::vector<BlockShape>& shapes) {
 
 std::vector<BlockShape> TensorGrid::shapes() const {
   std::vector<BlockShape> result(blocks.size());
-  for_blocks(blocks.size(), [&](std::size_t i) { result[i] = {blocks[i].origin, blocks[i].active}; });
+  tbb::parallel_for(std::size_t{0}, blocks.size(), [&](std::size_t i) {
+    result[i] = {blocks[i].origin, blocks[i].active};
+  });
   return result;
 }
 
@@ -75,16 +77,14 @@ std::size_t remove_non_finite(TensorBlock& block) {
 }
 
 void remove_empty_blocks(TensorGrid& grid) {
-  const auto is_empty = [](const TensorBlock& block) {
-    make_room();
-    return block.active.none();
-  };
+  const auto is_empty = [](const TensorBlock& block) { return block.active.none(); };
   grid.blocks.erase(std::remove_if(grid.blocks.begin(), grid.blocks.end(), is_empty), grid.blocks.end());
 }
 
 std::size_t remove_non_finite(TensorGrid& grid) {
   std::atomic<std::size_t> removed{0};
-  for_blocks(grid.blocks.size(), [&](std::size_t i) { removed += remove_non_finite(grid.blocks[i]); });
+  tbb::parallel_for(std::size_t{0}, grid.blocks.size(),
+                    [&](std::size_t i) { removed += remove_non_finite(grid.blocks[i]); });
   remove_empty_blocks(grid);
   return removed;
 }
@@ -111,7 +111,7 @@ AsymmetrySums asymmetry_sums(const TensorBlock& block) {
 
 double asymmetry(const TensorGrid& grid) {
   std::vector<AsymmetrySums> blocks(grid.blocks.size());
-  for_blocks(blocks.size(), [&](std::size_t i) { blocks[i] = asymmetry_sums(grid.blocks[i]); });
+  tbb::parallel_for(std::size_t{0}, blocks.size(), [&](std::size_t i) { blocks[i] = asymmetry_sums(grid.blocks[i]); });
   AsymmetrySums all;  // Summed in the order of the blocks: the result does not depend on the number of threads.
   for (const AsymmetrySums& block : blocks) all.add(block);
   return all.asymmetry();

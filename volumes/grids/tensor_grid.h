@@ -49,10 +49,9 @@ std::size_t active_voxels(const std::vector<BlockShape>& shapes);
 /// Index box from the least to the greatest active voxel; isEmpty() where there is none.
 Eigen::AlignedBox3i active_box(const std::vector<BlockShape>& shapes);
 
-/// A deque, so that blocks can be freed one by one while something else is made from them.
 using TensorBlocks = std::deque<TensorBlock, SlotAllocator<TensorBlock>>;
 
-/// `count` blocks without active voxels; `unset_blocks`: blocks whose values are not set. Run on all threads.
+/// `count` blocks without active voxels; `unset_blocks`: blocks whose values are not set.
 TensorBlocks make_blocks(std::size_t count);
 TensorBlocks unset_blocks(std::size_t count);
 

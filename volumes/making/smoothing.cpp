@@ -11,8 +11,6 @@
 
 #include <tbb/parallel_for.h>
 
-#include "volumes/grids/page_memory.h"
-
 namespace tensorray {
 namespace {
 
@@ -189,7 +187,6 @@ class TileSmoothing {
                               Vector3i(box_.max().x(), reach_.max().y(), reach_.max().z())));
     Component component;
     for (std::size_t i : sources_) {
-      make_room();
       fill(i, component);
       add_block(component, box_of(shapes_[i].origin, TensorBlock::size), kernel_, sums);
     }

@@ -7,8 +7,8 @@
 #include <vector>
 
 #include <Eigen/Eigenvalues>
+#include <tbb/parallel_for.h>
 
-#include "volumes/grids/page_memory.h"
 #include "volumes/tensors/eigenvalue_vectors.h"
 
 namespace tensorray {
@@ -215,7 +215,8 @@ EigenvalueReport apply_eigenvalues(TensorGrid& grid, Eigenvalues mode) {
   const Eigenvalues chosen = mode == Eigenvalues::automatic ? automatic_choice(asymmetry(grid)) : mode;
   if (chosen == Eigenvalues::raw) return report_of({}, chosen);
   std::vector<EigenvalueSums> blocks(grid.blocks.size());
-  for_blocks(blocks.size(), [&](std::size_t i) { blocks[i] = apply_eigenvalues(grid.blocks[i], chosen); });
+  tbb::parallel_for(std::size_t{0}, blocks.size(),
+                    [&](std::size_t i) { blocks[i] = apply_eigenvalues(grid.blocks[i], chosen); });
   EigenvalueSums all;  // Summed in the order of the blocks, so that the number of threads does not matter.
   for (const EigenvalueSums& block : blocks) all.add(block);
   return report_of(all, chosen);

@@ -4,7 +4,7 @@
 #include <array>
 #include <tuple>
 
-#include "volumes/grids/page_memory.h"
+#include <tbb/parallel_for.h>
 
 namespace tensorray {
 namespace {
@@ -150,7 +150,7 @@ Matrix3d hessian_at(const Neighbourhood& near, const Vector3i& position, const M
 template <class TensorAt>
 TensorBlocks derive(const SampleBlocks& blocks, const Matrix3d& to_index, const TensorAt& tensor_at) {
   TensorBlocks result = make_blocks(blocks.size());
-  for_blocks(blocks.size(), [&](std::size_t i) {
+  tbb::parallel_for(std::size_t{0}, blocks.size(), [&](std::size_t i) {
     const Neighbourhood near(blocks, blocks[i].origin);
     result[i].origin = blocks[i].origin;
     result[i].active = blocks[i].active;

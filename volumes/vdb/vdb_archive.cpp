@@ -22,7 +22,6 @@
 #include "base/text/byte_order.h"
 #include "base/text/content_hash.h"
 #include "base/text/text.h"
-#include "volumes/grids/page_memory.h"
 #include "volumes/vdb/vdb_tree_check.h"
 
 namespace tensorray {
@@ -49,7 +48,7 @@ StoredTree stored_tree(const openvdb::io::GridDescriptor& descriptor, std::uint3
   return tree;
 }
 
-/// Reads the table of grids itself. GridDescriptor::read refuses the whole file if one grid has an unknown type.
+/// Reads the table of grids itself: GridDescriptor::read refuses the whole file if one grid has an unknown type.
 class Reader : private openvdb::io::Archive {
  public:
   explicit Reader(const std::filesystem::path& path) : path_(path), buffer_(stream_buffer) {
@@ -61,45 +60,42 @@ class Reader : private openvdb::io::Archive {
     if (!in_) fail(path, "cannot be opened: " + std::generic_category().message(errno) + "; check the path");
     in_.exceptions(any_failure);
     size_ = static_cast<std::int64_t>(std::filesystem::file_size(path));
+    read_file_header();
   }
 
   VdbFile read(const std::set<std::string>& wanted) {
     VdbFile file;
-    read_file_header();
-    check_lengths(in_.tellg(), 0);
-    file.metadata.readMeta(in_);
+    file.metadata = read_metadata();
     const std::int32_t count = readGridCount(in_);
     std::vector<openvdb::io::GridDescriptor> table;
-    std::map<std::string, ReadGrid> grids;
+    std::map<std::string, VdbGrid> grids;  // By the names in the file.
     for (std::int32_t i = 0; i < count; ++i) {
       table.push_back(read_descriptor());
       if (inputHasGridOffsets())
         skip(table.back());
       else  // Written as a stream: only reading a grid tells where it ends.
-        grids[table.back().uniqueName()] = read_one(table.back());
+        grids[table.back().uniqueName()] = read_grid(table.back());
     }
-    if (inputHasGridOffsets()) read_wanted(table, wanted, grids);
+    if (inputHasGridOffsets()) grids = read_wanted(table, wanted);
     for (const auto& descriptor : table) {
-      const std::string name = openvdb::io::GridDescriptor::nameAsString(descriptor.uniqueName());
-      file.grids.push_back({name, descriptor.gridType(), descriptor.saveFloatAsHalf(), nullptr, nullptr});
-      if (!wanted.count(name)) continue;
-      ReadGrid& read = grids.at(descriptor.uniqueName());
-      if (descriptor.isInstance()) {
-        const ReadGrid& parent = grids.at(descriptor.instanceParentName());
-        read.grid->setTree(parent.grid->baseTreePtr());
-        read.stored = parent.stored;
+      VdbGrid grid = wanted.count(name_of(descriptor)) ? grids.at(descriptor.uniqueName()) : VdbGrid();
+      grid.name = name_of(descriptor);
+      grid.type = descriptor.gridType();
+      grid.half = descriptor.saveFloatAsHalf();
+      if (grid.grid && descriptor.isInstance()) {
+        const VdbGrid& parent = grids.at(descriptor.instanceParentName());
+        grid.grid->setTree(parent.grid->baseTreePtr());
+        grid.stored = parent.stored;
       }
-      file.grids.back().grid = read.grid;
-      file.grids.back().stored = read.stored;
+      file.grids.push_back(std::move(grid));
     }
     return file;
   }
 
  private:
-  struct ReadGrid {
-    openvdb::GridBase::Ptr grid;
-    std::shared_ptr<const StoredLeaves> stored;  // As in VdbGrid.
-  };
+  static std::string name_of(const openvdb::io::GridDescriptor& descriptor) {
+    return openvdb::io::GridDescriptor::nameAsString(descriptor.uniqueName());
+  }
 
   template <class Number>
   Number read_stored() {
@@ -111,8 +107,11 @@ class Reader : private openvdb::io::Archive {
   void read_file_header() {
     if (size_ < version_offset + 4 || read_stored<std::int64_t>() != openvdb::OPENVDB_MAGIC)
       fail(path_, "is not an OpenVDB file; `tensorray import` makes one of other programs' files");
-    if (read_stored<std::uint32_t>() > openvdb::OPENVDB_FILE_VERSION)
+    const auto version = read_stored<std::uint32_t>();
+    if (version > openvdb::OPENVDB_FILE_VERSION)
       fail(path_, "was written by a newer OpenVDB than this program has; write it in an older format");
+    if (version < openvdb::OPENVDB_FILE_VERSION_NODE_MASK_COMPRESSION)
+      fail(path_, "was written by OpenVDB 2 or older; write it again with a newer one");
     in_.seekg(0);
     readHeader(in_);
     setFormatVersion(in_);
@@ -120,6 +119,8 @@ class Reader : private openvdb::io::Archive {
     setDataCompression(in_);
   }
 
+  /// The length of what follows. OpenVDB allocates and fills as many bytes as a length says, up to 4 GB, before it
+  /// reads.
   std::uint32_t read_length() {
     const std::uint32_t length = read_stored<std::uint32_t>();
     if (length > size_ - in_.tellg()) fail_damaged(path_, "");
@@ -128,38 +129,37 @@ class Reader : private openvdb::io::Archive {
 
   std::string read_string() {
     std::string text(read_length(), ' ');
-    in_.read(&text[0], static_cast<std::streamsize>(text.size()));
+    in_.read(text.data(), static_cast<std::streamsize>(text.size()));
     return text;
   }
 
-  /// Whether the metadata at `start` and the `strings` strings after them fit in the file. OpenVDB allocates and
-  /// fills as many bytes as a length says, up to 4 GB, before it reads. Restores the stream's position.
-  void check_lengths(std::streamoff start, int strings) {
-    const std::streamoff before = in_.tellg();
-    in_.seekg(start);
-    const auto skip_string = [&] { in_.seekg(read_length(), std::ios::cur); };
+  /// As MetaMap::readMeta, but for OpenVDB's table of leaves, which it unpacks whatever its lengths are.
+  openvdb::MetaMap read_metadata() {
+    openvdb::MetaMap metadata;
     for (std::uint32_t left = read_stored<std::uint32_t>(); left > 0; --left) {
-      skip_string();  // Skips the name.
-      if (read_string() == openvdb::io::DelayedLoadMetadata::staticTypeName()) {
-        const std::string value = read_string();
-        if (!delayed_load_fits(value, size_)) fail_damaged(path_, "");
-      } else {
-        skip_string();
+      const std::string name = read_string(), type = read_string();
+      const std::streamoff value = in_.tellg(), end = value + 4 + static_cast<std::streamoff>(read_length());
+      if (type != openvdb::io::DelayedLoadMetadata::staticTypeName()) {
+        const openvdb::Metadata::Ptr read = openvdb::Metadata::isRegisteredType(type)
+                                                ? openvdb::Metadata::createMetadata(type)
+                                                : std::make_shared<openvdb::UnknownMetadata>(type);
+        in_.seekg(value);
+        read->read(in_);
+        metadata.insertMeta(name, *read);
       }
+      in_.seekg(end);
     }
-    for (int i = 0; i < strings; ++i) skip_string();
-    in_.seekg(before);
+    return metadata;
   }
 
   openvdb::io::GridDescriptor read_descriptor() {
     static const std::string half_suffix = "_HalfFloat";
     const std::string name = read_string();
     std::string type = read_string();
-    const bool half = type.size() > half_suffix.size() &&
-                      type.compare(type.size() - half_suffix.size(), half_suffix.size(), half_suffix) == 0;
+    const bool half = ends_with(type, half_suffix);
     if (half) type.resize(type.size() - half_suffix.size());
     openvdb::io::GridDescriptor descriptor(name, type, half);
-    if (fileVersion() >= openvdb::OPENVDB_FILE_VERSION_GRID_INSTANCING) descriptor.setInstanceParentName(read_string());
+    descriptor.setInstanceParentName(read_string());
     descriptor.setGridPos(read_stored<std::int64_t>());
     descriptor.setBlockPos(read_stored<std::int64_t>());
     descriptor.setEndPos(read_stored<std::int64_t>());
@@ -173,39 +173,31 @@ class Reader : private openvdb::io::Archive {
     descriptor.seekToEnd(in_);
   }
 
-  /// Reads the grid that begins at the stream's position, and goes behind it.
-  ReadGrid read_one(const openvdb::io::GridDescriptor& descriptor) {
-    check_lengths(in_.tellg() + std::streamoff(has_node_compression() ? 4 : 0),
-                  1);  // The transform's type is a string.
-    ReadGrid read{openvdb::GridBase::createGrid(descriptor.gridType()), nullptr};
-    read.grid->setSaveFloatAsHalf(descriptor.saveFloatAsHalf());
-    if (has_node_compression() && !descriptor.isInstance() && value_size(descriptor.gridType())) {
-      read.stored = read_topology(descriptor, *read.grid);
-      return read;
-    }
-    if (!has_node_compression() && memory_bound())
-      fail(path_, "is of OpenVDB 2, which --memory cannot read in parts; write it again with this program");
-    readGrid(read.grid, descriptor, in_);
-    return read;
-  }
-
-  bool has_node_compression() const { return fileVersion() >= openvdb::OPENVDB_FILE_VERSION_NODE_MASK_COMPRESSION; }
-
-  /// Reads a grid whose leaves keep their values in the file.
-  std::shared_ptr<const StoredLeaves> read_topology(const openvdb::io::GridDescriptor& descriptor,
-                                                    openvdb::GridBase& grid) {
+  /// Reads the grid that begins at the stream's position, without the values of its leaves, and goes behind it.
+  VdbGrid read_grid(const openvdb::io::GridDescriptor& descriptor) {
     readGridCompression(in_);
-    const std::uint32_t compression = openvdb::io::getDataCompression(in_);
-    grid.readMeta(in_);
-    grid.setSaveFloatAsHalf(descriptor.saveFloatAsHalf());  // Whatever its metadata say.
-    grid.readTransform(in_);
-    const auto stored = std::make_shared<StoredLeaves>(
-        StoredLeaves{FileBytes(path_), stored_tree(descriptor, compression), compression, {}});
-    if (!tree_fits(stored->file, in_.tellg(), stored->tree, stored->leaves)) fail_damaged(path_, "");
-    grid.readTopology(in_);
-    number_leaves(grid, stored->leaves);
+    VdbGrid read;
+    if (!value_size(descriptor.gridType()))
+      fail(path_,
+           "grid " + name_of(descriptor) + " is a " + descriptor.gridType() + ", which cannot be read; leave it out");
+    read.grid = openvdb::GridBase::createGrid(descriptor.gridType());
+    static_cast<openvdb::MetaMap&>(*read.grid) = read_metadata();
+    read.grid->setSaveFloatAsHalf(descriptor.saveFloatAsHalf());  // Whatever its metadata say.
+    const std::streamoff transform = in_.tellg();
+    read_length();  // The transform's type is a string.
+    in_.seekg(transform);
+    read.grid->readTransform(in_);
+    if (descriptor.isInstance()) return read;
+    const auto stored = std::make_shared<StoredLeaves>();
+    stored->file.emplace(path_);
+    stored->compression = openvdb::io::getDataCompression(in_);
+    stored->tree = stored_tree(descriptor, stored->compression);
+    if (!tree_fits(*stored->file, in_.tellg(), stored->tree, stored->leaves)) fail_damaged(path_, "");
+    read.grid->readTopology(in_);
+    number_leaves(*read.grid, stored->leaves);
     if (!stored->leaves.empty()) in_.seekg(stored->leaves.back().at + stored->leaves.back().bytes);
-    return stored;
+    read.stored = stored;
+    return read;
   }
 
   /// The file has the leaves in the order of the tree, unless it is damaged.
@@ -221,24 +213,25 @@ class Reader : private openvdb::io::Archive {
   }
 
   /// Reads the wanted grids, and the grids whose trees they share, in parallel. Each grid has its own stream.
-  void read_wanted(const std::vector<openvdb::io::GridDescriptor>& table, const std::set<std::string>& wanted,
-                   std::map<std::string, ReadGrid>& grids) {
+  std::map<std::string, VdbGrid> read_wanted(const std::vector<openvdb::io::GridDescriptor>& table,
+                                             const std::set<std::string>& wanted) {
     std::set<std::string> needed;
     for (const auto& descriptor : table) {
-      if (!wanted.count(openvdb::io::GridDescriptor::nameAsString(descriptor.uniqueName()))) continue;
+      if (!wanted.count(name_of(descriptor))) continue;
       needed.insert(descriptor.uniqueName());
       if (descriptor.isInstance()) needed.insert(descriptor.instanceParentName());
     }
-    std::vector<std::pair<const openvdb::io::GridDescriptor*, ReadGrid>> read;
+    std::vector<std::pair<const openvdb::io::GridDescriptor*, VdbGrid>> read;
     for (const auto& descriptor : table)
-      if (needed.count(descriptor.uniqueName())) read.emplace_back(&descriptor, ReadGrid());
+      if (needed.count(descriptor.uniqueName())) read.emplace_back(&descriptor, VdbGrid());
     tbb::parallel_for(std::size_t{0}, read.size(), [&](std::size_t i) {
       Reader reader(path_);
-      reader.read_file_header();
       read[i].first->seekToGrid(reader.in_);
-      read[i].second = reader.read_one(*read[i].first);
+      read[i].second = reader.read_grid(*read[i].first);
     });
+    std::map<std::string, VdbGrid> grids;
     for (const auto& [descriptor, grid] : read) grids[descriptor->uniqueName()] = grid;
+    return grids;
   }
 
   std::filesystem::path path_;
@@ -247,31 +240,8 @@ class Reader : private openvdb::io::Archive {
   std::int64_t size_ = 0;
 };
 
-/// The table of a grid's leaves. Their lengths are known when they are written; this only makes room for them, and says
-/// where it is.
-class LeafTableRoom : public openvdb::io::DelayedLoadMetadata {
- public:
-  LeafTableRoom(const StoredTree& tree, std::size_t leaves, std::streamoff& at)
-      : at_(&at), text_(delayed_load_text(tree, std::vector<StoredLeaf>(leaves))) {}
-
-  openvdb::Metadata::Ptr copy() const override { return std::make_shared<LeafTableRoom>(*this); }
-  openvdb::Index32 size() const override { return static_cast<openvdb::Index32>(text_.size()); }
-
- protected:
-  void writeValue(std::ostream& file) const override {
-    *at_ = file.tellp();
-    file << text_;
-  }
-
- private:
-  std::streamoff* at_;
-  std::string text_;
-};
-
 class Writer : private openvdb::io::Archive {
  public:
-  explicit Writer(const std::filesystem::path& path) : path_(path) {}
-
   void write_file(std::fstream& file, const openvdb::GridPtrVec& grids, const openvdb::MetaMap& metadata) {
     auto stream_metadata = std::make_shared<openvdb::io::StreamMetadata>();
     openvdb::io::setStreamMetadataPtr(file, stream_metadata, /*transfer=*/false);
@@ -285,8 +255,8 @@ class Writer : private openvdb::io::Archive {
   }
 
  private:
-  /// As Archive::writeGrid, which compresses values twice, because it writes the table of leaves first; for that, all
-  /// values must be in memory.
+  /// As Archive::writeGrid, but without a table of leaves: for that, all values must be in memory, and are compressed
+  /// twice.
   void write_grid(std::ostream& file, openvdb::GridBase& grid) const {
     openvdb::io::GridDescriptor descriptor(grid.getName(), grid.type(), grid.saveFloatAsHalf());
     descriptor.writeHeader(file);
@@ -297,27 +267,12 @@ class Writer : private openvdb::io::Archive {
     grid.addStatsMetadata();
     const std::string compressed = openvdb::io::compressionToString(openvdb::io::getDataCompression(file));
     grid.insertMeta(openvdb::GridBase::META_FILE_COMPRESSION, openvdb::StringMetadata(compressed));
-    std::streamoff table = 0;
-    const bool has_table = value_size(grid.type()).has_value();
-    const StoredTree tree = stored_tree(descriptor, openvdb::io::getDataCompression(file));
-    if (has_table)
-      grid.insertMeta(openvdb::GridBase::META_FILE_DELAYED_LOAD,
-                      LeafTableRoom(tree, grid.constBaseTree().leafCount(), table));
     grid.writeMeta(file);
-    grid.removeMeta(openvdb::GridBase::META_FILE_DELAYED_LOAD);
     grid.writeTransform(file);
-    const std::streamoff topology = file.tellp();
     grid.writeTopology(file);
     descriptor.setBlockPos(file.tellp());
     grid.writeBuffers(file);
     descriptor.setEndPos(file.tellp());
-    if (has_table) {
-      file.flush();
-      std::vector<StoredLeaf> written;
-      if (!tree_fits(FileBytes(path_), topology, tree, written)) throw std::ios_base::failure("leaves");
-      file.seekp(table);
-      file << delayed_load_text(tree, written);
-    }
     file.seekp(positions);
     descriptor.writeStreamPos(file);
     descriptor.seekToEnd(file);
@@ -348,8 +303,6 @@ class Writer : private openvdb::io::Archive {
     file.seekp(tag_offset);
     file.write(tag.data(), static_cast<std::streamsize>(tag.size()));
   }
-
-  const std::filesystem::path& path_;
 };
 
 }  // namespace
@@ -380,7 +333,7 @@ void write_vdb(const std::filesystem::path& path, const openvdb::GridPtrVec& gri
   try {
     file.exceptions(any_failure);
     file.open(path, std::ios::in | std::ios::out | std::ios::binary | std::ios::trunc);
-    Writer(path).write_file(file, grids, metadata);
+    Writer().write_file(file, grids, metadata);
     file.close();
   } catch (const std::ios_base::failure&) {
     fail(path, "cannot be written: " + (errno ? std::generic_category().message(errno) : "the write failed"));

@@ -4,14 +4,14 @@
 /// not check the state of its stream, so that it reads uncompressed files cut short as if they were whole, and it
 /// trusts the lengths in damaged trees, which may end the process. vdb_tree_check.h checks the lengths first.
 /// Not detected: changed bytes within voxel values or active masks where all lengths still fit, because the format
-/// has no checksum. Not checked: lengths in files older than format 222 (OpenVDB 3), and, in files without a table of
-/// grids, lengths in trees of types that this program does not read.
+/// has no checksum. Files older than format 222 (OpenVDB 3) are refused: their lengths are not checked.
 /// Only .cpp files of this folder that use OpenVDB themselves include this header: it includes all of OpenVDB.
 
 #include <bitset>
 #include <cstdint>
 #include <filesystem>
 #include <memory>
+#include <optional>
 #include <set>
 #include <string>
 #include <vector>
@@ -30,7 +30,7 @@ using FieldGridTypes =
 
 /// Where a file has the values of a tree's leaves.
 struct StoredLeaves {
-  FileBytes file;
+  std::optional<FileBytes> file;
   StoredTree tree;
   std::uint32_t compression = 0;   ///< OpenVDB's flags.
   std::vector<StoredLeaf> leaves;  ///< Leaf i is that of the tree whose transientData() is i.
@@ -41,8 +41,8 @@ struct VdbGrid {
   std::string name;                            ///< Unique in the file: the second of two grids "T" is "T[1]".
   std::string type;                            ///< Type of the tree: "Tree_vec3s_5_4_3".
   bool half = false;                           ///< The file stores 16-bit floats.
-  openvdb::GridBase::Ptr grid;                 ///< Null unless the caller asked for it.
-  std::shared_ptr<const StoredLeaves> stored;  ///< The leaves of `grid` have masks, but no values. Null: they have.
+  openvdb::GridBase::Ptr grid;                 ///< Null unless the caller asked for it. Its leaves have no values.
+  std::shared_ptr<const StoredLeaves> stored;  ///< The values.
 };
 
 struct VdbFile {
@@ -50,8 +50,7 @@ struct VdbFile {
   std::vector<VdbGrid> grids;  ///< All grids, in the file's order.
 };
 
-/// Reads the table of grids. Also reads the grids whose names are in `wanted`; the values of leaves stay in the file,
-/// unless it is of OpenVDB 2, or the grid of another type than tree_fits checks.
+/// Reads the table of grids. Also reads the grids whose names are in `wanted`; the values of leaves stay in the file.
 /// @throw std::runtime_error, one line that names the file and the fix: missing, not a VDB, truncated, damaged.
 VdbFile read_vdb(const std::filesystem::path& path, const std::set<std::string>& wanted = {});
 

@@ -148,51 +148,9 @@ std::optional<ValueSize> value_size(const std::string& type) {
   return found == sizes.end() ? std::nullopt : std::optional(found->second);
 }
 
-bool delayed_load_fits(const std::string& value, std::int64_t file_size) {
-  // The format: the number of leaves; one byte for each leaf; eight bytes for each leaf's length. A length precedes
-  // each of the two lists, which is packed if that length is not 0.
-  std::size_t at = 4;
-  const auto number = [&](std::size_t offset) {
-    return offset + 4 > value.size() ? 0 : read_number<std::uint32_t>(value.data() + offset, ByteOrder::little);
-  };
-  const std::int64_t leaves = number(0);
-  if (leaves > file_size / 64) return false;  // A leaf has a mask of 64 bytes.
-  for (const std::int64_t bytes_each : {1, 8}) {
-    constexpr std::int64_t rounding = 1 << 16;
-    constexpr std::uint32_t absent = 0xffffffff;
-    const std::uint32_t stored = number(at);
-    at += 4;
-    if (stored == absent) continue;
-    if (stored == 0) {
-      at += static_cast<std::size_t>(leaves * bytes_each);
-      continue;
-    }
-    if (stored < blosc_header || at + stored > value.size()) return false;
-    const std::int64_t unpacked = number(at + 4);
-    if (unpacked > leaves * bytes_each + rounding || !blosc_fits(value.data() + at, stored, unpacked)) return false;
-    at += stored;
-  }
-  return true;
-}
-
-std::string delayed_load_text(const StoredTree& tree, const std::vector<StoredLeaf>& leaves) {
-  const ValueSize size = value_size(tree.type).value();
-  std::string text;
-  constexpr std::uint32_t not_packed = 0;
-  append_number(static_cast<std::uint32_t>(leaves.size()), ByteOrder::little, text);
-  append_number(not_packed, ByteOrder::little, text);
-  for (const StoredLeaf& leaf : leaves) text += static_cast<char>(leaf.flag);
-  append_number(not_packed, ByteOrder::little, text);
-  for (const StoredLeaf& leaf : leaves)
-    append_number(leaf.bytes - bytes_before_chunk(leaf.flag, size), ByteOrder::little, text);
-  return text;
-}
-
 bool tree_fits(const FileBytes& file, std::int64_t at, const StoredTree& tree, std::vector<StoredLeaf>& leaves) {
-  const std::optional<ValueSize> size = value_size(tree.type);
-  if (!size) return true;
   try {
-    leaves = TreeParser(file, at, tree, *size).leaves();
+    leaves = TreeParser(file, at, tree, value_size(tree.type).value()).leaves();
     return true;
   } catch (const FormatError&) {
     return false;

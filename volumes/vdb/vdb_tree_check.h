@@ -33,8 +33,7 @@ struct StoredLeaf {
 };
 
 /// Reads through a tree whose topology begins at position `at`, and through the values that follow it. Only for files
-/// of OpenVDB 3 (format 222) and later. It accepts without a check trees of other types than float, double, vec3s and
-/// vec3d with nodes of 5, 4 and 3, and finds no leaves in them.
+/// of OpenVDB 3 (format 222) and later, and types that have a `value_size`.
 /// @param leaves  Gets the leaves, in the file's order.
 /// @return whether all lengths fit.
 bool tree_fits(const FileBytes& file, std::int64_t at, const StoredTree& tree, std::vector<StoredLeaf>& leaves);
@@ -48,15 +47,7 @@ struct ValueSize {
   std::int64_t full, half;
 };
 
-/// Nothing for a type that tree_fits does not check.
+/// Nothing for other types than float, double, vec3s and vec3d with nodes of 5, 4 and 3.
 std::optional<ValueSize> value_size(const std::string& type);
-
-/// Whether the lengths in the value of a grid's metadata "file_delayed_load" fit. OpenVDB unpacks this value when it
-/// reads the metadata.
-bool delayed_load_fits(const std::string& value, std::int64_t file_size);
-
-/// The value of these metadata for leaves that were read through. It is not packed, so that its length depends on the
-/// number of leaves alone.
-std::string delayed_load_text(const StoredTree& tree, const std::vector<StoredLeaf>& leaves);
 
 }  // namespace tensorray

@@ -6,6 +6,7 @@
 #include <cstdlib>
 #include <fstream>
 #include <functional>
+#include <memory>
 #include <string>
 
 #include <gtest/gtest.h>
@@ -94,24 +95,15 @@ TEST_F(SharedFiles, WaitingEndsWhereItsCallerWants) {
   EXPECT_THROW(SharedFile("key", [] { throw std::runtime_error("enough"); }), std::runtime_error);
 }
 
-TEST_F(SharedFiles, StayWithTheLastOfSeveralProcesses) {
-  pid_t second = 0;
-  {
-    SharedFile first("key", nothing_);
-    first.offer(whole_file());
-    second = start([&] {
-      const SharedFile found("key", nothing_);
-      tell();
-      await(asked_);
-      return found.file().is_open();
-    });
-    await(told_);
-  }
-  EXPECT_EQ(bytes_of(SharedFile("key", nothing_).file()), bytes);
-  ask();
-  EXPECT_TRUE(ended_well(second));
-  EXPECT_FALSE(SharedFile("key", nothing_).file().is_open());
+/// Who has found a file keeps it. Others then make their own.
+TEST_F(SharedFiles, EndWithTheProcessThatMadeThem) {
+  auto first = std::make_unique<SharedFile>("key", nothing_);
+  first->offer(whole_file());
+  const SharedFile found("key", nothing_);
+  first.reset();
+  EXPECT_EQ(bytes_of(found.file()), bytes);
   EXPECT_TRUE(is_empty());
+  EXPECT_FALSE(SharedFile("key", nothing_).file().is_open());
 }
 
 TEST_F(SharedFiles, AreMadeAgainIfTheirProcessIsKilled) {

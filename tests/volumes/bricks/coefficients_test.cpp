@@ -1,4 +1,4 @@
-// Bricks of a cubic field are made slab by slab, over blocks that are not needed any more.
+// Bricks are made slab by slab, over blocks that are not needed any more.
 
 #include "volumes/bricks/coefficients.h"
 
@@ -45,12 +45,12 @@ struct MadeBricks {
 };
 
 /// @param most  Places of a slab.
-MadeBricks make(const BlockTable& table, Border border, bool symmetric, std::size_t most) {
+MadeBricks make(const BlockTable& table, const Interpolant& interpolant, bool symmetric, std::size_t most) {
   const int components = symmetric ? TensorBrick::symmetric : TensorBrick::general;
   const Eigen::AlignedBox3i extent = active_box(table.shapes);
-  CoefficientBricks bricks = coefficient_bricks(table, extent, border);
+  CoefficientBricks bricks = coefficient_bricks(table, extent, interpolant);
   bricks.slabs = slabs_of(bricks.places, most);
-  MadeBricks made{cubic_memory(bricks, components), {}};
+  MadeBricks made{brick_memory(bricks, interpolant.between, components), {}};
   const BrickMemory blocks = blocks_within(made.bricks, bricks);
   std::mt19937 random(7);
   std::uniform_real_distribution<float> uniform(-1, 1);
@@ -63,7 +63,7 @@ MadeBricks make(const BlockTable& table, Border border, bool symmetric, std::siz
       }
     EXPECT_TRUE(place_values(block, components, blocks.brick(bricks.index.find(table.places[i]))));
   }
-  const Coefficients field{bricks, extent, border, blocks};
+  const Coefficients field{bricks, extent, interpolant, blocks};
   continue_values(field);
   made.strongest = make_coefficients(field, made.bricks);
   keep_bricks(made.bricks, bricks.count);
@@ -73,12 +73,13 @@ MadeBricks make(const BlockTable& table, Border border, bool symmetric, std::siz
 TEST(CoefficientSlabs, OfAnySizeGiveTheSameBricks) {
   const std::vector<BlockShape> shapes = shapes_with_gaps();
   const BlockTable table(shapes);
-  for (const Border border : {Border::fade, Border::extend})
+  for (const Interpolant& interpolant :
+       {Interpolant{}, Interpolant{Interpolation::cubic, Border::fade}, {Interpolation::cubic, Border::extend}})
     for (const bool symmetric : {true, false}) {
-      const MadeBricks whole = make(table, border, symmetric, 1 << 20);
+      const MadeBricks whole = make(table, interpolant, symmetric, 1 << 20);
       ASSERT_GT(whole.bricks.count, 20u);
       for (const std::size_t most : {1, 12, 30}) {
-        const MadeBricks made = make(table, border, symmetric, most);
+        const MadeBricks made = make(table, interpolant, symmetric, most);
         ASSERT_EQ(made.bricks.count, whole.bricks.count);
         EXPECT_EQ(made.strongest, whole.strongest) << most;
         EXPECT_TRUE(std::equal(whole.bricks.brick(0), whole.bricks.brick(whole.bricks.count), made.bricks.brick(0)))

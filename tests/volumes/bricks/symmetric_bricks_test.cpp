@@ -108,7 +108,7 @@ TEST(SymmetricBricks, HoldTheSameTensors) {
 }
 
 TEST(SymmetricBricks, BecomeGeneralOnesWithTheFirstTensorThatIsNotSymmetric) {
-  TensorGrid grid = symmetric_grid({0, 0, 0}, {159, 159, 87});  // Blocks are placed in several parts.
+  TensorGrid grid = symmetric_grid({0, 0, 0}, {39, 39, 30});
   first_tensor(grid).setZero();
   const TensorField symmetric(grid);
   grid.blocks[grid.blocks.size() - 9].values[77](2, 1) += 1;

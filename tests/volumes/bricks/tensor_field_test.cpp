@@ -151,35 +151,6 @@ TEST(TensorField, KnowsItsGreatestNorm) {
   EXPECT_NEAR(field.greatest_norm(), 2.5 * std::sqrt(3.0), 1e-6);
 }
 
-/// Checks that two fields have the same bricks, bit for bit.
-void expect_same(const TensorField& a, const TensorField& b, const Eigen::AlignedBox3i& bricks) {
-  ASSERT_EQ(a.brick_count(), b.brick_count());
-  for (int x = bricks.min().x(); x <= bricks.max().x(); ++x)
-    for (int y = bricks.min().y(); y <= bricks.max().y(); ++y)
-      for (int z = bricks.min().z(); z <= bricks.max().z(); ++z) {
-        const TensorBrick one = a.brick({x, y, z}), other = b.brick({x, y, z});
-        ASSERT_EQ(a.is_stored({x, y, z}), b.is_stored({x, y, z}));
-        ASSERT_EQ(one.strongest, other.strongest);
-        ASSERT_TRUE(std::equal(one.bending, one.bending + TensorBrick::trailing_offset(one.components), other.bending));
-        ASSERT_TRUE(std::equal(one.trailing, one.trailing + TensorBrick::voxels, other.trailing));
-      }
-}
-
-TEST(TensorField, IsTheSameIfTheSourceKeepsTheBlocks) {
-  const auto value = [](const Vector3i& i) { return trilinear(i.cast<double>() / 8); };
-  TensorGrid grid = dense_grid(box({-200, -3, 5}, {170, 140, 200}), oblique(), value);  // Several parts are made.
-  for (int turn = 0; turn < 2; ++turn) {
-    const TensorField field(grid);
-    const TensorField kept(source_of(grid));
-    expect_same(field, kept, box({-26, -2, -1}, {23, 19, 27}));
-    std::mt19937 random(3);
-    std::bernoulli_distribution leaves(0.6);
-    grid.blocks.erase(
-        std::remove_if(grid.blocks.begin(), grid.blocks.end(), [&](const TensorBlock&) { return leaves(random); }),
-        grid.blocks.end());
-  }
-}
-
 /// The Frobenius norm, in double precision, of the tensor of a voxel.
 double deviator(const TensorBrick& brick, int voxel) {
   const Matrix3d T = brick.tensor(voxel);

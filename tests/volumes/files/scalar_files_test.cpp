@@ -2,7 +2,6 @@
 
 #include "volumes/files/scalar_files.h"
 
-#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <openvdb/openvdb.h>
 
@@ -82,27 +81,11 @@ TEST(ScalarFiles, FogIsAFogVolumeForOtherPrograms) {
   EXPECT_EQ(text(*file.getMetadata(), "tensorray:version"), "1");
 }
 
-TEST(ScalarFiles, TheSameGridsGiveTheSameBytes) {
-  const TensorGrid field = sparse_grid();
-  const Temporary first("a.vdb"), second("b.vdb");
-  for (const auto& path : {first.string(), second.string()})
-    write_scalar_vdb(path, {invariant_grid(Invariant::vorticity, field)}, {});
-  EXPECT_EQ(bytes_of(first), bytes_of(second));
-}
-
 TEST(ScalarFiles, ValuesBeyondSinglePrecisionBecomeItsEnd) {
   const TensorGrid field = dense_grid(
       {Vector3i(0, 0, 0), Vector3i(0, 0, 0)}, Eigen::Affine3d::Identity(),
       [](const Vector3i&) { return Eigen::Matrix3d(1e20 * Vector3d(-1, 1, 1).asDiagonal().toDenseMatrix()); });
   EXPECT_EQ(invariant_grid(Invariant::determinant, field).blocks[0].values[0], std::numeric_limits<float>::lowest());
-}
-
-TEST(ScalarFiles, AFullDiskIsAnError) {
-  const ScalarGrid grid = invariant_grid(Invariant::norm, sparse_grid());
-  const Temporary path("a.vdb");
-  const FileSizeLimit limit(2048);
-  EXPECT_THAT([&] { write_scalar_vdb(path, {grid}, {}); },
-              testing::ThrowsMessage<std::runtime_error>(testing::HasSubstr(path.string())));
 }
 
 }  // namespace

@@ -7,7 +7,6 @@
 #include <openvdb/io/Stream.h>
 #include <openvdb/openvdb.h>
 
-#include "base/text/byte_order.h"
 #include "tests/volumes/file_support.h"
 
 namespace tensorray {
@@ -268,59 +267,6 @@ TEST(TensorFiles, DamagedVoxelsAreNoticedWhenTheyAreRead) {
   const BlockSource source = open_tensor_vdb(damaged);
   EXPECT_THAT([&] { to_grid(source); }, testing::ThrowsMessage<std::runtime_error>(testing::AllOf(
                                             testing::HasSubstr(damaged.string()), testing::HasSubstr("damaged"))));
-}
-
-/// Files have a table of their leaves' lengths.
-TEST(TensorFiles, OpenVdbSkipsLeavesByTheTable) {
-  const TensorGrid grid = sparse_grid();
-  const Temporary path("a.vdb");
-  for (const bool half : {false, true}) {
-    write_tensor_vdb(path, grid, half);
-    openvdb::io::File file(path.string());
-    file.open();
-    const auto all = openvdb::gridPtrCast<openvdb::Vec3SGrid>(file.readGrid("stress_row1"));
-    for (const TensorBlock& block : grid.blocks) {
-      const openvdb::Coord origin(block.origin.x(), block.origin.y(), block.origin.z());
-      const openvdb::CoordBBox box(origin, origin.offsetBy(TensorBlock::size - 1));
-      const openvdb::BBoxd world(all->indexToWorld(box.min()), all->indexToWorld(box.max()));
-      const auto part = openvdb::gridPtrCast<openvdb::Vec3SGrid>(file.readGrid("stress_row1", world));
-      for (int i = 0; i < TensorBlock::voxels; ++i) {
-        const Vector3i at = TensorBlock::position(i);
-        const openvdb::Coord voxel = origin.offsetBy(at.x(), at.y(), at.z());
-        if (!block.active[i]) continue;
-        ASSERT_EQ(part->getConstAccessor().getValue(voxel), all->getConstAccessor().getValue(voxel));
-      }
-    }
-  }
-}
-
-TEST(TensorFiles, WrongTablesOfLeavesDoNoHarm) {
-  const TensorGrid grid = sparse_grid();
-  const Temporary path("a.vdb"), damaged("b.vdb");
-  write_tensor_vdb(path, grid);
-  const std::string bytes = bytes_of(path);
-  // The number of leaves, their flags and their lengths follow the name, the type, and the length of the value. Lists
-  // begin with a zero where they are not packed.
-  const std::string type = "__delayedload";
-  const std::size_t table = bytes.find(type) + type.size() + 4, leaves = grid.blocks.size(),
-                    lengths = table + 12 + leaves;
-  ASSERT_EQ(read_number<std::uint32_t>(&bytes[table], ByteOrder::little), leaves);
-  const auto read_changed = [&](std::size_t at, std::int64_t first, std::int64_t second) {
-    std::string changed = bytes;
-    std::string numbers;
-    append_number(read_number<std::int64_t>(&bytes[at], ByteOrder::little) + first, ByteOrder::little, numbers);
-    append_number(read_number<std::int64_t>(&bytes[at + 8], ByteOrder::little) + second, ByteOrder::little, numbers);
-    write_bytes(damaged, changed.replace(at, 16, numbers));
-    return read_tensor_vdb(damaged);
-  };
-  for (std::size_t i = 0; i + 1 < leaves; ++i) {
-    const std::size_t at = lengths + 8 * i;
-    expect_same_blocks(read_changed(at, 0, 0), grid);
-    expect_same_blocks(read_changed(at, 1, 0), grid);
-    expect_same_blocks(read_changed(at, -(std::int64_t{1} << 40), 0), grid);
-    for (const std::int64_t difference : {-70, -1, 1, 8, 70})
-      expect_same_blocks(read_changed(at, difference, -difference), grid);
-  }
 }
 
 TEST(TensorFiles, ActiveTilesAreVoxels) {

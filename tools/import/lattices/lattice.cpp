@@ -12,7 +12,6 @@
 #include <fmt/format.h>
 #include <tbb/parallel_for.h>
 
-#include "volumes/grids/page_memory.h"
 #include "volumes/tensors/finite_differences.h"
 
 namespace tensorray {
@@ -92,7 +91,7 @@ void add_slab(const Lattice& lattice, const ValueOf& value_of, int first_z, std:
 template <class Blocks>
 void sort(Blocks& blocks) {
   std::vector<std::tuple<int, int, int, std::size_t>> order(blocks.size());
-  for_blocks(blocks.size(), [&](std::size_t i) {
+  tbb::parallel_for(std::size_t{0}, blocks.size(), [&](std::size_t i) {
     const Eigen::Vector3i& origin = blocks[i].origin;
     order[i] = {origin.x(), origin.y(), origin.z(), i};
   });
@@ -104,23 +103,12 @@ void sort(Blocks& blocks) {
     const auto first = std::make_unique<typename Blocks::value_type>(std::move(blocks[i]));
     std::size_t to = i;
     while (source[to] != i) {
-      make_room();
       blocks[to] = std::move(blocks[source[to]]);
       to = std::exchange(source[to], to);
     }
     blocks[to] = std::move(*first);
     source[to] = to;
   }
-}
-
-/// Checks, where there is a bound of memory, that it holds what is beside the blocks: those of the slab that is being
-/// read, a slice, and the leaves of the file that is written.
-template <class Block>
-void require_room_for(const Lattice& lattice) {
-  constexpr double leaf_bytes = 600;
-  const Eigen::Array3d blocks = ((lattice.size.array() - 1) / width + 1).cast<double>();
-  const double slice = lattice.size.head<2>().cast<double>().prod() * lattice.components * sizeof(double);
-  require_room(0, blocks.x() * blocks.y() * sizeof(Block) + slice + leaf_bytes * blocks.prod());
 }
 
 /// Fills `blocks` with `value_of(components)` at all active voxels.
@@ -131,7 +119,6 @@ void read_blocks(const Lattice& lattice, const ValueOf& value_of, Blocks& blocks
   if (!lattice.frame_note.empty()) report.notes.push_back(lattice.frame_note);
   const auto slice_voxels = static_cast<std::size_t>(lattice.size.x()) * lattice.size.y();
   report.voxels = slice_voxels * lattice.size.z();
-  require_room_for<typename Blocks::value_type>(lattice);
   std::vector<double> slice(slice_voxels * lattice.components);
   for (int first_z = (lattice.size.z() - 1) / width * width; first_z >= 0; first_z -= width)
     add_slab(lattice, value_of, first_z, slice, blocks, report);

@@ -62,8 +62,7 @@ void take_frame(Lattice& lattice, ComponentFrame frame);
 /// F, which need not be a rotation. Voxel (i, j, k) of the grid is voxel (i, j, k) of the lattice. A grid without
 /// active voxels is not an error.
 /// @param order  Used where the lattice has no order. Six components without any order are an error.
-/// Memory: the grid, a slice in double precision, and the blocks of eight slices; pages of the grid have the bound of
-/// page_memory.h.
+/// Memory: the grid, a slice in double precision, and the blocks of eight slices; the grid is in pages (page_memory.h).
 /// Threads: uses all threads, but calls read_slice from one. The result does not depend on their number.
 /// @throw std::invalid_argument naming the fix (--order, or another array), or whatever read_slice throws.
 TensorGrid tensors_of(const Lattice& lattice, const std::optional<TensorOrder>& order, LatticeReport& report);

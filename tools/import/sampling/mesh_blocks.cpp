@@ -15,7 +15,6 @@
 #include "tools/import/meshes/mesh_cell.h"
 #include "tools/import/sampling/cell_parts.h"
 #include "tools/import/sampling/voxel_average.h"
-#include "volumes/grids/page_memory.h"
 
 namespace tensorray {
 namespace {
@@ -292,7 +291,6 @@ TensorBlocks mesh_blocks(const MeshSource& source, const Progress& progress) {
   tbb::parallel_for(Range(0, used.size(), 4), [&](const Range& range) {
     Workspace work;
     for (std::size_t i = range.begin(); i < range.end(); ++i) {
-      make_room();
       const vtkIdType* const begin = bins.cells.data() + bins.first[used[i]];
       const vtkIdType* const end = bins.cells.data() + bins.first[used[i] + 1];
       blocks[i].origin = TensorBlock::size * bins.block(used[i]);

@@ -22,7 +22,6 @@ struct MeshSource {
 };
 
 /// The blocks that may have active voxels, as sample_mesh (mesh_sampling.h) describes them, ordered by origin.
-/// Memory: that of the blocks has the bound of page_memory.h.
 TensorBlocks mesh_blocks(const MeshSource& source, const Progress& progress);
 
 }  // namespace tensorray

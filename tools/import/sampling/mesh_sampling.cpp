@@ -75,7 +75,6 @@ void report_native(const MeshSource& source, const AlignedBox3d& bounds, Samplin
 void report_sampled(const TensorGrid& grid, SamplingReport& report) {
   Norms norms;
   for (const TensorBlock& block : grid.blocks) {
-    make_room();
     for (std::size_t offset = 0; offset < TensorBlock::voxels; ++offset)
       if (block.active[offset]) norms.push_back(block.values[offset].cast<double>().norm());
   }

@@ -1,10 +1,11 @@
-// Fields whose bricks other processes map: the same bits, and nothing where the file is not complete.
+// Fields whose bricks other processes map: the same bits.
 
-#include "volumes/making/field_file.h"
+#include "scenes/scene/shared_field.h"
 
 #include <cmath>
 #include <cstring>
 #include <iostream>
+#include <stdexcept>
 #include <string>
 
 #include <gtest/gtest.h>
@@ -16,9 +17,7 @@
 namespace tensorray {
 namespace {
 
-const std::string words = "words of the program";
-
-TensorField field_of(bool symmetric, const Interpolant& interpolant) {
+LoadedField loaded_field(bool symmetric, const Interpolant& interpolant) {
   const Eigen::AlignedBox3i box(Eigen::Vector3i(-5, 3, 0), Eigen::Vector3i(16, 20, 30));
   Eigen::Affine3d to_world(Eigen::AngleAxisd(0.3, Eigen::Vector3d(1, 2, 3).normalized()));
   to_world.translate(Eigen::Vector3d(0.1, 7, -2));
@@ -27,14 +26,14 @@ TensorField field_of(bool symmetric, const Interpolant& interpolant) {
     for (int i = 0; i < 9; ++i) T.data()[i] = std::sin(at.x() + 1.7 * i) * std::cos(0.3 * at.y() * i) + 0.1 * at.z();
     return Eigen::Matrix3d(symmetric ? Eigen::Matrix3d(T + T.transpose()) : T);
   };
-  return TensorField(dense_source(box, to_world, value), interpolant);
+  return prepare_field(dense_source(box, to_world, value), {0, Eigenvalues::raw, interpolant}, "the field");
 }
 
 bool are_same(const TensorField& a, const TensorField& b) {
-  if (a.bricks() != b.bricks() || a.memory().stride != b.memory().stride || !(a.interpolant() == b.interpolant()) ||
+  if (a.bricks() != b.bricks() || a.memory().stride != b.memory().stride || a.interpolant() != b.interpolant() ||
       a.is_symmetric() != b.is_symmetric() || a.greatest_norm() != b.greatest_norm() ||
       a.to_world().matrix() != b.to_world().matrix() || a.to_index().matrix() != b.to_index().matrix() ||
-      !(a.index_bounds().isApprox(b.index_bounds(), 0)) || !a.voxels().isApprox(b.voxels(), 0))
+      !a.index_bounds().isApprox(b.index_bounds(), 0) || !a.voxels().isApprox(b.voxels(), 0))
     return false;
   for (const Eigen::Vector3i& place : a.bricks()) {
     const TensorBrick one = a.brick(place), other = b.brick(place);
@@ -47,27 +46,28 @@ bool are_same(const TensorField& a, const TensorField& b) {
 
 /// @return what went wrong; empty: nothing.
 std::string share_fields(const std::filesystem::path& folder) {
+  setenv("TMPDIR", folder.c_str(), 1);
   bound_memory(std::size_t{256} << 20, folder);
+  int key = 0;
   for (const bool symmetric : {true, false})
     for (const Interpolant& interpolant :
          {Interpolant{}, Interpolant{Interpolation::cubic, Border::fade}, {Interpolation::cubic, Border::extend}}) {
-      const TensorField field = field_of(symmetric, interpolant);
-      const auto in_file = [&] { return duplicate(*field.memory().file); };
-      if (field_of_file(in_file())) return "the file is not complete";
-      if (!complete_field_file(field, words)) return "the file cannot be completed";
-      const std::optional<FieldOfFile> found = field_of_file(in_file());
-      if (!found || found->words != words) return "nothing, or other words, found";
-      if (!are_same(field, found->field)) return symmetric ? "another symmetric field" : "another field";
-      const off_t size = lseek(in_file().get(), 0, SEEK_END);
-      if (ftruncate(in_file().get(), size - 1) != 0 || field_of_file(in_file())) return "the file is cut off";
+      const std::string name = std::to_string(++key);
+      const auto make = [&] { return loaded_field(symmetric, interpolant); };
+      const auto refuse = []() -> LoadedField { throw std::logic_error("is loaded again"); };
+      const LoadedField made = share_field(name, make, Progress());
+      const LoadedField found = share_field(name, refuse, Progress());
+      if (!are_same(made.field, found.field)) return "another field";
+      if (found.notes.size() != made.notes.size() + 1 || found.notes[0] != made.notes[0]) return "other notes";
+      if (ftruncate(made.field.memory().file->get(), static_cast<off_t>(made.field.memory().bytes())) != 0)
+        return "cut";
+      if (share_field(name, make, Progress()).notes != made.notes) return "a file that is cut off is used";
     }
-  return "";
+  return std::filesystem::is_empty(folder) ? "" : "a file is left";
 }
 
-TEST(FieldFile, NeedsABound) { EXPECT_FALSE(complete_field_file(field_of(true, {}), words)); }
-
 /// In a process of its own, as the bound stays.
-TEST(FieldFile, IsTheSameFieldForAnotherProcess) {
+TEST(SharedField, IsTheSameForAnotherProcess) {
   GTEST_FLAG_SET(death_test_style, "threadsafe");
   const auto share = [] {
     const TemporaryFolder folder;
