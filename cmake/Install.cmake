@@ -30,7 +30,7 @@ if(TARGET _tensorray)
   set_target_properties(_tensorray PROPERTIES INSTALL_RPATH "$ORIGIN/${from_python}")
   install(TARGETS _tensorray LIBRARY DESTINATION ${TENSORRAY_PYTHON_FOLDER}/tensorray COMPONENT python)
   install(DIRECTORY python/tensorray/ DESTINATION ${TENSORRAY_PYTHON_FOLDER}/tensorray COMPONENT python
-          FILES_MATCHING PATTERN "*.py" PATTERN "*.pyi" PATTERN "py.typed" PATTERN "__pycache__" EXCLUDE)
+          FILES_MATCHING PATTERN "*.py" PATTERN "py.typed" PATTERN "__pycache__" EXCLUDE)
 endif()
 
 # Manual pages and completion of shells, made from what all programs say to --help.

@@ -48,14 +48,23 @@ Calls& calls() {
   return *all;
 }
 
-/// Whether Python ends, and this thread is another one than that which ends it. The caller holds the mutex.
-bool is_exiting() { return calls().exiting && *calls().exiting != std::this_thread::get_id(); }
+/// Whether Python ends, and this thread is another one than that which ends it.
+bool is_exiting() {
+  const std::lock_guard<std::mutex> lock(calls().mutex);
+  return calls().exiting && *calls().exiting != std::this_thread::get_id();
+}
+
+/// Ends the thread without a word. Python prints other exceptions of threads, and kills them meanwhile: the stream then
+/// stays locked, and Python, which flushes it at its end, aborts.
+[[noreturn]] void leave_thread() {
+  PyErr_SetNone(PyExc_SystemExit);
+  throw py::error_already_set();
+}
 
 class Running {
  public:
   explicit Running(Call& call) : call_(call) {
     const std::lock_guard<std::mutex> lock(calls().mutex);
-    if (is_exiting()) throw std::runtime_error("Python ends: no work begins any more");
     calls().running.insert(&call);
   }
   ~Running() {
@@ -90,10 +99,7 @@ void look_up(Call& shared, const py::object& report) {
   const std::string phase = shared.phase;
   const std::uint64_t done = shared.done, total = shared.total;
   lock.unlock();
-  {
-    const std::lock_guard<std::mutex> all(calls().mutex);
-    if (is_exiting()) throw Cancelled();  // What `report` does could take for ever.
-  }
+  if (is_exiting()) throw Cancelled();  // What `report` does could take for ever.
   const py::gil_scoped_acquire gil;
   if (PyErr_CheckSignals() != 0) throw py::error_already_set();
   if (!report.is_none() && total > 0) report(phase, done, total);
@@ -105,6 +111,7 @@ void run(const std::function<void(const Progress&)>& work, const py::object& rep
   if (threads < 0 || threads > 4096) throw std::invalid_argument("threads: from 1 to 4096, or 0 for all");
   Call shared;
   const Running running(shared);  // Until this thread has the GIL again.
+  if (is_exiting()) leave_thread();
   shared.progress.report = [&shared](const std::string& phase, std::uint64_t done, std::uint64_t total) {
     const std::lock_guard<std::mutex> lock(shared.mutex);
     shared.phase = phase;
@@ -129,6 +136,7 @@ void run(const std::function<void(const Progress&)>& work, const py::object& rep
     lock.unlock();
     thread.join();
   }
+  if (is_exiting()) leave_thread();
   if (interrupt) std::rethrow_exception(interrupt);
   if (shared.error) std::rethrow_exception(shared.error);
   look_up(shared, report);  // Short work, too, is reported.

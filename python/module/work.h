@@ -18,9 +18,9 @@ namespace tensorray {
 /// @throw whatever `work` throws. It must not touch Python's objects.
 void run(const std::function<void(const Progress&)>& work, const pybind11::object& report, int threads);
 
-/// Cancels the work of all threads, waits a few seconds for its end, and refuses more to other threads than this one.
-/// Python calls it at its exit: a thread (a daemon) that asks for the GIL afterwards is ended by Python within C++,
-/// which ends the process.
+/// Cancels the work of all threads, and waits a few seconds for its end. `run` then throws SystemExit to all threads
+/// but this one, also where it is called later. Python calls it at its exit: a thread (a daemon) that asks for the GIL
+/// afterwards is ended by Python within C++, which ends the process.
 void end_all_work();
 
 }  // namespace tensorray

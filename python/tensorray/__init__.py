@@ -23,6 +23,7 @@ RuntimeError for work that failed. docs/python.md has examples.
 """
 
 import json as _json
+import typing as _typing
 
 from . import _programs, _tensorray
 from ._fields import Field, import_file, invariant, make, read_vdb
@@ -30,20 +31,20 @@ from ._render import Render, render
 from ._tensorray import SceneError
 from ._trace import Landings, Plate, Trace, landings, trace
 
-__version__ = _tensorray.version
+__version__: str = _tensorray.version
 SceneError.__module__ = __name__
 
 #: Why a ray ended; index it with the numbers in `Trace.ends` and `Landings.ends`.
-RAY_ENDS = _tensorray.ray_ends
+RAY_ENDS: _typing.Tuple[str, ...] = _tensorray.ray_ends
 
 #: The names that `invariant` knows.
-INVARIANTS = tuple(_tensorray.invariant_names())
+INVARIANTS: _typing.Tuple[str, ...] = tuple(_tensorray.invariant_names())
 
 __all__ = ["Field", "INVARIANTS", "Landings", "Plate", "RAY_ENDS", "Render", "SceneError", "Trace", "import_file",
            "invariant", "landings", "make", "read_vdb", "render", "schema", "trace"]
 
 
-def schema():
+def schema() -> _typing.Dict[str, _typing.Any]:
     """The JSON Schema of scenes, as a dictionary: all keys, their meanings, limits and defaults."""
     return _json.loads(_tensorray.schema())
 

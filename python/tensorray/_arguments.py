@@ -1,12 +1,26 @@
 """Python's objects as the plain arguments of the module."""
 
+from __future__ import annotations
+
 import collections.abc
 import json
 import os
+from typing import Any, Callable, Literal, Mapping, Protocol, Union
 
 import numpy as np
 
 from . import _tensorray
+
+Path = Union[str, os.PathLike[str]]
+Progress = Union[None, bool, Callable[[str, int, int], object]]
+Scene = Union[None, Path, Mapping[str, Any]]
+Changes = Union[None, Mapping[str, Any]]
+Eigenvalues = Literal["auto", "raw", "absolute", "positive"]
+Method = Literal["auto", "splitting", "splitting4", "euler", "rk4", "bs23", "dopri5"]
+
+
+class Executor(Protocol):
+    def submit(self, function: Callable[..., Any], /, *arguments: Any) -> Any: ...
 
 #: The scene of a field alone: the light that it bends, on a plate, from the side that shows most.
 _FIELD_ALONE = {"light": {"direction": "auto"}, "integrator": {"type": "photon_distribution"}}
@@ -36,8 +50,8 @@ def changes_of(changes, seed=None):
 def module_field(function, field):
     """The module's part of a Field."""
     if not hasattr(field, "_field"):
-        raise TypeError(f"{function}: field must be a tensorray.Field, not {type(field).__name__}; tr.Field(T) makes one "
-                        "of an array")
+        raise TypeError(f"{function}: field must be a tensorray.Field, not {type(field).__name__}; tr.Field(T) makes "
+                        "one of an array")
     return field._field
 
 

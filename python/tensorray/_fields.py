@@ -1,15 +1,19 @@
 """Tensor fields."""
 
+from __future__ import annotations
+
 import functools
 import os
 import subprocess
 import tempfile
 import warnings
+from typing import Any, Literal, Sequence
 
 import numpy as np
+from numpy.typing import ArrayLike, NDArray
 
 from . import _programs, _tensorray
-from ._arguments import json_of, module_field
+from ._arguments import Path, Progress, json_of, module_field
 from ._progress import shown
 
 
@@ -29,7 +33,8 @@ class Field:
     The volume reaches from the first to the last voxel's centre along each axis; light is straight outside it.
     """
 
-    def __init__(self, T, voxel_size=1.0, origin=(0.0, 0.0, 0.0), *, to_world=None, name="tensor"):
+    def __init__(self, T: ArrayLike, voxel_size: ArrayLike = 1.0, origin: ArrayLike = (0.0, 0.0, 0.0), *,
+                 to_world: ArrayLike | None = None, name: str = "tensor") -> None:
         if np.ma.isMaskedArray(T):
             T = T.astype(np.result_type(T.dtype, np.float32)).filled(np.nan)
         tensors = np.asarray(T)
@@ -59,34 +64,34 @@ class Field:
         self._to_world, self._name, self._metadata = to_world, name, metadata
 
     @property
-    def tensors(self):
+    def tensors(self) -> NDArray[Any]:
         """The tensors, shape (nz, ny, nx, 3, 3); read-only. Voxels that a file does not have are zero."""
         return self._tensors
 
     @property
-    def to_world(self):
+    def to_world(self) -> NDArray[np.float64]:
         """The (4, 4) matrix from indices (i, j, k, 1) of `tensors[k, j, i]` to the world (x, y, z, 1)."""
         return self._to_world.copy()
 
     @property
-    def name(self):
+    def name(self) -> str:
         """Name of the field in files."""
         return self._name
 
     @property
-    def metadata(self):
+    def metadata(self) -> dict[str, str]:
         """What the file says about the field: a dictionary of texts (`tensorray:units`, ...)."""
         return dict(self._metadata)
 
     @property
-    def bounds(self):
+    def bounds(self) -> NDArray[np.float64]:
         """The least and the greatest corner of the volume's axis-aligned box, world; shape (2, 3)."""
         size = np.array(self._tensors.shape[2::-1], float) - 1
         corners = np.array([[x, y, z, 1] for x in (0, size[0]) for y in (0, size[1]) for z in (0, size[2])])
         world = corners @ self._to_world[:3].T
         return np.array([world.min(axis=0), world.max(axis=0)])
 
-    def write(self, file, *, half=False, progress=None):
+    def write(self, file: Path, *, half: bool = False, progress: Progress = None) -> None:
         """Writes the field as FILE.vdb, for the program `tensorray` and others that read OpenVDB.
 
         half  Store 16-bit floats: three significant digits, half the size.
@@ -95,7 +100,7 @@ class Field:
             _tensorray.write_field(self._field, os.fspath(file), half, report)
 
     def __reduce__(self):
-        """For pickle: other processes get the same bits."""
+        """For pickle: other processes get the same bits. (A file would round the transform.)"""
         if self._keys is None:
             return functools.partial(Field, to_world=self._to_world, name=self._name), (self._tensors,)
         return _of_voxels, (self._keys, _tensorray.voxels_of(self._field))
@@ -109,7 +114,8 @@ def _of_voxels(keys, voxels):
     return Field._of(_tensorray.field_of_voxels(keys, voxels), keys)
 
 
-def read_vdb(file, name="", *, derive="none", progress=None):
+def read_vdb(file: Path, name: str = "", *, derive: Literal["none", "gradient", "hessian"] = "none",
+             progress: Progress = None) -> Field:
     """Reads a field of an OpenVDB file.
 
     name    Name of the field; not needed if the file has one.
@@ -124,7 +130,8 @@ def read_vdb(file, name="", *, derive="none", progress=None):
         return Field._of(_tensorray.read_field(os.fspath(file), json_of(keys), name, derive, report), json_of(keys))
 
 
-def make(kind, resolution=None, *, min=None, max=None, progress=None, **parameters):
+def make(kind: str, resolution: int | Sequence[int] | None = None, *, min: ArrayLike | None = None,
+         max: ArrayLike | None = None, progress: Progress = None, **parameters: Any) -> Field:
     """Makes an analytic field: point_load, two_point_load, constant, rotation, shear, vortex or helix.
 
     resolution  Voxels along the longest axis of the box (voxels are then cubes), or along x, y and z.
@@ -137,9 +144,12 @@ def make(kind, resolution=None, *, min=None, max=None, progress=None, **paramete
         return Field._of(_tensorray.make_field(json_of(keys), report), json_of({"generate": keys}))
 
 
-def import_file(*files, array=None, gradient_of=None, strain_of=None, cells=None, order=None, frame=None,
-                resolution=None, voxel_size=None, origin=None, bounds=None, thickness=None, step=None, boundary=None,
-                name=None, units=None, progress=None):
+def import_file(*files: Path, array: str | None = None, gradient_of: str | None = None, strain_of: str | None = None,
+                cells: str | None = None, order: str | None = None, frame: str | None = None,
+                resolution: int | Sequence[int] | None = None, voxel_size: float | Sequence[float] | None = None,
+                origin: Sequence[float] | None = None, bounds: Sequence[float] | None = None,
+                thickness: float | None = None, step: int | str | None = None, boundary: Path | None = None,
+                name: str | None = None, units: str | None = None, progress: Progress = None) -> Field:
     """Makes a field of other programs' files: VTK, XDMF, EnSight, ExodusII, CGNS, OpenFOAM, PLOT3D, NRRD, NIfTI,
     MetaImage, MRtrix, NumPy.
 
@@ -207,7 +217,7 @@ def _run(command, report):
         return child.returncode, [line.removeprefix("tensorray: ") for line in errors.read().splitlines()]
 
 
-def invariant(field, name, *, progress=None):
+def invariant(field: Field, name: str, *, progress: Progress = None) -> NDArray[np.float32]:
     """A number that describes the tensor at each voxel, whatever the axes: an array (nz, ny, nx) of float32.
 
     name  One of tr.INVARIANTS: "norm", "trace", "von_mises", "vorticity", ...

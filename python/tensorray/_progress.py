@@ -1,7 +1,9 @@
 """Progress bars of long calls: tqdm's if it is installed, else a line of text."""
 
+import atexit
 import contextlib
 import sys
+import threading
 import warnings
 
 try:
@@ -12,34 +14,49 @@ except ImportError:
     tqdm = None
 
 
-class _Tqdm:
-    def __init__(self):
-        self.bar = None
+_writing = threading.RLock()
+_ended = False
 
-    def __call__(self, phase, done, total):
+
+def _end():
+    """At Python's exit: waits for the bar that is being written; none is written afterwards. Python kills the threads
+    that are left (daemons), and one that wrote then would leave standard error locked, which Python flushes."""
+    global _ended
+    _ended = True
+    if _writing.acquire(timeout=5):
+        _writing.release()
+
+
+atexit.register(_end)
+
+
+class _Tqdm:
+    bar = None
+
+    def draw(self, phase, done, total):
         if self.bar is None or self.bar.desc != phase or done < self.bar.n:
-            self.close()
+            self.clear()
             self.bar = tqdm(total=total, desc=phase, unit="", unit_scale=True, leave=False)
             self.bar.desc = phase
         self.bar.total = total
         self.bar.update(done - self.bar.n)
 
-    def close(self):
+    def clear(self):
         if self.bar is not None:
+            self.bar.disable = _ended  # Else it writes as soon as it is deleted.
             self.bar.close()
         self.bar = None
 
 
 class _Text:
-    def __init__(self):
-        self.drawn = False
+    drawn = False
 
-    def __call__(self, phase, done, total):
+    def draw(self, phase, done, total):
         print(f"\r\033[K{phase} {100 * min(done, total) // total}%", end="", file=sys.stderr, flush=True)
         self.drawn = True
 
-    def close(self):
-        if self.drawn:
+    def clear(self):
+        if self.drawn and not _ended:
             print("\r\033[K", end="", file=sys.stderr, flush=True)
 
 
@@ -61,9 +78,16 @@ def shown(progress):
         yield progress
     elif progress or (progress is None and _is_watched()):
         bar = _Tqdm() if tqdm else _Text()
+
+        def report(*state):
+            with _writing:
+                if not _ended:
+                    bar.draw(*state)
+
         try:
-            yield bar
+            yield report
         finally:
-            bar.close()
+            with _writing:
+                bar.clear()
     else:
         yield None

@@ -1,14 +1,19 @@
 """Renders of scenes."""
 
+from __future__ import annotations
+
 import contextlib
 import functools
 import json
 import os
+import tempfile
+from typing import Any, Sequence
 
 import numpy as np
+from numpy.typing import NDArray
 
-from . import _png, _shards, _tensorray
-from ._arguments import request_of
+from . import _shards, _tensorray
+from ._arguments import Changes, Executor, Path, Progress, Scene, request_of
 from ._fields import Field
 from ._progress import shown
 
@@ -16,8 +21,10 @@ _PHOTON = np.dtype([("position", "f4", 3), ("direction", "f4", 3), ("origin", "f
                     ("power", "f4")])
 
 
-def render(scene=None, field=None, *, outputs=(), keep=(), changes=None, frame=None, seed=None, threads=0, folder=None,
-           shards=None, executor=None, shard_folder=None, progress=None):
+def render(scene: Scene | Field = None, field: Field | None = None, *, outputs: Path | Sequence[Path] = (),
+           keep: str | Sequence[str] = (), changes: Changes = None, frame: int | None = None, seed: int | None = None,
+           threads: int = 0, folder: Path | None = None, shards: int | None = None, executor: Executor | None = None,
+           shard_folder: Path | None = None, progress: Progress = None) -> Render:
     """Renders a scene, as `tensorray render` does.
 
     scene     A dictionary with the keys of a scene file (docs/scenes.md, tr.schema()), or the name of a scene file or
@@ -69,41 +76,41 @@ class Render:
         self._rendered = rendered
 
     @functools.cached_property
-    def linear(self):
+    def linear(self) -> NDArray[np.float32]:
         """The picture in scene-linear light: float32, shape (height, width, 3), R, G, B of the working space, rows from
         the top. 1 is the undisturbed light."""
         return self._linear[:, :, :3]
 
     @functools.cached_property
-    def alpha(self):
+    def alpha(self) -> NDArray[np.float32] | None:
         """Opacity, shape (height, width); None if the method's picture covers everything."""
         return self._linear[:, :, 3] if self.channels[3:4] == ["A"] else None
 
     @functools.cached_property
-    def aovs(self):
+    def aovs(self) -> dict[str, NDArray[np.float32]]:
         """The other channels of the EXR file, by name: {"folds": array (height, width), ...}."""
         return {name: self._linear[:, :, i] for i, name in enumerate(self.channels) if name not in ("R", "G", "B", "A")}
 
     @functools.cached_property
-    def display(self):
+    def display(self) -> NDArray[np.float32]:
         """The picture for a screen (sRGB, unless the scene says otherwise): float32 from 0 to 1, shape
         (height, width, 3), or 4 with opacity. For Matplotlib: plt.imshow(render.display)."""
         return np.clip(np.nan_to_num(self._rendered.display()), 0, 1)
 
     @property
-    def channels(self):
+    def channels(self) -> list[str]:
         """Names of the channels of the EXR file: R, G, B, perhaps A, and those of `aovs`."""
         return self._rendered.channels()
 
     @functools.cached_property
-    def spectral(self):
+    def spectral(self) -> NDArray[np.float32] | None:
         """Spectral irradiance, unit of the light's irradiance per nm: float32, shape (height, width, bands). Needs
         keep=["spectral"]; else None."""
         spectral = self._rendered.spectral()
         return None if spectral is None else spectral[0][:, :, 3:]
 
     @functools.cached_property
-    def wavelengths(self):
+    def wavelengths(self) -> NDArray[np.float64] | None:
         """The middle wavelengths of the bands of `spectral`, nm: shape (bands,); None without them."""
         spectral = self._rendered.spectral()
         if spectral is None:
@@ -111,43 +118,43 @@ class Render:
         return np.array([float(name.split(".", 1)[1][:-2].replace(",", ".")) for name in spectral[1][3:]])
 
     @functools.cached_property
-    def photons(self):
+    def photons(self) -> NDArray[Any]:
         """The photons on the plate, a structured array with position, direction and origin (world), wavelength (nm) and
         power: photons["position"] has the shape (n, 3). Needs keep=["photons"]; else empty."""
         return self._rendered.photons().view(_PHOTON)[:, 0]
 
     @functools.cached_property
-    def paths(self):
+    def paths(self) -> list[dict[str, Any]]:
         """The paths of the method path_tracing, a list of dictionaries: position, direction, change (n, 3), tensor
         (n, 3, 3), length, in_field (n,); and flexibility, wavelength and end of each."""
         return self._rendered.paths()
 
     @functools.cached_property
-    def statistics(self):
+    def statistics(self) -> dict[str, Any]:
         """What `--stats` writes: counts of photons by where they ended, power, steps, seconds; a dictionary."""
         return json.loads(self._rendered.statistics())
 
     @property
-    def scene(self):
+    def scene(self) -> dict[str, Any]:
         """The scene that was rendered, a dictionary, with all changes."""
         return json.loads(self._rendered.scene())
 
     @property
-    def scale(self):
+    def scale(self) -> float:
         """The scale of the field: chosen, where the scene leaves it open."""
         return self._rendered.scale()
 
     @property
-    def notes(self):
+    def notes(self) -> list[str]:
         """What was chosen or found while loading, one line each."""
         return self._rendered.notes()
 
     @property
-    def warnings(self):
+    def warnings(self) -> list[str]:
         """Problems that the picture does not show by itself, one line each."""
         return self._rendered.warnings()
 
-    def write(self, *files):
+    def write(self, *files: Path) -> None:
         """Writes files as `outputs` of `render` does, later: either all are complete, or none has changed."""
         self._rendered.write([os.fspath(file) for file in files])
 
@@ -156,7 +163,11 @@ class Render:
         return self._rendered.linear()
 
     def _repr_png_(self):
-        return _png.encode(self.display)
+        with tempfile.TemporaryDirectory() as folder:
+            file = os.path.join(folder, "picture.png")
+            self.write(file)
+            with open(file, "rb") as stream:
+                return stream.read()
 
     def __repr__(self):
         height, width = self._linear.shape[:2]

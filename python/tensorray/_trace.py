@@ -1,13 +1,17 @@
 """Single rays, and the landings of a scene's light."""
 
+from __future__ import annotations
+
 import dataclasses
 import math
-from typing import Optional
+from typing import Any, Literal
 
 import numpy as np
+from numpy.typing import ArrayLike, NDArray
 
 from . import _tensorray
-from ._arguments import module_field, request_of
+from ._arguments import Changes, Eigenvalues, Method, Path, Progress, Scene, module_field, request_of
+from ._fields import Field
 from ._progress import shown
 
 
@@ -18,35 +22,38 @@ class Plate:
     center  Its middle, world. normal: any length. size: width and height, world units. up: its upper edge.
     """
 
-    center: tuple
-    normal: tuple = (0, 0, 1)
-    size: tuple = (1, 1)
-    up: tuple = (0, 0, 1)
+    center: ArrayLike
+    normal: ArrayLike = (0, 0, 1)
+    size: ArrayLike = (1, 1)
+    up: ArrayLike = (0, 0, 1)
 
 
 @dataclasses.dataclass
 class Trace:
     """The result of `trace`: arrays with one row a ray."""
 
-    positions: np.ndarray  #: Where rays ended, world: (n, 3). Rays that missed: where they left the volume.
-    directions: np.ndarray  #: Unit directions there: (n, 3).
-    lengths: np.ndarray  #: Lengths of the ways, world units: (n,).
-    ends: np.ndarray  #: Why they ended, numbers for tr.RAY_ENDS: (n,); 0 is on the plate.
-    steps: np.ndarray  #: Numbers of steps: (n,).
-    along: Optional[np.ndarray] = None  #: The vectors along which starts were moved: (n, 3, 2).
-    position_jacobians: Optional[np.ndarray] = None  #: Derivatives of `positions` along them: (n, 3, 2).
-    direction_jacobians: Optional[np.ndarray] = None  #: Derivatives of `directions` along them: (n, 3, 2).
-    ways: Optional[list] = None  #: A polyline a ray: a list of arrays (points, 3).
+    positions: NDArray[np.float64]  #: Where rays ended, world: (n, 3). Rays that missed: where they left the volume.
+    directions: NDArray[np.float64]  #: Unit directions there: (n, 3).
+    lengths: NDArray[np.float64]  #: Lengths of the ways, world units: (n,).
+    ends: NDArray[np.uint8]  #: Why they ended, numbers for tr.RAY_ENDS: (n,); 0 is on the plate.
+    steps: NDArray[np.uint32]  #: Numbers of steps: (n,).
+    along: NDArray[np.float64] | None = None  #: The vectors along which starts were moved: (n, 3, 2).
+    position_jacobians: NDArray[np.float64] | None = None  #: Derivatives of `positions` along them: (n, 3, 2).
+    direction_jacobians: NDArray[np.float64] | None = None  #: Derivatives of `directions` along them: (n, 3, 2).
+    ways: list[NDArray[np.float64]] | None = None  #: A polyline a ray: a list of arrays (points, 3).
 
     @property
-    def landed(self):
+    def landed(self) -> NDArray[np.bool_]:
         """Whether each ray ended on the plate: (n,) of bool."""
         return self.ends == _tensorray.ray_ends.index("plate")
 
 
-def trace(field, positions, directions, s, *, scale=1.0, plate=None, jacobians=False, along=None, turning=None,
-          ways=False, method="auto", step=None, max_steps=20000, max_length=None, eigenvalues="auto", smooth=0.0,
-          interpolation="cubic", border="fade", threads=0, progress=None):
+def trace(field: Field, positions: ArrayLike, directions: ArrayLike, s: ArrayLike, *, scale: float = 1.0,
+          plate: Plate | None = None, jacobians: bool = False, along: ArrayLike | None = None,
+          turning: ArrayLike | None = None, ways: bool = False, method: Method = "auto", step: float | None = None,
+          max_steps: int = 20000, max_length: float | None = None, eigenvalues: Eigenvalues = "auto",
+          smooth: float = 0.0, interpolation: Literal["cubic", "linear"] = "cubic",
+          border: Literal["fade", "extend"] = "fade", threads: int = 0, progress: Progress = None) -> Trace:
     """Follows single rays through a field.
 
     positions    Starts, world: (n, 3), or (3,) for one ray or for all.
@@ -124,27 +131,28 @@ def _across(directions):
 class Landings:
     """The result of `landings`: where the light of a scene lands on its plate, as a mesh over its starts."""
 
-    starts: np.ndarray  #: Where light starts, world: (n, 3).
-    landings: np.ndarray  #: Where it lands, for each flexibility, in pixels from the plate's top left: (n, k, 2).
-    ends: np.ndarray  #: Why it ended, numbers for tr.RAY_ENDS: (n, k); landings are valid where this is 0.
-    flexibilities: np.ndarray  #: (k,)
-    triangles: np.ndarray  #: Indices of neighbouring starts: (m, 3). They cover the beam once.
-    areas: np.ndarray  #: Area of the beam in each triangle, world units squared: (m,).
-    center: np.ndarray  #: Middle of the plate, world.
-    right: np.ndarray  #: Unit vector along its width.
-    up: np.ndarray  #: Unit vector along its height.
-    size: tuple  #: Width and height, world units.
-    resolution: tuple  #: Pixels along both.
+    starts: NDArray[np.float64]  #: Where light starts, world: (n, 3).
+    landings: NDArray[np.float32]  #: Where it lands, for each flexibility, in pixels from the plate's top left: (n, k, 2).
+    ends: NDArray[np.uint8]  #: Why it ended, numbers for tr.RAY_ENDS: (n, k); landings are valid where this is 0.
+    flexibilities: NDArray[np.float64]  #: (k,)
+    triangles: NDArray[np.uint32]  #: Indices of neighbouring starts: (m, 3). They cover the beam once.
+    areas: NDArray[np.float64]  #: Area of the beam in each triangle, world units squared: (m,).
+    center: NDArray[np.float64]  #: Middle of the plate, world.
+    right: NDArray[np.float64]  #: Unit vector along its width.
+    up: NDArray[np.float64]  #: Unit vector along its height.
+    size: tuple[float, float]  #: Width and height, world units.
+    resolution: tuple[int, int]  #: Pixels along both.
 
-    def world(self):
+    def world(self) -> NDArray[np.float64]:
         """The landings in the world: (n, k, 3)."""
         x = (self.landings[..., :1] / self.resolution[0] - 0.5) * self.size[0]
         y = (0.5 - self.landings[..., 1:] / self.resolution[1]) * self.size[1]
         return self.center + x * self.right + y * self.up
 
 
-def landings(scene=None, field=None, s=None, *, tolerance=0.5, changes=None, frame=None, threads=0, folder=None,
-             progress=None):
+def landings(scene: Scene = None, field: Field | None = None, s: ArrayLike | None = None, *, tolerance: float = 0.5,
+             changes: Changes = None, frame: int | None = None, threads: int = 0, folder: Path | None = None,
+             progress: Progress = None) -> Landings:
     """Where the light of a scene lands on its plate: the map whose light `photon_distribution` draws.
 
     scene, field, changes, frame, threads, folder, progress    As those of `render`.

@@ -74,8 +74,8 @@ class LongCallsTest(unittest.TestCase):
             begun.wait()
         """
         ended = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
-        self.assertEqual(ended.returncode, 0, ended.stderr)
-        self.assertNotIn("terminate", ended.stderr)
+        # A thread that writes when Python ends may keep the stream locked that Python flushes then.
+        self.assertEqual((ended.returncode, ended.stderr), (0, ""))
 
     def test_streams_that_only_write(self):
         class Writer:
