@@ -74,8 +74,6 @@ if(NOT TENSORRAY_SANITIZE)  # MPI itself would have to be built with the sanitiz
   endif()
 endif()
 
-# Libraries that the benchmark compares with, if they are installed.
 if(TENSORRAY_TESTS)
-  find_path(NanoVDB_INCLUDE_DIR nanovdb/NanoVDB.h)
-  find_package(VTK QUIET OPTIONAL_COMPONENTS FiltersFlowPaths FiltersGeneral)
+  find_package(benchmark REQUIRED)
 endif()

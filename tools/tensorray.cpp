@@ -51,7 +51,6 @@ int main(int argc, char** argv) {
   tensorray::add_make_command(app, progress);
   tensorray::add_derive_command(app, progress);
   tensorray::add_import_command(app);
-  tensorray::add_stretch_command(app, progress);
   tensorray::add_info_command(app);
   tensorray::add_schema_command(app);
   return tensorray::run_and_report([&] {

@@ -126,12 +126,7 @@ const std::vector<Room> rooms{
     {"tools/commands",
      {"tools/rendering", "tools/command_line", "tools/ranks", "scenes/*", "integrators/*", "renderer/*", "volumes/*"}},
     {"tools", {"tools/commands", "tools/command_line", "renderer/meshes"}},
-    {"tools/benchmark/kernels", {"integrators/*", "renderer/*", "volumes/*"}},
-    {"tools/benchmark/support", {}},
-    {"tools/benchmark/measures",
-     {"tools/benchmark/kernels", "tools/benchmark/support", "tools/viewer", "scenes/*", "integrators/*", "renderer/*",
-      "volumes/*"}},
-    {"tools/benchmark", {"tools/benchmark/measures", "tools/command_line"}},
+    {"tools/benchmark", {"tools/viewer", "scenes/*", "integrators/*", "renderer/*", "volumes/*"}},
 };
 
 /// Whether `name`, an item of `may_include`, means the room `folder`.

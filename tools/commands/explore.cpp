@@ -49,7 +49,7 @@ constexpr std::array<Direction, 6> directions{{{"+x", "[1,0,0]"},
                                                {"-z", "[0,0,-1]"}}};  // One column each.
 
 struct ExploreOptions {
-  std::string scene, method;
+  std::string scene;
   std::vector<std::string> overrides;
   std::string sheet, scene_copy;
   std::optional<int> pick;
@@ -110,7 +110,6 @@ class Sheet {
 /// What all cells have in common. Keys that place things in one direction of light do not fit another.
 std::vector<std::string> common_changes(const ExploreOptions& options) {
   std::vector<std::string> changes = options.overrides;
-  if (!options.method.empty()) changes.push_back("integrator.type=" + options.method);
   for (const char* key : {"light.up", "light.aperture", "receiver.center", "receiver.normal", "receiver.up",
                           "receiver.size", "receiver.resolution"})
     changes.push_back(std::string(key) + "=null");
@@ -227,8 +226,6 @@ void add_explore_command(CLI::App& program, Progress& progress) {
       "explore", "Show what a field does to light: one sheet of pictures, light from six sides, at three scales");
   command->add_option("FIELD", options->scene, "Field (.vdb), or a scene file")->required();
   command->add_option("-o,--output", options->sheet, "The sheet: .png .jpg .tif");
-  command->add_option("--method", options->method,
-                      "What to make of the light: photon_distribution, lens ... (the scene's)");
   command->add_option("--set", options->overrides, "KEY=VALUE: change a value of all scenes")->allow_extra_args(false);
   command->add_option("--size", options->size, "Of a picture: pixels along its longer side (200)")
       ->check(CLI::Range(16, 2048));

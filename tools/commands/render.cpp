@@ -17,7 +17,6 @@
 #include "tools/ranks/leader.h"
 #include "tools/ranks/ranks.h"
 #include "tools/rendering/render_scene.h"
-#include "tools/rendering/tev_display.h"
 
 namespace tensorray {
 namespace {
@@ -136,7 +135,6 @@ std::vector<int> render(const RenderOptions& options, Leader* leader, Progress& 
   }
   RenderRun run = options.run;
   run.leader = leader;
-  if (!run.keeping.display.empty()) check_display_address(run.keeping.display);
   if (!options.shard.empty()) take_shard(options.shard, changes, run.keeping);
   if (options.frames.empty()) {
     render_scene(options.scene, changes, run, progress);
@@ -226,10 +224,6 @@ void add_render_command(CLI::App& program, Progress& progress) {
   command->add_option("--light", options->run.keeping.light,
                       "A shard (the first) or a checkpoint of this render: the light that it has made before the tiles "
                       "is used, and not made again");
-  command
-      ->add_option("--display", options->run.keeping.display,
-                   "Show the picture in the viewer tev while it is rendered (14158)")
-      ->option_text("HOST:PORT");
   command
       ->add_option(
           "--memory", options->run.memory,

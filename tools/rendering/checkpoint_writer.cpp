@@ -87,7 +87,7 @@ void CheckpointWriter::begin() {
 void CheckpointWriter::run() {
   const std::chrono::duration<double> tick(settings_.interval > 0 ? std::min(longest_tick, settings_.interval / 2)
                                                                   : longest_tick);
-  Clock::time_point written = Clock::now(), shown = written, displayed = written;
+  Clock::time_point written = Clock::now(), shown = written;
   bool is_cancelled = false;
   std::unique_lock lock(waiting_);
   while (!wake_.wait_for(lock, tick, [this] { return ends_; })) {
@@ -97,13 +97,8 @@ void CheckpointWriter::run() {
     if (settings_.cancelled && *settings_.cancelled && !std::exchange(is_cancelled, true)) write();
     const bool is_asked = take_picture_request();
     if (is_asked || (settings_.watch > 0 && seconds_since(shown) > settings_.watch)) {
-      files_wanted_ = true;
       job_.work.picture_wanted = true;
       shown = Clock::now();
-    }
-    if (settings_.display > 0 && seconds_since(displayed) > settings_.display) {
-      job_.work.picture_wanted = true;
-      displayed = Clock::now();
     }
     if (is_asked || (settings_.interval > 0 && seconds_since(written) > settings_.interval)) {
       write();

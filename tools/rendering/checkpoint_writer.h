@@ -19,7 +19,6 @@ struct KeepSettings {
   std::filesystem::path file;  ///< The checkpoint; empty: none is written.
   double interval = 60;        ///< Seconds between checkpoints; 0: only those that are asked for.
   double watch = 0;            ///< Seconds between pictures of what there is so far; 0: only those that are asked for.
-  double display = 0;          ///< Seconds between pictures for a display; 0: none.
   bool quiet = false;
   const std::atomic<bool>* cancelled =
       nullptr;  ///< When it becomes true, a checkpoint is written at once; may be null.
@@ -42,9 +41,6 @@ class CheckpointWriter {
   /// Removes the checkpoint, and writes no other: the work is in other files.
   void remove();
 
-  /// Whether the picture that was asked for shall be in files; else it is for a display alone. Forgets it.
-  bool take_file_request() { return files_wanted_.exchange(false); }
-
   /// The work so far, as a file has it.
   WorkFile work_file();
 
@@ -59,7 +55,6 @@ class CheckpointWriter {
   std::mutex writing_;  ///< Guards what follows.
   std::optional<Json> origin_;
   bool is_written_ = false, has_failed_ = false, is_over_ = false;
-  std::atomic<bool> files_wanted_{false};
 
   std::mutex waiting_;
   std::condition_variable wake_;

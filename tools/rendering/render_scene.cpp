@@ -32,13 +32,12 @@
 #include "tools/rendering/checkpoint_writer.h"
 #include "tools/rendering/kept_work.h"
 #include "tools/rendering/run_outputs.h"
-#include "tools/rendering/tev_display.h"
 #include "volumes/grids/page_memory.h"
 
 namespace tensorray {
 namespace {
 
-constexpr double watch_interval = 5, display_interval = 1;  // Seconds.
+constexpr double watch_interval = 5;  // Seconds.
 
 /// A name that cannot be looked at does not exist; opening the file says why.
 bool is_there(const std::filesystem::path& file) {
@@ -58,7 +57,6 @@ KeepSettings keep_settings(const SceneDescription& description, const RenderRun&
   settings.file = checkpoint_of(description, run.keeping);
   settings.interval = run.keeping.interval;
   settings.watch = run.keeping.watch ? watch_interval : 0;
-  settings.display = run.keeping.display.empty() ? 0 : display_interval;
   settings.quiet = run.quiet;
   const Method& method = description.integrator.method();
   if (run.keeping.shard && !method.has_shards())
@@ -155,16 +153,12 @@ std::string run_statistics(const Scene& scene, const Statistics& statistics, dou
 void complete(const Scene& scene, RenderJob& job, OutputFiles files, const KeepSettings& keep, const RenderRun& run,
               Progress& progress) {
   std::optional<ProgressBar> bar(std::in_place, progress, run.quiet);
-  std::optional<TevDisplay> display;
-  if (!run.keeping.display.empty())
-    display.emplace(run.keeping.display, written_by(scene.description, run).front().filename().string());
   job.work.is_shard = run.keeping.shard.has_value();
   job.before.interval = job.work.interval = keep.file.empty() ? 0 : keep.interval;
   const SharedWork shared(run.leader, scene, job, running_threads());
   CheckpointWriter keeper(scene, job, keep);
   job.show = [&](Render picture) {
-    if (display) display->show(picture.linear);
-    if (!keeper.take_file_request() || run.keeping.shard) return;
+    if (run.keeping.shard) return;
     try {
       write_so_far(std::move(picture), scene, job.work);
     } catch (const std::exception& error) {
@@ -173,7 +167,6 @@ void complete(const Scene& scene, RenderJob& job, OutputFiles files, const KeepS
   };
   Render result = render_or_keep(scene, progress, job, keeper, keep.file);
   bar.reset();  // Erase the bar before the notes are printed.
-  if (display) display->show(result.linear);
   if (job.work.stopping) end_early(std::move(result), scene, job.work, keeper, run, keep.file);
   for (const std::string& warning : result.warnings) tell({"warning: " + warning}, run.quiet);
   const auto start = Clock::now();

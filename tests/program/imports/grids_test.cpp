@@ -144,8 +144,8 @@ TEST_F(Grids, FluenceIsOfPhotonsAlone) {
 TEST_F(Grids, StretchIsAGridAndAPicture) {
   write("scene.json", small_scene());
   const auto stretch = [&](const std::string& threads, const std::string& name) {
-    run_well({"stretch", "scene.json", "-q", "-o", name + ".vdb", "-o", name + ".png", "-o", name + ".exr",
-              "--resolution", "12", "--pixels", "40", "--threads", threads});
+    run_well({"render", "scene.json", "-q", "-o", name + ".vdb", "-o", name + ".png", "-o", name + ".exr", "--threads",
+              threads, "--set", R"(integrator={"type": "stretch", "stretch": {"resolution": 12, "pixels": 40}})"});
   };
   stretch("1", "a");
   stretch("2", "b");
@@ -161,11 +161,9 @@ TEST_F(Grids, StretchIsAGridAndAPicture) {
   EXPECT_EQ(image.width, 40);
   EXPECT_EQ(std::count(image.channels.begin(), image.channels.end(), "stretch"), 1);
 
-  expect_wrong_input({"stretch", "scene.json", "-o", "a.txt"}, {"a.txt", ".vdb", ".exr"});
-  expect_wrong_input({"stretch", "scene.json", "-o", "c.vdb", "--length", "-1"}, {"--length"});
-  expect_wrong_input(
-      {"stretch", "scene.json", "-q", "-o", "c.vdb", "--wavelength", "500", "--set", "bending.rgb=[0.1,0.2,0.3]"},
-      {"rgb"});
+  expect_wrong_input({"render", "scene.json", "-q", "-o", "c.vdb", "--set", "integrator.type=stretch", "--set",
+                      "integrator.stretch.wavelength=500", "--set", "bending.rgb=[0.1,0.2,0.3]"},
+                     {"rgb"});
 }
 
 TEST_F(Grids, PythonReadsThem) {

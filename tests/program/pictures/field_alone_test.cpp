@@ -47,7 +47,8 @@ TEST_F(FieldAlone, IsRenderedWithDefaultsAndTheSceneIsToldAndSaved) {
 
 TEST_F(FieldAlone, OtherMethodsAndCommandsTakeIt) {
   run_well(with_small({"render", "stress.vdb", "--set", "integrator.type=lens", "-o", "lens.png", "-q"}));
-  run_well({"stretch", "stress.vdb", "-o", "stretch.png", "--pixels", "16", "-q"});
+  run_well({"render", "stress.vdb", "--set", "integrator.type=stretch", "--set", "integrator.stretch.pixels=16", "-o",
+            "stretch.png", "-q"});
   const Outcome quiet = run_well(with_small({"render", "stress.vdb", "-q"}));
   EXPECT_EQ(quiet.error, "");
   EXPECT_TRUE(exists(in_folder("stress.png")));

@@ -1,0 +1,90 @@
+/// @file tools/benchmark/view.cpp
+/// Seconds from a page's message with a changed scale to a picture's bytes, without the network: the first, coarse
+/// picture and the finished one.
+
+#include <chrono>
+#include <condition_variable>
+#include <cstring>
+#include <filesystem>
+#include <memory>
+#include <mutex>
+#include <string>
+
+#include <benchmark/benchmark.h>
+
+#include "scenes/pipeline/read_scene.h"
+#include "tools/benchmark/questions.h"
+#include "tools/viewer/pages.h"
+
+namespace tensorray::bench {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+/// A page that waits for the answers to its scenes.
+class TimedPage {
+ public:
+  explicit TimedPage(Pages& pages) : pages_(pages) {
+    id_ = pages_.open([this](const PageMessage& message) { receive(message); });
+  }
+  ~TimedPage() { pages_.close(id_); }
+
+  /// Sends a scene, and waits for its first or its finished picture. @return the picture's header.
+  Json picture_of(const Json& scene, bool finished) {
+    const int message = ++last_;
+    pages_.receive(id_, Json{{"type", "scene"}, {"id", message}, {"scene", scene}}.dump());
+    std::unique_lock<std::mutex> lock(mutex_);
+    arrived_.wait(lock,
+                  [&] { return header_.value("id", 0) == message && (!finished || header_.value("final", false)); });
+    return header_;
+  }
+
+ private:
+  void receive(const PageMessage& message) {
+    if (!message.is_picture) return;
+    std::uint32_t size = 0;
+    std::memcpy(&size, message.data.data(), sizeof size);
+    const std::lock_guard<std::mutex> lock(mutex_);
+    header_ = Json::parse(message.data.substr(sizeof size, size));
+    arrived_.notify_all();
+  }
+
+  Pages& pages_;
+  Pages::Id id_ = 0;
+  int last_ = 0;
+  std::mutex mutex_;
+  std::condition_variable arrived_;
+  Json header_ = Json::object();
+};
+
+void change_scale(benchmark::State& state, const std::string& file, bool finished) {
+  const ViewedScene viewed{std::filesystem::path(TENSORRAY_SCENES) / file,
+                           {"receiver.resolution=[512,512]"},
+                           std::filesystem::temp_directory_path() / "tensorray_bench.view.json"};
+  Progress progress;
+  Pages pages(viewed, progress);
+  TimedPage page(pages);
+  Json scene = scene_json(viewed.file, viewed.overrides);
+  const double scale = page.picture_of(scene, true).at("scale");
+  int change = 0;
+  for (auto _ : state) {
+    scene["field"]["scale"] = scale * (1 + 0.01 * ++change);
+    page.picture_of(scene, finished);
+  }
+}
+
+}  // namespace
+
+void add_view() {
+  for (const char* const name : {"point_load_photons", "point_load_lens", "hemisphere_photons_side"})
+    for (const bool finished : {false, true}) {
+      const auto run = [=](benchmark::State& state) { change_scale(state, std::string(name) + ".json", finished); };
+      benchmark::RegisterBenchmark(
+          (std::string("view/") + name + (finished ? "/finished_picture" : "/first_picture")).c_str(), run)
+          ->Iterations(finished ? 3 : 20)
+          ->UseRealTime()
+          ->Unit(benchmark::kSecond);
+    }
+}
+
+}  // namespace tensorray::bench
