@@ -44,6 +44,15 @@ LandingLight sun(const Vector3d& direction) {
   return light;
 }
 
+TensorField bending_field() {
+  return cube_field(17, [](const Vector3d& p) {
+    Matrix3d T = Matrix3d::Zero();
+    T(0, 0) = p.x();
+    T(1, 0) = 0.5;
+    return T;
+  });
+}
+
 /// Irradiance times area, over the whole plate.
 double power(const FlowIrradiance& landed, int band) {
   double sum = 0;
@@ -69,12 +78,7 @@ TEST(FlowIrradianceTest, StraightLightFillsTheShadowOfTheVolume) {
 }
 
 TEST(FlowIrradianceTest, BentLightKeepsItsPower) {
-  const TensorField field = cube_field(17, [](const Vector3d& p) {
-    Matrix3d T = Matrix3d::Zero();
-    T(0, 0) = p.x();
-    T(1, 0) = 0.5;
-    return T;
-  });
+  const TensorField field = bending_field();
   LandingLight light = sun({0.2, 0.1, -1});
   const double straight = 4 + 2 * (2 * 0.2 + 2 * 0.1);  // Area of the shadow.
   for (const double angle : {0.0, 0.03}) {
@@ -187,12 +191,7 @@ TEST(FlowIrradianceTest, LightOfAPointFallsWithTheSquareOfTheDistance) {
 }
 
 TEST(FlowIrradianceTest, BentLightOfAPointKeepsItsPower) {
-  const TensorField field = cube_field(17, [](const Vector3d& p) {
-    Matrix3d T = Matrix3d::Zero();
-    T(0, 0) = p.x();
-    T(1, 0) = 0.5;
-    return T;
-  });
+  const TensorField field = bending_field();
   const Vector3d source(0.3, 0.2, 4);
   const FlowIrradiance landed = land(field, lamp(source), floor_plate(40));
   for (int band = 0; band < 2; ++band)
@@ -239,12 +238,7 @@ double irradiance_at(const FlowIrradiance& landed, int band, const Vector3d& poi
 }
 
 TEST(FlowIrradianceTest, ABodyHasTheLightOfAPlateInItsPlace) {
-  const TensorField field = cube_field(17, [](const Vector3d& p) {
-    Matrix3d T = Matrix3d::Zero();
-    T(0, 0) = p.x();
-    T(1, 0) = 0.5;
-    return T;
-  });
+  const TensorField field = bending_field();
   const LandingLight light = sun({0.2, 0.1, -1});
   Plate plate = floor_plate(8);
   const Vector3d normal = Vector3d(0.3, -0.2, 1).normalized();
@@ -268,12 +262,7 @@ TEST(FlowIrradianceTest, ABodyHasTheLightOfAPlateInItsPlace) {
 }
 
 TEST(FlowIrradianceTest, ABodyHasAPointsLightOfAPlateInItsPlace) {
-  const TensorField field = cube_field(17, [](const Vector3d& p) {
-    Matrix3d T = Matrix3d::Zero();
-    T(0, 0) = p.x();
-    T(1, 0) = 0.5;
-    return T;
-  });
+  const TensorField field = bending_field();
   const LandingLight light = lamp({0.5, 0.3, 4});
   Plate plate = floor_plate(5);
   const Vector3d normal = Vector3d(0.3, -0.2, 1).normalized();

