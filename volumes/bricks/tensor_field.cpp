@@ -60,8 +60,9 @@ TensorField::TensorField(const BlockSource& source, const Interpolant& interpola
   const CoefficientBricks bricks = coefficient_bricks(table, active, interpolant);
   std::vector<double> norms(table.shapes.size());
   const auto place = [&](std::size_t i, const TensorBlock& block, const BrickMemory& blocks) {
-    const std::optional<double> norm =
-        place_values(block, blocks.components, blocks.brick(bricks.index.find(table.places[i])));
+    const std::uint32_t at = bricks.index.find(table.places[i]);
+    if (at == BrickIndex::missing) return true;  // It has no active voxel.
+    const std::optional<double> norm = place_values(block, blocks.components, blocks.brick(at));
     if (norm) norms[i] = *norm;
     return norm.has_value();
   };
