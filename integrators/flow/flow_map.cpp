@@ -9,7 +9,7 @@
 #include <tbb/parallel_for.h>
 
 #include "base/geometry/box.h"
-#include "base/process/kept_results.h"
+#include "base/process/job.h"
 #include "integrators/flow/flow_triangles.h"
 #include "integrators/flow/flow_vertices.h"
 
@@ -87,7 +87,7 @@ class FlowMapBuilder {
     vertices_.trace_new();
     while (divide_quads())
       if (settings_.show) settings_.show([&] { return with_triangles(map()); });
-    if (settings_.kept && settings_.kept->is_shard()) vertices_.keep();
+    vertices_.keep();
     FlowMap map = with_triangles(vertices_.take());
     map.is_complete = is_complete_;
     return map;
@@ -115,8 +115,8 @@ class FlowMapBuilder {
   /// Whether a first quad belongs to the part of this shard. Blocks of a shard are far apart, so that shards have
   /// nearly the same work.
   bool is_in_part(std::uint32_t row, std::uint32_t column) const {
-    if (!settings_.kept) return true;
-    const WorkPart part = settings_.kept->part();
+    if (!settings_.job || !settings_.is_kept || !settings_.job->is_shard) return true;
+    const WorkPart part = settings_.job->part();
     const std::size_t step = std::max<std::size_t>(1, part.count * 3 / 8);
     return (column / block_size + row / block_size * step) % part.count == part.index;
   }

@@ -21,9 +21,8 @@
 
 namespace tensorray {
 
-class KeptResults;
+class Job;
 class RayMemory;
-class Team;
 struct FlowMap;
 
 struct FlowSettings {
@@ -48,14 +47,12 @@ struct FlowSettings {
 
   std::size_t most_starts = std::size_t{1} << 20;  ///< Refinement stops at so many vertices; > 0.
 
-  Team* team = nullptr;  ///< Processes that trace the same map with this one, each a part of its rays; null: alone.
+  Job* job = nullptr;  ///< Whose ranks trace the map together, each a part of its rays; null: alone.
 
-  /// Vertices that an earlier run or a shard has traced, for the same field and light; the map is the same. It keeps
-  /// its own there while it is traced. Where they are those of a shard, the map is only that of the shard's part: first
-  /// quads in blocks, of which each shard has some everywhere. Null: none is kept.
-  KeptResults* kept = nullptr;
-  std::uint64_t key = 0;  ///< A number of this map among those that are kept together and may have other surfaces
-                          ///< before the plate.
+  /// Whether the map is a unit of the job, which keeps where the light of its vertices lands: when it is complete, if
+  /// that took long. A map that finds landings there is the same, without tracing them. Of a shard, it is only that of
+  /// its part: first quads in blocks, of which each shard has some everywhere.
+  bool is_kept = false;
 
   /// Called after each division of quads, with a function that makes the map so far. Empty: nobody wants it.
   std::function<void(const std::function<FlowMap()>& so_far)> show;
@@ -176,7 +173,7 @@ inline bool jumps(bool is_torn, const Eigen::Vector2d& a, const Eigen::Vector2d&
 ///
 /// The result is the same for any number of threads and processes; but the numbers of rays, steps and tensor samples
 /// are those of this process. @throw std::invalid_argument if a setting is out of range or there is no plate;
-/// Cancelled; as Team::exchange.
+/// Cancelled; as Ranks::all_gather.
 FlowMap trace_flow_map(const TensorField& field, const Geometry& geometry, const Beam& beam,
                        const BendingSettings& bending, const FlowSettings& settings, const Progress& progress);
 

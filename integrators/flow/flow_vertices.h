@@ -2,22 +2,29 @@
 /// @file integrators/flow/flow_vertices.h
 /// The vertices of a flow map, and where their light lands. A part of flow_map.cpp.
 
+#include <array>
 #include <cstddef>
 #include <cstdint>
+#include <string>
+#include <string_view>
+#include <unordered_map>
 #include <vector>
 
 #include <Eigen/Core>
 
-#include "base/process/kept_results.h"
-#include "base/process/team.h"
+#include "base/process/job.h"
 #include "integrators/flow/flow_lattice.h"
 #include "integrators/flow/flow_map.h"
 #include "integrators/flow/wavelength_tracer.h"
 
 namespace tensorray {
 
-/// Adds vertices at points of a lattice, and traces their light: on all threads, with the settings' team, and only
-/// where it is not among the results that the settings keep. Not to be used by two threads at once.
+/// What the landings of a vertex depend on, beside the map's settings: where its light starts, and a hash of the
+/// landings of its parents.
+using VertexKey = std::array<std::uint64_t, 3>;
+
+/// Adds vertices at points of a lattice, and traces their light: on all threads, with the ranks of the settings' job,
+/// and only where it is not among the landings that the job keeps. Not to be used by two threads at once.
 class FlowVertices {
  public:
   /// @param settings  With a plate. All arguments must outlive it.
@@ -28,10 +35,10 @@ class FlowVertices {
   std::uint32_t at(std::uint32_t patch, std::uint32_t x, std::uint32_t y, const Parents& parents = {});
 
   /// Traces the light of those that were added; their parents must have been traced before. @throw Cancelled; as
-  /// Team::exchange.
+  /// Ranks::all_gather; DamagedArchive.
   void trace_new();
 
-  /// Keeps the landings of all, if the settings keep results.
+  /// Keeps the landings of all, if the map is kept, and is that of a shard or took long.
   void keep();
 
   /// The wavelength samples at which there are lengths.
@@ -51,15 +58,18 @@ class FlowVertices {
     Parents parents;
   };
 
-  void trace_round(std::size_t end);
-  void trace_tasks(std::size_t end, std::vector<std::uint8_t>& is_traced);
+  struct KeyHash {
+    std::size_t operator()(const VertexKey& key) const;
+  };
+
   void trace_vertices(std::size_t begin, std::size_t end);
-  void exchange_landings(Team& team, std::size_t end);
-  void copy_landings(std::size_t begin, std::size_t end, PartBytes& bytes);
+  void copy_landings(std::size_t begin, std::size_t end, Archive& archive);
+  std::size_t landing_bytes() const;
   std::uint64_t hash_of_landings(std::size_t vertex) const;
-  ResultKey key_of(std::size_t vertex) const;
+  VertexKey key_of(std::size_t vertex) const;
+  std::string name_of(std::size_t part) const;
+  void find_kept();
   bool restore(std::size_t vertex);
-  void add_kept(std::size_t begin, std::size_t end);
 
   const Beam& beam_;
   const FlowSettings& settings_;
@@ -67,9 +77,9 @@ class FlowVertices {
   WavelengthTracer tracer_;
   FlowMap map_;
   std::vector<Start> starts_;
-  std::size_t traced_ = 0;        // Number of vertices that have landings.
-  std::size_t added_ = 0;         // Number of those that were added to what is kept.
-  const std::uint64_t map_hash_;  // Of what landings depend on, beside their vertex.
+  std::size_t traced_ = 0;                                         // Number of vertices that have landings.
+  std::vector<Result> found_;                                      // What the job has kept of this map.
+  std::unordered_map<VertexKey, std::string_view, KeyHash> kept_;  // Landings in it.
 };
 
 }  // namespace tensorray

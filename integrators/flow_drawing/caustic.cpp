@@ -53,15 +53,15 @@ struct Worker {
   std::vector<double> densities{};
 };
 
-struct Job {
+struct Drawing {
   const FlowMap& map;
   const FlowPieces& pieces;
   const Eigen::Vector2i plate;
   const std::vector<CausticBand>& bands;
   double beam_area = 0;
-  Team* team = nullptr;
+  Ranks* ranks = nullptr;
   const Progress& progress;
-  std::size_t groups = 0;           // That are drawn, by all processes, in all strips and passes.
+  std::size_t groups = 0;           // That are drawn, by all ranks, in all strips and passes.
   std::atomic<std::size_t>& drawn;  // Of these.
 };
 
@@ -83,22 +83,22 @@ std::vector<BandRun> runs_at(Detail detail, const std::vector<CausticBand>& band
   return runs;
 }
 
-void set_landings(const Job& job, const FlowPiece& piece, double sample, Worker& worker) {
+void set_landings(const Drawing& drawing, const FlowPiece& piece, double sample, Worker& worker) {
   const std::size_t count = piece.vertices.size();
   worker.at.resize(count);
   worker.box.setEmpty();
   if (!piece.always_lands) {
     worker.ends.resize(count);
     for (std::size_t i = 0; i < count; ++i) {
-      const FlowLanding landing = landing_at(job.map, piece.vertices[i], sample);
+      const FlowLanding landing = landing_at(drawing.map, piece.vertices[i], sample);
       worker.at[i] = landing.at;
       worker.ends[i] = landing.end;
     }
     return;
   }
-  const auto before = std::min(static_cast<std::size_t>(sample), job.map.wavelengths - 1);
+  const auto before = std::min(static_cast<std::size_t>(sample), drawing.map.wavelengths - 1);
   const Eigen::Vector2f *const a = &piece.landings[before * count],
-                               *const b = &piece.landings[std::min(before + 1, job.map.wavelengths - 1) * count];
+                               *const b = &piece.landings[std::min(before + 1, drawing.map.wavelengths - 1) * count];
   const double part = sample - static_cast<double>(before);
   for (std::size_t i = 0; i < count; ++i) {
     worker.at[i] = (1 - part) * a[i].cast<double>() + part * b[i].cast<double>();
@@ -111,14 +111,14 @@ using Power = std::array<double, ray_end_count>;
 
 /// The density of a triangle for its edges. Light that is not spread over an area is added here.
 /// @param carried  Its power.
-double start_triangle(const Job& job, const FlowPiece& piece, const FlowPiece::Triangle& triangle, double carried,
-                      Worker& worker, Power& power) {
+double start_triangle(const Drawing& drawing, const FlowPiece& piece, const FlowPiece::Triangle& triangle,
+                      double carried, Worker& worker, Power& power) {
   const auto [a, b, c] = triangle.corners;
   const std::vector<Eigen::Vector2d>& at = worker.at;
   const auto landed = [&](std::uint16_t corner) { return piece.always_lands || worker.ends[corner] == RayEnd::plate; };
   const auto count = [&](RayEnd end, double part) { power[static_cast<int>(end)] += part * carried; };
   if (landed(a) && landed(b) && landed(c) && !jumps(triangle.is_torn, at[a], at[b], at[c])) {
-    const double on_plate = worker.is_all_on_plate ? 1 : part_on_plate(at[a], at[b], at[c], job.plate);
+    const double on_plate = worker.is_all_on_plate ? 1 : part_on_plate(at[a], at[b], at[c], drawing.plate);
     count(RayEnd::plate, on_plate);
     count(RayEnd::missed, 1 - on_plate);
     return worker.deposit.triangle(at[a], at[b], at[c], carried);
@@ -128,7 +128,7 @@ double start_triangle(const Job& job, const FlowPiece& piece, const FlowPiece::T
       count(worker.ends[corner], 1.0 / 3);
       continue;
     }
-    count(is_on_plate(at[corner], job.plate) ? RayEnd::plate : RayEnd::missed, 1.0 / 3);
+    count(is_on_plate(at[corner], drawing.plate) ? RayEnd::plate : RayEnd::missed, 1.0 / 3);
     worker.deposit.add_point(at[corner], carried / 3);
   }
   return 0;
@@ -148,9 +148,10 @@ void even_out(double& a, double& b, double area_a, double area_b) {
 
 /// Draws a piece at one place among the wavelength samples.
 /// @param unit  The power of a triangle of unit area.
-void draw_piece(const Job& job, const FlowPiece& piece, double sample, double unit, Worker& worker, Power& power) {
-  set_landings(job, piece, sample, worker);
-  const Eigen::AlignedBox2d plate(Eigen::Vector2d::Zero(), job.plate.cast<double>());
+void draw_piece(const Drawing& drawing, const FlowPiece& piece, double sample, double unit, Worker& worker,
+                Power& power) {
+  set_landings(drawing, piece, sample, worker);
+  const Eigen::AlignedBox2d plate(Eigen::Vector2d::Zero(), drawing.plate.cast<double>());
   if (piece.always_lands && !plate.intersects(worker.box)) {
     power[static_cast<int>(RayEnd::missed)] += unit * piece.area;
     return;
@@ -159,7 +160,7 @@ void draw_piece(const Job& job, const FlowPiece& piece, double sample, double un
   std::vector<double>& densities = worker.densities;
   densities.clear();
   for (const FlowPiece::Triangle& triangle : piece.triangles)
-    densities.push_back(start_triangle(job, piece, triangle, unit * triangle.area, worker, power));
+    densities.push_back(start_triangle(drawing, piece, triangle, unit * triangle.area, worker, power));
   for (const FlowPiece::Edge& edge : piece.edges)
     if (edge.is_diagonal)
       even_out(densities[edge.along], densities[edge.against], piece.triangles[edge.along].area,
@@ -181,15 +182,15 @@ AreaDeposit::PlaneWeights plane_weights_of(const Pass& pass, const BandRun& run)
 }
 
 /// Light without colour has power, too.
-bool counts_power(const Job& job, const Pass& pass, const BandRun& run) {
-  const auto first = job.bands.begin() + static_cast<std::ptrdiff_t>(run.first);
+bool counts_power(const Drawing& drawing, const Pass& pass, const BandRun& run) {
+  const auto first = drawing.bands.begin() + static_cast<std::ptrdiff_t>(run.first);
   return std::any_of(first, first + static_cast<std::ptrdiff_t>(run.count),
                      [&](const CausticBand& band) { return pass.counts(band); });
 }
 
-void add_power(const Job& job, const Pass& pass, const BandRun& run, const Power& power, PowerSums& sums) {
+void add_power(const Drawing& drawing, const Pass& pass, const BandRun& run, const Power& power, PowerSums& sums) {
   for (std::size_t i = run.first; i < run.first + run.count; ++i) {
-    const CausticBand& band = job.bands[i];
+    const CausticBand& band = drawing.bands[i];
     if (!pass.counts(band)) continue;
     for (int end = 0; end < ray_end_count; ++end)
       sums[band.channel][end] += static_cast<std::uint64_t>(power_unit * band.weight * power[end]);
@@ -198,18 +199,18 @@ void add_power(const Job& job, const Pass& pass, const BandRun& run, const Power
 
 /// Draws the triangles of a group at all their places.
 /// @param counts  Whether their power is counted.
-void draw_group(const Job& job, const Pass& pass, std::size_t group, bool counts, Worker& worker) {
-  for (const FlowPiece& piece : pieces_of(job.pieces, group))
-    for (const BandRun& run : runs_at(piece.detail, job.bands)) {
+void draw_group(const Drawing& drawing, const Pass& pass, std::size_t group, bool counts, Worker& worker) {
+  for (const FlowPiece& piece : pieces_of(drawing.pieces, group))
+    for (const BandRun& run : runs_at(piece.detail, drawing.bands)) {
       const AreaDeposit::PlaneWeights plane_weights = plane_weights_of(pass, run);
-      if (plane_weights == AreaDeposit::PlaneWeights{} && !(counts && counts_power(job, pass, run))) continue;
+      if (plane_weights == AreaDeposit::PlaneWeights{} && !(counts && counts_power(drawing, pass, run))) continue;
       worker.deposit.set_plane_weights(plane_weights);
       Power power{};
       const int parts = std::max(piece.detail, 0) + 1;
       for (int part = 0; part < parts; ++part)
-        draw_piece(job, piece, run.sample + ((part + 0.5) / parts - 0.5) * run.width, 1 / job.beam_area / parts, worker,
-                   power);
-      if (counts) add_power(job, pass, run, power, worker.power);
+        draw_piece(drawing, piece, run.sample + ((part + 0.5) / parts - 0.5) * run.width, 1 / drawing.beam_area / parts,
+                   worker, power);
+      if (counts) add_power(drawing, pass, run, power, worker.power);
     }
 }
 
@@ -227,16 +228,9 @@ struct Strip {
   }
 };
 
-/// As many rows as the memory of all threads allows, of the process that has most of them. The result does not depend
-/// on it.
-std::vector<Strip> strips_of(const Eigen::Vector2i& plate, Team* team) {
-  auto threads = static_cast<std::size_t>(tbb::this_task_arena::max_concurrency());
-  if (team) {
-    std::vector<std::size_t> all(team->count(), threads);
-    exchange_parts(*team, all.size(), all.size(),
-                   [&](std::size_t process, PartBytes& bytes) { bytes.copy(&all[process], sizeof all[process]); });
-    threads = *std::max_element(all.begin(), all.end());
-  }
+/// As many rows as the memory of all threads of the root allows. The result does not depend on it.
+std::vector<Strip> strips_of(const Eigen::Vector2i& plate, Ranks* ranks) {
+  const auto threads = static_cast<std::size_t>(broadcast(ranks, tbb::this_task_arena::max_concurrency()));
   const std::size_t row = 8 * planes * (static_cast<std::size_t>(plate.x()) + 3);
   const int rows = static_cast<int>(std::clamp<std::size_t>(most_memory / (threads * row), 1, plate.y()));
   std::vector<Strip> strips;
@@ -320,37 +314,33 @@ void add_power(const PowerSums& more, PowerSums& power) {
     for (int end = 0; end < ray_end_count; ++end) power[channel][end] += more[channel][end];
 }
 
-/// Gives process 0 what this one has drawn of a strip.
-/// @param deposits  Of the threads. They are joined, and process 0 adds those of the others.
-/// @param power     Of this process; at process 0, of all.
-void collect_strip(const Job& job, const Strip& strip, std::vector<AreaDeposit>& deposits, PowerSums& power) {
-  if (deposits.empty()) deposits.emplace_back(job.plate.x(), job.plate.y(), strip.first, strip.end);
+/// Gives the root what this rank has drawn of a strip.
+/// @param deposits  Of the threads. They are joined, and the root adds those of the others.
+/// @param power     Of this rank; at the root, of all.
+void gather_strip(const Drawing& drawing, const Strip& strip, std::vector<AreaDeposit>& deposits, PowerSums& power) {
+  if (deposits.empty()) deposits.emplace_back(drawing.plate.x(), drawing.plate.y(), strip.first, strip.end);
   for (; deposits.size() > 1; deposits.pop_back()) deposits[0].add(deposits.back().sums());
-  const std::size_t processes = job.team->count();
-  collect_parts(*job.team, processes, processes, [&](std::size_t, PartBytes& bytes) {
-    PowerSums more = power;
-    std::vector<std::uint64_t> sums = deposits[0].sums();
-    bytes.copy(more.data(), more.size() * sizeof more[0]);
-    bytes.copy(sums.data(), sums.size() * sizeof sums[0]);
-    if (!bytes.reads()) return;
-    add_power(more, power);
-    deposits[0].add(sums);
+  gather_in_turn(drawing.ranks, [&](Archive& archive) {
+    for (auto& of_channel : power) archive.copy_sums(of_channel.data(), of_channel.size());
+    std::vector<std::uint64_t> sums = archive.reads() ? std::vector<std::uint64_t>() : deposits[0].sums();
+    archive.copy_list(sums);
+    if (archive.reads()) deposits[0].add(sums);
   });
 }
 
-void draw_strip(const Job& job, const Pass& pass, const Strip& strip, PowerSums& power) {
+void draw_strip(const Drawing& drawing, const Pass& pass, const Strip& strip, PowerSums& power) {
   const std::thread::id caller = std::this_thread::get_id();
-  const int width = job.plate.x(), height = job.plate.y();
+  const int width = drawing.plate.x(), height = drawing.plate.y();
   tbb::enumerable_thread_specific<Worker> workers([&] {
     return Worker{AreaDeposit(width, height, strip.first, strip.end), PowerSums(power.size())};
   });
-  tbb::parallel_for(std::size_t{0}, job.pieces.groups(), [&](std::size_t group) {
-    if (job.progress.cancelled) throw Cancelled();
-    const bool counts = strip.counts(job.pieces.rows[group], height);
-    if (does_part(job.team, group) && (counts || strip.has_light(job.pieces.rows[group])))
-      draw_group(job, pass, group, counts, workers.local());
-    const std::size_t drawn = ++job.drawn;
-    if (std::this_thread::get_id() == caller) job.progress.update("drawing light", drawn, job.groups);
+  tbb::parallel_for(std::size_t{0}, drawing.pieces.groups(), [&](std::size_t group) {
+    if (drawing.progress.cancelled) throw Cancelled();
+    const bool counts = strip.counts(drawing.pieces.rows[group], height);
+    if (is_mine(drawing.ranks, group) && (counts || strip.has_light(drawing.pieces.rows[group])))
+      draw_group(drawing, pass, group, counts, workers.local());
+    const std::size_t drawn = ++drawing.drawn;
+    if (std::this_thread::get_id() == caller) drawing.progress.update("drawing light", drawn, drawing.groups);
   });
   std::vector<AreaDeposit> deposits;
   PowerSums drawn(power.size());
@@ -359,9 +349,9 @@ void draw_strip(const Job& job, const Pass& pass, const Strip& strip, PowerSums&
     deposits.push_back(std::move(worker.deposit));
     add_power(worker.power, drawn);
   }
-  if (job.team) collect_strip(job, strip, deposits, drawn);
+  if (drawing.ranks) gather_strip(drawing, strip, deposits, drawn);
   add_power(drawn, power);
-  if (!deposits.empty() && has_all(job.team)) add_to_films(pass, deposits, strip, width);
+  if (!deposits.empty() && is_root(drawing.ranks)) add_to_films(pass, deposits, strip, width);
 }
 
 }  // namespace
@@ -381,13 +371,13 @@ Caustic draw_caustic(const FlowMap& map, const Plate& plate, const std::vector<C
   for (const CausticBand& band : bands) widest = std::max(widest, band.width);
   const FlowPieces pieces = divide_map(map, widest / settings.step, joined_bands(bands));
   const std::vector<Pass> passes = passes_of(bands, area / plate.pixel_area(), caustic);
-  const std::vector<Strip> strips = strips_of(plate.resolution, settings.team);
+  const std::vector<Strip> strips = strips_of(plate.resolution, settings.ranks);
   const std::size_t all = passes.size() * strips.size() * pieces.groups();
   std::atomic<std::size_t> drawn{0};
-  const Job job{map, pieces, plate.resolution, bands, area, settings.team, progress, all, drawn};
+  const Drawing drawing{map, pieces, plate.resolution, bands, area, settings.ranks, progress, all, drawn};
   PowerSums power(channels);
   for (const Pass& pass : passes)
-    for (const Strip& strip : strips) draw_strip(job, pass, strip, power);
+    for (const Strip& strip : strips) draw_strip(drawing, pass, strip, power);
   for (std::size_t channel = 0; channel < channels; ++channel)
     for (int end = 0; end < ray_end_count; ++end)
       caustic.power[channel][end] = static_cast<double>(power[channel][end]) / power_unit;

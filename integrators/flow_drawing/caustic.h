@@ -10,7 +10,7 @@
 #include <Eigen/Core>
 
 #include "base/process/progress.h"
-#include "base/process/team.h"
+#include "base/process/ranks.h"
 #include "integrators/flow/flow_map.h"
 #include "renderer/film/film.h"
 
@@ -40,7 +40,7 @@ struct CausticSettings {
   std::size_t channels = 1;
   bool by_channel = true;    ///< Whether the result has the irradiance of each channel.
   double step = usual_step;  ///< Pixels.
-  Team* team = nullptr;      ///< Processes that have the same map and draw it together; null: this one is alone.
+  Ranks* ranks = nullptr;    ///< Who have the same map, and draw it together; null: this process is alone.
 };
 
 /// Draws each triangle once for each `step` by which its light moves, from the first band to the last; for every two
@@ -50,9 +50,9 @@ struct CausticSettings {
 /// missed.
 /// @param plate  The plate of the map.
 /// @param bands  In the order of their places, without gaps between those that have a width.
-/// The sums are integers, so that the result is the same for any number of threads and processes; only process 0 of a
-/// team has it. Memory: the films, and 32 bytes for each pixel and thread, if this is no more than 256 MiB; else the
-/// plate is drawn in strips. @throw Cancelled; as Team::exchange.
+/// The sums are integers, so that the result is the same for any number of threads and ranks; only the root has it.
+/// Memory: the films, and 32 bytes for each pixel and thread, if this is no more than 256 MiB; else the
+/// plate is drawn in strips. @throw Cancelled; as Ranks::gather.
 Caustic draw_caustic(const FlowMap& map, const Plate& plate, const std::vector<CausticBand>& bands,
                      const CausticSettings& settings, const Progress& progress);
 

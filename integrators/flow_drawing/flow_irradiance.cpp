@@ -4,11 +4,11 @@
 #include <cmath>
 #include <utility>
 
+#include <fmt/core.h>
 #include <tbb/parallel_for.h>
 
 #include "base/constants.h"
-#include "base/process/kept_results.h"
-#include "base/process/team.h"
+#include "base/process/job.h"
 #include "integrators/flow/flow_map.h"
 #include "integrators/flow/wavelength_tracer.h"
 #include "integrators/flow_drawing/caustic.h"
@@ -102,9 +102,7 @@ FlowSettings flow_settings(const LandingLight& light, const Plate& plate, const 
   settings.plate = plate;
   settings.tolerance = landing_tolerance;
   settings.most_starts = wanted.rays;
-  settings.team = wanted.team;
-  settings.kept = wanted.kept;
-  settings.key = wanted.key;
+  settings.job = wanted.job;
   return settings;
 }
 
@@ -146,13 +144,13 @@ std::vector<float> sheets_of(const FlowMap& map, const Eigen::Vector2i& resoluti
 
 /// Copies the light of a direction to or from bytes.
 /// @param folds  Of the first direction; else null.
-void copy_light(PartBytes& bytes, const Eigen::Vector2i& resolution, std::size_t channels, Film& irradiance,
+void copy_light(Archive& archive, const Eigen::Vector2i& resolution, std::size_t channels, Film& irradiance,
                 std::vector<float>* folds) {
-  if (bytes.reads()) irradiance = Film(resolution.x(), resolution.y(), static_cast<int>(channels));
-  bytes.copy(irradiance.values.data(), irradiance.values.size() * sizeof irradiance.values[0]);
+  if (archive.reads()) irradiance = Film(resolution.x(), resolution.y(), static_cast<int>(channels));
+  archive.copy(irradiance.values.data(), irradiance.values.size() * sizeof irradiance.values[0]);
   if (!folds) return;
   folds->resize(irradiance.plane_size());
-  bytes.copy(folds->data(), folds->size() * sizeof(float));
+  archive.copy(folds->data(), folds->size() * sizeof(float));
 }
 
 }  // namespace
@@ -174,6 +172,7 @@ std::optional<FlowIrradiance> flow_irradiance(const TensorField& field, const Su
   result.plate = part_of(plate, box, settings.resolution);
   const FlowSettings tracing = flow_settings(light, result.plate, settings);
   const std::size_t channels = light.flexibilities.size() - 1;
+  Ranks* const ranks = settings.job ? settings.job->ranks : nullptr;
   for (int pass = 0; pass < light.passes; ++pass) {
     Film irradiance;  // Of this direction.
     const auto make = [&] {
@@ -181,12 +180,14 @@ std::optional<FlowIrradiance> flow_irradiance(const TensorField& field, const Su
       const FlowMap map = trace_flow_map(field, geometry, beam, settings.bending, tracing, progress);
       CausticSettings drawing;
       drawing.channels = channels;
-      drawing.team = settings.team;
+      drawing.ranks = ranks;
       irradiance = draw_caustic(map, result.plate, bands_of(light, map, tracing), drawing, progress).irradiance;
+      broadcast_list(ranks, irradiance.values);
       if (pass == 0) result.folds = sheets_of(map, result.plate.resolution);
     };
-    find_or_make(settings.kept, {settings.key, static_cast<std::uint64_t>(pass), 0}, make, [&](PartBytes& bytes) {
-      copy_light(bytes, result.plate.resolution, channels, irradiance, pass == 0 ? &result.folds : nullptr);
+    const std::string name = fmt::format("{}map {} {}", light_name, settings.number, pass);
+    find_or_make(settings.job, name, make, [&](Archive& archive) {
+      copy_light(archive, result.plate.resolution, channels, irradiance, pass == 0 ? &result.folds : nullptr);
     });
     if (pass == 0) {
       result.irradiance = std::move(irradiance);
@@ -196,7 +197,6 @@ std::optional<FlowIrradiance> flow_irradiance(const TensorField& field, const Su
       result.irradiance.values[i] += irradiance.values[i];
   }
   for (double& value : result.irradiance.values) value /= light.passes;
-  if (settings.team) share_values(*settings.team, result.irradiance.values);
   return result;
 }
 

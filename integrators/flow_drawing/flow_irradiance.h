@@ -14,8 +14,7 @@
 
 namespace tensorray {
 
-class KeptResults;
-class Team;
+class Job;
 
 struct LandingLight {
   std::optional<Eigen::Vector3d> source;                  ///< Of a point light: where it is, outside the volume.
@@ -27,12 +26,11 @@ struct LandingLight {
 
 struct FlowIrradianceSettings {
   BendingSettings bending;
-  int resolution = 64;          ///< Pixels along the longer side of the part of the plate where light lands.
-  std::size_t rays = 1 << 16;   ///< Vertices of the flow map, at most, for each direction.
-  Team* team = nullptr;         ///< Processes that compute the same together; null: this one is alone.
-  KeptResults* kept = nullptr;  ///< The light of directions, and vertices of one that is not complete, that earlier
-                                ///< runs have made. Null: none is kept.
-  std::uint64_t key = 0;        ///< A number of this light among all that is kept.
+  int resolution = 64;         ///< Pixels along the longer side of the part of the plate where light lands.
+  std::size_t rays = 1 << 16;  ///< Vertices of the flow map, at most, for each direction.
+  Job* job = nullptr;          ///< Whose ranks compute the light together, and which keeps that of each direction;
+                               ///< null: alone.
+  std::uint64_t number = 0;    ///< Of this light among all that are kept.
 };
 
 struct FlowIrradiance {
@@ -49,7 +47,7 @@ struct FlowIrradiance {
 /// are
 ///               projected on it, from the source if there is one.
 /// @return nothing if no light lands, or if the light meets the plane before the volume. The same for any number of
-/// threads, and at all processes of a team of any size. @throw Cancelled; as Team::exchange.
+/// threads, and at all ranks of any number. @throw Cancelled; as Ranks::all_gather.
 std::optional<FlowIrradiance> flow_irradiance(const TensorField& field, const Surfaces& surfaces, const Plate& plate,
                                               const LandingLight& light, const FlowIrradianceSettings& settings,
                                               const Progress& progress);

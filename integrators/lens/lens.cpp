@@ -1,16 +1,15 @@
 #include "integrators/lens/lens.h"
 
 #include <algorithm>
-#include <atomic>
 #include <cmath>
 #include <functional>
 #include <stdexcept>
-#include <thread>
 
 #include <Eigen/Geometry>
 #include <Eigen/LU>
 #include <tbb/parallel_for.h>
 
+#include "base/process/job.h"
 #include "base/process/seconds.h"
 #include "integrators/flow_drawing/flow_view.h"
 #include "integrators/lens/lens_places.h"
@@ -94,8 +93,8 @@ FlowSettings flow_settings(const LensLight& light) {
   settings.finest = gathers(light) ? finest_of_gather : finest_of_scatter;
   settings.silhouette = false;
   settings.beside = gathers(light) && light.setup.image.wraps;
-  settings.team = light.settings.team;
-  settings.kept = light.settings.kept;
+  settings.job = light.settings.job;
+  settings.is_kept = true;
   settings.most_starts =
       most_starts + starts_per_pixel * static_cast<std::size_t>(light.setup.receiver.resolution.prod());
   return settings;
@@ -146,22 +145,19 @@ void draw_tile(const LensView& view, int tile, LensPicture& picture, TraceCounts
     }
 }
 
-/// Gives process 0 the tiles that this process has drawn.
-void collect_tiles(const LensView& view, Team& team, LensPicture& picture) {
-  const auto tiles = static_cast<std::size_t>(view.flow.tiles());
-  collect_parts(team, tiles, FlowView::tiles_at_once, [&](std::size_t tile, PartBytes& bytes) {
-    const Eigen::AlignedBox2i box = view.flow.pixels(static_cast<int>(tile));
-    const auto columns = static_cast<std::size_t>(box.sizes().x()) + 1;
-    for (int y = box.min().y(); y <= box.max().y(); ++y) {
-      const std::size_t first = static_cast<std::size_t>(y) * static_cast<std::size_t>(picture.color.width) +
-                                static_cast<std::size_t>(box.min().x());
-      const auto copy = [&](auto* values) { bytes.copy(values + first, columns * sizeof *values); };
-      for (int c = 0; c < 3; ++c) copy(picture.color.plane(c));
-      for (int c = 0; c < picture.radiance.channels; ++c) copy(picture.radiance.plane(c));
-      copy(picture.alpha.data());
-      copy(picture.points.data());
-    }
-  });
+/// Copies the pixels of a tile to or from bytes.
+void copy_tile(const LensView& view, int tile, LensPicture& picture, Archive& archive) {
+  const Eigen::AlignedBox2i box = view.flow.pixels(tile);
+  const auto columns = static_cast<std::size_t>(box.sizes().x()) + 1;
+  for (int y = box.min().y(); y <= box.max().y(); ++y) {
+    const std::size_t first = static_cast<std::size_t>(y) * static_cast<std::size_t>(picture.color.width) +
+                              static_cast<std::size_t>(box.min().x());
+    const auto copy = [&](auto* values) { archive.copy(values + first, columns * sizeof *values); };
+    for (int c = 0; c < 3; ++c) copy(picture.color.plane(c));
+    for (int c = 0; c < picture.radiance.channels; ++c) copy(picture.radiance.plane(c));
+    copy(picture.alpha.data());
+    copy(picture.points.data());
+  }
 }
 
 void count_places(const LensView& view, LensPicture& picture) {
@@ -229,10 +225,10 @@ LensLight trace_lens(const TensorField& field, const Surfaces& surfaces, const B
     flow.show = [&](const std::function<FlowMap()>& so_far) {
       settings.show([&]() -> const LensLight& {
         light.map = so_far();
-        light.settings.team = nullptr;
+        light.settings.job = nullptr;
         return light;
       });
-      light.settings.team = settings.team;
+      light.settings.job = settings.job;
     };
   light.map = trace_flow_map(field, light.planes.geometry(), beam_from(from, starts, along), bending, flow, progress);
   light.seconds_tracing = seconds_since(start);
@@ -255,18 +251,13 @@ LensPicture draw_lens(const LensLight& light, const std::vector<LensBand>& bands
 
   const LensView view = make_lens_view(light, bands, radiance);
   std::vector<TraceCounts> counts(static_cast<std::size_t>(view.flow.tiles()));
-  std::atomic<std::uint64_t> done{0};
-  const std::thread::id caller = std::this_thread::get_id();
-  progress.update("drawing the picture", 0, counts.size());
-  tbb::parallel_for(0, view.flow.tiles(), [&](int tile) {
-    if (progress.cancelled) throw Cancelled();
-    if (!does_part(light.settings.team, static_cast<std::size_t>(tile))) return;
-    draw_tile(view, tile, picture, counts[static_cast<std::size_t>(tile)]);
-    const std::uint64_t drawn = ++done;
-    if (std::this_thread::get_id() == caller) progress.update("drawing the picture", drawn, counts.size());
-  });
-  if (light.settings.team) collect_tiles(view, *light.settings.team, picture);
-  if (gathers(light) && has_all(light.settings.team)) count_places(view, picture);
+  Units tiles;
+  tiles.count = counts.size();
+  tiles.round = FlowView::tiles_at_once;
+  tiles.make = [&](std::size_t tile) { draw_tile(view, static_cast<int>(tile), picture, counts[tile]); };
+  tiles.copy = [&](std::size_t tile, Archive& archive) { copy_tile(view, static_cast<int>(tile), picture, archive); };
+  make_units(tiles, light.settings.job, "drawing the picture", progress);
+  if (gathers(light) && is_root(light.settings.job ? light.settings.job->ranks : nullptr)) count_places(view, picture);
   picture.counts = {light.map.ray_steps, light.map.tensor_samples};
   for (const TraceCounts& each : counts) picture.counts += each;
   picture.seconds_drawing = seconds_since(start);

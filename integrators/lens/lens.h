@@ -16,7 +16,6 @@
 #include <Eigen/Geometry>
 
 #include "base/process/progress.h"
-#include "base/process/team.h"
 #include "integrators/bending/light_channel.h"
 #include "integrators/flow/flow_map.h"
 #include "integrators/lens/lens_map.h"
@@ -25,9 +24,9 @@
 
 namespace tensorray {
 
-/// Two different maps. Their results differ where the field acts between different planes; see docs/scenes.md.
-class KeptResults;
+class Job;
 
+/// Two different maps. Their results differ where the field acts between different planes; see docs/scenes.md.
 enum class LensMode {
   gather,  ///< Parallel light leaves every pixel of the receiver against the light and bends with −s. The pixel shows
            ///< the point of the image where the light arrives. Every pixel is covered.
@@ -71,8 +70,8 @@ struct LensSettings {
   std::vector<double> flexibilities;
   bool range = false;
 
-  Team* team = nullptr;         ///< Processes that trace the same light and draw it together; null: this one is alone.
-  KeptResults* kept = nullptr;  ///< As FlowSettings has it; with those of a shard, the light cannot be drawn.
+  Job* job = nullptr;  ///< As FlowSettings has it; its ranks draw the light together, too. That of a shard cannot be
+                       ///< drawn.
 
   /// Called after each division of the map's quads, with a function that gives the light so far, which this process
   /// alone can draw. Empty: nobody wants it.
@@ -137,16 +136,16 @@ struct LensLight {
 
 /// Traces the light.
 /// @param surfaces  Bounds, cut and obstacles of the scene; its plate is not used.
-/// `field` and the image's texture must outlive the result, which is the same for any number of threads and processes.
-/// @throw std::invalid_argument if a setting is out of range; Cancelled; as Team::exchange.
+/// `field` and the image's texture must outlive the result, which is the same for any number of threads and ranks.
+/// @throw std::invalid_argument if a setting is out of range; Cancelled; as Ranks::all_gather.
 LensLight trace_lens(const TensorField& field, const Surfaces& surfaces, const BendingSettings& bending,
                      const LensSetup& setup, const LensSettings& settings, const Progress& progress);
 
 /// The picture that `bands` make up.
 /// @param channels    Number of channels; the bands of a channel follow each other.
 /// @param by_channel  Whether the result has the radiance of each channel.
-/// @throw Cancelled; as Team::exchange. The result is the same for any number of threads and processes; only process 0
-/// of a team has it.
+/// @throw Cancelled; as Ranks::gather. The result is the same for any number of threads and ranks; only the root has
+/// it.
 LensPicture draw_lens(const LensLight& light, const std::vector<LensBand>& bands, const LensRadiance& radiance,
                       std::size_t channels, bool by_channel, const Progress& progress);
 

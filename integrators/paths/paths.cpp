@@ -5,9 +5,8 @@
 #include <stdexcept>
 
 #include <tbb/enumerable_thread_specific.h>
-#include <tbb/parallel_for.h>
 
-#include "base/process/team.h"
+#include "base/process/job.h"
 #include "integrators/paths/joined_ray.h"
 #include "integrators/paths/path_thinning.h"
 #include "integrators/steps/path_tensors.h"
@@ -16,9 +15,9 @@
 namespace tensorray {
 namespace {
 
-constexpr std::size_t chunk_size = 4096;  // Paths between two progress reports.
-constexpr std::size_t batch_size = 32;    // Paths that are traced together: a packet of rays.
-constexpr double closest = 1e-9;          // Points nearer to each other than this, in voxels, count as one.
+constexpr std::size_t batch_size = 32;      // Paths that are traced together: a packet of rays.
+constexpr std::size_t round_batches = 128;  // That ranks give each other at once.
+constexpr double closest = 1e-9;            // Points nearer to each other than this, in voxels, count as one.
 
 /// What the threads share and do not change.
 struct PathJob {
@@ -99,19 +98,12 @@ void trace_batch(const PathJob& job, const PathSeed* seeds, std::size_t count, P
   }
 }
 
-/// Takes the batches that the others of the team have traced.
-/// @param paths  `count` ones, from the first batch on.
-void exchange_batches(Team& team, Path* paths, std::size_t count) {
-  const std::size_t batches = (count + batch_size - 1) / batch_size;
-  exchange_parts(team, batches, batches, [&](std::size_t batch, PartBytes& bytes) {
-    for (Path* path = paths + batch * batch_size; path != paths + std::min((batch + 1) * batch_size, count); ++path) {
-      bytes.copy_vector(path->points);
-      bytes.copy(&path->flexibility, sizeof path->flexibility);
-      bytes.copy(&path->wavelength, sizeof path->wavelength);
-      bytes.copy(&path->end, sizeof path->end);
-      bytes.copy(&path->backward_end, sizeof path->backward_end);
-    }
-  });
+void copy_path(Path& path, Archive& archive) {
+  archive.copy_list(path.points);
+  archive.copy(path.flexibility);
+  archive.copy(path.wavelength);
+  archive.copy(path.end);
+  archive.copy(path.backward_end);
 }
 
 }  // namespace
@@ -125,20 +117,21 @@ std::vector<Path> trace_paths(const TensorField& field, const Geometry& geometry
   PathJob job{field, geometry, bending, settings};
   job.voxel = std::cbrt(std::abs(field.to_world().linear().determinant()));
   std::vector<Path> paths(seeds.size());
-  Team* const team = seeds.size() > chunk_size ? settings.team : nullptr;  // A few are traced sooner than sent.
   tbb::enumerable_thread_specific<PathWorker> workers;
-  for (std::size_t first = 0; first < seeds.size(); first += chunk_size) {
-    progress.update("tracing paths", first, seeds.size());
-    const std::size_t count = std::min(chunk_size, seeds.size() - first);
-    tbb::parallel_for(std::size_t{0}, (count + batch_size - 1) / batch_size, [&](std::size_t batch) {
-      if (progress.cancelled) throw Cancelled();
-      if (!does_part(team, batch)) return;
-      const std::size_t begin = first + batch * batch_size, end = std::min(begin + batch_size, first + count);
-      trace_batch(job, &seeds[begin], end - begin, workers.local(), &paths[begin]);
-    });
-    if (team) exchange_batches(*team, &paths[first], count);
-  }
-  progress.update("tracing paths", seeds.size(), seeds.size());
+  Units batches;
+  batches.count = (seeds.size() + batch_size - 1) / batch_size;
+  batches.for_all = true;
+  batches.round = round_batches;
+  const auto begin_of = [](std::size_t batch) { return batch * batch_size; };
+  const auto end_of = [&](std::size_t batch) { return std::min((batch + 1) * batch_size, seeds.size()); };
+  batches.make = [&](std::size_t batch) {
+    const std::size_t begin = begin_of(batch);
+    trace_batch(job, &seeds[begin], end_of(batch) - begin, workers.local(), &paths[begin]);
+  };
+  batches.copy = [&](std::size_t batch, Archive& archive) {
+    for (std::size_t i = begin_of(batch); i < end_of(batch); ++i) copy_path(paths[i], archive);
+  };
+  make_units(batches, settings.job, "tracing paths", progress);
   return paths;
 }
 

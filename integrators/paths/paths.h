@@ -13,7 +13,7 @@
 
 namespace tensorray {
 
-class Team;
+class Job;
 
 /// A point and direction of a path, and its light.
 struct PathSeed {
@@ -37,8 +37,7 @@ struct PathSettings {
   double tensor_tolerance =
       0.02;  ///< In T, as a fraction of the greatest norm of T there; >= 0. Unused without tensors.
 
-  /// Processes that trace the same paths together, if these are thousands, and all have them; null: this one is alone.
-  Team* team = nullptr;
+  Job* job = nullptr;  ///< Whose ranks trace the paths together, and all have them; null: alone.
 };
 
 /// The path of one ray, in the light's direction. Points are those that `trace` records, thinned; lengths increase from
@@ -53,7 +52,7 @@ struct Path {
 };
 
 /// One path for each seed, in the order of the seeds. The result is the same for any number of threads
-/// and processes. @throw std::invalid_argument if a setting is out of range; Cancelled; as Team::exchange.
+/// and ranks. @throw std::invalid_argument if a setting is out of range; Cancelled; as Ranks::all_gather.
 std::vector<Path> trace_paths(const TensorField& field, const Geometry& geometry, const BendingSettings& bending,
                               const std::vector<PathSeed>& seeds, const PathSettings& settings,
                               const Progress& progress);

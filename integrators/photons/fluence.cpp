@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstring>
 #include <numeric>
 #include <stdexcept>
 #include <utility>
@@ -10,7 +9,6 @@
 #include <Eigen/LU>
 #include <tbb/parallel_for.h>
 
-#include "base/process/work.h"
 #include "volumes/grids/voxel_walk.h"
 
 namespace tensorray {
@@ -114,33 +112,25 @@ void FluenceSums::add(std::size_t channel, const RayRecord& ray) {
   }
 }
 
-/// The number of planes; then, for each block with light, its number and its sums.
-void FluenceSums::append_sums(std::string& bytes) const {
-  const auto append = [&](std::uint64_t value) { bytes.append(reinterpret_cast<const char*>(&value), sizeof value); };
-  append(planes_);
-  for (std::size_t block = 0; block < blocks_.size(); ++block) {
-    const Sum* const sums = blocks_[block].load();
-    if (!sums) continue;
-    append(block);
-    for (std::size_t i = 0; i < planes_ * TensorBlock::voxels; ++i) append(sums[i].load(std::memory_order_relaxed));
-  }
-}
-
-void FluenceSums::add_sums(std::string_view bytes) {
-  constexpr std::size_t size = sizeof(std::uint64_t);
-  const std::size_t of_block = planes_ * TensorBlock::voxels, record = size * (1 + of_block);
-  const auto number = [&](std::size_t at) {
-    std::uint64_t value = 0;
-    std::memcpy(&value, bytes.data() + at, size);
-    return value;
-  };
-  if (bytes.size() % record != size || number(0) != planes_) throw DamagedWork("fluence that was kept has other bands");
-  for (std::size_t at = size; at < bytes.size(); at += record) {
-    const std::uint64_t block = number(at);
-    if (block >= blocks_.size()) throw DamagedWork("fluence that was kept is that of another field");
+/// The number of planes, and that of blocks with light; then for each of these its number and its sums.
+void FluenceSums::copy_sums(Archive& archive) {
+  std::size_t planes = planes_, lit = lit_blocks();
+  archive.copy(planes);
+  archive.copy(lit);
+  if (planes != planes_) throw DamagedArchive("the fluence that was kept has other bands");
+  const std::size_t of_block = planes_ * TensorBlock::voxels;
+  std::vector<std::uint64_t> values(of_block);
+  std::size_t block = 0;
+  for (std::size_t i = 0; i < lit; ++i, ++block) {
+    while (!archive.reads() && !blocks_[block].load()) ++block;
+    archive.copy(block);
+    if (block >= blocks_.size()) throw DamagedArchive("the fluence that was kept is that of another field");
+    archive.require(archive.reads() ? of_block : 0, sizeof values[0]);
     Sum* const sums = sums_of(static_cast<std::uint32_t>(block));
-    for (std::size_t i = 0; i < of_block; ++i)
-      sums[i].fetch_add(number(at + size * (1 + i)), std::memory_order_relaxed);
+    for (std::size_t k = 0; k < of_block && !archive.reads(); ++k) values[k] = sums[k].load(std::memory_order_relaxed);
+    archive.copy(values.data(), of_block * sizeof values[0]);
+    for (std::size_t k = 0; k < of_block && archive.reads(); ++k)
+      sums[k].fetch_add(values[k], std::memory_order_relaxed);
   }
 }
 
@@ -174,9 +164,13 @@ ScalarGrid FluenceSums::grid_of(std::size_t first_plane, const std::vector<doubl
   return grid;
 }
 
+std::size_t FluenceSums::lit_blocks() const {
+  return static_cast<std::size_t>(
+      std::count_if(blocks_.begin(), blocks_.end(), [](const auto& block) { return block.load(); }));
+}
+
 std::size_t FluenceSums::memory_bytes() const {
-  const auto lit = std::count_if(blocks_.begin(), blocks_.end(), [](const auto& block) { return block.load(); });
-  return static_cast<std::size_t>(lit) * planes_ * TensorBlock::voxels * sizeof(Sum) +
+  return lit_blocks() * planes_ * TensorBlock::voxels * sizeof(Sum) +
          places_.size() * (sizeof(places_[0]) + sizeof(blocks_[0])) + index_.memory_bytes();
 }
 

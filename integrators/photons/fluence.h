@@ -5,10 +5,9 @@
 #include <atomic>
 #include <cstdint>
 #include <memory>
-#include <string>
-#include <string_view>
 #include <vector>
 
+#include "base/process/archive.h"
 #include "integrators/bending/ray_record.h"
 #include "volumes/bricks/brick_index.h"
 #include "volumes/bricks/tensor_field.h"
@@ -40,12 +39,9 @@ class FluenceSums {
   /// Adds a ray of the channel. Any number of threads may add rays at once.
   void add(std::size_t channel, const RayRecord& ray);
 
-  /// Appends the sums so far to `bytes`; not while rays are added.
-  void append_sums(std::string& bytes) const;
-
-  /// Adds the sums of other rays. @throw std::runtime_error if they are those of other channels, bands or another
-  /// field.
-  void add_sums(std::string_view bytes);
+  /// Writes the sums so far, or adds those of other rays; not while rays are added. @throw DamagedArchive if they are
+  /// those of other bands or another field.
+  void copy_sums(Archive& archive);
 
   /// The grids, as fog volumes: the one of all channels, then, with `bands`, one for each channel (1 is the undisturbed
   /// beam of that channel). Voxels that light has reached are active. The grids have no names yet. Runs on all threads.
@@ -58,6 +54,7 @@ class FluenceSums {
  private:
   using Sum = std::atomic<std::uint64_t>;
 
+  std::size_t lit_blocks() const;
   Sum* sums_of(std::uint32_t block);
   ScalarGrid grid_of(std::size_t first_plane, const std::vector<double>& weights) const;
 

@@ -14,8 +14,7 @@ namespace {
 
 constexpr double least_interval = 0.2;        // Seconds between states that are kept.
 constexpr double tracing_for_keeping = 20;    // Tracing takes so many times longer than keeping.
-constexpr std::uint64_t chunks_in_round = 2;  // That each process of a team traces before it hears from the others.
-constexpr std::size_t most_in_message = 1u << 30;  // Bytes.
+constexpr std::uint64_t chunks_in_round = 2;  // That each rank traces before it hears from the others.
 
 int rays_per_position(const std::vector<LightChannel>& channels, const PhotonSettings& settings) {
   const int count = static_cast<int>(channels.size());
@@ -64,116 +63,93 @@ PhotonDistribution distribution_of(const PhotonJob& job, const PhotonSums& sums)
   return result;
 }
 
-/// The units of the work, one after the other. A unit is every so many chunks. Of a team, all processes do each unit
-/// together, chunk by chunk in turn; process 0 alone has the states of units.
-class PhotonUnits {
+/// The parts of the photons, one after the other. A part is every so many chunks, which ranks trace in turn.
+class PhotonParts {
  public:
-  explicit PhotonUnits(const PhotonJob& job)
+  explicit PhotonParts(const PhotonJob& job)
       : job_(job),
-        work_(job.settings.work),
-        team_(job.settings.team),
-        units_(of_first(team_, work_ ? std::max(work_->size(), work_->part().count) : std::size_t{1})),
-        tracer_(job) {
-    if (work_) work_->begin(units_);
-  }
+        kept_(job.settings.job),
+        ranks_(kept_ ? kept_->ranks : nullptr),
+        parts_(kept_ ? kept_->part().count : 1),
+        tracer_(job),
+        all_(empty_sums(job)) {}
 
-  /// At process 0.
+  /// At the root.
   PhotonDistribution run() {
-    for (std::size_t unit = 0; unit < units_; ++unit)
-      if (units_ == 1 || of_first(team_, !work_ || work_->wants(unit))) trace_unit(unit);
-    if (!has_all(team_)) return {};
-    if (units_ > 1) add_units();
+    for (std::size_t part = 0; part < parts_; ++part)
+      if (!kept_ || kept_->has(part)) trace_part(part);
+    if (!is_root(ranks_) || (kept_ && kept_->is_shard)) return {};
     job_.progress.update("tracing photons", job_.positions.candidates(), job_.positions.candidates());
     const auto start = Clock::now();
-    PhotonDistribution result = distribution_of(job_, sums_);
-    result.photons = joined_chunks(std::move(sums_.photons));
+    PhotonDistribution result = distribution_of(job_, all_);
+    result.photons = joined_chunks(std::move(all_.photons));
     result.seconds_tracing = tracer_.seconds_tracing();
     result.seconds_density = tracer_.seconds_density() + seconds_since(start);
     return result;
   }
 
  private:
-  /// Its memory is freed first.
-  void clear_sums() {
-    sums_ = PhotonSums();
-    sums_ = empty_sums(job_);
-  }
-
-  /// Begins with what was kept of a unit.
-  void restore(std::size_t unit) {
-    const auto state = work_ ? work_->state(unit) : nullptr;
-    if (!state) return;
-    try {
-      add_bytes(*state, sums_);
-    } catch (const std::runtime_error&) {
-      if (!job_.settings.restarts) throw;
-      clear_sums();
+  /// Traces what is left of a part: every chunk whose number, divided by the number of parts, leaves that of the part.
+  /// Until they are gathered, other ranks than the root have sums of their own.
+  void trace_part(std::size_t part) {
+    const std::string name = "photons " + std::to_string(part);
+    const std::uint64_t before = all_.candidates, chunks = (job_.chunks() + parts_ - 1 - part) / parts_;
+    if (const Result found = kept_ && is_root(ranks_) ? kept_->find(name) : nullptr) {
+      Archive archive(*found);
+      copy_sums(archive, all_);
+      archive.finish();
     }
-  }
-
-  /// Traces what is left of a unit: every chunk whose number, divided by the number of units, leaves that of the unit.
-  void trace_unit(std::size_t unit) {
-    clear_sums();
-    restore(unit);
-    const std::uint64_t chunks = unit < job_.chunks() ? (job_.chunks() - unit - 1) / units_ + 1 : 0;
-    const std::uint64_t members = team_ ? team_->count() : 1, member = team_ ? team_->index() : 0;
-    const std::uint64_t round = team_ ? chunks_in_round * members : 1;
-    std::uint64_t next = of_first(team_, (sums_.candidates + job_.chunk_size() - 1) / job_.chunk_size());
+    const std::uint64_t step = ranks_ ? ranks_->count() : 1, mine = ranks_ ? ranks_->rank() : 0;
+    const std::uint64_t round = ranks_ ? chunks_in_round * step : 1;
+    std::uint64_t next = broadcast(ranks_, (all_.candidates - before + job_.chunk_size() - 1) / job_.chunk_size());
     while (next < chunks) {
       const std::uint64_t end = std::min(next + round, chunks);
-      for (std::uint64_t i = next + member; i < end; i += members) tracer_.trace(unit + i * units_, sums_);
+      for (std::uint64_t i = next + mine; i < end; i += step) tracer_.trace(part + i * parts_, all_);
       next = end;
-      if (work_) work_->fraction = static_cast<double>(next) / static_cast<double>(chunks);
-      if (next < chunks && of_first(team_, is_due())) keep(unit, false);
+      if (kept_) kept_->fraction = static_cast<double>(next) / static_cast<double>(chunks);
+      // What a picture follows from at once, or has other parts in it, is not kept: it takes memory.
+      if (next < chunks && broadcast(ranks_, is_due())) keep(name);
     }
-    keep(unit, true);
+    kept_ && kept_->is_shard ? keep(name) : gather();
   }
 
   bool is_due() const {
-    const bool is_wanted = job_.settings.show && work_ && work_->picture_wanted;
+    const bool is_wanted = job_.settings.show && kept_ && kept_->picture_wanted;
     const double interval = std::max(least_interval, tracing_for_keeping * seconds_keeping_);
-    return work_ && (is_wanted || seconds_since(kept_) > interval);
+    return kept_ && (parts_ == 1 || kept_->is_shard) && (is_wanted || seconds_since(time_kept_) > interval);
   }
 
-  /// Brings what the team has traced to process 0, and keeps it there.
-  void keep(std::size_t unit, bool is_done) {
+  /// Brings what the ranks have traced to the root.
+  void gather() {
+    gather_in_turn(ranks_, [&](Archive& archive) { copy_sums(archive, all_); });
+    if (is_root(ranks_)) return;
+    all_ = PhotonSums();  // Its memory is freed first.
+    all_ = empty_sums(job_);
+  }
+
+  void keep(const std::string& name) {
     const auto start = Clock::now();
-    if (team_) {
-      const std::string mine = has_all(team_) ? std::string() : bytes_of(sums_);
-      collect_in_turn(*team_, mine, most_in_message, [&](const std::string& bytes) { add_bytes(bytes, sums_); });
-    }
-    if (!has_all(team_)) {
-      clear_sums();
-      return;
-    }
-    // What a picture follows from at once, and is all there is, need not be kept: it takes memory.
-    if (work_ && (!is_done || units_ > 1 || work_->is_shard)) work_->keep(unit, bytes_of(sums_), is_done);
+    gather();
+    if (!is_root(ranks_)) return;
+    Archive archive;
+    copy_sums(archive, all_);
+    kept_->keep(name, archive.take());
     seconds_keeping_ = seconds_since(start);
-    if (!is_done) show();
-    kept_ = Clock::now();
-  }
-
-  void show() const {
-    if (!job_.settings.show || !work_ || !work_->picture_wanted.exchange(false)) return;
-    PhotonDistribution result = distribution_of(job_, sums_);
-    result.photons = joined_chunks(sums_.photons);
-    job_.settings.show(std::move(result));
-  }
-
-  /// What all units have.
-  void add_units() {
-    clear_sums();
-    for (std::size_t unit = 0; unit < units_; ++unit)
-      if (const auto state = work_->state(unit)) add_bytes(*state, sums_);
+    if (job_.settings.show && kept_->picture_wanted.exchange(false)) {
+      PhotonDistribution result = distribution_of(job_, all_);
+      result.photons = joined_chunks(all_.photons);
+      job_.settings.show(std::move(result));
+    }
+    time_kept_ = Clock::now();
   }
 
   const PhotonJob& job_;
-  Work* const work_;
-  Team* const team_;
-  const std::size_t units_;
+  Job* const kept_;
+  Ranks* const ranks_;
+  const std::size_t parts_;
   ChunkTracer tracer_;
-  PhotonSums sums_;  // Of the unit.
-  Clock::time_point kept_ = Clock::now();
+  PhotonSums all_;
+  Clock::time_point time_kept_ = Clock::now();
   double seconds_keeping_ = 0;
 };
 
@@ -191,7 +167,7 @@ PhotonDistribution distribute_photons(const TensorField& field, const Geometry& 
   job.rays_per_position = rays;
   job.channels_per_ray = static_cast<int>(channels.size()) / rays;
   job.ray_area = positions.area_per_candidate() * static_cast<double>(channels.size()) / rays;
-  return PhotonUnits(job).run();
+  return PhotonParts(job).run();
 }
 
 }  // namespace tensorray

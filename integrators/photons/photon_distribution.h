@@ -6,9 +6,8 @@
 #include <functional>
 #include <vector>
 
+#include "base/process/job.h"
 #include "base/process/progress.h"
-#include "base/process/team.h"
-#include "base/process/work.h"
 #include "integrators/bending/bending.h"
 #include "integrators/bending/geometry.h"
 #include "integrators/bending/light_channel.h"
@@ -41,17 +40,12 @@ struct PhotonSettings {
   /// one for each channel. Compared with 32 channels this takes a third of the time and a tenth of the memory.
   std::vector<Eigen::Vector3d> colors;
 
-  /// Keeps what was traced, every now and then; null: nothing is kept. It has as many units as it has parts, or as it
-  /// was given. States of units depend on the kinds of outputs: those that are wanted must have been from the
-  /// beginning.
-  Work* work = nullptr;
+  /// Keeps what was traced, every now and then, as "photons" and the number of a part: as many parts as the job has.
+  /// What is kept depends on the kinds of outputs: those that are wanted must have been from the beginning. Null:
+  /// alone, and nothing is kept.
+  Job* job = nullptr;
 
-  bool restarts = false;  ///< Whether a unit whose state is that of other outputs begins anew; else it is an error.
-
-  /// Processes that trace the photons together with this one; null: it is alone.
-  Team* team = nullptr;
-
-  /// Gets what there is so far when `work` wants a picture; may be empty. Called by the calling thread, at process 0.
+  /// Gets what there is so far when the job wants a picture; may be empty. Called by the calling thread, at the root.
   std::function<void(PhotonDistribution)> show;
 };
 
@@ -73,11 +67,10 @@ struct PhotonDistribution {
 };
 
 /// Emits parallel light, bends it through the field and estimates its density on the plate of `geometry`.
-/// The result is the same for any number of threads, processes and units. Of a team, only process 0 has it. Of work
-/// that has several parts, it is what the units that were given and those of this part have: incomplete, unless all
-/// units are done.
-/// @throw std::invalid_argument if a setting is out of range or `geometry` has no plate; std::runtime_error if the
-/// states of `work` are those of other light or outputs; Cancelled; as Team::exchange.
+/// The result is the same for any number of threads, ranks and parts. Of ranks, only the root has it. Of a shard, it is
+/// empty: what its part has is kept.
+/// @throw std::invalid_argument if a setting is out of range or `geometry` has no plate; DamagedArchive if what was
+/// kept is of other light or outputs; Cancelled; as Ranks::gather.
 PhotonDistribution distribute_photons(const TensorField& field, const Geometry& geometry, const Beam& beam,
                                       const std::vector<LightChannel>& channels, const PhotonSettings& settings,
                                       const Progress& progress);

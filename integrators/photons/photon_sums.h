@@ -5,14 +5,12 @@
 
 #include <cstddef>
 #include <cstdint>
-#include <functional>
 #include <map>
 #include <memory>
 #include <optional>
-#include <string>
 #include <vector>
 
-#include "base/process/team.h"
+#include "base/process/archive.h"
 #include "integrators/bending/light_channel.h"
 #include "integrators/photons/fluence.h"
 #include "renderer/density/density.h"
@@ -33,15 +31,8 @@ struct PhotonSums {
   std::map<std::uint64_t, std::vector<PlatePhoton>> photons;  ///< By the number of their chunk.
 };
 
-std::string bytes_of(const PhotonSums& sums);
-
-/// Adds the sums of other photons. What these sums do not want is left out.
-/// @throw std::runtime_error if the bytes are those of other light, or have not all that is wanted.
-void add_bytes(const std::string& bytes, PhotonSums& sums);
-
-/// Gives process 0 what all others have, one after the other, so that it has the bytes of one at a time.
-/// @param at_once  The most bytes of a message; > 0. @param take  Called at process 0. @throw as Team::collect.
-void collect_in_turn(Team& team, const std::string& mine, std::size_t at_once,
-                     const std::function<void(const std::string& bytes)>& take);
+/// Writes the sums, or adds those of other photons. What these sums do not want is left out.
+/// @throw DamagedArchive if they are those of other light, or have not all that is wanted.
+void copy_sums(Archive& archive, PhotonSums& sums);
 
 }  // namespace tensorray

@@ -17,8 +17,7 @@
 
 namespace tensorray {
 
-class KeptResults;
-class Team;
+class Job;
 
 /// The stretch at P₀ is ln σ / L, in 1/length, where σ is the greatest singular value of ∂P(L)/∂P₀. P(L) is the point
 /// of the ray from P₀ at length L, and P₀ moves across the light. The distance of two rays grows by a factor of at most
@@ -29,9 +28,8 @@ struct StretchSettings {
   double flexibility = 0.2;                               ///< s.
   double length = 1;                                      ///< L, world units; > 0.
 
-  Team* team = nullptr;         ///< Processes that compute the same together, for process 0; null: alone.
-  KeptResults* kept = nullptr;  ///< Rows of pictures and blocks of grids that an earlier run or a shard has computed.
-                                ///< Where they are those of a shard, only its own are computed; the others are NaN.
+  Job* job = nullptr;  ///< Keeps rows of pictures, and columns of blocks of grids, its units; null: alone. Of a shard,
+                       ///< the others are NaN. Only the root of its ranks has the result.
 
   /// Called from time to time with the picture so far, where it is NaN beyond; empty: nobody wants it.
   std::function<void(const std::vector<float>& picture)> show;
@@ -47,13 +45,13 @@ std::vector<float> stretches(const TensorField& field, const Geometry& geometry,
 /// The stretch at every point of a lattice in the volume, along the axes of the field's voxels. Voxels without a value
 /// are inactive.
 /// @param resolution  Voxels along the longest side of the extent in index space; the spacing is the same on all axes.
-/// The result is the same for any number of threads and processes. @throw std::invalid_argument if a setting is out of
-/// range; Cancelled; as Team::collect.
+/// The result is the same for any number of threads and ranks. @throw std::invalid_argument if a setting is out of
+/// range; Cancelled; as Ranks::gather.
 ScalarGrid stretch_grid(const TensorField& field, const Geometry& geometry, const BendingSettings& bending,
                         const StretchSettings& settings, int resolution, const Progress& progress);
 
 /// The stretch at every pixel of a rectangle, row by row. The result is the same for any number of threads and
-/// processes. @throw as stretch_grid.
+/// ranks. @throw as stretch_grid.
 std::vector<float> stretch_picture(const TensorField& field, const Geometry& geometry, const BendingSettings& bending,
                                    const StretchSettings& settings, const Plate& pixels, const Progress& progress);
 

@@ -16,7 +16,6 @@
 #include "python/module/scene_request.h"
 #include "python/module/work.h"
 #include "scenes/jobs/origin.h"
-#include "scenes/jobs/read_shards.h"
 #include "scenes/jobs/work_file.h"
 #include "scenes/outputs/picture_outputs.h"
 #include "scenes/outputs/statistics_json.h"
@@ -59,9 +58,9 @@ Render merge(const Scene& scene, const Json& origin, const std::vector<std::stri
   WorkFile work = read_shards(shards);
   const std::string other = difference(work.origin, origin);
   if (!other.empty()) throw std::runtime_error(printable("the scene has changed since its shards were made: " + other));
-  RenderJob job{Work({}, std::move(work.units)), {}};
+  RenderJob job(work.part, std::move(work.results));
   Render result = render(scene, progress, &job);
-  if (job.work.stopping) throw Cancelled();
+  if (job.stopping) throw Cancelled();
   return result;
 }
 
@@ -94,9 +93,6 @@ std::shared_ptr<Rendered> render_for_python(const SceneRequest& request, const s
 /// Finds what would be an error of each shard, or after all of them, before the first one begins.
 void check_shards(const SceneRequest& request) {
   const RequestedScene requested = read_request(request);
-  const Method& method = requested.description.integrator.method();
-  if (!method.has_shards())
-    throw SceneError(std::string("shards: the work of ") + method.name() + " is one piece; render it without them");
   open_requested(requested);
 }
 
@@ -106,11 +102,11 @@ void render_shard(const SceneRequest& request, const WorkPart& part, const std::
   const RequestedScene requested = read_request(request);
   Scene scene = load_request(request, requested, progress);
   const Json origin = origin_of_request(request, scene);  // Now, while files are those that were loaded.
-  RenderJob job{Work(part), {}};
-  job.work.is_shard = true;
+  RenderJob job(part);
+  job.is_shard = true;
   render(scene, progress, &job);
-  if (job.work.stopping) throw Cancelled();
-  write_work(file, {origin, std::filesystem::absolute(scene.description.path), part, job.work.units()});
+  if (job.stopping) throw Cancelled();
+  write_work(file, {origin, std::filesystem::absolute(scene.description.path), part, true, job.results()});
 }
 
 /// Writes further files of a render: of kinds that it has made.

@@ -15,7 +15,6 @@
 
 #include "base/errors.h"
 #include "base/process/seconds.h"
-#include "base/process/work.h"
 #include "renderer/camera/picture_tile.h"
 
 namespace tensorray {
@@ -30,6 +29,7 @@ constexpr int neighborhood = 2;  ///< Pixels in each direction that help decide 
 /// Samples that are shaded together. Where light bends, their rays fill packets; otherwise, all that is known of them
 /// should stay in the cache of the first level.
 constexpr std::size_t bent_batch = 256, straight_batch = 32;
+constexpr double round_seconds = 15;      ///< After which ranks give their tiles to the root.
 constexpr double least_luminance = 0.05;  ///< To which errors are compared; fraction of the picture's mean.
 
 void require_valid(const Camera& camera, const PathTracerSettings& settings) {
@@ -56,21 +56,34 @@ void extend_means(const BandsIn& sum, int samples, double count, double* means) 
   for (Eigen::Index band = 0; band < sum.size(); ++band) means[band] += (sum[band] - samples * means[band]) / count;
 }
 
+std::string name_of(std::size_t tile) { return "tile " + std::to_string(tile); }
+
+/// Numbers of tiles.
+struct TileLists {
+  std::vector<std::size_t> part;              ///< Those of this run.
+  std::vector<std::size_t> wanted;            ///< Of them, those that this rank renders, and that are not done.
+  std::vector<std::size_t> extended;          ///< Those that have more samples than the root knows.
+  Clock::time_point gathered = Clock::now();  ///< When the root got the last ones.
+};
+
 class Rendering {
  public:
   Rendering(const ShadedScene& scene, const Camera& camera, const PathTracerSettings& settings,
-            const RenderCallbacks& callbacks, Work& work)
+            const RenderCallbacks& callbacks, Job& job)
       : scene_(scene),
         camera_(camera),
         settings_(settings),
         callbacks_(callbacks),
-        work_(work),
+        job_(job),
         width_(camera.resolution.x()),
         height_(camera.resolution.y()),
         columns_((width_ + tile_size - 1) / tile_size),
         tiles_(static_cast<std::size_t>(columns_) * ((height_ + tile_size - 1) / tile_size)),
         light_values_(scene.colors.bands() + 3 * static_cast<std::size_t>(scene.layers())),
-        batch_samples_(scene.region ? bent_batch : straight_batch) {}
+        batch_samples_(scene.region ? bent_batch : straight_batch) {
+    for (std::size_t number = 0; number < tiles_; ++number)
+      if (job.has(number)) lists_.part.push_back(number);
+  }
 
   SurfacePicture run();
 
@@ -86,15 +99,16 @@ class Rendering {
   };
 
   Tile load(std::size_t number) const;
-  std::vector<std::size_t> wanted() const;
+  bool is_of_rank(std::size_t place) const;
+  bool gather_tiles();
   double mean_luminance() const;
   void count_samples();
-  void count_tiles();
+  bool is_round_over() const;
   double time_used() const;
   int next_samples(int before) const;
   void add_ray(int x, int y, int sample, Batch& batch) const;
-  void pass(const std::vector<std::size_t>& tiles);
-  void extend(std::size_t number, Batch& batch);
+  void add_pass();
+  bool extend(std::size_t number, Batch& batch);
   void shade(Tile& tile, int before, int after, Batch& batch);
   void add_sample(PixelState& pixel, std::size_t number, Batch& batch) const;
   void add_light(Tile& tile, int x, int y, int samples, Batch& batch) const;
@@ -108,27 +122,25 @@ class Rendering {
   const Camera& camera_;
   const PathTracerSettings& settings_;
   const RenderCallbacks& callbacks_;
-  Work& work_;
+  Job& job_;
   const int width_, height_, columns_;  ///< Columns of tiles.
   const std::size_t tiles_;
   const std::size_t light_values_;  ///< For each pixel.
   const std::size_t batch_samples_;
   double floor_ = 0;  ///< Least luminance to which errors are compared.
   Clock::time_point start_ = Clock::now();
+  TileLists lists_;
   std::uint64_t total_samples_ = 0;
   std::atomic<std::uint64_t> finished_samples_{0};
 };
 
 SurfacePicture Rendering::run() {
-  work_.begin(tiles_);
   if (settings_.noise_threshold > 0) floor_ = least_luminance * mean_luminance();
   count_samples();
-  while (!work_.stopping) {
-    const std::vector<std::size_t> tiles = work_.next ? work_.next() : wanted();
-    if (tiles.empty()) break;
-    if (work_.next) count_tiles();
-    pass(tiles);
-  }
+  do {
+    lists_.gathered = Clock::now();
+    while (!job_.stopping && !lists_.wanted.empty() && !is_round_over()) add_pass();
+  } while (!job_.stopping && gather_tiles());
   return picture();
 }
 
@@ -149,27 +161,25 @@ double Rendering::mean_luminance() const {
   return std::accumulate(luminances.begin(), luminances.end(), 0.0) / static_cast<double>(luminances.size());
 }
 
-/// For the progress: counts the samples of the part, and those that are kept.
+/// Finds the tiles that are left for this rank. For the progress, counts their samples, and those that are kept.
 void Rendering::count_samples() {
   const auto most = static_cast<std::uint64_t>(settings_.max_samples);
-  for (std::size_t number = 0; number < tiles_; ++number) {
-    if (!work_.is_in_part(number)) continue;
-    const Tile tile = load(number);
+  for (std::size_t i = 0; i < lists_.part.size(); ++i) {
+    const Tile tile = load(lists_.part[i]);
+    if (!is_of_rank(i)) continue;
+    if (!tile.is_done) lists_.wanted.push_back(lists_.part[i]);
     total_samples_ += tile.pixels.size() * most;
     for (const PixelState& pixel : tile.pixels)
-      finished_samples_ += pixel.done != 0 ? most : static_cast<std::uint64_t>(pixel.samples);
+      finished_samples_ += pixel.done != 0 || tile.is_done ? most : static_cast<std::uint64_t>(pixel.samples);
   }
 }
 
-/// For the progress where other processes render tiles, too: counts the tiles of the part that are done.
-void Rendering::count_tiles() {
-  std::uint64_t done = 0, all = 0;
-  for (std::size_t number = 0; number < tiles_; ++number) {
-    all += work_.is_in_part(number) ? 1 : 0;
-    done += work_.is_in_part(number) && !work_.wants(number) ? 1 : 0;
-  }
-  if (all > 0) finished_samples_ = total_samples_ * done / all;
+/// Ranks render every so many tiles of the part: others in each row of tiles.
+bool Rendering::is_of_rank(std::size_t place) const {
+  return is_mine(job_.ranks, place + lists_.part[place] / static_cast<std::size_t>(columns_));
 }
+
+bool Rendering::is_round_over() const { return job_.ranks && seconds_since(lists_.gathered) > round_seconds; }
 
 /// The fraction of the time that is used up.
 double Rendering::time_used() const {
@@ -184,42 +194,74 @@ int Rendering::next_samples(int before) const {
   return time_used() < 1 ? std::min(before, most) : 0;
 }
 
-/// A tile as it is kept. @throw std::runtime_error if it is damaged.
+/// A tile as it is kept. @throw DamagedArchive.
 Tile Rendering::load(std::size_t number) const {
   const int left = static_cast<int>(number) % columns_ * tile_size,
             top = static_cast<int>(number) / columns_ * tile_size;
   Tile tile(left, top, std::min(tile_size, width_ - left), std::min(tile_size, height_ - top), light_values_);
-  if (const auto state = work_.state(number))
-    tile.set_bytes(*state);
-  else if (work_.is_in_part(number) && !work_.wants(number))
-    throw DamagedWork("a tile that was kept has no samples; render it again");
+  if (const Result kept = job_.find(name_of(number))) {
+    Archive archive(*kept);
+    tile.copy(archive);
+    archive.finish();
+  }
   return tile;
 }
 
-std::vector<std::size_t> Rendering::wanted() const {
-  std::vector<std::size_t> tiles;
-  for (std::size_t number = 0; number < tiles_; ++number)
-    if (work_.wants(number)) tiles.push_back(number);
-  return tiles;
-}
-
-/// Gives all `tiles` more samples.
-void Rendering::pass(const std::vector<std::size_t>& tiles) {
+/// Gives the tiles that are wanted more samples: ranks only so many as they can until the end of the round.
+void Rendering::add_pass() {
   const auto caller = std::this_thread::get_id();
-  tbb::parallel_for(std::size_t{0}, tiles.size(), [&](std::size_t i) {
-    if (work_.stopping) return;
+  std::vector<char> is_extended(lists_.wanted.size()), is_done(lists_.wanted.size());
+  tbb::parallel_for(std::size_t{0}, lists_.wanted.size(), [&](std::size_t i) {
+    if (job_.stopping || is_round_over()) return;
     Batch batch(scene_, settings_.shading);
-    extend(tiles[i], batch);
+    is_done[i] = extend(lists_.wanted[i], batch) ? 1 : 0;
+    is_extended[i] = 1;
     if (std::this_thread::get_id() != caller) return;
     if (callbacks_.progress) {
       const auto by_time = static_cast<std::uint64_t>(std::min(1.0, time_used()) * static_cast<double>(total_samples_));
       callbacks_.progress(std::max(finished_samples_.load(), by_time), total_samples_);
     }
-    if (callbacks_.show && work_.picture_wanted.exchange(false)) callbacks_.show(picture());
+    if (callbacks_.show && is_root(job_.ranks) && job_.picture_wanted.exchange(false)) callbacks_.show(picture());
   });
+  // Those that had no turn are the first of the next pass.
+  std::vector<std::size_t> next[2];
+  for (std::size_t i = 0; i < lists_.wanted.size(); ++i) {
+    if (is_extended[i] != 0) lists_.extended.push_back(lists_.wanted[i]);
+    if (is_done[i] == 0) next[static_cast<std::size_t>(is_extended[i])].push_back(lists_.wanted[i]);
+  }
+  lists_.wanted = std::move(next[0]);
+  lists_.wanted.insert(lists_.wanted.end(), next[1].begin(), next[1].end());
 }
 
-void Rendering::extend(std::size_t number, Batch& batch) {
+/// Gives the root the tiles that have more samples. @return whether any rank has tiles left.
+bool Rendering::gather_tiles() {
+  if (!job_.ranks) return !lists_.wanted.empty();
+  std::sort(lists_.extended.begin(), lists_.extended.end());
+  lists_.extended.erase(std::unique(lists_.extended.begin(), lists_.extended.end()), lists_.extended.end());
+  Archive mine;
+  std::size_t left = lists_.wanted.size(), sent = is_root(job_.ranks) ? 0 : lists_.extended.size();
+  mine.copy(left);
+  std::size_t all = 0;
+  for (const std::string& given : job_.ranks->all_gather(mine.take())) {
+    Archive(given).copy(left);
+    all += left;
+  }
+  gather_in_turn(job_.ranks, [&](Archive& archive) {
+    archive.copy(sent);
+    for (std::size_t i = 0; i < sent; ++i) {
+      std::size_t number = archive.reads() ? 0 : lists_.extended[i];
+      std::string bytes = archive.reads() ? std::string() : *job_.find(name_of(number));
+      archive.copy(number);
+      archive.copy_list(bytes);
+      if (archive.reads()) job_.keep(name_of(number), std::move(bytes));
+    }
+  });
+  lists_.extended.clear();
+  return all > 0;
+}
+
+/// @return whether the tile is done.
+bool Rendering::extend(std::size_t number, Batch& batch) {
   Tile tile = load(number);
   const int before = tile.samples(), more = next_samples(before), after = before + more;
   for (int y = 0; y < tile.height; ++y)
@@ -232,8 +274,11 @@ void Rendering::extend(std::size_t number, Batch& batch) {
     }
   shade(tile, before, after, batch);
   const bool has_enough = after == settings_.max_samples || (after >= settings_.min_samples && finish_pixels(tile));
-  const bool done = has_enough || more == 0;
-  work_.keep(number, tile.bytes(), done);
+  tile.is_done = has_enough || more == 0;
+  Archive archive;
+  tile.copy(archive);
+  job_.keep(name_of(number), archive.take());
+  return tile.is_done;
 }
 
 /// Adds the ray of a sample of pixel x, y of the picture.
@@ -369,8 +414,8 @@ SurfacePicture render_surfaces(const ShadedScene& scene, const Camera& camera, c
                                const RenderCallbacks& callbacks) {
   require_valid(camera, settings);
   require_shadable(scene, settings.shading);
-  Work own;
-  return Rendering(scene, camera, settings, callbacks, callbacks.work ? *callbacks.work : own).run();
+  Job own;
+  return Rendering(scene, camera, settings, callbacks, callbacks.job ? *callbacks.job : own).run();
 }
 
 }  // namespace tensorray

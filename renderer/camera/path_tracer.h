@@ -9,7 +9,7 @@
 
 #include <Eigen/Core>
 
-#include "base/process/work.h"
+#include "base/process/job.h"
 #include "renderer/camera/camera.h"
 #include "renderer/camera/pixel_filter.h"
 #include "renderer/film/film.h"
@@ -70,12 +70,12 @@ struct RenderCallbacks {
   /// pixel stops early. May be empty. An exception that it throws ends the render and reaches the caller.
   std::function<void(std::uint64_t done, std::uint64_t total)> progress;
 
-  /// Keeps the tiles of the picture, its units; null: they are not needed. Only tiles of its part are rendered, and
-  /// only until it is stopping: others of the result are black, with 0 samples. The state of a tile depends on scene,
-  /// camera and settings alone.
-  Work* work = nullptr;
+  /// Keeps the tiles of the picture, its units, as "tile" and a number; null: they are not needed. Only tiles of its
+  /// part are rendered, and only until it is stopping: others of the result are black, with 0 samples. What is kept of
+  /// a tile depends on scene, camera and settings alone. Of its ranks, the root has the picture.
+  Job* job = nullptr;
 
-  /// Gets the picture so far if `work` wants it; on the thread that called `render_surfaces`, while others go on.
+  /// Gets the picture so far if the job wants it; on the thread that called `render_surfaces`, while others go on.
   std::function<void(const SurfacePicture&)> show;
 };
 

@@ -1,10 +1,6 @@
 #include "renderer/camera/picture_tile.h"
 
 #include <algorithm>
-#include <stdexcept>
-
-#include "base/process/work.h"
-#include "base/text/copy_bytes.h"
 
 namespace tensorray {
 
@@ -25,19 +21,12 @@ int Tile::samples() const {
   return most;
 }
 
-std::string Tile::bytes() const {
-  const std::size_t of_pixels = pixels.size() * sizeof(PixelState), of_light = light.size() * sizeof(double);
-  std::string bytes(of_pixels + of_light, 0);
-  copy_bytes(bytes.data(), pixels.data(), of_pixels);
-  copy_bytes(bytes.data() + of_pixels, light.data(), of_light);
-  return bytes;
-}
-
-void Tile::set_bytes(const std::string& bytes) {
-  const std::size_t of_pixels = pixels.size() * sizeof(PixelState), of_light = light.size() * sizeof(double);
-  if (bytes.size() != of_pixels + of_light) throw DamagedWork("a tile that was kept has another size");
-  copy_bytes(pixels.data(), bytes.data(), of_pixels);
-  copy_bytes(light.data(), bytes.data() + of_pixels, of_light);
+void Tile::copy(Archive& archive) {
+  std::uint64_t done = is_done;
+  archive.copy(done);
+  archive.copy(pixels.data(), pixels.size() * sizeof pixels[0]);
+  archive.copy(light.data(), light.size() * sizeof light[0]);
+  is_done = done != 0;
 }
 
 SurfacePicture empty_picture(int width, int height, const ShadedScene& scene) {

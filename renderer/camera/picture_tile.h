@@ -4,10 +4,10 @@
 
 #include <cstddef>
 #include <limits>
-#include <string>
 #include <type_traits>
 #include <vector>
 
+#include "base/process/archive.h"
 #include "renderer/camera/path_tracer.h"
 
 namespace tensorray {
@@ -38,6 +38,7 @@ struct Tile {
   std::size_t light_values;
   std::vector<PixelState> pixels;  ///< Row by row.
   std::vector<double> light;       ///< Means of each pixel's bands; then of red, green and blue of each layer.
+  bool is_done = false;            ///< Whether it gets no more samples.
 
   PixelState& pixel(int x, int y) { return pixels[static_cast<std::size_t>(y) * width + x]; }
   double* light_of(int x, int y) { return &light[(static_cast<std::size_t>(y) * width + x) * light_values]; }
@@ -45,9 +46,8 @@ struct Tile {
   /// The samples of pixels that are not done.
   int samples() const;
 
-  /// Pixels and light as bytes, and back. @throw std::runtime_error if the number of bytes is not that of the tile.
-  std::string bytes() const;
-  void set_bytes(const std::string& bytes);
+  /// To bytes or from them. @throw DamagedArchive if there are not so many.
+  void copy(Archive& archive);
 };
 
 /// A picture without samples, with the planes that one of the scene has.

@@ -2,14 +2,12 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstring>
 #include <stdexcept>
 
 #include <tbb/parallel_for.h>
 #include <tbb/partitioner.h>
 
 #include "base/constants.h"
-#include "base/process/work.h"
 #include "renderer/density/convolution.h"
 #include "renderer/density/mirror.h"
 
@@ -213,18 +211,7 @@ void DensityEstimator::deposit(std::uint32_t bucket) {
   }
 }
 
-void DensityEstimator::append_sums(std::string& bytes) const {
-  bytes.append(reinterpret_cast<const char*>(sums_.data()), sums_size());
-}
-
-void DensityEstimator::add_sums(std::string_view bytes) {
-  if (bytes.size() != sums_size()) throw DamagedWork("sums that were kept have another size");
-  for (std::size_t i = 0; i < sums_.size(); ++i) {
-    PixelColor more;
-    std::memcpy(&more, bytes.data() + i * sizeof more, sizeof more);
-    for (int k = 0; k < 4; ++k) sums_[i].values[k] += more.values[k];
-  }
-}
+void DensityEstimator::copy_sums(Archive& archive) { archive.copy_sums(&sums_[0].values[0], 4 * sums_.size()); }
 
 Film DensityEstimator::finish(double weight) const {
   const std::vector<std::vector<int>> rows = mirrored_rows(height_, margin_);

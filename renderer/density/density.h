@@ -3,12 +3,11 @@
 /// Density estimation: computes power per pixel from points on a plate.
 
 #include <optional>
-#include <string>
-#include <string_view>
 #include <vector>
 
 #include <Eigen/Core>
 
+#include "base/process/archive.h"
 #include "renderer/density/kernel_deposit.h"
 #include "renderer/density/point_buckets.h"
 #include "renderer/film/film.h"
@@ -59,12 +58,8 @@ class DensityEstimator {
   /// depend on their number.
   void add(const std::vector<DensityPoint>& points);
 
-  /// Appends the sums so far to `bytes`: sums_size() more.
-  std::size_t sums_size() const { return sums_.size() * sizeof sums_[0]; }
-  void append_sums(std::string& bytes) const;
-
-  /// Adds the sums of other points. @throw std::runtime_error if they are those of another estimator.
-  void add_sums(std::string_view bytes);
+  /// Writes the sums so far, or adds those of other points. @throw DamagedArchive if there are not so many.
+  void copy_sums(Archive& archive);
 
   /// Returns weight per pixel. @param weight  The weight of one point. Runs on all threads; the result does not depend
   /// on their number.

@@ -2,13 +2,11 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstring>
 #include <stdexcept>
 
 #include <Eigen/Eigenvalues>
 #include <Eigen/LU>
 
-#include "base/process/work.h"
 #include "renderer/density/mirror.h"
 
 namespace tensorray {
@@ -87,20 +85,12 @@ void FootprintDeposit::add(int channel, const Vector2d& at, const Matrix2d& axes
   for (const Tap& tap : taps) add_to_pixel(channel, tap.x, tap.y, tap.weight);
 }
 
-void FootprintDeposit::append_sums(std::string& bytes) const {
-  bytes.reserve(bytes.size() + sums_size());
-  for (const auto& sum : sums_) {
-    const std::int64_t value = sum.load(std::memory_order_relaxed);
-    bytes.append(reinterpret_cast<const char*>(&value), sizeof value);
-  }
-}
-
-void FootprintDeposit::add_sums(std::string_view bytes) {
-  if (bytes.size() != sums_size()) throw DamagedWork("sums that were kept have another size");
-  for (std::size_t i = 0; i < sums_.size(); ++i) {
-    std::int64_t value = 0;
-    std::memcpy(&value, bytes.data() + i * sizeof value, sizeof value);
-    sums_[i].fetch_add(value, std::memory_order_relaxed);
+void FootprintDeposit::copy_sums(Archive& archive) {
+  archive.require(archive.reads() ? sums_.size() : 0, sizeof(std::int64_t));
+  for (auto& sum : sums_) {
+    std::int64_t value = archive.reads() ? 0 : sum.load(std::memory_order_relaxed);
+    archive.copy(value);
+    if (archive.reads()) sum.fetch_add(value, std::memory_order_relaxed);
   }
 }
 

@@ -5,12 +5,11 @@
 
 #include <atomic>
 #include <cstdint>
-#include <string>
-#include <string_view>
 #include <vector>
 
 #include <Eigen/Core>
 
+#include "base/process/archive.h"
 #include "renderer/film/film.h"
 
 namespace tensorray {
@@ -31,12 +30,9 @@ class FootprintDeposit {
   ///              the plate, beyond which light is not linear in its start. Values that are not finite count as 0.
   void add(int channel, const Eigen::Vector2d& at, const Eigen::Matrix2d& axes);
 
-  /// Appends the sums so far to `bytes`, sums_size() more; not while photons are added.
-  std::size_t sums_size() const { return sums_.size() * sizeof(std::int64_t); }
-  void append_sums(std::string& bytes) const;
-
-  /// Adds the sums of other photons. @throw std::runtime_error if they are those of another deposit.
-  void add_sums(std::string_view bytes);
+  /// Writes the sums so far, or adds those of other photons; not while photons are added. @throw DamagedArchive if
+  /// there are not so many.
+  void copy_sums(Archive& archive);
 
   /// Weight per pixel. @param weight  The weight of one photon.
   Film finish(double weight) const;

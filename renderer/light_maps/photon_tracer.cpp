@@ -7,11 +7,7 @@
 #include <stdexcept>
 #include <utility>
 
-#include <tbb/parallel_for.h>
-
-#include "base/process/kept_results.h"
-#include "base/process/team.h"
-#include "base/process/work.h"
+#include "base/process/job.h"
 #include "renderer/lights/photon_emitter.h"
 
 namespace tensorray {
@@ -21,7 +17,7 @@ using Eigen::Vector3d;
 
 constexpr std::uint64_t photon_seed = 0x9e3779b97f4a7c15;  // Photons do not share the numbers of pixels.
 constexpr std::size_t chunk_size = 128;                    // Positions.
-constexpr std::size_t chunks_at_once = 256;                // That cross together: 100 MB, of 32 bands.
+constexpr std::size_t chunks_in_round = 256;               // That ranks give each other: 100 MB, of 32 bands.
 
 /// A light that emits photons.
 struct Source {
@@ -36,8 +32,6 @@ struct Chunk {
   std::size_t source = 0;
   std::uint64_t first = 0, last = 0;
 };
-
-constexpr std::uint64_t photon_key = 0;  // Among what is kept; no map of light has it.
 
 struct ChunkPhotons {
   std::vector<Photon> landed;
@@ -191,15 +185,15 @@ PhotonEnd PhotonTracer::land(const Source& source, const BentRay& ray, const Emi
   return PhotonEnd::landed;
 }
 
-/// @throw std::runtime_error if the photons cannot be those of the source.
-void copy_chunk(ChunkPhotons& part, const Source& source, std::size_t surfaces, PartBytes& bytes) {
-  bytes.copy_vector(part.landed);
-  bytes.copy(part.counts.data(), sizeof part.counts);
-  if (!bytes.reads()) return;
+/// @throw DamagedArchive if the photons cannot be those of the source.
+void copy_chunk(ChunkPhotons& part, const Source& source, std::size_t surfaces, Archive& archive) {
+  archive.copy_list(part.landed);
+  archive.copy(part.counts);
+  if (!archive.reads()) return;
   for (const Photon& photon : part.landed)
     if (photon.light != source.light || photon.surface >= surfaces || photon.band < 0 ||
         static_cast<std::size_t>(photon.band) >= source.strength->size())
-      throw DamagedWork("the photons that were kept or sent are damaged; render it again");
+      throw DamagedArchive();
 }
 
 }  // namespace
@@ -216,19 +210,22 @@ PhotonMaps trace_photons(const BendingRegion& region, const std::vector<Vector3d
   for (int pass = 0; pass < settings.passes; ++pass) {
     const PhotonTracer tracer(region, surfaces, settings, pass);
     std::vector<ChunkPhotons> parts(chunks.size());
-    const auto copy = [&](std::size_t i, PartBytes& bytes) {
-      copy_chunk(parts[i], sources[chunks[i].source], surfaces.surfaces().size(), bytes);
+    Units units;
+    units.count = chunks.size();
+    units.make = [&](std::size_t i) { parts[i] = tracer.trace(sources[chunks[i].source], chunks[i]); };
+    units.copy = [&](std::size_t i, Archive& archive) {
+      copy_chunk(parts[i], sources[chunks[i].source], surfaces.surfaces().size(), archive);
     };
-    const auto trace = [&] {
-      progress.update("tracing photons", static_cast<std::uint64_t>(pass), static_cast<std::uint64_t>(settings.passes));
-      tbb::parallel_for(std::size_t{0}, chunks.size(), [&](std::size_t i) {
-        if (does_part(settings.team, i)) parts[i] = tracer.trace(sources[chunks[i].source], chunks[i]);
-      });
-      if (settings.team) exchange_parts(*settings.team, parts.size(), chunks_at_once, copy);
-    };
-    find_or_make(settings.kept, {photon_key, static_cast<std::uint64_t>(pass), 0}, trace, [&](PartBytes& bytes) {
-      for (std::size_t i = 0; i < parts.size(); ++i) copy(i, bytes);
-    });
+    units.for_all = true;
+    units.round = chunks_in_round;
+    units.first = static_cast<std::size_t>(pass) * chunks.size();
+    units.total = static_cast<std::size_t>(settings.passes) * chunks.size();
+    find_or_make(
+        settings.job, light_name + "photons " + std::to_string(pass),
+        [&] { make_units(units, settings.job, "tracing photons", progress); },
+        [&](Archive& archive) {
+          for (std::size_t i = 0; i < chunks.size(); ++i) units.copy(i, archive);
+        });
     std::vector<Photon> landed;
     result.counts.push_back({});
     for (const ChunkPhotons& part : parts) {

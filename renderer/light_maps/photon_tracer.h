@@ -19,8 +19,7 @@
 
 namespace tensorray {
 
-class KeptResults;
-class Team;
+class Job;
 
 struct PhotonTracerSettings {
   std::uint64_t per_pass = 16384;  ///< Positions from which light starts, of all lights; each is at least one. Every
@@ -28,8 +27,7 @@ struct PhotonTracerSettings {
   int passes = 1;                  ///< >= 1
   double radius = 1;               ///< Of the first pass, world units; > 0.
   std::uint64_t seed = 0;
-  Team* team = nullptr;         ///< Processes that trace the same photons, each a part, and all have them; null: alone.
-  KeptResults* kept = nullptr;  ///< The photons of passes that earlier runs have traced. Null: none are kept.
+  Job* job = nullptr;  ///< Whose ranks trace the photons together, and which keeps those of each pass; null: alone.
   /// Whether a light lights a surface by photons.
   std::function<bool(int light, std::uint32_t surface)> serves;
   /// Of surfaces that are rectangles, by their index: photons near an edge are mirrored at it, so that the light that
@@ -39,7 +37,7 @@ struct PhotonTracerSettings {
 
 /// @param corners  Of the region's hull.
 /// @return the same for any number of threads: random numbers are functions of (seed, pass, light, photon, dimension).
-/// @throw Cancelled; as Team::exchange.
+/// @throw Cancelled; as Ranks::all_gather.
 PhotonMaps trace_photons(const BendingRegion& region, const std::vector<Eigen::Vector3d>& corners,
                          const SurfaceScene& surfaces, const std::vector<Light>& lights,
                          const PhotonTracerSettings& settings, const Progress& progress);

@@ -227,13 +227,13 @@ void add_solid(const Tube& tube, int segments, TubeCaps caps, TubeMesh& mesh) {
 }
 
 /// The settings, with values in place of those that were automatic.
-struct Job {
+struct TubeJob {
   TubeSettings settings;
   double value_tolerance, shade_tolerance;
 };
 
 /// A round wire along the ellipse of `point`.
-void add_hoop(const Job& job, const TubePoint& point, TubeMesh& mesh) {
+void add_hoop(const TubeJob& job, const TubePoint& point, TubeMesh& mesh) {
   const TubeSettings& s = job.settings;
   const int pieces = std::max(12, segments_for(greatest_radius(point), s.tolerance, s));
   Tube hoop;
@@ -246,7 +246,7 @@ void add_hoop(const Job& job, const TubePoint& point, TubeMesh& mesh) {
 }
 
 /// A round wire along the tube, at one angle.
-void add_line(const Job& job, const Tube& tube, double angle, TubeMesh& mesh) {
+void add_line(const TubeJob& job, const Tube& tube, double angle, TubeMesh& mesh) {
   const double radius = job.settings.wire_radius;
   const auto position = [&](std::size_t k) -> Eigen::Vector3d { return tube[k].center + rim(tube[k], angle); };
   Tube line;
@@ -260,14 +260,14 @@ void add_line(const Job& job, const Tube& tube, double angle, TubeMesh& mesh) {
   add_solid(line, segments_for(radius, job.settings.tolerance, job.settings), job.settings.caps, mesh);
 }
 
-void add_disc(const Job& job, const TubePoint& point, TubeMesh& mesh) {
+void add_disc(const TubeJob& job, const TubePoint& point, TubeMesh& mesh) {
   Tube disc{point, point};
   disc[0].center -= job.settings.thickness / 2 * axis(point);
   disc[1].center += job.settings.thickness / 2 * axis(point);
   add_solid(disc, segments_for(greatest_radius(point), job.settings.tolerance, job.settings), TubeCaps::flat, mesh);
 }
 
-TubeMesh make_tube(const Job& job, const Tube& tube) {
+TubeMesh make_tube(const TubeJob& job, const Tube& tube) {
   TubeMesh mesh;
   const TubeSettings& settings = job.settings;
   if (tube.size() >= 2 && settings.style == TubeStyle::discs) {
@@ -345,7 +345,7 @@ void require_few_ellipses(const std::vector<Tube>& tubes, const TubeSettings& se
   if (triangles > static_cast<double>(settings.most_triangles)) refuse_size(settings);
 }
 
-Job make_job(const std::vector<Tube>& tubes, TubeSettings settings) {
+TubeJob make_job(const std::vector<Tube>& tubes, TubeSettings settings) {
   const double lengths[] = {settings.tolerance, settings.spacing, settings.wire_radius, settings.thickness};
   for (const double length : lengths)
     if (!(length >= 0) || !std::isfinite(length))
@@ -384,7 +384,7 @@ double typical_radius(const std::vector<Tube>& tubes) {
 }
 
 TubeMesh make_tube_mesh(std::vector<Tube> tubes, const TubeSettings& settings) {
-  const Job job = make_job(tubes, settings);
+  const TubeJob job = make_job(tubes, settings);
   std::vector<TubeMesh> chunks;
   std::atomic<std::uint64_t> triangles{0};
   for (std::size_t first = 0; first < tubes.size(); first += chunk) {

@@ -48,7 +48,7 @@ class LoadedMethod {
  public:
   virtual ~LoadedMethod() = default;
 
-  /// @param job  Keeps the units of the work; null: they are not needed. Methods that are not divided ignore it.
+  /// @param job  Keeps the units of the work, and divides them; null: neither.
   /// @throw Cancelled; std::runtime_error; SceneError if a value of the scene does not fit the data.
   virtual Render render(const Scene& scene, const Progress& progress, RenderJob* job) const = 0;
 };
@@ -74,16 +74,6 @@ class Method {
 
   /// Whether its pictures have noise, which `integrator.max_samples` samples a pixel average.
   virtual bool is_sampled() const { return false; }
-
-  /// Whether its work has units that can be divided among machines (RenderJob).
-  virtual bool is_divided() const { return false; }
-
-  /// Whether several processes can make one picture together, step by step (RenderJob::team), or one by one, with what
-  /// they have computed as a unit each (KeptResults).
-  virtual bool is_shared() const { return false; }
-
-  /// Whether shards of its work can be made one by one, and merged.
-  bool has_shards() const { return is_divided() || is_shared(); }
 
   /// Whether the pixels of its pictures are those of the plate.
   virtual bool shows_plate() const { return false; }

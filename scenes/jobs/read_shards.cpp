@@ -1,5 +1,3 @@
-#include "scenes/jobs/read_shards.h"
-
 #include <map>
 #include <stdexcept>
 #include <utility>
@@ -8,25 +6,22 @@
 
 #include "base/text/text.h"
 #include "scenes/jobs/origin.h"
+#include "scenes/jobs/work_file.h"
 
 namespace tensorray {
 namespace {
 
-/// Adds the units of a shard to those of the others.
-void unite(const std::string& file, WorkFile shard, WorkFile& all) {
+/// Adds the results of a shard to those of the others.
+void unite(const std::string& file, const WorkFile& shard, WorkFile& all) {
   const auto fail = [&](const std::string& what) { throw std::invalid_argument(printable(file + ": " + what)); };
   const std::string other = difference(shard.origin, all.origin);
   if (!other.empty()) fail("is of another render than the first shard: " + other);
   if (shard.part.count != all.part.count)
     fail(fmt::format("is one of {} shards, the first one of {}", shard.part.count, all.part.count));
-  if (shard.units.size() != all.units.size()) fail("has another number of units than the first shard");
-  for (std::size_t i = shard.part.index; i < shard.units.size(); i += shard.part.count) {
-    if (!shard.units[i].done)
-      fail(fmt::format("is not complete; continue it with --shard {}/{} --resume", shard.part.index + 1,
-                       shard.part.count));
-    all.units[i] = std::move(shard.units[i]);
-  }
-  if (!all.before.state) all.before = std::move(shard.before);
+  if (!shard.is_complete)
+    fail(fmt::format("is not complete; continue it with --shard {}/{} --resume", shard.part.index + 1,
+                     shard.part.count));
+  all.results.insert(shard.results.begin(), shard.results.end());
 }
 
 }  // namespace
@@ -35,13 +30,10 @@ WorkFile read_shards(const std::vector<std::string>& files) {
   WorkFile all;
   std::map<std::size_t, std::string> names;
   for (const std::string& file : files) {
-    WorkFile shard = read_work(file);
-    if (names.empty()) {
-      all = shard;
-      all.units.assign(shard.units.size(), {});
-    }
+    const WorkFile shard = read_work(file);
+    if (names.empty()) all = shard;
     const std::size_t index = shard.part.index;
-    unite(file, std::move(shard), all);
+    unite(file, shard, all);
     const auto [before, is_new] = names.emplace(index, file);
     if (!is_new)
       throw std::invalid_argument(printable(fmt::format("{} and {} are both shard {}/{}; name one of them",
@@ -53,6 +45,7 @@ WorkFile read_shards(const std::vector<std::string>& files) {
   if (!missing.empty())
     throw std::invalid_argument(fmt::format("missing {} {}: render with --shard, and name all files",
                                             missing.size() > 1 ? "shards" : "shard", joined(missing)));
+  all.part.index = 0;
   return all;
 }
 

@@ -8,49 +8,18 @@
 #include "base/errors.h"
 #include "base/files/replace_file.h"
 #include "base/text/content_hash.h"
-#include "base/text/copy_bytes.h"
 #include "base/text/path_text.h"
 #include "scenes/jobs/origin.h"
 
-// The file: the mark; the length of the header; the header, as JSON; for each unit, twice the length of its state, plus
-// 1 if it is done (with "before": also for what is made before all units, behind them); the states; the hash of all
-// this. Numbers have 64 bits.
+// The file: the mark; an archive of the header, as JSON, and of the name and the size of each result; the results; the
+// hash of all this.
 
 namespace tensorray {
 namespace {
 
-const std::string mark = "tensorray work 1\n";
-
-std::string bytes_of(std::uint64_t number) {
-  std::string bytes(sizeof number, 0);
-  copy_bytes(bytes.data(), &number, sizeof number);
-  return bytes;
-}
-
-/// Takes a file apart from its front.
-class Reader {
- public:
-  Reader(const std::filesystem::path& path, std::string_view bytes) : path_(path), rest_(bytes) {}
-
-  std::string_view take(std::uint64_t size) {
-    if (size > rest_.size()) fail(path_, "is cut off; remove it and render it again");
-    const std::string_view bytes = rest_.substr(0, size);
-    rest_.remove_prefix(size);
-    return bytes;
-  }
-
-  std::uint64_t number() {
-    std::uint64_t number = 0;
-    copy_bytes(&number, take(sizeof number).data(), sizeof number);
-    return number;
-  }
-
-  std::size_t left() const { return rest_.size(); }
-
- private:
-  const std::filesystem::path& path_;
-  std::string_view rest_;
-};
+const std::string mark = "tensorray work 2\n";
+constexpr const char* damaged = "is damaged; remove it and render it again";
+constexpr const char* cut_off = "is cut off; remove it and render it again";
 
 std::string read_bytes(const std::filesystem::path& path) {
   require_readable(path);
@@ -60,72 +29,86 @@ std::string read_bytes(const std::filesystem::path& path) {
   return bytes;
 }
 
+/// @throw Json::exception, SceneError if it is that of no render.
+WorkFile from_header(const std::string& text) {
+  const Json header = parse_value(text);
+  WorkFile work;
+  work.origin = header.at("origin");
+  work.scene_file = path_of_text(header.at("scene_file").get<std::string>());
+  work.part = {header.at("part").at(0).get<std::size_t>(), header.at("part").at(1).get<std::size_t>()};
+  work.is_complete = header.at("complete").get<bool>();
+  if (!is_origin(work.origin) || work.part.index >= work.part.count || work.part.count > max_shards)
+    throw SceneError("it belongs to no render");
+  return work;
+}
+
 }  // namespace
 
 void write_work(const std::filesystem::path& path, const WorkFile& work) {
-  const Json header = {{"origin", work.origin},
-                       {"scene_file", text_of_path(work.scene_file)},
-                       {"part", {work.part.index, work.part.count}},
-                       {"units", work.units.size()},
-                       {"before", work.before.state != nullptr}};
-  const std::string text = header.dump();
-  std::string begin = mark + bytes_of(text.size()) + text;
-  std::vector<std::string_view> pieces{{}};
-  std::vector<WorkUnit> units = work.units;
-  if (work.before.state) units.push_back(work.before);
-  for (const WorkUnit& unit : units) {
-    begin += bytes_of(2 * (unit.state ? unit.state->size() : 0) + (unit.done ? 1 : 0));
-    if (unit.state && !unit.state->empty()) pieces.push_back(*unit.state);
+  std::string header = Json({{"origin", work.origin},
+                             {"scene_file", text_of_path(work.scene_file)},
+                             {"part", {work.part.index, work.part.count}},
+                             {"complete", work.is_complete}})
+                           .dump();
+  Archive table;
+  std::uint64_t count = work.results.size();
+  table.copy_list(header);
+  table.copy(count);
+  for (const auto& [name, result] : work.results) {
+    std::string copy = name;
+    std::uint64_t size = result->size();
+    table.copy_list(copy);
+    table.copy(size);
   }
-  pieces.front() = begin;
+  const std::string begin = mark + table.take();
+  std::vector<std::string_view> pieces{begin};
+  for (const auto& [name, result] : work.results)
+    if (!result->empty()) pieces.push_back(*result);
   std::uint64_t hash = 0;
   for (const std::string_view piece : pieces) hash = content_hash(piece, hash);
-  const std::string end = bytes_of(hash);
-  pieces.push_back(end);
+  Archive end;
+  end.copy(hash);
+  const std::string last = end.take();
+  pieces.push_back(last);
   replace_file(path, pieces);
 }
 
 WorkFile read_work(const std::filesystem::path& path) {
   const std::string bytes = read_bytes(path);
   if (bytes.compare(0, mark.size(), mark) != 0) fail(path, "is no checkpoint or shard of this version of tensorray");
-  Reader reader(path, bytes);
-  reader.take(mark.size());
   WorkFile work;
-  std::vector<std::uint64_t> sizes;
-  bool has_before = false;
+  std::uint64_t hash = 0, kept_hash = 0;
   try {
-    const Json header = parse_value(std::string(reader.take(reader.number())));
-    work.origin = header.at("origin");
-    work.scene_file = path_of_text(header.at("scene_file").get<std::string>());
-    work.part = {header.at("part").at(0).get<std::size_t>(), header.at("part").at(1).get<std::size_t>()};
-    if (!is_origin(work.origin) || work.part.index >= work.part.count || work.part.count > most_parts)
-      throw SceneError("it belongs to no render");
-    has_before = header.value("before", false);
-    const std::uint64_t units = header.at("units").get<std::uint32_t>() + std::uint64_t{has_before};
-    const std::string_view table = reader.take(sizeof(std::uint64_t) * units);
-    sizes.resize(table.size() / sizeof(std::uint64_t));
-    copy_bytes(sizes.data(), table.data(), table.size());
-  } catch (const Json::exception&) {
-    fail(path, "is damaged; remove it and render it again");
-  } catch (const SceneError&) {
-    fail(path, "is damaged; remove it and render it again");
-  }
-  const std::size_t begun = bytes.size() - reader.left();
-  std::uint64_t hash = content_hash(std::string_view(bytes).substr(0, begun));
-  for (const std::uint64_t size : sizes) {
-    WorkUnit unit;
-    unit.done = size % 2 == 1;
-    if (size > 1) {
-      unit.state = std::make_shared<const std::string>(reader.take(size / 2));
-      hash = content_hash(*unit.state, hash);
+    Archive archive(std::string_view(bytes).substr(mark.size()));
+    std::string header;
+    archive.copy_list(header);
+    work = from_header(header);
+    std::vector<std::pair<std::string, std::uint64_t>> table;
+    std::uint64_t count = 0;
+    archive.copy(count);
+    for (std::uint64_t i = 0; i < count; ++i) {
+      table.emplace_back();
+      archive.copy_list(table.back().first);
+      archive.copy(table.back().second);
     }
-    work.units.push_back(std::move(unit));
+    hash = content_hash(std::string_view(bytes).substr(0, bytes.size() - archive.left()));
+    for (const auto& [name, size] : table) {
+      archive.require(size, 1);
+      std::string result(size, 0);
+      archive.copy(result.data(), size);
+      if (size > 0) hash = content_hash(result, hash);
+      work.results[name] = std::make_shared<const std::string>(std::move(result));
+    }
+    archive.copy(kept_hash);
+    archive.finish();
+  } catch (const DamagedArchive&) {
+    fail(path, cut_off);
+  } catch (const Json::exception&) {
+    fail(path, damaged);
+  } catch (const SceneError&) {
+    fail(path, damaged);
   }
-  if (reader.number() != hash || reader.left() > 0) fail(path, "is damaged; remove it and render it again");
-  if (has_before) {
-    work.before = std::move(work.units.back());
-    work.units.pop_back();
-  }
+  if (kept_hash != hash) fail(path, damaged);
   return work;
 }
 

@@ -7,7 +7,6 @@
 #include <fmt/format.h>
 
 #include "base/constants.h"
-#include "base/process/kept_results.h"
 #include "integrators/lens/lens.h"
 #include "renderer/charts/grid_lines.h"
 #include "renderer/spectra/reflectance.h"
@@ -246,13 +245,13 @@ Render LoadedLens::render_of(const Scene& scene, LensPictures all) const {
 
 Render LoadedLens::render(const Scene& scene, const Progress& progress, RenderJob* job) const {
   LensSettings settings = trace_settings(scene);
-  settings.team = job ? job->team : nullptr;
-  KeptResults kept(job ? &job->work : nullptr, settings.team);
-  settings.kept = &kept;
+  settings.job = job;
+  const bool is_shard = job && job->is_shard;
+  Ranks* const ranks = job ? job->ranks : nullptr;
   LensPictures all;
-  if (job && job->show && has_all(settings.team))
+  if (job && job->show && is_root(ranks))
     settings.show = [&](const std::function<const LensLight&()>& so_far) {
-      if (!job->work.picture_wanted.exchange(false)) return;
+      if (!job->picture_wanted.exchange(false)) return;
       LensPictures shown = all;
       add_picture(scene, so_far(), progress, shown);
       job->show(render_of(scene, std::move(shown)));
@@ -264,17 +263,15 @@ Render LoadedLens::render(const Scene& scene, const Progress& progress, RenderJo
     image.plane = plane;
     const LensLight light = trace_lens(scene.field, scene.geometry.surfaces(), scene.bending,
                                        {lens_.receiver, image, scene.beam.direction}, settings, progress);
-    if (!kept.is_shard()) add_picture(scene, light, progress, all);
+    if (!is_shard) add_picture(scene, light, progress, all);
   }
-  if (kept.is_shard()) kept.keep(true);
-  if (settings.team) collect_counts(*settings.team, all.statistics);
-  return kept.is_shard() || !has_all(settings.team) ? Render() : render_of(scene, std::move(all));
+  gather_counts(ranks, all.statistics);
+  return is_shard || !is_root(ranks) ? Render() : render_of(scene, std::move(all));
 }
 
 class LensMethod : public MethodWith<LensDescription> {
  public:
   const char* name() const override { return "lens"; }
-  bool is_shared() const override { return true; }
   bool shows_plate() const override { return true; }
 
   std::vector<Output> outputs() const override {

@@ -6,8 +6,7 @@
 #include <fmt/format.h>
 
 #include "base/constants.h"
-#include "base/process/kept_results.h"
-#include "base/process/team.h"
+#include "base/process/job.h"
 #include "renderer/charts/colormap.h"
 #include "renderer/color/color.h"
 #include "renderer/film/spectral_image.h"
@@ -70,25 +69,26 @@ void add_lattice(int columns, int rows, const Keeps& keeps, TriangleMesh& mesh) 
     }
 }
 
-/// The light on the plate, of which each process of a team makes a part.
-Image plate_image(const Scene& scene, const Preparation& preparation, const Progress& progress) {
+/// The light on the plate, of which each rank makes a part.
+Image plate_image(const Scene& scene, Job* job, const Progress& progress) {
   const Eigen::Vector2i& resolution = scene.geometry.surfaces().plate->resolution;
   Image image(resolution.x(), resolution.y(), {"R", "G", "B"});
   const auto make = [&] {
-    RenderJob job{Work(), {}, preparation.team};
-    Image made = light_on_plate(scene, progress, preparation.team ? &job : nullptr, {}, preparation.kept).linear;
-    if (has_all(preparation.team)) image = std::move(made);
-    if (preparation.team) share_values(*preparation.team, image.pixels);
+    Job whole;  // All shards make all of it.
+    whole.ranks = job ? job->ranks : nullptr;
+    Image made = light_on_plate(scene, progress, whole.ranks ? &whole : nullptr).linear;
+    if (is_root(whole.ranks)) image = std::move(made);
+    broadcast_list(whole.ranks, image.pixels);
   };
-  find_or_make(preparation.kept, {}, make, [&](PartBytes& bytes) {
-    bytes.copy(image.pixels.data(), image.pixels.size() * sizeof image.pixels[0]);
+  find_or_make(job, light_name + "plate", make, [&](Archive& archive) {
+    archive.copy(image.pixels.data(), image.pixels.size() * sizeof image.pixels[0]);
   });
   return image;
 }
 
 /// The plate with the light of the photons as its colour: a vertex in the middle of each pixel.
-ShadedSurface lit_plate(const Scene& scene, const Preparation& preparation, const Progress& progress) {
-  const Image image = plate_image(scene, preparation, progress);
+ShadedSurface lit_plate(const Scene& scene, Job* job, const Progress& progress) {
+  const Image image = plate_image(scene, job, progress);
   std::vector<float> greatest;
   for (std::size_t i = 0; i < image.pixels.size(); i += 3)
     greatest.push_back(std::max({image.pixels[i], image.pixels[i + 1], image.pixels[i + 2]}));
@@ -226,7 +226,7 @@ Material load_material(const MaterialDescription& description, const ShownLight&
   return make_material(settings_of(description, light.bands), reflectance);
 }
 
-void add_context(const Scene& scene, const PathScene& paths, const Preparation& preparation, const Progress& progress,
+void add_context(const Scene& scene, const PathScene& paths, Job* job, const Progress& progress,
                  std::vector<ShadedSurface>& surfaces, std::vector<Material>& materials) {
   const ContextDescription& context = paths.settings.context;
   const auto add_surface = [&](ShadedSurface surface, const MaterialDescription& material) {
@@ -236,7 +236,7 @@ void add_context(const Scene& scene, const PathScene& paths, const Preparation& 
   if (context.obstacles)
     for (const std::filesystem::path& file : scene.description.obstacles)
       add_surface(read_mesh_surface(file), plain(0.6, 0.5));
-  if (context.plate) add_surface(lit_plate(scene, preparation, progress), plain(0.8, 1));
+  if (context.plate) add_surface(lit_plate(scene, job, progress), plain(0.8, 1));
   if (context.slice) add_surface(make_slice(scene, paths.lights.light, *context.slice), plain(0.8, 1));
   for (const IsosurfaceDescription& each : context.isosurfaces)
     add_surface(make_isosurface(scene, each), each.material);

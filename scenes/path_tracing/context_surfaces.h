@@ -13,7 +13,7 @@
 
 namespace tensorray {
 
-struct Preparation;
+class Job;
 
 /// Makes a material from its description, for the bands of the light that shows the paths.
 /// @throw std::invalid_argument if a metal is unknown.
@@ -24,10 +24,10 @@ Material load_material(const MaterialDescription& description, const ShownLight&
 ShadedSurface read_mesh_surface(const std::filesystem::path& file, std::optional<double> smooth_angle = {});
 
 /// Adds the scene's context to `surfaces`, and the materials that it needs to `materials`.
-/// @param preparation  Processes of a team make the light on the plate together, and all have it.
+/// @param job  Whose ranks make the light on the plate together, and which keeps it; null: alone.
 /// @throw SceneError if a slice or an isosurface is empty; Cancelled (light is traced for the plate); as
-/// Team::exchange.
-void add_context(const Scene& scene, const PathScene& paths, const Preparation& preparation, const Progress& progress,
+/// Ranks::all_gather.
+void add_context(const Scene& scene, const PathScene& paths, Job* job, const Progress& progress,
                  std::vector<ShadedSurface>& surfaces, std::vector<Material>& materials);
 
 }  // namespace tensorray

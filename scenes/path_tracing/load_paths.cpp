@@ -193,14 +193,14 @@ PathScene load_paths(const Scene& scene, const PathTracingDescription& settings,
   return paths;
 }
 
-std::vector<Path> follow_paths(const Scene& scene, const PathScene& path_scene, bool tensors, Team* team,
+std::vector<Path> follow_paths(const Scene& scene, const PathScene& path_scene, bool tensors, Job* job,
                                const Progress& progress, Statistics& statistics) {
   const PathTracingDescription& description = path_scene.settings;
   PathSettings settings;
   settings.backwards = description.backwards;
   settings.outside = description.outside;
   settings.tensors = tensors;
-  settings.team = team;
+  settings.job = job;
   std::vector<Path> paths = path_scene.seeds.empty() ? path_scene.paths
                                                      : trace_paths(scene.field, scene.geometry, scene.bending,
                                                                    path_scene.seeds, settings, progress);

@@ -4,7 +4,6 @@
 
 #include <fmt/format.h>
 
-#include "base/process/kept_results.h"
 #include "base/process/progress.h"
 #include "base/process/seconds.h"
 #include "integrators/path_files/path_files.h"
@@ -127,12 +126,7 @@ SurfacePicture LoadedPaths::render_stage(const Scene& scene, const std::vector<P
   const ShownLight& light = paths_.lights.light;
   std::vector<Material> materials{load_material(paths_.settings.material, light)};
   std::vector<ShadedSurface> surfaces{std::move(path_surface)};
-  {
-    Team* const team = run.job ? run.job->team : nullptr;
-    KeptResults kept(run.job ? &run.job->before : nullptr, team);
-    add_context(scene, paths_, {team, &kept}, run.progress, surfaces, materials);
-    kept.finish();
-  }
+  add_context(scene, paths_, run.job, run.progress, surfaces, materials);
   const std::vector<Light> lights = make_lights(scene.description, paths_.lights, camera);
   add_lamps(lights, light, surfaces, materials);
   const SurfaceScene stage(std::move(surfaces));
@@ -157,8 +151,7 @@ Render LoadedPaths::render(const Scene& scene, const Progress& progress, RenderJ
   const ShownLight& light = paths_.lights.light;
   const auto start = Clock::now();
   Render result;
-  Team* const team = job ? job->team : nullptr;
-  result.paths = follow_paths(scene, paths_, is_drawn || stores_tensors(output), team, progress, result.statistics);
+  result.paths = follow_paths(scene, paths_, is_drawn || stores_tensors(output), job, progress, result.statistics);
   result.statistics.seconds_tracing = seconds_since(start);
   if (!is_drawn) return result;
 
@@ -229,7 +222,6 @@ class PathTracingMethod : public MethodWith<PathTracingDescription> {
  public:
   const char* name() const override { return "path_tracing"; }
   bool is_sampled() const override { return true; }
-  bool is_divided() const override { return true; }
 
   std::vector<Output> outputs() const override {
     std::vector<Output> outputs = picture_outputs();

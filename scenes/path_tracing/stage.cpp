@@ -172,14 +172,14 @@ RenderCallbacks callbacks_of(const Progress& progress, RenderJob* job,
                              const std::function<Render(const SurfacePicture&)>& finish) {
   RenderCallbacks callbacks;
   callbacks.progress = [&progress, job](std::uint64_t done, std::uint64_t total) {
-    if (job) job->work.fraction = static_cast<double>(done) / static_cast<double>(total);
+    if (job) job->fraction = static_cast<double>(done) / static_cast<double>(total);
     if (job && progress.cancelled)
-      job->work.stopping = true;
+      job->stopping = true;
     else
       progress.update("rendering", done, total);
   };
   if (!job) return callbacks;
-  callbacks.work = &job->work;
+  callbacks.job = job;
   if (job->show) callbacks.show = [job, finish](const SurfacePicture& picture) { job->show(finish(picture)); };
   return callbacks;
 }

@@ -9,7 +9,6 @@
 
 #include <fmt/format.h>
 
-#include "base/process/kept_results.h"
 #include "base/process/seconds.h"
 #include "integrators/flow_drawing/caustic.h"
 #include "renderer/film/image_distance.h"
@@ -26,14 +25,12 @@ constexpr double least_tolerance = 1e-3;  // Pixels; landings are single precisi
 /// A picture that is made, and who makes it.
 struct MeshJob {
   const Scene& scene;
-  RenderJob* const job;  // Null: nobody else wants anything of it.
+  Job* const job;  // Null: nobody else wants anything of it.
   const ShowLight& show;
-  KeptResults* const given;  // Null: what is kept is in the work of the job.
-  Team* const team = job ? job->team : nullptr;
-  KeptResults own{job && !given ? &job->work : nullptr, team};
-  KeptResults& kept = given ? *given : own;
+  Ranks* const ranks = job ? job->ranks : nullptr;
+  const bool is_shard = job && job->is_shard;
 
-  bool is_shown() const { return job && has_all(team) && job->work.picture_wanted.exchange(false); }
+  bool is_shown() const { return job && is_root(ranks) && job->picture_wanted.exchange(false); }
 };
 
 /// How finely light is spread over the way that it moves from wavelength to wavelength.
@@ -68,11 +65,11 @@ std::vector<std::array<double, ray_end_count>> beam_power(const Scene& scene, co
   return power;
 }
 
-PlateLight draw(const Scene& scene, FlowMap map, const Sweep& sweep, Team* team, const Progress& progress) {
+PlateLight draw(const Scene& scene, FlowMap map, const Sweep& sweep, Ranks* ranks, const Progress& progress) {
   const auto start = Clock::now();
   PlateLight light;
   light.map = std::move(map);
-  const CausticSettings settings{scene.bands.size(), scene.description.output.wants("spectral"), sweep.step, team};
+  const CausticSettings settings{scene.bands.size(), scene.description.output.wants("spectral"), sweep.step, ranks};
   Caustic caustic = draw_caustic(light.map, *scene.geometry.surfaces().plate, bands_of(scene, light.map, sweep.bands),
                                  settings, progress);
   light.linear = color_image(caustic.color);
@@ -83,11 +80,11 @@ PlateLight draw(const Scene& scene, FlowMap map, const Sweep& sweep, Team* team,
   light.statistics.power = beam_power(scene, caustic);
   light.statistics.ray_steps = light.map.ray_steps;
   light.statistics.tensor_samples = light.map.tensor_samples;
-  if (team) collect_counts(*team, light.statistics);
+  gather_counts(ranks, light.statistics);
   return light;
 }
 
-FlowMap trace(MeshJob& job, double tolerance, const Progress& progress) {
+FlowMap trace(const MeshJob& job, double tolerance, const Progress& progress) {
   const Scene& scene = job.scene;
   FlowSettings settings;
   settings.most_starts = static_cast<std::size_t>(scene.description.light.photons);
@@ -97,8 +94,8 @@ FlowMap trace(MeshJob& job, double tolerance, const Progress& progress) {
   settings.range = range.is_range;
   settings.side_light = scene.description.integrator.settings<PhotonDescription>().side_light;
   settings.memory = scene.rays;
-  settings.team = job.team;
-  settings.kept = &job.kept;
+  settings.job = job.job;
+  settings.is_kept = true;
   if (job.show)
     settings.show = [&](const std::function<FlowMap()>& so_far) {
       if (job.is_shown()) job.show(draw(scene, so_far(), {}, nullptr, progress));
@@ -106,11 +103,11 @@ FlowMap trace(MeshJob& job, double tolerance, const Progress& progress) {
   return trace_flow_map(scene.field, scene.geometry, scene.beam, scene.bending, settings, progress);
 }
 
-PlateLight trace_and_draw(MeshJob& job, double tolerance, const Sweep& sweep, const Progress& progress) {
+PlateLight trace_and_draw(const MeshJob& job, double tolerance, const Sweep& sweep, const Progress& progress) {
   const auto start = Clock::now();
   FlowMap map = trace(job, tolerance, progress);
   const double seconds = seconds_since(start);
-  PlateLight light = draw(job.scene, std::move(map), sweep, job.team, progress);
+  PlateLight light = draw(job.scene, std::move(map), sweep, job.ranks, progress);
   light.statistics.seconds_tracing = seconds;
   return light;
 }
@@ -128,7 +125,7 @@ double rest_after(double change, double last_change) {
 }
 
 /// Halves the tolerance and the steps of wavelengths until what is left of the error is less than `bound`.
-PlateLight refine(MeshJob& job, double bound, const Progress& progress) {
+PlateLight refine(const MeshJob& job, double bound, const Progress& progress) {
   std::string label;
   Progress labelled;  // Shows the error behind the phase.
   labelled.report = [&](const std::string& phase, std::uint64_t done, std::uint64_t total) {
@@ -140,7 +137,7 @@ PlateLight refine(MeshJob& job, double bound, const Progress& progress) {
   for (;;) {
     tolerance /= 2;
     PlateLight finer = trace_and_draw(job, tolerance, refined_sweep(tolerance), labelled);
-    const double change = of_first(job.team, relative_distance(light.linear, finer.linear));
+    const double change = broadcast(job.ranks, relative_distance(light.linear, finer.linear));
     const double error = rest_after(change, last_change);
     last_change = change;
     finer.statistics.error = error;
@@ -159,14 +156,13 @@ PlateLight refine(MeshJob& job, double bound, const Progress& progress) {
 
 }  // namespace
 
-PlateLight mesh_light(const Scene& scene, const Progress& progress, RenderJob* job, const ShowLight& show,
-                      KeptResults* kept) {
+PlateLight mesh_light(const Scene& scene, const Progress& progress, Job* job, const ShowLight& show) {
   const PhotonDensity& density = scene.description.integrator.settings<PhotonDescription>().density;
-  MeshJob mesh{scene, job, show, kept};
+  const MeshJob mesh{scene, job, show};
   PlateLight light;
   if (density.error) {
     light = refine(mesh, *density.error, progress);
-  } else if (mesh.kept.is_shard()) {
+  } else if (mesh.is_shard) {
     trace(mesh, density.tolerance, progress);
   } else {
     light = trace_and_draw(mesh, density.tolerance, {}, progress);
@@ -174,9 +170,7 @@ PlateLight mesh_light(const Scene& scene, const Progress& progress, RenderJob* j
       light.warnings.push_back(
           "the light on the plate is coarser than `integrator.density.tolerance` asks: raise `light.photons`");
   }
-  if (!mesh.kept.is_shard()) return light;
-  mesh.kept.keep(true);
-  return {};
+  return mesh.is_shard ? PlateLight() : light;
 }
 
 }  // namespace tensorray

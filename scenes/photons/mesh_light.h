@@ -9,12 +9,11 @@
 
 namespace tensorray {
 
-/// Draws the light, with the team of the job. Its shards and checkpoints have the landings of its flow maps'
-/// vertices (KeptResults): of a shard, the result is empty. With a bound of the error, a shard refines until the error
+/// Draws the light, with the ranks of the job. Its shards and checkpoints have the landings of its flow maps' vertices
+/// (FlowSettings::is_kept): of a shard, the result is empty. With a bound of the error, a shard refines until the error
 /// of its own part is below it; what more the whole picture needs is traced where the shards are merged.
 /// @param job   Null: alone, and nothing is kept. @param show  Gets the light so far when the job wants a picture.
-/// @param kept  As in light_on_plate. @throw Cancelled; as Team::exchange.
-PlateLight mesh_light(const Scene& scene, const Progress& progress, RenderJob* job, const ShowLight& show,
-                      KeptResults* kept);
+/// @throw Cancelled; as Ranks::all_gather.
+PlateLight mesh_light(const Scene& scene, const Progress& progress, Job* job, const ShowLight& show);
 
 }  // namespace tensorray

@@ -74,14 +74,15 @@ double side_share(const Statistics& statistics) {
   return all > 0 ? side / all : 0;
 }
 
-/// @param team  Processes that have the same map; only process 0 has the result.
-Render render_of(const Scene& scene, PlateLight light, Team* team) {
+/// @param job  Whose ranks have the same map; only the root has the result. Null: alone.
+Render render_of(const Scene& scene, PlateLight light, const Progress& progress, Job* job) {
   const SceneDescription& description = scene.description;
   const auto start = Clock::now();
   Render result;
   const bool has_map = !light.map.triangles.empty() && description.output.wants("exr");
-  result.linear = has_map ? with_channels(light.linear, plate_map(light.map, scene, team)) : std::move(light.linear);
-  if (!has_all(team)) return {};
+  result.linear =
+      has_map ? with_channels(light.linear, plate_map(light.map, scene, progress, job)) : std::move(light.linear);
+  if (job && !is_root(job->ranks)) return {};
   if (description.output.wants("spectral"))
     result.spectral = spectral_image(light.irradiance, scene.bands, SpectralQuantity::irradiance,
                                      description.light.irradiance, to_working(scene));
@@ -109,11 +110,11 @@ class LoadedPhotons : public LoadedMethod {
  public:
   Render render(const Scene& scene, const Progress& progress, RenderJob* job) const override {
     const auto show = [&](PlateLight so_far) {
-      if (job->show) job->show(render_of(scene, std::move(so_far), nullptr));
+      if (job->show) job->show(render_of(scene, std::move(so_far), progress, nullptr));
     };
     PlateLight light = light_on_plate(scene, progress, job, show);
-    if (job && job->work.is_shard) return {};
-    return render_of(scene, std::move(light), job ? job->team : nullptr);
+    if (job && job->is_shard) return {};
+    return render_of(scene, std::move(light), progress, job);
   }
 };
 
@@ -153,7 +154,6 @@ class PhotonDistributionMethod : public MethodWith<PhotonDescription> {
  public:
   const char* name() const override { return "photon_distribution"; }
   bool shows_plate() const override { return true; }
-  bool is_shared() const override { return true; }
   std::string preferred_view() const override { return soft_highlights_view; }
 
   std::vector<Output> outputs() const override {

@@ -16,11 +16,11 @@ bool is_collected_in_color(const Scene& scene) {
   return !scene.description.output.wants("spectral") && scene.bands.size() > 3;
 }
 
-PhotonSettings photon_settings(const Scene& scene, Team* team) {
+PhotonSettings photon_settings(const Scene& scene, Job* job) {
   const SceneDescription& description = scene.description;
   PhotonSettings settings;
   settings.bending = scene.bending;
-  settings.team = team;
+  settings.job = job;
   settings.photons = description.light.photons;
   settings.pattern = description.light.pattern;
   settings.channels_per_photon = description.bending.rgb ? 0 : description.light.wavelengths_per_photon;
@@ -57,7 +57,8 @@ PlateLight light_of(const Scene& scene, PhotonDistribution traced) {
 PlateLight trace_photons(const Scene& scene, const PhotonSettings& settings, const Progress& progress) {
   PhotonDistribution traced =
       distribute_photons(scene.field, scene.geometry, scene.beam, scene.channels, settings, progress);
-  return has_all(settings.team) ? light_of(scene, std::move(traced)) : PlateLight();
+  const bool has_light = !settings.job || (is_root(settings.job->ranks) && !settings.job->is_shard);
+  return has_light ? light_of(scene, std::move(traced)) : PlateLight();
 }
 
 }  // namespace
@@ -69,20 +70,16 @@ void add_cost(const Statistics& more, Statistics& statistics) {
   statistics.tensor_samples += more.tensor_samples;
 }
 
-PlateLight light_on_plate(const Scene& scene, const Progress& progress, RenderJob* job, const ShowLight& show,
-                          KeptResults* kept) {
-  PhotonSettings settings = photon_settings(scene, job ? job->team : nullptr);
+PlateLight light_on_plate(const Scene& scene, const Progress& progress, Job* job, const ShowLight& show) {
+  PhotonSettings settings = photon_settings(scene, job);
   if (scene.description.integrator.settings<PhotonDescription>().density.kind != PhotonDensityKind::mesh) {
-    settings.work = job ? &job->work : nullptr;
     if (show) settings.show = [&](PhotonDistribution so_far) { show(light_of(scene, std::move(so_far))); };
     return trace_photons(scene, settings, progress);
   }
-  PlateLight light = mesh_light(scene, progress, job, show, kept);
+  PlateLight light = mesh_light(scene, progress, job, show);
   const OutputDescription& output = scene.description.output;
-  const bool is_shard = job && job->work.is_shard;  // Photons are then traced where shards are merged.
+  const bool is_shard = job && job->is_shard;  // Photons are then traced where shards are merged.
   if ((!output.wants("photons") && !output.wants("fluence")) || is_shard) return light;
-  settings.work = job ? &job->before : nullptr;
-  settings.restarts = true;
   PlateLight photons = trace_photons(scene, settings, progress);
   light.photons = std::move(photons.photons);
   light.fluence = std::move(photons.fluence);

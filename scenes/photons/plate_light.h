@@ -17,8 +17,6 @@
 
 namespace tensorray {
 
-class KeptResults;
-
 struct PlateLight {
   Image linear;                      ///< R, G, B in the working space; 1 is the undisturbed light.
   FlowMap map;                       ///< The map that `mesh` has drawn; empty for other estimators.
@@ -35,14 +33,11 @@ void add_cost(const Statistics& more, Statistics& statistics);
 /// Gets light that is not complete yet.
 using ShowLight = std::function<void(PlateLight)>;
 
-/// Traces the light with the density estimator of the method photon_distribution, with the team of the job. `mesh`
+/// Traces the light with the density estimator of the method photon_distribution, with the ranks of the job. `mesh`
 /// draws the flow map of the beam; photons and fluence, if the scene asks for them, are then traced as for the other
-/// estimators, and kept before the work of the job. Of a shard, the result is not complete: what it has traced is in
-/// the work of the job.
+/// estimators. Of a shard, the result is not complete: what it has traced is in the job.
 /// @param show  Gets the light so far when the job wants a picture; may be empty.
-/// @param kept  Where `mesh` keeps the vertices of its map; null: in the work of the job.
-/// @throw Cancelled; as Team::exchange.
-PlateLight light_on_plate(const Scene& scene, const Progress& progress, RenderJob* job = nullptr,
-                          const ShowLight& show = {}, KeptResults* kept = nullptr);
+/// @throw Cancelled; as Ranks::all_gather.
+PlateLight light_on_plate(const Scene& scene, const Progress& progress, Job* job = nullptr, const ShowLight& show = {});
 
 }  // namespace tensorray

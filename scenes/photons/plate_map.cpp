@@ -3,7 +3,6 @@
 #include <algorithm>
 
 #include <Eigen/Geometry>
-#include <tbb/parallel_for.h>
 
 #include "integrators/flow_drawing/flow_view.h"
 #include "scenes/outputs/channel_table.h"
@@ -72,7 +71,7 @@ ChannelTable<PlateLanding> plate_channels() {
 
 std::vector<ChannelText> plate_map_texts() { return channel_texts(plate_channels()); }
 
-Image plate_map(const FlowMap& map, const Scene& scene, Team* team) {
+Image plate_map(const FlowMap& map, const Scene& scene, const Progress& progress, Job* job) {
   const Plate& plate = *scene.geometry.surfaces().plate;
   FlowPicture picture;
   picture.resolution = plate.resolution;
@@ -81,24 +80,25 @@ Image plate_map(const FlowMap& map, const Scene& scene, Team* team) {
   const FlowView view(map, picture, {FlowRange{place, place}}, 1);
   const ChannelTable<PlateLanding> table = plate_channels();
   Image image(plate.resolution.x(), plate.resolution.y(), channel_names(table));
-  tbb::parallel_for(0, view.tiles(), [&](int tile) {
-    if (!does_part(team, static_cast<std::size_t>(tile))) return;
+  Units tiles;
+  tiles.count = static_cast<std::size_t>(view.tiles());
+  tiles.round = FlowView::tiles_at_once;
+  tiles.make = [&](std::size_t tile) {
     std::vector<FlowPoint> points;
-    view.draw(tile, 1, 0, place, {}, points);
-    const Eigen::AlignedBox2i box = view.pixels(tile);
+    view.draw(static_cast<int>(tile), 1, 0, place, {}, points);
+    const Eigen::AlignedBox2i box = view.pixels(static_cast<int>(tile));
     auto point = points.begin();
     for (int y = box.min().y(); y <= box.max().y(); ++y)
       for (int x = box.min().x(); x <= box.max().x(); ++x, ++point)
         if (point->end == RayEnd::plate)
           write_channels(table, landing_of(*point, {x + 0.5, y + 0.5}, plate, picture.straight), image.pixel(x, y));
-  });
-  const auto tiles = static_cast<std::size_t>(view.tiles());
-  if (team)
-    collect_parts(*team, tiles, FlowView::tiles_at_once, [&](std::size_t tile, PartBytes& bytes) {
-      const Eigen::AlignedBox2i box = view.pixels(static_cast<int>(tile));
-      const std::size_t row = (static_cast<std::size_t>(box.sizes().x()) + 1) * image.channels.size() * sizeof(float);
-      for (int y = box.min().y(); y <= box.max().y(); ++y) bytes.copy(image.pixel(box.min().x(), y), row);
-    });
+  };
+  tiles.copy = [&](std::size_t tile, Archive& archive) {
+    const Eigen::AlignedBox2i box = view.pixels(static_cast<int>(tile));
+    const std::size_t row = (static_cast<std::size_t>(box.sizes().x()) + 1) * image.channels.size() * sizeof(float);
+    for (int y = box.min().y(); y <= box.max().y(); ++y) archive.copy(image.pixel(box.min().x(), y), row);
+  };
+  make_units(tiles, job, "drawing the map", progress);
   return image;
 }
 

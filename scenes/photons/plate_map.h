@@ -4,7 +4,7 @@
 
 #include <vector>
 
-#include "base/process/team.h"
+#include "base/process/job.h"
 #include "integrators/flow/flow_map.h"
 #include "renderer/images/image.h"
 #include "scenes/description/method.h"
@@ -18,7 +18,7 @@ std::vector<ChannelText> plate_map_texts();
 /// How the light of the band nearest to 550 nm (in RGB mode: green) lands at the centre of each pixel. All channels are
 /// 0 where no light lands. Where the map folds, they describe the sheet that is displaced least.
 /// @param map   To the plate of the scene. Runs on all threads; the result does not depend on their number.
-/// @param team  Processes that have the same map and do this together, for process 0; null: alone.
-Image plate_map(const FlowMap& map, const Scene& scene, Team* team = nullptr);
+/// @param job   Whose ranks have the same map and do this together, for the root; null: alone.
+Image plate_map(const FlowMap& map, const Scene& scene, const Progress& progress, Job* job = nullptr);
 
 }  // namespace tensorray

@@ -41,13 +41,10 @@ bool nothing_arrived(const Statistics& statistics) {
                      [](const EndCounts& counts) { return counts[static_cast<int>(RayEnd::plate)] == 0; });
 }
 
-void collect_counts(Team& team, Statistics& statistics) {
-  collect_parts(team, team.count(), team.count(), [&](std::size_t, PartBytes& bytes) {
-    std::uint64_t counts[] = {statistics.ray_steps, statistics.tensor_samples};
-    bytes.copy(counts, sizeof counts);
-    if (!bytes.reads()) return;
-    statistics.ray_steps += counts[0];
-    statistics.tensor_samples += counts[1];
+void gather_counts(Ranks* ranks, Statistics& statistics) {
+  gather_in_turn(ranks, [&](Archive& archive) {
+    archive.copy_sums(&statistics.ray_steps, 1);
+    archive.copy_sums(&statistics.tensor_samples, 1);
   });
 }
 

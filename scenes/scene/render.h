@@ -12,8 +12,7 @@
 
 #include <Eigen/Core>
 
-#include "base/process/team.h"
-#include "base/process/work.h"
+#include "base/process/job.h"
 #include "integrators/bending/light_channel.h"
 #include "integrators/paths/paths.h"
 #include "renderer/film/plate_photon.h"
@@ -75,27 +74,20 @@ struct Render {
   std::vector<std::string> warnings;  ///< Problems that the picture does not show by itself; one line each.
 };
 
-/// Adds the steps and samples of the other processes; at process 0. @throw as Team::collect.
-void collect_counts(Team& team, Statistics& statistics);
+/// Adds the steps and samples of the other ranks, at the root. @throw as Ranks::gather.
+void gather_counts(Ranks* ranks, Statistics& statistics);
 
-/// A render whose work is kept. Where Progress is cancelled while units are done, the work stops, and the result is
-/// what there is.
-struct RenderJob {
-  Work work;  ///< Has no units if the method is not divided into units.
+/// A render whose work is kept, and may be divided. Where Progress is cancelled while tiles are rendered, the work
+/// stops, and the result is what there is.
+struct RenderJob : Job {
+  using Job::Job;
 
-  /// Gets what there is so far when `work` wants a picture; may be empty.
+  /// Gets what there is so far when a picture is wanted; may be empty.
   std::function<void(Render)> show;
-
-  /// Processes that make the same picture together with this one, if the method can (Method::is_shared); or that make
-  /// together what is needed before the units of the work. Null: alone.
-  Team* team = nullptr;
-
-  /// What is made before the units of `work` (KeptResults): the light of maps, photons, the light on a plate. It is the
-  /// same for all shards. Beside the mesh of photon_distribution: the photons and the fluence.
-  Work before = Work();
 };
 
-/// Renders the scene with its method. @param job  Null: nothing is kept. Of a team, only process 0 has the result.
+/// Renders the scene with its method. @param job  Null: nothing is kept. Of ranks, only the root has the result; a
+/// shard has none: what it makes is in the job.
 /// @throw Cancelled; std::runtime_error; SceneError.
 Render render(const Scene& scene, const Progress& progress, RenderJob* job = nullptr);
 

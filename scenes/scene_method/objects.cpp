@@ -116,13 +116,13 @@ std::vector<SceneObject> load_objects(const Scene& scene, const PathTracingDescr
   return objects;
 }
 
-void make_tubes(const Scene& scene, double tolerance, Team* team, const Progress& progress,
+void make_tubes(const Scene& scene, double tolerance, Job* job, const Progress& progress,
                 std::vector<SceneObject>& objects) {
   for (SceneObject& object : objects) {
     if (!object.paths) continue;
     Statistics ends;
     const PathTracingDescription& tracing = object.paths->settings;
-    const std::vector<Path> paths = follow_paths(scene, *object.paths, true, team, progress, ends);
+    const std::vector<Path> paths = follow_paths(scene, *object.paths, true, job, progress, ends);
     const double radius = typical_radius(tracing.radius, paths.size(), scene.field.world_box());
     const PathColors colors = path_colors(tracing.color, paths, radius);
     object.surface = path_surface(path_mesh(paths, tracing, colors, radius, tolerance), paths, colors,

@@ -16,8 +16,6 @@
 
 namespace tensorray {
 
-struct Preparation;
-
 /// A plate, a mesh, or paths of light.
 struct SceneObject {
   std::optional<Plate> plate;  ///< If it is flat.
@@ -33,8 +31,8 @@ struct LitObjects {
   const Scene& scene;
   const std::vector<Light>& lights;
   const std::vector<SceneObject>& objects;
-  const SurfaceScene& surfaces;    ///< All surfaces, of which that of object i has the index i, and lamps are the last.
-  const Preparation& preparation;  ///< Processes of a team trace the light together, and all have it.
+  const SurfaceScene& surfaces;  ///< All surfaces, of which that of object i has the index i, and lamps are the last.
+  Job* job = nullptr;            ///< Whose ranks trace the light together, and all have it; null: alone.
 };
 
 /// The objects of the scene (without any, a checkerboard as floor below the volume), then its obstacles.
@@ -45,7 +43,7 @@ std::vector<SceneObject> load_objects(const Scene& scene, const PathTracingDescr
 /// Follows the paths of objects that consist of paths, and makes their tubes.
 /// @param tolerance  Greatest distance of triangles from the tubes, world units.
 /// @throw SceneError if no path meets the volume; Cancelled.
-void make_tubes(const Scene& scene, double tolerance, Team* team, const Progress& progress,
+void make_tubes(const Scene& scene, double tolerance, Job* job, const Progress& progress,
                 std::vector<SceneObject>& objects);
 
 /// Adds their surfaces and materials.

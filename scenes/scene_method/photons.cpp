@@ -5,7 +5,6 @@
 #include <optional>
 
 #include "base/constants.h"
-#include "base/process/kept_results.h"
 
 namespace tensorray {
 namespace {
@@ -107,8 +106,7 @@ PhotonMaps photons_of(const LitObjects& lit, const PhotonPairs& pairs, const Ben
   settings.passes = passes;
   settings.radius = description.max_radius.value_or(automatic_radius(field, lit.lights, pairs, settings.per_pass));
   settings.seed = lit.scene.description.seed;
-  settings.team = lit.preparation.team;
-  settings.kept = lit.preparation.kept;
+  settings.job = lit.job;
   for (const SceneObject& object : lit.objects) settings.plates.push_back(object.plate);
   settings.serves = [&pairs](int light, std::uint32_t surface) {
     const std::vector<bool>& of_light = pairs[static_cast<std::size_t>(light)];

@@ -23,7 +23,7 @@ using PhotonPairs = std::vector<std::vector<bool>>;
 PhotonPairs photon_pairs(const LitObjects& lit, const SceneMethodDescription& settings);
 
 /// @param passes  Of photons.
-/// @throw Cancelled; as Team::exchange.
+/// @throw Cancelled; as Ranks::all_gather.
 PhotonMaps photons_of(const LitObjects& lit, const PhotonPairs& pairs, const BendingRegion& region,
                       const PhotonsDescription& description, int passes, const Progress& progress);
 

@@ -6,7 +6,6 @@
 
 #include <fmt/format.h>
 
-#include "base/process/kept_results.h"
 #include "base/process/progress.h"
 #include "base/process/seconds.h"
 #include "integrators/view/field_region.h"
@@ -207,8 +206,7 @@ Render LoadedObjects::render(const Scene& scene, const Progress& progress, Rende
   const std::vector<Light> lights = scene_lights(scene, loaded_.lights, {});
   const Camera camera = scene_camera(scene, points_of_interest(scene, loaded_.objects, lights));
   std::vector<SceneObject> objects = loaded_.objects;
-  Team* const team = job ? job->team : nullptr;
-  make_tubes(scene, tube_error * pixel_size(camera, scene.field.world_box().center()), team, progress, objects);
+  make_tubes(scene, tube_error * pixel_size(camera, scene.field.world_box().center()), job, progress, objects);
   std::vector<ShadedSurface> surfaces;
   std::vector<Material> materials;
   add_objects(objects, light, surfaces, materials);
@@ -228,11 +226,8 @@ Render LoadedObjects::render(const Scene& scene, const Progress& progress, Rende
   const PathTracerSettings samples = object_tracer_settings(scene, loaded_, camera, 0);
   FieldLight before;
   if (bends) {
-    KeptResults kept(job ? &job->before : nullptr, team);
-    const Preparation preparation{team, &kept};
-    const LitObjects lit{scene, lights, objects, stage, preparation};
+    const LitObjects lit{scene, lights, objects, stage, job};
     before = trace_light(lit, region, samples.max_samples / samples.first_samples, progress);
-    kept.finish();
     shaded.photons = &before.photons;
     shaded.irradiance_maps = std::move(before.maps);
   }
@@ -261,7 +256,6 @@ class SceneMethod : public MethodWith<SceneMethodDescription> {
  public:
   const char* name() const override { return "scene"; }
   bool is_sampled() const override { return true; }
-  bool is_divided() const override { return true; }
 
   /// The sun of a scene without `lights` shines along it, paths begin with it, and the automatic scale is for it.
   bool needs_light_direction(const SceneDescription& scene) const override {

@@ -8,7 +8,6 @@
 #include <fmt/format.h>
 
 #include "base/constants.h"
-#include "base/process/kept_results.h"
 #include "integrators/flow_drawing/flow_irradiance.h"
 #include "scenes/path_tracing/studio.h"
 
@@ -139,10 +138,9 @@ std::optional<IrradianceMap> land(const LitObjects& lit, std::size_t number, con
   plate.resolution.setConstant(caustic.resolution);
   std::optional<FlowIrradiance> landed;
   try {
-    landed = flow_irradiance(scene.field, surfaces_before(lit, receiver), plate, light,
-                             {scene.bending, caustic.resolution, caustic.rays, lit.preparation.team,
-                              lit.preparation.kept, 1 + number * lit.objects.size() + receiver},
-                             progress);
+    landed = flow_irradiance(
+        scene.field, surfaces_before(lit, receiver), plate, light,
+        {scene.bending, caustic.resolution, caustic.rays, lit.job, number * lit.objects.size() + receiver}, progress);
   } catch (const std::invalid_argument& error) {
     throw SceneError(fmt::format("{}: `/lights/{}` has no map of its light: {}; move it away, or use photons",
                                  scene.description.path.string(), number, error.what()));

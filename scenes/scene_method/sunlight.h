@@ -23,7 +23,7 @@ std::function<double(double)> flexibility_of(const BendingDescription& bending);
 
 /// The light of directional lights and points that lands on the objects through the field, by flow maps: of all pairs
 /// but those that have photons. @throw SceneError if a light is where it can have no map; Cancelled; as
-/// Team::exchange.
+/// Ranks::all_gather.
 std::vector<IrradianceMap> land_light(const LitObjects& lit, const PhotonPairs& photons, const ShownLight& shown,
                                       const CausticDescription& caustic, const Progress& progress);
 

@@ -5,7 +5,6 @@
 
 #include <fmt/format.h>
 
-#include "base/process/kept_results.h"
 #include "base/process/progress.h"
 #include "base/process/seconds.h"
 #include "integrators/probes/stretch.h"
@@ -109,9 +108,7 @@ class LoadedStretch : public LoadedMethod {
   Render render(const Scene& scene, const Progress& progress, RenderJob* job) const override {
     const auto start = Clock::now();
     StretchSettings settings = settings_;
-    settings.team = job ? job->team : nullptr;
-    KeptResults kept(job ? &job->work : nullptr, settings.team);
-    settings.kept = &kept;
+    settings.job = job;
     const OutputDescription& output = scene.description.output;
     const Geometry geometry = without_plate(scene);
     Render result;
@@ -124,9 +121,9 @@ class LoadedStretch : public LoadedMethod {
     }
     if (output.wants("image") || output.wants("exr")) {
       const Plate plane = entry_plane(scene, description_.pixels);
-      if (job && job->show && !job->team)
+      if (job && job->show && is_root(job->ranks))
         settings.show = [&](const std::vector<float>& picture) {
-          if (!job->work.picture_wanted.exchange(false)) return;
+          if (!job->picture_wanted.exchange(false)) return;
           Render so_far = result;
           draw(scene, picture, plane.resolution, so_far);
           job->show(std::move(so_far));
@@ -136,8 +133,7 @@ class LoadedStretch : public LoadedMethod {
       result.view = view_of(plane);
     }
     result.statistics.seconds_tracing = seconds_since(start);
-    if (kept.is_shard()) kept.keep(true);
-    return has_all(settings.team) ? std::move(result) : Render();
+    return result;
   }
 
  private:
@@ -148,7 +144,6 @@ class LoadedStretch : public LoadedMethod {
 class StretchMethod : public MethodWith<StretchKeys> {
  public:
   const char* name() const override { return "stretch"; }
-  bool is_shared() const override { return true; }
 
   std::vector<Output> outputs() const override {
     std::vector<Output> outputs = picture_outputs();

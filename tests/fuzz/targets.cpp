@@ -13,8 +13,7 @@
 
 #include "base/files/descriptor.h"
 #include "base/files/temporary_folder.h"
-#include "base/process/kept_results.h"
-#include "base/process/team.h"
+#include "base/process/archive.h"
 #include "base/text/path_text.h"
 #include "integrators/path_files/path_formats.h"
 #include "integrators/photons/photon_sums.h"
@@ -115,28 +114,22 @@ bool read_kept_work(const std::string& bytes) {
   return read_file(bytes, [](const std::filesystem::path& path) { read_work(path); });
 }
 
-/// What files of work hold: the sums of photons, or results by their keys. Their first byte chooses. (Few of the bytes
-/// that a fuzzer makes of such a file have the right hash.)
+/// What files of work hold: the sums of photons, or other results. Their first byte chooses. (Few of the bytes that a
+/// fuzzer makes of such a file have the right hash.)
 bool read_kept_unit(const std::string& bytes) {
   if (bytes.empty()) return false;
-  const std::string unit = bytes.substr(1);
-  if ((bytes[0] & 1) == 0) {
-    PhotonSums sums;
-    sums.ends.resize(2);
-    sums.points.emplace(4, 4, 2, DensitySettings{DensityKind::histogram});
-    sums.has_photons = true;
-    return expect_one_line([&] { add_bytes(unit, sums); });
-  }
-  Work work;
-  work.begin(1);
-  work.keep(0, unit, true);
-  return expect_one_line([&] {
-    KeptResults kept(&work, nullptr);
-    std::vector<double> values;
-    find_or_make(
-        &kept, {1, 0, 0}, [] { throw std::runtime_error("there is no such result"); },
-        [&](PartBytes& part) { part.copy_vector(values); });
-  });
+  Archive archive(std::string_view(bytes).substr(1));
+  if ((bytes[0] & 1) != 0)
+    return expect_one_line([&] {
+      std::vector<double> values;
+      archive.copy_list(values);
+      archive.finish();
+    });
+  PhotonSums sums;
+  sums.ends.resize(2);
+  sums.points.emplace(4, 4, 2, DensitySettings{DensityKind::histogram});
+  sums.has_photons = true;
+  return expect_one_line([&] { copy_sums(archive, sums); });
 }
 
 /// Each vertex has a normal or none has, and triangles name vertices that are there.

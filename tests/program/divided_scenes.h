@@ -9,19 +9,13 @@
 
 namespace tensorray::test {
 
-inline const char* const whole_scene = R"({
-  "field": {"file": "field.vdb", "eigenvalues": "absolute", "scale": 4},
-  "integrator": {"type": "scene", "max_samples": 16, "min_samples": 8, "bands": 4, "bands_per_sample": 4,
-                 "caustic": {"resolution": 32, "rays": 1000, "passes": 1}},
-  "camera": {"resolution": [70, 50]}})";
-
 inline const char* const path_scene = R"({
   "field": {"file": "field.vdb", "eigenvalues": "absolute", "scale": 4},
   "integrator": {"type": "path_tracing", "max_samples": 64, "min_samples": 8, "noise": 0.01},
   "camera": {"resolution": [60, 50]}})";
 
 /// Light by maps, of two directions, and by photons, on two plates.
-inline const char* const lit_scene = R"({
+inline const std::string lit_scene = R"({
   "field": {"file": "field.vdb", "eigenvalues": "absolute", "scale": 4},
   "objects": [{"plate": {"center": [0, 0, -2], "size": [6, 6]}}, {"plate": {"center": [0, 0, -3], "size": [9, 9]}}],
   "lights": [{"kind": "directional", "direction": [0.1, 0, -1], "angle": 0.5},
@@ -49,13 +43,9 @@ inline std::string plate_scene(const std::string& integrator, int photons = 2000
                      integrator, photons);
 }
 
-inline const std::vector<std::string> plate_integrators{
-    R"({"type": "photon_distribution"})",
-    R"({"type": "photon_distribution", "density": {"kind": "gaussian", "tau": 2}})",
-    R"({"type": "photon_distribution", "density": {"kind": "histogram"}})",
-    R"({"type": "photon_distribution", "density": {"kind": "photon_differential"}})",
-    R"({"type": "lens", "samples": 2, "mode": "scatter"})",
-    R"({"type": "lens", "samples": 1, "mode": "gather", "image_plane": {"depth": [-0.25, -1]}})",
-    R"({"type": "stretch"})"};
+inline const std::string gaussian_photons =
+    R"({"type": "photon_distribution", "density": {"kind": "gaussian", "tau": 2}})";
+inline const std::string lens = R"({"type": "lens", "samples": 2, "mode": "gather"})";
+inline const std::string stretch = R"({"type": "stretch"})";
 
 }  // namespace tensorray::test

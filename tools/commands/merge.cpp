@@ -1,12 +1,13 @@
 #include <memory>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include <CLI/CLI.hpp>
 
 #include "base/files/distinct_files.h"
 #include "scenes/jobs/origin.h"
-#include "scenes/jobs/read_shards.h"
+#include "scenes/jobs/work_file.h"
 #include "tools/commands/commands.h"
 #include "tools/rendering/render_scene.h"
 
@@ -24,11 +25,11 @@ void merge(const MergeOptions& options, Progress& progress) {
   for (const std::string& shard : options.shards) inputs.push_back({shard, "the shard"});
   for (const std::filesystem::path& output : options.outputs) outputs.push_back({output, "-o"});
   require_distinct_files(inputs, outputs);
-  const WorkFile work = read_shards(options.shards);
+  WorkFile work = read_shards(options.shards);
   SceneDescription description =
       read_scene_json(work.origin.at("scene"), work.scene_file, {{}, options.outputs, std::nullopt});
   set_chosen(work.origin, description);
-  write_merged(description, work, options.run, progress);
+  merge_shards(description, std::move(work), options.run, progress);
 }
 
 }  // namespace

@@ -13,9 +13,8 @@
 #include "scenes/source/frames.h"
 #include "tools/commands/commands.h"
 #include "tools/commands/imported_field.h"
-#include "tools/ranks/follower.h"
-#include "tools/ranks/leader.h"
 #include "tools/ranks/ranks.h"
+#include "tools/rendering/frames.h"
 #include "tools/rendering/render_scene.h"
 
 namespace tensorray {
@@ -61,10 +60,10 @@ void take_shard(const std::string& text, SceneChanges& changes, RunKeeping& keep
   std::size_t number = 0, count = 0;
   const bool is_read = slash != std::string::npos && CLI::detail::lexical_cast(text.substr(0, slash), number) &&
                        CLI::detail::lexical_cast(text.substr(slash + 1), count);
-  if (!is_read || number < 1 || number > count || count > most_parts)
+  if (!is_read || number < 1 || number > count || count > max_shards)
     throw std::invalid_argument(
         fmt::format("--shard {}: give number and count, as 3/16; numbers begin with 1, and there may be {}",
-                    printable(text), most_parts));
+                    printable(text), max_shards));
   if (changes.outputs.size() != 1)
     throw std::invalid_argument("--shard: name one file for the shard, as -o part" + std::to_string(number) + ".shard");
   keeping.shard = WorkPart{number - 1, count};
@@ -121,11 +120,12 @@ void render_import(const std::string& file, SceneChanges changes, const RenderOp
   render_scene(field.path(), changes, run, progress);
 }
 
-/// @param leader  Null: there are no other ranks. @return frames that failed, where the run keeps going.
-std::vector<int> render(const RenderOptions& options, Leader* leader, Progress& progress) {
+/// @param ranks  Null: this process is alone. @return frames that failed, where the run keeps going.
+std::vector<int> render(const RenderOptions& options, Ranks* ranks, Progress& progress) {
+  if (!is_root(ranks)) broadcast(ranks, true);  // The root has found nothing wrong with the command line.
   SceneChanges changes = changes_of(options);
   if (needs_import(options.scene)) {
-    if (leader) throw std::invalid_argument("mpirun: import the file first, with `tensorray import`");
+    if (ranks) throw std::invalid_argument("mpirun: import the file first, with `tensorray import`");
     render_import(options.scene, changes, options, progress);
     return {};
   }
@@ -134,43 +134,37 @@ std::vector<int> render(const RenderOptions& options, Leader* leader, Progress& 
     throw std::invalid_argument(flags.substr(1) + ": only files that have to be imported have this choice");
   }
   RenderRun run = options.run;
-  run.leader = leader;
+  run.ranks = ranks;
   if (!options.shard.empty()) take_shard(options.shard, changes, run.keeping);
+  if (!options.frames.empty() && !run.scene_copy.empty())
+    throw std::invalid_argument("--save-scene: not for several frames");
+  if (is_root(ranks)) broadcast(ranks, true);
   if (options.frames.empty()) {
     render_scene(options.scene, changes, run, progress);
     return {};
   }
-  if (!run.scene_copy.empty()) throw std::invalid_argument("--save-scene: not for several frames");
   return render_frames(options.scene, changes, parse_frames(options.frames), run, progress);
 }
 
-/// Rank 0 checks everything, and says it; the others do what it asks for. @return whether all frames succeeded.
-bool follow(const RenderOptions& options, Ranks& ranks, Progress& progress) {
-  Follower follower(ranks, progress, options.run.keeping.interval);
+/// The root says what is wrong for all; other ranks, what is wrong with them alone.
+std::vector<int> render_with_others(const RenderOptions& options, JoinedRanks& ranks, Progress& progress) {
   try {
-    return follow(options.scene, changes_of(options), options.run, follower, progress).empty();
+    return render(options, &ranks, progress);
   } catch (const Cancelled&) {
+    if (is_root(&ranks)) throw;
     throw CLI::RuntimeError(130);  // Without a word.
   } catch (const std::exception& error) {
+    if (is_root(&ranks)) throw;
     throw std::runtime_error(fmt::format("rank {}: {}", ranks.rank(), error.what()));
   }
 }
 
 void render_alone_or_with_others(const RenderOptions& options, Progress& progress) {
-  const std::unique_ptr<Ranks> ranks = join_ranks();
+  const std::unique_ptr<JoinedRanks> ranks = join_ranks(progress);
   if (!ranks) return report_failed(render(options, nullptr, progress));
-  std::vector<int> failed;
-  bool is_well = true;
-  if (ranks->rank() == 0) {
-    Leader leader(*ranks, progress);
-    failed = render(options, &leader, progress);
-    leader.finish();
-  } else {
-    is_well = follow(options, *ranks, progress);
-  }
-  ranks->finish();  // The leader's thread, which talks to the others, has ended.
-  report_failed(failed);
-  if (!is_well) throw CLI::RuntimeError(1);  // The frames were named when they failed.
+  const std::vector<int> failed = render_with_others(options, *ranks, progress);
+  ranks->finish();
+  if (is_root(ranks.get())) report_failed(failed);
 }
 
 void add_import_options(CLI::App& command, ImportChoices& import) {

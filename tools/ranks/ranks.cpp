@@ -18,7 +18,7 @@ bool has_others() {
 
 /// Loads the part of the program that uses MPI. The run path of the program, which `dlopen` searches, is its own
 /// folder. MPI loads parts of its own, which need its names.
-Ranks* (*load())() {
+JoinedRanks* (*load_mpi())(const Progress* progress) {
   void* const library = dlopen("libtensorray_mpi.so", RTLD_NOW | RTLD_GLOBAL);
   void* const function = library ? dlsym(library, "tensorray_join_ranks") : nullptr;
   if (!function)
@@ -26,20 +26,14 @@ Ranks* (*load())() {
         std::string("mpirun: this tensorray cannot use MPI; build it where MPI is installed (tools/setup release mpi), "
                     "or divide the work with --shard: ") +
         dlerror());
-  return reinterpret_cast<Ranks* (*)()>(function);
+  return reinterpret_cast<JoinedRanks* (*)(const Progress*)>(function);
 }
 
 }  // namespace
 
-std::vector<int> next_ranks(int rank, int count) {
-  std::vector<int> ranks;
-  for (int more = 1; rank + more < count && (rank & more) == 0; more *= 2) ranks.insert(ranks.begin(), rank + more);
-  return ranks;
-}
-
-std::unique_ptr<Ranks> join_ranks() {
+std::unique_ptr<JoinedRanks> join_ranks(const Progress& progress) {
   if (!has_others()) return nullptr;
-  std::unique_ptr<Ranks> ranks(load()());
+  std::unique_ptr<JoinedRanks> ranks(load_mpi()(&progress));
   if (ranks->count() > 1) return ranks;
   ranks->finish();
   return nullptr;

@@ -1,21 +1,20 @@
 #pragma once
 /// @file tools/rendering/render_scene.h
-/// Renders a scene file and writes its outputs.
+/// Renders a scene file and writes its outputs. Its drivers: frames.h renders sequences, checkpoint.h keeps the work
+/// and continues it, rank_scene.h gives the scene to other ranks.
 
 #include <filesystem>
 #include <optional>
 #include <string>
 #include <vector>
 
+#include "base/process/job.h"
 #include "base/process/progress.h"
-#include "base/process/work.h"
 #include "scenes/jobs/work_file.h"
 #include "scenes/pipeline/read_scene.h"
+#include "scenes/scene/scene.h"
 
 namespace tensorray {
-
-class Follower;
-class Leader;
 
 /// How a run keeps its work.
 struct RunKeeping {
@@ -30,7 +29,7 @@ struct RunKeeping {
 
 struct RenderRun {
   RunKeeping keeping;
-  Leader* leader = nullptr;          ///< Other processes that render, too; null: there are none.
+  Ranks* ranks = nullptr;            ///< Processes that render together with this one, the root; null: alone.
   std::size_t memory = 0;            ///< What may be resident, in bytes; 0: without a bound.
   unsigned threads = 0;              ///< Number of threads; 0: all.
   bool skip_existing = false;        ///< Leave out frames of which all files exist, but no checkpoint.
@@ -41,29 +40,23 @@ struct RenderRun {
 };
 
 /// Reads the scene file (or the field's; see read_scene), loads the scene, renders it and writes its outputs. Prints a
-/// progress bar and notes.
+/// progress bar and notes. Of ranks, only the root reads the file, prints and writes.
 /// The work is kept in a checkpoint beside the first output, PICTURE.checkpoint, while the render runs, and where it is
 /// interrupted, with the picture so far.
 /// @throw SceneError, std::invalid_argument, std::runtime_error, Cancelled; Interrupted.
 void render_scene(const std::filesystem::path& scene_file, const SceneChanges& changes, const RenderRun& run,
                   Progress& progress);
 
-/// Renders frames of a scene (see set_frame), one after the other. The scale and the direction `auto` are those of the
-/// first frame. A field that does not change is loaded once. Where there are other ranks, and the method's work is not
-/// divided, each takes the next frame.
-/// @return the frames that failed, where the run keeps going; they were named on standard error.
-/// @throw as render_scene; SceneError if the names of files do not count frames, so that one would replace another.
-std::vector<int> render_frames(const std::filesystem::path& scene_file, SceneChanges changes,
-                               const std::vector<int>& frames, const RenderRun& run, Progress& progress);
-
-/// Renders what rank 0 asks for, which calls render_scene or render_frames with the same arguments, until it has no
-/// more: units of its scenes, or frames. @return frames that failed here, where the run keeps going.
+/// Makes the pictures of a scene of shards, whose results must be all there are, and those of the scene.
 /// @throw as render_scene.
-std::vector<int> follow(const std::filesystem::path& scene_file, const SceneChanges& changes, const RenderRun& run,
-                        Follower& follower, Progress& progress);
+void merge_shards(const SceneDescription& description, WorkFile shards, const RenderRun& run, Progress& progress);
 
-/// Makes the pictures of a scene of work that is done. The work must be all of it, and that of the scene.
-/// @throw as render_scene.
-void write_merged(const SceneDescription& description, const WorkFile& work, const RenderRun& run, Progress& progress);
+/// The same from a description on. @param loaded  The scene of an earlier frame: what has not changed is not loaded
+/// again. @return the scene.
+Scene render_to_files(const SceneDescription& description, const RenderRun& run, std::optional<Scene> loaded,
+                      Progress& progress);
+
+/// Pages of a field that is larger than the memory are on the disk of the result.
+void bound_memory_of(const RenderRun& run, const SceneDescription& description);
 
 }  // namespace tensorray

@@ -10,10 +10,10 @@
 #include <gtest/gtest.h>
 #include <tbb/global_control.h>
 
-#include "base/process/kept_results.h"
+#include "base/process/job.h"
 #include "base/process/progress.h"
 #include "renderer/light_maps/irradiance_map.h"
-#include "tests/base/team_support.h"
+#include "tests/base/rank_support.h"
 #include "tests/integrators/support.h"
 
 namespace tensorray {
@@ -90,65 +90,31 @@ TEST(FlowIrradianceTest, BentLightKeepsItsPower) {
   }
 }
 
-TEST(FlowIrradianceTest, OfATeamIsThatOfOneProcess) {
+TEST(FlowIrradianceTest, OfRanksAndOfEarlierRunsIsThatOfOneProcess) {
   const TensorField field = cube_field(9, [](const Vector3d& p) { return Matrix3d(p.asDiagonal()); });
   LandingLight light = sun({0.2, 0.1, -1});
   light.angle = 0.03;
   light.passes = 2;
   const FlowIrradiance alone = land(field, light, floor_plate(8));
-  for (const std::size_t count : {std::size_t{2}, std::size_t{3}}) {
-    std::vector<std::optional<FlowIrradiance>> landed(count);
-    run_team(count, [&](Team& team) {
-      landed[team.index()] =
-          flow_irradiance(field, surfaces_of(field), floor_plate(8), light, {{}, 64, 20000, &team}, {});
-    });
-    for (const auto& each : landed) {
-      ASSERT_TRUE(each);
-      EXPECT_EQ(each->plate.center, alone.plate.center);
-      EXPECT_TRUE(each->irradiance.values == alone.irradiance.values);
-      EXPECT_TRUE(each->folds == alone.folds);
-    }
-  }
-}
-
-/// Changes the mantissa of the first number of each result that is kept: of a vertex, where its light lands.
-std::string changed_results(std::string bytes) {
-  constexpr std::size_t size_at = 24, head = 32;
-  for (std::size_t at = 0; at < bytes.size();) {
-    std::uint64_t size = 0;
-    std::memcpy(&size, &bytes[at + size_at], sizeof size);
-    ++bytes[at + head + 1];
-    at += head + (size << 1 >> 1);  // Its first bit marks parts.
-  }
-  return bytes;
-}
-
-TEST(FlowIrradianceTest, ADirectionThatIsInterruptedGoesOn) {
-  const TensorField field = cube_field(9, [](const Vector3d& p) { return Matrix3d(p.asDiagonal()); });
-  const LandingLight light = sun({0.2, 0.1, -1});
-  const FlowIrradiance alone = land(field, light, floor_plate(8));
-  const auto land_until = [&](int most_reports, Work& work) {
-    KeptResults kept(&work, nullptr);
-    Progress progress;
-    int reports = 0;
-    progress.report = [&](const std::string&, std::uint64_t, std::uint64_t) {
-      progress.cancelled = ++reports > most_reports;
-    };
-    return flow_irradiance(field, surfaces_of(field), floor_plate(8), light, {{}, 64, 20000, nullptr, &kept, 1},
-                           progress);
+  const auto expect_same = [&](Job& job) {
+    const auto landed = flow_irradiance(field, surfaces_of(field), floor_plate(8), light, {{}, 64, 20000, &job, 3}, {});
+    ASSERT_TRUE(landed);
+    EXPECT_EQ(landed->plate.center, alone.plate.center);
+    EXPECT_TRUE(landed->irradiance.values == alone.irradiance.values);
+    EXPECT_TRUE(landed->folds == alone.folds);
   };
-  Work work;
-  EXPECT_THROW(land_until(2, work), Cancelled);
-  ASSERT_TRUE(work.state(0));
-  std::string state = *work.state(0);
-  Work resumed({}, work.units()), misled;
-  misled.begin(1);
-  misled.keep(0, changed_results(std::move(state)), false);
-  const auto landed = land_until(1 << 30, resumed), other = land_until(1 << 30, misled);
-  ASSERT_TRUE(landed && other);
-  EXPECT_TRUE(landed->irradiance.values == alone.irradiance.values);
-  EXPECT_TRUE(landed->folds == alone.folds);
-  EXPECT_FALSE(other->irradiance.values == alone.irradiance.values);
+  Results kept;
+  run_ranks(3, [&](Ranks& ranks) {
+    Job job;
+    job.ranks = &ranks;
+    job.interval = 1e-9;
+    expect_same(job);
+    if (is_root(&ranks)) kept = job.results();
+  });
+  EXPECT_EQ(kept.size(), 2u);  // A direction is a unit.
+  kept.erase(kept.begin());
+  Job resumed({}, kept);
+  expect_same(resumed);
 }
 
 LandingLight lamp(const Vector3d& source) {

@@ -7,11 +7,12 @@
 #include <gtest/gtest.h>
 #include <tbb/task_arena.h>
 
+#include "base/process/job.h"
 #include "integrators/paths/cross_section.h"
 #include "integrators/steps/scalar_tracer.h"
 #include "integrators/tracing/trace.h"
 #include "renderer/surfaces/tube_mesh.h"
-#include "tests/base/team_support.h"
+#include "tests/base/rank_support.h"
 #include "tests/integrators/path_support.h"
 #include "tests/integrators/support.h"
 
@@ -333,22 +334,21 @@ TEST(Paths, AStraightFieldMakesStraightCircularTubes) {
   EXPECT_NEAR(tubes.mesh.bounds().min().z(), -1, 1e-9);
 }
 
-/// Thousands of paths, which processes divide.
-TEST(Paths, OfATeamAreThoseOfOneProcess) {
+/// More than one round of them.
+TEST(Paths, OfRanksAreThoseOfOneProcess) {
   const TensorField field = cube_field(5, linear_tensor);
   const Geometry geometry(surfaces_of(field));
   std::vector<PathSeed> seeds;
   for (int i = 0; i < 5000; ++i) seeds.push_back(seed_at({std::sin(1.0 * i), std::cos(1.7 * i), 2}, 2e-5 * i));
   const std::vector<Path> alone = trace_paths(field, geometry, {}, seeds, {}, Progress());
   std::vector<std::vector<Path>> paths(3);
-  const std::size_t bytes = run_team(paths.size(), [&](Team& team) {
+  run_ranks(paths.size(), [&](Ranks& ranks) {
+    Job job;
+    job.ranks = &ranks;
     PathSettings settings;
-    settings.team = &team;
-    paths[team.index()] = trace_paths(field, geometry, {}, seeds, settings, Progress());
+    settings.job = &job;
+    paths[ranks.rank()] = trace_paths(field, geometry, {}, seeds, settings, Progress());
   });
-  std::size_t points = 0;
-  for (const Path& path : alone) points += path.points.size();
-  EXPECT_EQ(bytes, points * sizeof(PathPoint) + alone.size() * (sizeof(std::size_t) + 2 * sizeof(double) + 3));
   for (const std::vector<Path>& each : paths) expect_same(each, alone);
 }
 

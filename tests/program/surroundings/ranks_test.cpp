@@ -21,6 +21,12 @@ std::string mpirun() {
 #endif
 }
 
+struct RankCase {
+  std::string scene;
+  std::vector<std::string> endings;  // Of the files.
+  int ranks = 2;
+};
+
 class RanksProgram : public Program {
  protected:
   void SetUp() override {
@@ -77,47 +83,33 @@ class RanksProgram : public Program {
   }
 };
 
+/// Each method: tiles with the light before them, the light on a plate, lens, stretch; and files without a picture.
 TEST_F(RanksProgram, GiveTheFilesOfOneProcess) {
-  for (const char* scene : {whole_scene, path_scene}) {
-    write("scene.json", scene);
-    run_well({"render", "scene.json", "-q", "-o", "one.png", "-o", "one.exr"});
-    for (const int ranks : {1, 2, 3, 4}) {
-      render_with_ranks(ranks, "-q -o a.png -o a.exr --threads 1 --stats stats.json");
-      expect_same("a.png", "one.png");
-      expect_same("a.exr", "one.exr");
-      if (ranks == 1) continue;  // This one has not loaded MPI.
-      const nlohmann::json traffic = read_json("stats.json")["ranks"];
-      EXPECT_EQ(traffic["count"], ranks);
-      std::uint64_t units = 0;
-      for (const std::uint64_t each : traffic["units"]) units += each;
-      EXPECT_EQ(units, scene == whole_scene ? 5u * 4u : 4u * 4u);
-      const std::uint64_t words = 24 * traffic["messages"].get<std::uint64_t>();
-      const bool is_lit = scene == whole_scene;
-      // Of the sun's light in four bands, vertices of 33 wavelengths cross, and the sums and results of 32² pixels. The
-      // scene's 1,000 vertices may become five thirds as many: a division adds up to five, and is taken for three.
-      const unsigned vertices = is_lit ? 1000 * 5 / 3 * (9 * 33 + 4 * 5) : 0, plate = is_lit ? 8 * 4 * 35 * 32 : 0;
-      // Each pixel crosses once: 120 bytes and 8 for each band, of the light and of what has landed, and few words.
-      const unsigned pixels = is_lit ? 70 * 50 * (120 + 8 * 2 * 4) : 60 * 50 * (120 + 8 * 32);
-      EXPECT_LE(traffic["bytes_received"], pixels + vertices + ranks * plate + words);
-      EXPECT_LE(traffic["bytes_sent"], 4000u * ranks + 2 * (vertices + plate) + words);  // To two ranks at most.
+  const RankCase cases[] = {
+      {lit_scene, {"png", "exr"}, 2},
+      {lit_scene, {"exr"}, 1},  // This one does not load MPI.
+      {plate_under_paths("gaussian"), {"exr", "vtp", "ply"}, 3},
+      {plate_scene(R"({"type": "photon_distribution"})"), {"png", "exr", "spectral.exr", "vtp", "fluence.vdb"}, 3},
+      {plate_scene(gaussian_photons), {"exr", "vtp"}, 2},
+      {plate_scene(lens), {"png", "exr", "spectral.exr"}, 2},
+      {plate_scene(stretch), {"exr", "vdb"}, 2},
+  };
+  for (const RankCase& each : cases) {
+    SCOPED_TRACE(each.scene);
+    write("scene.json", each.scene);
+    std::vector<std::string> alone{"render", "scene.json", "-q", "--stats", "one.json"};
+    std::string together = "-q --threads 1 --stats a.json";
+    for (const std::string& ending : each.endings) {
+      alone.insert(alone.end(), {"-o", "one." + ending});
+      together += " -o a." + ending;
     }
-  }
-}
-
-/// Light that is made before the tiles. No rank makes it alone: what rank 0 sends is more than orders.
-TEST_F(RanksProgram, MakeTheLightBeforeTheTilesTogether) {
-  for (const std::string& scene : {std::string(lit_scene), plate_under_paths("mesh"), plate_under_paths("gaussian")}) {
-    write("scene.json", scene);
-    run_well({"render", "scene.json", "-q", "-o", "one.exr"});
-    for (const int ranks : {2, 3}) {
-      render_with_ranks(ranks, "-q -o a.exr --threads 1 --stats stats.json");
-      expect_same("a.exr", "one.exr");
-      const nlohmann::json traffic = read_json("stats.json")["ranks"];
-      EXPECT_GT(traffic["bytes_sent"], 40 * 32 * 3 * 4) << scene;
-      std::uint64_t units = 0;
-      for (const std::uint64_t each : traffic["units"]) units += each;
-      EXPECT_EQ(units, 3u * 2u);
-    }
+    run_well(alone);
+    render_with_ranks(each.ranks, together);
+    for (const std::string& ending : each.endings) expect_same("a." + ending, "one." + ending);
+    const nlohmann::json one = read_json("one.json"), many = read_json("a.json");
+    if (each.ranks == 1) continue;
+    EXPECT_EQ(many["ranks"]["count"], each.ranks);
+    for (const char* key : {"positions", "photons"}) EXPECT_EQ(many[key], one[key]) << key;
   }
 }
 
@@ -134,83 +126,25 @@ TEST_F(RanksProgram, HaveOneFieldWithinABoundOfMemory) {
     EXPECT_NE(entry.path().filename().string().rfind("tensorray-", 0), 0u) << entry.path();
 }
 
-/// A file of paths has no tiles, and no light before them.
-TEST_F(RanksProgram, WriteFilesWithoutAPicture) {
-  write("scene.json", plate_under_paths("mesh"));
-  run_well({"render", "scene.json", "-q", "-o", "one.vtp", "-o", "one.ply"});
-  render_with_ranks(2, "-q -o a.vtp -o a.ply");
-  expect_same("a.vtp", "one.vtp");
-  expect_same("a.ply", "one.ply");
-}
-
-struct SharedCase {
-  const char* integrator;
-  std::vector<std::string> endings;  // Of the pictures.
-  std::string option;
-};
-
-/// The steps of light on a plate, of a lens, of stretch: all ranks trace it and draw it.
-TEST_F(RanksProgram, MakeOnePictureTogether) {
-  const SharedCase cases[] = {
-      {R"({"type": "photon_distribution"})", {"png", "exr", "spectral.exr", "vtp"}, ""},
-      {R"({"type": "photon_distribution"})", {"exr"}, "--until-error=20%"},
-      {R"({"type": "lens", "samples": 2, "mode": "gather"})", {"png", "exr", "spectral.exr"}, ""},
-      {R"({"type": "lens", "samples": 1, "mode": "scatter"})", {"exr"}, ""},
-      {R"({"type": "photon_distribution", "density": {"kind": "gaussian", "tau": 2}})", {"png", "exr", "vtp"}, ""},
-      {R"({"type": "photon_distribution", "density": {"kind": "histogram"}})", {"spectral.exr", "fluence.vdb"}, ""},
-      {R"({"type": "photon_distribution", "density": {"kind": "photon_differential"}})", {"exr"}, ""},
-      {R"({"type": "stretch"})", {"png", "exr", "vdb"}, ""},
-  };
-  for (const SharedCase& each : cases) {
-    write(
-        "scene.json",
-        fmt::format(R"({{"field": {{"file": "field.vdb"}}, "light": {{"photons": 20000, "wavelengths": {{"count": 6}}}},
-                                         "integrator": {}, "receiver": {{"resolution": [40, 32]}}}})",
-                    each.integrator));
-    std::vector<std::string> alone{"render", "scene.json", "-q", "--stats", "one.json"};
-    std::string together = each.option + " -q --threads 1 --stats a.json";
-    for (const std::string& ending : each.endings) {
-      alone.insert(alone.end(), {"-o", "one." + ending});
-      together += " -o a." + ending;
-    }
-    if (!each.option.empty()) alone.push_back(each.option);
-    run_well(alone);
-    const nlohmann::json one = read_json("one.json");
-    for (const int ranks : {2, 3}) {
-      render_with_ranks(ranks, together);
-      for (const std::string& ending : each.endings) expect_same("a." + ending, "one." + ending);
-      const nlohmann::json many = read_json("a.json");
-      for (const char* key : {"positions", "photons", "ray_steps", "tensor_samples"})
-        EXPECT_EQ(many[key], one[key]) << each.integrator << ' ' << key;
-      EXPECT_EQ(many["ranks"]["count"], ranks);
-      for (const std::uint64_t parts : many["ranks"]["units"]) EXPECT_GT(parts, 2u);
-    }
-  }
-}
-
-/// Methods without units of tiles: ranks take whole frames.
+/// Each rank renders every so many; those that fail are named once.
 TEST_F(RanksProgram, DivideTheFramesOfASequence) {
-  for (const char* method :
-       {R"({"type": "photon_distribution"})", R"({"type": "lens", "samples": 1})", R"({"type": "stretch"})"}) {
-    write("scene.json", fmt::format(R"({{"field": {{"file": "field.vdb"}}, "integrator": {},
-        "light": {{"photons": 500, "wavelengths": {{"count": 4}},
-                   "direction": {{"keys": [[1, [0, 0, -1]], [5, [0, 1, -1]]]}}}},
-        "receiver": {{"resolution": [24, 24]}}}})",
-                                    method));
-    run_well({"render", "scene.json", "-q", "--frames", "1-5", "-o", "one.#.exr"});
-    render_with_ranks(3, "--frames 1-5 -o a.#.exr");
-    for (int frame = 1; frame <= 5; ++frame)
-      expect_same(fmt::format("a.{}.exr", frame), fmt::format("one.{}.exr", frame));
-    for (const auto& entry : std::filesystem::directory_iterator(in_folder("")))
-      if (entry.path().extension() == ".exr") std::filesystem::remove(entry.path());
-  }
+  write("scene.json", R"({"field": {"file": "field.vdb"}, "integrator": {"type": "photon_distribution"},
+      "light": {"photons": {"keys": [[3, 500], [4, -1], [5, 500]]}, "wavelengths": {"count": 4},
+                "direction": {"keys": [[1, [0, 0, -1]], [5, [0, 1, -1]]]}},
+      "receiver": {"resolution": [24, 24]}})");
+  const Outcome alone = run({"render", "scene.json", "-q", "--frames", "1-5", "--keep-going", "-o", "one.#.exr"});
+  EXPECT_EQ(alone.status, 1);
+  EXPECT_EQ(wait_for_ranks(start_ranks(3, "--frames 1-5 --keep-going -o a.#.exr")), 1);
+  for (const int frame : {1, 2, 3, 5}) expect_same(fmt::format("a.{}.exr", frame), fmt::format("one.{}.exr", frame));
+  const std::string last = "1 frame failed: 4; render again with --frames 4";
+  EXPECT_NE(alone.error.find(last), std::string::npos) << alone.error;
+  EXPECT_NE(error().find(last), std::string::npos) << error();
 }
 
 TEST_F(RanksProgram, AKilledRankEndsTheJobWhichContinuesToTheSameFiles) {
-  write("scene.json", whole_scene);
-  const std::string more = " --set integrator.max_samples=384 --set integrator.min_samples=384 -q -o a.png -o a.exr";
-  run_well({"render", "scene.json", "--set", "integrator.max_samples=384", "--set", "integrator.min_samples=384", "-q",
-            "-o", "one.png", "-o", "one.exr"});
+  write("scene.json", path_scene);
+  const std::string more = " --set integrator.max_samples=384 -q -o a.png -o a.exr";
+  run_well({"render", "scene.json", "--set", "integrator.max_samples=384", "-q", "-o", "one.png", "-o", "one.exr"});
   for (const int rank : {2, 0}) {
     const pid_t job = start_ranks(3, "--threads 1 --checkpoint 0.05 --resume" + more);
     const auto checkpoint = in_folder("a.png.checkpoint");

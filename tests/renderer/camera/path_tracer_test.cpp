@@ -13,8 +13,10 @@
 #include <tbb/global_control.h>
 
 #include "base/constants.h"
+#include "base/process/job.h"
 #include "renderer/meshes/mesh.h"
 #include "renderer/sampling/random.h"
+#include "tests/base/rank_support.h"
 #include "tests/renderer/statistics.h"
 #include "tests/renderer/support.h"
 
@@ -381,17 +383,25 @@ TEST(PictureTest, TimeLimitsTheSamples) {
     EXPECT_NEAR(in_time.radiance.values[i], all.radiance.values[i], 1e-12);
 
   settings.max_seconds = 0;
-  Work work({1, 2});
+  Job shard({1, 2});
+  shard.is_shard = true;
   RenderCallbacks callbacks;
-  callbacks.work = &work;
+  callbacks.job = &shard;
   const SurfacePicture part = render_surfaces(world.scene, camera(20), settings, callbacks);
-  EXPECT_TRUE(work.units()[1].done);
-  EXPECT_FALSE(work.units()[0].done);
+  EXPECT_EQ(shard.results().size(), 2u);
   EXPECT_EQ(*std::max_element(part.samples.begin(), part.samples.end()), 2);
   EXPECT_EQ(render_surfaces(world.scene, camera(20), settings).samples, std::vector<float>(20 * 20, 2));
 }
 
-/// Work that is divided, stopped after each pass of a tile, and continued, gives the picture of one render.
+void expect_same(const SurfacePicture& a, const SurfacePicture& b) {
+  EXPECT_EQ(a.radiance.values, b.radiance.values);
+  EXPECT_EQ(a.samples, b.samples);
+  EXPECT_EQ(a.path, b.path);
+  EXPECT_EQ(a.variance, b.variance);
+}
+
+/// Work that is divided among shards and ranks, stopped after each pass of a tile, and continued, gives the picture of
+/// one render.
 TEST(PictureTest, PartsThatStopAndContinueGiveTheSamePicture) {
   const World world = still_life();
   PathTracerSettings settings;
@@ -399,31 +409,33 @@ TEST(PictureTest, PartsThatStopAndContinueGiveTheSamePicture) {
   settings.max_samples = 16;
   settings.noise_threshold = 0.1;
   const SurfacePicture whole = render_surfaces(world.scene, camera(40), settings);
-  std::vector<WorkUnit> all(9);
-  for (std::size_t part = 0; part < 2; ++part) {
-    std::vector<WorkUnit> units;
+  Results all;
+  const auto make_part = [&](std::size_t part, Ranks* ranks) {
+    Results results;
     for (bool is_done = false; !is_done;) {
-      Work work({part, 2}, units);
+      Job job({part, 2}, results);
+      job.is_shard = true;
+      job.ranks = ranks;
       RenderCallbacks callbacks;
-      callbacks.work = &work;
-      callbacks.progress = [&](std::uint64_t, std::uint64_t) { work.stopping = true; };
-      const SurfacePicture some = render_surfaces(world.scene, camera(40), settings, callbacks);
-      EXPECT_LT(std::count(some.samples.begin(), some.samples.end(), 0), 40 * 40);
-      units = work.units();
-      is_done = true;
-      for (std::size_t i = part; i < units.size(); i += 2) is_done = is_done && units[i].done;
+      callbacks.job = &job;
+      if (!ranks) callbacks.progress = [&](std::uint64_t, std::uint64_t) { job.stopping = true; };
+      render_surfaces(world.scene, camera(40), settings, callbacks);
+      results = job.results();
+      is_done = !job.stopping;
     }
-    for (std::size_t i = 0; i < units.size(); ++i) EXPECT_EQ(units[i].done, i % 2 == part);
-    for (std::size_t i = part; i < units.size(); i += 2) all[i] = units[i];
-  }
-  Work united({}, all);
+    if (is_root(ranks)) all.insert(results.begin(), results.end());
+  };
+  make_part(0, nullptr);
+  EXPECT_EQ(all.size(), 5u);
+  test::run_ranks(3, [&](Ranks& ranks) { make_part(1, &ranks); });
+  EXPECT_EQ(all.size(), 9u);
+  Job united({0, 2}, all);
   RenderCallbacks callbacks;
-  callbacks.work = &united;
-  const SurfacePicture picture = render_surfaces(world.scene, camera(40), settings, callbacks);
-  EXPECT_EQ(picture.radiance.values, whole.radiance.values);
-  EXPECT_EQ(picture.samples, whole.samples);
-  EXPECT_EQ(picture.path, whole.path);
-  EXPECT_EQ(picture.variance, whole.variance);
+  callbacks.job = &united;
+  expect_same(render_surfaces(world.scene, camera(40), settings, callbacks), whole);
+  Job damaged({}, {{"tile 3", std::make_shared<const std::string>("short")}});
+  callbacks.job = &damaged;
+  EXPECT_THROW(render_surfaces(world.scene, camera(40), settings, callbacks), DamagedArchive);
 }
 
 TEST(PictureTest, AdaptiveSamplingKeepsTheMeanAndWorksWhereItIsNoisy) {

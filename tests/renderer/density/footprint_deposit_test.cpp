@@ -93,10 +93,13 @@ TEST(FootprintDeposit, SumsOfPartsCanBeAdded) {
     for (int i = part; i < 200; i += 3)
       for (FootprintDeposit* each : {&all, &some})
         each->add(i % 2, {16 + 12 * std::sin(i), 10 + 9 * std::cos(3 * i)}, Vector2d(1 + i % 3, 0.5).asDiagonal());
-    std::string sums;
-    some.append_sums(sums);
-    joined.add_sums(sums);
-    EXPECT_THROW(joined.add_sums(sums.substr(8)), std::runtime_error);
+    Archive to;
+    some.copy_sums(to);
+    const std::string sums = to.take();
+    Archive from(sums), cut(std::string_view(sums).substr(8));
+    joined.copy_sums(from);
+    from.finish();
+    EXPECT_THROW(joined.copy_sums(cut), DamagedArchive);
   }
   EXPECT_EQ(all.finish(0.3).values, joined.finish(0.3).values);
 }

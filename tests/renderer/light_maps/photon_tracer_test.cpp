@@ -8,11 +8,10 @@
 #include <tbb/global_control.h>
 
 #include "base/constants.h"
-#include "base/process/kept_results.h"
-#include "base/process/work.h"
+#include "base/process/job.h"
 #include "renderer/sampling/random.h"
 #include "renderer/shading/shading.h"
-#include "tests/base/team_support.h"
+#include "tests/base/rank_support.h"
 #include "tests/renderer/statistics.h"
 
 namespace tensorray {
@@ -127,26 +126,26 @@ TEST(PhotonTracerTest, APointsPowerIsThatOfItsSolidAngle) {
   EXPECT_NEAR(power_in(photons, 1), 7 * solid_angle, 1e-3 * 7 * solid_angle);
 }
 
-TEST(PhotonTracerTest, OfATeamAreThoseOfOneProcess) {
+TEST(PhotonTracerTest, OfRanksAreThoseOfOneProcess) {
   const SurfaceScene floor = floor_at(-0.8, 3);
   const std::vector<Light> lights{sun({0.4, 0.3, -1}), PointLight{{0, 0, 2}, {5, 7}}};
   PhotonTracerSettings settings = settings_of(1000, 2);
   const PhotonMaps alone = traced(ClearCube(0.5), floor, lights, settings);
-  for (const std::size_t count : {std::size_t{2}, std::size_t{3}}) {
-    std::vector<PhotonMaps> photons(count);
-    run_team(count, [&](Team& team) {
-      PhotonTracerSettings mine = settings;
-      mine.team = &team;
-      photons[team.index()] = traced(ClearCube(0.5), floor, lights, mine);
-    });
-    for (const PhotonMaps& each : photons) {
-      EXPECT_EQ(each.counts, alone.counts);
-      ASSERT_EQ(each.passes.size(), alone.passes.size());
-      for (std::size_t pass = 0; pass < each.passes.size(); ++pass) {
-        const std::vector<Photon>&a = each.passes[pass].photons(), &b = alone.passes[pass].photons();
-        ASSERT_EQ(a.size(), b.size());
-        EXPECT_EQ(std::memcmp(a.data(), b.data(), a.size() * sizeof(Photon)), 0);
-      }
+  std::vector<PhotonMaps> photons(3);
+  run_ranks(photons.size(), [&](Ranks& ranks) {
+    Job job;
+    job.ranks = &ranks;
+    PhotonTracerSettings mine = settings;
+    mine.job = &job;
+    photons[ranks.rank()] = traced(ClearCube(0.5), floor, lights, mine);
+  });
+  for (const PhotonMaps& each : photons) {
+    EXPECT_EQ(each.counts, alone.counts);
+    ASSERT_EQ(each.passes.size(), alone.passes.size());
+    for (std::size_t pass = 0; pass < each.passes.size(); ++pass) {
+      const std::vector<Photon>&a = each.passes[pass].photons(), &b = alone.passes[pass].photons();
+      ASSERT_EQ(a.size(), b.size());
+      EXPECT_EQ(std::memcmp(a.data(), b.data(), a.size() * sizeof(Photon)), 0);
     }
   }
 }
@@ -155,31 +154,29 @@ TEST(PhotonTracerTest, OfATeamAreThoseOfOneProcess) {
 TEST(PhotonTracerTest, KeptPhotonsThatAreNoneAreRefused) {
   const SurfaceScene floor = floor_at(-0.8, 40);
   PhotonTracerSettings settings = settings_of(100);
-  const auto trace = [&](Work& work) {
-    work.interval = 1e-9;
-    KeptResults kept(&work, nullptr);
-    settings.kept = &kept;
-    return traced(ClearCube(), floor, {sun({0.4, 0.3, -1})}, settings);
+  const auto trace = [&](Results results) {
+    Job job({}, std::move(results));
+    job.interval = 1e-9;
+    settings.job = &job;
+    traced(ClearCube(), floor, {sun({0.4, 0.3, -1})}, settings);
+    return job.results();
   };
-  Work work;
-  trace(work);
-  const std::string kept = *work.state(0);
-  // The key and the size of the result; how many photons its first chunk has; the first one.
-  constexpr std::size_t first = sizeof(ResultKey) + sizeof(std::uint64_t) + sizeof(std::size_t);
+  const Results kept = trace({});
+  ASSERT_EQ(kept.size(), 1u);
+  constexpr std::size_t first = sizeof(std::size_t);  // How many photons the first chunk has stands before them.
   const auto trace_with = [&](const auto& change) {
-    std::string bytes = kept;
+    std::string bytes = *kept.begin()->second;
     Photon photon;
     std::memcpy(static_cast<void*>(&photon), &bytes[first], sizeof photon);
     change(photon);
     std::memcpy(&bytes[first], &photon, sizeof photon);
-    work.keep(0, bytes, true);
-    trace(work);
+    trace({{kept.begin()->first, std::make_shared<const std::string>(bytes)}});
   };
   EXPECT_NO_THROW(trace_with([](Photon&) {}));
   for (const int band : {-1, traced_bands})
-    EXPECT_THROW(trace_with([&](Photon& photon) { photon.band = band; }), std::runtime_error) << band;
-  EXPECT_THROW(trace_with([](Photon& photon) { photon.surface = 1; }), std::runtime_error);
-  EXPECT_THROW(trace_with([](Photon& photon) { photon.light = 1; }), std::runtime_error);
+    EXPECT_THROW(trace_with([&](Photon& photon) { photon.band = band; }), DamagedArchive) << band;
+  EXPECT_THROW(trace_with([](Photon& photon) { photon.surface = 1; }), DamagedArchive);
+  EXPECT_THROW(trace_with([](Photon& photon) { photon.light = 1; }), DamagedArchive);
 }
 
 /// Before the region, behind it, beside everything, and within it.

@@ -2,6 +2,9 @@
 
 #include "scenes/jobs/work_file.h"
 
+#include <fstream>
+#include <iterator>
+
 #include <gtest/gtest.h>
 
 #include "base/files/temporary_folder.h"
@@ -14,7 +17,7 @@ WorkFile right_work() {
   work.origin = {{"version", "1"}, {"method", "lens"},        {"scene", Json::object()},
                  {"scale", 1},     {"direction", {0, 0, -1}}, {"files", Json::object()}};
   work.part = {1, 3};
-  work.units.resize(4);
+  work.results["tile 1"] = std::make_shared<const std::string>("all of it");
   return work;
 }
 
@@ -22,10 +25,13 @@ TEST(WorkFileTest, WhatBelongsToNoRenderIsRefused) {
   const TemporaryFolder folder;
   const std::filesystem::path file = folder / "a.shard";
   write_work(file, right_work());
-  EXPECT_EQ(read_work(file).units.size(), 4u);
+  const WorkFile read = read_work(file);
+  EXPECT_EQ(read.results.size(), 1u);
+  EXPECT_EQ(*read.results.at("tile 1"), "all of it");
+  EXPECT_EQ(read.origin, right_work().origin);
 
   std::vector<WorkFile> wrong;
-  for (const WorkPart part : {WorkPart{0, 0}, {3, 3}, {0, most_parts + 1}, {0, ~std::size_t{0}}}) {
+  for (const WorkPart part : {WorkPart{0, 0}, {3, 3}, {0, max_shards + 1}, {0, ~std::size_t{0}}}) {
     wrong.push_back(right_work());
     wrong.back().part = part;
   }
@@ -51,6 +57,26 @@ TEST(WorkFileTest, WhatBelongsToNoRenderIsRefused) {
     } catch (const std::runtime_error& error) {
       EXPECT_NE(std::string(error.what()).find("a.shard: is damaged"), std::string::npos) << i << error.what();
     }
+  }
+}
+
+/// Every byte that is missing or changed.
+TEST(WorkFileTest, WhatIsDamagedIsRefused) {
+  const TemporaryFolder folder;
+  const std::filesystem::path file = folder / "a.shard";
+  write_work(file, right_work());
+  std::ifstream stream(file, std::ios::binary);
+  const std::string right{std::istreambuf_iterator<char>(stream), {}};
+  const auto expect_refused = [&](const std::string& bytes) {
+    std::ofstream(file, std::ios::binary) << bytes;
+    EXPECT_THROW(read_work(file), std::runtime_error);
+  };
+  for (std::size_t size = 0; size < right.size(); ++size) expect_refused(right.substr(0, size));
+  expect_refused(right + "x");
+  for (std::size_t i = 0; i < right.size(); ++i) {
+    std::string changed = right;
+    changed[i] = static_cast<char>(changed[i] ^ 0x41);
+    expect_refused(changed);
   }
 }
 

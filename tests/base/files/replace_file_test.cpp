@@ -1,4 +1,4 @@
-#include "base/process/work.h"
+#include "base/files/replace_file.h"
 
 #include <csignal>
 #include <fstream>
@@ -8,7 +8,6 @@
 #include <gtest/gtest.h>
 #include <sys/resource.h>
 
-#include "base/files/replace_file.h"
 #include "base/text/content_hash.h"
 
 namespace tensorray {
@@ -17,33 +16,6 @@ namespace {
 std::string content_of(const std::filesystem::path& file) {
   std::ifstream stream(file, std::ios::binary);
   return {std::istreambuf_iterator<char>(stream), {}};
-}
-
-TEST(WorkTest, PartsShareAllUnits) {
-  std::vector<int> owners(10);
-  for (std::size_t part = 0; part < 3; ++part) {
-    Work work({part, 3});
-    work.begin(owners.size());
-    for (std::size_t unit = 0; unit < owners.size(); ++unit) owners[unit] += work.wants(unit) ? 1 : 0;
-  }
-  EXPECT_EQ(owners, std::vector<int>(10, 1));
-}
-
-TEST(WorkTest, ContinuesWithItsUnits) {
-  Work first;
-  first.begin(3);
-  EXPECT_EQ(first.state(1), nullptr);
-  first.keep(1, "half", false);
-  first.keep(2, "all", true);
-  const std::vector<WorkUnit> kept = first.units();
-  first.keep(1, "more", true);
-
-  Work second({}, kept);
-  EXPECT_THROW(second.begin(4), std::runtime_error);
-  second.begin(3);
-  EXPECT_EQ(*second.state(1), "half");
-  EXPECT_TRUE(second.wants(0) && second.wants(1));
-  EXPECT_FALSE(second.wants(2));
 }
 
 TEST(ReplaceFileTest, WritesAllOrNothing) {

@@ -1,0 +1,196 @@
+#include "base/process/job.h"
+
+#include <atomic>
+#include <numeric>
+#include <vector>
+
+#include <gtest/gtest.h>
+
+#include "tests/base/rank_support.h"
+
+namespace tensorray {
+namespace {
+
+using namespace test;
+
+TEST(ArchiveTest, GivesBackWhatItWasGiven) {
+  std::vector<int> numbers{1, 2, 3}, none, copies{7};
+  std::string text = "text", copy;
+  double value = 0.1, again = 0;
+  Archive to;
+  to.copy_list(numbers);
+  to.copy(value);
+  to.copy_list(text);
+  to.copy_list(none);
+  const std::string bytes = to.take();
+  for (std::size_t size = 0; size < bytes.size(); ++size) {
+    Archive cut(std::string_view(bytes).substr(0, size));
+    EXPECT_THROW(
+        {
+          cut.copy_list(copies);
+          cut.copy(again);
+          cut.copy_list(copy);
+          cut.copy_list(copies);
+        },
+        DamagedArchive)
+        << size;
+  }
+  Archive from(bytes);
+  from.copy_list(copies);
+  EXPECT_EQ(copies, numbers);
+  EXPECT_THROW(from.finish(), DamagedArchive);
+  from.copy(again);
+  from.copy_list(copy);
+  from.copy_list(copies);
+  from.finish();
+  EXPECT_TRUE(again == value && copy == text && copies.empty());
+}
+
+/// A count that no bytes follow asks for no memory.
+TEST(ArchiveTest, HasMemoryOnlyForWhatIsThere) {
+  for (std::size_t count : {~std::size_t{0}, ~std::size_t{0} / 8, std::size_t{3}}) {
+    Archive to;
+    to.copy(count);
+    const std::string bytes = to.take() + std::string(16, 'x');
+    std::vector<double> values;
+    Archive from(bytes);
+    EXPECT_THROW(from.copy_list(values), DamagedArchive);
+    EXPECT_TRUE(values.empty());
+  }
+}
+
+constexpr std::size_t unit_count = 37;
+
+struct Made {
+  std::vector<std::size_t> values = std::vector<std::size_t>(unit_count);
+  std::atomic<std::size_t> made{0};
+};
+
+/// Units whose results are squares.
+void make_squares(Made& made, Job* job, bool for_all = false, const Progress& progress = {}) {
+  Units units;
+  units.count = unit_count;
+  units.kind = "square";
+  units.round = 10;
+  units.for_all = for_all;
+  units.make = [&](std::size_t i) {
+    made.values[i] = i * i;
+    ++made.made;
+  };
+  units.copy = [&](std::size_t i, Archive& archive) { archive.copy(made.values[i]); };
+  make_units(units, job, "squaring", progress);
+}
+
+std::vector<std::size_t> squares() {
+  Made made;
+  make_squares(made, nullptr);
+  return made.values;
+}
+
+TEST(JobTest, RanksMakeEachUnitOnce) {
+  for (const std::size_t count : {std::size_t{1}, std::size_t{2}, std::size_t{3}, std::size_t{40}})
+    for (const bool for_all : {true, false}) {
+      std::vector<Made> made(count);
+      std::size_t kept = 0;
+      run_ranks(count, [&](Ranks& ranks) {
+        Job job;
+        job.ranks = &ranks;
+        make_squares(made[ranks.rank()], &job, for_all);
+        if (is_root(&ranks)) kept = job.results().size();
+      });
+      std::size_t all = 0;
+      for (const Made& each : made) all += each.made;
+      EXPECT_EQ(all, unit_count);
+      EXPECT_EQ(kept, unit_count);
+      for (std::size_t rank = 0; rank < (for_all ? count : 1); ++rank) EXPECT_EQ(made[rank].values, squares());
+    }
+}
+
+TEST(JobTest, ShardsMergeAndRunsContinue) {
+  Results all;
+  for (std::size_t index = 0; index < 3; ++index) {
+    Job shard({index, 3});
+    shard.is_shard = true;
+    Made made;
+    make_squares(made, &shard);
+    EXPECT_LE(made.made, unit_count / 3 + 1);
+    const Results some = shard.results();
+    all.insert(some.begin(), some.end());
+  }
+  Job merged({0, 3}, all);
+  Made made;
+  make_squares(made, &merged);
+  EXPECT_EQ(made.made, 0u);
+  EXPECT_EQ(made.values, squares());
+  all.erase("square 5");
+  run_ranks(2, [&](Ranks& ranks) {
+    Job resumed({}, all);
+    resumed.ranks = &ranks;
+    Made rest;
+    make_squares(rest, &resumed, true);
+    EXPECT_EQ(rest.made, ranks.rank() == 1 ? 1u : 0u);
+    EXPECT_EQ(rest.values, squares());
+  });
+  Job damaged({}, {{"square 5", std::make_shared<const std::string>("short")}});
+  EXPECT_THROW(make_squares(made, &damaged), DamagedArchive);
+  StrangeRanks strange;
+  Job other;
+  other.ranks = &strange;
+  EXPECT_THROW(make_squares(made, &other), DamagedArchive);
+}
+
+/// A run that is cancelled has the rounds before.
+TEST(JobTest, ACancelledRunKeepsItsRounds) {
+  Job job;
+  Progress progress;
+  progress.report = [&](const std::string&, std::uint64_t done, std::uint64_t total) {
+    EXPECT_EQ(total, unit_count);
+    if (done > 20) progress.cancelled = true;
+  };
+  Made made;
+  EXPECT_THROW(make_squares(made, &job, false, progress), Cancelled);
+  EXPECT_GE(job.results().size(), 20u);
+  EXPECT_LT(job.results().size(), unit_count);
+}
+
+/// A result is made once, by the first run that is long enough.
+TEST(JobTest, ResultsAreFoundOrMade) {
+  int made = 0;
+  std::vector<int> values;
+  const auto find = [&](Job& job) {
+    values.clear();
+    find_or_make(
+        &job, "values",
+        [&] {
+          values.assign(3, 7);
+          ++made;
+        },
+        [&](Archive& archive) { archive.copy_list(values); });
+    EXPECT_EQ(values, std::vector<int>(3, 7));
+  };
+  Job quick, slow;  // Without an interval nothing is kept.
+  find(quick);
+  EXPECT_TRUE(quick.results().empty());
+  slow.interval = 1e-9;
+  find(slow);
+  Job resumed({}, slow.results());
+  find(resumed);
+  EXPECT_EQ(made, 2);
+  Job damaged({}, {{"values", std::make_shared<const std::string>(32, 'x')}});
+  EXPECT_THROW(find(damaged), DamagedArchive);
+}
+
+TEST(RanksTest, GiveWhatTheyHave) {
+  run_ranks(3, [](Ranks& ranks) {
+    EXPECT_EQ(broadcast(&ranks, ranks.rank() + 5), 5u);
+    std::string text = is_root(&ranks) ? "of the root" : "other";
+    broadcast_list(&ranks, text);
+    EXPECT_EQ(text, "of the root");
+    std::size_t sum = ranks.rank();
+    gather_in_turn(&ranks, [&](Archive& archive) { archive.copy_sums(&sum, 1); });
+    EXPECT_EQ(sum, is_root(&ranks) ? 3 : ranks.rank());
+  });
+}
+
+}  // namespace
+}  // namespace tensorray

@@ -1,0 +1,171 @@
+#include "tools/rendering/checkpoint.h"
+
+#include <algorithm>
+#include <chrono>
+#include <exception>
+#include <iterator>
+#include <string>
+#include <system_error>
+#include <utility>
+
+#include <fmt/format.h>
+
+#include "base/process/seconds.h"
+#include "base/text/text.h"
+#include "scenes/jobs/origin.h"
+#include "tools/command_line/interrupts.h"
+#include "tools/command_line/tell.h"
+#include "tools/rendering/run_outputs.h"
+
+namespace tensorray {
+namespace {
+
+constexpr double longest_tick = 0.2, watch_interval = 5;  // Seconds: a signal is noticed; pictures of --watch.
+
+/// @throw SceneError unless the file is of this scene.
+WorkFile read_work_of(const std::filesystem::path& file, const Scene& scene, const std::string& fix) {
+  WorkFile work = read_work(file);
+  if (const std::string other = difference(work.origin, origin_of(scene)); !other.empty())
+    throw SceneError(printable(fmt::format("{}: is of another render: {}; {}", file.string(), other, fix)));
+  return work;
+}
+
+bool is_light(const std::pair<const std::string, Result>& result) {
+  return result.first.compare(0, light_name.size(), light_name) == 0;
+}
+
+bool has_light(const Results& results) { return std::any_of(results.begin(), results.end(), is_light); }
+
+Results read_checkpoint(const std::filesystem::path& file, const RenderRun& run, const Scene& scene) {
+  std::error_code none;
+  if (!run.keeping.resume || file.empty() || !std::filesystem::exists(file, none)) return {};
+  WorkFile work = read_work_of(file, scene, "undo the change, or remove the file");
+  const WorkPart part = run.keeping.shard.value_or(WorkPart{});
+  if (work.part.index != part.index || work.part.count != part.count)
+    throw SceneError(printable(fmt::format("{}: is part {} of {} of the render; give its --shard, or remove the file",
+                                           file.string(), work.part.index + 1, work.part.count)));
+  return std::move(work.results);
+}
+
+}  // namespace
+
+std::filesystem::path checkpoint_file(const SceneDescription& description, const RunKeeping& keeping) {
+  std::filesystem::path file = checkpoint_of(description, keeping);
+  std::error_code none;
+  if (!keeping.resume && !file.empty() && std::filesystem::exists(file, none))
+    throw SceneError(
+        printable(fmt::format("{}: is the checkpoint of a render that did not end; continue it with --resume, "
+                              "or remove the file",
+                              file.string())));
+  return file;
+}
+
+EarlierResults read_earlier(const std::filesystem::path& checkpoint, const RenderRun& run, const Scene& scene) {
+  EarlierResults earlier{read_checkpoint(checkpoint, run, scene), {}};
+  if (!earlier.results.empty()) earlier.file = checkpoint;
+  const std::filesystem::path& light = run.keeping.light;
+  if (light.empty() || has_light(earlier.results)) return earlier;
+  const WorkFile other = read_work_of(light, scene, "undo the change, or leave --light out");
+  if (!has_light(other.results))
+    tell({fmt::format("note: {} has no light, because it was made quickly, or because another shard is the first one; "
+                      "it is made again",
+                      light.string())},
+         run.quiet);
+  for (const auto& result : other.results)
+    if (is_light(result)) earlier.results.insert(result);
+  if (earlier.file.empty()) earlier.file = light;
+  return earlier;
+}
+
+Checkpoint::Checkpoint(const Scene& scene, Job& job, std::filesystem::path file, const RunKeeping& keeping,
+                       const Progress& progress)
+    : scene_(scene), job_(job), keeping_(keeping), progress_(progress), file_(std::move(file)), thread_([this] {
+        try {
+          run();
+        } catch (...) {  // There was no memory even for a warning: the render goes on.
+        }
+      }) {}
+
+Checkpoint::~Checkpoint() {
+  {
+    const std::lock_guard lock(waiting_);
+    ends_ = true;
+  }
+  wake_.notify_all();
+  thread_.join();
+}
+
+WorkFile Checkpoint::work_file() {
+  if (!origin_) origin_ = origin_of(scene_);
+  return {*origin_, std::filesystem::absolute(scene_.description.path), job_.part(), false, job_.results()};
+}
+
+WorkFile Checkpoint::shard() {
+  const std::lock_guard lock(writing_);
+  WorkFile file = work_file();
+  file.is_complete = true;
+  if (job_.part().index == 0) return file;
+  for (auto result = file.results.begin();
+       result != file.results.end();)  // All shards have it: the first one keeps it.
+    result = is_light(*result) ? file.results.erase(result) : std::next(result);
+  return file;
+}
+
+bool Checkpoint::write() {
+  const std::lock_guard lock(writing_);
+  if (file_.empty()) return false;
+  try {
+    const WorkFile work = work_file();
+    if (work.results.empty()) return false;
+    write_work(file_, work);
+    is_written_ = true;
+  } catch (const std::exception& error) {  // Whatever it is: the render goes on.
+    if (!has_failed_) tell({fmt::format("warning: no checkpoint: {}", escaped(error.what()))}, false);
+    has_failed_ = true;
+  }
+  std::error_code none;
+  return is_written_ || std::filesystem::exists(file_, none);
+}
+
+void Checkpoint::remove() {
+  const std::lock_guard lock(writing_);
+  std::error_code error;
+  if (!file_.empty()) std::filesystem::remove(file_, error);
+  file_.clear();  // The thread may be about to write.
+}
+
+/// Finds what the work belongs to while the files are those that were loaded.
+void Checkpoint::find_origin() {
+  const std::lock_guard lock(writing_);
+  if (origin_ || file_.empty()) return;
+  try {
+    origin_ = origin_of(scene_);
+  } catch (const std::exception&) {  // write() reports it.
+  }
+}
+
+void Checkpoint::run() {
+  find_origin();
+  const double interval = keeping_.interval;
+  const std::chrono::duration<double> tick(interval > 0 ? std::min(longest_tick, interval / 2) : longest_tick);
+  Clock::time_point written = Clock::now(), shown = written;
+  bool is_cancelled = false;
+  std::unique_lock lock(waiting_);
+  while (!wake_.wait_for(lock, tick, [this] { return ends_; })) {
+    lock.unlock();
+    // Soon after SIGTERM, mpirun and queues kill a process, which may still be busy with units.
+    if (progress_.cancelled && !std::exchange(is_cancelled, true)) write();
+    const bool is_asked = take_picture_request();
+    if (is_asked || (keeping_.watch && seconds_since(shown) > watch_interval)) {
+      job_.picture_wanted = true;
+      shown = Clock::now();
+    }
+    if (is_asked || (interval > 0 && seconds_since(written) > interval)) {
+      write();
+      written = Clock::now();
+    }
+    lock.lock();
+  }
+}
+
+}  // namespace tensorray

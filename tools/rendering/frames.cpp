@@ -1,0 +1,176 @@
+#include "tools/rendering/frames.h"
+
+#include <algorithm>
+#include <exception>
+#include <iterator>
+#include <optional>
+#include <stdexcept>
+#include <utility>
+
+#include <fmt/format.h>
+
+#include "base/text/text.h"
+#include "scenes/jobs/origin.h"
+#include "tools/command_line/run_and_report.h"
+#include "tools/command_line/tell.h"
+#include "tools/command_line/threads.h"
+#include "tools/rendering/run_outputs.h"
+
+namespace tensorray {
+namespace {
+
+/// A sequence reads its scene for each frame. @throw SceneError if it comes through a pipe.
+void require_file(const std::filesystem::path& scene_file) {
+  std::error_code none;
+  if (std::filesystem::is_other(scene_file, none))
+    throw SceneError(printable(scene_file.string()) +
+                     ": a sequence reads its scene for each frame, and a pipe is read once; save the scene to a file");
+}
+
+/// @throw SceneError if two frames have a file in common.
+void check_names(const std::filesystem::path& scene_file, SceneChanges changes, const std::vector<int>& frames,
+                 const RenderRun& run) {
+  std::vector<std::vector<std::filesystem::path>> names;
+  for (std::size_t i = 0; i < frames.size() && names.size() < 2; ++i) {
+    changes.frame = frames[i];
+    try {
+      names.push_back(files_of(read_scene(scene_file, changes), at_frame(run, frames[i])));
+    } catch (const std::invalid_argument&) {
+      if (!run.keep_going) throw;  // Else it is reported when its turn comes.
+    }
+  }
+  if (names.size() < 2) return;
+  for (const std::filesystem::path& name : names[0])
+    if (std::find(names[1].begin(), names[1].end(), name) != names[1].end())
+      throw SceneError(
+          printable(fmt::format("{}: each frame would replace it; count frames by # in its name, as in "
+                                "picture.####.png",
+                                name.string())));
+}
+
+/// What the frames have in common: the scale and the direction, where scenes leave them open. They are those of the
+/// first frame; where the run keeps going, of the first one that can be loaded, or nothing if none can: each then fails
+/// when its turn comes.
+Json values_of_first(const std::filesystem::path& scene_file, SceneChanges changes, const std::vector<int>& frames,
+                     const RenderRun& run, std::optional<Scene>& loaded, Progress& progress) {
+  for (const int frame : frames) {
+    try {
+      changes.frame = frame;
+      const SceneDescription first = read_scene(scene_file, changes);
+      bound_memory_of(run, first);
+      if (!first.field.scale || !first.light.direction) loaded = load_scene(first, progress);
+      const Eigen::Vector3d direction = loaded ? *loaded->description.light.direction : *first.light.direction;
+      return {{"scale", loaded ? loaded->scale.scale : *first.field.scale},
+              {"direction", {direction.x(), direction.y(), direction.z()}}};
+    } catch (const Cancelled&) {
+      throw;
+    } catch (const std::invalid_argument&) {
+      if (!run.keep_going || frame == frames.back()) throw;
+    } catch (const std::exception&) {
+      if (!run.keep_going) throw;
+    }
+  }
+  return Json::object();
+}
+
+/// Whether the files of a frame are there, and complete. A name that cannot be looked at does not exist; opening the
+/// file says why.
+bool is_rendered(const SceneDescription& description, const RenderRun& run) {
+  const auto is_there = [](const std::filesystem::path& file) {
+    std::error_code none;
+    return std::filesystem::exists(file, none);
+  };
+  const std::vector<std::filesystem::path> files = files_of(description, run);
+  const std::filesystem::path checkpoint = checkpoint_of(description, run.keeping);
+  return std::all_of(files.begin(), files.end(), is_there) && (checkpoint.empty() || !is_there(checkpoint));
+}
+
+class Sequence {
+ public:
+  Sequence(std::filesystem::path scene_file, SceneChanges changes, const RenderRun& run, Progress& progress)
+      : scene_file_(std::move(scene_file)), changes_(std::move(changes)), run_(run), progress_(progress) {
+    run_.ranks = nullptr;  // Each frame is that of one rank.
+  }
+
+  /// Those that are left.
+  std::vector<int> left(std::vector<int> frames) {
+    if (!run_.skip_existing) return frames;
+    const auto is_done = [&](int frame) {
+      changes_.frame = frame;
+      try {
+        return is_rendered(read_scene(scene_file_, changes_), at_frame(run_, frame));
+      } catch (const std::exception&) {
+        return false;  // It is reported when its turn comes.
+      }
+    };
+    frames.erase(std::remove_if(frames.begin(), frames.end(), is_done), frames.end());
+    return frames;
+  }
+
+  std::string common_values(const std::vector<int>& frames) {
+    return values_of_first(scene_file_, changes_, frames, run_, loaded_, progress_).dump();
+  }
+
+  /// With --keep-going, a frame that fails is noted, and others follow.
+  void render(int frame, const Json& common) {
+    try {
+      changes_.frame = frame;
+      SceneDescription description = read_scene(scene_file_, changes_);
+      if (common.contains("scale")) set_chosen(common, description);
+      bound_memory_of(run_, description);
+      tell({fmt::format("frame {}", frame)}, run_.quiet);
+      Scene rendered = render_to_files(description, at_frame(run_, frame), std::exchange(loaded_, {}), progress_);
+      loaded_.emplace(std::move(rendered));
+    } catch (const Cancelled&) {
+      throw;
+    } catch (const Interrupted&) {
+      throw;
+    } catch (const std::exception& error) {
+      if (!run_.keep_going) throw;
+      tell({fmt::format("tensorray: frame {}: {}", frame, reason_of(error))}, false);
+      failed.push_back(frame);
+      loaded_.reset();
+    }
+  }
+
+  std::vector<int> failed;
+
+ private:
+  const std::filesystem::path scene_file_;
+  SceneChanges changes_;
+  RenderRun run_;
+  Progress& progress_;
+  std::optional<Scene> loaded_;  // Of the last frame.
+};
+
+}  // namespace
+
+std::vector<int> render_frames(const std::filesystem::path& scene_file, SceneChanges changes, std::vector<int> frames,
+                               const RenderRun& run, Progress& progress) {
+  const Threads threads(run.threads);
+  set_image_threads(static_cast<int>(running_threads()));
+  Sequence sequence(scene_file, changes, run, progress);
+  std::string common;
+  if (is_root(run.ranks)) {  // What is wrong with the scene is said once.
+    require_file(scene_file);
+    check_names(scene_file, changes, frames, run);
+    common = sequence.common_values(frames);
+    frames = sequence.left(std::move(frames));
+  }
+  broadcast_list(run.ranks, frames);
+  broadcast_list(run.ranks, common);
+  for (std::size_t i = 0; i < frames.size(); ++i)
+    if (is_mine(run.ranks, i)) sequence.render(frames[i], parse_value(common));
+  std::vector<int> failed = sequence.failed;
+  gather_in_turn(run.ranks, [&](Archive& archive) {
+    std::vector<int> more = sequence.failed;
+    archive.copy_list(more);
+    if (archive.reads()) failed.insert(failed.end(), more.begin(), more.end());
+  });
+  std::vector<int> in_order;
+  std::copy_if(frames.begin(), frames.end(), std::back_inserter(in_order),
+               [&](int frame) { return std::find(failed.begin(), failed.end(), frame) != failed.end(); });
+  return in_order;
+}
+
+}  // namespace tensorray
