@@ -62,10 +62,6 @@ void add_photons(SumsReader& reader, PhotonSums& sums) {
     reader.take(numbers[1], sizeof(PlatePhoton));
 }
 
-std::size_t plate_size(const PhotonSums& sums) {
-  return sums.points ? sums.points->sums_size() : sums.footprints->sums_size();
-}
-
 }  // namespace
 
 std::string bytes_of(const PhotonSums& sums) {
@@ -84,7 +80,7 @@ std::string bytes_of(const PhotonSums& sums) {
                       sums.photons.size()};
   std::string bytes;
   bytes.reserve(sizeof head + sums.ends.size() * sizeof sums.ends[0] + fluence.size() + photons_size +
-                plate_size(sums));
+                sums.density->sums_size());
   append(&head, 1, bytes);
   append(sums.ends.data(), sums.ends.size(), bytes);
   bytes += fluence;
@@ -93,7 +89,7 @@ std::string bytes_of(const PhotonSums& sums) {
     append(numbers, 2, bytes);
     append(photons.data(), photons.size(), bytes);
   }
-  sums.points ? sums.points->append_sums(bytes) : sums.footprints->append_sums(bytes);
+  sums.density->append_sums(bytes);
   return bytes;
 }
 
@@ -105,7 +101,8 @@ void add_bytes(const std::string& bytes, PhotonSums& sums) {
   const std::string_view fluence = reader.take(head.fluence_bytes);
   for (std::uint64_t chunk = 0; chunk < head.chunks; ++chunk) add_photons(reader, sums);
   const bool has_all_outputs = !(sums.fluence && fluence.empty()) && !(sums.has_photons && head.has_photons == 0);
-  if (!has_all_outputs || sums.is_colored != (head.is_colored != 0) || reader.rest().size() != plate_size(sums))
+  if (!has_all_outputs || sums.is_colored != (head.is_colored != 0) ||
+      reader.rest().size() != sums.density->sums_size())
     throw DamagedWork(
         "the photons that were kept are those of other outputs: from the beginning, ask for the same of `spectral`, "
         "`photons` and `fluence`");
@@ -114,7 +111,7 @@ void add_bytes(const std::string& bytes, PhotonSums& sums) {
   sums.tensor_samples += head.tensor_samples;
   add_ends(ends, sums);
   if (sums.fluence) sums.fluence->add_sums(fluence);
-  sums.points ? sums.points->add_sums(reader.rest()) : sums.footprints->add_sums(reader.rest());
+  sums.density->add_sums(reader.rest());
 }
 
 void collect_in_turn(Team& team, const std::string& mine, std::size_t at_once,

@@ -123,7 +123,7 @@ bool read_kept_unit(const std::string& bytes) {
   if ((bytes[0] & 1) == 0) {
     PhotonSums sums;
     sums.ends.resize(2);
-    sums.points.emplace(4, 4, 2, DensitySettings{DensityKind::histogram});
+    sums.density.emplace(4, 4, 2, DensitySettings{DensityKind::histogram});
     sums.has_photons = true;
     return expect_one_line([&] { add_bytes(unit, sums); });
   }
@@ -158,16 +158,12 @@ bool read_obj_mesh(const std::string& bytes) {
 
 /// For grey pictures, too.
 bool read_profile(const std::string& bytes) {
-  const bool is_grey = expect_one_line([&] { parse_icc_profile(bytes, true); });
-  return expect_one_line([&] { parse_icc_profile(bytes, false); }) || is_grey;
+  const bool is_grey = expect_one_line([&] { icc_to_xyz(bytes, true); });
+  return expect_one_line([&] { icc_to_xyz(bytes, false); }) || is_grey;
 }
 
 bool read_png_chunks(const std::string& bytes) {
-  return read_file(bytes, [](const std::filesystem::path& path) {
-    ColorTags tags;
-    add_png_tags(path, tags);
-    check_png(path);
-  });
+  return read_file(bytes, [](const std::filesystem::path& path) { tensorray::read_png_chunks(path); });
 }
 
 bool read_tck(const std::string& bytes) {

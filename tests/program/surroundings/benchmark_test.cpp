@@ -86,14 +86,12 @@ TEST_F(Benchmark, WholeJobsSayWhatTheyTookByPhase) {
   EXPECT_EQ(positions[0], positions[1]);
 }
 
-TEST_F(Benchmark, CheckpointsAndFixedOrdersHaveACost) {
+TEST_F(Benchmark, CheckpointsHaveACost) {
   const Outcome outcome = measure("--quick --json --only keeping");
   ASSERT_EQ(outcome.status, 0) << outcome.error;
   const auto keeping = nlohmann::json::parse(outcome.out).at("keeping");
   ASSERT_EQ(keeping.at("checkpoints").size(), 2u);
   for (const auto& job : keeping.at("checkpoints")) EXPECT_GT(job.at("seconds"), 0) << job;
-  EXPECT_GT(keeping.at("determinism").at("seconds_of_photon_in_order"), 0);
-  EXPECT_GT(keeping.at("determinism").at("most"), 0);
 }
 
 TEST_F(Benchmark, CausticsHaveErrorsAndTimes) {

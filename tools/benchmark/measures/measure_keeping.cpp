@@ -1,14 +1,10 @@
 #include <algorithm>
-#include <atomic>
 #include <fstream>
 #include <vector>
 
 #include <fmt/format.h>
-#include <tbb/blocked_range.h>
-#include <tbb/parallel_for.h>
 
 #include "base/files/temporary_folder.h"
-#include "renderer/density/density.h"
 #include "tools/benchmark/measures/parts.h"
 #include "tools/benchmark/support/child.h"
 #include "tools/benchmark/support/machine.h"
@@ -77,81 +73,11 @@ Json measure_checkpoints(const Options& options, const TemporaryFolder& folder) 
   return rows;
 }
 
-/// Landings as light leaves them: most of them in a few places.
-std::vector<DensityPoint> landings(const DensityEstimator& estimator, std::size_t count, int side, int channels) {
-  std::vector<DensityPoint> points;
-  std::uint64_t state = 1;
-  const auto random = [&] {
-    state = state * 6364136223846793005u + 1442695040888963407u;
-    return static_cast<double>(state >> 11) / 9007199254740992.0;
-  };
-  for (std::size_t i = 0; i < count; ++i) {
-    const double radius = random() * random();
-    const Eigen::Vector2d at = (0.5 + 0.5 * radius * (2 * random() - 1)) * Eigen::Vector2d(side, side) +
-                               0.25 * side * Eigen::Vector2d(random() - 0.5, random() - 0.5);
-    points.push_back(
-        estimator.point(static_cast<int>(i) % channels, at.cwiseMax(0).cwiseMin(static_cast<double>(side))));
-  }
-  return points;
-}
-
-/// Photons of a chunk, summed in the order of the photons, beside the same sums in any order, with atomic additions.
-/// @return seconds for a photon, of both.
-std::pair<double, double> measure_sums(const Options& options) {
-  const int side = 1024, channels = 32;
-  const std::size_t count = options.quick ? 1u << 12 : 1u << 20;
-  const std::vector<Eigen::Vector3d> colors(channels, Eigen::Vector3d(0.3, 0.5, 0.2));
-  DensityEstimator estimator(side, side, channels, {DensityKind::histogram, 6, 1}, colors);
-  const std::vector<DensityPoint> points = landings(estimator, count, side, channels);
-  const auto in_order = [&](std::uint64_t rounds) {
-    for (std::uint64_t i = 0; i < rounds; ++i) estimator.add(points);
-    return rounds * count;
-  };
-  std::vector<std::atomic<float>> sums(static_cast<std::size_t>(3) * (side + 1) * (side + 1));
-  const auto in_any_order = [&](std::uint64_t rounds) {
-    for (std::uint64_t round = 0; round < rounds; ++round)
-      tbb::parallel_for(tbb::blocked_range<std::size_t>(0, count, 4096), [&](const auto& range) {
-        for (std::size_t i = range.begin(); i < range.end(); ++i) {
-          const std::size_t pixel = 3 * (static_cast<std::size_t>(points[i].row) * side + points[i].column);
-          for (std::size_t color = 0; color < 3; ++color) {
-            std::atomic<float>& sum = sums[pixel + color];
-            float before = sum.load(std::memory_order_relaxed);
-            while (!sum.compare_exchange_weak(before, before + 0.3f, std::memory_order_relaxed)) {
-            }
-          }
-        }
-      });
-    return rounds * count;
-  };
-  const double seconds = options.quick ? 0.01 : 1;
-  return {1 / repeat(as_many, in_order, wall_seconds, seconds).median,
-          1 / repeat(as_many, in_any_order, wall_seconds, seconds).median};
-}
-
-/// What fixed orders cost, as a part of a job of photons: other methods have none, or sum integers, which take as long
-/// as numbers of double precision.
-Json measure_determinism(const Options& options, const TemporaryFolder& folder) {
-  options.announce("keeping: sums in a fixed order");
-  const auto [ordered, unordered] = measure_sums(options);
-  const KeptJob job = kept_jobs(options.quick).back();
-  seconds_of(folder, job, 0);
-  std::ifstream file(folder / "statistics.json");
-  const Json statistics = Json::parse(file);
-  const double photons = statistics.at("photons").at("emitted"), seconds = statistics.at("seconds").at("total");
-  return {{"job", job.name},
-          {"seconds_of_photon_in_order", ordered},
-          {"seconds_of_photon_in_any_order", unordered},
-          {"seconds", seconds},
-          {"part", std::max(0.0, ordered - unordered) * photons / seconds},
-          {"most", ordered * photons / seconds}};
-}
-
 }  // namespace
 
 Json measure_keeping(const Options& options) {
   const TemporaryFolder folder;
-  Json checkpoints = measure_checkpoints(options, folder);
-  return {{"checkpoints", checkpoints}, {"determinism", measure_determinism(options, folder)}};
+  return {{"checkpoints", measure_checkpoints(options, folder)}};
 }
 
 }  // namespace tensorray::benchmark

@@ -138,13 +138,7 @@ std::string keeping_text(const Json& keeping) {
                     fmt::format("{:.2f} s", number(job, "seconds_with_checkpoints")),
                     fmt::format("{:.3f} s", number(job, "seconds_of_one")),
                     fmt::format("{:.3f}%", 100 * number(job, "part_at_default_interval"))});
-  const Json& sums = keeping.at("determinism");
-  return table(rows) +
-         fmt::format(
-             "sums of photons in a fixed order: {:.1f} ns each; in any order, by atomic additions: {:.1f} ns; the "
-             "difference is {:.2f}% of {}; all of it would be {:.2f}%\n",
-             1e9 * number(sums, "seconds_of_photon_in_order"), 1e9 * number(sums, "seconds_of_photon_in_any_order"),
-             100 * number(sums, "part"), sums.at("job").get<std::string>(), 100 * number(sums, "most"));
+  return table(rows);
 }
 
 std::string view_text(const Json& view) {
