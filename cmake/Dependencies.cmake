@@ -23,6 +23,7 @@ endif()
 # The CMake packages of these two refer to folders that distributions do not install; their pkg-config modules work.
 pkg_check_modules(OpenImageIO REQUIRED IMPORTED_TARGET OpenImageIO>=2.4)
 pkg_check_modules(OpenColorIO REQUIRED IMPORTED_TARGET OpenColorIO>=2.1)
+pkg_check_modules(lcms2 REQUIRED IMPORTED_TARGET lcms2>=2.9)
 
 pkg_check_modules(Highway REQUIRED IMPORTED_TARGET libhwy>=1.0)
 # Code with vectors is compiled once for each instruction set: on x86 for SSE2, AVX2 and AVX-512. Those between them

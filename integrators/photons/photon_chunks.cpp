@@ -17,9 +17,8 @@
 namespace tensorray {
 namespace {
 
-// Largest number of positions whose landings are sorted and deposited together. Many positions give work to all
-// threads, and light that starts together lands together. The number of rays is also limited: their landings take 16
-// MiB, and twice that when they are sorted.
+// Largest number of positions of a chunk. Many positions give work to all threads; the number of rays is also limited,
+// so that a chunk does not take long.
 constexpr std::uint64_t largest_chunk = 1u << 16, rays_in_chunk = 1u << 20;
 constexpr std::uint64_t task_size = 32;       // Number of positions that one thread traces as one task.
 constexpr std::uint64_t rays_in_batch = 512;  // Approximate; all wavelengths of a position stay together.
@@ -119,10 +118,7 @@ PhotonSums empty_sums(const PhotonJob& job) {
   const int channels = static_cast<int>(job.channels.size());
   PhotonSums sums;
   sums.ends.assign(job.channels.size(), EndCounts{});
-  if (settings.density.kind == DensityKind::photon_differential)
-    sums.footprints.emplace(pixels.x(), pixels.y(), channels, settings.colors);
-  else
-    sums.points.emplace(pixels.x(), pixels.y(), channels, settings.density, settings.colors);
+  sums.density.emplace(pixels.x(), pixels.y(), channels, settings.density, settings.colors);
   sums.fluence = make_fluence(job);
   sums.is_colored = !settings.colors.empty();
   sums.has_photons = settings.keep_photons;
@@ -130,17 +126,14 @@ PhotonSums empty_sums(const PhotonJob& job) {
 }
 
 void ChunkTracer::trace(std::uint64_t chunk, PhotonSums& sums) {
-  auto start = Clock::now();
+  const auto start = Clock::now();
   trace_rays(chunk, sums);
   take_counts(sums);
-  seconds_tracing_ += seconds_since(start);
-  start = Clock::now();
-  if (sums.points) sums.points->add(landings_);
   for (const std::vector<PlatePhoton>& photons : photons_) {
     std::vector<PlatePhoton>& all = sums.photons[chunk];
     all.insert(all.end(), photons.begin(), photons.end());
   }
-  seconds_density_ += seconds_since(start);
+  seconds_tracing_ += seconds_since(start);
 }
 
 void ChunkTracer::trace_rays(std::uint64_t chunk, PhotonSums& sums) {
@@ -150,7 +143,6 @@ void ChunkTracer::trace_rays(std::uint64_t chunk, PhotonSums& sums) {
   emit(job_.positions, first, last, emissions_);
   sums.candidates += last - first;
   const std::size_t count = emissions_.size(), tasks = (count + task_size - 1) / task_size;
-  landings_.resize(count * job_.rays_per_position);
   if (job_.settings.keep_photons) photons_.resize(tasks);
   std::atomic<std::uint64_t> done{0};
   const std::thread::id caller = std::this_thread::get_id();
@@ -173,7 +165,7 @@ void ChunkTracer::trace_task(std::size_t task, PhotonSums& sums) {
   for (std::size_t begin = 0; begin < count; begin += batch) {
     fill_batch(first + begin, first + std::min(begin + batch, count), worker);
     trace_batch(worker, sums);
-    collect_batch(worker, sums, &landings_[first * rays + begin], count);
+    collect_batch(worker, sums);
     if (!job_.settings.keep_photons) continue;
     for (std::size_t i = 0; i < worker.batch.size(); ++i)
       if (worker.batch.end[i] == RayEnd::plate)
@@ -213,25 +205,18 @@ void ChunkTracer::trace_batch(Worker& worker, PhotonSums& sums) const {
   if (job_.sides) job_.sides->mark(worker.batch);
 }
 
-/// Counts the rays of a batch and writes their landings: those of the first ray of each position from `landings` on,
-/// those of the second rays `step` further on, and so on. Landings of one wavelength from neighbouring positions, which
-/// fall on the same pixels, are then next to each other.
-void ChunkTracer::collect_batch(Worker& worker, PhotonSums& sums, DensityPoint* landings, std::size_t step) const {
-  const std::size_t rays = job_.rays_per_position;
-  for (std::size_t i = 0, position = 0; i < worker.batch.size(); ++position)
-    for (std::size_t ray = 0; ray < rays; ++ray, ++i) {
-      const RayEnd end = worker.batch.end[i];
-      const std::uint16_t channel = worker.channels[i];
-      ++worker.ends[channel][static_cast<int>(end)];
-      worker.ray_steps += worker.batch.steps[i];
-      landings[ray * step + position] = DensityPoint();
-      if (end != RayEnd::plate) continue;
-      const Eigen::Vector2d at = job_.to_pixel(worker.batch.position[i]);
-      if (sums.footprints)
-        sums.footprints->add(channel, at, footprint(job_, worker.batch.differentials[i]));
-      else
-        landings[ray * step + position] = sums.points->point(channel, at);
-    }
+/// Counts the rays of a batch, and adds those that have landed.
+void ChunkTracer::collect_batch(Worker& worker, PhotonSums& sums) const {
+  const RayBatch& batch = worker.batch;
+  for (std::size_t i = 0; i < batch.size(); ++i) {
+    const std::uint16_t channel = worker.channels[i];
+    ++worker.ends[channel][static_cast<int>(batch.end[i])];
+    worker.ray_steps += batch.steps[i];
+    if (batch.end[i] != RayEnd::plate) continue;
+    const bool has_footprint = !batch.differentials.empty();
+    sums.density->add(channel, job_.to_pixel(batch.position[i]),
+                      has_footprint ? footprint(job_, batch.differentials[i]) : Eigen::Matrix2d::Zero());
+  }
 }
 
 /// Moves the counts of all threads to the sums. They are integers, so that the order does not matter.

@@ -17,7 +17,6 @@
 #include "integrators/bending/side_faces.h"
 #include "integrators/photons/photon_distribution.h"
 #include "integrators/photons/photon_sums.h"
-#include "renderer/density/kernel_deposit.h"
 #include "renderer/film/plate_photon.h"
 #include "renderer/lights/beam.h"
 #include "volumes/bricks/tensor_field.h"
@@ -69,7 +68,6 @@ class ChunkTracer {
   void trace(std::uint64_t chunk, PhotonSums& sums);
 
   double seconds_tracing() const { return seconds_tracing_; }
-  double seconds_density() const { return seconds_density_; }
 
  private:
   /// The buffers of a thread, and its counts.
@@ -85,15 +83,14 @@ class ChunkTracer {
   void trace_task(std::size_t task, PhotonSums& sums);
   void fill_batch(std::size_t begin, std::size_t end, Worker& worker) const;
   void trace_batch(Worker& worker, PhotonSums& sums) const;
-  void collect_batch(Worker& worker, PhotonSums& sums, DensityPoint* landings, std::size_t step) const;
+  void collect_batch(Worker& worker, PhotonSums& sums) const;
   void take_counts(PhotonSums& sums);
 
   const PhotonJob& job_;
   tbb::enumerable_thread_specific<Worker> workers_;
   std::vector<Emission> emissions_;                // Of the chunk, ordered along a Morton curve.
-  std::vector<DensityPoint> landings_;             // One for each ray; a default one if it is not on the plate.
   std::vector<std::vector<PlatePhoton>> photons_;  // One list for each task, if photons are kept.
-  double seconds_tracing_ = 0, seconds_density_ = 0;
+  double seconds_tracing_ = 0;
 };
 
 }  // namespace tensorray

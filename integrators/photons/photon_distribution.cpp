@@ -59,7 +59,7 @@ PhotonDistribution distribution_of(const PhotonJob& job, const PhotonSums& sums)
   result.positions = rays / static_cast<std::uint64_t>(job.rays_per_position);
   const double area = job.ray_area / share_of(job, sums), weight = area / job.geometry.surfaces().plate->pixel_area();
   if (sums.fluence) result.fluence = sums.fluence->grids(area);
-  result.irradiance = sums.points ? sums.points->finish(weight) : sums.footprints->finish(weight);
+  result.irradiance = sums.density->finish(weight);
   return result;
 }
 
@@ -84,7 +84,7 @@ class PhotonParts {
     PhotonDistribution result = distribution_of(job_, all_);
     result.photons = joined_chunks(std::move(all_.photons));
     result.seconds_tracing = tracer_.seconds_tracing();
-    result.seconds_density = tracer_.seconds_density() + seconds_since(start);
+    result.seconds_density = seconds_since(start);
     return result;
   }
 

@@ -62,8 +62,8 @@ struct PhotonDistribution {
                                 ///< emitted = deposited + missed + stopped holds exactly.
   double ray_area = 0;          ///< Cross section of the beam that one ray stands for, world units².
   std::uint64_t ray_steps = 0, tensor_samples = 0;
-  double seconds_tracing = 0;  ///< Includes emission.
-  double seconds_density = 0;  ///< From landings to the film.
+  double seconds_tracing = 0;  ///< From emission to the sums.
+  double seconds_density = 0;  ///< From the sums to the film.
 };
 
 /// Emits parallel light, bends it through the field and estimates its density on the plate of `geometry`.

@@ -6,7 +6,7 @@ namespace {
 /// Which light it is, and what is kept of it.
 struct Kind {
   std::uint64_t channels = 0;
-  std::uint32_t is_colored = 0, has_points = 0, has_fluence = 0, has_photons = 0;
+  std::uint32_t is_colored = 0, has_fluence = 0, has_photons = 0;
 };
 
 void add_photons(Archive& archive, PhotonSums& sums) {
@@ -44,12 +44,11 @@ void add_fluence(Archive& archive, PhotonSums& sums) {
 }  // namespace
 
 void copy_sums(Archive& archive, PhotonSums& sums) {
-  const Kind wanted{sums.ends.size(), sums.is_colored, sums.points.has_value(), sums.fluence != nullptr,
-                    sums.has_photons};
+  const Kind wanted{sums.ends.size(), sums.is_colored, sums.fluence != nullptr, sums.has_photons};
   Kind kind = wanted;
   archive.copy(kind);
   if (kind.channels != wanted.channels || kind.is_colored != wanted.is_colored ||
-      kind.has_points != wanted.has_points || kind.has_fluence < wanted.has_fluence ||
+      kind.has_fluence < wanted.has_fluence ||
       kind.has_photons < wanted.has_photons)
     throw DamagedArchive(
         "the photons that were kept are those of other outputs: from the beginning, ask for the same of `spectral`, "
@@ -58,7 +57,7 @@ void copy_sums(Archive& archive, PhotonSums& sums) {
   for (EndCounts& ends : sums.ends) archive.copy_sums(ends.data(), ends.size());
   add_fluence(archive, sums);
   add_photons(archive, sums);
-  sums.points ? sums.points->copy_sums(archive) : sums.footprints->copy_sums(archive);
+  sums.density->copy_sums(archive);
 }
 
 }  // namespace tensorray

@@ -14,7 +14,6 @@
 #include "integrators/bending/light_channel.h"
 #include "integrators/photons/fluence.h"
 #include "renderer/density/density.h"
-#include "renderer/density/footprint_deposit.h"
 #include "renderer/film/plate_photon.h"
 
 namespace tensorray {
@@ -22,12 +21,11 @@ namespace tensorray {
 struct PhotonSums {
   std::uint64_t candidates = 0;  ///< Of the beam (BeamSampler), whether they emitted or not.
   std::uint64_t ray_steps = 0, tensor_samples = 0;
-  std::vector<EndCounts> ends;             ///< By channel.
-  std::optional<DensityEstimator> points;  ///< Either this or `footprints` has the light on the plate.
-  std::optional<FootprintDeposit> footprints;
-  std::unique_ptr<FluenceSums> fluence;  ///< Null: not wanted.
-  bool is_colored = false;               ///< Whether the light on the plate is red, green and blue, not by channel.
-  bool has_photons = false;              ///< Whether photons are wanted.
+  std::vector<EndCounts> ends;              ///< By channel.
+  std::optional<DensityEstimator> density;  ///< The light on the plate.
+  std::unique_ptr<FluenceSums> fluence;     ///< Null: not wanted.
+  bool is_colored = false;                  ///< Whether the light on the plate is red, green and blue, not by channel.
+  bool has_photons = false;                 ///< Whether photons are wanted.
   std::map<std::uint64_t, std::vector<PlatePhoton>> photons;  ///< By the number of their chunk.
 };
 

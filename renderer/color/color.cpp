@@ -164,65 +164,36 @@ Matrix3d find_xyz_to_working(const OCIO::Config& config) {
   return rec709_to_xyz().inverse();
 }
 
-/// A matrix that is this near to identity is that of the same space: published numbers have four digits.
-constexpr double same_space = 2e-4;
-
-ColorConversion conversion_of(const FileColors& colors, const Matrix3d& xyz_to_working) {
-  const Eigen::Matrix3f matrix = (xyz_to_working * colors.rgb_to_xyz).cast<float>();
-  return [curves = colors.curves, matrix](float* rgba, std::size_t count) {
-    for (std::size_t i = 0; i < count; ++i, rgba += 4) {
-      const Eigen::Vector3f light(curves[0].at(rgba[0]), curves[1].at(rgba[1]), curves[2].at(rgba[2]));
-      const Eigen::Vector3f working = matrix * light;
-      if (!working.allFinite()) {  // Beyond single precision.
-        std::fill_n(rgba, 3, 0.0f);
-        continue;
-      }
-      Eigen::Map<Eigen::Vector3f>(rgba, 3) = working;
-    }
-  };
-}
-
-bool is_identity(const TransferCurve& curve) {
-  return curve.table.empty() && curve.g == 1 && curve.a == 1 && curve.b == 0 && curve.d <= 0 && curve.e == 0;
-}
-
-bool is_working_space(const FileColors& colors, const Matrix3d& xyz_to_working) {
-  const Matrix3d matrix = xyz_to_working * colors.rgb_to_xyz;
-  return (matrix - Matrix3d::Identity()).cwiseAbs().maxCoeff() < same_space && is_identity(colors.curves[0]) &&
-         is_identity(colors.curves[1]) && is_identity(colors.curves[2]);
-}
-
-/// A display as a curve and a matrix, if its colours are such.
-std::optional<IccProfile> measured(const OCIO::CPUProcessor& to_xyz) {
-  constexpr double rounding = 2e-3;
-  const Vector3d white = apply(to_xyz, Vector3d::Ones());
-  if (!(std::abs(white.y() - 1) < 0.01)) return std::nullopt;  // Displays of high dynamic range.
-  IccProfile profile;
-  constexpr int count = 4096;
-  TransferCurve curve;
-  for (int i = 0; i < count; ++i)
-    curve.table.push_back(static_cast<float>(apply(to_xyz, Vector3d::Constant(i / (count - 1.0))).y() / white.y()));
-  for (int c = 0; c < 3; ++c) profile.rgb_to_xyz.col(c) = apply(to_xyz, Vector3d::Unit(c)) / white.y();
-  profile.curves = {curve, curve, curve};
-  for (const Vector3d& color : {Vector3d(0.2, 0.5, 0.9), Vector3d(0.9, 0.1, 0.4), Vector3d(0.5, 0.5, 0.5)}) {
-    const Vector3d light = color.unaryExpr([&](double x) { return double(curve.at(static_cast<float>(x))); });
-    if (!((apply(to_xyz, color) / white.y() - profile.rgb_to_xyz * light).cwiseAbs().maxCoeff() < rounding))
-      return std::nullopt;
-  }
-  const double gamma = std::log(static_cast<double>(curve.at(0.5f))) / std::log(0.5);
-  const TransferCurve power = power_curve(gamma);
-  double difference = 0;
-  for (float x = 0; x <= 1; x += 1.0f / 64)
-    difference = std::max(difference, static_cast<double>(std::abs(power.at(x) - curve.at(x))));
-  if (difference < 1e-4) profile.curves = {power, power, power};
-  return profile;
-}
-
 /// Characters that ICC profiles of version 2 can hold.
 std::string printable_ascii(std::string text) {
   std::replace_if(
       text.begin(), text.end(), [](unsigned char c) { return c < 0x20 || c > 0x7e; }, '?');
   return text;
+}
+
+/// The mark of files for a display, if its colours are a curve and a matrix. @param to_xyz  From the display's values.
+DisplayEncoding measured_encoding(const OCIO::CPUProcessor& to_xyz, const std::string& name) {
+  constexpr double rounding = 2e-3;
+  constexpr int last = 4095;
+  const double white = apply(to_xyz, Vector3d::Ones()).y();
+  if (!(std::abs(white - 1) < 0.01)) return {};  // Displays of high dynamic range.
+  const auto light_of = [&](const Vector3d& values) { return Vector3d(apply(to_xyz, values) / white); };
+  Matrix3d rgb_to_xyz_matrix;
+  for (int c = 0; c < 3; ++c) rgb_to_xyz_matrix.col(c) = light_of(Vector3d::Unit(c));
+  std::vector<float> curve;
+  double from_srgb = (rgb_to_xyz_matrix - rec709_to_xyz()).cwiseAbs().maxCoeff();
+  for (int i = 0; i <= last; ++i) {
+    const double value = static_cast<double>(i) / last;
+    curve.push_back(static_cast<float>(light_of(Vector3d::Constant(value)).y()));
+    from_srgb = std::max(from_srgb, std::abs(static_cast<double>(curve.back()) - srgb_light(value)));
+  }
+  for (const Eigen::Vector3i& place : {Eigen::Vector3i(800, 2000, 3700), {3700, 400, 1600}, {2000, 2000, 2000}}) {
+    const Vector3d light(curve[place[0]], curve[place[1]], curve[place[2]]);
+    const Vector3d differs = light_of(place.cast<double>() / last) - rgb_to_xyz_matrix * light;
+    if (!(differs.cwiseAbs().maxCoeff() < rounding)) return {};
+  }
+  if (from_srgb < rounding) return {true, ""};
+  return {false, make_icc_profile(name, named_chromaticities(rgb_to_xyz_matrix), curve)};
 }
 
 /// What a view of a display shows its pictures in. Configs of version 1 do not say what their displays are; only names
@@ -236,10 +207,7 @@ DisplayEncoding stated_encoding(const OCIO::Config& config, const std::string& d
     return {lower_case(space_name).find("srgb") != std::string::npos, ""};
   if (!config.hasRole("cie_xyz_d65_interchange")) return {};
   const auto to_xyz = config.getProcessor(space_name.c_str(), "cie_xyz_d65_interchange")->getDefaultCPUProcessor();
-  const std::optional<IccProfile> profile = measured(*to_xyz);
-  if (!profile) return {};
-  if (is_srgb({profile->curves, profile->rgb_to_xyz})) return {true, ""};
-  return {false, make_icc_profile(printable_ascii(space_name), *profile)};
+  return measured_encoding(*to_xyz, printable_ascii(space_name));
 }
 
 /// The same, if that can be known: a display of which it cannot still shows pictures.
@@ -363,10 +331,8 @@ ColorConversion ColorManagement::picture_conversion(const std::filesystem::path&
   if (!wanted.empty() || !space_by_rule(*state_->config, file).empty()) return by_name();
   try {
     const bool grey = image.rgb[0] == image.rgb[1];
-    const std::optional<FileColors> colors = file_colors(image.tags, image.is_integer, grey);
-    if (!colors) return by_name();
-    if (is_working_space(*colors, state_->xyz_to_working)) return {};
-    return conversion_of(*colors, state_->xyz_to_working);
+    const auto conversion = file_colors(image.tags, image.is_integer, grey, state_->xyz_to_working);
+    return conversion ? *conversion : by_name();
   } catch (const std::runtime_error& error) {
     notes.push_back("warning: " + file.string() + ": its description of its colours is not used: " + error.what());
     return by_name();

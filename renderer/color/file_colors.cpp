@@ -2,7 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <stdexcept>
+#include <vector>
 
 #include <Eigen/LU>
 
@@ -13,10 +15,35 @@ namespace tensorray {
 namespace {
 
 using Eigen::Matrix3d;
+using Eigen::Matrix3f;
 using Eigen::Vector2d;
 using Eigen::Vector3d;
+using Eigen::Vector3f;
 
-std::array<TransferCurve, 3> alike(const TransferCurve& curve) { return {curve, curve, curve}; }
+/// From the values that a picture stores to light.
+using TransferCurve = std::function<double(double value)>;
+
+double linear_light(double value) { return value; }
+
+TransferCurve power_curve(double gamma) {
+  return [gamma](double value) { return std::copysign(std::pow(std::abs(value), gamma), value); };
+}
+
+/// Values that are not finite, or beyond single precision, become 0.
+void multiply(const Matrix3f& matrix, float* rgba) {
+  Eigen::Map<Vector3f> color(rgba);
+  color = (matrix * color).eval();
+  if (!color.allFinite()) color.setZero();
+}
+
+ColorConversion curve_and_matrix(const TransferCurve& curve, const Matrix3d& matrix) {
+  return [curve, to_xyz = Matrix3f(matrix.cast<float>())](float* rgba, std::size_t count) {
+    for (std::size_t i = 0; i < count; ++i, rgba += 4) {
+      for (int c = 0; c < 3; ++c) rgba[c] = static_cast<float>(curve(rgba[c]));
+      multiply(to_xyz, rgba);
+    }
+  };
+}
 
 /// Whether the primaries are those of XYZ.
 bool is_xyz(const Chromaticities& c) {
@@ -35,8 +62,7 @@ Matrix3d matrix_of(const Chromaticities& colors, const std::optional<std::array<
 }
 
 /// ITU-T H.273, as far as pictures of standard range use it.
-FileColors colors_of_code_points(int primaries, int curve) {
-  FileColors colors;
+ColorConversion code_points_to_xyz(int primaries, int curve) {
   Chromaticities chromaticities = rec709_chromaticities();
   if (primaries == 9) chromaticities = {{0.708, 0.292}, {0.170, 0.797}, {0.131, 0.046}, d65_white()};
   if (primaries == 12) chromaticities = {{0.680, 0.320}, {0.265, 0.690}, {0.150, 0.060}, d65_white()};
@@ -44,46 +70,61 @@ FileColors colors_of_code_points(int primaries, int curve) {
   if (!is_known)
     throw std::runtime_error("its code points (primaries " + std::to_string(primaries) + ", curve " +
                              std::to_string(curve) + ") are not read");
-  colors.rgb_to_xyz = matrix_of(chromaticities, std::nullopt);
-  colors.curves = alike(curve == 8 ? TransferCurve() : srgb_curve());
-  return colors;
+  return curve_and_matrix(curve == 8 ? linear_light : srgb_light, matrix_of(chromaticities, std::nullopt));
 }
 
 /// The gamma that PNGs of sRGB name for readers that know no sRGB.
 bool is_gamma_of_srgb(double gamma) { return std::abs(gamma - 0.45455) < 1e-4; }
 
-std::optional<FileColors> colors_of(const ColorTags& tags, bool integer, bool grey) {
-  if (tags.code_points) return colors_of_code_points((*tags.code_points)[0], (*tags.code_points)[1]);
-  if (!tags.icc_profile.empty()) {
-    const IccProfile profile = parse_icc_profile(tags.icc_profile, grey);
-    return FileColors{profile.curves, profile.rgb_to_xyz};
-  }
-  if (tags.is_srgb || (!tags.gamma && !tags.chromaticities)) return std::nullopt;
-  FileColors colors;
+/// Empty if the tags say nothing.
+ColorConversion tags_to_xyz(const ColorTags& tags, bool integer, bool grey) {
+  if (tags.code_points) return code_points_to_xyz((*tags.code_points)[0], (*tags.code_points)[1]);
+  if (!tags.icc_profile.empty()) return icc_to_xyz(tags.icc_profile, grey);
+  if (tags.is_srgb || (!tags.gamma && !tags.chromaticities)) return {};
   const Chromaticities chromaticities =
       tags.chromaticities ? chromaticities_of(*tags.chromaticities) : rec709_chromaticities();
-  colors.rgb_to_xyz = matrix_of(chromaticities, tags.adopted_neutral);
+  const Matrix3d matrix = matrix_of(chromaticities, tags.adopted_neutral);
+  if (!integer) return curve_and_matrix(linear_light, matrix);
   const bool is_srgb_curve = !tags.gamma || is_gamma_of_srgb(*tags.gamma);
-  if (integer) colors.curves = alike(is_srgb_curve ? srgb_curve() : power_curve(1 / *tags.gamma));
-  return colors;
+  return curve_and_matrix(is_srgb_curve ? TransferCurve(srgb_light) : power_curve(1 / *tags.gamma), matrix);
+}
+
+/// The greatest difference between what two conversions make of the colours from 0 to 1; the second may be empty.
+double difference(const ColorConversion& a, const ColorConversion& b, bool grey) {
+  constexpr int steps = 16;
+  std::vector<float> colors;
+  for (int i = 0; i <= steps; ++i)
+    for (int j = grey ? i : 0; j <= (grey ? i : steps); ++j)
+      for (int k = grey ? i : 0; k <= (grey ? i : steps); ++k)
+        for (const int step : {i, j, k, steps}) colors.push_back(static_cast<float>(step) / steps);
+  std::vector<float> others = colors;
+  a(colors.data(), colors.size() / 4);
+  if (b) b(others.data(), others.size() / 4);
+  double greatest = 0;
+  for (std::size_t i = 0; i < colors.size(); ++i)
+    greatest = std::max(greatest, static_cast<double>(std::abs(colors[i] - others[i])));
+  return greatest;
 }
 
 }  // namespace
 
-bool is_srgb(const FileColors& colors) {
-  constexpr double rounding = 2e-3;  // Profiles of sRGB differ by so much.
-  const TransferCurve expected = srgb_curve();
-  double difference = (colors.rgb_to_xyz - rgb_to_xyz(rec709_chromaticities())).cwiseAbs().maxCoeff();
-  for (const TransferCurve& curve : colors.curves)
-    for (float x = 0; x <= 1; x += 1.0f / 64)
-      difference = std::max(difference, static_cast<double>(std::abs(curve.at(x) - expected.at(x))));
-  return difference < rounding;
-}
+double srgb_light(double value) { return value >= 0.04045 ? std::pow((value + 0.055) / 1.055, 2.4) : value / 12.92; }
 
-std::optional<FileColors> file_colors(const ColorTags& tags, bool integer, bool grey) {
-  const std::optional<FileColors> colors = colors_of(tags, integer, grey);
-  if (colors && integer && is_srgb(*colors)) return std::nullopt;
-  return colors;
+std::optional<ColorConversion> file_colors(const ColorTags& tags, bool integer, bool grey,
+                                           const Matrix3d& xyz_to_working) {
+  constexpr double profiles_of_srgb = 2e-3;  // By so much they differ.
+  constexpr double same_space = 2e-4;        // Published numbers have four digits.
+  const ColorConversion to_xyz = tags_to_xyz(tags, integer, grey);
+  if (!to_xyz) return std::nullopt;
+  const ColorConversion srgb = curve_and_matrix(srgb_light, rgb_to_xyz(rec709_chromaticities()));
+  if (integer && difference(to_xyz, srgb, grey) < profiles_of_srgb) return std::nullopt;
+  const ColorConversion conversion = [to_xyz, matrix = Matrix3f(xyz_to_working.cast<float>())](float* rgba,
+                                                                                               std::size_t count) {
+    to_xyz(rgba, count);
+    for (std::size_t i = 0; i < count; ++i) multiply(matrix, rgba + 4 * i);
+  };
+  if (difference(conversion, {}, grey) < same_space) return ColorConversion();
+  return conversion;
 }
 
 }  // namespace tensorray

@@ -1,29 +1,23 @@
 #pragma once
 /// @file renderer/color/icc_profile.h
-/// ICC profiles that consist of a curve for each channel and a matrix (ICC.1:2010), which are those of cameras, screens
-/// and RGB spaces.
+/// ICC profiles, by Little CMS.
 
-#include <array>
 #include <string>
+#include <vector>
 
-#include <Eigen/Core>
-
-#include "renderer/color/transfer_curve.h"
+#include "renderer/color/chromaticities.h"
+#include "renderer/color/color.h"
 
 namespace tensorray {
 
-/// RGB, or grey with equal curves and a matrix whose columns add up to the white.
-struct IccProfile {
-  std::array<TransferCurve, 3> curves;
-  Eigen::Matrix3d rgb_to_xyz = Eigen::Matrix3d::Identity();  ///< XYZ relative to D65, as everywhere.
-};
-
-/// @param channels  Of the picture's colours: 1 or 3. @throw std::runtime_error with the reason if the profile is
-/// damaged, belongs to other colours, or consists of tables (as those of printers).
-IccProfile parse_icc_profile(const std::string& bytes, bool grey);
+/// The conversion of a profile's colours, by its tables or its curves and matrix, to XYZ relative to D65. It takes the
+/// profile's white for white (relative colorimetric). Of grey pictures, R is converted.
+/// @throw std::runtime_error with the reason if the profile is damaged, or belongs to other colours.
+ColorConversion icc_to_xyz(const std::string& bytes, bool grey);
 
 /// A profile of version 2 for a display. The same arguments give the same bytes.
-/// @param name  ASCII.
-std::string make_icc_profile(const std::string& name, const IccProfile& profile);
+/// @param name   ASCII.
+/// @param curve  Light at equal distances of a channel's value, from 0 to 1. One that is a power becomes its exponent.
+std::string make_icc_profile(const std::string& name, const Chromaticities& colors, const std::vector<float>& curve);
 
 }  // namespace tensorray

@@ -1,235 +1,200 @@
 #include "renderer/density/density.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <stdexcept>
 
+#include <Eigen/Eigenvalues>
 #include <tbb/parallel_for.h>
-#include <tbb/partitioner.h>
 
-#include "base/constants.h"
-#include "renderer/density/convolution.h"
-#include "renderer/density/mirror.h"
 
 namespace tensorray {
 namespace {
 
-constexpr double smallest_spline_tau = 2;  // For less the spline interpolant of the Gaussian is not accurate enough.
-constexpr double cut_off = 4.5;            // In units of tau; the Gaussian is 4e-5 of its peak there.
-constexpr std::size_t most_buckets = 1u << 14;  // Largest number of buckets to sort points into.
-constexpr int largest_size = 65000;             // Largest width and height: columns and rows of points are 16 bits.
-constexpr int fraction_bits = 26;               // Of what a point adds to a pixel, as a part of the brightest colour.
+using Eigen::Matrix2d;
+using Eigen::Vector2d;
 
-bool uses_splines(const DensitySettings& settings) {
-  return settings.kind == DensityKind::gaussian && settings.tau >= smallest_spline_tau;
+constexpr double units = 1.7179869184e10;  // 2^34.
+constexpr double least_blurred_tau = 2;    // For less the spline is not narrow enough beside the Gaussian.
+constexpr double spline_variance = 1.0 / 3;
+constexpr double gaussian_reach = 4.5;  // Standard deviations; the Gaussian is 4e-5 of its peak there.
+constexpr double footprint_reach = 3;   // Standard deviations.
+constexpr double narrowest = 0.4;       // Footprint, pixels.
+constexpr double widest = 1.0 / 16;     // Footprint; of the plate's longer side.
+constexpr int largest_size = 65000;     // Width and height.
+
+/// What a photon adds to a pixel, which may be beside the plate.
+struct Tap {
+  int x, y;
+  double weight;
+};
+
+bool is_blurred(const DensitySettings& settings) {
+  return settings.kind == DensityKind::gaussian && settings.tau >= least_blurred_tau;
 }
 
-/// The filter k, for indices −radius … radius, for which Σ k[n − m] B(x − m) interpolates the Gaussian at the integers.
-/// As Fourier series it is the sampled Gaussian divided by the sampled B-spline (the period is 2 radius; both are
-/// even).
-std::vector<double> spline_filter(double tau) {
-  constexpr double b[] = {66.0 / 120, 26.0 / 120, 1.0 / 120};  // The quintic B-spline at 0, 1 and 2.
-  const int radius = static_cast<int>(std::ceil(cut_off * tau)) + 12;
-  std::vector<double> ratio(radius + 1), filter(2 * radius + 1);
-  for (int f = 0; f <= radius; ++f) {
-    const double angle = pi * f / radius;
-    double gaussian = 1;
-    for (int n = 1; n < radius; ++n) gaussian += 2 * std::exp(-0.5 * n * n / (tau * tau)) * std::cos(angle * n);
-    ratio[f] = gaussian / (b[0] + 2 * b[1] * std::cos(angle) + 2 * b[2] * std::cos(2 * angle));
-  }
+/// Reflects an index into [0, size), as mirrors at the outer edges of the first and last pixel would.
+int mirror(int index, int size) {
+  const int period = 2 * size;
+  index = ((index % period) + period) % period;
+  return index < size ? index : period - 1 - index;
+}
+
+/// The cubic B-spline about a place along an axis, at the middles of four pixels. @return the first of them.
+int spline_weights(double at, std::array<double, 4>& weights) {
+  const double first = std::floor(at - 0.5), t = at - 0.5 - first, rest = 1 - t;
+  weights = {rest * rest * rest / 6, (4 - 6 * t * t + 3 * t * t * t) / 6,
+             (4 - 6 * rest * rest + 3 * rest * rest * rest) / 6, t * t * t / 6};
+  return static_cast<int>(first) - 1;
+}
+
+void find_spline_taps(const Vector2d& at, std::vector<Tap>& taps) {
+  std::array<double, 4> columns, rows;
+  const int x = spline_weights(at.x(), columns), y = spline_weights(at.y(), rows);
+  for (int j = 0; j < 4; ++j)
+    for (int i = 0; i < 4; ++i) taps.push_back({x + i, y + j, columns[i] * rows[j]});
+}
+
+/// The Gaussian at the middles of pixels, to the cut-off, with the sum 1.
+/// @param precision  The inverse of its covariance. @param cut_off  Standard deviations.
+void find_gaussian_taps(const Vector2d& at, const Matrix2d& precision, double cut_off, std::vector<Tap>& taps) {
+  const double a = precision(0, 0), b = precision(0, 1), c = precision(1, 1), determinant = a * c - b * b;
+  const double reach = cut_off * std::sqrt(a / determinant);
   double sum = 0;
-  for (int n = 0; n <= radius; ++n) {
-    double value = ratio[0] + ratio[radius] * std::cos(pi * n);
-    for (int f = 1; f < radius; ++f) value += 2 * ratio[f] * std::cos(pi * f * n / radius);
-    filter[radius - n] = filter[radius + n] = value;
-    sum += n > 0 ? 2 * value : value;
+  for (int y = static_cast<int>(std::floor(at.y() - reach)); y + 0.5 <= at.y() + reach; ++y) {
+    // a x² + 2 b x dy + c dy² = cut_off² at the ends of the row.
+    const double dy = y + 0.5 - at.y(), middle = -b / a * dy;
+    const double half = std::sqrt(std::max((cut_off * cut_off - determinant / a * dy * dy) / a, 0.0));
+    const auto last = static_cast<int>(std::floor(at.x() + middle + half - 0.5));
+    for (int x = static_cast<int>(std::ceil(at.x() + middle - half - 0.5)); x <= last; ++x) {
+      const double dx = x + 0.5 - at.x();
+      taps.push_back({x, y, std::exp(-0.5 * (a * dx * dx + 2 * b * dx * dy + c * dy * dy))});
+      sum += taps.back().weight;
+    }
+  }
+  for (Tap& tap : taps) tap.weight /= sum;
+}
+
+Matrix2d footprint_precision(const Matrix2d& axes, double most) {
+  const Matrix2d finite = axes.allFinite() ? axes : Matrix2d::Zero();
+  Eigen::SelfAdjointEigenSolver<Matrix2d> solver;
+  solver.computeDirect(finite * finite.transpose());
+  const Eigen::Array2d variances = solver.eigenvalues().array().max(0.0).min(most * most) + narrowest * narrowest;
+  return solver.eigenvectors() * variances.inverse().matrix().asDiagonal() * solver.eigenvectors().transpose();
+}
+
+/// A Gaussian at the integers, from its middle on; with its other half, the sum is 1.
+std::vector<double> half_filter(double tau) {
+  std::vector<double> filter;
+  double sum = -1;
+  for (int i = 0; i <= gaussian_reach * tau; ++i) {
+    filter.push_back(std::exp(-0.5 * i * i / (tau * tau)));
+    sum += 2 * filter.back();
   }
   for (double& value : filter) value /= sum;
   return filter;
 }
 
-/// Convolves a line of `count` values, which is mirrored at its ends.
-void filter_line(double* line, int count, const std::vector<double>& filter) {
-  thread_local std::vector<double> padded, result;
-  const int radius = static_cast<int>(filter.size() / 2);
-  const std::size_t room = convolution_room(count);
-  padded.resize(room + 2 * radius);
-  result.resize(room);
-  std::copy_n(line, count, &padded[radius]);
-  for (int i = -radius; i < 0; ++i) padded[i + radius] = line[mirror(i, count)];
-  for (int i = count; i < count + radius; ++i) padded[i + radius] = line[mirror(i, count)];
-  convolve(padded.data(), 1, filter, result.data(), count);
-  std::copy_n(result.data(), count, line);
+/// Adds factor × (a + b) to `sum`.
+void add_pair(double factor, const double* a, const double* b, int count, double* sum) {
+  for (int i = 0; i < count; ++i) sum[i] += factor * (a[i] + b[i]);
 }
 
-/// Convolves the columns [first, last) of a plane, which is mirrored at its upper and lower edges.
-void filter_columns(double* plane, int width, int height, int first, int last, const std::vector<double>& filter) {
-  thread_local std::vector<double> padded, result;
-  const int radius = static_cast<int>(filter.size() / 2), count = last - first;
-  const std::size_t room = convolution_room(count);
-  padded.resize((height + 2 * radius) * room);
-  result.resize(room);
-  for (int y = -radius; y < height + radius; ++y)
-    std::copy_n(plane + static_cast<std::size_t>(mirror(y, height)) * width + first, count,
-                &padded[(y + radius) * room]);
-  for (int y = 0; y < height; ++y) {
-    convolve(&padded[y * room], room, filter, result.data(), count);
-    std::copy_n(result.data(), count, plane + static_cast<std::size_t>(y) * width + first);
-  }
-}
-
-void filter_columns(Film& film, const std::vector<double>& filter) {
-  constexpr int strip = 64;
-  const int strips = (film.width + strip - 1) / strip;
-  tbb::parallel_for(0, film.channels * strips, [&](int task) {
-    const int first = task % strips * strip;
-    filter_columns(film.plane(task / strips), film.width, film.height, first, std::min(first + strip, film.width),
-                   filter);
+/// Blurs the rows of a film, and then its columns. It is mirrored at its edges.
+void blur(Film& film, const std::vector<double>& filter) {
+  const int width = film.width, height = film.height, radius = static_cast<int>(filter.size()) - 1;
+  const auto row = [&](Film& in, int task) { return in.plane(task / height) + std::ptrdiff_t{task % height} * width; };
+  Film rows = film;
+  tbb::parallel_for(0, film.channels * height, [&](int task) {
+    thread_local std::vector<double> padded;
+    const double* const from = row(film, task);
+    double* const to = row(rows, task);
+    padded.resize(static_cast<std::size_t>(width) + 2 * radius);
+    for (int x = -radius; x < width + radius; ++x) padded[x + radius] = from[mirror(x, width)];
+    const double* const middle = padded.data() + radius;
+    for (int x = 0; x < width; ++x) to[x] = filter[0] * middle[x];
+    for (int k = 1; k <= radius; ++k) add_pair(filter[k], middle - k, middle + k, width, to);
   });
-}
-
-/// Chooses the size of the tiles. A tile is at least as wide as a kernel, so that the kernels of two tiles with a third
-/// tile between them do not overlap. A small tile and its margin fit into a cache. Many tiles give all threads work
-/// even if the light is concentrated in a few places.
-PointBucketing make_bucketing(int width, int height, int planes, int least_tile_bits, int taps) {
-  PointBucketing bucketing;
-  bucketing.planes = static_cast<std::uint32_t>(planes);
-  for (int bits = least_tile_bits;; ++bits) {
-    bucketing.tile_bits = bits;
-    bucketing.columns = static_cast<std::uint32_t>(width >> bits) + 1;  // Columns of points go from 0 to width.
-    bucketing.rows = static_cast<std::uint32_t>(height >> bits) + 1;
-    const bool is_one = bucketing.tiles() == 1;
-    if ((1 << bits) >= taps && (is_one || std::size_t{bucketing.tiles()} * planes <= most_buckets)) return bucketing;
-  }
-}
-
-/// 2^-26, or 2^-26 of the power of two above the largest component of a colour.
-double quantum_of(const std::vector<Eigen::Vector3d>& colors) {
-  double largest = 0;
-  for (const Eigen::Vector3d& color : colors) largest = std::max(largest, color.cwiseAbs().maxCoeff());
-  int exponent = 0;
-  std::frexp(largest, &exponent);
-  return std::ldexp(1.0, exponent - fraction_bits);
-}
-
-/// For each row of a plate, the rows of the plane with margins that fall on it.
-std::vector<std::vector<int>> mirrored_rows(int height, int margin) {
-  std::vector<std::vector<int>> rows(height);
-  for (int y = -margin; y < height + margin; ++y) rows[mirror(y, height)].push_back(y + margin);
-  return rows;
+  tbb::parallel_for(0, film.channels * height, [&](int task) {
+    const int y = task % height, first = task - y;
+    double* const to = row(film, task);
+    for (int x = 0; x < width; ++x) to[x] = filter[0] * row(rows, task)[x];
+    for (int k = 1; k <= radius; ++k)
+      add_pair(filter[k], row(rows, first + mirror(y - k, height)), row(rows, first + mirror(y + k, height)), width,
+               to);
+  });
 }
 
 void check(int width, int height, int channels, const DensitySettings& settings,
            const std::vector<Eigen::Vector3d>& colors) {
   if (width < 1 || height < 1 || channels < 1)
     throw std::invalid_argument("a density estimate needs at least one pixel and one channel");
-  if (width > largest_size || height > largest_size || channels >= DensityPoint::nowhere)
-    throw std::invalid_argument("a density estimate has at most 65000 x 65000 pixels and 65534 channels");
+  if (width > largest_size || height > largest_size)
+    throw std::invalid_argument("a density estimate has at most 65000 x 65000 pixels");
   if (!(settings.tau >= 0.3 && settings.tau <= 1000))
     throw std::invalid_argument("the width tau of the density estimate must be between 0.3 and 1000 pixels");
-  if (settings.kind == DensityKind::photon_differential)
-    throw std::invalid_argument("photon differentials are deposited by FootprintDeposit");
   if (!colors.empty() && colors.size() != static_cast<std::size_t>(channels))
     throw std::invalid_argument("a density estimate in colour needs a colour for each channel");
+}
+
+/// Checked before memory is taken.
+std::size_t count_sums(int width, int height, int channels, const DensitySettings& settings,
+                       const std::vector<Eigen::Vector3d>& colors) {
+  check(width, height, channels, settings, colors);
+  return static_cast<std::size_t>(width) * height * (colors.empty() ? channels : 3);
 }
 
 }  // namespace
 
 DensityEstimator::DensityEstimator(int width, int height, int channels, const DensitySettings& settings,
                                    const std::vector<Eigen::Vector3d>& colors)
-    : settings_(settings), width_(width), height_(height), channels_(channels) {
-  check(width, height, channels, settings, colors);
-  for (const Eigen::Vector3d& color : colors) colors_.push_back({{color.x(), color.y(), color.z(), 0}});
-  quantum_ = quantum_of(colors);
-  int taps = 1;
-  if (uses_splines(settings)) {
-    taps = spline_taps;
-  } else if (settings.kind == DensityKind::gaussian) {
-    gaussian_.emplace(settings.tau, cut_off * settings.tau + 0.5);
-    taps = gaussian_->taps();
-  }
-  margin_ = taps / 2;
-  const bool is_colored = !colors_.empty();
-  const int planes = is_colored ? 1 : channels;
-  bucketing_ = make_bucketing(width, height, planes, is_colored ? 5 : 7, taps);
-  const std::size_t values = (is_colored ? 4 : planes) * plane_size();
-  sums_.resize((values + 3) / 4);
+    : settings_(settings),
+      width_(width),
+      height_(height),
+      channels_(channels),
+      colors_(colors),
+      sums_(count_sums(width, height, channels, settings, colors)) {}
+
+void DensityEstimator::add(int channel, const Vector2d& at, const Matrix2d& axes) {
+  thread_local std::vector<Tap> taps;
+  taps.clear();
+  if (settings_.kind == DensityKind::histogram)
+    taps.push_back(
+        {std::clamp(static_cast<int>(at.x()), 0, width_ - 1), std::clamp(static_cast<int>(at.y()), 0, height_ - 1), 1});
+  else if (settings_.kind == DensityKind::photon_differential)
+    find_gaussian_taps(at, footprint_precision(axes, widest * std::max(width_, height_)), footprint_reach, taps);
+  else if (is_blurred(settings_))
+    find_spline_taps(at, taps);
+  else
+    find_gaussian_taps(at, Matrix2d::Identity() / (settings_.tau * settings_.tau), gaussian_reach, taps);
+  for (const Tap& tap : taps) add_to_pixel(channel, tap.x, tap.y, tap.weight);
 }
 
-/// Number of pixels of a plane, including the margins.
-std::size_t DensityEstimator::plane_size() const {
-  return static_cast<std::size_t>(width_ + 2 * margin_) * (height_ + 2 * margin_);
+void DensityEstimator::add_to_pixel(int channel, int x, int y, double weight) {
+  const std::size_t plane = static_cast<std::size_t>(width_) * height_;
+  const std::size_t pixel = static_cast<std::size_t>(mirror(y, height_)) * width_ + mirror(x, width_);
+  const auto add = [&](std::size_t index, double value) {
+    sums_[index].fetch_add(std::llround(units * value), std::memory_order_relaxed);
+  };
+  if (colors_.empty()) return add(channel * plane + pixel, weight);
+  for (int k = 0; k < 3; ++k) add(k * plane + pixel, weight * colors_[channel][k]);
 }
 
-DensityPoint DensityEstimator::point(int channel, const Eigen::Vector2d& at) const {
-  DensityPoint point;
-  point.channel = static_cast<std::uint16_t>(channel);
-  if (settings_.kind == DensityKind::histogram) {
-    point.column = static_cast<std::uint16_t>(std::clamp(static_cast<int>(at.x()), 0, width_ - 1));
-    point.row = static_cast<std::uint16_t>(std::clamp(static_cast<int>(at.y()), 0, height_ - 1));
-    return point;
-  }
-  // Count pixels from the one before the first: column 0 is pixel −1. Its kernel begins where the margin begins.
-  const int column = std::min(static_cast<int>(at.x() + 0.5), width_),
-            row = std::min(static_cast<int>(at.y() + 0.5), height_);
-  point.column = static_cast<std::uint16_t>(column);
-  point.row = static_cast<std::uint16_t>(row);
-  point.x = static_cast<float>(at.x() + 0.5 - column);
-  point.y = static_cast<float>(at.y() + 0.5 - row);
-  return point;
-}
-
-/// Adds tiles in four passes of every second tile along both axes: within a pass the kernels of different tiles do not
-/// overlap, so that tiles can be filled at the same time.
-void DensityEstimator::add(const std::vector<DensityPoint>& points) {
-  sort_into_buckets(points, bucketing_, buckets_);
-  for (const std::uint32_t first : {0u, 1u, 2u, 3u}) {
-    const std::uint32_t right = first % 2, down = first / 2;
-    const std::uint32_t columns = (bucketing_.columns + 1 - right) / 2, rows = (bucketing_.rows + 1 - down) / 2;
-    const auto deposit_tile = [&](std::uint32_t task) {
-      const std::uint32_t plane = task / (rows * columns), row = 2 * (task / columns % rows) + down;
-      deposit((plane * bucketing_.rows + row) * bucketing_.columns + 2 * (task % columns) + right);
-    };
-    // One task per tile: tiles with many points are often neighbours and should not fall to the same thread.
-    tbb::parallel_for(std::uint32_t{0}, bucketing_.planes * rows * columns, deposit_tile, tbb::simple_partitioner());
+void DensityEstimator::copy_sums(Archive& archive) {
+  archive.require(archive.reads() ? sums_.size() : 0, sizeof(std::int64_t));
+  for (auto& sum : sums_) {
+    std::int64_t value = archive.reads() ? 0 : sum.load(std::memory_order_relaxed);
+    archive.copy(value);
+    if (archive.reads()) sum.fetch_add(value, std::memory_order_relaxed);
   }
 }
-
-void DensityEstimator::deposit(std::uint32_t bucket) {
-  const std::size_t first = buckets_.begin[bucket], last = buckets_.begin[bucket + 1];
-  DepositTarget target;
-  target.rounding = 1.5 * (std::uint64_t{1} << 52) * quantum_;
-  target.width = width_ + 2 * margin_;
-  target.colors = colors_.empty() ? nullptr : colors_.data();
-  target.pixels = &sums_[0].values[0] + (colors_.empty() ? bucket / bucketing_.tiles() * plane_size() : 0);
-  if (uses_splines(settings_)) {
-    deposit_splines(buckets_.points, first, last, target);
-  } else if (gaussian_) {
-    deposit_gaussians(buckets_.points, first, last, *gaussian_, target);
-  } else {
-    deposit_counts(buckets_.points, first, last, target);
-  }
-}
-
-void DensityEstimator::copy_sums(Archive& archive) { archive.copy_sums(&sums_[0].values[0], 4 * sums_.size()); }
 
 Film DensityEstimator::finish(double weight) const {
-  const std::vector<std::vector<int>> rows = mirrored_rows(height_, margin_);
-  const bool is_colored = !colors_.empty();
-  const std::vector<double> filter = uses_splines(settings_) ? spline_filter(settings_.tau) : std::vector<double>();
-  Film film(width_, height_, is_colored ? 3 : channels_);
-  const std::size_t step = is_colored ? 4 : 1, row_pixels = width_ + 2 * margin_;
-  tbb::parallel_for(0, film.channels * height_, [&](int task) {
-    const int channel = task / height_, y = task % height_;
-    const double* const plane = &sums_[0].values[0] + (is_colored ? channel : channel * plane_size());
-    double* const line = film.plane(channel) + static_cast<std::size_t>(y) * width_;
-    for (const int from : rows[y]) {
-      const double* const row = plane + from * row_pixels * step;
-      for (int x = -margin_; x < width_ + margin_; ++x) line[mirror(x, width_)] += weight * row[(x + margin_) * step];
-    }
-    if (!filter.empty()) filter_line(line, width_, filter);
-  });
-  if (!filter.empty()) filter_columns(film, filter);
+  Film film(width_, height_, colors_.empty() ? channels_ : 3);
+  for (std::size_t i = 0; i < sums_.size(); ++i)
+    film.values[i] = weight / units * static_cast<double>(sums_[i].load(std::memory_order_relaxed));
+  if (is_blurred(settings_)) blur(film, half_filter(std::sqrt(settings_.tau * settings_.tau - spline_variance)));
   return film;
 }
 

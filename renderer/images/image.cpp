@@ -71,22 +71,14 @@ void write_bytes(const std::filesystem::path& path, const std::vector<unsigned c
   if (!written || !closed) throw_errno();
 }
 
-bool begins_with(const std::string& bytes, const std::string& start) {
-  return bytes.compare(0, start.size(), start) == 0;
-}
-
-/// Whether the end of a JPEG or PNG is missing. libjpeg fills the missing part with grey without an error; libpng
-/// prints a message.
-bool is_cut_off(const std::filesystem::path& path) {
+/// Whether the end of a JPEG is missing. libjpeg fills the missing part with grey without an error.
+bool is_cut_off_jpeg(const std::filesystem::path& path) {
   std::ifstream file(path, std::ios::binary);
-  std::string bytes(4, '\0');
-  file.read(&bytes[0], 4);
-  const bool jpeg = begins_with(bytes, "\xFF\xD8"), png = begins_with(bytes, "\x89PNG");
-  if (!jpeg && !png) return false;
+  std::string bytes(2, '\0');
+  file.read(&bytes[0], 2);
+  if (bytes != "\xFF\xD8") return false;
   bytes.resize(std::filesystem::file_size(path));
   file.seekg(0).read(&bytes[0], static_cast<std::streamsize>(bytes.size()));
-  if (png)
-    return bytes.rfind("IEND\xAE\x42\x60\x82") == std::string::npos;  // The last chunk, which is always the same.
   // In the compressed data 0xFF is always followed by 0 or a restart marker. Therefore the first end marker after the
   // start of the last scan belongs to the picture itself, not to an embedded one.
   const std::size_t scan = bytes.rfind("\xFF\xDA");
@@ -113,14 +105,13 @@ std::vector<unsigned char> encode(const Image& image, const PictureFormat& forma
   return is_png(format) ? encode_png(shown, metadata) : ready_library().encode(shown, format, metadata);
 }
 
-/// Reads a file with `decode`; errors name the file.
+/// Reads a file with `decode`, which gets the tags of a PNG; errors name the file.
 template <class Decode>
 auto read(const std::filesystem::path& path, const Decode& decode) {
   require_readable(path);
   try {
-    if (is_cut_off(path)) throw std::runtime_error("the file is cut off");
-    check_png(path);
-    return decode();
+    if (is_cut_off_jpeg(path)) throw std::runtime_error("the file is cut off");
+    return decode(read_png_chunks(path));
   } catch (const std::bad_alloc&) {
     throw std::runtime_error("cannot read " + path.string() + ": not enough memory for a picture of its size");
   } catch (const std::exception& error) {
@@ -182,15 +173,16 @@ void write_image(const std::filesystem::path& path, const Image& image, const Im
 }
 
 Image read_image(const std::filesystem::path& path) {
-  return read(path, [&] { return ready_library().decode(path); });
+  return read(path, [&](const std::optional<ColorTags>&) { return ready_library().decode(path); });
 }
 
 NativeImage read_native_image(const std::filesystem::path& path, const std::string& layer) {
-  return read(path, [&] {
+  return read(path, [&](std::optional<ColorTags> of_png) {
     std::optional<NativeImage> image;
     if (layer.empty()) image = read_luminance_chroma(path);
     if (!image) image = ready_library().decode_native(path, layer);
-    add_png_tags(path, image->tags);
+    if (of_png) of_png->icc_profile = image->tags.icc_profile;
+    if (of_png) image->tags = *of_png;
     image->non_finite = non_finite_pixels(*image);
     return *image;
   });

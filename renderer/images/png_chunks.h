@@ -4,16 +4,15 @@
 /// on chromaticities and code points, and libpng prints a line of its own about damaged files.
 
 #include <filesystem>
+#include <optional>
 
 #include "renderer/images/color_tags.h"
 
 namespace tensorray {
 
-/// Does nothing if the file is no PNG. @throw std::runtime_error with the reason, without the file: it is cut off, or a
-/// chunk that pictures need has another CRC.
-void check_png(const std::filesystem::path& path);
-
-/// Adds cICP, sRGB, gAMA and cHRM to `tags`. Changes nothing if the file is no PNG. Damaged chunks are left out.
-void add_png_tags(const std::filesystem::path& path, ColorTags& tags);
+/// cICP, sRGB, gAMA and cHRM, without those that are damaged; nothing if the file is no PNG.
+/// @throw std::runtime_error with the reason, without the file: it is cut off, or a chunk that pictures need has
+/// another CRC.
+std::optional<ColorTags> read_png_chunks(const std::filesystem::path& path);
 
 }  // namespace tensorray

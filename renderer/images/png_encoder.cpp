@@ -24,24 +24,22 @@ std::string text_name(const std::string& attribute) {
   return attribute == "Artist" ? "Author" : attribute;
 }
 
-/// All that is written. libpng reports errors by a jump, over which nothing may be destroyed.
+/// What is written beside the pixels. libpng reports errors by a jump, over which nothing may be destroyed.
 struct Contents {
-  int width = 0, height = 0, color_type = 0;
+  int color_type = 0;
   bool is_srgb = true;
   std::string icc_profile;  // Empty: none.
   std::vector<std::pair<std::string, std::string>> texts;
-  Bytes values;  // Of 16 bits, high byte first, row after row.
-  std::size_t row_bytes = 0;
+  Bytes row;  // Values of 16 bits, high byte first.
 };
 
 Contents contents_of(const Image& image, const ImageMetadata& metadata) {
   Contents contents;
-  contents.width = image.width;
-  contents.height = image.height;
   const std::size_t channels = image.channels.size();
   contents.color_type = channels == 1   ? PNG_COLOR_TYPE_GRAY
                         : channels == 3 ? PNG_COLOR_TYPE_RGB
                                         : PNG_COLOR_TYPE_RGB_ALPHA;
+  contents.row.resize(2 * channels * static_cast<std::size_t>(image.width));
   const auto space = metadata.find(color_space);
   contents.is_srgb = space == metadata.end() || space->second == "sRGB";
   if (metadata.count(profile) > 0) contents.icc_profile = metadata.at(profile);
@@ -50,14 +48,16 @@ Contents contents_of(const Image& image, const ImageMetadata& metadata) {
     if (name != color_space && name != profile && !key.empty() && key.size() <= longest_name)
       contents.texts.emplace_back(key, text);
   }
-  contents.values.reserve(2 * image.pixels.size());
-  for (const float value : image.pixels) {
-    const auto number = static_cast<unsigned>(value * 65535.0f + 0.5f);
-    contents.values.push_back(static_cast<unsigned char>(number >> 8));
-    contents.values.push_back(static_cast<unsigned char>(number));
-  }
-  contents.row_bytes = 2 * channels * static_cast<std::size_t>(image.width);
   return contents;
+}
+
+void set_row(const Image& image, int y, Bytes& row) {
+  const float* const values = image.pixel(0, y);
+  for (std::size_t i = 0; i < row.size(); i += 2) {
+    const auto number = static_cast<unsigned>(values[i / 2] * 65535.0f + 0.5f);
+    row[i] = static_cast<unsigned char>(number >> 8);
+    row[i + 1] = static_cast<unsigned char>(number);
+  }
 }
 
 bool is_ascii(const std::string& text) {
@@ -65,13 +65,13 @@ bool is_ascii(const std::string& text) {
 }
 
 /// @return whether it succeeded.
-bool write(png_structp png, png_infop info, const Contents& contents, std::vector<png_text>& texts) {
+bool write(png_structp png, png_infop info, const Image& image, Contents& contents, std::vector<png_text>& texts) {
   if (setjmp(png_jmpbuf(png))) return false;
   // The format allows more than libpng does unless it is told so.
   png_set_user_limits(png, PNG_UINT_31_MAX, PNG_UINT_31_MAX);
   // Runs of equal bytes are all that is looked for: that is several times as fast, and these pictures have little else.
   png_set_compression_strategy(png, Z_RLE);
-  png_set_IHDR(png, info, static_cast<png_uint_32>(contents.width), static_cast<png_uint_32>(contents.height), 16,
+  png_set_IHDR(png, info, static_cast<png_uint_32>(image.width), static_cast<png_uint_32>(image.height), 16,
                contents.color_type, PNG_INTERLACE_NONE, PNG_COMPRESSION_TYPE_DEFAULT, PNG_FILTER_TYPE_DEFAULT);
   if (contents.is_srgb) png_set_sRGB_gAMA_and_cHRM(png, info, PNG_sRGB_INTENT_PERCEPTUAL);
   if (!contents.icc_profile.empty())
@@ -80,8 +80,10 @@ bool write(png_structp png, png_infop info, const Contents& contents, std::vecto
                  static_cast<png_uint_32>(contents.icc_profile.size()));
   png_set_text(png, info, texts.data(), static_cast<int>(texts.size()));
   png_write_info(png, info);
-  for (int y = 0; y < contents.height; ++y)
-    png_write_row(png, &contents.values[static_cast<std::size_t>(y) * contents.row_bytes]);
+  for (int y = 0; y < image.height; ++y) {
+    set_row(image, y, contents.row);
+    png_write_row(png, contents.row.data());
+  }
   png_write_end(png, info);
   return true;
 }
@@ -126,7 +128,7 @@ std::vector<unsigned char> encode_png(const Image& image, const ImageMetadata& m
       png_create_write_struct(PNG_LIBPNG_VER_STRING, &error, keep_error, [](png_structp, png_const_charp) {});
   png_infop info = png ? png_create_info_struct(png) : nullptr;
   if (png) png_set_write_fn(png, &file, append, [](png_structp) {});
-  const bool is_written = info && write(png, info, contents, texts);
+  const bool is_written = info && write(png, info, image, contents, texts);
   png_destroy_write_struct(&png, &info);
   if (!is_written) throw std::runtime_error("the picture cannot be encoded as PNG: " + error);
   return file;

@@ -38,20 +38,13 @@ struct ChunkPhotons {
   PhotonCounts counts{};
 };
 
-const std::vector<float>* strength_of(const Light& light) {
-  if (const auto* point = std::get_if<PointLight>(&light)) return &point->intensity;
-  if (const auto* sun = std::get_if<DirectionalLight>(&light)) return &sun->irradiance;
-  if (const auto* area = std::get_if<AreaLight>(&light)) return &area->radiance;
-  return nullptr;
-}
-
 /// The lights that light a surface, with shares of `per_pass` by their power.
 std::vector<Source> sources_of(const std::vector<Vector3d>& corners, const SurfaceScene& surfaces,
                                const std::vector<Light>& lights, const PhotonTracerSettings& settings) {
   std::vector<Source> sources;
   std::vector<double> powers;
   for (int i = 0; i < static_cast<int>(lights.size()); ++i) {
-    const std::vector<float>* const strength = strength_of(lights[static_cast<std::size_t>(i)]);
+    const std::vector<float>* const strength = thrown_light(lights[static_cast<std::size_t>(i)]);
     bool is_wanted = false;
     for (std::uint32_t k = 0; k < surfaces.surfaces().size(); ++k) is_wanted = is_wanted || settings.serves(i, k);
     const double sum = strength && is_wanted ? std::accumulate(strength->begin(), strength->end(), 0.0) : 0;
@@ -71,7 +64,7 @@ std::vector<std::optional<AreaPhotons>> areas_of(const std::vector<Source>& sour
   std::vector<std::optional<AreaPhotons>> areas(lights.size());
   for (const Source& source : sources) {
     const auto light = static_cast<std::size_t>(source.light);
-    if (!std::holds_alternative<AreaLight>(lights[light])) continue;
+    if (!emitting_mesh(lights[light])) continue;
     areas[light] = AreaPhotons{source.emitter, static_cast<double>(source.count), {}};
     for (std::uint32_t k = 0; k < surfaces.surfaces().size(); ++k)
       areas[light]->surfaces.push_back(settings.serves(source.light, k));

@@ -9,6 +9,7 @@
 
 #include "base/constants.h"
 #include "base/errors.h"
+#include "base/overloaded.h"
 #include "renderer/sampling/sampling.h"
 
 namespace tensorray {
@@ -63,8 +64,10 @@ Distribution1D triangles_by_area(const TriangleMesh& mesh) {
 }
 
 bool is_background(const Light& light) {
-  if (const auto* directional = std::get_if<DirectionalLight>(&light)) return directional->angle > 0;
-  return !std::holds_alternative<AreaLight>(light) && !std::holds_alternative<PointLight>(light);
+  return std::visit(Overloaded{[](const AreaLight&) { return false; }, [](const PointLight&) { return false; },
+                               [](const DirectionalLight& sun) { return sun.angle > 0; },
+                               [](const ConstantLight&) { return true; }, [](const EnvironmentLight&) { return true; }},
+                    light);
 }
 
 /// @param values  Of all bands. @param sum  Of those from `first_band` on.
@@ -86,7 +89,7 @@ std::shared_ptr<const TriangleScene> many_triangles(const std::vector<Light>& li
   Eigen::AlignedBox3d bounds;
   std::size_t count = 0;
   for (const int light : area_lights) {
-    meshes.push_back(&std::get<AreaLight>(lights[static_cast<std::size_t>(light)]).mesh);
+    meshes.push_back(emitting_mesh(lights[static_cast<std::size_t>(light)]));
     bounds.extend(meshes.back()->bounds());
     count += meshes.back()->triangles.size();
   }
@@ -95,6 +98,35 @@ std::shared_ptr<const TriangleScene> many_triangles(const std::vector<Light>& li
 }
 
 }  // namespace
+
+const TriangleMesh* emitting_mesh(const Light& light) {
+  using Mesh = const TriangleMesh*;
+  return std::visit(
+      Overloaded{[](const AreaLight& area) -> Mesh { return &area.mesh; }, [](const PointLight&) -> Mesh { return {}; },
+                 [](const DirectionalLight&) -> Mesh { return {}; }, [](const ConstantLight&) -> Mesh { return {}; },
+                 [](const EnvironmentLight&) -> Mesh { return {}; }},
+      light);
+}
+
+const std::vector<float>* thrown_light(const Light& light) {
+  using Strength = const std::vector<float>*;
+  return std::visit(Overloaded{[](const AreaLight& area) -> Strength { return &area.radiance; },
+                               [](const PointLight& point) -> Strength { return &point.intensity; },
+                               [](const DirectionalLight& sun) -> Strength { return &sun.irradiance; },
+                               [](const ConstantLight&) -> Strength { return {}; },
+                               [](const EnvironmentLight&) -> Strength { return {}; }},
+                    light);
+}
+
+std::optional<Vector3d> direction_at(const Light& light, const Vector3d& point) {
+  using Direction = std::optional<Vector3d>;
+  return std::visit(
+      Overloaded{[&](const PointLight& source) -> Direction { return Vector3d(point - source.position); },
+                 [](const DirectionalLight& sun) -> Direction { return sun.direction; },
+                 [](const AreaLight&) -> Direction { return {}; }, [](const ConstantLight&) -> Direction { return {}; },
+                 [](const EnvironmentLight&) -> Direction { return {}; }},
+      light);
+}
 
 TriangleMesh rectangle_mesh(const Vector3d& center, const Vector3d& right, const Vector3d& up, const Vector2d& size) {
   const Vector3d x = size.x() / 2 * right, y = size.y() / 2 * up;
@@ -119,7 +151,7 @@ LightSampler::LightSampler(std::vector<Light> lights, const std::vector<float>& 
       throw std::invalid_argument("light " + std::to_string(i) + ": " + error.what());
     }
     powers.push_back(prepared_.back().power);
-    if (std::holds_alternative<AreaLight>(lights_[i])) area_lights_.push_back(static_cast<int>(i));
+    if (emitting_mesh(lights_[i])) area_lights_.push_back(static_cast<int>(i));
   }
   triangles_ = many_triangles(lights_, area_lights_);
   if (std::any_of(powers.begin(), powers.end(), [](double power) { return power > 0; })) choice_.emplace(powers);
@@ -142,28 +174,31 @@ LightSampler::Prepared LightSampler::prepare(Light& light, const std::vector<flo
                                              double scene_radius) const {
   const double ball = pi * scene_radius * scene_radius;
   Prepared result;
-  if (auto* area = std::get_if<AreaLight>(&light)) {
-    require_bands(area->radiance, bands_, "radiance");
-    result.triangles = triangles_by_area(area->mesh);
-    result.power = pi * result.triangles->sum() * dot(area->radiance, importance);
-  } else if (auto* directional = std::get_if<DirectionalLight>(&light)) {
-    require_bands(directional->irradiance, bands_, "irradiance");
-    require(directional->direction.allFinite() && directional->direction.stableNorm() > 0,
-            "direction must be finite and not zero");
-    require(directional->angle >= 0 && directional->angle <= pi / 2, "angle must be 0 to pi / 2");
-    directional->direction.stableNormalize();
-    result.power = ball * dot(directional->irradiance, importance);
-    if (directional->angle > 0) result.disk = make_disk(*directional);
-  } else if (auto* point = std::get_if<PointLight>(&light)) {
-    require_bands(point->intensity, bands_, "intensity");
-    require(point->position.allFinite(), "position must be finite");
-    result.power = 4 * pi * dot(point->intensity, importance);
-  } else if (auto* constant = std::get_if<ConstantLight>(&light)) {
-    require_bands(constant->radiance, bands_, "radiance");
-  } else {
-    result.environment.emplace(std::move(std::get<EnvironmentLight>(light)), importance);
+  const auto prepare_area = [&](const AreaLight& area) {
+    require_bands(area.radiance, bands_, "radiance");
+    result.triangles = triangles_by_area(area.mesh);
+    result.power = pi * result.triangles->sum() * dot(area.radiance, importance);
+  };
+  const auto prepare_directional = [&](DirectionalLight& sun) {
+    require_bands(sun.irradiance, bands_, "irradiance");
+    require(sun.direction.allFinite() && sun.direction.stableNorm() > 0, "direction must be finite and not zero");
+    require(sun.angle >= 0 && sun.angle <= pi / 2, "angle must be 0 to pi / 2");
+    sun.direction.stableNormalize();
+    result.power = ball * dot(sun.irradiance, importance);
+    if (sun.angle > 0) result.disk = make_disk(sun);
+  };
+  const auto prepare_point = [&](const PointLight& point) {
+    require_bands(point.intensity, bands_, "intensity");
+    require(point.position.allFinite(), "position must be finite");
+    result.power = 4 * pi * dot(point.intensity, importance);
+  };
+  const auto prepare_environment = [&](EnvironmentLight& environment) {
+    result.environment.emplace(std::move(environment), importance);
     result.power = ball * result.environment->importance();
-  }
+  };
+  std::visit(Overloaded{prepare_area, prepare_directional, prepare_point, prepare_environment,
+                        [&](const ConstantLight& constant) { require_bands(constant.radiance, bands_, "radiance"); }},
+             light);
   return result;
 }
 
@@ -174,27 +209,36 @@ bool LightSampler::sample(const Vector3d& point, const Vector2d& u, LightSample&
   if (!choice_) return false;
   const Distribution1D::Sample chosen = choice_->sample(u.x());
   const Vector2d place(chosen.within, u.y());
-  const Light& light = lights_[chosen.cell];
-  if (std::holds_alternative<AreaLight>(light)) return sample_area(chosen.cell, point, place, sample, bands);
-
-  sample.is_delta = !is_background(light);
-  sample.light = sample.is_delta ? chosen.cell : -1;
-  if (const auto* lamp = std::get_if<PointLight>(&light))
-    return sample_point(*lamp, point, chosen.probability, sample, bands);
-  const auto* directional = std::get_if<DirectionalLight>(&light);
+  const Prepared& prepared = prepared_[chosen.cell];
+  sample.is_delta = false;
+  sample.light = -1;
   sample.distance = std::numeric_limits<double>::infinity();
-  if (sample.is_delta) {
-    sample.direction = -directional->direction;
-    set(directional->irradiance, sample.radiance, bands.first, size(bands));
+  const auto sample_background = [&](const Vector3d& direction) {
+    sample.direction = direction;
+    sample.pdf = background_pdf(sample.direction);
+    background(sample.direction, sample.radiance, true, -1, bands);
+    return sample.pdf > 0;
+  };
+  const auto sample_directional = [&](const DirectionalLight& sun) {
+    if (sun.angle > 0) return sample_background(prepared.disk->frame * square_to_cap(place, prepared.disk->height));
+    sample.is_delta = true;
+    sample.light = chosen.cell;
+    sample.direction = -sun.direction;
+    set(sun.irradiance, sample.radiance, bands.first, size(bands));
     sample.pdf = chosen.probability;
     return true;
-  }
-  const Prepared& prepared = prepared_[chosen.cell];
-  sample.direction = directional ? Vector3d(prepared.disk->frame * square_to_cap(place, prepared.disk->height))
-                                 : prepared.environment->sample(place);
-  sample.pdf = background_pdf(sample.direction);
-  background(sample.direction, sample.radiance, true, -1, bands);
-  return sample.pdf > 0;
+  };
+  const auto sample_lamp = [&](const PointLight& lamp) {
+    sample.is_delta = true;
+    sample.light = chosen.cell;
+    return sample_point(lamp, point, chosen.probability, sample, bands);
+  };
+  return std::visit(
+      Overloaded{sample_directional, sample_lamp,
+                 [&](const AreaLight&) { return sample_area(chosen.cell, point, place, sample, bands); },
+                 [&](const EnvironmentLight&) { return sample_background(prepared.environment->sample(place)); },
+                 [](const ConstantLight&) { return false; }},  // It is never chosen.
+      lights_[chosen.cell]);
 }
 
 bool LightSampler::sample_point(const PointLight& light, const Vector3d& point, double probability, LightSample& sample,
@@ -245,14 +289,16 @@ void LightSampler::background(const Vector3d& direction, std::vector<float>& rad
   radiance.assign(size(bands), 0);
   for (std::size_t i = 0; i < lights_.size(); ++i) {
     if (!is_background(lights_[i]) || (only >= 0 && static_cast<std::size_t>(only) != i)) continue;
-    if (const auto* sun = std::get_if<DirectionalLight>(&lights_[i])) {
+    const auto add_disk = [&](const DirectionalLight& sun) {
       const Disk& disk = *prepared_[i].disk;
-      if (disks && disk.contains(*sun, direction)) add(disk.radiance, sun->irradiance, radiance, bands.first);
-    } else if (const auto* constant = std::get_if<ConstantLight>(&lights_[i])) {
-      add(1, constant->radiance, radiance, bands.first);
-    } else {
-      prepared_[i].environment->add_radiance(direction, radiance, bands.first);
-    }
+      if (disks && disk.contains(sun, direction)) add(disk.radiance, sun.irradiance, radiance, bands.first);
+    };
+    std::visit(
+        Overloaded{
+            add_disk, [&](const ConstantLight& constant) { add(1, constant.radiance, radiance, bands.first); },
+            [&](const EnvironmentLight&) { prepared_[i].environment->add_radiance(direction, radiance, bands.first); },
+            [](const AreaLight&) {}, [](const PointLight&) {}},
+        lights_[i]);
   }
 }
 
@@ -274,7 +320,7 @@ double LightSampler::direction_pdf(const Vector3d& point, const Vector3d& direct
     return sum;
   }
   for (const int light : area_lights_)
-    for (std::size_t i = 0; i < std::get<AreaLight>(lights_[light]).mesh.triangles.size(); ++i)
+    for (std::size_t i = 0; i < emitting_mesh(lights_[light])->triangles.size(); ++i)
       sum += triangle_pdf(light, i, point, direction);
   return sum;
 }
@@ -282,7 +328,7 @@ double LightSampler::direction_pdf(const Vector3d& point, const Vector3d& direct
 /// The density of `direction` by a triangle of an area light; 0 if a straight ray does not meet it.
 double LightSampler::triangle_pdf(int light, std::size_t triangle, const Vector3d& point,
                                   const Vector3d& direction) const {
-  const TriangleMesh& mesh = std::get<AreaLight>(lights_[light]).mesh;
+  const TriangleMesh& mesh = *emitting_mesh(lights_[light]);
   const auto distance = distance_to(mesh, triangle, point, direction);
   if (!distance) return 0;
   return area_pdf(light, point, point + *distance * direction, triangle_normal(mesh, triangle).normalized());
@@ -290,17 +336,24 @@ double LightSampler::triangle_pdf(int light, std::size_t triangle, const Vector3
 
 bool LightSampler::is_concentrated() const {
   return std::any_of(lights_.begin(), lights_.end(), [](const Light& light) {
-    return std::holds_alternative<AreaLight>(light) || std::holds_alternative<EnvironmentLight>(light);
+    return std::visit(Overloaded{[](const AreaLight&) { return true; }, [](const EnvironmentLight&) { return true; },
+                                 [](const PointLight&) { return false; }, [](const DirectionalLight&) { return false; },
+                                 [](const ConstantLight&) { return false; }},
+                      light);
   });
 }
 
 /// The density with which a background light, once chosen, chooses a direction.
 double LightSampler::directional_pdf(int light, const Vector3d& direction) const {
-  if (const auto* sun = std::get_if<DirectionalLight>(&lights_[light])) {
+  const auto of_disk = [&](const DirectionalLight& sun) {
     const Disk& disk = *prepared_[light].disk;
-    return disk.contains(*sun, direction) ? disk.pdf : 0;
-  }
-  return prepared_[light].environment->pdf(direction);
+    return disk.contains(sun, direction) ? disk.pdf : 0;
+  };
+  return std::visit(
+      Overloaded{of_disk, [&](const EnvironmentLight&) { return prepared_[light].environment->pdf(direction); },
+                 [](const ConstantLight&) { return 0.0; }, [](const AreaLight&) { return 0.0; },
+                 [](const PointLight&) { return 0.0; }},
+      lights_[light]);
 }
 
 }  // namespace tensorray

@@ -43,6 +43,19 @@ struct ConstantLight {
 
 using Light = std::variant<AreaLight, DirectionalLight, ConstantLight, EnvironmentLight, PointLight>;
 
+// What others ask of a light, whatever its kind. Kinds are told apart by std::visit alone, with a function for each.
+
+/// The triangles of an area light; null of other kinds.
+const TriangleMesh* emitting_mesh(const Light& light);
+
+/// The strength, in every band, of the light that a volume throws on surfaces, as photons or as a map; null: no light
+/// of this kind comes through it.
+const std::vector<float>* thrown_light(const Light& light);
+
+/// The direction, of any length, in which light comes straight to a point, of lights that are so small that they cast
+/// shadows: directional ones, as from the disk's centre, and points; nothing of other kinds.
+std::optional<Eigen::Vector3d> direction_at(const Light& light, const Eigen::Vector3d& point);
+
 /// A rectangle of two triangles that faces right × up.
 /// @param right, up  Unit, normal to each other.
 TriangleMesh rectangle_mesh(const Eigen::Vector3d& center, const Eigen::Vector3d& right, const Eigen::Vector3d& up,

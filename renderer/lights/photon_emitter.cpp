@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "base/constants.h"
+#include "base/overloaded.h"
 
 namespace tensorray {
 namespace {
@@ -32,19 +33,20 @@ Vector2d sample_polygon(const std::vector<Vector2d>& polygon, Vector2d u) {
 
 PhotonEmitter::PhotonEmitter(const Light& light, std::vector<Vector3d> corners, const Eigen::AlignedBox3d& scene)
     : corners_(std::move(corners)), scene_(scene) {
-  if (const auto* point = std::get_if<PointLight>(&light)) {
-    if (is_surrounded(point->position, corners_))
-      surrounded_ = point->position;
+  const auto from_point = [&](const PointLight& point) {
+    if (is_surrounded(point.position, corners_))
+      surrounded_ = point.position;
     else
-      beam_ = point_beam(corners_, point->position);
-  } else if (const auto* sun = std::get_if<DirectionalLight>(&light)) {
-    beam_ = beam_towards(sun->direction.normalized());
-    angle_ = sun->angle;
-  } else if (const auto* area = std::get_if<AreaLight>(&light)) {
-    lamp_ = make_lamp(*area, corners_);
-  } else {
-    throw std::invalid_argument("only directional lights, points and area lights emit photons");
-  }
+      beam_ = point_beam(corners_, point.position);
+  };
+  const auto from_sun = [&](const DirectionalLight& sun) {
+    beam_ = beam_towards(sun.direction.normalized());
+    angle_ = sun.angle;
+  };
+  const auto none = [] { throw std::invalid_argument("only directional lights, points and area lights emit photons"); };
+  std::visit(Overloaded{from_point, from_sun, [&](const AreaLight& area) { lamp_ = make_lamp(area, corners_); },
+                        [&](const ConstantLight&) { none(); }, [&](const EnvironmentLight&) { none(); }},
+             light);
 }
 
 PhotonEmitter::Lamp PhotonEmitter::make_lamp(const AreaLight& light, const std::vector<Vector3d>& corners) {

@@ -92,7 +92,7 @@ int metadata(const aiScene& scene, const char* key, int otherwise) {
   return value;
 }
 
-/// FBX says which of its axes are right, up and front, and its unit in centimetres. assimp 5.2 passes on both.
+/// FBX says which of its axes are right, up and front, and its unit in centimetres. assimp passes on both.
 Eigen::Affine3d fbx_to_world(const aiScene& scene) {
   const auto axis = [&](const char* key, int otherwise) {
     const int number = metadata(scene, key, otherwise);
@@ -106,7 +106,8 @@ Eigen::Affine3d fbx_to_world(const aiScene& scene) {
   if (std::abs(turn.determinant()) != 1) throw std::runtime_error("its axes are not right, up and front");
   float unit = 1;
   if (scene.mMetaData) scene.mMetaData->Get("UnitScaleFactor", unit);
-  return Eigen::Affine3d(0.01 * double(unit) * turn);
+  // The format's root has no transformation. assimp 5.4 and newer turn and scale it by the same axes and unit.
+  return Eigen::Affine3d(0.01 * double(unit) * turn) * affine_of(scene.mRootNode->mTransformation).inverse();
 }
 
 /// From assimp's coordinates to metres with +z up, for the formats that say what theirs are. assimp has already brought

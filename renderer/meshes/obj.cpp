@@ -9,7 +9,6 @@
 #include <sstream>
 #include <stdexcept>
 #include <string>
-#include <unordered_map>
 #include <vector>
 
 #include "base/text/parse_number.h"
@@ -26,16 +25,6 @@ constexpr std::uint32_t none = 0xffffffff;
 /// A corner of a face: its vertex and its normal, from 0.
 struct ObjCorner {
   std::uint32_t vertex = none, normal = none;
-
-  friend bool operator==(const ObjCorner& a, const ObjCorner& b) {
-    return a.vertex == b.vertex && a.normal == b.normal;
-  }
-};
-
-struct ObjCornerHash {
-  std::size_t operator()(const ObjCorner& corner) const {
-    return std::hash<std::uint64_t>()(std::uint64_t{corner.vertex} << 32 | corner.normal);
-  }
 };
 
 struct ObjContents {
@@ -158,55 +147,38 @@ void check_corner(const ObjCorner& corner, const ObjContents& contents) {
   check(corner.normal, contents.normals.size(), "normal");
 }
 
-/// Makes a vertex of each pair of a vertex and a normal.
-class MeshBuilder {
- public:
-  explicit MeshBuilder(const ObjContents& contents) : contents_(contents) {}
-
-  void add_face(const ObjCorner* corners, std::size_t count) {
-    std::vector<Eigen::Vector3d> positions;
-    for (std::size_t i = 0; i < count; ++i) {
-      check_corner(corners[i], contents_);
-      positions.push_back(contents_.vertices[corners[i].vertex]);
-    }
-    for (const auto& triangle : triangulate(positions))
-      result_.mesh.triangles.push_back(
-          {vertex(corners[triangle[0]]), vertex(corners[triangle[1]]), vertex(corners[triangle[2]])});
+/// Adds the face whose corners are [first, end). Each corner becomes a vertex; mesh.cpp joins those that are equal.
+void add_obj_face(const ObjContents& contents, std::size_t first, std::size_t end, MeshWithNormals& result) {
+  const auto offset = static_cast<std::uint32_t>(result.mesh.vertices.size());
+  std::vector<Eigen::Vector3d> positions;
+  for (std::size_t i = first; i < end; ++i) {
+    const ObjCorner& corner = contents.corners[i];
+    check_corner(corner, contents);
+    positions.push_back(contents.vertices[corner.vertex]);
+    const bool has_normal = corner.normal != none;
+    if (!contents.normals.empty())
+      result.normals.push_back(has_normal ? contents.normals[corner.normal] : Eigen::Vector3f(0, 0, 0));
   }
-
-  MeshWithNormals take() { return std::move(result_); }
-
- private:
-  std::uint32_t vertex(const ObjCorner& corner) {
-    const auto [entry, is_new] = indices_.try_emplace(corner, static_cast<std::uint32_t>(result_.mesh.vertices.size()));
-    if (!is_new) return entry->second;
-    result_.mesh.vertices.push_back(contents_.vertices[corner.vertex]);
-    if (!contents_.normals.empty())
-      result_.normals.push_back(corner.normal == none ? Eigen::Vector3f(Eigen::Vector3f::Zero())
-                                                      : contents_.normals[corner.normal]);
-    return entry->second;
-  }
-
-  const ObjContents& contents_;
-  std::unordered_map<ObjCorner, std::uint32_t, ObjCornerHash> indices_;
-  MeshWithNormals result_;
-};
+  result.mesh.vertices.insert(result.mesh.vertices.end(), positions.begin(), positions.end());
+  for (const auto& triangle : triangulate(positions))
+    result.mesh.triangles.push_back({offset + triangle[0], offset + triangle[1], offset + triangle[2]});
+}
 
 }  // namespace
 
 MeshWithNormals read_obj(const std::filesystem::path& path) {
   const ObjContents contents = read_contents(path);
-  MeshBuilder builder(contents);
+  MeshWithNormals result;
   std::size_t first = 0;
   for (std::size_t face = 0; face < contents.face_ends.size(); ++face) {
     try {
-      builder.add_face(&contents.corners[first], contents.face_ends[face] - first);
+      add_obj_face(contents, first, contents.face_ends[face], result);
     } catch (const std::runtime_error& error) {
       throw std::runtime_error("line " + std::to_string(contents.face_lines[face]) + ": " + error.what());
     }
     first = contents.face_ends[face];
   }
-  return builder.take();
+  return result;
 }
 
 }  // namespace tensorray

@@ -62,7 +62,7 @@ void require_shadable(const ShadedScene& scene, const ShadingSettings& settings)
     require(scene.materials[i].reflectance.size() == scene.colors.bands(),
             "material " + std::to_string(i) + " must have a reflectance for each band of the light");
   const std::vector<Light>& lights = scene.lights.lights();
-  const auto is_area_light = [&](std::size_t i) { return std::holds_alternative<AreaLight>(lights[i]); };
+  const auto is_area_light = [&](std::size_t i) { return emitting_mesh(lights[i]) != nullptr; };
   std::set<std::size_t> found;
   for (std::size_t i = 0; i < scene.surfaces.surfaces().size(); ++i) {
     const ShadedSurface& surface = scene.surfaces.surfaces()[i];

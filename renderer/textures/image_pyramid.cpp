@@ -12,10 +12,6 @@ namespace {
 /// Pictures of up to so many pixels are stored at all sizes: 340 MiB.
 constexpr std::size_t small_picture = std::size_t{1} << 24;
 
-/// The first level that is stored of larger pictures. Storing larger levels would take more memory than the picture
-/// itself; they are quickly computed from the full picture.
-constexpr int first_of_large = 3;
-
 int halved(int size, int level) { return std::max(1, size >> level); }
 
 /// The part of a larger level that one pixel of a smaller level covers, along one axis.
@@ -57,7 +53,7 @@ void convert(const NativeImage& image, const ColorConversion& conversion, int co
 ImagePyramid::ImagePyramid(NativeImage image, ColorConversion conversion)
     : image_(std::move(image)),
       conversion_(std::move(conversion)),
-      first_stored_(static_cast<std::size_t>(image_.width) * image_.height <= small_picture ? 0 : first_of_large) {
+      first_stored_(static_cast<std::size_t>(image_.width) * image_.height <= small_picture ? 0 : 1) {
   for (int level = first_stored_; level < levels(); ++level) {
     std::vector<float> pixels(static_cast<std::size_t>(width(level)) * height(level) * 4);
     tbb::parallel_for(0, height(level), [&](int y) {
@@ -65,7 +61,7 @@ ImagePyramid::ImagePyramid(NativeImage image, ColorConversion conversion)
       if (level == 0)
         read_picture(0, y, width(0), row);
       else
-        reduce_row(level == first_stored_ ? 0 : level - 1, level, 0, y, width(level), row);
+        reduce_row(level - 1, level, 0, y, width(level), row);
     });
     stored_.push_back(std::move(pixels));
   }
@@ -81,25 +77,20 @@ int ImagePyramid::levels() const {
 int ImagePyramid::width(int level) const { return halved(image_.width, level); }
 int ImagePyramid::height(int level) const { return halved(image_.height, level); }
 
-Eigen::Vector4f ImagePyramid::mean() const {
-  Eigen::Vector4f rgba;
-  read_row(levels() - 1, 0, 0, 1, rgba.data());
-  return rgba;
-}
+Eigen::Vector4f ImagePyramid::mean() const { return texel(levels() - 1, 0, 0); }
 
-void ImagePyramid::read(const LevelRectangle& part, std::size_t row_pixels, float* rgba) const {
-  for (int row = 0; row < part.rows; ++row)
-    read_row(part.level, part.x, part.y + row, part.columns, rgba + row * row_pixels * 4);
+Eigen::Vector4f ImagePyramid::texel(int level, int x, int y) const {
+  Eigen::Vector4f rgba;
+  read_row(level, x, y, 1, rgba.data());
+  return rgba;
 }
 
 void ImagePyramid::read_row(int level, int x, int y, int count, float* rgba) const {
   if (const float* const pixels = stored(level)) {
     const std::size_t first = static_cast<std::size_t>(y) * width(level) + x;
     std::copy_n(pixels + first * 4, static_cast<std::size_t>(count) * 4, rgba);
-  } else if (level == 0) {
-    read_picture(x, y, count, rgba);
   } else {
-    reduce_row(0, level, x, y, count, rgba);
+    read_picture(x, y, count, rgba);
   }
 }
 

@@ -9,7 +9,6 @@
 
 #include "renderer/color/color.h"
 #include "renderer/images/image.h"
-#include "renderer/images/image_plugin.h"
 
 namespace tensorray {
 
@@ -17,25 +16,25 @@ namespace tensorray {
 /// width and height (rounded down, at least 1); the last level is a single pixel. A pixel of a level is the exact mean
 /// over its area for any size of the picture, so that no level aliases and all levels have the same mean.
 /// Memory: 21 bytes for each pixel of a picture of up to 16 million pixels, of which all levels are stored. Of a larger
-/// one, the picture as its file stores it, and a third of a byte per pixel: its levels 0 to 2 are converted when they
-/// are read. The constructor computes stored levels on all threads. Immutable; any number of threads may read.
-class ImagePyramid final : public TileSource {
+/// one, the picture as its file stores it, whose pixels are converted when they are read, and 5 bytes for each pixel,
+/// which its other levels take. The constructor computes stored levels on all threads. Immutable; any number of threads
+/// may read.
+class ImagePyramid {
  public:
   /// @param conversion  From the colours of the picture to scene-linear colours.
   ImagePyramid(NativeImage image, ColorConversion conversion);
 
-  int levels() const override;
-  int width(int level) const override;
-  int height(int level) const override;
+  int levels() const;
+  int width(int level) const;
+  int height(int level) const;
   Eigen::Vector4f mean() const;  ///< Mean of all pixels.
 
-  void read(const LevelRectangle& part, std::size_t row_pixels, float* rgba) const override;
-
-  /// The pixels of a level (R, G, B, A, row by row) if it is stored, otherwise null.
-  const float* stored(int level) const;
+  /// A pixel of a level: R, G, B, A. x and y count from the upper left one.
+  Eigen::Vector4f texel(int level, int x, int y) const;
 
  private:
   void read_picture(int x, int y, int count, float* rgba) const;
+  const float* stored(int level) const;
   void read_row(int level, int x, int y, int count, float* rgba) const;
   void reduce_row(int from, int level, int x, int y, int count, float* rgba) const;
 

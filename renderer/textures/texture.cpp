@@ -2,11 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
-#include <exception>
-#include <stdexcept>
 #include <utility>
 
-#include "renderer/images/image_plugin.h"
 #include "renderer/textures/image_pyramid.h"
 
 namespace tensorray {
@@ -53,12 +50,6 @@ double bring_near(double coordinate, Wrap wrap) {
   return std::clamp(coordinate, -1.0, 2.0);
 }
 
-/// Whether a coordinate is equal to the centre of a texel in single precision.
-bool is_centre(double coordinate, int size) {
-  const double texel = coordinate * size - 0.5;
-  return std::abs(texel - std::round(texel)) <= size * 0x1p-22;
-}
-
 /// The texel at an index along an axis of `size` texels, as the picture continues; -1: nothing.
 int wrapped(int index, int size, Wrap wrap) {
   if (index >= 0 && index < size) return index;
@@ -68,8 +59,9 @@ int wrapped(int index, int size, Wrap wrap) {
   return within < size ? within : 2 * size - 1 - within;
 }
 
-/// Linear between the texels of a level that is stored.
-Vector4f interpolate(const float* pixels, int width, int height, const Vector2d& st, Wrap wrap) {
+/// Linear between the texels of a level. @param st  Here t goes from the top downwards.
+Vector4f interpolate(const ImagePyramid& pyramid, int level, const Vector2d& st, Wrap wrap) {
+  const int width = pyramid.width(level), height = pyramid.height(level);
   const double x = st.x() * width - 0.5, y = st.y() * height - 0.5;
   const double left = std::floor(x), top = std::floor(y);
   const auto right_part = static_cast<float>(x - left), lower_part = static_cast<float>(y - top);
@@ -77,7 +69,7 @@ Vector4f interpolate(const float* pixels, int width, int height, const Vector2d&
     column = wrapped(column, width, wrap);
     row = wrapped(row, height, wrap);
     if (column < 0 || row < 0) return Vector4f::Zero();
-    return Eigen::Map<const Vector4f>(pixels + (static_cast<std::size_t>(row) * width + column) * 4);
+    return pyramid.texel(level, column, row);
   };
   const auto column = static_cast<int>(left), row = static_cast<int>(top);
   const Vector4f upper = (1 - right_part) * texel(column, row) + right_part * texel(column + 1, row);
@@ -103,43 +95,25 @@ LevelChoice choose_level(double size, int levels) {
 }  // namespace
 
 struct Texture::State {
-  State(NativeImage image, ColorConversion conversion, Wrap wrap_, std::string name_)
-      : pyramid(std::move(image), std::move(conversion)), wrap(wrap_), name(std::move(name_)) {}
+  State(NativeImage image, ColorConversion conversion, Wrap wrap_)
+      : pyramid(std::move(image), std::move(conversion)), wrap(wrap_) {}
 
-  Vector4f sample(void* thread, int level, bool closest, const Vector2d& st) const;
   Vector4f mean(const Vector2d& st) const;
-  Vector4f probe(void* thread, const Vector2d& st, LevelChoice choice) const;
+  Vector4f probe(const Vector2d& st, LevelChoice choice) const;
 
   ImagePyramid pyramid;
   Wrap wrap;
-  std::string name;  ///< For error messages.
-  std::unique_ptr<TileLookup> tiles = pyramid.stored(0) ? nullptr : image_plugin().make_lookup(pyramid, wrap);
 };
 
-/// @param st  Here t goes from the top downwards.
-Vector4f Texture::State::sample(void* thread, int level, bool closest, const Vector2d& st) const {
-  if (const float* const pixels = pyramid.stored(level))
-    return interpolate(pixels, pyramid.width(level), pyramid.height(level), st, wrap);
-  alignas(16) float rgba[4];
-  try {
-    tiles->lookup(thread, level, closest, static_cast<float>(st.x()), static_cast<float>(st.y()), rgba);
-  } catch (const std::exception& error) {
-    throw std::runtime_error("cannot look up " + name + ": " + error.what());
-  }
-  return Eigen::Map<const Vector4f>(rgba);
-}
-
-Vector4f Texture::State::probe(void* thread, const Vector2d& st, LevelChoice choice) const {
+Vector4f Texture::State::probe(const Vector2d& st, LevelChoice choice) const {
   const Vector2d place(bring_near(st.x(), wrap), bring_near(1 - st.y(), wrap));
-  const bool closest = choice.level == 0 && choice.blend == 0 && is_centre(place.x(), pyramid.width(0)) &&
-                       is_centre(place.y(), pyramid.height(0));
-  Vector4f result = sample(thread, choice.level, closest, place);
-  if (choice.blend > 0) result += choice.blend * (sample(thread, choice.level + 1, closest, place) - result);
+  Vector4f result = interpolate(pyramid, choice.level, place, wrap);
+  if (choice.blend > 0) result += choice.blend * (interpolate(pyramid, choice.level + 1, place, wrap) - result);
   return result;
 }
 
 Texture::Texture(Image image, Wrap wrap)
-    : state_(std::make_unique<State>(native_image(std::move(image)), ColorConversion(), wrap, "a picture in memory")) {}
+    : state_(std::make_unique<State>(native_image(std::move(image)), ColorConversion(), wrap)) {}
 
 Texture::Texture(const std::filesystem::path& file, const ColorManagement& color, const std::string& color_space,
                  Wrap wrap, const std::string& layer, std::vector<std::string>* notes) {
@@ -147,7 +121,7 @@ Texture::Texture(const std::filesystem::path& file, const ColorManagement& color
   NativeImage image = read_native_image(file, layer);
   add_notes(file, image, notes ? *notes : unread);
   ColorConversion conversion = color.picture_conversion(file, image, color_space, notes ? *notes : unread);
-  state_ = std::make_unique<State>(std::move(image), std::move(conversion), wrap, file.string());
+  state_ = std::make_unique<State>(std::move(image), std::move(conversion), wrap);
 }
 
 Texture::~Texture() = default;
@@ -175,9 +149,8 @@ Vector4f Texture::lookup(const Vector2d& st, const Matrix2d& footprint) const {
   const LevelChoice choice = choose_level(ellipse.minor, state_->pyramid.levels());
   const int probes = std::max(1, static_cast<int>(std::ceil(ellipse.major / ellipse.minor - 1e-3)));
   const Vector2d line = (ellipse.major - ellipse.minor) * ellipse.direction.cwiseQuotient(size);
-  void* const thread = state_->tiles ? state_->tiles->this_thread() : nullptr;
   Vector4f sum = Vector4f::Zero();
-  for (int i = 0; i < probes; ++i) sum += state_->probe(thread, st + ((i + 0.5) / probes - 0.5) * line, choice);
+  for (int i = 0; i < probes; ++i) sum += state_->probe(st + ((i + 0.5) / probes - 0.5) * line, choice);
   return sum / static_cast<float>(probes);
 }
 

@@ -22,12 +22,11 @@ enum class Wrap {
   mirror,  ///< Repeated copies, every other one mirrored.
 };
 
-/// A picture in the scene-linear working space, filtered over MIP maps. Pictures of up to 16 million pixels are in
-/// memory as floats; parts of larger ones come through OpenImageIO's TextureSystem.
+/// A picture in the scene-linear working space, filtered over MIP maps.
 ///
 /// Coordinates are those of ST maps: (0, 0) is the lower left corner of the picture and (1, 1) the upper right one. In
 /// a picture W pixels wide, the centre of pixel x is at s = (x + ½) / W. Values that are not finite count as 0.
-/// Memory: that of ImagePyramid; for large pictures also a cache of at most about 1 GiB of filtered tiles.
+/// Memory: that of ImagePyramid.
 /// Threads: any number may look up at the same time.
 class Texture {
  public:

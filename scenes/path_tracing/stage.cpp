@@ -187,13 +187,13 @@ RenderCallbacks callbacks_of(const Progress& progress, RenderJob* job,
 void add_lamps(const std::vector<Light>& lights, const ShownLight& light, std::vector<ShadedSurface>& surfaces,
                std::vector<Material>& materials) {
   for (std::size_t i = 0; i < lights.size(); ++i) {
-    const auto* area = std::get_if<AreaLight>(&lights[i]);
-    if (!area) continue;
+    const TriangleMesh* const mesh = emitting_mesh(lights[i]);
+    if (!mesh) continue;
     MaterialDescription black;
     black.kind = MaterialKind::diffuse;
     black.color.setZero();
     ShadedSurface surface;
-    surface.shape = area->mesh;
+    surface.shape = *mesh;
     surface.light = static_cast<int>(i);
     surface.material = static_cast<int>(materials.size());
     materials.push_back(load_material(black, light));

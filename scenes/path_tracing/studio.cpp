@@ -41,7 +41,9 @@ Eigen::AlignedBox3d box_of(const std::vector<Eigen::Vector3d>& points) {
   return box;
 }
 
-Light make_light(const LightSourceDescription& light, const ShownLight& shown) {
+/// @param environments  Of the lights before this one; changed.
+Light make_light(const LightSourceDescription& light, const ShownLights& all, std::size_t& environments) {
+  const ShownLight& shown = all.light;
   switch (light.kind) {
     case LightKind::directional: {
       DirectionalLight result;
@@ -58,9 +60,12 @@ Light make_light(const LightSourceDescription& light, const ShownLight& shown) {
     }
     case LightKind::point:
       return PointLight{light.position.value(), shown.radiance(light.color, pi * light.strength)};
-    default:
-      return ConstantLight{shown.radiance(light.color, light.strength)};
+    case LightKind::environment:
+      return all.environments[environments++];
+    case LightKind::constant:
+      break;
   }
+  return ConstantLight{shown.radiance(light.color, light.strength)};
 }
 
 }  // namespace
@@ -88,13 +93,8 @@ std::vector<Light> make_lights(const SceneDescription& description, const ShownL
   }
   std::vector<Light> lights;
   std::size_t environments = 0;
-  for (std::size_t i = 0; i < description.lights.size(); ++i) {
-    const LightSourceDescription& light = description.lights[i];
-    if (light.kind == LightKind::environment)
-      lights.emplace_back(shown.environments[environments++]);
-    else
-      lights.push_back(make_light(light, shown.light));
-  }
+  for (const LightSourceDescription& light : description.lights)
+    lights.push_back(make_light(light, shown, environments));
   return lights;
 }
 

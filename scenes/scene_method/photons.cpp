@@ -5,6 +5,7 @@
 #include <optional>
 
 #include "base/constants.h"
+#include "base/overloaded.h"
 
 namespace tensorray {
 namespace {
@@ -14,13 +15,6 @@ using Eigen::Vector3d;
 constexpr double steepest_along = 0.5;   // Sine of the angle between a plate and light along it; fields turn light.
 constexpr double small_lamp = 0.4;       // Radians, seen from the volume: fields turn light by more.
 constexpr double photons_in_reach = 10;  // Of a band, within the automatic radius, where light is undisturbed.
-
-/// The direction in which light comes to a point; nothing if it is of a kind that does not land.
-std::optional<Vector3d> direction_at(const Light& light, const Vector3d& point) {
-  if (const auto* sun = std::get_if<DirectionalLight>(&light)) return sun->direction;
-  if (const auto* source = std::get_if<PointLight>(&light)) return Vector3d(point - source->position);
-  return std::nullopt;
-}
 
 LightCaustic caustic_of(const Scene& scene, std::size_t light) {
   const std::vector<LightSourceDescription>& lights = scene.description.lights;
@@ -44,11 +38,20 @@ bool has_light_on_both_sides(const Plate& plate, const TensorField& field, const
 }
 
 /// Whether a lamp is so small, as seen from afar in the volume, that straight aim misses it.
-bool is_small(const AreaLight& lamp, const TensorField& field) {
+bool is_small(const TriangleMesh& lamp, const TensorField& field) {
   Eigen::AlignedBox3d box;
-  for (const Vector3d& vertex : lamp.mesh.vertices) box.extend(vertex);
+  for (const Vector3d& vertex : lamp.vertices) box.extend(vertex);
   const double distance = (box.center() - field.world_box().center()).norm();
   return box.diagonal().norm() < small_lamp * std::max(distance, field.world_box().diagonal().norm() / 2);
+}
+
+/// Whether a point light is in the volume, or so near that it is all around.
+bool is_within(const Light& light, const TensorField& field) {
+  return std::visit(
+      Overloaded{[&](const PointLight& point) { return is_surrounded(point.position, field.corners()); },
+                 [](const DirectionalLight&) { return false; }, [](const AreaLight&) { return false; },
+                 [](const ConstantLight&) { return false; }, [](const EnvironmentLight&) { return false; }},
+      light);
 }
 
 /// The area over which undisturbed light is spread where it leaves the volume. From outside, it is the silhouette: by
@@ -56,10 +59,9 @@ bool is_small(const AreaLight& lamp, const TensorField& field) {
 double spread_of(const Light& light, const TensorField& field) {
   const Vector3d size = field.world_box().sizes(), middle = field.world_box().center();
   const double ball = size.squaredNorm() * pi;
-  if (const auto* point = std::get_if<PointLight>(&light); point && is_surrounded(point->position, field.corners()))
-    return ball;
-  if (const auto* lamp = std::get_if<AreaLight>(&light))
-    if ((lamp->mesh.vertices.front() - middle).norm() < size.norm() / 2) return ball / 4;
+  if (is_within(light, field)) return ball;
+  if (const TriangleMesh* const lamp = emitting_mesh(light))
+    if ((lamp->vertices.front() - middle).norm() < size.norm() / 2) return ball / 4;
   return (size.x() * size.y() + size.y() * size.z() + size.z() * size.x()) / 2;
 }
 
@@ -81,15 +83,14 @@ PhotonPairs photon_pairs(const LitObjects& lit, const SceneMethodDescription& se
   if (settings.photons.per_pass == 0) return pairs;
   for (std::size_t i = 0; i < lit.lights.size(); ++i) {
     const LightCaustic caustic = caustic_of(lit.scene, i);
-    if (const auto* area = std::get_if<AreaLight>(&lit.lights[i])) {
-      const bool wanted = caustic == LightCaustic::photons || is_small(*area, field);
+    if (const TriangleMesh* const lamp = emitting_mesh(lit.lights[i])) {
+      const bool wanted = caustic == LightCaustic::photons || is_small(*lamp, field);
       pairs[i].assign(lit.objects.size(), wanted);
       continue;
     }
     if (!direction_at(lit.lights[i], {}) || caustic == LightCaustic::map) continue;
-    const auto* point = std::get_if<PointLight>(&lit.lights[i]);
-    const bool always = caustic == LightCaustic::photons || settings.conserve == Conserve::radiance ||
-                        (point && is_surrounded(point->position, field.corners()));
+    const bool always =
+        caustic == LightCaustic::photons || settings.conserve == Conserve::radiance || is_within(lit.lights[i], field);
     for (std::size_t k = 0; k < lit.objects.size(); ++k)
       pairs[i][k] =
           always || (lit.objects[k].plate && has_light_on_both_sides(*lit.objects[k].plate, field, lit.lights[i]));

@@ -53,12 +53,9 @@ std::vector<Vector3d> points_of_interest(const Scene& scene, const std::vector<S
   for (const SceneObject& object : objects) {
     if (!object.plate) points.insert(points.end(), object.mesh().vertices.begin(), object.mesh().vertices.end());
     for (const Light& each : lights) {
-      const auto* sun = std::get_if<DirectionalLight>(&each);
-      const auto* point = std::get_if<PointLight>(&each);
-      if ((!sun && !point) || !object.plate) continue;
+      if (!direction_at(each, Vector3d::Zero()) || !object.plate) continue;
       for (const Vector3d& corner : scene.field.corners()) {
-        const Vector3d normal = object.plate->normal();
-        const Vector3d direction = sun ? sun->direction : Vector3d(corner - point->position);
+        const Vector3d normal = object.plate->normal(), direction = *direction_at(each, corner);
         const double way = normal.dot(object.plate->center - corner) / normal.dot(direction);
         const Vector3d shadow = corner + way * direction;
         const Eigen::Vector2d across((shadow - object.plate->center).dot(object.plate->right),

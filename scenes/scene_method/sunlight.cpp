@@ -8,6 +8,7 @@
 #include <fmt/format.h>
 
 #include "base/constants.h"
+#include "base/overloaded.h"
 #include "integrators/flow_drawing/flow_irradiance.h"
 #include "scenes/path_tracing/studio.h"
 
@@ -49,15 +50,21 @@ Surfaces surfaces_before(const LitObjects& lit, std::size_t receiver) {
 std::optional<LandingLight> landing_light(const Light& light, const ShownLight& shown,
                                           const BendingDescription& bending, int passes) {
   LandingLight result;
-  if (const auto* point = std::get_if<PointLight>(&light)) {
-    result.source = point->position;
-  } else if (const auto* sun = std::get_if<DirectionalLight>(&light)) {
-    result.direction = sun->direction.normalized();
-    result.angle = sun->angle;
-    result.passes = sun->angle > 0 ? passes : 1;
-  } else {
-    return std::nullopt;
-  }
+  const auto from_sun = [&](const DirectionalLight& sun) {
+    result.direction = sun.direction.normalized();
+    result.angle = sun.angle;
+    result.passes = sun.angle > 0 ? passes : 1;
+    return true;
+  };
+  const auto from_point = [&](const PointLight& point) {
+    result.source = point.position;
+    return true;
+  };
+  const bool lands =
+      std::visit(Overloaded{from_sun, from_point, [](const AreaLight&) { return false; },
+                            [](const ConstantLight&) { return false; }, [](const EnvironmentLight&) { return false; }},
+                 light);
+  if (!lands) return std::nullopt;
   const auto flexibility = flexibility_of(bending);
   for (const Band& band : shown.bands) result.flexibilities.push_back(flexibility(band.wavelength - band.width / 2));
   result.flexibilities.push_back(flexibility(shown.bands.back().wavelength + shown.bands.back().width / 2));
@@ -116,11 +123,6 @@ IrradianceMap irradiance_map(const FlowIrradiance& landed, const LandingLight& l
   return result;
 }
 
-const std::vector<float>& strength_of(const Light& light) {
-  if (const auto* point = std::get_if<PointLight>(&light)) return point->intensity;
-  return std::get<DirectionalLight>(light).irradiance;
-}
-
 /// Gives light to one side of a plate.
 void face(double side, IrradianceMap& light) {
   light.side = side;
@@ -146,7 +148,7 @@ std::optional<IrradianceMap> land(const LitObjects& lit, std::size_t number, con
                                  scene.description.path.string(), number, error.what()));
   }
   if (!landed) return std::nullopt;
-  IrradianceMap map = irradiance_map(*landed, light, strength_of(lit.lights[number]));
+  IrradianceMap map = irradiance_map(*landed, light, *thrown_light(lit.lights[number]));
   map.surface = static_cast<std::uint32_t>(receiver);
   map.light = static_cast<int>(number);
   if (object.plate)

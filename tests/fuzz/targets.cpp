@@ -127,7 +127,7 @@ bool read_kept_unit(const std::string& bytes) {
     });
   PhotonSums sums;
   sums.ends.resize(2);
-  sums.points.emplace(4, 4, 2, DensitySettings{DensityKind::histogram});
+  sums.density.emplace(4, 4, 2, DensitySettings{DensityKind::histogram});
   sums.has_photons = true;
   return expect_one_line([&] { copy_sums(archive, sums); });
 }
@@ -151,16 +151,12 @@ bool read_obj_mesh(const std::string& bytes) {
 
 /// For grey pictures, too.
 bool read_profile(const std::string& bytes) {
-  const bool is_grey = expect_one_line([&] { parse_icc_profile(bytes, true); });
-  return expect_one_line([&] { parse_icc_profile(bytes, false); }) || is_grey;
+  const bool is_grey = expect_one_line([&] { icc_to_xyz(bytes, true); });
+  return expect_one_line([&] { icc_to_xyz(bytes, false); }) || is_grey;
 }
 
 bool read_png_chunks(const std::string& bytes) {
-  return read_file(bytes, [](const std::filesystem::path& path) {
-    ColorTags tags;
-    add_png_tags(path, tags);
-    check_png(path);
-  });
+  return read_file(bytes, [](const std::filesystem::path& path) { tensorray::read_png_chunks(path); });
 }
 
 bool read_tck(const std::string& bytes) {

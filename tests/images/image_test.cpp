@@ -102,7 +102,9 @@ TEST_P(EveryEnding, FilesThatWereCutOffAreRefused) {
   for (const double part : {0.001, 0.3, 0.5, 0.9, 0.999}) {
     const Temporary file("cut" + GetParam(),
                          bytes.substr(0, static_cast<std::size_t>(part * static_cast<double>(bytes.size()))));
+    ::testing::internal::CaptureStderr();  // Libraries add no lines of their own.
     const std::string text = message([&] { read_image(file.path()); });
+    EXPECT_EQ(::testing::internal::GetCapturedStderr(), "") << part;
     EXPECT_THAT(text, HasSubstr("cannot read " + file.path().string() + ": ")) << part;
     EXPECT_THAT(text, Not(::testing::EndsWith(": "))) << part;
   }
@@ -130,19 +132,6 @@ TEST(ImageTest, TheSamePictureGivesTheSameBytesAtAnyTime) {
   std::this_thread::sleep_for(std::chrono::milliseconds(1100));  // Time stamps have a resolution of one second.
   const std::vector<std::string> second = write_all();
   for (std::size_t i = 0; i < first.size(); ++i) EXPECT_TRUE(first[i] == second[i]) << image_endings()[i];
-}
-
-TEST(ImageTest, ExrKeepsEverything) {
-  const Temporary file("everything.exr");
-  Image image = noise(5, 4, {"R", "G", "B", "A", "Z", "S0.550,000000nm"});
-  image.pixel(1, 1)[0] = -3;
-  image.pixel(2, 1)[1] = std::numeric_limits<float>::infinity();
-  image.pixel(3, 1)[5] = 1e-30f;
-  write_image(file.path(), image, {{"scene", "{\n  \"é\": 1\n}"}, {"seed", "17"}});
-  const Image read = read_image(file.path());
-  ASSERT_EQ(read.channels, image.channels);
-  EXPECT_EQ(read.pixels, image.pixels);
-  EXPECT_THAT(read_bytes(file.path()), HasSubstr("{\n  \"é\": 1\n}"));
 }
 
 TEST(ImageTest, PngKeepsAllMetadataAndIsMarkedAsSrgb) {

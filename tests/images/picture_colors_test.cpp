@@ -2,13 +2,16 @@
 
 #include <cmath>
 #include <cstdlib>
+#include <functional>
 #include <limits>
 #include <string>
 #include <utility>
 #include <vector>
 
+#include <Eigen/LU>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <lcms2.h>
 
 #include "renderer/color/chromaticities.h"
 #include "renderer/color/color.h"
@@ -65,9 +68,21 @@ const Vector3d p3_red(1.22494, -0.04206, -0.01964);  // In Rec. 709, as publishe
 
 const Chromaticities p3{{0.680, 0.320}, {0.265, 0.690}, {0.150, 0.060}, {0.3127, 0.3290}};
 
-std::string p3_profile() {
-  const TransferCurve curve = srgb_curve();
-  return make_icc_profile("P3", {{curve, curve, curve}, rgb_to_xyz(p3)});
+std::vector<float> table_of(const std::function<double(double)>& curve) {
+  std::vector<float> table;
+  for (int i = 0; i < 4096; ++i) table.push_back(static_cast<float>(curve(i / 4095.0)));
+  return table;
+}
+
+std::string p3_profile() { return make_icc_profile("P3", p3, table_of(decoded)); }
+
+/// XYZ of a colour by a profile.
+Vector3d xyz_by(const std::string& profile, const Vector3d& color, bool grey = false) {
+  Eigen::Vector4f pixel(Eigen::Vector4f::Ones());
+  pixel.head<3>() = color.cast<float>();
+  icc_to_xyz(profile, grey)(pixel.data(), 1);
+  EXPECT_EQ(pixel[3], 1);
+  return pixel.head<3>().cast<double>();
 }
 
 TEST(PictureColors, PngChunksInTheirOrder) {
@@ -100,11 +115,12 @@ TEST(PictureColors, PngChunksInTheirOrder) {
 }
 
 TEST(PictureColors, ProfilesThatCannotBeUsedAreSaidAndNotUsed) {
-  std::string printer = p3_profile();
-  printer.replace(20, 4, "Lab ");
+  std::string damaged = p3_profile();
+  for (std::size_t at = 0; (at = damaged.find("curv", at)) != std::string::npos;) damaged.replace(at, 4, "none");
   const std::string code_points = png_chunk("cICP", std::string("\x09\x10\0\1", 4));  // Rec. 2020, PQ.
-  for (const auto& [chunk, text] : std::vector<std::pair<std::string, std::string>>{
-           {profile_chunk(printer), "it consists of tables"}, {code_points, "code points (primaries 9, curve 16)"}}) {
+  for (const auto& [chunk, text] :
+       std::vector<std::pair<std::string, std::string>>{{profile_chunk(damaged), "it is damaged, or has no colours"},
+                                                        {code_points, "code points (primaries 9, curve 16)"}}) {
     std::vector<std::string> notes;
     const Vector3d light = light_of("a.png", png_with(chunk, {255, 0, 0}), "", &notes);
     EXPECT_LT((light - Vector3d(1, 0, 0)).norm(), 1e-5);
@@ -114,53 +130,61 @@ TEST(PictureColors, ProfilesThatCannotBeUsedAreSaidAndNotUsed) {
 }
 
 TEST(IccProfileTest, ReadsWhatItWrites) {
-  TransferCurve table;
-  table.table = {0, 0.1f, 0.5f, 1};
-  for (const TransferCurve& curve : {power_curve(2.4), power_curve(1), srgb_curve(), table}) {
-    const IccProfile profile = parse_icc_profile(make_icc_profile("x", {{curve, curve, curve}, rgb_to_xyz(p3)}), false);
-    EXPECT_LT((profile.rgb_to_xyz - rgb_to_xyz(p3)).cwiseAbs().maxCoeff(), 5e-5);
-    for (float x = 0; x <= 1; x += 1.0f / 32)
-      EXPECT_NEAR(profile.curves[1].at(x), curve.at(x), 2e-3) << x;  // 2.4 is 614/256.
+  for (const std::function<double(double)>& curve :
+       std::vector<std::function<double(double)>>{[](double x) { return std::pow(x, 2.4); }, [](double x) { return x; },
+                                                  decoded, [](double x) { return 0.2 * x + 0.8 * x * x; }}) {
+    const std::string profile = make_icc_profile("x", p3, table_of(curve));
+    for (double x = 0; x <= 1; x += 1.0 / 32) {
+      const Vector3d color(x, 1 - x, 0.5 * x), light = color.unaryExpr(curve);
+      EXPECT_LT((xyz_by(profile, color) - rgb_to_xyz(p3) * light).cwiseAbs().maxCoeff(), 2e-3) << x;  // 2.4 is 614/256.
+    }
   }
-  std::string profile = p3_profile();
-  for (std::size_t size = 0; size < 500; size += 7)
-    EXPECT_THROW(parse_icc_profile(profile.substr(0, size), false), std::runtime_error) << size;
-  EXPECT_THROW(parse_icc_profile(profile, true), std::runtime_error);
 }
 
-/// A profile whose curves are parametric, all five kinds (ICC.1:2010, 10.16).
-TEST(IccProfileTest, ParametricCurves) {
-  const auto fixed = [](double x) { return big_endian(static_cast<std::uint32_t>(std::lround(x * 65536))); };
-  const auto expected = [](int kind, double x) {
-    const double g = 2, a = 0.8, b = 0.1, c = 0.25, d = 0.4, e = 0.05, f = 0.02;
-    if (kind == 0) return x * x;
-    if (kind == 1) return std::pow(a * x + b, g);
-    if (kind == 2) return std::pow(a * x + b, g) + c;
-    if (kind == 3) return x >= d ? std::pow(a * x + b, g) : c * x;
-    return x >= d ? std::pow(a * x + b, g) + e : c * x + f;
+TEST(IccProfileTest, DamagedOnesAreRefused) {
+  std::string profile = p3_profile();
+  for (std::size_t size = 0; size < 400; size += 7)
+    EXPECT_THROW(icc_to_xyz(profile.substr(0, size), false), std::runtime_error) << size;
+  EXPECT_THROW(icc_to_xyz(profile, true), std::runtime_error);
+}
+
+/// A profile of tables: its values are the roots of light in P3.
+std::string profile_of_tables() {
+  const auto sampler = [](const cmsUInt16Number* in, cmsUInt16Number* out, void*) -> cmsInt32Number {
+    const Vector3d light = Vector3d(in[0], in[1], in[2]).unaryExpr([](double x) { return std::pow(x / 65535, 2); });
+    const Vector3d d50(0.9642, 1, 0.8249);
+    const Vector3d xyz = *adaptation(xyz_of(d65_white()), d50) * rgb_to_xyz(p3) * light;
+    const cmsCIEXYZ color{xyz.x(), xyz.y(), xyz.z()};
+    cmsCIELab lab;
+    cmsXYZ2Lab(nullptr, &lab, &color);
+    cmsFloat2LabEncoded(out, &lab);
+    return 1;
   };
-  // Appended to a valid profile, of which the entry rTRC, the seventh, is directed to it.
-  const auto profile_with = [&](int kind, const std::vector<double>& numbers) {
-    std::string curve = std::string("para\0\0\0\0\0", 9) + static_cast<char>(kind) + std::string(2, '\0');
-    for (const double number : numbers) curve += fixed(number);
-    std::string profile = p3_profile();
-    const std::size_t entry = 132 + 12 * 6;
-    profile.replace(
-        entry + 4, 8,
-        big_endian(static_cast<std::uint32_t>(profile.size())) + big_endian(static_cast<std::uint32_t>(curve.size())));
-    return profile + curve;
-  };
-  for (int kind = 0; kind < 5; ++kind) {
-    const std::vector<double> all{2, 0.8, 0.1, 0.25, 0.4, 0.05, 0.02};
-    const int counts[] = {1, 3, 4, 5, 7};
-    const IccProfile parsed = parse_icc_profile(profile_with(kind, {all.begin(), all.begin() + counts[kind]}), false);
-    for (const float x : {0.0f, 0.2f, 0.39f, 0.41f, 0.7f, 1.0f})
-      EXPECT_NEAR(parsed.curves[0].at(x), expected(kind, x), 1e-4) << kind << " " << x;
+  cmsHPROFILE profile = cmsCreateProfilePlaceholder(nullptr);
+  cmsSetProfileVersion(profile, 4.3);
+  cmsSetDeviceClass(profile, cmsSigOutputClass);
+  cmsSetColorSpace(profile, cmsSigRgbData);
+  cmsSetPCS(profile, cmsSigLabData);
+  cmsPipeline* tables = cmsPipelineAlloc(nullptr, 3, 3);
+  cmsStage* table = cmsStageAllocCLut16bit(nullptr, 33, 3, 3, nullptr);
+  cmsStageSampleCLut16bit(table, sampler, nullptr, 0);
+  cmsPipelineInsertStage(tables, cmsAT_BEGIN, table);
+  cmsWriteTag(profile, cmsSigAToB0Tag, tables);
+  cmsUInt32Number size = 0;
+  cmsSaveProfileToMem(profile, nullptr, &size);
+  std::string bytes(size, '\0');
+  cmsSaveProfileToMem(profile, bytes.data(), &size);
+  cmsPipelineFree(tables);
+  cmsCloseProfile(profile);
+  return bytes;
+}
+
+TEST(IccProfileTest, OfTablesAreRead) {
+  const std::string profile = profile_of_tables();
+  for (const Vector3d& color : {Vector3d(1, 1, 1), Vector3d(0.5, 0, 0), Vector3d(0.3, 0.6, 0.9)}) {
+    const Vector3d light = rgb_to_xyz(p3) * color.cwiseAbs2();
+    EXPECT_LT((xyz_by(profile, color) - light).cwiseAbs().maxCoeff(), 0.005) << color.transpose();
   }
-  // What is infinite, falls, or is nothing.
-  for (const double exponent : {-1.0, 0.0})
-    EXPECT_THROW(parse_icc_profile(profile_with(0, {exponent}), false), std::runtime_error) << exponent;
-  EXPECT_THROW(parse_icc_profile(profile_with(1, {1, -1, 1}), false), std::runtime_error);
 }
 
 Vector3d light_of_exr(const Vector3d& rgb, const std::string& chromaticities) {
@@ -375,9 +399,11 @@ TEST(DisplayEncodingTest, OfEachDisplay) {
   EXPECT_THAT(color().display_encoding().icc_profile, IsEmpty());
   const ColorManagement video({builtin_config_word, "Rec.1886", ""});
   EXPECT_FALSE(video.display_encoding().is_srgb);
-  const IccProfile profile = parse_icc_profile(video.display_encoding().icc_profile, false);
-  EXPECT_LT((profile.rgb_to_xyz - rec709_to_xyz()).cwiseAbs().maxCoeff(), 5e-4);
-  for (const float x : {0.1f, 0.5f, 0.9f}) EXPECT_NEAR(profile.curves[0].at(x), std::pow(x, 2.4f), 1e-3);
+  const std::string& profile = video.display_encoding().icc_profile;
+  for (const Vector3d& color : {Vector3d(1, 0, 0), Vector3d(0, 0.5, 1), Vector3d(0.1, 0.9, 0.5)}) {
+    const Vector3d light = color.unaryExpr([](double x) { return std::pow(x, 2.4); });
+    EXPECT_LT((xyz_by(profile, color) - rec709_to_xyz() * light).cwiseAbs().maxCoeff(), 1e-3);
+  }
   const ColorManagement raw({builtin_config_word, "sRGB", "Raw"});
   EXPECT_FALSE(raw.display_encoding().is_srgb);
   EXPECT_THAT(raw.display_encoding().icc_profile, IsEmpty());

@@ -53,14 +53,6 @@ TEST(LinearImageTest, EqualsTheSumOverBands) {
     }
 }
 
-TEST(LinearImageTest, UnitBandsPassColorsOn) {
-  const Film film = counting_film(2, 2, 3);
-  std::vector<Band> bands(3);
-  for (int k = 0; k < 3; ++k) bands[k].xyz = Eigen::Vector3d::Unit(k);
-  const Image image = linear_image(film, bands, Eigen::Matrix3d::Identity());
-  for (int c = 0; c < 3; ++c) EXPECT_EQ(image.pixel(1, 0)[c], film.plane(c)[1]);
-}
-
 TEST(SpectralImageTest, FollowsTheLayout) {
   const std::vector<Band> bands = make_bands(illuminant("D65"), 380, 730, 4);
   const Film film = counting_film(4, 3, 4);
@@ -80,16 +72,6 @@ TEST(SpectralImageTest, FollowsTheLayout) {
     EXPECT_FLOAT_EQ(spectral.image.pixel(2, 1)[3 + k], static_cast<float>(expected));
   }
   for (int c = 0; c < 3; ++c) EXPECT_EQ(spectral.image.pixel(2, 1)[c], rgb.pixel(2, 1)[c]);
-}
-
-TEST(SpectralImageTest, IntegratesToTheBeamsIrradiance) {
-  const std::vector<Band> bands = make_bands(illuminant("A"), 400, 700, 7);
-  Film film(1, 1, 7);
-  film.values.assign(7, 1);
-  const Image image = spectral_image(film, bands, SpectralQuantity::irradiance, 2.5, Eigen::Matrix3d::Identity()).image;
-  double irradiance = 0;
-  for (int k = 0; k < 7; ++k) irradiance += image.pixels[3 + k] * bands[k].width;
-  EXPECT_NEAR(irradiance, 2.5, 1e-6);
 }
 
 TEST(SpectralImageTest, NamesHaveSixDecimalsInEveryLocale) {

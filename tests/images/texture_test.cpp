@@ -35,13 +35,6 @@ Image noise_image(int width, int height, std::vector<std::string> channels = {"R
   return image;
 }
 
-Image checkerboard(int width, int height) {
-  Image image(width, height, {"R", "G", "B"});
-  for (int y = 0; y < height; ++y)
-    for (int x = 0; x < width; ++x) std::fill_n(image.pixel(x, y), 3, static_cast<float>((x + y) % 2));
-  return image;
-}
-
 /// The coordinates of a texel's centre; y counts from the top, as in an Image.
 Vector2d centre(const Image& image, double x, double y) {
   return {(x + 0.5) / image.width, 1 - (y + 0.5) / image.height};
@@ -86,18 +79,6 @@ TEST(TextureTest, FootprintsOfATexelGiveTheTexels) {
     }
 }
 
-TEST(TextureTest, RotatedAndMirroredFootprintsOfATexelGiveTheTexels) {
-  const Image image = noise_image(300, 200);
-  const Texture texture(image, Wrap::clamp);
-  for (const double angle : {0.3, 1.0, 2.5}) {
-    Matrix2d turn;
-    turn << std::cos(angle), std::sin(angle), std::sin(angle), -std::cos(angle);
-    for (int x = 0; x < 300; ++x)
-      EXPECT_LT(difference(texture.lookup(centre(image, x, 99), texels(image, 1, 1) * turn), color_of(image, x, 99)),
-                1e-6);
-  }
-}
-
 TEST(TextureTest, MagnifiedTexelsAreInterpolatedLinearly) {
   const Image image = noise_image(50, 40);
   const Texture texture(image, Wrap::clamp);
@@ -111,24 +92,6 @@ TEST(TextureTest, MagnifiedTexelsAreInterpolatedLinearly) {
             v * ((1 - u) * color_of(image, column, row + 1) + u * color_of(image, column + 1, row + 1));
         EXPECT_LT(difference(texture.lookup(centre(image, x, y), footprint), expected), 2e-5) << x << " " << y;
       }
-}
-
-TEST(TextureTest, MinifiedCheckerboardsAreGrey) {
-  for (const Image& image :
-       {checkerboard(1000, 1000), checkerboard(1024, 512), checkerboard(1001, 999), checkerboard(777, 40)}) {
-    const Texture texture(image, Wrap::repeat);
-    // Where an odd size wraps, two squares of one colour are adjacent, and the mean of a row is off by half a texel.
-    const double tolerance = image.width % 2 || image.height % 2 ? 0.02 : 0.01;
-    for (double size = 2; size < std::min(image.height, 500); size *= 1.17)
-      for (double x = 100; x < 700; x += 7.3)
-        for (const double slant : {0.0, 0.4}) {
-          // A slanted footprint is narrower than the length of its columns.
-          Matrix2d footprint = (1 + slant) * texels(image, size, size);
-          footprint(0, 1) = slant * footprint(0, 0);
-          const Vector4f seen = texture.lookup(centre(image, x, 0.37 * image.height + 0.01 * x), footprint);
-          ASSERT_LT(difference(seen, {0.5f, 0.5f, 0.5f, 1}), tolerance) << image.width << " " << size << " " << x;
-        }
-  }
 }
 
 TEST(TextureTest, LongFootprintsAverageAlongThemAndStaySharpAcross) {
@@ -347,7 +310,7 @@ TEST(TextureFileTest, FilteringIsOfLightNotOfNumbers) {
 }
 
 TEST(TextureFileTest, LevelsOfLargeFilesHaveTheirMean) {
-  constexpr int width = 3001, height = 1777;  // 48 x 28 tiles; most levels have odd sizes.
+  constexpr int width = 4099, height = 4101;  // Too large to be stored as floats; most levels have odd sizes.
   std::vector<int> values;
   double sum = 0;
   for (int i = 0; i < width * height; ++i) {
@@ -357,6 +320,9 @@ TEST(TextureFileTest, LevelsOfLargeFilesHaveTheirMean) {
   const Temporary file("large.png", png_file(width, height, 1, 8, values));
   const Texture texture(file.path(), ColorManagement({}), "", Wrap::repeat);
   const double mean = sum / width / height;
+  for (const auto& [x, y] : {std::pair(0, 0), std::pair(4098, 17), std::pair(1234, 4100)})
+    EXPECT_NEAR(texture.lookup({(x + 0.5) / width, 1 - (y + 0.5) / height}, Matrix2d::Zero())[0],
+                linear_of((x * 7 + y * 13) % 256 / 255.0), 1e-4);
   EXPECT_NEAR(texture.lookup({0, 0}, 2 * Matrix2d::Identity())[0], mean, 1e-5);
   for (const double size : {300.0, 900.0})
     EXPECT_NEAR(texture.lookup({0.4, 0.7}, Vector2d(size / width, size / height).asDiagonal())[0], mean, 2e-3) << size;
@@ -373,18 +339,6 @@ TEST(TextureFileTest, BadFilesAreOneClearLine) {
   EXPECT_THAT(error_of(folder.path()), AllOf(HasSubstr(folder.path().string()), HasSubstr("folder")));
   EXPECT_THAT(error_of(empty.path()), AllOf(HasSubstr(empty.path().string()), HasSubstr("empty")));
   EXPECT_THAT(error_of(text.path()), HasSubstr("cannot read " + text.path().string() + ": "));
-  for (const std::string ending : {".png", ".jpg", ".tif", ".exr"}) {
-    const Temporary whole("whole" + ending);
-    write_image(whole.path(), noise_image(100, 80));
-    const std::string bytes = read_bytes(whole.path());
-    for (const double part : {0.3, 0.9}) {
-      const Temporary cut("cut" + ending,
-                          bytes.substr(0, static_cast<std::size_t>(part * static_cast<double>(bytes.size()))));
-      ::testing::internal::CaptureStderr();  // Libraries add no lines of their own.
-      EXPECT_THAT(error_of(cut.path()), HasSubstr("cannot read " + cut.path().string() + ": ")) << part;
-      EXPECT_EQ(::testing::internal::GetCapturedStderr(), "") << ending;
-    }
-  }
   const Temporary silent("silent.ppm", "P6 9 9 255\nshort");  // The reader of this format gives no error message.
   EXPECT_EQ(error_of(silent.path()), "cannot read " + silent.path().string() + ": the file is cut off or damaged");
   const Temporary good("good.png", png_file(1, 1, 1, 8, {7}));

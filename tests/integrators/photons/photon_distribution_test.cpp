@@ -87,9 +87,7 @@ TEST(PhotonDistribution, EveryRayIsAccountedFor) {
       for (std::size_t i = 0; i < light.irradiance.plane_size(); ++i)
         on_film += light.irradiance.plane(channel)[i] * plate.pixel_area();
       const double deposited = static_cast<double>(ends[static_cast<int>(RayEnd::plate)]) * light.ray_area;
-      // Rounding changes a photon by up to half a quantum at each of 36 pixels.
-      const double most = kind == DensityKind::gaussian ? 36 * std::ldexp(0.5, -26) : 1e-9;
-      EXPECT_NEAR(on_film, deposited, most * deposited);
+      EXPECT_NEAR(on_film, deposited, 1e-9 * deposited);
     }
     EXPECT_NEAR(static_cast<double>(light.positions) * light.ray_area, 4, 1e-9);  // The beam's cross section.
   }

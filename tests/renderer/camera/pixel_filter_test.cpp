@@ -74,53 +74,6 @@ TEST(PixelFilter, SamplesAreQuantilesOfTheDensity) {
   }
 }
 
-/// Between the nodes of its table, too, and in each of its steps.
-TEST(PixelFilter, SamplesAscendEvenly) {
-  for (const PixelFilterShape shape : all_shapes) {
-    const PixelFilter filter(shape, 1.5);
-    double last = -1.5, sum = 0;
-    constexpr int count = 10000;
-    for (int i = 0; i < count; ++i) {
-      const double x = filter.sample({(i + 0.5) / count, 0.5}).x();
-      EXPECT_GE(x, last);
-      // Where the density is p, neighbours are 1 / (count p) apart.
-      const double step = filter.density({(x + last) / 2, 0}) / filter.density({0, 0}) * (x - last);
-      if (i > 0) sum += std::pow(step * count * std::sqrt(filter.density({0, 0})) - 1, 2);
-      last = x;
-    }
-    EXPECT_LT(std::sqrt(sum / count), 1e-2);
-  }
-}
-
-TEST(PixelFilter, SampledHistogramIsTheFilter) {
-  constexpr int bins = 24;
-  for (const PixelFilterShape shape : all_shapes) {
-    const PixelFilter filter(shape, 1.5);
-    std::vector<double> line, weights;
-    for (int i = 0; i < bins; ++i)
-      line.push_back(integrate(filter, -1.5 + 3.0 * i / bins, -1.5 + 3.0 * (i + 1) / bins));
-    for (const double y : line)
-      for (const double x : line) weights.push_back(x * y);
-    // Bins with few expected samples are not normally distributed: merge them into one.
-    const double whole = std::pow(integrate(filter, -1.5, 1.5), 2);
-    std::vector<int> counts(bins * bins + 1);
-    weights.push_back(0);
-    constexpr int samples = 200000;
-    std::vector<bool> is_rare(bins * bins);
-    for (int i = 0; i < bins * bins; ++i) {
-      is_rare[i] = weights[i] / whole * samples < 20;
-      if (is_rare[i]) weights.back() += std::exchange(weights[i], 0);
-    }
-    for (int i = 0; i < samples; ++i) {
-      const Vector2d offset = filter.sample({random_uniform(1, i, 0), random_uniform(1, i, 1)});
-      const Eigen::Vector2i bin = ((offset / 3).array() * bins + bins / 2.0).floor().cast<int>().min(bins - 1);
-      const int index = bin.y() * bins + bin.x();
-      ++counts[is_rare[index] ? bins * bins : index];
-    }
-    EXPECT_LT(std::abs(chi_square_score(counts, weights)), 4);
-  }
-}
-
 TEST(PixelFilter, RefusesARadiusThatIsNone) {
   for (const double radius : {0.0, -1.0, std::nan(""), std::numeric_limits<double>::infinity()})
     EXPECT_THROW(PixelFilter(PixelFilterShape::box, radius), std::invalid_argument);

@@ -69,19 +69,6 @@ TEST(AnnotationsTest, InkIsSeenOnEveryGround) {
   }
 }
 
-/// Letters grow with the height of the picture, and are never too small: as high as the letters of the note are.
-TEST(AnnotationsTest, LettersHaveElevenPixelsOrMore) {
-  for (const int size : {96, 200, 512, 2048}) {
-    Image with = blank(size, size, 0), without = with;
-    const auto color = [](double) { return Eigen::Vector3d(0, 0, 0); };
-    draw_color_strip(with, {"", "", color, "H"});
-    draw_color_strip(without, {"", "", color, ""});
-    for (std::size_t i = 0; i < with.pixels.size(); ++i) with.pixels[i] -= without.pixels[i];
-    const double height = drawn_box(with, 0).sizes().y() + 1;
-    EXPECT_NEAR(height, std::max(11.0, 0.024 * size), 1.5) << size;
-  }
-}
-
 /// A caption ends at the margin, on its base line, and changes nothing left of its width.
 TEST(AnnotationsTest, CaptionIsInTheLowerRightCorner) {
   Image image(300, 200, {"R", "G", "B"});
@@ -130,16 +117,6 @@ TEST(AnnotationsTest, StripShowsItsColors) {
   }
   ASSERT_EQ(reds.size(), 100u);  // A fifth of the width.
   for (std::size_t i = 0; i < reds.size(); ++i) EXPECT_NEAR(reds[i], (static_cast<double>(i) + 0.5) / 100, 1e-6);
-}
-
-TEST(AnnotationsTest, WhatHasNoRoomIsCutOff) {
-  for (const int size : {1, 2, 7, 30}) {
-    Image image = blank(size, size, 0.5f);
-    draw_scale_bar(image, 1);
-    draw_axes(image, {1, 0, 0}, {0, 0, 1});
-    draw_color_strip(image, {"380", "730 nm", [](double) { return Eigen::Vector3d(1, 0, 0); }, "+0.0 stops"});
-    for (const float value : image.pixels) EXPECT_TRUE(value >= 0 && value <= 1);
-  }
 }
 
 }  // namespace

@@ -10,8 +10,6 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "base/constants.h"
-#include "renderer/color/color.h"
 #include "tests/renderer/support.h"
 
 namespace tensorray {
@@ -20,47 +18,6 @@ namespace {
 using ::testing::HasSubstr;
 
 constexpr double nan_value = std::numeric_limits<double>::quiet_NaN();
-
-Eigen::Vector3d to_lab(const Eigen::Vector3d& linear) {
-  const Eigen::Matrix3d matrix = rec709_to_xyz();
-  const Eigen::Vector3d white = matrix * Eigen::Vector3d::Ones();
-  const Eigen::Vector3d f = (matrix * linear).cwiseQuotient(white).unaryExpr([](double t) {
-    return t > 216.0 / 24389 ? std::cbrt(t) : (24389.0 / 27 * t + 16) / 116;
-  });
-  return {116 * f.y() - 16, 500 * (f.x() - f.y()), 200 * (f.y() - f.z())};
-}
-
-double degrees(double angle) { return angle * 180 / pi; }
-double radians(double angle) { return angle * pi / 180; }
-double cos_degrees(double angle) { return std::cos(radians(angle)); }
-
-/// The hue angle, 0 to 360 degrees.
-double hue(double a, double b) {
-  const double angle = degrees(std::atan2(b, a));
-  return angle < 0 ? angle + 360 : angle;
-}
-
-/// CIEDE2000 (CIE 142; G. Sharma, W. Wu, E. Dalal 2005).
-double color_difference(const Eigen::Vector3d& p, const Eigen::Vector3d& q) {
-  const auto seventh = [](double c) { return std::sqrt(std::pow(c, 7) / (std::pow(c, 7) + std::pow(25.0, 7))); };
-  const double stretch = 1 + 0.5 * (1 - seventh((std::hypot(p[1], p[2]) + std::hypot(q[1], q[2])) / 2));
-  const double c1 = std::hypot(stretch * p[1], p[2]), c2 = std::hypot(stretch * q[1], q[2]);
-  const double h1 = hue(stretch * p[1], p[2]), h2 = hue(stretch * q[1], q[2]);
-  double turn = c1 * c2 == 0 ? 0 : h2 - h1;
-  if (turn > 180) turn -= 360;
-  if (turn < -180) turn += 360;
-  const double h = c1 * c2 == 0 ? h1 + h2 : h1 + turn / 2, c = (c1 + c2) / 2, l = (p[0] + q[0]) / 2;
-  const double t = 1 - 0.17 * cos_degrees(h - 30) + 0.24 * cos_degrees(2 * h) + 0.32 * cos_degrees(3 * h + 6) -
-                   0.2 * cos_degrees(4 * h - 63);
-  const double positive = h < 0 ? h + 360 : h;
-  const double blue = 60 * std::exp(-std::pow((positive - 275) / 25, 2));
-  const double sl = 1 + 0.015 * std::pow(l - 50, 2) / std::sqrt(20 + std::pow(l - 50, 2));
-  const double dl = (q[0] - p[0]) / sl, dc = (c2 - c1) / (1 + 0.045 * c);
-  const double dh = 2 * std::sqrt(c1 * c2) * std::sin(radians(turn / 2)) / (1 + 0.015 * c * t);
-  return std::sqrt(dl * dl + dc * dc + dh * dh - std::sin(radians(blue)) * 2 * seventh(c) * dc * dh);
-}
-
-Eigen::Vector3d lab(Colormap map, double x) { return to_lab(colormap_linear(map, x)); }
 
 /// In the order of the enumeration.
 constexpr const char* names[] = {"viridis", "magma", "inferno", "plasma", "cividis", "cool_warm", "twilight", "grey"};
@@ -131,73 +88,6 @@ TEST(ColormapTest, HasNoJumps) {
     for (int i = 0; i < 4096; ++i)
       EXPECT_LT((colormap_srgb(map, (i + 1) / 4096.0) - colormap_srgb(map, i / 4096.0)).norm(), 8 / 4096.0)
           << name_of(map) << " at " << i;
-}
-
-TEST(ColormapTest, TheReferenceDifferenceIsTheOneOfSharmaWuAndDalal) {
-  EXPECT_NEAR(color_difference({50, 2.6772, -79.7751}, {50, 0, -82.7485}), 2.0425, 5e-5);
-  EXPECT_NEAR(color_difference({50, 2.5, 0}, {61, -5, 29}), 22.8977, 5e-5);
-  EXPECT_NEAR(color_difference({90.9257, -0.5406, -0.9208}, {88.6381, -0.8985, -0.7239}), 1.5381, 5e-5);
-}
-
-struct Steps {
-  double least, mean, greatest;
-};
-
-/// CIEDE2000 differences between neighbours of 33 colours. `color_at` returns linear Rec.709.
-template <class Color>
-Steps steps_of(const Color& color_at) {
-  constexpr int count = 32;
-  Steps steps{INFINITY, 0, 0};
-  for (int i = 0; i < count; ++i) {
-    const double step = color_difference(to_lab(color_at(i / 32.0)), to_lab(color_at((i + 1) / 32.0)));
-    steps.least = std::min(steps.least, step);
-    steps.mean += step / count;
-    steps.greatest = std::max(steps.greatest, step);
-  }
-  return steps;
-}
-
-// No map is designed to be uniform in this formula (viridis and its relatives are uniform in CAM02-UCS), so the steps
-// differ. A plain rainbow map would exceed these limits.
-constexpr double least_step = 0.4, greatest_step = 2;  // Relative to the mean step.
-
-TEST(ColormapTest, EqualStepsLookEqual) {
-  for (const Colormap map : all_maps()) {
-    const Steps steps = steps_of([&](double x) { return colormap_linear(map, x); });
-    EXPECT_GT(steps.least, least_step * steps.mean) << name_of(map);
-    EXPECT_LT(steps.greatest, greatest_step * steps.mean) << name_of(map);
-    EXPECT_GT(steps.mean, 2) << name_of(map) << " uses little of what can be told apart";
-  }
-  const Steps rainbow = steps_of([](double x) {
-    const auto channel = [&](double middle) { return std::clamp(2 - 6 * std::abs(0.8 * x - middle), 0.0, 1.0); };
-    return srgb_to_linear({std::max(channel(0), channel(1)), channel(1.0 / 3), channel(2.0 / 3)});
-  });
-  EXPECT_LT(rainbow.least, least_step * rainbow.mean);
-  EXPECT_GT(rainbow.greatest, greatest_step * rainbow.mean);
-}
-
-TEST(ColormapTest, LightnessRisesAlongSequentialMaps) {
-  for (const Colormap map : all_maps()) {
-    if (map == Colormap::cool_warm || map == Colormap::twilight) continue;
-    for (int i = 0; i < 256; ++i)
-      EXPECT_LT(lab(map, i / 256.0)[0], lab(map, (i + 1) / 256.0)[0]) << name_of(map) << " at " << i;
-  }
-  for (int i = 0; i <= 100; ++i) EXPECT_NEAR(lab(Colormap::grey, i / 100.0)[0], i, 1e-3);
-}
-
-TEST(ColormapTest, DivergingAndCyclicMapsAreBalanced) {
-  for (int i = 0; i < 128; ++i) {
-    const double x = i / 256.0, next = (i + 1) / 256.0;
-    EXPECT_LT(lab(Colormap::cool_warm, x)[0], lab(Colormap::cool_warm, next)[0]);
-    EXPECT_LT(lab(Colormap::cool_warm, 1 - x)[0], lab(Colormap::cool_warm, 1 - next)[0]);
-    EXPECT_NEAR(lab(Colormap::cool_warm, x)[0], lab(Colormap::cool_warm, 1 - x)[0], 5);
-    EXPECT_NEAR(lab(Colormap::twilight, x)[0], lab(Colormap::twilight, 1 - x)[0], 5);
-  }
-  EXPECT_EQ(colormap_srgb(Colormap::twilight, 0), colormap_srgb(Colormap::twilight, 1));
-  const double h = 1e-4;  // The map has no kink where it closes.
-  const Eigen::Vector3d before = colormap_srgb(Colormap::twilight, 1) - colormap_srgb(Colormap::twilight, 1 - h);
-  const Eigen::Vector3d after = colormap_srgb(Colormap::twilight, h) - colormap_srgb(Colormap::twilight, 0);
-  EXPECT_LT((before - after).norm(), 0.05 * after.norm());
 }
 
 std::vector<double> zero_to(int last) {

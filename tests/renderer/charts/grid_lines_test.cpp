@@ -63,16 +63,6 @@ GridLines white_lines(int cells, double width) {
 
 double white_pixels(const Image& image) { return std::accumulate(image.pixels.begin(), image.pixels.end(), 0.0) / 3; }
 
-/// Coverage is exact along the axes: 15 lines inside and half of each border line, minus the overlaps at crossings.
-TEST(GridLinesTest, UndistortedLinesHaveTheirWidth) {
-  const int size = 160, cells = 16;
-  for (const double width : {0.5, 1.0, 1.5, 3.0}) {
-    const Image image = drawn(size, size, undistorted(size, size), white_lines(cells, width));
-    const double covered = cells * width / size;
-    EXPECT_NEAR(white_pixels(image), size * size * (1 - (1 - covered) * (1 - covered)), 1e-3) << width;
-  }
-}
-
 TEST(GridLinesTest, LinesLieAtMultiplesOfACell) {
   const Image image = drawn(160, 80, undistorted(160, 80), white_lines(16, 2));  // Cells of 10 by 5 pixels.
   GridLines sparse = white_lines(8, 2);
@@ -129,12 +119,6 @@ TEST(GridLinesTest, FoldsAreNotFlooded) {
     const Image image = drawn(width, height, seen(width, height, s, nothing), white_lines(2, 2));
     EXPECT_LE(white_pixels(image) / height, 2 * 2 + 0.5) << turning;
   }
-}
-
-TEST(GridLinesTest, WhatSeesASinglePointHasNoLines) {
-  EXPECT_EQ(white_pixels(drawn(20, 20, seen(20, 20, nothing, nothing), white_lines(2, 2))), 0);
-  const Coordinate nearly = [](double x, double y) { return 0.5 + 1e-9 * std::sin(x * y); };
-  EXPECT_EQ(white_pixels(drawn(20, 20, seen(20, 20, nearly, nearly), white_lines(2, 2))), 0);
 }
 
 TEST(GridLinesTest, NoLinesBeyondThePicture) {

@@ -80,17 +80,6 @@ TEST(LetteringTest, InkIsWithinTheLine) {
     }
 }
 
-TEST(LetteringTest, WidthsAddUp) {
-  EXPECT_EQ(text_width("", 20), 0);
-  EXPECT_DOUBLE_EQ(text_width("Tensor", 50), 5 * text_width("Tensor", 10));
-  const double gap = text_width("II", 32) - 2 * text_width("I", 32);
-  EXPECT_GT(gap, 0);
-  EXPECT_DOUBLE_EQ(text_width("|T V| 0.25", 32), text_width("|T V|", 32) + gap + text_width(" 0.25", 32));
-  EXPECT_LT(text_width("i", 32), text_width("n", 32));
-  EXPECT_LT(text_width("n", 32), text_width("m", 32));
-  for (char digit = '1'; digit <= '9'; ++digit) EXPECT_EQ(text_width(std::string(1, digit), 32), text_width("0", 32));
-}
-
 /// The position of each character is the width of the text before it.
 TEST(LetteringTest, TextIsItsCharactersSideBySide) {
   const std::string text = "Ag 1e-3";
@@ -112,28 +101,6 @@ TEST(LetteringTest, StrokesCoverTheirArea) {
   EXPECT_NEAR(ink(drawn("I", height)), 4 * 28 * unit * unit + end_caps, 0.003 * 4 * 28 * unit * unit);
   const double ring = 4 * (2 * pi * 10 + 2 * 8) * unit * unit;
   EXPECT_NEAR(ink(drawn("O", height)), ring, 0.003 * ring);
-}
-
-TEST(LetteringTest, InkDoesNotDependOnWhereItLies) {
-  const double expected = ink(drawn("R&5", 20, {20, 40}, 100, 60));
-  for (const double shift : {0.2, 0.37, 0.5, 0.81})
-    EXPECT_NEAR(ink(drawn("R&5", 20, {20 + shift, 40 - shift}, 100, 60)), expected, 0.01 * expected);
-}
-
-TEST(LetteringTest, SymmetricLettersAreSymmetric) {
-  for (const char c : std::string("AHIMOTUVWXY08+=|*^ovwx\"")) {
-    const std::string text(1, c);
-    const Image image = drawn(text, 40, {50 - text_width(text, 40) / 2, 60}, 100, 80);
-    for (int y = 0; y < 80; ++y)
-      for (int x = 0; x < 50; ++x) ASSERT_NEAR(*image.pixel(x, y), *image.pixel(99 - x, y), 1e-5) << c;
-  }
-  for (const char c :
-       std::string("IOXN0")) {  // Rotated by 180° (not H and S: their middles lie above the centre on purpose).
-    const std::string text(1, c);
-    const Image image = drawn(text, 40, {50 - text_width(text, 40) / 2, 60}, 100, 80);
-    for (int y = 0; y < 80; ++y)
-      for (int x = 0; x < 100; ++x) ASSERT_NEAR(*image.pixel(x, y), *image.pixel(99 - x, 79 - y), 1e-5) << c;
-  }
 }
 
 TEST(LetteringTest, WhatLiesOutsideIsCutOff) {

@@ -184,13 +184,6 @@ TEST_P(PlanarMeshPlaces, NoPointFallsBetweenTriangles) {
   }
 }
 
-TEST(PlanarMesh, APointOffEdgesIsFoundOnce) {
-  std::mt19937 random(5);
-  const PlanarMesh mesh = jittered(700, random);
-  const PlanarMeshSearch search(mesh);
-  for (int i = 0; i < 20000; ++i) ASSERT_EQ(found(search, {uniform(random, 0, 1), uniform(random, 0, 1)}).size(), 1u);
-}
-
 TEST(PlanarMesh, TrianglesThinnerThanSinglePrecisionAreTold) {
   // Cells about 1e-10 wide, around x = 1/3.
   const std::uint32_t cells = 20;
@@ -249,27 +242,6 @@ TEST(PlanarMesh, NothingIsFoundOutsideOrInAnEmptyMesh) {
   }
   EXPECT_TRUE(found(PlanarMeshSearch(empty), Vector2d::Zero()).empty());
   EXPECT_EQ(found(PlanarMeshSearch(square), {0.9, 0.8}), std::vector<std::uint32_t>{1});
-}
-
-TEST(PlanarMesh, ThreadsMaySearchAtOnce) {
-  std::mt19937 random(7);
-  const PlanarMesh mesh = grid(50, [&](const Vector2d& p) {
-    return Vector2d(std::sin(5 * p.x()) + 0.1 * p.y() + 1e-3 * uniform(random, -1, 1), std::cos(4 * p.y()));
-  });
-  const PlanarMeshSearch search(mesh);
-  std::vector<Vector2d> points;
-  for (int i = 0; i < 5000; ++i) points.emplace_back(uniform(random, -1, 1), uniform(random, -1, 1));
-  std::vector<std::vector<PlanarHit>> together(points.size());
-  tbb::parallel_for(std::size_t{0}, points.size(), [&](std::size_t i) { search.find(points[i], together[i]); });
-  std::size_t total = 0;
-  std::vector<PlanarHit> alone;
-  for (std::size_t i = 0; i < points.size(); ++i) {
-    search.find(points[i], alone);
-    ASSERT_EQ(triangles(alone), triangles(together[i]));
-    for (std::size_t k = 0; k < alone.size(); ++k) EXPECT_EQ(alone[k].weights, together[i][k].weights);
-    total += alone.size();
-  }
-  EXPECT_GT(total, points.size());
 }
 
 }  // namespace

@@ -120,27 +120,6 @@ TEST(BendingRegionTest, AWhiteFloorInAWhiteSkyCannotBeSeen) {
   }
 }
 
-/// Turns about z keep everything about a lit point, if all bands turn by less than the lamp is large or not.
-TEST(BendingRegionTest, EverySubsetOfTechniquesHasTheSameMean) {
-  for (const double angle : {0.2, 1.3}) {
-    Stage stage({lamp(), ConstantLight{even(0.2f)}});
-    const TurningBall ball(angle);
-    stage.scene.region = &ball;
-    stage.scene.bands_per_view = 2;
-    stage.scene.bands_per_bounce = 1;
-    std::vector<Mean> means;
-    for (const DirectLight direct : {DirectLight::both, DirectLight::lights, DirectLight::material}) {
-      ShadingSettings settings;
-      settings.direct = direct;
-      settings.max_depth = 2;
-      settings.indirect_clamp = 0;
-      means.push_back(seen(stage.scene, settings, {1, -3, 0.4}, {0.05, 0.1, -0.8}, 60000));
-    }
-    for (std::size_t i = 1; i < means.size(); ++i)
-      EXPECT_NEAR(means[i].mean(), means[0].mean(), 4.5 * std::hypot(means[i].error(), means[0].error())) << i;
-  }
-}
-
 TEST(BendingRegionTest, BandsThatAreFollowedStandForAll) {
   Stage stage({lamp(), ConstantLight{even(0.2f)}});
   const TurningBall ball(0.4, 1.5);

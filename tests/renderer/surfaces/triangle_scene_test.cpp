@@ -106,17 +106,6 @@ TEST(TriangleScene, NearestAgreesWithBruteForce) {
   EXPECT_GT(compared, 500);
 }
 
-TEST(TriangleScene, NearFindsEveryOneOfManyTrianglesInOnePlace) {
-  TriangleMesh mesh;
-  mesh.vertices = {{-1, -1, 0}, {1, -1, 0}, {0, 1, 0}};
-  mesh.triangles.assign(500, {0, 1, 2});
-  const TriangleScene scene({&mesh, &mesh}, Vector3d::Zero(), 1);
-  std::vector<TriangleId> candidates;
-  scene.near({0.1, -0.2, 0}, 1e-6, candidates);
-  ASSERT_EQ(candidates.size(), 1000u);
-  for (std::uint32_t i = 0; i < 1000; ++i) EXPECT_TRUE(same(candidates[i], TriangleId{i / 500, i % 500}));
-}
-
 TEST(TriangleScene, NearReportsLongTrianglesOnce) {
   TriangleMesh mesh;  // Long, diagonal triangles, which a search tree splits into pieces.
   for (std::uint32_t i = 0; i < 2000; ++i) {

@@ -141,25 +141,6 @@ TEST(EnvironmentMap, SamplesFollowTheDensity) {
   EXPECT_LT(std::abs(chi_square_score(kept_counts, kept_weights)), 4);
 }
 
-TEST(EnvironmentMap, SamplesIntegrateAsQuadratureDoes) {
-  const EnvironmentMap map(uneven_sky(), {1});
-  const Vector3d normal = Vector3d(1, 2, 3).normalized();
-  const auto integrand = [&](const Vector3d& d) { return radiance(map, d) * (0.1 + std::max(0.0, d.dot(normal))); };
-  const double exact = integrate(integrand, 1500);
-  Mean mean;
-  for (int i = 0; i < 20000; ++i) {
-    const Vector3d d = map.sample({random_uniform(3, i, 0), random_uniform(3, i, 1)});
-    mean.add(integrand(d) / map.pdf(d));
-  }
-  EXPECT_NEAR(mean.mean(), exact, 4 * mean.error() + 1e-4 * exact);
-  EXPECT_LT(mean.error(), 0.01 * exact);
-  // Sampling by the light must be far better than uniform sampling: at most a tenth of the variance.
-  Mean even;
-  for (int i = 0; i < 20000; ++i)
-    even.add(4 * pi * integrand(square_to_sphere({random_uniform(4, i, 0), random_uniform(4, i, 1)})));
-  EXPECT_LT(mean.error(), even.error() / std::sqrt(10.0));
-}
-
 TEST(EnvironmentMap, LightIsNeverMissed) {
   const EnvironmentMap map(uneven_sky(), {1});
   int dark = 0;
