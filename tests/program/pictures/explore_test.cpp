@@ -34,7 +34,7 @@ TEST_F(Explore, ThePicturesAreThoseOfTheirScenes) {
   ASSERT_EQ(explore({"-o", "sheet.png", "--size", "32"}).status, 0);
   const Image sheet = read_image(in_folder("sheet.png"));
   EXPECT_EQ(sheet.width, columns * (size + gap) + gap);
-  for (const int number : {5, 6, 12}) {
+  for (const int number : {5, 12}) {
     ASSERT_EQ(explore({"--pick", std::to_string(number), "--save-scene", "cell.json"}).status, 0);
     run_well({"render", "cell.json", "--set", "receiver.resolution=[32,32]", "--set", "light.photons=20480", "--set",
               "integrator.density={\"kind\":\"gaussian\",\"tau\":1}", "--set", "light.wavelengths.count=16", "--set",
@@ -58,26 +58,20 @@ TEST_F(Explore, RowsAreScalesAndColumnsAreDirections) {
     EXPECT_EQ(explore({"--pick", std::to_string(number), "--save-scene", "cell.json"}).status, 0);
     return read_json("cell.json");
   };
-  const json first = picked(6), second = picked(12), third = picked(18), other = picked(3);
+  const json first = picked(6), third = picked(18), other = picked(3);
   EXPECT_EQ(first["light"]["direction"], json::array({0, 0, -1}));
   EXPECT_EQ(third["light"]["direction"], json::array({0, 0, -1}));
   EXPECT_EQ(other["light"]["direction"], json::array({0, 1, 0}));
-  EXPECT_NEAR(second["field"]["scale"].get<double>(), 2 * first["field"]["scale"].get<double>(), 1e-9);
   EXPECT_NEAR(third["field"]["scale"].get<double>(), 4 * first["field"]["scale"].get<double>(), 1e-9);
 }
 
-TEST_F(Explore, OtherMethodsHaveSheets) {
-  for (const char* method : {"lens", "path_tracing"}) {
-    const Outcome outcome = explore({"-o", "sheet.png", "--size", "16", "--method", method, "--set",
-                                     "integrator.seeds.count=9", "--set", "integrator.samples=1"});
-    EXPECT_EQ(outcome.status, 0) << outcome.error;
-  }
-}
-
-/// Several depths of a lens are side by side, and the stretch is 512 pixels wide.
-TEST_F(Explore, LargePicturesStayInTheirCells) {
+/// Several depths of a lens are side by side, and the stretch has pixels of its own.
+TEST_F(Explore, PicturesOfOtherMethodsStayInTheirCells) {
   for (const std::vector<std::string>& method : std::vector<std::vector<std::string>>{
-           {"stretch"}, {"lens", "--set", "integrator.image_plane.depth=[0,0.3,0.6,1]"}}) {
+           {"stretch", "--set", "integrator.stretch.pixels=64", "--set", "integrator.stretch.resolution=8"},
+           {"path_tracing", "--set", "integrator.seeds.count=9", "--set", "integrator.max_samples=1", "--set",
+            "integrator.min_samples=1"},
+           {"lens", "--set", "integrator.image_plane.depth=[0,0.5]", "--set", "integrator.mode=gather"}}) {
     std::vector<std::string> arguments{"-o", "sheet.png", "--size", "32", "--method"};
     arguments.insert(arguments.end(), method.begin(), method.end());
     const Outcome outcome = explore(arguments);
