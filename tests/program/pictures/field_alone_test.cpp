@@ -20,7 +20,7 @@ class FieldAlone : public Program {
     run_well({"make", "point_load", "-o", "stress.vdb", "--resolution", "17"});
   }
 
-  const std::vector<std::string> small_{"--set", "receiver.resolution=[48,48]", "--set", "light.wavelengths.count=4"};
+  const std::vector<std::string> small_{"--set", "receiver.resolution=[24,24]", "--set", "light.wavelengths.count=4"};
 
   std::vector<std::string> with_small(std::vector<std::string> arguments) const {
     arguments.insert(arguments.end(), small_.begin(), small_.end());
@@ -35,7 +35,7 @@ TEST_F(FieldAlone, IsRenderedWithDefaultsAndTheSceneIsToldAndSaved) {
   EXPECT_NE(outcome.error.find("scene: {\"field\":"), std::string::npos) << outcome.error;
   const json scene = read_json("else where/stress.json");
   EXPECT_EQ(scene["integrator"]["type"], "photon_distribution");
-  EXPECT_EQ(scene["receiver"]["resolution"], json::array({48, 48}));
+  EXPECT_EQ(scene["receiver"]["resolution"], json::array({24, 24}));
   run_well({"render", "else where/stress.json", "-o", "again.png", "-q"});
   const std::string picture = read_file(in_folder("alone.png"));
   EXPECT_GT(picture.size(), 1000u);

@@ -37,7 +37,7 @@ std::pair<std::string, std::string> points_and_lamp(const std::string& integrato
 /// The light of points, traced forwards to the floor, is that of a lamp that the path tracer finds backwards.
 TEST_F(WholeScene, TheLightOfPointsThroughTheFieldIsThatOfALamp) {
   const auto [points, lamp] =
-      points_and_lamp(R"("max_samples": 64, "min_samples": 64, "caustic": {"resolution": 128, "rays": 8000})");
+      points_and_lamp(R"("max_samples": 64, "min_samples": 64, "caustic": {"resolution": 256, "rays": 20000})");
   write("scene.json", points);
   // Light that is traced beforehand has little noise.
   const Image forwards = render({"integrator.max_samples=16", "integrator.min_samples=16"});

